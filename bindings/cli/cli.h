@@ -1,0 +1,33 @@
+// The `deform` command: one cmd_*.cpp per subcommand, each on the public API only.
+#pragma once
+#include <CLI/CLI.hpp>
+#include <string>
+
+#include "deform/deform.h"
+
+namespace cli {
+
+// Exit codes of interfaces: 0 done, 2 bad usage or input, 3 the simulation stopped itself.
+enum Exit { kDone = 0, kBadInput = 2, kStopped = 3 };
+
+struct Globals {
+  bool quiet = false;
+  bool json = false;
+  unsigned threads = 1;
+};
+
+// Prints "deform: <sentence>" to stderr and returns kBadInput.
+int fail(const std::string &sentence);
+
+// A context with the command's options; prints the sentence and exits the process with 2 where that fails.
+dfm_context *make_context(const Globals &globals);
+
+// Each adds its subcommand; the callback stores its exit code in *exit_code.
+void add_run(CLI::App &app, Globals &globals, int *exit_code);
+void add_explain(CLI::App &app, Globals &globals, int *exit_code);
+void add_mesh(CLI::App &app, Globals &globals, int *exit_code);
+void add_plugin(CLI::App &app, Globals &globals, int *exit_code);
+// Subcommands that interfaces name and later work delivers: they exit 2 and say so.
+void add_later(CLI::App &app, Globals &globals, int *exit_code);
+
+}  // namespace cli

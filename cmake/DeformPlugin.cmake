@@ -1,0 +1,18 @@
+# deform_add_plugin(NAME SOURCE...) builds a plugin that exports dfm_plugin_entry alone, with the number rules of the library.
+set(DEFORM_PLUGIN_MAP ${CMAKE_CURRENT_LIST_DIR}/deform_plugin.map)
+function(deform_add_plugin name)
+  add_library(${name} MODULE ${ARGN})
+  if(COMMAND deform_kernel_flags)
+    deform_kernel_flags(${ARGN})
+  endif()
+  if(TARGET deform::headers)
+    target_link_libraries(${name} PRIVATE deform::headers)
+  else()
+    target_link_libraries(${name} PRIVATE deform::deform_headers)
+  endif()
+  target_compile_options(${name} PRIVATE -ffp-contract=off)
+  set_target_properties(${name} PROPERTIES PREFIX "" C_VISIBILITY_PRESET hidden CXX_VISIBILITY_PRESET hidden
+    VISIBILITY_INLINES_HIDDEN ON)
+  target_link_options(${name} PRIVATE -Wl,--version-script=${DEFORM_PLUGIN_MAP})
+  set_target_properties(${name} PROPERTIES LINK_DEPENDS ${DEFORM_PLUGIN_MAP})
+endfunction()

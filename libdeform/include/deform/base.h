@@ -1,0 +1,114 @@
+/* deform/base.h -- version, export, status, hooks, context. SI units; C99 and later, C++11 and later.
+ * Thread phrases used in every header: "Any thread." / "One thread at a time per world." / "Not during step." /
+ * "Called from workers: must be re-entrant." */
+#ifndef DEFORM_BASE_H
+#define DEFORM_BASE_H
+#include <stdbool.h>
+#include <stddef.h>
+#include <stdint.h>
+#include "deform/plugin.h" /* dfm_status and its values */
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+#if defined(_WIN32)
+#  if defined(DEFORM_BUILDING)
+#    define DFM_API __declspec(dllexport)
+#  elif defined(DEFORM_SHARED)
+#    define DFM_API __declspec(dllimport)
+#  else
+#    define DFM_API
+#  endif
+#elif defined(__GNUC__)
+#  define DFM_API __attribute__((visibility("default")))
+#else
+#  define DFM_API
+#endif
+
+#define DFM_VERSION_MAJOR 0
+#define DFM_VERSION_MINOR 1
+#define DFM_VERSION_PATCH 0
+
+/** Version of the library at run time.
+ * @param major,minor,patch  out, each may be NULL
+ * @return "0.1.0", static storage.
+ * Threads: Any thread. Since 0.1. */
+DFM_API const char *dfm_version(int *major, int *minor, int *patch);
+
+/** Name of a status value, e.g. "DFM_E_ARG". Static storage. Threads: Any thread. Since 0.1. */
+DFM_API const char *dfm_status_name(dfm_status s);
+
+/** The sentence that belongs to the last call on this thread that returned a negative status: what was wrong, where, what to do.
+ * Empty when no call has failed. Valid until the next failing call on this thread.
+ * Threads: Any thread. Since 0.1. */
+DFM_API const char *dfm_last_error(void);
+
+enum { DFM_LOG_DEBUG = 0, DFM_LOG_INFO = 1, DFM_LOG_WARNING = 2, DFM_LOG_ERROR = 3 };
+
+typedef struct dfm_context dfm_context; /* the only pointer of the API: hooks, loaded plugins, worlds */
+
+/** What a host may lend to the library. Every hook may be NULL: then the library's own is used. */
+typedef struct dfm_context_def {
+  uint32_t size;      /* sizeof(dfm_context_def) */
+  uint32_t threads;   /* size of the own pool where parallel_for is NULL; 1 (default): no pool; 0: one per processor */
+  void *user;         /* first argument of every hook */
+  void *(*alloc)(void *user, size_t bytes, size_t align);            /* NULL on failure. Any thread. */
+  void (*release)(void *user, void *p, size_t bytes, size_t align);  /* Any thread. */
+  void (*log)(void *user, int32_t level, const char *utf8);          /* Any thread. */
+  /* Runs fn over [0,n), cut at multiples of grain; returns when all is done. Called from the stepping thread. */
+  void (*parallel_for)(void *user, uint32_t n, uint32_t grain,
+                       void (*fn)(void *task, uint32_t begin, uint32_t end), void *task);
+  void (*trace_begin)(void *user, const char *zone);                 /* stage zones of a step; same thread nests */
+  void (*trace_end)(void *user, const char *zone);
+  const char *plugin_dir;  /* NULL: DEFORM_PLUGIN_PATH, then the installed or build directory */
+} dfm_context_def;
+
+/** Defaults: no hooks, one thread. Threads: Any thread. Since 0.1. */
+DFM_API dfm_context_def dfm_context_def_default(void);
+
+/** Creates a context and scans its plugin directories (nothing is opened twice, nothing runs but plugin entries).
+ * @param def  NULL: all defaults; copied
+ * @param out  the context; untouched on failure
+ * @return DFM_OK; DFM_E_ARG; DFM_E_NOMEM
+ * Threads: Any thread. Since 0.1. */
+DFM_API dfm_status dfm_context_create(const dfm_context_def *def, dfm_context **out);
+
+/** Destroys the context with all its worlds, laws and scenes; their handles become stale. NULL is allowed.
+ * Threads: Any thread, with no call on this context running. Since 0.1. */
+DFM_API void dfm_context_destroy(dfm_context *context);
+
+/* ---- plugins of a context ---------------------------------------------------------------------------------- */
+
+/** Loads one plugin file (symlinks are followed).
+ * @return DFM_OK; DFM_E_IO no such file; DFM_E_UNSUPPORTED not a plugin or another ABI (sentence says which); DFM_E_STATE an id is taken
+ * Threads: Not during step. Since 0.1. */
+DFM_API dfm_status dfm_plugin_load(dfm_context *context, const char *path);
+
+/** Loads every plugin of a directory; files passed over are kept with their reason (dfm_plugin_visit_passed).
+ * @param loaded  out, number of plugins loaded now; may be NULL
+ * Threads: Not during step. Since 0.1. */
+DFM_API dfm_status dfm_plugin_scan(dfm_context *context, const char *directory, uint32_t *loaded);
+
+/** Registers a plugin that is linked into the application (its entry is dfm_plugin_entry_NAME).
+ * Threads: Not during step. Since 0.1. */
+DFM_API dfm_status dfm_plugin_register_static(dfm_context *context, dfm_plugin_fn entry, const char *name);
+
+typedef void (*dfm_plugin_visit_fn)(void *user, const dfm_type *type, const char *file);
+typedef void (*dfm_plugin_passed_fn)(void *user, const char *file, const char *reason);
+
+/** Calls visit for every type that the context knows, ordered by kind and id; file is "static:NAME" for registered ones.
+ * Threads: Not during step. Since 0.1. */
+DFM_API dfm_status dfm_plugin_visit(dfm_context *context, dfm_plugin_visit_fn visit, void *user);
+
+/** Calls visit for every file that discovery passed over, with the reason in one sentence.
+ * Threads: Not during step. Since 0.1. */
+DFM_API dfm_status dfm_plugin_visit_passed(dfm_context *context, dfm_plugin_passed_fn visit, void *user);
+
+/* ---- parameters by key -------------------------------------------------------------------------------------- */
+typedef struct { const char *key; const double *value; uint32_t width; } dfm_param_value;
+typedef struct { uint32_t size, n; const dfm_param_value *values; } dfm_params;
+
+#ifdef __cplusplus
+}
+#endif
+#endif

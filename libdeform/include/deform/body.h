@@ -1,0 +1,82 @@
+/* deform/body.h -- deformable bodies: creation, state, loads, held points, measures. */
+#ifndef DEFORM_BODY_H
+#define DEFORM_BODY_H
+#include "deform/base.h"
+#include "deform/id.h"
+#include "deform/math.h"
+#ifdef __cplusplus
+extern "C" {
+#endif
+typedef struct dfm_body_def {
+  uint32_t size, flags;
+  const char *name;                 /* unique in the world; NULL: "body<N>" */
+  uint32_t npoint, ntet;
+  const double *points;             /* [npoint,3] rest positions before pose, m; copied */
+  const uint32_t *tets;             /* [ntet,4] positive volume; copied */
+  dfm_material material;            /* 0: dfm_material_def_default() */
+  const char *model;                /* short name or full id; NULL: "msm" */
+  dfm_params model_params;
+  dfm_pose pose;
+  double velocity[3], spin[3];      /* m/s of the centre of mass; rad/s about it */
+  const uint8_t *fixed;             /* [npoint] held components, bits 1 x, 2 y, 4 z; NULL: none */
+  uint32_t category, collides_with; /* collision filter: a pair touches if (a.category & b.collides_with) and (b.category & a.collides_with) */
+  void *user;
+} dfm_body_def;
+
+/** No mesh, model msm, category 1, collides with all. Threads: Any thread. Since 0.1. */
+DFM_API dfm_body_def dfm_body_def_default(void);
+/** @return DFM_OK; DFM_E_ARG (which entry, why); DFM_E_UNSUPPORTED no plugin offers the model (lists those that do); DFM_E_NOMEM;
+ *          DFM_E_HANDLE. Threads: Not during step. Since 0.1. */
+DFM_API dfm_status dfm_body_create(dfm_world world, const dfm_body_def *def, dfm_body *out);
+/** Removes the body, between two steps of a running world too; its contacts end (events are reported). Threads: Not during step. Since 0.1. */
+DFM_API dfm_status dfm_body_destroy(dfm_body body);
+
+typedef struct dfm_body_info {
+  uint32_t size, npoint, ntet, nsurfel, ntriangle, nedge;
+  dfm_world world;
+  const char *name, *model;         /* valid while the body lives */
+  double mass, rest_volume;         /* kg, m3 */
+  void *user;
+} dfm_body_info;
+DFM_API dfm_status dfm_body_get_info(dfm_body body, dfm_body_info *out);
+DFM_API dfm_status dfm_body_set_user(dfm_body body, void *user);
+DFM_API dfm_status dfm_body_set_filter(dfm_body body, uint32_t category, uint32_t collides_with);
+
+/** Positions and velocities of all phyxels, [npoint,3] each; either may be NULL. Setting keeps held points where they are told to be.
+ * Threads: Not during step. Since 0.1. */
+DFM_API dfm_status dfm_body_get_state(dfm_body body, uint32_t capacity, double *x, double *v, uint32_t *n);
+DFM_API dfm_status dfm_body_set_state(dfm_body body, uint32_t n, const double *x, const double *v);
+/** Rest positions, [npoint,3], m, pose not applied; cells [ntet,4]. Either may be NULL. */
+DFM_API dfm_status dfm_body_get_rest(dfm_body body, uint32_t capacity_points, double *x, uint32_t capacity_tets, uint32_t *tets);
+
+/** Holds (bits 1 x, 2 y, 4 z) or releases (0) components of points. Threads: Not during step. Since 0.1. */
+DFM_API dfm_status dfm_body_hold(dfm_body body, uint32_t n, const uint32_t *points, uint8_t axes);
+/** Moves held points together: their start positions carried by the keys' pose (relative to key 0) and, on top, the sine offset.
+ * @param keys  [nkey], times strictly rising; nkey may be 0 when sine is given; copied
+ * Threads: Not during step. Since 0.1. */
+DFM_API dfm_status dfm_body_move_held(dfm_body body, uint32_t n, const uint32_t *points, uint32_t nkey, const dfm_pose_key *keys,
+                                      const dfm_sine *sine);
+/** Adds a lasting load: force[i] N on points[i], times the keyed scale (nkey 0: 1), times (1 + sine) where sine is given
+ * (its amplitude[0] counts). @param load out, number to remove it by; may be NULL. Threads: Not during step. Since 0.1. */
+DFM_API dfm_status dfm_body_add_load(dfm_body body, uint32_t n, const uint32_t *points, const double *force,
+                                     uint32_t nkey, const dfm_scale_key *keys, const dfm_sine *sine, uint32_t *load);
+DFM_API dfm_status dfm_body_remove_load(dfm_body body, uint32_t load);
+/** Impulse (N s) at a point of space, spread over the nearest surface triangle by barycentric weights. Threads: Not during step. Since 0.1. */
+DFM_API dfm_status dfm_body_apply_impulse(dfm_body body, const double point[3], const double impulse[3]);
+/** Changes runtime parameters of the body's model by key. @return DFM_E_ARG unknown key (nearest valid name), out of range, not a runtime row.
+ * Threads: Not during step. Since 0.1. */
+DFM_API dfm_status dfm_body_set_params(dfm_body body, const dfm_params *params);
+
+/** Sums over the body, in SI units. angular: about the centre of mass. contact_impulse: total contact impulse on the body since it was
+ * created (N s): divide differences by the interval for a mean force. elastic is NAN if the model has no energy. */
+typedef struct dfm_body_measure {
+  uint32_t size, inverted;
+  double mass, com[3], velocity[3], momentum[3], angular[3], kinetic, elastic, volume, rest_volume, speed_max, contact_impulse[3];
+} dfm_body_measure;
+DFM_API dfm_status dfm_body_get_measure(dfm_body body, dfm_body_measure *out);
+/** Per-cell strain energy density, J/m3, [ntet]; DFM_E_UNSUPPORTED if the model offers none. */
+DFM_API dfm_status dfm_body_energy_density(dfm_body body, uint32_t capacity, double *out);
+#ifdef __cplusplus
+}
+#endif
+#endif

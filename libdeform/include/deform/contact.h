@@ -1,0 +1,58 @@
+/* deform/contact.h -- friction between pairs, contact report, events. */
+#ifndef DEFORM_CONTACT_H
+#define DEFORM_CONTACT_H
+#include "deform/base.h"
+#include "deform/id.h"
+#ifdef __cplusplus
+extern "C" {
+#endif
+/** Law between two sides. A side is "*", a body or obstacle name, "body:GROUP", or "material=NAME". The most specific entry wins, then
+ * the last one given. Where none matches: law "coulomb" with its defaults. */
+typedef struct dfm_friction_def {
+  uint32_t size, flags;
+  const char *between[2];
+  const char *law;                  /* short name or full id */
+  dfm_params params;
+} dfm_friction_def;
+/** @return DFM_OK; DFM_E_ARG unknown name or key (nearest valid one), value out of range; DFM_E_UNSUPPORTED no such law (lists those loaded).
+ * Threads: Not during step. Since 0.1. */
+DFM_API dfm_status dfm_world_add_friction(dfm_world world, const dfm_friction_def *def);
+/** Lets two named sides pass or touch, whatever their filters say. Threads: Not during step. Since 0.1. */
+DFM_API dfm_status dfm_world_filter_pair(dfm_world world, const char *a, const char *b, bool collide);
+
+/** One contact of the last sub-step. Forces act on side a, in N: fn along normal, ft[0] along tangent, ft[1] along normal x tangent. */
+typedef struct { uint32_t size, flags; uint64_t body_a, body_b, key;   /* b 0: obstacle; flags 1 sticking, 2 began */
+                 uint32_t feature_a, feature_b, kind, law;             /* kind 0 vertex-face, 1 edge-edge, 2 primitive */
+                 double point[3], normal[3], tangent[3];               /* normal from b to a; 2nd tangent = normal x tangent */
+                 double gap, area, fn, ft[2], slip[2], bristle[2]; } dfm_contact;
+enum { DFM_CONTACT_STICKING = 1, DFM_CONTACT_BEGAN = 2 };
+/** @param capacity of out in contacts; 0 with out NULL only counts. Contacts come in key order. kind 2: feature_b is the obstacle's number.
+ * @return DFM_OK; DFM_E_ARG capacity too small (out untouched, *n set); DFM_E_HANDLE. Threads: Any thread. Not during step. Since 0.1. */
+DFM_API dfm_status dfm_world_contacts(dfm_world world, uint32_t capacity, dfm_contact *out, uint32_t *n);
+
+/** Resultants per touching pair of the last sub-step. b: body or obstacle handle (both are 64-bit values). */
+typedef struct dfm_pair_report {
+  uint32_t size, count, sticking, law;
+  uint64_t a, b;
+  double normal;                    /* N, sum of normal forces */
+  double force[3], friction[3];     /* N, resultants on a: total, friction alone */
+  double moment[3];                 /* N m, of the total force on a about its centre of mass */
+  double slip_max;                  /* m/s */
+  double friction_work;             /* J, done by friction on both sides since the pair first touched; <= 0 but for rounding */
+} dfm_pair_report;
+DFM_API dfm_status dfm_world_pairs(dfm_world world, uint32_t capacity, dfm_pair_report *out, uint32_t *n);
+
+typedef struct dfm_contact_event { uint32_t size, kind; uint64_t a, b, key; double t; } dfm_contact_event;
+enum { DFM_EVENT_BEGIN = 1, DFM_EVENT_END = 2 };
+/** Begin and end of contacts since the last call; empties the list (it keeps the newest 65,536). Threads: Not during step. Since 0.1. */
+DFM_API dfm_status dfm_world_events(dfm_world world, uint32_t capacity, dfm_contact_event *out, uint32_t *n);
+
+/** Starts measuring holds: from now on, contacts that touch and stick in every step qualify. Threads: Not during step. Since 0.1. */
+DFM_API dfm_status dfm_world_hold_begin(dfm_world world);
+/** @param creep  out, m/s: largest net tangential path of a qualifying contact since hold_begin, divided by the time; NAN if none qualifies
+ * @param count  out, how many qualify; may be NULL. Threads: Not during step. Since 0.1. */
+DFM_API dfm_status dfm_world_hold(dfm_world world, double *creep, uint32_t *count);
+#ifdef __cplusplus
+}
+#endif
+#endif

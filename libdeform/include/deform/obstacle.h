@@ -1,0 +1,38 @@
+/* deform/obstacle.h -- rigid things that the host moves and that feel nothing: plane, sphere, box, capsule. */
+#ifndef DEFORM_OBSTACLE_H
+#define DEFORM_OBSTACLE_H
+#include "deform/base.h"
+#include "deform/id.h"
+#include "deform/math.h"
+#ifdef __cplusplus
+extern "C" {
+#endif
+enum { DFM_SHAPE_PLANE = 0, DFM_SHAPE_SPHERE = 1, DFM_SHAPE_BOX = 2, DFM_SHAPE_CAPSULE = 3 };
+typedef struct dfm_obstacle_def {
+  uint32_t size, shape;             /* DFM_SHAPE_* */
+  const char *name;                 /* unique in the world */
+  dfm_pose pose;                    /* plane: through position, normal = rotation * (0,0,1) */
+  double half_size[3];              /* box, m */
+  double radius;                    /* sphere, capsule, m */
+  double half_length;               /* capsule: half of the axis between the centres of its caps, along local z, m */
+  uint32_t nkey, reserved;
+  const dfm_pose_key *keys;         /* absolute poses over time, replace pose; copied */
+  dfm_sine sine;                    /* offset on top */
+  double velocity_surface[3];       /* belt: velocity of the surface beside that of the pose, m/s, world frame */
+  dfm_material material;            /* for pair rules by material; 0: none */
+  uint32_t category, collides_with;
+  void *user;
+} dfm_obstacle_def;
+DFM_API dfm_obstacle_def dfm_obstacle_def_default(void);
+DFM_API dfm_status dfm_obstacle_create(dfm_world world, const dfm_obstacle_def *def, dfm_obstacle *out);
+DFM_API dfm_status dfm_obstacle_destroy(dfm_obstacle obstacle);
+/** Where it is now. Threads: Any thread. Not during step. Since 0.1. */
+DFM_API dfm_status dfm_obstacle_get_pose(dfm_obstacle obstacle, dfm_pose *out);
+/** Its def as created (name valid while it lives; keys are not returned). */
+DFM_API dfm_status dfm_obstacle_get_def(dfm_obstacle obstacle, dfm_obstacle_def *out);
+/** Pose at the end of the next step; its surface moves there at constant rate. Replaces keys. Threads: Not during step. Since 0.1. */
+DFM_API dfm_status dfm_obstacle_move_to(dfm_obstacle obstacle, const dfm_pose *pose);
+#ifdef __cplusplus
+}
+#endif
+#endif

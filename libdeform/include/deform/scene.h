@@ -1,0 +1,40 @@
+/* deform/scene.h -- JSON scenes (schema: deform-scene.schema.json). */
+#ifndef DEFORM_SCENE_H
+#define DEFORM_SCENE_H
+#include "deform/base.h"
+#include "deform/id.h"
+#ifdef __cplusplus
+extern "C" {
+#endif
+/** Loads a scene file into a new world.
+ * @return DFM_OK; DFM_E_IO; DFM_E_FORMAT not JSON (line, column); DFM_E_ARG (JSON pointer, key, what was expected, nearest valid name);
+ *         DFM_E_UNSUPPORTED "not available yet: POINTER". Threads: Not during step. Since 0.1. */
+DFM_API dfm_status dfm_scene_load(dfm_context *context, const char *path, dfm_world *out);
+
+/** A scene that keeps what only a runner needs: duration, step, output, probes. */
+typedef struct dfm_scene_options {
+  uint32_t size, nset;
+  const char *const *set;          /* [nset] "/json/pointer=value": value is JSON, or a bare string */
+  uint64_t jitter_seed;            /* 0: none. Positions +-1e-3 of the body's size, angles +-0.5 degrees, velocities +-1 % */
+} dfm_scene_options;
+DFM_API dfm_status dfm_scene_open(dfm_context *context, const char *path, const dfm_scene_options *options, dfm_scene *out);
+DFM_API dfm_status dfm_scene_close(dfm_scene scene);             /* destroys its world too */
+DFM_API dfm_status dfm_scene_world(dfm_scene scene, dfm_world *out);
+/** Any value of the scene after defaults and --set, as JSON text; pointer as in RFC 6901, e.g. "/output/camera/eye".
+ * text NULL: *bytes gets the size needed. @return DFM_E_ARG nothing there. */
+DFM_API dfm_status dfm_scene_value(dfm_scene scene, const char *pointer, char *text, size_t *bytes);
+/** What a runner needs most. step 0: "auto" (0.9 of the bound, asked anew at each step). */
+typedef struct dfm_scene_settings {
+  uint32_t size, nprobe;
+  double duration, step, every;
+  bool frames, states, nodes, contacts, check;
+  const char *color;                /* "body" "contact" "speed" "displacement" "stress" */
+  double eye[3], look_at[3]; bool has_camera;
+} dfm_scene_settings;
+DFM_API dfm_status dfm_scene_get_settings(dfm_scene scene, dfm_scene_settings *out);
+/** Position and velocity of a probe: fixed weights on the cell (or nearest cell) that held its point at rest. */
+DFM_API dfm_status dfm_scene_probe(dfm_scene scene, uint32_t probe, const char **name, double position[3], double velocity[3]);
+#ifdef __cplusplus
+}
+#endif
+#endif

@@ -1,0 +1,100 @@
+/* deform/world.h -- the world: gravity, step, snapshot, hash, statistics, plan. */
+#ifndef DEFORM_WORLD_H
+#define DEFORM_WORLD_H
+#include "deform/base.h"
+#include "deform/id.h"
+#include "deform/math.h"
+#ifdef __cplusplus
+extern "C" {
+#endif
+enum { DFM_METHOD_AUTO = 0, DFM_METHOD_VELOCITY = 1 };
+enum { DFM_INTEGRATOR_AUTO = 0, DFM_INTEGRATOR_SYMPLECTIC_EULER = 1 };
+
+typedef struct dfm_world_def {
+  uint32_t size, flags;
+  double gravity[3];            /* m/s2 */
+  int32_t method, integrator;   /* DFM_METHOD_*, DFM_INTEGRATOR_* */
+  double contact_offset;        /* m, rest distance d_c; 0: chosen per world from the meshes (mechanics: 1e-3 of the median surface edge) */
+  double contact_tolerance;     /* m/s, residual of the contact solve; 0: min(1e-6, 0.01 (d_c-d_g)/h) */
+  uint32_t max_sweeps;          /* per sub-step; 50 */
+  uint32_t max_passes;          /* outer passes per sub-step; 20 */
+  uint32_t max_substeps;        /* a step that needs more returns DFM_DISCARD; 10000 */
+  uint32_t reserved;
+  const char *const *effects;   /* NULL-terminated list the scene asks for; NULL: what its content calls for */
+} dfm_world_def;
+
+/** Gravity (0,0,-9.81), everything automatic. Threads: Any thread. Since 0.1. */
+DFM_API dfm_world_def dfm_world_def_default(void);
+/** @return DFM_OK; DFM_E_ARG a value out of range or an effect that nothing loaded provides; DFM_E_NOMEM.
+ * Threads: Not during step. Since 0.1. */
+DFM_API dfm_status dfm_world_create(dfm_context *context, const dfm_world_def *def, dfm_world *out);
+/** Destroys the world, its bodies and obstacles. Threads: Not during step. Since 0.1. */
+DFM_API dfm_status dfm_world_destroy(dfm_world world);
+
+DFM_API dfm_status dfm_world_set_gravity(dfm_world world, const double gravity[3]);
+/** Gravity that varies; times in s, strictly rising. n = 0 removes it. Threads: Not during step. Since 0.1. */
+DFM_API dfm_status dfm_world_set_gravity_keys(dfm_world world, uint32_t n, const dfm_vector_key *keys);
+
+/* ---- step -------------------------------------------------------------------------------------------------- */
+/** Trouble inside a step; each bit with its remedy. */
+enum {
+  DFM_TROUBLE_SUBSTEPS = 1,      /* dt is above the stable step, sub-steps were taken: soften, coarsen, or accept the cost */
+  DFM_TROUBLE_UNCONVERGED = 2,   /* the contact solve met its cap: raise max_sweeps, or lower mass ratios */
+  DFM_TROUBLE_NONFINITE = 4,     /* a plugin or a load made a NaN: the last good state is kept (status DFM_E_DIVERGED) */
+  DFM_TROUBLE_INVERTED = 8,      /* a cell turned inside out: refine, soften the load */
+  DFM_TROUBLE_PLUGIN = 16        /* a plugin failed: see the log */
+};
+/** Advances the world by dt. A step longer than the stable one is cut into equal sub-steps with the contact solve in each.
+ * @param dt       s, > 0
+ * @param trouble  out, DFM_TROUBLE_* bits; may be NULL
+ * @return DFM_OK; DFM_DISCARD too many sub-steps, nothing changed; DFM_E_DIVERGED non-finite state, world put back to the start of this step;
+ *         DFM_E_ARG; DFM_E_HANDLE; DFM_E_BUSY called from inside a step
+ * Threads: One thread at a time per world. Since 0.1. */
+DFM_API dfm_status dfm_world_step(dfm_world world, double dt, uint32_t *trouble);
+/** Largest step the current state allows without sub-steps (0.9 of the proven bound), s; +INFINITY if nothing bounds it.
+ * @param body,point  out, the element that bounds it; may be NULL. Threads: Not during step. Since 0.1. */
+DFM_API dfm_status dfm_world_stable_step(dfm_world world, double *dt, dfm_body *body, uint32_t *point);
+DFM_API double dfm_world_time(dfm_world world);        /* s; NAN for a stale handle */
+
+/** FNV-1a 64 of x, v, model state, contact keys and bristles, in id order; 0 for a stale handle.
+ * Threads: Any thread. Not during step. Since 0.1. */
+DFM_API uint64_t dfm_world_hash(dfm_world world);
+/** Writes what a later result depends on. buffer NULL: *bytes gets the size needed. Too small: DFM_E_ARG and the size.
+ * Threads: Not during step. Since 0.1. */
+DFM_API dfm_status dfm_world_snapshot(dfm_world world, void *buffer, size_t *bytes);
+/** Restores into a world with the same bodies (a scene loaded anew, in another process too); the next steps give the same bits.
+ * @return DFM_OK; DFM_E_FORMAT not a snapshot of such a world (nothing changed); DFM_E_HANDLE. Threads: Not during step. Since 0.1. */
+DFM_API dfm_status dfm_world_restore(dfm_world world, const void *buffer, size_t bytes);
+
+DFM_API dfm_status dfm_world_find_body(dfm_world world, const char *name, dfm_body *out);
+/** Bodies in id order. capacity 0 with bodies NULL only counts. Threads: Any thread. Not during step. Since 0.1. */
+DFM_API dfm_status dfm_world_bodies(dfm_world world, uint32_t capacity, dfm_body *bodies, uint32_t *n);
+DFM_API dfm_status dfm_world_obstacles(dfm_world world, uint32_t capacity, dfm_obstacle *obstacles, uint32_t *n);
+
+/* ---- what a step did --------------------------------------------------------------------------------------- */
+typedef struct dfm_world_stats {
+  uint32_t size, threads;
+  uint64_t steps, substeps;               /* since creation */
+  double time;                            /* s simulated */
+  uint32_t last_substeps, contacts, sticking, passes, sweeps, pairs_tested;   /* of the last step (last sub-step for contacts..sweeps) */
+  double residual;                        /* m/s, of the last sub-step */
+  uint32_t contacts_max, passes_max, sweeps_max; double contacts_mean, residual_max;   /* since creation */
+  uint64_t unconverged, guard_steps, rebuilds, refits;                        /* since creation */
+  uint32_t inverted_max, substeps_max;    /* since creation */
+  double stable_step;                     /* s, 0.9 of the bound at its last evaluation */
+} dfm_world_stats;
+DFM_API dfm_status dfm_world_get_stats(dfm_world world, dfm_world_stats *out);
+
+/** Seconds spent in each stage of the plan since creation (CPU time of the stepping thread is not separated from waiting).
+ * names are static storage. Threads: Not during step. Since 0.1. */
+typedef struct dfm_stage_time { const char *name; double seconds; uint64_t calls; } dfm_stage_time;
+DFM_API dfm_status dfm_world_profile(dfm_world world, uint32_t capacity, dfm_stage_time *out, uint32_t *n);
+
+/** The plan as JSON text (UTF-8, NUL-terminated): {"effects":[{"name","asked_by","provided_by"}], "stages":[{"name","why","cost"}],
+ * "absent":[{"name","why"}], "step":{"stable_s","worst_body","worst_point","reason"}}. text NULL: *bytes gets the size needed.
+ * Threads: Not during step. Since 0.1. */
+DFM_API dfm_status dfm_world_explain(dfm_world world, char *text, size_t *bytes);
+#ifdef __cplusplus
+}
+#endif
+#endif

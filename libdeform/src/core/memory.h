@@ -1,0 +1,43 @@
+// Memory of a context: every array of ours is allocated through the host's hooks, so that a host can count, pool or refuse it.
+#pragma once
+#include <cstddef>
+#include <cstdint>
+#include <new>
+#include <vector>
+
+namespace dfm {
+
+struct Memory {
+  void *user = nullptr;
+  void *(*alloc)(void *user, size_t bytes, size_t align) = nullptr;  // never null after Memory::standard()
+  void (*release)(void *user, void *p, size_t bytes, size_t align) = nullptr;
+  static const Memory &standard();  // aligned malloc and free
+};
+
+// Allocator of std::vector over Memory; 64-byte alignment so that kernels may load whole vectors.
+template <class T>
+struct HookAllocator {
+  using value_type = T;
+  const Memory *memory = &Memory::standard();
+  HookAllocator() = default;
+  explicit HookAllocator(const Memory &m) : memory(&m) {}
+  template <class U>
+  HookAllocator(const HookAllocator<U> &other) : memory(other.memory) {}
+  T *allocate(size_t n) {
+    if (n > SIZE_MAX / sizeof(T)) throw std::bad_alloc();
+    void *p = memory->alloc(memory->user, n * sizeof(T), 64);
+    if (!p) throw std::bad_alloc();
+    return static_cast<T *>(p);
+  }
+  void deallocate(T *p, size_t n) { memory->release(memory->user, p, n * sizeof(T), 64); }
+  template <class U>
+  bool operator==(const HookAllocator<U> &other) const { return memory == other.memory; }
+  // Containers move between worlds of one context only, so allocators travel with their content.
+  using propagate_on_container_move_assignment = std::true_type;
+  using propagate_on_container_swap = std::true_type;
+};
+
+template <class T>
+using Array = std::vector<T, HookAllocator<T>>;
+
+}  // namespace dfm

@@ -1,0 +1,33 @@
+// Contacts of one sub-step as a structure of arrays: what narrow/ finds, contact/ and friction/ solve, distribute/ applies, world/ reports.
+//
+//        a (surfel, edge or triangle of body a)        relative velocity  u = sum_k weight[k] v[node[k]] - v_obstacle
+//        |  ^ normal (from b to a)                      weights of side a are > 0, of side b < 0 (their sums are +1 and -1, or +1 and 0)
+//   -----+-----  b (triangle or edge of body b, or an obstacle)
+//
+// Nodes are world-wide surfel numbers: surfel s of the body in slot k is node first_node[k] + s.
+#pragma once
+#include <cstdint>
+
+#include "core/memory.h"
+
+namespace dfm {
+
+enum ContactKind : uint8_t { kVertexFace = 0, kEdgeEdge = 1, kPrimitive = 2 };
+
+// One contact's geometry, as narrow/ emits it. 160 bytes, plain.
+struct ContactPoint {
+  uint64_t key;          // persistent: (kind, a's feature, b's body or obstacle, b's patch); unique within a sub-step
+  uint32_t slot_a, slot_b;        // body slots in the world; slot_b = obstacle slot if obstacle
+  uint32_t feature_a, feature_b;  // surfel, edge or triangle number within its body; primitive: obstacle feature (face, edge, corner)
+  uint8_t kind, obstacle, nnode, reserved;
+  uint32_t reserved2;
+  uint32_t node[4];
+  double weight[4];
+  double point[3];       // m, midway between the closest points
+  double normal[3];      // unit, from b to a
+  double distance;       // m, true distance, >= 0; negative: depth below b's face, for recovery
+  double area;           // m2
+  double velocity[3];    // m/s of the obstacle's surface at the point, belt included; 0 for bodies
+};
+
+}  // namespace dfm

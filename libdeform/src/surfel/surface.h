@@ -1,0 +1,33 @@
+// The surface of one body: surfels, triangles, edges, patches, and where each surfel hangs on the body's phyxels.
+// Filled once per topology by make_surface; x, v, n are renewed every sub-step from the phyxels (N x_p).
+#pragma once
+#include <cstdint>
+
+#include "core/memory.h"
+
+namespace dfm {
+
+inline constexpr uint32_t kNone = UINT32_MAX;
+
+struct Surface {
+  uint32_t nsurfel = 0, ntri = 0, nedge = 0;
+  Array<uint32_t> tri;         // [ntri,3] surfels, counter-clockwise seen from outside
+  Array<uint32_t> edge;        // [nedge,2] surfels i < j, lexicographic
+  Array<uint32_t> edge_tri;    // [nedge,2] the triangles on both sides, kNone where open; first has the edge as i -> j
+  Array<uint32_t> tri_edge;    // [ntri,3] edge k joins corners k and k+1
+  Array<uint32_t> tri_owns;    // [ntri] bits 0-2: owns corner k; bits 3-5: owns edge k. Each surfel and edge has one owner
+  Array<uint32_t> patch;       // [ntri] features that share an edge within 60 degrees of normal (rest shape) are one patch
+  Array<double> area;          // [nsurfel] m2, a third of the rest triangles around it
+  double median_edge = 0;      // m, rest
+
+  // Coupling x_s = N x_p in CSR. Identity coupling: row and weight are empty and point[s] is surfel s's phyxel.
+  Array<uint32_t> point, row, col;
+  Array<double> weight;
+  bool identity() const { return row.empty(); }
+
+  // State, [nsurfel,4] (fourth component zero), m and m/s.
+  Array<double> x, v;
+  Array<double> force;         // [nsurfel,3] N, contact force of the last sub-step
+};
+
+}  // namespace dfm

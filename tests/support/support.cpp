@@ -1,0 +1,79 @@
+#include "support.h"
+
+#include <fcntl.h>
+#include <sys/stat.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <sstream>
+
+namespace test {
+
+CommandResult run(const std::vector<std::string> &argv) {
+  static int counter = 0;
+  const std::string base = scratch("run") + "/" + std::to_string(getpid()) + "_" + std::to_string(counter++);
+  const std::string out = base + ".out", err = base + ".err";
+  const pid_t child = fork();
+  if (child == 0) {
+    std::vector<char *> args;
+    for (const auto &a : argv) args.push_back(const_cast<char *>(a.c_str()));
+    args.push_back(nullptr);
+    const int fo = open(out.c_str(), O_CREAT | O_TRUNC | O_WRONLY, 0644), fe = open(err.c_str(), O_CREAT | O_TRUNC | O_WRONLY, 0644);
+    const int in = open("/dev/null", O_RDONLY);
+    dup2(in, 0), dup2(fo, 1), dup2(fe, 2);
+    execvp(args[0], args.data());
+    _exit(127);
+  }
+  int status = 0;
+  waitpid(child, &status, 0);
+  CommandResult result;
+  result.exit_code = WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status);
+  result.out = read_file(out), result.err = read_file(err);
+  unlink(out.c_str()), unlink(err.c_str());
+  return result;
+}
+
+CommandResult deform(std::vector<std::string> args) {
+  args.insert(args.begin(), DEFORM_COMMAND);
+  return run(args);
+}
+
+std::string shared_dir() {
+  if (const char *dir = std::getenv("DEFORM_SHARED_DIR")) return dir;
+  const std::string beside = std::string(DEFORM_SOURCE_DIR) + "/../shared";
+  return std::filesystem::exists(beside + "/meshes") ? beside : std::string();
+}
+
+std::string scratch(const std::string &name) {
+  const std::string dir = std::string(DEFORM_BINARY_DIR) + "/test-scratch/" + name;
+  std::filesystem::create_directories(dir);
+  return dir;
+}
+
+std::string read_file(const std::string &path) {
+  std::ifstream in(path, std::ios::binary);
+  std::ostringstream text;
+  text << in.rdbuf();
+  return text.str();
+}
+
+void write_file(const std::string &path, const std::string &text) {
+  std::ofstream(path, std::ios::binary) << text;
+}
+
+std::vector<std::vector<std::string>> read_csv(const std::string &path) {
+  std::vector<std::vector<std::string>> rows;
+  std::istringstream in(read_file(path));
+  for (std::string line; std::getline(in, line);) {
+    std::vector<std::string> row;
+    std::istringstream cells(line);
+    for (std::string cell; std::getline(cells, cell, ',');) row.push_back(cell);
+    rows.push_back(row);
+  }
+  return rows;
+}
+
+}  // namespace test

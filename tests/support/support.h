@@ -1,0 +1,22 @@
+// What several test programs share: where things lie, running the command, reference data.
+#pragma once
+#include <string>
+#include <vector>
+
+namespace test {
+
+struct CommandResult { int exit_code; std::string out, err; };
+// Runs a program (no shell) with its own HOME and waits for it; exit_code is 128+signal where a signal ended it.
+CommandResult run(const std::vector<std::string> &argv);
+// The `deform` command of this build.
+CommandResult deform(std::vector<std::string> args);
+
+// ../shared beside the repository: empty where it is absent. DEFORM_SHARED_DIR overrides it.
+std::string shared_dir();
+// A fresh folder below the build tree for one test's files.
+std::string scratch(const std::string &name);
+std::string read_file(const std::string &path);
+void write_file(const std::string &path, const std::string &text);
+std::vector<std::vector<std::string>> read_csv(const std::string &path);
+
+}  // namespace test
