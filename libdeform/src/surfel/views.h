@@ -1,0 +1,40 @@
+// What the detection stages see of bodies and obstacles: plain views that world/ fills each sub-step.
+#pragma once
+#include <cstdint>
+
+#include "math/vec3.h"
+#include "surfel/surface.h"
+
+namespace dfm {
+
+struct BodyView {
+  uint32_t slot, first_node;          // body slot in the world; node number of its surfel 0
+  uint32_t category, collides_with;
+  uint64_t id;                        // rises with creation: decides order, never a pointer
+  const Surface *surface;             // surface->x: start of the sub-step; surface->v: velocity without contact (mean over the sub-step)
+};
+
+enum class Shape : uint8_t { plane = 0, sphere = 1, box = 2, capsule = 3 };
+
+struct ObstacleView {
+  uint32_t slot;
+  uint32_t category, collides_with;
+  uint64_t id;
+  Shape shape;
+  Vec3 position;                      // at the start of the sub-step
+  Quat rotation;
+  Vec3 half_size;                     // box
+  double radius = 0, half_length = 0; // sphere, capsule; capsule axis is local z
+  Vec3 velocity, spin;                // of the pose over the sub-step, world frame, spin about position
+  Vec3 belt;                          // velocity_surface: slips along, moves nothing
+  Vec3 velocity_at(Vec3 p) const { return velocity + cross(spin, p - position) + belt; }
+};
+
+// Feature pairs that may touch while no surfel has moved further than the skin allows: a superset of all contacts until broad/ renews it.
+struct Candidate {
+  uint32_t slot_a, slot_b;            // slot_b: obstacle slot where obstacle != 0
+  uint32_t feature_a, feature_b;      // kVertexFace: surfel of a, triangle of b (a may be the higher body); kEdgeEdge: edges, a the lower body id
+  uint8_t kind, obstacle;             // obstacle: feature_a is a surfel (kind 0), an edge (kind 1) or a triangle (kind 2); feature_b 0
+};
+
+}  // namespace dfm
