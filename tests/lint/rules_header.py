@@ -5,6 +5,9 @@ from tree import includes, line_of, without_comments
 
 PUBLIC = "libdeform/include/deform/"
 C_HEADERS = {"stddef.h", "stdint.h", "stdbool.h"}
+# memcpy is the one way to read the bits of a double that both C and C++ define.
+MORE = {"elementary.h": {"string.h"}}
+NOT_IN_UMBRELLA = {"deform.h", "elementary.h"}  # elementary.h is for plugins, no part of the library
 DECLARATION = re.compile(r"^DFM_API\b[^;{]*?\b(dfm_\w+)\s*\(", re.M)
 
 
@@ -22,7 +25,7 @@ def public_headers(tree):
         name = path[len(PUBLIC):]
         content = tree.text(path)
         for line, _, other in includes(content):
-            allowed = {"stddef.h", "stdint.h"} if name == "plugin.h" else C_HEADERS
+            allowed = {"stddef.h", "stdint.h"} if name == "plugin.h" else C_HEADERS | MORE.get(name, set())
             if other not in allowed and (name == "plugin.h" or PUBLIC + other[len("deform/"):] not in tree.paths):
                 yield path, line, f"includes {other}; allowed are {', '.join(sorted(allowed))}" + ("" if name == "plugin.h" else " and deform/*.h")
         guard = f"DEFORM_{name[:-2].upper()}_H"
@@ -30,13 +33,13 @@ def public_headers(tree):
             yield path, 1, f"has no guard {guard}"
         if DECLARATION.search(without_comments(content)) and 'extern "C"' not in content:
             yield path, 1, "declares functions without extern \"C\" for C++"
-    for name in ("deform.h",):
-        if PUBLIC + name in tree.paths:
-            listed = {other for _, _, other in includes(tree.text(PUBLIC + name))}
-            for path in tree.select(PUBLIC, ext=(".h",)):
-                other = "deform/" + path[len(PUBLIC):]
-                if path != PUBLIC + name and other not in listed:
-                    yield PUBLIC + name, 1, f"does not include {other}"
+    umbrella = PUBLIC + "deform.h"
+    if umbrella in tree.paths:
+        listed = {other for _, _, other in includes(tree.text(umbrella))}
+        for path in tree.select(PUBLIC, ext=(".h",)):
+            name = path[len(PUBLIC):]
+            if name not in NOT_IN_UMBRELLA and "deform/" + name not in listed:
+                yield umbrella, 1, f"does not include deform/{name}"
 
 
 def threads(tree):
