@@ -279,7 +279,7 @@ Camera auto_camera(const Bounds &given, double aspect, const double up_in[3]) {
   for (int i = 0; i < 8; ++i) {  // the least distance from which this corner is inside the frame with a margin
     const Vec d = Vec{i & 1 ? hi.x : lo.x, i & 2 ? hi.y : lo.y, i & 4 ? hi.z : lo.z} - centre;
     const double wide = std::abs(dot(d, v.right)) / (v.tan_half * aspect), high = std::abs(dot(d, v.up)) / v.tan_half;
-    distance = std::max(distance, 1.18 * std::max(wide, high) + dot(d, v.back));
+    distance = std::max(distance, 1.1 * std::max(wide, high) + dot(d, v.back));
   }
   set(camera.eye, centre + away * distance);
   return camera;

@@ -39,11 +39,12 @@ struct Surface {
   const double *normal = nullptr;  // [n,3]; null (the better choice): smooth across flat edges, sharp across rims of more than 40 degrees
   float rgb[3] = {0.8f, 0.8f, 0.8f};
   const float *scalar = nullptr;  // [n] 0..1 through Scene::map; NaN shows rgb there; null shows rgb everywhere
+  float fade = 0;                 // values from here down to 0 run out into rgb: 0.25 makes contact patches without a jagged rim
   bool edges = false;             // triangle edges as thin darker lines
 };
 
 struct Look {
-  float rgb[3] = {0.62f, 0.66f, 0.71f};
+  float rgb[3] = {0.72f, 0.75f, 0.79f};
   float alpha = 1;  // below 1: seen through, casts no shadow
 };
 // A plane square to Scene::up is drawn as the floor (the highest one seen from above), any other as a tilted slab sized to the scene. A plane

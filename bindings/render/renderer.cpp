@@ -15,8 +15,9 @@
 namespace render {
 namespace {
 
-constexpr int kKeySide = 1536, kSkySide = 320, kSamples = 4;
+constexpr int kKeySide = 1536, kSkySide = 160, kSamples = 4;
 constexpr uint32_t kLargest = 8192;
+constexpr double kLevel = 0.9999;  // cosine from which a plane is the floor
 
 // What host code set for its own arithmetic (rounding, traps) stays as it was: a picture may not change a simulation's bits.
 struct FloatingPoint {
@@ -36,7 +37,7 @@ struct Batch {
   GLint first = 0;
   GLsizei count = 0;
   Kind kind = Kind::lit;
-  float alpha = 1;
+  float alpha = 1, fade = 0;
   bool edges = false, shadow = true, on_top = false;
   double depth = 0;  // of its middle, for the order of what is seen through
 };
@@ -93,22 +94,46 @@ Batch solid(const Look &look) {
   return b;
 }
 
-void add_planes(const Scene &scene, Frame &frame, const Vec &middle) {
+// A wall covers the box it stands beside; a ramp reaches farther, since things move along it.
+struct Slab { Vec centre, axes[3]; };
+Slab slab_of(const Plane &p, const Vec &up, const Bounds &extent) {
+  const Vec n = unit(vec(p.normal), up), across = unit(cross(up, n), square_to(n)), along = cross(n, across);
+  const Vec lo = vec(extent.lo), hi = vec(extent.hi), middle = (lo + hi) * 0.5, half = (hi - lo) * 0.5;
+  const auto reach = [&](const Vec &d) { return std::abs(d.x) * half.x + std::abs(d.y) * half.y + std::abs(d.z) * half.z; };
+  const double size = norm(half), thick = 0.02 * size;
+  const bool ramp = dot(n, up) > 0.3;
+  const double wide = ramp ? 0.9 * size : 1.02 * reach(across), high = ramp ? 1.3 * size : 1.02 * reach(along);
+  const Vec foot = middle - n * dot(n, middle - vec(p.point));
+  return {foot - n * thick, {across * std::max(wide, 0.1 * size), along * std::max(high, 0.1 * size), n * thick}};
+}
+
+// The extent with the places where planes near it lie across from its middle, so that the walls of a room meet each other and the floor.
+Bounds room_of(const Scene &scene, const Vec &up, const Bounds &extent) {
+  const Vec middle = (vec(extent.lo) + vec(extent.hi)) * 0.5;
+  const double size = norm(vec(extent.hi) - middle);
+  Bounds room = extent;
+  for (const Plane &p : scene.planes) {
+    const Vec n = unit(vec(p.normal), up), foot = middle - n * dot(n, middle - vec(p.point));
+    if (norm(foot - middle) < 1.5 * size) room.add(&foot.x);
+  }
+  return room;
+}
+
+void add_planes(const Scene &scene, Frame &frame, const Bounds &extent) {
+  const Bounds room = room_of(scene, frame.up, extent);
+  const Vec middle = (vec(extent.lo) + vec(extent.hi)) * 0.5;
   const Plane *floor = nullptr;
   for (const Plane &p : scene.planes) {
     const Vec n = unit(vec(p.normal), frame.up);
     const Vec eye = frame.view.eye + frame.shape.origin;
     if (dot(n, eye - vec(p.point)) <= 0) continue;
-    if (dot(n, frame.up) > 0.9999) {
+    if (dot(n, frame.up) > kLevel) {
       if (!floor || dot(vec(p.point) - vec(floor->point), frame.up) > 0) floor = &p;
       continue;
     }
     batch(frame, solid(p.look), [&] {
-      const Vec across = unit(cross(frame.up, n), square_to(n)), along = cross(n, across);
-      const double size = 1.15 * frame.extent, thick = 0.03 * frame.extent;
-      const Vec foot = middle - n * dot(n, middle - vec(p.point));
-      const Vec axes[3] = {across * (0.8 * size), along * size, n * (0.5 * thick)};
-      frame.shape.box(foot - n * (0.5 * thick), axes, p.look.rgb);
+      const Slab s = slab_of(p, frame.up, room);
+      frame.shape.box(s.centre, s.axes, p.look.rgb);
     });
   }
   if (!floor) return;
@@ -131,7 +156,7 @@ void add_planes(const Scene &scene, Frame &frame, const Vec &middle) {
   // Looks of obstacles are grey by default; a floor is lighter, so that shadows have room to fall.
   const float default_look = Look{}.rgb[0];
   const bool own = floor->look.rgb[0] != default_look || floor->look.rgb[1] != Look{}.rgb[1] || floor->look.rgb[2] != Look{}.rgb[2];
-  const float light[3] = {0.86f, 0.87f, 0.885f};
+  const float light[3] = {0.90f, 0.905f, 0.915f};
   batch(frame, b, [&] {
     const Vec n[3] = {frame.up, frame.up, frame.up}, c = snapped, x = g.x * g.radius, y = g.y * g.radius;
     const Vec corner[4] = {c - x - y, c + x - y, c + x + y, c - x + y};
@@ -175,7 +200,18 @@ Frame compose(const Scene &scene, double aspect, double pixels_high) {
   frame.extent = std::max(0.5 * norm(vec(extent.hi) - vec(extent.lo)), 1e-6);
   frame.up = unit(vec(scene.up));
   frame.shape.origin = middle;
-  frame.view = view_of(scene.camera ? *scene.camera : auto_camera(extent, aspect, scene.up));
+  Bounds shown = extent;
+  for (const Plane &p : scene.planes) {
+    const double slope = dot(unit(vec(p.normal), frame.up), frame.up);
+    if (slope < 0.3 || slope > kLevel) continue;
+    const Slab s = slab_of(p, frame.up, room_of(scene, frame.up, extent));
+    for (const double side : {-1.0, 1.0})
+      for (const double end : {-1.0, 1.0}) {
+        const Vec q = s.centre + s.axes[0] * side + s.axes[1] * end;
+        shown.add(&q.x);
+      }
+  }
+  frame.view = view_of(scene.camera ? *scene.camera : auto_camera(shown, aspect, scene.up));
   frame.view.eye = frame.view.eye - middle;
   const Vec level = unit(frame.view.back - frame.up * dot(frame.view.back, frame.up), frame.view.up);
   frame.key = unit(frame.up * 1.15 - frame.view.right * 0.62 + level * 0.55);
@@ -183,6 +219,7 @@ Frame compose(const Scene &scene, double aspect, double pixels_high) {
   for (const Surface &s : scene.surfaces) {
     Batch b;
     b.edges = s.edges;
+    b.fade = s.fade;
     batch(frame, b, [&] { frame.shape.surface(s); });
   }
   for (const Box &b : scene.boxes)
@@ -193,7 +230,7 @@ Frame compose(const Scene &scene, double aspect, double pixels_high) {
     });
   for (const Sphere &s : scene.spheres) batch(frame, solid(s.look), [&] { frame.shape.sphere(s); });
   for (const Capsule &c : scene.capsules) batch(frame, solid(c.look), [&] { frame.shape.capsule(c); });
-  add_planes(scene, frame, middle);
+  add_planes(scene, frame, extent);
   fit_casters(frame, box);
   View world = frame.view;
   world.eye = world.eye + middle;
@@ -447,6 +484,8 @@ void GlRenderer::draw_colours(const Frame &frame, const Mat4 &key, const std::ar
   set("key_map", to_texture(key));
   set("key_texel", 2 * frame.radius / kKeySide);
   set("sky_texel", 2 * frame.radius / kSkySide);
+  set("casters", frame.centre);
+  set("casters_radius", frame.radius);
   double open = 0;
   for (int i = 0; i < kSkyLights; ++i) {
     const std::string at = "[" + std::to_string(i) + "]";
@@ -471,6 +510,7 @@ void GlRenderer::draw_colours(const Frame &frame, const Mat4 &key, const std::ar
     set("kind", int(b.kind));
     set("edges", int(b.edges));
     set("alpha", double(b.alpha));
+    set("fade", double(b.fade));
     gl_.DrawArrays(GL_TRIANGLES, b.first, b.count);
   }
   gl_.DepthMask(GL_TRUE);

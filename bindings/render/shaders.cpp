@@ -1,4 +1,4 @@
-// One key light with a soft shadow map, and a sky of 24 directions with a shadow map each: what the sky does not reach is dark, which is the
+// One key light with a soft shadow map, and a sky of 48 directions with a shadow map each: what the sky does not reach is dark, which is the
 // shade in the gap between two bodies that shows whether they touch. A little light comes back from the ground, a soft rim from behind.
 #include "shaders.h"
 
@@ -10,11 +10,11 @@ in vec3 normal;
 in vec3 colour;
 in vec2 value;
 uniform mat4 to_clip;
-out vec3 p;
-out vec3 n;
-out vec3 rgb;
-out vec2 scalar;
-out vec3 corner;
+centroid out vec3 p;
+centroid out vec3 n;
+centroid out vec3 rgb;
+centroid out vec2 scalar;
+centroid out vec3 corner;
 void main() {
   p = position;
   n = normal;
@@ -27,14 +27,15 @@ void main() {
 )";
 
 const char *const kFragmentShader = R"(#version 330 core
-const int SKY = 24;
-in vec3 p;
-in vec3 n;
-in vec3 rgb;
-in vec2 scalar;
-in vec3 corner;
+const int SKY = 48;
+centroid in vec3 p;
+centroid in vec3 n;
+centroid in vec3 rgb;
+centroid in vec2 scalar;
+centroid in vec3 corner;
 uniform int kind;            // 0 lit, 1 floor, 2 plain colour
 uniform int edges;
+uniform float fade;          // values below it run out into the plain colour
 uniform float alpha;
 uniform vec3 eye;
 uniform vec3 up;
@@ -44,6 +45,8 @@ uniform float key_texel;     // of the map, in lengths of the scene
 uniform mat4 sky_map[SKY];
 uniform vec3 sky[SKY];       // towards that piece of sky
 uniform float sky_texel;
+uniform vec3 casters;        // centre of what casts shadows
+uniform float casters_radius;
 uniform float sky_scale;     // makes open level ground receive 1
 uniform vec3 floor_centre;
 uniform vec3 floor_x;
@@ -74,15 +77,14 @@ float key_light(vec3 nn) {
 
 float sky_light(vec3 nn) {
   vec4 from = vec4(p + nn * (1.6 * sky_texel), 1.0);
+  float away = smoothstep(2.5, 3.5, length(p - casters) / casters_radius);
+  int count = kind == 1 && away >= 1.0 ? 0 : SKY;  // most of the floor is open: a loop that ends at once costs nothing
   float sum = 0.0;
-  for (int i = 0; i < SKY; ++i) {
-    float facing = dot(nn, sky[i]);
-    if (facing > 0.0) {
-      vec3 q = (sky_map[i] * from).xyz;
-      sum += facing * texture(sky_shadow, vec4(q.xy, float(i), min(q.z - 0.002, 1.0)));
-    }
+  for (int i = 0; i < count; ++i) {
+    vec3 q = (sky_map[i] * from).xyz;
+    sum += max(dot(nn, sky[i]), 0.0) * texture(sky_shadow, vec4(q.xy, float(i), min(q.z - 0.002, 1.0)));
   }
-  return sum * sky_scale;
+  return kind == 1 ? mix(sum * sky_scale, 1.0, away) : sum * sky_scale;
 }
 
 float lines_of(vec2 x, float width) {  // coverage of the lines at whole numbers, `width` in pixels
@@ -94,14 +96,15 @@ float lines_of(vec2 x, float width) {  // coverage of the lines at whole numbers
 void main() {
   vec3 v = normalize(eye - p), nn = normalize(n);
   if (kind == 2) { result = vec4(rgb, alpha); return; }
-  if (dot(nn, v) < 0.0 && kind == 0) nn = -nn;
-  vec3 base = linear(mix(rgb, texture(map, vec2(scalar.x * 255.0 / 256.0 + 0.5 / 256.0, 0.5)).rgb, scalar.y));
-  float a = alpha, gloss = 0.10;
+  if (!gl_FrontFacing) nn = -nn;  // by winding: at a silhouette the interpolated normal may already look away
+  float valued = scalar.y * (fade > 0.0 ? smoothstep(0.0, fade, scalar.x) : 1.0);
+  vec3 base = linear(mix(rgb, texture(map, vec2(scalar.x * 255.0 / 256.0 + 0.5 / 256.0, 0.5)).rgb, valued));
+  float a = alpha, gloss = 0.16;
   if (kind == 1) {
     vec2 x = vec2(dot(p - floor_centre, floor_x), dot(p - floor_centre, floor_y)) / floor_size.x;
     float far = length(p - floor_centre) / floor_size.y, plain = clamp(1.6 - 4.0 * max(fwidth(x.x), fwidth(x.y)), 0.0, 1.0);
     float odd = mod(floor(x.x) + floor(x.y), 2.0);
-    base *= 1.0 - 0.045 * odd * plain - 0.14 * lines_of(x, 1.2);
+    base *= 1.0 - 0.035 * odd * plain - 0.09 * lines_of(x, 1.2);
     a *= 1.0 - smoothstep(0.12, 1.0, far);
     gloss = 0.0;
   }
@@ -112,10 +115,10 @@ void main() {
   }
   float facing = dot(nn, key), lit = facing > 0.0 ? facing * key_light(nn) : 0.0, open = sky_light(nn);
   float below = 0.5 - 0.5 * dot(nn, up);
-  vec3 light = lit * vec3(1.00, 0.96, 0.90) * 0.86 + open * vec3(0.90, 0.96, 1.06) * 0.42 +
-               (0.05 + 0.20 * below) * vec3(1.0, 0.97, 0.93) * (0.4 + 0.6 * min(open + 0.4, 1.0));
+  vec3 light = lit * vec3(1.00, 0.97, 0.92) * 0.72 + open * vec3(0.93, 0.97, 1.04) * 0.42 +
+               (0.09 + 0.24 * below) * vec3(1.0, 0.97, 0.93) * (0.4 + 0.6 * min(open + 0.4, 1.0));
   vec3 c = base * light;
-  float shine = pow(max(dot(nn, normalize(key + v)), 0.0), 48.0) * min(lit * 3.0, 1.0);
+  float shine = pow(max(dot(nn, normalize(key + v)), 0.0), 36.0) * min(lit * 3.0, 1.0);
   float rim = pow(1.0 - max(dot(nn, v), 0.0), 3.0) * min(open, 1.0);
   c += gloss * (shine * vec3(1.0, 0.98, 0.94) + 0.9 * rim * vec3(0.86, 0.93, 1.0));
   result = vec4(encoded(c), a);
