@@ -25,13 +25,15 @@ typedef struct dfm_tetmesh_info {
   double lo[3], hi[3];
   const char *warnings;                                    /* one sentence a line; valid while the mesh lives */
 } dfm_tetmesh_info;
+/** Counts, sizes and what reading repaired. Threads: Any thread. Since 0.1. */
 DFM_API dfm_status dfm_tetmesh_get_info(dfm_tetmesh mesh, dfm_tetmesh_info *out);
 /** Borrowed arrays, valid while the mesh lives: points [npoint,3], tets [ntet,4], file_point [npoint] number of each point in the file's order.
- * Each out may be NULL. */
+ * Each out may be NULL. Threads: Any thread. Since 0.1. */
 DFM_API dfm_status dfm_tetmesh_data(dfm_tetmesh mesh, const double **points, const uint32_t **tets, const uint32_t **file_point);
-/** Physical groups: name of group k and, per cell, its group (UINT32_MAX none). */
+/** Physical groups: name of group k and, per cell, its group (UINT32_MAX none). Threads: Any thread. Since 0.1. */
 DFM_API dfm_status dfm_tetmesh_groups(dfm_tetmesh mesh, const char *const **names, const uint32_t **cell_group);
-/** Writes MSH 4.1 or 2.2 binary ("*.msh"), legacy VTK ("*.vtk") by file name ending; to a temporary name first, so never half a file. */
+/** Writes MSH 4.1 or 2.2 binary ("*.msh"), legacy VTK ("*.vtk") by file name ending; to a temporary name first, so never half a file.
+ * Threads: Any thread. Since 0.1. */
 DFM_API dfm_status dfm_tetmesh_write(dfm_tetmesh mesh, const char *path);
 #ifdef __cplusplus
 }

@@ -137,6 +137,12 @@ typedef struct dfm_stepper {
   dfm_status (*commit)(void *self, const dfm_kin *k, const double *p_s, double *x, double *v);
   dfm_status (*fetch)(void *self, uint32_t what, double *dst);     /* [step] copies what lives off the host */
 } dfm_stepper;
+/* Extension "dfm.cell_energy/1" of a model (draft): elastic energy per rest volume, for pictures and probes. */
+#define DFM_EXT_CELL_ENERGY "dfm.cell_energy/1"
+typedef struct dfm_cell_energy {
+  uint32_t size, reserved;
+  dfm_status (*cell_energy)(void *self, const dfm_kin *k, double *density);  /* [step] density[ncell] = J/m^3 */
+} dfm_cell_energy;
 /* ---- linear solver for the implicit system (SPD, 3x3 blocks) ---------------------------------------- */
 typedef struct dfm_solver {
   uint32_t size, flags;

@@ -1,5 +1,6 @@
 #include "core/handle.h"
 
+#include <mutex>
 #include <shared_mutex>
 #include <vector>
 

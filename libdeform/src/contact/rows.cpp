@@ -1,0 +1,171 @@
+#include "contact/rows.h"
+
+#include <algorithm>
+
+namespace dfm {
+namespace {
+
+template <class T>
+Array<T> empty(const Memory &memory) { return Array<T>(HookAllocator<T>(memory)); }
+
+}  // namespace
+
+ContactRows::ContactRows(const Memory &m)
+    : begin(empty<uint32_t>(m)), dof(empty<uint32_t>(m)), weight(empty<double>(m)), y(empty<double>(m)), inv_mass(empty<double>(m)),
+      source(empty<uint32_t>(m)), point(empty<uint32_t>(m)), block(empty<uint32_t>(m)), blocks(empty<Block>(m)), response(empty<double>(m)),
+      frame(empty<double>(m)), drive(empty<double>(m)), rate(empty<double>(m)), wn(empty<double>(m)), wt(empty<double>(m)),
+      impulse(empty<double>(m)), dof_of_point_(empty<uint32_t>(m)), dof_of_node_(empty<uint32_t>(m)) {}
+
+void ContactRows::build(std::span<const ContactPoint> contacts, std::span<const DofSource> sources) {
+  // Dofs are numbered in order of first use, except that those of a self-stepping body follow each other (its response is one block).
+  n = static_cast<uint32_t>(contacts.size());
+  uint32_t nnode = 0, npoint = 0;
+  for (const DofSource &s : sources) nnode = std::max(nnode, s.first_node + s.nnode), npoint = std::max(npoint, s.first_point + s.npoint);
+  begin.clear(), dof.clear(), weight.clear(), source.clear(), point.clear(), block.clear(), blocks.clear(), response.clear();
+  ndof = 0;
+
+  auto source_of = [&](uint32_t node) {
+    // sources are in ascending first_node order
+    uint32_t lo = 0, hi = static_cast<uint32_t>(sources.size());
+    while (hi - lo > 1) {
+      const uint32_t mid = (lo + hi) / 2;
+      (sources[mid].first_node <= node ? lo : hi) = mid;
+    }
+    return lo;
+  };
+  // Pass 1: touched surfels of self-stepping bodies, ascending, one block each.
+  dof_of_node_.assign(nnode, kNone);
+  for (uint32_t s = 0; s < sources.size(); ++s) {
+    if (sources[s].inv_mass) continue;
+    const uint32_t first = ndof;
+    for (const ContactPoint &c : contacts)
+      for (uint32_t k = 0; k < c.nnode; ++k)
+        if (source_of(c.node[k]) == s) dof_of_node_[c.node[k]] = 0;
+    for (uint32_t node = sources[s].first_node; node < sources[s].first_node + sources[s].nnode; ++node) {
+      if (dof_of_node_[node] == kNone) continue;
+      dof_of_node_[node] = ndof++;
+      source.push_back(s), point.push_back(node - sources[s].first_node), block.push_back(static_cast<uint32_t>(blocks.size()));
+    }
+    const uint32_t count = ndof - first;
+    if (count == 0) continue;
+    blocks.push_back({s, first, count, response.size()});
+    response.resize(response.size() + size_t(9) * count * count);
+  }
+  // Pass 2: contacts to dofs. A coupled surfel expands to its phyxels; a phyxel that comes twice in one contact is merged.
+  dof_of_point_.assign(npoint, kNone);
+  auto dof_of = [&](uint32_t s, uint32_t phyxel) {
+    uint32_t &d = dof_of_point_[sources[s].first_point + phyxel];
+    if (d == kNone) d = ndof++, source.push_back(s), point.push_back(phyxel), block.push_back(kNone);
+    return d;
+  };
+  for (const ContactPoint &c : contacts) {
+    begin.push_back(static_cast<uint32_t>(dof.size()));
+    const uint32_t row = begin.back();
+    auto add = [&](uint32_t d, double w) {
+      for (uint32_t j = row; j < dof.size(); ++j)
+        if (dof[j] == d) {
+          weight[j] += w;
+          return;
+        }
+      dof.push_back(d), weight.push_back(w);
+    };
+    for (uint32_t k = 0; k < c.nnode; ++k) {
+      const uint32_t s = source_of(c.node[k]), surfel = c.node[k] - sources[s].first_node;
+      const Surface &surface = *sources[s].surface;
+      if (!sources[s].inv_mass) {
+        add(dof_of_node_[c.node[k]], c.weight[k]);
+      } else if (surface.identity()) {
+        add(dof_of(s, surface.point[surfel]), c.weight[k]);
+      } else {
+        for (uint32_t j = surface.row[surfel]; j < surface.row[surfel + 1]; ++j)
+          add(dof_of(s, surface.col[j]), c.weight[k] * surface.weight[j]);
+      }
+    }
+  }
+  begin.push_back(static_cast<uint32_t>(dof.size()));
+  y.resize(size_t(ndof) * 4), inv_mass.resize(size_t(ndof) * 4);
+  for (uint32_t d = 0; d < ndof; ++d) {
+    const DofSource &s = sources[source[d]];
+    for (uint32_t k = 0; k < 4; ++k) {
+      y[size_t(d) * 4 + k] = s.v_free[size_t(point[d]) * 4 + k];
+      inv_mass[size_t(d) * 4 + k] = s.inv_mass ? s.inv_mass[size_t(point[d]) * 4 + k] : 0;
+    }
+  }
+}
+
+// a^T W a for a unit world direction a, as a vector so that mixed terms come out too: returns (W a).
+Vec3 ContactRows::diagonal(uint32_t i, Vec3 a) const {
+  Vec3 sum;
+  for (uint32_t j = begin[i]; j < begin[i + 1]; ++j) {
+    const uint32_t d = dof[j];
+    if (block[d] == kNone) {
+      const double *const w = &inv_mass[size_t(d) * 4];
+      const double ww = weight[j] * weight[j];
+      sum += Vec3{ww * (w[0] * a.x), ww * (w[1] * a.y), ww * (w[2] * a.z)};
+      continue;
+    }
+    const Block &b = blocks[block[d]];
+    for (uint32_t l = begin[i]; l < begin[i + 1]; ++l) {
+      if (block[dof[l]] != block[d]) continue;
+      const double *const r = &response[b.response + size_t(3 * (d - b.first)) * 3 * b.count + 3 * (dof[l] - b.first)];
+      const double ww = weight[j] * weight[l];
+      for (uint32_t row = 0; row < 3; ++row) {
+        const double *const rr = r + size_t(row) * 3 * b.count;
+        sum[int(row)] += ww * (rr[0] * a.x + rr[1] * a.y + rr[2] * a.z);
+      }
+    }
+  }
+  return sum;
+}
+
+void ContactRows::finish(std::span<const ContactPoint> contacts, const double *tangents, double h, double offset) {
+  frame.resize(size_t(n) * 9), drive.resize(size_t(n) * 3), rate.resize(n), wn.resize(n), wt.resize(n), impulse.resize(size_t(n) * 3);
+  for (uint32_t i = 0; i < n; ++i) {
+    const Vec3 normal = load3(contacts[i].normal), t1 = load3(tangents + size_t(i) * 3), t2 = cross(normal, t1);
+    double *const f = &frame[size_t(i) * 9];
+    store3(f, normal), store3(f + 3, t1), store3(f + 6, t2);
+    const Vec3 v = load3(contacts[i].velocity);
+    store3(&drive[size_t(i) * 3], {dot(normal, v), dot(t1, v), dot(t2, v)});
+    const double gap = contacts[i].distance - offset;
+    rate[i] = std::max(gap / h, -0.1 * offset / h);
+    wn[i] = dot(normal, diagonal(i, normal));
+    const Vec3 w1 = diagonal(i, t1), w2 = diagonal(i, t2);
+    const double a = dot(t1, w1), c = dot(t2, w2), b = dot(t1, w2);
+    wt[i] = 0.5 * (a + c) + std::sqrt(0.25 * (a - c) * (a - c) + b * b);
+  }
+}
+
+Vec3 ContactRows::velocity(uint32_t i) const {
+  Vec3 u;
+  for (uint32_t j = begin[i]; j < begin[i + 1]; ++j) u += weight[j] * load3(&y[size_t(dof[j]) * 4]);
+  const double *const f = &frame[size_t(i) * 9];
+  return Vec3{dot(load3(f), u), dot(load3(f + 3), u), dot(load3(f + 6), u)} - load3(&drive[size_t(i) * 3]);
+}
+
+void ContactRows::response_apply(const Block &b, uint32_t d, Vec3 p) {
+  const size_t width = size_t(3) * b.count, column = size_t(3) * (d - b.first);
+  for (uint32_t k = 0; k < b.count; ++k) {
+    double *const to = &y[size_t(b.first + k) * 4];
+    for (uint32_t row = 0; row < 3; ++row) {
+      const double *const r = &response[b.response + (size_t(3) * k + row) * width + column];
+      to[row] += r[0] * p.x + r[1] * p.y + r[2] * p.z;
+    }
+  }
+}
+
+void ContactRows::apply(uint32_t i, Vec3 q) {
+  const double *const f = &frame[size_t(i) * 9];
+  const Vec3 p = q.x * load3(f) + q.y * load3(f + 3) + q.z * load3(f + 6);
+  for (uint32_t j = begin[i]; j < begin[i + 1]; ++j) {
+    const uint32_t d = dof[j];
+    if (block[d] != kNone) {
+      response_apply(blocks[block[d]], d, weight[j] * p);
+      continue;
+    }
+    double *const to = &y[size_t(d) * 4];
+    const double *const w = &inv_mass[size_t(d) * 4];
+    to[0] += weight[j] * (w[0] * p.x), to[1] += weight[j] * (w[1] * p.y), to[2] += weight[j] * (w[2] * p.z);
+  }
+}
+
+}  // namespace dfm

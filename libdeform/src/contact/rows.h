@@ -1,0 +1,60 @@
+// The contact operator of one sub-step.
+//
+// Contact i sees the mean velocity over the sub-step u_i = sum_k w_ik y_k - v_obstacle of a few unknowns ("dofs") y_k: phyxels of bodies
+// that the host integrates, surfels of bodies that step themselves. An impulse p at the contact changes them by
+//     y_k += w_ik M_k^-1 p                     (phyxel; M per component, infinite where held)
+//     y_j += R_jk w_ik p for all j of the body (self-stepping body; R is its own symmetric response, dense over its touched surfels)
+// which is W = J B J^T of doc/concepts/contact.md without ever forming it.
+#pragma once
+#include <span>
+
+#include "math/vec3.h"
+#include "surfel/contact_set.h"
+#include "surfel/surface.h"
+
+namespace dfm {
+
+// Where a body's dofs come from.
+struct DofSource {
+  uint32_t first_node = 0, nnode = 0;     // world-wide surfel numbers of the body
+  uint32_t first_point = 0, npoint = 0;   // world-wide phyxel numbers
+  const Surface *surface = nullptr;
+  const double *inv_mass = nullptr;       // [npoint,4]; null: self-stepping
+  const double *v_free = nullptr;         // [npoint,4] or, self-stepping, surface->v
+};
+
+struct ContactRows {
+  struct Block { uint32_t source, first, count; size_t response; };   // dofs [first, first+count) of a self-stepping body
+
+  uint32_t n = 0, ndof = 0;
+  Array<uint32_t> begin;                  // [n+1] into dof, weight
+  Array<uint32_t> dof;
+  Array<double> weight;
+  Array<double> y, inv_mass;              // [ndof,4]; inv_mass zero for dofs of blocks
+  Array<uint32_t> source, point;          // [ndof] index of the DofSource, phyxel (or surfel of a block)
+  Array<uint32_t> block;                  // [ndof] kNone or index into blocks
+  Array<Block> blocks;
+  Array<double> response;                 // per block [3 count, 3 count] row-major, 1/kg
+
+  Array<double> frame;                    // [n,9] normal, tangent, normal x tangent
+  Array<double> drive;                    // [n,3] obstacle velocity in the frame
+  Array<double> rate;                     // [n] m/s: gap / h, a negative gap enters as at least -0.1 d_c / h
+  Array<double> wn, wt;                   // [n] 1/kg: W_nn; largest eigenvalue of W_tt
+  Array<double> impulse;                  // [n,3] N s: normal, two tangents
+
+  explicit ContactRows(const Memory &memory);
+  // Expands contacts to dofs. Blocks get their dofs and counts; the caller fills `response`, then calls finish().
+  void build(std::span<const ContactPoint> contacts, std::span<const DofSource> sources);
+  // Frames from normals and tangents [n,3], W diagonals, rates.
+  void finish(std::span<const ContactPoint> contacts, const double *tangents, double h, double offset);
+
+  Vec3 velocity(uint32_t i) const;        // relative velocity of contact i in its frame (normal, t1, t2)
+  void apply(uint32_t i, Vec3 impulse_frame);   // changes y by an impulse given in the frame
+
+ private:
+  Array<uint32_t> dof_of_point_, dof_of_node_;   // this sub-step's dof of a phyxel, of a surfel of a self-stepping body; kNone
+  void response_apply(const Block &b, uint32_t k, Vec3 p);
+  Vec3 diagonal(uint32_t i, Vec3 direction) const;
+};
+
+}  // namespace dfm

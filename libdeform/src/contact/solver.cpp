@@ -1,0 +1,127 @@
+#include "contact/solver.h"
+
+#include <algorithm>
+
+namespace dfm {
+namespace {
+
+struct Pair { double a, b; };
+
+// Friction impulse that the linearised law wants, given the contact's present impulse (l1, l2), slip (u1, u2) and new normal impulse.
+//
+// Set-valued laws: lambda* = lambda - u / w_t would stop the slip. Inside the disc it is taken (stick); outside the contact slides along
+// lambda* on a disc whose radius grows with the slip speed s by the law's slope c = -v^ . (dft/dv) v^ >= 0 (viscous part):
+//     radius(s) = R + h c (s - s0),  s = w_t (|lambda*| - radius(s))   =>   s = w_t (|lambda*| - R + h c s0) / (1 + w_t h c).
+// The radius follows the normal impulse in proportion, which is exact for Coulomb's cone.
+//
+// Smooth laws: lambda = h [ft + D (u' - v) + d (fn' - fn)] with u' = u + w_t (lambda - lambda_old): a 2x2 system, positive definite
+// because only the negative semidefinite part of D is used.
+Pair friction_impulse(const ContactRows &rows, const ContactState &s, uint32_t i, double h, double ln, double u1, double u2) {
+  const double wt = rows.wt[i], l1 = rows.impulse[size_t(i) * 3 + 1], l2 = rows.impulse[size_t(i) * 3 + 2];
+  const uint32_t n = s.stride;
+  const double fn = s.fn[i];
+  if (s.set_valued[i]) {
+    const double ratio = fn > 0 ? ln / (h * fn) : 0;
+    const double a = l1 - u1 / wt, b = l2 - u2 / wt, size = std::sqrt(a * a + b * b);
+    double radius = h * s.limit[i] * ratio;
+    if (s.mode[i] == 2) {
+      const double v1 = s.vt[i], v2 = s.vt[n + i], speed = std::sqrt(v1 * v1 + v2 * v2);
+      double slope = 0;
+      if (speed > 0) {
+        const double e1 = v1 / speed, e2 = v2 / speed;
+        slope = std::max(0.0, -(e1 * (s.dft_dvt[i] * e1 + s.dft_dvt[n + i] * e2) + e2 * (s.dft_dvt[2 * n + i] * e1 + s.dft_dvt[3 * n + i] * e2)));
+      }
+      const double slip = std::max(0.0, wt * (size - radius + h * slope * speed) / (1 + wt * h * slope));
+      radius = std::max(0.0, radius + h * slope * (slip - speed));
+    }
+    if (size <= radius) return {a, b};
+    return {radius / size * a, radius / size * b};
+  }
+  // Symmetric part of D, its positive eigenvalue removed: D- = D - e+ q q^T.
+  double d11 = s.dft_dvt[i], d22 = s.dft_dvt[3 * n + i], d12 = 0.5 * (s.dft_dvt[n + i] + s.dft_dvt[2 * n + i]);
+  const double mean = 0.5 * (d11 + d22), dev = 0.5 * (d11 - d22), spread = std::sqrt(dev * dev + d12 * d12);
+  const double top = mean + spread, bottom = mean - spread;
+  if (bottom >= 0) {
+    d11 = d22 = d12 = 0;
+  } else if (top > 0) {  // keep only bottom * p p^T, p p^T = (top I - D) / (top - bottom)
+    const double scale = bottom / (top - bottom);
+    const double n11 = scale * (top - d11), n22 = scale * (top - d22), n12 = scale * -d12;
+    d11 = n11, d22 = n22, d12 = n12;
+  }
+  const double dfn = ln / h - fn;
+  const double v1 = u1 - wt * l1 - s.vt[i], v2 = u2 - wt * l2 - s.vt[n + i];
+  const double r1 = h * (s.ft[i] + d11 * v1 + d12 * v2 + s.dft_dfn[i] * dfn), r2 = h * (s.ft[n + i] + d12 * v1 + d22 * v2 + s.dft_dfn[n + i] * dfn);
+  const double m11 = 1 - h * wt * d11, m22 = 1 - h * wt * d22, m12 = -h * wt * d12, det = m11 * m22 - m12 * m12;
+  return {(m22 * r1 - m12 * r2) / det, (m11 * r2 - m12 * r1) / det};
+}
+
+double normal_impulse(const ContactRows &rows, uint32_t i, double un) {
+  return std::max(0.0, rows.impulse[size_t(i) * 3] - (un + rows.rate[i]) / rows.wn[i]);
+}
+
+}  // namespace
+
+void set_trial(const ContactRows &rows, double h, ContactState &s) {
+  for (uint32_t i = 0; i < rows.n; ++i) {
+    const Vec3 u = rows.velocity(i);
+    const double *const l = &rows.impulse[size_t(i) * 3];
+    // A contact without impulse yet is asked at the normal force that would close it alone, so that its law's limit is known.
+    s.fn[i] = (l[0] > 0 || rows.wn[i] == 0 ? l[0] : normal_impulse(rows, i, u.x)) / h;
+    s.vt[i] = u.y, s.vt[s.stride + i] = u.z;
+    const double wt = rows.wt[i];
+    s.ft_stop[i] = wt > 0 ? (l[1] - u.y / wt) / h : 0;
+    s.ft_stop[s.stride + i] = wt > 0 ? (l[2] - u.z / wt) / h : 0;
+  }
+}
+
+void sweep(ContactRows &rows, const ContactState &law, double h) {
+  for (uint32_t i = 0; i < rows.n; ++i) {
+    if (!(rows.wn[i] > 0)) continue;  // both sides are held: nothing an impulse could change
+    double *const l = &rows.impulse[size_t(i) * 3];
+    Vec3 u = rows.velocity(i);
+    const double ln = normal_impulse(rows, i, u.x);
+    if (ln == 0 && l[0] == 0 && l[1] == 0 && l[2] == 0) continue;
+    if (ln != l[0]) {
+      rows.apply(i, {ln - l[0], 0, 0});
+      l[0] = ln;
+      u = rows.velocity(i);
+    }
+    if (!(rows.wt[i] > 0)) continue;
+    const Pair t = ln > 0 ? friction_impulse(rows, law, i, h, ln, u.y, u.z) : Pair{0, 0};
+    if (t.a != l[1] || t.b != l[2]) {
+      rows.apply(i, {0, t.a - l[1], t.b - l[2]});
+      l[1] = t.a, l[2] = t.b;
+    }
+  }
+}
+
+Residual inner_residual(const ContactRows &rows, const ContactState &law, double h) {
+  Residual r;
+  for (uint32_t i = 0; i < rows.n; ++i) {
+    if (!(rows.wn[i] > 0)) continue;
+    const double *const l = &rows.impulse[size_t(i) * 3];
+    const Vec3 u = rows.velocity(i);
+    r.normal = std::max(r.normal, std::fabs(std::min(rows.wn[i] * l[0], u.x + rows.rate[i])));
+    if (!(rows.wt[i] > 0) || !(l[0] > 0)) continue;
+    const Pair t = friction_impulse(rows, law, i, h, l[0], u.y, u.z);
+    const double a = t.a - l[1], b = t.b - l[2];
+    r.tangent = std::max(r.tangent, rows.wt[i] * std::sqrt(a * a + b * b));
+  }
+  return r;
+}
+
+Residual true_residual(const ContactRows &rows, const ContactState &answer, double h) {
+  Residual r;
+  for (uint32_t i = 0; i < rows.n; ++i) {
+    if (!(rows.wn[i] > 0)) continue;
+    const double *const l = &rows.impulse[size_t(i) * 3];
+    const double un = rows.velocity(i).x;
+    r.normal = std::max(r.normal, std::fabs(std::min(rows.wn[i] * l[0], un + rows.rate[i])));
+    if (!(rows.wt[i] > 0) || !(l[0] > 0)) continue;
+    const double a = h * answer.ft[i] - l[1], b = h * answer.ft[answer.stride + i] - l[2];
+    r.tangent = std::max(r.tangent, rows.wt[i] * std::sqrt(a * a + b * b));
+  }
+  return r;
+}
+
+}  // namespace dfm

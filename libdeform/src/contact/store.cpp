@@ -1,0 +1,52 @@
+#include "contact/store.h"
+
+#include <algorithm>
+
+namespace dfm {
+
+ContactStore::ContactStore(const Memory &m) {
+  auto use = [&](auto &...arrays) { ((arrays = std::decay_t<decltype(arrays)>(typename std::decay_t<decltype(arrays)>::allocator_type(m))), ...); };
+  use(key, id_a, id_b, by_key, normal, tangent, impulse, bristle, law, dwell, path, touching, held, began);
+}
+
+uint32_t ContactStore::find(uint64_t k) const {
+  const auto it = std::lower_bound(by_key.begin(), by_key.end(), k, [&](uint32_t i, uint64_t value) { return key[i] < value; });
+  return it != by_key.end() && key[*it] == k ? *it : kNone;
+}
+
+Vec3 transport(Vec3 t, Vec3 m, Vec3 n, bool *reset) {
+  const double c = dot(m, n);
+  *reset = c < -0.5;
+  if (*reset) return any_tangent(n);
+  const Vec3 turned = t - (dot(n, t) / (1 + c)) * (m + n);   // rotation m -> n applied to a vector orthogonal to m
+  return normalized(turned - dot(turned, n) * n);            // rounding only
+}
+
+void warm_start(const ContactStore &old, std::span<const ContactPoint> contacts, double h, ContactRows &rows, ContactState &state,
+                double *tangents, uint32_t *match) {
+  const double scale = old.h > 0 ? h / old.h : 0;
+  rows.impulse.resize(size_t(contacts.size()) * 3);
+  for (uint32_t i = 0; i < contacts.size(); ++i) {
+    const Vec3 n = load3(contacts[i].normal);
+    const uint32_t m = match[i] = old.find(contacts[i].key);
+    double *const l = &rows.impulse[size_t(i) * 3];
+    l[0] = l[1] = l[2] = 0;
+    for (uint32_t s = 0; s < state.nstate; ++s) state.bristle[size_t(s) * state.stride + i] = 0;
+    state.dwell[i] = 0;
+    bool reset = true;
+    Vec3 t;
+    if (m != kNone) t = transport(load3(&old.tangent[size_t(m) * 3]), load3(&old.normal[size_t(m) * 3]), n, &reset);
+    else t = any_tangent(n);
+    store3(tangents + size_t(i) * 3, t);
+    if (reset) {
+      match[i] = kNone;
+      continue;
+    }
+    for (int k = 0; k < 3; ++k) l[k] = scale * old.impulse[size_t(m) * 3 + size_t(k)];
+    state.dwell[i] = old.dwell[m];
+    if (old.law[m] == state.law[i] && old.nstate == state.nstate)
+      for (uint32_t s = 0; s < state.nstate; ++s) state.bristle[size_t(s) * state.stride + i] = old.bristle[size_t(m) * old.nstate + s];
+  }
+}
+
+}  // namespace dfm

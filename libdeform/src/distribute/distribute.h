@@ -1,0 +1,21 @@
+// Contact impulses to surfels to phyxels: f_s = sum_k w_k p at the contact's nodes, f_p = N^T f_s. Force, torque and power are those of the
+// contacts to rounding, because it is the transpose of how the contacts read velocities.
+#pragma once
+#include <span>
+
+#include "math/vec3.h"
+#include "surfel/contact_set.h"
+#include "surfel/surface.h"
+
+namespace dfm {
+
+struct ImpulseSink {
+  uint32_t first_node, nnode;
+  const Surface *surface;
+  double *surfel;     // [nsurfel,3] N s, zeroed here
+  double *phyxel;     // [npoint,4] N s, zeroed by the caller; null: self-stepping, surfel impulses are all it needs
+};
+
+void distribute(std::span<const ContactPoint> contacts, const double *frame, const double *impulse, std::span<const ImpulseSink> sinks);
+
+}  // namespace dfm

@@ -1,0 +1,91 @@
+#include "friction/laws.h"
+
+#include <cmath>
+
+#include "core/error.h"
+
+namespace dfm {
+
+LawInstance::LawInstance(const dfm_type &t, const dfm_host &h, std::vector<double> values)
+    : type(&t), ops(static_cast<const dfm_friction *>(t.ops)), params(std::move(values)), host(&h) {
+  for (uint32_t s = 0; s < ops->nslot; ++s) nstate += ops->slots[s].width;
+  char why[256] = "";
+  if (ops->check && ops->check(params.data(), why, sizeof why) != DFM_OK)
+    fail(DFM_E_ARG, "law '%s' refuses its parameters: %s", t.id, why[0] ? why : "no reason given");
+  if (ops->prepare && ops->prepare(host, params.data(), &data) != DFM_OK) fail(DFM_E_FATAL, "law '%s' could not prepare its tables", t.id);
+}
+
+LawInstance::~LawInstance() {
+  if (ops->prepare && ops->release) ops->release(host, data);
+}
+
+LawBatches::LawBatches(const Memory &m)
+    : order_(HookAllocator<uint32_t>(m)), in_(HookAllocator<double>(m)), out_(HookAllocator<double>(m)), mode_(HookAllocator<uint8_t>(m)) {}
+
+void LawBatches::gather(const std::vector<LawInstance *> &laws, ContactState &state) {
+  batches_.clear();
+  order_.clear();
+  for (uint32_t l = 0; l < laws.size(); ++l) {
+    const uint32_t begin = static_cast<uint32_t>(order_.size());
+    for (uint32_t i = 0; i < state.n; ++i)
+      if (state.law[i] == l) {
+        order_.push_back(i);
+        state.set_valued[i] = (laws[l]->ops->flags & DFM_FRIC_SET_VALUED) != 0;
+      }
+    if (order_.size() > begin) batches_.push_back({laws[l], begin, static_cast<uint32_t>(order_.size()) - begin});
+  }
+}
+
+const LawInstance *LawBatches::evaluate(double h, ContactState &state) {
+  for (const Batch &batch : batches_)
+    if (const LawInstance *bad = evaluate(batch, h, state)) return bad;
+  return nullptr;
+}
+
+const LawInstance *LawBatches::evaluate(const Batch &batch, double h, ContactState &state) {
+  const LawInstance &law = *batch.law;
+  const uint32_t n = batch.n, stride = (n + 7) & ~7u, S = law.nstate;
+  const size_t column = stride;
+  in_.assign(column * (7 + S), 0.0);
+  out_.resize(column * (11 + S));
+  mode_.resize(stride);
+  double *const fn = in_.data(), *const vt = fn + column, *const stop = vt + 2 * column, *const area = stop + 2 * column,
+                *const dwell = area + column, *const bristle = dwell + column;
+  const uint32_t *const index = &order_[batch.begin];
+  for (uint32_t k = 0; k < n; ++k) {
+    const uint32_t i = index[k];
+    fn[k] = state.fn[i], area[k] = state.area[i], dwell[k] = state.dwell[i];
+    vt[k] = state.vt[i], vt[column + k] = state.vt[state.stride + i];
+    stop[k] = state.ft_stop[i], stop[column + k] = state.ft_stop[state.stride + i];
+    for (uint32_t s = 0; s < S; ++s) bristle[s * column + k] = state.bristle[size_t(s) * state.stride + i];
+  }
+  const uint32_t needs = law.ops->needs;
+  dfm_friction_in in{};
+  in.size = sizeof in, in.n = n, in.stride = stride, in.dt = h;
+  in.params = law.params.data(), in.data = law.data;
+  in.fn = fn, in.vt = vt, in.ft_stop = stop;
+  in.area = needs & DFM_NEED_AREA ? area : nullptr;
+  in.dwell = needs & DFM_NEED_DWELL ? dwell : nullptr;
+  in.state = bristle;
+  double *const ft = out_.data(), *const dv = ft + 2 * column, *const dn = dv + 4 * column, *const limit = dn + 2 * column,
+                *const next = limit + 3 * column;
+  dfm_friction_out out{};
+  out.size = sizeof out;
+  out.ft = ft, out.state = next, out.dft_dvt = dv, out.dft_dfn = dn, out.limit = limit, out.mode = mode_.data();
+  if (law.ops->eval(&in, &out) != DFM_OK) return &law;
+
+  double poison = 0;
+  for (uint32_t k = 0; k < n; ++k) {
+    const uint32_t i = index[k];
+    state.ft[i] = ft[k], state.ft[state.stride + i] = ft[column + k];
+    for (uint32_t j = 0; j < 4; ++j) state.dft_dvt[size_t(j) * state.stride + i] = dv[j * column + k];
+    state.dft_dfn[i] = dn[k], state.dft_dfn[state.stride + i] = dn[column + k];
+    state.limit[i] = limit[k], state.mode[i] = mode_[k];
+    for (uint32_t s = 0; s < S; ++s) poison += 0.0 * (state.bristle_out[size_t(s) * state.stride + i] = next[s * column + k]);
+    poison += 0.0 * (ft[k] + ft[column + k]) + 0.0 * (dv[k] + dv[column + k] + dv[2 * column + k] + dv[3 * column + k]) +
+              0.0 * (dn[k] + dn[column + k]);
+  }
+  return poison == 0 ? nullptr : &law;  // NaN or infinite: not equal to zero
+}
+
+}  // namespace dfm

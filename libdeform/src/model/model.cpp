@@ -1,0 +1,39 @@
+#include "model/model.h"
+
+#include "core/error.h"
+
+namespace dfm {
+
+size_t model_state_size(const dfm_model &ops, uint32_t npoint, uint32_t ncell, uint32_t nedge) {
+  size_t total = 0;
+  for (uint32_t s = 0; s < ops.nslot; ++s) {
+    const dfm_slot &slot = ops.slots[s];
+    const size_t count = slot.unit == DFM_PER_POINT  ? npoint
+                         : slot.unit == DFM_PER_CELL ? ncell
+                         : slot.unit == DFM_PER_EDGE ? nedge
+                                                     : 1;
+    total += count * slot.width;
+  }
+  return total;
+}
+
+void ModelInstance::create(const dfm_type &t, const dfm_host &host, const dfm_mesh &mesh, const Memory &memory, std::vector<double> values) {
+  type = &t;
+  ops = static_cast<const dfm_model *>(t.ops);
+  params = std::move(values);
+  if (!(ops->cells & DFM_CELL_TET)) fail(DFM_E_UNSUPPORTED, "model '%s' takes no tetrahedra; choose another model for this mesh", t.id);
+  const dfm_status s = ops->create(&host, &mesh, &self);
+  if (s != DFM_OK || !self) {
+    self = nullptr;
+    fail(s < 0 ? s : DFM_E_FATAL, "model '%s' refused the body (status %d); the log says why", t.id, int(s));
+  }
+  stepper = ops->extension ? static_cast<const dfm_stepper *>(ops->extension(self, "dfm.stepper/1")) : nullptr;
+  if (!stepper && !ops->add_forces) fail(DFM_E_UNSUPPORTED, "model '%s' neither adds forces nor steps itself; report it to its author", t.id);
+  const size_t nstate = model_state_size(*ops, mesh.npoint, mesh.ncell, mesh.nedge);
+  state = Array<double>(nstate, 0.0, HookAllocator<double>(memory));
+  state_out = state;
+  if (nstate && ops->state_init && ops->state_init(self, state.data()) != DFM_OK)
+    fail(DFM_E_FATAL, "model '%s' could not initialise its state", t.id);
+}
+
+}  // namespace dfm

@@ -1,0 +1,32 @@
+// One body's model: the plugin instance, its parameters and its state. Everything else in the library calls models through here.
+#pragma once
+#include <string>
+#include <vector>
+
+#include "core/memory.h"
+#include "deform/plugin.h"
+
+namespace dfm {
+
+struct ModelInstance {
+  const dfm_type *type = nullptr;
+  const dfm_model *ops = nullptr;
+  const dfm_stepper *stepper = nullptr;      // null: a force model, the host integrates
+  void *self = nullptr;
+  std::vector<double> params;
+  Array<double> state, state_out;            // slots end to end
+
+  ModelInstance() = default;
+  ModelInstance(const ModelInstance &) = delete;
+  ModelInstance &operator=(const ModelInstance &) = delete;
+  ~ModelInstance() { if (self && ops->destroy) ops->destroy(self); }
+
+  // Creates the instance and its state; throws Error naming the plugin where it refuses.
+  void create(const dfm_type &t, const dfm_host &host, const dfm_mesh &mesh, const Memory &memory, std::vector<double> values);
+  void commit_state() { if (!state.empty()) state.swap(state_out); }
+};
+
+// Sum of DFM_CELL_* values' data: number of state values a mesh of these counts needs.
+size_t model_state_size(const dfm_model &ops, uint32_t npoint, uint32_t ncell, uint32_t nedge);
+
+}  // namespace dfm

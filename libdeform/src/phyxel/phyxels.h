@@ -1,0 +1,32 @@
+// Physics points of one body as a structure of arrays. Points lie 4 doubles apart (the fourth is zero), so that one point is one
+// 256-bit load; the measurement behind it is doc/decisions/0002-point-layout.md.
+#pragma once
+#include <cstdint>
+
+#include "core/memory.h"
+#include "math/vec3.h"
+
+namespace dfm {
+
+inline constexpr uint32_t kStride = 4;
+
+struct Phyxels {
+  uint32_t n = 0;
+  Array<double> rest;       // [n,3] m, before pose
+  Array<double> x, v;       // [n,4] m, m/s: start of the sub-step
+  Array<double> v_free;     // [n,4] m/s: end of the sub-step without contact
+  Array<double> f;          // [n,4] N: loads and the model's forces
+  Array<double> load;       // [n,4] N: sum of lasting loads at the current time
+  Array<double> impulse;    // [n,4] N s: contact impulses of the sub-step, J^T lambda
+  Array<double> mass;       // [n] kg, lumped
+  Array<double> inv_mass;   // [n,4] 1/kg, zero where a component is held
+  Array<uint8_t> held;      // [n] bits 1 x, 2 y, 4 z
+};
+
+// Lumped mass of tetrahedra: a quarter of each cell's mass to each corner. Returns the volume.
+double lump_mass(uint32_t npoint, const double *rest, uint32_t ntet, const uint32_t *tets, double density, double *mass);
+void update_inverse_mass(Phyxels &p);
+
+double tet_volume(const double *x, uint32_t stride, const uint32_t tet[4]);
+
+}  // namespace dfm

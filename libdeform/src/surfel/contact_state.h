@@ -1,0 +1,38 @@
+// What contact/ and friction/ exchange while they solve one sub-step: columns over the contacts, in the contacts' order.
+// Pairs in the tangent plane are [2,stride], 2x2 matrices [4,stride] row-major; stride is a multiple of 8.
+#pragma once
+#include <cstdint>
+
+#include "core/memory.h"
+
+namespace dfm {
+
+struct ContactState {
+  uint32_t n = 0, stride = 0, nstate = 0;
+  Array<uint32_t> law;          // [n] index into the world's law table
+  // Trial: where the laws are asked.
+  Array<double> fn;             // N
+  Array<double> vt;             // [2,stride] m/s, mean slip of side a against side b
+  Array<double> ft_stop;        // [2,stride] N, force that makes the mean slip zero
+  Array<double> area, dwell;    // m2, s
+  Array<double> bristle;        // [nstate,stride] law state at the start of the sub-step, nstate = most that any law has
+  // Answer: the laws there.
+  Array<double> ft;             // [2,stride] N, force on side a
+  Array<double> dft_dvt;        // [4,stride] N s/m
+  Array<double> dft_dfn;        // [2,stride]
+  Array<double> limit;          // N
+  Array<double> bristle_out;    // [nstate,stride]
+  Array<uint8_t> mode;          // 0 open, 1 stick, 2 slip
+  Array<uint8_t> set_valued;    // 1: the law is solved by projection on the disc of radius limit
+
+  void resize(uint32_t count, uint32_t states) {
+    n = count, nstate = states, stride = (count + 7) & ~7u;
+    for (Array<double> *a : {&fn, &area, &dwell, &limit}) a->resize(stride);
+    for (Array<double> *a : {&vt, &ft_stop, &ft, &dft_dfn}) a->resize(size_t(2) * stride);
+    dft_dvt.resize(size_t(4) * stride);
+    bristle.resize(size_t(nstate) * stride), bristle_out.resize(size_t(nstate) * stride);
+    law.resize(stride), mode.resize(stride), set_valued.resize(stride);
+  }
+};
+
+}  // namespace dfm

@@ -1,0 +1,108 @@
+// A mass-spring body: the springs and cells of a mesh, cut into blocks that fit the first-level cache, and the ops on them.
+#pragma once
+#include <deform/plugin.h>
+
+#include <algorithm>
+#include <cstdint>
+#include <cstring>
+#include <new>
+
+#include "msm_kernel.h"
+
+namespace msm {
+
+enum Param : uint32_t { kYoung, kPoisson, kDampingStiffness, kDampingMass, kVolume, kParamCount };
+
+// Array in the host's memory; cleared on creation.
+template <class T>
+class Buffer {
+ public:
+  Buffer() = default;
+  Buffer(const Buffer &) = delete;
+  Buffer &operator=(const Buffer &) = delete;
+  ~Buffer() { if (data_) host_->release(host_->ctx, data_, size_ * sizeof(T), 64); }
+  void create(const dfm_host *host, size_t n) {
+    if (data_) host_->release(host_->ctx, data_, size_ * sizeof(T), 64), data_ = nullptr;
+    host_ = host, size_ = n ? n : 1;
+    data_ = static_cast<T *>(host->alloc(host->ctx, size_ * sizeof(T), 64));
+    if (!data_) throw std::bad_alloc();
+    std::memset(static_cast<void *>(data_), 0, size_ * sizeof(T));
+  }
+  T *data() { return data_; }
+  const T *data() const { return data_; }
+  T &operator[](size_t i) { return data_[i]; }
+  const T &operator[](size_t i) const { return data_[i]; }
+
+ private:
+  const dfm_host *host_ = nullptr;
+  T *data_ = nullptr;
+  size_t size_ = 0;
+};
+
+struct Body {
+  static constexpr uint32_t kNone = ~0u;
+  // From this size on the blocks go through the host's parallel_for; below it waking a worker costs more than it brings.
+  static constexpr uint32_t kParallelCells = 10000;
+
+  const dfm_host *host = nullptr;
+  const Kernels *kernels = nullptr;
+  uint32_t npoint = 0, ncell = 0, nedge = 0, nblock = 0;
+  double params[kParamCount] = {};
+
+  // In the host's order.
+  Buffer<double> mass, shape, edge_volume, edge_length, edge_energy;  // shape: sum of (E V) around the edge / L0^2, E = 1 without a field
+  Buffer<uint32_t> edges, cells, cell_edge;
+  Buffer<double> cell_young, cell_volume6;  // cell_young: empty without a field
+  bool young_field = false;
+  Buffer<double> spring_row;  // [npoint] sum of the stiffness of the springs at the point
+
+  // In block order.
+  Buffer<Block> block;
+  Buffer<uint32_t> point, spring_edge, cell_id;
+  Buffer<double> p, f, stiffness, rest, bulk, volume6;
+  Buffer<Quad> quad;
+  Buffer<Cell> cell;
+  struct Merge { uint32_t from, to; };  // slots: a halo point of another block, the point here that it stands for
+  Buffer<Merge> merge;
+  Buffer<uint32_t> merge_begin, slot_begin;  // [nblock + 1]
+
+  bool has_volume() const { return params[kVolume] > 0; }
+  double young_of(uint32_t c) const { return young_field ? cell_young[c] : params[kYoung]; }
+  // Moduli over Young's: the springs' scale and the volume modulus kV. See doc/models/msm.md.
+  double volume_ratio() const { return params[kVolume] / (3 * (1 - 2 * params[kPoisson])); }
+  double spring_scale() const;
+
+  void create(const dfm_host *h, const dfm_mesh &m);
+  void apply_params(const double *values);
+
+  void add_forces(const dfm_kin &k, double *f_out);
+  void bound(const dfm_kin &k, double *ksum, double *csum) const;
+  double energy(const dfm_kin &k) const;
+  void cell_energy(const dfm_kin &k, double *density);
+
+ private:
+  void take_mesh(const dfm_mesh &m);
+  void build_blocks(const double *rest_points);
+  void for_each_block(void (*fn)(void *, uint32_t, uint32_t), void *user);
+};
+
+// Order of the points by recursive bisection and where each block begins in it. See msm_partition.cpp.
+uint32_t partition_points(const double *rest, uint32_t npoint, uint32_t *order, uint32_t *block_begin);
+uint32_t partition_capacity(uint32_t npoint);
+
+// Best kernels of this processor, or those that DEFORM_SIMD names.
+const Kernels *choose_kernels(const dfm_host *host);
+
+// Six volumes and the length of a spring, by the operations of the kernels, so that the rest shape gives exactly zero.
+inline double volume6_of(const double *x0, const double *x1, const double *x2, const double *x3) {
+  const double a[3] = {x1[0] - x0[0], x1[1] - x0[1], x1[2] - x0[2]}, c[3] = {x2[0] - x0[0], x2[1] - x0[1], x2[2] - x0[2]};
+  const double d[3] = {x3[0] - x0[0], x3[1] - x0[1], x3[2] - x0[2]};
+  const double g[3] = {c[1] * d[2] - c[2] * d[1], c[2] * d[0] - c[0] * d[2], c[0] * d[1] - c[1] * d[0]};
+  return (a[0] * g[0] + a[1] * g[1]) + a[2] * g[2];
+}
+inline double length_of(const double *x, const double *y) {
+  const double d[3] = {y[0] - x[0], y[1] - x[1], y[2] - x[2]};
+  return __builtin_sqrt((d[0] * d[0] + d[1] * d[1]) + d[2] * d[2]);
+}
+
+}  // namespace msm

@@ -1,0 +1,44 @@
+// Mass-spring kernels, chosen at run time by instruction set. All of them do the same IEEE operations in the same order:
+//   spring  L = sqrt((dx^2 + dy^2) + dz^2),  F = k [(L - L0)/L + damp (dv.d)/L^2] d                       (2.25), (2.26 corrected)
+//   row     f_i += (F0 + F1) + (F2 + F3) per quad of springs, then f_j -= F one spring after the other
+//   cell    6V = a.(b x c),  F_n = -kV/(36 V0) (6V - 6V0) g_n,  F_0 = -((F_1 + F_2) + F_3)                  (2.27 corrected)
+// so that the instruction set never shows in a result. Plain data only: kernel files see no STL and nothing with external inline code.
+#pragma once
+#include <stdint.h>
+
+namespace msm {
+
+// Four springs that leave the same point. Short rows are filled with springs of stiffness zero.
+struct Quad { uint32_t i, reserved, j[4]; };
+// A cell: local points, orientation as given.
+struct Cell { uint32_t p[4]; };
+
+// One block of the body: points it owns, then the points of other blocks that its springs and cells touch (halo).
+struct Block {
+  uint32_t owned, local, quads, cells;  // cells is a multiple of 8
+  const uint32_t *point;                // [local] number of the point in the host's arrays
+  double *p;                            // [local,8] x y z 0 vx vy vz 0: a point with its velocity is one cache line
+  double *f;                            // [local,4]
+  const Quad *quad;                     // [quads]
+  const double *stiffness, *rest;       // [quads,4] N/m, m
+  const Cell *cell;                     // [cells]
+  const double *bulk, *volume6;         // [cells] kV/(36 V0), 6 V0
+};
+
+struct Kernels {
+  const char *name;
+  // Copies x (and v, unless NULL) of the block's points in and clears f.
+  void (*load)(const Block &b, const double *x, const double *v, uint32_t stride);
+  void (*springs)(const Block &b);
+  void (*damped_springs)(const Block &b, double damp);  // damp: seconds
+  void (*cells)(const Block &b);
+};
+
+// Springs shorter than this carry no force: their direction is rounding. The square root of the smallest safe square.
+constexpr double kShortestSquared = 1e-200;
+
+const Kernels *kernels_sse2();
+const Kernels *kernels_avx2();
+const Kernels *kernels_avx512();
+
+}  // namespace msm
