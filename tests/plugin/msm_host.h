@@ -142,19 +142,49 @@ inline Mesh kuhn_bar(uint32_t nx, uint32_t ny, uint32_t nz, double h, double noi
   return m;
 }
 
-// Points and tetrahedra of an MSH 2.2 file, text or binary.
-inline Mesh read_msh22(const std::string &path) {
+// Points and tetrahedra of an MSH file: 2.2 as text or binary, 4.1 as binary.
+inline Mesh read_msh(const std::string &path) {
   Mesh m;
   std::ifstream in(path, std::ios::binary);
   std::string word;
   bool binary = false;
-  std::map<int, uint32_t> number;
+  double version = 0;
+  std::map<size_t, uint32_t> number;
   const auto raw = [&](auto &value) { in.read(reinterpret_cast<char *>(&value), sizeof value); };
   while (in >> word) {
     if (word == "$MeshFormat") {
-      double version;
       int kind, size;
       in >> version >> kind >> size, binary = kind == 1;
+    } else if (version > 4 && word == "$Nodes") {
+      in.ignore(1);
+      size_t head[4], n;  // blocks, nodes, lowest and highest tag
+      raw(head);
+      for (size_t b = 0; b < head[0]; ++b) {
+        int entity[3];
+        raw(entity), raw(n);
+        std::vector<size_t> tags(n);
+        for (size_t &tag : tags) raw(tag);
+        for (size_t tag : tags) {
+          Vec x;
+          raw(x);
+          number[tag] = m.npoint(), m.rest.insert(m.rest.end(), x.begin(), x.end());
+        }
+      }
+    } else if (version > 4 && word == "$Elements") {
+      in.ignore(1);
+      size_t head[4], n, tag, node;
+      raw(head);
+      for (size_t b = 0; b < head[0]; ++b) {
+        int entity[3];  // dimension, tag, type
+        raw(entity), raw(n);
+        for (size_t e = 0; e < n; ++e) {
+          raw(tag);
+          for (int k = 0; k < (entity[2] == 4 ? 4 : entity[2] == 2 ? 3 : entity[2] == 1 ? 2 : 1); ++k) {
+            raw(node);
+            if (entity[2] == 4) m.cells.push_back(number.at(node));
+          }
+        }
+      }
     } else if (word == "$Nodes") {
       size_t n;
       in >> n, in.ignore(1);
