@@ -171,7 +171,8 @@ TEST(Nodal, Table_IsReadByFileNumbers) {
   EXPECT_EQ(rows[0].axes, 5u);
   EXPECT_EQ(rows[1].point, 0u);
   EXPECT_EQ(rows[1].force[1], -0.2);
-  for (const char *bad : {"node,x\n", "node,fixx,fixy,fixz,fx,fy,fz\n9,1,1,1,0,0,0\n", "node,fixx,fixy,fixz,fx,fy,fz\n0,2,1,1,0,0,0\n",
+  EXPECT_THROW(read_nodal(test::scratch("nodal"), mesh), dfm::Error) << "a folder";
+  for (const char *bad : {"", "node,x\n", "node,fixx,fixy,fixz,fx,fy,fz\n9,1,1,1,0,0,0\n", "node,fixx,fixy,fixz,fx,fy,fz\n0,2,1,1,0,0,0\n",
                           "node,fixx,fixy,fixz,fx,fy,fz\n0,1,1,1,0,0,nan\n", "node,fixx,fixy,fixz,fx,fy,fz\n0,1,1,1,0,0\n",
                           "node,fixx,fixy,fixz,fx,fy,fz\n1,0,0,0,1,0,0\n", "node,fixx,fixy,fixz,fx,fy,fz\n0.5,0,0,0,1,0,0\n"}) {
     test::write_file(path, bad);
