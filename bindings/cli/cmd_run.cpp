@@ -70,7 +70,7 @@ class Runner {
     while (!interrupted && !result_.stopped && advance()) outputs(false);
     count_time();
     if (interrupted) result_.interrupted = true, result_.stop_reason = "interrupted by a signal";
-    if (!at_record_ && !result_.stopped) {
+    if (!at_record_) {  // after a stop, too: the world is back at its last good state
       outputs_.record();
       if (!check_every_step_) check(false);
     }
