@@ -32,10 +32,13 @@ void edge_edge(const Pair &pair, Run run, Array<ContactPoint> &out) {
   Vec3 p0, u, vp0, vp1;
   double uu = 0, widest2 = 0;
   const double depth = edge_recovery_depth(sa, sb);
+  EdgeFaces fa;
+  bool known = false;          // fa belongs to last_a
   for (const Candidate &candidate : run) {
     const uint32_t *ea = &sa.edge[2 * size_t{candidate.feature_a}], *eb = &sb.edge[2 * size_t{candidate.feature_b}];
     if (candidate.feature_a != last_a) {
       last_a = candidate.feature_a;
+      known = false;
       p0 = pair.xa(ea[0]), u = pair.xa(ea[1]) - p0;
       vp0 = pair.va(ea[0]), vp1 = pair.va(ea[1]);
       uu = norm2(u);
@@ -56,8 +59,11 @@ void edge_edge(const Pair &pair, Run run, Array<ContactPoint> &out) {
     const double allowed = std::max(reach, depth);
     if (!(nr * nr < allowed * allowed * nn)) continue;
 
-    const EdgeFaces fa = edge_faces(sa, candidate.feature_a), fb = edge_faces(sb, candidate.feature_b);
-    if (!fa.convex || !fb.convex) continue;
+    if (!known) fa = edge_faces(sa, candidate.feature_a);
+    known = true;
+    if (!fa.convex) continue;
+    const EdgeFaces fb = edge_faces(sb, candidate.feature_b);
+    if (!fb.convex) continue;
     Vec3 normal = (1 / std::sqrt(nn)) * n;
     if (dot(normal, fb.outward()) < dot(normal, fa.outward())) normal = -normal;
     const double distance = dot(normal, r);
