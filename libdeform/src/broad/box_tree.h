@@ -35,7 +35,7 @@ struct PairOfTriangles {
 
 class BoxTree {
  public:
-  static constexpr uint32_t kLeaf = 4;  // triangles in a leaf, at most
+  static constexpr uint32_t kLeaf = 8;  // triangles in a leaf, at most
   struct Node {
     uint32_t right;         // inner: the left child is the next node, this is the right one; leaf: first place in triangle()
     uint32_t count;         // 0: inner

@@ -15,29 +15,6 @@ constexpr double kSkinMost = 0.5;           // beyond half an edge, lists grow f
 constexpr double kSpeedGrowth = 1.25;       // speeds may rise by so much before the margin of the reach is used up
 constexpr double kQualityLimit = 2;         // boxes that have grown this much in sum are worth a new tree
 
-struct Motion {
-  double displacement, speed;
-};
-
-// Largest displacement since x0, and largest speed: two surfels at a time, since every body pays this in every sub-step.
-Motion motion_of(const Surface &surface, const Array<double> &x0) {
-  using Two = double __attribute__((vector_size(16)));
-  const Two *x = reinterpret_cast<const Two *>(surface.x.data()), *v = reinterpret_cast<const Two *>(surface.v.data());
-  const Two *y = reinterpret_cast<const Two *>(x0.data());
-  Two d2 = {0, 0}, v2 = {0, 0};
-  const auto largest = [](Two a, Two b, Two most) {   // a, b: squares {x2 + z2, y2} of two surfels
-    const Two sum = __builtin_shufflevector(a, b, 0, 2) + __builtin_shufflevector(a, b, 1, 3);
-    return sum > most ? sum : most;
-  };
-  for (uint32_t s = 0; s < surface.nsurfel; s += 2) {
-    const uint32_t i = 2 * s, j = s + 1 < surface.nsurfel ? i + 2 : i;
-    const Two a = x[i] - y[i], b = x[i + 1] - y[i + 1], c = x[j] - y[j], d = x[j + 1] - y[j + 1];
-    d2 = largest(a * a + b * b, c * c + d * d, d2);
-    v2 = largest(v[i] * v[i] + v[i + 1] * v[i + 1], v[j] * v[j] + v[j + 1] * v[j + 1], v2);
-  }
-  return {std::sqrt(std::max(d2[0], d2[1])), std::sqrt(std::max(v2[0], v2[1]))};
-}
-
 double obstacle_speed(const ObstacleView &o, double extent) { return norm(o.velocity) + norm(o.spin) * extent; }
 
 // Bound of the motion of a shape between two poses: |q - q0| of unit quaternions is at most half the chord that a point at distance 1 moves.
@@ -138,8 +115,8 @@ bool BroadPhase::find_dirty(std::span<const BodyView> bodies, std::span<const Ob
   bool any = false;
   for (Body &b : bodies_) {
     if (!b.dirty) {
-      const Motion m = motion_of(*b.surface, b.x);
-      b.dirty = !(kRounding * (m.displacement + reach_share(h, offset, m.speed)) <= b.margin);
+      const double moved = largest_norm(b.surface->nsurfel, b.surface->x.data(), b.x.data());
+      b.dirty = !(kRounding * (moved + reach_share(h, offset, largest_speed(*b.surface))) <= b.margin);
     }
     any |= b.dirty;
   }
@@ -179,7 +156,7 @@ void BroadPhase::renew_body(Body &body, double h, double offset) {
     body.tree.build(s, body.x.data());
     ++stats_.rebuilds;
   }
-  const double speed = motion_of(s, body.x).speed;
+  const double speed = largest_speed(s);
   const double skin = std::clamp(skin_steps_ * h * speed, kSkinLeast * s.median_edge, kSkinMost * s.median_edge);
   body.margin = kRounding * reach_share(h, offset, kSpeedGrowth * speed) + skin;
 }
