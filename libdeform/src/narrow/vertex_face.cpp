@@ -72,9 +72,10 @@ bool Group::reaches(Run run, double widest2) const {
   bool any = false;
   for (const Candidate &candidate : run) {
     const uint32_t *c = &pair.b->surface->tri[3 * size_t{candidate.feature_b}];
-    const Vec3 a = pair.xb(c[0]), n = cross(pair.xb(c[1]) - a, pair.xb(c[2]) - a);
-    const double s = dot(n, p - a);
-    any |= s * s <= (s < 0 ? std::max(widest2, depth2) : widest2) * norm2(n);
+    const Vec3 a = pair.xb(c[0]), u = pair.xb(c[1]) - a, w = pair.xb(c[2]) - a, n = cross(u, w);
+    const double s = dot(n, p - a), nn = norm2(n);
+    // A sliver's normal is rounding; it is looked at closer whatever it says.
+    any |= s * s <= (s < 0 ? std::max(widest2, depth2) : widest2) * nn || nn <= 1e-12 * norm2(u) * norm2(w);
   }
   return any;
 }
