@@ -79,10 +79,13 @@ void near_pairs(const BoxTree &a, const BoxTree &b, double margin, Array<PairOfT
     if (!(box_distance2(a.boxes()[i], b.boxes()[j]) <= limit)) continue;
     const BoxTree::Node m = a.nodes()[i], n = b.nodes()[j];
     if (m.count && n.count) {
-      for (uint32_t p = m.right; p < m.right + m.count; ++p) {
+      uint32_t near_a[BoxTree::kLeaf], count = 0;
+      for (uint32_t q = n.right; q < n.right + n.count; ++q)
+        if (box_distance2(a.boxes()[i], b.triangle_boxes()[q]) <= limit) near_a[count++] = q;
+      for (uint32_t p = m.right; count && p < m.right + m.count; ++p) {
         if (!(box_distance2(a.triangle_boxes()[p], b.boxes()[j]) <= limit)) continue;
-        for (uint32_t q = n.right; q < n.right + n.count; ++q)
-          if (const double d2 = box_distance2(a.triangle_boxes()[p], b.triangle_boxes()[q]); d2 <= limit) f(p, q, d2);
+        for (uint32_t k = 0; k < count; ++k)
+          if (const double d2 = box_distance2(a.triangle_boxes()[p], b.triangle_boxes()[near_a[k]]); d2 <= limit) f(p, near_a[k], d2);
       }
     } else if (n.count || (!m.count && m.right - i >= n.right - j)) {
       stack.push_back({i + 1, j});       // the left child of a larger node first: its extent in the array stands for its size

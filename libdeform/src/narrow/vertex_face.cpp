@@ -18,6 +18,7 @@ namespace dfm::narrow {
 namespace {
 
 constexpr uint32_t kMost = 96;        // triangles kept per surfel; beyond that the nearest ones
+constexpr double kLoose = 1 + 1e-9;
 constexpr double kNearer = 1e-9;      // relative: a triangle beside the feature counts as nearer only beyond this
 
 struct Near {
@@ -41,7 +42,8 @@ struct Group {
   explicit Group(const Pair &of) : pair(of), depth(recovery_depth(*of.b->surface)) {}
 
   const uint32_t *corners(const Near &n) const { return &pair.b->surface->tri[3 * size_t{n.tri}]; }
-  bool reaches(Run run, double widest2) const;
+  double reach_to(Vec3 v, const uint32_t *corners) const;
+  bool reaches(Run run, Vec3 v, double widest2) const;
   void collect(Run run);
   uint32_t nearest() const;
   bool has_feature(const Near &other, const Near &of) const;
@@ -66,25 +68,34 @@ Near *place_for(Near *near, uint32_t &count, double distance) {
   return &near[count - 1];
 }
 
+double Group::reach_to(Vec3 v, const uint32_t *c) const {
+  double speed2 = 0;
+  for (int k = 0; k < 3; ++k) speed2 = std::max(speed2, norm2(v - pair.vb(c[k])));
+  return contact_reach(pair.h, pair.offset, std::sqrt(speed2));
+}
+
 // Is p within reach of a plane, or behind one, so that it is worth looking closer? In front of all faces beyond the reach, p is outside and free.
-bool Group::reaches(Run run, double widest2) const {
+// Looser by a few roundings than the decisions that follow, which alone may depend on distances.
+bool Group::reaches(Run run, Vec3 v, double widest2) const {
   const double depth2 = depth * depth;
-  bool any = false;
   for (const Candidate &candidate : run) {
     const uint32_t *c = &pair.b->surface->tri[3 * size_t{candidate.feature_b}];
     const Vec3 a = pair.xb(c[0]), u = pair.xb(c[1]) - a, w = pair.xb(c[2]) - a, n = cross(u, w);
     const double s = dot(n, p - a), nn = norm2(n);
     // A sliver's normal is rounding; it is looked at closer whatever it says.
-    any |= s * s <= (s < 0 ? std::max(widest2, depth2) : widest2) * nn || nn <= 1e-12 * norm2(u) * norm2(w);
+    if (nn <= 1e-12 * norm2(u) * norm2(w) || (s < 0 && s * s <= kLoose * depth2 * nn)) return true;
+    if (!(s * s <= kLoose * widest2 * nn)) continue;
+    const double reach = reach_to(v, c);
+    if (s * s <= kLoose * reach * reach * nn) return true;
   }
-  return any;
+  return false;
 }
 
 void Group::collect(Run run) {
   count = 0;
   const Vec3 v = pair.va(surfel);
   const double reach = contact_reach(pair.h, pair.offset, norm(v) + pair.speed_b);
-  if (!reaches(run, reach * reach)) return;
+  if (!reaches(run, v, reach * reach)) return;
   const double widest = std::max(reach, depth), widest2 = widest * widest;
   for (const Candidate &candidate : run) {
     const uint32_t *c = &pair.b->surface->tri[3 * size_t{candidate.feature_b}];
@@ -99,9 +110,7 @@ void Group::collect(Run run) {
     n->q = t.point, n->distance = distance;
     n->normal = normalized(cross(b - a, d - a));
     n->plane = dot(n->normal, p - t.point);
-    double speed2 = 0;
-    for (int k = 0; k < 3; ++k) speed2 = std::max(speed2, norm2(v - pair.vb(c[k])));
-    n->reach = contact_reach(pair.h, pair.offset, std::sqrt(speed2));
+    n->reach = reach_to(v, c);
   }
 }
 
