@@ -1,5 +1,5 @@
 // The kernels on vectors of four doubles, written once for the files that bring `v4` and its operations (msm_lanes_avx.h, or two
-// halves in msm_kernel_sse2.cpp). Everything here has internal linkage (see the house rules on wide kernels).
+// registers in msm_lanes_sse2.h). Everything here has internal linkage (see the house rules on wide kernels).
 #pragma once
 #include <stddef.h>
 
