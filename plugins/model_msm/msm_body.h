@@ -57,12 +57,11 @@ struct Body {
   Buffer<double> rest_point;           // [npoint,3]
   Buffer<double> weight;               // [npoint] of the row sums
   Buffer<double> spring_sum, coupled;  // [npoint] sum of the springs' stiffness k; sum of k w_other / w_own
-  Buffer<double> diagonal;             // [npoint,6] scratch of the row sums
 
   // In block order.
   Buffer<Block> block;
   Buffer<uint32_t> point, spring_edge, cell_id;
-  Buffer<double> p, f, stiffness, rest, bulk, volume6, slot_weight;
+  Buffer<double> p, f, stiffness, rest, bulk, volume6, slot_weight, row;
   Buffer<Quad> quad;
   Buffer<Cell> cell;
   Buffer<Merge> merge;  // by owning block
@@ -86,7 +85,6 @@ struct Body {
   void take_mesh(const dfm_mesh &m);
   void build_blocks();
   void find_weights();
-  void spring_diagonal(const double *points, uint32_t stride, double *norm);
   double spring_scale_of_shape() const { return spring_scale() * (young_field ? 1.0 : params[kYoung]); }
   void for_each_block(void (*fn)(void *, uint32_t, uint32_t), void *user);
 };

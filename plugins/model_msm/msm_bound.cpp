@@ -15,48 +15,46 @@ constexpr double kLeastWeight = 1e-3;  // far from the stiffest place weights ne
 
 void row_pass(void *user, uint32_t begin, uint32_t end) {
   const Call &call = *static_cast<const Call *>(user);
+  Body &body = *call.body;
   for (uint32_t n = begin; n < end; ++n) {
-    call.body->kernels->load(call.body->block[n], call.k->x, nullptr, call.k->stride);
-    call.body->kernels->cell_rows(call.body->block[n]);
+    body.kernels->load(body.block[n], call.k->x, nullptr, call.k->stride);
+    body.kernels->spring_rows(body.block[n]);
+    if (body.has_volume()) body.kernels->cell_rows(body.block[n]);
   }
 }
 
+// A bound of |A_i| that turning the body does not change: the largest eigenvalue of a symmetric 3 x 3 matrix is at most
+// mean + sqrt(2/3) |deviator| (equal where the other two eigenvalues are), and each spring adds at most its stiffness.
+double norm_of(const double *a, double spring_sum) {
+  const double mean = ((a[0] + a[1]) + a[2]) / 3, x = a[0] - mean, y = a[1] - mean, z = a[2] - mean;
+  const double deviator2 = ((x * x + y * y) + z * z) + 2 * ((a[4] * a[4] + a[5] * a[5]) + a[6] * a[6]);
+  return std::min(mean + __builtin_sqrt(deviator2 * (2.0 / 3)), spring_sum);
+}
+
+struct RowCall : Call { double *ksum, *csum; };  // csum NULL: the springs' diagonal alone
+
 void merge_row_pass(void *user, uint32_t begin, uint32_t end) {
-  const Call &call = *static_cast<const Call *>(user);
+  const RowCall &call = *static_cast<const RowCall *>(user);
   Body &body = *call.body;
   for (uint32_t n = begin; n < end; ++n) {
     const Block &b = body.block[n];
-    body.kernels->merge(body.f.data(), body.merge.data() + body.merge_begin[n], body.merge_begin[n + 1] - body.merge_begin[n]);
-    for (uint32_t i = 0; i < b.owned; ++i) call.f[b.point[i]] += b.f[4 * size_t(i)];
+    body.kernels->merge_rows(body.row.data(), body.merge.data() + body.merge_begin[n], body.merge_begin[n + 1] - body.merge_begin[n]);
+    for (uint32_t s = 0; s < b.owned; ++s) {
+      const uint32_t i = b.point[s];
+      const double *row = b.row + 8 * size_t(s), own = norm_of(row, body.spring_sum[i]);
+      if (!call.csum) {
+        call.ksum[i] = own;
+        continue;
+      }
+      const double springs = own + body.coupled[i];
+      call.ksum[i] += springs + row[7];
+      // A damper's n n^T is at most its spring's part of A_i over k.
+      call.csum[i] += body.params[kDampingStiffness] * springs + body.params[kDampingMass] * body.mass[i];
+    }
   }
 }
 
 }  // namespace
-
-// norm[i] = a bound of |A_i| that turning the body does not change: the largest eigenvalue of a symmetric 3 x 3 matrix is at most
-// mean + sqrt(2/3) |deviator| (equal where the other two eigenvalues are), and each spring adds at most its stiffness.
-void Body::spring_diagonal(const double *points, uint32_t stride, double *norm) {
-  std::fill(diagonal.data(), diagonal.data() + 6 * size_t(npoint), 0.0);
-  const double scale = spring_scale_of_shape();
-  for (uint32_t e = 0; e < nedge; ++e) {
-    const uint32_t *ends = edges.data() + 2 * size_t(e);
-    const double *a = points + size_t(stride) * ends[0], *b = points + size_t(stride) * ends[1];
-    const double d[3] = {b[0] - a[0], b[1] - a[1], b[2] - a[2]}, dd = (d[0] * d[0] + d[1] * d[1]) + d[2] * d[2];
-    const double k = scale * shape[e], length = __builtin_sqrt(dd), l0 = edge_length[e];
-    const double s = length > l0 ? 1 - l0 / length : 0, along = dd > kShortestSquared ? k * (1 - s) / dd : 0;
-    const double all = dd > kShortestSquared ? k * s : k;
-    const double term[6] = {along * d[0] * d[0] + all, along * d[1] * d[1] + all, along * d[2] * d[2] + all,
-                            along * d[0] * d[1], along * d[0] * d[2], along * d[1] * d[2]};
-    for (int n = 0; n < 2; ++n)
-      for (int c = 0; c < 6; ++c) diagonal[6 * size_t(ends[n]) + c] += term[c];
-  }
-  for (uint32_t i = 0; i < npoint; ++i) {
-    const double *a = diagonal.data() + 6 * size_t(i);
-    const double mean = ((a[0] + a[1]) + a[2]) / 3, x = a[0] - mean, y = a[1] - mean, z = a[2] - mean;
-    const double deviator2 = ((x * x + y * y) + z * z) + 2 * ((a[3] * a[3] + a[4] * a[4]) + a[5] * a[5]);
-    norm[i] = std::min(mean + __builtin_sqrt(deviator2 * (2.0 / 3)), spring_sum[i]);
-  }
-}
 
 void Body::find_weights() {
   const double scale = spring_scale_of_shape();
@@ -65,7 +63,11 @@ void Body::find_weights() {
     for (int n = 0; n < 2; ++n) spring_sum[edges[2 * size_t(e) + n]] += scale * shape[e];
   Buffer<double> own, next, gradient;  // gradient: 6 |dV/dx_a| sqrt(kV / (36 V0)) at rest
   own.create(host, npoint), next.create(host, npoint), gradient.create(host, has_volume() ? 4 * size_t(ncell) : 0);
-  spring_diagonal(rest_point.data(), 3, own.data());
+  dfm_kin at_rest{};
+  at_rest.x = rest_point.data(), at_rest.stride = 3;
+  RowCall diagonal{{this, &at_rest, nullptr}, own.data(), nullptr};
+  for_each_block(row_pass, static_cast<Call *>(&diagonal));
+  for_each_block(merge_row_pass, &diagonal);
   if (has_volume())
     for (uint32_t c = 0; c < ncell; ++c) {
       const uint32_t *q = cells.data() + 4 * size_t(c);
@@ -105,17 +107,8 @@ void Body::find_weights() {
 }
 
 void Body::bound(const dfm_kin &k, double *ksum, double *csum) {
-  const double damp = params[kDampingStiffness], drag = params[kDampingMass];
-  double *const norm = diagonal.data();  // in place: entry i is written after entries 6 i .. 6 i + 5 are read
-  spring_diagonal(k.x, k.stride, norm);
-  for (uint32_t i = 0; i < npoint; ++i) {
-    const double row = norm[i] + coupled[i];
-    ksum[i] += row;
-    csum[i] += damp * row + drag * mass[i];  // a damper's n n^T is at most its spring's share of A_i over k
-  }
-  if (!has_volume()) return;
-  Call call{this, &k, ksum};
-  for_each_block(row_pass, &call);
+  RowCall call{{this, &k, nullptr}, ksum, csum};
+  for_each_block(row_pass, static_cast<Call *>(&call));
   for_each_block(merge_row_pass, &call);
 }
 

@@ -40,7 +40,7 @@ void Body::take_mesh(const dfm_mesh &m) {
   npoint = m.npoint, ncell = m.ncell, nedge = m.nedge;
   mass.create(host, npoint), shape.create(host, nedge), edge_volume.create(host, nedge), edge_length.create(host, nedge);
   edge_energy.create(host, nedge), rest_point.create(host, 3 * size_t(npoint));
-  weight.create(host, npoint), spring_sum.create(host, npoint), coupled.create(host, npoint), diagonal.create(host, 6 * size_t(npoint));
+  weight.create(host, npoint), spring_sum.create(host, npoint), coupled.create(host, npoint);
   edges.create(host, 2 * size_t(nedge)), cells.create(host, 4 * size_t(ncell)), cell_edge.create(host, 6 * size_t(ncell));
   cell_volume6.create(host, ncell);
   std::copy(m.mass, m.mass + npoint, mass.data());
@@ -150,7 +150,7 @@ void Body::build_blocks() {
       Block &out = block[b];
       out.owned = owned, out.local = owned + nhalo, out.point = points;
       out.p = p.data() + 8 * size_t(slot_begin[b]), out.f = f.data() + 4 * size_t(slot_begin[b]);
-      out.weight = slot_weight.data() + slot_begin[b];
+      out.row = row.data() + 8 * size_t(slot_begin[b]), out.weight = slot_weight.data() + slot_begin[b];
       out.quad = quad.data() + quads_at, out.stiffness = stiffness.data() + 4 * quads_at, out.rest = rest.data() + 4 * quads_at;
       for (uint32_t r = begin[b]; r < begin[b + 1]; ++r)
         for (uint32_t s = rows.begin[r]; s < rows.begin[r + 1]; s += 4) {
@@ -185,7 +185,7 @@ void Body::build_blocks() {
     }
     if (pass == 0) {
       point.create(host, slot_begin[nblock]);
-      slot_weight.create(host, slot_begin[nblock]);
+      slot_weight.create(host, slot_begin[nblock]), row.create(host, 8 * size_t(slot_begin[nblock]));
       p.create(host, 8 * size_t(slot_begin[nblock])), f.create(host, 4 * size_t(slot_begin[nblock]));
     }
   }

@@ -126,7 +126,7 @@ static void volume_cells8(const Block &b) {
   }
 }
 
-constexpr Kernels kKernels = {"avx512", load_block, plain_springs8, damped_springs8, volume_cells8, cell_rows, merge_halo, add_to_host};
+constexpr Kernels kKernels = {"avx512", load_block, plain_springs8, damped_springs8, volume_cells8, spring_rows, cell_rows, merge_halo, merge_rows, add_to_host};
 
 }  // namespace
 

@@ -17,12 +17,14 @@ MSM_INLINE v4 load4(const double *p) { return {_mm_load_pd(p), _mm_load_pd(p + 2
 MSM_INLINE void store4(double *p, v4 a) { _mm_store_pd(p, a.lo), _mm_store_pd(p + 2, a.hi); }
 MSM_INLINE v4 load_xyz(const double *p) { return {_mm_loadu_pd(p), _mm_load_sd(p + 2)}; }
 MSM_INLINE v4 splat(double a) { return {_mm_set1_pd(a), _mm_set1_pd(a)}; }
+MSM_INLINE v4 set4(double a, double b, double c, double d) { return {_mm_setr_pd(a, b), _mm_setr_pd(c, d)}; }
 MSM_INLINE v4 sqrt4(v4 a) { return {_mm_sqrt_pd(a.lo), _mm_sqrt_pd(a.hi)}; }
 MSM_INLINE v4 max4(v4 a, v4 b) { return {_mm_max_pd(a.lo, b.lo), _mm_max_pd(a.hi, b.hi)}; }
 MSM_INLINE v4 abs4(v4 a) { return {_mm_andnot_pd(_mm_set1_pd(-0.0), a.lo), _mm_andnot_pd(_mm_set1_pd(-0.0), a.hi)}; }
 MSM_INLINE v4 zero_unless_above(v4 value, v4 a, v4 limit) {
   return {_mm_and_pd(value.lo, _mm_cmpgt_pd(a.lo, limit.lo)), _mm_and_pd(value.hi, _mm_cmpgt_pd(a.hi, limit.hi))};
 }
+MSM_INLINE v4 yzx(v4 a) { return {_mm_shuffle_pd(a.lo, a.hi, 1), _mm_shuffle_pd(a.lo, a.hi, 2)}; }
 template <int kLane>
 MSM_INLINE v4 lane(v4 a) {
   const __m128d half = kLane < 2 ? a.lo : a.hi, all = kLane % 2 ? _mm_unpackhi_pd(half, half) : _mm_unpacklo_pd(half, half);
