@@ -38,7 +38,9 @@ typedef struct dfm_body_info {
   double mass, rest_volume;         /* kg, m3 */
   void *user;
 } dfm_body_info;
+/** What it is made of. Threads: Any thread. Not during step. Since 0.1. */
 DFM_API dfm_status dfm_body_get_info(dfm_body body, dfm_body_info *out);
+/** Changes what its def gave. Threads: Not during step. Since 0.1. */
 DFM_API dfm_status dfm_body_set_user(dfm_body body, void *user);
 DFM_API dfm_status dfm_body_set_filter(dfm_body body, uint32_t category, uint32_t collides_with);
 
@@ -73,6 +75,7 @@ typedef struct dfm_body_measure {
   uint32_t size, inverted;
   double mass, com[3], velocity[3], momentum[3], angular[3], kinetic, elastic, volume, rest_volume, speed_max, contact_impulse[3];
 } dfm_body_measure;
+/** @return DFM_OK; DFM_E_HANDLE; DFM_E_ARG. Threads: Any thread. Not during step. Since 0.1. */
 DFM_API dfm_status dfm_body_get_measure(dfm_body body, dfm_body_measure *out);
 /** Per-cell strain energy density, J/m3, [ntet]; DFM_E_UNSUPPORTED if the model offers none. */
 DFM_API dfm_status dfm_body_energy_density(dfm_body body, uint32_t capacity, double *out);

@@ -23,12 +23,15 @@ typedef struct dfm_obstacle_def {
   uint32_t category, collides_with;
   void *user;
 } dfm_obstacle_def;
+/** A plane z = 0 that looks up, at rest, category 1, collides with all. Threads: Any thread. Since 0.1. */
 DFM_API dfm_obstacle_def dfm_obstacle_def_default(void);
+/** @return DFM_OK; DFM_E_ARG (which entry, why); DFM_E_NOMEM; DFM_E_HANDLE. Threads: Not during step. Since 0.1. */
 DFM_API dfm_status dfm_obstacle_create(dfm_world world, const dfm_obstacle_def *def, dfm_obstacle *out);
+/** Its contacts end (events are reported). Threads: Not during step. Since 0.1. */
 DFM_API dfm_status dfm_obstacle_destroy(dfm_obstacle obstacle);
 /** Where it is now. Threads: Any thread. Not during step. Since 0.1. */
 DFM_API dfm_status dfm_obstacle_get_pose(dfm_obstacle obstacle, dfm_pose *out);
-/** Its def as created (name valid while it lives; keys are not returned). */
+/** Its def as created (name valid while it lives; keys are not returned). Threads: Any thread. Not during step. Since 0.1. */
 DFM_API dfm_status dfm_obstacle_get_def(dfm_obstacle obstacle, dfm_obstacle_def *out);
 /** Pose at the end of the next step; its surface moves there at constant rate. Replaces keys. Threads: Not during step. Since 0.1. */
 DFM_API dfm_status dfm_obstacle_move_to(dfm_obstacle obstacle, const dfm_pose *pose);

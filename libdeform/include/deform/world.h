@@ -31,6 +31,7 @@ DFM_API dfm_status dfm_world_create(dfm_context *context, const dfm_world_def *d
 /** Destroys the world, its bodies and obstacles. Threads: Not during step. Since 0.1. */
 DFM_API dfm_status dfm_world_destroy(dfm_world world);
 
+/** Gravity from now on, m/s2. Threads: Not during step. Since 0.1. */
 DFM_API dfm_status dfm_world_set_gravity(dfm_world world, const double gravity[3]);
 /** Gravity that varies; times in s, strictly rising. n = 0 removes it. Threads: Not during step. Since 0.1. */
 DFM_API dfm_status dfm_world_set_gravity_keys(dfm_world world, uint32_t n, const dfm_vector_key *keys);
@@ -66,6 +67,7 @@ DFM_API dfm_status dfm_world_snapshot(dfm_world world, void *buffer, size_t *byt
  * @return DFM_OK; DFM_E_FORMAT not a snapshot of such a world (nothing changed); DFM_E_HANDLE. Threads: Not during step. Since 0.1. */
 DFM_API dfm_status dfm_world_restore(dfm_world world, const void *buffer, size_t bytes);
 
+/** @return DFM_OK; DFM_E_ARG no body of that name (nearest one). Threads: Any thread. Not during step. Since 0.1. */
 DFM_API dfm_status dfm_world_find_body(dfm_world world, const char *name, dfm_body *out);
 /** Bodies in id order. capacity 0 with bodies NULL only counts. Threads: Any thread. Not during step. Since 0.1. */
 DFM_API dfm_status dfm_world_bodies(dfm_world world, uint32_t capacity, dfm_body *bodies, uint32_t *n);
@@ -83,6 +85,7 @@ typedef struct dfm_world_stats {
   uint32_t inverted_max, substeps_max;    /* since creation */
   double stable_step;                     /* s, 0.9 of the bound at its last evaluation */
 } dfm_world_stats;
+/** @return DFM_OK; DFM_E_HANDLE. Threads: Any thread. Not during step. Since 0.1. */
 DFM_API dfm_status dfm_world_get_stats(dfm_world world, dfm_world_stats *out);
 
 /** Seconds spent in each stage of the plan since creation (CPU time of the stepping thread is not separated from waiting).

@@ -1,0 +1,60 @@
+# Two doors: `make demo` and `make test`. Each installs what is missing (cmake/deps.txt), configures, builds and runs;
+# a second call installs and rebuilds nothing. The rest is for those who work on the library.
+PREFIX ?= /usr/local
+JOBS ?= $(shell nproc)
+SETUP = @cmake/setup.sh
+BUILD = @cmake --build --preset
+
+.PHONY: help demo test bench lint asan tsan fuzz install clean setup setup-bench setup-fuzz
+
+help:
+	@echo "make demo             two soft cylinders with and without friction: table, picture, out/demo/"
+	@echo "make test             the whole test suite"
+	@echo "make bench            the figures: kernels and full steps"
+	@echo "make lint             layout, includes, headers, text"
+	@echo "make asan, make tsan  the suite under the sanitizers"
+	@echo "make fuzz             the readers under libFuzzer"
+	@echo "make install PREFIX=  library, headers, plugins, command (default $(PREFIX))"
+	@echo "make clean            removes build/ and out/"
+
+setup:
+	$(SETUP) doors
+setup-bench:
+	$(SETUP) doors bench
+setup-fuzz:
+	$(SETUP) doors clang
+
+# Configured once; ninja calls CMake again by itself where a CMake file changed.
+build/bench/build.ninja: | setup-bench
+build/fuzz/build.ninja: | setup-fuzz
+build/%/build.ninja: | setup
+	cmake --preset $*
+
+demo: setup build/release/build.ninja
+	$(BUILD) release --target deform_command
+	@python3 cmake/demo.py build/release/bin/deform out/demo
+
+test: setup build/release/build.ninja
+	$(BUILD) release
+	@ctest --preset release -j $(JOBS)
+
+lint: setup build/release/build.ninja
+	@ctest --preset release -j $(JOBS) -L lint
+
+asan tsan: %: setup build/%/build.ninja
+	$(BUILD) $@ --target checked_by_$@
+	@ctest --preset $@ -j $(JOBS)
+
+bench: setup-bench build/bench/build.ninja
+	$(BUILD) bench
+	$(BUILD) bench --target run_bench
+
+fuzz: setup-fuzz build/fuzz/build.ninja
+	$(BUILD) fuzz --target run_fuzz
+
+install: setup build/release/build.ninja
+	$(BUILD) release --target deform_command
+	@cmake --install build/release --prefix $(abspath $(PREFIX))
+
+clean:
+	rm -rf build out

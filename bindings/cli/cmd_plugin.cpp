@@ -1,0 +1,194 @@
+// deform plugin list | info ID | check FILE
+#include <cstdio>
+#include <cstring>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "cli.h"
+
+namespace cli {
+namespace {
+
+struct Type { const dfm_type *type; std::string file; };
+struct Passed { std::string file, reason; };
+struct Found { std::vector<Type> types; std::vector<Passed> passed; };
+
+using Context = std::unique_ptr<dfm_context, decltype(&dfm_context_destroy)>;
+
+Found look(dfm_context *context) {
+  Found found;
+  dfm_plugin_visit(
+      context, [](void *user, const dfm_type *type, const char *file) { static_cast<Found *>(user)->types.push_back({type, file}); }, &found);
+  dfm_plugin_visit_passed(
+      context, [](void *user, const char *file, const char *reason) { static_cast<Found *>(user)->passed.push_back({file, reason}); }, &found);
+  return found;
+}
+
+const char *kind_name(uint32_t kind) {
+  return kind == DFM_KIND_FRICTION ? "law" : kind == DFM_KIND_MODEL ? "model" : "solver";
+}
+
+std::string quoted(const char *text) {
+  std::string out = "\"";
+  for (const char *c = text ? text : ""; *c; ++c) {
+    const unsigned char u = static_cast<unsigned char>(*c);
+    char escape[8];
+    if (*c == '"' || *c == '\\') out += '\\', out += *c;
+    else if (u < 0x20) std::snprintf(escape, sizeof escape, "\\u%04x", u), out += escape;
+    else out += *c;
+  }
+  return out + "\"";
+}
+
+std::string number(double x) {
+  char text[40];
+  std::snprintf(text, sizeof text, "%.17g", x);
+  return text;
+}
+
+template <class List, class F>
+std::string array(const List &list, F &&one) {
+  std::string out = "[";
+  for (const auto &item : list) out += (out.size() > 1 ? ", " : "") + one(item);
+  return out + "]";
+}
+
+std::vector<std::string> effects(const dfm_type &type) {
+  std::vector<std::string> out;
+  for (const char *const *e = type.effects; e && *e; ++e) out.push_back(*e);
+  return out;
+}
+
+std::string joined(const std::vector<std::string> &words) {
+  std::string out;
+  for (const auto &w : words) out += (out.empty() ? "" : " ") + w;
+  return out.empty() ? "none" : out;
+}
+
+std::string json_head(const Type &t) {
+  return "\"kind\": " + quoted(kind_name(t.type->kind)) + ", \"id\": " + quoted(t.type->id) + ", \"name\": " + quoted(t.type->name) +
+         ", \"version\": " + quoted(t.type->version) + ", \"file\": " + quoted(t.file.c_str()) + ", \"effects\": " +
+         array(effects(*t.type), [](const std::string &e) { return quoted(e.c_str()); });
+}
+
+int list(const Globals &globals, const std::vector<std::string> &directories) {
+  const Context context(make_context(globals), dfm_context_destroy);
+  for (const auto &directory : directories)
+    if (dfm_plugin_scan(context.get(), directory.c_str(), nullptr) < 0) return fail(dfm_last_error());
+  const Found found = look(context.get());
+  if (globals.json) {
+    std::printf("{\"types\": %s,\n \"passed\": %s}\n", array(found.types, [](const Type &t) { return "\n  {" + json_head(t) + "}"; }).c_str(),
+                array(found.passed, [](const Passed &p) {
+                  return "\n  {\"file\": " + quoted(p.file.c_str()) + ", \"reason\": " + quoted(p.reason.c_str()) + "}";
+                }).c_str());
+    return kDone;
+  }
+  for (const Type &t : found.types)
+    std::printf("%-6s %-28s %-8s %s\n       effects: %s\n       %s\n", kind_name(t.type->kind), t.type->id, t.type->version, t.type->name,
+                joined(effects(*t.type)).c_str(), t.file.c_str());
+  if (found.types.empty()) std::printf("no plugin is loaded; set DEFORM_PLUGIN_PATH, or name directories with --dir\n");
+  if (!found.passed.empty()) std::printf("\npassed over:\n");
+  for (const Passed &p : found.passed) std::printf("  %s\n    %s\n", p.file.c_str(), p.reason.c_str());
+  return kDone;
+}
+
+// By full id or short name; several kinds may share a short name, then all are shown.
+std::vector<Type> matching(const Found &found, const std::string &id) {
+  std::vector<Type> exact, by_short_name;
+  for (const Type &t : found.types) {
+    const char *dot = std::strrchr(t.type->id, '.');
+    if (id == t.type->id) exact.push_back(t);
+    if (dot && id == dot + 1) by_short_name.push_back(t);
+  }
+  return exact.empty() ? by_short_name : exact;
+}
+
+std::string values_of(const dfm_param &row) {
+  std::string names;
+  for (const char *const *n = row.names; n && *n; ++n) names += (names.empty() ? "" : "|") + std::string(*n);
+  return names;
+}
+
+void print_info(const Type &t) {
+  const dfm_type &type = *t.type;
+  std::printf("%s %s, version %s\n  name     %s\n  licence  %s\n  source   %s\n  file     %s\n  effects  %s\n", kind_name(type.kind), type.id,
+              type.version, type.name, type.licence, type.source, t.file.c_str(), joined(effects(type)).c_str());
+  if (type.nparam) std::printf("\n  %-12s %-12s %-24s %-10s %s\n", "parameter", "default", "range", "unit", "meaning");
+  for (uint32_t i = 0; i < type.nparam; ++i) {
+    const dfm_param &row = type.params[i];
+    char range[64], value[32];
+    std::snprintf(range, sizeof range, "%g .. %g", row.min, row.max);
+    std::snprintf(value, sizeof value, "%g", row.def);
+    const std::string names = values_of(row);
+    std::printf("  %-12s %-12s %-24s %-10s %s%s%s%s\n", row.key, value, names.empty() ? range : names.c_str(), row.unit, row.label,
+                row.width > 1 ? (" (" + std::to_string(row.width) + " values)").c_str() : "", row.flags & DFM_PARAM_RUNTIME ? ", may change in a run" : "",
+                row.flags & DFM_PARAM_PER_CELL ? ", may vary by cell" : "");
+  }
+}
+
+std::string json_info(const Type &t) {
+  std::vector<const dfm_param *> rows;
+  for (uint32_t i = 0; i < t.type->nparam; ++i) rows.push_back(&t.type->params[i]);
+  const auto row_text = [](const dfm_param *row) {
+    std::vector<const char *> names;
+    for (const char *const *n = row->names; n && *n; ++n) names.push_back(*n);
+    const auto flag = [&](uint32_t bit) { return row->flags & bit ? "true" : "false"; };
+    return "\n    {\"key\": " + quoted(row->key) + ", \"label\": " + quoted(row->label) + ", \"unit\": " + quoted(row->unit) +
+           ", \"min\": " + number(row->min) + ", \"max\": " + number(row->max) + ", \"default\": " + number(row->def) +
+           ", \"width\": " + std::to_string(row->width) + ", \"integer\": " + flag(DFM_PARAM_INTEGER) + ", \"runtime\": " +
+           flag(DFM_PARAM_RUNTIME) + ", \"per_cell\": " + flag(DFM_PARAM_PER_CELL) +
+           (names.empty() ? "" : ", \"names\": " + array(names, [](const char *n) { return quoted(n); })) + "}";
+  };
+  return "{" + json_head(t) + ",\n  \"licence\": " + quoted(t.type->licence) + ", \"source\": " + quoted(t.type->source) +
+         ",\n  \"params\": " + array(rows, row_text) + "}";
+}
+
+int info(const Globals &globals, const std::string &id) {
+  const Context context(make_context(globals), dfm_context_destroy);
+  std::vector<Type> types;
+  if (id.find('/') != std::string::npos) {
+    if (dfm_plugin_load(context.get(), id.c_str()) < 0) return fail(dfm_last_error());
+    for (const Type &t : look(context.get()).types)
+      if (t.file == id) types.push_back(t);
+  } else {
+    types = matching(look(context.get()), id);
+  }
+  if (types.empty()) {
+    std::string known;
+    for (const Type &t : look(context.get()).types) known += (known.empty() ? "" : ", ") + std::string(t.type->id);
+    return fail("no plugin \"" + id + "\" is loaded; loaded: " + (known.empty() ? "none" : known) + "; see \"deform plugin list\"");
+  }
+  if (globals.json) {
+    std::printf("%s\n", types.size() == 1 ? json_info(types[0]).c_str() : array(types, json_info).c_str());
+    return kDone;
+  }
+  for (const Type &t : types) print_info(t);
+  return kDone;
+}
+
+}  // namespace
+
+void add_plugin(CLI::App &app, Globals &globals, int *exit_code) {
+  CLI::App *plugin = app.add_subcommand("plugin", "what plugins were found, what they offer");
+  plugin->require_subcommand(1);
+
+  CLI::App *list_command = plugin->add_subcommand("list", "types found and where; files passed over and why");
+  auto directories = std::make_shared<std::vector<std::string>>();
+  list_command->add_option("--dir", *directories, "also scan this directory")->type_name("DIR");
+  list_command->callback([=, &globals] { *exit_code = list(globals, *directories); });
+
+  CLI::App *info_command = plugin->add_subcommand("info", "metadata, effects and parameters of a type");
+  auto id = std::make_shared<std::string>();
+  info_command->add_option("ID", *id, "short name, full id, or path of a plugin file")->required();
+  info_command->callback([=, &globals] { *exit_code = info(globals, *id); });
+
+  CLI::App *check_command = plugin->add_subcommand("check", "the validator");
+  auto file = std::make_shared<std::string>();
+  check_command->add_option("FILE", *file, "plugin file")->required();
+  check_command->callback([=] { *exit_code = fail("\"plugin check\" is not available yet; \"plugin info " + *file + "\" loads a file and shows its table"); });
+  for (CLI::App *command : {list_command, info_command, check_command}) command->fallthrough();
+  plugin->fallthrough();
+}
+
+}  // namespace cli

@@ -1,0 +1,55 @@
+// Triangles for the GPU: surfaces with creased normals, solids, ribbons. Everything becomes one kind of vertex, three to a triangle, placed
+// relative to the scene's centre so that single precision suffices far from the origin.
+#pragma once
+#include <array>
+#include <cmath>
+#include <vector>
+
+#include "render.h"
+
+namespace render {
+
+struct Vec {
+  double x = 0, y = 0, z = 0;
+  Vec operator+(const Vec &o) const { return {x + o.x, y + o.y, z + o.z}; }
+  Vec operator-(const Vec &o) const { return {x - o.x, y - o.y, z - o.z}; }
+  Vec operator*(double s) const { return {x * s, y * s, z * s}; }
+};
+inline Vec vec(const double p[3]) { return {p[0], p[1], p[2]}; }
+inline double dot(const Vec &a, const Vec &b) { return a.x * b.x + a.y * b.y + a.z * b.z; }
+inline Vec cross(const Vec &a, const Vec &b) { return {a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x}; }
+inline double norm(const Vec &a) { return std::sqrt(dot(a, a)); }
+inline bool finite(const Vec &a) { return std::isfinite(a.x) && std::isfinite(a.y) && std::isfinite(a.z); }
+// `otherwise` where a has no direction.
+Vec unit(const Vec &a, const Vec &otherwise = {0, 0, 1});
+// Any direction square to the unit vector n.
+Vec square_to(const Vec &n);
+
+using Mat4 = std::array<float, 16>;  // columns, as GL reads them
+struct View { Vec eye, right, up, back; double tan_half; };
+View view_of(const Camera &camera);
+Mat4 perspective(const View &view, double aspect, double near, double far);
+// Looks against `towards_light` at a ball of that radius around the origin; clip coordinates -1..1.
+Mat4 orthographic(const Vec &towards_light, const Vec &centre, double radius);
+// Clip coordinates -1..1 to texture coordinates and depth 0..1.
+Mat4 to_texture(const Mat4 &clip);
+
+struct Vertex { float p[3], n[3], rgb[3], value, has_value; };
+
+struct Shape {
+  std::vector<Vertex> vertices;
+  Vec origin;
+  void surface(const Surface &s);
+  void box(const Vec &centre, const Vec axes[3], const float rgb[3]);  // axes carry the half lengths
+  void sphere(const Sphere &s);
+  void capsule(const Capsule &c);
+  void ribbons(const Lines &lines, const View &view, double pixels_high);
+
+ private:
+  void triangle(const Vec p[3], const Vec n[3], const float rgb[3]);
+  void revolve(const Vec &a, const Vec &axis, const std::vector<std::array<double, 4>> &profile, const float rgb[3]);
+};
+
+void axes_of(const Box &box, Vec axes[3]);
+
+}  // namespace render

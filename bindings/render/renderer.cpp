@@ -1,0 +1,601 @@
+// One picture: everything becomes triangles (geometry.cpp), the shadow maps of the key light and of the sky are drawn, then background, floor,
+// bodies, what is seen through (far to near), lines; four samples a pixel are resolved and read back.
+#include "render.h"
+
+#include <algorithm>
+#include <cfenv>
+#include <cstdio>
+#include <cstdlib>
+#include <cstring>
+#include <numbers>
+
+#include "geometry.h"
+#include "gl.h"
+#include "shaders.h"
+
+namespace render {
+namespace {
+
+constexpr int kKeySide = 1536, kSkySide = 160, kSamples = 4;
+constexpr uint32_t kLargest = 8192;
+constexpr double kLevel = 0.9999;  // cosine from which a plane is the floor
+
+// What host code set for its own arithmetic (rounding, traps) stays as it was: a picture may not change a simulation's bits.
+struct FloatingPoint {
+  std::fenv_t saved;
+  FloatingPoint() { std::fegetenv(&saved); std::fesetenv(FE_DFL_ENV); }
+  ~FloatingPoint() { std::fesetenv(&saved); }
+};
+
+struct Current {
+  Context &context;
+  bool ok;
+  explicit Current(Context &c) : context(c), ok(c.make_current()) {}
+  ~Current() { context.release(); }
+};
+
+struct Batch {
+  GLint first = 0;
+  GLsizei count = 0;
+  Kind kind = Kind::lit;
+  float alpha = 1, fade = 0;
+  bool edges = false, shadow = true, on_top = false;
+  double depth = 0;  // of its middle, for the order of what is seen through
+};
+
+struct Ground { Vec centre, x, y; double spacing, radius; bool present = false; };
+
+struct Frame {
+  Shape shape;
+  std::vector<Batch> batches;
+  Ground ground;
+  View view;
+  Vec up, key;
+  Vec centre;         // of the casters, relative to the origin
+  double radius = 1;  // of the casters
+  double extent = 1;  // half the diagonal of what grid and slabs are sized to
+};
+
+double nice(double x) {  // 1, 2 or 5 times a power of ten, not above x
+  const double base = std::pow(10, std::floor(std::log10(x))), m = x / base;
+  return base * (m >= 5 ? 5 : m >= 2 ? 2 : 1);
+}
+
+std::string check(const Scene &scene) {
+  const auto number = [](size_t i) { return std::to_string(i); };
+  for (size_t b = 0; b < scene.surfaces.size(); ++b) {
+    const Surface &s = scene.surfaces[b];
+    for (size_t i = 0; i < 3 * size_t(s.ntri); ++i)
+      if (s.tri[i] >= s.n)
+        return "surface " + number(b) + ": triangle " + number(i / 3) + " names vertex " + number(s.tri[i]) + " of " + number(s.n);
+  }
+  if (scene.camera && !(finite(vec(scene.camera->eye)) && finite(vec(scene.camera->look_at))))
+    return "camera: eye and look_at must be finite numbers";
+  return {};
+}
+
+// Appends what `add` draws as one batch.
+template <class F>
+void batch(Frame &frame, Batch b, F add) {
+  std::vector<Vertex> &v = frame.shape.vertices;
+  b.first = GLint(v.size());
+  add();
+  b.count = GLsizei(v.size()) - b.first;
+  if (b.count == 0) return;
+  Vec middle;
+  for (size_t i = size_t(b.first); i < v.size(); ++i) middle = middle + Vec{v[i].p[0], v[i].p[1], v[i].p[2]};
+  b.depth = dot(frame.view.eye - middle * (1.0 / b.count), frame.view.back);
+  frame.batches.push_back(b);
+}
+
+Batch solid(const Look &look) {
+  Batch b;
+  b.alpha = std::clamp(look.alpha, 0.f, 1.f);
+  b.shadow = b.alpha >= 1;
+  return b;
+}
+
+// A wall covers the box it stands beside; a ramp reaches farther, since things move along it.
+struct Slab { Vec centre, axes[3]; };
+Slab slab_of(const Plane &p, const Vec &up, const Bounds &extent) {
+  const Vec n = unit(vec(p.normal), up), across = unit(cross(up, n), square_to(n)), along = cross(n, across);
+  const Vec lo = vec(extent.lo), hi = vec(extent.hi), middle = (lo + hi) * 0.5, half = (hi - lo) * 0.5;
+  const auto reach = [&](const Vec &d) { return std::abs(d.x) * half.x + std::abs(d.y) * half.y + std::abs(d.z) * half.z; };
+  const double size = norm(half), thick = 0.02 * size;
+  const bool ramp = dot(n, up) > 0.3;
+  const double wide = ramp ? 0.9 * size : 1.02 * reach(across), high = ramp ? 1.3 * size : 1.02 * reach(along);
+  const Vec foot = middle - n * dot(n, middle - vec(p.point));
+  return {foot - n * thick, {across * std::max(wide, 0.1 * size), along * std::max(high, 0.1 * size), n * thick}};
+}
+
+// The extent with the places where planes near it lie across from its middle, so that the walls of a room meet each other and the floor.
+Bounds room_of(const Scene &scene, const Vec &up, const Bounds &extent) {
+  const Vec middle = (vec(extent.lo) + vec(extent.hi)) * 0.5;
+  const double size = norm(vec(extent.hi) - middle);
+  Bounds room = extent;
+  for (const Plane &p : scene.planes) {
+    const Vec n = unit(vec(p.normal), up), foot = middle - n * dot(n, middle - vec(p.point));
+    if (norm(foot - middle) < 1.5 * size) room.add(&foot.x);
+  }
+  return room;
+}
+
+void add_planes(const Scene &scene, Frame &frame, const Bounds &extent) {
+  const Bounds room = room_of(scene, frame.up, extent);
+  const Vec middle = (vec(extent.lo) + vec(extent.hi)) * 0.5;
+  const Plane *floor = nullptr;
+  for (const Plane &p : scene.planes) {
+    const Vec n = unit(vec(p.normal), frame.up);
+    const Vec eye = frame.view.eye + frame.shape.origin;
+    if (dot(n, eye - vec(p.point)) <= 0) continue;
+    if (dot(n, frame.up) > kLevel) {
+      if (!floor || dot(vec(p.point) - vec(floor->point), frame.up) > 0) floor = &p;
+      continue;
+    }
+    batch(frame, solid(p.look), [&] {
+      const Slab s = slab_of(p, frame.up, room);
+      frame.shape.box(s.centre, s.axes, p.look.rgb);
+    });
+  }
+  if (!floor) return;
+  Ground &g = frame.ground;
+  g.present = true;
+  g.radius = 6 * frame.extent;
+  g.spacing = nice(0.45 * frame.extent);
+  g.x = square_to(frame.up);
+  g.y = cross(frame.up, g.x);
+  // The pattern hangs on the world, not on the scene's middle, so that it rests from frame to frame.
+  const Vec level = vec(floor->point) + frame.up * 1e-9;
+  const Vec foot = middle + frame.up * dot(frame.up, level - middle);
+  const double two = 2 * g.spacing;
+  const Vec snapped = foot - g.x * (dot(foot, g.x) - two * std::round(dot(foot, g.x) / two)) - g.y * (dot(foot, g.y) - two * std::round(dot(foot, g.y) / two));
+  g.centre = snapped - frame.shape.origin;
+  Batch b;
+  b.kind = Kind::floor;
+  b.shadow = false;
+  b.alpha = floor->look.alpha;
+  // Looks of obstacles are grey by default; a floor is lighter, so that shadows have room to fall.
+  const float default_look = Look{}.rgb[0];
+  const bool own = floor->look.rgb[0] != default_look || floor->look.rgb[1] != Look{}.rgb[1] || floor->look.rgb[2] != Look{}.rgb[2];
+  const float light[3] = {0.90f, 0.905f, 0.915f};
+  batch(frame, b, [&] {
+    const Vec n[3] = {frame.up, frame.up, frame.up}, c = snapped, x = g.x * g.radius, y = g.y * g.radius;
+    const Vec corner[4] = {c - x - y, c + x - y, c + x + y, c - x + y};
+    for (int k = 0; k < 2; ++k)
+      for (const int i : {0, 1 + k, 2 + k}) {
+        Vertex v{};
+        const Vec q = corner[i] - frame.shape.origin;
+        v.p[0] = float(q.x), v.p[1] = float(q.y), v.p[2] = float(q.z);
+        v.n[0] = float(n[0].x), v.n[1] = float(n[0].y), v.n[2] = float(n[0].z);
+        std::copy_n(own ? floor->look.rgb : light, 3, v.rgb);
+        frame.shape.vertices.push_back(v);
+      }
+  });
+}
+
+// Ball around what casts shadows and lies in the box (floors cast none).
+void fit_casters(Frame &frame, const Bounds &box) {
+  Bounds all;
+  const double reach = norm(vec(box.hi) - vec(box.lo));
+  for (const Batch &b : frame.batches)
+    if (b.shadow && b.kind == Kind::lit)
+      for (GLint i = b.first; i < b.first + b.count; ++i) {
+        const float *q = frame.shape.vertices[size_t(i)].p;
+        double p[3] = {q[0], q[1], q[2]};
+        const double *o = &frame.shape.origin.x;
+        for (int k = 0; k < 3; ++k) p[k] = std::clamp(p[k], box.lo[k] - o[k] - 0.5 * reach, box.hi[k] - o[k] + 0.5 * reach);
+        all.add(p);
+      }
+  if (all.empty()) return;
+  frame.centre = (vec(all.lo) + vec(all.hi)) * 0.5;
+  frame.radius = std::max(0.5 * norm(vec(all.hi) - vec(all.lo)), 1e-9);
+}
+
+Frame compose(const Scene &scene, double aspect, double pixels_high) {
+  Frame frame;
+  Bounds box = bounds(scene);
+  if (box.empty())
+    for (int k = 0; k < 3; ++k) box.lo[k] = -1, box.hi[k] = 1;
+  const Bounds extent = scene.extent && !scene.extent->empty() ? *scene.extent : box;
+  const Vec middle = (vec(extent.lo) + vec(extent.hi)) * 0.5;
+  frame.extent = std::max(0.5 * norm(vec(extent.hi) - vec(extent.lo)), 1e-6);
+  frame.up = unit(vec(scene.up));
+  frame.shape.origin = middle;
+  Bounds shown = extent;
+  for (const Plane &p : scene.planes) {
+    const double slope = dot(unit(vec(p.normal), frame.up), frame.up);
+    if (slope < 0.3 || slope > kLevel) continue;
+    const Slab s = slab_of(p, frame.up, room_of(scene, frame.up, extent));
+    for (const double side : {-1.0, 1.0})
+      for (const double end : {-1.0, 1.0}) {
+        const Vec q = s.centre + s.axes[0] * side + s.axes[1] * end;
+        shown.add(&q.x);
+      }
+  }
+  frame.view = view_of(scene.camera ? *scene.camera : auto_camera(shown, aspect, scene.up));
+  frame.view.eye = frame.view.eye - middle;
+  const Vec level = unit(frame.view.back - frame.up * dot(frame.view.back, frame.up), frame.view.up);
+  frame.key = unit(frame.up * 1.15 - frame.view.right * 0.62 + level * 0.55);
+
+  for (const Surface &s : scene.surfaces) {
+    Batch b;
+    b.edges = s.edges;
+    b.fade = s.fade;
+    batch(frame, b, [&] { frame.shape.surface(s); });
+  }
+  for (const Box &b : scene.boxes)
+    batch(frame, solid(b.look), [&] {
+      Vec axes[3];
+      axes_of(b, axes);
+      frame.shape.box(vec(b.pose.position), axes, b.look.rgb);
+    });
+  for (const Sphere &s : scene.spheres) batch(frame, solid(s.look), [&] { frame.shape.sphere(s); });
+  for (const Capsule &c : scene.capsules) batch(frame, solid(c.look), [&] { frame.shape.capsule(c); });
+  add_planes(scene, frame, extent);
+  fit_casters(frame, box);
+  View world = frame.view;
+  world.eye = world.eye + middle;
+  for (const Lines &l : scene.lines) {
+    Batch b;
+    b.kind = Kind::plain;
+    b.shadow = false;
+    b.on_top = l.on_top;
+    batch(frame, b, [&] { frame.shape.ribbons(l, world, pixels_high); });
+  }
+  // Floor first (it fades into the background), then what hides, then what is seen through from far to near, lines last.
+  const auto rank = [](const Batch &b) { return b.kind == Kind::floor ? 0 : b.kind == Kind::plain ? 3 + b.on_top : b.alpha >= 1 ? 1 : 2; };
+  std::stable_sort(frame.batches.begin(), frame.batches.end(),
+                   [&](const Batch &a, const Batch &b) { return rank(a) != rank(b) ? rank(a) < rank(b) : rank(a) == 2 && a.depth > b.depth; });
+  return frame;
+}
+
+// Directions of the sky: a sunflower over the upper half ball, kept 8 degrees clear of the horizon.
+std::array<Vec, kSkyLights> sky_directions(const Vec &up) {
+  std::array<Vec, kSkyLights> d;
+  const Vec x = square_to(up), y = cross(up, x);
+  for (int i = 0; i < kSkyLights; ++i) {
+    const double z = 1 - (i + 0.5) / kSkyLights * 0.86, r = std::sqrt(1 - z * z), a = 2.399963229728653 * i;
+    d[size_t(i)] = up * z + x * (r * std::cos(a)) + y * (r * std::sin(a));
+  }
+  return d;
+}
+
+class GlRenderer final : public Renderer {
+ public:
+  GlRenderer(std::unique_ptr<Context> context, uint32_t width, uint32_t height) : context_(std::move(context)), width_(width), height_(height) {}
+  ~GlRenderer() override;
+  bool start(std::string *why_not);
+  bool draw(const Scene &scene, Image &picture, std::string *why_not) override;
+  const char *backend() const override { return context_->name(); }
+  const char *device() const override { return device_.c_str(); }
+
+ private:
+  GLuint program(const char *vertex, const char *fragment, std::string *why_not);
+  bool make_targets(std::string *why_not);
+  GLuint depth_map(GLenum target, int side, int layers);
+  void set(const char *name, const Vec &v) const;
+  void set(const char *name, const Mat4 &m) const { gl_.UniformMatrix4fv(gl_.GetUniformLocation(current_, name), 1, GL_FALSE, m.data()); }
+  void set(const char *name, int i) const { gl_.Uniform1i(gl_.GetUniformLocation(current_, name), i); }
+  void set(const char *name, double x) const { gl_.Uniform1f(gl_.GetUniformLocation(current_, name), float(x)); }
+  void use(GLuint program) { current_ = program; gl_.UseProgram(program); }
+  void upload(const Frame &frame, ColourMap map);
+  void draw_shadows(const Frame &frame, const Mat4 &key, const std::array<Mat4, kSkyLights> &sky);
+  void draw_colours(const Frame &frame, const Mat4 &key, const std::array<Mat4, kSkyLights> &sky, const std::array<Vec, kSkyLights> &directions);
+  void read(Image &picture);
+
+  std::unique_ptr<Context> context_;
+  Gl gl_;
+  std::string device_;
+  uint32_t width_, height_;
+  bool started_ = false;
+  GLuint main_ = 0, depth_ = 0, background_ = 0, current_ = 0;
+  GLuint array_ = 0, buffer_ = 0, key_texture_ = 0, sky_texture_ = 0, map_texture_ = 0;
+  GLuint shadow_target_ = 0, sampled_target_ = 0, resolved_target_ = 0, stores_[3] = {0, 0, 0};
+  std::vector<uint8_t> rgba_;
+};
+
+GlRenderer::~GlRenderer() {
+  if (!started_) return;
+  Current current(*context_);
+  if (!current.ok) return;
+  for (const GLuint p : {main_, depth_, background_}) gl_.DeleteProgram(p);
+  for (const GLuint t : {key_texture_, sky_texture_, map_texture_}) gl_.DeleteTextures(1, &t);
+  for (const GLuint f : {shadow_target_, sampled_target_, resolved_target_}) gl_.DeleteFramebuffers(1, &f);
+  gl_.DeleteRenderbuffers(3, stores_);
+  gl_.DeleteBuffers(1, &buffer_);
+  gl_.DeleteVertexArrays(1, &array_);
+}
+
+GLuint GlRenderer::program(const char *vertex, const char *fragment, std::string *why_not) {
+  const GLuint p = gl_.CreateProgram();
+  for (const auto &[type, source] : {std::pair{GL_VERTEX_SHADER, vertex}, std::pair{GL_FRAGMENT_SHADER, fragment}}) {
+    const GLuint s = gl_.CreateShader(GLenum(type));
+    gl_.ShaderSource(s, 1, &source, nullptr);
+    gl_.CompileShader(s);
+    GLint ok = 0;
+    gl_.GetShaderiv(s, GL_COMPILE_STATUS, &ok);
+    if (!ok) {
+      char log[1024] = "";
+      gl_.GetShaderInfoLog(s, sizeof log, nullptr, log);
+      *why_not = std::string(context_->name()) + ": " + device_ + " refuses a shader: " + log;
+    }
+    gl_.AttachShader(p, s);
+    gl_.DeleteShader(s);
+    if (!ok) return 0;
+  }
+  const char *names[] = {"position", "normal", "colour", "value"};
+  for (GLuint i = 0; i < 4; ++i) gl_.BindAttribLocation(p, i, names[i]);
+  gl_.LinkProgram(p);
+  GLint ok = 0;
+  gl_.GetProgramiv(p, GL_LINK_STATUS, &ok);
+  if (!ok) *why_not = std::string(context_->name()) + ": " + device_ + " cannot link a shader";
+  return ok ? p : 0;
+}
+
+GLuint GlRenderer::depth_map(GLenum target, int side, int layers) {
+  GLuint t = 0;
+  gl_.GenTextures(1, &t);
+  gl_.BindTexture(target, t);
+  if (target == GL_TEXTURE_2D) gl_.TexImage2D(target, 0, GL_DEPTH_COMPONENT24, side, side, 0, GL_DEPTH_COMPONENT, GL_UNSIGNED_INT, nullptr);
+  else gl_.TexImage3D(target, 0, GL_DEPTH_COMPONENT24, side, side, layers, 0, GL_DEPTH_COMPONENT, GL_UNSIGNED_INT, nullptr);
+  const float lit[4] = {1, 1, 1, 1};  // outside the map nothing stands in the way
+  gl_.TexParameterfv(target, GL_TEXTURE_BORDER_COLOR, lit);
+  gl_.TexParameteri(target, GL_TEXTURE_WRAP_S, GL_CLAMP_TO_BORDER);
+  gl_.TexParameteri(target, GL_TEXTURE_WRAP_T, GL_CLAMP_TO_BORDER);
+  gl_.TexParameteri(target, GL_TEXTURE_MIN_FILTER, GL_LINEAR);
+  gl_.TexParameteri(target, GL_TEXTURE_MAG_FILTER, GL_LINEAR);
+  gl_.TexParameteri(target, GL_TEXTURE_COMPARE_MODE, GL_COMPARE_REF_TO_TEXTURE);
+  gl_.TexParameteri(target, GL_TEXTURE_COMPARE_FUNC, GL_LEQUAL);
+  return t;
+}
+
+bool GlRenderer::make_targets(std::string *why_not) {
+  gl_.ActiveTexture(GL_TEXTURE0);
+  key_texture_ = depth_map(GL_TEXTURE_2D, kKeySide, 1);
+  gl_.ActiveTexture(GL_TEXTURE1);
+  sky_texture_ = depth_map(GL_TEXTURE_2D_ARRAY, kSkySide, kSkyLights);
+  gl_.ActiveTexture(GL_TEXTURE2);
+  gl_.GenTextures(1, &map_texture_);
+  gl_.BindTexture(GL_TEXTURE_2D, map_texture_);
+  for (const GLenum side : {GL_TEXTURE_WRAP_S, GL_TEXTURE_WRAP_T}) gl_.TexParameteri(GL_TEXTURE_2D, side, GL_CLAMP_TO_EDGE);
+  for (const GLenum filter : {GL_TEXTURE_MIN_FILTER, GL_TEXTURE_MAG_FILTER}) gl_.TexParameteri(GL_TEXTURE_2D, filter, GL_LINEAR);
+
+  GLint most = 0;
+  gl_.GetIntegerv(GL_MAX_SAMPLES, &most);
+  const GLsizei samples = std::min<GLsizei>(kSamples, most), w = GLsizei(width_), h = GLsizei(height_);
+  gl_.GenFramebuffers(1, &shadow_target_);
+  gl_.GenFramebuffers(1, &sampled_target_);
+  gl_.GenFramebuffers(1, &resolved_target_);
+  gl_.GenRenderbuffers(3, stores_);
+  const auto store = [&](int i, GLsizei n, GLenum format, GLenum point) {
+    gl_.BindRenderbuffer(GL_RENDERBUFFER, stores_[i]);
+    gl_.RenderbufferStorageMultisample(GL_RENDERBUFFER, n, format, w, h);
+    gl_.FramebufferRenderbuffer(GL_FRAMEBUFFER, point, GL_RENDERBUFFER, stores_[i]);
+  };
+  gl_.BindFramebuffer(GL_FRAMEBUFFER, sampled_target_);
+  store(0, samples, GL_RGBA8, GL_COLOR_ATTACHMENT0);
+  store(1, samples, GL_DEPTH_COMPONENT24, GL_DEPTH_ATTACHMENT);
+  const bool sampled = gl_.CheckFramebufferStatus(GL_FRAMEBUFFER) == GL_FRAMEBUFFER_COMPLETE;
+  gl_.BindFramebuffer(GL_FRAMEBUFFER, resolved_target_);
+  store(2, 0, GL_RGBA8, GL_COLOR_ATTACHMENT0);
+  const bool resolved = gl_.CheckFramebufferStatus(GL_FRAMEBUFFER) == GL_FRAMEBUFFER_COMPLETE;
+  gl_.GenVertexArrays(1, &array_);
+  gl_.BindVertexArray(array_);
+  gl_.GenBuffers(1, &buffer_);
+  gl_.BindBuffer(GL_ARRAY_BUFFER, buffer_);
+  const GLint widths[] = {3, 3, 3, 2};
+  size_t offset = 0;
+  for (GLuint i = 0; i < 4; ++i) {
+    gl_.EnableVertexAttribArray(i);
+    gl_.VertexAttribPointer(i, widths[i], GL_FLOAT, GL_FALSE, sizeof(Vertex), reinterpret_cast<const void *>(offset));
+    offset += size_t(widths[i]) * sizeof(float);
+  }
+  if (sampled && resolved && gl_.GetError() == GL_NO_ERROR) return true;
+  *why_not = std::string(context_->name()) + ": " + device_ + " gives no picture of " + std::to_string(width_) + " x " + std::to_string(height_) +
+             " pixels: ask for a smaller one";
+  return false;
+}
+
+bool GlRenderer::start(std::string *why_not) {
+  const FloatingPoint keep;
+  Current current(*context_);
+  std::string missing;
+  if (!current.ok) {
+    *why_not = std::string(context_->name()) + ": its context cannot be made current: install Debian's libgl1-mesa-dri";
+    return false;
+  }
+  if (!gl_.load(*context_, &missing)) {
+    *why_not = std::string(context_->name()) + ": the driver lacks " + missing + " of OpenGL 3.3: install Debian's libgl1-mesa-dri";
+    return false;
+  }
+  const GLubyte *text = gl_.GetString(GL_RENDERER);
+  device_ = text ? reinterpret_cast<const char *>(text) : "unnamed";
+  started_ = true;
+  return (main_ = program(kVertexShader, kFragmentShader, why_not)) && (depth_ = program(kDepthVertexShader, kDepthFragmentShader, why_not)) &&
+         (background_ = program(kBackgroundVertexShader, kBackgroundFragmentShader, why_not)) && make_targets(why_not);
+}
+
+void GlRenderer::set(const char *name, const Vec &v) const {
+  const float f[3] = {float(v.x), float(v.y), float(v.z)};
+  gl_.Uniform3fv(gl_.GetUniformLocation(current_, name), 1, f);
+}
+
+void GlRenderer::upload(const Frame &frame, ColourMap map) {
+  gl_.BindVertexArray(array_);
+  gl_.BindBuffer(GL_ARRAY_BUFFER, buffer_);
+  gl_.BufferData(GL_ARRAY_BUFFER, GLsizeiptr(frame.shape.vertices.size() * sizeof(Vertex)), frame.shape.vertices.data(), GL_STREAM_DRAW);
+  uint8_t table[257][4];  // an odd number: a map may have its kink in the middle
+  for (int i = 0; i < 257; ++i) {
+    const Colour c = map_colour(map, float(i) / 256);
+    const float rgb[3] = {c.r, c.g, c.b};
+    for (int k = 0; k < 3; ++k) table[i][k] = uint8_t(std::lround(255 * rgb[k]));
+    table[i][3] = 255;
+  }
+  gl_.ActiveTexture(GL_TEXTURE2);
+  gl_.TexImage2D(GL_TEXTURE_2D, 0, GL_RGBA8, 257, 1, 0, GL_RGBA, GL_UNSIGNED_BYTE, table);
+}
+
+void GlRenderer::draw_shadows(const Frame &frame, const Mat4 &key, const std::array<Mat4, kSkyLights> &sky) {
+  gl_.BindFramebuffer(GL_FRAMEBUFFER, shadow_target_);
+  gl_.DrawBuffer(GL_NONE);
+  gl_.ReadBuffer(GL_NONE);
+  gl_.Disable(GL_BLEND);
+  gl_.Enable(GL_DEPTH_TEST);
+  gl_.Enable(GL_DEPTH_CLAMP);  // what lies before or behind the ball still casts
+  gl_.Enable(GL_POLYGON_OFFSET_FILL);
+  gl_.PolygonOffset(1.5f, 2.f);
+  gl_.DepthFunc(GL_LEQUAL);
+  gl_.DepthMask(GL_TRUE);
+  use(depth_);
+  const auto draw = [&](const Mat4 &to_clip, int side) {
+    gl_.Viewport(0, 0, side, side);
+    gl_.Clear(GL_DEPTH_BUFFER_BIT);
+    set("to_clip", to_clip);
+    for (const Batch &b : frame.batches)
+      if (b.shadow) gl_.DrawArrays(GL_TRIANGLES, b.first, b.count);
+  };
+  gl_.FramebufferTexture2D(GL_FRAMEBUFFER, GL_DEPTH_ATTACHMENT, GL_TEXTURE_2D, key_texture_, 0);
+  draw(key, kKeySide);
+  for (int i = 0; i < kSkyLights; ++i) {
+    gl_.FramebufferTextureLayer(GL_FRAMEBUFFER, GL_DEPTH_ATTACHMENT, sky_texture_, 0, i);
+    draw(sky[size_t(i)], kSkySide);
+  }
+  gl_.Disable(GL_DEPTH_CLAMP);
+  gl_.Disable(GL_POLYGON_OFFSET_FILL);
+}
+
+void GlRenderer::draw_colours(const Frame &frame, const Mat4 &key, const std::array<Mat4, kSkyLights> &sky,
+                              const std::array<Vec, kSkyLights> &directions) {
+  gl_.BindFramebuffer(GL_FRAMEBUFFER, sampled_target_);
+  gl_.Viewport(0, 0, GLsizei(width_), GLsizei(height_));
+  gl_.ClearColor(1, 1, 1, 1);
+  gl_.Clear(GL_COLOR_BUFFER_BIT | GL_DEPTH_BUFFER_BIT);
+  gl_.Disable(GL_DEPTH_TEST);
+  use(background_);
+  gl_.DrawArrays(GL_TRIANGLES, 0, 3);
+
+  use(main_);
+  const double distance = norm(frame.view.eye - frame.centre);
+  const double near = std::max(distance - 1.8 * frame.radius - frame.extent, 0.02 * distance + 1e-9);
+  const double far = distance + frame.radius + (frame.ground.present ? 2 * frame.ground.radius : 0) + 4 * frame.extent;
+  set("to_clip", perspective(frame.view, double(width_) / height_, near, far));
+  set("eye", frame.view.eye);
+  set("up", frame.up);
+  set("key", frame.key);
+  set("key_map", to_texture(key));
+  set("key_texel", 2 * frame.radius / kKeySide);
+  set("sky_texel", 2 * frame.radius / kSkySide);
+  set("casters", frame.centre);
+  set("casters_radius", frame.radius);
+  double open = 0;
+  for (int i = 0; i < kSkyLights; ++i) {
+    char name[24];
+    std::snprintf(name, sizeof name, "sky_map[%d]", i);
+    set(name, to_texture(sky[size_t(i)]));
+    std::snprintf(name, sizeof name, "sky[%d]", i);
+    set(name, directions[size_t(i)]);
+    open += dot(directions[size_t(i)], frame.up);
+  }
+  set("sky_scale", 1 / open);
+  set("floor_centre", frame.ground.centre);
+  set("floor_x", frame.ground.x);
+  set("floor_y", frame.ground.y);
+  gl_.Uniform2f(gl_.GetUniformLocation(current_, "floor_size"), float(frame.ground.spacing), float(frame.ground.radius));
+  set("key_shadow", 0);
+  set("sky_shadow", 1);
+  set("map", 2);
+  gl_.Enable(GL_BLEND);
+  gl_.BlendFunc(GL_SRC_ALPHA, GL_ONE_MINUS_SRC_ALPHA);
+  gl_.Enable(GL_DEPTH_TEST);
+  for (const Batch &b : frame.batches) {
+    gl_.DepthFunc(b.on_top ? GL_ALWAYS : GL_LEQUAL);
+    gl_.DepthMask(b.alpha >= 1 && !b.on_top ? GL_TRUE : GL_FALSE);
+    set("kind", int(b.kind));
+    set("edges", int(b.edges));
+    set("alpha", double(b.alpha));
+    set("fade", double(b.fade));
+    gl_.DrawArrays(GL_TRIANGLES, b.first, b.count);
+  }
+  gl_.DepthMask(GL_TRUE);
+}
+
+void GlRenderer::read(Image &picture) {
+  const GLint w = GLint(width_), h = GLint(height_);
+  gl_.BindFramebuffer(GL_READ_FRAMEBUFFER, sampled_target_);
+  gl_.BindFramebuffer(GL_DRAW_FRAMEBUFFER, resolved_target_);
+  gl_.BlitFramebuffer(0, 0, w, h, 0, 0, w, h, GL_COLOR_BUFFER_BIT, GL_NEAREST);
+  gl_.BindFramebuffer(GL_FRAMEBUFFER, resolved_target_);
+  gl_.PixelStorei(GL_PACK_ALIGNMENT, 4);
+  rgba_.resize(size_t(width_) * height_ * 4);
+  gl_.ReadPixels(0, 0, w, h, GL_RGBA, GL_UNSIGNED_BYTE, rgba_.data());
+  picture.width = width_;
+  picture.height = height_;
+  picture.rgb.resize(size_t(width_) * height_ * 3);
+  for (size_t y = 0; y < height_; ++y) {  // GL's rows stand on their head
+    const uint8_t *from = rgba_.data() + (height_ - 1 - y) * width_ * 4;
+    uint8_t *to = picture.rgb.data() + y * width_ * 3;
+    for (size_t x = 0; x < width_; ++x) std::memcpy(to + 3 * x, from + 4 * x, 3);
+  }
+}
+
+bool GlRenderer::draw(const Scene &scene, Image &picture, std::string *why_not) {
+  std::string sentence = check(scene);
+  if (sentence.empty()) {
+    const FloatingPoint keep;
+    const Frame frame = compose(scene, double(width_) / height_, height_);
+    const std::array<Vec, kSkyLights> directions = sky_directions(frame.up);
+    const Mat4 key = orthographic(frame.key, frame.centre, 1.02 * frame.radius);
+    std::array<Mat4, kSkyLights> sky;
+    for (size_t i = 0; i < sky.size(); ++i) sky[i] = orthographic(directions[i], frame.centre, 1.02 * frame.radius);
+    Current current(*context_);
+    if (current.ok) {
+      upload(frame, scene.map);
+      draw_shadows(frame, key, sky);
+      draw_colours(frame, key, sky, directions);
+      read(picture);
+      const GLenum error = gl_.GetError();
+      if (error == GL_NO_ERROR) return true;
+      sentence = std::string(context_->name()) + ": " + device_ + " refuses the picture (GL error " + std::to_string(error) + ")";
+    } else {
+      sentence = std::string(context_->name()) + ": its context cannot be made current on this thread";
+    }
+  }
+  if (why_not) *why_not = sentence;
+  return false;
+}
+
+}  // namespace
+
+std::unique_ptr<Renderer> Renderer::create(Backend backend, uint32_t width, uint32_t height, std::string *why_not) {
+  std::string unused;
+  std::string &why = why_not ? *why_not : unused;
+  if (width < 1 || height < 1 || width > kLargest || height > kLargest) {
+    why = "a picture of " + std::to_string(width) + " x " + std::to_string(height) + " pixels: each side must be 1 to " + std::to_string(kLargest);
+    return nullptr;
+  }
+  const char *wish = std::getenv("DEFORM_RENDER_BACKEND");
+  if (backend == Backend::automatic && wish && *wish) {
+    const std::string name = wish;
+    if (name == "egl") backend = Backend::egl;
+    else if (name == "osmesa") backend = Backend::osmesa;
+    else if (name != "auto") {
+      why = name == "none" ? "pictures are switched off by DEFORM_RENDER_BACKEND=none: unset it, or set it to egl or osmesa"
+                           : "DEFORM_RENDER_BACKEND=" + name + " is not a backend: set it to auto, egl, osmesa or none";
+      return nullptr;
+    }
+  }
+  std::string reasons[2];
+  const FloatingPoint keep;
+  for (const Backend b : {Backend::egl, Backend::osmesa}) {
+    if (backend != Backend::automatic && backend != b) continue;
+    std::string &reason = reasons[b == Backend::osmesa];
+    std::unique_ptr<Context> context = b == Backend::egl ? create_egl(&reason) : create_osmesa(&reason);
+    if (!context) continue;
+    auto renderer = std::make_unique<GlRenderer>(std::move(context), width, height);
+    if (renderer->start(&reason)) return renderer;
+  }
+  why = "no pictures: " + reasons[0] + (reasons[0].empty() || reasons[1].empty() ? "" : "; ") + reasons[1];
+  return nullptr;
+}
+
+}  // namespace render

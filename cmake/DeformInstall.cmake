@@ -1,0 +1,37 @@
+# Everything that `make install PREFIX=` writes. The tree may be moved afterwards: the command finds the library by a relative
+# rpath, the library finds the plugins beside itself, deform.pc and the CMake package count from their own place.
+include(CMakePackageConfigHelpers)
+
+set(deform_plugin_dir ${CMAKE_INSTALL_LIBDIR}/deform/${DFM_ABI_DIR})
+set(deform_cmake_dir ${CMAKE_INSTALL_LIBDIR}/cmake/deform)
+file(RELATIVE_PATH deform_bin_to_lib /${CMAKE_INSTALL_BINDIR} /${CMAKE_INSTALL_LIBDIR})
+file(RELATIVE_PATH deform_pc_to_prefix /${CMAKE_INSTALL_LIBDIR}/pkgconfig /)
+string(REGEX REPLACE "/$" "" deform_pc_to_prefix ${deform_pc_to_prefix})
+
+set_target_properties(deform_cli PROPERTIES INSTALL_RPATH "$ORIGIN/${deform_bin_to_lib}")
+install(TARGETS deform_cli RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR})
+install(TARGETS deform deform_headers EXPORT deformTargets
+  LIBRARY DESTINATION ${CMAKE_INSTALL_LIBDIR} ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR})
+get_property(deform_plugins GLOBAL PROPERTY DEFORM_PLUGINS)
+if(deform_plugins)
+  install(TARGETS ${deform_plugins} LIBRARY DESTINATION ${deform_plugin_dir})
+endif()
+install(DIRECTORY ${CMAKE_SOURCE_DIR}/libdeform/include/deform DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}
+  FILES_MATCHING PATTERN "*.h" PATTERN "*.hpp")
+install(FILES ${CMAKE_SOURCE_DIR}/libdeform/schema/deform-scene.schema.json DESTINATION ${CMAKE_INSTALL_DATADIR}/deform)
+install(FILES ${CMAKE_SOURCE_DIR}/LICENSE ${CMAKE_SOURCE_DIR}/README.md ${CMAKE_SOURCE_DIR}/CHANGELOG.md
+  DESTINATION ${CMAKE_INSTALL_DOCDIR})
+
+install(EXPORT deformTargets NAMESPACE deform:: DESTINATION ${deform_cmake_dir})
+configure_package_config_file(${CMAKE_SOURCE_DIR}/cmake/deformConfig.cmake.in ${CMAKE_BINARY_DIR}/cmake/deformConfig.cmake
+  INSTALL_DESTINATION ${deform_cmake_dir} PATH_VARS deform_plugin_dir)
+write_basic_package_version_file(${CMAKE_BINARY_DIR}/cmake/deformConfigVersion.cmake COMPATIBILITY SameMinorVersion)
+install(FILES ${CMAKE_BINARY_DIR}/cmake/deformConfig.cmake ${CMAKE_BINARY_DIR}/cmake/deformConfigVersion.cmake
+  ${CMAKE_SOURCE_DIR}/cmake/DeformPlugin.cmake ${CMAKE_SOURCE_DIR}/cmake/deform_plugin.map DESTINATION ${deform_cmake_dir})
+
+set(deform_pc_private "")
+if(NOT DEFORM_SHARED)
+  set(deform_pc_private "-lstdc++ -lm -ldl -pthread")
+endif()
+configure_file(${CMAKE_SOURCE_DIR}/cmake/deform.pc.in ${CMAKE_BINARY_DIR}/cmake/deform.pc @ONLY)
+install(FILES ${CMAKE_BINARY_DIR}/cmake/deform.pc DESTINATION ${CMAKE_INSTALL_LIBDIR}/pkgconfig)

@@ -1,0 +1,79 @@
+#!/usr/bin/env python3
+"""make demo: the two cylinders with friction and without, as a table, one picture with two rows, and out/demo/summary.json.
+
+demo.py DEFORM_COMMAND OUT_DIR
+"""
+import csv
+import json
+import math
+import pathlib
+import subprocess
+import sys
+
+SCENE = "examples/scenes/two_cylinders.json"
+RUNS = {
+    "with friction": [],
+    "without friction": ["--set", '/contact/friction=[{"between": ["*", "*"], "law": "none"}]'],
+}
+PICTURES = 5  # per row
+FRAMES_PER_SECOND = 10
+
+
+def run(*argv):
+    done = subprocess.run([str(a) for a in argv])
+    if done.returncode:
+        sys.exit(f"demo: {' '.join(map(str, argv))} ended with exit code {done.returncode}; its sentence stands above")
+
+
+def simulate(command, out, label, options):
+    """Runs the scene and returns what the table and the picture need."""
+    folder = out / label.replace(" ", "_")
+    print(f"--- {label}", flush=True)
+    run(command, "run", SCENE, "--out", folder, "--frames", FRAMES_PER_SECOND, *options)
+    summary = json.loads((folder / "summary.json").read_text())
+    with open(folder / "bodies.csv", newline="") as file:
+        rows = [r for r in csv.DictReader(file) if r["body"] == "upper"]
+    start, end = ([float(row[f"com_{axis}"]) for axis in "xyz"] for row in (rows[0], rows[-1]))
+    frames = sorted((folder / "frames").glob("*.png"))
+    if not frames:
+        sys.exit(f"demo: {folder}/frames holds no picture")
+    last = len(frames) - 1
+    return {
+        "upper": {"start": start, "end": end, "moved_m": math.dist(start, end)},
+        "contacts": summary["contacts"], "creep_um_per_s": summary["hold"]["creep_max_um_per_s"],
+        "intersections_max": summary["intersections_max"], "steps": summary["steps"], "simulated_s": summary["simulated_s"],
+        "steps_per_second": 1000 / summary["ms_per_step"]["median"], "state_hash": summary["state_hash"],
+        "pictures": [str(frames[round(i * last / (PICTURES - 1))]) for i in range(PICTURES)],
+    }
+
+
+def table(runs):
+    def place(point):
+        return "({:.3f} {:.3f} {:.3f})".format(*point)
+
+    rows = [("upper cylinder starts at (m)", lambda r: place(r["upper"]["start"])),
+            ("upper cylinder ends at (m)", lambda r: place(r["upper"]["end"])),
+            ("moved (m)", lambda r: f"{r['upper']['moved_m']:.3f}"),
+            ("contacts, mean and most", lambda r: f"{r['contacts']['mean']:.0f}, {r['contacts']['max']}"),
+            ("creep of holding contacts (um/s)", lambda r: "none hold" if r["creep_um_per_s"] is None else f"{r['creep_um_per_s']:.3g}"),
+            ("crossing triangle pairs", lambda r: str(r["intersections_max"])),
+            ("steps per second", lambda r: f"{r['steps_per_second']:.0f}")]
+    print()
+    print(f"{'':34}" + "".join(f"{label:>24}" for label in runs))
+    for name, cell in rows:
+        print(f"{name:34}" + "".join(f"{cell(r):>24}" for r in runs.values()))
+
+
+def main():
+    command, out = sys.argv[1], pathlib.Path(sys.argv[2])
+    out.mkdir(parents=True, exist_ok=True)
+    runs = {label: simulate(command, out, label, options) for label, options in RUNS.items()}
+    picture = out / "two_cylinders.png"
+    run(command, "montage", *(part for label, r in runs.items() for part in ("--row", label, *r["pictures"])), "--out", picture)
+    (out / "summary.json").write_text(json.dumps({"scene": SCENE, "picture": str(picture), "runs": runs}, indent=2) + "\n")
+    table(runs)
+    print(f"\npicture {picture}, figures {out}/summary.json")
+
+
+if __name__ == "__main__":
+    main()

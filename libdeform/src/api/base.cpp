@@ -1,0 +1,126 @@
+#include "deform/base.h"
+
+#include <algorithm>
+#include <cstring>
+
+#include "api/guard.h"
+#include "plugin/context.h"
+
+using dfm::fail;
+using dfm::guard;
+
+namespace {
+
+dfm_context_def checked(const dfm_context_def *given) {
+  dfm_context_def def = dfm_context_def_default();
+  if (!given) return def;
+  if (given->size < offsetof(dfm_context_def, alloc))
+    fail(DFM_E_ARG, "dfm_context_def.size is %u; start from dfm_context_def_default()", given->size);
+  std::memset(&def, 0, sizeof def);
+  std::memcpy(&def, given, std::min<size_t>(given->size, sizeof def));
+  def.size = sizeof def;
+  if (!def.alloc != !def.release) fail(DFM_E_ARG, "the hooks alloc and release go together; %s is missing", def.alloc ? "release" : "alloc");
+  if (!def.trace_begin != !def.trace_end) fail(DFM_E_ARG, "the hooks trace_begin and trace_end go together");
+  if (def.threads > 1024) fail(DFM_E_ARG, "threads is %u, at most 1024 expected (0: one per processor)", def.threads);
+  return def;
+}
+
+dfm_context &require(dfm_context *context) {
+  if (!context) fail(DFM_E_ARG, "the context is NULL; create one with dfm_context_create");
+  return *context;
+}
+
+}  // namespace
+
+const char *dfm_version(int *major, int *minor, int *patch) {
+  if (major) *major = DFM_VERSION_MAJOR;
+  if (minor) *minor = DFM_VERSION_MINOR;
+  if (patch) *patch = DFM_VERSION_PATCH;
+#define DFM_TEXT_(x) #x
+#define DFM_TEXT(x) DFM_TEXT_(x)
+  return DFM_TEXT(DFM_VERSION_MAJOR) "." DFM_TEXT(DFM_VERSION_MINOR) "." DFM_TEXT(DFM_VERSION_PATCH);
+}
+
+const char *dfm_status_name(dfm_status s) {
+  switch (s) {
+    case DFM_OK: return "DFM_OK";
+    case DFM_DISCARD: return "DFM_DISCARD";
+    case DFM_E_ARG: return "DFM_E_ARG";
+    case DFM_E_NOMEM: return "DFM_E_NOMEM";
+    case DFM_E_UNSUPPORTED: return "DFM_E_UNSUPPORTED";
+    case DFM_E_STATE: return "DFM_E_STATE";
+    case DFM_E_FATAL: return "DFM_E_FATAL";
+    case DFM_E_HANDLE: return "DFM_E_HANDLE";
+    case DFM_E_IO: return "DFM_E_IO";
+    case DFM_E_FORMAT: return "DFM_E_FORMAT";
+    case DFM_E_DIVERGED: return "DFM_E_DIVERGED";
+    case DFM_E_BUSY: return "DFM_E_BUSY";
+  }
+  return "unknown status";
+}
+
+const char *dfm_last_error(void) { return dfm::last_error(); }
+
+dfm_context_def dfm_context_def_default(void) {
+  dfm_context_def def{};
+  def.size = sizeof def;
+  def.threads = 1;
+  return def;
+}
+
+dfm_status dfm_context_create(const dfm_context_def *def, dfm_context **out) {
+  return guard([&] {
+    if (!out) fail(DFM_E_ARG, "dfm_context_create: out is NULL");
+    auto context = std::make_unique<dfm_context>(checked(def));
+    if (context->hooks.plugin_dir) {
+      try {
+        context->loader.scan(context->hooks.plugin_dir);
+      } catch (const dfm::Error &e) {
+        fail(DFM_E_ARG, "plugin_dir: %s", e.what());
+      }
+      context->hooks.plugin_dir = nullptr;  // the caller's string need not outlive this call
+    } else {
+      context->loader.discover();
+    }
+    *out = context.release();
+  });
+}
+
+void dfm_context_destroy(dfm_context *context) { delete context; }
+
+dfm_status dfm_plugin_load(dfm_context *context, const char *path) {
+  return guard([&] {
+    if (!path || !*path) fail(DFM_E_ARG, "dfm_plugin_load: the path is empty");
+    require(context).loader.load(path);
+  });
+}
+
+dfm_status dfm_plugin_scan(dfm_context *context, const char *directory, uint32_t *loaded) {
+  return guard([&] {
+    if (!directory || !*directory) fail(DFM_E_ARG, "dfm_plugin_scan: the directory is empty");
+    const uint32_t n = require(context).loader.scan(directory);
+    if (loaded) *loaded = n;
+  });
+}
+
+dfm_status dfm_plugin_register_static(dfm_context *context, dfm_plugin_fn entry, const char *name) {
+  return guard([&] {
+    if (!entry || !name || !*name) fail(DFM_E_ARG, "dfm_plugin_register_static: entry and name are needed");
+    require(context).loader.add_static(entry, name);
+  });
+}
+
+dfm_status dfm_plugin_visit(dfm_context *context, dfm_plugin_visit_fn visit, void *user) {
+  return guard([&] {
+    if (!visit) fail(DFM_E_ARG, "dfm_plugin_visit: visit is NULL");
+    const dfm::Registry &registry = require(context).registry;
+    for (const dfm_type *type : registry.list()) visit(user, type, registry.file_of(*type).c_str());
+  });
+}
+
+dfm_status dfm_plugin_visit_passed(dfm_context *context, dfm_plugin_passed_fn visit, void *user) {
+  return guard([&] {
+    if (!visit) fail(DFM_E_ARG, "dfm_plugin_visit_passed: visit is NULL");
+    for (const auto &passed : require(context).registry.passed()) visit(user, passed.file.c_str(), passed.reason.c_str());
+  });
+}

@@ -1,0 +1,32 @@
+// No exception crosses the C API: every function of api/ runs its body in here.
+#pragma once
+#include <new>
+#include <type_traits>
+
+#include "core/error.h"
+#include "deform/base.h"
+
+namespace dfm {
+
+// Runs f and turns what it throws into a status and the sentence of dfm_last_error().
+template <class F>
+dfm_status guard(F &&f) noexcept {
+  try {
+    if constexpr (std::is_same_v<std::invoke_result_t<F>, dfm_status>) return f();
+    else return f(), DFM_OK;
+  } catch (const Error &e) {
+    set_last_error(e.what());
+    return e.status;
+  } catch (const std::bad_alloc &) {
+    set_last_error("out of memory: the allocation hook or the system refused; nothing was changed");
+    return DFM_E_NOMEM;
+  } catch (const std::exception &e) {
+    set_last_error(e.what());
+    return DFM_E_FATAL;
+  } catch (...) {
+    set_last_error("internal error: an exception of unknown type");
+    return DFM_E_FATAL;
+  }
+}
+
+}  // namespace dfm

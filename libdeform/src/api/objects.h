@@ -1,0 +1,54 @@
+// Handles to objects for the files of api/: each throws Error(DFM_E_HANDLE).
+#pragma once
+#include <cstring>
+
+#include "api/guard.h"
+#include "core/handle.h"
+#include "world/world.h"
+
+namespace dfm {
+
+inline World &world_of(dfm_world h) { return resolve<World>(Kind::world, h); }
+inline Body &body_of(dfm_body h) { return resolve<Body>(Kind::body, h); }
+inline Obstacle &obstacle_of(dfm_obstacle h) { return resolve<Obstacle>(Kind::obstacle, h); }
+inline Material &material_of(dfm_material h) { return resolve<Material>(Kind::material, h); }
+
+// For calls that say "Not during step."
+inline World &idle(World &w) {
+  if (w.stepping) fail(DFM_E_BUSY, "the world is inside a step; call again when dfm_world_step has returned");
+  return w;
+}
+
+// The part of a def that the caller's version of the struct has; the rest keeps its default.
+template <class T>
+T take_def(const T *given, const T &defaults) {
+  T def = defaults;
+  if (!given) return def;
+  if (given->size < 2 * sizeof(uint32_t)) fail(DFM_E_ARG, "a def's size is %u; start from its _default() function", given->size);
+  std::memcpy(static_cast<void *>(&def), given, given->size < sizeof(T) ? given->size : sizeof(T));
+  def.size = sizeof(T);
+  return def;
+}
+
+// Fills the part of an out struct that the caller's version has. size 0: taken as today's size.
+template <class T>
+void give(T *out, T value) {
+  if (!out) fail(DFM_E_ARG, "the out argument is NULL");
+  const uint32_t size = out->size && out->size < sizeof(T) ? out->size : static_cast<uint32_t>(sizeof(T));
+  value.size = size;
+  std::memcpy(static_cast<void *>(out), &value, size);
+}
+
+inline void need(const void *p, const char *name) {
+  if (!p) fail(DFM_E_ARG, "argument '%s' is NULL", name);
+}
+
+// The two-call convention: the count always, the data where there is room. True: copy.
+inline bool room(uint32_t count, uint32_t capacity, const void *out, uint32_t *n) {
+  if (n) *n = count;
+  if (!out && capacity == 0) return false;
+  if (capacity < count || !out) fail(DFM_E_ARG, "capacity %u is too small for %u entries; call with capacity 0 to learn the number", capacity, count);
+  return true;
+}
+
+}  // namespace dfm

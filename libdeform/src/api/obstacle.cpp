@@ -1,0 +1,60 @@
+#include "deform/obstacle.h"
+
+#include <cmath>
+
+#include "api/objects.h"
+#include "world/create.h"
+
+using namespace dfm;
+
+dfm_obstacle_def dfm_obstacle_def_default(void) {
+  dfm_obstacle_def d{};
+  d.size = sizeof d;
+  d.half_size[0] = d.half_size[1] = d.half_size[2] = 0.5, d.radius = 0.5, d.half_length = 0.5;
+  d.category = 1, d.collides_with = ~0u;
+  return d;
+}
+
+dfm_status dfm_obstacle_create(dfm_world world, const dfm_obstacle_def *def, dfm_obstacle *out) {
+  return guard([&] {
+    World &w = idle(world_of(world));
+    need(out, "out");
+    *out = create_obstacle(w, take_def(def, dfm_obstacle_def_default())).handle;
+  });
+}
+
+dfm_status dfm_obstacle_destroy(dfm_obstacle obstacle) {
+  return guard([&] {
+    Obstacle &o = obstacle_of(obstacle);
+    idle(*o.world);
+    destroy_obstacle(o);
+  });
+}
+
+dfm_status dfm_obstacle_get_pose(dfm_obstacle obstacle, dfm_pose *out) {
+  return guard([&] {
+    const Obstacle &o = obstacle_of(obstacle);
+    need(out, "out");
+    store3(out->position, o.pose.position);
+    const Quat q = o.pose.rotation;
+    out->rotation[0] = q.x, out->rotation[1] = q.y, out->rotation[2] = q.z, out->rotation[3] = q.w;
+  });
+}
+
+dfm_status dfm_obstacle_get_def(dfm_obstacle obstacle, dfm_obstacle_def *out) {
+  return guard([&] { give(out, obstacle_of(obstacle).def); });
+}
+
+dfm_status dfm_obstacle_move_to(dfm_obstacle obstacle, const dfm_pose *pose) {
+  return guard([&] {
+    Obstacle &o = obstacle_of(obstacle);
+    idle(*o.world);
+    need(pose, "pose");
+    for (int i = 0; i < 4; ++i)
+      if (!std::isfinite(pose->rotation[i]) || (i < 3 && !std::isfinite(pose->position[i])))
+        fail(DFM_E_ARG, "obstacle '%s': the target pose is not finite", o.name.c_str());
+    o.keys.clear();
+    o.def.sine = {};
+    o.target = to_pose(*pose), o.has_target = true;
+  });
+}

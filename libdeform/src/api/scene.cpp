@@ -1,0 +1,109 @@
+// deform/scene.h: argument checks and the exception guard.
+#include "deform/scene.h"
+
+#include <cstring>
+
+#include "api/guard.h"
+#include "core/handle.h"
+#include "plugin/context.h"
+#include "scene/scene.h"
+
+namespace {
+
+using dfm::scene::Scene;
+
+Scene &scene_of(dfm_scene handle) { return dfm::resolve<Scene>(dfm::Kind::scene, handle); }
+
+void close_scene(dfm_scene handle) {
+  Scene *scene = &scene_of(handle);
+  scene->context()->remove_live(handle);
+  dfm::handle_destroy(handle);
+  delete scene;
+}
+
+void check_call(const dfm_context *context, const char *path, const void *out) {
+  if (!context) dfm::fail(DFM_E_ARG, "dfm_scene: context is NULL; create one with dfm_context_create");
+  if (!path || !*path) dfm::fail(DFM_E_ARG, "dfm_scene: path is %s; expected a scene file", path ? "empty" : "NULL");
+  if (!out) dfm::fail(DFM_E_ARG, "dfm_scene: out is NULL");
+}
+
+}  // namespace
+
+dfm_status dfm_scene_load(dfm_context *context, const char *path, dfm_world *out) {
+  return dfm::guard([&] {
+    check_call(context, path, out);
+    *out = Scene(context, path, nullptr).release_world();
+  });
+}
+
+dfm_status dfm_scene_open(dfm_context *context, const char *path, const dfm_scene_options *options, dfm_scene *out) {
+  return dfm::guard([&] {
+    check_call(context, path, out);
+    if (options && options->size < sizeof(dfm_scene_options))
+      dfm::fail(DFM_E_ARG, "dfm_scene_open: options->size is %u, expected %zu", options->size, sizeof(dfm_scene_options));
+    auto scene = std::make_unique<Scene>(context, path, options);
+    const uint64_t handle = dfm::handle_create(dfm::Kind::scene, scene.get());
+    try {
+      context->add_live(handle, [](uint64_t h) { dfm_scene_close(h); });
+    } catch (...) {
+      dfm::handle_destroy(handle);
+      throw;
+    }
+    scene.release();
+    *out = handle;
+  });
+}
+
+dfm_status dfm_scene_close(dfm_scene scene) {
+  return dfm::guard([&] { close_scene(scene); });
+}
+
+dfm_status dfm_scene_world(dfm_scene scene, dfm_world *out) {
+  return dfm::guard([&] {
+    if (!out) dfm::fail(DFM_E_ARG, "dfm_scene_world: out is NULL");
+    *out = scene_of(scene).world();
+  });
+}
+
+dfm_status dfm_scene_value(dfm_scene scene, const char *pointer, char *text, size_t *bytes) {
+  return dfm::guard([&] {
+    if (!pointer || !bytes) dfm::fail(DFM_E_ARG, "dfm_scene_value: %s is NULL", pointer ? "bytes" : "pointer");
+    const std::string value = scene_of(scene).value(pointer);
+    const size_t capacity = *bytes;
+    *bytes = value.size() + 1;
+    if (!text) return;
+    if (capacity < value.size() + 1) dfm::fail(DFM_E_ARG, "dfm_scene_value: the text needs %zu bytes, %zu given", value.size() + 1, capacity);
+    std::memcpy(text, value.c_str(), value.size() + 1);
+  });
+}
+
+dfm_status dfm_scene_get_settings(dfm_scene scene, dfm_scene_settings *out) {
+  return dfm::guard([&] {
+    if (!out || out->size < sizeof(dfm_scene_settings))
+      dfm::fail(DFM_E_ARG, "dfm_scene_get_settings: out is NULL or its size is not set to sizeof(dfm_scene_settings)");
+    const Scene &s = scene_of(scene);
+    const dfm::scene::Definition &d = s.definition();
+    dfm_scene_settings r = {};
+    r.size = sizeof r;
+    r.nprobe = uint32_t(s.probe_count());
+    r.duration = d.duration, r.step = d.step, r.every = d.every;
+    r.frames = d.frames, r.states = d.states, r.nodes = d.nodes, r.contacts = d.contacts, r.check = d.check;
+    r.color = d.color.c_str();
+    std::memcpy(r.eye, d.eye, sizeof r.eye);
+    std::memcpy(r.look_at, d.look_at, sizeof r.look_at);
+    r.has_camera = d.has_camera;
+    *out = r;
+  });
+}
+
+dfm_status dfm_scene_probe(dfm_scene scene, uint32_t probe, const char **name, double position[3], double velocity[3]) {
+  return dfm::guard([&] {
+    Scene &s = scene_of(scene);
+    if (probe >= s.probe_count()) dfm::fail(DFM_E_ARG, "dfm_scene_probe: there is no probe %u, the scene has %zu", probe, s.probe_count());
+    double x[3], v[3];
+    s.probe_state(probe, x, v);
+    if (name) *name = s.probe(probe).name.c_str();
+    if (position) std::memcpy(position, x, sizeof x);
+    if (velocity) std::memcpy(velocity, v, sizeof v);
+  });
+}

@@ -1,0 +1,78 @@
+#include "deform/surface.h"
+
+#include "api/objects.h"
+#include "world/queries.h"
+
+using namespace dfm;
+
+namespace {
+
+// Copies one [nsurfel,4] column; get(s) gives the vector of surfel s.
+template <class Get>
+dfm_status column(dfm_body body, uint32_t capacity, double *xyz, uint32_t *n, Get get) {
+  return guard([&] {
+    const Body &b = body_of(body);
+    if (!room(b.surface.nsurfel, capacity, xyz, n)) return;
+    for (uint32_t s = 0; s < b.surface.nsurfel; ++s) store3(xyz + size_t(3) * s, get(b, s));
+  });
+}
+
+}  // namespace
+
+dfm_status dfm_surface_positions(dfm_body body, uint32_t capacity, double *xyz, uint32_t *n) {
+  return column(body, capacity, xyz, n, [](const Body &b, uint32_t s) { return surfel_vector(b, b.p.x, s); });
+}
+
+dfm_status dfm_surface_velocities(dfm_body body, uint32_t capacity, double *xyz, uint32_t *n) {
+  return column(body, capacity, xyz, n, [](const Body &b, uint32_t s) { return surfel_vector(b, b.p.v, s); });
+}
+
+dfm_status dfm_surface_forces(dfm_body body, uint32_t capacity, double *xyz, uint32_t *n) {
+  return column(body, capacity, xyz, n, [](const Body &b, uint32_t s) {
+    const double h = b.world->report.h;
+    return b.world->plan.touches() && h > 0 ? (1 / h) * load3(&b.surfel_impulse[size_t(3) * s]) : Vec3{};
+  });
+}
+
+dfm_status dfm_surface_normals(dfm_body body, uint32_t capacity, double *xyz, uint32_t *n) {
+  return guard([&] {
+    const Body &b = body_of(body);
+    if (!room(b.surface.nsurfel, capacity, xyz, n)) return;
+    std::vector<double> normals(size_t(3) * b.surface.nsurfel);
+    surface_normals(b, normals.data());
+    std::copy(normals.begin(), normals.end(), xyz);
+  });
+}
+
+dfm_status dfm_surface_triangles(dfm_body body, uint32_t capacity, uint32_t *tri, uint32_t *n) {
+  return guard([&] {
+    const Surface &s = body_of(body).surface;
+    if (room(s.ntri, capacity, tri, n)) std::copy(s.tri.begin(), s.tri.begin() + size_t(3) * s.ntri, tri);
+  });
+}
+
+dfm_status dfm_surface_points(dfm_body body, uint32_t capacity, uint32_t *point, uint32_t *n) {
+  return guard([&] {
+    const Body &b = body_of(body);
+    if (!b.surface.identity()) fail(DFM_E_UNSUPPORTED, "body '%s': its surfels hang on several points each; there is no one point per surfel", b.name.c_str());
+    if (room(b.surface.nsurfel, capacity, point, n)) std::copy(b.surface.point.begin(), b.surface.point.begin() + b.surface.nsurfel, point);
+  });
+}
+
+dfm_status dfm_world_ray(dfm_world world, const double origin[3], const double direction[3], double max_distance, dfm_ray_hit *hit) {
+  return guard([&] {
+    World &w = world_of(world);
+    need(origin, "origin"), need(direction, "direction");
+    const Vec3 d = normalized(load3(direction));
+    if (!(norm2(d) > 0.5) || !(max_distance > 0)) fail(DFM_E_ARG, "a ray needs a direction that is not zero and a positive max_distance");
+    give(hit, cast_ray(w, load3(origin), d, max_distance));
+  });
+}
+
+dfm_status dfm_world_closest(dfm_world world, const double point[3], double max_distance, dfm_ray_hit *hit) {
+  return guard([&] {
+    World &w = world_of(world);
+    need(point, "point");
+    give(hit, closest_surface(w, load3(point), max_distance));
+  });
+}

@@ -1,0 +1,205 @@
+// From what a file says to a mesh a body can be made of. Order matters: unsound input is refused first (flat cells), then cells are turned,
+// doubles dropped and points renumbered; what was done is counted and told. All thresholds are relative: a cell counts as flat when its
+// volume is not above the rounding of its own coordinates, so bodies of nanometres and of 100 km load alike.
+#include <algorithm>
+#include <array>
+#include <cfloat>
+#include <cmath>
+
+#include "core/error.h"
+#include "math/vec3.h"
+#include "mesh/faces.h"
+#include "mesh/raw_mesh.h"
+
+namespace dfm {
+namespace {
+
+constexpr double kLargestCoordinate = 1e100;  // m; beyond it squares of lengths overflow
+constexpr double kCoarseCoordinates = 1e-8;   // rounding of coordinates over the shortest edge, from which a warning is due
+
+struct CellShape { double volume6, edge_max, reach; };  // reach: largest coordinate
+
+CellShape cell_shape(const double *points, const uint32_t *tet) {
+  CellShape s{6 * tet_volume(points, tet), 0, 0};
+  double longest2 = 0;
+  for (const auto &e : kTetEdge)
+    longest2 = std::max(longest2, norm2(load3(points + 3 * size_t(tet[e[0]])) - load3(points + 3 * size_t(tet[e[1]]))));
+  s.edge_max = std::sqrt(longest2);
+  for (int k = 0; k < 4; ++k)
+    for (int c = 0; c < 3; ++c) s.reach = std::max(s.reach, std::fabs(points[3 * size_t(tet[k]) + c]));
+  return s;
+}
+
+// A coordinate x is known to eps*x; an altitude below a few of those says nothing.
+bool is_flat(const CellShape &s) { return !(std::fabs(s.volume6) > 8 * DBL_EPSILON * s.edge_max * s.edge_max * (s.edge_max + s.reach)); }
+
+void check_points(const std::string &path, const Array<double> &points) {
+  for (size_t i = 0; i < points.size(); ++i)
+    if (!(std::fabs(points[i]) <= kLargestCoordinate))
+      fail(DFM_E_FORMAT, "%s: point %zu (counted from 0) has the coordinate %g m; coordinates up to %g m are read", path.c_str(), i / 3,
+           points[i], kLargestCoordinate);
+}
+
+void refuse_flat(const std::string &path, const RawMesh &raw) {
+  const uint32_t ntet = uint32_t(raw.tets.size() / 4);
+  uint32_t flat = 0, first = 0;
+  for (uint32_t t = 0; t < ntet; ++t)
+    if (is_flat(cell_shape(raw.points.data(), &raw.tets[4 * size_t(t)])) && flat++ == 0) first = t;
+  if (flat == 0) return;
+  const uint32_t *c = &raw.tets[4 * size_t(first)];
+  if (flat == ntet)
+    fail(DFM_E_FORMAT, "%s: all %u tetrahedra are flat (no volume): the points of each lie in one plane; a body needs a volume mesh",
+         path.c_str(), ntet);
+  fail(DFM_E_FORMAT, "%s: %u of %u tetrahedra %s flat (no volume), the first is tetrahedron %u (counted from 0) on points %u %u %u %u; remove slivers in the mesher",
+       path.c_str(), flat, ntet, flat == 1 ? "is" : "are", first, c[0], c[1], c[2], c[3]);
+}
+
+void turn_negative(RawMesh &raw, TetMesh &mesh) {
+  for (size_t t = 0; t < raw.tets.size(); t += 4)
+    if (tet_volume(raw.points.data(), &raw.tets[t]) < 0) std::swap(raw.tets[t + 2], raw.tets[t + 3]), ++mesh.turned;
+}
+
+// Drops cells with the same four corners as an earlier cell.
+void drop_duplicates(RawMesh &raw, TetMesh &mesh) {
+  struct Key {
+    std::array<uint32_t, 4> corner;
+    uint32_t cell;
+    bool operator<(const Key &o) const { return corner != o.corner ? corner < o.corner : cell < o.cell; }
+  };
+  const uint32_t ntet = uint32_t(raw.tets.size() / 4);
+  Array<Key> keys{HookAllocator<Key>(*raw.memory)};
+  keys.reserve(ntet);
+  for (uint32_t t = 0; t < ntet; ++t) {
+    Key key{{}, t};
+    std::copy_n(&raw.tets[4 * size_t(t)], 4, key.corner.begin());
+    std::sort(key.corner.begin(), key.corner.end());
+    keys.push_back(key);
+  }
+  std::sort(keys.begin(), keys.end());
+  Array<uint8_t> drop(ntet, 0, HookAllocator<uint8_t>(*raw.memory));
+  for (size_t i = 1; i < keys.size(); ++i)
+    if (keys[i].corner == keys[i - 1].corner) drop[keys[i].cell] = 1, ++mesh.dropped_cells;
+  if (mesh.dropped_cells == 0) return;
+  size_t kept = 0;
+  for (uint32_t t = 0; t < ntet; ++t)
+    if (!drop[t]) {
+      std::copy_n(&raw.tets[4 * size_t(t)], 4, &raw.tets[4 * kept]);
+      raw.tet_group[kept++] = raw.tet_group[t];
+    }
+  raw.tets.resize(4 * kept), raw.tet_group.resize(kept);
+}
+
+// Keeps the points that cells use, in the file's order, and fills the groups' points.
+void renumber(RawMesh &raw, TetMesh &mesh) {
+  const Memory &memory = *raw.memory;
+  Array<uint32_t> number(raw.npoint(), kNoGroup, HookAllocator<uint32_t>(memory));
+  for (const uint32_t p : raw.tets) number[p] = 0;
+  const uint32_t kept = uint32_t(std::count(number.begin(), number.end(), 0u));
+  mesh.dropped_points = raw.npoint() - kept;
+  mesh.file_point.reserve(kept);
+  for (uint32_t p = 0; p < number.size(); ++p)
+    if (number[p] == 0) {
+      number[p] = uint32_t(mesh.file_point.size());
+      mesh.file_point.push_back(p);
+    }
+  for (size_t i = 0; i < kept; ++i) std::copy_n(&raw.points[3 * size_t(mesh.file_point[i])], 3, &raw.points[3 * i]);
+  raw.points.resize(3 * size_t(kept));
+  raw.points.shrink_to_fit();
+  for (uint32_t &p : raw.tets) p = number[p];
+
+  for (size_t i = 0; i < raw.tet_group.size(); ++i)
+    if (raw.tet_group[i] != kNoGroup) {
+      Array<uint32_t> &points = raw.groups[raw.tet_group[i]].points;
+      points.insert(points.end(), &raw.tets[4 * i], &raw.tets[4 * i] + 4);
+    }
+  for (MeshGroup &group : raw.groups) {
+    if (group.dimension < 3) {
+      for (uint32_t &p : group.points) p = number[p];
+      group.points.erase(std::remove(group.points.begin(), group.points.end(), kNoGroup), group.points.end());
+    }
+    std::sort(group.points.begin(), group.points.end());
+    group.points.erase(std::unique(group.points.begin(), group.points.end()), group.points.end());
+    group.points.shrink_to_fit();
+  }
+}
+
+// Groups by dimension and number, whatever order the file has them in.
+void sort_groups(RawMesh &raw) {
+  const uint32_t n = uint32_t(raw.groups.size());
+  std::vector<uint32_t> order(n), place(n);
+  for (uint32_t g = 0; g < n; ++g) order[g] = g;
+  std::sort(order.begin(), order.end(), [&](uint32_t a, uint32_t b) {
+    return std::pair(raw.groups[a].dimension, raw.groups[a].tag) < std::pair(raw.groups[b].dimension, raw.groups[b].tag);
+  });
+  std::vector<MeshGroup> sorted;
+  sorted.reserve(n);
+  for (uint32_t g = 0; g < n; ++g) place[order[g]] = g, sorted.push_back(std::move(raw.groups[order[g]]));
+  raw.groups = std::move(sorted);
+  for (uint32_t &g : raw.tet_group)
+    if (g != kNoGroup) g = place[g];
+}
+
+uint32_t count_overlaps(const TetMesh &mesh, uint32_t *crowded) {
+  const Array<TetFace> faces = sorted_faces(*mesh.memory, mesh.ntet(), mesh.tets.data());
+  uint32_t same_side = 0;
+  *crowded = 0;
+  for (size_t i = 0, j = 0; i < faces.size(); i = j) {
+    while (j < faces.size() && faces[j].same_corners(faces[i])) ++j;
+    if (j - i == 2) same_side += faces[i].odd == faces[i + 1].odd;
+    else *crowded += j - i > 2;
+  }
+  return same_side;
+}
+
+void add_warnings(TetMesh &mesh, uint32_t crowded) {
+  const auto warn = [&](const std::string &text) { mesh.warnings.push_back(text); };
+  const MeshStatistics s = mesh_statistics(mesh);
+  const auto be = [](uint32_t n) { return n == 1 ? "is" : "are"; };
+  const auto was = [](uint32_t n) { return n == 1 ? "was" : "were"; };
+  const auto some = [](uint32_t n) { return n == 1 ? "" : "s"; };
+  if (mesh.turned) warn(format("%u of %u cells had negative volume and %s turned", mesh.turned, s.ntet, was(mesh.turned)));
+  if (mesh.overlapping)
+    warn(format("the mesh is tangled: across %u face%s both cells lie on the same side, so they overlap; mesh the shape anew",
+                mesh.overlapping, some(mesh.overlapping)));
+  if (crowded) warn(format("%u face%s shared by more than two cells; the cells there overlap", crowded, crowded == 1 ? " is" : "s are"));
+  if (mesh.dropped_cells)
+    warn(format("%u duplicate cell%s %s dropped", mesh.dropped_cells, some(mesh.dropped_cells), was(mesh.dropped_cells)));
+  if (mesh.dropped_points)
+    warn(format("%u point%s that no tetrahedron uses %s dropped", mesh.dropped_points, some(mesh.dropped_points),
+                was(mesh.dropped_points)));
+  if (s.duplicate_points)
+    warn(format("%u point%s %s exactly at another point's place; cells that meet there are not joined", s.duplicate_points,
+                some(s.duplicate_points), s.duplicate_points == 1 ? "lies" : "lie"));
+  if (s.nonmanifold_edges)
+    warn(format("%u edge%s of the surface %s used by more than two triangles", s.nonmanifold_edges, some(s.nonmanifold_edges),
+                be(s.nonmanifold_edges)));
+  if (s.flat_cells)
+    warn(format("%u cell%s %s nearly flat (mean ratio below 0.01, least %.3g); they force small explicit steps", s.flat_cells,
+                some(s.flat_cells), be(s.flat_cells), s.quality_min));
+  double reach = 0;
+  for (int k = 0; k < 3; ++k) reach = std::max({reach, std::fabs(s.lo[k]), std::fabs(s.hi[k])});
+  if (DBL_EPSILON * reach > kCoarseCoordinates * s.edge_min)
+    warn(format("the body lies %.3g m from the origin, where coordinates resolve only %.2g m; move it nearer", reach, DBL_EPSILON * reach));
+}
+
+}  // namespace
+
+TetMesh finish_mesh(const std::string &path, RawMesh &&raw) {
+  TetMesh mesh(*raw.memory);
+  if (raw.tets.empty())
+    fail(DFM_E_FORMAT, "%s: no tetrahedra in this file; a body needs a volume mesh (a surface alone is not available yet)", path.c_str());
+  check_points(path, raw.points);
+  refuse_flat(path, raw);
+  turn_negative(raw, mesh);
+  drop_duplicates(raw, mesh);
+  renumber(raw, mesh);
+  sort_groups(raw);
+  mesh.points = std::move(raw.points), mesh.tets = std::move(raw.tets), mesh.tet_group = std::move(raw.tet_group);
+  mesh.groups = std::move(raw.groups);
+  uint32_t crowded = 0;
+  mesh.overlapping = count_overlaps(mesh, &crowded);
+  add_warnings(mesh, crowded);
+  return mesh;
+}
+
+}  // namespace dfm

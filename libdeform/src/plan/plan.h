@@ -1,0 +1,38 @@
+// The plan: which stages a sub-step runs, derived from what the scene contains. A stage that nothing calls for is not in the list, so it
+// costs no instruction; `deform explain` prints both lists with the reasons.
+#pragma once
+#include <string>
+#include <vector>
+
+namespace dfm {
+
+enum class StageId { motion, model, predict, broad, narrow, solve, distribute, commit, step };
+const char *stage_name(StageId id);
+
+// What the plan is derived from.
+struct SceneFacts {
+  unsigned bodies = 0, self_stepping = 0, obstacles = 0;
+  unsigned body_pairs = 0, obstacle_pairs = 0;         // pairs that may touch, filters applied
+  bool gravity_keys = false, loads_vary = false, held_move = false, obstacles_move = false;
+  struct Provider { std::string effect, plugin; };
+  std::vector<Provider> offered;                       // by models and laws that the scene uses
+  std::vector<Provider> available;                     // by every loaded plugin
+  bool effects_listed = false;
+  std::vector<std::string> asked;                      // where listed
+};
+
+struct PlannedStage { StageId id; std::string why; };
+struct AbsentStage { std::string name, why; };
+struct PlannedEffect { std::string name, asked_by, provided_by; };
+
+struct Plan {
+  std::vector<PlannedStage> stages;                    // in the order of a sub-step
+  std::vector<AbsentStage> absent;
+  std::vector<PlannedEffect> effects;
+  bool touches() const;                                // has contact stages
+};
+
+// Throws Error(DFM_E_ARG) where a listed effect is provided by nothing in the scene; names who could.
+Plan make_plan(const SceneFacts &facts);
+
+}  // namespace dfm

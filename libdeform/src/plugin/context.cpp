@@ -1,0 +1,101 @@
+#include "plugin/context.h"
+
+#include <cstdarg>
+#include <cstdio>
+
+#include "core/error.h"
+
+namespace {
+
+dfm_context &self(void *ctx) { return *static_cast<dfm_context *>(ctx); }
+
+void *host_alloc(void *ctx, size_t bytes, size_t align) {
+  const dfm::Memory &memory = self(ctx).memory;
+  return memory.alloc(memory.user, bytes, align);
+}
+
+void host_release(void *ctx, void *p, size_t bytes, size_t align) {
+  const dfm::Memory &memory = self(ctx).memory;
+  if (p) memory.release(memory.user, p, bytes, align);
+}
+
+// Outside a PluginCall (a thread of the plugin's own) each piece replaces the one before it, so that memory stays bounded.
+void *host_scratch(void *ctx, size_t bytes) {
+  dfm::ScratchArena *arena = self(ctx).scratch.arena();
+  if (!arena) return nullptr;
+  if (arena->depth == 0) arena->reset(0);
+  return arena->take(bytes);
+}
+
+void host_log(void *ctx, int32_t level, uint32_t code, const char *utf8) {
+  dfm::Loader::note_log(utf8);
+  if (code) self(ctx).logf(level, "[%u] %s", code, utf8 ? utf8 : "");
+  else self(ctx).log(level, utf8 ? utf8 : "");
+}
+
+void host_parallel_for(void *ctx, uint32_t n, uint32_t grain, void (*fn)(void *, uint32_t, uint32_t), void *user) {
+  dfm_context &context = self(ctx);
+  context.tasks.parallel_for(n, grain, [&](uint32_t begin, uint32_t end) {
+    const dfm::PluginCall call(context.scratch);  // what a worker took as scratch is given back when its block is done
+    fn(user, begin, end);
+  });
+}
+
+const void *host_extension(void *, const char *) { return nullptr; }
+
+dfm::Memory memory_of(const dfm_context_def &def) {
+  return def.alloc ? dfm::Memory{def.user, def.alloc, def.release} : dfm::Memory::standard();
+}
+
+}  // namespace
+
+dfm_context::dfm_context(const dfm_context_def &def)
+    : hooks(def), memory(memory_of(def)), tasks(def.threads, def.parallel_for, def.user), scratch(memory), host{},
+      loader(registry, host) {
+  host.size = sizeof host;
+  host.abi = DFM_ABI, host.abi_draft = DFM_ABI_DRAFT;
+  host.ctx = this;
+  host.alloc = host_alloc, host.release = host_release, host.scratch = host_scratch, host.log = host_log;
+  host.parallel_for = host_parallel_for, host.extension = host_extension;
+}
+
+dfm_context::~dfm_context() {
+  for (;;) {
+    std::pair<uint64_t, void (*)(uint64_t)> last;
+    {
+      const std::lock_guard lock(live_mutex_);
+      if (live_.empty()) return;
+      last = live_.back();
+      live_.pop_back();
+    }
+    last.second(last.first);
+  }
+}
+
+void dfm_context::log(int32_t level, const char *utf8) const noexcept {
+  if (hooks.log) hooks.log(hooks.user, level, utf8);
+  else if (level >= DFM_LOG_WARNING) std::fprintf(stderr, "deform: %s: %s\n", level >= DFM_LOG_ERROR ? "error" : "warning", utf8);
+}
+
+void dfm_context::logf(int32_t level, const char *format, ...) const noexcept {
+  char text[1024];
+  va_list args;
+  va_start(args, format);
+  std::vsnprintf(text, sizeof text, format, args);
+  va_end(args);
+  log(level, text);
+}
+
+void dfm_context::add_live(uint64_t handle, void (*destroy)(uint64_t)) {
+  const std::lock_guard lock(live_mutex_);
+  live_.emplace_back(handle, destroy);
+}
+
+void dfm_context::remove_live(uint64_t handle) noexcept {
+  const std::lock_guard lock(live_mutex_);
+  for (size_t i = live_.size(); i-- > 0;)
+    if (live_[i].first == handle) {
+      live_.erase(live_.begin() + static_cast<std::ptrdiff_t>(i));
+      return;
+    }
+}

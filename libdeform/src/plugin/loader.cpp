@@ -1,0 +1,217 @@
+#include "plugin/loader.h"
+
+#include <dlfcn.h>
+#include <sys/stat.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <climits>
+#include <cstdlib>
+#include <cstring>
+#include <filesystem>
+
+#include "core/error.h"
+#include "plugin/elf_file.h"
+#include "plugin/registry.h"
+#include "plugin/static_list.h"
+
+namespace dfm {
+namespace {
+
+namespace fs = std::filesystem;
+
+thread_local std::string *entry_log = nullptr;
+
+std::string real_path(const std::string &path) {
+  char *resolved = realpath(path.c_str(), nullptr);  // dlopen searches the system's libraries for a name without a slash
+  if (!resolved) fail(DFM_E_IO, "cannot open plugin \"%s\": %s", path.c_str(), std::strerror(errno));
+  std::string out = resolved;
+  std::free(resolved);
+  return out;
+}
+
+struct Library {
+  void *handle = nullptr;
+  ~Library() { if (handle) dlclose(handle); }
+};
+
+}  // namespace
+
+void Loader::note_log(const char *text) noexcept {
+  if (!entry_log || !text) return;
+  try {
+    if (!entry_log->empty()) *entry_log += "; ";
+    entry_log->append(text, strnlen(text, 512));
+  } catch (...) {
+  }
+}
+
+Loader::~Loader() {
+  while (!modules_.empty()) {
+    const Module module = modules_.back();
+    modules_.pop_back();
+    try {
+      if (module.shutdown) module.shutdown();
+    } catch (...) {
+      host_.log(host_.ctx, 2, 0, (module.file + ": its shutdown threw an exception").c_str());
+    }
+    if (module.library) dlclose(module.library);
+  }
+}
+
+// Calls the entry and copies what it returns; nothing beyond the two ABI numbers is read before they are found to match.
+void Loader::enter(dfm_plugin_fn entry, const std::string &file, dfm_plugin &plugin) {
+  std::string said;
+  const dfm_plugin *given = nullptr;
+  bool threw = false;
+  entry_log = &said;
+  try {
+    given = entry(&host_, DFM_ABI, DFM_ABI);
+  } catch (...) {
+    threw = true;
+  }
+  entry_log = nullptr;
+  if (threw) fail(DFM_E_UNSUPPORTED, "%s: its entry threw an exception%s%s", file.c_str(), said.empty() ? "" : " after it said: ", said.c_str());
+  if (!given)
+    fail(DFM_E_UNSUPPORTED, "%s: the plugin refuses this library (ABI %u draft %u)%s%s", file.c_str(), DFM_ABI, DFM_ABI_DRAFT,
+         said.empty() ? " and gave no reason" : ": ", said.c_str());
+  if (given->abi != DFM_ABI || given->abi_draft != DFM_ABI_DRAFT)
+    fail(DFM_E_UNSUPPORTED, "%s: built for plugin ABI %u draft %u, this library speaks ABI %u draft %u; rebuild it against this library's "
+         "deform/plugin.h", file.c_str(), given->abi, given->abi_draft, DFM_ABI, DFM_ABI_DRAFT);
+  constexpr uint32_t head = offsetof(dfm_plugin, types) + sizeof(void *);
+  if (given->size < head || given->size > 65536)
+    fail(DFM_E_UNSUPPORTED, "%s: dfm_plugin.size is %u, at least %u expected", file.c_str(), given->size, head);
+  plugin = dfm_plugin{};
+  std::memcpy(&plugin, given, std::min<size_t>(given->size, sizeof plugin));
+}
+
+bool Loader::load(const std::string &path) {
+  const std::string file = real_path(path);
+  struct stat st{};
+  if (stat(file.c_str(), &st) != 0) fail(DFM_E_IO, "cannot read plugin \"%s\": %s", path.c_str(), std::strerror(errno));
+  if (!S_ISREG(st.st_mode)) fail(DFM_E_UNSUPPORTED, "%s is not a file", path.c_str());
+  for (const Module &module : modules_)
+    if (module.library && module.device == st.st_dev && module.inode == st.st_ino) return false;
+  check_elf_plugin(file);
+
+  Library library;
+  library.handle = dlopen(file.c_str(), RTLD_NOW | RTLD_LOCAL);
+  if (!library.handle) fail(DFM_E_UNSUPPORTED, "%s cannot be loaded: %s", path.c_str(), dlerror());
+  const auto entry = reinterpret_cast<dfm_plugin_fn>(dlsym(library.handle, "dfm_plugin_entry"));
+  if (!entry) fail(DFM_E_UNSUPPORTED, "%s is not a plugin: it has no symbol dfm_plugin_entry", path.c_str());
+  dfm_plugin plugin;
+  enter(entry, path, plugin);
+  modules_.reserve(modules_.size() + 1);
+  try {
+    registry_.add(plugin, path);
+  } catch (...) {
+    if (plugin.shutdown) plugin.shutdown();
+    throw;
+  }
+  modules_.push_back({library.handle, st.st_dev, st.st_ino, path, entry, plugin.shutdown});
+  library.handle = nullptr;
+  return true;
+}
+
+uint32_t Loader::scan(const std::string &directory) {
+  std::error_code error;
+  std::vector<std::string> names;
+  for (fs::directory_iterator it(directory, error), end; !error && it != end; it.increment(error))
+    names.push_back(it->path().filename().string());
+  if (error) fail(DFM_E_IO, "cannot read plugin directory \"%s\": %s", directory.c_str(), error.message().c_str());
+  std::sort(names.begin(), names.end());  // the same order on every file system
+  uint32_t loaded = 0;
+  for (const std::string &name : names) {
+    const std::string path = directory + (directory.back() == '/' ? "" : "/") + name;
+    if (fs::is_directory(path, error)) {
+      registry_.pass_over(path, "a directory: plugins lie directly in the plugin directory");
+    } else if (fs::path(name).extension() != ".so") {
+      registry_.pass_over(path, "its name does not end in .so");
+    } else {
+      try {
+        if (load(path)) ++loaded;
+        else if (fs::is_symlink(path, error)) registry_.pass_over(path, "a link to a plugin that is loaded already");
+      } catch (const Error &e) {
+        registry_.pass_over(path, e.sentence);
+      }
+    }
+  }
+  return loaded;
+}
+
+void Loader::add_static(dfm_plugin_fn entry, const std::string &name) {
+  for (const Module &module : modules_)
+    if (module.entry == entry) return;
+  const std::string file = "static:" + name;
+  dfm_plugin plugin;
+  enter(entry, file, plugin);
+  modules_.reserve(modules_.size() + 1);
+  try {
+    registry_.add(plugin, file);
+  } catch (...) {
+    if (plugin.shutdown) plugin.shutdown();
+    throw;
+  }
+  modules_.push_back({nullptr, 0, 0, file, entry, plugin.shutdown});
+}
+
+std::vector<const dfm_type *> Loader::types_of(const std::string &path) const {
+  struct stat st{};
+  std::vector<const dfm_type *> out;
+  if (stat(path.c_str(), &st) != 0) return out;
+  for (const Module &module : modules_)
+    if (module.library && module.device == st.st_dev && module.inode == st.st_ino)
+      for (const dfm_type *type : registry_.list())
+        if (registry_.file_of(*type) == module.file) out.push_back(type);
+  return out;
+}
+
+void Loader::scan_if_there(const std::string &directory, bool asked_for) {
+  std::error_code error;
+  if (directory.empty()) return;
+  if (!fs::is_directory(directory, error)) {
+    if (asked_for) registry_.pass_over(directory, "named in DEFORM_PLUGIN_PATH, but there is no such directory");
+    return;
+  }
+  try {
+    scan(directory);
+  } catch (const Error &e) {
+    registry_.pass_over(directory, e.sentence);
+  }
+}
+
+void Loader::discover() {
+  for (const StaticPlugin &plugin : static_plugins()) {
+    try {
+      add_static(plugin.entry, plugin.name);
+    } catch (const Error &e) {
+      registry_.pass_over(std::string("static:") + plugin.name, e.sentence);
+    }
+  }
+  const char *path = secure_getenv("DEFORM_PLUGIN_PATH");
+  if (!path && std::getenv("DEFORM_PLUGIN_PATH")) registry_.pass_over("DEFORM_PLUGIN_PATH", "ignored: the process runs with elevated privilege");
+  for (const char *begin = path; begin && *begin;) {
+    const char *end = std::strchr(begin, ':');
+    scan_if_there(end ? std::string(begin, end) : std::string(begin), true);
+    begin = end ? end + 1 : nullptr;
+  }
+  scan_if_there(default_plugin_directory(), false);
+}
+
+std::string default_plugin_directory() {
+  Dl_info info{};
+  std::string self;
+  if (dladdr(reinterpret_cast<void *>(&default_plugin_directory), &info) && info.dli_fname && std::strchr(info.dli_fname, '/'))
+    self = info.dli_fname;
+  std::error_code error;
+  fs::path binary = self.empty() ? fs::path() : fs::canonical(self, error);
+  // For the main program dladdr repeats argv[0], which may name something else.
+  if (self.empty() || error || binary.extension() == "") binary = fs::canonical("/proc/self/exe", error);
+  for (const char *relative : {"deform", "../lib/deform"}) {
+    const fs::path candidate = binary.parent_path() / relative / DEFORM_ABI_DIR;
+    if (fs::is_directory(candidate, error)) return fs::canonical(candidate, error).string();
+  }
+  return DEFORM_INSTALL_PLUGIN_DIR;
+}
+
+}  // namespace dfm

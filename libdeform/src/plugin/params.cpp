@@ -1,0 +1,110 @@
+#include "plugin/params.h"
+
+#include <cmath>
+#include <cstring>
+
+#include "core/error.h"
+#include "plugin/registry.h"
+
+namespace dfm {
+namespace {
+
+std::string range_of(const dfm_param &row) {
+  if (row.flags & DFM_PARAM_ENUM) {
+    std::vector<std::string> names;
+    for (const char *const *n = row.names; n && *n; ++n) names.push_back(*n);
+    return "one of " + join(names);
+  }
+  return format("%s in [%g, %g] %s", row.flags & DFM_PARAM_INTEGER ? "a whole number" : "a number", row.min, row.max,
+                std::strcmp(row.unit, "1") == 0 ? "" : row.unit);
+}
+
+std::vector<std::string> keys_of(const dfm_type &type) {
+  std::vector<std::string> keys;
+  for (uint32_t i = 0; i < type.nparam; ++i) keys.push_back(type.params[i].key);
+  return keys;
+}
+
+bool has_row(const dfm_type &type, const char *key) {
+  for (uint32_t i = 0; i < type.nparam; ++i)
+    if (std::strcmp(type.params[i].key, key) == 0) return true;
+  return false;
+}
+
+bool stands_for(const dfm_type &type, const char *given, const char *row) {
+  return std::strcmp(given, "mu") == 0 && !has_row(type, "mu") && (std::strcmp(row, "mu_C") == 0 || std::strcmp(row, "mu_S") == 0);
+}
+
+void check_keys(const dfm_type &type, std::span<const dfm_param_value> given) {
+  for (size_t i = 0; i < given.size(); ++i) {
+    if (!given[i].key || !given[i].value) fail(DFM_E_ARG, "%s: parameter %zu has no %s", type.id, i, given[i].key ? "value" : "key");
+    bool known = has_row(type, given[i].key);
+    for (uint32_t k = 0; k < type.nparam; ++k) known |= stands_for(type, given[i].key, type.params[k].key);
+    if (!known) {
+      const auto keys = keys_of(type);
+      const std::string near = nearest(given[i].key, keys);
+      fail(DFM_E_ARG, "%s has no parameter \"%s\"%s%s%s; it has %s", type.id, given[i].key, near.empty() ? "" : ", did you mean \"",
+           near.c_str(), near.empty() ? "" : "\"", keys.empty() ? "none" : join(keys).c_str());
+    }
+    for (size_t k = 0; k < i; ++k)
+      if (std::strcmp(given[i].key, given[k].key) == 0) fail(DFM_E_ARG, "%s: parameter \"%s\" is given twice", type.id, given[i].key);
+  }
+}
+
+void check_value(const dfm_type &type, const dfm_param &row, const dfm_param_value &value) {
+  if (value.width != row.width)
+    fail(DFM_E_ARG, "%s: parameter \"%s\" has %u value%s, %u expected", type.id, value.key, value.width, value.width == 1 ? "" : "s",
+         row.width);
+  for (uint32_t k = 0; k < row.width; ++k) {
+    const double x = value.value[k];
+    const bool whole = !(row.flags & (DFM_PARAM_INTEGER | DFM_PARAM_ENUM)) || x == std::floor(x);
+    if (!(x >= row.min && x <= row.max) || !whole)
+      fail(DFM_E_ARG, "%s: parameter \"%s\" is %g, %s expected", type.id, value.key, x, range_of(row).c_str());
+  }
+}
+
+const dfm_param_value *choose(const dfm_type &type, const dfm_param &row, std::span<const dfm_param_value> given,
+                              const ParamLookup &fallback) {
+  for (const auto &value : given)
+    if (std::strcmp(value.key, row.key) == 0) return &value;
+  for (const auto &value : given)
+    if (stands_for(type, value.key, row.key)) return &value;
+  return fallback ? fallback(row.key) : nullptr;
+}
+
+}  // namespace
+
+uint32_t packed_width(const dfm_type &type) {
+  uint32_t n = 0;
+  for (uint32_t i = 0; i < type.nparam; ++i) n += type.params[i].width;
+  return n;
+}
+
+std::vector<double> pack_params(const dfm_type &type, std::span<const dfm_param_value> given, const ParamLookup &fallback) {
+  check_keys(type, given);
+  std::vector<double> packed;
+  packed.reserve(packed_width(type));
+  for (uint32_t i = 0; i < type.nparam; ++i) {
+    const dfm_param &row = type.params[i];
+    if (const dfm_param_value *value = choose(type, row, given, fallback)) {
+      check_value(type, row, *value);
+      packed.insert(packed.end(), value->value, value->value + row.width);
+    } else {
+      packed.insert(packed.end(), row.width, row.def);
+    }
+  }
+  if (type.kind == DFM_KIND_FRICTION && law_of(type).check) {
+    char why[256] = "";
+    dfm_status status = DFM_E_FATAL;
+    try {
+      status = law_of(type).check(packed.data(), why, sizeof why);
+    } catch (...) {
+      std::strcpy(why, "its check threw an exception");
+    }
+    why[sizeof why - 1] = 0;
+    if (status != DFM_OK) fail(DFM_E_ARG, "%s: %s", type.id, *why ? why : "its check refuses these parameters together");
+  }
+  return packed;
+}
+
+}  // namespace dfm

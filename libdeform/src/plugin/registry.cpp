@@ -1,0 +1,215 @@
+#include "plugin/registry.h"
+
+#include <algorithm>
+#include <cctype>
+#include <cmath>
+#include <cstring>
+
+#include "core/error.h"
+
+namespace dfm {
+namespace {
+
+// The head that every version of a struct has had; smaller sizes are a plugin's mistake.
+constexpr uint32_t kTypeHead = offsetof(dfm_type, ops) + sizeof(void *);
+constexpr uint32_t kParamHead = offsetof(dfm_param, names);
+constexpr uint32_t kLawHead = offsetof(dfm_friction, eval) + sizeof(void *);
+constexpr uint32_t kModelHead = offsetof(dfm_model, destroy) + sizeof(void *);
+constexpr uint32_t kSolverHead = offsetof(dfm_solver, release) + sizeof(void *);
+constexpr uint32_t kLargest = 1u << 16;  // no struct of this ABI will ever be larger: what claims more is not one
+
+[[noreturn]] void bad(const std::string &id, const std::string &what) {
+  fail(DFM_E_UNSUPPORTED, "type \"%s\" is not usable: %s", id.c_str(), what.c_str());
+}
+
+// Copies what both sides know; the rest of the full struct stays zero. The first field of every struct is its size.
+template <class T>
+void copy_struct(T &full, const void *from, uint32_t head, const std::string &id, const char *name) {
+  uint32_t size;
+  std::memcpy(&size, from, sizeof size);
+  if (size < head || size > kLargest)
+    bad(id, format("%s.size is %u, at least %u expected; set it to sizeof(%s)", name, size, head, name));
+  std::memcpy(&full, from, std::min<size_t>(size, sizeof(T)));
+  full.size = sizeof(T);
+}
+
+bool reverse_dns(const char *id) {
+  bool dot = false;
+  char last = '.';
+  for (const char *c = id; *c; last = *c++) {
+    if (*c == '.' ? last == '.' : !(std::isalnum(static_cast<unsigned char>(*c)) || *c == '_' || *c == '-')) return false;
+    dot |= *c == '.';
+  }
+  return dot && last != '.';
+}
+
+void check_head(const dfm_type &type) {
+  const std::string id = type.id ? type.id : "";
+  if (id.empty()) bad("", "it has no id; give one in reverse-DNS form such as \"org.example.mylaw\"");
+  if (!reverse_dns(type.id)) bad(id, "its id is not in reverse-DNS form such as \"org.example.mylaw\"");
+  const struct { const char *key, *text; } fields[] = {
+      {"name", type.name}, {"version", type.version}, {"licence", type.licence}, {"source", type.source}};
+  for (const auto &field : fields)
+    if (!field.text || !*field.text) bad(id, format("its metadata lacks \"%s\"", field.key));
+  if (type.kind < DFM_KIND_FRICTION || type.kind > DFM_KIND_SOLVER) bad(id, format("its kind %u is unknown to this library", type.kind));
+  if (!type.ops) bad(id, "it has no operations (ops is NULL)");
+}
+
+void check_row(const std::string &id, const dfm_param &row, const std::vector<dfm_param> &before) {
+  const std::string key = row.key ? row.key : "";
+  if (key.empty()) bad(id, "a parameter row has no key");
+  for (const auto &other : before)
+    if (key == other.key) bad(id, format("parameter \"%s\" stands twice in the table", key.c_str()));
+  if (!row.label || !row.unit) bad(id, format("parameter \"%s\" lacks a label or a unit (\"1\" if dimensionless)", key.c_str()));
+  if (!std::isfinite(row.min) || !std::isfinite(row.max) || !(row.min <= row.def && row.def <= row.max))
+    bad(id, format("parameter \"%s\": the range [%g, %g] must be finite and hold the default %g", key.c_str(), row.min, row.max, row.def));
+  if (row.width < 1 || row.width > 16) bad(id, format("parameter \"%s\": width %u is not in 1..16", key.c_str(), row.width));
+  if (row.flags & DFM_PARAM_ENUM) {
+    uint32_t n = 0;
+    while (row.names && n < kLargest && row.names[n]) ++n;
+    if (n == 0 || row.min != 0 || row.max != n - 1)
+      bad(id, format("parameter \"%s\": an enumeration of %u names needs the range [0, %g]", key.c_str(), n, n - 1.0));
+  }
+}
+
+void copy_rows(RegisteredType &out) {
+  const dfm_type &type = out.type;
+  const std::string id = type.id;
+  if (type.nparam == 0) return;
+  if (!type.params) bad(id, "nparam is not 0 but params is NULL");
+  if (type.nparam > 4096 || type.param_size < kParamHead || type.param_size > kLargest)
+    bad(id, format("its parameter table has %u rows of %u bytes; at least %u bytes a row expected", type.nparam, type.param_size, kParamHead));
+  for (uint32_t i = 0; i < type.nparam; ++i) {
+    dfm_param row{};
+    std::memcpy(&row, reinterpret_cast<const char *>(type.params) + size_t(i) * type.param_size,
+                std::min<size_t>(type.param_size, sizeof row));
+    check_row(id, row, out.rows);
+    out.rows.push_back(row);
+  }
+  out.type.params = out.rows.data();
+  out.type.param_size = sizeof(dfm_param);
+}
+
+void check_slots(const std::string &id, const dfm_slot *slots, uint32_t n, bool law) {
+  if (n > 4096 || (n && !slots)) bad(id, "its state slots are missing");
+  for (uint32_t i = 0; i < n; ++i) {
+    const dfm_slot &s = slots[i];
+    const uint32_t width = s.kind == DFM_SLOT_TANGENT ? 2 : s.kind == DFM_SLOT_VECTOR ? 3 : s.kind == DFM_SLOT_ROTATION ? 4 : s.width;
+    if (s.kind < DFM_SLOT_SCALAR || s.kind > DFM_SLOT_ROTATION || s.width == 0 || s.width > 4096 || s.width != width)
+      bad(id, format("state slot %u has kind %u and width %u, which do not agree", i, s.kind, s.width));
+    if (law ? s.unit != DFM_PER_CONTACT : s.unit < DFM_PER_POINT || s.unit > DFM_PER_INSTANCE)
+      bad(id, format("state slot %u has unit %u, which a %s cannot have", i, s.unit, law ? "law" : "model"));
+  }
+}
+
+void copy_ops(RegisteredType &out) {
+  const std::string id = out.type.id;
+  const void *ops = out.type.ops;
+  if (out.type.kind == DFM_KIND_FRICTION) {
+    copy_struct(out.friction, ops, kLawHead, id, "dfm_friction");
+    if (!out.friction.eval) bad(id, "a law needs eval");
+    if (!out.friction.prepare != !out.friction.release) bad(id, "prepare and release go together");
+    check_slots(id, out.friction.slots, out.friction.nslot, true);
+    out.type.ops = &out.friction;
+  } else if (out.type.kind == DFM_KIND_MODEL) {
+    copy_struct(out.model, ops, kModelHead, id, "dfm_model");
+    if (!out.model.create || !out.model.destroy) bad(id, "a model needs create and destroy");
+    if (!out.model.add_forces && !out.model.extension) bad(id, "a model needs add_forces, or the extension \"dfm.stepper/1\"");
+    if (out.model.cells == 0) bad(id, "a model must accept a kind of cell");
+    check_slots(id, out.model.slots, out.model.nslot, false);
+    out.type.ops = &out.model;
+  } else {
+    copy_struct(out.solver, ops, kSolverHead, id, "dfm_solver");
+    if (!out.solver.analyse || !out.solver.factor || !out.solver.solve || !out.solver.release)
+      bad(id, "a solver needs analyse, factor, solve and release");
+    out.type.ops = &out.solver;
+  }
+}
+
+}  // namespace
+
+const char *kind_name(uint32_t kind) {
+  return kind == DFM_KIND_FRICTION ? "law" : kind == DFM_KIND_MODEL ? "model" : kind == DFM_KIND_SOLVER ? "solver" : "type";
+}
+
+std::string short_name(const dfm_type &type) {
+  const char *dot = std::strrchr(type.id, '.');
+  return dot ? dot + 1 : type.id;
+}
+
+std::vector<std::string> effects(const dfm_type &type) {
+  std::vector<std::string> names;
+  for (const char *const *e = type.effects; e && *e; ++e) names.push_back(*e);
+  return names;
+}
+
+void Registry::add(const dfm_plugin &plugin, const std::string &file) {
+  if (plugin.ntype == 0 || plugin.ntype > 4096 || !plugin.types)
+    fail(DFM_E_UNSUPPORTED, "the plugin offers no types (ntype %u)", plugin.ntype);
+  std::vector<std::unique_ptr<RegisteredType>> fresh;
+  for (uint32_t i = 0; i < plugin.ntype; ++i) {
+    if (!plugin.types[i]) fail(DFM_E_UNSUPPORTED, "entry %u of the plugin's list of types is NULL", i);
+    auto entry = std::make_unique<RegisteredType>();
+    copy_struct(entry->type, plugin.types[i], kTypeHead, format("#%u", i), "dfm_type");
+    check_head(entry->type);
+    copy_rows(*entry);
+    copy_ops(*entry);
+    entry->file = file;
+    for (const auto *list : {&types_, &fresh})
+      for (const auto &other : *list)
+        if (std::strcmp(other->type.id, entry->type.id) == 0)
+          fail(DFM_E_STATE, "id \"%s\" is taken by %s; unload that one, or give this plugin an id of its own", entry->type.id,
+               other->file.c_str());
+    fresh.push_back(std::move(entry));
+  }
+  types_.reserve(types_.size() + fresh.size());
+  for (auto &entry : fresh) types_.push_back(std::move(entry));
+  std::sort(types_.begin(), types_.end(), [](const auto &a, const auto &b) {
+    return a->type.kind != b->type.kind ? a->type.kind < b->type.kind : std::strcmp(a->type.id, b->type.id) < 0;
+  });
+}
+
+const dfm_type *Registry::try_find(uint32_t kind, std::string_view name) const noexcept {
+  const dfm_type *by_short_name = nullptr;
+  for (const auto &entry : types_) {
+    const dfm_type &type = entry->type;
+    if (kind && type.kind != kind) continue;
+    if (name == type.id) return &type;
+    const char *dot = std::strrchr(type.id, '.');
+    if (!by_short_name && dot && name == dot + 1) by_short_name = &type;
+  }
+  return by_short_name;
+}
+
+const dfm_type &Registry::find(uint32_t kind, std::string_view name) const {
+  if (const dfm_type *type = try_find(kind, name)) return *type;
+  const std::string wrong(name);
+  std::vector<std::string> names, listed;
+  for (const dfm_type *type : list(kind)) {
+    names.push_back(short_name(*type)), names.push_back(type->id);
+    listed.push_back(short_name(*type));
+  }
+  const std::string near = nearest(wrong, names);
+  const char *what = kind_name(kind);
+  if (listed.empty())
+    fail(DFM_E_UNSUPPORTED, "no %s \"%s\": no plugin with a %s is loaded; set DEFORM_PLUGIN_PATH or see \"deform plugin list\"", what,
+         wrong.c_str(), what);
+  fail(DFM_E_UNSUPPORTED, "no %s \"%s\" is loaded%s%s%s; loaded: %s", what, wrong.c_str(), near.empty() ? "" : ", did you mean \"",
+       near.c_str(), near.empty() ? "" : "\"", join(listed).c_str());
+}
+
+std::vector<const dfm_type *> Registry::list(uint32_t kind) const {
+  std::vector<const dfm_type *> out;
+  for (const auto &entry : types_)
+    if (kind == 0 || entry->type.kind == kind) out.push_back(&entry->type);
+  return out;
+}
+
+const std::string &Registry::file_of(const dfm_type &type) const {
+  for (const auto &entry : types_)
+    if (&entry->type == &type) return entry->file;
+  static const std::string none;
+  return none;
+}
+
+}  // namespace dfm

@@ -1,0 +1,222 @@
+#include "scene/build.h"
+
+#include <algorithm>
+#include <cmath>
+#include <filesystem>
+#include <utility>
+
+#include "core/error.h"
+#include "scene/select.h"
+
+namespace dfm::scene {
+namespace {
+
+class Builder {
+ public:
+  Builder(dfm_context *context, Definition &def, uint64_t seed) : context_(context), def_(def), jittered_(seed != 0), jitter_(seed) {}
+  ~Builder() {
+    for (auto &[path, mesh] : meshes_) dfm_tetmesh_destroy(mesh);
+    if (world_) dfm_world_destroy(world_);
+  }
+  Builder(const Builder &) = delete;
+  Builder &operator=(const Builder &) = delete;
+
+  Built run() {
+    create_world();
+    for (Material &m : def_.materials) create_material(m);
+    for (Body &b : def_.bodies) create_body(b);
+    for (Obstacle &o : def_.obstacles) create_obstacle(o);
+    for (Friction &f : def_.friction) add_friction(f);
+    for (const Filter &f : def_.filters)
+      check(dfm_world_filter_pair(world_, f.between[0].c_str(), f.between[1].c_str(), f.collide), f.pointer);
+    return {std::exchange(world_, 0), std::move(probes_)};
+  }
+
+ private:
+  void check(dfm_status status, const std::string &pointer) const {
+    if (status < 0) fail(status, "%s: %s: %s", def_.file.c_str(), pointer.c_str(), dfm_last_error());
+  }
+
+  std::string path_of(const std::string &path) const {
+    const std::filesystem::path p(path);
+    return p.is_absolute() || def_.folder.empty() ? path : (std::filesystem::path(def_.folder) / p).lexically_normal().string();
+  }
+
+  void create_world() {
+    dfm_world_def w = dfm_world_def_default();
+    std::copy_n(def_.gravity, 3, w.gravity);
+    w.method = def_.method, w.integrator = def_.integrator;
+    w.contact_offset = def_.offset, w.contact_tolerance = def_.tolerance;
+    std::vector<const char *> effects;
+    for (const std::string &e : def_.effects) effects.push_back(e.c_str());
+    effects.push_back(nullptr);
+    if (!def_.effects_auto) w.effects = effects.data();
+    check(dfm_world_create(context_, &w, &world_), def_.effects_auto ? "/contact" : "/effects");
+    if (def_.gravity_keys.empty()) return;
+    check(dfm_world_set_gravity_keys(world_, uint32_t(def_.gravity_keys.size()), def_.gravity_keys.data()), "/gravity/keyframes");
+  }
+
+  void create_material(Material &m) {
+    dfm_material_def d = dfm_material_def_default();
+    d.name = m.name.c_str();
+    d.density = m.density, d.young = m.young, d.poisson = m.poisson;
+    d.damping_mass = m.damping_mass, d.damping_stiffness = m.damping_stiffness;
+    d.extra = m.extra.view();
+    check(dfm_material_create(world_, &d, &materials_[m.name]), m.pointer);
+  }
+
+  dfm_material material(const std::string &name) const { return name.empty() ? 0 : materials_.at(name); }
+
+  BodyMesh load_mesh(const Body &b) {
+    const std::string path = path_of(b.mesh);
+    const auto known = meshes_.find(path);
+    dfm_tetmesh mesh = known != meshes_.end() ? known->second : 0;
+    if (!mesh) {
+      check(dfm_tetmesh_read(context_, path.c_str(), &mesh), b.pointer + "/mesh");
+      meshes_[path] = mesh;
+    }
+    BodyMesh out;
+    dfm_tetmesh_info info = {};
+    info.size = sizeof info;
+    const double *points = nullptr;
+    check(dfm_tetmesh_get_info(mesh, &info), b.pointer + "/mesh");
+    check(dfm_tetmesh_data(mesh, &points, &out.tets, &out.file_point), b.pointer + "/mesh");
+    check(dfm_tetmesh_groups(mesh, &out.group_names, &out.cell_group), b.pointer + "/mesh");
+    out.npoint = info.npoint, out.ntet = info.ntet, out.ngroup = info.ngroup;
+    out.points.resize(3 * size_t(info.npoint));
+    for (size_t i = 0; i < out.points.size(); ++i) out.points[i] = points[i] * b.scale;
+    for (int k = 0; k < 3; ++k) out.lo[k] = info.lo[k] * b.scale, out.hi[k] = info.hi[k] * b.scale;
+    out.size = std::sqrt(std::pow(out.hi[0] - out.lo[0], 2) + std::pow(out.hi[1] - out.lo[1], 2) + std::pow(out.hi[2] - out.lo[2], 2));
+    return out;
+  }
+
+  void create_body(Body &b) {
+    const BodyMesh mesh = load_mesh(b);
+    std::vector<NodalRow> nodal;
+    if (!b.nodal_bc.empty()) {
+      try {
+        nodal = read_nodal(path_of(b.nodal_bc), mesh);
+      } catch (const Error &e) {
+        fail(e.status, "%s: %s/nodal_bc: %s", def_.file.c_str(), b.pointer.c_str(), e.what());
+      }
+    }
+    std::vector<uint8_t> fixed(mesh.npoint, 0);
+    std::vector<std::vector<uint32_t>> held;
+    for (const Fix &f : b.fixes) {
+      held.push_back(select(f.where, mesh, def_.file));
+      for (uint32_t p : held.back()) fixed[p] |= f.axes;
+    }
+    for (const NodalRow &row : nodal) fixed[row.point] |= row.axes;
+
+    dfm_body_def d = dfm_body_def_default();
+    d.name = b.name.c_str();
+    d.npoint = mesh.npoint, d.ntet = mesh.ntet;
+    d.points = mesh.points.data(), d.tets = mesh.tets;
+    d.material = material(b.material);
+    d.model = b.model.c_str();
+    d.model_params = b.params.view();
+    d.fixed = fixed.data();
+    if (jittered_) {
+      const double centre[3] = {(mesh.lo[0] + mesh.hi[0]) / 2, (mesh.lo[1] + mesh.hi[1]) / 2, (mesh.lo[2] + mesh.hi[2]) / 2};
+      jitter_.apply(mesh.size, centre, b.pose, b.velocity, b.spin);
+    }
+    d.pose = b.pose;
+    std::copy_n(b.velocity, 3, d.velocity);
+    std::copy_n(b.spin, 3, d.spin);
+    dfm_body body = 0;
+    check(dfm_body_create(world_, &d, &body), b.pointer);
+    for (size_t i = 0; i < b.fixes.size(); ++i) move_held(body, b.fixes[i], held[i]);
+    add_loads(body, b, mesh, nodal);
+    for (const Probe &p : def_.probes)
+      if (p.body == b.name) add_probe(body, p, mesh);
+  }
+
+  void move_held(dfm_body body, const Fix &f, const std::vector<uint32_t> &points) const {
+    if (!f.motion.any()) return;
+    check(dfm_body_move_held(body, uint32_t(points.size()), points.data(), uint32_t(f.motion.keys.size()), f.motion.keys.data(), &f.motion.sine),
+          f.where.pointer + "/motion");
+  }
+
+  void add_loads(dfm_body body, const Body &b, const BodyMesh &mesh, const std::vector<NodalRow> &nodal) const {
+    std::vector<uint32_t> triangles;
+    for (const Force &f : b.forces) {
+      if (triangles.empty()) triangles = boundary(body, b);
+      const std::vector<uint32_t> points = select(f.where, mesh, def_.file);
+      const std::vector<double> weights = share(f, points, mesh, triangles, def_.file);
+      std::vector<double> forces;
+      for (double w : weights)
+        for (double t : f.total) forces.push_back(w * t);
+      const bool sine = f.sine.amplitude[0] != 0;
+      check(dfm_body_add_load(body, uint32_t(points.size()), points.data(), forces.data(), uint32_t(f.keys.size()), f.keys.data(),
+                              sine ? &f.sine : nullptr, nullptr),
+            f.where.pointer);
+    }
+    std::vector<uint32_t> points;
+    std::vector<double> forces;
+    for (const NodalRow &row : nodal) {
+      if (row.force[0] == 0 && row.force[1] == 0 && row.force[2] == 0) continue;
+      points.push_back(row.point);
+      forces.insert(forces.end(), row.force, row.force + 3);
+    }
+    if (points.empty()) return;
+    check(dfm_body_add_load(body, uint32_t(points.size()), points.data(), forces.data(), 0, nullptr, nullptr, nullptr), b.pointer + "/nodal_bc");
+  }
+
+  // Boundary triangles in the numbers of the mesh's points.
+  std::vector<uint32_t> boundary(dfm_body body, const Body &b) const {
+    const std::string where = b.pointer + "/forces";
+    uint32_t ntriangle = 0, nsurfel = 0;
+    check(dfm_surface_triangles(body, 0, nullptr, &ntriangle), where);
+    check(dfm_surface_points(body, 0, nullptr, &nsurfel), where);
+    std::vector<uint32_t> triangles(3 * size_t(ntriangle)), point(nsurfel);
+    check(dfm_surface_triangles(body, ntriangle, triangles.data(), &ntriangle), where);
+    check(dfm_surface_points(body, nsurfel, point.data(), &nsurfel), where);
+    for (uint32_t &t : triangles) t = point[t];
+    return triangles;
+  }
+
+  void add_probe(dfm_body body, const Probe &p, const BodyMesh &mesh) {
+    ProbePoint probe;
+    probe.name = p.name, probe.body = body;
+    const double away = locate(mesh, p.point, probe.points, probe.weights);
+    if (!(away <= 0.25 * mesh.size))
+      fail(DFM_E_ARG, "%s: %s/point: lies %g m away from \"%s\", which at rest, scaled but before its pose, spans [%g, %g, %g] to [%g, %g, %g]",
+           def_.file.c_str(), p.pointer.c_str(), away, p.body.c_str(), mesh.lo[0], mesh.lo[1], mesh.lo[2], mesh.hi[0], mesh.hi[1], mesh.hi[2]);
+    // Probes are reported in the scene's order, whatever the order of their bodies.
+    if (probes_.size() < def_.probes.size()) probes_.resize(def_.probes.size());
+    probes_[size_t(&p - def_.probes.data())] = std::move(probe);
+  }
+
+  void create_obstacle(Obstacle &o) {
+    o.def.name = o.name.c_str();
+    o.def.nkey = uint32_t(o.keys.size());
+    o.def.keys = o.keys.data();
+    o.def.material = material(o.material);
+    dfm_obstacle obstacle = 0;
+    check(dfm_obstacle_create(world_, &o.def, &obstacle), o.pointer);
+  }
+
+  void add_friction(Friction &f) {
+    dfm_friction_def d = {};
+    d.size = sizeof d;
+    d.between[0] = f.between[0].c_str(), d.between[1] = f.between[1].c_str();
+    d.law = f.law.c_str();
+    d.params = f.params.view();
+    check(dfm_world_add_friction(world_, &d), f.pointer);
+  }
+
+  dfm_context *context_;
+  Definition &def_;
+  bool jittered_;
+  Jitter jitter_;
+  dfm_world world_ = 0;
+  std::map<std::string, dfm_material> materials_;
+  std::map<std::string, dfm_tetmesh> meshes_;
+  std::vector<ProbePoint> probes_;
+};
+
+}  // namespace
+
+Built build(dfm_context *context, Definition &def, uint64_t jitter_seed) { return Builder(context, def, jitter_seed).run(); }
+
+}  // namespace dfm::scene

@@ -1,0 +1,26 @@
+// Definition -> world, through the public C API only.
+#pragma once
+#include "scene/scene.h"
+
+namespace dfm::scene {
+
+// Owns the world until it is handed over, so that a scene that fails halfway leaves nothing behind.
+struct Built {
+  dfm_world world = 0;
+  std::vector<ProbePoint> probes;
+};
+Built build(dfm_context *context, Definition &def, uint64_t jitter_seed);
+
+// Small displacements of the start state, the same on every machine for the same seed: each body in turn draws 10 numbers.
+class Jitter {
+ public:
+  explicit Jitter(uint64_t seed) : state_(seed) {}
+  double symmetric();  // in [-1, 1)
+  // Positions +-1e-3 of `size`, angle +-0.5 degrees about an axis through `centre` (rest frame), velocities +-1 %.
+  void apply(double size, const double centre[3], dfm_pose &pose, double velocity[3], double spin[3]);
+
+ private:
+  uint64_t state_;
+};
+
+}  // namespace dfm::scene

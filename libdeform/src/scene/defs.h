@@ -1,0 +1,114 @@
+// What a scene file says, checked and in plain structs; build.cpp turns it into a world through the public API.
+#pragma once
+#include <cstdint>
+#include <map>
+#include <string>
+#include <vector>
+
+#include "deform/deform.h"
+
+namespace dfm::scene {
+
+// Parameters by key, owning what a dfm_params borrows.
+struct Params {
+  std::vector<std::string> keys;
+  std::vector<std::vector<double>> values;
+  std::vector<dfm_param_value> rows;
+  dfm_params view();
+};
+
+struct Selection {
+  std::string pointer, group;  // group empty: by box
+  double lo[3] = {}, hi[3] = {};
+};
+
+struct Motion {
+  std::vector<dfm_pose_key> keys;
+  dfm_sine sine = {};
+  bool any() const { return !keys.empty() || sine.amplitude[0] != 0 || sine.amplitude[1] != 0 || sine.amplitude[2] != 0; }
+};
+
+struct Fix {
+  Selection where;
+  uint8_t axes = 7;  // bits 1 x, 2 y, 4 z
+  Motion motion;
+};
+
+struct Force {
+  Selection where;
+  double total[3] = {};
+  std::string by;  // "auto" "area" "mass"
+  std::vector<dfm_scale_key> keys;
+  dfm_sine sine = {};
+};
+
+struct Body {
+  std::string pointer, name, mesh, material, model, nodal_bc;
+  Params params;
+  dfm_pose pose = {};
+  double scale = 1, velocity[3] = {}, spin[3] = {};
+  std::vector<Fix> fixes;
+  std::vector<Force> forces;
+};
+
+struct Obstacle {
+  std::string pointer, name, material;
+  dfm_obstacle_def def = {};
+  std::vector<dfm_pose_key> keys;
+};
+
+struct Material {
+  std::string pointer, name;
+  double density = 1000, young = 1e5, poisson = 0.3, damping_mass = 0, damping_stiffness = 0;
+  Params extra;
+};
+
+struct Friction {
+  std::string pointer, between[2], law;
+  Params params;
+};
+
+struct Filter {
+  std::string pointer, between[2];
+  bool collide = false;
+};
+
+struct Probe {
+  std::string pointer, name, body;
+  double point[3] = {};
+};
+
+struct Definition {
+  std::string file, folder;
+  double gravity[3] = {0, 0, -9.81};
+  std::vector<dfm_vector_key> gravity_keys;
+  int32_t method = DFM_METHOD_AUTO, integrator = DFM_INTEGRATOR_AUTO;
+  double offset = 0, tolerance = 0;
+  bool effects_auto = true;
+  std::vector<std::string> effects;
+  std::vector<Material> materials;
+  std::vector<Body> bodies;
+  std::vector<Obstacle> obstacles;
+  std::vector<Friction> friction;
+  std::vector<Filter> filters;
+  std::vector<Probe> probes;
+  // what only a runner needs
+  double duration = 0, step = 0, every = 0, frame_rate = 0;
+  bool frames = false, states = false, nodes = false, contacts = true, check = false, has_camera = false;
+  double eye[3] = {}, look_at[3] = {};
+  std::string color;
+};
+
+// Types that the context has loaded: parameters are checked against their own tables.
+class Types {
+ public:
+  explicit Types(dfm_context *context);
+  const dfm_type *find(uint32_t kind, const std::string &name) const;  // short name or full id; nullptr
+  std::vector<std::string> names(uint32_t kind) const;                 // short names
+  std::vector<std::string> model_keys() const;                         // parameters of any model
+ private:
+  std::vector<const dfm_type *> types_;
+};
+const dfm_param *find_row(const dfm_type *type, const std::string &key);
+
+}  // namespace dfm::scene

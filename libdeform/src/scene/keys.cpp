@@ -1,0 +1,95 @@
+#include "scene/keys.h"
+
+#include <stdexcept>
+
+namespace dfm::scene {
+namespace {
+
+using Table = std::vector<std::pair<std::string, std::vector<Key>>>;
+
+const Table &objects() {
+  static const Table table = {
+      {"scene",
+       {{"format", true}, {"version", true}, {"gravity", true}, {"time", true}, {"effects", true}, {"materials", true}, {"bodies", true},
+        {"obstacles", true}, {"rigid", false}, {"contact", true}, {"solver", false}, {"probes", true}, {"output", true}}},
+      {"gravity", {{"keyframes", true}}},
+      {"gravity_key", {{"t", true}, {"value", true}}},
+      {"time", {{"duration", true}, {"step", true}, {"integrator", true}, {"mode", true}}},
+      // A material may hold, beside these, any parameter of a loaded model.
+      {"material", {{"density", true}, {"young", true}, {"poisson", true}, {"damping", true}}},
+      {"damping", {{"mass", true}, {"stiffness", true}}},
+      {"body",
+       {{"name", true}, {"mesh", true}, {"material", true}, {"model", true}, {"pose", true}, {"velocity", true}, {"spin", true},
+        {"fix", true}, {"forces", true}, {"surface", true}, {"nodal_bc", true}, {"fill", false}, {"springs", false},
+        {"anisotropy", false}, {"materials_by_group", false}, {"fields", false}, {"start", false}, {"switch", false},
+        {"pressure", false}}},
+      {"model", {{"type", true}, {"params", true}}},
+      {"pose", {{"position", true}, {"rotation", true}, {"scale", true}}},
+      {"rotation", {{"axis", true}, {"angle_deg", true}}},
+      {"fix", {{"box", true}, {"group", true}, {"axes", true}, {"motion", true}}},
+      {"force", {{"box", true}, {"group", true}, {"total", true}, {"by", true}, {"keyframes", true}, {"sine", true}}},
+      {"force_key", {{"t", true}, {"scale", true}}},
+      {"motion", {{"keyframes", true}, {"sine", true}}},
+      {"motion_key", {{"t", true}, {"position", true}, {"rotation", true}}},
+      {"sine", {{"amplitude", true}, {"frequency", true}, {"phase", true}}},
+      {"surface", {{"from", true}, {"mesh", false}, {"coupling", false}, {"support", false}}},
+      {"obstacle",
+       {{"name", true}, {"shape", true}, {"point", true}, {"normal", true}, {"radius", true}, {"half_size", true},
+        {"half_length", true}, {"pose", true}, {"motion", true}, {"velocity_surface", true}, {"material", true}, {"mesh", false},
+        {"cells", false}}},
+      {"obstacle_pose", {{"position", true}, {"rotation", true}}},
+      {"contact",
+       {{"method", true}, {"self", true}, {"untangle", true}, {"sleep", true}, {"tolerance", true}, {"offset", true},
+        {"friction", true}, {"filter", true}}},
+      {"friction", {{"between", true}, {"law", true}, {"params", true}}},
+      {"filter", {{"between", true}, {"collide", true}}},
+      {"probe", {{"name", true}, {"body", true}, {"point", true}}},
+      {"output",
+       {{"every", true}, {"frames", true}, {"states", true}, {"nodes", true}, {"contacts", true}, {"check", true}, {"camera", true},
+        {"color", true}}},
+      {"camera", {{"eye", true}, {"look_at", true}}},
+  };
+  return table;
+}
+
+const Table &words() {
+  static const Table table = {
+      {"mode", {{"dynamic", true}, {"static", false}}},
+      {"integrator", {{"auto", true}, {"symplectic_euler", true}, {"verlet", false}, {"implicit_euler", false}}},
+      {"method", {{"auto", true}, {"velocity", true}, {"implicit", false}, {"rollback", false}}},
+      {"shape", {{"plane", true}, {"sphere", true}, {"box", true}, {"capsule", true}, {"mesh", false}, {"voxels", false}}},
+      {"from", {{"boundary", true}}},
+      {"by", {{"auto", true}, {"area", true}, {"mass", true}}},
+      {"color", {{"body", true}, {"contact", true}, {"speed", true}, {"displacement", true}, {"stress", false}}},
+  };
+  return table;
+}
+
+const std::vector<Key> &find(const Table &table, const std::string &name) {
+  for (const auto &[key, rows] : table)
+    if (key == name) return rows;
+  throw std::logic_error("no such table in scene/keys: " + name);
+}
+
+std::vector<std::string> names(const Table &table) {
+  std::vector<std::string> out;
+  for (const auto &row : table) out.push_back(row.first);
+  return out;
+}
+
+}  // namespace
+
+const std::vector<Key> &keys_of(const std::string &kind) { return find(objects(), kind); }
+const std::vector<Key> &words_of(const std::string &what) { return find(words(), what); }
+
+const std::vector<std::string> &object_kinds() {
+  static const std::vector<std::string> list = names(objects());
+  return list;
+}
+
+const std::vector<std::string> &word_sets() {
+  static const std::vector<std::string> list = names(words());
+  return list;
+}
+
+}  // namespace dfm::scene

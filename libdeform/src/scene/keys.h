@@ -1,0 +1,21 @@
+// The one table of names that a scene file may hold: reader, error messages and the shipped schema are checked against it.
+#pragma once
+#include <string>
+#include <vector>
+
+namespace dfm::scene {
+
+struct Key {
+  const char *name;
+  bool delivered;  // false: named in the format, refused with "not available yet: POINTER"
+};
+
+// Objects by kind ("scene", "time", "body", ...); kinds are also the names of the schema's definitions.
+const std::vector<std::string> &object_kinds();
+const std::vector<Key> &keys_of(const std::string &kind);
+
+// Words that a value may be, where the format fixes them ("time.mode", "shape", ...).
+const std::vector<Key> &words_of(const std::string &what);
+const std::vector<std::string> &word_sets();
+
+}  // namespace dfm::scene

@@ -1,0 +1,75 @@
+// Boundary conditions node by node: node,fixx,fixy,fixz,fx,fy,fz with the mesh file's node numbers from 0.
+#include <charconv>
+#include <cmath>
+#include <cstring>
+#include <fstream>
+#include <string_view>
+
+#include "core/error.h"
+#include "scene/select.h"
+
+namespace dfm::scene {
+namespace {
+
+constexpr const char *kHeader = "node,fixx,fixy,fixz,fx,fy,fz";
+
+std::string_view trim(std::string_view s) {
+  while (!s.empty() && std::strchr(" \t\r", s.front())) s.remove_prefix(1);
+  while (!s.empty() && std::strchr(" \t\r", s.back())) s.remove_suffix(1);
+  return s;
+}
+
+void split(const std::string &path, size_t line, std::string_view text, double out[7]) {
+  int n = 0;
+  for (size_t i = 0; i <= text.size(); ++n) {
+    const size_t comma = std::min(text.find(',', i), text.size());
+    const std::string_view cell = trim(text.substr(i, comma - i));
+    i = comma + 1;
+    if (n >= 7) continue;
+    const char *first = cell.data() + (!cell.empty() && cell.front() == '+');
+    const auto result = std::from_chars(first, cell.data() + cell.size(), out[n]);
+    if (result.ec != std::errc() || result.ptr != cell.data() + cell.size() || !std::isfinite(out[n]))
+      fail(DFM_E_FORMAT, "%s:%zu: expected a finite number in column %d of %s, found \"%.*s\"", path.c_str(), line, n + 1, kHeader,
+           int(std::min<size_t>(cell.size(), 40)), cell.data());
+  }
+  if (n != 7) fail(DFM_E_FORMAT, "%s:%zu: expected the 7 columns %s, found %d", path.c_str(), line, kHeader, n);
+}
+
+}  // namespace
+
+std::vector<NodalRow> read_nodal(const std::string &path, const BodyMesh &mesh) {
+  std::ifstream in(path);
+  if (!in) fail(DFM_E_IO, "%s: cannot be opened; expected a table %s", path.c_str(), kHeader);
+  uint32_t highest = 0;
+  for (uint32_t i = 0; i < mesh.npoint; ++i) highest = std::max(highest, mesh.file_point[i]);
+  std::vector<uint32_t> point_of(size_t(highest) + 1, UINT32_MAX);
+  for (uint32_t i = 0; i < mesh.npoint; ++i) point_of[mesh.file_point[i]] = i;
+  std::vector<NodalRow> rows;
+  std::string text;
+  for (size_t line = 1; std::getline(in, text); ++line) {
+    const std::string_view trimmed = trim(text);
+    if (line == 1) {
+      if (trimmed != kHeader) fail(DFM_E_FORMAT, "%s:1: expected the header %s", path.c_str(), kHeader);
+      continue;
+    }
+    if (trimmed.empty()) continue;
+    double cell[7];
+    split(path, line, trimmed, cell);
+    if (cell[0] < 0 || cell[0] != std::floor(cell[0]) || cell[0] > highest)
+      fail(DFM_E_ARG, "%s:%zu: there is no node %g; the mesh file has the nodes 0 to %u", path.c_str(), line, cell[0], highest);
+    NodalRow row = {point_of[size_t(cell[0])], 0, {cell[4], cell[5], cell[6]}};
+    for (int k = 0; k < 3; ++k) {
+      if (cell[1 + k] != 0 && cell[1 + k] != 1) fail(DFM_E_ARG, "%s:%zu: fix%c is 0 or 1, found %g", path.c_str(), line, "xyz"[k], cell[1 + k]);
+      if (cell[1 + k] == 1) row.axes = uint8_t(row.axes | (1u << k));
+    }
+    if (row.point == UINT32_MAX) {
+      // A node that no cell uses has no phyxel: holding it means nothing, a force on it would be lost.
+      if (cell[4] != 0 || cell[5] != 0 || cell[6] != 0) fail(DFM_E_ARG, "%s:%zu: node %g belongs to no tetrahedron, so no force can act on it", path.c_str(), line, cell[0]);
+      continue;
+    }
+    rows.push_back(row);
+  }
+  return rows;
+}
+
+}  // namespace dfm::scene

@@ -1,0 +1,174 @@
+#include "scene/node.h"
+
+#include <cmath>
+#include <cstdarg>
+#include <cstdio>
+
+#include "scene/keys.h"
+
+namespace dfm::scene {
+namespace {
+
+// What the file says, short enough for a sentence.
+std::string excerpt(const json &value) {
+  std::string text = value.dump(-1, ' ', false, json::error_handler_t::replace);
+  if (text.size() > 40) text = text.substr(0, 37) + "...";
+  return text;
+}
+
+std::string span(const Range &r) {
+  if (r.lo <= -1e300 && r.hi >= 1e300) return "a finite number";
+  if (r.hi >= 1e300) return format("a number %s %g", r.open_lo ? "above" : "of at least", r.lo);
+  return format("a number from %g%s to %g%s", r.lo, r.open_lo ? " (excluded)" : "", r.hi, r.open_hi ? " (excluded)" : "");
+}
+
+std::vector<std::string> delivered(const std::vector<Key> &keys) {
+  std::vector<std::string> out;
+  for (const Key &k : keys)
+    if (k.delivered) out.push_back(k.name);
+  return out;
+}
+
+}  // namespace
+
+std::string escape_pointer(const std::string &key) {
+  std::string out;
+  for (char c : key) {
+    if (c == '~') out += "~0";
+    else if (c == '/') out += "~1";
+    else out += c;
+  }
+  return out;
+}
+
+void Node::fail(const char *text, ...) const {
+  char buffer[1024];
+  va_list args;
+  va_start(args, text);
+  std::vsnprintf(buffer, sizeof buffer, text, args);
+  va_end(args);
+  dfm::fail(DFM_E_ARG, "%s: %s: %s", file_->c_str(), pointer_.empty() ? "/" : pointer_.c_str(), buffer);
+}
+
+void Node::not_yet() const { dfm::fail(DFM_E_UNSUPPORTED, "%s: not available yet: %s", file_->c_str(), pointer_.c_str()); }
+
+std::string Node::kind_found() const { return std::string(value_->type_name()) + " " + excerpt(*value_); }
+
+void Node::object(const std::string &kind, const std::vector<std::string> &further) const {
+  if (!value_->is_object()) fail("expected an object, found %s", kind_found().c_str());
+  const std::vector<Key> &keys = keys_of(kind);
+  for (auto it = value_->begin(); it != value_->end(); ++it) {
+    const Key *known = nullptr;
+    for (const Key &k : keys)
+      if (it.key() == k.name) known = &k;
+    bool extra = false;
+    for (const std::string &name : further) extra = extra || name == it.key();
+    const Node child(&it.value(), pointer_ + "/" + escape_pointer(it.key()), file_);
+    if (known && !known->delivered) {
+      // An empty list asks for nothing, so nothing is left out by accepting it.
+      if (it.value().is_array() && it.value().empty()) continue;
+      child.not_yet();
+    }
+    if (known || extra) continue;
+    std::vector<std::string> valid;
+    for (const Key &k : keys) valid.push_back(k.name);
+    for (const std::string &name : further) valid.push_back(name);
+    const std::string near = nearest(it.key(), valid);
+    if (!near.empty()) child.fail("unknown key \"%s\"; did you mean \"%s\"?", it.key().c_str(), near.c_str());
+    child.fail("unknown key \"%s\"; expected one of: %s", it.key().c_str(), join(delivered(keys)).c_str());
+  }
+}
+
+Node Node::member(const std::string &key) const { return Node(&(*value_)[key], pointer_ + "/" + escape_pointer(key), file_); }
+
+Node Node::at(const std::string &key) const {
+  if (!has(key.c_str())) fail("the key \"%s\" is missing here", key.c_str());
+  return member(key);
+}
+
+std::vector<Node> Node::items() const {
+  if (!value_->is_array()) fail("expected an array, found %s", kind_found().c_str());
+  std::vector<Node> out;
+  for (size_t i = 0; i < value_->size(); ++i) out.emplace_back(&(*value_)[i], pointer_ + "/" + std::to_string(i), file_);
+  return out;
+}
+
+std::vector<Node> Node::items(const char *key) const {
+  if (!has(key)) return {};
+  return member(key).items();
+}
+
+double Node::number(const Range &range) const {
+  if (!value_->is_number()) fail("expected %s, found %s", span(range).c_str(), kind_found().c_str());
+  const double x = value_->get<double>();
+  const bool low = range.open_lo ? x <= range.lo : x < range.lo, high = range.open_hi ? x >= range.hi : x > range.hi;
+  if (!std::isfinite(x) || low || high) fail("expected %s, found %s", span(range).c_str(), excerpt(*value_).c_str());
+  return x;
+}
+
+double Node::number(const char *key, double otherwise, const Range &range) const {
+  if (!has(key)) (*value_)[key] = otherwise;
+  return member(key).number(range);
+}
+
+bool Node::boolean() const {
+  if (!value_->is_boolean()) fail("expected true or false, found %s", kind_found().c_str());
+  return value_->get<bool>();
+}
+
+bool Node::boolean(const char *key, bool otherwise) const {
+  if (!has(key)) (*value_)[key] = otherwise;
+  return member(key).boolean();
+}
+
+std::string Node::text() const {
+  if (!value_->is_string()) fail("expected a string, found %s", kind_found().c_str());
+  std::string s = value_->get<std::string>();
+  if (s.empty()) fail("expected a string that is not empty");
+  if (s.find('\0') != std::string::npos) fail("expected a string without a NUL character");
+  return s;
+}
+
+std::string Node::word(const std::string &set) const {
+  const std::string s = text();
+  const std::vector<Key> &keys = words_of(set);
+  std::vector<std::string> valid;
+  for (const Key &k : keys) {
+    valid.push_back(k.name);
+    if (s != k.name) continue;
+    if (!k.delivered) not_yet();
+    return s;
+  }
+  const std::string near = nearest(s, valid);
+  if (!near.empty()) fail("\"%s\" is not known; did you mean \"%s\"?", s.c_str(), near.c_str());
+  fail("\"%s\" is not known; expected one of: %s", s.c_str(), join(delivered(keys)).c_str());
+}
+
+std::string Node::word(const char *key, const char *otherwise, const std::string &set) const {
+  if (!has(key)) (*value_)[key] = otherwise;
+  return member(key).word(set);
+}
+
+void Node::vector(double out[3]) const {
+  if (!value_->is_array() || value_->size() != 3) fail("expected three numbers [x, y, z], found %s", kind_found().c_str());
+  const std::vector<Node> parts = items();
+  for (int i = 0; i < 3; ++i) out[i] = parts[i].number();
+}
+
+void Node::vector(const char *key, double out[3], double x, double y, double z) const {
+  if (!has(key)) (*value_)[key] = json::array({x, y, z});
+  member(key).vector(out);
+}
+
+std::string Node::name() const {
+  const std::string s = text();
+  if (s.size() > 100) fail("a name has at most 100 bytes, found %zu", s.size());
+  if (s[0] == '.') fail("a name does not begin with a dot, found \"%s\"", s.c_str());
+  for (unsigned char c : s)
+    if (c < 0x20 || c == 0x7f || std::string("/\\,:*=\"").find(char(c)) != std::string::npos)
+      fail("a name holds no control characters and none of / \\ , : * = \", since it stands in file names, tables and \"between\"; found %s",
+           excerpt(*value_).c_str());
+  return s;
+}
+
+}  // namespace dfm::scene

@@ -1,0 +1,163 @@
+// Text to tree. A scan of our own runs before the JSON parser: it bounds nesting (so that neither the parser nor the tree's later
+// use can exhaust the stack) and finds keys given twice, which the parser would silently drop.
+#include <cstring>
+#include <filesystem>
+#include <fstream>
+#include <set>
+
+#include "scene/node.h"
+
+namespace dfm::scene {
+namespace {
+
+constexpr size_t kMaxBytes = size_t(64) << 20;
+constexpr size_t kMaxDepth = 64;
+
+struct Place { size_t line = 1, column = 1; };
+
+Place place_of(const std::string &text, size_t byte) {
+  Place p;
+  for (size_t i = 0; i < byte && i < text.size(); ++i) {
+    if (text[i] == '\n') ++p.line, p.column = 1;
+    else ++p.column;
+  }
+  return p;
+}
+
+// End of the string that begins at the quote `i` (index of its closing quote, or text.size()).
+size_t string_end(const std::string &text, size_t i) {
+  for (++i; i < text.size() && text[i] != '"'; ++i)
+    if (text[i] == '\\') ++i;
+  return std::min(i, text.size());
+}
+
+void scan(const std::string &text, const std::string &file) {
+  std::vector<std::set<std::string>> keys;  // of each open object; arrays hold none
+  for (size_t i = 0; i < text.size(); ++i) {
+    const char c = text[i];
+    if (c == '{' || c == '[') {
+      if (keys.size() == kMaxDepth) {
+        const Place p = place_of(text, i);
+        fail(DFM_E_FORMAT, "%s:%zu:%zu: brackets nested deeper than %zu levels", file.c_str(), p.line, p.column, kMaxDepth);
+      }
+      keys.emplace_back();
+    } else if (c == '}' || c == ']') {
+      if (!keys.empty()) keys.pop_back();
+    } else if (c == '"') {
+      const size_t end = string_end(text, i);
+      size_t next = end + 1;
+      while (next < text.size() && std::strchr(" \t\r\n", text[next])) ++next;
+      if (next < text.size() && text[next] == ':' && !keys.empty()) {
+        const std::string key = text.substr(i + 1, end - i - 1);
+        if (!keys.back().insert(key).second) {
+          const Place p = place_of(text, i);
+          fail(DFM_E_FORMAT, "%s:%zu:%zu: the key \"%.60s\" is given twice in one object; keep one", file.c_str(), p.line, p.column,
+               key.c_str());
+        }
+      }
+      i = end;
+    }
+  }
+}
+
+// The parser's own words after its code and place, which we give ourselves.
+std::string reason(const char *what) {
+  std::string text = what;
+  const size_t colon = text.find(": ");
+  if (colon != std::string::npos) text = text.substr(colon + 2);
+  for (char &c : text)
+    if (static_cast<unsigned char>(c) < 0x20) c = ' ';
+  if (text.size() > 200) text = text.substr(0, 197) + "...";
+  return text;
+}
+
+}  // namespace
+
+json parse_text(const std::string &text, const std::string &file) {
+  if (text.find_first_not_of(" \t\r\n") == std::string::npos) fail(DFM_E_FORMAT, "%s:1:1: the file is empty; expected a JSON object", file.c_str());
+  scan(text, file);
+  try {
+    return json::parse(text);
+  } catch (const json::parse_error &e) {
+    const Place p = place_of(text, e.byte > 0 ? e.byte - 1 : 0);
+    const bool not_a_number = std::strstr(e.what(), "'N") || std::strstr(e.what(), "'I") || std::strstr(e.what(), "'-I");
+    fail(DFM_E_FORMAT, "%s:%zu:%zu: not JSON: %s%s", file.c_str(), p.line, p.column, reason(e.what()).c_str(),
+         not_a_number ? "; numbers must be finite" : "");
+  } catch (const json::exception &e) {
+    fail(DFM_E_FORMAT, "%s: not JSON: %s", file.c_str(), reason(e.what()).c_str());
+  }
+}
+
+json parse_file(const std::string &path) {
+  std::error_code error;
+  const auto status = std::filesystem::status(path, error);
+  if (!std::filesystem::exists(status)) fail(DFM_E_IO, "%s: no such file; expected a scene (JSON)", path.c_str());
+  if (std::filesystem::is_directory(status)) fail(DFM_E_IO, "%s: is a folder; expected a scene file (JSON)", path.c_str());
+  std::ifstream in(path, std::ios::binary);
+  if (!in) fail(DFM_E_IO, "%s: cannot be opened for reading: %s", path.c_str(), std::strerror(errno));
+  // Read in pieces rather than by the size that the system claims, which means nothing for pipes and devices.
+  std::string text;
+  char piece[65536];
+  while (in.read(piece, sizeof piece) || in.gcount() > 0) {
+    text.append(piece, static_cast<size_t>(in.gcount()));
+    if (text.size() > kMaxBytes) fail(DFM_E_FORMAT, "%s: larger than %zu MiB; a scene refers to its meshes, it does not hold them", path.c_str(), kMaxBytes >> 20);
+  }
+  return parse_text(text, path);
+}
+
+namespace {
+
+std::vector<std::string> steps_of(const std::string &pointer) {
+  std::vector<std::string> steps;
+  for (size_t i = 0; i < pointer.size();) {
+    const size_t end = std::min(pointer.find('/', i + 1), pointer.size());
+    std::string step;
+    for (size_t k = i + 1; k < end; ++k) {
+      if (pointer[k] == '~' && k + 1 < end && (pointer[k + 1] == '0' || pointer[k + 1] == '1')) step += pointer[++k] == '0' ? '~' : '/';
+      else step += pointer[k];
+    }
+    steps.push_back(step);
+    i = end;
+  }
+  return steps;
+}
+
+bool is_index(const std::string &step) {
+  return !step.empty() && step.size() < 10 && step.find_first_not_of("0123456789") == std::string::npos;
+}
+
+}  // namespace
+
+void apply_set(json &tree, const std::string &assignment, const std::string &file) {
+  const size_t equals = assignment.find('=');
+  if (assignment.empty() || assignment[0] != '/' || equals == std::string::npos)
+    fail(DFM_E_ARG, "--set %s: expected /json/pointer=value, e.g. --set /time/duration=2", assignment.c_str());
+  const std::string pointer = assignment.substr(0, equals), text = assignment.substr(equals + 1);
+  scan(text, "--set " + pointer);
+  json value = json::parse(text, nullptr, false);
+  if (value.is_discarded()) value = text;  // a bare string
+  // Objects on the way are created, so that "/output/every=0.1" works on a scene without "output"; what it then holds is checked as ever.
+  json *here = &tree;
+  std::string so_far;
+  for (const std::string &step : steps_of(pointer)) {
+    if (here->is_null()) *here = json::object();
+    if (here->is_array() && step == "-") {
+      here->push_back(nullptr);
+      here = &here->back();
+    } else if (here->is_array()) {
+      if (!is_index(step) || std::stoul(step) >= here->size())
+        fail(DFM_E_ARG, "--set %s: %s in %s has %zu entries, numbered from 0 (\"-\" appends); there is no \"%s\"", pointer.c_str(),
+             so_far.c_str(), file.c_str(), here->size(), step.c_str());
+      here = &(*here)[std::stoul(step)];
+    } else if (here->is_object()) {
+      here = &(*here)[step];
+    } else {
+      fail(DFM_E_ARG, "--set %s: %s in %s is neither an object nor an array", pointer.c_str(), so_far.empty() ? "/" : so_far.c_str(),
+           file.c_str());
+    }
+    so_far += "/" + step;
+  }
+  *here = std::move(value);
+}
+
+}  // namespace dfm::scene

@@ -1,0 +1,357 @@
+#include "scene/read.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+#include <filesystem>
+
+#include "scene/keys.h"
+
+namespace dfm::scene {
+
+// ---- loaded types and their parameters ----------------------------------------------------------------------
+
+namespace {
+
+std::string short_name(const dfm_type *type) {
+  const char *dot = std::strrchr(type->id, '.');
+  return dot ? dot + 1 : type->id;
+}
+
+const dfm_param &row(const dfm_type *type, uint32_t i) {
+  return *reinterpret_cast<const dfm_param *>(reinterpret_cast<const char *>(type->params) + size_t(i) * type->param_size);
+}
+
+}  // namespace
+
+Types::Types(dfm_context *context) {
+  dfm_plugin_visit(
+      context, [](void *user, const dfm_type *type, const char *) { static_cast<std::vector<const dfm_type *> *>(user)->push_back(type); },
+      &types_);
+}
+
+const dfm_type *Types::find(uint32_t kind, const std::string &name) const {
+  for (const dfm_type *t : types_)
+    if (t->kind == kind && name == t->id) return t;
+  for (const dfm_type *t : types_)
+    if (t->kind == kind && name == short_name(t)) return t;
+  return nullptr;
+}
+
+std::vector<std::string> Types::names(uint32_t kind) const {
+  std::vector<std::string> out;
+  for (const dfm_type *t : types_)
+    if (t->kind == kind) out.push_back(short_name(t));
+  return out;
+}
+
+std::vector<std::string> Types::model_keys() const {
+  std::vector<std::string> out;
+  for (const dfm_type *t : types_)
+    for (uint32_t i = 0; t->kind == DFM_KIND_MODEL && i < t->nparam; ++i) out.push_back(row(t, i).key);
+  return out;
+}
+
+const dfm_param *find_row(const dfm_type *type, const std::string &key) {
+  for (uint32_t i = 0; i < type->nparam; ++i)
+    if (key == row(type, i).key) return &row(type, i);
+  return nullptr;
+}
+
+dfm_params Params::view() {
+  rows.clear();
+  for (size_t i = 0; i < keys.size(); ++i) rows.push_back({keys[i].c_str(), values[i].data(), uint32_t(values[i].size())});
+  return {sizeof(dfm_params), uint32_t(rows.size()), rows.data()};
+}
+
+namespace {
+
+std::vector<double> param_values(const Node &value, const dfm_param &p) {
+  if (value.value().is_string()) {
+    if (!(p.flags & DFM_PARAM_ENUM) || !p.names) value.fail("expected a number in %s", p.unit && *p.unit ? p.unit : "1");
+    std::vector<std::string> words;
+    for (const char *const *n = p.names; *n; ++n) words.push_back(*n);
+    return {double(std::find(words.begin(), words.end(), known(value, words, "value")) - words.begin())};
+  }
+  std::vector<double> out;
+  const Range range{p.min, p.max, false, false};
+  if (value.value().is_boolean() && (p.flags & DFM_PARAM_INTEGER)) out.push_back(value.value().get<bool>() ? 1 : 0);
+  else if (value.value().is_array())
+    for (const Node &item : value.items()) out.push_back(item.number(range));
+  else out.push_back(value.number(range));
+  const uint32_t width = p.width ? p.width : 1;
+  if (out.size() != width) value.fail("expected %u number%s, found %zu", width, width == 1 ? "" : "s", out.size());
+  for (double x : out)
+    if ((p.flags & (DFM_PARAM_INTEGER | DFM_PARAM_ENUM)) && x != std::floor(x)) value.fail("expected a whole number, found %g", x);
+  return out;
+}
+
+}  // namespace
+
+Params read_params(const Node &params, const dfm_type *type) {
+  Params out;
+  if (!params.value().is_object()) params.fail("expected an object of parameters by key");
+  std::vector<std::string> valid;
+  for (uint32_t i = 0; i < type->nparam; ++i) valid.push_back(row(type, i).key);
+  // "mu" is shorthand for mu_C = mu_S; the law's own table may hold one or both.
+  const bool shorthand = !find_row(type, "mu") && find_row(type, "mu_C");
+  if (shorthand) valid.push_back("mu");
+  for (const auto &entry : params.value().items()) {
+    const Node value = params.member(entry.key());
+    const dfm_param *p = find_row(type, shorthand && entry.key() == "mu" ? "mu_C" : entry.key());
+    if (!p) {
+      const std::string near = nearest(entry.key(), valid);
+      if (valid.empty()) value.fail("%s has no parameters", type->id);
+      if (!near.empty()) value.fail("%s has no parameter \"%s\"; did you mean \"%s\"?", type->id, entry.key().c_str(), near.c_str());
+      value.fail("%s has no parameter \"%s\"; it has: %s", type->id, entry.key().c_str(), join(valid).c_str());
+    }
+    out.keys.push_back(entry.key());
+    out.values.push_back(param_values(value, *p));
+  }
+  return out;
+}
+
+const dfm_type *read_type(const Node &name, uint32_t kind, const Types &types) {
+  const std::string wanted = name.text();
+  if (const dfm_type *type = types.find(kind, wanted)) return type;
+  const std::vector<std::string> loaded = types.names(kind);
+  const char *what = kind == DFM_KIND_MODEL ? "model" : "law";
+  const std::string near = nearest(wanted, loaded);
+  fail(DFM_E_UNSUPPORTED, "%s: %s: no loaded plugin offers the %s \"%s\"; loaded: %s%s", name.file().c_str(), name.pointer().c_str(), what,
+       wanted.c_str(), loaded.empty() ? "none (see: deform plugin list)" : join(loaded).c_str(),
+       near.empty() ? "" : ("; did you mean \"" + near + "\"?").c_str());
+}
+
+// ---- small shared parts ------------------------------------------------------------------------------------
+
+std::string known(const Node &name, const std::vector<std::string> &valid, const char *what) {
+  const std::string s = name.text();
+  if (std::find(valid.begin(), valid.end(), s) != valid.end()) return s;
+  const std::string near = nearest(s, valid);
+  if (!near.empty()) name.fail("there is no %s \"%s\"; did you mean \"%s\"?", what, s.c_str(), near.c_str());
+  name.fail("there is no %s \"%s\"; there %s: %s", what, s.c_str(), valid.size() == 1 ? "is" : "are", valid.empty() ? "none" : join(valid).c_str());
+}
+
+void check_fresh(const Node &name, const std::string &value, const std::vector<std::string> &taken, const char *what) {
+  if (std::find(taken.begin(), taken.end(), value) != taken.end()) name.fail("the name \"%s\" is taken by another %s; names are unique", value.c_str(), what);
+}
+
+void check_rising(const Node &key, size_t i, double previous, double t) {
+  if (i > 0 && !(t > previous)) key.at("t").fail("times of keyframes rise strictly; found %g after %g", t, previous);
+}
+
+dfm_sine read_sine(const Node &sine, bool scalar) {
+  dfm_sine out = {};
+  sine.object("sine");
+  if (scalar) out.amplitude[0] = sine.at("amplitude").number();
+  else sine.at("amplitude").vector(out.amplitude);
+  out.frequency = sine.at("frequency").number(kNotNegative);
+  out.phase = sine.number("phase", 0.0);
+  return out;
+}
+
+// ---- parts of the scene ------------------------------------------------------------------------------------
+
+namespace {
+
+void read_gravity(const Node &scene, Definition &def) {
+  if (!scene.has("gravity")) scene.value()["gravity"] = json::array({0.0, 0.0, -9.81});
+  const Node gravity = scene.member("gravity");
+  if (gravity.value().is_array()) return gravity.vector(def.gravity);
+  gravity.object("gravity");
+  const std::vector<Node> keys = gravity.at("keyframes").items();
+  if (keys.empty()) gravity.at("keyframes").fail("expected at least one keyframe");
+  for (size_t i = 0; i < keys.size(); ++i) {
+    keys[i].object("gravity_key");
+    dfm_vector_key key = {};
+    key.t = keys[i].at("t").number();
+    keys[i].at("value").vector(key.value);
+    check_rising(keys[i], i, i ? def.gravity_keys.back().t : 0, key.t);
+    def.gravity_keys.push_back(key);
+  }
+  std::copy_n(def.gravity_keys[0].value, 3, def.gravity);
+}
+
+void read_time(const Node &scene, Definition &def) {
+  const Node time = scene.at("time");
+  time.object("time");
+  def.duration = time.at("duration").number(kPositive);
+  if (!time.has("step")) time.value()["step"] = "auto";
+  const Node step = time.member("step");
+  if (step.value().is_string()) {
+    if (step.text() != "auto") step.fail("expected a number of seconds or \"auto\", found \"%s\"", step.text().c_str());
+  } else {
+    def.step = step.number(kPositive);
+    if (def.duration / def.step > 1e12) step.fail("%g s at %g s a step are more than 1e12 steps", def.duration, def.step);
+  }
+  time.word("mode", "dynamic", "mode");
+  if (time.word("integrator", "auto", "integrator") == "symplectic_euler") def.integrator = DFM_INTEGRATOR_SYMPLECTIC_EULER;
+}
+
+void read_effects(const Node &scene, Definition &def) {
+  if (!scene.has("effects")) scene.value()["effects"] = "auto";
+  const Node effects = scene.member("effects");
+  if (effects.value().is_string()) {
+    if (effects.text() != "auto") effects.fail("expected \"auto\" or a list of effects, found \"%s\"", effects.text().c_str());
+    return;
+  }
+  def.effects_auto = false;
+  for (const Node &effect : effects.items()) {
+    const std::string name = effect.text();
+    check_fresh(effect, name, def.effects, "effect of this list");
+    def.effects.push_back(name);
+  }
+}
+
+void read_materials(const Node &scene, Definition &def, ReadContext &context) {
+  if (!scene.has("materials")) return;
+  const Node materials = scene.member("materials");
+  if (!materials.value().is_object()) materials.fail("expected an object of materials by name");
+  const std::vector<std::string> model_keys = context.types.model_keys();
+  for (const auto &entry : materials.value().items()) {
+    const Node node = materials.member(entry.key());
+    node.object("material", model_keys);
+    Material m;
+    m.pointer = node.pointer(), m.name = entry.key();
+    json copy = entry.key();
+    Node(&copy, node.pointer(), &node.file()).name();
+    m.density = node.number("density", m.density, kPositive);
+    m.young = node.number("young", m.young, kPositive);
+    m.poisson = node.number("poisson", m.poisson, Range{-1, 0.5, true, true});
+    if (!node.has("damping")) node.value()["damping"] = json::object();
+    const Node damping = node.member("damping");
+    damping.object("damping");
+    m.damping_mass = damping.number("mass", 0.0, kNotNegative);
+    m.damping_stiffness = damping.number("stiffness", 0.0, kNotNegative);
+    for (const auto &further : node.value().items()) {
+      const std::string &key = further.key();
+      const std::vector<Key> &own = keys_of("material");
+      if (std::any_of(own.begin(), own.end(), [&](const Key &k) { return key == k.name; })) continue;
+      const Node value = node.member(key);
+      m.extra.keys.push_back(key);
+      m.extra.values.emplace_back();
+      if (value.value().is_array())
+        for (const Node &item : value.items()) m.extra.values.back().push_back(item.number());
+      else m.extra.values.back().push_back(value.number());
+    }
+    context.materials.push_back(m.name);
+    def.materials.push_back(std::move(m));
+  }
+}
+
+// A side of a pair: "*", a body or an obstacle, "material=NAME", "body:GROUP".
+std::string read_side(const Node &side, const ReadContext &context) {
+  const std::string text = side.text();
+  if (text == "*") return text;
+  if (text.rfind("material=", 0) == 0) {
+    json name = text.substr(9);
+    return "material=" + known(Node(&name, side.pointer(), &side.file()), context.materials, "material");
+  }
+  const size_t colon = text.find(':');
+  if (colon == std::string::npos) return known(side, context.sides, "body or obstacle");
+  json name = text.substr(0, colon);
+  known(Node(&name, side.pointer(), &side.file()), context.sides, "body or obstacle");
+  side.not_yet();  // surfaces carry no groups yet, so a pair rule by group has nothing to match
+}
+
+void read_between(const Node &entry, const ReadContext &context, std::string out[2]) {
+  const Node between = entry.at("between");
+  const std::vector<Node> sides = between.items();
+  if (sides.size() != 2) between.fail("expected two sides [a, b], found %zu", sides.size());
+  for (int i = 0; i < 2; ++i) out[i] = read_side(sides[i], context);
+}
+
+void read_contact(const Node &scene, Definition &def, const ReadContext &context) {
+  if (!scene.has("contact")) scene.value()["contact"] = json::object();
+  const Node contact = scene.member("contact");
+  contact.object("contact");
+  if (contact.word("method", "auto", "method") == "velocity") def.method = DFM_METHOD_VELOCITY;
+  for (const char *later : {"self", "untangle", "sleep"})
+    if (contact.boolean(later, false)) contact.member(later).not_yet();
+  if (contact.has("tolerance")) def.tolerance = contact.member("tolerance").number(kPositive);
+  if (contact.has("offset")) def.offset = contact.member("offset").number(kPositive);
+  for (const Node &entry : contact.items("friction")) {
+    entry.object("friction");
+    Friction f;
+    f.pointer = entry.pointer();
+    read_between(entry, context, f.between);
+    const dfm_type *type = read_type(entry.at("law"), DFM_KIND_FRICTION, context.types);
+    f.law = type->id;
+    if (entry.has("params")) f.params = read_params(entry.member("params"), type);
+    def.friction.push_back(std::move(f));
+  }
+  for (const Node &entry : contact.items("filter")) {
+    entry.object("filter");
+    Filter f;
+    f.pointer = entry.pointer();
+    read_between(entry, context, f.between);
+    f.collide = entry.boolean("collide", false);
+    def.filters.push_back(std::move(f));
+  }
+}
+
+void read_probes(const Node &scene, Definition &def) {
+  std::vector<std::string> bodies, names;
+  for (const Body &b : def.bodies) bodies.push_back(b.name);
+  for (const Node &entry : scene.items("probes")) {
+    entry.object("probe");
+    Probe p;
+    p.pointer = entry.pointer();
+    p.name = entry.at("name").name();
+    check_fresh(entry.at("name"), p.name, names, "probe");
+    names.push_back(p.name);
+    p.body = known(entry.at("body"), bodies, "body");
+    entry.at("point").vector(p.point);
+    def.probes.push_back(std::move(p));
+  }
+}
+
+void read_output(const Node &scene, Definition &def) {
+  if (!scene.has("output")) scene.value()["output"] = json::object();
+  const Node output = scene.member("output");
+  output.object("output");
+  def.every = output.number("every", 0.02, kPositive);
+  if (!output.has("frames")) output.value()["frames"] = false;
+  const Node frames = output.member("frames");
+  if (frames.value().is_number()) def.frame_rate = frames.number(Range{0, 1e6, true, false}), def.frames = true;
+  else def.frames = frames.boolean();
+  def.states = output.boolean("states", false);
+  def.nodes = output.boolean("nodes", false);
+  def.contacts = output.boolean("contacts", true);
+  def.check = output.boolean("check", false);
+  def.color = output.word("color", "body", "color");
+  if (output.has("camera")) {
+    const Node camera = output.member("camera");
+    camera.object("camera");
+    camera.at("eye").vector(def.eye);
+    camera.vector("look_at", def.look_at, 0, 0, 0);
+    if (std::equal(def.eye, def.eye + 3, def.look_at)) camera.fail("\"eye\" and \"look_at\" are the same point");
+    def.has_camera = true;
+  }
+}
+
+}  // namespace
+
+Definition read_scene(json &tree, const std::string &file, const Types &types) {
+  const Node scene(&tree, "", &file);
+  scene.object("scene");
+  const Node format = scene.at("format"), version = scene.at("version");
+  if (format.text() != "deform-scene") format.fail("expected \"deform-scene\", found \"%s\"", format.text().c_str());
+  if (version.number() != 1) version.fail("this reader knows version 1, found %g", version.number());
+  Definition def;
+  def.file = file;
+  def.folder = std::filesystem::path(file).parent_path().string();
+  ReadContext context{types, {}, {}};
+  read_gravity(scene, def);
+  read_time(scene, def);
+  read_effects(scene, def);
+  read_materials(scene, def, context);
+  def.bodies = read_bodies(scene, context);
+  def.obstacles = read_obstacles(scene, context);
+  read_contact(scene, def, context);
+  read_probes(scene, def);
+  read_output(scene, def);
+  return def;
+}
+
+}  // namespace dfm::scene

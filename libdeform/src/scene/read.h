@@ -1,0 +1,25 @@
+// Scene tree -> Definition. Every key is checked: name, type, range, references to other names.
+#pragma once
+#include "scene/defs.h"
+#include "scene/node.h"
+
+namespace dfm::scene {
+
+struct ReadContext {
+  const Types &types;
+  std::vector<std::string> materials, sides;  // names so far; sides: bodies and obstacles
+};
+
+Definition read_scene(json &tree, const std::string &file, const Types &types);
+
+// Parts that more than one file needs.
+Params read_params(const Node &params, const dfm_type *type);
+const dfm_type *read_type(const Node &name, uint32_t kind, const Types &types);
+dfm_sine read_sine(const Node &sine, bool scalar);
+void check_rising(const Node &keys, size_t i, double previous, double t);
+void check_fresh(const Node &name, const std::string &value, const std::vector<std::string> &taken, const char *what);
+std::string known(const Node &name, const std::vector<std::string> &valid, const char *what);
+std::vector<Body> read_bodies(const Node &scene, ReadContext &context);
+std::vector<Obstacle> read_obstacles(const Node &scene, ReadContext &context);
+
+}  // namespace dfm::scene

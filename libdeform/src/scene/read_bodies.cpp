@@ -1,0 +1,227 @@
+#include <algorithm>
+
+#include "scene/read.h"
+#include "scene/rotation.h"
+
+namespace dfm::scene {
+namespace {
+
+void read_rotation(const Node &holder, double out[4]) {
+  Quaternion q;
+  if (holder.has("rotation")) {
+    const Node node = holder.member("rotation");
+    node.object("rotation");
+    double axis[3];
+    node.at("axis").vector(axis);
+    if (axis[0] == 0 && axis[1] == 0 && axis[2] == 0) node.at("axis").fail("the axis of a rotation cannot be zero");
+    q = rotation(axis, node.at("angle_deg").number());
+  }
+  out[0] = q.x, out[1] = q.y, out[2] = q.z, out[3] = q.w;
+}
+
+dfm_pose read_pose(const Node &holder, const char *kind, double *scale) {
+  dfm_pose pose = {{0, 0, 0}, {0, 0, 0, 1}};
+  if (!holder.has("pose")) return pose;
+  const Node node = holder.member("pose");
+  node.object(kind);
+  node.vector("position", pose.position, 0, 0, 0);
+  read_rotation(node, pose.rotation);
+  if (scale) *scale = node.number("scale", 1.0, kPositive);
+  return pose;
+}
+
+Selection read_selection(const Node &entry) {
+  Selection s;
+  s.pointer = entry.pointer();
+  if (entry.has("box") == entry.has("group")) entry.fail("expected either \"box\" or \"group\" to say which points");
+  if (entry.has("group")) {
+    s.group = entry.member("group").text();
+    return s;
+  }
+  const Node box = entry.member("box");
+  const std::vector<Node> corners = box.items();
+  if (corners.size() != 2) box.fail("expected two corners [[x, y, z], [x, y, z]], found %zu", corners.size());
+  corners[0].vector(s.lo), corners[1].vector(s.hi);
+  for (int i = 0; i < 3; ++i)
+    if (s.lo[i] > s.hi[i]) box.fail("the first corner is the lower one; in %c it has %g and the second %g", "xyz"[i], s.lo[i], s.hi[i]);
+  return s;
+}
+
+// A key that leaves out position or rotation keeps that of `base`. `turn`: what every rotation is applied to (a plane's normal).
+std::vector<dfm_pose_key> read_keys(const Node &motion, const dfm_pose &base, const Quaternion &turn) {
+  std::vector<dfm_pose_key> keys;
+  const std::vector<Node> nodes = motion.items("keyframes");
+  for (size_t i = 0; i < nodes.size(); ++i) {
+    nodes[i].object("motion_key");
+    dfm_pose_key key = {nodes[i].at("t").number(), base};
+    check_rising(nodes[i], i, i ? keys.back().t : 0, key.t);
+    if (nodes[i].has("position")) nodes[i].member("position").vector(key.pose.position);
+    if (nodes[i].has("rotation")) {
+      double q[4];
+      read_rotation(nodes[i], q);
+      const Quaternion turned = multiply({q[0], q[1], q[2], q[3]}, turn);
+      key.pose.rotation[0] = turned.x, key.pose.rotation[1] = turned.y, key.pose.rotation[2] = turned.z, key.pose.rotation[3] = turned.w;
+    }
+    keys.push_back(key);
+  }
+  return keys;
+}
+
+Motion read_motion(const Node &motion, const dfm_pose &base, const Quaternion &turn) {
+  Motion out;
+  motion.object("motion");
+  if (!motion.has("keyframes") && !motion.has("sine")) motion.fail("expected \"keyframes\", \"sine\" or both");
+  out.keys = read_keys(motion, base, turn);
+  if (motion.has("keyframes") && out.keys.empty()) motion.at("keyframes").fail("expected at least one keyframe");
+  if (motion.has("sine")) out.sine = read_sine(motion.member("sine"), false);
+  return out;
+}
+
+uint8_t read_axes(const Node &entry) {
+  if (!entry.has("axes")) entry.value()["axes"] = "xyz";
+  const Node node = entry.member("axes");
+  uint8_t bits = 0;
+  for (char c : node.text()) {
+    if (c < 'x' || c > 'z') node.fail("expected letters out of \"xyz\", found \"%s\"", node.text().c_str());
+    bits |= uint8_t(1u << (c - 'x'));
+  }
+  return bits;
+}
+
+Fix read_fix(const Node &entry) {
+  Fix fix;
+  entry.object("fix");
+  fix.where = read_selection(entry);
+  fix.axes = read_axes(entry);
+  const dfm_pose still = {{0, 0, 0}, {0, 0, 0, 1}};
+  if (entry.has("motion")) fix.motion = read_motion(entry.member("motion"), still, Quaternion{});
+  return fix;
+}
+
+Force read_force(const Node &entry) {
+  Force force;
+  entry.object("force");
+  force.where = read_selection(entry);
+  entry.at("total").vector(force.total);
+  force.by = entry.word("by", "auto", "by");
+  const std::vector<Node> keys = entry.items("keyframes");
+  for (size_t i = 0; i < keys.size(); ++i) {
+    keys[i].object("force_key");
+    const dfm_scale_key key = {keys[i].at("t").number(), keys[i].at("scale").number()};
+    check_rising(keys[i], i, i ? force.keys.back().t : 0, key.t);
+    force.keys.push_back(key);
+  }
+  if (entry.has("sine")) force.sine = read_sine(entry.member("sine"), true);
+  return force;
+}
+
+Body read_body(const Node &node, ReadContext &context) {
+  Body b;
+  node.object("body");
+  b.pointer = node.pointer();
+  b.name = node.at("name").name();
+  check_fresh(node.at("name"), b.name, context.sides, "body or obstacle");
+  context.sides.push_back(b.name);
+  b.mesh = node.at("mesh").text();
+  if (node.has("material")) b.material = known(node.member("material"), context.materials, "material");
+  if (!node.has("model")) node.value()["model"] = json::object();
+  const Node model = node.member("model");
+  model.object("model");
+  if (!model.has("type")) model.value()["type"] = "msm";
+  const dfm_type *type = read_type(model.member("type"), DFM_KIND_MODEL, context.types);
+  b.model = type->id;
+  if (model.has("params")) b.params = read_params(model.member("params"), type);
+  b.pose = read_pose(node, "pose", &b.scale);
+  node.vector("velocity", b.velocity, 0, 0, 0);
+  node.vector("spin", b.spin, 0, 0, 0);
+  for (const Node &entry : node.items("fix")) b.fixes.push_back(read_fix(entry));
+  for (const Node &entry : node.items("forces")) b.forces.push_back(read_force(entry));
+  if (node.has("surface")) {
+    node.member("surface").object("surface");
+    node.member("surface").word("from", "boundary", "from");
+  }
+  if (node.has("nodal_bc")) b.nodal_bc = node.member("nodal_bc").text();
+  return b;
+}
+
+// Which of the keys that place or size a shape belong to it.
+void check_shape_keys(const Node &node, const std::string &shape) {
+  const std::vector<std::pair<std::string, std::vector<std::string>>> wanted = {
+      {"plane", {"point", "normal"}}, {"sphere", {"radius"}}, {"box", {"half_size"}}, {"capsule", {"radius", "half_length"}}};
+  for (const auto &[name, keys] : wanted) {
+    for (const std::string &key : keys) {
+      bool mine = false;
+      for (const auto &[other, others] : wanted)
+        if (other == shape) mine = std::find(others.begin(), others.end(), key) != others.end();
+      if (!mine && node.has(key.c_str())) node.member(key).fail("a %s has no \"%s\"; that is for a %s", shape.c_str(), key.c_str(), name.c_str());
+    }
+  }
+}
+
+Quaternion read_plane(const Node &node, dfm_obstacle_def &def) {
+  double normal[3];
+  if (node.has("pose") && node.has("point")) node.member("point").fail("a plane is placed by \"point\" or by \"pose\", not by both");
+  if (!node.has("pose")) node.vector("point", def.pose.position, 0, 0, 0);
+  node.vector("normal", normal, 0, 0, 1);
+  if (normal[0] == 0 && normal[1] == 0 && normal[2] == 0) node.at("normal").fail("the normal of a plane cannot be zero");
+  const Quaternion turn = rotation_to(normal);
+  const double *q = def.pose.rotation;
+  const Quaternion turned = multiply({q[0], q[1], q[2], q[3]}, turn);
+  def.pose.rotation[0] = turned.x, def.pose.rotation[1] = turned.y, def.pose.rotation[2] = turned.z, def.pose.rotation[3] = turned.w;
+  return turn;
+}
+
+Obstacle read_obstacle(const Node &node, ReadContext &context) {
+  Obstacle o;
+  o.def = dfm_obstacle_def_default();
+  node.object("obstacle");
+  o.pointer = node.pointer();
+  o.name = node.at("name").name();
+  check_fresh(node.at("name"), o.name, context.sides, "body or obstacle");
+  context.sides.push_back(o.name);
+  const std::string shape = node.at("shape").word("shape");
+  check_shape_keys(node, shape);
+  o.def.pose = read_pose(node, "obstacle_pose", nullptr);
+  Quaternion turn;
+  if (shape == "plane") {
+    o.def.shape = DFM_SHAPE_PLANE;
+    turn = read_plane(node, o.def);
+  } else if (shape == "sphere") {
+    o.def.shape = DFM_SHAPE_SPHERE;
+    o.def.radius = node.at("radius").number(kPositive);
+  } else if (shape == "box") {
+    o.def.shape = DFM_SHAPE_BOX;
+    const Node half = node.at("half_size");
+    half.vector(o.def.half_size);
+    for (double h : o.def.half_size)
+      if (!(h > 0)) half.fail("half sizes are above 0, found %g", h);
+  } else {
+    o.def.shape = DFM_SHAPE_CAPSULE;
+    o.def.radius = node.at("radius").number(kPositive);
+    o.def.half_length = node.at("half_length").number(kNotNegative);
+  }
+  if (node.has("motion")) {
+    Motion motion = read_motion(node.member("motion"), o.def.pose, turn);
+    o.keys = std::move(motion.keys);
+    o.def.sine = motion.sine;
+  }
+  node.vector("velocity_surface", o.def.velocity_surface, 0, 0, 0);
+  if (node.has("material")) o.material = known(node.member("material"), context.materials, "material");
+  return o;
+}
+
+}  // namespace
+
+std::vector<Body> read_bodies(const Node &scene, ReadContext &context) {
+  std::vector<Body> out;
+  for (const Node &node : scene.items("bodies")) out.push_back(read_body(node, context));
+  return out;
+}
+
+std::vector<Obstacle> read_obstacles(const Node &scene, ReadContext &context) {
+  std::vector<Obstacle> out;
+  for (const Node &node : scene.items("obstacles")) out.push_back(read_obstacle(node, context));
+  return out;
+}
+
+}  // namespace dfm::scene

@@ -1,0 +1,61 @@
+#include "scene/scene.h"
+
+#include "core/error.h"
+#include "scene/build.h"
+#include "scene/node.h"
+#include "scene/read.h"
+
+namespace dfm::scene {
+
+struct Scene::Tree { json root; };
+
+Scene::Scene(dfm_context *context, const std::string &path, const dfm_scene_options *options)
+    : context_(context), tree_(std::make_unique<Tree>()) {
+  tree_->root = parse_file(path);
+  for (uint32_t i = 0; options && i < options->nset; ++i) {
+    if (!options->set || !options->set[i]) fail(DFM_E_ARG, "scene options: set[%u] is NULL, expected \"/json/pointer=value\"", i);
+    apply_set(tree_->root, options->set[i], path);
+  }
+  definition_ = read_scene(tree_->root, path, Types(context));
+  Built built = build(context, definition_, options ? options->jitter_seed : 0);
+  world_ = built.world;
+  probes_ = std::move(built.probes);
+}
+
+Scene::~Scene() {
+  if (world_) dfm_world_destroy(world_);
+}
+
+dfm_world Scene::release_world() { return std::exchange(world_, 0); }
+
+void Scene::probe_state(size_t i, double position[3], double velocity[3]) {
+  const ProbePoint &p = probes_[i];
+  uint32_t n = 0;
+  dfm_status status = dfm_body_get_state(p.body, 0, nullptr, nullptr, &n);
+  if (status >= 0) {
+    x_.resize(3 * size_t(n)), v_.resize(3 * size_t(n));
+    status = dfm_body_get_state(p.body, n, x_.data(), v_.data(), &n);
+  }
+  if (status < 0) fail(status, "probe \"%s\": %s", p.name.c_str(), dfm_last_error());
+  for (int k = 0; k < 3; ++k) {
+    position[k] = velocity[k] = 0;
+    for (int c = 0; c < 4; ++c) {
+      position[k] += p.weights[c] * x_[3 * p.points[c] + k];
+      velocity[k] += p.weights[c] * v_[3 * p.points[c] + k];
+    }
+  }
+}
+
+std::string Scene::value(const std::string &pointer) const {
+  const json *found = nullptr;
+  try {
+    const json::json_pointer where(pointer);
+    if (tree_->root.contains(where)) found = &tree_->root.at(where);
+  } catch (const json::exception &) {
+    fail(DFM_E_ARG, "\"%s\" is not a JSON pointer (RFC 6901), e.g. \"/output/every\"", pointer.c_str());
+  }
+  if (!found) fail(DFM_E_ARG, "%s has nothing at %s", definition_.file.c_str(), pointer.c_str());
+  return found->dump(-1, ' ', false, json::error_handler_t::replace);
+}
+
+}  // namespace dfm::scene

@@ -1,0 +1,213 @@
+// Bodies and obstacles come into a world: defs are checked, meshes become phyxels and surfels, the model plugin gets its instance.
+#include "world/create.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+#include <functional>
+
+#include "core/error.h"
+#include "core/handle.h"
+#include "mesh/mesh.h"
+#include "surfel/make_surface.h"
+
+namespace dfm {
+namespace {
+
+bool finite(const double *p, size_t n) {
+  for (size_t i = 0; i < n; ++i)
+    if (!std::isfinite(p[i])) return false;
+  return true;
+}
+
+void check_name(World &w, const std::string &name, const char *kind) {
+  if (name.empty() || name == "*" || name.rfind("material=", 0) == 0)
+    fail(DFM_E_ARG, "%s name '%s' is reserved; choose another", kind, name.c_str());
+  if (w.find_body(name) || w.find_obstacle(name)) fail(DFM_E_ARG, "%s '%s': the name is taken in this world; names are unique", kind, name.c_str());
+}
+
+void check_mesh(const dfm_body_def &def, const std::string &name) {
+  if (def.npoint < 4 || def.ntet < 1 || !def.points || !def.tets)
+    fail(DFM_E_ARG, "body '%s' has %u points and %u tetrahedra; it needs at least 4 points and 1 tetrahedron", name.c_str(), def.npoint, def.ntet);
+  for (uint32_t i = 0; i < def.npoint; ++i)
+    if (!finite(def.points + size_t(3) * i, 3)) fail(DFM_E_ARG, "body '%s': point %u is not finite", name.c_str(), i);
+  std::vector<uint8_t> used(def.npoint);
+  for (uint32_t t = 0; t < def.ntet; ++t) {
+    const uint32_t *const c = def.tets + size_t(4) * t;
+    for (int k = 0; k < 4; ++k) {
+      if (c[k] >= def.npoint) fail(DFM_E_ARG, "body '%s': tetrahedron %u names point %u of %u", name.c_str(), t, c[k], def.npoint);
+      used[c[k]] = 1;
+    }
+    if (!(tet_volume(def.points, 3, c) > 0))
+      fail(DFM_E_ARG, "body '%s': tetrahedron %u has no positive volume; turn or remove it (deform mesh info shows such cells)", name.c_str(), t);
+  }
+  const auto unused = std::find(used.begin(), used.end(), uint8_t(0));
+  if (unused != used.end())
+    fail(DFM_E_ARG, "body '%s': point %td belongs to no tetrahedron and would have no mass; drop it", name.c_str(), unused - used.begin());
+}
+
+// A model parameter that the body does not give comes from the material's entry of the same key.
+std::vector<double> model_params(const dfm_type &type, const dfm_params &given, const Material &m) {
+  std::vector<dfm_param_value> entries;
+  const double *const values[] = {&m.def.young, &m.def.poisson, &m.def.damping_mass, &m.def.damping_stiffness};
+  const char *const keys[] = {"young", "poisson", "damping_mass", "damping_stiffness"};
+  for (int i = 0; i < 4; ++i) entries.push_back({keys[i], values[i], 1});
+  for (size_t i = 0; i < m.extra_keys.size(); ++i)
+    entries.push_back({m.extra_keys[i].c_str(), m.extra_values[i].data(), static_cast<uint32_t>(m.extra_values[i].size())});
+  return pack_params(type, {given.values, given.values ? given.n : 0}, [&](const char *key) -> const dfm_param_value * {
+    for (const auto &e : entries)
+      if (std::strcmp(e.key, key) == 0) return &e;
+    return nullptr;
+  });
+}
+
+void place_phyxels(Body &b, const dfm_body_def &def) {
+  Phyxels &p = b.p;
+  const Pose pose = to_pose(def.pose);
+  Vec3 com;
+  for (uint32_t i = 0; i < p.n; ++i) {
+    const Vec3 x = place(pose, load3(def.points + size_t(3) * i));
+    store3(&p.x[size_t(i) * kStride], x);
+    com += p.mass[i] * x;
+  }
+  com = (1 / b.mass) * com;
+  for (uint32_t i = 0; i < p.n; ++i) {
+    const Vec3 v = load3(def.velocity) + cross(load3(def.spin), load3(&p.x[size_t(i) * kStride]) - com);
+    for (int k = 0; k < 3; ++k) p.v[size_t(i) * kStride + size_t(k)] = p.held[i] & (1 << k) ? 0 : v[k];
+  }
+}
+
+}  // namespace
+
+Body &create_body(World &w, const dfm_body_def &def) {
+  auto owned = std::make_unique<Body>();
+  Body &b = *owned;
+  b.world = &w;
+  b.name = def.name ? def.name : "body" + std::to_string(w.next_id);
+  check_name(w, b.name, "body");
+  check_mesh(def, b.name);
+  if (!finite(def.pose.position, 3) || !finite(def.pose.rotation, 4) || !finite(def.velocity, 3) || !finite(def.spin, 3))
+    fail(DFM_E_ARG, "body '%s': pose, velocity and spin must be finite", b.name.c_str());
+  Material plain;
+  plain.def = dfm_material_def_default();
+  const Material &material = def.material ? resolve<Material>(Kind::material, def.material) : plain;
+  if (def.material && material.world != &w) fail(DFM_E_HANDLE, "body '%s': its material belongs to another world", b.name.c_str());
+  b.material = material.name;
+  b.category = def.category, b.collides_with = def.collides_with, b.user = def.user;
+
+  const Memory &m = w.memory();
+  auto make = [&](Array<double> &a, size_t n) { a = Array<double>(n, 0.0, HookAllocator<double>(m)); };
+  Phyxels &p = b.p;
+  p.n = def.npoint;
+  p.rest = Array<double>(def.points, def.points + size_t(3) * p.n, HookAllocator<double>(m));
+  for (Array<double> *a : {&p.x, &p.v, &p.v_free, &p.f, &p.load, &p.impulse, &p.inv_mass}) make(*a, size_t(kStride) * p.n);
+  make(p.mass, p.n), make(b.ksum, p.n), make(b.csum, p.n);
+  p.held = Array<uint8_t>(p.n, 0, HookAllocator<uint8_t>(m));
+  if (def.fixed)
+    for (uint32_t i = 0; i < p.n; ++i) p.held[i] = def.fixed[i] & 7;
+  b.tets = Array<uint32_t>(def.tets, def.tets + size_t(4) * def.ntet, HookAllocator<uint32_t>(m));
+  b.rest_volume = lump_mass(p.n, p.rest.data(), def.ntet, b.tets.data(), material.def.density, p.mass.data());
+  b.mass = material.def.density * b.rest_volume;
+  update_inverse_mass(p);
+  place_phyxels(b, def);
+
+  b.edges = unique_edges(m, def.ntet, b.tets.data());
+  const Array<uint32_t> boundary = boundary_triangles(m, def.ntet, b.tets.data());
+  make_surface(m, p.n, p.rest.data(), boundary.data(), static_cast<uint32_t>(boundary.size() / 3), b.surface);
+  gather_surface(b.surface, p.x.data(), p.v.data(), kStride);
+  make(b.surfel_impulse, size_t(3) * b.surface.nsurfel);
+
+  const dfm_type &type = w.context->registry.find(DFM_KIND_MODEL, def.model ? def.model : "msm");
+  Array<uint32_t> row(HookAllocator<uint32_t>{m}), col(HookAllocator<uint32_t>{m});
+  Array<double> weight(b.surface.nsurfel, 1.0, HookAllocator<double>(m));
+  row.resize(b.surface.nsurfel + 1), col.resize(b.surface.nsurfel);
+  for (uint32_t s = 0; s < b.surface.nsurfel; ++s) row[s] = s, col[s] = b.surface.point[s];
+  row[b.surface.nsurfel] = b.surface.nsurfel;
+  std::vector<double> values = model_params(type, def.model_params, material);
+  const char *const no_fields[] = {nullptr};
+  dfm_mesh mesh{};
+  mesh.size = sizeof mesh, mesh.npoint = p.n, mesh.ncell = def.ntet, mesh.cell = DFM_CELL_TET;
+  mesh.rest = p.rest.data(), mesh.cells = b.tets.data(), mesh.mass = p.mass.data(), mesh.params = values.data();
+  mesh.field_keys = no_fields, mesh.fields = nullptr;
+  mesh.nedge = static_cast<uint32_t>(b.edges.size() / 2), mesh.nsurfel = b.surface.nsurfel, mesh.edges = b.edges.data();
+  mesh.row = row.data(), mesh.col = col.data(), mesh.weight = weight.data(), mesh.fixed = p.held.data();
+  {
+    PluginCall call(w.context->scratch);
+    b.model.create(type, w.context->host, mesh, m, std::move(values));
+  }
+
+  w.bodies.reserve(w.bodies.size() + 1);
+  b.id = w.next_id;
+  b.handle = handle_create(Kind::body, &b);
+  ++w.next_id;
+  w.bodies.push_back(std::move(owned));
+  w.changed = true;
+  return b;
+}
+
+Obstacle &create_obstacle(World &w, const dfm_obstacle_def &def) {
+  auto owned = std::make_unique<Obstacle>();
+  Obstacle &o = *owned;
+  o.world = &w;
+  o.name = def.name ? def.name : "obstacle" + std::to_string(w.next_id);
+  check_name(w, o.name, "obstacle");
+  const char *const name = o.name.c_str();
+  if (def.shape > DFM_SHAPE_CAPSULE) fail(DFM_E_ARG, "obstacle '%s': shape %u is unknown; use DFM_SHAPE_PLANE, SPHERE, BOX or CAPSULE", name, def.shape);
+  if (!finite(def.pose.position, 3) || !finite(def.pose.rotation, 4) || !finite(def.velocity_surface, 3) || !finite(def.sine.amplitude, 3))
+    fail(DFM_E_ARG, "obstacle '%s': pose, sine and velocity_surface must be finite", name);
+  if ((def.shape == DFM_SHAPE_SPHERE || def.shape == DFM_SHAPE_CAPSULE) && !(def.radius > 0 && std::isfinite(def.radius)))
+    fail(DFM_E_ARG, "obstacle '%s': radius %g m; it must be positive", name, def.radius);
+  if (def.shape == DFM_SHAPE_CAPSULE && !(def.half_length >= 0 && std::isfinite(def.half_length)))
+    fail(DFM_E_ARG, "obstacle '%s': half_length %g m; it must not be negative", name, def.half_length);
+  if (def.shape == DFM_SHAPE_BOX)
+    for (double s : def.half_size)
+      if (!(s > 0 && std::isfinite(s))) fail(DFM_E_ARG, "obstacle '%s': half_size %g m; all three must be positive", name, s);
+  if (def.material) {
+    const Material &m = resolve<Material>(Kind::material, def.material);
+    if (m.world != &w) fail(DFM_E_HANDLE, "obstacle '%s': its material belongs to another world", name);
+    o.material = m.name;
+  }
+  o.def = def;
+  if (def.nkey) o.keys.assign(def.keys, def.keys + def.nkey);
+  check_keys(o.keys, name);
+  o.def.keys = nullptr, o.def.nkey = 0;
+  o.pose = o.pose_at_time(w.time);
+  w.obstacles.reserve(w.obstacles.size() + 1);
+  o.id = w.next_id;
+  o.handle = handle_create(Kind::obstacle, &o);
+  ++w.next_id;
+  o.def.name = o.name.c_str();
+  w.obstacles.push_back(std::move(owned));
+  w.changed = true;
+  return o;
+}
+
+// What remembers the removed thing: its contacts end with an event, its friction work leaves the books.
+void forget(World &w, uint64_t id, uint64_t handle) {
+  ContactStore &s = w.store;
+  for (uint32_t i = 0; i < s.n; ++i)
+    if ((s.id_a[i] == id || s.id_b[i] == id)) {
+      if (s.touching[i])
+        w.events.push_back({sizeof(dfm_contact_event), DFM_EVENT_END, w.handle_of(s.id_a[i]), w.handle_of(s.id_b[i]), s.key[i], w.time});
+      s.touching[i] = 0;
+    }
+  std::erase_if(w.work, [&](const PairWork &p) { return p.a == id || p.b == id; });
+  handle_destroy(handle);
+  w.report.n = 0;
+  w.changed = true;
+}
+
+void destroy_body(Body &b) {
+  World &w = *b.world;
+  forget(w, b.id, b.handle);
+  std::erase_if(w.bodies, [&](auto &p) { return p.get() == &b; });
+  w.worst_body = nullptr;
+}
+
+void destroy_obstacle(Obstacle &o) {
+  World &w = *o.world;
+  forget(w, o.id, o.handle);
+  std::erase_if(w.obstacles, [&](auto &p) { return p.get() == &o; });
+}
+
+}  // namespace dfm

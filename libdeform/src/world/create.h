@@ -1,0 +1,12 @@
+// Bodies and obstacles enter and leave a world. All throw Error and leave the world as it was.
+#pragma once
+#include "world/world.h"
+
+namespace dfm {
+
+Body &create_body(World &w, const dfm_body_def &def);
+Obstacle &create_obstacle(World &w, const dfm_obstacle_def &def);
+void destroy_body(Body &b);
+void destroy_obstacle(Obstacle &o);
+
+}  // namespace dfm

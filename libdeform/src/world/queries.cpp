@@ -1,0 +1,181 @@
+#include "world/queries.h"
+
+#include <algorithm>
+#include <limits>
+
+namespace dfm {
+namespace {
+
+constexpr double kFar = std::numeric_limits<double>::infinity();
+
+// Moeller and Trumbore 1997: distance along the ray, or infinity. Both sides count.
+double ray_triangle(Vec3 o, Vec3 d, Vec3 a, Vec3 b, Vec3 c) {
+  const Vec3 e1 = b - a, e2 = c - a, p = cross(d, e2);
+  const double det = dot(e1, p);
+  if (det == 0) return kFar;
+  const Vec3 s = o - a, q = cross(s, e1);
+  const double u = dot(s, p) / det, v = dot(d, q) / det, t = dot(e2, q) / det;
+  return u >= 0 && v >= 0 && u + v <= 1 && t >= 0 ? t : kFar;
+}
+
+double ray_sphere(Vec3 o, Vec3 d, Vec3 center, double r) {
+  const Vec3 m = o - center;
+  const double b = dot(m, d), c = norm2(m) - r * r, disc = b * b - c;
+  if (disc < 0) return kFar;
+  const double root = std::sqrt(disc), t = -b - root;
+  return t >= 0 ? t : c < 0 ? -b + root : kFar;
+}
+
+// In the obstacle's own frame.
+double ray_box(Vec3 o, Vec3 d, Vec3 half, Vec3 *normal) {
+  double near = -kFar, far = kFar;
+  int axis = 0;
+  for (int k = 0; k < 3; ++k) {
+    if (d[k] == 0) {
+      if (std::fabs(o[k]) > half[k]) return kFar;
+      continue;
+    }
+    double t0 = (-half[k] - o[k]) / d[k], t1 = (half[k] - o[k]) / d[k];
+    if (t0 > t1) std::swap(t0, t1);
+    if (t0 > near) near = t0, axis = k;
+    far = std::min(far, t1);
+  }
+  if (near > far || near < 0) return kFar;
+  *normal = {};
+  (*normal)[axis] = d[axis] > 0 ? -1 : 1;
+  return near;
+}
+
+double ray_capsule(Vec3 o, Vec3 d, double r, double half, Vec3 *normal) {
+  double best = kFar;
+  const double a = d.x * d.x + d.y * d.y, b = o.x * d.x + o.y * d.y, c = o.x * o.x + o.y * o.y - r * r, disc = b * b - a * c;
+  if (a > 0 && disc >= 0) {
+    const double t = (-b - std::sqrt(disc)) / a, z = o.z + t * d.z;
+    if (t >= 0 && std::fabs(z) <= half) best = t;
+  }
+  for (double s : {-half, half}) best = std::min(best, ray_sphere(o, d, {0, 0, s}, r));
+  if (best < kFar) {
+    const Vec3 p = o + best * d;
+    *normal = normalized(p - Vec3{0, 0, std::clamp(p.z, -half, half)});
+  }
+  return best;
+}
+
+double ray_obstacle(const Obstacle &ob, Vec3 origin, Vec3 direction, Vec3 *normal) {
+  const Quat q = ob.pose.rotation;
+  const Vec3 o = rotate_back(q, origin - ob.pose.position), d = rotate_back(q, direction);
+  double t = kFar;
+  Vec3 n{0, 0, 1};
+  switch (Shape(ob.def.shape)) {
+    case Shape::plane:
+      if (d.z != 0 && -o.z / d.z >= 0) t = -o.z / d.z;
+      break;
+    case Shape::sphere:
+      t = ray_sphere(o, d, {}, ob.def.radius);
+      if (t < kFar) n = normalized(o + t * d);
+      break;
+    case Shape::box: t = ray_box(o, d, load3(ob.def.half_size), &n); break;
+    case Shape::capsule: t = ray_capsule(o, d, ob.def.radius, ob.def.half_length, &n); break;
+  }
+  *normal = rotate(q, n);
+  return t;
+}
+
+Vec3 triangle_normal(const Body &b, uint32_t t) {
+  const uint32_t *const c = &b.surface.tri[size_t(3) * t];
+  const Vec3 a = surfel_vector(b, b.p.x, c[0]);
+  return cross(surfel_vector(b, b.p.x, c[1]) - a, surfel_vector(b, b.p.x, c[2]) - a);
+}
+
+dfm_ray_hit nothing() {
+  dfm_ray_hit hit{};
+  hit.distance = kFar, hit.triangle = kNone;
+  return hit;
+}
+
+}  // namespace
+
+Vec3 surfel_vector(const Body &b, const Array<double> &column, uint32_t s) {
+  const Surface &f = b.surface;
+  if (f.identity()) return load3(&column[size_t(f.point[s]) * kStride]);
+  Vec3 sum;
+  for (uint32_t j = f.row[s]; j < f.row[s + 1]; ++j) sum += f.weight[j] * load3(&column[size_t(f.col[j]) * kStride]);
+  return sum;
+}
+
+void surface_normals(const Body &b, double *out) {
+  std::fill(out, out + size_t(3) * b.surface.nsurfel, 0.0);
+  for (uint32_t t = 0; t < b.surface.ntri; ++t) {
+    const Vec3 n = triangle_normal(b, t);
+    for (int k = 0; k < 3; ++k) {
+      double *const to = out + size_t(3) * b.surface.tri[size_t(3) * t + size_t(k)];
+      store3(to, load3(to) + n);
+    }
+  }
+  for (uint32_t s = 0; s < b.surface.nsurfel; ++s) store3(out + size_t(3) * s, normalized(load3(out + size_t(3) * s)));
+}
+
+dfm_ray_hit cast_ray(World &w, Vec3 o, Vec3 d, double max_distance) {
+  dfm_ray_hit hit = nothing();
+  for (auto &b : w.bodies)
+    for (uint32_t t = 0; t < b->surface.ntri; ++t) {
+      const uint32_t *const c = &b->surface.tri[size_t(3) * t];
+      const double at = ray_triangle(o, d, surfel_vector(*b, b->p.x, c[0]), surfel_vector(*b, b->p.x, c[1]), surfel_vector(*b, b->p.x, c[2]));
+      if (at <= max_distance && at < hit.distance) {
+        hit.distance = at, hit.body = b->handle, hit.triangle = t;
+        store3(hit.normal, normalized(triangle_normal(*b, t)));
+      }
+    }
+  for (auto &ob : w.obstacles) {
+    Vec3 n;
+    const double at = ray_obstacle(*ob, o, d, &n);
+    if (at <= max_distance && at < hit.distance) {
+      hit.distance = at, hit.body = 0, hit.obstacle = ob->handle, hit.triangle = kNone;
+      store3(hit.normal, n);
+    }
+  }
+  if (hit.distance < kFar) store3(hit.point, o + hit.distance * d);
+  return hit;
+}
+
+// Ericson, Real-Time Collision Detection, section 5.1.5: Voronoi regions of the triangle, vertices first.
+Vec3 closest_on_triangle(Vec3 p, Vec3 a, Vec3 b, Vec3 c, double w[3]) {
+  const Vec3 ab = b - a, ac = c - a, ap = p - a, bp = p - b, cp = p - c;
+  const double d1 = dot(ab, ap), d2 = dot(ac, ap), d3 = dot(ab, bp), d4 = dot(ac, bp), d5 = dot(ab, cp), d6 = dot(ac, cp);
+  auto at = [&](double u, double v, double s) {
+    w[0] = u, w[1] = v, w[2] = s;
+    return u * a + v * b + s * c;
+  };
+  if (d1 <= 0 && d2 <= 0) return at(1, 0, 0);
+  if (d3 >= 0 && d4 <= d3) return at(0, 1, 0);
+  const double vc = d1 * d4 - d3 * d2;
+  if (vc <= 0 && d1 >= 0 && d3 <= 0) return at(1 - d1 / (d1 - d3), d1 / (d1 - d3), 0);
+  if (d6 >= 0 && d5 <= d6) return at(0, 0, 1);
+  const double vb = d5 * d2 - d1 * d6;
+  if (vb <= 0 && d2 >= 0 && d6 <= 0) return at(1 - d2 / (d2 - d6), 0, d2 / (d2 - d6));
+  const double va = d3 * d6 - d5 * d4;
+  if (va <= 0 && d4 - d3 >= 0 && d5 - d6 >= 0) {
+    const double s = (d4 - d3) / ((d4 - d3) + (d5 - d6));
+    return at(0, 1 - s, s);
+  }
+  const double sum = va + vb + vc;
+  return at(va / sum, vb / sum, vc / sum);
+}
+
+dfm_ray_hit closest_surface(World &w, Vec3 p, double max_distance) {
+  dfm_ray_hit hit = nothing();
+  for (auto &b : w.bodies)
+    for (uint32_t t = 0; t < b->surface.ntri; ++t) {
+      const uint32_t *const c = &b->surface.tri[size_t(3) * t];
+      double weight[3];
+      const Vec3 q = closest_on_triangle(p, surfel_vector(*b, b->p.x, c[0]), surfel_vector(*b, b->p.x, c[1]), surfel_vector(*b, b->p.x, c[2]), weight);
+      const double d = norm(p - q);
+      if (d <= max_distance && d < hit.distance) {
+        hit.distance = d, hit.body = b->handle, hit.triangle = t;
+        store3(hit.point, q), store3(hit.normal, normalized(triangle_normal(*b, t)));
+      }
+    }
+  return hit;
+}
+
+}  // namespace dfm

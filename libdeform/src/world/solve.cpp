@@ -1,0 +1,163 @@
+// contact <-> friction: the outer loop over the laws around the inner sweeps (doc/concepts/contact.md).
+//
+//   warm start: last impulses of the same keys, times h/h_old, applied before the first sweep
+//   repeat   ask all laws once, in batches, at the present slip and normal force
+//            residual of the true laws below tolerance: done
+//            sweep the linearised laws until their own residual is below tolerance
+#include <algorithm>
+
+#include "contact/solver.h"
+#include "core/error.h"
+#include "world/world.h"
+
+namespace dfm {
+namespace {
+
+// Responses of self-stepping bodies to unit impulses at their touched surfels: column by column.
+void fill_responses(World &w) {
+  for (const ContactRows::Block &block : w.rows.blocks) {
+    Body &b = *w.bodies[block.source];
+    const uint32_t n = block.count;
+    w.block_surfels.resize(n), w.block_impulse.resize(size_t(3) * n), w.block_velocity.resize(size_t(3) * n);
+    for (uint32_t k = 0; k < n; ++k) w.block_surfels[k] = w.rows.point[block.first + k];
+    const dfm_kin kin = b.kin(w.time, w.h, nullptr);
+    for (uint32_t c = 0; c < 3 * n; ++c) {
+      std::fill(w.block_impulse.begin(), w.block_impulse.end(), 0.0), std::fill(w.block_velocity.begin(), w.block_velocity.end(), 0.0);
+      w.block_impulse[c] = 1;
+      PluginCall call(w.context->scratch);
+      if (b.model.stepper->respond(b.model.self, &kin, n, w.block_surfels.data(), w.block_impulse.data(), w.block_velocity.data()) != DFM_OK)
+        fail(DFM_E_FATAL, "model '%s' of body '%s' does not answer impulses; change the model", b.model.type->id, b.name.c_str());
+      for (uint32_t r = 0; r < 3 * n; ++r) w.rows.response[block.response + size_t(r) * 3 * n + c] = w.block_velocity[r];
+    }
+  }
+}
+
+void prepare_rows(World &w) {
+  const uint32_t n = static_cast<uint32_t>(w.contacts.size());
+  uint32_t nstate = 0;
+  for (const LawInstance *law : w.law_list) nstate = std::max(nstate, law->nstate);
+  w.state.resize(n, nstate);
+  for (uint32_t i = 0; i < n; ++i) {
+    const ContactPoint &c = w.contacts[i];
+    w.state.law[i] = w.law_of(c.slot_a, c.obstacle, c.slot_b);
+    w.state.area[i] = c.area;
+  }
+  w.rows.build(w.contacts, w.sources);
+  fill_responses(w);
+  w.tangents.resize(size_t(3) * n), w.match.resize(n);
+  warm_start(w.store, w.contacts, w.h, w.rows, w.state, w.tangents.data(), w.match.data());
+  w.rows.finish(w.contacts, w.tangents.data(), w.h, w.offset);
+  for (uint32_t i = 0; i < n; ++i) {
+    double *const l = &w.rows.impulse[size_t(i) * 3];
+    if (!(w.rows.wn[i] > 0)) l[0] = l[1] = l[2] = 0;
+    else if (l[0] != 0) w.rows.apply(i, load3(l));
+  }
+  w.batches.gather(w.law_list, w.state);
+}
+
+}  // namespace
+
+bool World::stage_solve(uint32_t *trouble) {
+  passes = sweeps = 0;
+  residual = {};
+  prepare_rows(*this);
+  if (rows.n == 0) return true;
+  const double tolerance = def.contact_tolerance > 0 ? def.contact_tolerance : std::min(1e-6, 0.01 * (0.5 * offset) / h);
+  const LawInstance *bad = nullptr;
+  for (;;) {
+    set_trial(rows, h, state);
+    bad = batches.evaluate(h, state);
+    if (bad) break;
+    ++passes;
+    if (sweeps) {
+      residual = true_residual(rows, state, h);
+      if (residual.max() <= tolerance || sweeps >= def.max_sweeps || passes > def.max_passes) break;
+    }
+    // at least one sweep on a warm start is part of the method
+    acceleration.start(rows);
+    for (;;) {
+      sweep(rows, state, h);
+      ++sweeps;
+      if (sweeps >= def.max_sweeps || inner_residual(rows, state, h).max() <= 0.5 * tolerance) break;
+      acceleration.follow(rows);
+    }
+  }
+  double poison = 0;
+  for (double l : rows.impulse) poison += 0.0 * l;
+  if (bad || poison != 0) {
+    *trouble |= bad ? DFM_TROUBLE_PLUGIN : DFM_TROUBLE_NONFINITE;
+    set_last_error(format("step %llu: %s; %s", static_cast<unsigned long long>(step_count),
+                          bad ? (std::string("friction law '") + bad->type->id + "' failed or answered with something not finite").c_str()
+                              : "the contact solve is not finite",
+                          "take a smaller step or change the law").c_str());
+    return false;
+  }
+  if (residual.max() > tolerance) *trouble |= DFM_TROUBLE_UNCONVERGED, ++stats.unconverged;
+  stats.passes = passes, stats.sweeps = sweeps, stats.residual = residual.max();
+  stats.passes_max = std::max(stats.passes_max, passes), stats.sweeps_max = std::max(stats.sweeps_max, sweeps);
+  stats.residual_max = std::max(stats.residual_max, stats.residual);
+  return true;
+}
+
+// After the commit: what contacts keep for the next sub-step, their events, the hold measure, friction work and the report.
+void World::keep_contacts() {
+  const uint32_t n = rows.n, S = state.nstate;
+  ContactStore &to = next_store;
+  to.n = n, to.nstate = S, to.h = h;
+  to.key.resize(n), to.id_a.resize(n), to.id_b.resize(n), to.by_key.resize(n), to.law.resize(n), to.dwell.resize(n);
+  to.normal.resize(size_t(3) * n), to.tangent.resize(size_t(3) * n), to.impulse.resize(size_t(3) * n), to.path.resize(size_t(2) * n);
+  to.bristle.resize(size_t(S) * n), to.touching.resize(n), to.held.resize(n), to.began.resize(n);
+  report.n = n, report.h = h;
+  report.contacts.assign(contacts.begin(), contacts.end());
+  report.frame.assign(rows.frame.begin(), rows.frame.end());
+  report.impulse.assign(rows.impulse.begin(), rows.impulse.end());
+  report.slip.resize(size_t(2) * n), report.mode.resize(n);
+
+  auto event = [&](uint32_t kind, uint64_t a, uint64_t b, uint64_t key) {
+    if (events.size() >= 65536) events.erase(events.begin(), events.begin() + 1024);
+    events.push_back({sizeof(dfm_contact_event), kind, handle_of(a), handle_of(b), key, time + h});
+  };
+  uint32_t touching = 0, sticking = 0;
+  for (uint32_t i = 0; i < n; ++i) {
+    const ContactPoint &c = contacts[i];
+    const uint64_t a = bodies[c.slot_a]->id, b = c.obstacle ? obstacles[c.slot_b]->id : bodies[c.slot_b]->id;
+    const double *const l = &rows.impulse[size_t(i) * 3];
+    const uint32_t m = match[i];
+    const bool before = m != kNone && store.touching[m];
+    // hysteresis: a contact ends when it carries nothing and has opened by a tenth of the offset
+    const bool now = l[0] > 0 || (before && c.distance - offset < 0.1 * offset);
+    const bool stick = l[0] > 0 && state.mode[i] == 1;
+    to.key[i] = c.key, to.id_a[i] = a, to.id_b[i] = b, to.law[i] = state.law[i], to.by_key[i] = i;
+    store3(&to.normal[size_t(3) * i], load3(&rows.frame[size_t(9) * i]));
+    store3(&to.tangent[size_t(3) * i], load3(&rows.frame[size_t(9) * i + 3]));
+    store3(&to.impulse[size_t(3) * i], load3(l));
+    for (uint32_t s = 0; s < S; ++s) to.bristle[size_t(S) * i + s] = now ? state.bristle_out[size_t(s) * state.stride + i] : 0;
+    to.dwell[i] = now ? state.dwell[i] + h : 0;
+    const double v1 = state.vt[i], v2 = state.vt[state.stride + i];
+    const bool carried = holding && m != kNone && store.held[m] && stick;
+    to.path[2 * i] = carried ? store.path[2 * m] + h * v1 : 0;
+    to.path[2 * i + 1] = carried ? store.path[2 * m + 1] + h * v2 : 0;
+    to.touching[i] = now, to.held[i] = holding && stick && (carried || time <= hold_start);
+    to.began[i] = now && !before;
+    if (now && !before) event(DFM_EVENT_BEGIN, a, b, c.key);
+    if (before && !now) event(DFM_EVENT_END, a, b, c.key);
+    report.slip[2 * i] = v1, report.slip[2 * i + 1] = v2, report.mode[i] = state.mode[i];
+    touching += now, sticking += stick;
+
+    if (l[1] != 0 || l[2] != 0) {
+      auto it = std::lower_bound(work.begin(), work.end(), std::pair(a, b), [](const PairWork &w, auto &k) { return std::pair(w.a, w.b) < k; });
+      if (it == work.end() || it->a != a || it->b != b) it = work.insert(it, {a, b, 0});
+      it->work += l[1] * v1 + l[2] * v2;
+    }
+  }
+  std::sort(to.by_key.begin(), to.by_key.end(), [&](uint32_t i, uint32_t j) { return to.key[i] < to.key[j]; });
+  for (uint32_t m = 0; m < store.n; ++m)
+    if (store.touching[m] && to.find(store.key[m]) == kNone) event(DFM_EVENT_END, store.id_a[m], store.id_b[m], store.key[m]);
+  std::swap(store, next_store);
+
+  stats.contacts = touching, stats.sticking = sticking, stats.pairs_tested = static_cast<uint32_t>(broad.candidates().size());
+  stats.contacts_max = std::max(stats.contacts_max, touching);
+  stats.contacts_mean += (touching - stats.contacts_mean) / double(stats.substeps + 1);
+}
+
+}  // namespace dfm

@@ -1,0 +1,265 @@
+// One step, from top to bottom:
+//
+//   bound -> n sub-steps of { motion -> model -> predict -> broad -> narrow -> contact <-> friction -> distribute -> commit }
+//
+// The list of stages is the plan's (plan/plan.cpp): what a scene does not call for is not in it. Sub-steps are equal and the contact solve
+// runs in each; detection keeps its candidate lists while nothing has moved further than their skin.
+#include <algorithm>
+#include <atomic>
+#include <chrono>
+#include <cmath>
+#include <limits>
+
+#include "core/error.h"
+#include "integrate/symplectic_euler.h"
+#include "narrow/narrow_phase.h"
+#include "surfel/make_surface.h"
+#include "world/world.h"
+
+namespace dfm {
+namespace {
+
+// The bound depends on the state (volume terms stiffen as cells grow), so it is asked for again every 16 steps; 0.9 of it is used.
+constexpr uint64_t kBoundEvery = 16;
+constexpr double kBoundShare = 0.9;
+
+class StageTimer {
+ public:
+  StageTimer(World &w, StageId id) : w_(w), id_(id), start_(std::chrono::steady_clock::now()) {
+    w_.context->trace_begin(stage_name(id_));
+  }
+  ~StageTimer() {
+    w_.context->trace_end(stage_name(id_));
+    w_.stage_seconds[size_t(id_)] += std::chrono::duration<double>(std::chrono::steady_clock::now() - start_).count();
+    ++w_.stage_calls[size_t(id_)];
+  }
+
+ private:
+  World &w_;
+  StageId id_;
+  std::chrono::steady_clock::time_point start_;
+};
+
+// One stage; false: the sub-step cannot be taken, and nothing of it has been committed.
+bool run_stage(World &w, StageId id, uint32_t *trouble) {
+  StageTimer timer(w, id);
+  switch (id) {
+    case StageId::motion: w.stage_motion(); return true;
+    case StageId::model: return w.stage_model(trouble);
+    case StageId::predict: return w.stage_predict(trouble);
+    case StageId::broad: w.stage_broad(); return true;
+    case StageId::narrow: w.stage_narrow(); return true;
+    case StageId::solve: return w.stage_solve(trouble);
+    case StageId::distribute: w.stage_distribute(); return true;
+    case StageId::commit: w.stage_commit(); return true;
+    case StageId::step: return true;
+  }
+  return true;
+}
+
+// Pose now and at the end of the sub-step, as the velocity and spin that lead from one to the other.
+void view_obstacles(World &w, double t, double h, double left) {
+  for (size_t i = 0; i < w.obstacles.size(); ++i) {
+    const Obstacle &o = *w.obstacles[i];
+    ObstacleView &v = w.obstacle_views[i];
+    v.position = o.pose.position, v.rotation = o.pose.rotation;
+    v.velocity = v.spin = {};
+    if (o.has_target) {
+      v.velocity = (1 / left) * (o.target.position - o.pose.position);
+      v.spin = spin_between(o.pose.rotation, o.target.rotation, left);
+    } else if (o.moves()) {
+      const Pose end = o.pose_at_time(t + h);
+      v.velocity = (1 / h) * (end.position - o.pose.position);
+      v.spin = spin_between(o.pose.rotation, end.rotation, h);
+    }
+  }
+}
+
+// Where the obstacles are at the end of the sub-step; `last`: of the step, so that a target is met exactly.
+void move_obstacles(World &w, double t, double h, double left, bool last) {
+  for (auto &o : w.obstacles) {
+    if (o->has_target) {
+      const double s = last ? 1 : h / left;
+      o->pose = {o->pose.position + s * (o->target.position - o->pose.position), slerp(o->pose.rotation, o->target.rotation, s < 1 ? s : 0)};
+      if (last) o->pose = o->target, o->has_target = false;
+    } else if (o->moves()) {
+      o->pose = o->pose_at_time(t + h);
+    }
+  }
+}
+
+}  // namespace
+
+dfm_status World::step(double dt, uint32_t *trouble) {
+  prepare();
+  if (bound_due || step_count % kBoundEvery == 0) update_bound();
+  const double count = std::ceil(dt / stable - 1e-9);   // stable is infinite where nothing bounds the step
+  if (!(count <= def.max_substeps)) {
+    set_last_error(format("a step of %g s needs %.0f sub-steps of %g s (max_substeps %u): soften or coarsen body '%s', or take a shorter step",
+                          dt, count, stable, def.max_substeps, worst_body ? worst_body->name.c_str() : "?").c_str());
+    return DFM_DISCARD;
+  }
+  const uint32_t n = std::max(1u, static_cast<uint32_t>(count));
+  if (n > 1) *trouble |= DFM_TROUBLE_SUBSTEPS;
+
+  const double start = time;
+  stats.last_substeps = n, stats.substeps_max = std::max(stats.substeps_max, n);
+  for (uint32_t k = 0; k < n; ++k) {
+    const double end = k + 1 == n ? start + dt : start + dt * (double(k + 1) / n);
+    h = end - time;
+    view_obstacles(*this, time, h, start + dt - time);
+    for (const PlannedStage &stage : plan.stages)
+      if (!run_stage(*this, stage.id, trouble)) return DFM_E_DIVERGED;
+    move_obstacles(*this, time, h, start + dt - time, k + 1 == n);
+    time = end;
+    ++stats.substeps;
+  }
+  ++step_count;
+  stats.steps = step_count, stats.time = time;
+  return DFM_OK;
+}
+
+void World::update_bound() {
+  stable = std::numeric_limits<double>::infinity();
+  worst_body = nullptr, worst_point = 0;
+  for (auto &b : bodies) {
+    if (b->model.stepper || !b->model.ops->bound) continue;
+    std::fill(b->ksum.begin(), b->ksum.end(), 0.0), std::fill(b->csum.begin(), b->csum.end(), 0.0);
+    double cell = std::numeric_limits<double>::infinity();
+    const dfm_kin k = b->kin(time, 0, nullptr);
+    {
+      PluginCall call(context->scratch);
+      if (b->model.ops->bound(b->model.self, &k, b->ksum.data(), b->csum.data(), &cell) != DFM_OK)
+        fail(DFM_E_FATAL, "model '%s' of body '%s' gives no step bound", b->model.type->id, b->name.c_str());
+    }
+    uint32_t worst;
+    const double own = std::min(cell, stable_step(b->p, b->ksum.data(), b->csum.data(), &worst));
+    if (own < stable) stable = own, worst_body = b.get(), worst_point = worst;
+  }
+  stable *= kBoundShare;
+  stats.stable_step = stable;
+  bound_due = false;
+}
+
+void World::stage_motion() {
+  if (!gravity_keys.empty()) gravity = vector_at(gravity_keys, time + h);
+  for (auto &b : bodies) {
+    if (b->loads_vary()) {
+      std::fill(b->p.load.begin(), b->p.load.end(), 0.0);
+      for (const Load &load : b->loads) {
+        double scale = load.keys.empty() ? 1 : scale_at(load.keys, time + h);
+        if (load.sine.amplitude[0] != 0) scale *= 1 + load.sine.amplitude[0] * sine_at(load.sine, time + h);
+        for (size_t i = 0; i < load.points.size(); ++i) {
+          double *const f = &b->p.load[size_t(load.points[i]) * kStride];
+          store3(f, load3(f) + scale * load3(&load.force[3 * i]));
+        }
+      }
+    }
+    for (const HeldMotion &m : b->motions) {
+      const Pose first = m.keys.empty() ? Pose{} : to_pose(m.keys.front().pose), now = m.keys.empty() ? Pose{} : pose_at(m.keys, time + h);
+      const Vec3 shift = m.sine.frequency != 0 || m.sine.phase != 0 ? sine_at(m.sine, time + h) * load3(m.sine.amplitude) : Vec3{};
+      for (size_t i = 0; i < m.points.size(); ++i) {
+        const size_t at = size_t(m.points[i]) * kStride;
+        const Vec3 local = rotate_back(first.rotation, load3(&m.start[3 * i]) - first.position);
+        const Vec3 v = (1 / h) * (place(now, local) + shift - load3(&b->p.x[at]));
+        for (int k = 0; k < 3; ++k)
+          if (b->p.held[m.points[i]] & (1 << k)) b->p.v[at + size_t(k)] = v[k];
+      }
+    }
+  }
+}
+
+bool World::stage_model(uint32_t *trouble) {
+  std::atomic<uint32_t> failed{kNone};
+  context->tasks.parallel_for(static_cast<uint32_t>(bodies.size()), 1, [&](uint32_t begin, uint32_t end) {
+    for (uint32_t i = begin; i < end; ++i) {
+      Body &b = *bodies[i];
+      if (b.model.stepper) continue;
+      std::copy(b.p.load.begin(), b.p.load.end(), b.p.f.begin());
+      const dfm_kin k = b.kin(time, h, b.model.state_out.empty() ? nullptr : b.model.state_out.data());
+      PluginCall call(context->scratch);
+      if (b.model.ops->add_forces(b.model.self, &k, b.p.f.data()) != DFM_OK) failed = i;
+    }
+  });
+  if (failed == kNone) return true;
+  *trouble |= DFM_TROUBLE_PLUGIN;
+  const Body &b = *bodies[failed];
+  set_last_error(format("step %llu, body '%s': model '%s' could not compute its forces; take a smaller step or change the model",
+                        static_cast<unsigned long long>(step_count), b.name.c_str(), b.model.type->id).c_str());
+  return false;
+}
+
+bool World::stage_predict(uint32_t *trouble) {
+  const bool touches = plan.touches();
+  std::atomic<uint32_t> failed{kNone};
+  context->tasks.parallel_for(static_cast<uint32_t>(bodies.size()), 1, [&](uint32_t begin, uint32_t end) {
+    for (uint32_t i = begin; i < end; ++i) {
+      Body &b = *bodies[i];
+      bool good = true;
+      if (b.model.stepper) {
+        // A self-stepping body takes loads and gravity as external forces and answers the surfels' mean velocities.
+        for (uint32_t k = 0; k < b.p.n; ++k) {
+          double *const f = &b.p.f[size_t(k) * kStride];
+          store3(f, load3(&b.p.load[size_t(k) * kStride]) + b.p.mass[k] * gravity);
+        }
+        const dfm_kin k = b.kin(time, h, nullptr);
+        Array<double> &u = b.surfel_impulse;   // [nsurfel,3]: free until distribute
+        PluginCall call(context->scratch);
+        good = b.model.stepper->predict(b.model.self, &k, b.p.f.data(), u.data()) == DFM_OK;
+        for (uint32_t s = 0; s < b.surface.nsurfel; ++s) {
+          store3(&b.surface.v[size_t(s) * kStride], load3(&u[3 * size_t(s)]));
+          store3(&b.surface.x[size_t(s) * kStride], load3(&b.p.x[size_t(b.surface.point[s]) * kStride]));
+          good = good && norm2(load3(&u[3 * size_t(s)])) * 0.0 == 0;
+        }
+      } else {
+        good = predict(b.p, gravity, h);
+        if (touches) gather_surface(b.surface, b.p.x.data(), b.p.v_free.data(), kStride);
+      }
+      if (!good) failed = i;
+    }
+  });
+  if (failed == kNone) return true;
+  const Body &b = *bodies[failed];
+  *trouble |= DFM_TROUBLE_NONFINITE;
+  set_last_error(format("step %llu, body '%s': forces or velocities are not finite (model '%s'); take a smaller step, or look for loads and "
+                        "parameters that are too large", static_cast<unsigned long long>(step_count), b.name.c_str(), b.model.type->id).c_str());
+  return false;
+}
+
+void World::stage_broad() { broad.update(body_views, obstacle_views, filter, h, offset); }
+
+void World::stage_narrow() { find_contacts(body_views, obstacle_views, broad.candidates(), h, offset, contacts); }
+
+void World::stage_distribute() {
+  for (const ImpulseSink &s : sinks)
+    if (s.phyxel) std::fill(s.phyxel, s.phyxel + size_t(kStride) * bodies[size_t(&s - sinks.data())]->p.n, 0.0);
+  distribute(contacts, rows.frame.data(), rows.impulse.data(), sinks);
+  for (auto &b : bodies) {
+    Vec3 sum;
+    for (uint32_t s = 0; s < b->surface.nsurfel; ++s) sum += load3(&b->surfel_impulse[3 * size_t(s)]);
+    b->contact_impulse += sum;
+  }
+}
+
+void World::stage_commit() {
+  const bool touched = plan.touches() && rows.n > 0;
+  context->tasks.parallel_for(static_cast<uint32_t>(bodies.size()), 1, [&](uint32_t begin, uint32_t end) {
+    for (uint32_t i = begin; i < end; ++i) {
+      Body &b = *bodies[i];
+      if (b.model.stepper) {
+        if (!plan.touches()) std::fill(b.surfel_impulse.begin(), b.surfel_impulse.end(), 0.0);
+        const dfm_kin k = b.kin(time, h, b.model.state_out.empty() ? nullptr : b.model.state_out.data());
+        PluginCall call(context->scratch);
+        // x and v out must not alias k: v_free and f serve as the new arrays
+        if (b.model.stepper->commit(b.model.self, &k, b.surfel_impulse.data(), b.p.f.data(), b.p.v_free.data()) == DFM_OK)
+          b.p.x.swap(b.p.f), b.p.v.swap(b.p.v_free);
+      } else {
+        commit(b.p, touched, h);
+      }
+      b.model.commit_state();
+    }
+  });
+  if (plan.touches()) keep_contacts();
+}
+
+}  // namespace dfm

@@ -1,0 +1,199 @@
+// What the world knows about itself between steps: names, pair tables, offset, plan.
+#include "world/world.h"
+
+#include <algorithm>
+
+#include "core/error.h"
+
+namespace dfm {
+
+bool Body::loads_vary() const {
+  return std::any_of(loads.begin(), loads.end(), [](const Load &l) { return !l.keys.empty() || l.sine.amplitude[0] != 0; });
+}
+
+dfm_kin Body::kin(double t, double h, double *state_out) const {
+  dfm_kin k{};
+  k.size = sizeof k, k.stride = kStride, k.t = t, k.dt = h;
+  k.x = p.x.data(), k.v = p.v.data();
+  k.state = model.state.data(), k.state_out = state_out;
+  return k;
+}
+
+Pose Obstacle::pose_at_time(double t) const {
+  Pose p = keys.empty() ? to_pose(def.pose) : pose_at(keys, t);
+  if (def.sine.frequency != 0 || def.sine.phase != 0) p.position += sine_at(def.sine, t) * load3(def.sine.amplitude);
+  return p;
+}
+
+World::World(dfm_context *c)
+    : context(c), broad(c->memory), rows(c->memory), acceleration(c->memory), store(c->memory), next_store(c->memory), batches(c->memory) {
+  const Memory &m = c->memory;
+  auto use = [&](auto &...arrays) { ((arrays = std::decay_t<decltype(arrays)>(typename std::decay_t<decltype(arrays)>::allocator_type(m))), ...); };
+  use(contacts, tangents, match, block_surfels, block_impulse, block_velocity, report.contacts, report.frame, report.impulse, report.slip, report.mode,
+      state.law, state.fn, state.vt, state.ft_stop, state.area, state.dwell, state.bristle, state.ft, state.dft_dvt, state.dft_dfn, state.limit,
+      state.bristle_out, state.mode, state.set_valued);
+  stats.size = sizeof stats;
+}
+
+Body *World::find_body(const std::string &name) {
+  for (auto &b : bodies)
+    if (b->name == name) return b.get();
+  return nullptr;
+}
+
+Obstacle *World::find_obstacle(const std::string &name) {
+  for (auto &o : obstacles)
+    if (o->name == name) return o.get();
+  return nullptr;
+}
+
+uint64_t World::handle_of(uint64_t id) const {
+  for (auto &b : bodies)
+    if (b->id == id) return b->handle;
+  for (auto &o : obstacles)
+    if (o->id == id) return o->handle;
+  return 0;
+}
+
+uint32_t World::law_of(uint32_t slot_a, bool obstacle, uint32_t slot_b) const {
+  const size_t width = bodies.size() + obstacles.size();
+  return pair_law[slot_a * width + (obstacle ? bodies.size() : 0) + slot_b];
+}
+
+uint32_t World::add_law(const char *name, std::span<const dfm_param_value> values) {
+  const dfm_type &type = context->registry.find(DFM_KIND_FRICTION, name);
+  std::vector<double> packed = pack_params(type, values);
+  for (uint32_t i = 0; i < laws.size(); ++i)
+    if (laws[i]->type == &type && laws[i]->params == packed) return i;
+  laws.push_back(std::make_unique<LawInstance>(type, context->host, std::move(packed)));
+  return static_cast<uint32_t>(laws.size() - 1);
+}
+
+namespace {
+
+struct Side { const std::string *name, *material; };
+
+// How specific a side's pattern is for a thing: 0 no match, 1 any, 2 material, 3 name.
+int specificity(const std::string &pattern, const Side &side) {
+  if (pattern == "*") return 1;
+  if (pattern.rfind("material=", 0) == 0) return pattern.compare(9, std::string::npos, *side.material) == 0 ? 2 : 0;
+  return pattern == *side.name ? 3 : 0;
+}
+
+int match(const std::string between[2], const Side &a, const Side &b) {
+  const int forward = specificity(between[0], a) && specificity(between[1], b) ? specificity(between[0], a) + specificity(between[1], b) : 0;
+  const int back = specificity(between[0], b) && specificity(between[1], a) ? specificity(between[0], b) + specificity(between[1], a) : 0;
+  return std::max(forward, back);
+}
+
+// The most specific rule wins, then the last given.
+template <class Rule>
+const Rule *best_rule(const std::vector<Rule> &rules, const Side &a, const Side &b) {
+  const Rule *best = nullptr;
+  int score = 0;
+  for (const Rule &r : rules) {
+    const int s = match(r.between, a, b);
+    if (s && s >= score) score = s, best = &r;
+  }
+  return best;
+}
+
+// Rest distance d_c: 1e-3 of the median surface edge, at least 64 rounding units of the largest coordinate, at most 0.1 of the thinnest part;
+// as the thinnest part is not measured, a tenth of the shortest median edge stands for it.
+double contact_offset(const World &w) {
+  double edge = 0, shortest = 0, extent = 0;
+  std::vector<double> edges;
+  for (auto &b : w.bodies) {
+    edges.push_back(b->surface.median_edge);
+    shortest = shortest == 0 ? b->surface.median_edge : std::min(shortest, b->surface.median_edge);
+    for (double x : b->p.x) extent = std::max(extent, std::fabs(x));
+  }
+  if (edges.empty()) return 1e-6;
+  std::nth_element(edges.begin(), edges.begin() + std::ptrdiff_t(edges.size() / 2), edges.end());
+  edge = edges[edges.size() / 2];
+  return std::min(std::max(1e-3 * edge, 64 * 2.220446049250313e-16 * extent), 0.1 * shortest);
+}
+
+void offer(const dfm_type &type, std::vector<SceneFacts::Provider> &to) {
+  for (const std::string &e : effects(type)) to.push_back({e, type.id});
+}
+
+}  // namespace
+
+void World::prepare() {
+  if (!changed) return;
+  const uint32_t nb = static_cast<uint32_t>(bodies.size()), no = static_cast<uint32_t>(obstacles.size()), width = nb + no;
+  SceneFacts facts;
+  facts.bodies = nb, facts.obstacles = no;
+  facts.gravity_keys = !gravity_keys.empty();
+
+  body_views.clear(), obstacle_views.clear(), sources.clear(), sinks.clear();
+  uint32_t node = 0, point = 0;
+  for (uint32_t i = 0; i < nb; ++i) {
+    Body &b = *bodies[i];
+    b.slot = i;
+    facts.self_stepping += b.model.stepper != nullptr;
+    facts.loads_vary |= b.loads_vary(), facts.held_move |= !b.motions.empty();
+    const Surface &s = b.surface;
+    body_views.push_back({i, node, b.category, b.collides_with, b.id, &s});
+    sources.push_back({node, s.nsurfel, point, b.p.n, &s, b.model.stepper ? nullptr : b.p.inv_mass.data(),
+                       b.model.stepper ? s.v.data() : b.p.v_free.data()});
+    sinks.push_back({node, s.nsurfel, &s, b.surfel_impulse.data(), b.model.stepper ? nullptr : b.p.impulse.data()});
+    node += s.nsurfel, point += b.p.n;
+    offer(*b.model.type, facts.offered);
+  }
+  for (uint32_t i = 0; i < no; ++i) {
+    Obstacle &o = *obstacles[i];
+    o.slot = i;
+    facts.obstacles_move |= o.moves() || o.has_target;
+    ObstacleView v{};
+    v.slot = i, v.category = o.def.category, v.collides_with = o.def.collides_with, v.id = o.id, v.shape = Shape(o.def.shape);
+    v.position = o.pose.position, v.rotation = o.pose.rotation, v.half_size = load3(o.def.half_size);
+    v.radius = o.def.radius, v.half_length = o.def.half_length, v.belt = load3(o.def.velocity_surface);
+    obstacle_views.push_back(v);
+  }
+
+  // Pairs: filters, then laws. The default law is made only when a pair needs it.
+  const uint64_t filter_version = filter.version;   // rises, so that lists made under older rules are renewed
+  filter = PairFilter(memory());
+  filter.version = filter_version + 1;
+  pair_law.assign(size_t(nb) * width, 0);
+  for (uint32_t i = 0; i < nb; ++i) {
+    const Side a{&bodies[i]->name, &bodies[i]->material};
+    for (uint32_t j = 0; j < width; ++j) {
+      const bool is_body = j < nb;
+      if (is_body && j == i) continue;
+      const uint64_t id = is_body ? bodies[j]->id : obstacles[j - nb]->id;
+      const Side b = is_body ? Side{&bodies[j]->name, &bodies[j]->material} : Side{&obstacles[j - nb]->name, &obstacles[j - nb]->material};
+      bool touch = is_body ? (bodies[i]->category & bodies[j]->collides_with) && (bodies[j]->category & bodies[i]->collides_with)
+                           : (bodies[i]->category & obstacles[j - nb]->def.collides_with) &&
+                                 (obstacles[j - nb]->def.category & bodies[i]->collides_with);
+      if (const FilterRule *rule = best_rule(filters, a, b)) {
+        if (!is_body || i < j) filter.set(bodies[i]->id, id, !is_body, rule->collide);
+        touch = rule->collide;
+      }
+      if (!touch) continue;
+      if (is_body) facts.body_pairs += i < j;
+      else ++facts.obstacle_pairs;
+      const FrictionRule *rule = best_rule(friction, a, b);
+      const uint32_t law = rule ? rule->law : add_law("coulomb", {});
+      pair_law[size_t(i) * width + j] = law;
+      offer(*laws[law]->type, facts.offered);
+    }
+  }
+  law_list.clear();
+  for (auto &l : laws) law_list.push_back(l.get());
+
+  for (const dfm_type *t : context->registry.list()) offer(*t, facts.available);
+  facts.effects_listed = def.effects != nullptr;
+  facts.asked = asked_effects;
+  plan = make_plan(facts);
+
+  offset = def.contact_offset > 0 ? def.contact_offset : contact_offset(*this);
+  gravity = load3(def.gravity);
+  if (!gravity_keys.empty()) gravity = vector_at(gravity_keys, time);
+  bound_due = true;
+  changed = false;
+}
+
+}  // namespace dfm

@@ -1,0 +1,178 @@
+// The world: what it holds, and the buffers of a step. world/step.cpp is the table of contents of what happens to it.
+#pragma once
+#include <array>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "broad/broad_phase.h"
+#include "contact/solver.h"
+#include "contact/store.h"
+#include "deform/deform.h"
+#include "distribute/distribute.h"
+#include "friction/laws.h"
+#include "model/model.h"
+#include "phyxel/phyxels.h"
+#include "plan/plan.h"
+#include "plugin/context.h"
+#include "plugin/params.h"
+#include "surfel/views.h"
+#include "world/motion.h"
+
+namespace dfm {
+
+struct World;
+
+struct Material { uint64_t handle = 0; World *world = nullptr; std::string name; dfm_material_def def{}; std::vector<std::string> extra_keys; std::vector<std::vector<double>> extra_values; };
+
+// A lasting load: force[i] on points[i], times the keyed scale, times 1 + sine.
+struct Load { uint32_t number; std::vector<uint32_t> points; std::vector<double> force; std::vector<dfm_scale_key> keys; dfm_sine sine{}; };
+// Held points carried by keyed poses (relative to the first key) and a sine.
+struct HeldMotion { std::vector<uint32_t> points; std::vector<double> start; std::vector<dfm_pose_key> keys; dfm_sine sine{}; };
+
+struct Body {
+  World *world = nullptr;
+  uint64_t id = 0, handle = 0;
+  uint32_t slot = 0;
+  std::string name, material;
+  uint32_t category = 1, collides_with = ~0u;
+  void *user = nullptr;
+
+  Phyxels p;
+  Array<uint32_t> tets, edges;
+  Surface surface;
+  ModelInstance model;
+  double mass = 0, rest_volume = 0;
+  std::vector<Load> loads;
+  std::vector<HeldMotion> motions;
+  uint32_t next_load = 1;
+  Vec3 contact_impulse;              // N s since creation
+  Array<double> surfel_impulse;      // [nsurfel,3] N s of the last sub-step
+  Array<double> ksum, csum;          // [n] row sums of the step bound
+
+  bool loads_vary() const;
+  dfm_kin kin(double t, double h, double *state_out) const;
+};
+
+struct Obstacle {
+  World *world = nullptr;
+  uint64_t id = 0, handle = 0;
+  uint32_t slot = 0;
+  std::string name, material;
+  dfm_obstacle_def def{};
+  std::vector<dfm_pose_key> keys;
+  Pose pose;                         // now
+  Pose target;                       // at the end of the next step, where move_to set it
+  bool has_target = false;
+  bool moves() const { return !keys.empty() || def.sine.amplitude[0] != 0 || def.sine.amplitude[1] != 0 || def.sine.amplitude[2] != 0; }
+  Pose pose_at_time(double t) const;
+};
+
+struct FrictionRule { std::string between[2]; uint32_t law; };
+struct FilterRule { std::string between[2]; bool collide; };
+struct PairWork { uint64_t a, b; double work; };
+
+// What the last sub-step left for the report: contacts in key order with their solution.
+struct Report {
+  uint32_t n = 0;
+  double h = 0;
+  Array<ContactPoint> contacts;
+  Array<double> frame, impulse, slip;   // [n,9], [n,3], [n,2]
+  Array<uint8_t> mode;
+};
+
+struct World {
+  dfm_context *context;
+  uint64_t handle = 0;
+  dfm_world_def def{};
+  std::vector<std::string> asked_effects;
+  std::vector<dfm_vector_key> gravity_keys;
+
+  std::vector<std::unique_ptr<Body>> bodies;           // in id order
+  std::vector<std::unique_ptr<Obstacle>> obstacles;    // in id order
+  std::vector<std::unique_ptr<Material>> materials;
+  std::vector<std::unique_ptr<LawInstance>> laws;      // the first is the default law, made when first needed
+  std::vector<FrictionRule> friction;
+  std::vector<FilterRule> filters;
+  uint64_t next_id = 1;
+
+  // Derived from the above by prepare() whenever something changed.
+  bool changed = true;
+  Plan plan;
+  std::vector<uint32_t> pair_law;                      // [body][body or obstacle] -> index into laws
+  PairFilter filter;
+  std::vector<LawInstance *> law_list;
+  double offset = 0;                                   // d_c, m
+  bool bound_due = true;
+
+  // Time.
+  double time = 0, stable = 0;                         // s; stable: 0.9 of the bound at its last evaluation
+  uint64_t step_count = 0;
+  Body *worst_body = nullptr;
+  uint32_t worst_point = 0;
+  bool stepping = false;
+
+  // Buffers of a sub-step.
+  std::vector<BodyView> body_views;
+  std::vector<ObstacleView> obstacle_views;
+  std::vector<DofSource> sources;
+  std::vector<ImpulseSink> sinks;
+  BroadPhase broad;
+  Array<ContactPoint> contacts;
+  ContactRows rows;
+  ContactState state;
+  Acceleration acceleration;
+  ContactStore store, next_store;
+  LawBatches batches;
+  Array<double> tangents;
+  Array<uint32_t> match;
+  Array<uint32_t> block_surfels;                       // scratch of self-stepping bodies
+  Array<double> block_impulse, block_velocity;
+  Vec3 gravity;
+  double h = 0;
+  Residual residual;
+  uint32_t passes = 0, sweeps = 0;
+
+  Report report;
+  std::vector<PairWork> work;                          // sorted by (a, b)
+  std::vector<dfm_contact_event> events;
+  double hold_start = 0;
+  bool holding = false;
+
+  dfm_world_stats stats{};
+  std::array<double, 16> stage_seconds{};
+  std::array<uint64_t, 16> stage_calls{};
+
+  explicit World(dfm_context *c);
+  const Memory &memory() const { return context->memory; }
+
+  // world.cpp
+  void prepare();                                      // plan, pair tables, offset; throws Error
+  Body *find_body(const std::string &name);
+  Obstacle *find_obstacle(const std::string &name);
+  uint64_t handle_of(uint64_t id) const;               // body or obstacle; 0 if gone
+  uint32_t law_of(uint32_t slot_a, bool obstacle, uint32_t slot_b) const;
+  uint32_t add_law(const char *name, std::span<const dfm_param_value> values);
+
+  // step.cpp
+  dfm_status step(double dt, uint32_t *trouble);
+  void update_bound();                                 // stable, worst_body, worst_point
+
+  // stages of a sub-step, each in the file of its name
+  void stage_motion();
+  bool stage_model(uint32_t *trouble);
+  bool stage_predict(uint32_t *trouble);
+  void stage_broad();
+  void stage_narrow();
+  bool stage_solve(uint32_t *trouble);                 // solve.cpp
+  void stage_distribute();
+  void stage_commit();
+  void keep_contacts();                                // solve.cpp: store, events, hold, work
+};
+
+// snapshot.cpp
+uint64_t world_hash(const World &w);
+void world_snapshot(const World &w, std::vector<unsigned char> &out);
+void world_restore(World &w, const void *data, size_t bytes);
+
+}  // namespace dfm

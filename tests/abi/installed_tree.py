@@ -1,0 +1,58 @@
+#!/usr/bin/env python3
+"""Installs into a scratch prefix, moves it, and does there what a stranger does: build a host with CMake and one with pkg-config, build a
+law with deform_add_plugin, run them, ask the command which plugins it finds. Nothing may point back into the build or source tree.
+
+installed_tree.py BUILD_DIR SOURCE_DIR SCRATCH_DIR C_COMPILER LIBDIR
+"""
+import os
+import pathlib
+import shutil
+import subprocess
+import sys
+
+
+def run(*argv, env=None):
+    """Runs and returns stdout; prints everything and ends the test where it fails."""
+    done = subprocess.run([str(a) for a in argv], capture_output=True, text=True, env=env)
+    print("$", *argv)
+    print(done.stdout + done.stderr)
+    if done.returncode:
+        sys.exit(f"exit {done.returncode}")
+    return done.stdout
+
+
+def main():
+    build, source, scratch, compiler, libdir = sys.argv[1:]
+    here = pathlib.Path(__file__).resolve().parent / "stranger"
+    scratch = pathlib.Path(scratch)
+    shutil.rmtree(scratch, ignore_errors=True)
+    scratch.mkdir(parents=True)
+    clean = {k: v for k, v in os.environ.items() if not k.startswith(("DEFORM_", "LD_", "CMAKE_"))}
+    run("cmake", "--install", build, "--prefix", scratch / "first", env=clean)
+    prefix = (scratch / "first").rename(scratch / "moved")
+
+    run("cmake", "-S", here, "-B", scratch / "cmake", f"-DCMAKE_PREFIX_PATH={prefix}", f"-DCMAKE_C_COMPILER={compiler}",
+        "-DCMAKE_BUILD_TYPE=Release", env=clean)
+    run("cmake", "--build", scratch / "cmake", env=clean)
+    slab = next((scratch / "cmake").glob("slab.*"))
+    run(scratch / "cmake" / "host", slab, env=clean)
+
+    flags = run("pkg-config", "--cflags", "--libs", "deform", env={**clean, "PKG_CONFIG_PATH": str(prefix / libdir / "pkgconfig")}).split()
+    host = scratch / "host_by_pkg_config"
+    run(compiler, "-std=c99", "-Wall", "-Wextra", "-Werror", "-Wno-missing-field-initializers", here / "host.c", "-o", host, *flags, "-lm", env=clean)
+    run(host, slab, env={**clean, "LD_LIBRARY_PATH": str(prefix / libdir)})
+
+    command = prefix / "bin" / "deform"
+    listed = run(command, "plugin", "list", env=clean)
+    for plugin in (prefix / libdir / "deform").glob("plugins-*/*.so"):
+        if str(prefix) not in listed and plugin.name not in listed:
+            sys.exit(f"{command} plugin list does not show {plugin}")
+    if f"{build}/lib" in listed:  # the scratch prefix itself lies in the build folder
+        sys.exit(f"the installed command found plugins of the build tree in {build}")
+    for path in prefix.rglob("*"):
+        if path.is_file() and path.suffix in (".cmake", ".pc", ".h", ".hpp") and any(place in path.read_text() for place in (build, source)):
+            sys.exit(f"{path} names the build or source tree")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,38 @@
+#!/usr/bin/env python3
+"""What the compiler made of the wide kernels: no weak symbol, and only entries that carry the instruction set in their name.
+
+kernel_objects.py NM BUILD_DIR
+A weak symbol (an inline function, a template) of an object compiled for AVX may be the one that the linker keeps for everybody.
+"""
+import pathlib
+import re
+import subprocess
+import sys
+
+
+def check(nm, objects):
+    """Findings as lines."""
+    found = []
+    for path in objects:
+        isa = re.search(r"_kernel_(avx\w+)\.", path.name).group(1)
+        out = subprocess.run([nm, "--defined-only", path], capture_output=True, text=True, check=True).stdout
+        for line in out.splitlines():
+            _, kind, name = line.split(maxsplit=2)
+            if kind in "WVuwv":
+                found.append(f"{path}: weak symbol {name}; give it internal linkage")
+            elif kind.isupper() and kind not in "NU" and isa not in name:
+                found.append(f"{path}: external symbol {name} does not carry {isa} in its name")
+    return found
+
+
+def main():
+    nm, build = sys.argv[1:]
+    objects = sorted(p for p in pathlib.Path(build).rglob("*.o") if re.search(r"_kernel_avx\w+\.", p.name))
+    found = check(nm, objects)
+    print("\n".join(found))
+    print(f"{len(objects)} wide kernel objects, {len(found)} findings")
+    return 1 if found else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,129 @@
+#!/usr/bin/env python3
+"""The lint's own test: a small good tree is clean, and each bad change to it is found by the rule that is meant for it."""
+import os
+import pathlib
+import subprocess
+import tempfile
+import unittest
+
+import kernel_objects
+import lint
+
+HELLO = "int main(void) { return 0; }\n"
+HEADER = """#ifndef DEFORM_BASE_H
+#define DEFORM_BASE_H
+#include <stdint.h>
+#ifdef __cplusplus
+extern "C" {
+#endif
+/** Says hello. Threads: Any thread. Since 0.1. */
+DFM_API int dfm_hello(void);
+/** As above, louder. */
+DFM_API int dfm_hello_loud(void);
+#ifdef __cplusplus
+}
+#endif
+#endif
+"""
+GOOD = {
+    "README.md": f"# Title\n\n```c\n{HELLO}```\n",
+    "LICENSE": "MIT\n", "CHANGELOG.md": "# Changes\n", "CMakePresets.json": "{}\n", "Makefile": "all:\n\techo\n",
+    "CMakeLists.txt": "# no -ffast-math here\nadd_compile_options(-ffp-contract=off -mno-fma)\n", ".ci/run": "#!/bin/sh\n",
+    "examples/01_hello.c": HELLO,
+    "libdeform/include/deform/base.h": HEADER,
+    "libdeform/include/deform/deform.h": '#ifndef DEFORM_DEFORM_H\n#define DEFORM_DEFORM_H\n#include "deform/base.h"\n#endif\n',
+    "libdeform/src/core/error.h": "#pragma once\n#include <string>\n",
+    "libdeform/src/math/elementary.h": "#pragma once\ninline double exp_check(double x) { return std::exp(x); }\n",
+    "libdeform/src/broad/tree.cpp": '#include "core/error.h"\n// std::pow( and Eigen:: in a comment say nothing\nint log(int);\n',
+    "libdeform/src/api/scene.cpp": '#include "scene/reader.h"\n',
+    "libdeform/src/scene/reader.h": "#pragma once\n#include <nlohmann/json.hpp>\nusing json = nlohmann::json;\n",
+    "plugins/model_msm/model_msm.cpp": '#include "deform/plugin.h"\n#include "spring.h"\n#include <vector>\n',
+    "plugins/model_msm/spring.h": "#pragma once\n",
+    "plugins/model_msm/spring_kernel_avx2.cpp": "#include <immintrin.h>\nnamespace {\ninline double half(double x) { return x / 2; }\n}\n",
+    "bindings/cli/main.cpp": '#include <CLI/CLI.hpp>\n#include "deform/deform.h"\n',
+    "tests/unit/tree_test.cpp": '#include "broad/tree.h"\n',
+    "tests/api/hello_test.cpp": '#include "deform/deform.h"\n#include "support.h"\n',
+}
+# rule: [(file, text that is appended, or replaces it where it starts with "=")]
+BAD = {
+    "layout": [("notes.txt", "=x\n"), ("src/main.cpp", "=int x;\n"), ("libdeform/src/utils/a.h", "=#pragma once\n"), ("plugins/msm/a.c", "=\n"),
+               ("tests/misc/a_test.cpp", "=\n"), ("libdeform/src/core/Error.h", "=#pragma once\n"), ("docs/index.md", "=x\n")],
+    "text": [("libdeform/src/core/error.h", "int x;\n" * 801), ("README.md", "word \n"), ("libdeform/src/core/error.h", "\tint x;\n"),
+             ("README.md", "no end"), ("libdeform/src/core/error.h", "// " + "x" * 200 + "\n"), ("CHANGELOG.md", "a\r\n"),
+             ("libdeform/src/core/error.h", "// TODO later\n")],
+    "paths": [("README.md", "see /home/me/deform\n"), ("CMakeLists.txt", "set(X /root/x)\n"), ("README.md", "../.library/a\n"),
+              ("examples/01_hello.c", '// "/work/main"\n')],
+    "readme": [("examples/01_hello.c", "// more\n"), ("README.md", "=# Title\n"), ("examples/01_hello.c", "\n" * 40)],
+    "layers": [("libdeform/src/core/error.h", '#include "math/vec3.h"\n'), ("libdeform/src/broad/tree.cpp", '#include "narrow/pair.h"\n'),
+               ("libdeform/src/broad/tree.cpp", '#include "../core/error.h"\n'), ("libdeform/src/scene/reader.h", '#include "api/guard.h"\n'),
+               ("libdeform/src/mesh/a.h", '=#include "plugin/loader.h"\n'), ("libdeform/src/plan/a.h", '=#include <world/world.h>\n'),
+               ("libdeform/src/surfel/a.h", '=#include "phyxel/phyxels.h"\n')],
+    "public_only": [("bindings/cli/main.cpp", '#include "core/error.h"\n'), ("tests/api/hello_test.cpp", '#include "core/error.h"\n'),
+                    ("examples/01_hello.c", '#include "../libdeform/src/core/error.h"\n'), ("tests/analytic/a_test.cpp", '=#include "broad/tree.cpp"\n')],
+    "plugin_includes": [("plugins/model_msm/spring.h", '#include "deform/world.h"\n'), ("plugins/model_msm/spring.h", '#include "core/error.h"\n'),
+                        ("plugins/model_msm/spring.h", "#include <deform/base.h>\n"),
+                        ("plugins/friction_a/a.c", '=#include "../model_msm/spring.h"\n')],
+    "third_parties": [("libdeform/src/broad/tree.cpp", "#include <Eigen/Core>\n"), ("bindings/cli/main.cpp", "#include <nlohmann/json.hpp>\n"),
+                      ("libdeform/src/core/error.h", "using V = Eigen::Vector3d;\n"), ("libdeform/include/deform/base.h", "#include <GL/gl.h>\n"),
+                      ("libdeform/src/core/error.h", "#include <spdlog/spdlog.h>\n"), ("bindings/cli/main.cpp", "#include <png.h>\n")],
+    "numbers": [("CMakeLists.txt", "add_compile_options(-ffast-math)\n"), ("CMakePresets.json", '{"f": "-Ofast"}\n'), ("Makefile", "X = -mfma\n"),
+                ("libdeform/src/broad/tree.cpp", "double f(double a) { return std::fma(a, a, a); }\n"),
+                ("plugins/model_msm/spring_kernel_avx2.cpp", "__m256d f(__m256d a) { return _mm256_fmadd_pd(a, a, a); }\n"),
+                ("plugins/model_msm/spring_kernel_avx2.cpp", "__m256 f(__m256 a) { return _mm256_rsqrt_ps(a); }\n"),
+                ("CMakeLists.txt", "add_compile_options(-march=native)\n"),
+                ("libdeform/src/broad/tree.cpp", '#pragma GCC optimize("fast-math")\n')],
+    "libm": [("libdeform/src/broad/tree.cpp", "double f(double a) { return std::pow(a, 3); }\n"), ("plugins/model_msm/spring.h", "double y = sin(1.0);\n"),
+             ("libdeform/src/math/vec3.h", "=double y = cbrt(1.0);\n"), ("libdeform/src/world/step.cpp", "=float y = expf(1.0f);\n"),
+             ("libdeform/src/world/step.cpp", "=double f(double x) { return exp(x); }\n")],
+    "kernels": [("plugins/model_msm/spring_kernel_avx2.cpp", "#include <vector>\n"), ("plugins/model_msm/spring_kernel.h", "=#include <Eigen/Core>\n"),
+                ("plugins/model_msm/spring_kernel_avx2.cpp", "double f(double a) { return std::sqrt(a); }\n"),
+                ("plugins/model_msm/spring_kernel_avx512.cpp", "=inline double f(double a) { return a; }\n"),
+                ("libdeform/src/broad/box_kernel_avx2.cpp", "=double f(double a) { return a; }\n")],
+    "public_headers": [("libdeform/include/deform/base.h", "#include <stdlib.h>\n"), ("libdeform/include/deform/plugin.h", '=#include "deform/base.h"\n'),
+                       ("libdeform/include/deform/body.h", "=#pragma once\n"),
+                       ("libdeform/include/deform/deform.h", "=#ifndef DEFORM_DEFORM_H\n#define DEFORM_DEFORM_H\n#endif\n"),
+                       ("libdeform/include/deform/base.h", "=#ifndef DEFORM_BASE_H\n#define DEFORM_BASE_H\nDFM_API int dfm_a(void);\n#endif\n")],
+    "threads": [("libdeform/include/deform/base.h", "\nDFM_API int dfm_silent(void);\n"),
+                ("libdeform/include/deform/base.h", "\n/** Says nothing of threads. */\nDFM_API int dfm_silent(int a,\n  int b);\n")],
+}
+
+
+class Lint(unittest.TestCase):
+    def tree(self, changes=()):
+        root = pathlib.Path(self.enterContext(tempfile.TemporaryDirectory()))
+        files = dict(GOOD)
+        for path, text in changes:
+            files[path] = text[1:] if text.startswith("=") else files[path] + text
+        for path, text in files.items():
+            (root / path).parent.mkdir(parents=True, exist_ok=True)
+            (root / path).write_bytes(text.encode())
+        return root
+
+    def test_good_tree_is_clean(self):
+        self.assertEqual(lint.check(self.tree()), [])
+
+    def test_each_bad_change_is_found(self):
+        for rule, changes in BAD.items():
+            for change in changes:
+                with self.subTest(rule=rule, file=change[0], text=change[1][:60]):
+                    found = [f for f in lint.check(self.tree([change]), [rule]) if change[0] in f or rule in ("readme", "layout")]
+                    self.assertTrue(found, "not found")
+
+    def test_every_rule_has_a_bad_case(self):
+        self.assertEqual(set(BAD), set(lint.RULES))
+
+    def test_weak_and_unmarked_kernel_symbols_are_found(self):
+        root = pathlib.Path(self.enterContext(tempfile.TemporaryDirectory()))
+        source = "inline int weak() { return 1; }\nint entry() { return weak(); }\nint entry_avx2() { return weak(); }\n"
+        (root / "a_kernel_avx2.cpp").write_text(source)
+        target = root / "a_kernel_avx2.cpp.o"
+        compiler = os.environ.get("CXX", "c++")
+        subprocess.run([compiler, "-O0", "-c", root / "a_kernel_avx2.cpp", "-o", target], check=True)
+        found = kernel_objects.check("nm", [target])
+        self.assertEqual(len(found), 2, found)
+        self.assertIn("weak symbol", "".join(found))
+        self.assertIn("external symbol _Z5entryv", "".join(found))
+
+
+if __name__ == "__main__":
+    unittest.main()

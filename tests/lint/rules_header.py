@@ -1,0 +1,61 @@
+"""Rules about the public headers: what they include and what each function's comment says."""
+import re
+
+from tree import includes, line_of, without_comments
+
+PUBLIC = "libdeform/include/deform/"
+C_HEADERS = {"stddef.h", "stdint.h", "stdbool.h"}
+# memcpy is the one way to read the bits of a double that both C and C++ define.
+MORE = {"elementary.h": {"string.h"}}
+NOT_IN_UMBRELLA = {"deform.h", "elementary.h"}  # elementary.h is for plugins, no part of the library
+DECLARATION = re.compile(r"^DFM_API\b[^;{]*?\b(dfm_\w+)\s*\(", re.M)
+
+
+def declared(tree):
+    """(path, line, name) of every function that the public headers export."""
+    for path in tree.select(PUBLIC, ext=(".h",)):
+        code = without_comments(tree.text(path))
+        for match in DECLARATION.finditer(code):
+            yield path, line_of(code, match.start()), match.group(1)
+
+
+def public_headers(tree):
+    """Public C headers include three C headers and each other, plugin.h only two; all have guards and C linkage."""
+    for path in tree.select(PUBLIC, ext=(".h",)):
+        name = path[len(PUBLIC):]
+        content = tree.text(path)
+        for line, _, other in includes(content):
+            allowed = {"stddef.h", "stdint.h"} if name == "plugin.h" else C_HEADERS | MORE.get(name, set())
+            if other not in allowed and (name == "plugin.h" or PUBLIC + other[len("deform/"):] not in tree.paths):
+                yield path, line, f"includes {other}; allowed are {', '.join(sorted(allowed))}" + ("" if name == "plugin.h" else " and deform/*.h")
+        guard = f"DEFORM_{name[:-2].upper()}_H"
+        if f"#ifndef {guard}\n#define {guard}\n" not in content:
+            yield path, 1, f"has no guard {guard}"
+        if DECLARATION.search(without_comments(content)) and 'extern "C"' not in content:
+            yield path, 1, "declares functions without extern \"C\" for C++"
+    umbrella = PUBLIC + "deform.h"
+    if umbrella in tree.paths:
+        listed = {other for _, _, other in includes(tree.text(umbrella))}
+        for path in tree.select(PUBLIC, ext=(".h",)):
+            name = path[len(PUBLIC):]
+            if name not in NOT_IN_UMBRELLA and "deform/" + name not in listed:
+                yield umbrella, 1, f"does not include deform/{name}"
+
+
+def threads(tree):
+    """Each function says from which thread it may be called. A comment covers its declaration and those below it up to the next
+    empty line, so that a group shares one."""
+    for path in tree.select(PUBLIC, ext=(".h",)):
+        content = tree.text(path)
+        code = without_comments(content)
+        for match in DECLARATION.finditer(code):
+            start = content.rfind("\n\n", 0, match.start())
+            # A blank line inside a comment does not end its group.
+            while start > 0 and content.rfind("/*", 0, start) > content.rfind("*/", 0, start):
+                start = content.rfind("\n\n", 0, start)
+            end = content.find("\n", match.end())
+            if "Threads:" not in content[max(start, 0):end]:
+                yield path, line_of(content, match.start()), f"{match.group(1)} has no comment that says \"Threads: ...\" (see base.h for the four phrases)"
+
+
+RULES = {"public_headers": public_headers, "threads": threads}

@@ -1,0 +1,90 @@
+"""Rules about the tree: where things lie, what a text file looks like, what never stands in one."""
+import re
+
+from tree import CODE, line_of
+
+TOP = {"CMakeLists.txt", "libdeform", "plugins", "bindings", "examples", "tests", "cmake",
+       "README.md", "LICENSE", "CHANGELOG.md", "CMakePresets.json", "Makefile"}
+BELOW = {
+    "libdeform": {"CMakeLists.txt", "include", "src", "schema", "doc"},
+    "libdeform/include": {"deform"},
+    "libdeform/src": {"core", "math", "mesh", "phyxel", "surfel", "plugin", "plan", "model", "integrate", "broad", "narrow",
+                      "contact", "friction", "distribute", "world", "scene", "api"},
+    "libdeform/doc": {"README.md", "concepts", "models", "laws", "howto", "decisions", "images"},
+    "bindings": {"CMakeLists.txt", "cli", "render", "ode", "bullet", "python"},
+    "tests": {"CMakeLists.txt", "support", "data", "unit", "analytic", "stability", "api", "plugin", "determinism", "adapters",
+              "fuzz", "lint", "bench", "abi", "render"},
+}
+PLUGIN_FOLDER = re.compile(r"plugins/(CMakeLists\.txt|(model|friction|solver|template)_[a-z0-9_]+)$")
+MAX_LINES = 800
+MAX_COLUMNS = 160
+
+
+def layout(tree):
+    """The folders of the house and no others."""
+    entries = {"/".join(p.split("/")[:depth]) for p in tree.paths for depth in range(1, p.count("/") + 2)}
+    for entry in sorted(entries):
+        parent, _, name = entry.rpartition("/")
+        if not parent:
+            if name not in TOP and not name.startswith("."):
+                yield entry, 1, f"does not belong at the top; only these do: {', '.join(sorted(TOP))} and dotfiles"
+        elif parent in BELOW and name not in BELOW[parent]:
+            yield entry, 1, f"does not belong in {parent}/; only these do: {', '.join(sorted(BELOW[parent]))}"
+        elif parent == "plugins" and not PLUGIN_FOLDER.match(entry):
+            yield entry, 1, "a plugin's folder is called model_NAME, friction_NAME, solver_NAME or template_NAME"
+        if name != name.lower() and entry.startswith(("libdeform/src", "plugins", "bindings", "tests")) and name.endswith(CODE):
+            yield entry, 1, "file names are snake_case"
+
+
+def text(tree):
+    """Long files and lines, tabs, trailing spaces, line ends, marks of unfinished work."""
+    for path in tree.paths:
+        content = tree.text(path)
+        if content is None or path.startswith(("examples/data/", "tests/data/", "tests/bench/results/")):
+            continue
+        code = path.endswith((*CODE, ".py", ".cmake", "CMakeLists.txt", ".sh"))
+        lines = content.split("\n")
+        if code and len(lines) > MAX_LINES + 1:
+            yield path, 1, f"has {len(lines) - 1} lines; at most {MAX_LINES}: divide it by what its parts are about"
+        if content and not content.endswith("\n"):
+            yield path, len(lines), "the last line does not end"
+        for number, line in enumerate(lines, 1):
+            if "\r" in line:
+                yield path, number, "carriage return; lines end with a line feed alone"
+                break
+            if "\t" in line and path != "Makefile":
+                yield path, number, "tab; indent with spaces"
+            if line != line.rstrip():
+                yield path, number, "space at the end of the line"
+            if code and len(re.sub(r'"[^"]{40,}"', '""', line)) > MAX_COLUMNS:  # sentences stay whole, so that a search finds them
+                yield path, number, f"{len(line)} columns; at most {MAX_COLUMNS}, long sentences in quotes not counted"
+            if code and re.search(r"\b(TODO|FIXME|XXX|HACK)\b", line) and not path.startswith("tests/lint/"):
+                yield path, number, "a mark of unfinished work; finish it or write an issue"
+
+
+def paths(tree):
+    """Nothing names a place on somebody's machine."""
+    machine = re.compile(r"(?<![\w./])/(home|root|work|Users|mnt)/|(?<=/)\.library\b|[A-Z]:\\\\")
+    for path in tree.paths:
+        content = tree.text(path)
+        if content is None or path.startswith("tests/lint/"):
+            continue
+        for match in machine.finditer(content):
+            yield path, line_of(content, match.start()), f"names a place on one machine: {match.group(0)}"
+
+
+def readme(tree):
+    """The program that README.md shows is the example, to the letter, and short."""
+    example = "examples/01_hello.c"
+    if "README.md" not in tree.paths or example not in tree.paths:
+        yield "README.md", 1, f"README.md and {example} must both be there"
+        return
+    blocks = re.findall(r"^```c\n(.*?)^```", tree.text("README.md"), re.M | re.S)
+    program = tree.text(example)
+    if program not in blocks:
+        yield "README.md", 1, f"no ```c block equals {example}; copy the file into it"
+    if program.count("\n") > 30:
+        yield example, 31, f"has {program.count(chr(10))} lines; the front page promises 30"
+
+
+RULES = {"layout": layout, "text": text, "paths": paths, "readme": readme}
