@@ -26,7 +26,8 @@ bool check_params(const dfm_host *h, const double *values) {
   for (uint32_t n = 0; n < kParamCount; ++n)
     if (!(values[n] >= kParams[n].min && values[n] <= kParams[n].max)) {
       char text[200];
-      snprintf(text, sizeof text, "parameter %s = %g %s is outside %g .. %g", kParams[n].key, values[n], kParams[n].unit, kParams[n].min, kParams[n].max);
+      const dfm_param &p = kParams[n];
+      snprintf(text, sizeof text, "parameter %s = %g %s is outside %g .. %g", p.key, values[n], p.unit, p.min, p.max);
       complain(h, text);
       return false;
     }

@@ -64,11 +64,16 @@ void Body::add_forces(const dfm_kin &k, double *f_out) {
   for_each_block(merge_pass, &call);
 }
 
+double Body::stretch_of(uint32_t e, const dfm_kin &k) const {
+  const uint32_t *ends = edges.data() + 2 * size_t(e);
+  return length_of(k.x + size_t(k.stride) * ends[0], k.x + size_t(k.stride) * ends[1]) - edge_length[e];
+}
+
 double Body::energy(const dfm_kin &k) const {
   double springs = 0, volumes = 0;
   const double scale = spring_scale_of_shape();
   for (uint32_t e = 0; e < nedge; ++e) {
-    const double stretch = length_of(k.x + size_t(k.stride) * edges[2 * size_t(e)], k.x + size_t(k.stride) * edges[2 * size_t(e) + 1]) - edge_length[e];
+    const double stretch = stretch_of(e, k);
     springs += 0.5 * (scale * shape[e]) * (stretch * stretch);
   }
   if (has_volume())
@@ -86,7 +91,7 @@ double Body::energy(const dfm_kin &k) const {
 void Body::cell_energy(const dfm_kin &k, double *density) {
   const double scale = spring_scale_of_shape(), ratio = volume_ratio();
   for (uint32_t e = 0; e < nedge; ++e) {
-    const double stretch = length_of(k.x + size_t(k.stride) * edges[2 * size_t(e)], k.x + size_t(k.stride) * edges[2 * size_t(e) + 1]) - edge_length[e];
+    const double stretch = stretch_of(e, k);
     edge_energy[e] = edge_volume[e] > 0 ? 0.5 * (scale * shape[e]) * (stretch * stretch) / edge_volume[e] : 0;
   }
   for (uint32_t c = 0; c < ncell; ++c) {

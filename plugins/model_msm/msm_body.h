@@ -83,8 +83,17 @@ struct Body {
 
  private:
   void take_mesh(const dfm_mesh &m);
+  struct Layout;
   void build_blocks();
+  void order_springs(Layout &l) const;
+  void order_cells(Layout &l) const;
+  uint32_t high_rank(const Layout &l, uint32_t e) const;
+  uint32_t find_halo(Layout &l, uint32_t b) const;
+  size_t fill_springs(const Layout &l, Block &out, uint32_t b, size_t quads_at);
+  size_t fill_cells(const Layout &l, Block &out, uint32_t b, size_t cells_at);
+  void build_merge(const Layout &l);
   void find_weights();
+  double stretch_of(uint32_t e, const dfm_kin &k) const;
   double spring_scale_of_shape() const { return spring_scale() * (young_field ? 1.0 : params[kYoung]); }
   void for_each_block(void (*fn)(void *, uint32_t, uint32_t), void *user);
 };

@@ -1,5 +1,5 @@
-// The kernels on vectors of four doubles, written once for the files that bring `v4` and its operations (msm_lanes_avx.h, or two
-// registers in msm_lanes_sse2.h). Everything here has internal linkage (see the house rules on wide kernels).
+// The kernels on vectors of four doubles, written once for the files that bring `v4` and its operations (msm_kernel_lanes_avx.h, or two
+// registers in msm_kernel_lanes_sse2.h). Everything here has internal linkage (see the house rules on wide kernels).
 #pragma once
 #include <stddef.h>
 
@@ -118,7 +118,8 @@ static inline void cell_rows(const Block &b) {
   }
 }
 
-// Diagonal blocks of the springs' stiffness, a compressed spring counted without its softening: k ((1 - s) n n^T + s I), s = max(0, 1 - L0/L).
+// Diagonal blocks of the springs' stiffness, k ((1 - s) n n^T + s I) with s = max(0, 1 - L0/L): a compressed spring is counted
+// without its softening.
 static inline void spring_rows(const Block &b) {
   for (uint32_t n = 0; n < b.local; ++n) store4(b.row + 8 * size_t(n), splat(0)), store4(b.row + 8 * size_t(n) + 4, splat(0));
   const auto add = [&b](uint32_t n, v4 square, v4 mixed) __attribute__((always_inline)) {

@@ -1,11 +1,12 @@
 // The baseline of x86-64: four doubles are two registers.
-#include "msm_lanes_sse2.h"
+#include "msm_kernel_lanes_sse2.h"
 
 #include "msm_kernel_quad.h"
 
 namespace msm {
 namespace {
-constexpr Kernels kKernels = {"sse2", load_block, plain_springs, damped_springs, volume_cells, spring_rows, cell_rows, merge_halo, merge_rows, add_to_host};
+constexpr Kernels kKernels = {"sse2", load_block, plain_springs, damped_springs, volume_cells,
+                              spring_rows, cell_rows, merge_halo, merge_rows, add_to_host};
 }  // namespace
 
 const Kernels *kernels_sse2() { return &kKernels; }

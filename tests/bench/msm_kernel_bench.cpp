@@ -97,7 +97,8 @@ struct Flat {
         x[0][4 * n + a] = x[1][3 * n + a] = x[2][a * npoint + n] = px;
         v[0][4 * n + a] = v[1][3 * n + a] = v[2][a * npoint + n] = pv;
       }
-    s = {npoint, uint32_t(ns), i.data(), j.data(), stiffness, rest, npoint / 4, 0, begin.data(), neighbour.data(), row_stiffness, row_rest, 0.002};
+    s = {npoint, uint32_t(ns), i.data(), j.data(), stiffness, rest, npoint / 4, 0, begin.data(), neighbour.data(),
+         row_stiffness, row_rest, 0.002};
   }
 };
 
@@ -198,7 +199,8 @@ int main(int argc, char **argv) {
   else mesh() = kuhn_bar(25, 10, 10, 0.04, 0.2), name = "bar 25x10x10";
 
   const bound::Kernels *tables[] = {bound::kernels_sse2(), bound::kernels_avx2(), bound::kernels_avx512()};
-  const bool able[] = {true, bool(__builtin_cpu_supports("avx2")), bool(__builtin_cpu_supports("avx512dq")) && bool(__builtin_cpu_supports("avx512vl"))};
+  const bool able[] = {true, bool(__builtin_cpu_supports("avx2")),
+                       bool(__builtin_cpu_supports("avx512dq")) && bool(__builtin_cpu_supports("avx512vl"))};
   const char *isas[] = {"sse2", "avx2", "avx512"};
   for (int k = 0; k < 3; ++k) {
     if (!able[k]) continue;
@@ -207,7 +209,8 @@ int main(int argc, char **argv) {
     const auto add = [&](const std::string &what, auto &&...args) {
       benchmark::RegisterBenchmark((what + at).c_str(), std::forward<decltype(args)>(args)...)->Repetitions(15)->MinTime(0.02);
     };
-    add("scatter_padded", plain, t.scatter_padded, 0), add("scatter_packed", plain, t.scatter_packed, 1), add("scatter_split", plain, t.scatter_split, 2);
+    add("scatter_padded", plain, t.scatter_padded, 0), add("scatter_packed", plain, t.scatter_packed, 1);
+    add("scatter_split", plain, t.scatter_split, 2);
     add("rows_padded", plain, t.rows_padded, 0), add("rows_split", plain, t.rows_split, 2);
     add("plugin_undamped", through_abi, isas[k], kPlain, false), add("plugin_damped", through_abi, isas[k], kDamped, false);
     add("plugin_volume", through_abi, isas[k], kVolume, false), add("plugin_bound", through_abi, isas[k], kVolume, true);

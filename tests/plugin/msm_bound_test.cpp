@@ -54,7 +54,8 @@ struct Operator {
 };
 
 TEST(MsmBound, RowSums_BoundTheTrueSpectrumInEveryShape) {
-  for (const Params &p : {Params{1e5, 0.3, 0, 0, 0}, Params{1e5, 0.3, 0.004, 3, 0}, Params{1e5, 0.45, 0.001, 0, 1}, Params{1e5, 0.45, 0, 0, 20}})
+  for (const Params &p : {Params{1e5, 0.3, 0, 0, 0}, Params{1e5, 0.3, 0.004, 3, 0}, Params{1e5, 0.45, 0.001, 0, 1},
+                          Params{1e5, 0.45, 0, 0, 20}})
     for (double size : {1.0, 0.3, 2.0, -1.0}) {
       Host host;
       Instance b(host, kuhn_bar(4, 2, 2, 0.1, 0.2), p);
@@ -104,7 +105,8 @@ double growth(Instance &b, double h, int steps) {
 }
 
 TEST(MsmBound, FreeVibration_IsBoundedAtTheBoundAndGrowsAtTwiceTheTrueLimit) {
-  for (const Params &p : {Params{1e5, 0.3, 0, 0, 0}, Params{1e5, 0.3, 0.002, 0, 0}, Params{1e5, 0.45, 0, 0, 1}, Params{1e5, 0.45, 0.002, 1, 1}}) {
+  for (const Params &p : {Params{1e5, 0.3, 0, 0, 0}, Params{1e5, 0.3, 0.002, 0, 0}, Params{1e5, 0.45, 0, 0, 1},
+                          Params{1e5, 0.45, 0.002, 1, 1}}) {
     Host host;
     const Mesh mesh = kuhn_bar(4, 2, 2, 0.1, 0.2);
     double bound, limit;

@@ -1,4 +1,4 @@
-#include "model_msm/msm_lanes_avx.h"
+#include "model_msm/msm_kernel_lanes_avx.h"
 
 namespace msm {
 namespace {

@@ -1,4 +1,4 @@
-#include "model_msm/msm_lanes_sse2.h"
+#include "model_msm/msm_kernel_lanes_sse2.h"
 
 namespace msm {
 namespace {

@@ -1,4 +1,4 @@
-// The plain kernels on four lanes, for the files that bring v4 (see plugins/model_msm/msm_lanes_avx.h).
+// The plain kernels on four lanes, for the files that bring v4 (see plugins/model_msm/msm_kernel_lanes_avx.h).
 #pragma once
 #include <stddef.h>
 
@@ -80,9 +80,11 @@ static inline void rows_padded(const Springs &s, const Points &p) {
     v4 fx = splat(0), fy = splat(0), fz = splat(0);
     for (uint32_t r = s.slice_begin[slice]; r < s.slice_begin[slice + 1]; ++r) {
       const uint32_t *j = s.neighbour + 4 * size_t(r);
-      v4 dx = load4(p.x + 4 * size_t(j[0])), dy = load4(p.x + 4 * size_t(j[1])), dz = load4(p.x + 4 * size_t(j[2])), dw = load4(p.x + 4 * size_t(j[3]));
+      v4 dx = load4(p.x + 4 * size_t(j[0])), dy = load4(p.x + 4 * size_t(j[1]));
+      v4 dz = load4(p.x + 4 * size_t(j[2])), dw = load4(p.x + 4 * size_t(j[3]));
       transpose(dx, dy, dz, dw);
-      v4 ex = load4(p.v + 4 * size_t(j[0])), ey = load4(p.v + 4 * size_t(j[1])), ez = load4(p.v + 4 * size_t(j[2])), ew = load4(p.v + 4 * size_t(j[3]));
+      v4 ex = load4(p.v + 4 * size_t(j[0])), ey = load4(p.v + 4 * size_t(j[1]));
+      v4 ez = load4(p.v + 4 * size_t(j[2])), ew = load4(p.v + 4 * size_t(j[3]));
       transpose(ex, ey, ez, ew);
       dx = dx - x, dy = dy - y, dz = dz - z, ex = ex - vx, ey = ey - vy, ez = ez - vz;
       const v4 scale = scale_of((dx * dx + dy * dy) + dz * dz, (dx * ex + dy * ey) + dz * ez, load4(s.row_stiffness + 4 * size_t(r)),

@@ -36,8 +36,10 @@ MSM_INLINE v4 sum_rows(v4 s0, v4 s1, v4 s2, v4 s3) {
   return {_mm_add_pd(sum_pairs(s0.lo, s1.lo), sum_pairs(s0.hi, s1.hi)), _mm_add_pd(sum_pairs(s2.lo, s3.lo), sum_pairs(s2.hi, s3.hi))};
 }
 MSM_INLINE void transpose(v4 &r0, v4 &r1, v4 &r2, v4 &r3) {
-  const v4 a = {_mm_unpacklo_pd(r0.lo, r1.lo), _mm_unpacklo_pd(r2.lo, r3.lo)}, b = {_mm_unpackhi_pd(r0.lo, r1.lo), _mm_unpackhi_pd(r2.lo, r3.lo)};
-  const v4 c = {_mm_unpacklo_pd(r0.hi, r1.hi), _mm_unpacklo_pd(r2.hi, r3.hi)}, d = {_mm_unpackhi_pd(r0.hi, r1.hi), _mm_unpackhi_pd(r2.hi, r3.hi)};
+  const v4 a = {_mm_unpacklo_pd(r0.lo, r1.lo), _mm_unpacklo_pd(r2.lo, r3.lo)};
+  const v4 b = {_mm_unpackhi_pd(r0.lo, r1.lo), _mm_unpackhi_pd(r2.lo, r3.lo)};
+  const v4 c = {_mm_unpacklo_pd(r0.hi, r1.hi), _mm_unpacklo_pd(r2.hi, r3.hi)};
+  const v4 d = {_mm_unpackhi_pd(r0.hi, r1.hi), _mm_unpackhi_pd(r2.hi, r3.hi)};
   r0 = a, r1 = b, r2 = c, r3 = d;
 }
 
