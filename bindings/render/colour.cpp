@@ -32,10 +32,12 @@ void oklab_to_linear(float lightness, float a, float b, float (&rgb)[3]) {
 // Where a colour leaves the screen's range its chroma is lowered, never its lightness.
 Colour from_lch(float lightness, float chroma, float hue_deg) {
   const float h = hue_deg * 3.14159265f / 180;
-  float rgb[3];
-  for (float c = chroma;; c *= 0.96f) {
+  float rgb[3], low = 0, high = chroma, c = chroma;
+  for (int i = 0; i < 14; ++i) {
     oklab_to_linear(lightness, c * std::cos(h), c * std::sin(h), rgb);
-    if (inside(rgb) || c < 1e-3f) break;
+    (inside(rgb) ? low : high) = c;
+    if (low == chroma) break;
+    c = 0.5f * (low + high);
   }
   return {encode(rgb[0]), encode(rgb[1]), encode(rgb[2])};
 }

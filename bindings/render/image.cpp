@@ -10,6 +10,8 @@
 
 namespace render {
 
+bool Image::operator==(const Image &other) const { return width == other.width && height == other.height && rgb == other.rgb; }
+
 bool write_png(const std::string &path, const Image &picture, std::string *why_not) {
   const auto refuse = [&](const std::string &reason) {
     if (why_not) *why_not = "cannot write " + path + ": " + reason;

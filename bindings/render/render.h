@@ -12,7 +12,7 @@ namespace render {
 struct Image {
   uint32_t width = 0, height = 0;
   std::vector<uint8_t> rgb;  // rows from the top, 3 bytes each pixel
-  bool operator==(const Image &) const = default;
+  bool operator==(const Image &other) const;
 };
 
 struct Bounds {

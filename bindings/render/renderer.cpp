@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cfenv>
+#include <cstdio>
 #include <cstdlib>
 #include <cstring>
 #include <numbers>
@@ -423,15 +424,15 @@ void GlRenderer::upload(const Frame &frame, ColourMap map) {
   gl_.BindVertexArray(array_);
   gl_.BindBuffer(GL_ARRAY_BUFFER, buffer_);
   gl_.BufferData(GL_ARRAY_BUFFER, GLsizeiptr(frame.shape.vertices.size() * sizeof(Vertex)), frame.shape.vertices.data(), GL_STREAM_DRAW);
-  uint8_t table[256][4];
-  for (int i = 0; i < 256; ++i) {
-    const Colour c = map_colour(map, float(i) / 255);
+  uint8_t table[257][4];  // an odd number: a map may have its kink in the middle
+  for (int i = 0; i < 257; ++i) {
+    const Colour c = map_colour(map, float(i) / 256);
     const float rgb[3] = {c.r, c.g, c.b};
     for (int k = 0; k < 3; ++k) table[i][k] = uint8_t(std::lround(255 * rgb[k]));
     table[i][3] = 255;
   }
   gl_.ActiveTexture(GL_TEXTURE2);
-  gl_.TexImage2D(GL_TEXTURE_2D, 0, GL_RGBA8, 256, 1, 0, GL_RGBA, GL_UNSIGNED_BYTE, table);
+  gl_.TexImage2D(GL_TEXTURE_2D, 0, GL_RGBA8, 257, 1, 0, GL_RGBA, GL_UNSIGNED_BYTE, table);
 }
 
 void GlRenderer::draw_shadows(const Frame &frame, const Mat4 &key, const std::array<Mat4, kSkyLights> &sky) {
@@ -488,9 +489,11 @@ void GlRenderer::draw_colours(const Frame &frame, const Mat4 &key, const std::ar
   set("casters_radius", frame.radius);
   double open = 0;
   for (int i = 0; i < kSkyLights; ++i) {
-    const std::string at = "[" + std::to_string(i) + "]";
-    set(("sky_map" + at).c_str(), to_texture(sky[size_t(i)]));
-    set(("sky" + at).c_str(), directions[size_t(i)]);
+    char name[24];
+    std::snprintf(name, sizeof name, "sky_map[%d]", i);
+    set(name, to_texture(sky[size_t(i)]));
+    std::snprintf(name, sizeof name, "sky[%d]", i);
+    set(name, directions[size_t(i)]);
     open += dot(directions[size_t(i)], frame.up);
   }
   set("sky_scale", 1 / open);

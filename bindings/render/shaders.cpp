@@ -12,7 +12,7 @@ in vec2 value;
 uniform mat4 to_clip;
 centroid out vec3 p;
 centroid out vec3 n;
-centroid out vec3 rgb;
+flat out vec3 rgb;
 centroid out vec2 scalar;
 centroid out vec3 corner;
 void main() {
@@ -30,7 +30,7 @@ const char *const kFragmentShader = R"(#version 330 core
 const int SKY = 48;
 centroid in vec3 p;
 centroid in vec3 n;
-centroid in vec3 rgb;
+flat in vec3 rgb;     // one colour a body: interpolation over triangles seen edge-on would round it
 centroid in vec2 scalar;
 centroid in vec3 corner;
 uniform int kind;            // 0 lit, 1 floor, 2 plain colour
@@ -97,8 +97,10 @@ void main() {
   vec3 v = normalize(eye - p), nn = normalize(n);
   if (kind == 2) { result = vec4(rgb, alpha); return; }
   if (!gl_FrontFacing) nn = -nn;  // by winding: at a silhouette the interpolated normal may already look away
-  float valued = scalar.y * (fade > 0.0 ? smoothstep(0.0, fade, scalar.x) : 1.0);
-  vec3 base = linear(mix(rgb, texture(map, vec2(scalar.x * 255.0 / 256.0 + 0.5 / 256.0, 0.5)).rgb, valued));
+  // Corners without a value weigh nothing in it; the flat ends of the step hide what interpolation over slivers rounds.
+  float value = scalar.x / max(scalar.y, 0.01), valued = smoothstep(0.1, 0.9, scalar.y);
+  if (fade > 0.0) valued *= smoothstep(0.0, fade, value);
+  vec3 base = linear(mix(rgb, texture(map, vec2(value * 256.0 / 257.0 + 0.5 / 257.0, 0.5)).rgb, valued));
   float a = alpha, gloss = 0.16;
   if (kind == 1) {
     vec2 x = vec2(dot(p - floor_centre, floor_x), dot(p - floor_centre, floor_y)) / floor_size.x;

@@ -111,8 +111,8 @@ Body &create_body(World &w, const dfm_body_def &def) {
   update_inverse_mass(p);
   place_phyxels(b, def);
 
-  b.edges = unique_edges(m, b.tets.data(), def.ntet);
-  const Array<uint32_t> boundary = boundary_triangles(m, b.tets.data(), def.ntet);
+  b.edges = unique_edges(m, def.ntet, b.tets.data());
+  const Array<uint32_t> boundary = boundary_triangles(m, def.ntet, b.tets.data());
   make_surface(m, p.n, p.rest.data(), boundary.data(), static_cast<uint32_t>(boundary.size() / 3), b.surface);
   gather_surface(b.surface, p.x.data(), p.v.data(), kStride);
   make(b.surfel_impulse, size_t(3) * b.surface.nsurfel);

@@ -13,6 +13,7 @@
 #include "core/error.h"
 #include "integrate/symplectic_euler.h"
 #include "narrow/narrow_phase.h"
+#include "surfel/make_surface.h"
 #include "world/world.h"
 
 namespace dfm {
@@ -156,11 +157,11 @@ void World::stage_motion() {
     }
     for (const HeldMotion &m : b->motions) {
       const Pose first = m.keys.empty() ? Pose{} : to_pose(m.keys.front().pose), now = m.keys.empty() ? Pose{} : pose_at(m.keys, time + h);
-      const Vec3 offset = m.sine.frequency != 0 || m.sine.phase != 0 ? sine_at(m.sine, time + h) * load3(m.sine.amplitude) : Vec3{};
+      const Vec3 shift = m.sine.frequency != 0 || m.sine.phase != 0 ? sine_at(m.sine, time + h) * load3(m.sine.amplitude) : Vec3{};
       for (size_t i = 0; i < m.points.size(); ++i) {
         const size_t at = size_t(m.points[i]) * kStride;
         const Vec3 local = rotate_back(first.rotation, load3(&m.start[3 * i]) - first.position);
-        const Vec3 v = (1 / h) * (place(now, local) + offset - load3(&b->p.x[at]));
+        const Vec3 v = (1 / h) * (place(now, local) + shift - load3(&b->p.x[at]));
         for (int k = 0; k < 3; ++k)
           if (b->p.held[m.points[i]] & (1 << k)) b->p.v[at + size_t(k)] = v[k];
       }

@@ -154,7 +154,9 @@ void World::prepare() {
   }
 
   // Pairs: filters, then laws. The default law is made only when a pair needs it.
-  filter = PairFilter{};
+  const uint64_t filter_version = filter.version;   // rises, so that lists made under older rules are renewed
+  filter = PairFilter(memory());
+  filter.version = filter_version + 1;
   pair_law.assign(size_t(nb) * width, 0);
   for (uint32_t i = 0; i < nb; ++i) {
     const Side a{&bodies[i]->name, &bodies[i]->material};
@@ -167,7 +169,7 @@ void World::prepare() {
                            : (bodies[i]->category & obstacles[j - nb]->def.collides_with) &&
                                  (obstacles[j - nb]->def.category & bodies[i]->collides_with);
       if (const FilterRule *rule = best_rule(filters, a, b)) {
-        if (!is_body || i < j) filter.set(bodies[i]->id, id, rule->collide);
+        if (!is_body || i < j) filter.set(bodies[i]->id, id, !is_body, rule->collide);
         touch = rule->collide;
       }
       if (!touch) continue;

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "broad/broad_phase.h"
+#include "contact/solver.h"
 #include "contact/store.h"
 #include "deform/deform.h"
 #include "distribute/distribute.h"
@@ -14,6 +15,7 @@
 #include "phyxel/phyxels.h"
 #include "plan/plan.h"
 #include "plugin/context.h"
+#include "plugin/params.h"
 #include "surfel/views.h"
 #include "world/motion.h"
 

@@ -1,0 +1,238 @@
+#include "deform/body.h"
+
+#include <cmath>
+
+#include "api/objects.h"
+#include "world/create.h"
+#include "world/measure.h"
+#include "world/queries.h"
+
+using namespace dfm;
+
+namespace {
+
+void check_points(const Body &b, uint32_t n, const uint32_t *points) {
+  if (n) need(points, "points");
+  for (uint32_t i = 0; i < n; ++i)
+    if (points[i] >= b.p.n) fail(DFM_E_ARG, "body '%s': point %u does not exist; it has %u points", b.name.c_str(), points[i], b.p.n);
+}
+
+// The held components keep what holds them: their velocity is that of the hold, zero unless a motion moves them.
+void stop_held(Body &b) {
+  for (uint32_t i = 0; i < b.p.n; ++i)
+    for (int k = 0; k < 3; ++k)
+      if (b.p.held[i] & (1 << k)) b.p.v[size_t(i) * kStride + size_t(k)] = 0;
+}
+
+// Lasting loads that do not vary are summed once; varying ones are summed anew by the motion stage.
+void sum_loads(Body &b) {
+  std::fill(b.p.load.begin(), b.p.load.end(), 0.0);
+  for (const Load &load : b.loads)
+    for (size_t i = 0; i < load.points.size(); ++i) {
+      double *const f = &b.p.load[size_t(load.points[i]) * kStride];
+      store3(f, load3(f) + load3(&load.force[3 * i]));
+    }
+  b.world->changed = true;
+}
+
+}  // namespace
+
+dfm_body_def dfm_body_def_default(void) {
+  dfm_body_def d{};
+  d.size = sizeof d;
+  d.category = 1, d.collides_with = ~0u;
+  return d;
+}
+
+dfm_status dfm_body_create(dfm_world world, const dfm_body_def *def, dfm_body *out) {
+  return guard([&] {
+    World &w = idle(world_of(world));
+    need(out, "out");
+    *out = create_body(w, take_def(def, dfm_body_def_default())).handle;
+  });
+}
+
+dfm_status dfm_body_destroy(dfm_body body) {
+  return guard([&] {
+    Body &b = body_of(body);
+    idle(*b.world);
+    destroy_body(b);
+  });
+}
+
+dfm_status dfm_body_get_info(dfm_body body, dfm_body_info *out) {
+  return guard([&] {
+    const Body &b = body_of(body);
+    dfm_body_info i{};
+    i.npoint = b.p.n, i.ntet = static_cast<uint32_t>(b.tets.size() / 4);
+    i.nsurfel = b.surface.nsurfel, i.ntriangle = b.surface.ntri, i.nedge = static_cast<uint32_t>(b.edges.size() / 2);
+    i.world = b.world->handle, i.name = b.name.c_str(), i.model = b.model.type->id;
+    i.mass = b.mass, i.rest_volume = b.rest_volume, i.user = b.user;
+    give(out, i);
+  });
+}
+
+dfm_status dfm_body_set_user(dfm_body body, void *user) {
+  return guard([&] { body_of(body).user = user; });
+}
+
+dfm_status dfm_body_set_filter(dfm_body body, uint32_t category, uint32_t collides_with) {
+  return guard([&] {
+    Body &b = body_of(body);
+    idle(*b.world);
+    b.category = category, b.collides_with = collides_with;
+    b.world->changed = true;
+  });
+}
+
+dfm_status dfm_body_get_state(dfm_body body, uint32_t capacity, double *x, double *v, uint32_t *n) {
+  return guard([&] {
+    const Body &b = body_of(body);
+    if (!room(b.p.n, capacity, x ? x : v, n)) return;
+    for (uint32_t i = 0; i < b.p.n; ++i) {
+      if (x) store3(x + size_t(3) * i, load3(&b.p.x[size_t(i) * kStride]));
+      if (v) store3(v + size_t(3) * i, load3(&b.p.v[size_t(i) * kStride]));
+    }
+  });
+}
+
+dfm_status dfm_body_set_state(dfm_body body, uint32_t n, const double *x, const double *v) {
+  return guard([&] {
+    Body &b = body_of(body);
+    idle(*b.world);
+    if (n != b.p.n) fail(DFM_E_ARG, "body '%s' has %u points, %u were given", b.name.c_str(), b.p.n, n);
+    for (size_t i = 0; i < size_t(3) * n; ++i)
+      if ((x && !std::isfinite(x[i])) || (v && !std::isfinite(v[i])))
+        fail(DFM_E_ARG, "body '%s': the state of point %zu is not finite; nothing was changed", b.name.c_str(), i / 3);
+    for (uint32_t i = 0; i < n; ++i)
+      for (int k = 0; k < 3; ++k) {
+        if (b.p.held[i] & (1 << k)) continue;
+        if (x) b.p.x[size_t(i) * kStride + size_t(k)] = x[size_t(3) * i + size_t(k)];
+        if (v) b.p.v[size_t(i) * kStride + size_t(k)] = v[size_t(3) * i + size_t(k)];
+      }
+    b.world->bound_due = true;
+  });
+}
+
+dfm_status dfm_body_get_rest(dfm_body body, uint32_t capacity_points, double *x, uint32_t capacity_tets, uint32_t *tets) {
+  return guard([&] {
+    const Body &b = body_of(body);
+    if (x && room(b.p.n, capacity_points, x, nullptr)) std::copy(b.p.rest.begin(), b.p.rest.end(), x);
+    if (tets && room(static_cast<uint32_t>(b.tets.size() / 4), capacity_tets, tets, nullptr)) std::copy(b.tets.begin(), b.tets.end(), tets);
+  });
+}
+
+dfm_status dfm_body_hold(dfm_body body, uint32_t n, const uint32_t *points, uint8_t axes) {
+  return guard([&] {
+    Body &b = body_of(body);
+    idle(*b.world);
+    check_points(b, n, points);
+    if (axes > 7) fail(DFM_E_ARG, "axes is %u; it is a sum of 1 (x), 2 (y) and 4 (z)", unsigned(axes));
+    for (uint32_t i = 0; i < n; ++i) b.p.held[points[i]] = axes;
+    update_inverse_mass(b.p);
+    stop_held(b);
+    b.world->bound_due = true;
+  });
+}
+
+dfm_status dfm_body_move_held(dfm_body body, uint32_t n, const uint32_t *points, uint32_t nkey, const dfm_pose_key *keys, const dfm_sine *sine) {
+  return guard([&] {
+    Body &b = body_of(body);
+    idle(*b.world);
+    check_points(b, n, points);
+    if (nkey == 0 && !sine) fail(DFM_E_ARG, "body '%s': a motion needs keys or a sine", b.name.c_str());
+    HeldMotion m;
+    m.points.assign(points, points + n);
+    if (nkey) m.keys.assign(keys, keys + nkey);
+    check_keys(m.keys, b.name.c_str());
+    if (sine) m.sine = *sine;
+    for (uint32_t i = 0; i < n; ++i) {
+      if (!b.p.held[points[i]]) fail(DFM_E_ARG, "body '%s': point %u is not held; call dfm_body_hold first", b.name.c_str(), points[i]);
+      for (int k = 0; k < 3; ++k) m.start.push_back(b.p.x[size_t(points[i]) * kStride + size_t(k)]);
+    }
+    b.motions.push_back(std::move(m));
+    b.world->changed = true;
+  });
+}
+
+dfm_status dfm_body_add_load(dfm_body body, uint32_t n, const uint32_t *points, const double *force, uint32_t nkey, const dfm_scale_key *keys,
+                             const dfm_sine *sine, uint32_t *load) {
+  return guard([&] {
+    Body &b = body_of(body);
+    idle(*b.world);
+    check_points(b, n, points);
+    if (n) need(force, "force");
+    Load l{};
+    l.number = b.next_load;
+    l.points.assign(points, points + n), l.force.assign(force, force + size_t(3) * n);
+    for (double f : l.force)
+      if (!std::isfinite(f)) fail(DFM_E_ARG, "body '%s': a load is not finite", b.name.c_str());
+    if (nkey) l.keys.assign(keys, keys + nkey);
+    check_keys(l.keys, b.name.c_str());
+    if (sine) l.sine = *sine;
+    b.loads.push_back(std::move(l));
+    ++b.next_load;
+    if (load) *load = b.loads.back().number;
+    sum_loads(b);
+  });
+}
+
+dfm_status dfm_body_remove_load(dfm_body body, uint32_t load) {
+  return guard([&] {
+    Body &b = body_of(body);
+    idle(*b.world);
+    if (std::erase_if(b.loads, [&](const Load &l) { return l.number == load; }) == 0)
+      fail(DFM_E_ARG, "body '%s' has no load %u", b.name.c_str(), load);
+    sum_loads(b);
+  });
+}
+
+dfm_status dfm_body_apply_impulse(dfm_body body, const double point[3], const double impulse[3]) {
+  return guard([&] {
+    Body &b = body_of(body);
+    idle(*b.world);
+    need(point, "point"), need(impulse, "impulse");
+    for (int k = 0; k < 3; ++k)
+      if (!std::isfinite(point[k]) || !std::isfinite(impulse[k])) fail(DFM_E_ARG, "body '%s': point and impulse must be finite", b.name.c_str());
+    double best = INFINITY, weight[3] = {1, 0, 0};
+    uint32_t triangle = 0;
+    for (uint32_t t = 0; t < b.surface.ntri; ++t) {
+      const uint32_t *const c = &b.surface.tri[size_t(3) * t];
+      double w[3];
+      const Vec3 q = closest_on_triangle(load3(point), surfel_vector(b, b.p.x, c[0]), surfel_vector(b, b.p.x, c[1]), surfel_vector(b, b.p.x, c[2]), w);
+      const double d = norm2(q - load3(point));
+      if (d < best) best = d, triangle = t, std::copy(w, w + 3, weight);
+    }
+    auto push = [&](uint32_t phyxel, double share) {
+      for (int k = 0; k < 3; ++k)
+        b.p.v[size_t(phyxel) * kStride + size_t(k)] += share * b.p.inv_mass[size_t(phyxel) * kStride + size_t(k)] * impulse[k];
+    };
+    for (int k = 0; k < 3; ++k) {
+      const uint32_t s = b.surface.tri[size_t(3) * triangle + size_t(k)];
+      if (b.surface.identity()) push(b.surface.point[s], weight[k]);
+      else
+        for (uint32_t j = b.surface.row[s]; j < b.surface.row[s + 1]; ++j) push(b.surface.col[j], weight[k] * b.surface.weight[j]);
+    }
+  });
+}
+
+dfm_status dfm_body_set_params(dfm_body body, const dfm_params *params) {
+  return guard([&] {
+    Body &b = body_of(body);
+    idle(*b.world);
+    need(params, "params");
+    set_model_params(b, *params);
+  });
+}
+
+dfm_status dfm_body_get_measure(dfm_body body, dfm_body_measure *out) {
+  return guard([&] { give(out, measure(body_of(body))); });
+}
+
+dfm_status dfm_body_energy_density(dfm_body body, uint32_t capacity, double *out) {
+  return guard([&] {
+    Body &b = body_of(body);
+    if (!room(static_cast<uint32_t>(b.tets.size() / 4), capacity, out, nullptr)) return;
+    energy_density(b, out);
+  });
+}

@@ -1,0 +1,164 @@
+#include "deform/contact.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "api/objects.h"
+#include "world/measure.h"
+
+using namespace dfm;
+
+namespace {
+
+// A side of a rule: "*", a body or obstacle, or "material=NAME".
+std::string side(World &w, const char *text) {
+  need(text, "between");
+  const std::string s = text;
+  if (s == "*" || w.find_body(s) || w.find_obstacle(s)) return s;
+  std::vector<std::string> names{"*"};
+  for (auto &b : w.bodies) names.push_back(b->name);
+  for (auto &o : w.obstacles) names.push_back(o->name);
+  for (auto &m : w.materials) {
+    if (m->name.empty()) continue;
+    names.push_back("material=" + m->name);
+    if (names.back() == s) return s;
+  }
+  const size_t colon = s.find(':');
+  if (colon != std::string::npos && w.find_body(s.substr(0, colon)))
+    fail(DFM_E_UNSUPPORTED, "'%s': friction by surface group is not available yet; name the whole body", text);
+  const std::string near = nearest(s, names);
+  fail(DFM_E_ARG, "'%s' is no body, obstacle or material of this world%s; known: %s", text,
+       near.empty() ? "" : (", did you mean '" + near + "'?").c_str(), join(names).c_str());
+}
+
+// Is anything carried between a and b? Contacts that only stand by are not reported.
+bool touching(const World &w, uint32_t i) { return w.store.touching[i]; }
+
+struct Sides { uint64_t a, b; };
+Sides sides(const World &w, const ContactPoint &c) {
+  return {w.bodies[c.slot_a]->handle, c.obstacle ? w.obstacles[c.slot_b]->handle : w.bodies[c.slot_b]->handle};
+}
+
+dfm_contact report(const World &w, uint32_t i) {
+  const ContactPoint &c = w.report.contacts[i];
+  const double h = w.report.h, *const f = &w.report.frame[size_t(9) * i], *const l = &w.report.impulse[size_t(3) * i];
+  dfm_contact out{};
+  out.size = sizeof out;
+  out.flags = (l[0] > 0 && w.report.mode[i] == 1 ? DFM_CONTACT_STICKING : 0) | (w.store.began[i] ? DFM_CONTACT_BEGAN : 0);
+  const Sides s = sides(w, c);
+  out.body_a = s.a, out.body_b = c.obstacle ? 0 : s.b, out.key = c.key;
+  out.feature_a = c.feature_a, out.feature_b = c.obstacle ? c.slot_b : c.feature_b;
+  out.kind = c.obstacle ? 2 : c.kind, out.law = w.store.law[i];
+  std::copy(c.point, c.point + 3, out.point), std::copy(f, f + 3, out.normal), std::copy(f + 3, f + 6, out.tangent);
+  out.gap = c.distance - w.offset, out.area = c.area, out.fn = l[0] / h;
+  for (int k = 0; k < 2; ++k) out.ft[k] = l[1 + k] / h, out.slip[k] = w.report.slip[size_t(2) * i + size_t(k)];
+  for (uint32_t k = 0; k < 2 && k < w.store.nstate; ++k) out.bristle[k] = w.store.bristle[size_t(w.store.nstate) * i + k];
+  return out;
+}
+
+}  // namespace
+
+dfm_status dfm_world_add_friction(dfm_world world, const dfm_friction_def *def) {
+  return guard([&] {
+    World &w = idle(world_of(world));
+    need(def, "def"), need(def->law, "law");
+    FrictionRule rule{{side(w, def->between[0]), side(w, def->between[1])}, 0};
+    rule.law = w.add_law(def->law, {def->params.values, def->params.values ? def->params.n : 0});
+    w.friction.push_back(rule);
+    w.changed = true;
+  });
+}
+
+dfm_status dfm_world_filter_pair(dfm_world world, const char *a, const char *b, bool collide) {
+  return guard([&] {
+    World &w = idle(world_of(world));
+    w.filters.push_back({{side(w, a), side(w, b)}, collide});
+    w.changed = true;
+  });
+}
+
+dfm_status dfm_world_contacts(dfm_world world, uint32_t capacity, dfm_contact *out, uint32_t *n) {
+  return guard([&] {
+    const World &w = world_of(world);
+    uint32_t count = 0;
+    for (uint32_t i = 0; i < w.report.n; ++i) count += touching(w, i);
+    if (!room(count, capacity, out, n)) return;
+    uint32_t k = 0;
+    for (uint32_t i = 0; i < w.report.n; ++i)
+      if (touching(w, i)) out[k++] = report(w, i);
+  });
+}
+
+dfm_status dfm_world_pairs(dfm_world world, uint32_t capacity, dfm_pair_report *out, uint32_t *n) {
+  return guard([&] {
+    World &w = world_of(world);
+    std::vector<dfm_pair_report> pairs;
+    std::vector<Vec3> com(w.bodies.size());
+    std::vector<uint8_t> known(w.bodies.size());
+    for (uint32_t i = 0; i < w.report.n; ++i) {
+      if (!touching(w, i)) continue;
+      const ContactPoint &c = w.report.contacts[i];
+      const uint64_t ia = w.store.id_a[i], ib = w.store.id_b[i];
+      // vertex-face contacts of a pair come from both sides; the report's a is the body with the lower id
+      const bool turned = !c.obstacle && ib < ia;
+      Sides s = sides(w, c);
+      if (turned) std::swap(s.a, s.b);
+      auto it = std::find_if(pairs.begin(), pairs.end(), [&](const dfm_pair_report &p) { return p.a == s.a && p.b == s.b; });
+      if (it == pairs.end()) {
+        dfm_pair_report p{};
+        p.size = sizeof p, p.a = s.a, p.b = s.b, p.law = w.store.law[i];
+        for (const PairWork &work : w.work)
+          if ((work.a == ia && work.b == ib) || (work.a == ib && work.b == ia)) p.friction_work += work.work;
+        it = pairs.insert(pairs.end(), p);
+      }
+      const uint32_t body = turned ? c.slot_b : c.slot_a;
+      if (!known[body]) com[body] = load3(measure(*w.bodies[body]).com), known[body] = 1;
+      const double *const f = &w.report.frame[size_t(9) * i], *const l = &w.report.impulse[size_t(3) * i];
+      const double scale = (turned ? -1 : 1) / w.report.h;
+      const Vec3 friction = scale * (l[1] * load3(f + 3) + l[2] * load3(f + 6)), force = scale * l[0] * load3(f) + friction;
+      ++it->count, it->sticking += l[0] > 0 && w.report.mode[i] == 1;
+      it->normal += l[0] / w.report.h;
+      store3(it->force, load3(it->force) + force), store3(it->friction, load3(it->friction) + friction);
+      store3(it->moment, load3(it->moment) + cross(load3(c.point) - com[body], force));
+      const double *const slip = &w.report.slip[size_t(2) * i];
+      if (l[0] > 0) it->slip_max = std::max(it->slip_max, std::sqrt(slip[0] * slip[0] + slip[1] * slip[1]));
+    }
+    if (!room(static_cast<uint32_t>(pairs.size()), capacity, out, n)) return;
+    std::copy(pairs.begin(), pairs.end(), out);
+  });
+}
+
+dfm_status dfm_world_events(dfm_world world, uint32_t capacity, dfm_contact_event *out, uint32_t *n) {
+  return guard([&] {
+    World &w = idle(world_of(world));
+    if (!room(static_cast<uint32_t>(w.events.size()), capacity, out, n)) return;
+    std::copy(w.events.begin(), w.events.end(), out);
+    w.events.clear();
+  });
+}
+
+dfm_status dfm_world_hold_begin(dfm_world world) {
+  return guard([&] {
+    World &w = idle(world_of(world));
+    w.holding = true, w.hold_start = w.time;
+    std::fill(w.store.held.begin(), w.store.held.end(), uint8_t(0));
+    std::fill(w.store.path.begin(), w.store.path.end(), 0.0);
+  });
+}
+
+dfm_status dfm_world_hold(dfm_world world, double *creep, uint32_t *count) {
+  return guard([&] {
+    const World &w = world_of(world);
+    need(creep, "creep");
+    double longest = 0;
+    uint32_t n = 0;
+    for (uint32_t i = 0; i < w.store.n; ++i) {
+      if (!w.store.held[i]) continue;
+      ++n;
+      const double *const p = &w.store.path[size_t(2) * i];
+      longest = std::max(longest, std::sqrt(p[0] * p[0] + p[1] * p[1]));
+    }
+    *creep = w.holding && n && w.time > w.hold_start ? longest / (w.time - w.hold_start) : NAN;
+    if (count) *count = n;
+  });
+}

@@ -1,0 +1,214 @@
+#include "deform/world.h"
+
+#include <cmath>
+
+#include "api/objects.h"
+#include "world/explain.h"
+
+using namespace dfm;
+
+namespace {
+
+void destroy_world(uint64_t handle) {
+  World *const w = static_cast<World *>(handle_find(Kind::world, handle));
+  if (!w) return;
+  for (auto &b : w->bodies) handle_destroy(b->handle);
+  for (auto &o : w->obstacles) handle_destroy(o->handle);
+  for (auto &m : w->materials) handle_destroy(m->handle);
+  handle_destroy(handle);
+  delete w;
+}
+
+// A text or buffer that the caller sizes first.
+void give_bytes(const void *data, size_t size, void *to, size_t *bytes) {
+  need(bytes, "bytes");
+  const size_t room = *bytes;
+  *bytes = size;
+  if (!to) return;
+  if (room < size) fail(DFM_E_ARG, "the buffer has %zu bytes, %zu are needed; call with NULL to learn the size", room, size);
+  std::memcpy(to, data, size);
+}
+
+}  // namespace
+
+dfm_world_def dfm_world_def_default(void) {
+  dfm_world_def d{};
+  d.size = sizeof d;
+  d.gravity[2] = -9.81;
+  d.max_sweeps = 50, d.max_passes = 20, d.max_substeps = 10000;
+  return d;
+}
+
+dfm_status dfm_world_create(dfm_context *context, const dfm_world_def *def, dfm_world *out) {
+  return guard([&] {
+    need(context, "context"), need(out, "out");
+    auto w = std::make_unique<World>(context);
+    w->def = take_def(def, dfm_world_def_default());
+    for (double g : w->def.gravity)
+      if (!std::isfinite(g)) fail(DFM_E_ARG, "gravity is not finite; give m/s2");
+    if (!(w->def.contact_offset >= 0) || !(w->def.contact_tolerance >= 0))
+      fail(DFM_E_ARG, "contact_offset (m) and contact_tolerance (m/s) must be zero (automatic) or positive");
+    if (w->def.max_sweeps == 0 || w->def.max_passes == 0 || w->def.max_substeps == 0)
+      fail(DFM_E_ARG, "max_sweeps, max_passes and max_substeps must be at least 1");
+    if (w->def.method != DFM_METHOD_AUTO && w->def.method != DFM_METHOD_VELOCITY) fail(DFM_E_UNSUPPORTED, "contact method %d is not available; use DFM_METHOD_AUTO or DFM_METHOD_VELOCITY", w->def.method);
+    if (w->def.integrator != DFM_INTEGRATOR_AUTO && w->def.integrator != DFM_INTEGRATOR_SYMPLECTIC_EULER)
+      fail(DFM_E_UNSUPPORTED, "integrator %d is not available; use DFM_INTEGRATOR_AUTO or DFM_INTEGRATOR_SYMPLECTIC_EULER", w->def.integrator);
+    for (const char *const *e = w->def.effects; e && *e; ++e) w->asked_effects.push_back(*e);
+    w->prepare();
+    w->changed = true;
+    w->handle = handle_create(Kind::world, w.get());
+    context->add_live(w->handle, destroy_world);
+    *out = w.release()->handle;
+  });
+}
+
+dfm_status dfm_world_destroy(dfm_world world) {
+  return guard([&] {
+    World &w = idle(world_of(world));
+    w.context->remove_live(world);
+    destroy_world(world);
+  });
+}
+
+dfm_status dfm_world_set_gravity(dfm_world world, const double gravity[3]) {
+  return guard([&] {
+    World &w = idle(world_of(world));
+    need(gravity, "gravity");
+    for (int k = 0; k < 3; ++k)
+      if (!std::isfinite(gravity[k])) fail(DFM_E_ARG, "gravity is not finite; give m/s2");
+    store3(w.def.gravity, load3(gravity));
+    w.gravity_keys.clear();
+    w.changed = true;
+  });
+}
+
+dfm_status dfm_world_set_gravity_keys(dfm_world world, uint32_t n, const dfm_vector_key *keys) {
+  return guard([&] {
+    World &w = idle(world_of(world));
+    if (n) need(keys, "keys");
+    std::vector<dfm_vector_key> copy(keys, keys + n);
+    check_keys(copy, "gravity");
+    w.gravity_keys = std::move(copy);
+    w.changed = true;
+  });
+}
+
+dfm_status dfm_world_step(dfm_world world, double dt, uint32_t *trouble) {
+  return guard([&]() -> dfm_status {
+    World &w = idle(world_of(world));
+    if (!(dt > 0 && std::isfinite(dt))) fail(DFM_E_ARG, "a step of %g s; it must be positive and finite", dt);
+    uint32_t bits = 0;
+    struct Stepping {
+      World &w;
+      explicit Stepping(World &x) : w(x) { w.stepping = true; }
+      ~Stepping() { w.stepping = false; }
+    } stepping(w);
+    const dfm_status s = w.step(dt, &bits);
+    if (trouble) *trouble = bits;
+    return s;
+  });
+}
+
+dfm_status dfm_world_stable_step(dfm_world world, double *dt, dfm_body *body, uint32_t *point) {
+  return guard([&] {
+    World &w = idle(world_of(world));
+    need(dt, "dt");
+    w.prepare();
+    // The value the next step uses: asked anew only when it would ask, so that reading it changes no result.
+    if (w.bound_due) w.update_bound(), w.bound_due = false;
+    *dt = w.stable;
+    if (body) *body = w.worst_body ? w.worst_body->handle : 0;
+    if (point) *point = w.worst_point;
+  });
+}
+
+double dfm_world_time(dfm_world world) {
+  const World *const w = static_cast<World *>(handle_find(Kind::world, world));
+  return w ? w->time : NAN;
+}
+
+uint64_t dfm_world_hash(dfm_world world) {
+  const World *const w = static_cast<World *>(handle_find(Kind::world, world));
+  return w ? world_hash(*w) : 0;
+}
+
+dfm_status dfm_world_snapshot(dfm_world world, void *buffer, size_t *bytes) {
+  return guard([&] {
+    World &w = idle(world_of(world));
+    w.prepare();
+    std::vector<unsigned char> data;
+    world_snapshot(w, data);
+    give_bytes(data.data(), data.size(), buffer, bytes);
+  });
+}
+
+dfm_status dfm_world_restore(dfm_world world, const void *buffer, size_t bytes) {
+  return guard([&] {
+    World &w = idle(world_of(world));
+    need(buffer, "buffer");
+    world_restore(w, buffer, bytes);
+  });
+}
+
+dfm_status dfm_world_find_body(dfm_world world, const char *name, dfm_body *out) {
+  return guard([&] {
+    World &w = world_of(world);
+    need(name, "name"), need(out, "out");
+    const Body *const b = w.find_body(name);
+    if (!b) {
+      std::vector<std::string> names;
+      for (auto &x : w.bodies) names.push_back(x->name);
+      const std::string near = nearest(name, names);
+      fail(DFM_E_ARG, "no body is named '%s'%s; bodies: %s", name, near.empty() ? "" : (", did you mean '" + near + "'?").c_str(), join(names).c_str());
+    }
+    *out = b->handle;
+  });
+}
+
+dfm_status dfm_world_bodies(dfm_world world, uint32_t capacity, dfm_body *bodies, uint32_t *n) {
+  return guard([&] {
+    World &w = world_of(world);
+    if (!room(static_cast<uint32_t>(w.bodies.size()), capacity, bodies, n)) return;
+    for (size_t i = 0; i < w.bodies.size(); ++i) bodies[i] = w.bodies[i]->handle;
+  });
+}
+
+dfm_status dfm_world_obstacles(dfm_world world, uint32_t capacity, dfm_obstacle *obstacles, uint32_t *n) {
+  return guard([&] {
+    World &w = world_of(world);
+    if (!room(static_cast<uint32_t>(w.obstacles.size()), capacity, obstacles, n)) return;
+    for (size_t i = 0; i < w.obstacles.size(); ++i) obstacles[i] = w.obstacles[i]->handle;
+  });
+}
+
+dfm_status dfm_world_get_stats(dfm_world world, dfm_world_stats *out) {
+  return guard([&] {
+    World &w = world_of(world);
+    w.stats.rebuilds = w.broad.stats().rebuilds, w.stats.refits = w.broad.stats().refits;
+    w.stats.threads = w.context->tasks.threads();
+    w.stats.time = w.time;
+    give(out, w.stats);
+  });
+}
+
+dfm_status dfm_world_profile(dfm_world world, uint32_t capacity, dfm_stage_time *out, uint32_t *n) {
+  return guard([&] {
+    World &w = world_of(world);
+    w.prepare();
+    if (!room(static_cast<uint32_t>(w.plan.stages.size()), capacity, out, n)) return;
+    for (size_t i = 0; i < w.plan.stages.size(); ++i) {
+      const StageId id = w.plan.stages[i].id;
+      out[i] = {stage_name(id), w.stage_seconds[size_t(id)], w.stage_calls[size_t(id)]};
+    }
+  });
+}
+
+dfm_status dfm_world_explain(dfm_world world, char *text, size_t *bytes) {
+  return guard([&] {
+    World &w = idle(world_of(world));
+    w.prepare();
+    if (w.bound_due) w.update_bound();
+    const std::string json = explain(w);
+    give_bytes(json.c_str(), json.size() + 1, text, bytes);
+  });
+}

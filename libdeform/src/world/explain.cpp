@@ -1,0 +1,62 @@
+#include "world/explain.h"
+
+#include <cmath>
+
+#include "core/error.h"
+
+namespace dfm {
+namespace {
+
+std::string quote(const std::string &s) {
+  std::string out = "\"";
+  for (char c : s) {
+    if (c == '"' || c == '\\') out += '\\', out += c;
+    else if (static_cast<unsigned char>(c) < 0x20) out += format("\\u%04x", c);
+    else out += c;
+  }
+  return out + "\"";
+}
+
+// What a stage costs grows with this; counts of the present scene, not seconds.
+std::string cost(const World &w, StageId id) {
+  size_t points = 0, cells = 0, surfels = 0, triangles = 0;
+  for (auto &b : w.bodies) points += b->p.n, cells += b->tets.size() / 4, surfels += b->surface.nsurfel, triangles += b->surface.ntri;
+  switch (id) {
+    case StageId::model: return format("%zu cells", cells);
+    case StageId::predict:
+    case StageId::commit: return format("%zu points", points);
+    case StageId::broad: return format("%zu surfels every sub-step; %zu triangles whenever a skin is used up", surfels, triangles);
+    case StageId::narrow: return "candidate pairs";
+    case StageId::solve: return "contacts x sweeps, laws once per pass";
+    case StageId::distribute: return format("contacts and %zu surfels", surfels);
+    default: return "what is prescribed";
+  }
+}
+
+}  // namespace
+
+std::string explain(const World &w) {
+  std::string out = "{\"effects\":[";
+  for (size_t i = 0; i < w.plan.effects.size(); ++i) {
+    const PlannedEffect &e = w.plan.effects[i];
+    out += (i ? "," : "") + ("{\"name\":" + quote(e.name) + ",\"asked_by\":" + quote(e.asked_by) + ",\"provided_by\":" + quote(e.provided_by) + "}");
+  }
+  out += "],\"stages\":[";
+  for (size_t i = 0; i < w.plan.stages.size(); ++i) {
+    const PlannedStage &s = w.plan.stages[i];
+    out += (i ? "," : "") + ("{\"name\":" + quote(stage_name(s.id)) + ",\"why\":" + quote(s.why) + ",\"cost\":" + quote(cost(w, s.id)) + "}");
+  }
+  out += "],\"absent\":[";
+  for (size_t i = 0; i < w.plan.absent.size(); ++i) {
+    const AbsentStage &s = w.plan.absent[i];
+    out += (i ? "," : "") + ("{\"name\":" + quote(s.name) + ",\"why\":" + quote(s.why) + "}");
+  }
+  out += "],\"step\":{\"stable_s\":" + (std::isfinite(w.stable) ? format("%.9g", w.stable) : std::string("null")) +
+         ",\"worst_body\":" + (w.worst_body ? quote(w.worst_body->name) : "null") + ",\"worst_point\":" + std::to_string(w.worst_point) +
+         ",\"contact_offset_m\":" + format("%.9g", w.offset) + ",\"reason\":" +
+         quote(w.worst_body ? "0.9 of the proven bound: the stiffest point for its mass; longer steps are cut into equal sub-steps"
+                            : "nothing bounds the step") + "}}";
+  return out;
+}
+
+}  // namespace dfm

@@ -1,0 +1,81 @@
+#include "world/measure.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+
+#include "core/error.h"
+
+namespace dfm {
+
+dfm_body_measure measure(Body &b) {
+  dfm_body_measure m{};
+  m.mass = b.mass, m.rest_volume = b.rest_volume;
+  const Phyxels &p = b.p;
+  Vec3 com, momentum;
+  double kinetic = 0, fastest = 0;
+  for (uint32_t i = 0; i < p.n; ++i) {
+    const Vec3 x = load3(&p.x[size_t(i) * kStride]), v = load3(&p.v[size_t(i) * kStride]);
+    com += p.mass[i] * x, momentum += p.mass[i] * v;
+    kinetic += 0.5 * p.mass[i] * norm2(v), fastest = std::max(fastest, norm2(v));
+  }
+  com = (1 / b.mass) * com;
+  const Vec3 velocity = (1 / b.mass) * momentum;
+  Vec3 angular;
+  for (uint32_t i = 0; i < p.n; ++i)
+    angular += p.mass[i] * cross(load3(&p.x[size_t(i) * kStride]) - com, load3(&p.v[size_t(i) * kStride]) - velocity);
+  for (size_t t = 0; t < b.tets.size(); t += 4) {
+    const double v = tet_volume(p.x.data(), kStride, &b.tets[t]);
+    m.volume += v, m.inverted += v < 0;
+  }
+  store3(m.com, com), store3(m.velocity, velocity), store3(m.momentum, momentum), store3(m.angular, angular);
+  store3(m.contact_impulse, b.contact_impulse);
+  m.kinetic = kinetic, m.speed_max = std::sqrt(fastest);
+  m.elastic = NAN;
+  if ((b.model.ops->caps & DFM_CAP_ENERGY) && b.model.ops->energy) {
+    double joule = 0;
+    const dfm_kin k = b.kin(b.world->time, 0, nullptr);
+    PluginCall call(b.world->context->scratch);
+    if (b.model.ops->energy(b.model.self, &k, &joule) == DFM_OK) m.elastic = joule;
+  }
+  return m;
+}
+
+void energy_density(Body &b, double *out) {
+  const dfm_cell_energy *const e =
+      b.model.ops->extension ? static_cast<const dfm_cell_energy *>(b.model.ops->extension(b.model.self, DFM_EXT_CELL_ENERGY)) : nullptr;
+  if (!e) fail(DFM_E_UNSUPPORTED, "model '%s' of body '%s' offers no energy per cell", b.model.type->id, b.name.c_str());
+  const dfm_kin k = b.kin(b.world->time, 0, nullptr);
+  PluginCall call(b.world->context->scratch);
+  if (e->cell_energy(b.model.self, &k, out) != DFM_OK) fail(DFM_E_FATAL, "model '%s' could not give its energy per cell", b.model.type->id);
+}
+
+void set_model_params(Body &b, const dfm_params &params) {
+  const dfm_type &type = *b.model.type;
+  std::vector<dfm_param_value> given(params.values, params.values + params.n);
+  // What is not given keeps its present value.
+  std::vector<dfm_param_value> present;
+  size_t at = 0;
+  for (uint32_t i = 0; i < type.nparam; ++i) {
+    const dfm_param &row = type.params[i];
+    present.push_back({row.key, &b.model.params[at], row.width});
+    at += row.width;
+  }
+  std::vector<double> values = pack_params(type, given, [&](const char *key) -> const dfm_param_value * {
+    for (const auto &p : present)
+      if (std::strcmp(p.key, key) == 0) return &p;
+    return nullptr;
+  });
+  at = 0;
+  for (uint32_t i = 0; i < type.nparam; at += type.params[i++].width)
+    if (!(type.params[i].flags & DFM_PARAM_RUNTIME) && !std::equal(&values[at], &values[at] + type.params[i].width, &b.model.params[at]))
+      fail(DFM_E_ARG, "body '%s': parameter '%s' of model '%s' cannot change while it runs", b.name.c_str(), type.params[i].key, type.id);
+  if (!b.model.ops->set_params) fail(DFM_E_UNSUPPORTED, "model '%s' takes no parameters while it runs", type.id);
+  PluginCall call(b.world->context->scratch);
+  if (b.model.ops->set_params(b.model.self, values.data()) != DFM_OK)
+    fail(DFM_E_ARG, "body '%s': model '%s' refuses these parameters; the log says why", b.name.c_str(), type.id);
+  b.model.params = std::move(values);
+  b.world->bound_due = true;
+}
+
+}  // namespace dfm

@@ -1,0 +1,11 @@
+// Sums over a body: momentum, energy, volume; the model's own energy and its runtime parameters.
+#pragma once
+#include "world/world.h"
+
+namespace dfm {
+
+dfm_body_measure measure(Body &b);
+void energy_density(Body &b, double *out);                       // [ntet] J/m3; throws where the model offers none
+void set_model_params(Body &b, const dfm_params &params);        // runtime rows only; throws
+
+}  // namespace dfm
