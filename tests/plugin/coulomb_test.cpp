@@ -1,4 +1,5 @@
 // The laws none and coulomb against their closed forms (friction.md sections 2.1 and 6).
+#include <cstring>
 #include <random>
 
 #include "tiny_support.h"
@@ -247,6 +248,33 @@ TEST_F(Coulomb, EveryLane_IsTheSameAloneAndInAnyBatch) {
     ++modes[all.mode[i]];
   }
   for (int count : modes) EXPECT_GT(count, 20) << "the batch holds every case";
+}
+
+// Every compiler, optimisation level and vector width must give these bits (house rule; the inputs use + - * / alone as well).
+TEST_F(Coulomb, Bits_MatchTheRecordedHash) {
+  uint64_t seed = 88172645463325252ull, hash = 14695981039346656037ull;
+  const auto uniform = [&] {
+    seed ^= seed << 13, seed ^= seed >> 7, seed ^= seed << 17;
+    return static_cast<double>(seed >> 11) * 0x1p-52 - 1;
+  };
+  for (const double delta : {2.0, 1.0, 0.8}) {
+    Batch b(1000, Parameters{0.3, 0.5, 0.01, delta, 0.4}.values());
+    for (uint32_t i = 0; i < b.n; ++i) {
+      b.fn[i] = 1 + uniform(), b.area[i] = 1 + uniform();
+      for (uint32_t k = 0; k < 2; ++k) b.vt[k * b.stride + i] = 0.03 * uniform(), b.stop[k * b.stride + i] = 0.7 * uniform();
+    }
+    ASSERT_EQ(ops->eval(&b.in, &b.out), DFM_OK);
+    const auto add = [&](const double *column, uint32_t width) {
+      for (uint32_t k = 0; k < width; ++k)
+        for (uint32_t i = 0; i < b.n; ++i) {
+          unsigned char bytes[sizeof(double)];
+          std::memcpy(bytes, &column[k * b.stride + i], sizeof bytes);
+          for (unsigned char byte : bytes) hash = (hash ^ byte) * 1099511628211ull;
+        }
+    };
+    add(b.ft, 2), add(b.limit, 1), add(b.dv, 4), add(b.dn, 2);
+  }
+  EXPECT_EQ(hash, 3992741526289013015ull);
 }
 
 TEST_F(Coulomb, OutputsThatAreNotWanted_AreLeftOut) {
