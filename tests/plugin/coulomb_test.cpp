@@ -338,6 +338,22 @@ TEST_F(Coulomb, ThrownBlock_StopsWhereTheEnergyIsSpent) {
   EXPECT_NEAR(rig.x, 2 * 2 / (2 * 0.5 * 9.81), 2 * h);
 }
 
+// A mass pulled through a spring at constant speed: the closed form of the stick-slip cycle between two levels.
+TEST_F(Coulomb, StickSlipPeriod_MatchesTheClosedForm) {
+  const double k = 2, pull = 0.1, fc = 1, fs = 1.5, w = std::sqrt(k), df = fs - fc, h = 1e-4;
+  const double expected = 2 / w * (kPi - std::atan(df * w / (k * pull))) + 2 * df / (k * pull);  // 7.6113 s
+  const Parameters levels{fc, fs, 1e-9, 2, 0};
+  Rig rig;
+  std::vector<double> starts;
+  for (int i = 0; i < 320000; ++i) {
+    const bool stuck = rig.v == 0;
+    rig.step(*ops, levels, h, k * (pull * i * h - rig.x), 1);
+    if (stuck && rig.v != 0) starts.push_back(i * h);
+  }
+  ASSERT_GE(starts.size(), 4u);
+  EXPECT_NEAR(starts[3] - starts[2], expected, 2e-3 * expected);
+}
+
 TEST_F(Coulomb, None_IsZeroEverywhere) {
   Batch b(9);
   for (uint32_t i = 0; i < b.n; ++i) b.fn[i] = i, b.vt[i] = 1, b.stop[i] = -5, b.ft[i] = 7, b.limit[i] = 7;

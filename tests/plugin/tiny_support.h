@@ -18,9 +18,16 @@ namespace tiny {
 
 inline std::string plugin(const std::string &name) { return std::string(DEFORM_BINARY_DIR) + "/lib/tiny/" + name + ".so"; }
 
-// An empty folder of this test's own (several programs of the suite run at once).
+// An empty folder of this process (several programs of the suite run at once); gone when it ends.
 inline std::string folder(const std::string &name) {
-  const std::string dir = test::scratch("plugin") + "/" + std::to_string(getpid()) + "_" + name;
+  static const struct Base {
+    std::string path = test::scratch("plugin/" + std::to_string(getpid()));
+    ~Base() {
+      std::error_code ignored;
+      std::filesystem::remove_all(path, ignored);
+    }
+  } base;
+  const std::string dir = base.path + "/" + name;
   std::filesystem::remove_all(dir);
   std::filesystem::create_directories(dir);
   return dir;
