@@ -2,6 +2,7 @@
 #include <csignal>
 #include <ctime>
 
+#include <algorithm>
 #include <chrono>
 #include <cmath>
 #include <cstdio>
@@ -82,6 +83,19 @@ class Runner {
   const RunResult &result() const { return result_; }
   const Checks &checks() const { return checker_.result(); }
 
+  // Sentences that the summary must hold whether or not anybody reads the terminal.
+  std::vector<std::string> remarks() const {
+    std::vector<std::string> out;
+    if (held_nothing_ || !result_.hold_begun) out.push_back("hold.creep_max_um_per_s is null: no pair sticks throughout the last half of the run");
+    const dfm_world_stats stats = world_stats(scene_);
+    if (trouble_ & DFM_TROUBLE_SUBSTEPS)
+      out.push_back("steps were cut into up to " + std::to_string(stats.substeps_max) + " sub-steps: the step is longer than the stable one; deform explain says why");
+    if (stats.unconverged > 0) out.push_back("the contact solve met its cap in " + std::to_string(stats.unconverged) + " sub-steps");
+    if (trouble_ & DFM_TROUBLE_INVERTED) out.push_back("cells turned inside out: refine the mesh or soften the load");
+    if (checks().intersections_max > 0) out.push_back("surfaces cross: up to " + std::to_string(checks().intersections_max) + " triangle pairs in one state");
+    return out;
+  }
+
  private:
   struct Mark { double wall, cpu; };
 
@@ -105,7 +119,7 @@ class Runner {
       // Rather two halves at the end than one step and a sliver.
       if (left < 2 * step && left > step) step = left / 2;
     }
-    if (left <= 1e-6 * step) return false;
+    if (left <= 1e-6 * std::min(step, duration_)) return false;
     if (left < step * (1 + 1e-6) && (automatic || left < step * (1 - 1e-6))) step = left;
     const double begin = wall_seconds();
     uint32_t trouble = 0;
@@ -151,7 +165,9 @@ class Runner {
       if (frame_due) frames_->draw(t);
       mark_ = {wall_seconds(), cpu_seconds()};
     }
-    if (result_.steps % 16 == 0) progress_.show(t - result_.start, duration_, result_.steps ? double(result_.steps) / (result_.wall + wall_seconds() - mark_.wall) : 0);
+    if (result_.steps % 16 != 0) return;
+    const double spent = result_.wall + wall_seconds() - mark_.wall;
+    progress_.show(t - result_.start, duration_, result_.steps && spent > 0 ? double(result_.steps) / spent : 0);
   }
 
   void count_time() {
@@ -167,21 +183,6 @@ class Runner {
     }
   }
 
- public:
-  // Sentences that the summary must hold whether or not anybody reads the terminal.
-  std::vector<std::string> remarks() const {
-    std::vector<std::string> out;
-    if (held_nothing_ || !result_.hold_begun) out.push_back("hold.creep_max_um_per_s is null: no pair sticks throughout the last half of the run");
-    const dfm_world_stats stats = world_stats(scene_);
-    if (trouble_ & DFM_TROUBLE_SUBSTEPS)
-      out.push_back("steps were cut into up to " + std::to_string(stats.substeps_max) + " sub-steps: the step is longer than the stable one; deform explain says why");
-    if (stats.unconverged > 0) out.push_back("the contact solve met its cap in " + std::to_string(stats.unconverged) + " sub-steps");
-    if (trouble_ & DFM_TROUBLE_INVERTED) out.push_back("cells turned inside out: refine the mesh or soften the load");
-    if (checks().intersections_max > 0) out.push_back("surfaces cross: up to " + std::to_string(checks().intersections_max) + " triangle pairs in one state");
-    return out;
-  }
-
- private:
   const SceneFile &scene_;
   const RunOptions &options_;
   dfm_world world_;

@@ -59,8 +59,8 @@ TEST(Explain, Json_IsOneObject) {
 
 TEST(Explain, Set_ChangesThePlan) {
   const std::string path = scene("set", kOneBody);
-  const test::CommandResult still = test::deform({"explain", path}),
-                            moving = test::deform({"explain", path, "--set", R"(/gravity={"keyframes":[{"t":0,"value":[0,0,0]},{"t":1,"value":[0,0,-9.81]}]})"});
+  const char *varying = R"(/gravity={"keyframes":[{"t":0,"value":[0,0,0]},{"t":1,"value":[0,0,-9.81]}]})";
+  const test::CommandResult still = test::deform({"explain", path}), moving = test::deform({"explain", path, "--set", varying});
   EXPECT_EQ(running(still.out).find("motion"), std::string::npos) << still.out;
   EXPECT_NE(running(moving.out).find("motion"), std::string::npos) << moving.out;
 }

@@ -188,6 +188,9 @@ TEST(Run, LastStep_LandsOnTheEnd) {
   const Outcome r = run("end", {"--time", "0.00125", "--quiet"});
   EXPECT_EQ(value(r.summary, "steps"), "3");
   EXPECT_NEAR(std::stod(value(r.summary, "simulated_s")), 0.00125, 1e-15);
+  const Outcome one = run("one", {"--time", "0.001", "--quiet", "--set", "/time/step=5000"});
+  EXPECT_EQ(value(one.summary, "steps"), "1");
+  EXPECT_NEAR(std::stod(value(one.summary, "simulated_s")), 0.001, 1e-15);
   const Outcome automatic = run("auto", {"--time", "0.0123", "--quiet", "--set", "/time/step=auto"});
   EXPECT_NEAR(std::stod(value(automatic.summary, "simulated_s")), 0.0123, 1e-12);
 }
