@@ -13,7 +13,7 @@ void force_pass(void *user, uint32_t begin, uint32_t end) {
   Body &body = *call.body;
   const double damp = body.params[kDampingStiffness];
   for (uint32_t n = begin; n < end; ++n) {
-    const Block &b = body.block[n];
+    const Block b = body.lend(n, begin);
     body.kernels->load(b, call.k->x, damp > 0 ? call.k->v : nullptr, call.k->stride);
     if (damp > 0) body.kernels->damped_springs(b, damp);
     else body.kernels->springs(b);
@@ -54,7 +54,7 @@ const Kernels *choose_kernels(const dfm_host *host) {
 }
 
 void Body::for_each_block(void (*fn)(void *, uint32_t, uint32_t), void *user) {
-  if (ncell >= kParallelCells && host->parallel_for) return host->parallel_for(host->ctx, nblock, 1, fn, user);
+  if (ncell >= kParallelCells && host->parallel_for) return host->parallel_for(host->ctx, nblock, grain, fn, user);
   fn(user, 0, nblock);
 }
 

@@ -47,6 +47,7 @@ struct Body {
   const dfm_host *host = nullptr;
   const Kernels *kernels = nullptr;
   uint32_t npoint = 0, ncell = 0, nedge = 0, nblock = 0;
+  uint32_t grain = 1, largest = 0;  // blocks per piece of a pass at least; points of the largest block with its halo
   double params[kParamCount] = {};
 
   // In the host's order.
@@ -75,6 +76,14 @@ struct Body {
 
   void create(const dfm_host *h, const dfm_mesh &m);
   void apply_params(const double *values);
+
+  // Block n with the packed points of the piece that begins at block `begin`: a piece uses one place for all of its blocks, which
+  // therefore stays in the cache however large the body is. Pieces begin at multiples of the grain, so no two share a place.
+  Block lend(uint32_t n, uint32_t begin) {
+    Block b = block[n];
+    b.p = p.data() + 8 * size_t(largest) * (begin / grain);
+    return b;
+  }
 
   void add_forces(const dfm_kin &k, double *f_out);
   void bound(const dfm_kin &k, double *ksum, double *csum);

@@ -17,9 +17,10 @@ void row_pass(void *user, uint32_t begin, uint32_t end) {
   const Call &call = *static_cast<const Call *>(user);
   Body &body = *call.body;
   for (uint32_t n = begin; n < end; ++n) {
-    body.kernels->load(body.block[n], call.k->x, nullptr, call.k->stride);
-    body.kernels->spring_rows(body.block[n]);
-    if (body.has_volume()) body.kernels->cell_rows(body.block[n]);
+    const Block b = body.lend(n, begin);
+    body.kernels->load(b, call.k->x, nullptr, call.k->stride);
+    body.kernels->spring_rows(b);
+    if (body.has_volume()) body.kernels->cell_rows(b);
   }
 }
 
