@@ -53,15 +53,15 @@ const Kernels *choose_kernels(const dfm_host *host) {
   return best;
 }
 
-void Body::for_each_block(void (*fn)(void *, uint32_t, uint32_t), void *user) {
-  if (ncell >= kParallelCells && host->parallel_for) return host->parallel_for(host->ctx, nblock, grain, fn, user);
+void Body::for_each_block(uint32_t least_cells, void (*fn)(void *, uint32_t, uint32_t), void *user) {
+  if (ncell >= least_cells && host->parallel_for) return host->parallel_for(host->ctx, nblock, grain, fn, user);
   fn(user, 0, nblock);
 }
 
 void Body::add_forces(const dfm_kin &k, double *f_out) {
   Call call{this, &k, f_out};
-  for_each_block(force_pass, &call);
-  for_each_block(merge_pass, &call);
+  for_each_block(kParallelCells, force_pass, &call);
+  for_each_block(kParallelMergeCells, merge_pass, &call);
 }
 
 double Body::stretch_of(uint32_t e, const dfm_kin &k) const {

@@ -41,8 +41,9 @@ class Buffer {
 
 struct Body {
   static constexpr uint32_t kNone = ~0u;
-  // From this size on the blocks go through the host's parallel_for; below it waking a worker costs more than it brings.
-  static constexpr uint32_t kParallelCells = 10000;
+  // From this size on the blocks go through the host's parallel_for; below it waking a worker costs more than it brings. Adding up
+  // the blocks is a twentieth of the work.
+  static constexpr uint32_t kParallelCells = 10000, kParallelMergeCells = 100000;
 
   const dfm_host *host = nullptr;
   const Kernels *kernels = nullptr;
@@ -104,7 +105,7 @@ struct Body {
   void find_weights();
   double stretch_of(uint32_t e, const dfm_kin &k) const;
   double spring_scale_of_shape() const { return spring_scale() * (young_field ? 1.0 : params[kYoung]); }
-  void for_each_block(void (*fn)(void *, uint32_t, uint32_t), void *user);
+  void for_each_block(uint32_t least_cells, void (*fn)(void *, uint32_t, uint32_t), void *user);
 };
 
 // What the passes over blocks hand on to their pieces.
