@@ -27,7 +27,7 @@ enum class Touching { counts, allowed };
 class Counter {
  public:
   // Pairs within and between surfaces; pairs of one surface that share a vertex (by number or by position) are excepted.
-  // Coordinates must be finite.
+  // Coordinates must be finite, and below 1e90 for the exact signs not to overflow.
   size_t count(const std::vector<Surface> &surfaces, Touching touching);
 
  private:
