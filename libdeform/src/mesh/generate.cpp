@@ -40,7 +40,7 @@ TetMesh finished(TetMesh mesh) {
   return mesh;
 }
 
-uint32_t rounded(double x) { return static_cast<uint32_t>(std::max(1.0, std::floor(x + 0.5))); }
+uint32_t rounded(double x) { return uint32_t(std::max(1.0, std::floor(x + 0.5))); }
 // How far two positive numbers are apart, as a ratio of at least 1.
 double apart(double a, double b) { return std::max(a, b) / std::min(a, b); }
 // What a choice of counts costs, 1 at best: cells longer than wide (a little is cheap; beyond 2:1 they spoil the mesh, and more
@@ -80,13 +80,15 @@ Grid choose_grid(const double size[3], uint32_t cells) {
   for (int finer = 0; finer == 0 || (finer < 64 && edge > 0.5 * shortest); ++finer, edge *= 0.9)
     for (int up = 0; up < 8; ++up) {
       Grid g{};
-      for (int k = 0; k < 3; ++k) g.n[k] = static_cast<uint32_t>(std::clamp(std::floor(size[k] / edge) + (up >> k & 1), 1.0, double(kMostCells)));
+      for (int k = 0; k < 3; ++k) g.n[k] = uint32_t(std::clamp(std::floor(size[k] / edge) + (up >> k & 1), 1.0, double(kMostCells)));
       const double count = double(g.n[0]) * g.n[1] * g.n[2], h[3] = {size[0] / g.n[0], size[1] / g.n[1], size[2] / g.n[2]};
       if (count > kMostCells / 12) continue;
       const double s = score(std::max({h[0], h[1], h[2]}) / std::min({h[0], h[1], h[2]}), count, cubes);
       if (s < best_score) best_score = s, best = g;
     }
-  if (best_score == HUGE_VAL) fail(DFM_E_ARG, "a beam of %g x %g x %g m cannot be cut into %u cells of sound shape; give sizes nearer to each other", size[0], size[1], size[2], cells);
+  if (best_score == HUGE_VAL)
+    fail(DFM_E_ARG, "a beam of %g x %g x %g m cannot be cut into %u cells of sound shape; give sizes nearer to each other", size[0],
+         size[1], size[2], cells);
   return best;
 }
 
@@ -139,7 +141,8 @@ class BallBuilder {
       for (uint32_t t = 1; t < k; ++t) add_on_sphere(k, double(k - t) * corner_[a] + double(t) * corner_[b]);
     for (const auto &[a, b, c] : face_)
       for (uint32_t i = 1; i + 1 < k; ++i)
-        for (uint32_t j = 1; i + j < k; ++j) add_on_sphere(k, double(k - i - j) * corner_[a] + (double(i) * corner_[b] + double(j) * corner_[c]));
+        for (uint32_t j = 1; i + j < k; ++j)
+          add_on_sphere(k, double(k - i - j) * corner_[a] + (double(i) * corner_[b] + double(j) * corner_[c]));
   }
 
   uint32_t point(uint32_t f, const Lattice &w) const {
@@ -181,7 +184,7 @@ class BallBuilder {
 
   // Four cells around the shortest diagonal; where lengths are equal the choice goes round with the place, so that none is preferred.
   void cut_octahedron(uint32_t f, const Lattice &base) {
-    static constexpr uint32_t kPair[3][4] = {{0, 1, 2, 3}, {0, 2, 1, 3}, {0, 3, 1, 2}};  // opposite corners: base + two, base + the other two
+    static constexpr uint32_t kPair[3][4] = {{0, 1, 2, 3}, {0, 2, 1, 3}, {0, 3, 1, 2}};  // base + two is opposite base + the others
     uint32_t p[3][2];
     double length[3];
     for (int d = 0; d < 3; ++d) {
@@ -227,7 +230,9 @@ void choose_rings(double radius, double length, uint32_t cells, uint32_t *rings,
       const double s = score(apart(length / m, radius / n), 18.0 * n * n * m, cells);
       if (s < best) best = s, *rings = n, *layers = m;
     }
-  if (best == HUGE_VAL) fail(DFM_E_ARG, "a cylinder of radius %g m and length %g m cannot be cut into %u cells; give sizes nearer to each other", radius, length, cells);
+  if (best == HUGE_VAL)
+    fail(DFM_E_ARG, "a cylinder of radius %g m and length %g m cannot be cut into %u cells; give sizes nearer to each other", radius,
+         length, cells);
 }
 
 }  // namespace

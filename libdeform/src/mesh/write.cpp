@@ -93,7 +93,8 @@ void write_msh41(const TetMesh &mesh, const std::string &path) {
 }
 
 void write_msh22(const TetMesh &mesh, const std::string &path) {
-  if (mesh.npoint() > INT32_MAX) fail(DFM_E_UNSUPPORTED, "%s: MSH 2.2 holds up to %d nodes, the mesh has %u; write MSH 4.1", path.c_str(), INT32_MAX, mesh.npoint());
+  if (mesh.npoint() > INT32_MAX)
+    fail(DFM_E_UNSUPPORTED, "%s: MSH 2.2 holds up to %d nodes, the mesh has %u; write MSH 4.1", path.c_str(), INT32_MAX, mesh.npoint());
   AtomicFile out(path);
   put_head(out, "2.2"), put_names(out, mesh);
   out.write("$Nodes\n" + text(mesh.npoint()) + "\n");
@@ -127,7 +128,8 @@ void write_vtk(const TetMesh &mesh, const std::string &path) {
 void write_tet_mesh(const TetMesh &mesh, const std::string &path) {
   const auto ends = [&](const char *ending) {
     const std::string e(ending);
-    return path.size() > e.size() && std::equal(e.rbegin(), e.rend(), path.rbegin(), [](char a, char b) { return a == std::tolower(static_cast<unsigned char>(b)); });
+    const auto same = [](char a, char b) { return a == std::tolower(static_cast<unsigned char>(b)); };
+    return path.size() > e.size() && std::equal(e.rbegin(), e.rend(), path.rbegin(), same);
   };
   if (ends(".msh")) write_msh41(mesh, path);
   else if (ends(".msh2")) write_msh22(mesh, path);

@@ -24,8 +24,8 @@ struct Head {
   std::string xml;
   uint64_t offset = 0;
   void array(const char *type, const char *name, uint32_t width, uint64_t bytes) {
-    xml += std::string("        <DataArray type=\"") + type + "\" Name=\"" + escaped(name) + "\" NumberOfComponents=\"" + std::to_string(width) +
-           "\" format=\"appended\" offset=\"" + std::to_string(offset) + "\"/>\n";
+    xml += std::string("        <DataArray type=\"") + type + "\" Name=\"" + escaped(name) + "\" NumberOfComponents=\"" +
+           std::to_string(width) + "\" format=\"appended\" offset=\"" + std::to_string(offset) + "\"/>\n";
     offset += sizeof(uint64_t) + bytes;
   }
   void data(const char *section, const std::vector<VtuArray> &arrays, uint32_t n) {
@@ -68,7 +68,7 @@ void write_vtu(const std::string &path, const VtuGrid &grid) {
   out.write(head.xml);
   put_arrays(out, grid.point_data, grid.npoint), put_arrays(out, grid.cell_data, grid.ncell);
   put_array(out, grid.points, uint64_t(grid.npoint) * 24);
-  const auto put_number = [&](uint64_t n) { wide ? out.put(n) : out.put(static_cast<uint32_t>(n)); };
+  const auto put_number = [&](uint64_t n) { wide ? out.put(n) : out.put(uint32_t(n)); };
   out.put(corners * bytes);
   for (uint64_t i = 0; i < corners; ++i) put_number(grid.cells[i]);
   out.put(grid.ncell * bytes);
