@@ -241,7 +241,8 @@ Bounds bounds(const Scene &scene) {
   }
   Bounds all = bodies;
   const auto add = [&](const Vec &centre, const Vec &half) {
-    double lo[3] = {centre.x - half.x, centre.y - half.y, centre.z - half.z}, hi[3] = {centre.x + half.x, centre.y + half.y, centre.z + half.z};
+    const Vec low = centre - half, high = centre + half;
+    double lo[3] = {low.x, low.y, low.z}, hi[3] = {high.x, high.y, high.z};
     if (!limit.empty())
       for (int k = 0; k < 3; ++k) {
         lo[k] = std::clamp(lo[k], limit.lo[k], limit.hi[k]);
@@ -253,8 +254,9 @@ Bounds bounds(const Scene &scene) {
   for (const Box &b : scene.boxes) {
     Vec a[3];
     axes_of(b, a);
-    add(vec(b.pose.position), {std::abs(a[0].x) + std::abs(a[1].x) + std::abs(a[2].x), std::abs(a[0].y) + std::abs(a[1].y) + std::abs(a[2].y),
-                               std::abs(a[0].z) + std::abs(a[1].z) + std::abs(a[2].z)});
+    Vec half;
+    for (const Vec &axis : a) half = half + Vec{std::abs(axis.x), std::abs(axis.y), std::abs(axis.z)};
+    add(vec(b.pose.position), half);
   }
   for (const Sphere &s : scene.spheres) add(vec(s.centre), {s.radius, s.radius, s.radius});
   for (const Capsule &c : scene.capsules)

@@ -39,6 +39,7 @@ struct Vertex { float p[3], n[3], rgb[3], value, has_value; };
 struct Shape {
   std::vector<Vertex> vertices;
   Vec origin;
+  void triangle(const Vec p[3], const Vec n[3], const float rgb[3]);
   void surface(const Surface &s);
   void box(const Vec &centre, const Vec axes[3], const float rgb[3]);  // axes carry the half lengths
   void sphere(const Sphere &s);
@@ -46,7 +47,6 @@ struct Shape {
   void ribbons(const Lines &lines, const View &view, double pixels_high);
 
  private:
-  void triangle(const Vec p[3], const Vec n[3], const float rgb[3]);
   void revolve(const Vec &a, const Vec &axis, const std::vector<std::array<double, 4>> &profile, const float rgb[3]);
 };
 

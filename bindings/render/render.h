@@ -47,8 +47,8 @@ struct Look {
   float rgb[3] = {0.72f, 0.75f, 0.79f};
   float alpha = 1;  // below 1: seen through, casts no shadow
 };
-// A plane square to Scene::up is drawn as the floor (the highest one seen from above), any other as a tilted slab sized to the scene. A plane
-// whose back faces the camera is left out.
+// A plane square to Scene::up is drawn as the floor (the highest one seen from above), any other as a tilted slab sized to the scene. A
+// plane whose back faces the camera is left out.
 struct Plane { double point[3], normal[3]; Look look; };
 struct Box { Pose pose; double half[3]; Look look; };
 struct Sphere { double centre[3]; double radius; Look look; };

@@ -1,5 +1,5 @@
-// One picture: everything becomes triangles (geometry.cpp), the shadow maps of the key light and of the sky are drawn, then background, floor,
-// bodies, what is seen through (far to near), lines; four samples a pixel are resolved and read back.
+// One picture: everything becomes triangles (geometry.cpp), the shadow maps of the key light and of the sky are drawn, then background,
+// floor, bodies, what is seen through (far to near), lines; four samples a pixel are resolved and read back.
 #include "render.h"
 
 #include <algorithm>
@@ -148,28 +148,23 @@ void add_planes(const Scene &scene, Frame &frame, const Bounds &extent) {
   const Vec level = vec(floor->point) + frame.up * 1e-9;
   const Vec foot = middle + frame.up * dot(frame.up, level - middle);
   const double two = 2 * g.spacing;
-  const Vec snapped = foot - g.x * (dot(foot, g.x) - two * std::round(dot(foot, g.x) / two)) - g.y * (dot(foot, g.y) - two * std::round(dot(foot, g.y) / two));
+  const auto beyond = [&](const Vec &axis) { return axis * (dot(foot, axis) - two * std::round(dot(foot, axis) / two)); };
+  const Vec snapped = foot - beyond(g.x) - beyond(g.y);
   g.centre = snapped - frame.shape.origin;
   Batch b;
   b.kind = Kind::floor;
   b.shadow = false;
   b.alpha = floor->look.alpha;
   // Looks of obstacles are grey by default; a floor is lighter, so that shadows have room to fall.
-  const float default_look = Look{}.rgb[0];
-  const bool own = floor->look.rgb[0] != default_look || floor->look.rgb[1] != Look{}.rgb[1] || floor->look.rgb[2] != Look{}.rgb[2];
+  const bool own = !std::equal(floor->look.rgb, floor->look.rgb + 3, Look{}.rgb);
   const float light[3] = {0.90f, 0.905f, 0.915f};
   batch(frame, b, [&] {
-    const Vec n[3] = {frame.up, frame.up, frame.up}, c = snapped, x = g.x * g.radius, y = g.y * g.radius;
-    const Vec corner[4] = {c - x - y, c + x - y, c + x + y, c - x + y};
-    for (int k = 0; k < 2; ++k)
-      for (const int i : {0, 1 + k, 2 + k}) {
-        Vertex v{};
-        const Vec q = corner[i] - frame.shape.origin;
-        v.p[0] = float(q.x), v.p[1] = float(q.y), v.p[2] = float(q.z);
-        v.n[0] = float(n[0].x), v.n[1] = float(n[0].y), v.n[2] = float(n[0].z);
-        std::copy_n(own ? floor->look.rgb : light, 3, v.rgb);
-        frame.shape.vertices.push_back(v);
-      }
+    const Vec x = g.x * g.radius, y = g.y * g.radius;
+    const Vec corner[4] = {snapped - x - y, snapped + x - y, snapped + x + y, snapped - x + y}, n[3] = {frame.up, frame.up, frame.up};
+    for (const int k : {1, 2}) {
+      const Vec p[3] = {corner[0], corner[k], corner[k + 1]};
+      frame.shape.triangle(p, n, own ? floor->look.rgb : light);
+    }
   });
 }
 
@@ -244,8 +239,9 @@ Frame compose(const Scene &scene, double aspect, double pixels_high) {
   }
   // Floor first (it fades into the background), then what hides, then what is seen through from far to near, lines last.
   const auto rank = [](const Batch &b) { return b.kind == Kind::floor ? 0 : b.kind == Kind::plain ? 3 + b.on_top : b.alpha >= 1 ? 1 : 2; };
-  std::stable_sort(frame.batches.begin(), frame.batches.end(),
-                   [&](const Batch &a, const Batch &b) { return rank(a) != rank(b) ? rank(a) < rank(b) : rank(a) == 2 && a.depth > b.depth; });
+  std::stable_sort(frame.batches.begin(), frame.batches.end(), [&](const Batch &a, const Batch &b) {
+    return rank(a) != rank(b) ? rank(a) < rank(b) : rank(a) == 2 && a.depth > b.depth;
+  });
   return frame;
 }
 
@@ -262,7 +258,8 @@ std::array<Vec, kSkyLights> sky_directions(const Vec &up) {
 
 class GlRenderer final : public Renderer {
  public:
-  GlRenderer(std::unique_ptr<Context> context, uint32_t width, uint32_t height) : context_(std::move(context)), width_(width), height_(height) {}
+  GlRenderer(std::unique_ptr<Context> context, uint32_t width, uint32_t height)
+      : context_(std::move(context)), width_(width), height_(height) {}
   ~GlRenderer() override;
   bool start(std::string *why_not);
   bool draw(const Scene &scene, Image &picture, std::string *why_not) override;
@@ -280,7 +277,8 @@ class GlRenderer final : public Renderer {
   void use(GLuint program) { current_ = program; gl_.UseProgram(program); }
   void upload(const Frame &frame, ColourMap map);
   void draw_shadows(const Frame &frame, const Mat4 &key, const std::array<Mat4, kSkyLights> &sky);
-  void draw_colours(const Frame &frame, const Mat4 &key, const std::array<Mat4, kSkyLights> &sky, const std::array<Vec, kSkyLights> &directions);
+  void draw_colours(const Frame &frame, const Mat4 &key, const std::array<Mat4, kSkyLights> &sky,
+                    const std::array<Vec, kSkyLights> &directions);
   void read(Image &picture);
 
   std::unique_ptr<Context> context_;
@@ -391,8 +389,8 @@ bool GlRenderer::make_targets(std::string *why_not) {
     offset += size_t(widths[i]) * sizeof(float);
   }
   if (sampled && resolved && gl_.GetError() == GL_NO_ERROR) return true;
-  *why_not = std::string(context_->name()) + ": " + device_ + " gives no picture of " + std::to_string(width_) + " x " + std::to_string(height_) +
-             " pixels: ask for a smaller one";
+  *why_not = std::string(context_->name()) + ": " + device_ + " gives no picture of " + std::to_string(width_) + " x " +
+             std::to_string(height_) + " pixels: ask for a smaller one";
   return false;
 }
 
@@ -411,7 +409,8 @@ bool GlRenderer::start(std::string *why_not) {
   const GLubyte *text = gl_.GetString(GL_RENDERER);
   device_ = text ? reinterpret_cast<const char *>(text) : "unnamed";
   started_ = true;
-  return (main_ = program(kVertexShader, kFragmentShader, why_not)) && (depth_ = program(kDepthVertexShader, kDepthFragmentShader, why_not)) &&
+  return (main_ = program(kVertexShader, kFragmentShader, why_not)) &&
+         (depth_ = program(kDepthVertexShader, kDepthFragmentShader, why_not)) &&
          (background_ = program(kBackgroundVertexShader, kBackgroundFragmentShader, why_not)) && make_targets(why_not);
 }
 
@@ -570,7 +569,8 @@ std::unique_ptr<Renderer> Renderer::create(Backend backend, uint32_t width, uint
   std::string unused;
   std::string &why = why_not ? *why_not : unused;
   if (width < 1 || height < 1 || width > kLargest || height > kLargest) {
-    why = "a picture of " + std::to_string(width) + " x " + std::to_string(height) + " pixels: each side must be 1 to " + std::to_string(kLargest);
+    why = "a picture of " + std::to_string(width) + " x " + std::to_string(height) + " pixels: each side must be 1 to " +
+          std::to_string(kLargest);
     return nullptr;
   }
   const char *wish = std::getenv("DEFORM_RENDER_BACKEND");
