@@ -80,7 +80,7 @@ const JsonValue *JsonValue::find(const std::string &key) const {
 
 std::string JsonValue::get(const std::string &key) const {
   const JsonValue *v = find(key);
-  return v ? v->text : std::string();
+  return v && v->kind != JsonValue::null ? v->text : std::string();
 }
 
 namespace {
