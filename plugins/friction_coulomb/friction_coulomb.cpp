@@ -25,7 +25,7 @@ const dfm_param rows[] = {
 
 constexpr uint32_t kLanes = 8;
 constexpr double kTiny = 1e-280, kHuge = 1e280;  // squares beyond these have lost digits or are about to
-constexpr double kRest = 1e-140;                 // m/s; below it 1/w is held constant, so that no derivative is infinite
+constexpr double kRest = 1e-100;                 // m/s; below it 1/w is held constant, so that no derivative is infinite
 
 struct Batch { double mu_c, mu_s, v_s, delta, sigma2; };
 
