@@ -5,7 +5,7 @@ JOBS ?= $(shell nproc)
 SETUP = @cmake/setup.sh
 BUILD = @cmake --build --preset
 
-.PHONY: help demo test bench lint asan tsan install clean setup setup-bench
+.PHONY: help demo test bench lint asan tsan fuzz install clean setup setup-bench setup-fuzz
 
 help:
 	@echo "make demo             two soft cylinders with and without friction: table, picture, out/demo/"
@@ -13,6 +13,7 @@ help:
 	@echo "make bench            the figures: kernels and full steps"
 	@echo "make lint             layout, includes, headers, text"
 	@echo "make asan, make tsan  the suite under the sanitizers"
+	@echo "make fuzz             the readers under libFuzzer"
 	@echo "make install PREFIX=  library, headers, plugins, command (default $(PREFIX))"
 	@echo "make clean            removes build/ and out/"
 
@@ -20,9 +21,12 @@ setup:
 	$(SETUP) doors
 setup-bench:
 	$(SETUP) doors bench
+setup-fuzz:
+	$(SETUP) doors clang
 
 # Configured once; ninja calls CMake again by itself where a CMake file changed.
 build/bench/build.ninja: | setup-bench
+build/fuzz/build.ninja: | setup-fuzz
 build/%/build.ninja: | setup
 	cmake --preset $*
 
@@ -44,6 +48,9 @@ asan tsan: %: setup build/%/build.ninja
 bench: setup-bench build/bench/build.ninja
 	$(BUILD) bench
 	$(BUILD) bench --target run_bench
+
+fuzz: setup-fuzz build/fuzz/build.ninja
+	$(BUILD) fuzz --target run_fuzz
 
 install: setup build/release/build.ninja
 	$(BUILD) release --target deform_command

@@ -8,6 +8,7 @@
 //   dft/dv = -[F' v^v^T + (F/w) (1 - v^v^T)],  F = g + sigma2 A w,  F' = g' + sigma2 A,  dft/dfn = -(g/fn) v^
 // A lane with a NaN or an infinite input gives NaN in that lane alone. Each lane runs the same operations at every vector width.
 #include <cmath>
+#include <cstring>
 
 #include "deform/plugin.hpp"
 
@@ -22,77 +23,132 @@ const dfm_param rows[] = {
     dfm::plugin::param("sigma2", "viscous friction per area", "N s/m^3", 0, 1e12, 0, DFM_PARAM_RUNTIME),
 };
 
+constexpr uint32_t kLanes = 8;
 constexpr double kTiny = 1e-280, kHuge = 1e280;  // squares beyond these have lost digits or are about to
 constexpr double kRest = 1e-140;                 // m/s; below it 1/w is held constant, so that no derivative is infinite
 
-// The share of the Stribeck excess at speed w, and minus its logarithmic slope times w: s(w) = exp(-a), w s'(w) = -delta a s, a = (w/v_s)^delta.
-inline double stribeck(double w, double v_s, double delta, double *slope) {
-  const double x = w / v_s, a = delta == 2.0 ? x * x : delta == 1.0 ? x : dfm_pow(x, delta);
-  const double s = dfm_exp(-a);
-  *slope = s > 0 ? -delta * a * s : 0.0;  // a may be infinite where s has vanished
-  return s;
-}
+struct Batch { double mu_c, mu_s, v_s, delta, sigma2; };
 
-// Length and direction of a vector, scaled by its larger component where squares would leave the range of doubles.
+// Eight contacts: where their columns lie. An output that is not wanted points to a spare column.
+struct Block {
+  const double *fn, *vx, *vy, *sx, *sy, *area;
+  double *fx, *fy, *limit, *xx, *xy, *yx, *yy, *nx, *ny;
+};
+
+// What the passes over a block hand on: mode 0 open, 1 stick, 2 slip; speed and its inverse; excess s = exp(-a), a = (w/v_s)^delta, the share
+// of F_S - F_C at this speed, and slope = w s'(w) = -delta a s.
+struct Passes { double mode[kLanes], odd[kLanes], w[kLanes], inverse[kLanes], excess[kLanes], slope[kLanes]; };
+
+// Where squares leave the range of doubles, or slip begins from rest: rare, so one lane at a time, scaled by the larger component.
 struct Polar { double length, x, y; };
 
-Polar polar_scaled(double x, double y) {
+Polar polar(double x, double y) {
   const double m = std::fabs(x) > std::fabs(y) ? std::fabs(x) : std::fabs(y);
-  if (!(m > 0)) return {m, 0, 0};  // zero, or NaN
+  if (!(m > 0)) return {m, 0, 0};
   const double u = x / m, v = y / m, r = std::sqrt(u * u + v * v);
   return {m * r, u / r, v / r};
 }
 
-inline Polar polar(double x, double y) {
-  const double square = x * x + y * y;
-  if (!(square > kTiny && square < kHuge)) return polar_scaled(x, y);
-  const double r = std::sqrt(square);
-  return {r, x / r, y / r};
+void odd_lane(const Batch &p, const Block &b, Passes &t, uint32_t i) {
+  const double fn = b.fn[i], drag = p.sigma2 * b.area[i], stiction = p.mu_s * fn;
+  const double poison = 0.0 * fn + 0.0 * b.vx[i] + 0.0 * b.vy[i] + 0.0 * b.sx[i] + 0.0 * b.sy[i] + 0.0 * drag;
+  const Polar stop = polar(b.sx[i], b.sy[i]), v = polar(b.vx[i], b.vy[i]);
+  const double w = v.length;
+  double fx = b.sx[i], fy = b.sy[i], limit = stiction, nx = 0, ny = 0, xx = 0, xy = 0, yy = 0;
+  t.mode[i] = 1;
+  if (stop.length > stiction) {
+    const double x = w / p.v_s, a = p.delta == 2.0 ? x * x : dfm_pow(x, p.delta), s = dfm_exp(-a), slope = s > 0 ? -p.delta * a * s : 0.0;
+    const double mu = p.mu_c + (p.mu_s - p.mu_c) * s, dx = w > 0 ? -v.x : stop.x, dy = w > 0 ? -v.y : stop.y;
+    limit = mu * fn + drag * w;
+    fx = limit * dx, fy = limit * dy, nx = mu * dx, ny = mu * dy;
+    t.mode[i] = 2;
+    if (w > 0) {
+      const double divisor = w > kRest ? w : kRest, across = limit / divisor;
+      const double d = ((p.mu_s - p.mu_c) * fn * slope + drag * w) / divisor - across;
+      xx = -(across + d * dx * dx), xy = -(d * dx * dy), yy = -(across + d * dy * dy);
+    }
+  }
+  b.fx[i] = fx + poison, b.fy[i] = fy + poison, b.limit[i] = limit + poison, b.nx[i] = nx + poison, b.ny[i] = ny + poison;
+  b.xx[i] = xx + poison, b.xy[i] = b.yx[i] = xy + poison, b.yy[i] = yy + poison;
+}
+
+// The passes below choose by value, not by branch: real batches mix stick and slip, and a mispredicted branch costs more than both sides.
+// Returns whether any lane slips.
+bool decide(const Batch &p, const Block &b, Passes &t) {
+  double slips = 0;
+  for (uint32_t i = 0; i < kLanes; ++i) {
+    const double stiction = p.mu_s * b.fn[i], s2 = b.sx[i] * b.sx[i] + b.sy[i] * b.sy[i], f2 = stiction * stiction;
+    const double v2 = b.vx[i] * b.vx[i] + b.vy[i] * b.vy[i];
+    const double larger = s2 > f2 ? s2 : f2, touches = b.fn[i] > 0 ? 1.0 : 0.0, slip = s2 > f2 ? touches : 0.0;
+    const double low = larger < kTiny ? touches : 0.0, high = larger > kHuge ? touches : 0.0;
+    const double slow = v2 > kTiny ? 0.0 : slip, fast = v2 < kHuge ? 0.0 : slip;
+    t.mode[i] = touches + slip;
+    t.odd[i] = (low + high) + (slow + fast);
+    t.w[i] = std::sqrt(slip > 0 ? v2 : 1.0);
+    t.inverse[i] = 1.0 / t.w[i];
+    t.excess[i] = t.slope[i] = 0.0;
+    slips += slip;
+  }
+  return slips > 0;
+}
+
+void stribeck(const Batch &p, Passes &t) {
+  double a[kLanes];
+  const double inverse = 1.0 / p.v_s;
+  if (p.delta == 2.0) {
+    for (uint32_t i = 0; i < kLanes; ++i) {
+      const double x = t.w[i] * inverse;
+      a[i] = x * x;
+    }
+  } else {
+    for (uint32_t i = 0; i < kLanes; ++i) a[i] = t.mode[i] > 1 ? dfm_pow(t.w[i] * inverse, p.delta) : 0.0;
+  }
+  for (uint32_t i = 0; i < kLanes; ++i) {
+    const double s = dfm_exp(-a[i]);
+    t.excess[i] = s;
+    t.slope[i] = s > 0 ? -p.delta * a[i] * s : 0.0;  // a may be infinite where s has vanished
+  }
+}
+
+void answer(const Batch &p, const Block &b, const Passes &t) {
+  for (uint32_t i = 0; i < kLanes; ++i) {
+    const double fn = b.fn[i], drag = p.sigma2 * b.area[i], vx = b.vx[i], vy = b.vy[i], sx = b.sx[i], sy = b.sy[i];
+    // 0 where every input is finite, NaN otherwise: no output of a bad lane passes for a good one.
+    const double poison = 0.0 * fn + 0.0 * vx + 0.0 * vy + 0.0 * sx + 0.0 * sy + 0.0 * drag;
+    const double mu = p.mu_c + (p.mu_s - p.mu_c) * t.excess[i], w = t.w[i], inverse = t.inverse[i], level = mu * fn + drag * w;
+    const double dx = -vx * inverse, dy = -vy * inverse, across = level * inverse;
+    const double along = ((p.mu_s - p.mu_c) * fn * t.slope[i] + drag * w) * inverse, d = along - across;
+    const bool slip = t.mode[i] > 1, stick = t.mode[i] > 0;
+    const double fs = stick ? p.mu_s * fn : 0.0, fx = stick ? sx : 0.0, fy = stick ? sy : 0.0, xy = slip ? -(d * dx * dy) : 0.0;
+    b.fx[i] = (slip ? level * dx : fx) + poison;
+    b.fy[i] = (slip ? level * dy : fy) + poison;
+    b.limit[i] = (slip ? level : fs) + poison;
+    b.nx[i] = (slip ? mu * dx : 0.0) + poison;
+    b.ny[i] = (slip ? mu * dy : 0.0) + poison;
+    b.xx[i] = (slip ? -(across + d * dx * dx) : 0.0) + poison;
+    b.xy[i] = xy + poison;
+    b.yx[i] = xy + poison;
+    b.yy[i] = (slip ? -(across + d * dy * dy) : 0.0) + poison;
+  }
 }
 
 dfm_status eval(const dfm_friction_in *in, dfm_friction_out *out) {
-  const double *p = in->params;
-  const double mu_c = p[kMuC], mu_s = p[kMuS], v_s = p[kVs], delta = p[kDelta], sigma2 = p[kSigma2];
+  const Batch p = {in->params[kMuC], in->params[kMuS], in->params[kVs], in->params[kDelta], in->params[kSigma2]};
   const size_t stride = in->stride;
-  const bool curve = mu_s != mu_c;
-  for (uint32_t i = 0; i < in->n; ++i) {
-    const double fn = in->fn[i], vx = in->vt[i], vy = in->vt[stride + i], sx = in->ft_stop[i], sy = in->ft_stop[stride + i];
-    const double drag = sigma2 * in->area[i];
-    // 0 where everything is finite, NaN otherwise: added to each output, it keeps a bad lane from passing for a good one.
-    const double poison = 0.0 * fn + 0.0 * vx + 0.0 * vy + 0.0 * sx + 0.0 * sy + 0.0 * drag;
-    double fx = 0, fy = 0, limit = 0, xx = 0, xy = 0, yy = 0, nx = 0, ny = 0;
-    uint8_t mode = 0;
-    if (fn > 0) {
-      const Polar stop = polar(sx, sy);
-      const double stiction = mu_s * fn;
-      if (stop.length <= stiction) {
-        fx = sx, fy = sy, limit = stiction, mode = 1;
-      } else {
-        const Polar v = polar(vx, vy);
-        const double w = v.length;
-        double mu = mu_s, slope = 0, dx = stop.x, dy = stop.y;
-        if (w > 0) {
-          mu = curve ? mu_c + (mu_s - mu_c) * stribeck(w, v_s, delta, &slope) : mu_c;
-          dx = -v.x, dy = -v.y;
-        }
-        limit = mu * fn + drag * w, mode = 2;
-        fx = limit * dx, fy = limit * dy, nx = mu * dx, ny = mu * dy;
-        if (w > 0) {
-          const double divisor = w > kRest ? w : kRest;
-          const double across = limit / divisor, along = ((mu_s - mu_c) * fn * slope + drag * w) / divisor, d = along - across;
-          xx = -(across + d * dx * dx), xy = -(d * dx * dy), yy = -(across + d * dy * dy);
-        }
-      }
-    }
-    if (out->ft) out->ft[i] = fx + poison, out->ft[stride + i] = fy + poison;
-    if (out->limit) out->limit[i] = limit + poison;
-    if (out->mode) out->mode[i] = mode;
-    if (out->dft_dfn) out->dft_dfn[i] = nx + poison, out->dft_dfn[stride + i] = ny + poison;
-    if (out->dft_dvt) {
-      double *d = out->dft_dvt + i;
-      d[0] = xx + poison, d[stride] = xy + poison, d[2 * stride] = xy + poison, d[3 * stride] = yy + poison;
-    }
-    if (out->stored) out->stored[i] = poison;
+  double spare[kLanes];
+  for (size_t at = 0; at < in->n; at += kLanes) {  // lanes up to n rounded to 8 may be touched
+    const auto to = [&](double *column, size_t c) { return column ? column + c * stride + at : spare; };
+    const Block b = {in->fn + at, in->vt + at, in->vt + stride + at, in->ft_stop + at, in->ft_stop + stride + at, in->area + at,
+                     to(out->ft, 0), to(out->ft, 1), to(out->limit, 0), to(out->dft_dvt, 0), to(out->dft_dvt, 1), to(out->dft_dvt, 2),
+                     to(out->dft_dvt, 3), to(out->dft_dfn, 0), to(out->dft_dfn, 1)};
+    Passes t;
+    const bool slips = decide(p, b, t);
+    if (slips && p.mu_s != p.mu_c) stribeck(p, t);
+    answer(p, b, t);
+    for (uint32_t i = 0; i < kLanes; ++i)
+      if (t.odd[i] > 0) odd_lane(p, b, t, i);
+    for (uint32_t i = 0; out->mode && i < kLanes; ++i) out->mode[at + i] = static_cast<uint8_t>(t.mode[i]);
+    for (uint32_t i = 0; out->stored && i < kLanes; ++i) out->stored[at + i] = 0;
   }
   return DFM_OK;
 }

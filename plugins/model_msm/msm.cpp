@@ -87,7 +87,7 @@ dfm_status add_forces(void *self, const dfm_kin *k, double *f) {
 }
 
 dfm_status bound(void *self, const dfm_kin *k, double *ksum, double *csum, double *) {
-  static_cast<const Body *>(self)->bound(*k, ksum, csum);
+  static_cast<Body *>(self)->bound(*k, ksum, csum);
   return DFM_OK;
 }
 

@@ -32,20 +32,31 @@ void merge_pass(void *user, uint32_t begin, uint32_t end) {
   Body &body = *call.body;
   const double drag = body.params[kDampingMass];
   for (uint32_t n = begin; n < end; ++n) {
-    double *const sums = body.f.data();
-    for (uint32_t m = body.merge_begin[n]; m < body.merge_begin[n + 1]; ++m)
-      for (int a = 0; a < 3; ++a) sums[4 * size_t(body.merge[m].to) + a] += sums[4 * size_t(body.merge[m].from) + a];
     const Block &b = body.block[n];
-    for (uint32_t i = 0; i < b.owned; ++i) {
-      const size_t at = size_t(call.k->stride) * b.point[i];
-      const double *sum = b.f + 4 * size_t(i);
-      if (drag > 0) {
-        const double c = drag * body.mass[b.point[i]];
-        for (int a = 0; a < 3; ++a) call.f[at + a] += sum[a] - c * call.k->v[at + a];
-      } else {
-        for (int a = 0; a < 3; ++a) call.f[at + a] += sum[a];
-      }
+    body.kernels->merge(body.f.data(), body.merge.data() + body.merge_begin[n], body.merge_begin[n + 1] - body.merge_begin[n]);
+    for (uint32_t i = 0; drag > 0 && i < b.owned; ++i) {
+      const double c = drag * body.mass[b.point[i]], *v = call.k->v + size_t(call.k->stride) * b.point[i];
+      for (int a = 0; a < 3; ++a) b.f[4 * size_t(i) + a] -= c * v[a];
     }
+    body.kernels->store(b, call.f, call.k->stride);
+  }
+}
+
+void row_pass(void *user, uint32_t begin, uint32_t end) {
+  const Call &call = *static_cast<const Call *>(user);
+  for (uint32_t n = begin; n < end; ++n) {
+    call.body->kernels->load(call.body->block[n], call.k->x, nullptr, call.k->stride);
+    call.body->kernels->cell_rows(call.body->block[n]);
+  }
+}
+
+void merge_row_pass(void *user, uint32_t begin, uint32_t end) {
+  const Call &call = *static_cast<const Call *>(user);
+  Body &body = *call.body;
+  for (uint32_t n = begin; n < end; ++n) {
+    const Block &b = body.block[n];
+    body.kernels->merge(body.f.data(), body.merge.data() + body.merge_begin[n], body.merge_begin[n + 1] - body.merge_begin[n]);
+    for (uint32_t i = 0; i < b.owned; ++i) call.f[b.point[i]] += b.f[4 * size_t(i)];
   }
 }
 
@@ -115,36 +126,17 @@ void Body::cell_energy(const dfm_kin &k, double *density) {
   }
 }
 
-void Body::bound(const dfm_kin &k, double *ksum, double *csum) const {
+// Block row sums of stiffness and damping, see doc/models/msm.md: with h^2 ksum + 2 h csum <= 4 m in every row no step grows.
+void Body::bound(const dfm_kin &k, double *ksum, double *csum) {
   const double damp = params[kDampingStiffness], drag = params[kDampingMass];
   for (uint32_t i = 0; i < npoint; ++i) {
     ksum[i] += 2 * spring_row[i];
     csum[i] += damp * (2 * spring_row[i]) + drag * mass[i];
   }
   if (!has_volume()) return;
-  for (size_t c = 0, n = size_t(block[nblock - 1].cell + block[nblock - 1].cells - cell.data()); c < n; ++c) {
-    if (bulk[c] == 0) continue;
-    const uint32_t *q = cells.data() + 4 * size_t(cell_id[c]);
-    double e[4][4] = {}, g[4] = {}, total = 0;  // e: edge lengths; g: 6 |dV/dx_a|, twice the area of the opposite face
-    const double *x[4];
-    for (int a = 0; a < 4; ++a) x[a] = k.x + size_t(k.stride) * q[a];
-    for (int a = 0; a < 4; ++a)
-      for (int b = 0; b < 4; ++b) e[a][b] = length_of(x[a], x[b]);
-    for (int a = 0; a < 4; ++a) {
-      const double *o = x[(a + 1) & 3], *y = x[(a + 2) & 3], *z = x[(a + 3) & 3];
-      const double u[3] = {y[0] - o[0], y[1] - o[1], y[2] - o[2]}, w[3] = {z[0] - o[0], z[1] - o[1], z[2] - o[2]};
-      const double r[3] = {u[1] * w[2] - u[2] * w[1], u[2] * w[0] - u[0] * w[2], u[0] * w[1] - u[1] * w[0]};
-      g[a] = __builtin_sqrt((r[0] * r[0] + r[1] * r[1]) + r[2] * r[2]), total += g[a];
-    }
-    const double more = __builtin_fabs(volume6_of(x[0], x[1], x[2], x[3]) - volume6[c]);
-    for (int a = 0; a < 4; ++a) {  // block (a,b) of d2V: a cross product with the edge opposite to ab, over 6
-      double opposite = 0;
-      for (int i = 0; i < 4; ++i)
-        for (int j = i + 1; j < 4; ++j)
-          if (i != a && j != a) opposite += e[i][j];
-      ksum[q[a]] += bulk[c] * (g[a] * total + more * opposite);
-    }
-  }
+  Call call{this, &k, ksum};
+  for_each_block(row_pass, &call);
+  for_each_block(merge_row_pass, &call);
 }
 
 }  // namespace msm

@@ -62,8 +62,7 @@ struct Body {
   Buffer<double> p, f, stiffness, rest, bulk, volume6;
   Buffer<Quad> quad;
   Buffer<Cell> cell;
-  struct Merge { uint32_t from, to; };  // slots: a halo point of another block, the point here that it stands for
-  Buffer<Merge> merge;
+  Buffer<Merge> merge;  // by owning block
   Buffer<uint32_t> merge_begin, slot_begin;  // [nblock + 1]
 
   bool has_volume() const { return params[kVolume] > 0; }
@@ -76,7 +75,7 @@ struct Body {
   void apply_params(const double *values);
 
   void add_forces(const dfm_kin &k, double *f_out);
-  void bound(const dfm_kin &k, double *ksum, double *csum) const;
+  void bound(const dfm_kin &k, double *ksum, double *csum);
   double energy(const dfm_kin &k) const;
   void cell_energy(const dfm_kin &k, double *density);
 

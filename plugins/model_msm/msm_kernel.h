@@ -2,6 +2,7 @@
 //   spring  L = sqrt((dx^2 + dy^2) + dz^2),  F = k [(L - L0)/L + damp (dv.d)/L^2] d                       (2.25), (2.26 corrected)
 //   row     f_i += (F0 + F1) + (F2 + F3) per quad of springs, then f_j -= F one spring after the other
 //   cell    6V = a.(b x c),  F_n = -kV/(36 V0) (6V - 6V0) g_n,  F_0 = -((F_1 + F_2) + F_3)                  (2.27 corrected)
+//           four cells at a time, corner after corner in the order 1 2 3 0
 // so that the instruction set never shows in a result. Plain data only: kernel files see no STL and nothing with external inline code.
 #pragma once
 #include <stdint.h>
@@ -15,7 +16,7 @@ struct Cell { uint32_t p[4]; };
 
 // One block of the body: points it owns, then the points of other blocks that its springs and cells touch (halo).
 struct Block {
-  uint32_t owned, local, quads, cells;  // cells is a multiple of 8
+  uint32_t owned, local, quads, cells;  // quads is even, cells a multiple of 8
   const uint32_t *point;                // [local] number of the point in the host's arrays
   double *p;                            // [local,8] x y z 0 vx vy vz 0: a point with its velocity is one cache line
   double *f;                            // [local,4]
@@ -25,6 +26,9 @@ struct Block {
   const double *bulk, *volume6;         // [cells] kV/(36 V0), 6 V0
 };
 
+// Slots of all blocks' f: a halo point of another block, and the point that it stands for.
+struct Merge { uint32_t from, to; };
+
 struct Kernels {
   const char *name;
   // Copies x (and v, unless NULL) of the block's points in and clears f.
@@ -32,6 +36,9 @@ struct Kernels {
   void (*springs)(const Block &b);
   void (*damped_springs)(const Block &b, double damp);  // damp: seconds
   void (*cells)(const Block &b);
+  void (*cell_rows)(const Block &b);  // row sums of the cells' stiffness at the loaded points, into lane 0 of f
+  void (*merge)(double *f, const Merge *merge, uint32_t n);
+  void (*store)(const Block &b, double *f, uint32_t stride);  // adds the owned points' forces to the host's
 };
 
 // Springs shorter than this carry no force: their direction is rounding. The square root of the smallest safe square.

@@ -1,12 +1,11 @@
-// Vectors of four in one register.
-#include "msm_kernel_quad.h"
+// Four doubles in one register.
+#include "msm_lanes_avx.h"
 
-#include <immintrin.h>
+#include "msm_kernel_quad.h"
 
 namespace msm {
 namespace {
-MSM_INLINE void sqrt4(v4 &a) { a = _mm256_sqrt_pd(a); }
-constexpr Kernels kKernels = {"avx2", load_block, plain_springs, damped_springs, volume_cells};
+constexpr Kernels kKernels = {"avx2", load_block, plain_springs, damped_springs, volume_cells, cell_rows, merge_halo, add_to_host};
 }  // namespace
 
 const Kernels *kernels_avx2() { return &kKernels; }

@@ -1,12 +1,133 @@
-// Vectors of four in one register.
-#include "msm_kernel_quad.h"
+// Vectors of eight. A point with its velocity is one load; two quads of springs, or eight cells, share each root and each
+// division. Sums per point run in the order of the other kernels: first quad, then second; cell after cell.
+#include "msm_lanes_avx.h"
 
-#include <immintrin.h>
+#include "msm_kernel_quad.h"
 
 namespace msm {
 namespace {
-MSM_INLINE void sqrt4(v4 &a) { a = _mm256_sqrt_pd(a); }
-constexpr Kernels kKernels = {"avx512", load_block, plain_springs, damped_springs, volume_cells};
+
+MSM_INLINE __m512d point8(const Block &b, uint32_t n) { return _mm512_load_pd(b.p + 8 * size_t(n)); }
+MSM_INLINE __m256d low(__m512d a) { return _mm512_castpd512_pd256(a); }
+MSM_INLINE __m256d high(__m512d a) { return _mm512_extractf64x4_pd(a, 1); }
+// In each half: out[k] = (s_k.x + s_k.y) + (s_k.z + s_k.w)
+MSM_INLINE __m512d sum_rows(__m512d s0, __m512d s1, __m512d s2, __m512d s3) {
+  const __m512d a = _mm512_add_pd(_mm512_unpacklo_pd(s0, s1), _mm512_unpackhi_pd(s0, s1));
+  const __m512d b = _mm512_add_pd(_mm512_unpacklo_pd(s2, s3), _mm512_unpackhi_pd(s2, s3));
+  const __m512i lo = _mm512_setr_epi64(0, 1, 8, 9, 4, 5, 12, 13), hi = _mm512_setr_epi64(2, 3, 10, 11, 6, 7, 14, 15);
+  return _mm512_add_pd(_mm512_permutex2var_pd(a, lo, b), _mm512_permutex2var_pd(a, hi, b));
+}
+
+// [d | e] -> [d d | d e], the terms of d.d and of d.e
+MSM_INLINE __m512d products(__m512d de) { return _mm512_mul_pd(_mm512_shuffle_f64x2(de, de, 0x44), de); }
+
+// Forces of four springs to their points; lane kFirst + k of scale belongs to spring k.
+template <int kFirst>
+MSM_INLINE void spread(const Block &b, const Quad &q, __m512d scale, __m512d d0, __m512d d1, __m512d d2, __m512d d3) {
+  const __m256d f0 = _mm256_mul_pd(low(_mm512_permutexvar_pd(_mm512_set1_epi64(kFirst), scale)), low(d0));
+  const __m256d f1 = _mm256_mul_pd(low(_mm512_permutexvar_pd(_mm512_set1_epi64(kFirst + 1), scale)), low(d1));
+  const __m256d f2 = _mm256_mul_pd(low(_mm512_permutexvar_pd(_mm512_set1_epi64(kFirst + 2), scale)), low(d2));
+  const __m256d f3 = _mm256_mul_pd(low(_mm512_permutexvar_pd(_mm512_set1_epi64(kFirst + 3), scale)), low(d3));
+  add_to(b, q.i, _mm256_add_pd(_mm256_add_pd(f0, f1), _mm256_add_pd(f2, f3)));
+  take_from(b, q.j[0], f0), take_from(b, q.j[1], f1), take_from(b, q.j[2], f2), take_from(b, q.j[3], f3);
+}
+
+template <bool kDamped>
+MSM_INLINE void springs8(const Block &b, double damp) {
+  for (uint32_t n = 0; n < b.quads; n += 2) {
+    const Quad &q = b.quad[n], &r = b.quad[n + 1];
+    const __m512d pq = point8(b, q.i), pr = point8(b, r.i);
+    const __m512d d0 = _mm512_sub_pd(point8(b, q.j[0]), pq), d1 = _mm512_sub_pd(point8(b, q.j[1]), pq);
+    const __m512d d2 = _mm512_sub_pd(point8(b, q.j[2]), pq), d3 = _mm512_sub_pd(point8(b, q.j[3]), pq);
+    const __m512d d4 = _mm512_sub_pd(point8(b, r.j[0]), pr), d5 = _mm512_sub_pd(point8(b, r.j[1]), pr);
+    const __m512d d6 = _mm512_sub_pd(point8(b, r.j[2]), pr), d7 = _mm512_sub_pd(point8(b, r.j[3]), pr);
+    const __m512d s = sum_rows(products(d0), products(d1), products(d2), products(d3));
+    const __m512d t = sum_rows(products(d4), products(d5), products(d6), products(d7));
+    const __m512d dd = _mm512_shuffle_f64x2(s, t, 0x44);
+    const __m512d length = _mm512_sqrt_pd(dd), inverse = _mm512_div_pd(_mm512_set1_pd(1.0), length);
+    __m512d stretch = _mm512_mul_pd(_mm512_sub_pd(length, _mm512_load_pd(b.rest + 4 * size_t(n))), inverse);
+    if constexpr (kDamped) {
+      const __m512d rate = _mm512_shuffle_f64x2(s, t, 0xee);
+      stretch = _mm512_add_pd(stretch, _mm512_mul_pd(_mm512_set1_pd(damp), _mm512_mul_pd(_mm512_mul_pd(rate, inverse), inverse)));
+    }
+    const __mmask8 has_direction = _mm512_cmp_pd_mask(dd, _mm512_set1_pd(kShortestSquared), _CMP_GT_OQ);
+    const __m512d scale = _mm512_maskz_mul_pd(has_direction, _mm512_load_pd(b.stiffness + 4 * size_t(n)), stretch);
+    spread<0>(b, q, scale, d0, d1, d2, d3);
+    spread<4>(b, r, scale, d4, d5, d6, d7);
+  }
+}
+
+static void plain_springs8(const Block &b) { springs8<false>(b, 0); }
+static void damped_springs8(const Block &b, double damp) { springs8<true>(b, damp); }
+
+// Transposes the 4 x 4 of each half.
+MSM_INLINE void transpose(__m512d &r0, __m512d &r1, __m512d &r2, __m512d &r3) {
+  const __m512d a = _mm512_unpacklo_pd(r0, r1), b = _mm512_unpackhi_pd(r0, r1), c = _mm512_unpacklo_pd(r2, r3), d = _mm512_unpackhi_pd(r2, r3);
+  const __m512i lo = _mm512_setr_epi64(0, 1, 8, 9, 4, 5, 12, 13), hi = _mm512_setr_epi64(2, 3, 10, 11, 6, 7, 14, 15);
+  r0 = _mm512_permutex2var_pd(a, lo, c), r1 = _mm512_permutex2var_pd(b, lo, d);
+  r2 = _mm512_permutex2var_pd(a, hi, c), r3 = _mm512_permutex2var_pd(b, hi, d);
+}
+
+// Corner n of cells k and k + 4.
+MSM_INLINE __m512d corner(const Block &b, const Cell *c, int k, int n) {
+  return _mm512_insertf64x4(_mm512_castpd256_pd512(_mm256_load_pd(b.p + 8 * size_t(c[k].p[n]))),
+                            _mm256_load_pd(b.p + 8 * size_t(c[k + 4].p[n])), 1);
+}
+
+struct Edges8 { __m512d x, y, z; };
+MSM_INLINE void gather_edges(const Block &b, const Cell *c, int n, __m512d o0, __m512d o1, __m512d o2, __m512d o3, Edges8 &out) {
+  out.x = _mm512_sub_pd(corner(b, c, 0, n), o0), out.y = _mm512_sub_pd(corner(b, c, 1, n), o1);
+  out.z = _mm512_sub_pd(corner(b, c, 2, n), o2);
+  __m512d unused = _mm512_sub_pd(corner(b, c, 3, n), o3);
+  transpose(out.x, out.y, out.z, unused);
+}
+MSM_INLINE __m512d minor2(__m512d a, __m512d b, __m512d c, __m512d d) { return _mm512_sub_pd(_mm512_mul_pd(a, b), _mm512_mul_pd(c, d)); }
+MSM_INLINE void cross(const Edges8 &a, const Edges8 &b, Edges8 &out) {
+  out.x = minor2(a.y, b.z, a.z, b.y), out.y = minor2(a.z, b.x, a.x, b.z), out.z = minor2(a.x, b.y, a.y, b.x);
+}
+
+struct Forces { __m512d f0, f1, f2, f3; };  // of cells k and k + 4 at one corner
+MSM_INLINE void forces_at(__m512d pressure, const Edges8 &g, Forces &f) {
+  f.f0 = _mm512_mul_pd(pressure, g.x), f.f1 = _mm512_mul_pd(pressure, g.y), f.f2 = _mm512_mul_pd(pressure, g.z);
+  f.f3 = _mm512_setzero_pd();
+  transpose(f.f0, f.f1, f.f2, f.f3);
+}
+MSM_INLINE void add(Forces &a, const Forces &b) {
+  a.f0 = _mm512_add_pd(a.f0, b.f0), a.f1 = _mm512_add_pd(a.f1, b.f1), a.f2 = _mm512_add_pd(a.f2, b.f2), a.f3 = _mm512_add_pd(a.f3, b.f3);
+}
+// One cell after the other at each corner, corners 1 2 3 0, four cells at a time: the order of the other kernels.
+MSM_INLINE void spread_low(const Block &b, const Cell *c, int n, const Forces &f) {
+  add_to(b, c[0].p[n], low(f.f0)), add_to(b, c[1].p[n], low(f.f1)), add_to(b, c[2].p[n], low(f.f2)), add_to(b, c[3].p[n], low(f.f3));
+}
+MSM_INLINE void spread_high(const Block &b, const Cell *c, int n, const Forces &f) {
+  add_to(b, c[4].p[n], high(f.f0)), add_to(b, c[5].p[n], high(f.f1)), add_to(b, c[6].p[n], high(f.f2)), add_to(b, c[7].p[n], high(f.f3));
+}
+
+static void volume_cells8(const Block &b) {
+  for (uint32_t t = 0; t < b.cells; t += 8) {
+    const Cell *c = b.cell + t;
+    const __m512d o0 = corner(b, c, 0, 0), o1 = corner(b, c, 1, 0), o2 = corner(b, c, 2, 0), o3 = corner(b, c, 3, 0);
+    Edges8 e1, e2, e3, g1, g2, g3;
+    gather_edges(b, c, 1, o0, o1, o2, o3, e1);
+    gather_edges(b, c, 2, o0, o1, o2, o3, e2);
+    gather_edges(b, c, 3, o0, o1, o2, o3, e3);
+    cross(e2, e3, g1), cross(e3, e1, g2), cross(e1, e2, g3);
+    const __m512d volume6 = _mm512_add_pd(_mm512_add_pd(_mm512_mul_pd(e1.x, g1.x), _mm512_mul_pd(e1.y, g1.y)), _mm512_mul_pd(e1.z, g1.z));
+    const __m512d pressure = _mm512_mul_pd(_mm512_load_pd(b.bulk + t), _mm512_sub_pd(_mm512_load_pd(b.volume6 + t), volume6));
+    Forces f1, f2, f3, sum;
+    forces_at(pressure, g1, f1), forces_at(pressure, g2, f2), forces_at(pressure, g3, f3);
+    sum = f1, add(sum, f2), add(sum, f3);
+    spread_low(b, c, 1, f1), spread_low(b, c, 2, f2), spread_low(b, c, 3, f3);
+    take_from(b, c[0].p[0], low(sum.f0)), take_from(b, c[1].p[0], low(sum.f1));
+    take_from(b, c[2].p[0], low(sum.f2)), take_from(b, c[3].p[0], low(sum.f3));
+    spread_high(b, c, 1, f1), spread_high(b, c, 2, f2), spread_high(b, c, 3, f3);
+    take_from(b, c[4].p[0], high(sum.f0)), take_from(b, c[5].p[0], high(sum.f1));
+    take_from(b, c[6].p[0], high(sum.f2)), take_from(b, c[7].p[0], high(sum.f3));
+  }
+}
+
+constexpr Kernels kKernels = {"avx512", load_block, plain_springs8, damped_springs8, volume_cells8, cell_rows, merge_halo, add_to_host};
+
 }  // namespace
 
 const Kernels *kernels_avx512() { return &kKernels; }

@@ -1,5 +1,5 @@
-// Kernels on vectors of four doubles, for the files that offer `sqrt4`: the compiler splits them in two for SSE2.
-// Everything here has internal linkage (see house rules on wide kernels).
+// The kernels on vectors of four doubles, written once for the files that bring `v4` and its operations (msm_lanes_avx.h, or two
+// halves in msm_kernel_sse2.cpp). Everything here has internal linkage (see the house rules on wide kernels).
 #pragma once
 #include <stddef.h>
 
@@ -8,104 +8,125 @@
 namespace msm {
 namespace {
 
-typedef double v4 __attribute__((vector_size(32)));
-typedef double v4u __attribute__((vector_size(32), aligned(8)));
-typedef int64_t m4 __attribute__((vector_size(32)));
-
-#define MSM_INLINE static inline __attribute__((always_inline))
-
-MSM_INLINE void sqrt4(v4 &a);
-
-MSM_INLINE const v4 &at4(const double *p) { return *reinterpret_cast<const v4 *>(p); }
-MSM_INLINE v4 &at4(double *p) { return *reinterpret_cast<v4 *>(p); }
-
-// out[k] = (s_k.x + s_k.y) + (s_k.z + s_k.w)
-MSM_INLINE void sum_rows(const v4 &s0, const v4 &s1, const v4 &s2, const v4 &s3, v4 &out) {
-  const v4 a = __builtin_shufflevector(s0, s1, 0, 4, 2, 6) + __builtin_shufflevector(s0, s1, 1, 5, 3, 7);
-  const v4 b = __builtin_shufflevector(s2, s3, 0, 4, 2, 6) + __builtin_shufflevector(s2, s3, 1, 5, 3, 7);
-  out = __builtin_shufflevector(a, b, 0, 1, 4, 5) + __builtin_shufflevector(a, b, 2, 3, 6, 7);
+MSM_INLINE v4 point4(const Block &b, uint32_t n) { return load4(b.p + 8 * size_t(n)); }
+MSM_INLINE v4 velocity4(const Block &b, uint32_t n) { return load4(b.p + 8 * size_t(n) + 4); }
+MSM_INLINE void add_to(const Block &b, uint32_t n, v4 a) {
+  double *f = b.f + 4 * size_t(n);
+  store4(f, load4(f) + a);
+}
+MSM_INLINE void take_from(const Block &b, uint32_t n, v4 a) {
+  double *f = b.f + 4 * size_t(n);
+  store4(f, load4(f) - a);
 }
 
-MSM_INLINE void transpose(v4 &r0, v4 &r1, v4 &r2, v4 &r3) {
-  const v4 a = __builtin_shufflevector(r0, r1, 0, 4, 2, 6), b = __builtin_shufflevector(r0, r1, 1, 5, 3, 7);
-  const v4 c = __builtin_shufflevector(r2, r3, 0, 4, 2, 6), d = __builtin_shufflevector(r2, r3, 1, 5, 3, 7);
-  r0 = __builtin_shufflevector(a, c, 0, 1, 4, 5), r1 = __builtin_shufflevector(b, d, 0, 1, 4, 5);
-  r2 = __builtin_shufflevector(a, c, 2, 3, 6, 7), r3 = __builtin_shufflevector(b, d, 2, 3, 6, 7);
-}
-
-static void load_block(const Block &b, const double *x, const double *v, uint32_t stride) {
-  const m4 xyz = {-1, -1, -1, 0};
+static inline void load_block(const Block &b, const double *x, const double *v, uint32_t stride) {
   for (uint32_t n = 0; n < b.local; ++n) {
-    double *p = b.p + 8 * size_t(n);
     const size_t at = size_t(stride) * b.point[n];
-    if (stride >= 4) {  // the fourth lane is the host's: masked, whatever it holds
-      at4(p) = (v4)((m4) * reinterpret_cast<const v4u *>(x + at) & xyz);
-      if (v) at4(p + 4) = (v4)((m4) * reinterpret_cast<const v4u *>(v + at) & xyz);
-    } else {
-      at4(p) = v4{x[at], x[at + 1], x[at + 2], 0};
-      if (v) at4(p + 4) = v4{v[at], v[at + 1], v[at + 2], 0};
-    }
-    at4(b.f + 4 * size_t(n)) = v4{};
+    store4(b.p + 8 * size_t(n), load_xyz(x + at));
+    if (v) store4(b.p + 8 * size_t(n) + 4, load_xyz(v + at));
+    store4(b.f + 4 * size_t(n), splat(0));
   }
 }
 
 template <bool kDamped>
 MSM_INLINE void springs(const Block &b, double damp) {
-  for (uint32_t q = 0; q < b.quads; ++q) {
-    const Quad &quad = b.quad[q];
-    const double *pi = b.p + 8 * size_t(quad.i);
-    const double *p0 = b.p + 8 * size_t(quad.j[0]), *p1 = b.p + 8 * size_t(quad.j[1]);
-    const double *p2 = b.p + 8 * size_t(quad.j[2]), *p3 = b.p + 8 * size_t(quad.j[3]);
-    const v4 xi = at4(pi);
-    const v4 d0 = at4(p0) - xi, d1 = at4(p1) - xi, d2 = at4(p2) - xi, d3 = at4(p3) - xi;
-    v4 dd, stretch;
-    sum_rows(d0 * d0, d1 * d1, d2 * d2, d3 * d3, dd);
-    v4 length = dd;
-    sqrt4(length);
-    const v4 inverse = 1.0 / length;
-    stretch = (length - at4(b.rest + 4 * size_t(q))) * inverse;
+  for (uint32_t n = 0; n < b.quads; ++n) {
+    const Quad &q = b.quad[n];
+    const v4 xi = point4(b, q.i);
+    const v4 d0 = point4(b, q.j[0]) - xi, d1 = point4(b, q.j[1]) - xi, d2 = point4(b, q.j[2]) - xi, d3 = point4(b, q.j[3]) - xi;
+    const v4 dd = sum_rows(d0 * d0, d1 * d1, d2 * d2, d3 * d3), length = sqrt4(dd), inverse = splat(1.0) / length;
+    v4 stretch = (length - load4(b.rest + 4 * size_t(n))) * inverse;
     if constexpr (kDamped) {
-      const v4 vi = at4(pi + 4);
-      v4 rate;
-      sum_rows(d0 * (at4(p0 + 4) - vi), d1 * (at4(p1 + 4) - vi), d2 * (at4(p2 + 4) - vi), d3 * (at4(p3 + 4) - vi), rate);
-      stretch = stretch + damp * ((rate * inverse) * inverse);
+      const v4 vi = velocity4(b, q.i);
+      const v4 rate = sum_rows(d0 * (velocity4(b, q.j[0]) - vi), d1 * (velocity4(b, q.j[1]) - vi), d2 * (velocity4(b, q.j[2]) - vi),
+                               d3 * (velocity4(b, q.j[3]) - vi));
+      stretch = stretch + splat(damp) * ((rate * inverse) * inverse);
     }
-    const v4 scale = (v4)((m4)(at4(b.stiffness + 4 * size_t(q)) * stretch) & (m4)(dd > kShortestSquared));
-    const v4 f0 = scale[0] * d0, f1 = scale[1] * d1, f2 = scale[2] * d2, f3 = scale[3] * d3;
-    at4(b.f + 4 * size_t(quad.i)) += (f0 + f1) + (f2 + f3);
-    at4(b.f + 4 * size_t(quad.j[0])) -= f0;
-    at4(b.f + 4 * size_t(quad.j[1])) -= f1;
-    at4(b.f + 4 * size_t(quad.j[2])) -= f2;
-    at4(b.f + 4 * size_t(quad.j[3])) -= f3;
+    const v4 scale = zero_unless_above(load4(b.stiffness + 4 * size_t(n)) * stretch, dd, splat(kShortestSquared));
+    const v4 f0 = lane<0>(scale) * d0, f1 = lane<1>(scale) * d1, f2 = lane<2>(scale) * d2, f3 = lane<3>(scale) * d3;
+    add_to(b, q.i, (f0 + f1) + (f2 + f3));
+    take_from(b, q.j[0], f0), take_from(b, q.j[1], f1), take_from(b, q.j[2], f2), take_from(b, q.j[3], f3);
   }
 }
 
-static void plain_springs(const Block &b) { springs<false>(b, 0); }
-static void damped_springs(const Block &b, double damp) { springs<true>(b, damp); }
+static inline void plain_springs(const Block &b) { springs<false>(b, 0); }
+static inline void damped_springs(const Block &b, double damp) { springs<true>(b, damp); }
 
-static void volume_cells(const Block &b) {
+// Edges of four cells from their first corner to corner n, by component.
+struct Edges4 { v4 x, y, z; };
+MSM_INLINE void gather_edges(const Block &b, const Cell *c, int n, v4 o0, v4 o1, v4 o2, v4 o3, Edges4 &out) {
+  v4 unused = point4(b, c[3].p[n]) - o3;
+  out.x = point4(b, c[0].p[n]) - o0, out.y = point4(b, c[1].p[n]) - o1, out.z = point4(b, c[2].p[n]) - o2;
+  transpose(out.x, out.y, out.z, unused);
+}
+MSM_INLINE void gather_all(const Block &b, const Cell *c, Edges4 &e1, Edges4 &e2, Edges4 &e3) {
+  const v4 o0 = point4(b, c[0].p[0]), o1 = point4(b, c[1].p[0]), o2 = point4(b, c[2].p[0]), o3 = point4(b, c[3].p[0]);
+  gather_edges(b, c, 1, o0, o1, o2, o3, e1), gather_edges(b, c, 2, o0, o1, o2, o3, e2), gather_edges(b, c, 3, o0, o1, o2, o3, e3);
+}
+MSM_INLINE void cross(const Edges4 &a, const Edges4 &b, Edges4 &out) {
+  out.x = a.y * b.z - a.z * b.y, out.y = a.z * b.x - a.x * b.z, out.z = a.x * b.y - a.y * b.x;
+}
+MSM_INLINE v4 dot(const Edges4 &a, const Edges4 &b) { return (a.x * b.x + a.y * b.y) + a.z * b.z; }
+// Adds pressure * g to corner n of the four cells and hands the four forces back.
+MSM_INLINE void spread(const Block &b, const Cell *c, int n, v4 pressure, const Edges4 &g, v4 &f0, v4 &f1, v4 &f2, v4 &f3) {
+  f0 = pressure * g.x, f1 = pressure * g.y, f2 = pressure * g.z, f3 = splat(0);
+  transpose(f0, f1, f2, f3);
+  add_to(b, c[0].p[n], f0), add_to(b, c[1].p[n], f1), add_to(b, c[2].p[n], f2), add_to(b, c[3].p[n], f3);
+}
+
+static inline void volume_cells(const Block &b) {
   for (uint32_t t = 0; t < b.cells; t += 4) {
-    const Cell *cell = b.cell + t;
-    v4 edge[3][4];
-    for (int k = 0; k < 4; ++k) {
-      const v4 x0 = at4(b.p + 8 * size_t(cell[k].p[0]));
-      for (int n = 0; n < 3; ++n) edge[n][k] = at4(b.p + 8 * size_t(cell[k].p[n + 1])) - x0;
-    }
-    for (int n = 0; n < 3; ++n) transpose(edge[n][0], edge[n][1], edge[n][2], edge[n][3]);
-    const v4 *a = edge[0], *c = edge[1], *d = edge[2];
-    v4 g[3][4] = {{c[1] * d[2] - c[2] * d[1], c[2] * d[0] - c[0] * d[2], c[0] * d[1] - c[1] * d[0], {}},
-                  {d[1] * a[2] - d[2] * a[1], d[2] * a[0] - d[0] * a[2], d[0] * a[1] - d[1] * a[0], {}},
-                  {a[1] * c[2] - a[2] * c[1], a[2] * c[0] - a[0] * c[2], a[0] * c[1] - a[1] * c[0], {}}};
-    const v4 volume6 = (a[0] * g[0][0] + a[1] * g[0][1]) + a[2] * g[0][2];
-    const v4 pressure = at4(b.bulk + t) * (at4(b.volume6 + t) - volume6);
-    for (int n = 0; n < 3; ++n) {
-      for (int k = 0; k < 3; ++k) g[n][k] = pressure * g[n][k];
-      transpose(g[n][0], g[n][1], g[n][2], g[n][3]);
-    }
-    for (int k = 0; k < 4; ++k) {
-      at4(b.f + 4 * size_t(cell[k].p[0])) -= (g[0][k] + g[1][k]) + g[2][k];
-      for (int n = 0; n < 3; ++n) at4(b.f + 4 * size_t(cell[k].p[n + 1])) += g[n][k];
-    }
+    const Cell *c = b.cell + t;
+    Edges4 e1, e2, e3, g1, g2, g3;
+    gather_all(b, c, e1, e2, e3);
+    cross(e2, e3, g1), cross(e3, e1, g2), cross(e1, e2, g3);
+    const v4 pressure = load4(b.bulk + t) * (load4(b.volume6 + t) - dot(e1, g1));
+    v4 s0, s1, s2, s3, f0, f1, f2, f3;
+    spread(b, c, 1, pressure, g1, s0, s1, s2, s3);
+    spread(b, c, 2, pressure, g2, f0, f1, f2, f3);
+    s0 = s0 + f0, s1 = s1 + f1, s2 = s2 + f2, s3 = s3 + f3;
+    spread(b, c, 3, pressure, g3, f0, f1, f2, f3);
+    s0 = s0 + f0, s1 = s1 + f1, s2 = s2 + f2, s3 = s3 + f3;
+    take_from(b, c[0].p[0], s0), take_from(b, c[1].p[0], s1), take_from(b, c[2].p[0], s2), take_from(b, c[3].p[0], s3);
+  }
+}
+
+// Row sums of the second derivative of a cell's energy, k (g_a sum g_b + |6V - 6V0| 3 l): g_a = 6 |dV/dx_a|, l the longest edge, which
+// bounds the three opposite edges of the row's mixed derivatives. Added to lane 0 of f.
+static inline void cell_rows(const Block &b) {
+  for (uint32_t t = 0; t < b.cells; t += 4) {
+    const Cell *c = b.cell + t;
+    Edges4 e1, e2, e3, g1, g2, g3;
+    gather_all(b, c, e1, e2, e3);
+    cross(e2, e3, g1), cross(e3, e1, g2), cross(e1, e2, g3);
+    const Edges4 g0 = {(g1.x + g2.x) + g3.x, (g1.y + g2.y) + g3.y, (g1.z + g2.z) + g3.z};
+    const Edges4 a = {e2.x - e1.x, e2.y - e1.y, e2.z - e1.z}, d = {e3.x - e2.x, e3.y - e2.y, e3.z - e2.z};
+    const Edges4 h = {e1.x - e3.x, e1.y - e3.y, e1.z - e3.z};
+    const v4 longest = sqrt4(max4(max4(max4(dot(e1, e1), dot(e2, e2)), max4(dot(e3, e3), dot(a, a))), max4(dot(d, d), dot(h, h))));
+    const v4 more = abs4(dot(e1, g1) - load4(b.volume6 + t)) * (splat(3.0) * longest), k = load4(b.bulk + t);
+    const v4 n0 = sqrt4(dot(g0, g0)), n1 = sqrt4(dot(g1, g1)), n2 = sqrt4(dot(g2, g2)), n3 = sqrt4(dot(g3, g3));
+    const v4 sum = (n0 + n1) + (n2 + n3);
+    alignas(32) double row[4][4];
+    store4(row[0], k * (n0 * sum + more)), store4(row[1], k * (n1 * sum + more));
+    store4(row[2], k * (n2 * sum + more)), store4(row[3], k * (n3 * sum + more));
+    for (int n = 0; n < 4; ++n)
+      for (int m = 0; m < 4; ++m) b.f[4 * size_t(c[n].p[m])] += row[m][n];
+  }
+}
+
+static inline void merge_halo(double *f, const Merge *merge, uint32_t n) {
+  for (uint32_t m = 0; m < n; ++m) {
+    double *to = f + 4 * size_t(merge[m].to);
+    store4(to, load4(to) + load4(f + 4 * size_t(merge[m].from)));
+  }
+}
+
+static inline void add_to_host(const Block &b, double *f, uint32_t stride) {
+  for (uint32_t n = 0; n < b.owned; ++n) {
+    double *out = f + size_t(stride) * b.point[n];
+    const double *sum = b.f + 4 * size_t(n);
+    _mm_storeu_pd(out, _mm_add_pd(_mm_loadu_pd(out), _mm_load_pd(sum)));
+    out[2] += sum[2];
   }
 }
 

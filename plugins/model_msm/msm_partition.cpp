@@ -8,7 +8,7 @@
 namespace msm {
 namespace {
 
-constexpr uint32_t kBlockPoints = 512, kLeafPoints = 4;
+constexpr uint32_t kBlockPoints = 1024, kLeafPoints = 4;
 
 struct Partition {
   const double *rest;

@@ -13,7 +13,7 @@ BELOW = {
     "libdeform/doc": {"README.md", "concepts", "models", "laws", "howto", "decisions", "images"},
     "bindings": {"CMakeLists.txt", "cli", "render", "ode", "bullet", "python"},
     "tests": {"CMakeLists.txt", "support", "data", "unit", "analytic", "stability", "api", "plugin", "determinism", "adapters",
-              "fuzz", "lint", "bench", "abi"},
+              "fuzz", "lint", "bench", "abi", "render"},
 }
 PLUGIN_FOLDER = re.compile(r"plugins/(CMakeLists\.txt|(model|friction|solver|template)_[a-z0-9_]+)$")
 MAX_LINES = 800

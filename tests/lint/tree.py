@@ -1,6 +1,7 @@
 """The files that the rules look at, and text helpers that several rules share."""
 import pathlib
 import re
+import shutil
 import subprocess
 
 CODE = (".c", ".cpp", ".h", ".hpp", ".inl")
@@ -15,7 +16,7 @@ class Tree:
         self._text = {}
 
     def _list(self):
-        if (self.root / ".git").exists():
+        if (self.root / ".git").exists() and shutil.which("git"):
             out = subprocess.run(["git", "-c", "safe.directory=*", "-C", self.root, "ls-files", "-co", "--exclude-standard", "-z"],
                                  capture_output=True, text=True)
             if out.returncode == 0:

@@ -142,49 +142,57 @@ inline Mesh kuhn_bar(uint32_t nx, uint32_t ny, uint32_t nz, double h, double noi
   return m;
 }
 
-// Points and tetrahedra of an MSH 2.2 file, text or binary.
-inline Mesh read_msh22(const std::string &path) {
+// Points and tetrahedra of an MSH file, 2.2 or 4.1, text or binary.
+inline Mesh read_msh(const std::string &path) {
   Mesh m;
   std::ifstream in(path, std::ios::binary);
   std::string word;
   bool binary = false;
-  std::map<int, uint32_t> number;
-  const auto raw = [&](auto &value) { in.read(reinterpret_cast<char *>(&value), sizeof value); };
+  double version = 0;
+  std::map<size_t, uint32_t> number;
+  const auto get = [&](auto &...value) {
+    if (binary) (in.read(reinterpret_cast<char *>(&value), sizeof value), ...);
+    else (in >> ... >> value);
+  };
+  const auto point = [&](size_t tag) {
+    Vec x;
+    get(x[0], x[1], x[2]);
+    number[tag] = m.npoint(), m.rest.insert(m.rest.end(), x.begin(), x.end());
+  };
+  const auto cell = [&](int type, auto node) {  // type: 1 line, 2 triangle, 4 tetrahedron, 15 point
+    for (int k = 0; k < (type == 4 ? 4 : type == 2 ? 3 : type == 1 ? 2 : 1); ++k) {
+      get(node);
+      if (type == 4) m.cells.push_back(number.at(size_t(node)));
+    }
+  };
   while (in >> word) {
+    int entity[3], id, skip;
+    size_t blocks, count, lowest, highest, tag;
     if (word == "$MeshFormat") {
-      double version;
-      int kind, size;
-      in >> version >> kind >> size, binary = kind == 1;
-    } else if (word == "$Nodes") {
-      size_t n;
-      in >> n, in.ignore(1);
-      for (size_t i = 0; i < n; ++i) {
-        int id;
-        Vec x;
-        if (binary) raw(id), raw(x);
-        else in >> id >> x[0] >> x[1] >> x[2];
-        number[id] = uint32_t(i), m.rest.insert(m.rest.end(), x.begin(), x.end());
+      in >> version >> skip >> id, binary = skip == 1;
+    } else if (version > 4 && (word == "$Nodes" || word == "$Elements")) {
+      in.ignore(1);
+      get(blocks, count, lowest, highest);
+      for (size_t b = 0; b < blocks; ++b) {
+        get(entity[0], entity[1], entity[2], count);  // dimension, tag, parametric or type
+        std::vector<size_t> tags(word == "$Nodes" ? count : 0);
+        for (size_t &t : tags) get(t);
+        for (size_t t : tags) point(t);
+        for (size_t e = 0; word == "$Elements" && e < count; ++e) get(tag), cell(entity[2], tag);
       }
+    } else if (word == "$Nodes") {
+      in >> count, in.ignore(1);
+      for (size_t n = 0; n < count; ++n) get(id), point(size_t(id));
     } else if (word == "$Elements") {
-      size_t n;
-      in >> n, in.ignore(1);
-      const auto nodes_of = [](int type) { return type == 4 ? 4 : type == 2 ? 3 : type == 1 ? 2 : 1; };
-      for (size_t e = 0; e < n;) {
-        int head[3], id, skip, count = 1, tags;  // type, how many, tags
-        if (binary) raw(head), count = head[1], tags = head[2];
-        else in >> id >> head[0] >> tags;
-        for (int c = 0; c < count; ++c, ++e) {
-          if (binary) raw(id);
-          for (int t = 0; t < tags; ++t) {
-            if (binary) raw(skip);
-            else in >> skip;
-          }
-          for (int k = 0; k < nodes_of(head[0]); ++k) {
-            int node;
-            if (binary) raw(node);
-            else in >> node;
-            if (head[0] == 4) m.cells.push_back(number.at(node));
-          }
+      in >> count, in.ignore(1);
+      for (size_t e = 0; e < count;) {
+        int type, many = 1, tags;
+        if (binary) get(type, many, tags);
+        else in >> id >> type >> tags;
+        for (int c = 0; c < many; ++c, ++e) {
+          if (binary) get(id);
+          for (int t = 0; t < tags; ++t) get(skip);
+          cell(type, id);
         }
       }
     }

@@ -7,19 +7,22 @@
 extern "C" {
 #endif
 /** Reads MSH 2.2 and 4.1 (ASCII, binary) and legacy VTK (ASCII, binary; 2.0 to 5.1) with tetrahedra. Memory is bounded by the file's size.
- * Negative cells are turned, unused points dropped, duplicate cells dropped, each with a count in a warning on the log and in dfm_tetmesh_info.
+ * Negative cells are turned, unused points and duplicate cells dropped, each with a count in a warning on the log and in dfm_tetmesh_info.
+ * A cell without volume is refused: it has no rest shape.
  * @return DFM_OK; DFM_E_IO; DFM_E_FORMAT (file, line or byte, what was expected); DFM_E_UNSUPPORTED (how to convert); DFM_E_NOMEM
  * Threads: Any thread. Since 0.1. */
 DFM_API dfm_status dfm_tetmesh_read(dfm_context *context, const char *path, dfm_tetmesh *out);
-/** Generators, SI units, about `cells` tetrahedra (at least one layer).
- * "cylinder": size = {radius, length, 0}, axis z from 0 to length, base at the origin; "beam": size = {x, y, z} edges from the origin, along x first;
- * "ball": size = {radius, 0, 0}, about the origin. @return DFM_OK; DFM_E_ARG. Threads: Any thread. Since 0.1. */
+/** Generators, SI units, about `cells` tetrahedra: a number near it that the shape's lattice offers, more where cells would otherwise be
+ * longer than twice their width.
+ * "cylinder": size = {radius, length, 0}, axis z from 0 to length, base at the origin; "beam": size = {x, y, z} edges from the origin;
+ * "ball": size = {radius, 0, 0}, about the origin. @return DFM_OK; DFM_E_ARG; DFM_E_NOMEM. Threads: Any thread. Since 0.1. */
 DFM_API dfm_status dfm_tetmesh_make(dfm_context *context, const char *kind, const double size[3], uint32_t cells, dfm_tetmesh *out);
+/** @return DFM_OK; DFM_E_HANDLE. Threads: Any thread, with nobody using the mesh or its arrays. Since 0.1. */
 DFM_API dfm_status dfm_tetmesh_destroy(dfm_tetmesh mesh);
 
 typedef struct dfm_tetmesh_info {
   uint32_t size, npoint, ntet, ntriangle, nedge, npiece;   /* triangles of the boundary; edges of the cells; connected pieces */
-  uint32_t turned, dropped_points, dropped_cells, flat_cells, duplicate_points, nonmanifold_edges, ngroup, reserved;
+  uint32_t turned, dropped_points, dropped_cells, flat_cells, duplicate_points, nonmanifold_edges, overlapping_faces, ngroup;
   double volume, edge_min, edge_median, edge_max;          /* m3, m */
   double quality_min, quality_mean; uint32_t quality_histogram[10];   /* mean ratio, 1 for a regular tetrahedron; bins of 0.1 */
   double lo[3], hi[3];
@@ -27,13 +30,20 @@ typedef struct dfm_tetmesh_info {
 } dfm_tetmesh_info;
 /** Counts, sizes and what reading repaired. Threads: Any thread. Since 0.1. */
 DFM_API dfm_status dfm_tetmesh_get_info(dfm_tetmesh mesh, dfm_tetmesh_info *out);
-/** Borrowed arrays, valid while the mesh lives: points [npoint,3], tets [ntet,4], file_point [npoint] number of each point in the file's order.
+/** Borrowed arrays, valid while the mesh lives: points [npoint,3], tets [ntet,4], file_point [npoint] 0-based place in the file.
  * Each out may be NULL. Threads: Any thread. Since 0.1. */
 DFM_API dfm_status dfm_tetmesh_data(dfm_tetmesh mesh, const double **points, const uint32_t **tets, const uint32_t **file_point);
-/** Physical groups: name of group k and, per cell, its group (UINT32_MAX none). Threads: Any thread. Since 0.1. */
+/** Physical groups, [ngroup], of all dimensions: name of group k (its number where it has none); per cell, its group (UINT32_MAX none).
+ * Each out may be NULL; valid while the mesh lives. Threads: Any thread. Since 0.1. */
 DFM_API dfm_status dfm_tetmesh_groups(dfm_tetmesh mesh, const char *const **names, const uint32_t **cell_group);
-/** Writes MSH 4.1 or 2.2 binary ("*.msh"), legacy VTK ("*.vtk") by file name ending; to a temporary name first, so never half a file.
- * Threads: Any thread. Since 0.1. */
+/** Points of the elements of a group, ascending: a named surface may be held or loaded by them.
+ * @param dimension  out, of the group's elements: 0 points, 1 lines, 2 triangles, 3 cells
+ * @param points     out, borrowed, [n]. Each out may be NULL
+ * @return DFM_OK; DFM_E_ARG no such group; DFM_E_HANDLE. Threads: Any thread. Since 0.1. */
+DFM_API dfm_status dfm_tetmesh_group_points(dfm_tetmesh mesh, uint32_t group, uint32_t *dimension, const uint32_t **points, uint32_t *n);
+/** Writes binary MSH 4.1 ("*.msh"), MSH 2.2 ("*.msh2") or legacy VTK ("*.vtk", without groups) by file name ending; to a temporary
+ * name first, so never half a file. Groups of points, lines and triangles are not written.
+ * @return DFM_OK; DFM_E_IO; DFM_E_UNSUPPORTED another ending. Threads: Any thread. Since 0.1. */
 DFM_API dfm_status dfm_tetmesh_write(dfm_tetmesh mesh, const char *path);
 #ifdef __cplusplus
 }

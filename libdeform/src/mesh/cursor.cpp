@@ -9,7 +9,7 @@ void Cursor::refuse_as(dfm_status status, const char *sentence, va_list args) co
   char text[768];
   std::vsnprintf(text, sizeof text, sentence, args);
   if (binary) fail(status, "%s, byte %zu: %s", path_.c_str(), offset(), text);
-  fail(status, "%s:%zu: %s", path_.c_str(), 1 + static_cast<size_t>(std::count(begin_, p_, '\n')), text);
+  fail(status, "%s:%zu: %s", path_.c_str(), 1 + size_t(std::count(begin_, p_, '\n')), text);
 }
 
 void Cursor::refuse(const char *sentence, ...) const {

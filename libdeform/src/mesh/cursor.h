@@ -14,6 +14,10 @@
 
 namespace dfm {
 
+// For sentences: printf has no name of its own for 64 bits.
+inline long long ll(int64_t n) { return n; }
+inline unsigned long long ull(uint64_t n) { return n; }
+
 class Cursor {
  public:
   Cursor(const std::string &path, const char *begin, size_t bytes) : path_(path), begin_(begin), p_(begin), end_(begin + bytes) {}
@@ -22,8 +26,8 @@ class Cursor {
   bool swap = false;    // binary values have the other byte order
 
   const std::string &path() const { return path_; }
-  size_t left() const { return static_cast<size_t>(end_ - p_); }
-  size_t offset() const { return static_cast<size_t>(p_ - begin_); }
+  size_t left() const { return size_t(end_ - p_); }
+  size_t offset() const { return size_t(p_ - begin_); }
   void seek(size_t offset) { p_ = begin_ + offset; }
 
   // Throws "FILE:12: " or "FILE, byte 345: " and then the sentence; DFM_E_FORMAT.
@@ -37,12 +41,12 @@ class Cursor {
     skip_space();
     const char *from = p_;
     while (p_ < end_ && !is_space(*p_)) ++p_;
-    return {from, static_cast<size_t>(p_ - from)};
+    return {from, size_t(p_ - from)};
   }
   std::string_view line() {  // the rest of this line without its end; moves past it
     const char *from = p_;
     while (p_ < end_ && *p_ != '\n') ++p_;
-    std::string_view text(from, static_cast<size_t>(p_ - from));
+    std::string_view text(from, size_t(p_ - from));
     if (p_ < end_) ++p_;
     if (!text.empty() && text.back() == '\r') text.remove_suffix(1);
     return text;
@@ -84,10 +88,10 @@ class Cursor {
   }
   // Numbers that the file promises before it shows them: refused when the bytes left cannot hold them.
   uint64_t count(int64_t claimed, size_t least_bytes_each, const char *what) const {
-    if (claimed < 0) refuse("promises %lld %s; a count cannot be negative", static_cast<long long>(claimed), what);
+    if (claimed < 0) refuse("promises %lld %s; a count cannot be negative", ll(claimed), what);
     if (static_cast<uint64_t>(claimed) > left() / least_bytes_each)
       refuse("promises %lld %s, but the %zu bytes left in the file cannot hold them: the file is truncated or its count is wrong",
-             static_cast<long long>(claimed), what, left());
+             ll(claimed), what, left());
     return static_cast<uint64_t>(claimed);
   }
 

@@ -24,14 +24,14 @@ Array<char> read_whole_file(const Memory &memory, const std::string &path) {
   if (fstat(file.fd, &status) != 0) fail(DFM_E_IO, "%s: %s", path.c_str(), std::strerror(errno));
   if (!S_ISREG(status.st_mode))
     fail(DFM_E_IO, "%s: is %s; give the name of a mesh file", path.c_str(), S_ISDIR(status.st_mode) ? "a directory" : "not a regular file");
-  Array<char> bytes(static_cast<size_t>(status.st_size), HookAllocator<char>(memory));
+  Array<char> bytes(size_t(status.st_size), HookAllocator<char>(memory));
   size_t done = 0;
   while (done < bytes.size()) {
     const ssize_t n = read(file.fd, bytes.data() + done, bytes.size() - done);
     if (n < 0 && errno == EINTR) continue;
     if (n < 0) fail(DFM_E_IO, "%s: cannot be read: %s", path.c_str(), std::strerror(errno));
     if (n == 0) break;  // the file shrank meanwhile; the reader will miss its end marker
-    done += static_cast<size_t>(n);
+    done += size_t(n);
   }
   bytes.resize(done);
   return bytes;

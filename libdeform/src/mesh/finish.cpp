@@ -1,5 +1,5 @@
-// From what a file says to a mesh a body can be made of. Order matters: unsound input is refused first (indices, flat cells), then cells are
-// turned, doubles dropped and points renumbered; what was done is counted and told. All thresholds are relative: a cell counts as flat when its
+// From what a file says to a mesh a body can be made of. Order matters: unsound input is refused first (flat cells), then cells are turned,
+// doubles dropped and points renumbered; what was done is counted and told. All thresholds are relative: a cell counts as flat when its
 // volume is not above the rounding of its own coordinates, so bodies of nanometres and of 100 km load alike.
 #include <algorithm>
 #include <array>
@@ -22,7 +22,8 @@ struct CellShape { double volume6, edge_max, reach; };  // reach: largest coordi
 CellShape cell_shape(const double *points, const uint32_t *tet) {
   CellShape s{6 * tet_volume(points, tet), 0, 0};
   double longest2 = 0;
-  for (const auto &e : kTetEdge) longest2 = std::max(longest2, norm2(load3(points + 3 * size_t(tet[e[0]])) - load3(points + 3 * size_t(tet[e[1]]))));
+  for (const auto &e : kTetEdge)
+    longest2 = std::max(longest2, norm2(load3(points + 3 * size_t(tet[e[0]])) - load3(points + 3 * size_t(tet[e[1]]))));
   s.edge_max = std::sqrt(longest2);
   for (int k = 0; k < 4; ++k)
     for (int c = 0; c < 3; ++c) s.reach = std::max(s.reach, std::fabs(points[3 * size_t(tet[k]) + c]));
@@ -35,19 +36,20 @@ bool is_flat(const CellShape &s) { return !(std::fabs(s.volume6) > 8 * DBL_EPSIL
 void check_points(const std::string &path, const Array<double> &points) {
   for (size_t i = 0; i < points.size(); ++i)
     if (!(std::fabs(points[i]) <= kLargestCoordinate))
-      fail(DFM_E_FORMAT, "%s: point %zu (counted from 0) has the coordinate %g m; coordinates up to %g m are read", path.c_str(), i / 3, points[i],
-           kLargestCoordinate);
+      fail(DFM_E_FORMAT, "%s: point %zu (counted from 0) has the coordinate %g m; coordinates up to %g m are read", path.c_str(), i / 3,
+           points[i], kLargestCoordinate);
 }
 
 void refuse_flat(const std::string &path, const RawMesh &raw) {
-  const uint32_t ntet = static_cast<uint32_t>(raw.tets.size() / 4);
+  const uint32_t ntet = uint32_t(raw.tets.size() / 4);
   uint32_t flat = 0, first = 0;
   for (uint32_t t = 0; t < ntet; ++t)
     if (is_flat(cell_shape(raw.points.data(), &raw.tets[4 * size_t(t)])) && flat++ == 0) first = t;
   if (flat == 0) return;
   const uint32_t *c = &raw.tets[4 * size_t(first)];
   if (flat == ntet)
-    fail(DFM_E_FORMAT, "%s: all %u tetrahedra are flat (no volume): the points of each lie in one plane; a body needs a volume mesh", path.c_str(), ntet);
+    fail(DFM_E_FORMAT, "%s: all %u tetrahedra are flat (no volume): the points of each lie in one plane; a body needs a volume mesh",
+         path.c_str(), ntet);
   fail(DFM_E_FORMAT, "%s: %u of %u tetrahedra %s flat (no volume), the first is tetrahedron %u (counted from 0) on points %u %u %u %u; remove slivers in the mesher",
        path.c_str(), flat, ntet, flat == 1 ? "is" : "are", first, c[0], c[1], c[2], c[3]);
 }
@@ -64,7 +66,7 @@ void drop_duplicates(RawMesh &raw, TetMesh &mesh) {
     uint32_t cell;
     bool operator<(const Key &o) const { return corner != o.corner ? corner < o.corner : cell < o.cell; }
   };
-  const uint32_t ntet = static_cast<uint32_t>(raw.tets.size() / 4);
+  const uint32_t ntet = uint32_t(raw.tets.size() / 4);
   Array<Key> keys{HookAllocator<Key>(*raw.memory)};
   keys.reserve(ntet);
   for (uint32_t t = 0; t < ntet; ++t) {
@@ -92,12 +94,12 @@ void renumber(RawMesh &raw, TetMesh &mesh) {
   const Memory &memory = *raw.memory;
   Array<uint32_t> number(raw.npoint(), kNoGroup, HookAllocator<uint32_t>(memory));
   for (const uint32_t p : raw.tets) number[p] = 0;
-  const uint32_t kept = static_cast<uint32_t>(std::count(number.begin(), number.end(), 0u));
+  const uint32_t kept = uint32_t(std::count(number.begin(), number.end(), 0u));
   mesh.dropped_points = raw.npoint() - kept;
   mesh.file_point.reserve(kept);
   for (uint32_t p = 0; p < number.size(); ++p)
     if (number[p] == 0) {
-      number[p] = static_cast<uint32_t>(mesh.file_point.size());
+      number[p] = uint32_t(mesh.file_point.size());
       mesh.file_point.push_back(p);
     }
   for (size_t i = 0; i < kept; ++i) std::copy_n(&raw.points[3 * size_t(mesh.file_point[i])], 3, &raw.points[3 * i]);
@@ -123,7 +125,7 @@ void renumber(RawMesh &raw, TetMesh &mesh) {
 
 // Groups by dimension and number, whatever order the file has them in.
 void sort_groups(RawMesh &raw) {
-  const uint32_t n = static_cast<uint32_t>(raw.groups.size());
+  const uint32_t n = uint32_t(raw.groups.size());
   std::vector<uint32_t> order(n), place(n);
   for (uint32_t g = 0; g < n; ++g) order[g] = g;
   std::sort(order.begin(), order.end(), [&](uint32_t a, uint32_t b) {
@@ -157,16 +159,23 @@ void add_warnings(TetMesh &mesh, uint32_t crowded) {
   const auto some = [](uint32_t n) { return n == 1 ? "" : "s"; };
   if (mesh.turned) warn(format("%u of %u cells had negative volume and %s turned", mesh.turned, s.ntet, was(mesh.turned)));
   if (mesh.overlapping)
-    warn(format("the mesh is tangled: across %u face%s both cells lie on the same side, so they overlap; mesh the shape anew", mesh.overlapping, some(mesh.overlapping)));
+    warn(format("the mesh is tangled: across %u face%s both cells lie on the same side, so they overlap; mesh the shape anew",
+                mesh.overlapping, some(mesh.overlapping)));
   if (crowded) warn(format("%u face%s shared by more than two cells; the cells there overlap", crowded, crowded == 1 ? " is" : "s are"));
-  if (mesh.dropped_cells) warn(format("%u duplicate cell%s %s dropped", mesh.dropped_cells, some(mesh.dropped_cells), was(mesh.dropped_cells)));
-  if (mesh.dropped_points) warn(format("%u point%s that no tetrahedron uses %s dropped", mesh.dropped_points, some(mesh.dropped_points), was(mesh.dropped_points)));
+  if (mesh.dropped_cells)
+    warn(format("%u duplicate cell%s %s dropped", mesh.dropped_cells, some(mesh.dropped_cells), was(mesh.dropped_cells)));
+  if (mesh.dropped_points)
+    warn(format("%u point%s that no tetrahedron uses %s dropped", mesh.dropped_points, some(mesh.dropped_points),
+                was(mesh.dropped_points)));
   if (s.duplicate_points)
-    warn(format("%u point%s %s exactly at another point's place; cells that meet there are not joined", s.duplicate_points, some(s.duplicate_points), s.duplicate_points == 1 ? "lies" : "lie"));
+    warn(format("%u point%s %s exactly at another point's place; cells that meet there are not joined", s.duplicate_points,
+                some(s.duplicate_points), s.duplicate_points == 1 ? "lies" : "lie"));
   if (s.nonmanifold_edges)
-    warn(format("%u edge%s of the surface %s used by more than two triangles", s.nonmanifold_edges, some(s.nonmanifold_edges), be(s.nonmanifold_edges)));
+    warn(format("%u edge%s of the surface %s used by more than two triangles", s.nonmanifold_edges, some(s.nonmanifold_edges),
+                be(s.nonmanifold_edges)));
   if (s.flat_cells)
-    warn(format("%u cell%s %s nearly flat (mean ratio below 0.01, least %.3g); they force small explicit steps", s.flat_cells, some(s.flat_cells), be(s.flat_cells), s.quality_min));
+    warn(format("%u cell%s %s nearly flat (mean ratio below 0.01, least %.3g); they force small explicit steps", s.flat_cells,
+                some(s.flat_cells), be(s.flat_cells), s.quality_min));
   double reach = 0;
   for (int k = 0; k < 3; ++k) reach = std::max({reach, std::fabs(s.lo[k]), std::fabs(s.hi[k])});
   if (DBL_EPSILON * reach > kCoarseCoordinates * s.edge_min)
@@ -177,7 +186,8 @@ void add_warnings(TetMesh &mesh, uint32_t crowded) {
 
 TetMesh finish_mesh(const std::string &path, RawMesh &&raw) {
   TetMesh mesh(*raw.memory);
-  if (raw.tets.empty()) fail(DFM_E_FORMAT, "%s: no tetrahedra in this file; a body needs a volume mesh (a surface alone is not available yet)", path.c_str());
+  if (raw.tets.empty())
+    fail(DFM_E_FORMAT, "%s: no tetrahedra in this file; a body needs a volume mesh (a surface alone is not available yet)", path.c_str());
   check_points(path, raw.points);
   refuse_flat(path, raw);
   turn_negative(raw, mesh);

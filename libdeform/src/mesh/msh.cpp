@@ -52,27 +52,27 @@ void NodeNumbers::finish(const Cursor &in) {
     std::sort(tags_.begin(), tags_.end());
   }
   const auto twice = std::adjacent_find(tags_.begin(), tags_.end());
-  if (twice != tags_.end()) in.refuse("node number %lld is given twice", static_cast<long long>(*twice));
+  if (twice != tags_.end()) in.refuse("node number %lld is given twice", ll(*twice));
 }
 
 uint32_t NodeNumbers::find(const Cursor &in, int64_t tag) const {
   size_t at;
   if (!tags_.empty() && tag >= tags_.front() && tag <= tags_.back()) {
-    at = static_cast<size_t>(uint64_t(tag) - uint64_t(tags_.front()));  // where numbers have no gaps, this is the place
-    if (at >= tags_.size() || tags_[at] != tag) at = static_cast<size_t>(std::lower_bound(tags_.begin(), tags_.end(), tag) - tags_.begin());
-    if (tags_[at] == tag) return order_.empty() ? static_cast<uint32_t>(at) : order_[at];
+    at = size_t(uint64_t(tag) - uint64_t(tags_.front()));  // where numbers have no gaps, this is the place
+    if (at >= tags_.size() || tags_[at] != tag) at = size_t(std::lower_bound(tags_.begin(), tags_.end(), tag) - tags_.begin());
+    if (tags_[at] == tag) return order_.empty() ? uint32_t(at) : order_[at];
   }
-  in.refuse("an element uses node %lld, which the file does not define", static_cast<long long>(tag));
+  in.refuse("an element uses node %lld, which the file does not define", ll(tag));
 }
 
 uint32_t ElementSink::begin(const Cursor &in, int64_t type) {
   element_ = msh_element(type);
-  if (element_.points == 0) in.refuse("element type %lld is not known; 4 is a tetrahedron", static_cast<long long>(type));
+  if (element_.points == 0) in.refuse("element type %lld is not known; 4 is a tetrahedron", ll(type));
   if (element_.dimension == 3 && type != 4) {
     const bool tet = type == 11 || (type >= 29 && type <= 31);
     in.unsupported(tet ? "second- or higher-order tetrahedra (element type %lld, %u points); %s"
                        : "element type %lld (%u points) is a hexahedron, prism or pyramid; only tetrahedra are read: mesh the volume with tetrahedra, or split the cells; then %s",
-                   static_cast<long long>(type), element_.points, kConvertMsh);
+                   ll(type), element_.points, kConvertMsh);
   }
   return element_.points;
 }
@@ -91,7 +91,7 @@ void ElementSink::add(const Cursor &in, uint32_t group, const int64_t *tags) {
 }
 
 int32_t msh_int(const Cursor &in, int64_t value, const char *what) {
-  if (value < INT32_MIN || value > INT32_MAX) in.refuse("%s %lld does not fit 32 bits", what, static_cast<long long>(value));
+  if (value < INT32_MIN || value > INT32_MAX) in.refuse("%s %lld does not fit 32 bits", what, ll(value));
   return static_cast<int32_t>(value);
 }
 
@@ -105,11 +105,12 @@ void read_physical_names(Cursor &in, RawMesh &out) {
   const uint64_t n = in.count(in.integer("the number of physical names"), 6, "physical names");
   for (uint64_t i = 0; i < n; ++i) {
     const int64_t dimension = in.integer("a physical group's dimension");
-    if (dimension < 0 || dimension > 3) in.refuse("a physical group of dimension %lld; expected 0 to 3", static_cast<long long>(dimension));
+    if (dimension < 0 || dimension > 3) in.refuse("a physical group of dimension %lld; expected 0 to 3", ll(dimension));
     const int32_t tag = msh_int(in, in.integer("a physical group's number"), "the physical group number");
     const std::string_view text = in.line();
     const size_t open = text.find('"'), close = text.rfind('"');
-    if (open == std::string_view::npos || close == open) in.refuse("expected a physical group's name in double quotes, found %s", Cursor::quote(text.empty() ? " " : text).c_str());
+    if (open == std::string_view::npos || close == open)
+      in.refuse("expected a physical group's name in double quotes, found %s", Cursor::quote(text.empty() ? " " : text).c_str());
     const uint32_t group = out.group(in, static_cast<int32_t>(dimension), tag);
     if (group != kNoGroup && close > open + 1) out.groups[group].name.assign(text.substr(open + 1, close - open - 1));
   }
@@ -131,8 +132,8 @@ void read_msh(Cursor &in, RawMesh &out) {
     if (version == 1.0 || version == 4.0 || version == 3.0) in.unsupported("MSH version %g is not available yet; %s", version, kConvertMsh);
     in.unsupported("MSH version %g is not known; 2.2 and 4.1 are read", version);
   }
-  if (type != 0 && type != 1) in.refuse("file type %lld; expected 0 (ASCII) or 1 (binary)", static_cast<long long>(type));
-  if (size != 8 && !(four && size == 4)) in.refuse("data size %lld; expected 8", static_cast<long long>(size));
+  if (type != 0 && type != 1) in.refuse("file type %lld; expected 0 (ASCII) or 1 (binary)", ll(type));
+  if (size != 8 && !(four && size == 4)) in.refuse("data size %lld; expected 8", ll(size));
   if (type == 1) {
     in.end_line("the data size");
     in.binary = true;
@@ -142,7 +143,7 @@ void read_msh(Cursor &in, RawMesh &out) {
   }
   in.expect("$EndMeshFormat", "the format");
   if (two) read_msh22(in, out);
-  else read_msh41(in, out, static_cast<size_t>(size));
+  else read_msh41(in, out, size_t(size));
 }
 
 }  // namespace dfm

@@ -24,7 +24,7 @@ constexpr const char *kReadable = "MSH 2.2 and 4.1 (.msh) and legacy VTK (.vtk) 
 
 uint32_t RawMesh::group(const Cursor &at, int32_t dimension, int32_t tag) {
   if (tag == 0) return kNoGroup;
-  const auto [entry, fresh] = group_index_.try_emplace({dimension, tag}, static_cast<uint32_t>(groups.size()));
+  const auto [entry, fresh] = group_index_.try_emplace({dimension, tag}, uint32_t(groups.size()));
   if (fresh) {
     if (groups.size() == kMaxGroups) at.refuse("more than %u physical groups", kMaxGroups);
     groups.push_back({std::to_string(tag), dimension, tag, Array<uint32_t>(HookAllocator<uint32_t>(*memory))});
@@ -38,8 +38,8 @@ TetMesh read_tet_mesh(const Memory &memory, const std::string &path) {
   if (!msh && !vtk) {
     static const std::vector<std::string> later{"vtu", "mesh", "obj", "ply", "stl", "off", "node", "ele", "inp"};
     if (std::find(later.begin(), later.end(), kind) != later.end())
-      fail(DFM_E_UNSUPPORTED, "%s: reading .%s is not available yet; %s, so convert it first (for instance with meshio or gmsh)", path.c_str(),
-           kind.c_str(), kReadable);
+      fail(DFM_E_UNSUPPORTED, "%s: reading .%s is not available yet; %s, so convert it first (for instance with meshio or gmsh)",
+           path.c_str(), kind.c_str(), kReadable);
     fail(DFM_E_UNSUPPORTED, "%s: unknown mesh file ending '%s'; %s", path.c_str(), kind.c_str(), kReadable);
   }
   const Array<char> bytes = read_whole_file(memory, path);

@@ -25,7 +25,7 @@ void read_text_elements(Cursor &in, RawMesh &out, ElementSink &sink) {
     const int64_t type = in.integer("an element's type");
     const uint32_t points = sink.begin(in, type);
     const int64_t ntag = in.integer("an element's number of tags");
-    if (ntag < 0) in.refuse("an element with %lld tags", static_cast<long long>(ntag));
+    if (ntag < 0) in.refuse("an element with %lld tags", ll(ntag));
     int32_t physical = 0;
     for (int64_t k = 0; k < ntag; ++k) {
       const int64_t tag = in.integer("an element's tag");
@@ -42,9 +42,10 @@ void read_binary_elements(Cursor &in, RawMesh &out, ElementSink &sink) {
   in.end_line("the number of elements");
   int64_t tags[kMaxElementPoints];
   for (uint64_t i = 0; i < n;) {
-    const int32_t type = in.value<int32_t>("an element's type"), follow = in.value<int32_t>("a run of elements"), ntag = in.value<int32_t>("a number of tags");
+    const int32_t type = in.value<int32_t>("an element's type"), follow = in.value<int32_t>("a run of elements");
+    const int32_t ntag = in.value<int32_t>("a number of tags");
     const uint32_t points = sink.begin(in, type);
-    if (follow <= 0 || uint64_t(follow) > n - i) in.refuse("a run of %d elements where %llu are left", follow, static_cast<unsigned long long>(n - i));
+    if (follow <= 0 || uint64_t(follow) > n - i) in.refuse("a run of %d elements where %llu are left", follow, ull(n - i));
     if (ntag < 0) in.refuse("elements with %d tags", ntag);
     in.count(follow, 4 * (1 + size_t(ntag) + points), "elements in a run");
     for (int32_t e = 0; e < follow; ++e, ++i) {
@@ -81,7 +82,8 @@ void read_msh22(Cursor &in, RawMesh &out) {
     } else if (section[0] == '$') skip_section(in, section);
     else in.refuse("expected a section such as $Nodes or $Elements, found %s", Cursor::quote(section).c_str());
   }
-  if (!have_nodes || !have_elements) in.refuse("no %s section; the file is truncated or holds no mesh", have_nodes ? "$Elements" : "$Nodes");
+  if (!have_nodes || !have_elements)
+    in.refuse("no %s section; the file is truncated or holds no mesh", have_nodes ? "$Elements" : "$Nodes");
 }
 
 }  // namespace dfm

@@ -1,4 +1,4 @@
-// MSH 4.1, ASCII and binary: nodes and elements in blocks, one per entity of the geometry; $Entities tells the physical groups of each entity.
+// MSH 4.1, ASCII and binary: nodes and elements in blocks, one per entity of the geometry; $Entities tells the physical groups of each.
 // Counts and numbers are size_t of the writing machine (data size 8 or 4), entity and type numbers are int.
 #include <algorithm>
 
@@ -10,7 +10,8 @@ namespace {
 class Msh41Reader {
  public:
   Msh41Reader(Cursor &in, RawMesh &out, size_t size_bytes)
-      : in_(in), out_(out), wide_(size_bytes == 8), nodes_(*out.memory), sink_(out, nodes_), entities_(HookAllocator<Entity>(*out.memory)) {}
+      : in_(in), out_(out), wide_(size_bytes == 8), nodes_(*out.memory), sink_(out, nodes_),
+        entities_(HookAllocator<Entity>(*out.memory)) {}
 
   void run() {
     bool have_nodes = false, have_elements = false;
@@ -29,7 +30,8 @@ class Msh41Reader {
       } else if (section[0] == '$') skip_section(in_, section);
       else in_.refuse("expected a section such as $Nodes or $Elements, found %s", Cursor::quote(section).c_str());
     }
-    if (!have_nodes || !have_elements) in_.refuse("no %s section; the file is truncated or holds no mesh", have_nodes ? "$Elements" : "$Nodes");
+    if (!have_nodes || !have_elements)
+      in_.refuse("no %s section; the file is truncated or holds no mesh", have_nodes ? "$Elements" : "$Nodes");
   }
 
  private:
@@ -43,7 +45,7 @@ class Msh41Reader {
     if (!in_.binary) return in_.integer(what);
     if (!wide_) return in_.value<uint32_t>(what);
     const uint64_t v = in_.value<uint64_t>(what);
-    if (v > uint64_t(INT64_MAX)) in_.seek(in_.offset() - 8), in_.refuse("%s %llu is out of range", what, static_cast<unsigned long long>(v));
+    if (v > uint64_t(INT64_MAX)) in_.seek(in_.offset() - 8), in_.refuse("%s %llu is out of range", what, ull(v));
     return static_cast<int64_t>(v);
   }
   int32_t number(const char *what) { return in_.binary ? in_.value<int32_t>(what) : msh_int(in_, in_.integer(what), what); }
@@ -98,7 +100,7 @@ class Msh41Reader {
       if (dimension < 0 || dimension > 3) in_.refuse("a node block of dimension %d; expected 0 to 3", dimension);
       if (parametric != 0 && parametric != 1) in_.refuse("parametric flag %d; expected 0 or 1", parametric);
       if (n < 0 || uint64_t(n) > nnode - nodes_.size())
-        in_.refuse("a block of %lld nodes where %llu of the %llu promised are left", static_cast<long long>(n), static_cast<unsigned long long>(nnode - nodes_.size()), static_cast<unsigned long long>(nnode));
+        in_.refuse("a block of %lld nodes where %llu of the %llu promised are left", ll(n), ull(nnode - nodes_.size()), ull(nnode));
       for (int64_t i = 0; i < n; ++i) nodes_.add(size("a node's number"));
       for (int64_t i = 0; i < n; ++i) {
         for (int k = 0; k < 3; ++k) out_.points.push_back(real("a node's coordinate"));
@@ -106,7 +108,7 @@ class Msh41Reader {
       }
     }
     in_.expect("$EndNodes", "the node blocks promised");
-    if (nodes_.size() != nnode) in_.refuse("$Nodes promises %llu nodes, its blocks hold %zu", static_cast<unsigned long long>(nnode), nodes_.size());
+    if (nodes_.size() != nnode) in_.refuse("$Nodes promises %llu nodes, its blocks hold %zu", ull(nnode), nodes_.size());
     nodes_.finish(in_);
   }
 
@@ -122,11 +124,12 @@ class Msh41Reader {
       const int32_t type = number("an element block's type");
       const int64_t n = size("an element block's number of elements");
       if (n < 0 || uint64_t(n) > nelement - done)
-        in_.refuse("a block of %lld elements where %llu of the %llu promised are left", static_cast<long long>(n), static_cast<unsigned long long>(nelement - done), static_cast<unsigned long long>(nelement));
+        in_.refuse("a block of %lld elements where %llu of the %llu promised are left", ll(n), ull(nelement - done), ull(nelement));
       const uint32_t points = sink_.begin(in_, type);
       in_.count(n, size_bytes() * (1 + points), "elements in a block");
       const uint32_t group = group_of(dimension, entity);
-      if (group != kNoGroup && msh_element(type).dimension != dimension) in_.refuse("elements of type %d in an entity of dimension %d", type, dimension);
+      if (group != kNoGroup && msh_element(type).dimension != dimension)
+        in_.refuse("elements of type %d in an entity of dimension %d", type, dimension);
       for (int64_t i = 0; i < n; ++i) {
         size("an element's number");
         for (uint32_t k = 0; k < points; ++k) tags[k] = size("an element's node");
@@ -135,7 +138,7 @@ class Msh41Reader {
       done += uint64_t(n);
     }
     in_.expect("$EndElements", "the element blocks promised");
-    if (done != nelement) in_.refuse("$Elements promises %llu elements, its blocks hold %llu", static_cast<unsigned long long>(nelement), static_cast<unsigned long long>(done));
+    if (done != nelement) in_.refuse("$Elements promises %llu elements, its blocks hold %llu", ull(nelement), ull(done));
   }
 
   Cursor &in_;

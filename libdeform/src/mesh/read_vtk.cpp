@@ -21,8 +21,8 @@ Number number_type(const Cursor &in, std::string_view name) {
   static const std::pair<const char *, Number> known[] = {
       {"float", Number::f32}, {"double", Number::f64}, {"int", Number::i32}, {"unsigned_int", Number::u32}, {"long", Number::i64},
       {"unsigned_long", Number::u64}, {"vtktypeint64", Number::i64}, {"vtktypeuint64", Number::u64}, {"vtktypeint32", Number::i32},
-      {"vtkidtype", Number::i32}, {"short", Number::i16}, {"unsigned_short", Number::u16}, {"char", Number::i8}, {"signed_char", Number::i8},
-      {"unsigned_char", Number::u8}, {"string", Number::text}, {"bit", Number::bit}};
+      {"vtkidtype", Number::i32}, {"short", Number::i16}, {"unsigned_short", Number::u16}, {"char", Number::i8},
+      {"signed_char", Number::i8}, {"unsigned_char", Number::u8}, {"string", Number::text}, {"bit", Number::bit}};
   const std::string wanted = lower(name);
   for (const auto &[text, type] : known)
     if (wanted == text) return type;
@@ -42,7 +42,8 @@ size_t number_bytes(Number type) {
 
 class VtkReader {
  public:
-  VtkReader(Cursor &in, RawMesh &out) : in_(in), out_(out), cells_(HookAllocator<uint32_t>(*out.memory)), start_(HookAllocator<uint32_t>(*out.memory)),
+  VtkReader(Cursor &in, RawMesh &out) : in_(in), out_(out), cells_(HookAllocator<uint32_t>(*out.memory)),
+                                        start_(HookAllocator<uint32_t>(*out.memory)),
                                         types_(HookAllocator<uint8_t>(*out.memory)) {}
 
   void run() {
@@ -60,7 +61,8 @@ class VtkReader {
       } else if (keyword == "field") skip_field();
       else if (keyword == "metadata") skip_metadata();
       else if (keyword == "point_data" || keyword == "cell_data" || keyword.empty()) break;  // attributes come last and are not used
-      else in_.refuse("unknown keyword %s; expected POINTS, CELLS, CELL_TYPES, FIELD, METADATA, POINT_DATA or CELL_DATA", Cursor::quote(keyword).c_str());
+      else in_.refuse("unknown keyword %s; expected POINTS, CELLS, CELL_TYPES, FIELD, METADATA, POINT_DATA or CELL_DATA",
+          Cursor::quote(keyword).c_str());
     }
     if (!types) in_.refuse("no %s section; the file is truncated or holds no mesh", !points ? "POINTS" : !cells ? "CELLS" : "CELL_TYPES");
     collect();
@@ -78,7 +80,8 @@ class VtkReader {
       in_.unsupported("this is an XML (VTU) file, not legacy VTK; reading VTU is not available yet, so save it as legacy VTK (for instance with meshio or ParaView)");
     constexpr std::string_view kMark = "# vtk DataFile Version ";
     if (first.substr(0, kMark.size()) != kMark)
-      in_.seek(0), in_.refuse("expected '# vtk DataFile Version x.y' in the first line, found %s", Cursor::quote(first.empty() ? " " : first).c_str());
+      in_.seek(0), in_.refuse("expected '# vtk DataFile Version x.y' in the first line, found %s",
+          Cursor::quote(first.empty() ? " " : first).c_str());
     double version = 0;
     const std::string_view number = first.substr(kMark.size());
     std::from_chars(number.data(), number.data() + number.size(), version);
@@ -132,8 +135,8 @@ class VtkReader {
     return in_.count(claimed, bytes, what);
   }
   uint32_t small_count(uint64_t n, const char *what) const {
-    if (n >= UINT32_MAX) in_.unsupported("%llu %s; up to %u are read", static_cast<unsigned long long>(n), what, UINT32_MAX - 1);
-    return static_cast<uint32_t>(n);
+    if (n >= UINT32_MAX) in_.unsupported("%llu %s; up to %u are read", ull(n), what, UINT32_MAX - 1);
+    return uint32_t(n);
   }
   void begin_data(const char *after) {
     if (in_.binary) in_.end_line(after);
@@ -164,9 +167,9 @@ class VtkReader {
     const int64_t p = integer(type, "a cell's point number");
     if (p < 0 || p >= int64_t(out_.npoint())) {
       if (in_.binary) in_.seek(at);
-      in_.refuse("a cell refers to point %lld; the file has points 0 to %lld", static_cast<long long>(p), static_cast<long long>(out_.npoint()) - 1);
+      in_.refuse("a cell refers to point %lld; the file has points 0 to %lld", ll(p), ll(out_.npoint()) - 1);
     }
-    return static_cast<uint32_t>(p);
+    return uint32_t(p);
   }
 
   void read_cells() {
@@ -178,7 +181,7 @@ class VtkReader {
     in_.seek(at);
     begin_data("CELLS");
     const uint64_t size = count(second, 1, Number::i32, "numbers in the cell list");
-    if (first < 0 || uint64_t(first) > size) in_.refuse("CELLS promises %lld cells in a list of %lld numbers", static_cast<long long>(first), static_cast<long long>(second));
+    if (first < 0 || uint64_t(first) > size) in_.refuse("CELLS promises %lld cells in a list of %lld numbers", ll(first), ll(second));
     const uint32_t ncell = small_count(uint64_t(first), "cells");
     small_count(size, "numbers in the cell list");
     start_.reserve(size_t(ncell) + 1), cells_.reserve(size - ncell);
@@ -186,13 +189,13 @@ class VtkReader {
     for (uint32_t c = 0; c < ncell; ++c) {
       const int64_t k = integer(Number::i32, "a cell's number of points");
       if (k < 0 || used + 1 + uint64_t(k) > size)
-        in_.refuse("cell %u has %lld points; the list of %lld numbers that CELLS promises has no room for it", c, static_cast<long long>(k), static_cast<long long>(second));
+        in_.refuse("cell %u has %lld points; the list of %lld numbers that CELLS promises has no room for it", c, ll(k), ll(second));
       used += 1 + uint64_t(k);
-      start_.push_back(static_cast<uint32_t>(cells_.size()));
+      start_.push_back(uint32_t(cells_.size()));
       for (int64_t i = 0; i < k; ++i) cells_.push_back(corner(Number::i32));
     }
-    if (used != size) in_.refuse("CELLS promises a list of %lld numbers, but its %u cells use %llu", static_cast<long long>(second), ncell, static_cast<unsigned long long>(used));
-    start_.push_back(static_cast<uint32_t>(cells_.size()));
+    if (used != size) in_.refuse("CELLS promises a list of %lld numbers, but its %u cells use %llu", ll(second), ncell, ull(used));
+    start_.push_back(uint32_t(cells_.size()));
   }
 
   void read_cell_arrays(int64_t noffset, int64_t nconnectivity) {
@@ -203,11 +206,11 @@ class VtkReader {
     for (uint32_t i = 0; i < n; ++i) {
       const int64_t v = integer(offset_type, "a cell offset");
       if (v < (i ? int64_t(start_.back()) : 0) || v > nconnectivity || (i == 0 && v != 0))
-        in_.refuse("cell offset %lld; offsets start at 0 and rise to the %lld numbers of CONNECTIVITY", static_cast<long long>(v), static_cast<long long>(nconnectivity));
+        in_.refuse("cell offset %lld; offsets start at 0 and rise to the %lld numbers of CONNECTIVITY", ll(v), ll(nconnectivity));
       start_.push_back(small_count(uint64_t(v), "numbers in the cell list"));
     }
     if (n ? int64_t(start_.back()) != nconnectivity : nconnectivity != 0)
-      in_.refuse("the last cell offset must equal the %lld numbers of CONNECTIVITY", static_cast<long long>(nconnectivity));
+      in_.refuse("the last cell offset must equal the %lld numbers of CONNECTIVITY", ll(nconnectivity));
     if (n == 0) start_.push_back(0);
     const std::string_view word = in_.word();
     if (lower(word) != "connectivity") in_.refuse("expected CONNECTIVITY after OFFSETS, found %s", Cursor::quote(word).c_str());
@@ -222,12 +225,12 @@ class VtkReader {
     const int64_t claimed = in_.integer("the number of cell types");
     const size_t ncell = start_.size() - 1;
     if (claimed < 0 || uint64_t(claimed) != ncell)
-      in_.refuse("CELL_TYPES promises %lld types, but CELLS has %zu cells", static_cast<long long>(claimed), ncell);
+      in_.refuse("CELL_TYPES promises %lld types, but CELLS has %zu cells", ll(claimed), ncell);
     begin_data("CELL_TYPES");
     types_.reserve(count(claimed, 1, Number::i32, "cell types"));
     for (size_t c = 0; c < ncell; ++c) {
       const int64_t type = integer(Number::i32, "a cell type");
-      if (type < 0 || type > 255) in_.refuse("cell type %lld; expected 0 to 82 (10 is a tetrahedron)", static_cast<long long>(type));
+      if (type < 0 || type > 255) in_.refuse("cell type %lld; expected 0 to 82 (10 is a tetrahedron)", ll(type));
       types_.push_back(static_cast<uint8_t>(type));
     }
   }
@@ -244,8 +247,8 @@ class VtkReader {
           break;
         case 24: case 71: case 78: case 79: case 80:
           in_.unsupported("cell %zu is a second- or higher-order tetrahedron (type %d); write first-order cells (for instance gmsh -order 1)", c, types_[c]);
-        case 11: case 12: case 13: case 14: case 15: case 16: case 25: case 26: case 27: case 29: case 31: case 32: case 33: case 41: case 42:
-        case 72: case 73: case 74:
+        case 11: case 12: case 13: case 14: case 15: case 16: case 25: case 26: case 27: case 29: case 31: case 32: case 33:
+        case 41: case 42: case 72: case 73: case 74:
           in_.unsupported("cell %zu is a volume cell of type %d (hexahedron, wedge, pyramid or polyhedron); only tetrahedra (type 10) are read: mesh the shape with tetrahedra", c, types_[c]);
         default: break;
       }
@@ -265,10 +268,11 @@ class VtkReader {
       const size_t at = in_.offset();
       std::string_view name = in_.word();
       if (lower(name) == "metadata") { skip_metadata(); --a; continue; }
-      if (name.empty()) in_.seek(at), in_.refuse("the file ends inside a FIELD that promises %lld arrays", static_cast<long long>(arrays));
+      if (name.empty()) in_.seek(at), in_.refuse("the file ends inside a FIELD that promises %lld arrays", ll(arrays));
       const int64_t width = in_.integer("an array's number of components"), tuples = in_.integer("an array's number of tuples");
       const Number type = number_type(in_, in_.word());
-      if (width < 0 || tuples < 0 || (width && tuples > INT64_MAX / width)) in_.refuse("a FIELD array of %lld x %lld values", static_cast<long long>(width), static_cast<long long>(tuples));
+      if (width < 0 || tuples < 0 || (width && tuples > INT64_MAX / width))
+        in_.refuse("a FIELD array of %lld x %lld values", ll(width), ll(tuples));
       skip_values(type, width * tuples);
     }
   }
@@ -287,7 +291,7 @@ class VtkReader {
       else in_.skip(in_.count(n, number_bytes(type), "values") * number_bytes(type), "a FIELD array");
     } else {
       for (int64_t i = 0; i < n; ++i)
-        if (in_.word().empty()) in_.refuse("the file ends inside a FIELD array of %lld values", static_cast<long long>(n));
+        if (in_.word().empty()) in_.refuse("the file ends inside a FIELD array of %lld values", ll(n));
     }
   }
 
@@ -297,7 +301,7 @@ class VtkReader {
     const int more = first >> 6 == 3 ? 0 : first >> 6 == 2 ? 1 : first >> 6 == 1 ? 3 : 7;
     uint64_t length = first & 63;
     for (int i = 0; i < more; ++i) length = length << 8 | in_.value<uint8_t>("a string's length");
-    return static_cast<size_t>(length);
+    return size_t(length);
   }
 
   // Up to the next blank line.

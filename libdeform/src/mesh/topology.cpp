@@ -59,7 +59,8 @@ Array<uint32_t> unique_edges(const Memory &memory, uint32_t ntet, const uint32_t
 
 double tet_volume(const double *points, const uint32_t *tet) {
   const Vec3 a = load3(points + 3 * size_t(tet[0]));
-  const Vec3 u = load3(points + 3 * size_t(tet[1])) - a, v = load3(points + 3 * size_t(tet[2])) - a, w = load3(points + 3 * size_t(tet[3])) - a;
+  const Vec3 u = load3(points + 3 * size_t(tet[1])) - a, v = load3(points + 3 * size_t(tet[2])) - a,
+      w = load3(points + 3 * size_t(tet[3])) - a;
   return dot(cross(u, v), w) / 6;
 }
 
@@ -82,7 +83,8 @@ uint32_t count_duplicate_points(const TetMesh &mesh) {
   Array<uint32_t> order(mesh.npoint(), HookAllocator<uint32_t>(*mesh.memory));
   for (uint32_t i = 0; i < order.size(); ++i) order[i] = i;
   const auto at = [&](uint32_t i) { return mesh.points.data() + 3 * size_t(i); };
-  std::sort(order.begin(), order.end(), [&](uint32_t a, uint32_t b) { return std::lexicographical_compare(at(a), at(a) + 3, at(b), at(b) + 3); });
+  std::sort(order.begin(), order.end(),
+            [&](uint32_t a, uint32_t b) { return std::lexicographical_compare(at(a), at(a) + 3, at(b), at(b) + 3); });
   uint32_t n = 0;
   for (size_t i = 1; i < order.size(); ++i) n += std::equal(at(order[i]), at(order[i]) + 3, at(order[i - 1]));
   return n;
@@ -131,15 +133,16 @@ MeshStatistics mesh_statistics(const TetMesh &mesh) {
   if (s.ntet == 0) return s;
   {
     const Array<uint32_t> triangles = boundary_triangles(mesh.tets);
-    s.ntriangle = static_cast<uint32_t>(triangles.size() / 3);
+    s.ntriangle = uint32_t(triangles.size() / 3);
     s.nonmanifold_edges = count_nonmanifold_edges(memory, triangles);
   }
   {
     const Array<uint32_t> edges = unique_edges(mesh.tets);
-    s.nedge = static_cast<uint32_t>(edges.size() / 2);
+    s.nedge = uint32_t(edges.size() / 2);
     Array<double> length{HookAllocator<double>(memory)};
     length.reserve(s.nedge);
-    for (size_t i = 0; i < edges.size(); i += 2) length.push_back(norm(load3(&mesh.points[3 * size_t(edges[i])]) - load3(&mesh.points[3 * size_t(edges[i + 1])])));
+    for (size_t i = 0; i < edges.size(); i += 2)
+      length.push_back(norm(load3(&mesh.points[3 * size_t(edges[i])]) - load3(&mesh.points[3 * size_t(edges[i + 1])])));
     std::sort(length.begin(), length.end());
     s.edge_min = length.front(), s.edge_median = length[length.size() / 2], s.edge_max = length.back();
   }
@@ -155,7 +158,8 @@ MeshStatistics mesh_statistics(const TetMesh &mesh) {
   }
   s.quality_mean /= s.ntet;
   for (int k = 0; k < 3; ++k) s.lo[k] = s.hi[k] = mesh.points[k];
-  for (size_t i = 0; i < mesh.points.size(); ++i) s.lo[i % 3] = std::min(s.lo[i % 3], mesh.points[i]), s.hi[i % 3] = std::max(s.hi[i % 3], mesh.points[i]);
+  for (size_t i = 0; i < mesh.points.size(); ++i)
+    s.lo[i % 3] = std::min(s.lo[i % 3], mesh.points[i]), s.hi[i % 3] = std::max(s.hi[i % 3], mesh.points[i]);
   return s;
 }
 

@@ -19,13 +19,14 @@ struct ContactPoint {
   uint64_t key;          // persistent: (kind, a's feature, b's body or obstacle, b's patch); unique within a sub-step
   uint32_t slot_a, slot_b;        // body slots in the world; slot_b = obstacle slot if obstacle
   uint32_t feature_a, feature_b;  // surfel, edge or triangle number within its body; primitive: obstacle feature (face, edge, corner)
-  uint8_t kind, obstacle, nnode, reserved;
+  uint8_t kind, obstacle, nnode;
+  uint8_t type_a;                 // what feature_a is: 0 surfel, 1 edge, 2 triangle
   uint32_t reserved2;
   uint32_t node[4];
   double weight[4];
   double point[3];       // m, midway between the closest points
   double normal[3];      // unit, from b to a
-  double distance;       // m, true distance, >= 0; negative: depth below b's face, for recovery
+  double distance;       // m, true distance, >= 0; negative: depth below b's surface, for recovery
   double area;           // m2
   double velocity[3];    // m/s of the obstacle's surface at the point, belt included; 0 for bodies
 };

@@ -1,0 +1,62 @@
+// deform explain SCENE.json: the plan of a step, and why.
+#include <cmath>
+#include <cstdio>
+#include <cstdlib>
+#include <memory>
+
+#include "json_text.h"
+#include "messages.h"
+#include "scene_file.h"
+
+namespace cli {
+namespace {
+
+struct Options { std::string scene; std::vector<std::string> set; };
+
+void print_list(const JsonValue &plan, const char *key, const char *title, const std::vector<std::string> &columns) {
+  const JsonValue *list = plan.find(key);
+  std::printf("%s\n", title);
+  if (!list || list->items.empty()) std::printf("  none\n");
+  for (size_t i = 0; list && i < list->items.size(); ++i) {
+    const JsonValue &row = list->items[i];
+    std::printf("  %-20s", row.get("name").c_str());
+    for (const std::string &column : columns)
+      if (const std::string text = row.get(column); !text.empty()) std::printf("  %s%s", column == "why" ? "" : (column + ": ").c_str(), text.c_str());
+    std::printf("\n");
+  }
+}
+
+int explain(const Options &options, const Globals &globals) {
+  SceneFile scene(globals, options.scene, options.set, 0);
+  const std::string text = scene.explain();
+  JsonValue plan;
+  if (!parse_json(text, plan)) throw Failure(kBadInput, "the library's plan is not JSON: " + text.substr(0, 200));
+  if (globals.json) {
+    std::printf("%s\n", text.c_str());
+    return kDone;
+  }
+  print_list(plan, "effects", "effects", {"asked_by", "provided_by"});
+  print_list(plan, "stages", "stages of a step, in order", {"why", "cost"});
+  print_list(plan, "absent", "left out", {"why"});
+  if (const JsonValue *step = plan.find("step")) {
+    std::printf("step\n  stable %s s", step->get("stable_s").c_str());
+    if (const std::string body = step->get("worst_body"); !body.empty()) std::printf(", bounded by point %s of \"%s\"", step->get("worst_point").c_str(), body.c_str());
+    if (const std::string reason = step->get("reason"); !reason.empty()) std::printf(": %s", reason.c_str());
+    std::printf("\n");
+    const double stable = std::strtod(step->get("stable_s").c_str(), nullptr), asked = scene.settings().step;
+    if (asked > 0 && stable > 0) std::printf("  the scene asks for %g s: %.0f sub-step%s each\n", asked, std::ceil(asked / stable - 1e-9), asked > stable ? "s" : "");
+  }
+  return kDone;
+}
+
+}  // namespace
+
+void add_explain(CLI::App &app, Globals &globals, int *exit_code) {
+  auto options = std::make_shared<Options>();
+  CLI::App *sub = app.add_subcommand("explain", "the plan: effects, stages that run, stages left out and why");
+  sub->add_option("SCENE", options->scene, "scene file (JSON)")->required();
+  sub->add_option("--set", options->set, "change a value of the scene")->type_name("/json/pointer=value")->take_all()->allow_extra_args(false);
+  sub->callback([=, &globals] { *exit_code = explain(*options, globals); });
+}
+
+}  // namespace cli

@@ -1,0 +1,242 @@
+// deform run SCENE.json: simulates and writes what interfaces promise.
+#include <csignal>
+#include <ctime>
+
+#include <chrono>
+#include <cmath>
+#include <cstdio>
+#include <filesystem>
+#include <memory>
+
+#include "frames.h"
+#include "messages.h"
+#include "output.h"
+#include "progress.h"
+
+namespace cli {
+namespace {
+
+volatile std::sig_atomic_t interrupted = 0;
+
+void on_signal(int) { interrupted = 1; }
+
+// The first signal ends the run in order; a second one ends the process as usual.
+void catch_signals() {
+  struct sigaction action = {};
+  action.sa_handler = on_signal;
+  action.sa_flags = static_cast<int>(SA_RESETHAND);
+  sigaction(SIGINT, &action, nullptr);
+  sigaction(SIGTERM, &action, nullptr);
+}
+
+double cpu_seconds() {
+  timespec t = {};
+  clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &t);
+  return double(t.tv_sec) + 1e-9 * double(t.tv_nsec);
+}
+
+double wall_seconds() { return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count(); }
+
+// Multiples of an interval: due() is true once for each that time has passed. Outputs never shape the steps, so a run gives the same
+// bits whatever it writes.
+class Schedule {
+ public:
+  explicit Schedule(double interval) : interval_(interval) {}
+  bool due(double t) {
+    if (interval_ <= 0 || t < double(next_) * interval_ - 1e-9 * interval_) return false;
+    next_ = uint64_t(std::floor(t / interval_ + 1e-9)) + 1;
+    return true;
+  }
+
+ private:
+  double interval_;
+  uint64_t next_ = 0;
+};
+
+class Runner {
+ public:
+  Runner(const SceneFile &scene, const RunOptions &options, const Globals &globals)
+      : scene_(scene), options_(options), world_(scene.world()), duration_(options.time > 0 ? options.time : scene.settings().duration),
+        check_every_step_(options.check || scene.settings().check), progress_(!globals.quiet && !globals.json),
+        outputs_(scene, options.out), checker_(scene), record_(scene.settings().every), frame_(frame_interval()) {
+    if (frame_interval() > 0) frames_ = Frames::create(scene, options.out + "/frames");
+  }
+
+  void run() {
+    result_.start = result_.simulated = dfm_world_time(world_);
+    outputs(true);
+    mark_ = {wall_seconds(), cpu_seconds()};
+    while (!interrupted && !result_.stopped && advance()) outputs(false);
+    count_time();
+    if (interrupted) result_.interrupted = true, result_.stop_reason = "interrupted by a signal";
+    if (!at_record_ && !result_.stopped) outputs_.record(), check(false);
+    if (result_.interrupted || result_.stopped) outputs_.write_last();
+    if (result_.hold_begun) end_hold();
+    outputs_.write_nodes();
+  }
+
+  const RunResult &result() const { return result_; }
+  const Checks &checks() const { return checker_.result(); }
+
+ private:
+  struct Mark { double wall, cpu; };
+
+  double frame_interval() const {
+    double rate = options_.frame_rate;
+    if (rate <= 0 && scene_.settings().frames) {
+      rate = std::strtod(scene_.value("/output/frames").c_str(), nullptr);  // a number is a rate; true: with every record
+      if (rate <= 0) return scene_.settings().every;
+    }
+    return rate > 0 ? 1 / rate : 0;
+  }
+
+  // One step towards the end; false when there.
+  bool advance() {
+    const double left = result_.start + duration_ - result_.simulated;
+    double step = scene_.settings().step;
+    const bool automatic = step <= 0;
+    if (automatic) {
+      need(dfm_world_stable_step(world_, &step, nullptr, nullptr));
+      if (!std::isfinite(step)) step = 1e-3;  // nothing bounds it: no springs, no contact
+      // Rather two halves at the end than one step and a sliver.
+      if (left < 2 * step && left > step) step = left / 2;
+    }
+    if (left <= 1e-6 * step) return false;
+    if (left < step * (1 + 1e-6) && (automatic || left < step * (1 - 1e-6))) step = left;
+    const double begin = wall_seconds();
+    uint32_t trouble = 0;
+    const dfm_status status = dfm_world_step(world_, step, &trouble);
+    result_.times.add(wall_seconds() - begin);
+    if (status != DFM_OK) return stop(status, step), false;
+    ++result_.steps;
+    trouble_ |= trouble;
+    result_.simulated = dfm_world_time(world_);
+    return true;
+  }
+
+  void stop(dfm_status status, double step) {
+    result_.stopped = true;
+    result_.stop_reason = dfm_last_error();
+    dfm_body body = 0;
+    double stable = 0;
+    uint32_t point = 0;
+    if (status == DFM_DISCARD) {
+      char text[160];
+      dfm_world_stable_step(world_, &stable, &body, &point);
+      std::snprintf(text, sizeof text, "a step of %g s needs more sub-steps than allowed: the stable step is %g s, bounded by point %u", step, stable, point);
+      result_.stop_reason = text;
+      result_.stop_body = body ? scene_.name_of(body) : "";
+      return;
+    }
+    // The sentence names the body that diverged in quotes.
+    for (const BodyView &b : scene_.bodies())
+      if (result_.stop_reason.find("\"" + b.name + "\"") != std::string::npos) result_.stop_body = b.name;
+  }
+
+  void check(bool start_state) { checker_.check(start_state); }
+
+  // What is due at this time; its cost is kept out of the run's times.
+  void outputs(bool start_state) {
+    const double t = result_.simulated;
+    if (!result_.hold_begun && t >= result_.start + duration_ / 2) result_.hold_begun = dfm_world_hold_begin(world_) == DFM_OK;
+    at_record_ = record_.due(t - result_.start);
+    const bool frame_due = frames_ && frame_.due(t - result_.start);
+    if (at_record_ || frame_due || check_every_step_) {
+      if (!start_state) count_time();
+      if (at_record_) outputs_.record();
+      if (at_record_ || check_every_step_) check(start_state);
+      if (frame_due) frames_->draw(t);
+      mark_ = {wall_seconds(), cpu_seconds()};
+    }
+    if (result_.steps % 16 == 0) progress_.show(t - result_.start, duration_, result_.steps ? double(result_.steps) / (result_.wall + wall_seconds() - mark_.wall) : 0);
+  }
+
+  void count_time() {
+    result_.wall += wall_seconds() - mark_.wall, result_.cpu += cpu_seconds() - mark_.cpu;
+    mark_ = {wall_seconds(), cpu_seconds()};
+  }
+
+  void end_hold() {
+    need(dfm_world_hold(world_, &result_.creep, &result_.hold_count));
+    if (result_.hold_count == 0 || !std::isfinite(result_.creep)) {
+      result_.hold_count = 0;
+      held_nothing_ = true;
+    }
+  }
+
+ public:
+  // Sentences that the summary must hold whether or not anybody reads the terminal.
+  std::vector<std::string> remarks() const {
+    std::vector<std::string> out;
+    if (held_nothing_ || !result_.hold_begun) out.push_back("hold.creep_max_um_per_s is null: no pair sticks throughout the last half of the run");
+    const dfm_world_stats stats = world_stats(scene_);
+    if (trouble_ & DFM_TROUBLE_SUBSTEPS)
+      out.push_back("steps were cut into up to " + std::to_string(stats.substeps_max) + " sub-steps: the step is longer than the stable one; deform explain says why");
+    if (stats.unconverged > 0) out.push_back("the contact solve met its cap in " + std::to_string(stats.unconverged) + " sub-steps");
+    if (trouble_ & DFM_TROUBLE_INVERTED) out.push_back("cells turned inside out: refine the mesh or soften the load");
+    if (checks().intersections_max > 0) out.push_back("surfaces cross: up to " + std::to_string(checks().intersections_max) + " triangle pairs in one state");
+    return out;
+  }
+
+ private:
+  const SceneFile &scene_;
+  const RunOptions &options_;
+  dfm_world world_;
+  double duration_;
+  bool check_every_step_, at_record_ = false, held_nothing_ = false;
+  uint32_t trouble_ = 0;
+  Progress progress_;
+  Outputs outputs_;
+  Checker checker_;
+  Schedule record_, frame_;
+  std::unique_ptr<Frames> frames_;
+  RunResult result_;
+  Mark mark_ = {};
+};
+
+int run(RunOptions options, const Globals &globals) {
+  if (options.out.empty()) options.out = "out/" + std::filesystem::path(options.scene).stem().string();
+  const SceneFile scene(globals, options.scene, options.set, options.jitter);
+  RunResult result;
+  Checks checks;
+  catch_signals();
+  {
+    Runner runner(scene, options, globals);
+    runner.run();
+    for (const std::string &remark : runner.remarks()) keep_warning(remark);
+    result = runner.result(), checks = runner.checks();
+  }
+  const std::string summary = summary_json(scene, options, result, checks);
+  write_whole(options.out + "/summary.json", summary);
+  if (globals.json) std::printf("%s", summary.c_str());
+  else if (!globals.quiet) {
+    print_table(scene, result, checks);
+    std::printf("written: %s\n", options.out.c_str());
+  }
+  if (options.profile && !globals.json) print_profile(scene, result);
+  if (result.stopped) {
+    char text[160];
+    std::snprintf(text, sizeof text, "stopped at step %llu, t = %g s", static_cast<unsigned long long>(result.steps + 1), result.simulated);
+    throw Failure(kStopped, options.scene + ": " + text + (result.stop_body.empty() ? "" : ", body \"" + result.stop_body + "\"") + ": " +
+                                result.stop_reason + "; the last good state is in " + options.out + "/states/last_*.vtu");
+  }
+  return result.interrupted ? int(kInterrupted) : int(kDone);
+}
+
+}  // namespace
+
+void add_run(CLI::App &app, Globals &globals, int *exit_code) {
+  auto options = std::make_shared<RunOptions>();
+  CLI::App *sub = app.add_subcommand("run", "simulates a scene and writes figures and pictures");
+  sub->add_option("SCENE", options->scene, "scene file (JSON)")->required();
+  sub->add_option("--out", options->out, "folder for the results (out/SCENE)")->type_name("DIR");
+  sub->add_option("--time", options->time, "seconds to simulate, instead of the scene's")->check(CLI::PositiveNumber)->type_name("T");
+  sub->add_option("--set", options->set, "change a value of the scene")->type_name("/json/pointer=value")->take_all()->allow_extra_args(false);
+  sub->add_option("--frames", options->frame_rate, "pictures per simulated second")->check(CLI::PositiveNumber)->type_name("FPS");
+  sub->add_flag("--profile", options->profile, "time spent in each stage");
+  sub->add_option("--jitter", options->jitter, "small random changes of the start state; the same seed gives the same run")->type_name("SEED");
+  sub->add_flag("--check", options->check, "count crossing triangles in every step, not only in recorded states");
+  sub->callback([=, &globals] { *exit_code = run(*options, globals); });
+}
+
+}  // namespace cli

@@ -1,0 +1,48 @@
+// Triangle pairs that cross, by exact predicates: the judge of "nothing passes through". It shares no code with the library's detection,
+// and sees positions only as the public API reports them.
+#pragma once
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+namespace crossing {
+
+// Sign of the volume of (a, b, c, d): > 0 if d lies on the side of triangle abc from which a, b, c turn clockwise; 0: coplanar. Exact.
+int orientation(const double a[3], const double b[3], const double c[3], const double d[3]);
+// Sign of the area of (a, b, c) in the plane of two axes: > 0 counter-clockwise. Exact.
+int orientation(const double a[3], const double b[3], const double c[3], int axis_u, int axis_v);
+
+using Triangle = const double *[3];
+// The closed triangles share at least one point (touching included). A triangle without area counts as its edges; two of those never meet.
+bool meet(const Triangle a, const Triangle b);
+// They meet, and each has corners strictly on both sides of the other's plane: they pass through each other rather than touch.
+bool pass_through(const Triangle a, const Triangle b);
+
+struct Surface { const double *xyz; uint32_t n; const uint32_t *tri; uint32_t ntri; };
+
+// Committed states keep a distance between surfaces, so there any shared point counts; a start state is the user's own, and may touch.
+enum class Touching { counts, allowed };
+
+class Counter {
+ public:
+  // Pairs within and between surfaces; pairs of one surface that share a vertex (by number or by position) are excepted.
+  // Coordinates must be finite.
+  size_t count(const std::vector<Surface> &surfaces, Touching touching);
+
+ private:
+  struct Box { double lo[3], hi[3]; };
+  struct Node { Box box; uint32_t begin, end, left, right; };  // left 0: leaf
+  struct Item { Box box; uint32_t surface, triangle; };
+  uint32_t build(uint32_t begin, uint32_t end);
+  void within(uint32_t node);
+  void between(uint32_t a, uint32_t b);
+  void test(const Item &a, const Item &b);
+
+  const std::vector<Surface> *surfaces_ = nullptr;
+  Touching touching_ = Touching::counts;
+  std::vector<Item> items_;
+  std::vector<Node> nodes_;
+  size_t found_ = 0;
+};
+
+}  // namespace crossing

@@ -1,0 +1,192 @@
+#include "frames.h"
+
+#include "messages.h"
+
+#ifdef DEFORM_HAVE_RENDER
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <filesystem>
+#include <limits>
+
+#include "render/render.h"
+
+namespace cli {
+namespace {
+
+constexpr uint32_t kWidth = 960, kHeight = 720;
+
+void rotate(const double q[4], const double v[3], double out[3]) {
+  double n2 = q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3];
+  if (n2 == 0) {
+    for (int i = 0; i < 3; ++i) out[i] = v[i];
+    return;
+  }
+  const double s = 2 / n2, u[3] = {q[1] * v[2] - q[2] * v[1] + q[3] * v[0], q[2] * v[0] - q[0] * v[2] + q[3] * v[1], q[0] * v[1] - q[1] * v[0] + q[3] * v[2]};
+  out[0] = v[0] + s * (q[1] * u[2] - q[2] * u[1]);
+  out[1] = v[1] + s * (q[2] * u[0] - q[0] * u[2]);
+  out[2] = v[2] + s * (q[0] * u[1] - q[1] * u[0]);
+}
+
+class OffScreen : public Frames {
+ public:
+  OffScreen(const SceneFile &scene, std::string folder, std::unique_ptr<render::Renderer> renderer)
+      : scene_(scene), folder_(std::move(folder)), renderer_(std::move(renderer)), colour_(scene.settings().color) {
+    for (const BodyView &body : scene.bodies()) {
+      Buffers b;
+      b.xyz.resize(3 * size_t(body.nsurfel)), b.vectors.resize(3 * size_t(body.nsurfel)), b.scalar.resize(body.nsurfel);
+      uint32_t n = 0;
+      need(dfm_surface_positions(body.handle, body.nsurfel, b.xyz.data(), &n));
+      b.start = b.xyz;
+      buffers_.push_back(std::move(b));
+    }
+  }
+
+  void draw(double t) override {
+    render::Scene picture_scene;
+    add_bodies(picture_scene);
+    add_obstacles(picture_scene);
+    // One camera and one extent for the whole film: what the first picture needs.
+    if (!extent_) {
+      extent_ = render::bounds(picture_scene);
+      const dfm_scene_settings &s = scene_.settings();
+      render::Camera camera = render::auto_camera(*extent_, double(kWidth) / kHeight, picture_scene.up);
+      if (s.has_camera)
+        for (int i = 0; i < 3; ++i) camera.eye[i] = s.eye[i], camera.look_at[i] = s.look_at[i];
+      camera_ = camera;
+    }
+    picture_scene.extent = extent_, picture_scene.camera = camera_;
+    if (colour_ == "displacement") picture_scene.map = render::ColourMap::lagoon;
+    render::Image image;
+    std::string why;
+    if (!renderer_->draw(picture_scene, image, &why)) throw Failure(kBadInput, "frame " + std::to_string(drawn_) + ": " + why);
+    annotate(image, picture_scene.map, t);
+    char name[40];
+    std::snprintf(name, sizeof name, "/frame_%06u.png", drawn_++);
+    if (!render::write_png(folder_ + name, image, &why)) throw Failure(kBadInput, why);
+  }
+
+ private:
+  struct Buffers { std::vector<double> xyz, start, vectors; std::vector<float> scalar; };
+
+  // Fills the scalars of one body in their own unit; false where the scene colours by body.
+  bool fill_values(const BodyView &body, Buffers &b) {
+    uint32_t n = 0;
+    if (colour_ == "body") return false;
+    if (colour_ == "speed") need(dfm_surface_velocities(body.handle, body.nsurfel, b.vectors.data(), &n));
+    else if (colour_ == "contact") need(dfm_surface_forces(body.handle, body.nsurfel, b.vectors.data(), &n));
+    else
+      for (size_t i = 0; i < b.xyz.size(); ++i) b.vectors[i] = b.xyz[i] - b.start[i];
+    for (size_t i = 0; i < b.scalar.size(); ++i) {
+      const double *v = &b.vectors[3 * i];
+      b.scalar[i] = float(std::sqrt(v[0] * v[0] + v[1] * v[1] + v[2] * v[2]));
+    }
+    return true;
+  }
+
+  void add_bodies(render::Scene &out) {
+    float top = 0;
+    bool coloured = false;
+    for (size_t i = 0; i < buffers_.size(); ++i) {
+      const BodyView &body = scene_.bodies()[i];
+      uint32_t n = 0;
+      need(dfm_surface_positions(body.handle, body.nsurfel, buffers_[i].xyz.data(), &n));
+      coloured = fill_values(body, buffers_[i]);
+      for (float x : buffers_[i].scalar) top = std::max(top, x);
+    }
+    // The scale of a film only grows, so colours of neighbouring frames can be compared.
+    scale_ = std::max(scale_, top);
+    for (size_t i = 0; i < buffers_.size(); ++i) {
+      Buffers &b = buffers_[i];
+      const render::Colour own = render::palette(uint32_t(i));
+      render::Surface s;
+      s.xyz = b.xyz.data(), s.n = uint32_t(b.xyz.size() / 3);
+      s.tri = scene_.bodies()[i].triangles.data(), s.ntri = uint32_t(scene_.bodies()[i].triangles.size() / 3);
+      s.rgb[0] = own.r, s.rgb[1] = own.g, s.rgb[2] = own.b;
+      if (coloured) {
+        // Where nothing touches the body keeps its own colour.
+        for (float &x : b.scalar) x = colour_ == "contact" && x == 0 ? std::numeric_limits<float>::quiet_NaN() : scale_ > 0 ? x / scale_ : 0;
+        s.scalar = b.scalar.data();
+      }
+      out.surfaces.push_back(s);
+    }
+  }
+
+  void add_obstacles(render::Scene &out) const {
+    for (const ObstacleView &o : scene_.obstacles()) {
+      dfm_pose pose = {};
+      need(dfm_obstacle_get_pose(o.handle, &pose));
+      const double up[3] = {0, 0, 1};
+      double axis[3];
+      rotate(pose.rotation, up, axis);
+      const double *p = pose.position;
+      if (o.def.shape == DFM_SHAPE_PLANE) out.planes.push_back({{p[0], p[1], p[2]}, {axis[0], axis[1], axis[2]}, {}});
+      else if (o.def.shape == DFM_SHAPE_SPHERE) out.spheres.push_back({{p[0], p[1], p[2]}, o.def.radius, {}});
+      else if (o.def.shape == DFM_SHAPE_BOX) {
+        render::Box box = {};
+        for (int i = 0; i < 3; ++i) box.pose.position[i] = p[i], box.half[i] = o.def.half_size[i];
+        for (int i = 0; i < 4; ++i) box.pose.rotation[i] = pose.rotation[i];
+        box.look = {};
+        out.boxes.push_back(box);
+      } else {
+        render::Capsule capsule = {};
+        for (int i = 0; i < 3; ++i) capsule.a[i] = p[i] - o.def.half_length * axis[i], capsule.b[i] = p[i] + o.def.half_length * axis[i];
+        capsule.radius = o.def.radius, capsule.look = {};
+        out.capsules.push_back(capsule);
+      }
+    }
+  }
+
+  void annotate(render::Image &image, render::ColourMap map, double t) const {
+    char text[40];
+    std::snprintf(text, sizeof text, "t = %.3f s", t);
+    render::draw_text(image, 16, 28, 14, text, {0.15f, 0.17f, 0.2f});
+    if (colour_ == "speed") render::legend(image, map, 0, scale_, "speed", "m/s");
+    if (colour_ == "contact") render::legend(image, map, 0, scale_, "contact force", "N");
+    if (colour_ == "displacement") render::legend(image, map, 0, scale_, "displacement", "m");
+  }
+
+  const SceneFile &scene_;
+  std::string folder_;
+  std::unique_ptr<render::Renderer> renderer_;
+  std::string colour_;
+  std::vector<Buffers> buffers_;
+  std::optional<render::Bounds> extent_;
+  std::optional<render::Camera> camera_;
+  float scale_ = 0;
+  uint32_t drawn_ = 0;
+};
+
+}  // namespace
+
+std::unique_ptr<Frames> Frames::create(const SceneFile &scene, const std::string &folder) {
+  std::string why;
+  auto renderer = render::Renderer::create(render::Backend::automatic, kWidth, kHeight, &why);
+  if (!renderer) {
+    warn("no pictures: " + why);
+    return nullptr;
+  }
+  std::error_code error;
+  std::filesystem::create_directories(folder, error);
+  if (error) throw Failure(kBadInput, folder + ": the folder cannot be made: " + error.message());
+  for (const auto &entry : std::filesystem::directory_iterator(folder, error)) {
+    const std::string name = entry.path().filename().string();
+    if (name.rfind("frame_", 0) == 0 && entry.path().extension() == ".png") std::filesystem::remove(entry.path(), error);
+  }
+  return std::make_unique<OffScreen>(scene, folder, std::move(renderer));
+}
+
+}  // namespace cli
+
+#else
+
+namespace cli {
+
+std::unique_ptr<Frames> Frames::create(const SceneFile &, const std::string &) {
+  warn("no pictures: this deform was built without the renderer (cmake -DDEFORM_RENDER=ON, Debian packages libegl-dev or libosmesa6-dev)");
+  return nullptr;
+}
+
+}  // namespace cli
+
+#endif

@@ -1,0 +1,18 @@
+// Pictures of a run through the off-screen renderer; without one (not built, or no backend here) a warning and no pictures.
+#pragma once
+#include <memory>
+#include <string>
+
+#include "scene_file.h"
+
+namespace cli {
+
+class Frames {
+ public:
+  // Null where pictures cannot be made; the reason goes to the warnings.
+  static std::unique_ptr<Frames> create(const SceneFile &scene, const std::string &folder);
+  virtual ~Frames() = default;
+  virtual void draw(double t) = 0;
+};
+
+}  // namespace cli

@@ -1,0 +1,36 @@
+// JSON that the command writes, and the little it must read back: the library's own explain text.
+#pragma once
+#include <string>
+#include <utility>
+#include <vector>
+
+namespace cli {
+
+std::string quoted(const std::string &text);
+std::string number(double x);  // shortest text that reads back the same; "null" for what JSON cannot hold
+
+// Builds "{...}" or "[...]"; values are JSON text already.
+class JsonObject {
+ public:
+  JsonObject &add(const std::string &key, const std::string &value);
+  std::string text() const;
+
+ private:
+  std::vector<std::pair<std::string, std::string>> members_;
+};
+std::string json_array(const std::vector<std::string> &values);
+std::string json_vector(const double v[3]);
+std::string indented(const std::string &json);  // objects and arrays of objects on lines of their own
+
+// A parsed value; text of strings is unescaped, numbers and literals keep their text.
+struct JsonValue {
+  enum Kind { null, literal, string, array, object } kind = null;
+  std::string text;
+  std::vector<JsonValue> items;
+  std::vector<std::pair<std::string, JsonValue>> members;
+  const JsonValue *find(const std::string &key) const;
+  std::string get(const std::string &key) const;  // text of a member, "" where absent
+};
+bool parse_json(const std::string &text, JsonValue &out);
+
+}  // namespace cli

@@ -1,0 +1,147 @@
+// The `deform` command: global options, errors to exit codes.
+#include <algorithm>
+#include <cstdio>
+#include <cstdlib>
+#include <cstring>
+
+#include "cli.h"
+#include "messages.h"
+
+namespace cli {
+namespace {
+
+Globals globals;
+std::vector<std::string> kept_warnings;
+
+void on_log(void *, int32_t level, const char *utf8) {
+  if (level < DFM_LOG_WARNING) return;
+  if (level == DFM_LOG_WARNING) kept_warnings.push_back(utf8);
+  if (!globals.quiet) std::fprintf(stderr, "deform: %s: %s\n", level == DFM_LOG_WARNING ? "warning" : "error", utf8);
+}
+
+size_t edit_distance(const std::string &a, const std::string &b) {
+  std::vector<size_t> row(b.size() + 1);
+  for (size_t j = 0; j <= b.size(); ++j) row[j] = j;
+  for (size_t i = 1; i <= a.size(); ++i) {
+    size_t diagonal = row[0];
+    row[0] = i;
+    for (size_t j = 1; j <= b.size(); ++j) {
+      const size_t above = row[j];
+      row[j] = std::min({above + 1, row[j - 1] + 1, diagonal + (a[i - 1] != b[j - 1])});
+      diagonal = above;
+    }
+  }
+  return row[b.size()];
+}
+
+std::vector<CLI::App *> children(CLI::App *app) {
+  return app->get_subcommands([](CLI::App *sub) { return !sub->get_group().empty(); });
+}
+
+// --quiet, --threads and --json belong to every subcommand, wherever they are written.
+void add_common(CLI::App *app) {
+  for (CLI::App *sub : children(app)) {
+    sub->add_flag("--quiet", globals.quiet, "print results and errors only");
+    sub->add_flag("--json", globals.json, "machine-readable output");
+    sub->add_option("--threads", globals.threads, "worker threads; 0: one per processor")->check(CLI::Range(0, 1024))->type_name("N");
+    add_common(sub);
+  }
+}
+
+// The subcommand that was reached, or the application: what a word was meant for.
+CLI::App *reached(CLI::App *app) {
+  for (CLI::App *sub : app->get_subcommands()) return reached(sub);
+  return app;
+}
+
+std::string nearest_to(const std::string &word, CLI::App *app) {
+  std::vector<std::string> valid;
+  for (const CLI::App *sub : children(app)) valid.push_back(sub->get_name());
+  for (const CLI::Option *option : app->get_options())
+    for (const std::string &name : option->get_lnames()) valid.push_back("--" + name);
+  std::string best;
+  size_t least = std::max<size_t>(2, word.size() / 3) + 1;
+  for (const std::string &name : valid)
+    if (const size_t d = edit_distance(word, name); d < least) least = d, best = name;
+  return best;
+}
+
+std::string path_of(CLI::App *app) {
+  return app->get_parent() ? path_of(app->get_parent()) + " " + app->get_name() : "deform";
+}
+
+int bad_usage(CLI::App &app, const CLI::ParseError &error) {
+  CLI::App *at = reached(&app);
+  std::string text = error.what();
+  const std::vector<std::string> extra = app.remaining(true);
+  if (dynamic_cast<const CLI::ExtrasError *>(&error) && !extra.empty()) {
+    text = "\"" + extra[0] + "\" is not expected here";
+    const std::string near = nearest_to(extra[0].substr(0, extra[0].find('=')), at);
+    if (!near.empty()) text += "; did you mean \"" + near + "\"?";
+  } else if (dynamic_cast<const CLI::RequiredError *>(&error) && at->get_subcommands().empty() && !children(at).empty()) {
+    std::vector<std::string> names;
+    text = "a subcommand is needed:";
+    for (const CLI::App *sub : children(at)) text += (text.back() == ':' ? " " : ", ") + sub->get_name();
+    if (!extra.empty()) {
+      text = "there is no subcommand \"" + extra[0] + "\"";
+      const std::string near = nearest_to(extra[0], at);
+      if (!near.empty()) text += "; did you mean \"" + near + "\"?";
+    }
+  }
+  std::replace(text.begin(), text.end(), '\n', ' ');
+  return fail(text + " (see: " + path_of(at) + " --help)");
+}
+
+}  // namespace
+
+int fail(const std::string &sentence) {
+  std::fflush(stdout);
+  std::fprintf(stderr, "deform: %s\n", sentence.c_str());
+  return kBadInput;
+}
+
+const std::vector<std::string> &warnings() { return kept_warnings; }
+
+void keep_warning(const std::string &sentence) { kept_warnings.push_back(sentence); }
+
+void warn(const std::string &sentence) { on_log(nullptr, DFM_LOG_WARNING, sentence.c_str()); }
+
+dfm_context *make_context(const Globals &g) {
+  dfm_context_def def = dfm_context_def_default();
+  def.threads = g.threads;
+  def.log = on_log;
+  dfm_context *context = nullptr;
+  if (dfm_context_create(&def, &context) < 0) std::exit(fail(dfm_last_error()));
+  return context;
+}
+
+}  // namespace cli
+
+int main(int argc, char **argv) {
+  int exit_code = cli::kDone;
+  CLI::App app{"Deformable bodies in contact with real friction.", "deform"};
+  app.set_version_flag("--version", dfm_version(nullptr, nullptr, nullptr));
+  app.require_subcommand(1);
+  cli::add_run(app, cli::globals, &exit_code);
+  cli::add_explain(app, cli::globals, &exit_code);
+  cli::add_mesh(app, cli::globals, &exit_code);
+  cli::add_plugin(app, cli::globals, &exit_code);
+  cli::add_later(app, cli::globals, &exit_code);
+  cli::add_montage(app, &exit_code);
+  cli::add_common(&app);
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::Success &success) {  // --help, --version
+    return app.exit(success);
+  } catch (const CLI::ParseError &error) {
+    return cli::bad_usage(app, error);
+  } catch (const cli::Failure &failure) {
+    cli::fail(failure.what());
+    return failure.exit_code;
+  } catch (const std::bad_alloc &) {
+    return cli::fail("out of memory");
+  } catch (const std::exception &error) {
+    return cli::fail(error.what());
+  }
+  return exit_code;
+}

@@ -1,0 +1,30 @@
+// How the command's parts stop with a sentence, and what is kept of the library's warnings.
+#pragma once
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+#include "cli.h"
+
+namespace cli {
+
+// Thrown anywhere below a subcommand: main prints the sentence and leaves with the code.
+struct Failure : std::runtime_error {
+  Failure(int code, const std::string &sentence) : std::runtime_error(sentence), exit_code(code) {}
+  int exit_code;
+};
+
+// Throws what the library said about a call that failed.
+inline void need(dfm_status status) {
+  if (status < 0) throw Failure(kBadInput, dfm_last_error());
+}
+
+void warn(const std::string &sentence);  // to stderr, and kept for the summary
+void keep_warning(const std::string &sentence);  // for the summary only
+const std::vector<std::string> &warnings();
+// Exit code of a run that a signal ended in order, as shells give it for SIGINT.
+enum { kInterrupted = 130 };
+
+void add_montage(CLI::App &app, int *exit_code);  // pictures in rows, for `make demo`; not listed in --help
+
+}  // namespace cli

@@ -1,0 +1,58 @@
+// deform montage: pictures of several runs in labelled rows. `make demo` calls it; it is not part of the command's promised surface.
+#include <memory>
+
+#include "messages.h"
+
+#ifdef DEFORM_HAVE_RENDER
+#include "render/render.h"
+#endif
+
+namespace cli {
+namespace {
+
+struct Options { std::vector<std::string> rows, columns; std::string out, title; };
+
+#ifdef DEFORM_HAVE_RENDER
+int montage(const Options &options) {
+  std::vector<std::vector<render::Image>> rows;
+  std::vector<std::string> labels;
+  // Each row reads LABEL FILE FILE ...; rows end where the next --row begins, which "%%" marks.
+  bool begin = true;
+  std::string why;
+  for (const std::string &word : options.rows) {
+    if (word == "%%") {
+      begin = true;
+    } else if (begin) {
+      labels.push_back(word), rows.emplace_back();
+      begin = false;
+    } else {
+      render::Image image;
+      if (!render::read_png(word, image, &why)) return fail(why);
+      rows.back().push_back(std::move(image));
+    }
+  }
+  for (const auto &row : rows)
+    if (row.empty()) return fail("montage: each --row is LABEL FILE...");
+  const render::Image picture = render::montage(rows, labels, options.columns, options.title);
+  if (!render::write_png(options.out, picture, &why)) return fail(why);
+  return kDone;
+}
+#else
+int montage(const Options &) { return fail("montage: this deform was built without the renderer"); }
+#endif
+
+}  // namespace
+
+void add_montage(CLI::App &app, int *exit_code) {
+  auto options = std::make_shared<Options>();
+  CLI::App *sub = app.add_subcommand("montage", "pictures in labelled rows");
+  sub->group("");
+  CLI::Option *row = sub->add_option("--row", options->rows, "LABEL FILE...; may be repeated")->required()->type_name("LABEL FILE...");
+  row->inject_separator();
+  sub->add_option("--columns", options->columns, "labels above the columns");
+  sub->add_option("--title", options->title, "title");
+  sub->add_option("--out", options->out, "picture to write (PNG)")->required();
+  sub->callback([=] { *exit_code = montage(*options); });
+}
+
+}  // namespace cli

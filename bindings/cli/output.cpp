@@ -1,0 +1,212 @@
+#include "output.h"
+
+#include <algorithm>
+#include <cerrno>
+#include <cmath>
+#include <cstring>
+#include <filesystem>
+
+#include "json_text.h"
+#include "messages.h"
+
+namespace fs = std::filesystem;
+
+namespace cli {
+namespace {
+
+[[noreturn]] void cannot_write(const std::string &path) {
+  throw Failure(kBadInput, path + ": cannot be written: " + std::strerror(errno));
+}
+
+void make_folder(const std::string &path) {
+  std::error_code error;
+  fs::create_directories(path, error);
+  if (error || !fs::is_directory(path)) throw Failure(kBadInput, path + ": the folder cannot be made: " + (error ? error.message() : "a file of that name is there"));
+}
+
+// Numbered files of an earlier run would read as later states of this one.
+void remove_numbered(const std::string &folder, const char *ending) {
+  std::error_code error;
+  for (const auto &entry : fs::directory_iterator(folder, error)) {
+    const std::string stem = entry.path().stem().string();
+    const size_t mark = stem.rfind('_');
+    const bool numbered = mark != std::string::npos && stem.size() == mark + 7 && stem.find_first_not_of("0123456789", mark + 1) == std::string::npos;
+    if (entry.path().extension() == ending && (numbered || stem.rfind("last_", 0) == 0)) fs::remove(entry.path(), error);
+  }
+}
+
+double norm(const double v[3]) { return std::sqrt(v[0] * v[0] + v[1] * v[1] + v[2] * v[2]); }
+
+}  // namespace
+
+static std::string csv_number(double x) { return std::isfinite(x) ? number(x) : std::isnan(x) ? "nan" : x > 0 ? "inf" : "-inf"; }
+
+void write_whole(const std::string &path, const std::string &text) {
+  const std::string temporary = path + ".part";
+  FILE *file = std::fopen(temporary.c_str(), "wb");
+  if (!file) cannot_write(path);
+  const bool written = std::fwrite(text.data(), 1, text.size(), file) == text.size();
+  if (std::fclose(file) != 0 || !written || std::rename(temporary.c_str(), path.c_str()) != 0) {
+    const int reason = errno;
+    std::remove(temporary.c_str());
+    errno = reason;
+    cannot_write(path);
+  }
+}
+
+// ---- tables ------------------------------------------------------------------------------------------------
+
+Csv::Csv(const std::string &path, const std::string &header) : path_(path), file_(std::fopen(path.c_str(), "wb"), std::fclose) {
+  if (!file_) cannot_write(path);
+  block_ = header + "\n";
+  flush();
+}
+
+Csv &Csv::cell(const std::string &text) {
+  if (!first_) block_ += ',';
+  first_ = false;
+  block_ += text;
+  return *this;
+}
+
+Csv &Csv::cell(double x) { return cell(csv_number(x)); }
+
+Csv &Csv::cells(const double *x, int n) {
+  for (int i = 0; i < n; ++i) cell(x[i]);
+  return *this;
+}
+
+void Csv::end_row() { block_ += '\n', first_ = true; }
+
+void Csv::flush() {
+  if (std::fwrite(block_.data(), 1, block_.size(), file_.get()) != block_.size() || std::fflush(file_.get()) != 0) cannot_write(path_);
+  block_.clear();
+}
+
+// ---- a run's files -----------------------------------------------------------------------------------------
+
+Outputs::Outputs(const SceneFile &scene, const std::string &folder)
+    : scene_(scene), folder_((make_folder(folder), folder)),
+      bodies_(folder + "/bodies.csv",
+              "t,body,com_x,com_y,com_z,vel_x,vel_y,vel_z,ang_x,ang_y,ang_z,kinetic_J,elastic_J,volume,force_x,force_y,force_z") {
+  const dfm_scene_settings &s = scene.settings();
+  if (s.contacts)
+    contacts_ = std::make_unique<Csv>(folder + "/contacts.csv",
+                                      "t,body_a,body_b,count,sticking,normal_N,friction_N,moment_Nm,slip_max,friction_work_J");
+  probes_ = std::make_unique<Csv>(folder + "/probes.csv", "t,probe,x,y,z,vx,vy,vz");
+  remove_numbered(folder + "/states", ".vtu");
+  if (s.states) {
+    make_folder(folder + "/states");
+    index_ = std::make_unique<Csv>(folder + "/states/index.csv", "index,t");
+  }
+  last_time_ = dfm_world_time(scene.world());
+  last_impulse_.assign(3 * scene.bodies().size(), 0.0);
+  for (size_t b = 0; b < scene.bodies().size() && s.nodes; ++b) {
+    const BodyView &body = scene.bodies()[b];
+    start_.emplace_back(3 * size_t(body.npoint));
+    uint32_t n = 0;
+    need(dfm_body_get_state(body.handle, body.npoint, start_.back().data(), nullptr, &n));
+  }
+}
+
+void Outputs::record() {
+  const double t = dfm_world_time(scene_.world());
+  write_bodies(t);
+  if (contacts_) write_contacts(t);
+  write_probes(t);
+  if (index_) {
+    char number_text[16];
+    std::snprintf(number_text, sizeof number_text, "_%06u", recorded_);
+    write_states(number_text);
+    index_->cell(std::to_string(recorded_)).cell(t).end_row();
+    index_->flush();
+  }
+  ++recorded_;
+  last_time_ = t;
+}
+
+void Outputs::write_bodies(double t) {
+  for (size_t b = 0; b < scene_.bodies().size(); ++b) {
+    const dfm_body_measure m = body_measure(scene_.bodies()[b]);
+    double force[3] = {0, 0, 0};
+    for (int k = 0; k < 3; ++k) {
+      if (t > last_time_) force[k] = (m.contact_impulse[k] - last_impulse_[3 * b + k]) / (t - last_time_);
+      last_impulse_[3 * b + k] = m.contact_impulse[k];
+    }
+    bodies_.cell(t).cell(scene_.bodies()[b].name).cells(m.com, 3).cells(m.velocity, 3).cells(m.angular, 3);
+    bodies_.cell(m.kinetic).cell(m.elastic).cell(m.volume).cells(force, 3).end_row();
+  }
+  bodies_.flush();
+}
+
+void Outputs::write_contacts(double t) {
+  uint32_t n = 0;
+  need(dfm_world_pairs(scene_.world(), 0, nullptr, &n));
+  pairs_.resize(n);
+  for (dfm_pair_report &p : pairs_) p.size = sizeof p;
+  if (n > 0) need(dfm_world_pairs(scene_.world(), n, pairs_.data(), &n));
+  for (uint32_t i = 0; i < n; ++i) {
+    const dfm_pair_report &p = pairs_[i];
+    contacts_->cell(t).cell(scene_.name_of(p.a)).cell(scene_.name_of(p.b));
+    contacts_->cell(std::to_string(p.count)).cell(std::to_string(p.sticking));
+    contacts_->cell(p.normal).cell(norm(p.friction)).cell(norm(p.moment)).cell(p.slip_max).cell(p.friction_work).end_row();
+  }
+  contacts_->flush();
+}
+
+void Outputs::write_probes(double t) {
+  for (uint32_t i = 0; i < scene_.settings().nprobe; ++i) {
+    const char *name = nullptr;
+    double x[3], v[3];
+    need(dfm_scene_probe(scene_.scene(), i, &name, x, v));
+    probes_->cell(t).cell(name).cells(x, 3).cells(v, 3).end_row();
+  }
+  probes_->flush();
+}
+
+void Outputs::write_states(const std::string &suffix) {
+  for (const BodyView &body : scene_.bodies()) {
+    need(dfm_debug_write_body(body.handle, state_path(body.name + suffix).c_str()));
+    need(dfm_debug_write_surface(body.handle, state_path(body.name + "_surface" + suffix).c_str()));
+  }
+}
+
+void Outputs::write_last() {
+  make_folder(folder_ + "/states");
+  for (const BodyView &body : scene_.bodies()) {
+    need(dfm_debug_write_body(body.handle, state_path("last_" + body.name).c_str()));
+    need(dfm_debug_write_surface(body.handle, state_path("last_" + body.name + "_surface").c_str()));
+  }
+}
+
+void Outputs::write_nodes() {
+  if (start_.empty()) return;
+  make_folder(folder_ + "/nodes");
+  const fs::path scene_folder = fs::path(scene_.path()).parent_path();
+  for (size_t b = 0; b < scene_.bodies().size(); ++b) {
+    const BodyView &body = scene_.bodies()[b];
+    // The numbers of the mesh file's nodes: the body's points are those of the mesh as it was read.
+    JsonValue path;
+    if (!parse_json(scene_.value("/bodies/" + std::to_string(b) + "/mesh"), path)) throw Failure(kBadInput, "body \"" + body.name + "\" has no mesh file");
+    dfm_tetmesh mesh = 0;
+    need(dfm_tetmesh_read(scene_.context(), (scene_folder / path.text).string().c_str(), &mesh));
+    const uint32_t *file_point = nullptr;
+    need(dfm_tetmesh_data(mesh, nullptr, nullptr, &file_point));
+    std::vector<double> now(3 * size_t(body.npoint));
+    uint32_t n = 0;
+    need(dfm_body_get_state(body.handle, body.npoint, now.data(), nullptr, &n));
+    std::vector<uint32_t> order(body.npoint);
+    for (uint32_t i = 0; i < body.npoint; ++i) order[i] = i;
+    std::sort(order.begin(), order.end(), [&](uint32_t i, uint32_t j) { return file_point[i] < file_point[j]; });
+    std::string text = "node,ux,uy,uz\n";
+    for (const uint32_t i : order) {
+      text += std::to_string(file_point[i]);
+      for (int k = 0; k < 3; ++k) text += "," + csv_number(now[3 * size_t(i) + k] - start_[b][3 * size_t(i) + k]);
+      text += "\n";
+    }
+    write_whole(folder_ + "/nodes/" + body.name + ".csv", text);
+    dfm_tetmesh_destroy(mesh);
+  }
+}
+
+}  // namespace cli

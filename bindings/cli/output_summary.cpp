@@ -1,0 +1,180 @@
+// summary.json, the table at the end of a run, and the profile.
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+
+#include "json_text.h"
+#include "messages.h"
+#include "run.h"
+
+namespace cli {
+
+void StepTimes::add(double seconds) {
+  longest_ = std::max(longest_, seconds);
+  if (seen_++ % every_ == 0) kept_.push_back(float(seconds));
+  if (kept_.size() < (size_t(1) << 20)) return;
+  for (size_t i = 0; 2 * i < kept_.size(); ++i) kept_[i] = kept_[2 * i];
+  kept_.resize(kept_.size() / 2);
+  every_ *= 2;
+}
+
+double StepTimes::quantile(double q) const {
+  if (kept_.empty()) return NAN;
+  std::vector<float> sorted = kept_;
+  std::sort(sorted.begin(), sorted.end());
+  return sorted[std::min(sorted.size() - 1, size_t(q * double(sorted.size())))];
+}
+
+dfm_world_stats world_stats(const SceneFile &scene) {
+  dfm_world_stats stats = {};
+  stats.size = sizeof stats;
+  need(dfm_world_get_stats(scene.world(), &stats));
+  return stats;
+}
+
+dfm_body_measure body_measure(const BodyView &body) {
+  dfm_body_measure m = {};
+  m.size = sizeof m;
+  need(dfm_body_get_measure(body.handle, &m));
+  return m;
+}
+
+void Checker::check(bool start_state) {
+  ++checks_.states;
+  surfaces_.clear();
+  bool finite = true;
+  for (size_t b = 0; b < positions_.size(); ++b) {
+    const BodyView &body = scene_.bodies()[b];
+    uint32_t n = 0;
+    positions_[b].resize(3 * size_t(body.nsurfel));
+    need(dfm_surface_positions(body.handle, body.nsurfel, positions_[b].data(), &n));
+    finite = finite && std::all_of(positions_[b].begin(), positions_[b].end(), [](double x) { return std::isfinite(x); });
+    const dfm_body_measure m = body_measure(body);
+    finite = finite && std::isfinite(m.kinetic) && std::isfinite(m.volume);
+    checks_.inverted_max = std::max(checks_.inverted_max, m.inverted);
+    surfaces_.push_back({positions_[b].data(), n, body.triangles.data(), uint32_t(body.triangles.size() / 3)});
+  }
+  checks_.finite = checks_.finite && finite;
+  if (!finite) return;
+  const size_t found = counter_.count(surfaces_, start_state ? crossing::Touching::allowed : crossing::Touching::counts);
+  checks_.intersections_max = std::max(checks_.intersections_max, found);
+}
+
+namespace {
+
+std::vector<dfm_stage_time> profile(const SceneFile &scene) {
+  uint32_t n = 0;
+  need(dfm_world_profile(scene.world(), 0, nullptr, &n));
+  std::vector<dfm_stage_time> stages(n);
+  if (n > 0) need(dfm_world_profile(scene.world(), n, stages.data(), &n));
+  return stages;
+}
+
+std::string stages_json(const SceneFile &scene, uint64_t steps) {
+  JsonObject out;
+  for (const dfm_stage_time &stage : profile(scene)) out.add(stage.name, number(1e3 * stage.seconds / double(std::max<uint64_t>(1, steps))));
+  return out.text();
+}
+
+std::string names_json(const JsonValue &plan, const char *key) {
+  std::vector<std::string> names;
+  if (const JsonValue *list = plan.find(key))
+    for (const JsonValue &row : list->items) names.push_back(quoted(row.get("name")));
+  return json_array(names);
+}
+
+std::string plugins_json(const SceneFile &scene) {
+  std::vector<std::string> rows;
+  need(dfm_plugin_visit(
+      scene.context(),
+      [](void *user, const dfm_type *type, const char *file) {
+        JsonObject row;
+        row.add("id", quoted(type->id)).add("version", quoted(type->version ? type->version : "")).add("file", quoted(file ? file : ""));
+        static_cast<std::vector<std::string> *>(user)->push_back(row.text());
+      },
+      &rows));
+  return json_array(rows);
+}
+
+std::string bodies_json(const SceneFile &scene) {
+  JsonObject out;
+  for (const BodyView &body : scene.bodies()) {
+    const dfm_body_measure m = body_measure(body);
+    JsonObject row;
+    row.add("com", json_vector(m.com)).add("velocity", json_vector(m.velocity));
+    row.add("kinetic_J", number(m.kinetic)).add("elastic_J", number(m.elastic));
+    row.add("volume_ratio", number(m.volume / m.rest_volume)).add("speed_max", number(m.speed_max));
+    row.add("dofs", std::to_string(3 * uint64_t(body.npoint))).add("cells", std::to_string(body.ntet));
+    out.add(body.name, row.text());
+  }
+  return out.text();
+}
+
+std::string stopped_json(const RunResult &run) {
+  if (!run.stopped && !run.interrupted) return "null";
+  JsonObject row;
+  row.add("step", std::to_string(run.steps)).add("t", number(run.simulated)).add("body", run.stop_body.empty() ? "null" : quoted(run.stop_body));
+  return row.add("reason", quoted(run.stop_reason)).text();
+}
+
+}  // namespace
+
+std::string summary_json(const SceneFile &scene, const RunOptions &options, const RunResult &run, const Checks &checks) {
+  if (checks.states == 0) throw Failure(kStopped, "no state was recorded, so nothing can be said about intersections");
+  const dfm_world_stats stats = world_stats(scene);
+  JsonValue plan;
+  parse_json(scene.explain(), plan);
+  char hash[24];
+  std::snprintf(hash, sizeof hash, "\"%016llx\"", static_cast<unsigned long long>(dfm_world_hash(scene.world())));
+  std::vector<std::string> warning_texts;
+  for (const std::string &w : warnings()) warning_texts.push_back(quoted(w));
+  JsonObject ms, solver, hold, effects, contacts, out;
+  ms.add("median", number(1e3 * run.times.quantile(0.5))).add("p99", number(1e3 * run.times.quantile(0.99)));
+  ms.add("max", number(1e3 * run.times.longest()));
+  solver.add("passes", std::to_string(stats.passes_max)).add("sweeps", std::to_string(stats.sweeps_max));
+  solver.add("residual_max", number(stats.residual_max));
+  hold.add("creep_max_um_per_s", run.hold_begun && run.hold_count > 0 ? number(1e6 * run.creep) : "null");
+  effects.add("active", names_json(plan, "effects")).add("absent", names_json(plan, "absent"));
+  contacts.add("max", std::to_string(stats.contacts_max)).add("mean", number(stats.contacts_mean));
+  out.add("format", "\"deform-summary\"").add("version", "1").add("library", quoted(dfm_version(nullptr, nullptr, nullptr)));
+  out.add("scene", quoted(options.scene)).add("steps", std::to_string(run.steps)).add("substeps", std::to_string(stats.substeps));
+  out.add("simulated_s", number(run.simulated)).add("wall_s", number(run.wall)).add("cpu_s", number(run.cpu));
+  out.add("ms_per_step", ms.text()).add("stages", stages_json(scene, run.steps)).add("threads", std::to_string(stats.threads));
+  out.add("finite", checks.finite ? "true" : "false").add("states_checked", std::to_string(checks.states));
+  out.add("intersections_max", std::to_string(checks.intersections_max));
+  out.add("inverted_max", std::to_string(std::max(checks.inverted_max, stats.inverted_max)));
+  out.add("guard_steps", std::to_string(stats.guard_steps)).add("unconverged_steps", std::to_string(stats.unconverged));
+  out.add("solver", solver.text()).add("hold", hold.text()).add("effects", effects.text()).add("plugins", plugins_json(scene));
+  out.add("bodies", bodies_json(scene)).add("contacts", contacts.text()).add("swaps", "[]").add("state_hash", hash);
+  out.add("stopped", stopped_json(run)).add("warnings", json_array(warning_texts));
+  return indented(out.text());
+}
+
+void print_table(const SceneFile &scene, const RunResult &run, const Checks &checks) {
+  const dfm_world_stats stats = world_stats(scene);
+  std::printf("%-16s %9s %8s  %-30s %10s %9s\n", "body", "points", "cells", "centre of mass / m", "speed m/s", "volume");
+  for (const BodyView &body : scene.bodies()) {
+    const dfm_body_measure m = body_measure(body);
+    char com[64];
+    std::snprintf(com, sizeof com, "%9.4f %9.4f %9.4f", m.com[0], m.com[1], m.com[2]);
+    std::printf("%-16.16s %9u %8u  %-30s %10.3g %8.2f%%\n", body.name.c_str(), body.npoint, body.ntet, com, m.speed_max, 100 * m.volume / m.rest_volume);
+  }
+  std::printf("%llu steps, %g s simulated in %.3g s: %.4g steps/s, %.3g x real time\n", static_cast<unsigned long long>(run.steps), run.simulated,
+              run.wall, double(run.steps) / run.wall, (run.simulated - run.start) / run.wall);
+  std::printf("contacts: %u at most, %.3g on average; states checked: %llu, crossing triangle pairs: %zu, inverted cells: %u\n", stats.contacts_max,
+              stats.contacts_mean, static_cast<unsigned long long>(checks.states), checks.intersections_max,
+              std::max(checks.inverted_max, stats.inverted_max));
+}
+
+void print_profile(const SceneFile &scene, const RunResult &run) {
+  std::vector<dfm_stage_time> stages = profile(scene);
+  double sum = 0;
+  for (const dfm_stage_time &s : stages) sum += s.seconds;
+  std::printf("%-20s %10s %12s %8s\n", "stage", "ms/step", "calls/step", "share");
+  const double steps = double(std::max<uint64_t>(1, run.steps));
+  for (const dfm_stage_time &s : stages)
+    std::printf("%-20s %10.4f %12.2f %7.1f%%\n", s.name, 1e3 * s.seconds / steps, double(s.calls) / steps, sum > 0 ? 100 * s.seconds / sum : 0.0);
+  std::printf("%-20s %10.4f %12s %7.1f%%\n", "outside stages", 1e3 * std::max(0.0, run.wall - sum) / steps, "", run.wall > 0 ? 100 * (run.wall - sum) / run.wall : 0.0);
+}
+
+}  // namespace cli

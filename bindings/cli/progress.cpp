@@ -1,0 +1,31 @@
+#include "progress.h"
+
+#include <unistd.h>
+
+#include <algorithm>
+#include <cstdio>
+#include <string>
+
+namespace cli {
+
+Progress::Progress(bool wanted) : on_(wanted && isatty(STDERR_FILENO)), begin_(Clock::now()), next_(begin_ + std::chrono::seconds(2)) {}
+
+Progress::~Progress() {
+  if (drawn_) std::fprintf(stderr, "\r\033[K");
+}
+
+void Progress::show(double done, double total, double steps_per_second) {
+  if (!on_) return;
+  const Clock::time_point now = Clock::now();
+  if (now < next_) return;
+  next_ = now + std::chrono::milliseconds(100);
+  const double part = total > 0 ? std::clamp(done / total, 0.0, 1.0) : 0.0;
+  const double elapsed = std::chrono::duration<double>(now - begin_).count();
+  const int width = 32, filled = int(part * width);
+  std::fprintf(stderr, "\r[%s%s] %3.0f %%  t = %.3f s of %g s  %.0f steps/s  %.0f s left \033[K", std::string(size_t(filled), '#').c_str(),
+               std::string(size_t(width - filled), '.').c_str(), 100 * part, done, total, steps_per_second, part > 0 ? elapsed / part * (1 - part) : 0.0);
+  std::fflush(stderr);
+  drawn_ = true;
+}
+
+}  // namespace cli

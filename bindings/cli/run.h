@@ -1,0 +1,77 @@
+// What the parts of `deform run` share: options, and what a run has measured so far.
+#pragma once
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "crossing.h"
+#include "scene_file.h"
+
+namespace cli {
+
+struct RunOptions {
+  std::string scene, out;
+  double time = 0;    // 0: the scene's duration
+  double frame_rate = 0;  // 0: what the scene says
+  std::vector<std::string> set;
+  bool profile = false, check = false;
+  uint64_t jitter = 0;
+};
+
+// Wall time of every step, thinned evenly once there are very many; the longest is kept exactly.
+class StepTimes {
+ public:
+  void add(double seconds);
+  double quantile(double q) const;  // s
+  double longest() const { return longest_; }
+
+ private:
+  std::vector<float> kept_;
+  uint64_t seen_ = 0, every_ = 1;
+  double longest_ = 0;
+};
+
+struct RunResult {
+  uint64_t steps = 0;
+  double start = 0, simulated = 0, wall = 0, cpu = 0;  // s; wall and cpu are of the steps, without outputs and checks
+  StepTimes times;
+  bool interrupted = false, stopped = false;
+  std::string stop_reason, stop_body;
+  bool hold_begun = false;
+  double creep = 0;         // m/s, NAN if no pair qualifies
+  uint32_t hold_count = 0;
+};
+
+// What recorded states showed. "Recorded" is every state written to bodies.csv, and with --check every step.
+struct Checks {
+  uint64_t states = 0;
+  size_t intersections_max = 0;
+  uint32_t inverted_max = 0;
+  bool finite = true;
+};
+
+// Judges one state: crossings, inverted cells, finiteness.
+class Checker {
+ public:
+  explicit Checker(const SceneFile &scene) : scene_(scene), positions_(scene.bodies().size()) {}
+  void check(bool start_state);
+  const Checks &result() const { return checks_; }
+
+ private:
+  const SceneFile &scene_;
+  std::vector<std::vector<double>> positions_;
+  std::vector<crossing::Surface> surfaces_;
+  crossing::Counter counter_;
+  Checks checks_;
+};
+
+std::string summary_json(const SceneFile &scene, const RunOptions &options, const RunResult &run, const Checks &checks);
+void print_table(const SceneFile &scene, const RunResult &run, const Checks &checks);
+void print_profile(const SceneFile &scene, const RunResult &run);
+
+dfm_world_stats world_stats(const SceneFile &scene);
+dfm_body_measure body_measure(const BodyView &body);
+// To a temporary name first, then renamed: nobody reads half a file.
+void write_whole(const std::string &path, const std::string &text);
+
+}  // namespace cli

@@ -1,0 +1,75 @@
+#include "scene_file.h"
+
+#include "messages.h"
+
+namespace cli {
+
+SceneFile::SceneFile(const Globals &globals, const std::string &path, const std::vector<std::string> &set, uint64_t jitter_seed)
+    : context_(make_context(globals), dfm_context_destroy), path_(path) {
+  std::vector<const char *> assignments;
+  for (const std::string &s : set) assignments.push_back(s.c_str());
+  dfm_scene_options options = {};
+  options.size = sizeof options;
+  options.nset = uint32_t(assignments.size());
+  options.set = assignments.data();
+  options.jitter_seed = jitter_seed;
+  need(dfm_scene_open(context_.get(), path.c_str(), &options, &scene_));
+  need(dfm_scene_world(scene_, &world_));
+  settings_.size = sizeof settings_;
+  need(dfm_scene_get_settings(scene_, &settings_));
+
+  uint32_t n = 0;
+  need(dfm_world_bodies(world_, 0, nullptr, &n));
+  std::vector<dfm_body> handles(n);
+  need(dfm_world_bodies(world_, n, handles.data(), &n));
+  for (const dfm_body handle : handles) {
+    dfm_body_info info = {};
+    info.size = sizeof info;
+    need(dfm_body_get_info(handle, &info));
+    BodyView body;
+    body.handle = handle, body.name = info.name, body.model = info.model;
+    body.npoint = info.npoint, body.ntet = info.ntet, body.nsurfel = info.nsurfel, body.rest_volume = info.rest_volume;
+    body.triangles.resize(3 * size_t(info.ntriangle));
+    uint32_t ntriangle = 0;
+    need(dfm_surface_triangles(handle, info.ntriangle, body.triangles.data(), &ntriangle));
+    names_[handle] = body.name;
+    bodies_.push_back(std::move(body));
+  }
+  need(dfm_world_obstacles(world_, 0, nullptr, &n));
+  std::vector<dfm_obstacle> obstacles(n);
+  need(dfm_world_obstacles(world_, n, obstacles.data(), &n));
+  for (const dfm_obstacle handle : obstacles) {
+    ObstacleView obstacle;
+    obstacle.handle = handle;
+    obstacle.def.size = sizeof obstacle.def;
+    need(dfm_obstacle_get_def(handle, &obstacle.def));
+    obstacle.name = names_[handle] = obstacle.def.name ? obstacle.def.name : "";
+    obstacles_.push_back(obstacle);
+  }
+}
+
+const std::string &SceneFile::name_of(uint64_t handle) const {
+  static const std::string unknown = "?";
+  const auto found = names_.find(handle);
+  return found == names_.end() ? unknown : found->second;
+}
+
+std::string SceneFile::value(const std::string &pointer) const {
+  size_t bytes = 0;
+  if (dfm_scene_value(scene_, pointer.c_str(), nullptr, &bytes) < 0) return "";
+  std::string text(bytes, '\0');
+  need(dfm_scene_value(scene_, pointer.c_str(), text.data(), &bytes));
+  text.resize(bytes - 1);
+  return text;
+}
+
+std::string SceneFile::explain() const {
+  size_t bytes = 0;
+  need(dfm_world_explain(world_, nullptr, &bytes));
+  std::string text(bytes, '\0');
+  need(dfm_world_explain(world_, text.data(), &bytes));
+  text.resize(text.find('\0') == std::string::npos ? text.size() : text.find('\0'));
+  return text;
+}
+
+}  // namespace cli

@@ -1,0 +1,52 @@
+// A scene as the command sees it: opened, with the names and sizes of what is in it. On the public API only.
+#pragma once
+#include <map>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "cli.h"
+
+namespace cli {
+
+struct BodyView {
+  dfm_body handle = 0;
+  std::string name, model;
+  uint32_t npoint = 0, ntet = 0, nsurfel = 0;
+  double rest_volume = 0;
+  std::vector<uint32_t> triangles;  // [n,3] surfel numbers
+};
+
+struct ObstacleView {
+  dfm_obstacle handle = 0;
+  std::string name;
+  dfm_obstacle_def def = {};
+};
+
+class SceneFile {
+ public:
+  SceneFile(const Globals &globals, const std::string &path, const std::vector<std::string> &set, uint64_t jitter_seed);
+
+  dfm_context *context() const { return context_.get(); }
+  dfm_scene scene() const { return scene_; }
+  dfm_world world() const { return world_; }
+  const std::string &path() const { return path_; }
+  const dfm_scene_settings &settings() const { return settings_; }
+  const std::vector<BodyView> &bodies() const { return bodies_; }
+  const std::vector<ObstacleView> &obstacles() const { return obstacles_; }
+  const std::string &name_of(uint64_t handle) const;  // of a body or an obstacle
+  std::string value(const std::string &pointer) const;  // JSON text; "" where nothing is
+  std::string explain() const;
+
+ private:
+  std::unique_ptr<dfm_context, decltype(&dfm_context_destroy)> context_;  // owns scene and world
+  std::string path_;
+  dfm_scene scene_ = 0;
+  dfm_world world_ = 0;
+  dfm_scene_settings settings_ = {};
+  std::vector<BodyView> bodies_;
+  std::vector<ObstacleView> obstacles_;
+  std::map<uint64_t, std::string> names_;
+};
+
+}  // namespace cli

@@ -1,0 +1,111 @@
+// Binary tree of boxes over a surface's triangles. Its topology is found once by median splits; later only its boxes are renewed from
+// below, and it is built anew when they have grown too much.
+#pragma once
+#include <cstdint>
+
+#include "core/memory.h"
+#include "math/vec3.h"
+#include "surfel/surface.h"
+
+namespace dfm {
+
+struct Box {
+  double lo[4], hi[4];  // fourth component 0
+};
+
+// Squared distance of two boxes; 0 where they overlap.
+inline double box_distance2(const Box &a, const Box &b) {
+  double sum = 0;
+  for (int k = 0; k < 3; ++k) {
+    const double g = a.lo[k] - b.hi[k], e = b.lo[k] - a.hi[k], d = g > e ? g : e;
+    if (d > 0) sum += d * d;
+  }
+  return sum;
+}
+
+struct PairOfTriangles {
+  uint32_t a, b;  // nodes during the descent, triangles after it
+};
+
+class BoxTree {
+ public:
+  static constexpr uint32_t kLeaf = 4;  // triangles in a leaf, at most
+  struct Node {
+    uint32_t right;         // inner: the left child is the next node, this is the right one; leaf: first place in triangle()
+    uint32_t count;         // 0: inner
+  };
+  explicit BoxTree(const Memory &memory);
+
+  // x: [nsurfel,4]
+  void build(const Surface &surface, const double *x);
+  void refit(const Surface &surface, const double *x);
+  // Sum of the boxes' areas over its value after build().
+  double quality() const { return area_built_ > 0 ? area_ / area_built_ : 1; }
+
+  bool empty() const { return node_.empty(); }
+  const Box &root() const { return box_[0]; }
+  const Array<Node> &nodes() const { return node_; }
+  const Array<Box> &boxes() const { return box_; }
+  const Array<uint32_t> &triangles() const { return tri_; }   // in the order of the leaves
+  const Array<Box> &triangle_boxes() const { return tri_box_; }
+
+ private:
+  struct Centroid { double x[3]; uint32_t tri; };
+  uint32_t split(uint32_t begin, uint32_t end);
+  Array<Node> node_;
+  Array<Box> box_, tri_box_;
+  Array<uint32_t> tri_;
+  Array<Centroid> centroid_;
+  double area_ = 0, area_built_ = 0;
+};
+
+// f(triangle of a, triangle of b) for all pairs whose boxes are no further apart than margin. stack is scratch.
+template <class F>
+void near_pairs(const BoxTree &a, const BoxTree &b, double margin, Array<PairOfTriangles> &stack, F &&f) {
+  if (a.empty() || b.empty()) return;
+  const double limit = margin * margin;
+  stack.clear();
+  stack.push_back({0, 0});
+  while (!stack.empty()) {
+    const auto [i, j] = stack.back();
+    stack.pop_back();
+    if (!(box_distance2(a.boxes()[i], b.boxes()[j]) <= limit)) continue;
+    const BoxTree::Node m = a.nodes()[i], n = b.nodes()[j];
+    if (m.count && n.count) {
+      for (uint32_t p = m.right; p < m.right + m.count; ++p) {
+        if (!(box_distance2(a.triangle_boxes()[p], b.boxes()[j]) <= limit)) continue;
+        for (uint32_t q = n.right; q < n.right + n.count; ++q)
+          if (box_distance2(a.triangle_boxes()[p], b.triangle_boxes()[q]) <= limit) f(a.triangles()[p], b.triangles()[q]);
+      }
+    } else if (n.count || (!m.count && m.right - i >= n.right - j)) {
+      stack.push_back({i + 1, j});       // the left child of a larger node first: its extent in the array stands for its size
+      stack.push_back({m.right, j});
+    } else {
+      stack.push_back({i, j + 1});
+      stack.push_back({i, n.right});
+    }
+  }
+}
+
+// f(triangle) for all whose boxes pass `near(const Box &)`.
+template <class N, class F>
+void near_triangles(const BoxTree &tree, Array<PairOfTriangles> &stack, N &&near, F &&f) {
+  if (tree.empty()) return;
+  stack.clear();
+  stack.push_back({0, 0});
+  while (!stack.empty()) {
+    const uint32_t i = stack.back().a;
+    stack.pop_back();
+    if (!near(tree.boxes()[i])) continue;
+    const BoxTree::Node n = tree.nodes()[i];
+    if (n.count) {
+      for (uint32_t p = n.right; p < n.right + n.count; ++p)
+        if (near(tree.triangle_boxes()[p])) f(tree.triangles()[p]);
+    } else {
+      stack.push_back({i + 1, 0});
+      stack.push_back({n.right, 0});
+    }
+  }
+}
+
+}  // namespace dfm

@@ -1,0 +1,349 @@
+#include "broad/broad_phase.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "surfel/closest.h"
+#include "surfel/obstacle_shape.h"
+
+namespace dfm {
+namespace {
+
+constexpr double kRounding = 1 + 1e-9;      // margins hold in spite of rounded distances
+constexpr double kSkinLeast = 0.02;         // of the median edge: a resting body keeps its lists
+constexpr double kSkinMost = 0.5;           // beyond half an edge, lists grow faster than they last
+constexpr double kSpeedGrowth = 1.25;       // speeds may rise by so much before the margin of the reach is used up
+constexpr double kQualityLimit = 2;         // boxes that have grown this much in sum are worth a new tree
+
+struct Motion {
+  double displacement, speed;
+};
+
+// Largest displacement since x0, and largest speed. A maximum has the same bits in any order, so the compiler may use any width.
+Motion motion_of(const Surface &surface, const Array<double> &x0) {
+  const double *__restrict x = surface.x.data();
+  const double *__restrict v = surface.v.data();
+  const double *__restrict y = x0.data();
+  double d2[2] = {0, 0}, v2[2] = {0, 0};
+  const uint32_t n = surface.nsurfel;
+  for (uint32_t s = 0; s < n; ++s) {
+    const uint32_t i = 4 * s;
+    const double dx = x[i] - y[i], dy = x[i + 1] - y[i + 1], dz = x[i + 2] - y[i + 2];
+    const double d = dx * dx + dy * dy + dz * dz, w = v[i] * v[i] + v[i + 1] * v[i + 1] + v[i + 2] * v[i + 2];
+    d2[s & 1] = d > d2[s & 1] ? d : d2[s & 1];
+    v2[s & 1] = w > v2[s & 1] ? w : v2[s & 1];
+  }
+  return {std::sqrt(std::max(d2[0], d2[1])), std::sqrt(std::max(v2[0], v2[1]))};
+}
+
+double obstacle_speed(const ObstacleView &o, double extent) { return norm(o.velocity) + norm(o.spin) * extent; }
+
+// Bound of the motion of a shape between two poses: |q - q0| of unit quaternions is at most half the chord that a point at distance 1 moves.
+double obstacle_displacement(const ObstacleView &now, const ObstacleView &then, double extent) {
+  const Quat p = now.rotation, q = then.rotation;
+  const double s = p.x * q.x + p.y * q.y + p.z * q.z + p.w * q.w < 0 ? -1 : 1;
+  const double dx = p.x - s * q.x, dy = p.y - s * q.y, dz = p.z - s * q.z, dw = p.w - s * q.w;
+  return norm(now.position - then.position) + 2 * extent * std::sqrt(dx * dx + dy * dy + dz * dz + dw * dw);
+}
+
+// Shape, size and belt are an obstacle's own; a new one under an old id has other lists.
+bool same_shape(const ObstacleView &a, const ObstacleView &b) {
+  return a.shape == b.shape && a.slot == b.slot && a.category == b.category && a.collides_with == b.collides_with && a.radius == b.radius &&
+         a.half_length == b.half_length && a.half_size.x == b.half_size.x && a.half_size.y == b.half_size.y && a.half_size.z == b.half_size.z;
+}
+
+uint64_t features(uint32_t a, uint32_t b) { return uint64_t{a} << 32 | b; }
+
+struct Features {      // corners of a surface as listed
+  const Surface &surface;
+  const double *x;
+  Vec3 point(uint32_t s) const { return load3(x + 4 * size_t{s}); }
+  Vec3 corner(uint32_t t, int k) const { return point(surface.tri[3 * size_t{t} + k]); }
+  Vec3 edge(uint32_t e, int k) const { return point(surface.edge[2 * size_t{e} + k]); }
+};
+
+bool finite_positions(const Surface &s) {
+  double sum = 0;
+  for (const double x : s.x) sum += x - x;
+  return sum == 0;
+}
+
+}  // namespace
+
+BroadPhase::BroadPhase(const Memory &memory)
+    : memory_(memory), bodies_(HookAllocator<Body>(memory_)), things_(HookAllocator<Thing>(memory_)),
+      segments_(HookAllocator<Segment>(memory_)), next_segments_(HookAllocator<Segment>(memory_)),
+      candidates_(HookAllocator<Candidate>(memory_)), next_(HookAllocator<Candidate>(memory_)), fresh_(HookAllocator<uint64_t>(memory_)),
+      vf_(HookAllocator<uint64_t>(memory_)), fv_(HookAllocator<uint64_t>(memory_)), ee_(HookAllocator<uint64_t>(memory_)),
+      order_(HookAllocator<uint32_t>(memory_)), stack_(HookAllocator<PairOfTriangles>(memory_)) {}
+
+void BroadPhase::clear() {
+  bodies_.clear();
+  things_.clear();
+  segments_.clear();
+  candidates_.clear();
+}
+
+bool BroadPhase::update(std::span<const BodyView> bodies, std::span<const ObstacleView> obstacles, const PairFilter &filter, double h,
+                        double offset) {
+  ++stats_.updates;
+  match(bodies, obstacles, filter);
+  if (!find_dirty(bodies, obstacles, h, offset)) return false;
+  ++stats_.renewals;
+  for (Body &b : bodies_)
+    if (b.dirty) renew_body(b, h, offset);
+  bound_bodies();
+  for (size_t o = 0; o < things_.size(); ++o) {
+    Thing &t = things_[o];
+    // A plane's share is taken over the sphere around the bodies, which has just changed.
+    if (!t.dirty && t.view.shape == Shape::plane) t.dirty = !holds(t, obstacles[o], h, offset);
+    if (!t.dirty) continue;
+    t.view = obstacles[o];
+    const double extent = t.view.shape == Shape::plane ? norm(center_ - t.view.position) + radius_ : ObstacleShape(t.view).extent();
+    t.margin = kRounding * reach_share(h, offset, (kSpeedGrowth + 0.5 * skin_steps_) * obstacle_speed(t.view, extent)) + offset;
+  }
+  find_pairs(bodies, obstacles, filter);
+  assemble();
+  for (Body &b : bodies_) b.dirty = !b.usable;
+  for (Thing &t : things_) t.dirty = false;
+  return true;
+}
+
+// Brings bodies_ and things_ in line with the views; what is new, gone or changed in kind loses its lists.
+void BroadPhase::match(std::span<const BodyView> bodies, std::span<const ObstacleView> obstacles, const PairFilter &filter) {
+  bool same = bodies.size() == bodies_.size() && obstacles.size() == things_.size() && filter.version == filter_version_;
+  for (size_t i = 0; same && i < bodies.size(); ++i) {
+    const Body &b = bodies_[i];
+    same = b.id == bodies[i].id && b.surface == bodies[i].surface && b.slot == bodies[i].slot && b.category == bodies[i].category &&
+           b.collides_with == bodies[i].collides_with && b.x.size() == bodies[i].surface->x.size();
+  }
+  for (size_t o = 0; same && o < obstacles.size(); ++o)
+    same = things_[o].view.id == obstacles[o].id && same_shape(things_[o].view, obstacles[o]);
+  if (same) return;
+  clear();
+  filter_version_ = filter.version;
+  bodies_.reserve(bodies.size());
+  for (const BodyView &v : bodies) {
+    Body &b = bodies_.emplace_back(memory_);
+    b.id = v.id, b.surface = v.surface, b.slot = v.slot, b.category = v.category, b.collides_with = v.collides_with;
+    b.x.resize(v.surface->x.size());
+  }
+  things_.reserve(obstacles.size());
+  for (const ObstacleView &v : obstacles) things_.push_back({v, -1, true});
+}
+
+bool BroadPhase::find_dirty(std::span<const BodyView> bodies, std::span<const ObstacleView> obstacles, double h, double offset) {
+  bool any = false;
+  for (Body &b : bodies_) {
+    if (!b.dirty) {
+      const Motion m = motion_of(*b.surface, b.x);
+      b.dirty = !(kRounding * (m.displacement + reach_share(h, offset, m.speed)) <= b.margin);
+    }
+    any |= b.dirty;
+  }
+  for (size_t o = 0; o < things_.size(); ++o) {
+    things_[o].dirty = things_[o].dirty || !holds(things_[o], obstacles[o], h, offset);
+    any |= things_[o].dirty;
+  }
+  return any;
+}
+
+bool BroadPhase::holds(const Thing &thing, const ObstacleView &now, double h, double offset) const {
+  const ObstacleView &then = thing.view;
+  double moved, extent;
+  if (now.shape == Shape::plane) {
+    // Only the motion along the normal counts, over the sphere that holds all bodies.
+    const Vec3 n = ObstacleShape(now).axis(2), n0 = ObstacleShape(then).axis(2);
+    moved = norm(n - n0) * radius_ + std::fabs(dot(n, center_ - now.position) - dot(n0, center_ - then.position));
+    extent = norm(center_ - now.position) + radius_;
+  } else {
+    extent = ObstacleShape(now).extent();
+    moved = obstacle_displacement(now, then, extent);
+  }
+  return kRounding * (moved + reach_share(h, offset, obstacle_speed(now, extent))) <= thing.margin;
+}
+
+// The skin lasts for skin_steps_ of the present motion, a function of the state alone.
+void BroadPhase::renew_body(Body &body, double h, double offset) {
+  const Surface &s = *body.surface;
+  body.usable = s.ntri > 0 && finite_positions(s);
+  if (!body.usable) return;
+  std::copy(s.x.begin(), s.x.end(), body.x.begin());
+  if (!body.tree.empty()) {
+    body.tree.refit(s, body.x.data());
+    ++stats_.refits;
+  }
+  if (body.tree.empty() || body.tree.quality() > kQualityLimit) {
+    body.tree.build(s, body.x.data());
+    ++stats_.rebuilds;
+  }
+  const double speed = motion_of(s, body.x).speed;
+  const double skin = std::clamp(skin_steps_ * h * speed, kSkinLeast * s.median_edge, kSkinMost * s.median_edge);
+  body.margin = kRounding * reach_share(h, offset, kSpeedGrowth * speed) + skin;
+}
+
+void BroadPhase::bound_bodies() {
+  bool first = true;
+  Vec3 lo, hi;
+  for (const Body &b : bodies_) {
+    if (!b.usable) continue;
+    for (int k = 0; k < 3; ++k) {
+      const double l = b.tree.root().lo[k] - b.margin, u = b.tree.root().hi[k] + b.margin;
+      lo[k] = first ? l : std::min(lo[k], l);
+      hi[k] = first ? u : std::max(hi[k], u);
+    }
+    first = false;
+  }
+  center_ = 0.5 * (lo + hi);
+  radius_ = 0.5 * norm(hi - lo);
+}
+
+// Pairs of which neither side has changed keep their runs; the others are listed again. Bodies are swept along x.
+void BroadPhase::find_pairs(std::span<const BodyView> bodies, std::span<const ObstacleView> obstacles, const PairFilter &filter) {
+  fresh_.clear();
+  next_segments_.clear();
+  for (const Segment &s : segments_)
+    if (!bodies_[s.a].dirty && !(s.obstacle ? things_[s.b].dirty : bodies_[s.b].dirty)) next_segments_.push_back(s);
+  order_.clear();
+  for (uint32_t i = 0; i < bodies_.size(); ++i)
+    if (bodies_[i].usable) order_.push_back(i);
+  const auto low = [&](uint32_t i) { return bodies_[i].tree.root().lo[0] - bodies_[i].margin - recovery_depth(*bodies_[i].surface); };
+  std::sort(order_.begin(), order_.end(), [&](uint32_t i, uint32_t j) { return low(i) != low(j) ? low(i) < low(j) : i < j; });
+  for (size_t p = 0; p < order_.size(); ++p) {
+    const Body &a = bodies_[order_[p]];
+    const double high = a.tree.root().hi[0] + a.margin + recovery_depth(*a.surface);
+    for (size_t q = p + 1; q < order_.size() && low(order_[q]) <= high; ++q)
+      if ((a.dirty || bodies_[order_[q]].dirty) && filter.may_touch(bodies[order_[p]], bodies[order_[q]])) {
+        const bool ordered = a.id < bodies_[order_[q]].id;
+        list_bodies(order_[ordered ? p : q], order_[ordered ? q : p]);
+      }
+    for (uint32_t o = 0; o < things_.size(); ++o)
+      if ((a.dirty || things_[o].dirty) && filter.may_touch(bodies[order_[p]], obstacles[o])) list_obstacle(order_[p], o);
+  }
+}
+
+void BroadPhase::list_bodies(uint32_t i, uint32_t j) {
+  const Body &a = bodies_[i], &b = bodies_[j];
+  const Features fa{*a.surface, a.x.data()}, fb{*b.surface, b.x.data()};
+  const double near = kRounding * (a.margin + b.margin), edges = near + edge_recovery_depth(*a.surface, *b.surface), edges2 = edges * edges;
+  const double deep_a = near + recovery_depth(*a.surface), deep_b = near + recovery_depth(*b.surface), wide = std::max(deep_a, deep_b);
+  if (!(box_distance2(a.tree.root(), b.tree.root()) <= wide * wide)) return;
+  vf_.clear();
+  fv_.clear();
+  ee_.clear();
+  // Surfels of one side against a triangle of the other: those that the triangle owns, so that no pair comes twice.
+  const auto vertices = [](const Features &from, uint32_t t, const Features &to, uint32_t face, double limit, Array<uint64_t> &found) {
+    const uint32_t owns = from.surface.tri_owns[t];
+    for (int k = 0; k < 3; ++k) {
+      if (!(owns >> k & 1)) continue;
+      const TrianglePoint q = closest_on_triangle(from.corner(t, k), to.corner(face, 0), to.corner(face, 1), to.corner(face, 2));
+      if (q.distance2 <= limit * limit) found.push_back(features(from.surface.tri[3 * size_t{t} + k], face));
+    }
+  };
+  near_pairs(a.tree, b.tree, wide, stack_, [&](uint32_t s, uint32_t t) {
+    vertices(fa, s, fb, t, deep_b, vf_);
+    vertices(fb, t, fa, s, deep_a, fv_);
+    const uint32_t own_s = fa.surface.tri_owns[s] >> 3, own_t = fb.surface.tri_owns[t] >> 3;
+    if (!own_s || !own_t) return;
+    for (int k = 0; k < 3; ++k)
+      for (int l = 0; l < 3; ++l) {
+        if (!(own_s >> k & 1) || !(own_t >> l & 1)) continue;
+        const SegmentPoints q = closest_segments(fa.corner(s, k), fa.corner(s, (k + 1) % 3), fb.corner(t, l), fb.corner(t, (l + 1) % 3));
+        if (q.distance2 <= edges2) ee_.push_back(features(fa.surface.tri_edge[3 * size_t{s} + k], fb.surface.tri_edge[3 * size_t{t} + l]));
+      }
+  });
+  add_segment(i, j, false, 0, vf_);
+  add_segment(i, j, false, 1, ee_);
+  add_segment(j, i, false, 0, fv_);
+}
+
+// Edges and triangles count only where a surfel alone would let the obstacle through: edges at a round shape or at a box's edges,
+// triangles at a round shape or at a box's corners.
+void BroadPhase::list_obstacle(uint32_t i, uint32_t o) {
+  const Body &a = bodies_[i];
+  const ObstacleShape shape(things_[o].view);
+  const Features fa{*a.surface, a.x.data()};
+  const Shape kind = shape.view().shape;
+  const double near = kRounding * (a.margin + things_[o].margin + recovery_depth(*a.surface));
+  const double round = kind == Shape::sphere || kind == Shape::capsule ? shape.view().radius : 0;
+  const double limit = near + round, limit2 = limit * limit;
+  Box bounds{{0, 0, 0, 0}, {0, 0, 0, 0}};
+  if (kind != Shape::plane) shape.bounds(bounds.lo, bounds.hi);
+  const Vec3 n = shape.axis(2);
+  const auto box_near = [&](const Box &b) {
+    if (kind != Shape::plane) return box_distance2(b, bounds) <= near * near;
+    double lowest = -dot(n, shape.view().position);
+    for (int k = 0; k < 3; ++k) lowest += n[k] * (n[k] > 0 ? b.lo[k] : b.hi[k]);
+    return lowest <= near;
+  };
+  const auto edge_near = [&](Vec3 p, Vec3 q) {
+    if (kind != Shape::box) return closest_segments(p, q, shape.end(0), shape.end(1)).distance2 <= limit2;
+    for (uint32_t e = 0; e < 12; ++e) {
+      Vec3 from, to;
+      uint32_t faces[2];
+      shape.edge(e, from, to, faces);
+      if (closest_segments(p, q, from, to).distance2 <= limit2) return true;
+    }
+    return false;
+  };
+  const auto triangle_near = [&](uint32_t t) {
+    const uint32_t points = kind == Shape::box ? 8 : 2;
+    for (uint32_t c = 0; c < points; ++c) {
+      const Vec3 p = kind == Shape::box ? shape.corner(c) : shape.end(int(c));
+      if (closest_on_triangle(p, fa.corner(t, 0), fa.corner(t, 1), fa.corner(t, 2)).distance2 <= limit2) return true;
+    }
+    return false;
+  };
+  vf_.clear();
+  ee_.clear();
+  fv_.clear();
+  near_triangles(a.tree, stack_, box_near, [&](uint32_t t) {
+    const uint32_t owns = fa.surface.tri_owns[t];
+    for (int k = 0; k < 3; ++k) {
+      if (owns >> k & 1 && shape.closest(fa.corner(t, k)).distance <= near) vf_.push_back(fa.surface.tri[3 * size_t{t} + k]);
+      if (kind != Shape::plane && owns >> (3 + k) & 1 && edge_near(fa.corner(t, k), fa.corner(t, (k + 1) % 3)))
+        ee_.push_back(fa.surface.tri_edge[3 * size_t{t} + k]);
+    }
+    if (kind != Shape::plane && triangle_near(t)) fv_.push_back(t);
+  });
+  for (Array<uint64_t> *found : {&vf_, &ee_, &fv_})
+    for (uint64_t &f : *found) f <<= 32;
+  add_segment(i, o, true, 0, vf_);
+  if (kind == Shape::plane) return;
+  add_segment(i, o, true, 1, ee_);
+  add_segment(i, o, true, 2, fv_);
+}
+
+void BroadPhase::add_segment(uint32_t a, uint32_t b, bool obstacle, uint8_t kind, Array<uint64_t> &found) {
+  std::sort(found.begin(), found.end());
+  const uint64_t id_b = obstacle ? things_[b].view.id : bodies_[b].id;
+  next_segments_.push_back({bodies_[a].id, id_b, a, b, uint32_t(fresh_.size()), uint32_t(found.size()), obstacle, kind, true});
+  fresh_.insert(fresh_.end(), found.begin(), found.end());
+}
+
+// Runs in the order of contacts, from the old lists and the fresh ones.
+void BroadPhase::assemble() {
+  std::sort(next_segments_.begin(), next_segments_.end(), [](const Segment &l, const Segment &r) {
+    if (l.id_a != r.id_a) return l.id_a < r.id_a;
+    if (l.obstacle != r.obstacle) return l.obstacle < r.obstacle;
+    return l.id_b != r.id_b ? l.id_b < r.id_b : l.kind < r.kind;
+  });
+  next_.clear();
+  stats_.pairs = 0;
+  for (Segment &s : next_segments_) {
+    const uint32_t begin = uint32_t(next_.size()), slot_a = bodies_[s.a].slot, slot_b = s.obstacle ? things_[s.b].view.slot : bodies_[s.b].slot;
+    if (s.fresh) {
+      for (uint32_t i = s.begin; i < s.begin + s.count; ++i)
+        next_.push_back({slot_a, slot_b, uint32_t(fresh_[i] >> 32), uint32_t(fresh_[i]), s.kind, s.obstacle});
+    } else {
+      next_.insert(next_.end(), candidates_.begin() + s.begin, candidates_.begin() + s.begin + s.count);
+    }
+    s.begin = begin;
+    s.fresh = false;
+    stats_.pairs += s.kind == 0 && (s.obstacle || s.id_a < s.id_b);
+  }
+  candidates_.swap(next_);
+  segments_.swap(next_segments_);
+}
+
+}  // namespace dfm

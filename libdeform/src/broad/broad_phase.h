@@ -1,0 +1,93 @@
+// Which features may touch: lists of pairs with a skin around them, so that most sub-steps only check that the lists still hold.
+//
+// Every body and obstacle keeps the shape it had when its lists were made, and a margin m. Its share is respected while
+//     displacement since then + d_c + 2 h speed <= m,
+// and two features whose boxes were further apart than m_a + m_b (+ recovery depth) cannot be within the reach of a contact then. Lists hold a
+// superset of the contacts and narrow/ decides by the geometry of the sub-step alone, so results never depend on when lists were made.
+#pragma once
+#include <cstdint>
+#include <span>
+
+#include "broad/box_tree.h"
+#include "broad/pair_filter.h"
+#include "core/memory.h"
+#include "surfel/reach.h"
+#include "surfel/views.h"
+
+namespace dfm {
+
+class BroadPhase {
+ public:
+  explicit BroadPhase(const Memory &memory);
+
+  // Renews what is out of date; true if candidates() changed. h in s; offset d_c in m. Views may come in any order.
+  bool update(std::span<const BodyView> bodies, std::span<const ObstacleView> obstacles, const PairFilter &filter, double h, double offset);
+
+  // In the order that find_contacts expects: (id a, body before obstacle, id b, kind, feature a, feature b).
+  const Array<Candidate> &candidates() const { return candidates_; }
+
+  // The skin is made to last for about this many sub-steps of the present motion. Results do not depend on it.
+  void set_skin_steps(double steps) { skin_steps_ = steps; }
+  // Forgets all lists (after a change that update() cannot see). Results do not depend on it.
+  void clear();
+
+  struct Stats {
+    uint64_t updates = 0;   // calls
+    uint64_t renewals = 0;  // calls that made lists anew
+    uint64_t refits = 0;    // trees whose boxes were renewed
+    uint64_t rebuilds = 0;  // trees built from nothing
+    uint64_t pairs = 0;     // body pairs and body-obstacle pairs with lists, now
+  };
+  const Stats &stats() const { return stats_; }
+
+ private:
+  struct Body {
+    uint64_t id = 0;
+    const Surface *surface = nullptr;
+    uint32_t slot = 0, category = 0, collides_with = 0;
+    double margin = -1;     // negative: no lists yet
+    bool dirty = true, usable = false;  // usable: all positions finite
+    BoxTree tree;
+    Array<double> x;        // [nsurfel,4] when the lists were made
+    explicit Body(const Memory &m) : tree(m), x(HookAllocator<double>(m)) {}
+  };
+  struct Thing {            // an obstacle
+    ObstacleView view{};    // when the lists were made
+    double margin = -1;
+    bool dirty = true;
+  };
+  struct Segment {          // a run of candidates of one pair and one kind
+    uint64_t id_a, id_b;
+    uint32_t a, b;          // indices of the views
+    uint32_t begin, count;
+    uint8_t obstacle, kind;
+    bool fresh;             // lies in fresh_, not in candidates_
+  };
+
+  void match(std::span<const BodyView> bodies, std::span<const ObstacleView> obstacles, const PairFilter &filter);
+  bool find_dirty(std::span<const BodyView> bodies, std::span<const ObstacleView> obstacles, double h, double offset);
+  bool holds(const Thing &thing, const ObstacleView &now, double h, double offset) const;
+  void renew_body(Body &body, double h, double offset);
+  void bound_bodies();
+  void find_pairs(std::span<const BodyView> bodies, std::span<const ObstacleView> obstacles, const PairFilter &filter);
+  void list_bodies(uint32_t i, uint32_t j);
+  void list_obstacle(uint32_t i, uint32_t o);
+  void add_segment(uint32_t a, uint32_t b, bool obstacle, uint8_t kind, Array<uint64_t> &found);
+  void assemble();
+
+  Memory memory_;
+  double skin_steps_ = 16;
+  Array<Body> bodies_;
+  Array<Thing> things_;
+  uint64_t filter_version_ = 0;
+  Vec3 center_;              // of a sphere around all bodies as they were when listed, for the motion of planes
+  double radius_ = 0;
+  Array<Segment> segments_, next_segments_;
+  Array<Candidate> candidates_, next_;
+  Array<uint64_t> fresh_, vf_, fv_, ee_;   // {feature a, feature b}
+  Array<uint32_t> order_;
+  Array<PairOfTriangles> stack_;
+  Stats stats_;
+};
+
+}  // namespace dfm

@@ -1,0 +1,331 @@
+// Structured bodies with near-isotropic cells and no preferred direction. Only + - * / sqrt, so the same bits on every machine.
+//
+//   beam      body-centred cubic lattice: grid points and cell centres; four cells around each inner grid face (mean ratio 0.95), two on
+//             each boundary face with alternating diagonals. All inner points have 14 neighbours.
+//   cylinder  rings of 6, 12, 18 .. points (a triangular lattice bent into a disc), extruded; each prism is cut in three by the lattice's
+//             three colours, layers mirrored in turn, so that the surface diagonals zigzag and nothing twists.
+//   ball      icosahedron around the centre, each of its 20 cells cut into n^3 by the tetrahedral-octahedral lattice, layers pushed out to
+//             spheres: the surface triangles are nearly equilateral.
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include "core/error.h"
+#include "math/vec3.h"
+#include "mesh/mesh.h"
+
+namespace dfm {
+namespace {
+
+constexpr uint32_t kMostCells = 100'000'000;
+
+void check(const char *what, double size) {
+  if (!(size > 0) || !std::isfinite(size)) fail(DFM_E_ARG, "the %s is %g m; expected a finite length above 0", what, size);
+}
+void check_cells(uint32_t cells) {
+  if (cells < 1 || cells > kMostCells) fail(DFM_E_ARG, "cells is %u; expected 1 to %u", cells, kMostCells);
+}
+
+void add_point(TetMesh &mesh, Vec3 p) { mesh.points.insert(mesh.points.end(), {p.x, p.y, p.z}); }
+void add_tet(TetMesh &mesh, uint32_t a, uint32_t b, uint32_t c, uint32_t d) {
+  uint32_t tet[4] = {a, b, c, d};
+  if (tet_volume(mesh.points.data(), tet) < 0) std::swap(tet[2], tet[3]);
+  mesh.tets.insert(mesh.tets.end(), tet, tet + 4);
+}
+
+TetMesh finished(TetMesh mesh) {
+  mesh.tet_group.assign(mesh.ntet(), kNoGroup);
+  mesh.file_point.resize(mesh.npoint());
+  for (uint32_t i = 0; i < mesh.npoint(); ++i) mesh.file_point[i] = i;
+  return mesh;
+}
+
+uint32_t rounded(double x) { return uint32_t(std::max(1.0, std::floor(x + 0.5))); }
+// How far two positive numbers are apart, as a ratio of at least 1.
+double apart(double a, double b) { return std::max(a, b) / std::min(a, b); }
+// What a choice of counts costs, 1 at best: cells longer than wide (a little is cheap; beyond 2:1 they spoil the mesh, and more
+// cells than asked for are made instead) against a number of cells far from the one asked for.
+double score(double elongation, double count, double asked) {
+  const double excess = std::max(1.0, elongation / 2);
+  return std::sqrt(elongation) * excess * excess * excess * apart(count, asked);
+}
+
+// sin and cos on [0, pi/3] by their series: libm's bits depend on the processor.
+Vec3 unit_on_circle(double angle) {
+  const double t = angle * angle;
+  double s = 1, c = 1;
+  for (int k = 10; k > 0; --k) {
+    s = 1 - t * s / ((2 * k) * (2 * k + 1));
+    c = 1 - t * c / ((2 * k - 1) * (2 * k));
+  }
+  return {c, angle * s, 0};
+}
+
+// ---- beam ----------------------------------------------------------------------------------------------------------
+
+struct Grid {
+  uint32_t n[3];
+  uint32_t slab() const { return (n[1] + 1) * (n[2] + 1) + n[1] * n[2]; }
+  uint32_t corner(uint32_t i, uint32_t j, uint32_t k) const { return i * slab() + j * (n[2] + 1) + k; }
+  uint32_t centre(uint32_t i, uint32_t j, uint32_t k) const { return i * slab() + (n[1] + 1) * (n[2] + 1) + j * n[2] + k; }
+};
+
+// Tries cubes of the size that gives the number of cells, and smaller ones, each edge's number rounded down and up.
+Grid choose_grid(const double size[3], uint32_t cells) {
+  const double cubes = std::max(1.0, cells / 12.0);
+  const double shortest = std::min({size[0], size[1], size[2]});
+  double edge = std::cbrt(size[0] * (size[1] * (size[2] / cubes)));
+  Grid best{};
+  double best_score = HUGE_VAL;
+  for (int finer = 0; finer == 0 || (finer < 64 && edge > 0.5 * shortest); ++finer, edge *= 0.9)
+    for (int up = 0; up < 8; ++up) {
+      Grid g{};
+      for (int k = 0; k < 3; ++k) g.n[k] = uint32_t(std::clamp(std::floor(size[k] / edge) + (up >> k & 1), 1.0, double(kMostCells)));
+      const double count = double(g.n[0]) * g.n[1] * g.n[2], h[3] = {size[0] / g.n[0], size[1] / g.n[1], size[2] / g.n[2]};
+      if (count > kMostCells / 12) continue;
+      const double s = score(std::max({h[0], h[1], h[2]}) / std::min({h[0], h[1], h[2]}), count, cubes);
+      if (s < best_score) best_score = s, best = g;
+    }
+  if (best_score == HUGE_VAL)
+    fail(DFM_E_ARG, "a beam of %g x %g x %g m cannot be cut into %u cells of sound shape; give sizes nearer to each other", size[0],
+         size[1], size[2], cells);
+  return best;
+}
+
+// ---- ball ----------------------------------------------------------------------------------------------------------
+
+class BallBuilder {
+ public:
+  BallBuilder(TetMesh &mesh, double radius, uint32_t n) : mesh_(mesh), radius_(radius), n_(n) {
+    make_icosahedron();
+    add_point(mesh_, {});
+    for (uint32_t k = 1; k <= n_; ++k) add_layer(k);
+    for (uint32_t f = 0; f < 20; ++f) cut_cone(f);
+  }
+
+ private:
+  using Lattice = std::array<uint32_t, 4>;  // weights of the centre and of the face's three corners; they sum to n
+
+  void make_icosahedron() {
+    const double g = (1 + std::sqrt(5.0)) / 2, length = std::sqrt(1 + g * g);
+    uint32_t v = 0;
+    for (int axis = 0; axis < 3; ++axis)
+      for (const double s : {1.0, -1.0})
+        for (const double t : {1.0, -1.0}) {
+          Vec3 p;
+          p[axis] = 0, p[(axis + 1) % 3] = s / length, p[(axis + 2) % 3] = t * g / length;
+          corner_[v++] = p;
+        }
+    // Neighbours of the unit icosahedron are 1.05 apart, the next points 1.70.
+    const auto near = [&](uint32_t a, uint32_t b) { return norm2(corner_[a] - corner_[b]) < 2; };
+    uint32_t e = 0, f = 0;
+    for (uint32_t a = 0; a < 12; ++a)
+      for (uint32_t b = a + 1; b < 12; ++b) {
+        if (!near(a, b)) continue;
+        edge_[a][b] = e, ends_[e++] = {a, b};
+        for (uint32_t c = b + 1; c < 12; ++c)
+          if (near(a, c) && near(b, c)) face_[f++] = {a, b, c};
+      }
+  }
+
+  uint32_t first_of_layer(uint32_t k) const {  // 1 centre and 10 q^2 + 2 points in each layer q < k
+    return 1 + 2 * (k - 1) + 10 * ((k - 1) * k * (2 * k - 1) / 6);
+  }
+
+  void add_on_sphere(uint32_t k, Vec3 direction) { add_point(mesh_, (radius_ * (double(k) / n_)) * normalized(direction)); }
+
+  // Corners, then points inside edges, then points inside faces.
+  void add_layer(uint32_t k) {
+    for (const Vec3 &p : corner_) add_on_sphere(k, p);
+    for (const auto &[a, b] : ends_)
+      for (uint32_t t = 1; t < k; ++t) add_on_sphere(k, double(k - t) * corner_[a] + double(t) * corner_[b]);
+    for (const auto &[a, b, c] : face_)
+      for (uint32_t i = 1; i + 1 < k; ++i)
+        for (uint32_t j = 1; i + j < k; ++j)
+          add_on_sphere(k, double(k - i - j) * corner_[a] + (double(i) * corner_[b] + double(j) * corner_[c]));
+  }
+
+  uint32_t point(uint32_t f, const Lattice &w) const {
+    const uint32_t k = n_ - w[0], i = w[2], j = w[3];
+    if (k == 0) return 0;
+    const auto &[a, b, c] = face_[f];
+    const uint32_t first = first_of_layer(k), inner = first + 12 + 30 * (k - 1);
+    if (w[1] == k) return first + a;
+    if (i == k) return first + b;
+    if (j == k) return first + c;
+    if (j == 0) return first + 12 + edge_[a][b] * (k - 1) + i - 1;
+    if (i == 0) return first + 12 + edge_[a][c] * (k - 1) + j - 1;
+    if (w[1] == 0) return first + 12 + edge_[b][c] * (k - 1) + j - 1;
+    const uint32_t per_face = (k - 1) * (k - 2) / 2;
+    return inner + f * per_face + (i - 1) * (k - 1) - i * (i - 1) / 2 + j - 1;
+  }
+
+  void cut_cone(uint32_t f) {
+    for (uint32_t missing = 1; missing <= 3 && missing <= n_; ++missing)
+      for (uint32_t w = 0; w <= n_ - missing; ++w)
+        for (uint32_t a = 0; a + w <= n_ - missing; ++a)
+          for (uint32_t b = 0; a + b + w <= n_ - missing; ++b) {
+            const Lattice base{w, a, b, n_ - missing - w - a - b};
+            if (missing == 2) cut_octahedron(f, base);
+            else add_lattice_tet(f, base, missing);
+          }
+  }
+
+  // missing 1: base + one each; missing 3: base + all but one each.
+  void add_lattice_tet(uint32_t f, const Lattice &base, uint32_t missing) {
+    uint32_t p[4];
+    for (uint32_t k = 0; k < 4; ++k) {
+      Lattice w = base;
+      for (uint32_t q = 0; q < 4; ++q) w[q] += (q == k) == (missing == 1);
+      p[k] = point(f, w);
+    }
+    add_tet(mesh_, p[0], p[1], p[2], p[3]);
+  }
+
+  // Four cells around the shortest diagonal; where lengths are equal the choice goes round with the place, so that none is preferred.
+  void cut_octahedron(uint32_t f, const Lattice &base) {
+    static constexpr uint32_t kPair[3][4] = {{0, 1, 2, 3}, {0, 2, 1, 3}, {0, 3, 1, 2}};  // base + two is opposite base + the others
+    uint32_t p[3][2];
+    double length[3];
+    for (int d = 0; d < 3; ++d) {
+      for (int end = 0; end < 2; ++end) {
+        Lattice w = base;
+        ++w[kPair[d][2 * end]], ++w[kPair[d][2 * end + 1]];
+        p[d][end] = point(f, w);
+      }
+      length[d] = norm2(load3(&mesh_.points[3 * size_t(p[d][0])]) - load3(&mesh_.points[3 * size_t(p[d][1])]));
+    }
+    uint32_t best = (base[1] + 2 * base[2] + base[0]) % 3;
+    for (uint32_t d = 0; d < 3; ++d)
+      if (length[d] < length[best] * (1 - 1e-9)) best = d;
+    const uint32_t *axis = p[best], *u = p[(best + 1) % 3], *v = p[(best + 2) % 3];
+    add_tet(mesh_, axis[0], axis[1], u[0], v[0]), add_tet(mesh_, axis[0], axis[1], v[0], u[1]);
+    add_tet(mesh_, axis[0], axis[1], u[1], v[1]), add_tet(mesh_, axis[0], axis[1], v[1], u[0]);
+  }
+
+  TetMesh &mesh_;
+  double radius_;
+  uint32_t n_;
+  Vec3 corner_[12];
+  uint32_t edge_[12][12] = {};
+  std::array<std::array<uint32_t, 2>, 30> ends_{};
+  std::array<std::array<uint32_t, 3>, 20> face_{};
+};
+
+// ---- cylinder ------------------------------------------------------------------------------------------------------
+
+struct Disc {  // triangular lattice in rings
+  uint32_t n;
+  uint32_t npoint() const { return 1 + 3 * n * (n + 1); }
+  static uint32_t point(uint32_t ring, uint32_t j) { return ring == 0 ? 0 : 1 + 3 * ring * (ring - 1) + j % (6 * ring); }
+};
+
+// Tries every number of rings, with the layers that give the number of cells and with those that give near-equal edges.
+void choose_rings(double radius, double length, uint32_t cells, uint32_t *rings, uint32_t *layers) {
+  double best = HUGE_VAL;
+  for (uint32_t n = 1; n == 1 || 18.0 * n * n <= std::max(4.0 * cells, 2e5); ++n)
+    for (const double wanted : {cells / (18.0 * n * n), length * n / radius}) {
+      if (wanted > kMostCells / (18.0 * n * n)) continue;
+      const uint32_t m = rounded(wanted);
+      const double s = score(apart(length / m, radius / n), 18.0 * n * n * m, cells);
+      if (s < best) best = s, *rings = n, *layers = m;
+    }
+  if (best == HUGE_VAL)
+    fail(DFM_E_ARG, "a cylinder of radius %g m and length %g m cannot be cut into %u cells; give sizes nearer to each other", radius,
+         length, cells);
+}
+
+}  // namespace
+
+TetMesh make_beam(const Memory &memory, double x, double y, double z, uint32_t cells) {
+  check("beam's x size", x), check("beam's y size", y), check("beam's z size", z), check_cells(cells);
+  const double size[3] = {x, y, z};
+  const Grid g = choose_grid(size, cells);
+  TetMesh mesh(memory);
+  const auto at = [&](double i, double j, double k) { add_point(mesh, {x * (i / g.n[0]), y * (j / g.n[1]), z * (k / g.n[2])}); };
+  for (uint32_t i = 0; i <= g.n[0]; ++i) {
+    for (uint32_t j = 0; j <= g.n[1]; ++j)
+      for (uint32_t k = 0; k <= g.n[2]; ++k) at(i, j, k);
+    for (uint32_t j = 0; i < g.n[0] && j < g.n[1]; ++j)
+      for (uint32_t k = 0; k < g.n[2]; ++k) at(i + 0.5, j + 0.5, k + 0.5);
+  }
+  // One face of cube c across `axis`, on its low or high side: shared with the next cube, or on the boundary.
+  const auto add_face = [&](const uint32_t c[3], int axis, uint32_t high) {
+    uint32_t corner[4], even = 0;
+    for (uint32_t q = 0; q < 4; ++q) {
+      uint32_t p[3] = {c[0], c[1], c[2]};
+      p[axis] += high, p[(axis + 1) % 3] += q == 1 || q == 2, p[(axis + 2) % 3] += q >= 2;
+      corner[q] = g.corner(p[0], p[1], p[2]);
+      if (q == 0) even = (p[0] + p[1] + p[2]) % 2;  // the diagonal starts at an even corner
+    }
+    const uint32_t centre = g.centre(c[0], c[1], c[2]);
+    if (!high || c[axis] + 1 == g.n[axis]) {
+      add_tet(mesh, corner[even], corner[even + 1], corner[even + 2], centre);
+      add_tet(mesh, corner[even], corner[even + 2], corner[(even + 3) % 4], centre);
+      return;
+    }
+    uint32_t next[3] = {c[0], c[1], c[2]};
+    ++next[axis];
+    for (uint32_t q = 0; q < 4; ++q) add_tet(mesh, corner[q], corner[(q + 1) % 4], centre, g.centre(next[0], next[1], next[2]));
+  };
+  uint32_t c[3];
+  for (c[0] = 0; c[0] < g.n[0]; ++c[0])
+    for (c[1] = 0; c[1] < g.n[1]; ++c[1])
+      for (c[2] = 0; c[2] < g.n[2]; ++c[2])
+        for (int axis = 0; axis < 3; ++axis) {
+          if (c[axis] == 0) add_face(c, axis, 0);
+          add_face(c, axis, 1);
+        }
+  return finished(std::move(mesh));
+}
+
+TetMesh make_cylinder(const Memory &memory, double radius, double length, uint32_t cells) {
+  check("cylinder's radius", radius), check("cylinder's length", length), check_cells(cells);
+  uint32_t n = 1, m = 1;
+  choose_rings(radius, length, cells, &n, &m);
+  const Disc disc{n};
+  TetMesh mesh(memory);
+  // The disc: points, and their colours in the triangular lattice (axial coordinates of hexagon directions, difference modulo 3).
+  static constexpr int kAxial[7][2] = {{1, 0}, {0, 1}, {-1, 1}, {-1, 0}, {0, -1}, {1, -1}, {1, 0}};
+  const double half = 0.5, root = std::sqrt(3.0) / 2, third = 1.0471975511965977462;  // pi/3
+  const double turn[6][2] = {{1, 0}, {half, root}, {-half, root}, {-1, 0}, {-half, -root}, {half, -root}};
+  std::vector<Vec3> flat{{}};
+  std::vector<int> colour{0};
+  for (int k = 1; k <= int(n); ++k)
+    for (int s = 0; s < 6; ++s)
+      for (int t = 0; t < k; ++t) {
+        const Vec3 u = (radius * (double(k) / n)) * unit_on_circle(third * (double(t) / k));
+        flat.push_back({turn[s][0] * u.x - turn[s][1] * u.y, turn[s][1] * u.x + turn[s][0] * u.y, 0});
+        const int q = (k - t) * kAxial[s][0] + t * kAxial[s + 1][0], r = (k - t) * kAxial[s][1] + t * kAxial[s + 1][1];
+        colour.push_back(((q - r) % 3 + 3) % 3);
+      }
+  for (uint32_t layer = 0; layer <= m; ++layer)
+    for (const Vec3 &p : flat) add_point(mesh, {p.x, p.y, length * (double(layer) / m)});
+  const auto add_prism = [&](uint32_t layer, std::array<uint32_t, 3> v) {
+    std::sort(v.begin(), v.end(), [&](uint32_t a, uint32_t b) { return layer % 2 ? colour[a] > colour[b] : colour[a] < colour[b]; });
+    const uint32_t low = layer * disc.npoint(), up = low + disc.npoint();
+    add_tet(mesh, low + v[0], low + v[1], low + v[2], up + v[2]);
+    add_tet(mesh, low + v[0], low + v[1], up + v[1], up + v[2]);
+    add_tet(mesh, low + v[0], up + v[0], up + v[1], up + v[2]);
+  };
+  for (uint32_t layer = 0; layer < m; ++layer)
+    for (uint32_t k = 1; k <= n; ++k)
+      for (uint32_t s = 0; s < 6; ++s)
+        for (uint32_t t = 0; t < k; ++t) {
+          const uint32_t outer = s * k + t, inner = s * (k - 1) + t;
+          add_prism(layer, {Disc::point(k - 1, inner), Disc::point(k, outer), Disc::point(k, outer + 1)});
+          if (t + 1 < k) add_prism(layer, {Disc::point(k - 1, inner), Disc::point(k, outer + 1), Disc::point(k - 1, inner + 1)});
+        }
+  return finished(std::move(mesh));
+}
+
+TetMesh make_ball(const Memory &memory, double radius, uint32_t cells) {
+  check("ball's radius", radius), check_cells(cells);
+  uint32_t n = 1;
+  while (apart(20.0 * (n + 1) * (n + 1) * (n + 1), cells) < apart(20.0 * n * n * n, cells)) ++n;
+  TetMesh mesh(memory);
+  BallBuilder(mesh, radius, n);
+  return finished(std::move(mesh));
+}
+
+}  // namespace dfm

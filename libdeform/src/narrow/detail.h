@@ -1,0 +1,90 @@
+// What the parts of narrow/ share.
+#pragma once
+#include <cmath>
+#include <cstdint>
+#include <span>
+
+#include "surfel/contact_set.h"
+#include "surfel/obstacle_shape.h"
+#include "surfel/reach.h"
+#include "surfel/views.h"
+
+namespace dfm::narrow {
+
+using Run = std::span<const Candidate>;
+
+// Cosines and sines of directions, dimensionless.
+constexpr double kFlat = 1e-3;        // sine of the angle between two faces below which their edge counts as flat
+constexpr double kCone = 0.035;       // 2 degrees: slack of an edge's cone of normals, so that contacts do not flicker at its border
+constexpr double kParallel = 1e-3;    // sine between two edges below which vertex-face contacts stand for them
+
+struct Pair {
+  const BodyView &a;
+  const BodyView *b;            // or
+  const ObstacleShape *shape;
+  double h, offset;
+  double speed_b;               // m/s, bound over body b's surfels
+
+  Vec3 xa(uint32_t s) const { return load3(&a.surface->x[4 * size_t{s}]); }
+  Vec3 va(uint32_t s) const { return load3(&a.surface->v[4 * size_t{s}]); }
+  Vec3 xb(uint32_t s) const { return load3(&b->surface->x[4 * size_t{s}]); }
+  Vec3 vb(uint32_t s) const { return load3(&b->surface->v[4 * size_t{s}]); }
+};
+
+// Strong enough that a clash of two keys is as likely as an error of the memory.
+inline uint64_t mix(uint64_t hash, uint64_t value) {
+  hash = (hash ^ value) * 0xff51afd7ed558ccdull;
+  hash ^= hash >> 32;
+  hash *= 0xc4ceb9fe1a85ec53ull;
+  return hash ^ hash >> 29;
+}
+// ordinal: tells apart contacts of one feature with one patch, in the order of b's features.
+inline uint64_t contact_key(const ContactPoint &c, uint64_t id_a, uint64_t id_b, uint32_t patch, uint32_t ordinal) {
+  const uint64_t head = uint64_t{c.kind} | uint64_t{c.obstacle} << 8 | uint64_t{c.type_a} << 16 | uint64_t{ordinal} << 32;
+  uint64_t hash = mix(0x9e3779b97f4a7c15ull, head);
+  hash = mix(hash, id_a);
+  hash = mix(hash, id_b);
+  return mix(hash, uint64_t{c.feature_a} << 32 | patch);
+}
+
+// Blank contact of a pair; the caller fills geometry, nodes and weights.
+inline ContactPoint blank(const Pair &pair, uint8_t kind, uint8_t type_a, uint32_t feature_a, uint32_t feature_b) {
+  ContactPoint c{};
+  c.kind = kind;
+  c.type_a = type_a;
+  c.slot_a = pair.a.slot;
+  c.slot_b = pair.b ? pair.b->slot : pair.shape->view().slot;
+  c.obstacle = pair.b ? 0 : 1;
+  c.feature_a = feature_a;
+  c.feature_b = feature_b;
+  return c;
+}
+inline void add_node(ContactPoint &c, uint32_t node, double weight) {
+  if (weight == 0) return;
+  c.node[c.nnode] = node;
+  c.weight[c.nnode++] = weight;
+}
+inline void place(ContactPoint &c, Vec3 on_a, Vec3 on_b, Vec3 normal, double distance) {
+  store3(c.point, 0.5 * (on_a + on_b));
+  store3(c.normal, normal);
+  c.distance = distance;
+}
+
+// Each works on one run: all candidates of one pair and kind.
+void vertex_face(const Pair &pair, Run run, Array<ContactPoint> &out);
+void edge_edge(const Pair &pair, Run run, Array<ContactPoint> &out);
+void surfel_obstacle(const Pair &pair, Run run, Array<ContactPoint> &out);
+void edge_obstacle(const Pair &pair, Run run, Array<ContactPoint> &out);
+void triangle_obstacle(const Pair &pair, Run run, Array<ContactPoint> &out);
+// The faces beside an edge and their cone of normals: a unit direction that is orthogonal to the edge lies in it if it leans to neither face by more
+// than `slack` (sine).
+struct EdgeFaces {
+  Vec3 along;                  // unit, i to j
+  Vec3 normal[2], inward[2];   // unit; inward lies in the face, orthogonal to the edge; both zero where there is no face
+  bool convex;
+  Vec3 outward() const { return normal[0] + normal[1]; }
+  bool leans_out(Vec3 n, double slack) const { return dot(n, inward[0]) <= slack && dot(n, inward[1]) <= slack; }
+};
+EdgeFaces edge_faces(const Surface &surface, uint32_t edge);
+
+}  // namespace dfm::narrow

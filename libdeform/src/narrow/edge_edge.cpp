@@ -1,0 +1,88 @@
+// Two edges cross over each other: closest points of their lines n . r / |n| with n = u x w, both inside the edges, both edges convex, and the
+// direction inside both cones of normals. The faces beside the edges give the sign, so that edges which have slipped through each
+// other by a little are pushed back the way they came.
+#include <algorithm>
+
+#include "narrow/detail.h"
+
+namespace dfm::narrow {
+
+EdgeFaces edge_faces(const Surface &surface, uint32_t edge) {
+  const uint32_t *ends = &surface.edge[2 * size_t{edge}], *tris = &surface.edge_tri[2 * size_t{edge}];
+  const auto x = [&](uint32_t s) { return load3(&surface.x[4 * size_t{s}]); };
+  EdgeFaces f{};
+  f.along = normalized(x(ends[1]) - x(ends[0]));
+  for (int k = 0; k < 2; ++k) {
+    if (tris[k] == kNone) continue;
+    const uint32_t *c = &surface.tri[3 * size_t{tris[k]}];
+    f.normal[k] = normalized(cross(x(c[1]) - x(c[0]), x(c[2]) - x(c[0])));
+    // The first face has the edge as i to j, so inward lies to its left; the second has it as j to i.
+    f.inward[k] = (k == 0 ? 1.0 : -1.0) * cross(f.normal[k], f.along);
+  }
+  // An open edge is as convex as can be; between two faces the second normal leans away from the first face.
+  const bool open = tris[0] == kNone || tris[1] == kNone;
+  f.convex = open || dot(f.normal[1], f.inward[0]) < -kFlat;
+  return f;
+}
+
+void edge_edge(const Pair &pair, Run run, Array<ContactPoint> &out) {
+  const Surface &sa = *pair.a.surface, &sb = *pair.b->surface;
+  const size_t begin = out.size();
+  uint32_t last_a = kNone;
+  Vec3 p0, u, vp0, vp1;
+  double uu = 0, widest2 = 0;
+  const double depth = edge_recovery_depth(sa, sb);
+  for (const Candidate &candidate : run) {
+    const uint32_t *ea = &sa.edge[2 * size_t{candidate.feature_a}], *eb = &sb.edge[2 * size_t{candidate.feature_b}];
+    if (candidate.feature_a != last_a) {
+      last_a = candidate.feature_a;
+      p0 = pair.xa(ea[0]), u = pair.xa(ea[1]) - p0;
+      vp0 = pair.va(ea[0]), vp1 = pair.va(ea[1]);
+      uu = norm2(u);
+      const double speed = std::sqrt(std::max(norm2(vp0), norm2(vp1))) + pair.speed_b;
+      const double widest = std::max(contact_reach(pair.h, pair.offset, speed), depth);
+      widest2 = widest * widest;
+    }
+    const Vec3 q0 = pair.xb(eb[0]), w = pair.xb(eb[1]) - q0, r = p0 - q0;
+    const Vec3 n = cross(u, w);
+    const double nn = norm2(n), nr = dot(n, r), ww = norm2(w);
+    if (!(nr * nr <= widest2 * nn) || !(nn > kParallel * kParallel * uu * ww)) continue;
+    const double uw = dot(u, w), ur = dot(u, r), wr = dot(w, r);
+    const double s = uw * wr - ww * ur, t = uu * wr - uw * ur;   // times nn
+    if (!(s > 0 && s < nn && t > 0 && t < nn)) continue;
+    double speed2 = 0;
+    for (const uint32_t e : {eb[0], eb[1]}) speed2 = std::max({speed2, norm2(vp0 - pair.vb(e)), norm2(vp1 - pair.vb(e))});
+    const double reach = contact_reach(pair.h, pair.offset, std::sqrt(speed2));
+    const double allowed = std::max(reach, depth);
+    if (!(nr * nr < allowed * allowed * nn)) continue;
+
+    const EdgeFaces fa = edge_faces(sa, candidate.feature_a), fb = edge_faces(sb, candidate.feature_b);
+    if (!fa.convex || !fb.convex) continue;
+    Vec3 normal = (1 / std::sqrt(nn)) * n;
+    if (dot(normal, fb.outward()) < dot(normal, fa.outward())) normal = -normal;
+    const double distance = dot(normal, r);
+    if (!(distance < reach)) continue;
+    // As far as the edges can turn within the sub-step, their cones may open.
+    const double slack = kCone + std::min(0.3, reach / std::sqrt(std::min(uu, ww)));
+    if (!fb.leans_out(normal, slack) || !fa.leans_out(-normal, slack)) continue;
+    const double edge_s = s / nn, edge_t = t / nn;
+    ContactPoint c = blank(pair, kEdgeEdge, 1, candidate.feature_a, candidate.feature_b);
+    add_node(c, pair.a.first_node + ea[0], 1 - edge_s);
+    add_node(c, pair.a.first_node + ea[1], edge_s);
+    add_node(c, pair.b->first_node + eb[0], edge_t - 1);
+    add_node(c, pair.b->first_node + eb[1], -edge_t);
+    place(c, p0 + edge_s * u, q0 + edge_t * w, normal, distance);
+    out.push_back(c);
+  }
+  const auto patch = [&](const ContactPoint &c) {
+    const uint32_t *t = &sb.edge_tri[2 * size_t{c.feature_b}];
+    return sb.patch[t[0] != kNone ? t[0] : t[1]];
+  };
+  for (size_t i = begin; i < out.size(); ++i) {
+    uint32_t ordinal = 0;
+    for (size_t j = i; j-- > begin && out[j].feature_a == out[i].feature_a;) ordinal += patch(out[j]) == patch(out[i]);
+    out[i].key = contact_key(out[i], pair.a.id, pair.b->id, patch(out[i]), ordinal);
+  }
+}
+
+}  // namespace dfm::narrow

@@ -1,0 +1,169 @@
+// Bodies against planes, spheres, boxes and capsules, in closed form. A surfel sees the nearest point of the obstacle. Where the obstacle is smaller than
+// a triangle, edges and faces of the body count too, with the same rule as between bodies: only local minima of the distance, seen from outside.
+#include <algorithm>
+
+#include "narrow/detail.h"
+#include "surfel/closest.h"
+
+namespace dfm::narrow {
+namespace {
+
+// A contact on `q` of the body (nodes and weights already set), on `o` of the obstacle.
+void finish(const Pair &pair, ContactPoint &c, Vec3 q, Vec3 o, Vec3 normal, double distance, uint32_t patch, Array<ContactPoint> &out) {
+  place(c, q, o, normal, distance);
+  store3(c.velocity, pair.shape->view().velocity_at(o));
+  c.key = contact_key(c, pair.a.id, pair.shape->view().id, patch, 0);
+  out.push_back(c);
+}
+
+double reach_of(const Pair &pair, std::span<const uint32_t> nodes, Vec3 o) {
+  const Vec3 v = pair.shape->shape_velocity(o);
+  double speed2 = 0;
+  for (const uint32_t s : nodes) speed2 = std::max(speed2, norm2(pair.va(s) - v));
+  return contact_reach(pair.h, pair.offset, std::sqrt(speed2));
+}
+
+// One edge of the body with what it needs against a shape; the faces beside it are found when first asked for.
+struct Edge {
+  const Pair &pair;
+  uint32_t number;
+  std::span<const uint32_t> ends;
+  Vec3 p, u;                   // p + s u
+  EdgeFaces faces;
+  bool known = false;
+
+  Edge(const Pair &of, uint32_t e) : pair(of), number(e), ends(&of.a.surface->edge[2 * size_t{e}], 2) {
+    p = pair.xa(ends[0]);
+    u = pair.xa(ends[1]) - p;
+  }
+  const EdgeFaces &sides() {
+    if (!known) faces = edge_faces(*pair.a.surface, number);
+    known = true;
+    return faces;
+  }
+  void emit(double s, Vec3 o, Vec3 normal, double distance, uint32_t feature_b, Array<ContactPoint> &out) const {
+    ContactPoint c = blank(pair, kPrimitive, 1, number, feature_b);
+    add_node(c, pair.a.first_node + ends[0], 1 - s);
+    add_node(c, pair.a.first_node + ends[1], s);
+    finish(pair, c, p + s * u, o, normal, distance, feature_b, out);
+  }
+};
+
+// The inner point s of an edge against a ball around c; normal from c to the edge. `cone` accepts directions that leave the obstacle.
+template <class Cone>
+void edge_point(Edge &e, double s, Vec3 c, double radius, uint32_t feature_b, Cone &&cone, Array<ContactPoint> &out) {
+  if (!(s > 0 && s < 1)) return;
+  const Vec3 r = e.p + s * e.u - c;
+  const double d = norm(r);
+  if (!(d > 0) || !(d - radius < reach_of(e.pair, e.ends, c))) return;
+  const Vec3 normal = (1 / d) * r;
+  const EdgeFaces &f = e.sides();
+  if (!f.convex || !(dot(normal, f.outward()) < 0) || !f.leans_out(-normal, kFlat) || !cone(normal)) return;
+  e.emit(s, c + radius * normal, normal, d - radius, feature_b, out);
+}
+
+void edge_round(Edge &e, Array<ContactPoint> &out) {
+  const ObstacleShape &shape = *e.pair.shape;
+  const double radius = shape.view().radius;
+  const auto any = [](Vec3) { return true; };
+  const Vec3 axis = shape.end(1) - shape.end(0);
+  // Nearly parallel to the axis: the ends of the axis, not one point that jumps between them.
+  const bool parallel = norm2(cross(e.u, axis)) <= 0.0025 * norm2(e.u) * norm2(axis);
+  if (shape.view().shape == Shape::sphere || parallel) {
+    const int ends = shape.view().shape == Shape::sphere ? 1 : 2;
+    for (int k = 0; k < ends; ++k)
+      edge_point(e, closest_on_segment(shape.end(k), e.p, e.p + e.u), shape.end(k), radius, uint32_t(k), any, out);
+    return;
+  }
+  const SegmentPoints q = closest_segments(e.p, e.p + e.u, shape.end(0), shape.end(1));
+  edge_point(e, q.s, shape.end(0) + q.t * axis, radius, 2, any, out);
+}
+
+// Numbers of box features: edges 0 to 11, corners 12 to 19.
+void edge_box(Edge &e, Array<ContactPoint> &out) {
+  const Pair &pair = e.pair;
+  const ObstacleShape &shape = *pair.shape;
+  const double depth = recovery_depth(*pair.a.surface), uu = norm2(e.u);
+  for (uint32_t k = 0; k < 12; ++k) {
+    Vec3 q, to;
+    uint32_t face[2];
+    shape.edge(k, q, to, face);
+    const Vec3 w = to - q, r = e.p - q, n = cross(e.u, w);
+    const double nn = norm2(n), ww = norm2(w), uw = dot(e.u, w), ur = dot(e.u, r), wr = dot(w, r);
+    const double s = uw * wr - ww * ur, t = uu * wr - uw * ur;   // times nn
+    if (!(nn > kParallel * kParallel * uu * ww) || !(s > 0 && s < nn && t > 0 && t < nn)) continue;
+    const Vec3 o = q + (t / nn) * w;
+    const double reach = reach_of(pair, e.ends, o), nr = dot(n, r), allowed = std::max(reach, depth);
+    if (!(nr * nr < allowed * allowed * nn)) continue;
+    const EdgeFaces &f = e.sides();
+    const Vec3 m0 = shape.face_normal(face[0]), m1 = shape.face_normal(face[1]);
+    Vec3 normal = (1 / std::sqrt(nn)) * n;
+    if (dot(normal, m0 + m1) < dot(normal, f.outward())) normal = -normal;
+    const double distance = dot(normal, r), slack = kCone + std::min(0.3, reach / std::sqrt(std::min(uu, ww)));
+    if (!f.convex || !(distance < reach) || !f.leans_out(-normal, slack) || dot(normal, m0) < -slack || dot(normal, m1) < -slack) continue;
+    e.emit(s / nn, o, normal, distance, k, out);
+  }
+  for (uint32_t k = 0; k < 8; ++k) {
+    const Vec3 corner = shape.corner(k);
+    const auto cone = [&](Vec3 n) {
+      for (int i = 0; i < 3; ++i)
+        if (dot(n, shape.axis(i)) * (k >> i & 1 ? 1 : -1) < -kFlat) return false;
+      return true;
+    };
+    edge_point(e, closest_on_segment(corner, e.p, e.p + e.u), corner, 0, 12 + k, cone, out);
+  }
+}
+
+}  // namespace
+
+void surfel_obstacle(const Pair &pair, Run run, Array<ContactPoint> &out) {
+  for (const Candidate &candidate : run) {
+    const uint32_t s = candidate.feature_a;
+    const Vec3 x = pair.xa(s);
+    const ObstaclePoint o = pair.shape->closest(x);
+    if (!(o.distance < reach_of(pair, {&s, 1}, o.point))) continue;
+    ContactPoint c = blank(pair, kPrimitive, 0, s, o.face);
+    add_node(c, pair.a.first_node + s, 1);
+    c.area = pair.a.surface->area[s];
+    finish(pair, c, x, o.point, o.normal, o.distance, o.face, out);
+  }
+}
+
+void edge_obstacle(const Pair &pair, Run run, Array<ContactPoint> &out) {
+  for (const Candidate &candidate : run) {
+    Edge e(pair, candidate.feature_a);
+    if (pair.shape->view().shape == Shape::box) edge_box(e, out);
+    else edge_round(e, out);
+  }
+}
+
+// Faces against the centre of a sphere, the ends of a capsule's axis, the corners of a box.
+void triangle_obstacle(const Pair &pair, Run run, Array<ContactPoint> &out) {
+  const ObstacleShape &shape = *pair.shape;
+  const bool box = shape.view().shape == Shape::box;
+  const double radius = box ? 0 : shape.view().radius, depth = recovery_depth(*pair.a.surface);
+  const uint32_t points = box ? 8 : shape.view().shape == Shape::sphere ? 1 : 2;
+  for (const Candidate &candidate : run) {
+    const std::span<const uint32_t> corner(&pair.a.surface->tri[3 * size_t{candidate.feature_a}], 3);
+    const Vec3 a = pair.xa(corner[0]), b = pair.xa(corner[1]), d = pair.xa(corner[2]);
+    const Vec3 m = normalized(cross(b - a, d - a));
+    for (uint32_t k = 0; k < points; ++k) {
+      const Vec3 c = box ? shape.corner(k) : shape.end(int(k));
+      const TrianglePoint q = closest_on_triangle(c, a, b, d);
+      const double plane = dot(m, c - q.point), distance = plane - radius;
+      // Over the face, its border included: there rounding may put a point beside both of two triangles.
+      if (q.feature != TriangleFeature::face && !(q.distance2 <= plane * plane * (1 + 1e-9))) continue;
+      if (!(norm2(m) > 0) || !(distance < reach_of(pair, corner, c)) || !(plane > (box ? -depth : -std::min(radius, depth)))) continue;
+      if (box && plane < 0) {              // only a corner that leads the box into the body, not one of its far side
+        bool leads = true;
+        for (int i = 0; i < 3; ++i) leads &= dot(m, shape.axis(i)) * (k >> i & 1 ? 1 : -1) <= 0.3;
+        if (!leads) continue;
+      }
+      ContactPoint p = blank(pair, kPrimitive, 2, candidate.feature_a, box ? 12 + k : k);
+      for (int i = 0; i < 3; ++i) add_node(p, pair.a.first_node + corner[i], q.weight[i]);
+      finish(pair, p, q.point, c - radius * m, -m, distance, p.feature_b, out);
+    }
+  }
+}
+
+}  // namespace dfm::narrow

@@ -1,0 +1,236 @@
+// A surfel p of body a against the triangles of body b near it, all together:
+//
+//      F   over a face: plane distance, face normal            p            p       .  p
+//      E   over an edge or corner, if no triangle that         |F        E  |    X  . /|
+//          has it is nearer: direction from it to p        ____|____     ___/    ___./ |F
+//      X   beside a concave edge: the other face's plane,           \       |        \____
+//          its weights extrapolated                                  \      |
+//
+// Whether p is outside is told by the nearest point: over a face by its side, over an edge or corner by the face there that p sees most steeply.
+// From inside, only the nearest face pushes back (with the planes across concave edges): the far side of a thin body does not pull p through.
+#include <algorithm>
+
+#include "narrow/detail.h"
+#include "surfel/closest.h"
+
+namespace dfm::narrow {
+namespace {
+
+constexpr uint32_t kMost = 96;        // triangles kept per surfel; beyond that the nearest ones
+constexpr double kNearer = 1e-9;      // relative: a triangle beside the feature counts as nearer only beyond this
+
+struct Near {
+  uint32_t tri;
+  TriangleFeature feature;
+  bool emitted;
+  double weight[3];
+  Vec3 q, normal;              // closest point; unit face normal (zero for a triangle without area)
+  double distance, plane;      // to the triangle (>= 0); signed, to its plane
+  double reach;
+};
+
+struct Group {
+  const Pair &pair;
+  double depth;                // m, recovery
+  uint32_t surfel = 0, count = 0;
+  Vec3 p;
+  Near near[kMost];
+
+  explicit Group(const Pair &of) : pair(of), depth(recovery_depth(*of.b->surface)) {}
+
+  const uint32_t *corners(const Near &n) const { return &pair.b->surface->tri[3 * size_t{n.tri}]; }
+  void collect(Run run);
+  uint32_t nearest() const;
+  bool has_feature(const Near &other, const Near &of) const;
+  bool local_minimum(const Near &n) const;
+  uint32_t steepest(const Near &n) const;
+  bool plane_weights(const Near &n, double weight[3]) const;
+  bool reachable_across(const Near &n, double weight[3]) const;
+  void emit(Near &n, Vec3 normal, double distance, const double weight[3], Array<ContactPoint> &out) const;
+  void resolve(Array<ContactPoint> &out);
+};
+
+void keep_nearest(Near *near, uint32_t &count, const Near &n) {
+  if (count < kMost) {
+    near[count++] = n;
+    return;
+  }
+  // Full (a surface folded onto itself): the farthest leaves, order of triangles stays.
+  uint32_t far = 0;
+  for (uint32_t i = 1; i < count; ++i)
+    if (near[i].distance >= near[far].distance) far = i;
+  if (!(n.distance < near[far].distance)) return;
+  std::copy(near + far + 1, near + count, near + far);
+  near[count - 1] = n;
+}
+
+void Group::collect(Run run) {
+  const Vec3 v = pair.va(surfel);
+  const double widest = std::max(contact_reach(pair.h, pair.offset, norm(v) + pair.speed_b), depth), widest2 = widest * widest;
+  for (const Candidate &candidate : run) {
+    const uint32_t *c = &pair.b->surface->tri[3 * size_t{candidate.feature_b}];
+    const Vec3 a = pair.xb(c[0]), b = pair.xb(c[1]), d = pair.xb(c[2]);
+    const Vec3 n = cross(b - a, d - a);
+    const double s = dot(n, p - a), nn = norm2(n);
+    if (!(s * s <= widest2 * nn)) continue;
+    const TrianglePoint t = closest_on_triangle(p, a, b, d);
+    if (!(t.distance2 <= widest2)) continue;
+    const double area = std::sqrt(nn);
+    Near entry{candidate.feature_b, t.feature, false, {t.weight[0], t.weight[1], t.weight[2]}, t.point, {}, std::sqrt(t.distance2), 0, 0};
+    if (area > 0) {
+      entry.normal = (1 / area) * n;
+      entry.plane = dot(entry.normal, p - t.point);
+    }
+    double speed2 = 0;
+    for (int k = 0; k < 3; ++k) speed2 = std::max(speed2, norm2(v - pair.vb(c[k])));
+    entry.reach = contact_reach(pair.h, pair.offset, std::sqrt(speed2));
+    keep_nearest(near, count, entry);
+  }
+}
+
+uint32_t Group::nearest() const {
+  uint32_t best = 0;
+  for (uint32_t i = 1; i < count; ++i)
+    if (near[i].distance < near[best].distance) best = i;
+  return best;
+}
+
+// Does `other` have the edge or corner on which `of` has its closest point?
+bool Group::has_feature(const Near &other, const Near &of) const {
+  const uint32_t *c = corners(of), *o = corners(other);
+  const auto has = [&](uint32_t s) { return o[0] == s || o[1] == s || o[2] == s; };
+  const int f = int(of.feature);
+  return f >= 4 ? has(c[f - 4]) : has(c[f - 1]) && has(c[f % 3]);
+}
+
+bool Group::local_minimum(const Near &n) const {
+  if (n.feature == TriangleFeature::face) return true;
+  for (uint32_t i = 0; i < count; ++i)
+    if (near[i].distance < n.distance * (1 - kNearer) && has_feature(near[i], n)) return false;
+  return true;
+}
+
+// The face at n's feature that the direction to p is least tangent to: its side tells inside from outside.
+uint32_t Group::steepest(const Near &n) const {
+  uint32_t best = uint32_t(&n - near);
+  double most = -1;
+  for (uint32_t i = 0; i < count; ++i) {
+    if (near[i].tri != n.tri && (n.feature == TriangleFeature::face || !has_feature(near[i], n))) continue;
+    const double s = std::fabs(dot(near[i].normal, p - n.q));
+    if (s > most) most = s, best = i;
+  }
+  return best;
+}
+
+// Weights of p's projection on n's plane, negative beyond an edge; false for a triangle without area.
+bool Group::plane_weights(const Near &n, double weight[3]) const {
+  const uint32_t *c = corners(n);
+  const Vec3 a = pair.xb(c[0]), b = pair.xb(c[1]), d = pair.xb(c[2]), normal = cross(b - a, d - a);
+  const double nn = norm2(normal);
+  if (!(nn > 0) || !(norm2(n.normal) > 0)) return false;
+  weight[1] = dot(normal, cross(p - a, d - a)) / nn;
+  weight[2] = dot(normal, cross(b - a, p - a)) / nn;
+  weight[0] = 1 - weight[1] - weight[2];
+  return true;
+}
+
+// p projects beside the face, across concave edges only and no further than it can travel. Flat edges do not count: sliding over them within the reach
+// costs less than a tenth of the rest distance.
+bool Group::reachable_across(const Near &n, double weight[3]) const {
+  if (!plane_weights(n, weight)) return false;
+  const Surface &s = *pair.b->surface;
+  const uint32_t *c = corners(n);
+  const double area2 = norm(cross(pair.xb(c[1]) - pair.xb(c[0]), pair.xb(c[2]) - pair.xb(c[0])));
+  bool across = false;
+  for (int k = 0; k < 3; ++k) {            // edge k faces corner k + 2
+    const double w = weight[(k + 2) % 3];
+    if (w >= 0) continue;
+    const uint32_t from = c[k], to = c[(k + 1) % 3];
+    const Vec3 along = pair.xb(to) - pair.xb(from);
+    const double length = norm(along);
+    if (!(-w * area2 <= n.reach * length)) return false;
+    const uint32_t *sides = &s.edge_tri[2 * size_t{s.tri_edge[3 * size_t{n.tri} + k]}], beyond = sides[0] == n.tri ? sides[1] : sides[0];
+    if (beyond == kNone) return false;
+    Vec3 o;
+    for (int i = 0; i < 3; ++i)
+      if (const uint32_t v = s.tri[3 * size_t{beyond} + i]; v != from && v != to) o = pair.xb(v) - pair.xb(from);
+    const double rise = dot(n.normal, o) * length, height = norm(cross(along, o));   // rise / height: sine of the fold
+    if (!(rise * n.reach > 0.1 * pair.offset * height)) return false;
+    across = true;
+  }
+  return across;
+}
+
+void Group::emit(Near &n, Vec3 normal, double distance, const double weight[3], Array<ContactPoint> &out) const {
+  ContactPoint c = blank(pair, kVertexFace, 0, surfel, n.tri);
+  add_node(c, pair.a.first_node + surfel, 1);
+  for (int k = 0; k < 3; ++k) add_node(c, pair.b->first_node + corners(n)[k], -weight[k]);
+  place(c, p, p - distance * normal, normal, distance);
+  out.push_back(c);
+  n.emitted = true;
+}
+
+void Group::resolve(Array<ContactPoint> &out) {
+  const Near &best = near[nearest()];
+  const double tiny = 1e-9 * pair.b->surface->median_edge;
+  const uint32_t steep = steepest(best);
+  const bool inside = dot(near[steep].normal, p - best.q) < 0;
+  uint32_t deepest = kNone;                // of the faces that p is behind, the one it is least deep below
+  double weight[3];
+  for (uint32_t i = 0; i < count; ++i) {
+    Near &n = near[i];
+    if (n.feature == TriangleFeature::face) {
+      if (n.plane >= 0) {
+        if (n.plane < n.reach) emit(n, n.normal, n.plane, n.weight, out);
+      } else if (inside && -n.plane <= depth && (deepest == kNone || n.plane > near[deepest].plane)) {
+        deepest = i;
+      }
+      continue;
+    }
+    const Vec3 f = near[steepest(n)].normal;
+    if (n.distance < n.reach && local_minimum(n) && norm2(f) > 0 && (n.distance <= tiny || dot(f, p - n.q) > 0)) {
+      bool again = false;                  // the same edge, corner or face border, from another triangle
+      for (uint32_t j = 0; j < i; ++j) again |= near[j].emitted && norm2(near[j].q - n.q) <= 1e-8 * n.distance * n.distance + tiny * tiny;
+      if (!again) emit(n, n.distance > tiny ? (1 / n.distance) * (p - n.q) : f, n.distance, n.weight, out);
+    } else if (std::fabs(n.plane) < n.reach && (inside || n.plane >= 0) && reachable_across(n, weight)) {
+      emit(n, n.normal, n.plane, weight, out);
+    }
+  }
+  if (!inside) return;
+  if (deepest != kNone) {
+    emit(near[deepest], near[deepest].normal, near[deepest].plane, near[deepest].weight, out);
+  } else if (best.distance <= depth && best.feature != TriangleFeature::face && !near[steep].emitted && plane_weights(near[steep], weight)) {
+    // Nearest is a concave edge or a saddle: its steepest face, extended, leads out.
+    emit(near[steep], near[steep].normal, near[steep].plane, weight, out);
+  }
+}
+
+}  // namespace
+
+void vertex_face(const Pair &pair, Run run, Array<ContactPoint> &out) {
+  const Surface &b = *pair.b->surface;
+  Group group(pair);
+  for (size_t i = 0; i < run.size();) {
+    size_t end = i + 1;
+    while (end < run.size() && run[end].feature_a == run[i].feature_a) ++end;
+    group.surfel = run[i].feature_a;
+    group.p = pair.xa(group.surfel);
+    group.count = 0;
+    group.collect(run.subspan(i, end - i));
+    i = end;
+    if (!group.count) continue;
+    const size_t begin = out.size();
+    group.resolve(out);
+    std::sort(out.begin() + begin, out.end(), [](const ContactPoint &l, const ContactPoint &r) { return l.feature_b < r.feature_b; });
+    uint32_t touching = 0;
+    for (size_t k = begin; k < out.size(); ++k) touching += out[k].distance < 2 * pair.offset;
+    for (size_t k = begin; k < out.size(); ++k) {
+      uint32_t ordinal = 0;
+      for (size_t j = begin; j < k; ++j) ordinal += b.patch[out[j].feature_b] == b.patch[out[k].feature_b];
+      out[k].key = contact_key(out[k], pair.a.id, pair.b->id, b.patch[out[k].feature_b], ordinal);
+      out[k].area = 0.5 * pair.a.surface->area[group.surfel] / (out[k].distance < 2 * pair.offset ? touching : 1);
+    }
+  }
+}
+
+}  // namespace dfm::narrow

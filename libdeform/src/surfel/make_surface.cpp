@@ -1,0 +1,150 @@
+// Topology of a surface is found by sorting, never by hashing, so that numbers depend on the input alone.
+#include "surfel/make_surface.h"
+
+#include <algorithm>
+
+#include "math/vec3.h"
+
+namespace dfm {
+namespace {
+
+constexpr double kPatchCosine = 0.5;  // faces within 60 degrees are one patch (mechanics, section 4)
+
+struct Side {
+  uint64_t key;      // {lower surfel, higher surfel}
+  uint32_t tri;
+  uint8_t corner;    // the edge runs from this corner to the next one
+  bool forward;      // from the lower to the higher surfel
+};
+
+void number_surfels(uint32_t npoint, const uint32_t *tris, uint32_t ntri, Surface &out) {
+  Array<uint32_t> number(size_t{npoint}, kNone, out.tri.get_allocator());
+  for (size_t i = 0; i < size_t{3} * ntri; ++i) number[tris[i]] = 0;
+  out.point.clear();
+  for (uint32_t p = 0; p < npoint; ++p) {
+    if (number[p] == kNone) continue;
+    number[p] = uint32_t(out.point.size());
+    out.point.push_back(p);
+  }
+  out.nsurfel = uint32_t(out.point.size());
+  out.ntri = ntri;
+  out.tri.resize(size_t{3} * ntri);
+  for (size_t i = 0; i < out.tri.size(); ++i) out.tri[i] = number[tris[i]];
+}
+
+void find_edges(Surface &out) {
+  Array<Side> sides(out.tri.get_allocator());
+  sides.reserve(out.tri.size());
+  for (uint32_t t = 0; t < out.ntri; ++t)
+    for (uint8_t k = 0; k < 3; ++k) {
+      const uint32_t i = out.tri[3 * t + k], j = out.tri[3 * t + (k + 1) % 3];
+      sides.push_back({uint64_t{std::min(i, j)} << 32 | std::max(i, j), t, k, i < j});
+    }
+  std::sort(sides.begin(), sides.end(), [](const Side &a, const Side &b) { return a.key != b.key ? a.key < b.key : a.tri < b.tri; });
+  out.edge.clear();
+  out.edge_tri.clear();
+  out.tri_edge.assign(size_t{3} * out.ntri, kNone);
+  out.tri_owns.assign(out.ntri, 0);
+  for (size_t s = 0; s < sides.size(); ++s) {
+    if (s == 0 || sides[s].key != sides[s - 1].key) {
+      out.edge.push_back(uint32_t(sides[s].key >> 32));
+      out.edge.push_back(uint32_t(sides[s].key));
+      out.edge_tri.insert(out.edge_tri.end(), {kNone, kNone});
+      out.tri_owns[sides[s].tri] |= 8u << sides[s].corner;
+    }
+    const uint32_t e = uint32_t(out.edge.size() / 2 - 1);
+    out.tri_edge[3 * sides[s].tri + sides[s].corner] = e;
+    uint32_t &slot = out.edge_tri[2 * e + (sides[s].forward ? 0 : 1)];
+    if (slot == kNone) slot = sides[s].tri;
+  }
+  out.nedge = uint32_t(out.edge.size() / 2);
+  Array<uint8_t> owned(out.nsurfel, 0, out.tri.get_allocator());
+  for (uint32_t t = 0; t < out.ntri; ++t)
+    for (int k = 0; k < 3; ++k) {
+      uint8_t &taken = owned[out.tri[3 * t + k]];
+      if (!taken) out.tri_owns[t] |= 1u << k;
+      taken = 1;
+    }
+}
+
+uint32_t root(Array<uint32_t> &parent, uint32_t i) {
+  while (parent[i] != i) i = parent[i] = parent[parent[i]];
+  return i;
+}
+
+// Patches are numbered in the order of their lowest triangles.
+void find_patches(const Array<Vec3> &normal, Surface &out) {
+  Array<uint32_t> parent(out.ntri, 0u, out.tri.get_allocator());
+  for (uint32_t t = 0; t < out.ntri; ++t) parent[t] = t;
+  for (uint32_t e = 0; e < out.nedge; ++e) {
+    const uint32_t s = out.edge_tri[2 * e], t = out.edge_tri[2 * e + 1];
+    if (s == kNone || t == kNone || dot(normal[s], normal[t]) < kPatchCosine) continue;
+    const uint32_t rs = root(parent, s), rt = root(parent, t);
+    parent[std::max(rs, rt)] = std::min(rs, rt);
+  }
+  out.patch.assign(out.ntri, 0);
+  uint32_t count = 0;
+  for (uint32_t t = 0; t < out.ntri; ++t) {
+    const uint32_t r = root(parent, t);
+    out.patch[t] = r == t ? count++ : out.patch[r];
+  }
+}
+
+}  // namespace
+
+void make_surface(const Memory &memory, uint32_t npoint, const double *rest, const uint32_t *boundary_tris, uint32_t ntri, Surface &out) {
+  const HookAllocator<uint32_t> a(memory);
+  out.tri = Array<uint32_t>(a), out.edge = Array<uint32_t>(a), out.edge_tri = Array<uint32_t>(a), out.tri_edge = Array<uint32_t>(a);
+  out.tri_owns = Array<uint32_t>(a), out.patch = Array<uint32_t>(a), out.point = Array<uint32_t>(a), out.row = Array<uint32_t>(a);
+  out.col = Array<uint32_t>(a), out.weight = Array<double>(a), out.area = Array<double>(a);
+  out.x = Array<double>(a), out.v = Array<double>(a), out.force = Array<double>(a);
+  number_surfels(npoint, boundary_tris, ntri, out);
+  find_edges(out);
+
+  const auto at = [&](uint32_t surfel) { return load3(rest + size_t{3} * out.point[surfel]); };
+  Array<Vec3> normal(ntri, Vec3{}, a);
+  out.area.assign(out.nsurfel, 0.0);
+  for (uint32_t t = 0; t < ntri; ++t) {
+    const uint32_t *c = &out.tri[3 * t];
+    const Vec3 n = cross(at(c[1]) - at(c[0]), at(c[2]) - at(c[0]));
+    normal[t] = normalized(n);
+    for (int k = 0; k < 3; ++k) out.area[c[k]] += norm(n) / 6;
+  }
+  find_patches(normal, out);
+
+  Array<double> length(a);
+  for (uint32_t e = 0; e < out.nedge; ++e) length.push_back(norm(at(out.edge[2 * e + 1]) - at(out.edge[2 * e])));
+  if (!length.empty()) {
+    std::nth_element(length.begin(), length.begin() + length.size() / 2, length.end());
+    out.median_edge = length[length.size() / 2];
+  }
+  out.x.assign(size_t{4} * out.nsurfel, 0.0);
+  out.v.assign(size_t{4} * out.nsurfel, 0.0);
+  out.force.assign(size_t{3} * out.nsurfel, 0.0);
+  for (uint32_t s = 0; s < out.nsurfel; ++s) store3(&out.x[4 * s], at(s));
+}
+
+void gather_surface(Surface &surface, const double *x, const double *v, uint32_t stride) {
+  double *__restrict xs = surface.x.data();
+  double *__restrict vs = surface.v.data();
+  if (surface.identity()) {
+    const uint32_t *point = surface.point.data();
+    for (uint32_t s = 0; s < surface.nsurfel; ++s) {
+      const double *xp = x + size_t{stride} * point[s], *vp = v + size_t{stride} * point[s];
+      for (int k = 0; k < 3; ++k) xs[4 * s + k] = xp[k];
+      for (int k = 0; k < 3; ++k) vs[4 * s + k] = vp[k];
+    }
+    return;
+  }
+  for (uint32_t s = 0; s < surface.nsurfel; ++s) {
+    Vec3 xa, va;
+    for (uint32_t i = surface.row[s]; i < surface.row[s + 1]; ++i) {
+      xa += surface.weight[i] * load3(x + size_t{stride} * surface.col[i]);
+      va += surface.weight[i] * load3(v + size_t{stride} * surface.col[i]);
+    }
+    store3(xs + 4 * s, xa);
+    store3(vs + 4 * s, va);
+  }
+}
+
+}  // namespace dfm

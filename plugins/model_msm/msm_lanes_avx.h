@@ -1,0 +1,40 @@
+// Four doubles in one AVX register, for the files compiled with it. Internal linkage only.
+#pragma once
+#if defined(__GNUC__) && !defined(__clang__)  // GCC 12 takes the undefined pass-through of its own unmasked intrinsics for a bug of ours
+#pragma GCC diagnostic ignored "-Wmaybe-uninitialized"
+#pragma GCC diagnostic ignored "-Wuninitialized"
+#endif
+#include <immintrin.h>
+
+#define MSM_INLINE static inline __attribute__((always_inline))
+
+namespace msm {
+namespace {
+
+typedef __m256d v4;
+
+MSM_INLINE v4 load4(const double *p) { return _mm256_load_pd(p); }
+MSM_INLINE void store4(double *p, v4 a) { _mm256_store_pd(p, a); }
+MSM_INLINE v4 load_xyz(const double *p) { return _mm256_maskload_pd(p, _mm256_setr_epi64x(-1, -1, -1, 0)); }  // masked: never read
+MSM_INLINE v4 splat(double a) { return _mm256_set1_pd(a); }
+MSM_INLINE v4 sqrt4(v4 a) { return _mm256_sqrt_pd(a); }
+MSM_INLINE v4 max4(v4 a, v4 b) { return _mm256_max_pd(a, b); }
+MSM_INLINE v4 abs4(v4 a) { return _mm256_andnot_pd(_mm256_set1_pd(-0.0), a); }
+MSM_INLINE v4 zero_unless_above(v4 value, v4 a, v4 limit) { return _mm256_and_pd(value, _mm256_cmp_pd(a, limit, _CMP_GT_OQ)); }
+template <int kLane>
+MSM_INLINE v4 lane(v4 a) { return _mm256_permute4x64_pd(a, kLane * 0x55); }
+
+// k-th lane of the result: (s_k.x + s_k.y) + (s_k.z + s_k.w)
+MSM_INLINE v4 sum_rows(v4 s0, v4 s1, v4 s2, v4 s3) {
+  const v4 a = _mm256_add_pd(_mm256_unpacklo_pd(s0, s1), _mm256_unpackhi_pd(s0, s1));
+  const v4 b = _mm256_add_pd(_mm256_unpacklo_pd(s2, s3), _mm256_unpackhi_pd(s2, s3));
+  return _mm256_add_pd(_mm256_permute2f128_pd(a, b, 0x20), _mm256_permute2f128_pd(a, b, 0x31));
+}
+MSM_INLINE void transpose(v4 &r0, v4 &r1, v4 &r2, v4 &r3) {
+  const v4 a = _mm256_unpacklo_pd(r0, r1), b = _mm256_unpackhi_pd(r0, r1), c = _mm256_unpacklo_pd(r2, r3), d = _mm256_unpackhi_pd(r2, r3);
+  r0 = _mm256_permute2f128_pd(a, c, 0x20), r1 = _mm256_permute2f128_pd(b, d, 0x20);
+  r2 = _mm256_permute2f128_pd(a, c, 0x31), r3 = _mm256_permute2f128_pd(b, d, 0x31);
+}
+
+}  // namespace
+}  // namespace msm

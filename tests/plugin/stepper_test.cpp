@@ -1,0 +1,156 @@
+// A toy self-stepping model in contact, through dfm.stepper/1: a body that only translates. Its answers are those of a point mass, so
+// every figure has a closed form.
+#define DFM_STATIC_PLUGIN toy_stepper
+#include "world.h"
+
+namespace {
+
+struct Toy {
+  uint32_t npoint, nsurfel;
+  std::vector<double> mass;
+  std::vector<uint32_t> row, col;
+  double total = 0;
+};
+
+dfm_status create(const dfm_host *, const dfm_mesh *m, void **self) {
+  Toy *t = new Toy{m->npoint, m->nsurfel, std::vector<double>(m->mass, m->mass + m->npoint), std::vector<uint32_t>(m->row, m->row + m->nsurfel + 1),
+                   std::vector<uint32_t>(m->col, m->col + m->row[m->nsurfel])};
+  for (double x : t->mass) t->total += x;
+  *self = t;
+  return DFM_OK;
+}
+void destroy(void *self) { delete static_cast<Toy *>(self); }
+
+// The velocity all points share, after external forces.
+void mean_velocity(const Toy &t, const dfm_kin *k, const double *f, double v[3]) {
+  for (int c = 0; c < 3; ++c) {
+    double p = 0;
+    for (uint32_t i = 0; i < t.npoint; ++i) p += t.mass[i] * k->v[size_t(i) * k->stride + c] + k->dt * f[size_t(i) * k->stride + c];
+    v[c] = p / t.total;
+  }
+}
+
+struct Pending { double v[3]; };
+Pending pending;   // predict and commit see the same external forces; one body in these tests
+
+dfm_status predict(void *self, const dfm_kin *k, const double *f, double *u) {
+  const Toy &t = *static_cast<Toy *>(self);
+  mean_velocity(t, k, f, pending.v);
+  for (uint32_t s = 0; s < t.nsurfel; ++s)
+    for (int c = 0; c < 3; ++c) u[3 * s + c] = pending.v[c];
+  return DFM_OK;
+}
+dfm_status respond(void *self, const dfm_kin *, uint32_t n, const uint32_t *, const double *p, double *du) {
+  const Toy &t = *static_cast<Toy *>(self);
+  for (int c = 0; c < 3; ++c) {
+    double sum = 0;
+    for (uint32_t i = 0; i < n; ++i) sum += p[3 * i + c];
+    for (uint32_t i = 0; i < n; ++i) du[3 * i + c] = sum / t.total;
+  }
+  return DFM_OK;
+}
+dfm_status diagonal(void *self, const dfm_kin *, uint32_t n, const uint32_t *, double *w) {
+  const Toy &t = *static_cast<Toy *>(self);
+  for (uint32_t i = 0; i < 9 * n; ++i) w[i] = i % 9 == 0 || i % 9 == 4 || i % 9 == 8 ? 1 / t.total : 0;
+  return DFM_OK;
+}
+dfm_status commit(void *self, const dfm_kin *k, const double *p, double *x, double *v) {
+  const Toy &t = *static_cast<Toy *>(self);
+  for (int c = 0; c < 3; ++c) {
+    double sum = 0;
+    for (uint32_t s = 0; s < t.nsurfel; ++s) sum += p[3 * s + c];
+    const double u = pending.v[c] + sum / t.total;
+    for (uint32_t i = 0; i < t.npoint; ++i) {
+      v[size_t(i) * k->stride + c] = u;
+      x[size_t(i) * k->stride + c] = k->x[size_t(i) * k->stride + c] + k->dt * u;
+    }
+  }
+  for (uint32_t i = 0; i < t.npoint; ++i) v[size_t(i) * k->stride + 3] = x[size_t(i) * k->stride + 3] = 0;
+  return DFM_OK;
+}
+
+const void *extension(const void *, const char *id) {
+  static const dfm_stepper stepper{sizeof(dfm_stepper), 0, predict, respond, diagonal, commit, nullptr};
+  return std::string(id) == "dfm.stepper/1" ? &stepper : nullptr;
+}
+
+}  // namespace
+
+extern "C" const dfm_plugin *dfm_plugin_entry_toy_stepper(const dfm_host *host, uint32_t, uint32_t) {
+  if (!DFM_ABI_OK(host)) return nullptr;
+  static dfm_model ops{};
+  ops.size = sizeof ops, ops.cells = DFM_CELL_TET, ops.create = create, ops.destroy = destroy, ops.extension = extension;
+  static dfm_type type{};
+  static const char *const effects[] = {nullptr};
+  type.size = sizeof type, type.kind = DFM_KIND_MODEL, type.id = "test.toy_stepper", type.name = "translating toy", type.version = "1";
+  type.licence = "MIT", type.source = "Newton 1687", type.param_size = sizeof(dfm_param), type.effects = effects, type.ops = &ops;
+  static const dfm_type *const types[] = {&type};
+  static const dfm_plugin plugin{sizeof(dfm_plugin), DFM_ABI, DFM_ABI_DRAFT, 1, types, nullptr};
+  return &plugin;
+}
+
+namespace {
+
+struct World {
+  test::Context context;
+  dfm_world world;
+  dfm_body body;
+  World(double mu, std::array<double, 3> gravity, double z) {
+    test::ok(dfm_plugin_register_static(context, dfm_plugin_entry_toy_stepper, "toy_stepper"));
+    world = test::make_world(context, gravity);
+    test::BodyOptions o;
+    o.name = "toy", o.model = "toy_stepper", o.position = {0, 0, z};
+    body = test::make_body(context, world, "beam", {0.1, 0.1, 0.1}, 60, o);
+    test::add_plane(world, "floor");
+    test::set_friction(world, mu);
+  }
+};
+
+}  // namespace
+
+TEST(Stepper, DroppedOnAFloor_RestsAtTheOffsetAndCarriesItsWeight) {
+  World w(0.5, {0, 0, -9.81}, 0.01);
+  test::run(w.world, 1.0, 1e-3);
+  const dfm_body_measure m = test::measure(w.body);
+  EXPECT_LT(m.speed_max, 1e-9);
+  dfm_pair_report pair{};
+  uint32_t n = 0;
+  ASSERT_EQ(dfm_world_pairs(w.world, 1, &pair, &n), DFM_OK) << dfm_last_error();
+  EXPECT_NEAR(pair.normal, m.mass * 9.81, 1e-3 * m.mass * 9.81);
+}
+
+TEST(Stepper, OnASlope_SlidesWithCoulombsAcceleration) {
+  const double theta = 0.5, mu = 0.3;
+  World w(mu, {9.81 * std::sin(theta), 0, -9.81 * std::cos(theta)}, 1e-4);
+  test::run(w.world, 0.1, 1e-3);
+  const double v0 = test::measure(w.body).velocity[0];
+  test::run(w.world, 0.4, 1e-3);
+  EXPECT_NEAR((test::measure(w.body).velocity[0] - v0) / 0.4, 9.81 * (std::sin(theta) - mu * std::cos(theta)), 1e-3);
+}
+
+TEST(Stepper, OnASlopeBelowTheLimit_Holds) {
+  World w(0.6, {9.81 * std::sin(0.5), 0, -9.81 * std::cos(0.5)}, 1e-4);
+  test::run(w.world, 0.3, 1e-3);
+  const double x0 = test::measure(w.body).com[0];
+  test::run(w.world, 1.0, 1e-3);
+  EXPECT_LT(std::fabs(test::measure(w.body).com[0] - x0), 1e-6);
+}
+
+// The seam meets the other kind of body: a soft ball on top of the toy.
+TEST(Stepper, UnderASoftBall_BothRest) {
+  World w(0.5, {0, 0, -9.81}, 1e-4);
+  test::BodyOptions o;
+  o.name = "ball", o.young = 5e4, o.damping_stiffness = 2e-3, o.position = {0.05, 0.05, 0.152};
+  const dfm_body ball = test::make_body(w.context, w.world, "ball", {0.05, 0, 0}, 300, o);
+  test::run(w.world, 2.0, 1e-3);
+  dfm_pair_report pair[4];
+  uint32_t n = 0;
+  ASSERT_EQ(dfm_world_pairs(w.world, 4, pair, &n), DFM_OK) << dfm_last_error();
+  ASSERT_EQ(n, 2u);
+  const double toy = test::measure(w.body).mass * 9.81, top = test::measure(ball).mass * 9.81;
+  double floor_force = 0, between = 0;
+  for (uint32_t i = 0; i < n; ++i) (pair[i].a == w.body && pair[i].b != ball ? floor_force : between) = pair[i].normal;
+  EXPECT_NEAR(floor_force, toy + top, 0.02 * (toy + top));
+  EXPECT_NEAR(between, top, 0.05 * top);
+  EXPECT_GT(test::measure(ball).com[2], 0.13);
+}

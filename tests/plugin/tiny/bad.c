@@ -1,0 +1,49 @@
+/* One plugin per mistake in the self-description; the library refuses each with a sentence. */
+#include "deform/plugin.h"
+
+#ifdef BAD_NO_SOURCE
+#define SOURCE ""
+#else
+#define SOURCE "test"
+#endif
+#ifdef BAD_BAD_ID
+#define ID "just a name"
+#else
+#define ID "org.tiny.bad"
+#endif
+#ifdef BAD_BAD_RANGE
+#define DEFAULT 11.0
+#else
+#define DEFAULT 1.0
+#endif
+#ifdef BAD_DOUBLE_KEY
+#define SECOND "first"
+#else
+#define SECOND "second"
+#endif
+#ifdef BAD_FOREIGN_SLOT
+#define UNIT DFM_PER_CELL
+#else
+#define UNIT DFM_PER_CONTACT
+#endif
+#ifdef BAD_NO_EVAL
+#define EVAL NULL
+#else
+#define EVAL eval
+static dfm_status eval(const dfm_friction_in *in, dfm_friction_out *out) {
+  (void)in, (void)out;
+  return DFM_OK;
+}
+#endif
+
+static const dfm_param rows[] = {{"first", "first", "N", 0.0, 10.0, DEFAULT, 0, 1, NULL}, {SECOND, "second", "N", 0.0, 10.0, 2.0, 0, 1, NULL}};
+static const dfm_slot slots[] = {{UNIT, 2, DFM_SLOT_TANGENT, 0}};
+static const dfm_friction law = {sizeof(dfm_friction), 0, 0, 1, slots, EVAL, NULL, NULL, NULL};
+static const dfm_type type = {sizeof(dfm_type), DFM_KIND_FRICTION, ID, "bad", "1.0", "MIT", SOURCE, rows, 2, sizeof(dfm_param), NULL, &law};
+static const dfm_type *const types[] = {&type};
+static const dfm_plugin plugin = {sizeof(dfm_plugin), DFM_ABI, DFM_ABI_DRAFT, 1, types, NULL};
+
+const dfm_plugin *dfm_plugin_entry(const dfm_host *host, uint32_t host_abi, uint32_t host_abi_min) {
+  (void)host_abi, (void)host_abi_min;
+  return DFM_ABI_OK(host) ? &plugin : NULL;
+}

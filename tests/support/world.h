@@ -1,0 +1,114 @@
+// Worlds that several tests build through the public API.
+#pragma once
+#include <gtest/gtest.h>
+
+#include <array>
+#include <cmath>
+#include <string>
+#include <vector>
+
+#include "deform/deform.h"
+
+namespace test {
+
+// A context with this build's plugins; fails the test where they are missing.
+struct Context {
+  dfm_context *c = nullptr;
+  explicit Context(uint32_t threads = 1) {
+    dfm_context_def def = dfm_context_def_default();
+    def.threads = threads, def.plugin_dir = DEFORM_PLUGIN_DIR;
+    def.log = [](void *, int32_t, const char *) {};
+    EXPECT_EQ(dfm_context_create(&def, &c), DFM_OK) << dfm_last_error();
+  }
+  ~Context() { dfm_context_destroy(c); }
+  operator dfm_context *() const { return c; }
+};
+
+#define DFM_OK_OR_DIE(call) ASSERT_EQ(call, DFM_OK) << dfm_last_error()
+inline void ok(dfm_status s) { EXPECT_EQ(s, DFM_OK) << dfm_last_error(); }
+
+struct BodyOptions {
+  std::string name, model;
+  double young = 1e5, poisson = 0.3, density = 1000, damping_stiffness = 0, damping_mass = 0, volume = -1;
+  std::array<double, 3> position{}, velocity{}, spin{};
+  std::array<double, 4> rotation{0, 0, 0, 1};
+};
+
+// A body from a generator: kind "beam", "cylinder" or "ball".
+inline dfm_body make_body(dfm_context *c, dfm_world w, const char *kind, std::array<double, 3> size, uint32_t cells, const BodyOptions &o) {
+  dfm_tetmesh mesh = 0;
+  ok(dfm_tetmesh_make(c, kind, size.data(), cells, &mesh));
+  dfm_tetmesh_info info{};
+  info.size = sizeof info;
+  ok(dfm_tetmesh_get_info(mesh, &info));
+  const double *points = nullptr;
+  const uint32_t *tets = nullptr;
+  ok(dfm_tetmesh_data(mesh, &points, &tets, nullptr));
+  dfm_material_def md = dfm_material_def_default();
+  md.density = o.density, md.young = o.young, md.poisson = o.poisson;
+  md.damping_mass = o.damping_mass, md.damping_stiffness = o.damping_stiffness;
+  dfm_material material = 0;
+  ok(dfm_material_create(w, &md, &material));
+  dfm_body_def d = dfm_body_def_default();
+  d.name = o.name.empty() ? nullptr : o.name.c_str();
+  d.model = o.model.empty() ? nullptr : o.model.c_str();
+  d.npoint = info.npoint, d.ntet = info.ntet, d.points = points, d.tets = tets, d.material = material;
+  const dfm_param_value volume{"volume", &o.volume, 1};
+  if (o.volume >= 0) d.model_params = {sizeof(dfm_params), 1, &volume};
+  for (int k = 0; k < 3; ++k) d.pose.position[k] = o.position[k], d.velocity[k] = o.velocity[k], d.spin[k] = o.spin[k];
+  for (int k = 0; k < 4; ++k) d.pose.rotation[k] = o.rotation[k];
+  dfm_body body = 0;
+  ok(dfm_body_create(w, &d, &body));
+  ok(dfm_tetmesh_destroy(mesh));
+  return body;
+}
+
+inline dfm_world make_world(dfm_context *c, std::array<double, 3> gravity = {0, 0, -9.81}) {
+  dfm_world_def d = dfm_world_def_default();
+  for (int k = 0; k < 3; ++k) d.gravity[k] = gravity[k];
+  dfm_world w = 0;
+  ok(dfm_world_create(c, &d, &w));
+  return w;
+}
+
+inline dfm_obstacle add_plane(dfm_world w, const char *name, std::array<double, 3> point = {}, std::array<double, 4> rotation = {0, 0, 0, 1}) {
+  dfm_obstacle_def d = dfm_obstacle_def_default();
+  d.name = name, d.shape = DFM_SHAPE_PLANE;
+  for (int k = 0; k < 3; ++k) d.pose.position[k] = point[k];
+  for (int k = 0; k < 4; ++k) d.pose.rotation[k] = rotation[k];
+  dfm_obstacle o = 0;
+  ok(dfm_obstacle_create(w, &d, &o));
+  return o;
+}
+
+inline void set_friction(dfm_world w, double mu, const char *law = "coulomb") {
+  const dfm_param_value v{"mu", &mu, 1};
+  dfm_friction_def f{};
+  f.size = sizeof f, f.between[0] = f.between[1] = "*", f.law = law;
+  if (std::string(law) != "none") f.params = {sizeof(dfm_params), 1, &v};
+  ok(dfm_world_add_friction(w, &f));
+}
+
+inline dfm_body_measure measure(dfm_body b) {
+  dfm_body_measure m{};
+  m.size = sizeof m;
+  ok(dfm_body_get_measure(b, &m));
+  return m;
+}
+
+inline dfm_world_stats stats(dfm_world w) {
+  dfm_world_stats s{};
+  s.size = sizeof s;
+  ok(dfm_world_get_stats(w, &s));
+  return s;
+}
+
+inline void run(dfm_world w, double seconds, double dt) {
+  const long n = std::lround(seconds / dt);
+  for (long i = 0; i < n; ++i) {
+    uint32_t trouble = 0;
+    ASSERT_EQ(dfm_world_step(w, dt, &trouble), DFM_OK) << dfm_last_error();
+  }
+}
+
+}  // namespace test

@@ -1,0 +1,312 @@
+#include <gtest/gtest.h>
+
+#include "../surfel/detect_scene.h"
+#include "surfel/closest.h"
+
+namespace {
+
+using namespace dfm;
+using namespace test;
+
+void deform_at_random(Surface &s, std::mt19937 &random, double by, double speed) {
+  std::normal_distribution<double> normal;
+  for (uint32_t i = 0; i < s.nsurfel; ++i)
+    for (int k = 0; k < 3; ++k) {
+      s.x[4 * i + k] += by * normal(random);
+      s.v[4 * i + k] = speed * normal(random);
+    }
+}
+
+Quat random_turn(std::mt19937 &random) {
+  std::normal_distribution<double> normal;
+  return turn({normal(random), normal(random), normal(random)}, 3 * normal(random));
+}
+
+// Spheres, boxes and needles, thrown together, deformed and moving, among all kinds of obstacles.
+Scene random_scene(unsigned seed, double speed) {
+  std::mt19937 random(seed);
+  std::uniform_real_distribution<double> unit(-1, 1);
+  Scene scene;
+  scene.offset = 1e-4;
+  const Mesh meshes[4] = {sphere_mesh(0.3, 2), box_mesh({0.5, 0.4, 0.3}, 4, 3, 2), box_mesh({1, 0.01, 0.02}, 12, 1, 1), sphere_mesh(0.2, 1)};
+  for (const Mesh &m : meshes)
+    deform_at_random(scene.add(moved(m, random_turn(random), 0.4 * Vec3{unit(random), unit(random), unit(random)})), random, 0.004, speed);
+  scene.add(Shape::plane, {0, 0, -0.4}, turn({1, 0, 0}, 0.2));
+  ObstacleView &ball = scene.add(Shape::sphere, {0.4, 0.1, 0.2});
+  ball.radius = 0.15, ball.velocity = speed * Vec3{1, 0, 0};
+  ObstacleView &box = scene.add(Shape::box, {-0.3, 0.2, 0.1}, random_turn(random));
+  box.half_size = {0.2, 0.05, 0.1}, box.spin = speed * Vec3{0, 1, 2};
+  ObstacleView &capsule = scene.add(Shape::capsule, {0, -0.3, 0}, random_turn(random));
+  capsule.radius = 0.05, capsule.half_length = 0.3, capsule.spin = speed * Vec3{1, 1, 0};
+  return scene;
+}
+
+void advance(Scene &scene, std::mt19937 &random, double shake) {
+  std::normal_distribution<double> normal;
+  for (auto &s : scene.surfaces)
+    for (uint32_t i = 0; i < s->nsurfel; ++i)
+      for (int k = 0; k < 3; ++k) {
+        s->x[4 * i + k] += scene.h * s->v[4 * i + k];
+        s->v[4 * i + k] += shake * normal(random);
+      }
+  for (ObstacleView &o : scene.obstacles) {
+    o.position += scene.h * o.velocity;
+    const double w = norm(o.spin);
+    if (w > 0) o.rotation = turn(o.spin, scene.h * w) * o.rotation;
+  }
+}
+
+TEST(BroadPhase, RandomScenes_ListEveryPairInReach) {
+  size_t found = 0;
+  for (unsigned seed = 1; seed <= 6; ++seed) {
+    Scene scene = random_scene(seed, seed % 2 ? 0.2 : 4);
+    BroadPhase broad(Memory::standard());
+    EXPECT_TRUE(broad.update(scene.bodies, scene.obstacles, scene.filter, scene.h, scene.offset));
+    const auto brute = scene.contacts(), listed = scene.contacts(broad.candidates());
+    EXPECT_EQ(flaw(scene, brute), "");
+    EXPECT_TRUE(same_bits(brute, listed)) << "seed " << seed << ": " << brute.size() << " and " << listed.size();
+    found += brute.size();
+    EXPECT_LT(broad.candidates().size(), scene.all().size() / 10);
+  }
+  EXPECT_GT(found, 300u);
+}
+
+// Candidates as sets: whatever is nearer than the guaranteed range is listed, whether it becomes a contact or not.
+TEST(BroadPhase, PairsNearerThanReach_AreCandidates) {
+  Scene scene = random_scene(11, 1);
+  BroadPhase broad(Memory::standard());
+  broad.update(scene.bodies, scene.obstacles, scene.filter, scene.h, scene.offset);
+  const auto before = [](const Candidate &l, const Candidate &r) {
+    return std::tie(l.obstacle, l.slot_a, l.slot_b, l.kind, l.feature_a, l.feature_b) <
+           std::tie(r.obstacle, r.slot_a, r.slot_b, r.kind, r.feature_a, r.feature_b);
+  };
+  std::vector<Candidate> listed(broad.candidates().begin(), broad.candidates().end());
+  std::sort(listed.begin(), listed.end(), before);
+  EXPECT_EQ(std::adjacent_find(listed.begin(), listed.end(), [&](const Candidate &l, const Candidate &r) { return !before(l, r); }), listed.end())
+      << "a pair is listed twice";
+  size_t near = 0;
+  for (const Candidate &c : scene.all()) {
+    if (c.obstacle) continue;
+    const Surface &a = *scene.bodies[c.slot_a].surface, &b = *scene.bodies[c.slot_b].surface;
+    const auto xa = [&](uint32_t s) { return load3(&a.x[4 * s]); };
+    const auto xb = [&](uint32_t s) { return load3(&b.x[4 * s]); };
+    double d2;
+    if (c.kind == 0) {
+      const uint32_t *t = &b.tri[3 * c.feature_b];
+      d2 = closest_on_triangle(xa(c.feature_a), xb(t[0]), xb(t[1]), xb(t[2])).distance2;
+    } else {
+      const uint32_t *e = &a.edge[2 * c.feature_a], *f = &b.edge[2 * c.feature_b];
+      d2 = closest_segments(xa(e[0]), xa(e[1]), xb(f[0]), xb(f[1])).distance2;
+    }
+    double va = 0, vb = 0;
+    for (uint32_t s = 0; s < a.nsurfel; ++s) va = std::max(va, norm(load3(&a.v[4 * s])));
+    for (uint32_t s = 0; s < b.nsurfel; ++s) vb = std::max(vb, norm(load3(&b.v[4 * s])));
+    const double reach = contact_reach(scene.h, scene.offset, va + vb);
+    if (std::sqrt(d2) >= (c.kind == 0 ? std::max(reach, recovery_depth(b)) : reach)) continue;
+    ++near;
+    EXPECT_TRUE(std::binary_search(listed.begin(), listed.end(), c, before));
+  }
+  EXPECT_GT(near, 100u);
+}
+
+TEST(BroadPhase, MovingScene_ReusedListsMissNothing) {
+  for (unsigned seed = 1; seed <= 3; ++seed) {
+    Scene scene = random_scene(seed, 0.3);
+    scene.h = 2e-4;
+    std::mt19937 random(seed);
+    BroadPhase broad(Memory::standard());
+    size_t found = 0;
+    for (int step = 0; step < 40; ++step) {
+      broad.update(scene.bodies, scene.obstacles, scene.filter, scene.h, scene.offset);
+      const auto brute = scene.contacts();
+      ASSERT_TRUE(same_bits(brute, scene.contacts(broad.candidates()))) << "seed " << seed << " step " << step;
+      found += brute.size();
+      advance(scene, random, 0.01);
+    }
+    EXPECT_GT(found, 500u);
+    EXPECT_LT(broad.stats().renewals, 20u) << "lists should last for several steps";
+  }
+}
+
+TEST(BroadPhase, TwoSkinHistories_GiveTheSameBits) {
+  Scene scene = random_scene(5, 1);
+  scene.h = 2e-4;
+  std::mt19937 random(5), whim(6);
+  BroadPhase one(Memory::standard()), two(Memory::standard());
+  two.set_skin_steps(3);
+  for (int step = 0; step < 60; ++step) {
+    if (whim() % 5 == 0) two.clear();
+    two.set_skin_steps(double(1 + whim() % 40));
+    one.update(scene.bodies, scene.obstacles, scene.filter, scene.h, scene.offset);
+    two.update(scene.bodies, scene.obstacles, scene.filter, scene.h, scene.offset);
+    ASSERT_TRUE(same_bits(scene.contacts(one.candidates()), scene.contacts(two.candidates()))) << "step " << step;
+    advance(scene, random, 0.02);
+  }
+  EXPECT_NE(one.stats().renewals, two.stats().renewals);
+}
+
+TEST(BroadPhase, TurningPlane_IsFollowed) {
+  Scene scene;
+  scene.add(box_mesh({1, 1, 1}, 3, 3, 3));
+  scene.add(Shape::plane, {5, 0, -0.9});
+  scene.obstacles[0].spin = {0, 0.5, 0};
+  BroadPhase broad(Memory::standard());
+  size_t found = 0;
+  for (int step = 0; step < 400; ++step) {
+    broad.update(scene.bodies, scene.obstacles, scene.filter, scene.h, scene.offset);
+    const auto brute = scene.contacts();
+    ASSERT_TRUE(same_bits(brute, scene.contacts(broad.candidates()))) << "step " << step;
+    found += brute.size();
+    scene.obstacles[0].rotation = turn({0, 1, 0}, 0.5 * scene.h * (step + 1));
+  }
+  EXPECT_GT(found, 100u);
+  EXPECT_LT(broad.stats().renewals, 100u);
+}
+
+TEST(BroadPhase, CoincidentBodies_ListAllOverlaps) {
+  Scene scene;
+  const Mesh m = sphere_mesh(0.3, 1);
+  scene.add(m);
+  scene.add(m);
+  BroadPhase broad(Memory::standard());
+  broad.update(scene.bodies, scene.obstacles, scene.filter, scene.h, scene.offset);
+  const auto brute = scene.contacts();
+  EXPECT_EQ(flaw(scene, brute), "");
+  EXPECT_TRUE(same_bits(brute, scene.contacts(broad.candidates())));
+  EXPECT_GE(brute.size(), 2 * size_t{scene.bodies[0].surface->nsurfel});
+}
+
+TEST(BroadPhase, RestingScene_KeepsItsLists) {
+  Scene scene;
+  scene.add(box_mesh({1, 1, 1}, 4, 4, 4));
+  scene.add(moved(box_mesh({1, 1, 1}, 4, 4, 4), {}, {0, 0, 1.001}));
+  BroadPhase broad(Memory::standard());
+  std::mt19937 random(1);
+  for (int step = 0; step < 1000; ++step) {
+    broad.update(scene.bodies, scene.obstacles, scene.filter, scene.h, scene.offset);
+    advance(scene, random, 1e-6);
+  }
+  EXPECT_EQ(broad.stats().renewals, 1u);
+  EXPECT_EQ(broad.stats().rebuilds, 2u);
+  EXPECT_EQ(broad.stats().pairs, 1u);
+}
+
+TEST(BroadPhase, OnlyTheMovingBody_IsListedAgain) {
+  Scene scene;
+  for (int i = 0; i < 4; ++i) scene.add(moved(box_mesh({1, 1, 1}, 2, 2, 2), {}, {0, 0, 1.001 * i}));
+  Surface &fast = scene.add(moved(box_mesh({1, 1, 1}, 2, 2, 2), {}, {1.01, 0, 0}), {0, 0, 2});
+  BroadPhase broad(Memory::standard());
+  for (int step = 0; step < 600; ++step) {
+    broad.update(scene.bodies, scene.obstacles, scene.filter, scene.h, scene.offset);
+    ASSERT_TRUE(same_bits(scene.contacts(), scene.contacts(broad.candidates()))) << "step " << step;
+    for (uint32_t i = 0; i < fast.nsurfel; ++i) fast.x[4 * i + 2] += scene.h * 2;
+    step += 19;
+  }
+  EXPECT_GT(broad.stats().renewals, 1u);
+  EXPECT_EQ(broad.stats().refits, broad.stats().renewals - 1) << "only the fast body's tree is renewed";
+}
+
+TEST(BroadPhase, Filter_DecidesByMasksAndNamedPairs) {
+  Scene scene;
+  for (int i = 0; i < 3; ++i) scene.add(moved(box_mesh({1, 1, 1}, 1, 1, 1), {}, {0, 0, 1.001 * i}));
+  scene.add(Shape::plane, {0, 0, -0.501});
+  BroadPhase broad(Memory::standard());
+  const auto touching = [&] {
+    broad.update(scene.bodies, scene.obstacles, scene.filter, scene.h, scene.offset);
+    std::string pairs;
+    for (const ContactPoint &c : scene.contacts(broad.candidates())) {
+      const std::string p = std::to_string(std::min(c.slot_a, c.obstacle ? 9 : c.slot_b)) + (c.obstacle ? "p" : std::to_string(std::max(c.slot_a, c.slot_b)));
+      if (pairs.find(p) == std::string::npos) pairs += p + " ";
+    }
+    return pairs;
+  };
+  EXPECT_EQ(touching(), "01 0p 12 ");
+  scene.filter.set(101, 100, false, false);
+  EXPECT_EQ(touching(), "0p 12 ");
+  scene.bodies[0].collides_with = 2;
+  EXPECT_EQ(touching(), "12 ");
+  scene.filter.set(100, 100, true, true);
+  EXPECT_EQ(touching(), "0p 12 ") << "a named pair outranks the masks";
+  scene.filter.set(100, 101, false, true);
+  EXPECT_EQ(touching(), "01 0p 12 ");
+}
+
+TEST(BroadPhase, RemovedAndChangedBodies_AreForgotten) {
+  Scene scene;
+  for (int i = 0; i < 3; ++i) scene.add(moved(box_mesh({1, 1, 1}, 1, 1, 1), {}, {0, 0, 1.001 * i}));
+  BroadPhase broad(Memory::standard());
+  broad.update(scene.bodies, scene.obstacles, scene.filter, scene.h, scene.offset);
+  scene.bodies.erase(scene.bodies.begin() + 1);   // slots 0 and 2 stay
+  EXPECT_TRUE(broad.update(scene.bodies, scene.obstacles, scene.filter, scene.h, scene.offset));
+  EXPECT_TRUE(broad.candidates().empty());
+  scene.bodies.clear();
+  EXPECT_TRUE(broad.update(scene.bodies, scene.obstacles, scene.filter, scene.h, scene.offset) || broad.candidates().empty());
+}
+
+TEST(BroadPhase, BodyWithNaN_LeavesTheOthersAlone) {
+  Scene scene;
+  for (int i = 0; i < 3; ++i) scene.add(moved(box_mesh({1, 1, 1}, 2, 2, 2), {}, {0, 0, 1.001 * i}));
+  BroadPhase broad(Memory::standard());
+  broad.update(scene.bodies, scene.obstacles, scene.filter, scene.h, scene.offset);
+  for (double &x : scene.surfaces[0]->x) x = NAN;
+  broad.clear();
+  broad.update(scene.bodies, scene.obstacles, scene.filter, scene.h, scene.offset);
+  size_t others = 0;
+  for (const ContactPoint &c : scene.contacts(broad.candidates())) {
+    EXPECT_NE(c.slot_a, 0u);
+    EXPECT_NE(c.slot_b, 0u);
+    ++others;
+  }
+  EXPECT_GT(others, 8u);
+}
+
+// The same number of allocations in step 2 and step 200: none.
+TEST(BroadPhase, SettledUpdates_DoNotAllocate) {
+  static size_t allocations;
+  Memory counting = Memory::standard();
+  counting.alloc = [](void *, size_t bytes, size_t align) {
+    ++allocations;
+    return Memory::standard().alloc(Memory::standard().user, bytes, align);
+  };
+  Scene scene = random_scene(3, 0.5);
+  scene.h = 1e-5;
+  std::mt19937 random(3);
+  BroadPhase broad(counting);
+  Array<ContactPoint> out{HookAllocator<ContactPoint>(counting)};
+  size_t settled = 0;
+  for (int step = 0; step < 200; ++step) {
+    if (step == 100) settled = allocations;
+    broad.update(scene.bodies, scene.obstacles, scene.filter, scene.h, scene.offset);
+    find_contacts(scene.bodies, scene.obstacles, broad.candidates(), scene.h, scene.offset, out);
+    for (auto &s : scene.surfaces)       // to and fro, so that lists are renewed but do not grow
+      for (uint32_t i = 0; i < s->nsurfel; ++i) s->x[4 * i] += step % 2 ? 0.03 : -0.03;
+  }
+  EXPECT_GT(broad.stats().renewals, 100u);
+  EXPECT_EQ(allocations, settled);
+}
+
+TEST(BoxTree, Refit_BoundsDeformedTriangles) {
+  Scene scene;
+  Surface &s = scene.add(sphere_mesh(1, 3));
+  BoxTree tree(Memory::standard());
+  tree.build(s, s.x.data());
+  EXPECT_DOUBLE_EQ(tree.quality(), 1);
+  std::mt19937 random(2);
+  deform_at_random(s, random, 0.2, 0);
+  tree.refit(s, s.x.data());
+  EXPECT_GT(tree.quality(), 1.2);
+  std::vector<int> seen(s.ntri, 0);
+  for (uint32_t i = 0; i < s.ntri; ++i) ++seen[tree.triangles()[i]];
+  EXPECT_EQ(std::count(seen.begin(), seen.end(), 1), long(s.ntri));
+  for (uint32_t i = 0; i < s.ntri; ++i)
+    for (int k = 0; k < 3; ++k)
+      for (int d = 0; d < 3; ++d) {
+        const double x = s.x[4 * s.tri[3 * tree.triangles()[i] + k] + d];
+        EXPECT_LE(tree.triangle_boxes()[i].lo[d], x);
+        EXPECT_GE(tree.triangle_boxes()[i].hi[d], x);
+        EXPECT_LE(tree.root().lo[d], x);
+        EXPECT_GE(tree.root().hi[d], x);
+      }
+}
+
+}  // namespace
