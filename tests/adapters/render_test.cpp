@@ -337,7 +337,7 @@ TEST(RendererDeathTest, MissingLibraries_NameTheirPackages) {
         std::fprintf(stderr, "%s\n", why.c_str());
         std::exit(none ? 1 : 7);
       },
-      testing::ExitedWithCode(7), "no pictures: EGL.*libegl1 and libegl-mesa0; OSMesa.*libosmesa6");
+      testing::ExitedWithCode(7), "EGL.*libegl1 and libegl-mesa0; OSMesa.*libosmesa6");
 }
 
 TEST(RendererDeathTest, MissingEgl_FallsBackToOsMesa) {
