@@ -52,4 +52,12 @@ struct Shape {
 
 void axes_of(const Box &box, Vec axes[3]);
 
+// Cosines to the up direction from which a plane is the floor, and from which it is a ramp rather than a wall.
+inline constexpr double kLevel = 0.9999, kRamp = 0.3;
+// Never empty: Scene::extent, or bounds(), or a box of 2 m around the origin.
+Bounds extent_of(const Scene &scene);
+Bounds room_of(const Scene &scene, const Vec &up, const Bounds &extent);
+struct Slab { Vec centre, axes[3]; };
+Slab slab_of(const Plane &p, const Vec &up, const Bounds &extent);
+
 }  // namespace render

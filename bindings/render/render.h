@@ -81,6 +81,8 @@ struct Scene {
 Bounds bounds(const Scene &scene);
 // Three-quarter view from the front right that just holds the box.
 Camera auto_camera(const Bounds &bounds, double aspect, const double up[3]);
+// The same for the extent of a scene with its ramps and a floor that is near; what draw() takes where the scene has no camera.
+Camera auto_camera(const Scene &scene, double aspect);
 
 enum class Backend { automatic, egl, osmesa };
 

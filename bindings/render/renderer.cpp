@@ -18,7 +18,6 @@ namespace {
 
 constexpr int kKeySide = 1536, kSkySide = 160, kSamples = 4;
 constexpr uint32_t kLargest = 8192;
-constexpr double kLevel = 0.9999;  // cosine from which a plane is the floor
 
 // What host code set for its own arithmetic (rounding, traps) stays as it was: a picture may not change a simulation's bits.
 struct FloatingPoint {
@@ -95,31 +94,6 @@ Batch solid(const Look &look) {
   return b;
 }
 
-// A wall covers the box it stands beside; a ramp reaches farther, since things move along it.
-struct Slab { Vec centre, axes[3]; };
-Slab slab_of(const Plane &p, const Vec &up, const Bounds &extent) {
-  const Vec n = unit(vec(p.normal), up), across = unit(cross(up, n), square_to(n)), along = cross(n, across);
-  const Vec lo = vec(extent.lo), hi = vec(extent.hi), middle = (lo + hi) * 0.5, half = (hi - lo) * 0.5;
-  const auto reach = [&](const Vec &d) { return std::abs(d.x) * half.x + std::abs(d.y) * half.y + std::abs(d.z) * half.z; };
-  const double size = norm(half), thick = 0.02 * size;
-  const bool ramp = dot(n, up) > 0.3;
-  const double wide = ramp ? 0.9 * size : 1.02 * reach(across), high = ramp ? 1.3 * size : 1.02 * reach(along);
-  const Vec foot = middle - n * dot(n, middle - vec(p.point));
-  return {foot - n * thick, {across * std::max(wide, 0.1 * size), along * std::max(high, 0.1 * size), n * thick}};
-}
-
-// The extent with the places where planes near it lie across from its middle, so that the walls of a room meet each other and the floor.
-Bounds room_of(const Scene &scene, const Vec &up, const Bounds &extent) {
-  const Vec middle = (vec(extent.lo) + vec(extent.hi)) * 0.5;
-  const double size = norm(vec(extent.hi) - middle);
-  Bounds room = extent;
-  for (const Plane &p : scene.planes) {
-    const Vec n = unit(vec(p.normal), up), foot = middle - n * dot(n, middle - vec(p.point));
-    if (norm(foot - middle) < 1.5 * size) room.add(&foot.x);
-  }
-  return room;
-}
-
 void add_planes(const Scene &scene, Frame &frame, const Bounds &extent) {
   const Bounds room = room_of(scene, frame.up, extent);
   const Vec middle = (vec(extent.lo) + vec(extent.hi)) * 0.5;
@@ -188,26 +162,12 @@ void fit_casters(Frame &frame, const Bounds &box) {
 
 Frame compose(const Scene &scene, double aspect, double pixels_high) {
   Frame frame;
-  Bounds box = bounds(scene);
-  if (box.empty())
-    for (int k = 0; k < 3; ++k) box.lo[k] = -1, box.hi[k] = 1;
-  const Bounds extent = scene.extent && !scene.extent->empty() ? *scene.extent : box;
+  const Bounds extent = extent_of(scene);
   const Vec middle = (vec(extent.lo) + vec(extent.hi)) * 0.5;
   frame.extent = std::max(0.5 * norm(vec(extent.hi) - vec(extent.lo)), 1e-6);
   frame.up = unit(vec(scene.up));
   frame.shape.origin = middle;
-  Bounds shown = extent;
-  for (const Plane &p : scene.planes) {
-    const double slope = dot(unit(vec(p.normal), frame.up), frame.up);
-    if (slope < 0.3 || slope > kLevel) continue;
-    const Slab s = slab_of(p, frame.up, room_of(scene, frame.up, extent));
-    for (const double side : {-1.0, 1.0})
-      for (const double end : {-1.0, 1.0}) {
-        const Vec q = s.centre + s.axes[0] * side + s.axes[1] * end;
-        shown.add(&q.x);
-      }
-  }
-  frame.view = view_of(scene.camera ? *scene.camera : auto_camera(shown, aspect, scene.up));
+  frame.view = view_of(scene.camera ? *scene.camera : auto_camera(scene, aspect));
   frame.view.eye = frame.view.eye - middle;
   const Vec level = unit(frame.view.back - frame.up * dot(frame.view.back, frame.up), frame.view.up);
   frame.key = unit(frame.up * 1.15 - frame.view.right * 0.62 + level * 0.55);
@@ -227,7 +187,8 @@ Frame compose(const Scene &scene, double aspect, double pixels_high) {
   for (const Sphere &s : scene.spheres) batch(frame, solid(s.look), [&] { frame.shape.sphere(s); });
   for (const Capsule &c : scene.capsules) batch(frame, solid(c.look), [&] { frame.shape.capsule(c); });
   add_planes(scene, frame, extent);
-  fit_casters(frame, box);
+  const Bounds now = bounds(scene);
+  fit_casters(frame, now.empty() ? extent : now);
   View world = frame.view;
   world.eye = world.eye + middle;
   for (const Lines &l : scene.lines) {
@@ -594,7 +555,7 @@ std::unique_ptr<Renderer> Renderer::create(Backend backend, uint32_t width, uint
     auto renderer = std::make_unique<GlRenderer>(std::move(context), width, height);
     if (renderer->start(&reason)) return renderer;
   }
-  why = "no pictures: " + reasons[0] + (reasons[0].empty() || reasons[1].empty() ? "" : "; ") + reasons[1];
+  why = reasons[0] + (reasons[0].empty() || reasons[1].empty() ? "" : "; ") + reasons[1];
   return nullptr;
 }
 
