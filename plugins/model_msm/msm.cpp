@@ -75,7 +75,11 @@ void destroy(void *self) {
 dfm_status set_params(void *self, const double *params) {
   Body *body = static_cast<Body *>(self);
   if (!check_params(body->host, params)) return DFM_E_ARG;
-  body->apply_params(params);
+  try {
+    body->apply_params(params);
+  } catch (...) {
+    return DFM_E_NOMEM;
+  }
   return DFM_OK;
 }
 

@@ -39,10 +39,12 @@ double Body::spring_scale() const {
 void Body::take_mesh(const dfm_mesh &m) {
   npoint = m.npoint, ncell = m.ncell, nedge = m.nedge;
   mass.create(host, npoint), shape.create(host, nedge), edge_volume.create(host, nedge), edge_length.create(host, nedge);
-  edge_energy.create(host, nedge), spring_row.create(host, npoint);
+  edge_energy.create(host, nedge), rest_point.create(host, 3 * size_t(npoint));
+  weight.create(host, npoint), spring_sum.create(host, npoint), coupled.create(host, npoint), diagonal.create(host, 6 * size_t(npoint));
   edges.create(host, 2 * size_t(nedge)), cells.create(host, 4 * size_t(ncell)), cell_edge.create(host, 6 * size_t(ncell));
   cell_volume6.create(host, ncell);
   std::copy(m.mass, m.mass + npoint, mass.data());
+  std::copy(m.rest, m.rest + 3 * size_t(npoint), rest_point.data());
   std::copy(m.edges, m.edges + 2 * size_t(nedge), edges.data());
   std::copy(m.cells, m.cells + 4 * size_t(ncell), cells.data());
   for (uint32_t k = 0; m.field_keys && m.field_keys[k]; ++k)
@@ -71,10 +73,10 @@ void Body::take_mesh(const dfm_mesh &m) {
   }
 }
 
-void Body::build_blocks(const double *rest_points) {
+void Body::build_blocks() {
   Buffer<uint32_t> order, rank, begin, block_of;
   order.create(host, npoint), rank.create(host, npoint), begin.create(host, partition_capacity(npoint)), block_of.create(host, npoint);
-  nblock = partition_points(rest_points, npoint, order.data(), begin.data());
+  nblock = partition_points(rest_point.data(), npoint, order.data(), begin.data());
   for (uint32_t b = 0; b < nblock; ++b)
     for (uint32_t r = begin[b]; r < begin[b + 1]; ++r) rank[order[r]] = r, block_of[r] = b;
 
@@ -148,6 +150,7 @@ void Body::build_blocks(const double *rest_points) {
       Block &out = block[b];
       out.owned = owned, out.local = owned + nhalo, out.point = points;
       out.p = p.data() + 8 * size_t(slot_begin[b]), out.f = f.data() + 4 * size_t(slot_begin[b]);
+      out.weight = slot_weight.data() + slot_begin[b];
       out.quad = quad.data() + quads_at, out.stiffness = stiffness.data() + 4 * quads_at, out.rest = rest.data() + 4 * quads_at;
       for (uint32_t r = begin[b]; r < begin[b + 1]; ++r)
         for (uint32_t s = rows.begin[r]; s < rows.begin[r + 1]; s += 4) {
@@ -182,6 +185,7 @@ void Body::build_blocks(const double *rest_points) {
     }
     if (pass == 0) {
       point.create(host, slot_begin[nblock]);
+      slot_weight.create(host, slot_begin[nblock]);
       p.create(host, 8 * size_t(slot_begin[nblock])), f.create(host, 4 * size_t(slot_begin[nblock]));
     }
   }
@@ -204,16 +208,13 @@ void Body::build_blocks(const double *rest_points) {
 void Body::create(const dfm_host *h, const dfm_mesh &m) {
   host = h, kernels = choose_kernels(h);
   take_mesh(m);
-  build_blocks(m.rest);
+  build_blocks();
   apply_params(m.params);
 }
 
 void Body::apply_params(const double *values) {
   std::copy(values, values + kParamCount, params);
-  const double scale = spring_scale() * (young_field ? 1.0 : params[kYoung]), ratio = volume_ratio();
-  std::fill(spring_row.data(), spring_row.data() + npoint, 0.0);
-  for (uint32_t e = 0; e < nedge; ++e)
-    for (int n = 0; n < 2; ++n) spring_row[edges[2 * size_t(e) + n]] += scale * shape[e];
+  const double scale = spring_scale_of_shape(), ratio = volume_ratio();
   const Block &last = block[nblock - 1];
   const size_t nspring = 4 * size_t(last.quad + last.quads - quad.data()), ncells = size_t(last.cell + last.cells - cell.data());
   for (size_t s = 0; s < nspring; ++s) stiffness[s] = spring_edge[s] == kNone ? 0 : scale * shape[spring_edge[s]];
@@ -223,6 +224,7 @@ void Body::apply_params(const double *values) {
     // A cell that is flat at rest has no volume to keep.
     bulk[c] = cell_id[c] != kNone && v0 > 1e-12 * side * side * side ? ratio * young_of(cell_id[c]) / (36 * v0) : 0;
   }
+  find_weights();
 }
 
 }  // namespace msm

@@ -20,6 +20,7 @@ struct Block {
   const uint32_t *point;                // [local] number of the point in the host's arrays
   double *p;                            // [local,8] x y z 0 vx vy vz 0: a point with its velocity is one cache line
   double *f;                            // [local,4]
+  const double *weight;                 // [local] of the row sums, see Body::find_weights
   const Quad *quad;                     // [quads]
   const double *stiffness, *rest;       // [quads,4] N/m, m
   const Cell *cell;                     // [cells]

@@ -1,5 +1,5 @@
 // The kernels on vectors of four doubles, written once for the files that bring `v4` and its operations (msm_lanes_avx.h, or two
-// halves in msm_kernel_sse2.cpp). Everything here has internal linkage (see the house rules on wide kernels).
+// registers in msm_lanes_sse2.h). Everything here has internal linkage (see the house rules on wide kernels).
 #pragma once
 #include <stddef.h>
 
@@ -91,8 +91,8 @@ static inline void volume_cells(const Block &b) {
   }
 }
 
-// Row sums of the second derivative of a cell's energy, k (g_a sum g_b + |6V - 6V0| 3 l): g_a = 6 |dV/dx_a|, l the longest edge, which
-// bounds the three opposite edges of the row's mixed derivatives. Added to lane 0 of f.
+// Weighted row sums of the second derivative of a cell's energy, (k / w_a) (g_a sum_b g_b w_b + |6V - 6V0| l sum_{b != a} w_b):
+// g_a = 6 |dV/dx_a|, and l, the longest edge, for the opposite edge that makes each mixed derivative. Added to lane 0 of f.
 static inline void cell_rows(const Block &b) {
   for (uint32_t t = 0; t < b.cells; t += 4) {
     const Cell *c = b.cell + t;
@@ -103,12 +103,15 @@ static inline void cell_rows(const Block &b) {
     const Edges4 a = {e2.x - e1.x, e2.y - e1.y, e2.z - e1.z}, d = {e3.x - e2.x, e3.y - e2.y, e3.z - e2.z};
     const Edges4 h = {e1.x - e3.x, e1.y - e3.y, e1.z - e3.z};
     const v4 longest = sqrt4(max4(max4(max4(dot(e1, e1), dot(e2, e2)), max4(dot(e3, e3), dot(a, a))), max4(dot(d, d), dot(h, h))));
-    const v4 more = abs4(dot(e1, g1) - load4(b.volume6 + t)) * (splat(3.0) * longest), k = load4(b.bulk + t);
+    const v4 more = abs4(dot(e1, g1) - load4(b.volume6 + t)) * longest, k = load4(b.bulk + t);
+    alignas(32) double weight[4][4], row[4][4];
+    for (int n = 0; n < 4; ++n)
+      for (int m = 0; m < 4; ++m) weight[m][n] = b.weight[c[n].p[m]];
+    const v4 w0 = load4(weight[0]), w1 = load4(weight[1]), w2 = load4(weight[2]), w3 = load4(weight[3]), w = (w0 + w1) + (w2 + w3);
     const v4 n0 = sqrt4(dot(g0, g0)), n1 = sqrt4(dot(g1, g1)), n2 = sqrt4(dot(g2, g2)), n3 = sqrt4(dot(g3, g3));
-    const v4 sum = (n0 + n1) + (n2 + n3);
-    alignas(32) double row[4][4];
-    store4(row[0], k * (n0 * sum + more)), store4(row[1], k * (n1 * sum + more));
-    store4(row[2], k * (n2 * sum + more)), store4(row[3], k * (n3 * sum + more));
+    const v4 sum = (n0 * w0 + n1 * w1) + (n2 * w2 + n3 * w3);
+    store4(row[0], k * (n0 * sum + more * (w - w0)) / w0), store4(row[1], k * (n1 * sum + more * (w - w1)) / w1);
+    store4(row[2], k * (n2 * sum + more * (w - w2)) / w2), store4(row[3], k * (n3 * sum + more * (w - w3)) / w3);
     for (int n = 0; n < 4; ++n)
       for (int m = 0; m < 4; ++m) b.f[4 * size_t(c[n].p[m])] += row[m][n];
   }
