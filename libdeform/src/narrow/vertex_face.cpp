@@ -6,7 +6,8 @@
 //      X   beside a concave edge: the other face's plane,           \       |        \____
 //          its weights extrapolated                                  \      |
 //
-// Whether p is outside is told by the nearest point: over a face by its side, over an edge or corner by the face there that p sees most steeply.
+// Whether p is outside is told by the nearest point: over a face by its side, over an edge by the sum of its faces' normals, over a corner by
+// the edge there that points to p most (the point of the corner's spherical outline nearest to the direction of p lies on it).
 // From inside, only the nearest face pushes back (with the planes across concave edges): the far side of a thin body does not pull p through.
 #include <algorithm>
 
@@ -25,6 +26,7 @@ struct Near {
   bool emitted;
   double weight[3];
   Vec3 q, normal;              // closest point; unit face normal (zero for a triangle without area)
+  Vec3 emitted_normal;
   double distance, plane;      // to the triangle (>= 0); signed, to its plane
   double reach;
 };
@@ -43,6 +45,8 @@ struct Group {
   uint32_t nearest() const;
   bool has_feature(const Near &other, const Near &of) const;
   bool local_minimum(const Near &n) const;
+  Vec3 outward(const Near &n) const;
+  bool repeated(const Near &n, Vec3 normal) const;
   uint32_t steepest(const Near &n) const;
   bool plane_weights(const Near &n, double weight[3]) const;
   bool reachable_across(const Near &n, double weight[3]) const;
@@ -76,7 +80,7 @@ void Group::collect(Run run) {
     const TrianglePoint t = closest_on_triangle(p, a, b, d);
     if (!(t.distance2 <= widest2)) continue;
     const double area = std::sqrt(nn);
-    Near entry{candidate.feature_b, t.feature, false, {t.weight[0], t.weight[1], t.weight[2]}, t.point, {}, std::sqrt(t.distance2), 0, 0};
+    Near entry{candidate.feature_b, t.feature, false, {t.weight[0], t.weight[1], t.weight[2]}, t.point, {}, {}, std::sqrt(t.distance2), 0, 0};
     if (area > 0) {
       entry.normal = (1 / area) * n;
       entry.plane = dot(entry.normal, p - t.point);
@@ -110,7 +114,41 @@ bool Group::local_minimum(const Near &n) const {
   return true;
 }
 
-// The face at n's feature that the direction to p is least tangent to: its side tells inside from outside.
+// Not normalised; its side at n's closest point tells inside from outside.
+Vec3 Group::outward(const Near &n) const {
+  if (n.feature == TriangleFeature::face) return n.normal;
+  Vec3 sum;
+  const int f = int(n.feature);
+  uint32_t i0 = corners(n)[f >= 4 ? f - 4 : f - 1], i1 = corners(n)[f >= 4 ? 0 : f % 3];
+  if (f >= 4) {
+    double most = -2;
+    for (uint32_t i = 0; i < count; ++i) {
+      if (!has_feature(near[i], n)) continue;
+      for (int k = 0; k < 3; ++k) {
+        const uint32_t w = corners(near[i])[k];
+        const double c = dot(normalized(pair.xb(w) - n.q), p - n.q);
+        if (w == i0 || !(c > most || most == -2)) continue;
+        most = c;
+        i1 = w;
+      }
+    }
+  }
+  for (uint32_t i = 0; i < count; ++i) {
+    const uint32_t *c = corners(near[i]);
+    if ((c[0] == i0 || c[1] == i0 || c[2] == i0) && (c[0] == i1 || c[1] == i1 || c[2] == i1)) sum += near[i].normal;
+  }
+  return sum;
+}
+
+// Was the same closest point made a contact from another triangle, with the same normal?
+bool Group::repeated(const Near &n, Vec3 normal) const {
+  const double tiny = 1e-9 * pair.b->surface->median_edge, same = 1e-8 * n.distance * n.distance + tiny * tiny;
+  for (uint32_t j = 0; j < count; ++j)
+    if (near[j].emitted && norm2(near[j].q - n.q) <= same && norm2(near[j].emitted_normal - normal) <= 1e-6) return true;
+  return false;
+}
+
+// The face at n's feature that the direction to p is least tangent to.
 uint32_t Group::steepest(const Near &n) const {
   uint32_t best = uint32_t(&n - near);
   double most = -1;
@@ -168,35 +206,37 @@ void Group::emit(Near &n, Vec3 normal, double distance, const double weight[3], 
   place(c, p, p - distance * normal, normal, distance);
   out.push_back(c);
   n.emitted = true;
+  n.emitted_normal = normal;
 }
 
 void Group::resolve(Array<ContactPoint> &out) {
   const Near &best = near[nearest()];
   const double tiny = 1e-9 * pair.b->surface->median_edge;
-  const uint32_t steep = steepest(best);
-  const bool inside = dot(near[steep].normal, p - best.q) < 0;
+  const bool inside = dot(outward(best), p - best.q) < 0;
   uint32_t deepest = kNone;                // of the faces that p is behind, the one it is least deep below
   double weight[3];
   for (uint32_t i = 0; i < count; ++i) {
     Near &n = near[i];
     if (n.feature == TriangleFeature::face) {
       if (n.plane >= 0) {
-        if (n.plane < n.reach) emit(n, n.normal, n.plane, n.weight, out);
+        if (n.plane < n.reach && !repeated(n, n.normal)) emit(n, n.normal, n.plane, n.weight, out);
       } else if (inside && -n.plane <= depth && (deepest == kNone || n.plane > near[deepest].plane)) {
         deepest = i;
       }
       continue;
     }
-    const Vec3 f = near[steepest(n)].normal;
-    if (n.distance < n.reach && local_minimum(n) && norm2(f) > 0 && (n.distance <= tiny || dot(f, p - n.q) > 0)) {
-      bool again = false;                  // the same edge, corner or face border, from another triangle
-      for (uint32_t j = 0; j < i; ++j) again |= near[j].emitted && norm2(near[j].q - n.q) <= 1e-8 * n.distance * n.distance + tiny * tiny;
-      if (!again) emit(n, n.distance > tiny ? (1 / n.distance) * (p - n.q) : f, n.distance, n.weight, out);
-    } else if (std::fabs(n.plane) < n.reach && (inside || n.plane >= 0) && reachable_across(n, weight)) {
-      emit(n, n.normal, n.plane, weight, out);
+    bool rim = n.distance < n.reach && local_minimum(n);
+    if (rim) {
+      const Vec3 out_here = outward(n);
+      rim = norm2(out_here) > 0 && (n.distance <= tiny || dot(out_here, p - n.q) > 0);
+      const Vec3 normal = n.distance > tiny ? (1 / n.distance) * (p - n.q) : normalized(out_here);
+      if (rim && !repeated(n, normal)) emit(n, normal, n.distance, n.weight, out);
     }
+    if (!rim && std::fabs(n.plane) < n.reach && (inside || n.plane >= 0) && reachable_across(n, weight))
+      emit(n, n.normal, n.plane, weight, out);
   }
   if (!inside) return;
+  const uint32_t steep = steepest(best);
   if (deepest != kNone) {
     emit(near[deepest], near[deepest].normal, near[deepest].plane, near[deepest].weight, out);
   } else if (best.distance <= depth && best.feature != TriangleFeature::face && !near[steep].emitted && plane_weights(near[steep], weight)) {
