@@ -113,17 +113,18 @@ class Lint(unittest.TestCase):
     def test_every_rule_has_a_bad_case(self):
         self.assertEqual(set(BAD), set(lint.RULES))
 
-    def test_weak_and_unmarked_kernel_symbols_are_found(self):
+    def test_bad_kernel_objects_are_found(self):
         root = pathlib.Path(self.enterContext(tempfile.TemporaryDirectory()))
-        source = "inline int weak() { return 1; }\nint entry() { return weak(); }\nint entry_avx2() { return weak(); }\n"
+        source = ("inline int weak() { return 1; }\nint entry() { return weak(); }\n"
+                  "__attribute__((target(\"fma\"))) double fused_avx2(double a) { return __builtin_fma(a, a, a); }\n")
         (root / "a_kernel_avx2.cpp").write_text(source)
         target = root / "a_kernel_avx2.cpp.o"
         compiler = os.environ.get("CXX", "c++")
         subprocess.run([compiler, "-O0", "-c", root / "a_kernel_avx2.cpp", "-o", target], check=True)
-        found = kernel_objects.check("nm", [target])
-        self.assertEqual(len(found), 2, found)
-        self.assertIn("weak symbol", "".join(found))
-        self.assertIn("external symbol _Z5entryv", "".join(found))
+        found = kernel_objects.check("nm", "objdump", [target])
+        self.assertEqual(len(found), 3, found)
+        for part in ("weak symbol", "external symbol _Z5entryv", "instruction vfmadd"):
+            self.assertIn(part, "".join(found))
 
 
 if __name__ == "__main__":
