@@ -343,7 +343,7 @@ struct Reference : Coulomb {
     int compared = 0;
     for (size_t i = 1; i < rows.size(); ++i) {
       const double slip = std::stod(rows[i][size_t(v)]), expected = std::stod(rows[i][size_t(f)]);
-      if (slip == 0) continue;
+      if (std::fabs(slip) < 1e-15) continue;  // set-valued: the file holds sin(k pi) to rounding, and F = 0 there
       EXPECT_NEAR(-slide(*ops, dev, 9.8, slip, 0).fx, expected, 2e-12) << "row " << i;
       ++compared;
     }

@@ -95,6 +95,82 @@ void sweep(ContactRows &rows, const ContactState &law, double h) {
   }
 }
 
+Acceleration::Acceleration(const Memory &m) {
+  for (Array<double> *a : {&metric_, &from_, &f_, &g_, &df_, &dg_}) *a = Array<double>(HookAllocator<double>(m));
+}
+
+void Acceleration::start(const ContactRows &rows) {
+  n_ = 3 * rows.n, count_ = next_ = 0, first_ = true, last_ = 0;
+  metric_.resize(n_), f_.resize(n_), g_.resize(n_), df_.resize(size_t(kWindow) * n_), dg_.resize(size_t(kWindow) * n_);
+  for (uint32_t i = 0; i < rows.n; ++i) {
+    metric_[3 * i] = std::sqrt(rows.wn[i]);
+    metric_[3 * i + 1] = metric_[3 * i + 2] = std::sqrt(rows.wt[i]);
+  }
+  from_.assign(rows.impulse.begin(), rows.impulse.end());
+}
+
+// gamma that makes |f - sum gamma_j df_j| least: normal equations by Cholesky, slightly regularised. False: not usable.
+bool Acceleration::combine(const double *f, double *gamma) const {
+  double l[kWindow][kWindow], y[kWindow], trace = 0;
+  for (uint32_t j = 0; j < count_; ++j) trace += gram_[j][j];
+  for (uint32_t j = 0; j < count_; ++j) {
+    double dot = 0;
+    for (uint32_t k = 0; k < n_; ++k) dot += df_[size_t(j) * n_ + k] * f[k];
+    y[j] = dot;
+  }
+  for (uint32_t j = 0; j < count_; ++j) {
+    for (uint32_t k = 0; k <= j; ++k) {
+      double sum = gram_[j][k] + (j == k ? 1e-12 * trace : 0);
+      for (uint32_t m = 0; m < k; ++m) sum -= l[j][m] * l[k][m];
+      if (j != k) l[j][k] = sum / l[k][k];
+      else if (sum > 0) l[j][j] = std::sqrt(sum);
+      else return false;
+    }
+    for (uint32_t k = 0; k < j; ++k) y[j] -= l[j][k] * y[k];
+    y[j] /= l[j][j];
+  }
+  for (uint32_t j = count_; j-- > 0;) {
+    for (uint32_t k = j + 1; k < count_; ++k) y[j] -= l[k][j] * gamma[k];
+    gamma[j] = y[j] / l[j][j];
+  }
+  return true;
+}
+
+void Acceleration::follow(ContactRows &rows) {
+  double size = 0;
+  for (uint32_t k = 0; k < n_; ++k) {
+    const double f = metric_[k] * (rows.impulse[k] - from_[k]);
+    if (!first_) df_[size_t(next_) * n_ + k] = f - f_[k], dg_[size_t(next_) * n_ + k] = rows.impulse[k] - g_[k];
+    f_[k] = f, g_[k] = rows.impulse[k];
+    size += f * f;
+  }
+  if (!first_ && size > 4 * last_) {        // the map has changed under us (contacts opened or began to slip): what was learned is void
+    count_ = next_ = 0;
+  } else if (!first_) {
+    count_ = std::max(count_, next_ + 1);
+    for (uint32_t j = 0; j < count_; ++j) {
+      double dot = 0;
+      for (uint32_t k = 0; k < n_; ++k) dot += df_[size_t(j) * n_ + k] * df_[size_t(next_) * n_ + k];
+      gram_[j][next_] = gram_[next_][j] = dot;
+    }
+    next_ = (next_ + 1) % kWindow;
+  }
+  first_ = false, last_ = size;
+
+  double gamma[kWindow] = {};
+  if (count_ > 0 && combine(f_.data(), gamma)) {
+    for (uint32_t i = 0; i < rows.n; ++i) {
+      Vec3 jump;
+      for (uint32_t c = 0; c < 3; ++c)
+        for (uint32_t j = 0; j < count_; ++j) jump[int(c)] -= gamma[j] * dg_[size_t(j) * n_ + 3 * i + c];
+      if (jump.x == 0 && jump.y == 0 && jump.z == 0) continue;
+      rows.apply(i, jump);
+      for (uint32_t c = 0; c < 3; ++c) rows.impulse[3 * i + c] += jump[int(c)];
+    }
+  }
+  from_.assign(rows.impulse.begin(), rows.impulse.end());
+}
+
 Residual inner_residual(const ContactRows &rows, const ContactState &law, double h) {
   Residual r;
   for (uint32_t i = 0; i < rows.n; ++i) {

@@ -74,10 +74,13 @@ bool World::stage_solve(uint32_t *trouble) {
       if (residual.max() <= tolerance || sweeps >= def.max_sweeps || passes > def.max_passes) break;
     }
     // at least one sweep on a warm start is part of the method
-    do {
+    acceleration.start(rows);
+    for (;;) {
       sweep(rows, state, h);
       ++sweeps;
-    } while (sweeps < def.max_sweeps && inner_residual(rows, state, h).max() > 0.5 * tolerance);
+      if (sweeps >= def.max_sweeps || inner_residual(rows, state, h).max() <= 0.5 * tolerance) break;
+      acceleration.follow(rows);
+    }
   }
   double poison = 0;
   for (double l : rows.impulse) poison += 0.0 * l;

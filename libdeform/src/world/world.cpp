@@ -26,7 +26,7 @@ Pose Obstacle::pose_at_time(double t) const {
 }
 
 World::World(dfm_context *c)
-    : context(c), broad(c->memory), rows(c->memory), store(c->memory), next_store(c->memory), batches(c->memory) {
+    : context(c), broad(c->memory), rows(c->memory), acceleration(c->memory), store(c->memory), next_store(c->memory), batches(c->memory) {
   const Memory &m = c->memory;
   auto use = [&](auto &...arrays) { ((arrays = std::decay_t<decltype(arrays)>(typename std::decay_t<decltype(arrays)>::allocator_type(m))), ...); };
   use(contacts, tangents, match, block_surfels, block_impulse, block_velocity, report.contacts, report.frame, report.impulse, report.slip, report.mode,

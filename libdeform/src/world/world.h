@@ -128,6 +128,7 @@ struct World {
   Array<ContactPoint> contacts;
   ContactRows rows;
   ContactState state;
+  Acceleration acceleration;
   ContactStore store, next_store;
   LawBatches batches;
   Array<double> tangents;
