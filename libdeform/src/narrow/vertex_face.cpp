@@ -41,6 +41,7 @@ struct Group {
   explicit Group(const Pair &of) : pair(of), depth(recovery_depth(*of.b->surface)) {}
 
   const uint32_t *corners(const Near &n) const { return &pair.b->surface->tri[3 * size_t{n.tri}]; }
+  bool reaches(Run run, double widest2) const;
   void collect(Run run);
   uint32_t nearest() const;
   bool has_feature(const Near &other, const Near &of) const;
@@ -54,41 +55,52 @@ struct Group {
   void resolve(Array<ContactPoint> &out);
 };
 
-void keep_nearest(Near *near, uint32_t &count, const Near &n) {
-  if (count < kMost) {
-    near[count++] = n;
-    return;
-  }
-  // Full (a surface folded onto itself): the farthest leaves, order of triangles stays.
+// Place for a new entry; where all are taken (a surface folded onto itself), that of the farthest, or null. The order of triangles stays.
+Near *place_for(Near *near, uint32_t &count, double distance) {
+  if (count < kMost) return &near[count++];
   uint32_t far = 0;
   for (uint32_t i = 1; i < count; ++i)
     if (near[i].distance >= near[far].distance) far = i;
-  if (!(n.distance < near[far].distance)) return;
+  if (!(distance < near[far].distance)) return nullptr;
   std::copy(near + far + 1, near + count, near + far);
-  near[count - 1] = n;
+  return &near[count - 1];
+}
+
+// Is p within reach of a plane, or behind one, so that it is worth looking closer? In front of all faces beyond the reach, p is outside and free.
+bool Group::reaches(Run run, double widest2) const {
+  const double depth2 = depth * depth;
+  bool any = false;
+  for (const Candidate &candidate : run) {
+    const uint32_t *c = &pair.b->surface->tri[3 * size_t{candidate.feature_b}];
+    const Vec3 a = pair.xb(c[0]), n = cross(pair.xb(c[1]) - a, pair.xb(c[2]) - a);
+    const double s = dot(n, p - a);
+    any |= s * s <= (s < 0 ? std::max(widest2, depth2) : widest2) * norm2(n);
+  }
+  return any;
 }
 
 void Group::collect(Run run) {
+  count = 0;
   const Vec3 v = pair.va(surfel);
-  const double widest = std::max(contact_reach(pair.h, pair.offset, norm(v) + pair.speed_b), depth), widest2 = widest * widest;
+  const double reach = contact_reach(pair.h, pair.offset, norm(v) + pair.speed_b);
+  if (!reaches(run, reach * reach)) return;
+  const double widest = std::max(reach, depth), widest2 = widest * widest;
   for (const Candidate &candidate : run) {
     const uint32_t *c = &pair.b->surface->tri[3 * size_t{candidate.feature_b}];
     const Vec3 a = pair.xb(c[0]), b = pair.xb(c[1]), d = pair.xb(c[2]);
-    const Vec3 n = cross(b - a, d - a);
-    const double s = dot(n, p - a), nn = norm2(n);
-    if (!(s * s <= widest2 * nn)) continue;
     const TrianglePoint t = closest_on_triangle(p, a, b, d);
     if (!(t.distance2 <= widest2)) continue;
-    const double area = std::sqrt(nn);
-    Near entry{candidate.feature_b, t.feature, false, {t.weight[0], t.weight[1], t.weight[2]}, t.point, {}, {}, std::sqrt(t.distance2), 0, 0};
-    if (area > 0) {
-      entry.normal = (1 / area) * n;
-      entry.plane = dot(entry.normal, p - t.point);
-    }
+    const double distance = std::sqrt(t.distance2);
+    Near *n = place_for(near, count, distance);
+    if (!n) continue;
+    n->tri = candidate.feature_b, n->feature = t.feature, n->emitted = false;
+    for (int k = 0; k < 3; ++k) n->weight[k] = t.weight[k];
+    n->q = t.point, n->distance = distance;
+    n->normal = normalized(cross(b - a, d - a));
+    n->plane = dot(n->normal, p - t.point);
     double speed2 = 0;
     for (int k = 0; k < 3; ++k) speed2 = std::max(speed2, norm2(v - pair.vb(c[k])));
-    entry.reach = contact_reach(pair.h, pair.offset, std::sqrt(speed2));
-    keep_nearest(near, count, entry);
+    n->reach = contact_reach(pair.h, pair.offset, std::sqrt(speed2));
   }
 }
 
@@ -255,7 +267,6 @@ void vertex_face(const Pair &pair, Run run, Array<ContactPoint> &out) {
     while (end < run.size() && run[end].feature_a == run[i].feature_a) ++end;
     group.surfel = run[i].feature_a;
     group.p = pair.xa(group.surfel);
-    group.count = 0;
     group.collect(run.subspan(i, end - i));
     i = end;
     if (!group.count) continue;
