@@ -151,7 +151,8 @@ class Runner {
       if (frame_due) frames_->draw(t);
       mark_ = {wall_seconds(), cpu_seconds()};
     }
-    if (result_.steps % 16 == 0) progress_.show(t - result_.start, duration_, result_.steps ? double(result_.steps) / (result_.wall + wall_seconds() - mark_.wall) : 0);
+    if (result_.steps % 16 == 0)
+      progress_.show(t - result_.start, duration_, result_.steps ? double(result_.steps) / (result_.wall + wall_seconds() - mark_.wall) : 0);
   }
 
   void count_time() {
