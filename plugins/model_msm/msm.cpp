@@ -26,7 +26,8 @@ bool check_params(const dfm_host *h, const double *values) {
   for (uint32_t n = 0; n < kParamCount; ++n)
     if (!(values[n] >= kParams[n].min && values[n] <= kParams[n].max)) {
       char text[200];
-      snprintf(text, sizeof text, "parameter %s = %g %s is outside %g .. %g", kParams[n].key, values[n], kParams[n].unit, kParams[n].min, kParams[n].max);
+      const dfm_param &p = kParams[n];
+      snprintf(text, sizeof text, "parameter %s = %g %s is outside %g .. %g", p.key, values[n], p.unit, p.min, p.max);
       complain(h, text);
       return false;
     }
@@ -75,7 +76,11 @@ void destroy(void *self) {
 dfm_status set_params(void *self, const double *params) {
   Body *body = static_cast<Body *>(self);
   if (!check_params(body->host, params)) return DFM_E_ARG;
-  body->apply_params(params);
+  try {
+    body->apply_params(params);
+  } catch (...) {
+    return DFM_E_NOMEM;
+  }
   return DFM_OK;
 }
 

@@ -8,12 +8,6 @@
 namespace msm {
 namespace {
 
-struct Call {
-  Body *body;
-  const dfm_kin *k;
-  double *f;
-};
-
 void force_pass(void *user, uint32_t begin, uint32_t end) {
   const Call &call = *static_cast<const Call *>(user);
   Body &body = *call.body;
@@ -39,24 +33,6 @@ void merge_pass(void *user, uint32_t begin, uint32_t end) {
       for (int a = 0; a < 3; ++a) b.f[4 * size_t(i) + a] -= c * v[a];
     }
     body.kernels->store(b, call.f, call.k->stride);
-  }
-}
-
-void row_pass(void *user, uint32_t begin, uint32_t end) {
-  const Call &call = *static_cast<const Call *>(user);
-  for (uint32_t n = begin; n < end; ++n) {
-    call.body->kernels->load(call.body->block[n], call.k->x, nullptr, call.k->stride);
-    call.body->kernels->cell_rows(call.body->block[n]);
-  }
-}
-
-void merge_row_pass(void *user, uint32_t begin, uint32_t end) {
-  const Call &call = *static_cast<const Call *>(user);
-  Body &body = *call.body;
-  for (uint32_t n = begin; n < end; ++n) {
-    const Block &b = body.block[n];
-    body.kernels->merge(body.f.data(), body.merge.data() + body.merge_begin[n], body.merge_begin[n + 1] - body.merge_begin[n]);
-    for (uint32_t i = 0; i < b.owned; ++i) call.f[b.point[i]] += b.f[4 * size_t(i)];
   }
 }
 
@@ -88,11 +64,16 @@ void Body::add_forces(const dfm_kin &k, double *f_out) {
   for_each_block(merge_pass, &call);
 }
 
+double Body::stretch_of(uint32_t e, const dfm_kin &k) const {
+  const uint32_t *ends = edges.data() + 2 * size_t(e);
+  return length_of(k.x + size_t(k.stride) * ends[0], k.x + size_t(k.stride) * ends[1]) - edge_length[e];
+}
+
 double Body::energy(const dfm_kin &k) const {
   double springs = 0, volumes = 0;
-  const double scale = spring_scale() * (young_field ? 1.0 : params[kYoung]);
+  const double scale = spring_scale_of_shape();
   for (uint32_t e = 0; e < nedge; ++e) {
-    const double stretch = length_of(k.x + size_t(k.stride) * edges[2 * size_t(e)], k.x + size_t(k.stride) * edges[2 * size_t(e) + 1]) - edge_length[e];
+    const double stretch = stretch_of(e, k);
     springs += 0.5 * (scale * shape[e]) * (stretch * stretch);
   }
   if (has_volume())
@@ -108,9 +89,9 @@ double Body::energy(const dfm_kin &k) const {
 }
 
 void Body::cell_energy(const dfm_kin &k, double *density) {
-  const double scale = spring_scale() * (young_field ? 1.0 : params[kYoung]), ratio = volume_ratio();
+  const double scale = spring_scale_of_shape(), ratio = volume_ratio();
   for (uint32_t e = 0; e < nedge; ++e) {
-    const double stretch = length_of(k.x + size_t(k.stride) * edges[2 * size_t(e)], k.x + size_t(k.stride) * edges[2 * size_t(e) + 1]) - edge_length[e];
+    const double stretch = stretch_of(e, k);
     edge_energy[e] = edge_volume[e] > 0 ? 0.5 * (scale * shape[e]) * (stretch * stretch) / edge_volume[e] : 0;
   }
   for (uint32_t c = 0; c < ncell; ++c) {
@@ -124,19 +105,6 @@ void Body::cell_energy(const dfm_kin &k, double *density) {
     }
     density[c] = sum;
   }
-}
-
-// Block row sums of stiffness and damping, see doc/models/msm.md: with h^2 ksum + 2 h csum <= 4 m in every row no step grows.
-void Body::bound(const dfm_kin &k, double *ksum, double *csum) {
-  const double damp = params[kDampingStiffness], drag = params[kDampingMass];
-  for (uint32_t i = 0; i < npoint; ++i) {
-    ksum[i] += 2 * spring_row[i];
-    csum[i] += damp * (2 * spring_row[i]) + drag * mass[i];
-  }
-  if (!has_volume()) return;
-  Call call{this, &k, ksum};
-  for_each_block(row_pass, &call);
-  for_each_block(merge_row_pass, &call);
 }
 
 }  // namespace msm

@@ -54,12 +54,14 @@ struct Body {
   Buffer<uint32_t> edges, cells, cell_edge;
   Buffer<double> cell_young, cell_volume6;  // cell_young: empty without a field
   bool young_field = false;
-  Buffer<double> spring_row;  // [npoint] sum of the stiffness of the springs at the point
+  Buffer<double> rest_point;           // [npoint,3]
+  Buffer<double> weight;               // [npoint] of the row sums
+  Buffer<double> spring_sum, coupled;  // [npoint] sum of the springs' stiffness k; sum of k w_other / w_own
 
   // In block order.
   Buffer<Block> block;
   Buffer<uint32_t> point, spring_edge, cell_id;
-  Buffer<double> p, f, stiffness, rest, bulk, volume6;
+  Buffer<double> p, f, stiffness, rest, bulk, volume6, slot_weight, row;
   Buffer<Quad> quad;
   Buffer<Cell> cell;
   Buffer<Merge> merge;  // by owning block
@@ -81,8 +83,26 @@ struct Body {
 
  private:
   void take_mesh(const dfm_mesh &m);
-  void build_blocks(const double *rest_points);
+  struct Layout;
+  void build_blocks();
+  void order_springs(Layout &l) const;
+  void order_cells(Layout &l) const;
+  uint32_t high_rank(const Layout &l, uint32_t e) const;
+  uint32_t find_halo(Layout &l, uint32_t b) const;
+  size_t fill_springs(const Layout &l, Block &out, uint32_t b, size_t quads_at);
+  size_t fill_cells(const Layout &l, Block &out, uint32_t b, size_t cells_at);
+  void build_merge(const Layout &l);
+  void find_weights();
+  double stretch_of(uint32_t e, const dfm_kin &k) const;
+  double spring_scale_of_shape() const { return spring_scale() * (young_field ? 1.0 : params[kYoung]); }
   void for_each_block(void (*fn)(void *, uint32_t, uint32_t), void *user);
+};
+
+// What the passes over blocks hand on to their pieces.
+struct Call {
+  Body *body;
+  const dfm_kin *k;
+  double *f;
 };
 
 // Order of the points by recursive bisection and where each block begins in it. See msm_partition.cpp.

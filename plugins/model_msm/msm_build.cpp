@@ -20,11 +20,6 @@ uint32_t find_edge(const uint32_t *edges, uint32_t nedge, uint32_t i, uint32_t j
   return found ? lo : Body::kNone;
 }
 
-// Springs by the point of lower rank, the others' ranks ascending; cells by block.
-struct Rows {
-  Buffer<uint32_t> begin, edge;
-};
-
 }  // namespace
 
 // Scale of the springs that keeps Young's modulus when the volume term is on: springs give lambda = mu, the term adds kV to
@@ -39,10 +34,12 @@ double Body::spring_scale() const {
 void Body::take_mesh(const dfm_mesh &m) {
   npoint = m.npoint, ncell = m.ncell, nedge = m.nedge;
   mass.create(host, npoint), shape.create(host, nedge), edge_volume.create(host, nedge), edge_length.create(host, nedge);
-  edge_energy.create(host, nedge), spring_row.create(host, npoint);
+  edge_energy.create(host, nedge), rest_point.create(host, 3 * size_t(npoint));
+  weight.create(host, npoint), spring_sum.create(host, npoint), coupled.create(host, npoint);
   edges.create(host, 2 * size_t(nedge)), cells.create(host, 4 * size_t(ncell)), cell_edge.create(host, 6 * size_t(ncell));
   cell_volume6.create(host, ncell);
   std::copy(m.mass, m.mass + npoint, mass.data());
+  std::copy(m.rest, m.rest + 3 * size_t(npoint), rest_point.data());
   std::copy(m.edges, m.edges + 2 * size_t(nedge), edges.data());
   std::copy(m.cells, m.cells + 4 * size_t(ncell), cells.data());
   for (uint32_t k = 0; m.field_keys && m.field_keys[k]; ++k)
@@ -55,7 +52,9 @@ void Body::take_mesh(const dfm_mesh &m) {
     edge_length[e] = length_of(m.rest + 3 * size_t(edges[2 * size_t(e)]), m.rest + 3 * size_t(edges[2 * size_t(e) + 1]));
   for (uint32_t c = 0; c < ncell; ++c) {
     const uint32_t *q = m.cells + 4 * size_t(c);
-    cell_volume6[c] = volume6_of(m.rest + 3 * size_t(q[0]), m.rest + 3 * size_t(q[1]), m.rest + 3 * size_t(q[2]), m.rest + 3 * size_t(q[3]));
+    const double *x[4];
+    for (int a = 0; a < 4; ++a) x[a] = m.rest + 3 * size_t(q[a]);
+    cell_volume6[c] = volume6_of(x[0], x[1], x[2], x[3]);
     const double volume = __builtin_fabs(cell_volume6[c]) / 6;
     for (int n = 0; n < 6; ++n) {
       const uint32_t e = find_edge(edges.data(), nedge, q[kEdgeOf[n][0]], q[kEdgeOf[n][1]]);
@@ -71,149 +70,178 @@ void Body::take_mesh(const dfm_mesh &m) {
   }
 }
 
-void Body::build_blocks(const double *rest_points) {
-  Buffer<uint32_t> order, rank, begin, block_of;
-  order.create(host, npoint), rank.create(host, npoint), begin.create(host, partition_capacity(npoint)), block_of.create(host, npoint);
-  nblock = partition_points(rest_points, npoint, order.data(), begin.data());
-  for (uint32_t b = 0; b < nblock; ++b)
-    for (uint32_t r = begin[b]; r < begin[b + 1]; ++r) rank[order[r]] = r, block_of[r] = b;
+// What leads from the mesh to the blocks; a rank is a point's place in the order of partition_points.
+struct Body::Layout {
+  Buffer<uint32_t> order, rank, begin, block_of;    // points by rank, ranks by point, first rank of each block, block of a rank
+  Buffer<uint32_t> row, edge;                       // springs by their end of lower rank, other ends ascending
+  Buffer<uint32_t> cell_order, cell_begin;          // cells by block
+  Buffer<uint32_t> mark, local, halo;               // last block that saw a rank, its number there, ranks outside the block
+};
 
-  Rows rows;  // springs by their end of lower rank
-  rows.begin.create(host, size_t(npoint) + 1), rows.edge.create(host, nedge);
-  const auto low = [&](uint32_t e) { return std::min(rank[edges[2 * size_t(e)]], rank[edges[2 * size_t(e) + 1]]); };
-  const auto high = [&](uint32_t e) { return std::max(rank[edges[2 * size_t(e)]], rank[edges[2 * size_t(e) + 1]]); };
-  for (uint32_t e = 0; e < nedge; ++e) rows.edge[e] = e;
-  std::sort(rows.edge.data(), rows.edge.data() + nedge, [&](uint32_t a, uint32_t b) {
-    return low(a) != low(b) ? low(a) < low(b) : high(a) < high(b);
+void Body::order_springs(Layout &l) const {
+  l.row.create(host, size_t(npoint) + 1), l.edge.create(host, nedge);
+  const auto low = [&](uint32_t e) { return std::min(l.rank[edges[2 * size_t(e)]], l.rank[edges[2 * size_t(e) + 1]]); };
+  for (uint32_t e = 0; e < nedge; ++e) l.edge[e] = e;
+  std::sort(l.edge.data(), l.edge.data() + nedge, [&](uint32_t a, uint32_t b) {
+    return low(a) != low(b) ? low(a) < low(b) : high_rank(l, a) < high_rank(l, b);
   });
-  for (uint32_t e = 0; e < nedge; ++e) ++rows.begin[low(e) + 1];
-  for (uint32_t r = 0; r < npoint; ++r) rows.begin[r + 1] += rows.begin[r];
+  for (uint32_t e = 0; e < nedge; ++e) ++l.row[low(e) + 1];
+  for (uint32_t r = 0; r < npoint; ++r) l.row[r + 1] += l.row[r];
+}
 
-  Buffer<uint32_t> cell_order, cell_block, cell_begin;  // cells by the block that owns most of their points, the first of equals
-  cell_order.create(host, ncell), cell_block.create(host, ncell), cell_begin.create(host, size_t(nblock) + 1);
+uint32_t Body::high_rank(const Layout &l, uint32_t e) const {
+  return std::max(l.rank[edges[2 * size_t(e)]], l.rank[edges[2 * size_t(e) + 1]]);
+}
+
+// A cell goes to the block that owns most of its points, the first of equals; within the block by its lowest rank.
+void Body::order_cells(Layout &l) const {
+  Buffer<uint32_t> block_of_cell;
+  l.cell_order.create(host, ncell), block_of_cell.create(host, ncell), l.cell_begin.create(host, size_t(nblock) + 1);
   const auto lowest = [&](uint32_t c) {
     const uint32_t *q = cells.data() + 4 * size_t(c);
-    return std::min(std::min(rank[q[0]], rank[q[1]]), std::min(rank[q[2]], rank[q[3]]));
+    return std::min(std::min(l.rank[q[0]], l.rank[q[1]]), std::min(l.rank[q[2]], l.rank[q[3]]));
   };
   for (uint32_t c = 0; c < ncell; ++c) {
     uint32_t of[4], best = 0, best_count = 0;
-    for (int n = 0; n < 4; ++n) of[n] = block_of[rank[cells[4 * size_t(c) + n]]];
+    for (int n = 0; n < 4; ++n) of[n] = l.block_of[l.rank[cells[4 * size_t(c) + n]]];
     std::sort(of, of + 4);
     for (uint32_t n = 0; n < 4; ++n) {
       const uint32_t count = uint32_t(std::count(of, of + 4, of[n]));
       if (count > best_count) best = of[n], best_count = count;
     }
-    cell_order[c] = c, cell_block[c] = best, ++cell_begin[best + 1];
+    l.cell_order[c] = c, block_of_cell[c] = best, ++l.cell_begin[best + 1];
   }
-  for (uint32_t b = 0; b < nblock; ++b) cell_begin[b + 1] += cell_begin[b];
-  std::sort(cell_order.data(), cell_order.data() + ncell, [&](uint32_t a, uint32_t b) {
-    if (cell_block[a] != cell_block[b]) return cell_block[a] < cell_block[b];
+  for (uint32_t b = 0; b < nblock; ++b) l.cell_begin[b + 1] += l.cell_begin[b];
+  std::sort(l.cell_order.data(), l.cell_order.data() + ncell, [&](uint32_t a, uint32_t b) {
+    if (block_of_cell[a] != block_of_cell[b]) return block_of_cell[a] < block_of_cell[b];
     return lowest(a) != lowest(b) ? lowest(a) < lowest(b) : a < b;
   });
+}
 
-  // Sizes, then one allocation per array, then each block's share.
-  size_t nquad = 0, ncells = 0;
-  for (uint32_t b = 0; b < nblock; ++b) {
-    for (uint32_t r = begin[b]; r < begin[b + 1]; ++r) nquad += (rows.begin[r + 1] - rows.begin[r] + 3) / 4;
-    nquad += nquad % 2;
-  }
-  for (uint32_t b = 0; b < nblock; ++b) ncells += (cell_begin[b + 1] - cell_begin[b] + 7) / 8 * 8;
-  block.create(host, nblock), slot_begin.create(host, size_t(nblock) + 1), merge_begin.create(host, size_t(nblock) + 1);
-  quad.create(host, nquad), stiffness.create(host, 4 * nquad), rest.create(host, 4 * nquad), spring_edge.create(host, 4 * nquad);
-  cell.create(host, ncells), bulk.create(host, ncells), volume6.create(host, ncells), cell_id.create(host, ncells);
+// Ranks outside block b that its springs and cells touch, ascending, in l.halo; returns how many.
+uint32_t Body::find_halo(Layout &l, uint32_t b) const {
+  uint32_t n = 0;
+  const auto see = [&](uint32_t r) {
+    if (l.block_of[r] != b && l.mark[r] != b) l.mark[r] = b, l.halo[n++] = r;
+  };
+  for (uint32_t s = l.row[l.begin[b]]; s < l.row[l.begin[b + 1]]; ++s) see(high_rank(l, l.edge[s]));
+  for (uint32_t c = l.cell_begin[b]; c < l.cell_begin[b + 1]; ++c)
+    for (int a = 0; a < 4; ++a) see(l.rank[cells[4 * size_t(l.cell_order[c]) + a]]);
+  std::sort(l.halo.data(), l.halo.data() + n);
+  return n;
+}
 
-  Buffer<uint32_t> mark, local, halo;  // mark: last block that saw a point; local: its number there
-  mark.create(host, npoint), local.create(host, npoint), halo.create(host, npoint);
-  for (int pass = 0; pass < 2; ++pass) {  // first count the slots, then fill
-    std::fill(mark.data(), mark.data() + npoint, kNone);
-    size_t quads_at = 0, cells_at = 0;
-    for (uint32_t b = 0; b < nblock; ++b) {
-      const uint32_t owned = begin[b + 1] - begin[b];
-      uint32_t nhalo = 0;
-      const auto see = [&](uint32_t r) {
-        if (block_of[r] != b && mark[r] != b) mark[r] = b, halo[nhalo++] = r;
-      };
-      for (uint32_t s = rows.begin[begin[b]]; s < rows.begin[begin[b + 1]]; ++s) see(high(rows.edge[s]));
-      for (uint32_t c = cell_begin[b]; c < cell_begin[b + 1]; ++c)
-        for (int n = 0; n < 4; ++n) see(rank[cells[4 * size_t(cell_order[c]) + n]]);
-      if (pass == 0) {
-        slot_begin[b + 1] = slot_begin[b] + owned + nhalo;
-        continue;
-      }
-      std::sort(halo.data(), halo.data() + nhalo);
-      uint32_t *const points = point.data() + slot_begin[b];
-      for (uint32_t r = begin[b]; r < begin[b + 1]; ++r) local[r] = r - begin[b], points[r - begin[b]] = order[r];
-      for (uint32_t n = 0; n < nhalo; ++n) local[halo[n]] = owned + n, points[owned + n] = order[halo[n]];
-
-      Block &out = block[b];
-      out.owned = owned, out.local = owned + nhalo, out.point = points;
-      out.p = p.data() + 8 * size_t(slot_begin[b]), out.f = f.data() + 4 * size_t(slot_begin[b]);
-      out.quad = quad.data() + quads_at, out.stiffness = stiffness.data() + 4 * quads_at, out.rest = rest.data() + 4 * quads_at;
-      for (uint32_t r = begin[b]; r < begin[b + 1]; ++r)
-        for (uint32_t s = rows.begin[r]; s < rows.begin[r + 1]; s += 4) {
-          Quad &q = quad[quads_at];
-          q.i = local[r];
-          for (uint32_t n = 0; n < 4; ++n) {  // filled up with the row's first end: no stiffness, and no point of another row
-            const bool real = s + n < rows.begin[r + 1];
-            const uint32_t e = rows.edge[real ? s + n : rows.begin[r]];
-            q.j[n] = local[high(e)];
-            spring_edge[4 * quads_at + n] = real ? e : kNone;
-            rest[4 * quads_at + n] = real ? edge_length[e] : 0;
-          }
-          ++quads_at;
-        }
-      if (quads_at % 2) {  // the widest kernel takes two quads at a time
-        quad[quads_at] = quad[quads_at - 1];
-        std::fill_n(spring_edge.data() + 4 * quads_at, 4, kNone);
-        ++quads_at;
-      }
-      out.quads = uint32_t(quad.data() + quads_at - out.quad);
-
-      out.cell = cell.data() + cells_at, out.bulk = bulk.data() + cells_at, out.volume6 = volume6.data() + cells_at;
-      out.cells = (cell_begin[b + 1] - cell_begin[b] + 7) / 8 * 8;
-      for (uint32_t n = 0; n < out.cells; ++n, ++cells_at) {
-        const uint32_t rank_of = n;
-        const bool real = cell_begin[b] + rank_of < cell_begin[b + 1];
-        const uint32_t c = cell_order[real ? cell_begin[b] + rank_of : cell_begin[b]];
-        for (int a = 0; a < 4; ++a) cell[cells_at].p[a] = local[rank[cells[4 * size_t(c) + a]]];
-        cell_id[cells_at] = real ? c : kNone;
-        volume6[cells_at] = cell_volume6[c];
+// Rows of springs as quads from quads_at on; a short one is filled up with its first end: no stiffness, and no point of another row.
+size_t Body::fill_springs(const Layout &l, Block &out, uint32_t b, size_t quads_at) {
+  out.quad = quad.data() + quads_at, out.stiffness = stiffness.data() + 4 * quads_at, out.rest = rest.data() + 4 * quads_at;
+  const size_t first = quads_at;
+  for (uint32_t r = l.begin[b]; r < l.begin[b + 1]; ++r)
+    for (uint32_t s = l.row[r]; s < l.row[r + 1]; s += 4, ++quads_at) {
+      Quad &q = quad[quads_at];
+      q.i = l.local[r];
+      for (uint32_t n = 0; n < 4; ++n) {
+        const bool real = s + n < l.row[r + 1];
+        const uint32_t e = l.edge[real ? s + n : l.row[r]];
+        q.j[n] = l.local[high_rank(l, e)];
+        spring_edge[4 * quads_at + n] = real ? e : kNone;
+        rest[4 * quads_at + n] = real ? edge_length[e] : 0;
       }
     }
-    if (pass == 0) {
-      point.create(host, slot_begin[nblock]);
-      p.create(host, 8 * size_t(slot_begin[nblock])), f.create(host, 4 * size_t(slot_begin[nblock]));
-    }
+  if ((quads_at - first) % 2) {  // the widest kernel takes two quads at a time
+    quad[quads_at] = quad[quads_at - 1];
+    std::fill_n(spring_edge.data() + 4 * quads_at, 4, kNone);
+    ++quads_at;
   }
+  out.quads = uint32_t(quads_at - first);
+  return quads_at;
+}
 
-  // Halo sums by owner, sources in block order: the order of the sums is the mesh's, never the threads'.
-  for (uint32_t b = 0; b < nblock; ++b)
-    for (uint32_t n = block[b].owned; n < block[b].local; ++n) ++merge_begin[block_of[rank[block[b].point[n]]] + 1];
+size_t Body::fill_cells(const Layout &l, Block &out, uint32_t b, size_t cells_at) {
+  out.cell = cell.data() + cells_at, out.bulk = bulk.data() + cells_at, out.volume6 = volume6.data() + cells_at;
+  out.cells = (l.cell_begin[b + 1] - l.cell_begin[b] + 7) / 8 * 8;
+  for (uint32_t n = 0; n < out.cells; ++n, ++cells_at) {
+    const bool real = l.cell_begin[b] + n < l.cell_begin[b + 1];
+    const uint32_t c = l.cell_order[l.cell_begin[b] + (real ? n : 0)];
+    for (int a = 0; a < 4; ++a) cell[cells_at].p[a] = l.local[l.rank[cells[4 * size_t(c) + a]]];
+    cell_id[cells_at] = real ? c : kNone;
+    volume6[cells_at] = cell_volume6[c];
+  }
+  return cells_at;
+}
+
+// Halo sums by owner, sources in block order: the order of the sums is the mesh's, never the threads'.
+void Body::build_merge(const Layout &l) {
+  merge_begin.create(host, size_t(nblock) + 1);
+  const auto each = [&](auto &&use) {
+    for (uint32_t b = 0; b < nblock; ++b)
+      for (uint32_t n = block[b].owned; n < block[b].local; ++n) use(b, n, l.rank[block[b].point[n]]);
+  };
+  each([&](uint32_t, uint32_t, uint32_t r) { ++merge_begin[l.block_of[r] + 1]; });
   for (uint32_t b = 0; b < nblock; ++b) merge_begin[b + 1] += merge_begin[b];
   merge.create(host, merge_begin[nblock]);
   Buffer<uint32_t> at;
   at.create(host, nblock);
   std::copy(merge_begin.data(), merge_begin.data() + nblock, at.data());
+  each([&](uint32_t b, uint32_t n, uint32_t r) {
+    const uint32_t owner = l.block_of[r];
+    merge[at[owner]++] = {slot_begin[b] + n, slot_begin[owner] + (r - l.begin[owner])};
+  });
+}
+
+void Body::build_blocks() {
+  Layout l;
+  l.order.create(host, npoint), l.rank.create(host, npoint), l.block_of.create(host, npoint);
+  l.begin.create(host, partition_capacity(npoint));
+  nblock = partition_points(rest_point.data(), npoint, l.order.data(), l.begin.data());
   for (uint32_t b = 0; b < nblock; ++b)
-    for (uint32_t n = block[b].owned; n < block[b].local; ++n) {
-      const uint32_t r = rank[block[b].point[n]], owner = block_of[r];
-      merge[at[owner]++] = {slot_begin[b] + n, slot_begin[owner] + (r - begin[owner])};
-    }
+    for (uint32_t r = l.begin[b]; r < l.begin[b + 1]; ++r) l.rank[l.order[r]] = r, l.block_of[r] = b;
+  order_springs(l);
+  order_cells(l);
+  l.mark.create(host, npoint), l.local.create(host, npoint), l.halo.create(host, npoint);
+  std::fill(l.mark.data(), l.mark.data() + npoint, kNone);
+
+  // Sizes, then one allocation per array, then each block's share.
+  size_t nquad = 0, ncells = 0;
+  slot_begin.create(host, size_t(nblock) + 1);
+  for (uint32_t b = 0; b < nblock; ++b) {
+    for (uint32_t r = l.begin[b]; r < l.begin[b + 1]; ++r) nquad += (l.row[r + 1] - l.row[r] + 3) / 4;
+    nquad += nquad % 2;
+    ncells += (l.cell_begin[b + 1] - l.cell_begin[b] + 7) / 8 * 8;
+    slot_begin[b + 1] = slot_begin[b] + (l.begin[b + 1] - l.begin[b]) + find_halo(l, b);
+  }
+  const size_t nslot = slot_begin[nblock];
+  block.create(host, nblock), point.create(host, nslot), slot_weight.create(host, nslot);
+  p.create(host, 8 * nslot), row.create(host, 8 * nslot), f.create(host, 4 * nslot);
+  quad.create(host, nquad), stiffness.create(host, 4 * nquad), rest.create(host, 4 * nquad), spring_edge.create(host, 4 * nquad);
+  cell.create(host, ncells), bulk.create(host, ncells), volume6.create(host, ncells), cell_id.create(host, ncells);
+
+  std::fill(l.mark.data(), l.mark.data() + npoint, kNone);
+  size_t quads_at = 0, cells_at = 0;
+  for (uint32_t b = 0; b < nblock; ++b) {
+    const uint32_t owned = l.begin[b + 1] - l.begin[b], nhalo = find_halo(l, b);
+    uint32_t *const points = point.data() + slot_begin[b];
+    for (uint32_t n = 0; n < owned; ++n) l.local[l.begin[b] + n] = n, points[n] = l.order[l.begin[b] + n];
+    for (uint32_t n = 0; n < nhalo; ++n) l.local[l.halo[n]] = owned + n, points[owned + n] = l.order[l.halo[n]];
+    Block &out = block[b];
+    out.owned = owned, out.local = owned + nhalo, out.point = points;
+    out.p = p.data() + 8 * size_t(slot_begin[b]), out.f = f.data() + 4 * size_t(slot_begin[b]);
+    out.row = row.data() + 8 * size_t(slot_begin[b]), out.weight = slot_weight.data() + slot_begin[b];
+    quads_at = fill_springs(l, out, b, quads_at);
+    cells_at = fill_cells(l, out, b, cells_at);
+  }
+  build_merge(l);
 }
 
 void Body::create(const dfm_host *h, const dfm_mesh &m) {
   host = h, kernels = choose_kernels(h);
   take_mesh(m);
-  build_blocks(m.rest);
+  build_blocks();
   apply_params(m.params);
 }
 
 void Body::apply_params(const double *values) {
   std::copy(values, values + kParamCount, params);
-  const double scale = spring_scale() * (young_field ? 1.0 : params[kYoung]), ratio = volume_ratio();
-  std::fill(spring_row.data(), spring_row.data() + npoint, 0.0);
-  for (uint32_t e = 0; e < nedge; ++e)
-    for (int n = 0; n < 2; ++n) spring_row[edges[2 * size_t(e) + n]] += scale * shape[e];
+  const double scale = spring_scale_of_shape(), ratio = volume_ratio();
   const Block &last = block[nblock - 1];
   const size_t nspring = 4 * size_t(last.quad + last.quads - quad.data()), ncells = size_t(last.cell + last.cells - cell.data());
   for (size_t s = 0; s < nspring; ++s) stiffness[s] = spring_edge[s] == kNone ? 0 : scale * shape[spring_edge[s]];
@@ -223,6 +251,7 @@ void Body::apply_params(const double *values) {
     // A cell that is flat at rest has no volume to keep.
     bulk[c] = cell_id[c] != kNone && v0 > 1e-12 * side * side * side ? ratio * young_of(cell_id[c]) / (36 * v0) : 0;
   }
+  find_weights();
 }
 
 }  // namespace msm

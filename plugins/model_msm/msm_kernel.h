@@ -20,6 +20,8 @@ struct Block {
   const uint32_t *point;                // [local] number of the point in the host's arrays
   double *p;                            // [local,8] x y z 0 vx vy vz 0: a point with its velocity is one cache line
   double *f;                            // [local,4]
+  double *row;                          // [local,8] row sums: the springs' block xx yy zz - xy yz zx, then the cells' row
+  const double *weight;                 // [local] of the row sums, see Body::find_weights
   const Quad *quad;                     // [quads]
   const double *stiffness, *rest;       // [quads,4] N/m, m
   const Cell *cell;                     // [cells]
@@ -36,8 +38,10 @@ struct Kernels {
   void (*springs)(const Block &b);
   void (*damped_springs)(const Block &b, double damp);  // damp: seconds
   void (*cells)(const Block &b);
-  void (*cell_rows)(const Block &b);  // row sums of the cells' stiffness at the loaded points, into lane 0 of f
+  void (*spring_rows)(const Block &b);  // clears row, then both at the loaded points: what the step bound is made of
+  void (*cell_rows)(const Block &b);
   void (*merge)(double *f, const Merge *merge, uint32_t n);
+  void (*merge_rows)(double *row, const Merge *merge, uint32_t n);
   void (*store)(const Block &b, double *f, uint32_t stride);  // adds the owned points' forces to the host's
 };
 

@@ -1,6 +1,6 @@
 // Vectors of eight. A point with its velocity is one load; two quads of springs, or eight cells, share each root and each
 // division. Sums per point run in the order of the other kernels: first quad, then second; cell after cell.
-#include "msm_lanes_avx.h"
+#include "msm_kernel_lanes_avx.h"
 
 #include "msm_kernel_quad.h"
 
@@ -62,7 +62,8 @@ static void damped_springs8(const Block &b, double damp) { springs8<true>(b, dam
 
 // Transposes the 4 x 4 of each half.
 MSM_INLINE void transpose(__m512d &r0, __m512d &r1, __m512d &r2, __m512d &r3) {
-  const __m512d a = _mm512_unpacklo_pd(r0, r1), b = _mm512_unpackhi_pd(r0, r1), c = _mm512_unpacklo_pd(r2, r3), d = _mm512_unpackhi_pd(r2, r3);
+  const __m512d a = _mm512_unpacklo_pd(r0, r1), b = _mm512_unpackhi_pd(r0, r1);
+  const __m512d c = _mm512_unpacklo_pd(r2, r3), d = _mm512_unpackhi_pd(r2, r3);
   const __m512i lo = _mm512_setr_epi64(0, 1, 8, 9, 4, 5, 12, 13), hi = _mm512_setr_epi64(2, 3, 10, 11, 6, 7, 14, 15);
   r0 = _mm512_permutex2var_pd(a, lo, c), r1 = _mm512_permutex2var_pd(b, lo, d);
   r2 = _mm512_permutex2var_pd(a, hi, c), r3 = _mm512_permutex2var_pd(b, hi, d);
@@ -126,7 +127,8 @@ static void volume_cells8(const Block &b) {
   }
 }
 
-constexpr Kernels kKernels = {"avx512", load_block, plain_springs8, damped_springs8, volume_cells8, cell_rows, merge_halo, add_to_host};
+constexpr Kernels kKernels = {"avx512", load_block, plain_springs8, damped_springs8, volume_cells8,
+                              spring_rows, cell_rows, merge_halo, merge_rows, add_to_host};
 
 }  // namespace
 

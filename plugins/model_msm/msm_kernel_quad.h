@@ -1,5 +1,5 @@
-// The kernels on vectors of four doubles, written once for the files that bring `v4` and its operations (msm_lanes_avx.h, or two
-// halves in msm_kernel_sse2.cpp). Everything here has internal linkage (see the house rules on wide kernels).
+// The kernels on vectors of four doubles, written once for the files that bring `v4` and its operations (msm_kernel_lanes_avx.h, or two
+// registers in msm_kernel_lanes_sse2.h). Everything here has internal linkage (see the house rules on wide kernels).
 #pragma once
 #include <stddef.h>
 
@@ -91,8 +91,11 @@ static inline void volume_cells(const Block &b) {
   }
 }
 
-// Row sums of the second derivative of a cell's energy, k (g_a sum g_b + |6V - 6V0| 3 l): g_a = 6 |dV/dx_a|, l the longest edge, which
-// bounds the three opposite edges of the row's mixed derivatives. Added to lane 0 of f.
+MSM_INLINE v4 weights(const Block &b, const Cell *c, int n) {
+  return set4(b.weight[c[0].p[n]], b.weight[c[1].p[n]], b.weight[c[2].p[n]], b.weight[c[3].p[n]]);
+}
+// Weighted row sums of the second derivative of a cell's energy, (k / w_a) (g_a sum_b g_b w_b + |6V - 6V0| l sum_{b != a} w_b):
+// g_a = 6 |dV/dx_a|, and l, the longest edge, for the opposite edge that makes each mixed derivative.
 static inline void cell_rows(const Block &b) {
   for (uint32_t t = 0; t < b.cells; t += 4) {
     const Cell *c = b.cell + t;
@@ -103,23 +106,53 @@ static inline void cell_rows(const Block &b) {
     const Edges4 a = {e2.x - e1.x, e2.y - e1.y, e2.z - e1.z}, d = {e3.x - e2.x, e3.y - e2.y, e3.z - e2.z};
     const Edges4 h = {e1.x - e3.x, e1.y - e3.y, e1.z - e3.z};
     const v4 longest = sqrt4(max4(max4(max4(dot(e1, e1), dot(e2, e2)), max4(dot(e3, e3), dot(a, a))), max4(dot(d, d), dot(h, h))));
-    const v4 more = abs4(dot(e1, g1) - load4(b.volume6 + t)) * (splat(3.0) * longest), k = load4(b.bulk + t);
-    const v4 n0 = sqrt4(dot(g0, g0)), n1 = sqrt4(dot(g1, g1)), n2 = sqrt4(dot(g2, g2)), n3 = sqrt4(dot(g3, g3));
-    const v4 sum = (n0 + n1) + (n2 + n3);
+    const v4 more = abs4(dot(e1, g1) - load4(b.volume6 + t)) * longest, k = load4(b.bulk + t);
     alignas(32) double row[4][4];
-    store4(row[0], k * (n0 * sum + more)), store4(row[1], k * (n1 * sum + more));
-    store4(row[2], k * (n2 * sum + more)), store4(row[3], k * (n3 * sum + more));
+    const v4 w0 = weights(b, c, 0), w1 = weights(b, c, 1), w2 = weights(b, c, 2), w3 = weights(b, c, 3), w = (w0 + w1) + (w2 + w3);
+    const v4 n0 = sqrt4(dot(g0, g0)), n1 = sqrt4(dot(g1, g1)), n2 = sqrt4(dot(g2, g2)), n3 = sqrt4(dot(g3, g3));
+    const v4 sum = (n0 * w0 + n1 * w1) + (n2 * w2 + n3 * w3);
+    store4(row[0], k * (n0 * sum + more * (w - w0)) / w0), store4(row[1], k * (n1 * sum + more * (w - w1)) / w1);
+    store4(row[2], k * (n2 * sum + more * (w - w2)) / w2), store4(row[3], k * (n3 * sum + more * (w - w3)) / w3);
     for (int n = 0; n < 4; ++n)
-      for (int m = 0; m < 4; ++m) b.f[4 * size_t(c[n].p[m])] += row[m][n];
+      for (int m = 0; m < 4; ++m) b.row[8 * size_t(c[n].p[m]) + 7] += row[m][n];
   }
 }
 
-static inline void merge_halo(double *f, const Merge *merge, uint32_t n) {
-  for (uint32_t m = 0; m < n; ++m) {
-    double *to = f + 4 * size_t(merge[m].to);
-    store4(to, load4(to) + load4(f + 4 * size_t(merge[m].from)));
+// Diagonal blocks of the springs' stiffness, k ((1 - s) n n^T + s I) with s = max(0, 1 - L0/L): a compressed spring is counted
+// without its softening.
+static inline void spring_rows(const Block &b) {
+  for (uint32_t n = 0; n < b.local; ++n) store4(b.row + 8 * size_t(n), splat(0)), store4(b.row + 8 * size_t(n) + 4, splat(0));
+  const auto add = [&b](uint32_t n, v4 square, v4 mixed) __attribute__((always_inline)) {
+    double *row = b.row + 8 * size_t(n);
+    store4(row, load4(row) + square), store4(row + 4, load4(row + 4) + mixed);
+  };
+  for (uint32_t n = 0; n < b.quads; ++n) {
+    const Quad &q = b.quad[n];
+    const v4 xi = point4(b, q.i);
+    const v4 d0 = point4(b, q.j[0]) - xi, d1 = point4(b, q.j[1]) - xi, d2 = point4(b, q.j[2]) - xi, d3 = point4(b, q.j[3]) - xi;
+    const v4 dd = sum_rows(d0 * d0, d1 * d1, d2 * d2, d3 * d3), length = sqrt4(dd), inverse = splat(1.0) / length;
+    const v4 k = load4(b.stiffness + 4 * size_t(n)), least = splat(kShortestSquared);
+    const v4 turned = max4((length - load4(b.rest + 4 * size_t(n))) * inverse, splat(0));
+    const v4 straight = zero_unless_above(k - k * turned, dd, least), all = k - straight;
+    const v4 along = zero_unless_above((straight * inverse) * inverse, dd, least);
+    const v4 o0 = lane<0>(along) * d0, o1 = lane<1>(along) * d1, o2 = lane<2>(along) * d2, o3 = lane<3>(along) * d3;
+    const v4 s0 = o0 * d0 + lane<0>(all), s1 = o1 * d1 + lane<1>(all), s2 = o2 * d2 + lane<2>(all), s3 = o3 * d3 + lane<3>(all);
+    const v4 m0 = o0 * yzx(d0), m1 = o1 * yzx(d1), m2 = o2 * yzx(d2), m3 = o3 * yzx(d3);
+    add(q.i, (s0 + s1) + (s2 + s3), (m0 + m1) + (m2 + m3));
+    add(q.j[0], s0, m0), add(q.j[1], s1, m1), add(q.j[2], s2, m2), add(q.j[3], s3, m3);
   }
 }
+
+template <int kLanes>
+MSM_INLINE void merge_lanes(double *sums, const Merge *merge, uint32_t n) {
+  for (uint32_t m = 0; m < n; ++m)
+    for (int k = 0; k < kLanes; k += 4) {
+      double *to = sums + kLanes * size_t(merge[m].to) + k;
+      store4(to, load4(to) + load4(sums + kLanes * size_t(merge[m].from) + k));
+    }
+}
+static inline void merge_halo(double *f, const Merge *merge, uint32_t n) { merge_lanes<4>(f, merge, n); }
+static inline void merge_rows(double *row, const Merge *merge, uint32_t n) { merge_lanes<8>(row, merge, n); }
 
 static inline void add_to_host(const Block &b, double *f, uint32_t stride) {
   for (uint32_t n = 0; n < b.owned; ++n) {

@@ -15,27 +15,6 @@ constexpr double kSkinMost = 0.5;           // beyond half an edge, lists grow f
 constexpr double kSpeedGrowth = 1.25;       // speeds may rise by so much before the margin of the reach is used up
 constexpr double kQualityLimit = 2;         // boxes that have grown this much in sum are worth a new tree
 
-struct Motion {
-  double displacement, speed;
-};
-
-// Largest displacement since x0, and largest speed. A maximum has the same bits in any order, so the compiler may use any width.
-Motion motion_of(const Surface &surface, const Array<double> &x0) {
-  const double *__restrict x = surface.x.data();
-  const double *__restrict v = surface.v.data();
-  const double *__restrict y = x0.data();
-  double d2[2] = {0, 0}, v2[2] = {0, 0};
-  const uint32_t n = surface.nsurfel;
-  for (uint32_t s = 0; s < n; ++s) {
-    const uint32_t i = 4 * s;
-    const double dx = x[i] - y[i], dy = x[i + 1] - y[i + 1], dz = x[i + 2] - y[i + 2];
-    const double d = dx * dx + dy * dy + dz * dz, w = v[i] * v[i] + v[i + 1] * v[i + 1] + v[i + 2] * v[i + 2];
-    d2[s & 1] = d > d2[s & 1] ? d : d2[s & 1];
-    v2[s & 1] = w > v2[s & 1] ? w : v2[s & 1];
-  }
-  return {std::sqrt(std::max(d2[0], d2[1])), std::sqrt(std::max(v2[0], v2[1]))};
-}
-
 double obstacle_speed(const ObstacleView &o, double extent) { return norm(o.velocity) + norm(o.spin) * extent; }
 
 // Bound of the motion of a shape between two poses: |q - q0| of unit quaternions is at most half the chord that a point at distance 1 moves.
@@ -136,8 +115,8 @@ bool BroadPhase::find_dirty(std::span<const BodyView> bodies, std::span<const Ob
   bool any = false;
   for (Body &b : bodies_) {
     if (!b.dirty) {
-      const Motion m = motion_of(*b.surface, b.x);
-      b.dirty = !(kRounding * (m.displacement + reach_share(h, offset, m.speed)) <= b.margin);
+      const double moved = largest_norm(b.surface->nsurfel, b.surface->x.data(), b.x.data());
+      b.dirty = !(kRounding * (moved + reach_share(h, offset, largest_speed(*b.surface))) <= b.margin);
     }
     any |= b.dirty;
   }
@@ -177,7 +156,7 @@ void BroadPhase::renew_body(Body &body, double h, double offset) {
     body.tree.build(s, body.x.data());
     ++stats_.rebuilds;
   }
-  const double speed = motion_of(s, body.x).speed;
+  const double speed = largest_speed(s);
   const double skin = std::clamp(skin_steps_ * h * speed, kSkinLeast * s.median_edge, kSkinMost * s.median_edge);
   body.margin = kRounding * reach_share(h, offset, kSpeedGrowth * speed) + skin;
 }
@@ -233,24 +212,22 @@ void BroadPhase::list_bodies(uint32_t i, uint32_t j) {
   ee_.clear();
   // Surfels of one side against a triangle of the other: those that the triangle owns, so that no pair comes twice.
   const auto vertices = [](const Features &from, uint32_t t, const Features &to, uint32_t face, double limit, Array<uint64_t> &found) {
-    const uint32_t owns = from.surface.tri_owns[t];
-    for (int k = 0; k < 3; ++k) {
-      if (!(owns >> k & 1)) continue;
-      const TrianglePoint q = closest_on_triangle(from.corner(t, k), to.corner(face, 0), to.corner(face, 1), to.corner(face, 2));
-      if (q.distance2 <= limit * limit) found.push_back(features(from.surface.tri[3 * size_t{t} + k], face));
-    }
+    const uint32_t owns = from.surface.tri_owns[t] & 7;
+    for (int k = 0; owns >> k; ++k)
+      if (owns >> k & 1 && triangle_within(from.corner(t, k), to.corner(face, 0), to.corner(face, 1), to.corner(face, 2), limit))
+        found.push_back(features(from.surface.tri[3 * size_t{t} + k], face));
   };
-  near_pairs(a.tree, b.tree, wide, stack_, [&](uint32_t s, uint32_t t) {
+  near_pairs(a.tree, b.tree, wide, stack_, [&](uint32_t place_a, uint32_t place_b, double distance2) {
+    const uint32_t s = a.tree.triangles()[place_a], t = b.tree.triangles()[place_b];
     vertices(fa, s, fb, t, deep_b, vf_);
     vertices(fb, t, fa, s, deep_a, fv_);
     const uint32_t own_s = fa.surface.tri_owns[s] >> 3, own_t = fb.surface.tri_owns[t] >> 3;
-    if (!own_s || !own_t) return;
-    for (int k = 0; k < 3; ++k)
-      for (int l = 0; l < 3; ++l) {
-        if (!(own_s >> k & 1) || !(own_t >> l & 1)) continue;
-        const SegmentPoints q = closest_segments(fa.corner(s, k), fa.corner(s, (k + 1) % 3), fb.corner(t, l), fb.corner(t, (l + 1) % 3));
-        if (q.distance2 <= edges2) ee_.push_back(features(fa.surface.tri_edge[3 * size_t{s} + k], fb.surface.tri_edge[3 * size_t{t} + l]));
-      }
+    if (!own_s || !own_t || !(distance2 <= edges2)) return;
+    for (int k = 0; own_s >> k; ++k)
+      for (int l = 0; own_t >> l; ++l)
+        if (own_s >> k & own_t >> l & 1 &&
+            segments_within(fa.corner(s, k), fa.corner(s, (k + 1) % 3), fb.corner(t, l), fb.corner(t, (l + 1) % 3), edges))
+          ee_.push_back(features(fa.surface.tri_edge[3 * size_t{s} + k], fb.surface.tri_edge[3 * size_t{t} + l]));
   });
   add_segment(i, j, false, 0, vf_);
   add_segment(i, j, false, 1, ee_);

@@ -76,7 +76,7 @@ class BroadPhase {
   void assemble();
 
   Memory memory_;
-  double skin_steps_ = 16;
+  double skin_steps_ = 24;
   Array<Body> bodies_;
   Array<Thing> things_;
   uint64_t filter_version_ = 0;

@@ -81,10 +81,11 @@ void triangle_obstacle(const Pair &pair, Run run, Array<ContactPoint> &out);
 struct EdgeFaces {
   Vec3 along;                  // unit, i to j
   Vec3 normal[2], inward[2];   // unit; inward lies in the face, orthogonal to the edge; both zero where there is no face
-  bool convex;
   Vec3 outward() const { return normal[0] + normal[1]; }
   bool leans_out(Vec3 n, double slack) const { return dot(n, inward[0]) <= slack && dot(n, inward[1]) <= slack; }
 };
 EdgeFaces edge_faces(const Surface &surface, uint32_t edge);
+// The same judgement of convexity for a fraction of the cost: most edges stop here.
+bool edge_convex(const Surface &surface, uint32_t edge);
 
 }  // namespace dfm::narrow

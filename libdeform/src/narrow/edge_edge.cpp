@@ -19,10 +19,23 @@ EdgeFaces edge_faces(const Surface &surface, uint32_t edge) {
     // The first face has the edge as i to j, so inward lies to its left; the second has it as j to i.
     f.inward[k] = (k == 0 ? 1.0 : -1.0) * cross(f.normal[k], f.along);
   }
-  // An open edge is as convex as can be; between two faces the second normal leans away from the first face.
-  const bool open = tris[0] == kNone || tris[1] == kNone;
-  f.convex = open || dot(f.normal[1], f.inward[0]) < -kFlat;
   return f;
+}
+
+// An open edge is as convex as can be. Between two faces the sine of the fold is c0 . r1 |e| / (|c0| |c1|), with r1 to the second face's far corner
+// and c the faces' normals times twice their areas; it is negative where the second face falls away from the first.
+bool edge_convex(const Surface &surface, uint32_t edge) {
+  const uint32_t *ends = &surface.edge[2 * size_t{edge}], *tris = &surface.edge_tri[2 * size_t{edge}];
+  if (tris[0] == kNone || tris[1] == kNone) return true;
+  const auto x = [&](uint32_t s) { return load3(&surface.x[4 * size_t{s}]); };
+  const auto far_corner = [&](uint32_t t) {
+    const uint32_t *c = &surface.tri[3 * size_t{t}];
+    return c[0] + c[1] + c[2] - ends[0] - ends[1];
+  };
+  const Vec3 from = x(ends[0]), e = x(ends[1]) - from, r0 = x(far_corner(tris[0])) - from, r1 = x(far_corner(tris[1])) - from;
+  const Vec3 c0 = cross(e, r0), c1 = cross(r1, e);
+  const double fold = dot(c0, r1);
+  return fold < 0 && fold * fold * norm2(e) > kFlat * kFlat * norm2(c0) * norm2(c1);
 }
 
 void edge_edge(const Pair &pair, Run run, Array<ContactPoint> &out) {
@@ -32,10 +45,14 @@ void edge_edge(const Pair &pair, Run run, Array<ContactPoint> &out) {
   Vec3 p0, u, vp0, vp1;
   double uu = 0, widest2 = 0;
   const double depth = edge_recovery_depth(sa, sb);
+  EdgeFaces fa;
+  bool known = false, convex = false;   // fa belongs to last_a; so does convex
   for (const Candidate &candidate : run) {
     const uint32_t *ea = &sa.edge[2 * size_t{candidate.feature_a}], *eb = &sb.edge[2 * size_t{candidate.feature_b}];
     if (candidate.feature_a != last_a) {
       last_a = candidate.feature_a;
+      known = false;
+      convex = edge_convex(sa, last_a);
       p0 = pair.xa(ea[0]), u = pair.xa(ea[1]) - p0;
       vp0 = pair.va(ea[0]), vp1 = pair.va(ea[1]);
       uu = norm2(u);
@@ -43,6 +60,7 @@ void edge_edge(const Pair &pair, Run run, Array<ContactPoint> &out) {
       const double widest = std::max(contact_reach(pair.h, pair.offset, speed), depth);
       widest2 = widest * widest;
     }
+    if (!convex) continue;
     const Vec3 q0 = pair.xb(eb[0]), w = pair.xb(eb[1]) - q0, r = p0 - q0;
     const Vec3 n = cross(u, w);
     const double nn = norm2(n), nr = dot(n, r), ww = norm2(w);
@@ -56,8 +74,10 @@ void edge_edge(const Pair &pair, Run run, Array<ContactPoint> &out) {
     const double allowed = std::max(reach, depth);
     if (!(nr * nr < allowed * allowed * nn)) continue;
 
-    const EdgeFaces fa = edge_faces(sa, candidate.feature_a), fb = edge_faces(sb, candidate.feature_b);
-    if (!fa.convex || !fb.convex) continue;
+    if (!edge_convex(sb, candidate.feature_b)) continue;
+    if (!known) fa = edge_faces(sa, candidate.feature_a);
+    known = true;
+    const EdgeFaces fb = edge_faces(sb, candidate.feature_b);
     Vec3 normal = (1 / std::sqrt(nn)) * n;
     if (dot(normal, fb.outward()) < dot(normal, fa.outward())) normal = -normal;
     const double distance = dot(normal, r);

@@ -15,79 +15,88 @@ const View *find_slot(std::span<const View> views, uint32_t slot) {
   return nullptr;
 }
 
-double largest_speed(const Surface &s) {
-  double v2[2] = {0, 0};
-  const double *__restrict v = s.v.data();
-  for (uint32_t i = 0; i < s.nsurfel; ++i) {
-    const double w = v[4 * i] * v[4 * i] + v[4 * i + 1] * v[4 * i + 1] + v[4 * i + 2] * v[4 * i + 2];
-    v2[i & 1] = w > v2[i & 1] ? w : v2[i & 1];
+// Surfels of one body that have contacts of their own with one other side: a sorted run of the list.
+struct Owners {
+  const ContactPoint *begin, *end;
+  bool has(uint32_t surfel) const {
+    const ContactPoint *at = std::lower_bound(begin, end, surfel, [](const ContactPoint &c, uint32_t s) { return c.feature_a < s; });
+    return at != end && at->feature_a == surfel;
   }
-  return std::sqrt(std::max(v2[0], v2[1]));
-}
+};
 
-// Contacts of one surfel with one other side are neighbours in the sorted list.
-class Owners {
+// An edge or triangle contact takes over the area of the nearest of its corners that carries no contact of its own with the other side; none is
+// given twice; 0 where none is free (mechanics, section 5). reserved2 holds the node that gave.
+class Areas {
  public:
-  Owners(std::span<const BodyView> bodies, std::span<const ObstacleView> obstacles, const Array<ContactPoint> &contacts)
+  Areas(std::span<const BodyView> bodies, std::span<const ObstacleView> obstacles, Array<ContactPoint> &contacts)
       : bodies_(bodies), obstacles_(obstacles), contacts_(contacts) {}
 
-  bool has_contact(const BodyView &a, uint32_t surfel, uint64_t id_b, bool obstacle) const {
-    const Place wanted{a.id, id_b, surfel, obstacle};
-    const auto at = std::lower_bound(contacts_.begin(), contacts_.end(), wanted, [&](const ContactPoint &c, const Place &w) {
-      const Place p = place_of(c);
-      if (p.id_a != w.id_a) return p.id_a < w.id_a;
-      if (p.obstacle != w.obstacle) return p.obstacle < w.obstacle;
-      if (p.id_b != w.id_b) return p.id_b < w.id_b;
-      return c.type_a == 0 && c.feature_a < w.surfel;
-    });
-    if (at == contacts_.end() || at->type_a != 0 || at->feature_a != surfel) return false;
-    const Place p = place_of(*at);
-    return p.id_a == wanted.id_a && p.id_b == wanted.id_b && p.obstacle == obstacle;
+  void share() {
+    for (size_t i = 0; i < contacts_.size();) {
+      if (contacts_[i].type_a == 0) {
+        ++i;
+        continue;
+      }
+      const ContactPoint &first = contacts_[i];
+      size_t end = i + 1;
+      while (end < contacts_.size() && contacts_[end].type_a != 0 && contacts_[end].slot_a == first.slot_a && contacts_[end].slot_b == first.slot_b &&
+             contacts_[end].obstacle == first.obstacle)
+        ++end;
+      share(i, end);
+      i = end;
+    }
   }
 
  private:
   struct Place {
     uint64_t id_a, id_b;
-    uint32_t surfel;
     bool obstacle;
   };
   Place place_of(const ContactPoint &c) const {
-    return {find_slot(bodies_, c.slot_a)->id, c.obstacle ? find_slot(obstacles_, c.slot_b)->id : find_slot(bodies_, c.slot_b)->id, c.feature_a,
-            c.obstacle != 0};
+    return {find_slot(bodies_, c.slot_a)->id, c.obstacle ? find_slot(obstacles_, c.slot_b)->id : find_slot(bodies_, c.slot_b)->id, c.obstacle != 0};
   }
-  std::span<const BodyView> bodies_;
-  std::span<const ObstacleView> obstacles_;
-  const Array<ContactPoint> &contacts_;
-};
+  Owners owners(const Place &wanted) const {
+    const auto before = [](const Place &p, const Place &w) {
+      if (p.id_a != w.id_a) return p.id_a < w.id_a;
+      return p.obstacle != w.obstacle ? p.obstacle < w.obstacle : p.id_b < w.id_b;
+    };
+    const ContactPoint *list = contacts_.data(), *last = list + contacts_.size();
+    // Surfels come before edges and triangles of the same pair.
+    const ContactPoint *begin = std::lower_bound(list, last, wanted, [&](const ContactPoint &c, const Place &w) { return before(place_of(c), w); });
+    const ContactPoint *end = std::lower_bound(begin, last, wanted, [&](const ContactPoint &c, const Place &w) {
+      return !before(w, place_of(c)) && c.type_a == 0;
+    });
+    return {begin, end};
+  }
 
-// An edge or triangle contact takes over the area of the nearest of its corners that carries no contact of its own with the other side; none is
-// given twice; 0 where none is free (mechanics, section 5). reserved2 holds the node that gave.
-void share_areas(std::span<const BodyView> bodies, std::span<const ObstacleView> obstacles, Array<ContactPoint> &out) {
-  const Owners owners(bodies, obstacles, out);
-  size_t first = 0;                        // of this pair's edges and triangles
-  for (size_t i = 0; i < out.size(); ++i) {
-    ContactPoint &c = out[i];
-    if (c.type_a == 0 || c.slot_a != out[first].slot_a || c.slot_b != out[first].slot_b || c.obstacle != out[first].obstacle) first = i;
-    if (c.type_a == 0) continue;
-    const BodyView &a = *find_slot(bodies, c.slot_a);
-    const BodyView *b = c.obstacle ? nullptr : find_slot(bodies, c.slot_b);
-    const uint64_t id_b = b ? b->id : find_slot(obstacles, c.slot_b)->id;
-    double nearest = 0;
-    for (int k = 0; k < c.nnode; ++k) {
-      const bool side_a = c.weight[k] > 0;
-      const BodyView &own = side_a ? a : *b;
-      const uint32_t surfel = c.node[k] - own.first_node;
-      const double d2 = norm2(load3(&own.surface->x[4 * size_t{surfel}]) - load3(c.point));
-      if (c.reserved2 && !(d2 < nearest)) continue;
-      bool free = !owners.has_contact(own, surfel, side_a ? id_b : a.id, c.obstacle != 0);
-      for (size_t j = first; free && j < i; ++j) free = out[j].reserved2 != c.node[k] + 1;
-      if (!free) continue;
-      nearest = d2;
-      c.reserved2 = c.node[k] + 1;
-      c.area = own.surface->area[surfel] * (b ? 0.5 : 1.0);
+  void share(size_t begin, size_t end) {
+    const Place pair = place_of(contacts_[begin]);
+    const BodyView &a = *find_slot(bodies_, contacts_[begin].slot_a);
+    const BodyView *b = pair.obstacle ? nullptr : find_slot(bodies_, contacts_[begin].slot_b);
+    const Owners of_a = owners(pair), of_b = b ? owners({pair.id_b, pair.id_a, false}) : Owners{};
+    for (size_t i = begin; i < end; ++i) {
+      ContactPoint &c = contacts_[i];
+      double nearest = 0;
+      for (int k = 0; k < c.nnode; ++k) {
+        const bool side_a = c.weight[k] > 0;
+        const BodyView &own = side_a ? a : *b;
+        const uint32_t surfel = c.node[k] - own.first_node;
+        const double d2 = norm2(load3(&own.surface->x[4 * size_t{surfel}]) - load3(c.point));
+        if ((c.reserved2 && !(d2 < nearest)) || (side_a ? of_a : of_b).has(surfel)) continue;
+        bool free = true;
+        for (size_t j = begin; free && j < i; ++j) free = contacts_[j].reserved2 != c.node[k] + 1;
+        if (!free) continue;
+        nearest = d2;
+        c.reserved2 = c.node[k] + 1;
+        c.area = own.surface->area[surfel] * (b ? 0.5 : 1.0);
+      }
     }
   }
-}
+
+  std::span<const BodyView> bodies_;
+  std::span<const ObstacleView> obstacles_;
+  Array<ContactPoint> &contacts_;
+};
 
 }  // namespace
 
@@ -117,7 +126,7 @@ void find_contacts(std::span<const BodyView> bodies, std::span<const ObstacleVie
     const narrow::Pair pair{a, b, nullptr, h, offset, speed};
     (c.kind == 0 ? narrow::vertex_face : narrow::edge_edge)(pair, run, out);
   }
-  share_areas(bodies, obstacles, out);
+  Areas(bodies, obstacles, out).share();
 }
 
 }  // namespace dfm

@@ -58,7 +58,7 @@ void edge_point(Edge &e, double s, Vec3 c, double radius, uint32_t feature_b, Co
   if (!(d > 0) || !(d - radius < reach_of(e.pair, e.ends, c))) return;
   const Vec3 normal = (1 / d) * r;
   const EdgeFaces &f = e.sides();
-  if (!f.convex || !(dot(normal, f.outward()) < 0) || !f.leans_out(-normal, kFlat) || !cone(normal)) return;
+  if (!(dot(normal, f.outward()) < 0) || !f.leans_out(-normal, kFlat) || !cone(normal)) return;
   e.emit(s, c + radius * normal, normal, d - radius, feature_b, out);
 }
 
@@ -100,7 +100,7 @@ void edge_box(Edge &e, Array<ContactPoint> &out) {
     Vec3 normal = (1 / std::sqrt(nn)) * n;
     if (dot(normal, m0 + m1) < dot(normal, f.outward())) normal = -normal;
     const double distance = dot(normal, r), slack = kCone + std::min(0.3, reach / std::sqrt(std::min(uu, ww)));
-    if (!f.convex || !(distance < reach) || !f.leans_out(-normal, slack) || dot(normal, m0) < -slack || dot(normal, m1) < -slack) continue;
+    if (!(distance < reach) || !f.leans_out(-normal, slack) || dot(normal, m0) < -slack || dot(normal, m1) < -slack) continue;
     e.emit(s / nn, o, normal, distance, k, out);
   }
   for (uint32_t k = 0; k < 8; ++k) {
@@ -131,6 +131,7 @@ void surfel_obstacle(const Pair &pair, Run run, Array<ContactPoint> &out) {
 
 void edge_obstacle(const Pair &pair, Run run, Array<ContactPoint> &out) {
   for (const Candidate &candidate : run) {
+    if (!edge_convex(*pair.a.surface, candidate.feature_a)) continue;
     Edge e(pair, candidate.feature_a);
     if (pair.shape->view().shape == Shape::box) edge_box(e, out);
     else edge_round(e, out);

@@ -6,7 +6,8 @@
 //      X   beside a concave edge: the other face's plane,           \       |        \____
 //          its weights extrapolated                                  \      |
 //
-// Whether p is outside is told by the nearest point: over a face by its side, over an edge or corner by the face there that p sees most steeply.
+// Whether p is outside is told by the nearest point: over a face by its side, over an edge by the sum of its faces' normals, over a corner by
+// the edge there that points to p most (the point of the corner's spherical outline nearest to the direction of p lies on it).
 // From inside, only the nearest face pushes back (with the planes across concave edges): the far side of a thin body does not pull p through.
 #include <algorithm>
 
@@ -17,6 +18,7 @@ namespace dfm::narrow {
 namespace {
 
 constexpr uint32_t kMost = 96;        // triangles kept per surfel; beyond that the nearest ones
+constexpr double kLoose = 1 + 1e-9;
 constexpr double kNearer = 1e-9;      // relative: a triangle beside the feature counts as nearer only beyond this
 
 struct Near {
@@ -25,6 +27,7 @@ struct Near {
   bool emitted;
   double weight[3];
   Vec3 q, normal;              // closest point; unit face normal (zero for a triangle without area)
+  Vec3 emitted_normal;
   double distance, plane;      // to the triangle (>= 0); signed, to its plane
   double reach;
 };
@@ -39,10 +42,14 @@ struct Group {
   explicit Group(const Pair &of) : pair(of), depth(recovery_depth(*of.b->surface)) {}
 
   const uint32_t *corners(const Near &n) const { return &pair.b->surface->tri[3 * size_t{n.tri}]; }
+  double reach_to(Vec3 v, const uint32_t *corners) const;
+  bool reaches(Run run, Vec3 v, double widest2) const;
   void collect(Run run);
   uint32_t nearest() const;
   bool has_feature(const Near &other, const Near &of) const;
   bool local_minimum(const Near &n) const;
+  Vec3 outward(const Near &n) const;
+  bool repeated(const Near &n, Vec3 normal) const;
   uint32_t steepest(const Near &n) const;
   bool plane_weights(const Near &n, double weight[3]) const;
   bool reachable_across(const Near &n, double weight[3]) const;
@@ -50,41 +57,60 @@ struct Group {
   void resolve(Array<ContactPoint> &out);
 };
 
-void keep_nearest(Near *near, uint32_t &count, const Near &n) {
-  if (count < kMost) {
-    near[count++] = n;
-    return;
-  }
-  // Full (a surface folded onto itself): the farthest leaves, order of triangles stays.
+// Place for a new entry; where all are taken (a surface folded onto itself), that of the farthest, or null. The order of triangles stays.
+Near *place_for(Near *near, uint32_t &count, double distance) {
+  if (count < kMost) return &near[count++];
   uint32_t far = 0;
   for (uint32_t i = 1; i < count; ++i)
     if (near[i].distance >= near[far].distance) far = i;
-  if (!(n.distance < near[far].distance)) return;
+  if (!(distance < near[far].distance)) return nullptr;
   std::copy(near + far + 1, near + count, near + far);
-  near[count - 1] = n;
+  return &near[count - 1];
+}
+
+double Group::reach_to(Vec3 v, const uint32_t *c) const {
+  double speed2 = 0;
+  for (int k = 0; k < 3; ++k) speed2 = std::max(speed2, norm2(v - pair.vb(c[k])));
+  return contact_reach(pair.h, pair.offset, std::sqrt(speed2));
+}
+
+// Is p within reach of a plane, or behind one, so that it is worth looking closer? In front of all faces beyond the reach, p is outside and free.
+// Looser by a few roundings than the decisions that follow, which alone may depend on distances.
+bool Group::reaches(Run run, Vec3 v, double widest2) const {
+  const double depth2 = depth * depth;
+  for (const Candidate &candidate : run) {
+    const uint32_t *c = &pair.b->surface->tri[3 * size_t{candidate.feature_b}];
+    const Vec3 a = pair.xb(c[0]), u = pair.xb(c[1]) - a, w = pair.xb(c[2]) - a, n = cross(u, w);
+    const double s = dot(n, p - a), nn = norm2(n);
+    // A sliver's normal is rounding; it is looked at closer whatever it says.
+    if (nn <= 1e-12 * norm2(u) * norm2(w) || (s < 0 && s * s <= kLoose * depth2 * nn)) return true;
+    if (!(s * s <= kLoose * widest2 * nn)) continue;
+    const double reach = reach_to(v, c);
+    if (s * s <= kLoose * reach * reach * nn) return true;
+  }
+  return false;
 }
 
 void Group::collect(Run run) {
+  count = 0;
   const Vec3 v = pair.va(surfel);
-  const double widest = std::max(contact_reach(pair.h, pair.offset, norm(v) + pair.speed_b), depth), widest2 = widest * widest;
+  const double reach = contact_reach(pair.h, pair.offset, norm(v) + pair.speed_b);
+  if (!reaches(run, v, reach * reach)) return;
+  const double widest = std::max(reach, depth), widest2 = widest * widest;
   for (const Candidate &candidate : run) {
     const uint32_t *c = &pair.b->surface->tri[3 * size_t{candidate.feature_b}];
     const Vec3 a = pair.xb(c[0]), b = pair.xb(c[1]), d = pair.xb(c[2]);
-    const Vec3 n = cross(b - a, d - a);
-    const double s = dot(n, p - a), nn = norm2(n);
-    if (!(s * s <= widest2 * nn)) continue;
     const TrianglePoint t = closest_on_triangle(p, a, b, d);
     if (!(t.distance2 <= widest2)) continue;
-    const double area = std::sqrt(nn);
-    Near entry{candidate.feature_b, t.feature, false, {t.weight[0], t.weight[1], t.weight[2]}, t.point, {}, std::sqrt(t.distance2), 0, 0};
-    if (area > 0) {
-      entry.normal = (1 / area) * n;
-      entry.plane = dot(entry.normal, p - t.point);
-    }
-    double speed2 = 0;
-    for (int k = 0; k < 3; ++k) speed2 = std::max(speed2, norm2(v - pair.vb(c[k])));
-    entry.reach = contact_reach(pair.h, pair.offset, std::sqrt(speed2));
-    keep_nearest(near, count, entry);
+    const double distance = std::sqrt(t.distance2);
+    Near *n = place_for(near, count, distance);
+    if (!n) continue;
+    n->tri = candidate.feature_b, n->feature = t.feature, n->emitted = false;
+    for (int k = 0; k < 3; ++k) n->weight[k] = t.weight[k];
+    n->q = t.point, n->distance = distance;
+    n->normal = normalized(cross(b - a, d - a));
+    n->plane = dot(n->normal, p - t.point);
+    n->reach = reach_to(v, c);
   }
 }
 
@@ -110,7 +136,41 @@ bool Group::local_minimum(const Near &n) const {
   return true;
 }
 
-// The face at n's feature that the direction to p is least tangent to: its side tells inside from outside.
+// Not normalised; its side at n's closest point tells inside from outside.
+Vec3 Group::outward(const Near &n) const {
+  if (n.feature == TriangleFeature::face) return n.normal;
+  Vec3 sum;
+  const int f = int(n.feature);
+  uint32_t i0 = corners(n)[f >= 4 ? f - 4 : f - 1], i1 = corners(n)[f >= 4 ? 0 : f % 3];
+  if (f >= 4) {
+    double most = -2;
+    for (uint32_t i = 0; i < count; ++i) {
+      if (!has_feature(near[i], n)) continue;
+      for (int k = 0; k < 3; ++k) {
+        const uint32_t w = corners(near[i])[k];
+        const double c = dot(normalized(pair.xb(w) - n.q), p - n.q);
+        if (w == i0 || !(c > most || most == -2)) continue;
+        most = c;
+        i1 = w;
+      }
+    }
+  }
+  for (uint32_t i = 0; i < count; ++i) {
+    const uint32_t *c = corners(near[i]);
+    if ((c[0] == i0 || c[1] == i0 || c[2] == i0) && (c[0] == i1 || c[1] == i1 || c[2] == i1)) sum += near[i].normal;
+  }
+  return sum;
+}
+
+// Was the same closest point made a contact from another triangle, with the same normal?
+bool Group::repeated(const Near &n, Vec3 normal) const {
+  const double tiny = 1e-9 * pair.b->surface->median_edge, same = 1e-8 * n.distance * n.distance + tiny * tiny;
+  for (uint32_t j = 0; j < count; ++j)
+    if (near[j].emitted && norm2(near[j].q - n.q) <= same && norm2(near[j].emitted_normal - normal) <= 1e-6) return true;
+  return false;
+}
+
+// The face at n's feature that the direction to p is least tangent to.
 uint32_t Group::steepest(const Near &n) const {
   uint32_t best = uint32_t(&n - near);
   double most = -1;
@@ -168,35 +228,37 @@ void Group::emit(Near &n, Vec3 normal, double distance, const double weight[3], 
   place(c, p, p - distance * normal, normal, distance);
   out.push_back(c);
   n.emitted = true;
+  n.emitted_normal = normal;
 }
 
 void Group::resolve(Array<ContactPoint> &out) {
   const Near &best = near[nearest()];
   const double tiny = 1e-9 * pair.b->surface->median_edge;
-  const uint32_t steep = steepest(best);
-  const bool inside = dot(near[steep].normal, p - best.q) < 0;
+  const bool inside = dot(outward(best), p - best.q) < 0;
   uint32_t deepest = kNone;                // of the faces that p is behind, the one it is least deep below
   double weight[3];
   for (uint32_t i = 0; i < count; ++i) {
     Near &n = near[i];
     if (n.feature == TriangleFeature::face) {
       if (n.plane >= 0) {
-        if (n.plane < n.reach) emit(n, n.normal, n.plane, n.weight, out);
+        if (n.plane < n.reach && !repeated(n, n.normal)) emit(n, n.normal, n.plane, n.weight, out);
       } else if (inside && -n.plane <= depth && (deepest == kNone || n.plane > near[deepest].plane)) {
         deepest = i;
       }
       continue;
     }
-    const Vec3 f = near[steepest(n)].normal;
-    if (n.distance < n.reach && local_minimum(n) && norm2(f) > 0 && (n.distance <= tiny || dot(f, p - n.q) > 0)) {
-      bool again = false;                  // the same edge, corner or face border, from another triangle
-      for (uint32_t j = 0; j < i; ++j) again |= near[j].emitted && norm2(near[j].q - n.q) <= 1e-8 * n.distance * n.distance + tiny * tiny;
-      if (!again) emit(n, n.distance > tiny ? (1 / n.distance) * (p - n.q) : f, n.distance, n.weight, out);
-    } else if (std::fabs(n.plane) < n.reach && (inside || n.plane >= 0) && reachable_across(n, weight)) {
-      emit(n, n.normal, n.plane, weight, out);
+    bool rim = n.distance < n.reach && local_minimum(n);
+    if (rim) {
+      const Vec3 out_here = outward(n);
+      rim = norm2(out_here) > 0 && (n.distance <= tiny || dot(out_here, p - n.q) > 0);
+      const Vec3 normal = n.distance > tiny ? (1 / n.distance) * (p - n.q) : normalized(out_here);
+      if (rim && !repeated(n, normal)) emit(n, normal, n.distance, n.weight, out);
     }
+    if (!rim && std::fabs(n.plane) < n.reach && (inside || n.plane >= 0) && reachable_across(n, weight))
+      emit(n, n.normal, n.plane, weight, out);
   }
   if (!inside) return;
+  const uint32_t steep = steepest(best);
   if (deepest != kNone) {
     emit(near[deepest], near[deepest].normal, near[deepest].plane, near[deepest].weight, out);
   } else if (best.distance <= depth && best.feature != TriangleFeature::face && !near[steep].emitted && plane_weights(near[steep], weight)) {
@@ -215,7 +277,6 @@ void vertex_face(const Pair &pair, Run run, Array<ContactPoint> &out) {
     while (end < run.size() && run[end].feature_a == run[i].feature_a) ++end;
     group.surfel = run[i].feature_a;
     group.p = pair.xa(group.surfel);
-    group.count = 0;
     group.collect(run.subspan(i, end - i));
     i = end;
     if (!group.count) continue;

@@ -1,8 +1,12 @@
 // Voronoi regions of a triangle are told apart by signs of dot products; no division happens before the region is known.
 #include "surfel/closest.h"
 
+#include <algorithm>
+
 namespace dfm {
 namespace {
+
+constexpr double kSolid = 1e-12;  // squared sine below which a cross product is too much rounding to judge distances by
 
 TrianglePoint on_corner(Vec3 p, Vec3 a, int corner) {
   TrianglePoint r{a, {0, 0, 0}, norm2(p - a), TriangleFeature(4 + corner)};
@@ -77,6 +81,25 @@ SegmentPoints closest_segments(Vec3 p0, Vec3 p1, Vec3 q0, Vec3 q1) {
   offer(closest_on_segment(q0, p0, p1), 0);
   offer(closest_on_segment(q1, p0, p1), 1);
   return best;
+}
+
+bool segments_within(Vec3 p0, Vec3 p1, Vec3 q0, Vec3 q1, double limit) {
+  for (int k = 0; k < 3; ++k)
+    if (std::max(p0[k], p1[k]) + limit < std::min(q0[k], q1[k]) || std::max(q0[k], q1[k]) + limit < std::min(p0[k], p1[k])) return false;
+  // Lines are never further apart than the segments on them. NaN goes on and fails the last comparison.
+  const Vec3 u = p1 - p0, w = q1 - q0, n = cross(u, w);
+  const double along = dot(n, p0 - q0), nn = norm2(n);
+  if (nn > kSolid * norm2(u) * norm2(w) && along * along > limit * limit * (1 + 1e-9) * nn) return false;
+  return closest_segments(p0, p1, q0, q1).distance2 <= limit * limit;
+}
+
+bool triangle_within(Vec3 p, Vec3 a, Vec3 b, Vec3 c, double limit) {
+  for (int k = 0; k < 3; ++k)
+    if (p[k] + limit < std::min({a[k], b[k], c[k]}) || p[k] - limit > std::max({a[k], b[k], c[k]})) return false;
+  const Vec3 u = b - a, w = c - a, n = cross(u, w);
+  const double along = dot(n, p - a), nn = norm2(n);
+  if (nn > kSolid * norm2(u) * norm2(w) && along * along > limit * limit * (1 + 1e-9) * nn) return false;
+  return closest_on_triangle(p, a, b, c).distance2 <= limit * limit;
 }
 
 }  // namespace dfm

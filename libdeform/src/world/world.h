@@ -122,6 +122,8 @@ struct World {
   ContactRows rows;
   ContactState state;
   Acceleration acceleration;
+  Tolerance tolerance;
+  Array<double> disturbance, best_impulse;
   ContactStore store, next_store;
   LawBatches batches;
   Array<double> tangents;

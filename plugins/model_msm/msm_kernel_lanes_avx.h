@@ -17,10 +17,12 @@ MSM_INLINE v4 load4(const double *p) { return _mm256_load_pd(p); }
 MSM_INLINE void store4(double *p, v4 a) { _mm256_store_pd(p, a); }
 MSM_INLINE v4 load_xyz(const double *p) { return _mm256_maskload_pd(p, _mm256_setr_epi64x(-1, -1, -1, 0)); }  // masked: never read
 MSM_INLINE v4 splat(double a) { return _mm256_set1_pd(a); }
+MSM_INLINE v4 set4(double a, double b, double c, double d) { return _mm256_setr_pd(a, b, c, d); }
 MSM_INLINE v4 sqrt4(v4 a) { return _mm256_sqrt_pd(a); }
 MSM_INLINE v4 max4(v4 a, v4 b) { return _mm256_max_pd(a, b); }
 MSM_INLINE v4 abs4(v4 a) { return _mm256_andnot_pd(_mm256_set1_pd(-0.0), a); }
 MSM_INLINE v4 zero_unless_above(v4 value, v4 a, v4 limit) { return _mm256_and_pd(value, _mm256_cmp_pd(a, limit, _CMP_GT_OQ)); }
+MSM_INLINE v4 yzx(v4 a) { return _mm256_permute4x64_pd(a, 0xc9); }
 template <int kLane>
 MSM_INLINE v4 lane(v4 a) { return _mm256_permute4x64_pd(a, kLane * 0x55); }
 

@@ -1,0 +1,13 @@
+#include "model_msm/msm_kernel_lanes_sse2.h"
+
+namespace msm {
+namespace {
+MSM_INLINE v4 gather4(const double *p, const unsigned *n) { return {_mm_set_pd(p[n[1]], p[n[0]]), _mm_set_pd(p[n[3]], p[n[2]])}; }
+}  // namespace
+}  // namespace msm
+
+#include "msm_bound_lanes.h"
+
+namespace bound {
+const Kernels *kernels_sse2() { return &kKernels; }
+}  // namespace bound

@@ -1,0 +1,140 @@
+// Detection of two crossed fine cylinders (../shared/meshes/thesis/cyl_fine.msh, or one of our own of that size where it is absent), pressed flat
+// against each other: at rest, and with the upper one rolling at 50 mm/s. Step 0.25 ms; time per step, one core.
+#include <benchmark/benchmark.h>
+
+#include <cmath>
+#include <filesystem>
+
+#include "../unit/surfel/detect_scene.h"
+#include "mesh/mesh.h"
+#include "support.h"
+
+namespace {
+
+using namespace dfm;
+using test::Scene;
+
+constexpr double kStep = 0.25e-3, kRadius = 0.02, kSqueeze = 0.4e-3;
+
+// Axis along y through the origin, radius kRadius.
+test::Mesh fine_cylinder() {
+  const std::string shared = test::shared_dir();
+  const std::string path = shared + "/meshes/thesis/cyl_fine.msh";
+  const bool have = !shared.empty() && std::filesystem::exists(path);
+  const TetMesh tets = have ? read_tet_mesh(Memory::standard(), path) : make_cylinder(Memory::standard(), 0.02, 0.16, 4);
+  const Array<uint32_t> tri = boundary_triangles(tets.tets);
+  test::Mesh m;
+  m.x.assign(tets.points.begin(), tets.points.end());
+  m.tri.assign(tri.begin(), tri.end());
+  Vec3 lo{1e9, 1e9, 1e9}, hi{-1e9, -1e9, -1e9};
+  for (uint32_t i = 0; i < m.npoint(); ++i)
+    for (int k = 0; k < 3; ++k) lo[k] = std::min(lo[k], m.at(i)[k]), hi[k] = std::max(hi[k], m.at(i)[k]);
+  int axis = 0;
+  for (int k = 1; k < 3; ++k)
+    if (hi[k] - lo[k] > hi[axis] - lo[axis]) axis = k;
+  const double scale = 2 * kRadius / (hi[(axis + 1) % 3] - lo[(axis + 1) % 3]);
+  for (uint32_t i = 0; i < m.npoint(); ++i) {
+    const Vec3 p = m.at(i) - 0.5 * (lo + hi);
+    store3(&m.x[3 * i], scale * Vec3{p[(axis + 2) % 3], p[axis], p[(axis + 1) % 3]});
+  }
+  return m;
+}
+
+struct Pair {
+  Scene scene;
+  test::Mesh rest;
+  double angle = 0, x = 0;
+  explicit Pair(bool parallel) : rest(fine_cylinder()) {
+    scene.h = kStep;
+    scene.add(test::moved(rest, parallel ? Quat{} : test::turn({0, 0, 1}, M_PI / 2), {0, 0, -kRadius}));
+    scene.add(test::moved(rest, {}, {0, 0, kRadius}));
+    scene.offset = 1e-3 * scene.surfaces[0]->median_edge;
+    Surface &lower = *scene.surfaces[0];
+    for (uint32_t i = 0; i < lower.nsurfel; ++i) flatten(lower.x[4 * i + 2], -1);
+    roll(0);
+  }
+  // Pressed into the plane z = 0, half the rest distance away from it.
+  void flatten(double &z, double side) const { z = side * std::max(side * z - kSqueeze, 0.5 * scene.offset); }
+  void roll(double speed) {
+    x += speed * kStep;
+    angle += speed * kStep / kRadius;
+    Surface &upper = *scene.surfaces[1];
+    for (uint32_t i = 0; i < upper.nsurfel; ++i) {
+      const Vec3 r = rotate(test::turn({0, 1, 0}, angle), rest.at(upper.point[i])), p = r + Vec3{x, 0, kRadius};
+      store3(&upper.x[4 * i], p);
+      store3(&upper.v[4 * i], (speed / kRadius) * Vec3{p.z, 0, x - p.x});
+      flatten(upper.x[4 * i + 2], 1);
+    }
+  }
+};
+
+void pair_step(benchmark::State &state, bool parallel, double speed) {
+  Pair pair(parallel);
+  Scene &s = pair.scene;
+  BroadPhase broad(Memory::standard());
+  Array<ContactPoint> contacts;
+  double n = 0, candidates = 0, steps = 0;
+  for (auto _ : state) {
+    if (speed > 0) {
+      state.PauseTiming();
+      pair.roll(std::fmod(steps, 800) < 400 ? speed : -speed);   // to and fro by 5 mm
+      state.ResumeTiming();
+    }
+    broad.update(s.bodies, s.obstacles, s.filter, s.h, s.offset);
+    find_contacts(s.bodies, s.obstacles, broad.candidates(), s.h, s.offset, contacts);
+    n += double(contacts.size()), candidates += double(broad.candidates().size()), steps += 1;
+  }
+  state.counters["contacts"] = n / steps;
+  state.counters["candidates"] = candidates / steps;
+  state.counters["renewals_per_step"] = double(broad.stats().renewals) / steps;
+}
+BENCHMARK_CAPTURE(pair_step, crossed_rest, false, 0.0);
+BENCHMARK_CAPTURE(pair_step, crossed_rolling, false, 0.05)->Iterations(4000);
+BENCHMARK_CAPTURE(pair_step, parallel_rest, true, 0.0);
+BENCHMARK_CAPTURE(pair_step, parallel_rolling, true, 0.05)->Iterations(4000);
+
+void idle_check(benchmark::State &state) {
+  Pair pair(false);
+  BroadPhase broad(Memory::standard());
+  Scene &s = pair.scene;
+  for (auto _ : state) broad.update(s.bodies, s.obstacles, s.filter, s.h, s.offset);
+}
+BENCHMARK(idle_check);
+
+void renew_lists(benchmark::State &state) {
+  Pair pair(state.range(0));
+  BroadPhase broad(Memory::standard());
+  Scene &s = pair.scene;
+  broad.update(s.bodies, s.obstacles, s.filter, s.h, s.offset);
+  double shift = 0.01;
+  for (auto _ : state) {
+    state.PauseTiming();
+    for (auto &surface : s.surfaces)
+      for (uint32_t i = 0; i < surface->nsurfel; ++i) surface->x[4 * i] += shift;
+    shift = -shift;
+    state.ResumeTiming();
+    broad.update(s.bodies, s.obstacles, s.filter, s.h, s.offset);
+  }
+}
+BENCHMARK(renew_lists)->Arg(0)->Arg(1)->Iterations(1000);
+
+void tree_rebuild(benchmark::State &state) {
+  Pair pair(false);
+  BoxTree tree(Memory::standard());
+  const Surface &s = *pair.scene.surfaces[0];
+  for (auto _ : state) tree.build(s, s.x.data());
+}
+BENCHMARK(tree_rebuild);
+
+void tree_refit(benchmark::State &state) {
+  Pair pair(false);
+  BoxTree tree(Memory::standard());
+  const Surface &s = *pair.scene.surfaces[0];
+  tree.build(s, s.x.data());
+  for (auto _ : state) tree.refit(s, s.x.data());
+}
+BENCHMARK(tree_refit);
+
+}  // namespace
+
+BENCHMARK_MAIN();

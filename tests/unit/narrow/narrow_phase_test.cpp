@@ -1,0 +1,446 @@
+#include <gtest/gtest.h>
+
+#include <set>
+
+#include "../surfel/detect_scene.h"
+#include "surfel/closest.h"
+
+namespace {
+
+using namespace dfm;
+using namespace test;
+
+// A probe: a tiny tetrahedron whose lowest corner is at `tip`, so that one surfel meets the other surface.
+constexpr double kProbe = 0.02;
+Mesh probe(Vec3 tip, Quat q = {}) {
+  return moved(tetrahedron_mesh({0, 0, 0}, {kProbe, 0, 2 * kProbe}, {-kProbe, kProbe, 2 * kProbe}, {-kProbe, -kProbe, 2 * kProbe}), q, tip);
+}
+std::vector<ContactPoint> of_tip(const Scene &scene, uint32_t body, uint32_t surfel) {
+  std::vector<ContactPoint> found;
+  for (const ContactPoint &c : scene.contacts())
+    if (c.slot_a == body && c.type_a == 0 && c.feature_a == surfel && !c.obstacle) found.push_back(c);
+  return found;
+}
+
+// A floor with a valley or a ridge along y at x = 0: two slabs that rise to both sides by `rise`, closed below.
+Mesh folded_floor(double rise, int n) {
+  Welder w;
+  for (int side = 0; side < 2; ++side) {
+    const double x0 = side ? 0 : -1, x1 = side ? 1 : 0, z0 = side ? 0 : rise, z1 = side ? rise : 0;
+    w.patch({x0, -1, z0}, {x1 - x0, 0, z1 - z0}, {0, 2, 0}, n, 2 * n);
+    w.patch({x0, -1, -3}, {0, 2, 0}, {x1 - x0, 0, 0}, 2 * n, n);
+  }
+  return w.mesh;
+}
+
+TEST(VertexFace, PointOverFace_HasFaceNormalAndBarycentricWeights) {
+  Scene scene;
+  scene.add(probe({0.1, 0.3, 0.5005}));
+  scene.add(box_mesh({2, 2, 1}, 2, 2, 1));
+  const auto c = of_tip(scene, 0, 0);
+  ASSERT_EQ(c.size(), 1u);
+  EXPECT_NEAR(c[0].distance, 5e-4, 1e-15);
+  EXPECT_EQ(c[0].normal[2], 1.0);
+  EXPECT_EQ(c[0].kind, kVertexFace);
+  EXPECT_EQ(c[0].nnode, 4);
+  EXPECT_DOUBLE_EQ(c[0].area, scene.surfaces[0]->area[0] / 2);
+  EXPECT_EQ(flaw(scene, scene.contacts()), "");
+}
+
+TEST(VertexFace, Reach_GrowsWithRelativeSpeedOnly) {
+  for (const double speed : {0.0, 1.0, 5.0})
+    for (const double common : {0.0, 100.0}) {
+      const double reach = 2e-3 + 2e-3 * speed;
+      for (const double part : {0.99, 1.01}) {
+        Scene scene;
+        scene.add(probe({0.1, 0.3, 0.5 + part * reach}), {0, 0, common - speed});
+        scene.add(box_mesh({2, 2, 1}, 2, 2, 1), {0, 0, common});
+        EXPECT_EQ(of_tip(scene, 0, 0).size(), part < 1 ? 1u : 0u) << speed << " " << common;
+      }
+    }
+}
+
+// Slides a tip over a flat face cut into triangles: exactly one contact everywhere, always with the plane's own normal and distance.
+TEST(VertexFace, SlideOverFlatTriangulation_SeesNoBump) {
+  Scene scene;
+  scene.add(probe({0, 0, 0}));
+  scene.add(moved(box_mesh({2, 2, 1}, 7, 5, 1), turn({0, 0, 1}, 0.3), {0, 0, -0.5}));
+  std::mt19937 random(1);
+  std::uniform_real_distribution<double> unit(-0.6, 0.6);
+  const Surface &floor = *scene.surfaces[1];
+  std::vector<Vec3> tips;
+  for (int i = 0; i < 400; ++i) tips.push_back({unit(random), unit(random), 1e-3});
+  for (uint32_t e = 0; e < floor.nedge; ++e) {      // right above edges and corners
+    const Vec3 a = load3(&floor.x[4 * floor.edge[2 * e]]), b = load3(&floor.x[4 * floor.edge[2 * e + 1]]);
+    for (const double t : {0.0, 0.25, 0.5})
+      if (a.z > -0.1 && b.z > -0.1) {
+        const Vec3 p = a + t * (b - a);
+        if (std::fabs(p.x) < 0.6 && std::fabs(p.y) < 0.6)
+          for (const double off : {0.0, 1e-16, 1e-12, 1e-9, -1e-7}) tips.push_back({p.x + off, p.y - off, 1e-3});
+      }
+  }
+  Surface &s = *scene.surfaces[0];
+  const Mesh at_origin = probe({0, 0, 0});
+  for (const Vec3 tip : tips) {
+    for (uint32_t i = 0; i < s.nsurfel; ++i) store3(&s.x[4 * i], at_origin.at(i) + tip);
+    const auto c = of_tip(scene, 0, 0);
+    ASSERT_EQ(c.size(), 1u) << tip.x << " " << tip.y;
+    EXPECT_NEAR(c[0].distance, 1e-3, 1e-12);
+    EXPECT_NEAR(c[0].normal[2], 1, 1e-9);
+    EXPECT_LT(std::hypot(c[0].normal[0], c[0].normal[1]), 1e-5);
+  }
+  EXPECT_GT(tips.size(), 600u);
+}
+
+// Round a tessellated cylinder at a constant distance from its surface: one contact each, the normal within the faces' own spread.
+TEST(VertexFace, SlideRoundCylinder_OneContactWithTurningNormal) {
+  const int n = 32;
+  Scene scene;
+  scene.add(probe({0, 0, 0}));
+  const Mesh cylinder = cylinder_mesh(0.5, 1, n, 8);
+  scene.add(cylinder);
+  Surface &s = *scene.surfaces[0];
+  std::set<uint64_t> keys;
+  Vec3 last;
+  for (int i = 0; i < 1000; ++i) {
+    const double angle = 0.001 * M_PI * i, radius = 0.5005;
+    const Vec3 out{std::cos(angle), 0, std::sin(angle)}, tip{radius * out.x, 0.013 + 1e-4 * i, radius * out.z};
+    const Mesh p = probe(tip, turn({0, 1, 0}, M_PI / 2 - angle));
+    for (uint32_t k = 0; k < s.nsurfel; ++k) store3(&s.x[4 * k], p.at(k));
+    scene.offset = 4e-3;
+    const auto c = of_tip(scene, 0, 0);
+    ASSERT_EQ(c.size(), 1u) << i;
+    const Vec3 normal = load3(c[0].normal);
+    EXPECT_GT(dot(normal, out), std::cos(1.01 * M_PI / n));
+    EXPECT_GT(c[0].distance, 0);
+    EXPECT_LT(c[0].distance, 0.0005 + 0.5 * (1 - std::cos(M_PI / n)) + 1e-9);
+    keys.insert(c[0].key);
+    last = normal;
+  }
+  EXPECT_LT(last.x, -0.9);
+  EXPECT_EQ(keys.size(), 1u) << "one patch, one key";
+}
+
+TEST(VertexFace, OverConvexEdgeAndCorner_OneContactAlongTheDirection) {
+  Scene scene;
+  scene.add(box_mesh({1, 1, 1}, 3, 3, 3));
+  scene.add(probe({0, 0, 0}));
+  Surface &s = *scene.surfaces[1];
+  std::mt19937 random(4);
+  std::uniform_real_distribution<double> unit(0, 1);
+  for (int i = 0; i < 300; ++i) {
+    const bool corner = i % 2;
+    const Vec3 d = 1.5e-3 * normalized(Vec3{unit(random), corner ? unit(random) : 0, unit(random)});
+    const Vec3 tip = Vec3{0.5, corner ? 0.5 : unit(random) - 0.5, 0.5} + d;
+    for (uint32_t k = 0; k < s.nsurfel; ++k) store3(&s.x[4 * k], probe(tip).at(k));
+    const auto c = of_tip(scene, 1, 0);
+    ASSERT_EQ(c.size(), 1u);
+    EXPECT_NEAR(c[0].distance, 1.5e-3, 1e-12);
+    EXPECT_LT(norm(load3(c[0].normal) - normalized(d)), 1e-9);
+    EXPECT_EQ(flaw(scene, scene.contacts()), "");
+  }
+}
+
+// A step in a floor: beside the riser both planes hold the tip, in front and behind of the fold alike.
+TEST(VertexFace, InValley_BothPlanesHold) {
+  for (const double rise : {0.2, 1.0, 2.0}) {
+    Scene scene;
+    scene.add(folded_floor(rise, 4));
+    const Vec3 n0 = normalized({rise, 0, 1}), n1 = normalized({-rise, 0, 1});
+    scene.add(probe({0, 0.1, 1e-3 * std::sqrt(1 + rise * rise)}), {1, 0, 0});
+    const auto c = of_tip(scene, 1, 0);
+    ASSERT_EQ(c.size(), 2u) << rise;
+    int seen = 0;
+    for (const ContactPoint &k : c)
+      for (const Vec3 n : {n0, n1})
+        if (norm(load3(k.normal) - n) < 1e-9) {
+          ++seen;
+          EXPECT_NEAR(k.distance, 1e-3, 1e-12);
+        }
+    EXPECT_EQ(seen, 2);
+    EXPECT_NE(c[0].key, c[1].key);
+    EXPECT_EQ(flaw(scene, scene.contacts()), "");
+  }
+}
+
+// Above one side of a gentle valley, about to reach the other side within the step: the other plane is there in advance, with weights that
+// sum to one and no torque.
+TEST(VertexFace, NearValley_PlaneAcrossIsExtrapolated) {
+  Scene scene;
+  scene.add(folded_floor(0.2, 4));
+  const Vec3 n0 = normalized({0.2, 0, 1});
+  const double s = 1e-3;                       // beside the fold, above the left side
+  scene.add(probe(Vec3{-s, 0.1, 0.2 * s} + 1e-4 * n0), {2, 0, 0});
+  const auto c = of_tip(scene, 1, 0);
+  ASSERT_EQ(c.size(), 2u);
+  EXPECT_EQ(flaw(scene, scene.contacts()), "");
+  const ContactPoint &across = c[0].normal[0] < 0 ? c[0] : c[1];
+  double most = 0;
+  for (int k = 1; k < across.nnode; ++k) most = std::max(most, across.weight[k]);
+  EXPECT_GT(most, 0) << "extrapolated: one weight of side b has the other sign";
+  EXPECT_GT(across.distance, 1e-4);
+  // Far from the fold, or slow, there is nothing to reach.
+  Scene slow;
+  slow.add(folded_floor(0.2, 4));
+  slow.add(probe(Vec3{-5 * s, 0.1, 5 * 0.2 * s} + 1e-4 * n0), {0.001, 0, 0});
+  EXPECT_EQ(of_tip(slow, 1, 0).size(), 1u);
+}
+
+TEST(VertexFace, SlightlyInside_IsPushedOutThroughTheNearestFace) {
+  Scene scene;
+  scene.add(box_mesh({1, 1, 1}, 4, 4, 4));
+  scene.add(probe({0.49, 0.03, 0.498}));         // 2 mm below the top, 10 mm beside the side
+  auto c = of_tip(scene, 1, 0);
+  ASSERT_EQ(c.size(), 1u);
+  EXPECT_NEAR(c[0].distance, -2e-3, 1e-12);
+  EXPECT_EQ(c[0].normal[2], 1.0);
+  // Deeper than a quarter edge: the nearest face is not trusted any more.
+  Scene deep;
+  deep.add(box_mesh({1, 1, 1}, 4, 4, 4));
+  deep.add(probe({0.05, 0.03, 0.40}));
+  EXPECT_TRUE(of_tip(deep, 1, 0).empty());
+}
+
+// A plate thinner than the recovery depth: a tip under it is held below, never pulled through to the top.
+TEST(VertexFace, ThinPlate_FarSideDoesNotPull) {
+  for (const double below : {-5e-4, 1e-5, 5e-4, 1e-3}) {
+    Scene scene;
+    scene.add(box_mesh({1, 1, 4e-3}, 4, 4, 1));
+    scene.add(probe({0.05, 0.03, -2e-3 - below}, turn({1, 0, 0}, M_PI)));
+    const auto c = of_tip(scene, 1, 0);
+    ASSERT_EQ(c.size(), 1u) << below;
+    EXPECT_LT(c[0].normal[2], -0.999);
+    EXPECT_NEAR(c[0].distance, below, 1e-12);
+  }
+}
+
+// Inside the corner of an L both planes push, also when the tip has gone below both.
+TEST(VertexFace, BelowBothPlanesOfValley_BothPush) {
+  Scene scene;
+  scene.add(folded_floor(1, 4));
+  scene.add(probe({1e-5, 0.1, -2e-4}));
+  const auto c = of_tip(scene, 1, 0);
+  ASSERT_EQ(c.size(), 2u);
+  for (const ContactPoint &k : c) EXPECT_LT(k.distance, 0);
+  EXPECT_LT(c[0].normal[0] * c[1].normal[0], 0);
+  EXPECT_EQ(flaw(scene, scene.contacts()), "");
+}
+
+// The nearest distance over all contacts equals the brute-force distance of two bodies apart, from every direction: no gap in the rules.
+TEST(FindContacts, NearestContact_IsTheDistanceOfTheBodies) {
+  std::mt19937 random(8);
+  std::normal_distribution<double> normal;
+  const Mesh meshes[3] = {box_mesh({1, 0.7, 0.5}, 1, 1, 1), sphere_mesh(0.5, 1), tetrahedron_mesh({0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0.1, 0.2, 0.8})};
+  int edges = 0, faces = 0, rims = 0;
+  for (int i = 0; i < 600; ++i) {
+    Scene scene;
+    scene.offset = 0.05;
+    scene.h = 0;
+    const auto any_turn = [&] { return turn({normal(random), normal(random), normal(random)}, 3 * normal(random)); };
+    scene.add(moved(meshes[i % 3], any_turn(), {}));
+    Surface &b = scene.add(moved(meshes[(i / 3) % 3], any_turn(), {}));
+    const Surface &a = *scene.surfaces[0];
+    const auto distance = [&] {
+      double least = 1e9;
+      for (int side = 0; side < 2; ++side) {
+        const Surface &p = side ? b : a, &q = side ? a : b;
+        for (uint32_t v = 0; v < p.nsurfel; ++v)
+          for (uint32_t t = 0; t < q.ntri; ++t)
+            least = std::min(least, closest_on_triangle(load3(&p.x[4 * v]), load3(&q.x[4 * q.tri[3 * t]]), load3(&q.x[4 * q.tri[3 * t + 1]]),
+                                                        load3(&q.x[4 * q.tri[3 * t + 2]])).distance2);
+      }
+      for (uint32_t e = 0; e < a.nedge; ++e)
+        for (uint32_t f = 0; f < b.nedge; ++f)
+          least = std::min(least, closest_segments(load3(&a.x[4 * a.edge[2 * e]]), load3(&a.x[4 * a.edge[2 * e + 1]]),
+                                                   load3(&b.x[4 * b.edge[2 * f]]), load3(&b.x[4 * b.edge[2 * f + 1]])).distance2);
+      return std::sqrt(least);
+    };
+    // From far away towards each other until they are 0.03 to 0.09 apart.
+    const Vec3 way = normalized({normal(random), normal(random), normal(random)});
+    for (uint32_t v = 0; v < b.nsurfel; ++v) store3(&b.x[4 * v], load3(&b.x[4 * v]) + 3.0 * way);
+    double d = distance();
+    for (int k = 0; k < 200 && d > 0.09; ++k) {
+      const double go = std::max(0.5 * (d - 0.03), 0.005);
+      for (uint32_t v = 0; v < b.nsurfel; ++v) store3(&b.x[4 * v], load3(&b.x[4 * v]) - go * way);
+      d = distance();
+    }
+    if (d > 0.099 || d < 1e-3) continue;
+    const auto contacts = scene.contacts();
+    ASSERT_EQ(flaw(scene, contacts), "");
+    double least = 1e9;
+    const ContactPoint *nearest = nullptr;
+    for (const ContactPoint &c : contacts)
+      if (c.distance < least) least = c.distance, nearest = &c;
+    ASSERT_NE(nearest, nullptr) << "pair " << i << " at distance " << d;
+    EXPECT_NEAR(least, d, 1e-9) << "pair " << i;
+    const Vec3 n = load3(nearest->normal);
+    EXPECT_GT(dot(n, way) * (nearest->slot_a == 1 ? 1 : -1), 0);
+    edges += nearest->kind == kEdgeEdge, faces += nearest->kind == kVertexFace && nearest->nnode == 4;
+    rims += nearest->kind == kVertexFace && nearest->nnode < 4;
+  }
+  EXPECT_GT(edges, 50);
+  EXPECT_GT(faces, 50);
+  EXPECT_GT(rims, 10);
+}
+
+Scene crossed_tetrahedra(double gap) {
+  Scene scene;
+  scene.add(tetrahedron_mesh({-1, 0, 0}, {1, 0, 0}, {0, -0.5, -1}, {0, 0.5, -1}));
+  scene.add(tetrahedron_mesh({0, -1, gap}, {0, 1, gap}, {-0.5, 0, gap + 1}, {0.5, 0, gap + 1}));
+  return scene;
+}
+
+// Only edges meet; no vertex of either is near the other (errata 4.2: the source misses this case).
+TEST(EdgeEdge, CrossedTetrahedra_MeetEdgeOnEdge) {
+  Scene scene = crossed_tetrahedra(1e-3);
+  const auto c = scene.contacts();
+  ASSERT_EQ(c.size(), 1u);
+  EXPECT_EQ(c[0].kind, kEdgeEdge);
+  EXPECT_EQ(c[0].slot_a, 0u);
+  EXPECT_NEAR(c[0].distance, 1e-3, 1e-15);
+  EXPECT_NEAR(c[0].normal[2], -1, 1e-15);      // from b (above) to a
+  EXPECT_NEAR(c[0].point[2], 0.5e-3, 1e-15);
+  for (int k = 0; k < 4; ++k) EXPECT_NEAR(std::fabs(c[0].weight[k]), 0.5, 1e-12);
+  EXPECT_EQ(flaw(scene, c), "");
+  // No end has a contact of its own, so the nearest end (all equally near: the first) lends its share.
+  EXPECT_DOUBLE_EQ(c[0].area, scene.surfaces[0]->area[0] / 2);
+}
+
+TEST(EdgeEdge, SlightPenetration_KeepsItsSign) {
+  Scene scene = crossed_tetrahedra(-1e-3);
+  const auto c = scene.contacts();
+  ASSERT_EQ(c.size(), 1u);
+  EXPECT_NEAR(c[0].distance, -1e-3, 1e-15);
+  EXPECT_NEAR(c[0].normal[2], -1, 1e-15);
+  EXPECT_EQ(flaw(scene, c), "");
+}
+
+TEST(EdgeEdge, ParallelEdges_AreLeftToVertexFace) {
+  Scene scene;
+  scene.add(box_mesh({1, 1, 1}, 1, 1, 1));
+  scene.add(moved(box_mesh({1, 1, 1}, 1, 1, 1), {}, {0.3, 1.0005, 1.0005}));   // edge along edge, diagonally above
+  const auto c = scene.contacts();
+  EXPECT_EQ(flaw(scene, c), "");
+  ASSERT_FALSE(c.empty());
+  for (const ContactPoint &k : c) {
+    EXPECT_EQ(k.kind, kVertexFace);
+    EXPECT_NEAR(k.distance, 5e-4 * std::sqrt(2.0), 1e-12);
+  }
+}
+
+// Edges inside flat faces never count, whatever crosses them.
+TEST(EdgeEdge, FlatFaces_HaveNoEdgeContacts) {
+  Scene scene;
+  scene.add(box_mesh({1, 1, 1}, 5, 5, 2));
+  scene.add(moved(box_mesh({0.6, 0.6, 1}, 7, 3, 2), turn({0, 0, 1}, 0.4), {0, 0, 1.001}));
+  const auto c = scene.contacts();
+  EXPECT_EQ(flaw(scene, c), "");
+  size_t faces = 0;
+  for (const ContactPoint &k : c) {
+    EXPECT_NEAR(std::fabs(k.normal[2]), 1, 1e-9);
+    if (k.kind == kVertexFace) ++faces;
+    if (k.kind == kEdgeEdge) ADD_FAILURE() << "edge " << k.feature_a << " on " << k.feature_b;
+  }
+  EXPECT_GE(faces, 32u + 4u);
+}
+
+// The areas of a fully touching patch sum to the patch, from both sides in halves.
+TEST(FindContacts, SummedArea_IsTheTouchingPatch) {
+  Scene scene;
+  scene.add(box_mesh({4, 4, 1}, 24, 24, 4));
+  scene.add(moved(box_mesh({1, 1, 1}, 30, 31, 4), turn({0, 0, 1}, 0.2), {0, 0, 1.001}));
+  double area = 0;
+  for (const ContactPoint &c : scene.contacts()) area += c.area;
+  // The upper surfels on the rim own a third of the triangles on the sides too.
+  double rim = 0;
+  for (uint32_t i = 0; i < scene.surfaces[1]->nsurfel; ++i)
+    if (scene.surfaces[1]->x[4 * i + 2] < 0.502) rim += scene.surfaces[1]->area[i];
+  EXPECT_NEAR(area, 0.5 * rim + 0.5, 0.02);
+}
+
+TEST(FindContacts, SwappedBodies_GiveMirroredContacts) {
+  Scene one, two;
+  const Mesh m = sphere_mesh(0.5, 2), n = moved(box_mesh({1, 1, 1}, 3, 3, 3), turn({1, 2, 3}, 0.7), {0.9, 0.3, 0.2});
+  one.offset = two.offset = 0.02;
+  one.add(m), one.add(n);
+  two.add(n), two.add(m);
+  const auto a = one.contacts(), b = two.contacts();
+  ASSERT_EQ(a.size(), b.size());
+  ASSERT_GT(a.size(), 3u);
+  for (const ContactPoint &c : a) {
+    int matches = 0;
+    for (const ContactPoint &d : b) {
+      if (c.kind != d.kind || norm(load3(c.point) - load3(d.point)) > 1e-12) continue;
+      const bool same_side = c.slot_a == 1 - d.slot_a;
+      EXPECT_EQ(same_side, c.kind == kVertexFace);
+      EXPECT_NEAR(c.distance, d.distance, 1e-14);
+      EXPECT_LT(norm(load3(c.normal) - (same_side ? 1.0 : -1.0) * load3(d.normal)), 1e-12);
+      ++matches;
+    }
+    EXPECT_EQ(matches, 1);
+  }
+}
+
+TEST(FindContacts, Translation_KeepsContacts) {
+  Scene one, two;
+  const Vec3 shift{10, 20, 30};
+  const Mesh m = sphere_mesh(0.5, 2), n = moved(sphere_mesh(0.5, 2), turn({1, 2, 3}, 0.7), {0.9, 0.3, 0.2});
+  for (Scene *s : {&one, &two}) {
+    s->offset = 0.02;
+    const Vec3 by = s == &one ? Vec3{} : shift;
+    s->add(moved(m, {}, by));
+    s->add(moved(n, {}, by));
+    ObstacleView &o = s->add(Shape::box, by + Vec3{-0.7, 0, 0}, turn({1, 1, 0}, 0.5));
+    o.half_size = {0.2, 0.2, 0.2};
+  }
+  const auto a = one.contacts(), b = two.contacts();
+  ASSERT_EQ(a.size(), b.size());
+  ASSERT_GT(a.size(), 5u);
+  for (size_t i = 0; i < a.size(); ++i) {
+    EXPECT_EQ(a[i].key, b[i].key);
+    EXPECT_NEAR(a[i].distance, b[i].distance, 1e-12);
+    EXPECT_LT(norm(load3(a[i].point) + shift - load3(b[i].point)), 1e-12);
+    EXPECT_LT(norm(load3(a[i].normal) - load3(b[i].normal)), 1e-9);
+  }
+}
+
+TEST(FindContacts, CallOrderOfViews_DoesNotMatter) {
+  Scene scene;
+  scene.offset = 0.02;
+  scene.add(sphere_mesh(0.5, 2));
+  scene.add(moved(sphere_mesh(0.5, 2), {}, {0.99, 0, 0}));
+  const auto c = scene.all();
+  const auto a = scene.contacts(c);
+  std::swap(scene.bodies[0], scene.bodies[1]);
+  EXPECT_TRUE(same_bits(a, scene.contacts(c)));
+}
+
+TEST(FindContacts, DegenerateShapes_StayFinite) {
+  const Mesh box = box_mesh({1, 1, 1}, 2, 2, 2);
+  for (int kind = 0; kind < 5; ++kind) {
+    Scene scene;
+    scene.offset = 0.01;
+    Surface &s = scene.add(box);
+    scene.add(moved(box, {}, {0.2, 0.1, 0.4}));
+    for (uint32_t i = 0; i < s.nsurfel; ++i) {
+      double *x = &s.x[4 * i];
+      if (kind == 0) x[0] = x[1] = x[2] = 0.5;          // one point
+      if (kind == 1) x[1] = x[2] = 0;                    // a line
+      if (kind == 2) x[2] = 0.6;                         // a sheet
+      if (kind == 3) x[0] = -x[0];                       // inside out
+      if (kind == 4 && i % 3 == 0) x[0] = NAN;
+    }
+    for (const Shape shape : {Shape::plane, Shape::sphere, Shape::box, Shape::capsule}) {
+      ObstacleView &o = scene.add(shape, {0.5, 0.1, 0.1});
+      o.half_size = {0.3, 0.3, 0.3}, o.radius = 0.3, o.half_length = 0;
+    }
+    const auto c = scene.contacts();
+    if (kind != 4) {
+      EXPECT_EQ(flaw(scene, c), "") << kind;
+      continue;
+    }
+    for (const ContactPoint &k : c) EXPECT_TRUE(std::isfinite(k.distance) && std::isfinite(k.normal[0]) && std::isfinite(k.point[0]));
+  }
+}
+
+}  // namespace
