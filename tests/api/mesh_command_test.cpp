@@ -165,3 +165,23 @@ TEST(MeshApi, WrongArguments_LeaveTheOutputAlone) {
   EXPECT_EQ(dfm_tetmesh_read(c.context, own("none.msh").c_str(), &mesh), DFM_E_IO);
   EXPECT_EQ(mesh, 77u);
 }
+
+TEST(MeshApi, SurfaceGroupInAScene_HoldsItsPoints) {
+  const auto top_after_a_step = [](const std::string &fix) {
+    const std::string scene = folder() + "/group" + std::to_string(fix.size()) + ".json";
+    test::write_file(scene, "{\"format\": \"deform-scene\", \"version\": 1, \"time\": {\"duration\": 1, \"step\": 0.0001}, \"bodies\": "
+                            "[{\"name\": \"cube\", \"mesh\": \"" + own("cube_msh41_ascii.msh") + "\"" + fix + "}]}");
+    Context c;
+    dfm_world world = 0;
+    dfm_body body = 0;
+    double x[24] = {};
+    uint32_t n = 0;
+    EXPECT_EQ(dfm_scene_load(c.context, scene.c_str(), &world), DFM_OK) << dfm_last_error();
+    EXPECT_EQ(dfm_world_step(world, 1e-4, nullptr), DFM_OK) << dfm_last_error();
+    EXPECT_EQ(dfm_world_find_body(world, "cube", &body), DFM_OK);
+    EXPECT_EQ(dfm_body_get_state(body, 8, x, nullptr, &n), DFM_OK) << dfm_last_error();
+    return x[23];
+  };
+  EXPECT_LT(top_after_a_step(""), 1.0);
+  EXPECT_EQ(top_after_a_step(", \"fix\": [{\"group\": \"skin\"}]"), 1.0);
+}
