@@ -38,13 +38,8 @@ function(deform_kernel_flags)
     if(file MATCHES "_kernel_avx2\\.cpp$")
       set_source_files_properties(${file} PROPERTIES COMPILE_OPTIONS "-mavx2;-mno-fma")
     elseif(file MATCHES "_kernel_avx512\\.cpp$")
-      # clang counts FMA as part of AVX-512: -mno-fma would switch both off. Nothing is fused all the same: -ffp-contract=off.
       set_source_files_properties(${file} PROPERTIES COMPILE_OPTIONS
-<<<<<<< HEAD
-        "-mavx512f;-mavx512vl;-mavx512dq;-mprefer-vector-width=512;$<$<NOT:$<CXX_COMPILER_ID:Clang>>:-mno-fma>")
-=======
         "-mavx512f;-mavx512vl;-mavx512dq;-mprefer-vector-width=512")
->>>>>>> doors
     endif()
   endforeach()
 endfunction()
