@@ -145,7 +145,7 @@ class Reader {
     do {
       out.members.emplace_back();
       space();
-      if (!string(out.members.back().first) || !take(':') || !value(out.members.back().second, depth + 1)) return false;
+      if (!string(out.members.back().name) || !take(':') || !value(out.members.back().value, depth + 1)) return false;
     } while (take(','));
     return take('}');
   }

@@ -41,20 +41,23 @@ struct Context {
 TEST(MeshCommand, Info_PrintsCountsGroupsAndWarnings) {
   const auto r = test::deform({"mesh", "info", own("cube_msh41_ascii.msh")});
   EXPECT_EQ(r.exit_code, 0) << r.err;
-  for (const char *word : {"points            8", "tetrahedra        6", "surface triangles 12", "edges             19", "volume            1 m3",
-                           "skin (triangles, 8 points)", "high end (cells, 6 points)", "warning: 1 point that no tetrahedron uses was dropped"})
+  for (const char *word : {"points            8", "tetrahedra        6", "surface triangles 12", "edges             19",
+                           "volume            1 m3", "skin (triangles, 8 points)", "high end (cells, 6 points)",
+                           "warning: 1 point that no tetrahedron uses was dropped"})
     EXPECT_TRUE(has(r.out, word)) << word << " not in\n" << r.out;
 }
 
 TEST(MeshCommand, InfoAsJson_HoldsTheSame) {
   const auto r = test::deform({"mesh", "info", "--json", own("cube_msh22_bin_be.msh")});
   EXPECT_EQ(r.exit_code, 0) << r.err;
-  for (const char *word : {"\"points\": 8", "\"tets\": 6", "\"surface_triangles\": 12", "\"edges\": 19", "\"pieces\": 1", "\"dropped_points\": 1", "\"name\": \"high end\""})
+  for (const char *word : {"\"points\": 8", "\"tets\": 6", "\"surface_triangles\": 12", "\"edges\": 19", "\"pieces\": 1",
+                           "\"dropped_points\": 1", "\"name\": \"high end\""})
     EXPECT_TRUE(has(r.out, word)) << word << " not in\n" << r.out;
 }
 
 TEST(MeshCommand, Make_WritesEachShape) {
-  const std::vector<std::vector<std::string>> shapes = {{"cylinder", "--radius", "0.2", "--length", "1"}, {"beam", "--size", "1", "0.1", "0.2"}, {"ball", "--radius", "0.05"}};
+  const std::vector<std::vector<std::string>> shapes = {
+      {"cylinder", "--radius", "0.2", "--length", "1"}, {"beam", "--size", "1", "0.1", "0.2"}, {"ball", "--radius", "0.05"}};
   for (const auto &shape : shapes)
     for (const char *ending : {".msh", ".msh2", ".vtk"}) {
       const std::string out = folder() + "/" + shape[0] + ending;
@@ -76,8 +79,9 @@ TEST(MeshCommand, Convert_ThereAndBackKeepsTheBytes) {
 }
 
 TEST(MeshCommand, BadInput_ExitsTwoWithOneSentence) {
-  test::write_file(folder() + "/flat.vtk", "# vtk DataFile Version 3.0\nt\nASCII\nDATASET UNSTRUCTURED_GRID\nPOINTS 4 double\n0 0 0\n1 0 0\n0 1 0\n1 1 0\n"
-                                           "CELLS 1 5\n4 0 1 2 3\nCELL_TYPES 1\n10\n");
+  test::write_file(folder() + "/flat.vtk",
+      "# vtk DataFile Version 3.0\nt\nASCII\nDATASET UNSTRUCTURED_GRID\nPOINTS 4 double\n0 0 0\n1 0 0\n0 1 0\n1 1 0\n"
+      "CELLS 1 5\n4 0 1 2 3\nCELL_TYPES 1\n10\n");
   test::write_file(folder() + "/surface.obj", "v 0 0 0\n");
   const std::string ball = folder() + "/ball.msh";
   expect_refused({"mesh", "info", folder() + "/none.msh"}, {"none.msh", "No such file"});
@@ -160,4 +164,24 @@ TEST(MeshApi, WrongArguments_LeaveTheOutputAlone) {
   EXPECT_EQ(dfm_tetmesh_read(c.context, nullptr, &mesh), DFM_E_ARG);
   EXPECT_EQ(dfm_tetmesh_read(c.context, own("none.msh").c_str(), &mesh), DFM_E_IO);
   EXPECT_EQ(mesh, 77u);
+}
+
+TEST(MeshApi, SurfaceGroupInAScene_HoldsItsPoints) {
+  const auto top_after_a_step = [](const std::string &fix) {
+    const std::string scene = folder() + "/group" + std::to_string(fix.size()) + ".json";
+    test::write_file(scene, "{\"format\": \"deform-scene\", \"version\": 1, \"time\": {\"duration\": 1, \"step\": 0.0001}, \"bodies\": "
+                            "[{\"name\": \"cube\", \"mesh\": \"" + own("cube_msh41_ascii.msh") + "\"" + fix + "}]}");
+    Context c;
+    dfm_world world = 0;
+    dfm_body body = 0;
+    double x[24] = {};
+    uint32_t n = 0;
+    EXPECT_EQ(dfm_scene_load(c.context, scene.c_str(), &world), DFM_OK) << dfm_last_error();
+    EXPECT_EQ(dfm_world_step(world, 1e-4, nullptr), DFM_OK) << dfm_last_error();
+    EXPECT_EQ(dfm_world_find_body(world, "cube", &body), DFM_OK);
+    EXPECT_EQ(dfm_body_get_state(body, 8, x, nullptr, &n), DFM_OK) << dfm_last_error();
+    return x[23];
+  };
+  EXPECT_LT(top_after_a_step(""), 1.0);
+  EXPECT_EQ(top_after_a_step(", \"fix\": [{\"group\": \"skin\"}]"), 1.0);
 }

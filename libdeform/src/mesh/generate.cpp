@@ -1,4 +1,5 @@
-// Structured bodies with near-isotropic cells and no preferred direction. Only + - * / sqrt, so the same bits on every machine.
+// Structured bodies with near-isotropic cells and no preferred direction. Coordinates come from + - * / sqrt alone, so their bits are the
+// same on every machine.
 //
 //   beam      body-centred cubic lattice: grid points and cell centres; four cells around each inner grid face (mean ratio 0.95), two on
 //             each boundary face with alternating diagonals. All inner points have 14 neighbours.

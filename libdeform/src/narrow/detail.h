@@ -76,8 +76,8 @@ void edge_edge(const Pair &pair, Run run, Array<ContactPoint> &out);
 void surfel_obstacle(const Pair &pair, Run run, Array<ContactPoint> &out);
 void edge_obstacle(const Pair &pair, Run run, Array<ContactPoint> &out);
 void triangle_obstacle(const Pair &pair, Run run, Array<ContactPoint> &out);
-// The faces beside an edge and their cone of normals: a unit direction that is orthogonal to the edge lies in it if it leans to neither face by more
-// than `slack` (sine).
+// The faces beside an edge and their cone of normals: a unit direction that is orthogonal to the edge lies in it if it leans to neither
+// face by more than `slack` (sine).
 struct EdgeFaces {
   Vec3 along;                  // unit, i to j
   Vec3 normal[2], inward[2];   // unit; inward lies in the face, orthogonal to the edge; both zero where there is no face

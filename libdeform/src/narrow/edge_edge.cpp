@@ -1,5 +1,5 @@
-// Two edges cross over each other: closest points of their lines n . r / |n| with n = u x w, both inside the edges, both edges convex, and the
-// direction inside both cones of normals. The faces beside the edges give the sign, so that edges which have slipped through each
+// Two edges cross over each other: closest points of their lines n . r / |n| with n = u x w, both inside the edges, both edges convex,
+// and the direction inside both cones of normals. The faces beside the edges give the sign, so that edges which have slipped through each
 // other by a little are pushed back the way they came.
 #include <algorithm>
 
@@ -22,8 +22,8 @@ EdgeFaces edge_faces(const Surface &surface, uint32_t edge) {
   return f;
 }
 
-// An open edge is as convex as can be. Between two faces the sine of the fold is c0 . r1 |e| / (|c0| |c1|), with r1 to the second face's far corner
-// and c the faces' normals times twice their areas; it is negative where the second face falls away from the first.
+// An open edge is as convex as can be. Between two faces the sine of the fold is c0 . r1 |e| / (|c0| |c1|), with r1 to the second face's
+// far corner and c the faces' normals times twice their areas; it is negative where the second face falls away from the first.
 bool edge_convex(const Surface &surface, uint32_t edge) {
   const uint32_t *ends = &surface.edge[2 * size_t{edge}], *tris = &surface.edge_tri[2 * size_t{edge}];
   if (tris[0] == kNone || tris[1] == kNone) return true;

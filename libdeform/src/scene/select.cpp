@@ -52,17 +52,18 @@ std::vector<uint32_t> select(const Selection &where, const BodyMesh &mesh, const
     const auto found = std::find(names.begin(), names.end(), where.group);
     if (found == names.end()) {
       const std::string near = nearest(where.group, names);
-      fail(DFM_E_ARG, "%s: %s/group: the mesh has no physical group \"%s\" of cells%s%s", file.c_str(), where.pointer.c_str(),
+      fail(DFM_E_ARG, "%s: %s/group: the mesh has no physical group \"%s\"%s%s", file.c_str(), where.pointer.c_str(),
            where.group.c_str(), names.empty() ? "; it has none at all" : ("; it has: " + join(names)).c_str(),
            near.empty() ? "" : ("; did you mean \"" + near + "\"?").c_str());
     }
     const uint32_t group = uint32_t(found - names.begin());
-    std::vector<uint8_t> in(mesh.npoint, 0);
-    for (uint32_t c = 0; c < mesh.ntet; ++c)
-      for (int k = 0; k < 4 && mesh.cell_group[c] == group; ++k) in[mesh.tets[4 * c + k]] = 1;
-    for (uint32_t i = 0; i < mesh.npoint; ++i)
-      if (in[i]) out.push_back(i);
-    return out;
+    const uint32_t *points = nullptr;
+    uint32_t n = 0;
+    if (dfm_tetmesh_group_points(mesh.handle, group, nullptr, &points, &n) < 0) fail(DFM_E_HANDLE, "%s", dfm_last_error());
+    if (n == 0)
+      fail(DFM_E_ARG, "%s: %s/group: the physical group \"%s\" has no point of a tetrahedron", file.c_str(), where.pointer.c_str(),
+           where.group.c_str());
+    return {points, points + n};
   }
   // Points that lie on a face of the box by the author's reckoning may miss it by a rounding of scale or file format.
   const double slack = 1e-9 * mesh.size;

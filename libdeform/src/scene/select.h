@@ -10,7 +10,8 @@ namespace dfm::scene {
 // A mesh file read once, with the scale of one body.
 struct BodyMesh {
   std::vector<double> points;  // [n,3] rest, scaled
-  const uint32_t *tets = nullptr, *file_point = nullptr, *cell_group = nullptr;
+  const uint32_t *tets = nullptr, *file_point = nullptr;
+  dfm_tetmesh handle = 0;      // lends the arrays and the points of its groups
   const char *const *group_names = nullptr;
   uint32_t npoint = 0, ntet = 0, ngroup = 0;
   double lo[3] = {}, hi[3] = {}, size = 0;  // of the scaled points; size: diagonal

@@ -28,7 +28,8 @@ Scene random_scene(unsigned seed, double speed) {
   std::uniform_real_distribution<double> unit(-1, 1);
   Scene scene;
   scene.offset = 1e-4;
-  const Mesh meshes[4] = {sphere_mesh(0.3, 2), box_mesh({0.5, 0.4, 0.3}, 4, 3, 2), box_mesh({1, 0.01, 0.02}, 12, 1, 1), sphere_mesh(0.2, 1)};
+  const Mesh meshes[4] = {sphere_mesh(0.3, 2), box_mesh({0.5, 0.4, 0.3}, 4, 3, 2), box_mesh({1, 0.01, 0.02}, 12, 1, 1),
+                          sphere_mesh(0.2, 1)};
   for (const Mesh &m : meshes)
     deform_at_random(scene.add(moved(m, random_turn(random), 0.4 * Vec3{unit(random), unit(random), unit(random)})), random, 0.004, speed);
   scene.add(Shape::plane, {0, 0, -0.4}, turn({1, 0, 0}, 0.2));
@@ -82,8 +83,8 @@ TEST(BroadPhase, PairsNearerThanReach_AreCandidates) {
   };
   std::vector<Candidate> listed(broad.candidates().begin(), broad.candidates().end());
   std::sort(listed.begin(), listed.end(), before);
-  EXPECT_EQ(std::adjacent_find(listed.begin(), listed.end(), [&](const Candidate &l, const Candidate &r) { return !before(l, r); }), listed.end())
-      << "a pair is listed twice";
+  const auto twice = [&](const Candidate &l, const Candidate &r) { return !before(l, r); };
+  EXPECT_EQ(std::adjacent_find(listed.begin(), listed.end(), twice), listed.end()) << "a pair is listed twice";
   size_t near = 0;
   for (const Candidate &c : scene.all()) {
     if (c.obstacle) continue;
@@ -215,7 +216,8 @@ TEST(BroadPhase, Filter_DecidesByMasksAndNamedPairs) {
     broad.update(scene.bodies, scene.obstacles, scene.filter, scene.h, scene.offset);
     std::string pairs;
     for (const ContactPoint &c : scene.contacts(broad.candidates())) {
-      const std::string p = std::to_string(std::min(c.slot_a, c.obstacle ? 9 : c.slot_b)) + (c.obstacle ? "p" : std::to_string(std::max(c.slot_a, c.slot_b)));
+      const std::string lower = std::to_string(std::min(c.slot_a, c.obstacle ? 9 : c.slot_b));
+      const std::string p = lower + (c.obstacle ? "p" : std::to_string(std::max(c.slot_a, c.slot_b)));
       if (pairs.find(p) == std::string::npos) pairs += p + " ";
     }
     return pairs;

@@ -73,10 +73,13 @@ TEST(MeshBounds, MutatedBytes_NeitherCrashNorEatMemory) {
 
 TEST(MeshBounds, PromiseOfTenGigabytes_IsRefusedWithLittleMemory) {
   const std::string v = "# vtk DataFile Version 3.0\nt\n", grid = "DATASET UNSTRUCTURED_GRID\n";
-  const std::string four = "POINTS 4 double\n0 0 0\n1 0 0\n0 1 0\n0 0 1\n", m22 = "$MeshFormat\n2.2 0 8\n$EndMeshFormat\n", m41 = "$MeshFormat\n4.1 0 8\n$EndMeshFormat\n";
+  const std::string four = "POINTS 4 double\n0 0 0\n1 0 0\n0 1 0\n0 0 1\n";
+  const std::string m22 = "$MeshFormat\n2.2 0 8\n$EndMeshFormat\n", m41 = "$MeshFormat\n4.1 0 8\n$EndMeshFormat\n";
   const std::string nodes22 = "$Nodes\n1\n1 0 0 0\n$EndNodes\n", nodes41 = "$Nodes\n1 1 1 1\n3 1 0 1\n1\n0 0 0\n$EndNodes\n";
   const std::string one("\1\0\0\0", 4), huge("\0\xe4\x0b\x54\x02\0\0\0", 8), eight(8, '\0');
-  const std::string b22 = "$MeshFormat\n2.2 1 8\n" + one + "\n$EndMeshFormat\n", b41 = "$MeshFormat\n4.1 1 8\n" + one + "\n$EndMeshFormat\n";
+  const std::string endless("\0\xff\xff\xff\xff\xff\xff\xff", 8), run("\4\0\0\0\xff\xff\xff\x7f\0\0\0\0", 12);
+  const std::string b22 = "$MeshFormat\n2.2 1 8\n" + one + "\n$EndMeshFormat\n",
+      b41 = "$MeshFormat\n4.1 1 8\n" + one + "\n$EndMeshFormat\n";
   const std::pair<const char *, std::string> lies[] = {
       {"points.vtk", v + "ASCII\n" + grid + "POINTS 10000000000 double\n0 0 0\n"},
       {"points64.vtk", v + "ASCII\n" + grid + "POINTS 9223372036854775807 double\n0 0 0\n"},
@@ -87,13 +90,13 @@ TEST(MeshBounds, PromiseOfTenGigabytes_IsRefusedWithLittleMemory) {
       {"connectivity.vtk", v + "ASCII\n" + grid + four + "CELLS 2 10000000000\nOFFSETS vtktypeint64\n0 10000000000\nCONNECTIVITY int\n0 1 2 3\n"},
       {"field.vtk", v + "ASCII\n" + grid + "FIELD f 10000000000\n"},
       {"field_bin.vtk", v + "BINARY\n" + grid + "FIELD f 1\na 100000 1000000 double\n" + eight},
-      {"field_string.vtk", v + "BINARY\n" + grid + "FIELD f 1\na 1 10000000000 string\n" + std::string("\0\xff\xff\xff\xff\xff\xff\xff", 8)},
+      {"field_string.vtk", v + "BINARY\n" + grid + "FIELD f 1\na 1 10000000000 string\n" + endless},
       {"nodes22.msh", m22 + "$Nodes\n10000000000\n1 0 0 0\n"},
       {"elements22.msh", m22 + nodes22 + "$Elements\n10000000000\n1 4 0 1 1 1 1\n"},
       {"tags22.msh", m22 + nodes22 + "$Elements\n1\n1 4 10000000000 1 1 1 1\n$EndElements\n"},
       {"names22.msh", m22 + "$PhysicalNames\n10000000000\n3 1 \"a\"\n"},
       {"nodes22_bin.msh", b22 + "$Nodes\n10000000000\n" + eight},
-      {"run22_bin.msh", b22 + "$Nodes\n0\n$EndNodes\n$Elements\n2000000000\n" + std::string("\4\0\0\0\xff\xff\xff\x7f\0\0\0\0", 12) + eight},
+      {"run22_bin.msh", b22 + "$Nodes\n0\n$EndNodes\n$Elements\n2000000000\n" + run + eight},
       {"nodes41.msh", m41 + "$Nodes\n1 10000000000 1 1\n3 1 0 10000000000\n1\n"},
       {"blocks41.msh", m41 + "$Nodes\n10000000000 1 1 1\n3 1 0 1\n1\n0 0 0\n"},
       {"empty_blocks41.msh", m41 + "$Nodes\n9223372036854775807 1 1 1\n3 1 0 0\n3 1 0 0\n"},

@@ -58,7 +58,8 @@ uint64_t hash_of(const TetMesh &m) {
 
 TEST(MeshGenerate, Beams_AreSoundAndFillTheirBox) {
   for (const uint32_t cells : {1u, 50u, 500u, 3000u, 20000u})
-    for (const auto &[x, y, z] : {std::tuple{1.0, 0.1, 0.1}, std::tuple{0.1, 0.1, 0.1}, std::tuple{1.0, 1.0, 0.1}, std::tuple{2e-9, 1e-9, 3e-9}}) {
+    for (const auto &[x, y, z] :
+         {std::tuple{1.0, 0.1, 0.1}, std::tuple{0.1, 0.1, 0.1}, std::tuple{1.0, 1.0, 0.1}, std::tuple{2e-9, 1e-9, 3e-9}}) {
       SCOPED_TRACE(testing::Message() << cells << " cells, " << x << " " << y << " " << z);
       const TetMesh m = make_beam(standard(), x, y, z, cells);
       expect_sound(m);

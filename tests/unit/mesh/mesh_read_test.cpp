@@ -28,7 +28,8 @@ void expect_refusal(const std::string &name, const std::string &text, dfm_status
   const auto error = test::refusal_of_text(name, text);
   ASSERT_TRUE(error) << name << " was read";
   EXPECT_EQ(error->status, status) << error->sentence;
-  for (const std::string &word : words) EXPECT_NE(error->sentence.find(word), std::string::npos) << "no '" << word << "' in: " << error->sentence;
+  for (const std::string &word : words)
+    EXPECT_NE(error->sentence.find(word), std::string::npos) << "no '" << word << "' in: " << error->sentence;
 }
 
 using Corner = std::array<double, 3>;
@@ -129,7 +130,8 @@ TEST(MeshRead, AnySize_LoadsWithoutAbsoluteEpsilon) {
 
 TEST(MeshRead, CellThinnerThanItsCoordinatesResolve_IsFlat) {
   // 1 mm cells 1e13 m from the origin, where doubles are 2 mm apart: whatever volume comes out is rounding.
-  expect_refusal("far.vtk", kVtk + "POINTS 4 double\n1e13 0 0\n10000000000000.002 0 0\n1e13 0.001 0\n1e13 0 0.001\n" + kOneCell, DFM_E_FORMAT, {"flat"});
+  expect_refusal("far.vtk", kVtk + "POINTS 4 double\n1e13 0 0\n10000000000000.002 0 0\n1e13 0.001 0\n1e13 0 0.001\n" + kOneCell,
+      DFM_E_FORMAT, {"flat"});
   // The same shape nearby is sound, and so is a sliver that is thin but resolved.
   EXPECT_EQ(read_text("near.vtk", kVtk + "POINTS 4 double\n0 0 0\n0.002 0 0\n0 0.001 0\n0 0 0.001\n" + kOneCell).ntet(), 1u);
   const TetMesh sliver = read_text("sliver.vtk", kVtk + "POINTS 4 double\n0 0 0\n1 0 0\n0 1 0\n0.3 0.3 1e-9\n" + kOneCell);
@@ -139,15 +141,18 @@ TEST(MeshRead, CellThinnerThanItsCoordinatesResolve_IsFlat) {
 
 TEST(MeshRead, FlatCells_AreRefusedWithTheFirst) {
   const std::string six = "POINTS 6 double\n0 0 0\n1 0 0\n0 1 0\n0 0 1\n1 1 0\n2 3 0\n";
-  expect_refusal("flat_all.vtk", kVtk + six + "CELLS 2 10\n4 0 1 2 4\n4 0 1 2 5\nCELL_TYPES 2\n10\n10\n", DFM_E_FORMAT, {"all 2 tetrahedra are flat"});
-  expect_refusal("flat_one.vtk", kVtk + six + "CELLS 2 10\n4 0 1 2 3\n4 0 1 2 4\nCELL_TYPES 2\n10\n10\n", DFM_E_FORMAT, {"1 of 2", "tetrahedron 1", "0 1 2 4"});
+  expect_refusal("flat_all.vtk", kVtk + six + "CELLS 2 10\n4 0 1 2 4\n4 0 1 2 5\nCELL_TYPES 2\n10\n10\n", DFM_E_FORMAT,
+      {"all 2 tetrahedra are flat"});
+  expect_refusal("flat_one.vtk", kVtk + six + "CELLS 2 10\n4 0 1 2 3\n4 0 1 2 4\nCELL_TYPES 2\n10\n10\n", DFM_E_FORMAT,
+      {"1 of 2", "tetrahedron 1", "0 1 2 4"});
   expect_refusal("flat_twice.vtk", kVtk + kFour + "CELLS 1 5\n4 0 1 1 3\nCELL_TYPES 1\n10\n", DFM_E_FORMAT, {"flat", "0 1 1 3"});
 }
 
 TEST(MeshRead, NumbersThatAreNone_AreRefusedWithTheirLine) {
   const auto points = [](const std::string &x) { return kVtk + "POINTS 4 double\n0 0 0\n1 0 0\n0 1 0\n0 0 " + x + "\n" + kOneCell; };
   for (const char *bad : {"nan", "NaN", "-nan", "inf", "-Infinity", "1e999", "zero", "1,5", "1.0x", "0x10", "--1", "+", "1e101"})
-    expect_refusal("number.vtk", points(bad), DFM_E_FORMAT, {std::string(bad) == "1e101" ? "coordinate" : "number.vtk:9: expected a point's coordinate"});
+    expect_refusal("number.vtk", points(bad), DFM_E_FORMAT,
+        {std::string(bad) == "1e101" ? "coordinate" : "number.vtk:9: expected a point's coordinate"});
   for (const char *good : {"+1", "1.", ".5", "1E0", "1e-400"}) {
     const auto error = test::refusal_of_text("number.vtk", points(good));
     EXPECT_EQ(bool(error), std::string(good) == "1e-400") << good << (error ? error->sentence : "");  // underflow reads as 0: a flat cell
@@ -163,7 +168,8 @@ TEST(MeshRead, Locale_HasNoSay) {
 }
 
 TEST(MeshRead, LongLinesAndCarriageReturns_AreFine) {
-  std::string text = "# vtk DataFile Version 3.0\r\n" + std::string(100000, 'x') + "\r\nASCII\r\nDATASET UNSTRUCTURED_GRID\r\nPOINTS 4 double\r\n";
+  std::string text = "# vtk DataFile Version 3.0\r\n" + std::string(100000, 'x');
+  text += "\r\nASCII\r\nDATASET UNSTRUCTURED_GRID\r\nPOINTS 4 double\r\n";
   text += "0 0 0 1 0 0 0 1 0" + std::string(70000, ' ') + "\t0 0 1\r\nCELLS 1 5\r\n4 0 1 2 3\r\nCELL_TYPES 1\r\n10";
   EXPECT_EQ(read_text("long.vtk", text).ntet(), 1u);
 }
@@ -196,7 +202,8 @@ TEST(MeshRead, MshStructure_IsChecked) {
   const std::string nodes = "$Nodes\n1 4 1 4\n3 1 0 4\n1\n2\n3\n4\n0 0 0\n1 0 0\n0 1 0\n0 0 1\n$EndNodes\n";
   const std::string cells = "$Elements\n1 1 1 1\n3 1 4 1\n1 1 2 3 4\n$EndElements\n";
   EXPECT_EQ(read_text("m.msh", kMsh41 + nodes + cells).ntet(), 1u);
-  EXPECT_EQ(read_text("m.msh", "$Comments\nanything $ at all\n$EndComments\n" + kMsh41 + "$Later\nx y\n$EndLater\n" + nodes + cells).ntet(), 1u);
+  const std::string comments = "$Comments\nanything $ at all\n$EndComments\n", later = "$Later\nx y\n$EndLater\n";
+  EXPECT_EQ(read_text("m.msh", comments + kMsh41 + later + nodes + cells).ntet(), 1u);
   expect_refusal("m.msh", "", DFM_E_FORMAT, {"empty"});
   expect_refusal("m.msh", "solid\n", DFM_E_FORMAT, {"$MeshFormat", "solid"});
   expect_refusal("m.msh", "$NOD\n4\n", DFM_E_UNSUPPORTED, {"version 1", "gmsh", "msh41"});
@@ -213,12 +220,14 @@ TEST(MeshRead, MshStructure_IsChecked) {
   expect_refusal("m.msh", kMsh41 + nodes + "$Elements\n1 1 1 1\n3 1 77 1\n1 1 2 3 4\n$EndElements\n", DFM_E_FORMAT, {"element type 77"});
   expect_refusal("m.msh", kMsh41 + nodes + "$Elements\n1 1 1 1\n3 1 4 1\n1 1 2 3 4\n", DFM_E_FORMAT, {"$EndElements"});
   expect_refusal("m.msh", kMsh41 + nodes + cells + "$Tail\n", DFM_E_FORMAT, {"'$Tail'", "has no end"});
-  expect_refusal("m.msh", kMsh41 + "$Nodes\n1 2 1 2\n3 1 0 2\n1\n1\n0 0 0\n1 0 0\n$EndNodes\n" + cells, DFM_E_FORMAT, {"node number 1 is given twice"});
+  expect_refusal("m.msh", kMsh41 + "$Nodes\n1 2 1 2\n3 1 0 2\n1\n1\n0 0 0\n1 0 0\n$EndNodes\n" + cells, DFM_E_FORMAT,
+      {"node number 1 is given twice"});
   expect_refusal("m.msh", kMsh22 + "$Nodes\n2\n1 0 0 0\n2 1 0 0\n$Elements\n", DFM_E_FORMAT, {"m.msh:8", "$EndNodes", "$Elements"});
   expect_refusal("m.msh", kMsh22 + "$PhysicalNames\n1\n3 1 body\n$EndPhysicalNames\n", DFM_E_FORMAT, {"double quotes"});
   const std::string hexes = "$Elements\n1 1 1 1\n3 1 5 1\n1 1 2 3 4 1 2 3 4\n$EndElements\n";
   expect_refusal("m.msh", kMsh41 + nodes + hexes, DFM_E_UNSUPPORTED, {"hexahedron", "tetrahedra"});
-  expect_refusal("m.msh", kMsh41 + nodes + "$Elements\n1 1 1 1\n3 1 11 1\n1 1 2 3 4 1 2 3 4 1 2\n$EndElements\n", DFM_E_UNSUPPORTED, {"order", "-order 1"});
+  expect_refusal("m.msh", kMsh41 + nodes + "$Elements\n1 1 1 1\n3 1 11 1\n1 1 2 3 4 1 2 3 4 1 2\n$EndElements\n", DFM_E_UNSUPPORTED,
+      {"order", "-order 1"});
 }
 
 TEST(MeshRead, OtherFiles_AreRefusedByEnding) {

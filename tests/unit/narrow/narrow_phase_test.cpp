@@ -230,7 +230,8 @@ TEST(VertexFace, BelowBothPlanesOfValley_BothPush) {
 TEST(FindContacts, NearestContact_IsTheDistanceOfTheBodies) {
   std::mt19937 random(8);
   std::normal_distribution<double> normal;
-  const Mesh meshes[3] = {box_mesh({1, 0.7, 0.5}, 1, 1, 1), sphere_mesh(0.5, 1), tetrahedron_mesh({0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0.1, 0.2, 0.8})};
+  const Mesh meshes[3] = {box_mesh({1, 0.7, 0.5}, 1, 1, 1), sphere_mesh(0.5, 1),
+                          tetrahedron_mesh({0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0.1, 0.2, 0.8})};
   int edges = 0, faces = 0, rims = 0;
   for (int i = 0; i < 600; ++i) {
     Scene scene;
@@ -246,8 +247,8 @@ TEST(FindContacts, NearestContact_IsTheDistanceOfTheBodies) {
         const Surface &p = side ? b : a, &q = side ? a : b;
         for (uint32_t v = 0; v < p.nsurfel; ++v)
           for (uint32_t t = 0; t < q.ntri; ++t)
-            least = std::min(least, closest_on_triangle(load3(&p.x[4 * v]), load3(&q.x[4 * q.tri[3 * t]]), load3(&q.x[4 * q.tri[3 * t + 1]]),
-                                                        load3(&q.x[4 * q.tri[3 * t + 2]])).distance2);
+            least = std::min(least, closest_on_triangle(load3(&p.x[4 * v]), load3(&q.x[4 * q.tri[3 * t]]),
+                                                        load3(&q.x[4 * q.tri[3 * t + 1]]), load3(&q.x[4 * q.tri[3 * t + 2]])).distance2);
       }
       for (uint32_t e = 0; e < a.nedge; ++e)
         for (uint32_t f = 0; f < b.nedge; ++f)
@@ -350,7 +351,7 @@ TEST(FindContacts, SummedArea_IsTheTouchingPatch) {
   scene.add(box_mesh({4, 4, 1}, 24, 24, 4));
   scene.add(moved(box_mesh({1, 1, 1}, 30, 31, 4), turn({0, 0, 1}, 0.2), {0, 0, 1.001}));
   double area = 0;
-  for (const ContactPoint &c : scene.contacts()) area += c.area;
+  for (const ContactPoint &c : scene.listed()) area += c.area;
   // The upper surfels on the rim own a third of the triangles on the sides too.
   double rim = 0;
   for (uint32_t i = 0; i < scene.surfaces[1]->nsurfel; ++i)
