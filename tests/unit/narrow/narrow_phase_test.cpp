@@ -346,6 +346,49 @@ TEST(EdgeEdge, FlatFaces_HaveNoEdgeContacts) {
   EXPECT_GE(faces, 32u + 4u);
 }
 
+// A tilted edge over a rim: the closest points of the lines lie inside both, but the distance falls on along the edge, so it is no minimum.
+TEST(EdgeEdge, DirectionOutsideTheCone_IsNoContact) {
+  for (const double tilt : {-0.5, 0.5}) {
+    Scene scene;
+    scene.h = 0;
+    scene.offset = 0.05;
+    scene.add(box_mesh({1, 1, 1}, 1, 1, 1));
+    // Its lower edge runs in x and z through (0.5, 0.1, 0.52), down to the inside or to the outside.
+    const Vec3 u{1, 0, tilt}, at{0.5, 0.1, 0.56};
+    scene.add(tetrahedron_mesh(at - 0.06 * u, at + 0.8 * u, at + Vec3{0, 0.4, 1}, at + Vec3{0, -0.4, 1}));
+    size_t edges = 0;
+    for (const ContactPoint &c : scene.contacts()) edges += c.kind == kEdgeEdge;
+    EXPECT_EQ(edges, tilt > 0 ? 0u : 1u) << tilt;
+  }
+}
+
+// An edge contact lives on the share of a corner that touches nothing by itself, and no corner gives twice.
+TEST(EdgeEdge, Area_ComesFromFreeCorners) {
+  Scene scene;
+  scene.add(box_mesh({1, 1, 1}, 5, 5, 2));
+  scene.add(moved(box_mesh({0.8, 0.8, 1}, 7, 3, 2), turn({0, 0, 1}, 0.4), {0, 0, 1.001}));
+  const auto contacts = scene.contacts();
+  std::set<uint32_t> touching;
+  for (const ContactPoint &c : contacts)
+    if (c.kind == kVertexFace) touching.insert(c.node[0]);
+  size_t edges = 0;
+  double given = 0, free = 0;
+  std::set<uint32_t> corners;
+  for (const ContactPoint &c : contacts) {
+    if (c.kind != kEdgeEdge) continue;
+    ++edges;
+    given += c.area;
+    for (int k = 0; k < c.nnode; ++k) {
+      const uint32_t body = c.node[k] < scene.surfaces[0]->nsurfel ? 0 : 1;
+      if (!touching.count(c.node[k]) && corners.insert(c.node[k]).second)
+        free += 0.5 * scene.surfaces[body]->area[c.node[k] - scene.bodies[body].first_node];
+    }
+  }
+  EXPECT_GE(edges, 8u);
+  EXPECT_GT(given, 0);
+  EXPECT_LE(given, free * (1 + 1e-12));
+}
+
 // The areas of a fully touching patch sum to the patch, from both sides in halves.
 TEST(FindContacts, SummedArea_IsTheTouchingPatch) {
   Scene scene;
