@@ -40,7 +40,8 @@ int explain(const Options &options, const Globals &globals) {
   print_list(plan, "absent", "left out", {"why"});
   if (const JsonValue *step = plan.find("step")) {
     std::printf("step\n  stable %s s", step->get("stable_s").c_str());
-    if (const std::string body = step->get("worst_body"); !body.empty()) std::printf(", bounded by point %s of \"%s\"", step->get("worst_point").c_str(), body.c_str());
+    if (const std::string body = step->get("worst_body"); !body.empty())
+      std::printf(", bounded by point %s of \"%s\"", step->get("worst_point").c_str(), body.c_str());
     if (const std::string reason = step->get("reason"); !reason.empty()) std::printf(": %s", reason.c_str());
     std::printf("\n");
     const double stable = std::strtod(step->get("stable_s").c_str(), nullptr), asked = scene.settings().step;

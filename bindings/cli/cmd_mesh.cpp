@@ -71,7 +71,7 @@ void print_json(const std::string &file, dfm_tetmesh mesh, const dfm_tetmesh_inf
   out.add("edges", whole(i.nedge)).add("pieces", whole(i.npiece)).add("volume", number(i.volume));
   out.add("lo", json_vector(i.lo)).add("hi", json_vector(i.hi)).add("edge", edge.text()).add("quality", quality.text());
   out.add("defects", found.text()).add("groups", json_array(names)).add("warnings", json_array(warnings));
-  std::printf("%s\n", indented(out.text()).c_str());
+  std::fputs(indented(out.text()).c_str(), stdout);
 }
 
 void print_table(const std::string &file, dfm_tetmesh mesh, const dfm_tetmesh_info &i) {

@@ -6,6 +6,8 @@
 #include <vector>
 
 #include "cli.h"
+#include "json_text.h"
+#include "messages.h"
 
 namespace cli {
 namespace {
@@ -29,31 +31,6 @@ const char *kind_name(uint32_t kind) {
   return kind == DFM_KIND_FRICTION ? "law" : kind == DFM_KIND_MODEL ? "model" : "solver";
 }
 
-std::string quoted(const char *text) {
-  std::string out = "\"";
-  for (const char *c = text ? text : ""; *c; ++c) {
-    const unsigned char u = static_cast<unsigned char>(*c);
-    char escape[8];
-    if (*c == '"' || *c == '\\') out += '\\', out += *c;
-    else if (u < 0x20) std::snprintf(escape, sizeof escape, "\\u%04x", u), out += escape;
-    else out += *c;
-  }
-  return out + "\"";
-}
-
-std::string number(double x) {
-  char text[40];
-  std::snprintf(text, sizeof text, "%.17g", x);
-  return text;
-}
-
-template <class List, class F>
-std::string array(const List &list, F &&one) {
-  std::string out = "[";
-  for (const auto &item : list) out += (out.size() > 1 ? ", " : "") + one(item);
-  return out + "]";
-}
-
 std::vector<std::string> effects(const dfm_type &type) {
   std::vector<std::string> out;
   for (const char *const *e = type.effects; e && *e; ++e) out.push_back(*e);
@@ -66,10 +43,17 @@ std::string joined(const std::vector<std::string> &words) {
   return out.empty() ? "none" : out;
 }
 
-std::string json_head(const Type &t) {
-  return "\"kind\": " + quoted(kind_name(t.type->kind)) + ", \"id\": " + quoted(t.type->id) + ", \"name\": " + quoted(t.type->name) +
-         ", \"version\": " + quoted(t.type->version) + ", \"file\": " + quoted(t.file.c_str()) + ", \"effects\": " +
-         array(effects(*t.type), [](const std::string &e) { return quoted(e.c_str()); });
+std::vector<std::string> quoted_all(const std::vector<std::string> &words) {
+  std::vector<std::string> out;
+  for (const auto &w : words) out.push_back(quoted(w));
+  return out;
+}
+
+JsonObject json_head(const Type &t) {
+  JsonObject o;
+  o.add("kind", quoted(kind_name(t.type->kind))).add("id", quoted(t.type->id)).add("name", quoted(t.type->name));
+  o.add("version", quoted(t.type->version)).add("file", quoted(t.file)).add("effects", json_array(quoted_all(effects(*t.type))));
+  return o;
 }
 
 int list(const Globals &globals, const std::vector<std::string> &directories) {
@@ -78,10 +62,10 @@ int list(const Globals &globals, const std::vector<std::string> &directories) {
     if (dfm_plugin_scan(context.get(), directory.c_str(), nullptr) < 0) return fail(dfm_last_error());
   const Found found = look(context.get());
   if (globals.json) {
-    std::printf("{\"types\": %s,\n \"passed\": %s}\n", array(found.types, [](const Type &t) { return "\n  {" + json_head(t) + "}"; }).c_str(),
-                array(found.passed, [](const Passed &p) {
-                  return "\n  {\"file\": " + quoted(p.file.c_str()) + ", \"reason\": " + quoted(p.reason.c_str()) + "}";
-                }).c_str());
+    std::vector<std::string> types, passed;
+    for (const Type &t : found.types) types.push_back(json_head(t).text());
+    for (const Passed &p : found.passed) passed.push_back(JsonObject().add("file", quoted(p.file)).add("reason", quoted(p.reason)).text());
+    std::fputs(indented(JsonObject().add("types", json_array(types)).add("passed", json_array(passed)).text()).c_str(), stdout);
     return kDone;
   }
   for (const Type &t : found.types)
@@ -104,44 +88,42 @@ std::vector<Type> matching(const Found &found, const std::string &id) {
   return exact.empty() ? by_short_name : exact;
 }
 
-std::string values_of(const dfm_param &row) {
-  std::string names;
-  for (const char *const *n = row.names; n && *n; ++n) names += (names.empty() ? "" : "|") + std::string(*n);
-  return names;
+std::vector<std::string> names_of(const dfm_param &row) {
+  std::vector<std::string> out;
+  for (const char *const *n = row.names; n && *n; ++n) out.push_back(*n);
+  return out;
 }
 
 void print_info(const Type &t) {
   const dfm_type &type = *t.type;
   std::printf("%s %s, version %s\n  name     %s\n  licence  %s\n  source   %s\n  file     %s\n  effects  %s\n", kind_name(type.kind), type.id,
               type.version, type.name, type.licence, type.source, t.file.c_str(), joined(effects(type)).c_str());
-  if (type.nparam) std::printf("\n  %-12s %-12s %-24s %-10s %s\n", "parameter", "default", "range", "unit", "meaning");
+  if (type.nparam) std::printf("\n  %-18s %-10s %-16s %-10s %s\n", "parameter", "default", "range", "unit", "meaning");
   for (uint32_t i = 0; i < type.nparam; ++i) {
     const dfm_param &row = type.params[i];
     char range[64], value[32];
     std::snprintf(range, sizeof range, "%g .. %g", row.min, row.max);
     std::snprintf(value, sizeof value, "%g", row.def);
-    const std::string names = values_of(row);
-    std::printf("  %-12s %-12s %-24s %-10s %s%s%s%s\n", row.key, value, names.empty() ? range : names.c_str(), row.unit, row.label,
+    const std::string names = row.names ? joined(names_of(row)) : "";
+    std::printf("  %-18s %-10s %-16s %-10s %s%s%s%s\n", row.key, value, names.empty() ? range : names.c_str(), row.unit, row.label,
                 row.width > 1 ? (" (" + std::to_string(row.width) + " values)").c_str() : "", row.flags & DFM_PARAM_RUNTIME ? ", may change in a run" : "",
                 row.flags & DFM_PARAM_PER_CELL ? ", may vary by cell" : "");
   }
 }
 
 std::string json_info(const Type &t) {
-  std::vector<const dfm_param *> rows;
-  for (uint32_t i = 0; i < t.type->nparam; ++i) rows.push_back(&t.type->params[i]);
-  const auto row_text = [](const dfm_param *row) {
-    std::vector<const char *> names;
-    for (const char *const *n = row->names; n && *n; ++n) names.push_back(*n);
-    const auto flag = [&](uint32_t bit) { return row->flags & bit ? "true" : "false"; };
-    return "\n    {\"key\": " + quoted(row->key) + ", \"label\": " + quoted(row->label) + ", \"unit\": " + quoted(row->unit) +
-           ", \"min\": " + number(row->min) + ", \"max\": " + number(row->max) + ", \"default\": " + number(row->def) +
-           ", \"width\": " + std::to_string(row->width) + ", \"integer\": " + flag(DFM_PARAM_INTEGER) + ", \"runtime\": " +
-           flag(DFM_PARAM_RUNTIME) + ", \"per_cell\": " + flag(DFM_PARAM_PER_CELL) +
-           (names.empty() ? "" : ", \"names\": " + array(names, [](const char *n) { return quoted(n); })) + "}";
-  };
-  return "{" + json_head(t) + ",\n  \"licence\": " + quoted(t.type->licence) + ", \"source\": " + quoted(t.type->source) +
-         ",\n  \"params\": " + array(rows, row_text) + "}";
+  std::vector<std::string> rows;
+  for (uint32_t i = 0; i < t.type->nparam; ++i) {
+    const dfm_param &row = t.type->params[i];
+    const auto flag = [&](uint32_t bit) { return row.flags & bit ? "true" : "false"; };
+    JsonObject o;
+    o.add("key", quoted(row.key)).add("label", quoted(row.label)).add("unit", quoted(row.unit));
+    o.add("min", number(row.min)).add("max", number(row.max)).add("default", number(row.def)).add("width", std::to_string(row.width));
+    o.add("integer", flag(DFM_PARAM_INTEGER)).add("runtime", flag(DFM_PARAM_RUNTIME)).add("per_cell", flag(DFM_PARAM_PER_CELL));
+    if (row.names) o.add("names", json_array(quoted_all(names_of(row))));
+    rows.push_back(o.text());
+  }
+  return json_head(t).add("licence", quoted(t.type->licence)).add("source", quoted(t.type->source)).add("params", json_array(rows)).text();
 }
 
 int info(const Globals &globals, const std::string &id) {
@@ -155,12 +137,18 @@ int info(const Globals &globals, const std::string &id) {
     types = matching(look(context.get()), id);
   }
   if (types.empty()) {
-    std::string known;
-    for (const Type &t : look(context.get()).types) known += (known.empty() ? "" : ", ") + std::string(t.type->id);
-    return fail("no plugin \"" + id + "\" is loaded; loaded: " + (known.empty() ? "none" : known) + "; see \"deform plugin list\"");
+    std::vector<std::string> ids, names;
+    for (const Type &t : look(context.get()).types) {
+      ids.push_back(t.type->id), names.push_back(t.type->id);
+      if (const char *dot = std::strrchr(t.type->id, '.')) names.push_back(dot + 1);
+    }
+    const std::string near = nearest(id, names);
+    return fail("no plugin \"" + id + "\" is loaded" + (near.empty() ? "" : ", did you mean \"" + near + "\"") + "; loaded: " + joined(ids));
   }
   if (globals.json) {
-    std::printf("%s\n", types.size() == 1 ? json_info(types[0]).c_str() : array(types, json_info).c_str());
+    std::vector<std::string> all;
+    for (const Type &t : types) all.push_back(json_info(t));
+    std::fputs(indented(all.size() == 1 ? all[0] : json_array(all)).c_str(), stdout);
     return kDone;
   }
   for (const Type &t : types) print_info(t);
@@ -187,8 +175,6 @@ void add_plugin(CLI::App &app, Globals &globals, int *exit_code) {
   auto file = std::make_shared<std::string>();
   check_command->add_option("FILE", *file, "plugin file")->required();
   check_command->callback([=] { *exit_code = fail("\"plugin check\" is not available yet; \"plugin info " + *file + "\" loads a file and shows its table"); });
-  for (CLI::App *command : {list_command, info_command, check_command}) command->fallthrough();
-  plugin->fallthrough();
 }
 
 }  // namespace cli

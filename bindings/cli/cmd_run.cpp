@@ -5,6 +5,7 @@
 #include <chrono>
 #include <cmath>
 #include <cstdio>
+#include <cstdlib>
 #include <filesystem>
 #include <memory>
 
@@ -69,7 +70,10 @@ class Runner {
     while (!interrupted && !result_.stopped && advance()) outputs(false);
     count_time();
     if (interrupted) result_.interrupted = true, result_.stop_reason = "interrupted by a signal";
-    if (!at_record_ && !result_.stopped) outputs_.record(), check(false);
+    if (!at_record_) {  // after a stop, too: the world is back at its last good state
+      outputs_.record();
+      if (!check_every_step_) check(false);
+    }
     if (result_.interrupted || result_.stopped) outputs_.write_last();
     if (result_.hold_begun) end_hold();
     outputs_.write_nodes();
@@ -128,9 +132,8 @@ class Runner {
       result_.stop_body = body ? scene_.name_of(body) : "";
       return;
     }
-    // The sentence names the body that diverged in quotes.
-    for (const BodyView &b : scene_.bodies())
-      if (result_.stop_reason.find("\"" + b.name + "\"") != std::string::npos) result_.stop_body = b.name;
+    for (const BodyView &b : scene_.bodies())  // the sentence names the body in quotes
+      if (result_.stop_reason.find("'" + b.name + "'") != std::string::npos) result_.stop_body = b.name;
   }
 
   void check(bool start_state) { checker_.check(start_state); }
@@ -148,7 +151,8 @@ class Runner {
       if (frame_due) frames_->draw(t);
       mark_ = {wall_seconds(), cpu_seconds()};
     }
-    if (result_.steps % 16 == 0) progress_.show(t - result_.start, duration_, result_.steps ? double(result_.steps) / (result_.wall + wall_seconds() - mark_.wall) : 0);
+    if (result_.steps % 16 == 0)
+      progress_.show(t - result_.start, duration_, result_.steps ? double(result_.steps) / (result_.wall + wall_seconds() - mark_.wall) : 0);
   }
 
   void count_time() {
@@ -216,9 +220,10 @@ int run(RunOptions options, const Globals &globals) {
   if (options.profile && !globals.json) print_profile(scene, result);
   if (result.stopped) {
     char text[160];
-    std::snprintf(text, sizeof text, "stopped at step %llu, t = %g s", static_cast<unsigned long long>(result.steps + 1), result.simulated);
-    throw Failure(kStopped, options.scene + ": " + text + (result.stop_body.empty() ? "" : ", body \"" + result.stop_body + "\"") + ": " +
-                                result.stop_reason + "; the last good state is in " + options.out + "/states/last_*.vtu");
+    std::snprintf(text, sizeof text, "stopped at step %llu, t = %g s", static_cast<unsigned long long>(result.steps), result.simulated);
+    const bool named = result.stop_body.empty() || result.stop_reason.find("'" + result.stop_body + "'") != std::string::npos;
+    throw Failure(kStopped, options.scene + ": " + text + (named ? "" : ", body '" + result.stop_body + "'") + ": " + result.stop_reason +
+                                "; the last good state is in " + options.out + "/states/last_*.vtu");
   }
   return result.interrupted ? int(kInterrupted) : int(kDone);
 }
@@ -227,12 +232,17 @@ int run(RunOptions options, const Globals &globals) {
 
 void add_run(CLI::App &app, Globals &globals, int *exit_code) {
   auto options = std::make_shared<RunOptions>();
+  const auto positive = [](const std::string &text) {
+    char *end = nullptr;
+    const double x = std::strtod(text.c_str(), &end);
+    return *end == 0 && x > 0 && std::isfinite(x) ? std::string() : "expected a finite number above 0, found " + text;
+  };
   CLI::App *sub = app.add_subcommand("run", "simulates a scene and writes figures and pictures");
   sub->add_option("SCENE", options->scene, "scene file (JSON)")->required();
   sub->add_option("--out", options->out, "folder for the results (out/SCENE)")->type_name("DIR");
-  sub->add_option("--time", options->time, "seconds to simulate, instead of the scene's")->check(CLI::PositiveNumber)->type_name("T");
+  sub->add_option("--time", options->time, "seconds to simulate, instead of the scene's")->check(positive)->type_name("T");
   sub->add_option("--set", options->set, "change a value of the scene")->type_name("/json/pointer=value")->take_all()->allow_extra_args(false);
-  sub->add_option("--frames", options->frame_rate, "pictures per simulated second")->check(CLI::PositiveNumber)->type_name("FPS");
+  sub->add_option("--frames", options->frame_rate, "pictures per simulated second")->check(positive)->type_name("FPS");
   sub->add_flag("--profile", options->profile, "time spent in each stage");
   sub->add_option("--jitter", options->jitter, "small random changes of the start state; the same seed gives the same run")->type_name("SEED");
   sub->add_flag("--check", options->check, "count crossing triangles in every step, not only in recorded states");

@@ -59,11 +59,7 @@ std::string nearest_to(const std::string &word, CLI::App *app) {
   for (const CLI::App *sub : children(app)) valid.push_back(sub->get_name());
   for (const CLI::Option *option : app->get_options())
     for (const std::string &name : option->get_lnames()) valid.push_back("--" + name);
-  std::string best;
-  size_t least = std::max<size_t>(2, word.size() / 3) + 1;
-  for (const std::string &name : valid)
-    if (const size_t d = edit_distance(word, name); d < least) least = d, best = name;
-  return best;
+  return nearest(word, valid);
 }
 
 std::string path_of(CLI::App *app) {
@@ -93,6 +89,14 @@ int bad_usage(CLI::App &app, const CLI::ParseError &error) {
 }
 
 }  // namespace
+
+std::string nearest(const std::string &word, const std::vector<std::string> &valid) {
+  std::string best;
+  size_t least = std::max<size_t>(2, word.size() / 3) + 1;
+  for (const std::string &name : valid)
+    if (const size_t d = edit_distance(word, name); d < least) least = d, best = name;
+  return best;
+}
 
 int fail(const std::string &sentence) {
   std::fflush(stdout);

@@ -4,7 +4,7 @@
 //   stick  |ft_stop| <= F_S:  ft = ft_stop, the force that makes the slip of this step zero
 //   slip   otherwise:         ft = -(g(w) + sigma2 A w) v/w; from rest (w = 0) along ft_stop, which is where the contact is about to go
 //
-// Olsson et al. 1998, eq. 2 and 3 (static part); implicit step as projection on the disc of radius F_S. Derivatives at w > 0:
+// Zerbato 2010, (5.1)-(5.6), as an inclusion at w = 0 and odd in v; the implicit step is the projection on the disc of radius F_S. At w > 0:
 //   dft/dv = -[F' v^v^T + (F/w) (1 - v^v^T)],  F = g + sigma2 A w,  F' = g' + sigma2 A,  dft/dfn = -(g/fn) v^
 // A lane with a NaN or an infinite input gives NaN in that lane alone. Each lane runs the same operations at every vector width.
 #include <cmath>
@@ -25,7 +25,7 @@ const dfm_param rows[] = {
 
 constexpr uint32_t kLanes = 8;
 constexpr double kTiny = 1e-280, kHuge = 1e280;  // squares beyond these have lost digits or are about to
-constexpr double kRest = 1e-140;                 // m/s; below it 1/w is held constant, so that no derivative is infinite
+constexpr double kRest = 1e-100;                 // m/s; below it 1/w is held constant, so that no derivative is infinite
 
 struct Batch { double mu_c, mu_s, v_s, delta, sigma2; };
 
@@ -93,7 +93,7 @@ bool decide(const Batch &p, const Block &b, Passes &t) {
 }
 
 void stribeck(const Batch &p, Passes &t) {
-  double a[kLanes];
+  double a[kLanes], e[kLanes];
   const double inverse = 1.0 / p.v_s;
   if (p.delta == 2.0) {
     for (uint32_t i = 0; i < kLanes; ++i) {
@@ -103,10 +103,10 @@ void stribeck(const Batch &p, Passes &t) {
   } else {
     for (uint32_t i = 0; i < kLanes; ++i) a[i] = t.mode[i] > 1 ? dfm_pow(t.w[i] * inverse, p.delta) : 0.0;
   }
+  for (uint32_t i = 0; i < kLanes; ++i) e[i] = dfm_exp(-a[i]);
   for (uint32_t i = 0; i < kLanes; ++i) {
-    const double s = dfm_exp(-a[i]);
-    t.excess[i] = s;
-    t.slope[i] = s > 0 ? -p.delta * a[i] * s : 0.0;  // a may be infinite where s has vanished
+    t.excess[i] = e[i];
+    t.slope[i] = e[i] > 0 ? -p.delta * a[i] * e[i] : 0.0;  // a may be infinite where e has vanished
   }
 }
 
@@ -163,7 +163,7 @@ const dfm_friction law = dfm::plugin::friction(DFM_NEED_FN | DFM_NEED_VT | DFM_N
                                                DFM_FRIC_SET_VALUED | DFM_FRIC_ISOTROPIC | DFM_FRIC_PASSIVE | DFM_FRIC_JACOBIAN, eval, check);
 const char *const effects[] = {"stiction", "stribeck", "viscous", nullptr};
 const dfm_type coulomb = dfm::plugin::type(DFM_KIND_FRICTION, "org.deform.coulomb", "Coulomb friction with stiction, Stribeck effect and viscous part",
-                                           "0.1.0", "MIT", "Olsson, Astrom, Canudas de Wit, Gafvert, Lischinsky 1998, eq. 2-3; set-valued at rest",
+                                           "0.1.0", "MIT", "Zerbato 2010, (5.1)-(5.6) corrected: set-valued at rest, odd in v",
                                            rows, effects, &law);
 
 }  // namespace

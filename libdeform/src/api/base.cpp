@@ -72,6 +72,7 @@ dfm_status dfm_context_create(const dfm_context_def *def, dfm_context **out) {
   return guard([&] {
     if (!out) fail(DFM_E_ARG, "dfm_context_create: out is NULL");
     auto context = std::make_unique<dfm_context>(checked(def));
+    context->loader.add_bundled();
     if (context->hooks.plugin_dir) {
       try {
         context->loader.scan(context->hooks.plugin_dir);

@@ -65,8 +65,9 @@ void set_trial(const ContactRows &rows, double h, ContactState &s) {
   for (uint32_t i = 0; i < rows.n; ++i) {
     const Vec3 u = rows.velocity(i);
     const double *const l = &rows.impulse[size_t(i) * 3];
-    // A contact without impulse yet is asked at the normal force that would close it alone, so that its law's limit is known.
-    s.fn[i] = (l[0] > 0 || rows.wn[i] == 0 ? l[0] : normal_impulse(rows, i, u.x)) / h;
+    // A contact without impulse is asked at the normal force that would close it alone, and never below what changes its velocity by 1e-6 m/s:
+    // its law's limit per normal force must be known, or a contact that opens and closes would lose its friction in every other pass.
+    s.fn[i] = rows.wn[i] > 0 ? std::max(l[0] > 0 ? l[0] : normal_impulse(rows, i, u.x), 1e-6 / rows.wn[i]) / h : 0;
     s.vt[i] = u.y, s.vt[s.stride + i] = u.z;
     const double wt = rows.wt[i];
     s.ft_stop[i] = wt > 0 ? (l[1] - u.y / wt) / h : 0;
@@ -163,6 +164,7 @@ void Acceleration::follow(ContactRows &rows) {
       Vec3 jump;
       for (uint32_t c = 0; c < 3; ++c)
         for (uint32_t j = 0; j < count_; ++j) jump[int(c)] -= gamma[j] * dg_[size_t(j) * n_ + 3 * i + c];
+      jump.x = std::max(jump.x, -rows.impulse[3 * i]);   // a normal impulse never pulls, not in between either
       if (jump.x == 0 && jump.y == 0 && jump.z == 0) continue;
       rows.apply(i, jump);
       for (uint32_t c = 0; c < 3; ++c) rows.impulse[3 * i + c] += jump[int(c)];
@@ -171,33 +173,66 @@ void Acceleration::follow(ContactRows &rows) {
   from_.assign(rows.impulse.begin(), rows.impulse.end());
 }
 
-Residual inner_residual(const ContactRows &rows, const ContactState &law, double h) {
+namespace {
+
+double tangent_residual(const ContactRows &rows, uint32_t i, Pair law) {
+  const double a = law.a - rows.impulse[size_t(i) * 3 + 1], b = law.b - rows.impulse[size_t(i) * 3 + 2];
+  return rows.wt[i] * std::sqrt(a * a + b * b);
+}
+
+// What the laws, asked at the present state, want contact i to carry. A set-valued law is compared by its projection: where a contact just
+// slips, its force and its slip may still differ in direction by much while what is left to correct, the slip across the force, is tiny.
+Pair answered(const ContactRows &rows, const ContactState &s, uint32_t i, double h, Vec3 u) {
+  if (s.set_valued[i]) return friction_impulse(rows, s, i, h, rows.impulse[size_t(i) * 3], u.y, u.z);
+  return {h * s.ft[i], h * s.ft[s.stride + i]};
+}
+
+// law(i, u) gives the friction impulse that contact i should carry.
+template <class Law>
+Residual residual(const ContactRows &rows, const Tolerance &tolerance, Law law) {
   Residual r;
   for (uint32_t i = 0; i < rows.n; ++i) {
     if (!(rows.wn[i] > 0)) continue;
     const double *const l = &rows.impulse[size_t(i) * 3];
     const Vec3 u = rows.velocity(i);
-    r.normal = std::max(r.normal, std::fabs(std::min(rows.wn[i] * l[0], u.x + rows.rate[i])));
+    const double normal = std::fabs(std::min(rows.wn[i] * l[0], u.x + rows.rate[i]));
+    r.share = std::max(r.share, normal / tolerance.normal), r.speed = std::max(r.speed, normal);
     if (!(rows.wt[i] > 0) || !(l[0] > 0)) continue;
-    const Pair t = friction_impulse(rows, law, i, h, l[0], u.y, u.z);
-    const double a = t.a - l[1], b = t.b - l[2];
-    r.tangent = std::max(r.tangent, rows.wt[i] * std::sqrt(a * a + b * b));
+    const Pair t = law(i, u);
+    const double tangent = tangent_residual(rows, i, t), allowed = std::max(tolerance.tangent[i], 1e-3 * std::sqrt(u.y * u.y + u.z * u.z));
+    r.share = std::max(r.share, tangent / allowed), r.speed = std::max(r.speed, tangent);
   }
   return r;
 }
 
-Residual true_residual(const ContactRows &rows, const ContactState &answer, double h) {
-  Residual r;
+}  // namespace
+
+Residual inner_residual(const ContactRows &rows, const ContactState &law, double h, const Tolerance &tolerance) {
+  return residual(rows, tolerance, [&](uint32_t i, Vec3 u) { return friction_impulse(rows, law, i, h, rows.impulse[size_t(i) * 3], u.y, u.z); });
+}
+
+Residual true_residual(const ContactRows &rows, const ContactState &answer, double h, const Tolerance &tolerance) {
+  return residual(rows, tolerance, [&](uint32_t i, Vec3 u) { return answered(rows, answer, i, h, u); });
+}
+
+void set_tolerance(const ContactRows &rows, const ContactState &answer, std::span<const ContactPoint> contacts, double h, double least,
+                   uint32_t bodies, Array<double> &disturbance, Tolerance &tolerance) {
+  disturbance.assign(bodies, 0.0);
+  auto visit = [&](uint32_t i, auto f) {
+    f(disturbance[contacts[i].slot_a]);
+    if (!contacts[i].obstacle) f(disturbance[contacts[i].slot_b]);
+  };
   for (uint32_t i = 0; i < rows.n; ++i) {
-    if (!(rows.wn[i] > 0)) continue;
-    const double *const l = &rows.impulse[size_t(i) * 3];
-    const double un = rows.velocity(i).x;
-    r.normal = std::max(r.normal, std::fabs(std::min(rows.wn[i] * l[0], un + rows.rate[i])));
-    if (!(rows.wt[i] > 0) || !(l[0] > 0)) continue;
-    const double a = h * answer.ft[i] - l[1], b = h * answer.ft[answer.stride + i] - l[2];
-    r.tangent = std::max(r.tangent, rows.wt[i] * std::sqrt(a * a + b * b));
+    if (!(rows.wt[i] > 0) || !(rows.impulse[size_t(i) * 3] > 0 || answer.fn[i] > 0)) continue;
+    const double r = tangent_residual(rows, i, answered(rows, answer, i, h, rows.velocity(i)));
+    visit(i, [&](double &d) { d = std::max(d, r); });
   }
-  return r;
+  tolerance.tangent.resize(rows.n);
+  for (uint32_t i = 0; i < rows.n; ++i) {
+    double t = least;
+    visit(i, [&](double d) { t = std::max(t, 1e-2 * d); });
+    tolerance.tangent[i] = t;
+  }
 }
 
 }  // namespace dfm

@@ -47,7 +47,7 @@ void refuse_flat(const std::string &path, const RawMesh &raw) {
     if (is_flat(cell_shape(raw.points.data(), &raw.tets[4 * size_t(t)])) && flat++ == 0) first = t;
   if (flat == 0) return;
   const uint32_t *c = &raw.tets[4 * size_t(first)];
-  if (flat == ntet)
+  if (flat == ntet && ntet > 1)
     fail(DFM_E_FORMAT, "%s: all %u tetrahedra are flat (no volume): the points of each lie in one plane; a body needs a volume mesh",
          path.c_str(), ntet);
   fail(DFM_E_FORMAT, "%s: %u of %u tetrahedra %s flat (no volume), the first is tetrahedron %u (counted from 0) on points %u %u %u %u; remove slivers in the mesher",

@@ -1,4 +1,5 @@
-// Structured bodies with near-isotropic cells and no preferred direction. Only + - * / sqrt, so the same bits on every machine.
+// Structured bodies with near-isotropic cells and no preferred direction. Coordinates come from + - * / sqrt alone, so their bits are the
+// same on every machine.
 //
 //   beam      body-centred cubic lattice: grid points and cell centres; four cells around each inner grid face (mean ratio 0.95), two on
 //             each boundary face with alternating diagonals. All inner points have 14 neighbours.
@@ -49,6 +50,12 @@ double score(double elongation, double count, double asked) {
   const double excess = std::max(1.0, elongation / 2);
   return std::sqrt(elongation) * excess * excess * excess * apart(count, asked);
 }
+// More cells than asked for are made within reason only.
+void check_choice(const char *shape, double count, uint32_t asked) {
+  if (count > 100.0 * std::max(asked, 100u))
+    fail(DFM_E_ARG, "a %s of these proportions needs about %.2g cells to keep them in shape, %u were asked for; ask for more, or give sizes nearer to each other",
+         shape, count, asked);
+}
 
 // sin and cos on [0, pi/3] by their series: libm's bits depend on the processor.
 Vec3 unit_on_circle(double angle) {
@@ -86,9 +93,7 @@ Grid choose_grid(const double size[3], uint32_t cells) {
       const double s = score(std::max({h[0], h[1], h[2]}) / std::min({h[0], h[1], h[2]}), count, cubes);
       if (s < best_score) best_score = s, best = g;
     }
-  if (best_score == HUGE_VAL)
-    fail(DFM_E_ARG, "a beam of %g x %g x %g m cannot be cut into %u cells of sound shape; give sizes nearer to each other", size[0],
-         size[1], size[2], cells);
+  check_choice("beam", best_score < HUGE_VAL ? 12.0 * best.n[0] * best.n[1] * best.n[2] : HUGE_VAL, cells);
   return best;
 }
 
@@ -230,9 +235,7 @@ void choose_rings(double radius, double length, uint32_t cells, uint32_t *rings,
       const double s = score(apart(length / m, radius / n), 18.0 * n * n * m, cells);
       if (s < best) best = s, *rings = n, *layers = m;
     }
-  if (best == HUGE_VAL)
-    fail(DFM_E_ARG, "a cylinder of radius %g m and length %g m cannot be cut into %u cells; give sizes nearer to each other", radius,
-         length, cells);
+  check_choice("cylinder", best < HUGE_VAL ? 18.0 * *rings * *rings * *layers : HUGE_VAL, cells);
 }
 
 }  // namespace

@@ -40,6 +40,8 @@ inline constexpr uint32_t kMaxTets = 1u << 30;  // face numbers are 4*cell+face 
 // ---- reading -----------------------------------------------------------------------------------------------------
 // By file name ending; throws Error (IO, FORMAT, UNSUPPORTED) with one sentence. Memory stays within a small multiple of the file's size.
 TetMesh read_tet_mesh(const Memory &memory, const std::string &path);
+// The same from bytes that already lie in memory; `path` tells the format and stands in sentences.
+TetMesh parse_tet_mesh(const Memory &memory, const std::string &path, const char *bytes, size_t size);
 
 // ---- generators (SI units, near-isotropic cells, about `cells` of them) -------------------------------------------
 TetMesh make_cylinder(const Memory &memory, double radius, double length, uint32_t cells);  // axis z, base at the origin

@@ -32,10 +32,18 @@ uint32_t RawMesh::group(const Cursor &at, int32_t dimension, int32_t tag) {
   return entry->second;
 }
 
+TetMesh parse_tet_mesh(const Memory &memory, const std::string &path, const char *bytes, size_t size) {
+  Cursor in(path, bytes, size);
+  RawMesh raw(memory);
+  if (size == 0) in.refuse("the file is empty; %s", kReadable);
+  if (ending(path) == "vtk") read_vtk(in, raw);
+  else read_msh(in, raw);
+  return finish_mesh(path, std::move(raw));
+}
+
 TetMesh read_tet_mesh(const Memory &memory, const std::string &path) {
   const std::string kind = ending(path);
-  const bool msh = kind == "msh" || kind == "msh2", vtk = kind == "vtk";
-  if (!msh && !vtk) {
+  if (kind != "msh" && kind != "msh2" && kind != "vtk") {
     static const std::vector<std::string> later{"vtu", "mesh", "obj", "ply", "stl", "off", "node", "ele", "inp"};
     if (std::find(later.begin(), later.end(), kind) != later.end())
       fail(DFM_E_UNSUPPORTED, "%s: reading .%s is not available yet; %s, so convert it first (for instance with meshio or gmsh)",
@@ -43,12 +51,7 @@ TetMesh read_tet_mesh(const Memory &memory, const std::string &path) {
     fail(DFM_E_UNSUPPORTED, "%s: unknown mesh file ending '%s'; %s", path.c_str(), kind.c_str(), kReadable);
   }
   const Array<char> bytes = read_whole_file(memory, path);
-  Cursor in(path, bytes.data(), bytes.size());
-  RawMesh raw(memory);
-  if (bytes.empty()) in.refuse("the file is empty; %s", kReadable);
-  if (msh) read_msh(in, raw);
-  else read_vtk(in, raw);
-  return finish_mesh(path, std::move(raw));
+  return parse_tet_mesh(memory, path, bytes.data(), bytes.size());
 }
 
 }  // namespace dfm

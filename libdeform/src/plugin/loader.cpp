@@ -180,7 +180,7 @@ void Loader::scan_if_there(const std::string &directory, bool asked_for) {
   }
 }
 
-void Loader::discover() {
+void Loader::add_bundled() {
   for (const StaticPlugin &plugin : static_plugins()) {
     try {
       add_static(plugin.entry, plugin.name);
@@ -188,6 +188,9 @@ void Loader::discover() {
       registry_.pass_over(std::string("static:") + plugin.name, e.sentence);
     }
   }
+}
+
+void Loader::discover() {
   const char *path = secure_getenv("DEFORM_PLUGIN_PATH");
   if (!path && std::getenv("DEFORM_PLUGIN_PATH")) registry_.pass_over("DEFORM_PLUGIN_PATH", "ignored: the process runs with elevated privilege");
   for (const char *begin = path; begin && *begin;) {

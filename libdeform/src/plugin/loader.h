@@ -23,6 +23,7 @@ class Loader {
   // Every plugin of a directory, by name; what is passed over goes to the registry with its reason. Throws DFM_E_IO: no directory.
   uint32_t scan(const std::string &directory);
   void add_static(dfm_plugin_fn entry, const std::string &name);
+  void add_bundled();  // plugins linked into this library (option DEFORM_PLUGINS_STATIC)
   // DEFORM_PLUGIN_PATH (not under elevated privilege), then the directory beside this library, else the installed one.
   void discover();
   // Plugins of one file, by type id order; empty where the file is not loaded.

@@ -29,6 +29,9 @@ class Builder {
     for (Friction &f : def_.friction) add_friction(f);
     for (const Filter &f : def_.filters)
       check(dfm_world_filter_pair(world_, f.between[0].c_str(), f.between[1].c_str(), f.collide), f.pointer);
+    // Makes the plan now, so that an effect that nothing provides is an error of the scene and not of its first step.
+    double step = 0;
+    check(dfm_world_stable_step(world_, &step, nullptr, nullptr), def_.effects_auto ? "/bodies" : "/effects");
     return {std::exchange(world_, 0), std::move(probes_)};
   }
 
@@ -81,8 +84,8 @@ class Builder {
     const double *points = nullptr;
     check(dfm_tetmesh_get_info(mesh, &info), b.pointer + "/mesh");
     check(dfm_tetmesh_data(mesh, &points, &out.tets, &out.file_point), b.pointer + "/mesh");
-    check(dfm_tetmesh_groups(mesh, &out.group_names, &out.cell_group), b.pointer + "/mesh");
-    out.npoint = info.npoint, out.ntet = info.ntet, out.ngroup = info.ngroup;
+    check(dfm_tetmesh_groups(mesh, &out.group_names, nullptr), b.pointer + "/mesh");
+    out.handle = mesh, out.npoint = info.npoint, out.ntet = info.ntet, out.ngroup = info.ngroup;
     out.points.resize(3 * size_t(info.npoint));
     for (size_t i = 0; i < out.points.size(); ++i) out.points[i] = points[i] * b.scale;
     for (int k = 0; k < 3; ++k) out.lo[k] = info.lo[k] * b.scale, out.hi[k] = info.hi[k] * b.scale;

@@ -10,7 +10,8 @@ namespace dfm::scene {
 // A mesh file read once, with the scale of one body.
 struct BodyMesh {
   std::vector<double> points;  // [n,3] rest, scaled
-  const uint32_t *tets = nullptr, *file_point = nullptr, *cell_group = nullptr;
+  const uint32_t *tets = nullptr, *file_point = nullptr;
+  dfm_tetmesh handle = 0;      // lends the arrays and the points of its groups
   const char *const *group_names = nullptr;
   uint32_t npoint = 0, ntet = 0, ngroup = 0;
   double lo[3] = {}, hi[3] = {}, size = 0;  // of the scaled points; size: diagonal
@@ -24,7 +25,7 @@ std::vector<double> share_by_area(const std::vector<uint32_t> &points, const Bod
 std::vector<double> share(const Force &force, const std::vector<uint32_t> &points, const BodyMesh &mesh,
                           const std::vector<uint32_t> &triangles, const std::string &file);
 
-// Cell that holds a point (or the nearest one) and the point's barycentric coordinates there; returns the distance to the cell, at least.
+// Cell that holds a point (or the nearest one) and the point's barycentric coordinates there; returns the distance to the cell.
 double locate(const BodyMesh &mesh, const double point[3], uint32_t corners[4], double weights[4]);
 
 // Held components and forces by the file's node numbers.

@@ -5,6 +5,8 @@
 //            residual of the true laws below tolerance: done
 //            sweep the linearised laws until their own residual is below tolerance
 #include <algorithm>
+#include <cmath>
+#include <limits>
 
 #include "contact/solver.h"
 #include "core/error.h"
@@ -55,6 +57,29 @@ void prepare_rows(World &w) {
   w.batches.gather(w.law_list, w.state);
 }
 
+// Sweeps on the laws as they were last answered. At the cap the best state seen is taken, not the last one.
+void sweep_until_good(World &w, Acceleration &acceleration, const Tolerance &tolerance) {
+  double best = std::numeric_limits<double>::infinity();
+  acceleration.start(w.rows);
+  for (;;) {
+    sweep(w.rows, w.state, w.h);
+    ++w.sweeps;
+    const double share = inner_residual(w.rows, w.state, w.h, tolerance).share;
+    if (share <= 0.5) return;
+    if (share < best) best = share, w.best_impulse.assign(w.rows.impulse.begin(), w.rows.impulse.end());
+    if (w.sweeps >= w.def.max_sweeps) break;
+    acceleration.follow(w.rows);
+  }
+  if (std::isinf(best)) return;
+  for (uint32_t i = 0; i < w.rows.n; ++i) {
+    double *const l = &w.rows.impulse[size_t(i) * 3];
+    const Vec3 change = load3(&w.best_impulse[size_t(i) * 3]) - load3(l);
+    if (change.x == 0 && change.y == 0 && change.z == 0) continue;
+    w.rows.apply(i, change);
+    store3(l, load3(&w.best_impulse[size_t(i) * 3]));
+  }
+}
+
 }  // namespace
 
 bool World::stage_solve(uint32_t *trouble) {
@@ -62,25 +87,22 @@ bool World::stage_solve(uint32_t *trouble) {
   residual = {};
   prepare_rows(*this);
   if (rows.n == 0) return true;
-  const double tolerance = def.contact_tolerance > 0 ? def.contact_tolerance : std::min(1e-6, 0.01 * (0.5 * offset) / h);
+  const double gap_margin = 0.01 * (0.5 * offset) / h;
+  const double least = def.contact_tolerance > 0 ? def.contact_tolerance : std::min(1e-6, gap_margin);
+  tolerance.normal = gap_margin;
   const LawInstance *bad = nullptr;
   for (;;) {
     set_trial(rows, h, state);
     bad = batches.evaluate(h, state);
     if (bad) break;
     ++passes;
-    if (sweeps) {
-      residual = true_residual(rows, state, h);
-      if (residual.max() <= tolerance || sweeps >= def.max_sweeps || passes > def.max_passes) break;
+    if (!sweeps) set_tolerance(rows, state, contacts, h, least, static_cast<uint32_t>(bodies.size()), disturbance, tolerance);
+    else {
+      residual = true_residual(rows, state, h, tolerance);
+      if (residual.share <= 1 || sweeps >= def.max_sweeps || passes > def.max_passes) break;
     }
     // at least one sweep on a warm start is part of the method
-    acceleration.start(rows);
-    for (;;) {
-      sweep(rows, state, h);
-      ++sweeps;
-      if (sweeps >= def.max_sweeps || inner_residual(rows, state, h).max() <= 0.5 * tolerance) break;
-      acceleration.follow(rows);
-    }
+    sweep_until_good(*this, acceleration, tolerance);
   }
   double poison = 0;
   for (double l : rows.impulse) poison += 0.0 * l;
@@ -92,8 +114,8 @@ bool World::stage_solve(uint32_t *trouble) {
                           "take a smaller step or change the law").c_str());
     return false;
   }
-  if (residual.max() > tolerance) *trouble |= DFM_TROUBLE_UNCONVERGED, ++stats.unconverged;
-  stats.passes = passes, stats.sweeps = sweeps, stats.residual = residual.max();
+  if (residual.share > 1) *trouble |= DFM_TROUBLE_UNCONVERGED, ++stats.unconverged;
+  stats.passes = passes, stats.sweeps = sweeps, stats.residual = residual.speed;
   stats.passes_max = std::max(stats.passes_max, passes), stats.sweeps_max = std::max(stats.sweeps_max, sweeps);
   stats.residual_max = std::max(stats.residual_max, stats.residual);
   return true;

@@ -1,4 +1,5 @@
 // Uses what the host lends: memory and the log in prepare and release, scratch and parallel_for in eval.
+#include <atomic>
 #include <cstring>
 
 #include "deform/plugin.hpp"
@@ -22,11 +23,15 @@ void release(const dfm_host *host, void *data) {
   host->release(host->ctx, data, sizeof(Tables), alignof(Tables));
 }
 
-struct Job { const dfm_friction_in *in; double *twice; const dfm_host *host; };
+struct Job { const dfm_friction_in *in; double *twice; const dfm_host *host; std::atomic<bool> refused; };
 
 void work(void *user, uint32_t begin, uint32_t end) {
-  const Job &job = *static_cast<Job *>(user);
+  Job &job = *static_cast<Job *>(user);
   double *own = static_cast<double *>(job.host->scratch(job.host->ctx, (end - begin) * sizeof(double)));
+  if (!own) {
+    job.refused = true;
+    return;
+  }
   for (uint32_t i = begin; i < end; ++i) own[i - begin] = job.in->fn[i];
   for (uint32_t i = begin; i < end; ++i) job.twice[i] = 2 * own[i - begin];
 }
@@ -39,8 +44,9 @@ dfm_status eval(const dfm_friction_in *in, dfm_friction_out *out) {
   double *large = static_cast<double *>(host->scratch(host->ctx, 3000000));
   if (!twice || !large || reinterpret_cast<uintptr_t>(twice) % 64 || reinterpret_cast<uintptr_t>(large) % 64) return DFM_E_FATAL;
   std::memset(large, 0xff, 3000000);
-  Job job{in, twice, host};
+  Job job{in, twice, host, false};
   host->parallel_for(host->ctx, in->n, 16, work, &job);
+  if (job.refused) return DFM_E_NOMEM;
   for (uint32_t i = 0; i < in->n; ++i) out->ft[i] = twice[i], out->ft[in->stride + i] = tables.factor;
   return host->extension(host->ctx, "dfm.unheard-of/1") ? DFM_E_FATAL : DFM_OK;
 }

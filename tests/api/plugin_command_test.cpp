@@ -1,0 +1,70 @@
+// deform plugin list | info | check as a user calls it.
+#include <gtest/gtest.h>
+
+#include "support.h"
+
+namespace {
+
+bool has(const std::string &text, const std::string &part) { return text.find(part) != std::string::npos; }
+
+TEST(PluginCommand, List_ShowsTypesWithKindAndFile) {
+  const auto r = test::deform({"plugin", "list"});
+  EXPECT_EQ(r.exit_code, 0) << r.err;
+  EXPECT_TRUE(has(r.out, "org.deform.coulomb") && has(r.out, "org.deform.none") && has(r.out, "law")) << r.out;
+  EXPECT_TRUE(has(r.out, "stiction stribeck viscous") && has(r.out, "friction_coulomb.so")) << r.out;
+}
+
+TEST(PluginCommand, ListOfAFolder_GivesAReasonForWhatIsNoPlugin) {
+  const std::string dir = test::scratch("plugin_command");
+  test::write_file(dir + "/broken.so", "no library");
+  for (const char *json : {"", "--json"}) {
+    std::vector<std::string> args{"plugin", "list", "--dir", dir};
+    if (*json) args.push_back(json);
+    const auto r = test::deform(args);
+    EXPECT_EQ(r.exit_code, 0) << r.err;
+    EXPECT_TRUE(has(r.out, "broken.so") && has(r.out, "not a shared library")) << r.out;
+  }
+  const auto missing = test::deform({"plugin", "list", "--dir", "/nowhere/at/all"});
+  EXPECT_EQ(missing.exit_code, 2);
+  EXPECT_TRUE(has(missing.err, "/nowhere/at/all")) << missing.err;
+}
+
+TEST(PluginCommand, ListAsJson_IsOneObject) {
+  const auto r = test::deform({"plugin", "list", "--json"});
+  EXPECT_EQ(r.exit_code, 0) << r.err;
+  EXPECT_TRUE(has(r.out, "\"types\": [") && has(r.out, "\"id\": \"org.deform.coulomb\"") && has(r.out, "\"passed\": [")) << r.out;
+}
+
+TEST(PluginCommand, Info_ShowsTheParameterTable) {
+  for (const char *id : {"coulomb", "org.deform.coulomb"}) {
+    const auto r = test::deform({"plugin", "info", id});
+    EXPECT_EQ(r.exit_code, 0) << r.err;
+    for (const char *part : {"mu_C", "mu_S", "v_s", "delta", "sigma2", "N s/m^3", "stribeck", "Zerbato", "MIT"}) EXPECT_TRUE(has(r.out, part)) << part;
+  }
+  const auto json = test::deform({"plugin", "info", "coulomb", "--json"});
+  EXPECT_EQ(json.exit_code, 0) << json.err;
+  EXPECT_TRUE(has(json.out, "\"key\": \"v_s\"") && has(json.out, "\"default\": 0.01") && has(json.out, "\"unit\": \"m/s\"")) << json.out;
+}
+
+TEST(PluginCommand, InfoOfAFile_LoadsIt) {
+  const auto r = test::deform({"plugin", "info", std::string(DEFORM_PLUGIN_DIR) + "/friction_none.so"});
+  EXPECT_EQ(r.exit_code, 0) << r.err;
+  EXPECT_TRUE(has(r.out, "org.deform.none")) << r.out;
+}
+
+TEST(PluginCommand, UnknownId_ExitsTwoAndListsWhatThereIs) {
+  const auto r = test::deform({"plugin", "info", "coulob"});
+  EXPECT_EQ(r.exit_code, 2);
+  EXPECT_TRUE(has(r.err, "coulob") && has(r.err, "did you mean \"coulomb\"") && has(r.err, "org.deform.none")) << r.err;
+  EXPECT_EQ(test::deform({"plugin", "info", "/nowhere/x.so"}).exit_code, 2);
+  EXPECT_EQ(test::deform({"plugin", "info"}).exit_code, 2);
+  EXPECT_EQ(test::deform({"plugin"}).exit_code, 2);
+}
+
+TEST(PluginCommand, Check_SaysThatItComesLater) {
+  const auto r = test::deform({"plugin", "check", "x.so"});
+  EXPECT_EQ(r.exit_code, 2);
+  EXPECT_TRUE(has(r.err, "not available yet")) << r.err;
+}
+
+}  // namespace

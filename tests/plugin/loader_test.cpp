@@ -1,0 +1,203 @@
+// Discovery: what is loaded, from where, and the reason for everything that is not.
+#include <fstream>
+
+#include "tiny_support.h"
+
+namespace fs = std::filesystem;
+using tiny::Context;
+using tiny::folder;
+using tiny::plugin;
+
+namespace {
+
+using Ids = std::vector<std::string>;
+
+dfm_status load(const Context &c, const std::string &path) { return dfm_plugin_load(c.c, path.c_str()); }
+bool says(const std::string &part) { return std::string(dfm_last_error()).find(part) != std::string::npos; }
+
+struct Environment {
+  std::string name, before;
+  bool had;
+  Environment(const char *n, const std::string &value) : name(n), before(std::getenv(n) ? std::getenv(n) : ""), had(std::getenv(n)) {
+    setenv(n, value.c_str(), 1);
+  }
+  ~Environment() { had ? setenv(name.c_str(), before.c_str(), 1) : unsetenv(name.c_str()); }
+};
+
+TEST(Loader, ExplicitPath_LoadsTheFile) {
+  Context c;
+  EXPECT_EQ(load(c, plugin("tiny_law")), DFM_OK) << dfm_last_error();
+  EXPECT_EQ(c.ids(), Ids{"org.tiny.drag"});
+  EXPECT_EQ(c.file_of("org.tiny.drag"), plugin("tiny_law"));
+}
+
+TEST(Loader, TheSameFileTwice_IsHarmless) {
+  Context c;
+  EXPECT_EQ(load(c, plugin("tiny_law")), DFM_OK);
+  EXPECT_EQ(load(c, plugin("tiny_law")), DFM_OK);
+  EXPECT_EQ(load(c, std::string(DEFORM_BINARY_DIR) + "/lib/../lib/tiny/tiny_law.so"), DFM_OK);
+  EXPECT_EQ(c.ids().size(), 1u);
+}
+
+TEST(Loader, NoSuchFile_IsAnIoErrorWithItsName) {
+  Context c;
+  EXPECT_EQ(load(c, "/nowhere/x.so"), DFM_E_IO);
+  EXPECT_TRUE(says("/nowhere/x.so") && says("No such file")) << dfm_last_error();
+  EXPECT_EQ(dfm_plugin_load(c.c, ""), DFM_E_ARG);
+  EXPECT_EQ(dfm_plugin_load(nullptr, "x.so"), DFM_E_ARG);
+  uint32_t n = 7;
+  EXPECT_EQ(dfm_plugin_scan(c.c, "/nowhere", &n), DFM_E_IO);
+  EXPECT_EQ(n, 7u);
+}
+
+TEST(Loader, SymbolicLink_IsFollowed) {
+  const std::string dir = folder("links");
+  fs::create_symlink(plugin("tiny_law"), dir + "/a.so");
+  fs::create_symlink(dir + "/a.so", dir + "/b.so");
+  fs::create_symlink("/nowhere/c.so", dir + "/c.so");
+  Context c;
+  uint32_t loaded = 0;
+  EXPECT_EQ(dfm_plugin_scan(c.c, dir.c_str(), &loaded), DFM_OK);
+  EXPECT_EQ(loaded, 1u);
+  EXPECT_EQ(c.file_of("org.tiny.drag"), dir + "/a.so");
+  EXPECT_NE(c.reason("b.so").find("link to a plugin that is loaded"), std::string::npos) << c.reason("b.so");
+  EXPECT_NE(c.reason("c.so").find("No such file"), std::string::npos) << c.reason("c.so");
+}
+
+TEST(Loader, ForeignAbi_IsRefusedByTheLibrary) {
+  Context c;
+  EXPECT_EQ(load(c, plugin("tiny_foreign")), DFM_E_UNSUPPORTED);
+  EXPECT_TRUE(says("ABI 7 draft 3") && says("speaks ABI 0 draft 1") && says("rebuild")) << dfm_last_error();
+  EXPECT_TRUE(c.ids().empty());
+}
+
+TEST(Loader, ForeignHost_IsRefusedByThePluginWithItsOwnWords) {
+  Context c;
+  EXPECT_EQ(load(c, plugin("tiny_refuse")), DFM_E_UNSUPPORTED);
+  EXPECT_TRUE(says("refuses this library") && says("built for ABI 0 draft 99")) << dfm_last_error();
+  EXPECT_EQ(load(c, plugin("tiny_silent")), DFM_E_UNSUPPORTED);
+  EXPECT_TRUE(says("gave no reason")) << dfm_last_error();
+}
+
+TEST(Loader, LibraryWithoutEntry_IsRefusedBeforeItsConstructorsRun) {
+  unsetenv("TINY_NOENTRY_RAN");
+  Context c;
+  EXPECT_EQ(load(c, plugin("tiny_noentry")), DFM_E_UNSUPPORTED);
+  EXPECT_TRUE(says("no symbol dfm_plugin_entry")) << dfm_last_error();
+  EXPECT_EQ(std::getenv("TINY_NOENTRY_RAN"), nullptr);
+}
+
+TEST(Loader, TakenId_IsAStateErrorThatNamesTheHolder) {
+  Context c;
+  EXPECT_EQ(load(c, plugin("tiny_law")), DFM_OK);
+  EXPECT_EQ(load(c, plugin("tiny_taken")), DFM_E_STATE);
+  EXPECT_TRUE(says("org.tiny.drag") && says("tiny_law.so")) << dfm_last_error();
+  EXPECT_EQ(c.ids().size(), 1u);
+}
+
+TEST(Loader, ThrowingEntry_LeavesTheHostStanding) {
+  Context c;
+  EXPECT_EQ(load(c, plugin("tiny_throw_entry")), DFM_E_UNSUPPORTED);
+  EXPECT_TRUE(says("threw an exception")) << dfm_last_error();
+  EXPECT_EQ(load(c, plugin("tiny_law")), DFM_OK);
+}
+
+TEST(Loader, TruncatedFile_IsRefusedAtEveryLength) {
+  const std::string whole = test::read_file(plugin("tiny_law")), path = folder("cut") + "/cut.so";
+  ASSERT_GT(whole.size(), 4096u);
+  Context c;
+  for (size_t n : {size_t(0), size_t(1), size_t(4), size_t(63), size_t(64), size_t(200), size_t(1000), size_t(4096), whole.size() / 2}) {
+    test::write_file(path, whole.substr(0, n));
+    EXPECT_EQ(load(c, path), DFM_E_UNSUPPORTED) << n;
+  }
+  EXPECT_TRUE(says("cut short")) << dfm_last_error();
+  EXPECT_TRUE(c.ids().empty());
+}
+
+TEST(Loader, AnyByteOfTheHeadersChanged_DoesNotEndTheProcess) {
+  const std::string whole = test::read_file(plugin("tiny_law")), path = folder("flip") + "/flip.so";
+  Context c;
+  for (size_t at = 4; at < 64; ++at) {
+    std::string spoilt = whole;
+    spoilt[at] = static_cast<char>(spoilt[at] ^ 0x55);
+    if (at >= 24 && at < 32) continue;  // the entry address, which a library does not use
+    test::write_file(path, spoilt);
+    dfm_plugin_load(c.c, path.c_str());
+    std::filesystem::remove(path);
+  }
+  SUCCEED();
+}
+
+TEST(Loader, Scan_TakesPluginsInNameOrderAndGivesAReasonForTheRest) {
+  const std::string dir = folder("scan");
+  for (const char *name : {"tiny_taken", "tiny_law", "tiny_old", "tiny_foreign", "tiny_noentry", "tiny_throw_entry"})
+    fs::copy_file(plugin(name), dir + "/" + name + ".so");
+  test::write_file(dir + "/text.so", "this is no library\n");
+  test::write_file(dir + "/readme.txt", "text");
+  fs::create_directory(dir + "/more");
+  Context c(dir);
+  EXPECT_EQ(c.ids(), (Ids{"org.tiny.drag", "org.tiny.old"}));
+  EXPECT_EQ(c.file_of("org.tiny.drag"), dir + "/tiny_law.so");  // before tiny_taken.so
+  EXPECT_NE(c.reason("tiny_taken.so").find("is taken by"), std::string::npos);
+  EXPECT_NE(c.reason("tiny_foreign.so").find("ABI 7"), std::string::npos);
+  EXPECT_NE(c.reason("tiny_noentry.so").find("dfm_plugin_entry"), std::string::npos);
+  EXPECT_NE(c.reason("tiny_throw_entry.so").find("threw"), std::string::npos);
+  EXPECT_NE(c.reason("text.so").find("not a shared library"), std::string::npos);
+  EXPECT_NE(c.reason("readme.txt").find(".so"), std::string::npos);
+  EXPECT_NE(c.reason("more").find("directory"), std::string::npos);
+  EXPECT_EQ(c.reason("tiny_old.so"), "");
+}
+
+TEST(Loader, WrongPluginDirectory_FailsTheContext) {
+  dfm_context_def def = dfm_context_def_default();
+  def.plugin_dir = "/nowhere/plugins";
+  dfm_context *context = nullptr;
+  EXPECT_EQ(dfm_context_create(&def, &context), DFM_E_ARG);
+  EXPECT_EQ(context, nullptr);
+  EXPECT_TRUE(says("/nowhere/plugins")) << dfm_last_error();
+}
+
+TEST(Loader, PluginPath_ComesBeforeTheLibrarysOwnDirectory) {
+  const std::string first = folder("path_first"), second = folder("path_second");
+  fs::copy_file(plugin("tiny_law"), first + "/x.so");
+  fs::copy_file(plugin("tiny_taken"), second + "/x.so");
+  const Environment path("DEFORM_PLUGIN_PATH", first + ":/nowhere::" + second);
+  dfm_context *context = nullptr;
+  ASSERT_EQ(dfm_context_create(nullptr, &context), DFM_OK);
+  Context probe;
+  std::swap(probe.c, context);
+  EXPECT_EQ(probe.file_of("org.tiny.drag"), first + "/x.so");
+  EXPECT_NE(probe.reason("path_second/x.so").find("is taken by"), std::string::npos);
+  EXPECT_NE(probe.reason("/nowhere").find("no such directory"), std::string::npos);
+  EXPECT_NE(probe.file_of("org.deform.coulomb").find(DEFORM_PLUGIN_DIR), std::string::npos) << probe.file_of("org.deform.coulomb");
+  std::swap(probe.c, context);
+  dfm_context_destroy(context);
+}
+
+TEST(Loader, WithoutAnySetting_FindsThePluginsOfTheBuild) {
+  unsetenv("DEFORM_PLUGIN_PATH");
+  dfm_context *context = nullptr;
+  ASSERT_EQ(dfm_context_create(nullptr, &context), DFM_OK);
+  dfm_law law = 0;
+  EXPECT_EQ(dfm_law_open(context, "coulomb", &law), DFM_OK) << dfm_last_error();
+  EXPECT_EQ(dfm_law_open(context, "org.deform.none", &law), DFM_OK) << dfm_last_error();
+  dfm_context_destroy(context);
+}
+
+TEST(Loader, TwoContexts_ShareAFileButNotTheirTypes) {
+  Context a, b;
+  EXPECT_EQ(load(a, plugin("tiny_host")), DFM_OK);
+  EXPECT_EQ(load(b, plugin("tiny_host")), DFM_OK);
+  const dfm_type *ta = nullptr, *tb = nullptr;
+  dfm_law_type(a.open("host"), &ta), dfm_law_type(b.open("host"), &tb);
+  EXPECT_NE(ta, tb);
+}
+
+TEST(Loader, LoadAndDestroy_CanBeRepeated) {
+  for (int i = 0; i < 100; ++i) {
+    Context c;
+    ASSERT_EQ(load(c, plugin("tiny_host")), DFM_OK);
+  }
+}
+
+}  // namespace

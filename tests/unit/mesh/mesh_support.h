@@ -1,0 +1,62 @@
+// What the mesh tests share: memory that counts and refuses, files by folder, the sentence of a refusal.
+#pragma once
+#include <algorithm>
+#include <cstdlib>
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "core/error.h"
+#include "mesh/mesh.h"
+#include "support.h"
+
+namespace test {
+
+// Counts what is held, remembers the peak, and refuses beyond a cap or from the n-th call on.
+struct CountedMemory {
+  size_t held = 0, peak = 0, cap = SIZE_MAX, calls = 0, refuse_from = SIZE_MAX;
+  dfm::Memory hooks;
+  CountedMemory() {
+    hooks.user = this;
+    hooks.alloc = [](void *user, size_t bytes, size_t align) -> void * {
+      CountedMemory &m = *static_cast<CountedMemory *>(user);
+      if (++m.calls > m.refuse_from || bytes > m.cap - std::min(m.cap, m.held)) return nullptr;
+      m.held += bytes, m.peak = std::max(m.peak, m.held);
+      return std::aligned_alloc(align, (std::max<size_t>(bytes, 1) + align - 1) / align * align);
+    };
+    hooks.release = [](void *user, void *p, size_t bytes, size_t) {
+      static_cast<CountedMemory *>(user)->held -= bytes;
+      std::free(p);
+    };
+  }
+  CountedMemory(const CountedMemory &) = delete;
+  CountedMemory &operator=(const CountedMemory &) = delete;
+};
+
+inline std::vector<std::string> files_of(const std::string &folder, const std::vector<std::string> &endings) {
+  std::vector<std::string> out;
+  for (const auto &entry : std::filesystem::directory_iterator(folder))
+    for (const std::string &ending : endings)
+      if (entry.path().extension() == ending) out.push_back(entry.path().string());
+  std::sort(out.begin(), out.end());
+  return out;
+}
+inline std::vector<std::string> own_meshes() { return files_of(std::string(DEFORM_SOURCE_DIR) + "/tests/data/meshes", {".msh", ".vtk"}); }
+
+// The error of reading a file; none where it is read.
+inline std::optional<dfm::Error> refusal(const std::string &path, const dfm::Memory &memory = dfm::Memory::standard()) {
+  try {
+    dfm::read_tet_mesh(memory, path);
+  } catch (const dfm::Error &e) {
+    return e;
+  }
+  return std::nullopt;
+}
+inline std::optional<dfm::Error> refusal_of_text(const std::string &name, const std::string &text) {
+  const std::string path = scratch("mesh") + "/" + name;
+  write_file(path, text);
+  return refusal(path);
+}
+
+}  // namespace test

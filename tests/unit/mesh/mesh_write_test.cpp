@@ -1,0 +1,147 @@
+// Writers: what is written reads back to the bit, and a failed write leaves nothing behind.
+#include <gtest/gtest.h>
+
+#include <sys/resource.h>
+
+#include <csignal>
+#include <cstring>
+
+#include "mesh_support.h"
+
+using namespace dfm;
+
+namespace {
+
+std::string folder() { return test::scratch("mesh_write"); }
+
+// Coordinates that need all 17 digits, cells of alternating groups.
+TetMesh sample() {
+  TetMesh m = make_ball(Memory::standard(), 1.0 / 3, 500);
+  m.groups.push_back({"skin", 2, 3, {0, 1}});
+  m.groups.push_back({"inner part", 3, 4, {}});
+  m.groups.push_back({"outer", 3, 9, {}});
+  for (uint32_t t = 0; t < m.ntet(); ++t) m.tet_group[t] = t % 7 < 3 ? 1 : t % 7 == 5 ? kNoGroup : 2;
+  return m;
+}
+
+void expect_same_bits(const TetMesh &a, const TetMesh &b) {
+  ASSERT_EQ(a.points.size(), b.points.size());
+  EXPECT_EQ(std::memcmp(a.points.data(), b.points.data(), a.points.size() * sizeof(double)), 0);
+  EXPECT_EQ(a.tets, b.tets);
+}
+
+size_t files_in(const std::string &path) { return size_t(std::distance(std::filesystem::directory_iterator(path), {})); }
+
+}  // namespace
+
+TEST(MeshWrite, MshBinary_ReadsBackToTheBitWithGroups) {
+  const TetMesh m = sample();
+  for (const char *name : {"/a.msh", "/a.msh2", "/UPPER.MSH"}) {
+    SCOPED_TRACE(name);
+    write_tet_mesh(m, folder() + name);
+    const TetMesh back = read_tet_mesh(Memory::standard(), folder() + name);
+    expect_same_bits(m, back);
+    ASSERT_EQ(back.groups.size(), 2u);
+    EXPECT_EQ(back.groups[0].name, "inner part");
+    EXPECT_EQ(back.groups[0].tag, 4);
+    EXPECT_EQ(back.groups[1].name, "outer");
+    for (uint32_t t = 0; t < m.ntet(); ++t) ASSERT_EQ(back.tet_group[t], m.tet_group[t] == kNoGroup ? kNoGroup : m.tet_group[t] - 1);
+    EXPECT_TRUE(back.warnings.empty());
+  }
+}
+
+TEST(MeshWrite, VtkBinary_ReadsBackToTheBit) {
+  const TetMesh m = sample();
+  write_tet_mesh(m, folder() + "/a.vtk");
+  expect_same_bits(m, read_tet_mesh(Memory::standard(), folder() + "/a.vtk"));
+}
+
+TEST(MeshWrite, FailedWrite_LeavesOldFileAndNothingElse) {
+  const std::string home = test::scratch("mesh_write_failed");
+  std::filesystem::remove_all(home);
+  std::filesystem::create_directories(home + "/taken.msh/inside");
+  EXPECT_THROW(write_tet_mesh(sample(), home + "/taken.msh"), Error);  // a folder stands there: renaming fails
+  EXPECT_EQ(files_in(home), 1u);
+  EXPECT_THROW(write_tet_mesh(sample(), home + "/none/a.msh"), Error);
+  test::write_file(home + "/old.obj", "old");
+  try {
+    write_tet_mesh(sample(), home + "/old.obj");
+    ADD_FAILURE();
+  } catch (const Error &e) {
+    EXPECT_EQ(e.status, DFM_E_UNSUPPORTED);
+    EXPECT_NE(e.sentence.find(".vtk"), std::string::npos);
+  }
+  EXPECT_EQ(test::read_file(home + "/old.obj"), "old");
+  EXPECT_EQ(files_in(home), 2u);
+}
+
+TEST(MeshWrite, DiskThatFills_LeavesNothing) {
+  const std::string home = test::scratch("mesh_write_full");
+  std::filesystem::remove_all(home);
+  std::filesystem::create_directories(home);
+  std::signal(SIGXFSZ, SIG_IGN);  // so that the limit shows as a failing write, as a full disk does
+  rlimit before{}, small{};
+  getrlimit(RLIMIT_FSIZE, &before);
+  small.rlim_cur = 4096, small.rlim_max = before.rlim_max;
+  setrlimit(RLIMIT_FSIZE, &small);
+  for (const char *name : {"/a.msh", "/a.msh2", "/a.vtk"}) {
+    try {
+      write_tet_mesh(sample(), home + name);
+      ADD_FAILURE() << name;
+    } catch (const Error &e) {
+      EXPECT_EQ(e.status, DFM_E_IO);
+      EXPECT_NE(e.sentence.find("cannot be written"), std::string::npos) << e.sentence;
+    }
+  }
+  setrlimit(RLIMIT_FSIZE, &before);
+  EXPECT_EQ(files_in(home), 0u);
+}
+
+TEST(MeshWrite, Vtu_OffsetsLeadToItsArrays) {
+  const TetMesh m = make_beam(Memory::standard(), 2, 1, 1, 24);
+  std::vector<double> u(m.points.size(), 0.25), energy(m.ntet(), 7);
+  std::vector<uint32_t> part(m.ntet(), 3);
+  VtuGrid grid;
+  grid.npoint = m.npoint(), grid.ncell = m.ntet(), grid.points = m.points.data(), grid.cells = m.tets.data();
+  grid.point_data = {{"u", 3, u.data(), nullptr}};
+  grid.cell_data = {{"energy \"density\" <J>", 1, energy.data(), nullptr}, {"part", 1, nullptr, part.data()}};
+  write_vtu(folder() + "/a.vtu", grid);
+  const std::string text = test::read_file(folder() + "/a.vtu");
+  EXPECT_NE(text.find("NumberOfPoints=\"" + std::to_string(m.npoint()) + "\" NumberOfCells=\"" + std::to_string(m.ntet()) + "\""),
+      std::string::npos);
+  const size_t data = text.find("<AppendedData encoding=\"raw\">\n_") + std::strlen("<AppendedData encoding=\"raw\">\n_");
+  size_t end = data;
+  const auto block = [&](const std::string &name) {
+    const size_t at = text.find("Name=\"" + name + "\""), offset = text.find("offset=\"", at);
+    EXPECT_NE(at, std::string::npos) << name;
+    const size_t start = data + std::stoul(text.substr(offset + 8));
+    uint64_t bytes = 0;
+    std::memcpy(&bytes, &text[start], 8);
+    end = std::max(end, start + 8 + bytes);
+    return text.substr(start + 8, bytes);
+  };
+  const auto same = [](const std::string &bytes, const void *values, size_t size) {
+    return bytes.size() == size && std::memcmp(bytes.data(), values, size) == 0;
+  };
+  EXPECT_TRUE(same(block("Points"), m.points.data(), m.points.size() * 8));
+  EXPECT_TRUE(same(block("u"), u.data(), u.size() * 8));
+  EXPECT_TRUE(same(block("energy &quot;density&quot; &lt;J>"), energy.data(), energy.size() * 8));
+  EXPECT_TRUE(same(block("part"), part.data(), part.size() * 4));
+  EXPECT_TRUE(same(block("connectivity"), m.tets.data(), m.tets.size() * 4));
+  const std::string offsets = block("offsets");
+  uint32_t last = 0;
+  std::memcpy(&last, &offsets[offsets.size() - 4], 4);
+  EXPECT_EQ(last, 4 * m.ntet());
+  EXPECT_EQ(block("types"), std::string(m.ntet(), '\12'));
+  EXPECT_EQ(text.substr(end), "\n  </AppendedData>\n</VTKFile>\n");
+}
+
+TEST(MeshWrite, VtuOfTriangles_HasTriangleCells) {
+  const TetMesh m = make_beam(Memory::standard(), 1, 1, 1, 12);
+  const Array<uint32_t> tri = boundary_triangles(m.tets);
+  VtuGrid grid;
+  grid.npoint = m.npoint(), grid.ncell = uint32_t(tri.size() / 3), grid.corners = 3, grid.points = m.points.data(), grid.cells = tri.data();
+  write_vtu(folder() + "/t.vtu", grid);
+  const std::string text = test::read_file(folder() + "/t.vtu"), end = "\n  </AppendedData>\n</VTKFile>\n";
+  EXPECT_EQ(text.substr(text.size() - end.size() - grid.ncell, grid.ncell), std::string(grid.ncell, '\5'));
+}
