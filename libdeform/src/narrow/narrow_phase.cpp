@@ -25,7 +25,7 @@ struct Owners {
 };
 
 // An edge or triangle contact takes over the area of the nearest of its corners that carries no contact of its own with the other side;
-// none is given twice; 0 where none is free (mechanics, section 5). reserved2 holds the node that gave.
+// none is given twice; 0 where none is free (mechanics, section 5). lender holds the node that gave.
 class Areas {
  public:
   Areas(std::span<const BodyView> bodies, std::span<const ObstacleView> obstacles, Array<ContactPoint> &contacts)
@@ -81,16 +81,16 @@ class Areas {
       ContactPoint &c = contacts_[i];
       double nearest = 0;
       for (int k = 0; k < c.nnode; ++k) {
-        const bool side_a = c.weight[k] > 0;
+        const bool side_a = !b || c.weight[k] > 0;
         const BodyView &own = side_a ? a : *b;
         const uint32_t surfel = c.node[k] - own.first_node;
         const double d2 = norm2(load3(&own.surface->x[4 * size_t{surfel}]) - load3(c.point));
-        if ((c.reserved2 && !(d2 < nearest)) || (side_a ? of_a : of_b).has(surfel)) continue;
+        if ((c.lender && !(d2 < nearest)) || (side_a ? of_a : of_b).has(surfel)) continue;
         bool free = true;
-        for (size_t j = begin; free && j < i; ++j) free = contacts_[j].reserved2 != c.node[k] + 1;
+        for (size_t j = begin; free && j < i; ++j) free = contacts_[j].lender != c.node[k] + 1;
         if (!free) continue;
         nearest = d2;
-        c.reserved2 = c.node[k] + 1;
+        c.lender = c.node[k] + 1;
         c.area = own.surface->area[surfel] * (b ? 0.5 : 1.0);
       }
     }
