@@ -48,7 +48,8 @@ enum {
 /** Advances the world by dt. A step longer than the stable one is cut into equal sub-steps with the contact solve in each.
  * @param dt       s, > 0
  * @param trouble  out, DFM_TROUBLE_* bits; may be NULL
- * @return DFM_OK; DFM_DISCARD too many sub-steps, nothing changed; DFM_E_DIVERGED a force, velocity or impulse is not finite: the world stays at its last good sub-step;
+ * @return DFM_OK; DFM_DISCARD too many sub-steps, nothing changed; DFM_E_DIVERGED a force, velocity or impulse is not finite: the world
+ *         stays at its last good sub-step;
  *         DFM_E_ARG; DFM_E_HANDLE; DFM_E_BUSY called from inside a step
  * Threads: One thread at a time per world. Since 0.1. */
 DFM_API dfm_status dfm_world_step(dfm_world world, double dt, uint32_t *trouble);

@@ -91,9 +91,7 @@ void sweep(ContactRows &rows, const ContactState &law, double h) {
   }
 }
 
-Acceleration::Acceleration(const Memory &m) {
-  for (Array<double> *a : {&metric_, &from_, &f_, &g_, &df_, &dg_}) *a = Array<double>(HookAllocator<double>(m));
-}
+Acceleration::Acceleration(const Memory &m) { use_memory(m, metric_, from_, f_, g_, df_, dg_); }
 
 void Acceleration::start(const ContactRows &rows) {
   n_ = 3 * rows.n, count_ = next_ = 0, first_ = true, last_ = 0;

@@ -233,7 +233,7 @@ TEST(FindContacts, NearestContact_IsTheDistanceOfTheBodies) {
   std::normal_distribution<double> normal;
   const Mesh meshes[3] = {box_mesh({1, 0.7, 0.5}, 1, 1, 1), sphere_mesh(0.5, 1),
                           tetrahedron_mesh({0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0.1, 0.2, 0.8})};
-  int edges = 0, faces = 0, rims = 0;
+  int edges = 0, faces = 0, rims = 0, exact = 0, pairs = 0;
   for (int i = 0; i < 600; ++i) {
     Scene scene;
     scene.offset = 0.05;
@@ -274,7 +274,11 @@ TEST(FindContacts, NearestContact_IsTheDistanceOfTheBodies) {
     for (const ContactPoint &c : contacts)
       if (c.distance < least) least = c.distance, nearest = &c;
     ASSERT_NE(nearest, nullptr) << "pair " << i << " at distance " << d;
-    EXPECT_NEAR(least, d, 1e-9) << "pair " << i;
+    // Exact, but for edges that meet within a thousandth of their ends: there the end stands for them, x further along the other edge.
+    const double x = 1e-3 * 1.4;   // no edge of these meshes is longer than 1.4
+    EXPECT_GE(least, d - 1e-9) << "pair " << i;
+    EXPECT_LE(least, std::sqrt(d * d + x * x) + 1e-9) << "pair " << i;
+    exact += least < d + 1e-9, ++pairs;
     const Vec3 n = load3(nearest->normal);
     EXPECT_GT(dot(n, way) * (nearest->slot_a == 1 ? 1 : -1), 0);
     edges += nearest->kind == kEdgeEdge, faces += nearest->kind == kVertexFace && nearest->nnode == 4;
@@ -283,6 +287,7 @@ TEST(FindContacts, NearestContact_IsTheDistanceOfTheBodies) {
   EXPECT_GT(edges, 50);
   EXPECT_GT(faces, 50);
   EXPECT_GT(rims, 10);
+  EXPECT_GT(exact, 0.97 * pairs);
 }
 
 Scene crossed_tetrahedra(double gap) {
