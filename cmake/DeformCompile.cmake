@@ -31,15 +31,15 @@ if(DEFORM_SANITIZE)
   add_link_options(-fsanitize=${DEFORM_SANITIZE})
 endif()
 
-# Files named *_kernel_avx2.cpp and *_kernel_avx512.cpp are compiled for those instruction sets and chosen at run time.
+# Files named *_kernel_avx2.cpp and *_kernel_avx512.cpp are compiled for those instruction sets and chosen at run time. AVX-512 cannot
+# be had without FMA (clang turns it off with -mno-fma); -ffp-contract=off keeps it unused, and a test looks into the objects.
 function(deform_kernel_flags)
   foreach(file IN LISTS ARGN)
     if(file MATCHES "_kernel_avx2\\.cpp$")
       set_source_files_properties(${file} PROPERTIES COMPILE_OPTIONS "-mavx2;-mno-fma")
     elseif(file MATCHES "_kernel_avx512\\.cpp$")
-      # clang counts FMA as part of AVX-512: -mno-fma would switch both off. Nothing is fused all the same: -ffp-contract=off.
       set_source_files_properties(${file} PROPERTIES COMPILE_OPTIONS
-        "-mavx512f;-mavx512vl;-mavx512dq;-mprefer-vector-width=512;$<$<NOT:$<CXX_COMPILER_ID:Clang>>:-mno-fma>")
+        "-mavx512f;-mavx512vl;-mavx512dq;-mprefer-vector-width=512")
     endif()
   endforeach()
 endfunction()

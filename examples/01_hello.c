@@ -21,8 +21,8 @@ int main(void) {
   if (dfm_context_create(NULL, &context) < 0 || dfm_world_create(context, &world_def, &world) < 0 ||
       dfm_obstacle_create(world, &floor_def, &ground) < 0 ||
       dfm_tetmesh_make(context, "ball", (double[]){0.1, 0, 0}, 500, &mesh) < 0) return puts(dfm_last_error()), 1;
-  const dfm_body lower = drop(world, mesh, 0, 0.11), upper = drop(world, mesh, 0.01, 0.32);
-  for (int i = 0; i < 300; ++i) if (dfm_world_step(world, 1e-3, NULL) != DFM_OK) return puts(dfm_last_error()), 1;
+  const dfm_body lower = drop(world, mesh, 0, 0.11), upper = drop(world, mesh, 0.01, 0.31);
+  for (int i = 0; i < 500; ++i) if (dfm_world_step(world, 1e-3, NULL) != DFM_OK) return puts(dfm_last_error()), 1;
   if (!lower || !upper || dfm_world_contacts(world, 256, c, &n) < 0) return puts(dfm_last_error()), 1;
   for (uint32_t i = 0; i < n; ++i)
     printf("%s: %.3f N at z = %.4f m\n", c[i].body_b ? "ball on ball" : "ball on floor", c[i].fn, c[i].point[2]);

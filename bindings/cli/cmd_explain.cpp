@@ -21,7 +21,8 @@ void print_list(const JsonValue &plan, const char *key, const char *title, const
     const JsonValue &row = list->items[i];
     std::printf("  %-20s", row.get("name").c_str());
     for (const std::string &column : columns)
-      if (const std::string text = row.get(column); !text.empty()) std::printf("  %s%s", column == "why" ? "" : (column + ": ").c_str(), text.c_str());
+      if (const std::string text = row.get(column); !text.empty())
+        std::printf("  %s%s", column == "why" ? "" : (column + ": ").c_str(), text.c_str());
     std::printf("\n");
   }
 }
@@ -40,11 +41,13 @@ int explain(const Options &options, const Globals &globals) {
   print_list(plan, "absent", "left out", {"why"});
   if (const JsonValue *step = plan.find("step")) {
     std::printf("step\n  stable %s s", step->get("stable_s").c_str());
-    if (const std::string body = step->get("worst_body"); !body.empty()) std::printf(", bounded by point %s of \"%s\"", step->get("worst_point").c_str(), body.c_str());
+    if (const std::string body = step->get("worst_body"); !body.empty())
+      std::printf(", bounded by point %s of \"%s\"", step->get("worst_point").c_str(), body.c_str());
     if (const std::string reason = step->get("reason"); !reason.empty()) std::printf(": %s", reason.c_str());
     std::printf("\n");
     const double stable = std::strtod(step->get("stable_s").c_str(), nullptr), asked = scene.settings().step;
-    if (asked > 0 && stable > 0) std::printf("  the scene asks for %g s: %.0f sub-step%s each\n", asked, std::ceil(asked / stable - 1e-9), asked > stable ? "s" : "");
+    if (asked > 0 && stable > 0)
+      std::printf("  the scene asks for %g s: %.0f sub-step%s each\n", asked, std::ceil(asked / stable - 1e-9), asked > stable ? "s" : "");
   }
   return kDone;
 }

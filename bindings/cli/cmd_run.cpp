@@ -2,9 +2,11 @@
 #include <csignal>
 #include <ctime>
 
+#include <algorithm>
 #include <chrono>
 #include <cmath>
 #include <cstdio>
+#include <cstdlib>
 #include <filesystem>
 #include <memory>
 
@@ -69,7 +71,10 @@ class Runner {
     while (!interrupted && !result_.stopped && advance()) outputs(false);
     count_time();
     if (interrupted) result_.interrupted = true, result_.stop_reason = "interrupted by a signal";
-    if (!at_record_ && !result_.stopped) outputs_.record(), check(false);
+    if (!at_record_) {  // after a stop, too: the world is back at its last good state
+      outputs_.record();
+      if (!check_every_step_) check(false);
+    }
     if (result_.interrupted || result_.stopped) outputs_.write_last();
     if (result_.hold_begun) end_hold();
     outputs_.write_nodes();
@@ -77,6 +82,19 @@ class Runner {
 
   const RunResult &result() const { return result_; }
   const Checks &checks() const { return checker_.result(); }
+
+  // Sentences that the summary must hold whether or not anybody reads the terminal.
+  std::vector<std::string> remarks() const {
+    std::vector<std::string> out;
+    if (held_nothing_ || !result_.hold_begun) out.push_back("hold.creep_max_um_per_s is null: no pair sticks throughout the last half of the run");
+    const dfm_world_stats stats = world_stats(scene_);
+    if (trouble_ & DFM_TROUBLE_SUBSTEPS)
+      out.push_back("steps were cut into up to " + std::to_string(stats.substeps_max) + " sub-steps: the step is longer than the stable one; deform explain says why");
+    if (stats.unconverged > 0) out.push_back("the contact solve met its cap in " + std::to_string(stats.unconverged) + " sub-steps");
+    if (trouble_ & DFM_TROUBLE_INVERTED) out.push_back("cells turned inside out: refine the mesh or soften the load");
+    if (checks().intersections_max > 0) out.push_back("surfaces cross: up to " + std::to_string(checks().intersections_max) + " triangle pairs in one state");
+    return out;
+  }
 
  private:
   struct Mark { double wall, cpu; };
@@ -101,7 +119,7 @@ class Runner {
       // Rather two halves at the end than one step and a sliver.
       if (left < 2 * step && left > step) step = left / 2;
     }
-    if (left <= 1e-6 * step) return false;
+    if (left <= 1e-6 * std::min(step, duration_)) return false;
     if (left < step * (1 + 1e-6) && (automatic || left < step * (1 - 1e-6))) step = left;
     const double begin = wall_seconds();
     uint32_t trouble = 0;
@@ -128,9 +146,8 @@ class Runner {
       result_.stop_body = body ? scene_.name_of(body) : "";
       return;
     }
-    // The sentence names the body that diverged in quotes.
-    for (const BodyView &b : scene_.bodies())
-      if (result_.stop_reason.find("\"" + b.name + "\"") != std::string::npos) result_.stop_body = b.name;
+    for (const BodyView &b : scene_.bodies())  // the sentence names the body in quotes
+      if (result_.stop_reason.find("'" + b.name + "'") != std::string::npos) result_.stop_body = b.name;
   }
 
   void check(bool start_state) { checker_.check(start_state); }
@@ -148,7 +165,9 @@ class Runner {
       if (frame_due) frames_->draw(t);
       mark_ = {wall_seconds(), cpu_seconds()};
     }
-    if (result_.steps % 16 == 0) progress_.show(t - result_.start, duration_, result_.steps ? double(result_.steps) / (result_.wall + wall_seconds() - mark_.wall) : 0);
+    if (result_.steps % 16 != 0) return;
+    const double spent = result_.wall + wall_seconds() - mark_.wall;
+    progress_.show(t - result_.start, duration_, result_.steps && spent > 0 ? double(result_.steps) / spent : 0);
   }
 
   void count_time() {
@@ -164,21 +183,6 @@ class Runner {
     }
   }
 
- public:
-  // Sentences that the summary must hold whether or not anybody reads the terminal.
-  std::vector<std::string> remarks() const {
-    std::vector<std::string> out;
-    if (held_nothing_ || !result_.hold_begun) out.push_back("hold.creep_max_um_per_s is null: no pair sticks throughout the last half of the run");
-    const dfm_world_stats stats = world_stats(scene_);
-    if (trouble_ & DFM_TROUBLE_SUBSTEPS)
-      out.push_back("steps were cut into up to " + std::to_string(stats.substeps_max) + " sub-steps: the step is longer than the stable one; deform explain says why");
-    if (stats.unconverged > 0) out.push_back("the contact solve met its cap in " + std::to_string(stats.unconverged) + " sub-steps");
-    if (trouble_ & DFM_TROUBLE_INVERTED) out.push_back("cells turned inside out: refine the mesh or soften the load");
-    if (checks().intersections_max > 0) out.push_back("surfaces cross: up to " + std::to_string(checks().intersections_max) + " triangle pairs in one state");
-    return out;
-  }
-
- private:
   const SceneFile &scene_;
   const RunOptions &options_;
   dfm_world world_;
@@ -216,9 +220,10 @@ int run(RunOptions options, const Globals &globals) {
   if (options.profile && !globals.json) print_profile(scene, result);
   if (result.stopped) {
     char text[160];
-    std::snprintf(text, sizeof text, "stopped at step %llu, t = %g s", static_cast<unsigned long long>(result.steps + 1), result.simulated);
-    throw Failure(kStopped, options.scene + ": " + text + (result.stop_body.empty() ? "" : ", body \"" + result.stop_body + "\"") + ": " +
-                                result.stop_reason + "; the last good state is in " + options.out + "/states/last_*.vtu");
+    std::snprintf(text, sizeof text, "stopped at step %llu, t = %g s", static_cast<unsigned long long>(result.steps), result.simulated);
+    const bool named = result.stop_body.empty() || result.stop_reason.find("'" + result.stop_body + "'") != std::string::npos;
+    throw Failure(kStopped, options.scene + ": " + text + (named ? "" : ", body '" + result.stop_body + "'") + ": " + result.stop_reason +
+                                "; the last good state is in " + options.out + "/states/last_*.vtu");
   }
   return result.interrupted ? int(kInterrupted) : int(kDone);
 }
@@ -227,12 +232,17 @@ int run(RunOptions options, const Globals &globals) {
 
 void add_run(CLI::App &app, Globals &globals, int *exit_code) {
   auto options = std::make_shared<RunOptions>();
+  const auto positive = [](const std::string &text) {
+    char *end = nullptr;
+    const double x = std::strtod(text.c_str(), &end);
+    return *end == 0 && x > 0 && std::isfinite(x) ? std::string() : "expected a finite number above 0, found " + text;
+  };
   CLI::App *sub = app.add_subcommand("run", "simulates a scene and writes figures and pictures");
   sub->add_option("SCENE", options->scene, "scene file (JSON)")->required();
   sub->add_option("--out", options->out, "folder for the results (out/SCENE)")->type_name("DIR");
-  sub->add_option("--time", options->time, "seconds to simulate, instead of the scene's")->check(CLI::PositiveNumber)->type_name("T");
+  sub->add_option("--time", options->time, "seconds to simulate, instead of the scene's")->check(positive)->type_name("T");
   sub->add_option("--set", options->set, "change a value of the scene")->type_name("/json/pointer=value")->take_all()->allow_extra_args(false);
-  sub->add_option("--frames", options->frame_rate, "pictures per simulated second")->check(CLI::PositiveNumber)->type_name("FPS");
+  sub->add_option("--frames", options->frame_rate, "pictures per simulated second")->check(positive)->type_name("FPS");
   sub->add_flag("--profile", options->profile, "time spent in each stage");
   sub->add_option("--jitter", options->jitter, "small random changes of the start state; the same seed gives the same run")->type_name("SEED");
   sub->add_flag("--check", options->check, "count crossing triangles in every step, not only in recorded states");

@@ -155,14 +155,35 @@ bool meet(const Triangle a, const Triangle b, Sides &sides) {
 
 }  // namespace
 
+namespace {
+
+// Turns a triangle so that the corner alone on its side of the other's plane comes first; returns that side.
+int first_alone(const Triangle t, const int sides[3], const double *out[3]) {
+  const int positive = (sides[0] > 0) + (sides[1] > 0) + (sides[2] > 0), side = positive == 1 ? 1 : -1;
+  int first = 0;
+  while (sides[first] != side) ++first;
+  for (int i = 0; i < 3; ++i) out[i] = t[(first + i) % 3];
+  return side;
+}
+
+}  // namespace
+
 bool meet(const Triangle a, const Triangle b) {
   Sides sides;
   return meet(a, b, sides);
 }
 
+// Both triangles cut the common line of their planes in intervals; they pass through each other where these overlap by more than a
+// point. Order of the ends by two signs (Devillers and Guigue, Faster triangle-triangle intersection tests, 2002, section 4), once each
+// triangle begins with the corner that is alone on its side, and that side is the positive one.
 bool pass_through(const Triangle a, const Triangle b) {
   Sides sides;
-  return meet(a, b, sides) && Sides::both(sides.a) && Sides::both(sides.b);
+  if (!meet(a, b, sides) || !Sides::both(sides.a) || !Sides::both(sides.b)) return false;
+  const double *p[3], *q[3];
+  const int above_p = first_alone(a, sides.a, p), above_q = first_alone(b, sides.b, q);
+  if (above_p < 0) std::swap(q[1], q[2]);  // turns b's plane over
+  if (above_q < 0) std::swap(p[1], p[2]);
+  return orientation(p[0], p[1], q[0], q[1]) < 0 && orientation(p[0], p[2], q[2], q[0]) < 0;
 }
 
 // ---- which pairs to test: a box tree over all triangles, median split ---------------------------------------

@@ -15,7 +15,8 @@ int orientation(const double a[3], const double b[3], const double c[3], int axi
 using Triangle = const double *[3];
 // The closed triangles share at least one point (touching included). A triangle without area counts as its edges; two of those never meet.
 bool meet(const Triangle a, const Triangle b);
-// They meet, and each has corners strictly on both sides of the other's plane: they pass through each other rather than touch.
+// They meet along more than a point, and each has corners strictly on both sides of the other's plane: they pass through each other
+// rather than touch.
 bool pass_through(const Triangle a, const Triangle b);
 
 struct Surface { const double *xyz; uint32_t n; const uint32_t *tri; uint32_t ntri; };
@@ -26,7 +27,7 @@ enum class Touching { counts, allowed };
 class Counter {
  public:
   // Pairs within and between surfaces; pairs of one surface that share a vertex (by number or by position) are excepted.
-  // Coordinates must be finite.
+  // Coordinates must be finite, and below 1e90 for the exact signs not to overflow.
   size_t count(const std::vector<Surface> &surfaces, Touching touching);
 
  private:

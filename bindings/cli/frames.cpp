@@ -50,7 +50,7 @@ class OffScreen : public Frames {
     if (!extent_) {
       extent_ = render::bounds(picture_scene);
       const dfm_scene_settings &s = scene_.settings();
-      render::Camera camera = render::auto_camera(*extent_, double(kWidth) / kHeight, picture_scene.up);
+      render::Camera camera = render::auto_camera(picture_scene, double(kWidth) / kHeight);
       if (s.has_camera)
         for (int i = 0; i < 3; ++i) camera.eye[i] = s.eye[i], camera.look_at[i] = s.look_at[i];
       camera_ = camera;

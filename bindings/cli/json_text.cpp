@@ -80,7 +80,7 @@ const JsonValue *JsonValue::find(const std::string &key) const {
 
 std::string JsonValue::get(const std::string &key) const {
   const JsonValue *v = find(key);
-  return v ? v->text : std::string();
+  return v && v->kind != JsonValue::null ? v->text : std::string();
 }
 
 namespace {
@@ -145,7 +145,7 @@ class Reader {
     do {
       out.members.emplace_back();
       space();
-      if (!string(out.members.back().first) || !take(':') || !value(out.members.back().second, depth + 1)) return false;
+      if (!string(out.members.back().name) || !take(':') || !value(out.members.back().value, depth + 1)) return false;
     } while (take(','));
     return take('}');
   }

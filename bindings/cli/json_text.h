@@ -22,15 +22,17 @@ std::string json_array(const std::vector<std::string> &values);
 std::string json_vector(const double v[3]);
 std::string indented(const std::string &json);  // objects and arrays of objects on lines of their own
 
+struct JsonMember;
 // A parsed value; text of strings is unescaped, numbers and literals keep their text.
 struct JsonValue {
   enum Kind { null, literal, string, array, object } kind = null;
   std::string text;
   std::vector<JsonValue> items;
-  std::vector<std::pair<std::string, JsonValue>> members;
+  std::vector<JsonMember> members;
   const JsonValue *find(const std::string &key) const;
   std::string get(const std::string &key) const;  // text of a member, "" where absent
 };
+struct JsonMember { std::string name; JsonValue value; };
 bool parse_json(const std::string &text, JsonValue &out);
 
 }  // namespace cli

@@ -16,11 +16,11 @@ struct Options { std::vector<std::string> rows, columns; std::string out, title;
 int montage(const Options &options) {
   std::vector<std::vector<render::Image>> rows;
   std::vector<std::string> labels;
-  // Each row reads LABEL FILE FILE ...; rows end where the next --row begins, which "%%" marks.
+  // Each row reads LABEL FILE FILE ...; rows end where the next --row begins, which an empty word marks.
   bool begin = true;
   std::string why;
   for (const std::string &word : options.rows) {
-    if (word == "%%") {
+    if (word.empty()) {
       begin = true;
     } else if (begin) {
       labels.push_back(word), rows.emplace_back();

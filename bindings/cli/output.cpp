@@ -21,7 +21,8 @@ namespace {
 void make_folder(const std::string &path) {
   std::error_code error;
   fs::create_directories(path, error);
-  if (error || !fs::is_directory(path)) throw Failure(kBadInput, path + ": the folder cannot be made: " + (error ? error.message() : "a file of that name is there"));
+  if (error || !fs::is_directory(path))
+    throw Failure(kBadInput, path + ": the folder cannot be made: " + (error ? error.message() : "a file of that name is there"));
 }
 
 // Numbered files of an earlier run would read as later states of this one.

@@ -47,7 +47,7 @@ struct Checks {
   uint64_t states = 0;
   size_t intersections_max = 0;
   uint32_t inverted_max = 0;
-  bool finite = true;
+  bool finite = true, too_far = false;
 };
 
 // Judges one state: crossings, inverted cells, finiteness.
@@ -61,6 +61,7 @@ class Checker {
   const SceneFile &scene_;
   std::vector<std::vector<double>> positions_;
   std::vector<crossing::Surface> surfaces_;
+  std::vector<double> state_;  // x and v of one body
   crossing::Counter counter_;
   Checks checks_;
 };

@@ -15,7 +15,8 @@ namespace {
 struct Sign { char c; const char *strokes; };
 constexpr Sign kSigns[] = {
     {'A', "023962 1454"}, {'B', "0209 ~09494606 ~06565202"}, {'C', "~584909024253"}, {'D', "0209 ~092959522202"}, {'E', "59090252 0646"},
-    {'F', "590902 0646"}, {'G', "~584909025255 5535"}, {'H', "0209 5259 0656"}, {'I', "0209"}, {'J', "~3934321203"}, {'K', "0209 5905 1652"},
+    {'F', "590902 0646"}, {'G', "~584909025255 5535"}, {'H', "0209 5259 0656"}, {'I', "0209"}, {'J', "~3934321203"},
+    {'K', "0209 5905 1652"},
     {'L', "090252"}, {'M', "0209356962"}, {'N', "02095259"}, {'O', "~0969620209"}, {'P', "0209 ~092959552505"}, {'Q', "~0969620209 4461"},
     {'R', "0209 ~092959552505 2552"}, {'S', "~5849090655521203"}, {'T', "0969 3932"}, {'U', "~090502525559"}, {'V', "093269"},
     {'W', "0922486289"}, {'X', "0952 5902"}, {'Y', "093569 3532"}, {'Z', "09590252"},
@@ -27,12 +28,13 @@ constexpr Sign kSigns[] = {
     {'k', "0902 4704 1542"}, {'l', "0902"}, {'m', "0702 ~0507373532 ~3537676562"}, {'n', "0702 ~0507474542"}, {'o', "~0747420207"},
     {'p', "0700 ~0747420207"}, {'q', "4740 ~0747420207"}, {'r', "0702 ~050737"}, {'s', "~4637070544421203"}, {'t', "~19141232 0727"},
     {'u', "~0704024244 4742"}, {'v', "072247"}, {'w', "0712365267"}, {'x', "0742 4702"}, {'y', "0722 4710"}, {'z', "07470242"},
-    {'.', "0212"}, {',', "1201"}, {':', "0212 0616"}, {';', "1201 1616"}, {'-', "0535"}, {'_', "0141"}, {'+', "0545 2723"}, {'=', "0646 0444"},
+    {'.', "0202"}, {',', "1201"}, {':', "0202 0606"}, {';', "1201 1616"},
+    {'-', "0535"}, {'_', "0141"}, {'+', "0545 2723"}, {'=', "0646 0444"},
     {'/', "0149"}, {'(', "~29070320"}, {')', "~09272300"}, {'[', "29090020"}, {']', "09292000"}, {'<', "480542"}, {'>', "084502"},
     {'%', "0269 ~0929270709 ~4464624244"}, {'*', "2723 0644 0446"}, {'^', "072947"}, {'!', "0904 0202"}, {'?', "~081949462624 2222"},
     {'\'', "0907"}, {'"', "0907 2927"}, {'#', "1219 3239 0444 0747"}, {'|', "0900"}};
 constexpr const char *kUnknown = "0209595202";  // an empty frame
-constexpr double kCapital = 7, kBaseLine = 2, kGap = 1.9, kBlank = 2.6, kPen = 0.46;
+constexpr double kCapital = 7, kBaseLine = 2, kGap = 1.9, kBlank = 2.6, kPen = 0.46, kDot = 0.2;  // a dot is a little thicker than a line
 
 struct Point { double x, y; };
 using Stroke = std::vector<Point>;
@@ -86,7 +88,8 @@ double advance(char c) {
 
 double distance(Point p, Point a, Point b) {
   const double dx = b.x - a.x, dy = b.y - a.y, length = dx * dx + dy * dy;
-  const double t = length > 0 ? std::clamp(((p.x - a.x) * dx + (p.y - a.y) * dy) / length, 0.0, 1.0) : 0;
+  if (length == 0) return std::hypot(p.x - a.x, p.y - a.y) - kDot;
+  const double t = std::clamp(((p.x - a.x) * dx + (p.y - a.y) * dy) / length, 0.0, 1.0);
   return std::hypot(p.x - a.x - t * dx, p.y - a.y - t * dy);
 }
 
@@ -134,7 +137,7 @@ void draw_text(Image &picture, double x, double y, double size, const std::strin
         double nearest = 1e9;
         const Point p{(double(column) + 0.5 - x) / scale, (y - double(row) - 0.5) / scale + kBaseLine};
         for (const Stroke &s : strokes)
-          for (size_t i = 0; i < std::max<size_t>(s.size() - 1, 1); ++i) nearest = std::min(nearest, distance(p, s[i], s[std::min(i + 1, s.size() - 1)]));
+          for (size_t i = 0; i + 1 < s.size(); ++i) nearest = std::min(nearest, distance(p, s[i], s[i + 1]));
         const double cover = std::clamp(pen + 0.5 - nearest * scale, 0.0, 1.0);
         if (cover > 0) blend(picture, column, row, colour, cover);
       }
@@ -145,20 +148,23 @@ void draw_text(Image &picture, double x, double y, double size, const std::strin
 void legend(Image &picture, ColourMap map, double min, double max, const std::string &title, const std::string &unit) {
   const double size = std::max(8.0, picture.height / 46.0);
   const std::string head = unit.empty() ? title : title + " [" + unit + "]", low = number(min), high = number(max);
-  const long wide = std::max({long(picture.width) / 5, std::lround(text_width(size, head)), std::lround(text_width(size, low + "    " + high))});
+  const double words = std::max(text_width(size, head), text_width(size, low + "    " + high));
+  const long wide = std::max(long(picture.width) / 5, std::lround(words));
   const long bar = std::lround(0.9 * size), pad = std::lround(1.1 * size), margin = std::lround(1.4 * size);
-  const long high_box = std::lround(4.6 * size) + bar + pad, x0 = long(picture.width) - margin - wide - 2 * pad, y0 = long(picture.height) - margin - high_box;
-  fill(picture, x0, y0, x0 + wide + 2 * pad, y0 + high_box, {1, 1, 1}, 0.72);
+  const long box = std::lround(4.6 * size) + bar + pad;
+  const long x0 = long(picture.width) - margin - wide - 2 * pad, y0 = long(picture.height) - margin - box;
+  fill(picture, x0, y0, x0 + wide + 2 * pad, y0 + box, {1, 1, 1}, 0.72);
   const long x = x0 + pad, top = y0 + pad + std::lround(1.9 * size);
   draw_text(picture, double(x), double(y0 + pad) + size, size, head, kInk);
-  for (long i = 0; i < wide; ++i) fill(picture, x + i, top, x + i + 1, top + bar, map_colour(map, wide > 1 ? float(i) / float(wide - 1) : 0));
+  for (long i = 0; i < wide; ++i)
+    fill(picture, x + i, top, x + i + 1, top + bar, map_colour(map, float(i) / float(std::max(wide - 1, 1L))));
   const double line = double(top + bar) + 1.8 * size;
   draw_text(picture, double(x), line, size, low, kInk);
   draw_text(picture, double(x + wide) - text_width(size, high), line, size, high, kInk);
 }
 
-Image montage(const std::vector<std::vector<Image>> &rows, const std::vector<std::string> &row_labels, const std::vector<std::string> &column_labels,
-              const std::string &title) {
+Image montage(const std::vector<std::vector<Image>> &rows, const std::vector<std::string> &row_labels,
+              const std::vector<std::string> &column_labels, const std::string &title) {
   uint32_t wide = 0, high = 0, columns = 0;
   for (const auto &row : rows) {
     columns = std::max(columns, uint32_t(row.size()));
@@ -174,19 +180,23 @@ Image montage(const std::vector<std::vector<Image>> &rows, const std::vector<std
   double longest = 0;
   for (const std::string &label : row_labels) longest = std::max(longest, text_width(size, label));
   const uint32_t left = gap + (longest > 0 ? uint32_t(std::ceil(longest)) + 2 * gap : 0);
-  const uint32_t title_line = title.empty() ? 0 : uint32_t(std::lround(1.3 * line)), top = gap + title_line + (column_labels.empty() ? 0 : line);
+  const uint32_t title_line = title.empty() ? 0 : uint32_t(std::lround(1.3 * line));
+  const uint32_t top = gap + title_line + (column_labels.empty() ? 0 : line);
   all.width = left + columns * (wide + gap);
   all.height = top + uint32_t(rows.size()) * (high + gap);
   all.rgb.assign(size_t(all.width) * all.height * 3, 255);
   draw_text(all, left, gap + 1.6 * size, 1.3 * size, title, kInk);
-  for (size_t c = 0; c < std::min<size_t>(column_labels.size(), columns); ++c)
-    draw_text(all, left + double(c) * (wide + gap) + 0.5 * (wide - text_width(size, column_labels[c])), top - 0.9 * size, size, column_labels[c], kInk);
+  for (size_t c = 0; c < std::min<size_t>(column_labels.size(), columns); ++c) {
+    const double middle = left + double(c) * (wide + gap) + 0.5 * wide;
+    draw_text(all, middle - 0.5 * text_width(size, column_labels[c]), top - 0.9 * size, size, column_labels[c], kInk);
+  }
   for (size_t r = 0; r < rows.size(); ++r) {
     const uint32_t y = top + uint32_t(r) * (high + gap);
     if (r < row_labels.size()) draw_text(all, 1.5 * gap, y + 0.5 * (high + size), size, row_labels[r], kInk);
     for (size_t c = 0; c < rows[r].size(); ++c) {
       const Image &p = rows[r][c];
-      if (p.rgb.size() == size_t(p.width) * p.height * 3) paste(all, p, left + uint32_t(c) * (wide + gap) + (wide - p.width) / 2, y + (high - p.height) / 2);
+      if (p.rgb.size() != size_t(p.width) * p.height * 3) continue;
+      paste(all, p, left + uint32_t(c) * (wide + gap) + (wide - p.width) / 2, y + (high - p.height) / 2);
     }
   }
   return all;

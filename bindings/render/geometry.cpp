@@ -241,7 +241,8 @@ Bounds bounds(const Scene &scene) {
   }
   Bounds all = bodies;
   const auto add = [&](const Vec &centre, const Vec &half) {
-    double lo[3] = {centre.x - half.x, centre.y - half.y, centre.z - half.z}, hi[3] = {centre.x + half.x, centre.y + half.y, centre.z + half.z};
+    const Vec low = centre - half, high = centre + half;
+    double lo[3] = {low.x, low.y, low.z}, hi[3] = {high.x, high.y, high.z};
     if (!limit.empty())
       for (int k = 0; k < 3; ++k) {
         lo[k] = std::clamp(lo[k], limit.lo[k], limit.hi[k]);
@@ -253,8 +254,9 @@ Bounds bounds(const Scene &scene) {
   for (const Box &b : scene.boxes) {
     Vec a[3];
     axes_of(b, a);
-    add(vec(b.pose.position), {std::abs(a[0].x) + std::abs(a[1].x) + std::abs(a[2].x), std::abs(a[0].y) + std::abs(a[1].y) + std::abs(a[2].y),
-                               std::abs(a[0].z) + std::abs(a[1].z) + std::abs(a[2].z)});
+    Vec half;
+    for (const Vec &axis : a) half = half + Vec{std::abs(axis.x), std::abs(axis.y), std::abs(axis.z)};
+    add(vec(b.pose.position), half);
   }
   for (const Sphere &s : scene.spheres) add(vec(s.centre), {s.radius, s.radius, s.radius});
   for (const Capsule &c : scene.capsules)
@@ -283,6 +285,60 @@ Camera auto_camera(const Bounds &given, double aspect, const double up_in[3]) {
   }
   set(camera.eye, centre + away * distance);
   return camera;
+}
+
+Bounds extent_of(const Scene &scene) {
+  if (scene.extent && !scene.extent->empty()) return *scene.extent;
+  Bounds box = bounds(scene);
+  if (box.empty())
+    for (int k = 0; k < 3; ++k) box.lo[k] = -1, box.hi[k] = 1;
+  return box;
+}
+
+// A wall covers the box it stands beside; a ramp reaches farther, since things move along it.
+Slab slab_of(const Plane &p, const Vec &up, const Bounds &extent) {
+  const Vec n = unit(vec(p.normal), up), across = unit(cross(up, n), square_to(n)), along = cross(n, across);
+  const Vec lo = vec(extent.lo), hi = vec(extent.hi), middle = (lo + hi) * 0.5, half = (hi - lo) * 0.5;
+  const auto reach = [&](const Vec &d) { return std::abs(d.x) * half.x + std::abs(d.y) * half.y + std::abs(d.z) * half.z; };
+  const double size = norm(half), thick = 0.02 * size;
+  const bool ramp = dot(n, up) > kRamp;
+  const double wide = ramp ? 0.9 * size : 1.02 * reach(across), high = ramp ? 1.3 * size : 1.02 * reach(along);
+  const Vec foot = middle - n * dot(n, middle - vec(p.point));
+  return {foot - n * thick, {across * std::max(wide, 0.1 * size), along * std::max(high, 0.1 * size), n * thick}};
+}
+
+// The extent with the places where planes near it lie across from its middle, so that the walls of a room meet each other and the floor.
+Bounds room_of(const Scene &scene, const Vec &up, const Bounds &extent) {
+  const Vec middle = (vec(extent.lo) + vec(extent.hi)) * 0.5;
+  const double size = norm(vec(extent.hi) - middle);
+  Bounds room = extent;
+  for (const Plane &p : scene.planes) {
+    const Vec n = unit(vec(p.normal), up), foot = middle - n * dot(n, middle - vec(p.point));
+    if (norm(foot - middle) < 1.5 * size) room.add(&foot.x);
+  }
+  return room;
+}
+
+Camera auto_camera(const Scene &scene, double aspect) {
+  const Vec up = unit(vec(scene.up));
+  const Bounds extent = extent_of(scene), room = room_of(scene, up, extent);
+  Bounds shown = extent;
+  for (const Plane &p : scene.planes) {
+    const double slope = dot(unit(vec(p.normal), up), up);
+    if (slope < kRamp) continue;
+    if (slope > kLevel) {
+      const Vec middle = (vec(extent.lo) + vec(extent.hi)) * 0.5, foot = middle + up * dot(up, vec(p.point) - middle);
+      if (norm(foot - middle) < 1.5 * norm(vec(extent.hi) - middle)) shown.add(&foot.x);
+      continue;
+    }
+    const Slab s = slab_of(p, up, room);
+    for (const double side : {-1.0, 1.0})
+      for (const double end : {-1.0, 1.0}) {
+        const Vec q = s.centre + s.axes[0] * side + s.axes[1] * end;
+        shown.add(&q.x);
+      }
+  }
+  return auto_camera(shown, aspect, scene.up);
 }
 
 }  // namespace render

@@ -39,6 +39,7 @@ struct Vertex { float p[3], n[3], rgb[3], value, has_value; };
 struct Shape {
   std::vector<Vertex> vertices;
   Vec origin;
+  void triangle(const Vec p[3], const Vec n[3], const float rgb[3]);
   void surface(const Surface &s);
   void box(const Vec &centre, const Vec axes[3], const float rgb[3]);  // axes carry the half lengths
   void sphere(const Sphere &s);
@@ -46,10 +47,17 @@ struct Shape {
   void ribbons(const Lines &lines, const View &view, double pixels_high);
 
  private:
-  void triangle(const Vec p[3], const Vec n[3], const float rgb[3]);
   void revolve(const Vec &a, const Vec &axis, const std::vector<std::array<double, 4>> &profile, const float rgb[3]);
 };
 
 void axes_of(const Box &box, Vec axes[3]);
+
+// Cosines to the up direction from which a plane is the floor, and from which it is a ramp rather than a wall.
+inline constexpr double kLevel = 0.9999, kRamp = 0.3;
+// Never empty: Scene::extent, or bounds(), or a box of 2 m around the origin.
+Bounds extent_of(const Scene &scene);
+Bounds room_of(const Scene &scene, const Vec &up, const Bounds &extent);
+struct Slab { Vec centre, axes[3]; };
+Slab slab_of(const Plane &p, const Vec &up, const Bounds &extent);
 
 }  // namespace render

@@ -47,8 +47,8 @@ struct Look {
   float rgb[3] = {0.72f, 0.75f, 0.79f};
   float alpha = 1;  // below 1: seen through, casts no shadow
 };
-// A plane square to Scene::up is drawn as the floor (the highest one seen from above), any other as a tilted slab sized to the scene. A plane
-// whose back faces the camera is left out.
+// A plane square to Scene::up is drawn as the floor (the highest one seen from above), any other as a tilted slab sized to the scene. A
+// plane whose back faces the camera is left out.
 struct Plane { double point[3], normal[3]; Look look; };
 struct Box { Pose pose; double half[3]; Look look; };
 struct Sphere { double centre[3]; double radius; Look look; };
@@ -81,6 +81,8 @@ struct Scene {
 Bounds bounds(const Scene &scene);
 // Three-quarter view from the front right that just holds the box.
 Camera auto_camera(const Bounds &bounds, double aspect, const double up[3]);
+// The same for the extent of a scene with its ramps and a floor that is near; what draw() takes where the scene has no camera.
+Camera auto_camera(const Scene &scene, double aspect);
 
 enum class Backend { automatic, egl, osmesa };
 

@@ -1,5 +1,5 @@
-// One picture: everything becomes triangles (geometry.cpp), the shadow maps of the key light and of the sky are drawn, then background, floor,
-// bodies, what is seen through (far to near), lines; four samples a pixel are resolved and read back.
+// One picture: everything becomes triangles (geometry.cpp), the shadow maps of the key light and of the sky are drawn, then background,
+// floor, bodies, what is seen through (far to near), lines; four samples a pixel are resolved and read back.
 #include "render.h"
 
 #include <algorithm>
@@ -18,7 +18,6 @@ namespace {
 
 constexpr int kKeySide = 1536, kSkySide = 160, kSamples = 4;
 constexpr uint32_t kLargest = 8192;
-constexpr double kLevel = 0.9999;  // cosine from which a plane is the floor
 
 // What host code set for its own arithmetic (rounding, traps) stays as it was: a picture may not change a simulation's bits.
 struct FloatingPoint {
@@ -95,31 +94,6 @@ Batch solid(const Look &look) {
   return b;
 }
 
-// A wall covers the box it stands beside; a ramp reaches farther, since things move along it.
-struct Slab { Vec centre, axes[3]; };
-Slab slab_of(const Plane &p, const Vec &up, const Bounds &extent) {
-  const Vec n = unit(vec(p.normal), up), across = unit(cross(up, n), square_to(n)), along = cross(n, across);
-  const Vec lo = vec(extent.lo), hi = vec(extent.hi), middle = (lo + hi) * 0.5, half = (hi - lo) * 0.5;
-  const auto reach = [&](const Vec &d) { return std::abs(d.x) * half.x + std::abs(d.y) * half.y + std::abs(d.z) * half.z; };
-  const double size = norm(half), thick = 0.02 * size;
-  const bool ramp = dot(n, up) > 0.3;
-  const double wide = ramp ? 0.9 * size : 1.02 * reach(across), high = ramp ? 1.3 * size : 1.02 * reach(along);
-  const Vec foot = middle - n * dot(n, middle - vec(p.point));
-  return {foot - n * thick, {across * std::max(wide, 0.1 * size), along * std::max(high, 0.1 * size), n * thick}};
-}
-
-// The extent with the places where planes near it lie across from its middle, so that the walls of a room meet each other and the floor.
-Bounds room_of(const Scene &scene, const Vec &up, const Bounds &extent) {
-  const Vec middle = (vec(extent.lo) + vec(extent.hi)) * 0.5;
-  const double size = norm(vec(extent.hi) - middle);
-  Bounds room = extent;
-  for (const Plane &p : scene.planes) {
-    const Vec n = unit(vec(p.normal), up), foot = middle - n * dot(n, middle - vec(p.point));
-    if (norm(foot - middle) < 1.5 * size) room.add(&foot.x);
-  }
-  return room;
-}
-
 void add_planes(const Scene &scene, Frame &frame, const Bounds &extent) {
   const Bounds room = room_of(scene, frame.up, extent);
   const Vec middle = (vec(extent.lo) + vec(extent.hi)) * 0.5;
@@ -148,28 +122,23 @@ void add_planes(const Scene &scene, Frame &frame, const Bounds &extent) {
   const Vec level = vec(floor->point) + frame.up * 1e-9;
   const Vec foot = middle + frame.up * dot(frame.up, level - middle);
   const double two = 2 * g.spacing;
-  const Vec snapped = foot - g.x * (dot(foot, g.x) - two * std::round(dot(foot, g.x) / two)) - g.y * (dot(foot, g.y) - two * std::round(dot(foot, g.y) / two));
+  const auto beyond = [&](const Vec &axis) { return axis * (dot(foot, axis) - two * std::round(dot(foot, axis) / two)); };
+  const Vec snapped = foot - beyond(g.x) - beyond(g.y);
   g.centre = snapped - frame.shape.origin;
   Batch b;
   b.kind = Kind::floor;
   b.shadow = false;
   b.alpha = floor->look.alpha;
   // Looks of obstacles are grey by default; a floor is lighter, so that shadows have room to fall.
-  const float default_look = Look{}.rgb[0];
-  const bool own = floor->look.rgb[0] != default_look || floor->look.rgb[1] != Look{}.rgb[1] || floor->look.rgb[2] != Look{}.rgb[2];
+  const bool own = !std::equal(floor->look.rgb, floor->look.rgb + 3, Look{}.rgb);
   const float light[3] = {0.90f, 0.905f, 0.915f};
   batch(frame, b, [&] {
-    const Vec n[3] = {frame.up, frame.up, frame.up}, c = snapped, x = g.x * g.radius, y = g.y * g.radius;
-    const Vec corner[4] = {c - x - y, c + x - y, c + x + y, c - x + y};
-    for (int k = 0; k < 2; ++k)
-      for (const int i : {0, 1 + k, 2 + k}) {
-        Vertex v{};
-        const Vec q = corner[i] - frame.shape.origin;
-        v.p[0] = float(q.x), v.p[1] = float(q.y), v.p[2] = float(q.z);
-        v.n[0] = float(n[0].x), v.n[1] = float(n[0].y), v.n[2] = float(n[0].z);
-        std::copy_n(own ? floor->look.rgb : light, 3, v.rgb);
-        frame.shape.vertices.push_back(v);
-      }
+    const Vec x = g.x * g.radius, y = g.y * g.radius;
+    const Vec corner[4] = {snapped - x - y, snapped + x - y, snapped + x + y, snapped - x + y}, n[3] = {frame.up, frame.up, frame.up};
+    for (const int k : {1, 2}) {
+      const Vec p[3] = {corner[0], corner[k], corner[k + 1]};
+      frame.shape.triangle(p, n, own ? floor->look.rgb : light);
+    }
   });
 }
 
@@ -193,26 +162,12 @@ void fit_casters(Frame &frame, const Bounds &box) {
 
 Frame compose(const Scene &scene, double aspect, double pixels_high) {
   Frame frame;
-  Bounds box = bounds(scene);
-  if (box.empty())
-    for (int k = 0; k < 3; ++k) box.lo[k] = -1, box.hi[k] = 1;
-  const Bounds extent = scene.extent && !scene.extent->empty() ? *scene.extent : box;
+  const Bounds extent = extent_of(scene);
   const Vec middle = (vec(extent.lo) + vec(extent.hi)) * 0.5;
   frame.extent = std::max(0.5 * norm(vec(extent.hi) - vec(extent.lo)), 1e-6);
   frame.up = unit(vec(scene.up));
   frame.shape.origin = middle;
-  Bounds shown = extent;
-  for (const Plane &p : scene.planes) {
-    const double slope = dot(unit(vec(p.normal), frame.up), frame.up);
-    if (slope < 0.3 || slope > kLevel) continue;
-    const Slab s = slab_of(p, frame.up, room_of(scene, frame.up, extent));
-    for (const double side : {-1.0, 1.0})
-      for (const double end : {-1.0, 1.0}) {
-        const Vec q = s.centre + s.axes[0] * side + s.axes[1] * end;
-        shown.add(&q.x);
-      }
-  }
-  frame.view = view_of(scene.camera ? *scene.camera : auto_camera(shown, aspect, scene.up));
+  frame.view = view_of(scene.camera ? *scene.camera : auto_camera(scene, aspect));
   frame.view.eye = frame.view.eye - middle;
   const Vec level = unit(frame.view.back - frame.up * dot(frame.view.back, frame.up), frame.view.up);
   frame.key = unit(frame.up * 1.15 - frame.view.right * 0.62 + level * 0.55);
@@ -232,7 +187,8 @@ Frame compose(const Scene &scene, double aspect, double pixels_high) {
   for (const Sphere &s : scene.spheres) batch(frame, solid(s.look), [&] { frame.shape.sphere(s); });
   for (const Capsule &c : scene.capsules) batch(frame, solid(c.look), [&] { frame.shape.capsule(c); });
   add_planes(scene, frame, extent);
-  fit_casters(frame, box);
+  const Bounds now = bounds(scene);
+  fit_casters(frame, now.empty() ? extent : now);
   View world = frame.view;
   world.eye = world.eye + middle;
   for (const Lines &l : scene.lines) {
@@ -244,8 +200,9 @@ Frame compose(const Scene &scene, double aspect, double pixels_high) {
   }
   // Floor first (it fades into the background), then what hides, then what is seen through from far to near, lines last.
   const auto rank = [](const Batch &b) { return b.kind == Kind::floor ? 0 : b.kind == Kind::plain ? 3 + b.on_top : b.alpha >= 1 ? 1 : 2; };
-  std::stable_sort(frame.batches.begin(), frame.batches.end(),
-                   [&](const Batch &a, const Batch &b) { return rank(a) != rank(b) ? rank(a) < rank(b) : rank(a) == 2 && a.depth > b.depth; });
+  std::stable_sort(frame.batches.begin(), frame.batches.end(), [&](const Batch &a, const Batch &b) {
+    return rank(a) != rank(b) ? rank(a) < rank(b) : rank(a) == 2 && a.depth > b.depth;
+  });
   return frame;
 }
 
@@ -262,7 +219,8 @@ std::array<Vec, kSkyLights> sky_directions(const Vec &up) {
 
 class GlRenderer final : public Renderer {
  public:
-  GlRenderer(std::unique_ptr<Context> context, uint32_t width, uint32_t height) : context_(std::move(context)), width_(width), height_(height) {}
+  GlRenderer(std::unique_ptr<Context> context, uint32_t width, uint32_t height)
+      : context_(std::move(context)), width_(width), height_(height) {}
   ~GlRenderer() override;
   bool start(std::string *why_not);
   bool draw(const Scene &scene, Image &picture, std::string *why_not) override;
@@ -280,7 +238,8 @@ class GlRenderer final : public Renderer {
   void use(GLuint program) { current_ = program; gl_.UseProgram(program); }
   void upload(const Frame &frame, ColourMap map);
   void draw_shadows(const Frame &frame, const Mat4 &key, const std::array<Mat4, kSkyLights> &sky);
-  void draw_colours(const Frame &frame, const Mat4 &key, const std::array<Mat4, kSkyLights> &sky, const std::array<Vec, kSkyLights> &directions);
+  void draw_colours(const Frame &frame, const Mat4 &key, const std::array<Mat4, kSkyLights> &sky,
+                    const std::array<Vec, kSkyLights> &directions);
   void read(Image &picture);
 
   std::unique_ptr<Context> context_;
@@ -391,8 +350,8 @@ bool GlRenderer::make_targets(std::string *why_not) {
     offset += size_t(widths[i]) * sizeof(float);
   }
   if (sampled && resolved && gl_.GetError() == GL_NO_ERROR) return true;
-  *why_not = std::string(context_->name()) + ": " + device_ + " gives no picture of " + std::to_string(width_) + " x " + std::to_string(height_) +
-             " pixels: ask for a smaller one";
+  *why_not = std::string(context_->name()) + ": " + device_ + " gives no picture of " + std::to_string(width_) + " x " +
+             std::to_string(height_) + " pixels: ask for a smaller one";
   return false;
 }
 
@@ -411,7 +370,8 @@ bool GlRenderer::start(std::string *why_not) {
   const GLubyte *text = gl_.GetString(GL_RENDERER);
   device_ = text ? reinterpret_cast<const char *>(text) : "unnamed";
   started_ = true;
-  return (main_ = program(kVertexShader, kFragmentShader, why_not)) && (depth_ = program(kDepthVertexShader, kDepthFragmentShader, why_not)) &&
+  return (main_ = program(kVertexShader, kFragmentShader, why_not)) &&
+         (depth_ = program(kDepthVertexShader, kDepthFragmentShader, why_not)) &&
          (background_ = program(kBackgroundVertexShader, kBackgroundFragmentShader, why_not)) && make_targets(why_not);
 }
 
@@ -570,7 +530,8 @@ std::unique_ptr<Renderer> Renderer::create(Backend backend, uint32_t width, uint
   std::string unused;
   std::string &why = why_not ? *why_not : unused;
   if (width < 1 || height < 1 || width > kLargest || height > kLargest) {
-    why = "a picture of " + std::to_string(width) + " x " + std::to_string(height) + " pixels: each side must be 1 to " + std::to_string(kLargest);
+    why = "a picture of " + std::to_string(width) + " x " + std::to_string(height) + " pixels: each side must be 1 to " +
+          std::to_string(kLargest);
     return nullptr;
   }
   const char *wish = std::getenv("DEFORM_RENDER_BACKEND");
@@ -594,7 +555,7 @@ std::unique_ptr<Renderer> Renderer::create(Backend backend, uint32_t width, uint
     auto renderer = std::make_unique<GlRenderer>(std::move(context), width, height);
     if (renderer->start(&reason)) return renderer;
   }
-  why = "no pictures: " + reasons[0] + (reasons[0].empty() || reasons[1].empty() ? "" : "; ") + reasons[1];
+  why = reasons[0] + (reasons[0].empty() || reasons[1].empty() ? "" : "; ") + reasons[1];
   return nullptr;
 }
 

@@ -13,7 +13,7 @@ void force_pass(void *user, uint32_t begin, uint32_t end) {
   Body &body = *call.body;
   const double damp = body.params[kDampingStiffness];
   for (uint32_t n = begin; n < end; ++n) {
-    const Block &b = body.block[n];
+    const Block b = body.lend(n, begin);
     body.kernels->load(b, call.k->x, damp > 0 ? call.k->v : nullptr, call.k->stride);
     if (damp > 0) body.kernels->damped_springs(b, damp);
     else body.kernels->springs(b);
@@ -53,15 +53,15 @@ const Kernels *choose_kernels(const dfm_host *host) {
   return best;
 }
 
-void Body::for_each_block(void (*fn)(void *, uint32_t, uint32_t), void *user) {
-  if (ncell >= kParallelCells && host->parallel_for) return host->parallel_for(host->ctx, nblock, 1, fn, user);
+void Body::for_each_block(uint32_t least_cells, void (*fn)(void *, uint32_t, uint32_t), void *user) {
+  if (ncell >= least_cells && host->parallel_for) return host->parallel_for(host->ctx, nblock, grain, fn, user);
   fn(user, 0, nblock);
 }
 
 void Body::add_forces(const dfm_kin &k, double *f_out) {
   Call call{this, &k, f_out};
-  for_each_block(force_pass, &call);
-  for_each_block(merge_pass, &call);
+  for_each_block(kParallelCells, force_pass, &call);
+  for_each_block(kParallelMergeCells, merge_pass, &call);
 }
 
 double Body::stretch_of(uint32_t e, const dfm_kin &k) const {

@@ -41,12 +41,14 @@ class Buffer {
 
 struct Body {
   static constexpr uint32_t kNone = ~0u;
-  // From this size on the blocks go through the host's parallel_for; below it waking a worker costs more than it brings.
-  static constexpr uint32_t kParallelCells = 10000;
+  // From this size on the blocks go through the host's parallel_for; below it waking a worker costs more than it brings. Adding up
+  // the blocks is a twentieth of the work.
+  static constexpr uint32_t kParallelCells = 10000, kParallelMergeCells = 100000;
 
   const dfm_host *host = nullptr;
   const Kernels *kernels = nullptr;
   uint32_t npoint = 0, ncell = 0, nedge = 0, nblock = 0;
+  uint32_t grain = 1, largest = 0;  // blocks per piece of a pass at least; points of the largest block with its halo
   double params[kParamCount] = {};
 
   // In the host's order.
@@ -76,6 +78,14 @@ struct Body {
   void create(const dfm_host *h, const dfm_mesh &m);
   void apply_params(const double *values);
 
+  // Block n with the packed points of the piece that begins at block `begin`: a piece uses one place for all of its blocks, which
+  // therefore stays in the cache however large the body is. Pieces begin at multiples of the grain, so no two share a place.
+  Block lend(uint32_t n, uint32_t begin) {
+    Block b = block[n];
+    b.p = p.data() + 8 * size_t(largest) * (begin / grain);
+    return b;
+  }
+
   void add_forces(const dfm_kin &k, double *f_out);
   void bound(const dfm_kin &k, double *ksum, double *csum);
   double energy(const dfm_kin &k) const;
@@ -95,7 +105,7 @@ struct Body {
   void find_weights();
   double stretch_of(uint32_t e, const dfm_kin &k) const;
   double spring_scale_of_shape() const { return spring_scale() * (young_field ? 1.0 : params[kYoung]); }
-  void for_each_block(void (*fn)(void *, uint32_t, uint32_t), void *user);
+  void for_each_block(uint32_t least_cells, void (*fn)(void *, uint32_t, uint32_t), void *user);
 };
 
 // What the passes over blocks hand on to their pieces.

@@ -17,9 +17,10 @@ void row_pass(void *user, uint32_t begin, uint32_t end) {
   const Call &call = *static_cast<const Call *>(user);
   Body &body = *call.body;
   for (uint32_t n = begin; n < end; ++n) {
-    body.kernels->load(body.block[n], call.k->x, nullptr, call.k->stride);
-    body.kernels->spring_rows(body.block[n]);
-    if (body.has_volume()) body.kernels->cell_rows(body.block[n]);
+    const Block b = body.lend(n, begin);
+    body.kernels->load(b, call.k->x, nullptr, call.k->stride);
+    body.kernels->spring_rows(b);
+    if (body.has_volume()) body.kernels->cell_rows(b);
   }
 }
 
@@ -66,8 +67,8 @@ void Body::find_weights() {
   dfm_kin at_rest{};
   at_rest.x = rest_point.data(), at_rest.stride = 3;
   RowCall diagonal{{this, &at_rest, nullptr}, own.data(), nullptr};
-  for_each_block(row_pass, static_cast<Call *>(&diagonal));
-  for_each_block(merge_row_pass, &diagonal);
+  for_each_block(kParallelCells, row_pass, static_cast<Call *>(&diagonal));
+  for_each_block(kParallelMergeCells, merge_row_pass, &diagonal);
   if (has_volume())
     for (uint32_t c = 0; c < ncell; ++c) {
       const uint32_t *q = cells.data() + 4 * size_t(c);
@@ -108,8 +109,8 @@ void Body::find_weights() {
 
 void Body::bound(const dfm_kin &k, double *ksum, double *csum) {
   RowCall call{{this, &k, nullptr}, ksum, csum};
-  for_each_block(row_pass, static_cast<Call *>(&call));
-  for_each_block(merge_row_pass, &call);
+  for_each_block(kParallelCells, row_pass, static_cast<Call *>(&call));
+  for_each_block(kParallelMergeCells, merge_row_pass, &call);
 }
 
 }  // namespace msm

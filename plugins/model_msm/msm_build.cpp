@@ -6,6 +6,8 @@
 namespace msm {
 namespace {
 
+constexpr uint32_t kPieces = 32;  // of a pass over the blocks at most: enough for the workers that one body can feed
+
 constexpr int kEdgeOf[6][2] = {{0, 1}, {0, 2}, {0, 3}, {1, 2}, {1, 3}, {2, 3}};
 
 uint32_t find_edge(const uint32_t *edges, uint32_t nedge, uint32_t i, uint32_t j) {
@@ -208,10 +210,12 @@ void Body::build_blocks() {
     nquad += nquad % 2;
     ncells += (l.cell_begin[b + 1] - l.cell_begin[b] + 7) / 8 * 8;
     slot_begin[b + 1] = slot_begin[b] + (l.begin[b + 1] - l.begin[b]) + find_halo(l, b);
+    largest = std::max(largest, slot_begin[b + 1] - slot_begin[b]);
   }
+  grain = (nblock + kPieces - 1) / kPieces;
   const size_t nslot = slot_begin[nblock];
   block.create(host, nblock), point.create(host, nslot), slot_weight.create(host, nslot);
-  p.create(host, 8 * nslot), row.create(host, 8 * nslot), f.create(host, 4 * nslot);
+  p.create(host, 8 * size_t(largest) * ((nblock + grain - 1) / grain)), row.create(host, 8 * nslot), f.create(host, 4 * nslot);
   quad.create(host, nquad), stiffness.create(host, 4 * nquad), rest.create(host, 4 * nquad), spring_edge.create(host, 4 * nquad);
   cell.create(host, ncells), bulk.create(host, ncells), volume6.create(host, ncells), cell_id.create(host, ncells);
 
@@ -224,7 +228,7 @@ void Body::build_blocks() {
     for (uint32_t n = 0; n < nhalo; ++n) l.local[l.halo[n]] = owned + n, points[owned + n] = l.order[l.halo[n]];
     Block &out = block[b];
     out.owned = owned, out.local = owned + nhalo, out.point = points;
-    out.p = p.data() + 8 * size_t(slot_begin[b]), out.f = f.data() + 4 * size_t(slot_begin[b]);
+    out.f = f.data() + 4 * size_t(slot_begin[b]);
     out.row = row.data() + 8 * size_t(slot_begin[b]), out.weight = slot_weight.data() + slot_begin[b];
     quads_at = fill_springs(l, out, b, quads_at);
     cells_at = fill_cells(l, out, b, cells_at);

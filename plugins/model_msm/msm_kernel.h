@@ -18,7 +18,7 @@ struct Cell { uint32_t p[4]; };
 struct Block {
   uint32_t owned, local, quads, cells;  // quads is even, cells a multiple of 8
   const uint32_t *point;                // [local] number of the point in the host's arrays
-  double *p;                            // [local,8] x y z 0 vx vy vz 0: a point with its velocity is one cache line
+  double *p;                            // [local,8] x y z 0 vx vy vz 0: a point with its velocity is one cache line; lent by the pass
   double *f;                            // [local,4]
   double *row;                          // [local,8] row sums: the springs' block xx yy zz - xy yz zx, then the cells' row
   const double *weight;                 // [local] of the row sums, see Body::find_weights

@@ -1,5 +1,5 @@
-// Detection of two crossed fine cylinders (../shared/meshes/thesis/cyl_fine.msh, or one of our own of that size where it is absent), pressed flat
-// against each other: at rest, and with the upper one rolling at 50 mm/s. Step 0.25 ms; time per step, one core.
+// Detection of two crossed fine cylinders (../shared/meshes/thesis/cyl_fine.msh, or one of our own of that size where it is absent),
+// pressed flat against each other: at rest, and with the upper one rolling at 50 mm/s. Step 0.25 ms; time per step, one core.
 #include <benchmark/benchmark.h>
 
 #include <cmath>

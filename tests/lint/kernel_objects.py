@@ -1,7 +1,8 @@
 #!/usr/bin/env python3
-"""What the compiler made of the wide kernels: no weak symbol, and only entries that carry the instruction set in their name.
+"""What the compiler made of the wide kernels: no weak symbol, only entries that carry the instruction set in their name, and no
+instruction that rounds otherwise than + - * / and sqrt (fused multiply-add, estimates).
 
-kernel_objects.py NM BUILD_DIR
+kernel_objects.py NM OBJDUMP BUILD_DIR
 A weak symbol (an inline function, a template) of an object compiled for AVX may be the one that the linker keeps for everybody.
 """
 import pathlib
@@ -10,7 +11,10 @@ import subprocess
 import sys
 
 
-def check(nm, objects):
+OTHER_BITS = re.compile(r"\t(vfn?m(?:add|sub)\w*|vrcp\w*|vrsqrt\w*|rcpps|rcpss|rsqrtps|rsqrtss)\b")
+
+
+def check(nm, objdump, objects):
     """Findings as lines."""
     found = []
     for path in objects:
@@ -22,13 +26,16 @@ def check(nm, objects):
                 found.append(f"{path}: weak symbol {name}; give it internal linkage")
             elif kind.isupper() and kind not in "NU" and isa not in name:
                 found.append(f"{path}: external symbol {name} does not carry {isa} in its name")
+        code = subprocess.run([objdump, "-d", path], capture_output=True, text=True, check=True).stdout
+        for instruction in sorted(set(OTHER_BITS.findall(code))):
+            found.append(f"{path}: instruction {instruction} gives other bits than plain operations")
     return found
 
 
 def main():
-    nm, build = sys.argv[1:]
+    nm, objdump, build = sys.argv[1:]
     objects = sorted(p for p in pathlib.Path(build).rglob("*.o") if re.search(r"_kernel_avx\w+\.", p.name))
-    found = check(nm, objects)
+    found = check(nm, objdump, objects)
     print("\n".join(found))
     print(f"{len(objects)} wide kernel objects, {len(found)} findings")
     return 1 if found else 0

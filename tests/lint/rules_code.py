@@ -132,13 +132,21 @@ def libm(tree):
 def kernels(tree):
     """Wide kernels see no STL and no Eigen and link internally: the linker may choose an inline function compiled with wide flags
     for the whole program, which then dies on an older processor."""
-    for path in tree.select(SRC, "plugins/"):
-        if "_kernel" not in path.rsplit("/", 1)[1]:
+    pending = [p for p in tree.select(SRC, "plugins/") if "_kernel" in p.rsplit("/", 1)[1]]
+    seen = set()
+    while pending:
+        path = pending.pop()
+        if path in seen or tree.text(path) is None:
             continue
+        seen.add(path)
         content = tree.text(path)
         for line, quote, name in includes(content):
-            if name not in KERNEL_HEADERS and not (quote == '"' and "_kernel" in name):
-                yield path, line, f"a kernel file includes {name}; allowed are {', '.join(sorted(KERNEL_HEADERS))} and *_kernel* of its own"
+            if name in KERNEL_HEADERS:
+                continue
+            if quote == '"' and "/" not in name and _resolves(tree, path, name):
+                pending.append(posixpath.join(posixpath.dirname(path), name))  # its own header keeps the same rules
+            else:
+                yield path, line, f"a kernel file includes {name}; allowed are {', '.join(sorted(KERNEL_HEADERS))} and headers beside it"
         code = without_comments(content, strings=True)
         for match in re.finditer(r"\b(std|Eigen)::", code):
             yield path, line_of(code, match.start()), f"a kernel file uses {match.group(0)}"

@@ -56,7 +56,7 @@ def text(tree):
                 yield path, number, "tab; indent with spaces"
             if line != line.rstrip():
                 yield path, number, "space at the end of the line"
-            if code and len(re.sub(r'"[^"]{40,}"', '""', line)) > MAX_COLUMNS:  # sentences stay whole, so that a search finds them
+            if code and len(re.sub(r'R"\(.*?\)"|"[^"]{40,}"', '""', line)) > MAX_COLUMNS:  # sentences stay whole, so that a search finds them
                 yield path, number, f"{len(line)} columns; at most {MAX_COLUMNS}, long sentences in quotes not counted"
             if code and re.search(r"\b(TODO|FIXME|XXX|HACK)\b", line) and not path.startswith("tests/lint/"):
                 yield path, number, "a mark of unfinished work; finish it or write an issue"

@@ -65,8 +65,8 @@ class BoxTree {
   double area_ = 0, area_built_ = 0;
 };
 
-// f(place in a, place in b, squared distance of the boxes) for all triangles whose boxes are no further apart than margin; places count in the order of
-// the leaves. stack is scratch.
+// f(place in a, place in b, squared distance of the boxes) for all triangles whose boxes are no further apart than margin; places count
+// in the order of the leaves. stack is scratch.
 template <class F>
 void near_pairs(const BoxTree &a, const BoxTree &b, double margin, Array<PairOfTriangles> &stack, F &&f) {
   if (a.empty() || b.empty()) return;

@@ -17,7 +17,8 @@ constexpr double kQualityLimit = 2;         // boxes that have grown this much i
 
 double obstacle_speed(const ObstacleView &o, double extent) { return norm(o.velocity) + norm(o.spin) * extent; }
 
-// Bound of the motion of a shape between two poses: |q - q0| of unit quaternions is at most half the chord that a point at distance 1 moves.
+// Bound of the motion of a shape between two poses: |q - q0| of unit quaternions is at most half the chord that a point at distance 1
+// moves.
 double obstacle_displacement(const ObstacleView &now, const ObstacleView &then, double extent) {
   const Quat p = now.rotation, q = then.rotation;
   const double s = p.x * q.x + p.y * q.y + p.z * q.z + p.w * q.w < 0 ? -1 : 1;
@@ -28,7 +29,8 @@ double obstacle_displacement(const ObstacleView &now, const ObstacleView &then, 
 // Shape, size and belt are an obstacle's own; a new one under an old id has other lists.
 bool same_shape(const ObstacleView &a, const ObstacleView &b) {
   return a.shape == b.shape && a.slot == b.slot && a.category == b.category && a.collides_with == b.collides_with && a.radius == b.radius &&
-         a.half_length == b.half_length && a.half_size.x == b.half_size.x && a.half_size.y == b.half_size.y && a.half_size.z == b.half_size.z;
+         a.half_length == b.half_length && a.half_size.x == b.half_size.x && a.half_size.y == b.half_size.y &&
+         a.half_size.z == b.half_size.z;
 }
 
 uint64_t features(uint32_t a, uint32_t b) { return uint64_t{a} << 32 | b; }
@@ -308,7 +310,8 @@ void BroadPhase::assemble() {
   next_.clear();
   stats_.pairs = 0;
   for (Segment &s : next_segments_) {
-    const uint32_t begin = uint32_t(next_.size()), slot_a = bodies_[s.a].slot, slot_b = s.obstacle ? things_[s.b].view.slot : bodies_[s.b].slot;
+    const uint32_t begin = uint32_t(next_.size());
+    const uint32_t slot_a = bodies_[s.a].slot, slot_b = s.obstacle ? things_[s.b].view.slot : bodies_[s.b].slot;
     if (s.fresh) {
       for (uint32_t i = s.begin; i < s.begin + s.count; ++i)
         next_.push_back({slot_a, slot_b, uint32_t(fresh_[i] >> 32), uint32_t(fresh_[i]), s.kind, s.obstacle});

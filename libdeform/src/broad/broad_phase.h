@@ -2,8 +2,9 @@
 //
 // Every body and obstacle keeps the shape it had when its lists were made, and a margin m. Its share is respected while
 //     displacement since then + d_c + 2 h speed <= m,
-// and two features whose boxes were further apart than m_a + m_b (+ recovery depth) cannot be within the reach of a contact then. Lists hold a
-// superset of the contacts and narrow/ decides by the geometry of the sub-step alone, so results never depend on when lists were made.
+// and two features whose boxes were further apart than m_a + m_b (+ recovery depth) cannot be within the reach of a contact then. Lists
+// hold a superset of the contacts and narrow/ decides by the geometry of the sub-step alone, so results never depend on when lists were
+// made.
 #pragma once
 #include <cstdint>
 #include <span>

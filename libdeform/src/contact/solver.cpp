@@ -79,20 +79,15 @@ void sweep(ContactRows &rows, const ContactState &law, double h) {
   for (uint32_t i = 0; i < rows.n; ++i) {
     if (!(rows.wn[i] > 0)) continue;  // both sides are held: nothing an impulse could change
     double *const l = &rows.impulse[size_t(i) * 3];
-    Vec3 u = rows.velocity(i);
-    const double ln = normal_impulse(rows, i, u.x);
+    const Vec3 u = rows.velocity(i);
+    const double ln = normal_impulse(rows, i, u.x), d = ln - l[0];
     if (ln == 0 && l[0] == 0 && l[1] == 0 && l[2] == 0) continue;
-    if (ln != l[0]) {
-      rows.apply(i, {ln - l[0], 0, 0});
-      l[0] = ln;
-      u = rows.velocity(i);
-    }
-    if (!(rows.wt[i] > 0)) continue;
-    const Pair t = ln > 0 ? friction_impulse(rows, law, i, h, ln, u.y, u.z) : Pair{0, 0};
-    if (t.a != l[1] || t.b != l[2]) {
-      rows.apply(i, {0, t.a - l[1], t.b - l[2]});
-      l[1] = t.a, l[2] = t.b;
-    }
+    Pair t{0, 0};
+    if (ln > 0 && rows.wt[i] > 0)
+      t = friction_impulse(rows, law, i, h, ln, u.y + rows.cross[2 * size_t(i)] * d, u.z + rows.cross[2 * size_t(i) + 1] * d);
+    if (d == 0 && t.a == l[1] && t.b == l[2]) continue;
+    rows.apply(i, {d, t.a - l[1], t.b - l[2]});
+    l[0] = ln, l[1] = t.a, l[2] = t.b;
   }
 }
 

@@ -17,6 +17,7 @@ using Run = std::span<const Candidate>;
 constexpr double kFlat = 1e-3;        // sine of the angle between two faces below which their edge counts as flat
 constexpr double kCone = 0.035;       // 2 degrees: slack of an edge's cone of normals, so that contacts do not flicker at its border
 constexpr double kParallel = 1e-3;    // sine between two edges below which vertex-face contacts stand for them
+constexpr double kEnd = 1e-3;         // share of an edge next to its ends that is left to vertex-face contacts
 
 struct Pair {
   const BodyView &a;
@@ -76,8 +77,8 @@ void edge_edge(const Pair &pair, Run run, Array<ContactPoint> &out);
 void surfel_obstacle(const Pair &pair, Run run, Array<ContactPoint> &out);
 void edge_obstacle(const Pair &pair, Run run, Array<ContactPoint> &out);
 void triangle_obstacle(const Pair &pair, Run run, Array<ContactPoint> &out);
-// The faces beside an edge and their cone of normals: a unit direction that is orthogonal to the edge lies in it if it leans to neither face by more
-// than `slack` (sine).
+// The faces beside an edge and their cone of normals: a unit direction that is orthogonal to the edge lies in it if it leans to neither
+// face by more than `slack` (sine).
 struct EdgeFaces {
   Vec3 along;                  // unit, i to j
   Vec3 normal[2], inward[2];   // unit; inward lies in the face, orthogonal to the edge; both zero where there is no face

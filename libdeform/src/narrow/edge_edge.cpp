@@ -1,5 +1,5 @@
-// Two edges cross over each other: closest points of their lines n . r / |n| with n = u x w, both inside the edges, both edges convex, and the
-// direction inside both cones of normals. The faces beside the edges give the sign, so that edges which have slipped through each
+// Two edges cross over each other: closest points of their lines n . r / |n| with n = u x w, both inside the edges, both edges convex,
+// and the direction inside both cones of normals. The faces beside the edges give the sign, so that edges which have slipped through each
 // other by a little are pushed back the way they came.
 #include <algorithm>
 
@@ -22,8 +22,8 @@ EdgeFaces edge_faces(const Surface &surface, uint32_t edge) {
   return f;
 }
 
-// An open edge is as convex as can be. Between two faces the sine of the fold is c0 . r1 |e| / (|c0| |c1|), with r1 to the second face's far corner
-// and c the faces' normals times twice their areas; it is negative where the second face falls away from the first.
+// An open edge is as convex as can be. Between two faces the sine of the fold is c0 . r1 |e| / (|c0| |c1|), with r1 to the second face's
+// far corner and c the faces' normals times twice their areas; it is negative where the second face falls away from the first.
 bool edge_convex(const Surface &surface, uint32_t edge) {
   const uint32_t *ends = &surface.edge[2 * size_t{edge}], *tris = &surface.edge_tri[2 * size_t{edge}];
   if (tris[0] == kNone || tris[1] == kNone) return true;
@@ -67,7 +67,9 @@ void edge_edge(const Pair &pair, Run run, Array<ContactPoint> &out) {
     if (!(nr * nr <= widest2 * nn) || !(nn > kParallel * kParallel * uu * ww)) continue;
     const double uw = dot(u, w), ur = dot(u, r), wr = dot(w, r);
     const double s = uw * wr - ww * ur, t = uu * wr - uw * ur;   // times nn
-    if (!(s > 0 && s < nn && t > 0 && t < nn)) continue;
+    // Closer to an end than a thousandth of the edge the end itself makes the contact (vertex-face), and a second one in the same place with
+    // nearly the same normal would only make the solve ill-conditioned.
+    if (!(s > kEnd * nn && s < (1 - kEnd) * nn && t > kEnd * nn && t < (1 - kEnd) * nn)) continue;
     double speed2 = 0;
     for (const uint32_t e : {eb[0], eb[1]}) speed2 = std::max({speed2, norm2(vp0 - pair.vb(e)), norm2(vp1 - pair.vb(e))});
     const double reach = contact_reach(pair.h, pair.offset, std::sqrt(speed2));

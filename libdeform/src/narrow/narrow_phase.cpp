@@ -24,8 +24,8 @@ struct Owners {
   }
 };
 
-// An edge or triangle contact takes over the area of the nearest of its corners that carries no contact of its own with the other side; none is
-// given twice; 0 where none is free (mechanics, section 5). reserved2 holds the node that gave.
+// An edge or triangle contact takes over the area of the nearest of its corners that carries no contact of its own with the other side;
+// none is given twice; 0 where none is free (mechanics, section 5). lender holds the node that gave.
 class Areas {
  public:
   Areas(std::span<const BodyView> bodies, std::span<const ObstacleView> obstacles, Array<ContactPoint> &contacts)
@@ -39,8 +39,8 @@ class Areas {
       }
       const ContactPoint &first = contacts_[i];
       size_t end = i + 1;
-      while (end < contacts_.size() && contacts_[end].type_a != 0 && contacts_[end].slot_a == first.slot_a && contacts_[end].slot_b == first.slot_b &&
-             contacts_[end].obstacle == first.obstacle)
+      while (end < contacts_.size() && contacts_[end].type_a != 0 && contacts_[end].slot_a == first.slot_a &&
+             contacts_[end].slot_b == first.slot_b && contacts_[end].obstacle == first.obstacle)
         ++end;
       share(i, end);
       i = end;
@@ -53,7 +53,8 @@ class Areas {
     bool obstacle;
   };
   Place place_of(const ContactPoint &c) const {
-    return {find_slot(bodies_, c.slot_a)->id, c.obstacle ? find_slot(obstacles_, c.slot_b)->id : find_slot(bodies_, c.slot_b)->id, c.obstacle != 0};
+    const uint64_t id_b = c.obstacle ? find_slot(obstacles_, c.slot_b)->id : find_slot(bodies_, c.slot_b)->id;
+    return {find_slot(bodies_, c.slot_a)->id, id_b, c.obstacle != 0};
   }
   Owners owners(const Place &wanted) const {
     const auto before = [](const Place &p, const Place &w) {
@@ -62,7 +63,9 @@ class Areas {
     };
     const ContactPoint *list = contacts_.data(), *last = list + contacts_.size();
     // Surfels come before edges and triangles of the same pair.
-    const ContactPoint *begin = std::lower_bound(list, last, wanted, [&](const ContactPoint &c, const Place &w) { return before(place_of(c), w); });
+    const ContactPoint *begin = std::lower_bound(list, last, wanted, [&](const ContactPoint &c, const Place &w) {
+      return before(place_of(c), w);
+    });
     const ContactPoint *end = std::lower_bound(begin, last, wanted, [&](const ContactPoint &c, const Place &w) {
       return !before(w, place_of(c)) && c.type_a == 0;
     });
@@ -78,16 +81,16 @@ class Areas {
       ContactPoint &c = contacts_[i];
       double nearest = 0;
       for (int k = 0; k < c.nnode; ++k) {
-        const bool side_a = c.weight[k] > 0;
+        const bool side_a = !b || c.weight[k] > 0;
         const BodyView &own = side_a ? a : *b;
         const uint32_t surfel = c.node[k] - own.first_node;
         const double d2 = norm2(load3(&own.surface->x[4 * size_t{surfel}]) - load3(c.point));
-        if ((c.reserved2 && !(d2 < nearest)) || (side_a ? of_a : of_b).has(surfel)) continue;
+        if ((c.lender && !(d2 < nearest)) || (side_a ? of_a : of_b).has(surfel)) continue;
         bool free = true;
-        for (size_t j = begin; free && j < i; ++j) free = contacts_[j].reserved2 != c.node[k] + 1;
+        for (size_t j = begin; free && j < i; ++j) free = contacts_[j].lender != c.node[k] + 1;
         if (!free) continue;
         nearest = d2;
-        c.reserved2 = c.node[k] + 1;
+        c.lender = c.node[k] + 1;
         c.area = own.surface->area[surfel] * (b ? 0.5 : 1.0);
       }
     }

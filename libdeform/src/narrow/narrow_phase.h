@@ -2,10 +2,10 @@
 //     reach = 2 d_c + 2 h |relative velocity of the features|,
 // so that whatever may touch within the sub-step is a constraint in its solve.
 //
-// One rule keeps ghosts out: a contact is a local minimum of the distance of the two surfaces, seen from outside. A point over a face has the
-// face's normal; over an edge or a corner it counts only if no triangle beside it is nearer, and then once, not once per triangle. Two edges count
-// only where both are convex and face each other. Beside a concave edge the second face's plane is a contact too if it can be reached.
-// All decisions use the geometry of this sub-step alone: more candidates never change the result.
+// One rule keeps ghosts out: a contact is a local minimum of the distance of the two surfaces, seen from outside. A point over a face has
+// the face's normal; over an edge or a corner it counts only if no triangle beside it is nearer, and then once, not once per triangle.
+// Two edges count only where both are convex and face each other. Beside a concave edge the second face's plane is a contact too if it
+// can be reached. All decisions use the geometry of this sub-step alone: more candidates never change the result.
 #pragma once
 #include <cstdint>
 #include <span>
@@ -16,8 +16,8 @@
 
 namespace dfm {
 
-// candidates: in the order of BroadPhase::candidates(). out is cleared; contacts come sorted by (body a, body before obstacle, body or obstacle b,
-// kind, type_a, feature a, feature b), keys are unique. Does not allocate once out's capacity has settled.
+// candidates: in the order of BroadPhase::candidates(). out is cleared; contacts come sorted by (body a, body before obstacle, body or
+// obstacle b, kind, type_a, feature a, feature b), keys are unique. Does not allocate once out's capacity has settled.
 //   h       s
 //   offset  m, rest distance d_c
 // Numbers that are not finite make no contact.

@@ -1,5 +1,6 @@
-// Bodies against planes, spheres, boxes and capsules, in closed form. A surfel sees the nearest point of the obstacle. Where the obstacle is smaller than
-// a triangle, edges and faces of the body count too, with the same rule as between bodies: only local minima of the distance, seen from outside.
+// Bodies against planes, spheres, boxes and capsules, in closed form. A surfel sees the nearest point of the obstacle. Where the obstacle
+// is smaller than a triangle, edges and faces of the body count too, with the same rule as between bodies: only local minima of the
+// distance, seen from outside.
 #include <algorithm>
 
 #include "narrow/detail.h"

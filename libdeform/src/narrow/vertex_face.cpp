@@ -6,9 +6,10 @@
 //      X   beside a concave edge: the other face's plane,           \       |        \____
 //          its weights extrapolated                                  \      |
 //
-// Whether p is outside is told by the nearest point: over a face by its side, over an edge by the sum of its faces' normals, over a corner by
-// the edge there that points to p most (the point of the corner's spherical outline nearest to the direction of p lies on it).
-// From inside, only the nearest face pushes back (with the planes across concave edges): the far side of a thin body does not pull p through.
+// Whether p is outside is told by the nearest point: over a face by its side, over an edge by the sum of its faces' normals, over a
+// corner by the edge there that points to p most (the point of the corner's spherical outline nearest to the direction of p lies on it).
+// From inside, only the nearest face pushes back (with the planes across concave edges): the far side of a thin body does not pull p
+// through.
 #include <algorithm>
 
 #include "narrow/detail.h"
@@ -74,8 +75,8 @@ double Group::reach_to(Vec3 v, const uint32_t *c) const {
   return contact_reach(pair.h, pair.offset, std::sqrt(speed2));
 }
 
-// Is p within reach of a plane, or behind one, so that it is worth looking closer? In front of all faces beyond the reach, p is outside and free.
-// Looser by a few roundings than the decisions that follow, which alone may depend on distances.
+// Is p within reach of a plane, or behind one, so that it is worth looking closer? In front of all faces beyond the reach, p is outside
+// and free. Looser by a few roundings than the decisions that follow, which alone may depend on distances.
 bool Group::reaches(Run run, Vec3 v, double widest2) const {
   const double depth2 = depth * depth;
   for (const Candidate &candidate : run) {
@@ -194,8 +195,8 @@ bool Group::plane_weights(const Near &n, double weight[3]) const {
   return true;
 }
 
-// p projects beside the face, across concave edges only and no further than it can travel. Flat edges do not count: sliding over them within the reach
-// costs less than a tenth of the rest distance.
+// p projects beside the face, across concave edges only and no further than it can travel. Flat edges do not count: sliding over them
+// within the reach costs less than a tenth of the rest distance.
 bool Group::reachable_across(const Near &n, double weight[3]) const {
   if (!plane_weights(n, weight)) return false;
   const Surface &s = *pair.b->surface;
@@ -261,7 +262,8 @@ void Group::resolve(Array<ContactPoint> &out) {
   const uint32_t steep = steepest(best);
   if (deepest != kNone) {
     emit(near[deepest], near[deepest].normal, near[deepest].plane, near[deepest].weight, out);
-  } else if (best.distance <= depth && best.feature != TriangleFeature::face && !near[steep].emitted && plane_weights(near[steep], weight)) {
+  } else if (best.distance <= depth && best.feature != TriangleFeature::face && !near[steep].emitted &&
+             plane_weights(near[steep], weight)) {
     // Nearest is a concave edge or a saddle: its steepest face, extended, leads out.
     emit(near[steep], near[steep].normal, near[steep].plane, weight, out);
   }

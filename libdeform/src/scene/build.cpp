@@ -29,6 +29,9 @@ class Builder {
     for (Friction &f : def_.friction) add_friction(f);
     for (const Filter &f : def_.filters)
       check(dfm_world_filter_pair(world_, f.between[0].c_str(), f.between[1].c_str(), f.collide), f.pointer);
+    // Makes the plan now, so that an effect that nothing provides is an error of the scene and not of its first step.
+    double step = 0;
+    check(dfm_world_stable_step(world_, &step, nullptr, nullptr), def_.effects_auto ? "/bodies" : "/effects");
     return {std::exchange(world_, 0), std::move(probes_)};
   }
 

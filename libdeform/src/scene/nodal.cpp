@@ -46,7 +46,8 @@ std::vector<NodalRow> read_nodal(const std::string &path, const BodyMesh &mesh) 
   for (uint32_t i = 0; i < mesh.npoint; ++i) point_of[mesh.file_point[i]] = i;
   std::vector<NodalRow> rows;
   std::string text;
-  for (size_t line = 1; std::getline(in, text); ++line) {
+  size_t line = 1;
+  for (; std::getline(in, text); ++line) {
     const std::string_view trimmed = trim(text);
     if (line == 1) {
       if (trimmed != kHeader) fail(DFM_E_FORMAT, "%s:1: expected the header %s", path.c_str(), kHeader);
@@ -69,6 +70,7 @@ std::vector<NodalRow> read_nodal(const std::string &path, const BodyMesh &mesh) 
     }
     rows.push_back(row);
   }
+  if (line == 1) fail(DFM_E_FORMAT, "%s: nothing to read; expected the header %s and a row for each node", path.c_str(), kHeader);
   return rows;
 }
 

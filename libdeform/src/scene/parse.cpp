@@ -1,5 +1,6 @@
 // Text to tree. A scan of our own runs before the JSON parser: it bounds nesting (so that neither the parser nor the tree's later
 // use can exhaust the stack) and finds keys given twice, which the parser would silently drop.
+#include <cctype>
 #include <cstring>
 #include <filesystem>
 #include <fstream>
@@ -71,6 +72,16 @@ std::string reason(const char *what) {
   return text;
 }
 
+// Whether the word at which the parser stopped is one of the ways to write what is not finite.
+bool is_not_finite(const std::string &text, size_t byte) {
+  size_t begin = std::min(byte, text.size());
+  while (begin > 0 && (std::isalpha(static_cast<unsigned char>(text[begin - 1])) || text[begin - 1] == '-')) --begin;
+  std::string word;
+  for (size_t i = begin; i < text.size() && word.size() < 4; ++i)
+    if (text[i] != '-') word += char(std::tolower(static_cast<unsigned char>(text[i])));
+  return word.rfind("nan", 0) == 0 || word.rfind("inf", 0) == 0;
+}
+
 }  // namespace
 
 json parse_text(const std::string &text, const std::string &file) {
@@ -80,9 +91,8 @@ json parse_text(const std::string &text, const std::string &file) {
     return json::parse(text);
   } catch (const json::parse_error &e) {
     const Place p = place_of(text, e.byte > 0 ? e.byte - 1 : 0);
-    const bool not_a_number = std::strstr(e.what(), "'N") || std::strstr(e.what(), "'I") || std::strstr(e.what(), "'-I");
     fail(DFM_E_FORMAT, "%s:%zu:%zu: not JSON: %s%s", file.c_str(), p.line, p.column, reason(e.what()).c_str(),
-         not_a_number ? "; numbers must be finite" : "");
+         is_not_finite(text, e.byte) ? "; numbers must be finite" : "");
   } catch (const json::exception &e) {
     fail(DFM_E_FORMAT, "%s: not JSON: %s", file.c_str(), reason(e.what()).c_str());
   }

@@ -126,26 +126,53 @@ std::vector<double> share(const Force &force, const std::vector<uint32_t> &point
   return face && !weights.empty() ? weights : share_by_mass(points, mesh);
 }
 
+namespace {
+
+double dot(const double *a, const double *b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
+
+// Distance of a point from a segment, and from a triangle: inside its prism the height, else the nearest of its edges.
+double segment_distance(const double *p, const double *a, const double *b) {
+  double u[3], v[3], r[3];
+  subtract(b, a, u), subtract(p, a, v);
+  const double t = std::clamp(dot(u, v) / dot(u, u), 0.0, 1.0);
+  for (int k = 0; k < 3; ++k) r[k] = v[k] - t * u[k];
+  return std::sqrt(dot(r, r));
+}
+
+double triangle_distance(const double *p, const double *const c[3]) {
+  double u[3], v[3], w[3], n[3];
+  subtract(c[1], c[0], u), subtract(c[2], c[0], v), subtract(p, c[0], w);
+  for (int k = 0; k < 3; ++k) n[k] = u[(k + 1) % 3] * v[(k + 2) % 3] - u[(k + 2) % 3] * v[(k + 1) % 3];
+  const double s = triple(w, v, n), t = triple(u, w, n), whole = dot(n, n);
+  if (s >= 0 && t >= 0 && s + t <= whole) return std::fabs(dot(w, n)) / std::sqrt(whole);
+  return std::min({segment_distance(p, c[0], c[1]), segment_distance(p, c[1], c[2]), segment_distance(p, c[2], c[0])});
+}
+
+}  // namespace
+
 double locate(const BodyMesh &mesh, const double point[3], uint32_t corners[4], double weights[4]) {
   double best = INFINITY;
-  for (uint32_t c = 0; c < mesh.ntet; ++c) {
+  for (uint32_t c = 0; c < mesh.ntet && best > 0; ++c) {
     const uint32_t *t = mesh.tets + 4 * size_t(c);
     const double volume6 = tet_volume6(mesh, t);
     if (!(std::fabs(volume6) > 0)) continue;
-    double w[4], away = 0;
-    for (int k = 0; k < 4; ++k) {
-      // Volume with corner k moved to the point, over the cell's; the face opposite k lies 6V / (2 area) from k.
+    double w[4], away = INFINITY;
+    bool inside = true;
+    for (int k = 0; k < 4; ++k) {  // volume with corner k moved to the point, over the cell's
       const double *p[4] = {&mesh.points[3 * t[0]], &mesh.points[3 * t[1]], &mesh.points[3 * t[2]], &mesh.points[3 * t[3]]};
       p[k] = point;
       double u[3], v[3], x[3];
       subtract(p[1], p[0], u), subtract(p[2], p[0], v), subtract(p[3], p[0], x);
       w[k] = triple(u, v, x) / volume6;
+      inside = inside && w[k] >= 0;
+    }
+    for (int k = 0; k < 4 && !inside; ++k) {
       const double *face[3];
       for (int j = 0, n = 0; j < 4; ++j)
         if (j != k) face[n++] = &mesh.points[3 * t[j]];
-      const double height = std::fabs(volume6) / (2 * triangle_area(face[0], face[1], face[2]));
-      away = std::max(away, -w[k] * height);
+      away = std::min(away, triangle_distance(point, face));
     }
+    if (inside) away = 0;
     if (away >= best) continue;
     best = away;
     std::copy_n(t, 4, corners);

@@ -25,7 +25,7 @@ std::vector<double> share_by_area(const std::vector<uint32_t> &points, const Bod
 std::vector<double> share(const Force &force, const std::vector<uint32_t> &points, const BodyMesh &mesh,
                           const std::vector<uint32_t> &triangles, const std::string &file);
 
-// Cell that holds a point (or the nearest one) and the point's barycentric coordinates there; returns the distance to the cell, at least.
+// Cell that holds a point (or the nearest one) and the point's barycentric coordinates there; returns the distance to the cell.
 double locate(const BodyMesh &mesh, const double point[3], uint32_t corners[4], double weights[4]);
 
 // Held components and forces by the file's node numbers.

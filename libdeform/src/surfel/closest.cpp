@@ -52,9 +52,9 @@ TrianglePoint closest_on_triangle(Vec3 p, Vec3 a, Vec3 b, Vec3 c) {
   if (!(nn > 1e-28 * norm2(ab) * norm2(ac))) return nearest_edge(p, a, b, c);
   const double wa = dot(n, cross(bc, bp)), wb = -dot(n, cross(ac, cp)), wc = dot(n, cross(ab, ap));
   if (wa >= 0 && wb >= 0 && wc >= 0) {
-    const double sum = wa + wb + wc, v = wb / sum, w = wc / sum, u = 1 - v - w;
+    const double sum = wa + wb + wc, v = wb / sum, w = wc / sum;
     const Vec3 q = a + v * ab + w * ac;
-    return {q, {u, v, w}, norm2(p - q), TriangleFeature::face};
+    return {q, {wa / sum, v, w}, norm2(p - q), TriangleFeature::face};   // never negative, as 1 - v - w might be
   }
   if (wc <= 0 && d1 >= 0 && d3 <= 0) return on_edge(p, a, b, d1 / (d1 - d3), 0);
   if (wa <= 0 && d4 >= 0 && d5 <= 0) return on_edge(p, b, c, d4 / (d4 - d5), 1);

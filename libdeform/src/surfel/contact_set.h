@@ -21,7 +21,7 @@ struct ContactPoint {
   uint32_t feature_a, feature_b;  // surfel, edge or triangle number within its body; primitive: obstacle feature (face, edge, corner)
   uint8_t kind, obstacle, nnode;
   uint8_t type_a;                 // what feature_a is: 0 surfel, 1 edge, 2 triangle
-  uint32_t reserved2;
+  uint32_t lender;                // area: of an edge or triangle contact, the node that lent it, plus 1; else 0
   uint32_t node[4];
   double weight[4];
   double point[3];       // m, midway between the closest points

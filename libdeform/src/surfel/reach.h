@@ -16,10 +16,10 @@ inline double reach_share(double h, double offset, double speed) { return offset
 // A surfel behind a face is pushed back out from no deeper than this: deeper, the nearest face is no longer the one it came through.
 inline double recovery_depth(const Surface &faces) { return 0.25 * faces.median_edge; }
 // Edges that have slipped through each other are pushed back from a smaller depth: their cones of normals say less than a face does.
-inline double edge_recovery_depth(const Surface &a, const Surface &b) { return 0.02 * (a.median_edge < b.median_edge ? a.median_edge : b.median_edge); }
+inline double edge_recovery_depth(const Surface &a, const Surface &b) { return 0.02 * std::min(a.median_edge, b.median_edge); }
 
-// Largest length of the differences of two arrays [n,4] whose fourth components are zero; y null: of x itself. Two points at a time, since every body
-// pays this in every sub-step; a maximum has the same bits in any order.
+// Largest length of the differences of two arrays [n,4] whose fourth components are zero; y null: of x itself. Two points at a time,
+// since every body pays this in every sub-step; a maximum has the same bits in any order.
 inline double largest_norm(uint32_t n, const double *x, const double *y) {
   using Two = double __attribute__((vector_size(16)));
   const Two *p = reinterpret_cast<const Two *>(x), *q = reinterpret_cast<const Two *>(y);

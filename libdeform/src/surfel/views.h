@@ -33,7 +33,8 @@ struct ObstacleView {
 // Feature pairs that may touch while no surfel has moved further than the skin allows: a superset of all contacts until broad/ renews it.
 struct Candidate {
   uint32_t slot_a, slot_b;            // slot_b: obstacle slot where obstacle != 0
-  uint32_t feature_a, feature_b;      // kVertexFace: surfel of a, triangle of b (a may be the higher body); kEdgeEdge: edges, a the lower body id
+  uint32_t feature_a, feature_b;      // kVertexFace: surfel of a, triangle of b (a may be the higher body); kEdgeEdge: edges, a the lower
+                                      // body id
   uint8_t kind, obstacle;             // obstacle: feature_a is a surfel (kind 0), an edge (kind 1) or a triangle (kind 2); feature_b 0
 };
 

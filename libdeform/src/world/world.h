@@ -23,7 +23,14 @@ namespace dfm {
 
 struct World;
 
-struct Material { uint64_t handle = 0; World *world = nullptr; std::string name; dfm_material_def def{}; std::vector<std::string> extra_keys; std::vector<std::vector<double>> extra_values; };
+struct Material {
+  uint64_t handle = 0;
+  World *world = nullptr;
+  std::string name;
+  dfm_material_def def{};
+  std::vector<std::string> extra_keys;
+  std::vector<std::vector<double>> extra_values;
+};
 
 // A lasting load: force[i] on points[i], times the keyed scale, times 1 + sine.
 struct Load { uint32_t number; std::vector<uint32_t> points; std::vector<double> force; std::vector<dfm_scale_key> keys; dfm_sine sine{}; };

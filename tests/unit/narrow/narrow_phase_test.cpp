@@ -3,6 +3,7 @@
 #include <set>
 
 #include "../surfel/detect_scene.h"
+#include "core/hash.h"
 #include "surfel/closest.h"
 
 namespace {
@@ -230,13 +231,14 @@ TEST(VertexFace, BelowBothPlanesOfValley_BothPush) {
 TEST(FindContacts, NearestContact_IsTheDistanceOfTheBodies) {
   std::mt19937 random(8);
   std::normal_distribution<double> normal;
-  const Mesh meshes[3] = {box_mesh({1, 0.7, 0.5}, 1, 1, 1), sphere_mesh(0.5, 1), tetrahedron_mesh({0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0.1, 0.2, 0.8})};
+  const Mesh meshes[3] = {box_mesh({1, 0.7, 0.5}, 1, 1, 1), sphere_mesh(0.5, 1),
+                          tetrahedron_mesh({0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0.1, 0.2, 0.8})};
   int edges = 0, faces = 0, rims = 0;
   for (int i = 0; i < 600; ++i) {
     Scene scene;
     scene.offset = 0.05;
     scene.h = 0;
-    const auto any_turn = [&] { return turn({normal(random), normal(random), normal(random)}, 3 * normal(random)); };
+    const auto any_turn = [&] { return turn(Vec3{normal(random), normal(random), normal(random)}, 1 + i); };
     scene.add(moved(meshes[i % 3], any_turn(), {}));
     Surface &b = scene.add(moved(meshes[(i / 3) % 3], any_turn(), {}));
     const Surface &a = *scene.surfaces[0];
@@ -246,8 +248,8 @@ TEST(FindContacts, NearestContact_IsTheDistanceOfTheBodies) {
         const Surface &p = side ? b : a, &q = side ? a : b;
         for (uint32_t v = 0; v < p.nsurfel; ++v)
           for (uint32_t t = 0; t < q.ntri; ++t)
-            least = std::min(least, closest_on_triangle(load3(&p.x[4 * v]), load3(&q.x[4 * q.tri[3 * t]]), load3(&q.x[4 * q.tri[3 * t + 1]]),
-                                                        load3(&q.x[4 * q.tri[3 * t + 2]])).distance2);
+            least = std::min(least, closest_on_triangle(load3(&p.x[4 * v]), load3(&q.x[4 * q.tri[3 * t]]),
+                                                        load3(&q.x[4 * q.tri[3 * t + 1]]), load3(&q.x[4 * q.tri[3 * t + 2]])).distance2);
       }
       for (uint32_t e = 0; e < a.nedge; ++e)
         for (uint32_t f = 0; f < b.nedge; ++f)
@@ -344,13 +346,56 @@ TEST(EdgeEdge, FlatFaces_HaveNoEdgeContacts) {
   EXPECT_GE(faces, 32u + 4u);
 }
 
+// A tilted edge over a rim: the closest points of the lines lie inside both, but the distance falls on along the edge, so it is no minimum.
+TEST(EdgeEdge, DirectionOutsideTheCone_IsNoContact) {
+  for (const double tilt : {-0.5, 0.5}) {
+    Scene scene;
+    scene.h = 0;
+    scene.offset = 0.05;
+    scene.add(box_mesh({1, 1, 1}, 1, 1, 1));
+    // Its lower edge runs in x and z through (0.5, 0.1, 0.52), down to the inside or to the outside.
+    const Vec3 u{1, 0, tilt}, at{0.5, 0.1, 0.56};
+    scene.add(tetrahedron_mesh(at - 0.06 * u, at + 0.8 * u, at + Vec3{0, 0.4, 1}, at + Vec3{0, -0.4, 1}));
+    size_t edges = 0;
+    for (const ContactPoint &c : scene.contacts()) edges += c.kind == kEdgeEdge;
+    EXPECT_EQ(edges, tilt > 0 ? 0u : 1u) << tilt;
+  }
+}
+
+// An edge contact lives on the share of a corner that touches nothing by itself, and no corner gives twice.
+TEST(EdgeEdge, Area_ComesFromFreeCorners) {
+  Scene scene;
+  scene.add(box_mesh({1, 1, 1}, 5, 5, 2));
+  scene.add(moved(box_mesh({0.8, 0.8, 1}, 7, 3, 2), turn({0, 0, 1}, 0.4), {0, 0, 1.001}));
+  const auto contacts = scene.contacts();
+  std::set<uint32_t> touching;
+  for (const ContactPoint &c : contacts)
+    if (c.kind == kVertexFace) touching.insert(c.node[0]);
+  size_t edges = 0;
+  double given = 0, free = 0;
+  std::set<uint32_t> corners;
+  for (const ContactPoint &c : contacts) {
+    if (c.kind != kEdgeEdge) continue;
+    ++edges;
+    given += c.area;
+    for (int k = 0; k < c.nnode; ++k) {
+      const uint32_t body = c.node[k] < scene.surfaces[0]->nsurfel ? 0 : 1;
+      if (!touching.count(c.node[k]) && corners.insert(c.node[k]).second)
+        free += 0.5 * scene.surfaces[body]->area[c.node[k] - scene.bodies[body].first_node];
+    }
+  }
+  EXPECT_GE(edges, 8u);
+  EXPECT_GT(given, 0);
+  EXPECT_LE(given, free * (1 + 1e-12));
+}
+
 // The areas of a fully touching patch sum to the patch, from both sides in halves.
 TEST(FindContacts, SummedArea_IsTheTouchingPatch) {
   Scene scene;
   scene.add(box_mesh({4, 4, 1}, 24, 24, 4));
   scene.add(moved(box_mesh({1, 1, 1}, 30, 31, 4), turn({0, 0, 1}, 0.2), {0, 0, 1.001}));
   double area = 0;
-  for (const ContactPoint &c : scene.contacts()) area += c.area;
+  for (const ContactPoint &c : scene.listed()) area += c.area;
   // The upper surfels on the rim own a third of the triangles on the sides too.
   double rim = 0;
   for (uint32_t i = 0; i < scene.surfaces[1]->nsurfel; ++i)
@@ -402,6 +447,27 @@ TEST(FindContacts, Translation_KeepsContacts) {
     EXPECT_LT(norm(load3(a[i].point) + shift - load3(b[i].point)), 1e-12);
     EXPECT_LT(norm(load3(a[i].normal) - load3(b[i].normal)), 1e-9);
   }
+}
+
+// One value for gcc and clang, -O0 and -O2. The scene is made with + - * / sqrt alone.
+TEST(FindContacts, FixedScene_HasItsGoldenHash) {
+  Scene scene;
+  scene.offset = 0.02;
+  const double q[4] = {0.3, -0.2, 0.5, 0.7};
+  scene.add(sphere_mesh(0.5, 2), {0.5, 0.1, 0});
+  scene.add(moved(box_mesh({1, 0.8, 0.6}, 4, 3, 2), unit_quat(q), {0.8, 0.2, 0.3}));
+  scene.add(moved(sphere_mesh(0.3, 2), {}, {-0.2, 0.77, 0.1}));
+  scene.add(Shape::plane, {0, 0, -0.49});
+  ObstacleView &o = scene.add(Shape::capsule, {-0.3, 0, 0.5}, unit_quat(q));
+  o.radius = 0.05, o.half_length = 0.4;
+  ObstacleView &box = scene.add(Shape::box, {0.2, -0.6, 0.1}, unit_quat(q));
+  box.half_size = {0.2, 0.2, 0.2};
+  const auto contacts = scene.contacts();
+  EXPECT_EQ(flaw(scene, contacts), "");
+  ASSERT_GT(contacts.size(), 20u);
+  Hash hash;
+  for (const ContactPoint &c : contacts) hash.add(c);
+  EXPECT_EQ(hash.value, 11455495798150159590u);
 }
 
 TEST(FindContacts, CallOrderOfViews_DoesNotMatter) {

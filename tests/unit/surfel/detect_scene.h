@@ -184,6 +184,12 @@ struct Scene {
     return out;
   }
   Array<ContactPoint> contacts() const { return contacts(all()); }
+  // By way of the broad phase, where all pairs would be too many.
+  Array<ContactPoint> listed() const {
+    BroadPhase broad(Memory::standard());
+    broad.update(bodies, obstacles, filter, h, offset);
+    return contacts(broad.candidates());
+  }
 };
 
 inline bool same_bits(const Array<ContactPoint> &a, const Array<ContactPoint> &b) {
@@ -198,8 +204,8 @@ inline std::string flaw(const Scene &scene, const Array<ContactPoint> &contacts)
   for (const BodyView &b : scene.bodies)
     for (uint32_t s = 0; s < b.surface->nsurfel; ++s) at.push_back(load3(&b.surface->x[4 * s]));
   const auto order = [&](const ContactPoint &c) {
-    return std::array<uint64_t, 7>{scene.bodies[c.slot_a].id, c.obstacle, c.obstacle ? scene.obstacles[c.slot_b].id : scene.bodies[c.slot_b].id,
-                                   c.kind, c.type_a, c.feature_a, c.feature_b};
+    const uint64_t id_b = c.obstacle ? scene.obstacles[c.slot_b].id : scene.bodies[c.slot_b].id;
+    return std::array<uint64_t, 7>{scene.bodies[c.slot_a].id, c.obstacle, id_b, c.kind, c.type_a, c.feature_a, c.feature_b};
   };
   for (size_t i = 0; i < contacts.size(); ++i) {
     const ContactPoint &c = contacts[i];

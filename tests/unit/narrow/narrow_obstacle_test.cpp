@@ -175,8 +175,8 @@ TEST(Obstacles, NearestContact_IsTheDistance) {
     Scene scene;
     scene.h = 0;
     scene.offset = 0.05;
-    Surface &s = scene.add(moved(i % 2 ? box_mesh({1, 0.7, 0.5}, 1, 1, 1) : sphere_mesh(0.5, 1), turn(any(), normal(random)), {}));
-    ObstacleView &o = scene.add(kind, {}, turn(any(), 3 * normal(random)));
+    Surface &s = scene.add(moved(i % 2 ? box_mesh({1, 0.7, 0.5}, 1, 1, 1) : sphere_mesh(0.5, 1), turn(any(), 1 + i), {}));
+    ObstacleView &o = scene.add(kind, {}, turn(any(), 2 * i));
     o.half_size = {0.3, 0.2, 0.4}, o.radius = 0.15, o.half_length = 0.4;
     const ObstacleShape shape(o);
     // Distance by points sampled densely on the body's surface, from the signed distance of the obstacle.

@@ -1,0 +1,282 @@
+// `deform run`: files, columns and keys that others read, and how a run ends.
+#include <gtest/gtest.h>
+#include <signal.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <chrono>
+#include <filesystem>
+#include <map>
+#include <set>
+#include <thread>
+
+#include "support.h"
+#include "world.h"
+
+namespace fs = std::filesystem;
+
+namespace {
+
+// Two blocks, one dropped on the other, which stands on the floor.
+const char *kScene = R"({
+  "format": "deform-scene", "version": 1,
+  "time": {"duration": 0.1, "step": 0.0005},
+  "materials": {"gel": {"density": 1000, "young": 50000, "poisson": 0.3, "damping": {"mass": 2, "stiffness": 0.002}}},
+  "bodies": [{"name": "low", "mesh": "block.msh", "material": "gel", "pose": {"position": [0, 0, 0.001]},
+              "fix": [{"box": [[-1, -1, -1], [1, 1, 1e-6]]}]},
+             {"name": "top", "mesh": "block.msh", "material": "gel", "pose": {"position": [0.013, 0.017, 0.104]}}],
+  "obstacles": [{"name": "floor", "shape": "plane"}],
+  "contact": {"friction": [{"between": ["*", "*"], "law": "coulomb", "params": {"mu": 0.5}}]},
+  "probes": [{"name": "corner", "body": "top", "point": [0, 0, 0]}],
+  "output": {"every": 0.02, "states": true, "nodes": true}
+})";
+
+const std::string &folder() {
+  static const std::string dir = [] {
+    const std::string d = test::scratch("run_" + std::to_string(getpid()));
+    test::Context context;
+    dfm_tetmesh mesh = 0;
+    const double size[3] = {0.1, 0.1, 0.1};
+    test::ok(dfm_tetmesh_make(context, "beam", size, 60, &mesh));
+    test::ok(dfm_tetmesh_write(mesh, (d + "/block.msh").c_str()));
+    test::write_file(d + "/scene.json", kScene);
+    return d;
+  }();
+  return dir;
+}
+
+struct Outcome {
+  test::CommandResult result;
+  std::string out, summary;
+};
+
+Outcome run(const std::string &name, std::vector<std::string> arguments) {
+  Outcome r;
+  r.out = folder() + "/" + name;
+  fs::remove_all(r.out);
+  arguments.insert(arguments.begin(), {"run", folder() + "/scene.json", "--out", r.out});
+  r.result = test::deform(arguments);
+  r.summary = test::read_file(r.out + "/summary.json");
+  return r;
+}
+
+// Text of a key's value in the summary: up to the comma or the closing bracket that ends it.
+std::string value(const std::string &json, const std::string &key) {
+  const size_t at = json.find("\"" + key + "\": ");
+  if (at == std::string::npos) return "";
+  size_t begin = at + key.size() + 4, end = begin;
+  int depth = 0;
+  for (bool in_string = false; end < json.size(); ++end) {
+    const char c = json[end];
+    if (c == '"' && json[end - 1] != '\\') in_string = !in_string;
+    if (in_string) continue;
+    if (c == '{' || c == '[') ++depth;
+    if ((c == ',' && depth == 0) || ((c == '}' || c == ']') && depth-- == 0) || (c == '\n' && depth == 0)) break;
+  }
+  return json.substr(begin, end - begin);
+}
+
+std::string line(const std::string &path) {
+  const std::string text = test::read_file(path);
+  return text.substr(0, text.find('\n'));
+}
+
+std::string hash_of(const std::string &name, const std::vector<std::string> &arguments) {
+  const Outcome r = run(name, arguments);
+  EXPECT_EQ(r.result.exit_code, 0) << r.result.err;
+  return value(r.summary, "state_hash");
+}
+
+}  // namespace
+
+TEST(Run, Outputs_HaveTheirColumnsAndKeys) {
+  const Outcome r = run("outputs", {});
+  ASSERT_EQ(r.result.exit_code, 0) << r.result.err;
+  EXPECT_NE(r.result.out.find("steps/s"), std::string::npos);
+  EXPECT_EQ(line(r.out + "/bodies.csv"),
+            "t,body,com_x,com_y,com_z,vel_x,vel_y,vel_z,ang_x,ang_y,ang_z,kinetic_J,elastic_J,volume,force_x,force_y,force_z");
+  EXPECT_EQ(line(r.out + "/contacts.csv"), "t,body_a,body_b,count,sticking,normal_N,friction_N,moment_Nm,slip_max,friction_work_J");
+  EXPECT_EQ(line(r.out + "/probes.csv"), "t,probe,x,y,z,vx,vy,vz");
+  EXPECT_EQ(line(r.out + "/nodes/top.csv"), "node,ux,uy,uz");
+  const auto bodies = test::read_csv(r.out + "/bodies.csv");
+  ASSERT_EQ(bodies.size(), 1u + 2 * 6);  // t = 0, 0.02, ... 0.1
+  for (const auto &row : bodies) EXPECT_EQ(row.size(), 17u);
+  EXPECT_EQ(bodies[1][1], "low");
+  EXPECT_NEAR(std::stod(bodies[12][0]), 0.1, 1e-12);
+  EXPECT_EQ(test::read_csv(r.out + "/probes.csv").size(), 7u);
+  for (const auto &row : test::read_csv(r.out + "/contacts.csv")) EXPECT_EQ(row.size(), 10u);
+  for (const char *file : {"states/top_000000.vtu", "states/top_surface_000005.vtu", "states/low_000005.vtu"})
+    EXPECT_TRUE(fs::exists(r.out + "/" + file)) << file;
+  EXPECT_FALSE(fs::exists(r.out + "/states/top_000006.vtu"));
+  EXPECT_EQ(test::read_csv(r.out + "/states/index.csv").size(), 7u);
+
+  for (const char *key :
+       {"format", "version", "steps", "simulated_s", "wall_s", "cpu_s", "ms_per_step", "median", "p99", "max", "stages", "threads", "finite",
+        "states_checked", "intersections_max", "inverted_max", "guard_steps", "solver", "passes", "sweeps", "residual_max", "hold",
+        "creep_max_um_per_s", "effects", "active", "absent", "plugins", "bodies", "com", "velocity", "kinetic_J", "elastic_J", "volume_ratio",
+        "speed_max", "dofs", "cells", "contacts", "mean", "swaps", "state_hash", "warnings"})
+    EXPECT_NE(value(r.summary, key), "") << key;
+  EXPECT_EQ(value(r.summary, "steps"), "200");
+  EXPECT_EQ(value(r.summary, "finite"), "true");
+  EXPECT_EQ(value(r.summary, "states_checked"), "6");
+  EXPECT_EQ(value(r.summary, "intersections_max"), "0");
+  EXPECT_EQ(value(r.summary, "state_hash").size(), 18u);
+  EXPECT_NE(value(r.summary, "active").find("\"stiction\""), std::string::npos);
+  for (const auto &entry : fs::recursive_directory_iterator(r.out)) EXPECT_NE(entry.path().extension(), ".part");
+}
+
+TEST(Run, ContactForces_MatchTheMomentumChange) {
+  // Top block: its momentum change over an interval is the mean contact force plus its weight.
+  const Outcome r = run("momentum", {"--set", "/output/every=0.01"});
+  ASSERT_EQ(r.result.exit_code, 0) << r.result.err;
+  const auto rows = test::read_csv(r.out + "/bodies.csv");
+  const double mass = 1.0;  // 1000 kg/m3, 0.1 m
+  double last_v = 0, last_t = 0, largest = 0;
+  for (size_t i = 1; i < rows.size(); ++i) {
+    if (rows[i][1] != "top") continue;
+    const double t = std::stod(rows[i][0]), v = std::stod(rows[i][7]), force = std::stod(rows[i][16]);
+    if (t > 0) {
+      // Mass damping (2 1/s) is the only other force; it is bounded by its rate times the speed.
+      EXPECT_NEAR(mass * (v - last_v) / (t - last_t), force - 9.81 * mass, 2 * mass * std::max(std::fabs(v), std::fabs(last_v)) + 1e-9) << t;
+      largest = std::max(largest, force);
+    }
+    last_v = v, last_t = t;
+  }
+  EXPECT_GT(largest, 1.0) << "the blocks never met, so nothing was tested";
+}
+
+TEST(Run, Displacements_ComeInTheMeshFilesOrder) {
+  const Outcome r = run("nodes", {"--time", "0.01"});
+  ASSERT_EQ(r.result.exit_code, 0) << r.result.err;
+  const auto rows = test::read_csv(r.out + "/nodes/top.csv");
+  ASSERT_GT(rows.size(), 8u);
+  for (size_t i = 1; i < rows.size(); ++i) {
+    EXPECT_EQ(rows[i][0], std::to_string(i - 1));
+    EXPECT_NEAR(std::stod(rows[i][3]), -0.5 * 9.81 * 0.01 * 0.01, 6e-5);  // free fall; symplectic Euler leads by g t h / 2
+  }
+}
+
+TEST(Run, SameScene_GivesTheSameHashWhateverItWrites) {
+  const std::string plain = hash_of("plain", {"--quiet", "--set", "/output/states=false"});
+  EXPECT_EQ(hash_of("more", {"--quiet", "--check", "--set", "/output/every=0.003", "--profile"}), plain);
+  EXPECT_EQ(hash_of("threads", {"--quiet", "--threads", "3"}), plain);
+  EXPECT_NE(hash_of("softer", {"--quiet", "--set", "/materials/gel/young=49999"}), plain);
+}
+
+TEST(Run, JitterSeeds_DifferAndRepeat) {
+  std::set<std::string> hashes = {hash_of("j0", {"--quiet", "--time", "0.005"})};
+  for (int seed = 1; seed <= 5; ++seed) hashes.insert(hash_of("j" + std::to_string(seed), {"--quiet", "--time", "0.005", "--jitter", std::to_string(seed)}));
+  EXPECT_EQ(hashes.size(), 6u);
+  EXPECT_TRUE(hashes.count(hash_of("j3", {"--quiet", "--time", "0.005", "--jitter", "3"})));
+}
+
+TEST(Run, CheckEveryStep_CountsEveryStep) {
+  const Outcome r = run("check", {"--check", "--time", "0.01"});
+  EXPECT_EQ(value(r.summary, "states_checked"), "21");
+}
+
+TEST(Run, CrossingBodies_AreCounted) {
+  // Two blocks that start inside each other and may pass: the check must see what detection is told to ignore.
+  const Outcome r = run("crossing", {"--time", "0.002", "--set", "/bodies/1/pose/position=[0.03,0.04,0.05]", "--set",
+                                 "/contact/filter=[{\"between\":[\"low\",\"top\"]}]"});
+  ASSERT_EQ(r.result.exit_code, 0) << r.result.err;
+  EXPECT_GT(std::stoi(value(r.summary, "intersections_max")), 0);
+  EXPECT_NE(value(r.summary, "warnings").find("surfaces cross"), std::string::npos);
+}
+
+TEST(Run, LastStep_LandsOnTheEnd) {
+  const Outcome r = run("end", {"--time", "0.00125", "--quiet"});
+  EXPECT_EQ(value(r.summary, "steps"), "3");
+  EXPECT_NEAR(std::stod(value(r.summary, "simulated_s")), 0.00125, 1e-15);
+  const Outcome one = run("one", {"--time", "0.001", "--quiet", "--set", "/time/step=5000"});
+  EXPECT_EQ(value(one.summary, "steps"), "1");
+  EXPECT_NEAR(std::stod(value(one.summary, "simulated_s")), 0.001, 1e-15);
+  const Outcome automatic = run("auto", {"--time", "0.0123", "--quiet", "--set", "/time/step=auto"});
+  EXPECT_NEAR(std::stod(value(automatic.summary, "simulated_s")), 0.0123, 1e-12);
+}
+
+TEST(Run, Json_IsTheSummary) {
+  const Outcome r = run("json", {"--json", "--time", "0.001"});
+  EXPECT_EQ(r.result.out, r.summary);
+}
+
+TEST(Run, Profile_NamesTheStages) {
+  const Outcome r = run("profile", {"--profile", "--time", "0.005"});
+  for (const char *stage : {"model", "predict", "narrow", "commit"}) EXPECT_NE(r.result.out.find(stage), std::string::npos) << stage;
+}
+
+TEST(Run, StepFarTooLong_StopsWithTheLastGoodState) {
+  // A step of 1e6 seconds needs more sub-steps than allowed.
+  const Outcome r = run("stopped", {"--set", "/time/step=1e6", "--time", "1e9"});
+  EXPECT_EQ(r.result.exit_code, 3);
+  EXPECT_NE(r.result.err.find("stopped at step 0"), std::string::npos) << r.result.err;
+  EXPECT_NE(r.result.err.find("body '"), std::string::npos) << r.result.err;
+  EXPECT_TRUE(fs::exists(r.out + "/states/last_top.vtu"));
+  EXPECT_EQ(value(r.summary, "finite"), "true");
+  EXPECT_NE(value(r.summary, "stopped"), "null");
+}
+
+TEST(Run, ForceBeyondAllBounds_StopsWithTheLastGoodState) {
+  const Outcome r = run("diverged", {"--set", "/bodies/1/forces=[{\"box\":[[-1,-1,-1],[1,1,1]],\"total\":[1e300,1e300,0]}]"});
+  EXPECT_EQ(r.result.exit_code, 3) << r.result.err;
+  EXPECT_NE(r.result.err.find("body 'top'"), std::string::npos) << r.result.err;
+  EXPECT_EQ(value(value(r.summary, "stopped"), "body"), "\"top\"");
+  EXPECT_TRUE(fs::exists(r.out + "/states/last_low.vtu"));
+  EXPECT_EQ(value(r.summary, "finite"), "true") << "the state that is kept is the last good one";
+}
+
+TEST(Run, Interrupt_WritesTheLastStateAndTheSummary) {
+  const std::string out = folder() + "/interrupted", scene = folder() + "/scene.json";
+  fs::remove_all(out);
+  const pid_t child = fork();
+  if (child == 0) {
+    execl(DEFORM_COMMAND, "deform", "run", scene.c_str(), "--quiet", "--time", "1e5", "--out", out.c_str(), nullptr);
+    _exit(127);
+  }
+  // Recorded rows show that the run is under way.
+  for (int i = 0; i < 1000 && test::read_csv(out + "/bodies.csv").size() < 8; ++i) std::this_thread::sleep_for(std::chrono::milliseconds(10));
+  kill(child, SIGINT);
+  int status = 0;
+  waitpid(child, &status, 0);
+  ASSERT_TRUE(WIFEXITED(status));
+  EXPECT_EQ(WEXITSTATUS(status), 130);
+  EXPECT_TRUE(fs::exists(out + "/states/last_top.vtu"));
+  const std::string summary = test::read_file(out + "/summary.json");
+  EXPECT_NE(value(summary, "stopped").find("interrupted"), std::string::npos);
+  EXPECT_GT(std::stoi(value(summary, "steps")), 10);
+}
+
+TEST(Run, EarlierNumberedFiles_AreRemoved) {
+  const std::string out = folder() + "/stale";
+  fs::create_directories(out + "/states");
+  test::write_file(out + "/states/top_000999.vtu", "old");
+  test::write_file(out + "/states/notes.txt", "mine");
+  const test::CommandResult result = test::deform({"run", folder() + "/scene.json", "--quiet", "--time", "0.001", "--out", out});
+  EXPECT_EQ(result.exit_code, 0) << result.err;
+  EXPECT_FALSE(fs::exists(out + "/states/top_000999.vtu"));
+  EXPECT_TRUE(fs::exists(out + "/states/notes.txt"));
+}
+
+TEST(Run, Frames_AreDrawnAtTheirRate) {
+  const Outcome r = run("frames", {"--frames", "100", "--time", "0.02", "--set", "/output/color=speed"});
+  ASSERT_EQ(r.result.exit_code, 0) << r.result.err;
+  if (r.result.err.find("no pictures") != std::string::npos) GTEST_SKIP() << r.result.err;
+  for (const char *file : {"frame_000000.png", "frame_000001.png", "frame_000002.png"}) EXPECT_GT(fs::file_size(r.out + "/frames/" + file), 1000u);
+  EXPECT_FALSE(fs::exists(r.out + "/frames/frame_000003.png"));
+}
+
+TEST(Run, Frames_WithoutABackendAreAWarning) {
+  setenv("DEFORM_RENDER_BACKEND", "none", 1);
+  const Outcome r = run("no_frames", {"--frames", "100", "--time", "0.002"});
+  unsetenv("DEFORM_RENDER_BACKEND");
+  EXPECT_EQ(r.result.exit_code, 0) << r.result.err;
+  EXPECT_NE(value(r.summary, "warnings").find("no pictures"), std::string::npos);
+}
+
+TEST(Run, EverySubcommand_HasHelp) {
+  for (const char *command : {"run", "explain", "mesh", "plugin", "friction", "cost", "ccd"}) {
+    const test::CommandResult result = test::deform({command, "--help"});
+    EXPECT_EQ(result.exit_code, 0) << command;
+    for (const char *option : {"--help", "--quiet", "--threads", "--json"}) EXPECT_NE(result.out.find(option), std::string::npos) << command << " " << option;
+  }
+}
