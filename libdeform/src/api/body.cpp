@@ -111,7 +111,7 @@ dfm_status dfm_body_set_state(dfm_body body, uint32_t n, const double *x, const 
         if (x) b.p.x[size_t(i) * kStride + size_t(k)] = x[size_t(3) * i + size_t(k)];
         if (v) b.p.v[size_t(i) * kStride + size_t(k)] = v[size_t(3) * i + size_t(k)];
       }
-    b.world->bound_due = true;
+    b.world->bound_age = kNone;
   });
 }
 
@@ -132,7 +132,7 @@ dfm_status dfm_body_hold(dfm_body body, uint32_t n, const uint32_t *points, uint
     for (uint32_t i = 0; i < n; ++i) b.p.held[points[i]] = axes;
     update_inverse_mass(b.p);
     stop_held(b);
-    b.world->bound_due = true;
+    b.world->bound_age = kNone;
   });
 }
 

@@ -83,7 +83,7 @@ void world_snapshot(const World &w, std::vector<unsigned char> &out) {
   Writer s{out};
   s.bytes(kMagic, sizeof kMagic);
   s.value(structure(w));
-  s.value(w.bound_due);
+  s.value(w.bound_age);
   fields(s, w);
   Hash h;
   h.add(out.data(), out.size());
@@ -106,7 +106,7 @@ void world_restore(World &w, const void *data, size_t bytes) {
   s.value(shape);
   if (shape != structure(w))
     fail(DFM_E_FORMAT, "the snapshot belongs to another world: bodies, meshes, models, obstacles and laws must be the same; nothing was restored");
-  s.value(w.bound_due);
+  s.value(w.bound_age);
   fields(s, w);
   for (auto &b : w.bodies) update_inverse_mass(b->p);
   w.worst_body = nullptr;

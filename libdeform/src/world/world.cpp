@@ -192,7 +192,7 @@ void World::prepare() {
   offset = def.contact_offset > 0 ? def.contact_offset : contact_offset(*this);
   gravity = load3(def.gravity);
   if (!gravity_keys.empty()) gravity = vector_at(gravity_keys, time);
-  bound_due = true;
+  bound_age = kNone;
   changed = false;
 }
 
