@@ -231,8 +231,6 @@ void World::stage_broad() { broad.update(body_views, obstacle_views, filter, h, 
 void World::stage_narrow() { find_contacts(body_views, obstacle_views, broad.candidates(), h, offset, contacts); }
 
 void World::stage_distribute() {
-  for (const ImpulseSink &s : sinks)
-    if (s.phyxel) std::fill(s.phyxel, s.phyxel + size_t(kStride) * bodies[size_t(&s - sinks.data())]->p.n, 0.0);
   distribute(contacts, rows.frame.data(), rows.impulse.data(), sinks);
   for (auto &b : bodies) {
     Vec3 sum;
