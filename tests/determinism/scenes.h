@@ -54,12 +54,24 @@ inline dfm_world ten_in_a_box(dfm_context *c) {
   return w;
 }
 
+// One body large enough that its model cuts its own work (10,000 cells).
+inline dfm_world fine_ball(dfm_context *c) {
+  const dfm_world w = test::make_world(c);
+  test::add_plane(w, "floor");
+  test::set_friction(w, 0.4);
+  test::BodyOptions o;
+  o.name = "ball", o.young = 2e4, o.volume = 1, o.position = {0, 0, 0.0502}, o.velocity = {0.3, 0.1, -0.5}, o.spin = {0, 20, 3};
+  test::make_body(c, w, "ball", {0.05, 0, 0}, 12000, o);
+  return w;
+}
+
 struct Scene {
   const char *name;
   dfm_world (*build)(dfm_context *);
   int steps;
 };
-inline const Scene all[] = {{"ball_on_floor", ball_on_floor, 150}, {"crossing_beams", crossing_beams, 150}, {"ten_in_a_box", ten_in_a_box, 150}};
+inline const Scene all[] = {{"ball_on_floor", ball_on_floor, 150}, {"crossing_beams", crossing_beams, 150}, {"ten_in_a_box", ten_in_a_box, 150},
+                                {"fine_ball", fine_ball, 20}};
 
 inline void advance(dfm_world w, int steps) {
   for (int i = 0; i < steps; ++i) ASSERT_EQ(dfm_world_step(w, 1e-3, nullptr), DFM_OK) << dfm_last_error();
