@@ -10,7 +10,7 @@ import sys
 import tempfile
 
 # Scenes with simulated seconds: short, since -O0 runs them too, but long enough for contacts to come, stick and slide.
-SCENES = {"two_cylinders": 0.05, "ten_bodies": 0.05, "block_on_slope": 0.05}
+SCENES = {"two_cylinders": 0.05, "ten_bodies": 0.05, "slope_block": 0.05}
 
 
 def state_hash(build, scene, seconds, folder, threads):
