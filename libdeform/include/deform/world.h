@@ -15,7 +15,7 @@ typedef struct dfm_world_def {
   double gravity[3];            /* m/s2 */
   int32_t method, integrator;   /* DFM_METHOD_*, DFM_INTEGRATOR_* */
   double contact_offset;        /* m, rest distance d_c; 0: chosen per world from the meshes (mechanics: 1e-3 of the median surface edge) */
-  double contact_tolerance;     /* m/s, residual of the contact solve; 0: min(1e-6, 0.01 (d_c-d_g)/h) */
+  double contact_tolerance;     /* m/s, slip that a sticking contact may be left with; 0: min(1e-6, 0.01 (d_c-d_g)/h); doc/decisions/0004 */
   uint32_t max_sweeps;          /* per sub-step; 50 */
   uint32_t max_passes;          /* outer passes per sub-step; 20 */
   uint32_t max_substeps;        /* a step that needs more returns DFM_DISCARD; 10000 */
@@ -41,15 +41,16 @@ DFM_API dfm_status dfm_world_set_gravity_keys(dfm_world world, uint32_t n, const
 enum {
   DFM_TROUBLE_SUBSTEPS = 1,      /* dt is above the stable step, sub-steps were taken: soften, coarsen, or accept the cost */
   DFM_TROUBLE_UNCONVERGED = 2,   /* the contact solve met its cap: raise max_sweeps, or lower mass ratios */
-  DFM_TROUBLE_NONFINITE = 4,     /* a plugin or a load made a NaN: the last good state is kept (status DFM_E_DIVERGED) */
+  DFM_TROUBLE_NONFINITE = 4,     /* a plugin or a load made a NaN: the last good sub-step is kept (status DFM_E_DIVERGED) */
   DFM_TROUBLE_INVERTED = 8,      /* a cell turned inside out: refine, soften the load */
   DFM_TROUBLE_PLUGIN = 16        /* a plugin failed: see the log */
 };
 /** Advances the world by dt. A step longer than the stable one is cut into equal sub-steps with the contact solve in each.
  * @param dt       s, > 0
  * @param trouble  out, DFM_TROUBLE_* bits; may be NULL
- * @return DFM_OK; DFM_DISCARD too many sub-steps, nothing changed; DFM_E_DIVERGED non-finite state, world put back to the start of this step;
- *         DFM_E_ARG; DFM_E_HANDLE; DFM_E_BUSY called from inside a step
+ * @return DFM_OK; DFM_DISCARD too many sub-steps, nothing changed; DFM_E_DIVERGED a sub-step could not be taken (a value that is not
+ *         finite, a plugin that failed): the world stays at its last good sub-step, and may step again once the cause is gone;
+ *         DFM_E_NOMEM likewise; DFM_E_FATAL a plugin gave no step bound; DFM_E_ARG; DFM_E_HANDLE; DFM_E_BUSY called from inside a step
  * Threads: One thread at a time per world. Since 0.1. */
 DFM_API dfm_status dfm_world_step(dfm_world world, double dt, uint32_t *trouble);
 /** Largest step the current state allows without sub-steps (0.9 of the proven bound), s; +INFINITY if nothing bounds it.
@@ -63,7 +64,8 @@ DFM_API uint64_t dfm_world_hash(dfm_world world);
 /** Writes what a later result depends on. buffer NULL: *bytes gets the size needed. Too small: DFM_E_ARG and the size.
  * Threads: Not during step. Since 0.1. */
 DFM_API dfm_status dfm_world_snapshot(dfm_world world, void *buffer, size_t *bytes);
-/** Restores into a world with the same bodies (a scene loaded anew, in another process too); the next steps give the same bits.
+/** Restores into a world with the same bodies and obstacles (a scene loaded anew, in another process too): state, contacts, loads, holds,
+ * motions, gravity, filters, friction rules, runtime parameters. The next steps give the same bits; events not yet read are dropped.
  * @return DFM_OK; DFM_E_FORMAT not a snapshot of such a world (nothing changed); DFM_E_HANDLE. Threads: Not during step. Since 0.1. */
 DFM_API dfm_status dfm_world_restore(dfm_world world, const void *buffer, size_t bytes);
 

@@ -3,6 +3,7 @@
 #include <cmath>
 
 #include "api/objects.h"
+#include "surfel/closest.h"
 #include "world/create.h"
 #include "world/measure.h"
 #include "world/queries.h"
@@ -10,6 +11,14 @@
 using namespace dfm;
 
 namespace {
+
+// A count of keys without keys, and a sine that is not finite.
+void check_motion(const Body &b, uint32_t nkey, const void *keys, const dfm_sine *sine) {
+  if (nkey && !keys) fail(DFM_E_ARG, "body '%s': %u keys are announced, but keys is NULL", b.name.c_str(), nkey);
+  if (!sine) return;
+  for (double v : {sine->amplitude[0], sine->amplitude[1], sine->amplitude[2], sine->frequency, sine->phase})
+    if (!std::isfinite(v)) fail(DFM_E_ARG, "body '%s': the sine is not finite; give amplitude, frequency (Hz) and phase (rad)", b.name.c_str());
+}
 
 void check_points(const Body &b, uint32_t n, const uint32_t *points) {
   if (n) need(points, "points");
@@ -110,7 +119,7 @@ dfm_status dfm_body_set_state(dfm_body body, uint32_t n, const double *x, const 
         if (x) b.p.x[size_t(i) * kStride + size_t(k)] = x[size_t(3) * i + size_t(k)];
         if (v) b.p.v[size_t(i) * kStride + size_t(k)] = v[size_t(3) * i + size_t(k)];
       }
-    b.world->bound_due = true;
+    b.world->bound_age = kNone;
   });
 }
 
@@ -131,7 +140,7 @@ dfm_status dfm_body_hold(dfm_body body, uint32_t n, const uint32_t *points, uint
     for (uint32_t i = 0; i < n; ++i) b.p.held[points[i]] = axes;
     update_inverse_mass(b.p);
     stop_held(b);
-    b.world->bound_due = true;
+    b.world->bound_age = kNone;
   });
 }
 
@@ -139,7 +148,7 @@ dfm_status dfm_body_move_held(dfm_body body, uint32_t n, const uint32_t *points,
   return guard([&] {
     Body &b = body_of(body);
     idle(*b.world);
-    check_points(b, n, points);
+    check_points(b, n, points), check_motion(b, nkey, keys, sine);
     if (nkey == 0 && !sine) fail(DFM_E_ARG, "body '%s': a motion needs keys or a sine", b.name.c_str());
     HeldMotion m;
     m.points.assign(points, points + n);
@@ -160,7 +169,7 @@ dfm_status dfm_body_add_load(dfm_body body, uint32_t n, const uint32_t *points, 
   return guard([&] {
     Body &b = body_of(body);
     idle(*b.world);
-    check_points(b, n, points);
+    check_points(b, n, points), check_motion(b, nkey, keys, sine);
     if (n) need(force, "force");
     Load l{};
     l.number = b.next_load;
@@ -198,10 +207,9 @@ dfm_status dfm_body_apply_impulse(dfm_body body, const double point[3], const do
     uint32_t triangle = 0;
     for (uint32_t t = 0; t < b.surface.ntri; ++t) {
       const uint32_t *const c = &b.surface.tri[size_t(3) * t];
-      double w[3];
-      const Vec3 q = closest_on_triangle(load3(point), surfel_vector(b, b.p.x, c[0]), surfel_vector(b, b.p.x, c[1]), surfel_vector(b, b.p.x, c[2]), w);
-      const double d = norm2(q - load3(point));
-      if (d < best) best = d, triangle = t, std::copy(w, w + 3, weight);
+      const TrianglePoint q =
+          closest_on_triangle(load3(point), surfel_vector(b, b.p.x, c[0]), surfel_vector(b, b.p.x, c[1]), surfel_vector(b, b.p.x, c[2]));
+      if (q.distance2 < best) best = q.distance2, triangle = t, std::copy(q.weight, q.weight + 3, weight);
     }
     auto push = [&](uint32_t phyxel, double share) {
       for (int k = 0; k < 3; ++k)

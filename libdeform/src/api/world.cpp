@@ -57,7 +57,12 @@ dfm_status dfm_world_create(dfm_context *context, const dfm_world_def *def, dfm_
     w->prepare();
     w->changed = true;
     w->handle = handle_create(Kind::world, w.get());
-    context->add_live(w->handle, destroy_world);
+    try {
+      context->add_live(w->handle, destroy_world);
+    } catch (...) {
+      handle_destroy(w->handle);
+      throw;
+    }
     *out = w.release()->handle;
   });
 }
@@ -115,7 +120,7 @@ dfm_status dfm_world_stable_step(dfm_world world, double *dt, dfm_body *body, ui
     need(dt, "dt");
     w.prepare();
     // The value the next step uses: asked anew only when it would ask, so that reading it changes no result.
-    if (w.bound_due) w.update_bound(), w.bound_due = false;
+    if (w.bound_age == kNone) w.update_bound();
     *dt = w.stable;
     if (body) *body = w.worst_body ? w.worst_body->handle : 0;
     if (point) *point = w.worst_point;
@@ -207,7 +212,7 @@ dfm_status dfm_world_explain(dfm_world world, char *text, size_t *bytes) {
   return guard([&] {
     World &w = idle(world_of(world));
     w.prepare();
-    if (w.bound_due) w.update_bound();
+    if (w.bound_age == kNone) w.update_bound();
     const std::string json = explain(w);
     give_bytes(json.c_str(), json.size() + 1, text, bytes);
   });

@@ -67,7 +67,9 @@ void edge_edge(const Pair &pair, Run run, Array<ContactPoint> &out) {
     if (!(nr * nr <= widest2 * nn) || !(nn > kParallel * kParallel * uu * ww)) continue;
     const double uw = dot(u, w), ur = dot(u, r), wr = dot(w, r);
     const double s = uw * wr - ww * ur, t = uu * wr - uw * ur;   // times nn
-    if (!(s > 0 && s < nn && t > 0 && t < nn)) continue;
+    // Closer to an end than a thousandth of the edge the end itself makes the contact (vertex-face), and a second one in the same place with
+    // nearly the same normal would only make the solve ill-conditioned.
+    if (!(s > kEnd * nn && s < (1 - kEnd) * nn && t > kEnd * nn && t < (1 - kEnd) * nn)) continue;
     double speed2 = 0;
     for (const uint32_t e : {eb[0], eb[1]}) speed2 = std::max({speed2, norm2(vp0 - pair.vb(e)), norm2(vp1 - pair.vb(e))});
     const double reach = contact_reach(pair.h, pair.offset, std::sqrt(speed2));

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <limits>
 
+#include "surfel/closest.h"
+
 namespace dfm {
 namespace {
 
@@ -26,10 +28,10 @@ double ray_sphere(Vec3 o, Vec3 d, Vec3 center, double r) {
   return t >= 0 ? t : c < 0 ? -b + root : kFar;
 }
 
-// In the obstacle's own frame.
+// In the obstacle's own frame. From inside, the surface met first is the one that the ray leaves by.
 double ray_box(Vec3 o, Vec3 d, Vec3 half, Vec3 *normal) {
   double near = -kFar, far = kFar;
-  int axis = 0;
+  int axis = 0, exit = 0;
   for (int k = 0; k < 3; ++k) {
     if (d[k] == 0) {
       if (std::fabs(o[k]) > half[k]) return kFar;
@@ -38,22 +40,34 @@ double ray_box(Vec3 o, Vec3 d, Vec3 half, Vec3 *normal) {
     double t0 = (-half[k] - o[k]) / d[k], t1 = (half[k] - o[k]) / d[k];
     if (t0 > t1) std::swap(t0, t1);
     if (t0 > near) near = t0, axis = k;
-    far = std::min(far, t1);
+    if (t1 < far) far = t1, exit = k;
   }
-  if (near > far || near < 0) return kFar;
+  if (near > far || far < 0) return kFar;
   *normal = {};
-  (*normal)[axis] = d[axis] > 0 ? -1 : 1;
-  return near;
+  if (near >= 0) (*normal)[axis] = d[axis] > 0 ? -1 : 1;
+  else (*normal)[exit] = d[exit] > 0 ? 1 : -1;
+  return near >= 0 ? near : far;
 }
 
 double ray_capsule(Vec3 o, Vec3 d, double r, double half, Vec3 *normal) {
-  double best = kFar;
+  // A capsule is convex: from outside the first of all crossings of its parts counts, from inside the last.
+  const bool inside = norm2(o - Vec3{0, 0, std::clamp(o.z, -half, half)}) < r * r;
+  double first = kFar, last = -kFar;
+  auto crossing = [&](double t) {
+    if (t >= 0) first = std::min(first, t), last = std::max(last, t);
+  };
   const double a = d.x * d.x + d.y * d.y, b = o.x * d.x + o.y * d.y, c = o.x * o.x + o.y * o.y - r * r, disc = b * b - a * c;
   if (a > 0 && disc >= 0) {
-    const double t = (-b - std::sqrt(disc)) / a, z = o.z + t * d.z;
-    if (t >= 0 && std::fabs(z) <= half) best = t;
+    for (double root : {-std::sqrt(disc), std::sqrt(disc)})
+      if (const double t = (-b + root) / a; std::fabs(o.z + t * d.z) <= half) crossing(t);
   }
-  for (double s : {-half, half}) best = std::min(best, ray_sphere(o, d, {0, 0, s}, r));
+  for (double s : {-half, half}) {
+    const Vec3 m = o - Vec3{0, 0, s};
+    const double along = dot(m, d), square = along * along - (norm2(m) - r * r);
+    if (square < 0) continue;
+    crossing(-along - std::sqrt(square)), crossing(-along + std::sqrt(square));
+  }
+  const double best = !inside ? first : last >= 0 ? last : kFar;
   if (best < kFar) {
     const Vec3 p = o + best * d;
     *normal = normalized(p - Vec3{0, 0, std::clamp(p.z, -half, half)});
@@ -138,41 +152,16 @@ dfm_ray_hit cast_ray(World &w, Vec3 o, Vec3 d, double max_distance) {
   return hit;
 }
 
-// Ericson, Real-Time Collision Detection, section 5.1.5: Voronoi regions of the triangle, vertices first.
-Vec3 closest_on_triangle(Vec3 p, Vec3 a, Vec3 b, Vec3 c, double w[3]) {
-  const Vec3 ab = b - a, ac = c - a, ap = p - a, bp = p - b, cp = p - c;
-  const double d1 = dot(ab, ap), d2 = dot(ac, ap), d3 = dot(ab, bp), d4 = dot(ac, bp), d5 = dot(ab, cp), d6 = dot(ac, cp);
-  auto at = [&](double u, double v, double s) {
-    w[0] = u, w[1] = v, w[2] = s;
-    return u * a + v * b + s * c;
-  };
-  if (d1 <= 0 && d2 <= 0) return at(1, 0, 0);
-  if (d3 >= 0 && d4 <= d3) return at(0, 1, 0);
-  const double vc = d1 * d4 - d3 * d2;
-  if (vc <= 0 && d1 >= 0 && d3 <= 0) return at(1 - d1 / (d1 - d3), d1 / (d1 - d3), 0);
-  if (d6 >= 0 && d5 <= d6) return at(0, 0, 1);
-  const double vb = d5 * d2 - d1 * d6;
-  if (vb <= 0 && d2 >= 0 && d6 <= 0) return at(1 - d2 / (d2 - d6), 0, d2 / (d2 - d6));
-  const double va = d3 * d6 - d5 * d4;
-  if (va <= 0 && d4 - d3 >= 0 && d5 - d6 >= 0) {
-    const double s = (d4 - d3) / ((d4 - d3) + (d5 - d6));
-    return at(0, 1 - s, s);
-  }
-  const double sum = va + vb + vc;
-  return at(va / sum, vb / sum, vc / sum);
-}
-
 dfm_ray_hit closest_surface(World &w, Vec3 p, double max_distance) {
   dfm_ray_hit hit = nothing();
   for (auto &b : w.bodies)
     for (uint32_t t = 0; t < b->surface.ntri; ++t) {
       const uint32_t *const c = &b->surface.tri[size_t(3) * t];
-      double weight[3];
-      const Vec3 q = closest_on_triangle(p, surfel_vector(*b, b->p.x, c[0]), surfel_vector(*b, b->p.x, c[1]), surfel_vector(*b, b->p.x, c[2]), weight);
-      const double d = norm(p - q);
+      const TrianglePoint q = closest_on_triangle(p, surfel_vector(*b, b->p.x, c[0]), surfel_vector(*b, b->p.x, c[1]), surfel_vector(*b, b->p.x, c[2]));
+      const double d = std::sqrt(q.distance2);
       if (d <= max_distance && d < hit.distance) {
         hit.distance = d, hit.body = b->handle, hit.triangle = t;
-        store3(hit.point, q), store3(hit.normal, normalized(triangle_normal(*b, t)));
+        store3(hit.point, q.point), store3(hit.normal, normalized(triangle_normal(*b, t)));
       }
     }
   return hit;
