@@ -15,7 +15,7 @@ void finish(const Pair &pair, ContactPoint &c, Vec3 q, Vec3 o, Vec3 normal, doub
   place(c, q, o, normal, distance);
   // A belt slips along its surface; it never pushes what lies beside it.
   const ObstacleView &view = pair.shape->view();
-  store3(c.velocity, view.velocity_at(o) - dot(view.belt, normal) * normal);
+  store3(c.velocity, view.velocity_at(o, pair.h) - dot(view.belt, normal) * normal);
   c.key = contact_key(c, pair.a.id, view.id, patch, 0);
   out.push_back(c);
 }
