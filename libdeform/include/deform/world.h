@@ -48,9 +48,9 @@ enum {
 /** Advances the world by dt. A step longer than the stable one is cut into equal sub-steps with the contact solve in each.
  * @param dt       s, > 0
  * @param trouble  out, DFM_TROUBLE_* bits; may be NULL
- * @return DFM_OK; DFM_DISCARD too many sub-steps, nothing changed; DFM_E_DIVERGED a force, velocity or impulse is not finite: the world
- *         stays at its last good sub-step;
- *         DFM_E_ARG; DFM_E_HANDLE; DFM_E_BUSY called from inside a step
+ * @return DFM_OK; DFM_DISCARD too many sub-steps, nothing changed; DFM_E_DIVERGED a sub-step could not be taken (a value that is not
+ *         finite, a plugin that failed): the world stays at its last good sub-step, and may step again once the cause is gone;
+ *         DFM_E_NOMEM likewise; DFM_E_FATAL a plugin gave no step bound; DFM_E_ARG; DFM_E_HANDLE; DFM_E_BUSY called from inside a step
  * Threads: One thread at a time per world. Since 0.1. */
 DFM_API dfm_status dfm_world_step(dfm_world world, double dt, uint32_t *trouble);
 /** Largest step the current state allows without sub-steps (0.9 of the proven bound), s; +INFINITY if nothing bounds it.
@@ -64,7 +64,8 @@ DFM_API uint64_t dfm_world_hash(dfm_world world);
 /** Writes what a later result depends on. buffer NULL: *bytes gets the size needed. Too small: DFM_E_ARG and the size.
  * Threads: Not during step. Since 0.1. */
 DFM_API dfm_status dfm_world_snapshot(dfm_world world, void *buffer, size_t *bytes);
-/** Restores into a world with the same bodies (a scene loaded anew, in another process too); the next steps give the same bits.
+/** Restores into a world with the same bodies and obstacles (a scene loaded anew, in another process too): state, contacts, loads, holds,
+ * motions, gravity, filters, friction rules, runtime parameters. The next steps give the same bits; events not yet read are dropped.
  * @return DFM_OK; DFM_E_FORMAT not a snapshot of such a world (nothing changed); DFM_E_HANDLE. Threads: Not during step. Since 0.1. */
 DFM_API dfm_status dfm_world_restore(dfm_world world, const void *buffer, size_t bytes);
 

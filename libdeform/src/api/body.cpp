@@ -12,6 +12,14 @@ using namespace dfm;
 
 namespace {
 
+// A count of keys without keys, and a sine that is not finite.
+void check_motion(const Body &b, uint32_t nkey, const void *keys, const dfm_sine *sine) {
+  if (nkey && !keys) fail(DFM_E_ARG, "body '%s': %u keys are announced, but keys is NULL", b.name.c_str(), nkey);
+  if (!sine) return;
+  for (double v : {sine->amplitude[0], sine->amplitude[1], sine->amplitude[2], sine->frequency, sine->phase})
+    if (!std::isfinite(v)) fail(DFM_E_ARG, "body '%s': the sine is not finite; give amplitude, frequency (Hz) and phase (rad)", b.name.c_str());
+}
+
 void check_points(const Body &b, uint32_t n, const uint32_t *points) {
   if (n) need(points, "points");
   for (uint32_t i = 0; i < n; ++i)
@@ -140,7 +148,7 @@ dfm_status dfm_body_move_held(dfm_body body, uint32_t n, const uint32_t *points,
   return guard([&] {
     Body &b = body_of(body);
     idle(*b.world);
-    check_points(b, n, points);
+    check_points(b, n, points), check_motion(b, nkey, keys, sine);
     if (nkey == 0 && !sine) fail(DFM_E_ARG, "body '%s': a motion needs keys or a sine", b.name.c_str());
     HeldMotion m;
     m.points.assign(points, points + n);
@@ -161,7 +169,7 @@ dfm_status dfm_body_add_load(dfm_body body, uint32_t n, const uint32_t *points, 
   return guard([&] {
     Body &b = body_of(body);
     idle(*b.world);
-    check_points(b, n, points);
+    check_points(b, n, points), check_motion(b, nkey, keys, sine);
     if (n) need(force, "force");
     Load l{};
     l.number = b.next_load;

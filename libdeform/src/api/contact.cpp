@@ -58,13 +58,17 @@ dfm_contact report(const World &w, uint32_t i) {
 
 }  // namespace
 
-dfm_status dfm_world_add_friction(dfm_world world, const dfm_friction_def *def) {
+dfm_status dfm_world_add_friction(dfm_world world, const dfm_friction_def *given) {
   return guard([&] {
     World &w = idle(world_of(world));
-    need(def, "def"), need(def->law, "law");
-    FrictionRule rule{{side(w, def->between[0]), side(w, def->between[1])}, 0};
-    rule.law = w.add_law(def->law, {def->params.values, def->params.values ? def->params.n : 0});
-    w.friction.push_back(rule);
+    need(given, "def");
+    const dfm_friction_def def = take_def(given, dfm_friction_def{});
+    need(def.law, "law");
+    if (def.params.n && !def.params.values) fail(DFM_E_ARG, "%u parameters are announced for law '%s', but params.values is NULL", def.params.n, def.law);
+    FrictionRule rule{{side(w, def.between[0]), side(w, def.between[1])}, 0};
+    w.friction.reserve(w.friction.size() + 1);
+    rule.law = w.add_law(def.law, {def.params.values, def.params.n});
+    w.friction.push_back(std::move(rule));
     w.changed = true;
   });
 }

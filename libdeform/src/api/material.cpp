@@ -35,6 +35,7 @@ dfm_status dfm_material_create(dfm_world world, const dfm_material_def *def, dfm
         if (other->name == m->name) fail(DFM_E_ARG, "material '%s': the name is taken in this world; names are unique", name);
     for (uint32_t i = 0; m->def.extra.values && i < m->def.extra.n; ++i) {
       const dfm_param_value &v = m->def.extra.values[i];
+      if (!v.key || !v.value) fail(DFM_E_ARG, "material '%s': extra entry %u has no %s", name, i, v.key ? "value" : "key");
       m->extra_keys.push_back(v.key), m->extra_values.emplace_back(v.value, v.value + v.width);
     }
     m->def.extra = {}, m->def.name = nullptr;

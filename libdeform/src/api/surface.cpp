@@ -1,5 +1,7 @@
 #include "deform/surface.h"
 
+#include <cmath>
+
 #include "api/objects.h"
 #include "world/queries.h"
 
@@ -38,9 +40,7 @@ dfm_status dfm_surface_normals(dfm_body body, uint32_t capacity, double *xyz, ui
   return guard([&] {
     const Body &b = body_of(body);
     if (!room(b.surface.nsurfel, capacity, xyz, n)) return;
-    std::vector<double> normals(size_t(3) * b.surface.nsurfel);
-    surface_normals(b, normals.data());
-    std::copy(normals.begin(), normals.end(), xyz);
+    surface_normals(b, xyz);
   });
 }
 
@@ -64,7 +64,8 @@ dfm_status dfm_world_ray(dfm_world world, const double origin[3], const double d
     World &w = world_of(world);
     need(origin, "origin"), need(direction, "direction");
     const Vec3 d = normalized(load3(direction));
-    if (!(norm2(d) > 0.5) || !(max_distance > 0)) fail(DFM_E_ARG, "a ray needs a direction that is not zero and a positive max_distance");
+    if (!(norm2(d) > 0.5) || !(norm2(load3(origin)) < INFINITY) || !(max_distance > 0))
+      fail(DFM_E_ARG, "a ray needs a finite origin, a direction that is not zero and a positive max_distance");
     give(hit, cast_ray(w, load3(origin), d, max_distance));
   });
 }
@@ -73,6 +74,9 @@ dfm_status dfm_world_closest(dfm_world world, const double point[3], double max_
   return guard([&] {
     World &w = world_of(world);
     need(point, "point");
+    for (int k = 0; k < 3; ++k)
+      if (!std::isfinite(point[k])) fail(DFM_E_ARG, "the point is not finite");
+    if (!(max_distance > 0)) fail(DFM_E_ARG, "max_distance is %g m; it must be positive", max_distance);
     give(hit, closest_surface(w, load3(point), max_distance));
   });
 }

@@ -57,7 +57,12 @@ dfm_status dfm_world_create(dfm_context *context, const dfm_world_def *def, dfm_
     w->prepare();
     w->changed = true;
     w->handle = handle_create(Kind::world, w.get());
-    context->add_live(w->handle, destroy_world);
+    try {
+      context->add_live(w->handle, destroy_world);
+    } catch (...) {
+      handle_destroy(w->handle);
+      throw;
+    }
     *out = w.release()->handle;
   });
 }

@@ -9,8 +9,24 @@
 
 namespace dfm {
 namespace {
+
 thread_local bool inside_worker = false;
+
+struct Inside {
+  const bool outer = inside_worker;
+  Inside() { inside_worker = true; }
+  ~Inside() { inside_worker = outer; }
+};
+
+// A host's workers do not know that they are ours: each block marks its thread while it runs.
+struct HostTask { void (*fn)(void *, uint32_t, uint32_t); void *task; };
+void run_host_block(void *task, uint32_t begin, uint32_t end) {
+  const Inside inside;
+  const HostTask &t = *static_cast<HostTask *>(task);
+  t.fn(t.task, begin, end);
 }
+
+}  // namespace
 
 // Blocks of `grain` are handed out by an atomic counter; workers sleep between jobs.
 struct Tasks::Pool {
@@ -27,15 +43,13 @@ struct Tasks::Pool {
   void *task = nullptr;
 
   void drain() {
-    const bool outer = inside_worker;
-    inside_worker = true;
+    const Inside inside;
     for (;;) {
       const uint32_t block = next.fetch_add(1, std::memory_order_relaxed);
       const uint64_t begin = uint64_t(block) * grain;
       if (begin >= n) break;
       fn(task, static_cast<uint32_t>(begin), static_cast<uint32_t>(std::min<uint64_t>(n, begin + grain)));
     }
-    inside_worker = outer;
   }
 
   void work() {
@@ -78,7 +92,8 @@ void Tasks::run(uint32_t n, uint32_t grain, void (*fn)(void *, uint32_t, uint32_
     return;
   }
   if (host_for_) {
-    host_for_(host_user_, n, grain, fn, task);
+    HostTask block{fn, task};
+    host_for_(host_user_, n, grain, run_host_block, &block);
     return;
   }
   Pool &pool = *pool_;

@@ -4,20 +4,20 @@
 #include <cmath>
 
 #include "core/error.h"
+#include "plugin/call.h"
 
 namespace dfm {
 
 LawInstance::LawInstance(const dfm_type &t, const dfm_host &h, std::vector<double> values)
     : type(&t), ops(static_cast<const dfm_friction *>(t.ops)), params(std::move(values)), host(&h) {
   for (uint32_t s = 0; s < ops->nslot; ++s) nstate += ops->slots[s].width;
-  char why[256] = "";
-  if (ops->check && ops->check(params.data(), why, sizeof why) != DFM_OK)
-    fail(DFM_E_ARG, "law '%s' refuses its parameters: %s", t.id, why[0] ? why : "no reason given");
-  if (ops->prepare && ops->prepare(host, params.data(), &data) != DFM_OK) fail(DFM_E_FATAL, "law '%s' could not prepare its tables", t.id);
+  // check() was asked by pack_params
+  if (ops->prepare && call_plugin(h, t, "prepare", [&] { return ops->prepare(host, params.data(), &data); }) != DFM_OK)
+    fail(DFM_E_FATAL, "law '%s' could not prepare its tables; the log says why", t.id);
 }
 
 LawInstance::~LawInstance() {
-  if (ops->prepare && ops->release) ops->release(host, data);
+  if (ops->prepare && ops->release) call_plugin(*host, *type, "release", [&] { return ops->release(host, data), DFM_OK; });
 }
 
 LawBatches::LawBatches(const Memory &m)
@@ -76,11 +76,14 @@ const LawInstance *LawBatches::evaluate(const Batch &batch, double h, ContactSta
   out.ft = ft, out.state = next, out.dft_dvt = dv, out.dft_dfn = dn, out.limit = limit, out.mode = mode_.data();
   const bool given = law.ops->flags & DFM_FRIC_JACOBIAN;
   if (!given) out.dft_dvt = out.dft_dfn = nullptr;
-  if (law.ops->eval(&in, &out) != DFM_OK || (!given && !difference(law, in, ft, dv, dn))) return &law;
+  const auto eval = [&] { return law.ops->eval(&in, &out); };
+  if (call_plugin(*law.host, *law.type, "eval", eval) != DFM_OK || (!given && !difference(law, in, ft, dv, dn))) return &law;
 
   double poison = 0;
+  bool limits = true;
   for (uint32_t k = 0; k < n; ++k) {
     const uint32_t i = index[k];
+    limits &= limit[k] >= 0;  // false for NaN; +inf is an answer: no limit
     state.ft[i] = ft[k], state.ft[state.stride + i] = ft[column + k];
     for (uint32_t j = 0; j < 4; ++j) state.dft_dvt[size_t(j) * state.stride + i] = dv[j * column + k];
     state.dft_dfn[i] = dn[k], state.dft_dfn[state.stride + i] = dn[column + k];
@@ -89,7 +92,7 @@ const LawInstance *LawBatches::evaluate(const Batch &batch, double h, ContactSta
     poison += 0.0 * (ft[k] + ft[column + k]) + 0.0 * (dv[k] + dv[column + k] + dv[2 * column + k] + dv[3 * column + k]) +
               0.0 * (dn[k] + dn[column + k]);
   }
-  return poison == 0 ? nullptr : &law;  // NaN or infinite: not equal to zero
+  return poison == 0 && limits ? nullptr : &law;  // poison of NaN or infinite: not equal to zero
 }
 
 // Derivatives of a law that gives none, by forward differences: without them a steep law (h w_t c > 1) would make the passes diverge. The step
@@ -104,7 +107,7 @@ bool LawBatches::difference(const LawInstance &law, dfm_friction_in in, const do
     moved_.assign(at, at + columns * column);
     for (size_t i = 0; i < in.n; ++i) moved_[c * column + i] += std::max(least, 1e-6 * std::fabs(at[c * column + i]));
     input = moved_.data();
-    const bool answered = law.ops->eval(&in, &out) == DFM_OK;
+    const bool answered = call_plugin(*law.host, *law.type, "eval", [&] { return law.ops->eval(&in, &out); }) == DFM_OK;
     input = at;
     for (size_t r = 0; r < 2; ++r)
       for (size_t i = 0; i < in.n; ++i)

@@ -17,22 +17,22 @@ size_t model_state_size(const dfm_model &ops, uint32_t npoint, uint32_t ncell, u
   return total;
 }
 
-void ModelInstance::create(const dfm_type &t, const dfm_host &host, const dfm_mesh &mesh, const Memory &memory, std::vector<double> values) {
-  type = &t;
+void ModelInstance::create(const dfm_type &t, const dfm_host &h, const dfm_mesh &mesh, const Memory &memory, std::vector<double> values) {
+  type = &t, host = &h;
   ops = static_cast<const dfm_model *>(t.ops);
   params = std::move(values);
   if (!(ops->cells & DFM_CELL_TET)) fail(DFM_E_UNSUPPORTED, "model '%s' takes no tetrahedra; choose another model for this mesh", t.id);
-  const dfm_status s = ops->create(&host, &mesh, &self);
+  const dfm_status s = call("create", [&] { return ops->create(host, &mesh, &self); });
   if (s != DFM_OK || !self) {
     self = nullptr;
     fail(s < 0 ? s : DFM_E_FATAL, "model '%s' refused the body (status %d); the log says why", t.id, int(s));
   }
-  stepper = ops->extension ? static_cast<const dfm_stepper *>(ops->extension(self, "dfm.stepper/1")) : nullptr;
+  if (ops->extension) call("extension", [&] { return stepper = static_cast<const dfm_stepper *>(ops->extension(self, "dfm.stepper/1")), DFM_OK; });
   if (!stepper && !ops->add_forces) fail(DFM_E_UNSUPPORTED, "model '%s' neither adds forces nor steps itself; report it to its author", t.id);
   const size_t nstate = model_state_size(*ops, mesh.npoint, mesh.ncell, mesh.nedge);
   state = Array<double>(nstate, 0.0, HookAllocator<double>(memory));
   state_out = state;
-  if (nstate && ops->state_init && ops->state_init(self, state.data()) != DFM_OK)
+  if (nstate && ops->state_init && call("state_init", [&] { return ops->state_init(self, state.data()); }) != DFM_OK)
     fail(DFM_E_FATAL, "model '%s' could not initialise its state", t.id);
 }
 

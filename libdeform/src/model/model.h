@@ -5,12 +5,14 @@
 
 #include "core/memory.h"
 #include "deform/plugin.h"
+#include "plugin/call.h"
 
 namespace dfm {
 
 struct ModelInstance {
   const dfm_type *type = nullptr;
   const dfm_model *ops = nullptr;
+  const dfm_host *host = nullptr;
   const dfm_stepper *stepper = nullptr;      // null: a force model, the host integrates
   void *self = nullptr;
   std::vector<double> params;
@@ -19,10 +21,15 @@ struct ModelInstance {
   ModelInstance() = default;
   ModelInstance(const ModelInstance &) = delete;
   ModelInstance &operator=(const ModelInstance &) = delete;
-  ~ModelInstance() { if (self && ops->destroy) ops->destroy(self); }
+  ~ModelInstance() {
+    if (self && ops->destroy) call("destroy", [&] { return ops->destroy(self), DFM_OK; });
+  }
 
   // Creates the instance and its state; throws Error naming the plugin where it refuses.
   void create(const dfm_type &t, const dfm_host &host, const dfm_mesh &mesh, const Memory &memory, std::vector<double> values);
+  // Runs f, which calls into the plugin: an exception becomes a status, a failure is logged as `what`.
+  template <class F>
+  dfm_status call(const char *what, F &&f) const noexcept { return call_plugin(*host, *type, what, f); }
   void commit_state() { if (!state.empty()) state.swap(state_out); }
 };
 

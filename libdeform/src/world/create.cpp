@@ -131,10 +131,7 @@ Body &create_body(World &w, const dfm_body_def &def) {
   mesh.field_keys = no_fields, mesh.fields = nullptr;
   mesh.nedge = static_cast<uint32_t>(b.edges.size() / 2), mesh.nsurfel = b.surface.nsurfel, mesh.edges = b.edges.data();
   mesh.row = row.data(), mesh.col = col.data(), mesh.weight = weight.data(), mesh.fixed = p.held.data();
-  {
-    PluginCall call(w.context->scratch);
-    b.model.create(type, w.context->host, mesh, m, std::move(values));
-  }
+  b.model.create(type, w.context->host, mesh, m, std::move(values));
 
   w.bodies.reserve(w.bodies.size() + 1);
   b.id = w.next_id;
@@ -153,7 +150,8 @@ Obstacle &create_obstacle(World &w, const dfm_obstacle_def &def) {
   check_name(w, o.name, "obstacle");
   const char *const name = o.name.c_str();
   if (def.shape > DFM_SHAPE_CAPSULE) fail(DFM_E_ARG, "obstacle '%s': shape %u is unknown; use DFM_SHAPE_PLANE, SPHERE, BOX or CAPSULE", name, def.shape);
-  if (!finite(def.pose.position, 3) || !finite(def.pose.rotation, 4) || !finite(def.velocity_surface, 3) || !finite(def.sine.amplitude, 3))
+  if (!finite(def.pose.position, 3) || !finite(def.pose.rotation, 4) || !finite(def.velocity_surface, 3) || !finite(def.sine.amplitude, 3) ||
+      !finite(&def.sine.frequency, 1) || !finite(&def.sine.phase, 1))
     fail(DFM_E_ARG, "obstacle '%s': pose, sine and velocity_surface must be finite", name);
   if ((def.shape == DFM_SHAPE_SPHERE || def.shape == DFM_SHAPE_CAPSULE) && !(def.radius > 0 && std::isfinite(def.radius)))
     fail(DFM_E_ARG, "obstacle '%s': radius %g m; it must be positive", name, def.radius);
@@ -168,6 +166,7 @@ Obstacle &create_obstacle(World &w, const dfm_obstacle_def &def) {
     o.material = m.name;
   }
   o.def = def;
+  if (def.nkey && !def.keys) fail(DFM_E_ARG, "obstacle '%s': %u keys are announced, but keys is NULL", name, def.nkey);
   if (def.nkey) o.keys.assign(def.keys, def.keys + def.nkey);
   check_keys(o.keys, name);
   o.def.keys = nullptr, o.def.nkey = 0;
@@ -182,13 +181,15 @@ Obstacle &create_obstacle(World &w, const dfm_obstacle_def &def) {
   return o;
 }
 
+namespace {
+
 // What remembers the removed thing: its contacts end with an event, its friction work leaves the books.
 void forget(World &w, uint64_t id, uint64_t handle) {
   ContactStore &s = w.store;
+  w.reserve_events(s.n);
   for (uint32_t i = 0; i < s.n; ++i)
     if ((s.id_a[i] == id || s.id_b[i] == id)) {
-      if (s.touching[i])
-        w.events.push_back({sizeof(dfm_contact_event), DFM_EVENT_END, w.handle_of(s.id_a[i]), w.handle_of(s.id_b[i]), s.key[i], w.time});
+      if (s.touching[i]) w.add_event(DFM_EVENT_END, s.id_a[i], s.id_b[i], s.key[i], w.time);
       s.touching[i] = 0;
     }
   std::erase_if(w.work, [&](const PairWork &p) { return p.a == id || p.b == id; });
@@ -196,6 +197,8 @@ void forget(World &w, uint64_t id, uint64_t handle) {
   w.report.n = 0;
   w.changed = true;
 }
+
+}  // namespace
 
 void destroy_body(Body &b) {
   World &w = *b.world;

@@ -35,23 +35,26 @@ dfm_body_measure measure(Body &b) {
   if ((b.model.ops->caps & DFM_CAP_ENERGY) && b.model.ops->energy) {
     double joule = 0;
     const dfm_kin k = b.kin(b.world->time, 0, nullptr);
-    PluginCall call(b.world->context->scratch);
-    if (b.model.ops->energy(b.model.self, &k, &joule) == DFM_OK) m.elastic = joule;
+    if (b.model.call("energy", [&] { return b.model.ops->energy(b.model.self, &k, &joule); }) == DFM_OK) m.elastic = joule;
   }
   return m;
 }
 
 void energy_density(Body &b, double *out) {
-  const dfm_cell_energy *const e =
-      b.model.ops->extension ? static_cast<const dfm_cell_energy *>(b.model.ops->extension(b.model.self, DFM_EXT_CELL_ENERGY)) : nullptr;
+  const dfm_cell_energy *e = nullptr;
+  if (b.model.ops->extension)
+    b.model.call("extension", [&] {
+      return e = static_cast<const dfm_cell_energy *>(b.model.ops->extension(b.model.self, DFM_EXT_CELL_ENERGY)), DFM_OK;
+    });
   if (!e) fail(DFM_E_UNSUPPORTED, "model '%s' of body '%s' offers no energy per cell", b.model.type->id, b.name.c_str());
   const dfm_kin k = b.kin(b.world->time, 0, nullptr);
-  PluginCall call(b.world->context->scratch);
-  if (e->cell_energy(b.model.self, &k, out) != DFM_OK) fail(DFM_E_FATAL, "model '%s' could not give its energy per cell", b.model.type->id);
+  if (b.model.call("cell_energy", [&] { return e->cell_energy(b.model.self, &k, out); }) != DFM_OK)
+    fail(DFM_E_FATAL, "model '%s' could not give its energy per cell", b.model.type->id);
 }
 
 void set_model_params(Body &b, const dfm_params &params) {
   const dfm_type &type = *b.model.type;
+  if (params.n && !params.values) fail(DFM_E_ARG, "body '%s': %u parameters are announced, but params.values is NULL", b.name.c_str(), params.n);
   std::vector<dfm_param_value> given(params.values, params.values + params.n);
   // What is not given keeps its present value.
   std::vector<dfm_param_value> present;
@@ -71,8 +74,7 @@ void set_model_params(Body &b, const dfm_params &params) {
     if (!(type.params[i].flags & DFM_PARAM_RUNTIME) && !std::equal(&values[at], &values[at] + type.params[i].width, &b.model.params[at]))
       fail(DFM_E_ARG, "body '%s': parameter '%s' of model '%s' cannot change while it runs", b.name.c_str(), type.params[i].key, type.id);
   if (!b.model.ops->set_params) fail(DFM_E_UNSUPPORTED, "model '%s' takes no parameters while it runs", type.id);
-  PluginCall call(b.world->context->scratch);
-  if (b.model.ops->set_params(b.model.self, values.data()) != DFM_OK)
+  if (b.model.call("set_params", [&] { return b.model.ops->set_params(b.model.self, values.data()); }) != DFM_OK)
     fail(DFM_E_ARG, "body '%s': model '%s' refuses these parameters; the log says why", b.name.c_str(), type.id);
   b.model.params = std::move(values);
   b.world->bound_age = kNone;

@@ -28,10 +28,10 @@ double ray_sphere(Vec3 o, Vec3 d, Vec3 center, double r) {
   return t >= 0 ? t : c < 0 ? -b + root : kFar;
 }
 
-// In the obstacle's own frame.
+// In the obstacle's own frame. From inside, the surface met first is the one that the ray leaves by.
 double ray_box(Vec3 o, Vec3 d, Vec3 half, Vec3 *normal) {
   double near = -kFar, far = kFar;
-  int axis = 0;
+  int axis = 0, exit = 0;
   for (int k = 0; k < 3; ++k) {
     if (d[k] == 0) {
       if (std::fabs(o[k]) > half[k]) return kFar;
@@ -40,22 +40,34 @@ double ray_box(Vec3 o, Vec3 d, Vec3 half, Vec3 *normal) {
     double t0 = (-half[k] - o[k]) / d[k], t1 = (half[k] - o[k]) / d[k];
     if (t0 > t1) std::swap(t0, t1);
     if (t0 > near) near = t0, axis = k;
-    far = std::min(far, t1);
+    if (t1 < far) far = t1, exit = k;
   }
-  if (near > far || near < 0) return kFar;
+  if (near > far || far < 0) return kFar;
   *normal = {};
-  (*normal)[axis] = d[axis] > 0 ? -1 : 1;
-  return near;
+  if (near >= 0) (*normal)[axis] = d[axis] > 0 ? -1 : 1;
+  else (*normal)[exit] = d[exit] > 0 ? 1 : -1;
+  return near >= 0 ? near : far;
 }
 
 double ray_capsule(Vec3 o, Vec3 d, double r, double half, Vec3 *normal) {
-  double best = kFar;
+  // A capsule is convex: from outside the first of all crossings of its parts counts, from inside the last.
+  const bool inside = norm2(o - Vec3{0, 0, std::clamp(o.z, -half, half)}) < r * r;
+  double first = kFar, last = -kFar;
+  auto crossing = [&](double t) {
+    if (t >= 0) first = std::min(first, t), last = std::max(last, t);
+  };
   const double a = d.x * d.x + d.y * d.y, b = o.x * d.x + o.y * d.y, c = o.x * o.x + o.y * o.y - r * r, disc = b * b - a * c;
   if (a > 0 && disc >= 0) {
-    const double t = (-b - std::sqrt(disc)) / a, z = o.z + t * d.z;
-    if (t >= 0 && std::fabs(z) <= half) best = t;
+    for (double root : {-std::sqrt(disc), std::sqrt(disc)})
+      if (const double t = (-b + root) / a; std::fabs(o.z + t * d.z) <= half) crossing(t);
   }
-  for (double s : {-half, half}) best = std::min(best, ray_sphere(o, d, {0, 0, s}, r));
+  for (double s : {-half, half}) {
+    const Vec3 m = o - Vec3{0, 0, s};
+    const double along = dot(m, d), square = along * along - (norm2(m) - r * r);
+    if (square < 0) continue;
+    crossing(-along - std::sqrt(square)), crossing(-along + std::sqrt(square));
+  }
+  const double best = !inside ? first : last >= 0 ? last : kFar;
   if (best < kFar) {
     const Vec3 p = o + best * d;
     *normal = normalized(p - Vec3{0, 0, std::clamp(p.z, -half, half)});

@@ -1,15 +1,17 @@
 // Snapshot, restore and hash: everything that a later result depends on, and nothing else. Candidate lists are left out on purpose:
-// contacts come from exact geometry, so lists that are built anew give the same contacts (broad/).
+// contacts come from exact geometry, so lists that are built anew give the same contacts (broad/). What the host may change between two
+// steps (loads, holds, motions, gravity, filters, friction rules, runtime parameters) is state too.
 #include <cstring>
 
 #include "core/error.h"
 #include "core/hash.h"
+#include "world/measure.h"
 #include "world/world.h"
 
 namespace dfm {
 namespace {
 
-constexpr char kMagic[8] = {'d', 'f', 'm', 's', 'n', 'a', 'p', '1'};
+constexpr char kMagic[8] = {'d', 'f', 'm', 's', 'n', 'a', 'p', '2'};
 
 // What must be the same in the world that a snapshot is restored into.
 uint64_t structure(const World &w) {
@@ -17,10 +19,15 @@ uint64_t structure(const World &w) {
   for (auto &b : w.bodies) {
     h.add(b->id), h.add(b->p.n), h.add(b->surface.nsurfel), h.add(uint64_t(b->model.state.size()));
     h.add(b->model.type->id, std::strlen(b->model.type->id));
-    h.add(b->tets.data(), b->tets.size() * sizeof(uint32_t));
+    h.add(b->name.data(), b->name.size()), h.add(b->material.data(), b->material.size());
+    h.add(b->tets.data(), b->tets.size() * sizeof(uint32_t)), h.add(b->p.rest.data(), b->p.rest.size() * sizeof(double));
+    h.add(b->p.mass.data(), b->p.mass.size() * sizeof(double));
   }
-  for (auto &o : w.obstacles) h.add(o->id), h.add(o->def.shape);
-  for (auto &l : w.laws) h.add(l->type->id, std::strlen(l->type->id)), h.add(l->params.data(), l->params.size() * sizeof(double));
+  for (auto &o : w.obstacles) {
+    const dfm_obstacle_def &d = o->def;
+    h.add(o->id), h.add(d.shape), h.add(d.pose), h.add(d.half_size), h.add(d.radius), h.add(d.half_length), h.add(d.velocity_surface);
+    h.add(d.category), h.add(d.collides_with), h.add(o->name.data(), o->name.size()), h.add(o->material.data(), o->material.size());
+  }
   return h.value;
 }
 
@@ -32,38 +39,192 @@ struct Writer {
   void value(const T &x) { bytes(&x, sizeof x); }
   template <class A>
   void array(const A &a) { value(uint64_t(a.size())), bytes(a.data(), a.size() * sizeof(a[0])); }
+  template <class A, class F>
+  void each(const A &a, F f) {
+    value(uint64_t(a.size()));
+    for (const auto &x : a) f(x);
+  }
 };
 
 struct Reader {
   const unsigned char *p, *end;
   void bytes(void *to, size_t n) {
     if (size_t(end - p) < n) fail(DFM_E_FORMAT, "snapshot is cut short: %zu bytes missing; nothing was restored", n - size_t(end - p));
-    std::memcpy(to, p, n), p += n;
+    if (n) std::memcpy(to, p, n);
+    p += n;
+  }
+  uint64_t count(size_t entry) {
+    uint64_t n;
+    value(n);
+    if (n > uint64_t(end - p) / entry)
+      fail(DFM_E_FORMAT, "snapshot is damaged: an array of %llu entries does not fit; nothing was restored", static_cast<unsigned long long>(n));
+    return n;
   }
   template <class T>
   void value(T &x) { bytes(&x, sizeof x); }
   template <class A>
   void array(A &a) {
-    uint64_t n;
-    value(n);
-    if (n > uint64_t(end - p) / sizeof(a[0])) fail(DFM_E_FORMAT, "snapshot is damaged: an array of %llu entries does not fit; nothing was restored", static_cast<unsigned long long>(n));
-    a.resize(n);
-    bytes(a.data(), n * sizeof(a[0]));
+    a.resize(count(sizeof(a[0])));
+    bytes(a.data(), a.size() * sizeof(a[0]));
+  }
+  template <class A, class F>
+  void each(A &a, F f) {
+    a.resize(count(1));
+    for (auto &x : a) f(x);
   }
 };
 
+// A world's changing part, read in full before anything of it is put in place. Members are named as in World, Body and Obstacle, so that
+// fields() below serves both.
+struct StagedBody {
+  struct { std::vector<double> x, v, load; std::vector<uint8_t> held; } p;
+  struct { std::vector<double> state, params; } model;
+  Vec3 contact_impulse;
+  std::vector<Load> loads;
+  std::vector<HeldMotion> motions;
+  uint32_t next_load = 1, category = 1, collides_with = ~0u;
+};
+struct StagedObstacle { Pose pose, target; bool has_target; std::vector<dfm_pose_key> keys; dfm_obstacle_def def; };
+struct StagedLaw { std::string id; std::vector<double> params; };
+struct Staged {
+  double time, stable, offset, hold_start;
+  uint64_t step_count, next_id;
+  bool holding;
+  uint32_t bound_age;
+  dfm_world_stats stats;
+  Vec3 gravity;
+  dfm_world_def def;
+  std::vector<dfm_vector_key> gravity_keys;
+  std::vector<StagedBody> bodies;
+  std::vector<StagedObstacle> obstacles;
+  std::vector<StagedLaw> laws;
+  std::vector<FrictionRule> friction;
+  std::vector<FilterRule> filters;
+  ContactStore store;
+  std::vector<PairWork> work;
+  explicit Staged(const Memory &m) : store(m) {}
+};
+
+template <class T>
+auto &object(T &x) { return x; }
+template <class T>
+T &object(const std::unique_ptr<T> &x) { return *x; }
+
 template <class Stream, class W>
 void fields(Stream &s, W &w) {
-  s.value(w.time), s.value(w.step_count), s.value(w.stable), s.value(w.hold_start), s.value(w.holding), s.value(w.stats), s.value(w.gravity);
-  for (auto &b : w.bodies) {
-    s.array(b->p.x), s.array(b->p.v), s.array(b->p.held), s.array(b->p.load), s.array(b->model.state), s.value(b->contact_impulse);
-  }
-  for (auto &o : w.obstacles) s.value(o->pose), s.value(o->target), s.value(o->has_target);
+  s.value(w.time), s.value(w.step_count), s.value(w.stable), s.value(w.offset), s.value(w.hold_start), s.value(w.holding), s.value(w.bound_age);
+  s.value(w.stats), s.value(w.gravity), s.value(w.def.gravity), s.value(w.next_id), s.array(w.gravity_keys);
+  s.each(w.bodies, [&](auto &entry) {
+    auto &b = object(entry);
+    s.array(b.p.x), s.array(b.p.v), s.array(b.p.held), s.array(b.p.load), s.array(b.model.state), s.array(b.model.params);
+    s.value(b.contact_impulse), s.value(b.next_load), s.value(b.category), s.value(b.collides_with);
+    s.each(b.loads, [&](auto &l) { s.value(l.number), s.array(l.points), s.array(l.force), s.array(l.keys), s.value(l.sine); });
+    s.each(b.motions, [&](auto &m) { s.array(m.points), s.array(m.start), s.array(m.keys), s.value(m.sine); });
+  });
+  s.each(w.obstacles, [&](auto &entry) {
+    auto &o = object(entry);
+    s.value(o.pose), s.value(o.target), s.value(o.has_target), s.array(o.keys), s.value(o.def.sine);
+  });
+  auto rule = [&](auto &r) { s.array(r.between[0]), s.array(r.between[1]); };
+  s.each(w.friction, [&](auto &r) { rule(r), s.value(r.law); });
+  s.each(w.filters, [&](auto &r) { rule(r), s.value(r.collide); });
   auto &c = w.store;
   s.value(c.n), s.value(c.nstate), s.value(c.h);
   s.array(c.key), s.array(c.id_a), s.array(c.id_b), s.array(c.by_key), s.array(c.normal), s.array(c.tangent), s.array(c.impulse), s.array(c.bristle);
   s.array(c.law), s.array(c.dwell), s.array(c.path), s.array(c.touching), s.array(c.held), s.array(c.began);
   s.array(w.work);
+}
+
+void write_laws(Writer &s, const World &w) {
+  s.each(w.laws, [&](auto &l) { s.array(std::string(l->type->id)), s.array(l->params); });
+}
+
+// The checksum vouches for what was written, not for who wrote it: sizes are compared with the world all the same.
+void check(const Staged &t, const World &w) {
+  bool good = t.bodies.size() == w.bodies.size() && t.obstacles.size() == w.obstacles.size();
+  for (size_t i = 0; good && i < t.bodies.size(); ++i) {
+    const StagedBody &from = t.bodies[i];
+    const Body &b = *w.bodies[i];
+    good = from.p.x.size() == b.p.x.size() && from.p.v.size() == b.p.v.size() && from.p.held.size() == b.p.held.size() &&
+           from.p.load.size() == b.p.load.size() && from.model.state.size() == b.model.state.size() &&
+           from.model.params.size() == b.model.params.size();
+    for (const Load &l : from.loads) {
+      good = good && l.force.size() == 3 * l.points.size();
+      for (uint32_t p : l.points) good = good && p < b.p.n;
+    }
+    for (const HeldMotion &m : from.motions) {
+      good = good && m.start.size() == 3 * m.points.size();
+      for (uint32_t p : m.points) good = good && p < b.p.n;
+    }
+  }
+  const ContactStore &c = t.store;
+  const size_t n = c.n;
+  good = good && c.key.size() == n && c.id_a.size() == n && c.id_b.size() == n && c.by_key.size() == n && c.normal.size() == 3 * n &&
+         c.tangent.size() == 3 * n && c.impulse.size() == 3 * n && c.bristle.size() == n * c.nstate && c.law.size() == n && c.dwell.size() == n &&
+         c.path.size() == 2 * n && c.touching.size() == n && c.held.size() == n && c.began.size() == n;
+  for (uint32_t i : c.by_key) good = good && i < n;
+  for (const FrictionRule &r : t.friction) good = good && r.law < t.laws.size();
+  if (!good) fail(DFM_E_FORMAT, "the snapshot is damaged: its arrays do not fit this world; nothing was restored");
+}
+
+// Laws stand in the order in which the run first needed them, and contacts remember their law by that place.
+std::vector<std::unique_ptr<LawInstance>> make_laws(const World &w, const Staged &t) {
+  std::vector<std::unique_ptr<LawInstance>> laws;
+  for (const StagedLaw &l : t.laws) {
+    const dfm_type &type = w.context->registry.find(DFM_KIND_FRICTION, l.id);
+    if (l.params.size() != packed_width(type)) fail(DFM_E_FORMAT, "the snapshot was made with another version of law '%s'; nothing was restored", type.id);
+    laws.push_back(std::make_unique<LawInstance>(type, w.context->host, l.params));
+  }
+  return laws;
+}
+
+void put_parameters(Body &b, const std::vector<double> &values) {
+  if (values == b.model.params) return;
+  if (!b.model.ops->set_params || b.model.call("set_params", [&] { return b.model.ops->set_params(b.model.self, values.data()); }) != DFM_OK)
+    fail(DFM_E_FORMAT, "the snapshot has other parameters for model '%s' of body '%s', which cannot take them while it runs; nothing was restored",
+         b.model.type->id, b.name.c_str());
+}
+
+// All parameters of all models, or none.
+void put_parameters(World &w, Staged &t) {
+  size_t done = 0;
+  try {
+    for (; done < w.bodies.size(); ++done) put_parameters(*w.bodies[done], t.bodies[done].model.params);
+  } catch (...) {
+    while (done-- > 0) {
+      Body &b = *w.bodies[done];
+      if (t.bodies[done].model.params != b.model.params)
+        b.model.call("set_params", [&] { return b.model.ops->set_params(b.model.self, b.model.params.data()); });
+    }
+    throw;
+  }
+  for (size_t i = 0; i < w.bodies.size(); ++i) w.bodies[i]->model.params.swap(t.bodies[i].model.params);
+}
+
+// Nothing in here allocates: arrays have the right size already, or change hands.
+void put(World &w, Staged &t) noexcept {
+  auto copy = [](const auto &from, auto &to) { std::copy(from.begin(), from.end(), to.begin()); };
+  for (size_t i = 0; i < w.bodies.size(); ++i) {
+    Body &b = *w.bodies[i];
+    StagedBody &from = t.bodies[i];
+    copy(from.p.x, b.p.x), copy(from.p.v, b.p.v), copy(from.p.held, b.p.held), copy(from.p.load, b.p.load), copy(from.model.state, b.model.state);
+    b.loads.swap(from.loads), b.motions.swap(from.motions);
+    b.contact_impulse = from.contact_impulse, b.next_load = from.next_load, b.category = from.category, b.collides_with = from.collides_with;
+    update_inverse_mass(b.p);
+  }
+  for (size_t i = 0; i < w.obstacles.size(); ++i) {
+    Obstacle &o = *w.obstacles[i];
+    StagedObstacle &from = t.obstacles[i];
+    o.pose = from.pose, o.target = from.target, o.has_target = from.has_target, o.def.sine = from.def.sine;
+    o.keys.swap(from.keys);
+  }
+  w.friction.swap(t.friction), w.filters.swap(t.filters), w.gravity_keys.swap(t.gravity_keys), w.work.swap(t.work);
+  std::copy(t.def.gravity, t.def.gravity + 3, w.def.gravity);
+  std::swap(w.store, t.store);
+  w.time = t.time, w.step_count = t.step_count, w.hold_start = t.hold_start, w.holding = t.holding, w.stats = t.stats, w.next_id = t.next_id;
+  w.worst_body = nullptr, w.worst_point = 0;
+  w.report.n = 0, w.report.h = 0;
+  w.events.clear();
 }
 
 }  // namespace
@@ -83,7 +244,7 @@ void world_snapshot(const World &w, std::vector<unsigned char> &out) {
   Writer s{out};
   s.bytes(kMagic, sizeof kMagic);
   s.value(structure(w));
-  s.value(w.bound_age);
+  write_laws(s, w);
   fields(s, w);
   Hash h;
   h.add(out.data(), out.size());
@@ -91,26 +252,31 @@ void world_snapshot(const World &w, std::vector<unsigned char> &out) {
 }
 
 void world_restore(World &w, const void *data, size_t bytes) {
-  w.prepare();
   const unsigned char *const p = static_cast<const unsigned char *>(data);
   if (bytes < sizeof kMagic + 16 || std::memcmp(p, kMagic, sizeof kMagic) != 0)
     fail(DFM_E_FORMAT, "these %zu bytes are no snapshot of this version; take one with dfm_world_snapshot", bytes);
-  // The checksum is read first: past it, sizes and arrays are known to be what was written, so reading cannot fail half way.
   Hash h;
   h.add(p, bytes - sizeof(uint64_t));
   uint64_t sum;
   std::memcpy(&sum, p + bytes - sizeof sum, sizeof sum);
-  if (sum != h.value) fail(DFM_E_FORMAT, "the snapshot is damaged (checksum); nothing was restored");
+  if (sum != h.value) fail(DFM_E_FORMAT, "the snapshot is cut short or damaged (checksum); nothing was restored");
   Reader s{p + sizeof kMagic, p + bytes - sizeof sum};
   uint64_t shape;
   s.value(shape);
   if (shape != structure(w))
-    fail(DFM_E_FORMAT, "the snapshot belongs to another world: bodies, meshes, models, obstacles and laws must be the same; nothing was restored");
-  s.value(w.bound_age);
-  fields(s, w);
-  for (auto &b : w.bodies) update_inverse_mass(b->p);
-  w.worst_body = nullptr;
-  w.report.n = 0;
+    fail(DFM_E_FORMAT, "the snapshot belongs to another world: names, meshes, masses, models and obstacles must be the same; nothing was restored");
+  Staged staged(w.memory());
+  s.each(staged.laws, [&](StagedLaw &l) { s.array(l.id), s.array(l.params); });
+  fields(s, staged);
+  check(staged, w);
+  std::vector<std::unique_ptr<LawInstance>> laws = make_laws(w, staged);
+  put_parameters(w, staged);
+  w.laws.swap(laws);
+  put(w, staged);
+  // Tables and plan follow from what is there now; what prepare() would choose anew is put back as it was.
+  w.changed = true;
+  w.prepare();
+  w.gravity = staged.gravity, w.stable = staged.stable, w.offset = staged.offset, w.bound_age = staged.bound_age;
 }
 
 }  // namespace dfm

@@ -26,8 +26,9 @@ void fill_responses(World &w) {
     for (uint32_t c = 0; c < 3 * n; ++c) {
       std::fill(w.block_impulse.begin(), w.block_impulse.end(), 0.0), std::fill(w.block_velocity.begin(), w.block_velocity.end(), 0.0);
       w.block_impulse[c] = 1;
-      PluginCall call(w.context->scratch);
-      if (b.model.stepper->respond(b.model.self, &kin, n, w.block_surfels.data(), w.block_impulse.data(), w.block_velocity.data()) != DFM_OK)
+      if (b.model.call("respond", [&] {
+            return b.model.stepper->respond(b.model.self, &kin, n, w.block_surfels.data(), w.block_impulse.data(), w.block_velocity.data());
+          }) != DFM_OK)
         fail(DFM_E_FATAL, "model '%s' of body '%s' does not answer impulses; change the model", b.model.type->id, b.name.c_str());
       for (uint32_t r = 0; r < 3 * n; ++r) w.rows.response[block.response + size_t(r) * 3 * n + c] = w.block_velocity[r];
     }
@@ -86,7 +87,7 @@ bool World::stage_solve(uint32_t *trouble) {
   passes = sweeps = 0;
   residual = {};
   prepare_rows(*this);
-  if (rows.n == 0) return true;
+  if (rows.n == 0) return reserve_contacts(), true;
   const double gap_margin = 0.01 * (0.5 * offset) / h;
   const double least = def.contact_tolerance > 0 ? def.contact_tolerance : std::min(1e-6, gap_margin);
   tolerance.normal = gap_margin;
@@ -118,7 +119,30 @@ bool World::stage_solve(uint32_t *trouble) {
   stats.passes = passes, stats.sweeps = sweeps, stats.residual = residual.speed;
   stats.passes_max = std::max(stats.passes_max, passes), stats.sweeps_max = std::max(stats.sweeps_max, sweeps);
   stats.residual_max = std::max(stats.residual_max, stats.residual);
+  reserve_contacts();
   return true;
+}
+
+// All memory that keep_contacts() will need, so that it cannot fail once the bodies have moved.
+void World::reserve_contacts() {
+  const uint32_t n = rows.n, S = state.nstate;
+  ContactStore &to = next_store;
+  auto room = [&](size_t entries, auto &...arrays) { (arrays.reserve(entries), ...); };
+  room(n, to.key, to.id_a, to.id_b, to.by_key, to.law, to.dwell, to.touching, to.held, to.began, report.contacts, report.mode);
+  room(size_t(2) * n, to.path, report.slip), room(size_t(3) * n, to.normal, to.tangent, to.impulse, report.impulse);
+  room(size_t(S) * n, to.bristle), room(size_t(9) * n, report.frame);
+  work.reserve(std::min(work.size() + n, bodies.size() * (bodies.size() + obstacles.size())));
+  reserve_events(size_t(n) + store.n);
+}
+
+void World::reserve_events(size_t more) {
+  const size_t most = std::min(kMostEvents, events.size() + more);
+  if (events.capacity() < most) events.reserve(std::min(kMostEvents, 2 * most));
+}
+
+void World::add_event(uint32_t kind, uint64_t a, uint64_t b, uint64_t key, double t) {
+  if (events.size() >= kMostEvents) events.erase(events.begin(), events.begin() + 1024);
+  events.push_back({sizeof(dfm_contact_event), kind, handle_of(a), handle_of(b), key, t});
 }
 
 // After the commit: what contacts keep for the next sub-step, their events, the hold measure, friction work and the report.
@@ -135,10 +159,6 @@ void World::keep_contacts() {
   report.impulse.assign(rows.impulse.begin(), rows.impulse.end());
   report.slip.resize(size_t(2) * n), report.mode.resize(n);
 
-  auto event = [&](uint32_t kind, uint64_t a, uint64_t b, uint64_t key) {
-    if (events.size() >= 65536) events.erase(events.begin(), events.begin() + 1024);
-    events.push_back({sizeof(dfm_contact_event), kind, handle_of(a), handle_of(b), key, time + h});
-  };
   uint32_t touching = 0, sticking = 0;
   for (uint32_t i = 0; i < n; ++i) {
     const ContactPoint &c = contacts[i];
@@ -161,8 +181,8 @@ void World::keep_contacts() {
     to.path[2 * i + 1] = carried ? store.path[2 * m + 1] + h * v2 : 0;
     to.touching[i] = now, to.held[i] = holding && stick && (carried || time <= hold_start);
     to.began[i] = now && !before;
-    if (now && !before) event(DFM_EVENT_BEGIN, a, b, c.key);
-    if (before && !now) event(DFM_EVENT_END, a, b, c.key);
+    if (now && !before) add_event(DFM_EVENT_BEGIN, a, b, c.key, time + h);
+    if (before && !now) add_event(DFM_EVENT_END, a, b, c.key, time + h);
     report.slip[2 * i] = v1, report.slip[2 * i + 1] = v2, report.mode[i] = state.mode[i];
     touching += now, sticking += stick;
 
@@ -174,7 +194,7 @@ void World::keep_contacts() {
   }
   std::sort(to.by_key.begin(), to.by_key.end(), [&](uint32_t i, uint32_t j) { return to.key[i] < to.key[j]; });
   for (uint32_t m = 0; m < store.n; ++m)
-    if (store.touching[m] && to.find(store.key[m]) == kNone) event(DFM_EVENT_END, store.id_a[m], store.id_b[m], store.key[m]);
+    if (store.touching[m] && to.find(store.key[m]) == kNone) add_event(DFM_EVENT_END, store.id_a[m], store.id_b[m], store.key[m], time + h);
   std::swap(store, next_store);
 
   stats.contacts = touching, stats.sticking = sticking, stats.pairs_tested = static_cast<uint32_t>(broad.candidates().size());

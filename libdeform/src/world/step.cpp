@@ -23,6 +23,15 @@ namespace {
 constexpr uint32_t kBoundEvery = 16;
 constexpr double kBoundShare = 0.9;
 
+// The first body, in id order, for which something failed: the same for every cut of the bodies over threads.
+struct FirstFailure {
+  std::atomic<uint32_t> body{kNone};
+  void note(uint32_t i) {
+    uint32_t seen = body;
+    while (i < seen && !body.compare_exchange_weak(seen, i)) {}
+  }
+};
+
 class StageTimer {
  public:
   StageTimer(World &w, StageId id) : w_(w), id_(id), start_(std::chrono::steady_clock::now()) {
@@ -51,7 +60,7 @@ bool run_stage(World &w, StageId id, uint32_t *trouble) {
     case StageId::narrow: w.stage_narrow(); return true;
     case StageId::solve: return w.stage_solve(trouble);
     case StageId::distribute: w.stage_distribute(); return true;
-    case StageId::commit: w.stage_commit(); return true;
+    case StageId::commit: return w.stage_commit(trouble);
     case StageId::step: return true;
   }
   return true;
@@ -108,8 +117,7 @@ dfm_status World::step(double dt, uint32_t *trouble) {
     const double end = k + 1 == n ? start + dt : start + dt * (double(k + 1) / n);
     h = end - time;
     view_obstacles(*this, time, h, start + dt - time);
-    for (const PlannedStage &stage : plan.stages)
-      if (!run_stage(*this, stage.id, trouble)) return DFM_E_DIVERGED;
+    if (!sub_step(trouble)) return DFM_E_DIVERGED;
     move_obstacles(*this, time, h, start + dt - time, k + 1 == n);
     time = end;
     ++stats.substeps, ++bound_age;
@@ -117,6 +125,19 @@ dfm_status World::step(double dt, uint32_t *trouble) {
   ++step_count;
   stats.steps = step_count, stats.time = time;
   return DFM_OK;
+}
+
+// All stages, or none: where one fails or throws, the state is that of the sub-step before.
+bool World::sub_step(uint32_t *trouble) {
+  struct Undo {
+    World &w;
+    bool kept = false;
+    ~Undo() { if (!kept) w.undo_motion(); }
+  } undo{*this};
+  driven.clear();
+  for (const PlannedStage &stage : plan.stages)
+    if (!run_stage(*this, stage.id, trouble)) return false;
+  return undo.kept = true;
 }
 
 void World::update_bound() {
@@ -127,11 +148,8 @@ void World::update_bound() {
     std::fill(b->ksum.begin(), b->ksum.end(), 0.0), std::fill(b->csum.begin(), b->csum.end(), 0.0);
     double cell = std::numeric_limits<double>::infinity();
     const dfm_kin k = b->kin(time, 0, nullptr);
-    {
-      PluginCall call(context->scratch);
-      if (b->model.ops->bound(b->model.self, &k, b->ksum.data(), b->csum.data(), &cell) != DFM_OK)
-        fail(DFM_E_FATAL, "model '%s' of body '%s' gives no step bound", b->model.type->id, b->name.c_str());
-    }
+    if (b->model.call("bound", [&] { return b->model.ops->bound(b->model.self, &k, b->ksum.data(), b->csum.data(), &cell); }) != DFM_OK)
+      fail(DFM_E_FATAL, "model '%s' of body '%s' gives no step bound", b->model.type->id, b->name.c_str());
     uint32_t worst;
     const double own = std::min(cell, stable_step(b->p, b->ksum.data(), b->csum.data(), &worst));
     if (own < stable) stable = own, worst_body = b.get(), worst_point = worst;
@@ -142,6 +160,7 @@ void World::update_bound() {
 }
 
 void World::stage_motion() {
+  // Held velocities are the one part of the state that changes before a sub-step is known to succeed; what was there is kept.
   if (!gravity_keys.empty()) gravity = vector_at(gravity_keys, time + h);
   for (auto &b : bodies) {
     if (b->loads_vary()) {
@@ -163,27 +182,34 @@ void World::stage_motion() {
         const Vec3 local = rotate_back(first.rotation, load3(&m.start[3 * i]) - first.position);
         const Vec3 v = (1 / h) * (place(now, local) + shift - load3(&b->p.x[at]));
         for (int k = 0; k < 3; ++k)
-          if (b->p.held[m.points[i]] & (1 << k)) b->p.v[at + size_t(k)] = v[k];
+          if (b->p.held[m.points[i]] & (1 << k)) {
+            driven.push_back({&b->p.v[at + size_t(k)], b->p.v[at + size_t(k)]});
+            b->p.v[at + size_t(k)] = v[k];
+          }
       }
     }
   }
 }
 
+void World::undo_motion() {
+  for (size_t i = driven.size(); i-- > 0;) *driven[i].velocity = driven[i].before;
+  driven.clear();
+}
+
 bool World::stage_model(uint32_t *trouble) {
-  std::atomic<uint32_t> failed{kNone};
+  FirstFailure failed;
   context->tasks.parallel_for(static_cast<uint32_t>(bodies.size()), 1, [&](uint32_t begin, uint32_t end) {
     for (uint32_t i = begin; i < end; ++i) {
       Body &b = *bodies[i];
       if (b.model.stepper) continue;
       std::copy(b.p.load.begin(), b.p.load.end(), b.p.f.begin());
       const dfm_kin k = b.kin(time, h, b.model.state_out.empty() ? nullptr : b.model.state_out.data());
-      PluginCall call(context->scratch);
-      if (b.model.ops->add_forces(b.model.self, &k, b.p.f.data()) != DFM_OK) failed = i;
+      if (b.model.call("add_forces", [&] { return b.model.ops->add_forces(b.model.self, &k, b.p.f.data()); }) != DFM_OK) failed.note(i);
     }
   });
-  if (failed == kNone) return true;
+  if (failed.body == kNone) return true;
   *trouble |= DFM_TROUBLE_PLUGIN;
-  const Body &b = *bodies[failed];
+  const Body &b = *bodies[failed.body];
   set_last_error(format("step %llu, body '%s': model '%s' could not compute its forces; take a smaller step or change the model",
                         static_cast<unsigned long long>(step_count), b.name.c_str(), b.model.type->id).c_str());
   return false;
@@ -191,7 +217,7 @@ bool World::stage_model(uint32_t *trouble) {
 
 bool World::stage_predict(uint32_t *trouble) {
   const bool touches = plan.touches();
-  std::atomic<uint32_t> failed{kNone};
+  FirstFailure failed;
   context->tasks.parallel_for(static_cast<uint32_t>(bodies.size()), 1, [&](uint32_t begin, uint32_t end) {
     for (uint32_t i = begin; i < end; ++i) {
       Body &b = *bodies[i];
@@ -204,8 +230,7 @@ bool World::stage_predict(uint32_t *trouble) {
         }
         const dfm_kin k = b.kin(time, h, nullptr);
         Array<double> &u = b.surfel_impulse;   // [nsurfel,3]: free until distribute
-        PluginCall call(context->scratch);
-        good = b.model.stepper->predict(b.model.self, &k, b.p.f.data(), u.data()) == DFM_OK;
+        good = b.model.call("predict", [&] { return b.model.stepper->predict(b.model.self, &k, b.p.f.data(), u.data()); }) == DFM_OK;
         for (uint32_t s = 0; s < b.surface.nsurfel; ++s) {
           store3(&b.surface.v[size_t(s) * kStride], load3(&u[3 * size_t(s)]));
           store3(&b.surface.x[size_t(s) * kStride], load3(&b.p.x[size_t(b.surface.point[s]) * kStride]));
@@ -215,11 +240,11 @@ bool World::stage_predict(uint32_t *trouble) {
         good = predict(b.p, gravity, h);
         if (touches) gather_surface(b.surface, b.p.x.data(), b.p.v_free.data(), kStride);
       }
-      if (!good) failed = i;
+      if (!good) failed.note(i);
     }
   });
-  if (failed == kNone) return true;
-  const Body &b = *bodies[failed];
+  if (failed.body == kNone) return true;
+  const Body &b = *bodies[failed.body];
   *trouble |= DFM_TROUBLE_NONFINITE;
   set_last_error(format("step %llu, body '%s': forces or velocities are not finite (model '%s'); take a smaller step, or look for loads and "
                         "parameters that are too large", static_cast<unsigned long long>(step_count), b.name.c_str(), b.model.type->id).c_str());
@@ -232,32 +257,53 @@ void World::stage_narrow() { find_contacts(body_views, obstacle_views, broad.can
 
 void World::stage_distribute() {
   distribute(contacts, rows.frame.data(), rows.impulse.data(), sinks);
-  for (auto &b : bodies) {
-    Vec3 sum;
-    for (uint32_t s = 0; s < b->surface.nsurfel; ++s) sum += load3(&b->surfel_impulse[3 * size_t(s)]);
-    b->contact_impulse += sum;
-  }
 }
 
-void World::stage_commit() {
+// Self-stepping bodies write their end of the sub-step beside the present state, so that one that fails leaves all bodies as they were.
+bool World::commit_steppers(uint32_t *trouble) {
+  FirstFailure failed;
+  context->tasks.parallel_for(static_cast<uint32_t>(bodies.size()), 1, [&](uint32_t begin, uint32_t end) {
+    for (uint32_t i = begin; i < end; ++i) {
+      Body &b = *bodies[i];
+      if (!b.model.stepper) continue;
+      if (!plan.touches()) std::fill(b.surfel_impulse.begin(), b.surfel_impulse.end(), 0.0);
+      const dfm_kin k = b.kin(time, h, b.model.state_out.empty() ? nullptr : b.model.state_out.data());
+      // x and v out must not alias k: v_free and f serve as the new arrays
+      double *const x = b.p.f.data(), *const v = b.p.v_free.data();
+      if (b.model.call("commit", [&] { return b.model.stepper->commit(b.model.self, &k, b.surfel_impulse.data(), x, v); }) != DFM_OK) {
+        failed.note(i);
+        continue;
+      }
+      double poison = 0;
+      for (size_t j = 0; j < size_t(b.p.n) * kStride; ++j) poison += 0.0 * x[j] + 0.0 * v[j];
+      if (poison != 0) failed.note(i);
+    }
+  });
+  if (failed.body == kNone) return true;
+  *trouble |= DFM_TROUBLE_PLUGIN;
+  const Body &b = *bodies[failed.body];
+  set_last_error(format("step %llu, body '%s': model '%s' could not end its step, or ended it with something not finite; take a smaller step "
+                        "or change the model", static_cast<unsigned long long>(step_count), b.name.c_str(), b.model.type->id).c_str());
+  return false;
+}
+
+bool World::stage_commit(uint32_t *trouble) {
+  if (!commit_steppers(trouble)) return false;
   const bool touched = plan.touches() && rows.n > 0;
   context->tasks.parallel_for(static_cast<uint32_t>(bodies.size()), 1, [&](uint32_t begin, uint32_t end) {
     for (uint32_t i = begin; i < end; ++i) {
       Body &b = *bodies[i];
-      if (b.model.stepper) {
-        if (!plan.touches()) std::fill(b.surfel_impulse.begin(), b.surfel_impulse.end(), 0.0);
-        const dfm_kin k = b.kin(time, h, b.model.state_out.empty() ? nullptr : b.model.state_out.data());
-        PluginCall call(context->scratch);
-        // x and v out must not alias k: v_free and f serve as the new arrays
-        if (b.model.stepper->commit(b.model.self, &k, b.surfel_impulse.data(), b.p.f.data(), b.p.v_free.data()) == DFM_OK)
-          b.p.x.swap(b.p.f), b.p.v.swap(b.p.v_free);
-      } else {
-        commit(b.p, touched, h);
-      }
+      if (b.model.stepper) b.p.x.swap(b.p.f), b.p.v.swap(b.p.v_free);
+      else commit(b.p, touched, h);
       b.model.commit_state();
+      if (!plan.touches()) continue;
+      Vec3 sum;
+      for (uint32_t s = 0; s < b.surface.nsurfel; ++s) sum += load3(&b.surfel_impulse[3 * size_t(s)]);
+      b.contact_impulse += sum;
     }
   });
   if (plan.touches()) keep_contacts();
+  return true;
 }
 
 }  // namespace dfm

@@ -88,6 +88,8 @@ struct Report {
   Array<uint8_t> mode;
 };
 
+inline constexpr size_t kMostEvents = 65536;           // the list keeps the newest ones
+
 struct World {
   dfm_context *context;
   uint64_t handle = 0;
@@ -137,6 +139,8 @@ struct World {
   Array<uint32_t> match;
   Array<uint32_t> block_surfels;                       // scratch of self-stepping bodies
   Array<double> block_impulse, block_velocity;
+  struct Driven { double *velocity, before; };
+  Array<Driven> driven;                                // held components that this sub-step's motion stage has set
   Vec3 gravity;
   double h = 0;
   Residual residual;
@@ -165,6 +169,8 @@ struct World {
 
   // step.cpp
   dfm_status step(double dt, uint32_t *trouble);
+  bool sub_step(uint32_t *trouble);
+  void undo_motion();                                  // held velocities as before stage_motion()
   void update_bound();                                 // stable, worst_body, worst_point
 
   // stages of a sub-step, each in the file of its name
@@ -175,8 +181,12 @@ struct World {
   void stage_narrow();
   bool stage_solve(uint32_t *trouble);                 // solve.cpp
   void stage_distribute();
-  void stage_commit();
-  void keep_contacts();                                // solve.cpp: store, events, hold, work
+  bool stage_commit(uint32_t *trouble);
+  bool commit_steppers(uint32_t *trouble);
+  void reserve_events(size_t more);
+  void add_event(uint32_t kind, uint64_t a, uint64_t b, uint64_t key, double t);   // a, b: ids
+  void reserve_contacts();                             // solve.cpp: memory for keep_contacts()
+  void keep_contacts();                                // solve.cpp: store, events, hold, work; allocates nothing
 };
 
 // snapshot.cpp

@@ -1,0 +1,213 @@
+// Handles: null, stale, of another kind or made up, every call that takes one says so; ends of life in any order.
+#include <functional>
+#include <limits>
+
+#include "stack.h"
+
+namespace {
+
+using Call = std::pair<const char *, std::function<dfm_status(uint64_t)>>;
+
+// Buffers that calls may be given; none of them is touched by a refused call.
+double zero3[3] = {0, 0, 0}, one3[3] = {1, 1, 1};
+double numbers[64];
+uint32_t count, index0 = 0;
+uint64_t made;
+size_t bytes;
+dfm_pose pose{};
+dfm_friction_def friction() {
+  dfm_friction_def f{};
+  f.size = sizeof f, f.between[0] = f.between[1] = "*", f.law = "coulomb";
+  return f;
+}
+
+std::vector<Call> world_calls() {
+  return {
+      {"world_destroy", [](uint64_t h) { return dfm_world_destroy(h); }},
+      {"world_set_gravity", [](uint64_t h) { return dfm_world_set_gravity(h, zero3); }},
+      {"world_set_gravity_keys", [](uint64_t h) { return dfm_world_set_gravity_keys(h, 0, nullptr); }},
+      {"world_step", [](uint64_t h) { return dfm_world_step(h, 1e-3, nullptr); }},
+      {"world_stable_step", [](uint64_t h) { return dfm_world_stable_step(h, numbers, nullptr, nullptr); }},
+      {"world_snapshot", [](uint64_t h) { return dfm_world_snapshot(h, nullptr, &bytes); }},
+      {"world_restore", [](uint64_t h) { return dfm_world_restore(h, numbers, sizeof numbers); }},
+      {"world_find_body", [](uint64_t h) { return dfm_world_find_body(h, "lower", &made); }},
+      {"world_bodies", [](uint64_t h) { return dfm_world_bodies(h, 0, nullptr, &count); }},
+      {"world_obstacles", [](uint64_t h) { return dfm_world_obstacles(h, 0, nullptr, &count); }},
+      {"world_get_stats", [](uint64_t h) { dfm_world_stats s{}; return dfm_world_get_stats(h, &s); }},
+      {"world_profile", [](uint64_t h) { return dfm_world_profile(h, 0, nullptr, &count); }},
+      {"world_explain", [](uint64_t h) { return dfm_world_explain(h, nullptr, &bytes); }},
+      {"world_add_friction", [](uint64_t h) { const dfm_friction_def f = friction(); return dfm_world_add_friction(h, &f); }},
+      {"world_filter_pair", [](uint64_t h) { return dfm_world_filter_pair(h, "*", "*", true); }},
+      {"world_contacts", [](uint64_t h) { return dfm_world_contacts(h, 0, nullptr, &count); }},
+      {"world_pairs", [](uint64_t h) { return dfm_world_pairs(h, 0, nullptr, &count); }},
+      {"world_events", [](uint64_t h) { return dfm_world_events(h, 0, nullptr, &count); }},
+      {"world_hold_begin", [](uint64_t h) { return dfm_world_hold_begin(h); }},
+      {"world_hold", [](uint64_t h) { return dfm_world_hold(h, numbers, nullptr); }},
+      {"world_ray", [](uint64_t h) { dfm_ray_hit r{}; return dfm_world_ray(h, zero3, one3, 1, &r); }},
+      {"world_closest", [](uint64_t h) { dfm_ray_hit r{}; return dfm_world_closest(h, zero3, 1, &r); }},
+      {"debug_draw", [](uint64_t h) {
+         return dfm_debug_draw(h, DFM_DRAW_CONTACTS, [](void *, const double *, const double *, uint32_t) {}, nullptr);
+       }},
+      {"body_create", [](uint64_t h) { const dfm_body_def d = dfm_body_def_default(); return dfm_body_create(h, &d, &made); }},
+      {"obstacle_create", [](uint64_t h) { const dfm_obstacle_def d = dfm_obstacle_def_default(); return dfm_obstacle_create(h, &d, &made); }},
+      {"material_create", [](uint64_t h) { const dfm_material_def d = dfm_material_def_default(); return dfm_material_create(h, &d, &made); }},
+  };
+}
+
+std::vector<Call> body_calls() {
+  return {
+      {"body_destroy", [](uint64_t h) { return dfm_body_destroy(h); }},
+      {"body_get_info", [](uint64_t h) { dfm_body_info i{}; return dfm_body_get_info(h, &i); }},
+      {"body_set_user", [](uint64_t h) { return dfm_body_set_user(h, nullptr); }},
+      {"body_set_filter", [](uint64_t h) { return dfm_body_set_filter(h, 1, 1); }},
+      {"body_get_state", [](uint64_t h) { return dfm_body_get_state(h, 0, nullptr, nullptr, &count); }},
+      {"body_set_state", [](uint64_t h) { return dfm_body_set_state(h, 1, numbers, numbers); }},
+      {"body_get_rest", [](uint64_t h) { return dfm_body_get_rest(h, 1, numbers, 0, nullptr); }},
+      {"body_hold", [](uint64_t h) { return dfm_body_hold(h, 1, &index0, 7); }},
+      {"body_move_held", [](uint64_t h) { const dfm_sine s{}; return dfm_body_move_held(h, 1, &index0, 0, nullptr, &s); }},
+      {"body_add_load", [](uint64_t h) { return dfm_body_add_load(h, 1, &index0, one3, 0, nullptr, nullptr, nullptr); }},
+      {"body_remove_load", [](uint64_t h) { return dfm_body_remove_load(h, 1); }},
+      {"body_apply_impulse", [](uint64_t h) { return dfm_body_apply_impulse(h, zero3, one3); }},
+      {"body_set_params", [](uint64_t h) { const dfm_params p{sizeof p, 0, nullptr}; return dfm_body_set_params(h, &p); }},
+      {"body_get_measure", [](uint64_t h) { dfm_body_measure m{}; return dfm_body_get_measure(h, &m); }},
+      {"body_energy_density", [](uint64_t h) { return dfm_body_energy_density(h, 64, numbers); }},
+      {"surface_positions", [](uint64_t h) { return dfm_surface_positions(h, 0, nullptr, &count); }},
+      {"surface_velocities", [](uint64_t h) { return dfm_surface_velocities(h, 0, nullptr, &count); }},
+      {"surface_normals", [](uint64_t h) { return dfm_surface_normals(h, 0, nullptr, &count); }},
+      {"surface_forces", [](uint64_t h) { return dfm_surface_forces(h, 0, nullptr, &count); }},
+      {"surface_triangles", [](uint64_t h) { return dfm_surface_triangles(h, 0, nullptr, &count); }},
+      {"surface_points", [](uint64_t h) { return dfm_surface_points(h, 0, nullptr, &count); }},
+      {"debug_write_body", [](uint64_t h) { return dfm_debug_write_body(h, "/nonexistent/x.vtu"); }},
+      {"debug_write_surface", [](uint64_t h) { return dfm_debug_write_surface(h, "/nonexistent/x.vtu"); }},
+  };
+}
+
+std::vector<Call> obstacle_calls() {
+  return {
+      {"obstacle_destroy", [](uint64_t h) { return dfm_obstacle_destroy(h); }},
+      {"obstacle_get_pose", [](uint64_t h) { return dfm_obstacle_get_pose(h, &pose); }},
+      {"obstacle_get_def", [](uint64_t h) { dfm_obstacle_def d{}; return dfm_obstacle_get_def(h, &d); }},
+      {"obstacle_move_to", [](uint64_t h) { return dfm_obstacle_move_to(h, &pose); }},
+  };
+}
+
+std::vector<Call> other_calls() {
+  return {
+      {"material_destroy", [](uint64_t h) { return dfm_material_destroy(h); }},
+      {"law_close", [](uint64_t h) { return dfm_law_close(h); }},
+      {"law_type", [](uint64_t h) { const dfm_type *t; return dfm_law_type(h, &t); }},
+      {"law_pack", [](uint64_t h) { return dfm_law_pack(h, nullptr, 0, nullptr, &count); }},
+      {"law_eval", [](uint64_t h) { dfm_friction_in in{}; dfm_friction_out out{}; return dfm_law_eval(h, &in, &out); }},
+      {"tetmesh_destroy", [](uint64_t h) { return dfm_tetmesh_destroy(h); }},
+      {"tetmesh_get_info", [](uint64_t h) { dfm_tetmesh_info i{}; return dfm_tetmesh_get_info(h, &i); }},
+      {"tetmesh_data", [](uint64_t h) { return dfm_tetmesh_data(h, nullptr, nullptr, nullptr); }},
+      {"tetmesh_groups", [](uint64_t h) { return dfm_tetmesh_groups(h, nullptr, nullptr); }},
+      {"tetmesh_group_points", [](uint64_t h) { return dfm_tetmesh_group_points(h, 0, nullptr, nullptr, nullptr); }},
+      {"tetmesh_write", [](uint64_t h) { return dfm_tetmesh_write(h, "/nonexistent/x.msh"); }},
+      {"scene_close", [](uint64_t h) { return dfm_scene_close(h); }},
+      {"scene_world", [](uint64_t h) { return dfm_scene_world(h, &made); }},
+      {"scene_value", [](uint64_t h) { return dfm_scene_value(h, "/time", nullptr, &bytes); }},
+  };
+}
+
+void all_refuse(const std::vector<Call> &calls, uint64_t handle, const char *what) {
+  for (const auto &[name, call] : calls) {
+    EXPECT_EQ(call(handle), DFM_E_HANDLE) << name << " on a " << what << " handle";
+    EXPECT_NE(std::string(dfm_last_error()).find("handle 0x"), std::string::npos) << name << ": " << dfm_last_error();
+  }
+}
+
+}  // namespace
+
+TEST(Handles, NullOrMadeUp_AreRefusedByEveryCall) {
+  test::Context c;
+  const test::Stack s = test::make_stack(c);
+  for (const auto &calls : {world_calls(), body_calls(), obstacle_calls(), other_calls()}) {
+    all_refuse(calls, 0, "null");
+    all_refuse(calls, 0xdeadbeefdeadbeefull, "made up");
+    all_refuse(calls, std::numeric_limits<uint64_t>::max(), "made up");
+  }
+  EXPECT_TRUE(std::isnan(dfm_world_time(0)));
+  EXPECT_EQ(dfm_world_hash(0), 0u);
+  EXPECT_NE(dfm_world_hash(s.world), 0u);
+}
+
+TEST(Handles, OfAnotherKind_AreRefusedByEveryCall) {
+  test::Context c;
+  const test::Stack s = test::make_stack(c);
+  all_refuse(world_calls(), s.lower, "body");
+  all_refuse(body_calls(), s.world, "world");
+  all_refuse(body_calls(), s.floor, "obstacle");
+  all_refuse(obstacle_calls(), s.upper, "body");
+  all_refuse(other_calls(), s.world, "world");
+  EXPECT_TRUE(std::isnan(dfm_world_time(s.lower)));
+  EXPECT_EQ(dfm_world_hash(s.lower), 0u);
+  test::run(s.world, 2e-3, 1e-3);  // and nothing was harmed
+}
+
+TEST(Handles, AfterTheirObjectWent_AreRefusedThoughTheSlotIsUsedAgain) {
+  test::Context c;
+  test::Stack s = test::make_stack(c);
+  test::ok(dfm_body_destroy(s.upper));
+  test::ok(dfm_obstacle_destroy(s.floor));
+  all_refuse(body_calls(), s.upper, "stale");
+  all_refuse(obstacle_calls(), s.floor, "stale");
+  for (int i = 0; i < 50; ++i) {  // new objects take the slots with other generations
+    const dfm_obstacle o = test::add_plane(s.world, "again");
+    EXPECT_NE(o, s.floor);
+    EXPECT_NE(o, s.upper);
+    test::ok(dfm_obstacle_destroy(o));
+  }
+  all_refuse(obstacle_calls(), s.floor, "stale");
+  all_refuse(body_calls(), s.upper, "stale");
+  dfm_body_info info{};
+  test::ok(dfm_body_get_info(s.lower, &info));
+}
+
+TEST(Handles, WhenAWorldGoes_AllThatWasInItIsStale) {
+  test::Context c;
+  const test::Stack s = test::make_stack(c);
+  dfm_material material = 0;
+  const dfm_material_def md = dfm_material_def_default();
+  test::ok(dfm_material_create(s.world, &md, &material));
+  const test::Stack other = test::make_stack(c);
+  test::ok(dfm_world_destroy(s.world));
+  all_refuse(world_calls(), s.world, "stale");
+  all_refuse(body_calls(), s.lower, "stale");
+  all_refuse(obstacle_calls(), s.floor, "stale");
+  EXPECT_EQ(dfm_material_destroy(material), DFM_E_HANDLE);
+  test::run(other.world, 2e-3, 1e-3);  // the world beside it lives
+}
+
+TEST(Handles, WhenTheContextGoesFirst_EveryHandleIsStale) {
+  test::Stack s;
+  dfm_law law = 0;
+  dfm_tetmesh mesh = 0;
+  {
+    test::Context c;
+    s = test::make_stack(c);
+    test::run(s.world, 5e-3, 1e-3);
+    test::ok(dfm_law_open(c, "coulomb", &law));
+    const double size[3] = {0.1, 0, 0};
+    test::ok(dfm_tetmesh_make(c, "ball", size, 100, &mesh));
+  }
+  all_refuse(world_calls(), s.world, "stale");
+  all_refuse(body_calls(), s.upper, "stale");
+  all_refuse(obstacle_calls(), s.floor, "stale");
+  all_refuse(other_calls(), law, "stale");
+  all_refuse(other_calls(), mesh, "stale");
+  dfm_context_destroy(nullptr);
+}
+
+TEST(Handles, MaterialOfAnotherWorld_IsRefused) {
+  test::Context c;
+  const dfm_world a = test::make_world(c), b = test::make_world(c);
+  const dfm_material_def md = dfm_material_def_default();
+  dfm_obstacle_def od = dfm_obstacle_def_default();
+  test::ok(dfm_material_create(a, &md, &od.material));
+  dfm_obstacle o = 0;
+  EXPECT_EQ(dfm_obstacle_create(b, &od, &o), DFM_E_HANDLE);
+  EXPECT_EQ(o, 0u);
+  od.material = b;
+  EXPECT_EQ(dfm_obstacle_create(b, &od, &o), DFM_E_HANDLE) << "a world handle is no material";
+}

@@ -1,0 +1,95 @@
+// One scene, one hash: whatever the threads, the host's way to cut and order work, the instruction set, the lists that detection keeps.
+#include <algorithm>
+#include <cstdlib>
+#include <random>
+#include <thread>
+
+#include "core/handle.h"
+#include "scenes.h"
+#include "world/world.h"
+
+namespace {
+
+class Determinism : public testing::TestWithParam<scenes::Scene> {};
+INSTANTIATE_TEST_SUITE_P(Scenes, Determinism, testing::ValuesIn(scenes::all), [](const auto &i) { return std::string(i.param.name); });
+
+// A host that cuts at random multiples of grain and hands the pieces, shuffled, to three threads.
+struct RudeHost {
+  std::mt19937 random{7};
+  uint64_t calls = 0;
+  static void parallel_for(void *user, uint32_t n, uint32_t grain, void (*fn)(void *, uint32_t, uint32_t), void *task) {
+    RudeHost &host = *static_cast<RudeHost *>(user);
+    ++host.calls;
+    std::vector<std::pair<uint32_t, uint32_t>> pieces;
+    for (uint32_t at = 0; at < n;) {
+      const uint64_t end = at + uint64_t(grain) * (1 + host.random() % 3);
+      pieces.push_back({at, uint32_t(std::min<uint64_t>(n, end))});
+      at = pieces.back().second;
+    }
+    std::shuffle(pieces.begin(), pieces.end(), host.random);
+    std::vector<std::thread> threads;
+    for (size_t t = 0; t < 3; ++t)
+      threads.emplace_back([&, t] {
+        for (size_t i = t; i < pieces.size(); i += 3) fn(task, pieces[i].first, pieces[i].second);
+      });
+    for (auto &t : threads) t.join();
+  }
+};
+
+TEST_P(Determinism, OneToFourThreads_GiveTheSameHash) {
+  const uint64_t one = scenes::run(GetParam(), 1);
+  for (uint32_t threads : {2u, 3u, 4u}) EXPECT_EQ(scenes::run(GetParam(), threads), one) << threads << " threads";
+}
+
+TEST_P(Determinism, AHostThatCutsAndShuffles_GivesTheSameHash) {
+  RudeHost host;
+  dfm_context_def def = dfm_context_def_default();
+  def.user = &host, def.parallel_for = RudeHost::parallel_for, def.plugin_dir = DEFORM_PLUGIN_DIR;
+  def.log = [](void *, int32_t, const char *) {};
+  dfm_context *c = nullptr;
+  ASSERT_EQ(dfm_context_create(&def, &c), DFM_OK) << dfm_last_error();
+  scenes::Scene few = GetParam();
+  few.steps = 60;  // threads are made and joined for every call
+  EXPECT_EQ(scenes::hex(scenes::run(c, few)), scenes::hex(scenes::run(few)));
+  dfm_context_destroy(c);
+  EXPECT_TRUE(host.calls > 60 || few.name != std::string("ten_in_a_box")) << "the hook was not used";
+}
+
+// Lists of pairs that are renewed every sub-step, or hold for long, hold the same contacts.
+TEST_P(Determinism, LivesOfCandidateLists_DoNotShow) {
+  const uint64_t usual = scenes::run(GetParam());
+  for (double skin : {1.0, 90.0}) {
+    const test::Context c;
+    const dfm_world w = GetParam().build(c);
+    static_cast<dfm::World *>(dfm::handle_find(dfm::Kind::world, w))->broad.set_skin_steps(skin);
+    scenes::advance(w, GetParam().steps);
+    EXPECT_EQ(dfm_world_hash(w), usual) << "skin of " << skin << " steps";
+  }
+}
+
+// Renewed at random times.
+TEST_P(Determinism, ForgottenCandidateLists_DoNotShow) {
+  const test::Context c;
+  const dfm_world w = GetParam().build(c);
+  dfm::BroadPhase &broad = static_cast<dfm::World *>(dfm::handle_find(dfm::Kind::world, w))->broad;
+  std::mt19937 random(3);
+  for (int i = 0; i < GetParam().steps; ++i) {
+    if (random() % 5 == 0) broad.clear();
+    scenes::advance(w, 1);
+  }
+  EXPECT_EQ(dfm_world_hash(w), scenes::run(GetParam()));
+}
+
+// Kernels are chosen when a body is created. Those that the processor lacks are refused by a warning on the log.
+TEST_P(Determinism, InstructionSets_GiveTheSameHash) {
+  const char *const given = std::getenv("DEFORM_SIMD");
+  const std::string before = given ? given : "";
+  const uint64_t best = scenes::run(GetParam());
+  for (const char *simd : {"sse2", "avx2", "avx512"}) {
+    setenv("DEFORM_SIMD", simd, 1);
+    EXPECT_EQ(scenes::run(GetParam()), best) << simd;
+  }
+  setenv("DEFORM_SIMD", before.c_str(), 1);  // empty: the processor's best
+}
+
+}  // namespace

@@ -1,0 +1,98 @@
+// Scenes whose state hash must be the same on every build, cut and processor.
+#pragma once
+#include "world.h"
+
+namespace scenes {
+
+// A ball that spins and slides as it meets a floor.
+inline dfm_world ball_on_floor(dfm_context *c) {
+  const dfm_world w = test::make_world(c);
+  test::add_plane(w, "floor");
+  test::set_friction(w, 0.4);
+  test::BodyOptions o;
+  o.name = "ball", o.young = 2e4, o.damping_stiffness = 5e-4, o.position = {0, 0, 0.0503}, o.velocity = {0.3, 0.1, -0.5}, o.spin = {0, 20, 3};
+  test::make_body(c, w, "ball", {0.05, 0, 0}, 400, o);
+  return w;
+}
+
+// A beam held at both ends, another that falls across it: edges meet edges, with and without the volume term.
+inline dfm_world crossing_beams(dfm_context *c) {
+  const dfm_world w = test::make_world(c);
+  test::set_friction(w, 0.5);
+  test::BodyOptions o;
+  o.name = "lower", o.young = 5e4, o.damping_stiffness = 5e-4, o.position = {-0.1, -0.02, 0};
+  const dfm_body lower = test::make_body(c, w, "beam", {0.2, 0.04, 0.04}, 200, o);
+  std::vector<double> x(3 * 4096);
+  uint32_t n = 0;
+  test::ok(dfm_body_get_state(lower, 4096, x.data(), nullptr, &n));
+  std::vector<uint32_t> ends;
+  for (uint32_t i = 0; i < n; ++i)
+    if (std::fabs(x[3 * i]) > 0.0999) ends.push_back(i);
+  test::ok(dfm_body_hold(lower, uint32_t(ends.size()), ends.data(), 7));
+  o.name = "upper", o.volume = 1, o.position = {-0.017, -0.1, 0.0403}, o.velocity = {0.05, 0, -0.4}, o.spin = {0, 0, 1};
+  test::make_body(c, w, "beam", {0.04, 0.2, 0.04}, 200, o);
+  return w;
+}
+
+// Ten small bodies thrown together in a box of five planes.
+inline dfm_world ten_in_a_box(dfm_context *c) {
+  const dfm_world w = test::make_world(c);
+  const double s = std::sqrt(0.5);
+  test::add_plane(w, "floor");
+  test::add_plane(w, "west", {-0.06, 0, 0}, {0, s, 0, s}), test::add_plane(w, "east", {0.06, 0, 0}, {0, -s, 0, s});
+  test::add_plane(w, "south", {0, -0.06, 0}, {-s, 0, 0, s}), test::add_plane(w, "north", {0, 0.06, 0}, {s, 0, 0, s});
+  test::set_friction(w, 0.3);
+  const char *const kinds[] = {"ball", "beam", "cylinder"};
+  const std::array<double, 3> sizes[] = {{0.015, 0, 0}, {0.025, 0.02, 0.02}, {0.012, 0.03, 0}};
+  for (int i = 0; i < 10; ++i) {
+    test::BodyOptions o;
+    o.young = 1e4, o.damping_stiffness = 1e-3;
+    o.position = {-0.03 + 0.036 * (i % 2), -0.03 + 0.036 * (i / 2 % 2), 0.02 + 0.036 * (i / 4)};
+    o.velocity = {0.2 - 0.04 * i, 0.05 * (i % 5) - 0.1, -0.6}, o.spin = {double(i), 3.0 - i, 1};
+    test::make_body(c, w, kinds[i % 3], sizes[i % 3], 60, o);
+  }
+  return w;
+}
+
+// One body large enough that its model cuts its own work (10,000 cells).
+inline dfm_world fine_ball(dfm_context *c) {
+  const dfm_world w = test::make_world(c);
+  test::add_plane(w, "floor");
+  test::set_friction(w, 0.4);
+  test::BodyOptions o;
+  o.name = "ball", o.young = 2e4, o.volume = 1, o.position = {0, 0, 0.0502}, o.velocity = {0.3, 0.1, -0.5}, o.spin = {0, 20, 3};
+  test::make_body(c, w, "ball", {0.05, 0, 0}, 12000, o);
+  return w;
+}
+
+struct Scene {
+  const char *name;
+  dfm_world (*build)(dfm_context *);
+  int steps;
+};
+inline const Scene all[] = {{"ball_on_floor", ball_on_floor, 150}, {"crossing_beams", crossing_beams, 150}, {"ten_in_a_box", ten_in_a_box, 150},
+                                {"fine_ball", fine_ball, 20}};
+
+inline void advance(dfm_world w, int steps) {
+  for (int i = 0; i < steps; ++i) ASSERT_EQ(dfm_world_step(w, 1e-3, nullptr), DFM_OK) << dfm_last_error();
+}
+
+inline uint64_t run(dfm_context *c, const Scene &scene) {
+  const dfm_world w = scene.build(c);
+  advance(w, scene.steps);
+  EXPECT_GT(test::stats(w).contacts_max, 3u) << scene.name << ": a scene without contact shows nothing";
+  return dfm_world_hash(w);
+}
+
+inline uint64_t run(const Scene &scene, uint32_t threads = 1) {
+  const test::Context c(threads);
+  return run(c, scene);
+}
+
+inline std::string hex(uint64_t h) {
+  char text[20];
+  std::snprintf(text, sizeof text, "%016llx", static_cast<unsigned long long>(h));
+  return text;
+}
+
+}  // namespace scenes

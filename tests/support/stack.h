@@ -1,0 +1,52 @@
+// Two soft cubes on a floor, one on the other: the smallest world in which everything touches.
+#pragma once
+#include "world.h"
+
+namespace test {
+
+struct Stack {
+  dfm_world world = 0;
+  dfm_body lower = 0, upper = 0;
+  dfm_obstacle floor = 0;
+};
+
+// drop: how far above its place the upper cube starts, m.
+inline Stack make_stack(dfm_context *c, double drop = 1e-4, double mu = 0.5) {
+  Stack s;
+  s.world = make_world(c);
+  s.floor = add_plane(s.world, "floor");
+  set_friction(s.world, mu);
+  BodyOptions o;
+  o.young = 2e5, o.damping_stiffness = 2e-3, o.volume = 1;
+  o.name = "lower", o.position = {0, 0, 1e-4};
+  s.lower = make_body(c, s.world, "beam", {0.1, 0.1, 0.1}, 60, o);
+  o.name = "upper", o.position = {0.013, 0.007, 0.1 + 2e-4 + drop};
+  s.upper = make_body(c, s.world, "beam", {0.1, 0.1, 0.1}, 60, o);
+  return s;
+}
+
+inline std::vector<dfm_contact> contacts(dfm_world w) {
+  uint32_t n = 0;
+  ok(dfm_world_contacts(w, 0, nullptr, &n));
+  std::vector<dfm_contact> out(n);
+  if (n) ok(dfm_world_contacts(w, n, out.data(), &n));
+  return out;
+}
+
+inline std::vector<dfm_pair_report> pairs(dfm_world w) {
+  uint32_t n = 0;
+  ok(dfm_world_pairs(w, 0, nullptr, &n));
+  std::vector<dfm_pair_report> out(n);
+  if (n) ok(dfm_world_pairs(w, n, out.data(), &n));
+  return out;
+}
+
+inline std::vector<dfm_contact_event> events(dfm_world w) {
+  uint32_t n = 0;
+  ok(dfm_world_events(w, 0, nullptr, &n));
+  std::vector<dfm_contact_event> out(n);
+  if (n) ok(dfm_world_events(w, n, out.data(), &n));
+  return out;
+}
+
+}  // namespace test
