@@ -15,7 +15,7 @@ typedef struct dfm_world_def {
   double gravity[3];            /* m/s2 */
   int32_t method, integrator;   /* DFM_METHOD_*, DFM_INTEGRATOR_* */
   double contact_offset;        /* m, rest distance d_c; 0: chosen per world from the meshes (mechanics: 1e-3 of the median surface edge) */
-  double contact_tolerance;     /* m/s, residual of the contact solve; 0: min(1e-6, 0.01 (d_c-d_g)/h) */
+  double contact_tolerance;     /* m/s, slip that a sticking contact may be left with; 0: min(1e-6, 0.01 (d_c-d_g)/h); doc/decisions/0004 */
   uint32_t max_sweeps;          /* per sub-step; 50 */
   uint32_t max_passes;          /* outer passes per sub-step; 20 */
   uint32_t max_substeps;        /* a step that needs more returns DFM_DISCARD; 10000 */
@@ -41,7 +41,7 @@ DFM_API dfm_status dfm_world_set_gravity_keys(dfm_world world, uint32_t n, const
 enum {
   DFM_TROUBLE_SUBSTEPS = 1,      /* dt is above the stable step, sub-steps were taken: soften, coarsen, or accept the cost */
   DFM_TROUBLE_UNCONVERGED = 2,   /* the contact solve met its cap: raise max_sweeps, or lower mass ratios */
-  DFM_TROUBLE_NONFINITE = 4,     /* a plugin or a load made a NaN: the last good state is kept (status DFM_E_DIVERGED) */
+  DFM_TROUBLE_NONFINITE = 4,     /* a plugin or a load made a NaN: the last good sub-step is kept (status DFM_E_DIVERGED) */
   DFM_TROUBLE_INVERTED = 8,      /* a cell turned inside out: refine, soften the load */
   DFM_TROUBLE_PLUGIN = 16        /* a plugin failed: see the log */
 };

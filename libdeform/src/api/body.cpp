@@ -3,6 +3,7 @@
 #include <cmath>
 
 #include "api/objects.h"
+#include "surfel/closest.h"
 #include "world/create.h"
 #include "world/measure.h"
 #include "world/queries.h"
@@ -118,7 +119,7 @@ dfm_status dfm_body_set_state(dfm_body body, uint32_t n, const double *x, const 
         if (x) b.p.x[size_t(i) * kStride + size_t(k)] = x[size_t(3) * i + size_t(k)];
         if (v) b.p.v[size_t(i) * kStride + size_t(k)] = v[size_t(3) * i + size_t(k)];
       }
-    b.world->bound_due = true;
+    b.world->bound_age = kNone;
   });
 }
 
@@ -139,7 +140,7 @@ dfm_status dfm_body_hold(dfm_body body, uint32_t n, const uint32_t *points, uint
     for (uint32_t i = 0; i < n; ++i) b.p.held[points[i]] = axes;
     update_inverse_mass(b.p);
     stop_held(b);
-    b.world->bound_due = true;
+    b.world->bound_age = kNone;
   });
 }
 
@@ -206,10 +207,9 @@ dfm_status dfm_body_apply_impulse(dfm_body body, const double point[3], const do
     uint32_t triangle = 0;
     for (uint32_t t = 0; t < b.surface.ntri; ++t) {
       const uint32_t *const c = &b.surface.tri[size_t(3) * t];
-      double w[3];
-      const Vec3 q = closest_on_triangle(load3(point), surfel_vector(b, b.p.x, c[0]), surfel_vector(b, b.p.x, c[1]), surfel_vector(b, b.p.x, c[2]), w);
-      const double d = norm2(q - load3(point));
-      if (d < best) best = d, triangle = t, std::copy(w, w + 3, weight);
+      const TrianglePoint q =
+          closest_on_triangle(load3(point), surfel_vector(b, b.p.x, c[0]), surfel_vector(b, b.p.x, c[1]), surfel_vector(b, b.p.x, c[2]));
+      if (q.distance2 < best) best = q.distance2, triangle = t, std::copy(q.weight, q.weight + 3, weight);
     }
     auto push = [&](uint32_t phyxel, double share) {
       for (int k = 0; k < 3; ++k)

@@ -120,7 +120,7 @@ dfm_status dfm_world_stable_step(dfm_world world, double *dt, dfm_body *body, ui
     need(dt, "dt");
     w.prepare();
     // The value the next step uses: asked anew only when it would ask, so that reading it changes no result.
-    if (w.bound_due) w.update_bound(), w.bound_due = false;
+    if (w.bound_age == kNone) w.update_bound();
     *dt = w.stable;
     if (body) *body = w.worst_body ? w.worst_body->handle : 0;
     if (point) *point = w.worst_point;
@@ -212,7 +212,7 @@ dfm_status dfm_world_explain(dfm_world world, char *text, size_t *bytes) {
   return guard([&] {
     World &w = idle(world_of(world));
     w.prepare();
-    if (w.bound_due) w.update_bound();
+    if (w.bound_age == kNone) w.update_bound();
     const std::string json = explain(w);
     give_bytes(json.c_str(), json.size() + 1, text, bytes);
   });

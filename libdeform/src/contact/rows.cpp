@@ -3,18 +3,11 @@
 #include <algorithm>
 
 namespace dfm {
-namespace {
 
-template <class T>
-Array<T> empty(const Memory &memory) { return Array<T>(HookAllocator<T>(memory)); }
-
-}  // namespace
-
-ContactRows::ContactRows(const Memory &m)
-    : begin(empty<uint32_t>(m)), dof(empty<uint32_t>(m)), weight(empty<double>(m)), y(empty<double>(m)), inv_mass(empty<double>(m)),
-      source(empty<uint32_t>(m)), point(empty<uint32_t>(m)), block(empty<uint32_t>(m)), blocks(empty<Block>(m)), response(empty<double>(m)),
-      frame(empty<double>(m)), drive(empty<double>(m)), rate(empty<double>(m)), wn(empty<double>(m)), wt(empty<double>(m)), cross(empty<double>(m)),
-      impulse(empty<double>(m)), dof_of_point_(empty<uint32_t>(m)), dof_of_node_(empty<uint32_t>(m)) {}
+ContactRows::ContactRows(const Memory &m) {
+  use_memory(m, begin, dof, weight, y, inv_mass, source, point, block, blocks, response, frame, drive, rate, wn, wt, cross, impulse,
+             dof_of_point_, dof_of_node_);
+}
 
 void ContactRows::build(std::span<const ContactPoint> contacts, std::span<const DofSource> sources) {
   // Dofs are numbered in order of first use, except that those of a self-stepping body follow each other (its response is one block).
@@ -119,7 +112,8 @@ Vec3 ContactRows::diagonal(uint32_t i, Vec3 a) const {
 }
 
 void ContactRows::finish(std::span<const ContactPoint> contacts, const double *tangents, double h, double offset) {
-  frame.resize(size_t(n) * 9), drive.resize(size_t(n) * 3), rate.resize(n), wn.resize(n), wt.resize(n), cross.resize(size_t(n) * 2), impulse.resize(size_t(n) * 3);
+  frame.resize(size_t(n) * 9), drive.resize(size_t(n) * 3), rate.resize(n), wn.resize(n), wt.resize(n);
+  cross.resize(size_t(n) * 2), impulse.resize(size_t(n) * 3);
   for (uint32_t i = 0; i < n; ++i) {
     const Vec3 normal = load3(contacts[i].normal), t1 = load3(tangents + size_t(i) * 3), t2 = dfm::cross(normal, t1);
     double *const f = &frame[size_t(i) * 9];

@@ -15,7 +15,8 @@ struct Pair { double a, b; };
 // The radius follows the normal impulse in proportion, which is exact for Coulomb's cone.
 //
 // Smooth laws: lambda = h [ft + D (u' - v) + d (fn' - fn)] with u' = u + w_t (lambda - lambda_old): a 2x2 system, positive definite
-// because only the negative semidefinite part of D is used.
+// because only the negative semidefinite part of D is used. A contact that stuck when its law was asked is kept inside the law's limit: an
+// elastic bristle that breaks away then slides on the cone at once instead of overshooting it.
 Pair friction_impulse(const ContactRows &rows, const ContactState &s, uint32_t i, double h, double ln, double u1, double u2) {
   const double wt = rows.wt[i], l1 = rows.impulse[size_t(i) * 3 + 1], l2 = rows.impulse[size_t(i) * 3 + 2];
   const uint32_t n = s.stride;
@@ -52,7 +53,10 @@ Pair friction_impulse(const ContactRows &rows, const ContactState &s, uint32_t i
   const double v1 = u1 - wt * l1 - s.vt[i], v2 = u2 - wt * l2 - s.vt[n + i];
   const double r1 = h * (s.ft[i] + d11 * v1 + d12 * v2 + s.dft_dfn[i] * dfn), r2 = h * (s.ft[n + i] + d12 * v1 + d22 * v2 + s.dft_dfn[n + i] * dfn);
   const double m11 = 1 - h * wt * d11, m22 = 1 - h * wt * d22, m12 = -h * wt * d12, det = m11 * m22 - m12 * m12;
-  return {(m22 * r1 - m12 * r2) / det, (m11 * r2 - m12 * r1) / det};
+  Pair l{(m22 * r1 - m12 * r2) / det, (m11 * r2 - m12 * r1) / det};
+  const double size = std::sqrt(l.a * l.a + l.b * l.b), radius = fn > 0 ? s.limit[i] / fn * ln : 0;
+  if (s.mode[i] == 1 && size > radius) l = {radius / size * l.a, radius / size * l.b};
+  return l;
 }
 
 double normal_impulse(const ContactRows &rows, uint32_t i, double un) {
@@ -91,9 +95,7 @@ void sweep(ContactRows &rows, const ContactState &law, double h) {
   }
 }
 
-Acceleration::Acceleration(const Memory &m) {
-  for (Array<double> *a : {&metric_, &from_, &f_, &g_, &df_, &dg_}) *a = Array<double>(HookAllocator<double>(m));
-}
+Acceleration::Acceleration(const Memory &m) { use_memory(m, metric_, from_, f_, g_, df_, dg_); }
 
 void Acceleration::start(const ContactRows &rows) {
   n_ = 3 * rows.n, count_ = next_ = 0, first_ = true, last_ = 0;

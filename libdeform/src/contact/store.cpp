@@ -5,8 +5,7 @@
 namespace dfm {
 
 ContactStore::ContactStore(const Memory &m) {
-  auto use = [&](auto &...arrays) { ((arrays = std::decay_t<decltype(arrays)>(typename std::decay_t<decltype(arrays)>::allocator_type(m))), ...); };
-  use(key, id_a, id_b, by_key, normal, tangent, impulse, bristle, law, dwell, path, touching, held, began);
+  use_memory(m, key, id_a, id_b, by_key, normal, tangent, impulse, bristle, law, dwell, path, touching, held, began);
 }
 
 uint32_t ContactStore::find(uint64_t k) const {

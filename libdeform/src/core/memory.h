@@ -40,4 +40,8 @@ struct HookAllocator {
 template <class T>
 using Array = std::vector<T, HookAllocator<T>>;
 
+// Empties arrays and has them allocate from m from now on.
+template <class... T>
+void use_memory(const Memory &m, Array<T> &...arrays) { ((arrays = Array<T>(HookAllocator<T>(m))), ...); }
+
 }  // namespace dfm

@@ -21,6 +21,7 @@ void distribute(std::span<const ContactPoint> contacts, const double *frame, con
   for (const ImpulseSink &s : sinks) {
     if (!s.phyxel) continue;
     const Surface &surface = *s.surface;
+    for (uint32_t col : surface.col) store3(s.phyxel + size_t(4) * col, {});
     for (uint32_t j = 0; j < s.nnode; ++j) {
       const Vec3 p = load3(s.surfel + size_t(3) * j);
       if (surface.identity()) {

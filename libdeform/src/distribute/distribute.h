@@ -13,7 +13,7 @@ struct ImpulseSink {
   uint32_t first_node, nnode;
   const Surface *surface;
   double *surfel;     // [nsurfel,3] N s, zeroed here
-  double *phyxel;     // [npoint,4] N s, zeroed by the caller; null: self-stepping, surfel impulses are all it needs
+  double *phyxel;     // [npoint,4] N s, written where surfels hang, zero elsewhere from the start; null: self-stepping, surfel impulses do
 };
 
 void distribute(std::span<const ContactPoint> contacts, const double *frame, const double *impulse, std::span<const ImpulseSink> sinks);

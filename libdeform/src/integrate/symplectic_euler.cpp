@@ -4,35 +4,33 @@
 
 namespace dfm {
 
+namespace {
+
+// One point: four doubles, two or one machine vectors. The same operations on each component as written, at every width.
+using Point = double __attribute__((vector_size(32)));
+static_assert(kStride == 4 && sizeof(Point) == kStride * sizeof(double));
+Point *points(Array<double> &a) { return reinterpret_cast<Point *>(a.data()); }
+
+}  // namespace
+
 bool predict(Phyxels &p, Vec3 gravity, double h) {
-  const double g[4] = {gravity.x, gravity.y, gravity.z, 0};
-  double poison[4] = {0, 0, 0, 0};  // stays zero unless a value is infinite or NaN
+  const Point g{gravity.x, gravity.y, gravity.z, 0};
+  const Point *const v = points(p.v), *const w = points(p.inv_mass), *const f = points(p.f);
+  Point *const free = points(p.v_free);
+  Point poison{0, 0, 0, 0};  // stays zero unless a value is infinite or NaN
   for (uint32_t i = 0; i < p.n; ++i) {
-    const double m = p.mass[i];
-    const size_t at = size_t(i) * kStride;
-    for (uint32_t k = 0; k < kStride; ++k) {
-      const double v = p.v[at + k] + h * (p.inv_mass[at + k] * (p.f[at + k] + m * g[k]));
-      p.v_free[at + k] = v;
-      poison[k] += v * 0.0;
-    }
+    free[i] = v[i] + h * (w[i] * (f[i] + p.mass[i] * g));
+    poison += free[i] * 0.0;
   }
   return poison[0] + poison[1] + poison[2] + poison[3] == 0;
 }
 
 void commit(Phyxels &p, bool touched, double h) {
-  const size_t count = size_t(p.n) * kStride;
-  double *const x = p.x.data(), *const v = p.v.data();
-  const double *const free = p.v_free.data(), *const w = p.inv_mass.data(), *const impulse = p.impulse.data();
-  if (touched) {
-    for (size_t i = 0; i < count; ++i) {
-      v[i] = free[i] + w[i] * impulse[i];
-      x[i] += h * v[i];
-    }
-  } else {
-    for (size_t i = 0; i < count; ++i) {
-      v[i] = free[i];
-      x[i] += h * v[i];
-    }
+  Point *const x = points(p.x), *const v = points(p.v);
+  const Point *const free = points(p.v_free), *const w = points(p.inv_mass), *const impulse = points(p.impulse);
+  for (uint32_t i = 0; i < p.n; ++i) {
+    v[i] = touched ? free[i] + w[i] * impulse[i] : free[i];
+    x[i] += h * v[i];
   }
 }
 

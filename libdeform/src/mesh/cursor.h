@@ -63,7 +63,7 @@ class Cursor {
     const std::string_view text = word();
     int64_t value = 0;
     const char *from = text.data(), *to = from + text.size();
-    if (text.size() > 1 && *from == '+') ++from;
+    if (text.size() > 1 && *from == '+' && from[1] != '-') ++from;
     const auto result = std::from_chars(from, to, value);
     if (text.empty() || result.ec != std::errc() || result.ptr != to) {
       seek(at);
@@ -76,7 +76,7 @@ class Cursor {
     const std::string_view text = word();
     double value = 0;
     const char *from = text.data(), *to = from + text.size();
-    if (text.size() > 1 && *from == '+') ++from;
+    if (text.size() > 1 && *from == '+' && from[1] != '-') ++from;
     const auto result = std::from_chars(from, to, value);
     const bool underflow = result.ec == std::errc::result_out_of_range && below_one(text);
     if (underflow) value = 0;

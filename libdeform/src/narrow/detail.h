@@ -17,7 +17,7 @@ using Run = std::span<const Candidate>;
 constexpr double kFlat = 1e-3;        // sine of the angle between two faces below which their edge counts as flat
 constexpr double kCone = 0.035;       // 2 degrees: slack of an edge's cone of normals, so that contacts do not flicker at its border
 constexpr double kParallel = 1e-3;    // sine between two edges below which vertex-face contacts stand for them
-constexpr double kEnd = 1e-3;         // share of an edge next to its ends that is left to vertex-face contacts
+constexpr double kEnd = 1e-3;         // share of an edge next to its ends that is left to vertex-face contacts: no longer than the default d_c
 
 struct Pair {
   const BodyView &a;
@@ -87,6 +87,6 @@ struct EdgeFaces {
 };
 EdgeFaces edge_faces(const Surface &surface, uint32_t edge);
 // The same judgement of convexity for a fraction of the cost: most edges stop here.
-bool edge_convex(const Surface &surface, uint32_t edge);
+bool edge_convex(const Surface &surface, uint32_t edge, double ahead = 0);   // at the positions x + ahead v
 
 }  // namespace dfm::narrow

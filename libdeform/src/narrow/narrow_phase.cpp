@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "narrow/detail.h"
+#include "surfel/area.h"
 
 namespace dfm {
 namespace {
@@ -91,7 +92,7 @@ class Areas {
         if (!free) continue;
         nearest = d2;
         c.lender = c.node[k] + 1;
-        c.area = own.surface->area[surfel] * (b ? 0.5 : 1.0);
+        c.area = facing_area(*own.surface, surfel, side_a ? -load3(c.normal) : load3(c.normal)) * (b ? 0.5 : 1.0);
       }
     }
   }

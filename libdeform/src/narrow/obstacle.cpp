@@ -4,6 +4,7 @@
 #include <algorithm>
 
 #include "narrow/detail.h"
+#include "surfel/area.h"
 #include "surfel/closest.h"
 
 namespace dfm::narrow {
@@ -125,7 +126,7 @@ void surfel_obstacle(const Pair &pair, Run run, Array<ContactPoint> &out) {
     if (!(o.distance < reach_of(pair, {&s, 1}, o.point))) continue;
     ContactPoint c = blank(pair, kPrimitive, 0, s, o.face);
     add_node(c, pair.a.first_node + s, 1);
-    c.area = pair.a.surface->area[s];
+    c.area = facing_area(*pair.a.surface, s, -o.normal);
     finish(pair, c, x, o.point, o.normal, o.distance, o.face, out);
   }
 }

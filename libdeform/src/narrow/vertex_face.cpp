@@ -13,6 +13,7 @@
 #include <algorithm>
 
 #include "narrow/detail.h"
+#include "surfel/area.h"
 #include "surfel/closest.h"
 
 namespace dfm::narrow {
@@ -291,7 +292,8 @@ void vertex_face(const Pair &pair, Run run, Array<ContactPoint> &out) {
       uint32_t ordinal = 0;
       for (size_t j = begin; j < k; ++j) ordinal += b.patch[out[j].feature_b] == b.patch[out[k].feature_b];
       out[k].key = contact_key(out[k], pair.a.id, pair.b->id, b.patch[out[k].feature_b], ordinal);
-      out[k].area = 0.5 * pair.a.surface->area[group.surfel] / (out[k].distance < 2 * pair.offset ? touching : 1);
+      const double area = facing_area(*pair.a.surface, group.surfel, -load3(out[k].normal));
+      out[k].area = 0.5 * area / (out[k].distance < 2 * pair.offset ? touching : 1);
     }
   }
 }

@@ -90,27 +90,35 @@ void find_patches(const Array<Vec3> &normal, Surface &out) {
   }
 }
 
+void find_fans(Surface &out) {
+  out.fan_begin.assign(out.nsurfel + 1, 0);
+  for (const uint32_t s : out.tri) ++out.fan_begin[s + 1];
+  for (uint32_t s = 0; s < out.nsurfel; ++s) out.fan_begin[s + 1] += out.fan_begin[s];
+  out.fan.resize(out.tri.size());
+  Array<uint32_t> next(out.fan_begin);
+  for (uint32_t t = 0; t < out.ntri; ++t)
+    for (int k = 0; k < 3; ++k) out.fan[next[out.tri[3 * t + k]]++] = t;
+}
+
 }  // namespace
 
 void make_surface(const Memory &memory, uint32_t npoint, const double *rest, const uint32_t *boundary_tris, uint32_t ntri, Surface &out) {
   const HookAllocator<uint32_t> a(memory);
   out.tri = Array<uint32_t>(a), out.edge = Array<uint32_t>(a), out.edge_tri = Array<uint32_t>(a), out.tri_edge = Array<uint32_t>(a);
   out.tri_owns = Array<uint32_t>(a), out.patch = Array<uint32_t>(a), out.point = Array<uint32_t>(a), out.row = Array<uint32_t>(a);
-  out.col = Array<uint32_t>(a), out.weight = Array<double>(a), out.area = Array<double>(a);
+  out.col = Array<uint32_t>(a), out.weight = Array<double>(a), out.fan_begin = Array<uint32_t>(a), out.fan = Array<uint32_t>(a);
   out.x = Array<double>(a), out.v = Array<double>(a), out.force = Array<double>(a);
   number_surfels(npoint, boundary_tris, ntri, out);
   find_edges(out);
 
   const auto at = [&](uint32_t surfel) { return load3(rest + size_t{3} * out.point[surfel]); };
   Array<Vec3> normal(ntri, Vec3{}, a);
-  out.area.assign(out.nsurfel, 0.0);
   for (uint32_t t = 0; t < ntri; ++t) {
     const uint32_t *c = &out.tri[3 * t];
-    const Vec3 n = cross(at(c[1]) - at(c[0]), at(c[2]) - at(c[0]));
-    normal[t] = normalized(n);
-    for (int k = 0; k < 3; ++k) out.area[c[k]] += norm(n) / 6;
+    normal[t] = normalized(cross(at(c[1]) - at(c[0]), at(c[2]) - at(c[0])));
   }
   find_patches(normal, out);
+  find_fans(out);
 
   Array<double> length(a);
   for (uint32_t e = 0; e < out.nedge; ++e) length.push_back(norm(at(out.edge[2 * e + 1]) - at(out.edge[2 * e])));

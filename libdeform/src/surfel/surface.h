@@ -17,7 +17,7 @@ struct Surface {
   Array<uint32_t> tri_edge;    // [ntri,3] edge k joins corners k and k+1
   Array<uint32_t> tri_owns;    // [ntri] bits 0-2: owns corner k; bits 3-5: owns edge k. Each surfel and edge has one owner
   Array<uint32_t> patch;       // [ntri] features that share an edge within 60 degrees of normal (rest shape) are one patch
-  Array<double> area;          // [nsurfel] m2, a third of the rest triangles around it
+  Array<uint32_t> fan_begin, fan;   // [nsurfel+1], triangles around each surfel, ascending
   double median_edge = 0;      // m, rest
 
   // Coupling x_s = N x_p in CSR. Identity coupling: row and weight are empty and point[s] is surfel s's phyxel.

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <limits>
 
+#include "surfel/closest.h"
+
 namespace dfm {
 namespace {
 
@@ -150,41 +152,16 @@ dfm_ray_hit cast_ray(World &w, Vec3 o, Vec3 d, double max_distance) {
   return hit;
 }
 
-// Ericson, Real-Time Collision Detection, section 5.1.5: Voronoi regions of the triangle, vertices first.
-Vec3 closest_on_triangle(Vec3 p, Vec3 a, Vec3 b, Vec3 c, double w[3]) {
-  const Vec3 ab = b - a, ac = c - a, ap = p - a, bp = p - b, cp = p - c;
-  const double d1 = dot(ab, ap), d2 = dot(ac, ap), d3 = dot(ab, bp), d4 = dot(ac, bp), d5 = dot(ab, cp), d6 = dot(ac, cp);
-  auto at = [&](double u, double v, double s) {
-    w[0] = u, w[1] = v, w[2] = s;
-    return u * a + v * b + s * c;
-  };
-  if (d1 <= 0 && d2 <= 0) return at(1, 0, 0);
-  if (d3 >= 0 && d4 <= d3) return at(0, 1, 0);
-  const double vc = d1 * d4 - d3 * d2;
-  if (vc <= 0 && d1 >= 0 && d3 <= 0) return at(1 - d1 / (d1 - d3), d1 / (d1 - d3), 0);
-  if (d6 >= 0 && d5 <= d6) return at(0, 0, 1);
-  const double vb = d5 * d2 - d1 * d6;
-  if (vb <= 0 && d2 >= 0 && d6 <= 0) return at(1 - d2 / (d2 - d6), 0, d2 / (d2 - d6));
-  const double va = d3 * d6 - d5 * d4;
-  if (va <= 0 && d4 - d3 >= 0 && d5 - d6 >= 0) {
-    const double s = (d4 - d3) / ((d4 - d3) + (d5 - d6));
-    return at(0, 1 - s, s);
-  }
-  const double sum = va + vb + vc;
-  return at(va / sum, vb / sum, vc / sum);
-}
-
 dfm_ray_hit closest_surface(World &w, Vec3 p, double max_distance) {
   dfm_ray_hit hit = nothing();
   for (auto &b : w.bodies)
     for (uint32_t t = 0; t < b->surface.ntri; ++t) {
       const uint32_t *const c = &b->surface.tri[size_t(3) * t];
-      double weight[3];
-      const Vec3 q = closest_on_triangle(p, surfel_vector(*b, b->p.x, c[0]), surfel_vector(*b, b->p.x, c[1]), surfel_vector(*b, b->p.x, c[2]), weight);
-      const double d = norm(p - q);
+      const TrianglePoint q = closest_on_triangle(p, surfel_vector(*b, b->p.x, c[0]), surfel_vector(*b, b->p.x, c[1]), surfel_vector(*b, b->p.x, c[2]));
+      const double d = std::sqrt(q.distance2);
       if (d <= max_distance && d < hit.distance) {
         hit.distance = d, hit.body = b->handle, hit.triangle = t;
-        store3(hit.point, q), store3(hit.normal, normalized(triangle_normal(*b, t)));
+        store3(hit.point, q.point), store3(hit.normal, normalized(triangle_normal(*b, t)));
       }
     }
   return hit;

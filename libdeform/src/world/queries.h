@@ -8,6 +8,5 @@ Vec3 surfel_vector(const Body &b, const Array<double> &phyxel_column, uint32_t s
 void surface_normals(const Body &b, double *out);                                         // [nsurfel,3], area-weighted
 dfm_ray_hit cast_ray(World &w, Vec3 origin, Vec3 unit_direction, double max_distance);
 dfm_ray_hit closest_surface(World &w, Vec3 p, double max_distance);
-Vec3 closest_on_triangle(Vec3 p, Vec3 a, Vec3 b, Vec3 c, double weight[3]);
 
 }  // namespace dfm

@@ -89,7 +89,8 @@ struct StagedLaw { std::string id; std::vector<double> params; };
 struct Staged {
   double time, stable, offset, hold_start;
   uint64_t step_count, next_id;
-  bool holding, bound_due;
+  bool holding;
+  uint32_t bound_age;
   dfm_world_stats stats;
   Vec3 gravity;
   dfm_world_def def;
@@ -111,7 +112,7 @@ T &object(const std::unique_ptr<T> &x) { return *x; }
 
 template <class Stream, class W>
 void fields(Stream &s, W &w) {
-  s.value(w.time), s.value(w.step_count), s.value(w.stable), s.value(w.offset), s.value(w.hold_start), s.value(w.holding), s.value(w.bound_due);
+  s.value(w.time), s.value(w.step_count), s.value(w.stable), s.value(w.offset), s.value(w.hold_start), s.value(w.holding), s.value(w.bound_age);
   s.value(w.stats), s.value(w.gravity), s.value(w.def.gravity), s.value(w.next_id), s.array(w.gravity_keys);
   s.each(w.bodies, [&](auto &entry) {
     auto &b = object(entry);
@@ -275,7 +276,7 @@ void world_restore(World &w, const void *data, size_t bytes) {
   // Tables and plan follow from what is there now; what prepare() would choose anew is put back as it was.
   w.changed = true;
   w.prepare();
-  w.gravity = staged.gravity, w.stable = staged.stable, w.offset = staged.offset, w.bound_due = staged.bound_due;
+  w.gravity = staged.gravity, w.stable = staged.stable, w.offset = staged.offset, w.bound_age = staged.bound_age;
 }
 
 }  // namespace dfm

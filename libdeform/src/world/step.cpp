@@ -19,8 +19,8 @@
 namespace dfm {
 namespace {
 
-// The bound depends on the state (volume terms stiffen as cells grow), so it is asked for again every 16 steps; 0.9 of it is used.
-constexpr uint64_t kBoundEvery = 16;
+// The bound depends on the state (volume terms stiffen as cells grow), so it is asked for again after 16 sub-steps; 0.9 of it is used.
+constexpr uint32_t kBoundEvery = 16;
 constexpr double kBoundShare = 0.9;
 
 // The first body, in id order, for which something failed: the same for every cut of the bodies over threads.
@@ -101,7 +101,7 @@ void move_obstacles(World &w, double t, double h, double left, bool last) {
 
 dfm_status World::step(double dt, uint32_t *trouble) {
   prepare();
-  if (bound_due || step_count % kBoundEvery == 0) update_bound();
+  if (bound_age >= kBoundEvery) update_bound();
   const double count = std::ceil(dt / stable - 1e-9);   // stable is infinite where nothing bounds the step
   if (!(count <= def.max_substeps)) {
     set_last_error(format("a step of %g s needs %.0f sub-steps of %g s (max_substeps %u): soften or coarsen body '%s', or take a shorter step",
@@ -120,7 +120,7 @@ dfm_status World::step(double dt, uint32_t *trouble) {
     if (!sub_step(trouble)) return DFM_E_DIVERGED;
     move_obstacles(*this, time, h, start + dt - time, k + 1 == n);
     time = end;
-    ++stats.substeps;
+    ++stats.substeps, ++bound_age;
   }
   ++step_count;
   stats.steps = step_count, stats.time = time;
@@ -156,7 +156,7 @@ void World::update_bound() {
   }
   stable *= kBoundShare;
   stats.stable_step = stable;
-  bound_due = false;
+  bound_age = 0;
 }
 
 void World::stage_motion() {
@@ -263,8 +263,6 @@ void World::stage_broad() {
 void World::stage_narrow() { find_contacts(body_views, obstacle_views, broad.candidates(), h, offset, contacts); }
 
 void World::stage_distribute() {
-  for (const ImpulseSink &s : sinks)
-    if (s.phyxel) std::fill(s.phyxel, s.phyxel + size_t(kStride) * bodies[size_t(&s - sinks.data())]->p.n, 0.0);
   distribute(contacts, rows.frame.data(), rows.impulse.data(), sinks);
 }
 

@@ -28,10 +28,10 @@ Pose Obstacle::pose_at_time(double t) const {
 World::World(dfm_context *c)
     : context(c), broad(c->memory), rows(c->memory), acceleration(c->memory), store(c->memory), next_store(c->memory), batches(c->memory) {
   const Memory &m = c->memory;
-  auto use = [&](auto &...arrays) { ((arrays = std::decay_t<decltype(arrays)>(typename std::decay_t<decltype(arrays)>::allocator_type(m))), ...); };
-  use(driven, contacts, tolerance.tangent, disturbance, best_impulse, tangents, match, block_surfels, block_impulse, block_velocity, report.contacts, report.frame, report.impulse, report.slip, report.mode,
-      state.law, state.fn, state.vt, state.ft_stop, state.area, state.dwell, state.bristle, state.ft, state.dft_dvt, state.dft_dfn, state.limit,
-      state.bristle_out, state.mode, state.set_valued);
+  use_memory(m, driven, contacts, tolerance.tangent, disturbance, best_impulse, tangents, match, block_surfels, block_impulse, block_velocity);
+  use_memory(m, report.contacts, report.frame, report.impulse, report.slip, report.mode);
+  use_memory(m, state.law, state.fn, state.vt, state.ft_stop, state.area, state.dwell, state.bristle, state.ft, state.dft_dvt, state.dft_dfn, state.limit,
+             state.bristle_out, state.mode, state.set_valued);
   stats.size = sizeof stats;
 }
 
@@ -192,7 +192,7 @@ void World::prepare() {
   offset = def.contact_offset > 0 ? def.contact_offset : contact_offset(*this);
   gravity = load3(def.gravity);
   if (!gravity_keys.empty()) gravity = vector_at(gravity_keys, time);
-  bound_due = true;
+  bound_age = kNone;
   changed = false;
 }
 

@@ -112,7 +112,7 @@ struct World {
   PairFilter filter;
   std::vector<LawInstance *> law_list;
   double offset = 0;                                   // d_c, m
-  bool bound_due = true;
+  uint32_t bound_age = kNone;                          // sub-steps since the bound was asked for; kNone: ask before the next step
 
   // Time.
   double time = 0, stable = 0;                         // s; stable: 0.9 of the bound at its last evaluation

@@ -150,7 +150,7 @@ TEST(MeshRead, FlatCells_AreRefusedWithTheFirst) {
 
 TEST(MeshRead, NumbersThatAreNone_AreRefusedWithTheirLine) {
   const auto points = [](const std::string &x) { return kVtk + "POINTS 4 double\n0 0 0\n1 0 0\n0 1 0\n0 0 " + x + "\n" + kOneCell; };
-  for (const char *bad : {"nan", "NaN", "-nan", "inf", "-Infinity", "1e999", "zero", "1,5", "1.0x", "0x10", "--1", "+", "1e101"})
+  for (const char *bad : {"nan", "NaN", "-nan", "inf", "-Infinity", "1e999", "zero", "1,5", "1.0x", "0x10", "--1", "+-1", "+", "1e101"})
     expect_refusal("number.vtk", points(bad), DFM_E_FORMAT,
         {std::string(bad) == "1e101" ? "coordinate" : "number.vtk:9: expected a point's coordinate"});
   for (const char *good : {"+1", "1.", ".5", "1E0", "1e-400"}) {

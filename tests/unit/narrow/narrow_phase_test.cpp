@@ -4,6 +4,7 @@
 
 #include "../surfel/detect_scene.h"
 #include "core/hash.h"
+#include "surfel/area.h"
 #include "surfel/closest.h"
 
 namespace {
@@ -44,7 +45,7 @@ TEST(VertexFace, PointOverFace_HasFaceNormalAndBarycentricWeights) {
   EXPECT_EQ(c[0].normal[2], 1.0);
   EXPECT_EQ(c[0].kind, kVertexFace);
   EXPECT_EQ(c[0].nnode, 4);
-  EXPECT_DOUBLE_EQ(c[0].area, scene.surfaces[0]->area[0] / 2);
+  EXPECT_DOUBLE_EQ(c[0].area, facing_area(*scene.surfaces[0], 0, -load3(c[0].normal)) / 2);
   EXPECT_EQ(flaw(scene, scene.contacts()), "");
 }
 
@@ -233,7 +234,7 @@ TEST(FindContacts, NearestContact_IsTheDistanceOfTheBodies) {
   std::normal_distribution<double> normal;
   const Mesh meshes[3] = {box_mesh({1, 0.7, 0.5}, 1, 1, 1), sphere_mesh(0.5, 1),
                           tetrahedron_mesh({0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0.1, 0.2, 0.8})};
-  int edges = 0, faces = 0, rims = 0;
+  int edges = 0, faces = 0, rims = 0, exact = 0, pairs = 0;
   for (int i = 0; i < 600; ++i) {
     Scene scene;
     scene.offset = 0.05;
@@ -274,7 +275,11 @@ TEST(FindContacts, NearestContact_IsTheDistanceOfTheBodies) {
     for (const ContactPoint &c : contacts)
       if (c.distance < least) least = c.distance, nearest = &c;
     ASSERT_NE(nearest, nullptr) << "pair " << i << " at distance " << d;
-    EXPECT_NEAR(least, d, 1e-9) << "pair " << i;
+    // Exact, but for edges that meet within a thousandth of their ends: there the end stands for them, x further along the other edge.
+    const double x = 1e-3 * 1.4;   // no edge of these meshes is longer than 1.4
+    EXPECT_GE(least, d - 1e-9) << "pair " << i;
+    EXPECT_LE(least, std::sqrt(d * d + x * x) + 1e-9) << "pair " << i;
+    exact += least < d + 1e-9, ++pairs;
     const Vec3 n = load3(nearest->normal);
     EXPECT_GT(dot(n, way) * (nearest->slot_a == 1 ? 1 : -1), 0);
     edges += nearest->kind == kEdgeEdge, faces += nearest->kind == kVertexFace && nearest->nnode == 4;
@@ -283,6 +288,7 @@ TEST(FindContacts, NearestContact_IsTheDistanceOfTheBodies) {
   EXPECT_GT(edges, 50);
   EXPECT_GT(faces, 50);
   EXPECT_GT(rims, 10);
+  EXPECT_GT(exact, 0.97 * pairs);
 }
 
 Scene crossed_tetrahedra(double gap) {
@@ -305,7 +311,7 @@ TEST(EdgeEdge, CrossedTetrahedra_MeetEdgeOnEdge) {
   for (int k = 0; k < 4; ++k) EXPECT_NEAR(std::fabs(c[0].weight[k]), 0.5, 1e-12);
   EXPECT_EQ(flaw(scene, c), "");
   // No end has a contact of its own, so the nearest end (all equally near: the first) lends its share.
-  EXPECT_DOUBLE_EQ(c[0].area, scene.surfaces[0]->area[0] / 2);
+  EXPECT_DOUBLE_EQ(c[0].area, facing_area(*scene.surfaces[0], 0, -load3(c[0].normal)) / 2);
 }
 
 TEST(EdgeEdge, SlightPenetration_KeepsItsSign) {
@@ -381,7 +387,7 @@ TEST(EdgeEdge, Area_ComesFromFreeCorners) {
     for (int k = 0; k < c.nnode; ++k) {
       const uint32_t body = c.node[k] < scene.surfaces[0]->nsurfel ? 0 : 1;
       if (!touching.count(c.node[k]) && corners.insert(c.node[k]).second)
-        free += 0.5 * scene.surfaces[body]->area[c.node[k] - scene.bodies[body].first_node];
+        free += 0.5 * facing_area(*scene.surfaces[body], c.node[k] - scene.bodies[body].first_node, {0, 0, body ? -1.0 : 1.0});
     }
   }
   EXPECT_GE(edges, 8u);
@@ -396,11 +402,7 @@ TEST(FindContacts, SummedArea_IsTheTouchingPatch) {
   scene.add(moved(box_mesh({1, 1, 1}, 30, 31, 4), turn({0, 0, 1}, 0.2), {0, 0, 1.001}));
   double area = 0;
   for (const ContactPoint &c : scene.listed()) area += c.area;
-  // The upper surfels on the rim own a third of the triangles on the sides too.
-  double rim = 0;
-  for (uint32_t i = 0; i < scene.surfaces[1]->nsurfel; ++i)
-    if (scene.surfaces[1]->x[4 * i + 2] < 0.502) rim += scene.surfaces[1]->area[i];
-  EXPECT_NEAR(area, 0.5 * rim + 0.5, 0.02);
+  EXPECT_NEAR(area, 1, 0.02);
 }
 
 TEST(FindContacts, SwappedBodies_GiveMirroredContacts) {
@@ -467,7 +469,7 @@ TEST(FindContacts, FixedScene_HasItsGoldenHash) {
   ASSERT_GT(contacts.size(), 20u);
   Hash hash;
   for (const ContactPoint &c : contacts) hash.add(c);
-  EXPECT_EQ(hash.value, 11455495798150159590u);
+  EXPECT_EQ(hash.value, 4085627832085423884u);
 }
 
 TEST(FindContacts, CallOrderOfViews_DoesNotMatter) {

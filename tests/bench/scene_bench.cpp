@@ -1,0 +1,138 @@
+// Full steps per second of processor time, on the scene files that are examples and tests too. What is timed is dfm_world_step alone: model,
+// detection, contact and friction, one core. Prints a table with the figure to reach (quality page of the design) and where the time goes;
+// --csv FILE appends rows.
+#include <sys/resource.h>
+
+#include <cstdio>
+#include <cstring>
+#include <fstream>
+#include <string>
+#include <vector>
+
+#include "deform/deform.h"
+#include "support.h"
+
+namespace {
+
+struct Case {
+  const char *name, *scene;
+  std::vector<std::string> set;
+  double settle, timed;   // s simulated before and during the measurement
+  double reach;           // full steps per second; 0: none stated
+};
+
+double cpu_seconds() {
+  rusage u{};
+  getrusage(RUSAGE_SELF, &u);
+  return double(u.ru_utime.tv_sec + u.ru_stime.tv_sec) + 1e-6 * double(u.ru_utime.tv_usec + u.ru_stime.tv_usec);
+}
+
+[[noreturn]] void die(const std::string &what) {
+  std::fprintf(stderr, "scene_bench: %s: %s\n", what.c_str(), dfm_last_error());
+  std::exit(2);
+}
+
+std::string compiler() {
+#if defined(__clang__)
+  return "clang " __clang_version__;
+#else
+  return "gcc " __VERSION__;
+#endif
+}
+
+std::string machine() {
+  std::ifstream in("/proc/cpuinfo");
+  for (std::string line; std::getline(in, line);)
+    if (line.rfind("model name", 0) == 0) return line.substr(line.find(':') + 2);
+  return "unknown";
+}
+
+void run(dfm_context *context, const Case &c, std::FILE *csv, const std::string &commit) {
+  std::vector<const char *> set;
+  for (const auto &s : c.set) set.push_back(s.c_str());
+  dfm_scene_options options{};
+  options.size = sizeof options, options.nset = static_cast<uint32_t>(set.size()), options.set = set.data();
+  dfm_scene scene = 0;
+  dfm_world world = 0;
+  const std::string path = std::string(DEFORM_SOURCE_DIR) + "/examples/scenes/" + c.scene;
+  if (dfm_scene_open(context, path.c_str(), &options, &scene) != DFM_OK || dfm_scene_world(scene, &world) != DFM_OK) {
+    std::printf("%-34s left out: %s\n", c.name, dfm_last_error());
+    return;
+  }
+  dfm_scene_settings settings{};
+  settings.size = sizeof settings;
+  if (dfm_scene_get_settings(scene, &settings) != DFM_OK) die(c.name);
+  const double h = settings.step;
+  auto steps = [&](double seconds) {
+    const long n = static_cast<long>(seconds / h + 0.5);
+    for (long i = 0; i < n; ++i)
+      if (dfm_world_step(world, h, nullptr) != DFM_OK) die(c.name);
+    return n;
+  };
+  auto stats = [&] {
+    dfm_world_stats s{};
+    s.size = sizeof s;
+    if (dfm_world_get_stats(world, &s) != DFM_OK) die(c.name);
+    return s;
+  };
+  steps(c.settle);
+  const dfm_world_stats before = stats();
+  dfm_stage_time t0[16], t1[16];
+  uint32_t n = 0;
+  dfm_world_profile(world, 16, t0, &n);
+  const double start = cpu_seconds();
+  // Slices of the timed part: the fastest tells what the machine can do, the whole what it did.
+  double fastest = 0;
+  long total = 0;
+  uint64_t contacts = 0, sweeps = 0, slices = 20;
+  for (uint64_t k = 0; k < slices; ++k) {
+    const double at = cpu_seconds();
+    const long done = steps(c.timed / double(slices));
+    total += done;
+    fastest = std::max(fastest, double(done) / (cpu_seconds() - at));
+    contacts += stats().contacts, sweeps += stats().sweeps;
+  }
+  const double rate = double(total) / (cpu_seconds() - start);
+  dfm_world_profile(world, 16, t1, &n);
+  const dfm_world_stats after = stats();
+  const double substeps = double(after.substeps - before.substeps) / double(total);
+  std::printf("%-34s %8.0f (best %.0f)", c.name, rate, fastest);
+  if (c.reach > 0) std::printf("  reach %6.0f: %3.0f %%", c.reach, 100 * rate / c.reach);
+  std::printf("  contacts %.0f  sub-steps %.2f  sweeps %.1f\n", double(contacts) / double(slices), substeps, double(sweeps) / double(slices));
+  double all = 0;
+  for (uint32_t i = 0; i < n; ++i) all += t1[i].seconds - t0[i].seconds;
+  for (uint32_t i = 0; i < n; ++i) std::printf("    %-18s %5.1f %%\n", t1[i].name, 100 * (t1[i].seconds - t0[i].seconds) / all);
+  if (csv)
+    std::fprintf(csv, "%s,%s,%s,%s,%.0f,%.0f,%.0f,%.1f,%.2f\n", machine().c_str(), compiler().c_str(), commit.c_str(), c.name, rate, fastest, c.reach,
+                 double(contacts) / double(slices), substeps);
+  dfm_scene_close(scene);
+}
+
+}  // namespace
+
+int main(int argc, char **argv) {
+  std::FILE *csv = nullptr;
+  std::string commit = "unknown";
+  for (int i = 1; i + 1 < argc; ++i) {
+    if (!std::strcmp(argv[i], "--csv")) csv = std::fopen(argv[i + 1], "w");
+    if (!std::strcmp(argv[i], "--commit")) commit = argv[i + 1];
+  }
+  if (csv) std::fprintf(csv, "machine,compiler,commit,scene,steps_per_cpu_s,best_slice,reach,contacts,substeps\n");
+  dfm_context_def def = dfm_context_def_default();
+  def.plugin_dir = DEFORM_PLUGIN_DIR;
+  dfm_context *context = nullptr;
+  if (dfm_context_create(&def, &context) != DFM_OK) die("context");
+  const std::vector<std::string> springs{"/bodies/0/model/params/volume=0", "/bodies/1/model/params/volume=0"};
+  const std::vector<Case> cases{
+      {"fine pair, springs", "two_cylinders_fine.json", springs, 3, 1, 2000},
+      {"fine pair, springs and volume", "two_cylinders_fine.json", {}, 3, 1, 1200},
+      {"coarse pair, springs", "two_cylinders_coarse.json", springs, 3, 1, 10000},
+      {"coarse pair, springs and volume", "two_cylinders_coarse.json", {}, 3, 1, 6000},
+      {"own pair (demo)", "two_cylinders.json", {}, 2, 1, 0},
+      {"ten bodies", "ten_bodies.json", {}, 1, 0.5, 0},
+  };
+  std::printf("%-34s %8s\n", "scene", "full steps per second of processor time");
+  for (const Case &c : cases) run(context, c, csv, commit);
+  dfm_context_destroy(context);
+  if (csv) std::fclose(csv);
+}
