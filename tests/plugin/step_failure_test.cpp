@@ -66,7 +66,7 @@ extern "C" const dfm_plugin *dfm_plugin_entry_misbehaving(const dfm_host *host, 
   if (!DFM_ABI_OK(host)) return nullptr;
   static const char *const effects[] = {nullptr};
   static dfm_friction friction{};
-  friction.size = sizeof friction, friction.needs = 0, friction.flags = DFM_FRIC_SET_VALUED, friction.eval = law_eval;
+  friction.size = sizeof friction, friction.needs = 0, friction.flags = DFM_FRIC_SET_VALUED | DFM_FRIC_JACOBIAN, friction.eval = law_eval;
   static dfm_model ops{};
   ops.size = sizeof ops, ops.cells = DFM_CELL_TET, ops.create = create, ops.destroy = destroy, ops.add_forces = add_forces, ops.bound = bound;
   static dfm_type law{}, model{};
