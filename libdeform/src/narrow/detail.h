@@ -89,6 +89,6 @@ struct EdgeFaces {
 };
 EdgeFaces edge_faces(const Surface &surface, uint32_t edge);
 // The same judgement of convexity for a fraction of the cost: most edges stop here.
-bool edge_convex(const Surface &surface, uint32_t edge);
+bool edge_convex(const Surface &surface, uint32_t edge, double ahead = 0);   // at the positions x + ahead v
 
 }  // namespace dfm::narrow

@@ -24,10 +24,10 @@ EdgeFaces edge_faces(const Surface &surface, uint32_t edge) {
 
 // An open edge is as convex as can be. Between two faces the sine of the fold is c0 . r1 |e| / (|c0| |c1|), with r1 to the second face's
 // far corner and c the faces' normals times twice their areas; it is negative where the second face falls away from the first.
-bool edge_convex(const Surface &surface, uint32_t edge) {
+bool edge_convex(const Surface &surface, uint32_t edge, double ahead) {
   const uint32_t *ends = &surface.edge[2 * size_t{edge}], *tris = &surface.edge_tri[2 * size_t{edge}];
   if (tris[0] == kNone || tris[1] == kNone) return true;
-  const auto x = [&](uint32_t s) { return load3(&surface.x[4 * size_t{s}]); };
+  const auto x = [&](uint32_t s) { return load3(&surface.x[4 * size_t{s}]) + ahead * load3(&surface.v[4 * size_t{s}]); };
   const auto far_corner = [&](uint32_t t) {
     const uint32_t *c = &surface.tri[3 * size_t{t}];
     return c[0] + c[1] + c[2] - ends[0] - ends[1];
@@ -36,6 +36,11 @@ bool edge_convex(const Surface &surface, uint32_t edge) {
   const Vec3 c0 = cross(e, r0), c1 = cross(r1, e);
   const double fold = dot(c0, r1);
   return fold < 0 && fold * fold * norm2(e) > kConvex * kConvex * norm2(c0) * norm2(c1);
+}
+
+// Convex now, or on the way to be within the sub-step: a fold that pops out under an edge that lies on both its faces meets it at once.
+bool edge_becomes_convex(const Surface &surface, uint32_t edge, double h) {
+  return edge_convex(surface, edge, 0) || edge_convex(surface, edge, 2 * h);
 }
 
 void edge_edge(const Pair &pair, Run run, Array<ContactPoint> &out) {
@@ -52,7 +57,7 @@ void edge_edge(const Pair &pair, Run run, Array<ContactPoint> &out) {
     if (candidate.feature_a != last_a) {
       last_a = candidate.feature_a;
       known = false;
-      convex = edge_convex(sa, last_a);
+      convex = edge_becomes_convex(sa, last_a, pair.h);
       p0 = pair.xa(ea[0]), u = pair.xa(ea[1]) - p0;
       vp0 = pair.va(ea[0]), vp1 = pair.va(ea[1]);
       uu = norm2(u);
@@ -76,7 +81,7 @@ void edge_edge(const Pair &pair, Run run, Array<ContactPoint> &out) {
     const double allowed = std::max(reach, depth);
     if (!(nr * nr < allowed * allowed * nn)) continue;
 
-    if (!edge_convex(sb, candidate.feature_b)) continue;
+    if (!edge_becomes_convex(sb, candidate.feature_b, pair.h)) continue;
     if (!known) fa = edge_faces(sa, candidate.feature_a);
     known = true;
     const EdgeFaces fb = edge_faces(sb, candidate.feature_b);

@@ -251,7 +251,14 @@ bool World::stage_predict(uint32_t *trouble) {
   return false;
 }
 
-void World::stage_broad() { broad.update(body_views, obstacle_views, filter, h, offset); }
+void World::stage_broad() {
+  try {
+    broad.update(body_views, obstacle_views, filter, h, offset);
+  } catch (...) {
+    broad.clear();   // out of memory half way through its lists: they are made anew next time
+    throw;
+  }
+}
 
 void World::stage_narrow() { find_contacts(body_views, obstacle_views, broad.candidates(), h, offset, contacts); }
 
