@@ -48,3 +48,21 @@ TEST(Stack, ThreeCubes_InterfacesCarryTheWeightAboveAndRest) {
     EXPECT_LE(std::hypot(contacts[i].ft[0], contacts[i].ft[1]), kMu * contacts[i].fn * (1 + 1e-9));
   }
 }
+
+// The automatic rest distance follows the bodies' edges. It must not grow under bodies that already rest.
+TEST(Stack, CoarseBodyAddedElsewhere_LeavesRestAlone) {
+  test::Context context;
+  const dfm_world world = test::make_world(context);
+  test::BodyOptions small, large;
+  small.name = "small", small.young = 1e6, small.damping_stiffness = 1e-3, small.position = {0, 0, 5e-5};
+  large.name = "large", large.young = 1e6, large.position = {5, 5, 0.01};
+  const dfm_body body = test::make_body(context, world, "beam", {0.1, 0.1, 0.1}, 60, small);
+  test::add_plane(world, "floor");
+  test::run(world, 0.5, 1e-3);
+  const double height = test::measure(body).com[2];
+  test::make_body(context, world, "beam", {1, 1, 1}, 60, large);
+  for (int step = 0; step < 100; ++step) {
+    test::run(world, 1e-3, 1e-3);
+    ASSERT_NEAR(test::measure(body).com[2], height, 1e-7) << "step " << step;
+  }
+}
