@@ -165,7 +165,8 @@ void World::keep_contacts() {
     const uint64_t a = bodies[c.slot_a]->id, b = c.obstacle ? obstacles[c.slot_b]->id : bodies[c.slot_b]->id;
     const double *const l = &rows.impulse[size_t(i) * 3];
     const uint32_t m = match[i];
-    const bool before = m != kNone && store.touching[m];
+    const uint32_t known = m != kNone ? m : store.find(c.key);   // also where the normal turned over and nothing else is taken along
+    const bool before = known != kNone && store.touching[known];
     // hysteresis: a contact ends when it carries nothing and has opened by a tenth of the offset
     const bool now = l[0] > 0 || (before && c.distance - offset < 0.1 * offset);
     const bool stick = l[0] > 0 && state.mode[i] == 1;
