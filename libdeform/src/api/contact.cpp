@@ -119,7 +119,10 @@ dfm_status dfm_world_pairs(dfm_world world, uint32_t capacity, dfm_pair_report *
       }
       dfm_pair_report *const it = &at->report;
       const uint32_t body = turned ? c.slot_b : c.slot_a;
-      if (!known[body]) com[body] = load3(measure(*w.bodies[body]).com), known[body] = 1;
+      if (!known[body]) {  // where the centre was when the contact points were there: at the start of the sub-step
+        const dfm_body_measure m = measure(*w.bodies[body]);
+        com[body] = load3(m.com) - w.report.h * load3(m.velocity), known[body] = 1;
+      }
       const double *const f = &w.report.frame[size_t(9) * i], *const l = &w.report.impulse[size_t(3) * i];
       const double scale = (turned ? -1 : 1) / w.report.h;
       const Vec3 friction = scale * (l[1] * load3(f + 3) + l[2] * load3(f + 6)), force = scale * l[0] * load3(f) + friction;

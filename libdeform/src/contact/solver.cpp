@@ -177,11 +177,11 @@ double tangent_residual(const ContactRows &rows, uint32_t i, Pair law) {
   return rows.wt[i] * std::sqrt(a * a + b * b);
 }
 
-// What the laws, asked at the present state, want contact i to carry. A set-valued law is compared by its projection: where a contact just
-// slips, its force and its slip may still differ in direction by much while what is left to correct, the slip across the force, is tiny.
+// What the laws, asked at the present state, want contact i to carry. They are compared by the answer they give together with the contact's own
+// response, not by the bare force: the difference is then the velocity that is left to correct. Where a set-valued law just slips, force and
+// slip may differ in direction by much while that is tiny; a smooth law with a steep slope c would count it 1 + h w_t c times.
 Pair answered(const ContactRows &rows, const ContactState &s, uint32_t i, double h, Vec3 u) {
-  if (s.set_valued[i]) return friction_impulse(rows, s, i, h, rows.impulse[size_t(i) * 3], u.y, u.z);
-  return {h * s.ft[i], h * s.ft[s.stride + i]};
+  return friction_impulse(rows, s, i, h, rows.impulse[size_t(i) * 3], u.y, u.z);
 }
 
 // law(i, u) gives the friction impulse that contact i should carry.

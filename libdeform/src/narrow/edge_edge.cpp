@@ -35,7 +35,7 @@ bool edge_convex(const Surface &surface, uint32_t edge, double ahead) {
   const Vec3 from = x(ends[0]), e = x(ends[1]) - from, r0 = x(far_corner(tris[0])) - from, r1 = x(far_corner(tris[1])) - from;
   const Vec3 c0 = cross(e, r0), c1 = cross(r1, e);
   const double fold = dot(c0, r1);
-  return fold < 0 && fold * fold * norm2(e) > kFlat * kFlat * norm2(c0) * norm2(c1);
+  return fold < 0 && fold * fold * norm2(e) > kConvex * kConvex * norm2(c0) * norm2(c1);
 }
 
 // Convex now, or on the way to be within the sub-step: a fold that pops out under an edge that lies on both its faces meets it at once.

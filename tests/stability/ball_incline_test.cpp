@@ -1,0 +1,58 @@
+// A ball on an incline of 10 degrees: frictionless it slides and does not turn; with friction it rolls, a = 5/7 g sin(theta), and twice the
+// friction changes nothing. Gravity grows within 0.2 s, so that nothing rings. Source: ../shared/reference/contact/tables/rolling_incline.csv.
+#include "scenes.h"
+
+namespace {
+
+constexpr double kSlide = 1.70348862291, kRoll = 1.21677758779;  // accelerations, m/s2
+
+// Mean acceleration after the start.
+double acceleration(const test::SceneRun &run) {
+  const auto rows = run.rows("ball");
+  size_t first = 0;
+  while (first + 1 < rows.size() && rows[first].t < 0.395) ++first;
+  return (rows.back().velocity[0] - rows[first].velocity[0]) / (rows.back().t - rows[first].t);
+}
+
+// Largest component of angular velocity: angular momentum over 2/5 m r2.
+double spin(const test::SceneRun &run) {
+  double most = 0;
+  for (const test::BodyRow &row : run.rows("ball"))
+    for (double l : row.spin_momentum) most = std::max(most, std::fabs(l) / (0.4 * 1000 * row.volume * 0.1 * 0.1));
+  return most;
+}
+
+// 5 %: the ball is a polyhedron of 720 facets and loses a little at every edge.
+bool rolls(const test::SceneRun &run) { return std::fabs(acceleration(run) / kRoll - 1) < 0.05 && spin(run) > 8; }
+
+}  // namespace
+
+TEST(BallIncline, Frictionless_SlidesWithoutTurning) {
+  const test::SceneRun run("ball_incline", {"--set", test::kFrictionless});
+  run.expect_sound(3, "frictionless");
+  EXPECT_NEAR(acceleration(run), kSlide, 0.001 * kSlide);
+  EXPECT_LT(spin(run), 1e-3) << "rad/s; rolling it would be 13";
+  EXPECT_FALSE(rolls(run));
+}
+
+TEST(BallIncline, WithFriction_Rolls) {
+  const test::SceneRun run("ball_incline", {});
+  run.expect_sound(3, "mu 0.3");
+  EXPECT_TRUE(rolls(run)) << acceleration(run) << " m/s2, " << spin(run) << " rad/s";
+}
+
+TEST(BallIncline, TwiceTheFriction_RollsTheSame) {
+  const test::SceneRun once("ball_incline", {}), twice("ball_incline", {"--set", "/contact/friction/0/params/mu=0.6"});
+  EXPECT_TRUE(rolls(twice));
+  EXPECT_NEAR(acceleration(twice), acceleration(once), 0.05 * acceleration(once));
+}
+
+// tan(10 degrees) 2/7 = 0.0504: with less friction than that it slides and turns too slowly.
+TEST(BallIncline, TooLittleFriction_DoesNotRoll) {
+  const test::SceneRun run("ball_incline", {"--set", "/contact/friction/0/params/mu=0.02"});
+  EXPECT_FALSE(rolls(run));
+  EXPECT_NEAR(acceleration(run), 9.81 * (std::sin(0.174532925199) - 0.02 * std::cos(0.174532925199)), 0.005 * kSlide);
+}
+
+TEST(BallIncline, FiveJitteredRuns_AllRoll) { test::expect_jittered("ball_incline", 1, 5, {}, 3, rolls); }
+TEST(BallIncline, FiveMoreJitteredRuns_AllRoll) { test::expect_jittered("ball_incline", 6, 10, {}, 3, rolls); }

@@ -1,0 +1,38 @@
+// Balls, bars and rods of three stiffnesses dropped into a box: they pile up, come to rest and never cross.
+#include "scenes.h"
+
+namespace {
+
+const char *const kBodies[] = {"ball1", "ball2", "ball3", "ball4", "bar1", "bar2", "bar3", "rod1", "rod2", "rod3"};
+
+bool inside_the_box(const test::SceneRun &run) {
+  bool inside = true;
+  for (const char *body : kBodies) {
+    const test::BodyRow row = run.last(body);
+    inside = inside && std::fabs(row.com[0]) < 0.32 && std::fabs(row.com[1]) < 0.32 && row.com[2] > 0.03 && row.com[2] < 2.0;
+  }
+  return inside;
+}
+
+bool apart(const test::SceneRun &run) { return run.number("intersections_max") == 0; }
+
+}  // namespace
+
+TEST(TenBodies, DroppedInABox_ComeToRestWithoutCrossing) {
+  const test::SceneRun run("ten_bodies", {"--time", "4"});
+  run.expect_sound(100, "ten bodies");
+  EXPECT_TRUE(apart(run));
+  EXPECT_TRUE(inside_the_box(run));
+  EXPECT_LT(run.creep_um_per_s(), 1);
+  double kinetic = 0;
+  for (const char *body : kBodies) kinetic += run.last(body).kinetic;
+  EXPECT_LT(kinetic, 1e-2) << "joule; the drop is worth 300";
+}
+
+TEST(TenBodies, TwoKindsThatMayPass_Cross) {
+  const test::SceneRun run("ten_bodies", {"--time", "0.8", "--set", R"(/contact/filter=[{"between": ["material=jelly", "material=gel"]}])"});
+  EXPECT_FALSE(apart(run)) << "the crossing check must see what contact is told to ignore";
+}
+
+TEST(TenBodies, FiveJitteredRuns_DoNotCross) { test::expect_jittered("ten_bodies", 1, 5, {"--time", "0.9"}, 60, inside_the_box); }
+TEST(TenBodies, FiveMoreJitteredRuns_DoNotCross) { test::expect_jittered("ten_bodies", 6, 10, {"--time", "0.9"}, 60, inside_the_box); }
