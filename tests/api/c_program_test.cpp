@@ -9,7 +9,8 @@
 namespace {
 
 test::CommandResult example(const std::string &name) {
-  return test::run({"/usr/bin/env", std::string("DEFORM_PLUGIN_PATH=") + DEFORM_PLUGIN_DIR, std::string(DEFORM_BINARY_DIR) + "/bin/example_" + name});
+  const std::string plugins = std::string("DEFORM_PLUGIN_PATH=") + DEFORM_PLUGIN_DIR;
+  return test::run({"/usr/bin/env", plugins, std::string(DEFORM_BINARY_DIR) + "/bin/example_" + name});
 }
 
 }  // namespace
@@ -37,7 +38,8 @@ TEST(CProgram, Pull_SlidesWhereCoulombSays) {
   ASSERT_EQ(r.exit_code, 0) << r.out << r.err;
   double at = 0, mu = 0;
   unsigned begun = 0, ended = 0, now = 0;
-  ASSERT_EQ(std::sscanf(r.out.c_str(), "slides at %lf of its weight (mu %lf)\ncontacts: %u begun, %u ended, %u now", &at, &mu, &begun, &ended, &now), 5) << r.out;
+  const char *const form = "slides at %lf of its weight (mu %lf)\ncontacts: %u begun, %u ended, %u now";
+  ASSERT_EQ(std::sscanf(r.out.c_str(), form, &at, &mu, &begun, &ended, &now), 5) << r.out;
   EXPECT_EQ(mu, 0.5);
   EXPECT_NEAR(at, mu, 0.03) << "0.016 of it pass while the block gathers the speed that counts as sliding";
   EXPECT_EQ(begun - ended, now) << "the events tell what touches";

@@ -434,6 +434,25 @@ TEST(Step, ThatNeedsTooManySubSteps_IsDiscardedAndNothingChanges) {
   EXPECT_EQ(test::stats(w).last_substeps, 2u);
 }
 
+TEST(Step, WithACellInsideOut_SaysSo) {
+  test::Context c;
+  const dfm_world w = test::make_world(c);
+  Tet t;
+  dfm_body b = 0;
+  test::ok(dfm_body_create(w, &t.def, &b));
+  uint32_t trouble = 0;
+  test::ok(dfm_world_step(w, 1e-4, &trouble));
+  EXPECT_EQ(trouble, 0u);
+  double x[12], v[12] = {};
+  std::copy(t.points, t.points + 12, x);
+  x[11] = -0.1;
+  test::ok(dfm_body_set_state(b, 4, x, v));
+  test::ok(dfm_world_step(w, 1e-4, &trouble));
+  EXPECT_TRUE(trouble & DFM_TROUBLE_INVERTED);
+  EXPECT_EQ(test::stats(w).inverted_max, 1u);
+  EXPECT_EQ(test::measure(b).inverted, 1u);
+}
+
 TEST(Step, CalledFromInsideAStep_IsBusy) {
   struct Host { dfm_world world = 0; dfm_status step = DFM_OK, destroy = DFM_OK, gravity = DFM_OK; } host;
   dfm_context_def def = dfm_context_def_default();

@@ -23,10 +23,11 @@ dfm_status law_eval(const dfm_friction_in *in, dfm_friction_out *out) {
   for (uint32_t i = 0; i < in->n; ++i) {
     const bool last = i + 1 == in->n;
     out->ft[i] = last && law_way == Way::nan_force ? NAN : 0;
-    out->ft[in->stride + i] = out->dft_dfn[i] = out->dft_dfn[in->stride + i] = 0;
-    for (uint32_t k = 0; k < 4; ++k) out->dft_dvt[k * in->stride + i] = 0;
-    out->limit[i] = last && law_way == Way::nan_limit ? NAN : last && law_way == Way::negative_limit ? -1 : 0;
-    out->mode[i] = 2;
+    out->ft[in->stride + i] = 0;
+    for (uint32_t k = 0; k < 4 && out->dft_dvt; ++k) out->dft_dvt[k * in->stride + i] = 0;
+    for (uint32_t k = 0; k < 2 && out->dft_dfn; ++k) out->dft_dfn[k * in->stride + i] = 0;
+    if (out->limit) out->limit[i] = last && law_way == Way::nan_limit ? NAN : last && law_way == Way::negative_limit ? -1 : 0;
+    if (out->mode) out->mode[i] = 2;
   }
   return DFM_OK;
 }
@@ -91,7 +92,8 @@ struct Host {
     if (own_parallel_for)
       def.parallel_for = [](void *, uint32_t n, uint32_t grain, void (*fn)(void *, uint32_t, uint32_t), void *task) {
         std::vector<std::thread> pieces;
-        for (uint32_t at = 0; at < n; at += std::max(grain, (n + 3) / 4)) pieces.emplace_back(fn, task, at, std::min(n, at + std::max(grain, (n + 3) / 4)));
+        const uint32_t piece = std::max(grain, (n + 3) / 4);
+        for (uint32_t at = 0; at < n; at += piece) pieces.emplace_back(fn, task, at, std::min(n, at + piece));
         for (auto &t : pieces) t.join();
       };
     EXPECT_EQ(dfm_context_create(&def, &c), DFM_OK) << dfm_last_error();

@@ -49,6 +49,12 @@ class StageTimer {
   std::chrono::steady_clock::time_point start_;
 };
 
+uint32_t inverted_cells(const Body &b) {
+  uint32_t n = 0;
+  for (size_t t = 0; t < b.tets.size(); t += 4) n += tet_volume(b.p.x.data(), kStride, &b.tets[t]) < 0;
+  return n;
+}
+
 // One stage; false: the sub-step cannot be taken, and nothing of it has been committed.
 bool run_stage(World &w, StageId id, uint32_t *trouble) {
   StageTimer timer(w, id);
@@ -110,6 +116,7 @@ dfm_status World::step(double dt, uint32_t *trouble) {
   }
   const uint32_t n = std::max(1u, static_cast<uint32_t>(count));
   if (n > 1) *trouble |= DFM_TROUBLE_SUBSTEPS;
+  if (inverted) *trouble |= DFM_TROUBLE_INVERTED;
 
   const double start = time;
   stats.last_substeps = n, stats.substeps_max = std::max(stats.substeps_max, n);
@@ -143,7 +150,9 @@ bool World::sub_step(uint32_t *trouble) {
 void World::update_bound() {
   stable = std::numeric_limits<double>::infinity();
   worst_body = nullptr, worst_point = 0;
+  inverted = 0;
   for (auto &b : bodies) {
+    inverted += inverted_cells(*b);
     if (b->model.stepper || !b->model.ops->bound) continue;
     std::fill(b->ksum.begin(), b->ksum.end(), 0.0), std::fill(b->csum.begin(), b->csum.end(), 0.0);
     double cell = std::numeric_limits<double>::infinity();
@@ -155,7 +164,7 @@ void World::update_bound() {
     if (own < stable) stable = own, worst_body = b.get(), worst_point = worst;
   }
   stable *= kBoundShare;
-  stats.stable_step = stable;
+  stats.stable_step = stable, stats.inverted_max = std::max(stats.inverted_max, inverted);
   bound_age = 0;
 }
 
