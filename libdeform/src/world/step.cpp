@@ -304,7 +304,8 @@ bool World::commit_steppers(uint32_t *trouble) {
 }
 
 bool World::stage_commit(uint32_t *trouble) {
-  if (!commit_steppers(trouble)) return false;
+  const bool steppers = std::any_of(bodies.begin(), bodies.end(), [](auto &b) { return b->model.stepper != nullptr; });
+  if (steppers && !commit_steppers(trouble)) return false;
   const bool touched = plan.touches() && rows.n > 0;
   context->tasks.parallel_for(static_cast<uint32_t>(bodies.size()), 1, [&](uint32_t begin, uint32_t end) {
     for (uint32_t i = begin; i < end; ++i) {
