@@ -58,6 +58,16 @@ void prepare_rows(World &w) {
   w.batches.gather(w.law_list, w.state);
 }
 
+// The body to name when a solve fails: where a load or a parameter is out of bounds, that body is off before contact is.
+const Body &fastest(const World &w) {
+  const Body *fast = w.bodies.front().get();
+  double most = -1;
+  for (const auto &b : w.bodies)
+    for (const double v : b->surface.v)
+      if (!(std::fabs(v) <= most)) most = std::isnan(v) ? INFINITY : std::fabs(v), fast = b.get();
+  return *fast;
+}
+
 // Sweeps on the laws as they were last answered. At the cap the best state seen is taken, not the last one.
 void sweep_until_good(World &w, Acceleration &acceleration, const Tolerance &tolerance) {
   double best = std::numeric_limits<double>::infinity();
@@ -109,10 +119,11 @@ bool World::stage_solve(uint32_t *trouble) {
   for (double l : rows.impulse) poison += 0.0 * l;
   if (bad || poison != 0) {
     *trouble |= bad ? DFM_TROUBLE_PLUGIN : DFM_TROUBLE_NONFINITE;
-    set_last_error(format("step %llu: %s; %s", static_cast<unsigned long long>(step_count),
+    const Body &fast = fastest(*this);
+    set_last_error(format("step %llu, body '%s' (the fastest one): %s; take a smaller step, lessen its loads or change the law",
+                          static_cast<unsigned long long>(step_count), fast.name.c_str(),
                           bad ? (std::string("friction law '") + bad->type->id + "' failed or answered with something not finite").c_str()
-                              : "the contact solve is not finite",
-                          "take a smaller step or change the law").c_str());
+                              : "the contact solve is not finite").c_str());
     return false;
   }
   if (residual.share > 1) *trouble |= DFM_TROUBLE_UNCONVERGED, ++stats.unconverged;
