@@ -188,10 +188,12 @@ void World::keep_contacts() {
     for (uint32_t s = 0; s < S; ++s) to.bristle[size_t(S) * i + s] = now ? state.bristle_out[size_t(s) * state.stride + i] : 0;
     to.dwell[i] = now ? state.dwell[i] + h : 0;
     const double v1 = state.vt[i], v2 = state.vt[state.stride + i];
-    const bool carried = holding && m != kNone && store.held[m] && stick;
-    to.path[2 * i] = carried ? store.path[2 * m] + h * v1 : 0;
-    to.path[2 * i + 1] = carried ? store.path[2 * m + 1] + h * v2 : 0;
-    to.touching[i] = now, to.held[i] = holding && stick && (carried || time <= hold_start);
+    // A hold counts from hold_begin on: what sticks in the first sub-step after it, and in every one since.
+    const bool first = time <= hold_start, carried = !first && m != kNone && store.held[m];
+    const bool holds = holding && stick && (first || carried);
+    to.path[2 * i] = holds ? (carried ? store.path[2 * m] : 0) + h * v1 : 0;
+    to.path[2 * i + 1] = holds ? (carried ? store.path[2 * m + 1] : 0) + h * v2 : 0;
+    to.touching[i] = now, to.held[i] = holds;
     to.began[i] = now && !before;
     if (now && !before) add_event(DFM_EVENT_BEGIN, a, b, c.key, time + h);
     if (before && !now) add_event(DFM_EVENT_END, a, b, c.key, time + h);
