@@ -199,6 +199,22 @@ TEST(Handles, WhenTheContextGoesFirst_EveryHandleIsStale) {
   dfm_context_destroy(nullptr);
 }
 
+TEST(Handles, OfASceneWhoseWorldWentFirst_StayAsFarAsTheSceneGoes) {
+  test::Context c;
+  dfm_scene scene = 0;
+  dfm_world world = 0, again = 0;
+  const std::string file = std::string(DEFORM_SOURCE_DIR) + "/examples/scenes/two_cylinders.json";
+  ASSERT_EQ(dfm_scene_open(c, file.c_str(), nullptr, &scene), DFM_OK) << dfm_last_error();
+  test::ok(dfm_scene_world(scene, &world));
+  test::ok(dfm_world_step(world, 1e-4, nullptr));
+  test::ok(dfm_world_destroy(world));
+  test::ok(dfm_scene_world(scene, &again));
+  EXPECT_EQ(again, world);
+  all_refuse(world_calls(), again, "stale");
+  test::ok(dfm_scene_close(scene));
+  EXPECT_EQ(dfm_scene_close(scene), DFM_E_HANDLE);
+}
+
 TEST(Handles, MaterialOfAnotherWorld_IsRefused) {
   test::Context c;
   const dfm_world a = test::make_world(c), b = test::make_world(c);

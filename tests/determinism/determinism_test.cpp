@@ -80,6 +80,46 @@ TEST_P(Determinism, ForgottenCandidateLists_DoNotShow) {
   EXPECT_EQ(dfm_world_hash(w), scenes::run(GetParam()));
 }
 
+// Two worlds of one context may step at the same time, each on its own thread.
+TEST_P(Determinism, WorldsThatStepAtTheSameTime_DoNotDisturbEachOther) {
+  scenes::Scene few = GetParam();
+  few.steps = 60;
+  const uint64_t alone = scenes::run(few);
+  const test::Context c(3);
+  dfm_world worlds[2] = {few.build(c), few.build(c)};
+  std::thread other([&] { scenes::advance(worlds[1], few.steps); });
+  scenes::advance(worlds[0], few.steps);
+  other.join();
+  EXPECT_EQ(dfm_world_hash(worlds[0]), alone);
+  EXPECT_EQ(dfm_world_hash(worlds[1]), alone);
+}
+
+// Reading a world, in every way there is, changes nothing that comes later.
+TEST_P(Determinism, QueriesAndSnapshots_ChangeNothing) {
+  const test::Context c;
+  const dfm_world w = GetParam().build(c);
+  std::vector<dfm_body> bodies(16);
+  uint32_t n = 0;
+  test::ok(dfm_world_bodies(w, 16, bodies.data(), &n));
+  for (int i = 0; i < GetParam().steps; ++i) {
+    scenes::advance(w, 1);
+    double dt = 0;
+    size_t bytes = 0;
+    dfm_ray_hit hit{};
+    const double origin[3] = {0, 0, 1}, down[3] = {0, 0, -1};
+    switch (i % 7) {
+      case 0: test::ok(dfm_world_stable_step(w, &dt, nullptr, nullptr)); break;
+      case 1: test::ok(dfm_world_explain(w, nullptr, &bytes)); break;
+      case 2: test::ok(dfm_world_snapshot(w, nullptr, &bytes)); break;
+      case 3: test::measure(bodies[0]), test::stats(w); break;
+      case 4: test::ok(dfm_world_ray(w, origin, down, 10, &hit)); break;
+      case 5: test::ok(dfm_world_events(w, 0, nullptr, &n)); break;
+      default: test::ok(dfm_world_contacts(w, 0, nullptr, &n)), test::ok(dfm_world_pairs(w, 0, nullptr, &n));
+    }
+  }
+  EXPECT_EQ(dfm_world_hash(w), scenes::run(GetParam()));
+}
+
 // Kernels are chosen when a body is created. Those that the processor lacks are refused by a warning on the log.
 TEST_P(Determinism, InstructionSets_GiveTheSameHash) {
   const char *const given = std::getenv("DEFORM_SIMD");

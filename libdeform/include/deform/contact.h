@@ -40,7 +40,7 @@ typedef struct dfm_pair_report {
   double slip_max;                  /* m/s */
   double friction_work;             /* J, done by friction on both sides since the pair first touched; <= 0 but for rounding */
 } dfm_pair_report;
-/** Pairs in order of (a, b); capacity as for dfm_world_contacts. Threads: Any thread. Not during step. Since 0.1. */
+/** Pairs in the order in which their sides were created, a first; capacity as for dfm_world_contacts. Threads: Any thread. Not during step. Since 0.1. */
 DFM_API dfm_status dfm_world_pairs(dfm_world world, uint32_t capacity, dfm_pair_report *out, uint32_t *n);
 
 typedef struct dfm_contact_event { uint32_t size, kind; uint64_t a, b, key; double t; } dfm_contact_event;

@@ -42,7 +42,7 @@ enum {
   DFM_TROUBLE_SUBSTEPS = 1,      /* dt is above the stable step, sub-steps were taken: soften, coarsen, or accept the cost */
   DFM_TROUBLE_UNCONVERGED = 2,   /* the contact solve met its cap: raise max_sweeps, or lower mass ratios */
   DFM_TROUBLE_NONFINITE = 4,     /* a plugin or a load made a NaN: the last good sub-step is kept (status DFM_E_DIVERGED) */
-  DFM_TROUBLE_INVERTED = 8,      /* a cell turned inside out: refine, soften the load */
+  DFM_TROUBLE_INVERTED = 8,      /* a cell is inside out (looked for when the step bound is asked): refine, soften the load */
   DFM_TROUBLE_PLUGIN = 16        /* a plugin failed: see the log */
 };
 /** Advances the world by dt. A step longer than the stable one is cut into equal sub-steps with the contact solve in each.

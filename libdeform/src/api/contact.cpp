@@ -88,35 +88,41 @@ dfm_status dfm_world_contacts(dfm_world world, uint32_t capacity, dfm_contact *o
     for (uint32_t i = 0; i < w.report.n; ++i) count += touching(w, i);
     if (!room(count, capacity, out, n)) return;
     uint32_t k = 0;
-    for (uint32_t i = 0; i < w.report.n; ++i)
-      if (touching(w, i)) out[k++] = report(w, i);
+    if (w.report.n)
+      for (uint32_t i : w.store.by_key)
+        if (touching(w, i)) out[k++] = report(w, i);
   });
 }
 
 dfm_status dfm_world_pairs(dfm_world world, uint32_t capacity, dfm_pair_report *out, uint32_t *n) {
   return guard([&] {
     World &w = world_of(world);
-    std::vector<dfm_pair_report> pairs;
+    struct Pair { uint64_t a, b; dfm_pair_report report; };   // ids: the order of creation
+    std::vector<Pair> pairs;
     std::vector<Vec3> com(w.bodies.size());
     std::vector<uint8_t> known(w.bodies.size());
     for (uint32_t i = 0; i < w.report.n; ++i) {
       if (!touching(w, i)) continue;
       const ContactPoint &c = w.report.contacts[i];
-      const uint64_t ia = w.store.id_a[i], ib = w.store.id_b[i];
+      uint64_t ia = w.store.id_a[i], ib = w.store.id_b[i];
       // vertex-face contacts of a pair come from both sides; the report's a is the body with the lower id
       const bool turned = !c.obstacle && ib < ia;
       Sides s = sides(w, c);
-      if (turned) std::swap(s.a, s.b);
-      auto it = std::find_if(pairs.begin(), pairs.end(), [&](const dfm_pair_report &p) { return p.a == s.a && p.b == s.b; });
-      if (it == pairs.end()) {
+      if (turned) std::swap(s.a, s.b), std::swap(ia, ib);
+      auto at = std::lower_bound(pairs.begin(), pairs.end(), std::pair(ia, ib), [](const Pair &p, auto &k) { return std::pair(p.a, p.b) < k; });
+      if (at == pairs.end() || at->a != ia || at->b != ib) {
         dfm_pair_report p{};
         p.size = sizeof p, p.a = s.a, p.b = s.b, p.law = w.store.law[i];
         for (const PairWork &work : w.work)
           if ((work.a == ia && work.b == ib) || (work.a == ib && work.b == ia)) p.friction_work += work.work;
-        it = pairs.insert(pairs.end(), p);
+        at = pairs.insert(at, {ia, ib, p});
       }
+      dfm_pair_report *const it = &at->report;
       const uint32_t body = turned ? c.slot_b : c.slot_a;
-      if (!known[body]) com[body] = load3(measure(*w.bodies[body]).com), known[body] = 1;
+      if (!known[body]) {  // where the centre was when the contact points were there: at the start of the sub-step
+        const dfm_body_measure m = measure(*w.bodies[body]);
+        com[body] = load3(m.com) - w.report.h * load3(m.velocity), known[body] = 1;
+      }
       const double *const f = &w.report.frame[size_t(9) * i], *const l = &w.report.impulse[size_t(3) * i];
       const double scale = (turned ? -1 : 1) / w.report.h;
       const Vec3 friction = scale * (l[1] * load3(f + 3) + l[2] * load3(f + 6)), force = scale * l[0] * load3(f) + friction;
@@ -128,7 +134,7 @@ dfm_status dfm_world_pairs(dfm_world world, uint32_t capacity, dfm_pair_report *
       if (l[0] > 0) it->slip_max = std::max(it->slip_max, std::sqrt(slip[0] * slip[0] + slip[1] * slip[1]));
     }
     if (!room(static_cast<uint32_t>(pairs.size()), capacity, out, n)) return;
-    std::copy(pairs.begin(), pairs.end(), out);
+    for (const Pair &p : pairs) *out++ = p.report;
   });
 }
 

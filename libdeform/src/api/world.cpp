@@ -188,11 +188,12 @@ dfm_status dfm_world_obstacles(dfm_world world, uint32_t capacity, dfm_obstacle 
 
 dfm_status dfm_world_get_stats(dfm_world world, dfm_world_stats *out) {
   return guard([&] {
-    World &w = world_of(world);
-    w.stats.rebuilds = w.broad.stats().rebuilds, w.stats.refits = w.broad.stats().refits;
-    w.stats.threads = w.context->tasks.threads();
-    w.stats.time = w.time;
-    give(out, w.stats);
+    const World &w = world_of(world);
+    dfm_world_stats s = w.stats;
+    s.rebuilds = w.broad.stats().rebuilds, s.refits = w.broad.stats().refits;
+    s.threads = w.context->tasks.threads();
+    s.time = w.time;
+    give(out, s);
   });
 }
 

@@ -12,7 +12,7 @@ struct Pair { double a, b; };
 // Set-valued laws: lambda* = lambda - u / w_t would stop the slip. Inside the disc it is taken (stick); outside the contact slides along
 // lambda* on a disc whose radius grows with the slip speed s by the law's slope c = -v^ . (dft/dv) v^ >= 0 (viscous part):
 //     radius(s) = R + h c (s - s0),  s = w_t (|lambda*| - radius(s))   =>   s = w_t (|lambda*| - R + h c s0) / (1 + w_t h c).
-// The radius follows the normal impulse in proportion, which is exact for Coulomb's cone.
+// The radius follows the normal impulse: in proportion while it sticks, by the law's dft/dfn while it slips (its viscous part does not).
 //
 // Smooth laws: lambda = h [ft + D (u' - v) + d (fn' - fn)] with u' = u + w_t (lambda - lambda_old): a 2x2 system, positive definite
 // because only the negative semidefinite part of D is used. A contact that stuck when its law was asked is kept inside the law's limit: an
@@ -26,6 +26,8 @@ Pair friction_impulse(const ContactRows &rows, const ContactState &s, uint32_t i
     const double a = l1 - u1 / wt, b = l2 - u2 / wt, size = std::sqrt(a * a + b * b);
     double radius = h * s.limit[i] * ratio;
     if (s.mode[i] == 2) {
+      const double growth = std::sqrt(s.dft_dfn[i] * s.dft_dfn[i] + s.dft_dfn[n + i] * s.dft_dfn[n + i]);
+      radius = std::max(0.0, h * s.limit[i] + growth * (ln - h * fn));
       const double v1 = s.vt[i], v2 = s.vt[n + i], speed = std::sqrt(v1 * v1 + v2 * v2);
       double slope = 0;
       if (speed > 0) {
@@ -177,11 +179,11 @@ double tangent_residual(const ContactRows &rows, uint32_t i, Pair law) {
   return rows.wt[i] * std::sqrt(a * a + b * b);
 }
 
-// What the laws, asked at the present state, want contact i to carry. A set-valued law is compared by its projection: where a contact just
-// slips, its force and its slip may still differ in direction by much while what is left to correct, the slip across the force, is tiny.
+// What the laws, asked at the present state, want contact i to carry. They are compared by the answer they give together with the contact's own
+// response, not by the bare force: the difference is then the velocity that is left to correct. Where a set-valued law just slips, force and
+// slip may differ in direction by much while that is tiny; a smooth law with a steep slope c would count it 1 + h w_t c times.
 Pair answered(const ContactRows &rows, const ContactState &s, uint32_t i, double h, Vec3 u) {
-  if (s.set_valued[i]) return friction_impulse(rows, s, i, h, rows.impulse[size_t(i) * 3], u.y, u.z);
-  return {h * s.ft[i], h * s.ft[s.stride + i]};
+  return friction_impulse(rows, s, i, h, rows.impulse[size_t(i) * 3], u.y, u.z);
 }
 
 // law(i, u) gives the friction impulse that contact i should carry.

@@ -30,6 +30,7 @@ void run_host_block(void *task, uint32_t begin, uint32_t end) {
 
 // Blocks of `grain` are handed out by an atomic counter; workers sleep between jobs.
 struct Tasks::Pool {
+  std::mutex taken;  // held by the thread whose job runs: worlds of one context may step on several threads
   std::mutex mutex;
   std::condition_variable start, done;
   std::vector<std::thread> workers;
@@ -97,6 +98,11 @@ void Tasks::run(uint32_t n, uint32_t grain, void (*fn)(void *, uint32_t, uint32_
     return;
   }
   Pool &pool = *pool_;
+  const std::unique_lock own(pool.taken, std::try_to_lock);
+  if (!own) {  // results do not depend on the cut, so the work is done here rather than waited for
+    fn(task, 0, n);
+    return;
+  }
   {
     std::lock_guard lock(pool.mutex);
     pool.n = n, pool.grain = grain, pool.fn = fn, pool.task = task;

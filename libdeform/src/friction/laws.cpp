@@ -1,5 +1,6 @@
 #include "friction/laws.h"
 
+#include <algorithm>
 #include <cmath>
 
 #include "core/error.h"
@@ -20,7 +21,8 @@ LawInstance::~LawInstance() {
 }
 
 LawBatches::LawBatches(const Memory &m)
-    : order_(HookAllocator<uint32_t>(m)), in_(HookAllocator<double>(m)), out_(HookAllocator<double>(m)), mode_(HookAllocator<uint8_t>(m)) {}
+    : order_(HookAllocator<uint32_t>(m)), in_(HookAllocator<double>(m)), out_(HookAllocator<double>(m)), moved_(HookAllocator<double>(m)),
+      answer_(HookAllocator<double>(m)), mode_(HookAllocator<uint8_t>(m)) {}
 
 void LawBatches::gather(const std::vector<LawInstance *> &laws, ContactState &state) {
   batches_.clear();
@@ -72,7 +74,10 @@ const LawInstance *LawBatches::evaluate(const Batch &batch, double h, ContactSta
   dfm_friction_out out{};
   out.size = sizeof out;
   out.ft = ft, out.state = next, out.dft_dvt = dv, out.dft_dfn = dn, out.limit = limit, out.mode = mode_.data();
-  if (call_plugin(*law.host, *law.type, "eval", [&] { return law.ops->eval(&in, &out); }) != DFM_OK) return &law;
+  const bool given = law.ops->flags & DFM_FRIC_JACOBIAN;
+  if (!given) out.dft_dvt = out.dft_dfn = nullptr;
+  const auto eval = [&] { return law.ops->eval(&in, &out); };
+  if (call_plugin(*law.host, *law.type, "eval", eval) != DFM_OK || (!given && !difference(law, in, ft, dv, dn))) return &law;
 
   double poison = 0;
   bool limits = true;
@@ -88,6 +93,28 @@ const LawInstance *LawBatches::evaluate(const Batch &batch, double h, ContactSta
               0.0 * (dn[k] + dn[column + k]);
   }
   return poison == 0 && limits ? nullptr : &law;  // poison of NaN or infinite: not equal to zero
+}
+
+// Derivatives of a law that gives none, by forward differences: without them a steep law (h w_t c > 1) would make the passes diverge. The step
+// is a millionth of the value, and at least a tenth of the slip and of the force that the solve resolves.
+bool LawBatches::difference(const LawInstance &law, dfm_friction_in in, const double *ft, double *dv, double *dn) {
+  const size_t column = in.stride;
+  const double *const fn = in.fn, *const vt = in.vt;
+  answer_.resize(2 * column);
+  dfm_friction_out out{};
+  out.size = sizeof out, out.ft = answer_.data();
+  const auto ask = [&](const double *at, size_t columns, size_t c, const double *&input, double least, double *to, size_t width) {
+    moved_.assign(at, at + columns * column);
+    for (size_t i = 0; i < in.n; ++i) moved_[c * column + i] += std::max(least, 1e-6 * std::fabs(at[c * column + i]));
+    input = moved_.data();
+    const bool answered = call_plugin(*law.host, *law.type, "eval", [&] { return law.ops->eval(&in, &out); }) == DFM_OK;
+    input = at;
+    for (size_t r = 0; r < 2; ++r)
+      for (size_t i = 0; i < in.n; ++i)
+        to[(r * width + c) * column + i] = (answer_[r * column + i] - ft[r * column + i]) / (moved_[c * column + i] - at[c * column + i]);
+    return answered;
+  };
+  return ask(vt, 2, 0, in.vt, 1e-7, dv, 2) && ask(vt, 2, 1, in.vt, 1e-7, dv, 2) && ask(fn, 1, 0, in.fn, 1e-9, dn, 1);
 }
 
 }  // namespace dfm

@@ -38,8 +38,10 @@ class LawBatches {
   std::vector<Batch> batches_;
   Array<uint32_t> order_;         // contacts by law, in contact order within each
   Array<double> in_, out_;        // columns of one batch
+  Array<double> moved_, answer_;  // inputs and force beside the trial, for laws without derivatives
   Array<uint8_t> mode_;
   const LawInstance *evaluate(const Batch &batch, double h, ContactState &state);
+  bool difference(const LawInstance &law, dfm_friction_in in, const double *ft, double *dv, double *dn);
 };
 
 }  // namespace dfm

@@ -15,8 +15,11 @@ using Run = std::span<const Candidate>;
 
 // Cosines and sines of directions, dimensionless.
 constexpr double kFlat = 1e-3;        // sine of the angle between two faces below which their edge counts as flat
+constexpr double kConvex = 2e-5;     // the same for an edge to take part against another edge: such an edge rises over its faces' corners by at most
+                                      // kConvex / 4 of its length, 0.005 of the default d_c, so that nothing is felt when it comes or goes
 constexpr double kCone = 0.035;       // 2 degrees: slack of an edge's cone of normals, so that contacts do not flicker at its border
 constexpr double kParallel = 1e-3;    // sine between two edges below which vertex-face contacts stand for them
+constexpr double kPast = 0.25;        // share of an edge by which it may count as longer for what slides in over its ends
 constexpr double kEnd = 1e-3;         // share of an edge next to its ends that is left to vertex-face contacts: no longer than the default d_c
 
 struct Pair {
@@ -87,6 +90,6 @@ struct EdgeFaces {
 };
 EdgeFaces edge_faces(const Surface &surface, uint32_t edge);
 // The same judgement of convexity for a fraction of the cost: most edges stop here.
-bool edge_convex(const Surface &surface, uint32_t edge);
+bool edge_convex(const Surface &surface, uint32_t edge, double ahead = 0);   // at the positions x + ahead v
 
 }  // namespace dfm::narrow

@@ -24,10 +24,10 @@ EdgeFaces edge_faces(const Surface &surface, uint32_t edge) {
 
 // An open edge is as convex as can be. Between two faces the sine of the fold is c0 . r1 |e| / (|c0| |c1|), with r1 to the second face's
 // far corner and c the faces' normals times twice their areas; it is negative where the second face falls away from the first.
-bool edge_convex(const Surface &surface, uint32_t edge) {
+bool edge_convex(const Surface &surface, uint32_t edge, double ahead) {
   const uint32_t *ends = &surface.edge[2 * size_t{edge}], *tris = &surface.edge_tri[2 * size_t{edge}];
   if (tris[0] == kNone || tris[1] == kNone) return true;
-  const auto x = [&](uint32_t s) { return load3(&surface.x[4 * size_t{s}]); };
+  const auto x = [&](uint32_t s) { return load3(&surface.x[4 * size_t{s}]) + ahead * load3(&surface.v[4 * size_t{s}]); };
   const auto far_corner = [&](uint32_t t) {
     const uint32_t *c = &surface.tri[3 * size_t{t}];
     return c[0] + c[1] + c[2] - ends[0] - ends[1];
@@ -35,7 +35,21 @@ bool edge_convex(const Surface &surface, uint32_t edge) {
   const Vec3 from = x(ends[0]), e = x(ends[1]) - from, r0 = x(far_corner(tris[0])) - from, r1 = x(far_corner(tris[1])) - from;
   const Vec3 c0 = cross(e, r0), c1 = cross(r1, e);
   const double fold = dot(c0, r1);
-  return fold < 0 && fold * fold * norm2(e) > kFlat * kFlat * norm2(c0) * norm2(c1);
+  return fold < 0 && fold * fold * norm2(e) > kConvex * kConvex * norm2(c0) * norm2(c1);
+}
+
+// Is the crossing at `at` (0 and 1: the ends) of an edge its own affair? Closer to an end than a thousandth of the edge the end itself makes the
+// contact (vertex-face), and a second one in the same place with nearly the same normal would only make the solve ill-conditioned. But where
+// the crossing may slide in over an end within the sub-step (by `slide`, in lengths of the edge), the edges would be through each other
+// before they were seen: then the edge counts as that much longer.
+bool between_ends(double at, double slide) {
+  const double margin = slide > kEnd ? -std::min(slide, kPast) : kEnd;
+  return at > margin && at < 1 - margin;
+}
+
+// Convex now, or on the way to be within the sub-step: a fold that pops out under an edge that lies on both its faces meets it at once.
+bool edge_becomes_convex(const Surface &surface, uint32_t edge, double h) {
+  return edge_convex(surface, edge, 0) || edge_convex(surface, edge, 2 * h);
 }
 
 void edge_edge(const Pair &pair, Run run, Array<ContactPoint> &out) {
@@ -52,7 +66,7 @@ void edge_edge(const Pair &pair, Run run, Array<ContactPoint> &out) {
     if (candidate.feature_a != last_a) {
       last_a = candidate.feature_a;
       known = false;
-      convex = edge_convex(sa, last_a);
+      convex = edge_becomes_convex(sa, last_a, pair.h);
       p0 = pair.xa(ea[0]), u = pair.xa(ea[1]) - p0;
       vp0 = pair.va(ea[0]), vp1 = pair.va(ea[1]);
       uu = norm2(u);
@@ -67,16 +81,15 @@ void edge_edge(const Pair &pair, Run run, Array<ContactPoint> &out) {
     if (!(nr * nr <= widest2 * nn) || !(nn > kParallel * kParallel * uu * ww)) continue;
     const double uw = dot(u, w), ur = dot(u, r), wr = dot(w, r);
     const double s = uw * wr - ww * ur, t = uu * wr - uw * ur;   // times nn
-    // Closer to an end than a thousandth of the edge the end itself makes the contact (vertex-face), and a second one in the same place with
-    // nearly the same normal would only make the solve ill-conditioned.
-    if (!(s > kEnd * nn && s < (1 - kEnd) * nn && t > kEnd * nn && t < (1 - kEnd) * nn)) continue;
+    if (!(s > -kPast * nn && s < (1 + kPast) * nn && t > -kPast * nn && t < (1 + kPast) * nn)) continue;
     double speed2 = 0;
     for (const uint32_t e : {eb[0], eb[1]}) speed2 = std::max({speed2, norm2(vp0 - pair.vb(e)), norm2(vp1 - pair.vb(e))});
     const double reach = contact_reach(pair.h, pair.offset, std::sqrt(speed2));
     const double allowed = std::max(reach, depth);
     if (!(nr * nr < allowed * allowed * nn)) continue;
+    if (!between_ends(s / nn, 2 * pair.h * std::sqrt(speed2 / uu)) || !between_ends(t / nn, 2 * pair.h * std::sqrt(speed2 / ww))) continue;
 
-    if (!edge_convex(sb, candidate.feature_b)) continue;
+    if (!edge_becomes_convex(sb, candidate.feature_b, pair.h)) continue;
     if (!known) fa = edge_faces(sa, candidate.feature_a);
     known = true;
     const EdgeFaces fb = edge_faces(sb, candidate.feature_b);

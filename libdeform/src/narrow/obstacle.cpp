@@ -13,8 +13,10 @@ namespace {
 // A contact on `q` of the body (nodes and weights already set), on `o` of the obstacle.
 void finish(const Pair &pair, ContactPoint &c, Vec3 q, Vec3 o, Vec3 normal, double distance, uint32_t patch, Array<ContactPoint> &out) {
   place(c, q, o, normal, distance);
-  store3(c.velocity, pair.shape->view().velocity_at(o));
-  c.key = contact_key(c, pair.a.id, pair.shape->view().id, patch, 0);
+  // A belt slips along its surface; it never pushes what lies beside it.
+  const ObstacleView &view = pair.shape->view();
+  store3(c.velocity, view.velocity_at(o, pair.h) - dot(view.belt, normal) * normal);
+  c.key = contact_key(c, pair.a.id, view.id, patch, 0);
   out.push_back(c);
 }
 

@@ -27,7 +27,12 @@ struct ObstacleView {
   double radius = 0, half_length = 0; // sphere, capsule; capsule axis is local z
   Vec3 velocity, spin;                // of the pose over the sub-step, world frame, spin about position
   Vec3 belt;                          // velocity_surface: slips along, moves nothing
-  Vec3 velocity_at(Vec3 p) const { return velocity + cross(spin, p - position) + belt; }
+  // Mean over the sub-step, from p to where the turn carries it: (exp(h spin) - 1) r / h to third order. The first term alone is the tangent, and
+  // what sticks to a turntable would creep outwards by h spin^2 r / 2.
+  Vec3 velocity_at(Vec3 p, double h) const {
+    const Vec3 first = cross(spin, p - position), second = cross(spin, first), third = cross(spin, second);
+    return velocity + first + (0.5 * h) * second + (h * h / 6) * third + belt;
+  }
 };
 
 // Feature pairs that may touch while no surfel has moved further than the skin allows: a superset of all contacts until broad/ renews it.

@@ -89,6 +89,7 @@ struct StagedLaw { std::string id; std::vector<double> params; };
 struct Staged {
   double time, stable, offset, hold_start;
   uint64_t step_count, next_id;
+  uint32_t inverted;
   bool holding;
   uint32_t bound_age;
   dfm_world_stats stats;
@@ -112,7 +113,8 @@ T &object(const std::unique_ptr<T> &x) { return *x; }
 
 template <class Stream, class W>
 void fields(Stream &s, W &w) {
-  s.value(w.time), s.value(w.step_count), s.value(w.stable), s.value(w.offset), s.value(w.hold_start), s.value(w.holding), s.value(w.bound_age);
+  s.value(w.time), s.value(w.step_count), s.value(w.stable), s.value(w.inverted), s.value(w.bound_age), s.value(w.offset);
+  s.value(w.hold_start), s.value(w.holding);
   s.value(w.stats), s.value(w.gravity), s.value(w.def.gravity), s.value(w.next_id), s.array(w.gravity_keys);
   s.each(w.bodies, [&](auto &entry) {
     auto &b = object(entry);
@@ -264,7 +266,8 @@ void world_restore(World &w, const void *data, size_t bytes) {
   uint64_t shape;
   s.value(shape);
   if (shape != structure(w))
-    fail(DFM_E_FORMAT, "the snapshot belongs to another world: names, meshes, masses, models and obstacles must be the same; nothing was restored");
+    fail(DFM_E_FORMAT,
+         "the snapshot belongs to another world: names, meshes, masses, models and obstacles must be the same; nothing was restored");
   Staged staged(w.memory());
   s.each(staged.laws, [&](StagedLaw &l) { s.array(l.id), s.array(l.params); });
   fields(s, staged);
@@ -276,7 +279,7 @@ void world_restore(World &w, const void *data, size_t bytes) {
   // Tables and plan follow from what is there now; what prepare() would choose anew is put back as it was.
   w.changed = true;
   w.prepare();
-  w.gravity = staged.gravity, w.stable = staged.stable, w.offset = staged.offset, w.bound_age = staged.bound_age;
+  w.gravity = staged.gravity, w.stable = staged.stable, w.inverted = staged.inverted, w.offset = staged.offset, w.bound_age = staged.bound_age;
 }
 
 }  // namespace dfm

@@ -49,6 +49,12 @@ class StageTimer {
   std::chrono::steady_clock::time_point start_;
 };
 
+uint32_t inverted_cells(const Body &b) {
+  uint32_t n = 0;
+  for (size_t t = 0; t < b.tets.size(); t += 4) n += tet_volume(b.p.x.data(), kStride, &b.tets[t]) < 0;
+  return n;
+}
+
 // One stage; false: the sub-step cannot be taken, and nothing of it has been committed.
 bool run_stage(World &w, StageId id, uint32_t *trouble) {
   StageTimer timer(w, id);
@@ -110,6 +116,7 @@ dfm_status World::step(double dt, uint32_t *trouble) {
   }
   const uint32_t n = std::max(1u, static_cast<uint32_t>(count));
   if (n > 1) *trouble |= DFM_TROUBLE_SUBSTEPS;
+  if (inverted) *trouble |= DFM_TROUBLE_INVERTED;
 
   const double start = time;
   stats.last_substeps = n, stats.substeps_max = std::max(stats.substeps_max, n);
@@ -143,7 +150,9 @@ bool World::sub_step(uint32_t *trouble) {
 void World::update_bound() {
   stable = std::numeric_limits<double>::infinity();
   worst_body = nullptr, worst_point = 0;
+  inverted = 0;
   for (auto &b : bodies) {
+    inverted += inverted_cells(*b);
     if (b->model.stepper || !b->model.ops->bound) continue;
     std::fill(b->ksum.begin(), b->ksum.end(), 0.0), std::fill(b->csum.begin(), b->csum.end(), 0.0);
     double cell = std::numeric_limits<double>::infinity();
@@ -155,7 +164,7 @@ void World::update_bound() {
     if (own < stable) stable = own, worst_body = b.get(), worst_point = worst;
   }
   stable *= kBoundShare;
-  stats.stable_step = stable;
+  stats.stable_step = stable, stats.inverted_max = std::max(stats.inverted_max, inverted);
   bound_age = 0;
 }
 
@@ -251,7 +260,14 @@ bool World::stage_predict(uint32_t *trouble) {
   return false;
 }
 
-void World::stage_broad() { broad.update(body_views, obstacle_views, filter, h, offset); }
+void World::stage_broad() {
+  try {
+    broad.update(body_views, obstacle_views, filter, h, offset);
+  } catch (...) {
+    broad.clear();   // out of memory half way through its lists: they are made anew next time
+    throw;
+  }
+}
 
 void World::stage_narrow() { find_contacts(body_views, obstacle_views, broad.candidates(), h, offset, contacts); }
 
@@ -288,7 +304,8 @@ bool World::commit_steppers(uint32_t *trouble) {
 }
 
 bool World::stage_commit(uint32_t *trouble) {
-  if (!commit_steppers(trouble)) return false;
+  const bool steppers = std::any_of(bodies.begin(), bodies.end(), [](auto &b) { return b->model.stepper != nullptr; });
+  if (steppers && !commit_steppers(trouble)) return false;
   const bool touched = plan.touches() && rows.n > 0;
   context->tasks.parallel_for(static_cast<uint32_t>(bodies.size()), 1, [&](uint32_t begin, uint32_t end) {
     for (uint32_t i = begin; i < end; ++i) {

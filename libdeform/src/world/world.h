@@ -118,6 +118,7 @@ struct World {
   double time = 0, stable = 0;                         // s; stable: 0.9 of the bound at its last evaluation
   uint64_t step_count = 0;
   Body *worst_body = nullptr;
+  uint32_t inverted = 0;                               // cells inside out at the last evaluation of the bound
   uint32_t worst_point = 0;
   bool stepping = false;
 

@@ -13,8 +13,8 @@ TEST(Plane, Surfels_HaveSignedDistanceAreaAndBelt) {
   Scene scene;
   scene.add(moved(box_mesh({1, 1, 1}, 2, 2, 2), {}, {0, 0, 0.5005}));
   scene.add(Shape::plane, {0, 0, 0});
-  scene.obstacles[0].belt = {0.3, 0, 0};
-  scene.obstacles[0].spin = {0, 0, 0.001};
+  scene.obstacles[0].belt = {0.3, 0, 0.2};
+  scene.obstacles[0].spin = {0, 0, 5};
   const auto c = scene.contacts();
   EXPECT_EQ(flaw(scene, c), "");
   ASSERT_EQ(c.size(), 9u);
@@ -24,7 +24,10 @@ TEST(Plane, Surfels_HaveSignedDistanceAreaAndBelt) {
     EXPECT_EQ(k.nnode, 1);
     EXPECT_NEAR(k.distance, 5e-4, 1e-15);
     EXPECT_EQ(k.normal[2], 1.0);
-    EXPECT_DOUBLE_EQ(k.velocity[0], 0.3 - 0.001 * k.point[1]);
+    const double turn = 5 * scene.h, x = k.point[0], y = k.point[1];
+    EXPECT_NEAR(k.velocity[0], 0.3 + ((std::cos(turn) - 1) * x - std::sin(turn) * y) / scene.h, 1e-7) << "the chord, not the tangent";
+    EXPECT_NEAR(k.velocity[1], ((std::cos(turn) - 1) * y + std::sin(turn) * x) / scene.h, 1e-7);
+    EXPECT_NEAR(k.velocity[2], 0, 1e-12) << "a belt does not push";
     area += k.area;
   }
   EXPECT_NEAR(area, 1, 1e-12) << "the bottom, and nothing of the sides";

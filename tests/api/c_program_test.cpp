@@ -1,0 +1,47 @@
+// The example programs, which are C: each runs, and prints what physics says.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <sstream>
+
+#include "support.h"
+
+namespace {
+
+test::CommandResult example(const std::string &name) {
+  const std::string plugins = std::string("DEFORM_PLUGIN_PATH=") + DEFORM_PLUGIN_DIR;
+  return test::run({"/usr/bin/env", plugins, std::string(DEFORM_BINARY_DIR) + "/bin/example_" + name});
+}
+
+}  // namespace
+
+TEST(CProgram, Hello_PrintsBallsThatPressOnTheFloorAndOnEachOther) {
+  const test::CommandResult r = example("01_hello");
+  ASSERT_EQ(r.exit_code, 0) << r.out << r.err;
+  std::istringstream lines(r.out);
+  int on_floor = 0, on_ball = 0;
+  for (std::string line; std::getline(lines, line);) {
+    double newton = -1, z = -1;
+    char what[32] = "";
+    ASSERT_EQ(std::sscanf(line.c_str(), "ball on %31[a-z]: %lf N at z = %lf m", what, &newton, &z), 3) << line;
+    EXPECT_GE(newton, 0);
+    EXPECT_LT(newton, 200);
+    const bool floor = what == std::string("floor");
+    EXPECT_TRUE(floor ? std::fabs(z) < 0.005 : z > 0.01 && z < 0.25) << line;
+    ++(floor ? on_floor : on_ball);
+  }
+  EXPECT_GT(on_floor, 0) << r.out;
+}
+
+TEST(CProgram, Pull_SlidesWhereCoulombSays) {
+  const test::CommandResult r = example("02_pull");
+  ASSERT_EQ(r.exit_code, 0) << r.out << r.err;
+  double at = 0, mu = 0;
+  unsigned begun = 0, ended = 0, now = 0;
+  const char *const form = "slides at %lf of its weight (mu %lf)\ncontacts: %u begun, %u ended, %u now";
+  ASSERT_EQ(std::sscanf(r.out.c_str(), form, &at, &mu, &begun, &ended, &now), 5) << r.out;
+  EXPECT_EQ(mu, 0.5);
+  EXPECT_NEAR(at, mu, 0.03) << "0.016 of it pass while the block gathers the speed that counts as sliding";
+  EXPECT_EQ(begun - ended, now) << "the events tell what touches";
+  EXPECT_GT(now, 3u);
+}

@@ -1,0 +1,208 @@
+// Memory: a settled step allocates nothing; every allocation may fail; what the hooks gave comes back.
+#include <atomic>
+#include <cstdlib>
+#include <new>
+
+#include "stack.h"
+
+namespace {
+
+// The program's own operator new stands in for the library's: what the library takes beside the hooks is counted too.
+std::atomic<uint64_t> heap_calls{0};
+
+void *counted(size_t bytes, size_t align) {
+  ++heap_calls;
+  if (void *p = align > sizeof(void *) ? std::aligned_alloc(align, (bytes + align - 1) / align * align) : std::malloc(bytes ? bytes : 1)) return p;
+  throw std::bad_alloc();
+}
+
+}  // namespace
+
+void *operator new(size_t bytes) { return counted(bytes, 0); }
+void *operator new[](size_t bytes) { return counted(bytes, 0); }
+void *operator new(size_t bytes, std::align_val_t align) { return counted(bytes, size_t(align)); }
+void *operator new[](size_t bytes, std::align_val_t align) { return counted(bytes, size_t(align)); }
+void operator delete(void *p) noexcept { std::free(p); }
+void operator delete[](void *p) noexcept { std::free(p); }
+void operator delete(void *p, size_t) noexcept { std::free(p); }
+void operator delete[](void *p, size_t) noexcept { std::free(p); }
+void operator delete(void *p, std::align_val_t) noexcept { std::free(p); }
+void operator delete[](void *p, std::align_val_t) noexcept { std::free(p); }
+void operator delete(void *p, size_t, std::align_val_t) noexcept { std::free(p); }
+void operator delete[](void *p, size_t, std::align_val_t) noexcept { std::free(p); }
+
+namespace {
+
+// Hooks that count, and refuse the n-th allocation and every one after it until told otherwise.
+struct Hooks {
+  std::atomic<int64_t> calls{0}, live_bytes{0}, live_blocks{0}, wrong_align{0}, fail_from{-1};
+  dfm_context_def def() {
+    dfm_context_def d = dfm_context_def_default();
+    d.user = this, d.plugin_dir = DEFORM_PLUGIN_DIR;
+    d.log = [](void *, int32_t, const char *) {};
+    d.alloc = [](void *user, size_t bytes, size_t align) -> void * {
+      Hooks &h = *static_cast<Hooks *>(user);
+      const int64_t call = h.calls++;
+      if (h.fail_from >= 0 && call >= h.fail_from) return nullptr;
+      h.live_bytes += int64_t(bytes), ++h.live_blocks;
+      return std::aligned_alloc(align, (bytes + align - 1) / align * align + align);
+    };
+    d.release = [](void *user, void *p, size_t bytes, size_t align) {
+      Hooks &h = *static_cast<Hooks *>(user);
+      h.live_bytes -= int64_t(bytes), --h.live_blocks;
+      h.wrong_align += reinterpret_cast<uintptr_t>(p) % align != 0;
+      std::free(p);
+    };
+    return d;
+  }
+};
+
+}  // namespace
+
+TEST(Memory, ASettledStep_AllocatesNothing) {
+  Hooks hooks;
+  const dfm_context_def def = hooks.def();
+  dfm_context *c = nullptr;
+  ASSERT_EQ(dfm_context_create(&def, &c), DFM_OK) << dfm_last_error();
+  {
+    const test::Stack s = test::make_stack(c);
+    std::vector<dfm_contact> contacts(4096);
+    std::vector<double> forces(3 * 4096);
+    for (int i = 0; i < 1500; ++i) ASSERT_EQ(dfm_world_step(s.world, 1e-3, nullptr), DFM_OK) << dfm_last_error();
+    ASSERT_EQ(test::pairs(s.world).size(), 2u) << "the bodies rest on each other and on the floor";
+    test::events(s.world);
+    std::vector<dfm_contact_event> events(65536);
+    const int64_t hook_calls = hooks.calls;
+    const uint64_t heap = heap_calls;
+    uint64_t sticking = 0;
+    dfm_status bad = DFM_OK;
+    auto check = [&](dfm_status status) { if (status != DFM_OK) bad = status; };
+    for (int i = 0; i < 1000; ++i) {
+      uint32_t trouble = 0, n = 0;
+      check(dfm_world_step(s.world, 1e-3, &trouble));
+      dfm_world_stats stats{};
+      stats.size = sizeof stats;
+      check(dfm_world_get_stats(s.world, &stats));
+      check(dfm_world_contacts(s.world, 4096, contacts.data(), &n));
+      check(dfm_world_events(s.world, 65536, events.data(), &n));
+      check(dfm_surface_forces(s.upper, 4096, forces.data(), &n));
+      check(dfm_surface_normals(s.upper, 4096, forces.data(), &n));
+      dfm_body_measure m{};
+      m.size = sizeof m;
+      check(dfm_body_get_measure(s.upper, &m));
+      sticking += stats.sticking;
+    }
+    EXPECT_EQ(bad, DFM_OK) << dfm_last_error();
+    EXPECT_GT(sticking, 5000u);
+    EXPECT_EQ(hooks.calls - hook_calls, 0) << "calls of the allocation hook";
+    EXPECT_EQ(heap_calls - heap, 0u) << "calls of operator new";
+    size_t bytes = 0;
+    test::ok(dfm_world_snapshot(s.world, nullptr, &bytes));
+    EXPECT_GT(heap_calls, heap) << "the library's calls are not counted: the zero above shows nothing";
+  }
+  dfm_context_destroy(c);
+  EXPECT_EQ(hooks.live_bytes, 0);
+  EXPECT_EQ(hooks.live_blocks, 0);
+  EXPECT_EQ(hooks.wrong_align, 0);
+}
+
+// Everything from the context to a step in contact, with the allocator failing at the n-th call, for all n that are ever reached.
+TEST(Memory, WhenTheNthAllocationFails_TheCallFailsCleanlyAndNothingLeaks) {
+  int failures[4] = {};
+  bool through = false;
+  for (int64_t n = 0; !through && n < 20000; ++n) {
+    Hooks hooks;
+    hooks.fail_from = n;
+    const dfm_context_def def = hooks.def();
+    dfm_context *c = nullptr;
+    dfm_world world = 0;
+    dfm_tetmesh mesh = 0;
+    dfm_body bodies[2] = {};
+    int stage = 0;
+    dfm_status status = dfm_context_create(&def, &c);
+    if (status == DFM_OK) {
+      ++stage;
+      const dfm_world_def wd = dfm_world_def_default();
+      status = dfm_world_create(c, &wd, &world);
+      dfm_obstacle floor = 0;
+      const dfm_obstacle_def od = dfm_obstacle_def_default();
+      if (status == DFM_OK) status = dfm_obstacle_create(world, &od, &floor);
+      const double size[3] = {0.05, 0, 0};
+      if (status == DFM_OK) status = dfm_tetmesh_make(c, "ball", size, 100, &mesh);
+      if (status == DFM_OK) {
+        ++stage;
+        dfm_tetmesh_info info{};
+        test::ok(dfm_tetmesh_get_info(mesh, &info));
+        dfm_body_def bd = dfm_body_def_default();
+        bd.npoint = info.npoint, bd.ntet = info.ntet;
+        test::ok(dfm_tetmesh_data(mesh, &bd.points, &bd.tets, nullptr));
+        for (int k = 0; k < 2 && status == DFM_OK; ++k) {
+          bd.pose.position[2] = 0.0501 + 0.1002 * k, bd.velocity[2] = -0.1;
+          status = dfm_body_create(world, &bd, &bodies[k]);
+        }
+      }
+      if (status == DFM_OK) {
+        ++stage;
+        for (int i = 0; i < 12 && status == DFM_OK; ++i) {
+          const uint64_t before = dfm_world_hash(world);
+          status = dfm_world_step(world, 1e-3, nullptr);
+          EXPECT_TRUE(status == DFM_OK || dfm_world_hash(world) == before) << "allocation " << n;
+        }
+        if (status == DFM_OK) through = true;
+        else {  // with memory again, the world goes on
+          hooks.fail_from = -1;
+          EXPECT_EQ(dfm_world_step(world, 1e-3, nullptr), DFM_OK) << dfm_last_error();
+        }
+      } else if (world) {  // what was refused is not there; the rest is
+        uint32_t count = 0;
+        test::ok(dfm_world_bodies(world, 0, nullptr, &count));
+        EXPECT_EQ(count, bodies[1] ? 2u : bodies[0] ? 1u : 0u) << "allocation " << n;
+        hooks.fail_from = -1;
+        EXPECT_EQ(dfm_world_step(world, 1e-3, nullptr), DFM_OK) << dfm_last_error();
+      }
+    }
+    if (status != DFM_OK) {
+      EXPECT_EQ(status, DFM_E_NOMEM) << "allocation " << n << " at stage " << stage << ": " << dfm_last_error();
+      ++failures[stage];
+    }
+    dfm_context_destroy(c);
+    ASSERT_EQ(hooks.live_bytes, 0) << "allocation " << n << " at stage " << stage;
+    ASSERT_EQ(hooks.live_blocks, 0) << "allocation " << n << " at stage " << stage;
+  }
+  EXPECT_TRUE(through);
+  EXPECT_GT(failures[1] + failures[2], 20) << "mesh, world and bodies take memory";
+  EXPECT_GT(failures[3], 20) << "so do first steps in contact";
+}
+
+TEST(Memory, WhenRestoreHasNoMemory_ItSaysSoAndTheWorldGoesOn) {
+  Hooks hooks;
+  const dfm_context_def def = hooks.def();
+  dfm_context *c = nullptr;
+  ASSERT_EQ(dfm_context_create(&def, &c), DFM_OK) << dfm_last_error();
+  {
+    const test::Stack s = test::make_stack(c);
+    for (int i = 0; i < 100; ++i) ASSERT_EQ(dfm_world_step(s.world, 1e-3, nullptr), DFM_OK);
+    size_t bytes = 0;
+    test::ok(dfm_world_snapshot(s.world, nullptr, &bytes));
+    std::vector<char> data(bytes);
+    test::ok(dfm_world_snapshot(s.world, data.data(), &bytes));
+    const uint64_t then = dfm_world_hash(s.world);
+    for (int i = 0; i < 10; ++i) ASSERT_EQ(dfm_world_step(s.world, 1e-3, nullptr), DFM_OK);
+    const uint64_t now = dfm_world_hash(s.world);
+    dfm_status status = DFM_E_NOMEM;
+    int refused = 0;
+    for (int64_t n = 0; status != DFM_OK; ++n, ++refused) {
+      hooks.fail_from = hooks.calls + n;
+      status = dfm_world_restore(s.world, data.data(), bytes);
+      if (status == DFM_OK) break;
+      ASSERT_EQ(status, DFM_E_NOMEM) << dfm_last_error();
+      ASSERT_EQ(dfm_world_hash(s.world), now) << "allocation " << n;
+    }
+    hooks.fail_from = -1;
+    EXPECT_GT(refused, 3);
+    EXPECT_EQ(dfm_world_hash(s.world), then);
+    EXPECT_EQ(dfm_world_step(s.world, 1e-3, nullptr), DFM_OK) << dfm_last_error();
+  }
+  dfm_context_destroy(c);
+  EXPECT_EQ(hooks.live_bytes, 0);
+}
