@@ -73,6 +73,7 @@ void pair_step(benchmark::State &state, bool parallel, double speed) {
   Scene &s = pair.scene;
   BroadPhase broad(Memory::standard());
   Array<ContactPoint> contacts;
+  Array<uint8_t> lent;
   double n = 0, candidates = 0, steps = 0;
   for (auto _ : state) {
     if (speed > 0) {
@@ -81,7 +82,7 @@ void pair_step(benchmark::State &state, bool parallel, double speed) {
       state.ResumeTiming();
     }
     broad.update(s.bodies, s.obstacles, s.filter, s.h, s.offset);
-    find_contacts(s.bodies, s.obstacles, broad.candidates(), s.h, s.offset, contacts);
+    find_contacts(s.bodies, s.obstacles, broad.candidates(), s.h, s.offset, lent, contacts);
     n += double(contacts.size()), candidates += double(broad.candidates().size()), steps += 1;
   }
   state.counters["contacts"] = n / steps;

@@ -97,27 +97,40 @@ void sweep(ContactRows &rows, const ContactState &law, double h) {
   }
 }
 
-Acceleration::Acceleration(const Memory &m) { use_memory(m, metric_, from_, f_, g_, df_, dg_); }
+Acceleration::Acceleration(const Memory &m) { use_memory(m, metric_, from_, f_, g_, now_, df_, dg_); }
+
+namespace {
+
+// Columns are padded with zeros to whole fours; a sum has four partial sums at every vector width.
+using Four = double __attribute__((vector_size(32)));
+
+double dot(const double *a, const double *b, uint32_t n) {
+  const Four *const x = reinterpret_cast<const Four *>(a), *const y = reinterpret_cast<const Four *>(b);
+  Four sum{0, 0, 0, 0};
+  for (uint32_t k = 0; k < n / 4; ++k) sum += x[k] * y[k];
+  return (sum[0] + sum[1]) + (sum[2] + sum[3]);
+}
+
+}  // namespace
 
 void Acceleration::start(const ContactRows &rows) {
-  n_ = 3 * rows.n, count_ = next_ = 0, first_ = true, last_ = 0;
-  metric_.resize(n_), f_.resize(n_), g_.resize(n_), df_.resize(size_t(kWindow) * n_), dg_.resize(size_t(kWindow) * n_);
+  const uint32_t values = 3 * rows.n;
+  n_ = (values + 3) & ~3u, count_ = next_ = 0, first_ = true, last_ = 0;
+  metric_.resize(n_), f_.resize(n_), g_.resize(n_), now_.resize(n_), df_.resize(size_t(kWindow) * n_), dg_.resize(size_t(kWindow) * n_);
   for (uint32_t i = 0; i < rows.n; ++i) {
     metric_[3 * i] = std::sqrt(rows.wn[i]);
     metric_[3 * i + 1] = metric_[3 * i + 2] = std::sqrt(rows.wt[i]);
   }
-  from_.assign(rows.impulse.begin(), rows.impulse.end());
+  for (uint32_t k = values; k < n_; ++k) metric_[k] = 0;
+  from_.assign(n_, 0.0);
+  std::copy(rows.impulse.begin(), rows.impulse.end(), from_.begin());
 }
 
 // gamma that makes |f - sum gamma_j df_j| least: normal equations by Cholesky, slightly regularised. False: not usable.
 bool Acceleration::combine(const double *f, double *gamma) const {
   double l[kWindow][kWindow], y[kWindow], trace = 0;
   for (uint32_t j = 0; j < count_; ++j) trace += gram_[j][j];
-  for (uint32_t j = 0; j < count_; ++j) {
-    double dot = 0;
-    for (uint32_t k = 0; k < n_; ++k) dot += df_[size_t(j) * n_ + k] * f[k];
-    y[j] = dot;
-  }
+  for (uint32_t j = 0; j < count_; ++j) y[j] = dot(&df_[size_t(j) * n_], f, n_);
   for (uint32_t j = 0; j < count_; ++j) {
     for (uint32_t k = 0; k <= j; ++k) {
       double sum = gram_[j][k] + (j == k ? 1e-12 * trace : 0);
@@ -137,39 +150,41 @@ bool Acceleration::combine(const double *f, double *gamma) const {
 }
 
 void Acceleration::follow(ContactRows &rows) {
-  double size = 0;
+  std::fill(now_.begin(), now_.end(), 0.0);
+  std::copy(rows.impulse.begin(), rows.impulse.end(), now_.begin());
+  double *const df = &df_[size_t(next_) * n_], *const dg = &dg_[size_t(next_) * n_];
   for (uint32_t k = 0; k < n_; ++k) {
-    const double f = metric_[k] * (rows.impulse[k] - from_[k]);
-    if (!first_) df_[size_t(next_) * n_ + k] = f - f_[k], dg_[size_t(next_) * n_ + k] = rows.impulse[k] - g_[k];
-    f_[k] = f, g_[k] = rows.impulse[k];
-    size += f * f;
+    const double f = metric_[k] * (now_[k] - from_[k]);
+    if (!first_) df[k] = f - f_[k], dg[k] = now_[k] - g_[k];
+    f_[k] = f, g_[k] = now_[k];
   }
+  const double size = dot(f_.data(), f_.data(), n_);
   if (!first_ && size > 4 * last_) {        // the map has changed under us (contacts opened or began to slip): what was learned is void
     count_ = next_ = 0;
   } else if (!first_) {
     count_ = std::max(count_, next_ + 1);
-    for (uint32_t j = 0; j < count_; ++j) {
-      double dot = 0;
-      for (uint32_t k = 0; k < n_; ++k) dot += df_[size_t(j) * n_ + k] * df_[size_t(next_) * n_ + k];
-      gram_[j][next_] = gram_[next_][j] = dot;
-    }
+    for (uint32_t j = 0; j < count_; ++j) gram_[j][next_] = gram_[next_][j] = dot(&df_[size_t(j) * n_], df, n_);
     next_ = (next_ + 1) % kWindow;
   }
   first_ = false, last_ = size;
 
   double gamma[kWindow] = {};
   if (count_ > 0 && combine(f_.data(), gamma)) {
+    Four *const jumps = reinterpret_cast<Four *>(now_.data());
+    for (uint32_t k = 0; k < n_ / 4; ++k) {
+      Four sum{0, 0, 0, 0};
+      for (uint32_t j = 0; j < count_; ++j) sum -= gamma[j] * reinterpret_cast<const Four *>(&dg_[size_t(j) * n_])[k];
+      jumps[k] = sum;
+    }
     for (uint32_t i = 0; i < rows.n; ++i) {
-      Vec3 jump;
-      for (uint32_t c = 0; c < 3; ++c)
-        for (uint32_t j = 0; j < count_; ++j) jump[int(c)] -= gamma[j] * dg_[size_t(j) * n_ + 3 * i + c];
+      Vec3 jump = load3(&now_[size_t(3) * i]);
       jump.x = std::max(jump.x, -rows.impulse[3 * i]);   // a normal impulse never pulls, not in between either
       if (jump.x == 0 && jump.y == 0 && jump.z == 0) continue;
       rows.apply(i, jump);
       for (uint32_t c = 0; c < 3; ++c) rows.impulse[3 * i + c] += jump[int(c)];
     }
   }
-  from_.assign(rows.impulse.begin(), rows.impulse.end());
+  std::copy(rows.impulse.begin(), rows.impulse.end(), from_.begin());
 }
 
 namespace {

@@ -24,12 +24,12 @@ class Acceleration {
 
  private:
   static constexpr uint32_t kWindow = 5;
-  uint32_t n_ = 0, count_ = 0, next_ = 0;      // values, columns held, column to write
+  uint32_t n_ = 0, count_ = 0, next_ = 0;      // values padded to fours, columns held, column to write
   bool first_ = true;
   double last_ = 0;
   Array<double> metric_;                       // [n] square roots of the diagonal
   Array<double> from_;                         // [n] iterate that the last sweep started from
-  Array<double> f_, g_;                        // [n] of the last sweep, f in the metric
+  Array<double> f_, g_, now_;                  // [n] of the last sweep, f in the metric; scratch
   Array<double> df_, dg_;                      // [window,n] differences of successive f and g
   double gram_[kWindow][kWindow] = {};
   bool combine(const double *f, double *gamma) const;

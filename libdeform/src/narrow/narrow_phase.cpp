@@ -29,8 +29,12 @@ struct Owners {
 // none is given twice; 0 where none is free (mechanics, section 5). lender holds the node that gave.
 class Areas {
  public:
-  Areas(std::span<const BodyView> bodies, std::span<const ObstacleView> obstacles, Array<ContactPoint> &contacts)
-      : bodies_(bodies), obstacles_(obstacles), contacts_(contacts) {}
+  Areas(std::span<const BodyView> bodies, std::span<const ObstacleView> obstacles, Array<ContactPoint> &contacts, Array<uint8_t> &lent)
+      : bodies_(bodies), obstacles_(obstacles), contacts_(contacts), lent_(lent) {
+    uint32_t nnode = 0;
+    for (const BodyView &b : bodies) nnode = std::max(nnode, b.first_node + b.surface->nsurfel);
+    lent_.assign(nnode, 0);
+  }
 
   void share() {
     for (size_t i = 0; i < contacts_.size();) {
@@ -87,25 +91,27 @@ class Areas {
         const uint32_t surfel = c.node[k] - own.first_node;
         const double d2 = norm2(load3(&own.surface->x[4 * size_t{surfel}]) - load3(c.point));
         if ((c.lender && !(d2 < nearest)) || (side_a ? of_a : of_b).has(surfel)) continue;
-        bool free = true;
-        for (size_t j = begin; free && j < i; ++j) free = contacts_[j].lender != c.node[k] + 1;
-        if (!free) continue;
+        if (lent_[c.node[k]]) continue;
         nearest = d2;
         c.lender = c.node[k] + 1;
         c.area = facing_area(*own.surface, surfel, side_a ? -load3(c.normal) : load3(c.normal)) * (b ? 0.5 : 1.0);
       }
+      if (c.lender) lent_[c.lender - 1] = 1;
     }
+    for (size_t i = begin; i < end; ++i)
+      if (contacts_[i].lender) lent_[contacts_[i].lender - 1] = 0;
   }
 
   std::span<const BodyView> bodies_;
   std::span<const ObstacleView> obstacles_;
   Array<ContactPoint> &contacts_;
+  Array<uint8_t> &lent_;   // per node: has lent its area in the pair at hand
 };
 
 }  // namespace
 
 void find_contacts(std::span<const BodyView> bodies, std::span<const ObstacleView> obstacles, const Array<Candidate> &candidates, double h,
-                   double offset, Array<ContactPoint> &out) {
+                   double offset, Array<uint8_t> &lent, Array<ContactPoint> &out) {
   out.clear();
   const BodyView *fast = nullptr;
   double speed = 0;
@@ -130,7 +136,7 @@ void find_contacts(std::span<const BodyView> bodies, std::span<const ObstacleVie
     const narrow::Pair pair{a, b, nullptr, h, offset, speed};
     (c.kind == 0 ? narrow::vertex_face : narrow::edge_edge)(pair, run, out);
   }
-  Areas(bodies, obstacles, out).share();
+  Areas(bodies, obstacles, out, lent).share();
 }
 
 }  // namespace dfm

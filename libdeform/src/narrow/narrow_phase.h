@@ -20,8 +20,9 @@ namespace dfm {
 // obstacle b, kind, type_a, feature a, feature b), keys are unique. Does not allocate once out's capacity has settled.
 //   h       s
 //   offset  m, rest distance d_c
+//   lent    scratch that the caller keeps
 // Numbers that are not finite make no contact.
 void find_contacts(std::span<const BodyView> bodies, std::span<const ObstacleView> obstacles, const Array<Candidate> &candidates, double h,
-                   double offset, Array<ContactPoint> &out);
+                   double offset, Array<uint8_t> &lent, Array<ContactPoint> &out);
 
 }  // namespace dfm

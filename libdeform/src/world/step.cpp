@@ -269,7 +269,7 @@ void World::stage_broad() {
   }
 }
 
-void World::stage_narrow() { find_contacts(body_views, obstacle_views, broad.candidates(), h, offset, contacts); }
+void World::stage_narrow() { find_contacts(body_views, obstacle_views, broad.candidates(), h, offset, lent, contacts); }
 
 void World::stage_distribute() {
   distribute(contacts, rows.frame.data(), rows.impulse.data(), sinks);

@@ -129,6 +129,7 @@ struct World {
   std::vector<ImpulseSink> sinks;
   BroadPhase broad;
   Array<ContactPoint> contacts;
+  Array<uint8_t> lent;                                 // scratch of the narrow phase
   ContactRows rows;
   ContactState state;
   Acceleration acceleration;
