@@ -121,7 +121,9 @@ void ContactRows::finish(std::span<const ContactPoint> contacts, const double *t
     const Vec3 v = load3(contacts[i].velocity);
     store3(&drive[size_t(i) * 3], {dot(normal, v), dot(t1, v), dot(t2, v)});
     const double gap = contacts[i].distance - offset;
-    rate[i] = std::max(gap / h, -0.1 * offset / h);
+    // A depth closes by a fifth per sub-step: closed at once it would leave the bodies apart at gap / h, and a contact that comes with a little depth
+    // (an edge of a face that bends) would be struck away, come back deeper, and never rest.
+    rate[i] = gap > 0 ? gap / h : std::max(0.2 * gap / h, -0.1 * offset / h);
     const Vec3 w0 = diagonal(i, normal);
     wn[i] = dot(normal, w0), cross[2 * size_t(i)] = dot(t1, w0), cross[2 * size_t(i) + 1] = dot(t2, w0);
     const Vec3 w1 = diagonal(i, t1), w2 = diagonal(i, t2);

@@ -38,7 +38,7 @@ struct ContactRows {
 
   Array<double> frame;                    // [n,9] normal, tangent, normal x tangent
   Array<double> drive;                    // [n,3] obstacle velocity in the frame
-  Array<double> rate;                     // [n] m/s: gap / h, a negative gap enters as at least -0.1 d_c / h
+  Array<double> rate;                     // [n] m/s: gap / h; a depth 0.2 gap / h, at least -0.1 d_c / h
   Array<double> wn, wt;                   // [n] 1/kg: W_nn; largest eigenvalue of W_tt
   Array<double> cross;                    // [n,2] 1/kg: W_tn, the slip that a unit normal impulse makes at its own contact
   Array<double> impulse;                  // [n,3] N s: normal, two tangents

@@ -12,7 +12,7 @@ struct Pair { double a, b; };
 // Set-valued laws: lambda* = lambda - u / w_t would stop the slip. Inside the disc it is taken (stick); outside the contact slides along
 // lambda* on a disc whose radius grows with the slip speed s by the law's slope c = -v^ . (dft/dv) v^ >= 0 (viscous part):
 //     radius(s) = R + h c (s - s0),  s = w_t (|lambda*| - radius(s))   =>   s = w_t (|lambda*| - R + h c s0) / (1 + w_t h c).
-// The radius follows the normal impulse in proportion, which is exact for Coulomb's cone.
+// The radius follows the normal impulse: in proportion while it sticks, by the law's dft/dfn while it slips (its viscous part does not).
 //
 // Smooth laws: lambda = h [ft + D (u' - v) + d (fn' - fn)] with u' = u + w_t (lambda - lambda_old): a 2x2 system, positive definite
 // because only the negative semidefinite part of D is used. A contact that stuck when its law was asked is kept inside the law's limit: an
@@ -26,6 +26,8 @@ Pair friction_impulse(const ContactRows &rows, const ContactState &s, uint32_t i
     const double a = l1 - u1 / wt, b = l2 - u2 / wt, size = std::sqrt(a * a + b * b);
     double radius = h * s.limit[i] * ratio;
     if (s.mode[i] == 2) {
+      const double growth = std::sqrt(s.dft_dfn[i] * s.dft_dfn[i] + s.dft_dfn[n + i] * s.dft_dfn[n + i]);
+      radius = std::max(0.0, h * s.limit[i] + growth * (ln - h * fn));
       const double v1 = s.vt[i], v2 = s.vt[n + i], speed = std::sqrt(v1 * v1 + v2 * v2);
       double slope = 0;
       if (speed > 0) {

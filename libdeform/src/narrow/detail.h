@@ -19,6 +19,7 @@ constexpr double kConvex = 2e-5;     // the same for an edge to take part agains
                                       // kConvex / 4 of its length, 0.005 of the default d_c, so that nothing is felt when it comes or goes
 constexpr double kCone = 0.035;       // 2 degrees: slack of an edge's cone of normals, so that contacts do not flicker at its border
 constexpr double kParallel = 1e-3;    // sine between two edges below which vertex-face contacts stand for them
+constexpr double kPast = 0.25;        // share of an edge by which it may count as longer for what slides in over its ends
 constexpr double kEnd = 1e-3;         // share of an edge next to its ends that is left to vertex-face contacts: no longer than the default d_c
 
 struct Pair {

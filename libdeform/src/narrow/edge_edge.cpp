@@ -38,6 +38,15 @@ bool edge_convex(const Surface &surface, uint32_t edge, double ahead) {
   return fold < 0 && fold * fold * norm2(e) > kConvex * kConvex * norm2(c0) * norm2(c1);
 }
 
+// Is the crossing at `at` (0 and 1: the ends) of an edge its own affair? Closer to an end than a thousandth of the edge the end itself makes the
+// contact (vertex-face), and a second one in the same place with nearly the same normal would only make the solve ill-conditioned. But where
+// the crossing may slide in over an end within the sub-step (by `slide`, in lengths of the edge), the edges would be through each other
+// before they were seen: then the edge counts as that much longer.
+bool between_ends(double at, double slide) {
+  const double margin = slide > kEnd ? -std::min(slide, kPast) : kEnd;
+  return at > margin && at < 1 - margin;
+}
+
 // Convex now, or on the way to be within the sub-step: a fold that pops out under an edge that lies on both its faces meets it at once.
 bool edge_becomes_convex(const Surface &surface, uint32_t edge, double h) {
   return edge_convex(surface, edge, 0) || edge_convex(surface, edge, 2 * h);
@@ -72,14 +81,13 @@ void edge_edge(const Pair &pair, Run run, Array<ContactPoint> &out) {
     if (!(nr * nr <= widest2 * nn) || !(nn > kParallel * kParallel * uu * ww)) continue;
     const double uw = dot(u, w), ur = dot(u, r), wr = dot(w, r);
     const double s = uw * wr - ww * ur, t = uu * wr - uw * ur;   // times nn
-    // Closer to an end than a thousandth of the edge the end itself makes the contact (vertex-face), and a second one in the same place with
-    // nearly the same normal would only make the solve ill-conditioned.
-    if (!(s > kEnd * nn && s < (1 - kEnd) * nn && t > kEnd * nn && t < (1 - kEnd) * nn)) continue;
+    if (!(s > -kPast * nn && s < (1 + kPast) * nn && t > -kPast * nn && t < (1 + kPast) * nn)) continue;
     double speed2 = 0;
     for (const uint32_t e : {eb[0], eb[1]}) speed2 = std::max({speed2, norm2(vp0 - pair.vb(e)), norm2(vp1 - pair.vb(e))});
     const double reach = contact_reach(pair.h, pair.offset, std::sqrt(speed2));
     const double allowed = std::max(reach, depth);
     if (!(nr * nr < allowed * allowed * nn)) continue;
+    if (!between_ends(s / nn, 2 * pair.h * std::sqrt(speed2 / uu)) || !between_ends(t / nn, 2 * pair.h * std::sqrt(speed2 / ww))) continue;
 
     if (!edge_becomes_convex(sb, candidate.feature_b, pair.h)) continue;
     if (!known) fa = edge_faces(sa, candidate.feature_a);

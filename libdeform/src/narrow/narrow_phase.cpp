@@ -82,7 +82,7 @@ class Areas {
       ContactPoint &c = contacts_[i];
       double nearest = 0;
       for (int k = 0; k < c.nnode; ++k) {
-        const bool side_a = !b || c.weight[k] > 0;
+        const bool side_a = c.node[k] - a.first_node < a.surface->nsurfel;
         const BodyView &own = side_a ? a : *b;
         const uint32_t surfel = c.node[k] - own.first_node;
         const double d2 = norm2(load3(&own.surface->x[4 * size_t{surfel}]) - load3(c.point));

@@ -58,6 +58,16 @@ void prepare_rows(World &w) {
   w.batches.gather(w.law_list, w.state);
 }
 
+// The body to name when a solve fails: where a load or a parameter is out of bounds, that body is off before contact is.
+const Body &fastest(const World &w) {
+  const Body *fast = w.bodies.front().get();
+  double most = -1;
+  for (const auto &b : w.bodies)
+    for (const double v : b->surface.v)
+      if (!(std::fabs(v) <= most)) most = std::isnan(v) ? INFINITY : std::fabs(v), fast = b.get();
+  return *fast;
+}
+
 // Sweeps on the laws as they were last answered. At the cap the best state seen is taken, not the last one.
 void sweep_until_good(World &w, Acceleration &acceleration, const Tolerance &tolerance) {
   double best = std::numeric_limits<double>::infinity();
@@ -109,10 +119,11 @@ bool World::stage_solve(uint32_t *trouble) {
   for (double l : rows.impulse) poison += 0.0 * l;
   if (bad || poison != 0) {
     *trouble |= bad ? DFM_TROUBLE_PLUGIN : DFM_TROUBLE_NONFINITE;
-    set_last_error(format("step %llu: %s; %s", static_cast<unsigned long long>(step_count),
+    const Body &fast = fastest(*this);
+    set_last_error(format("step %llu, body '%s' (the fastest one): %s; take a smaller step, lessen its loads or change the law",
+                          static_cast<unsigned long long>(step_count), fast.name.c_str(),
                           bad ? (std::string("friction law '") + bad->type->id + "' failed or answered with something not finite").c_str()
-                              : "the contact solve is not finite",
-                          "take a smaller step or change the law").c_str());
+                              : "the contact solve is not finite").c_str());
     return false;
   }
   if (residual.share > 1) *trouble |= DFM_TROUBLE_UNCONVERGED, ++stats.unconverged;
@@ -165,7 +176,8 @@ void World::keep_contacts() {
     const uint64_t a = bodies[c.slot_a]->id, b = c.obstacle ? obstacles[c.slot_b]->id : bodies[c.slot_b]->id;
     const double *const l = &rows.impulse[size_t(i) * 3];
     const uint32_t m = match[i];
-    const bool before = m != kNone && store.touching[m];
+    const uint32_t known = m != kNone ? m : store.find(c.key);   // also where the normal turned over and nothing else is taken along
+    const bool before = known != kNone && store.touching[known];
     // hysteresis: a contact ends when it carries nothing and has opened by a tenth of the offset
     const bool now = l[0] > 0 || (before && c.distance - offset < 0.1 * offset);
     const bool stick = l[0] > 0 && state.mode[i] == 1;
@@ -176,10 +188,12 @@ void World::keep_contacts() {
     for (uint32_t s = 0; s < S; ++s) to.bristle[size_t(S) * i + s] = now ? state.bristle_out[size_t(s) * state.stride + i] : 0;
     to.dwell[i] = now ? state.dwell[i] + h : 0;
     const double v1 = state.vt[i], v2 = state.vt[state.stride + i];
-    const bool carried = holding && m != kNone && store.held[m] && stick;
-    to.path[2 * i] = carried ? store.path[2 * m] + h * v1 : 0;
-    to.path[2 * i + 1] = carried ? store.path[2 * m + 1] + h * v2 : 0;
-    to.touching[i] = now, to.held[i] = holding && stick && (carried || time <= hold_start);
+    // A hold counts from hold_begin on: what sticks in the first sub-step after it, and in every one since.
+    const bool first = time <= hold_start, carried = !first && m != kNone && store.held[m];
+    const bool holds = holding && stick && (first || carried);
+    to.path[2 * i] = holds ? (carried ? store.path[2 * m] : 0) + h * v1 : 0;
+    to.path[2 * i + 1] = holds ? (carried ? store.path[2 * m + 1] : 0) + h * v2 : 0;
+    to.touching[i] = now, to.held[i] = holds;
     to.began[i] = now && !before;
     if (now && !before) add_event(DFM_EVENT_BEGIN, a, b, c.key, time + h);
     if (before && !now) add_event(DFM_EVENT_END, a, b, c.key, time + h);

@@ -189,7 +189,9 @@ void World::prepare() {
   facts.asked = asked_effects;
   plan = make_plan(facts);
 
-  offset = def.contact_offset > 0 ? def.contact_offset : contact_offset(*this);
+  // While contacts live it only falls: a larger one would turn their rest into a depth, and push them apart at 0.1 d_c / h.
+  const double wanted = contact_offset(*this);
+  offset = def.contact_offset > 0 ? def.contact_offset : store.n > 0 ? std::min(offset, wanted) : wanted;
   gravity = load3(def.gravity);
   if (!gravity_keys.empty()) gravity = vector_at(gravity_keys, time);
   bound_age = kNone;

@@ -314,6 +314,25 @@ TEST(EdgeEdge, CrossedTetrahedra_MeetEdgeOnEdge) {
   EXPECT_DOUBLE_EQ(c[0].area, facing_area(*scene.surfaces[0], 0, -load3(c[0].normal)) / 2);
 }
 
+// The upper edge starts a little beyond the end of the lower one and slides in over it: at the end of the sub-step they would be through each
+// other without ever having been seen side by side. At rest the same place makes no edge contact.
+TEST(EdgeEdge, EdgeThatSlidesInOverAnEnd_IsSeenBefore) {
+  for (const double speed : {0.0, 50.0}) {
+    Scene scene = crossed_tetrahedra(1e-3);
+    Surface &upper = *scene.surfaces[1];
+    for (uint32_t s = 0; s < upper.nsurfel; ++s) upper.x[4 * s] += 1.02, upper.v[4 * s] = -speed, upper.v[4 * s + 2] = -0.1 * speed;
+    int edges = 0;
+    for (const ContactPoint &c : scene.contacts())
+      if (c.kind == kEdgeEdge && c.feature_a == 0 && c.feature_b == 0) {
+        ++edges;
+        EXPECT_NEAR(c.weight[0], -0.01, 1e-12);
+        EXPECT_NEAR(c.weight[1], 1.01, 1e-12);
+        EXPECT_NEAR(c.distance, 1e-3, 1e-12);
+      }
+    EXPECT_EQ(edges, speed > 0 ? 1 : 0);
+  }
+}
+
 TEST(EdgeEdge, SlightPenetration_KeepsItsSign) {
   Scene scene = crossed_tetrahedra(-1e-3);
   const auto c = scene.contacts();
