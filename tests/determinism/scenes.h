@@ -70,7 +70,7 @@ struct Scene {
   dfm_world (*build)(dfm_context *);
   int steps;
 };
-inline const Scene all[] = {{"ball_on_floor", ball_on_floor, 150}, {"crossing_beams", crossing_beams, 150}, {"ten_in_a_box", ten_in_a_box, 150},
+inline const Scene all[] = {{"ball_on_floor", ball_on_floor, 150}, {"crossing_beams", crossing_beams, 150}, {"ten_in_a_box", ten_in_a_box, 80},
                                 {"fine_ball", fine_ball, 20}};
 
 inline void advance(dfm_world w, int steps) {
