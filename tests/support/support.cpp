@@ -10,7 +10,20 @@
 #include <fstream>
 #include <sstream>
 
+#include <gtest/gtest.h>
+
 namespace test {
+namespace {
+
+// Where the shared data are there, nothing has a reason to be left out.
+class SkipsFail : public testing::EmptyTestEventListener {
+  void OnTestEnd(const testing::TestInfo &info) override {
+    if (info.result()->Skipped() && !shared_dir().empty()) ADD_FAILURE() << "skipped, although the shared data are present";
+  }
+};
+[[maybe_unused]] const bool listening = (testing::UnitTest::GetInstance()->listeners().Append(new SkipsFail), true);
+
+}  // namespace
 
 CommandResult run(const std::vector<std::string> &argv) {
   static int counter = 0;

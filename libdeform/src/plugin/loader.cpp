@@ -55,7 +55,7 @@ Loader::~Loader() {
     } catch (...) {
       host_.log(host_.ctx, 2, 0, (module.file + ": its shutdown threw an exception").c_str());
     }
-    if (module.library) dlclose(module.library);
+    if (module.image) dlclose(module.image);
   }
 }
 
@@ -91,7 +91,7 @@ bool Loader::load(const std::string &path) {
   if (stat(file.c_str(), &st) != 0) fail(DFM_E_IO, "cannot read plugin \"%s\": %s", path.c_str(), std::strerror(errno));
   if (!S_ISREG(st.st_mode)) fail(DFM_E_UNSUPPORTED, "%s is not a file", path.c_str());
   for (const Module &module : modules_)
-    if (module.library && module.device == st.st_dev && module.inode == st.st_ino) return false;
+    if (module.image && module.device == st.st_dev && module.inode == st.st_ino) return false;
   check_elf_plugin(file);
 
   Library library;
@@ -160,7 +160,7 @@ std::vector<const dfm_type *> Loader::types_of(const std::string &path) const {
   std::vector<const dfm_type *> out;
   if (stat(path.c_str(), &st) != 0) return out;
   for (const Module &module : modules_)
-    if (module.library && module.device == st.st_dev && module.inode == st.st_ino)
+    if (module.image && module.device == st.st_dev && module.inode == st.st_ino)
       for (const dfm_type *type : registry_.list())
         if (registry_.file_of(*type) == module.file) out.push_back(type);
   return out;

@@ -33,7 +33,7 @@ class Loader {
   static void note_log(const char *text) noexcept;
 
  private:
-  struct Module { void *library; uint64_t device, inode; std::string file; dfm_plugin_fn entry; void (*shutdown)(void); };
+  struct Module { void *image; uint64_t device, inode; std::string file; dfm_plugin_fn entry; void (*shutdown)(void); };
   void enter(dfm_plugin_fn entry, const std::string &file, dfm_plugin &plugin);
   void scan_if_there(const std::string &directory, bool asked_for);
   Registry &registry_;
