@@ -66,3 +66,24 @@ TEST(Stack, CoarseBodyAddedElsewhere_LeavesRestAlone) {
     ASSERT_NEAR(test::measure(body).com[2], height, 1e-7) << "step " << step;
   }
 }
+
+// A block that overhangs a narrower box bends over its rim: inner edges of the bending face meet the rim, and everything rests.
+TEST(Stack, BlockOverhangingABox_ComesToRest) {
+  test::Context context;
+  const dfm_world world = test::make_world(context);
+  test::BodyOptions o;
+  o.young = 2e5, o.damping_stiffness = 2e-3, o.damping_mass = 2, o.position = {-0.1, -0.05, 1e-4};
+  const dfm_body block = test::make_body(context, world, "beam", {0.2, 0.1, 0.05}, 300, o);
+  dfm_obstacle_def box = dfm_obstacle_def_default();
+  box.name = "box", box.shape = DFM_SHAPE_BOX, box.pose.position[2] = -0.05;
+  box.half_size[0] = 0.06, box.half_size[1] = 0.2, box.half_size[2] = 0.05;
+  dfm_obstacle obstacle = 0;
+  test::ok(dfm_obstacle_create(world, &box, &obstacle));
+  test::set_friction(world, 0.5);
+  test::run(world, 1.5, 1e-3);
+  for (int i = 0; i < 100; ++i) {
+    test::run(world, 1e-3, 1e-3);
+    ASSERT_LT(test::measure(block).speed_max, 1e-8) << "m/s, step " << i;
+  }
+  EXPECT_GT(test::stats(world).contacts, 5u);
+}

@@ -91,5 +91,6 @@ struct EdgeFaces {
 EdgeFaces edge_faces(const Surface &surface, uint32_t edge);
 // The same judgement of convexity for a fraction of the cost: most edges stop here.
 bool edge_convex(const Surface &surface, uint32_t edge, double ahead = 0);   // at the positions x + ahead v
+bool edge_becomes_convex(const Surface &surface, uint32_t edge, double h);
 
 }  // namespace dfm::narrow

@@ -135,7 +135,7 @@ void surfel_obstacle(const Pair &pair, Run run, Array<ContactPoint> &out) {
 
 void edge_obstacle(const Pair &pair, Run run, Array<ContactPoint> &out) {
   for (const Candidate &candidate : run) {
-    if (!edge_convex(*pair.a.surface, candidate.feature_a)) continue;
+    if (!edge_becomes_convex(*pair.a.surface, candidate.feature_a, pair.h)) continue;
     Edge e(pair, candidate.feature_a);
     if (pair.shape->view().shape == Shape::box) edge_box(e, out);
     else edge_round(e, out);
