@@ -24,10 +24,12 @@ extern "C" int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
     if (dfm_context_create(&def, &made) != DFM_OK) std::abort();
     return made;
   }();
-  const fuzz::File file(data, size);
-  dfm_tetmesh mesh = 0;
-  const dfm_status status = dfm_tetmesh_read(context, file.path(), &mesh);
-  if (status == DFM_OK) check(mesh), dfm_tetmesh_destroy(mesh);
-  else if (dfm_last_error()[0] == 0) std::abort();
+  for (const char *ending : {".msh", ".vtk"}) {
+    const fuzz::File file(data, size, ending);
+    dfm_tetmesh mesh = 0;
+    const dfm_status status = dfm_tetmesh_read(context, file.path(), &mesh);
+    if (status == DFM_OK) check(mesh), dfm_tetmesh_destroy(mesh);
+    else if (dfm_last_error()[0] == 0) std::abort();
+  }
   return 0;
 }
