@@ -205,17 +205,9 @@ void World::undo_motion() {
   driven.clear();
 }
 
-// Bodies that one worker takes at a time, for a stage that does `effort` times what moving a point costs: all of them (that is, no second
-// thread) where handing work over would cost more than it saves.
-uint32_t World::grain(uint32_t effort) const {
-  uint32_t points = 0;
-  for (const auto &b : bodies) points += b->p.n;
-  return uint64_t(points) * effort < 4096 ? static_cast<uint32_t>(bodies.size()) : 1;
-}
-
 bool World::stage_model(uint32_t *trouble) {
   FirstFailure failed;
-  context->tasks.parallel_for(static_cast<uint32_t>(bodies.size()), grain(4), [&](uint32_t begin, uint32_t end) {
+  context->tasks.parallel_for(static_cast<uint32_t>(bodies.size()), 1, [&](uint32_t begin, uint32_t end) {
     for (uint32_t i = begin; i < end; ++i) {
       Body &b = *bodies[i];
       if (b.model.stepper) continue;
@@ -235,7 +227,7 @@ bool World::stage_model(uint32_t *trouble) {
 bool World::stage_predict(uint32_t *trouble) {
   const bool touches = plan.touches();
   FirstFailure failed;
-  context->tasks.parallel_for(static_cast<uint32_t>(bodies.size()), grain(1), [&](uint32_t begin, uint32_t end) {
+  context->tasks.parallel_for(static_cast<uint32_t>(bodies.size()), 1, [&](uint32_t begin, uint32_t end) {
     for (uint32_t i = begin; i < end; ++i) {
       Body &b = *bodies[i];
       bool good = true;
@@ -286,7 +278,7 @@ void World::stage_distribute() {
 // Self-stepping bodies write their end of the sub-step beside the present state, so that one that fails leaves all bodies as they were.
 bool World::commit_steppers(uint32_t *trouble) {
   FirstFailure failed;
-  context->tasks.parallel_for(static_cast<uint32_t>(bodies.size()), grain(4), [&](uint32_t begin, uint32_t end) {
+  context->tasks.parallel_for(static_cast<uint32_t>(bodies.size()), 1, [&](uint32_t begin, uint32_t end) {
     for (uint32_t i = begin; i < end; ++i) {
       Body &b = *bodies[i];
       if (!b.model.stepper) continue;
@@ -315,7 +307,7 @@ bool World::stage_commit(uint32_t *trouble) {
   const bool steppers = std::any_of(bodies.begin(), bodies.end(), [](auto &b) { return b->model.stepper != nullptr; });
   if (steppers && !commit_steppers(trouble)) return false;
   const bool touched = plan.touches() && rows.n > 0;
-  context->tasks.parallel_for(static_cast<uint32_t>(bodies.size()), grain(1), [&](uint32_t begin, uint32_t end) {
+  context->tasks.parallel_for(static_cast<uint32_t>(bodies.size()), 1, [&](uint32_t begin, uint32_t end) {
     for (uint32_t i = begin; i < end; ++i) {
       Body &b = *bodies[i];
       if (b.model.stepper) b.p.x.swap(b.p.f), b.p.v.swap(b.p.v_free);

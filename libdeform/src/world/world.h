@@ -174,7 +174,6 @@ struct World {
   bool sub_step(uint32_t *trouble);
   void undo_motion();                                  // held velocities as before stage_motion()
   void update_bound();                                 // stable, worst_body, worst_point
-  uint32_t grain(uint32_t effort) const;
 
   // stages of a sub-step, each in the file of its name
   void stage_motion();
