@@ -10,7 +10,21 @@
 #include <cstdlib>
 #include <string>
 
+#include "deform/deform.h"
+
 namespace fuzz {
+
+// One silent context for all inputs.
+inline dfm_context *context() {
+  static dfm_context *const one = [] {
+    dfm_context_def def = dfm_context_def_default();
+    def.log = [](void *, int32_t, const char *) {};
+    dfm_context *made = nullptr;
+    if (dfm_context_create(&def, &made) != DFM_OK) std::abort();
+    return made;
+  }();
+  return one;
+}
 
 class File {
  public:

@@ -17,13 +17,7 @@ static void check(dfm_tetmesh mesh) {
 }
 
 extern "C" int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
-  static dfm_context *const context = [] {
-    dfm_context_def def = dfm_context_def_default();
-    def.log = [](void *, int32_t, const char *) {};
-    dfm_context *made = nullptr;
-    if (dfm_context_create(&def, &made) != DFM_OK) std::abort();
-    return made;
-  }();
+  dfm_context *const context = fuzz::context();
   for (const char *ending : {".msh", ".vtk"}) {
     const fuzz::File file(data, size, ending);
     dfm_tetmesh mesh = 0;

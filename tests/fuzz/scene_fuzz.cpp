@@ -3,13 +3,7 @@
 #include "fuzz_file.h"
 
 extern "C" int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
-  static dfm_context *const context = [] {
-    dfm_context_def def = dfm_context_def_default();
-    def.log = [](void *, int32_t, const char *) {};
-    dfm_context *made = nullptr;
-    if (dfm_context_create(&def, &made) != DFM_OK) std::abort();
-    return made;
-  }();
+  dfm_context *const context = fuzz::context();
   const fuzz::File file(data, size);
   dfm_world world = 0;
   const dfm_status status = dfm_scene_load(context, file.path(), &world);

@@ -14,7 +14,7 @@ namespace dfm::narrow {
 using Run = std::span<const Candidate>;
 
 // Cosines and sines of directions, dimensionless.
-constexpr double kFlat = 1e-3;        // sine of the angle between two faces below which their edge counts as flat
+constexpr double kFlat = 1e-3;        // slack of the cones of normals against the edges of a box
 constexpr double kConvex = 2e-5;     // the same for an edge to take part against another edge: such an edge rises over its faces' corners by at most
                                       // kConvex / 4 of its length, 0.005 of the default d_c, so that nothing is felt when it comes or goes
 constexpr double kCone = 0.035;       // 2 degrees: slack of an edge's cone of normals, so that contacts do not flicker at its border

@@ -107,7 +107,7 @@ void make_surface(const Memory &memory, uint32_t npoint, const double *rest, con
   out.tri = Array<uint32_t>(a), out.edge = Array<uint32_t>(a), out.edge_tri = Array<uint32_t>(a), out.tri_edge = Array<uint32_t>(a);
   out.tri_owns = Array<uint32_t>(a), out.patch = Array<uint32_t>(a), out.point = Array<uint32_t>(a), out.row = Array<uint32_t>(a);
   out.col = Array<uint32_t>(a), out.weight = Array<double>(a), out.fan_begin = Array<uint32_t>(a), out.fan = Array<uint32_t>(a);
-  out.x = Array<double>(a), out.v = Array<double>(a), out.force = Array<double>(a);
+  out.x = Array<double>(a), out.v = Array<double>(a);
   number_surfels(npoint, boundary_tris, ntri, out);
   find_edges(out);
 
@@ -128,7 +128,6 @@ void make_surface(const Memory &memory, uint32_t npoint, const double *rest, con
   }
   out.x.assign(size_t{4} * out.nsurfel, 0.0);
   out.v.assign(size_t{4} * out.nsurfel, 0.0);
-  out.force.assign(size_t{3} * out.nsurfel, 0.0);
   for (uint32_t s = 0; s < out.nsurfel; ++s) store3(&out.x[4 * s], at(s));
 }
 

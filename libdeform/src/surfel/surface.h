@@ -27,7 +27,6 @@ struct Surface {
 
   // State, [nsurfel,4] (fourth component zero), m and m/s.
   Array<double> x, v;
-  Array<double> force;         // [nsurfel,3] N, contact force of the last sub-step
 };
 
 }  // namespace dfm
