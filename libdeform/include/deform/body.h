@@ -7,6 +7,20 @@
 #ifdef __cplusplus
 extern "C" {
 #endif
+/** How a surface of its own hangs on the body's points: x_s = N x_p, rows of N sum to one; forces go back by the transpose.
+ * BARYCENTRIC: in the cell that holds the surfel, or the nearest one. MLS: moving least squares over the points within the support; both
+ * reproduce linear fields. THESIS: the source's weights, literally, to compare: torque and power are wrong (doc/concepts/couplings.md). */
+enum { DFM_COUPLING_BARYCENTRIC = 0, DFM_COUPLING_MLS = 1, DFM_COUPLING_THESIS = 2 };
+typedef struct dfm_surface_def {
+  uint32_t size; int32_t coupling;
+  uint32_t npoint, ntriangle;
+  const double *points;             /* [npoint,3] at rest, in the frame of the body's points; copied */
+  const uint32_t *triangles;        /* [ntriangle,3] counter-clockwise from outside; copied */
+  double support;                   /* MLS, THESIS: support radius in mean distances to the ten nearest points; 0: 3 */
+} dfm_surface_def;
+
+typedef struct dfm_cell_field { const char *key; const double *values; uint32_t width; } dfm_cell_field;   /* [ntet,width] */
+
 typedef struct dfm_body_def {
   uint32_t size, flags;
   const char *name;                 /* unique in the world; NULL: "body<N>" */
@@ -21,6 +35,11 @@ typedef struct dfm_body_def {
   const uint8_t *fixed;             /* [npoint] held components, bits 1 x, 2 y, 4 z; NULL: none */
   uint32_t category, collides_with; /* collision filter: a pair touches if (a.category & b.collides_with) and (b.category & a.collides_with) */
   void *user;
+  const dfm_surface_def *surface;   /* NULL: the boundary of the cells, each surfel a point of the body */
+  uint32_t nfield;
+  const dfm_cell_field *fields;     /* model parameters that differ by cell ("young", "anisotropy_axis"); win over materials; copied */
+  const dfm_material *cell_materials;  /* [ntet] material of each cell, 0: `material`; NULL: one for all */
+  const double *cell_share;         /* [ntet] how much of the cell is material, (0,1]: scales its mass and Young's modulus; NULL: all */
 } dfm_body_def;
 
 /** No mesh, model msm, category 1, collides with all. Threads: Any thread. Since 0.1. */

@@ -13,6 +13,7 @@ typedef uint64_t dfm_material;
 typedef uint64_t dfm_law;
 typedef uint64_t dfm_scene;
 typedef uint64_t dfm_tetmesh;
+typedef uint64_t dfm_trimesh;
 #ifdef __cplusplus
 }
 #endif

@@ -1,4 +1,4 @@
-/* deform/mesh.h -- tetrahedral meshes from files and generators, before they become bodies. */
+/* deform/mesh.h -- tetrahedral and triangle meshes from files and generators, before they become bodies. */
 #ifndef DEFORM_MESH_H
 #define DEFORM_MESH_H
 #include "deform/base.h"
@@ -45,6 +45,53 @@ DFM_API dfm_status dfm_tetmesh_group_points(dfm_tetmesh mesh, uint32_t group, ui
  * name first, so never half a file. Groups of points, lines and triangles are not written.
  * @return DFM_OK; DFM_E_IO; DFM_E_UNSUPPORTED another ending. Threads: Any thread. Since 0.1. */
 DFM_API dfm_status dfm_tetmesh_write(dfm_tetmesh mesh, const char *path);
+/** What a mesh file holds. Decides whether a body takes its cells from the file or is filled from its surface. */
+enum { DFM_MESH_TETS = 1, DFM_MESH_SURFACE = 2 };
+/** Looks into a file of any format that dfm_tetmesh_read or dfm_trimesh_read take. @param kind out: DFM_MESH_TETS if it has any tetrahedron,
+ * else DFM_MESH_SURFACE. @return DFM_OK; as dfm_tetmesh_read. Threads: Any thread. Since 0.2. */
+DFM_API dfm_status dfm_mesh_file_kind(dfm_context *context, const char *path, uint32_t *kind);
+
+/** Reads a triangle surface: OBJ, PLY, STL, OFF, and the triangles of MSH, VTK, VTU and Medit files (where such a file has tetrahedra: their
+ * boundary). Polygons are cut into triangles. Points at the same place are merged, triangles without area and doubles dropped, triangles
+ * turned so that neighbours agree and closed pieces face outward; holes are counted, not closed. Each repair is one sentence of warnings.
+ * @return as dfm_tetmesh_read. Threads: Any thread. Since 0.2. */
+DFM_API dfm_status dfm_trimesh_read(dfm_context *context, const char *path, dfm_trimesh *out);
+/** The same repair for triangles of the host: points [npoint,3] m, triangles [ntriangle,3]. Threads: Any thread. Since 0.2. */
+DFM_API dfm_status dfm_trimesh_create(dfm_context *context, uint32_t npoint, const double *points, uint32_t ntriangle,
+                                      const uint32_t *triangles, dfm_trimesh *out);
+/** @return DFM_OK; DFM_E_HANDLE. Threads: Any thread, with nobody using the mesh or its arrays. Since 0.2. */
+DFM_API dfm_status dfm_trimesh_destroy(dfm_trimesh mesh);
+typedef struct dfm_trimesh_info {
+  uint32_t size, npoint, ntriangle, nedge, npiece, ngroup;
+  uint32_t merged_points, dropped_points, dropped_triangles, turned;                 /* what reading repaired */
+  uint32_t open_edges, holes, nonmanifold_edges, closed;                             /* closed: 1 if every edge has two triangles that agree */
+  double area, volume, edge_min, edge_median, edge_max;                              /* m2, m3 (signed sum; of a closed surface), m */
+  double quality_min, quality_mean; uint32_t quality_histogram[10];                  /* 4 sqrt(3) area / sum l2: 1 for an equilateral triangle */
+  double lo[3], hi[3];
+  const char *warnings;                                                              /* one sentence a line; valid while the mesh lives */
+} dfm_trimesh_info;
+/** Counts, sizes and what reading repaired. Threads: Any thread. Since 0.2. */
+DFM_API dfm_status dfm_trimesh_get_info(dfm_trimesh mesh, dfm_trimesh_info *out);
+/** Borrowed arrays, valid while the mesh lives: points [npoint,3], triangles [ntriangle,3] outward, file_point [npoint] 0-based place in the
+ * file. Each out may be NULL. Threads: Any thread. Since 0.2. */
+DFM_API dfm_status dfm_trimesh_data(dfm_trimesh mesh, const double **points, const uint32_t **triangles, const uint32_t **file_point);
+/** Groups of triangles, [ngroup]: physical groups, OBJ groups or materials, PLY and STL solids; per triangle its group (UINT32_MAX none).
+ * Each out may be NULL; valid while the mesh lives. Threads: Any thread. Since 0.2. */
+DFM_API dfm_status dfm_trimesh_groups(dfm_trimesh mesh, const char *const **names, const uint32_t **triangle_group);
+/** Writes OBJ, PLY (binary), STL (binary), OFF, legacy VTK or VTU by file name ending; to a temporary name first, so never half a file.
+ * @return DFM_OK; DFM_E_IO; DFM_E_UNSUPPORTED another ending. Threads: Any thread. Since 0.2. */
+DFM_API dfm_status dfm_trimesh_write(dfm_trimesh mesh, const char *path);
+
+/** Lattice cells inside a closed surface, so that a surface alone becomes a body. Small holes, flipped or touching triangles do no harm:
+ * inside is where the winding number exceeds one half.
+ * @param surface  closed but for small holes; else DFM_E_FORMAT says how large the opening is
+ * @param cells    wanted number of tetrahedra; the lattice offers one near it
+ * @param out      cells that cover the inside; the surface lies within them. dfm_tetmesh_share tells how much of each is material
+ * Threads: Any thread. Since 0.2. */
+DFM_API dfm_status dfm_tetmesh_fill(dfm_trimesh surface, uint32_t cells, dfm_tetmesh *out);
+/** Share of each cell that is material, [ntet], in (0,1]; NULL for a mesh that was not filled. Borrowed. Threads: Any thread. Since 0.2. */
+DFM_API dfm_status dfm_tetmesh_share(dfm_tetmesh mesh, const double **share);
+
 #ifdef __cplusplus
 }
 #endif

@@ -31,6 +31,7 @@ const char *kind_name(Kind kind) {
     case Kind::law: return "law";
     case Kind::scene: return "scene";
     case Kind::tetmesh: return "mesh";
+    case Kind::trimesh: return "surface mesh";
     case Kind::none: break;
   }
   return "object";

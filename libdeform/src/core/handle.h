@@ -6,7 +6,7 @@
 
 namespace dfm {
 
-enum class Kind : uint8_t { none = 0, world = 1, body = 2, obstacle = 3, material = 4, law = 5, scene = 6, tetmesh = 7 };
+enum class Kind : uint8_t { none = 0, world = 1, body = 2, obstacle = 3, material = 4, law = 5, scene = 6, tetmesh = 7, trimesh = 8 };
 
 // Registers an object (not owned) and returns its handle. Thread-safe; throws std::bad_alloc.
 uint64_t handle_create(Kind kind, void *object);

@@ -1,0 +1,31 @@
+// Triangle surfaces before they become a body's skin or are filled with cells: reading, repair, measures, writing.
+#pragma once
+#include "mesh/mesh.h"
+
+namespace dfm {
+
+struct TriMesh {
+  explicit TriMesh(const Memory &m = Memory::standard())
+      : memory(&m), points(HookAllocator<double>(m)), tris(HookAllocator<uint32_t>(m)), tri_group(HookAllocator<uint32_t>(m)),
+        file_point(HookAllocator<uint32_t>(m)) {}
+  const Memory *memory;
+  Array<double> points;          // [npoint,3], m
+  Array<uint32_t> tris;          // [ntri,3], neighbours agree; closed pieces face outward
+  Array<uint32_t> tri_group;     // [ntri] index into groups, kNoGroup without
+  Array<uint32_t> file_point;    // [npoint] 0-based position of the point in its file (the first of those merged)
+  std::vector<MeshGroup> groups;
+  // What reading had to repair or noticed.
+  uint32_t merged_points = 0, dropped_points = 0, dropped_tris = 0, turned = 0;
+  std::vector<std::string> warnings;  // one sentence each
+  uint32_t npoint() const { return static_cast<uint32_t>(points.size() / 3); }
+  uint32_t ntri() const { return static_cast<uint32_t>(tris.size() / 3); }
+};
+
+TriMesh read_tri_mesh(const Memory &memory, const std::string &path);
+TriMesh parse_tri_mesh(const Memory &memory, const std::string &path, const char *bytes, size_t size);
+
+// Cells of a body-centred cubic lattice that cover the inside of the surface, about `cells` of them, with `share` filled in. The surface
+// need not be clean: inside is where the generalised winding number exceeds one half. Throws Error(FORMAT) where nothing is inside.
+TetMesh fill_surface(const TriMesh &surface, uint32_t cells);
+
+}  // namespace dfm
