@@ -179,6 +179,7 @@ struct World {
   void stage_motion();
   bool stage_model(uint32_t *trouble);
   bool stage_predict(uint32_t *trouble);
+  void stage_gather();
   void stage_broad();
   void stage_narrow();
   bool stage_solve(uint32_t *trouble);                 // solve.cpp
