@@ -1,4 +1,4 @@
-// What N and its transpose cost: a sphere of 10,242 or 40,962 surfels on a ball of 1,500 cells. Counters: ns per weight, weights per row.
+// What N and its transpose cost: a sphere of 4,098 or 16,386 surfels on a ball of 1,500 cells. Counters: ns per weight and surfel, weights per row.
 #include <benchmark/benchmark.h>
 
 #include "../unit/surfel/detect_scene.h"
