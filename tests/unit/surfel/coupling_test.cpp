@@ -264,7 +264,8 @@ TEST_F(Reference, QuadraticField_BothCouplings) {
   const auto linear = read("fields/mls_linear_surfel_u.csv"), quadratic = read("fields/mls_quadratic_surfel_u.csv");
   double worst = 0, worst_thesis = 0, top = 0;
   for (uint32_t s = 0; s < k.in().nsurfel; ++s) {
-    const auto sum = [&](size_t at) { return Vec3{linear[s][at] + quadratic[s][at], linear[s][at + 1] + quadratic[s][at + 1], linear[s][at + 2] + quadratic[s][at + 2]}; };
+    const auto at3 = [](const std::vector<double> &row, size_t at) { return Vec3{row[at], row[at + 1], row[at + 2]}; };
+    const auto sum = [&](size_t at) { return at3(linear[s], at) + at3(quadratic[s], at); };
     top = std::max(top, norm(sum(4)));
     worst = std::max(worst, norm(apply(mls, s, u) - sum(4))), worst_thesis = std::max(worst_thesis, norm(apply(thesis, s, u) - sum(1)));
   }
