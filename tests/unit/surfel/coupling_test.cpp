@@ -83,8 +83,8 @@ TEST_P(Linear, Rows_SumToOneAndReproduceLinearFieldsAtAnyScaleAndPlace) {
   }
 }
 
-TEST_P(Linear, Place_ChangesNoWeightByMoreThanItsRounding) {
-  // A power of two is exact, so what is left is the rounding of the shifted input, 1e-9 of a cell.
+// A power of two is exact, so no step of the construction may know the unit of length.
+TEST_P(Linear, ScaleByAPowerOfTwo_ChangesNoBit) {
   const Coupling home = couple(GetParam(), ball().in()), scaled = couple(GetParam(), ball(0x1p-30).in());
   EXPECT_EQ(home.col, scaled.col);
   EXPECT_EQ(home.weight, scaled.weight);
