@@ -137,7 +137,7 @@ void read_msh(Cursor &in, RawMesh &out) {
   const int64_t type = in.integer("the file type"), size = in.integer("the data size");
   const bool two = version >= 2.0 && version <= 2.2, four = version == 4.1;
   if (!two && !four) {
-    if (version == 1.0 || version == 4.0 || version == 3.0) in.unsupported("MSH version %g is not read; %s", version, kConvertMsh);
+    if (version == 1.0 || version == 4.0 || version == 3.0) in.unsupported("MSH version %.1f is not read; %s", version, kConvertMsh);
     in.unsupported("MSH version %g is not known; 2.2 and 4.1 are read", version);
   }
   if (type != 0 && type != 1) in.refuse("file type %lld; expected 0 (ASCII) or 1 (binary)", ll(type));

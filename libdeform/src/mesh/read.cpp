@@ -133,9 +133,10 @@ const Format &choose(const std::string &path, std::string_view bytes, RawMesh &r
 }
 
 // Warnings of the reader stand before those of the repair.
-TetMesh finish_with_warnings(const std::string &path, RawMesh &&raw) {
+template <class Mesh>
+Mesh finish_with_warnings(Mesh (*finish)(const std::string &, RawMesh &&), const std::string &path, RawMesh &&raw) {
   const std::vector<std::string> warnings = raw.warnings;
-  TetMesh mesh = finish_mesh(path, std::move(raw));
+  Mesh mesh = finish(path, std::move(raw));
   mesh.warnings.insert(mesh.warnings.begin(), warnings.begin(), warnings.end());
   return mesh;
 }
@@ -159,11 +160,17 @@ RawMesh read_raw(const Memory &memory, const std::string &path) {
 }
 
 TetMesh parse_tet_mesh(const Memory &memory, const std::string &path, const char *bytes, size_t size) {
-  return finish_with_warnings(path, parse_raw(memory, path, bytes, size));
+  return finish_with_warnings(finish_mesh, path, parse_raw(memory, path, bytes, size));
 }
 
 TetMesh read_tet_mesh(const Memory &memory, const std::string &path) {
-  return finish_with_warnings(path, read_raw(memory, path));  // the file's bytes are free before the repair begins
+  return finish_with_warnings(finish_mesh, path, read_raw(memory, path));  // the file's bytes are free before the repair begins
 }
+
+TriMesh parse_tri_mesh(const Memory &memory, const std::string &path, const char *bytes, size_t size) {
+  return finish_with_warnings(finish_surface, path, parse_raw(memory, path, bytes, size));
+}
+
+TriMesh read_tri_mesh(const Memory &memory, const std::string &path) { return finish_with_warnings(finish_surface, path, read_raw(memory, path)); }
 
 }  // namespace dfm

@@ -142,7 +142,7 @@ class PlyReader {
     if (e.name == "tristrips" && e.number > 0) in_.unsupported("triangle strips; save the surface with faces (for instance meshlab, or meshio convert FILE OUT.obj)");
     size_t least = 0;
     for (const Property &p : e.properties) least += bytes_of(p.count != PlyNumber::none ? p.count : p.type);
-    const std::string name(e.name.substr(0, 40));
+    const std::string name = "elements " + Cursor::quote(e.name);
     const uint64_t n = in_.binary ? in_.count(e.number, least, name.c_str()) : in_.text_count(e.number, e.properties.size(), name.c_str());
     if (e.name == "vertex") read_points(e, n);
     else if (e.name == "face") read_faces(e, n);
