@@ -49,7 +49,7 @@ const std::string kPlyThree = "0 0 0\n1 0 0\n0 1 0\n";
 }  // namespace
 
 TEST(ReadSurface, EveryDialect_GivesTheSameCube) {
-  const auto files = test::files_of(kFolder, {".obj", ".ply", ".stl", ".off", ".vtk", ".vtp", ".mesh", ".msh"});
+  const auto files = test::own_surfaces();
   ASSERT_EQ(files.size(), 19u);
   for (const std::string &file : files) {
     SCOPED_TRACE(file);
