@@ -87,8 +87,8 @@ TEST(MeshCommand, BadInput_ExitsTwoWithOneSentence) {
   expect_refused({"mesh", "info", folder() + "/none.msh"}, {"none.msh", "No such file"});
   expect_refused({"mesh", "info", folder()}, {"ending"});
   expect_refused({"mesh", "info", folder() + "/flat.vtk"}, {"flat.vtk", "flat"});
-  expect_refused({"mesh", "info", folder() + "/surface.obj"}, {"not available yet", ".msh", ".vtk"});
-  expect_refused({"mesh", "convert", own("cube_vtk20_ascii.vtk"), folder() + "/x.obj"}, {"not available yet", ".msh"});
+  expect_refused({"mesh", "info", folder() + "/surface.obj"}, {"surface.obj", "no tetrahedra"});
+  expect_refused({"mesh", "convert", own("cube_vtk20_ascii.vtk"), folder() + "/x.obj"}, {"x.obj", ".msh", ".vtu"});
   EXPECT_FALSE(std::filesystem::exists(folder() + "/x.obj"));
   expect_refused({"mesh", "fill", folder() + "/surface.obj", "--out", ball, "--cells", "5"}, {"not available yet"});
   expect_refused({"mesh", "make", "ball", "--out", folder() + "/none/b.msh"}, {"none/b.msh", "No such file"});
