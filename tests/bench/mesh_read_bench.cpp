@@ -86,8 +86,8 @@ int main(int argc, char **argv) {
     std::filesystem::remove(path);
     std::printf("%-10s %10u %8.0f %10.2f %10.2f %12.0f %12.0f\n", name, beam.ntet(), megabytes, parse, whole, double(peak) / each, double(held) / each);
     if (!csv.empty())
-      std::ofstream(csv, std::ios::app) << machine() << ',' << compiler() << ',' << name << ',' << beam.ntet() << ',' << megabytes << ',' << parse << ',' << whole << ','
-                                        << double(peak) / each << ',' << double(held) / each << '\n';
+      std::ofstream(csv, std::ios::app) << machine() << ',' << compiler() << ',' << name << ',' << beam.ntet() << ',' << megabytes << ','
+                                        << parse << ',' << whole << ',' << double(peak) / each << ',' << double(held) / each << '\n';
   }
   return 0;
 }

@@ -108,10 +108,11 @@ TEST(MeshBounds, PromiseOfTenGigabytes_IsRefusedWithLittleMemory) {
   const std::string medit = "MeshVersionFormatted 2\nDimension 3\n";
   const auto vtu = [](uint64_t points, uint64_t cells, const std::string &form, const std::string &data, bool packed = false) {
     const std::string array = "<DataArray type=\"Int64\" " + (form.empty() ? "format=\"ascii\"" : form) + " Name=\"";
-    return std::string("<VTKFile type=\"UnstructuredGrid\"") + (packed ? " compressor=\"vtkZLibDataCompressor\"" : "") + "><UnstructuredGrid><Piece NumberOfPoints=\"" +
-           std::to_string(points) + "\" NumberOfCells=\"" + std::to_string(cells) + "\"><Points><DataArray type=\"Float32\" NumberOfComponents=\"3\" format=\"ascii\">0 0 0" +
-           "</DataArray></Points><Cells>" + array + "connectivity\">" + data + "</DataArray>" + array + "offsets\">" + data + "</DataArray>" + array + "types\">" + data +
-           "</DataArray></Cells></Piece></UnstructuredGrid></VTKFile>";
+    const std::string compressor = packed ? " compressor=\"vtkZLibDataCompressor\"" : "", end = "</DataArray>";
+    return "<VTKFile type=\"UnstructuredGrid\"" + compressor + "><UnstructuredGrid><Piece NumberOfPoints=\"" + std::to_string(points) +
+           "\" NumberOfCells=\"" + std::to_string(cells) + "\"><Points><DataArray type=\"Float32\" NumberOfComponents=\"3\" format=\"ascii\">0 0 0" +
+           end + "</Points><Cells>" + array + "connectivity\">" + data + end + array + "offsets\">" + data + end + array + "types\">" + data + end +
+           "</Cells></Piece></UnstructuredGrid></VTKFile>";
   };
   const std::pair<const char *, std::string> lies[] = {
       {"points.vtk", v + "ASCII\n" + grid + "POINTS 10000000000 double\n0 0 0\n"},
@@ -139,11 +140,13 @@ TEST(MeshBounds, PromiseOfTenGigabytes_IsRefusedWithLittleMemory) {
       {"nodes41_bin.msh", b41 + "$Nodes\n" + eight + huge + eight + eight},
       {"entities41_bin.msh", b41 + "$Entities\n" + huge + huge + huge + huge},
       {"polygons.vtk", v + "ASCII\nDATASET POLYDATA\n" + four + "POLYGONS 2000000000 10000000000\n3 0 1 2\n"},
-      {"scalars.vtk", v + "BINARY\n" + grid + "POINTS 0 float\n\nCELLS 0 0\n\nCELL_TYPES 0\n\nCELL_DATA 10000000000\nSCALARS group int\nLOOKUP_TABLE default\n" + eight},
+      {"scalars.vtk", v + "BINARY\n" + grid +
+                          "POINTS 0 float\n\nCELLS 0 0\n\nCELL_TYPES 0\n\nCELL_DATA 10000000000\nSCALARS group int\nLOOKUP_TABLE default\n" + eight},
       {"vertices.mesh", medit + "Vertices\n10000000000\n0 0 0 0\n"},
       {"tets.mesh", medit + "Vertices\n1\n0 0 0 0\nTetrahedra\n10000000000\n1 1 1 1 0\n"},
       {"points.ply", "ply\nformat ascii 1.0\nelement vertex 4000000000\nproperty float x\nproperty float y\nproperty float z\nend_header\n0 0 0\n"},
-      {"points_bin.ply", "ply\nformat binary_little_endian 1.0\nelement vertex 4000000000\nproperty float x\nproperty float y\nproperty float z\nend_header\n" + eight + eight},
+      {"points_bin.ply",
+       "ply\nformat binary_little_endian 1.0\nelement vertex 4000000000\nproperty float x\nproperty float y\nproperty float z\nend_header\n" + eight + eight},
       {"empty_properties.ply", "ply\nformat ascii 1.0\nelement vertex 4000000000\nelement nothing 9000000000000000000\nend_header\n"},
       {"list.ply", "ply\nformat binary_little_endian 1.0\nelement face 1\nproperty list uint double vertex_indices\nend_header\n" + run.substr(4, 4) + eight},
       {"faces.off", "OFF\n1 10000000000 0\n0 0 0\n3 0 0 0\n"},

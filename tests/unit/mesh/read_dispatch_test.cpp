@@ -53,9 +53,10 @@ TEST(ReadDispatch, ForeignContent_IsNamedWhateverTheEnding) {
 }
 
 TEST(ReadDispatch, ForeignEndings_AreRefusedWithTheWayToConvert) {
-  for (const auto &[end, word] : {std::pair("inp", "meshio convert"), {"node", "tetgen -g"}, {"ele", "tetgen -g"}, {"face", "meshio convert"}, {"gltf", "assimp"},
-                                  {"glb", "assimp"}, {"fbx", "assimp"}, {"3ds", "assimp"}, {"dae", "assimp"}, {"gz", "gunzip"}, {"meshb", "gmsh -3"},
-                                  {"step", "gmsh -3"}, {"med", "meshio"}})
+  const std::pair<const char *, const char *> rows[] = {
+      {"inp", "meshio convert"}, {"node", "tetgen -g"}, {"ele", "tetgen -g"}, {"face", "meshio convert"}, {"gltf", "assimp"}, {"glb", "assimp"},
+      {"fbx", "assimp"}, {"3ds", "assimp"}, {"dae", "assimp"}, {"gz", "gunzip"}, {"meshb", "gmsh -3"}, {"step", "gmsh -3"}, {"med", "meshio"}};
+  for (const auto &[end, word] : rows)
     expect_unsupported(std::string("a.") + end, "x", {word});
 }
 

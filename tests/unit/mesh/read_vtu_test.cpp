@@ -25,6 +25,9 @@ std::string piece(int npoint, const std::string &points, int ncell, const std::s
 std::string file(const std::string &content, const std::string &head = "byte_order=\"LittleEndian\"") {
   return "<VTKFile type=\"UnstructuredGrid\" version=\"0.1\" " + head + ">\n<UnstructuredGrid>\n" + content + "\n</UnstructuredGrid></VTKFile>\n";
 }
+std::string points_alone(const std::string &how, const std::string &text) {
+  return "<Piece NumberOfPoints=\"1\" NumberOfCells=\"0\"><Points>" + array("Float32", "Points", text, how) + "</Points></Piece>";
+}
 const std::string kFour = "0 0 0 1 0 0 0 1 0 0 0 1";
 std::string one_tet() { return piece(4, kFour, 1, "0 1 2 3", "4", "10"); }
 
@@ -120,11 +123,10 @@ TEST(ReadVtu, DamagedData_AreRefused) {
   expect_refusal(with({1, n, n + 1, p}, body), DFM_E_FORMAT, {"cannot hold"});
   expect_refusal(with({1, 5, 0, p}, body), DFM_E_FORMAT, {"damaged"});
   expect_refusal(with({0, n, 0}, ""), DFM_E_FORMAT, {"promises 12 points"});
-  const auto inline_points = [](const std::string &text) {
-    return file("<Piece NumberOfPoints=\"1\" NumberOfCells=\"0\"><Points>" + array("Float32", "Points", text, "NumberOfComponents=\"3\" format=\"binary\"") + "</Points></Piece>");
-  };
+  const auto inline_points = [](const std::string &text) { return file(points_alone("NumberOfComponents=\"3\" format=\"binary\"", text)); };
   EXPECT_EQ(parse(inline_points(base64(bytes_of<uint32_t>({12, 0, 0, 0})))).npoint(), 1u);
-  EXPECT_EQ(parse(inline_points(" \n" + base64(bytes_of<uint32_t>({12})) + "\n" + base64(bytes_of<uint32_t>({0, 0, 0})))).npoint(), 1u);  // length encoded apart
+  const std::string apart = " \n" + base64(bytes_of<uint32_t>({12})) + "\n" + base64(bytes_of<uint32_t>({0, 0, 0}));  // length encoded apart
+  EXPECT_EQ(parse(inline_points(apart)).npoint(), 1u);
   expect_refusal(inline_points("DAAAAA*AAAAAAAAAAAAAAA=="), DFM_E_FORMAT, {"not base64"});
   expect_refusal(inline_points(base64(bytes_of<uint32_t>({12, 0, 0, 0x7f800000}))), DFM_E_FORMAT, {"DataArray 'Points', byte 8", "finite"});
   expect_refusal(inline_points(base64(bytes_of<uint32_t>({13, 0, 0, 0}))), DFM_E_FORMAT, {"13 bytes"});
@@ -145,10 +147,8 @@ TEST(ReadVtu, Structure_IsChecked) {
   expect_refusal(file(piece(4, "0 0 0 1 0 0 0 nan 0 0 0 1", 1, "0 1 2 3", "4", "10")), DFM_E_FORMAT, {"a.vtu:3:", "'nan'"});
   expect_refusal(file(piece(8, kFour + " " + kFour, 1, "0 1 2 3 4 5 6 7", "8", "12")), DFM_E_UNSUPPORTED, {"hexahedron", "mesh the shape"});
   expect_refusal(file(piece(4, kFour, 1, "0 1 2 3 0 1 2 3 0 1", "10", "24")), DFM_E_UNSUPPORTED, {"higher-order", "-order 1"});
-  expect_refusal(file("<Piece NumberOfPoints=\"1\" NumberOfCells=\"0\"><Points>" + array("Float32", "P", "0 0", "NumberOfComponents=\"2\" format=\"ascii\"") + "</Points></Piece>"),
-                 DFM_E_FORMAT, {"2 components"});
-  expect_refusal(file("<Piece NumberOfPoints=\"1\" NumberOfCells=\"0\"><Points>" + array("Float32", "P", "", "NumberOfComponents=\"3\" format=\"appended\" offset=\"0\"") +
-                      "</Points></Piece>"), DFM_E_FORMAT, {"no AppendedData"});
+  expect_refusal(file(points_alone("NumberOfComponents=\"2\" format=\"ascii\"", "0 0")), DFM_E_FORMAT, {"2 components"});
+  expect_refusal(file(points_alone("NumberOfComponents=\"3\" format=\"appended\" offset=\"0\"", "")), DFM_E_FORMAT, {"no AppendedData"});
   expect_refusal("<VTKFile type=\"ImageData\"></VTKFile>", DFM_E_UNSUPPORTED, {"'ImageData'", "UnstructuredGrid or PolyData"});
   expect_refusal(file(one_tet(), "compressor=\"vtkLZ4DataCompressor\""), DFM_E_UNSUPPORTED, {"LZ4", "vtkZLibDataCompressor"});
   expect_refusal(file(one_tet(), "byte_order=\"Middle\""), DFM_E_FORMAT, {"'Middle'"});
