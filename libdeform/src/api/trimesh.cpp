@@ -18,6 +18,15 @@ void log_warnings(const dfm_context &context, const char *what, const dfm::TriMe
 
 }  // namespace
 
+dfm_status dfm_trimesh_read(dfm_context *context, const char *path, dfm_trimesh *out) {
+  return guard([&] {
+    need(context, "context"), need(path, "path"), need(out, "out");
+    dfm::TriMesh mesh = dfm::read_tri_mesh(context->memory, path);
+    log_warnings(*context, path, mesh);
+    *out = Object::keep(*context, std::move(mesh));
+  });
+}
+
 dfm_status dfm_trimesh_create(dfm_context *context, uint32_t npoint, const double *points, uint32_t ntriangle, const uint32_t *triangles,
                               dfm_trimesh *out) {
   return guard([&] {

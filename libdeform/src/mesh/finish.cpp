@@ -51,6 +51,17 @@ void turn_negative(RawMesh &raw, TetMesh &mesh) {
     if (tet_volume(raw.points.data(), &raw.tets[t]) < 0) std::swap(raw.tets[t + 2], raw.tets[t + 3]), ++mesh.turned;
 }
 
+// Triangles without a group say nothing that the cells' boundary does not.
+void keep_grouped_triangles(const RawMesh &raw, TetMesh &mesh, const Array<uint32_t> &number) {
+  for (size_t t = 0; t < raw.tri_group.size(); ++t) {
+    const uint32_t *c = &raw.tris[3 * t];
+    if (raw.tri_group[t] == kNoGroup || number[c[0]] == kNoGroup || number[c[1]] == kNoGroup || number[c[2]] == kNoGroup) continue;
+    mesh.tris.insert(mesh.tris.end(), {number[c[0]], number[c[1]], number[c[2]]});
+    mesh.tri_group.push_back(raw.tri_group[t]);
+  }
+  mesh.tris.shrink_to_fit(), mesh.tri_group.shrink_to_fit();
+}
+
 // Keeps the points that cells use, in the file's order, and fills the groups' points.
 void renumber(RawMesh &raw, TetMesh &mesh) {
   const Memory &memory = *raw.memory;
@@ -68,6 +79,7 @@ void renumber(RawMesh &raw, TetMesh &mesh) {
   raw.points.resize(3 * size_t(kept));
   raw.points.shrink_to_fit();
   for (uint32_t &p : raw.tets) p = number[p];
+  keep_grouped_triangles(raw, mesh, number);
 
   for (size_t i = 0; i < raw.tet_group.size(); ++i)
     if (raw.tet_group[i] != kNoGroup) {
@@ -86,7 +98,7 @@ void renumber(RawMesh &raw, TetMesh &mesh) {
 }
 
 // Groups by dimension and number, whatever order the file has them in.
-void sort_groups(RawMesh &raw) {
+void sort_groups(RawMesh &raw, TetMesh &mesh) {
   const uint32_t n = uint32_t(raw.groups.size());
   std::vector<uint32_t> order(n), place(n);
   for (uint32_t g = 0; g < n; ++g) order[g] = g;
@@ -99,6 +111,7 @@ void sort_groups(RawMesh &raw) {
   raw.groups = std::move(sorted);
   for (uint32_t &g : raw.tet_group)
     if (g != kNoGroup) g = place[g];
+  for (uint32_t &g : mesh.tri_group) g = place[g];
 }
 
 uint32_t count_overlaps(const TetMesh &mesh, uint32_t *crowded) {
@@ -187,14 +200,15 @@ std::string coarse_coordinates(const double lo[3], const double hi[3], double ed
 
 TetMesh finish_mesh(const std::string &path, RawMesh &&raw) {
   TetMesh mesh(*raw.memory);
-  if (raw.tets.empty())
-    fail(DFM_E_FORMAT, "%s: no tetrahedra in this file; a body needs a volume mesh (a surface alone is not available yet)", path.c_str());
+  if (raw.tets.empty() && !raw.tris.empty())
+    fail(DFM_E_FORMAT, "%s: no tetrahedra in this file, only a surface of %u triangles; fill it first: deform mesh fill FILE OUT.msh", path.c_str(), raw.ntri());
+  if (raw.tets.empty()) fail(DFM_E_FORMAT, "%s: no tetrahedra in this file; a body needs a volume mesh or a closed surface", path.c_str());
   check_points(path, raw.points);
   refuse_flat(path, raw);
   turn_negative(raw, mesh);
   mesh.dropped_cells = drop_duplicate_cells(raw);
   renumber(raw, mesh);
-  sort_groups(raw);
+  sort_groups(raw, mesh);
   mesh.points = std::move(raw.points), mesh.tets = std::move(raw.tets), mesh.tet_group = std::move(raw.tet_group);
   mesh.groups = std::move(raw.groups);
   uint32_t crowded = 0;

@@ -29,11 +29,10 @@ void put_points(AtomicFile &out, const TriMesh &mesh, const char *before) {
     out.write(format("%s%.17g %.17g %.17g\n", before, mesh.points[p], mesh.points[p + 1], mesh.points[p + 2]));
 }
 
-// A space would end a name in OBJ.
-std::string one_word(const std::string &name) {
-  std::string word = name;
-  std::replace_if(word.begin(), word.end(), [](unsigned char c) { return std::isspace(c); }, '_');
-  return word;
+// A name ends with its line.
+std::string one_line(std::string name) {
+  std::replace_if(name.begin(), name.end(), [](unsigned char c) { return c < ' '; }, '_');
+  return name;
 }
 
 void put_obj(AtomicFile &out, const TriMesh &mesh) {
@@ -43,7 +42,7 @@ void put_obj(AtomicFile &out, const TriMesh &mesh) {
   for (uint32_t t = 0; t < mesh.ntri(); ++t) {
     if (mesh.tri_group[t] != group) {
       group = mesh.tri_group[t];
-      out.write(group == kNoGroup ? "g\n" : "g " + one_word(mesh.groups[group].name) + "\n");
+      out.write("g " + (group == kNoGroup ? "default" : one_line(mesh.groups[group].name)) + "\n");
     }
     const uint32_t *c = &mesh.tris[3 * size_t(t)];
     out.write("f " + text(c[0] + 1ull) + " " + text(c[1] + 1ull) + " " + text(c[2] + 1ull) + "\n");
@@ -89,33 +88,11 @@ void put_stl(AtomicFile &out, const TriMesh &mesh, const std::string &path) {
   }
 }
 
-int32_t group_number(const TriMesh &mesh, uint32_t t) { return mesh.tri_group[t] == kNoGroup ? 0 : mesh.groups[mesh.tri_group[t]].tag; }
-
-void put_vtk(AtomicFile &out, const TriMesh &mesh) {
-  out.write("# vtk DataFile Version 3.0\ntriangles\nBINARY\nDATASET UNSTRUCTURED_GRID\nPOINTS " + text(mesh.npoint()) + " double\n");
-  for (const double x : mesh.points) put_as(out, std::endian::big, x);
-  out.write("\nCELLS " + text(mesh.ntri()) + " " + text(4 * uint64_t(mesh.ntri())) + "\n");
-  for (size_t i = 0; i < mesh.tris.size(); ++i) {
-    if (i % 3 == 0) put_as(out, std::endian::big, int32_t(3));
-    put_as(out, std::endian::big, mesh.tris[i]);
-  }
-  out.write("\nCELL_TYPES " + text(mesh.ntri()) + "\n");
-  for (uint32_t t = 0; t < mesh.ntri(); ++t) put_as(out, std::endian::big, int32_t(5));
-  if (!mesh.groups.empty()) {
-    out.write("\nCELL_DATA " + text(mesh.ntri()) + "\nSCALARS group int 1\nLOOKUP_TABLE default\n");
-    for (uint32_t t = 0; t < mesh.ntri(); ++t) put_as(out, std::endian::big, group_number(mesh, t));
-  }
-  out.write("\n");
-}
-
-void put_vtu(const std::string &path, const TriMesh &mesh) {
-  VtuGrid grid;
-  grid.npoint = mesh.npoint(), grid.ncell = mesh.ntri(), grid.corners = 3;
-  grid.points = mesh.points.data(), grid.cells = mesh.tris.data();
-  Array<uint32_t> number{HookAllocator<uint32_t>(*mesh.memory)};
-  for (uint32_t t = 0; !mesh.groups.empty() && t < mesh.ntri(); ++t) number.push_back(uint32_t(group_number(mesh, t)));
-  if (!number.empty()) grid.cell_data.push_back({"group", 1, nullptr, number.data()});
-  write_vtu(path, grid);
+// The formats of cells hold triangles too: a body without cells, whose triangles all stand in the file.
+TetMesh as_cells(const TriMesh &mesh) {
+  TetMesh out(*mesh.memory);
+  out.points = mesh.points, out.tris = mesh.tris, out.tri_group = mesh.tri_group, out.groups = mesh.groups;
+  return out;
 }
 
 }  // namespace
@@ -124,7 +101,8 @@ void write_tri_mesh(const TriMesh &mesh, const std::string &path) {
   const size_t slash = path.find_last_of('/'), dot = path.find_last_of('.');
   std::string ending = dot == std::string::npos || (slash != std::string::npos && dot < slash) ? "" : path.substr(dot);
   for (char &c : ending) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
-  if (ending == ".vtu") return put_vtu(path, mesh);
+  if (ending == ".vtk") return write_vtk(as_cells(mesh), path);
+  if (ending == ".vtu") return write_vtu(as_cells(mesh), path);
   static const std::vector<std::string> known{".obj", ".ply", ".stl", ".off", ".vtk", ".vtu"};
   if (std::find(known.begin(), known.end(), ending) == known.end())
     fail(DFM_E_UNSUPPORTED, "%s: a surface is written as %s, told by the file name's ending; this one ends with '%s'", path.c_str(),
@@ -133,8 +111,7 @@ void write_tri_mesh(const TriMesh &mesh, const std::string &path) {
   if (ending == ".obj") put_obj(out, mesh);
   else if (ending == ".ply") put_ply(out, mesh);
   else if (ending == ".stl") put_stl(out, mesh, path);
-  else if (ending == ".off") put_off(out, mesh);
-  else put_vtk(out, mesh);
+  else put_off(out, mesh);
   out.commit();
 }
 
