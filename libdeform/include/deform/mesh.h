@@ -6,7 +6,8 @@
 #ifdef __cplusplus
 extern "C" {
 #endif
-/** Reads MSH 2.2 and 4.1 (ASCII, binary) and legacy VTK (ASCII, binary; 2.0 to 5.1) with tetrahedra. Memory is bounded by the file's size.
+/** Reads the tetrahedra of MSH 2.2 and 4.1, legacy VTK 2.0 to 5.1, VTU and Medit files (ASCII and binary; doc/concepts/mesh_files.md). What a
+ * file is its first bytes say, else its name's ending. Memory is bounded by the file's size.
  * Negative cells are turned, unused points and duplicate cells dropped, each with a count in a warning on the log and in dfm_tetmesh_info.
  * A cell without volume is refused: it has no rest shape.
  * @return DFM_OK; DFM_E_IO; DFM_E_FORMAT (file, line or byte, what was expected); DFM_E_UNSUPPORTED (how to convert); DFM_E_NOMEM
@@ -15,7 +16,8 @@ DFM_API dfm_status dfm_tetmesh_read(dfm_context *context, const char *path, dfm_
 /** Generators, SI units, about `cells` tetrahedra: a number near it that the shape's lattice offers, more where cells would otherwise be
  * longer than twice their width.
  * "cylinder": size = {radius, length, 0}, axis z from 0 to length, base at the origin; "beam": size = {x, y, z} edges from the origin;
- * "ball": size = {radius, 0, 0}, about the origin. @return DFM_OK; DFM_E_ARG; DFM_E_NOMEM. Threads: Any thread. Since 0.1. */
+ * "ball": size = {radius, 0, 0}, about the origin; "tube": size = {inner radius, outer radius, length}, as the cylinder (since 0.2).
+ * @return DFM_OK; DFM_E_ARG; DFM_E_NOMEM. Threads: Any thread. Since 0.1. */
 DFM_API dfm_status dfm_tetmesh_make(dfm_context *context, const char *kind, const double size[3], uint32_t cells, dfm_tetmesh *out);
 /** @return DFM_OK; DFM_E_HANDLE. Threads: Any thread, with nobody using the mesh or its arrays. Since 0.1. */
 DFM_API dfm_status dfm_tetmesh_destroy(dfm_tetmesh mesh);
@@ -41,8 +43,9 @@ DFM_API dfm_status dfm_tetmesh_groups(dfm_tetmesh mesh, const char *const **name
  * @param points     out, borrowed, [n]. Each out may be NULL
  * @return DFM_OK; DFM_E_ARG no such group; DFM_E_HANDLE. Threads: Any thread. Since 0.1. */
 DFM_API dfm_status dfm_tetmesh_group_points(dfm_tetmesh mesh, uint32_t group, uint32_t *dimension, const uint32_t **points, uint32_t *n);
-/** Writes binary MSH 4.1 ("*.msh"), MSH 2.2 ("*.msh2") or legacy VTK ("*.vtk", without groups) by file name ending; to a temporary
- * name first, so never half a file. Groups of points, lines and triangles are not written.
+/** Writes binary MSH 4.1 ("*.msh"), MSH 2.2 ("*.msh2"), legacy VTK ("*.vtk"), VTU ("*.vtu") or Medit ("*.mesh", groups by number alone) by
+ * file name ending; to a temporary name first, so never half a file. Groups of cells and of triangles are kept in all of them, groups of
+ * points in MSH, groups of lines in none.
  * @return DFM_OK; DFM_E_IO; DFM_E_UNSUPPORTED another ending. Threads: Any thread. Since 0.1. */
 DFM_API dfm_status dfm_tetmesh_write(dfm_tetmesh mesh, const char *path);
 /** What a mesh file holds. Decides whether a body takes its cells from the file or is filled from its surface. */
@@ -59,6 +62,10 @@ DFM_API dfm_status dfm_trimesh_read(dfm_context *context, const char *path, dfm_
 /** The same repair for triangles of the host: points [npoint,3] m, triangles [ntriangle,3]. Threads: Any thread. Since 0.2. */
 DFM_API dfm_status dfm_trimesh_create(dfm_context *context, uint32_t npoint, const double *points, uint32_t ntriangle,
                                       const uint32_t *triangles, dfm_trimesh *out);
+/** Generators of closed surfaces, SI units, about `triangles` near-equilateral triangles: "cylinder", "beam", "ball" and "tube" as for
+ * dfm_tetmesh_make; "torus": size = {ring radius, tube radius, 0}, about the origin, axis z.
+ * @return DFM_OK; DFM_E_ARG; DFM_E_NOMEM. Threads: Any thread. Since 0.2. */
+DFM_API dfm_status dfm_trimesh_make(dfm_context *context, const char *kind, const double size[3], uint32_t triangles, dfm_trimesh *out);
 /** @return DFM_OK; DFM_E_HANDLE. Threads: Any thread, with nobody using the mesh or its arrays. Since 0.2. */
 DFM_API dfm_status dfm_trimesh_destroy(dfm_trimesh mesh);
 typedef struct dfm_trimesh_info {
