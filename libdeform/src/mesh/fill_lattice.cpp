@@ -92,7 +92,7 @@ KeySet::KeySet(const Memory &memory) : keys_(HookAllocator<uint64_t>(memory)), t
 
 size_t KeySet::slot(uint64_t key) const {
   const size_t mask = table_.size() - 1;
-  size_t i = size_t((key * 0x9E3779B97F4A7C15u) >> 20) & mask;
+  size_t i = size_t((key * 0x9E3779B97F4A7C15u) >> 32) & mask;  // the upper half: all three coordinates reach it
   while (table_[i] != UINT32_MAX && keys_[table_[i]] != key) i = (i + 1) & mask;
   return i;
 }

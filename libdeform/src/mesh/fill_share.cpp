@@ -25,16 +25,19 @@ class Sampler {
     for (int k = 0; k < 4; ++k) corner[k] = place_of(site[k]);
     share_ = loose_ = 0;
     level_[0].assign(tris, tris + ntri);
-    part(corner, 0, 1);
+    part(corner, 0, 1, {}, 0);
     *share = share_, *loose = loose_;
     const TetShape shape(corner);
     *touched_only = ntri > 0 && std::none_of(tris, tris + ntri, [&](uint32_t t) { return meets(shape, t, -tolerance_); });
   }
 
  private:
+  void triangle(uint32_t t, Vec3 c[3]) const {
+    for (int k = 0; k < 3; ++k) c[k] = lattice_.from_box(load3(&surface_.points[3 * size_t(surface_.tris[3 * size_t(t) + k])]));
+  }
   bool meets(const TetShape &shape, uint32_t t, double tolerance) const {
     Vec3 c[3];
-    for (int k = 0; k < 3; ++k) c[k] = lattice_.from_box(load3(&surface_.points[3 * size_t(surface_.tris[3 * size_t(t) + k])]));
+    triangle(t, c);
     return shape.meets(c, tolerance);
   }
 
@@ -50,16 +53,44 @@ class Sampler {
     return u[0] * corner[0] + (u[1] - u[0]) * corner[1] + ((u[2] - u[1]) * corner[2] + (1 - u[2]) * corner[3]);
   }
 
-  void part(const Vec3 corner[4], int level, double fraction) {
-    const bool crossed = !level_[size_t(level)].empty();
-    if (!crossed || level == cuts_) {
-      const Vec3 place = crossed ? any_place(corner) : 0.25 * ((corner[0] + corner[1]) + (corner[2] + corner[3]));
-      const double w = surface_.winding.at(lattice_.to_box(place));
-      if (level == cuts_ || surface_.closed || std::fabs(w - 0.5) > 0.25) {
-        if (w > 0.5) share_ += fraction;
-        if (crossed) loose_ += fraction;
-        return;
+  // The winding number at `place` from the one at `known`, both in the part at `level`: it rises by one where the way goes in through a
+  // triangle. Only for closed surfaces, where nothing else changes it. False: the way meets an edge, or begins or ends on a triangle.
+  bool go(int level, Vec3 known, Vec3 place, double *winding) const {
+    const Vec3 way = place - known;
+    for (const uint32_t t : level_[size_t(level)]) {
+      Vec3 c[3];
+      triangle(t, c);
+      const Vec3 normal = cross(c[1] - c[0], c[2] - c[0]);
+      const double from = dot(normal, known - c[0]), to = dot(normal, place - c[0]), thin = 1e-10 * norm(normal);
+      if ((from > thin && to > thin) || (from < -thin && to < -thin)) continue;
+      int left = 0, right = 0, on = 0;
+      for (int k = 0; k < 3; ++k) {
+        const Vec3 a = c[k] - known, b = c[(k + 1) % 3] - known;
+        const double side = dot(way, cross(a, b)), zero = 1e-12 * std::sqrt(norm2(way) * norm2(a) * norm2(b));
+        (side > zero ? left : side < -zero ? right : on) += 1;
       }
+      if (left && right) continue;
+      if (on || std::fabs(from) <= thin || std::fabs(to) <= thin) return false;
+      *winding += from > 0 ? 1 : -1;
+    }
+    return true;
+  }
+
+  double winding_at(Vec3 place) const { return surface_.winding.at(lattice_.to_box(place)); }
+
+  // known: a place in the part above and its winding number, for closed surfaces.
+  void part(const Vec3 corner[4], int level, double fraction, Vec3 known, double known_winding) {
+    const bool crossed = !level_[size_t(level)].empty();
+    const Vec3 place = crossed ? any_place(corner) : 0.25 * ((corner[0] + corner[1]) + (corner[2] + corner[3]));
+    double w = known_winding;
+    if (level == 0 || !surface_.closed || !go(level - 1, known, place, &w)) {
+      w = winding_at(place);
+      if (surface_.closed) w = std::floor(w + 0.5);
+    }
+    if (level == cuts_ || (!crossed && (surface_.closed || std::fabs(w - 0.5) > 0.25))) {
+      if (w > 0.5) share_ += fraction;
+      if (crossed) loose_ += fraction;
+      return;
     }
     const auto child = [&](Vec3 a, Vec3 b, Vec3 c, Vec3 d) {
       const Vec3 p[4] = {a, b, c, d};
@@ -68,7 +99,7 @@ class Sampler {
       mine.clear();
       for (const uint32_t t : level_[size_t(level)])
         if (meets(shape, t, 0)) mine.push_back(t);
-      part(p, level + 1, fraction / 8);
+      part(p, level + 1, fraction / 8, place, w);
     };
     // Corners keep the shape; the octahedron between is cut around its shortest diagonal, between the middles of the two lattice edges.
     const auto mid = [&](int i, int j) { return 0.5 * (corner[i] + corner[j]); };
