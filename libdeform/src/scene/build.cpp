@@ -141,16 +141,13 @@ class Builder {
   }
 
   void add_loads(dfm_body body, const Body &b, const BodyMesh &mesh, const std::vector<NodalRow> &nodal) const {
-    std::vector<uint32_t> triangles;
     for (const Force &f : b.forces) {
-      if (triangles.empty()) triangles = boundary(body, b);
-      const std::vector<uint32_t> points = select(f.where, mesh, def_.file);
-      const std::vector<double> weights = share(f, points, mesh, triangles, def_.file);
+      const Shared shared = share(f, mesh, def_.file);
       std::vector<double> forces;
-      for (double w : weights)
+      for (double w : shared.weights)
         for (double t : f.total) forces.push_back(w * t);
       const bool sine = f.sine.amplitude[0] != 0;
-      check(dfm_body_add_load(body, uint32_t(points.size()), points.data(), forces.data(), uint32_t(f.keys.size()), f.keys.data(),
+      check(dfm_body_add_load(body, uint32_t(shared.points.size()), shared.points.data(), forces.data(), uint32_t(f.keys.size()), f.keys.data(),
                               sine ? &f.sine : nullptr, nullptr),
             f.where.pointer);
     }
@@ -163,19 +160,6 @@ class Builder {
     }
     if (points.empty()) return;
     check(dfm_body_add_load(body, uint32_t(points.size()), points.data(), forces.data(), 0, nullptr, nullptr, nullptr), b.pointer + "/nodal_bc");
-  }
-
-  // Boundary triangles in the numbers of the mesh's points.
-  std::vector<uint32_t> boundary(dfm_body body, const Body &b) const {
-    const std::string where = b.pointer + "/forces";
-    uint32_t ntriangle = 0, nsurfel = 0;
-    check(dfm_surface_triangles(body, 0, nullptr, &ntriangle), where);
-    check(dfm_surface_points(body, 0, nullptr, &nsurfel), where);
-    std::vector<uint32_t> triangles(3 * size_t(ntriangle)), point(nsurfel);
-    check(dfm_surface_triangles(body, ntriangle, triangles.data(), &ntriangle), where);
-    check(dfm_surface_points(body, nsurfel, point.data(), &nsurfel), where);
-    for (uint32_t &t : triangles) t = point[t];
-    return triangles;
   }
 
   void add_probe(dfm_body body, const Probe &p, const BodyMesh &mesh) {
