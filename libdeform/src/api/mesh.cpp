@@ -7,6 +7,7 @@
 
 #include "api/objects.h"
 #include "mesh/mesh.h"
+#include "mesh/raw_mesh.h"
 #include "plugin/context.h"
 
 using dfm::fail;
@@ -58,6 +59,16 @@ dfm_status dfm_tetmesh_read(dfm_context *context, const char *path, dfm_tetmesh 
     dfm::TetMesh mesh = dfm::read_tet_mesh(context->memory, path);
     for (const std::string &w : mesh.warnings) context->logf(DFM_LOG_WARNING, "%s: %s", path, w.c_str());
     *out = keep(*context, std::move(mesh));
+  });
+}
+
+dfm_status dfm_mesh_file_kind(dfm_context *context, const char *path, uint32_t *kind) {
+  return guard([&] {
+    need(context, "context"), need(path, "path"), need(kind, "kind");
+    const dfm::RawMesh raw = dfm::read_raw(context->memory, path);
+    if (raw.tets.empty() && raw.tris.empty())
+      fail(DFM_E_FORMAT, "%s: no tetrahedra and no triangles in this file; a body needs one of them", path);
+    *kind = raw.tets.empty() ? DFM_MESH_SURFACE : DFM_MESH_TETS;
   });
 }
 
