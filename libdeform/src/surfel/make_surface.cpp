@@ -107,7 +107,7 @@ void make_surface(const Memory &memory, uint32_t npoint, const double *rest, con
   out.tri = Array<uint32_t>(a), out.edge = Array<uint32_t>(a), out.edge_tri = Array<uint32_t>(a), out.tri_edge = Array<uint32_t>(a);
   out.tri_owns = Array<uint32_t>(a), out.patch = Array<uint32_t>(a), out.point = Array<uint32_t>(a), out.row = Array<uint32_t>(a);
   out.col = Array<uint32_t>(a), out.weight = Array<double>(a), out.fan_begin = Array<uint32_t>(a), out.fan = Array<uint32_t>(a);
-  out.x = Array<double>(a), out.v = Array<double>(a);
+  out.rest = Array<double>(a), out.x = Array<double>(a), out.v = Array<double>(a);
   number_surfels(npoint, boundary_tris, ntri, out);
   find_edges(out);
 
@@ -131,26 +131,50 @@ void make_surface(const Memory &memory, uint32_t npoint, const double *rest, con
   for (uint32_t s = 0; s < out.nsurfel; ++s) store3(&out.x[4 * s], at(s));
 }
 
-void gather_surface(Surface &surface, const double *x, const double *v, uint32_t stride) {
+void wear_coupling(Coupling &&coupling, Surface &surface) {
+  surface.row = std::move(coupling.row), surface.col = std::move(coupling.col), surface.weight = std::move(coupling.weight);
+  surface.rest = Array<double>(size_t{3} * surface.nsurfel, 0.0, surface.weight.get_allocator());
+  for (uint32_t s = 0; s < surface.nsurfel; ++s) store3(&surface.rest[size_t{3} * s], load3(&surface.x[size_t{4} * s]));
+  surface.point.clear();
+  surface.point.shrink_to_fit();
+}
+
+namespace {
+
+// One phyxel or surfel: the same operations on each component, at every vector width. The fourth component stays zero.
+using Point = double __attribute__((vector_size(32)));
+const Point *points(const double *p) { return reinterpret_cast<const Point *>(p); }
+
+}  // namespace
+
+void gather_rows(Surface &surface, const double *x, const double *v, uint32_t begin, uint32_t end) {
+  Point *const xs = reinterpret_cast<Point *>(surface.x.data()), *const vs = reinterpret_cast<Point *>(surface.v.data());
+  const uint32_t *const row = surface.row.data(), *const col = surface.col.data();
+  const double *const weight = surface.weight.data();
+  const Point *const xp = points(x), *const vp = points(v);
+  for (uint32_t s = begin; s < end; ++s) {
+    Point xa{0, 0, 0, 0}, va{0, 0, 0, 0};
+    if (v) {
+      for (uint32_t i = row[s]; i < row[s + 1]; ++i) xa += weight[i] * xp[col[i]], va += weight[i] * vp[col[i]];
+      vs[s] = va;
+    } else {
+      for (uint32_t i = row[s]; i < row[s + 1]; ++i) xa += weight[i] * xp[col[i]];
+    }
+    xs[s] = xa;
+  }
+}
+
+void gather_surface(Surface &surface, const double *x, const double *v) {
+  if (!surface.identity()) return gather_rows(surface, x, v, 0, surface.nsurfel);
   double *__restrict xs = surface.x.data();
   double *__restrict vs = surface.v.data();
-  if (surface.identity()) {
-    const uint32_t *point = surface.point.data();
-    for (uint32_t s = 0; s < surface.nsurfel; ++s) {
-      const double *xp = x + size_t{stride} * point[s], *vp = v + size_t{stride} * point[s];
-      for (int k = 0; k < 3; ++k) xs[4 * s + k] = xp[k];
-      for (int k = 0; k < 3; ++k) vs[4 * s + k] = vp[k];
-    }
-    return;
-  }
+  const uint32_t *point = surface.point.data();
   for (uint32_t s = 0; s < surface.nsurfel; ++s) {
-    Vec3 xa, va;
-    for (uint32_t i = surface.row[s]; i < surface.row[s + 1]; ++i) {
-      xa += surface.weight[i] * load3(x + size_t{stride} * surface.col[i]);
-      va += surface.weight[i] * load3(v + size_t{stride} * surface.col[i]);
-    }
-    store3(xs + 4 * s, xa);
-    store3(vs + 4 * s, va);
+    const double *xp = x + size_t{4} * point[s];
+    for (int k = 0; k < 3; ++k) xs[4 * s + k] = xp[k];
+    if (!v) continue;
+    const double *vp = v + size_t{4} * point[s];
+    for (int k = 0; k < 3; ++k) vs[4 * s + k] = vp[k];
   }
 }
 

@@ -1,5 +1,6 @@
 #include "world/explain.h"
 
+#include <algorithm>
 #include <cmath>
 
 #include "core/error.h"
@@ -19,18 +20,36 @@ std::string quote(const std::string &s) {
 
 // What a stage costs grows with this; counts of the present scene, not seconds.
 std::string cost(const World &w, StageId id) {
-  size_t points = 0, cells = 0, surfels = 0, triangles = 0;
-  for (auto &b : w.bodies) points += b->p.n, cells += b->tets.size() / 4, surfels += b->surface.nsurfel, triangles += b->surface.ntri;
+  size_t points = 0, cells = 0, surfels = 0, triangles = 0, weights = 0;
+  for (auto &b : w.bodies) points += b->p.n, cells += b->tets.size() / 4, surfels += b->surface.nsurfel, triangles += b->surface.ntri, weights += b->surface.weight.size();
   switch (id) {
     case StageId::model: return format("%zu cells", cells);
     case StageId::predict:
     case StageId::commit: return format("%zu points", points);
+    case StageId::gather: return format("%zu weights", weights);
     case StageId::broad: return format("%zu surfels every sub-step; %zu triangles whenever a skin is used up", surfels, triangles);
     case StageId::narrow: return "candidate pairs";
     case StageId::solve: return "contacts x sweeps, laws once per pass";
     case StageId::distribute: return format("contacts and %zu surfels", surfels);
     default: return "what is prescribed";
   }
+}
+
+// Where a body's numbers come from: its cells, its surface, and the parameters that differ by cell.
+std::string body(const Body &b) {
+  std::string out = "{\"name\":" + quote(b.name) + ",\"model\":" + quote(b.model.type->id) + format(",\"cells\":%zu,\"points\":%u,\"surfels\":%u", b.tets.size() / 4,
+                    b.p.n, b.surface.nsurfel);
+  const char *const surface = b.coupling == kNoCoupling           ? "boundary"
+                              : b.coupling == DFM_COUPLING_MLS    ? "own, mls"
+                              : b.coupling == DFM_COUPLING_THESIS ? "own, thesis"
+                                                                  : "own, barycentric";
+  out += std::string(",\"surface\":") + quote(surface) + ",\"filled\":" + (b.share.empty() ? "false" : "true") + ",\"fields\":[";
+  for (size_t i = 0; i < b.fields.size(); ++i) {
+    const CellField &f = b.fields[i];
+    const auto [lo, hi] = std::minmax_element(f.values.begin(), f.values.end());
+    out += (i ? "," : "") + ("{\"name\":" + quote(f.key) + ",\"from\":" + quote(f.from) + format(",\"min\":%.9g,\"max\":%.9g}", *lo, *hi));
+  }
+  return out + "]}";
 }
 
 }  // namespace
@@ -51,6 +70,8 @@ std::string explain(const World &w) {
     const AbsentStage &s = w.plan.absent[i];
     out += (i ? "," : "") + ("{\"name\":" + quote(s.name) + ",\"why\":" + quote(s.why) + "}");
   }
+  out += "],\"bodies\":[";
+  for (size_t i = 0; i < w.bodies.size(); ++i) out += (i ? "," : "") + body(*w.bodies[i]);
   out += "],\"step\":{\"stable_s\":" + (std::isfinite(w.stable) ? format("%.9g", w.stable) : std::string("null")) +
          ",\"worst_body\":" + (w.worst_body ? quote(w.worst_body->name) : "null") + ",\"worst_point\":" + std::to_string(w.worst_point) +
          ",\"contact_offset_m\":" + format("%.9g", w.offset) + ",\"reason\":" +
