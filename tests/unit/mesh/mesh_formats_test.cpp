@@ -89,6 +89,7 @@ TEST_F(SharedMeshes, Nasty_RepairsAndReportsAreTold) {
     return std::any_of(m.warnings.begin(), m.warnings.end(), [&](const std::string &w) { return w.find(word) != std::string::npos; });
   };
   EXPECT_EQ(mesh_statistics(read("two_pieces.msh")).npiece, 2u);
+  EXPECT_TRUE(told(read("two_pieces.msh"), "2 pieces that share no point"));
   EXPECT_EQ(mesh_statistics(read("duplicate_vertices.vtk")).npiece, 2u);
   EXPECT_EQ(mesh_statistics(read("duplicate_vertices.vtk")).duplicate_points, 4u);
   EXPECT_TRUE(told(read("duplicate_vertices.vtk"), "4 points"));
