@@ -161,7 +161,7 @@ void check_points(const std::string &path, const Array<double> &points) {
            points[i], kLargestCoordinate);
 }
 
-uint32_t drop_duplicate_cells(RawMesh &raw) {
+uint32_t drop_duplicate_cells(RawMesh &raw, Array<uint32_t> *file_cell) {
   struct Key {
     std::array<uint32_t, 4> corner;
     uint32_t cell;
@@ -187,6 +187,7 @@ uint32_t drop_duplicate_cells(RawMesh &raw) {
     if (!drop[t]) {
       std::copy_n(&raw.tets[4 * size_t(t)], 4, &raw.tets[4 * kept]);
       raw.tet_group[kept++] = raw.tet_group[t];
+      if (file_cell) file_cell->push_back(t);
     }
   raw.tets.resize(4 * kept), raw.tet_group.resize(kept);
   return dropped;
@@ -208,7 +209,7 @@ TetMesh finish_mesh(const std::string &path, RawMesh &&raw) {
   check_points(path, raw.points);
   refuse_flat(path, raw);
   turn_negative(raw, mesh);
-  mesh.dropped_cells = drop_duplicate_cells(raw);
+  mesh.dropped_cells = drop_duplicate_cells(raw, &mesh.file_cell);
   renumber(raw, mesh);
   sort_groups(raw, mesh);
   mesh.points = std::move(raw.points), mesh.tets = std::move(raw.tets), mesh.tet_group = std::move(raw.tet_group);

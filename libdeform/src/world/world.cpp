@@ -141,7 +141,7 @@ void World::prepare() {
     sinks.push_back({node, s.nsurfel, b.p.n, &s, b.surfel_impulse.data(), b.model.stepper ? nullptr : b.p.impulse.data()});
     if (!s.identity()) ++facts.coupled, facts.coupled_surfels += s.nsurfel;
     node += s.nsurfel, point += b.p.n;
-    offer(*b.model.type, facts.offered);
+    for (const std::string &e : effects(*b.model.type)) (b.model.works(e) ? facts.offered : facts.idle).push_back({e, b.model.type->id});
   }
   for (uint32_t i = 0; i < no; ++i) {
     Obstacle &o = *obstacles[i];
