@@ -103,12 +103,12 @@ bool settle(Filling &f, double wanted, double piece) {
   return true;
 }
 
-// Cells in order; those that the surface only touches from outside, and pieces without any material, are left out.
+// Cells in order, without those around an opening that turn out to be outside.
 Filling arrange(const FillSurface &surface, const FillCover &cover, const FillShares &shares) {
   const Memory &memory = surface.memory;
   Array<uint32_t> order{HookAllocator<uint32_t>(memory)};
   for (uint32_t i = 0; i < cover.cells.size(); ++i)
-    if (cover.kind[i] != CellKind::outside && !(shares.share[i] == 0 && (shares.touched_only[i] || cover.kind[i] == CellKind::mixed)))
+    if (cover.kind[i] != CellKind::outside && !(shares.share[i] == 0 && cover.kind[i] == CellKind::mixed))
       order.push_back(i);
   std::sort(order.begin(), order.end(), [&](uint32_t i, uint32_t j) { return cover.cells[i] < cover.cells[j]; });
   Filling out(memory);
@@ -232,8 +232,8 @@ void refuse_unfit(const TriMesh &surface, const FillSurface &s, uint32_t cells) 
 void tell(const FillSurface &s, const Filling &f, double half_pitch, uint32_t cells, bool settled, double sampled, uint32_t empty, TetMesh &out) {
   const double cube = s.size * s.size * s.size, unit = kLatticeCell * half_pitch * half_pitch * half_pitch;
   if (!s.closed)
-    out.warnings.push_back(format("the surface has %u opening%s or patch%s that face the wrong way, %.3g m2 in all (%.2g %% of its area), the widest %.3g m across; it is filled across them",
-                                  s.openings, s.openings == 1 ? "" : "s", s.openings == 1 ? "" : "es", s.opening_area * s.size * s.size,
+    out.warnings.push_back(format("the surface has %u opening%s (or triangles that face the wrong way) of %.3g m2 in all, %.2g %% of its area, the widest %.3g m across; it is filled across them",
+                                  s.openings, s.openings == 1 ? "" : "s", s.opening_area * s.size * s.size,
                                   100 * s.opening_area / (s.area + s.opening_area), s.opening_width * s.size));
   if (s.closed && !settled)
     out.warnings.push_back(format("the triangles sum up to a volume of %.6g m3, but %.6g m3 lie inside: the surface passes through itself, and what it encloses twice counts once",

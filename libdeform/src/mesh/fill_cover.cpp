@@ -67,7 +67,7 @@ int32_t first_at_least(double x, int32_t modulus, int32_t rest) {
 // Tests a piece of a triangle, no longer than a few cells, against all cells whose boxes meet its own.
 class PieceTest {
  public:
-  PieceTest(double tolerance, const KeySet *skip, const std::function<bool(uint64_t, uint32_t)> &visit)
+  PieceTest(double tolerance, const KeySet *skip, const VisitCrossing &visit)
       : tolerance_(tolerance), skip_(skip), visit_(visit) {}
 
   bool run(const Vec3 corner[3], uint32_t triangle) {
@@ -103,14 +103,15 @@ class PieceTest {
           const Site at{key[0], key[1], key[2]};
           if (skip_ && skip_->find(pack(at)) != UINT32_MAX) continue;
           const Vec3 middle = 0.5 * place_of(at), moved[3] = {corner[0] - middle, corner[1] - middle, corner[2] - middle};
-          if (Kinds::all().shape[size_t(Kinds::number(a, b, (key[c] & 2) != 0))].meets(moved, t) && !visit_(pack(at), triangle)) return false;
+          const TetShape &shape = Kinds::all().shape[size_t(Kinds::number(a, b, (key[c] & 2) != 0))];
+          if (shape.meets(moved, t) && !visit_(pack(at), triangle, shape.meets(moved, -t))) return false;
         }
     return true;
   }
 
   double tolerance_;
   const KeySet *skip_;
-  const std::function<bool(uint64_t, uint32_t)> &visit_;
+  const VisitCrossing &visit_;
 };
 
 }  // namespace
@@ -176,7 +177,7 @@ void FillSurface::measure_openings() {
 
 double touch_tolerance(const FillSurface &surface, const Lattice &lattice) { return 1e-9 + 4 * surface.resolution / lattice.half_pitch; }
 
-void each_crossing(const FillSurface &surface, const Lattice &lattice, const KeySet *skip, const std::function<bool(uint64_t, uint32_t)> &visit) {
+void each_crossing(const FillSurface &surface, const Lattice &lattice, const KeySet *skip, const VisitCrossing &visit) {
   PieceTest test(touch_tolerance(surface, lattice), skip, visit);
   for (uint32_t t = 0; t < surface.tris.size() / 3; ++t) {
     Vec3 corner[3];
@@ -187,29 +188,31 @@ void each_crossing(const FillSurface &surface, const Lattice &lattice, const Key
 
 FillCover cover(const FillSurface &surface, const Lattice &lattice, uint32_t limit) {
   FillCover out(surface.memory);
-  each_crossing(surface, lattice, &out.cells, [&](uint64_t key, uint32_t) {
-    out.cells.add(key);
+  KeySet touched(surface.memory);
+  each_crossing(surface, lattice, &out.cells, [&](uint64_t key, uint32_t, bool deep) {
+    (deep ? out.cells : touched).add(key);
     return out.cells.size() <= limit;
   });
-  out.kept = out.cells.size();
-  out.kind.assign(out.kept, CellKind::crossed);
-  for (uint32_t i = 0; i < out.cells.size() && out.kept <= limit; ++i) {
-    if (out.kind[i] == CellKind::outside) continue;
-    for (uint32_t face = 0; face < 4; ++face) {
-      const Site next = neighbour(unpack(out.cells[i]), face);
-      bool is_new = false;
-      out.cells.add(pack(next), &is_new);
-      if (!is_new) continue;
-      CellKind kind = CellKind::inside;
-      if (!(surface.closed && out.kind[i] == CellKind::inside)) {  // nothing lies between neighbours without a triangle
-        const double w = surface.winding.at(lattice.to_box(0.5 * place_of(next)));
-        kind = w > 0.5 ? CellKind::inside : CellKind::outside;
-        if (!surface.closed && std::fabs(w - 0.5) < kSettled) kind = CellKind::mixed;
-      }
-      out.kind.push_back(kind);
-      out.kept += kind != CellKind::outside;
+  const uint32_t crossed = out.kept = out.cells.size();
+  out.kind.assign(crossed, CellKind::crossed);
+  const auto look = [&](uint64_t key, bool surely_inside) {
+    bool is_new = false;
+    out.cells.add(key, &is_new);
+    if (!is_new) return;
+    CellKind kind = CellKind::inside;
+    if (!surely_inside) {
+      const double w = surface.winding.at(lattice.to_box(0.5 * place_of(unpack(key))));
+      kind = w > 0.5 ? CellKind::inside : CellKind::outside;
+      if (!surface.closed && std::fabs(w - 0.5) < kSettled) kind = CellKind::mixed;
     }
-  }
+    out.kind.push_back(kind);
+    out.kept += kind != CellKind::outside;
+  };
+  for (uint32_t i = 0; i < touched.size(); ++i) look(touched[i], false);
+  const uint32_t near = out.cells.size();
+  for (uint32_t i = 0; i < out.cells.size() && out.kept <= limit; ++i)
+    for (uint32_t face = 0; face < 4 && out.kind[i] != CellKind::outside; ++face)  // nothing lies between neighbours that no triangle touches
+      look(pack(neighbour(unpack(out.cells[i]), face)), i >= near && surface.closed && out.kind[i] == CellKind::inside);
   return out;
 }
 

@@ -80,7 +80,7 @@ struct Lattice {
   Vec3 from_box(Vec3 x) const { return (1 / half_pitch) * x + shift; }
 };
 
-// Cells that the surface needs at a pitch: those that a triangle touches, and those inside.
+// Cells that the surface needs: those that a triangle enters, and those inside. A triangle in a face between two cells enters neither.
 struct FillCover {
   explicit FillCover(const Memory &memory) : cells(memory), kind(HookAllocator<CellKind>(memory)) {}
   KeySet cells;
@@ -90,15 +90,15 @@ struct FillCover {
 // `limit`: stops early once more cells are crossed than that.
 FillCover cover(const FillSurface &surface, const Lattice &lattice, uint32_t limit);
 
-// Calls visit(cell's key, triangle) for every cell within the touch tolerance of a triangle, a pair perhaps more than once; cells in `skip`
-// are not tested. visit returns false to stop.
-void each_crossing(const FillSurface &surface, const Lattice &lattice, const KeySet *skip,
-                   const std::function<bool(uint64_t, uint32_t)> &visit);
+// Calls visit(cell's key, triangle, deep) for every cell within the touch tolerance of a triangle, a pair perhaps more than once; deep: the
+// triangle enters the cell by more than that. Cells in `skip` are not tested. visit returns false to stop.
+using VisitCrossing = std::function<bool(uint64_t key, uint32_t triangle, bool deep)>;
+void each_crossing(const FillSurface &surface, const Lattice &lattice, const KeySet *skip, const VisitCrossing &visit);
 double touch_tolerance(const FillSurface &surface, const Lattice &lattice);
 
 // Share of each kept cell that is inside, before any floor. `loose` is the part of the cell that was decided by one sample for each of its
 // pieces of `piece` cells: sums of shares have a standard deviation below sqrt(piece * sum of loose) / 2.
-struct FillShares { Array<double> share, loose; Array<uint8_t> touched_only; double piece; };
+struct FillShares { Array<double> share, loose; double piece; };
 FillShares sample_shares(const FillSurface &surface, const FillCover &cover, const Lattice &lattice);
 
 }  // namespace dfm

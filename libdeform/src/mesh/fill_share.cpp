@@ -14,11 +14,11 @@ constexpr uint32_t kFineCells = 20000;  // above so many crossed cells one cut l
 class Sampler {
  public:
   Sampler(const FillSurface &surface, const Lattice &lattice, int cuts)
-      : surface_(surface), lattice_(lattice), tolerance_(touch_tolerance(surface, lattice)), cuts_(cuts),
+      : surface_(surface), lattice_(lattice), cuts_(cuts),
         level_(size_t(cuts) + 1, Array<uint32_t>(HookAllocator<uint32_t>(surface.memory))) {}
 
   // Of the whole cell, in parts of one.
-  void run(Site key, const uint32_t *tris, uint32_t ntri, double *share, double *loose, uint8_t *touched_only) {
+  void run(Site key, const uint32_t *tris, uint32_t ntri, double *share, double *loose) {
     Site site[4];
     corners_of(key, site);
     Vec3 corner[4];
@@ -27,18 +27,16 @@ class Sampler {
     level_[0].assign(tris, tris + ntri);
     part(corner, 0, 1, {}, 0);
     *share = share_, *loose = loose_;
-    const TetShape shape(corner);
-    *touched_only = ntri > 0 && std::none_of(tris, tris + ntri, [&](uint32_t t) { return meets(shape, t, -tolerance_); });
   }
 
  private:
   void triangle(uint32_t t, Vec3 c[3]) const {
     for (int k = 0; k < 3; ++k) c[k] = lattice_.from_box(load3(&surface_.points[3 * size_t(surface_.tris[3 * size_t(t) + k])]));
   }
-  bool meets(const TetShape &shape, uint32_t t, double tolerance) const {
+  bool meets(const TetShape &shape, uint32_t t) const {
     Vec3 c[3];
     triangle(t, c);
-    return shape.meets(c, tolerance);
+    return shape.meets(c, 0);
   }
 
   // Evenly distributed over tetrahedra: steps of the generalised golden ratio in the cube, sorted, so that the gaps are weights that sum to one.
@@ -98,7 +96,7 @@ class Sampler {
       Array<uint32_t> &mine = level_[size_t(level) + 1];
       mine.clear();
       for (const uint32_t t : level_[size_t(level)])
-        if (meets(shape, t, 0)) mine.push_back(t);
+        if (meets(shape, t)) mine.push_back(t);
       part(p, level + 1, fraction / 8, place, w);
     };
     // Corners keep the shape; the octahedron between is cut around its shortest diagonal, between the middles of the two lattice edges.
@@ -111,7 +109,7 @@ class Sampler {
 
   const FillSurface &surface_;
   Lattice lattice_;
-  double tolerance_, step_[3] = {0.5, 0.5, 0.5};
+  double step_[3] = {0.5, 0.5, 0.5};
   int cuts_;
   double share_ = 0, loose_ = 0;
   std::vector<Array<uint32_t>> level_;  // triangles of the part being cut at each level
@@ -127,9 +125,9 @@ FillShares sample_shares(const FillSurface &surface, const FillCover &cover, con
   };
   const Memory &memory = surface.memory;
   Array<Pair> pairs{HookAllocator<Pair>(memory)};
-  each_crossing(surface, lattice, nullptr, [&](uint64_t key, uint32_t tri) {
+  each_crossing(surface, lattice, nullptr, [&](uint64_t key, uint32_t tri, bool) {
     const Pair pair{cover.cells.find(key), tri};
-    if (pairs.empty() || !(pairs.back() == pair)) pairs.push_back(pair);
+    if (cover.kind[pair.cell] == CellKind::crossed && (pairs.empty() || !(pairs.back() == pair))) pairs.push_back(pair);
     return true;
   });
   std::sort(pairs.begin(), pairs.end());
@@ -137,8 +135,7 @@ FillShares sample_shares(const FillSurface &surface, const FillCover &cover, con
   const auto sampled = uint32_t(std::count_if(cover.kind.begin(), cover.kind.end(),
                                               [](CellKind k) { return k == CellKind::crossed || k == CellKind::mixed; }));
   const uint32_t n = cover.cells.size();
-  FillShares out{Array<double>(n, 0.0, HookAllocator<double>(memory)), Array<double>(n, 0.0, HookAllocator<double>(memory)),
-                 Array<uint8_t>(n, uint8_t(0), HookAllocator<uint8_t>(memory)), 1};
+  FillShares out{Array<double>(n, 0.0, HookAllocator<double>(memory)), Array<double>(n, 0.0, HookAllocator<double>(memory)), 1};
   const int cuts = sampled > kFineCells ? 2 : 3;
   out.piece = cuts == 2 ? 1.0 / 64 : 1.0 / 512;
   Sampler sampler(surface, lattice, cuts);
@@ -149,7 +146,7 @@ FillShares sample_shares(const FillSurface &surface, const FillCover &cover, con
     for (; at < pairs.size() && pairs[at].cell == i; ++at) tris.push_back(pairs[at].tri);
     if (cover.kind[i] == CellKind::inside) out.share[i] = 1;
     else if (cover.kind[i] != CellKind::outside)
-      sampler.run(unpack(cover.cells[i]), tris.data(), uint32_t(tris.size()), &out.share[i], &out.loose[i], &out.touched_only[i]);
+      sampler.run(unpack(cover.cells[i]), tris.data(), uint32_t(tris.size()), &out.share[i], &out.loose[i]);
   }
   return out;
 }

@@ -52,6 +52,7 @@ TetMesh parse_tet_mesh(const Memory &memory, const std::string &path, const char
 TetMesh make_cylinder(const Memory &memory, double radius, double length, uint32_t cells);  // axis z, base at the origin
 TetMesh make_beam(const Memory &memory, double x, double y, double z, uint32_t cells);      // from the origin
 TetMesh make_ball(const Memory &memory, double radius, uint32_t cells);                     // about the origin
+TetMesh make_tube(const Memory &memory, double inner, double outer, double length, uint32_t cells);  // as the cylinder, with a hole
 
 // ---- topology ----------------------------------------------------------------------------------------------------
 // Corners of the four faces of a cell, outward for a positive cell; face f lies opposite corner f.

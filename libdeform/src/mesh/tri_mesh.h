@@ -24,6 +24,17 @@ struct TriMesh {
 TriMesh read_tri_mesh(const Memory &memory, const std::string &path);
 TriMesh parse_tri_mesh(const Memory &memory, const std::string &path, const char *bytes, size_t size);
 
+// ---- generators: closed surfaces of about `triangles` near-equilateral triangles, in the places of the bodies of the same names ----
+TriMesh make_cylinder_surface(const Memory &memory, double radius, double length, uint32_t triangles);
+TriMesh make_beam_surface(const Memory &memory, double x, double y, double z, uint32_t triangles);
+TriMesh make_ball_surface(const Memory &memory, double radius, uint32_t triangles);
+TriMesh make_tube_surface(const Memory &memory, double inner, double outer, double length, uint32_t triangles);
+TriMesh make_torus_surface(const Memory &memory, double ring, double radius, uint32_t triangles);  // about the origin, axis z
+
+// ---- writing: to a temporary name beside the target, then renamed. By ending: .obj, .ply, .stl, .off, .vtk, .vtu. Throws Error.
+void write_tri_mesh(const TriMesh &mesh, const std::string &path);
+
+// ---- measures ----------------------------------------------------------------------------------------------------
 double triangle_area(const double *points, const uint32_t *tri);
 // 4 sqrt(3) area / sum l^2: 1 for an equilateral triangle, 0 for a flat one.
 double triangle_quality(const double *points, const uint32_t *tri);
