@@ -319,6 +319,21 @@ TEST(SceneFill, Probes_LieOnTheFillingCells) {
   EXPECT_NEAR(v[0], 1, 1e-14);
 }
 
+TEST(SceneFill, Outputs_AreOfTheFilesSurface) {
+  const std::string out = folder() + "/out";
+  const test::CommandResult result = test::deform({"run", scene(), "--quiet", "--out", out, "--set", kBox, "--set", kFill, "--set", "/gravity=[0,0,-9.81]", "--set",
+                                                   "/output={\"nodes\": true, \"states\": true, \"every\": 0.01}"});
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  const auto nodes = test::read_csv(out + "/nodes/column.csv");
+  ASSERT_EQ(nodes.size(), 9u) << "a header and the eight points of the file";
+  for (size_t i = 1; i < 9; ++i) {
+    EXPECT_EQ(nodes[i][0], std::to_string(i - 1));
+    EXPECT_NEAR(std::stod(nodes[i][3]), -0.5 * 9.81 * 0.01 * 0.011, 1e-9) << "free fall of ten steps";
+  }
+  EXPECT_NE(test::read_file(out + "/states/column_surface_000001.vtu").find("NumberOfPoints=\"8\" NumberOfCells=\"12\""), std::string::npos);
+  EXPECT_EQ(test::read_file(out + "/states/column_000001.vtu").find("NumberOfPoints=\"8\""), std::string::npos) << "the cells' points";
+}
+
 TEST(SceneFill, Mistakes_AreTold) {
   expect_refused("/bodies/0/fill={\"cells\": 5}", {"/bodies/0/fill", "holds tetrahedra already"});
   expect_refused({kBox, "/bodies/0/fill={\"cells\": 0}"}, {"/bodies/0/fill/cells", "from 1"});
