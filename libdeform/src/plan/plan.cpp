@@ -82,7 +82,8 @@ Plan make_plan(const SceneFacts &f) {
   if (pairs) {
     const std::string who = count(f.body_pairs, "pair of bodies", "pairs of bodies") + " and " +
                             count(f.obstacle_pairs, "pair of body and obstacle", "pairs of body and obstacle") + " may touch";
-    if (f.coupled) run(StageId::gather, count(f.coupled_surfels, "surfel", "surfels") + " of " + count(f.coupled, "body", "bodies") + " hang on several points each");
+    const std::string coupled = count(f.coupled_surfels, "surfel", "surfels") + " of " + count(f.coupled, "body", "bodies");
+    if (f.coupled) run(StageId::gather, coupled + " hang on several points each");
     else leave("gather", "every surfel is a point of its body");
     run(StageId::broad, who);
     run(StageId::narrow, who);
