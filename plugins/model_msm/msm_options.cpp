@@ -166,6 +166,8 @@ void Body::apply_params(const double *values) {
   find_shapes();
   find_tilts();
   find_dampers();
+  Buffer<uint8_t> off;
+  off.swap(edge_off);  // the weights of the step bound never depend on what is switched off, nor on when it was
   if (has_branch() && rest_now.empty()) rest_now.create(host, spring_slots());
   for (uint32_t b = 0; b < nblock; ++b) {
     const size_t at = size_t(block[b].stiffness - stiffness.data());
@@ -175,6 +177,9 @@ void Body::apply_params(const double *values) {
   fill_stiffness();
   find_weights();
   find_effects();
+  if (off.empty()) return;
+  off.swap(edge_off);
+  fill_stiffness();
 }
 
 // The rows of the step bound keep counting a spring that is off: a bound it stays, and a cut need not look for new weights.
