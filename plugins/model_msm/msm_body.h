@@ -52,7 +52,8 @@ struct Body {
   double params[kParamCount] = {};
 
   // In the host's order.
-  Buffer<double> mass, shape, edge_volume, edge_length, edge_energy;  // shape: sum of (E V) around the edge / L0^2, E = 1 without a field
+  Buffer<double> mass, shape, edge_volume, edge_length, edge_energy;  // shape: stiffness, E = 1 without a field
+  Buffer<double> per_modulus;  // [nedge] stiffness over the sum of E V around the edge
   Buffer<uint32_t> edges, cells, cell_edge;
   Buffer<double> cell_young, cell_volume6;  // cell_young: empty without a field
   bool young_field = false;
@@ -93,6 +94,7 @@ struct Body {
 
  private:
   void take_mesh(const dfm_mesh &m);
+  void find_directions();
   struct Layout;
   void build_blocks();
   void order_springs(Layout &l) const;

@@ -1,4 +1,4 @@
-// From a mesh to blocks: stiffness per spring (Van Gelder), rows of springs in quads, halos, and who adds up whose forces.
+// From a mesh to blocks: rows of springs in quads, halos, and who adds up whose forces.
 #include <algorithm>
 
 #include "msm_body.h"
@@ -66,10 +66,8 @@ void Body::take_mesh(const dfm_mesh &m) {
       shape[e] += volume * (young_field ? cell_young[c] : 1.0);
     }
   }
-  for (uint32_t e = 0; e < nedge; ++e) {
-    const double l2 = edge_length[e] * edge_length[e];
-    shape[e] = l2 > kShortestSquared ? shape[e] / l2 : 0;  // two points at one place: no direction, no spring
-  }
+  find_directions();
+  for (uint32_t e = 0; e < nedge; ++e) shape[e] *= per_modulus[e];
 }
 
 // What leads from the mesh to the blocks; a rank is a point's place in the order of partition_points.
