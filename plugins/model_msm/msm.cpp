@@ -1,19 +1,32 @@
-// org.deform.msm: mass-spring model on the edges of tetrahedra, dampers along the springs, a volume term per cell.
-// Thesis 2.2, equations (2.25), (2.26) and (2.27), the last two as corrected in doc/models/msm.md, which derives the constants.
+// org.deform.msm: mass-spring model on the edges of tetrahedra, dampers along the springs, a volume term per cell, anisotropy by extra
+// coordinates. Thesis 2.2, equations (2.25), (2.26), (2.27), Fig. 2.5 and chapter 6, as corrected in doc/models/msm.md, which derives the
+// constants.
 #include <stdio.h>
 
 #include "msm_body.h"
 
 namespace msm {
-namespace {
 
-constexpr uint32_t kRun = DFM_PARAM_RUNTIME;
+namespace {
+constexpr uint32_t kRun = DFM_PARAM_RUNTIME, kCell = DFM_PARAM_PER_CELL;
+const char *const kKinds[] = {"softer", "stiffer", nullptr};
+const char *const kForces[] = {"B", "A", nullptr};
+const char *const kDampers[] = {"voigt", "maxwell", "sls", nullptr};
+}  // namespace
+
 const dfm_param kParams[kParamCount] = {
-    {"young", "Young's modulus", "Pa", 1e-3, 1e13, 1e5, kRun | DFM_PARAM_LOG_SCALE | DFM_PARAM_PER_CELL, 1, nullptr},
-    {"poisson", "Poisson ratio that the volume term aims at (springs alone: 1/4)", "1", -0.99, 0.4999, 0.3, kRun, 1, nullptr},
-    {"damping_stiffness", "damper over stiffness of each spring", "s", 0, 1e3, 0, kRun, 1, nullptr},
-    {"damping_mass", "drag over mass of each point", "1/s", 0, 1e6, 0, kRun, 1, nullptr},
-    {"volume", "volume stiffness in bulk moduli E/(3(1-2 nu)); 0: off", "1", 0, 1e6, 0, kRun, 1, nullptr},
+    {"young", "Young's modulus", "Pa", 1e-3, 1e13, 1e5, kRun | DFM_PARAM_LOG_SCALE | kCell, 1, nullptr},
+    {"poisson", "Poisson ratio that the volume term aims at (springs alone: 1/4)", "1", -0.99, 0.4999, 0.3, kRun | kCell, 1, nullptr},
+    {"damping_stiffness", "damper over stiffness of each spring", "s", 0, 1e3, 0, kRun | kCell, 1, nullptr},
+    {"damping_mass", "drag over mass of each point", "1/s", 0, 1e6, 0, kRun | kCell, 1, nullptr},
+    {"volume", "volume stiffness in bulk moduli E/(3(1-2 nu)); 0: off", "1", 0, 1e6, 0, kRun | kCell, 1, nullptr},
+    {"anisotropy_slope", "slope of the extra coordinates; 0: isotropic", "1", 0, 1e3, 0, kRun | kCell, 1, nullptr},
+    {"anisotropy_kind", "what the body is along the axis", "1", 0, 1, kSofter, kRun | DFM_PARAM_ENUM, 1, kKinds},
+    {"anisotropy_form", "force of a tilted spring: projected (B) or turned back (A)", "1", 0, 1, kFormB, DFM_PARAM_ENUM, 1, kForces},
+    {"damper", "voigt: beside the spring; maxwell: behind it; sls: a spring beside both", "1", 0, 2, kVoigt, DFM_PARAM_ENUM, 1, kDampers},
+    {"relaxation_ratio", "sls: stiffness of the branch over that of the spring", "1", 1e-6, 1e3, 1, kRun, 1, nullptr},
+    {"relaxation_time", "maxwell and sls: dashpot over stiffness of the branch", "s", 1e-9, 1e9, 0.1, kRun | DFM_PARAM_LOG_SCALE, 1, nullptr},
+    {"anisotropy_axis", "axis of the anisotropy; its length does not matter", "1", -1e6, 1e6, 1, kRun | kCell, 3, nullptr},
 };
 
 void complain(const dfm_host *h, const char *what) {
@@ -22,15 +35,20 @@ void complain(const dfm_host *h, const char *what) {
   h->log(h->ctx, 3, 0, text);
 }
 
+namespace {
+
 bool check_params(const dfm_host *h, const double *values) {
-  for (uint32_t n = 0; n < kParamCount; ++n)
-    if (!(values[n] >= kParams[n].min && values[n] <= kParams[n].max)) {
-      char text[200];
-      const dfm_param &p = kParams[n];
-      snprintf(text, sizeof text, "parameter %s = %g %s is outside %g .. %g", p.key, values[n], p.unit, p.min, p.max);
-      complain(h, text);
-      return false;
-    }
+  for (uint32_t n = 0; n < kValueCount; ++n) {
+    const dfm_param &p = kParams[n < kAxis ? n : uint32_t(kAxis)];
+    if (values[n] >= p.min && values[n] <= p.max) continue;
+    char text[200];
+    snprintf(text, sizeof text, "parameter %s = %g %s is outside %g .. %g", p.key, values[n], p.unit, p.min, p.max);
+    return complain(h, text), false;
+  }
+  const double *a = values + kAxis;
+  if (!(a[0] != 0 || a[1] != 0 || a[2] != 0)) return complain(h, "parameter anisotropy_axis is zero; give a direction"), false;
+  if (uint32_t(values[kAxisForm]) == kFormA && uint32_t(values[kDamper]) != kVoigt)
+    return complain(h, "parameter anisotropy_form A takes damper voigt only: with a branch its force has no energy; choose form B"), false;
   return true;
 }
 
@@ -54,6 +72,8 @@ dfm_status create(const dfm_host *h, const dfm_mesh *m, void **self) {
   dfm_status status = DFM_OK;
   try {
     body->create(h, *m);
+  } catch (const Refused &) {
+    status = DFM_E_ARG;
   } catch (const char *wrong) {
     complain(h, wrong), status = DFM_E_ARG;
   } catch (...) {
@@ -84,41 +104,86 @@ dfm_status set_params(void *self, const double *params) {
   return DFM_OK;
 }
 
-dfm_status state_init(const void *, double *) { return DFM_OK; }
+// Branches: r of every spring, then `kept` of the step before; 1 where none was.
+dfm_status state_init(const void *self, double *state) {
+  const Body &body = *static_cast<const Body *>(self);
+  if (!body.has_branch()) return DFM_OK;
+  std::fill(state, state + body.nedge, 0.0);
+  state[body.nedge] = 1;
+  return DFM_OK;
+}
 
 dfm_status add_forces(void *self, const dfm_kin *k, double *f) {
-  static_cast<Body *>(self)->add_forces(*k, f);
+  Body &body = *static_cast<Body *>(self);
+  if (body.lacks_state(*k)) return DFM_E_STATE;
+  body.add_forces(*k, f);
   return DFM_OK;
 }
 
 dfm_status bound(void *self, const dfm_kin *k, double *ksum, double *csum, double *) {
-  static_cast<Body *>(self)->bound(*k, ksum, csum);
+  Body &body = *static_cast<Body *>(self);
+  if (body.lacks_state(*k)) return DFM_E_STATE;
+  body.bound(*k, ksum, csum);
   return DFM_OK;
 }
 
 dfm_status energy(void *self, const dfm_kin *k, double *joule) {
-  *joule = static_cast<const Body *>(self)->energy(*k);
+  const Body &body = *static_cast<const Body *>(self);
+  if (body.lacks_state(*k)) return DFM_E_STATE;
+  *joule = body.energy(*k);
   return DFM_OK;
 }
 
 dfm_status cell_energy(void *self, const dfm_kin *k, double *density) {
-  static_cast<Body *>(self)->cell_energy(*k, density);
+  Body &body = *static_cast<Body *>(self);
+  if (body.lacks_state(*k)) return DFM_E_STATE;
+  body.cell_energy(*k, density);
   return DFM_OK;
 }
 
+const char *const *active_effects(const void *self) { return static_cast<const Body *>(self)->active_effects; }
+
+dfm_status set_mask(void *self, uint32_t n, const uint32_t *edges, uint8_t on) {
+  Body &body = *static_cast<Body *>(self);
+  for (uint32_t k = 0; k < n; ++k)
+    if (edges[k] >= body.nedge) return complain(body.host, "a spring that is to be switched does not exist; nothing was changed"), DFM_E_ARG;
+  try {
+    body.mask_springs(n, edges, on != 0);
+  } catch (...) {
+    return DFM_E_NOMEM;
+  }
+  return DFM_OK;
+}
+
+dfm_status get_mask(const void *self, uint8_t *on) {
+  const Body &body = *static_cast<const Body *>(self);
+  for (uint32_t e = 0; e < body.nedge; ++e) on[e] = body.edge_off.empty() || !body.edge_off[e];
+  return DFM_OK;
+}
+
+const dfm_slot kBranchSlots[] = {{DFM_PER_EDGE, 1, DFM_SLOT_SCALAR, 0}, {DFM_PER_INSTANCE, 1, DFM_SLOT_SCALAR, 0}};
 const dfm_cell_energy kCellEnergy = {sizeof(dfm_cell_energy), 0, cell_energy};
+const dfm_slots kNoSlots = {sizeof(dfm_slots), 0, nullptr}, kSlots = {sizeof(dfm_slots), 2, kBranchSlots};
+const dfm_effects kActiveEffects = {sizeof(dfm_effects), 0, active_effects};
+const dfm_spring_mask kSpringMask = {sizeof(dfm_spring_mask), 0, set_mask, get_mask};
 
-const void *extension(const void *, const char *id) { return !strcmp(id, DFM_EXT_CELL_ENERGY) ? &kCellEnergy : nullptr; }
+const void *extension(const void *self, const char *id) {
+  if (!strcmp(id, DFM_EXT_CELL_ENERGY)) return &kCellEnergy;
+  if (!strcmp(id, DFM_EXT_SLOTS)) return static_cast<const Body *>(self)->has_branch() ? &kSlots : &kNoSlots;
+  if (!strcmp(id, DFM_EXT_EFFECTS)) return &kActiveEffects;
+  if (!strcmp(id, DFM_EXT_SPRING_MASK)) return &kSpringMask;
+  return nullptr;
+}
 
-const char *const kEffects[] = {"volume", "damping", "large_rotation", nullptr};
+const char *const kEffects[] = {"volume", "damping", "large_rotation", "anisotropy", "deform.relaxation", nullptr};
 
 const dfm_model kModel = {
     sizeof(dfm_model), DFM_CAP_ENERGY | DFM_CAP_DAMPING | DFM_CAP_ROTATION_INVARIANT | DFM_CAP_PLAUSIBLE, DFM_CELL_TET, 0, nullptr,
     create, destroy, set_params, state_init, add_forces, bound, energy, nullptr, nullptr, extension};
 
 const dfm_type kType = {
-    sizeof(dfm_type), DFM_KIND_MODEL, "org.deform.msm", "mass-spring", "0.1.0", "MIT",
-    "Zerbato 2010, (2.25)-(2.27) corrected; Van Gelder 1998, Approximate simulation of elastic membranes by triangulated spring meshes",
+    sizeof(dfm_type), DFM_KIND_MODEL, "org.deform.msm", "mass-spring", "0.2.0", "MIT",
+    "Zerbato 2010, (2.25)-(2.27) and chapter 6 corrected, Fig. 2.5; Van Gelder 1998, Approximate simulation of elastic membranes by triangulated spring meshes",
     kParams, kParamCount, sizeof(dfm_param), kEffects, &kModel};
 
 const dfm_type *const kTypes[] = {&kType};

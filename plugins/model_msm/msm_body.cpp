@@ -1,9 +1,9 @@
 // The ops on the blocks. Forces run in two passes: each block loads its points, sums its springs and cells into its own array,
 // halo included; then each block adds up, in block order, what the others' halos hold for its points. No two workers write
 // one place, and the order of every sum is fixed by the mesh.
-#include "msm_body.h"
+#include <deform/elementary.h>
 
-#include <stdlib.h>
+#include "msm_body.h"
 
 namespace msm {
 namespace {
@@ -11,25 +11,26 @@ namespace {
 void force_pass(void *user, uint32_t begin, uint32_t end) {
   const Call &call = *static_cast<const Call *>(user);
   Body &body = *call.body;
-  const double damp = body.params[kDampingStiffness];
+  const Damping damping = body.damping();
+  const double damp = body.damp_scale() * body.params[kDampingStiffness];
   for (uint32_t n = begin; n < end; ++n) {
     const Block b = body.lend(n, begin);
-    body.kernels->load(b, call.k->x, damp > 0 ? call.k->v : nullptr, call.k->stride);
-    if (damp > 0) body.kernels->damped_springs(b, damp);
-    else body.kernels->springs(b);
-    if (body.has_volume()) body.kernels->cells(b);
+    body.kernels->load(b, call.k->x, damping != kUndamped ? call.k->v : nullptr, call.k->stride);
+    if (call.branch) body.kernels->branches[damping](b, damp, *call.branch);
+    else body.kernels->springs[body.form()][damping](b, damp);
+    if (body.volume_on) body.kernels->cells(b);
   }
 }
 
 void merge_pass(void *user, uint32_t begin, uint32_t end) {
   const Call &call = *static_cast<const Call *>(user);
   Body &body = *call.body;
-  const double drag = body.params[kDampingMass];
+  const auto drag = [&](uint32_t i) { return body.point_drag.empty() ? body.params[kDampingMass] : body.point_drag[i]; };
   for (uint32_t n = begin; n < end; ++n) {
     const Block &b = body.block[n];
     body.kernels->merge(body.f.data(), body.merge.data() + body.merge_begin[n], body.merge_begin[n + 1] - body.merge_begin[n]);
-    for (uint32_t i = 0; drag > 0 && i < b.owned; ++i) {
-      const double c = drag * body.mass[b.point[i]], *v = call.k->v + size_t(call.k->stride) * b.point[i];
+    for (uint32_t i = 0; body.drag_on && i < b.owned; ++i) {
+      const double c = drag(b.point[i]) * body.mass[b.point[i]], *v = call.k->v + size_t(call.k->stride) * b.point[i];
       for (int a = 0; a < 3; ++a) b.f[4 * size_t(i) + a] -= c * v[a];
     }
     body.kernels->store(b, call.f, call.k->stride);
@@ -58,52 +59,49 @@ void Body::for_each_block(uint32_t least_cells, void (*fn)(void *, uint32_t, uin
   fn(user, 0, nblock);
 }
 
+// Branches: exact for a stretch that grows evenly over a step, dp/dt = de/dt - p/tau, hence p+ = E p + kept (e+ - e) with E = exp(-x),
+// kept = (1 - E)/x, x = h/tau. What is known at the start of the step is r = E p - kept e; the state is that and kept.
+Branch Body::branch_at(const dfm_kin &k) const {
+  Branch b{};
+  if (!has_branch() || !k.state) return b;
+  const double x = k.dt / params[kRelaxationTime];
+  b.part = part(), b.state = k.state, b.state_out = k.state_out, b.kept = k.state[nedge];
+  b.follow = 1 - b.part * (1 - b.kept);
+  if (x > 0.25) {
+    b.keep = dfm_exp(-x), b.next = (1 - b.keep) / x;
+  } else {  // 1 - E would lose digits: its series over x
+    double series = 1;
+    for (int n = 14; n > 1; --n) series = 1 - x / n * series;
+    b.next = series, b.keep = 1 - x * series;
+  }
+  return b;
+}
+
+bool Body::lacks_state(const dfm_kin &k) const {
+  if (!has_branch() || k.state) return false;
+  complain(host, "the host gives no state, which dampers other than voigt need: it must ask the instance for the extension " DFM_EXT_SLOTS);
+  return true;
+}
+
 void Body::add_forces(const dfm_kin &k, double *f_out) {
-  Call call{this, &k, f_out};
+  const Branch branch = branch_at(k);
+  Call call{this, &k, f_out, has_branch() ? &branch : nullptr};
+  if (has_branch() && k.state_out) k.state_out[nedge] = branch.next;
   for_each_block(kParallelCells, force_pass, &call);
   for_each_block(kParallelMergeCells, merge_pass, &call);
 }
 
-double Body::stretch_of(uint32_t e, const dfm_kin &k) const {
-  const uint32_t *ends = edges.data() + 2 * size_t(e);
-  return length_of(k.x + size_t(k.stride) * ends[0], k.x + size_t(k.stride) * ends[1]) - edge_length[e];
-}
-
-double Body::energy(const dfm_kin &k) const {
-  double springs = 0, volumes = 0;
-  const double scale = spring_scale_of_shape();
-  for (uint32_t e = 0; e < nedge; ++e) {
-    const double stretch = stretch_of(e, k);
-    springs += 0.5 * (scale * shape[e]) * (stretch * stretch);
-  }
-  if (has_volume())
-    for (size_t c = 0, n = size_t(block[nblock - 1].cell + block[nblock - 1].cells - cell.data()); c < n; ++c) {
-      if (cell_id[c] == kNone) continue;
-      const uint32_t *q = cells.data() + 4 * size_t(cell_id[c]);
-      const double *x[4];
-      for (int a = 0; a < 4; ++a) x[a] = k.x + size_t(k.stride) * q[a];
-      const double more = volume6_of(x[0], x[1], x[2], x[3]) - volume6[c];
-      volumes += 0.5 * bulk[c] * (more * more);
-    }
-  return springs + volumes;
-}
-
-void Body::cell_energy(const dfm_kin &k, double *density) {
-  const double scale = spring_scale_of_shape(), ratio = volume_ratio();
-  for (uint32_t e = 0; e < nedge; ++e) {
-    const double stretch = stretch_of(e, k);
-    edge_energy[e] = edge_volume[e] > 0 ? 0.5 * (scale * shape[e]) * (stretch * stretch) / edge_volume[e] : 0;
-  }
-  for (uint32_t c = 0; c < ncell; ++c) {
-    double sum = 0;
-    for (int n = 0; n < 6; ++n) sum += edge_energy[cell_edge[6 * size_t(c) + n]];
-    const double *x[4];
-    for (int a = 0; a < 4; ++a) x[a] = k.x + size_t(k.stride) * cells[4 * size_t(c) + a];
-    if (has_volume() && cell_volume6[c] != 0) {
-      const double strain = (volume6_of(x[0], x[1], x[2], x[3]) - cell_volume6[c]) / cell_volume6[c];
-      sum += 0.5 * (ratio * young_of(c)) * (strain * strain);
-    }
-    density[c] = sum;
+// T = k (L - L0 - part q), q the dashpot's extension: a plain spring of the same stiffness and a rest length of L0 + part q.
+void Body::rest_of_branches(uint32_t n, const dfm_kin &k) {
+  const Branch branch = branch_at(k);
+  const size_t begin = size_t(block[n].stiffness - stiffness.data());
+  for (size_t s = begin; s < begin + 4 * size_t(block[n].quads); ++s) {
+    const uint32_t e = spring_edge[s];
+    if (e == kNone) continue;
+    const uint32_t *ends = edges.data() + 2 * size_t(e);
+    const double dd = square_of(k.x + size_t(k.stride) * ends[0], k.x + size_t(k.stride) * ends[1]);
+    const double more = __builtin_sqrt(dd + tilt[s]) - rest[s];
+    rest_now[s] = rest[s] + branch.part * ((1 - branch.kept) * more - branch.state[e]);
   }
 }
 

@@ -11,7 +11,17 @@
 
 namespace msm {
 
-enum Param : uint32_t { kYoung, kPoisson, kDampingStiffness, kDampingMass, kVolume, kParamCount };
+// Rows of the parameter table; a row's value begins at its number, the last row is three wide.
+enum Param : uint32_t {
+  kYoung, kPoisson, kDampingStiffness, kDampingMass, kVolume, kSlope, kAxisKind, kAxisForm, kDamper, kRelaxationRatio, kRelaxationTime, kAxis,
+  kParamCount, kValueCount = kAxis + 3
+};
+enum Kind : uint32_t { kSofter, kStiffer };
+enum Force : uint32_t { kFormB, kFormA };
+enum Damper : uint32_t { kVoigt, kMaxwell, kStandardLinear };
+extern const dfm_param kParams[kParamCount];
+struct Refused {};  // thrown after the reason was logged
+void complain(const dfm_host *h, const char *what);
 
 // Array in the host's memory; cleared on creation.
 template <class T>
@@ -20,14 +30,19 @@ class Buffer {
   Buffer() = default;
   Buffer(const Buffer &) = delete;
   Buffer &operator=(const Buffer &) = delete;
-  ~Buffer() { if (data_) host_->release(host_->ctx, data_, size_ * sizeof(T), 64); }
+  ~Buffer() { drop(); }
+  void drop() {
+    if (data_) host_->release(host_->ctx, data_, size_ * sizeof(T), 64);
+    data_ = nullptr;
+  }
   void create(const dfm_host *host, size_t n) {
-    if (data_) host_->release(host_->ctx, data_, size_ * sizeof(T), 64), data_ = nullptr;
+    drop();
     host_ = host, size_ = n ? n : 1;
     data_ = static_cast<T *>(host->alloc(host->ctx, size_ * sizeof(T), 64));
     if (!data_) throw std::bad_alloc();
     std::memset(static_cast<void *>(data_), 0, size_ * sizeof(T));
   }
+  bool empty() const { return !data_; }
   T *data() { return data_; }
   const T *data() const { return data_; }
   T &operator[](size_t i) { return data_[i]; }
@@ -49,32 +64,58 @@ struct Body {
   const Kernels *kernels = nullptr;
   uint32_t npoint = 0, ncell = 0, nedge = 0, nblock = 0;
   uint32_t grain = 1, largest = 0;  // blocks per piece of a pass at least; points of the largest block with its halo
-  double params[kParamCount] = {};
+  double params[kValueCount] = {};
+  Buffer<double> field[kParamCount];  // [ncell,width] values by cell in place of a parameter's; empty without
 
   // In the host's order.
-  Buffer<double> mass, shape, edge_volume, edge_length, edge_energy;  // shape: stiffness, E = 1 without a field
-  Buffer<double> per_modulus;  // [nedge] stiffness over the sum of E V around the edge
+  Buffer<double> mass, shape, edge_volume, edge_length, edge_energy;  // shape: stiffness over `scale`, see find_shapes
+  Buffer<double> per_modulus;          // [nedge] stiffness over the sum of E V around the edge
   Buffer<uint32_t> edges, cells, cell_edge;
-  Buffer<double> cell_young, cell_volume6;  // cell_young: empty without a field
-  bool young_field = false;
+  Buffer<double> cell_volume6;
   Buffer<double> rest_point;           // [npoint,3]
   Buffer<double> weight;               // [npoint] of the row sums
   Buffer<double> spring_sum, coupled;  // [npoint] sum of the springs' stiffness k; sum of k w_other / w_own
+
+  // What an effect that is off leaves empty.
+  Buffer<double> edge_tilt, edge_rest;     // [nedge] w^2 and sqrt(L0^2 + w^2)
+  Buffer<double> edge_damp, damp_most;     // [nedge], [npoint] damper over stiffness and its largest around a point, where it differs
+  Buffer<double> point_drag;               // [npoint] drag over mass, where it differs
+  Buffer<uint8_t> edge_off;                // [nedge] springs that are switched off
+  const char *active_effects[8] = {};      // of the present parameters, NULL-terminated
 
   // In block order.
   Buffer<Block> block;
   Buffer<uint32_t> point, spring_edge, cell_id;
   Buffer<double> p, f, stiffness, rest, bulk, volume6, slot_weight, row;
+  Buffer<double> tilt, damp, rest_now;     // as the springs'; rest_now: of plain springs with the same forces as those with branches
   Buffer<Quad> quad;
   Buffer<Cell> cell;
   Buffer<Merge> merge;  // by owning block
   Buffer<uint32_t> merge_begin, slot_begin;  // [nblock + 1]
 
-  bool has_volume() const { return params[kVolume] > 0; }
-  double young_of(uint32_t c) const { return young_field ? cell_young[c] : params[kYoung]; }
+  uint32_t choice(Param which) const { return uint32_t(params[which]); }
+  bool volume_on = false, damping_on = false, drag_on = false;
+  Form form() const { return edge_tilt.empty() ? kPlain : choice(kAxisForm) == kFormA ? kTurned : kTilted; }
+  Damping damping() const { return !damping_on ? kUndamped : edge_damp.empty() ? kUniform : kPerSpring; }
+
+  // Branches: a spring of share `part` of the stiffness in series with a dashpot.
+  bool has_branch() const { return choice(kDamper) != kVoigt; }
+  double part() const {
+    return choice(kDamper) == kMaxwell ? 1 : choice(kDamper) == kVoigt ? 0 : params[kRelaxationRatio] / (1 + params[kRelaxationRatio]);
+  }
+  Branch branch_at(const dfm_kin &k) const;
+
+  double at(Param which, uint32_t c) const { return field[which].empty() ? params[which] : field[which][c]; }
   // Moduli over Young's: the springs' scale and the volume modulus kV. See doc/models/msm.md.
-  double volume_ratio() const { return params[kVolume] / (3 * (1 - 2 * params[kPoisson])); }
-  double spring_scale() const;
+  double volume_ratio(uint32_t c) const { return at(kVolume, c) / (3 * (1 - 2 * at(kPoisson, c))); }
+  // Of spring e with its branch, switched off or not; its damper over that; its rest length as it counts.
+  double full_stiffness(uint32_t e) const { return scale * shape[e]; }
+  double stiffness_of(uint32_t e) const { return edge_off.empty() || !edge_off[e] ? scale * shape[e] : 0; }
+  double damp_scale() const { return choice(kDamper) == kStandardLinear ? 1 / (1 + params[kRelaxationRatio]) : 1; }
+  double rest_length(uint32_t e) const { return edge_rest.empty() ? edge_length[e] : edge_rest[e]; }
+  double bulk_of(uint32_t c) const;
+  size_t spring_slots() const { return 4 * size_t(block[nblock - 1].quad + block[nblock - 1].quads - quad.data()); }
+  size_t cell_slots() const { return size_t(block[nblock - 1].cell + block[nblock - 1].cells - cell.data()); }
 
   void create(const dfm_host *h, const dfm_mesh &m);
   void apply_params(const double *values);
@@ -89,10 +130,14 @@ struct Body {
 
   void add_forces(const dfm_kin &k, double *f_out);
   void bound(const dfm_kin &k, double *ksum, double *csum);
+  bool lacks_state(const dfm_kin &k) const;
   double energy(const dfm_kin &k) const;
   void cell_energy(const dfm_kin &k, double *density);
+  void mask_springs(uint32_t n, const uint32_t *which, bool on);
+  void rest_of_branches(uint32_t n, const dfm_kin &k);  // fills rest_now of block n
 
  private:
+  double scale = 1;  // of shape
   void take_mesh(const dfm_mesh &m);
   void find_directions();
   struct Layout;
@@ -104,9 +149,14 @@ struct Body {
   size_t fill_springs(const Layout &l, Block &out, uint32_t b, size_t quads_at);
   size_t fill_cells(const Layout &l, Block &out, uint32_t b, size_t cells_at);
   void build_merge(const Layout &l);
+  void take_fields(const dfm_mesh &m);
+  void find_shapes();
+  void find_tilts();
+  void find_dampers();
+  void find_effects();
+  void fill_stiffness();
   void find_weights();
-  double stretch_of(uint32_t e, const dfm_kin &k) const;
-  double spring_scale_of_shape() const { return spring_scale() * (young_field ? 1.0 : params[kYoung]); }
+  double spring_energy(uint32_t e, const dfm_kin &k, const Branch &branch) const;
   void for_each_block(uint32_t least_cells, void (*fn)(void *, uint32_t, uint32_t), void *user);
 };
 
@@ -115,6 +165,7 @@ struct Call {
   Body *body;
   const dfm_kin *k;
   double *f;
+  const Branch *branch;
 };
 
 // Order of the points by recursive bisection and where each block begins in it. See msm_partition.cpp.
@@ -131,9 +182,13 @@ inline double volume6_of(const double *x0, const double *x1, const double *x2, c
   const double g[3] = {c[1] * d[2] - c[2] * d[1], c[2] * d[0] - c[0] * d[2], c[0] * d[1] - c[1] * d[0]};
   return (a[0] * g[0] + a[1] * g[1]) + a[2] * g[2];
 }
-inline double length_of(const double *x, const double *y) {
+inline double square_of(const double *x, const double *y) {
   const double d[3] = {y[0] - x[0], y[1] - x[1], y[2] - x[2]};
-  return __builtin_sqrt((d[0] * d[0] + d[1] * d[1]) + d[2] * d[2]);
+  return (d[0] * d[0] + d[1] * d[1]) + d[2] * d[2];
 }
+inline double length_of(const double *x, const double *y) { return __builtin_sqrt(square_of(x, y)); }
+
+// Energy of form A over k, the integral of L - L0 over l from rest to l. See msm_energy.cpp.
+double turned_energy(double l, double l0, double tilt2);
 
 }  // namespace msm

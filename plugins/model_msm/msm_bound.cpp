@@ -1,7 +1,7 @@
 // Row sums for the step bound (errata, CFL). With K and C the stiffness and damping of the body, any D >= K and E >= C that are
 // diagonal (Loewner order) make h^2 D + 2 h E <= 4 M sufficient for symplectic Euler; doc/models/msm.md proves it. The rows are
 //   D_i = |A_i| + sum_j k_ij w_j / w_i + cells,   A_i = sum_j k_ij ((1 - s) n n^T + s I),   s = max(0, 1 - L0/L)
-// with positive weights w, chosen once so that the rows are even: they come from a few steps towards the Perron vector of the
+// (doc/models/msm.md has A_i and k_ij where the length counts extra coordinates), with positive weights w, chosen once so that the rows are even: they come from a few steps towards the Perron vector of the
 // row-sum operator. Every w gives a bound, a good one gives nearly the true step (0.95 of it on a free mesh, 0.6 for w = 1).
 #include <algorithm>
 
@@ -17,10 +17,12 @@ void row_pass(void *user, uint32_t begin, uint32_t end) {
   const Call &call = *static_cast<const Call *>(user);
   Body &body = *call.body;
   for (uint32_t n = begin; n < end; ++n) {
-    const Block b = body.lend(n, begin);
+    Block b = body.lend(n, begin);
+    if (body.has_branch() && call.k->state)
+      body.rest_of_branches(n, *call.k), b.rest = body.rest_now.data() + (b.stiffness - body.stiffness.data());
     body.kernels->load(b, call.k->x, nullptr, call.k->stride);
-    body.kernels->spring_rows(b);
-    if (body.has_volume()) body.kernels->cell_rows(b);
+    body.kernels->spring_rows[body.form()](b);
+    if (body.volume_on) body.kernels->cell_rows(b);
   }
 }
 
@@ -47,10 +49,11 @@ void merge_row_pass(void *user, uint32_t begin, uint32_t end) {
         call.ksum[i] = own;
         continue;
       }
-      const double springs = own + body.coupled[i];
+      const double springs = own + (body.edge_tilt.empty() ? body.coupled[i] : row[3]);
+      const double damp = body.damp_most.empty() ? body.damp_scale() * body.params[kDampingStiffness] : body.damp_most[i];
       call.ksum[i] += springs + row[7];
       // A damper's n n^T is at most its spring's part of A_i over k.
-      call.csum[i] += body.params[kDampingStiffness] * springs + body.params[kDampingMass] * body.mass[i];
+      call.csum[i] += damp * springs + (body.point_drag.empty() ? body.params[kDampingMass] : body.point_drag[i]) * body.mass[i];
     }
   }
 }
@@ -58,18 +61,22 @@ void merge_row_pass(void *user, uint32_t begin, uint32_t end) {
 }  // namespace
 
 void Body::find_weights() {
-  const double scale = spring_scale_of_shape();
+  // Along a spring at rest a tilted one is softer by (L0/L)^2, a turned one by L0/L.
+  const auto tangent = [this](uint32_t e) {
+    const double k = full_stiffness(e), ratio = edge_tilt.empty() || !(edge_rest[e] > 0) ? 1 : edge_length[e] / edge_rest[e];
+    return form() == kPlain ? k : form() == kTurned ? k * ratio : k * (ratio * ratio);
+  };
   std::fill(spring_sum.data(), spring_sum.data() + npoint, 0.0);
   for (uint32_t e = 0; e < nedge; ++e)
-    for (int n = 0; n < 2; ++n) spring_sum[edges[2 * size_t(e) + n]] += scale * shape[e];
+    for (int n = 0; n < 2; ++n) spring_sum[edges[2 * size_t(e) + n]] += full_stiffness(e);
   Buffer<double> own, next, gradient;  // gradient: 6 |dV/dx_a| sqrt(kV / (36 V0)) at rest
-  own.create(host, npoint), next.create(host, npoint), gradient.create(host, has_volume() ? 4 * size_t(ncell) : 0);
+  own.create(host, npoint), next.create(host, npoint), gradient.create(host, volume_on ? 4 * size_t(ncell) : 0);
   dfm_kin at_rest{};
   at_rest.x = rest_point.data(), at_rest.stride = 3;
-  RowCall diagonal{{this, &at_rest, nullptr}, own.data(), nullptr};
+  RowCall diagonal{{this, &at_rest, nullptr, nullptr}, own.data(), nullptr};
   for_each_block(kParallelCells, row_pass, static_cast<Call *>(&diagonal));
   for_each_block(kParallelMergeCells, merge_row_pass, &diagonal);
-  if (has_volume())
+  if (volume_on)
     for (uint32_t c = 0; c < ncell; ++c) {
       const uint32_t *q = cells.data() + 4 * size_t(c);
       const double *x[4], v0 = __builtin_fabs(cell_volume6[c]) / 6;
@@ -78,7 +85,7 @@ void Body::find_weights() {
         const double *o = x[(a + 1) & 3], *y = x[(a + 2) & 3], *z = x[(a + 3) & 3];
         const double u[3] = {y[0] - o[0], y[1] - o[1], y[2] - o[2]}, w[3] = {z[0] - o[0], z[1] - o[1], z[2] - o[2]};
         const double r[3] = {u[1] * w[2] - u[2] * w[1], u[2] * w[0] - u[0] * w[2], u[0] * w[1] - u[1] * w[0]};
-        const double k = v0 > 0 ? volume_ratio() * young_of(c) / (36 * v0) : 0;
+        const double k = v0 > 0 ? volume_ratio(c) * at(kYoung, c) / (36 * v0) : 0;
         gradient[4 * size_t(c) + a] = __builtin_sqrt(k * ((r[0] * r[0] + r[1] * r[1]) + r[2] * r[2]));
       }
     }
@@ -87,9 +94,9 @@ void Body::find_weights() {
     for (uint32_t i = 0; i < npoint; ++i) next[i] = own[i] * weight[i];
     for (uint32_t e = 0; e < nedge; ++e) {
       const uint32_t i = edges[2 * size_t(e)], j = edges[2 * size_t(e) + 1];
-      next[i] += scale * shape[e] * weight[j], next[j] += scale * shape[e] * weight[i];
+      next[i] += tangent(e) * weight[j], next[j] += tangent(e) * weight[i];
     }
-    for (uint32_t c = 0; has_volume() && c < ncell; ++c) {
+    for (uint32_t c = 0; volume_on && c < ncell; ++c) {
       const uint32_t *q = cells.data() + 4 * size_t(c);
       const double *g = gradient.data() + 4 * size_t(c);
       const double sum = (g[0] * weight[q[0]] + g[1] * weight[q[1]]) + (g[2] * weight[q[2]] + g[3] * weight[q[3]]);
@@ -102,13 +109,13 @@ void Body::find_weights() {
   std::fill(coupled.data(), coupled.data() + npoint, 0.0);
   for (uint32_t e = 0; e < nedge; ++e) {
     const uint32_t i = edges[2 * size_t(e)], j = edges[2 * size_t(e) + 1];
-    coupled[i] += scale * shape[e] * weight[j] / weight[i], coupled[j] += scale * shape[e] * weight[i] / weight[j];
+    coupled[i] += full_stiffness(e) * weight[j] / weight[i], coupled[j] += full_stiffness(e) * weight[i] / weight[j];
   }
   for (uint32_t n = 0; n < slot_begin[nblock]; ++n) slot_weight[n] = weight[point[n]];
 }
 
 void Body::bound(const dfm_kin &k, double *ksum, double *csum) {
-  RowCall call{{this, &k, nullptr}, ksum, csum};
+  RowCall call{{this, &k, nullptr, nullptr}, ksum, csum};
   for_each_block(kParallelCells, row_pass, static_cast<Call *>(&call));
   for_each_block(kParallelMergeCells, merge_row_pass, &call);
 }

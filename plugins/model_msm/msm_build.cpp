@@ -24,15 +24,6 @@ uint32_t find_edge(const uint32_t *edges, uint32_t nedge, uint32_t i, uint32_t j
 
 }  // namespace
 
-// Scale of the springs that keeps Young's modulus when the volume term is on: springs give lambda = mu, the term adds kV to
-// lambda, and E = mu (3 lambda + 2 mu) / (lambda + mu) is solved for mu; without it mu = 0.4 E.
-double Body::spring_scale() const {
-  const double r = volume_ratio();
-  if (r == 0) return 1;
-  const double b = 3 * r - 2;
-  return (__builtin_sqrt(b * b + 20 * r) - b) / 10 / 0.4;
-}
-
 void Body::take_mesh(const dfm_mesh &m) {
   npoint = m.npoint, ncell = m.ncell, nedge = m.nedge;
   mass.create(host, npoint), shape.create(host, nedge), edge_volume.create(host, nedge), edge_length.create(host, nedge);
@@ -44,12 +35,6 @@ void Body::take_mesh(const dfm_mesh &m) {
   std::copy(m.rest, m.rest + 3 * size_t(npoint), rest_point.data());
   std::copy(m.edges, m.edges + 2 * size_t(nedge), edges.data());
   std::copy(m.cells, m.cells + 4 * size_t(ncell), cells.data());
-  for (uint32_t k = 0; m.field_keys && m.field_keys[k]; ++k)
-    if (!std::strcmp(m.field_keys[k], "young")) {
-      young_field = true;
-      cell_young.create(host, ncell);
-      std::copy(m.fields[k], m.fields[k] + ncell, cell_young.data());
-    }
   for (uint32_t e = 0; e < nedge; ++e)
     edge_length[e] = length_of(m.rest + 3 * size_t(edges[2 * size_t(e)]), m.rest + 3 * size_t(edges[2 * size_t(e) + 1]));
   for (uint32_t c = 0; c < ncell; ++c) {
@@ -63,11 +48,9 @@ void Body::take_mesh(const dfm_mesh &m) {
       if (e == kNone) throw "a cell has an edge that the mesh's edge list lacks";
       cell_edge[6 * size_t(c) + n] = e;
       edge_volume[e] += volume;
-      shape[e] += volume * (young_field ? cell_young[c] : 1.0);
     }
   }
   find_directions();
-  for (uint32_t e = 0; e < nedge; ++e) shape[e] *= per_modulus[e];
 }
 
 // What leads from the mesh to the blocks; a rank is a point's place in the order of partition_points.
@@ -213,6 +196,7 @@ void Body::build_blocks() {
   grain = (nblock + kPieces - 1) / kPieces;
   const size_t nslot = slot_begin[nblock];
   block.create(host, nblock), point.create(host, nslot), slot_weight.create(host, nslot);
+  std::fill(slot_weight.data(), slot_weight.data() + nslot, 1.0);
   p.create(host, 8 * size_t(largest) * ((nblock + grain - 1) / grain)), row.create(host, 8 * nslot), f.create(host, 4 * nslot);
   quad.create(host, nquad), stiffness.create(host, 4 * nquad), rest.create(host, 4 * nquad), spring_edge.create(host, 4 * nquad);
   cell.create(host, ncells), bulk.create(host, ncells), volume6.create(host, ncells), cell_id.create(host, ncells);
@@ -227,6 +211,7 @@ void Body::build_blocks() {
     Block &out = block[b];
     out.owned = owned, out.local = owned + nhalo, out.point = points;
     out.f = f.data() + 4 * size_t(slot_begin[b]);
+    out.edge = spring_edge.data() + 4 * quads_at;
     out.row = row.data() + 8 * size_t(slot_begin[b]), out.weight = slot_weight.data() + slot_begin[b];
     quads_at = fill_springs(l, out, b, quads_at);
     cells_at = fill_cells(l, out, b, cells_at);
@@ -237,23 +222,9 @@ void Body::build_blocks() {
 void Body::create(const dfm_host *h, const dfm_mesh &m) {
   host = h, kernels = choose_kernels(h);
   take_mesh(m);
+  take_fields(m);
   build_blocks();
   apply_params(m.params);
-}
-
-void Body::apply_params(const double *values) {
-  std::copy(values, values + kParamCount, params);
-  const double scale = spring_scale_of_shape(), ratio = volume_ratio();
-  const Block &last = block[nblock - 1];
-  const size_t nspring = 4 * size_t(last.quad + last.quads - quad.data()), ncells = size_t(last.cell + last.cells - cell.data());
-  for (size_t s = 0; s < nspring; ++s) stiffness[s] = spring_edge[s] == kNone ? 0 : scale * shape[spring_edge[s]];
-  for (size_t c = 0; c < ncells; ++c) {
-    const double v0 = __builtin_fabs(volume6[c]) / 6;
-    const double side = cell_id[c] == kNone ? 0 : edge_length[cell_edge[6 * size_t(cell_id[c])]];
-    // A cell that is flat at rest has no volume to keep.
-    bulk[c] = cell_id[c] != kNone && v0 > 1e-12 * side * side * side ? ratio * young_of(cell_id[c]) / (36 * v0) : 0;
-  }
-  find_weights();
 }
 
 }  // namespace msm

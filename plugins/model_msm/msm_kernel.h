@@ -1,5 +1,8 @@
 // Mass-spring kernels, chosen at run time by instruction set. All of them do the same IEEE operations in the same order:
 //   spring  L = sqrt((dx^2 + dy^2) + dz^2),  F = k [(L - L0)/L + damp (dv.d)/L^2] d                       (2.25), (2.26 corrected)
+//   tilted  L = sqrt(((dx^2 + dy^2) + dz^2) + w^2) in its place, w the frozen extra coordinates' part of d  (chapter 6, form B)
+//   turned  l = sqrt(d.d),  F = k [(L - L0)/l + damp (dv.d)/(l L)] d                                        (chapter 6, form A)
+//   branch  F = k [(a e + part r)/L + damp (dv.d)/L^2] d,  e = L - L0, and r for the next step              (Fig. 2.5 a, c)
 //   row     f_i += (F0 + F1) + (F2 + F3) per quad of springs, then f_j -= F one spring after the other
 //   cell    6V = a.(b x c),  F_n = -kV/(36 V0) (6V - 6V0) g_n,  F_0 = -((F_1 + F_2) + F_3)                  (2.27 corrected)
 //           four cells at a time, corner after corner in the order 1 2 3 0
@@ -20,10 +23,12 @@ struct Block {
   const uint32_t *point;                // [local] number of the point in the host's arrays
   double *p;                            // [local,8] x y z 0 vx vy vz 0: a point with its velocity is one cache line; lent by the pass
   double *f;                            // [local,4]
-  double *row;                          // [local,8] row sums: the springs' block xx yy zz - xy yz zx, then the cells' row
+  double *row;                          // [local,8] row sums: the springs' block xx yy zz, coupling (kTilted, kTurned), xy yz zx, then the cells' row
   const double *weight;                 // [local] of the row sums, see Body::find_weights
   const Quad *quad;                     // [quads]
   const double *stiffness, *rest;       // [quads,4] N/m, m
+  const double *tilt, *damp;            // [quads,4] w^2, m^2; damper over stiffness, s; each NULL where nothing calls for it
+  const uint32_t *edge;                 // [quads,4] number of the spring in the host's list, ~0 for one that fills up
   const Cell *cell;                     // [cells]
   const double *bulk, *volume6;         // [cells] kV/(36 V0), 6 V0
 };
@@ -31,14 +36,27 @@ struct Block {
 // Slots of all blocks' f: a halo point of another block, and the point that it stands for.
 struct Merge { uint32_t from, to; };
 
+// A spring with a dashpot in series beside it, for one step: p = r + kept e is the stretch of the branch's spring (doc/models/msm.md).
+struct Branch {
+  double follow, part;     // a = 1 - part (1 - kept); share of the branch in the stiffness
+  double kept;             // of the step that led here
+  double keep, next;       // exp(-h/tau) and kept of the step that begins
+  const double *state;     // [nedge] r
+  double *state_out;       // [nedge] r of the next step; NULL: not wanted
+};
+
+// How a spring's length counts, and where its damper's constant comes from.
+enum Form : uint32_t { kPlain, kTilted, kTurned, kForms };
+enum Damping : uint32_t { kUndamped, kUniform, kPerSpring, kDampings };
+
 struct Kernels {
   const char *name;
   // Copies x (and v, unless NULL) of the block's points in and clears f.
   void (*load)(const Block &b, const double *x, const double *v, uint32_t stride);
-  void (*springs)(const Block &b);
-  void (*damped_springs)(const Block &b, double damp);  // damp: seconds
+  void (*springs[kForms][kDampings])(const Block &b, double damp);                // damp: seconds, of kUniform
+  void (*branches[kDampings])(const Block &b, double damp, const Branch &branch);  // tilted or plain (tilt zero)
   void (*cells)(const Block &b);
-  void (*spring_rows)(const Block &b);  // clears row, then both at the loaded points: what the step bound is made of
+  void (*spring_rows[kForms])(const Block &b);  // clears row, then both at the loaded points: what the step bound is made of
   void (*cell_rows)(const Block &b);
   void (*merge)(double *f, const Merge *merge, uint32_t n);
   void (*merge_rows)(double *row, const Merge *merge, uint32_t n);

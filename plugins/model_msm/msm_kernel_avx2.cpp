@@ -5,8 +5,8 @@
 
 namespace msm {
 namespace {
-constexpr Kernels kKernels = {"avx2", load_block, plain_springs, damped_springs, volume_cells,
-                              spring_rows, cell_rows, merge_halo, merge_rows, add_to_host};
+constexpr Kernels kKernels = {"avx2", load_block, {MSM_SPRINGS(springs)}, MSM_BRANCHES, volume_cells,
+                              MSM_ROWS, merge_halo, merge_rows, add_to_host};
 }  // namespace
 
 const Kernels *kernels_avx2() { return &kKernels; }

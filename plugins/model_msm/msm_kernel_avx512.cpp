@@ -32,8 +32,8 @@ MSM_INLINE void spread(const Block &b, const Quad &q, __m512d scale, __m512d d0,
   take_from(b, q.j[0], f0), take_from(b, q.j[1], f1), take_from(b, q.j[2], f2), take_from(b, q.j[3], f3);
 }
 
-template <bool kDamped>
-MSM_INLINE void springs8(const Block &b, double damp) {
+template <Form kForm, Damping kDamping>
+static void springs8(const Block &b, double damp) {
   for (uint32_t n = 0; n < b.quads; n += 2) {
     const Quad &q = b.quad[n], &r = b.quad[n + 1];
     const __m512d pq = point8(b, q.i), pr = point8(b, r.i);
@@ -44,11 +44,16 @@ MSM_INLINE void springs8(const Block &b, double damp) {
     const __m512d s = sum_rows(products(d0), products(d1), products(d2), products(d3));
     const __m512d t = sum_rows(products(d4), products(d5), products(d6), products(d7));
     const __m512d dd = _mm512_shuffle_f64x2(s, t, 0x44);
-    const __m512d length = _mm512_sqrt_pd(dd), inverse = _mm512_div_pd(_mm512_set1_pd(1.0), length);
-    __m512d stretch = _mm512_mul_pd(_mm512_sub_pd(length, _mm512_load_pd(b.rest + 4 * size_t(n))), inverse);
-    if constexpr (kDamped) {
-      const __m512d rate = _mm512_shuffle_f64x2(s, t, 0xee);
-      stretch = _mm512_add_pd(stretch, _mm512_mul_pd(_mm512_set1_pd(damp), _mm512_mul_pd(_mm512_mul_pd(rate, inverse), inverse)));
+    const __m512d counted = kForm == kPlain ? dd : _mm512_add_pd(dd, _mm512_load_pd(b.tilt + 4 * size_t(n)));
+    const __m512d length = _mm512_sqrt_pd(counted), more = _mm512_sub_pd(length, _mm512_load_pd(b.rest + 4 * size_t(n)));
+    // 1/L, or 1/(l L) where the force turns back into the body (kTurned).
+    const __m512d inverse =
+        _mm512_div_pd(_mm512_set1_pd(1.0), kForm == kTurned ? _mm512_mul_pd(_mm512_sqrt_pd(dd), length) : length);
+    __m512d stretch = _mm512_mul_pd(more, kForm == kTurned ? _mm512_mul_pd(inverse, length) : inverse);
+    if constexpr (kDamping != kUndamped) {
+      const __m512d factor = kDamping == kPerSpring ? _mm512_load_pd(b.damp + 4 * size_t(n)) : _mm512_set1_pd(damp);
+      const __m512d rate = _mm512_mul_pd(_mm512_shuffle_f64x2(s, t, 0xee), inverse);
+      stretch = _mm512_add_pd(stretch, _mm512_mul_pd(factor, kForm == kTurned ? rate : _mm512_mul_pd(rate, inverse)));
     }
     const __mmask8 has_direction = _mm512_cmp_pd_mask(dd, _mm512_set1_pd(kShortestSquared), _CMP_GT_OQ);
     const __m512d scale = _mm512_maskz_mul_pd(has_direction, _mm512_load_pd(b.stiffness + 4 * size_t(n)), stretch);
@@ -56,9 +61,6 @@ MSM_INLINE void springs8(const Block &b, double damp) {
     spread<4>(b, r, scale, d4, d5, d6, d7);
   }
 }
-
-static void plain_springs8(const Block &b) { springs8<false>(b, 0); }
-static void damped_springs8(const Block &b, double damp) { springs8<true>(b, damp); }
 
 // Transposes the 4 x 4 of each half.
 MSM_INLINE void transpose(__m512d &r0, __m512d &r1, __m512d &r2, __m512d &r3) {
@@ -127,8 +129,8 @@ static void volume_cells8(const Block &b) {
   }
 }
 
-constexpr Kernels kKernels = {"avx512", load_block, plain_springs8, damped_springs8, volume_cells8,
-                              spring_rows, cell_rows, merge_halo, merge_rows, add_to_host};
+constexpr Kernels kKernels = {"avx512", load_block, {MSM_SPRINGS(springs8)}, MSM_BRANCHES, volume_cells8,
+                              MSM_ROWS, merge_halo, merge_rows, add_to_host};
 
 }  // namespace
 

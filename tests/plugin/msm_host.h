@@ -203,7 +203,13 @@ inline Mesh read_msh(const std::string &path) {
 
 struct Params {
   double young = 1e5, poisson = 0.3, damping_stiffness = 0, damping_mass = 0, volume = 0;
+  double slope = 0;
+  Vec axis = {1, 0, 0};
+  bool stiffer = false, form_a = false;
+  int damper = 0;  // voigt, maxwell, sls
+  double ratio = 1, time = 0.1;
 };
+using Fields = std::map<std::string, std::vector<double>>;
 
 // An instance with its point arrays. x starts at rest, v at zero.
 struct Instance {
@@ -215,15 +221,19 @@ struct Instance {
   dfm_status status;
   std::vector<double> storage[3];
   double *x, *v, *f;
+  std::vector<double> state, state_out;
+  double dt = 1e-3;
 
-  Instance(Host &h, const Mesh &m, const Params &p, uint32_t s = 4, const std::vector<double> *young_field = nullptr)
+  Instance(Host &h, const Mesh &m, const Params &p, uint32_t s = 4, const Fields &by_cell = {})
       : host(h), mesh(m), stride(s), ops(static_cast<const dfm_model *>(plugin_type().ops)) {
-    const char *keys[] = {"young", nullptr};
-    const double *fields[] = {young_field ? young_field->data() : nullptr};
+    std::vector<const char *> keys;
+    std::vector<const double *> fields;
+    for (const auto &[key, values] : by_cell) keys.push_back(key.c_str()), fields.push_back(values.data());
+    keys.push_back(nullptr);
     dfm_mesh d{};
     d.size = sizeof d, d.npoint = m.npoint(), d.ncell = m.ncell(), d.cell = DFM_CELL_TET, d.rest = m.rest.data(), d.cells = m.cells.data();
     d.mass = m.mass.data(), d.nedge = uint32_t(m.edges.size() / 2), d.edges = m.edges.data();
-    d.field_keys = young_field ? keys : keys + 1, d.fields = fields;
+    d.field_keys = keys.data(), d.fields = fields.data();
     const std::vector<double> values = row(p);
     d.params = values.data();
     status = ops->create(&h.table, &d, &self);
@@ -234,15 +244,27 @@ struct Instance {
       while (reinterpret_cast<uintptr_t>(*to[n]) % 64) ++*to[n];
     }
     for (uint32_t i = 0; i < m.npoint(); ++i) set(x, i, m.at(i));
+    if (status != DFM_OK) return;
+    const auto *slots = static_cast<const dfm_slots *>(ops->extension(self, DFM_EXT_SLOTS));
+    for (uint32_t n = 0; n < slots->nslot; ++n)
+      state.resize(state.size() + size_t(slots->slots[n].width) * (slots->slots[n].unit == DFM_PER_EDGE ? d.nedge : 1));
+    ops->state_init(self, state.data());
+    state_out = state;
   }
   ~Instance() { ops->destroy(self); }
   Instance(const Instance &) = delete;
 
   static std::vector<double> row(const Params &p) {
-    std::map<std::string, double> by_key = {{"young", p.young}, {"poisson", p.poisson}, {"damping_stiffness", p.damping_stiffness},
-                                            {"damping_mass", p.damping_mass}, {"volume", p.volume}};
+    std::map<std::string, std::vector<double>> by_key = {
+        {"young", {p.young}}, {"poisson", {p.poisson}}, {"damping_stiffness", {p.damping_stiffness}}, {"damping_mass", {p.damping_mass}},
+        {"volume", {p.volume}}, {"anisotropy_slope", {p.slope}}, {"anisotropy_axis", {p.axis.begin(), p.axis.end()}},
+        {"anisotropy_kind", {double(p.stiffer)}}, {"anisotropy_form", {double(p.form_a)}}, {"damper", {double(p.damper)}},
+        {"relaxation_ratio", {p.ratio}}, {"relaxation_time", {p.time}}};
     std::vector<double> values;
-    for (uint32_t n = 0; n < plugin_type().nparam; ++n) values.push_back(by_key.at(plugin_type().params[n].key));
+    for (uint32_t n = 0; n < plugin_type().nparam; ++n) {
+      const std::vector<double> &value = by_key.at(plugin_type().params[n].key);
+      values.insert(values.end(), value.begin(), value.end());
+    }
     return values;
   }
   uint32_t size() const { return mesh.npoint(); }
@@ -250,8 +272,20 @@ struct Instance {
   void set(double *a, uint32_t i, Vec value) const { std::copy(value.begin(), value.end(), a + size_t(stride) * i); }
   dfm_kin kin() const {
     dfm_kin k{};
-    k.size = sizeof k, k.stride = stride, k.x = x, k.v = v, k.dt = 1e-3;
+    k.size = sizeof k, k.stride = stride, k.x = x, k.v = v, k.dt = dt, k.state = state.empty() ? nullptr : state.data();
     return k;
+  }
+  // Forces of a step of length dt, whose end is then the present state.
+  void forces_and_step() {
+    std::fill(f, f + size_t(size()) * stride, 0.0);
+    dfm_kin k = kin();
+    k.state_out = state.empty() ? nullptr : state_out.data();
+    EXPECT_EQ(ops->add_forces(self, &k, f), DFM_OK);
+    state.swap(state_out);
+  }
+  void mask(const std::vector<uint32_t> &which, bool on) {
+    const auto *ext = static_cast<const dfm_spring_mask *>(ops->extension(self, DFM_EXT_SPRING_MASK));
+    EXPECT_EQ(ext->set(self, uint32_t(which.size()), which.data(), on), DFM_OK);
   }
   void forces() {
     std::fill(f, f + size_t(size()) * stride, 0.0);

@@ -11,7 +11,7 @@ TEST(MsmMaterial, YoungField_ScalesTheSpringsOfItsCells) {
   std::vector<double> doubled = uniform;
   for (double &e : doubled) e *= 2;
   const Params p = {1e4, 0.4, 0.002, 0, 1};
-  Instance plain(host, mesh, {3e4, 0.4, 0.002, 0, 1}), field(host, mesh, p, 4, &uniform), twice(host, mesh, p, 4, &doubled);
+  Instance plain(host, mesh, {3e4, 0.4, 0.002, 0, 1}), field(host, mesh, p, 4, {{"young", uniform}}), twice(host, mesh, p, 4, {{"young", doubled}});
   plain.shake(0.01, 1), field.shake(0.01, 1), twice.shake(0.01, 1);
   plain.forces(), field.forces(), twice.forces();
   for (uint32_t i = 0; i < mesh.npoint(); ++i) {

@@ -143,6 +143,25 @@ typedef struct dfm_cell_energy {
   uint32_t size, reserved;
   dfm_status (*cell_energy)(void *self, const dfm_kin *k, double *density);  /* [step] density[ncell] = J/m^3 */
 } dfm_cell_energy;
+/* Extension "dfm.slots/1" of a model (draft): state of this instance, where its parameters decide how much there is. It stands in the
+ * place of dfm_model.slots, is asked for once after create() and stays as it is while the instance lives. */
+#define DFM_EXT_SLOTS "dfm.slots/1"
+typedef struct dfm_slots { uint32_t size, nslot; const dfm_slot *slots; } dfm_slots;
+/* Extension "dfm.effects/1" of a model (draft): those of dfm_type.effects that the instance's present parameters call for,
+ * NULL-terminated. Without it all of them are taken to be at work. */
+#define DFM_EXT_EFFECTS "dfm.effects/1"
+typedef struct dfm_effects {
+  uint32_t size, reserved;
+  const char *const *(*active)(const void *self);                  /* [setup] valid until the next call of set_params */
+} dfm_effects;
+/* Extension "dfm.spring_mask/1" of a model (draft): springs by edge of the mesh, switched off and on. Like a parameter, the mask is the
+ * host's to keep: it is no state. Off gives a spring's energy away; on again may bring some. */
+#define DFM_EXT_SPRING_MASK "dfm.spring_mask/1"
+typedef struct dfm_spring_mask {
+  uint32_t size, reserved;
+  dfm_status (*set)(void *self, uint32_t n, const uint32_t *edges, uint8_t on);  /* [setup] all or, on DFM_E_ARG, none */
+  dfm_status (*get)(const void *self, uint8_t *on);                              /* [any] on[nedge] 1, 0 */
+} dfm_spring_mask;
 /* ---- linear solver for the implicit system (SPD, 3x3 blocks) ---------------------------------------- */
 typedef struct dfm_solver {
   uint32_t size, flags;

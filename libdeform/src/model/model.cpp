@@ -1,13 +1,14 @@
 #include "model/model.h"
 
 #include "core/error.h"
+#include "plugin/registry.h"
 
 namespace dfm {
 
-size_t model_state_size(const dfm_model &ops, uint32_t npoint, uint32_t ncell, uint32_t nedge) {
+size_t model_state_size(const dfm_slot *slots, uint32_t nslot, uint32_t npoint, uint32_t ncell, uint32_t nedge) {
   size_t total = 0;
-  for (uint32_t s = 0; s < ops.nslot; ++s) {
-    const dfm_slot &slot = ops.slots[s];
+  for (uint32_t s = 0; s < nslot; ++s) {
+    const dfm_slot &slot = slots[s];
     const size_t count = slot.unit == DFM_PER_POINT  ? npoint
                          : slot.unit == DFM_PER_CELL ? ncell
                          : slot.unit == DFM_PER_EDGE ? nedge
@@ -27,13 +28,30 @@ void ModelInstance::create(const dfm_type &t, const dfm_host &h, const dfm_mesh 
     self = nullptr;
     fail(s < 0 ? s : DFM_E_FATAL, "model '%s' refused the body (status %d); the log says why", t.id, int(s));
   }
-  if (ops->extension) call("extension", [&] { return stepper = static_cast<const dfm_stepper *>(ops->extension(self, "dfm.stepper/1")), DFM_OK; });
+  const dfm_slots *own = nullptr;
+  if (ops->extension)
+    call("extension", [&] {
+      stepper = static_cast<const dfm_stepper *>(ops->extension(self, "dfm.stepper/1"));
+      own = static_cast<const dfm_slots *>(ops->extension(self, DFM_EXT_SLOTS));
+      effects = static_cast<const dfm_effects *>(ops->extension(self, DFM_EXT_EFFECTS));
+      return DFM_OK;
+    });
   if (!stepper && !ops->add_forces) fail(DFM_E_UNSUPPORTED, "model '%s' neither adds forces nor steps itself; report it to its author", t.id);
-  const size_t nstate = model_state_size(*ops, mesh.npoint, mesh.ncell, mesh.nedge);
+  if (own) check_slots(t.id, own->slots, own->nslot, false);
+  const size_t nstate = model_state_size(own ? own->slots : ops->slots, own ? own->nslot : ops->nslot, mesh.npoint, mesh.ncell, mesh.nedge);
   state = Array<double>(nstate, 0.0, HookAllocator<double>(memory));
   state_out = state;
   if (nstate && ops->state_init && call("state_init", [&] { return ops->state_init(self, state.data()); }) != DFM_OK)
     fail(DFM_E_FATAL, "model '%s' could not initialise its state", t.id);
+}
+
+bool ModelInstance::works(const std::string &effect) const {
+  if (!effects || !effects->active) return true;
+  const char *const *active = nullptr;
+  call("effects", [&] { return active = effects->active(self), DFM_OK; });
+  for (; active && *active; ++active)
+    if (effect == *active) return true;
+  return false;
 }
 
 }  // namespace dfm

@@ -14,6 +14,7 @@ struct ModelInstance {
   const dfm_model *ops = nullptr;
   const dfm_host *host = nullptr;
   const dfm_stepper *stepper = nullptr;      // null: a force model, the host integrates
+  const dfm_effects *effects = nullptr;      // null: whatever the type promises is at work
   void *self = nullptr;
   std::vector<double> params;
   Array<double> state, state_out;            // slots end to end
@@ -30,10 +31,12 @@ struct ModelInstance {
   // Runs f, which calls into the plugin: an exception becomes a status, a failure is logged as `what`.
   template <class F>
   dfm_status call(const char *what, F &&f) const noexcept { return call_plugin(*host, *type, what, f); }
+  // Is this effect of the type called for by the present parameters?
+  bool works(const std::string &effect) const;
   void commit_state() { if (!state.empty()) state.swap(state_out); }
 };
 
-// Sum of DFM_CELL_* values' data: number of state values a mesh of these counts needs.
-size_t model_state_size(const dfm_model &ops, uint32_t npoint, uint32_t ncell, uint32_t nedge);
+// Number of state values that slots need on a mesh of these counts.
+size_t model_state_size(const dfm_slot *slots, uint32_t nslot, uint32_t npoint, uint32_t ncell, uint32_t nedge);
 
 }  // namespace dfm

@@ -26,6 +26,9 @@ void plan_effects(const SceneFacts &f, Plan &plan) {
   }
   for (const auto &name : names) {
     const std::string by = provider(f.offered, name);
+    if (const std::string idle = provider(f.idle, name); by.empty() && !idle.empty())
+      fail(DFM_E_ARG, "effect '%s' is asked for, and %s provides it, but the parameters of every body leave it off; set them "
+           "('deform plugin info %s' lists them) or take the effect from the list", name.c_str(), idle.c_str(), idle.c_str());
     if (by.empty()) {
       const std::string could = provider(f.available, name);
       fail(DFM_E_ARG, "effect '%s' is asked for, but nothing in the scene provides it; %s", name.c_str(),

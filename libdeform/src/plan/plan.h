@@ -15,7 +15,8 @@ struct SceneFacts {
   unsigned body_pairs = 0, obstacle_pairs = 0;         // pairs that may touch, filters applied
   bool gravity_keys = false, loads_vary = false, held_move = false, obstacles_move = false;
   struct Provider { std::string effect, plugin; };
-  std::vector<Provider> offered;                       // by models and laws that the scene uses
+  std::vector<Provider> offered;                       // by models and laws that the scene uses, as their parameters stand
+  std::vector<Provider> idle;                          // by models that the scene uses, if their parameters called for it
   std::vector<Provider> available;                     // by every loaded plugin
   bool effects_listed = false;
   std::vector<std::string> asked;                      // where listed

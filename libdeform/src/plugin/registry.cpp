@@ -90,18 +90,6 @@ void copy_rows(RegisteredType &out) {
   out.type.param_size = sizeof(dfm_param);
 }
 
-void check_slots(const std::string &id, const dfm_slot *slots, uint32_t n, bool law) {
-  if (n > 4096 || (n && !slots)) bad(id, "its state slots are missing");
-  for (uint32_t i = 0; i < n; ++i) {
-    const dfm_slot &s = slots[i];
-    const uint32_t width = s.kind == DFM_SLOT_TANGENT ? 2 : s.kind == DFM_SLOT_VECTOR ? 3 : s.kind == DFM_SLOT_ROTATION ? 4 : s.width;
-    if (s.kind < DFM_SLOT_SCALAR || s.kind > DFM_SLOT_ROTATION || s.width == 0 || s.width > 4096 || s.width != width)
-      bad(id, format("state slot %u has kind %u and width %u, which do not agree", i, s.kind, s.width));
-    if (law ? s.unit != DFM_PER_CONTACT : s.unit < DFM_PER_POINT || s.unit > DFM_PER_INSTANCE)
-      bad(id, format("state slot %u has unit %u, which a %s cannot have", i, s.unit, law ? "law" : "model"));
-  }
-}
-
 void copy_ops(RegisteredType &out) {
   const std::string id = out.type.id;
   const void *ops = out.type.ops;
@@ -127,6 +115,18 @@ void copy_ops(RegisteredType &out) {
 }
 
 }  // namespace
+
+void check_slots(const std::string &id, const dfm_slot *slots, uint32_t n, bool law) {
+  if (n > 4096 || (n && !slots)) bad(id, "its state slots are missing");
+  for (uint32_t i = 0; i < n; ++i) {
+    const dfm_slot &s = slots[i];
+    const uint32_t width = s.kind == DFM_SLOT_TANGENT ? 2 : s.kind == DFM_SLOT_VECTOR ? 3 : s.kind == DFM_SLOT_ROTATION ? 4 : s.width;
+    if (s.kind < DFM_SLOT_SCALAR || s.kind > DFM_SLOT_ROTATION || s.width == 0 || s.width > 4096 || s.width != width)
+      bad(id, format("state slot %u has kind %u and width %u, which do not agree", i, s.kind, s.width));
+    if (law ? s.unit != DFM_PER_CONTACT : s.unit < DFM_PER_POINT || s.unit > DFM_PER_INSTANCE)
+      bad(id, format("state slot %u has unit %u, which a %s cannot have", i, s.unit, law ? "law" : "model"));
+  }
+}
 
 const char *kind_name(uint32_t kind) {
   return kind == DFM_KIND_FRICTION ? "law" : kind == DFM_KIND_MODEL ? "model" : kind == DFM_KIND_SOLVER ? "solver" : "type";

@@ -48,6 +48,8 @@ class Registry {
 const char *kind_name(uint32_t kind);  // "law", "model", "solver"
 std::string short_name(const dfm_type &type);
 std::vector<std::string> effects(const dfm_type &type);
+// Throws Error naming the type where a slot's unit, kind and width do not agree.
+void check_slots(const std::string &id, const dfm_slot *slots, uint32_t n, bool law);
 inline const dfm_friction &law_of(const dfm_type &type) { return *static_cast<const dfm_friction *>(type.ops); }
 inline const dfm_model &model_of(const dfm_type &type) { return *static_cast<const dfm_model *>(type.ops); }
 

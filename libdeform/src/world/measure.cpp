@@ -82,7 +82,7 @@ void set_model_params(Body &b, const dfm_params &params) {
   if (b.model.call("set_params", [&] { return b.model.ops->set_params(b.model.self, values.data()); }) != DFM_OK)
     fail(DFM_E_ARG, "body '%s': model '%s' refuses these parameters; the log says why", b.name.c_str(), type.id);
   b.model.params = std::move(values);
-  b.world->bound_age = kNone;
+  b.world->bound_age = kNone, b.world->changed = true;   // the plan names the effects that parameters call for
 }
 
 }  // namespace dfm

@@ -140,7 +140,7 @@ void World::prepare() {
                        b.model.stepper ? s.v.data() : b.p.v_free.data()});
     sinks.push_back({node, s.nsurfel, &s, b.surfel_impulse.data(), b.model.stepper ? nullptr : b.p.impulse.data()});
     node += s.nsurfel, point += b.p.n;
-    offer(*b.model.type, facts.offered);
+    for (const std::string &e : effects(*b.model.type)) (b.model.works(e) ? facts.offered : facts.idle).push_back({e, b.model.type->id});
   }
   for (uint32_t i = 0; i < no; ++i) {
     Obstacle &o = *obstacles[i];

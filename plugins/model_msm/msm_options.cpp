@@ -1,0 +1,184 @@
+// From parameters and fields by cell to what the passes read: stiffness per spring, frozen extra coordinates, dampers, drag,
+// springs that are switched off. What nothing calls for stays empty and its kernels are never chosen.
+#include <algorithm>
+
+#include <stdio.h>
+
+#include "msm_body.h"
+
+namespace msm {
+
+// Scale of the springs that keeps Young's modulus when the volume term is on: springs give lambda = mu, the term adds kV to
+// lambda, and E = mu (3 lambda + 2 mu) / (lambda + mu) is solved for mu; without it mu = 0.4 E. r = kV/E.
+static double spring_scale(double r) {
+  if (r == 0) return 1;
+  const double b = 3 * r - 2;
+  return (__builtin_sqrt(b * b + 20 * r) - b) / 10 / 0.4;
+}
+
+[[noreturn]] static void refuse_field(const dfm_host *host, const dfm_param &row, uint32_t cell, double value) {
+  char text[200];
+  snprintf(text, sizeof text, "field %s of cell %u is %g; %g .. %g %s is expected, and an axis that is not zero", row.key, cell, value, row.min,
+           row.max, row.unit);
+  complain(host, text);
+  throw Refused{};
+}
+
+void Body::take_fields(const dfm_mesh &m) {
+  for (uint32_t k = 0; m.field_keys && m.field_keys[k]; ++k)
+    for (uint32_t r = 0; r < kParamCount; ++r) {
+      const dfm_param &known = kParams[r];
+      if (!(known.flags & DFM_PARAM_PER_CELL) || std::strcmp(m.field_keys[k], known.key)) continue;
+      const double *values = m.fields[k];
+      for (uint32_t c = 0; c < ncell; ++c) {
+        double square = 0;
+        for (uint32_t w = 0; w < known.width; ++w) {
+          const double x = values[size_t(known.width) * c + w];
+          if (!(x >= known.min && x <= known.max)) refuse_field(host, known, c, x);
+          square += x * x;
+        }
+        if (r == kAxis && !(square > 0)) refuse_field(host, known, c, 0);
+      }
+      field[r].create(host, size_t(known.width) * ncell);
+      std::copy(values, values + size_t(known.width) * ncell, field[r].data());
+    }
+}
+
+// Every cell gives each of its edges E V, times what msm_stiffness.cpp finds. What all cells share (Young's modulus, the volume term's correction) stays outside.
+void Body::find_shapes() {
+  const bool scaled = !field[kVolume].empty() || !field[kPoisson].empty(), stiff = !field[kYoung].empty();
+  scale = (scaled ? 1.0 : spring_scale(volume_ratio(0))) * (stiff ? 1.0 : params[kYoung]);
+  if (choice(kDamper) == kStandardLinear) scale *= 1 + params[kRelaxationRatio];
+  std::fill(shape.data(), shape.data() + nedge, 0.0);
+  for (uint32_t c = 0; c < ncell; ++c) {
+    const double volume = __builtin_fabs(cell_volume6[c]) / 6;
+    const double share = volume * (stiff ? field[kYoung][c] : 1.0) * (scaled ? spring_scale(volume_ratio(c)) : 1.0);
+    for (int n = 0; n < 6; ++n) shape[cell_edge[6 * size_t(c) + n]] += share;
+  }
+  for (uint32_t e = 0; e < nedge; ++e) shape[e] *= per_modulus[e];
+}
+
+// w^2 of a spring d at rest: softer, g^2 (a.d)^2, one extra coordinate g a.X; stiffer, g^2 (|d|^2 - (a.d)^2), two of them along any two
+// axes across a. Springs between cells that differ take the mean over the volume around them, which knows no sign of an axis.
+void Body::find_tilts() {
+  const bool by_cell = !field[kSlope].empty() || !field[kAxis].empty();
+  double steepest = params[kSlope];
+  if (!field[kSlope].empty()) steepest = *std::max_element(field[kSlope].data(), field[kSlope].data() + ncell);
+  edge_tilt.drop(), edge_rest.drop(), tilt.drop();
+  if (steepest > 0) {
+    edge_tilt.create(host, nedge), edge_rest.create(host, nedge);
+    const auto squared = [&](uint32_t c, uint32_t e) {
+      const double *x = rest_point.data() + 3 * size_t(edges[2 * size_t(e)]), *y = rest_point.data() + 3 * size_t(edges[2 * size_t(e) + 1]);
+      const double *axis = field[kAxis].empty() ? params + kAxis : field[kAxis].data() + 3 * size_t(c), slope = at(kSlope, c);
+      const double d[3] = {y[0] - x[0], y[1] - x[1], y[2] - x[2]};
+      const double ad = (axis[0] * d[0] + axis[1] * d[1]) + axis[2] * d[2], aa = (axis[0] * axis[0] + axis[1] * axis[1]) + axis[2] * axis[2];
+      const double along = ad * ad / aa, all = (d[0] * d[0] + d[1] * d[1]) + d[2] * d[2];
+      return slope * slope * (choice(kAxisKind) == kSofter ? along : std::max(all - along, 0.0));
+    };
+    for (uint32_t c = 0; by_cell && c < ncell; ++c)
+      for (int n = 0; n < 6; ++n) {
+        const uint32_t e = cell_edge[6 * size_t(c) + n];
+        if (edge_volume[e] > 0) edge_tilt[e] += __builtin_fabs(cell_volume6[c]) / 6 / edge_volume[e] * squared(c, e);
+      }
+    for (uint32_t e = 0; e < nedge; ++e) {
+      if (!by_cell) edge_tilt[e] = squared(0, e);
+      const uint32_t *ends = edges.data() + 2 * size_t(e);
+      edge_rest[e] = __builtin_sqrt(square_of(rest_point.data() + 3 * size_t(ends[0]), rest_point.data() + 3 * size_t(ends[1])) + edge_tilt[e]);
+    }
+  }
+  const size_t n = spring_slots();
+  if (steepest > 0 || has_branch()) tilt.create(host, n);
+  for (size_t s = 0; s < n; ++s) {
+    const uint32_t e = spring_edge[s];
+    rest[s] = e == kNone ? 0 : rest_length(e);
+    if (steepest > 0) tilt[s] = e == kNone ? 0 : edge_tilt[e];
+  }
+}
+
+// Dampers by cell add up like the springs: c of an edge is the sum of its cells' damping_stiffness times their share of k.
+void Body::find_dampers() {
+  const Buffer<double> &by_cell = field[kDampingStiffness];
+  damping_on = by_cell.empty() ? params[kDampingStiffness] > 0 : *std::max_element(by_cell.data(), by_cell.data() + ncell) > 0;
+  if (!by_cell.empty() && damping_on) {
+    Buffer<double> share;
+    edge_damp.create(host, nedge), damp_most.create(host, npoint), damp.create(host, spring_slots()), share.create(host, nedge);
+    for (uint32_t c = 0; c < ncell; ++c) {
+      const double k = __builtin_fabs(cell_volume6[c]) * at(kYoung, c) * spring_scale(volume_ratio(c));
+      for (int n = 0; n < 6; ++n) {
+        const uint32_t e = cell_edge[6 * size_t(c) + n];
+        edge_damp[e] += k * by_cell[c], share[e] += k;
+      }
+    }
+    for (uint32_t e = 0; e < nedge; ++e) {
+      edge_damp[e] = share[e] > 0 ? damp_scale() * (edge_damp[e] / share[e]) : 0;
+      for (int n = 0; n < 2; ++n) {
+        double &most = damp_most[edges[2 * size_t(e) + n]];
+        most = std::max(most, edge_damp[e]);
+      }
+    }
+    for (size_t s = 0; s < spring_slots(); ++s) damp[s] = spring_edge[s] == kNone ? 0 : edge_damp[spring_edge[s]];
+  }
+  const Buffer<double> &drag = field[kDampingMass];
+  drag_on = drag.empty() ? params[kDampingMass] > 0 : *std::max_element(drag.data(), drag.data() + ncell) > 0;
+  if (!drag.empty() && drag_on) {
+    Buffer<double> around;
+    point_drag.create(host, npoint), around.create(host, npoint);
+    for (uint32_t c = 0; c < ncell; ++c)
+      for (int a = 0; a < 4; ++a) {
+        const uint32_t i = cells[4 * size_t(c) + a];
+        point_drag[i] += __builtin_fabs(cell_volume6[c]) * drag[c], around[i] += __builtin_fabs(cell_volume6[c]);
+      }
+    for (uint32_t i = 0; i < npoint; ++i) point_drag[i] = around[i] > 0 ? point_drag[i] / around[i] : 0;
+  }
+}
+
+// A cell that is flat at rest has no volume to keep, and neither has one that lost a spring (it is cut).
+double Body::bulk_of(uint32_t c) const {
+  const double v0 = __builtin_fabs(cell_volume6[c]) / 6, side = edge_length[cell_edge[6 * size_t(c)]];
+  for (int n = 0; !edge_off.empty() && n < 6; ++n)
+    if (edge_off[cell_edge[6 * size_t(c) + n]]) return 0;
+  return v0 > 1e-12 * side * side * side ? volume_ratio(c) * at(kYoung, c) / (36 * v0) : 0;
+}
+
+void Body::fill_stiffness() {
+  const size_t springs = spring_slots(), ncells = cell_slots();
+  for (size_t s = 0; s < springs; ++s) stiffness[s] = spring_edge[s] == kNone ? 0 : stiffness_of(spring_edge[s]);
+  for (size_t c = 0; c < ncells; ++c) bulk[c] = cell_id[c] == kNone ? 0 : bulk_of(cell_id[c]);
+}
+
+void Body::find_effects() {
+  size_t n = 0;
+  if (volume_on) active_effects[n++] = "volume";
+  if (damping_on || drag_on || has_branch()) active_effects[n++] = "damping";
+  active_effects[n++] = "large_rotation";
+  if (!edge_tilt.empty()) active_effects[n++] = "anisotropy";
+  if (has_branch()) active_effects[n++] = "deform.relaxation";
+  active_effects[n] = nullptr;
+}
+
+void Body::apply_params(const double *values) {
+  std::copy(values, values + kValueCount, params);
+  const Buffer<double> &volumes = field[kVolume];
+  volume_on = volumes.empty() ? params[kVolume] > 0 : *std::max_element(volumes.data(), volumes.data() + ncell) > 0;
+  find_shapes();
+  find_tilts();
+  find_dampers();
+  if (has_branch() && rest_now.empty()) rest_now.create(host, spring_slots());
+  for (uint32_t b = 0; b < nblock; ++b) {
+    const size_t at = size_t(block[b].stiffness - stiffness.data());
+    block[b].tilt = tilt.empty() ? nullptr : tilt.data() + at;
+    block[b].damp = damp.empty() ? nullptr : damp.data() + at;
+  }
+  fill_stiffness();
+  find_weights();
+  find_effects();
+}
+
+// The rows of the step bound keep counting a spring that is off: a bound it stays, and a cut need not look for new weights.
+void Body::mask_springs(uint32_t n, const uint32_t *which, bool on) {
+  if (edge_off.empty()) edge_off.create(host, nedge);
+  for (uint32_t k = 0; k < n; ++k) edge_off[which[k]] = !on;
+  fill_stiffness();
+}
+
+}  // namespace msm
