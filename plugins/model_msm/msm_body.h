@@ -70,7 +70,8 @@ struct Body {
   Buffer<double> field[kParamCount];  // [ncell,width] values by cell in place of a parameter's; empty without
 
   // In the host's order.
-  Buffer<double> mass, shape, edge_volume, edge_length, edge_energy;  // shape: sum of (E V) around the edge / L0^2, see find_shapes
+  Buffer<double> mass, shape, edge_volume, edge_length, edge_energy;  // shape: stiffness over `scale`, see find_shapes
+  Buffer<double> per_modulus;          // [nedge] stiffness over the sum of E V around the edge
   Buffer<uint32_t> edges, cells, cell_edge;
   Buffer<double> cell_volume6;
   Buffer<double> rest_point;           // [npoint,3]
@@ -140,6 +141,7 @@ struct Body {
  private:
   double scale = 1;  // of shape
   void take_mesh(const dfm_mesh &m);
+  void find_directions();
   struct Layout;
   void build_blocks();
   void order_springs(Layout &l) const;

@@ -1,4 +1,4 @@
-// From parameters and fields by cell to what the passes read: stiffness per spring (Van Gelder), frozen extra coordinates, dampers, drag,
+// From parameters and fields by cell to what the passes read: stiffness per spring, frozen extra coordinates, dampers, drag,
 // springs that are switched off. What nothing calls for stays empty and its kernels are never chosen.
 #include <algorithm>
 
@@ -44,7 +44,7 @@ void Body::take_fields(const dfm_mesh &m) {
     }
 }
 
-// Every cell gives each of its edges E V / L0^2. What all cells share (Young's modulus, the volume term's correction) stays outside.
+// Every cell gives each of its edges E V, times what msm_stiffness.cpp finds. What all cells share (Young's modulus, the volume term's correction) stays outside.
 void Body::find_shapes() {
   const bool scaled = !field[kVolume].empty() || !field[kPoisson].empty(), stiff = !field[kYoung].empty();
   scale = (scaled ? 1.0 : spring_scale(volume_ratio(0))) * (stiff ? 1.0 : params[kYoung]);
@@ -55,10 +55,7 @@ void Body::find_shapes() {
     const double share = volume * (stiff ? field[kYoung][c] : 1.0) * (scaled ? spring_scale(volume_ratio(c)) : 1.0);
     for (int n = 0; n < 6; ++n) shape[cell_edge[6 * size_t(c) + n]] += share;
   }
-  for (uint32_t e = 0; e < nedge; ++e) {
-    const double l2 = edge_length[e] * edge_length[e];
-    shape[e] = l2 > kShortestSquared ? shape[e] / l2 : 0;  // two points at one place: no direction, no spring
-  }
+  for (uint32_t e = 0; e < nedge; ++e) shape[e] *= per_modulus[e];
 }
 
 // w^2 of a spring d at rest: softer, g^2 (a.d)^2, one extra coordinate g a.X; stiffer, g^2 (|d|^2 - (a.d)^2), two of them along any two

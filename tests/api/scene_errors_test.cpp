@@ -154,12 +154,7 @@ TEST(SceneErrors, NotDelivered_IsNeverIgnored) {
       {"/output/color=\"stress\"", "/output/color"},
       {"/obstacles/0/shape=\"voxels\"", "/obstacles/0/shape"},
       {"/obstacles/0/shape=\"mesh\"", "/obstacles/0/shape"},
-      {"/bodies/0/surface={\"mesh\":\"a.obj\",\"coupling\":\"mls\"}", "/bodies/0/surface/coupling"},
-      {"/bodies/0/fill={\"cells\":5}", "/bodies/0/fill"},
       {"/bodies/0/springs=[{\"point\":[0,0,0]}]", "/bodies/0/springs"},
-      {"/bodies/0/anisotropy={}", "/bodies/0/anisotropy"},
-      {"/bodies/0/materials_by_group={}", "/bodies/0/materials_by_group"},
-      {"/bodies/0/fields={}", "/bodies/0/fields"},
       {"/bodies/0/start={\"invert\":true}", "/bodies/0/start"},
       {"/bodies/0/switch=[{\"t\":1}]", "/bodies/0/switch"},
       {"/bodies/0/pressure=5", "/bodies/0/pressure"}};

@@ -84,7 +84,8 @@ DFM_API dfm_status dfm_body_add_load(dfm_body body, uint32_t n, const uint32_t *
 DFM_API dfm_status dfm_body_remove_load(dfm_body body, uint32_t load);
 /** Impulse (N s) at a point of space, spread over the nearest surface triangle by barycentric weights. Threads: Not during step. Since 0.1. */
 DFM_API dfm_status dfm_body_apply_impulse(dfm_body body, const double point[3], const double impulse[3]);
-/** Changes runtime parameters of the body's model by key. @return DFM_E_ARG unknown key (nearest valid name), out of range, not a runtime row.
+/** Changes runtime parameters of the body's model by key. @return DFM_E_ARG unknown key (nearest valid name), out of range, not a runtime row,
+ * or a parameter that differs by cell in this body (from fields, materials or share): one value cannot replace it.
  * Threads: Not during step. Since 0.1. */
 DFM_API dfm_status dfm_body_set_params(dfm_body body, const dfm_params *params);
 

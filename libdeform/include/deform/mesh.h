@@ -45,6 +45,9 @@ DFM_API dfm_status dfm_tetmesh_group_points(dfm_tetmesh mesh, uint32_t group, ui
  * name first, so never half a file. Groups of points, lines and triangles are not written.
  * @return DFM_OK; DFM_E_IO; DFM_E_UNSUPPORTED another ending. Threads: Any thread. Since 0.1. */
 DFM_API dfm_status dfm_tetmesh_write(dfm_tetmesh mesh, const char *path);
+/** Place of each cell among the file's tetrahedra, [ntet], from 0; NULL where reading dropped none (they stand as in the file). Borrowed.
+ * Threads: Any thread. Since 0.2. */
+DFM_API dfm_status dfm_tetmesh_file_cells(dfm_tetmesh mesh, const uint32_t **file_cell);
 /** What a mesh file holds. Decides whether a body takes its cells from the file or is filled from its surface. */
 enum { DFM_MESH_TETS = 1, DFM_MESH_SURFACE = 2 };
 /** Looks into a file of any format that dfm_tetmesh_read or dfm_trimesh_read take. @param kind out: DFM_MESH_TETS if it has any tetrahedron,

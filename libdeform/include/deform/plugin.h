@@ -94,8 +94,8 @@ typedef struct dfm_mesh {             /* rest configuration; borrowed during cre
   const uint32_t *cells;              /* [ncell,k] */
   const double *mass;                 /* [npoint] kg */
   const double *params;               /* as in dfm_param */
-  const char *const *field_keys;      /* per-cell fields of the mesh, NULL-terminated ("fibre", "young") */
-  const double *const *fields;        /* [nfield] each [ncell,width] */
+  const char *const *field_keys;      /* DFM_PARAM_PER_CELL rows that differ by cell, NULL-terminated ("young") */
+  const double *const *fields;        /* [nfield] each [ncell, width of the row of that key], in the row's range */
   uint32_t nedge, nsurfel;
   const uint32_t *edges;              /* [nedge,2] i < j, lexicographic: the order of DFM_PER_EDGE state */
   const uint32_t *row, *col;          /* coupling N in CSR: surfel s has points col[row[s] .. row[s+1]) */

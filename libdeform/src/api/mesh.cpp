@@ -108,6 +108,14 @@ dfm_status dfm_tetmesh_data(dfm_tetmesh mesh, const double **points, const uint3
   });
 }
 
+dfm_status dfm_tetmesh_file_cells(dfm_tetmesh mesh, const uint32_t **file_cell) {
+  return guard([&] {
+    need(file_cell, "file_cell");
+    const dfm::TetMesh &m = mesh_of(mesh).mesh;
+    *file_cell = m.file_cell.empty() ? nullptr : m.file_cell.data();
+  });
+}
+
 dfm_status dfm_tetmesh_groups(dfm_tetmesh mesh, const char *const **names, const uint32_t **cell_group) {
   return guard([&] {
     const MeshObject &object = mesh_of(mesh);

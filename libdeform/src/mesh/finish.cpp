@@ -85,6 +85,7 @@ void drop_duplicates(RawMesh &raw, TetMesh &mesh) {
     if (!drop[t]) {
       std::copy_n(&raw.tets[4 * size_t(t)], 4, &raw.tets[4 * kept]);
       raw.tet_group[kept++] = raw.tet_group[t];
+      mesh.file_cell.push_back(t);
     }
   raw.tets.resize(4 * kept), raw.tet_group.resize(kept);
 }

@@ -20,12 +20,13 @@ struct MeshGroup {
 struct TetMesh {
   explicit TetMesh(const Memory &m = Memory::standard())
       : memory(&m), points(HookAllocator<double>(m)), tets(HookAllocator<uint32_t>(m)), tet_group(HookAllocator<uint32_t>(m)),
-        file_point(HookAllocator<uint32_t>(m)), share(HookAllocator<double>(m)) {}
+        file_point(HookAllocator<uint32_t>(m)), file_cell(HookAllocator<uint32_t>(m)), share(HookAllocator<double>(m)) {}
   const Memory *memory;
   Array<double> points;          // [npoint,3], m
   Array<uint32_t> tets;          // [ntet,4], every volume positive
   Array<uint32_t> tet_group;     // [ntet] index into groups, kNoGroup without
   Array<uint32_t> file_point;    // [npoint] 0-based position of the point in its file
+  Array<uint32_t> file_cell;     // [ntet] 0-based position among the file's tetrahedra; empty where none was dropped
   Array<double> share;           // [ntet] of a filled surface: how much of the cell is material, (0,1]; else empty
   std::vector<MeshGroup> groups; // by dimension, then tag
   // What reading had to repair or noticed.

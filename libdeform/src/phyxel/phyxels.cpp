@@ -8,16 +8,19 @@ double tet_volume(const double *x, uint32_t stride, const uint32_t t[4]) {
   return dot(cross(b - a, c - a), d - a) / 6;
 }
 
-double lump_mass(uint32_t npoint, const double *rest, uint32_t ntet, const uint32_t *tets, double density, double *mass) {
+LumpedMass lump_mass(uint32_t npoint, const double *rest, uint32_t ntet, const uint32_t *tets, double density, const double *cell_density,
+                     const double *share, double *mass) {
   for (uint32_t i = 0; i < npoint; ++i) mass[i] = 0;
-  double volume = 0;
+  LumpedMass sum = {0, 0};
   for (uint32_t t = 0; t < ntet; ++t) {
     const uint32_t *corner = tets + size_t(t) * 4;
-    const double v = tet_volume(rest, 3, corner);
-    volume += v;
-    for (int k = 0; k < 4; ++k) mass[corner[k]] += 0.25 * density * v;
+    const double v = share ? share[t] * tet_volume(rest, 3, corner) : tet_volume(rest, 3, corner);
+    const double rho = cell_density ? cell_density[t] : density;
+    sum.volume += v, sum.mass += rho * v;
+    for (int k = 0; k < 4; ++k) mass[corner[k]] += 0.25 * rho * v;
   }
-  return volume;
+  if (!cell_density) sum.mass = density * sum.volume;
+  return sum;
 }
 
 void update_inverse_mass(Phyxels &p) {

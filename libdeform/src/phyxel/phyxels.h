@@ -23,8 +23,11 @@ struct Phyxels {
   Array<uint8_t> held;      // [n] bits 1 x, 2 y, 4 z
 };
 
-// Lumped mass of tetrahedra: a quarter of each cell's mass to each corner. Returns the volume.
-double lump_mass(uint32_t npoint, const double *rest, uint32_t ntet, const uint32_t *tets, double density, double *mass);
+// Lumped mass of tetrahedra: a quarter of each cell's mass to each corner. cell_density [ntet] wins over density; share [ntet]: how much of
+// a cell is material. Both may be null.
+struct LumpedMass { double volume, mass; };
+LumpedMass lump_mass(uint32_t npoint, const double *rest, uint32_t ntet, const uint32_t *tets, double density, const double *cell_density,
+                     const double *share, double *mass);
 void update_inverse_mass(Phyxels &p);
 
 double tet_volume(const double *x, uint32_t stride, const uint32_t tet[4]);

@@ -84,7 +84,9 @@ class Builder {
     const double *points = nullptr;
     check(dfm_tetmesh_get_info(mesh, &info), b.pointer + "/mesh");
     check(dfm_tetmesh_data(mesh, &points, &out.tets, &out.file_point), b.pointer + "/mesh");
-    check(dfm_tetmesh_groups(mesh, &out.group_names, nullptr), b.pointer + "/mesh");
+    check(dfm_tetmesh_groups(mesh, &out.group_names, &out.cell_group), b.pointer + "/mesh");
+    check(dfm_tetmesh_file_cells(mesh, &out.file_cell), b.pointer + "/mesh");
+    out.dropped_cells = info.dropped_cells;
     out.handle = mesh, out.npoint = info.npoint, out.ntet = info.ntet, out.ngroup = info.ngroup;
     out.points.resize(3 * size_t(info.npoint));
     for (size_t i = 0; i < out.points.size(); ++i) out.points[i] = points[i] * b.scale;
@@ -93,15 +95,62 @@ class Builder {
     return out;
   }
 
-  void create_body(Body &b) {
-    const BodyMesh mesh = load_mesh(b);
-    std::vector<NodalRow> nodal;
-    if (!b.nodal_bc.empty()) {
-      try {
-        nodal = read_nodal(path_of(b.nodal_bc), mesh);
-      } catch (const Error &e) {
-        fail(e.status, "%s: %s/nodal_bc: %s", def_.file.c_str(), b.pointer.c_str(), e.what());
+  // Reads one of a body's tables; complaints say which key of the scene named it.
+  template <class Read>
+  auto table(const std::string &pointer, Read &&read) const {
+    try {
+      return read();
+    } catch (const Error &e) {
+      fail(e.status, "%s: %s: %s", def_.file.c_str(), pointer.c_str(), e.what());
+    }
+  }
+
+  // Material of each cell; empty where no group has its own.
+  std::vector<dfm_material> materials_by_group(const Body &b, const BodyMesh &mesh) const {
+    std::vector<dfm_material> of_group(mesh.ngroup, material(b.material)), out;
+    if (b.by_group.empty()) return out;
+    std::vector<std::string> names;
+    std::vector<uint32_t> cells(mesh.ngroup, 0);
+    for (uint32_t t = 0; t < mesh.ntet; ++t)
+      if (mesh.cell_group[t] != UINT32_MAX) ++cells[mesh.cell_group[t]];
+    for (uint32_t g = 0; g < mesh.ngroup; ++g)
+      if (cells[g]) names.push_back(mesh.group_names[g]);
+    for (const GroupMaterial &m : b.by_group) {
+      if (std::find(names.begin(), names.end(), m.group) == names.end()) {
+        const std::string near = nearest(m.group, names);
+        fail(DFM_E_ARG, "%s: %s: the mesh has no physical group of cells \"%s\"%s%s", def_.file.c_str(), m.pointer.c_str(), m.group.c_str(),
+             mesh.filled ? "; the cells of a filled body belong to none" : names.empty() ? "; it has none at all" : ("; it has: " + join(names)).c_str(),
+             near.empty() ? "" : ("; did you mean \"" + near + "\"?").c_str());
       }
+      for (uint32_t g = 0; g < mesh.ngroup; ++g)
+        if (cells[g] && m.group == mesh.group_names[g]) of_group[g] = material(m.material);
+    }
+    for (uint32_t t = 0; t < mesh.ntet; ++t) out.push_back(mesh.cell_group[t] == UINT32_MAX ? material(b.material) : of_group[mesh.cell_group[t]]);
+    return out;
+  }
+
+  // What forces that are shared by mass go by: density times share.
+  std::vector<double> cell_weights(const BodyMesh &mesh, const std::vector<dfm_material> &materials) const {
+    std::vector<double> out;
+    if (!mesh.share && materials.empty()) return out;
+    std::map<dfm_material, double> density = {{0, dfm_material_def_default().density}};
+    for (const Material &m : def_.materials) density[materials_.at(m.name)] = m.density;
+    for (uint32_t t = 0; t < mesh.ntet; ++t)
+      out.push_back((mesh.share ? mesh.share[t] : 1) * (materials.empty() ? 1 : density.at(materials[t])));
+    return out;
+  }
+
+  void create_body(Body &b) {
+    BodyMesh mesh = load_mesh(b);
+    const std::vector<dfm_material> materials = materials_by_group(b, mesh);
+    mesh.cell_weight = cell_weights(mesh, materials);
+    std::vector<NodalRow> nodal;
+    if (!b.nodal_bc.empty()) nodal = table(b.pointer + "/nodal_bc", [&] { return read_nodal(path_of(b.nodal_bc), mesh); });
+    std::vector<std::vector<double>> values;
+    std::vector<dfm_cell_field> fields;
+    for (const FieldFile &f : b.fields) {
+      values.push_back(table(f.pointer, [&] { return read_field(path_of(f.path), f, mesh); }));
+      fields.push_back({f.key.c_str(), values.back().data(), f.width});
     }
     std::vector<uint8_t> fixed(mesh.npoint, 0);
     std::vector<std::vector<uint32_t>> held;
@@ -119,6 +168,9 @@ class Builder {
     d.model = b.model.c_str();
     d.model_params = b.params.view();
     d.fixed = fixed.data();
+    d.nfield = uint32_t(fields.size()), d.fields = fields.data();
+    if (!materials.empty()) d.cell_materials = materials.data();
+    d.cell_share = mesh.share;
     if (jittered_) {
       const double centre[3] = {(mesh.lo[0] + mesh.hi[0]) / 2, (mesh.lo[1] + mesh.hi[1]) / 2, (mesh.lo[2] + mesh.hi[2]) / 2};
       jitter_.apply(mesh.size, centre, b.pose, b.velocity, b.spin);
@@ -141,16 +193,13 @@ class Builder {
   }
 
   void add_loads(dfm_body body, const Body &b, const BodyMesh &mesh, const std::vector<NodalRow> &nodal) const {
-    std::vector<uint32_t> triangles;
     for (const Force &f : b.forces) {
-      if (triangles.empty()) triangles = boundary(body, b);
-      const std::vector<uint32_t> points = select(f.where, mesh, def_.file);
-      const std::vector<double> weights = share(f, points, mesh, triangles, def_.file);
+      const Shared shared = share(f, mesh, def_.file);
       std::vector<double> forces;
-      for (double w : weights)
+      for (double w : shared.weights)
         for (double t : f.total) forces.push_back(w * t);
       const bool sine = f.sine.amplitude[0] != 0;
-      check(dfm_body_add_load(body, uint32_t(points.size()), points.data(), forces.data(), uint32_t(f.keys.size()), f.keys.data(),
+      check(dfm_body_add_load(body, uint32_t(shared.points.size()), shared.points.data(), forces.data(), uint32_t(f.keys.size()), f.keys.data(),
                               sine ? &f.sine : nullptr, nullptr),
             f.where.pointer);
     }
@@ -163,19 +212,6 @@ class Builder {
     }
     if (points.empty()) return;
     check(dfm_body_add_load(body, uint32_t(points.size()), points.data(), forces.data(), 0, nullptr, nullptr, nullptr), b.pointer + "/nodal_bc");
-  }
-
-  // Boundary triangles in the numbers of the mesh's points.
-  std::vector<uint32_t> boundary(dfm_body body, const Body &b) const {
-    const std::string where = b.pointer + "/forces";
-    uint32_t ntriangle = 0, nsurfel = 0;
-    check(dfm_surface_triangles(body, 0, nullptr, &ntriangle), where);
-    check(dfm_surface_points(body, 0, nullptr, &nsurfel), where);
-    std::vector<uint32_t> triangles(3 * size_t(ntriangle)), point(nsurfel);
-    check(dfm_surface_triangles(body, ntriangle, triangles.data(), &ntriangle), where);
-    check(dfm_surface_points(body, nsurfel, point.data(), &nsurfel), where);
-    for (uint32_t &t : triangles) t = point[t];
-    return triangles;
   }
 
   void add_probe(dfm_body body, const Probe &p, const BodyMesh &mesh) {

@@ -42,8 +42,28 @@ struct Force {
   dfm_sine sine = {};
 };
 
+// Values of one model parameter for each cell, from a file.
+struct FieldFile {
+  std::string pointer, key, path;
+  uint32_t width = 1;
+  bool directions = false;  // scaled to unit length, as an axis given in the scene is
+};
+
+struct GroupMaterial { std::string pointer, group, material; };
+
+struct OwnSurface {
+  std::string pointer, mesh;
+  int32_t coupling = DFM_COUPLING_BARYCENTRIC;
+  double support = 0;
+  bool boundary = false, coupled = false;  // "from": "boundary" is said; a coupling is said
+};
+
 struct Body {
   std::string pointer, name, mesh, material, model, nodal_bc;
+  OwnSurface surface;
+  uint32_t fill = 0;  // cells; 0: not said
+  std::vector<GroupMaterial> by_group;
+  std::vector<FieldFile> fields;
   Params params;
   dfm_pose pose = {};
   double scale = 1, velocity[3] = {}, spin[3] = {};
@@ -106,9 +126,11 @@ class Types {
   const dfm_type *find(uint32_t kind, const std::string &name) const;  // short name or full id; nullptr
   std::vector<std::string> names(uint32_t kind) const;                 // short names
   std::vector<std::string> model_keys() const;                         // parameters of any model
+  std::vector<const dfm_type *> models() const;
  private:
   std::vector<const dfm_type *> types_;
 };
+std::vector<const dfm_param *> rows_of(const dfm_type *type);
 const dfm_param *find_row(const dfm_type *type, const std::string &key);
 
 }  // namespace dfm::scene

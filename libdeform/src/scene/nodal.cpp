@@ -1,39 +1,15 @@
 // Boundary conditions node by node: node,fixx,fixy,fixz,fx,fy,fz with the mesh file's node numbers from 0.
-#include <charconv>
 #include <cmath>
-#include <cstring>
 #include <fstream>
-#include <string_view>
 
 #include "core/error.h"
 #include "scene/select.h"
+#include "scene/table.h"
 
 namespace dfm::scene {
 namespace {
 
 constexpr const char *kHeader = "node,fixx,fixy,fixz,fx,fy,fz";
-
-std::string_view trim(std::string_view s) {
-  while (!s.empty() && std::strchr(" \t\r", s.front())) s.remove_prefix(1);
-  while (!s.empty() && std::strchr(" \t\r", s.back())) s.remove_suffix(1);
-  return s;
-}
-
-void split(const std::string &path, size_t line, std::string_view text, double out[7]) {
-  int n = 0;
-  for (size_t i = 0; i <= text.size(); ++n) {
-    const size_t comma = std::min(text.find(',', i), text.size());
-    const std::string_view cell = trim(text.substr(i, comma - i));
-    i = comma + 1;
-    if (n >= 7) continue;
-    const char *first = cell.data() + (!cell.empty() && cell.front() == '+');
-    const auto result = std::from_chars(first, cell.data() + cell.size(), out[n]);
-    if (result.ec != std::errc() || result.ptr != cell.data() + cell.size() || !std::isfinite(out[n]))
-      fail(DFM_E_FORMAT, "%s:%zu: expected a finite number in column %d of %s, found \"%.*s\"", path.c_str(), line, n + 1, kHeader,
-           int(std::min<size_t>(cell.size(), 40)), cell.data());
-  }
-  if (n != 7) fail(DFM_E_FORMAT, "%s:%zu: expected the 7 columns %s, found %d", path.c_str(), line, kHeader, n);
-}
 
 }  // namespace
 
@@ -55,7 +31,7 @@ std::vector<NodalRow> read_nodal(const std::string &path, const BodyMesh &mesh) 
     }
     if (trimmed.empty()) continue;
     double cell[7];
-    split(path, line, trimmed, cell);
+    split_row(path, line, trimmed, kHeader, 7, cell);
     if (cell[0] < 0 || cell[0] != std::floor(cell[0]) || cell[0] > highest)
       fail(DFM_E_ARG, "%s:%zu: there is no node %g; the mesh file has the nodes 0 to %u", path.c_str(), line, cell[0], highest);
     NodalRow row = {point_of[size_t(cell[0])], 0, {cell[4], cell[5], cell[6]}};

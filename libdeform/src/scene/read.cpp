@@ -45,10 +45,23 @@ std::vector<std::string> Types::names(uint32_t kind) const {
   return out;
 }
 
+std::vector<const dfm_type *> Types::models() const {
+  std::vector<const dfm_type *> out;
+  for (const dfm_type *t : types_)
+    if (t->kind == DFM_KIND_MODEL) out.push_back(t);
+  return out;
+}
+
 std::vector<std::string> Types::model_keys() const {
   std::vector<std::string> out;
   for (const dfm_type *t : types_)
     for (uint32_t i = 0; t->kind == DFM_KIND_MODEL && i < t->nparam; ++i) out.push_back(row(t, i).key);
+  return out;
+}
+
+std::vector<const dfm_param *> rows_of(const dfm_type *type) {
+  std::vector<const dfm_param *> out;
+  for (uint32_t i = 0; i < type->nparam; ++i) out.push_back(&row(type, i));
   return out;
 }
 
@@ -64,14 +77,20 @@ dfm_params Params::view() {
   return {sizeof(dfm_params), uint32_t(rows.size()), rows.data()};
 }
 
-namespace {
+// A word of an enumeration; its number otherwise.
+static double enum_value(const Node &value, const char *const *names) {
+  std::vector<std::string> words;
+  for (const char *const *n = names; *n; ++n) words.push_back(*n);
+  const std::string word = value.text();
+  const auto found = std::find(words.begin(), words.end(), word);
+  if (found == words.end()) value.fail("expected one of: %s; found \"%s\"", join(words).c_str(), word.c_str());
+  return double(found - words.begin());
+}
 
-std::vector<double> param_values(const Node &value, const dfm_param &p) {
+std::vector<double> read_param(const Node &value, const dfm_param &p) {
   if (value.value().is_string()) {
     if (!(p.flags & DFM_PARAM_ENUM) || !p.names) value.fail("expected a number in %s", p.unit && *p.unit ? p.unit : "1");
-    std::vector<std::string> words;
-    for (const char *const *n = p.names; *n; ++n) words.push_back(*n);
-    return {double(std::find(words.begin(), words.end(), known(value, words, "value")) - words.begin())};
+    return {enum_value(value, p.names)};
   }
   std::vector<double> out;
   const Range range{p.min, p.max, false, false};
@@ -85,8 +104,6 @@ std::vector<double> param_values(const Node &value, const dfm_param &p) {
     if ((p.flags & (DFM_PARAM_INTEGER | DFM_PARAM_ENUM)) && x != std::floor(x)) value.fail("expected a whole number, found %g", x);
   return out;
 }
-
-}  // namespace
 
 Params read_params(const Node &params, const dfm_type *type) {
   Params out;
@@ -106,7 +123,7 @@ Params read_params(const Node &params, const dfm_type *type) {
       value.fail("%s has no parameter \"%s\"; it has: %s", type->id, entry.key().c_str(), join(valid).c_str());
     }
     out.keys.push_back(entry.key());
-    out.values.push_back(param_values(value, *p));
+    out.values.push_back(read_param(value, *p));
   }
   return out;
 }
@@ -203,6 +220,26 @@ void read_effects(const Node &scene, Definition &def) {
   }
 }
 
+// A further entry of a material: numbers, or a word of an enumeration that some model has under this key.
+std::vector<double> read_extra(const Node &value, const std::string &key, const Types &types) {
+  std::vector<double> out;
+  if (value.value().is_string()) {
+    for (const dfm_type *model : types.models()) {
+      const dfm_param *row = find_row(model, key);
+      if (!row || !(row->flags & DFM_PARAM_ENUM) || !row->names) continue;
+      const double number = enum_value(value, row->names);
+      if (!out.empty() && out[0] != number) value.fail("the models number this word differently; give it in the body's model params");
+      out = {number};
+    }
+    if (out.empty()) value.fail("expected a number, found a string; no loaded model has words for this parameter");
+  } else if (value.value().is_array()) {
+    for (const Node &item : value.items()) out.push_back(item.number());
+  } else {
+    out.push_back(value.number());
+  }
+  return out;
+}
+
 void read_materials(const Node &scene, Definition &def, ReadContext &context) {
   if (!scene.has("materials")) return;
   const Node materials = scene.member("materials");
@@ -229,10 +266,7 @@ void read_materials(const Node &scene, Definition &def, ReadContext &context) {
       if (std::any_of(own.begin(), own.end(), [&](const Key &k) { return key == k.name; })) continue;
       const Node value = node.member(key);
       m.extra.keys.push_back(key);
-      m.extra.values.emplace_back();
-      if (value.value().is_array())
-        for (const Node &item : value.items()) m.extra.values.back().push_back(item.number());
-      else m.extra.values.back().push_back(value.number());
+      m.extra.values.push_back(read_extra(value, key, context.types));
     }
     context.materials.push_back(m.name);
     def.materials.push_back(std::move(m));

@@ -14,11 +14,14 @@ Definition read_scene(json &tree, const std::string &file, const Types &types);
 
 // Parts that more than one file needs.
 Params read_params(const Node &params, const dfm_type *type);
+std::vector<double> read_param(const Node &value, const dfm_param &row);
 const dfm_type *read_type(const Node &name, uint32_t kind, const Types &types);
 dfm_sine read_sine(const Node &sine, bool scalar);
 void check_rising(const Node &keys, size_t i, double previous, double t);
 void check_fresh(const Node &name, const std::string &value, const std::vector<std::string> &taken, const char *what);
 std::string known(const Node &name, const std::vector<std::string> &valid, const char *what);
+// What a body is made of beside its material: fields, materials by group, anisotropy; its surface and filling. read_carriers.cpp
+void read_carriers(const Node &body, const dfm_type *model, ReadContext &context, Body &out);
 std::vector<Body> read_bodies(const Node &scene, ReadContext &context);
 std::vector<Obstacle> read_obstacles(const Node &scene, ReadContext &context);
 

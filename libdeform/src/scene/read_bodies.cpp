@@ -136,10 +136,7 @@ Body read_body(const Node &node, ReadContext &context) {
   node.vector("spin", b.spin, 0, 0, 0);
   for (const Node &entry : node.items("fix")) b.fixes.push_back(read_fix(entry));
   for (const Node &entry : node.items("forces")) b.forces.push_back(read_force(entry));
-  if (node.has("surface")) {
-    node.member("surface").object("surface");
-    node.member("surface").word("from", "boundary", "from");
-  }
+  read_carriers(node, type, context, b);
   if (node.has("nodal_bc")) b.nodal_bc = node.member("nodal_bc").text();
   return b;
 }

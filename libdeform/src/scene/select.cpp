@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "core/error.h"
+#include "mesh/mesh.h"
 
 namespace dfm::scene {
 namespace {
@@ -45,34 +46,108 @@ void normalise(std::vector<double> &weights) {
 
 }  // namespace
 
-std::vector<uint32_t> select(const Selection &where, const BodyMesh &mesh, const std::string &file) {
+double locate(const BodyMesh &mesh, const double point[3], uint32_t corners[4], double weights[4]) {
+  if (!mesh.locator) mesh.locator = std::make_shared<const Locator>(mesh);
+  return mesh.locator->find(point, corners, weights);
+}
+
+namespace {
+
+constexpr double kSlack = 1e-9;  // of the body's diagonal: points that lie on a face of the box by the author's reckoning may miss it by rounding
+
+bool in_box(const Selection &where, const BodyMesh &mesh, const double *p) {
+  const double slack = kSlack * mesh.size;
+  bool in = true;
+  for (int k = 0; k < 3; ++k) in = in && p[k] >= where.lo[k] - slack && p[k] <= where.hi[k] + slack;
+  return in;
+}
+
+uint32_t find_group(const std::string &group, const char *const *names, uint32_t n) {
+  uint32_t g = 0;
+  while (g < n && group != names[g]) ++g;
+  return g;
+}
+
+[[noreturn]] void no_group(const Selection &where, const BodyMesh &mesh, const std::string &file) {
+  std::vector<std::string> names(mesh.group_names, mesh.group_names + mesh.ngroup);
+  names.insert(names.end(), mesh.skin.group_names, mesh.skin.group_names + mesh.skin.ngroup);
+  const std::string near = nearest(where.group, names);
+  fail(DFM_E_ARG, "%s: %s/group: the mesh has no physical group \"%s\"%s%s", file.c_str(), where.pointer.c_str(), where.group.c_str(),
+       names.empty() ? "; it has none at all" : ("; it has: " + join(names)).c_str(),
+       near.empty() ? "" : ("; did you mean \"" + near + "\"?").c_str());
+}
+
+// Triangles of the skin by group, or those with three corners in the box.
+std::vector<uint32_t> skin_triangles(const Selection &where, const BodyMesh &mesh) {
+  const Skin &skin = mesh.skin;
   std::vector<uint32_t> out;
   if (!where.group.empty()) {
-    std::vector<std::string> names(mesh.group_names, mesh.group_names + mesh.ngroup);
-    const auto found = std::find(names.begin(), names.end(), where.group);
-    if (found == names.end()) {
-      const std::string near = nearest(where.group, names);
-      fail(DFM_E_ARG, "%s: %s/group: the mesh has no physical group \"%s\"%s%s", file.c_str(), where.pointer.c_str(),
-           where.group.c_str(), names.empty() ? "; it has none at all" : ("; it has: " + join(names)).c_str(),
-           near.empty() ? "" : ("; did you mean \"" + near + "\"?").c_str());
-    }
-    const uint32_t group = uint32_t(found - names.begin());
-    const uint32_t *points = nullptr;
-    uint32_t n = 0;
-    if (dfm_tetmesh_group_points(mesh.handle, group, nullptr, &points, &n) < 0) fail(DFM_E_HANDLE, "%s", dfm_last_error());
-    if (n == 0)
-      fail(DFM_E_ARG, "%s: %s/group: the physical group \"%s\" has no point of a tetrahedron", file.c_str(), where.pointer.c_str(),
-           where.group.c_str());
-    return {points, points + n};
+    const uint32_t group = find_group(where.group, skin.group_names, skin.ngroup);
+    for (uint32_t t = 0; t < skin.ntriangle && group < skin.ngroup; ++t)
+      if (skin.triangle_group[t] == group) out.push_back(t);
+    return out;
   }
-  // Points that lie on a face of the box by the author's reckoning may miss it by a rounding of scale or file format.
-  const double slack = 1e-9 * mesh.size;
-  for (uint32_t i = 0; i < mesh.npoint; ++i) {
-    const double *p = &mesh.points[3 * i];
+  for (uint32_t t = 0; t < skin.ntriangle; ++t) {
+    const uint32_t *c = skin.triangles + 3 * size_t(t);
     bool in = true;
-    for (int k = 0; k < 3; ++k) in = in && p[k] >= where.lo[k] - slack && p[k] <= where.hi[k] + slack;
-    if (in) out.push_back(i);
+    for (int k = 0; k < 3; ++k) in = in && in_box(where, mesh, &skin.points[3 * size_t(c[k])]);
+    if (in) out.push_back(t);
   }
+  return out;
+}
+
+// Marks the corners of the cells that hold the skin's marked points.
+void mark_cells(const std::vector<uint8_t> &surfel, const BodyMesh &mesh, std::vector<uint8_t> &point) {
+  for (uint32_t s = 0; s < mesh.skin.npoint; ++s) {
+    if (!surfel[s]) continue;
+    uint32_t corners[4];
+    double weights[4];
+    locate(mesh, &mesh.skin.points[3 * size_t(s)], corners, weights);
+    for (uint32_t c : corners) point[c] = 1;
+  }
+}
+
+std::vector<uint32_t> marked(const std::vector<uint8_t> &marks) {
+  std::vector<uint32_t> out;
+  for (uint32_t i = 0; i < marks.size(); ++i)
+    if (marks[i]) out.push_back(i);
+  return out;
+}
+
+std::vector<uint32_t> select_group(const Selection &where, const BodyMesh &mesh, const std::string &file) {
+  const uint32_t group = find_group(where.group, mesh.group_names, mesh.ngroup);
+  if (group == mesh.ngroup) {
+    if (find_group(where.group, mesh.skin.group_names, mesh.skin.ngroup) == mesh.skin.ngroup) no_group(where, mesh, file);
+    std::vector<uint8_t> surfel(mesh.skin.npoint, 0), point(mesh.npoint, 0);
+    for (uint32_t t : skin_triangles(where, mesh))
+      for (int k = 0; k < 3; ++k) surfel[mesh.skin.triangles[3 * size_t(t) + size_t(k)]] = 1;
+    mark_cells(surfel, mesh, point);
+    std::vector<uint32_t> out = marked(point);
+    if (out.empty())
+      fail(DFM_E_ARG, "%s: %s/group: the group \"%s\" has no triangle", file.c_str(), where.pointer.c_str(), where.group.c_str());
+    return out;
+  }
+  const uint32_t *points = nullptr;
+  uint32_t n = 0;
+  if (dfm_tetmesh_group_points(mesh.handle, group, nullptr, &points, &n) < 0) fail(DFM_E_HANDLE, "%s", dfm_last_error());
+  if (n == 0)
+    fail(DFM_E_ARG, "%s: %s/group: the physical group \"%s\" has no point of a tetrahedron", file.c_str(), where.pointer.c_str(),
+         where.group.c_str());
+  return {points, points + n};
+}
+
+}  // namespace
+
+std::vector<uint32_t> select(const Selection &where, const BodyMesh &mesh, const std::string &file) {
+  if (!where.group.empty()) return select_group(where, mesh, file);
+  std::vector<uint8_t> point(mesh.npoint, 0);
+  for (uint32_t i = 0; i < mesh.npoint; ++i) point[i] = in_box(where, mesh, &mesh.points[3 * size_t(i)]);
+  if (mesh.filled) {
+    std::vector<uint8_t> surfel(mesh.skin.npoint, 0);
+    for (uint32_t s = 0; s < mesh.skin.npoint; ++s) surfel[s] = in_box(where, mesh, &mesh.skin.points[3 * size_t(s)]);
+    mark_cells(surfel, mesh, point);
+  }
+  std::vector<uint32_t> out = marked(point);
   if (out.empty())
     fail(DFM_E_ARG, "%s: %s/box: no point of the body lies in this box; the body at rest, scaled but before its pose, spans [%g, %g, %g] to [%g, %g, %g]",
          file.c_str(), where.pointer.c_str(), mesh.lo[0], mesh.lo[1], mesh.lo[2], mesh.hi[0], mesh.hi[1], mesh.hi[2]);
@@ -84,7 +159,7 @@ std::vector<double> share_by_mass(const std::vector<uint32_t> &points, const Bod
   std::vector<double> weights(points.size(), 0.0);
   for (uint32_t c = 0; c < mesh.ntet; ++c) {
     const uint32_t *t = mesh.tets + 4 * size_t(c);
-    const double quarter = std::fabs(tet_volume6(mesh, t)) / 24;
+    const double quarter = std::fabs(tet_volume6(mesh, t)) / 24 * (mesh.cell_weight.empty() ? 1 : mesh.cell_weight[c]);
     for (int k = 0; k < 4; ++k)
       if (rank[t[k]] != UINT32_MAX) weights[rank[t[k]]] += quarter;
   }
@@ -109,76 +184,67 @@ std::vector<double> share_by_area(const std::vector<uint32_t> &points, const Bod
   return weights;
 }
 
-std::vector<double> share(const Force &force, const std::vector<uint32_t> &points, const BodyMesh &mesh,
-                          const std::vector<uint32_t> &triangles, const std::string &file) {
-  if (force.by == "mass") return share_by_mass(points, mesh);
-  std::vector<double> weights = share_by_area(points, mesh, triangles);
-  if (force.by == "area") {
-    if (weights.empty())
-      fail(DFM_E_ARG, "%s: %s/by: no boundary triangle has its three corners in this selection; enlarge it or share by \"mass\"", file.c_str(),
-           force.where.pointer.c_str());
-    return weights;
+Shared share_on_skin(const std::vector<uint32_t> &triangles, const BodyMesh &mesh) {
+  const Skin &skin = mesh.skin;
+  std::vector<double> surfel(skin.npoint, 0.0), point(mesh.npoint, 0.0);
+  std::vector<uint8_t> touched(mesh.npoint, 0);
+  for (uint32_t t : triangles) {
+    const uint32_t *c = skin.triangles + 3 * size_t(t);
+    const double *p = skin.points.data();
+    const double third = triangle_area(p + 3 * size_t(c[0]), p + 3 * size_t(c[1]), p + 3 * size_t(c[2])) / 3;
+    for (int k = 0; k < 3; ++k) surfel[c[k]] += third;
   }
-  // "auto": a selection that lies on the surface is a pressed face; one that reaches inside is a piece of the body.
-  std::vector<uint8_t> boundary(mesh.npoint, 0);
-  for (uint32_t p : triangles) boundary[p] = 1;
-  const bool face = std::all_of(points.begin(), points.end(), [&](uint32_t p) { return boundary[p] != 0; });
-  return face && !weights.empty() ? weights : share_by_mass(points, mesh);
+  for (uint32_t s = 0; s < skin.npoint; ++s) {
+    if (!(surfel[s] > 0)) continue;
+    uint32_t corners[4];
+    double weights[4];
+    locate(mesh, &skin.points[3 * size_t(s)], corners, weights);
+    for (int k = 0; k < 4; ++k) point[corners[k]] += weights[k] * surfel[s], touched[corners[k]] = 1;
+  }
+  Shared out;
+  for (uint32_t i : marked(touched)) out.points.push_back(i), out.weights.push_back(point[i]);
+  normalise(out.weights);
+  return out;
 }
 
 namespace {
 
-double dot(const double *a, const double *b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
-
-// Distance of a point from a segment, and from a triangle: inside its prism the height, else the nearest of its edges.
-double segment_distance(const double *p, const double *a, const double *b) {
-  double u[3], v[3], r[3];
-  subtract(b, a, u), subtract(p, a, v);
-  const double t = std::clamp(dot(u, v) / dot(u, u), 0.0, 1.0);
-  for (int k = 0; k < 3; ++k) r[k] = v[k] - t * u[k];
-  return std::sqrt(dot(r, r));
-}
-
-double triangle_distance(const double *p, const double *const c[3]) {
-  double u[3], v[3], w[3], n[3];
-  subtract(c[1], c[0], u), subtract(c[2], c[0], v), subtract(p, c[0], w);
-  for (int k = 0; k < 3; ++k) n[k] = u[(k + 1) % 3] * v[(k + 2) % 3] - u[(k + 2) % 3] * v[(k + 1) % 3];
-  const double s = triple(w, v, n), t = triple(u, w, n), whole = dot(n, n);
-  if (s >= 0 && t >= 0 && s + t <= whole) return std::fabs(dot(w, n)) / std::sqrt(whole);
-  return std::min({segment_distance(p, c[0], c[1]), segment_distance(p, c[1], c[2]), segment_distance(p, c[2], c[0])});
+// Shares on the cells' own points: a selection that lies on the boundary is a pressed face; one that reaches inside is a piece of the body.
+Shared share_on_cells(const Force &force, const BodyMesh &mesh, const std::string &file) {
+  Shared out;
+  out.points = select(force.where, mesh, file);
+  if (force.by == "mass") return out.weights = share_by_mass(out.points, mesh), out;
+  const Array<uint32_t> faces = boundary_triangles(Memory::standard(), mesh.ntet, mesh.tets);
+  const std::vector<uint32_t> triangles(faces.begin(), faces.end());
+  out.weights = share_by_area(out.points, mesh, triangles);
+  if (force.by == "area") {
+    if (out.weights.empty())
+      fail(DFM_E_ARG, "%s: %s/by: no boundary triangle has its three corners in this selection; enlarge it or share by \"mass\"", file.c_str(),
+           force.where.pointer.c_str());
+    return out;
+  }
+  std::vector<uint8_t> boundary(mesh.npoint, 0);
+  for (uint32_t p : triangles) boundary[p] = 1;
+  const bool face = std::all_of(out.points.begin(), out.points.end(), [&](uint32_t p) { return boundary[p] != 0; });
+  if (!face || out.weights.empty()) out.weights = share_by_mass(out.points, mesh);
+  return out;
 }
 
 }  // namespace
 
-double locate(const BodyMesh &mesh, const double point[3], uint32_t corners[4], double weights[4]) {
-  double best = INFINITY;
-  for (uint32_t c = 0; c < mesh.ntet && best > 0; ++c) {
-    const uint32_t *t = mesh.tets + 4 * size_t(c);
-    const double volume6 = tet_volume6(mesh, t);
-    if (!(std::fabs(volume6) > 0)) continue;
-    double w[4], away = INFINITY;
-    bool inside = true;
-    for (int k = 0; k < 4; ++k) {  // volume with corner k moved to the point, over the cell's
-      const double *p[4] = {&mesh.points[3 * t[0]], &mesh.points[3 * t[1]], &mesh.points[3 * t[2]], &mesh.points[3 * t[3]]};
-      p[k] = point;
-      double u[3], v[3], x[3];
-      subtract(p[1], p[0], u), subtract(p[2], p[0], v), subtract(p[3], p[0], x);
-      w[k] = triple(u, v, x) / volume6;
-      inside = inside && w[k] >= 0;
-    }
-    for (int k = 0; k < 4 && !inside; ++k) {
-      const double *face[3];
-      for (int j = 0, n = 0; j < 4; ++j)
-        if (j != k) face[n++] = &mesh.points[3 * t[j]];
-      away = std::min(away, triangle_distance(point, face));
-    }
-    if (inside) away = 0;
-    if (away >= best) continue;
-    best = away;
-    std::copy_n(t, 4, corners);
-    std::copy_n(w, 4, weights);
-  }
-  return best;
+Shared share(const Force &force, const BodyMesh &mesh, const std::string &file) {
+  const bool of_cells = find_group(force.where.group, mesh.group_names, mesh.ngroup) < mesh.ngroup;
+  const bool on_skin = force.where.group.empty() ? mesh.filled : !of_cells;
+  if (!on_skin || force.by == "mass") return share_on_cells(force, mesh, file);
+  const std::vector<uint32_t> triangles = skin_triangles(force.where, mesh);
+  if (!triangles.empty()) return share_on_skin(triangles, mesh);
+  if (force.by == "area" && force.where.group.empty())
+    fail(DFM_E_ARG, "%s: %s/by: no triangle of the surface has its three corners in this box; enlarge it or share by \"mass\"", file.c_str(),
+         force.where.pointer.c_str());
+  Shared out;
+  out.points = select(force.where, mesh, file);
+  out.weights = share_by_mass(out.points, mesh);
+  return out;
 }
 
 }  // namespace dfm::scene

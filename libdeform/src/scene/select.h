@@ -1,32 +1,57 @@
 // Which points of a mesh a selection means, and how a total force is shared among them.
 #pragma once
+#include <memory>
 #include <string>
 #include <vector>
 
 #include "scene/defs.h"
+#include "scene/locate.h"
 
 namespace dfm::scene {
+
+// A surface that was given as such: that of a filled body, or one of its own over cells.
+struct Skin {
+  std::vector<double> points;  // [n,3] rest, scaled
+  const uint32_t *triangles = nullptr, *triangle_group = nullptr;
+  const char *const *group_names = nullptr;
+  uint32_t npoint = 0, ntriangle = 0, ngroup = 0;
+};
 
 // A mesh file read once, with the scale of one body.
 struct BodyMesh {
   std::vector<double> points;  // [n,3] rest, scaled
-  const uint32_t *tets = nullptr, *file_point = nullptr;
+  const uint32_t *tets = nullptr, *file_point = nullptr, *cell_group = nullptr, *file_cell = nullptr;
+  const double *share = nullptr;
   dfm_tetmesh handle = 0;      // lends the arrays and the points of its groups
   const char *const *group_names = nullptr;
-  uint32_t npoint = 0, ntet = 0, ngroup = 0;
+  uint32_t npoint = 0, ntet = 0, ngroup = 0, dropped_cells = 0;
+  bool filled = false;         // the cells are ours, the file's shape is the skin
+  Skin skin;                   // npoint 0: the boundary of the cells
+  std::vector<double> cell_weight;          // [ntet] mass per volume of each cell relative to the others; empty: the same
   double lo[3] = {}, hi[3] = {}, size = 0;  // of the scaled points; size: diagonal
+  mutable std::shared_ptr<const Locator> locator;  // made when first asked for
 };
 
+// Points to hold: by physical group of the cells or of the skin (then the corners of the cells that hold its points), or those in a box. On
+// a filled body the box takes the skin's points in it too, by the corners of their cells: what is held then includes the given surface.
 std::vector<uint32_t> select(const Selection &where, const BodyMesh &mesh, const std::string &file);
+
 // Weights that sum to 1, one per selected point. triangles: boundary, point numbers.
 std::vector<double> share_by_mass(const std::vector<uint32_t> &points, const BodyMesh &mesh);
 // By boundary area: a third of each triangle whose three corners are selected. Empty if there is no such triangle.
 std::vector<double> share_by_area(const std::vector<uint32_t> &points, const BodyMesh &mesh, const std::vector<uint32_t> &triangles);
-std::vector<double> share(const Force &force, const std::vector<uint32_t> &points, const BodyMesh &mesh,
-                          const std::vector<uint32_t> &triangles, const std::string &file);
 
-// Cell that holds a point (or the nearest one) and the point's barycentric coordinates there; returns the distance to the cell.
-double locate(const BodyMesh &mesh, const double point[3], uint32_t corners[4], double weights[4]);
+// Which points carry a force, and how much of it each.
+struct Shared { std::vector<uint32_t> points; std::vector<double> weights; };
+// By area of the skin: a third of each triangle to each of its points, from there to the corners of its cell by its barycentric weights, so
+// that force and torque are those of the traction.
+Shared share_on_skin(const std::vector<uint32_t> &triangles, const BodyMesh &mesh);
+Shared share(const Force &force, const BodyMesh &mesh, const std::string &file);
+
+double locate(const BodyMesh &mesh, const double point[3], uint32_t corners[4], double weights[4]);  // see Locator::find
+
+// Values of a field for each cell of the mesh, [ntet,width].
+std::vector<double> read_field(const std::string &path, const FieldFile &field, const BodyMesh &mesh);
 
 // Held components and forces by the file's node numbers.
 struct NodalRow { uint32_t point; uint8_t axes; double force[3]; };

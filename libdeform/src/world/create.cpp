@@ -3,13 +3,12 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstring>
-#include <functional>
 
 #include "core/error.h"
 #include "core/handle.h"
 #include "mesh/mesh.h"
 #include "surfel/make_surface.h"
+#include "world/material.h"
 
 namespace dfm {
 namespace {
@@ -46,21 +45,6 @@ void check_mesh(const dfm_body_def &def, const std::string &name) {
     fail(DFM_E_ARG, "body '%s': point %td belongs to no tetrahedron and would have no mass; drop it", name.c_str(), unused - used.begin());
 }
 
-// A model parameter that the body does not give comes from the material's entry of the same key.
-std::vector<double> model_params(const dfm_type &type, const dfm_params &given, const Material &m) {
-  std::vector<dfm_param_value> entries;
-  const double *const values[] = {&m.def.young, &m.def.poisson, &m.def.damping_mass, &m.def.damping_stiffness};
-  const char *const keys[] = {"young", "poisson", "damping_mass", "damping_stiffness"};
-  for (int i = 0; i < 4; ++i) entries.push_back({keys[i], values[i], 1});
-  for (size_t i = 0; i < m.extra_keys.size(); ++i)
-    entries.push_back({m.extra_keys[i].c_str(), m.extra_values[i].data(), static_cast<uint32_t>(m.extra_values[i].size())});
-  return pack_params(type, {given.values, given.values ? given.n : 0}, [&](const char *key) -> const dfm_param_value * {
-    for (const auto &e : entries)
-      if (std::strcmp(e.key, key) == 0) return &e;
-    return nullptr;
-  });
-}
-
 void place_phyxels(Body &b, const dfm_body_def &def) {
   Phyxels &p = b.p;
   const Pose pose = to_pose(def.pose);
@@ -90,9 +74,9 @@ Body &create_body(World &w, const dfm_body_def &def) {
     fail(DFM_E_ARG, "body '%s': pose, velocity and spin must be finite", b.name.c_str());
   Material plain;
   plain.def = dfm_material_def_default();
-  const Material &material = def.material ? resolve<Material>(Kind::material, def.material) : plain;
-  if (def.material && material.world != &w) fail(DFM_E_HANDLE, "body '%s': its material belongs to another world", b.name.c_str());
-  b.material = material.name;
+  const CellMaterials materials = cell_materials(w, def, b.name, plain);
+  check_share(def, b.name);
+  if (def.material) b.material = resolve<Material>(Kind::material, def.material).name;
   b.category = def.category, b.collides_with = def.collides_with, b.user = def.user;
 
   const Memory &m = w.memory();
@@ -106,8 +90,8 @@ Body &create_body(World &w, const dfm_body_def &def) {
   if (def.fixed)
     for (uint32_t i = 0; i < p.n; ++i) p.held[i] = def.fixed[i] & 7;
   b.tets = Array<uint32_t>(def.tets, def.tets + size_t(4) * def.ntet, HookAllocator<uint32_t>(m));
-  b.rest_volume = lump_mass(p.n, p.rest.data(), def.ntet, b.tets.data(), material.def.density, p.mass.data());
-  b.mass = material.def.density * b.rest_volume;
+  if (def.cell_share) b.share = Array<double>(def.cell_share, def.cell_share + def.ntet, HookAllocator<double>(m));
+  lump_body(b, def, materials);
   update_inverse_mass(p);
   place_phyxels(b, def);
 
@@ -123,12 +107,15 @@ Body &create_body(World &w, const dfm_body_def &def) {
   row.resize(b.surface.nsurfel + 1), col.resize(b.surface.nsurfel);
   for (uint32_t s = 0; s < b.surface.nsurfel; ++s) row[s] = s, col[s] = b.surface.point[s];
   row[b.surface.nsurfel] = b.surface.nsurfel;
-  std::vector<double> values = model_params(type, def.model_params, material);
-  const char *const no_fields[] = {nullptr};
+  std::vector<double> values = model_values(w, b, type, def, materials);
+  std::vector<const char *> field_keys;
+  std::vector<const double *> fields;
+  for (const CellField &f : b.fields) field_keys.push_back(f.key.c_str()), fields.push_back(f.values.data());
+  field_keys.push_back(nullptr);
   dfm_mesh mesh{};
   mesh.size = sizeof mesh, mesh.npoint = p.n, mesh.ncell = def.ntet, mesh.cell = DFM_CELL_TET;
   mesh.rest = p.rest.data(), mesh.cells = b.tets.data(), mesh.mass = p.mass.data(), mesh.params = values.data();
-  mesh.field_keys = no_fields, mesh.fields = nullptr;
+  mesh.field_keys = field_keys.data(), mesh.fields = fields.data();
   mesh.nedge = static_cast<uint32_t>(b.edges.size() / 2), mesh.nsurfel = b.surface.nsurfel, mesh.edges = b.edges.data();
   mesh.row = row.data(), mesh.col = col.data(), mesh.weight = weight.data(), mesh.fixed = p.held.data();
   b.model.create(type, w.context->host, mesh, m, std::move(values));

@@ -1,5 +1,6 @@
 #include "world/explain.h"
 
+#include <algorithm>
 #include <cmath>
 
 #include "core/error.h"
@@ -33,6 +34,19 @@ std::string cost(const World &w, StageId id) {
   }
 }
 
+// Where a body's numbers come from: its cells, its surface, and the parameters that differ by cell.
+std::string body(const Body &b) {
+  std::string out = "{\"name\":" + quote(b.name) + ",\"model\":" + quote(b.model.type->id) + format(",\"cells\":%zu,\"points\":%u,\"surfels\":%u", b.tets.size() / 4,
+                    b.p.n, b.surface.nsurfel);
+  out += std::string(",\"surface\":") + quote(b.surface.identity() ? "boundary" : "own") + ",\"filled\":" + (b.share.empty() ? "false" : "true") + ",\"fields\":[";
+  for (size_t i = 0; i < b.fields.size(); ++i) {
+    const CellField &f = b.fields[i];
+    const auto [lo, hi] = std::minmax_element(f.values.begin(), f.values.end());
+    out += (i ? "," : "") + ("{\"name\":" + quote(f.key) + ",\"from\":" + quote(f.from) + format(",\"min\":%.9g,\"max\":%.9g}", *lo, *hi));
+  }
+  return out + "]}";
+}
+
 }  // namespace
 
 std::string explain(const World &w) {
@@ -51,6 +65,8 @@ std::string explain(const World &w) {
     const AbsentStage &s = w.plan.absent[i];
     out += (i ? "," : "") + ("{\"name\":" + quote(s.name) + ",\"why\":" + quote(s.why) + "}");
   }
+  out += "],\"bodies\":[";
+  for (size_t i = 0; i < w.bodies.size(); ++i) out += (i ? "," : "") + body(*w.bodies[i]);
   out += "],\"step\":{\"stable_s\":" + (std::isfinite(w.stable) ? format("%.9g", w.stable) : std::string("null")) +
          ",\"worst_body\":" + (w.worst_body ? quote(w.worst_body->name) : "null") + ",\"worst_point\":" + std::to_string(w.worst_point) +
          ",\"contact_offset_m\":" + format("%.9g", w.offset) + ",\"reason\":" +

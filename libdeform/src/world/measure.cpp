@@ -26,7 +26,7 @@ dfm_body_measure measure(Body &b) {
     angular += p.mass[i] * cross(load3(&p.x[size_t(i) * kStride]) - com, load3(&p.v[size_t(i) * kStride]) - velocity);
   for (size_t t = 0; t < b.tets.size(); t += 4) {
     const double v = tet_volume(p.x.data(), kStride, &b.tets[t]);
-    m.volume += v, m.inverted += v < 0;
+    m.volume += b.share.empty() ? v : b.share[t / 4] * v, m.inverted += v < 0;
   }
   store3(m.com, com), store3(m.velocity, velocity), store3(m.momentum, momentum), store3(m.angular, angular);
   store3(m.contact_impulse, b.contact_impulse);
@@ -56,6 +56,11 @@ void set_model_params(Body &b, const dfm_params &params) {
   const dfm_type &type = *b.model.type;
   if (params.n && !params.values) fail(DFM_E_ARG, "body '%s': %u parameters are announced, but params.values is NULL", b.name.c_str(), params.n);
   std::vector<dfm_param_value> given(params.values, params.values + params.n);
+  for (const dfm_param_value &value : given)
+    for (const CellField &f : b.fields)
+      if (value.key && f.key == value.key)
+        fail(DFM_E_ARG, "body '%s': parameter '%s' differs by cell (from %s), so one value cannot replace it while it runs; make the body anew",
+             b.name.c_str(), f.key.c_str(), f.from.c_str());
   // What is not given keeps its present value.
   std::vector<dfm_param_value> present;
   size_t at = 0;

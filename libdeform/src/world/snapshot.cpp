@@ -22,6 +22,7 @@ uint64_t structure(const World &w) {
     h.add(b->name.data(), b->name.size()), h.add(b->material.data(), b->material.size());
     h.add(b->tets.data(), b->tets.size() * sizeof(uint32_t)), h.add(b->p.rest.data(), b->p.rest.size() * sizeof(double));
     h.add(b->p.mass.data(), b->p.mass.size() * sizeof(double));
+    for (const CellField &f : b->fields) h.add(f.key.data(), f.key.size()), h.add(f.values.data(), f.values.size() * sizeof(double));
   }
   for (auto &o : w.obstacles) {
     const dfm_obstacle_def &d = o->def;
@@ -267,7 +268,7 @@ void world_restore(World &w, const void *data, size_t bytes) {
   s.value(shape);
   if (shape != structure(w))
     fail(DFM_E_FORMAT,
-         "the snapshot belongs to another world: names, meshes, masses, models and obstacles must be the same; nothing was restored");
+         "the snapshot belongs to another world: names, meshes, masses, models, fields and obstacles must be the same; nothing was restored");
   Staged staged(w.memory());
   s.each(staged.laws, [&](StagedLaw &l) { s.array(l.id), s.array(l.params); });
   fields(s, staged);

@@ -32,6 +32,9 @@ struct Material {
   std::vector<std::vector<double>> extra_values;
 };
 
+// A model parameter that differs from cell to cell, and who said so ("field", "materials", "share").
+struct CellField { std::string key, from; uint32_t width; Array<double> values; };
+
 // A lasting load: force[i] on points[i], times the keyed scale, times 1 + sine.
 struct Load { uint32_t number; std::vector<uint32_t> points; std::vector<double> force; std::vector<dfm_scale_key> keys; dfm_sine sine{}; };
 // Held points carried by keyed poses (relative to the first key) and a sine.
@@ -50,6 +53,8 @@ struct Body {
   Surface surface;
   ModelInstance model;
   double mass = 0, rest_volume = 0;
+  Array<double> share;               // [ntet] how much of each cell is material; empty: all
+  std::vector<CellField> fields;
   std::vector<Load> loads;
   std::vector<HeldMotion> motions;
   uint32_t next_load = 1;

@@ -1,0 +1,79 @@
+// A parameter of the model for each cell, from a table: one row per tetrahedron of the mesh file, in the file's order, or with a column `cell`
+// of its number from 0 in any order.
+#include <algorithm>
+#include <cmath>
+#include <fstream>
+
+#include "core/error.h"
+#include "scene/select.h"
+#include "scene/table.h"
+
+namespace dfm::scene {
+namespace {
+
+std::string columns_of(uint32_t width) {
+  if (width == 1) return "value";
+  if (width == 3) return "x,y,z";
+  std::string out = "value0";
+  for (uint32_t k = 1; k < width; ++k) out += ",value" + std::to_string(k);
+  return out;
+}
+
+// Without spaces around its names.
+std::string tidy(std::string_view header) {
+  std::string out;
+  for (char c : header)
+    if (c != ' ' && c != '\t' && c != '\r') out += c;
+  return out;
+}
+
+void make_unit(double *v) {
+  const double norm = std::sqrt(v[0] * v[0] + v[1] * v[1] + v[2] * v[2]);
+  if (norm > 0)
+    for (int k = 0; k < 3; ++k) v[k] /= norm;
+}
+
+}  // namespace
+
+std::vector<double> read_field(const std::string &path, const FieldFile &field, const BodyMesh &mesh) {
+  const std::string plain = columns_of(field.width), numbered = "cell," + plain;
+  const std::string expected = plain + " or " + numbered;
+  std::ifstream in(path);
+  if (!in) fail(DFM_E_IO, "%s: cannot be opened; expected a table with the header %s", path.c_str(), expected.c_str());
+  std::string text, header;
+  if (std::getline(in, text)) header = tidy(text);
+  if (field.width == 1 && header == field.key) header = plain;
+  if (field.width == 1 && header == "cell," + field.key) header = numbered;
+  if (header != plain && header != numbered) fail(DFM_E_FORMAT, "%s:1: expected the header %s", path.c_str(), expected.c_str());
+  const bool has_cell = header == numbered;
+  const int columns = int(field.width) + has_cell;
+
+  const uint32_t nfile = mesh.ntet + mesh.dropped_cells, w = field.width;
+  std::vector<uint32_t> cell_of(nfile, UINT32_MAX);
+  for (uint32_t t = 0; t < mesh.ntet; ++t) cell_of[mesh.file_cell ? mesh.file_cell[t] : t] = t;
+  std::vector<uint8_t> seen(nfile, 0);
+  std::vector<double> out(size_t(mesh.ntet) * w), row(static_cast<size_t>(columns));
+  uint32_t next = 0;
+  for (size_t line = 2; std::getline(in, text); ++line) {
+    const std::string_view trimmed = trim(text);
+    if (trimmed.empty()) continue;
+    split_row(path, line, trimmed, header.c_str(), columns, row.data());
+    const double number = has_cell ? row[0] : double(next);
+    if (!has_cell && next == nfile) fail(DFM_E_FORMAT, "%s:%zu: more rows than the %u tetrahedra of the mesh file", path.c_str(), line, nfile);
+    if (number < 0 || number != std::floor(number) || number >= nfile)
+      fail(DFM_E_ARG, "%s:%zu: there is no cell %g; the mesh file has the tetrahedra 0 to %u", path.c_str(), line, number, nfile - 1);
+    const uint32_t cell = uint32_t(number);
+    if (seen[cell]) fail(DFM_E_ARG, "%s:%zu: cell %u has a row already", path.c_str(), line, cell);
+    seen[cell] = 1, ++next;
+    if (cell_of[cell] == UINT32_MAX) continue;  // a double that reading dropped
+    double *const to = &out[size_t(cell_of[cell]) * w];
+    std::copy_n(&row[has_cell], w, to);
+    if (field.directions) make_unit(to);
+  }
+  for (uint32_t c = 0; c < nfile; ++c)
+    if (!seen[c] && cell_of[c] != UINT32_MAX)
+      fail(DFM_E_FORMAT, "%s: cell %u has no row; expected one for each of the %u tetrahedra of the mesh file, found %u", path.c_str(), c, nfile, next);
+  return out;
+}
+
+}  // namespace dfm::scene

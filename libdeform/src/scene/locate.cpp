@@ -1,0 +1,147 @@
+#include "scene/locate.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "scene/select.h"
+
+namespace dfm::scene {
+namespace {
+
+void subtract(const double *a, const double *b, double *out) {
+  for (int i = 0; i < 3; ++i) out[i] = a[i] - b[i];
+}
+
+double triple(const double *a, const double *b, const double *c) {
+  return a[0] * (b[1] * c[2] - b[2] * c[1]) + a[1] * (b[2] * c[0] - b[0] * c[2]) + a[2] * (b[0] * c[1] - b[1] * c[0]);
+}
+
+double dot(const double *a, const double *b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
+
+double volume6(const double *const p[4]) {
+  double u[3], v[3], w[3];
+  subtract(p[1], p[0], u), subtract(p[2], p[0], v), subtract(p[3], p[0], w);
+  return triple(u, v, w);
+}
+
+// Distance of a point from a segment, and from a triangle: inside its prism the height, else the nearest of its edges.
+double segment_distance(const double *p, const double *a, const double *b) {
+  double u[3], v[3], r[3];
+  subtract(b, a, u), subtract(p, a, v);
+  const double t = std::clamp(dot(u, v) / dot(u, u), 0.0, 1.0);
+  for (int k = 0; k < 3; ++k) r[k] = v[k] - t * u[k];
+  return std::sqrt(dot(r, r));
+}
+
+double triangle_distance(const double *p, const double *const c[3]) {
+  double u[3], v[3], w[3], n[3];
+  subtract(c[1], c[0], u), subtract(c[2], c[0], v), subtract(p, c[0], w);
+  for (int k = 0; k < 3; ++k) n[k] = u[(k + 1) % 3] * v[(k + 2) % 3] - u[(k + 2) % 3] * v[(k + 1) % 3];
+  const double s = triple(w, v, n), t = triple(u, w, n), whole = dot(n, n);
+  if (s >= 0 && t >= 0 && s + t <= whole) return std::fabs(dot(w, n)) / std::sqrt(whole);
+  return std::min({segment_distance(p, c[0], c[1]), segment_distance(p, c[1], c[2]), segment_distance(p, c[2], c[0])});
+}
+
+// Barycentric coordinates of the point in the cell, and its distance from it.
+double from_cell(const double *const corner[4], const double *point, double weights[4]) {
+  const double whole = volume6(corner);
+  if (!(std::fabs(whole) > 0)) return INFINITY;
+  bool inside = true;
+  for (int k = 0; k < 4; ++k) {  // volume with corner k moved to the point, over the cell's
+    const double *p[4] = {corner[0], corner[1], corner[2], corner[3]};
+    p[k] = point;
+    weights[k] = volume6(p) / whole;
+    inside = inside && weights[k] >= 0;
+  }
+  double away = inside ? 0 : INFINITY;
+  for (int k = 0; k < 4 && !inside; ++k) {
+    const double *const face[3] = {corner[k == 0], corner[k <= 1 ? 2 : 1], corner[k <= 2 ? 3 : 2]};
+    away = std::min(away, triangle_distance(point, face));
+  }
+  return away;
+}
+
+}  // namespace
+
+Locator::Locator(const BodyMesh &mesh) : mesh_(mesh) {
+  double hi[3];
+  for (int k = 0; k < 3; ++k) {
+    lo_[k] = INFINITY, hi[k] = -INFINITY;
+    for (uint32_t i = 0; i < mesh.npoint; ++i) lo_[k] = std::min(lo_[k], mesh.points[3 * i + k]), hi[k] = std::max(hi[k], mesh.points[3 * i + k]);
+  }
+  // About one bin a cell, as cubes; a bin is never thinner than a body's thinnest extent asks for.
+  const double extent = std::max({hi[0] - lo_[0], hi[1] - lo_[1], hi[2] - lo_[2]});
+  double volume = 1;
+  for (int k = 0; k < 3; ++k) volume *= std::max(hi[k] - lo_[k], 1e-3 * extent) / extent;
+  const double edge = extent * std::cbrt(volume / std::max(1u, mesh.ntet));
+  least_width_ = INFINITY;
+  for (int k = 0; k < 3; ++k) {
+    n_[k] = std::clamp(int((hi[k] - lo_[k]) / edge), 1, 1000);
+    width_[k] = std::max(hi[k] - lo_[k], 1e-3 * extent) / n_[k];
+    least_width_ = std::min(least_width_, width_[k]);
+  }
+  // Two passes over the bins that each cell's box overlaps: count, then fill in the order of the cells.
+  begin_.assign(size_t(n_[0]) * size_t(n_[1]) * size_t(n_[2]) + 1, 0);
+  for (int pass = 0; pass < 2; ++pass) {
+    std::vector<uint32_t> at(begin_.begin(), begin_.end() - 1);
+    for (uint32_t c = 0; c < mesh.ntet; ++c) {
+      int first[3], last[3];
+      for (int k = 0; k < 3; ++k) {
+        double least = INFINITY, most = -INFINITY;
+        for (int j = 0; j < 4; ++j) {
+          const double x = mesh.points[3 * size_t(mesh.tets[4 * size_t(c) + size_t(j)]) + size_t(k)];
+          least = std::min(least, x), most = std::max(most, x);
+        }
+        first[k] = bin(least, k), last[k] = bin(most, k);
+      }
+      for (int i = first[0]; i <= last[0]; ++i)
+        for (int j = first[1]; j <= last[1]; ++j)
+          for (int k = first[2]; k <= last[2]; ++k) {
+            const size_t b = (size_t(i) * size_t(n_[1]) + size_t(j)) * size_t(n_[2]) + size_t(k);
+            if (pass == 0) ++begin_[b + 1];
+            else cell_[at[b]++] = c;
+          }
+    }
+    if (pass == 1) break;
+    for (size_t b = 1; b < begin_.size(); ++b) begin_[b] += begin_[b - 1];
+    cell_.resize(begin_.back());
+  }
+}
+
+int Locator::bin(double x, int axis) const {
+  return int(std::clamp((x - lo_[axis]) / width_[axis], 0.0, double(n_[axis] - 1)));
+}
+
+void Locator::look(int i, int j, int k, const double *point, Best &best) const {
+  const size_t b = (size_t(i) * size_t(n_[1]) + size_t(j)) * size_t(n_[2]) + size_t(k);
+  for (uint32_t n = begin_[b]; n < begin_[b + 1]; ++n) {
+    const uint32_t c = cell_[n], *const t = mesh_.tets + 4 * size_t(c);
+    if (best.away == 0 && c >= best.cell) return;
+    const double *const corner[4] = {&mesh_.points[3 * size_t(t[0])], &mesh_.points[3 * size_t(t[1])], &mesh_.points[3 * size_t(t[2])],
+                                     &mesh_.points[3 * size_t(t[3])]};
+    Best here = {0, c, {}};
+    here.away = from_cell(corner, point, here.weights);
+    if (here.away < best.away || (here.away == best.away && c < best.cell)) best = here;
+  }
+}
+
+double Locator::find(const double point[3], uint32_t corners[4], double weights[4]) const {
+  Best best = {INFINITY, UINT32_MAX, {}};
+  const int at[3] = {bin(point[0], 0), bin(point[1], 1), bin(point[2], 2)};
+  const int rings = std::max({n_[0], n_[1], n_[2]});
+  // Bins of ring r lie at least r - 1 bins away; a point outside the grid is nearer to none of them than its projection.
+  for (int r = 0; r < rings && !(best.away < (r - 1) * least_width_) && !(r > 0 && best.away == 0); ++r) {
+    int first[3], last[3];
+    for (int k = 0; k < 3; ++k) first[k] = std::max(at[k] - r, 0), last[k] = std::min(at[k] + r, n_[k] - 1);
+    for (int i = first[0]; i <= last[0]; ++i)
+      for (int j = first[1]; j <= last[1]; ++j)
+        for (int k = first[2]; k <= last[2]; ++k)
+          if (std::max({std::abs(i - at[0]), std::abs(j - at[1]), std::abs(k - at[2])}) == r) look(i, j, k, point, best);
+  }
+  if (best.cell == UINT32_MAX) return best.away;
+  std::copy_n(mesh_.tets + 4 * size_t(best.cell), 4, corners);
+  std::copy_n(best.weights, 4, weights);
+  return best.away;
+}
+
+}  // namespace dfm::scene

@@ -1,0 +1,132 @@
+// What a body is made of, cell by cell, and what carries its surface: the keys fields, materials_by_group, anisotropy, surface and fill.
+#include <algorithm>
+#include <cmath>
+
+#include "scene/keys.h"
+#include "scene/read.h"
+
+namespace dfm::scene {
+namespace {
+
+constexpr char kPrefix[] = "anisotropy_";
+constexpr char kAxis[] = "anisotropy_axis";
+constexpr double kMostCells = 1 << 28;
+
+void read_fields(const Node &node, const dfm_type *model, Body &b) {
+  if (!node.value().is_object()) node.fail("expected an object of files by parameter of the model");
+  std::vector<std::string> valid;
+  for (const dfm_param *row : rows_of(model))
+    if (row->flags & DFM_PARAM_PER_CELL) valid.push_back(row->key);
+  for (const auto &entry : node.value().items()) {
+    const Node value = node.member(entry.key());
+    const dfm_param *row = find_row(model, entry.key());
+    if (!row || !(row->flags & DFM_PARAM_PER_CELL)) {
+      const std::string near = row ? "" : nearest(entry.key(), valid);
+      const std::string has = valid.empty() ? "it has none" : "it has: " + join(valid);
+      value.fail("%s has no parameter \"%s\" that may differ by cell%s; %s", model->id, entry.key().c_str(),
+                 near.empty() ? "" : ("; did you mean \"" + near + "\"?").c_str(), has.c_str());
+    }
+    if (std::find(b.params.keys.begin(), b.params.keys.end(), entry.key()) != b.params.keys.end())
+      value.fail("\"%s\" is given in the model's params too; keep one", entry.key().c_str());
+    b.fields.push_back({value.pointer(), entry.key(), value.text(), row->width ? row->width : 1, false});
+  }
+}
+
+void read_materials_by_group(const Node &node, const ReadContext &context, Body &b) {
+  if (!node.value().is_object()) node.fail("expected an object of materials by physical group");
+  for (const auto &entry : node.value().items()) {
+    const Node value = node.member(entry.key());
+    b.by_group.push_back({value.pointer(), entry.key(), known(value, context.materials, "material")});
+  }
+}
+
+// Parameters of the model by their short names: "slope" is the model's "anisotropy_slope".
+void read_anisotropy_params(const Node &params, const dfm_type *model, Body &b) {
+  if (!params.value().is_object()) params.fail("expected an object of parameters by key");
+  std::vector<std::string> valid;
+  for (const dfm_param *row : rows_of(model)) {
+    const std::string key = row->key;
+    if (key.rfind(kPrefix, 0) == 0 && key != kAxis) valid.push_back(key.substr(sizeof kPrefix - 1));
+  }
+  for (const auto &entry : params.value().items()) {
+    const Node value = params.member(entry.key());
+    const dfm_param *row = find_row(model, kPrefix + entry.key());
+    if (!row) row = find_row(model, entry.key());
+    if (!row) {
+      const std::string near = nearest(entry.key(), valid);
+      value.fail("%s has no anisotropy parameter \"%s\"%s; it has: %s", model->id, entry.key().c_str(),
+                 near.empty() ? "" : ("; did you mean \"" + near + "\"?").c_str(), valid.empty() ? "none" : join(valid).c_str());
+    }
+    if (std::string(row->key) == kAxis) value.fail("the direction is given by \"axis\" or \"field\" beside \"params\"");
+    if (std::find(b.params.keys.begin(), b.params.keys.end(), row->key) != b.params.keys.end())
+      value.fail("\"%s\" is given in the model's params too; keep one", row->key);
+    b.params.keys.push_back(row->key);
+    b.params.values.push_back(read_param(value, *row));
+  }
+}
+
+void read_anisotropy(const Node &node, const dfm_type *model, const Types &types, Body &b) {
+  node.object("anisotropy");
+  const dfm_param *row = find_row(model, kAxis);
+  if (!row || row->width != 3) {
+    std::vector<std::string> able;
+    for (const dfm_type *t : types.models())
+      if (find_row(t, kAxis)) able.push_back(t->id);
+    node.fail("%s is the same in all directions; %s%s", model->id, able.empty() ? "no loaded model has a direction" : "models with a direction: ",
+              join(able).c_str());
+  }
+  if (node.has("axis") == node.has("field")) node.fail("expected either \"axis\" or \"field\" to say the direction");
+  const bool taken = std::find(b.params.keys.begin(), b.params.keys.end(), kAxis) != b.params.keys.end() ||
+                     std::any_of(b.fields.begin(), b.fields.end(), [](const FieldFile &f) { return f.key == kAxis; });
+  if (taken) node.fail("the direction is given as \"%s\" too; keep one", kAxis);
+  if (node.has("axis")) {
+    double axis[3];
+    node.member("axis").vector(axis);
+    const double largest = std::max({std::fabs(axis[0]), std::fabs(axis[1]), std::fabs(axis[2])});
+    if (!(largest > 0)) node.member("axis").fail("the direction cannot be zero");
+    double square = 0;
+    for (double &a : axis) a /= largest, square += a * a;
+    for (double &a : axis) a /= std::sqrt(square);
+    b.params.keys.push_back(kAxis);
+    b.params.values.push_back({axis, axis + 3});
+  } else {
+    if (!(row->flags & DFM_PARAM_PER_CELL)) node.member("field").fail("%s takes one direction for the whole body; give \"axis\"", model->id);
+    b.fields.push_back({node.member("field").pointer(), kAxis, node.member("field").text(), 3, true});
+  }
+  if (node.has("params")) read_anisotropy_params(node.member("params"), model, b);
+}
+
+void read_surface(const Node &node, OwnSurface &out) {
+  node.object("surface");
+  out.pointer = node.pointer();
+  out.boundary = node.has("from");
+  if (out.boundary) node.member("from").word("from");
+  if (out.boundary && node.has("mesh")) node.member("mesh").fail("a surface is either \"from\": \"boundary\" or a mesh of its own; keep one");
+  if (node.has("mesh")) out.mesh = node.member("mesh").text();
+  out.coupled = node.has("coupling");
+  if (out.boundary && out.coupled) node.member("coupling").fail("the boundary's points are the body's own; a coupling is for a surface of its own");
+  const std::string coupling = out.coupled ? node.member("coupling").word("coupling") : "barycentric";
+  out.coupling = coupling == "mls" ? DFM_COUPLING_MLS : coupling == "thesis" ? DFM_COUPLING_THESIS : DFM_COUPLING_BARYCENTRIC;
+  if (!node.has("support")) return;
+  if (coupling == "barycentric") node.member("support").fail("a support is for the couplings mls and thesis; \"coupling\" is barycentric here");
+  out.support = node.member("support").number(kPositive);
+}
+
+}  // namespace
+
+void read_carriers(const Node &body, const dfm_type *model, ReadContext &context, Body &b) {
+  if (body.has("surface")) read_surface(body.member("surface"), b.surface);
+  if (body.has("fill")) {
+    const Node fill = body.member("fill");
+    fill.object("fill");
+    const Node cells = fill.at("cells");
+    const double n = cells.number(Range{1, kMostCells, false, false});
+    if (n != std::floor(n)) cells.fail("expected a whole number, found %g", n);
+    b.fill = uint32_t(n);
+  }
+  if (body.has("materials_by_group")) read_materials_by_group(body.member("materials_by_group"), context, b);
+  if (body.has("fields")) read_fields(body.member("fields"), model, b);
+  if (body.has("anisotropy")) read_anisotropy(body.member("anisotropy"), model, context.types, b);
+}
+
+}  // namespace dfm::scene
