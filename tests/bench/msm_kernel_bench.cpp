@@ -1,6 +1,6 @@
 // Time of the mass-spring forces per spring and per cell, through the plugin ABI, beside plain kernels (bound/msm_bound.h) for the
 // layouts of the points, each for every instruction set. `--csv FILE --commit ID` appends the figures; --mesh FILE takes another
-// mesh than the fine cylinder. The least of the repetitions counts: others share the machine. Options of the model are timed against
+// mesh than the fine cylinder; --only options leaves out the plain kernels. The least of the repetitions counts: others share the machine. Options of the model are timed against
 // the same body without them, in turn: the median of eleven pairs counts.
 #include <benchmark/benchmark.h>
 #include <sys/utsname.h>
@@ -264,10 +264,12 @@ void print(const Reporter &r, const std::string &csv, const std::string &commit,
 
 int main(int argc, char **argv) {
   std::string csv, commit = "unknown", path = test::shared_dir() + "/meshes/thesis/cyl_fine.msh", name = "cyl_fine.msh";
+  bool only_options = false;
   for (int n = 1; n + 1 < argc; n += 2) {
     const std::string key = argv[n];
     if (key == "--csv") csv = argv[n + 1];
     if (key == "--commit") commit = argv[n + 1];
+    if (key == "--only") only_options = argv[n + 1] == std::string("options");
     if (key == "--mesh") path = argv[n + 1], name = path.substr(path.rfind('/') + 1);
   }
   if (std::ifstream(path).good()) mesh() = read_msh(path);
@@ -293,6 +295,6 @@ int main(int argc, char **argv) {
   int none = 1;
   benchmark::Initialize(&none, argv);
   Reporter reporter;
-  if (!getenv("ONLY_OPTIONS")) benchmark::RunSpecifiedBenchmarks(&reporter);
+  if (!only_options) benchmark::RunSpecifiedBenchmarks(&reporter);
   print(reporter, csv, commit, name);
 }

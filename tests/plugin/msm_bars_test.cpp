@@ -215,10 +215,8 @@ TEST(MsmBars, SlopeAlongOneAxis_SoftensAsTheAffineNetworkOnAFreeMesh) {
                   expected.young, across, expected.poisson, across / along, expected.poisson / expected.young);
       EXPECT_LT(along, last);
       EXPECT_GT(across / along, last_ratio);
-      // Points move less evenly the more springs differ, and the soft direction gains most by it; a regular mesh adds its own directions.
-      const double over = across / along / (expected.poisson / expected.young);
-      if (free_mesh) { EXPECT_GE(over, 0.98); }
-      if (free_mesh && g <= 2) { EXPECT_LE(over, 1.15); }
+      // Points move less evenly the more springs differ; a regular mesh adds its own directions.
+      if (free_mesh && g <= 2) { EXPECT_NEAR(across / along / (expected.poisson / expected.young), 1, 0.05); }
       last = along, last_ratio = across / along;
     }
   }

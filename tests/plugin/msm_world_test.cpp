@@ -80,7 +80,7 @@ TEST(MsmWorld, Branches_AreSavedHashedAndRestored) {
 
 TEST(MsmWorld, MaxwellBar_FlowsUnderGravityWhereAVoigtBarStands) {
   const auto sag = [](double damper, int steps) {
-    Scene s({{"young", {5e5}}, {"damper", {damper}}, {"relaxation_time", {0.05}}, {"damping_stiffness", {0.01}}});
+    Scene s({{"young", {5e5}}, {"damper", {damper}}, {"relaxation_time", {0.05}}, {"damping_stiffness", {0.002}}, {"damping_mass", {8}}});
     dfm_body_measure before{}, after{};
     before.size = after.size = sizeof before;
     test::ok(dfm_body_get_measure(s.body, &before));
@@ -88,9 +88,9 @@ TEST(MsmWorld, MaxwellBar_FlowsUnderGravityWhereAVoigtBarStands) {
     test::ok(dfm_body_get_measure(s.body, &after));
     return before.com[2] - after.com[2];
   };
-  const double voigt = sag(0, 8000), sls = sag(2, 8000), maxwell = sag(1, 400);
+  const double voigt = sag(0, 4000), sls = sag(2, 4000), maxwell = sag(1, 400);
   EXPECT_NEAR(sls, voigt, 0.01 * voigt);  // the same spring carries both in the end
-  EXPECT_GT(maxwell, 3 * voigt);
+  EXPECT_GT(maxwell, 2 * voigt);
 }
 
 TEST(MsmWorld, Plan_ListsTheEffectsThatParametersCallFor) {
