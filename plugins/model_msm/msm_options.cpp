@@ -1,8 +1,8 @@
 // From parameters and fields by cell to what the passes read: stiffness per spring, frozen extra coordinates, dampers, drag,
 // springs that are switched off. What nothing calls for stays empty and its kernels are never chosen.
-#include <algorithm>
-
 #include <stdio.h>
+
+#include <algorithm>
 
 #include "msm_body.h"
 
@@ -44,7 +44,8 @@ void Body::take_fields(const dfm_mesh &m) {
     }
 }
 
-// Every cell gives each of its edges E V, times what msm_stiffness.cpp finds. What all cells share (Young's modulus, the volume term's correction) stays outside.
+// Every cell gives each of its edges E V, times what msm_stiffness.cpp finds. What all cells share (Young's modulus, the volume term's
+// correction, a branch) stays outside.
 void Body::find_shapes() {
   const bool scaled = !field[kVolume].empty() || !field[kPoisson].empty(), stiff = !field[kYoung].empty();
   scale = (scaled ? 1.0 : spring_scale(volume_ratio(0))) * (stiff ? 1.0 : params[kYoung]);

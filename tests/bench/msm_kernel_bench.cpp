@@ -1,7 +1,7 @@
 // Time of the mass-spring forces per spring and per cell, through the plugin ABI, beside plain kernels (bound/msm_bound.h) for the
 // layouts of the points, each for every instruction set. `--csv FILE --commit ID` appends the figures; --mesh FILE takes another
-// mesh than the fine cylinder; --only options leaves out the plain kernels. The least of the repetitions counts: others share the machine. Options of the model are timed against
-// the same body without them, in turn: the median of eleven pairs counts.
+// mesh than the fine cylinder; --only options leaves out the plain kernels. The least of the repetitions counts: others share the
+// machine. Options of the model are timed against the same body without them, in turn: the median of eleven pairs counts.
 #include <benchmark/benchmark.h>
 #include <sys/utsname.h>
 
@@ -182,7 +182,8 @@ void print_options(std::ofstream &out, const std::string &head) {
       const Pair p = cost_of(isa, o.without, o.with, o.fields, o.rows);
       if (p.ratio == 0) continue;
       std::printf("  %-7s %-28s %7.3f  %7.2f ns per spring\n", isa, o.name, p.ratio, p.ns);
-      if (out.is_open()) out << head << isa << ",option_" << o.name << "_ratio," << p.ratio << ",\n" << head << isa << ",option_" << o.name << "," << p.ns << ",\n";
+      if (!out.is_open()) continue;
+      out << head << isa << ",option_" << o.name << "_ratio," << p.ratio << ",\n" << head << isa << ",option_" << o.name << "," << p.ns << ",\n";
     }
 }
 
