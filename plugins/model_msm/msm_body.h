@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <cstring>
 #include <new>
+#include <utility>
 
 #include "msm_kernel.h"
 
@@ -42,6 +43,7 @@ class Buffer {
     if (!data_) throw std::bad_alloc();
     std::memset(static_cast<void *>(data_), 0, size_ * sizeof(T));
   }
+  void swap(Buffer &other) { std::swap(host_, other.host_), std::swap(data_, other.data_), std::swap(size_, other.size_); }
   bool empty() const { return !data_; }
   T *data() { return data_; }
   const T *data() const { return data_; }

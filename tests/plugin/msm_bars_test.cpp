@@ -185,6 +185,43 @@ TEST(MsmBars, Cantilever_SagGrowsTowardsTheBeamUnderRefinement) {
   EXPECT_LT(coarse, 0.8 * fine);
 }
 
+// Along and across the axis of springs whose extra coordinates have slope g (doc/models/msm.md, affine network), over Young's modulus.
+Bar::Pull affine(double g, bool form_a) {
+  double m0 = 0, m2 = 0, m4 = 0;  // means of t, t c^2, t c^4 over directions, t the softening of a spring at cosine c to the axis
+  const int n = 20000;
+  for (int k = 0; k < n; ++k) {
+    const double c = (k + 0.5) / n, s = 1 / (1 + g * g * c * c), t = (form_a ? std::sqrt(s) : s) / n;
+    m0 += t, m2 += t * c * c, m4 += t * c * c * c * c;
+  }
+  const double c33 = 6 * m4, c11 = 6 * 3.0 / 8 * (m0 - 2 * m2 + m4), c12 = c11 / 3, c13 = 3 * (m2 - m4);
+  const double sum = (c11 + c12) * c33 - 2 * c13 * c13;
+  return {sum / (c11 + c12), (c11 - c12) * sum / (c11 * c33 - c13 * c13)};  // here: along, across
+}
+
+TEST(MsmBars, SlopeAlongOneAxis_SoftensAsTheAffineNetworkOnAFreeMesh) {
+  Mesh mesh = kuhn_bar(20, 3, 3, 0.05, 0.28);
+  const std::string path = test::shared_dir() + "/meshes/bars/bar_u3.msh";
+  const bool free_mesh = std::ifstream(path).good();
+  if (free_mesh) mesh = read_msh(path);
+  for (bool form_a : {false, true}) {
+    double last = 1e300, last_ratio = 0;
+    for (double g : {0.0, 1.0, 2.0, 4.0, 12.0}) {
+      Params p = {kYoung, 0.3, 0, 0, 0};
+      p.slope = g, p.form_a = form_a;
+      Bar bar(mesh, p);
+      const double along = bar.pull(0).young / kYoung, across = bar.pull(1).young / kYoung;
+      const Bar::Pull expected = affine(g, form_a);
+      std::printf("form %c  slope %4.1f  along %.3f (affine %.3f)  across %.3f (%.3f)  ratio %.2f (%.2f)\n", form_a ? 'A' : 'B', g, along,
+                  expected.young, across, expected.poisson, across / along, expected.poisson / expected.young);
+      EXPECT_LT(along, last);
+      EXPECT_GT(across / along, last_ratio);
+      // Points move less evenly the more springs differ; a regular mesh adds its own directions.
+      if (free_mesh && g <= 2) { EXPECT_NEAR(across / along / (expected.poisson / expected.young), 1, 0.05); }
+      last = along, last_ratio = across / along;
+    }
+  }
+}
+
 // kV 1 x 1 on top of springs scaled by s: by the Sherman-Morrison formula a lattice whose axes are alike answers to a unit stress along
 // one of them with the strains 1/s - q and -nu/s - q, in 1/E, where b = 1 - 2 nu and q = (b/s)^2 / (1/r + 3 b/s).
 TEST(MsmBars, VolumeTerm_AddsItsModulusToTheLatticeInClosedForm) {

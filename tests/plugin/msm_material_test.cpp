@@ -20,6 +20,45 @@ TEST(MsmMaterial, YoungField_ScalesTheSpringsOfItsCells) {
   }
 }
 
+TEST(MsmMaterial, UniformFields_AreTheParametersAndUnevenOnesAddUpByCell) {
+  Host host;
+  const Mesh mesh = kuhn_bar(6, 2, 2, 0.1, 0.2);
+  const auto all = [&](double value) { return std::vector<double>(mesh.ncell(), value); };
+  Instance plain(host, mesh, {3e4, 0.4, 0.002, 3, 1.5});
+  Instance field(host, mesh, {}, 4, {{"young", all(3e4)}, {"poisson", all(0.4)}, {"damping_stiffness", all(0.002)},
+                                     {"damping_mass", all(3)}, {"volume", all(1.5)}});
+  plain.shake(0.01, 1), field.shake(0.01, 1), plain.forces(), field.forces();
+  for (uint32_t i = 0; i < mesh.npoint(); ++i) EXPECT_LT(norm(plain.get(plain.f, i) - field.get(field.f, i)), 1e-12 * plain.largest_force());
+  EXPECT_NEAR(plain.bound() / field.bound(), 1, 1e-12);
+
+  // Forces are a sum over cells: those of a body of two materials are those of its halves, each in a body whose other half is nothing.
+  Fields both, left, right;
+  for (uint32_t c = 0; c < mesh.ncell(); ++c) {
+    const bool l = mesh.at(mesh.cells[4 * c])[0] < 0.25;
+    const auto add = [&](const char *key, double a, double b, double none) {
+      both[key].push_back(l ? a : b), left[key].push_back(l ? a : none), right[key].push_back(l ? none : b);
+    };
+    add("young", 1e5, 3e4, 1e-3), add("poisson", 0.45, 0.1, 0.25), add("damping_stiffness", 0.001, 0.004, 0), add("volume", 2, 0, 0);
+  }
+  Instance sum(host, mesh, {}, 4, both), a(host, mesh, {}, 4, left), b(host, mesh, {}, 4, right);
+  for (Instance *m : {&sum, &a, &b}) m->shake(0.01, 1), m->forces();
+  for (uint32_t i = 0; i < mesh.npoint(); ++i)
+    EXPECT_LT(norm(sum.get(sum.f, i) - a.get(a.f, i) - b.get(b.f, i)), 1e-7 * sum.largest_force()) << i;  // nothing is 1e-8 of something
+}
+
+TEST(MsmMaterial, DragByCell_WeighsByVolumeAroundAPoint) {
+  Mesh m = irregular_tet();
+  m.rest.insert(m.rest.end(), {0.6, 0.4, -1.3});
+  m.cells.insert(m.cells.end(), {0, 2, 1, 4});
+  m.finish();
+  Host host;
+  Instance b(host, m, {}, 4, {{"damping_mass", {2, 10}}});
+  for (uint32_t i = 0; i < 5; ++i) b.set(b.v, i, {1, -2, 3});
+  b.forces();
+  const double v0 = m.volume(0), v1 = m.volume(1), mixed = (2 * v0 + 10 * v1) / (v0 + v1), drag[] = {mixed, mixed, mixed, 2, 10};
+  for (uint32_t i = 0; i < 5; ++i) EXPECT_LT(norm(b.get(b.f, i) + (drag[i] * m.mass[i]) * Vec{1, -2, 3}), 1e-11 * m.mass[i]);
+}
+
 // M3: m x'' + c x' + k x = F from rest, with m = 0.2, k = 50, c = 0.4: the free point of a cell whose base is held. A force of 1e-5 N
 // keeps x so small that the springs are linear to 1e-7.
 TEST(MsmMaterial, VoigtElement_FollowsTheClosedForm) {
