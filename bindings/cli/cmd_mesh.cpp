@@ -63,7 +63,8 @@ std::vector<std::string> losses(const MeshSession &s, const std::string &out) {
   i.size = sizeof i;
   dfm_trimesh_get_info(s.surface, &i);
   if (ending == "stl") lost.push_back("digits beyond single precision, about 7, which is all that STL holds");
-  if (i.ngroup && (ending == "stl" || ending == "ply" || ending == "off"))
+  if (i.ngroup && ending == "ply") lost.push_back("names of groups, of which PLY holds the number alone");
+  if (i.ngroup && (ending == "stl" || ending == "off"))
     lost.push_back(std::to_string(i.ngroup) + (i.ngroup == 1 ? " group" : " groups") + " of triangles, without which ." + ending + " is written");
   return lost;
 }

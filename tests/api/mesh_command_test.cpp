@@ -138,7 +138,8 @@ TEST(MeshCommand, ConvertSurfaces_ThereAndBackKeepsTheBytes) {
 TEST(MeshCommand, ConvertWithGroups_SaysWhatIsLost) {
   const std::string file = folder() + "/groups.obj";
   test::write_file(file, "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 1 1 0\ng a\nf 1 2 3\ng b\nf 2 4 3\n");
-  EXPECT_TRUE(has(test::deform({"mesh", "convert", file, folder() + "/groups.ply"}).err, "not kept: 2 groups of triangles")) << "PLY has none";
+  EXPECT_TRUE(has(test::deform({"mesh", "convert", file, folder() + "/groups.off"}).err, "not kept: 2 groups of triangles")) << "OFF has none";
+  EXPECT_TRUE(has(test::deform({"mesh", "convert", file, folder() + "/groups.ply"}).err, "not kept: names of groups")) << "PLY has numbers";
   const auto kept = test::deform({"mesh", "convert", file, folder() + "/groups.vtu"});
   EXPECT_FALSE(has(kept.err, "not kept")) << kept.err;
   EXPECT_TRUE(has(test::deform({"mesh", "info", folder() + "/groups.vtu"}).out, "group             b (1 triangles)"));

@@ -89,6 +89,7 @@ DFM_API dfm_status dfm_trimesh_data(dfm_trimesh mesh, const double **points, con
  * Each out may be NULL; valid while the mesh lives. Threads: Any thread. Since 0.2. */
 DFM_API dfm_status dfm_trimesh_groups(dfm_trimesh mesh, const char *const **names, const uint32_t **triangle_group);
 /** Writes OBJ, PLY (binary), STL (binary), OFF, legacy VTK or VTU by file name ending; to a temporary name first, so never half a file.
+ * Groups survive in OBJ, VTK and VTU, in PLY by number. STL holds single precision.
  * @return DFM_OK; DFM_E_IO; DFM_E_UNSUPPORTED another ending. Threads: Any thread. Since 0.2. */
 DFM_API dfm_status dfm_trimesh_write(dfm_trimesh mesh, const char *path);
 

@@ -59,6 +59,14 @@ TEST(WriteSurface, Groups_ComeBackWhereTheFormatHasThem) {
   }
 }
 
+TEST(WriteSurface, PlyGroups_ComeBackByNumber) {
+  const TriMesh m = ball_in_groups(), back = there_and_back(m, ".ply");
+  ASSERT_EQ(back.groups.size(), 2u);
+  EXPECT_EQ(back.groups[0].name, "3");
+  EXPECT_EQ(back.groups[1].tag, 8);
+  EXPECT_EQ(back.tri_group, m.tri_group);
+}
+
 TEST(WriteSurface, Stl_KeepsSinglePrecision) {
   const TriMesh m = ball_in_groups(), back = there_and_back(m, ".stl");
   ASSERT_EQ(back.ntri(), m.ntri());
