@@ -1,0 +1,134 @@
+// Brings a query to the form that the finders work on. Only differences between the two features enter, in an order that their coordinates decide,
+// times a power of two: so the answer's bits do not depend on how the caller numbers vertices, on where the origin is, or on the unit of length.
+#include "narrow/toi.h"
+
+#include <cstring>
+
+#include "narrow/toi_query.h"
+
+namespace dfm {
+namespace {
+
+using toi::Query;
+
+double power_of_two(int exponent) {
+  const uint64_t bits = uint64_t(exponent + 1023) << 52;
+  double x;
+  std::memcpy(&x, &bits, sizeof x);
+  return x;
+}
+
+// e with 2^(e-1) <= x < 2^e for normal x > 0; -1022 below.
+int exponent_of(double x) {
+  uint64_t bits;
+  std::memcpy(&bits, &x, sizeof bits);
+  return int(bits >> 52 & 0x7ff) - 1022;
+}
+
+double largest(double so_far, const dfm_motion &m) {
+  for (int i = 0; i < 3; ++i) so_far = std::max({so_far, std::fabs(m.p0[i]), std::fabs(m.p1[i])});
+  return so_far;
+}
+
+bool before(const dfm_motion &a, const dfm_motion &b) {
+  for (int i = 0; i < 3; ++i)
+    if (a.p0[i] != b.p0[i]) return a.p0[i] < b.p0[i];
+  for (int i = 0; i < 3; ++i)
+    if (a.p1[i] != b.p1[i]) return a.p1[i] < b.p1[i];
+  return false;
+}
+
+// Differences of numbers above 2^1000 or below 2^-900 could overflow or lose bits: such queries are moved to the middle first.
+constexpr double kHuge = 0x1p1000, kTiny = 0x1p-900;
+
+struct Scaled {
+  Query query;
+  int exponent = 0;        // the query is 2^-exponent times the world
+  int shift = 0;           // of the vertices before subtraction
+
+  Vec3 difference(const double *a, const double *b) const {
+    if (shift == 0) return load3(a) - load3(b);
+    const double half = power_of_two(-shift / 2), rest = power_of_two(-shift - -shift / 2);
+    return rest * (half * load3(a)) - rest * (half * load3(b));
+  }
+  void corner(int k, const dfm_motion &a, const dfm_motion &b) {
+    query.w0[k] = difference(a.p0, b.p0), query.w1[k] = difference(a.p1, b.p1);
+  }
+  void edge(Vec3 out[2], const dfm_motion &to, const dfm_motion &from) const { out[0] = difference(to.p0, from.p0), out[1] = difference(to.p1, from.p1); }
+
+  // Extreme vertices; call before corners are set.
+  void look_at(double size) {
+    if (size > kHuge || (size < kTiny && size > 0)) shift = exponent_of(size);
+  }
+  // 2^-exponent applied in two halves, since a power of two need not be a normal number where its halves are.
+  static double scaled(double x, int exponent) {
+    const int half = -exponent / 2;
+    return x * power_of_two(half) * power_of_two(-exponent - half);
+  }
+  void finish(const dfm_toi_options &options, double margin) {
+    Query &q = query;
+    double size = 0;
+    for (int k = 0; k < q.ncorner; ++k)
+      for (int i = 0; i < 3; ++i) size = std::max({size, std::fabs(q.w0[k][i]), std::fabs(q.w1[k][i])});
+    const int e = size > 0 ? exponent_of(size) : 0;
+    const double first = power_of_two(-e / 2), second = power_of_two(-e - -e / 2);
+    for (int k = 0; k < q.ncorner; ++k) q.w0[k] = second * (first * q.w0[k]), q.w1[k] = second * (first * q.w1[k]);
+    for (Vec3 *v : {q.e1, q.e2})
+      for (int end = 0; end < 2; ++end) v[end] = second * (first * v[end]);
+    exponent = e + shift;
+    q.separation = std::min(scaled(options.min_separation, exponent), 0x1p100);
+    q.tolerance = margin > 0 ? std::min(scaled(margin, exponent), 0x1p100) : options.tolerance > 0 ? options.tolerance : 1e-12;
+    const bool safe = options.method == DFM_TOI_CONSERVATIVE;
+    q.max_iterations = options.max_iterations > 0 ? options.max_iterations : safe ? 512 : 100;
+  }
+};
+
+toi::Answer solve(const Query &query, int method) {
+  return method == DFM_TOI_CONSERVATIVE ? toi::conservative(query) : toi::by_roots(query, method);
+}
+
+}  // namespace
+
+ToiHit toi_point_triangle(const dfm_motion &p, const dfm_motion tri[3], const dfm_toi_options &options, double margin) {
+  int order[3] = {0, 1, 2};
+  const auto sort2 = [&](int i, int j) {
+    if (before(tri[order[j]], tri[order[i]])) std::swap(order[i], order[j]);
+  };
+  sort2(0, 1), sort2(1, 2), sort2(0, 1);
+  const dfm_motion *corner[3] = {&tri[order[0]], &tri[order[1]], &tri[order[2]]};
+  Scaled s;
+  s.query.ncorner = 3;
+  s.look_at(largest(largest(largest(largest(0, p), tri[0]), tri[1]), tri[2]));
+  for (int k = 0; k < 3; ++k) s.corner(k, p, *corner[k]);
+  s.edge(s.query.e1, *corner[0], *corner[1]);
+  s.edge(s.query.e2, *corner[0], *corner[2]);
+  s.finish(options, margin);
+  const toi::Answer answer = solve(s.query, options.method);
+  ToiHit hit{answer.t, {}, answer.evaluations};
+  const double weight[3] = {1 - answer.u - answer.v, answer.u, answer.v};
+  for (int k = 0; k < 3; ++k) hit.at[order[k]] = weight[k];
+  return hit;
+}
+
+ToiHit toi_edge_edge(const dfm_motion a[2], const dfm_motion b[2], const dfm_toi_options &options, double margin) {
+  const bool turn_a = before(a[1], a[0]), turn_b = before(b[1], b[0]);
+  const dfm_motion *ends[2][2] = {{&a[turn_a], &a[!turn_a]}, {&b[turn_b], &b[!turn_b]}};
+  const bool same_first = !before(*ends[0][0], *ends[1][0]) && !before(*ends[1][0], *ends[0][0]);
+  const bool swap = same_first ? before(*ends[1][1], *ends[0][1]) : before(*ends[1][0], *ends[0][0]);
+  const dfm_motion *const *x = ends[swap], *const *y = ends[!swap];
+  Scaled s;
+  s.query.ncorner = 4;
+  s.look_at(largest(largest(largest(largest(0, a[0]), a[1]), b[0]), b[1]));
+  s.corner(0, *x[0], *y[0]);
+  s.corner(1, *x[1], *y[0]);
+  s.corner(2, *x[1], *y[1]);
+  s.corner(3, *x[0], *y[1]);
+  s.edge(s.query.e1, *x[1], *x[0]);
+  s.edge(s.query.e2, *y[0], *y[1]);
+  s.finish(options, margin);
+  const toi::Answer answer = solve(s.query, options.method);
+  const double on_x = answer.u, on_y = answer.v, on_a = swap ? on_y : on_x, on_b = swap ? on_x : on_y;
+  return {answer.t, {turn_a ? 1 - on_a : on_a, turn_b ? 1 - on_b : on_b, 0}, answer.evaluations};
+}
+
+}  // namespace dfm
