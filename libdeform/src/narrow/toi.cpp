@@ -39,45 +39,50 @@ bool before(const dfm_motion &a, const dfm_motion &b) {
 }
 
 // Differences of numbers above 2^1000 or below 2^-900 could overflow or lose bits: such queries are moved to the middle first.
+constexpr double kTolerance = 1e-12;
 constexpr double kHuge = 0x1p1000, kTiny = 0x1p-900;
 
-struct Scaled {
-  Query query;
-  int exponent = 0;        // the query is 2^-exponent times the world
-  int shift = 0;           // of the vertices before subtraction
+// Two factors whose product is 2^exponent.
+void split_power(int exponent, double out[2]) {
+  out[0] = power_of_two(exponent / 2), out[1] = power_of_two(exponent - exponent / 2);
+}
+Vec3 times(const double factor[2], Vec3 v) { return factor[1] * (factor[0] * v); }
+double times(const double factor[2], double x) { return factor[1] * (factor[0] * x); }
 
+struct Builder {
+  Query query;
+  int shift = 0;
+
+  explicit Builder(double size) {   // of the coordinates
+    if (size <= kHuge && (size >= kTiny || size == 0)) return;
+    shift = exponent_of(size);
+    split_power(-shift, query.before);
+  }
   Vec3 difference(const double *a, const double *b) const {
-    if (shift == 0) return load3(a) - load3(b);
-    const double half = power_of_two(-shift / 2), rest = power_of_two(-shift - -shift / 2);
-    return rest * (half * load3(a)) - rest * (half * load3(b));
+    return shift == 0 ? load3(a) - load3(b) : times(query.before, load3(a)) - times(query.before, load3(b));
   }
   void corner(int k, const dfm_motion &a, const dfm_motion &b) {
     query.w0[k] = difference(a.p0, b.p0), query.w1[k] = difference(a.p1, b.p1);
+    if (k == 0) query.to[0] = &a, query.from[0] = &b;
   }
-  void edge(Vec3 out[2], const dfm_motion &to, const dfm_motion &from) const { out[0] = difference(to.p0, from.p0), out[1] = difference(to.p1, from.p1); }
+  void edge(int k, Vec3 out[2], const dfm_motion &to, const dfm_motion &from) {
+    out[0] = difference(to.p0, from.p0), out[1] = difference(to.p1, from.p1);
+    query.to[k] = &to, query.from[k] = &from;
+  }
 
-  // Extreme vertices; call before corners are set.
-  void look_at(double size) {
-    if (size > kHuge || (size < kTiny && size > 0)) shift = exponent_of(size);
-  }
-  // 2^-exponent applied in two halves, since a power of two need not be a normal number where its halves are.
-  static double scaled(double x, int exponent) {
-    const int half = -exponent / 2;
-    return x * power_of_two(half) * power_of_two(-exponent - half);
-  }
   void finish(const dfm_toi_options &options, double margin) {
     Query &q = query;
     double size = 0;
     for (int k = 0; k < q.ncorner; ++k)
       for (int i = 0; i < 3; ++i) size = std::max({size, std::fabs(q.w0[k][i]), std::fabs(q.w1[k][i])});
-    const int e = size > 0 ? exponent_of(size) : 0;
-    const double first = power_of_two(-e / 2), second = power_of_two(-e - -e / 2);
-    for (int k = 0; k < q.ncorner; ++k) q.w0[k] = second * (first * q.w0[k]), q.w1[k] = second * (first * q.w1[k]);
+    const int exponent = size > 0 ? exponent_of(size) : 0;
+    split_power(-exponent, q.after);
+    for (int k = 0; k < q.ncorner; ++k) q.w0[k] = times(q.after, q.w0[k]), q.w1[k] = times(q.after, q.w1[k]);
     for (Vec3 *v : {q.e1, q.e2})
-      for (int end = 0; end < 2; ++end) v[end] = second * (first * v[end]);
-    exponent = e + shift;
-    q.separation = std::min(scaled(options.min_separation, exponent), 0x1p100);
-    q.tolerance = margin > 0 ? std::min(scaled(margin, exponent), 0x1p100) : options.tolerance > 0 ? options.tolerance : 1e-12;
+      for (int end = 0; end < 2; ++end) v[end] = times(q.after, v[end]);
+    const auto scaled = [&](double x) { return std::min(times(q.after, times(q.before, x)), 0x1p100); };
+    q.separation = scaled(options.min_separation);
+    q.tolerance = margin > 0 ? scaled(margin) : options.tolerance > 0 ? options.tolerance : kTolerance;
     const bool safe = options.method == DFM_TOI_CONSERVATIVE;
     q.max_iterations = options.max_iterations > 0 ? options.max_iterations : safe ? 512 : 100;
   }
@@ -96,12 +101,11 @@ ToiHit toi_point_triangle(const dfm_motion &p, const dfm_motion tri[3], const df
   };
   sort2(0, 1), sort2(1, 2), sort2(0, 1);
   const dfm_motion *corner[3] = {&tri[order[0]], &tri[order[1]], &tri[order[2]]};
-  Scaled s;
+  Builder s(largest(largest(largest(largest(0, p), tri[0]), tri[1]), tri[2]));
   s.query.ncorner = 3;
-  s.look_at(largest(largest(largest(largest(0, p), tri[0]), tri[1]), tri[2]));
   for (int k = 0; k < 3; ++k) s.corner(k, p, *corner[k]);
-  s.edge(s.query.e1, *corner[0], *corner[1]);
-  s.edge(s.query.e2, *corner[0], *corner[2]);
+  s.edge(1, s.query.e1, *corner[0], *corner[1]);
+  s.edge(2, s.query.e2, *corner[0], *corner[2]);
   s.finish(options, margin);
   const toi::Answer answer = solve(s.query, options.method);
   ToiHit hit{answer.t, {}, answer.evaluations};
@@ -116,15 +120,14 @@ ToiHit toi_edge_edge(const dfm_motion a[2], const dfm_motion b[2], const dfm_toi
   const bool same_first = !before(*ends[0][0], *ends[1][0]) && !before(*ends[1][0], *ends[0][0]);
   const bool swap = same_first ? before(*ends[1][1], *ends[0][1]) : before(*ends[1][0], *ends[0][0]);
   const dfm_motion *const *x = ends[swap], *const *y = ends[!swap];
-  Scaled s;
+  Builder s(largest(largest(largest(largest(0, a[0]), a[1]), b[0]), b[1]));
   s.query.ncorner = 4;
-  s.look_at(largest(largest(largest(largest(0, a[0]), a[1]), b[0]), b[1]));
   s.corner(0, *x[0], *y[0]);
   s.corner(1, *x[1], *y[0]);
   s.corner(2, *x[1], *y[1]);
   s.corner(3, *x[0], *y[1]);
-  s.edge(s.query.e1, *x[1], *x[0]);
-  s.edge(s.query.e2, *y[0], *y[1]);
+  s.edge(1, s.query.e1, *x[1], *x[0]);
+  s.edge(2, s.query.e2, *y[0], *y[1]);
   s.finish(options, margin);
   const toi::Answer answer = solve(s.query, options.method);
   const double on_x = answer.u, on_y = answer.v, on_a = swap ? on_y : on_x, on_b = swap ? on_x : on_y;

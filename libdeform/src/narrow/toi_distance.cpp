@@ -12,6 +12,8 @@ namespace {
 
 // Less of the distance proven than this share: other normals are tried as well.
 constexpr double kProven = 0.9;
+// A cubic that is nowhere larger than that many times its error is computed again, sharper.
+constexpr double kBlurred = 0x1p32;
 
 struct Patch {
   Vec3 w[4];
@@ -64,10 +66,25 @@ void offer_side(Separation &s, const Patch &patch, int k) {
   offer_normal(s, patch, point - (dot(point, e) / ee) * e);
 }
 
+// The foot of the origin from the best point so far instead of from a corner: what a sliver's small area spoils is then the small rest alone.
+void offer_foot(Separation &s, const Patch &patch, Vec3 across) {
+  const double area2 = norm2(across);
+  if (!(area2 > 0)) return;
+  const Vec3 r = patch.w[0], e1 = patch.w[1] - r, e2 = patch.w[patch.n - 1] - r;
+  double u = s.u, v = s.v;
+  for (int pass = 0; pass < 2; ++pass) {
+    const Vec3 rest = r + u * e1 + v * e2;
+    u = std::clamp(u + dot(cross(e2, rest), across) / area2, 0.0, 1.0);
+    v = std::clamp(v + dot(cross(rest, e1), across) / area2, 0.0, patch.n == 3 ? 1 - u : 1.0);
+    offer_point(s, r + u * e1 + v * e2, u, v);
+  }
+}
+
 // Everything there is: for slivers and points next to the border of two features' regions.
 void offer_all(Separation &s, const Patch &patch, Vec3 across) {
   offer_normal(s, patch, across);
   offer_normal(s, patch, -across);
+  offer_foot(s, patch, across);
   for (int k = 0; k < patch.n; ++k) {
     offer_side(s, patch, k);
     offer_normal(s, patch, patch.w[k]);
@@ -118,7 +135,17 @@ Coplanarity coplanarity(const Query &q) {
   };
   // Six products of three factors, each rounded at most eight times on the way and three times before: 66 units of 2^-53, and as much again for
   // evaluating the polynomial.
-  c.error = 0x1p-45 * size(r0, r1) * size(q.e1[0], q.e1[1]) * size(q.e2[0], q.e2[1]);
+  const double size3 = size(r0, r1) * size(q.e1[0], q.e1[1]) * size(q.e2[0], q.e2[1]);
+  c.error = 0x1p-45 * size3;
+  double largest = c.f.size();
+  c.vanishes = false;
+  if (largest < kBlurred * c.error) {
+    c.f = sharp_coplanarity(q).high;
+    largest = c.f.size();
+    const double pairs = 0x1p-94 * size3;
+    c.error = pairs + 0x1p-49 * largest;
+    c.vanishes = !(largest > 16 * pairs);
+  }
   c.normal_max = std::max({norm(n0), 0.5 * norm(n1), norm(n2)}) * (1 + kRound);
   return c;
 }

@@ -29,6 +29,11 @@ struct Poly {
     for (int i = 0; i < degree; ++i) d.b[i] = (i + 1) * b[i + 1] - (degree - i) * b[i];
     return d;
   }
+  double size() const {
+    double largest = 0;
+    for (int i = 0; i <= degree; ++i) largest = std::max(largest, std::fabs(b[i]));
+    return largest;
+  }
   // Least and largest value on [0,1], by the hull of the control values.
   void bounds(double &least, double &largest) const {
     double binomial = 1;

@@ -20,6 +20,8 @@ struct Query {
   int ncorner = 3;         // 3 triangle, 4 parallelogram; in order around the patch
   Vec3 w0[4], w1[4];       // corners at t = 0 and 1, scaled by a power of two so that the largest coordinate is in [1/2, 1)
   Vec3 e1[2], e2[2];       // w[1] - w[0] and w[last] - w[0] at t = 0 and 1, from the vertices themselves
+  const dfm_motion *to[3], *from[3];        // w[0], e1 and e2 are to - from, scaled by powers of two
+  double before[2] = {1, 1}, after[2];      // subtraction; each a product of two, which need not be a normal number where its factors are
   double separation = 0;   // scaled like the corners
   double tolerance = 0;    // scaled distance (conservative), or width in t
   int max_iterations = 0;
@@ -52,8 +54,15 @@ struct Coplanarity {
   Poly f;
   double error;            // bound of the rounding of coefficients and values
   double normal_max;       // bound of |e1 x e2| over [0,1]
+  bool vanishes;           // all that is known of f is that it is nearly zero
 };
 Coplanarity coplanarity(const Query &query);
+// The same in pairs of doubles, ten times slower.
+struct SharpCubic {
+  Poly high, low;          // high: each coefficient rounded once
+  double operator()(double t) const;
+};
+SharpCubic sharp_coplanarity(const Query &query);
 // Nothing can touch: all corners lie on one side along an axis over the whole step.
 bool apart_along_axis(const Query &query);
 

@@ -14,7 +14,9 @@ namespace dfm::toi {
 namespace {
 
 constexpr double kPolyRound = 0x1p-44;   // rounding of a polynomial's values, in sizes of its coefficients
-constexpr double kVanishing = 16;        // a cubic with no value above that many times its error says nothing
+
+constexpr double kSharp = 1e-11;         // in t: roots less certain than that are sharpened
+constexpr double kSharpenBy = 1e-8;      // in t: no step further than that
 
 struct VectorPoly {
   Poly x, y, z;
@@ -30,8 +32,10 @@ class Roots {
   Roots(const Query &query, int method) : q_(query), method_(method) {}
 
   Answer run() {
-    touch_ = q_.separation + std::max(8 * q_.tolerance, 4 * kRound);
-    if (apart_along_axis(q_) || touches(0)) return answer_;
+    if (apart_along_axis(q_)) return answer_;
+    touch_ = q_.separation + 4 * kRound;
+    if (touches(0)) return answer_;
+    touch_ += 8 * q_.tolerance;   // as far as the features may move while t is uncertain
     if (q_.separation > 0) separation();
     else contact();
     std::sort(time_, time_ + ntime_);
@@ -96,18 +100,28 @@ class Roots {
     if (std::fabs(p(1)) <= error) add(1);
   }
 
-  double error_of(const Poly &p) const {
-    double size = 0;
-    for (int i = 0; i <= p.degree; ++i) size = std::max(size, std::fabs(p.b[i]));
-    return kPolyRound * size;
+  // Two roots close together lie where the cubic is flat, and its rounding moves them: Newton steps on the sharp one, unless a touch of an even
+  // root leaves nothing to find.
+  void sharpen(const Coplanarity &c, int first) {
+    const Poly slope = c.f.derivative();
+    for (int k = first; k < ntime_; ++k) {
+      if (!(c.error > kSharp * std::fabs(slope(time_[k])))) continue;
+      const SharpCubic sharp = sharp_coplanarity(q_);
+      for (int pass = 0; pass < 4; ++pass) {
+        ++answer_.evaluations;
+        const double step = sharp(time_[k]) / slope(time_[k]), t = time_[k] - step;
+        if (!(std::fabs(step) < kSharpenBy && t > 0 && t <= 1)) break;
+        time_[k] = t;
+      }
+    }
   }
 
   void contact() {
     const Coplanarity c = coplanarity(q_);
+    const int first = ntime_;
     add_roots(c.f, c.error);
-    double least, largest;
-    c.f.bounds(least, largest);
-    if (std::max(-least, largest) > kVanishing * c.error) return;
+    sharpen(c, first);
+    if (!c.vanishes) return;
     for (int k = 0; k < q_.ncorner; ++k) {
       const int next = k + 1 < q_.ncorner ? k + 1 : 0;
       const VectorPoly from = path(q_.w0[k], q_.w1[k]), line = cross(from, path(q_.w0[next], q_.w1[next]));
@@ -119,14 +133,14 @@ class Roots {
     const double m2 = q_.separation * q_.separation;
     const VectorPoly r = path(q_.w0[0], q_.w1[0]), n = cross(path(q_.e1[0], q_.e1[1]), path(q_.e2[0], q_.e2[1]));
     const Poly f = r.x * n.x + r.y * n.y + r.z * n.z, ff = f * f, plane = ff - m2 * raised(raised(square(n)));
-    add_roots(plane, error_of(ff));
+    add_roots(plane, kPolyRound * ff.size());
     for (int k = 0; k < q_.ncorner; ++k) {
       const int next = k + 1 < q_.ncorner ? k + 1 : 0;
       const VectorPoly from = path(q_.w0[k], q_.w1[k]), to = path(q_.w0[next], q_.w1[next]);
       const VectorPoly side{to.x - from.x, to.y - from.y, to.z - from.z};
       const Poly area = square(cross(from, to)), distance = square(from);
-      add_roots(area - m2 * raised(raised(square(side))), error_of(area));
-      add_roots(distance - m2 * raised(raised(Poly{0, {1}})), error_of(distance));
+      add_roots(area - m2 * raised(raised(square(side))), kPolyRound * area.size());
+      add_roots(distance - m2 * raised(raised(Poly{0, {1}})), kPolyRound * distance.size());
     }
   }
 
