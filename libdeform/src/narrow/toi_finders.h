@@ -14,14 +14,15 @@ struct Bracket { double lo, hi, f_lo, f_hi; };
 // (4.8)
 template <class F>
 double bisection(const F &f, Bracket b, double width, int max_iterations, uint32_t &evaluations) {
-  for (int i = 0; i < max_iterations && b.hi - b.lo > width; ++i) {
-    const double x = b.lo + 0.5 * (b.hi - b.lo), value = f(x);
+  double length = b.hi - b.lo;
+  for (int i = 0; i < max_iterations && length > width; ++i) {
+    length *= 0.5;
+    const double x = b.lo + length, value = f(x);
     ++evaluations;
     if (value == 0) return x;
-    if ((value > 0) == (b.f_lo > 0)) b.lo = x;
-    else b.hi = x;
+    b.lo += length * double((value > 0) == (b.f_lo > 0));   // no branch: which half it is nobody can foretell
   }
-  return b.lo + 0.5 * (b.hi - b.lo);
+  return b.lo + 0.5 * length;
 }
 
 // (4.9) keeps one end for ever on a convex function; halving the value kept (Illinois, Dowell and Jarratt 1971) makes it super-linear. The end

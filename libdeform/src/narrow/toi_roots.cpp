@@ -15,7 +15,7 @@ namespace {
 
 constexpr double kPolyRound = 0x1p-44;   // rounding of a polynomial's values, in sizes of its coefficients
 
-constexpr double kSharp = 1e-11;         // in t: roots less certain than that are sharpened
+constexpr double kSharp = 1e-10;         // in t: roots less certain than that are sharpened
 constexpr double kSharpenBy = 1e-8;      // in t: no step further than that
 
 struct VectorPoly {
@@ -33,11 +33,15 @@ class Roots {
 
   Answer run() {
     if (apart_along_axis(q_)) return answer_;
-    touch_ = q_.separation + 4 * kRound;
-    if (touches(0)) return answer_;
-    touch_ += 8 * q_.tolerance;   // as far as the features may move while t is uncertain
-    if (q_.separation > 0) separation();
-    else contact();
+    const bool contacts = q_.separation == 0;
+    if (contacts) plane_ = coplanarity(q_);
+    if (!contacts || !(std::fabs(plane_.f.b[0]) > plane_.error)) {
+      touch_ = q_.separation + 4 * kRound;
+      if (touches(0)) return answer_;
+    }
+    touch_ = q_.separation + 8 * q_.tolerance + 4 * kRound;   // as far as the features may move while t is uncertain
+    if (contacts) contact();
+    else separation();
     std::sort(time_, time_ + ntime_);
     for (int k = 0; k < ntime_; ++k)
       if ((k == 0 || time_[k] > time_[k - 1]) && touches(time_[k])) break;
@@ -102,10 +106,10 @@ class Roots {
 
   // Two roots close together lie where the cubic is flat, and its rounding moves them: Newton steps on the sharp one, unless a touch of an even
   // root leaves nothing to find.
-  void sharpen(const Coplanarity &c, int first) {
-    const Poly slope = c.f.derivative();
-    for (int k = first; k < ntime_; ++k) {
-      if (!(c.error > kSharp * std::fabs(slope(time_[k])))) continue;
+  void sharpen() {
+    const Poly slope = plane_.f.derivative();
+    for (int k = 0; k < ntime_; ++k) {
+      if (!(plane_.error > kSharp * std::fabs(slope(time_[k])))) continue;
       const SharpCubic sharp = sharp_coplanarity(q_);
       for (int pass = 0; pass < 4; ++pass) {
         ++answer_.evaluations;
@@ -117,11 +121,9 @@ class Roots {
   }
 
   void contact() {
-    const Coplanarity c = coplanarity(q_);
-    const int first = ntime_;
-    add_roots(c.f, c.error);
-    sharpen(c, first);
-    if (!c.vanishes) return;
+    add_roots(plane_.f, plane_.error);
+    sharpen();
+    if (!plane_.vanishes) return;
     for (int k = 0; k < q_.ncorner; ++k) {
       const int next = k + 1 < q_.ncorner ? k + 1 : 0;
       const VectorPoly from = path(q_.w0[k], q_.w1[k]), line = cross(from, path(q_.w0[next], q_.w1[next]));
@@ -147,6 +149,7 @@ class Roots {
   static constexpr int kMaxTimes = 128;   // 3 + 4 sides x (3 quadratics x 4 + 3 lines x 2) without, 6 + 4 x (8 + 4) + ... with separation
   const Query &q_;
   const int method_;
+  Coplanarity plane_;
   double touch_ = 0;
   double time_[kMaxTimes];
   int ntime_ = 0;
