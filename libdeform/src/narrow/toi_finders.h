@@ -14,13 +14,14 @@ struct Bracket { double lo, hi, f_lo, f_hi; };
 // (4.8)
 template <class F>
 double bisection(const F &f, Bracket b, double width, int max_iterations, uint32_t &evaluations) {
+  const double sign = b.f_lo > 0 ? 1 : -1;
   double length = b.hi - b.lo;
   for (int i = 0; i < max_iterations && length > width; ++i) {
     length *= 0.5;
-    const double x = b.lo + length, value = f(x);
+    const double x = b.lo + length, value = sign * f(x);
     ++evaluations;
     if (value == 0) return x;
-    b.lo += length * double((value > 0) == (b.f_lo > 0));   // no branch: which half it is nobody can foretell
+    b.lo += length * (0.5 + std::copysign(0.5, value));   // 1 where f has f_lo's sign, else 0; a branch would be foretold wrongly half the time
   }
   return b.lo + 0.5 * length;
 }
