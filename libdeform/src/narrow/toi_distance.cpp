@@ -82,10 +82,20 @@ void offer_foot(Separation &s, const Patch &patch, Vec3 across) {
   }
 }
 
+// The cross product of two long, nearly parallel sides leans by its rounding over its length, which matters along the patch alone.
+Vec3 level(const Patch &patch, Vec3 across) {
+  Vec3 longest;
+  for (int k = 0; k < patch.n; ++k)
+    if (norm2(patch.side(k)) > norm2(longest)) longest = patch.side(k);
+  const double ee = norm2(longest);
+  return ee > 0 ? across - (dot(across, longest) / ee) * longest : across;
+}
+
 // Everything there is: for slivers and points next to the border of two features' regions.
 void offer_all(Separation &s, const Patch &patch, Vec3 across) {
-  offer_normal(s, patch, across);
-  offer_normal(s, patch, -across);
+  const Vec3 normal = level(patch, across);
+  offer_normal(s, patch, normal);
+  offer_normal(s, patch, -normal);
   offer_foot(s, patch, across);
   for (int k = 0; k < patch.n; ++k) {
     offer_side(s, patch, k);
@@ -94,9 +104,9 @@ void offer_all(Separation &s, const Patch &patch, Vec3 across) {
     const double ee = norm2(e);
     for (const Vec3 from : {patch.w[k], cross(across, e)})
       if (ee > 0) {
-        const Vec3 normal = from - (dot(from, e) / ee) * e;
-        offer_normal(s, patch, normal);
-        offer_normal(s, patch, -normal);
+        const Vec3 beside = from - (dot(from, e) / ee) * e;
+        offer_normal(s, patch, beside);
+        offer_normal(s, patch, -beside);
       }
   }
 }
