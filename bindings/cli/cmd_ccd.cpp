@@ -64,6 +64,10 @@ class QueryFile {
  private:
   [[noreturn]] void refuse(const std::string &what) const { throw Failure(kBadInput, path_ + ":" + std::to_string(line_) + ": " + what); }
 
+  static std::string coordinate_name(int p, int end, int axis) {
+    return "p" + std::to_string(p) + "_t" + std::to_string(end) + "_" + "xyz"[axis];
+  }
+
   void header(const std::vector<std::string> &cells) {
     names_ = cells;
     id_ = column("id", true), kind_ = column("kind", true), hit_ = column("hit", false);
@@ -71,14 +75,18 @@ class QueryFile {
     for (int p = 0; p < 4; ++p)
       for (int end = 0; end < 2; ++end)
         for (int axis = 0; axis < 3; ++axis)
-          coordinate_[p][end][axis] = column("p" + std::to_string(p) + "_t" + std::to_string(end) + "_" + "xyz"[axis], true);
+          coordinate_[p][end][axis] = column(coordinate_name(p, end, axis), true);
   }
 
   int column(const std::string &name, bool needed) const {
     const auto found = std::find(names_.begin(), names_.end(), name);
     if (found != names_.end()) return int(found - names_.begin());
     if (!needed) return -1;
-    const std::string near = nearest(name, names_);
+    std::vector<std::string> strange = names_;   // a right name is not a misspelt one
+    for (int p = 0; p < 4; ++p)
+      for (int end = 0; end < 2; ++end)
+        for (int axis = 0; axis < 3; ++axis) std::erase(strange, coordinate_name(p, end, axis));
+    const std::string near = nearest(name, strange);
     refuse("there is no column \"" + name + "\"" + (near.empty() ? "" : " (but \"" + near + "\")") +
            "; expected id, kind and p0_t0_x to p3_t1_z (the path of vertex 0 to 3 at t = 0 and 1)");
   }
