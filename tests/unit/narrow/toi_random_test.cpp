@@ -220,7 +220,8 @@ TEST(ToiConservative, ExactTouches_AreNeverMissedAndNeverLate) {
     ASSERT_LE(distance_at(q, Real(time)), 1e-17 * extent_of(q)) << "the construction itself, " << n;
     const ToiAnswer a = ask(q, DFM_TOI_CONSERVATIVE);
     ASSERT_LE(a.t, time) << n << (q.edges ? " edges" : " point");
-    ASSERT_LE(distance_at(q, Real(a.t)), 2e-12L * Real(extent_of(q))) << n << ": called touching while apart, t " << a.t << " exact " << time << " evaluations " << a.evaluations;
+    ASSERT_LE(distance_at(q, Real(a.t)), 2e-12L * Real(extent_of(q)))
+        << n << ": called touching while apart, t " << a.t << " exact " << time << " evaluations " << a.evaluations;
     ASSERT_LT(a.evaluations, 512u) << n;
   }
 }
