@@ -14,8 +14,6 @@ namespace {
 constexpr double kProven = 0.9;
 // A cubic that is nowhere larger than that many times its error is computed again, sharper.
 constexpr double kBlurred = 0x1p32;
-// And one below this share of its error is the rounding of zero: the features stay in one plane to 2^-50 of their size.
-constexpr double kNothing = 0x1p-6;
 
 struct Patch {
   Vec3 w[4];
@@ -150,7 +148,7 @@ Coplanarity coplanarity(const Query &q) {
   const double size3 = size(r0, r1) * size(q.e1[0], q.e1[1]) * size(q.e2[0], q.e2[1]);
   c.error = 0x1p-45 * size3;
   const double largest = c.f.size();
-  c.vanishes = !(largest > kNothing * c.error);
+  c.vanishes = largest == 0;
   if (!c.vanishes && largest < kBlurred * c.error) {
     c.f = sharp_coplanarity(q).high;
     const double pairs = 0x1p-94 * size3, sharp = c.f.size();
