@@ -51,7 +51,7 @@ double times(const double factor[2], double x) { return factor[1] * (factor[0] *
 
 struct Builder {
   Query query;
-  int shift = 0;
+  int shift = 0, exponent = 0;
 
   explicit Builder(double size) {   // of the coordinates
     if (size <= kHuge && (size >= kTiny || size == 0)) return;
@@ -75,7 +75,7 @@ struct Builder {
     double size = 0;
     for (int k = 0; k < q.ncorner; ++k)
       for (int i = 0; i < 3; ++i) size = std::max({size, std::fabs(q.w0[k][i]), std::fabs(q.w1[k][i])});
-    const int exponent = size > 0 ? exponent_of(size) : 0;
+    exponent = size > 0 ? exponent_of(size) : 0;
     split_power(-exponent, q.after);
     for (int k = 0; k < q.ncorner; ++k) q.w0[k] = times(q.after, q.w0[k]), q.w1[k] = times(q.after, q.w1[k]);
     for (Vec3 *v : {q.e1, q.e2})
@@ -86,6 +86,13 @@ struct Builder {
     const bool safe = options.method == DFM_TOI_CONSERVATIVE;
     q.max_iterations = options.max_iterations > 0 ? options.max_iterations : safe ? 512 : 100;
   }
+  double unscaled(double x) const {
+    double factor[2];
+    split_power(exponent, factor);
+    x = times(factor, x);
+    split_power(shift, factor);
+    return times(factor, x);
+  }
 };
 
 toi::Answer solve(const Query &query, int method) {
@@ -94,18 +101,53 @@ toi::Answer solve(const Query &query, int method) {
 
 }  // namespace
 
-ToiHit toi_point_triangle(const dfm_motion &p, const dfm_motion tri[3], const dfm_toi_options &options, double margin) {
-  int order[3] = {0, 1, 2};
+namespace {
+
+// Builds the query of a point and a triangle; order: which of the caller's vertices stands where.
+Builder build(const dfm_motion &p, const dfm_motion tri[3], int order[3]) {
   const auto sort2 = [&](int i, int j) {
     if (before(tri[order[j]], tri[order[i]])) std::swap(order[i], order[j]);
   };
+  order[0] = 0, order[1] = 1, order[2] = 2;
   sort2(0, 1), sort2(1, 2), sort2(0, 1);
-  const dfm_motion *corner[3] = {&tri[order[0]], &tri[order[1]], &tri[order[2]]};
   Builder s(largest(largest(largest(largest(0, p), tri[0]), tri[1]), tri[2]));
   s.query.ncorner = 3;
-  for (int k = 0; k < 3; ++k) s.corner(k, p, *corner[k]);
-  s.edge(1, s.query.e1, *corner[0], *corner[1]);
-  s.edge(2, s.query.e2, *corner[0], *corner[2]);
+  for (int k = 0; k < 3; ++k) s.corner(k, p, tri[order[k]]);
+  s.edge(1, s.query.e1, tri[order[0]], tri[order[1]]);
+  s.edge(2, s.query.e2, tri[order[0]], tri[order[2]]);
+  return s;
+}
+
+struct EdgeOrder {
+  bool turn_a, turn_b, swap;
+};
+Builder build(const dfm_motion a[2], const dfm_motion b[2], EdgeOrder &order) {
+  order.turn_a = before(a[1], a[0]), order.turn_b = before(b[1], b[0]);
+  const dfm_motion *const ends[2][2] = {{&a[order.turn_a], &a[!order.turn_a]}, {&b[order.turn_b], &b[!order.turn_b]}};
+  const bool same_first = !before(*ends[0][0], *ends[1][0]) && !before(*ends[1][0], *ends[0][0]);
+  order.swap = same_first ? before(*ends[1][1], *ends[0][1]) : before(*ends[1][0], *ends[0][0]);
+  const dfm_motion *const *x = ends[order.swap], *const *y = ends[!order.swap];
+  Builder s(largest(largest(largest(largest(0, a[0]), a[1]), b[0]), b[1]));
+  s.query.ncorner = 4;
+  s.corner(0, *x[0], *y[0]);
+  s.corner(1, *x[1], *y[0]);
+  s.corner(2, *x[1], *y[1]);
+  s.corner(3, *x[0], *y[1]);
+  s.edge(1, s.query.e1, *x[1], *x[0]);
+  s.edge(2, s.query.e2, *y[0], *y[1]);
+  return s;
+}
+
+double distance(Builder &s, double t) {
+  s.finish({}, 0);
+  return s.unscaled(std::max(0.0, toi::separate(s.query, t).lower));
+}
+
+}  // namespace
+
+ToiHit toi_point_triangle(const dfm_motion &p, const dfm_motion tri[3], const dfm_toi_options &options, double margin) {
+  int order[3];
+  Builder s = build(p, tri, order);
   s.finish(options, margin);
   const toi::Answer answer = solve(s.query, options.method);
   ToiHit hit{answer.t, {}, answer.evaluations};
@@ -115,23 +157,24 @@ ToiHit toi_point_triangle(const dfm_motion &p, const dfm_motion tri[3], const df
 }
 
 ToiHit toi_edge_edge(const dfm_motion a[2], const dfm_motion b[2], const dfm_toi_options &options, double margin) {
-  const bool turn_a = before(a[1], a[0]), turn_b = before(b[1], b[0]);
-  const dfm_motion *ends[2][2] = {{&a[turn_a], &a[!turn_a]}, {&b[turn_b], &b[!turn_b]}};
-  const bool same_first = !before(*ends[0][0], *ends[1][0]) && !before(*ends[1][0], *ends[0][0]);
-  const bool swap = same_first ? before(*ends[1][1], *ends[0][1]) : before(*ends[1][0], *ends[0][0]);
-  const dfm_motion *const *x = ends[swap], *const *y = ends[!swap];
-  Builder s(largest(largest(largest(largest(0, a[0]), a[1]), b[0]), b[1]));
-  s.query.ncorner = 4;
-  s.corner(0, *x[0], *y[0]);
-  s.corner(1, *x[1], *y[0]);
-  s.corner(2, *x[1], *y[1]);
-  s.corner(3, *x[0], *y[1]);
-  s.edge(1, s.query.e1, *x[1], *x[0]);
-  s.edge(2, s.query.e2, *y[0], *y[1]);
+  EdgeOrder order;
+  Builder s = build(a, b, order);
   s.finish(options, margin);
   const toi::Answer answer = solve(s.query, options.method);
-  const double on_x = answer.u, on_y = answer.v, on_a = swap ? on_y : on_x, on_b = swap ? on_x : on_y;
-  return {answer.t, {turn_a ? 1 - on_a : on_a, turn_b ? 1 - on_b : on_b, 0}, answer.evaluations};
+  const double on_a = order.swap ? answer.v : answer.u, on_b = order.swap ? answer.u : answer.v;
+  return {answer.t, {order.turn_a ? 1 - on_a : on_a, order.turn_b ? 1 - on_b : on_b, 0}, answer.evaluations};
+}
+
+double distance_point_triangle(const dfm_motion &p, const dfm_motion tri[3], double t) {
+  int order[3];
+  Builder s = build(p, tri, order);
+  return distance(s, t);
+}
+
+double distance_edge_edge(const dfm_motion a[2], const dfm_motion b[2], double t) {
+  EdgeOrder order;
+  Builder s = build(a, b, order);
+  return distance(s, t);
 }
 
 }  // namespace dfm
