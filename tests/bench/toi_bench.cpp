@@ -2,6 +2,7 @@
 // 1. Queries: ours through the C API on the exact reference queries, the published ones (both from ../shared) and random ones; beside them the scheme of
 //    the thesis (4.2): one bracket [0,1], a change of sign of the distance, an inside test at the one root.
 // 2. Roots: values of the function per root to 1e-12, for (4.7) as printed, for the distance to the plane and for the cubic.
+// 3. Guard: the whole list of feature pairs of two fine spheres that roll on each other and of two that crash, per listed pair.
 // --csv FILE --commit ID appends the figures. Of the repetitions the least time counts: others share the machine.
 #include <chrono>
 #include <cstdio>
@@ -9,7 +10,9 @@
 #include <fstream>
 
 #include "../unit/narrow/toi_support.h"
+#include "../unit/surfel/detect_scene.h"
 #include "narrow/toi_finders.h"
+#include "narrow/toi_guard.h"
 
 namespace {
 
@@ -205,6 +208,42 @@ void roots(const Sink &sink) {
   }
 }
 
+// ---- guard ---------------------------------------------------------------------------------------------------------------------------
+
+void guard(const Sink &sink) {
+  std::printf("\n%-24s %10s %8s %14s\n", "guard", "pairs", "hits", "ns per pair");
+  for (const bool crash : {false, true}) {
+    Scene scene;
+    const Mesh ball = sphere_mesh(0.1, 4);
+    scene.offset = 1e-3 * 0.012, scene.h = 1e-3;
+    const double fall = crash ? -5 : 0, slide = crash ? 0 : 0.5;
+    const dfm::Vec3 velocity{slide, 0, fall};
+    scene.add(ball);
+    scene.add(moved(ball, {}, dfm::Vec3{0, 0, 0.2 + scene.offset}), velocity);
+    dfm::BroadPhase broad(dfm::Memory::standard());
+    broad.update(scene.bodies, scene.obstacles, scene.filter, scene.h, scene.offset);
+    std::vector<double> end[2];
+    for (int b = 0; b < 2; ++b) {
+      const dfm::Surface &surface = *scene.surfaces[size_t(b)];
+      for (size_t i = 0; i < surface.x.size(); ++i) end[b].push_back(surface.x[i] + scene.h * surface.v[i]);
+    }
+    const double *const ends[2] = {end[0].data(), end[1].data()};
+    const double floor = scene.offset / 2, margin = 0.1 * floor;
+    dfm::Array<dfm::GuardHit> hits;
+    const size_t pairs = broad.candidates().size();
+    double best = HUGE_VAL;
+    for (int repetition = 0; repetition < kRepetitions; ++repetition) {
+      const auto begin = std::chrono::steady_clock::now();
+      dfm::guard_pairs(scene.bodies, ends, broad.candidates(), floor, margin, hits);
+      const std::chrono::duration<double> spent = std::chrono::steady_clock::now() - begin;
+      best = std::min(best, 1e9 * spent.count() / double(pairs));
+    }
+    const char *const name = crash ? "guard: crash at 5 m/s" : "guard: sliding at rest";
+    std::printf("%-24s %10zu %8zu %14.1f\n", name + 7, pairs, hits.size(), best);
+    if (sink.csv) std::fprintf(sink.csv, "%s,%s,guard,%zu,%zu,,,%.1f,,,,\n", sink.head.c_str(), name, pairs, hits.size(), best);
+  }
+}
+
 }  // namespace
 
 int main(int argc, char **argv) {
@@ -225,6 +264,7 @@ int main(int argc, char **argv) {
   }
   queries(sink, "random", random_queries(), false);
   roots(sink);
+  guard(sink);
   if (sink.csv) std::fclose(sink.csv);
   return 0;
 }

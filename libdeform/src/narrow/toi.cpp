@@ -25,9 +25,21 @@ int exponent_of(double x) {
   return int(bits >> 52 & 0x7ff) - 1022;
 }
 
-double largest(double so_far, const dfm_motion &m) {
-  for (int i = 0; i < 3; ++i) so_far = std::max({so_far, std::fabs(m.p0[i]), std::fabs(m.p1[i])});
-  return so_far;
+// Largest coordinate, one chain of comparisons per axis.
+struct Size {
+  double axis[3] = {0, 0, 0};
+  void look_at(const double *p) {
+    for (int i = 0; i < 3; ++i) axis[i] = std::max(axis[i], std::fabs(p[i]));
+  }
+  void look_at(const dfm_motion &m) { look_at(m.p0), look_at(m.p1); }
+  double largest() const { return std::max({axis[0], axis[1], axis[2]}); }
+};
+
+double size_of(const dfm_motion *a, int na, const dfm_motion *b, int nb) {
+  Size size;
+  for (int k = 0; k < na; ++k) size.look_at(a[k]);
+  for (int k = 0; k < nb; ++k) size.look_at(b[k]);
+  return size.largest();
 }
 
 bool before(const dfm_motion &a, const dfm_motion &b) {
@@ -42,11 +54,13 @@ bool before(const dfm_motion &a, const dfm_motion &b) {
 constexpr double kTolerance = 1e-12;
 constexpr double kHuge = 0x1p1000, kTiny = 0x1p-900;
 
-// Two factors whose product is 2^exponent.
+// Two factors whose product is 2^exponent; the second is 1 unless the first alone would not be a normal number.
 void split_power(int exponent, double out[2]) {
-  out[0] = power_of_two(exponent / 2), out[1] = power_of_two(exponent - exponent / 2);
+  const bool normal = exponent > -1000 && exponent < 1000;
+  const int first = normal ? exponent : exponent / 2;
+  out[0] = power_of_two(first), out[1] = power_of_two(exponent - first);
 }
-Vec3 times(const double factor[2], Vec3 v) { return factor[1] * (factor[0] * v); }
+Vec3 times(const double factor[2], Vec3 v) { return factor[1] == 1 ? factor[0] * v : factor[1] * (factor[0] * v); }
 double times(const double factor[2], double x) { return factor[1] * (factor[0] * x); }
 
 struct Builder {
@@ -72,9 +86,9 @@ struct Builder {
 
   void finish(const dfm_toi_options &options, double margin) {
     Query &q = query;
-    double size = 0;
-    for (int k = 0; k < q.ncorner; ++k)
-      for (int i = 0; i < 3; ++i) size = std::max({size, std::fabs(q.w0[k][i]), std::fabs(q.w1[k][i])});
+    Size extent;
+    for (int k = 0; k < q.ncorner; ++k) extent.look_at(&q.w0[k].x), extent.look_at(&q.w1[k].x);
+    const double size = extent.largest();
     exponent = size > 0 ? exponent_of(size) : 0;
     split_power(-exponent, q.after);
     for (int k = 0; k < q.ncorner; ++k) q.w0[k] = times(q.after, q.w0[k]), q.w1[k] = times(q.after, q.w1[k]);
@@ -110,7 +124,7 @@ Builder build(const dfm_motion &p, const dfm_motion tri[3], int order[3]) {
   };
   order[0] = 0, order[1] = 1, order[2] = 2;
   sort2(0, 1), sort2(1, 2), sort2(0, 1);
-  Builder s(largest(largest(largest(largest(0, p), tri[0]), tri[1]), tri[2]));
+  Builder s(size_of(&p, 1, tri, 3));
   s.query.ncorner = 3;
   for (int k = 0; k < 3; ++k) s.corner(k, p, tri[order[k]]);
   s.edge(1, s.query.e1, tri[order[0]], tri[order[1]]);
@@ -127,7 +141,7 @@ Builder build(const dfm_motion a[2], const dfm_motion b[2], EdgeOrder &order) {
   const bool same_first = !before(*ends[0][0], *ends[1][0]) && !before(*ends[1][0], *ends[0][0]);
   order.swap = same_first ? before(*ends[1][1], *ends[0][1]) : before(*ends[1][0], *ends[0][0]);
   const dfm_motion *const *x = ends[order.swap], *const *y = ends[!order.swap];
-  Builder s(largest(largest(largest(largest(0, a[0]), a[1]), b[0]), b[1]));
+  Builder s(size_of(a, 2, b, 2));
   s.query.ncorner = 4;
   s.corner(0, *x[0], *y[0]);
   s.corner(1, *x[1], *y[0]);

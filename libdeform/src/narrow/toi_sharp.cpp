@@ -14,11 +14,15 @@ Pair sum(double a, double b) {
   const double s = a + b, t = s - a;
   return {s, (a - (s - t)) + (b - t)};
 }
+// |a| >= |b|, or a is 0.
+Pair quick_sum(double a, double b) {
+  const double s = a + b;
+  return {s, b - (s - a)};
+}
+// Off by 2^-104 of |a| + |b|, which is what the bounds count on; of a sum that cancels it may be more.
 Pair operator+(Pair a, Pair b) {
-  Pair s = sum(a.high, b.high);
-  const Pair t = sum(a.low, b.low);
-  s = sum(s.high, s.low + t.high);
-  return sum(s.high, s.low + t.low);
+  const Pair s = sum(a.high, b.high);
+  return quick_sum(s.high, s.low + (a.low + b.low));
 }
 Pair operator-(Pair a, Pair b) { return a + Pair{-b.high, -b.low}; }
 Pair operator*(Pair a, Pair b) {
@@ -29,7 +33,7 @@ Pair operator*(Pair a, Pair b) {
   const Pair x = split(a.high), y = split(b.high);
   const double p = a.high * b.high;
   const double rest = ((x.high * y.high - p) + x.high * y.low + x.low * y.high) + x.low * y.low;
-  return sum(p, rest + (a.high * b.low + a.low * b.high));
+  return quick_sum(p, rest + (a.high * b.low + a.low * b.high));
 }
 
 struct Pairs {
