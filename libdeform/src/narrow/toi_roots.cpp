@@ -146,7 +146,7 @@ class Roots {
     }
   }
 
-  static constexpr int kMaxTimes = 128;   // 3 + 4 sides x (3 quadratics x 4 + 3 lines x 2) without, 6 + 4 x (8 + 4) + ... with separation
+  static constexpr int kMaxTimes = 128;   // at most 6 + 4 sides x (3 quadratics x 4 + 3 lines x 2) = 78 are there
   const Query &q_;
   const int method_;
   Coplanarity plane_;
