@@ -218,6 +218,12 @@ TEST(Toi, Bits_DoNotDependOnUnitOriginOrOrder) {
   }
 }
 
+TEST(Toi, LargestNumbers_DoNotOverflow) {
+  const double far = 0x1.8p1023;   // twice that is no number any more
+  const P a = {0, 0, -far}, b = {4e300, 0, -far}, c = {0, 4e300, -far}, d = {0, 0, far}, e = {4e300, 0, far}, f = {0, 4e300, far};
+  expect_time(query(false, {P{1e300, 1e300, far}, a, b, c}, {P{1e300, 1e300, -far}, d, e, f}), 0.5, "triangle and point fall past each other");
+}
+
 // With too few iterations the conservative answer is early, never late and never a miss.
 TEST(Toi, IterationCap_StaysOnTheSafeSide) {
   Random random(3);
