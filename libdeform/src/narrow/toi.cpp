@@ -94,10 +94,11 @@ struct Builder {
     for (int k = 0; k < q.ncorner; ++k) q.w0[k] = times(q.after, q.w0[k]), q.w1[k] = times(q.after, q.w1[k]);
     for (Vec3 *v : {q.e1, q.e2})
       for (int end = 0; end < 2; ++end) v[end] = times(q.after, v[end]);
-    const auto scaled = [&](double x) { return std::min(times(q.after, times(q.before, x)), 0x1p100); };
-    q.separation = scaled(options.min_separation);
-    q.tolerance = margin > 0 ? scaled(margin) : options.tolerance > 0 ? options.tolerance : kTolerance;
+    const auto scaled = [&](double x) { return std::min(times(q.after, x), 0x1p100); };   // of lengths after the shift
+    q.separation = scaled(times(q.before, options.min_separation));
     const bool safe = options.method == DFM_TOI_CONSERVATIVE;
+    const double share = options.tolerance > 0 ? options.tolerance : kTolerance;
+    q.tolerance = margin > 0 ? scaled(times(q.before, margin)) : safe ? share * scaled(size) : share;
     q.max_iterations = options.max_iterations > 0 ? options.max_iterations : safe ? 512 : 100;
   }
   double unscaled(double x) const {
@@ -112,10 +113,6 @@ struct Builder {
 toi::Answer solve(const Query &query, int method) {
   return method == DFM_TOI_CONSERVATIVE ? toi::conservative(query) : toi::by_roots(query, method);
 }
-
-}  // namespace
-
-namespace {
 
 // Builds the query of a point and a triangle; order: which of the caller's vertices stands where.
 Builder build(const dfm_motion &p, const dfm_motion tri[3], int order[3]) {
