@@ -143,21 +143,27 @@ Tally answer(const CcdOptions &options, const std::vector<CcdQuery> &queries, st
   const auto method = std::find(kRoots.begin(), kRoots.end(), options.root) - kRoots.begin();
   const dfm_toi_options toi = {sizeof toi, int32_t(method), options.tolerance, options.separation, 0};
   Tally tally;
-  for (const CcdQuery &q : queries) {
-    double t = 0;
-    const auto begin = std::chrono::steady_clock::now();
-    need(q.edges ? dfm_toi_edge_edge(q.motion, q.motion + 2, &toi, &t, nullptr) : dfm_toi_point_triangle(q.motion, q.motion + 1, &toi, &t, nullptr));
-    tally.seconds += std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
-    const uint32_t evaluations = dfm_toi_evaluations();
+  std::vector<double> times(queries.size());
+  std::vector<uint32_t> evaluations(queries.size());
+  const auto begin = std::chrono::steady_clock::now();
+  for (size_t k = 0; k < queries.size(); ++k) {
+    const dfm_motion *const m = queries[k].motion;
+    need(queries[k].edges ? dfm_toi_edge_edge(m, m + 2, &toi, &times[k], nullptr) : dfm_toi_point_triangle(m, m + 1, &toi, &times[k], nullptr));
+    evaluations[k] = dfm_toi_evaluations();
+  }
+  tally.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+  for (size_t k = 0; k < queries.size(); ++k) {
+    const CcdQuery &q = queries[k];
+    const double t = times[k];
     const bool hit = t <= 1;
-    tally.edges += q.edges, tally.hits += hit, tally.evaluations += evaluations, tally.most = std::max(tally.most, evaluations);
+    tally.edges += q.edges, tally.hits += hit, tally.evaluations += evaluations[k], tally.most = std::max(tally.most, evaluations[k]);
     if (q.labelled) {
       ++tally.labelled;
       tally.missed += q.hit && !hit, tally.false_hits += !q.hit && hit;
       if (q.hit && hit && t > q.latest) ++tally.late, tally.latest = std::max(tally.latest, t - q.latest);
     }
     char row[64];
-    std::snprintf(row, sizeof row, ",%d,%.17g,%u\n", hit, t, evaluations);
+    std::snprintf(row, sizeof row, ",%d,%.17g,%u\n", hit, t, evaluations[k]);
     rows += q.id + row;
   }
   return tally;
