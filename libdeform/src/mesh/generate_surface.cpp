@@ -66,9 +66,9 @@ TriMesh make_ball_surface(const Memory &memory, double radius, uint32_t triangle
   const uint32_t n = rounded(std::sqrt(triangles / 20.0));
   const Icosahedron ico;
   Soup soup(memory);
-  for (const auto &[a, b, c] : ico.face) {
+  for (const auto &face : ico.face) {
     const auto at = [&](uint32_t i, uint32_t j) {
-      return radius * normalized(double(n - i - j) * ico.corner[a] + double(i) * ico.corner[b] + double(j) * ico.corner[c]);
+      return radius * normalized(double(n - i - j) * ico.corner[face[0]] + double(i) * ico.corner[face[1]] + double(j) * ico.corner[face[2]]);
     };
     for (uint32_t i = 0; i < n; ++i)
       for (uint32_t j = 0; i + j < n; ++j) {
