@@ -31,6 +31,10 @@ void plan_effects(const SceneFacts &f, Plan &plan) {
            "('deform plugin info %s' lists them) or take the effect from the list", name.c_str(), idle.c_str(), idle.c_str());
     if (by.empty()) {
       const std::string could = provider(f.available, name);
+      if (f.bodies == 0 && !could.empty()) {   // an empty world: whoever comes first may provide it
+        plan.effects.push_back({name, "effects", ""});
+        continue;
+      }
       fail(DFM_E_ARG, "effect '%s' is asked for, but nothing in the scene provides it; %s", name.c_str(),
            could.empty() ? "no loaded plugin could" : ("these loaded plugins could: " + could).c_str());
     }
