@@ -1,8 +1,8 @@
-// From parameters and fields by cell to what the passes read: stiffness per spring (Van Gelder), frozen extra coordinates, dampers, drag,
+// From parameters and fields by cell to what the passes read: stiffness per spring, frozen extra coordinates, dampers, drag,
 // springs that are switched off. What nothing calls for stays empty and its kernels are never chosen.
-#include <algorithm>
-
 #include <stdio.h>
+
+#include <algorithm>
 
 #include "msm_body.h"
 
@@ -44,7 +44,8 @@ void Body::take_fields(const dfm_mesh &m) {
     }
 }
 
-// Every cell gives each of its edges E V / L0^2. What all cells share (Young's modulus, the volume term's correction) stays outside.
+// Every cell gives each of its edges E V, times what msm_stiffness.cpp finds. What all cells share (Young's modulus, the volume term's
+// correction, a branch) stays outside.
 void Body::find_shapes() {
   const bool scaled = !field[kVolume].empty() || !field[kPoisson].empty(), stiff = !field[kYoung].empty();
   scale = (scaled ? 1.0 : spring_scale(volume_ratio(0))) * (stiff ? 1.0 : params[kYoung]);
@@ -55,10 +56,7 @@ void Body::find_shapes() {
     const double share = volume * (stiff ? field[kYoung][c] : 1.0) * (scaled ? spring_scale(volume_ratio(c)) : 1.0);
     for (int n = 0; n < 6; ++n) shape[cell_edge[6 * size_t(c) + n]] += share;
   }
-  for (uint32_t e = 0; e < nedge; ++e) {
-    const double l2 = edge_length[e] * edge_length[e];
-    shape[e] = l2 > kShortestSquared ? shape[e] / l2 : 0;  // two points at one place: no direction, no spring
-  }
+  for (uint32_t e = 0; e < nedge; ++e) shape[e] *= per_modulus[e];
 }
 
 // w^2 of a spring d at rest: softer, g^2 (a.d)^2, one extra coordinate g a.X; stiffer, g^2 (|d|^2 - (a.d)^2), two of them along any two
@@ -166,6 +164,8 @@ void Body::apply_params(const double *values) {
   find_shapes();
   find_tilts();
   find_dampers();
+  Buffer<uint8_t> off;
+  off.swap(edge_off);  // the weights of the step bound never depend on what is switched off, nor on when it was
   if (has_branch() && rest_now.empty()) rest_now.create(host, spring_slots());
   for (uint32_t b = 0; b < nblock; ++b) {
     const size_t at = size_t(block[b].stiffness - stiffness.data());
@@ -175,6 +175,9 @@ void Body::apply_params(const double *values) {
   fill_stiffness();
   find_weights();
   find_effects();
+  if (off.empty()) return;
+  off.swap(edge_off);
+  fill_stiffness();
 }
 
 // The rows of the step bound keep counting a spring that is off: a bound it stays, and a cut need not look for new weights.

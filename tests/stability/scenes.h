@@ -4,6 +4,7 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <filesystem>
 #include <limits>
@@ -72,6 +73,15 @@ class SceneRun {
       if (probes_[i].size() == 8 && probes_[i][1] == name) return {std::stod(probes_[i][2]), std::stod(probes_[i][3]), std::stod(probes_[i][4])};
     ADD_FAILURE() << "no probe " << name;
     return {0, 0, 0};
+  }
+
+  // All places of a probe: t, x, y, z.
+  std::vector<std::array<double, 4>> probe_rows(const std::string &name) const {
+    std::vector<std::array<double, 4>> rows;
+    for (const auto &c : probes_)
+      if (c.size() == 8 && c[1] == name) rows.push_back({std::stod(c[0]), std::stod(c[2]), std::stod(c[3]), std::stod(c[4])});
+    EXPECT_FALSE(rows.empty()) << "no probe " << name;
+    return rows;
   }
 
   // What holds in every scene: finite, no crossing triangle pair in any recorded state, and at least so many contacts, so that something

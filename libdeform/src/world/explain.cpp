@@ -21,7 +21,10 @@ std::string quote(const std::string &s) {
 // What a stage costs grows with this; counts of the present scene, not seconds.
 std::string cost(const World &w, StageId id) {
   size_t points = 0, cells = 0, surfels = 0, triangles = 0, weights = 0;
-  for (auto &b : w.bodies) points += b->p.n, cells += b->tets.size() / 4, surfels += b->surface.nsurfel, triangles += b->surface.ntri, weights += b->surface.weight.size();
+  for (auto &b : w.bodies) {
+    points += b->p.n, cells += b->tets.size() / 4;
+    surfels += b->surface.nsurfel, triangles += b->surface.ntri, weights += b->surface.weight.size();
+  }
   switch (id) {
     case StageId::model: return format("%zu cells", cells);
     case StageId::predict:
