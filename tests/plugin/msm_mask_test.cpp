@@ -121,6 +121,24 @@ TEST(MsmMask, OnAgain_IsThePlainBodyToTheBit) {
   EXPECT_EQ(a.bound(), b.bound());
 }
 
+TEST(MsmMask, ParametersThatFindNoMemory_LeaveAMaskAndABodyThatRuns) {
+  Host host;
+  Instance b(host, kuhn_bar(3, 2, 2, 0.1, 0.2), {1e5}, 4, {{"damping_mass", std::vector<double>(72, 1)}});
+  b.mask({2}, false);
+  b.shake(0.01, 1);
+  const std::vector<uint8_t> before = get(b);
+  size_t failed = 0;
+  for (dfm_status status = DFM_E_NOMEM; status == DFM_E_NOMEM; ++failed) {
+    host.calls = 0, host.fail_at = failed;
+    status = b.ops->set_params(b.self, Instance::row(soft()).data());
+    host.fail_at = ~size_t(0);
+    EXPECT_EQ(get(b), before);
+    b.forces(), b.bound();
+    EXPECT_TRUE(std::isfinite(b.largest_force()));
+  }
+  EXPECT_GT(failed, 5u);
+}
+
 TEST(MsmMask, EdgeThatDoesNotExist_IsRefusedAndNothingChanges) {
   Host host;
   Instance b(host, irregular_tet(), soft());
