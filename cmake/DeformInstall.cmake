@@ -31,7 +31,7 @@ install(FILES ${CMAKE_BINARY_DIR}/cmake/deformConfig.cmake ${CMAKE_BINARY_DIR}/c
 
 set(deform_pc_private "")
 if(NOT DEFORM_SHARED)
-  set(deform_pc_private "-lstdc++ -lm -ldl -pthread")
+  set(deform_pc_private "-lz -lstdc++ -lm -ldl -pthread")
 endif()
 configure_file(${CMAKE_SOURCE_DIR}/cmake/deform.pc.in ${CMAKE_BINARY_DIR}/cmake/deform.pc @ONLY)
 install(FILES ${CMAKE_BINARY_DIR}/cmake/deform.pc DESTINATION ${CMAKE_INSTALL_LIBDIR}/pkgconfig)

@@ -27,6 +27,20 @@ void print_list(const JsonValue &plan, const char *key, const char *title, const
   }
 }
 
+// What differs from cell to cell, and who says so.
+void print_fields(const JsonValue &plan) {
+  const JsonValue *bodies = plan.find("bodies");
+  for (size_t i = 0; bodies && i < bodies->items.size(); ++i) {
+    const JsonValue &body = bodies->items[i];
+    const JsonValue *fields = body.find("fields");
+    for (size_t k = 0; fields && k < fields->items.size(); ++k) {
+      const JsonValue &f = fields->items[k];
+      std::printf("  %-20s  %s by cell, from %s: %s to %s\n", body.get("name").c_str(), f.get("name").c_str(), f.get("from").c_str(), f.get("min").c_str(),
+                  f.get("max").c_str());
+    }
+  }
+}
+
 int explain(const Options &options, const Globals &globals) {
   SceneFile scene(globals, options.scene, options.set, 0);
   const std::string text = scene.explain();
@@ -39,6 +53,8 @@ int explain(const Options &options, const Globals &globals) {
   print_list(plan, "effects", "effects", {"asked_by", "provided_by"});
   print_list(plan, "stages", "stages of a step, in order", {"why", "cost"});
   print_list(plan, "absent", "left out", {"why"});
+  print_list(plan, "bodies", "bodies", {"model", "surface", "cells", "points", "surfels"});
+  print_fields(plan);
   if (const JsonValue *step = plan.find("step")) {
     std::printf("step\n  stable %s s", step->get("stable_s").c_str());
     if (const std::string body = step->get("worst_body"); !body.empty())

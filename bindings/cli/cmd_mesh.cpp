@@ -1,4 +1,4 @@
-// deform mesh info FILE | make cylinder, beam or ball --out FILE | convert IN OUT | fill
+// deform mesh info FILE | make cylinder, beam or ball --out FILE | convert IN OUT; fill has its own file
 #include <cstdio>
 #include <memory>
 #include <string>
@@ -167,9 +167,7 @@ void add_mesh(CLI::App &app, Globals &globals, int *exit_code) {
   convert_command->add_option("OUT", *second, ".msh (MSH 4.1), .msh2 (MSH 2.2) or .vtk (legacy VTK)")->required();
   convert_command->callback([=, &globals] { *exit_code = convert(globals, *first, *second); });
 
-  CLI::App *fill_command = mesh->add_subcommand("fill", "tetrahedra for a closed surface (not available yet)");
-  fill_command->allow_extras();
-  fill_command->callback([=] { *exit_code = fail("not available yet: deform mesh fill; give a tetrahedral mesh (.msh or .vtk) instead of a surface"); });
+  add_mesh_fill(mesh, globals, exit_code);
 }
 
 }  // namespace cli

@@ -184,8 +184,8 @@ TEST(Fields, WrongOnes_AreRefused) {
   dfm_cell_field f[2] = {{"yuong", values.data(), 1}, {"young", values.data(), 1}};
   b.def.nfield = 1, b.def.fields = f;
   expect_refused(b, DFM_E_ARG, {"'block'", "'yuong'", "did you mean 'young'"});
-  f[0].key = "damping_mass";
-  expect_refused(b, DFM_E_ARG, {"damping_mass", "whole body", "young"});
+  f[0].key = "relaxation_time";
+  expect_refused(b, DFM_E_ARG, {"relaxation_time", "whole body", "young"});
   f[0] = {"young", values.data(), 3};
   expect_refused(b, DFM_E_ARG, {"3 values per cell, 1 expected"});
   f[0] = {"young", nullptr, 1};
@@ -227,13 +227,13 @@ TEST(CellMaterials, WrongOnes_AreRefused) {
   expect_refused(b, DFM_E_HANDLE, {"'far'", "another world"});
   materials[11] = 12345;
   expect_refused(b, DFM_E_HANDLE, {});
-  // What the model takes for the whole body cannot differ, unless the body says it itself. damping_mass is such a row of msm.
+  // What the model takes for the whole body cannot differ, unless the body says it itself. relaxation_time is such a row of msm.
   dfm_material_def d = dfm_material_def_default();
-  d.name = "dragged", d.damping_mass = 3, d.damping_stiffness = 1e-3;
+  const double slow = 3, time = 0.2;
+  const dfm_param_value extra{"relaxation_time", &slow, 1}, given{"relaxation_time", &time, 1};
+  d.name = "slow", d.young = 1e4, d.extra = {sizeof(dfm_params), 1, &extra};
   test::ok(dfm_material_create(b.world, &d, &materials[11]));
-  expect_refused(b, DFM_E_ARG, {"'damping_mass'", "'gel'", "'dragged'", "differ"});
-  const double drag = 1;
-  const dfm_param_value given{"damping_mass", &drag, 1};
+  expect_refused(b, DFM_E_ARG, {"'relaxation_time'", "'gel'", "'slow'", "differ"});
   b.def.model_params = {sizeof(dfm_params), 1, &given};
   b.create();
 }

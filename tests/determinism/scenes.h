@@ -1,6 +1,6 @@
 // Scenes whose state hash must be the same on every build, cut and processor.
 #pragma once
-#include "world.h"
+#include "coupled.h"
 
 namespace scenes {
 
@@ -65,13 +65,29 @@ inline dfm_world fine_ball(dfm_context *c) {
   return w;
 }
 
+// Two bodies with surfaces of their own: a ball that hangs by moving least squares falls on a block that hangs by cells, on a floor.
+inline dfm_world coupled_pair(dfm_context *c) {
+  const dfm_world w = test::make_world(c);
+  test::add_plane(w, "floor");
+  test::set_friction(w, 0.4);
+  const test::Skin box = test::box_skin({0.1, 0.1, 0.06}, 8), ball = test::ball_skin(0.048, 3);
+  const dfm_surface_def below = box.def(), above = ball.def(DFM_COUPLING_MLS, 1.5);
+  test::BodyOptions o;
+  o.young = 5e4, o.damping_stiffness = 5e-4;
+  o.name = "block", o.position = {-0.05, -0.05, 1e-4}, o.surface = &below;
+  test::make_body(c, w, "beam", {0.1, 0.1, 0.06}, 60, o);
+  o.name = "ball", o.position = {0.01, 0.005, 0.1085}, o.velocity = {0.2, 0.1, -0.6}, o.spin = {0, 10, 3}, o.surface = &above;
+  test::make_body(c, w, "ball", {0.05, 0, 0}, 100, o);
+  return w;
+}
+
 struct Scene {
   const char *name;
   dfm_world (*build)(dfm_context *);
   int steps;
 };
 inline const Scene all[] = {{"ball_on_floor", ball_on_floor, 150}, {"crossing_beams", crossing_beams, 150}, {"ten_in_a_box", ten_in_a_box, 80},
-                                {"fine_ball", fine_ball, 20}};
+                                {"fine_ball", fine_ball, 20}, {"coupled_pair", coupled_pair, 80}};
 
 inline void advance(dfm_world w, int steps) {
   for (int i = 0; i < steps; ++i) ASSERT_EQ(dfm_world_step(w, 1e-3, nullptr), DFM_OK) << dfm_last_error();

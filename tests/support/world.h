@@ -32,6 +32,7 @@ struct BodyOptions {
   double young = 1e5, poisson = 0.3, density = 1000, damping_stiffness = 0, damping_mass = 0, volume = -1;
   std::array<double, 3> position{}, velocity{}, spin{};
   std::array<double, 4> rotation{0, 0, 0, 1};
+  const dfm_surface_def *surface = nullptr;
 };
 
 // A body from a generator: kind "beam", "cylinder" or "ball".
@@ -57,6 +58,7 @@ inline dfm_body make_body(dfm_context *c, dfm_world w, const char *kind, std::ar
   if (o.volume >= 0) d.model_params = {sizeof(dfm_params), 1, &volume};
   for (int k = 0; k < 3; ++k) d.pose.position[k] = o.position[k], d.velocity[k] = o.velocity[k], d.spin[k] = o.spin[k];
   for (int k = 0; k < 4; ++k) d.pose.rotation[k] = o.rotation[k];
+  d.surface = o.surface;
   dfm_body body = 0;
   ok(dfm_body_create(w, &d, &body));
   ok(dfm_tetmesh_destroy(mesh));

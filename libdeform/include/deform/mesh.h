@@ -15,7 +15,8 @@ DFM_API dfm_status dfm_tetmesh_read(dfm_context *context, const char *path, dfm_
 /** Generators, SI units, about `cells` tetrahedra: a number near it that the shape's lattice offers, more where cells would otherwise be
  * longer than twice their width.
  * "cylinder": size = {radius, length, 0}, axis z from 0 to length, base at the origin; "beam": size = {x, y, z} edges from the origin;
- * "ball": size = {radius, 0, 0}, about the origin. @return DFM_OK; DFM_E_ARG; DFM_E_NOMEM. Threads: Any thread. Since 0.1. */
+ * "ball": size = {radius, 0, 0}, about the origin; "tube": size = {inner radius, outer radius, length}, as the cylinder (since 0.2).
+ * @return DFM_OK; DFM_E_ARG; DFM_E_NOMEM. Threads: Any thread. Since 0.1. */
 DFM_API dfm_status dfm_tetmesh_make(dfm_context *context, const char *kind, const double size[3], uint32_t cells, dfm_tetmesh *out);
 /** @return DFM_OK; DFM_E_HANDLE. Threads: Any thread, with nobody using the mesh or its arrays. Since 0.1. */
 DFM_API dfm_status dfm_tetmesh_destroy(dfm_tetmesh mesh);
@@ -62,6 +63,10 @@ DFM_API dfm_status dfm_trimesh_read(dfm_context *context, const char *path, dfm_
 /** The same repair for triangles of the host: points [npoint,3] m, triangles [ntriangle,3]. Threads: Any thread. Since 0.2. */
 DFM_API dfm_status dfm_trimesh_create(dfm_context *context, uint32_t npoint, const double *points, uint32_t ntriangle,
                                       const uint32_t *triangles, dfm_trimesh *out);
+/** Generators of closed surfaces, SI units, about `triangles` near-equilateral triangles: "cylinder", "beam", "ball" and "tube" as for
+ * dfm_tetmesh_make; "torus": size = {ring radius, tube radius, 0}, about the origin, axis z.
+ * @return DFM_OK; DFM_E_ARG; DFM_E_NOMEM. Threads: Any thread. Since 0.2. */
+DFM_API dfm_status dfm_trimesh_make(dfm_context *context, const char *kind, const double size[3], uint32_t triangles, dfm_trimesh *out);
 /** @return DFM_OK; DFM_E_HANDLE. Threads: Any thread, with nobody using the mesh or its arrays. Since 0.2. */
 DFM_API dfm_status dfm_trimesh_destroy(dfm_trimesh mesh);
 typedef struct dfm_trimesh_info {

@@ -211,16 +211,11 @@ dfm_status dfm_body_apply_impulse(dfm_body body, const double point[3], const do
           closest_on_triangle(load3(point), surfel_vector(b, b.p.x, c[0]), surfel_vector(b, b.p.x, c[1]), surfel_vector(b, b.p.x, c[2]));
       if (q.distance2 < best) best = q.distance2, triangle = t, std::copy(q.weight, q.weight + 3, weight);
     }
-    auto push = [&](uint32_t phyxel, double share) {
-      for (int k = 0; k < 3; ++k)
-        b.p.v[size_t(phyxel) * kStride + size_t(k)] += share * b.p.inv_mass[size_t(phyxel) * kStride + size_t(k)] * impulse[k];
-    };
-    for (int k = 0; k < 3; ++k) {
-      const uint32_t s = b.surface.tri[size_t(3) * triangle + size_t(k)];
-      if (b.surface.identity()) push(b.surface.point[s], weight[k]);
-      else
-        for (uint32_t j = b.surface.row[s]; j < b.surface.row[s + 1]; ++j) push(b.surface.col[j], weight[k] * b.surface.weight[j]);
-    }
+    // dv = M^-1 N^T p: of all changes that give the point its new velocity the one of least kinetic energy
+    for (int k = 0; k < 3; ++k)
+      b.surface.each_phyxel(b.surface.tri[size_t(3) * triangle + size_t(k)], [&](uint32_t phyxel, double w) {
+        for (size_t c = 0; c < 3; ++c) b.p.v[size_t(phyxel) * kStride + c] += weight[k] * w * b.p.inv_mass[size_t(phyxel) * kStride + c] * impulse[c];
+      });
   });
 }
 

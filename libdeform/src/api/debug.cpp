@@ -47,7 +47,7 @@ dfm_status dfm_debug_write_surface(dfm_body body, const char *path) {
     const double h = b.world->report.h;
     for (uint32_t s = 0; s < n; ++s) {
       store3(&x[size_t(3) * s], surfel_vector(b, b.p.x, s)), store3(&v[size_t(3) * s], surfel_vector(b, b.p.v, s));
-      const Vec3 rest = b.surface.identity() ? load3(&b.p.rest[size_t(3) * b.surface.point[s]]) : load3(&x[size_t(3) * s]);
+      const Vec3 rest = load3(b.surface.identity() ? &b.p.rest[size_t(3) * b.surface.point[s]] : &b.surface.rest[size_t(3) * s]);
       store3(&u[size_t(3) * s], load3(&x[size_t(3) * s]) - rest);
       if (h > 0) store3(&force[size_t(3) * s], (1 / h) * load3(&b.surfel_impulse[size_t(3) * s]));
     }

@@ -1,63 +1,32 @@
 #include "deform/mesh.h"
 
 #include <algorithm>
-#include <memory>
 #include <string>
-#include <vector>
 
-#include "api/objects.h"
-#include "mesh/mesh.h"
-#include "plugin/context.h"
+#include "api/mesh_objects.h"
+#include "mesh/raw_mesh.h"
 
 using dfm::fail;
 using dfm::guard;
 using dfm::need;
-
-namespace {
-
-// A mesh with what the C side borrows from it.
-struct MeshObject {
-  dfm_context &context;
-  dfm::TetMesh mesh;
-  dfm::MeshStatistics statistics;
-  std::vector<const char *> names;
-  std::string warnings;
-
-  MeshObject(dfm_context &c, dfm::TetMesh &&m) : context(c), mesh(std::move(m)), statistics(mesh_statistics(mesh)) {
-    for (const dfm::MeshGroup &g : mesh.groups) names.push_back(g.name.c_str());
-    for (const std::string &w : mesh.warnings) warnings += w + "\n";
-  }
-};
-
-MeshObject &mesh_of(dfm_tetmesh handle) { return dfm::resolve<MeshObject>(dfm::Kind::tetmesh, handle); }
-
-void destroy(uint64_t handle) {
-  auto *object = static_cast<MeshObject *>(dfm::handle_find(dfm::Kind::tetmesh, handle));
-  dfm::handle_destroy(handle);
-  delete object;
-}
-
-dfm_tetmesh keep(dfm_context &context, dfm::TetMesh &&mesh) {
-  auto object = std::make_unique<MeshObject>(context, std::move(mesh));
-  const uint64_t handle = dfm::handle_create(dfm::Kind::tetmesh, object.get());
-  try {
-    context.add_live(handle, destroy);
-  } catch (...) {
-    dfm::handle_destroy(handle);
-    throw;
-  }
-  object.release();
-  return handle;
-}
-
-}  // namespace
+using Object = dfm::TetMeshObject;
 
 dfm_status dfm_tetmesh_read(dfm_context *context, const char *path, dfm_tetmesh *out) {
   return guard([&] {
     need(context, "context"), need(path, "path"), need(out, "out");
     dfm::TetMesh mesh = dfm::read_tet_mesh(context->memory, path);
     for (const std::string &w : mesh.warnings) context->logf(DFM_LOG_WARNING, "%s: %s", path, w.c_str());
-    *out = keep(*context, std::move(mesh));
+    *out = Object::keep(*context, std::move(mesh));
+  });
+}
+
+dfm_status dfm_mesh_file_kind(dfm_context *context, const char *path, uint32_t *kind) {
+  return guard([&] {
+    need(context, "context"), need(path, "path"), need(kind, "kind");
+    const dfm::RawMesh raw = dfm::read_raw(context->memory, path);
+    if (raw.tets.empty() && raw.tris.empty())
+      fail(DFM_E_FORMAT, "%s: no tetrahedra and no triangles in this file; a body needs one of them", path);
+    *kind = raw.tets.empty() ? DFM_MESH_SURFACE : DFM_MESH_TETS;
   });
 }
 
@@ -66,23 +35,21 @@ dfm_status dfm_tetmesh_make(dfm_context *context, const char *kind, const double
     need(context, "context"), need(kind, "kind"), need(size, "size"), need(out, "out");
     const std::string name = kind;
     const dfm::Memory &memory = context->memory;
-    if (name == "cylinder") *out = keep(*context, dfm::make_cylinder(memory, size[0], size[1], cells));
-    else if (name == "beam") *out = keep(*context, dfm::make_beam(memory, size[0], size[1], size[2], cells));
-    else if (name == "ball") *out = keep(*context, dfm::make_ball(memory, size[0], cells));
-    else fail(DFM_E_ARG, "no generator is called '%s'; expected cylinder, beam or ball", kind);
+    if (name == "cylinder") *out = Object::keep(*context, dfm::make_cylinder(memory, size[0], size[1], cells));
+    else if (name == "beam") *out = Object::keep(*context, dfm::make_beam(memory, size[0], size[1], size[2], cells));
+    else if (name == "ball") *out = Object::keep(*context, dfm::make_ball(memory, size[0], cells));
+    else if (name == "tube") *out = Object::keep(*context, dfm::make_tube(memory, size[0], size[1], size[2], cells));
+    else fail(DFM_E_ARG, "no generator is called '%s'; expected cylinder, beam, ball or tube", kind);
   });
 }
 
 dfm_status dfm_tetmesh_destroy(dfm_tetmesh mesh) {
-  return guard([&] {
-    mesh_of(mesh).context.remove_live(mesh);
-    destroy(mesh);
-  });
+  return guard([&] { Object::destroy(mesh); });
 }
 
 dfm_status dfm_tetmesh_get_info(dfm_tetmesh mesh, dfm_tetmesh_info *out) {
   return guard([&] {
-    const MeshObject &object = mesh_of(mesh);
+    const Object &object = Object::of(mesh);
     const dfm::TetMesh &m = object.mesh;
     const dfm::MeshStatistics &s = object.statistics;
     dfm_tetmesh_info info{};
@@ -101,7 +68,7 @@ dfm_status dfm_tetmesh_get_info(dfm_tetmesh mesh, dfm_tetmesh_info *out) {
 
 dfm_status dfm_tetmesh_data(dfm_tetmesh mesh, const double **points, const uint32_t **tets, const uint32_t **file_point) {
   return guard([&] {
-    const dfm::TetMesh &m = mesh_of(mesh).mesh;
+    const dfm::TetMesh &m = Object::of(mesh).mesh;
     if (points) *points = m.points.data();
     if (tets) *tets = m.tets.data();
     if (file_point) *file_point = m.file_point.data();
@@ -111,14 +78,14 @@ dfm_status dfm_tetmesh_data(dfm_tetmesh mesh, const double **points, const uint3
 dfm_status dfm_tetmesh_file_cells(dfm_tetmesh mesh, const uint32_t **file_cell) {
   return guard([&] {
     need(file_cell, "file_cell");
-    const dfm::TetMesh &m = mesh_of(mesh).mesh;
+    const dfm::TetMesh &m = Object::of(mesh).mesh;
     *file_cell = m.file_cell.empty() ? nullptr : m.file_cell.data();
   });
 }
 
 dfm_status dfm_tetmesh_groups(dfm_tetmesh mesh, const char *const **names, const uint32_t **cell_group) {
   return guard([&] {
-    const MeshObject &object = mesh_of(mesh);
+    const Object &object = Object::of(mesh);
     if (names) *names = object.names.data();
     if (cell_group) *cell_group = object.mesh.tet_group.data();
   });
@@ -126,7 +93,7 @@ dfm_status dfm_tetmesh_groups(dfm_tetmesh mesh, const char *const **names, const
 
 dfm_status dfm_tetmesh_group_points(dfm_tetmesh mesh, uint32_t group, uint32_t *dimension, const uint32_t **points, uint32_t *n) {
   return guard([&] {
-    const dfm::TetMesh &m = mesh_of(mesh).mesh;
+    const dfm::TetMesh &m = Object::of(mesh).mesh;
     if (group >= m.groups.size()) fail(DFM_E_ARG, "there is no group %u; the mesh has %zu", group, m.groups.size());
     const dfm::MeshGroup &g = m.groups[group];
     if (dimension) *dimension = static_cast<uint32_t>(g.dimension);
@@ -138,6 +105,6 @@ dfm_status dfm_tetmesh_group_points(dfm_tetmesh mesh, uint32_t group, uint32_t *
 dfm_status dfm_tetmesh_write(dfm_tetmesh mesh, const char *path) {
   return guard([&] {
     need(path, "path");
-    dfm::write_tet_mesh(mesh_of(mesh).mesh, path);
+    dfm::write_tet_mesh(Object::of(mesh).mesh, path);
   });
 }

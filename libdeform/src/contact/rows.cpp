@@ -6,7 +6,7 @@ namespace dfm {
 
 ContactRows::ContactRows(const Memory &m) {
   use_memory(m, begin, dof, weight, y, inv_mass, source, point, block, blocks, response, frame, drive, rate, wn, wt, cross, impulse,
-             dof_of_point_, dof_of_node_);
+             dof_of_point_, dof_of_node_, place_);
 }
 
 void ContactRows::build(std::span<const ContactPoint> contacts, std::span<const DofSource> sources) {
@@ -62,6 +62,17 @@ void ContactRows::build(std::span<const ContactPoint> contacts, std::span<const 
         }
       dof.push_back(d), weight.push_back(w);
     };
+    // The same by a table, for rows that are long. What it holds of other contacts is told by the row's own columns.
+    auto add_far = [&](uint32_t d, double w) {
+      if (d >= place_.size()) place_.resize(d + 1);
+      const uint32_t at = place_[d];
+      if (at >= row && at < dof.size() && dof[at] == d) {
+        weight[at] += w;
+        return;
+      }
+      place_[d] = static_cast<uint32_t>(dof.size());
+      dof.push_back(d), weight.push_back(w);
+    };
     for (uint32_t k = 0; k < c.nnode; ++k) {
       const uint32_t s = source_of(c.node[k]), surfel = c.node[k] - sources[s].first_node;
       const Surface &surface = *sources[s].surface;
@@ -70,8 +81,7 @@ void ContactRows::build(std::span<const ContactPoint> contacts, std::span<const 
       } else if (surface.identity()) {
         add(dof_of(s, surface.point[surfel]), c.weight[k]);
       } else {
-        for (uint32_t j = surface.row[surfel]; j < surface.row[surfel + 1]; ++j)
-          add(dof_of(s, surface.col[j]), c.weight[k] * surface.weight[j]);
+        surface.each_phyxel(surfel, [&](uint32_t phyxel, double w) { add_far(dof_of(s, phyxel), c.weight[k] * w); });
       }
     }
   }

@@ -54,6 +54,7 @@ struct ContactRows {
 
  private:
   Array<uint32_t> dof_of_point_, dof_of_node_;   // this sub-step's dof of a phyxel, of a surfel of a self-stepping body; kNone
+  Array<uint32_t> place_;                        // where a dof of a coupled surface stands in the row being made
   void response_apply(const Block &b, uint32_t k, Vec3 p);
   Vec3 diagonal(uint32_t i, Vec3 direction) const;
 };

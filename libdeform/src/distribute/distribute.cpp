@@ -21,18 +21,23 @@ void distribute(std::span<const ContactPoint> contacts, const double *frame, con
   for (const ImpulseSink &s : sinks) {
     if (!s.phyxel) continue;
     const Surface &surface = *s.surface;
-    for (uint32_t col : surface.col) store3(s.phyxel + size_t(4) * col, {});
-    for (uint32_t j = 0; j < s.nnode; ++j) {
-      const Vec3 p = load3(s.surfel + size_t(3) * j);
-      if (surface.identity()) {
-        store3(s.phyxel + size_t(4) * surface.point[j], p);
-        continue;
-      }
-      for (uint32_t e = surface.row[j]; e < surface.row[j + 1]; ++e) {
-        double *const to = s.phyxel + size_t(4) * surface.col[e];
-        store3(to, load3(to) + surface.weight[e] * p);
-      }
+    if (!surface.identity()) {
+      scatter_surface(surface, s.surfel, s.npoint, s.phyxel);
+      continue;
     }
+    for (uint32_t j = 0; j < s.nnode; ++j) store3(s.phyxel + size_t(4) * surface.point[j], load3(s.surfel + size_t(3) * j));
+  }
+}
+
+void scatter_surface(const Surface &surface, const double *surfel, uint32_t npoint, double *phyxel) {
+  std::fill(phyxel, phyxel + size_t(4) * npoint, 0.0);
+  using Point = double __attribute__((vector_size(32)));
+  Point *const to = reinterpret_cast<Point *>(phyxel);
+  for (uint32_t s = 0; s < surface.nsurfel; ++s) {
+    const double *const f = surfel + size_t(3) * s;
+    if (f[0] == 0 && f[1] == 0 && f[2] == 0) continue;
+    const Point p{f[0], f[1], f[2], 0};
+    for (uint32_t j = surface.row[s]; j < surface.row[s + 1]; ++j) to[surface.col[j]] += surface.weight[j] * p;
   }
 }
 

@@ -10,12 +10,15 @@
 namespace dfm {
 
 struct ImpulseSink {
-  uint32_t first_node, nnode;
+  uint32_t first_node, nnode, npoint;
   const Surface *surface;
   double *surfel;     // [nsurfel,3] N s, zeroed here
   double *phyxel;     // [npoint,4] N s, written where surfels hang, zero elsewhere from the start; null: self-stepping, surfel impulses do
 };
 
 void distribute(std::span<const ContactPoint> contacts, const double *frame, const double *impulse, std::span<const ImpulseSink> sinks);
+
+// f_p = N^T f_s of a coupled surface: surfel [nsurfel,3], phyxel [npoint,4] is overwritten. A surfel that carries nothing costs one look.
+void scatter_surface(const Surface &surface, const double *surfel, uint32_t npoint, double *phyxel);
 
 }  // namespace dfm

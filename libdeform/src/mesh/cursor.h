@@ -24,11 +24,19 @@ class Cursor {
 
   bool binary = false;  // names places by byte instead of line
   bool swap = false;    // binary values have the other byte order
+  char comment = 0;     // from a word that starts with it to the end of the line nothing is read
 
   const std::string &path() const { return path_; }
   size_t left() const { return size_t(end_ - p_); }
   size_t offset() const { return size_t(p_ - begin_); }
   void seek(size_t offset) { p_ = begin_ + offset; }
+  // The same file from here on, ending after `bytes`: places in sentences stay those of the file.
+  Cursor part(size_t bytes) const {
+    Cursor out = *this;
+    out.end_ = p_ + bytes;
+    return out;
+  }
+  std::string_view rest() const { return {p_, left()}; }
 
   // Throws "FILE:12: " or "FILE, byte 345: " and then the sentence; DFM_E_FORMAT.
   [[noreturn]] void refuse(const char *sentence, ...) const __attribute__((format(printf, 2, 3)));
@@ -36,7 +44,13 @@ class Cursor {
   [[noreturn]] void unsupported(const char *sentence, ...) const __attribute__((format(printf, 2, 3)));
 
   // ---- text ----
-  void skip_space() { while (p_ < end_ && is_space(*p_)) ++p_; }
+  void skip_space() {
+    for (;;) {
+      while (p_ < end_ && is_space(*p_)) ++p_;
+      if (comment == 0 || p_ == end_ || *p_ != comment) return;
+      while (p_ < end_ && *p_ != '\n') ++p_;
+    }
+  }
   std::string_view word() {  // empty at the end of the file
     skip_space();
     const char *from = p_;
@@ -58,33 +72,48 @@ class Cursor {
     seek(at);
     refuse("expected %.*s after %s, found %s", int(wanted.size()), wanted.data(), after, quote(found).c_str());
   }
-  int64_t integer(const char *what) {
-    const size_t at = next_offset();
-    const std::string_view text = word();
+  int64_t integer(const char *what) { return to_integer(word(), what); }
+  double real(const char *what) { return to_real(word(), what); }
+  // A word of this file as a number.
+  int64_t to_integer(std::string_view text, const char *what) {
     int64_t value = 0;
     const char *from = text.data(), *to = from + text.size();
     if (text.size() > 1 && *from == '+' && from[1] != '-') ++from;
     const auto result = std::from_chars(from, to, value);
-    if (text.empty() || result.ec != std::errc() || result.ptr != to) {
-      seek(at);
-      refuse("expected %s (a whole number), found %s", what, quote(text).c_str());
-    }
+    if (text.empty() || result.ec != std::errc() || result.ptr != to) refuse_word(text, what, "a whole number");
     return value;
   }
-  double real(const char *what) {
-    const size_t at = next_offset();
-    const std::string_view text = word();
+  double to_real(std::string_view text, const char *what) {
     double value = 0;
     const char *from = text.data(), *to = from + text.size();
     if (text.size() > 1 && *from == '+' && from[1] != '-') ++from;
     const auto result = std::from_chars(from, to, value);
     const bool underflow = result.ec == std::errc::result_out_of_range && below_one(text);
     if (underflow) value = 0;
-    if (text.empty() || result.ptr != to || (result.ec != std::errc() && !underflow) || !std::isfinite(value)) {
-      seek(at);
-      refuse("expected %s (a finite number), found %s", what, quote(text).c_str());
-    }
+    if (text.empty() || result.ptr != to || (result.ec != std::errc() && !underflow) || !std::isfinite(value))
+      refuse_word(text, what, "a finite number");
     return value;
+  }
+  // The next word of this line; empty at its end, which stays unread. A backslash before a line end continues the line.
+  std::string_view line_word() {
+    for (; p_ < end_ && *p_ != '\n'; ++p_) {
+      if (is_space(*p_)) continue;
+      if (continues()) {
+        while (*p_ != '\n') ++p_;
+        continue;
+      }
+      const char *from = p_;
+      while (p_ < end_ && !is_space(*p_) && !continues()) ++p_;
+      return {from, size_t(p_ - from)};
+    }
+    return {};
+  }
+  // Whether a word is `lower` whatever its case.
+  static bool is_word(std::string_view word, std::string_view lower) {
+    if (word.size() != lower.size()) return false;
+    for (size_t i = 0; i < word.size(); ++i)
+      if ((word[i] >= 'A' && word[i] <= 'Z' ? word[i] + ('a' - 'A') : word[i]) != lower[i]) return false;
+    return true;
   }
   // Numbers that the file promises before it shows them: refused when the bytes left cannot hold them.
   uint64_t count(int64_t claimed, size_t least_bytes_each, const char *what) const {
@@ -93,6 +122,11 @@ class Cursor {
       refuse("promises %lld %s, but the %zu bytes left in the file cannot hold them: the file is truncated or its count is wrong",
              ll(claimed), what, left());
     return static_cast<uint64_t>(claimed);
+  }
+  // The same in text, where the last number needs no space behind it.
+  uint64_t text_count(int64_t claimed, size_t words_each, const char *what) const {
+    if (claimed > 0 && uint64_t(claimed) <= (left() + 1) / (2 * words_each)) return uint64_t(claimed);
+    return count(claimed, 2 * words_each, what);
   }
 
   // ---- binary ----
@@ -107,10 +141,11 @@ class Cursor {
     std::memcpy(&out, raw, sizeof(T));
     return out;
   }
+  template <class T = double>
   double binary_real(const char *what) {
-    const double v = value<double>(what);
-    if (!std::isfinite(v)) p_ -= sizeof(double), refuse("%s is not a finite number", what);
-    return v;
+    const T v = value<T>(what);
+    if (!std::isfinite(v)) p_ -= sizeof(T), refuse("%s is not a finite number", what);
+    return static_cast<double>(v);
   }
   void skip(size_t bytes, const char *what) {
     if (left() < bytes) refuse("the file ends inside %s", what);
@@ -144,6 +179,13 @@ class Cursor {
   size_t next_offset() {
     skip_space();
     return offset();
+  }
+  bool continues() const {  // at a backslash that stands before the line's end
+    return *p_ == '\\' && end_ - p_ > 1 && (p_[1] == '\n' || (p_[1] == '\r' && end_ - p_ > 2 && p_[2] == '\n'));
+  }
+  [[noreturn]] void refuse_word(std::string_view text, const char *what, const char *kind) {
+    if (!text.empty()) p_ = text.data();
+    refuse("expected %s (%s), found %s", what, kind, quote(text).c_str());
   }
   [[noreturn]] void refuse_as(dfm_status status, const char *sentence, va_list args) const;
   std::string path_;

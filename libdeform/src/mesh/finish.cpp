@@ -9,12 +9,11 @@
 #include "core/error.h"
 #include "math/vec3.h"
 #include "mesh/faces.h"
-#include "mesh/raw_mesh.h"
+#include "mesh/finish.h"
 
 namespace dfm {
 namespace {
 
-constexpr double kLargestCoordinate = 1e100;  // m; beyond it squares of lengths overflow
 constexpr double kCoarseCoordinates = 1e-8;   // rounding of coordinates over the shortest edge, from which a warning is due
 
 struct CellShape { double volume6, edge_max, reach; };  // reach: largest coordinate
@@ -32,13 +31,6 @@ CellShape cell_shape(const double *points, const uint32_t *tet) {
 
 // A coordinate x is known to eps*x; an altitude below a few of those says nothing.
 bool is_flat(const CellShape &s) { return !(std::fabs(s.volume6) > 8 * DBL_EPSILON * s.edge_max * s.edge_max * (s.edge_max + s.reach)); }
-
-void check_points(const std::string &path, const Array<double> &points) {
-  for (size_t i = 0; i < points.size(); ++i)
-    if (!(std::fabs(points[i]) <= kLargestCoordinate))
-      fail(DFM_E_FORMAT, "%s: point %zu (counted from 0) has the coordinate %g m; coordinates up to %g m are read", path.c_str(), i / 3,
-           points[i], kLargestCoordinate);
-}
 
 void refuse_flat(const std::string &path, const RawMesh &raw) {
   const uint32_t ntet = uint32_t(raw.tets.size() / 4);
@@ -59,35 +51,15 @@ void turn_negative(RawMesh &raw, TetMesh &mesh) {
     if (tet_volume(raw.points.data(), &raw.tets[t]) < 0) std::swap(raw.tets[t + 2], raw.tets[t + 3]), ++mesh.turned;
 }
 
-// Drops cells with the same four corners as an earlier cell.
-void drop_duplicates(RawMesh &raw, TetMesh &mesh) {
-  struct Key {
-    std::array<uint32_t, 4> corner;
-    uint32_t cell;
-    bool operator<(const Key &o) const { return corner != o.corner ? corner < o.corner : cell < o.cell; }
-  };
-  const uint32_t ntet = uint32_t(raw.tets.size() / 4);
-  Array<Key> keys{HookAllocator<Key>(*raw.memory)};
-  keys.reserve(ntet);
-  for (uint32_t t = 0; t < ntet; ++t) {
-    Key key{{}, t};
-    std::copy_n(&raw.tets[4 * size_t(t)], 4, key.corner.begin());
-    std::sort(key.corner.begin(), key.corner.end());
-    keys.push_back(key);
+// Triangles without a group say nothing that the cells' boundary does not.
+void keep_grouped_triangles(const RawMesh &raw, TetMesh &mesh, const Array<uint32_t> &number) {
+  for (size_t t = 0; t < raw.tri_group.size(); ++t) {
+    const uint32_t *c = &raw.tris[3 * t];
+    if (raw.tri_group[t] == kNoGroup || number[c[0]] == kNoGroup || number[c[1]] == kNoGroup || number[c[2]] == kNoGroup) continue;
+    mesh.tris.insert(mesh.tris.end(), {number[c[0]], number[c[1]], number[c[2]]});
+    mesh.tri_group.push_back(raw.tri_group[t]);
   }
-  std::sort(keys.begin(), keys.end());
-  Array<uint8_t> drop(ntet, 0, HookAllocator<uint8_t>(*raw.memory));
-  for (size_t i = 1; i < keys.size(); ++i)
-    if (keys[i].corner == keys[i - 1].corner) drop[keys[i].cell] = 1, ++mesh.dropped_cells;
-  if (mesh.dropped_cells == 0) return;
-  size_t kept = 0;
-  for (uint32_t t = 0; t < ntet; ++t)
-    if (!drop[t]) {
-      std::copy_n(&raw.tets[4 * size_t(t)], 4, &raw.tets[4 * kept]);
-      raw.tet_group[kept++] = raw.tet_group[t];
-      mesh.file_cell.push_back(t);
-    }
-  raw.tets.resize(4 * kept), raw.tet_group.resize(kept);
+  mesh.tris.shrink_to_fit(), mesh.tri_group.shrink_to_fit();
 }
 
 // Keeps the points that cells use, in the file's order, and fills the groups' points.
@@ -107,6 +79,7 @@ void renumber(RawMesh &raw, TetMesh &mesh) {
   raw.points.resize(3 * size_t(kept));
   raw.points.shrink_to_fit();
   for (uint32_t &p : raw.tets) p = number[p];
+  keep_grouped_triangles(raw, mesh, number);
 
   for (size_t i = 0; i < raw.tet_group.size(); ++i)
     if (raw.tet_group[i] != kNoGroup) {
@@ -125,7 +98,7 @@ void renumber(RawMesh &raw, TetMesh &mesh) {
 }
 
 // Groups by dimension and number, whatever order the file has them in.
-void sort_groups(RawMesh &raw) {
+void sort_groups(RawMesh &raw, TetMesh &mesh) {
   const uint32_t n = uint32_t(raw.groups.size());
   std::vector<uint32_t> order(n), place(n);
   for (uint32_t g = 0; g < n; ++g) order[g] = g;
@@ -138,6 +111,7 @@ void sort_groups(RawMesh &raw) {
   raw.groups = std::move(sorted);
   for (uint32_t &g : raw.tet_group)
     if (g != kNoGroup) g = place[g];
+  for (uint32_t &g : mesh.tri_group) g = place[g];
 }
 
 uint32_t count_overlaps(const TetMesh &mesh, uint32_t *crowded) {
@@ -155,46 +129,87 @@ uint32_t count_overlaps(const TetMesh &mesh, uint32_t *crowded) {
 void add_warnings(TetMesh &mesh, uint32_t crowded) {
   const auto warn = [&](const std::string &text) { mesh.warnings.push_back(text); };
   const MeshStatistics s = mesh_statistics(mesh);
-  const auto be = [](uint32_t n) { return n == 1 ? "is" : "are"; };
-  const auto was = [](uint32_t n) { return n == 1 ? "was" : "were"; };
-  const auto some = [](uint32_t n) { return n == 1 ? "" : "s"; };
-  if (mesh.turned) warn(format("%u of %u cells had negative volume and %s turned", mesh.turned, s.ntet, was(mesh.turned)));
+  if (mesh.turned) warn(format("%u of %u cells had negative volume and %s turned", mesh.turned, s.ntet, was_were(mesh.turned)));
   if (mesh.overlapping)
     warn(format("the mesh is tangled: across %u face%s both cells lie on the same side, so they overlap; mesh the shape anew",
-                mesh.overlapping, some(mesh.overlapping)));
+                mesh.overlapping, plural(mesh.overlapping)));
   if (crowded) warn(format("%u face%s shared by more than two cells; the cells there overlap", crowded, crowded == 1 ? " is" : "s are"));
   if (mesh.dropped_cells)
-    warn(format("%u duplicate cell%s %s dropped", mesh.dropped_cells, some(mesh.dropped_cells), was(mesh.dropped_cells)));
+    warn(format("%u duplicate cell%s %s dropped", mesh.dropped_cells, plural(mesh.dropped_cells), was_were(mesh.dropped_cells)));
   if (mesh.dropped_points)
-    warn(format("%u point%s that no tetrahedron uses %s dropped", mesh.dropped_points, some(mesh.dropped_points),
-                was(mesh.dropped_points)));
+    warn(format("%u point%s that no tetrahedron uses %s dropped", mesh.dropped_points, plural(mesh.dropped_points),
+                was_were(mesh.dropped_points)));
   if (s.duplicate_points)
     warn(format("%u point%s %s exactly at another point's place; cells that meet there are not joined", s.duplicate_points,
-                some(s.duplicate_points), s.duplicate_points == 1 ? "lies" : "lie"));
+                plural(s.duplicate_points), s.duplicate_points == 1 ? "lies" : "lie"));
   if (s.nonmanifold_edges)
-    warn(format("%u edge%s of the surface %s used by more than two triangles", s.nonmanifold_edges, some(s.nonmanifold_edges),
-                be(s.nonmanifold_edges)));
+    warn(format("%u edge%s of the surface %s used by more than two triangles", s.nonmanifold_edges, plural(s.nonmanifold_edges),
+                is_are(s.nonmanifold_edges)));
   if (s.flat_cells)
     warn(format("%u cell%s %s nearly flat (mean ratio below 0.01, least %.3g); they force small explicit steps", s.flat_cells,
-                some(s.flat_cells), be(s.flat_cells), s.quality_min));
-  double reach = 0;
-  for (int k = 0; k < 3; ++k) reach = std::max({reach, std::fabs(s.lo[k]), std::fabs(s.hi[k])});
-  if (DBL_EPSILON * reach > kCoarseCoordinates * s.edge_min)
-    warn(format("the body lies %.3g m from the origin, where coordinates resolve only %.2g m; move it nearer", reach, DBL_EPSILON * reach));
+                plural(s.flat_cells), is_are(s.flat_cells), s.quality_min));
+  if (const std::string coarse = coarse_coordinates(s.lo, s.hi, s.edge_min); !coarse.empty()) warn(coarse);
 }
 
 }  // namespace
 
+void check_points(const std::string &path, const Array<double> &points) {
+  for (size_t i = 0; i < points.size(); ++i)
+    if (!(std::fabs(points[i]) <= kLargestCoordinate))
+      fail(DFM_E_FORMAT, "%s: point %zu (counted from 0) has the coordinate %g m; coordinates up to %g m are read", path.c_str(), i / 3,
+           points[i], kLargestCoordinate);
+}
+
+uint32_t drop_duplicate_cells(RawMesh &raw, Array<uint32_t> *file_cell) {
+  struct Key {
+    std::array<uint32_t, 4> corner;
+    uint32_t cell;
+    bool operator<(const Key &o) const { return corner != o.corner ? corner < o.corner : cell < o.cell; }
+  };
+  const uint32_t ntet = uint32_t(raw.tets.size() / 4);
+  Array<Key> keys{HookAllocator<Key>(*raw.memory)};
+  keys.reserve(ntet);
+  for (uint32_t t = 0; t < ntet; ++t) {
+    Key key{{}, t};
+    std::copy_n(&raw.tets[4 * size_t(t)], 4, key.corner.begin());
+    std::sort(key.corner.begin(), key.corner.end());
+    keys.push_back(key);
+  }
+  std::sort(keys.begin(), keys.end());
+  uint32_t dropped = 0;
+  Array<uint8_t> drop(ntet, 0, HookAllocator<uint8_t>(*raw.memory));
+  for (size_t i = 1; i < keys.size(); ++i)
+    if (keys[i].corner == keys[i - 1].corner) drop[keys[i].cell] = 1, ++dropped;
+  if (dropped == 0) return 0;
+  size_t kept = 0;
+  for (uint32_t t = 0; t < ntet; ++t)
+    if (!drop[t]) {
+      std::copy_n(&raw.tets[4 * size_t(t)], 4, &raw.tets[4 * kept]);
+      raw.tet_group[kept++] = raw.tet_group[t];
+      if (file_cell) file_cell->push_back(t);
+    }
+  raw.tets.resize(4 * kept), raw.tet_group.resize(kept);
+  return dropped;
+}
+
+std::string coarse_coordinates(const double lo[3], const double hi[3], double edge_min) {
+  double reach = 0;
+  for (int k = 0; k < 3; ++k) reach = std::max({reach, std::fabs(lo[k]), std::fabs(hi[k])});
+  if (!(DBL_EPSILON * reach > kCoarseCoordinates * edge_min)) return {};
+  return format("the body lies %.3g m from the origin, where coordinates resolve only %.2g m; move it nearer", reach, DBL_EPSILON * reach);
+}
+
 TetMesh finish_mesh(const std::string &path, RawMesh &&raw) {
   TetMesh mesh(*raw.memory);
-  if (raw.tets.empty())
-    fail(DFM_E_FORMAT, "%s: no tetrahedra in this file; a body needs a volume mesh (a surface alone is not available yet)", path.c_str());
+  if (raw.tets.empty() && !raw.tris.empty())
+    fail(DFM_E_FORMAT, "%s: no tetrahedra in this file, only a surface of %u triangles; fill it first: deform mesh fill FILE OUT.msh", path.c_str(), raw.ntri());
+  if (raw.tets.empty()) fail(DFM_E_FORMAT, "%s: no tetrahedra in this file; a body needs a volume mesh or a closed surface", path.c_str());
   check_points(path, raw.points);
   refuse_flat(path, raw);
   turn_negative(raw, mesh);
-  drop_duplicates(raw, mesh);
+  mesh.dropped_cells = drop_duplicate_cells(raw, &mesh.file_cell);
   renumber(raw, mesh);
-  sort_groups(raw);
+  sort_groups(raw, mesh);
   mesh.points = std::move(raw.points), mesh.tets = std::move(raw.tets), mesh.tet_group = std::move(raw.tet_group);
   mesh.groups = std::move(raw.groups);
   uint32_t crowded = 0;

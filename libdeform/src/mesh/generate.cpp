@@ -13,18 +13,38 @@
 
 #include "core/error.h"
 #include "math/vec3.h"
+#include "mesh/generate.h"
 #include "mesh/mesh.h"
 
 namespace dfm {
-namespace {
 
-constexpr uint32_t kMostCells = 100'000'000;
-
-void check(const char *what, double size) {
-  if (!(size > 0) || !std::isfinite(size)) fail(DFM_E_ARG, "the %s is %g m; expected a finite length above 0", what, size);
+Vec3 unit_on_circle(double angle) {
+  const double t = angle * angle;
+  double s = 1, c = 1;
+  for (int k = 10; k > 0; --k) {
+    s = 1 - t * s / ((2 * k) * (2 * k + 1));
+    c = 1 - t * c / ((2 * k - 1) * (2 * k));
+  }
+  return {c, angle * s, 0};
 }
-void check_cells(uint32_t cells) {
-  if (cells < 1 || cells > kMostCells) fail(DFM_E_ARG, "cells is %u; expected 1 to %u", cells, kMostCells);
+
+Vec3 unit_on_circle(uint64_t i, uint64_t n) {
+  static constexpr double half = 0.5, third = 1.0471975511965977462;  // pi/3
+  static const double root = std::sqrt(3.0) / 2;
+  static const double turn[6][2] = {{1, 0}, {half, root}, {-half, root}, {-1, 0}, {-half, -root}, {half, -root}};
+  const uint64_t sextant = 6 * (i % n) / n;
+  const Vec3 u = unit_on_circle(third * (double(6 * (i % n) - sextant * n) / double(n)));
+  return {turn[sextant][0] * u.x - turn[sextant][1] * u.y, turn[sextant][1] * u.x + turn[sextant][0] * u.y, 0};
+}
+
+Vec3 on_annulus(double inner, double outer, uint32_t k, uint32_t rings, uint32_t j, uint32_t n) {
+  const double w = double(k) / rings;
+  return ((1 - w) * inner + w * outer) * unit_on_circle(2 * uint64_t(j) + k % 2, 2 * uint64_t(n));
+}
+
+void check_tube(double inner, double outer, double length) {
+  check_size("tube's inner radius", inner), check_size("tube's outer radius", outer), check_size("tube's length", length);
+  if (!(inner < outer)) fail(DFM_E_ARG, "the tube's inner radius is %g m; expected less than the outer radius, %g m", inner, outer);
 }
 
 void add_point(TetMesh &mesh, Vec3 p) { mesh.points.insert(mesh.points.end(), {p.x, p.y, p.z}); }
@@ -41,32 +61,23 @@ TetMesh finished(TetMesh mesh) {
   return mesh;
 }
 
-uint32_t rounded(double x) { return uint32_t(std::max(1.0, std::floor(x + 0.5))); }
-// How far two positive numbers are apart, as a ratio of at least 1.
-double apart(double a, double b) { return std::max(a, b) / std::min(a, b); }
-// What a choice of counts costs, 1 at best: cells longer than wide (a little is cheap; beyond 2:1 they spoil the mesh, and more
-// cells than asked for are made instead) against a number of cells far from the one asked for.
-double score(double elongation, double count, double asked) {
-  const double excess = std::max(1.0, elongation / 2);
-  return std::sqrt(elongation) * excess * excess * excess * apart(count, asked);
-}
-// More cells than asked for are made within reason only.
-void check_choice(const char *shape, double count, uint32_t asked) {
-  if (count > 100.0 * std::max(asked, 100u))
-    fail(DFM_E_ARG, "a %s of these proportions needs about %.2g cells to keep them in shape, %u were asked for; ask for more, or give sizes nearer to each other",
-         shape, count, asked);
+Icosahedron::Icosahedron() {
+  const double g = (1 + std::sqrt(5.0)) / 2, length = std::sqrt(1 + g * g);
+  uint32_t v = 0, f = 0;
+  for (int axis = 0; axis < 3; ++axis)
+    for (const double s : {1.0, -1.0})
+      for (const double t : {1.0, -1.0}) {
+        Vec3 p;
+        p[axis] = 0, p[(axis + 1) % 3] = s / length, p[(axis + 2) % 3] = t * g / length;
+        corner[v++] = p;
+      }
+  for (uint32_t a = 0; a < 12; ++a)
+    for (uint32_t b = a + 1; b < 12; ++b)
+      for (uint32_t c = b + 1; c < 12; ++c)
+        if (near(a, b) && near(a, c) && near(b, c)) face[f++] = {a, b, c};
 }
 
-// sin and cos on [0, pi/3] by their series: libm's bits depend on the processor.
-Vec3 unit_on_circle(double angle) {
-  const double t = angle * angle;
-  double s = 1, c = 1;
-  for (int k = 10; k > 0; --k) {
-    s = 1 - t * s / ((2 * k) * (2 * k + 1));
-    c = 1 - t * c / ((2 * k - 1) * (2 * k));
-  }
-  return {c, angle * s, 0};
-}
+namespace {
 
 // ---- beam ----------------------------------------------------------------------------------------------------------
 
@@ -90,7 +101,7 @@ Grid choose_grid(const double size[3], uint32_t cells) {
       for (int k = 0; k < 3; ++k) g.n[k] = uint32_t(std::clamp(std::floor(size[k] / edge) + (up >> k & 1), 1.0, double(kMostCells)));
       const double count = double(g.n[0]) * g.n[1] * g.n[2], h[3] = {size[0] / g.n[0], size[1] / g.n[1], size[2] / g.n[2]};
       if (count > kMostCells / 12) continue;
-      const double s = score(std::max({h[0], h[1], h[2]}) / std::min({h[0], h[1], h[2]}), count, cubes);
+      const double s = choice_score(std::max({h[0], h[1], h[2]}) / std::min({h[0], h[1], h[2]}), count, cubes);
       if (s < best_score) best_score = s, best = g;
     }
   check_choice("beam", best_score < HUGE_VAL ? 12.0 * best.n[0] * best.n[1] * best.n[2] : HUGE_VAL, cells);
@@ -102,7 +113,7 @@ Grid choose_grid(const double size[3], uint32_t cells) {
 class BallBuilder {
  public:
   BallBuilder(TetMesh &mesh, double radius, uint32_t n) : mesh_(mesh), radius_(radius), n_(n) {
-    make_icosahedron();
+    number_edges();
     add_point(mesh_, {});
     for (uint32_t k = 1; k <= n_; ++k) add_layer(k);
     for (uint32_t f = 0; f < 20; ++f) cut_cone(f);
@@ -111,26 +122,11 @@ class BallBuilder {
  private:
   using Lattice = std::array<uint32_t, 4>;  // weights of the centre and of the face's three corners; they sum to n
 
-  void make_icosahedron() {
-    const double g = (1 + std::sqrt(5.0)) / 2, length = std::sqrt(1 + g * g);
-    uint32_t v = 0;
-    for (int axis = 0; axis < 3; ++axis)
-      for (const double s : {1.0, -1.0})
-        for (const double t : {1.0, -1.0}) {
-          Vec3 p;
-          p[axis] = 0, p[(axis + 1) % 3] = s / length, p[(axis + 2) % 3] = t * g / length;
-          corner_[v++] = p;
-        }
-    // Neighbours of the unit icosahedron are 1.05 apart, the next points 1.70.
-    const auto near = [&](uint32_t a, uint32_t b) { return norm2(corner_[a] - corner_[b]) < 2; };
-    uint32_t e = 0, f = 0;
+  void number_edges() {
+    uint32_t e = 0;
     for (uint32_t a = 0; a < 12; ++a)
-      for (uint32_t b = a + 1; b < 12; ++b) {
-        if (!near(a, b)) continue;
-        edge_[a][b] = e, ends_[e++] = {a, b};
-        for (uint32_t c = b + 1; c < 12; ++c)
-          if (near(a, c) && near(b, c)) face_[f++] = {a, b, c};
-      }
+      for (uint32_t b = a + 1; b < 12; ++b)
+        if (ico_.near(a, b)) edge_[a][b] = e, ends_[e++] = {a, b};
   }
 
   uint32_t first_of_layer(uint32_t k) const {  // 1 centre and 10 q^2 + 2 points in each layer q < k
@@ -141,19 +137,19 @@ class BallBuilder {
 
   // Corners, then points inside edges, then points inside faces.
   void add_layer(uint32_t k) {
-    for (const Vec3 &p : corner_) add_on_sphere(k, p);
+    for (const Vec3 &p : ico_.corner) add_on_sphere(k, p);
     for (const auto &[a, b] : ends_)
-      for (uint32_t t = 1; t < k; ++t) add_on_sphere(k, double(k - t) * corner_[a] + double(t) * corner_[b]);
-    for (const auto &[a, b, c] : face_)
+      for (uint32_t t = 1; t < k; ++t) add_on_sphere(k, double(k - t) * ico_.corner[a] + double(t) * ico_.corner[b]);
+    for (const auto &[a, b, c] : ico_.face)
       for (uint32_t i = 1; i + 1 < k; ++i)
         for (uint32_t j = 1; i + j < k; ++j)
-          add_on_sphere(k, double(k - i - j) * corner_[a] + (double(i) * corner_[b] + double(j) * corner_[c]));
+          add_on_sphere(k, double(k - i - j) * ico_.corner[a] + (double(i) * ico_.corner[b] + double(j) * ico_.corner[c]));
   }
 
   uint32_t point(uint32_t f, const Lattice &w) const {
     const uint32_t k = n_ - w[0], i = w[2], j = w[3];
     if (k == 0) return 0;
-    const auto &[a, b, c] = face_[f];
+    const auto &[a, b, c] = ico_.face[f];
     const uint32_t first = first_of_layer(k), inner = first + 12 + 30 * (k - 1);
     if (w[1] == k) return first + a;
     if (i == k) return first + b;
@@ -211,10 +207,9 @@ class BallBuilder {
   TetMesh &mesh_;
   double radius_;
   uint32_t n_;
-  Vec3 corner_[12];
+  const Icosahedron ico_;
   uint32_t edge_[12][12] = {};
   std::array<std::array<uint32_t, 2>, 30> ends_{};
-  std::array<std::array<uint32_t, 3>, 20> face_{};
 };
 
 // ---- cylinder ------------------------------------------------------------------------------------------------------
@@ -232,7 +227,7 @@ void choose_rings(double radius, double length, uint32_t cells, uint32_t *rings,
     for (const double wanted : {cells / (18.0 * n * n), length * n / radius}) {
       if (wanted > kMostCells / (18.0 * n * n)) continue;
       const uint32_t m = rounded(wanted);
-      const double s = score(apart(length / m, radius / n), 18.0 * n * n * m, cells);
+      const double s = choice_score(apart(length / m, radius / n), 18.0 * n * n * m, cells);
       if (s < best) best = s, *rings = n, *layers = m;
     }
   check_choice("cylinder", best < HUGE_VAL ? 18.0 * *rings * *rings * *layers : HUGE_VAL, cells);
@@ -241,7 +236,7 @@ void choose_rings(double radius, double length, uint32_t cells, uint32_t *rings,
 }  // namespace
 
 TetMesh make_beam(const Memory &memory, double x, double y, double z, uint32_t cells) {
-  check("beam's x size", x), check("beam's y size", y), check("beam's z size", z), check_cells(cells);
+  check_size("beam's x size", x), check_size("beam's y size", y), check_size("beam's z size", z), check_cells(cells);
   const double size[3] = {x, y, z};
   const Grid g = choose_grid(size, cells);
   TetMesh mesh(memory);
@@ -283,7 +278,7 @@ TetMesh make_beam(const Memory &memory, double x, double y, double z, uint32_t c
 }
 
 TetMesh make_cylinder(const Memory &memory, double radius, double length, uint32_t cells) {
-  check("cylinder's radius", radius), check("cylinder's length", length), check_cells(cells);
+  check_size("cylinder's radius", radius), check_size("cylinder's length", length), check_cells(cells);
   uint32_t n = 1, m = 1;
   choose_rings(radius, length, cells, &n, &m);
   const Disc disc{n};
@@ -323,7 +318,7 @@ TetMesh make_cylinder(const Memory &memory, double radius, double length, uint32
 }
 
 TetMesh make_ball(const Memory &memory, double radius, uint32_t cells) {
-  check("ball's radius", radius), check_cells(cells);
+  check_size("ball's radius", radius), check_cells(cells);
   uint32_t n = 1;
   while (apart(20.0 * (n + 1) * (n + 1) * (n + 1), cells) < apart(20.0 * n * n * n, cells)) ++n;
   TetMesh mesh(memory);

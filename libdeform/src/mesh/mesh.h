@@ -20,11 +20,14 @@ struct MeshGroup {
 struct TetMesh {
   explicit TetMesh(const Memory &m = Memory::standard())
       : memory(&m), points(HookAllocator<double>(m)), tets(HookAllocator<uint32_t>(m)), tet_group(HookAllocator<uint32_t>(m)),
-        file_point(HookAllocator<uint32_t>(m)), file_cell(HookAllocator<uint32_t>(m)), share(HookAllocator<double>(m)) {}
+        tris(HookAllocator<uint32_t>(m)), tri_group(HookAllocator<uint32_t>(m)), file_point(HookAllocator<uint32_t>(m)),
+        file_cell(HookAllocator<uint32_t>(m)), share(HookAllocator<double>(m)) {}
   const Memory *memory;
   Array<double> points;          // [npoint,3], m
   Array<uint32_t> tets;          // [ntet,4], every volume positive
   Array<uint32_t> tet_group;     // [ntet] index into groups, kNoGroup without
+  Array<uint32_t> tris;          // [n,3] the file's triangles that belong to a group, so that it survives writing; in the file's sense of turn
+  Array<uint32_t> tri_group;     // [n] index into groups
   Array<uint32_t> file_point;    // [npoint] 0-based position of the point in its file
   Array<uint32_t> file_cell;     // [ntet] 0-based position among the file's tetrahedra; empty where none was dropped
   Array<double> share;           // [ntet] of a filled surface: how much of the cell is material, (0,1]; else empty
@@ -49,6 +52,7 @@ TetMesh parse_tet_mesh(const Memory &memory, const std::string &path, const char
 TetMesh make_cylinder(const Memory &memory, double radius, double length, uint32_t cells);  // axis z, base at the origin
 TetMesh make_beam(const Memory &memory, double x, double y, double z, uint32_t cells);      // from the origin
 TetMesh make_ball(const Memory &memory, double radius, uint32_t cells);                     // about the origin
+TetMesh make_tube(const Memory &memory, double inner, double outer, double length, uint32_t cells);  // as the cylinder, with a hole
 
 // ---- topology ----------------------------------------------------------------------------------------------------
 // Corners of the four faces of a cell, outward for a positive cell; face f lies opposite corner f.
@@ -86,7 +90,9 @@ MeshStatistics mesh_statistics(const TetMesh &mesh);
 void write_msh41(const TetMesh &mesh, const std::string &path);  // binary
 void write_msh22(const TetMesh &mesh, const std::string &path);  // binary
 void write_vtk(const TetMesh &mesh, const std::string &path);    // legacy 3.0, binary
-void write_tet_mesh(const TetMesh &mesh, const std::string &path);  // by ending: .msh (4.1), .msh2 (2.2), .vtk
+void write_medit(const TetMesh &mesh, const std::string &path);  // text; groups by number alone
+void write_vtu(const TetMesh &mesh, const std::string &path);    // with groups and share as cell data
+void write_tet_mesh(const TetMesh &mesh, const std::string &path);  // by ending: .msh (4.1), .msh2 (2.2), .vtk, .vtu, .mesh
 
 // VTU (XML, appended raw data), as ParaView reads it.
 struct VtuArray {
@@ -99,7 +105,10 @@ struct VtuGrid {
   uint32_t npoint = 0, ncell = 0, corners = 4;  // 4 tetrahedra, 3 triangles
   const double *points = nullptr;               // [npoint,3]
   const uint32_t *cells = nullptr;              // [ncell,corners]
+  uint32_t nface = 0;                           // triangles behind the cells; cell data are [ncell+nface]
+  const uint32_t *faces = nullptr;              // [nface,3]
   std::vector<VtuArray> point_data, cell_data;
+  const std::vector<MeshGroup> *groups = nullptr;  // their names go into the field data
 };
 void write_vtu(const std::string &path, const VtuGrid &grid);
 

@@ -68,7 +68,7 @@ uint32_t NodeNumbers::find(const Cursor &in, int64_t tag) const {
 uint32_t ElementSink::begin(const Cursor &in, int64_t type) {
   element_ = msh_element(type);
   if (element_.points == 0) in.refuse("element type %lld is not known; 4 is a tetrahedron", ll(type));
-  if (element_.dimension == 3 && type != 4) {
+  if (element_.dimension == 3 && type != kMshTet) {
     const bool tet = type == 11 || (type >= 29 && type <= 31);
     in.unsupported(tet ? "second- or higher-order tetrahedra (element type %lld, %u points); %s"
                        : "element type %lld (%u points) is a hexahedron, prism or pyramid; only tetrahedra are read: mesh the volume with tetrahedra, or split the cells; then %s",
@@ -78,16 +78,24 @@ uint32_t ElementSink::begin(const Cursor &in, int64_t type) {
 }
 
 void ElementSink::add(const Cursor &in, uint32_t group, const int64_t *tags) {
-  if (element_.dimension == 3) {
-    if (out_.tet_group.size() == kMaxTets - 1) in.unsupported("more than %u tetrahedra", kMaxTets - 1);
-    for (int k = 0; k < 4; ++k) out_.tets.push_back(nodes_.find(in, tags[k]));
-    out_.tet_group.push_back(group);
-  } else {
-    for (uint32_t k = 0; k < element_.points; ++k) {
-      const uint32_t point = nodes_.find(in, tags[k]);
-      if (group != kNoGroup) out_.groups[group].points.push_back(point);
-    }
+  uint32_t corners[4];
+  const bool straight = element_.points <= 4;
+  if (straight && element_.dimension >= 2) {
+    for (uint32_t k = 0; k < element_.points; ++k) corners[k] = nodes_.find(in, tags[k]);
+    if (element_.dimension == 3) out_.add_tet(in, corners, group);
+    else out_.add_polygon(in, corners, element_.points, group);
+    return;
   }
+  curved_ += element_.dimension == 2;
+  for (uint32_t k = 0; k < element_.points; ++k) {
+    const uint32_t point = nodes_.find(in, tags[k]);
+    if (group != kNoGroup) out_.groups[group].points.push_back(point);
+  }
+}
+
+void ElementSink::finish(const Cursor &in) const {
+  if (curved_ && out_.tets.empty() && out_.tris.empty())
+    in.unsupported("%llu second- or higher-order triangles or quadrangles and nothing straight; %s", ull(curved_), kConvertMsh);
 }
 
 int32_t msh_int(const Cursor &in, int64_t value, const char *what) {
@@ -120,7 +128,7 @@ void read_physical_names(Cursor &in, RawMesh &out) {
 void read_msh(Cursor &in, RawMesh &out) {
   std::string_view section = in.word();
   while (section == "$Comments") skip_section(in, section), section = in.word();
-  if (section == "$NOD") in.unsupported("MSH version 1 ($NOD) is not available yet; %s", kConvertMsh);
+  if (section == "$NOD") in.unsupported("MSH version 1 ($NOD) is not read; %s", kConvertMsh);
   if (section != "$MeshFormat") {
     in.seek(0);
     in.refuse("expected $MeshFormat at the start of a gmsh file, found %s", Cursor::quote(section).c_str());
@@ -129,7 +137,7 @@ void read_msh(Cursor &in, RawMesh &out) {
   const int64_t type = in.integer("the file type"), size = in.integer("the data size");
   const bool two = version >= 2.0 && version <= 2.2, four = version == 4.1;
   if (!two && !four) {
-    if (version == 1.0 || version == 4.0 || version == 3.0) in.unsupported("MSH version %g is not available yet; %s", version, kConvertMsh);
+    if (version == 1.0 || version == 4.0 || version == 3.0) in.unsupported("MSH version %.1f is not read; %s", version, kConvertMsh);
     in.unsupported("MSH version %g is not known; 2.2 and 4.1 are read", version);
   }
   if (type != 0 && type != 1) in.refuse("file type %lld; expected 0 (ASCII) or 1 (binary)", ll(type));

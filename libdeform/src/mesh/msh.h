@@ -11,6 +11,7 @@ constexpr const char *kConvertMsh = "convert it first: gmsh -3 -save_all -format
 // Points and dimension of a gmsh element type; points 0: not known.
 struct MshElement { uint32_t points; int32_t dimension; };
 MshElement msh_element(int64_t type);
+constexpr int64_t kMshTet = 4;
 
 // Node numbers of the file to positions. Numbers may have gaps and come in any order.
 class NodeNumbers {
@@ -27,18 +28,21 @@ class NodeNumbers {
   Array<uint32_t> order_;    // position of each ascending number; empty where they ascend in the file already
 };
 
-// Takes elements one by one: keeps tetrahedra, passes over lower dimensions (their points join their group), refuses other volume cells.
+// Takes elements one by one: keeps tetrahedra, triangles and quadrangles (cut), passes over points and lines (their points join their
+// group), refuses other volume cells, and curved faces where the file has nothing straight.
 class ElementSink {
  public:
   ElementSink(RawMesh &out, const NodeNumbers &nodes) : out_(out), nodes_(nodes) {}
   // Checks that elements of this type can be taken; returns how many points each has.
   uint32_t begin(const Cursor &in, int64_t type);
   void add(const Cursor &in, uint32_t group, const int64_t *tags);
+  void finish(const Cursor &in) const;
 
  private:
   RawMesh &out_;
   const NodeNumbers &nodes_;
   MshElement element_{0, 0};
+  uint64_t curved_ = 0;  // faces of second and higher order
 };
 
 constexpr uint32_t kMaxElementPoints = 125;

@@ -22,18 +22,36 @@ struct RawMesh {
   Array<uint32_t> tris;        // polygons are cut into triangles by the readers
   Array<uint32_t> tri_group;   // index into groups, kNoGroup without
   std::vector<MeshGroup> groups;  // points: of elements below dimension 3 only, in file order, with repeats
+  std::vector<std::string> warnings;  // one sentence each, to stand before those of repair
   uint32_t npoint() const { return static_cast<uint32_t>(points.size() / 3); }
+  uint32_t ntri() const { return static_cast<uint32_t>(tris.size() / 3); }
+  uint32_t ntet() const { return static_cast<uint32_t>(tets.size() / 4); }
 
   // Index of the group, made where it is new. tag 0 is "no group".
   uint32_t group(const Cursor &at, int32_t dimension, int32_t tag);
+  // The same where a file knows groups by name alone; they are numbered as they come. No name is "no group".
+  uint32_t named_group(const Cursor &at, int32_t dimension, std::string_view name);
+
+  void add_tet(const Cursor &at, const uint32_t corners[4], uint32_t in_group);
+  // n >= 3 corners around a face, cut into the n-2 triangles of a fan about the first: right for convex polygons.
+  void add_polygon(const Cursor &at, const uint32_t *corners, size_t n, uint32_t in_group);
+  // Triangles (i, i+1, i+2), every second one turned.
+  void add_strip(const Cursor &at, const uint32_t *corners, size_t n, uint32_t in_group);
+  // Room for n more: readers that know a sound count ask once, and no array is grown by copying.
+  void expect_tets(size_t n);
 
  private:
+  void add_triangle(const Cursor &at, uint32_t a, uint32_t b, uint32_t c, uint32_t in_group);
   std::map<std::pair<int32_t, int32_t>, uint32_t> group_index_;
+  std::map<std::string, uint32_t, std::less<>> name_index_;
 };
+inline constexpr uint32_t kMaxTris = 1u << 30;
+inline constexpr uint32_t kMaxPoints = UINT32_MAX - 1;
+// A promised number of points that 32 bits can name.
+uint32_t point_count(const Cursor &at, uint64_t n, const char *what = "points");
 
 void read_msh(Cursor &in, RawMesh &out);
 void read_vtk(Cursor &in, RawMesh &out);
-
 void read_vtu(Cursor &in, RawMesh &out);
 void read_medit(Cursor &in, RawMesh &out);
 void read_obj(Cursor &in, RawMesh &out);

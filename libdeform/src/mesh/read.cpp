@@ -1,3 +1,5 @@
+// Which reader a file needs: by what it begins with where that is beyond doubt, else by its name's ending. What is not read is refused with
+// the way to convert it.
 #include <algorithm>
 #include <cctype>
 
@@ -8,7 +10,51 @@
 namespace dfm {
 namespace {
 
-constexpr uint32_t kMaxGroups = 1u << 16;  // a file cannot make us keep more names than this
+struct Format {
+  const char *name;                       // in sentences
+  std::vector<const char *> endings;      // the first is the usual one
+  void (*read)(Cursor &, RawMesh &);      // null: not read, and then
+  const char *advice;                     // how to convert it
+};
+
+constexpr const char *kMeshio = "convert it first: meshio convert FILE OUT.vtu";
+constexpr const char *kAssimp = "convert it first: deform mesh convert FILE OUT.obj (where the command is built with assimp), or export OBJ, PLY or STL";
+constexpr const char *kCad = "it is a shape without cells; mesh it first: gmsh -3 -format msh41 FILE -o OUT.msh";
+
+const std::vector<Format> &formats() {
+  static const std::vector<Format> all{
+      {"MSH (gmsh)", {"msh", "msh2"}, read_msh, nullptr},
+      {"legacy VTK", {"vtk"}, read_vtk, nullptr},
+      {"VTU (XML)", {"vtu", "vtp"}, read_vtu, nullptr},
+      {"Medit", {"mesh"}, read_medit, nullptr},
+      {"OBJ", {"obj"}, read_obj, nullptr},
+      {"PLY", {"ply"}, read_ply, nullptr},
+      {"STL", {"stl"}, read_stl, nullptr},
+      {"OFF", {"off", "coff", "noff"}, read_off, nullptr},
+      {"Abaqus", {"inp"}, nullptr, kMeshio},
+      {"TetGen", {"node", "ele", "face", "edge", "poly", "smesh"}, nullptr,
+       "let tetgen write Medit (tetgen -g) and read the .mesh, or convert it first: meshio convert FILE.node OUT.vtu"},
+      {"binary Medit", {"meshb"}, nullptr, "convert it first: gmsh -3 -format mesh FILE -o OUT.mesh"},
+      {"glTF", {"gltf", "glb"}, nullptr, kAssimp},
+      {"FBX", {"fbx"}, nullptr, kAssimp},
+      {"3DS", {"3ds"}, nullptr, kAssimp},
+      {"COLLADA", {"dae"}, nullptr, kAssimp},
+      {"X3D or Blender", {"x3d", "wrl", "blend"}, nullptr, kAssimp},
+      {"3MF or zip", {"3mf", "zip"}, nullptr, kAssimp},
+      {"HDF5 (MED, CGNS, XDMF)", {"med", "cgns", "h5m", "h5", "xdmf", "exo", "e"}, nullptr, kMeshio},
+      {"Nastran", {"bdf", "nas"}, nullptr, kMeshio},
+      {"CAD", {"step", "stp", "iges", "igs", "brep", "geo"}, nullptr, kCad},
+      {"gzip", {"gz", "tgz"}, nullptr, "unpack it first: gunzip FILE"},
+      {"compressed", {"bz2", "xz", "zst"}, nullptr, "unpack it first"},
+      {"UTF-16 text", {}, nullptr, "save it as plain text (ASCII or UTF-8)"}};
+  return all;
+}
+
+const Format *format_called(std::string_view name) {
+  for (const Format &f : formats())
+    if (f.name == name) return &f;
+  return nullptr;
+}
 
 std::string ending(const std::string &path) {
   const size_t slash = path.find_last_of('/'), dot = path.find_last_of('.');
@@ -18,40 +64,113 @@ std::string ending(const std::string &path) {
   return text;
 }
 
-constexpr const char *kReadable = "MSH 2.2 and 4.1 (.msh) and legacy VTK (.vtk) with tetrahedra are read";
+const Format *format_by_ending(const std::string &end) {
+  for (const Format &f : formats())
+    for (const char *e : f.endings)
+      if (end == e) return &f;
+  return nullptr;
+}
+
+std::string readable() {
+  std::string out;
+  for (const Format &f : formats())
+    if (f.read) out += std::string(out.empty() ? "" : ", ") + "." + f.endings.front();
+  return out;
+}
+
+bool starts(std::string_view text, std::string_view with) { return text.substr(0, with.size()) == with; }
+
+// What the first bytes say beyond doubt; null where they say nothing. OBJ, ASCII STL and TetGen have no mark of their own.
+const Format *format_by_content(std::string_view bytes) {
+  if (starts(bytes, "\x1f\x8b")) return format_called("gzip");
+  if (starts(bytes, "glTF")) return format_called("glTF");
+  if (starts(bytes, "Kaydara FBX") || starts(bytes, "; FBX")) return format_called("FBX");
+  if (starts(bytes, "PK\3\4")) return format_called("3MF or zip");
+  if (starts(bytes, "\x89HDF")) return format_called("HDF5 (MED, CGNS, XDMF)");
+  if (starts(bytes, "\xff\xfe") || starts(bytes, "\xfe\xff")) return format_called("UTF-16 text");
+  std::string_view head = bytes.substr(0, 4096);
+  head.remove_prefix(std::min(head.find_first_not_of(" \t\r\n"), head.size()));
+  if (starts(head, "# vtk DataFile")) return format_called("legacy VTK");
+  if (starts(head, "<?xml") || starts(head, "<VTKFile") || starts(head, "<!--")) {
+    if (head.find("<VTKFile") != head.npos) return format_called("VTU (XML)");
+    return format_called(head.find("<COLLADA") != head.npos ? "COLLADA" : head.find("<X3D") != head.npos ? "X3D or Blender" : "");
+  }
+  while (starts(head, "#")) {  // OFF and Medit may begin with comments
+    head.remove_prefix(std::min(head.find('\n'), head.size()));
+    head.remove_prefix(std::min(head.find_first_not_of(" \t\r\n"), head.size()));
+  }
+  const std::string_view word = head.substr(0, head.find_first_of(" \t\r\n"));
+  if (word == "$MeshFormat" || word == "$NOD" || word == "$Comments") return format_called("MSH (gmsh)");
+  if (word == "MeshVersionFormatted") return format_called("Medit");
+  if (word == "ply") return format_called("PLY");
+  if (word == "OFF" || word == "COFF" || word == "NOFF" || word == "CNOFF" || word == "STOFF") return format_called("OFF");
+  if (starts(word, "**") || Cursor::is_word(word, "*heading") || Cursor::is_word(word, "*node") || Cursor::is_word(word, "*node,"))
+    return format_called("Abaqus");
+  if (word == "ISO-10303-21;") return format_called("CAD");
+  return nullptr;
+}
+
+const Format &choose(const std::string &path, std::string_view bytes, RawMesh &raw) {
+  const std::string end = ending(path);
+  const Format *const named = format_by_ending(end), *const seen = format_by_content(bytes);
+  if (bytes.empty()) fail(DFM_E_FORMAT, "%s: the file is empty; expected a mesh (%s)", path.c_str(), readable().c_str());
+  const Format *const found = seen ? seen : named;
+  const bool lies = seen && seen != named;
+  const std::string although = !lies ? "" : end.empty() ? " (as its first bytes show; the name has no ending)"
+                                                        : format(" (as its first bytes show, although its name ends in .%s)", end.c_str());
+  if (!found) {
+    std::vector<std::string> known;
+    for (const Format &f : formats())
+      if (f.read) known.insert(known.end(), f.endings.begin(), f.endings.end());
+    const std::string near = nearest(end, known);
+    fail(DFM_E_UNSUPPORTED, "%s: unknown mesh file ending '%s'%s; %s are read", path.c_str(), end.c_str(),
+         near.empty() ? "" : (", did you mean ." + near + "?").c_str(), readable().c_str());
+  }
+  if (!found->read)
+    fail(DFM_E_UNSUPPORTED, "%s: this is a %s file%s, which is not read; %s", path.c_str(), found->name, although.c_str(), found->advice);
+  if (lies) raw.warnings.push_back(format("read as %s%s", found->name, although.c_str()));
+  return *found;
+}
+
+// Warnings of the reader stand before those of the repair.
+template <class Mesh>
+Mesh finish_with_warnings(Mesh (*finish)(const std::string &, RawMesh &&), const std::string &path, RawMesh &&raw) {
+  const std::vector<std::string> warnings = raw.warnings;
+  Mesh mesh = finish(path, std::move(raw));
+  mesh.warnings.insert(mesh.warnings.begin(), warnings.begin(), warnings.end());
+  return mesh;
+}
 
 }  // namespace
 
-uint32_t RawMesh::group(const Cursor &at, int32_t dimension, int32_t tag) {
-  if (tag == 0) return kNoGroup;
-  const auto [entry, fresh] = group_index_.try_emplace({dimension, tag}, uint32_t(groups.size()));
-  if (fresh) {
-    if (groups.size() == kMaxGroups) at.refuse("more than %u physical groups", kMaxGroups);
-    groups.push_back({std::to_string(tag), dimension, tag, Array<uint32_t>(HookAllocator<uint32_t>(*memory))});
-  }
-  return entry->second;
+RawMesh parse_raw(const Memory &memory, const std::string &path, const char *bytes, size_t size) {
+  RawMesh raw(memory);
+  const size_t mark = starts({bytes, size}, "\xef\xbb\xbf") ? 3 : 0;  // some editors put this before text
+  Cursor in(path, bytes + mark, size - mark);
+  choose(path, in.rest(), raw).read(in, raw);
+  return raw;
+}
+
+RawMesh read_raw(const Memory &memory, const std::string &path) {
+  const Format *const named = format_by_ending(ending(path));
+  if (named && !named->read)  // before a large file is read for nothing
+    fail(DFM_E_UNSUPPORTED, "%s: %s files are not read; %s", path.c_str(), named->name, named->advice);
+  const Array<char> bytes = read_whole_file(memory, path);
+  return parse_raw(memory, path, bytes.data(), bytes.size());
 }
 
 TetMesh parse_tet_mesh(const Memory &memory, const std::string &path, const char *bytes, size_t size) {
-  Cursor in(path, bytes, size);
-  RawMesh raw(memory);
-  if (size == 0) in.refuse("the file is empty; %s", kReadable);
-  if (ending(path) == "vtk") read_vtk(in, raw);
-  else read_msh(in, raw);
-  return finish_mesh(path, std::move(raw));
+  return finish_with_warnings(finish_mesh, path, parse_raw(memory, path, bytes, size));
 }
 
 TetMesh read_tet_mesh(const Memory &memory, const std::string &path) {
-  const std::string kind = ending(path);
-  if (kind != "msh" && kind != "msh2" && kind != "vtk") {
-    static const std::vector<std::string> later{"vtu", "mesh", "obj", "ply", "stl", "off", "node", "ele", "inp"};
-    if (std::find(later.begin(), later.end(), kind) != later.end())
-      fail(DFM_E_UNSUPPORTED, "%s: reading .%s is not available yet; %s, so convert it first (for instance with meshio or gmsh)",
-           path.c_str(), kind.c_str(), kReadable);
-    fail(DFM_E_UNSUPPORTED, "%s: unknown mesh file ending '%s'; %s", path.c_str(), kind.c_str(), kReadable);
-  }
-  const Array<char> bytes = read_whole_file(memory, path);
-  return parse_tet_mesh(memory, path, bytes.data(), bytes.size());
+  return finish_with_warnings(finish_mesh, path, read_raw(memory, path));  // the file's bytes are free before the repair begins
 }
+
+TriMesh parse_tri_mesh(const Memory &memory, const std::string &path, const char *bytes, size_t size) {
+  return finish_with_warnings(finish_surface, path, parse_raw(memory, path, bytes, size));
+}
+
+TriMesh read_tri_mesh(const Memory &memory, const std::string &path) { return finish_with_warnings(finish_surface, path, read_raw(memory, path)); }
 
 }  // namespace dfm

@@ -48,6 +48,7 @@ void read_binary_elements(Cursor &in, RawMesh &out, ElementSink &sink) {
     if (follow <= 0 || uint64_t(follow) > n - i) in.refuse("a run of %d elements where %llu are left", follow, ull(n - i));
     if (ntag < 0) in.refuse("elements with %d tags", ntag);
     in.count(follow, 4 * (1 + size_t(ntag) + points), "elements in a run");
+    if (type == kMshTet) out.expect_tets(size_t(follow));
     for (int32_t e = 0; e < follow; ++e, ++i) {
       in.value<int32_t>("an element's number");
       int32_t physical = 0;
@@ -84,6 +85,7 @@ void read_msh22(Cursor &in, RawMesh &out) {
   }
   if (!have_nodes || !have_elements)
     in.refuse("no %s section; the file is truncated or holds no mesh", have_nodes ? "$Elements" : "$Nodes");
+  sink.finish(in);
 }
 
 }  // namespace dfm

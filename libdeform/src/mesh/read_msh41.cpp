@@ -32,6 +32,7 @@ class Msh41Reader {
     }
     if (!have_nodes || !have_elements)
       in_.refuse("no %s section; the file is truncated or holds no mesh", have_nodes ? "$Elements" : "$Nodes");
+    sink_.finish(in_);
   }
 
  private:
@@ -127,6 +128,7 @@ class Msh41Reader {
         in_.refuse("a block of %lld elements where %llu of the %llu promised are left", ll(n), ull(nelement - done), ull(nelement));
       const uint32_t points = sink_.begin(in_, type);
       in_.count(n, size_bytes() * (1 + points), "elements in a block");
+      if (type == kMshTet) out_.expect_tets(size_t(n));
       const uint32_t group = group_of(dimension, entity);
       if (group != kNoGroup && msh_element(type).dimension != dimension)
         in_.refuse("elements of type %d in an entity of dimension %d", type, dimension);

@@ -1,20 +1,16 @@
-// Legacy VTK files 2.0 to 5.1, UNSTRUCTURED_GRID, ASCII and binary (always big-endian). A line of header, a title, ASCII or BINARY, then
-// sections by keyword. CELLS comes as "k i1 .. ik" rows (to 4.x) or, from 5.0 on, as OFFSETS and CONNECTIVITY arrays.
+// Legacy VTK files 2.0 to 5.1, UNSTRUCTURED_GRID and POLYDATA, ASCII and binary (always big-endian). A line of header, a title, ASCII or
+// BINARY, then sections by keyword. Cells come as "k i1 .. ik" rows (to 4.x) or, from 5.0 on, as OFFSETS and CONNECTIVITY arrays. Of the
+// attributes behind them only an array that numbers groups is kept.
 #include <algorithm>
+#include <bit>
 #include <cctype>
 
-#include "mesh/raw_mesh.h"
+#include "mesh/vtk.h"
 
 namespace dfm {
 namespace {
 
-std::string lower(std::string_view text) {
-  std::string out(text.substr(0, 64));
-  for (char &c : out) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
-  return out;
-}
-
-enum class Number { f32, f64, i8, u8, i16, u16, i32, u32, i64, u64, text, bit };
+using Number = VtkNumber;
 
 // VTK writes vtkIdType as int; long is that of the machine that wrote the file, 8 bytes on all that count today.
 Number number_type(const Cursor &in, std::string_view name) {
@@ -23,52 +19,56 @@ Number number_type(const Cursor &in, std::string_view name) {
       {"unsigned_long", Number::u64}, {"vtktypeint64", Number::i64}, {"vtktypeuint64", Number::u64}, {"vtktypeint32", Number::i32},
       {"vtkidtype", Number::i32}, {"short", Number::i16}, {"unsigned_short", Number::u16}, {"char", Number::i8},
       {"signed_char", Number::i8}, {"unsigned_char", Number::u8}, {"string", Number::text}, {"bit", Number::bit}};
-  const std::string wanted = lower(name);
+  const std::string wanted = vtk_lower(name);
   for (const auto &[text, type] : known)
     if (wanted == text) return type;
   in.refuse("expected a number type (float, double, int, long, vtktypeint64 ...), found %s", Cursor::quote(name).c_str());
 }
 
-size_t number_bytes(Number type) {
-  switch (type) {
-    case Number::i8: case Number::u8: return 1;
-    case Number::i16: case Number::u16: return 2;
-    case Number::f32: case Number::i32: case Number::u32: return 4;
-    case Number::f64: case Number::i64: case Number::u64: return 8;
-    case Number::text: case Number::bit: break;
-  }
-  return 0;
-}
-
 class VtkReader {
  public:
-  VtkReader(Cursor &in, RawMesh &out) : in_(in), out_(out), cells_(HookAllocator<uint32_t>(*out.memory)),
-                                        start_(HookAllocator<uint32_t>(*out.memory)),
-                                        types_(HookAllocator<uint8_t>(*out.memory)) {}
+  VtkReader(Cursor &in, RawMesh &out)
+      : in_(in), out_(out), sink_(out), cells_(HookAllocator<uint32_t>(*out.memory)), start_(HookAllocator<uint32_t>(*out.memory)),
+        types_(HookAllocator<uint8_t>(*out.memory)), labels_(HookAllocator<int32_t>(*out.memory)) {}
 
   void run() {
     header();
-    bool points = false, cells = false, types = false;
+    bool points = false, types = false, any = false;
     for (;;) {
-      const std::string keyword = lower(in_.word());
+      const std::string keyword = vtk_lower(in_.word());
       if (keyword == "points") once(points, "POINTS"), read_points();
-      else if (keyword == "cells") {
-        if (!points) in_.refuse("CELLS before POINTS; expected POINTS first");
-        once(cells, "CELLS"), read_cells();
-      } else if (keyword == "cell_types") {
-        if (!cells) in_.refuse("CELL_TYPES before CELLS; expected CELLS first");
+      else if (const uint8_t face = face_type(keyword); face && polydata_) cells_after(points, any, keyword), read_cells(face);
+      else if (keyword == "cells" && !polydata_) {
+        if (any) in_.refuse("a second CELLS section; one mesh per file is read");
+        cells_after(points, any, keyword), read_cells(0);
+      } else if (keyword == "cell_types" && !polydata_) {
+        if (!any) in_.refuse("CELL_TYPES before CELLS; expected CELLS first");
         once(types, "CELL_TYPES"), read_types();
-      } else if (keyword == "field") skip_field();
+      } else if (keyword == "field") read_field(nullptr);
       else if (keyword == "metadata") skip_metadata();
-      else if (keyword == "point_data" || keyword == "cell_data" || keyword.empty()) break;  // attributes come last and are not used
-      else in_.refuse("unknown keyword %s; expected POINTS, CELLS, CELL_TYPES, FIELD, METADATA, POINT_DATA or CELL_DATA",
-          Cursor::quote(keyword).c_str());
+      else if (keyword == "point_data" || keyword == "cell_data") {
+        read_attributes(keyword == "cell_data");
+        break;
+      } else if (keyword.empty()) break;
+      else in_.refuse("unknown keyword %s; expected POINTS, %s, FIELD, METADATA, POINT_DATA or CELL_DATA", Cursor::quote(keyword).c_str(),
+          polydata_ ? "VERTICES, LINES, POLYGONS, TRIANGLE_STRIPS" : "CELLS, CELL_TYPES");
     }
-    if (!types) in_.refuse("no %s section; the file is truncated or holds no mesh", !points ? "POINTS" : !cells ? "CELLS" : "CELL_TYPES");
+    const char *const missing = !points ? "POINTS" : !any ? (polydata_ ? "POLYGONS" : "CELLS") : !types && !polydata_ ? "CELL_TYPES" : nullptr;
+    if (missing) in_.refuse("no %s section; the file is truncated or holds no mesh", missing);
     collect();
   }
 
  private:
+  // The cell type that a section of POLYDATA holds; 0: no such section.
+  static uint8_t face_type(const std::string &keyword) {
+    return keyword == "vertices" ? 2 : keyword == "lines" ? 4 : keyword == "polygons" ? 7 : keyword == "triangle_strips" ? 6 : 0;
+  }
+  void cells_after(bool points, bool &any, const std::string &keyword) {
+    std::string name = keyword;
+    for (char &c : name) c = static_cast<char>(std::toupper(static_cast<unsigned char>(c)));
+    if (!points) in_.refuse("%s before POINTS; expected POINTS first", name.c_str());
+    any = true;
+  }
   void once(bool &seen, const char *keyword) {
     if (seen) in_.refuse("a second %s section; one mesh per file is read", keyword);
     seen = true;
@@ -76,8 +76,6 @@ class VtkReader {
 
   void header() {
     const std::string_view first = in_.line();
-    if (first.substr(0, 8) == "<VTKFile" || first.substr(0, 5) == "<?xml")
-      in_.unsupported("this is an XML (VTU) file, not legacy VTK; reading VTU is not available yet, so save it as legacy VTK (for instance with meshio or ParaView)");
     constexpr std::string_view kMark = "# vtk DataFile Version ";
     if (first.substr(0, kMark.size()) != kMark)
       in_.seek(0), in_.refuse("expected '# vtk DataFile Version x.y' in the first line, found %s",
@@ -89,50 +87,24 @@ class VtkReader {
       in_.seek(0), in_.unsupported("legacy VTK version %s; 2.0 to 5.1 are read", Cursor::quote(number.empty() ? " " : number).c_str());
     in_.line();  // title
     const std::string_view form = in_.word();
-    const std::string kind = lower(form);
+    const std::string kind = vtk_lower(form);
     if (kind != "ascii" && kind != "binary") in_.refuse("expected ASCII or BINARY, found %s", Cursor::quote(form).c_str());
     in_.expect("DATASET", "ASCII or BINARY");
     const std::string_view dataset = in_.word();
-    if (lower(dataset) != "unstructured_grid")
-      in_.unsupported("DATASET %s has no tetrahedra; expected UNSTRUCTURED_GRID", Cursor::quote(dataset).c_str());
+    polydata_ = vtk_lower(dataset) == "polydata";
+    if (!polydata_ && vtk_lower(dataset) != "unstructured_grid")
+      in_.unsupported("DATASET %s has no tetrahedra and no triangles; expected UNSTRUCTURED_GRID or POLYDATA", Cursor::quote(dataset).c_str());
     in_.binary = kind == "binary";
     in_.swap = std::endian::native == std::endian::little;
   }
 
-  double real(Number type, const char *what) {
-    if (!in_.binary) return in_.real(what);
-    if (type == Number::f64) return in_.binary_real(what);
-    if (type == Number::f32) {
-      const float v = in_.value<float>(what);
-      if (!std::isfinite(v)) in_.seek(in_.offset() - sizeof v), in_.refuse("%s is not a finite number", what);
-      return v;
-    }
-    return static_cast<double>(integer(type, what));
-  }
-
-  int64_t integer(Number type, const char *what) {
-    if (!in_.binary) return in_.integer(what);
-    switch (type) {
-      case Number::i8: return in_.value<int8_t>(what);
-      case Number::u8: return in_.value<uint8_t>(what);
-      case Number::i16: return in_.value<int16_t>(what);
-      case Number::u16: return in_.value<uint16_t>(what);
-      case Number::i32: return in_.value<int32_t>(what);
-      case Number::u32: return in_.value<uint32_t>(what);
-      case Number::i64: return in_.value<int64_t>(what);
-      case Number::u64: return static_cast<int64_t>(in_.value<uint64_t>(what));  // above 2^63 reads as negative and is refused by range
-      default: break;
-    }
-    in_.refuse("%s must be whole numbers", what);
-  }
+  double real(Number type, const char *what) { return vtk_real(in_, type, what); }
+  int64_t integer(Number type, const char *what) { return vtk_integer(in_, type, what); }
 
   // Bytes that one number takes at least in this file.
-  size_t least(Number type) const { return in_.binary ? number_bytes(type) : 2; }
-  // Text may end without a space after its last number.
+  size_t least(Number type) const { return in_.binary ? vtk_bytes(type) : 2; }
   uint64_t count(int64_t claimed, size_t numbers_each, Number type, const char *what) const {
-    const size_t bytes = numbers_each * least(type);
-    if (!in_.binary && claimed > 0 && uint64_t(claimed) <= (in_.left() + 1) / bytes) return uint64_t(claimed);
-    return in_.count(claimed, bytes, what);
+    return in_.binary ? in_.count(claimed, numbers_each * least(type), what) : in_.text_count(claimed, numbers_each, what);
   }
   uint32_t small_count(uint64_t n, const char *what) const {
     if (n >= UINT32_MAX) in_.unsupported("%llu %s; up to %u are read", ull(n), what, UINT32_MAX - 1);
@@ -143,12 +115,12 @@ class VtkReader {
   }
   Number real_type(std::string_view name) {
     const Number type = number_type(in_, name);
-    if (number_bytes(type) == 0) in_.refuse("POINTS of type %s; expected float or double", Cursor::quote(name).c_str());
+    if (vtk_bytes(type) == 0) in_.refuse("POINTS of type %s; expected float or double", Cursor::quote(name).c_str());
     return type;
   }
   Number integer_type(std::string_view name) {
     const Number type = number_type(in_, name);
-    if (number_bytes(type) == 0 || type == Number::f32 || type == Number::f64)
+    if (!vtk_whole(type))
       in_.refuse("cells of type %s; expected a whole-number type such as vtktypeint64", Cursor::quote(name).c_str());
     return type;
   }
@@ -172,11 +144,18 @@ class VtkReader {
     return uint32_t(p);
   }
 
-  void read_cells() {
+  // Appends to the cells; type 0: CELL_TYPES will tell.
+  void read_cells(uint8_t type) {
+    if (!start_.empty()) start_.pop_back();
+    read_rows();
+    if (type) types_.resize(start_.size() - 1, type);
+  }
+
+  void read_rows() {
     const int64_t first = in_.integer("the number of cells"), second = in_.integer("the size of the cell list");
     const size_t at = in_.offset();
     if (in_.binary) in_.end_line("CELLS");  // OFFSETS is text on a line of its own; old cell rows would be bytes here
-    const bool arrays = lower(in_.word()) == "offsets";
+    const bool arrays = vtk_lower(in_.word()) == "offsets";
     if (arrays) return read_cell_arrays(first, second);
     in_.seek(at);
     begin_data("CELLS");
@@ -184,7 +163,8 @@ class VtkReader {
     if (first < 0 || uint64_t(first) > size) in_.refuse("CELLS promises %lld cells in a list of %lld numbers", ll(first), ll(second));
     const uint32_t ncell = small_count(uint64_t(first), "cells");
     small_count(size, "numbers in the cell list");
-    start_.reserve(size_t(ncell) + 1), cells_.reserve(size - ncell);
+    small_count(cells_.size() + size, "numbers in the cell lists");
+    start_.reserve(start_.size() + ncell + 1), cells_.reserve(cells_.size() + (size - ncell));
     uint64_t used = 0;
     for (uint32_t c = 0; c < ncell; ++c) {
       const int64_t k = integer(Number::i32, "a cell's number of points");
@@ -202,22 +182,24 @@ class VtkReader {
     const Number offset_type = integer_type(in_.word());
     begin_data("OFFSETS");
     const uint32_t n = small_count(count(noffset, 1, offset_type, "cell offsets"), "cells");
-    start_.reserve(n);
+    const size_t base = cells_.size();
+    start_.reserve(start_.size() + n + 1);
+    int64_t last = 0;
     for (uint32_t i = 0; i < n; ++i) {
       const int64_t v = integer(offset_type, "a cell offset");
-      if (v < (i ? int64_t(start_.back()) : 0) || v > nconnectivity || (i == 0 && v != 0))
+      if (v < last || v > nconnectivity || (i == 0 && v != 0))
         in_.refuse("cell offset %lld; offsets start at 0 and rise to the %lld numbers of CONNECTIVITY", ll(v), ll(nconnectivity));
-      start_.push_back(small_count(uint64_t(v), "numbers in the cell list"));
+      start_.push_back(small_count(base + uint64_t(v), "numbers in the cell lists"));
+      last = v;
     }
-    if (n ? int64_t(start_.back()) != nconnectivity : nconnectivity != 0)
-      in_.refuse("the last cell offset must equal the %lld numbers of CONNECTIVITY", ll(nconnectivity));
-    if (n == 0) start_.push_back(0);
+    if (last != nconnectivity) in_.refuse("the last cell offset must equal the %lld numbers of CONNECTIVITY", ll(nconnectivity));
+    if (n == 0) start_.push_back(small_count(base, "numbers in the cell lists"));
     const std::string_view word = in_.word();
-    if (lower(word) != "connectivity") in_.refuse("expected CONNECTIVITY after OFFSETS, found %s", Cursor::quote(word).c_str());
+    if (vtk_lower(word) != "connectivity") in_.refuse("expected CONNECTIVITY after OFFSETS, found %s", Cursor::quote(word).c_str());
     const Number type = integer_type(in_.word());
     begin_data("CONNECTIVITY");
     const uint32_t m = small_count(count(nconnectivity, 1, type, "numbers in CONNECTIVITY"), "numbers in CONNECTIVITY");
-    cells_.reserve(m);
+    cells_.reserve(base + m);
     for (uint32_t i = 0; i < m; ++i) cells_.push_back(corner(type));
   }
 
@@ -235,63 +217,120 @@ class VtkReader {
     }
   }
 
-  // Tetrahedra are kept, cells below dimension 3 passed over, other volume cells refused: a body must not lose parts in silence.
   void collect() {
-    size_t ntet = 0;
-    for (size_t c = 0; c < types_.size(); ++c) {
-      const uint32_t corners = start_[c + 1] - start_[c];
-      switch (types_[c]) {
-        case 10:
-          if (corners != 4) in_.refuse("cell %zu is a tetrahedron (type 10) with %u points; expected 4", c, corners);
-          ++ntet;
-          break;
-        case 24: case 71: case 78: case 79: case 80:
-          in_.unsupported("cell %zu is a second- or higher-order tetrahedron (type %d); write first-order cells (for instance gmsh -order 1)", c, types_[c]);
-        case 11: case 12: case 13: case 14: case 15: case 16: case 25: case 26: case 27: case 29: case 31: case 32: case 33:
-        case 41: case 42: case 72: case 73: case 74:
-          in_.unsupported("cell %zu is a volume cell of type %d (hexahedron, wedge, pyramid or polyhedron); only tetrahedra (type 10) are read: mesh the shape with tetrahedra", c, types_[c]);
-        default: break;
-      }
-    }
-    if (ntet >= kMaxTets) in_.unsupported("%zu tetrahedra; fewer than %u are read", ntet, kMaxTets);
-    out_.tets.reserve(4 * ntet);
+    const auto ntet = std::count(types_.begin(), types_.end(), 10);
+    out_.expect_tets(size_t(ntet));
+    if (labels_.size() != types_.size()) labels_.clear();
     for (size_t c = 0; c < types_.size(); ++c)
-      if (types_[c] == 10) out_.tets.insert(out_.tets.end(), cells_.begin() + start_[c], cells_.begin() + start_[c] + 4);
-    out_.tet_group.assign(ntet, kNoGroup);
+      sink_.add(in_, types_[c], cells_.data() + start_[c], start_[c + 1] - start_[c], labels_.empty() ? 0 : labels_[c]);
+    sink_.finish(in_);
+    sink_.name_groups(group_numbers_, group_names_);
   }
 
-  // "FIELD name n", then n arrays "name components tuples type" and their values.
-  void skip_field() {
+  // "name type [components]", "LOOKUP_TABLE name", or "name components tuples type" in a FIELD; then the values. Attributes are passed over but
+  // for the one over the cells that numbers groups. What comes behind an unknown keyword is left unread.
+  void read_attributes(bool of_cells) {
+    int64_t n = in_.integer("the number of tuples");
+    for (;;) {
+      const std::string keyword = vtk_lower(in_.word());
+      if (keyword == "point_data" || keyword == "cell_data") of_cells = keyword == "cell_data", n = in_.integer("the number of tuples");
+      else if (keyword == "field") read_field(of_cells ? &n : nullptr);
+      else if (keyword == "metadata") skip_metadata();
+      else if (keyword == "scalars") read_scalars(of_cells, n);
+      else if (keyword == "color_scalars" || keyword == "lookup_table") {
+        in_.word();
+        const int64_t k = in_.integer("a number of colours");
+        skip_values(in_.binary ? Number::u8 : Number::f32, keyword == "lookup_table" ? product(4, k) : product(k, n));
+      } else if (const int64_t width = attribute_width(keyword)) {
+        in_.word();
+        const int64_t components = width < 0 ? in_.integer("a number of components") : width;
+        skip_values(number_type(in_, in_.word()), product(components, n));
+      } else return;
+    }
+  }
+
+  static int64_t attribute_width(const std::string &keyword) {  // -1: the file says
+    if (keyword == "vectors" || keyword == "normals") return 3;
+    if (keyword == "tensors") return 9;
+    if (keyword == "tensors6") return 6;
+    if (keyword == "texture_coordinates") return -1;
+    return keyword == "global_ids" || keyword == "pedigree_ids" || keyword == "edge_flags" ? 1 : 0;
+  }
+
+  int64_t product(int64_t a, int64_t b) const {
+    if (a < 0 || b < 0 || (a && b > INT64_MAX / a)) in_.refuse("an array of %lld x %lld values", ll(a), ll(b));
+    return a * b;
+  }
+
+  void read_scalars(bool of_cells, int64_t n) {
+    const std::string_view name = in_.word();
+    const Number type = number_type(in_, in_.word());
+    const std::string_view given = in_.line_word();
+    const int64_t width = given.empty() ? 1 : in_.to_integer(given, "a number of components");
+    const size_t at = in_.offset();
+    if (vtk_lower(in_.word()) == "lookup_table") in_.word();
+    else in_.seek(at);
+    keep_or_skip(of_cells && width == 1, name, type, product(width, n));
+  }
+
+  void keep_or_skip(bool candidate, std::string_view name, Number type, int64_t n) {
+    if (!candidate || !vtk_whole(type) || !labels_.empty() || !vtk_names_groups(name)) return skip_values(type, n);
+    begin_data("an array's type");
+    const uint64_t m = count(n, 1, type, "numbers of groups");
+    labels_.reserve(m);
+    for (uint64_t i = 0; i < m; ++i) {
+      const int64_t v = integer(type, "a group's number");
+      labels_.push_back(v >= INT32_MIN && v <= int64_t(UINT32_MAX) ? static_cast<int32_t>(v) : 0);
+    }
+  }
+
+  // "FIELD name n", then n arrays "name components tuples type" and their values. n_cells: where the field is over the cells.
+  void read_field(const int64_t *n_cells) {
     in_.word();
     const int64_t arrays = in_.integer("the number of arrays in FIELD");
     for (int64_t a = 0; a < arrays; ++a) {
       const size_t at = in_.offset();
-      std::string_view name = in_.word();
-      if (lower(name) == "metadata") { skip_metadata(); --a; continue; }
+      const std::string_view name = in_.word();
+      if (vtk_lower(name) == "metadata") { skip_metadata(); --a; continue; }
       if (name.empty()) in_.seek(at), in_.refuse("the file ends inside a FIELD that promises %lld arrays", ll(arrays));
       const int64_t width = in_.integer("an array's number of components"), tuples = in_.integer("an array's number of tuples");
       const Number type = number_type(in_, in_.word());
-      if (width < 0 || tuples < 0 || (width && tuples > INT64_MAX / width))
-        in_.refuse("a FIELD array of %lld x %lld values", ll(width), ll(tuples));
-      skip_values(type, width * tuples);
+      if (name == kVtkGroupNumber && width == 2 && type == Number::i32) read_group_numbers(product(2, tuples));
+      else if (name == kVtkGroupName && width == 1 && type == Number::text) skip_strings(tuples, &group_names_);
+      else keep_or_skip(n_cells && width == 1 && tuples == *n_cells, name, type, product(width, tuples));
     }
+  }
+
+  void read_group_numbers(int64_t n) {
+    begin_data("an array's type");
+    const uint64_t m = count(n, 1, Number::i32, "numbers of groups");
+    for (uint64_t i = 0; i < m; ++i) group_numbers_.push_back(integer(Number::i32, "a group's number"));
   }
 
   void skip_values(Number type, int64_t n) {
     if (type == Number::text) {
-      in_.line();
-      for (int64_t i = 0; i < n; ++i) {
-        if (in_.left() == 0) in_.refuse("the file ends inside a FIELD of strings");
-        if (in_.binary) in_.skip(string_bytes(), "a FIELD string");
-        else in_.line();
-      }
+      skip_strings(n, nullptr);
     } else if (in_.binary) {
       in_.end_line("an array's type");
       if (type == Number::bit) in_.skip(size_t((uint64_t(n) + 7) / 8), "a FIELD array");
-      else in_.skip(in_.count(n, number_bytes(type), "values") * number_bytes(type), "a FIELD array");
+      else in_.skip(in_.count(n, vtk_bytes(type), "values") * vtk_bytes(type), "a FIELD array");
     } else {
       for (int64_t i = 0; i < n; ++i)
         if (in_.word().empty()) in_.refuse("the file ends inside a FIELD array of %lld values", ll(n));
+    }
+  }
+
+  void skip_strings(int64_t n, std::vector<std::string> *keep) {
+    in_.line();
+    for (int64_t i = 0; i < n; ++i) {
+      if (in_.left() == 0) in_.refuse("the file ends inside a FIELD of strings");
+      std::string_view text;
+      if (in_.binary) {
+        const size_t bytes = string_bytes();
+        text = in_.rest().substr(0, bytes);
+        in_.skip(bytes, "a FIELD string");
+      } else text = in_.line();
+      if (keep) keep->emplace_back(text);
     }
   }
 
@@ -312,8 +351,13 @@ class VtkReader {
 
   Cursor &in_;
   RawMesh &out_;
+  VtkCells sink_;
+  bool polydata_ = false;
   Array<uint32_t> cells_, start_;  // corners end to end; first corner of each cell, and the end
   Array<uint8_t> types_;
+  Array<int32_t> labels_;          // the file's number of each cell's group, where it has an array of them
+  std::vector<int64_t> group_numbers_;  // dimension and number of each named group
+  std::vector<std::string> group_names_;
 };
 
 }  // namespace

@@ -1,11 +1,12 @@
+// Legacy VTK, VTU and Medit out of a tetrahedral mesh, and which writer a file name asks for.
 #include <algorithm>
 #include <bit>
 #include <cctype>
-#include <cmath>
+#include <charconv>
 
 #include "core/error.h"
 #include "mesh/file.h"
-#include "mesh/mesh.h"
+#include "mesh/vtk.h"
 
 namespace dfm {
 namespace {
@@ -21,107 +22,128 @@ T big_endian(T value) {
 
 std::string text(uint64_t n) { return std::to_string(n); }
 
-void put_head(AtomicFile &out, const char *version) {
-  out.write(std::string("$MeshFormat\n") + version + " 1 8\n");
-  out.put<int32_t>(1);
-  out.write("\n$EndMeshFormat\n");
+// The file's number of each cell's and then each triangle's group, 0 without. Empty where there are no groups at all.
+Array<uint32_t> group_numbers(const TetMesh &mesh) {
+  Array<uint32_t> out(HookAllocator<uint32_t>(*mesh.memory));
+  if (mesh.groups.empty()) return out;
+  out.reserve(mesh.tet_group.size() + mesh.tri_group.size());
+  for (const Array<uint32_t> *groups : {&mesh.tet_group, &mesh.tri_group})
+    for (const uint32_t g : *groups) out.push_back(g == kNoGroup ? 0 : static_cast<uint32_t>(mesh.groups[g].tag));
+  return out;
 }
 
-// Only groups of cells are written: the points of surface groups have no elements here to stand on.
-void put_names(AtomicFile &out, const TetMesh &mesh) {
-  const auto of_cells = [](const MeshGroup &g) { return g.dimension == 3; };
-  const auto n = std::count_if(mesh.groups.begin(), mesh.groups.end(), of_cells);
-  if (n == 0) return;
-  out.write("$PhysicalNames\n" + text(static_cast<uint64_t>(n)) + "\n");
-  for (const MeshGroup &g : mesh.groups)
-    if (of_cells(g)) out.write("3 " + std::to_string(g.tag) + " \"" + g.name + "\"\n");
-  out.write("$EndPhysicalNames\n");
+// Triangles have no share; they take 1 so that a picture by share shows them whole.
+Array<double> shares(const TetMesh &mesh) {
+  Array<double> out(HookAllocator<double>(*mesh.memory));
+  if (mesh.share.empty()) return out;
+  out.assign(mesh.share.begin(), mesh.share.end());
+  out.resize(mesh.ntet() + mesh.tri_group.size(), 1.0);
+  return out;
 }
 
-int32_t entity_of(const TetMesh &mesh, uint32_t group) {  // one volume per group of cells, the last for cells without
-  return static_cast<int32_t>(group == kNoGroup ? mesh.groups.size() + 1 : group + 1);
+// Lengths of strings in binary legacy files: the top bits of the first byte tell how many bytes the length takes.
+void put_string(AtomicFile &out, const std::string &s) {
+  if (s.size() < 64) out.put(static_cast<uint8_t>(0xc0 | s.size()));
+  else out.put(big_endian(static_cast<uint16_t>(0x8000 | std::min<size_t>(s.size(), 0x3fff))));
+  out.write(s.data(), std::min<size_t>(s.size(), 0x3fff));
 }
 
-void put_entities(AtomicFile &out, const TetMesh &mesh) {
-  double box[6] = {HUGE_VAL, HUGE_VAL, HUGE_VAL, -HUGE_VAL, -HUGE_VAL, -HUGE_VAL};
-  for (size_t i = 0; i < mesh.points.size(); ++i) {
-    box[i % 3] = std::min(box[i % 3], mesh.points[i]);
-    box[3 + i % 3] = std::max(box[3 + i % 3], mesh.points[i]);
+void put_group_names(AtomicFile &out, const TetMesh &mesh) {
+  if (mesh.groups.empty()) return;
+  const std::string n = text(mesh.groups.size());
+  out.write(std::string("FIELD FieldData 2\n") + kVtkGroupNumber + " 2 " + n + " int\n");
+  for (const MeshGroup &g : mesh.groups) out.put(big_endian(g.dimension)), out.put(big_endian(g.tag));
+  out.write(std::string("\n") + kVtkGroupName + " 1 " + n + " string\n");
+  for (const MeshGroup &g : mesh.groups) put_string(out, g.name);
+  out.write("\n");
+}
+
+void put_cells(AtomicFile &out, const Array<uint32_t> &cells, uint32_t corners) {
+  for (size_t i = 0; i < cells.size(); ++i) {
+    if (i % corners == 0) out.put(big_endian(corners));
+    out.put(big_endian(cells[i]));
   }
-  std::vector<uint32_t> groups;
-  for (uint32_t g = 0; g < mesh.groups.size(); ++g)
-    if (mesh.groups[g].dimension == 3) groups.push_back(g);
-  groups.push_back(kNoGroup);
-  out.write("$Entities\n");
-  for (const uint64_t n : {uint64_t(0), uint64_t(0), uint64_t(0), uint64_t(groups.size())}) out.put(n);
-  for (const uint32_t g : groups) {
-    out.put(entity_of(mesh, g)), out.write(box, sizeof box);
-    out.put<uint64_t>(g != kNoGroup);
-    if (g != kNoGroup) out.put(mesh.groups[g].tag);
-    out.put<uint64_t>(0);
-  }
-  out.write("\n$EndEntities\n");
 }
+
+// Rows of a Medit section; numbers in the fewest digits that read back the same.
+class TextRows {
+ public:
+  explicit TextRows(AtomicFile &out) : out_(out) {}
+  template <class T>
+  void put(T value, char behind) {
+    const auto end = std::to_chars(row_ + used_, row_ + sizeof row_, value);
+    used_ = size_t(end.ptr - row_);
+    row_[used_++] = behind;
+    if (behind == '\n') out_.write(row_, used_), used_ = 0;
+  }
+  void elements(const char *keyword, uint32_t corners, const Array<uint32_t> &points, const Array<uint32_t> &group, const TetMesh &mesh) {
+    if (group.empty()) return;
+    out_.write(std::string(keyword) + "\n" + text(group.size()) + "\n");
+    for (size_t t = 0; t < group.size(); ++t) {
+      for (uint32_t k = 0; k < corners; ++k) put(points[corners * t + k] + 1, ' ');
+      put(group[t] == kNoGroup ? 0 : mesh.groups[group[t]].tag, '\n');
+    }
+  }
+
+ private:
+  AtomicFile &out_;
+  char row_[256];
+  size_t used_ = 0;
+};
 
 }  // namespace
 
-void write_msh41(const TetMesh &mesh, const std::string &path) {
-  AtomicFile out(path);
-  put_head(out, "4.1"), put_names(out, mesh), put_entities(out, mesh);
-  const uint64_t npoint = mesh.npoint(), ntet = mesh.ntet();
-  out.write("$Nodes\n");
-  for (const uint64_t n : {uint64_t(1), npoint, uint64_t(1), npoint}) out.put(n);
-  out.put<int32_t>(3), out.put(entity_of(mesh, ntet ? mesh.tet_group[0] : kNoGroup)), out.put<int32_t>(0), out.put(npoint);
-  for (uint64_t i = 1; i <= npoint; ++i) out.put(i);
-  out.write(mesh.points.data(), mesh.points.size() * sizeof(double));
-  out.write("\n$EndNodes\n$Elements\n");
-  // A new block wherever the group changes, so that the cells keep their order.
-  uint64_t blocks = ntet > 0;
-  for (uint64_t t = 1; t < ntet; ++t) blocks += mesh.tet_group[t] != mesh.tet_group[t - 1];
-  for (const uint64_t n : {blocks, ntet, uint64_t(1), ntet}) out.put(n);
-  for (uint64_t t = 0; t < ntet;) {
-    uint64_t end = t + 1;
-    while (end < ntet && mesh.tet_group[end] == mesh.tet_group[t]) ++end;
-    out.put<int32_t>(3), out.put(entity_of(mesh, mesh.tet_group[t])), out.put<int32_t>(4), out.put(end - t);
-    for (; t < end; ++t) {
-      out.put(t + 1);
-      for (int k = 0; k < 4; ++k) out.put<uint64_t>(uint64_t(mesh.tets[4 * t + k]) + 1);
-    }
-  }
-  out.write("\n$EndElements\n");
-  out.commit();
-}
-
-void write_msh22(const TetMesh &mesh, const std::string &path) {
-  if (mesh.npoint() > INT32_MAX)
-    fail(DFM_E_UNSUPPORTED, "%s: MSH 2.2 holds up to %d nodes, the mesh has %u; write MSH 4.1", path.c_str(), INT32_MAX, mesh.npoint());
-  AtomicFile out(path);
-  put_head(out, "2.2"), put_names(out, mesh);
-  out.write("$Nodes\n" + text(mesh.npoint()) + "\n");
-  for (uint32_t i = 0; i < mesh.npoint(); ++i) out.put(int32_t(i + 1)), out.write(&mesh.points[3 * size_t(i)], 3 * sizeof(double));
-  out.write("\n$EndNodes\n$Elements\n" + text(mesh.ntet()) + "\n");
-  if (mesh.ntet()) out.put<int32_t>(4), out.put(static_cast<int32_t>(mesh.ntet())), out.put<int32_t>(2);
-  for (uint32_t t = 0; t < mesh.ntet(); ++t) {
-    const uint32_t g = mesh.tet_group[t];
-    out.put(int32_t(t + 1)), out.put(g == kNoGroup ? 0 : mesh.groups[g].tag), out.put(entity_of(mesh, g));
-    for (int k = 0; k < 4; ++k) out.put(static_cast<int32_t>(mesh.tets[4 * size_t(t) + k] + 1));
-  }
-  out.write("\n$EndElements\n");
-  out.commit();
-}
-
 void write_vtk(const TetMesh &mesh, const std::string &path) {
   AtomicFile out(path);
-  out.write("# vtk DataFile Version 3.0\ntetrahedra\nBINARY\nDATASET UNSTRUCTURED_GRID\nPOINTS " + text(mesh.npoint()) + " double\n");
+  const uint64_t ntri = mesh.tri_group.size(), ncell = mesh.ntet() + ntri;
+  out.write("# vtk DataFile Version 3.0\ntetrahedra\nBINARY\nDATASET UNSTRUCTURED_GRID\n");
+  put_group_names(out, mesh);
+  out.write("POINTS " + text(mesh.npoint()) + " double\n");
   for (const double x : mesh.points) out.put(big_endian(x));
-  out.write("\nCELLS " + text(mesh.ntet()) + " " + text(5 * uint64_t(mesh.ntet())) + "\n");
-  for (size_t i = 0; i < mesh.tets.size(); ++i) {
-    if (i % 4 == 0) out.put(big_endian(int32_t(4)));
-    out.put(big_endian(mesh.tets[i]));
+  out.write("\nCELLS " + text(ncell) + " " + text(5 * uint64_t(mesh.ntet()) + 4 * ntri) + "\n");
+  put_cells(out, mesh.tets, 4), put_cells(out, mesh.tris, 3);
+  out.write("\nCELL_TYPES " + text(ncell) + "\n");
+  for (uint64_t t = 0; t < ncell; ++t) out.put(big_endian(int32_t(t < mesh.ntet() ? 10 : 5)));
+  const Array<uint32_t> groups = group_numbers(mesh);
+  const Array<double> share = shares(mesh);
+  if (!groups.empty() || !share.empty()) out.write("\nCELL_DATA " + text(ncell) + "\n");
+  if (!groups.empty()) {
+    out.write(std::string("SCALARS ") + kVtkGroup + " int 1\nLOOKUP_TABLE default\n");
+    for (const uint32_t g : groups) out.put(big_endian(g));
+    out.write("\n");
   }
-  out.write("\nCELL_TYPES " + text(mesh.ntet()) + "\n");
-  for (uint32_t t = 0; t < mesh.ntet(); ++t) out.put(big_endian(int32_t(10)));
+  if (!share.empty()) {
+    out.write("SCALARS share double 1\nLOOKUP_TABLE default\n");
+    for (const double s : share) out.put(big_endian(s));
+  }
   out.write("\n");
+  out.commit();
+}
+
+void write_vtu(const TetMesh &mesh, const std::string &path) {
+  const Array<uint32_t> groups = group_numbers(mesh);
+  const Array<double> share = shares(mesh);
+  VtuGrid grid;
+  grid.npoint = mesh.npoint(), grid.points = mesh.points.data();
+  grid.ncell = mesh.ntet(), grid.cells = mesh.tets.data();
+  grid.nface = static_cast<uint32_t>(mesh.tri_group.size()), grid.faces = mesh.tris.data();
+  grid.groups = &mesh.groups;
+  if (!groups.empty()) grid.cell_data.push_back({kVtkGroup, 1, nullptr, groups.data()});
+  if (!share.empty()) grid.cell_data.push_back({"share", 1, share.data(), nullptr});
+  write_vtu(path, grid);
+}
+
+void write_medit(const TetMesh &mesh, const std::string &path) {
+  AtomicFile out(path);
+  out.write("MeshVersionFormatted 2\nDimension\n3\nVertices\n" + text(mesh.npoint()) + "\n");
+  TextRows rows(out);
+  for (size_t i = 0; i < mesh.points.size(); i += 3) {
+    for (size_t k = 0; k < 3; ++k) rows.put(mesh.points[i + k], ' ');
+    rows.put(0, '\n');
+  }
+  rows.elements("Triangles", 3, mesh.tris, mesh.tri_group, mesh);
+  rows.elements("Tetrahedra", 4, mesh.tets, mesh.tet_group, mesh);
+  out.write("End\n");
   out.commit();
 }
 
@@ -134,7 +156,9 @@ void write_tet_mesh(const TetMesh &mesh, const std::string &path) {
   if (ends(".msh")) write_msh41(mesh, path);
   else if (ends(".msh2")) write_msh22(mesh, path);
   else if (ends(".vtk")) write_vtk(mesh, path);
-  else fail(DFM_E_UNSUPPORTED, "%s: writing to this file name ending is not available yet; expected .msh (MSH 4.1), .msh2 (MSH 2.2) or .vtk (legacy VTK)", path.c_str());
+  else if (ends(".vtu")) write_vtu(mesh, path);
+  else if (ends(".mesh")) write_medit(mesh, path);
+  else fail(DFM_E_UNSUPPORTED, "%s: tetrahedra are not written to this file name ending; expected .msh (MSH 4.1), .msh2 (MSH 2.2), .vtk (legacy VTK), .vtu (VTU) or .mesh (Medit)", path.c_str());
 }
 
 }  // namespace dfm

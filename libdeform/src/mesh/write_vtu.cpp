@@ -2,10 +2,24 @@
 #include <bit>
 
 #include "mesh/file.h"
-#include "mesh/mesh.h"
+#include "mesh/vtk.h"
 
 namespace dfm {
 namespace {
+
+// As numbers of characters, each text ended by a zero: what VTK reads as an array of strings.
+std::string names_xml(const std::vector<MeshGroup> &groups) {
+  const std::string n = std::to_string(groups.size());
+  std::string numbers, letters;
+  for (const MeshGroup &g : groups) {
+    numbers += " " + std::to_string(g.dimension) + " " + std::to_string(g.tag);
+    for (const char c : g.name) letters += " " + std::to_string(static_cast<int>(static_cast<signed char>(c)));
+    letters += " 0";
+  }
+  return std::string("    <FieldData>\n      <DataArray type=\"Int32\" Name=\"") + kVtkGroupNumber + "\" NumberOfComponents=\"2\" NumberOfTuples=\"" + n +
+         "\" format=\"ascii\">" + numbers + "</DataArray>\n      <DataArray type=\"String\" Name=\"" + kVtkGroupName + "\" NumberOfTuples=\"" + n +
+         "\" format=\"ascii\">" + letters + "</DataArray>\n    </FieldData>\n";
+}
 
 std::string escaped(const char *name) {
   std::string out;
@@ -45,36 +59,39 @@ void put_arrays(AtomicFile &out, const std::vector<VtuArray> &arrays, uint32_t n
 }  // namespace
 
 void write_vtu(const std::string &path, const VtuGrid &grid) {
-  const uint64_t corners = uint64_t(grid.ncell) * grid.corners;
+  const uint64_t cell_corners = uint64_t(grid.ncell) * grid.corners, corners = cell_corners + 3 * uint64_t(grid.nface);
+  const uint32_t ncell = grid.ncell + grid.nface;
   const bool wide = corners > INT32_MAX;  // VTK's numbers are signed
   const char *type = wide ? "Int64" : "Int32";
   const uint64_t bytes = wide ? 8 : 4;
   Head head;
   head.xml = std::string("<?xml version=\"1.0\"?>\n<VTKFile type=\"UnstructuredGrid\" version=\"1.0\" byte_order=\"") +
              (std::endian::native == std::endian::little ? "LittleEndian" : "BigEndian") +
-             "\" header_type=\"UInt64\">\n  <UnstructuredGrid>\n    <Piece NumberOfPoints=\"" + std::to_string(grid.npoint) +
-             "\" NumberOfCells=\"" + std::to_string(grid.ncell) + "\">\n";
+             "\" header_type=\"UInt64\">\n  <UnstructuredGrid>\n";
+  if (grid.groups && !grid.groups->empty()) head.xml += names_xml(*grid.groups);
+  head.xml += "    <Piece NumberOfPoints=\"" + std::to_string(grid.npoint) + "\" NumberOfCells=\"" + std::to_string(ncell) + "\">\n";
   head.data("PointData", grid.point_data, grid.npoint);
-  head.data("CellData", grid.cell_data, grid.ncell);
+  head.data("CellData", grid.cell_data, ncell);
   head.xml += "      <Points>\n";
   head.array("Float64", "Points", 3, uint64_t(grid.npoint) * 24);
   head.xml += "      </Points>\n      <Cells>\n";
   head.array(type, "connectivity", 1, corners * bytes);
-  head.array(type, "offsets", 1, grid.ncell * bytes);
-  head.array("UInt8", "types", 1, grid.ncell);
+  head.array(type, "offsets", 1, ncell * bytes);
+  head.array("UInt8", "types", 1, ncell);
   head.xml += "      </Cells>\n    </Piece>\n  </UnstructuredGrid>\n  <AppendedData encoding=\"raw\">\n_";
 
   AtomicFile out(path);
   out.write(head.xml);
-  put_arrays(out, grid.point_data, grid.npoint), put_arrays(out, grid.cell_data, grid.ncell);
+  put_arrays(out, grid.point_data, grid.npoint), put_arrays(out, grid.cell_data, ncell);
   put_array(out, grid.points, uint64_t(grid.npoint) * 24);
   const auto put_number = [&](uint64_t n) { wide ? out.put(n) : out.put(uint32_t(n)); };
   out.put(corners * bytes);
-  for (uint64_t i = 0; i < corners; ++i) put_number(grid.cells[i]);
-  out.put(grid.ncell * bytes);
-  for (uint64_t c = 1; c <= grid.ncell; ++c) put_number(c * grid.corners);
-  out.put<uint64_t>(grid.ncell);
-  for (uint32_t c = 0; c < grid.ncell; ++c) out.put<uint8_t>(grid.corners == 4 ? 10 : 5);
+  for (uint64_t i = 0; i < cell_corners; ++i) put_number(grid.cells[i]);
+  for (uint64_t i = 0; i < 3 * uint64_t(grid.nface); ++i) put_number(grid.faces[i]);
+  out.put(ncell * bytes);
+  for (uint64_t c = 1; c <= ncell; ++c) put_number(c <= grid.ncell ? c * grid.corners : cell_corners + 3 * (c - grid.ncell));
+  out.put<uint64_t>(ncell);
+  for (uint32_t c = 0; c < ncell; ++c) out.put<uint8_t>(grid.corners == 4 && c < grid.ncell ? 10 : 5);
   out.write("\n  </AppendedData>\n</VTKFile>\n");
   out.commit();
 }

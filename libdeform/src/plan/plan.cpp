@@ -49,6 +49,7 @@ const char *stage_name(StageId id) {
     case StageId::motion: return "motion";
     case StageId::model: return "model";
     case StageId::predict: return "predict";
+    case StageId::gather: return "gather";
     case StageId::broad: return "broad";
     case StageId::narrow: return "narrow";
     case StageId::solve: return "contact+friction";
@@ -85,13 +86,16 @@ Plan make_plan(const SceneFacts &f) {
   if (pairs) {
     const std::string who = count(f.body_pairs, "pair of bodies", "pairs of bodies") + " and " +
                             count(f.obstacle_pairs, "pair of body and obstacle", "pairs of body and obstacle") + " may touch";
+    const std::string coupled = count(f.coupled_surfels, "surfel", "surfels") + " of " + count(f.coupled, "body", "bodies");
+    if (f.coupled) run(StageId::gather, coupled + " hang on several points each");
+    else leave("gather", "every surfel is a point of its body");
     run(StageId::broad, who);
     run(StageId::narrow, who);
     run(StageId::solve, who);
     run(StageId::distribute, who);
   } else {
     const std::string why = f.bodies < 2 && !f.obstacles ? "one body and nothing to touch" : "filters let no pair touch";
-    for (StageId id : {StageId::broad, StageId::narrow, StageId::solve, StageId::distribute}) leave(stage_name(id), why);
+    for (StageId id : {StageId::gather, StageId::broad, StageId::narrow, StageId::solve, StageId::distribute}) leave(stage_name(id), why);
   }
   if (f.bodies) run(StageId::commit, "positions and velocities at the end of the sub-step");
   leave("self contact", "not asked for");

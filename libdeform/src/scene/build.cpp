@@ -1,21 +1,18 @@
 #include "scene/build.h"
 
 #include <algorithm>
-#include <cmath>
-#include <filesystem>
 #include <utility>
 
 #include "core/error.h"
-#include "scene/select.h"
+#include "scene/load.h"
 
 namespace dfm::scene {
 namespace {
 
 class Builder {
  public:
-  Builder(dfm_context *context, Definition &def, uint64_t seed) : context_(context), def_(def), jittered_(seed != 0), jitter_(seed) {}
+  Builder(dfm_context *context, Definition &def, uint64_t seed) : context_(context), def_(def), jittered_(seed != 0), jitter_(seed), files_(context, def) {}
   ~Builder() {
-    for (auto &[path, mesh] : meshes_) dfm_tetmesh_destroy(mesh);
     if (world_) dfm_world_destroy(world_);
   }
   Builder(const Builder &) = delete;
@@ -38,11 +35,6 @@ class Builder {
  private:
   void check(dfm_status status, const std::string &pointer) const {
     if (status < 0) fail(status, "%s: %s: %s", def_.file.c_str(), pointer.c_str(), dfm_last_error());
-  }
-
-  std::string path_of(const std::string &path) const {
-    const std::filesystem::path p(path);
-    return p.is_absolute() || def_.folder.empty() ? path : (std::filesystem::path(def_.folder) / p).lexically_normal().string();
   }
 
   void create_world() {
@@ -70,31 +62,6 @@ class Builder {
 
   dfm_material material(const std::string &name) const { return name.empty() ? 0 : materials_.at(name); }
 
-  BodyMesh load_mesh(const Body &b) {
-    const std::string path = path_of(b.mesh);
-    const auto known = meshes_.find(path);
-    dfm_tetmesh mesh = known != meshes_.end() ? known->second : 0;
-    if (!mesh) {
-      check(dfm_tetmesh_read(context_, path.c_str(), &mesh), b.pointer + "/mesh");
-      meshes_[path] = mesh;
-    }
-    BodyMesh out;
-    dfm_tetmesh_info info = {};
-    info.size = sizeof info;
-    const double *points = nullptr;
-    check(dfm_tetmesh_get_info(mesh, &info), b.pointer + "/mesh");
-    check(dfm_tetmesh_data(mesh, &points, &out.tets, &out.file_point), b.pointer + "/mesh");
-    check(dfm_tetmesh_groups(mesh, &out.group_names, &out.cell_group), b.pointer + "/mesh");
-    check(dfm_tetmesh_file_cells(mesh, &out.file_cell), b.pointer + "/mesh");
-    out.dropped_cells = info.dropped_cells;
-    out.handle = mesh, out.npoint = info.npoint, out.ntet = info.ntet, out.ngroup = info.ngroup;
-    out.points.resize(3 * size_t(info.npoint));
-    for (size_t i = 0; i < out.points.size(); ++i) out.points[i] = points[i] * b.scale;
-    for (int k = 0; k < 3; ++k) out.lo[k] = info.lo[k] * b.scale, out.hi[k] = info.hi[k] * b.scale;
-    out.size = std::sqrt(std::pow(out.hi[0] - out.lo[0], 2) + std::pow(out.hi[1] - out.lo[1], 2) + std::pow(out.hi[2] - out.lo[2], 2));
-    return out;
-  }
-
   // Reads one of a body's tables; complaints say which key of the scene named it.
   template <class Read>
   auto table(const std::string &pointer, Read &&read) const {
@@ -119,7 +86,7 @@ class Builder {
       if (std::find(names.begin(), names.end(), m.group) == names.end()) {
         const std::string near = nearest(m.group, names);
         fail(DFM_E_ARG, "%s: %s: the mesh has no physical group of cells \"%s\"%s%s", def_.file.c_str(), m.pointer.c_str(), m.group.c_str(),
-             mesh.filled ? "; the cells of a filled body belong to none" : names.empty() ? "; it has none at all" : ("; it has: " + join(names)).c_str(),
+             names.empty() ? "; it has none at all" : ("; it has: " + join(names)).c_str(),
              near.empty() ? "" : ("; did you mean \"" + near + "\"?").c_str());
       }
       for (uint32_t g = 0; g < mesh.ngroup; ++g)
@@ -141,15 +108,15 @@ class Builder {
   }
 
   void create_body(Body &b) {
-    BodyMesh mesh = load_mesh(b);
+    BodyMesh mesh = files_.load(b);
     const std::vector<dfm_material> materials = materials_by_group(b, mesh);
     mesh.cell_weight = cell_weights(mesh, materials);
     std::vector<NodalRow> nodal;
-    if (!b.nodal_bc.empty()) nodal = table(b.pointer + "/nodal_bc", [&] { return read_nodal(path_of(b.nodal_bc), mesh); });
+    if (!b.nodal_bc.empty()) nodal = table(b.pointer + "/nodal_bc", [&] { return read_nodal(files_.path_of(b.nodal_bc), mesh); });
     std::vector<std::vector<double>> values;
     std::vector<dfm_cell_field> fields;
     for (const FieldFile &f : b.fields) {
-      values.push_back(table(f.pointer, [&] { return read_field(path_of(f.path), f, mesh); }));
+      values.push_back(table(f.pointer, [&] { return read_field(files_.path_of(f.path), f, mesh); }));
       fields.push_back({f.key.c_str(), values.back().data(), f.width});
     }
     std::vector<uint8_t> fixed(mesh.npoint, 0);
@@ -171,6 +138,10 @@ class Builder {
     d.nfield = uint32_t(fields.size()), d.fields = fields.data();
     if (!materials.empty()) d.cell_materials = materials.data();
     d.cell_share = mesh.share;
+    const Skin &skin = mesh.skin;
+    const dfm_surface_def surface = {sizeof(dfm_surface_def), b.surface.coupling, skin.npoint,      skin.ntriangle,
+                                     skin.points.data(),      skin.triangles,     b.surface.support};
+    if (mesh.wears_skin) d.surface = &surface;
     if (jittered_) {
       const double centre[3] = {(mesh.lo[0] + mesh.hi[0]) / 2, (mesh.lo[1] + mesh.hi[1]) / 2, (mesh.lo[2] + mesh.hi[2]) / 2};
       jitter_.apply(mesh.size, centre, b.pose, b.velocity, b.spin);
@@ -250,7 +221,7 @@ class Builder {
   Jitter jitter_;
   dfm_world world_ = 0;
   std::map<std::string, dfm_material> materials_;
-  std::map<std::string, dfm_tetmesh> meshes_;
+  MeshFiles files_;
   std::vector<ProbePoint> probes_;
 };
 

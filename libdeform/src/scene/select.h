@@ -26,7 +26,8 @@ struct BodyMesh {
   const char *const *group_names = nullptr;
   uint32_t npoint = 0, ntet = 0, ngroup = 0, dropped_cells = 0;
   bool filled = false;         // the cells are ours, the file's shape is the skin
-  Skin skin;                   // npoint 0: the boundary of the cells
+  bool wears_skin = false;     // the skin is the body's surface; else that is the boundary of the cells
+  Skin skin;                   // npoint 0: none
   std::vector<double> cell_weight;          // [ntet] mass per volume of each cell relative to the others; empty: the same
   double lo[3] = {}, hi[3] = {}, size = 0;  // of the scaled points; size: diagonal
   mutable std::shared_ptr<const Locator> locator;  // made when first asked for

@@ -1,5 +1,6 @@
 // The surface of one body: surfels, triangles, edges, patches, and where each surfel hangs on the body's phyxels.
-// Filled once per topology by make_surface; x, v, n are renewed every sub-step from the phyxels (N x_p).
+// Filled once per topology by make_surface, and by wear_coupling where the body wears a surface of its own; x and v are renewed every sub-step
+// from the phyxels (N x_p).
 #pragma once
 #include <cstdint>
 
@@ -20,10 +21,18 @@ struct Surface {
   Array<uint32_t> fan_begin, fan;   // [nsurfel+1], triangles around each surfel, ascending
   double median_edge = 0;      // m, rest
 
-  // Coupling x_s = N x_p in CSR. Identity coupling: row and weight are empty and point[s] is surfel s's phyxel.
+  // Coupling x_s = N x_p. Identity: row, col, weight and rest are empty and point[s] is surfel s's phyxel. Else N in CSR, columns ascending, and
+  // point is empty.
   Array<uint32_t> point, row, col;
   Array<double> weight;
+  Array<double> rest;          // [nsurfel,3] m, as given; where N does not reproduce linear fields this is not N times the phyxels at rest
   bool identity() const { return row.empty(); }
+  // f(phyxel, weight) for all that surfel s hangs on.
+  template <class F>
+  void each_phyxel(uint32_t s, F &&f) const {
+    if (identity()) return f(point[s], 1.0);
+    for (uint32_t j = row[s]; j < row[s + 1]; ++j) f(col[j], weight[j]);
+  }
 
   // State, [nsurfel,4] (fourth component zero), m and m/s.
   Array<double> x, v;

@@ -7,7 +7,7 @@
 #include "core/error.h"
 #include "core/handle.h"
 #include "mesh/mesh.h"
-#include "surfel/make_surface.h"
+#include "world/body_surface.h"
 #include "world/material.h"
 
 namespace dfm {
@@ -96,17 +96,12 @@ Body &create_body(World &w, const dfm_body_def &def) {
   place_phyxels(b, def);
 
   b.edges = unique_edges(m, def.ntet, b.tets.data());
-  const Array<uint32_t> boundary = boundary_triangles(m, def.ntet, b.tets.data());
-  make_surface(m, p.n, p.rest.data(), boundary.data(), static_cast<uint32_t>(boundary.size() / 3), b.surface);
-  gather_surface(b.surface, p.x.data(), p.v.data(), kStride);
+  make_body_surface(b, def.surface);
+  if (def.surface) b.coupling = def.surface->coupling;
   make(b.surfel_impulse, size_t(3) * b.surface.nsurfel);
 
   const dfm_type &type = w.context->registry.find(DFM_KIND_MODEL, def.model ? def.model : "msm");
-  Array<uint32_t> row(HookAllocator<uint32_t>{m}), col(HookAllocator<uint32_t>{m});
-  Array<double> weight(b.surface.nsurfel, 1.0, HookAllocator<double>(m));
-  row.resize(b.surface.nsurfel + 1), col.resize(b.surface.nsurfel);
-  for (uint32_t s = 0; s < b.surface.nsurfel; ++s) row[s] = s, col[s] = b.surface.point[s];
-  row[b.surface.nsurfel] = b.surface.nsurfel;
+  const MeshCoupling coupling(m, b.surface);
   std::vector<double> values = model_values(w, b, type, def, materials);
   std::vector<const char *> field_keys;
   std::vector<const double *> fields;
@@ -116,8 +111,8 @@ Body &create_body(World &w, const dfm_body_def &def) {
   mesh.size = sizeof mesh, mesh.npoint = p.n, mesh.ncell = def.ntet, mesh.cell = DFM_CELL_TET;
   mesh.rest = p.rest.data(), mesh.cells = b.tets.data(), mesh.mass = p.mass.data(), mesh.params = values.data();
   mesh.field_keys = field_keys.data(), mesh.fields = fields.data();
-  mesh.nedge = static_cast<uint32_t>(b.edges.size() / 2), mesh.nsurfel = b.surface.nsurfel, mesh.edges = b.edges.data();
-  mesh.row = row.data(), mesh.col = col.data(), mesh.weight = weight.data(), mesh.fixed = p.held.data();
+  mesh.nedge = static_cast<uint32_t>(b.edges.size() / 2), mesh.edges = b.edges.data(), mesh.fixed = p.held.data();
+  coupling.tell(mesh);
   b.model.create(type, w.context->host, mesh, m, std::move(values));
 
   w.bodies.reserve(w.bodies.size() + 1);

@@ -20,12 +20,16 @@ std::string quote(const std::string &s) {
 
 // What a stage costs grows with this; counts of the present scene, not seconds.
 std::string cost(const World &w, StageId id) {
-  size_t points = 0, cells = 0, surfels = 0, triangles = 0;
-  for (auto &b : w.bodies) points += b->p.n, cells += b->tets.size() / 4, surfels += b->surface.nsurfel, triangles += b->surface.ntri;
+  size_t points = 0, cells = 0, surfels = 0, triangles = 0, weights = 0;
+  for (auto &b : w.bodies) {
+    points += b->p.n, cells += b->tets.size() / 4;
+    surfels += b->surface.nsurfel, triangles += b->surface.ntri, weights += b->surface.weight.size();
+  }
   switch (id) {
     case StageId::model: return format("%zu cells", cells);
     case StageId::predict:
     case StageId::commit: return format("%zu points", points);
+    case StageId::gather: return format("%zu weights", weights);
     case StageId::broad: return format("%zu surfels every sub-step; %zu triangles whenever a skin is used up", surfels, triangles);
     case StageId::narrow: return "candidate pairs";
     case StageId::solve: return "contacts x sweeps, laws once per pass";
@@ -38,7 +42,11 @@ std::string cost(const World &w, StageId id) {
 std::string body(const Body &b) {
   std::string out = "{\"name\":" + quote(b.name) + ",\"model\":" + quote(b.model.type->id) + format(",\"cells\":%zu,\"points\":%u,\"surfels\":%u", b.tets.size() / 4,
                     b.p.n, b.surface.nsurfel);
-  out += std::string(",\"surface\":") + quote(b.surface.identity() ? "boundary" : "own") + ",\"filled\":" + (b.share.empty() ? "false" : "true") + ",\"fields\":[";
+  const char *const surface = b.coupling == kNoCoupling           ? "boundary"
+                              : b.coupling == DFM_COUPLING_MLS    ? "own, mls"
+                              : b.coupling == DFM_COUPLING_THESIS ? "own, thesis"
+                                                                  : "own, barycentric";
+  out += std::string(",\"surface\":") + quote(surface) + ",\"filled\":" + (b.share.empty() ? "false" : "true") + ",\"fields\":[";
   for (size_t i = 0; i < b.fields.size(); ++i) {
     const CellField &f = b.fields[i];
     const auto [lo, hi] = std::minmax_element(f.values.begin(), f.values.end());

@@ -110,10 +110,9 @@ dfm_ray_hit nothing() {
 }  // namespace
 
 Vec3 surfel_vector(const Body &b, const Array<double> &column, uint32_t s) {
-  const Surface &f = b.surface;
-  if (f.identity()) return load3(&column[size_t(f.point[s]) * kStride]);
+  if (b.surface.identity()) return load3(&column[size_t(b.surface.point[s]) * kStride]);
   Vec3 sum;
-  for (uint32_t j = f.row[s]; j < f.row[s + 1]; ++j) sum += f.weight[j] * load3(&column[size_t(f.col[j]) * kStride]);
+  b.surface.each_phyxel(s, [&](uint32_t i, double w) { sum += w * load3(&column[size_t(i) * kStride]); });
   return sum;
 }
 

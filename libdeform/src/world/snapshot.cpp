@@ -23,6 +23,10 @@ uint64_t structure(const World &w) {
     h.add(b->tets.data(), b->tets.size() * sizeof(uint32_t)), h.add(b->p.rest.data(), b->p.rest.size() * sizeof(double));
     h.add(b->p.mass.data(), b->p.mass.size() * sizeof(double));
     for (const CellField &f : b->fields) h.add(f.key.data(), f.key.size()), h.add(f.values.data(), f.values.size() * sizeof(double));
+    const Surface &s = b->surface;
+    h.add(s.row.data(), s.row.size() * sizeof(uint32_t)), h.add(s.col.data(), s.col.size() * sizeof(uint32_t));
+    h.add(s.weight.data(), s.weight.size() * sizeof(double)), h.add(s.rest.data(), s.rest.size() * sizeof(double));
+    if (!s.identity()) h.add(s.tri.data(), s.tri.size() * sizeof(uint32_t));
   }
   for (auto &o : w.obstacles) {
     const dfm_obstacle_def &d = o->def;

@@ -62,6 +62,7 @@ bool run_stage(World &w, StageId id, uint32_t *trouble) {
     case StageId::motion: w.stage_motion(); return true;
     case StageId::model: return w.stage_model(trouble);
     case StageId::predict: return w.stage_predict(trouble);
+    case StageId::gather: w.stage_gather(); return true;
     case StageId::broad: w.stage_broad(); return true;
     case StageId::narrow: w.stage_narrow(); return true;
     case StageId::solve: return w.stage_solve(trouble);
@@ -242,12 +243,12 @@ bool World::stage_predict(uint32_t *trouble) {
         good = b.model.call("predict", [&] { return b.model.stepper->predict(b.model.self, &k, b.p.f.data(), u.data()); }) == DFM_OK;
         for (uint32_t s = 0; s < b.surface.nsurfel; ++s) {
           store3(&b.surface.v[size_t(s) * kStride], load3(&u[3 * size_t(s)]));
-          store3(&b.surface.x[size_t(s) * kStride], load3(&b.p.x[size_t(b.surface.point[s]) * kStride]));
           good = good && norm2(load3(&u[3 * size_t(s)])) * 0.0 == 0;
         }
+        if (b.surface.identity()) gather_surface(b.surface, b.p.x.data(), nullptr);
       } else {
         good = predict(b.p, gravity, h);
-        if (touches) gather_surface(b.surface, b.p.x.data(), b.p.v_free.data(), kStride);
+        if (touches && b.surface.identity()) gather_surface(b.surface, b.p.x.data(), b.p.v_free.data());
       }
       if (!good) failed.note(i);
     }
@@ -258,6 +259,17 @@ bool World::stage_predict(uint32_t *trouble) {
   set_last_error(format("step %llu, body '%s': forces or velocities are not finite (model '%s'); take a smaller step, or look for loads and "
                         "parameters that are too large", static_cast<unsigned long long>(step_count), b.name.c_str(), b.model.type->id).c_str());
   return false;
+}
+
+// Surfels that hang on several phyxels: rows of N are independent of each other, so they are cut among the threads.
+void World::stage_gather() {
+  for (auto &b : bodies) {
+    if (b->surface.identity()) continue;
+    const double *const v = b->model.stepper ? nullptr : b->p.v_free.data();   // a self-stepping model has answered its surfels' velocities
+    context->tasks.parallel_for(b->surface.nsurfel, 1024, [&](uint32_t begin, uint32_t end) {
+      gather_rows(b->surface, b->p.x.data(), v, begin, end);
+    });
+  }
 }
 
 void World::stage_broad() {

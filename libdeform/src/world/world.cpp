@@ -138,7 +138,8 @@ void World::prepare() {
     body_views.push_back({i, node, b.category, b.collides_with, b.id, &s});
     sources.push_back({node, s.nsurfel, point, b.p.n, &s, b.model.stepper ? nullptr : b.p.inv_mass.data(),
                        b.model.stepper ? s.v.data() : b.p.v_free.data()});
-    sinks.push_back({node, s.nsurfel, &s, b.surfel_impulse.data(), b.model.stepper ? nullptr : b.p.impulse.data()});
+    sinks.push_back({node, s.nsurfel, b.p.n, &s, b.surfel_impulse.data(), b.model.stepper ? nullptr : b.p.impulse.data()});
+    if (!s.identity()) ++facts.coupled, facts.coupled_surfels += s.nsurfel;
     node += s.nsurfel, point += b.p.n;
     for (const std::string &e : effects(*b.model.type)) (b.model.works(e) ? facts.offered : facts.idle).push_back({e, b.model.type->id});
   }

@@ -40,6 +40,8 @@ struct Load { uint32_t number; std::vector<uint32_t> points; std::vector<double>
 // Held points carried by keyed poses (relative to the first key) and a sine.
 struct HeldMotion { std::vector<uint32_t> points; std::vector<double> start; std::vector<dfm_pose_key> keys; dfm_sine sine{}; };
 
+inline constexpr int32_t kNoCoupling = -1;
+
 struct Body {
   World *world = nullptr;
   uint64_t id = 0, handle = 0;
@@ -51,6 +53,7 @@ struct Body {
   Phyxels p;
   Array<uint32_t> tets, edges;
   Surface surface;
+  int32_t coupling = kNoCoupling;    // DFM_COUPLING_* of a surface of its own
   ModelInstance model;
   double mass = 0, rest_volume = 0;
   Array<double> share;               // [ntet] how much of each cell is material; empty: all
@@ -184,6 +187,7 @@ struct World {
   void stage_motion();
   bool stage_model(uint32_t *trouble);
   bool stage_predict(uint32_t *trouble);
+  void stage_gather();
   void stage_broad();
   void stage_narrow();
   bool stage_solve(uint32_t *trouble);                 // solve.cpp

@@ -104,15 +104,16 @@ TEST(MakeSurface, OpenAndNonManifoldInput_IsKept) {
 
 TEST(GatherSurface, Coupling_InterpolatesAndIdentityCopies) {
   Surface s = surface_of(tetrahedron_mesh({0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, 0, 1}));
-  const double x[] = {1, 2, 3, 0, 4, 5, 6, 0, 7, 8, 9, 0, 10, 11, 12, 0}, v[] = {1, 1, 1, 0, 2, 2, 2, 0, 3, 3, 3, 0, 4, 4, 4, 0};
-  gather_surface(s, x, v, 4);
+  alignas(32) const double x[] = {1, 2, 3, 0, 4, 5, 6, 0, 7, 8, 9, 0, 10, 11, 12, 0};
+  alignas(32) const double v[] = {1, 1, 1, 0, 2, 2, 2, 0, 3, 3, 3, 0, 4, 4, 4, 0};
+  gather_surface(s, x, v);
   EXPECT_EQ(s.x[4 * 2 + 1], 8.0);
   EXPECT_EQ(s.v[4 * 3], 4.0);
   EXPECT_EQ(s.x[4 * 2 + 3], 0.0);
   s.row = {0, 2, 3, 4, 5};
   s.col = {0, 1, 1, 2, 3};
   s.weight = {0.25, 0.75, 1, 1, 1};
-  gather_surface(s, x, v, 4);
+  gather_surface(s, x, v);
   EXPECT_EQ(s.x[0], 0.25 * 1 + 0.75 * 4);
   EXPECT_EQ(s.v[2], 0.25 * 1 + 0.75 * 2);
   EXPECT_EQ(s.x[4], 4.0);

@@ -1,0 +1,104 @@
+// The body-centred cubic lattice that surfaces are filled with, and the cells of it that a surface needs.
+//
+// Unit of length is half the pitch h of the grid: grid points have even coordinates, centres of the cubes odd ones. A cell spans two
+// neighbouring grid points along axis b and two neighbouring centres along axis a, at distance 1 along axis c; its volume is 2/3 (h^3/12).
+// Its key is twice its centre, a vector of integers: 0 mod 4 along a, 2 mod 4 along b, odd along c. All cells are congruent (mean ratio 0.95).
+#pragma once
+#include <cstdint>
+#include <functional>
+
+#include "mesh/tri_mesh.h"
+#include "mesh/winding.h"
+
+namespace dfm {
+
+struct Site { int32_t x = 0, y = 0, z = 0; };
+inline Vec3 place_of(Site s) { return {double(s.x), double(s.y), double(s.z)}; }
+
+inline constexpr double kLatticeCell = 2.0 / 3;         // volume
+inline constexpr int32_t kLatticeReach = 1 << 20;       // keys and sites lie within
+inline uint64_t pack(Site s) {
+  return uint64_t(uint32_t(s.x + kLatticeReach)) << 42 | uint64_t(uint32_t(s.y + kLatticeReach)) << 21 | uint32_t(s.z + kLatticeReach);
+}
+inline Site unpack(uint64_t p) {
+  constexpr uint64_t kMask = (1u << 21) - 1;
+  return {int32_t(p >> 42 & kMask) - kLatticeReach, int32_t(p >> 21 & kMask) - kLatticeReach, int32_t(p & kMask) - kLatticeReach};
+}
+
+void corners_of(Site key, Site corner[4]);              // two grid points, then two centres; positive volume
+Site neighbour(Site key, uint32_t face);                // across the face opposite that corner of corners_of
+
+// A tetrahedron with its planes, for overlaps with triangles.
+struct TetShape {
+  Vec3 corner[4], normal[4];                            // unit normals, outward
+  double offset[4];                                     // of the planes
+  explicit TetShape(const Vec3 c[4]);
+  // Whether the triangle comes within `tolerance` (below 0: enters deeper than that). Separating axes.
+  bool meets(const Vec3 triangle[3], double tolerance) const;
+};
+
+// Set of packed keys that remembers the order of insertion; numbers are positions in it.
+class KeySet {
+ public:
+  explicit KeySet(const Memory &memory);
+  uint32_t add(uint64_t key, bool *is_new = nullptr);
+  uint32_t find(uint64_t key) const;                    // UINT32_MAX: not there
+  uint32_t size() const { return uint32_t(keys_.size()); }
+  uint64_t operator[](uint32_t i) const { return keys_[i]; }
+
+ private:
+  size_t slot(uint64_t key) const;
+  Array<uint64_t> keys_;
+  Array<uint32_t> table_;
+};
+
+enum class CellKind : uint8_t { outside, inside, crossed, mixed };   // mixed: no triangle, yet the winding number passes 1/2 (a hole)
+
+// Surface in a frame of its own: about the middle of its box, in lengths of the box.
+struct FillSurface {
+  explicit FillSurface(const TriMesh &surface);
+  const Memory &memory;
+  double size = 0, resolution = 0;                      // diagonal of the box, m; rounding of a coordinate, in box lengths
+  Vec3 middle;                                          // of the box, m
+  double area = 0, volume = 0;                          // by the triangles, in box lengths
+  bool closed = true;                                   // every edge is passed as often forth as back
+  double opening_area = 0, opening_width = 0;           // of all openings; longest extent of the widest one. Box lengths
+  uint32_t openings = 0;
+  Array<double> points;                                 // box lengths
+  Array<uint32_t> tris;
+  WindingTree winding;
+
+ private:
+  void measure_openings();
+};
+
+// Where the lattice lies: box lengths are half_pitch * (lattice lengths - shift).
+struct Lattice {
+  double half_pitch = 1;
+  Vec3 shift;
+  Vec3 to_box(Vec3 x) const { return half_pitch * (x - shift); }
+  Vec3 from_box(Vec3 x) const { return (1 / half_pitch) * x + shift; }
+};
+
+// Cells that the surface needs: those that a triangle enters, and those inside. A triangle in a face between two cells enters neither.
+struct FillCover {
+  explicit FillCover(const Memory &memory) : cells(memory), kind(HookAllocator<CellKind>(memory)) {}
+  KeySet cells;
+  Array<CellKind> kind;                                 // by number; outside for cells that were looked at only
+  uint32_t kept = 0;
+};
+// `limit`: stops early once more cells are crossed than that.
+FillCover cover(const FillSurface &surface, const Lattice &lattice, uint32_t limit);
+
+// Calls visit(cell's key, triangle, deep) for every cell within the touch tolerance of a triangle, a pair perhaps more than once; deep: the
+// triangle enters the cell by more than that. Cells in `skip` are not tested. visit returns false to stop.
+using VisitCrossing = std::function<bool(uint64_t key, uint32_t triangle, bool deep)>;
+void each_crossing(const FillSurface &surface, const Lattice &lattice, const KeySet *skip, const VisitCrossing &visit);
+double touch_tolerance(const FillSurface &surface, const Lattice &lattice);
+
+// Share of each kept cell that is inside, before any floor. `loose` is the part of the cell that was decided by one sample for each of its
+// pieces of `piece` cells: sums of shares have a standard deviation below sqrt(piece * sum of loose) / 2.
+struct FillShares { Array<double> share, loose; double piece; };
+FillShares sample_shares(const FillSurface &surface, const FillCover &cover, const Lattice &lattice);
+
+}  // namespace dfm

@@ -1,0 +1,327 @@
+// From loose triangles to a surface with two sides. Order matters: points at one place become one (an STL file has each corner anew), which
+// makes neighbours; triangles without area go, and where one lies flat along a neighbour's side that neighbour is split, so that no slit
+// opens; doubles go; what is left is turned to agree and to face outward. Nothing is closed or smoothed. All thresholds are relative.
+#include <algorithm>
+#include <array>
+#include <bit>
+#include <cfloat>
+#include <cmath>
+
+#include "core/error.h"
+#include "math/vec3.h"
+#include "mesh/faces.h"
+#include "mesh/finish.h"
+#include "mesh/topology_tri.h"
+
+namespace dfm {
+namespace {
+
+constexpr int kSplitRounds = 16;  // a flat triangle beside a flat one waits for the next round
+
+struct Repairs { uint32_t split = 0, flat = 0, doubles = 0, walls = 0, twisted = 0; };
+using Corners3 = std::array<uint32_t, 3>;
+
+uint32_t count(const RawMesh &raw) { return uint32_t(raw.tris.size() / 3); }
+const uint32_t *corners(const RawMesh &raw, uint32_t t) { return &raw.tris[3 * size_t(t)]; }
+
+Corners3 sorted_corners(const uint32_t *c) {
+  Corners3 key{c[0], c[1], c[2]};
+  std::sort(key.begin(), key.end());
+  return key;
+}
+
+template <class Keep>
+uint32_t keep_triangles(RawMesh &raw, const Keep &keep) {
+  uint32_t kept = 0;
+  const uint32_t n = count(raw);
+  for (uint32_t t = 0; t < n; ++t)
+    if (keep(t)) {
+      std::copy_n(corners(raw, t), 3, &raw.tris[3 * size_t(kept)]);
+      raw.tri_group[kept++] = raw.tri_group[t];
+    }
+  raw.tris.resize(3 * size_t(kept)), raw.tri_group.resize(kept);
+  return n - kept;
+}
+
+// ---- points at one place -------------------------------------------------------------------------------------------
+
+uint64_t place_hash(const double *p) {
+  uint64_t h = 0;
+  for (int k = 0; k < 3; ++k) {  // splitmix64; + 0.0 makes the two zeros one
+    h = (h ^ std::bit_cast<uint64_t>(p[k] + 0.0)) * 0x9e3779b97f4a7c15u;
+    h = (h ^ h >> 30) * 0xbf58476d1ce4e5b9u;
+    h ^= h >> 27;
+  }
+  return h;
+}
+
+// Every used point becomes the first used one at exactly its place. Open addressing in file order, so the outcome has one answer.
+uint32_t merge_points(RawMesh &raw) {
+  const uint32_t n = raw.npoint();
+  Array<uint32_t> into(n, kNoGroup, HookAllocator<uint32_t>(*raw.memory));
+  for (const uint32_t p : raw.tets) into[p] = p;
+  for (const uint32_t p : raw.tris) into[p] = p;
+  Array<uint32_t> table(std::bit_ceil(2 * size_t(n) + 1), kNoGroup, HookAllocator<uint32_t>(*raw.memory));
+  const size_t mask = table.size() - 1;
+  uint32_t merged = 0;
+  for (uint32_t p = 0; p < n; ++p) {
+    if (into[p] == kNoGroup) continue;
+    const double *x = &raw.points[3 * size_t(p)];
+    size_t slot = place_hash(x) & mask;
+    while (table[slot] != kNoGroup && !std::equal(x, x + 3, &raw.points[3 * size_t(table[slot])])) slot = (slot + 1) & mask;
+    if (table[slot] == kNoGroup) table[slot] = p;
+    else into[p] = table[slot], ++merged;
+  }
+  for (uint32_t &p : raw.tets) p = into[p];
+  for (uint32_t &p : raw.tris) p = into[p];
+  return merged;
+}
+
+// ---- boundary of cells ---------------------------------------------------------------------------------------------
+
+// The file's own triangles stay only as the groups of the boundary's. Returns how many points lie inside.
+uint32_t take_boundary(RawMesh &raw) {
+  raw.tet_group.resize(raw.tets.size() / 4, kNoGroup);
+  drop_duplicate_cells(raw);
+  for (size_t t = 0; t < raw.tets.size(); t += 4)
+    if (tet_volume(raw.points.data(), &raw.tets[t]) < 0) std::swap(raw.tets[t + 2], raw.tets[t + 3]);
+  std::vector<std::pair<Corners3, uint32_t>> skin;
+  for (uint32_t t = 0; t < count(raw); ++t)
+    if (raw.tri_group[t] != kNoGroup) skin.emplace_back(sorted_corners(corners(raw, t)), raw.tri_group[t]);
+  std::sort(skin.begin(), skin.end());
+  raw.tris = boundary_triangles(raw.tets);
+  raw.tri_group.assign(count(raw), kNoGroup);
+  for (uint32_t t = 0; t < count(raw); ++t) {
+    const std::pair<Corners3, uint32_t> key{sorted_corners(corners(raw, t)), 0};
+    const auto found = std::lower_bound(skin.begin(), skin.end(), key);
+    if (found != skin.end() && found->first == key.first) raw.tri_group[t] = found->second;
+  }
+  Array<uint8_t> inner(raw.npoint(), 0, HookAllocator<uint8_t>(*raw.memory));
+  for (const uint32_t p : raw.tets) inner[p] = 1;
+  for (const uint32_t p : raw.tris) inner[p] = 0;
+  raw.tets.clear(), raw.tet_group.clear();
+  return uint32_t(std::count(inner.begin(), inner.end(), 1));
+}
+
+// ---- triangles without area ----------------------------------------------------------------------------------------
+
+bool has_double_corner(const uint32_t *c) { return c[0] == c[1] || c[1] == c[2] || c[2] == c[0]; }
+
+// An altitude below a few roundings of the coordinates says nothing. Relative to the longest edge, so that no product leaves the range.
+bool is_flat(const RawMesh &raw, const uint32_t *c) {
+  const Vec3 a = load3(&raw.points[3 * size_t(c[0])]), b = load3(&raw.points[3 * size_t(c[1])]), d = load3(&raw.points[3 * size_t(c[2])]);
+  double longest = 0, reach = 0;
+  for (int k = 0; k < 3; ++k) {
+    longest = std::max({longest, std::fabs(b[k] - a[k]), std::fabs(d[k] - a[k]), std::fabs(d[k] - b[k])});
+    reach = std::max({reach, std::fabs(a[k]), std::fabs(b[k]), std::fabs(d[k])});
+  }
+  const Vec3 u{(b.x - a.x) / longest, (b.y - a.y) / longest, (b.z - a.z) / longest};
+  const Vec3 v{(d.x - a.x) / longest, (d.y - a.y) / longest, (d.z - a.z) / longest};
+  return !(norm(cross(u, v)) > 8 * DBL_EPSILON * (1 + reach / longest));  // also where longest is 0
+}
+
+uint32_t longest_edge(const RawMesh &raw, uint32_t t) {
+  uint32_t best = 3 * t;
+  double length = -1;
+  for (uint32_t h = 3 * t; h < 3 * t + 3; ++h) {
+    const double l = norm2(load3(&raw.points[3 * size_t(raw.tris[next_half_edge(h)])]) - load3(&raw.points[3 * size_t(raw.tris[h])]));
+    if (l > length) length = l, best = h;
+  }
+  return best;
+}
+
+//        d                 d
+//       / \               /|\        the flat triangle a b c and its neighbour c a d
+//      /   \     ->      / | \       become a b d and b c d
+//     a--b--c           a--b--c
+uint32_t split_beside_flat(RawMesh &raw) {
+  uint32_t split = 0, before = UINT32_MAX;
+  for (int round = 0; round < kSplitRounds && before != split; ++round) {
+    before = split;
+    const uint32_t n = count(raw);
+    Array<uint8_t> skip(n, 0, HookAllocator<uint8_t>(*raw.memory));  // flat, or changed in this round
+    Array<uint32_t> flat{HookAllocator<uint32_t>(*raw.memory)};
+    for (uint32_t t = 0; t < n; ++t)
+      if (is_flat(raw, corners(raw, t))) skip[t] = 1, flat.push_back(t);
+    if (flat.empty()) break;
+    const Array<uint32_t> twin = edge_twins(*raw.memory, sorted_edges(*raw.memory, n, raw.tris.data()));
+    for (const uint32_t t : flat) {
+      const uint32_t h = longest_edge(raw, t), a = raw.tris[h], c = raw.tris[next_half_edge(h)], b = raw.tris[previous_half_edge(h)];
+      if (twin[h] >= kCrowdedEdge || skip[twin[h] / 3]) continue;
+      const uint32_t u = twin[h] / 3;
+      Corners3 first, second;
+      for (int k = 0; k < 3; ++k) {
+        const uint32_t p = corners(raw, u)[k];
+        first[k] = p == c ? b : p, second[k] = p == a ? b : p;
+      }
+      if (has_double_corner(first.data()) || is_flat(raw, first.data()) || is_flat(raw, second.data())) continue;
+      std::copy_n(first.data(), 3, &raw.tris[3 * size_t(u)]), std::copy_n(second.data(), 3, &raw.tris[3 * size_t(t)]);
+      raw.tri_group[t] = raw.tri_group[u];
+      skip[u] = 1, ++split;
+    }
+  }
+  return split;
+}
+
+// ---- doubles -------------------------------------------------------------------------------------------------------
+
+// Triangles that lie twice in the surface are either listed twice, or a wall where two pieces touch, which is inside and must go. They
+// differ at their rim: across it a triangle listed twice has one neighbour, a wall two. A sheet that is doubled everywhere keeps one side.
+class Walls {
+ public:
+  Walls(const RawMesh &raw, const Array<uint8_t> &drop, const Array<uint8_t> &twice) : raw_(raw), parent_(count(raw)) {
+    for (uint32_t t = 0; t < parent_.size(); ++t) parent_[t] = t;
+    wall_.assign(parent_.size(), 0), not_wall_ = wall_;
+    const Array<TriEdge> edges = sorted_edges(*raw.memory, count(raw), raw.tris.data());
+    for (int pass = 0; pass < 2; ++pass)  // patches first, then what their rims say
+      for (size_t i = 0, j = 0; i < edges.size(); i = j) {
+        uint32_t first = kNoGroup, others = 0;
+        for (; j < edges.size() && edges[j].key == edges[i].key; ++j) {
+          const uint32_t t = edges[j].half / 3;
+          if (drop[t]) continue;
+          if (!twice[t]) ++others;
+          else if (first == kNoGroup) first = t;
+          else if (pass == 0) parent_[std::max(root(first), root(t))] = std::min(root(first), root(t));
+        }
+        if (pass == 1 && first != kNoGroup && others > 0) (others % 2 ? not_wall_ : wall_)[root(first)] = 1;
+      }
+  }
+  bool is_wall(uint32_t t) { return wall_[root(t)] && !not_wall_[root(t)]; }
+
+ private:
+  uint32_t root(uint32_t t) {
+    while (parent_[t] != t) t = parent_[t] = parent_[parent_[t]];
+    return t;
+  }
+  const RawMesh &raw_;
+  std::vector<uint32_t> parent_;
+  std::vector<uint8_t> wall_, not_wall_;
+};
+
+void drop_doubles(RawMesh &raw, Repairs &done) {
+  const uint32_t n = count(raw);
+  std::vector<std::pair<Corners3, uint32_t>> keys;
+  keys.reserve(n);
+  for (uint32_t t = 0; t < n; ++t) keys.emplace_back(sorted_corners(corners(raw, t)), t);
+  std::sort(keys.begin(), keys.end());
+  Array<uint8_t> drop(n, 0, HookAllocator<uint8_t>(*raw.memory)), twice = drop;
+  for (size_t i = 0, j = 0; i < keys.size(); i = j) {
+    while (j < keys.size() && keys[j].first == keys[i].first) ++j;
+    for (size_t k = i + 1; k < j; ++k) drop[keys[k].second] = 1, ++done.doubles;
+    twice[keys[i].second] = (j - i) % 2 == 0;
+  }
+  if (done.doubles == 0) return;
+  Walls walls(raw, drop, twice);
+  for (uint32_t t = 0; t < n; ++t)
+    if (twice[t] && walls.is_wall(t)) drop[t] = 1, ++done.walls;
+  done.doubles -= done.walls;  // of a wall both go
+  keep_triangles(raw, [&](uint32_t t) { return !drop[t]; });
+}
+
+// ---- numbers and groups --------------------------------------------------------------------------------------------
+
+void renumber(RawMesh &raw, TriMesh &mesh, uint32_t inner) {
+  const uint32_t npoint = raw.npoint();
+  Array<uint32_t> number(npoint, kNoGroup, HookAllocator<uint32_t>(*raw.memory));
+  for (const uint32_t p : raw.tris) number[p] = 0;
+  for (uint32_t p = 0; p < npoint; ++p)
+    if (number[p] == 0) {
+      number[p] = uint32_t(mesh.file_point.size());
+      mesh.file_point.push_back(p);
+      mesh.points.insert(mesh.points.end(), &raw.points[3 * size_t(p)], &raw.points[3 * size_t(p)] + 3);
+    }
+  for (uint32_t &p : raw.tris) p = number[p];
+  mesh.dropped_points = npoint - mesh.merged_points - inner - mesh.npoint();
+  mesh.points.shrink_to_fit();
+  mesh.tris = std::move(raw.tris);
+}
+
+// Groups that triangles carry, by number; their points are those of the triangles, not of the file's elements.
+void take_groups(RawMesh &raw, TriMesh &mesh) {
+  std::vector<uint32_t> order, place(raw.groups.size(), kNoGroup);
+  for (const uint32_t g : raw.tri_group)
+    if (g != kNoGroup && place[g] == kNoGroup) place[g] = 0, order.push_back(g);
+  std::sort(order.begin(), order.end(), [&](uint32_t a, uint32_t b) {
+    return std::pair(raw.groups[a].tag, a) < std::pair(raw.groups[b].tag, b);
+  });
+  for (const uint32_t g : order) {
+    place[g] = uint32_t(mesh.groups.size());
+    mesh.groups.push_back({raw.groups[g].name, 2, raw.groups[g].tag, Array<uint32_t>(HookAllocator<uint32_t>(*raw.memory))});
+  }
+  for (size_t t = 0; t < raw.tri_group.size(); ++t) {
+    if (raw.tri_group[t] == kNoGroup) continue;
+    raw.tri_group[t] = place[raw.tri_group[t]];
+    Array<uint32_t> &points = mesh.groups[raw.tri_group[t]].points;
+    points.insert(points.end(), &mesh.tris[3 * t], &mesh.tris[3 * t] + 3);
+  }
+  for (MeshGroup &group : mesh.groups) {
+    std::sort(group.points.begin(), group.points.end());
+    group.points.erase(std::unique(group.points.begin(), group.points.end()), group.points.end());
+    group.points.shrink_to_fit();
+  }
+  mesh.tri_group = std::move(raw.tri_group);
+}
+
+// ---- what was done -------------------------------------------------------------------------------------------------
+
+void add_warnings(TriMesh &mesh, const Repairs &done) {
+  const auto warn = [&](const std::string &text) { mesh.warnings.push_back(text); };
+  const TriMeshStatistics s = tri_mesh_statistics(mesh);
+  if (mesh.merged_points)
+    warn(format("%u point%s %s merged with another at exactly the same place", mesh.merged_points, plural(mesh.merged_points),
+                was_were(mesh.merged_points)));
+  if (done.split)
+    warn(format("%u triangle%s without area %s taken up by splitting the neighbour", done.split, plural(done.split), was_were(done.split)));
+  if (done.flat) warn(format("%u triangle%s without area %s dropped", done.flat, plural(done.flat), was_were(done.flat)));
+  if (done.doubles) warn(format("%u duplicate triangle%s %s dropped", done.doubles, plural(done.doubles), was_were(done.doubles)));
+  if (done.walls)
+    warn(format("%u pair%s of triangles where two pieces touch %s dropped, so the pieces are one", done.walls, plural(done.walls),
+                was_were(done.walls)));
+  if (mesh.dropped_points)
+    warn(format("%u point%s that no triangle uses %s dropped", mesh.dropped_points, plural(mesh.dropped_points),
+                was_were(mesh.dropped_points)));
+  if (mesh.turned)
+    warn(format("%u of %u triangles faced the wrong way and %s turned", mesh.turned, s.ntri, was_were(mesh.turned)));
+  if (done.twisted)
+    warn(format("%u piece%s no two sides (like a Moebius strip) and %s left as in the file", done.twisted,
+                done.twisted == 1 ? " has" : "s have", was_were(done.twisted)));
+  if (s.open_edges)
+    warn(format("the surface is open: %u edge%s with one triangle around %u hole%s", s.open_edges, plural(s.open_edges), s.holes,
+                plural(s.holes)));
+  if (s.nonmanifold_edges)
+    warn(format("%u edge%s %s used by more than two triangles", s.nonmanifold_edges, plural(s.nonmanifold_edges),
+                is_are(s.nonmanifold_edges)));
+  if (const std::string coarse = coarse_coordinates(s.lo, s.hi, s.edge_min); !coarse.empty()) warn(coarse);
+}
+
+}  // namespace
+
+TriMesh finish_surface(const std::string &path, RawMesh &&raw) {
+  TriMesh mesh(*raw.memory);
+  if (raw.tris.empty() && raw.tets.empty())
+    fail(DFM_E_FORMAT, "%s: no triangles in this file; a surface needs triangles, or polygons to cut into them", path.c_str());
+  if (raw.tris.size() >= kCrowdedEdge)
+    fail(DFM_E_UNSUPPORTED, "%s: %zu triangles; up to %u are read", path.c_str(), raw.tris.size() / 3, kCrowdedEdge / 3);
+  check_points(path, raw.points);
+  raw.tri_group.resize(count(raw), kNoGroup);
+  mesh.merged_points = merge_points(raw);
+  const uint32_t inner = raw.tets.empty() ? 0 : take_boundary(raw);
+
+  Repairs done;
+  const uint32_t given = count(raw);
+  done.flat = keep_triangles(raw, [&](uint32_t t) { return !has_double_corner(corners(raw, t)); });
+  done.split = split_beside_flat(raw);
+  done.flat += keep_triangles(raw, [&](uint32_t t) { return !is_flat(raw, corners(raw, t)); });
+  drop_doubles(raw, done);
+  if (raw.tris.empty())
+    fail(DFM_E_FORMAT, "%s: all %u triangles are without area or cancel each other; a surface needs triangles with three corners apart",
+         path.c_str(), given);
+  mesh.dropped_tris = given - count(raw);
+  renumber(raw, mesh, inner);
+  take_groups(raw, mesh);
+  mesh.turned = orient_triangles(*raw.memory, mesh.points, mesh.tris, &done.twisted);
+  add_warnings(mesh, done);
+  return mesh;
+}
+
+}  // namespace dfm

@@ -1,0 +1,23 @@
+// Which triangles meet at which edge. Half-edge 3 t + k runs from corner k of triangle t to its next corner.
+#pragma once
+#include "core/memory.h"
+
+namespace dfm {
+
+inline constexpr uint32_t kCrowdedEdge = UINT32_MAX - 1, kOpenEdge = UINT32_MAX;  // instead of a twin: more than two triangles, one only
+
+inline uint32_t next_half_edge(uint32_t h) { return h % 3 == 2 ? h - 2 : h + 1; }
+inline uint32_t previous_half_edge(uint32_t h) { return h % 3 == 0 ? h + 2 : h - 1; }
+
+struct TriEdge {
+  uint64_t key;    // lower point << 32 | higher point
+  uint32_t half;
+  bool operator<(const TriEdge &o) const { return key != o.key ? key < o.key : half < o.half; }
+};
+
+// All half-edges, those of one edge side by side.
+Array<TriEdge> sorted_edges(const Memory &memory, uint32_t ntri, const uint32_t *tris);
+// [3 ntri] the half-edge of the other triangle where exactly two meet, else kOpenEdge or kCrowdedEdge.
+Array<uint32_t> edge_twins(const Memory &memory, const Array<TriEdge> &edges);
+
+}  // namespace dfm

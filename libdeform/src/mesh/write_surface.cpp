@@ -1,0 +1,118 @@
+// Triangles in the formats that other programs read. Text carries 17 digits, so that a double comes back as it was.
+#include <algorithm>
+#include <bit>
+#include <cctype>
+#include <cfloat>
+#include <cmath>
+
+#include "core/error.h"
+#include "math/vec3.h"
+#include "mesh/file.h"
+#include "mesh/tri_mesh.h"
+
+namespace dfm {
+namespace {
+
+// Bytes of a number in the order the format wants.
+template <class T>
+void put_as(AtomicFile &out, std::endian order, T value) {
+  char bytes[sizeof(T)];
+  std::copy_n(reinterpret_cast<const char *>(&value), sizeof(T), bytes);
+  if (order != std::endian::native) std::reverse(bytes, bytes + sizeof(T));
+  out.write(bytes, sizeof(T));
+}
+
+std::string text(uint64_t n) { return std::to_string(n); }
+
+void put_points(AtomicFile &out, const TriMesh &mesh, const char *before) {
+  for (size_t p = 0; p < mesh.points.size(); p += 3)
+    out.write(format("%s%.17g %.17g %.17g\n", before, mesh.points[p], mesh.points[p + 1], mesh.points[p + 2]));
+}
+
+// A name ends with its line.
+std::string one_line(std::string name) {
+  std::replace_if(name.begin(), name.end(), [](unsigned char c) { return c < ' '; }, '_');
+  return name;
+}
+
+void put_obj(AtomicFile &out, const TriMesh &mesh) {
+  out.write(format("# %u points, %u triangles, m\n", mesh.npoint(), mesh.ntri()));
+  put_points(out, mesh, "v ");
+  uint32_t group = kNoGroup;
+  for (uint32_t t = 0; t < mesh.ntri(); ++t) {
+    if (mesh.tri_group[t] != group) {
+      group = mesh.tri_group[t];
+      out.write("g " + (group == kNoGroup ? "default" : one_line(mesh.groups[group].name)) + "\n");
+    }
+    const uint32_t *c = &mesh.tris[3 * size_t(t)];
+    out.write("f " + text(c[0] + 1ull) + " " + text(c[1] + 1ull) + " " + text(c[2] + 1ull) + "\n");
+  }
+}
+
+void put_off(AtomicFile &out, const TriMesh &mesh) {
+  out.write("OFF\n" + text(mesh.npoint()) + " " + text(mesh.ntri()) + " 0\n");
+  put_points(out, mesh, "");
+  for (size_t i = 0; i < mesh.tris.size(); i += 3)
+    out.write("3 " + text(mesh.tris[i]) + " " + text(mesh.tris[i + 1]) + " " + text(mesh.tris[i + 2]) + "\n");
+}
+
+void put_ply(AtomicFile &out, const TriMesh &mesh) {
+  out.write("ply\nformat binary_little_endian 1.0\nelement vertex " + text(mesh.npoint()) +
+            "\nproperty double x\nproperty double y\nproperty double z\nelement face " + text(mesh.ntri()) +
+            "\nproperty list uchar uint vertex_indices\nend_header\n");
+  for (const double x : mesh.points) put_as(out, std::endian::little, x);
+  for (size_t i = 0; i < mesh.tris.size(); ++i) {
+    if (i % 3 == 0) out.put(uint8_t(3));
+    put_as(out, std::endian::little, mesh.tris[i]);
+  }
+}
+
+void put_stl(AtomicFile &out, const TriMesh &mesh, const std::string &path) {
+  for (const double x : mesh.points)
+    if (std::fabs(x) > FLT_MAX)
+      fail(DFM_E_UNSUPPORTED, "%s: STL holds coordinates up to %g m, the surface has %g m; write .ply", path.c_str(), double(FLT_MAX), x);
+  std::string head = "binary STL, m";
+  head.resize(80, ' ');
+  out.write(head);
+  put_as(out, std::endian::little, mesh.ntri());
+  const auto put_vector = [&](Vec3 v) {
+    for (int k = 0; k < 3; ++k) put_as(out, std::endian::little, float(v[k]));
+  };
+  for (size_t i = 0; i < mesh.tris.size(); i += 3) {
+    Vec3 corner[3];
+    for (int k = 0; k < 3; ++k) corner[k] = load3(&mesh.points[3 * size_t(mesh.tris[i + k])]);
+    const Vec3 u = corner[1] - corner[0], v = corner[2] - corner[0];
+    put_vector(normalized(cross((1 / norm(u)) * u, (1 / norm(v)) * v)));
+    for (const Vec3 &p : corner) put_vector(p);
+    out.put(uint16_t(0));
+  }
+}
+
+// The formats of cells hold triangles too: a body without cells, whose triangles all stand in the file.
+TetMesh as_cells(const TriMesh &mesh) {
+  TetMesh out(*mesh.memory);
+  out.points = mesh.points, out.tris = mesh.tris, out.tri_group = mesh.tri_group, out.groups = mesh.groups;
+  return out;
+}
+
+}  // namespace
+
+void write_tri_mesh(const TriMesh &mesh, const std::string &path) {
+  const size_t slash = path.find_last_of('/'), dot = path.find_last_of('.');
+  std::string ending = dot == std::string::npos || (slash != std::string::npos && dot < slash) ? "" : path.substr(dot);
+  for (char &c : ending) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
+  if (ending == ".vtk") return write_vtk(as_cells(mesh), path);
+  if (ending == ".vtu") return write_vtu(as_cells(mesh), path);
+  static const std::vector<std::string> known{".obj", ".ply", ".stl", ".off", ".vtk", ".vtu"};
+  if (std::find(known.begin(), known.end(), ending) == known.end())
+    fail(DFM_E_UNSUPPORTED, "%s: a surface is written as %s, told by the file name's ending; this one ends with '%s'", path.c_str(),
+         join(known).c_str(), ending.c_str());
+  AtomicFile out(path);
+  if (ending == ".obj") put_obj(out, mesh);
+  else if (ending == ".ply") put_ply(out, mesh);
+  else if (ending == ".stl") put_stl(out, mesh, path);
+  else put_off(out, mesh);
+  out.commit();
+}
+
+}  // namespace dfm

@@ -1,0 +1,121 @@
+#include "scene/load.h"
+
+#include <cmath>
+#include <filesystem>
+
+#include "core/error.h"
+#include "plugin/context.h"
+
+namespace dfm::scene {
+
+MeshFiles::~MeshFiles() {
+  for (auto &[path, mesh] : cells_) dfm_tetmesh_destroy(mesh);
+  for (auto &[key, mesh] : fillings_) dfm_tetmesh_destroy(mesh);
+  for (auto &[path, mesh] : surfaces_) dfm_trimesh_destroy(mesh);
+}
+
+void MeshFiles::check(dfm_status status, const std::string &pointer) const {
+  if (status < 0) fail(status, "%s: %s: %s", def_.file.c_str(), pointer.c_str(), dfm_last_error());
+}
+
+void MeshFiles::refuse(const std::string &pointer, const std::string &sentence) const {
+  fail(DFM_E_ARG, "%s: %s: %s", def_.file.c_str(), pointer.c_str(), sentence.c_str());
+}
+
+std::string MeshFiles::path_of(const std::string &path) const {
+  const std::filesystem::path p(path);
+  return p.is_absolute() || def_.folder.empty() ? path : (std::filesystem::path(def_.folder) / p).lexically_normal().string();
+}
+
+uint32_t MeshFiles::kind(const std::string &path, const std::string &pointer) {
+  const auto [at, fresh] = kinds_.try_emplace(path, 0u);
+  if (fresh) check(dfm_mesh_file_kind(context_, path.c_str(), &at->second), pointer);
+  return at->second;
+}
+
+dfm_tetmesh MeshFiles::cells(const std::string &path, const std::string &pointer) {
+  dfm_tetmesh &mesh = cells_[path];
+  if (!mesh) check(dfm_tetmesh_read(context_, path.c_str(), &mesh), pointer);
+  return mesh;
+}
+
+dfm_trimesh MeshFiles::surface(const std::string &path, const std::string &pointer) {
+  dfm_trimesh &mesh = surfaces_[path];
+  if (!mesh) check(dfm_trimesh_read(context_, path.c_str(), &mesh), pointer);
+  return mesh;
+}
+
+dfm_tetmesh MeshFiles::filling(const std::string &path, const Body &b) {
+  const uint32_t wanted = b.fill ? b.fill : kFillCells;
+  dfm_tetmesh &mesh = fillings_[{path, wanted}];
+  if (!mesh) check(dfm_tetmesh_fill(surface(path, b.pointer + "/mesh"), wanted, &mesh), b.pointer + (b.fill ? "/fill" : "/mesh"));
+  if (!b.fill) {
+    dfm_tetmesh_info info = {};
+    info.size = sizeof info;
+    check(dfm_tetmesh_get_info(mesh, &info), b.pointer + "/mesh");
+    context_->logf(DFM_LOG_WARNING, "body '%s': %s holds a surface and no cells; it is filled with %u tetrahedra; \"fill\": {\"cells\": N} chooses", b.name.c_str(),
+                   path.c_str(), info.ntet);
+  }
+  return mesh;
+}
+
+// Keys that go with one kind of mesh file only.
+void MeshFiles::check_keys(const Body &b, bool filled) const {
+  if (filled) {
+    if (!b.nodal_bc.empty()) refuse(b.pointer + "/nodal_bc", "the mesh is a surface, whose nodes are none of the filled body's points; use \"fix\" and \"forces\"");
+    if (!b.fields.empty()) refuse(b.fields[0].pointer, "the mesh is a surface, so its file has no cells to give values for; fill it first with deform mesh fill and use the result as mesh");
+    if (!b.by_group.empty()) refuse(b.by_group[0].pointer, "the mesh is a surface, and the cells that fill it belong to no group");
+    return;
+  }
+  if (b.fill) refuse(b.pointer + "/fill", "the mesh holds tetrahedra already; \"fill\" is for a closed surface");
+  if (b.surface.coupled && b.surface.mesh.empty())
+    refuse(b.surface.pointer + "/coupling", "the surface is the boundary of the cells, whose points are the body's own; a coupling needs \"mesh\"");
+}
+
+void MeshFiles::take_cells(dfm_tetmesh mesh, const Body &b, BodyMesh &out) const {
+  const std::string pointer = b.pointer + "/mesh";
+  dfm_tetmesh_info info = {};
+  info.size = sizeof info;
+  const double *points = nullptr;
+  check(dfm_tetmesh_get_info(mesh, &info), pointer);
+  check(dfm_tetmesh_data(mesh, &points, &out.tets, &out.file_point), pointer);
+  check(dfm_tetmesh_groups(mesh, &out.group_names, &out.cell_group), pointer);
+  check(dfm_tetmesh_file_cells(mesh, &out.file_cell), pointer);
+  check(dfm_tetmesh_share(mesh, &out.share), pointer);
+  out.handle = mesh, out.npoint = info.npoint, out.ntet = info.ntet, out.ngroup = info.ngroup, out.dropped_cells = info.dropped_cells;
+  out.points.resize(3 * size_t(info.npoint));
+  for (size_t i = 0; i < out.points.size(); ++i) out.points[i] = points[i] * b.scale;
+  for (int k = 0; k < 3; ++k) out.lo[k] = info.lo[k] * b.scale, out.hi[k] = info.hi[k] * b.scale;
+  out.size = std::sqrt(std::pow(out.hi[0] - out.lo[0], 2) + std::pow(out.hi[1] - out.lo[1], 2) + std::pow(out.hi[2] - out.lo[2], 2));
+}
+
+void MeshFiles::take_skin(dfm_trimesh mesh, const Body &b, const std::string &pointer, BodyMesh &out) const {
+  dfm_trimesh_info info = {};
+  info.size = sizeof info;
+  const double *points = nullptr;
+  Skin &skin = out.skin;
+  check(dfm_trimesh_get_info(mesh, &info), pointer);
+  check(dfm_trimesh_data(mesh, &points, &skin.triangles, nullptr), pointer);
+  check(dfm_trimesh_groups(mesh, &skin.group_names, &skin.triangle_group), pointer);
+  skin.npoint = info.npoint, skin.ntriangle = info.ntriangle, skin.ngroup = info.ngroup;
+  skin.points.resize(3 * size_t(info.npoint));
+  for (size_t i = 0; i < skin.points.size(); ++i) skin.points[i] = points[i] * b.scale;
+}
+
+BodyMesh MeshFiles::load(const Body &b) {
+  const std::string path = path_of(b.mesh), pointer = b.pointer + "/mesh";
+  BodyMesh out;
+  out.filled = kind(path, pointer) == DFM_MESH_SURFACE;
+  check_keys(b, out.filled);
+  take_cells(out.filled ? filling(path, b) : cells(path, pointer), b, out);
+  out.wears_skin = !b.surface.mesh.empty() || (out.filled && !b.surface.boundary);
+  if (!b.surface.mesh.empty()) {
+    const std::string where = b.surface.pointer + "/mesh";
+    take_skin(surface(path_of(b.surface.mesh), where), b, where, out);
+  } else if (out.filled) {
+    take_skin(surface(path, pointer), b, pointer, out);
+  }
+  return out;
+}
+
+}  // namespace dfm::scene

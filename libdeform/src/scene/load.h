@@ -1,0 +1,43 @@
+// Mesh files of a scene, each read once; a body whose file is a surface gets its cells by filling it.
+#pragma once
+#include <map>
+#include <string>
+#include <utility>
+
+#include "scene/select.h"
+
+namespace dfm::scene {
+
+inline constexpr uint32_t kFillCells = 5000;  // where a scene says none
+
+class MeshFiles {
+ public:
+  MeshFiles(dfm_context *context, const Definition &def) : context_(context), def_(def) {}
+  ~MeshFiles();
+  MeshFiles(const MeshFiles &) = delete;
+  MeshFiles &operator=(const MeshFiles &) = delete;
+
+  std::string path_of(const std::string &path) const;  // relative to the scene file
+  // Cells, skin and groups of a body, scaled. Borrows from this object.
+  BodyMesh load(const Body &body);
+
+ private:
+  void check(dfm_status status, const std::string &pointer) const;
+  [[noreturn]] void refuse(const std::string &pointer, const std::string &sentence) const;
+  uint32_t kind(const std::string &path, const std::string &pointer);
+  dfm_tetmesh cells(const std::string &path, const std::string &pointer);
+  dfm_trimesh surface(const std::string &path, const std::string &pointer);
+  dfm_tetmesh filling(const std::string &path, const Body &body);
+  void check_keys(const Body &body, bool filled) const;
+  void take_cells(dfm_tetmesh mesh, const Body &body, BodyMesh &out) const;
+  void take_skin(dfm_trimesh mesh, const Body &body, const std::string &pointer, BodyMesh &out) const;
+
+  dfm_context *context_;
+  const Definition &def_;
+  std::map<std::string, uint32_t> kinds_;
+  std::map<std::string, dfm_tetmesh> cells_;
+  std::map<std::string, dfm_trimesh> surfaces_;
+  std::map<std::pair<std::string, uint32_t>, dfm_tetmesh> fillings_;  // by file and number of cells
+};
+
+}  // namespace dfm::scene
