@@ -10,7 +10,7 @@
 #include <thread>
 #include <vector>
 
-#include "cli.h"
+#include "cmd_mesh.h"
 #include "json_text.h"
 
 namespace cli {
@@ -123,33 +123,21 @@ void print_table(const std::string &in, const std::string &file, const Filled &f
   if (f.warnings.empty()) std::printf("  the surface is clean\n");
 }
 
-struct Session {
-  dfm_context *context = nullptr;
-  dfm_trimesh surface = 0;
-  dfm_tetmesh mesh = 0;
-  explicit Session(const Globals &globals) {
-    dfm_context_def def = dfm_context_def_default();
-    def.threads = globals.threads;
-    def.log = [](void *, int32_t, const char *) {};  // the report holds the warnings
-    if (dfm_context_create(&def, &context) < 0) context = nullptr;
-  }
-  ~Session() { dfm_context_destroy(context); }
-  Session(const Session &) = delete;
-  Session &operator=(const Session &) = delete;
-};
-
 int fill(const Globals &globals, const std::string &in, const std::string &out, uint32_t cells) {
-  Session s(globals);
+  MeshSession s(globals);
   Filled filled;
   const Clock::time_point begin = Clock::now();
   {
     const Patience patience(!globals.quiet && !globals.json, "filling " + in);
-    if (!s.context || dfm_trimesh_read(s.context, in.c_str(), &s.surface) < 0) return fail(dfm_last_error());
-    if (dfm_tetmesh_fill(s.surface, cells, &s.mesh) < 0) return fail(in + ": " + dfm_last_error());
-    if (dfm_tetmesh_write(s.mesh, out.c_str()) < 0) return fail(dfm_last_error());
+    if (!s.context) return fail(dfm_last_error());
+    std::string sentence;
+    if (!import_surface(in, s, sentence)) return fail(sentence);
+    if (!s.surface && dfm_trimesh_read(s.context, in.c_str(), &s.surface) < 0) return fail(dfm_last_error());
+    if (dfm_tetmesh_fill(s.surface, cells, &s.cells) < 0) return fail(in + ": " + dfm_last_error());
+    if (dfm_tetmesh_write(s.cells, out.c_str()) < 0) return fail(dfm_last_error());
   }
   filled.seconds = seconds_since(begin);
-  if (!measure(s.surface, s.mesh, filled)) return fail(dfm_last_error());
+  if (!measure(s.surface, s.cells, filled)) return fail(dfm_last_error());
   if (globals.json) print_json(in, out, cells, filled);
   else if (!globals.quiet) print_table(in, out, filled);
   return kDone;
@@ -162,7 +150,7 @@ struct FillOptions { std::string surface, out; uint32_t cells = 5000; };
 void add_mesh_fill(CLI::App *mesh, Globals &globals, int *exit_code) {
   CLI::App *command = mesh->add_subcommand("fill", "lattice tetrahedra inside a closed surface; a scene does it by itself with the body key \"fill\"");
   const auto options = std::make_shared<FillOptions>();
-  command->add_option("SURFACE", options->surface, "OBJ, PLY, STL or OFF, or a mesh file with triangles")->required();
+  command->add_option("SURFACE", options->surface, "OBJ, PLY, STL, OFF, or any file with triangles that mesh info reads")->required();
   command->add_option("--out", options->out, "file to write: .msh (MSH 4.1), .msh2 (MSH 2.2) or .vtk")->required()->type_name("FILE");
   command->add_option("--cells", options->cells, "about how many tetrahedra")->capture_default_str()->type_name("N");
   command->callback([=, &globals] { *exit_code = fill(globals, options->surface, options->out, options->cells); });

@@ -32,6 +32,7 @@ class SceneRun {
     summary_ = read_file(out_ + "/summary.json");
     bodies_ = read_csv(out_ + "/bodies.csv");
     probes_ = read_csv(out_ + "/probes.csv");
+    contacts_ = read_csv(out_ + "/contacts.csv");
     std::filesystem::remove_all(out_);
   }
 
@@ -75,6 +76,13 @@ class SceneRun {
     return {0, 0, 0};
   }
 
+  // Sum of the normal forces between a side and its partners in the last record.
+  double contact_force(const std::string &side) const {
+    double sum = 0;
+    for (const auto &c : contacts_)
+      if (c.size() == 10 && c[0] == contacts_.back()[0] && (c[1] == side || c[2] == side)) sum += std::stod(c[5]);
+    return sum;
+  }
   // All places of a probe: t, x, y, z.
   std::vector<std::array<double, 4>> probe_rows(const std::string &name) const {
     std::vector<std::array<double, 4>> rows;
@@ -95,7 +103,7 @@ class SceneRun {
 
  private:
   std::string out_, summary_;
-  std::vector<std::vector<std::string>> bodies_, probes_;
+  std::vector<std::vector<std::string>> bodies_, probes_, contacts_;
 };
 
 // Runs with seeds from..to: sound, criterion met by each, and no two alike.
