@@ -40,8 +40,8 @@ std::string cost(const World &w, StageId id) {
 
 // Where a body's numbers come from: its cells, its surface, and the parameters that differ by cell.
 std::string body(const Body &b) {
-  std::string out = "{\"name\":" + quote(b.name) + ",\"model\":" + quote(b.model.type->id) + format(",\"cells\":%zu,\"points\":%u,\"surfels\":%u", b.tets.size() / 4,
-                    b.p.n, b.surface.nsurfel);
+  std::string out = "{\"name\":" + quote(b.name) + ",\"model\":" + quote(b.model.type->id);
+  out += format(",\"cells\":%zu,\"points\":%u,\"surfels\":%u", b.tets.size() / 4, b.p.n, b.surface.nsurfel);
   const char *const surface = b.coupling == kNoCoupling           ? "boundary"
                               : b.coupling == DFM_COUPLING_MLS    ? "own, mls"
                               : b.coupling == DFM_COUPLING_THESIS ? "own, thesis"

@@ -21,7 +21,10 @@ struct Cells {
     body.points.assign(mesh.points.begin(), mesh.points.end());
     body.tets = mesh.tets.data(), body.npoint = mesh.npoint(), body.ntet = mesh.ntet();
     for (int k = 0; k < 3; ++k) body.lo[k] = INFINITY, body.hi[k] = -INFINITY;
-    for (size_t i = 0; i < body.points.size(); ++i) body.lo[i % 3] = std::min(body.lo[i % 3], body.points[i]), body.hi[i % 3] = std::max(body.hi[i % 3], body.points[i]);
+    for (size_t i = 0; i < body.points.size(); ++i) {
+      const double x = body.points[i];
+      body.lo[i % 3] = std::min(body.lo[i % 3], x), body.hi[i % 3] = std::max(body.hi[i % 3], x);
+    }
     body.size = std::hypot(body.hi[0] - body.lo[0], body.hi[1] - body.lo[1], body.hi[2] - body.lo[2]);
   }
 };
@@ -42,7 +45,9 @@ double one_cell(const BodyMesh &all, uint32_t cell, const double *point) {
 TEST(Locator, FindsTheCellThatASearchThroughAllFinds) {
   const dfm::Memory &memory = dfm::Memory::standard();
   for (int shape = 0; shape < 3; ++shape) {
-    const Cells c(shape == 0 ? dfm::make_ball(memory, 1, 200) : shape == 1 ? dfm::make_beam(memory, 4, 0.5, 0.05, 150) : dfm::make_cylinder(memory, 0.2, 3, 200));
+    const Cells c(shape == 0   ? dfm::make_ball(memory, 1, 200)
+                  : shape == 1 ? dfm::make_beam(memory, 4, 0.5, 0.05, 150)
+                               : dfm::make_cylinder(memory, 0.2, 3, 200));
     std::mt19937 random(7);
     std::uniform_real_distribution<double> in(-0.4, 1.4);
     for (int n = 0; n < 40; ++n) {
