@@ -1,7 +1,7 @@
 // Coulomb friction with stiction, Stribeck effect and viscous part, as true stick and slip (never smoothed at zero speed): the set-valued law
 // of stribeck.h with no band of rest. Zerbato 2010, (5.1)-(5.6), as an inclusion at w = 0 and odd in v; the implicit step is the projection
 // on the disc of radius F_S.
-#include "stribeck.h"
+#include "../friction_common/stribeck.h"
 
 namespace {
 

@@ -2,7 +2,7 @@
 // faster is braked by kinetic friction alone until it enters the band. The set-valued law of stribeck.h with that band.
 // Zerbato 2010, (5.7) corrected: |v| in the test of the band, the stick branch saturates at F_S, and a contact that is caught is brought to
 // rest within the step (ft_stop), so that nothing creeps at speeds inside the band.
-#include "../friction_coulomb/stribeck.h"
+#include "../friction_common/stribeck.h"
 
 namespace {
 
