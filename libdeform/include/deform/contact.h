@@ -21,7 +21,7 @@ DFM_API dfm_status dfm_world_add_friction(dfm_world world, const dfm_friction_de
 DFM_API dfm_status dfm_world_filter_pair(dfm_world world, const char *a, const char *b, bool collide);
 
 /** One contact of the last sub-step. Forces act on side a, in N: fn along normal, ft[0] along tangent, ft[1] along normal x tangent. */
-typedef struct { uint32_t size, flags; uint64_t body_a, body_b, key;   /* b 0: obstacle; flags 1 sticking, 2 began */
+typedef struct { uint32_t size, flags; uint64_t body_a, body_b, key;   /* b 0: obstacle that feels nothing; flags 1 sticking, 2 began */
                  uint32_t feature_a, feature_b, kind, law;             /* kind 0 vertex-face, 1 edge-edge, 2 primitive */
                  double point[3], normal[3], tangent[3];               /* normal from b to a; 2nd tangent = normal x tangent */
                  double gap, area, fn, ft[2], slip[2], bristle[2]; } dfm_contact;

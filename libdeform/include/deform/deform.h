@@ -12,6 +12,7 @@
 #include "deform/mesh.h"
 #include "deform/obstacle.h"
 #include "deform/plugin.h"
+#include "deform/rigid.h"
 #include "deform/scene.h"
 #include "deform/surface.h"
 #include "deform/toi.h"

@@ -14,6 +14,7 @@ typedef uint64_t dfm_law;
 typedef uint64_t dfm_scene;
 typedef uint64_t dfm_tetmesh;
 typedef uint64_t dfm_trimesh;
+typedef uint64_t dfm_rigid;      /* names a dfm_obstacle too */
 #ifdef __cplusplus
 }
 #endif

@@ -46,7 +46,7 @@ dfm_contact report(const World &w, uint32_t i) {
   out.size = sizeof out;
   out.flags = (l[0] > 0 && w.report.mode[i] == 1 ? DFM_CONTACT_STICKING : 0) | (w.store.began[i] ? DFM_CONTACT_BEGAN : 0);
   const Sides s = sides(w, c);
-  out.body_a = s.a, out.body_b = c.obstacle ? 0 : s.b, out.key = c.key;
+  out.body_a = s.a, out.body_b = c.obstacle && !w.obstacles[c.slot_b]->rigid ? 0 : s.b, out.key = c.key;
   out.feature_a = c.feature_a, out.feature_b = c.obstacle ? c.slot_b : c.feature_b;
   out.kind = c.obstacle ? 2 : c.kind, out.law = w.store.law[i];
   std::copy(c.point, c.point + 3, out.point), std::copy(f, f + 3, out.normal), std::copy(f + 3, f + 6, out.tangent);

@@ -27,6 +27,7 @@ dfm_status dfm_obstacle_destroy(dfm_obstacle obstacle) {
   return guard([&] {
     Obstacle &o = obstacle_of(obstacle);
     idle(*o.world);
+    if (o.rigid) fail(DFM_E_STATE, "'%s' is a rigid body; dfm_rigid_destroy removes it, with the set it came with", o.name.c_str());
     destroy_obstacle(o);
   });
 }
@@ -50,6 +51,7 @@ dfm_status dfm_obstacle_move_to(dfm_obstacle obstacle, const dfm_pose *pose) {
     Obstacle &o = obstacle_of(obstacle);
     idle(*o.world);
     need(pose, "pose");
+    if (o.rigid) fail(DFM_E_STATE, "'%s' is a rigid body and moves by itself; dfm_rigid_set_state puts it somewhere", o.name.c_str());
     for (int i = 0; i < 4; ++i)
       if (!std::isfinite(pose->rotation[i]) || (i < 3 && !std::isfinite(pose->position[i])))
         fail(DFM_E_ARG, "obstacle '%s': the target pose is not finite", o.name.c_str());

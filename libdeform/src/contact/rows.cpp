@@ -6,10 +6,44 @@ namespace dfm {
 
 ContactRows::ContactRows(const Memory &m) {
   use_memory(m, begin, dof, weight, y, inv_mass, source, point, block, blocks, response, frame, drive, rate, wn, wt, cross, impulse,
-             dof_of_point_, dof_of_node_, place_);
+             dof_of_point_, dof_of_node_, place_, rigid, arm, dof_of_group_);
 }
 
-void ContactRows::build(std::span<const ContactPoint> contacts, std::span<const DofSource> sources) {
+// Blocks of the rigid groups that are touched, in their order.
+void ContactRows::build_rigid(std::span<const ContactPoint> contacts, const RigidPlaces &rigids) {
+  rigid.assign(n, kNone), arm.resize(size_t(3) * n);
+  dof_of_group_.assign(rigids.group_size.size(), kNone);
+  for (const ContactPoint &c : contacts)
+    if (c.obstacle && rigids.of_obstacle[c.slot_b].group != kNone) dof_of_group_[rigids.of_obstacle[c.slot_b].group] = 0;
+  for (uint32_t g = 0; g < rigids.group_size.size(); ++g) {
+    if (dof_of_group_[g] == kNone) continue;
+    const uint32_t count = 2 * rigids.group_size[g];
+    dof_of_group_[g] = ndof;
+    for (uint32_t k = 0; k < count; ++k) source.push_back(kNone), point.push_back(k), block.push_back(static_cast<uint32_t>(blocks.size()));
+    blocks.push_back({kNone, ndof, count, response.size(), g});
+    response.resize(response.size() + size_t(9) * count * count);
+    ndof += count;
+  }
+}
+
+// From the rigid body's centre to where the impulse acts on the soft body: the same point on both sides, so that angular momentum is kept to rounding.
+void ContactRows::set_arms(std::span<const ContactPoint> contacts, std::span<const DofSource> sources, const RigidPlaces &rigids) {
+  uint32_t s = 0;
+  for (uint32_t i = 0; i < n; ++i) {
+    const ContactPoint &c = contacts[i];
+    if (!c.obstacle || rigids.of_obstacle[c.slot_b].group == kNone) continue;
+    const RigidPlace &r = rigids.of_obstacle[c.slot_b];
+    rigid[i] = dof_of_group_[r.group] + 2 * r.place;
+    Vec3 at;
+    for (uint32_t k = 0; k < c.nnode; ++k) {
+      while (c.node[k] < sources[s].first_node || c.node[k] >= sources[s].first_node + sources[s].nnode) s = (s + 1) % uint32_t(sources.size());
+      at += c.weight[k] * load3(&sources[s].surface->x[size_t(c.node[k] - sources[s].first_node) * 4]);
+    }
+    store3(&arm[size_t(3) * i], at - r.centre);
+  }
+}
+
+void ContactRows::build(std::span<const ContactPoint> contacts, std::span<const DofSource> sources, const RigidPlaces &rigids) {
   // Dofs are numbered in order of first use, except that those of a self-stepping body follow each other (its response is one block).
   n = static_cast<uint32_t>(contacts.size());
   uint32_t nnode = 0, npoint = 0;
@@ -41,9 +75,11 @@ void ContactRows::build(std::span<const ContactPoint> contacts, std::span<const 
     }
     const uint32_t count = ndof - first;
     if (count == 0) continue;
-    blocks.push_back({s, first, count, response.size()});
+    blocks.push_back({s, first, count, response.size(), kNone});
     response.resize(response.size() + size_t(9) * count * count);
   }
+  rigid.clear();
+  if (!rigids.of_obstacle.empty()) build_rigid(contacts, rigids), set_arms(contacts, sources, rigids);
   // Pass 2: contacts to dofs. A coupled surfel expands to its phyxels; a phyxel that comes twice in one contact is merged.
   dof_of_point_.assign(npoint, kNone);
   auto dof_of = [&](uint32_t s, uint32_t phyxel) {
@@ -88,12 +124,30 @@ void ContactRows::build(std::span<const ContactPoint> contacts, std::span<const 
   begin.push_back(static_cast<uint32_t>(dof.size()));
   y.resize(size_t(ndof) * 4), inv_mass.resize(size_t(ndof) * 4);
   for (uint32_t d = 0; d < ndof; ++d) {
+    if (source[d] == kNone) {          // a rigid body's change of velocity: what it has without contact is the contact's own `velocity`
+      std::fill_n(&y[size_t(d) * 4], 4, 0.0), std::fill_n(&inv_mass[size_t(d) * 4], 4, 0.0);
+      continue;
+    }
     const DofSource &s = sources[source[d]];
     for (uint32_t k = 0; k < 4; ++k) {
       y[size_t(d) * 4 + k] = s.v_free[size_t(point[d]) * 4 + k];
       inv_mass[size_t(d) * 4 + k] = s.inv_mass ? s.inv_mass[size_t(point[d]) * 4 + k] : 0;
     }
   }
+}
+
+// What the impulse a on the soft body, -a on the rigid one, changes of the velocity between them on the rigid side.
+Vec3 ContactRows::rigid_diagonal(uint32_t i, Vec3 a) const {
+  const Block &b = blocks[block[rigid[i]]];
+  const Vec3 r = load3(&arm[size_t(3) * i]), m = dfm::cross(r, a);
+  const size_t width = size_t(3) * b.count, own = size_t(3) * (rigid[i] - b.first);
+  double p[6] = {a.x, a.y, a.z, m.x, m.y, m.z}, v[6];
+  for (size_t row = 0; row < 6; ++row) {
+    const double *const to = &response[b.response + (own + row) * width + own];
+    v[row] = 0;
+    for (size_t k = 0; k < 6; ++k) v[row] += to[k] * p[k];
+  }
+  return load3(v) + dfm::cross(load3(v + 3), r);
 }
 
 // a^T W a for a unit world direction a, as a vector so that mixed terms come out too: returns (W a).
@@ -118,6 +172,7 @@ Vec3 ContactRows::diagonal(uint32_t i, Vec3 a) const {
       }
     }
   }
+  if (!rigid.empty() && rigid[i] != kNone) sum += rigid_diagonal(i, a);
   return sum;
 }
 
@@ -145,6 +200,10 @@ void ContactRows::finish(std::span<const ContactPoint> contacts, const double *t
 Vec3 ContactRows::velocity(uint32_t i) const {
   Vec3 u;
   for (uint32_t j = begin[i]; j < begin[i + 1]; ++j) u += weight[j] * load3(&y[size_t(dof[j]) * 4]);
+  if (!rigid.empty() && rigid[i] != kNone) {
+    const double *const v = &y[size_t(rigid[i]) * 4];
+    u -= load3(v) + dfm::cross(load3(v + 4), load3(&arm[size_t(3) * i]));
+  }
   const double *const f = &frame[size_t(i) * 9];
   return Vec3{dot(load3(f), u), dot(load3(f + 3), u), dot(load3(f + 6), u)} - load3(&drive[size_t(i) * 3]);
 }
@@ -163,6 +222,10 @@ void ContactRows::response_apply(const Block &b, uint32_t d, Vec3 p) {
 void ContactRows::apply(uint32_t i, Vec3 q) {
   const double *const f = &frame[size_t(i) * 9];
   const Vec3 p = q.x * load3(f) + q.y * load3(f + 3) + q.z * load3(f + 6);
+  if (!rigid.empty() && rigid[i] != kNone) {
+    const Block &b = blocks[block[rigid[i]]];
+    response_apply(b, rigid[i], -p), response_apply(b, rigid[i] + 1, -dfm::cross(load3(&arm[size_t(3) * i]), p));
+  }
   for (uint32_t j = begin[i]; j < begin[i + 1]; ++j) {
     const uint32_t d = dof[j];
     if (block[d] != kNone) {

@@ -4,6 +4,8 @@
 // that the host integrates, surfels of bodies that step themselves. An impulse p at the contact changes them by
 //     y_k += w_ik M_k^-1 p                     (phyxel; M per component, infinite where held)
 //     y_j += R_jk w_ik p for all j of the body (self-stepping body; R is its own symmetric response, dense over its touched surfels)
+// A contact with a rigid body also sees the change (dv, dw) of that body's mean velocity, at the arm r from its centre to the contact:
+//     u_i -= dv + dw x r,   (dv, dw)_j -= R_jk (p, r x p)  for all bodies j of its group (joints tie them)
 // which is W = J B J^T of doc/concepts/contact.md without ever forming it.
 #pragma once
 #include <span>
@@ -23,16 +25,29 @@ struct DofSource {
   const double *v_free = nullptr;         // [npoint,4] or, self-stepping, surface->v
 };
 
+// The rigid body that an obstacle is: its number in a group of bodies that answer each other's impulses.
+struct RigidPlace {
+  uint32_t group = kNone, place = 0;      // world-wide; kNone: an obstacle that feels nothing
+  Vec3 centre;                            // of mass, at the start of the sub-step
+};
+struct RigidPlaces {
+  std::span<const RigidPlace> of_obstacle;      // by obstacle slot; empty: no rigid bodies
+  std::span<const uint32_t> group_size;         // bodies per group
+};
+
 struct ContactRows {
-  struct Block { uint32_t source, first, count; size_t response; };   // dofs [first, first+count) of a self-stepping body
+  // Dofs [first, first+count) of a self-stepping body, or of a rigid group: per body its linear velocity, then its spin.
+  struct Block { uint32_t source, first, count; size_t response; uint32_t group; };
 
   uint32_t n = 0, ndof = 0;
   Array<uint32_t> begin;                  // [n+1] into dof, weight
   Array<uint32_t> dof;
   Array<double> weight;
   Array<double> y, inv_mass;              // [ndof,4]; inv_mass zero for dofs of blocks
-  Array<uint32_t> source, point;          // [ndof] index of the DofSource, phyxel (or surfel of a block)
+  Array<uint32_t> source, point;          // [ndof] index of the DofSource (rigid: kNone), phyxel (or surfel of a block)
   Array<uint32_t> block;                  // [ndof] kNone or index into blocks
+  Array<uint32_t> rigid;                  // [n] dof of the rigid body's velocity, its spin is the next one; kNone. Empty: no contact has any
+  Array<double> arm;                      // [n,3] m, where there are any
   Array<Block> blocks;
   Array<double> response;                 // per block [3 count, 3 count] row-major, 1/kg
 
@@ -45,7 +60,7 @@ struct ContactRows {
 
   explicit ContactRows(const Memory &memory);
   // Expands contacts to dofs. Blocks get their dofs and counts; the caller fills `response`, then calls finish().
-  void build(std::span<const ContactPoint> contacts, std::span<const DofSource> sources);
+  void build(std::span<const ContactPoint> contacts, std::span<const DofSource> sources, const RigidPlaces &rigids = {});
   // Frames from normals and tangents [n,3], W diagonals, rates.
   void finish(std::span<const ContactPoint> contacts, const double *tangents, double h, double offset);
 
@@ -55,7 +70,11 @@ struct ContactRows {
  private:
   Array<uint32_t> dof_of_point_, dof_of_node_;   // this sub-step's dof of a phyxel, of a surfel of a self-stepping body; kNone
   Array<uint32_t> place_;                        // where a dof of a coupled surface stands in the row being made
+  Array<uint32_t> dof_of_group_;                 // first dof of a rigid group
+  void build_rigid(std::span<const ContactPoint> contacts, const RigidPlaces &rigids);
+  void set_arms(std::span<const ContactPoint> contacts, std::span<const DofSource> sources, const RigidPlaces &rigids);
   void response_apply(const Block &b, uint32_t k, Vec3 p);
+  Vec3 rigid_diagonal(uint32_t i, Vec3 a) const;
   Vec3 diagonal(uint32_t i, Vec3 direction) const;
 };
 

@@ -55,6 +55,8 @@ const char *stage_name(StageId id) {
     case StageId::solve: return "contact+friction";
     case StageId::distribute: return "distribute";
     case StageId::commit: return "commit";
+    case StageId::rigid_predict: return "rigid predict";
+    case StageId::rigid_commit: return "rigid commit";
     case StageId::step: return "step";
   }
   return "?";
@@ -82,6 +84,9 @@ Plan make_plan(const SceneFacts &f) {
   }
   if (f.bodies > f.self_stepping) run(StageId::model, "internal forces of " + count(f.bodies - f.self_stepping, "body", "bodies"));
   if (f.bodies) run(StageId::predict, "velocities without contact of " + count(f.bodies, "body", "bodies"));
+  const std::string rigids = count(f.rigid_bodies, "rigid body", "rigid bodies") + " and " + count(f.rigid_joints, "joint", "joints") + " of host " + f.rigid_hosts;
+  if (f.rigid_bodies) run(StageId::rigid_predict, rigids);
+  else leave("rigid", "no rigid bodies");
   const unsigned pairs = f.body_pairs + f.obstacle_pairs;
   if (pairs) {
     const std::string who = count(f.body_pairs, "pair of bodies", "pairs of bodies") + " and " +
@@ -97,6 +102,7 @@ Plan make_plan(const SceneFacts &f) {
     const std::string why = f.bodies < 2 && !f.obstacles ? "one body and nothing to touch" : "filters let no pair touch";
     for (StageId id : {StageId::gather, StageId::broad, StageId::narrow, StageId::solve, StageId::distribute}) leave(stage_name(id), why);
   }
+  if (f.rigid_bodies) run(StageId::rigid_commit, "ends of " + rigids);
   if (f.bodies) run(StageId::commit, "positions and velocities at the end of the sub-step");
   leave("self contact", "not asked for");
   leave("guard", "not available yet: contacts are made from the closest points at the start of each sub-step");

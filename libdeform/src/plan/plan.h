@@ -6,7 +6,7 @@
 
 namespace dfm {
 
-enum class StageId { motion, model, predict, gather, broad, narrow, solve, distribute, commit, step };
+enum class StageId { motion, model, predict, gather, broad, narrow, solve, distribute, commit, rigid_predict, rigid_commit, step };
 const char *stage_name(StageId id);
 
 // What the plan is derived from.
@@ -14,6 +14,8 @@ struct SceneFacts {
   unsigned bodies = 0, self_stepping = 0, obstacles = 0;
   unsigned coupled = 0, coupled_surfels = 0;           // bodies with a surface of their own, and its surfels
   unsigned body_pairs = 0, obstacle_pairs = 0;         // pairs that may touch, filters applied
+  unsigned rigid_bodies = 0, rigid_joints = 0;
+  std::string rigid_hosts;                             // names
   bool gravity_keys = false, loads_vary = false, held_move = false, obstacles_move = false;
   struct Provider { std::string effect, plugin; };
   std::vector<Provider> offered;                       // by models and laws that the scene uses, as their parameters stand

@@ -23,6 +23,7 @@ class Builder {
     for (Material &m : def_.materials) create_material(m);
     for (Body &b : def_.bodies) create_body(b);
     for (Obstacle &o : def_.obstacles) create_obstacle(o);
+    create_rigid(def_.rigid);
     for (Friction &f : def_.friction) add_friction(f);
     for (const Filter &f : def_.filters)
       check(dfm_world_filter_pair(world_, f.between[0].c_str(), f.between[1].c_str(), f.collide), f.pointer);
@@ -204,6 +205,34 @@ class Builder {
     o.def.material = material(o.material);
     dfm_obstacle obstacle = 0;
     check(dfm_obstacle_create(world_, &o.def, &obstacle), o.pointer);
+  }
+
+  void create_rigid(Rigid &rigid) {
+    if (rigid.bodies.empty()) return;
+    std::vector<dfm_rigid_def> bodies;
+    std::vector<dfm_joint_def> joints;
+    for (RigidBody &b : rigid.bodies) {
+      b.def.name = b.name.c_str(), b.def.material = material(b.material);
+      const uint32_t number = uint32_t(bodies.size());
+      bool tied = b.def.fixed != 0;
+      for (const RigidBody &other : rigid.bodies)
+        for (const Joint &j : other.joints) tied = tied || &other == &b || j.with == b.name;
+      if (jittered_ && !tied) {   // what hangs on joints stands where they say
+        const double centre[3] = {0, 0, 0}, *const a = b.def.half_size;
+        const double size = b.def.shape == DFM_SHAPE_BOX ? 2 * std::max({a[0], a[1], a[2]}) : 2 * (b.def.radius + b.def.half_length);
+        jitter_.apply(size, centre, b.def.pose, b.def.velocity, b.def.spin);
+      }
+      bodies.push_back(b.def);
+      for (Joint &j : b.joints) {
+        j.def.body = number, j.def.with = DFM_RIGID_WORLD;
+        for (uint32_t k = 0; k < rigid.bodies.size(); ++k)
+          if (rigid.bodies[k].name == j.with) j.def.with = k;
+        joints.push_back(j.def);
+      }
+    }
+    const dfm_rigid_set_def set = {sizeof set, uint32_t(bodies.size()), uint32_t(joints.size()), 0, bodies.data(), joints.data()};
+    std::vector<dfm_rigid> made(bodies.size());
+    check(dfm_rigid_create(world_, rigid.host.c_str(), &set, made.data()), rigid.pointer);
   }
 
   void add_friction(Friction &f) {

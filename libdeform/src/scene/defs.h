@@ -77,6 +77,22 @@ struct Obstacle {
   std::vector<dfm_pose_key> keys;
 };
 
+struct Joint {
+  std::string pointer, with;  // with empty: the world
+  dfm_joint_def def = {};
+};
+
+struct RigidBody {
+  std::string pointer, name, material;
+  dfm_rigid_def def = {};
+  std::vector<Joint> joints;
+};
+
+struct Rigid {
+  std::string pointer, host = "builtin";
+  std::vector<RigidBody> bodies;
+};
+
 struct Material {
   std::string pointer, name;
   double density = 1000, young = 1e5, poisson = 0.3, damping_mass = 0, damping_stiffness = 0;
@@ -109,6 +125,7 @@ struct Definition {
   std::vector<Material> materials;
   std::vector<Body> bodies;
   std::vector<Obstacle> obstacles;
+  Rigid rigid;
   std::vector<Friction> friction;
   std::vector<Filter> filters;
   std::vector<Probe> probes;

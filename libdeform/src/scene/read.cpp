@@ -382,6 +382,7 @@ Definition read_scene(json &tree, const std::string &file, const Types &types) {
   read_materials(scene, def, context);
   def.bodies = read_bodies(scene, context);
   def.obstacles = read_obstacles(scene, context);
+  def.rigid = read_rigid(scene, context);
   read_contact(scene, def, context);
   read_probes(scene, def);
   read_output(scene, def);

@@ -24,5 +24,10 @@ std::string known(const Node &name, const std::vector<std::string> &valid, const
 void read_carriers(const Node &body, const dfm_type *model, ReadContext &context, Body &out);
 std::vector<Body> read_bodies(const Node &scene, ReadContext &context);
 std::vector<Obstacle> read_obstacles(const Node &scene, ReadContext &context);
+// Size and place of a shape, as obstacles and rigid bodies say it; kind: of the pose's object.
+void check_shape_keys(const Node &node, const std::string &shape);
+dfm_pose read_pose(const Node &holder, const char *kind, double *scale);
+void read_solid(const Node &node, const std::string &shape, uint32_t &number, double half_size[3], double &radius, double &half_length);
+Rigid read_rigid(const Node &scene, ReadContext &context);
 
 }  // namespace dfm::scene

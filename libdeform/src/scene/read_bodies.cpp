@@ -19,6 +19,8 @@ void read_rotation(const Node &holder, double out[4]) {
   out[0] = q.x, out[1] = q.y, out[2] = q.z, out[3] = q.w;
 }
 
+}  // namespace
+
 dfm_pose read_pose(const Node &holder, const char *kind, double *scale) {
   dfm_pose pose = {{0, 0, 0}, {0, 0, 0, 1}};
   if (!holder.has("pose")) return pose;
@@ -29,6 +31,8 @@ dfm_pose read_pose(const Node &holder, const char *kind, double *scale) {
   if (scale) *scale = node.number("scale", 1.0, kPositive);
   return pose;
 }
+
+namespace {
 
 Selection read_selection(const Node &entry) {
   Selection s;
@@ -141,6 +145,8 @@ Body read_body(const Node &node, ReadContext &context) {
   return b;
 }
 
+}  // namespace
+
 // Which of the keys that place or size a shape belong to it.
 void check_shape_keys(const Node &node, const std::string &shape) {
   const std::vector<std::pair<std::string, std::vector<std::string>>> wanted = {
@@ -154,6 +160,25 @@ void check_shape_keys(const Node &node, const std::string &shape) {
     }
   }
 }
+
+void read_solid(const Node &node, const std::string &shape, uint32_t &number, double half_size[3], double &radius, double &half_length) {
+  if (shape == "sphere") {
+    number = DFM_SHAPE_SPHERE;
+    radius = node.at("radius").number(kPositive);
+  } else if (shape == "box") {
+    number = DFM_SHAPE_BOX;
+    const Node half = node.at("half_size");
+    half.vector(half_size);
+    for (int k = 0; k < 3; ++k)
+      if (!(half_size[k] > 0)) half.fail("half sizes are above 0, found %g", half_size[k]);
+  } else {
+    number = DFM_SHAPE_CAPSULE;
+    radius = node.at("radius").number(kPositive);
+    half_length = node.at("half_length").number(kNotNegative);
+  }
+}
+
+namespace {
 
 Quaternion read_plane(const Node &node, dfm_obstacle_def &def) {
   double normal[3];
@@ -183,19 +208,8 @@ Obstacle read_obstacle(const Node &node, ReadContext &context) {
   if (shape == "plane") {
     o.def.shape = DFM_SHAPE_PLANE;
     turn = read_plane(node, o.def);
-  } else if (shape == "sphere") {
-    o.def.shape = DFM_SHAPE_SPHERE;
-    o.def.radius = node.at("radius").number(kPositive);
-  } else if (shape == "box") {
-    o.def.shape = DFM_SHAPE_BOX;
-    const Node half = node.at("half_size");
-    half.vector(o.def.half_size);
-    for (double h : o.def.half_size)
-      if (!(h > 0)) half.fail("half sizes are above 0, found %g", h);
   } else {
-    o.def.shape = DFM_SHAPE_CAPSULE;
-    o.def.radius = node.at("radius").number(kPositive);
-    o.def.half_length = node.at("half_length").number(kNotNegative);
+    read_solid(node, shape, o.def.shape, o.def.half_size, o.def.radius, o.def.half_length);
   }
   if (node.has("motion")) {
     Motion motion = read_motion(node.member("motion"), o.def.pose, turn);

@@ -33,6 +33,11 @@ uint64_t structure(const World &w) {
     h.add(o->id), h.add(d.shape), h.add(d.pose), h.add(d.half_size), h.add(d.radius), h.add(d.half_length), h.add(d.velocity_surface);
     h.add(d.category), h.add(d.collides_with), h.add(o->name.data(), o->name.size()), h.add(o->material.data(), o->material.size());
   }
+  for (auto &set : w.rigid_sets) {
+    h.add(set->host_name.data(), set->host_name.size()), h.add(set->njoint), h.add(uint64_t(set->extra.size()));
+    h.add(set->group.data(), set->group.size() * sizeof(uint32_t));
+    for (const dfm_rigid_def &d : set->defs) h.add(d.mass), h.add(d.inertia);
+  }
   return h.value;
 }
 
@@ -90,6 +95,7 @@ struct StagedBody {
   uint32_t next_load = 1, category = 1, collides_with = ~0u;
 };
 struct StagedObstacle { Pose pose, target; bool has_target; std::vector<dfm_pose_key> keys; dfm_obstacle_def def; };
+struct StagedRigids { std::vector<dfm_rigid_state> state; std::vector<double> extra, total; };
 struct StagedLaw { std::string id; std::vector<double> params; };
 struct Staged {
   double time, stable, offset, hold_start;
@@ -103,6 +109,7 @@ struct Staged {
   std::vector<dfm_vector_key> gravity_keys;
   std::vector<StagedBody> bodies;
   std::vector<StagedObstacle> obstacles;
+  std::vector<StagedRigids> rigid_sets;                // as many as the world has, before reading: `structure` vouches for them
   std::vector<StagedLaw> laws;
   std::vector<FrictionRule> friction;
   std::vector<FilterRule> filters;
@@ -132,6 +139,10 @@ void fields(Stream &s, W &w) {
     auto &o = object(entry);
     s.value(o.pose), s.value(o.target), s.value(o.has_target), s.array(o.keys), s.value(o.def.sine);
   });
+  for (auto &entry : w.rigid_sets) {
+    auto &r = object(entry);
+    s.array(r.state), s.array(r.extra), s.array(r.total);
+  }
   auto rule = [&](auto &r) { s.array(r.between[0]), s.array(r.between[1]); };
   s.each(w.friction, [&](auto &r) { rule(r), s.value(r.law); });
   s.each(w.filters, [&](auto &r) { rule(r), s.value(r.collide); });
@@ -163,6 +174,11 @@ void check(const Staged &t, const World &w) {
       good = good && m.start.size() == 3 * m.points.size();
       for (uint32_t p : m.points) good = good && p < b.p.n;
     }
+  }
+  for (size_t i = 0; good && i < t.rigid_sets.size(); ++i) {
+    const StagedRigids &from = t.rigid_sets[i];
+    const RigidSet &set = *w.rigid_sets[i];
+    good = from.state.size() == set.state.size() && from.extra.size() == set.extra.size() && from.total.size() == set.total.size();
   }
   const ContactStore &c = t.store;
   const size_t n = c.n;
@@ -225,6 +241,11 @@ void put(World &w, Staged &t) noexcept {
     o.pose = from.pose, o.target = from.target, o.has_target = from.has_target, o.def.sine = from.def.sine;
     o.keys.swap(from.keys);
   }
+  for (size_t i = 0; i < w.rigid_sets.size(); ++i) {
+    RigidSet &set = *w.rigid_sets[i];
+    copy(t.rigid_sets[i].state, set.state), copy(t.rigid_sets[i].extra, set.extra), copy(t.rigid_sets[i].total, set.total);
+    set.last_h = 0;
+  }
   w.friction.swap(t.friction), w.filters.swap(t.filters), w.gravity_keys.swap(t.gravity_keys), w.work.swap(t.work);
   std::copy(t.def.gravity, t.def.gravity + 3, w.def.gravity);
   std::swap(w.store, t.store);
@@ -240,6 +261,9 @@ uint64_t world_hash(const World &w) {
   Hash h;
   for (auto &b : w.bodies) {
     for (const Array<double> *a : {&b->p.x, &b->p.v, &b->model.state}) h.add(a->data(), a->size() * sizeof(double));
+  }
+  for (auto &set : w.rigid_sets) {
+    h.add(set->state.data(), set->state.size() * sizeof(dfm_rigid_state)), h.add(set->extra.data(), set->extra.size() * sizeof(double));
   }
   const ContactStore &c = w.store;
   h.add(c.key.data(), c.key.size() * sizeof(uint64_t));
@@ -274,6 +298,7 @@ void world_restore(World &w, const void *data, size_t bytes) {
     fail(DFM_E_FORMAT,
          "the snapshot belongs to another world: names, meshes, masses, models, fields and obstacles must be the same; nothing was restored");
   Staged staged(w.memory());
+  staged.rigid_sets.resize(w.rigid_sets.size());
   s.each(staged.laws, [&](StagedLaw &l) { s.array(l.id), s.array(l.params); });
   fields(s, staged);
   check(staged, w);

@@ -18,6 +18,10 @@ namespace {
 // Responses of self-stepping bodies to unit impulses at their touched surfels: column by column.
 void fill_responses(World &w) {
   for (const ContactRows::Block &block : w.rows.blocks) {
+    if (block.group != kNone) {
+      rigid_response(w, block.group, &w.rows.response[block.response]);
+      continue;
+    }
     Body &b = *w.bodies[block.source];
     const uint32_t n = block.count;
     w.block_surfels.resize(n), w.block_impulse.resize(size_t(3) * n), w.block_velocity.resize(size_t(3) * n);
@@ -45,7 +49,7 @@ void prepare_rows(World &w) {
     w.state.law[i] = w.law_of(c.slot_a, c.obstacle, c.slot_b);
     w.state.area[i] = c.area;
   }
-  w.rows.build(w.contacts, w.sources);
+  w.rows.build(w.contacts, w.sources, {w.rigid_places, w.rigid_groups});
   fill_responses(w);
   w.tangents.resize(size_t(3) * n), w.match.resize(n);
   warm_start(w.store, w.contacts, w.h, w.rows, w.state, w.tangents.data(), w.match.data());

@@ -68,6 +68,8 @@ bool run_stage(World &w, StageId id, uint32_t *trouble) {
     case StageId::solve: return w.stage_solve(trouble);
     case StageId::distribute: w.stage_distribute(); return true;
     case StageId::commit: return w.stage_commit(trouble);
+    case StageId::rigid_predict: return w.stage_rigid_predict(trouble);
+    case StageId::rigid_commit: return w.stage_rigid_commit(trouble);
     case StageId::step: return true;
   }
   return true;
@@ -145,6 +147,7 @@ bool World::sub_step(uint32_t *trouble) {
   driven.clear();
   for (const PlannedStage &stage : plan.stages)
     if (!run_stage(*this, stage.id, trouble)) return false;
+  keep_rigids();
   return undo.kept = true;
 }
 

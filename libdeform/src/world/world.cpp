@@ -154,6 +154,13 @@ void World::prepare() {
     obstacle_views.push_back(v);
   }
 
+  place_rigids(*this);
+  for (auto &set : rigid_sets) {
+    facts.rigid_bodies += static_cast<unsigned>(set->defs.size()), facts.rigid_joints += set->njoint;
+    if (facts.rigid_hosts.find(set->host_name) == std::string::npos) facts.rigid_hosts += (facts.rigid_hosts.empty() ? "" : ", ") + set->host_name;
+    facts.offered.push_back({"two_way_rigid", "rigid host " + set->host_name});
+  }
+
   // Pairs: filters, then laws. The default law is made only when a pair needs it.
   const uint64_t filter_version = filter.version;   // rises, so that lists made under older rules are renewed
   filter = PairFilter(memory());

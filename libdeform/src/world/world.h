@@ -18,6 +18,7 @@
 #include "plugin/params.h"
 #include "surfel/views.h"
 #include "world/motion.h"
+#include "world/rigid.h"
 
 namespace dfm {
 
@@ -79,6 +80,8 @@ struct Obstacle {
   Pose pose;                         // now
   Pose target;                       // at the end of the next step, where move_to set it
   bool has_target = false;
+  RigidSet *rigid = nullptr;         // a body of a rigid host: where it stands in `rigid`
+  uint32_t rigid_body = 0;
   bool moves() const { return !keys.empty() || def.sine.amplitude[0] != 0 || def.sine.amplitude[1] != 0 || def.sine.amplitude[2] != 0; }
   Pose pose_at_time(double t) const;
 };
@@ -108,6 +111,7 @@ struct World {
   std::vector<std::unique_ptr<Body>> bodies;           // in id order
   std::vector<std::unique_ptr<Obstacle>> obstacles;    // in id order
   std::vector<std::unique_ptr<Material>> materials;
+  std::vector<std::unique_ptr<RigidSet>> rigid_sets;   // each a host's bodies, which are obstacles too
   std::vector<std::unique_ptr<LawInstance>> laws;      // the first is the default law, made when first needed
   std::vector<FrictionRule> friction;
   std::vector<FilterRule> filters;
@@ -133,6 +137,8 @@ struct World {
   // Buffers of a sub-step.
   std::vector<BodyView> body_views;
   std::vector<ObstacleView> obstacle_views;
+  std::vector<RigidPlace> rigid_places;                // by obstacle slot; empty without rigid bodies
+  std::vector<uint32_t> rigid_groups;                  // bodies per group, all sets
   std::vector<DofSource> sources;
   std::vector<ImpulseSink> sinks;
   BroadPhase broad;
@@ -187,6 +193,9 @@ struct World {
   void stage_motion();
   bool stage_model(uint32_t *trouble);
   bool stage_predict(uint32_t *trouble);
+  bool stage_rigid_predict(uint32_t *trouble);         // rigid.cpp
+  bool stage_rigid_commit(uint32_t *trouble);          // rigid.cpp: ends beside the present states, kept by keep_rigids()
+  void keep_rigids();                                  // rigid.cpp: once the sub-step is known to succeed
   void stage_gather();
   void stage_broad();
   void stage_narrow();

@@ -1,0 +1,129 @@
+/* deform/rigid.h -- rigid bodies that soft bodies push: their states, joints and motors, and the table by which a rigid host takes part
+ * in the contact solve. doc/concepts/rigid.md.
+ *
+ * A set of rigid bodies belongs to one host. The world keeps their states; the host answers, once per sub-step, how they would move without
+ * contact, how they answer impulses, and where they end. Contact is solved with these answers, so both sides feel the same impulses.
+ * Rigid bodies touch soft bodies only: neither each other nor obstacles. */
+#ifndef DEFORM_RIGID_H
+#define DEFORM_RIGID_H
+#include "deform/base.h"
+#include "deform/body.h"
+#include "deform/id.h"
+#include "deform/math.h"
+#ifdef __cplusplus
+extern "C" {
+#endif
+#define DFM_RIGID_WORLD UINT32_MAX    /* a joint's `with`: the world */
+#define DFM_RIGID_STILL UINT32_MAX    /* a body's group: it feels nothing and never moves */
+enum { DFM_JOINT_HINGE = 0, DFM_JOINT_SLIDER = 1, DFM_JOINT_BALL = 2, DFM_JOINT_FIXED = 3 };
+
+/** What moves of one body. World frame; the centre of mass is the pose's position. */
+typedef struct dfm_rigid_state { double position[3], rotation[4], velocity[3], spin[3]; } dfm_rigid_state;   /* m, x y z w, m/s, rad/s */
+
+typedef struct dfm_rigid_def {
+  uint32_t size, shape;               /* DFM_SHAPE_SPHERE, BOX or CAPSULE, centred at the pose */
+  const char *name;                   /* unique in the world among bodies and obstacles too */
+  dfm_pose pose;
+  double half_size[3], radius, half_length;   /* as in dfm_obstacle_def, m */
+  double mass;                        /* kg; > 0 unless fixed */
+  double inertia[3];                  /* kg m2, principal moments about the body's own axes; all zero: solid of uniform density */
+  double velocity[3], spin[3];        /* m/s of the centre of mass, rad/s, world frame */
+  uint32_t fixed, category;
+  uint32_t collides_with, reserved;
+  dfm_material material;              /* for pair rules by material; 0: none */
+  void *user;
+} dfm_rigid_def;
+
+typedef struct dfm_joint_def {
+  uint32_t size, type;                /* DFM_JOINT_* */
+  uint32_t body, with;                /* numbers within the set; with: DFM_RIGID_WORLD for the world */
+  double anchor[3];                   /* m, world frame, as the bodies stand when they are created */
+  double axis[3];                     /* hinge, slider: world frame, any length */
+  uint32_t motor, reserved;           /* 1: hinge and slider may have one */
+  double velocity;                    /* of `body` against `with`: rad/s about the axis, m/s along it */
+  double max;                         /* N m, N; what the motor can do at most */
+} dfm_joint_def;
+
+/** One host's bodies and joints in one world. Strings and arrays are copied. */
+typedef struct dfm_rigid_set_def {
+  uint32_t size, nbody, njoint, reserved;
+  const dfm_rigid_def *bodies;
+  const dfm_joint_def *joints;
+} dfm_rigid_set_def;
+
+/* ---- the table of a host ------------------------------------------------------------------------------------ */
+
+/** One sub-step as a host sees it. Arrays hold the world's state and live during the call. */
+typedef struct dfm_rigid_step {
+  uint32_t size, nbody;
+  double t, h, gravity[3];            /* s at its start, s, m/s2 */
+  const dfm_rigid_state *state;       /* [nbody] at its start */
+  const double *extra;                /* [nextra] */
+} dfm_rigid_step;
+
+/** Per sub-step: predict, then respond for each group that is touched, then commit (again, if the
+ * guard asks for other impulses), all with the same dfm_rigid_step. A sub-step that fails is not
+ * committed anywhere: the next predict then has the state of the last one that succeeded, so a host with a world of its own writes `state` into it
+ * first. Called from the thread that steps the world, never by two threads at once for one instance; results must depend on the arguments alone.
+ * Every function returns DFM_OK, or a negative status, which ends the step with DFM_TROUBLE_PLUGIN. */
+typedef struct dfm_rigid_host {
+  uint32_t size, flags;               /* flags: 0 */
+  void *user;                         /* handed to create */
+  /** Takes a set. @param set    checked: masses and inertias are there (1/0 never occurs), poses are unit
+   * @param group  out, [nbody]: bodies that answer each other's impulses share a number; numbers 0, 1, 2, .. each in use; DFM_RIGID_STILL
+   * @param nextra out, values of further state that the world keeps for this instance (motors, caches that must survive restore); they start at 0 */
+  dfm_status (*create)(void *user, const dfm_rigid_set_def *set, void **self, uint32_t *group, uint32_t *nextra);
+  void (*destroy)(void *self);
+  /** Mean velocity over the sub-step with everything but contact: [nbody,6] linear of the centre of mass, angular; world frame. */
+  dfm_status (*predict)(void *self, const dfm_rigid_step *step, double *velocity);
+  /** Change of that mean velocity per unit impulse: [6g,6g] row-major, symmetric, positive semidefinite; per body of the group, in rising order,
+   * linear at the centre of mass, then angular (1/kg, 1/(kg m2)). */
+  dfm_status (*respond)(void *self, const dfm_rigid_step *step, uint32_t group, double *matrix);
+  /** End of the sub-step. @param impulse [nbody,6] of contact: N s, and N m s about the centre of mass at the start
+   * @param state  out, [nbody]; @param extra out, [nextra]. Neither aliases *step. */
+  dfm_status (*commit)(void *self, const dfm_rigid_step *step, const double *impulse, dfm_rigid_state *state, double *extra);
+  /** Changes what extra must say for a motor; extra holds the start values when called right after create. May be NULL: no motors. */
+  dfm_status (*set_motor)(void *self, uint32_t joint, double velocity, double max, double *extra);
+  /** Angle or path of a hinge or slider since creation (rad, m), its rate, and what its motor did in the last sub-step (N m, N). May be NULL. */
+  dfm_status (*joint)(void *self, const dfm_rigid_state *state, const double *extra, uint32_t joint, double *position, double *rate, double *effort);
+} dfm_rigid_host;
+
+/** Makes a host known under a name to every context of the process; the table is copied, its code must stay loaded. "builtin" is always known.
+ * @return DFM_OK; DFM_E_ARG an entry is missing; DFM_E_STATE the name is taken. Threads: Any thread. Since 0.2. */
+DFM_API dfm_status dfm_rigid_host_register(const char *name, const dfm_rigid_host *table);
+
+/* ---- bodies ------------------------------------------------------------------------------------------------- */
+
+/** A ball of 1 kg and radius 0.5 m at the origin, category 1, collides with all. Threads: Any thread. Since 0.2. */
+DFM_API dfm_rigid_def dfm_rigid_def_default(void);
+/** Makes a set of bodies. A dfm_rigid is a dfm_obstacle too: poses, defs, rays, pair rules and reports take it; it moves by itself only.
+ * @param host  "builtin" or a registered name; NULL: "builtin"
+ * @param out   [nbody]
+ * @return DFM_OK; DFM_E_ARG (which body or joint, why; nearest host); DFM_E_FATAL the host refuses. Threads: Not during step. Since 0.2. */
+DFM_API dfm_status dfm_rigid_create(dfm_world world, const char *host, const dfm_rigid_set_def *set, dfm_rigid *out);
+/** Removes the whole set that the body came with; their contacts end. Threads: Not during step. Since 0.2. */
+DFM_API dfm_status dfm_rigid_destroy(dfm_rigid rigid);
+/** All rigid bodies in order of creation; capacity 0 with out NULL only counts. Threads: Any thread. Not during step. Since 0.2. */
+DFM_API dfm_status dfm_world_rigids(dfm_world world, uint32_t capacity, dfm_rigid *out, uint32_t *n);
+/** @return DFM_OK; DFM_E_ARG none of that name (nearest one). Threads: Any thread. Not during step. Since 0.2. */
+DFM_API dfm_status dfm_world_find_rigid(dfm_world world, const char *name, dfm_rigid *out);
+/** Its def as created (name valid while it lives). Threads: Any thread. Not during step. Since 0.2. */
+DFM_API dfm_status dfm_rigid_get_def(dfm_rigid rigid, dfm_rigid_def *out);
+DFM_API dfm_status dfm_rigid_get_state(dfm_rigid rigid, dfm_rigid_state *out);
+/** Puts a body somewhere, at once; a body with joints must fit them (what does not is pulled back in the next step).
+ * @return DFM_E_ARG not finite, or the body is fixed. Threads: Not during step. Since 0.2. */
+DFM_API dfm_status dfm_rigid_set_state(dfm_rigid rigid, const dfm_rigid_state *state);
+/** Mass, momenta and energies as of a soft body: elastic 0, volume that of the shape. Threads: Any thread. Not during step. Since 0.2. */
+DFM_API dfm_status dfm_rigid_get_measure(dfm_rigid rigid, dfm_body_measure *out);
+/** Mean force (N) and moment about the centre of mass (N m) that contact put on it in the last sub-step. Threads: Any thread. Not during step. Since 0.2. */
+DFM_API dfm_status dfm_rigid_contact_wrench(dfm_rigid rigid, double force[3], double moment[3]);
+/** Motor of one of the set's joints, numbered as in its def; any body of the set names it. max 0: off.
+ * @return DFM_E_ARG no such joint, or no hinge or slider; DFM_E_UNSUPPORTED the host has no motors. Threads: Not during step. Since 0.2. */
+DFM_API dfm_status dfm_rigid_set_motor(dfm_rigid rigid, uint32_t joint, double velocity, double max);
+/** Angle (rad, within a half turn) or path (m) of a hinge or slider since creation, its rate, and what its motor did in the last sub-step; each may be
+ * NULL. @return as dfm_rigid_set_motor. Threads: Any thread. Not during step. Since 0.2. */
+DFM_API dfm_status dfm_rigid_joint(dfm_rigid rigid, uint32_t joint, double *position, double *rate, double *effort);
+#ifdef __cplusplus
+}
+#endif
+#endif

@@ -1,0 +1,127 @@
+#include "deform/rigid.h"
+
+#include "api/objects.h"
+
+using namespace dfm;
+
+namespace {
+
+Obstacle &rigid_of(dfm_rigid h) {
+  Obstacle &o = obstacle_of(h);
+  if (!o.rigid) fail(DFM_E_HANDLE, "obstacle '%s' is no rigid body: it feels nothing", o.name.c_str());
+  return o;
+}
+
+}  // namespace
+
+dfm_status dfm_rigid_host_register(const char *name, const dfm_rigid_host *table) {
+  return guard([&] {
+    need(name, "name"), need(table, "table");
+    register_host(name, take_def(table, dfm_rigid_host{}));
+  });
+}
+
+dfm_rigid_def dfm_rigid_def_default(void) {
+  dfm_rigid_def d{};
+  d.size = sizeof d, d.shape = 1;   // DFM_SHAPE_SPHERE
+  d.half_size[0] = d.half_size[1] = d.half_size[2] = 0.5, d.radius = 0.5, d.half_length = 0.5, d.mass = 1;
+  d.category = 1, d.collides_with = ~0u;
+  return d;
+}
+
+dfm_status dfm_rigid_create(dfm_world world, const char *host, const dfm_rigid_set_def *set, dfm_rigid *out) {
+  return guard([&] {
+    World &w = idle(world_of(world));
+    need(set, "set"), need(out, "out");
+    create_rigids(w, host, take_def(set, dfm_rigid_set_def{}), out);
+  });
+}
+
+dfm_status dfm_rigid_destroy(dfm_rigid rigid) {
+  return guard([&] {
+    Obstacle &o = rigid_of(rigid);
+    idle(*o.world);
+    destroy_rigids(*o.rigid);
+  });
+}
+
+dfm_status dfm_world_rigids(dfm_world world, uint32_t capacity, dfm_rigid *out, uint32_t *n) {
+  return guard([&] {
+    const World &w = world_of(world);
+    uint32_t count = 0;
+    for (auto &o : w.obstacles) count += o->rigid != nullptr;
+    if (!room(count, capacity, out, n)) return;
+    for (auto &o : w.obstacles)
+      if (o->rigid) *out++ = o->handle;
+  });
+}
+
+dfm_status dfm_world_find_rigid(dfm_world world, const char *name, dfm_rigid *out) {
+  return guard([&] {
+    World &w = world_of(world);
+    need(name, "name"), need(out, "out");
+    std::vector<std::string> names;
+    for (auto &o : w.obstacles) {
+      if (!o->rigid) continue;
+      if (o->name == name) {
+        *out = o->handle;
+        return;
+      }
+      names.push_back(o->name);
+    }
+    const std::string near = nearest(name, names);
+    fail(DFM_E_ARG, "there is no rigid body '%s'%s", name, near.empty() ? "" : ("; did you mean '" + near + "'?").c_str());
+  });
+}
+
+dfm_status dfm_rigid_get_def(dfm_rigid rigid, dfm_rigid_def *out) {
+  return guard([&] {
+    const Obstacle &o = rigid_of(rigid);
+    give(out, o.rigid->defs[o.rigid_body]);
+  });
+}
+
+dfm_status dfm_rigid_get_state(dfm_rigid rigid, dfm_rigid_state *out) {
+  return guard([&] {
+    const Obstacle &o = rigid_of(rigid);
+    need(out, "out");
+    *out = o.rigid->state[o.rigid_body];
+  });
+}
+
+dfm_status dfm_rigid_set_state(dfm_rigid rigid, const dfm_rigid_state *state) {
+  return guard([&] {
+    Obstacle &o = rigid_of(rigid);
+    idle(*o.world);
+    need(state, "state");
+    set_rigid_state(o, *state);
+  });
+}
+
+dfm_status dfm_rigid_get_measure(dfm_rigid rigid, dfm_body_measure *out) {
+  return guard([&] {
+    const Obstacle &o = rigid_of(rigid);
+    give(out, measure_rigid(*o.rigid, o.rigid_body));
+  });
+}
+
+dfm_status dfm_rigid_contact_wrench(dfm_rigid rigid, double force[3], double moment[3]) {
+  return guard([&] {
+    const Obstacle &o = rigid_of(rigid);
+    need(force, "force"), need(moment, "moment");
+    const double h = o.rigid->last_h, *const p = &o.rigid->impulse[6 * size_t{o.rigid_body}];
+    for (int k = 0; k < 3; ++k) force[k] = h > 0 ? p[k] / h : 0, moment[k] = h > 0 ? p[3 + k] / h : 0;
+  });
+}
+
+dfm_status dfm_rigid_set_motor(dfm_rigid rigid, uint32_t joint, double velocity, double max) {
+  return guard([&] {
+    Obstacle &o = rigid_of(rigid);
+    idle(*o.world);
+    set_rigid_motor(*o.rigid, joint, velocity, max);
+  });
+}
+
+dfm_status dfm_rigid_joint(dfm_rigid rigid, uint32_t joint, double *position, double *rate, double *effort) {
+  return guard([&] { rigid_joint(*rigid_of(rigid).rigid, joint, position, rate, effort); });
+}

@@ -1,0 +1,56 @@
+// Rotations of a rigid body over a step: exponential map, its inverse, and the mean spin that conserves angular momentum. + - * / sqrt only.
+#pragma once
+#include "math/trig.h"
+#include "math/vec3.h"
+
+namespace dfm {
+
+inline Quat unit(Quat q) {
+  const double n = std::sqrt(q.x * q.x + q.y * q.y + q.z * q.z + q.w * q.w);
+  return {q.x / n, q.y / n, q.z / n, q.w / n};
+}
+inline Quat conjugate(Quat q) { return {-q.x, -q.y, -q.z, q.w}; }
+
+// q turned by the rotation vector r (world frame, rad).
+inline Quat turned(Quat q, Vec3 r) {
+  const double angle = norm(r);
+  if (!(angle > 0)) return q;
+  const double half = angle / (4 * 3.14159265358979323846);   // half the angle in turns
+  const Vec3 v = (sin_turns(half) / angle) * r;
+  return unit(Quat{v.x, v.y, v.z, sin_turns(half + 0.25)} * q);
+}
+
+// The rotation vector of q along the shorter arc. Halving the arc needs square roots only; asin by its series is exact to rounding after five.
+inline Vec3 rotation_vector(Quat q) {
+  if (q.w < 0) q = {-q.x, -q.y, -q.z, -q.w};
+  double scale = 2;
+  for (int i = 0; i < 5; ++i) {
+    q = unit({q.x, q.y, q.z, q.w + 1});
+    scale *= 2;
+  }
+  const Vec3 v{q.x, q.y, q.z};
+  const double s = norm2(v);
+  return (scale * (1 + s * (1.0 / 6 + s * (3.0 / 40 + s * (15.0 / 336 + s * (105.0 / 3456)))))) * v;
+}
+
+// I v and I^-1 v for principal moments (or their inverses) about the axes of q, in the world frame.
+inline Vec3 in_axes(Quat q, Vec3 diagonal, Vec3 v) {
+  const Vec3 b = rotate_back(q, v);
+  return rotate(q, {diagonal.x * b.x, diagonal.y * b.y, diagonal.z * b.z});
+}
+
+// Mean spin w over a step with constant angular momentum L: w = I^-1(q_m) L with q_m half way, q_m = exp(h w / 2) q (the midpoint Lie scheme;
+// Krysl 2005, IJNME 63:2171). L is conserved whatever w is, so the spin is bounded; fixed-point steps converge while h |w| is below about 1, and a
+// round body needs none.
+inline Vec3 mean_spin(Quat q, Vec3 inverse_moments, Vec3 L, double h) {
+  Vec3 w = in_axes(q, inverse_moments, L);
+  if (inverse_moments.x == inverse_moments.y && inverse_moments.y == inverse_moments.z) return w;
+  for (int k = 0; k < 60; ++k) {
+    const Vec3 next = in_axes(turned(q, (0.5 * h) * w), inverse_moments, L), change = next - w;
+    w = next;
+    if (norm2(change) <= 1e-31 * norm2(w)) break;
+  }
+  return w;
+}
+
+}  // namespace dfm

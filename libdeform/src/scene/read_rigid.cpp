@@ -1,0 +1,92 @@
+// "rigid": bodies of a rigid host with their joints.
+#include <algorithm>
+
+#include "scene/read.h"
+
+namespace dfm::scene {
+namespace {
+
+RigidBody read_rigid_body(const Node &node, ReadContext &context) {
+  RigidBody b;
+  b.def = dfm_rigid_def_default();
+  b.def.half_length = 0;
+  node.object("rigid_body");
+  b.pointer = node.pointer();
+  b.name = node.at("name").name();
+  check_fresh(node.at("name"), b.name, context.sides, "body or obstacle");
+  context.sides.push_back(b.name);
+  const Node shape_node = node.at("shape");
+  const std::string shape = shape_node.word("shape");
+  if (shape == "plane") shape_node.fail("a rigid body is a sphere, a box or a capsule; a plane has no mass, put it among the obstacles");
+  check_shape_keys(node, shape);
+  read_solid(node, shape, b.def.shape, b.def.half_size, b.def.radius, b.def.half_length);
+  b.def.pose = read_pose(node, "obstacle_pose", nullptr);
+  b.def.fixed = node.boolean("fixed", false);
+  if (!b.def.fixed || node.has("mass")) b.def.mass = node.at("mass").number(kPositive);
+  if (node.has("inertia")) {
+    const Node inertia = node.member("inertia");
+    inertia.vector(b.def.inertia);
+    for (double i : b.def.inertia)
+      if (!(i > 0)) inertia.fail("moments of inertia are above 0, found %g", i);
+  }
+  node.vector("velocity", b.def.velocity, 0, 0, 0);
+  node.vector("spin", b.def.spin, 0, 0, 0);
+  if (node.has("material")) b.material = known(node.member("material"), context.materials, "material");
+  return b;
+}
+
+Joint read_joint(const Node &node, const RigidBody &body, const std::vector<std::string> &names) {
+  Joint j;
+  j.def.size = sizeof j.def;
+  node.object("joint");
+  j.pointer = node.pointer();
+  const Node type_node = node.at("type");
+  const std::string type = type_node.word("joint_type");
+  j.def.type = type == "hinge" ? DFM_JOINT_HINGE : type == "slider" ? DFM_JOINT_SLIDER : type == "ball" ? DFM_JOINT_BALL : DFM_JOINT_FIXED;
+  const bool has_axis = j.def.type == DFM_JOINT_HINGE || j.def.type == DFM_JOINT_SLIDER;
+  if (node.has("with") && !node.member("with").value().is_null()) {
+    j.with = known(node.member("with"), names, "rigid body");
+    if (j.with == body.name) node.member("with").fail("\"%s\" cannot be tied to itself", j.with.c_str());
+  }
+  const double *const p = body.def.pose.position;
+  node.vector("anchor", j.def.anchor, p[0], p[1], p[2]);
+  if (has_axis) {
+    node.at("axis").vector(j.def.axis);
+    if (j.def.axis[0] == 0 && j.def.axis[1] == 0 && j.def.axis[2] == 0) node.at("axis").fail("the axis of a joint cannot be zero");
+  } else {
+    for (const char *key : {"axis", "motor"})
+      if (node.has(key)) node.member(key).fail("a %s joint has no \"%s\"; that is for a hinge or a slider", type.c_str(), key);
+  }
+  if (node.has("motor")) {
+    const Node motor = node.member("motor");
+    motor.object("motor");
+    j.def.motor = 1;
+    j.def.velocity = motor.at("velocity").number();
+    j.def.max = motor.at("max").number(kNotNegative);
+  }
+  return j;
+}
+
+}  // namespace
+
+Rigid read_rigid(const Node &scene, ReadContext &context) {
+  Rigid out;
+  if (!scene.has("rigid")) return out;
+  const Node rigid = scene.member("rigid");
+  rigid.object("rigid");
+  out.pointer = rigid.pointer();
+  if (!rigid.has("host")) rigid.value()["host"] = "builtin";
+  out.host = rigid.member("host").text();
+  std::vector<std::string> names;
+  const std::vector<Node> nodes = rigid.items("bodies");
+  for (const Node &node : nodes) {
+    out.bodies.push_back(read_rigid_body(node, context));
+    names.push_back(out.bodies.back().name);
+  }
+  // Joints may name bodies that stand further down.
+  for (size_t i = 0; i < nodes.size(); ++i)
+    for (const Node &joint : nodes[i].items("joints")) out.bodies[i].joints.push_back(read_joint(joint, out.bodies[i], names));
+  return out;
+}
+
+}  // namespace dfm::scene

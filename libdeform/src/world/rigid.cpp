@@ -1,0 +1,178 @@
+// The two stages of rigid bodies, around the solve: how they would move without contact, and where they end with it.
+#include "world/rigid.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "core/error.h"
+#include "rigid/turn.h"
+#include "world/world.h"
+
+namespace dfm {
+namespace {
+
+Quat rotation_of(const dfm_rigid_state &s) { return {s.rotation[0], s.rotation[1], s.rotation[2], s.rotation[3]}; }
+
+bool finite(const double *p, size_t n) {
+  double poison = 0;
+  for (size_t i = 0; i < n; ++i) poison += 0.0 * p[i];
+  return poison == 0;
+}
+constexpr size_t kStateValues = sizeof(dfm_rigid_state) / sizeof(double);
+
+bool host_failed(const World &w, const RigidSet &set, const char *what, uint32_t *trouble) {
+  *trouble |= DFM_TROUBLE_PLUGIN;
+  set_last_error(format("step %llu, rigid body '%s' and those with it: host '%s' %s; take a smaller step or look at its masses and motors",
+                        static_cast<unsigned long long>(w.step_count), set.defs[0].name, set.host_name.c_str(), what).c_str());
+  return false;
+}
+
+}  // namespace
+
+Obstacle &rigid_obstacle(World &w, uint64_t id) {
+  for (auto &o : w.obstacles)
+    if (o->id == id) return *o;
+  fail(DFM_E_FATAL, "a rigid body has lost its shape");
+}
+
+void place_rigids(World &w) {
+  w.rigid_places.clear(), w.rigid_groups.clear();
+  if (w.rigid_sets.empty()) return;
+  w.rigid_places.resize(w.obstacles.size());
+  for (auto &set : w.rigid_sets) {
+    set->first_group = static_cast<uint32_t>(w.rigid_groups.size());
+    w.rigid_groups.resize(w.rigid_groups.size() + set->ngroup);
+    for (uint32_t g : set->group)
+      if (g != DFM_RIGID_STILL) ++w.rigid_groups[set->first_group + g];
+  }
+  for (auto &o : w.obstacles) {
+    if (!o->rigid) continue;
+    const uint32_t g = o->rigid->group[o->rigid_body];
+    if (g != DFM_RIGID_STILL) w.rigid_places[o->slot] = {o->rigid->first_group + g, o->rigid->place[o->rigid_body], o->pose.position};
+  }
+}
+
+bool World::stage_rigid_predict(uint32_t *trouble) {
+  for (auto &set : rigid_sets) {
+    RigidSet &s = *set;
+    const uint32_t n = static_cast<uint32_t>(s.defs.size());
+    s.step = {sizeof s.step, n, time, h, {gravity.x, gravity.y, gravity.z}, s.state.data(), s.extra.data()};
+    std::fill(s.velocity.begin(), s.velocity.end(), 0.0);
+    if (s.host.predict(s.self, &s.step, s.velocity.data()) != DFM_OK) return host_failed(*this, s, "gave no velocities", trouble);
+    if (!finite(s.velocity.data(), s.velocity.size())) return host_failed(*this, s, "gave velocities that are not finite", trouble);
+  }
+  for (auto &o : obstacles) {
+    if (!o->rigid || o->rigid->group[o->rigid_body] == DFM_RIGID_STILL) continue;
+    const double *const v = &o->rigid->velocity[6 * size_t{o->rigid_body}];
+    obstacle_views[o->slot].velocity = load3(v), obstacle_views[o->slot].spin = load3(v + 3);
+    rigid_places[o->slot].centre = o->pose.position;
+  }
+  return true;
+}
+
+void rigid_response(World &w, uint32_t group, double *matrix) {
+  for (auto &set : w.rigid_sets) {
+    if (group < set->first_group || group >= set->first_group + set->ngroup) continue;
+    const size_t width = 6 * size_t{w.rigid_groups[group]};
+    if (set->host.respond(set->self, &set->step, group - set->first_group, matrix) != DFM_OK || !finite(matrix, width * width))
+      fail(DFM_E_FATAL, "rigid host '%s' does not answer impulses on '%s' and those with it", set->host_name.c_str(), set->defs[0].name);
+    return;
+  }
+}
+
+bool World::stage_rigid_commit(uint32_t *trouble) {
+  for (auto &set : rigid_sets) std::fill(set->impulse.begin(), set->impulse.end(), 0.0);
+  if (plan.touches() && !rows.rigid.empty())
+    for (uint32_t i = 0; i < rows.n; ++i) {
+      if (rows.rigid[i] == kNone) continue;
+      const Obstacle &o = *obstacles[contacts[i].slot_b];
+      const double *const f = &rows.frame[size_t(9) * i], *const l = &rows.impulse[size_t(3) * i];
+      const Vec3 p = l[0] * load3(f) + l[1] * load3(f + 3) + l[2] * load3(f + 6);
+      double *const to = &o.rigid->impulse[6 * size_t{o.rigid_body}];
+      store3(to, load3(to) - p), store3(to + 3, load3(to + 3) - cross(load3(&rows.arm[size_t(3) * i]), p));
+    }
+  for (auto &set : rigid_sets) {
+    RigidSet &s = *set;
+    if (s.host.commit(s.self, &s.step, s.impulse.data(), s.next.data(), s.next_extra.data()) != DFM_OK)
+      return host_failed(*this, s, "could not end its step", trouble);
+    for (uint32_t i = 0; i < s.defs.size(); ++i)
+      if (s.group[i] == DFM_RIGID_STILL) s.next[i] = s.state[i];
+    if (!finite(reinterpret_cast<const double *>(s.next.data()), kStateValues * s.next.size()) || !finite(s.next_extra.data(), s.next_extra.size()))
+      return host_failed(*this, s, "ended its step with something not finite", trouble);
+  }
+  // What is looked at from here on (the guard) sees how they truly move.
+  for (auto &o : obstacles) {
+    if (!o->rigid || o->rigid->group[o->rigid_body] == DFM_RIGID_STILL) continue;
+    const dfm_rigid_state &from = o->rigid->state[o->rigid_body], &to = o->rigid->next[o->rigid_body];
+    obstacle_views[o->slot].velocity = (1 / h) * (load3(to.position) - load3(from.position));
+    obstacle_views[o->slot].spin = (1 / h) * rotation_vector(rotation_of(to) * conjugate(rotation_of(from)));
+  }
+  return true;
+}
+
+void World::keep_rigids() {
+  for (auto &set : rigid_sets) {
+    set->state.swap(set->next), set->extra.swap(set->next_extra);
+    for (uint32_t i = 0; i < set->defs.size(); ++i)
+      for (uint32_t k = 0; k < 3; ++k) set->total[3 * i + k] += set->impulse[6 * i + k];
+    set->last_h = h;
+  }
+  if (!rigid_sets.empty())
+    for (auto &o : obstacles)
+      if (o->rigid) o->pose = {load3(o->rigid->state[o->rigid_body].position), rotation_of(o->rigid->state[o->rigid_body])};
+}
+
+dfm_body_measure measure_rigid(const RigidSet &set, uint32_t i) {
+  const dfm_rigid_def &d = set.defs[i];
+  const dfm_rigid_state &s = set.state[i];
+  dfm_body_measure m{};
+  m.size = sizeof m, m.mass = d.mass, m.volume = m.rest_volume = solid_volume(d);
+  const Vec3 v = load3(s.velocity), w = load3(s.spin), L = in_axes(rotation_of(s), load3(d.inertia), w);
+  store3(m.com, load3(s.position)), store3(m.velocity, v), store3(m.momentum, d.mass * v), store3(m.angular, L);
+  m.kinetic = 0.5 * d.mass * norm2(v) + 0.5 * dot(w, L);
+  double reach = d.shape == DFM_SHAPE_BOX ? norm(load3(d.half_size)) : d.radius + (d.shape == DFM_SHAPE_CAPSULE ? d.half_length : 0);
+  m.speed_max = norm(v) + norm(w) * reach;
+  for (uint32_t k = 0; k < 3; ++k) m.contact_impulse[k] = set.total[3 * i + k];
+  return m;
+}
+
+void set_rigid_state(Obstacle &o, const dfm_rigid_state &given) {
+  RigidSet &set = *o.rigid;
+  if (set.group[o.rigid_body] == DFM_RIGID_STILL) fail(DFM_E_ARG, "rigid body '%s' is fixed; it cannot be put elsewhere", o.name.c_str());
+  if (!finite(reinterpret_cast<const double *>(&given), kStateValues)) fail(DFM_E_ARG, "rigid body '%s': the given state is not finite", o.name.c_str());
+  dfm_rigid_state &s = set.state[o.rigid_body];
+  s = given;
+  const Quat q = unit_quat(given.rotation);
+  s.rotation[0] = q.x, s.rotation[1] = q.y, s.rotation[2] = q.z, s.rotation[3] = q.w;
+  o.pose = {load3(s.position), q};
+  o.world->changed = true;
+}
+
+namespace {
+
+void check_joint(const RigidSet &set, uint32_t joint, dfm_status status) {
+  if (joint >= set.njoint) fail(DFM_E_ARG, "there is no joint %u; the set of rigid body '%s' has %u", joint, set.defs[0].name, set.njoint);
+  if (status != DFM_OK) fail(DFM_E_ARG, "joint %u of the set of rigid body '%s' is neither hinge nor slider", joint, set.defs[0].name);
+}
+
+}  // namespace
+
+void set_rigid_motor(RigidSet &set, uint32_t joint, double velocity, double max) {
+  if (!set.host.set_motor) fail(DFM_E_UNSUPPORTED, "rigid host '%s' has no motors", set.host_name.c_str());
+  if (!std::isfinite(velocity) || !(max >= 0 && std::isfinite(max)))
+    fail(DFM_E_ARG, "motor of joint %u: velocity %g and max %g must be finite, max not negative", joint, velocity, max);
+  check_joint(set, joint, DFM_OK);
+  check_joint(set, joint, set.host.set_motor(set.self, joint, velocity, max, set.extra.data()));
+}
+
+void rigid_joint(RigidSet &set, uint32_t joint, double *position, double *rate, double *effort) {
+  if (!set.host.joint) fail(DFM_E_UNSUPPORTED, "rigid host '%s' says nothing about its joints", set.host_name.c_str());
+  check_joint(set, joint, DFM_OK);
+  double p, r, e;
+  check_joint(set, joint, set.host.joint(set.self, set.state.data(), set.extra.data(), joint, &p, &r, &e));
+  if (position) *position = p;
+  if (rate) *rate = r;
+  if (effort) *effort = e;
+}
+
+}  // namespace dfm

@@ -1,0 +1,53 @@
+// Rigid bodies in a world: sets of bodies that one host answers for. To detection, filters and reports each body is an obstacle; the solve takes
+// its response from the host, so that it feels what it pushes. The states are the world's (snapshot, hash), the host only maps one to the next.
+#pragma once
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "core/memory.h"
+#include "deform/rigid.h"
+#include "math/vec3.h"
+#include "rigid/host.h"
+
+namespace dfm {
+
+struct World;
+struct Obstacle;
+
+struct RigidSet {
+  World *world;
+  std::string host_name;
+  dfm_rigid_host host;
+  void *self = nullptr;
+  std::vector<dfm_rigid_def> defs;             // names: those of the obstacles
+  std::vector<uint64_t> obstacle;              // [n] ids
+  uint32_t njoint = 0, ngroup = 0, first_group = 0;   // first_group: of this set among the world's
+  std::vector<uint32_t> group, place;          // [n] within the set; its number within the group
+  dfm_rigid_step step{};                       // this sub-step's
+
+  Array<dfm_rigid_state> state, next;          // [n] now; at the end of the sub-step
+  Array<double> extra, next_extra;             // the host's
+  Array<double> velocity, impulse;             // [n,6] mean velocity without contact; contact impulse of the last sub-step
+  Array<double> total;                         // [n,3] N s of contact since creation
+  double last_h = 0;                           // s, of the last sub-step; 0: none yet
+
+  RigidSet(World &w, const std::string &host);
+  ~RigidSet();
+  RigidSet(const RigidSet &) = delete;
+  RigidSet &operator=(const RigidSet &) = delete;
+};
+
+// Throws Error and leaves the world as it was. out: [nbody] handles.
+void create_rigids(World &w, const char *host, const dfm_rigid_set_def &def, uint64_t *out);
+void destroy_rigids(RigidSet &set);
+Obstacle &rigid_obstacle(World &w, uint64_t id);
+void place_rigids(World &w);                   // World::prepare(): slots and groups
+void rigid_response(World &w, uint32_t group, double *matrix);
+dfm_body_measure measure_rigid(const RigidSet &set, uint32_t body);
+void set_rigid_state(Obstacle &o, const dfm_rigid_state &state);
+void set_rigid_motor(RigidSet &set, uint32_t joint, double velocity, double max);
+void rigid_joint(RigidSet &set, uint32_t joint, double *position, double *rate, double *effort);
+
+}  // namespace dfm

@@ -1,0 +1,151 @@
+// A set of rigid bodies comes into a world: defs are checked, the host gets them, each becomes an obstacle too.
+#include <algorithm>
+#include <cmath>
+
+#include "core/error.h"
+#include "world/create.h"
+#include "world/rigid.h"
+#include "world/world.h"
+
+namespace dfm {
+namespace {
+
+bool finite(const double *p, size_t n) { return std::all_of(p, p + n, [](double x) { return std::isfinite(x); }); }
+bool zero(const double *p) { return p[0] == 0 && p[1] == 0 && p[2] == 0; }
+
+// Shape, pose and material are checked where the obstacle is made.
+void check_body(dfm_rigid_def &d, const char *name) {
+  if (d.shape != DFM_SHAPE_SPHERE && d.shape != DFM_SHAPE_BOX && d.shape != DFM_SHAPE_CAPSULE)
+    fail(DFM_E_ARG, "rigid body '%s': shape %u; it can be a sphere, a box or a capsule (what never moves may be an obstacle of any shape)", name, d.shape);
+  if (!finite(d.velocity, 3) || !finite(d.spin, 3)) fail(DFM_E_ARG, "rigid body '%s': velocity and spin must be finite", name);
+  if (d.fixed) {
+    if (!zero(d.velocity) || !zero(d.spin)) fail(DFM_E_ARG, "rigid body '%s' is fixed and has a velocity; drop one (an obstacle's motion is prescribed)", name);
+    d.mass = 0, d.inertia[0] = d.inertia[1] = d.inertia[2] = 0;
+    return;
+  }
+  if (!(d.mass > 0 && std::isfinite(d.mass))) fail(DFM_E_ARG, "rigid body '%s': mass %g kg; it must be positive, or the body fixed", name, d.mass);
+  if (zero(d.inertia)) solid_inertia(d, d.inertia);
+  const double *const i = d.inertia, slack = 1e-9 * (i[0] + i[1] + i[2]);
+  for (int k = 0; k < 3; ++k) {
+    if (!(i[k] > 0 && std::isfinite(i[k]))) fail(DFM_E_ARG, "rigid body '%s': moment of inertia %g kg m2; all three must be positive", name, i[k]);
+    if (i[k] > i[(k + 1) % 3] + i[(k + 2) % 3] + slack)
+      fail(DFM_E_ARG, "rigid body '%s': moments of inertia %g, %g, %g kg m2; no body has one above the sum of the other two", name, i[0], i[1], i[2]);
+  }
+}
+
+void check_joint(const dfm_joint_def &j, uint32_t number, const std::vector<dfm_rigid_def> &bodies) {
+  if (j.size < sizeof(dfm_joint_def)) fail(DFM_E_ARG, "joint %u: size is %u, expected %zu; set it to sizeof", number, j.size, sizeof(dfm_joint_def));
+  if (j.type > DFM_JOINT_FIXED) fail(DFM_E_ARG, "joint %u: type %u is unknown; use DFM_JOINT_HINGE, SLIDER, BALL or FIXED", number, j.type);
+  const uint32_t n = static_cast<uint32_t>(bodies.size());
+  if (j.body >= n || (j.with >= n && j.with != DFM_RIGID_WORLD))
+    fail(DFM_E_ARG, "joint %u names body %u; the set has %u", number, j.body >= n ? j.body : j.with, n);
+  const char *const name = bodies[j.body].name;
+  if (j.body == j.with) fail(DFM_E_ARG, "joint %u ties rigid body '%s' to itself", number, name);
+  if (bodies[j.body].fixed && (j.with == DFM_RIGID_WORLD || bodies[j.with].fixed))
+    fail(DFM_E_ARG, "joint %u of rigid body '%s' ties two things that never move", number, name);
+  if (!finite(j.anchor, 3) || !finite(j.axis, 3)) fail(DFM_E_ARG, "joint %u of rigid body '%s': anchor and axis must be finite", number, name);
+  const bool drives = j.type == DFM_JOINT_HINGE || j.type == DFM_JOINT_SLIDER;
+  if (drives && zero(j.axis)) fail(DFM_E_ARG, "joint %u of rigid body '%s': its axis is zero", number, name);
+  if (!j.motor) return;
+  if (!drives) fail(DFM_E_ARG, "joint %u of rigid body '%s': only hinges and sliders have motors", number, name);
+  if (!std::isfinite(j.velocity) || !(j.max >= 0 && std::isfinite(j.max)))
+    fail(DFM_E_ARG, "joint %u of rigid body '%s': motor velocity %g and max %g must be finite, max not negative", number, name, j.velocity, j.max);
+}
+
+Obstacle &make_obstacle(World &w, const dfm_rigid_def &d) {
+  dfm_obstacle_def o{};
+  o.size = sizeof o, o.shape = d.shape, o.name = d.name, o.pose = d.pose;
+  std::copy(d.half_size, d.half_size + 3, o.half_size);
+  o.radius = d.radius, o.half_length = d.half_length, o.material = d.material;
+  o.category = d.category, o.collides_with = d.collides_with, o.user = d.user;
+  return create_obstacle(w, o);
+}
+
+void ask_host(RigidSet &set, const std::vector<dfm_joint_def> &joints) {
+  const uint32_t n = static_cast<uint32_t>(set.defs.size());
+  set.group.assign(n, DFM_RIGID_STILL);
+  const dfm_rigid_set_def def = {sizeof def, n, set.njoint, 0, set.defs.data(), joints.data()};
+  uint32_t nextra = 0;
+  const char *const host = set.host_name.c_str();
+  if (set.host.create(set.host.user, &def, &set.self, set.group.data(), &nextra) != DFM_OK)
+    fail(DFM_E_FATAL, "rigid host '%s' refuses this set of %u bodies and %u joints", host, n, set.njoint);
+  std::vector<uint32_t> members;
+  for (const uint32_t g : set.group) {
+    if (g == DFM_RIGID_STILL) {
+      set.place.push_back(0);
+      continue;
+    }
+    if (g >= n) fail(DFM_E_FATAL, "rigid host '%s' names group %u; groups are numbered from 0 to at most %u", host, g, n - 1);
+    if (g >= members.size()) members.resize(g + 1);
+    set.place.push_back(members[g]++);
+  }
+  set.ngroup = static_cast<uint32_t>(members.size());
+  if (std::find(members.begin(), members.end(), 0u) != members.end()) fail(DFM_E_FATAL, "rigid host '%s' leaves out a group number", host);
+  set.extra.assign(nextra, 0.0), set.next_extra.assign(nextra, 0.0);
+  for (uint32_t k = 0; k < set.njoint; ++k)
+    if (joints[k].motor) set_rigid_motor(set, k, joints[k].velocity, joints[k].max);
+}
+
+}  // namespace
+
+RigidSet::RigidSet(World &w, const std::string &name) : world(&w), host_name(name), host(find_host(name)) {
+  const Memory &m = w.memory();
+  use_memory(m, state, next), use_memory(m, extra, next_extra, velocity, impulse, total);
+}
+
+RigidSet::~RigidSet() {
+  if (self) host.destroy(self);
+}
+
+void destroy_rigids(RigidSet &set) {
+  World &w = *set.world;
+  const std::vector<uint64_t> ids = set.obstacle;
+  for (const uint64_t id : ids) destroy_obstacle(rigid_obstacle(w, id));
+  std::erase_if(w.rigid_sets, [&](auto &s) { return s.get() == &set; });
+  w.changed = true;
+}
+
+void create_rigids(World &w, const char *host, const dfm_rigid_set_def &def, uint64_t *out) {
+  if (!def.nbody || !def.bodies) fail(DFM_E_ARG, "a set of rigid bodies needs at least one body");
+  if (def.njoint && !def.joints) fail(DFM_E_ARG, "%u joints are announced, but joints is NULL", def.njoint);
+  auto owned = std::make_unique<RigidSet>(w, host ? host : "builtin");
+  RigidSet &set = *owned;
+  std::vector<std::string> names;
+  for (uint32_t i = 0; i < def.nbody; ++i) {
+    dfm_rigid_def d = def.bodies[i];
+    if (d.size < sizeof d) fail(DFM_E_ARG, "rigid body %u: size is %u, expected %zu; start from dfm_rigid_def_default()", i, d.size, sizeof d);
+    names.push_back(d.name ? d.name : "rigid" + std::to_string(w.next_id + i));
+    check_body(d, names.back().c_str());
+    const Quat q = unit_quat(d.pose.rotation);
+    d.pose.rotation[0] = q.x, d.pose.rotation[1] = q.y, d.pose.rotation[2] = q.z, d.pose.rotation[3] = q.w;
+    set.defs.push_back(d);
+  }
+  for (uint32_t i = 0; i < def.nbody; ++i) set.defs[i].name = names[i].c_str();
+  const std::vector<dfm_joint_def> joints(def.joints, def.joints + def.njoint);
+  set.njoint = def.njoint;
+  for (uint32_t k = 0; k < set.njoint; ++k) check_joint(joints[k], k, set.defs);
+  ask_host(set, joints);
+
+  const size_t n = set.defs.size();
+  set.state.resize(n), set.next.resize(n), set.velocity.assign(6 * n, 0.0), set.impulse.assign(6 * n, 0.0), set.total.assign(3 * n, 0.0);
+  w.rigid_sets.reserve(w.rigid_sets.size() + 1);
+  std::vector<uint64_t> handles;
+  try {
+    for (uint32_t i = 0; i < n; ++i) {
+      dfm_rigid_def &d = set.defs[i];
+      Obstacle &o = make_obstacle(w, d);
+      set.obstacle.push_back(o.id), handles.push_back(o.handle);
+      o.rigid = &set, o.rigid_body = i, d.name = o.name.c_str();
+      dfm_rigid_state &s = set.state[i];
+      std::copy(d.pose.position, d.pose.position + 3, s.position), std::copy(d.pose.rotation, d.pose.rotation + 4, s.rotation);
+      std::copy(d.velocity, d.velocity + 3, s.velocity), std::copy(d.spin, d.spin + 3, s.spin);
+    }
+  } catch (...) {
+    for (const uint64_t id : set.obstacle) destroy_obstacle(rigid_obstacle(w, id));
+    throw;
+  }
+  std::copy(handles.begin(), handles.end(), out);
+  w.rigid_sets.push_back(std::move(owned));
+}
+
+}  // namespace dfm
