@@ -43,6 +43,7 @@ class Outputs {
  private:
   FileNodes file_nodes(size_t body) const;
   std::vector<double> node_positions(const BodyView &body, const FileNodes &nodes) const;
+  void write_body(double t, const std::string &name, const dfm_body_measure &m, size_t b);
   void write_bodies(double t);
   void write_contacts(double t);
   void write_probes(double t);

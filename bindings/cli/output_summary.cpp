@@ -44,6 +44,13 @@ dfm_body_measure body_measure(const BodyView &body) {
   return m;
 }
 
+dfm_body_measure rigid_measure(const RigidView &rigid) {
+  dfm_body_measure m = {};
+  m.size = sizeof m;
+  need(dfm_rigid_get_measure(rigid.handle, &m));
+  return m;
+}
+
 void Checker::check(bool start_state) {
   ++checks_.states;
   surfaces_.clear();
@@ -60,6 +67,10 @@ void Checker::check(bool start_state) {
     for (double x : positions_[b]) reach = std::max(reach, std::fabs(x));
     checks_.inverted_max = std::max(checks_.inverted_max, body_measure(body).inverted);
     surfaces_.push_back({positions_[b].data(), n, body.triangles.data(), uint32_t(body.triangles.size() / 3)});
+  }
+  for (const RigidView &rigid : scene_.rigids()) {
+    const dfm_body_measure m = rigid_measure(rigid);
+    for (int k = 0; k < 3; ++k) finite = finite && std::isfinite(m.com[k]) && std::isfinite(m.momentum[k]) && std::isfinite(m.angular[k]);
   }
   checks_.finite = checks_.finite && finite;
   if (!finite) return;
@@ -108,17 +119,18 @@ std::string plugins_json(const SceneFile &scene) {
   return json_array(rows);
 }
 
+std::string body_json(const dfm_body_measure &m, uint64_t dofs, uint32_t cells) {
+  JsonObject row;
+  row.add("com", json_vector(m.com)).add("velocity", json_vector(m.velocity));
+  row.add("kinetic_J", number(m.kinetic)).add("elastic_J", number(m.elastic));
+  row.add("volume_ratio", number(m.volume / m.rest_volume)).add("speed_max", number(m.speed_max));
+  return row.add("dofs", std::to_string(dofs)).add("cells", std::to_string(cells)).text();
+}
+
 std::string bodies_json(const SceneFile &scene) {
   JsonObject out;
-  for (const BodyView &body : scene.bodies()) {
-    const dfm_body_measure m = body_measure(body);
-    JsonObject row;
-    row.add("com", json_vector(m.com)).add("velocity", json_vector(m.velocity));
-    row.add("kinetic_J", number(m.kinetic)).add("elastic_J", number(m.elastic));
-    row.add("volume_ratio", number(m.volume / m.rest_volume)).add("speed_max", number(m.speed_max));
-    row.add("dofs", std::to_string(3 * uint64_t(body.npoint))).add("cells", std::to_string(body.ntet));
-    out.add(body.name, row.text());
-  }
+  for (const BodyView &body : scene.bodies()) out.add(body.name, body_json(body_measure(body), 3 * uint64_t(body.npoint), body.ntet));
+  for (const RigidView &rigid : scene.rigids()) out.add(rigid.name, body_json(rigid_measure(rigid), 6, 0));
   return out.text();
 }
 

@@ -46,6 +46,10 @@ SceneFile::SceneFile(const Globals &globals, const std::string &path, const std:
     obstacle.name = names_[handle] = obstacle.def.name ? obstacle.def.name : "";
     obstacles_.push_back(obstacle);
   }
+  need(dfm_world_rigids(world_, 0, nullptr, &n));
+  std::vector<dfm_rigid> rigids(n);
+  if (n > 0) need(dfm_world_rigids(world_, n, rigids.data(), &n));
+  for (const dfm_rigid handle : rigids) rigids_.push_back({handle, names_[handle]});
 }
 
 const std::string &SceneFile::name_of(uint64_t handle) const {

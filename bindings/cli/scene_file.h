@@ -23,6 +23,12 @@ struct ObstacleView {
   dfm_obstacle_def def = {};
 };
 
+// A rigid body; it is drawn as the obstacle that it is too.
+struct RigidView {
+  dfm_rigid handle = 0;
+  std::string name;
+};
+
 class SceneFile {
  public:
   SceneFile(const Globals &globals, const std::string &path, const std::vector<std::string> &set, uint64_t jitter_seed);
@@ -34,6 +40,7 @@ class SceneFile {
   const dfm_scene_settings &settings() const { return settings_; }
   const std::vector<BodyView> &bodies() const { return bodies_; }
   const std::vector<ObstacleView> &obstacles() const { return obstacles_; }
+  const std::vector<RigidView> &rigids() const { return rigids_; }
   const std::string &name_of(uint64_t handle) const;  // of a body or an obstacle
   std::string value(const std::string &pointer) const;  // JSON text; "" where nothing is
   std::string explain() const;
@@ -46,6 +53,7 @@ class SceneFile {
   dfm_scene_settings settings_ = {};
   std::vector<BodyView> bodies_;
   std::vector<ObstacleView> obstacles_;
+  std::vector<RigidView> rigids_;
   std::map<uint64_t, std::string> names_;
 };
 

@@ -3,56 +3,18 @@
 
 #include <functional>
 
-#include "support/world.h"
+#include "rigid.h"
 
 namespace {
 
-using Vec = std::array<double, 3>;
-
-double dot(Vec a, Vec b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
-double norm(Vec a) { return std::sqrt(dot(a, a)); }
-Vec vec(const double *p) { return {p[0], p[1], p[2]}; }
-
-dfm_rigid_def box(const char *name, Vec half, double mass, Vec position = {}) {
-  dfm_rigid_def d = dfm_rigid_def_default();
-  d.name = name, d.shape = DFM_SHAPE_BOX, d.mass = mass;
-  for (int k = 0; k < 3; ++k) d.half_size[k] = half[size_t(k)], d.pose.position[k] = position[size_t(k)];
-  return d;
-}
-
-dfm_joint_def joint(uint32_t type, uint32_t body, uint32_t with, Vec anchor, Vec axis = {0, 0, 1}) {
-  dfm_joint_def j{};
-  j.size = sizeof j, j.type = type, j.body = body, j.with = with;
-  for (int k = 0; k < 3; ++k) j.anchor[k] = anchor[size_t(k)], j.axis[k] = axis[size_t(k)];
-  return j;
-}
-
-std::vector<dfm_rigid> create(dfm_world w, const std::vector<dfm_rigid_def> &bodies, const std::vector<dfm_joint_def> &joints = {}) {
-  std::vector<dfm_rigid> out(bodies.size());
-  const dfm_rigid_set_def set = {sizeof set, uint32_t(bodies.size()), uint32_t(joints.size()), 0, bodies.data(), joints.data()};
-  test::ok(dfm_rigid_create(w, nullptr, &set, out.data()));
-  return out;
-}
-
-dfm_rigid_state state(dfm_rigid r) {
-  dfm_rigid_state s{};
-  test::ok(dfm_rigid_get_state(r, &s));
-  return s;
-}
-
-dfm_body_measure measure(dfm_rigid r) {
-  dfm_body_measure m{};
-  m.size = sizeof m;
-  test::ok(dfm_rigid_get_measure(r, &m));
-  return m;
-}
+using namespace test;
 
 // Seconds between the first and the last rise of x through 0, per rise. Linear between steps.
 double period(dfm_world w, double duration, double h, const std::function<double()> &x) {
   double before = x(), first = -1, last = 0;
   int rises = -1;
   for (double t = 0; t < duration; t += h) {
-    test::run(w, h, h);
+    run(w, h, h);
     const double now = x();
     if (before < 0 && now >= 0) {
       last = t + h * (-before / (now - before));
@@ -71,7 +33,7 @@ TEST(Rigid, FreeFall_IsThatOfSymplecticEuler) {
   test::Context c;
   const dfm_world w = test::make_world(c);
   const dfm_rigid r = create(w, {box("box", {0.1, 0.2, 0.3}, 2)})[0];
-  test::run(w, 1, 1e-3);
+  run(w, 1, 1e-3);
   EXPECT_NEAR(state(r).position[2], -9.81 / 2 * (1 + 1e-3), 1e-12);
   EXPECT_NEAR(state(r).velocity[2], -9.81, 1e-12);
 }
@@ -84,7 +46,7 @@ TEST(Rigid, SpinningBall_ReturnsAfterTenTurns) {
   const double pi = 3.14159265358979323846;
   d.spin[0] = 2 * pi * 6, d.spin[2] = 2 * pi * 8;   // 10 turns a second
   const dfm_rigid r = create(w, {d})[0];
-  test::run(w, 1, 1e-3);
+  run(w, 1, 1e-3);
   EXPECT_NEAR(std::fabs(state(r).rotation[3]), 1, 1e-13);
   for (int k = 0; k < 3; ++k) EXPECT_NEAR(state(r).rotation[k], 0, 1e-11);
   for (int k = 0; k < 3; ++k) EXPECT_NEAR(state(r).spin[k], d.spin[k], 1e-10);
@@ -99,16 +61,16 @@ TEST(Rigid, TumblingBox_KeepsAngularMomentum) {
     dfm_rigid_def d = box("box", {0.1, 0.25, 0.4}, 1.5);
     d.spin[0] = 0.01, d.spin[1] = 7, d.spin[2] = 0.02;   // about the middle axis: it turns over
     const dfm_rigid r = create(w, {d})[0];
-    const dfm_body_measure start = measure(r);
+    const dfm_body_measure start = rigid_measure(r);
     const double h = fine ? 5e-4 : 1e-3;
     swing[fine] = 0;
     double lowest = 1;
     for (int k = 0; k < 10000; ++k) {
-      test::run(w, h, h);
-      swing[fine] = std::max(swing[fine], std::fabs(measure(r).kinetic / start.kinetic - 1));
+      run(w, h, h);
+      swing[fine] = std::max(swing[fine], std::fabs(rigid_measure(r).kinetic / start.kinetic - 1));
       lowest = std::min(lowest, dot(vec(state(r).spin), {0, 1, 0}) / 7);
     }
-    const dfm_body_measure end = measure(r);
+    const dfm_body_measure end = rigid_measure(r);
     for (int k = 0; k < 3; ++k) EXPECT_NEAR(end.angular[k], start.angular[k], 1e-10 * norm(vec(start.angular)));
     EXPECT_NEAR(end.kinetic, start.kinetic, 1e-4 * start.kinetic);
   }
@@ -158,7 +120,7 @@ TEST(Rigid, SlantedSlider_FallsAlongItsAxis) {
   test::Context c;
   const dfm_world w = test::make_world(c);
   const dfm_rigid r = create(w, {box("sled", {0.1, 0.1, 0.1}, 2)}, {joint(DFM_JOINT_SLIDER, 0, DFM_RIGID_WORLD, {0.3, 0, 0}, {3, 0, -4})})[0];
-  test::run(w, 1, 1e-3);
+  run(w, 1, 1e-3);
   const double path = 0.8 * 9.81 / 2 * (1 + 1e-3);
   EXPECT_NEAR(state(r).position[0], 0.6 * path, 1e-9);
   EXPECT_NEAR(state(r).position[1], 0, 1e-12);
@@ -177,13 +139,13 @@ TEST(Rigid, SliderMotor_DoesAtMostItsForce) {
   dfm_joint_def j = joint(DFM_JOINT_SLIDER, 0, DFM_RIGID_WORLD, {}, {0, 0, 1});
   j.motor = 1, j.velocity = 0.5, j.max = 15;
   const dfm_rigid r = create(w, {box("lift", {0.1, 0.1, 0.1}, 2)}, {j})[0];
-  test::run(w, 0.5, 1e-3);
+  run(w, 0.5, 1e-3);
   double rate = 0, effort = 0;
   test::ok(dfm_rigid_joint(r, 0, nullptr, &rate, &effort));
   EXPECT_NEAR(rate, (15 - 2 * 9.81) / 2 * 0.5, 1e-9);
   EXPECT_NEAR(effort, 15, 1e-12);
   test::ok(dfm_rigid_set_motor(r, 0, 0.5, 60));
-  test::run(w, 0.5, 1e-3);
+  run(w, 0.5, 1e-3);
   test::ok(dfm_rigid_joint(r, 0, nullptr, &rate, &effort));
   EXPECT_NEAR(rate, 0.5, 1e-12);
   EXPECT_NEAR(effort, 2 * 9.81, 1e-9);
@@ -196,10 +158,10 @@ TEST(Rigid, HingeMotorBetweenFreeBodies_KeepsMomenta) {
   dfm_joint_def j = joint(DFM_JOINT_HINGE, 1, 0, {0.2, 0, 0}, {0, 0, 1});
   j.motor = 1, j.velocity = 1e9, j.max = 0.02;
   const auto r = create(w, {box("a", {0.2, 0.1, 0.1}, 1), box("b", {0.2, 0.1, 0.05}, 3, {0.4, 0, 0})}, {j});
-  test::run(w, 1, 1e-3);
+  run(w, 1, 1e-3);
   double momentum[3] = {}, angular[3] = {};
   for (const dfm_rigid body : r) {
-    const dfm_body_measure m = measure(body);
+    const dfm_body_measure m = rigid_measure(body);
     for (int k = 0; k < 3; ++k) {
       momentum[k] += m.momentum[k];
       angular[k] += m.angular[k] + m.com[(k + 1) % 3] * m.momentum[(k + 2) % 3] - m.com[(k + 2) % 3] * m.momentum[(k + 1) % 3];
@@ -221,7 +183,7 @@ TEST(Rigid, FixedJoint_MovesAsOneBody) {
     s.spin[2] = 3, s.velocity[1] = (side ? 1 : -1) * 0.9;
     test::ok(dfm_rigid_set_state(r[size_t(side)], &s));
   }
-  test::run(w, 1, 1e-3);
+  run(w, 1, 1e-3);
   const dfm_rigid_state a = state(r[0]), b = state(r[1]);
   EXPECT_NEAR(norm({b.position[0] - a.position[0], b.position[1] - a.position[1], b.position[2] - a.position[2]}), 0.6, 1e-9);
   for (int k = 0; k < 4; ++k) EXPECT_NEAR(a.rotation[k], b.rotation[k], 1e-9);
@@ -244,7 +206,7 @@ TEST(Rigid, ClosedLoop_Holds) {
     if (body != r[2]) s.spin[1] = -1;
     test::ok(dfm_rigid_set_state(body, &s));
   }
-  test::run(w, 2, 1e-3);
+  run(w, 2, 1e-3);
   const dfm_rigid_state bar = state(r[2]), left = state(r[0]);
   EXPECT_NEAR(bar.rotation[1], 0, 1e-9);   // stays level
   EXPECT_NEAR(bar.position[0] - 0.5, 2 * left.position[0], 1e-9);
