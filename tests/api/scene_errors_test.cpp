@@ -140,7 +140,7 @@ TEST(SceneErrors, Names_AreUniqueAndKnown) {
 
 TEST(SceneErrors, NotDelivered_IsNeverIgnored) {
   const std::vector<std::pair<const char *, const char *>> later = {
-      {"/rigid={\"host\":\"bullet\",\"bodies\":[]}", "/rigid"},
+      {"/rigid={\"bodies\":[{\"name\":\"r\",\"shape\":\"mesh\"}]}", "/rigid/bodies/0/shape"},
       {"/solver={\"type\":\"ldlt\"}", "/solver"},
       {"/time/mode=\"static\"", "/time/mode"},
       {"/time/integrator=\"verlet\"", "/time/integrator"},

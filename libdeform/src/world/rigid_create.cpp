@@ -26,11 +26,11 @@ void check_body(dfm_rigid_def &d, const char *name) {
   if (!(d.mass > 0 && std::isfinite(d.mass))) fail(DFM_E_ARG, "rigid body '%s': mass %g kg; it must be positive, or the body fixed", name, d.mass);
   if (zero(d.inertia)) solid_inertia(d, d.inertia);
   const double *const i = d.inertia, slack = 1e-9 * (i[0] + i[1] + i[2]);
-  for (int k = 0; k < 3; ++k) {
+  for (int k = 0; k < 3; ++k)
     if (!(i[k] > 0 && std::isfinite(i[k]))) fail(DFM_E_ARG, "rigid body '%s': moment of inertia %g kg m2; all three must be positive", name, i[k]);
+  for (int k = 0; k < 3; ++k)
     if (i[k] > i[(k + 1) % 3] + i[(k + 2) % 3] + slack)
       fail(DFM_E_ARG, "rigid body '%s': moments of inertia %g, %g, %g kg m2; no body has one above the sum of the other two", name, i[0], i[1], i[2]);
-  }
 }
 
 void check_joint(const dfm_joint_def &j, uint32_t number, const std::vector<dfm_rigid_def> &bodies) {
