@@ -56,3 +56,11 @@ TEST(CProgram, Surface_JoinsAndTurnsALooseCube) {
                    "8 points, 12 triangles, closed, 0.001 m3\n"
                    "read again: 8 points, closed, nothing to repair: yes\n");
 }
+
+TEST(CProgram, RigidHost_IsCarriedByTheBall) {
+  const test::CommandResult r = example("04_rigid_host");
+  ASSERT_EQ(r.exit_code, 0) << r.out << r.err;
+  const size_t at = r.out.find("carried with ");
+  ASSERT_NE(at, std::string::npos) << r.out;
+  EXPECT_NEAR(std::strtod(r.out.c_str() + at + 13, nullptr), 2 * 9.81, 0.02 * 2 * 9.81);
+}

@@ -29,6 +29,12 @@ std::string cost(const World &w, StageId id) {
     case StageId::model: return format("%zu cells", cells);
     case StageId::predict:
     case StageId::commit: return format("%zu points", points);
+    case StageId::rigid_predict:
+    case StageId::rigid_commit: {
+      size_t n = 0;
+      for (auto &set : w.rigid_sets) n += set->defs.size();
+      return format("%zu states", n);
+    }
     case StageId::gather: return format("%zu weights", weights);
     case StageId::broad: return format("%zu surfels every sub-step; %zu triangles whenever a skin is used up", surfels, triangles);
     case StageId::narrow: return "candidate pairs";
