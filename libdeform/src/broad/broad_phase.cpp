@@ -269,7 +269,7 @@ void BroadPhase::list_voxels(uint32_t i, uint32_t o) {
   const Body &a = bodies_[i];
   const ObstacleShape shape(things_[o].view);
   const Features fa{*a.surface, a.x.data()};
-  const double near = kRounding * (a.margin + things_[o].margin + recovery_depth(*a.surface));
+  const double near = kRounding * (a.margin + things_[o].margin);
   Box bounds{{0, 0, 0, 0}, {0, 0, 0, 0}};
   shape.bounds(bounds.lo, bounds.hi);
   vf_.clear();

@@ -10,13 +10,14 @@ namespace dfm::narrow {
 namespace {
 
 constexpr double kLeastDip = 0.1;   // of the rest offset: less is left to the corners
+constexpr double kFarthest = 0.58;  // of the longest edge: no place of a triangle is further from its nearest corner (1 / sqrt(3))
 constexpr double kFinest = 0.25;    // of a cell: the grid tells no more about where the lowest place is
 
-struct Face {
-  const ObstacleShape &shape;
+struct Face {                       // in the grid's frame
+  const VoxelGrid &grid;
   Vec3 x[3];
   double longest;                   // edge
-  Vec3 point(const double w[3]) const { return w[0] * x[0] + w[1] * x[1] + w[2] * x[2]; }
+  VoxelGrid::Value at(const double w[3]) const { return grid.at(w[0] * x[0] + w[1] * x[1] + w[2] * x[2]); }
 };
 
 // Compass search from a corner: steps along the edges' directions, halved where none leads down. Grids have kinks, so no derivative is asked.
@@ -31,7 +32,7 @@ double lowest_place(const Face &face, double finest, double weight[3], double di
           if (from == to || best[from] < step) continue;
           double w[3] = {best[0], best[1], best[2]};
           w[from] -= step, w[to] += step;                         // sums of powers of two: exact
-          const double d = face.shape.closest(face.point(w)).distance;
+          const double d = face.at(w).distance;
           if (d < lowest) lowest = d, std::copy(w, w + 3, next), moved = true;
         }
       std::copy(next, next + 3, best);
@@ -55,29 +56,30 @@ void voxel_triangle(const Pair &pair, Run run, Array<ContactPoint> &out) {
   const ObstacleShape &shape = *pair.shape;
   const ObstacleView &view = shape.view();
   const double dip = kLeastDip * pair.offset, finest = kFinest * view.grid->cell();
+  const double widest = contact_reach(pair.h, pair.offset, largest_speed(*pair.a.surface) + norm(view.velocity) + norm(view.spin) * view.extent);
   for (const Candidate &candidate : run) {
     const std::span<const uint32_t> corner(&pair.a.surface->tri[3 * size_t{candidate.feature_a}], 3);
-    const Face face{shape, {pair.xa(corner[0]), pair.xa(corner[1]), pair.xa(corner[2])},
-                    std::sqrt(std::max({norm2(pair.xa(corner[0]) - pair.xa(corner[1])), norm2(pair.xa(corner[1]) - pair.xa(corner[2])),
-                                        norm2(pair.xa(corner[2]) - pair.xa(corner[0]))}))};
+    const Vec3 x[3] = {pair.xa(corner[0]), pair.xa(corner[1]), pair.xa(corner[2])};
+    const double longest = std::sqrt(std::max({norm2(x[0] - x[1]), norm2(x[1] - x[2]), norm2(x[2] - x[0])}));
+    const Face face{*view.grid, {shape.local(x[0]), shape.local(x[1]), shape.local(x[2])}, longest};
     int low = 0;
-    ObstaclePoint at[3];
+    VoxelGrid::Value at[3];
     for (int k = 0; k < 3; ++k) {
-      at[k] = shape.closest(face.x[k]);
+      at[k] = face.grid.at(face.x[k]);
       if (at[k].distance < at[low].distance) low = k;
     }
-    const double reach = reach_of(pair, corner, at[low].point);
-    if (at[low].distance - face.longest > reach) continue;
+    if (at[low].distance - kFarthest * longest - 0.25 * face.grid.cell() > widest) continue;
     // Linear from the corner on, the distance would fall by so much within the face.
     double fall = 0;
-    for (int k = 0; k < 3; ++k) fall = std::min(fall, dot(at[low].normal, face.x[k] - face.x[low]));
+    for (int k = 0; k < 3; ++k) fall = std::min(fall, dot(at[low].gradient, face.x[k] - face.x[low]));
     if (fall > -dip) continue;
     double w[3] = {0, 0, 0};
     w[low] = 1;
     const double distance = lowest_place(face, finest, w, at[low].distance);
-    if (!(distance < reach) || !(distance < at[low].distance - dip) || !owned(*pair.a.surface, candidate.feature_a, w)) continue;
-    const Vec3 q = face.point(w);
+    if (!(distance < at[low].distance - dip) || !owned(*pair.a.surface, candidate.feature_a, w)) continue;
+    const Vec3 q = w[0] * x[0] + w[1] * x[1] + w[2] * x[2];
     const ObstaclePoint o = shape.closest(q);
+    if (!(o.distance < reach_of(pair, corner, o.point))) continue;
     ContactPoint c = blank(pair, kPrimitive, 2, candidate.feature_a, o.face);
     for (int k = 0; k < 3; ++k) add_node(c, pair.a.first_node + corner[k], w[k]);
     finish(pair, c, q, o.point, o.normal, o.distance, o.face, out);

@@ -28,6 +28,7 @@ class ObstacleShape {
   Vec3 face_normal(uint32_t i) const { return i & 1 ? axis_[i >> 1] : -axis_[i >> 1]; }
 
   ObstaclePoint closest(Vec3 p) const;               // not of a mesh
+  Vec3 local(Vec3 p) const { return rotate_back(view_.rotation, p - view_.position); }
   // Voxels: may p, or a place near it, be nearer than `limit`? (VoxelGrid::near)
   bool voxels_near(Vec3 p, double limit) const;
   // Velocity with which the shape at q moves, without the belt and without a round shape's spin about itself, which moves no surface.
@@ -40,7 +41,6 @@ class ObstacleShape {
  private:
   ObstaclePoint closest_on_box(Vec3 p) const;
   ObstaclePoint closest_on_voxels(Vec3 p) const;
-  Vec3 local(Vec3 p) const { return rotate_back(view_.rotation, p - view_.position); }
   ObstacleView view_;
   Vec3 axis_[3], end_[2];
 };

@@ -14,7 +14,7 @@ namespace {
 constexpr double kSqrt3 = 1.7320508075688772;
 
 // Eight corners of a cell, x first, at (u, v, w) in it.
-VoxelGrid::Value join(const double c[8], const double t[3], double size) {
+VoxelGrid::Value join(const double c[8], const double t[3], double per_size) {
   const auto mix = [](double a, double b, double s) { return a + s * (b - a); };
   const double x00 = mix(c[0], c[1], t[0]), x10 = mix(c[2], c[3], t[0]), x01 = mix(c[4], c[5], t[0]), x11 = mix(c[6], c[7], t[0]);
   const double y0 = mix(x00, x10, t[1]), y1 = mix(x01, x11, t[1]);
@@ -22,7 +22,7 @@ VoxelGrid::Value join(const double c[8], const double t[3], double size) {
   g.x = mix(mix(c[1] - c[0], c[3] - c[2], t[1]), mix(c[5] - c[4], c[7] - c[6], t[1]), t[2]);
   g.y = mix(x10 - x00, x11 - x01, t[2]);
   g.z = y1 - y0;
-  return {mix(y0, y1, t[2]), (1 / size) * g};
+  return {mix(y0, y1, t[2]), per_size * g};
 }
 
 // Distances and signs of a surface, for setting up.
@@ -111,7 +111,7 @@ VoxelGrid::VoxelGrid(const Memory &memory, const double *points, uint32_t ntri, 
   }
   cell_ = large;
   const double span = cell_ * kBrick;
-  margin_ = kBand * cell_;
+  margin_ = kBand * cell_, per_cell_ = 1 / cell_;
   for (int k = 0; k < 3; ++k) {
     bricks_[k] = uint32_t(std::ceil((size[k] + 2 * margin_) / span));
     origin_[k] = 0.5 * (low_[k] + high_[k]) - 0.5 * span * bricks_[k];
@@ -172,8 +172,8 @@ double VoxelGrid::extent() const {
 VoxelGrid::Place VoxelGrid::place(Vec3 p) const {
   Place out;
   for (int k = 0; k < 3; ++k) {
-    const double most = double(bricks_[k]) * kBrick, x = (p[k] - origin_[k]) / cell_, y = x > 0 ? std::min(x, most) : 0;   // NaN: 0
-    out.brick[k] = std::min(uint32_t(y / kBrick), bricks_[k] - 1);
+    const double most = double(bricks_[k]) * kBrick, x = (p[k] - origin_[k]) * per_cell_, y = x > 0 ? std::min(x, most) : 0;   // NaN: 0
+    out.brick[k] = std::min(uint32_t(y) / kBrick, bricks_[k] - 1);
     out.in[k] = y - double(out.brick[k]) * kBrick;
     out.inside[k] = x == y ? p[k] : origin_[k] + y * cell_;
   }
@@ -193,11 +193,11 @@ VoxelGrid::Value VoxelGrid::at(Vec3 p) const {
     }
     const float *const v = &value_[size_t{stored} * kNodes] + (first[2] * (kBrick + 1) + first[1]) * (kBrick + 1) + first[0];
     for (uint32_t i = 0; i < 8; ++i) c[i] = double(v[((i >> 2) * (kBrick + 1) + (i >> 1 & 1)) * (kBrick + 1) + (i & 1)]);
-    value = join(c, t, cell_);
+    value = join(c, t, per_cell_);
   } else {
     for (int k = 0; k < 3; ++k) t[k] = w.in[k] / kBrick;
     for (uint32_t i = 0; i < 8; ++i) c[i] = double(coarse_[corner(w.brick[0] + (i & 1), w.brick[1] + (i >> 1 & 1), w.brick[2] + (i >> 2))]);
-    value = join(c, t, cell_ * kBrick);
+    value = join(c, t, per_cell_ / kBrick);
   }
   const Vec3 beyond = p - w.inside;
   if (norm2(beyond) > 0) {   // beside the grid: what is certain
@@ -209,7 +209,7 @@ VoxelGrid::Value VoxelGrid::at(Vec3 p) const {
 
 bool VoxelGrid::near(Vec3 p, double limit) const {
   const bool fine = limit < kBand * cell_ && brick_[index(place(p).brick)] != kNone;
-  return at(p).distance <= kSqrt3 * (fine ? limit : limit + kBrick * cell_);
+  return at(p).distance <= (fine ? std::min(kSqrt3 * limit, limit + kSqrt3 * cell_) : kSqrt3 * (limit + kBrick * cell_));
 }
 
 }  // namespace dfm

@@ -26,7 +26,7 @@ class VoxelGrid {
 
   Value at(Vec3 p) const;
   // False only if no place within `way` of p has a distance below limit - way: what lists are made by. Joined values change by no more than sqrt(3)
-  // of a way, since those at corners change by no more than it; between bricks they are off by at most a brick's diagonal.
+  // of a way, since those at corners change by no more than it; and they are off the true distance by at most half the diagonal of what is joined.
   bool near(Vec3 p, double limit) const;
 
   double cell() const { return cell_; }
@@ -45,7 +45,7 @@ class VoxelGrid {
   void build(const Memory &memory, const double *points, uint32_t ntri, const uint32_t *tris);
 
   Vec3 origin_, low_, high_;
-  double cell_ = 0, margin_ = 0, error_ = 0;   // margin: least distance from the surface's box to the grid's border
+  double cell_ = 0, per_cell_ = 0, margin_ = 0, error_ = 0;   // margin: least distance from the surface's box to the grid's border
   uint32_t bricks_[3];
   Array<uint32_t> brick_;      // [bricks] place in value_ over kNodes, or kNone
   Array<float> value_;         // [.,kNodes] x first
