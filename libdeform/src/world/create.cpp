@@ -143,8 +143,9 @@ void take_triangles(Obstacle &o, const dfm_obstacle_def &def) {
     if (c[0] == c[1] || c[1] == c[2] || c[2] == c[0])
       fail(DFM_E_ARG, "obstacle '%s': triangle %u names a point twice; drop it (dfm_trimesh_create does)", name, t);
   }
-  o.points.assign(def.points, def.points + size_t(3) * def.npoint);
-  o.triangles.assign(def.triangles, def.triangles + size_t(3) * def.ntriangle);
+  const Memory &m = o.world->memory();
+  o.points = Array<double>(def.points, def.points + size_t(3) * def.npoint, HookAllocator<double>(m));
+  o.triangles = Array<uint32_t>(def.triangles, def.triangles + size_t(3) * def.ntriangle, HookAllocator<uint32_t>(m));
   o.def.points = o.points.data(), o.def.triangles = o.triangles.data();
 }
 

@@ -82,8 +82,8 @@ struct Obstacle {
   Pose target;                       // at the end of the next step, where move_to set it
   bool has_target = false;
   bool moves() const { return !keys.empty() || def.sine.amplitude[0] != 0 || def.sine.amplitude[1] != 0 || def.sine.amplitude[2] != 0; }
-  std::vector<double> points;        // mesh, voxels: as given, in its frame
-  std::vector<uint32_t> triangles;
+  Array<double> points;              // mesh, voxels: as given, in its frame
+  Array<uint32_t> triangles;
   std::unique_ptr<ObstacleMesh> mesh;
   std::unique_ptr<VoxelGrid> grid;
   Pose pose_at_time(double t) const;
