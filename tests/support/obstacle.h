@@ -5,7 +5,7 @@
 #include <functional>
 #include <vector>
 
-#include "world.h"
+#include "stack.h"
 
 namespace test {
 
@@ -79,15 +79,6 @@ inline dfm_obstacle add_mesh(dfm_world w, const char *name, const Triangles &m, 
   dfm_obstacle o = 0;
   ok(dfm_obstacle_create(w, &d, &o));
   return o;
-}
-
-inline std::vector<dfm_contact> contacts(dfm_world w) {
-  uint32_t n = 0;
-  ok(dfm_world_contacts(w, 0, nullptr, &n));
-  std::vector<dfm_contact> list(n);
-  for (dfm_contact &c : list) c.size = sizeof c;
-  if (n) ok(dfm_world_contacts(w, n, list.data(), &n));
-  return list;
 }
 
 }  // namespace test
