@@ -145,7 +145,7 @@ double valley(double x) { return x > 0.1 ? 0.3 * (x - 0.1) : 0; }
 }  // namespace
 
 TEST(MeshFloor, ConvexAndConcaveEdge_ArePassed) {
-  for (const bool convex : {true, false}) {
+  for (const auto &[convex, mu] : {std::pair{true, 0.0}, {false, 0.0}, {true, 0.5}, {false, 0.5}}) {   // sliding, rolling
     double (*const height)(double) = convex ? roof : valley;
     // Columns of points on the edge, so that it is where the formula has it.
     test::Triangles m = test::height_field(0.8, 32, flat, 0.2);
@@ -157,8 +157,9 @@ TEST(MeshFloor, ConvexAndConcaveEdge_ArePassed) {
     const dfm_world world = test::make_world(context);
     test::BodyOptions o;
     o.name = "ball", o.young = 2e5, o.damping_stiffness = 1e-3, o.position = {-0.1, 0, 0.0503}, o.velocity = {0.8, 0, 0};
+    if (mu > 0) o.spin = {0, 16, 0};
     const dfm_body ball = test::make_body(context, world, "ball", {0.05, 0, 0}, 400, o);
-    test::set_friction(world, 0);
+    test::set_friction(world, mu);
     test::add_mesh(world, "floor", m);
     const auto energy = [&] {
       const dfm_body_measure k = test::measure(ball);
@@ -177,7 +178,7 @@ TEST(MeshFloor, ConvexAndConcaveEdge_ArePassed) {
     }
     const dfm_body_measure end = test::measure(ball);
     EXPECT_GT(end.com[0], convex ? 0.18 : 0.13) << "past the edge";
-    EXPECT_GT(least, 0) << (convex ? "convex" : "concave");
+    EXPECT_GT(least, 0) << (convex ? "convex" : "concave") << ", mu " << mu;
     EXPECT_LT(gained, 0.01 * 0.5 * end.mass * 0.64) << (convex ? "convex" : "concave");
   }
 }

@@ -8,6 +8,7 @@
 
 #include "../unit/surfel/detect_scene.h"
 #include "mesh/mesh.h"
+#include "mesh/tri_mesh.h"
 #include "support.h"
 #include "surfel/obstacle_mesh.h"
 #include "surfel/voxel_grid.h"
@@ -220,6 +221,31 @@ void voxel_build(benchmark::State &state) {
   for (auto _ : state) benchmark::DoNotOptimize(VoxelGrid(Memory::standard(), ball.x.data(), ball.ntri(), ball.tri.data(), uint32_t(state.range(0))).cell());
 }
 BENCHMARK(voxel_build)->Arg(32768)->Arg(262144)->Iterations(2)->Unit(benchmark::kMillisecond);
+
+// Error of the grid at 100,000 places of the folded basin's surface, where the true distance is zero; time is that of building.
+void voxel_error(benchmark::State &state) {
+  const TriMesh m = read_tri_mesh(Memory::standard(), std::string(DEFORM_SOURCE_DIR) + "/examples/data/basin.obj");
+  const auto corner = [&](uint32_t t, int k) { return load3(&m.points[3 * size_t{m.tris[3 * size_t{t} + size_t(k)]}]); };
+  std::unique_ptr<VoxelGrid> grid;
+  for (auto _ : state) grid = std::make_unique<VoxelGrid>(Memory::standard(), m.points.data(), m.ntri(), m.tris.data(), uint32_t(state.range(0)));
+  std::vector<double> area, errors;
+  for (uint32_t t = 0; t < m.ntri(); ++t) area.push_back(norm(cross(corner(t, 1) - corner(t, 0), corner(t, 2) - corner(t, 0))));
+  std::mt19937 random(1);
+  std::discrete_distribution<uint32_t> pick(area.begin(), area.end());
+  std::uniform_real_distribution<double> u(0, 1);
+  for (int i = 0; i < 100000; ++i) {
+    const uint32_t t = pick(random);
+    const double r = std::sqrt(u(random)), q = u(random);
+    errors.push_back(std::fabs(grid->at((1 - r) * corner(t, 0) + r * (1 - q) * corner(t, 1) + r * q * corner(t, 2)).distance));
+  }
+  std::sort(errors.begin(), errors.end());
+  state.counters["cell_mm"] = 1e3 * grid->cell();
+  state.counters["median_um"] = 1e6 * errors[errors.size() / 2];
+  state.counters["p99_um"] = 1e6 * errors[errors.size() * 99 / 100];
+  state.counters["max_um"] = 1e6 * errors.back();
+  state.counters["MB"] = 1e-6 * double(grid->bytes());
+}
+BENCHMARK(voxel_error)->RangeMultiplier(8)->Range(4096, 2097152)->Iterations(1)->Unit(benchmark::kMillisecond);
 
 }  // namespace
 
