@@ -28,9 +28,9 @@ double obstacle_displacement(const ObstacleView &now, const ObstacleView &then, 
 
 // Shape, size and belt are an obstacle's own; a new one under an old id has other lists.
 bool same_shape(const ObstacleView &a, const ObstacleView &b) {
-  return a.shape == b.shape && a.surface == b.surface && a.grid == b.grid && a.slot == b.slot && a.category == b.category && a.collides_with == b.collides_with && a.radius == b.radius &&
-         a.half_length == b.half_length && a.half_size.x == b.half_size.x && a.half_size.y == b.half_size.y &&
-         a.half_size.z == b.half_size.z;
+  return a.shape == b.shape && a.surface == b.surface && a.grid == b.grid && a.slot == b.slot && a.category == b.category &&
+         a.collides_with == b.collides_with && a.radius == b.radius && a.half_length == b.half_length && a.half_size.x == b.half_size.x &&
+         a.half_size.y == b.half_size.y && a.half_size.z == b.half_size.z;
 }
 
 uint64_t features(uint32_t a, uint32_t b) { return uint64_t{a} << 32 | b; }

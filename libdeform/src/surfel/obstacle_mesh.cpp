@@ -19,8 +19,10 @@ bool is_closed(const Surface &s) {
 
 void keep_first_features(Surface &s) {
   Array<uint8_t> edge_first(size_t{s.nedge}, 0, s.tri.get_allocator()), first(size_t{s.nsurfel}, 0, s.tri.get_allocator());
+  Array<uint32_t> sides(size_t{s.nedge}, 0u, s.tri.get_allocator());
+  for (const uint32_t e : s.tri_edge) ++sides[e];
   for (uint32_t e = 0; e < s.nedge; ++e) {
-    if (!edge_convex(s, e)) continue;
+    if (sides[e] <= 2 && !edge_convex(s, e)) continue;   // of more than two sides, two say nothing about the others
     edge_first[e] = first[s.edge[2 * size_t{e}]] = first[s.edge[2 * size_t{e} + 1]] = 1;
   }
   for (uint32_t t = 0; t < s.ntri; ++t)
