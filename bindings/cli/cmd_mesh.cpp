@@ -1,151 +1,153 @@
-// deform mesh info FILE | make cylinder, beam or ball --out FILE | convert IN OUT | fill
-#include <cstdio>
-#include <memory>
-#include <string>
-#include <vector>
+// deform mesh info FILE | make SHAPE --out FILE | convert IN OUT | fill SURFACE
+#include "cmd_mesh.h"
 
-#include "cli.h"
-#include "json_text.h"
+#include <algorithm>
+#include <cctype>
+#include <memory>
 
 namespace cli {
+
+MeshSession::MeshSession(const Globals &globals) {
+  dfm_context_def def = dfm_context_def_default();
+  def.threads = globals.threads;
+  def.log = [](void *, int32_t, const char *) {};
+  if (dfm_context_create(&def, &context) < 0) context = nullptr;
+}
+
+std::string mesh_ending(const std::string &path) {
+  const size_t slash = path.find_last_of('/'), dot = path.find_last_of('.');
+  if (dot == std::string::npos || (slash != std::string::npos && dot < slash)) return "";
+  std::string ending = path.substr(dot + 1);
+  for (char &c : ending) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
+  return ending;
+}
+
+Writes written_by(const std::string &path) {
+  const std::string ending = mesh_ending(path);
+  for (const char *e : {"msh", "msh2", "mesh"})
+    if (ending == e) return Writes::cells;
+  for (const char *e : {"obj", "ply", "stl", "off"})
+    if (ending == e) return Writes::surface;
+  return Writes::either;
+}
+
 namespace {
 
-// Warnings of the reader belong to the report of this command, so its context logs nothing by itself.
-struct Session {
-  dfm_context *context = nullptr;
-  dfm_tetmesh mesh = 0;
-  explicit Session(const Globals &globals) {
-    dfm_context_def def = dfm_context_def_default();
-    def.threads = globals.threads;
-    def.log = [](void *, int32_t, const char *) {};
-    if (dfm_context_create(&def, &context) < 0) context = nullptr;
-  }
-  ~Session() { dfm_context_destroy(context); }
-  Session(const Session &) = delete;
-  Session &operator=(const Session &) = delete;
-};
+constexpr const char *kIn = "mesh of any format that is read: .msh .vtk .vtu .mesh .obj .ply .stl .off";
 
-struct Defect { const char *key; uint32_t count; };
-
-std::vector<Defect> defects(const dfm_tetmesh_info &i) {
-  return {{"turned", i.turned}, {"dropped_points", i.dropped_points}, {"dropped_cells", i.dropped_cells}, {"flat_cells", i.flat_cells},
-          {"duplicate_points", i.duplicate_points}, {"nonmanifold_edges", i.nonmanifold_edges}, {"overlapping_faces", i.overlapping_faces}};
-}
-
-std::vector<std::string> lines(const char *text) {
-  std::vector<std::string> out;
-  for (const char *c = text; *c;) {
-    const char *end = c;
-    while (*end && *end != '\n') ++end;
-    out.emplace_back(c, end);
-    c = *end ? end + 1 : end;
-  }
-  return out;
-}
-
-struct Group { std::string name; uint32_t dimension = 0, points = 0; };
-
-std::vector<Group> groups(dfm_tetmesh mesh, const dfm_tetmesh_info &info) {
-  const char *const *names = nullptr;
-  dfm_tetmesh_groups(mesh, &names, nullptr);
-  std::vector<Group> out(info.ngroup);
-  for (uint32_t k = 0; k < info.ngroup; ++k) {
-    out[k].name = names[k];
-    dfm_tetmesh_group_points(mesh, k, &out[k].dimension, nullptr, &out[k].points);
-  }
-  return out;
-}
-
-void print_json(const std::string &file, dfm_tetmesh mesh, const dfm_tetmesh_info &i) {
-  const auto whole = [](uint64_t n) { return std::to_string(n); };
-  std::vector<std::string> histogram, names, warnings;
-  for (const uint32_t n : i.quality_histogram) histogram.push_back(whole(n));
-  for (const Group &g : groups(mesh, i))
-    names.push_back(JsonObject().add("name", quoted(g.name)).add("dimension", whole(g.dimension)).add("points", whole(g.points)).text());
-  for (const std::string &w : lines(i.warnings)) warnings.push_back(quoted(w));
-  JsonObject out, edge, quality, found;
-  for (const Defect &d : defects(i)) found.add(d.key, whole(d.count));
-  edge.add("min", number(i.edge_min)).add("median", number(i.edge_median)).add("max", number(i.edge_max));
-  quality.add("min", number(i.quality_min)).add("mean", number(i.quality_mean)).add("histogram", json_array(histogram));
-  out.add("file", quoted(file)).add("points", whole(i.npoint)).add("tets", whole(i.ntet)).add("surface_triangles", whole(i.ntriangle));
-  out.add("edges", whole(i.nedge)).add("pieces", whole(i.npiece)).add("volume", number(i.volume));
-  out.add("lo", json_vector(i.lo)).add("hi", json_vector(i.hi)).add("edge", edge.text()).add("quality", quality.text());
-  out.add("defects", found.text()).add("groups", json_array(names)).add("warnings", json_array(warnings));
-  std::fputs(indented(out.text()).c_str(), stdout);
-}
-
-void print_table(const std::string &file, dfm_tetmesh mesh, const dfm_tetmesh_info &i) {
-  std::printf("%s\n", file.c_str());
-  std::printf("  points            %u\n  tetrahedra        %u\n  surface triangles %u\n", i.npoint, i.ntet, i.ntriangle);
-  std::printf("  edges             %u\n  pieces            %u\n  volume            %.10g m3\n", i.nedge, i.npiece, i.volume);
-  std::printf("  box               %g %g %g to %g %g %g m\n", i.lo[0], i.lo[1], i.lo[2], i.hi[0], i.hi[1], i.hi[2]);
-  std::printf("  edge length       %.4g to %.4g m, median %.4g\n", i.edge_min, i.edge_max, i.edge_median);
-  std::printf("  mean ratio        least %.3g, mean %.3g (1: regular)\n", i.quality_min, i.quality_mean);
-  for (int bin = 0; bin < 10; ++bin)
-    if (i.quality_histogram[bin]) std::printf("    %.1f to %.1f      %u\n", 0.1 * bin, 0.1 * (bin + 1), i.quality_histogram[bin]);
-  static const char *const kElements[4] = {"points", "lines", "triangles", "cells"};
-  for (const Group &g : groups(mesh, i))
-    std::printf("  group             %s (%s, %u points)\n", g.name.c_str(), kElements[g.dimension < 4 ? g.dimension : 3], g.points);
-  for (const std::string &w : lines(i.warnings)) std::printf("  warning: %s\n", w.c_str());
-}
-
-// What a mesh command tells when it is done; quiet says nothing but errors and what was asked for.
-int report(const Globals &globals, const std::string &file, dfm_tetmesh mesh, bool asked) {
-  dfm_tetmesh_info info = {};
-  info.size = sizeof info;
-  if (dfm_tetmesh_get_info(mesh, &info) < 0) return fail(dfm_last_error());
-  if (globals.json) print_json(file, mesh, info);
-  else if (asked) print_table(file, mesh, info);
-  else if (!globals.quiet) {
-    for (const std::string &w : lines(info.warnings)) std::fprintf(stderr, "deform: warning: %s\n", w.c_str());
-    std::printf("%s: %u points, %u tetrahedra, %u surface triangles, least mean ratio %.3g\n", file.c_str(), info.npoint, info.ntet,
-                info.ntriangle, info.quality_min);
-  }
-  return kDone;
+bool open(MeshSession &s, const std::string &file, bool as_surface) {
+  uint32_t kind = 0;
+  if (!s.context || dfm_mesh_file_kind(s.context, file.c_str(), &kind) < 0) return false;
+  if (kind == DFM_MESH_TETS && !as_surface) return dfm_tetmesh_read(s.context, file.c_str(), &s.cells) >= 0;
+  return dfm_trimesh_read(s.context, file.c_str(), &s.surface) >= 0;
 }
 
 int info(const Globals &globals, const std::string &file) {
-  Session s(globals);
-  if (!s.context || dfm_tetmesh_read(s.context, file.c_str(), &s.mesh) < 0) return fail(dfm_last_error());
-  return report(globals, file, s.mesh, true);
+  MeshSession s(globals);
+  if (!open(s, file, false)) return fail(dfm_last_error());
+  return report_mesh(globals, file, s, true);
 }
 
-int make(const Globals &globals, const std::string &kind, const double *size, uint32_t cells, const std::string &out) {
-  Session s(globals);
-  if (!s.context || dfm_tetmesh_make(s.context, kind.c_str(), size, cells, &s.mesh) < 0 || dfm_tetmesh_write(s.mesh, out.c_str()) < 0)
-    return fail(dfm_last_error());
-  return report(globals, out, s.mesh, false);
+// What `out` cannot say of the mesh that was read.
+std::vector<std::string> losses(const MeshSession &s, const std::string &out) {
+  std::vector<std::string> lost;
+  const std::string ending = mesh_ending(out);
+  if (s.cells) {
+    dfm_tetmesh_info i = {};
+    i.size = sizeof i;
+    dfm_tetmesh_get_info(s.cells, &i);
+    if (i.ngroup && ending == "mesh") lost.push_back("names of groups, of which Medit holds the number alone");
+    return lost;
+  }
+  dfm_trimesh_info i = {};
+  i.size = sizeof i;
+  dfm_trimesh_get_info(s.surface, &i);
+  if (ending == "stl") lost.push_back("digits beyond single precision, about 7, which is all that STL holds");
+  if (i.ngroup && ending == "ply") lost.push_back("names of groups, of which PLY holds the number alone");
+  if (i.ngroup && (ending == "stl" || ending == "off"))
+    lost.push_back(std::to_string(i.ngroup) + (i.ngroup == 1 ? " group" : " groups") + " of triangles, without which ." + ending + " is written");
+  return lost;
 }
 
 int convert(const Globals &globals, const std::string &in, const std::string &out) {
-  Session s(globals);
-  if (!s.context || dfm_tetmesh_read(s.context, in.c_str(), &s.mesh) < 0 || dfm_tetmesh_write(s.mesh,
-      out.c_str()) < 0) return fail(dfm_last_error());
-  return report(globals, out, s.mesh, false);
+  MeshSession s(globals);
+  std::vector<std::string> lost;
+  std::string sentence;
+  if (!s.context) return fail(dfm_last_error());
+  if (!import_surface(in, s, sentence)) return fail(sentence);
+  if (s.surface) lost.push_back("materials, normals, textures and movement, of which a surface has none");
+  else if (!open(s, in, false)) return fail(dfm_last_error());
+  if (s.surface && written_by(out) == Writes::cells)
+    return fail(out + ": ." + mesh_ending(out) + " is written with tetrahedra, and " + in + " is a surface; fill it: deform mesh fill " + in +
+                " --out " + out + ", or convert it to .obj, .ply, .stl, .off, .vtk or .vtu");
+  if (s.cells && written_by(out) == Writes::surface) {
+    dfm_tetmesh_info i = {};
+    i.size = sizeof i;
+    dfm_tetmesh_get_info(s.cells, &i);
+    lost.push_back(std::to_string(i.ntet) + " tetrahedra, of which ." + mesh_ending(out) + " holds the boundary alone");
+    s.cells = 0;
+    if (dfm_trimesh_read(s.context, in.c_str(), &s.surface) < 0) return fail(dfm_last_error());
+  }
+  if ((s.surface ? dfm_trimesh_write(s.surface, out.c_str()) : dfm_tetmesh_write(s.cells, out.c_str())) < 0) return fail(dfm_last_error());
+  for (const std::string &l : losses(s, out)) lost.push_back(l);
+  return report_mesh(globals, out, s, false, lost);
 }
 
-struct Shape { std::string out; uint32_t cells = 1000; double radius = 0, length = 1; std::vector<double> size{1, 0.1, 0.1}; };
+struct Shape {
+  std::string kind, out;
+  uint32_t cells = 1000;
+  double radius = 0.2, inner = 0.15, ring = 0.5, length = 1;
+  std::vector<double> edges{1, 0.1, 0.1};
+  bool surface = false;
+  std::vector<double> size() const {
+    if (kind == "ball") return {radius, 0, 0};
+    if (kind == "cylinder") return {radius, length, 0};
+    if (kind == "tube") return {inner, radius, length};
+    if (kind == "torus") return {ring, radius, 0};
+    return edges;
+  }
+};
+
+int make(const Globals &globals, const Shape &shape) {
+  MeshSession s(globals);
+  const std::vector<double> size = shape.size();
+  const Writes writes = written_by(shape.out);
+  const bool surface = shape.surface || writes == Writes::surface || (shape.kind == "torus" && writes == Writes::either);
+  if (surface && writes == Writes::cells)
+    return fail(shape.out + ": ." + mesh_ending(shape.out) + " is written with tetrahedra; write a surface as .obj, .ply, .stl, .off, .vtk or .vtu");
+  if (!s.context) return fail(dfm_last_error());
+  if (!surface && shape.kind == "torus")
+    return fail(shape.out + ": a torus is made as a surface; write .obj, .ply, .stl, .off, .vtk or .vtu, then: deform mesh fill SURFACE --out " +
+                shape.out);
+  const dfm_status made = surface ? dfm_trimesh_make(s.context, shape.kind.c_str(), size.data(), shape.cells, &s.surface)
+                                  : dfm_tetmesh_make(s.context, shape.kind.c_str(), size.data(), shape.cells, &s.cells);
+  if (made < 0) return fail(dfm_last_error());
+  if ((surface ? dfm_trimesh_write(s.surface, shape.out.c_str()) : dfm_tetmesh_write(s.cells, shape.out.c_str())) < 0)
+    return fail(dfm_last_error());
+  return report_mesh(globals, shape.out, s, false);
+}
 
 void add_make(CLI::App *mesh, Globals &globals, int *exit_code) {
-  CLI::App *command = mesh->add_subcommand("make", "a cylinder, beam or ball of near-isotropic cells");
+  struct Kind { const char *name, *about; };
+  CLI::App *command = mesh->add_subcommand("make", "a cylinder, beam, ball, tube or torus, of near-isotropic cells or as a surface");
   command->require_subcommand(1);
-  for (const char *kind : {"cylinder", "beam", "ball"}) {
-    const std::string name = kind;
-    CLI::App *sub = command->add_subcommand(name,
-        name == "beam" ? "edges from the origin" : name == "ball" ? "about the origin" : "axis z, base at the origin");
+  for (const Kind &kind : {Kind{"cylinder", "axis z, base at the origin"}, Kind{"beam", "edges from the origin"}, Kind{"ball", "about the origin"},
+                           Kind{"tube", "a cylinder with a hole; axis z, base at the origin"}, Kind{"torus", "a surface; about the origin, axis z"}}) {
+    const std::string name = kind.name;
+    CLI::App *sub = command->add_subcommand(name, kind.about);
     const auto shape = std::make_shared<Shape>();
-    shape->radius = name == "ball" ? 0.1 : 0.2;
-    sub->add_option("--out", shape->out, "file to write: .msh (MSH 4.1), .msh2 (MSH 2.2) or .vtk")->required()->type_name("FILE");
-    sub->add_option("--cells", shape->cells, "about how many tetrahedra")->capture_default_str()->type_name("N");
-    if (name != "beam") sub->add_option("--radius", shape->radius, "m")->capture_default_str();
-    if (name == "cylinder") sub->add_option("--length", shape->length, "m")->capture_default_str();
-    if (name == "beam") sub->add_option("--size", shape->size, "edges x y z, m")->expected(3)->capture_default_str();
-    sub->callback([=, &globals] {
-      std::vector<double> size = shape->size;
-      if (name == "ball") size = {shape->radius, 0, 0};
-      if (name == "cylinder") size = {shape->radius, shape->length, 0};
-      *exit_code = make(globals, name, size.data(), shape->cells, shape->out);
-    });
+    shape->kind = name;
+    if (name == "ball" || name == "torus") shape->radius = 0.1;
+    sub->add_option("--out", shape->out, "file to write: cells as .msh (MSH 4.1), .msh2 (MSH 2.2), .mesh, .vtk or .vtu, a surface as .obj, .ply, .stl or .off")
+        ->required()->type_name("FILE");
+    sub->add_option("--cells", shape->cells, "about how many tetrahedra, or triangles of a surface")->capture_default_str()->type_name("N");
+    if (name == "beam") sub->add_option("--size", shape->edges, "edges x y z, m")->expected(3)->capture_default_str();
+    else sub->add_option("--radius", shape->radius, name == "tube" ? "outer, m" : name == "torus" ? "of the tube, m" : "m")->capture_default_str();
+    if (name == "tube") sub->add_option("--inner", shape->inner, "inner radius, m")->capture_default_str();
+    if (name == "torus") sub->add_option("--ring", shape->ring, "radius of the ring, m")->capture_default_str();
+    if (name == "cylinder" || name == "tube") sub->add_option("--length", shape->length, "m")->capture_default_str();
+    sub->add_flag("--surface", shape->surface, "the surface alone, also as .vtk or .vtu");
+    sub->callback([=, &globals] { *exit_code = make(globals, *shape); });
   }
 }
 
@@ -157,19 +159,17 @@ void add_mesh(CLI::App &app, Globals &globals, int *exit_code) {
   const auto first = std::make_shared<std::string>(), second = std::make_shared<std::string>();
 
   CLI::App *info_command = mesh->add_subcommand("info", "counts, quality, groups and what had to be repaired");
-  info_command->add_option("FILE", *first, "MSH 2.2 or 4.1, or legacy VTK")->required();
+  info_command->add_option("FILE", *first, kIn)->required();
   info_command->callback([=, &globals] { *exit_code = info(globals, *first); });
 
   add_make(mesh, globals, exit_code);
 
-  CLI::App *convert_command = mesh->add_subcommand("convert", "reads IN, writes OUT by its file name ending");
-  convert_command->add_option("IN", *first, "MSH 2.2 or 4.1, or legacy VTK")->required();
-  convert_command->add_option("OUT", *second, ".msh (MSH 4.1), .msh2 (MSH 2.2) or .vtk (legacy VTK)")->required();
+  CLI::App *convert_command = mesh->add_subcommand("convert", "reads IN, writes OUT by its file name ending; of cells the boundary where OUT is a surface");
+  convert_command->add_option("IN", *first, std::string(kIn) + "; glTF, FBX, COLLADA and others where built with assimp")->required();
+  convert_command->add_option("OUT", *second, ".msh (MSH 4.1), .msh2 (MSH 2.2), .mesh, .vtk, .vtu, .obj, .ply, .stl or .off")->required();
   convert_command->callback([=, &globals] { *exit_code = convert(globals, *first, *second); });
 
-  CLI::App *fill_command = mesh->add_subcommand("fill", "tetrahedra for a closed surface (not available yet)");
-  fill_command->allow_extras();
-  fill_command->callback([=] { *exit_code = fail("not available yet: deform mesh fill; give a tetrahedral mesh (.msh or .vtk) instead of a surface"); });
+  add_mesh_fill(mesh, globals, exit_code);
 }
 
 }  // namespace cli

@@ -102,12 +102,7 @@ Outputs::Outputs(const SceneFile &scene, const std::string &folder)
   }
   last_time_ = dfm_world_time(scene.world());
   last_impulse_.assign(3 * scene.bodies().size(), 0.0);
-  for (size_t b = 0; b < scene.bodies().size() && s.nodes; ++b) {
-    const BodyView &body = scene.bodies()[b];
-    start_.emplace_back(3 * size_t(body.npoint));
-    uint32_t n = 0;
-    need(dfm_body_get_state(body.handle, body.npoint, start_.back().data(), nullptr, &n));
-  }
+  for (size_t b = 0; b < scene.bodies().size() && s.nodes; ++b) nodes_.push_back(file_nodes(b));
 }
 
 void Outputs::record() {
@@ -180,33 +175,60 @@ void Outputs::write_last() {
   }
 }
 
+// The numbers of the mesh file's nodes and where they are now. Of a filled body they are points of the surface that it wears; where it wears
+// another one, its own points are numbered as they stand.
+FileNodes Outputs::file_nodes(size_t b) const {
+  const BodyView &body = scene_.bodies()[b];
+  const std::string key = "/bodies/" + std::to_string(b);
+  JsonValue mesh;
+  if (!parse_json(scene_.value(key + "/mesh"), mesh)) throw Failure(kBadInput, "body \"" + body.name + "\" has no mesh file");
+  const std::string path = (fs::path(scene_.path()).parent_path() / mesh.text).string();
+  FileNodes out;
+  uint32_t kind = 0;
+  need(dfm_mesh_file_kind(scene_.context(), path.c_str(), &kind));
+  const uint32_t *file_point = nullptr;
+  if (kind == DFM_MESH_SURFACE) {
+    out.surface = scene_.value(key + "/surface/mesh").empty() && scene_.value(key + "/surface/from").empty();
+    out.number.resize(out.surface ? body.nsurfel : body.npoint);
+    for (uint32_t i = 0; i < out.number.size(); ++i) out.number[i] = i;
+    dfm_trimesh file = 0;
+    if (out.surface) need(dfm_trimesh_read(scene_.context(), path.c_str(), &file)), need(dfm_trimesh_data(file, nullptr, nullptr, &file_point));
+    if (out.surface) std::copy_n(file_point, out.number.size(), out.number.begin()), dfm_trimesh_destroy(file);
+  } else {
+    dfm_tetmesh file = 0;
+    need(dfm_tetmesh_read(scene_.context(), path.c_str(), &file));
+    need(dfm_tetmesh_data(file, nullptr, nullptr, &file_point));
+    out.number.assign(file_point, file_point + body.npoint);
+    dfm_tetmesh_destroy(file);
+  }
+  out.start = node_positions(body, out);
+  return out;
+}
+
+std::vector<double> Outputs::node_positions(const BodyView &body, const FileNodes &nodes) const {
+  uint32_t n = uint32_t(nodes.number.size());
+  std::vector<double> x(3 * size_t(n));
+  need(nodes.surface ? dfm_surface_positions(body.handle, n, x.data(), &n) : dfm_body_get_state(body.handle, n, x.data(), nullptr, &n));
+  return x;
+}
+
 void Outputs::write_nodes() {
-  if (start_.empty()) return;
+  if (nodes_.empty()) return;
   make_folder(folder_ + "/nodes");
-  const fs::path scene_folder = fs::path(scene_.path()).parent_path();
-  for (size_t b = 0; b < scene_.bodies().size(); ++b) {
+  for (size_t b = 0; b < nodes_.size(); ++b) {
     const BodyView &body = scene_.bodies()[b];
-    // The numbers of the mesh file's nodes: the body's points are those of the mesh as it was read.
-    JsonValue path;
-    if (!parse_json(scene_.value("/bodies/" + std::to_string(b) + "/mesh"), path)) throw Failure(kBadInput, "body \"" + body.name + "\" has no mesh file");
-    dfm_tetmesh mesh = 0;
-    need(dfm_tetmesh_read(scene_.context(), (scene_folder / path.text).string().c_str(), &mesh));
-    const uint32_t *file_point = nullptr;
-    need(dfm_tetmesh_data(mesh, nullptr, nullptr, &file_point));
-    std::vector<double> now(3 * size_t(body.npoint));
-    uint32_t n = 0;
-    need(dfm_body_get_state(body.handle, body.npoint, now.data(), nullptr, &n));
-    std::vector<uint32_t> order(body.npoint);
-    for (uint32_t i = 0; i < body.npoint; ++i) order[i] = i;
-    std::sort(order.begin(), order.end(), [&](uint32_t i, uint32_t j) { return file_point[i] < file_point[j]; });
+    const FileNodes &nodes = nodes_[b];
+    const std::vector<double> now = node_positions(body, nodes);
+    std::vector<uint32_t> order(nodes.number.size());
+    for (uint32_t i = 0; i < order.size(); ++i) order[i] = i;
+    std::sort(order.begin(), order.end(), [&](uint32_t i, uint32_t j) { return nodes.number[i] < nodes.number[j]; });
     std::string text = "node,ux,uy,uz\n";
     for (const uint32_t i : order) {
-      text += std::to_string(file_point[i]);
-      for (int k = 0; k < 3; ++k) text += "," + csv_number(now[3 * size_t(i) + k] - start_[b][3 * size_t(i) + k]);
+      text += std::to_string(nodes.number[i]);
+      for (int k = 0; k < 3; ++k) text += "," + csv_number(now[3 * size_t(i) + k] - nodes.start[3 * size_t(i) + k]);
       text += "\n";
     }
     write_whole(folder_ + "/nodes/" + body.name + ".csv", text);
-    dfm_tetmesh_destroy(mesh);
   }
 }
 

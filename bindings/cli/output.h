@@ -25,6 +25,13 @@ class Csv {
   bool first_ = true;
 };
 
+// A body's nodes by the numbers of its mesh file; `surface`: they are points of its surface, not of its cells.
+struct FileNodes {
+  bool surface = false;
+  std::vector<uint32_t> number;
+  std::vector<double> start;  // where they were at the start
+};
+
 class Outputs {
  public:
   Outputs(const SceneFile &scene, const std::string &folder);
@@ -34,6 +41,8 @@ class Outputs {
   void write_nodes();  // nodes/BODY.csv
 
  private:
+  FileNodes file_nodes(size_t body) const;
+  std::vector<double> node_positions(const BodyView &body, const FileNodes &nodes) const;
   void write_bodies(double t);
   void write_contacts(double t);
   void write_probes(double t);
@@ -47,7 +56,7 @@ class Outputs {
   uint32_t recorded_ = 0;
   double last_time_ = 0;
   std::vector<double> last_impulse_;              // [nbody,3]
-  std::vector<std::vector<double>> start_;        // positions at the start, for nodes
+  std::vector<FileNodes> nodes_;                  // of each body, where the scene asks for them
   std::vector<dfm_pair_report> pairs_;
 };
 

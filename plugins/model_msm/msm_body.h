@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <cstring>
 #include <new>
+#include <utility>
 
 #include "msm_kernel.h"
 
@@ -42,6 +43,7 @@ class Buffer {
     if (!data_) throw std::bad_alloc();
     std::memset(static_cast<void *>(data_), 0, size_ * sizeof(T));
   }
+  void swap(Buffer &other) { std::swap(host_, other.host_), std::swap(data_, other.data_), std::swap(size_, other.size_); }
   bool empty() const { return !data_; }
   T *data() { return data_; }
   const T *data() const { return data_; }
@@ -68,7 +70,8 @@ struct Body {
   Buffer<double> field[kParamCount];  // [ncell,width] values by cell in place of a parameter's; empty without
 
   // In the host's order.
-  Buffer<double> mass, shape, edge_volume, edge_length, edge_energy;  // shape: sum of (E V) around the edge / L0^2, see find_shapes
+  Buffer<double> mass, shape, edge_volume, edge_length, edge_energy;  // shape: stiffness over `scale`, see find_shapes
+  Buffer<double> per_modulus;          // [nedge] stiffness over the sum of E V around the edge
   Buffer<uint32_t> edges, cells, cell_edge;
   Buffer<double> cell_volume6;
   Buffer<double> rest_point;           // [npoint,3]
@@ -138,6 +141,7 @@ struct Body {
  private:
   double scale = 1;  // of shape
   void take_mesh(const dfm_mesh &m);
+  void find_directions();
   struct Layout;
   void build_blocks();
   void order_springs(Layout &l) const;

@@ -1,4 +1,4 @@
-// From a mesh to blocks: stiffness per spring (Van Gelder), rows of springs in quads, halos, and who adds up whose forces.
+// From a mesh to blocks: rows of springs in quads, halos, and who adds up whose forces.
 #include <algorithm>
 
 #include "msm_body.h"
@@ -50,6 +50,7 @@ void Body::take_mesh(const dfm_mesh &m) {
       edge_volume[e] += volume;
     }
   }
+  find_directions();
 }
 
 // What leads from the mesh to the blocks; a rank is a point's place in the order of partition_points.

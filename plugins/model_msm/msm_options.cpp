@@ -1,8 +1,8 @@
-// From parameters and fields by cell to what the passes read: stiffness per spring (Van Gelder), frozen extra coordinates, dampers, drag,
+// From parameters and fields by cell to what the passes read: stiffness per spring, frozen extra coordinates, dampers, drag,
 // springs that are switched off. What nothing calls for stays empty and its kernels are never chosen.
-#include <algorithm>
-
 #include <stdio.h>
+
+#include <algorithm>
 
 #include "msm_body.h"
 
@@ -44,7 +44,8 @@ void Body::take_fields(const dfm_mesh &m) {
     }
 }
 
-// Every cell gives each of its edges E V / L0^2. What all cells share (Young's modulus, the volume term's correction) stays outside.
+// Every cell gives each of its edges E V, times what msm_stiffness.cpp finds. What all cells share (Young's modulus, the volume term's
+// correction, a branch) stays outside.
 void Body::find_shapes() {
   const bool scaled = !field[kVolume].empty() || !field[kPoisson].empty(), stiff = !field[kYoung].empty();
   scale = (scaled ? 1.0 : spring_scale(volume_ratio(0))) * (stiff ? 1.0 : params[kYoung]);
@@ -55,10 +56,7 @@ void Body::find_shapes() {
     const double share = volume * (stiff ? field[kYoung][c] : 1.0) * (scaled ? spring_scale(volume_ratio(c)) : 1.0);
     for (int n = 0; n < 6; ++n) shape[cell_edge[6 * size_t(c) + n]] += share;
   }
-  for (uint32_t e = 0; e < nedge; ++e) {
-    const double l2 = edge_length[e] * edge_length[e];
-    shape[e] = l2 > kShortestSquared ? shape[e] / l2 : 0;  // two points at one place: no direction, no spring
-  }
+  for (uint32_t e = 0; e < nedge; ++e) shape[e] *= per_modulus[e];
 }
 
 // w^2 of a spring d at rest: softer, g^2 (a.d)^2, one extra coordinate g a.X; stiffer, g^2 (|d|^2 - (a.d)^2), two of them along any two
@@ -67,9 +65,11 @@ void Body::find_tilts() {
   const bool by_cell = !field[kSlope].empty() || !field[kAxis].empty();
   double steepest = params[kSlope];
   if (!field[kSlope].empty()) steepest = *std::max_element(field[kSlope].data(), field[kSlope].data() + ncell);
-  edge_tilt.drop(), edge_rest.drop(), tilt.drop();
+  Buffer<double> squares, lengths, packed;  // what may fail comes first
+  if (steepest > 0) squares.create(host, nedge), lengths.create(host, nedge);
+  if (steepest > 0 || has_branch()) packed.create(host, spring_slots());
+  edge_tilt.swap(squares), edge_rest.swap(lengths), tilt.swap(packed);
   if (steepest > 0) {
-    edge_tilt.create(host, nedge), edge_rest.create(host, nedge);
     const auto squared = [&](uint32_t c, uint32_t e) {
       const double *x = rest_point.data() + 3 * size_t(edges[2 * size_t(e)]), *y = rest_point.data() + 3 * size_t(edges[2 * size_t(e) + 1]);
       const double *axis = field[kAxis].empty() ? params + kAxis : field[kAxis].data() + 3 * size_t(c), slope = at(kSlope, c);
@@ -89,13 +89,12 @@ void Body::find_tilts() {
       edge_rest[e] = __builtin_sqrt(square_of(rest_point.data() + 3 * size_t(ends[0]), rest_point.data() + 3 * size_t(ends[1])) + edge_tilt[e]);
     }
   }
-  const size_t n = spring_slots();
-  if (steepest > 0 || has_branch()) tilt.create(host, n);
-  for (size_t s = 0; s < n; ++s) {
+  for (size_t s = 0; s < spring_slots(); ++s) {
     const uint32_t e = spring_edge[s];
     rest[s] = e == kNone ? 0 : rest_length(e);
     if (steepest > 0) tilt[s] = e == kNone ? 0 : edge_tilt[e];
   }
+  for (uint32_t b = 0; b < nblock; ++b) block[b].tilt = tilt.empty() ? nullptr : tilt.data() + (block[b].stiffness - stiffness.data());
 }
 
 // Dampers by cell add up like the springs: c of an edge is the sum of its cells' damping_stiffness times their share of k.
@@ -103,8 +102,9 @@ void Body::find_dampers() {
   const Buffer<double> &by_cell = field[kDampingStiffness];
   damping_on = by_cell.empty() ? params[kDampingStiffness] > 0 : *std::max_element(by_cell.data(), by_cell.data() + ncell) > 0;
   if (!by_cell.empty() && damping_on) {
-    Buffer<double> share;
-    edge_damp.create(host, nedge), damp_most.create(host, npoint), damp.create(host, spring_slots()), share.create(host, nedge);
+    Buffer<double> share, damper, most_around, packed;
+    damper.create(host, nedge), most_around.create(host, npoint), packed.create(host, spring_slots()), share.create(host, nedge);
+    edge_damp.swap(damper), damp_most.swap(most_around), damp.swap(packed);
     for (uint32_t c = 0; c < ncell; ++c) {
       const double k = __builtin_fabs(cell_volume6[c]) * at(kYoung, c) * spring_scale(volume_ratio(c));
       for (int n = 0; n < 6; ++n) {
@@ -120,12 +120,14 @@ void Body::find_dampers() {
       }
     }
     for (size_t s = 0; s < spring_slots(); ++s) damp[s] = spring_edge[s] == kNone ? 0 : edge_damp[spring_edge[s]];
+    for (uint32_t b = 0; b < nblock; ++b) block[b].damp = damp.data() + (block[b].stiffness - stiffness.data());
   }
   const Buffer<double> &drag = field[kDampingMass];
   drag_on = drag.empty() ? params[kDampingMass] > 0 : *std::max_element(drag.data(), drag.data() + ncell) > 0;
   if (!drag.empty() && drag_on) {
-    Buffer<double> around;
-    point_drag.create(host, npoint), around.create(host, npoint);
+    Buffer<double> rate, around;
+    rate.create(host, npoint), around.create(host, npoint);
+    point_drag.swap(rate);
     for (uint32_t c = 0; c < ncell; ++c)
       for (int a = 0; a < 4; ++a) {
         const uint32_t i = cells[4 * size_t(c) + a];
@@ -159,6 +161,14 @@ void Body::find_effects() {
   active_effects[n] = nullptr;
 }
 
+namespace {
+struct Aside {  // the mask, while no spring counts as off
+  Buffer<uint8_t> &mask, kept;
+  explicit Aside(Buffer<uint8_t> &m) : mask(m) { kept.swap(mask); }
+  ~Aside() { kept.swap(mask); }
+};
+}  // namespace
+
 void Body::apply_params(const double *values) {
   std::copy(values, values + kValueCount, params);
   const Buffer<double> &volumes = field[kVolume];
@@ -167,14 +177,13 @@ void Body::apply_params(const double *values) {
   find_tilts();
   find_dampers();
   if (has_branch() && rest_now.empty()) rest_now.create(host, spring_slots());
-  for (uint32_t b = 0; b < nblock; ++b) {
-    const size_t at = size_t(block[b].stiffness - stiffness.data());
-    block[b].tilt = tilt.empty() ? nullptr : tilt.data() + at;
-    block[b].damp = damp.empty() ? nullptr : damp.data() + at;
+  {  // the weights of the step bound never depend on what is switched off, nor on when it was
+    const Aside aside(edge_off);
+    fill_stiffness();
+    find_weights();
   }
-  fill_stiffness();
-  find_weights();
   find_effects();
+  if (!edge_off.empty()) fill_stiffness();
 }
 
 // The rows of the step bound keep counting a spring that is off: a bound it stays, and a cut need not look for new weights.

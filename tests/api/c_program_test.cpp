@@ -8,9 +8,11 @@
 
 namespace {
 
-test::CommandResult example(const std::string &name) {
+test::CommandResult example(const std::string &name, const std::vector<std::string> &args = {}) {
   const std::string plugins = std::string("DEFORM_PLUGIN_PATH=") + DEFORM_PLUGIN_DIR;
-  return test::run({"/usr/bin/env", plugins, std::string(DEFORM_BINARY_DIR) + "/bin/example_" + name});
+  std::vector<std::string> line{"/usr/bin/env", plugins, std::string(DEFORM_BINARY_DIR) + "/bin/example_" + name};
+  line.insert(line.end(), args.begin(), args.end());
+  return test::run(line);
 }
 
 }  // namespace
@@ -44,4 +46,13 @@ TEST(CProgram, Pull_SlidesWhereCoulombSays) {
   EXPECT_NEAR(at, mu, 0.03) << "0.016 of it pass while the block gathers the speed that counts as sliding";
   EXPECT_EQ(begun - ended, now) << "the events tell what touches";
   EXPECT_GT(now, 3u);
+}
+
+TEST(CProgram, Surface_JoinsAndTurnsALooseCube) {
+  const test::CommandResult r = example("03_surface", {test::scratch("c_program") + "/cube.obj"});
+  ASSERT_EQ(r.exit_code, 0) << r.out << r.err;
+  EXPECT_EQ(r.out, "28 points were merged with another at exactly the same place\n"
+                   "4 of 12 triangles faced the wrong way and were turned\n"
+                   "8 points, 12 triangles, closed, 0.001 m3\n"
+                   "read again: 8 points, closed, nothing to repair: yes\n");
 }

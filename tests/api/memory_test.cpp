@@ -3,6 +3,7 @@
 #include <cstdlib>
 #include <new>
 
+#include "coupled.h"
 #include "obstacle.h"
 
 namespace {
@@ -142,11 +143,37 @@ TEST(Memory, ASettledStepOnTrianglesAndVoxels_AllocatesNothing) {
   EXPECT_EQ(hooks.live_bytes, 0);
 }
 
+// A surface of its own hangs, touches and is spread anew in every sub-step.
+TEST(Memory, ASettledCoupledStep_AllocatesNothing) {
+  Hooks hooks;
+  const dfm_context_def def = hooks.def();
+  dfm_context *c = nullptr;
+  ASSERT_EQ(dfm_context_create(&def, &c), DFM_OK) << dfm_last_error();
+  const dfm_world w = test::make_world(c);
+  test::add_plane(w, "floor");
+  const test::Skin skin = test::box_skin({0.1, 0.1, 0.1}, 6);
+  const dfm_surface_def surface = skin.def();
+  test::BodyOptions o;
+  o.young = 1e6, o.damping_stiffness = 1e-3, o.position = {0, 0, 2e-5}, o.surface = &surface;
+  test::make_body(c, w, "beam", {0.1, 0.1, 0.1}, 60, o);
+  test::run(w, 0.5, 1e-3);
+  const int64_t hook_calls = hooks.calls;
+  const uint64_t heap = heap_calls;
+  for (int i = 0; i < 200; ++i) ASSERT_EQ(dfm_world_step(w, 1e-3, nullptr), DFM_OK);
+  EXPECT_EQ(hooks.calls - hook_calls, 0) << "calls of the allocation hook";
+  EXPECT_EQ(heap_calls - heap, 0u) << "calls of operator new";
+  EXPECT_GT(test::stats(w).sticking, 3u);
+  dfm_context_destroy(c);
+  EXPECT_EQ(hooks.live_bytes, 0);
+}
+
 // Everything from the context to a step in contact, with the allocator failing at the n-th call, for all n that are ever reached.
 TEST(Memory, WhenTheNthAllocationFails_TheCallFailsCleanlyAndNothingLeaks) {
   const test::Triangles slab = test::box_surface({0.2, 0.2, 0.05}, 1);
   int failures[4] = {};
   bool through = false;
+  const test::Skin skin = test::ball_skin(0.049, 1);
+  const dfm_surface_def surface = skin.def(DFM_COUPLING_MLS, 1.5);
   for (int64_t n = 0; !through && n < 20000; ++n) {
     Hooks hooks;
     hooks.fail_from = n;
@@ -179,7 +206,7 @@ TEST(Memory, WhenTheNthAllocationFails_TheCallFailsCleanlyAndNothingLeaks) {
         bd.npoint = info.npoint, bd.ntet = info.ntet;
         test::ok(dfm_tetmesh_data(mesh, &bd.points, &bd.tets, nullptr));
         for (int k = 0; k < 2 && status == DFM_OK; ++k) {
-          bd.pose.position[2] = 0.0501 + 0.1002 * k, bd.velocity[2] = -0.1;
+          bd.pose.position[2] = 0.0501 + 0.1002 * k, bd.velocity[2] = -0.1, bd.surface = k ? &surface : nullptr;
           status = dfm_body_create(world, &bd, &bodies[k]);
         }
       }

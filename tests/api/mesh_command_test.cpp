@@ -57,9 +57,10 @@ TEST(MeshCommand, InfoAsJson_HoldsTheSame) {
 
 TEST(MeshCommand, Make_WritesEachShape) {
   const std::vector<std::vector<std::string>> shapes = {
-      {"cylinder", "--radius", "0.2", "--length", "1"}, {"beam", "--size", "1", "0.1", "0.2"}, {"ball", "--radius", "0.05"}};
+      {"cylinder", "--radius", "0.2", "--length", "1"}, {"beam", "--size", "1", "0.1", "0.2"}, {"ball", "--radius", "0.05"},
+      {"tube", "--inner", "0.1", "--radius", "0.2", "--length", "0.5"}};
   for (const auto &shape : shapes)
-    for (const char *ending : {".msh", ".msh2", ".vtk"}) {
+    for (const char *ending : {".msh", ".msh2", ".vtk", ".vtu", ".mesh"}) {
       const std::string out = folder() + "/" + shape[0] + ending;
       std::vector<std::string> args = {"mesh", "make"};
       args.insert(args.end(), shape.begin(), shape.end());
@@ -78,23 +79,120 @@ TEST(MeshCommand, Convert_ThereAndBackKeepsTheBytes) {
   EXPECT_EQ(test::read_file(a), test::read_file(c));
 }
 
+TEST(MeshCommand, MakeSurface_ByEndingOrByFlag) {
+  const std::vector<std::vector<std::string>> shapes = {{"cylinder", "--radius", "0.2", "--length", "1"}, {"beam", "--size", "1", "0.1", "0.2"},
+                                                        {"ball", "--radius", "0.05"}, {"tube", "--inner", "0.1", "--radius", "0.2"},
+                                                        {"torus", "--ring", "0.3", "--radius", "0.1"}};
+  for (const auto &shape : shapes)
+    for (const char *ending : {".obj", ".ply", ".stl", ".off", ".vtk", ".vtu"}) {
+      const std::string out = folder() + "/" + shape[0] + "_surface" + ending;
+      std::vector<std::string> args = {"mesh", "make"};
+      args.insert(args.end(), shape.begin(), shape.end());
+      args.insert(args.end(), {"--surface", "--cells", "500", "--out", out});
+      const auto made = test::deform(args);
+      EXPECT_EQ(made.exit_code, 0) << made.err;
+      const auto told = test::deform({"mesh", "info", "--json", out});
+      EXPECT_EQ(told.exit_code, 0) << told.err;
+      EXPECT_TRUE(has(told.out, "\"kind\": \"surface\"") && has(told.out, "\"open_edges\": 0")) << told.out;
+    }
+  const auto plain = test::deform({"mesh", "make", "ball", "--out", folder() + "/plain.obj", "--cells", "100"});
+  EXPECT_TRUE(has(plain.out, "plain.obj: 42 points, 80 triangles, closed, least quality")) << plain.out;
+}
+
+TEST(MeshCommand, InfoOfASurface_TellsHolesGroupsAndRepairs) {
+  const std::string file = folder() + "/open.obj";
+  test::write_file(file, "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nv 5 5 5\ng sole\nf 1 3 2\ng side\nf 1 2 4\nf 1 3 4\n");
+  const auto r = test::deform({"mesh", "info", file});
+  EXPECT_EQ(r.exit_code, 0) << r.err;
+  for (const char *word : {"points            4", "triangles         3", "pieces            1", "group             sole (1 triangles)",
+                           "closed            no, 3 open edges around 1 holes, 0 edges of more than two triangles", "area              1.5 m2",
+                           "0.8 to 0.9      3         ########", "warning: 1 of 3 triangles faced the wrong way and was turned",
+                           "warning: 1 point that no triangle uses was dropped"})
+    EXPECT_TRUE(has(r.out, word)) << word << " not in\n" << r.out;
+  const auto json = test::deform({"mesh", "info", "--json", file});
+  for (const char *word : {"\"kind\": \"surface\"", "\"triangles\": 3", "\"turned\": 1", "\"holes\": 1", "\"open_edges\": 3", "\"dropped_points\": 1",
+                           "\"name\": \"side\"", "\"triangles\": 2"})
+    EXPECT_TRUE(has(json.out, word)) << word << " not in\n" << json.out;
+}
+
+TEST(MeshCommand, ConvertCellsToASurface_WritesTheBoundaryAndSaysSo) {
+  const std::string ball = folder() + "/body.msh", skin = folder() + "/skin.stl";
+  ASSERT_EQ(test::deform({"mesh", "make", "ball", "--out", ball, "--cells", "160", "--quiet"}).exit_code, 0);
+  const auto r = test::deform({"mesh", "convert", ball, skin});
+  EXPECT_EQ(r.exit_code, 0) << r.err;
+  EXPECT_TRUE(has(r.err, "not kept: 160 tetrahedra, of which .stl holds the boundary alone")) << r.err;
+  EXPECT_TRUE(has(r.err, "not kept: digits beyond single precision")) << r.err;
+  EXPECT_TRUE(has(r.out, "skin.stl: 42 points, 80 triangles, closed")) << r.out;
+  EXPECT_EQ(test::read_file(skin).size(), 84u + 50 * 80);
+  const auto json = test::deform({"mesh", "convert", "--json", ball, skin});
+  EXPECT_TRUE(has(json.out, "\"lost\": [")) << json.out;
+}
+
+TEST(MeshCommand, ConvertSurfaces_ThereAndBackKeepsTheBytes) {
+  const std::string a = folder() + "/s.ply", b = folder() + "/s.obj", c = folder() + "/s.vtu", d = folder() + "/s.off", e = folder() + "/t.ply";
+  ASSERT_EQ(test::deform({"mesh", "make", "torus", "--out", a, "--cells", "300", "--quiet"}).exit_code, 0);
+  for (const auto &[from, to] : {std::pair{a, b}, {b, c}, {c, d}, {d, e}}) ASSERT_EQ(test::deform({"mesh", "convert", from, to}).exit_code, 0);
+  EXPECT_EQ(test::read_file(a), test::read_file(e));
+}
+
+TEST(MeshCommand, ConvertWithGroups_SaysWhatIsLost) {
+  const std::string file = folder() + "/groups.obj";
+  test::write_file(file, "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 1 1 0\ng a\nf 1 2 3\ng b\nf 2 4 3\n");
+  EXPECT_TRUE(has(test::deform({"mesh", "convert", file, folder() + "/groups.off"}).err, "not kept: 2 groups of triangles")) << "OFF has none";
+  EXPECT_TRUE(has(test::deform({"mesh", "convert", file, folder() + "/groups.ply"}).err, "not kept: names of groups")) << "PLY has numbers";
+  const auto kept = test::deform({"mesh", "convert", file, folder() + "/groups.vtu"});
+  EXPECT_FALSE(has(kept.err, "not kept")) << kept.err;
+  EXPECT_TRUE(has(test::deform({"mesh", "info", folder() + "/groups.vtu"}).out, "group             b (1 triangles)"));
+}
+
+// A triangle in glTF: read where the command is built with assimp, else a sentence that says how.
+TEST(MeshCommand, ConvertForeignFormat_ReadsItOrSaysHow) {
+  const std::string file = folder() + "/triangle.gltf", out = folder() + "/triangle.obj";
+  test::write_file(file, R"({"asset":{"version":"2.0"},"scene":0,"scenes":[{"nodes":[0]}],"nodes":[{"mesh":0}],
+    "meshes":[{"primitives":[{"attributes":{"POSITION":1},"indices":0}]}],
+    "buffers":[{"uri":"data:application/octet-stream;base64,AAABAAIAAAAAAAAAAAAAAAAAAAAAAIA/AAAAAAAAAAAAAAAAAACAPwAAAAA=","byteLength":44}],
+    "bufferViews":[{"buffer":0,"byteOffset":0,"byteLength":6,"target":34963},{"buffer":0,"byteOffset":8,"byteLength":36,"target":34962}],
+    "accessors":[{"bufferView":0,"byteOffset":0,"componentType":5123,"count":3,"type":"SCALAR","max":[2],"min":[0]},
+      {"bufferView":1,"byteOffset":0,"componentType":5126,"count":3,"type":"VEC3","max":[1,1,0],"min":[0,0,0]}]})");
+  const auto r = test::deform({"mesh", "convert", file, out});
+  if (has(r.err, "built without")) {
+    expect_refused({"mesh", "convert", file, out}, {"triangle.gltf", ".gltf is read through assimp", "libassimp-dev", "DEFORM_ASSIMP=ON"});
+    EXPECT_FALSE(std::filesystem::exists(out));
+  } else {
+    EXPECT_EQ(r.exit_code, 0) << r.err;
+    EXPECT_TRUE(has(r.out, "triangle.obj: 3 points, 1 triangles")) << r.out;
+    EXPECT_TRUE(has(r.err, "not kept: materials")) << r.err;
+    test::write_file(file, "{\"asset\": ");
+    expect_refused({"mesh", "convert", file, out}, {"triangle.gltf"});
+  }
+}
+
 TEST(MeshCommand, BadInput_ExitsTwoWithOneSentence) {
   test::write_file(folder() + "/flat.vtk",
       "# vtk DataFile Version 3.0\nt\nASCII\nDATASET UNSTRUCTURED_GRID\nPOINTS 4 double\n0 0 0\n1 0 0\n0 1 0\n1 1 0\n"
       "CELLS 1 5\n4 0 1 2 3\nCELL_TYPES 1\n10\n");
-  test::write_file(folder() + "/surface.obj", "v 0 0 0\n");
-  const std::string ball = folder() + "/ball.msh";
+  test::write_file(folder() + "/points.obj", "v 0 0 0\n");
+  test::write_file(folder() + "/sheet.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n");
+  test::write_file(folder() + "/line.obj", "v 0 0 0\nv 1 0 0\nv 2 0 0\nf 1 2 3\n");
+  const std::string ball = folder() + "/never.msh", sheet = folder() + "/sheet.obj";
   expect_refused({"mesh", "info", folder() + "/none.msh"}, {"none.msh", "No such file"});
-  expect_refused({"mesh", "info", folder()}, {"ending"});
+  expect_refused({"mesh", "info", folder()}, {"directory"});
   expect_refused({"mesh", "info", folder() + "/flat.vtk"}, {"flat.vtk", "flat"});
-  expect_refused({"mesh", "info", folder() + "/surface.obj"}, {"not available yet", ".msh", ".vtk"});
-  expect_refused({"mesh", "convert", own("cube_vtk20_ascii.vtk"), folder() + "/x.obj"}, {"not available yet", ".msh"});
-  EXPECT_FALSE(std::filesystem::exists(folder() + "/x.obj"));
-  expect_refused({"mesh", "fill", folder() + "/surface.obj", "--out", ball, "--cells", "5"}, {"not available yet"});
+  expect_refused({"mesh", "info", folder() + "/points.obj"}, {"points.obj"});
+  expect_refused({"mesh", "info", folder() + "/line.obj"}, {"line.obj", "without area"});
+  expect_refused({"mesh", "convert", sheet, ball}, {"sheet.obj is a surface", "deform mesh fill"});
+  EXPECT_FALSE(std::filesystem::exists(ball));
+  expect_refused({"mesh", "convert", sheet, folder() + "/x.xyz"}, {".xyz", ".obj"});
+  expect_refused({"mesh", "convert", own("cube_vtk20_ascii.vtk"), folder() + "/x.xyz"}, {"x.xyz", ".msh"});
+  expect_refused({"mesh", "make", "torus", "--out", ball}, {"torus", "surface", "fill"});
+  expect_refused({"mesh", "make", "ball", "--surface", "--out", ball}, {"never.msh", ".obj"});
+  expect_refused({"mesh", "make", "tube", "--inner", "0.3", "--radius", "0.2", "--out", ball}, {"inner radius is 0.3 m"});
+  expect_refused({"mesh", "make", "torus", "--ring", "0.1", "--radius", "0.2", "--out", folder() + "/t.obj"}, {"torus", "0.2 m"});
   expect_refused({"mesh", "make", "ball", "--out", folder() + "/none/b.msh"}, {"none/b.msh", "No such file"});
   expect_refused({"mesh", "make", "ball", "--out", ball, "--radius", "-1"}, {"radius", "-1", "above 0"});
   expect_refused({"mesh", "make", "ball", "--out", ball, "--radius", "nan"}, {"radius"});
   expect_refused({"mesh", "make", "ball", "--out", ball, "--cells", "0"}, {"cells is 0"});
+  expect_refused({"mesh", "make", "ball", "--out", folder() + "/b.obj", "--cells", "0"}, {"triangles is 0"});
   expect_refused({"mesh", "make", "ball"}, {"--out"});
   expect_refused({"mesh", "make", "bal", "--out", ball}, {"bal", "ball"});
   expect_refused({"mesh", "inof", ball}, {"inof", "info"});

@@ -199,7 +199,7 @@ TEST(SceneErrors, Arguments_AreRefused) {
       {{"explain", folder() + "/nothing.json"}, {"nothing.json"}},
       {{"friction", "case.json"}, {"not available yet"}},
       {{"cost", "scene.json", "--budget", "1"}, {"not available yet"}},
-      {{"ccd", "q.csv"}, {"not available yet"}}};
+      {{"ccd", "q.csv"}, {"q.csv"}}};
   for (const auto &[arguments, parts] : calls) {
     std::string what;
     for (const std::string &a : arguments) what += a + " ";

@@ -155,7 +155,8 @@ double tip(int kind, double support) {
   const uint32_t n = cells.npoint();
   const double *const x = cells.points.data();
   CouplingInput in;
-  in.npoint = n, in.ntet = cells.ntet(), in.nsurfel = skin.npoint(), in.point = x, in.tet = cells.tets.data(), in.surfel = skin.points.data(), in.support = support;
+  in.npoint = n, in.ntet = cells.ntet(), in.nsurfel = skin.npoint(), in.support = support;
+  in.point = x, in.tet = cells.tets.data(), in.surfel = skin.points.data();
   const Coupling c = couple(kind, in);
   std::vector<uint32_t> held, all, end;
   for (uint32_t i = 0; i < n; ++i) {

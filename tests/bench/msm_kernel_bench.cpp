@@ -1,8 +1,11 @@
 // Time of the mass-spring forces per spring and per cell, through the plugin ABI, beside plain kernels (bound/msm_bound.h) for the
 // layouts of the points, each for every instruction set. `--csv FILE --commit ID` appends the figures; --mesh FILE takes another
-// mesh than the fine cylinder. The least of the repetitions counts: others share the machine.
+// mesh than the fine cylinder; --only options leaves out the plain kernels. The least of the repetitions counts: others share the
+// machine. Options of the model are timed against the same body without them, in turn: the median of eleven pairs counts.
 #include <benchmark/benchmark.h>
 #include <sys/utsname.h>
+
+#include <time.h>
 
 #include <fstream>
 
@@ -114,6 +117,76 @@ void plain(benchmark::State &state, Kernel kernel, int layout) {
   }
 }
 
+double thread_ns() {
+  timespec t;
+  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &t);
+  return 1e9 * double(t.tv_sec) + double(t.tv_nsec);
+}
+
+// What an option costs: median over eleven pairs of (time with it) / (time without), and its time per spring.
+struct Pair { double ratio, ns; };
+Pair cost_of(const char *isa, const Params &without, const Params &with, const Fields &fields, bool row_sums) {
+  setenv("DEFORM_SIMD", isa, 1);
+  Host host;
+  Instance plain(host, mesh(), without), option(host, mesh(), with, 4, fields);
+  unsetenv("DEFORM_SIMD");
+  if (!host.logged.empty()) return {0, 0};
+  plain.shake(1e-3, 0.1), option.shake(1e-3, 0.1);
+  std::vector<double> k(plain.size()), c(plain.size());
+  const auto time = [&](Instance &b) {
+    dfm_kin kin = b.kin();
+    kin.state_out = b.state_out.data();
+    double h = 1;
+    double least = 1e300;
+    for (int run = 0; run < 6; ++run) {
+      const double start = thread_ns();
+      for (int n = 0; n < 20; ++n) {
+        if (row_sums) b.ops->bound(b.self, &kin, k.data(), c.data(), &h);
+        else b.ops->add_forces(b.self, &kin, b.f);
+      }
+      least = std::min(least, (thread_ns() - start) / 20);
+    }
+    return least;
+  };
+  time(plain), time(option);
+  std::vector<double> ratio, ns;
+  for (int n = 0; n < 11; ++n) {
+    const bool first = n % 2;
+    const double a = first ? time(option) : time(plain), b = first ? time(plain) : time(option);
+    ratio.push_back(first ? a / b : b / a), ns.push_back(first ? a : b);
+  }
+  std::nth_element(ratio.begin(), ratio.begin() + 5, ratio.end()), std::nth_element(ns.begin(), ns.begin() + 5, ns.end());
+  return {ratio[5], ns[5] / springs()};
+}
+
+void print_options(std::ofstream &out, const std::string &head) {
+  const auto make = [](double damp, double slope, bool form_a, int damper) {
+    Params p = {1e5, 0.3, damp, 0, 0};
+    p.slope = slope, p.axis = {1, 2, 3}, p.form_a = form_a, p.damper = damper;
+    return p;
+  };
+  const std::vector<double> uneven(mesh().ncell(), 0.002);
+  const struct { const char *name; Params without, with; Fields fields; bool rows; } options[] = {
+      {"anisotropic_B", make(0, 0, false, 0), make(0, 2, false, 0), {}, false},
+      {"anisotropic_B_damped", make(0.002, 0, false, 0), make(0.002, 2, false, 0), {}, false},
+      {"anisotropic_A", make(0, 0, false, 0), make(0, 2, true, 0), {}, false},
+      {"anisotropic_A_damped", make(0.002, 0, false, 0), make(0.002, 2, true, 0), {}, false},
+      {"anisotropic_B_bound", make(0, 0, false, 0), make(0, 2, false, 0), {}, true},
+      {"damping_by_cell", make(0.002, 0, false, 0), make(0.002, 0, false, 0), {{"damping_stiffness", uneven}}, false},
+      {"maxwell", make(0.002, 0, false, 0), make(0, 0, false, 1), {}, false},
+      {"sls", make(0.002, 0, false, 0), make(0, 0, false, 2), {}, false},
+      {"the_same", make(0.002, 0, false, 0), make(0.002, 0, false, 0), {}, false}};
+  std::printf("\noptions, time with over time without, median of eleven pairs (the_same: what the machine's noise leaves)\n");
+  for (const char *isa : {"sse2", "avx2", "avx512"})
+    for (const auto &o : options) {
+      const Pair p = cost_of(isa, o.without, o.with, o.fields, o.rows);
+      if (p.ratio == 0) continue;
+      std::printf("  %-7s %-28s %7.3f  %7.2f ns per spring\n", isa, o.name, p.ratio, p.ns);
+      if (!out.is_open()) continue;
+      out << head << isa << ",option_" << o.name << "_ratio," << p.ratio << ",\n" << head << isa << ",option_" << o.name << "," << p.ns << ",\n";
+    }
+}
+
 // Collects the least time of each benchmark.
 struct Reporter : benchmark::ConsoleReporter {
   std::vector<std::pair<std::string, double>> least;
@@ -183,16 +256,21 @@ void print(const Reporter &r, const std::string &csv, const std::string &commit,
     row(isa, "plugin_bound_of_step", 0, r.of("plugin_bound" + at) / nc);
     std::printf("  %-7s speed against the best plain kernel: %.0f %%\n", isa, 100 * best / (damped / ns));
   }
+  std::ostringstream head;
+  head << processor() << "," << kCompiler << "," << commit << "," << mesh_name << "," << mesh().npoint() << "," << ns << "," << nc << ",";
+  print_options(out, head.str());
 }
 
 }  // namespace
 
 int main(int argc, char **argv) {
   std::string csv, commit = "unknown", path = test::shared_dir() + "/meshes/thesis/cyl_fine.msh", name = "cyl_fine.msh";
+  bool only_options = false;
   for (int n = 1; n + 1 < argc; n += 2) {
     const std::string key = argv[n];
     if (key == "--csv") csv = argv[n + 1];
     if (key == "--commit") commit = argv[n + 1];
+    if (key == "--only") only_options = argv[n + 1] == std::string("options");
     if (key == "--mesh") path = argv[n + 1], name = path.substr(path.rfind('/') + 1);
   }
   if (std::ifstream(path).good()) mesh() = read_msh(path);
@@ -218,6 +296,6 @@ int main(int argc, char **argv) {
   int none = 1;
   benchmark::Initialize(&none, argv);
   Reporter reporter;
-  benchmark::RunSpecifiedBenchmarks(&reporter);
+  if (!only_options) benchmark::RunSpecifiedBenchmarks(&reporter);
   print(reporter, csv, commit, name);
 }

@@ -1,29 +1,67 @@
-// Any bytes as a mesh file: an error with a sentence, or a mesh whose numbers hold together; never a crash, never much memory.
+// Any bytes as a mesh file, one program per reader (DEFORM_FUZZ_READER): an error with a sentence, or a mesh whose numbers hold together; never
+// a crash, never more memory than a small multiple of the bytes.
+#include <algorithm>
 #include <cmath>
+#include <cstdlib>
 
-#include "deform/deform.h"
-#include "fuzz_file.h"
+#include "mesh/raw_mesh.h"
 
-static void check(dfm_tetmesh mesh) {
-  dfm_tetmesh_info info = {};
-  info.size = sizeof info;
-  const double *points = nullptr;
-  const uint32_t *tets = nullptr;
-  if (dfm_tetmesh_get_info(mesh, &info) != DFM_OK || dfm_tetmesh_data(mesh, &points, &tets, nullptr) != DFM_OK) std::abort();
-  for (uint32_t i = 0; i < 3 * info.npoint; ++i)
-    if (!std::isfinite(points[i])) std::abort();
-  for (uint32_t i = 0; i < 4 * info.ntet; ++i)
-    if (tets[i] >= info.npoint) std::abort();
+namespace {
+
+// Compressed arrays may unpack to 64 times their file; a polygon's corner of one byte stands for a triangle, which repair sorts.
+constexpr size_t kMultiple = 256, kBase = 65536;
+
+struct Capped {
+  size_t held = 0, cap = 0;
+  dfm::Memory hooks;
+  Capped() {
+    hooks.user = this;
+    hooks.alloc = [](void *user, size_t bytes, size_t align) -> void * {
+      Capped &m = *static_cast<Capped *>(user);
+      if (bytes > m.cap - std::min(m.cap, m.held)) std::abort();
+      m.held += bytes;
+      return std::aligned_alloc(align, (std::max<size_t>(bytes, 1) + align - 1) / align * align);
+    };
+    hooks.release = [](void *user, void *p, size_t bytes, size_t) {
+      static_cast<Capped *>(user)->held -= bytes;
+      std::free(p);
+    };
+  }
+};
+
+template <class Mesh>
+void check(const Mesh &mesh, const dfm::Array<uint32_t> &corners, const dfm::Array<uint32_t> &group) {
+  for (const double x : mesh.points)
+    if (!std::isfinite(x)) std::abort();
+  for (const uint32_t p : corners)
+    if (p >= mesh.npoint()) std::abort();
+  for (const uint32_t g : group)
+    if (g != dfm::kNoGroup && g >= mesh.groups.size()) std::abort();
+  for (const dfm::MeshGroup &g : mesh.groups)
+    for (const uint32_t p : g.points)
+      if (p >= mesh.npoint()) std::abort();
 }
 
+}  // namespace
+
 extern "C" int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
-  dfm_context *const context = fuzz::context();
-  for (const char *ending : {".msh", ".vtk"}) {
-    const fuzz::File file(data, size, ending);
-    dfm_tetmesh mesh = 0;
-    const dfm_status status = dfm_tetmesh_read(context, file.path(), &mesh);
-    if (status == DFM_OK) check(mesh), dfm_tetmesh_destroy(mesh);
-    else if (dfm_last_error()[0] == 0) std::abort();
+  Capped memory;
+  memory.cap = kBase + kMultiple * size;
+  try {
+    dfm::RawMesh raw(memory.hooks);
+    dfm::Cursor in("fuzz", reinterpret_cast<const char *>(data), size);
+    dfm::DEFORM_FUZZ_READER(in, raw);
+    check(raw, raw.tets, raw.tet_group), check(raw, raw.tris, raw.tri_group);
+    if (raw.tets.size() != 4 * raw.tet_group.size() || raw.tris.size() != 3 * raw.tri_group.size()) std::abort();
+    if (raw.tets.empty()) {
+      const dfm::TriMesh mesh = dfm::finish_surface("fuzz", std::move(raw));
+      check(mesh, mesh.tris, mesh.tri_group);
+    } else {
+      const dfm::TetMesh mesh = dfm::finish_mesh("fuzz", std::move(raw));
+      check(mesh, mesh.tets, mesh.tet_group), check(mesh, mesh.tris, mesh.tri_group);
+    }
+  } catch (const dfm::Error &e) {
+    if (e.sentence.empty()) std::abort();
   }
   return 0;
 }

@@ -68,10 +68,13 @@ def public_only(tree):
 
 
 def plugin_includes(tree):
-    """A plugin is built from plugin.h alone: what it needs more, a stranger's plugin would not have."""
+    """A plugin is built from plugin.h alone: what it needs more, a stranger's plugin would not have. Plugins of one kind may share headers in
+    plugins/KIND_common, which hold no .cpp."""
     for path in tree.select("plugins/"):
         for line, quote, name in includes(tree.text(path)):
-            own = quote == '"' and ".." not in name and _resolves(tree, path, name)
+            common = re.match(r"\.\./([a-z]+)_common/[a-z0-9_]+\.h$", name)
+            shared = common and path.startswith(f"plugins/{common.group(1)}_") and f"plugins/{name[3:]}" in tree.paths
+            own = quote == '"' and (".." not in name and _resolves(tree, path, name) or shared)
             if quote == "<" and not name.startswith("deform/") or name in PLUGIN_HEADERS or own:
                 continue
             yield path, line, f"includes {name}; a plugin includes {', '.join(PLUGIN_HEADERS)}, its own files and header-only third parties"

@@ -2,10 +2,13 @@
 #include <cstring>
 #include <random>
 
-#include "tiny_support.h"
+#include "set_valued_rig.h"
 
+using tiny::Answer;
 using tiny::Batch;
 using tiny::Context;
+using tiny::one_contact;
+using tiny::Rig;
 
 namespace {
 
@@ -30,16 +33,8 @@ struct Parameters {
   double level(double fn, double w) const { return fn * (mu_c + (mu_s - mu_c) * std::exp(-std::pow(w / v_s, delta))); }
 };
 
-struct Answer { double fx, fy, limit; int mode; double dv[4], dn[2]; };
-
-// One contact: normal force, slip, stopping force, area. Straight to the plugin, so that a NaN comes back to be looked at.
 Answer ask(const dfm_friction &ops, const Parameters &p, double fn, double vx, double vy, double sx, double sy, double area = 1) {
-  Batch b(1, p.values());
-  b.fn[0] = fn, b.vt[0] = vx, b.vt[b.stride] = vy, b.stop[0] = sx, b.stop[b.stride] = sy, b.area[0] = area;
-  EXPECT_EQ(ops.eval(&b.in, &b.out), DFM_OK);
-  Answer a{b.ft[0], b.ft[b.stride], b.limit[0], b.mode[0], {}, {b.dn[0], b.dn[b.stride]}};
-  for (int k = 0; k < 4; ++k) a.dv[k] = b.dv[k * b.stride];
-  return a;
+  return one_contact(ops, p.values(), fn, vx, vy, sx, sy, area);
 }
 
 // A slip whose stopping force lies well outside the cone.
@@ -299,33 +294,17 @@ TEST_F(Coulomb, ClosedLoops_Dissipate) {
   }
 }
 
-// A mass on a plane by the law alone: implicit step m (v' - v)/h = f + ft with the stopping force of the step.
-struct Rig {
-  double m = 1, v = 0, x = 0;
-  void step(const dfm_friction &ops, const Parameters &p, double h, double f, double fn) {
-    const double free = v + h * f / m;
-    double u = free;  // the slip under the friction force: fixed point of the smooth part, at once for plain Coulomb
-    for (int pass = 0; pass < 30; ++pass) {
-      const Answer a = ask(ops, p, fn, pass == 0 ? free : u, 0, -m * free / h, 0);
-      const double next = a.mode == 1 ? 0 : free + h * a.fx / m;
-      if (next == u && pass) break;
-      u = next;
-    }
-    v = u, x += h * v;
-  }
-};
-
 TEST_F(Coulomb, BlockBelowTheConeAngle_NeverMoves) {
   Rig rig;
   const double angle = std::atan(0.5) - 1e-9;
-  for (int i = 0; i < 60000; ++i) rig.step(*ops, Parameters{}, 1e-3, 9.81 * std::sin(angle), 9.81 * std::cos(angle));
+  for (int i = 0; i < 60000; ++i) rig.step(*ops, Parameters{}.values(), 1e-3, 9.81 * std::sin(angle), 9.81 * std::cos(angle));
   EXPECT_EQ(rig.x, 0);
 }
 
 TEST_F(Coulomb, SlidingBlock_AcceleratesByGravityLessFriction) {
   Rig rig;
   const double angle = 0.6, expected = 9.81 * (std::sin(angle) - 0.5 * std::cos(angle));
-  for (int i = 0; i < 1000; ++i) rig.step(*ops, Parameters{}, 1e-3, 9.81 * std::sin(angle), 9.81 * std::cos(angle));
+  for (int i = 0; i < 1000; ++i) rig.step(*ops, Parameters{}.values(), 1e-3, 9.81 * std::sin(angle), 9.81 * std::cos(angle));
   EXPECT_NEAR(rig.v, expected, 1e-12);
 }
 
@@ -333,7 +312,7 @@ TEST_F(Coulomb, ThrownBlock_StopsWhereTheEnergyIsSpent) {
   Rig rig;
   rig.v = 2;
   const double h = 1e-4;
-  for (int i = 0; i < 10000; ++i) rig.step(*ops, Parameters{}, h, 0, 9.81);
+  for (int i = 0; i < 10000; ++i) rig.step(*ops, Parameters{}.values(), h, 0, 9.81);
   EXPECT_EQ(rig.v, 0);
   EXPECT_NEAR(rig.x, 2 * 2 / (2 * 0.5 * 9.81), 2 * h);
 }
@@ -347,7 +326,7 @@ TEST_F(Coulomb, StickSlipPeriod_MatchesTheClosedForm) {
   std::vector<double> starts;
   for (int i = 0; i < 320000; ++i) {
     const bool stuck = rig.v == 0;
-    rig.step(*ops, levels, h, k * (pull * i * h - rig.x), 1);
+    rig.step(*ops, levels.values(), h, k * (pull * i * h - rig.x), 1);
     if (stuck && rig.v != 0) starts.push_back(i * h);
   }
   ASSERT_GE(starts.size(), 4u);

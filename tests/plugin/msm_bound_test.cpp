@@ -53,12 +53,26 @@ struct Operator {
   }
 };
 
+Params tilted(double damping, double volume, double slope, bool form_a, bool stiffer = false) {
+  Params p = {1e5, 0.4, damping, 0, volume};
+  p.slope = slope, p.axis = {1, 1, 0.3}, p.form_a = form_a, p.stiffer = stiffer;
+  return p;
+}
+
 TEST(MsmBound, RowSums_BoundTheTrueSpectrumInEveryShape) {
-  for (const Params &p : {Params{1e5, 0.3, 0, 0, 0}, Params{1e5, 0.3, 0.004, 3, 0}, Params{1e5, 0.45, 0.001, 0, 1},
-                          Params{1e5, 0.45, 0, 0, 20}})
+  const Mesh mesh = kuhn_bar(4, 2, 2, 0.1, 0.2);
+  Fields uneven;
+  for (uint32_t c = 0; c < mesh.ncell(); ++c) {
+    uneven["damping_stiffness"].push_back(c % 3 ? 0 : 0.01), uneven["young"].push_back(c % 2 ? 1e5 : 3e4);
+    uneven["volume"].push_back(c % 4), uneven["damping_mass"].push_back(c % 5), uneven["anisotropy_slope"].push_back(c % 6);
+  }
+  for (const auto &[p, fields] : std::initializer_list<std::pair<Params, Fields>>{
+           {{1e5, 0.3, 0, 0, 0}, {}}, {{1e5, 0.3, 0.004, 3, 0}, {}}, {{1e5, 0.45, 0.001, 0, 1}, {}}, {{1e5, 0.45, 0, 0, 20}, {}},
+           {tilted(0, 0, 2, false), {}}, {tilted(0.004, 0, 2, false), {}}, {tilted(0.004, 1, 10, false), {}}, {tilted(0, 0, 2, true), {}},
+           {tilted(0.004, 0, 10, true), {}}, {tilted(0.01, 0, 1, false, true), {}}, {tilted(0.01, 1, 1, true, true), {}}, {{}, uneven}})
     for (double size : {1.0, 0.3, 2.0, -1.0}) {
       Host host;
-      Instance b(host, kuhn_bar(4, 2, 2, 0.1, 0.2), p);
+      Instance b(host, mesh, p, 4, fields);
       std::mt19937 random(9);
       std::uniform_real_distribution<double> noise(-0.03, 0.03);
       for (uint32_t i = 0; i < b.size(); ++i) {  // squeezed, stretched, turned inside out, and shaken
@@ -66,7 +80,7 @@ TEST(MsmBound, RowSums_BoundTheTrueSpectrumInEveryShape) {
         b.set(b.x, i, {size * x[0] + noise(random), x[1] + noise(random), std::sqrt(std::abs(size)) * x[2] + noise(random)});
       }
       const double h = b.bound(), value = Operator(b).largest(h, 300);
-      EXPECT_LE(value, 4 * (1 + 1e-6)) << p.volume << " " << size;
+      EXPECT_LE(value, 4 * (1 + 1e-6)) << p.volume << " " << p.slope << " " << p.form_a << " " << size;
     }
 }
 
@@ -106,7 +120,7 @@ double growth(Instance &b, double h, int steps) {
 
 TEST(MsmBound, FreeVibration_IsBoundedAtTheBoundAndGrowsAtTwiceTheTrueLimit) {
   for (const Params &p : {Params{1e5, 0.3, 0, 0, 0}, Params{1e5, 0.3, 0.002, 0, 0}, Params{1e5, 0.45, 0, 0, 1},
-                          Params{1e5, 0.45, 0.002, 1, 1}}) {
+                          Params{1e5, 0.45, 0.002, 1, 1}, tilted(0, 0, 2, false), tilted(0.002, 0, 2, true), tilted(0.002, 0, 1, false, true)}) {
     Host host;
     const Mesh mesh = kuhn_bar(4, 2, 2, 0.1, 0.2);
     double bound, limit;

@@ -1,7 +1,7 @@
 // A toy self-stepping model in contact, through dfm.stepper/1: a body that only translates. Its answers are those of a point mass, so
 // every figure has a closed form.
 #define DFM_STATIC_PLUGIN toy_stepper
-#include "world.h"
+#include "coupled.h"
 
 namespace {
 
@@ -95,11 +95,11 @@ struct World {
   test::Context context;
   dfm_world world;
   dfm_body body;
-  World(double mu, std::array<double, 3> gravity, double z) {
+  World(double mu, std::array<double, 3> gravity, double z, const dfm_surface_def *surface = nullptr) {
     test::ok(dfm_plugin_register_static(context, dfm_plugin_entry_toy_stepper, "toy_stepper"));
     world = test::make_world(context, gravity);
     test::BodyOptions o;
-    o.name = "toy", o.model = "toy_stepper", o.position = {0, 0, z};
+    o.name = "toy", o.model = "toy_stepper", o.position = {0, 0, z}, o.surface = surface;
     body = test::make_body(context, world, "beam", {0.1, 0.1, 0.1}, 60, o);
     test::add_plane(world, "floor");
     test::set_friction(world, mu);
@@ -117,6 +117,22 @@ TEST(Stepper, DroppedOnAFloor_RestsAtTheOffsetAndCarriesItsWeight) {
   uint32_t n = 0;
   ASSERT_EQ(dfm_world_pairs(w.world, 1, &pair, &n), DFM_OK) << dfm_last_error();
   EXPECT_NEAR(pair.normal, m.mass * 9.81, 1e-3 * m.mass * 9.81);
+}
+
+// Its surface hangs on its points through N: positions come from the host, velocities from the model.
+TEST(Stepper, WithASurfaceOfItsOwn_RestsOnItsSurfels) {
+  const test::Skin skin = test::box_skin({0.1, 0.1, 0.1}, 5);   // no multiple of the cells
+  const dfm_surface_def surface = skin.def();
+  World w(0.5, {0, 0, -9.81}, 0.01, &surface);
+  test::run(w.world, 1.0, 1e-3);
+  const dfm_body_measure m = test::measure(w.body);
+  EXPECT_LT(m.speed_max, 1e-9);
+  dfm_pair_report pair{};
+  uint32_t n = 0;
+  ASSERT_EQ(dfm_world_pairs(w.world, 1, &pair, &n), DFM_OK) << dfm_last_error();
+  EXPECT_NEAR(pair.normal, m.mass * 9.81, 1e-3 * m.mass * 9.81);
+  EXPECT_GE(pair.count, 3u) << "of 36 below that could carry it";
+  EXPECT_NEAR(m.com[2], 0.05 + 2e-5, 1e-9) << "d_c: a thousandth of the surface's median edge, 0.02 m";
 }
 
 TEST(Stepper, OnASlope_SlidesWithCoulombsAcceleration) {

@@ -73,7 +73,8 @@ TEST(CoupledBodies, TenJitteredDrops_NeverCross) {
   std::mt19937 random(11);
   std::uniform_real_distribution<double> jitter(-0.02, 0.02);
   for (int run = 0; run < 10; ++run) {
-    Pair p(run % 3 == 2 ? DFM_COUPLING_MLS : DFM_COUPLING_BARYCENTRIC, 1.5, {0, 0, -9.81}, {jitter(random), jitter(random), 0.5 * std::fabs(jitter(random))}, 0.5);
+    const double x = jitter(random), y = jitter(random), z = 0.5 * std::fabs(jitter(random));
+    Pair p(run % 3 == 2 ? DFM_COUPLING_MLS : DFM_COUPLING_BARYCENTRIC, 1.5, {0, 0, -9.81}, {x, y, z}, 0.5);
     test::add_plane(p.world, "floor");
     size_t crossed = 0;
     for (int i = 0; i < 50; ++i) test::run(p.world, 3e-3, 1e-3), crossed += crossings(p.bodies);

@@ -4,6 +4,7 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <filesystem>
 #include <limits>
@@ -31,6 +32,7 @@ class SceneRun {
     summary_ = read_file(out_ + "/summary.json");
     bodies_ = read_csv(out_ + "/bodies.csv");
     probes_ = read_csv(out_ + "/probes.csv");
+    contacts_ = read_csv(out_ + "/contacts.csv");
     std::filesystem::remove_all(out_);
   }
 
@@ -74,6 +76,22 @@ class SceneRun {
     return {0, 0, 0};
   }
 
+  // Sum of the normal forces between a side and its partners in the last record.
+  double contact_force(const std::string &side) const {
+    double sum = 0;
+    for (const auto &c : contacts_)
+      if (c.size() == 10 && c[0] == contacts_.back()[0] && (c[1] == side || c[2] == side)) sum += std::stod(c[5]);
+    return sum;
+  }
+  // All places of a probe: t, x, y, z.
+  std::vector<std::array<double, 4>> probe_rows(const std::string &name) const {
+    std::vector<std::array<double, 4>> rows;
+    for (const auto &c : probes_)
+      if (c.size() == 8 && c[1] == name) rows.push_back({std::stod(c[0]), std::stod(c[2]), std::stod(c[3]), std::stod(c[4])});
+    EXPECT_FALSE(rows.empty()) << "no probe " << name;
+    return rows;
+  }
+
   // What holds in every scene: finite, no crossing triangle pair in any recorded state, and at least so many contacts, so that something
   // was tested.
   void expect_sound(double least_contacts, const std::string &what) const {
@@ -85,7 +103,7 @@ class SceneRun {
 
  private:
   std::string out_, summary_;
-  std::vector<std::vector<std::string>> bodies_, probes_;
+  std::vector<std::vector<std::string>> bodies_, probes_, contacts_;
 };
 
 // Runs with seeds from..to: sound, criterion met by each, and no two alike.

@@ -14,5 +14,6 @@
 #include "deform/plugin.h"
 #include "deform/scene.h"
 #include "deform/surface.h"
+#include "deform/toi.h"
 #include "deform/world.h"
 #endif

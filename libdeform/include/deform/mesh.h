@@ -6,7 +6,8 @@
 #ifdef __cplusplus
 extern "C" {
 #endif
-/** Reads MSH 2.2 and 4.1 (ASCII, binary) and legacy VTK (ASCII, binary; 2.0 to 5.1) with tetrahedra. Memory is bounded by the file's size.
+/** Reads the tetrahedra of MSH 2.2 and 4.1, legacy VTK 2.0 to 5.1, VTU and Medit files (ASCII and binary; doc/concepts/mesh_files.md). What a
+ * file is its first bytes say, else its name's ending. Memory is bounded by the file's size.
  * Negative cells are turned, unused points and duplicate cells dropped, each with a count in a warning on the log and in dfm_tetmesh_info.
  * A cell without volume is refused: it has no rest shape.
  * @return DFM_OK; DFM_E_IO; DFM_E_FORMAT (file, line or byte, what was expected); DFM_E_UNSUPPORTED (how to convert); DFM_E_NOMEM
@@ -42,8 +43,9 @@ DFM_API dfm_status dfm_tetmesh_groups(dfm_tetmesh mesh, const char *const **name
  * @param points     out, borrowed, [n]. Each out may be NULL
  * @return DFM_OK; DFM_E_ARG no such group; DFM_E_HANDLE. Threads: Any thread. Since 0.1. */
 DFM_API dfm_status dfm_tetmesh_group_points(dfm_tetmesh mesh, uint32_t group, uint32_t *dimension, const uint32_t **points, uint32_t *n);
-/** Writes binary MSH 4.1 ("*.msh"), MSH 2.2 ("*.msh2") or legacy VTK ("*.vtk", without groups) by file name ending; to a temporary
- * name first, so never half a file. Groups of points, lines and triangles are not written.
+/** Writes binary MSH 4.1 ("*.msh"), MSH 2.2 ("*.msh2"), legacy VTK ("*.vtk"), VTU ("*.vtu") or Medit ("*.mesh", groups by number alone) by
+ * file name ending; to a temporary name first, so never half a file. Groups of cells and of triangles are kept in all of them, groups of
+ * points in MSH, groups of lines in none.
  * @return DFM_OK; DFM_E_IO; DFM_E_UNSUPPORTED another ending. Threads: Any thread. Since 0.1. */
 DFM_API dfm_status dfm_tetmesh_write(dfm_tetmesh mesh, const char *path);
 /** Place of each cell among the file's tetrahedra, [ntet], from 0; NULL where reading dropped none (they stand as in the file). Borrowed.
@@ -87,6 +89,7 @@ DFM_API dfm_status dfm_trimesh_data(dfm_trimesh mesh, const double **points, con
  * Each out may be NULL; valid while the mesh lives. Threads: Any thread. Since 0.2. */
 DFM_API dfm_status dfm_trimesh_groups(dfm_trimesh mesh, const char *const **names, const uint32_t **triangle_group);
 /** Writes OBJ, PLY (binary), STL (binary), OFF, legacy VTK or VTU by file name ending; to a temporary name first, so never half a file.
+ * Groups survive in OBJ, VTK and VTU, in PLY by number. STL holds single precision.
  * @return DFM_OK; DFM_E_IO; DFM_E_UNSUPPORTED another ending. Threads: Any thread. Since 0.2. */
 DFM_API dfm_status dfm_trimesh_write(dfm_trimesh mesh, const char *path);
 

@@ -26,6 +26,8 @@ inline Vec3 normalized(Vec3 a) {
   const double n = norm(a);
   return n > 0 ? (1 / n) * a : Vec3{};
 }
+// Signed volume of a tetrahedron: positive where a, b, c run counter-clockwise seen from d's other side.
+inline double tet_volume(Vec3 a, Vec3 b, Vec3 c, Vec3 d) { return dot(cross(b - a, c - a), d - a) / 6; }
 // A unit vector orthogonal to the unit vector n; depends on n alone, so that equal frames come out equal.
 inline Vec3 any_tangent(Vec3 n) {
   const double ax = std::fabs(n.x), ay = std::fabs(n.y), az = std::fabs(n.z);

@@ -142,6 +142,7 @@ void add_warnings(TetMesh &mesh, uint32_t crowded) {
   if (s.duplicate_points)
     warn(format("%u point%s %s exactly at another point's place; cells that meet there are not joined", s.duplicate_points,
                 plural(s.duplicate_points), s.duplicate_points == 1 ? "lies" : "lie"));
+  if (s.npiece > 1) warn(format("the mesh has %u pieces that share no point and move apart", s.npiece));
   if (s.nonmanifold_edges)
     warn(format("%u edge%s of the surface %s used by more than two triangles", s.nonmanifold_edges, plural(s.nonmanifold_edges),
                 is_are(s.nonmanifold_edges)));
@@ -202,7 +203,8 @@ std::string coarse_coordinates(const double lo[3], const double hi[3], double ed
 TetMesh finish_mesh(const std::string &path, RawMesh &&raw) {
   TetMesh mesh(*raw.memory);
   if (raw.tets.empty() && !raw.tris.empty())
-    fail(DFM_E_FORMAT, "%s: no tetrahedra in this file, only a surface of %u triangles; fill it first: deform mesh fill FILE OUT.msh", path.c_str(), raw.ntri());
+    fail(DFM_E_FORMAT, "%s: no tetrahedra in this file, only a surface of %u triangles; fill it first: deform mesh fill %s --out OUT.msh",
+         path.c_str(), raw.ntri(), path.c_str());
   if (raw.tets.empty()) fail(DFM_E_FORMAT, "%s: no tetrahedra in this file; a body needs a volume mesh or a closed surface", path.c_str());
   check_points(path, raw.points);
   refuse_flat(path, raw);

@@ -169,7 +169,7 @@ uint32_t split_beside_flat(RawMesh &raw) {
 // differ at their rim: across it a triangle listed twice has one neighbour, a wall two. A sheet that is doubled everywhere keeps one side.
 class Walls {
  public:
-  Walls(const RawMesh &raw, const Array<uint8_t> &drop, const Array<uint8_t> &twice) : raw_(raw), parent_(count(raw)) {
+  Walls(const RawMesh &raw, const Array<uint8_t> &drop, const Array<uint8_t> &twice) : parent_(count(raw)) {
     for (uint32_t t = 0; t < parent_.size(); ++t) parent_[t] = t;
     wall_.assign(parent_.size(), 0), not_wall_ = wall_;
     const Array<TriEdge> edges = sorted_edges(*raw.memory, count(raw), raw.tris.data());
@@ -193,7 +193,6 @@ class Walls {
     while (parent_[t] != t) t = parent_[t] = parent_[parent_[t]];
     return t;
   }
-  const RawMesh &raw_;
   std::vector<uint32_t> parent_;
   std::vector<uint8_t> wall_, not_wall_;
 };

@@ -66,9 +66,9 @@ TriMesh make_ball_surface(const Memory &memory, double radius, uint32_t triangle
   const uint32_t n = rounded(std::sqrt(triangles / 20.0));
   const Icosahedron ico;
   Soup soup(memory);
-  for (const auto &[a, b, c] : ico.face) {
+  for (const auto &face : ico.face) {
     const auto at = [&](uint32_t i, uint32_t j) {
-      return radius * normalized(double(n - i - j) * ico.corner[a] + double(i) * ico.corner[b] + double(j) * ico.corner[c]);
+      return radius * normalized(double(n - i - j) * ico.corner[face[0]] + double(i) * ico.corner[face[1]] + double(j) * ico.corner[face[2]]);
     };
     for (uint32_t i = 0; i < n; ++i)
       for (uint32_t j = 0; i + j < n; ++j) {
@@ -164,8 +164,10 @@ TriMesh make_tube_surface(const Memory &memory, double inner, double outer, doub
 TriMesh make_torus_surface(const Memory &memory, double ring, double radius, uint32_t triangles) {
   check_size("torus's ring radius", ring), check_size("torus's tube radius", radius), check_triangles(triangles);
   if (!(radius < ring)) fail(DFM_E_ARG, "the torus's tube radius is %g m; expected less than the ring radius, %g m", radius, ring);
-  const double edge = std::sqrt(kTwoPi * ring * kTwoPi * radius / triangles / (0.5 * kRow));
-  const uint32_t around = std::max(3u, rounded(kTwoPi * radius / edge)), along = 2 * std::max(2u, rounded(0.5 * kTwoPi * ring / (edge * kRow)));
+  const double small = std::sqrt(radius / ring * (triangles * 0.5 * kRow));  // around the tube, in edges, where both ways have the same
+  const auto whole = [](double n) { return rounded(std::min(n, 1e7)); };
+  const uint32_t around = std::max(3u, whole(small)), along = 2 * std::max(2u, whole(small * (ring / radius) / (2 * kRow)));
+  check_choice("torus", 2.0 * around * along, triangles);
   Soup soup(memory);
   const auto at = [&](uint32_t i, uint32_t j) {  // odd rows are shifted by half a step
     const Vec3 u = unit_on_circle(2 * uint64_t(j % around) + i % 2, 2 * uint64_t(around)), v = unit_on_circle(i % along, along);

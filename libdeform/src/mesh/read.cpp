@@ -23,9 +23,9 @@ constexpr const char *kCad = "it is a shape without cells; mesh it first: gmsh -
 
 const std::vector<Format> &formats() {
   static const std::vector<Format> all{
-      {"MSH (gmsh)", {"msh", "msh2"}, read_msh, nullptr},
+      {"MSH", {"msh", "msh2"}, read_msh, nullptr},
       {"legacy VTK", {"vtk"}, read_vtk, nullptr},
-      {"VTU (XML)", {"vtu", "vtp"}, read_vtu, nullptr},
+      {"VTU", {"vtu", "vtp"}, read_vtu, nullptr},
       {"Medit", {"mesh"}, read_medit, nullptr},
       {"OBJ", {"obj"}, read_obj, nullptr},
       {"PLY", {"ply"}, read_ply, nullptr},
@@ -92,7 +92,7 @@ const Format *format_by_content(std::string_view bytes) {
   head.remove_prefix(std::min(head.find_first_not_of(" \t\r\n"), head.size()));
   if (starts(head, "# vtk DataFile")) return format_called("legacy VTK");
   if (starts(head, "<?xml") || starts(head, "<VTKFile") || starts(head, "<!--")) {
-    if (head.find("<VTKFile") != head.npos) return format_called("VTU (XML)");
+    if (head.find("<VTKFile") != head.npos) return format_called("VTU");
     return format_called(head.find("<COLLADA") != head.npos ? "COLLADA" : head.find("<X3D") != head.npos ? "X3D or Blender" : "");
   }
   while (starts(head, "#")) {  // OFF and Medit may begin with comments
@@ -100,7 +100,7 @@ const Format *format_by_content(std::string_view bytes) {
     head.remove_prefix(std::min(head.find_first_not_of(" \t\r\n"), head.size()));
   }
   const std::string_view word = head.substr(0, head.find_first_of(" \t\r\n"));
-  if (word == "$MeshFormat" || word == "$NOD" || word == "$Comments") return format_called("MSH (gmsh)");
+  if (word == "$MeshFormat" || word == "$NOD" || word == "$Comments") return format_called("MSH");
   if (word == "MeshVersionFormatted") return format_called("Medit");
   if (word == "ply") return format_called("PLY");
   if (word == "OFF" || word == "COFF" || word == "NOFF" || word == "CNOFF" || word == "STOFF") return format_called("OFF");
@@ -116,8 +116,8 @@ const Format &choose(const std::string &path, std::string_view bytes, RawMesh &r
   if (bytes.empty()) fail(DFM_E_FORMAT, "%s: the file is empty; expected a mesh (%s)", path.c_str(), readable().c_str());
   const Format *const found = seen ? seen : named;
   const bool lies = seen && seen != named;
-  const std::string although = !lies ? "" : end.empty() ? " (as its first bytes show; the name has no ending)"
-                                                        : format(" (as its first bytes show, although its name ends in .%s)", end.c_str());
+  const std::string although = !lies ? "" : end.empty() ? ", as its first bytes show, although its name has no ending"
+                                                        : format(", as its first bytes show, although its name ends in .%s", end.c_str());
   if (!found) {
     std::vector<std::string> known;
     for (const Format &f : formats())
@@ -127,7 +127,7 @@ const Format &choose(const std::string &path, std::string_view bytes, RawMesh &r
          near.empty() ? "" : (", did you mean ." + near + "?").c_str(), readable().c_str());
   }
   if (!found->read)
-    fail(DFM_E_UNSUPPORTED, "%s: this is a %s file%s, which is not read; %s", path.c_str(), found->name, although.c_str(), found->advice);
+    fail(DFM_E_UNSUPPORTED, "%s: this is a %s file%s; it is not read; %s", path.c_str(), found->name, although.c_str(), found->advice);
   if (lies) raw.warnings.push_back(format("read as %s%s", found->name, although.c_str()));
   return *found;
 }

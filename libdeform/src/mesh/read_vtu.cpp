@@ -37,6 +37,7 @@ class VtuReader {
 
  private:
   void find_head() {
+    packing_.file_bytes = in_.left();
     auto tag = next_tag(in_);
     if (!tag || tag->name != "VTKFile") in_.refuse("expected <VTKFile> first, found %s", Cursor::quote(tag ? tag->name : "").c_str());
     const std::string_view type = tag->get("type");

@@ -58,10 +58,8 @@ Array<uint32_t> unique_edges(const Memory &memory, uint32_t ntet, const uint32_t
 }
 
 double tet_volume(const double *points, const uint32_t *tet) {
-  const Vec3 a = load3(points + 3 * size_t(tet[0]));
-  const Vec3 u = load3(points + 3 * size_t(tet[1])) - a, v = load3(points + 3 * size_t(tet[2])) - a,
-      w = load3(points + 3 * size_t(tet[3])) - a;
-  return dot(cross(u, v), w) / 6;
+  const auto at = [&](int k) { return load3(points + 3 * size_t(tet[k])); };
+  return tet_volume(at(0), at(1), at(2), at(3));
 }
 
 double tet_quality(const double *points, const uint32_t *tet) {
@@ -71,9 +69,8 @@ double tet_quality(const double *points, const uint32_t *tet) {
   const double length = std::sqrt(sum / 6);
   if (!(length > 0)) return 0;
   const Vec3 a = load3(points + 3 * size_t(tet[0]));
-  const Vec3 u = (1 / length) * (load3(points + 3 * size_t(tet[1])) - a), v = (1 / length) * (load3(points + 3 * size_t(tet[2])) - a),
-             w = (1 / length) * (load3(points + 3 * size_t(tet[3])) - a);
-  const double volume = dot(cross(u, v), w) / 6, root = std::cbrt(3 * std::fabs(volume));
+  const auto scaled = [&](int k) { return (1 / length) * (load3(points + 3 * size_t(tet[k])) - a); };
+  const double volume = tet_volume(Vec3{}, scaled(1), scaled(2), scaled(3)), root = std::cbrt(3 * std::fabs(volume));
   return std::copysign(2 * root * root, volume);
 }
 

@@ -8,9 +8,9 @@
 namespace dfm {
 namespace {
 
-// Unpacked bytes that one array may have over the bytes of what packs it: sound files stay far below, since coordinates and cells are not
-// all alike; deflate alone would allow a thousand.
-constexpr uint64_t kMaxUnpacking = 64, kFreeUnpacking = 1 << 16;
+// Unpacked bytes that one array may have, over the bytes of its whole file: an array of types packs a thousandfold, but coordinates and
+// cells of a sound file are not all alike. And what deflate can make of one byte at most.
+constexpr uint64_t kMaxUnpacking = 64, kFreeUnpacking = 4096, kMaxDeflation = 1032;
 
 // Bytes out of raw data or base64. White space is passed over; a padded group may stand anywhere, as writers encode lengths and data apart.
 class ByteSource {
@@ -98,11 +98,15 @@ class Unpacker {
   std::string_view inflate_blocks(uint64_t nblock, Array<char> &out) {
     if (nblock > source_.at_most() / packing_.header_bytes) in_.refuse("promises %llu blocks, for which the file is too short", ull(nblock));
     const uint64_t size = length(), last = length(), packed_left = source_.at_most();
-    const uint64_t most = kFreeUnpacking + kMaxUnpacking * packed_left;
-    if (size > most || last > size || (nblock && size > most / nblock) )
+    const uint64_t most = kFreeUnpacking + kMaxUnpacking * packing_.file_bytes;
+    if (size > most || last > size || (nblock && size > most / nblock))
       in_.refuse("promises %llu blocks of %llu bytes, but the %llu packed bytes left in the file cannot hold them", ull(nblock), ull(size), ull(packed_left));
     Array<uint64_t> packed(size_t(nblock), HookAllocator<uint64_t>(*out.get_allocator().memory));
-    for (uint64_t &p : packed) p = length();
+    for (uint64_t &p : packed) {
+      p = length();
+      if (p > packed_left || (&p != &packed.back() && size > kMaxDeflation * (p + 1)))
+        in_.refuse("compressed block %zu has %llu bytes where %llu are left, for %llu", size_t(&p - packed.data()), ull(p), ull(packed_left), ull(size));
+    }
     const uint64_t total = nblock == 0 ? 0 : size * (nblock - 1) + (last ? last : size);
     out.resize(size_t(total));
     Array<char> block(HookAllocator<char>(*out.get_allocator().memory));

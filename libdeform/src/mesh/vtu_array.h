@@ -26,6 +26,7 @@ struct VtuPacking {
   size_t header_bytes = 4;      // of each length
   bool compressed = false;
   bool appended_base64 = false;
+  size_t file_bytes = 0;        // bounds what unpacking may take
   std::string_view appended;    // what stands behind the underscore
 };
 

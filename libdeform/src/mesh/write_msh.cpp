@@ -85,7 +85,10 @@ void put_entities(AtomicFile &out, const TetMesh &mesh, std::vector<uint32_t> gr
   groups.push_back(kNoGroup);
   const auto dimension = [&](uint32_t g) { return g == kNoGroup ? 3 : mesh.groups[g].dimension; };
   out.write("$Entities\n");
-  for (int32_t d = 0; d < 4; ++d) out.put<uint64_t>(static_cast<uint64_t>(std::count_if(groups.begin(), groups.end(), [&](uint32_t g) { return dimension(g) == d; })));
+  for (int32_t d = 0; d < 4; ++d) {
+    const auto n = std::count_if(groups.begin(), groups.end(), [&](uint32_t g) { return dimension(g) == d; });
+    out.put(static_cast<uint64_t>(n));
+  }
   for (int32_t d = 0; d < 4; ++d)
     for (const uint32_t g : groups) {
       if (dimension(g) != d) continue;

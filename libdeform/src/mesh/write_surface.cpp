@@ -59,11 +59,12 @@ void put_off(AtomicFile &out, const TriMesh &mesh) {
 void put_ply(AtomicFile &out, const TriMesh &mesh) {
   out.write("ply\nformat binary_little_endian 1.0\nelement vertex " + text(mesh.npoint()) +
             "\nproperty double x\nproperty double y\nproperty double z\nelement face " + text(mesh.ntri()) +
-            "\nproperty list uchar uint vertex_indices\nend_header\n");
+            "\nproperty list uchar uint vertex_indices\n" + (mesh.groups.empty() ? "" : "property int group\n") + "end_header\n");
   for (const double x : mesh.points) put_as(out, std::endian::little, x);
-  for (size_t i = 0; i < mesh.tris.size(); ++i) {
-    if (i % 3 == 0) out.put(uint8_t(3));
-    put_as(out, std::endian::little, mesh.tris[i]);
+  for (uint32_t t = 0; t < mesh.ntri(); ++t) {
+    out.put(uint8_t(3));
+    for (int k = 0; k < 3; ++k) put_as(out, std::endian::little, mesh.tris[3 * size_t(t) + k]);
+    if (!mesh.groups.empty()) put_as(out, std::endian::little, mesh.tri_group[t] == kNoGroup ? 0 : mesh.groups[mesh.tri_group[t]].tag);
   }
 }
 

@@ -3,9 +3,8 @@
 namespace dfm {
 
 double tet_volume(const double *x, uint32_t stride, const uint32_t t[4]) {
-  const Vec3 a = load3(x + size_t(t[0]) * stride), b = load3(x + size_t(t[1]) * stride), c = load3(x + size_t(t[2]) * stride),
-             d = load3(x + size_t(t[3]) * stride);
-  return dot(cross(b - a, c - a), d - a) / 6;
+  const auto at = [&](int k) { return load3(x + size_t(t[k]) * stride); };
+  return tet_volume(at(0), at(1), at(2), at(3));
 }
 
 LumpedMass lump_mass(uint32_t npoint, const double *rest, uint32_t ntet, const uint32_t *tets, double density, const double *cell_density,

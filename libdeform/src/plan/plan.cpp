@@ -31,6 +31,10 @@ void plan_effects(const SceneFacts &f, Plan &plan) {
            "('deform plugin info %s' lists them) or take the effect from the list", name.c_str(), idle.c_str(), idle.c_str());
     if (by.empty()) {
       const std::string could = provider(f.available, name);
+      if (f.bodies == 0 && !could.empty()) {   // an empty world: whoever comes first may provide it
+        plan.effects.push_back({name, "effects", ""});
+        continue;
+      }
       fail(DFM_E_ARG, "effect '%s' is asked for, but nothing in the scene provides it; %s", name.c_str(),
            could.empty() ? "no loaded plugin could" : ("these loaded plugins could: " + could).c_str());
     }
@@ -82,7 +86,8 @@ Plan make_plan(const SceneFacts &f) {
   if (pairs) {
     const std::string who = count(f.body_pairs, "pair of bodies", "pairs of bodies") + " and " +
                             count(f.obstacle_pairs, "pair of body and obstacle", "pairs of body and obstacle") + " may touch";
-    if (f.coupled) run(StageId::gather, count(f.coupled_surfels, "surfel", "surfels") + " of " + count(f.coupled, "body", "bodies") + " hang on several points each");
+    const std::string coupled = count(f.coupled_surfels, "surfel", "surfels") + " of " + count(f.coupled, "body", "bodies");
+    if (f.coupled) run(StageId::gather, coupled + " hang on several points each");
     else leave("gather", "every surfel is a point of its body");
     run(StageId::broad, who);
     run(StageId::narrow, who);

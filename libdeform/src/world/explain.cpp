@@ -21,7 +21,10 @@ std::string quote(const std::string &s) {
 // What a stage costs grows with this; counts of the present scene, not seconds.
 std::string cost(const World &w, StageId id) {
   size_t points = 0, cells = 0, surfels = 0, triangles = 0, weights = 0;
-  for (auto &b : w.bodies) points += b->p.n, cells += b->tets.size() / 4, surfels += b->surface.nsurfel, triangles += b->surface.ntri, weights += b->surface.weight.size();
+  for (auto &b : w.bodies) {
+    points += b->p.n, cells += b->tets.size() / 4;
+    surfels += b->surface.nsurfel, triangles += b->surface.ntri, weights += b->surface.weight.size();
+  }
   switch (id) {
     case StageId::model: return format("%zu cells", cells);
     case StageId::predict:
@@ -37,8 +40,8 @@ std::string cost(const World &w, StageId id) {
 
 // Where a body's numbers come from: its cells, its surface, and the parameters that differ by cell.
 std::string body(const Body &b) {
-  std::string out = "{\"name\":" + quote(b.name) + ",\"model\":" + quote(b.model.type->id) + format(",\"cells\":%zu,\"points\":%u,\"surfels\":%u", b.tets.size() / 4,
-                    b.p.n, b.surface.nsurfel);
+  std::string out = "{\"name\":" + quote(b.name) + ",\"model\":" + quote(b.model.type->id);
+  out += format(",\"cells\":%zu,\"points\":%u,\"surfels\":%u", b.tets.size() / 4, b.p.n, b.surface.nsurfel);
   const char *const surface = b.coupling == kNoCoupling           ? "boundary"
                               : b.coupling == DFM_COUPLING_MLS    ? "own, mls"
                               : b.coupling == DFM_COUPLING_THESIS ? "own, thesis"

@@ -1,11 +1,14 @@
 #!/usr/bin/env python3
-"""Writes the small meshes beside this file: one body in every dialect that the readers know.
+"""Writes the small meshes beside this file, and the surfaces in ../surfaces: one body in every dialect that the readers know.
 
 A unit cube of six tetrahedra (three named "low", three "high"), twelve skin triangles in the group "skin", a ninth node that no
-tetrahedron uses, standing third in the file, and node numbers with gaps that do not ascend. Run it again after a change here.
+tetrahedron uses, standing third in the file, and node numbers with gaps that do not ascend. The surfaces are the skin alone, as triangles
+or as the cube's six squares. Run it again after a change here.
 """
+import base64
 import os
 import struct
+import zlib
 
 HERE = os.path.dirname(os.path.abspath(__file__))
 POINTS = [(0, 0, 0), (1, 0, 0), (5, 5, 5), (0, 1, 0), (1, 1, 0), (0, 0, 1), (1, 0, 1), (0, 1, 1), (1, 1, 1)]
@@ -17,6 +20,7 @@ TETS = [tuple(AT[c] for c in t) for t in
 GROUPS = [1, 1, 1, 2, 2, 2]  # physical numbers of the cells
 SKIN = [tuple(AT[c] for c in t) for t in
         [(0, 3, 1), (0, 2, 3), (0, 6, 2), (0, 4, 6), (0, 1, 5), (0, 5, 4), (7, 1, 3), (7, 5, 1), (7, 4, 5), (7, 6, 4), (7, 2, 6), (7, 3, 2)]]
+SQUARES = [tuple(AT[c] for c in q) for q in [(0, 2, 3, 1), (4, 5, 7, 6), (0, 1, 5, 4), (2, 6, 7, 3), (0, 4, 6, 2), (1, 3, 7, 5)]]
 NAMES = '$PhysicalNames\n3\n2 7 "skin"\n3 1 "low"\n3 2 "high end"\n$EndPhysicalNames\n'
 
 
@@ -125,6 +129,129 @@ def vtk():
               struct.pack(f">{len(flat)}{code}", *flat), f"\nCELL_TYPES {len(cells)}\n", types, "\n")
 
 
+class Vtu:
+    """One XML file; arrays are kept inline or collected behind it."""
+
+    def __init__(self, order="<", header="I", zlib_block=0, place="ascii"):
+        self.order, self.header, self.block, self.place = order, header, zlib_block, place
+        self.appended = b""
+
+    def packed(self, data):
+        """Length and data, or the blocks of zlib with their head, as they stand in the file; base64 encodes the head of blocks apart."""
+        as_text = self.place in ("b64", "appended_b64")
+        if not self.block:
+            both = struct.pack(self.order + self.header, len(data)) + data
+            return base64.b64encode(both) if as_text else both
+        blocks = [data[i:i + self.block] for i in range(0, len(data), self.block)]
+        last = len(blocks[-1]) % self.block if blocks else 0
+        deflated = [zlib.compress(b) for b in blocks]
+        head = struct.pack(f"{self.order}{3 + len(blocks)}{self.header}", len(blocks), self.block, last, *map(len, deflated))
+        body = b"".join(deflated)
+        return base64.b64encode(head) + base64.b64encode(body) if as_text else head + body
+
+    def array(self, kind, code, name, values, components=1):
+        head = f'<DataArray type="{kind}" Name="{name}" NumberOfComponents="{components}" '
+        if self.place == "ascii":
+            return f'{head}format="ascii">\n{" ".join(map(str, values))}\n</DataArray>\n'.encode()
+        packed = self.packed(struct.pack(f"{self.order}{len(values)}{code}", *values))
+        if self.place == "b64":
+            return head.encode() + b'format="binary">\n  ' + packed + b"\n</DataArray>\n"
+        self.appended += packed
+        return f'{head}format="appended" offset="{len(self.appended) - len(packed)}"/>\n'.encode()
+
+    def file(self, name, kind, content):
+        order = "LittleEndian" if self.order == "<" else "BigEndian"
+        header = "" if self.header == "I" and self.place == "ascii" else f' header_type="{"UInt32" if self.header == "I" else "UInt64"}"'
+        compressor = ' compressor="vtkZLibDataCompressor"' if self.block else ""
+        tail = b"</VTKFile>\n"
+        if self.place.startswith("appended"):
+            encoding = "base64" if self.place == "appended_b64" else "raw"
+            tail = f'<AppendedData encoding="{encoding}">\n  _'.encode() + self.appended + b"\n</AppendedData>\n" + tail
+        write(name, f'<?xml version="1.0"?>\n<!-- small > cube -->\n<VTKFile type="{kind}" version="1.0" byte_order="{order}"{header}{compressor}>\n<{kind}>\n',
+              content, f"</{kind}>\n", tail)
+
+    def tets(self, name, point="Float64"):
+        cells, kinds, groups = [*TETS, *SKIN], [10] * len(TETS) + [5] * len(SKIN), [*GROUPS, *[7] * len(SKIN)]
+        ends = [sum(map(len, cells[:i + 1])) for i in range(len(cells))]
+        letters = [c for n in ("skin", "low", "high end") for c in [*n.encode(), 0]]
+        content = b"<FieldData>\n" + self.array("Int32", "i", "group_number", [2, 7, 3, 1, 3, 2], 2)
+        content += self.array("String", "b", "group_name", letters) + b"</FieldData>\n"
+        content += f'<Piece NumberOfPoints="9" NumberOfCells="{len(cells)}">\n<PointData>\n'.encode()
+        content += self.array("Float32", "f", "warmth", [0.5] * 9) + b"</PointData>\n<CellData>\n"
+        content += self.array("UInt8", "B", "group", groups) + b"</CellData>\n<Points>\n"
+        content += self.array(point, "d" if point == "Float64" else "f", "Points", [x for p in POINTS for x in p], 3) + b"</Points>\n<Cells>\n"
+        content += self.array("Int64", "q", "connectivity", [p for c in cells for p in c])
+        content += self.array("Int32", "i", "offsets", ends) + self.array("UInt8", "B", "types", kinds) + b"</Cells>\n</Piece>\n"
+        self.file(name, "UnstructuredGrid", content)
+
+    def skin(self, name):
+        content = f'<Piece NumberOfPoints="9" NumberOfPolys="{len(SQUARES)}">\n<Points>\n'.encode()
+        content += self.array("Float32", "f", "Points", [x for p in POINTS for x in p], 3) + b"</Points>\n<Polys>\n"
+        content += self.array("Int32", "i", "connectivity", [p for q in SQUARES for p in q])
+        content += self.array("Int32", "i", "offsets", [4 * (i + 1) for i in range(len(SQUARES))]) + b"</Polys>\n</Piece>\n"
+        self.file(name, "PolyData", content)
+
+
+def vtu():
+    Vtu().tets("cube_vtu_ascii.vtu", "Float32")
+    Vtu(place="b64").tets("cube_vtu_b64.vtu")
+    Vtu(">", "Q", place="b64").tets("cube_vtu_b64_be64.vtu", "Float32")
+    Vtu("<", "Q", 64, "b64").tets("cube_vtu_b64_zlib64.vtu")
+    Vtu(place="appended_raw").tets("cube_vtu_raw.vtu")
+    Vtu(">", "Q", place="appended_raw").tets("cube_vtu_raw_be64.vtu")
+    Vtu("<", "I", 100, "appended_raw").tets("cube_vtu_raw_zlib.vtu")
+    Vtu("<", "Q", place="appended_b64").tets("cube_vtu_appended_b64.vtu", "Float32")
+    Vtu(">", "I", 32768, "appended_b64").tets("cube_vtu_appended_b64_zlib_be.vtu")
+
+
+def medit():
+    write("cube_medit.mesh", "# a comment\nMeshVersionFormatted 2\n\nDimension\n3\n\nVertices\n9\n", words((*p, 0) for p in POINTS), "\nCorners 2\n1\n2\n",
+          f"\nTriangles\n{len(SKIN)}\n", words((*[p + 1 for p in t], 7) for t in SKIN), "Edges\n1\n1 2 3 # the third\n",
+          f"\nTetrahedra {len(TETS)}\n", words((*[p + 1 for p in t], g) for t, g in zip(TETS, GROUPS)), "\nEnd\n")
+
+
+def surfaces():
+    here = "../surfaces/cube_"
+    back = [[f"{p - 9}/1" for p in q] for q in SQUARES]
+    write(here + "obj.obj", "# cube\r\nmtllib none.mtl\r\no box\r\n", "".join(f"v\t{x} {y}   {z} 0.5 0.5 0.5\r\n" for x, y, z in POINTS), "vt 0 0\r\nvn 0 0 1\r\n",
+          "g low\r\nusemtl red\r\n", "".join("f " + " ".join(f"{p + 1}/1/1" for p in t) + "\r\n" for t in SKIN[:6]),
+          "g high end \r\ns off\r\n", "".join("f " + " \\\r\n  ".join(f"{p - 9}//-1" for p in t) + "\r\n" for t in SKIN[6:]), "l 1 2\r\n")
+    write(here + "obj_quads.obj", words(("v", *p) for p in POINTS), words(("f", *q) for q in back))
+    head = "element vertex 9\nproperty float x\nproperty double y\nproperty float z\nproperty uchar red\nelement face 6\n" \
+           "property list uchar int vertex_indices\nproperty short group\nelement edge 1\nproperty int vertex1\nproperty list ushort float weights\nend_header\n"
+    write(here + "ply_ascii.ply", "ply\nformat ascii 1.0\ncomment small\nobj_info cube\n", head, words((*p, 200) for p in POINTS),
+          words((4, *q, i // 3) for i, q in enumerate(SQUARES)), "0 2 0.5 nan\n")
+    for order, name in (("<", "little"), (">", "big")):
+        rows = b"".join(struct.pack(order + "fdfB", *p, 200) for p in POINTS)
+        rows += b"".join(struct.pack(order + "B4ih", 4, *q, i // 3) for i, q in enumerate(SQUARES)) + struct.pack(order + "iH2f", 0, 2, 0.5, 0.5)
+        write(here + f"ply_{name}.ply", f"ply\nformat binary_{name}_endian 1.0\n", head, rows)
+    facets = ["facet normal 0 0 0\nouter loop\n" + words(("vertex", *POINTS[p]) for p in t) + "endloop\nendfacet\n" for t in SKIN]
+    write(here + "stl_ascii.stl", "solid low\n", *facets[:6], "endsolid low\nsolid high end\n", *facets[6:], "endsolid\n")
+    write(here + "stl_upper.stl", ("solid\n" + "".join(facets) + "endsolid\n").upper().replace("\n", "\r\n"))
+    rows = b"".join(struct.pack("<12fH", 0, 0, 0, *[x for p in t for x in POINTS[p]], 0) for t in SKIN)
+    write(here + "stl_binary.stl", b"solid but binary".ljust(80), struct.pack("<I", len(SKIN)), rows)
+    write(here + "off.off", "OFF\n# comment\n\n9 6 0\n", words(POINTS), words((4, *q) for q in SQUARES))
+    write(here + "off_first_line.off", "OFF 9 12 0\n", words(POINTS), words((3, *t, 255, 0, 0) for t in SKIN))
+    write(here + "off_colour.off", "COFF\n9 6\n", words((*p, 10, 20, 30, 255) for p in POINTS), words((4, *q, "# a square") for q in SQUARES))
+    write(here + "off_normal.off", "NOFF 9 6 0\n", words((*p, 0, 0, 1) for p in POINTS), words((4, *q) for q in SQUARES))
+    write(here + "off_bare.off", "9 6 12\n", words(POINTS), words((4, *q) for q in SQUARES))
+    write(here + "off_binary.off", "CNOFF BINARY\n", struct.pack(">3i", 9, 6, 0), b"".join(struct.pack(">10f", *p, *[1] * 7) for p in POINTS),
+          b"".join(struct.pack(">6i", 4, *q, i % 2) + b"\0" * 4 * (i % 2) for i, q in enumerate(SQUARES)))
+    vtk_head = "# vtk DataFile Version %s\ncube\nASCII\nDATASET POLYDATA\nPOINTS 9 float\n"
+    strip = [AT[c] for c in (4, 5, 6, 7, 2, 3, 0, 1)]  # three of the squares in one band
+    write(here + "vtk_polydata.vtk", vtk_head % "3.0", words(POINTS), "VERTICES 1 2\n1 0\nLINES 1 4\n3 0 1 4\nPOLYGONS 3 15\n",
+          words((4, *SQUARES[i]) for i in (2, 4, 5)), "TRIANGLE_STRIPS 1 9\n", words([(8, *strip)]),
+          "POINT_DATA 9\nSCALARS warmth float\nLOOKUP_TABLE default\n", words([range(9)]),
+          "CELL_DATA 6\nNORMALS n float\n", words([(0, 0, 1)] * 6), "SCALARS material int 1\nLOOKUP_TABLE default\n", words([(0, 0, 1, 2, 2, 1)]))
+    write(here + "vtk51_polydata.vtk", vtk_head % "5.1", words(POINTS), "VERTICES 2 1\nOFFSETS vtktypeint64\n0 1\nCONNECTIVITY vtktypeint64\n0\n",
+          "POLYGONS 7 24\nOFFSETS vtktypeint64\n0 4 8 12 16 20 24\nCONNECTIVITY vtktypeint64\n", words(SQUARES))
+    Vtu(place="b64").skin(here + "vtp.vtp")
+    write(here + "medit.mesh", "MeshVersionFormatted 1\nDimension 3\nVertices\n9\n", words((*p, 0) for p in POINTS), "Quadrilaterals\n6\n",
+          words((*[p + 1 for p in q], 1 + i // 3) for i, q in enumerate(SQUARES)), "End\n")
+    write(here + "msh22.msh", "$MeshFormat\n2.2 0 8\n$EndMeshFormat\n$Nodes\n9\n", words((i + 1, *p) for i, p in enumerate(POINTS)), "$EndNodes\n$Elements\n6\n",
+          words((i + 1, 3, 2, 1 + i // 3, 1, *[p + 1 for p in q]) for i, q in enumerate(SQUARES)), "$EndElements\n")
+
+
 msh22()
 msh41_text(False)
 msh41_text(True)
@@ -132,3 +259,6 @@ msh41_binary("<", 8, "cube_msh41_bin_le.msh")
 msh41_binary(">", 8, "cube_msh41_bin_be.msh")
 msh41_binary("<", 4, "cube_msh41_bin_size4.msh")
 vtk()
+vtu()
+medit()
+surfaces()

@@ -146,6 +146,7 @@ TEST(GenerateSurface, ImpossibleSizes_AreRefused) {
   EXPECT_NE(refused([] { make_tube(standard(), 0.2, 0.1, 1, 10); }).find("inner radius is 0.2 m; expected less than"), std::string::npos);
   EXPECT_NE(refused([] { make_tube_surface(standard(), 0, 0.1, 1, 10); }).find("inner radius is 0 m"), std::string::npos);
   EXPECT_NE(refused([] { make_torus_surface(standard(), 1, 1, 10); }).find("torus"), std::string::npos);
+  EXPECT_NE(refused([] { make_torus_surface(standard(), 1, 1e-20, 10); }).find("ask for more"), std::string::npos);
   EXPECT_NE(refused([] { make_ball_surface(standard(), NAN, 10); }).find("ball's radius"), std::string::npos);
   EXPECT_NE(refused([] { make_ball_surface(standard(), 1, 0); }).find("triangles is 0"), std::string::npos);
   EXPECT_NE(refused([] { make_tube(standard(), 1, 1.0001, 100, 10); }).find("ask for more"), std::string::npos);

@@ -42,7 +42,10 @@ inline std::vector<std::string> files_of(const std::string &folder, const std::v
   std::sort(out.begin(), out.end());
   return out;
 }
-inline std::vector<std::string> own_meshes() { return files_of(std::string(DEFORM_SOURCE_DIR) + "/tests/data/meshes", {".msh", ".vtk"}); }
+inline std::vector<std::string> own_meshes() { return files_of(std::string(DEFORM_SOURCE_DIR) + "/tests/data/meshes", {".msh", ".vtk", ".vtu", ".mesh"}); }
+inline std::vector<std::string> own_surfaces() {
+  return files_of(std::string(DEFORM_SOURCE_DIR) + "/tests/data/surfaces", {".obj", ".ply", ".stl", ".off", ".vtk", ".vtp", ".mesh", ".msh"});
+}
 
 // The error of reading a file; none where it is read.
 inline std::optional<dfm::Error> refusal(const std::string &path, const dfm::Memory &memory = dfm::Memory::standard()) {

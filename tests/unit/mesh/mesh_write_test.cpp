@@ -5,6 +5,8 @@
 
 #include <csignal>
 #include <cstring>
+#include <map>
+#include <set>
 
 #include "mesh_support.h"
 
@@ -56,6 +58,81 @@ TEST(MeshWrite, VtkBinary_ReadsBackToTheBit) {
   expect_same_bits(m, read_tet_mesh(Memory::standard(), folder() + "/a.vtk"));
 }
 
+namespace {
+
+// A beam whose ends are named: groups of cells, of triangles, of points, and of lines, of which only the points are known.
+TetMesh grouped() {
+  TetMesh m = make_beam(Memory::standard(), 2, 1, 1, 100);
+  m.groups.push_back({"corner", 0, 4, {0, 1}});
+  m.groups.push_back({"edge", 1, 5, {0, 1}});
+  m.groups.push_back({"left end", 2, 8, {}});
+  m.groups.push_back({"right", 2, 9, {}});
+  m.groups.push_back({"soft", 3, 2, {}});
+  m.groups.push_back({"hard", 3, -7, {}});
+  for (uint32_t t = 0; t < m.ntet(); ++t) m.tet_group[t] = t % 3 == 0 ? kNoGroup : 3 + t % 3;
+  const Array<uint32_t> boundary = boundary_triangles(m.tets);
+  for (size_t t = 0; t < boundary.size(); t += 3)
+    for (const double end : {0.0, 2.0}) {
+      bool there = true;
+      for (size_t k = 0; k < 3; ++k) there = there && m.points[3 * size_t(boundary[t + k])] == end;
+      if (!there) continue;
+      m.tris.insert(m.tris.end(), &boundary[t], &boundary[t] + 3);
+      m.tri_group.push_back(end == 0.0 ? 2 : 3);
+    }
+  return m;
+}
+
+using Named = std::map<std::pair<int32_t, std::string>, std::set<uint32_t>>;
+
+// By dimension and name (number where the format keeps no names): the elements.
+Named named(const TetMesh &m, bool by_number) {
+  Named out;
+  const auto key = [&](uint32_t g) { return std::pair(m.groups[g].dimension, by_number ? std::to_string(m.groups[g].tag) : m.groups[g].name); };
+  for (uint32_t t = 0; t < m.ntet(); ++t)
+    if (m.tet_group[t] != kNoGroup) out[key(m.tet_group[t])].insert(t);
+  for (size_t t = 0; t < m.tri_group.size(); ++t) {
+    out[key(m.tri_group[t])].insert(m.tris[3 * t]), out[key(m.tri_group[t])].insert(m.tris[3 * t + 1]), out[key(m.tri_group[t])].insert(m.tris[3 * t + 2]);
+  }
+  return out;
+}
+
+}  // namespace
+
+TEST(MeshWrite, Groups_SurviveEveryFormat) {
+  const TetMesh m = grouped();
+  ASSERT_GT(m.tri_group.size(), 4u);
+  for (const char *name : {"/g.msh", "/g.msh2", "/g.vtk", "/g.vtu", "/g.mesh"}) {
+    SCOPED_TRACE(name);
+    write_tet_mesh(m, folder() + name);
+    const TetMesh back = read_tet_mesh(Memory::standard(), folder() + name);
+    expect_same_bits(m, back);
+    const bool by_number = std::strcmp(name, "/g.mesh") == 0;
+    EXPECT_EQ(named(back, by_number), named(m, by_number));
+    const auto corner = std::find_if(back.groups.begin(), back.groups.end(), [](const MeshGroup &g) { return g.dimension == 0; });
+    ASSERT_EQ(corner != back.groups.end(), std::strstr(name, ".msh") != nullptr);
+    if (corner != back.groups.end()) { EXPECT_EQ(corner->points, (Array<uint32_t>{0, 1})); }
+    EXPECT_TRUE(back.warnings.empty());
+  }
+}
+
+TEST(MeshWrite, Vtu_HasTheShareOfFilledCells) {
+  TetMesh m = grouped();
+  for (uint32_t t = 0; t < m.ntet(); ++t) m.share.push_back(1.0 / (t + 1));
+  write_tet_mesh(m, folder() + "/share.vtu");
+  const std::string text = test::read_file(folder() + "/share.vtu");
+  const size_t at = text.find("Name=\"share\"");
+  ASSERT_NE(at, std::string::npos);
+  const size_t data = text.find("<AppendedData encoding=\"raw\">\n_") + std::strlen("<AppendedData encoding=\"raw\">\n_");
+  const size_t start = data + std::stoul(text.substr(text.find("offset=\"", at) + 8));
+  uint64_t bytes = 0;
+  std::memcpy(&bytes, &text[start], 8);
+  EXPECT_EQ(bytes, 8 * (m.ntet() + m.tri_group.size()));
+  EXPECT_EQ(std::memcmp(&text[start + 8], m.share.data(), 8 * m.share.size()), 0);
+  expect_same_bits(m, read_tet_mesh(Memory::standard(), folder() + "/share.vtu"));
+  write_tet_mesh(m, folder() + "/share.vtk");
+  expect_same_bits(m, read_tet_mesh(Memory::standard(), folder() + "/share.vtk"));
+}
+
 TEST(MeshWrite, FailedWrite_LeavesOldFileAndNothingElse) {
   const std::string home = test::scratch("mesh_write_failed");
   std::filesystem::remove_all(home);
@@ -84,7 +161,7 @@ TEST(MeshWrite, DiskThatFills_LeavesNothing) {
   getrlimit(RLIMIT_FSIZE, &before);
   small.rlim_cur = 4096, small.rlim_max = before.rlim_max;
   setrlimit(RLIMIT_FSIZE, &small);
-  for (const char *name : {"/a.msh", "/a.msh2", "/a.vtk"}) {
+  for (const char *name : {"/a.msh", "/a.msh2", "/a.vtk", "/a.vtu", "/a.mesh"}) {
     try {
       write_tet_mesh(sample(), home + name);
       ADD_FAILURE() << name;

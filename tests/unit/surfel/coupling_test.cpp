@@ -83,8 +83,8 @@ TEST_P(Linear, Rows_SumToOneAndReproduceLinearFieldsAtAnyScaleAndPlace) {
   }
 }
 
-TEST_P(Linear, Place_ChangesNoWeightByMoreThanItsRounding) {
-  // A power of two is exact, so what is left is the rounding of the shifted input, 1e-9 of a cell.
+// A power of two is exact, so no step of the construction may know the unit of length.
+TEST_P(Linear, ScaleByAPowerOfTwo_ChangesNoBit) {
   const Coupling home = couple(GetParam(), ball().in()), scaled = couple(GetParam(), ball(0x1p-30).in());
   EXPECT_EQ(home.col, scaled.col);
   EXPECT_EQ(home.weight, scaled.weight);
@@ -264,7 +264,8 @@ TEST_F(Reference, QuadraticField_BothCouplings) {
   const auto linear = read("fields/mls_linear_surfel_u.csv"), quadratic = read("fields/mls_quadratic_surfel_u.csv");
   double worst = 0, worst_thesis = 0, top = 0;
   for (uint32_t s = 0; s < k.in().nsurfel; ++s) {
-    const auto sum = [&](size_t at) { return Vec3{linear[s][at] + quadratic[s][at], linear[s][at + 1] + quadratic[s][at + 1], linear[s][at + 2] + quadratic[s][at + 2]}; };
+    const auto at3 = [](const std::vector<double> &row, size_t at) { return Vec3{row[at], row[at + 1], row[at + 2]}; };
+    const auto sum = [&](size_t at) { return at3(linear[s], at) + at3(quadratic[s], at); };
     top = std::max(top, norm(sum(4)));
     worst = std::max(worst, norm(apply(mls, s, u) - sum(4))), worst_thesis = std::max(worst_thesis, norm(apply(thesis, s, u) - sum(1)));
   }

@@ -1,0 +1,37 @@
+// What the subcommands of `deform mesh` share: a quiet context with a mesh of either kind, and how one is told.
+#pragma once
+#include <string>
+#include <vector>
+
+#include "cli.h"
+
+namespace cli {
+
+// Warnings of the reader belong to the report of this command, so its context logs nothing by itself.
+struct MeshSession {
+  dfm_context *context = nullptr;
+  dfm_tetmesh cells = 0;
+  dfm_trimesh surface = 0;
+  explicit MeshSession(const Globals &globals);
+  ~MeshSession() { dfm_context_destroy(context); }
+  MeshSession(const MeshSession &) = delete;
+  MeshSession &operator=(const MeshSession &) = delete;
+};
+
+// Tells the mesh of the session. asked: all that is known, as a table; else one line and, on stderr, the warnings. --json: everything.
+// `notes` stand beside the warnings: what a conversion could not keep.
+int report_mesh(const Globals &globals, const std::string &file, const MeshSession &session, bool asked,
+                const std::vector<std::string> &notes = {});
+
+// How a file name ending is written: cells (.msh .msh2 .mesh), a surface (.obj .ply .stl .off) or either (.vtk .vtu, anything unknown).
+enum class Writes { cells, surface, either };
+Writes written_by(const std::string &path);
+std::string mesh_ending(const std::string &path);  // lower case, without the dot
+
+// Reads a surface of a format that the library leaves to assimp. False: its message is in `sentence`; true with session.surface 0: not
+// such a format.
+bool import_surface(const std::string &path, MeshSession &session, std::string &sentence);
+
+void add_mesh_fill(CLI::App *mesh, Globals &globals, int *exit_code);
+
+}  // namespace cli

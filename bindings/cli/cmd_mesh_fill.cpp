@@ -1,0 +1,159 @@
+// deform mesh fill SURFACE --out FILE --cells N
+#include <unistd.h>
+
+#include <chrono>
+#include <condition_variable>
+#include <cstdio>
+#include <memory>
+#include <mutex>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "cmd_mesh.h"
+#include "json_text.h"
+
+namespace cli {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+double seconds_since(Clock::time_point begin) { return std::chrono::duration<double>(Clock::now() - begin).count(); }
+
+// Filling is one call that does not know its end before it has it: after two seconds a terminal is told what is being done and for how long.
+class Patience {
+ public:
+  Patience(bool wanted, std::string what) : what_(std::move(what)) {
+    if (wanted && isatty(STDERR_FILENO)) thread_ = std::thread([this] { run(); });
+  }
+  ~Patience() {
+    if (!thread_.joinable()) return;
+    {
+      const std::lock_guard<std::mutex> lock(mutex_);
+      done_ = true;
+    }
+    changed_.notify_one();
+    thread_.join();
+  }
+
+ private:
+  void run() {
+    const Clock::time_point begin = Clock::now();
+    std::unique_lock<std::mutex> lock(mutex_);
+    bool drawn = false;
+    auto next = begin + std::chrono::seconds(2);
+    while (!changed_.wait_until(lock, next, [this] { return done_; })) {
+      std::fprintf(stderr, "\r%s, %.0f s \033[K", what_.c_str(), seconds_since(begin));
+      std::fflush(stderr);
+      drawn = true, next += std::chrono::seconds(1);
+    }
+    if (drawn) std::fprintf(stderr, "\r\033[K");
+  }
+
+  std::string what_;
+  std::mutex mutex_;
+  std::condition_variable changed_;
+  bool done_ = false;
+  std::thread thread_;
+};
+
+std::vector<std::string> lines(const char *text) {
+  std::vector<std::string> out;
+  for (const char *c = text; *c;) {
+    const char *end = c;
+    while (*end && *end != '\n') ++end;
+    out.emplace_back(c, end);
+    c = *end ? end + 1 : end;
+  }
+  return out;
+}
+
+struct Filled {
+  dfm_trimesh_info surface = {};
+  dfm_tetmesh_info cells = {};
+  double volume = 0, mean_share = 0, least_share = 1, seconds = 0;
+  std::vector<std::string> warnings;
+};
+
+double cell_volume(const double *x, const uint32_t *tet) {
+  double e[3][3];
+  for (int k = 0; k < 3; ++k)
+    for (int c = 0; c < 3; ++c) e[k][c] = x[3 * size_t(tet[k + 1]) + c] - x[3 * size_t(tet[0]) + c];
+  return (e[0][0] * (e[1][1] * e[2][2] - e[1][2] * e[2][1]) - e[0][1] * (e[1][0] * e[2][2] - e[1][2] * e[2][0]) +
+          e[0][2] * (e[1][0] * e[2][1] - e[1][1] * e[2][0])) / 6;
+}
+
+bool measure(dfm_trimesh surface, dfm_tetmesh mesh, Filled &out) {
+  out.surface.size = sizeof out.surface, out.cells.size = sizeof out.cells;
+  const double *points = nullptr, *share = nullptr;
+  const uint32_t *tets = nullptr;
+  if (dfm_trimesh_get_info(surface, &out.surface) < 0 || dfm_tetmesh_get_info(mesh, &out.cells) < 0 ||
+      dfm_tetmesh_data(mesh, &points, &tets, nullptr) < 0 || dfm_tetmesh_share(mesh, &share) < 0) return false;
+  for (uint32_t t = 0; t < out.cells.ntet; ++t) {
+    out.volume += share[t] * cell_volume(points, tets + 4 * size_t(t));
+    out.mean_share += share[t] / out.cells.ntet;
+    out.least_share = share[t] < out.least_share ? share[t] : out.least_share;
+  }
+  out.warnings = lines(out.surface.warnings);
+  for (const std::string &w : lines(out.cells.warnings)) out.warnings.push_back(w);
+  return true;
+}
+
+void print_json(const std::string &in, const std::string &file, uint32_t wanted, const Filled &f) {
+  const auto whole = [](uint64_t n) { return std::to_string(n); };
+  std::vector<std::string> warnings;
+  for (const std::string &w : f.warnings) warnings.push_back(quoted(w));
+  JsonObject out;
+  out.add("surface", quoted(in)).add("file", quoted(file)).add("triangles", whole(f.surface.ntriangle)).add("wanted", whole(wanted));
+  out.add("cells", whole(f.cells.ntet)).add("points", whole(f.cells.npoint)).add("pieces", whole(f.cells.npiece));
+  out.add("enclosed_volume", number(f.volume)).add("cells_volume", number(f.cells.volume)).add("mean_share", number(f.mean_share));
+  out.add("least_share", number(f.least_share)).add("edge_median", number(f.cells.edge_median)).add("seconds", number(f.seconds));
+  out.add("open_edges", whole(f.surface.open_edges)).add("holes", whole(f.surface.holes)).add("turned", whole(f.surface.turned));
+  out.add("warnings", json_array(warnings));
+  std::fputs(indented(out.text()).c_str(), stdout);
+}
+
+void print_table(const std::string &in, const std::string &file, const Filled &f) {
+  std::printf("%s: %u triangles, filled into %s\n", in.c_str(), f.surface.ntriangle, file.c_str());
+  std::printf("  cells             %u\n  points            %u\n  pieces            %u\n", f.cells.ntet, f.cells.npoint, f.cells.npiece);
+  std::printf("  enclosed volume   %.6g m3\n", f.volume);
+  std::printf("  share of material mean %.3f, least %.3f\n", f.mean_share, f.least_share);
+  std::printf("  edge length       %.4g to %.4g m\n", f.cells.edge_min, f.cells.edge_max);
+  std::printf("  seconds           %.2f\n", f.seconds);
+  for (const std::string &w : f.warnings) std::printf("  warning: %s\n", w.c_str());
+  if (f.warnings.empty()) std::printf("  the surface is clean\n");
+}
+
+int fill(const Globals &globals, const std::string &in, const std::string &out, uint32_t cells) {
+  MeshSession s(globals);
+  Filled filled;
+  const Clock::time_point begin = Clock::now();
+  {
+    const Patience patience(!globals.quiet && !globals.json, "filling " + in);
+    if (!s.context) return fail(dfm_last_error());
+    std::string sentence;
+    if (!import_surface(in, s, sentence)) return fail(sentence);
+    if (!s.surface && dfm_trimesh_read(s.context, in.c_str(), &s.surface) < 0) return fail(dfm_last_error());
+    if (dfm_tetmesh_fill(s.surface, cells, &s.cells) < 0) return fail(in + ": " + dfm_last_error());
+    if (dfm_tetmesh_write(s.cells, out.c_str()) < 0) return fail(dfm_last_error());
+  }
+  filled.seconds = seconds_since(begin);
+  if (!measure(s.surface, s.cells, filled)) return fail(dfm_last_error());
+  if (globals.json) print_json(in, out, cells, filled);
+  else if (!globals.quiet) print_table(in, out, filled);
+  return kDone;
+}
+
+struct FillOptions { std::string surface, out; uint32_t cells = 5000; };
+
+}  // namespace
+
+void add_mesh_fill(CLI::App *mesh, Globals &globals, int *exit_code) {
+  CLI::App *command = mesh->add_subcommand("fill", "lattice tetrahedra inside a closed surface; a scene does it by itself with the body key \"fill\"");
+  const auto options = std::make_shared<FillOptions>();
+  command->add_option("SURFACE", options->surface, "OBJ, PLY, STL, OFF, or any file with triangles that mesh info reads")->required();
+  command->add_option("--out", options->out, "file to write: .msh (MSH 4.1), .msh2 (MSH 2.2) or .vtk")->required()->type_name("FILE");
+  command->add_option("--cells", options->cells, "about how many tetrahedra")->capture_default_str()->type_name("N");
+  command->callback([=, &globals] { *exit_code = fill(globals, options->surface, options->out, options->cells); });
+}
+
+}  // namespace cli

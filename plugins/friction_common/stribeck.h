@@ -1,0 +1,178 @@
+// Set-valued friction with a Stribeck curve: what the laws coulomb and karnopp share.
+//
+//   g(w) = F_C + (F_S - F_C) exp(-(w/v_s)^delta),   F_C = mu_C fn, F_S = mu_S fn, w = |v|        (Stribeck curve, N)
+//   stick  |ft_stop| <= R:  ft = ft_stop, the force that makes the slip of this step zero
+//   slip   otherwise:       at rest (w <= band)  F_S along ft_stop, which is where the contact is about to go;
+//                           beyond it            ft = -(g(w) + sigma2 A w) v/w
+//
+// The laws differ in the band that counts as rest and in the disc that holds what slides already. Coulomb: band 0 and R = F_S at every speed.
+// Karnopp: band dv, and beyond it R = g(w) + sigma2 A w: what slides is stopped by kinetic friction alone. Where w > band,
+//   dft/dv = -[F' v^v^T + (F/w) (1 - v^v^T)],  F = g + sigma2 A w,  F' = g' + sigma2 A,  dft/dfn = -(g/fn) v^
+// A lane with a NaN or an infinite input gives NaN in that lane alone. Each lane runs the same operations at every vector width.
+#pragma once
+#include <cmath>
+#include <cstdio>
+
+#include "deform/plugin.hpp"
+
+namespace stribeck {
+
+enum { kMuC, kMuS, kVs, kDelta, kSigma2, kShared };  // every law of the family begins with these parameters
+constexpr dfm_param kRows[kShared] = {
+    dfm::plugin::param("mu_C", "kinetic friction coefficient", "1", 0, 100, 0.5, DFM_PARAM_RUNTIME),
+    dfm::plugin::param("mu_S", "static friction coefficient", "1", 0, 100, 0.5, DFM_PARAM_RUNTIME),
+    dfm::plugin::param("v_s", "Stribeck speed", "m/s", 1e-9, 1e3, 0.01, DFM_PARAM_RUNTIME | DFM_PARAM_LOG_SCALE),
+    dfm::plugin::param("delta", "Stribeck exponent", "1", 0.1, 10, 2, DFM_PARAM_RUNTIME),
+    dfm::plugin::param("sigma2", "viscous friction per area", "N s/m^3", 0, 1e12, 0, DFM_PARAM_RUNTIME),
+};
+
+constexpr uint32_t kLanes = 8;
+constexpr double kTiny = 1e-280, kHuge = 1e280;  // squares beyond these have lost digits or are about to
+constexpr double kRest = 1e-100;                 // m/s; below it 1/w is held constant, so that no derivative is infinite
+
+// kinetic_stop: what slides already is stopped by g(w) + sigma2 A w alone (Karnopp), not by F_S.
+struct Batch { double mu_c, mu_s, v_s, delta, sigma2, band; bool kinetic_stop; };
+
+// Eight contacts: where their columns lie. An output that is not wanted points to a spare column.
+struct Block {
+  const double *fn, *vx, *vy, *sx, *sy, *area;
+  double *fx, *fy, *limit, *xx, *xy, *yx, *yy, *nx, *ny;
+};
+
+// What the passes over a block hand on: mode 0 open, 1 stick, 2 slip; odd: left to odd_lane; speed and its inverse; excess s = exp(-a),
+// a = (w/v_s)^delta, the share of F_S - F_C at this speed, and slope = w s'(w) = -delta a s.
+struct Passes { double mode[kLanes], odd[kLanes], w[kLanes], inverse[kLanes], excess[kLanes], slope[kLanes]; };
+
+// Where squares leave the range of doubles, or slip begins from the band of rest: rare, so one lane at a time, scaled by the larger component.
+struct Polar { double length, x, y; };
+
+inline Polar polar(double x, double y) {
+  const double m = std::fabs(x) > std::fabs(y) ? std::fabs(x) : std::fabs(y);
+  if (!(m > 0)) return {m, 0, 0};
+  const double u = x / m, v = y / m, r = std::sqrt(u * u + v * v);
+  return {m * r, u / r, v / r};
+}
+
+inline void odd_lane(const Batch &p, const Block &b, Passes &t, uint32_t i) {
+  const double fn = b.fn[i], drag = p.sigma2 * b.area[i], stiction = p.mu_s * fn;
+  const double poison = 0.0 * fn + 0.0 * b.vx[i] + 0.0 * b.vy[i] + 0.0 * b.sx[i] + 0.0 * b.sy[i] + 0.0 * drag;
+  const Polar stop = polar(b.sx[i], b.sy[i]), v = polar(b.vx[i], b.vy[i]);
+  const double w = v.length > p.band ? v.length : 0.0;
+  const double x = w / p.v_s, a = p.delta == 2.0 ? x * x : dfm_pow(x, p.delta), s = dfm_exp(-a), slope = s > 0 ? -p.delta * a * s : 0.0;
+  const double mu = p.mu_c + (p.mu_s - p.mu_c) * s, level = mu * fn + drag * w;
+  double fx = b.sx[i], fy = b.sy[i], limit = p.kinetic_stop && w > 0 ? level : stiction, nx = 0, ny = 0, xx = 0, xy = 0, yy = 0;
+  t.mode[i] = 1;
+  if (stop.length > limit) {
+    const double dx = w > 0 ? -v.x : stop.x, dy = w > 0 ? -v.y : stop.y;
+    limit = level;
+    fx = limit * dx, fy = limit * dy, nx = mu * dx, ny = mu * dy;
+    t.mode[i] = 2;
+    if (w > 0) {
+      const double divisor = w > kRest ? w : kRest, across = limit / divisor;
+      const double d = ((p.mu_s - p.mu_c) * fn * slope + drag * w) / divisor - across;
+      xx = -(across + d * dx * dx), xy = -(d * dx * dy), yy = -(across + d * dy * dy);
+    }
+  }
+  b.fx[i] = fx + poison, b.fy[i] = fy + poison, b.limit[i] = limit + poison, b.nx[i] = nx + poison, b.ny[i] = ny + poison;
+  b.xx[i] = xx + poison, b.xy[i] = b.yx[i] = xy + poison, b.yy[i] = yy + poison;
+}
+
+// The passes below choose by value, not by branch: real batches mix stick and slip, and a mispredicted branch costs more than both sides.
+// Returns whether any lane slips; with kinetic_stop these are the lanes beyond the band, and answer() finds those that stop.
+template <bool kKineticStop>
+bool decide(const Batch &p, const Block &b, Passes &t) {
+  double slips = 0;
+  const double band2 = p.band * p.band;
+  for (uint32_t i = 0; i < kLanes; ++i) {
+    const double stiction = p.mu_s * b.fn[i], s2 = b.sx[i] * b.sx[i] + b.sy[i] * b.sy[i], f2 = stiction * stiction;
+    const double v2 = b.vx[i] * b.vx[i] + b.vy[i] * b.vy[i];
+    const double larger = s2 > f2 ? s2 : f2, touches = b.fn[i] > 0 ? 1.0 : 0.0, gives = s2 > f2 ? touches : 0.0;
+    const double moves = v2 > band2 ? touches : 0.0, slip = kKineticStop ? moves : gives;
+    const double starts = kKineticStop ? gives * (1.0 - moves) : 0.0;
+    const double low = larger < kTiny ? touches : 0.0, high = larger > kHuge ? touches : 0.0;
+    const double slow = v2 > kTiny ? 0.0 : slip, fast = v2 < kHuge ? 0.0 : slip;
+    t.mode[i] = touches + slip;
+    t.odd[i] = ((low + high) + (slow + fast)) + starts;
+    t.w[i] = std::sqrt(slip > 0 ? v2 : 1.0);
+    t.inverse[i] = 1.0 / t.w[i];
+    t.excess[i] = t.slope[i] = 0.0;
+    slips += slip;
+  }
+  return slips > 0;
+}
+
+inline void stribeck(const Batch &p, Passes &t) {
+  double a[kLanes], e[kLanes];
+  const double inverse = 1.0 / p.v_s;
+  if (p.delta == 2.0) {
+    for (uint32_t i = 0; i < kLanes; ++i) {
+      const double x = t.w[i] * inverse;
+      a[i] = x * x;
+    }
+  } else {
+    for (uint32_t i = 0; i < kLanes; ++i) a[i] = t.mode[i] > 1 ? dfm_pow(t.w[i] * inverse, p.delta) : 0.0;
+  }
+  for (uint32_t i = 0; i < kLanes; ++i) e[i] = dfm_exp(-a[i]);
+  for (uint32_t i = 0; i < kLanes; ++i) {
+    t.excess[i] = e[i];
+    t.slope[i] = e[i] > 0 ? -p.delta * a[i] * e[i] : 0.0;  // a may be infinite where e has vanished
+  }
+}
+
+template <bool kKineticStop>
+void answer(const Batch &p, const Block &b, Passes &t) {
+  for (uint32_t i = 0; i < kLanes; ++i) {
+    const double fn = b.fn[i], drag = p.sigma2 * b.area[i], vx = b.vx[i], vy = b.vy[i], sx = b.sx[i], sy = b.sy[i];
+    // 0 where every input is finite, NaN otherwise: no output of a bad lane passes for a good one.
+    const double poison = 0.0 * fn + 0.0 * vx + 0.0 * vy + 0.0 * sx + 0.0 * sy + 0.0 * drag;
+    const double mu = p.mu_c + (p.mu_s - p.mu_c) * t.excess[i], w = t.w[i], inverse = t.inverse[i], level = mu * fn + drag * w;
+    const double dx = -vx * inverse, dy = -vy * inverse, across = level * inverse;
+    const double along = ((p.mu_s - p.mu_c) * fn * t.slope[i] + drag * w) * inverse, d = along - across;
+    const bool moves = t.mode[i] > 1, stops = kKineticStop && moves && sx * sx + sy * sy <= level * level;
+    const bool slip = moves && !stops, stick = t.mode[i] > 0;
+    const double disc = stops ? level : p.mu_s * fn, fs = stick ? disc : 0.0, fx = stick ? sx : 0.0, fy = stick ? sy : 0.0, xy = slip ? -(d * dx * dy) : 0.0;
+    b.fx[i] = (slip ? level * dx : fx) + poison;
+    b.fy[i] = (slip ? level * dy : fy) + poison;
+    b.limit[i] = (slip ? level : fs) + poison;
+    b.nx[i] = (slip ? mu * dx : 0.0) + poison;
+    b.ny[i] = (slip ? mu * dy : 0.0) + poison;
+    b.xx[i] = (slip ? -(across + d * dx * dx) : 0.0) + poison;
+    b.xy[i] = xy + poison;
+    b.yx[i] = xy + poison;
+    b.yy[i] = (slip ? -(across + d * dy * dy) : 0.0) + poison;
+    if (kKineticStop) t.mode[i] -= stops ? 1.0 : 0.0;
+  }
+}
+
+template <bool kKineticStop>
+dfm_status eval(const dfm_friction_in *in, dfm_friction_out *out, double band = 0) {
+  const Batch p = {in->params[kMuC], in->params[kMuS], in->params[kVs], in->params[kDelta], in->params[kSigma2], band, kKineticStop};
+  const size_t stride = in->stride;
+  double spare[kLanes];
+  for (size_t at = 0; at < in->n; at += kLanes) {  // lanes up to n rounded to 8 may be touched
+    const auto to = [&](double *column, size_t c) { return column ? column + c * stride + at : spare; };
+    const Block b = {in->fn + at, in->vt + at, in->vt + stride + at, in->ft_stop + at, in->ft_stop + stride + at, in->area + at,
+                     to(out->ft, 0), to(out->ft, 1), to(out->limit, 0), to(out->dft_dvt, 0), to(out->dft_dvt, 1), to(out->dft_dvt, 2),
+                     to(out->dft_dvt, 3), to(out->dft_dfn, 0), to(out->dft_dfn, 1)};
+    Passes t;
+    const bool slips = decide<kKineticStop>(p, b, t);
+    if (slips && p.mu_s != p.mu_c) stribeck(p, t);
+    answer<kKineticStop>(p, b, t);
+    for (uint32_t i = 0; i < kLanes; ++i)
+      if (t.odd[i] > 0) odd_lane(p, b, t, i);
+    for (uint32_t i = 0; out->mode && i < kLanes; ++i) out->mode[at + i] = static_cast<uint8_t>(t.mode[i]);
+    for (uint32_t i = 0; out->stored && i < kLanes; ++i) out->stored[at + i] = 0;
+  }
+  return DFM_OK;
+}
+
+inline dfm_status check(const double *p, char *why, size_t cap) {
+  if (p[kMuS] >= p[kMuC]) return DFM_OK;
+  std::snprintf(why, cap, "mu_S (%g) must not be below mu_C (%g); give both, or \"mu\" for mu_C = mu_S", p[kMuS], p[kMuC]);
+  return DFM_E_ARG;
+}
+
+constexpr uint32_t kNeeds = DFM_NEED_FN | DFM_NEED_VT | DFM_NEED_FT_STOP | DFM_NEED_AREA;
+constexpr uint32_t kFlags = DFM_FRIC_SET_VALUED | DFM_FRIC_ISOTROPIC | DFM_FRIC_PASSIVE | DFM_FRIC_JACOBIAN;
+
+}  // namespace stribeck

@@ -1,0 +1,71 @@
+// Stiffness of each spring at rest, a product of two (doc/models/msm.md derives both, doc/decisions/0010 says why the second):
+//   Van Gelder   sum of E V over the cells around the edge / L0^2: the size of the cells drops out,
+//   directions   m.S m with m = n n^T, S the inverse of the body's mean C = 6 sum w m m^T / sum w, w the volumes around each edge.
+// C is the tensor of the body under a uniform strain if every cell had Young's modulus 1, so m.S m = 1 / E(n) is its compliance along
+// the spring: where a mesh has many edges one way (the surface of a bar one cell thick) they soften, where it has few they stiffen.
+// It is one step of the multiplicative algorithm for D-optimal designs (Silvey, Titterington, Torsney 1978), whose fixed point has the
+// largest det C, and that is an isotropic C whenever one can be had (log det is concave). The weighted mean of the factor is 1, it is
+// positive, turns with the body, and is 1 for a single cell and for an even spread of directions.
+#include "msm_body.h"
+
+namespace msm {
+namespace {
+
+constexpr int kN = 6;
+// Below this share of the mean pivot the edges all but leave out a strain (points in a plane): nothing to even out.
+constexpr double kFlat = 1e-6;
+
+// Components of n n^T such that the dot product of two is that of the tensors.
+void dyad_of(const double *a, const double *b, double length, double *m) {
+  const double n[3] = {(b[0] - a[0]) / length, (b[1] - a[1]) / length, (b[2] - a[2]) / length}, root2 = __builtin_sqrt(2.0);
+  m[0] = n[0] * n[0], m[1] = n[1] * n[1], m[2] = n[2] * n[2];
+  m[3] = root2 * (n[1] * n[2]), m[4] = root2 * (n[2] * n[0]), m[5] = root2 * (n[0] * n[1]);
+}
+
+// C = l l^T in place, lower triangle; false where C is not safely positive.
+bool factor(double (*c)[kN]) {
+  for (int i = 0; i < kN; ++i)
+    for (int j = 0; j <= i; ++j) {
+      double sum = c[i][j];
+      for (int k = 0; k < j; ++k) sum -= c[i][k] * c[j][k];
+      if (i == j && !(sum > kFlat)) return false;
+      c[i][j] = i == j ? __builtin_sqrt(sum) : sum / c[j][j];
+    }
+  return true;
+}
+
+double inverse_form(const double (*l)[kN], const double *m) {
+  double y[kN], sum = 0;
+  for (int i = 0; i < kN; ++i) {
+    y[i] = m[i];
+    for (int k = 0; k < i; ++k) y[i] -= l[i][k] * y[k];
+    y[i] /= l[i][i];
+    sum += y[i] * y[i];
+  }
+  return sum;
+}
+
+}  // namespace
+
+void Body::find_directions() {
+  per_modulus.create(host, nedge);
+  double c[kN][kN] = {}, m[kN], total = 0;
+  const auto directed = [&](uint32_t e) {  // two points at one place: no direction, no spring
+    const bool yes = edge_length[e] * edge_length[e] > kShortestSquared;
+    if (yes) dyad_of(rest_point.data() + 3 * size_t(edges[2 * size_t(e)]), rest_point.data() + 3 * size_t(edges[2 * size_t(e) + 1]), edge_length[e], m);
+    return yes;
+  };
+  for (uint32_t e = 0; e < nedge; ++e) {
+    if (!directed(e)) continue;
+    total += edge_volume[e];
+    for (int i = 0; i < kN; ++i)
+      for (int j = 0; j <= i; ++j) c[i][j] += edge_volume[e] * (m[i] * m[j]);
+  }
+  for (int i = 0; i < kN; ++i)
+    for (int j = 0; j <= i; ++j) c[i][j] *= total > 0 ? kN / total : 0;
+  const bool even_out = factor(c);
+  for (uint32_t e = 0; e < nedge; ++e)
+    per_modulus[e] = directed(e) ? (even_out ? inverse_form(c, m) : 1) / (edge_length[e] * edge_length[e]) : 0;
+}
+
+}  // namespace msm

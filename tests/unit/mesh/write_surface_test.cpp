@@ -1,0 +1,110 @@
+// Surfaces out and back in again, in every format that is written.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <filesystem>
+
+#include "mesh/raw_mesh.h"
+#include "mesh_support.h"
+
+using namespace dfm;
+
+namespace {
+
+std::string folder() { return test::scratch("write_surface"); }
+
+TriMesh ball_in_groups() {
+  TriMesh m = make_ball_surface(Memory::standard(), 0.1, 320);
+  m.groups.push_back({"north pole", 2, 3, {}}), m.groups.push_back({"south", 2, 8, {}});
+  for (uint32_t t = 0; t < m.ntri(); ++t) m.tri_group[t] = t % 5 == 0 ? 0 : t % 5 < 3 ? 1 : kNoGroup;
+  return m;
+}
+
+TriMesh there_and_back(const TriMesh &m, const std::string &ending) {
+  const std::string path = folder() + "/ball" + ending;
+  write_tri_mesh(m, path);
+  return read_tri_mesh(Memory::standard(), path);
+}
+
+std::string refused(const TriMesh &m, const std::string &name, dfm_status status) {
+  try {
+    write_tri_mesh(m, folder() + "/" + name);
+  } catch (const Error &e) {
+    EXPECT_EQ(e.status, status);
+    return e.what();
+  }
+  return "";
+}
+
+}  // namespace
+
+TEST(WriteSurface, ThereAndBack_KeepsEveryBit) {
+  const TriMesh m = ball_in_groups();
+  for (const char *ending : {".obj", ".ply", ".off", ".vtk", ".vtu", ".OBJ", ".Vtu"}) {
+    const TriMesh back = there_and_back(m, ending);
+    EXPECT_EQ(back.points, m.points) << ending;
+    EXPECT_EQ(back.tris, m.tris) << ending;
+    EXPECT_TRUE(back.warnings.empty()) << ending << back.warnings.front();
+  }
+}
+
+TEST(WriteSurface, Groups_ComeBackWhereTheFormatHasThem) {
+  const TriMesh m = ball_in_groups();
+  for (const char *ending : {".obj", ".vtk", ".vtu"}) {
+    const TriMesh back = there_and_back(m, ending);
+    ASSERT_EQ(back.groups.size(), 2u) << ending;
+    EXPECT_EQ(back.groups[0].name, "north pole") << ending;
+    EXPECT_EQ(back.groups[1].name, "south") << ending;
+    EXPECT_EQ(back.tri_group, m.tri_group) << ending;
+  }
+}
+
+TEST(WriteSurface, PlyGroups_ComeBackByNumber) {
+  const TriMesh m = ball_in_groups(), back = there_and_back(m, ".ply");
+  ASSERT_EQ(back.groups.size(), 2u);
+  EXPECT_EQ(back.groups[0].name, "3");
+  EXPECT_EQ(back.groups[1].tag, 8);
+  EXPECT_EQ(back.tri_group, m.tri_group);
+}
+
+TEST(WriteSurface, Stl_KeepsSinglePrecision) {
+  const TriMesh m = ball_in_groups(), back = there_and_back(m, ".stl");
+  ASSERT_EQ(back.ntri(), m.ntri());
+  EXPECT_EQ(back.npoint(), m.npoint());
+  EXPECT_TRUE(tri_mesh_statistics(back).closed);
+  EXPECT_EQ(back.turned, 0u);
+  for (size_t i = 0; i < m.tris.size(); ++i)
+    for (int k = 0; k < 3; ++k)
+      EXPECT_EQ(back.points[3 * size_t(back.tris[i]) + k], double(float(m.points[3 * size_t(m.tris[i]) + k])));
+}
+
+TEST(WriteSurface, StlNormals_PointOutward) {
+  const std::string path = folder() + "/ball.stl";
+  write_tri_mesh(ball_in_groups(), path);
+  const std::string bytes = test::read_file(path);
+  ASSERT_EQ(bytes.size(), 84u + 50 * 320);
+  for (size_t t = 0; t < 320; ++t) {
+    float v[12];
+    std::memcpy(v, bytes.data() + 84 + 50 * t, sizeof v);
+    EXPECT_NEAR(std::hypot(v[0], v[1], v[2]), 1, 1e-6);
+    EXPECT_GT(v[0] * v[3] + v[1] * v[4] + v[2] * v[5], 0.09f);
+  }
+}
+
+// Numbers that no short text holds, from nanometres to the largest that is read.
+TEST(WriteSurface, ExtremeCoordinates_SurviveText) {
+  for (const double scale : {1e-9 / 3, 1e5 / 3, 1e99 / 3}) {
+    TriMesh m = make_ball_surface(Memory::standard(), 1, 20);
+    for (double &x : m.points) x *= scale;
+    for (const char *ending : {".obj", ".off"}) EXPECT_EQ(there_and_back(m, ending).points, m.points) << ending << scale;
+  }
+}
+
+TEST(WriteSurface, WhatAFormatCannotHold_IsRefusedAndLeavesNoFile) {
+  TriMesh m = make_ball_surface(Memory::standard(), 1e50, 20);
+  EXPECT_NE(refused(m, "big.stl", DFM_E_UNSUPPORTED).find("STL holds coordinates up to"), std::string::npos);
+  EXPECT_NE(refused(m, "ball.xyz", DFM_E_UNSUPPORTED).find(".obj, .ply, .stl, .off, .vtk, .vtu"), std::string::npos);
+  EXPECT_NE(refused(m, "ball", DFM_E_UNSUPPORTED).find("this one ends with ''"), std::string::npos);
+  EXPECT_NE(refused(m, "none/ball.obj", DFM_E_IO).find("No such file"), std::string::npos);
+  for (const auto &entry : std::filesystem::directory_iterator(folder())) EXPECT_EQ(entry.path().string().find("big"), std::string::npos);
+}
