@@ -88,6 +88,7 @@ void view_obstacles(World &w, double t, double h, double left) {
       v.velocity = (1 / h) * (end.position - o.pose.position);
       v.spin = spin_between(o.pose.rotation, end.rotation, h);
     }
+    if (o.mesh) o.mesh->place(v.position, v.rotation, v.velocity, v.spin);
   }
 }
 
