@@ -53,6 +53,17 @@ int info(const Globals &globals, const std::string &file) {
   return report_mesh(globals, file, s, true);
 }
 
+}  // namespace
+
+std::string lost_shares(dfm_tetmesh cells, const std::string &out) {
+  const double *share = nullptr;
+  const std::string ending = mesh_ending(out);
+  if (dfm_tetmesh_share(cells, &share) < 0 || !share || ending == "vtk" || ending == "vtu") return "";
+  return "shares of material, which .vtk and .vtu hold: as a body every cell of ." + ending + " counts whole in mass and stiffness";
+}
+
+namespace {
+
 // What `out` cannot say of the mesh that was read.
 std::vector<std::string> losses(const MeshSession &s, const std::string &out) {
   std::vector<std::string> lost;
@@ -62,6 +73,7 @@ std::vector<std::string> losses(const MeshSession &s, const std::string &out) {
     i.size = sizeof i;
     dfm_tetmesh_get_info(s.cells, &i);
     if (i.ngroup && ending == "mesh") lost.push_back("names of groups, of which Medit holds the number alone");
+    if (const std::string shares = lost_shares(s.cells, out); !shares.empty()) lost.push_back(shares);
     return lost;
   }
   dfm_trimesh_info i = {};

@@ -68,7 +68,7 @@ void print_table(const std::string &in, const std::string &file, const Filled &f
   std::printf("  edge length       %.4g to %.4g m\n", f.cells.edge_min, f.cells.edge_max);
   std::printf("  seconds           %.2f\n", f.seconds);
   for (const std::string &w : f.warnings) std::printf("  warning: %s\n", w.c_str());
-  if (f.warnings.empty()) std::printf("  the surface is clean\n");
+  if (f.surface.warnings[0] == 0 && f.cells.warnings[0] == 0) std::printf("  the surface is clean\n");
 }
 
 int fill(const Globals &globals, const std::string &in, const std::string &out, uint32_t cells) {
@@ -86,6 +86,7 @@ int fill(const Globals &globals, const std::string &in, const std::string &out, 
   }
   filled.seconds = seconds_since(begin);
   if (!measure(s.surface, s.cells, filled)) return fail(dfm_last_error());
+  if (const std::string lost = lost_shares(s.cells, out); !lost.empty()) filled.warnings.push_back("not kept: " + lost);
   if (globals.json) print_json(in, out, cells, filled);
   else if (!globals.quiet) print_table(in, out, filled);
   return kDone;
