@@ -28,6 +28,10 @@ struct RigidView {
   dfm_rigid handle = 0;
   std::string name;
 };
+// By a quaternion x, y, z, w; all zero reads as identity.
+void rotate(const double q[4], const double v[3], double out[3]);
+// Points of an obstacle of triangles where it is now, [n,3].
+void place_points(const ObstacleView &obstacle, std::vector<double> &out);
 
 class SceneFile {
  public:

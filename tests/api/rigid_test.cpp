@@ -257,7 +257,7 @@ TEST(RigidBodies, SceneErrors_NameTheirPlace) {
   };
   refused("/rigid/host=bulit", {"/rigid", "builtin"});
   refused("/rigid/bodies/0/mass=0", {"/rigid/bodies/0/mass"});
-  refused("/rigid/bodies/1/shape=plane", {"/rigid/bodies/1/shape", "obstacles"});
+  refused("/rigid/bodies/1/shape=plane", {"/rigid/bodies/1/shape", "sphere", "capsule"});
   refused("/rigid/bodies/1/shape=voxels", {"not available yet: /rigid/bodies/1/shape"});
   refused("/rigid/bodies/1/massa=1", {"/rigid/bodies/1", "mass"});
   refused("/rigid/bodies/1/name=ball", {"/rigid/bodies/1/name", "taken"});

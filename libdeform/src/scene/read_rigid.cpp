@@ -15,12 +15,10 @@ RigidBody read_rigid_body(const Node &node, ReadContext &context) {
   b.name = node.at("name").name();
   check_fresh(node.at("name"), b.name, context.sides, "body or obstacle");
   context.sides.push_back(b.name);
-  const Node shape_node = node.at("shape");
-  const std::string shape = shape_node.word("shape");
-  if (shape == "plane") shape_node.fail("a rigid body is a sphere, a box or a capsule; a plane has no mass, put it among the obstacles");
+  const std::string shape = node.at("shape").word("rigid_shape");
   check_shape_keys(node, shape);
   read_solid(node, shape, b.def.shape, b.def.half_size, b.def.radius, b.def.half_length);
-  b.def.pose = read_pose(node, "obstacle_pose", nullptr);
+  b.def.pose = read_pose(node, "rigid_pose", nullptr);
   b.def.fixed = node.boolean("fixed", false);
   if (!b.def.fixed || node.has("mass")) b.def.mass = node.at("mass").number(kPositive);
   if (node.has("inertia")) {
