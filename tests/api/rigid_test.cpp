@@ -174,8 +174,11 @@ TEST(RigidBodies, ReportsNameThem) {
   double force[3] = {}, wrench[3], moment[3];
   for (const dfm_contact &k : contacts) {
     with_plate += k.body_b == plate, with_floor += k.body_b == 0;
-    if (k.body_b == plate)
-      for (int i = 0; i < 3; ++i) force[i] -= k.fn * k.normal[i] + k.ft[0] * k.tangent[i] + k.ft[1] * (k.normal[(i + 1) % 3] * k.tangent[(i + 2) % 3] - k.normal[(i + 2) % 3] * k.tangent[(i + 1) % 3]);
+    if (k.body_b != plate) continue;
+    for (int i = 0; i < 3; ++i) {
+      const int m = (i + 1) % 3, n2 = (i + 2) % 3;
+      force[i] -= k.fn * k.normal[i] + k.ft[0] * k.tangent[i] + k.ft[1] * (k.normal[m] * k.tangent[n2] - k.normal[n2] * k.tangent[m]);
+    }
   }
   EXPECT_GT(with_plate, 0u);
   EXPECT_GT(with_floor, 0u);

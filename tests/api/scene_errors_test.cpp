@@ -83,7 +83,7 @@ TEST(SceneErrors, UnknownKeys_NameTheNearest) {
          {"/time/zzzzzzzz=1", {"/time/zzzzzzzz", "expected one of: duration, step, integrator, mode"}},
          {"/bodies/0/model/params/volum=1", {"/bodies/0/model/params/volum", "volume"}},
          {"/contact/friction/0/params/mu_X=1", {"/contact/friction/0/params/mu_X", "mu_"}},
-         {"/obstacles/0/radius=1", {"/obstacles/0/radius", "a plane has no \"radius\""}}});
+         {"/obstacles/0/radius=1", {"/obstacles/0/radius", "the shape plane has no \"radius\""}}});
 }
 
 TEST(SceneErrors, WrongTypes_SayWhatWasExpected) {

@@ -84,7 +84,8 @@ Plan make_plan(const SceneFacts &f) {
   }
   if (f.bodies > f.self_stepping) run(StageId::model, "internal forces of " + count(f.bodies - f.self_stepping, "body", "bodies"));
   if (f.bodies) run(StageId::predict, "velocities without contact of " + count(f.bodies, "body", "bodies"));
-  const std::string rigids = count(f.rigid_bodies, "rigid body", "rigid bodies") + " and " + count(f.rigid_joints, "joint", "joints") + " of host " + f.rigid_hosts;
+  const std::string rigids =
+      count(f.rigid_bodies, "rigid body", "rigid bodies") + " and " + count(f.rigid_joints, "joint", "joints") + " of host " + f.rigid_hosts;
   if (f.rigid_bodies) run(StageId::rigid_predict, rigids);
   else leave("rigid", "no rigid bodies");
   const unsigned pairs = f.body_pairs + f.obstacle_pairs;
