@@ -16,7 +16,7 @@ std::vector<std::string> kept_warnings;
 void on_log(void *, int32_t level, const char *utf8) {
   if (level < DFM_LOG_WARNING) return;
   if (level == DFM_LOG_WARNING) kept_warnings.push_back(utf8);
-  if (!globals.quiet) std::fprintf(stderr, "deform: %s: %s\n", level == DFM_LOG_WARNING ? "warning" : "error", utf8);
+  if (!globals.quiet || level > DFM_LOG_WARNING) std::fprintf(stderr, "deform: %s: %s\n", level == DFM_LOG_WARNING ? "warning" : "error", utf8);
 }
 
 size_t edit_distance(const std::string &a, const std::string &b) {

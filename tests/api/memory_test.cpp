@@ -167,6 +167,32 @@ TEST(Memory, ASettledCoupledStep_AllocatesNothing) {
   EXPECT_EQ(hooks.live_bytes, 0);
 }
 
+TEST(Memory, ParametersThatFindNoMemory_SayWhyAndChangeNothing) {
+  Hooks hooks;
+  const dfm_context_def def = hooks.def();
+  dfm_context *c = nullptr;
+  ASSERT_EQ(dfm_context_create(&def, &c), DFM_OK) << dfm_last_error();
+  const dfm_world w = test::make_world(c);
+  const dfm_body b = test::make_body(c, w, "beam", {0.1, 0.1, 0.1}, 60, {});
+  test::run(w, 0.01, 1e-3);
+  const double slope = 2;
+  const dfm_param_value value{"anisotropy_slope", &slope, 1};
+  const dfm_params params{sizeof(dfm_params), 1, &value};
+  double before = 0, after = 0;
+  test::ok(dfm_world_stable_step(w, &before, nullptr, nullptr));
+  hooks.fail_from = hooks.calls.load();
+  EXPECT_EQ(dfm_body_set_params(b, &params), DFM_E_NOMEM);
+  EXPECT_NE(std::string(dfm_last_error()).find("no memory"), std::string::npos) << dfm_last_error();
+  hooks.fail_from = -1;
+  test::ok(dfm_world_stable_step(w, &after, nullptr, nullptr));
+  EXPECT_EQ(before, after);
+  test::ok(dfm_body_set_params(b, &params));
+  test::ok(dfm_world_stable_step(w, &after, nullptr, nullptr));
+  EXPECT_GT(after, before) << "a softer body";
+  dfm_context_destroy(c);
+  EXPECT_EQ(hooks.live_bytes, 0);
+}
+
 // Everything from the context to a step in contact, with the allocator failing at the n-th call, for all n that are ever reached.
 TEST(Memory, WhenTheNthAllocationFails_TheCallFailsCleanlyAndNothingLeaks) {
   const test::Triangles slab = test::box_surface({0.2, 0.2, 0.05}, 1);

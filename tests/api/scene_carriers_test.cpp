@@ -247,6 +247,15 @@ TEST(SceneAnisotropy, Mistakes_AreTold) {
                  {"/bodies/0/anisotropy: the direction is given as"});
 }
 
+// The sentence that refuses the body points to the log, so --quiet keeps the log's errors.
+TEST(SceneAnisotropy, WhatTheModelRefuses_IsToldToTheQuietToo) {
+  const test::CommandResult result = test::deform({"explain", scene(), "--quiet", "--set", R"(/bodies/0/model/params={"damper": "sls", "anisotropy_form": "A"})",
+                                                   "--set", R"(/bodies/0/anisotropy={"axis": [0, 0, 1], "params": {"slope": 1}})"});
+  EXPECT_EQ(result.exit_code, 2);
+  EXPECT_NE(result.err.find("choose form B"), std::string::npos) << result.err;
+  EXPECT_EQ(result.err.find("warning"), std::string::npos) << result.err;
+}
+
 constexpr const char *kBox = "/bodies/0/mesh=box.obj";
 constexpr const char *kFill = "/bodies/0/fill={\"cells\": 600}";
 

@@ -91,9 +91,7 @@ void renumber(RawMesh &raw, TetMesh &mesh) {
       for (uint32_t &p : group.points) p = number[p];
       group.points.erase(std::remove(group.points.begin(), group.points.end(), kNoGroup), group.points.end());
     }
-    std::sort(group.points.begin(), group.points.end());
-    group.points.erase(std::unique(group.points.begin(), group.points.end()), group.points.end());
-    group.points.shrink_to_fit();
+    sort_once(group.points);
   }
 }
 
@@ -165,6 +163,12 @@ void check_points(const std::string &path, const Array<double> &points) {
     if (!(std::fabs(points[i]) <= kLargestCoordinate))
       fail(DFM_E_FORMAT, "%s: point %zu (counted from 0) has the coordinate %g m; coordinates up to %g m are read", path.c_str(), i / 3,
            points[i], kLargestCoordinate);
+}
+
+void sort_once(Array<uint32_t> &points) {
+  std::sort(points.begin(), points.end());
+  points.erase(std::unique(points.begin(), points.end()), points.end());
+  points.shrink_to_fit();
 }
 
 uint32_t drop_duplicate_cells(RawMesh &raw, Array<uint32_t> *file_cell) {
