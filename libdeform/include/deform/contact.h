@@ -6,8 +6,10 @@
 #ifdef __cplusplus
 extern "C" {
 #endif
-/** Law between two sides. A side is "*", a body or obstacle name, "body:GROUP", or "material=NAME". The most specific entry wins, then
- * the last one given. Where none matches: law "coulomb" with its defaults. */
+/** Law between two sides. A side is "*", "material=NAME", a body or obstacle name, or "body:GROUP" (a group of its surface triangles), weighing
+ * 1, 2, 3 and 4: of the entries that match in either order the one with the largest sum wins, then the last one given. "material=NAME" asks
+ * the material of the cell behind a triangle. Where none matches: law "coulomb", mu_C = mu_S = sqrt(f_a f_b), f a material's entry "friction", 0.5
+ * where it has none. */
 typedef struct dfm_friction_def {
   uint32_t size, flags;
   const char *between[2];
