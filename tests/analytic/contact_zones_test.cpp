@@ -9,12 +9,22 @@ namespace {
 
 constexpr double kG = 9.81;
 
+// Adds a speed along x to all points.
+void push(dfm_body body, double speed) {
+  uint32_t n = 0;
+  test::ok(dfm_body_get_state(body, 0, nullptr, nullptr, &n));
+  std::vector<double> x(3 * n), v(3 * n);
+  test::ok(dfm_body_get_state(body, n, x.data(), v.data(), &n));
+  for (uint32_t i = 0; i < n; ++i) v[3 * i] += speed;
+  test::ok(dfm_body_set_state(body, n, x.data(), v.data()));
+}
+
 // A block of edge 0.1 m, ice for y < 0.05 and rubber beyond, on a plane.
 struct Sledge {
   test::Context context;
   dfm_world world;
   dfm_body body;
-  explicit Sledge(double ice, double rubber, uint32_t cells = 400) {
+  explicit Sledge(double ice, double rubber, uint32_t cells = 768) {   // 4 cells along an edge: the line between the parts is one of the mesh
     world = test::make_world(context);
     test::ZonedOptions o;
     o.name = "block", o.young = 1e6, o.poisson = 0, o.damping_stiffness = 1e-3, o.position = {-0.05, -0.05, 2e-5};
@@ -24,24 +34,18 @@ struct Sledge {
     test::ok(test::friction(world, "block:ice", "floor", ice));
     test::ok(test::friction(world, "floor", "block:rubber", rubber));
   }
-  void push(double speed) {
-    uint32_t n = 0;
-    test::ok(dfm_body_get_state(body, 0, nullptr, nullptr, &n));
-    std::vector<double> x(3 * n), v(3 * n);
-    test::ok(dfm_body_get_state(body, n, x.data(), v.data(), &n));
-    for (uint32_t i = 0; i < n; ++i) v[3 * i] += speed;
-    test::ok(dfm_body_set_state(body, n, x.data(), v.data()));
-  }
 };
 
 }  // namespace
 
 TEST(Zones, SlidingBlockOnIceAndRubber_IsTurnedByTheClosedForm) {
-  // uniform pressure W/b2, each half of it with its own coefficient at a mean lever of b/4: moment W b (rubber - ice) / 8, force W (ice + rubber) / 2
+  // Uniform pressure W/b2, each half with its own coefficient at a mean lever of b/4: moment W b (rubber - ice) / 8, force W (ice + rubber) / 2.
+  // The surfels on the line between the halves, a quarter of the face at 4 cells along an edge, belong to the part with the lowest triangles: ice.
+  // That moves an eighth of the weight from rubber to ice, and nothing of the moment, as the line runs through the middle.
   const double ice = 0.05, rubber = 0.35;
   Sledge s(ice, rubber);
   test::run(s.world, 0.3, 1e-3);
-  s.push(3);
+  push(s.body, 3);
   test::run(s.world, 0.03, 1e-3);
   const double weight = test::measure(s.body).mass * kG;
   double moment = 0, friction = 0;
@@ -55,14 +59,15 @@ TEST(Zones, SlidingBlockOnIceAndRubber_IsTurnedByTheClosedForm) {
     moment += pair.moment[2] / steps, friction += pair.friction[0] / steps;
   }
   EXPECT_NEAR(moment, weight * 0.1 * (rubber - ice) / 8, 0.02 * weight * 0.1 * (rubber - ice) / 8);
-  EXPECT_NEAR(friction, -weight * (ice + rubber) / 2, 0.02 * weight * (ice + rubber) / 2);
+  const double force = weight * (0.625 * ice + 0.375 * rubber);
+  EXPECT_NEAR(friction, -force, 0.02 * force);
   EXPECT_GT(test::measure(s.body).angular[2], 0) << "the rubber holds back the left side";
 }
 
 TEST(Zones, EveryContact_CarriesTheLawOfItsPart) {
   Sledge s(0.05, 0.35);
   test::run(s.world, 0.3, 1e-3);
-  s.push(3);
+  push(s.body, 3);
   std::map<uint32_t, int> seen;
   for (int k = 0; k < 20; ++k) {
     test::run(s.world, 1e-3, 1e-3);
@@ -89,15 +94,15 @@ TEST(Zones, MaterialOfTheCellBehindATriangle_DecidesItsLaw) {
   test::ZonedOptions o;
   o.name = "block", o.position = {-0.05, -0.05, 2e-5}, o.velocity = {2, 0, 0};
   o.material = [&](const double x[3]) { return soft[x[1] < 0.05 ? 0 : 1]; };
-  test::make_zoned_beam(context, world, {0.1, 0.1, 0.1}, 200, o);
+  test::make_zoned_beam(context, world, {0.1, 0.1, 0.1}, 768, o);
   test::add_plane(world, "floor");
   test::ok(test::friction(world, "material=ice", "*", 0.05));
   test::ok(test::friction(world, "material=rubber", "*", 0.35));
   int seen[2] = {};
-  for (int k = 0; k < 100; ++k) {
+  for (int k = 0; k < 60; ++k) {
     test::run(world, 1e-3, 1e-3);
     for (const dfm_contact &c : test::contacts(world)) {
-      if (!(c.fn > 1e-3) || std::fabs(c.point[1]) < 1e-2 || c.flags & DFM_CONTACT_STICKING) continue;
+      if (!(c.fn > 1e-3) || std::fabs(c.point[1]) < 5e-3 || c.flags & DFM_CONTACT_STICKING) continue;
       EXPECT_NEAR(std::hypot(c.ft[0], c.ft[1]), (c.point[1] < 0 ? 0.05 : 0.35) * c.fn, 1e-6 * c.fn) << "y " << c.point[1];
       ++seen[c.point[1] < 0 ? 0 : 1];
     }
@@ -108,7 +113,7 @@ TEST(Zones, MaterialOfTheCellBehindATriangle_DecidesItsLaw) {
 
 namespace {
 
-// A small block slides along x over a held plate of two parts; both carry the bristle law, softer on the second part.
+// A narrow block slides along x between two rows of points of a held plate of two parts; both carry the bristle law, softer on the second part.
 struct Crossing {
   test::Context context;
   dfm_world world;
@@ -120,10 +125,10 @@ struct Crossing {
     test::ZonedOptions p;
     p.name = "plate", p.held = true, p.position = {0, -0.05, -0.02};
     p.groups = {"near", "far"}, p.group = [](const double x[3]) { return x[0] < 0.2 ? 0u : 1u; };
-    plate = test::make_zoned_beam(context, world, {0.4, 0.1, 0.02}, 3000, p);
+    plate = test::make_zoned_beam(context, world, {0.4, 0.1, 0.02}, 1200, p);   // squares of 0.02 m
     test::ZonedOptions o;
-    o.name = "block", o.young = 1e6, o.damping_stiffness = 1e-3, o.position = {0.02, -0.013, 5e-6}, o.velocity = {1.2, 0, 0};
-    block = test::make_zoned_beam(context, world, {0.03, 0.03, 0.03}, 12, o);
+    o.name = "block", o.young = 2e5, o.damping_stiffness = 1e-3, o.position = {0.02, -0.005, 2e-5};
+    block = test::make_zoned_beam(context, world, {0.03, 0.01, 0.01}, 36, o);
     const double mu = 0.1;
     for (int k = 0; k < 2; ++k) {
       const dfm_param_value values[] = {{"mu", &mu, 1}, {"sigma0", &kSigma[one_law ? 0 : k], 1}};
@@ -145,7 +150,9 @@ struct Crossing {
 
 TEST(Identity, ContactSlidingOverTwentyTriangles_KeepsItsKeyAndItsBristle) {
   Crossing s(true);
-  test::run(s.world, 0.05, 1e-3);
+  test::run(s.world, 0.2, 1e-3);
+  push(s.block, 1.2);
+  test::run(s.world, 0.02, 1e-3);
   const auto first = s.corners();
   ASSERT_GE(first.size(), 4u);
   uint32_t n = 0;
@@ -174,7 +181,9 @@ TEST(Identity, ContactSlidingOverTwentyTriangles_KeepsItsKeyAndItsBristle) {
 
 TEST(Identity, ContactThatSlidesIntoAnotherPart_ChangesItsLawAndStartsFromRest) {
   Crossing s(false);
-  test::run(s.world, 0.05, 1e-3);
+  test::run(s.world, 0.2, 1e-3);
+  push(s.block, 1.2);
+  test::run(s.world, 0.02, 1e-3);
   std::map<uint32_t, dfm_contact> before = s.corners();
   int crossed = 0;
   for (int k = 0; k < 250; ++k) {
