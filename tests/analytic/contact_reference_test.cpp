@@ -120,7 +120,7 @@ TEST(ContactReference, StickSlip_PeriodAndAmplitudeWithinTwoPercent) {
   int n = 0;
   for (const Row &row : table("stick_slip")) {      // m k Fs Fk V x_slip x_max x_restick x_min ts tslip period rate
     const std::vector<double> &v = row.v;
-    const ref::StickSlip got = ref::stick_slip(v[0], v[1], v[2], v[3], v[4], 2e-4, 2.6 * v[11] + v[5] / v[4], 5e-4 * v[4]);
+    const ref::StickSlip got = ref::stick_slip(v[0], v[1], v[2], v[3], v[4], 1e-4, 2.3 * v[11] + v[5] / v[4], 8e-4 * v[4]);
     ASSERT_GE(got.cycles, 1) << "m " << v[0];
     EXPECT_NEAR(got.period, v[11], 0.02 * v[11]) << "m " << v[0];
     EXPECT_NEAR(got.x_max - got.x_min, v[6] - v[8], 0.02 * (v[6] - v[8])) << "m " << v[0];

@@ -126,7 +126,8 @@ struct StickSlip { double period, x_max, x_min; int cycles; };
 inline StickSlip stick_slip(double m, double k, double f_s, double f_k, double belt, double h, double until, double dv, const char *law = "karnopp") {
   const double w = m * kG;
   Block::Shape s;
-  s.cells = 12, s.density = 1000 * m, s.young = 1e7 * m, s.damping = 2e-4;
+  // Stiff, so that its own shaking, about (F_s - F_k) / sqrt(stiffness mass), stays below the slip: a softer block catches itself on the way.
+  s.cells = 12, s.density = 1000 * m, s.young = 1e8 * m, s.damping = 1e-4;
   Block b({f_s / w, f_k / w, law, dv}, {0, 0, -kG}, s, belt);
   run(b.world, 0.3, h);
   b.mark();
