@@ -82,6 +82,15 @@ dfm_contact report(const World &w, uint32_t i) {
   return out;
 }
 
+// Body or obstacle of this world.
+uint64_t id_of(const World &w, uint64_t handle, const char *what) {
+  for (auto &b : w.bodies)
+    if (b->handle == handle) return b->id;
+  for (auto &o : w.obstacles)
+    if (o->handle == handle) return o->id;
+  fail(DFM_E_HANDLE, "'%s' is no body or obstacle of this world", what);
+}
+
 }  // namespace
 
 dfm_status dfm_world_add_friction(dfm_world world, const dfm_friction_def *given) {
@@ -161,6 +170,25 @@ dfm_status dfm_world_pairs(dfm_world world, uint32_t capacity, dfm_pair_report *
     }
     if (!room(static_cast<uint32_t>(pairs.size()), capacity, out, n)) return;
     for (const Pair &p : pairs) *out++ = p.report;
+  });
+}
+
+dfm_status dfm_world_pair_wrench(dfm_world world, uint64_t a, uint64_t b, const double point[3], double force[3], double moment[3]) {
+  return guard([&] {
+    const World &w = world_of(world);
+    need(point, "point");
+    const uint64_t ia = id_of(w, a, "a"), ib = id_of(w, b, "b");
+    const Vec3 about = load3(point);
+    Vec3 sum, turn;
+    for (uint32_t i = 0; i < w.report.n; ++i) {
+      const bool straight = w.store.id_a[i] == ia && w.store.id_b[i] == ib, turned = w.store.id_a[i] == ib && w.store.id_b[i] == ia;
+      if (!touching(w, i) || !(straight || turned)) continue;
+      const double *const f = &w.report.frame[size_t(9) * i], *const l = &w.report.impulse[size_t(3) * i], scale = (turned ? -1 : 1) / w.report.h;
+      const Vec3 one = scale * (l[0] * load3(f) + l[1] * load3(f + 3) + l[2] * load3(f + 6));
+      sum += one, turn += cross(load3(w.report.contacts[i].point) - about, one);
+    }
+    if (force) store3(force, sum);
+    if (moment) store3(moment, turn);
   });
 }
 
