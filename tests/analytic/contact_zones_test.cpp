@@ -133,7 +133,8 @@ struct Crossing {
     for (int k = 0; k < 2; ++k) {
       const dfm_param_value values[] = {{"mu", &mu, 1}, {"sigma0", &kSigma[one_law ? 0 : k], 1}};
       dfm_friction_def f{};
-      f.size = sizeof f, f.between[0] = "block", f.between[1] = k ? "plate:far" : "plate:near", f.law = "test.bristle", f.params = {sizeof(dfm_params), 2, values};
+      f.size = sizeof f, f.between[0] = "block", f.between[1] = k ? "plate:far" : "plate:near", f.law = "test.bristle";
+      f.params = {sizeof(dfm_params), 2, values};
       test::ok(dfm_world_add_friction(world, &f));
     }
   }

@@ -43,7 +43,8 @@ inline dfm_body make_zoned_beam(dfm_context *c, dfm_world w, std::array<double, 
     }
     if (o.material) middle(q, 4, x), materials.push_back(o.material(x));
   }
-  const dfm_surface_groups groups{sizeof(dfm_surface_groups), uint32_t(o.groups.size()), o.groups.data(), uint32_t(group.size()), 0, triangles.data(), group.data()};
+  const dfm_surface_groups groups{sizeof(dfm_surface_groups), uint32_t(o.groups.size()), o.groups.data(), uint32_t(group.size()), 0,
+                                  triangles.data(), group.data()};
   dfm_material_def md = dfm_material_def_default();
   md.density = o.density, md.young = o.young, md.poisson = o.poisson, md.damping_mass = o.damping_mass, md.damping_stiffness = o.damping_stiffness;
   dfm_material material = 0;
