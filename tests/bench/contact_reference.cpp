@@ -69,34 +69,36 @@ double top_of(dfm_body body) {
   return top;
 }
 
-// Boxes of edge 1 m on each other, nu = 0: weight above each interface, and the shortening rho g (n L)^2 / (2 E).
+// Boxes on each other, nu = 0: weight above each interface, and the shortening rho g (n L)^2 / (2 E).
 void stack() {
-  const auto rows = table("box_stack");
-  const uint32_t count = uint32_t(std::stoul(rows[0][0]));
-  const double edge = std::stod(rows[0][1]), rho = std::stod(rows[0][2]), young = std::stod(rows[0][3]), shortening = std::stod(rows[0][6]);
-  for (const uint32_t cells : {12u, 96u, 324u}) {
-    test::Context context;
-    const dfm_world world = test::make_world(context);
-    std::vector<dfm_body> box;
-    for (uint32_t k = 0; k < count; ++k) {
-      test::BodyOptions o;
-      o.young = young, o.density = rho, o.poisson = 0, o.damping_mass = 3, o.damping_stiffness = 1e-2;
-      o.position = {-edge / 2, -edge / 2, k * (edge + 1e-3)};
-      box.push_back(test::make_body(context, world, "beam", {edge, edge, edge}, cells, o));
+  const auto row = table("box_stack").back();
+  const uint32_t count = uint32_t(std::stoul(row[0]));
+  const double edge = std::stod(row[1]), rho = std::stod(row[2]);
+  for (const double stiffer : {1.0, 10.0})
+    for (const uint32_t cells : {12u, 96u}) {
+      const double young = stiffer * std::stod(row[3]), shortening = std::stod(row[6]) / stiffer;
+      test::Context context;
+      const dfm_world world = test::make_world(context);
+      std::vector<dfm_body> box;
+      for (uint32_t k = 0; k < count; ++k) {
+        test::BodyOptions o;
+        o.young = young, o.density = rho, o.poisson = 0, o.damping_mass = 10, o.damping_stiffness = 1e-3;
+        o.position = {-edge / 2, -edge / 2, k * (edge + 1e-4)};
+        box.push_back(test::make_body(context, world, "beam", {edge, edge, edge}, cells, o));
+      }
+      const dfm_obstacle floor = test::add_plane(world, "floor");
+      test::set_friction(world, 0.3);
+      test::run(world, 2, 1e-3);
+      double worst = 0;
+      for (uint32_t k = 0; k < count; ++k) {
+        const double origin[3] = {};
+        double force[3] = {};
+        test::ok(dfm_world_pair_wrench(world, box[k], k ? uint64_t(box[k - 1]) : uint64_t(floor), origin, force, nullptr));
+        worst = std::max(worst, std::fabs(percent(force[2], (count - k) * rho * edge * edge * edge * ref::kG)));
+      }
+      std::printf("box_stack, E %g Pa, boxes of %u cells: worst interface force %.3f %%, shortening %+.2f %%\n", young, cells, worst,
+                  percent(count * edge - top_of(box.back()), shortening));
     }
-    const dfm_obstacle floor = test::add_plane(world, "floor");
-    test::set_friction(world, 0.3);
-    test::run(world, 8, 2e-3);
-    double worst = 0;
-    for (uint32_t k = 0; k < count; ++k) {
-      const double origin[3] = {};
-      double force[3] = {};
-      test::ok(dfm_world_pair_wrench(world, box[k], k ? uint64_t(box[k - 1]) : uint64_t(floor), origin, force, nullptr));
-      worst = std::max(worst, std::fabs(percent(force[2], (count - k) * rho * edge * edge * edge * ref::kG)));
-    }
-    std::printf("box_stack, boxes of %u cells: worst interface force %.3f %%, shortening %+.2f %%\n", cells, worst,
-                percent(count * edge - top_of(box.back()), shortening));
-  }
 }
 
 // Bar of nu = 0 end-on against a wall: time in contact and rebound.
@@ -177,6 +179,6 @@ void hertz_impact() {
 int main(int argc, char **argv) {
   if (test::shared_dir().empty()) return std::printf("../shared/reference is absent\n"), 0;
   const std::string half = argc > 1 ? argv[1] : "";
-  if (half != "rigid") stack(), bar_impact(), hertz(), hertz_impact();
+  if (half != "rigid") bar_impact(), hertz_impact(), stack(), hertz();
   if (half != "elastic") rigid();
 }
