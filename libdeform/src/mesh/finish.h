@@ -9,6 +9,7 @@ namespace dfm {
 inline constexpr double kLargestCoordinate = 1e100;  // m; beyond it squares of lengths overflow
 
 void check_points(const std::string &path, const Array<double> &points);
+void sort_once(Array<uint32_t> &points);  // points of a group: ascending, each once
 // Drops cells with the same four corners as an earlier cell; returns how many. file_cell (may be null): numbers of those kept, if any goes.
 uint32_t drop_duplicate_cells(RawMesh &raw, Array<uint32_t> *file_cell = nullptr);
 // The body's box against the rounding of its coordinates: a sentence where they are coarse, else empty.

@@ -253,11 +253,7 @@ void take_groups(RawMesh &raw, TriMesh &mesh) {
     Array<uint32_t> &points = mesh.groups[raw.tri_group[t]].points;
     points.insert(points.end(), &mesh.tris[3 * t], &mesh.tris[3 * t] + 3);
   }
-  for (MeshGroup &group : mesh.groups) {
-    std::sort(group.points.begin(), group.points.end());
-    group.points.erase(std::unique(group.points.begin(), group.points.end()), group.points.end());
-    group.points.shrink_to_fit();
-  }
+  for (MeshGroup &group : mesh.groups) sort_once(group.points);
   mesh.tri_group = std::move(raw.tri_group);
 }
 

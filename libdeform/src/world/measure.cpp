@@ -79,7 +79,9 @@ void set_model_params(Body &b, const dfm_params &params) {
     if (!(type.params[i].flags & DFM_PARAM_RUNTIME) && !std::equal(&values[at], &values[at] + type.params[i].width, &b.model.params[at]))
       fail(DFM_E_ARG, "body '%s': parameter '%s' of model '%s' cannot change while it runs", b.name.c_str(), type.params[i].key, type.id);
   if (!b.model.ops->set_params) fail(DFM_E_UNSUPPORTED, "model '%s' takes no parameters while it runs", type.id);
-  if (b.model.call("set_params", [&] { return b.model.ops->set_params(b.model.self, values.data()); }) != DFM_OK)
+  const dfm_status status = b.model.call("set_params", [&] { return b.model.ops->set_params(b.model.self, values.data()); });
+  if (status == DFM_E_NOMEM) fail(DFM_E_NOMEM, "body '%s': model '%s' found no memory for these parameters; nothing was changed", b.name.c_str(), type.id);
+  if (status != DFM_OK)
     fail(DFM_E_ARG, "body '%s': model '%s' refuses these parameters; the log says why", b.name.c_str(), type.id);
   b.model.params = std::move(values);
   b.world->bound_age = kNone, b.world->changed = true;   // the plan names the effects that parameters call for

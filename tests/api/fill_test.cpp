@@ -1,0 +1,144 @@
+// Filling through the public door and the command: shares, warnings, refusals.
+#include <cmath>
+
+#include "support.h"
+#include "world.h"
+
+namespace {
+
+struct Filled {
+  test::Context context;
+  dfm_trimesh surface = 0;
+  dfm_tetmesh mesh = 0;
+  explicit Filled(const char *kind, std::array<double, 3> size, uint32_t triangles) {
+    test::ok(dfm_trimesh_make(context, kind, size.data(), triangles, &surface));
+  }
+};
+
+}  // namespace
+
+TEST(TetmeshFill, Torus_SharesSumUpToItsVolume) {
+  Filled f("torus", {0.1, 0.03, 0}, 4000);
+  test::ok(dfm_tetmesh_fill(f.surface, 2000, &f.mesh));
+  dfm_tetmesh_info info{};
+  info.size = sizeof info;
+  test::ok(dfm_tetmesh_get_info(f.mesh, &info));
+  dfm_trimesh_info skin{};
+  skin.size = sizeof skin;
+  test::ok(dfm_trimesh_get_info(f.surface, &skin));
+  const double *share = nullptr;
+  test::ok(dfm_tetmesh_share(f.mesh, &share));
+  ASSERT_NE(share, nullptr);
+  EXPECT_NEAR(info.ntet, 2000, 200);
+  EXPECT_EQ(info.npiece, 1u);
+  double sum = 0;  // cells of the lattice are alike
+  for (uint32_t t = 0; t < info.ntet; ++t) sum += share[t] * info.volume / info.ntet;
+  EXPECT_NEAR(sum, skin.volume, 1e-9 * skin.volume);
+  EXPECT_GT(info.volume, 1.1 * skin.volume);
+}
+
+TEST(TetmeshFill, MeshThatWasNotFilled_HasNoShare) {
+  test::Context context;
+  const double size[3] = {1, 1, 1};
+  dfm_tetmesh mesh = 0;
+  test::ok(dfm_tetmesh_make(context, "beam", size, 100, &mesh));
+  const double *share = size;
+  test::ok(dfm_tetmesh_share(mesh, &share));
+  EXPECT_EQ(share, nullptr);
+}
+
+TEST(TetmeshFill, WrongArguments_AreRefusedWithASentence) {
+  Filled f("ball", {0.1, 0, 0}, 500);
+  EXPECT_EQ(dfm_tetmesh_fill(f.surface, 0, &f.mesh), DFM_E_ARG);
+  EXPECT_EQ(dfm_tetmesh_fill(f.surface, 100, nullptr), DFM_E_ARG);
+  EXPECT_EQ(dfm_tetmesh_fill(0, 100, &f.mesh), DFM_E_HANDLE);
+  EXPECT_EQ(dfm_tetmesh_share(0, nullptr), DFM_E_ARG);
+  const double points[] = {0, 0, 0, 1, 0, 0, 0, 1, 0};
+  const uint32_t triangle[] = {0, 1, 2};
+  dfm_trimesh sheet = 0;
+  test::ok(dfm_trimesh_create(f.context, 3, points, 1, triangle, &sheet));
+  EXPECT_EQ(dfm_tetmesh_fill(sheet, 100, &f.mesh), DFM_E_FORMAT);
+  EXPECT_NE(std::string(dfm_last_error()).find("1 opening of 0.5 m2"), std::string::npos) << dfm_last_error();
+}
+
+TEST(MeshFillCommand, Surface_BecomesAFileOfCells) {
+  const std::string folder = test::scratch("fill_command"), data = std::string(DEFORM_SOURCE_DIR) + "/examples/data/";
+  const test::CommandResult made = test::deform({"mesh", "fill", data + "organ.obj", "--out", folder + "/organ.vtu", "--cells", "1000", "--json"});
+  ASSERT_EQ(made.exit_code, 0) << made.err;
+  for (const char *key : {"\"cells\": ", "\"points\": ", "\"enclosed_volume\": ", "\"mean_share\": ", "\"seconds\": ", "\"warnings\": []"})
+    EXPECT_NE(made.out.find(key), std::string::npos) << key << "\n" << made.out;
+  const test::CommandResult info = test::deform({"mesh", "info", folder + "/organ.vtu"});
+  EXPECT_EQ(info.exit_code, 0) << info.err;
+  const test::CommandResult table = test::deform({"mesh", "fill", data + "rabbit.obj", "--out", folder + "/rabbit.vtk", "--cells", "500"});
+  EXPECT_NE(table.out.find("the surface is clean"), std::string::npos) << table.out;
+}
+
+namespace {
+
+struct FromFile {
+  test::Context context;
+  dfm_tetmesh mesh = 0;
+  const double *share = nullptr;
+  dfm_tetmesh_info info{};
+  explicit FromFile(const std::string &path) {
+    info.size = sizeof info;
+    test::ok(dfm_tetmesh_read(context, path.c_str(), &mesh));
+    test::ok(dfm_tetmesh_get_info(mesh, &info));
+    test::ok(dfm_tetmesh_share(mesh, &share));
+  }
+};
+
+}  // namespace
+
+// What is filled here and loaded there weighs the same, or the loss is told.
+TEST(MeshFillCommand, Shares_SurviveInVtkAndVtu_AndTheirLossIsTold) {
+  const std::string folder = test::scratch("fill_command_shares"), organ = std::string(DEFORM_SOURCE_DIR) + "/examples/data/organ.obj";
+  const auto fill = [&](const std::string &name) { return test::deform({"mesh", "fill", organ, "--out", folder + "/" + name, "--cells", "600"}); };
+  EXPECT_EQ(fill("a.vtu").out.find("not kept"), std::string::npos);
+  fill("b.vtk");
+  const FromFile vtu(folder + "/a.vtu"), vtk(folder + "/b.vtk");
+  ASSERT_NE(vtu.share, nullptr);
+  ASSERT_NE(vtk.share, nullptr);
+  double mean = 0;
+  for (uint32_t t = 0; t < vtu.info.ntet; ++t) {
+    ASSERT_EQ(vtu.share[t], vtk.share[t]);
+    mean += vtu.share[t] / vtu.info.ntet;
+  }
+  EXPECT_GT(mean, 0.3);
+  EXPECT_LT(mean, 0.8);
+  for (const char *name : {"c.msh", "c.msh2", "c.mesh"}) {
+    EXPECT_NE(fill(name).out.find("warning: not kept: shares of material"), std::string::npos) << name;
+    const test::CommandResult converted = test::deform({"mesh", "convert", folder + "/a.vtu", folder + "/" + name});
+    EXPECT_NE(converted.err.find("not kept: shares of material"), std::string::npos) << name << converted.err;
+    EXPECT_EQ(FromFile(folder + "/" + name).share, nullptr);
+  }
+}
+
+TEST(MeshFillCommand, ArrayThatIsNoShare_IsLeftAlone) {
+  const std::string file = test::scratch("fill_command_foreign") + "/a.vtk";
+  const std::string mesh = "# vtk DataFile Version 3.0\nt\nASCII\nDATASET UNSTRUCTURED_GRID\nPOINTS 5 double\n0 0 0 1 0 0 0 1 0 0 0 1 1 1 1\n"
+                           "CELLS 4 19\n4 0 1 2 3\n3 0 2 1\n4 0 1 2 3\n4 1 2 3 4\nCELL_TYPES 4\n10 5 10 10\nCELL_DATA 4\n";
+  for (const auto &[array, counts] : {std::pair("SCALARS share double 1\nLOOKUP_TABLE default\n0.5 1 0.5 0.25\n", true),
+                                      std::pair("SCALARS share double 1\nLOOKUP_TABLE default\n0.5 1 0.5 1.5\n", false),
+                                      std::pair("SCALARS share double 1\nLOOKUP_TABLE default\n0.5 1 0.5 0\n", false),
+                                      std::pair("SCALARS share int 1\nLOOKUP_TABLE default\n1 1 1 1\n", false),
+                                      std::pair("VECTORS share double\n1 1 1 1 1 1 1 1 1 1 1 1\n", false)}) {
+    test::write_file(file, mesh + array);
+    const FromFile read(file);
+    ASSERT_EQ(read.info.ntet, 2u) << "the double is dropped";
+    ASSERT_EQ(read.share != nullptr, counts) << array;
+    if (!counts) continue;
+    EXPECT_EQ(read.share[0], 0.5);
+    EXPECT_EQ(read.share[1], 0.25) << "shares stay with their cells, past triangles and doubles";
+  }
+}
+
+TEST(MeshFillCommand, OpenSheet_ExitsTwoAndNamesTheFileAndTheOpening) {
+  const std::string folder = test::scratch("fill_command_open");
+  test::write_file(folder + "/sheet.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n");
+  const test::CommandResult result = test::deform({"mesh", "fill", folder + "/sheet.obj", "--out", folder + "/x.msh"});
+  EXPECT_EQ(result.exit_code, 2);
+  EXPECT_NE(result.err.find("sheet.obj: the surface is open: 1 opening of 0.5 m2"), std::string::npos) << result.err;
+  EXPECT_EQ(test::read_file(folder + "/sheet.obj").substr(0, 1), "v");
+  EXPECT_EQ(test::deform({"mesh", "info", folder + "/x.msh"}).exit_code, 2) << "nothing may be written";
+}
