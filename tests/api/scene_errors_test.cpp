@@ -150,7 +150,6 @@ TEST(SceneErrors, NotDelivered_IsNeverIgnored) {
       {"/contact/self=true", "/contact/self"},
       {"/contact/untangle=true", "/contact/untangle"},
       {"/contact/sleep=true", "/contact/sleep"},
-      {"/contact/friction/0/between=[\"block:left\",\"*\"]", "/contact/friction/0/between/0"},
       {"/output/color=\"stress\"", "/output/color"},
       {"/bodies/0/springs=[{\"point\":[0,0,0]}]", "/bodies/0/springs"},
       {"/bodies/0/start={\"invert\":true}", "/bodies/0/start"},

@@ -220,7 +220,7 @@ TEST(Arguments, Wrong_AreRefusedInOneSentenceAndChangeNothing) {
       {DFM_E_ARG, [&] { return friction("*", "*", "coulomb", {"mu", &minus, 1}); }, {"mu", "-1"}},
       {DFM_E_ARG, [&] { return friction("*", nullptr, "coulomb", {}); }, {"NULL"}},
       {DFM_E_ARG, [&] { return friction("*", "*", nullptr, {}); }, {"'law'"}},
-      {DFM_E_UNSUPPORTED, [&] { return friction("upper:top", "*", "coulomb", {}); }, {"not available yet"}},
+      {DFM_E_ARG, [&] { return friction("upper:top", "*", "coulomb", {}); }, {"'upper'", "'top'", "no groups"}},
       {DFM_E_ARG, [&] { return dfm_world_add_friction(s.world, nullptr); }, {"NULL"}},
   };
   for (const Case &k : cases) {

@@ -19,6 +19,17 @@ typedef struct dfm_surface_def {
   double support;                   /* MLS, THESIS: support radius in mean distances to the ten nearest points; 0: 3 */
 } dfm_surface_def;
 
+/** Groups of a body's surface triangles, for friction by "body:GROUP". With `triangles`: any of the surface's triangles by their points (the
+ * body's, or those of a surface of its own), in any order and turn; those inside the body are passed over, one that is named twice keeps its first
+ * group. Without: one entry for every triangle in the order of dfm_surface_triangles. Since 0.2. */
+typedef struct dfm_surface_groups {
+  uint32_t size, ngroup;
+  const char *const *names;         /* [ngroup] */
+  uint32_t ntriangle, reserved;
+  const uint32_t *triangles;        /* [ntriangle,3], or NULL */
+  const uint32_t *group;            /* [ntriangle] index into names; UINT32_MAX: none */
+} dfm_surface_groups;
+
 typedef struct dfm_cell_field { const char *key; const double *values; uint32_t width; } dfm_cell_field;   /* [ntet,width] */
 
 typedef struct dfm_body_def {
@@ -40,6 +51,7 @@ typedef struct dfm_body_def {
   const dfm_cell_field *fields;     /* model parameters that differ by cell ("young", "anisotropy_axis"); win over materials; copied */
   const dfm_material *cell_materials;  /* [ntet] material of each cell, 0: `material`; NULL: one for all */
   const double *cell_share;         /* [ntet] how much of the cell is material, (0,1]: scales its mass and Young's modulus; NULL: all */
+  const dfm_surface_groups *groups; /* named parts of its surface; NULL: none. Copied */
 } dfm_body_def;
 
 /** No mesh, model msm, category 1, collides with all. Threads: Any thread. Since 0.1. */

@@ -6,8 +6,10 @@
 #ifdef __cplusplus
 extern "C" {
 #endif
-/** Law between two sides. A side is "*", a body or obstacle name, "body:GROUP", or "material=NAME". The most specific entry wins, then
- * the last one given. Where none matches: law "coulomb" with its defaults. */
+/** Law between two sides. A side is "*", "material=NAME", a body or obstacle name, or "body:GROUP" (a group of its surface triangles), weighing
+ * 1, 2, 3 and 4: of the entries that match in either order the one with the largest sum wins, then the last one given. "material=NAME" asks
+ * the material of the cell behind a triangle. Where none matches: law "coulomb", mu_C = mu_S = sqrt(f_a f_b), f a material's entry "friction", 0.5
+ * where it has none. */
 typedef struct dfm_friction_def {
   uint32_t size, flags;
   const char *between[2];
@@ -32,7 +34,7 @@ DFM_API dfm_status dfm_world_contacts(dfm_world world, uint32_t capacity, dfm_co
 
 /** Resultants per touching pair of the last sub-step. b: body or obstacle handle (both are 64-bit values). */
 typedef struct dfm_pair_report {
-  uint32_t size, count, sticking, law;
+  uint32_t size, count, sticking, law;   /* law: of its first contact in key order; friction by group or material may differ within the pair */
   uint64_t a, b;
   double normal;                    /* N, sum of normal forces */
   double force[3], friction[3];     /* N, resultants on a: total, friction alone */
@@ -42,6 +44,14 @@ typedef struct dfm_pair_report {
 } dfm_pair_report;
 /** Pairs in the order in which their sides were created, a first; capacity as for dfm_world_contacts. Threads: Any thread. Not during step. Since 0.1. */
 DFM_API dfm_status dfm_world_pairs(dfm_world world, uint32_t capacity, dfm_pair_report *out, uint32_t *n);
+
+/** Resultant of the contacts between two things in the last sub-step, friction included, about a point of the caller's choice.
+ * @param a, b    body or obstacle handles, in any order: force and moment act on a, those on b are their negatives
+ * @param point   m, world
+ * @param force   out, N; zero where the two do not touch. May be NULL
+ * @param moment  out, N m, about point. May be NULL
+ * @return DFM_OK; DFM_E_ARG; DFM_E_HANDLE a or b is none of this world. Threads: Any thread. Not during step. Since 0.2. */
+DFM_API dfm_status dfm_world_pair_wrench(dfm_world world, uint64_t a, uint64_t b, const double point[3], double force[3], double moment[3]);
 
 typedef struct dfm_contact_event { uint32_t size, kind; uint64_t a, b, key; double t; } dfm_contact_event;
 enum { DFM_EVENT_BEGIN = 1, DFM_EVENT_END = 2 };

@@ -7,7 +7,8 @@
 extern "C" {
 #endif
 /** density kg/m3 (> 0), young Pa (> 0), poisson (-1..0.5), damping_mass 1/s, damping_stiffness s. A model parameter that a body does
- * not give itself is taken from the material's entry of the same key, else from the model's default. `extra` holds such further entries. */
+ * not give itself is taken from the material's entry of the same key, else from the model's default. `extra` holds such further entries, and
+ * "friction": the coefficient with which it meets others where no rule names the pair (dfm_friction_def). */
 typedef struct dfm_material_def {
   uint32_t size, flags;
   const char *name;                    /* unique in its world; NULL: none */

@@ -38,6 +38,9 @@ DFM_API dfm_status dfm_tetmesh_data(dfm_tetmesh mesh, const double **points, con
 /** Physical groups, [ngroup], of all dimensions: name of group k (its number where it has none); per cell, its group (UINT32_MAX none).
  * Each out may be NULL; valid while the mesh lives. Threads: Any thread. Since 0.1. */
 DFM_API dfm_status dfm_tetmesh_groups(dfm_tetmesh mesh, const char *const **names, const uint32_t **cell_group);
+/** Triangles of the file that belong to a group, [n,3] points, and the group of each, [n]: a body takes them as dfm_body_def.groups. They may
+ * lie inside. Each out may be NULL; borrowed. Threads: Any thread. Since 0.2. */
+DFM_API dfm_status dfm_tetmesh_triangles(dfm_tetmesh mesh, const uint32_t **triangles, const uint32_t **group, uint32_t *n);
 /** Points of the elements of a group, ascending: a named surface may be held or loaded by them.
  * @param dimension  out, of the group's elements: 0 points, 1 lines, 2 triangles, 3 cells
  * @param points     out, borrowed, [n]. Each out may be NULL

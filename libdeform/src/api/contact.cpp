@@ -4,14 +4,39 @@
 #include <cmath>
 
 #include "api/objects.h"
+#include "friction/pair_rules.h"
 #include "world/measure.h"
 
 using namespace dfm;
 
 namespace {
 
-// A side of a rule: "*", a body or obstacle, or "material=NAME".
-std::string side(World &w, const char *text) {
+// Names of the groups that a body's surface has, by first triangle.
+std::vector<std::string> groups_of(const Body &b) {
+  std::vector<std::string> out;
+  for (const auto &zone : b.zones.list)
+    if (!zone.group.empty() && std::find(out.begin(), out.end(), zone.group) == out.end()) out.push_back(zone.group);
+  return out;
+}
+
+// "body:GROUP", or an empty string where the text is none of a body.
+std::string group_side(World &w, const std::string &text) {
+  for (size_t colon = text.find(':'); colon != std::string::npos; colon = text.find(':', colon + 1)) {
+    const std::string name = text.substr(0, colon), group = text.substr(colon + 1);
+    if (w.find_obstacle(name)) fail(DFM_E_ARG, "'%s': obstacle '%s' has no surface groups; name the whole obstacle", text.c_str(), name.c_str());
+    const Body *const b = w.find_body(name);
+    if (!b) continue;
+    const std::vector<std::string> known = groups_of(*b);
+    if (std::find(known.begin(), known.end(), group) != known.end()) return text;
+    const std::string near = nearest(group, known);
+    fail(DFM_E_ARG, "'%s': no triangle of the surface of '%s' is in a group '%s'%s; %s", text.c_str(), name.c_str(), group.c_str(),
+         near.empty() ? "" : (", did you mean '" + near + "'?").c_str(), known.empty() ? "it has no groups" : ("groups: " + join(known)).c_str());
+  }
+  return {};
+}
+
+// A side of a rule: "*", a body or obstacle, "material=NAME", "body:GROUP".
+std::string side(World &w, const char *text, bool grouped) {
   need(text, "between");
   const std::string s = text;
   if (s == "*" || w.find_body(s) || w.find_obstacle(s)) return s;
@@ -20,12 +45,13 @@ std::string side(World &w, const char *text) {
   for (auto &o : w.obstacles) names.push_back(o->name);
   for (auto &m : w.materials) {
     if (m->name.empty()) continue;
-    names.push_back("material=" + m->name);
+    names.push_back(std::string(kMaterialPrefix) + m->name);
     if (names.back() == s) return s;
   }
-  const size_t colon = s.find(':');
-  if (colon != std::string::npos && w.find_body(s.substr(0, colon)))
-    fail(DFM_E_UNSUPPORTED, "'%s': friction by surface group is not available yet; name the whole body", text);
+  if (const std::string found = group_side(w, s); !found.empty()) {
+    if (!grouped) fail(DFM_E_UNSUPPORTED, "'%s': groups of a surface choose friction, not whether it touches; name the whole body", text);
+    return found;
+  }
   const std::string near = nearest(s, names);
   fail(DFM_E_ARG, "'%s' is no body, obstacle or material of this world%s; known: %s", text,
        near.empty() ? "" : (", did you mean '" + near + "'?").c_str(), join(names).c_str());
@@ -56,6 +82,15 @@ dfm_contact report(const World &w, uint32_t i) {
   return out;
 }
 
+// Body or obstacle of this world.
+uint64_t id_of(const World &w, uint64_t handle, const char *what) {
+  for (auto &b : w.bodies)
+    if (b->handle == handle) return b->id;
+  for (auto &o : w.obstacles)
+    if (o->handle == handle) return o->id;
+  fail(DFM_E_HANDLE, "'%s' is no body or obstacle of this world", what);
+}
+
 }  // namespace
 
 dfm_status dfm_world_add_friction(dfm_world world, const dfm_friction_def *given) {
@@ -65,7 +100,7 @@ dfm_status dfm_world_add_friction(dfm_world world, const dfm_friction_def *given
     const dfm_friction_def def = take_def(given, dfm_friction_def{});
     need(def.law, "law");
     if (def.params.n && !def.params.values) fail(DFM_E_ARG, "%u parameters are announced for law '%s', but params.values is NULL", def.params.n, def.law);
-    FrictionRule rule{{side(w, def.between[0]), side(w, def.between[1])}, 0};
+    FrictionRule rule{{side(w, def.between[0], true), side(w, def.between[1], true)}, 0};
     w.friction.reserve(w.friction.size() + 1);
     rule.law = w.add_law(def.law, {def.params.values, def.params.n});
     w.friction.push_back(std::move(rule));
@@ -76,7 +111,7 @@ dfm_status dfm_world_add_friction(dfm_world world, const dfm_friction_def *given
 dfm_status dfm_world_filter_pair(dfm_world world, const char *a, const char *b, bool collide) {
   return guard([&] {
     World &w = idle(world_of(world));
-    w.filters.push_back({{side(w, a), side(w, b)}, collide});
+    w.filters.push_back({{side(w, a, false), side(w, b, false)}, collide});
     w.changed = true;
   });
 }
@@ -135,6 +170,25 @@ dfm_status dfm_world_pairs(dfm_world world, uint32_t capacity, dfm_pair_report *
     }
     if (!room(static_cast<uint32_t>(pairs.size()), capacity, out, n)) return;
     for (const Pair &p : pairs) *out++ = p.report;
+  });
+}
+
+dfm_status dfm_world_pair_wrench(dfm_world world, uint64_t a, uint64_t b, const double point[3], double force[3], double moment[3]) {
+  return guard([&] {
+    const World &w = world_of(world);
+    need(point, "point");
+    const uint64_t ia = id_of(w, a, "a"), ib = id_of(w, b, "b");
+    const Vec3 about = load3(point);
+    Vec3 sum, turn;
+    for (uint32_t i = 0; i < w.report.n; ++i) {
+      const bool straight = w.store.id_a[i] == ia && w.store.id_b[i] == ib, turned = w.store.id_a[i] == ib && w.store.id_b[i] == ia;
+      if (!touching(w, i) || !(straight || turned)) continue;
+      const double *const f = &w.report.frame[size_t(9) * i], *const l = &w.report.impulse[size_t(3) * i], scale = (turned ? -1 : 1) / w.report.h;
+      const Vec3 one = scale * (l[0] * load3(f) + l[1] * load3(f + 3) + l[2] * load3(f + 6));
+      sum += one, turn += cross(load3(w.report.contacts[i].point) - about, one);
+    }
+    if (force) store3(force, sum);
+    if (moment) store3(moment, turn);
   });
 }
 

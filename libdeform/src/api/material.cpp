@@ -2,8 +2,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstring>
 
 #include "api/objects.h"
+#include "world/body_zones.h"
 
 using namespace dfm;
 
@@ -36,6 +38,8 @@ dfm_status dfm_material_create(dfm_world world, const dfm_material_def *def, dfm
     for (uint32_t i = 0; m->def.extra.values && i < m->def.extra.n; ++i) {
       const dfm_param_value &v = m->def.extra.values[i];
       if (!v.key || !v.value) fail(DFM_E_ARG, "material '%s': extra entry %u has no %s", name, i, v.key ? "value" : "key");
+      if (!std::strcmp(v.key, kFrictionKey) && !(v.width == 1 && v.value[0] >= 0 && std::isfinite(v.value[0])))
+        fail(DFM_E_ARG, "material '%s': friction is %g of %u values; it must be one coefficient, zero or positive", name, v.width ? v.value[0] : 0.0, v.width);
       m->extra_keys.push_back(v.key), m->extra_values.emplace_back(v.value, v.value + v.width);
     }
     m->def.extra = {}, m->def.name = nullptr;

@@ -91,6 +91,15 @@ dfm_status dfm_tetmesh_groups(dfm_tetmesh mesh, const char *const **names, const
   });
 }
 
+dfm_status dfm_tetmesh_triangles(dfm_tetmesh mesh, const uint32_t **triangles, const uint32_t **group, uint32_t *n) {
+  return guard([&] {
+    const dfm::TetMesh &m = Object::of(mesh).mesh;
+    if (triangles) *triangles = m.tris.data();
+    if (group) *group = m.tri_group.data();
+    if (n) *n = static_cast<uint32_t>(m.tri_group.size());
+  });
+}
+
 dfm_status dfm_tetmesh_group_points(dfm_tetmesh mesh, uint32_t group, uint32_t *dimension, const uint32_t **points, uint32_t *n) {
   return guard([&] {
     const dfm::TetMesh &m = Object::of(mesh).mesh;

@@ -97,6 +97,13 @@ class Builder {
     return out;
   }
 
+  // Named parts of the surface: the skin's, or the file's groups of triangles.
+  static dfm_surface_groups groups_of(const BodyMesh &mesh) {
+    const uint32_t size = sizeof(dfm_surface_groups);
+    if (mesh.wears_skin) return {size, mesh.skin.ngroup, mesh.skin.group_names, mesh.skin.ntriangle, 0, nullptr, mesh.skin.triangle_group};
+    return {size, mesh.nface ? mesh.ngroup : 0, mesh.group_names, mesh.nface, 0, mesh.faces, mesh.face_group};
+  }
+
   // What forces that are shared by mass go by: density times share.
   std::vector<double> cell_weights(const BodyMesh &mesh, const std::vector<dfm_material> &materials) const {
     std::vector<double> out;
@@ -143,6 +150,8 @@ class Builder {
     const dfm_surface_def surface = {sizeof(dfm_surface_def), b.surface.coupling, skin.npoint,      skin.ntriangle,
                                      skin.points.data(),      skin.triangles,     b.surface.support};
     if (mesh.wears_skin) d.surface = &surface;
+    const dfm_surface_groups groups = groups_of(mesh);
+    if (groups.ngroup) d.groups = &groups;
     if (jittered_) {
       const double centre[3] = {(mesh.lo[0] + mesh.hi[0]) / 2, (mesh.lo[1] + mesh.hi[1]) / 2, (mesh.lo[2] + mesh.hi[2]) / 2};
       jitter_.apply(mesh.size, centre, b.pose, b.velocity, b.spin);

@@ -16,7 +16,7 @@ const Table &objects() {
       {"gravity_key", {{"t", true}, {"value", true}}},
       {"time", {{"duration", true}, {"step", true}, {"integrator", true}, {"mode", true}}},
       // A material may hold, beside these, any parameter of a loaded model.
-      {"material", {{"density", true}, {"young", true}, {"poisson", true}, {"damping", true}}},
+      {"material", {{"density", true}, {"young", true}, {"poisson", true}, {"damping", true}, {"friction", true}}},
       {"damping", {{"mass", true}, {"stiffness", true}}},
       {"body",
        {{"name", true}, {"mesh", true}, {"material", true}, {"model", true}, {"pose", true}, {"velocity", true}, {"spin", true},

@@ -80,6 +80,7 @@ void MeshFiles::take_cells(dfm_tetmesh mesh, const Body &b, BodyMesh &out) const
   check(dfm_tetmesh_get_info(mesh, &info), pointer);
   check(dfm_tetmesh_data(mesh, &points, &out.tets, &out.file_point), pointer);
   check(dfm_tetmesh_groups(mesh, &out.group_names, &out.cell_group), pointer);
+  check(dfm_tetmesh_triangles(mesh, &out.faces, &out.face_group, &out.nface), pointer);
   check(dfm_tetmesh_file_cells(mesh, &out.file_cell), pointer);
   check(dfm_tetmesh_share(mesh, &out.share), pointer);
   out.handle = mesh, out.npoint = info.npoint, out.ntet = info.ntet, out.ngroup = info.ngroup, out.dropped_cells = info.dropped_cells;

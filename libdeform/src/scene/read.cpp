@@ -265,18 +265,18 @@ void read_materials(const Node &scene, Definition &def, ReadContext &context) {
     for (const auto &further : node.value().items()) {
       const std::string &key = further.key();
       const std::vector<Key> &own = keys_of("material");
-      if (std::any_of(own.begin(), own.end(), [&](const Key &k) { return key == k.name; })) continue;
+      if (key != "friction" && std::any_of(own.begin(), own.end(), [&](const Key &k) { return key == k.name; })) continue;
       const Node value = node.member(key);
       m.extra.keys.push_back(key);
-      m.extra.values.push_back(read_extra(value, key, context.types));
+      m.extra.values.push_back(key == "friction" ? std::vector<double>{value.number(kNotNegative)} : read_extra(value, key, context.types));
     }
     context.materials.push_back(m.name);
     def.materials.push_back(std::move(m));
   }
 }
 
-// A side of a pair: "*", a body or an obstacle, "material=NAME", "body:GROUP".
-std::string read_side(const Node &side, const ReadContext &context) {
+// A side of a pair: "*", a body or an obstacle, "material=NAME", "body:GROUP" (whose groups the world knows once the body is there).
+std::string read_side(const Node &side, const ReadContext &context, bool grouped) {
   const std::string text = side.text();
   if (text == "*") return text;
   if (text.rfind("material=", 0) == 0) {
@@ -287,14 +287,15 @@ std::string read_side(const Node &side, const ReadContext &context) {
   if (colon == std::string::npos) return known(side, context.sides, "body or obstacle");
   json name = text.substr(0, colon);
   known(Node(&name, side.pointer(), &side.file()), context.sides, "body or obstacle");
-  side.not_yet();  // surfaces carry no groups yet, so a pair rule by group has nothing to match
+  if (!grouped) side.fail("groups of a surface choose friction, not whether it touches; name the whole body");
+  return text;
 }
 
-void read_between(const Node &entry, const ReadContext &context, std::string out[2]) {
+void read_between(const Node &entry, const ReadContext &context, bool grouped, std::string out[2]) {
   const Node between = entry.at("between");
   const std::vector<Node> sides = between.items();
   if (sides.size() != 2) between.fail("expected two sides [a, b], found %zu", sides.size());
-  for (int i = 0; i < 2; ++i) out[i] = read_side(sides[i], context);
+  for (int i = 0; i < 2; ++i) out[i] = read_side(sides[i], context, grouped);
 }
 
 void read_contact(const Node &scene, Definition &def, const ReadContext &context) {
@@ -310,7 +311,7 @@ void read_contact(const Node &scene, Definition &def, const ReadContext &context
     entry.object("friction");
     Friction f;
     f.pointer = entry.pointer();
-    read_between(entry, context, f.between);
+    read_between(entry, context, true, f.between);
     const dfm_type *type = read_type(entry.at("law"), DFM_KIND_FRICTION, context.types);
     f.law = type->id;
     if (entry.has("params")) f.params = read_params(entry.member("params"), type);
@@ -320,7 +321,7 @@ void read_contact(const Node &scene, Definition &def, const ReadContext &context
     entry.object("filter");
     Filter f;
     f.pointer = entry.pointer();
-    read_between(entry, context, f.between);
+    read_between(entry, context, false, f.between);
     f.collide = entry.boolean("collide", false);
     def.filters.push_back(std::move(f));
   }

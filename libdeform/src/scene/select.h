@@ -24,7 +24,8 @@ struct BodyMesh {
   const double *share = nullptr;
   dfm_tetmesh handle = 0;      // lends the arrays and the points of its groups
   const char *const *group_names = nullptr;
-  uint32_t npoint = 0, ntet = 0, ngroup = 0, dropped_cells = 0;
+  const uint32_t *faces = nullptr, *face_group = nullptr;   // [nface,3], [nface] the file's triangles that belong to a group
+  uint32_t npoint = 0, ntet = 0, ngroup = 0, dropped_cells = 0, nface = 0;
   bool filled = false;         // the cells are ours, the file's shape is the skin
   bool wears_skin = false;     // the skin is the body's surface; else that is the boundary of the cells
   Skin skin;                   // npoint 0: none

@@ -61,7 +61,7 @@ void tet_weights(Vec3 x, const Vec3 c[4], double w[4]) {
 RestCells::RestCells(const Memory &memory, const CouplingInput &in, const LocalRest &rest)
     : in_(in), rest_(rest), box_(cell_boxes(memory, in, rest)), tree_(memory, box_) {}
 
-double RestCells::row(Vec3 x, RowEntry out[4]) const {
+uint32_t RestCells::find(Vec3 x, double *away) const {
   Vec3 c[4];
   double w[4];
   const auto corners = [&](uint32_t t) {
@@ -82,9 +82,19 @@ double RestCells::row(Vec3 x, RowEntry out[4]) const {
       if (d2 < far2 || (d2 == far2 && t < cell)) far2 = d2, cell = t;
     });
   }
-  corners(cell), tet_weights(x, c, w);
-  for (int k = 0; k < 4; ++k) out[k] = {in_.tet[size_t{4} * cell + size_t(k)], w[k]};
-  return std::sqrt(far2);
+  if (away) *away = std::sqrt(far2);
+  return cell;
+}
+
+double RestCells::row(Vec3 x, RowEntry out[4]) const {
+  double away;
+  const uint32_t *const corner = in_.tet + size_t{4} * find(x, &away);
+  Vec3 c[4];
+  double w[4];
+  for (int k = 0; k < 4; ++k) c[k] = rest_.point[corner[k]];
+  tet_weights(x, c, w);
+  for (int k = 0; k < 4; ++k) out[k] = {corner[k], w[k]};
+  return away;
 }
 
 void append_row(Coupling &out, RowEntry *entries, size_t n) {

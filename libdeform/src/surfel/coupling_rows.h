@@ -22,7 +22,9 @@ void tet_weights(Vec3 x, const Vec3 c[4], double w[4]);
 class RestCells {
  public:
   RestCells(const Memory &memory, const CouplingInput &in, const LocalRest &rest);
-  // The row of a surfel at x: lowest cell that holds it (returns 0), else the nearest one (returns how far it is, m).
+  // The lowest cell that holds x (away 0), else the nearest one (away: how far it is, m; may be null).
+  uint32_t find(Vec3 x, double *away = nullptr) const;
+  // The row of a surfel at x, from the cell that find() gives; returns away.
   double row(Vec3 x, RowEntry out[4]) const;
 
  private:

@@ -8,6 +8,7 @@
 #include "core/handle.h"
 #include "mesh/mesh.h"
 #include "world/body_surface.h"
+#include "world/body_zones.h"
 #include "world/material.h"
 
 namespace dfm {
@@ -98,6 +99,7 @@ Body &create_body(World &w, const dfm_body_def &def) {
   b.edges = unique_edges(m, def.ntet, b.tets.data());
   make_body_surface(b, def.surface);
   if (def.surface) b.coupling = def.surface->coupling;
+  make_zones(b, def, materials, plain);
   make(b.surfel_impulse, size_t(3) * b.surface.nsurfel);
 
   const dfm_type &type = w.context->registry.find(DFM_KIND_MODEL, def.model ? def.model : "msm");
@@ -203,6 +205,7 @@ Obstacle &create_obstacle(World &w, const dfm_obstacle_def &def) {
     const Material &m = resolve<Material>(Kind::material, def.material);
     if (m.world != &w) fail(DFM_E_HANDLE, "obstacle '%s': its material belongs to another world", name);
     o.material = m.name;
+    o.zone = {"", m.name, friction_of(m)};
   }
   o.def = def;
   if (def.nkey && !def.keys) fail(DFM_E_ARG, "obstacle '%s': %u keys are announced, but keys is NULL", name, def.nkey);

@@ -13,6 +13,10 @@ namespace {
 
 constexpr char kMagic[8] = {'d', 'f', 'm', 's', 'n', 'a', 'p', '2'};
 
+void zone(Hash &h, const SurfaceZones::Zone &z) {
+  h.add(z.group.data(), z.group.size()), h.add(z.material.data(), z.material.size()), h.add(z.friction);
+}
+
 // What must be the same in the world that a snapshot is restored into.
 uint64_t structure(const World &w) {
   Hash h;
@@ -27,6 +31,10 @@ uint64_t structure(const World &w) {
     h.add(s.row.data(), s.row.size() * sizeof(uint32_t)), h.add(s.col.data(), s.col.size() * sizeof(uint32_t));
     h.add(s.weight.data(), s.weight.size() * sizeof(double)), h.add(s.rest.data(), s.rest.size() * sizeof(double));
     if (!s.identity()) h.add(s.tri.data(), s.tri.size() * sizeof(uint32_t));
+    zone(h, b->zones.list[0]);
+    if (b->zones.of.empty()) continue;
+    for (const auto &z : b->zones.list) zone(h, z);
+    h.add(b->zones.of.data(), b->zones.of.size() * sizeof(uint32_t));
   }
   for (auto &o : w.obstacles) {
     const dfm_obstacle_def &d = o->def;
@@ -36,6 +44,7 @@ uint64_t structure(const World &w) {
       h.add(d.cells);
     }
     h.add(d.category), h.add(d.collides_with), h.add(o->name.data(), o->name.size()), h.add(o->material.data(), o->material.size());
+    h.add(o->zone.friction);
   }
   for (auto &set : w.rigid_sets) {
     h.add(set->host_name.data(), set->host_name.size()), h.add(set->njoint), h.add(uint64_t(set->extra.size()));

@@ -49,6 +49,7 @@ void prepare_rows(World &w) {
     w.state.law[i] = w.law_of(c.slot_a, c.obstacle, c.slot_b);
     w.state.area[i] = c.area;
   }
+  if (!w.zone_table.empty()) w.set_zone_laws();
   w.rows.build(w.contacts, w.sources, {w.rigid_places, w.rigid_groups});
   fill_responses(w);
   w.tangents.resize(size_t(3) * n), w.match.resize(n);

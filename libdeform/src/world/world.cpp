@@ -4,6 +4,7 @@
 #include <algorithm>
 
 #include "core/error.h"
+#include "friction/pair_rules.h"
 
 namespace dfm {
 
@@ -55,11 +56,6 @@ uint64_t World::handle_of(uint64_t id) const {
   return 0;
 }
 
-uint32_t World::law_of(uint32_t slot_a, bool obstacle, uint32_t slot_b) const {
-  const size_t width = bodies.size() + obstacles.size();
-  return pair_law[slot_a * width + (obstacle ? bodies.size() : 0) + slot_b];
-}
-
 uint32_t World::add_law(const char *name, std::span<const dfm_param_value> values) {
   const dfm_type &type = context->registry.find(DFM_KIND_FRICTION, name);
   std::vector<double> packed = pack_params(type, values);
@@ -70,33 +66,6 @@ uint32_t World::add_law(const char *name, std::span<const dfm_param_value> value
 }
 
 namespace {
-
-struct Side { const std::string *name, *material; };
-
-// How specific a side's pattern is for a thing: 0 no match, 1 any, 2 material, 3 name.
-int specificity(const std::string &pattern, const Side &side) {
-  if (pattern == "*") return 1;
-  if (pattern.rfind("material=", 0) == 0) return pattern.compare(9, std::string::npos, *side.material) == 0 ? 2 : 0;
-  return pattern == *side.name ? 3 : 0;
-}
-
-int match(const std::string between[2], const Side &a, const Side &b) {
-  const int forward = specificity(between[0], a) && specificity(between[1], b) ? specificity(between[0], a) + specificity(between[1], b) : 0;
-  const int back = specificity(between[0], b) && specificity(between[1], a) ? specificity(between[0], b) + specificity(between[1], a) : 0;
-  return std::max(forward, back);
-}
-
-// The most specific rule wins, then the last given.
-template <class Rule>
-const Rule *best_rule(const std::vector<Rule> &rules, const Side &a, const Side &b) {
-  const Rule *best = nullptr;
-  int score = 0;
-  for (const Rule &r : rules) {
-    const int s = match(r.between, a, b);
-    if (s && s >= score) score = s, best = &r;
-  }
-  return best;
-}
 
 // Rest distance d_c: 1e-3 of the median surface edge, at least 64 rounding units of the largest coordinate, at most 0.1 of the thinnest part;
 // as the thinnest part is not measured, a tenth of the shortest median edge stands for it.
@@ -171,13 +140,15 @@ void World::prepare() {
   filter = PairFilter(memory());
   filter.version = filter_version + 1;
   pair_law.assign(size_t(nb) * width, 0);
+  zone_table.clear(), zone_law.clear();
+  std::vector<uint32_t> used;
   for (uint32_t i = 0; i < nb; ++i) {
-    const Side a{&bodies[i]->name, &bodies[i]->material};
+    const PairSide a{bodies[i]->name, {}, bodies[i]->material};
     for (uint32_t j = 0; j < width; ++j) {
       const bool is_body = j < nb;
       if (is_body && j == i) continue;
       const uint64_t id = is_body ? bodies[j]->id : obstacles[j - nb]->id;
-      const Side b = is_body ? Side{&bodies[j]->name, &bodies[j]->material} : Side{&obstacles[j - nb]->name, &obstacles[j - nb]->material};
+      const PairSide b = is_body ? PairSide{bodies[j]->name, {}, bodies[j]->material} : PairSide{obstacles[j - nb]->name, {}, obstacles[j - nb]->material};
       bool touch = is_body ? (bodies[i]->category & bodies[j]->collides_with) && (bodies[j]->category & bodies[i]->collides_with)
                            : (bodies[i]->category & obstacles[j - nb]->def.collides_with) &&
                                  (obstacles[j - nb]->def.category & bodies[i]->collides_with);
@@ -188,10 +159,8 @@ void World::prepare() {
       if (!touch) continue;
       if (is_body) facts.body_pairs += i < j;
       else ++facts.obstacle_pairs;
-      const FrictionRule *rule = best_rule(friction, a, b);
-      const uint32_t law = rule ? rule->law : add_law("coulomb", {});
-      pair_law[size_t(i) * width + j] = law;
-      offer(*laws[law]->type, facts.offered);
+      find_law(i, j, used);
+      for (uint32_t law : used) offer(*laws[law]->type, facts.offered);
     }
   }
   law_list.clear();

@@ -19,6 +19,7 @@
 #include "surfel/obstacle_mesh.h"
 #include "surfel/views.h"
 #include "surfel/voxel_grid.h"
+#include "surfel/zones.h"
 #include "world/motion.h"
 #include "world/rigid.h"
 
@@ -44,6 +45,7 @@ struct Load { uint32_t number; std::vector<uint32_t> points; std::vector<double>
 struct HeldMotion { std::vector<uint32_t> points; std::vector<double> start; std::vector<dfm_pose_key> keys; dfm_sine sine{}; };
 
 inline constexpr int32_t kNoCoupling = -1;
+inline constexpr double kDefaultFriction = 0.5;        // of a material that has no entry "friction"
 
 struct Body {
   World *world = nullptr;
@@ -56,6 +58,7 @@ struct Body {
   Phyxels p;
   Array<uint32_t> tets, edges;
   Surface surface;
+  SurfaceZones zones;
   int32_t coupling = kNoCoupling;    // DFM_COUPLING_* of a surface of its own
   ModelInstance model;
   double mass = 0, rest_volume = 0;
@@ -77,6 +80,7 @@ struct Obstacle {
   uint64_t id = 0, handle = 0;
   uint32_t slot = 0;
   std::string name, material;
+  SurfaceZones::Zone zone{"", "", kDefaultFriction};
   dfm_obstacle_def def{};
   std::vector<dfm_pose_key> keys;
   Pose pose;                         // now
@@ -127,6 +131,7 @@ struct World {
   bool changed = true;
   Plan plan;
   std::vector<uint32_t> pair_law;                      // [body][body or obstacle] -> index into laws
+  std::vector<uint32_t> zone_table, zone_law;          // as pair_law -> first in zone_law [zone a][zone b], kNone: the pair has one law; empty: all have
   PairFilter filter;
   std::vector<LawInstance *> law_list;
   double offset = 0;                                   // d_c, m
@@ -186,8 +191,13 @@ struct World {
   Body *find_body(const std::string &name);
   Obstacle *find_obstacle(const std::string &name);
   uint64_t handle_of(uint64_t id) const;               // body or obstacle; 0 if gone
-  uint32_t law_of(uint32_t slot_a, bool obstacle, uint32_t slot_b) const;
   uint32_t add_law(const char *name, std::span<const dfm_param_value> values);
+
+  // pair_table.cpp; a, b: bodies by slot, then obstacles
+  uint32_t law_of(uint32_t slot_a, bool obstacle, uint32_t slot_b) const;
+  uint32_t resolve_law(uint32_t a, uint32_t zone_a, uint32_t b, uint32_t zone_b);
+  void find_law(uint32_t a, uint32_t b, std::vector<uint32_t> &used);   // fills pair_law and, where zones differ, the tables; used: laws out
+  void set_zone_laws();                                // state.law of this sub-step's contacts where a pair has a table
 
   // step.cpp
   dfm_status step(double dt, uint32_t *trouble);

@@ -1,0 +1,52 @@
+// Which rule holds between two sides. A side of a rule is a pattern, a side of a pair is a thing with a name, a group and a material.
+//
+//   pattern        matches                                   weight
+//   body:GROUP     that group of that body's surface         4
+//   body           that body or obstacle                     3
+//   material=NAME  where it is of that material              2
+//   *              everything                                1
+//
+// A rule matches a pair in either order; of those that match, the one with the largest sum of weights wins, then the last given.
+#pragma once
+#include <algorithm>
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace dfm {
+
+struct PairSide { std::string_view name, group, material; };
+
+inline constexpr std::string_view kMaterialPrefix = "material=";
+
+// 0: no match.
+inline int pattern_weight(std::string_view pattern, const PairSide &side) {
+  if (pattern == "*") return 1;
+  if (pattern.substr(0, kMaterialPrefix.size()) == kMaterialPrefix) return pattern.substr(kMaterialPrefix.size()) == side.material ? 2 : 0;
+  if (pattern == side.name) return 3;
+  const bool grouped = !side.group.empty() && pattern.size() == side.name.size() + 1 + side.group.size() && pattern[side.name.size()] == ':' &&
+                       pattern.substr(0, side.name.size()) == side.name && pattern.substr(side.name.size() + 1) == side.group;
+  return grouped ? 4 : 0;
+}
+
+inline int rule_weight(const std::string between[2], const PairSide &a, const PairSide &b) {
+  const auto both = [&](const PairSide &first, const PairSide &second) {
+    const int i = pattern_weight(between[0], first), j = pattern_weight(between[1], second);
+    return i && j ? i + j : 0;
+  };
+  return std::max(both(a, b), both(b, a));
+}
+
+// nullptr: no rule names the pair.
+template <class Rule>
+const Rule *best_rule(const std::vector<Rule> &rules, const PairSide &a, const PairSide &b) {
+  const Rule *best = nullptr;
+  int most = 0;
+  for (const Rule &r : rules) {
+    const int weight = rule_weight(r.between, a, b);
+    if (weight && weight >= most) most = weight, best = &r;
+  }
+  return best;
+}
+
+}  // namespace dfm

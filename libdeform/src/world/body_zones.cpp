@@ -1,0 +1,143 @@
+#include "world/body_zones.h"
+
+#include <algorithm>
+#include <array>
+#include <cstring>
+#include <optional>
+
+#include "core/error.h"
+#include "mesh/mesh.h"
+#include "surfel/coupling_rows.h"
+
+namespace dfm {
+namespace {
+
+using Corners = std::array<uint32_t, 3>;
+
+Corners sorted(const uint32_t *c) {
+  Corners out{c[0], c[1], c[2]};
+  std::sort(out.begin(), out.end());
+  return out;
+}
+
+// Finds triangles of the surface by their points, as the def numbers them.
+class TriangleIndex {
+ public:
+  explicit TriangleIndex(const Surface &s) {
+    for (uint32_t t = 0; t < s.ntri; ++t) {
+      Corners c{};
+      for (size_t k = 0; k < 3; ++k) {
+        const uint32_t surfel = s.tri[size_t{3} * t + k];
+        c[k] = s.identity() ? s.point[surfel] : surfel;
+      }
+      entries_.push_back({sorted(c.data()), t});
+    }
+    std::sort(entries_.begin(), entries_.end());
+  }
+  uint32_t find(const uint32_t *corners) const {   // kNone: not on the surface
+    const Corners key = sorted(corners);
+    const auto at = std::lower_bound(entries_.begin(), entries_.end(), std::pair(key, 0u));
+    return at != entries_.end() && at->first == key ? at->second : kNone;
+  }
+
+ private:
+  std::vector<std::pair<Corners, uint32_t>> entries_;
+};
+
+void check_groups(const dfm_surface_groups &g, const Body &b, uint32_t npoint) {
+  const char *const name = b.name.c_str();
+  if (g.size < sizeof g) fail(DFM_E_ARG, "body '%s': groups->size is %u, expected %zu; set it to sizeof", name, g.size, sizeof g);
+  if ((g.ngroup && !g.names) || (g.ntriangle && !g.group))
+    fail(DFM_E_ARG, "body '%s': %u groups and %u triangles are announced, but groups->%s is NULL", name, g.ngroup, g.ntriangle, g.ngroup && !g.names ? "names" : "group");
+  for (uint32_t k = 0; k < g.ngroup; ++k)
+    if (!g.names[k] || !*g.names[k]) fail(DFM_E_ARG, "body '%s': surface group %u has no name", name, k);
+  if (!g.triangles && g.ntriangle != b.surface.ntri)
+    fail(DFM_E_ARG, "body '%s': groups are given for %u triangles in the surface's order, which has %u; give groups->triangles to name some of them", name,
+         g.ntriangle, b.surface.ntri);
+  for (uint32_t t = 0; t < g.ntriangle; ++t) {
+    if (g.group[t] != UINT32_MAX && g.group[t] >= g.ngroup) fail(DFM_E_ARG, "body '%s': triangle %u of groups is in group %u of %u", name, t, g.group[t], g.ngroup);
+    for (uint32_t k = 0; g.triangles && k < 3; ++k)
+      if (g.triangles[size_t{3} * t + k] >= npoint)
+        fail(DFM_E_ARG, "body '%s': triangle %u of groups names point %u of %u", name, t, g.triangles[size_t{3} * t + k], npoint);
+  }
+}
+
+// [ntri] group of each triangle, kNone without. A triangle that is named twice keeps its first group; one inside the body is passed over.
+std::vector<uint32_t> triangle_groups(const Body &b, const dfm_body_def &def) {
+  std::vector<uint32_t> out(b.surface.ntri, kNone);
+  if (!def.groups) return out;
+  const dfm_surface_groups &g = *def.groups;
+  check_groups(g, b, def.surface ? def.surface->npoint : def.npoint);
+  if (!g.triangles) {
+    std::copy(g.group, g.group + g.ntriangle, out.begin());
+    return out;
+  }
+  const TriangleIndex index(b.surface);
+  for (uint32_t t = 0; t < g.ntriangle; ++t) {
+    const uint32_t at = index.find(g.triangles + size_t{3} * t);
+    if (at != kNone && out[at] == kNone) out[at] = g.group[t];
+  }
+  return out;
+}
+
+// [ntri] entry of materials.list of the cell that carries each triangle: the cell that it is a face of, or that its middle lies in.
+std::vector<uint32_t> triangle_materials(const Body &b, const dfm_body_def &def, const CellMaterials &materials) {
+  std::vector<uint32_t> out(b.surface.ntri, 0);
+  if (materials.of.empty()) return out;
+  if (!def.surface) {
+    const TriangleIndex index(b.surface);
+    for (uint32_t t = 0; t < def.ntet; ++t)
+      for (const auto &face : kTetFace) {
+        const uint32_t *const c = def.tets + size_t{4} * t, corners[3] = {c[face[0]], c[face[1]], c[face[2]]};
+        if (const uint32_t at = index.find(corners); at != kNone) out[at] = materials.of[t];
+      }
+    return out;
+  }
+  std::vector<double> middle;
+  for (uint32_t t = 0; t < def.surface->ntriangle; ++t) {
+    Vec3 sum;
+    for (uint32_t k = 0; k < 3; ++k) sum += load3(def.surface->points + size_t{3} * def.surface->triangles[size_t{3} * t + k]);
+    for (int k = 0; k < 3; ++k) middle.push_back(sum[k] / 3);
+  }
+  CouplingInput in;
+  in.npoint = def.npoint, in.ntet = def.ntet, in.nsurfel = b.surface.ntri;
+  in.point = def.points, in.tet = def.tets, in.surfel = middle.data();
+  const Memory &m = b.world->memory();
+  const LocalRest rest(m, in);
+  const RestCells cells(m, in, rest);
+  for (uint32_t t = 0; t < b.surface.ntri; ++t) out[t] = materials.of[cells.find(rest.surfel[t])];
+  return out;
+}
+
+}  // namespace
+
+double friction_of(const Material &m) {
+  for (size_t i = 0; i < m.extra_keys.size(); ++i)
+    if (m.extra_keys[i] == kFrictionKey) return m.extra_values[i][0];
+  return kDefaultFriction;
+}
+
+void make_zones(Body &b, const dfm_body_def &def, const CellMaterials &materials, const Material &plain) {
+  const auto name = [&](uint32_t k) { return materials.list[k] == &plain ? std::string() : materials.list[k]->name; };
+  SurfaceZones &zones = b.zones;
+  zones.list.clear();
+  zones.of = Array<uint32_t>(HookAllocator<uint32_t>(b.world->memory()));
+  if (!def.groups && materials.of.empty()) {
+    zones.list.push_back({"", name(0), friction_of(*materials.list[0])});
+    return;
+  }
+  const std::vector<uint32_t> group = triangle_groups(b, def), material = triangle_materials(b, def, materials);
+  std::vector<std::pair<uint32_t, uint32_t>> kinds;
+  for (uint32_t t = 0; t < b.surface.ntri; ++t) {
+    const std::pair kind(group[t], material[t]);
+    const size_t at = size_t(std::find(kinds.begin(), kinds.end(), kind) - kinds.begin());
+    if (at == kinds.size()) {
+      kinds.push_back(kind);
+      zones.list.push_back({group[t] == kNone ? "" : def.groups->names[group[t]], name(material[t]), friction_of(*materials.list[material[t]])});
+    }
+    zones.of.push_back(uint32_t(at));
+  }
+  if (kinds.size() == 1) zones.of.clear();
+}
+
+}  // namespace dfm

@@ -1,0 +1,236 @@
+// The rigid-limit cases of ../shared/reference/contact, run with stiff `msm` bodies. The test compares some rows, the bench prints all of them.
+#pragma once
+#include <functional>
+#include <memory>
+
+#include "coupled.h"
+
+namespace test::reference {
+
+inline constexpr double kG = 9.81, kDegree = 3.14159265358979323846 / 180;
+using Vector = std::array<double, 3>;
+inline Vector tilted(double theta_deg) { return {kG * std::sin(theta_deg * kDegree), 0, -kG * std::cos(theta_deg * kDegree)}; }
+
+struct Friction { double mu_s, mu_c; const char *law = "coulomb"; double dv = 0; };
+
+// A block on a plane at z = 0 whose surface may run as a belt along x.
+struct Block {
+  Context context;
+  dfm_world world;
+  dfm_body body;
+  Vector start{};
+  struct Shape { Vector size{0.1, 0.1, 0.1}; uint32_t cells = 96; double density = 1000, young = 1e7, damping = 2e-4; };
+
+  Block(const Friction &f, Vector gravity, const Shape &s, double belt = 0) {
+    world = make_world(context, gravity);
+    BodyOptions o;
+    o.name = "block", o.density = s.density, o.young = s.young, o.damping_stiffness = s.damping, o.velocity = {belt, 0, 0};
+    o.position = {-s.size[0] / 2, -s.size[1] / 2, 2e-4 * s.size[2]};
+    body = make_body(context, world, "beam", s.size, s.cells, o);
+    dfm_obstacle_def d = dfm_obstacle_def_default();
+    d.name = "floor", d.shape = DFM_SHAPE_PLANE, d.velocity_surface[0] = belt;
+    dfm_obstacle floor = 0;
+    ok(dfm_obstacle_create(world, &d, &floor));
+    const double v_s = 1e-9, delta = 2;   // from rest to kinetic friction at once
+    const dfm_param_value values[] = {{"mu_C", &f.mu_c, 1}, {"mu_S", &f.mu_s, 1}, {"v_s", &v_s, 1}, {"delta", &delta, 1}, {"dv", &f.dv, 1}};
+    dfm_friction_def def{};
+    def.size = sizeof def, def.between[0] = def.between[1] = "*", def.law = f.law;
+    def.params = {sizeof(dfm_params), f.mu_c == f.mu_s ? 2u : f.dv > 0 ? 5u : 4u, values};
+    ok(dfm_world_add_friction(world, &def));
+    mark();
+  }
+  ~Block() { dfm_world_destroy(world); }
+  dfm_body_measure now() const { return measure(body); }
+  void mark() { std::copy_n(now().com, 3, start.begin()); }
+  double travelled() const { return now().com[0] - start[0]; }
+  void push(double speed) {
+    uint32_t n = 0;
+    ok(dfm_body_get_state(body, 0, nullptr, nullptr, &n));
+    std::vector<double> x(3 * n), v(3 * n);
+    ok(dfm_body_get_state(body, n, x.data(), v.data(), &n));
+    for (uint32_t i = 0; i < n; ++i) v[3 * i] += speed;
+    ok(dfm_body_set_state(body, n, x.data(), v.data()));
+  }
+};
+
+// Mean acceleration after the first 0.1 s, and how far it went in the rest of the second.
+struct Incline { double acceleration, creep; };
+inline Incline incline(double theta_deg, double mu) {
+  Block b({mu, mu}, tilted(theta_deg), {});
+  run(b.world, 0.1, 1e-3);
+  b.mark();
+  const double v = b.now().velocity[0];
+  run(b.world, 0.4, 1e-3);
+  const double a = (b.now().velocity[0] - v) / 0.4;
+  if (std::fabs(b.travelled()) < 0.01) run(b.world, 0.5, 1e-3);   // it holds: watch it for the whole second
+  return {a, b.travelled()};
+}
+
+// Pushed to v0 over a floor at rest, or held back to rest on a belt of that speed: time and way until both move as one.
+struct Slide { double time, distance; };
+inline Slide slide(double v0, double mu, bool belt) {
+  Block b({mu, mu}, {0, 0, -kG}, {}, belt ? v0 : 0);
+  run(b.world, 0.3, 1e-3);
+  b.push(belt ? -v0 : v0);
+  b.mark();
+  const double end = belt ? v0 : 0, h = 5e-4;
+  double t = 0, before = v0;
+  int steps = 0;
+  for (; t < 5; t += h) {
+    run(b.world, h, h), ++steps;
+    const double left = std::fabs(b.now().velocity[0] - end);
+    if (left <= 5e-3 * v0) {
+      t += h * (before - 5e-3 * v0) / (before - left);
+      break;
+    }
+    before = left;
+  }
+  return {t, std::fabs((belt ? v0 * steps * h : 0) - b.travelled())};
+}
+
+// Gravity leans over within half a second; does the block lie on its side 1.5 s later?
+inline bool topples(double theta_deg, double ratio) {
+  const Vector size{0.1 * ratio, 0.05, 0.1};
+  Block b({1, 1}, {0, 0, -kG}, {size, 60, 1000, 1e6, 1e-3});
+  std::vector<dfm_vector_key> keys;
+  for (int i = 0; i <= 100; ++i) {
+    const double s = i / 100.0, a = theta_deg * s * s * (3 - 2 * s);
+    const Vector g = tilted(a);
+    keys.push_back({0.2 + 0.5 * s, {g[0], g[1], g[2]}});
+  }
+  ok(dfm_world_set_gravity_keys(b.world, uint32_t(keys.size()), keys.data()));
+  for (int k = 0; k < 22; ++k) {
+    run(b.world, 0.1, 1e-3);
+    if (b.now().com[2] < 0.75 * 0.05) return true;
+  }
+  return false;
+}
+
+// The points that stand on something, and each one's share of the load.
+inline void feet(dfm_body body, std::vector<uint32_t> *points, std::vector<double> *shares) {
+  uint32_t n = 0;
+  ok(dfm_surface_points(body, 0, nullptr, &n));
+  std::vector<uint32_t> point(n);
+  std::vector<double> force(3 * n);
+  ok(dfm_surface_points(body, n, point.data(), &n));
+  ok(dfm_surface_forces(body, n, force.data(), &n));
+  double sum = 0;
+  for (uint32_t s = 0; s < n; ++s) sum += force[3 * s + 2];
+  for (uint32_t s = 0; s < n; ++s)
+    if (force[3 * s + 2] > 0) points->push_back(point[s]), shares->push_back(force[3 * s + 2] / sum);
+}
+
+// A mass on a belt, held by a spring to the ground. The spring pulls at the feet, each by its share of the load: pulled at its centre the
+// block would lean, and the contacts that carry less would slip before the others, as those of a real block do.
+struct StickSlip { double period, x_max, x_min; int cycles; };
+inline StickSlip stick_slip(double m, double k, double f_s, double f_k, double belt, double h, double until, double dv, const char *law = "karnopp") {
+  const double w = m * kG;
+  Block::Shape s;
+  // Stiff, so that its own shaking, about (F_s - F_k) / sqrt(stiffness mass), stays below the slip: a softer block catches itself on the way.
+  s.cells = 12, s.density = 1000 * m, s.young = 1e8 * m, s.damping = 1e-4;
+  Block b({f_s / w, f_k / w, law, dv}, {0, 0, -kG}, s, belt);
+  run(b.world, 0.3, h);
+  b.mark();
+  // A turn counts once x has come back from it by a twentieth of the swing; the first cycle starts from rest and is left out.
+  std::vector<uint32_t> points;
+  std::vector<double> weights, force;
+  feet(b.body, &points, &weights);
+  force.resize(3 * points.size());
+  uint32_t load = 0;
+  const double enough = 0.05 * 2 * (f_s - f_k) / k;
+  double top = 0, low = 0, t_top = 0, first = 0, last = 0, x_max = 0, x_min = 0;
+  int tops = 0;
+  bool rising = true;
+  for (double t = 0; t < until; t += h) {
+    for (size_t i = 0; i < points.size(); ++i) force[3 * i] = -k * b.travelled() * weights[i];
+    if (load) ok(dfm_body_remove_load(b.body, load));
+    ok(dfm_body_add_load(b.body, uint32_t(points.size()), points.data(), force.data(), 0, nullptr, nullptr, &load));
+    run(b.world, h, h);
+    const double x = b.travelled();
+    if (rising && x > top) top = x, t_top = t;
+    if (!rising && x < low) low = x;
+    if (rising && x < top - enough) {
+      rising = false, low = x;
+      if (tops++ == 0) first = t_top;
+      else x_max += top;
+      last = t_top;
+    } else if (!rising && x > low + enough) {
+      rising = true, top = x;
+      x_min += low;
+    }
+  }
+  const int n = tops - 1;
+  return n > 0 ? StickSlip{(last - first) / n, x_max / n, x_min / (rising ? n + 1 : n), n} : StickSlip{};
+}
+
+// Round bodies of radius 0.05 m: coarse cells that wear a fine surface.
+struct Round {
+  Context context;
+  dfm_world world;
+  dfm_body body;
+  double radius = 0.05, inertia;   // inertia in m R2
+  Round(bool ball, double mu, Vector gravity, Vector velocity = {}, uint32_t cells = 1200, uint32_t facets = 6000) : inertia(ball ? 0.4 : 0.5) {
+    world = make_world(context, gravity);
+    const double size[3] = {radius, ball ? 0 : radius, 0};
+    dfm_trimesh mesh = 0;
+    ok(dfm_trimesh_make(context, ball ? "ball" : "cylinder", size, facets, &mesh));
+    dfm_trimesh_info info{};
+    info.size = sizeof info;
+    ok(dfm_trimesh_get_info(mesh, &info));
+    const double *points = nullptr;
+    const uint32_t *triangles = nullptr;
+    ok(dfm_trimesh_data(mesh, &points, &triangles, nullptr));
+    const dfm_surface_def skin{sizeof(dfm_surface_def), DFM_COUPLING_BARYCENTRIC, info.npoint, info.ntriangle, points, triangles, 0};
+    BodyOptions o;
+    o.young = 2e6, o.damping_stiffness = 2e-5, o.volume = 1, o.velocity = velocity, o.surface = &skin;
+    // the ball starts on no face, edge or corner in particular; the cylinder lies along y, turned a little about its axis
+    const double half = 45 * kDegree;
+    if (ball) o.rotation = {0.0848, 0.1696, 0.2544, 0.9483}, o.position = {0, 0, 0.9995 * radius};
+    else o.rotation = {std::sin(-half), 0, 0, std::cos(half)}, o.position = {0, -radius / 2, 0.9999 * radius};
+    body = make_body(context, world, ball ? "ball" : "cylinder", {size[0], size[1], size[2]}, cells, o);
+    ok(dfm_trimesh_destroy(mesh));
+    add_plane(world, "incline");
+    set_friction(world, mu);
+  }
+  ~Round() { dfm_world_destroy(world); }
+  double speed() const { return measure(body).velocity[0]; }
+  double turning() const {   // R omega
+    const dfm_body_measure m = measure(body);
+    return m.angular[1] / (inertia * m.mass * radius);
+  }
+};
+
+// Slopes of speed and R omega over 0.3 s by least squares.
+struct Roll { double acceleration, turning; };
+inline Roll roll(bool ball, double theta_deg, double mu, double h = 2e-4) {
+  Round r(ball, mu, tilted(theta_deg));
+  run(r.world, 0.1, h);
+  constexpr int kSamples = 75;
+  double tt = 0, tv = 0, tw = 0;
+  for (int i = 0; i < kSamples; ++i) {
+    const double t = (i - 0.5 * (kSamples - 1)) * 4e-3;
+    tt += t * t, tv += t * r.speed(), tw += t * r.turning();
+    run(r.world, 4e-3, h);
+  }
+  return {tv / tt, tw / tt};
+}
+
+// Thrown without spin: when it rolls, at what speed, and how far it came.
+struct Skid { double time, speed, distance; };
+inline Skid skid(bool ball, double v0, double mu, double h = 2e-4) {
+  Round r(ball, mu, {0, 0, -kG}, {v0, 0, 0});
+  const double x0 = measure(r.body).com[0];
+  Skid out{};
+  for (double t = 0; t < 3; t += h) {
+    run(r.world, h, h);
+    if (r.speed() - r.turning() > 0.01 * v0) continue;
+    out.time = t, out.distance = measure(r.body).com[0] - x0;
+    break;
+  }
+  run(r.world, 0.02, h);
+  double sum = 0;
+  for (int i = 0; i < 10; ++i) run(r.world, 2e-3, h), sum += r.speed() / 10;
+  return out.speed = sum, out;
+}
+
+}  // namespace test::reference
