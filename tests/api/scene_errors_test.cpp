@@ -149,7 +149,6 @@ TEST(SceneErrors, NotDelivered_IsNeverIgnored) {
       {"/contact/method=\"rollback\"", "/contact/method"},
       {"/contact/self=true", "/contact/self"},
       {"/contact/untangle=true", "/contact/untangle"},
-      {"/contact/sleep=true", "/contact/sleep"},
       {"/contact/friction/0/between=[\"block:left\",\"*\"]", "/contact/friction/0/between/0"},
       {"/output/color=\"stress\"", "/output/color"},
       {"/obstacles/0/shape=\"voxels\"", "/obstacles/0/shape"},

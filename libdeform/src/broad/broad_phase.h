@@ -48,6 +48,7 @@ class BroadPhase {
     uint32_t slot = 0, category = 0, collides_with = 0;
     double margin = -1;     // negative: no lists yet
     bool dirty = true, usable = false;  // usable: all positions finite
+    bool asleep = false;    // at the last update: nothing has moved if it still is
     BoxTree tree;
     Array<double> x;        // [nsurfel,4] when the lists were made
     explicit Body(const Memory &m) : tree(m), x(HookAllocator<double>(m)) {}

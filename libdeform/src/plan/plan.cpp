@@ -55,6 +55,7 @@ const char *stage_name(StageId id) {
     case StageId::solve: return "contact+friction";
     case StageId::distribute: return "distribute";
     case StageId::commit: return "commit";
+    case StageId::sleep: return "sleep";
     case StageId::step: return "step";
   }
   return "?";
@@ -98,6 +99,8 @@ Plan make_plan(const SceneFacts &f) {
     for (StageId id : {StageId::gather, StageId::broad, StageId::narrow, StageId::solve, StageId::distribute}) leave(stage_name(id), why);
   }
   if (f.bodies) run(StageId::commit, "positions and velocities at the end of the sub-step");
+  if (f.bodies && f.sleep) run(StageId::sleep, "islands at rest leave the stages above until something reaches them (contact.sleep)");
+  else leave("sleep", f.bodies ? "not asked for (contact.sleep)" : "no body");
   leave("self contact", "not asked for");
   leave("guard", "not available yet: contacts are made from the closest points at the start of each sub-step");
   return plan;

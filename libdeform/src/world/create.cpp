@@ -159,6 +159,7 @@ Obstacle &create_obstacle(World &w, const dfm_obstacle_def &def) {
   ++w.next_id;
   o.def.name = o.name.c_str();
   w.obstacles.push_back(std::move(owned));
+  w.wake_all();   // it may stand where someone sleeps
   w.changed = true;
   return o;
 }
@@ -166,7 +167,8 @@ Obstacle &create_obstacle(World &w, const dfm_obstacle_def &def) {
 namespace {
 
 // What remembers the removed thing: its contacts end with an event, its friction work leaves the books.
-void forget(World &w, uint64_t id, uint64_t handle) {
+void forget(World &w, uint64_t id, bool obstacle, uint64_t handle) {
+  w.close_slot(id, obstacle);
   ContactStore &s = w.store;
   w.reserve_events(s.n);
   for (uint32_t i = 0; i < s.n; ++i)
@@ -176,7 +178,6 @@ void forget(World &w, uint64_t id, uint64_t handle) {
     }
   std::erase_if(w.work, [&](const PairWork &p) { return p.a == id || p.b == id; });
   handle_destroy(handle);
-  w.report.n = 0;
   w.changed = true;
 }
 
@@ -184,14 +185,14 @@ void forget(World &w, uint64_t id, uint64_t handle) {
 
 void destroy_body(Body &b) {
   World &w = *b.world;
-  forget(w, b.id, b.handle);
+  forget(w, b.id, false, b.handle);
   std::erase_if(w.bodies, [&](auto &p) { return p.get() == &b; });
   w.worst_body = nullptr;
 }
 
 void destroy_obstacle(Obstacle &o) {
   World &w = *o.world;
-  forget(w, o.id, o.handle);
+  forget(w, o.id, true, o.handle);
   std::erase_if(w.obstacles, [&](auto &p) { return p.get() == &o; });
 }
 

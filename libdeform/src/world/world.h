@@ -17,7 +17,9 @@
 #include "plugin/context.h"
 #include "plugin/params.h"
 #include "surfel/views.h"
+#include "world/islands.h"
 #include "world/motion.h"
+#include "world/sleep.h"
 
 namespace dfm {
 
@@ -64,8 +66,11 @@ struct Body {
   Vec3 contact_impulse;              // N s since creation
   Array<double> surfel_impulse;      // [nsurfel,3] N s of the last sub-step
   Array<double> ksum, csum;          // [n] row sums of the step bound
+  struct { bool known = false; double step = 0; uint32_t point = 0, inverted = 0; } bound;   // as last asked for; holds while asleep
+  Slumber slumber;
 
   bool loads_vary() const;
+  double impulse_time() const;       // s that surfel_impulse belongs to
   dfm_kin kin(double t, double h, double *state_out) const;
 };
 
@@ -156,11 +161,18 @@ struct World {
   Residual residual;
   uint32_t passes = 0, sweeps = 0;
 
-  Report report;
+  Report report, last_report;                          // last_report: scratch
   std::vector<PairWork> work;                          // sorted by (a, b)
   std::vector<dfm_contact_event> events;
   double hold_start = 0;
   bool holding = false;
+
+  // Sleep. With nobody asleep `active` holds all bodies.
+  Islands islands;
+  Array<uint32_t> active, woken;                       // slots that the stages work on, ascending; slots woken in this sub-step
+  Array<uint8_t> stirred;                              // [island] scratch
+  uint32_t sleepers = 0;
+  double calm_speed = 0;                               // m/s
 
   dfm_world_stats stats{};
   std::array<double, 16> stage_seconds{};
@@ -182,6 +194,7 @@ struct World {
   bool sub_step(uint32_t *trouble);
   void undo_motion();                                  // held velocities as before stage_motion()
   void update_bound();                                 // stable, worst_body, worst_point
+  void ask_bound(Body &b);
 
   // stages of a sub-step, each in the file of its name
   void stage_motion();
@@ -189,11 +202,22 @@ struct World {
   bool stage_predict(uint32_t *trouble);
   void stage_gather();
   void stage_broad();
-  void stage_narrow();
+  bool stage_narrow(uint32_t *trouble);                // sleep.cpp
   bool stage_solve(uint32_t *trouble);                 // solve.cpp
   void stage_distribute();
   bool stage_commit(uint32_t *trouble);
   bool commit_steppers(uint32_t *trouble);
+  void stage_sleep();                                  // sleep.cpp, as are the next ones
+  void gather_active();
+  void wake(Body &b);                                  // and its island
+  void wake_all();
+  void wake_touching(uint64_t obstacle);
+  void rouse(std::span<const uint32_t> slots);
+  void fall_asleep(Body &b, double end);
+  bool idle() const;
+  void carry_sleepers(uint32_t *touching, uint32_t *sticking);
+  void close_slot(uint64_t id, bool obstacle);
+  void hold_sleepers();                                // hold_begin() while contacts sleep
   void reserve_events(size_t more);
   void add_event(uint32_t kind, uint64_t a, uint64_t b, uint64_t key, double t);   // a, b: ids
   void reserve_contacts();                             // solve.cpp: memory for keep_contacts()
