@@ -21,8 +21,8 @@ typedef struct dfm_world_def {
   uint32_t max_substeps;        /* a step that needs more returns DFM_DISCARD; 10000 */
   uint32_t sleep;               /* 1: islands of bodies at rest sleep until something reaches them (doc/concepts/sleeping.md); 0 */
   const char *const *effects;   /* NULL-terminated list the scene asks for; NULL: what its content calls for */
-  double sleep_speed;           /* m/s, every point of the bodies of an island that falls asleep is slower; 0: 0.5 d_c / sleep_time */
-  double sleep_time;            /* s, for so long; 0.5 */
+  double sleep_speed;           /* m/s, 0.01: what falls asleep has been slower in every point, and has stayed within half of d_c, */
+  double sleep_time;            /* s, 0.5: for so long */
 } dfm_world_def;
 
 /** Gravity (0,0,-9.81), everything automatic. Threads: Any thread. Since 0.1. */

@@ -1,6 +1,7 @@
 // Sleep and waking.
 //
-//   end of a sub-step    no point of a body is faster than calm_speed: its calm time grows, else it is zero
+//   end of a sub-step    a body whose points are all slower than sleep_speed, and within half of d_c of where they were when its calm began,
+//                        stays calm. Speed alone would let slow drift pass, and never let a stiff body sleep that shivers by a nanometre
 //                        an island sleeps when all its bodies have been calm for sleep_time, none of its contacts slides or meets
 //                        an obstacle that moves, and nothing that is prescribed for its bodies lies ahead
 //   asleep               x, contacts and their forces stay, v = 0; no stage works on the body. Detection keeps its shape as a partner:
@@ -24,6 +25,7 @@
 namespace dfm {
 namespace {
 
+constexpr double kStay = 0.5;   // of d_c
 constexpr double kForever = std::numeric_limits<double>::infinity();
 
 template <class Key>
@@ -147,7 +149,16 @@ void World::stage_sleep() {
   bool tired = false;
   for (const uint32_t i : active) {
     Body &b = *bodies[i];
-    b.slumber.calm = largest_norm(b.p.n, b.p.v.data(), nullptr) < calm_speed ? b.slumber.calm + h : 0;
+    const Phyxels &p = b.p;
+    double &calm = b.slumber.calm;
+    if (!(largest_norm(p.n, p.v.data(), nullptr) < def.sleep_speed)) {
+      calm = 0;
+    } else if (calm > 0 && largest_norm(p.n, p.x.data(), b.anchor.data()) <= kStay * offset) {
+      calm += h;
+    } else {
+      calm = h;
+      std::copy(p.x.begin(), p.x.end(), b.anchor.begin());
+    }
     tired |= b.slumber.calm >= def.sleep_time;
   }
   if (!tired || end < last_time(gravity_keys)) return;
@@ -158,6 +169,7 @@ void World::stage_sleep() {
     if (!contacts[i].obstacle) islands.join(contacts[i].slot_a, contacts[i].slot_b);
   islands.finish();
   stirred.assign(islands.count, 0);
+  const double creep = def.contact_tolerance > 0 ? def.contact_tolerance : 1e-6;
   for (const uint32_t i : active) {
     const Body &b = *bodies[i];
     if (!(b.slumber.calm >= def.sleep_time && settled_from(b) <= end)) stirred[islands.of[i]] = 1;
@@ -165,7 +177,9 @@ void World::stage_sleep() {
   for (size_t i = 0; i < n; ++i) {
     const ContactPoint &c = contacts[i];
     const double *const l = &rows.impulse[3 * i];
-    const bool slides = state.mode[i] != 1 && (l[1] != 0 || l[2] != 0);
+    // At the edge of its cone a contact may rest as well: sliding is what is faster than a contact that sticks may be left with.
+    const double s1 = state.vt[i], s2 = state.vt[state.stride + i];
+    const bool slides = state.mode[i] != 1 && (l[1] != 0 || l[2] != 0) && s1 * s1 + s2 * s2 > creep * creep;
     if (slides || (c.obstacle && obstacle_views[c.slot_b].moves())) stirred[islands.of[c.slot_a]] = 1;
   }
   bool any = false;

@@ -90,7 +90,7 @@ struct StagedBody {
   std::vector<HeldMotion> motions;
   uint32_t next_load = 1, category = 1, collides_with = ~0u;
   Slumber slumber;
-  std::vector<double> surfel_impulse;
+  std::vector<double> surfel_impulse, anchor;
 };
 struct StagedObstacle { Pose pose, target; bool has_target; std::vector<dfm_pose_key> keys; dfm_obstacle_def def; };
 struct StagedLaw { std::string id; std::vector<double> params; };
@@ -134,6 +134,7 @@ void fields(Stream &s, W &w) {
     Slumber &z = b.slumber;
     s.value(z.asleep), s.value(z.calm), s.value(z.since), s.value(z.h), s.value(z.force);
     if (z.asleep) s.array(b.surfel_impulse);
+    if (w.def.sleep) s.array(b.anchor);
     s.each(b.motions, [&](auto &m) { s.array(m.points), s.array(m.start), s.array(m.keys), s.value(m.sine); });
   });
   s.each(w.obstacles, [&](auto &entry) {
@@ -185,7 +186,8 @@ void check(const Staged &t, const World &w) {
   for (size_t i = 0; good && i < t.bodies.size(); ++i) {
     const StagedBody &from = t.bodies[i];
     sleepers += from.slumber.asleep;
-    good = !from.slumber.asleep || from.surfel_impulse.size() == w.bodies[i]->surfel_impulse.size();
+    good = (!from.slumber.asleep || from.surfel_impulse.size() == w.bodies[i]->surfel_impulse.size()) &&
+           (!t.def.sleep || from.anchor.size() == w.bodies[i]->p.x.size());
   }
   good = good && sleepers == t.sleepers && t.def.sleep <= 1;
   if (const Report &r = t.report; sleepers > 0) {
@@ -241,6 +243,7 @@ void put(World &w, Staged &t) noexcept {
     b.loads.swap(from.loads), b.motions.swap(from.motions);
     b.contact_impulse = from.contact_impulse, b.next_load = from.next_load, b.category = from.category, b.collides_with = from.collides_with;
     b.slumber = from.slumber, b.bound.known = false;
+    if (t.def.sleep) copy(from.anchor, b.anchor);
     if (b.slumber.asleep) copy(from.surfel_impulse, b.surfel_impulse), gather_surface(b.surface, b.p.x.data(), b.p.v.data());
     update_inverse_mass(b.p);
   }
@@ -306,6 +309,8 @@ void world_restore(World &w, const void *data, size_t bytes) {
   fields(s, staged);
   check(staged, w);
   std::vector<std::unique_ptr<LawInstance>> laws = make_laws(w, staged);
+  if (staged.def.sleep)
+    for (auto &b : w.bodies) b->anchor.resize(b->p.x.size());
   put_parameters(w, staged);
   w.laws.swap(laws);
   put(w, staged);

@@ -196,8 +196,8 @@ void World::prepare() {
   const double wanted = contact_offset(*this);
   const double before = offset;
   offset = def.contact_offset > 0 ? def.contact_offset : store.n > 0 ? std::min(offset, wanted) : wanted;
-  // What moves at this speed stays within half of d_c while its calm is watched.
-  calm_speed = def.sleep_speed > 0 ? def.sleep_speed : 0.5 * offset / def.sleep_time;
+  for (auto &b : bodies)
+    if (def.sleep && b->anchor.empty()) b->anchor = b->p.x;
   islands.reserve(nb), active.reserve(nb), woken.reserve(nb), stirred.reserve(nb), sinks.reserve(nb);
   if (sleepers > 0 && offset != before) wake_all();   // contacts rest at another distance now
   gather_active();

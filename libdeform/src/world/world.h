@@ -68,6 +68,7 @@ struct Body {
   Array<double> ksum, csum;          // [n] row sums of the step bound
   struct { bool known = false; double step = 0; uint32_t point = 0, inverted = 0; } bound;   // as last asked for; holds while asleep
   Slumber slumber;
+  Array<double> anchor;              // [n,4] m, positions since which it is calm; empty where nothing may sleep
 
   bool loads_vary() const;
   double impulse_time() const;       // s that surfel_impulse belongs to
@@ -172,7 +173,6 @@ struct World {
   Array<uint32_t> active, woken;                       // slots that the stages work on, ascending; slots woken in this sub-step
   Array<uint8_t> stirred;                              // [island] scratch
   uint32_t sleepers = 0;
-  double calm_speed = 0;                               // m/s
 
   dfm_world_stats stats{};
   std::array<double, 16> stage_seconds{};
