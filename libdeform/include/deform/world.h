@@ -16,7 +16,7 @@ typedef struct dfm_world_def {
   int32_t method, integrator;   /* DFM_METHOD_*, DFM_INTEGRATOR_* */
   double contact_offset;        /* m, rest distance d_c; 0: chosen per world from the meshes (mechanics: 1e-3 of the median surface edge) */
   double contact_tolerance;     /* m/s, slip that a sticking contact may be left with; 0: min(1e-6, 0.01 (d_c-d_g)/h); doc/decisions/0004 */
-  uint32_t max_sweeps;          /* per sub-step; 50 */
+  uint32_t max_sweeps;          /* per sub-step; 50. Up to eight times as many where bodies would else pass through each other */
   uint32_t max_passes;          /* outer passes per sub-step; 20 */
   uint32_t max_substeps;        /* a step that needs more returns DFM_DISCARD; 10000 */
   uint32_t sleep;               /* 1: islands of bodies at rest sleep until something reaches them (doc/concepts/sleeping.md); 0 */

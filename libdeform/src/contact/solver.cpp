@@ -210,7 +210,7 @@ Residual residual(const ContactRows &rows, const Tolerance &tolerance, Law law) 
     const double *const l = &rows.impulse[size_t(i) * 3];
     const Vec3 u = rows.velocity(i);
     const double normal = std::fabs(std::min(rows.wn[i] * l[0], u.x + rows.rate[i]));
-    r.share = std::max(r.share, normal / tolerance.normal), r.speed = std::max(r.speed, normal);
+    r.share = std::max(r.share, normal / tolerance.normal), r.speed = std::max(r.speed, normal), r.normal = std::max(r.normal, normal);
     if (!(rows.wt[i] > 0) || !(l[0] > 0)) continue;
     const Pair t = law(i, u);
     const double tangent = tangent_residual(rows, i, t), allowed = std::max(tolerance.tangent[i], 1e-3 * std::sqrt(u.y * u.y + u.z * u.z));

@@ -41,7 +41,8 @@ class Acceleration {
 //   r_t <= max(tangent[i], 1e-3 |slip|)   set_tolerance: 1e-6 m/s at rest, which bounds the creep of what sticks
 // `share` is the worst contact's residual over its tolerance: at most 1 is converged (doc/decisions/0004-contact-tolerance.md).
 struct Tolerance { double normal = 0; Array<double> tangent; };
-struct Residual { double share = 0, speed = 0; };
+// `normal` is the worst r_n alone, m/s.
+struct Residual { double share = 0, speed = 0, normal = 0; };
 Residual inner_residual(const ContactRows &rows, const ContactState &law, double h, const Tolerance &tolerance);   // of the linearised laws
 Residual true_residual(const ContactRows &rows, const ContactState &answer, double h, const Tolerance &tolerance); // laws asked at this state
 

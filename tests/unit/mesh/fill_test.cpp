@@ -69,7 +69,7 @@ struct Case { const char *name; TriMesh surface; double volume; };   // volume b
 
 std::vector<Case> clean() {
   std::vector<Case> out;
-  out.push_back({"ball", test::sphere_surface(0.5, 6), 4 * M_PI / 3 * 0.125});
+  out.push_back({"ball", test::sphere_surface(0.5, 5), 4 * M_PI / 3 * 0.125});
   out.push_back({"box", test::box_surface({0, 0, 0}, {1, 0.4, 0.3}), 0.12});
   out.push_back({"torus", test::torus_surface(0.5, 0.15, 160, 80), 2 * M_PI * M_PI * 0.5 * 0.15 * 0.15});
   out.push_back({"plate", test::box_surface({0, 0, 0}, {1, 1, 0.002}), 0.002});
@@ -162,12 +162,12 @@ TEST(Fill, AlignedBox_KeepsNoCellsThatItOnlyTouches) {
   for (uint32_t i = 0; i < cover.cells.size(); ++i)
     if (cover.kind[i] != dfm::CellKind::outside) sum += shares.share[i];
   EXPECT_NEAR(sum, 64 * 12, 1.5);                 // 4^3 cubes of 12 cells; walls cut the cells across them in half
-  EXPECT_EQ(cover.kept, 12u * 48 + 4u * 6 * 16 + 0u);
+  EXPECT_EQ(cover.kept, 9u * 64 + 6u * 4 * 16);  // 4 cells around each of the 144 inner faces, and around each of the 96 in the walls
 }
 
 TEST(Fill, WantedNumber_IsMetWithinTenPercent) {
   for (const Case &c : clean())
-    for (const uint32_t wanted : {300u, 1000u, 3000u}) {
+    for (const uint32_t wanted : {300u, 2000u}) {
       const TetMesh m = fill_surface(c.surface, wanted);
       EXPECT_NEAR(m.ntet(), wanted, 0.1 * wanted) << c.name;
     }
@@ -216,7 +216,7 @@ TEST(Fill, HolesAndFlippedTriangles_ChangeTheVolumeByLittle) {
   for (uint32_t t = 40; t-- > 0;) test::remove(holes, 51 * t);
   for (uint32_t t = 0; t < 40; ++t) test::flip(flips, 51 * t);
   for (const TriMesh *s : {&holes, &flips}) {
-    const TetMesh m = fill_surface(*s, 3000);
+    const TetMesh m = fill_surface(*s, 1500);
     expect_sound(m);
     EXPECT_NEAR(material(m), volume, 0.02 * volume);
     EXPECT_EQ(dfm::mesh_statistics(m).npiece, 1u);

@@ -1,0 +1,48 @@
+// Closed surfaces, filled with cells as the scene is read, dropped on a floor, into a corner and on each other.
+#include "scenes.h"
+
+namespace {
+
+const char *const kBodies[] = {"organ1", "rabbit1", "organ2", "rabbit2"};
+
+bool in_the_corner(const test::SceneRun &run) {
+  bool inside = true;
+  for (const char *body : kBodies) {
+    const test::BodyRow row = run.last(body);
+    inside = inside && std::fabs(row.com[0]) < 0.15 && std::fabs(row.com[1]) < 0.15 && row.com[2] > 0.01;
+  }
+  return inside;
+}
+
+const std::vector<std::string> kLanding = {"--time", "0.4", "--set", "/output/every=0.01"};
+
+}  // namespace
+
+TEST(FillDrop, OrgansAndRabbits_ComeToRestWithoutCrossing) {
+  const test::SceneRun run("fill_drop", {"--time", "1.6"});
+  run.expect_sound(50, "filled bodies");
+  EXPECT_TRUE(in_the_corner(run));
+  EXPECT_EQ(run.number("guard_steps"), 0);
+  double kinetic = 0;
+  for (const char *body : kBodies) {
+    kinetic += run.last(body).kinetic;
+    EXPECT_NEAR(run.last(body).volume, run.rows(body).front().volume, 0.02 * run.last(body).volume) << body;
+  }
+  EXPECT_LT(kinetic, 5e-3) << "joule; the drop is worth 10";
+}
+
+TEST(FillDrop, BodiesThatMayPass_Cross) {
+  const test::SceneRun run("fill_drop", {"--time", "0.4", "--set", R"(/contact/filter=[{"between": ["*", "rabbit1"], "collide": false}])"});
+  EXPECT_GT(run.number("intersections_max"), 0) << "the crossing check must see what contact is told to ignore";
+}
+
+TEST(FillDrop, JitteredRuns1To3_DoNotCross) { test::expect_jittered("fill_drop", 1, 3, kLanding, 30, in_the_corner); }
+TEST(FillDrop, JitteredRuns4To6_DoNotCross) { test::expect_jittered("fill_drop", 4, 6, kLanding, 30, in_the_corner); }
+TEST(FillDrop, JitteredRuns7To8_DoNotCross) { test::expect_jittered("fill_drop", 7, 8, kLanding, 30, in_the_corner); }
+TEST(FillDrop, JitteredRuns9To10_DoNotCross) { test::expect_jittered("fill_drop", 9, 10, kLanding, 30, in_the_corner); }
+
+TEST(FillDrop, LiversAndBunnyOfTheCollection_DoNotCross) {
+  if (test::shared_dir().empty()) GTEST_SKIP() << "../shared is not there";
+  const test::SceneRun run("fill_drop_organs", {"--time", "0.5"});
+  run.expect_sound(30, "livers and bunny");
+}
