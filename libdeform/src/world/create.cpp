@@ -116,6 +116,7 @@ Body &create_body(World &w, const dfm_body_def &def) {
   b.model.create(type, w.context->host, mesh, m, std::move(values));
 
   w.bodies.reserve(w.bodies.size() + 1);
+  w.reserve_sleep(static_cast<uint32_t>(w.bodies.size() + 1));
   b.id = w.next_id;
   b.handle = handle_create(Kind::body, &b);
   ++w.next_id;

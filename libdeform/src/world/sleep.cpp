@@ -69,6 +69,10 @@ void World::gather_active() {
   sleepers = static_cast<uint32_t>(bodies.size() - active.size());
 }
 
+void World::reserve_sleep(uint32_t n) {
+  if (def.sleep) islands.reserve(n), active.reserve(n), woken.reserve(n), stirred.reserve(n);
+}
+
 void World::rouse(std::span<const uint32_t> slots) {
   // What time would have added to contacts that stay: their age, and the impulse that they pass on.
   for (uint32_t m = 0; m < store.n; ++m) {
@@ -102,9 +106,10 @@ void World::wake(Body &b) {
 }
 
 void World::wake_all() {
+  for (auto &b : bodies) b->slumber.calm = 0;
+  if (sleepers == 0) return;
   islands.start(static_cast<uint32_t>(bodies.size()));
   islands.finish();
-  for (auto &b : bodies) b->slumber.calm = 0;
   rouse(islands.member);   // of islands that no pair joins: all bodies, ascending
 }
 
@@ -125,8 +130,8 @@ bool World::stage_narrow(uint32_t *trouble) {
   };
   for (;;) {
     find_contacts(body_views, obstacle_views, broad.candidates(), h, offset, lent, contacts);
-    if (sleepers == 0) return true;
     woken.clear();
+    if (sleepers == 0) return true;
     for (const ContactPoint &c : contacts) {
       if (bodies[c.slot_a]->slumber.asleep) wake(*bodies[c.slot_a]);
       if (!c.obstacle && bodies[c.slot_b]->slumber.asleep) wake(*bodies[c.slot_b]);
@@ -146,6 +151,7 @@ bool World::stage_narrow(uint32_t *trouble) {
 // At the end of a sub-step that has been committed; allocates nothing.
 void World::stage_sleep() {
   const double end = time + h;
+  woken.clear();
   bool tired = false;
   for (const uint32_t i : active) {
     Body &b = *bodies[i];

@@ -198,7 +198,8 @@ void World::prepare() {
   offset = def.contact_offset > 0 ? def.contact_offset : store.n > 0 ? std::min(offset, wanted) : wanted;
   for (auto &b : bodies)
     if (def.sleep && b->anchor.empty()) b->anchor = b->p.x;
-  islands.reserve(nb), active.reserve(nb), woken.reserve(nb), stirred.reserve(nb), sinks.reserve(nb);
+  active.reserve(nb), sinks.reserve(nb);
+  reserve_sleep(nb);
   if (sleepers > 0 && offset != before) wake_all();   // contacts rest at another distance now
   gather_active();
   gravity = load3(def.gravity);

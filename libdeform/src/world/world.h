@@ -209,6 +209,7 @@ struct World {
   bool commit_steppers(uint32_t *trouble);
   void stage_sleep();                                  // sleep.cpp, as are the next ones
   void gather_active();
+  void reserve_sleep(uint32_t n);                      // waking and falling asleep allocate nothing, and cannot fail
   void wake(Body &b);                                  // and its island
   void wake_all();
   void wake_touching(uint64_t obstacle);
