@@ -81,13 +81,32 @@ inline dfm_world coupled_pair(dfm_context *c) {
   return w;
 }
 
+// Two blocks come to rest and sleep; a ball falls on one of them and wakes it, the other sleeps on.
+inline dfm_world woken(dfm_context *c) {
+  dfm_world_def d = dfm_world_def_default();
+  d.sleep = 1, d.sleep_time = 0.04, d.contact_offset = 2e-4;
+  dfm_world w = 0;
+  test::ok(dfm_world_create(c, &d, &w));
+  test::add_plane(w, "floor");
+  test::set_friction(w, 0.4);
+  test::BodyOptions o;
+  o.young = 2e5, o.damping_stiffness = 2e-3, o.damping_mass = 40, o.position = {0, 0, 1.6e-4};
+  test::make_body(c, w, "beam", {0.1, 0.1, 0.06}, 100, o);
+  o.position[0] = 0.3;
+  test::make_body(c, w, "beam", {0.1, 0.1, 0.06}, 100, o);
+  o.damping_mass = 0, o.position = {0.06, 0.045, 0.22}, o.spin = {3, 1, 0};
+  test::make_body(c, w, "ball", {0.04, 0, 0}, 100, o);
+  return w;
+}
+
 struct Scene {
   const char *name;
   dfm_world (*build)(dfm_context *);
   int steps;
 };
 inline const Scene all[] = {{"ball_on_floor", ball_on_floor, 150}, {"crossing_beams", crossing_beams, 150}, {"ten_in_a_box", ten_in_a_box, 80},
-                                {"fine_ball", fine_ball, 20}, {"coupled_pair", coupled_pair, 80}};
+                            {"fine_ball", fine_ball, 20}, {"coupled_pair", coupled_pair, 80},
+                            {"woken", woken, 220}};
 
 inline void advance(dfm_world w, int steps) {
   for (int i = 0; i < steps; ++i) ASSERT_EQ(dfm_world_step(w, 1e-3, nullptr), DFM_OK) << dfm_last_error();
