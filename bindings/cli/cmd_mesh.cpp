@@ -5,6 +5,8 @@
 #include <cctype>
 #include <memory>
 
+#include "progress.h"
+
 namespace cli {
 
 MeshSession::MeshSession(const Globals &globals) {
@@ -44,9 +46,23 @@ bool open(MeshSession &s, const std::string &file, bool as_surface) {
 
 int info(const Globals &globals, const std::string &file) {
   MeshSession s(globals);
-  if (!open(s, file, false)) return fail(dfm_last_error());
+  {
+    const Patience patience(told(globals), "reading " + file);
+    if (!open(s, file, false)) return fail(dfm_last_error());
+  }
   return report_mesh(globals, file, s, true);
 }
+
+}  // namespace
+
+std::string lost_shares(dfm_tetmesh cells, const std::string &out) {
+  const double *share = nullptr;
+  const std::string ending = mesh_ending(out);
+  if (dfm_tetmesh_share(cells, &share) < 0 || !share || ending == "vtk" || ending == "vtu") return "";
+  return "shares of material, which .vtk and .vtu hold: as a body every cell of ." + ending + " counts whole in mass and stiffness";
+}
+
+namespace {
 
 // What `out` cannot say of the mesh that was read.
 std::vector<std::string> losses(const MeshSession &s, const std::string &out) {
@@ -57,6 +73,7 @@ std::vector<std::string> losses(const MeshSession &s, const std::string &out) {
     i.size = sizeof i;
     dfm_tetmesh_get_info(s.cells, &i);
     if (i.ngroup && ending == "mesh") lost.push_back("names of groups, of which Medit holds the number alone");
+    if (const std::string shares = lost_shares(s.cells, out); !shares.empty()) lost.push_back(shares);
     return lost;
   }
   dfm_trimesh_info i = {};
@@ -69,9 +86,8 @@ std::vector<std::string> losses(const MeshSession &s, const std::string &out) {
   return lost;
 }
 
-int convert(const Globals &globals, const std::string &in, const std::string &out) {
-  MeshSession s(globals);
-  std::vector<std::string> lost;
+// Reads, drops what `out` cannot hold and says so in `lost`, writes.
+int convert_file(MeshSession &s, const std::string &in, const std::string &out, std::vector<std::string> &lost) {
   std::string sentence;
   if (!s.context) return fail(dfm_last_error());
   if (!import_surface(in, s, sentence)) return fail(sentence);
@@ -84,12 +100,22 @@ int convert(const Globals &globals, const std::string &in, const std::string &ou
     dfm_tetmesh_info i = {};
     i.size = sizeof i;
     dfm_tetmesh_get_info(s.cells, &i);
-    lost.push_back(std::to_string(i.ntet) + " tetrahedra, of which ." + mesh_ending(out) + " holds the boundary alone");
+    lost.push_back(std::to_string(i.ntet) + (i.ntet == 1 ? " tetrahedron" : " tetrahedra") + ", of which ." + mesh_ending(out) + " holds the boundary alone");
     s.cells = 0;
     if (dfm_trimesh_read(s.context, in.c_str(), &s.surface) < 0) return fail(dfm_last_error());
   }
   if ((s.surface ? dfm_trimesh_write(s.surface, out.c_str()) : dfm_tetmesh_write(s.cells, out.c_str())) < 0) return fail(dfm_last_error());
   for (const std::string &l : losses(s, out)) lost.push_back(l);
+  return kDone;
+}
+
+int convert(const Globals &globals, const std::string &in, const std::string &out) {
+  MeshSession s(globals);
+  std::vector<std::string> lost;
+  {
+    const Patience patience(told(globals), "converting " + in);
+    if (const int failed = convert_file(s, in, out, lost)) return failed;
+  }
   return report_mesh(globals, out, s, false, lost);
 }
 
@@ -119,11 +145,14 @@ int make(const Globals &globals, const Shape &shape) {
   if (!surface && shape.kind == "torus")
     return fail(shape.out + ": a torus is made as a surface; write .obj, .ply, .stl, .off, .vtk or .vtu, then: deform mesh fill SURFACE --out " +
                 shape.out);
-  const dfm_status made = surface ? dfm_trimesh_make(s.context, shape.kind.c_str(), size.data(), shape.cells, &s.surface)
-                                  : dfm_tetmesh_make(s.context, shape.kind.c_str(), size.data(), shape.cells, &s.cells);
-  if (made < 0) return fail(dfm_last_error());
-  if ((surface ? dfm_trimesh_write(s.surface, shape.out.c_str()) : dfm_tetmesh_write(s.cells, shape.out.c_str())) < 0)
-    return fail(dfm_last_error());
+  {
+    const Patience patience(told(globals), "making " + shape.out);
+    const dfm_status made = surface ? dfm_trimesh_make(s.context, shape.kind.c_str(), size.data(), shape.cells, &s.surface)
+                                    : dfm_tetmesh_make(s.context, shape.kind.c_str(), size.data(), shape.cells, &s.cells);
+    if (made < 0) return fail(dfm_last_error());
+    if ((surface ? dfm_trimesh_write(s.surface, shape.out.c_str()) : dfm_tetmesh_write(s.cells, shape.out.c_str())) < 0)
+      return fail(dfm_last_error());
+  }
   return report_mesh(globals, shape.out, s, false);
 }
 

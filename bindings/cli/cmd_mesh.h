@@ -23,6 +23,11 @@ struct MeshSession {
 int report_mesh(const Globals &globals, const std::string &file, const MeshSession &session, bool asked,
                 const std::vector<std::string> &notes = {});
 
+// Where `out` cannot hold how much of each cell is material, and the mesh knows it: the sentence about it.
+std::string lost_shares(dfm_tetmesh cells, const std::string &out);
+std::vector<std::string> lines_of(const char *text);  // what the library's infos hold as one text
+inline bool told(const Globals &globals) { return !globals.quiet && !globals.json; }  // whether a terminal hears how long it takes
+
 // How a file name ending is written: cells (.msh .msh2 .mesh), a surface (.obj .ply .stl .off) or either (.vtk .vtu, anything unknown).
 enum class Writes { cells, surface, either };
 Writes written_by(const std::string &path);

@@ -1,71 +1,19 @@
 // deform mesh fill SURFACE --out FILE --cells N
-#include <unistd.h>
-
 #include <chrono>
-#include <condition_variable>
 #include <cstdio>
 #include <memory>
-#include <mutex>
 #include <string>
-#include <thread>
 #include <vector>
 
 #include "cmd_mesh.h"
 #include "json_text.h"
+#include "progress.h"
 
 namespace cli {
 namespace {
 
 using Clock = std::chrono::steady_clock;
 double seconds_since(Clock::time_point begin) { return std::chrono::duration<double>(Clock::now() - begin).count(); }
-
-// Filling is one call that does not know its end before it has it: after two seconds a terminal is told what is being done and for how long.
-class Patience {
- public:
-  Patience(bool wanted, std::string what) : what_(std::move(what)) {
-    if (wanted && isatty(STDERR_FILENO)) thread_ = std::thread([this] { run(); });
-  }
-  ~Patience() {
-    if (!thread_.joinable()) return;
-    {
-      const std::lock_guard<std::mutex> lock(mutex_);
-      done_ = true;
-    }
-    changed_.notify_one();
-    thread_.join();
-  }
-
- private:
-  void run() {
-    const Clock::time_point begin = Clock::now();
-    std::unique_lock<std::mutex> lock(mutex_);
-    bool drawn = false;
-    auto next = begin + std::chrono::seconds(2);
-    while (!changed_.wait_until(lock, next, [this] { return done_; })) {
-      std::fprintf(stderr, "\r%s, %.0f s \033[K", what_.c_str(), seconds_since(begin));
-      std::fflush(stderr);
-      drawn = true, next += std::chrono::seconds(1);
-    }
-    if (drawn) std::fprintf(stderr, "\r\033[K");
-  }
-
-  std::string what_;
-  std::mutex mutex_;
-  std::condition_variable changed_;
-  bool done_ = false;
-  std::thread thread_;
-};
-
-std::vector<std::string> lines(const char *text) {
-  std::vector<std::string> out;
-  for (const char *c = text; *c;) {
-    const char *end = c;
-    while (*end && *end != '\n') ++end;
-    out.emplace_back(c, end);
-    c = *end ? end + 1 : end;
-  }
-  return out;
-}
 
 struct Filled {
   dfm_trimesh_info surface = {};
@@ -93,8 +41,8 @@ bool measure(dfm_trimesh surface, dfm_tetmesh mesh, Filled &out) {
     out.mean_share += share[t] / out.cells.ntet;
     out.least_share = share[t] < out.least_share ? share[t] : out.least_share;
   }
-  out.warnings = lines(out.surface.warnings);
-  for (const std::string &w : lines(out.cells.warnings)) out.warnings.push_back(w);
+  out.warnings = lines_of(out.surface.warnings);
+  for (const std::string &w : lines_of(out.cells.warnings)) out.warnings.push_back(w);
   return true;
 }
 
@@ -120,7 +68,7 @@ void print_table(const std::string &in, const std::string &file, const Filled &f
   std::printf("  edge length       %.4g to %.4g m\n", f.cells.edge_min, f.cells.edge_max);
   std::printf("  seconds           %.2f\n", f.seconds);
   for (const std::string &w : f.warnings) std::printf("  warning: %s\n", w.c_str());
-  if (f.warnings.empty()) std::printf("  the surface is clean\n");
+  if (f.surface.warnings[0] == 0 && f.cells.warnings[0] == 0) std::printf("  the surface is clean\n");
 }
 
 int fill(const Globals &globals, const std::string &in, const std::string &out, uint32_t cells) {
@@ -128,7 +76,7 @@ int fill(const Globals &globals, const std::string &in, const std::string &out, 
   Filled filled;
   const Clock::time_point begin = Clock::now();
   {
-    const Patience patience(!globals.quiet && !globals.json, "filling " + in);
+    const Patience patience(told(globals), "filling " + in);
     if (!s.context) return fail(dfm_last_error());
     std::string sentence;
     if (!import_surface(in, s, sentence)) return fail(sentence);
@@ -138,6 +86,7 @@ int fill(const Globals &globals, const std::string &in, const std::string &out, 
   }
   filled.seconds = seconds_since(begin);
   if (!measure(s.surface, s.cells, filled)) return fail(dfm_last_error());
+  if (const std::string lost = lost_shares(s.cells, out); !lost.empty()) filled.warnings.push_back("not kept: " + lost);
   if (globals.json) print_json(in, out, cells, filled);
   else if (!globals.quiet) print_table(in, out, filled);
   return kDone;
@@ -150,8 +99,8 @@ struct FillOptions { std::string surface, out; uint32_t cells = 5000; };
 void add_mesh_fill(CLI::App *mesh, Globals &globals, int *exit_code) {
   CLI::App *command = mesh->add_subcommand("fill", "lattice tetrahedra inside a closed surface; a scene does it by itself with the body key \"fill\"");
   const auto options = std::make_shared<FillOptions>();
-  command->add_option("SURFACE", options->surface, "OBJ, PLY, STL, OFF, or any file with triangles that mesh info reads")->required();
-  command->add_option("--out", options->out, "file to write: .msh (MSH 4.1), .msh2 (MSH 2.2) or .vtk")->required()->type_name("FILE");
+  command->add_option("SURFACE", options->surface, "OBJ, PLY, STL, OFF, or any file with triangles that mesh info or mesh convert reads")->required();
+  command->add_option("--out", options->out, "file to write: .msh (MSH 4.1), .msh2 (MSH 2.2), .mesh, .vtk or .vtu")->required()->type_name("FILE");
   command->add_option("--cells", options->cells, "about how many tetrahedra")->capture_default_str()->type_name("N");
   command->callback([=, &globals] { *exit_code = fill(globals, options->surface, options->out, options->cells); });
 }

@@ -32,17 +32,6 @@ std::string text(const char *format, double x) {
   return line;
 }
 
-std::vector<std::string> lines_of(const char *text) {
-  std::vector<std::string> out;
-  for (const char *c = text; *c;) {
-    const char *end = c;
-    while (*end && *end != '\n') ++end;
-    out.emplace_back(c, end);
-    c = *end ? end + 1 : end;
-  }
-  return out;
-}
-
 template <class Info>
 void take_common(Report &r, const Info &i) {
   std::copy_n(i.lo, 3, r.lo), std::copy_n(i.hi, 3, r.hi);
@@ -88,7 +77,7 @@ bool describe_surface(dfm_trimesh mesh, Report &r) {
   const auto count = [&](const char *name, uint32_t n) { r.lines.emplace_back(name, std::to_string(n)); };
   count("points", i.npoint), count("triangles", i.ntriangle), count("edges", i.nedge), count("pieces", i.npiece);
   r.lines.emplace_back("closed", i.closed ? "yes" : "no, " + std::to_string(i.open_edges) + " open edges around " + std::to_string(i.holes) +
-                                                    " holes, " + std::to_string(i.nonmanifold_edges) + " edges of more than two triangles");
+                                                    (i.holes == 1 ? " hole, " : " holes, ") + std::to_string(i.nonmanifold_edges) + " edges of more than two triangles");
   r.lines.emplace_back("area", text("%.10g m2", i.area));
   if (i.closed) r.lines.emplace_back("volume", text("%.10g m3", i.volume));
   r.defects = {{"merged_points", i.merged_points}, {"dropped_points", i.dropped_points}, {"dropped_triangles", i.dropped_triangles},
@@ -149,6 +138,17 @@ void print_table(const std::string &file, const Report &r) {
 }
 
 }  // namespace
+
+std::vector<std::string> lines_of(const char *text) {
+  std::vector<std::string> out;
+  for (const char *c = text; *c;) {
+    const char *end = c;
+    while (*end && *end != '\n') ++end;
+    out.emplace_back(c, end);
+    c = *end ? end + 1 : end;
+  }
+  return out;
+}
 
 int report_mesh(const Globals &globals, const std::string &file, const MeshSession &session, bool asked, const std::vector<std::string> &notes) {
   Report r;

@@ -264,6 +264,7 @@ void Counter::between(uint32_t ia, uint32_t ib) {
 void Counter::test(const Item &ia, const Item &ib) {
   if (!overlap(ia.box, ib.box)) return;
   const Surface &sa = (*surfaces_)[ia.surface], &sb = (*surfaces_)[ib.surface];
+  if (sa.obstacle && sb.obstacle) return;
   const uint32_t *ta = sa.tri + 3 * size_t(ia.triangle), *tb = sb.tri + 3 * size_t(ib.triangle);
   const double *a[3], *b[3];
   for (int i = 0; i < 3; ++i) a[i] = sa.xyz + 3 * size_t(ta[i]), b[i] = sb.xyz + 3 * size_t(tb[i]);

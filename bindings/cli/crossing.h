@@ -19,7 +19,8 @@ bool meet(const Triangle a, const Triangle b);
 // rather than touch.
 bool pass_through(const Triangle a, const Triangle b);
 
-struct Surface { const double *xyz; uint32_t n; const uint32_t *tri; uint32_t ntri; };
+// obstacle: pairs of its triangles among themselves or with another obstacle's are nobody's affair.
+struct Surface { const double *xyz; uint32_t n; const uint32_t *tri; uint32_t ntri; bool obstacle = false; };
 
 // Committed states keep a distance between surfaces, so there any shared point counts; a start state is the user's own, and may touch.
 enum class Touching { counts, allowed };

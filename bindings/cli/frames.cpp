@@ -16,18 +16,6 @@ namespace {
 
 constexpr uint32_t kWidth = 960, kHeight = 720;
 
-void rotate(const double q[4], const double v[3], double out[3]) {
-  double n2 = q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3];
-  if (n2 == 0) {
-    for (int i = 0; i < 3; ++i) out[i] = v[i];
-    return;
-  }
-  const double s = 2 / n2, u[3] = {q[1] * v[2] - q[2] * v[1] + q[3] * v[0], q[2] * v[0] - q[0] * v[2] + q[3] * v[1], q[0] * v[1] - q[1] * v[0] + q[3] * v[2]};
-  out[0] = v[0] + s * (q[1] * u[2] - q[2] * u[1]);
-  out[1] = v[1] + s * (q[2] * u[0] - q[0] * u[2]);
-  out[2] = v[2] + s * (q[0] * u[1] - q[1] * u[0]);
-}
-
 class OffScreen : public Frames {
  public:
   OffScreen(const SceneFile &scene, std::string folder, std::unique_ptr<render::Renderer> renderer)
@@ -40,6 +28,7 @@ class OffScreen : public Frames {
       b.start = b.xyz;
       buffers_.push_back(std::move(b));
     }
+    placed_.resize(scene.obstacles().size());
   }
 
   void draw(double t) override {
@@ -112,8 +101,13 @@ class OffScreen : public Frames {
     }
   }
 
-  void add_obstacles(render::Scene &out) const {
-    for (const ObstacleView &o : scene_.obstacles()) {
+  void add_obstacles(render::Scene &out) {
+    for (size_t at = 0; at < placed_.size(); ++at) {
+      const ObstacleView &o = scene_.obstacles()[at];
+      if (o.def.ntriangle) {
+        add_triangles(o, placed_[at], out);
+        continue;
+      }
       dfm_pose pose = {};
       need(dfm_obstacle_get_pose(o.handle, &pose));
       const double up[3] = {0, 0, 1};
@@ -137,6 +131,14 @@ class OffScreen : public Frames {
     }
   }
 
+  void add_triangles(const ObstacleView &o, std::vector<double> &placed, render::Scene &out) const {
+    place_points(o, placed);
+    render::Surface s;
+    s.xyz = placed.data(), s.n = o.def.npoint, s.tri = o.def.triangles, s.ntri = o.def.ntriangle;
+    s.rgb[0] = 0.72f, s.rgb[1] = 0.73f, s.rgb[2] = 0.75f;   // no body's colour
+    out.surfaces.push_back(s);
+  }
+
   void annotate(render::Image &image, render::ColourMap map, double t) const {
     char text[40];
     std::snprintf(text, sizeof text, "t = %.3f s", t);
@@ -151,6 +153,7 @@ class OffScreen : public Frames {
   std::unique_ptr<render::Renderer> renderer_;
   std::string colour_;
   std::vector<Buffers> buffers_;
+  std::vector<std::vector<double>> placed_;   // of obstacles of triangles
   std::optional<render::Bounds> extent_;
   std::optional<render::Camera> camera_;
   float scale_ = 0;

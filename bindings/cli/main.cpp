@@ -66,6 +66,17 @@ std::string path_of(CLI::App *app) {
   return app->get_parent() ? path_of(app->get_parent()) + " " + app->get_name() : "deform";
 }
 
+// "Could not convert: --cells = 1e9" says what was read, not what was expected: whole numbers are those whose option is shown as N.
+std::string not_a_number(const std::string &text, CLI::App *at) {
+  for (const CLI::Option *option : at->get_options()) {
+    const std::string begin = "Could not convert: " + option->get_name() + " = ";
+    if (text.rfind(begin, 0) != 0) continue;
+    return option->get_name() + ": expected " + (option->get_type_name()[0] == 'N' ? "a whole number, 0 or more" : "a number") + ", found \"" +
+           text.substr(begin.size()) + "\"";
+  }
+  return text;
+}
+
 int bad_usage(CLI::App &app, const CLI::ParseError &error) {
   CLI::App *at = reached(&app);
   std::string text = error.what();
@@ -84,6 +95,7 @@ int bad_usage(CLI::App &app, const CLI::ParseError &error) {
       if (!near.empty()) text += "; did you mean \"" + near + "\"?";
     }
   }
+  if (dynamic_cast<const CLI::ConversionError *>(&error)) text = not_a_number(text, at);
   std::replace(text.begin(), text.end(), '\n', ' ');
   return fail(text + " (see: " + path_of(at) + " --help)");
 }

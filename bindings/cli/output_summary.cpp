@@ -68,6 +68,12 @@ void Checker::check(bool start_state) {
     if (!std::exchange(checks_.too_far, true)) keep_warning("a body is further than 1e90 m away: crossings cannot be counted in such a state");
     return;
   }
+  for (size_t o = 0; o < placed_.size(); ++o) {
+    const ObstacleView &obstacle = scene_.obstacles()[o];
+    if (obstacle.def.shape != DFM_SHAPE_MESH) continue;
+    place_points(obstacle, placed_[o]);
+    surfaces_.push_back({placed_[o].data(), obstacle.def.npoint, obstacle.def.triangles, obstacle.def.ntriangle, true});
+  }
   const size_t found = counter_.count(surfaces_, start_state ? crossing::Touching::allowed : crossing::Touching::counts);
   checks_.intersections_max = std::max(checks_.intersections_max, found);
 }

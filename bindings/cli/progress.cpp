@@ -28,4 +28,32 @@ void Progress::show(double done, double total, double steps_per_second) {
   drawn_ = true;
 }
 
+Patience::Patience(bool wanted, std::string what, std::chrono::milliseconds wait) : what_(std::move(what)) {
+  if (wanted && isatty(STDERR_FILENO)) thread_ = std::thread([this, wait] { run(wait); });
+}
+
+Patience::~Patience() {
+  if (!thread_.joinable()) return;
+  {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    done_ = true;
+  }
+  changed_.notify_one();
+  thread_.join();
+}
+
+void Patience::run(std::chrono::milliseconds wait) {
+  using Clock = std::chrono::steady_clock;
+  const Clock::time_point begin = Clock::now();
+  std::unique_lock<std::mutex> lock(mutex_);
+  bool drawn = false;
+  auto next = begin + wait;
+  while (!changed_.wait_until(lock, next, [this] { return done_; })) {
+    std::fprintf(stderr, "\r%s, %.0f s \033[K", what_.c_str(), std::chrono::duration<double>(Clock::now() - begin).count());
+    std::fflush(stderr);
+    drawn = true, next += std::chrono::seconds(1);
+  }
+  if (drawn) std::fprintf(stderr, "\r\033[K");
+}
+
 }  // namespace cli

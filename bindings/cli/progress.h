@@ -1,6 +1,10 @@
-// A progress bar on a terminal, for runs that last over two seconds.
+// What a terminal is shown of anything that lasts over two seconds.
 #pragma once
 #include <chrono>
+#include <condition_variable>
+#include <mutex>
+#include <string>
+#include <thread>
 
 namespace cli {
 
@@ -14,6 +18,21 @@ class Progress {
   using Clock = std::chrono::steady_clock;
   bool on_, drawn_ = false;
   Clock::time_point begin_, next_;
+};
+
+// For one call that does not know its end before it has it: a terminal is told what is being done and for how long, as long as this lives.
+class Patience {
+ public:
+  Patience(bool wanted, std::string what, std::chrono::milliseconds wait = std::chrono::seconds(2));
+  ~Patience();  // wipes the line
+
+ private:
+  void run(std::chrono::milliseconds wait);
+  std::string what_;
+  std::mutex mutex_;
+  std::condition_variable changed_;
+  bool done_ = false;
+  std::thread thread_;
 };
 
 }  // namespace cli

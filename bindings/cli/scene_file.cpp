@@ -4,6 +4,28 @@
 
 namespace cli {
 
+void rotate(const double q[4], const double v[3], double out[3]) {
+  double n2 = q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3];
+  if (n2 == 0) {
+    for (int i = 0; i < 3; ++i) out[i] = v[i];
+    return;
+  }
+  const double s = 2 / n2, u[3] = {q[1] * v[2] - q[2] * v[1] + q[3] * v[0], q[2] * v[0] - q[0] * v[2] + q[3] * v[1], q[0] * v[1] - q[1] * v[0] + q[3] * v[2]};
+  out[0] = v[0] + s * (q[1] * u[2] - q[2] * u[1]);
+  out[1] = v[1] + s * (q[2] * u[0] - q[0] * u[2]);
+  out[2] = v[2] + s * (q[0] * u[1] - q[1] * u[0]);
+}
+
+void place_points(const ObstacleView &obstacle, std::vector<double> &out) {
+  dfm_pose pose = {};
+  need(dfm_obstacle_get_pose(obstacle.handle, &pose));
+  out.resize(3 * size_t(obstacle.def.npoint));
+  for (size_t i = 0; i < out.size(); i += 3) {
+    rotate(pose.rotation, obstacle.def.points + i, &out[i]);
+    for (int k = 0; k < 3; ++k) out[i + size_t(k)] += pose.position[k];
+  }
+}
+
 SceneFile::SceneFile(const Globals &globals, const std::string &path, const std::vector<std::string> &set, uint64_t jitter_seed)
     : context_(make_context(globals), dfm_context_destroy), path_(path) {
   std::vector<const char *> assignments;

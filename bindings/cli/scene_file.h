@@ -23,6 +23,11 @@ struct ObstacleView {
   dfm_obstacle_def def = {};
 };
 
+// By a quaternion x, y, z, w; all zero reads as identity.
+void rotate(const double q[4], const double v[3], double out[3]);
+// Points of an obstacle of triangles where it is now, [n,3].
+void place_points(const ObstacleView &obstacle, std::vector<double> &out);
+
 class SceneFile {
  public:
   SceneFile(const Globals &globals, const std::string &path, const std::vector<std::string> &set, uint64_t jitter_seed);

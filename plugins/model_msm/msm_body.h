@@ -153,11 +153,17 @@ struct Body {
   void build_merge(const Layout &l);
   void take_fields(const dfm_mesh &m);
   void find_shapes();
-  void find_tilts();
-  void find_dampers();
+  struct Room {  // what new parameters need, taken before anything changes: arrays to swap in, and sums and vectors on the way
+    Buffer<double> edge_tilt, edge_rest, tilt, edge_damp, damp_most, damp, point_drag, rest_now;
+    Buffer<double> damp_share, drag_around, own, next, gradient;
+  };
+  void make_room(Room &room) const;
+  double largest_of(Param which) const;
+  void find_tilts(Room &room);
+  void find_dampers(Room &room);
   void find_effects();
   void fill_stiffness();
-  void find_weights();
+  void find_weights(Room &room);
   double spring_energy(uint32_t e, const dfm_kin &k, const Branch &branch) const;
   void for_each_block(uint32_t least_cells, void (*fn)(void *, uint32_t, uint32_t), void *user);
 };

@@ -61,7 +61,7 @@ void merge_row_pass(void *user, uint32_t begin, uint32_t end) {
 
 }  // namespace
 
-void Body::find_weights() {
+void Body::find_weights(Room &room) {
   // Along a spring at rest a tilted one is softer by (L0/L)^2, a turned one by L0/L.
   const auto tangent = [this](uint32_t e) {
     const double k = full_stiffness(e), ratio = edge_tilt.empty() || !(edge_rest[e] > 0) ? 1 : edge_length[e] / edge_rest[e];
@@ -70,8 +70,7 @@ void Body::find_weights() {
   std::fill(spring_sum.data(), spring_sum.data() + npoint, 0.0);
   for (uint32_t e = 0; e < nedge; ++e)
     for (int n = 0; n < 2; ++n) spring_sum[edges[2 * size_t(e) + n]] += full_stiffness(e);
-  Buffer<double> own, next, gradient;  // gradient: 6 |dV/dx_a| sqrt(kV / (36 V0)) at rest
-  own.create(host, npoint), next.create(host, npoint), gradient.create(host, volume_on ? 4 * size_t(ncell) : 0);
+  Buffer<double> &own = room.own, &next = room.next, &gradient = room.gradient;  // gradient: 6 |dV/dx_a| sqrt(kV / (36 V0)) at rest
   dfm_kin at_rest{};
   at_rest.x = rest_point.data(), at_rest.stride = 3;
   RowCall diagonal{{this, &at_rest, nullptr, nullptr}, own.data(), nullptr};

@@ -9,9 +9,9 @@
 namespace msm {
 namespace {
 
-// q - ln(1 + q); near zero by the series of ln(1+q) = 2 artanh s, s = q/(2+q), so that small strains keep their digits.
-double less_log(double q) {
-  if (!(q > -0.25 && q < 0.25)) return q - dfm_log(1 + q);
+// q - ln(grown), grown = 1 + q; near zero by the series of ln(1+q) = 2 artanh s, s = q/(2+q), so that small strains keep their digits.
+double less_log(double q, double grown) {
+  if (!(q > -0.25 && q < 0.25)) return q - dfm_log(grown);
   const double s = q / (2 + q), s2 = s * s;
   double series = 0;  // s^2/3 + s^4/5 + ..., |s| <= 1/7: ten terms leave 1e-18
   for (int n = 21; n >= 3; n -= 2) series = s2 * (1.0 / n + series);
@@ -21,9 +21,11 @@ double less_log(double q) {
 }  // namespace
 
 double turned_energy(double l, double l0, double tilt2) {
+  if (!(tilt2 > 0)) return 0.5 * ((l - l0) * (l - l0));
   const double length = __builtin_sqrt(l * l + tilt2), length0 = __builtin_sqrt(l0 * l0 + tilt2), t0 = l0 + length0, b = tilt2 / (t0 * t0);
-  const double more = l - l0, q = (more + more * ((l + l0) / (length + length0))) / t0, bq = b * q / (1 + q);
-  return t0 * t0 * 0.25 * (0.5 * (q * q) + q * bq - 0.5 * (bq * bq) - 2 * b * less_log(q));
+  // 1 + q by itself: where the ends meet it is w/t0, of which 1 + q would keep no digit
+  const double more = l - l0, q = (more + more * ((l + l0) / (length + length0))) / t0, grown = (l + length) / t0, bq = b * q / grown;
+  return t0 * t0 * 0.25 * (0.5 * (q * q) + q * bq - 0.5 * (bq * bq) - 2 * b * less_log(q, grown));
 }
 
 double Body::spring_energy(uint32_t e, const dfm_kin &k, const Branch &branch) const {

@@ -61,14 +61,10 @@ void Body::find_shapes() {
 
 // w^2 of a spring d at rest: softer, g^2 (a.d)^2, one extra coordinate g a.X; stiffer, g^2 (|d|^2 - (a.d)^2), two of them along any two
 // axes across a. Springs between cells that differ take the mean over the volume around them, which knows no sign of an axis.
-void Body::find_tilts() {
+void Body::find_tilts(Room &room) {
   const bool by_cell = !field[kSlope].empty() || !field[kAxis].empty();
-  double steepest = params[kSlope];
-  if (!field[kSlope].empty()) steepest = *std::max_element(field[kSlope].data(), field[kSlope].data() + ncell);
-  Buffer<double> squares, lengths, packed;  // what may fail comes first
-  if (steepest > 0) squares.create(host, nedge), lengths.create(host, nedge);
-  if (steepest > 0 || has_branch()) packed.create(host, spring_slots());
-  edge_tilt.swap(squares), edge_rest.swap(lengths), tilt.swap(packed);
+  const double steepest = largest_of(kSlope);
+  edge_tilt.swap(room.edge_tilt), edge_rest.swap(room.edge_rest), tilt.swap(room.tilt);
   if (steepest > 0) {
     const auto squared = [&](uint32_t c, uint32_t e) {
       const double *x = rest_point.data() + 3 * size_t(edges[2 * size_t(e)]), *y = rest_point.data() + 3 * size_t(edges[2 * size_t(e) + 1]);
@@ -98,13 +94,12 @@ void Body::find_tilts() {
 }
 
 // Dampers by cell add up like the springs: c of an edge is the sum of its cells' damping_stiffness times their share of k.
-void Body::find_dampers() {
+void Body::find_dampers(Room &room) {
   const Buffer<double> &by_cell = field[kDampingStiffness];
-  damping_on = by_cell.empty() ? params[kDampingStiffness] > 0 : *std::max_element(by_cell.data(), by_cell.data() + ncell) > 0;
+  damping_on = largest_of(kDampingStiffness) > 0;
   if (!by_cell.empty() && damping_on) {
-    Buffer<double> share, damper, most_around, packed;
-    damper.create(host, nedge), most_around.create(host, npoint), packed.create(host, spring_slots()), share.create(host, nedge);
-    edge_damp.swap(damper), damp_most.swap(most_around), damp.swap(packed);
+    Buffer<double> &share = room.damp_share;
+    edge_damp.swap(room.edge_damp), damp_most.swap(room.damp_most), damp.swap(room.damp);
     for (uint32_t c = 0; c < ncell; ++c) {
       const double k = __builtin_fabs(cell_volume6[c]) * at(kYoung, c) * spring_scale(volume_ratio(c));
       for (int n = 0; n < 6; ++n) {
@@ -123,11 +118,10 @@ void Body::find_dampers() {
     for (uint32_t b = 0; b < nblock; ++b) block[b].damp = damp.data() + (block[b].stiffness - stiffness.data());
   }
   const Buffer<double> &drag = field[kDampingMass];
-  drag_on = drag.empty() ? params[kDampingMass] > 0 : *std::max_element(drag.data(), drag.data() + ncell) > 0;
+  drag_on = largest_of(kDampingMass) > 0;
   if (!drag.empty() && drag_on) {
-    Buffer<double> rate, around;
-    rate.create(host, npoint), around.create(host, npoint);
-    point_drag.swap(rate);
+    Buffer<double> &around = room.drag_around;
+    point_drag.swap(room.point_drag);
     for (uint32_t c = 0; c < ncell; ++c)
       for (int a = 0; a < 4; ++a) {
         const uint32_t i = cells[4 * size_t(c) + a];
@@ -169,18 +163,46 @@ struct Aside {  // the mask, while no spring counts as off
 };
 }  // namespace
 
+double Body::largest_of(Param which) const {
+  return field[which].empty() ? params[which] : *std::max_element(field[which].data(), field[which].data() + ncell);
+}
+
+void Body::make_room(Room &room) const {
+  const size_t slots = spring_slots();
+  const bool tilted = largest_of(kSlope) > 0;
+  if (tilted) room.edge_tilt.create(host, nedge), room.edge_rest.create(host, nedge);
+  if (tilted || has_branch()) room.tilt.create(host, slots);
+  if (!field[kDampingStiffness].empty() && largest_of(kDampingStiffness) > 0) {
+    room.edge_damp.create(host, nedge), room.damp_share.create(host, nedge);
+    room.damp_most.create(host, npoint), room.damp.create(host, slots);
+  }
+  if (!field[kDampingMass].empty() && largest_of(kDampingMass) > 0) room.point_drag.create(host, npoint), room.drag_around.create(host, npoint);
+  if (has_branch() && rest_now.empty()) room.rest_now.create(host, slots);
+  room.own.create(host, npoint), room.next.create(host, npoint);
+  room.gradient.create(host, largest_of(kVolume) > 0 ? 4 * size_t(ncell) : 0);
+}
+
+// All or nothing: what may fail comes first.
 void Body::apply_params(const double *values) {
+  double before[kValueCount];
+  std::copy(params, params + kValueCount, before);
   std::copy(values, values + kValueCount, params);
-  const Buffer<double> &volumes = field[kVolume];
-  volume_on = volumes.empty() ? params[kVolume] > 0 : *std::max_element(volumes.data(), volumes.data() + ncell) > 0;
+  Room room;
+  try {
+    make_room(room);
+  } catch (...) {
+    std::copy(before, before + kValueCount, params);
+    throw;
+  }
+  volume_on = largest_of(kVolume) > 0;
   find_shapes();
-  find_tilts();
-  find_dampers();
-  if (has_branch() && rest_now.empty()) rest_now.create(host, spring_slots());
+  find_tilts(room);
+  find_dampers(room);
+  if (!room.rest_now.empty()) rest_now.swap(room.rest_now);
   {  // the weights of the step bound never depend on what is switched off, nor on when it was
     const Aside aside(edge_off);
     fill_stiffness();
-    find_weights();
+    find_weights(room);
   }
   find_effects();
   if (!edge_off.empty()) fill_stiffness();

@@ -6,6 +6,10 @@
 // It is one step of the multiplicative algorithm for D-optimal designs (Silvey, Titterington, Torsney 1978), whose fixed point has the
 // largest det C, and that is an isotropic C whenever one can be had (log det is concave). The weighted mean of the factor is 1, it is
 // positive, turns with the body, and is 1 for a single cell and for an even spread of directions.
+// C belongs to the whole body: where nearly all edges lie in a plane or along a line, the few that do not (a knob on a sheet) would take all
+// that the rest lacks, a hundred times their stiffness and more. So the factor is kept between 1/3 and 3; meshes of good cells stay within.
+#include <algorithm>
+
 #include "msm_body.h"
 
 namespace msm {
@@ -14,6 +18,7 @@ namespace {
 constexpr int kN = 6;
 // Below this share of the mean pivot the edges all but leave out a strain (points in a plane): nothing to even out.
 constexpr double kFlat = 1e-6;
+constexpr double kMostFactor = 3;
 
 // Components of n n^T such that the dot product of two is that of the tensors.
 void dyad_of(const double *a, const double *b, double length, double *m) {
@@ -65,7 +70,7 @@ void Body::find_directions() {
     for (int j = 0; j <= i; ++j) c[i][j] *= total > 0 ? kN / total : 0;
   const bool even_out = factor(c);
   for (uint32_t e = 0; e < nedge; ++e)
-    per_modulus[e] = directed(e) ? (even_out ? inverse_form(c, m) : 1) / (edge_length[e] * edge_length[e]) : 0;
+    per_modulus[e] = directed(e) ? (even_out ? std::clamp(inverse_form(c, m), 1 / kMostFactor, kMostFactor) : 1) / (edge_length[e] * edge_length[e]) : 0;
 }
 
 }  // namespace msm

@@ -63,14 +63,74 @@ TEST(TetmeshFill, WrongArguments_AreRefusedWithASentence) {
 
 TEST(MeshFillCommand, Surface_BecomesAFileOfCells) {
   const std::string folder = test::scratch("fill_command"), data = std::string(DEFORM_SOURCE_DIR) + "/examples/data/";
-  const test::CommandResult made = test::deform({"mesh", "fill", data + "organ.obj", "--out", folder + "/organ.msh", "--cells", "1000", "--json"});
+  const test::CommandResult made = test::deform({"mesh", "fill", data + "organ.obj", "--out", folder + "/organ.vtu", "--cells", "1000", "--json"});
   ASSERT_EQ(made.exit_code, 0) << made.err;
   for (const char *key : {"\"cells\": ", "\"points\": ", "\"enclosed_volume\": ", "\"mean_share\": ", "\"seconds\": ", "\"warnings\": []"})
     EXPECT_NE(made.out.find(key), std::string::npos) << key << "\n" << made.out;
-  const test::CommandResult info = test::deform({"mesh", "info", folder + "/organ.msh"});
+  const test::CommandResult info = test::deform({"mesh", "info", folder + "/organ.vtu"});
   EXPECT_EQ(info.exit_code, 0) << info.err;
   const test::CommandResult table = test::deform({"mesh", "fill", data + "rabbit.obj", "--out", folder + "/rabbit.vtk", "--cells", "500"});
   EXPECT_NE(table.out.find("the surface is clean"), std::string::npos) << table.out;
+}
+
+namespace {
+
+struct FromFile {
+  test::Context context;
+  dfm_tetmesh mesh = 0;
+  const double *share = nullptr;
+  dfm_tetmesh_info info{};
+  explicit FromFile(const std::string &path) {
+    info.size = sizeof info;
+    test::ok(dfm_tetmesh_read(context, path.c_str(), &mesh));
+    test::ok(dfm_tetmesh_get_info(mesh, &info));
+    test::ok(dfm_tetmesh_share(mesh, &share));
+  }
+};
+
+}  // namespace
+
+// What is filled here and loaded there weighs the same, or the loss is told.
+TEST(MeshFillCommand, Shares_SurviveInVtkAndVtu_AndTheirLossIsTold) {
+  const std::string folder = test::scratch("fill_command_shares"), organ = std::string(DEFORM_SOURCE_DIR) + "/examples/data/organ.obj";
+  const auto fill = [&](const std::string &name) { return test::deform({"mesh", "fill", organ, "--out", folder + "/" + name, "--cells", "600"}); };
+  EXPECT_EQ(fill("a.vtu").out.find("not kept"), std::string::npos);
+  fill("b.vtk");
+  const FromFile vtu(folder + "/a.vtu"), vtk(folder + "/b.vtk");
+  ASSERT_NE(vtu.share, nullptr);
+  ASSERT_NE(vtk.share, nullptr);
+  double mean = 0;
+  for (uint32_t t = 0; t < vtu.info.ntet; ++t) {
+    ASSERT_EQ(vtu.share[t], vtk.share[t]);
+    mean += vtu.share[t] / vtu.info.ntet;
+  }
+  EXPECT_GT(mean, 0.3);
+  EXPECT_LT(mean, 0.8);
+  for (const char *name : {"c.msh", "c.msh2", "c.mesh"}) {
+    EXPECT_NE(fill(name).out.find("warning: not kept: shares of material"), std::string::npos) << name;
+    const test::CommandResult converted = test::deform({"mesh", "convert", folder + "/a.vtu", folder + "/" + name});
+    EXPECT_NE(converted.err.find("not kept: shares of material"), std::string::npos) << name << converted.err;
+    EXPECT_EQ(FromFile(folder + "/" + name).share, nullptr);
+  }
+}
+
+TEST(MeshFillCommand, ArrayThatIsNoShare_IsLeftAlone) {
+  const std::string file = test::scratch("fill_command_foreign") + "/a.vtk";
+  const std::string mesh = "# vtk DataFile Version 3.0\nt\nASCII\nDATASET UNSTRUCTURED_GRID\nPOINTS 5 double\n0 0 0 1 0 0 0 1 0 0 0 1 1 1 1\n"
+                           "CELLS 4 19\n4 0 1 2 3\n3 0 2 1\n4 0 1 2 3\n4 1 2 3 4\nCELL_TYPES 4\n10 5 10 10\nCELL_DATA 4\n";
+  for (const auto &[array, counts] : {std::pair("SCALARS share double 1\nLOOKUP_TABLE default\n0.5 1 0.5 0.25\n", true),
+                                      std::pair("SCALARS share double 1\nLOOKUP_TABLE default\n0.5 1 0.5 1.5\n", false),
+                                      std::pair("SCALARS share double 1\nLOOKUP_TABLE default\n0.5 1 0.5 0\n", false),
+                                      std::pair("SCALARS share int 1\nLOOKUP_TABLE default\n1 1 1 1\n", false),
+                                      std::pair("VECTORS share double\n1 1 1 1 1 1 1 1 1 1 1 1\n", false)}) {
+    test::write_file(file, mesh + array);
+    const FromFile read(file);
+    ASSERT_EQ(read.info.ntet, 2u) << "the double is dropped";
+    ASSERT_EQ(read.share != nullptr, counts) << array;
+    if (!counts) continue;
+    EXPECT_EQ(read.share[0], 0.5);
+    EXPECT_EQ(read.share[1], 0.25) << "shares stay with their cells, past triangles and doubles";
+  }
 }
 
 TEST(MeshFillCommand, OpenSheet_ExitsTwoAndNamesTheFileAndTheOpening) {

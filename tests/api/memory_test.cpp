@@ -4,7 +4,7 @@
 #include <new>
 
 #include "coupled.h"
-#include "stack.h"
+#include "obstacle.h"
 
 namespace {
 
@@ -107,6 +107,42 @@ TEST(Memory, ASettledStep_AllocatesNothing) {
   EXPECT_EQ(hooks.wrong_align, 0);
 }
 
+TEST(Memory, ASettledStepOnTrianglesAndVoxels_AllocatesNothing) {
+  Hooks hooks;
+  const dfm_context_def def = hooks.def();
+  dfm_context *c = nullptr;
+  ASSERT_EQ(dfm_context_create(&def, &c), DFM_OK) << dfm_last_error();
+  {
+    const dfm_world w = test::make_world(c);
+    test::set_friction(w, 0.5);
+    test::BodyOptions o;
+    o.young = 2e5, o.damping_stiffness = 2e-3;
+    o.name = "left", o.position = {-0.15, 0, 0.0101};
+    test::make_body(c, w, "beam", {0.1, 0.1, 0.1}, 60, o);
+    o.name = "right", o.position = {0.45, 0, 1e-4};
+    test::make_body(c, w, "beam", {0.1, 0.1, 0.1}, 60, o);
+    test::add_mesh(w, "hills", test::height_field(0.3, 20, [](double x, double y) { return 0.01 * std::sin(20 * x) * std::cos(30 * y); }));
+    dfm_obstacle_def d = test::mesh_def("slab", test::Triangles{}, DFM_SHAPE_VOXELS, 4000);
+    const test::Triangles slab = test::box_surface({0.2, 0.2, 0.05}, 1);
+    d.npoint = uint32_t(slab.points.size() / 3), d.ntriangle = uint32_t(slab.tris.size() / 3), d.points = slab.points.data(), d.triangles = slab.tris.data();
+    d.pose.position[0] = 0.55, d.pose.position[2] = -0.05;
+    dfm_obstacle obstacle = 0;
+    test::ok(dfm_obstacle_create(w, &d, &obstacle));
+    for (int i = 0; i < 2000; ++i) ASSERT_EQ(dfm_world_step(w, 1e-3, nullptr), DFM_OK) << dfm_last_error();
+    ASSERT_EQ(test::pairs(w).size(), 2u) << "one on the hills, one on the slab";
+    const int64_t hook_calls = hooks.calls;
+    const uint64_t heap = heap_calls;
+    dfm_status bad = DFM_OK;
+    for (int i = 0; i < 1000; ++i)
+      if (const dfm_status s = dfm_world_step(w, 1e-3, nullptr); s != DFM_OK) bad = s;
+    EXPECT_EQ(bad, DFM_OK);
+    EXPECT_EQ(hooks.calls - hook_calls, 0);
+    EXPECT_EQ(heap_calls - heap, 0u);
+  }
+  dfm_context_destroy(c);
+  EXPECT_EQ(hooks.live_bytes, 0);
+}
+
 // A surface of its own hangs, touches and is spread anew in every sub-step.
 TEST(Memory, ASettledCoupledStep_AllocatesNothing) {
   Hooks hooks;
@@ -175,6 +211,7 @@ TEST(Memory, FallingAsleepAndWaking_AllocatesNothing) {
 
 // Everything from the context to a step in contact, with the allocator failing at the n-th call, for all n that are ever reached.
 TEST(Memory, WhenTheNthAllocationFails_TheCallFailsCleanlyAndNothingLeaks) {
+  const test::Triangles slab = test::box_surface({0.2, 0.2, 0.05}, 1);
   int failures[4] = {};
   bool through = false;
   const test::Skin skin = test::ball_skin(0.049, 1);
@@ -196,6 +233,11 @@ TEST(Memory, WhenTheNthAllocationFails_TheCallFailsCleanlyAndNothingLeaks) {
       dfm_obstacle floor = 0;
       const dfm_obstacle_def od = dfm_obstacle_def_default();
       if (status == DFM_OK) status = dfm_obstacle_create(world, &od, &floor);
+      for (const uint32_t shape : {uint32_t(DFM_SHAPE_MESH), uint32_t(DFM_SHAPE_VOXELS)}) {
+        dfm_obstacle_def td = test::mesh_def(shape == DFM_SHAPE_MESH ? "slab" : "rock", slab, shape, 64);
+        td.pose.position[2] = -0.05;
+        if (status == DFM_OK) status = dfm_obstacle_create(world, &td, &floor);
+      }
       const double size[3] = {0.05, 0, 0};
       if (status == DFM_OK) status = dfm_tetmesh_make(c, "ball", size, 100, &mesh);
       if (status == DFM_OK) {

@@ -105,7 +105,7 @@ TEST(MeshCommand, InfoOfASurface_TellsHolesGroupsAndRepairs) {
   const auto r = test::deform({"mesh", "info", file});
   EXPECT_EQ(r.exit_code, 0) << r.err;
   for (const char *word : {"points            4", "triangles         3", "pieces            1", "group             sole (1 triangles)",
-                           "closed            no, 3 open edges around 1 holes, 0 edges of more than two triangles", "area              1.5 m2",
+                           "closed            no, 3 open edges around 1 hole, 0 edges of more than two triangles", "area              1.5 m2",
                            "0.8 to 0.9      3         ########", "warning: 1 of 3 triangles faced the wrong way and was turned",
                            "warning: 1 point that no triangle uses was dropped"})
     EXPECT_TRUE(has(r.out, word)) << word << " not in\n" << r.out;
@@ -193,6 +193,13 @@ TEST(MeshCommand, BadInput_ExitsTwoWithOneSentence) {
   expect_refused({"mesh", "make", "ball", "--out", ball, "--radius", "nan"}, {"radius"});
   expect_refused({"mesh", "make", "ball", "--out", ball, "--cells", "0"}, {"cells is 0"});
   expect_refused({"mesh", "make", "ball", "--out", folder() + "/b.obj", "--cells", "0"}, {"triangles is 0"});
+  for (const char *wrong : {"-5", "1e9", "1.5", "many", "99999999999999999999"})
+    for (const std::vector<std::string> &call : {std::vector<std::string>{"mesh", "make", "ball"}, {"mesh", "fill", sheet}}) {
+      std::vector<std::string> args = call;
+      args.insert(args.end(), {"--out", ball, "--cells", wrong});
+      expect_refused(args, {"--cells", "whole number", std::string("found \"") + wrong + "\""});
+    }
+  expect_refused({"mesh", "make", "ball", "--out", ball, "--radius", "wide"}, {"--radius", "expected a number, found \"wide\""});
   expect_refused({"mesh", "make", "ball"}, {"--out"});
   expect_refused({"mesh", "make", "bal", "--out", ball}, {"bal", "ball"});
   expect_refused({"mesh", "inof", ball}, {"inof", "info"});

@@ -182,7 +182,9 @@ TEST(SceneFields, Tables_AreCheckedWithTheirPlace) {
     all.push_back("/bodies/0");
     expect_refused(R"(/bodies/0/fields={"young": "bad.csv"})", all);
   }
-  expect_refused(R"(/bodies/0/fields={"young": "missing.csv"})", {"/bodies/0/fields/young", "missing.csv", "cannot be opened"});
+  expect_refused(R"(/bodies/0/fields={"young": "missing.csv"})", {"/bodies/0/fields/young", "missing.csv", "No such file"});
+  expect_refused(R"(/bodies/0/fields={"young": "."})", {"/bodies/0/fields/young", "is a directory", "value or cell,value"});
+  expect_refused("/bodies/0/nodal_bc=.", {"/bodies/0/nodal_bc", "is a directory", "node,fixx"});
 }
 
 TEST(SceneFields, Keys_AreTheModels) {
@@ -238,6 +240,7 @@ TEST(SceneAnisotropy, Mistakes_AreTold) {
   expect_refused(R"(/bodies/0/anisotropy={"axis": [0, 0, 1], "params": {"slpoe": 1}})", {"/bodies/0/anisotropy/params/slpoe", "did you mean \"slope\"?"});
   expect_refused(R"(/bodies/0/anisotropy={"axis": [0, 0, 1], "params": {"kind": "stiff"}})", {"/bodies/0/anisotropy/params/kind", "expected one of: "});
   expect_refused(R"(/bodies/0/anisotropy={"axis": [0, 0, 1], "params": {"slope": -1}})", {"/bodies/0/anisotropy/params/slope", "number from 0"});
+  expect_refused(R"(/bodies/0/anisotropy={"axis": [0, 0, 1], "params": {"slope": "a"}})", {"/bodies/0/anisotropy/params/slope", "expected a number, found \"a\""});
   expect_refused(R"(/bodies/0/anisotropy={"field": "values.csv"})", {"/bodies/0/anisotropy/field", "values.csv:1:", "x,y,z"});
   expect_refused(R"(/bodies/0/anisotropy={"field": "missing.csv"})", {"/bodies/0/anisotropy/field", "missing.csv"});
   expect_refused({R"(/bodies/0/model/params={"anisotropy_axis": [1, 0, 0]})", R"(/bodies/0/anisotropy={"axis": [0, 0, 1]})"},
@@ -342,6 +345,8 @@ TEST(SceneFill, Outputs_AreOfTheFilesSurface) {
 TEST(SceneFill, Mistakes_AreTold) {
   expect_refused("/bodies/0/fill={\"cells\": 5}", {"/bodies/0/fill", "holds tetrahedra already"});
   expect_refused({kBox, "/bodies/0/fill={\"cells\": 0}"}, {"/bodies/0/fill/cells", "from 1"});
+  expect_refused({kBox, "/bodies/0/fill={\"cells\": 100000001}"}, {"/bodies/0/fill/cells", "from 1 to 100000000, found 100000001"});
+  expect_refused({kBox, "/bodies/0/fill={\"cells\": null}"}, {"/bodies/0/fill/cells", "found null"});
   expect_refused({kBox, "/bodies/0/fill={\"cells\": 10.5}"}, {"/bodies/0/fill/cells", "whole number"});
   expect_refused({kBox, "/bodies/0/fill={\"cell\": 10}"}, {"/bodies/0/fill/cell", "did you mean \"cells\"?"});
   expect_refused({kBox, "/bodies/0/fill={}"}, {"/bodies/0/fill", "\"cells\" is missing"});
@@ -362,7 +367,8 @@ TEST(SceneSurface, Mistakes_AreTold) {
   expect_refused(R"(/bodies/0/surface={"from": "boundary", "coupling": "mls"})", {"/bodies/0/surface/coupling", "boundary"});
   expect_refused(R"(/bodies/0/surface={"mesh": "box.obj", "coupling": "msl"})", {"/bodies/0/surface/coupling", "did you mean \"mls\"?"});
   expect_refused(R"(/bodies/0/surface={"mesh": "box.obj", "support": 3})", {"/bodies/0/surface/support", "mls and thesis"});
-  expect_refused(R"(/bodies/0/surface={"mesh": "box.obj", "coupling": "mls", "support": 0})", {"/bodies/0/surface/support", "above 0"});
+  expect_refused(R"(/bodies/0/surface={"mesh": "box.obj", "coupling": "mls", "support": 0})", {"/bodies/0/surface/support", "from 0 (excluded) to 10"});
+  expect_refused(R"(/bodies/0/surface={"mesh": "box.obj", "coupling": "mls", "support": 11})", {"/bodies/0/surface/support", "to 10, found 11"});
   expect_refused(R"(/bodies/0/surface={"mseh": "box.obj"})", {"/bodies/0/surface/mseh", "did you mean \"mesh\"?"});
   expect_refused(R"(/bodies/0/surface={"from": "inside"})", {"/bodies/0/surface/from", "boundary"});
 }

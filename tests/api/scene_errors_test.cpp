@@ -151,8 +151,6 @@ TEST(SceneErrors, NotDelivered_IsNeverIgnored) {
       {"/contact/untangle=true", "/contact/untangle"},
       {"/contact/friction/0/between=[\"block:left\",\"*\"]", "/contact/friction/0/between/0"},
       {"/output/color=\"stress\"", "/output/color"},
-      {"/obstacles/0/shape=\"voxels\"", "/obstacles/0/shape"},
-      {"/obstacles/0/shape=\"mesh\"", "/obstacles/0/shape"},
       {"/bodies/0/springs=[{\"point\":[0,0,0]}]", "/bodies/0/springs"},
       {"/bodies/0/start={\"invert\":true}", "/bodies/0/start"},
       {"/bodies/0/switch=[{\"t\":1}]", "/bodies/0/switch"},

@@ -153,6 +153,21 @@ TEST(MsmAnisotropy, Force_IsMinusTheGradientOfTheEnergyOverDecades) {
       }
 }
 
+// A cell squeezed into one point: no stretch is left of springs across the axis, next to none of those that lean by rounding alone.
+TEST(MsmAnisotropy, EnergyOfFormA_WhereAllPointsMeet_IsThatJustBefore) {
+  for (Vec axis : {Vec{0, 0, 1}, Vec{1, 0, 0}, Vec{1e-17, 1, 0}, Vec{1, 2, -0.5}})
+    for (double slope : {1e-9, 1.0, 12.0}) {
+      Host host;
+      Instance b(host, regular_tet(), tilted(slope, axis, true));
+      const auto squeezed = [&](double to) {
+        for (uint32_t i = 0; i < 4; ++i) b.set(b.x, i, to * b.mesh.at(i));
+        return b.energy();
+      };
+      const double before = squeezed(1e-9);
+      EXPECT_NEAR(squeezed(0) / before, 1, 1e-7) << axis[0] << " " << axis[1] << " " << axis[2] << ", slope " << slope;
+    }
+}
+
 TEST(MsmAnisotropy, EnergyOfFormA_AgreesWithItsIntegralForAnyStretch) {
   Host host;
   for (double slope : {1e-4, 0.3, 3.0, 100.0}) {

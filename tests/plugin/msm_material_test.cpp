@@ -20,6 +20,30 @@ TEST(MsmMaterial, YoungField_ScalesTheSpringsOfItsCells) {
   }
 }
 
+// The weights by direction belong to the whole body, so what a part is made of depends on the rest; it stays within three times. Without that limit
+// the cube beside a sheet would be 133 times as stiff.
+TEST(MsmMaterial, ACubeBesideASheet_KeepsTheOrderOfItsStiffness) {
+  Host host;
+  const Mesh cube = kuhn_bar(3, 3, 3, 0.1);
+  Mesh both = kuhn_bar(20, 20, 1, 1);
+  for (uint32_t i = 0; i < both.npoint(); ++i) both.rest[3 * i + 2] *= 0.01;
+  const uint32_t first = both.npoint();
+  for (uint32_t i = 0; i < cube.npoint(); ++i) both.rest.insert(both.rest.end(), {cube.at(i)[0] + 50, cube.at(i)[1], cube.at(i)[2]});
+  for (uint32_t c : cube.cells) both.cells.push_back(first + c);
+  both.finish();
+  Instance alone(host, cube, {}), beside(host, both, {});
+  for (int k = 0; k < 3; ++k) {   // stretched along one axis
+    for (uint32_t i = 0; i < cube.npoint(); ++i) {
+      Vec a = cube.at(i), b = both.at(first + i);
+      a[k] *= 1.001, b[k] += 0.001 * cube.at(i)[k];
+      alone.set(alone.x, i, a), beside.set(beside.x, first + i, b);
+    }
+    const double ratio = beside.energy() / alone.energy();
+    EXPECT_GT(ratio, 1.0 / 3) << k;
+    EXPECT_LT(ratio, 3) << k;
+  }
+}
+
 TEST(MsmMaterial, UniformFields_AreTheParametersAndUnevenOnesAddUpByCell) {
   Host host;
   const Mesh mesh = kuhn_bar(6, 2, 2, 0.1, 0.2);

@@ -30,7 +30,7 @@ typedef struct dfm_tetmesh_info {
   double lo[3], hi[3];
   const char *warnings;                                    /* one sentence a line; valid while the mesh lives */
 } dfm_tetmesh_info;
-/** Counts, sizes and what reading repaired. Threads: Any thread. Since 0.1. */
+/** Counts, sizes and what reading repaired, as far as out->size goes. @return DFM_OK; DFM_E_ARG; DFM_E_HANDLE. Threads: Any thread. Since 0.1. */
 DFM_API dfm_status dfm_tetmesh_get_info(dfm_tetmesh mesh, dfm_tetmesh_info *out);
 /** Borrowed arrays, valid while the mesh lives: points [npoint,3], tets [ntet,4], file_point [npoint] 0-based place in the file.
  * Each out may be NULL. Threads: Any thread. Since 0.1. */
@@ -80,7 +80,7 @@ typedef struct dfm_trimesh_info {
   double lo[3], hi[3];
   const char *warnings;                                                              /* one sentence a line; valid while the mesh lives */
 } dfm_trimesh_info;
-/** Counts, sizes and what reading repaired. Threads: Any thread. Since 0.2. */
+/** Counts, sizes and what reading repaired, as far as out->size goes. @return DFM_OK; DFM_E_ARG; DFM_E_HANDLE. Threads: Any thread. Since 0.2. */
 DFM_API dfm_status dfm_trimesh_get_info(dfm_trimesh mesh, dfm_trimesh_info *out);
 /** Borrowed arrays, valid while the mesh lives: points [npoint,3], triangles [ntriangle,3] outward, file_point [npoint] 0-based place in the
  * file. Each out may be NULL. Threads: Any thread. Since 0.2. */
@@ -98,9 +98,11 @@ DFM_API dfm_status dfm_trimesh_write(dfm_trimesh mesh, const char *path);
  * @param surface  closed but for small holes; else DFM_E_FORMAT says how large the opening is
  * @param cells    wanted number of tetrahedra; the lattice offers one near it
  * @param out      cells that cover the inside; the surface lies within them. dfm_tetmesh_share tells how much of each is material
+ * @return DFM_OK; DFM_E_ARG cells below 1 or above 1e8; DFM_E_FORMAT; DFM_E_NOMEM; DFM_E_HANDLE
  * Threads: Any thread. Since 0.2. */
 DFM_API dfm_status dfm_tetmesh_fill(dfm_trimesh surface, uint32_t cells, dfm_tetmesh *out);
-/** Share of each cell that is material, [ntet], in (0,1]; NULL for a mesh that was not filled. Borrowed. Threads: Any thread. Since 0.2. */
+/** Share of each cell that is material, [ntet], in (0,1]; NULL for a mesh that was not filled. VTK and VTU files keep it. Borrowed.
+ * @return DFM_OK; DFM_E_HANDLE. Threads: Any thread. Since 0.2. */
 DFM_API dfm_status dfm_tetmesh_share(dfm_tetmesh mesh, const double **share);
 
 #ifdef __cplusplus

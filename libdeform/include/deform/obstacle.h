@@ -1,4 +1,4 @@
-/* deform/obstacle.h -- rigid things that the host moves and that feel nothing: plane, sphere, box, capsule. */
+/* deform/obstacle.h -- rigid things that the host moves and that feel nothing: plane, sphere, box, capsule, triangle mesh, voxel grid. */
 #ifndef DEFORM_OBSTACLE_H
 #define DEFORM_OBSTACLE_H
 #include "deform/base.h"
@@ -7,7 +7,8 @@
 #ifdef __cplusplus
 extern "C" {
 #endif
-enum { DFM_SHAPE_PLANE = 0, DFM_SHAPE_SPHERE = 1, DFM_SHAPE_BOX = 2, DFM_SHAPE_CAPSULE = 3 };
+enum { DFM_SHAPE_PLANE = 0, DFM_SHAPE_SPHERE = 1, DFM_SHAPE_BOX = 2, DFM_SHAPE_CAPSULE = 3,
+       DFM_SHAPE_MESH = 4, DFM_SHAPE_VOXELS = 5   /* since 0.2 */ };
 typedef struct dfm_obstacle_def {
   uint32_t size, shape;             /* DFM_SHAPE_* */
   const char *name;                 /* unique in the world */
@@ -22,6 +23,13 @@ typedef struct dfm_obstacle_def {
   dfm_material material;            /* for pair rules by material; 0: none */
   uint32_t category, collides_with;
   void *user;
+  /* Since 0.2. mesh, voxels: a triangle surface in the obstacle's frame; copied. Points of one place must be one point (dfm_trimesh_read and
+   * dfm_trimesh_create see to that). A mesh may be open: it acts on the side that its triangles face. Voxels need a closed one. */
+  uint32_t npoint, ntriangle;
+  const double *points;             /* [npoint,3] m */
+  const uint32_t *triangles;        /* [ntriangle,3] counter-clockwise seen from outside */
+  uint32_t cells;                   /* voxels: cubic cells that fill the surface's box, about; 0: 262144 (64 x 64 x 64 of a cube) */
+  uint32_t reserved2;
 } dfm_obstacle_def;
 /** A plane z = 0 that looks up, at rest, category 1, collides with all. Threads: Any thread. Since 0.1. */
 DFM_API dfm_obstacle_def dfm_obstacle_def_default(void);
@@ -31,7 +39,7 @@ DFM_API dfm_status dfm_obstacle_create(dfm_world world, const dfm_obstacle_def *
 DFM_API dfm_status dfm_obstacle_destroy(dfm_obstacle obstacle);
 /** Where it is now. Threads: Any thread. Not during step. Since 0.1. */
 DFM_API dfm_status dfm_obstacle_get_pose(dfm_obstacle obstacle, dfm_pose *out);
-/** Its def as created (name valid while it lives; keys are not returned). Threads: Any thread. Not during step. Since 0.1. */
+/** Its def as created (name, points and triangles valid while it lives; keys are not returned). Threads: Any thread. Not during step. Since 0.1. */
 DFM_API dfm_status dfm_obstacle_get_def(dfm_obstacle obstacle, dfm_obstacle_def *out);
 /** Pose at the end of the next step; its surface moves there at constant rate. Replaces keys. Threads: Not during step. Since 0.1. */
 DFM_API dfm_status dfm_obstacle_move_to(dfm_obstacle obstacle, const dfm_pose *pose);

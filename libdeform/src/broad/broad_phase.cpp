@@ -28,9 +28,9 @@ double obstacle_displacement(const ObstacleView &now, const ObstacleView &then, 
 
 // Shape, size and belt are an obstacle's own; a new one under an old id has other lists.
 bool same_shape(const ObstacleView &a, const ObstacleView &b) {
-  return a.shape == b.shape && a.slot == b.slot && a.category == b.category && a.collides_with == b.collides_with && a.radius == b.radius &&
-         a.half_length == b.half_length && a.half_size.x == b.half_size.x && a.half_size.y == b.half_size.y &&
-         a.half_size.z == b.half_size.z;
+  return a.shape == b.shape && a.surface == b.surface && a.grid == b.grid && a.slot == b.slot && a.category == b.category &&
+         a.collides_with == b.collides_with && a.radius == b.radius && a.half_length == b.half_length && a.half_size.x == b.half_size.x &&
+         a.half_size.y == b.half_size.y && a.half_size.z == b.half_size.z;
 }
 
 uint64_t features(uint32_t a, uint32_t b) { return uint64_t{a} << 32 | b; }
@@ -78,10 +78,7 @@ bool BroadPhase::update(std::span<const BodyView> bodies, std::span<const Obstac
     Thing &t = things_[o];
     // A plane's share is taken over the sphere around the bodies, which has just changed.
     if (!t.dirty && t.view.shape == Shape::plane) t.dirty = !holds(t, obstacles[o], h, offset);
-    if (!t.dirty) continue;
-    t.view = obstacles[o];
-    const double extent = t.view.shape == Shape::plane ? norm(center_ - t.view.position) + radius_ : ObstacleShape(t.view).extent();
-    t.margin = kRounding * reach_share(h, offset, (kSpeedGrowth + 0.5 * skin_steps_) * obstacle_speed(t.view, extent)) + offset;
+    if (t.dirty) renew_thing(t, obstacles[o], h, offset);
   }
   find_pairs(bodies, obstacles, filter);
   assemble();
@@ -110,7 +107,13 @@ void BroadPhase::match(std::span<const BodyView> bodies, std::span<const Obstacl
     b.x.resize(v.surface->x.size());
   }
   things_.reserve(obstacles.size());
-  for (const ObstacleView &v : obstacles) things_.push_back({v, -1, true});
+  for (const ObstacleView &v : obstacles) {
+    Thing &t = things_.emplace_back(memory_);
+    t.view = v;
+    if (v.shape != Shape::mesh) continue;
+    t.surface = v.surface;
+    t.x.resize(v.surface->x.size());
+  }
 }
 
 bool BroadPhase::find_dirty(std::span<const BodyView> bodies, std::span<const ObstacleView> obstacles, double h, double offset) {
@@ -147,20 +150,34 @@ bool BroadPhase::holds(const Thing &thing, const ObstacleView &now, double h, do
   return kRounding * (moved + reach_share(h, offset, obstacle_speed(now, extent))) <= thing.margin;
 }
 
-// The skin lasts for skin_steps_ of the present motion, a function of the state alone.
-void BroadPhase::renew_body(Body &body, double h, double offset) {
-  const Surface &s = *body.surface;
-  body.usable = s.ntri > 0 && finite_positions(s);
-  if (!body.usable) return;
-  std::copy(s.x.begin(), s.x.end(), body.x.begin());
-  if (!body.tree.empty()) {
-    body.tree.refit(s, body.x.data());
+// Brings the side's copy and tree up to date with its surface; false where that is not finite.
+bool BroadPhase::renew_tree(Side &side) {
+  const Surface &s = *side.surface;
+  side.usable = s.ntri > 0 && finite_positions(s);
+  if (!side.usable) return false;
+  std::copy(s.x.begin(), s.x.end(), side.x.begin());
+  if (!side.tree.empty()) {
+    side.tree.refit(s, side.x.data());
     ++stats_.refits;
   }
-  if (body.tree.empty() || body.tree.quality() > kQualityLimit) {
-    body.tree.build(s, body.x.data());
+  if (side.tree.empty() || side.tree.quality() > kQualityLimit) {
+    side.tree.build(s, side.x.data());
     ++stats_.rebuilds;
   }
+  return true;
+}
+
+void BroadPhase::renew_thing(Thing &t, const ObstacleView &now, double h, double offset) {
+  t.view = now;
+  if (t.surface) renew_tree(t);
+  const double extent = now.shape == Shape::plane ? norm(center_ - now.position) + radius_ : ObstacleShape(now).extent();
+  t.margin = kRounding * reach_share(h, offset, (kSpeedGrowth + 0.5 * skin_steps_) * obstacle_speed(now, extent)) + offset;
+}
+
+// The skin lasts for skin_steps_ of the present motion, a function of the state alone.
+void BroadPhase::renew_body(Body &body, double h, double offset) {
+  if (!renew_tree(body)) return;
+  const Surface &s = *body.surface;
   const double speed = largest_speed(s);
   const double skin = std::clamp(skin_steps_ * h * speed, kSkinLeast * s.median_edge, kSkinMost * s.median_edge);
   body.margin = kRounding * reach_share(h, offset, kSpeedGrowth * speed) + skin;
@@ -202,16 +219,16 @@ void BroadPhase::find_pairs(std::span<const BodyView> bodies, std::span<const Ob
         list_bodies(order_[ordered ? p : q], order_[ordered ? q : p]);
       }
     for (uint32_t o = 0; o < things_.size(); ++o)
-      if ((a.dirty || things_[o].dirty) && filter.may_touch(bodies[order_[p]], obstacles[o])) list_obstacle(order_[p], o);
+      if ((a.dirty || things_[o].dirty) && filter.may_touch(bodies[order_[p]], obstacles[o])) list_thing(order_[p], o);
   }
 }
 
-void BroadPhase::list_bodies(uint32_t i, uint32_t j) {
-  const Body &a = bodies_[i], &b = bodies_[j];
+// Into vf_, ee_ and fv_; false where the two are too far apart for any.
+bool BroadPhase::list_surfaces(const Side &a, const Side &b) {
   const Features fa{*a.surface, a.x.data()}, fb{*b.surface, b.x.data()};
   const double near = kRounding * (a.margin + b.margin), edges = near + edge_recovery_depth(*a.surface, *b.surface), edges2 = edges * edges;
   const double deep_a = near + recovery_depth(*a.surface), deep_b = near + recovery_depth(*b.surface), wide = std::max(deep_a, deep_b);
-  if (!(box_distance2(a.tree.root(), b.tree.root()) <= wide * wide)) return;
+  if (!(box_distance2(a.tree.root(), b.tree.root()) <= wide * wide)) return false;
   vf_.clear();
   fv_.clear();
   ee_.clear();
@@ -234,9 +251,51 @@ void BroadPhase::list_bodies(uint32_t i, uint32_t j) {
             segments_within(fa.corner(s, k), fa.corner(s, (k + 1) % 3), fb.corner(t, l), fb.corner(t, (l + 1) % 3), edges))
           ee_.push_back(features(fa.surface.tri_edge[3 * size_t{s} + k], fb.surface.tri_edge[3 * size_t{t} + l]));
   });
+  return true;
+}
+
+void BroadPhase::list_bodies(uint32_t i, uint32_t j) {
+  if (!list_surfaces(bodies_[i], bodies_[j])) return;
   add_segment(i, j, false, 0, vf_);
   add_segment(i, j, false, 1, ee_);
   add_segment(j, i, false, 0, fv_);
+}
+
+void BroadPhase::list_mesh(uint32_t i, uint32_t o) {
+  if (!things_[o].usable || !list_surfaces(bodies_[i], things_[o])) return;
+  add_segment(i, o, true, 0, vf_);
+  add_segment(i, o, true, 1, ee_);
+  add_segment(i, o, true, 2, fv_);
+}
+
+void BroadPhase::list_voxels(uint32_t i, uint32_t o) {
+  const Body &a = bodies_[i];
+  const ObstacleShape shape(things_[o].view);
+  const Features fa{*a.surface, a.x.data()};
+  const double near = kRounding * (a.margin + things_[o].margin);
+  Box bounds{{0, 0, 0, 0}, {0, 0, 0, 0}};
+  shape.bounds(bounds.lo, bounds.hi);
+  vf_.clear();
+  fv_.clear();
+  near_triangles(a.tree, stack_, [&](const Box &b) { return box_distance2(b, bounds) <= near * near; }, [&](uint32_t t) {
+    const Vec3 x[3] = {fa.corner(t, 0), fa.corner(t, 1), fa.corner(t, 2)}, centre = (1.0 / 3) * (x[0] + x[1] + x[2]);
+    double size2 = 0;
+    for (int k = 0; k < 3; ++k) {
+      if (fa.surface.tri_owns[t] >> k & 1 && shape.voxels_near(x[k], near)) vf_.push_back(uint64_t{fa.surface.tri[3 * size_t{t} + k]} << 32);
+      size2 = std::max(size2, norm2(x[k] - centre));
+    }
+    if (shape.voxels_near(centre, near + std::sqrt(size2))) fv_.push_back(uint64_t{t} << 32);
+  });
+  add_segment(i, o, true, 0, vf_);
+  add_segment(i, o, true, 2, fv_);
+}
+
+void BroadPhase::list_thing(uint32_t i, uint32_t o) {
+  switch (things_[o].view.shape) {
+    case Shape::mesh: return list_mesh(i, o);
+    case Shape::voxels: return list_voxels(i, o);
+    default: return list_obstacle(i, o);
+  }
 }
 
 // Edges and triangles count only where a surfel alone would let the obstacle through: edges at a round shape or at a box's edges,

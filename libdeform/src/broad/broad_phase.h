@@ -42,21 +42,23 @@ class BroadPhase {
   const Stats &stats() const { return stats_; }
 
  private:
-  struct Body {
-    uint64_t id = 0;
+  struct Side {             // a surface in lists
     const Surface *surface = nullptr;
-    uint32_t slot = 0, category = 0, collides_with = 0;
     double margin = -1;     // negative: no lists yet
     bool dirty = true, usable = false;  // usable: all positions finite
     bool asleep = false;    // at the last update: nothing has moved if it still is
     BoxTree tree;
     Array<double> x;        // [nsurfel,4] when the lists were made
-    explicit Body(const Memory &m) : tree(m), x(HookAllocator<double>(m)) {}
+    explicit Side(const Memory &m) : tree(m), x(HookAllocator<double>(m)) {}
   };
-  struct Thing {            // an obstacle
+  struct Body : Side {
+    uint64_t id = 0;
+    uint32_t slot = 0, category = 0, collides_with = 0;
+    using Side::Side;
+  };
+  struct Thing : Side {     // an obstacle; surface and tree of a mesh only
     ObstacleView view{};    // when the lists were made
-    double margin = -1;
-    bool dirty = true;
+    using Side::Side;
   };
   struct Segment {          // a run of candidates of one pair and one kind
     uint64_t id_a, id_b;
@@ -69,11 +71,17 @@ class BroadPhase {
   void match(std::span<const BodyView> bodies, std::span<const ObstacleView> obstacles, const PairFilter &filter);
   bool find_dirty(std::span<const BodyView> bodies, std::span<const ObstacleView> obstacles, double h, double offset);
   bool holds(const Thing &thing, const ObstacleView &now, double h, double offset) const;
+  bool renew_tree(Side &side);
   void renew_body(Body &body, double h, double offset);
+  void renew_thing(Thing &thing, const ObstacleView &now, double h, double offset);
   void bound_bodies();
   void find_pairs(std::span<const BodyView> bodies, std::span<const ObstacleView> obstacles, const PairFilter &filter);
+  bool list_surfaces(const Side &a, const Side &b);
   void list_bodies(uint32_t i, uint32_t j);
+  void list_mesh(uint32_t i, uint32_t o);
+  void list_voxels(uint32_t i, uint32_t o);
   void list_obstacle(uint32_t i, uint32_t o);
+  void list_thing(uint32_t i, uint32_t o);
   void add_segment(uint32_t a, uint32_t b, bool obstacle, uint8_t kind, Array<uint64_t> &found);
   void assemble();
 

@@ -114,6 +114,12 @@ void sort_groups(RawMesh &raw, TetMesh &mesh) {
   for (uint32_t &g : mesh.tri_group) g = place[g];
 }
 
+// Shares count where there is one for each cell, all in (0,1]: another array of that name means something else.
+void take_shares(RawMesh &raw, TetMesh &mesh) {
+  const bool sound = raw.tet_share.size() == raw.ntet() && std::all_of(raw.tet_share.begin(), raw.tet_share.end(), [](double s) { return s > 0 && s <= 1; });
+  if (sound) mesh.share = std::move(raw.tet_share);
+}
+
 uint32_t count_overlaps(const TetMesh &mesh, uint32_t *crowded) {
   const Array<TetFace> faces = sorted_faces(*mesh.memory, mesh.ntet(), mesh.tets.data());
   uint32_t same_side = 0;
@@ -186,9 +192,11 @@ uint32_t drop_duplicate_cells(RawMesh &raw, Array<uint32_t> *file_cell) {
   for (uint32_t t = 0; t < ntet; ++t)
     if (!drop[t]) {
       std::copy_n(&raw.tets[4 * size_t(t)], 4, &raw.tets[4 * kept]);
+      if (raw.tet_share.size() == ntet) raw.tet_share[kept] = raw.tet_share[t];
       raw.tet_group[kept++] = raw.tet_group[t];
       if (file_cell) file_cell->push_back(t);
     }
+  if (raw.tet_share.size() == ntet) raw.tet_share.resize(kept);
   raw.tets.resize(4 * kept), raw.tet_group.resize(kept);
   return dropped;
 }
@@ -210,6 +218,7 @@ TetMesh finish_mesh(const std::string &path, RawMesh &&raw) {
   refuse_flat(path, raw);
   turn_negative(raw, mesh);
   mesh.dropped_cells = drop_duplicate_cells(raw, &mesh.file_cell);
+  take_shares(raw, mesh);
   renumber(raw, mesh);
   sort_groups(raw, mesh);
   mesh.points = std::move(raw.points), mesh.tets = std::move(raw.tets), mesh.tet_group = std::move(raw.tet_group);

@@ -14,11 +14,12 @@ namespace dfm {
 struct RawMesh {
   explicit RawMesh(const Memory &m)
       : memory(&m), points(HookAllocator<double>(m)), tets(HookAllocator<uint32_t>(m)), tet_group(HookAllocator<uint32_t>(m)),
-        tris(HookAllocator<uint32_t>(m)), tri_group(HookAllocator<uint32_t>(m)) {}
+        tet_share(HookAllocator<double>(m)), tris(HookAllocator<uint32_t>(m)), tri_group(HookAllocator<uint32_t>(m)) {}
   const Memory *memory;
   Array<double> points;
   Array<uint32_t> tets;        // 0-based positions of points in the file
   Array<uint32_t> tet_group;   // index into groups
+  Array<double> tet_share;     // how much of each is material, where the file says so of all; else of no use (finish_mesh decides)
   Array<uint32_t> tris;        // polygons are cut into triangles by the readers
   Array<uint32_t> tri_group;   // index into groups, kNoGroup without
   std::vector<MeshGroup> groups;  // points: of elements below dimension 3 only, in file order, with repeats

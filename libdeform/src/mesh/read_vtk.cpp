@@ -1,6 +1,6 @@
 // Legacy VTK files 2.0 to 5.1, UNSTRUCTURED_GRID and POLYDATA, ASCII and binary (always big-endian). A line of header, a title, ASCII or
 // BINARY, then sections by keyword. Cells come as "k i1 .. ik" rows (to 4.x) or, from 5.0 on, as OFFSETS and CONNECTIVITY arrays. Of the
-// attributes behind them only an array that numbers groups is kept.
+// attributes behind them only an array that numbers groups and one of shares are kept.
 #include <algorithm>
 #include <bit>
 #include <cctype>
@@ -29,7 +29,7 @@ class VtkReader {
  public:
   VtkReader(Cursor &in, RawMesh &out)
       : in_(in), out_(out), sink_(out), cells_(HookAllocator<uint32_t>(*out.memory)), start_(HookAllocator<uint32_t>(*out.memory)),
-        types_(HookAllocator<uint8_t>(*out.memory)), labels_(HookAllocator<int32_t>(*out.memory)) {}
+        types_(HookAllocator<uint8_t>(*out.memory)), labels_(HookAllocator<int32_t>(*out.memory)), shares_(HookAllocator<double>(*out.memory)) {}
 
   void run() {
     header();
@@ -223,12 +223,14 @@ class VtkReader {
     if (labels_.size() != types_.size()) labels_.clear();
     for (size_t c = 0; c < types_.size(); ++c)
       sink_.add(in_, types_[c], cells_.data() + start_[c], start_[c + 1] - start_[c], labels_.empty() ? 0 : labels_[c]);
+    for (size_t c = 0; shares_.size() == types_.size() && c < types_.size(); ++c)
+      if (types_[c] == 10) out_.tet_share.push_back(shares_[c]);
     sink_.finish(in_);
     sink_.name_groups(group_numbers_, group_names_);
   }
 
   // "name type [components]", "LOOKUP_TABLE name", or "name components tuples type" in a FIELD; then the values. Attributes are passed over but
-  // for the one over the cells that numbers groups. What comes behind an unknown keyword is left unread.
+  // for those over the cells that number groups and hold shares. What comes behind an unknown keyword is left unread.
   void read_attributes(bool of_cells) {
     int64_t n = in_.integer("the number of tuples");
     for (;;) {
@@ -274,6 +276,13 @@ class VtkReader {
   }
 
   void keep_or_skip(bool candidate, std::string_view name, Number type, int64_t n) {
+    if (candidate && shares_.empty() && vtk_names_share(name, type)) {
+      begin_data("an array's type");
+      const uint64_t m = count(n, 1, type, "shares");
+      shares_.reserve(m);
+      for (uint64_t i = 0; i < m; ++i) shares_.push_back(real(type, "a cell's share"));
+      return;
+    }
     if (!candidate || !vtk_whole(type) || !labels_.empty() || !vtk_names_groups(name)) return skip_values(type, n);
     begin_data("an array's type");
     const uint64_t m = count(n, 1, type, "numbers of groups");
@@ -356,6 +365,7 @@ class VtkReader {
   Array<uint32_t> cells_, start_;  // corners end to end; first corner of each cell, and the end
   Array<uint8_t> types_;
   Array<int32_t> labels_;          // the file's number of each cell's group, where it has an array of them
+  Array<double> shares_;           // of each cell, where it has these
   std::vector<int64_t> group_numbers_;  // dimension and number of each named group
   std::vector<std::string> group_names_;
 };

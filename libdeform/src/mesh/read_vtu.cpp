@@ -1,5 +1,5 @@
 // VTU and VTP: the XML files of VTK. Pieces follow one another in one mesh; each holds points, cells (offsets, connectivity and, of
-// UnstructuredGrid, types) and data, of which only an array over the cells that numbers groups is kept.
+// UnstructuredGrid, types) and data, of which only an array over the cells that numbers groups and one of shares are kept.
 #include <algorithm>
 #include <bit>
 
@@ -14,7 +14,7 @@ struct Piece {
   uint64_t npoint = 0;
   uint64_t ncell[4] = {};       // UnstructuredGrid: the first alone; PolyData: vertices, lines, polygons, strips
   CellList cells[4];
-  VtuPlace points, group;
+  VtuPlace points, group, share;
 };
 
 class VtuReader {
@@ -111,6 +111,7 @@ class VtuReader {
     if (section == "Points") piece.points = std::move(place);
     else if (section == "CellData") {
       if (!piece.group.given && place.components == 1 && vtk_whole(place.type) && vtk_names_groups(place.name)) piece.group = std::move(place);
+      else if (!piece.share.given && place.components == 1 && vtk_names_share(place.name, place.type)) piece.share = std::move(place);
     } else {
       int list = polydata_ ? -1 : section == "Cells" ? 0 : -1;
       for (int k = 0; polydata_ && k < 4; ++k)
@@ -150,13 +151,14 @@ class VtuReader {
       total += n;
     }
     if (total == 0) return;
-    std::optional<VtuNumbers> group;
+    std::optional<VtuNumbers> group, share;
     if (piece.group.given) group.emplace(numbers(piece.group, total, "groups of cells", true));
+    if (piece.share.given && !polydata_) share.emplace(numbers(piece.share, total, "shares of cells", false));
     for (int k = 0; k < 4; ++k)
-      if (piece.ncell[k]) read_list(piece.cells[k], piece.ncell[k], base, polydata_ ? kinds[k] : 0, group);
+      if (piece.ncell[k]) read_list(piece.cells[k], piece.ncell[k], base, polydata_ ? kinds[k] : 0, group, share);
   }
 
-  void read_list(const CellList &list, uint64_t n, uint32_t base, uint8_t kind, std::optional<VtuNumbers> &group) {
+  void read_list(const CellList &list, uint64_t n, uint32_t base, uint8_t kind, std::optional<VtuNumbers> &group, std::optional<VtuNumbers> &share) {
     VtuNumbers offsets = numbers(list.offsets, n, "offsets of cells", true), connectivity = numbers(list.connectivity, 0, "connectivity", true);
     std::optional<VtuNumbers> types;
     if (kind == 0) {
@@ -181,6 +183,8 @@ class VtuReader {
       if (type < 0 || type > 255) types->in.refuse("cell type %lld; expected 0 to 82 (10 is a tetrahedron)", ll(type));
       const int64_t label = group ? vtk_integer(group->in, group->type, "a cell's group") : 0;
       sink_.add(in_, static_cast<uint8_t>(type), corners_.data(), corners_.size(), label);
+      const double part = share ? vtk_real(share->in, share->type, "a cell's share") : 1;
+      if (share && type == 10) out_.tet_share.push_back(part);
     }
   }
 

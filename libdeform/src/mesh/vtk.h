@@ -20,6 +20,9 @@ std::string vtk_lower(std::string_view text);  // its first 64 characters
 // Arrays over the cells that are taken for numbers of groups: ours and those of gmsh, meshio, medit and common meshers.
 bool vtk_names_groups(std::string_view array);
 inline constexpr const char *kVtkGroup = "group", *kVtkGroupNumber = "group_number", *kVtkGroupName = "group_name";
+// Real numbers over the cells by this name are the shares of a filled surface, as our writer leaves them.
+inline constexpr const char *kVtkShare = "share";
+inline bool vtk_names_share(std::string_view array, VtkNumber type) { return array == kVtkShare && (type == VtkNumber::f32 || type == VtkNumber::f64); }
 
 // Takes cells one by one: keeps tetrahedra and straight faces (cut into triangles), passes over points and lines, refuses other volume cells:
 // a body must not lose parts in silence.

@@ -5,9 +5,11 @@
 #include <span>
 
 #include "surfel/contact_set.h"
+#include "surfel/convex.h"
 #include "surfel/obstacle_shape.h"
 #include "surfel/reach.h"
 #include "surfel/views.h"
+#include "surfel/voxel_grid.h"
 
 namespace dfm::narrow {
 
@@ -15,8 +17,6 @@ using Run = std::span<const Candidate>;
 
 // Cosines and sines of directions, dimensionless.
 constexpr double kFlat = 1e-3;        // slack of the cones of normals against the edges of a box
-constexpr double kConvex = 2e-5;     // the same for an edge to take part against another edge: such an edge rises over its faces' corners by at most
-                                      // kConvex / 4 of its length, 0.005 of the default d_c, so that nothing is felt when it comes or goes
 constexpr double kCone = 0.035;       // 2 degrees: slack of an edge's cone of normals, so that contacts do not flicker at its border
 constexpr double kParallel = 1e-3;    // sine between two edges below which vertex-face contacts stand for them
 constexpr double kPast = 0.25;        // share of an edge by which it may count as longer for what slides in over its ends
@@ -80,6 +80,13 @@ void edge_edge(const Pair &pair, Run run, Array<ContactPoint> &out);
 void surfel_obstacle(const Pair &pair, Run run, Array<ContactPoint> &out);
 void edge_obstacle(const Pair &pair, Run run, Array<ContactPoint> &out);
 void triangle_obstacle(const Pair &pair, Run run, Array<ContactPoint> &out);
+void voxel_triangle(const Pair &pair, Run run, Array<ContactPoint> &out);
+// A contact on `q` of the body (nodes and weights already set), on `o` of the obstacle.
+void finish(const Pair &pair, ContactPoint &c, Vec3 q, Vec3 o, Vec3 normal, double distance, uint32_t patch, Array<ContactPoint> &out);
+// Of these surfels against the obstacle's surface at o.
+double reach_of(const Pair &pair, std::span<const uint32_t> nodes, Vec3 o);
+// A body against a mesh that has no dofs: pair.b is the mesh, and its nodes lie beyond those of all bodies.
+void mesh_obstacle(const Pair &pair, const ObstacleView &view, uint8_t kind, Run run, Array<ContactPoint> &out);
 // The faces beside an edge and their cone of normals: a unit direction that is orthogonal to the edge lies in it if it leans to neither
 // face by more than `slack` (sine).
 struct EdgeFaces {
@@ -89,8 +96,6 @@ struct EdgeFaces {
   bool leans_out(Vec3 n, double slack) const { return dot(n, inward[0]) <= slack && dot(n, inward[1]) <= slack; }
 };
 EdgeFaces edge_faces(const Surface &surface, uint32_t edge);
-// The same judgement of convexity for a fraction of the cost: most edges stop here.
-bool edge_convex(const Surface &surface, uint32_t edge, double ahead = 0);   // at the positions x + ahead v
 bool edge_becomes_convex(const Surface &surface, uint32_t edge, double h);
 
 }  // namespace dfm::narrow

@@ -113,6 +113,8 @@ class Areas {
 void find_contacts(std::span<const BodyView> bodies, std::span<const ObstacleView> obstacles, const Array<Candidate> &candidates, double h,
                    double offset, Array<uint8_t> &lent, Array<ContactPoint> &out) {
   out.clear();
+  uint32_t nnode = 0;
+  for (const BodyView &b : bodies) nnode = std::max(nnode, b.first_node + b.surface->nsurfel);
   const BodyView *fast = nullptr;
   double speed = 0;
   for (size_t i = 0; i < candidates.size();) {
@@ -126,9 +128,16 @@ void find_contacts(std::span<const BodyView> bodies, std::span<const ObstacleVie
     const BodyView &a = *find_slot(bodies, c.slot_a);
     if (a.asleep && !(c.obstacle ? find_slot(obstacles, c.slot_b)->moves() : !find_slot(bodies, c.slot_b)->asleep)) continue;
     if (c.obstacle) {
-      const ObstacleShape shape(*find_slot(obstacles, c.slot_b));
+      const ObstacleView &view = *find_slot(obstacles, c.slot_b);
+      if (view.shape == Shape::mesh) {
+        const BodyView mesh{view.slot, nnode, view.category, view.collides_with, view.id, view.surface};
+        narrow::mesh_obstacle({a, &mesh, nullptr, h, offset, norm(view.velocity) + norm(view.spin) * view.extent}, view, c.kind, run, out);
+        continue;
+      }
+      const ObstacleShape shape(view);
       const narrow::Pair pair{a, nullptr, &shape, h, offset, 0};
-      (c.kind == 0 ? narrow::surfel_obstacle : c.kind == 1 ? narrow::edge_obstacle : narrow::triangle_obstacle)(pair, run, out);
+      const auto triangle = view.shape == Shape::voxels ? narrow::voxel_triangle : narrow::triangle_obstacle;
+      (c.kind == 0 ? narrow::surfel_obstacle : c.kind == 1 ? narrow::edge_obstacle : triangle)(pair, run, out);
       continue;
     }
     const BodyView *b = find_slot(bodies, c.slot_b);

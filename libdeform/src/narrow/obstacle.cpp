@@ -8,9 +8,7 @@
 #include "surfel/closest.h"
 
 namespace dfm::narrow {
-namespace {
 
-// A contact on `q` of the body (nodes and weights already set), on `o` of the obstacle.
 void finish(const Pair &pair, ContactPoint &c, Vec3 q, Vec3 o, Vec3 normal, double distance, uint32_t patch, Array<ContactPoint> &out) {
   place(c, q, o, normal, distance);
   // A belt slips along its surface; it never pushes what lies beside it.
@@ -26,6 +24,8 @@ double reach_of(const Pair &pair, std::span<const uint32_t> nodes, Vec3 o) {
   for (const uint32_t s : nodes) speed2 = std::max(speed2, norm2(pair.va(s) - v));
   return contact_reach(pair.h, pair.offset, std::sqrt(speed2));
 }
+
+namespace {
 
 // One edge of the body with what it needs against a shape; the faces beside it are found when first asked for.
 struct Edge {

@@ -51,6 +51,7 @@ struct Group {
   bool has_feature(const Near &other, const Near &of) const;
   bool local_minimum(const Near &n) const;
   Vec3 outward(const Near &n) const;
+  bool beyond_rim(const Near &n) const;
   bool repeated(const Near &n, Vec3 normal) const;
   uint32_t steepest(const Near &n) const;
   bool plane_weights(const Near &n, double weight[3]) const;
@@ -164,6 +165,22 @@ Vec3 Group::outward(const Near &n) const {
   return sum;
 }
 
+// Is p beside an open surface, where there is no inside?
+bool Group::beyond_rim(const Near &n) const {
+  const Surface &s = *pair.b->surface;
+  const auto open = [&](uint32_t edge) { return s.edge_tri[2 * size_t{edge}] == kNone || s.edge_tri[2 * size_t{edge} + 1] == kNone; };
+  const int f = int(n.feature);
+  if (f == 0) return false;
+  if (f < 4) return open(s.tri_edge[3 * size_t{n.tri} + f - 1]);
+  const uint32_t corner = corners(n)[f - 4];
+  for (uint32_t k = s.fan_begin[corner]; k < s.fan_begin[corner + 1]; ++k)
+    for (int i = 0; i < 3; ++i) {
+      const uint32_t *c = &s.tri[3 * size_t{s.fan[k]}];
+      if ((c[i] == corner || c[(i + 1) % 3] == corner) && open(s.tri_edge[3 * size_t{s.fan[k]} + i])) return true;
+    }
+  return false;
+}
+
 // Was the same closest point made a contact from another triangle, with the same normal?
 bool Group::repeated(const Near &n, Vec3 normal) const {
   const double tiny = 1e-9 * pair.b->surface->median_edge, same = 1e-8 * n.distance * n.distance + tiny * tiny;
@@ -236,7 +253,7 @@ void Group::emit(Near &n, Vec3 normal, double distance, const double weight[3], 
 void Group::resolve(Array<ContactPoint> &out) {
   const Near &best = near[nearest()];
   const double tiny = 1e-9 * pair.b->surface->median_edge;
-  const bool inside = dot(outward(best), p - best.q) < 0;
+  const bool inside = dot(outward(best), p - best.q) < 0 && !beyond_rim(best);
   uint32_t deepest = kNone;                // of the faces that p is behind, the one it is least deep below
   double weight[3];
   for (uint32_t i = 0; i < count; ++i) {

@@ -202,6 +202,8 @@ class Builder {
     o.def.nkey = uint32_t(o.keys.size());
     o.def.keys = o.keys.data();
     o.def.material = material(o.material);
+    std::vector<double> points;
+    if (!o.mesh.empty()) files_.load(o, points);
     dfm_obstacle obstacle = 0;
     check(dfm_obstacle_create(world_, &o.def, &obstacle), o.pointer);
   }

@@ -72,7 +72,8 @@ struct Body {
 };
 
 struct Obstacle {
-  std::string pointer, name, material;
+  std::string pointer, name, material, mesh;
+  double scale = 1;  // of the mesh
   dfm_obstacle_def def = {};
   std::vector<dfm_pose_key> keys;
 };

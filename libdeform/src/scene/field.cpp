@@ -2,7 +2,6 @@
 // of its number from 0 in any order.
 #include <algorithm>
 #include <cmath>
-#include <fstream>
 
 #include "core/error.h"
 #include "scene/select.h"
@@ -38,8 +37,7 @@ void make_unit(double *v) {
 std::vector<double> read_field(const std::string &path, const FieldFile &field, const BodyMesh &mesh) {
   const std::string plain = columns_of(field.width), numbered = "cell," + plain;
   const std::string expected = plain + " or " + numbered;
-  std::ifstream in(path);
-  if (!in) fail(DFM_E_IO, "%s: cannot be opened; expected a table with the header %s", path.c_str(), expected.c_str());
+  std::ifstream in = open_table(path, "with the header " + expected);
   std::string text, header;
   if (std::getline(in, text)) header = tidy(text);
   if (field.width == 1 && header == field.key) header = plain;

@@ -118,4 +118,18 @@ BodyMesh MeshFiles::load(const Body &b) {
   return out;
 }
 
+void MeshFiles::load(Obstacle &o, std::vector<double> &points) {
+  const std::string pointer = o.pointer + "/mesh";
+  const dfm_trimesh mesh = surface(path_of(o.mesh), pointer);
+  dfm_trimesh_info info = {};
+  info.size = sizeof info;
+  check(dfm_trimesh_get_info(mesh, &info), pointer);
+  check(dfm_trimesh_data(mesh, &o.def.points, &o.def.triangles, nullptr), pointer);
+  o.def.npoint = info.npoint, o.def.ntriangle = info.ntriangle;
+  if (o.scale == 1) return;
+  points.assign(o.def.points, o.def.points + 3 * size_t(info.npoint));
+  for (double &x : points) x *= o.scale;
+  o.def.points = points.data();
+}
+
 }  // namespace dfm::scene

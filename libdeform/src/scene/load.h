@@ -20,6 +20,8 @@ class MeshFiles {
   std::string path_of(const std::string &path) const;  // relative to the scene file
   // Cells, skin and groups of a body, scaled. Borrows from this object.
   BodyMesh load(const Body &body);
+  // Triangles of an obstacle of shape mesh or voxels into its def. `points` takes those that are scaled; the rest is borrowed from this object.
+  void load(Obstacle &obstacle, std::vector<double> &points);
 
  private:
   void check(dfm_status status, const std::string &pointer) const;

@@ -1,6 +1,5 @@
 // Boundary conditions node by node: node,fixx,fixy,fixz,fx,fy,fz with the mesh file's node numbers from 0.
 #include <cmath>
-#include <fstream>
 
 #include "core/error.h"
 #include "scene/select.h"
@@ -14,8 +13,7 @@ constexpr const char *kHeader = "node,fixx,fixy,fixz,fx,fy,fz";
 }  // namespace
 
 std::vector<NodalRow> read_nodal(const std::string &path, const BodyMesh &mesh) {
-  std::ifstream in(path);
-  if (!in) fail(DFM_E_IO, "%s: cannot be opened; expected a table %s", path.c_str(), kHeader);
+  std::ifstream in = open_table(path, std::string("with the header ") + kHeader);
   uint32_t highest = 0;
   for (uint32_t i = 0; i < mesh.npoint; ++i) highest = std::max(highest, mesh.file_point[i]);
   std::vector<uint32_t> point_of(size_t(highest) + 1, UINT32_MAX);

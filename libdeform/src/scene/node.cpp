@@ -19,7 +19,7 @@ std::string excerpt(const json &value) {
 std::string span(const Range &r) {
   if (r.lo <= -1e300 && r.hi >= 1e300) return "a finite number";
   if (r.hi >= 1e300) return format("a number %s %g", r.open_lo ? "above" : "of at least", r.lo);
-  return format("a number from %g%s to %g%s", r.lo, r.open_lo ? " (excluded)" : "", r.hi, r.open_hi ? " (excluded)" : "");
+  return format("a number from %.9g%s to %.9g%s", r.lo, r.open_lo ? " (excluded)" : "", r.hi, r.open_hi ? " (excluded)" : "");
 }
 
 std::vector<std::string> delivered(const std::vector<Key> &keys) {
@@ -52,7 +52,7 @@ void Node::fail(const char *text, ...) const {
 
 void Node::not_yet() const { dfm::fail(DFM_E_UNSUPPORTED, "%s: not available yet: %s", file_->c_str(), pointer_.c_str()); }
 
-std::string Node::kind_found() const { return std::string(value_->type_name()) + " " + excerpt(*value_); }
+std::string Node::kind_found() const { return value_->is_null() ? "null" : std::string(value_->type_name()) + " " + excerpt(*value_); }
 
 void Node::object(const std::string &kind, const std::vector<std::string> &further) const {
   if (!value_->is_object()) fail("expected an object, found %s", kind_found().c_str());

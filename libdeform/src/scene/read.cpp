@@ -89,7 +89,8 @@ static double enum_value(const Node &value, const char *const *names) {
 
 std::vector<double> read_param(const Node &value, const dfm_param &p) {
   if (value.value().is_string()) {
-    if (!(p.flags & DFM_PARAM_ENUM) || !p.names) value.fail("expected a number in %s", p.unit && *p.unit ? p.unit : "1");
+    const std::string unit = p.unit && std::string(p.unit) != "1" ? p.unit : "";
+    if (!(p.flags & DFM_PARAM_ENUM) || !p.names) value.fail("expected a number%s%s, found \"%s\"", unit.empty() ? "" : " in ", unit.c_str(), value.text().c_str());
     return {enum_value(value, p.names)};
   }
   std::vector<double> out;

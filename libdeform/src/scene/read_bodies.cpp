@@ -1,4 +1,5 @@
 #include <algorithm>
+#include <cmath>
 
 #include "scene/read.h"
 #include "scene/rotation.h"
@@ -144,13 +145,14 @@ Body read_body(const Node &node, ReadContext &context) {
 // Which of the keys that place or size a shape belong to it.
 void check_shape_keys(const Node &node, const std::string &shape) {
   const std::vector<std::pair<std::string, std::vector<std::string>>> wanted = {
-      {"plane", {"point", "normal"}}, {"sphere", {"radius"}}, {"box", {"half_size"}}, {"capsule", {"radius", "half_length"}}};
+      {"plane", {"point", "normal"}}, {"sphere", {"radius"}}, {"box", {"half_size"}}, {"capsule", {"radius", "half_length"}},
+      {"mesh", {"mesh"}}, {"voxels", {"mesh", "cells"}}};
   for (const auto &[name, keys] : wanted) {
     for (const std::string &key : keys) {
       bool mine = false;
       for (const auto &[other, others] : wanted)
         if (other == shape) mine = std::find(others.begin(), others.end(), key) != others.end();
-      if (!mine && node.has(key.c_str())) node.member(key).fail("a %s has no \"%s\"; that is for a %s", shape.c_str(), key.c_str(), name.c_str());
+      if (!mine && node.has(key.c_str())) node.member(key).fail("the shape %s has no \"%s\"; that is for %s", shape.c_str(), key.c_str(), name.c_str());
     }
   }
 }
@@ -168,6 +170,14 @@ Quaternion read_plane(const Node &node, dfm_obstacle_def &def) {
   return turn;
 }
 
+constexpr double kFewestVoxels = 64, kMostVoxels = 1 << 28;
+
+uint32_t read_count(const Node &node, double least, double most) {
+  const double n = node.number();
+  if (!(n >= least && n <= most) || n != std::floor(n)) node.fail("expected a whole number from %.0f to %.0f, found %g", least, most, n);
+  return uint32_t(n);
+}
+
 Obstacle read_obstacle(const Node &node, ReadContext &context) {
   Obstacle o;
   o.def = dfm_obstacle_def_default();
@@ -178,7 +188,10 @@ Obstacle read_obstacle(const Node &node, ReadContext &context) {
   context.sides.push_back(o.name);
   const std::string shape = node.at("shape").word("shape");
   check_shape_keys(node, shape);
-  o.def.pose = read_pose(node, "obstacle_pose", nullptr);
+  const bool of_triangles = shape == "mesh" || shape == "voxels";
+  if (node.has("pose") && !of_triangles && node.member("pose").has("scale"))
+    node.member("pose").at("scale").fail("a %s has its own size; \"scale\" is for the shapes mesh and voxels", shape.c_str());
+  o.def.pose = read_pose(node, "obstacle_pose", of_triangles ? &o.scale : nullptr);
   Quaternion turn;
   if (shape == "plane") {
     o.def.shape = DFM_SHAPE_PLANE;
@@ -192,6 +205,10 @@ Obstacle read_obstacle(const Node &node, ReadContext &context) {
     half.vector(o.def.half_size);
     for (double h : o.def.half_size)
       if (!(h > 0)) half.fail("half sizes are above 0, found %g", h);
+  } else if (of_triangles) {
+    o.def.shape = shape == "mesh" ? DFM_SHAPE_MESH : DFM_SHAPE_VOXELS;
+    o.mesh = node.at("mesh").text();
+    if (node.has("cells")) o.def.cells = read_count(node.at("cells"), kFewestVoxels, kMostVoxels);
   } else {
     o.def.shape = DFM_SHAPE_CAPSULE;
     o.def.radius = node.at("radius").number(kPositive);

@@ -10,7 +10,8 @@ namespace {
 
 constexpr char kPrefix[] = "anisotropy_";
 constexpr char kAxis[] = "anisotropy_axis";
-constexpr double kMostCells = 1 << 28;
+constexpr double kMostCells = 1e8;  // dfm_tetmesh_fill and dfm_body_create say the same of these two
+constexpr double kWidestSupport = 10;
 
 void read_fields(const Node &node, const dfm_type *model, Body &b) {
   if (!node.value().is_object()) node.fail("expected an object of files by parameter of the model");
@@ -109,7 +110,7 @@ void read_surface(const Node &node, OwnSurface &out) {
   out.coupling = coupling == "mls" ? DFM_COUPLING_MLS : coupling == "thesis" ? DFM_COUPLING_THESIS : DFM_COUPLING_BARYCENTRIC;
   if (!node.has("support")) return;
   if (coupling == "barycentric") node.member("support").fail("a support is for the couplings mls and thesis; \"coupling\" is barycentric here");
-  out.support = node.member("support").number(kPositive);
+  out.support = node.member("support").number(Range{0, kWidestSupport, true, false});
 }
 
 }  // namespace

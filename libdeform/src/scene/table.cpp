@@ -1,12 +1,22 @@
 #include "scene/table.h"
 
+#include <cerrno>
 #include <charconv>
 #include <cmath>
 #include <cstring>
+#include <filesystem>
 
 #include "core/error.h"
 
 namespace dfm::scene {
+
+std::ifstream open_table(const std::string &path, const std::string &expected) {
+  std::error_code unknown;
+  if (std::filesystem::is_directory(path, unknown)) fail(DFM_E_IO, "%s: is a directory; expected a table %s", path.c_str(), expected.c_str());
+  std::ifstream in(path);
+  if (!in) fail(DFM_E_IO, "%s: cannot be opened: %s; expected a table %s", path.c_str(), std::strerror(errno), expected.c_str());
+  return in;
+}
 
 std::string_view trim(std::string_view s) {
   while (!s.empty() && std::strchr(" \t\r", s.front())) s.remove_prefix(1);

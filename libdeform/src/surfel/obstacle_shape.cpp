@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "surfel/closest.h"
+#include "surfel/voxel_grid.h"
 
 namespace dfm {
 
@@ -40,6 +41,7 @@ ObstaclePoint ObstacleShape::closest(Vec3 p) const {
       return {p - d * axis_[2], axis_[2], d, 0};
     }
     case Shape::box: return closest_on_box(p);
+    case Shape::voxels: return closest_on_voxels(p);
     default: break;
   }
   const Vec3 c = end_[0] + closest_on_segment(p, end_[0], end_[1]) * (end_[1] - end_[0]);
@@ -79,6 +81,16 @@ ObstaclePoint ObstacleShape::closest_on_box(Vec3 p) const {
   return {p - r, n, d, uint32_t(2 * most + (outside[most] < 0 ? 0 : 1))};
 }
 
+ObstaclePoint ObstacleShape::closest_on_voxels(Vec3 p) const {
+  const VoxelGrid::Value value = view_.grid->at(local(p));
+  const double g = norm(value.gradient);
+  // Halfway between two walls no direction is better than another.
+  const Vec3 n = g > 1e-6 ? normalized(rotate(view_.rotation, value.gradient)) : axis_[2];
+  return {p - value.distance * n, n, value.distance, 0};
+}
+
+bool ObstacleShape::voxels_near(Vec3 p, double limit) const { return view_.grid->near(local(p), limit); }
+
 Vec3 ObstacleShape::shape_velocity(Vec3 q) const {
   switch (view_.shape) {
     case Shape::sphere: return view_.velocity;
@@ -89,10 +101,25 @@ Vec3 ObstacleShape::shape_velocity(Vec3 q) const {
 }
 
 double ObstacleShape::extent() const {
-  return view_.shape == Shape::box ? norm(view_.half_size) : view_.shape == Shape::capsule ? view_.half_length : 0;
+  switch (view_.shape) {
+    case Shape::box: return norm(view_.half_size);
+    case Shape::capsule: return view_.half_length;
+    case Shape::mesh:
+    case Shape::voxels: return view_.extent;
+    default: return 0;
+  }
 }
 
 void ObstacleShape::bounds(double lo[3], double hi[3]) const {
+  if (view_.shape == Shape::voxels) {
+    const Vec3 half = 0.5 * (view_.grid->high() - view_.grid->low()), centre = 0.5 * (view_.grid->high() + view_.grid->low());
+    for (int k = 0; k < 3; ++k) {
+      double c = view_.position[k], r = 0;
+      for (int i = 0; i < 3; ++i) c += axis_[i][k] * centre[i], r += std::fabs(axis_[i][k]) * half[i];
+      lo[k] = c - r, hi[k] = c + r;
+    }
+    return;
+  }
   for (int k = 0; k < 3; ++k) {
     double r = view_.radius;
     if (view_.shape == Shape::box) {

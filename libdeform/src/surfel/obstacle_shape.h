@@ -27,16 +27,20 @@ class ObstacleShape {
   void edge(uint32_t i, Vec3 &from, Vec3 &to, uint32_t faces[2]) const;
   Vec3 face_normal(uint32_t i) const { return i & 1 ? axis_[i >> 1] : -axis_[i >> 1]; }
 
-  ObstaclePoint closest(Vec3 p) const;
+  ObstaclePoint closest(Vec3 p) const;               // not of a mesh
+  Vec3 local(Vec3 p) const { return rotate_back(view_.rotation, p - view_.position); }
+  // Voxels: may p, or a place near it, be nearer than `limit`? (VoxelGrid::near)
+  bool voxels_near(Vec3 p, double limit) const;
   // Velocity with which the shape at q moves, without the belt and without a round shape's spin about itself, which moves no surface.
   Vec3 shape_velocity(Vec3 q) const;
   // Largest distance from position at which rotation moves the shape; 0 for a sphere; a plane has none (its caller bounds it).
   double extent() const;
-  // Axis-parallel bounds; not for a plane.
+  // Axis-parallel bounds; not for a plane or a mesh.
   void bounds(double lo[3], double hi[3]) const;
 
  private:
   ObstaclePoint closest_on_box(Vec3 p) const;
+  ObstaclePoint closest_on_voxels(Vec3 p) const;
   ObstacleView view_;
   Vec3 axis_[3], end_[2];
 };

@@ -15,7 +15,9 @@ struct BodyView {
   bool asleep = false;                // x stays as it is; it meets only what is awake or moves
 };
 
-enum class Shape : uint8_t { plane = 0, sphere = 1, box = 2, capsule = 3 };
+enum class Shape : uint8_t { plane = 0, sphere = 1, box = 2, capsule = 3, mesh = 4, voxels = 5 };
+
+class VoxelGrid;
 
 struct ObstacleView {
   uint32_t slot;
@@ -26,6 +28,9 @@ struct ObstacleView {
   Quat rotation;
   Vec3 half_size;                     // box
   double radius = 0, half_length = 0; // sphere, capsule; capsule axis is local z
+  double extent = 0;                  // mesh, voxels: farthest point from position
+  const Surface *surface = nullptr;   // mesh: in place, v of the pose alone
+  const VoxelGrid *grid = nullptr;    // voxels: in the obstacle's frame
   Vec3 velocity, spin;                // of the pose over the sub-step, world frame, spin about position
   Vec3 belt;                          // velocity_surface: slips along, moves nothing
   bool moves() const { return norm2(velocity) + norm2(spin) != 0; }
@@ -42,7 +47,8 @@ struct Candidate {
   uint32_t slot_a, slot_b;            // slot_b: obstacle slot where obstacle != 0
   uint32_t feature_a, feature_b;      // kVertexFace: surfel of a, triangle of b (a may be the higher body); kEdgeEdge: edges, a the lower
                                       // body id
-  uint8_t kind, obstacle;             // obstacle: feature_a is a surfel (kind 0), an edge (kind 1) or a triangle (kind 2); feature_b 0
+  uint8_t kind, obstacle;             // obstacle: feature_a is a surfel (kind 0), an edge (kind 1) or a triangle (kind 2); feature_b 0. A mesh: surfel and
+                                      // triangle of the mesh, two edges, vertex of the mesh and triangle of a (kind 2)
 };
 
 }  // namespace dfm

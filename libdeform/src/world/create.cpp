@@ -125,6 +125,62 @@ Body &create_body(World &w, const dfm_body_def &def) {
   return b;
 }
 
+namespace {
+
+constexpr uint32_t kVoxelCells = 262144, kMostVoxelCells = 1u << 28, kFewestVoxelCells = 64;
+
+// Points and triangles of a mesh or of voxels: checked and kept.
+void take_triangles(Obstacle &o, const dfm_obstacle_def &def) {
+  const char *const name = o.name.c_str();
+  if (def.npoint < 3 || def.ntriangle < 1 || !def.points || !def.triangles)
+    fail(DFM_E_ARG, "obstacle '%s': its surface has %u points and %u triangles; it needs at least 3 points and 1 triangle", name, def.npoint,
+         def.ntriangle);
+  for (uint32_t i = 0; i < def.npoint; ++i)
+    if (!finite(def.points + size_t(3) * i, 3)) fail(DFM_E_ARG, "obstacle '%s': point %u is not finite", name, i);
+  for (uint32_t t = 0; t < def.ntriangle; ++t) {
+    const uint32_t *const c = def.triangles + size_t(3) * t;
+    for (int k = 0; k < 3; ++k)
+      if (c[k] >= def.npoint) fail(DFM_E_ARG, "obstacle '%s': triangle %u names point %u of %u", name, t, c[k], def.npoint);
+    if (c[0] == c[1] || c[1] == c[2] || c[2] == c[0])
+      fail(DFM_E_ARG, "obstacle '%s': triangle %u names a point twice; drop it (dfm_trimesh_create does)", name, t);
+  }
+  const Memory &m = o.world->memory();
+  o.points = Array<double>(def.points, def.points + size_t(3) * def.npoint, HookAllocator<double>(m));
+  o.triangles = Array<uint32_t>(def.triangles, def.triangles + size_t(3) * def.ntriangle, HookAllocator<uint32_t>(m));
+  o.def.points = o.points.data(), o.def.triangles = o.triangles.data();
+}
+
+double signed_volume(const Obstacle &o) {
+  const Vec3 origin = load3(o.points.data());
+  double sum = 0;
+  for (size_t t = 0; t < o.triangles.size(); t += 3) {
+    const auto x = [&](size_t k) { return load3(&o.points[size_t(3) * o.triangles[t + k]]) - origin; };
+    sum += dot(x(0), cross(x(1), x(2))) / 6;
+  }
+  return sum;
+}
+
+void make_voxels(Obstacle &o, const Memory &memory) {
+  const char *const name = o.name.c_str();
+  const uint32_t cells = o.def.cells ? o.def.cells : kVoxelCells;
+  if (cells < kFewestVoxelCells || cells > kMostVoxelCells)
+    fail(DFM_E_ARG, "obstacle '%s': %u cells; a grid has between %u and %u", name, cells, kFewestVoxelCells, kMostVoxelCells);
+  if (!ObstacleMesh(memory, o.def.npoint, o.points.data(), o.def.ntriangle, o.triangles.data()).closed)
+    fail(DFM_E_ARG, "obstacle '%s': voxels need a closed surface, and this one has open edges or edges of more than two triangles, so no place "
+         "is inside or outside; close it, or use the shape mesh, which takes open ones", name);
+  if (!(signed_volume(o) > 0))
+    fail(DFM_E_ARG, "obstacle '%s': its surface encloses no volume or faces inward; turn its triangles (dfm_trimesh_create does)", name);
+  o.grid = std::make_unique<VoxelGrid>(memory, o.points.data(), o.def.ntriangle, o.triangles.data(), cells);
+  const VoxelGrid &g = *o.grid;
+  o.world->context->logf(DFM_LOG_INFO, "obstacle '%s': voxels of %g m in %.1f MB; distances are wrong by at most %g m at the centres of its triangles",
+                         name, g.cell(), 1e-6 * double(g.bytes()), g.error());
+  if (g.error() > 0.25 * g.cell())
+    o.world->context->logf(DFM_LOG_WARNING, "obstacle '%s': its voxels of %g m are too coarse: distances are wrong by %g m somewhere, as where walls are "
+                           "thinner than two cells; ask for more cells or use the shape mesh", name, g.cell(), g.error());
+}
+
+}  // namespace
+
 Obstacle &create_obstacle(World &w, const dfm_obstacle_def &def) {
   auto owned = std::make_unique<Obstacle>();
   Obstacle &o = *owned;
@@ -132,7 +188,8 @@ Obstacle &create_obstacle(World &w, const dfm_obstacle_def &def) {
   o.name = def.name ? def.name : "obstacle" + std::to_string(w.next_id);
   check_name(w, o.name, "obstacle");
   const char *const name = o.name.c_str();
-  if (def.shape > DFM_SHAPE_CAPSULE) fail(DFM_E_ARG, "obstacle '%s': shape %u is unknown; use DFM_SHAPE_PLANE, SPHERE, BOX or CAPSULE", name, def.shape);
+  if (def.shape > DFM_SHAPE_VOXELS)
+    fail(DFM_E_ARG, "obstacle '%s': shape %u is unknown; use DFM_SHAPE_PLANE, SPHERE, BOX, CAPSULE, MESH or VOXELS", name, def.shape);
   if (!finite(def.pose.position, 3) || !finite(def.pose.rotation, 4) || !finite(def.velocity_surface, 3) || !finite(def.sine.amplitude, 3) ||
       !finite(&def.sine.frequency, 1) || !finite(&def.sine.phase, 1))
     fail(DFM_E_ARG, "obstacle '%s': pose, sine and velocity_surface must be finite", name);
@@ -153,6 +210,12 @@ Obstacle &create_obstacle(World &w, const dfm_obstacle_def &def) {
   if (def.nkey) o.keys.assign(def.keys, def.keys + def.nkey);
   check_keys(o.keys, name);
   o.def.keys = nullptr, o.def.nkey = 0;
+  o.def.points = nullptr, o.def.triangles = nullptr;
+  if (def.shape == DFM_SHAPE_MESH || def.shape == DFM_SHAPE_VOXELS) take_triangles(o, def);
+  else o.def.npoint = o.def.ntriangle = 0;
+  if (def.shape == DFM_SHAPE_MESH)
+    o.mesh = std::make_unique<ObstacleMesh>(w.memory(), def.npoint, o.points.data(), def.ntriangle, o.triangles.data());
+  if (def.shape == DFM_SHAPE_VOXELS) make_voxels(o, w.memory());
   o.pose = o.pose_at_time(w.time);
   w.obstacles.reserve(w.obstacles.size() + 1);
   o.id = w.next_id;

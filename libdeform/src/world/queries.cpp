@@ -75,6 +75,17 @@ double ray_capsule(Vec3 o, Vec3 d, double r, double half, Vec3 *normal) {
   return best;
 }
 
+// Voxels answer as the surface that they are made from.
+double ray_triangles(const Obstacle &ob, Vec3 o, Vec3 d, Vec3 *normal) {
+  double best = kFar;
+  for (size_t i = 0; i < ob.triangles.size(); i += 3) {
+    const auto x = [&](size_t k) { return load3(&ob.points[size_t(3) * ob.triangles[i + k]]); };
+    const double t = ray_triangle(o, d, x(0), x(1), x(2));
+    if (t < best) best = t, *normal = normalized(cross(x(1) - x(0), x(2) - x(0)));
+  }
+  return best;
+}
+
 double ray_obstacle(const Obstacle &ob, Vec3 origin, Vec3 direction, Vec3 *normal) {
   const Quat q = ob.pose.rotation;
   const Vec3 o = rotate_back(q, origin - ob.pose.position), d = rotate_back(q, direction);
@@ -90,6 +101,8 @@ double ray_obstacle(const Obstacle &ob, Vec3 origin, Vec3 direction, Vec3 *norma
       break;
     case Shape::box: t = ray_box(o, d, load3(ob.def.half_size), &n); break;
     case Shape::capsule: t = ray_capsule(o, d, ob.def.radius, ob.def.half_length, &n); break;
+    case Shape::mesh:
+    case Shape::voxels: t = ray_triangles(ob, o, d, &n); break;
   }
   *normal = rotate(q, n);
   return t;

@@ -32,6 +32,10 @@ uint64_t structure(const World &w) {
   for (auto &o : w.obstacles) {
     const dfm_obstacle_def &d = o->def;
     h.add(o->id), h.add(d.shape), h.add(d.pose), h.add(d.half_size), h.add(d.radius), h.add(d.half_length), h.add(d.velocity_surface);
+    if (!o->points.empty()) {
+      h.add(o->points.data(), o->points.size() * sizeof(double)), h.add(o->triangles.data(), o->triangles.size() * sizeof(uint32_t));
+      h.add(d.cells);
+    }
     h.add(d.category), h.add(d.collides_with), h.add(o->name.data(), o->name.size()), h.add(o->material.data(), o->material.size());
   }
   return h.value;

@@ -18,9 +18,10 @@
 namespace dfm {
 namespace {
 
-// The bound depends on the state (volume terms stiffen as cells grow), so it is asked for again after 16 sub-steps; 0.9 of it is used.
+// The bound depends on the state (volume terms stiffen as cells grow, tilted springs as they stretch). 0.9 of it is used, which pays for what a
+// shape changes by about a twentieth of its lengths; so it is asked for again after 16 sub-steps, sooner where the edges stretch faster.
 constexpr uint32_t kBoundEvery = 16;
-constexpr double kBoundShare = 0.9;
+constexpr double kBoundShare = 0.9, kBoundStrain = 0.05;
 
 // The first body, in id order, for which something failed: the same for every cut of the bodies over threads.
 struct FirstFailure {
@@ -52,6 +53,19 @@ uint32_t inverted_cells(const Body &b) {
   uint32_t n = 0;
   for (size_t t = 0; t < b.tets.size(); t += 4) n += tet_volume(b.p.x.data(), kStride, &b.tets[t]) < 0;
   return n;
+}
+
+// The fastest stretch of an edge, 1/s; turning gives none.
+double strain_rate(const Body &b) {
+  const double *const x = b.p.x.data(), *const v = b.p.v.data();
+  double most = 0;
+  for (size_t e = 0; e < b.edges.size(); e += 2) {
+    const size_t i = size_t(b.edges[e]) * kStride, j = size_t(b.edges[e + 1]) * kStride;
+    const Vec3 d = load3(x + j) - load3(x + i);
+    const double dd = norm2(d), stretch = std::fabs(dot(d, load3(v + j) - load3(v + i)));
+    if (stretch > most * dd) most = dd > 0 ? stretch / dd : most;
+  }
+  return most;
 }
 
 // One stage; false: the sub-step cannot be taken, and nothing of it has been committed.
@@ -88,6 +102,7 @@ void view_obstacles(World &w, double t, double h, double left) {
       v.velocity = (1 / h) * (end.position - o.pose.position);
       v.spin = spin_between(o.pose.rotation, end.rotation, h);
     }
+    if (o.mesh) o.mesh->place(v.position, v.rotation, v.velocity, v.spin);
   }
 }
 
@@ -119,18 +134,33 @@ dfm_status World::step(double dt, uint32_t *trouble) {
   if (n > 1) *trouble |= DFM_TROUBLE_SUBSTEPS;
   if (inverted) *trouble |= DFM_TROUBLE_INVERTED;
 
-  const double start = time;
-  stats.last_substeps = n, stats.substeps_max = std::max(stats.substeps_max, n);
-  for (uint32_t k = 0; k < n; ++k) {
-    const double end = k + 1 == n ? start + dt : start + dt * (double(k + 1) / n);
+  const double goal = time + dt;
+  double from = time, span = dt;   // `cut` equal sub-steps since `from`; the rest of the step is cut anew where the bound has fallen
+  uint32_t cut = n, done = 0;
+  for (uint32_t k = 0; k < cut; ++k, ++done) {
+    if (bound_age >= kBoundEvery) {
+      update_bound();
+      if (inverted) *trouble |= DFM_TROUBLE_INVERTED;
+      const double more = std::ceil((goal - time) / stable - 1e-9);
+      if (!(done + more <= def.max_substeps)) {
+        set_last_error(format("step %llu: the shape of body '%s' has changed so much that the rest of the step needs %.0f sub-steps of %g s "
+                              "(max_substeps %u); take a shorter step", static_cast<unsigned long long>(step_count),
+                              worst_body ? worst_body->name.c_str() : "?", more, stable, def.max_substeps).c_str());
+        return DFM_E_DIVERGED;
+      }
+      if (more > cut - k) from = time, span = goal - time, cut = static_cast<uint32_t>(more), k = 0, *trouble |= DFM_TROUBLE_SUBSTEPS;
+    }
+    const bool last = k + 1 == cut;
+    const double end = last ? goal : from + span * (double(k + 1) / cut);
     h = end - time;
-    view_obstacles(*this, time, h, start + dt - time);
+    view_obstacles(*this, time, h, goal - time);
     if (idle()) stats.contacts_mean += (stats.contacts - stats.contacts_mean) / double(stats.substeps + 1);
     else if (!sub_step(trouble)) return DFM_E_DIVERGED;
-    move_obstacles(*this, time, h, start + dt - time, k + 1 == n);
+    move_obstacles(*this, time, h, goal - time, last);
     time = end;
     ++stats.substeps, ++bound_age;
   }
+  stats.last_substeps = done, stats.substeps_max = std::max(stats.substeps_max, done);
   ++step_count;
   stats.steps = step_count, stats.time = time;
   return DFM_OK;
@@ -153,14 +183,18 @@ void World::update_bound() {
   stable = std::numeric_limits<double>::infinity();
   worst_body = nullptr, worst_point = 0;
   inverted = 0;
+  double fastest = 0;
   for (auto &b : bodies) {
-    if (!b->slumber.asleep || !b->bound.known) ask_bound(*b);   // who sleeps counts too: the step must not change when it wakes
+    const bool stays = b->slumber.asleep && b->bound.known;
+    if (!stays) ask_bound(*b);   // who sleeps counts too: the step must not change when it wakes
     inverted += b->bound.inverted;
+    if (!stays && !b->model.stepper && b->model.ops->bound) fastest = std::max(fastest, strain_rate(*b));
     if (b->bound.step < stable) stable = b->bound.step, worst_body = b.get(), worst_point = b->bound.point;
   }
   stable *= kBoundShare;
   stats.stable_step = stable, stats.inverted_max = std::max(stats.inverted_max, inverted);
-  bound_age = 0;
+  const double keeps = kBoundStrain / (fastest * stable);   // sub-steps
+  bound_age = keeps >= kBoundEvery || !(fastest > 0) ? 0 : kBoundEvery - std::max(1u, static_cast<uint32_t>(keeps));
 }
 
 void World::ask_bound(Body &b) {

@@ -153,6 +153,11 @@ void World::prepare() {
     v.slot = i, v.category = o.def.category, v.collides_with = o.def.collides_with, v.id = o.id, v.shape = Shape(o.def.shape);
     v.position = o.pose.position, v.rotation = o.pose.rotation, v.half_size = load3(o.def.half_size);
     v.radius = o.def.radius, v.half_length = o.def.half_length, v.belt = load3(o.def.velocity_surface);
+    if (o.mesh) {
+      o.mesh->place(v.position, v.rotation, {}, {});
+      v.surface = &o.mesh->surface, v.extent = o.mesh->extent;
+    }
+    if (o.grid) v.grid = o.grid.get(), v.extent = o.grid->extent();
     obstacle_views.push_back(v);
   }
 

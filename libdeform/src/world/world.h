@@ -16,7 +16,9 @@
 #include "plan/plan.h"
 #include "plugin/context.h"
 #include "plugin/params.h"
+#include "surfel/obstacle_mesh.h"
 #include "surfel/views.h"
+#include "surfel/voxel_grid.h"
 #include "world/islands.h"
 #include "world/motion.h"
 #include "world/sleep.h"
@@ -86,6 +88,10 @@ struct Obstacle {
   Pose target;                       // at the end of the next step, where move_to set it
   bool has_target = false;
   bool moves() const { return !keys.empty() || def.sine.amplitude[0] != 0 || def.sine.amplitude[1] != 0 || def.sine.amplitude[2] != 0; }
+  Array<double> points;              // mesh, voxels: as given, in its frame
+  Array<uint32_t> triangles;
+  std::unique_ptr<ObstacleMesh> mesh;
+  std::unique_ptr<VoxelGrid> grid;
   Pose pose_at_time(double t) const;
 };
 

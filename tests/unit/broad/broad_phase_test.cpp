@@ -205,6 +205,32 @@ TEST(BroadPhase, RestingScene_KeepsItsLists) {
   EXPECT_EQ(broad.stats().pairs, 1u);
 }
 
+// A slender bar turns on a slab and bends as it goes: boxes that fitted it along an axis grow until the tree is made anew. Contacts are those of
+// lists made from nothing all the way.
+TEST(BroadPhase, TurningBar_GetsNewTreesAndTheSameContacts) {
+  Scene scene;
+  const Mesh bar = box_mesh({6, 0.25, 0.25}, 48, 2, 2);
+  Surface &s = scene.add(bar);
+  scene.add(moved(box_mesh({4, 4, 0.5}, 6, 6, 1), {}, {0, 0, -0.25}));
+  BroadPhase broad(Memory::standard());
+  size_t found = 0;
+  for (int step = 0; step <= 180; ++step) {
+    const Quat q = turn({0, 0, 1}, M_PI * step / 180);
+    for (uint32_t i = 0; i < s.nsurfel; ++i) {
+      const Vec3 r = bar.at(s.point[i]), bent{r.x, r.y + 0.002 * step * std::sin(r.x), r.z};
+      store3(&s.x[4 * i], rotate(q, bent) + Vec3{0, 0, 0.1255});
+    }
+    broad.update(scene.bodies, scene.obstacles, scene.filter, scene.h, scene.offset);
+    const Array<ContactPoint> kept = scene.contacts(broad.candidates()), fresh = scene.listed();
+    ASSERT_TRUE(same_bits(kept, fresh)) << step;
+    found += kept.size();
+  }
+  EXPECT_GE(broad.stats().rebuilds, 3u) << "beside the first of each body";
+  EXPECT_LE(broad.stats().rebuilds, 12u) << "most updates only renew boxes";
+  EXPECT_GE(broad.stats().refits, 150u);
+  EXPECT_GT(found, 5000u);
+}
+
 TEST(BroadPhase, OnlyTheMovingBody_IsListedAgain) {
   Scene scene;
   for (int i = 0; i < 4; ++i) scene.add(moved(box_mesh({1, 1, 1}, 2, 2, 2), {}, {0, 0, 1.001 * i}));

@@ -227,3 +227,15 @@ TEST(Counter, SelfPairsThatShareAVertex_AreExcepted) {
   const std::vector<uint32_t> apart = {0, 1, 2, 5, 3, 4};
   EXPECT_EQ(count({{split.data(), 6, apart.data(), 2}}, Touching::counts), 1u);
 }
+
+// A body against an obstacle counts; an obstacle against itself or another one does not.
+TEST(Counter, Obstacles_CountAgainstBodiesOnly) {
+  const double upright[9] = {-1, 0, -1, 1, 0, -1, 0, 0, 1}, level[9] = {-1, -1, 0, 1, -1, 0, 0, 1, 0};
+  const uint32_t tri[3] = {0, 1, 2};
+  Counter counter;
+  const auto count = [&](bool a, bool b) { return counter.count({{upright, 3, tri, 1, a}, {level, 3, tri, 1, b}}, Touching::counts); };
+  EXPECT_EQ(count(false, false), 1u);
+  EXPECT_EQ(count(true, false), 1u);
+  EXPECT_EQ(count(false, true), 1u);
+  EXPECT_EQ(count(true, true), 0u);
+}

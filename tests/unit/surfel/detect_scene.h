@@ -223,7 +223,7 @@ inline std::string flaw(const Scene &scene, const Array<ContactPoint> &contacts)
       sum[s] += c.weight[k];
       side[s] += c.weight[k] * at[c.node[k]];
       // An edge may count as up to a quarter longer for what slides in over its ends.
-      if (s == 0 && !(c.weight[k] > (c.kind == kEdgeEdge ? -0.25 : 0.0))) return which + "weight of side a is out of range";
+      if (s == 0 && !(c.weight[k] > (c.kind == kEdgeEdge || (c.obstacle && c.type_a == 1) ? -0.25 : 0.0))) return which + "weight of side a is out of range";
     }
     if (std::fabs(sum[0] - 1) > 1e-12 || std::fabs(sum[1] + (c.obstacle ? 0 : 1)) > 1e-12) return which + "weights do not sum to one";
     // No torque: the two points where the force acts lie on the line of the normal.

@@ -1,0 +1,61 @@
+// What a terminal is shown of a call that takes long, and what a file is not.
+#include "progress.h"
+
+#include <fcntl.h>
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <cstdlib>
+#include <string>
+
+namespace {
+
+// stderr as a terminal for as long as this lives; read gives what came out on the other side.
+class Terminal {
+ public:
+  Terminal() : kept_(dup(STDERR_FILENO)), near_(posix_openpt(O_RDWR | O_NOCTTY)) {
+    if (near_ < 0 || grantpt(near_) != 0 || unlockpt(near_) != 0) return;
+    far_ = open(ptsname(near_), O_RDWR | O_NOCTTY);
+    if (far_ >= 0) dup2(far_, STDERR_FILENO);
+  }
+  ~Terminal() {
+    dup2(kept_, STDERR_FILENO);
+    for (const int fd : {kept_, near_, far_})
+      if (fd >= 0) close(fd);
+  }
+  bool works() const { return far_ >= 0; }
+  std::string read() const {
+    char text[4096];
+    fcntl(near_, F_SETFL, O_NONBLOCK);
+    const ssize_t n = ::read(near_, text, sizeof text);
+    return n > 0 ? std::string(text, size_t(n)) : std::string();
+  }
+
+ private:
+  int kept_, near_, far_ = -1;
+};
+
+std::string shown(bool wanted, std::chrono::milliseconds wait, std::chrono::milliseconds takes) {
+  const Terminal terminal;
+  if (!terminal.works()) return "no terminal";
+  {
+    const cli::Patience patience(wanted, "filling a.obj", wait);
+    std::this_thread::sleep_for(takes);
+  }
+  return terminal.read();
+}
+
+using std::chrono::milliseconds;
+
+}  // namespace
+
+TEST(Patience, LongCall_IsToldAndWiped) {
+  const std::string text = shown(true, milliseconds(20), milliseconds(300));
+  if (text == "no terminal") GTEST_SKIP() << "this system gives no pseudo terminal";
+  EXPECT_EQ(text.find("\rfilling a.obj, 0 s "), 0u) << text;
+  EXPECT_EQ(text.rfind("\r\033[K"), text.size() - 4) << "the line is wiped at the end";
+}
+
+TEST(Patience, ShortCall_SaysNothing) { EXPECT_EQ(shown(true, milliseconds(10000), milliseconds(30)).find("filling"), std::string::npos); }
+
+TEST(Patience, QuietCall_SaysNothing) { EXPECT_EQ(shown(false, milliseconds(10), milliseconds(100)).find("filling"), std::string::npos); }
