@@ -245,7 +245,10 @@ TEST(Wake, ByWhateverChangesOrReachesABody_TakesItsIslandAndNoOther) {
       {"impulse", true, true, false, [&](const Rest &s) { test::ok(dfm_body_apply_impulse(s.upper, top, up)); }},
       {"load", true, true, false, [&](const Rest &s) { test::ok(dfm_body_add_load(s.lower, 1, &point, force, 0, nullptr, nullptr, nullptr)); }},
       {"hold", false, false, true, [&](const Rest &s) { test::ok(dfm_body_hold(s.far, 1, &point, 7)); }},
-      {"state", false, false, true, [](const Rest &s) { test::ok(dfm_body_set_state(s.far, uint32_t(positions(s.far).size() / 3), positions(s.far).data(), nullptr)); }},
+      {"state", false, false, true, [](const Rest &s) {
+         const auto x = positions(s.far);
+         test::ok(dfm_body_set_state(s.far, uint32_t(x.size() / 3), x.data(), nullptr));
+       }},
       {"parameters", false, false, true, [&](const Rest &s) { test::ok(dfm_body_set_params(s.far, &params)); }},
       {"filter of a body", true, true, false, [](const Rest &s) { test::ok(dfm_body_set_filter(s.lower, 2, ~0u)); }},
       {"gravity", true, true, true, [&](const Rest &s) { test::ok(dfm_world_set_gravity(s.world, g)); }},
@@ -399,6 +402,23 @@ TEST(Sleep, Plan_ListsTheStageOnlyWhereItIsAskedFor) {
     ASSERT_NE(at, std::string::npos);
     EXPECT_EQ(at < absent, on);
   }
+}
+
+TEST(Sleep, OfAScene_IsItsContactKey) {
+  const test::Context c;
+  const char *const set[] = {"/contact/sleep=true"};
+  dfm_scene_options options{};
+  options.size = sizeof options, options.nset = 1, options.set = set;
+  dfm_scene scene = 0;
+  dfm_world w = 0;
+  ASSERT_EQ(dfm_scene_open(c, DEFORM_SOURCE_DIR "/examples/scenes/slope_block.json", &options, &scene), DFM_OK) << dfm_last_error();
+  test::ok(dfm_scene_world(scene, &w));
+  size_t bytes = 0;
+  test::ok(dfm_world_explain(w, nullptr, &bytes));
+  std::string text(bytes, '\0');
+  test::ok(dfm_world_explain(w, text.data(), &bytes));
+  EXPECT_LT(text.find("{\"name\":\"sleep\""), text.find("\"absent\""));
+  test::ok(dfm_scene_close(scene));
 }
 
 TEST(Sleep, OutOfRangeSettings_AreRefused) {

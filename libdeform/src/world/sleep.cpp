@@ -243,8 +243,8 @@ void World::hold_sleepers() {
 
 // Before the world forgets a body or an obstacle: whom it touched wakes, and the contacts of those who sleep on name slots that move up.
 void World::close_slot(uint64_t id, bool obstacle) {
-  const uint32_t slot = obstacle ? static_cast<uint32_t>(std::find_if(obstacles.begin(), obstacles.end(), [&](auto &o) { return o->id == id; }) - obstacles.begin())
-                                 : slot_of(*this, id);
+  const auto thing = std::find_if(obstacles.begin(), obstacles.end(), [&](auto &o) { return o->id == id; });
+  const uint32_t slot = obstacle ? static_cast<uint32_t>(thing - obstacles.begin()) : slot_of(*this, id);
   if (obstacle) wake_touching(id);
   else wake(*bodies[slot]);
   if (sleepers == 0) report.n = 0;
