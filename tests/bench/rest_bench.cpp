@@ -66,7 +66,12 @@ int main() {
     std::printf("asleep after %d steps: %u of 100\n", settle, test::stats(asleep.world).asleep);
     row("100 bodies asleep", steps(asleep.world, 20000, 1e-3));
     test::ok(dfm_body_wake(asleep.bodies[0]));
+    dfm_stage_time before[16], after[16];
+    uint32_t n = 0;
+    test::ok(dfm_world_profile(asleep.world, 16, before, &n));
     row("2 awake, 98 asleep", steps(asleep.world, 400, 1e-3));
+    test::ok(dfm_world_profile(asleep.world, 16, after, &n));
+    for (uint32_t i = 0; i < n; ++i) std::printf("    %-18s %8.2f us\n", after[i].name, 1e6 * (after[i].seconds - before[i].seconds) / 400);
     steps(awake.world, 300, 1e-3);
     row("100 bodies awake", steps(awake.world, 60, 1e-3));
   }

@@ -212,28 +212,50 @@ void World::fall_asleep(Body &b, double end) {
   b.bound.known = false;
 }
 
-// Contacts of those who sleep go on behind the ones of this sub-step. last_report is the report that belongs to `store`.
+// Contacts of those who sleep go on behind the ones of this sub-step, in the order of their keys. last_report belongs to `store`.
 void World::carry_sleepers(uint32_t *touching, uint32_t *sticking) {
   ContactStore &to = next_store;
+  const uint32_t own = to.n;
   const double scale = store.h > 0 ? h / store.h : 0;   // impulses belong to a sub-step's length
-  for (uint32_t m = 0; m < store.n; ++m) {
-    if (!asleep(*this, store.id_a[m])) continue;
-    const auto copy = [m](const auto &from, auto &into, size_t width) {
-      into.insert(into.end(), from.begin() + std::ptrdiff_t(m * width), from.begin() + std::ptrdiff_t((m + 1) * width));
+  const auto carry = [&](uint32_t from, uint32_t end) {
+    const auto copy = [=](const auto &source, auto &into, size_t width) {
+      into.insert(into.end(), source.begin() + std::ptrdiff_t(from * width), source.begin() + std::ptrdiff_t(end * width));
     };
     copy(store.key, to.key, 1), copy(store.id_a, to.id_a, 1), copy(store.id_b, to.id_b, 1), copy(store.law, to.law, 1);
     copy(store.dwell, to.dwell, 1), copy(store.touching, to.touching, 1), copy(store.held, to.held, 1), copy(store.path, to.path, 2);
-    copy(store.normal, to.normal, 3), copy(store.tangent, to.tangent, 3);
-    to.by_key.push_back(to.n), to.began.push_back(0);
-    for (uint32_t s = 0; s < to.nstate; ++s) to.bristle.push_back(s < store.nstate ? store.bristle[size_t(store.nstate) * m + s] : 0);
-    for (uint32_t k = 0; k < 3; ++k) to.impulse.push_back(scale * store.impulse[size_t(3) * m + k]);
+    copy(store.normal, to.normal, 3), copy(store.tangent, to.tangent, 3), copy(store.impulse, to.impulse, 3);
     copy(last_report.contacts, report.contacts, 1), copy(last_report.frame, report.frame, 9), copy(last_report.slip, report.slip, 2);
     copy(last_report.mode, report.mode, 1);
-    report.impulse.insert(report.impulse.end(), to.impulse.end() - 3, to.impulse.end());
-    ++to.n, ++report.n;
-    *touching += to.touching.back(), *sticking += to.impulse[size_t(3) * (to.n - 1)] > 0 && report.mode.back() == 1;
+    if (to.nstate == store.nstate) copy(store.bristle, to.bristle, store.nstate);
+    else
+      for (uint32_t m = from; m < end; ++m)
+        for (uint32_t s = 0; s < to.nstate; ++s) to.bristle.push_back(s < store.nstate ? store.bristle[size_t(store.nstate) * m + s] : 0);
+    to.n += end - from;
+  };
+  // While the same ones sleep they are the old store's tail, and go over as a whole.
+  uint32_t tail = store.n;
+  while (tail > 0 && sleeps(tail - 1) && (tail == store.n || store.key[tail - 1] < store.key[tail])) --tail;
+  uint32_t before = 0;
+  while (before < tail && !sleeps(before)) ++before;
+  if (before == tail) {
+    carry(tail, store.n);
+  } else {
+    for (const uint32_t m : store.by_key)
+      if (sleeps(m)) carry(m, m + 1);
   }
+  to.began.resize(to.n, 0), to.by_key.resize(to.n), report.n = to.n;
+  for (size_t i = size_t(3) * own; i < size_t(3) * to.n; ++i) to.impulse[i] *= scale;
+  report.impulse.insert(report.impulse.end(), to.impulse.begin() + std::ptrdiff_t(size_t(3) * own), to.impulse.end());
+  for (uint32_t m = own; m < to.n; ++m) *touching += to.touching[m], *sticking += to.impulse[size_t(3) * m] > 0 && report.mode[m] == 1;
+
+  // Two sorted runs: this sub-step's, which `match` takes meanwhile, and the carried, whose places are their order.
+  std::copy(to.by_key.begin(), to.by_key.begin() + own, match.begin());
+  for (uint32_t i = 0, m = own, k = 0; k < to.n; ++k)
+    to.by_key[k] = m == to.n || (i < own && to.key[match[i]] < to.key[m]) ? match[i++] : m++;
 }
+
+// Is a contact of the old store one of sleepers, which goes on as it is?
+bool World::sleeps(uint32_t m) const { return sleepers > 0 && bodies[last_report.contacts[m].slot_a]->slumber.asleep; }
 
 // Contacts that sleep stick: a hold that begins now counts them from now on.
 void World::hold_sleepers() {

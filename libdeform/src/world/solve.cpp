@@ -216,10 +216,10 @@ void World::keep_contacts() {
       it->work += l[1] * v1 + l[2] * v2;
     }
   }
-  if (sleepers) carry_sleepers(&touching, &sticking);
   std::sort(to.by_key.begin(), to.by_key.end(), [&](uint32_t i, uint32_t j) { return to.key[i] < to.key[j]; });
+  if (sleepers) carry_sleepers(&touching, &sticking);
   for (uint32_t m = 0; m < store.n; ++m)
-    if (store.touching[m] && to.find(store.key[m]) == kNone) add_event(DFM_EVENT_END, store.id_a[m], store.id_b[m], store.key[m], time + h);
+    if (store.touching[m] && !sleeps(m) && to.find(store.key[m]) == kNone) add_event(DFM_EVENT_END, store.id_a[m], store.id_b[m], store.key[m], time + h);
   std::swap(store, next_store);
 
   stats.contacts = touching, stats.sticking = sticking, stats.pairs_tested = static_cast<uint32_t>(broad.candidates().size());

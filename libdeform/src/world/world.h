@@ -223,6 +223,7 @@ struct World {
   void fall_asleep(Body &b, double end);
   bool idle() const;
   void carry_sleepers(uint32_t *touching, uint32_t *sticking);
+  bool sleeps(uint32_t m) const;
   void close_slot(uint64_t id, bool obstacle);
   void hold_sleepers();                                // hold_begin() while contacts sleep
   void reserve_events(size_t more);
