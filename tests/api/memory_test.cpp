@@ -167,6 +167,48 @@ TEST(Memory, ASettledCoupledStep_AllocatesNothing) {
   EXPECT_EQ(hooks.live_bytes, 0);
 }
 
+// Islands, the moment of falling asleep, the steps of a world that sleeps, waking by hand and by an obstacle.
+TEST(Memory, FallingAsleepAndWaking_AllocatesNothing) {
+  Hooks hooks;
+  const dfm_context_def def = hooks.def();
+  dfm_context *c = nullptr;
+  ASSERT_EQ(dfm_context_create(&def, &c), DFM_OK) << dfm_last_error();
+  const dfm_world w = test::make_world(c);
+  test::ok(dfm_world_set_sleep(w, true));
+  const dfm_obstacle floor = test::add_plane(w, "floor");
+  test::BodyOptions o;
+  o.young = 2e5, o.damping_stiffness = 2e-3, o.damping_mass = 20, o.position = {0, 0, 4e-5};
+  const dfm_body near = test::make_body(c, w, "beam", {0.1, 0.1, 0.1}, 60, o);
+  o.position[0] = 1;
+  const dfm_body far = test::make_body(c, w, "beam", {0.1, 0.1, 0.1}, 60, o);
+  dfm_pose pose{};
+  const auto round = [&] {
+    bool slept = false, woke = false;
+    for (int i = 0; i < 700; ++i) {
+      EXPECT_EQ(dfm_world_step(w, 1e-3, nullptr), DFM_OK);
+      slept |= test::stats(w).asleep == 2;
+    }
+    EXPECT_EQ(dfm_body_wake(far), DFM_OK);
+    for (int i = 0; i < 20; ++i) EXPECT_EQ(dfm_world_step(w, 1e-3, nullptr), DFM_OK);
+    woke = test::stats(w).asleep == 1;
+    EXPECT_EQ(dfm_obstacle_get_pose(floor, &pose), DFM_OK);
+    pose.position[2] -= 1e-6;
+    EXPECT_EQ(dfm_obstacle_move_to(floor, &pose), DFM_OK);
+    EXPECT_EQ(dfm_world_step(w, 1e-3, nullptr), DFM_OK);
+    EXPECT_EQ(test::stats(w).asleep, 0u);
+    return slept && woke;
+  };
+  for (int i = 0; i < 3; ++i) round();   // buffers find their size
+  const int64_t hook_calls = hooks.calls;
+  const uint64_t heap = heap_calls;
+  EXPECT_TRUE(round());
+  EXPECT_EQ(hooks.calls - hook_calls, 0) << "calls of the allocation hook";
+  EXPECT_EQ(heap_calls - heap, 0u) << "calls of operator new";
+  EXPECT_EQ(dfm_body_wake(near), DFM_OK);
+  dfm_context_destroy(c);
+  EXPECT_EQ(hooks.live_bytes, 0);
+}
+
 TEST(Memory, ParametersThatFindNoMemory_SayWhyAndChangeNothing) {
   Hooks hooks;
   const dfm_context_def def = hooks.def();

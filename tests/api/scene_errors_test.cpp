@@ -149,7 +149,6 @@ TEST(SceneErrors, NotDelivered_IsNeverIgnored) {
       {"/contact/method=\"rollback\"", "/contact/method"},
       {"/contact/self=true", "/contact/self"},
       {"/contact/untangle=true", "/contact/untangle"},
-      {"/contact/sleep=true", "/contact/sleep"},
       {"/output/color=\"stress\"", "/output/color"},
       {"/bodies/0/springs=[{\"point\":[0,0,0]}]", "/bodies/0/springs"},
       {"/bodies/0/start={\"invert\":true}", "/bodies/0/start"},

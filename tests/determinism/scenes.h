@@ -1,6 +1,7 @@
 // Scenes whose state hash must be the same on every build, cut and processor.
 #pragma once
 #include "coupled.h"
+#include "obstacle.h"
 
 namespace scenes {
 
@@ -81,13 +82,51 @@ inline dfm_world coupled_pair(dfm_context *c) {
   return w;
 }
 
+// A ball rolls and a beam falls over a dale of irregular triangles that sinks at the same time.
+inline dfm_world dale(dfm_context *c) {
+  const dfm_world w = test::make_world(c);
+  const test::Triangles ground = test::height_field(0.15, 12, [](double x, double y) { return 0.8 * (x * x + 0.5 * y * y); });
+  const dfm_pose_key keys[] = {{0, {{0, 0, 0}, {0, 0, 0, 1}}}, {0.2, {{0, 0.002, -0.004}, {0, 0.02, 0, 1}}}};
+  dfm_obstacle_def d = test::mesh_def("ground", ground);
+  d.nkey = 2, d.keys = keys;
+  dfm_obstacle o = 0;
+  test::ok(dfm_obstacle_create(w, &d, &o));
+  test::set_friction(w, 0.4);
+  test::BodyOptions b;
+  b.young = 5e4, b.damping_stiffness = 5e-4, b.position = {-0.03, 0.01, 0.0325}, b.velocity = {0.3, 0, -0.3}, b.spin = {0, 8, 0};
+  test::make_body(c, w, "ball", {0.03, 0, 0}, 200, b);
+  b.position = {0.02, -0.03, 0.035}, b.velocity = {0, 0.1, -0.4}, b.spin = {1, 0, 4};
+  test::make_body(c, w, "beam", {0.06, 0.03, 0.03}, 100, b);
+  return w;
+}
+
+// Two blocks come to rest and sleep; a ball falls on one of them and wakes it, the other sleeps on.
+inline dfm_world woken(dfm_context *c) {
+  dfm_world_def d = dfm_world_def_default();
+  d.sleep = 1, d.sleep_time = 0.04, d.contact_offset = 2e-4;
+  dfm_world w = 0;
+  test::ok(dfm_world_create(c, &d, &w));
+  test::add_plane(w, "floor");
+  test::set_friction(w, 0.4);
+  test::BodyOptions o;
+  o.young = 2e5, o.damping_stiffness = 2e-3, o.damping_mass = 40, o.position = {0, 0, 1.6e-4};
+  test::make_body(c, w, "beam", {0.1, 0.1, 0.06}, 100, o);
+  o.position[0] = 0.3;
+  test::make_body(c, w, "beam", {0.1, 0.1, 0.06}, 100, o);
+  o.damping_mass = 0, o.position = {0.06, 0.045, 0.22}, o.spin = {3, 1, 0};
+  test::make_body(c, w, "ball", {0.04, 0, 0}, 100, o);
+  return w;
+}
+
 struct Scene {
   const char *name;
   dfm_world (*build)(dfm_context *);
   int steps;
 };
 inline const Scene all[] = {{"ball_on_floor", ball_on_floor, 150}, {"crossing_beams", crossing_beams, 150}, {"ten_in_a_box", ten_in_a_box, 80},
-                                {"fine_ball", fine_ball, 20}, {"coupled_pair", coupled_pair, 80}};
+                            {"fine_ball", fine_ball, 20}, {"coupled_pair", coupled_pair, 80},
+                            {"dale", dale, 100},
+                            {"woken", woken, 220}};
 
 inline void advance(dfm_world w, int steps) {
   for (int i = 0; i < steps; ++i) ASSERT_EQ(dfm_world_step(w, 1e-3, nullptr), DFM_OK) << dfm_last_error();

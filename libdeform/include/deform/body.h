@@ -101,6 +101,12 @@ DFM_API dfm_status dfm_body_apply_impulse(dfm_body body, const double point[3], 
  * Threads: Not during step. Since 0.1. */
 DFM_API dfm_status dfm_body_set_params(dfm_body body, const dfm_params *params);
 
+/** Wakes the body and those it touches, directly or through others; awake, it starts to count its calm anew. Whatever changes a body, or
+ * reaches it, wakes it by itself. Threads: Not during step. Since 0.2. */
+DFM_API dfm_status dfm_body_wake(dfm_body body);
+/** Does the body sleep (dfm_world_def.sleep)? @param asleep out. Threads: Any thread. Not during step. Since 0.2. */
+DFM_API dfm_status dfm_body_is_asleep(dfm_body body, bool *asleep);
+
 /** Sums over the body, in SI units. angular: about the centre of mass. contact_impulse: total contact impulse on the body since it was
  * created (N s): divide differences by the interval for a mean force. elastic is NAN if the model has no energy. */
 typedef struct dfm_body_measure {

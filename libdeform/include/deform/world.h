@@ -19,8 +19,10 @@ typedef struct dfm_world_def {
   uint32_t max_sweeps;          /* per sub-step; 50. Up to eight times as many where bodies would else pass through each other */
   uint32_t max_passes;          /* outer passes per sub-step; 20 */
   uint32_t max_substeps;        /* a step that needs more returns DFM_DISCARD; 10000 */
-  uint32_t reserved;
+  uint32_t sleep;               /* 1: islands of bodies at rest sleep until something reaches them (doc/concepts/sleeping.md); 0 */
   const char *const *effects;   /* NULL-terminated list the scene asks for; NULL: what its content calls for */
+  double sleep_speed;           /* m/s, 0.01: what falls asleep has been slower in every point, and has stayed within half of d_c, */
+  double sleep_time;            /* s, 0.5: for so long */
 } dfm_world_def;
 
 /** Gravity (0,0,-9.81), everything automatic. Threads: Any thread. Since 0.1. */
@@ -35,6 +37,9 @@ DFM_API dfm_status dfm_world_destroy(dfm_world world);
 DFM_API dfm_status dfm_world_set_gravity(dfm_world world, const double gravity[3]);
 /** Gravity that varies; times in s, strictly rising. n = 0 removes it. Threads: Not during step. Since 0.1. */
 DFM_API dfm_status dfm_world_set_gravity_keys(dfm_world world, uint32_t n, const dfm_vector_key *keys);
+
+/** Lets islands at rest sleep, or (false) wakes all and keeps them awake. Threads: Not during step. Since 0.2. */
+DFM_API dfm_status dfm_world_set_sleep(dfm_world world, bool sleep);
 
 /* ---- step -------------------------------------------------------------------------------------------------- */
 /** Trouble inside a step; each bit with its remedy. */
@@ -86,6 +91,8 @@ typedef struct dfm_world_stats {
   uint64_t unconverged, guard_steps, rebuilds, refits;                        /* since creation */
   uint32_t inverted_max, substeps_max;    /* since creation */
   double stable_step;                     /* s, 0.9 of the bound at its last evaluation */
+  uint32_t asleep, reserved;              /* bodies that sleep now */
+  double sleep_energy, sleep_momentum[3]; /* J and N s that bodies still had when they fell asleep, since creation */
 } dfm_world_stats;
 /** @return DFM_OK; DFM_E_HANDLE. Threads: Any thread. Not during step. Since 0.1. */
 DFM_API dfm_status dfm_world_get_stats(dfm_world world, dfm_world_stats *out);

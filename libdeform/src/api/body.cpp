@@ -41,6 +41,7 @@ void sum_loads(Body &b) {
       double *const f = &b.p.load[size_t(load.points[i]) * kStride];
       store3(f, load3(f) + load3(&load.force[3 * i]));
     }
+  b.world->wake(b);
   b.world->changed = true;
 }
 
@@ -90,6 +91,7 @@ dfm_status dfm_body_set_filter(dfm_body body, uint32_t category, uint32_t collid
     Body &b = body_of(body);
     idle(*b.world);
     b.category = category, b.collides_with = collides_with;
+    b.world->wake(b);
     b.world->changed = true;
   });
 }
@@ -119,6 +121,7 @@ dfm_status dfm_body_set_state(dfm_body body, uint32_t n, const double *x, const 
         if (x) b.p.x[size_t(i) * kStride + size_t(k)] = x[size_t(3) * i + size_t(k)];
         if (v) b.p.v[size_t(i) * kStride + size_t(k)] = v[size_t(3) * i + size_t(k)];
       }
+    b.world->wake(b);
     b.world->bound_age = kNone;
   });
 }
@@ -140,6 +143,7 @@ dfm_status dfm_body_hold(dfm_body body, uint32_t n, const uint32_t *points, uint
     for (uint32_t i = 0; i < n; ++i) b.p.held[points[i]] = axes;
     update_inverse_mass(b.p);
     stop_held(b);
+    b.world->wake(b);
     b.world->bound_age = kNone;
   });
 }
@@ -160,6 +164,7 @@ dfm_status dfm_body_move_held(dfm_body body, uint32_t n, const uint32_t *points,
       for (int k = 0; k < 3; ++k) m.start.push_back(b.p.x[size_t(points[i]) * kStride + size_t(k)]);
     }
     b.motions.push_back(std::move(m));
+    b.world->wake(b);
     b.world->changed = true;
   });
 }
@@ -211,6 +216,7 @@ dfm_status dfm_body_apply_impulse(dfm_body body, const double point[3], const do
           closest_on_triangle(load3(point), surfel_vector(b, b.p.x, c[0]), surfel_vector(b, b.p.x, c[1]), surfel_vector(b, b.p.x, c[2]));
       if (q.distance2 < best) best = q.distance2, triangle = t, std::copy(q.weight, q.weight + 3, weight);
     }
+    b.world->wake(b);
     // dv = M^-1 N^T p: of all changes that give the point its new velocity the one of least kinetic energy
     for (int k = 0; k < 3; ++k)
       b.surface.each_phyxel(b.surface.tri[size_t(3) * triangle + size_t(k)], [&](uint32_t phyxel, double w) {
@@ -225,6 +231,22 @@ dfm_status dfm_body_set_params(dfm_body body, const dfm_params *params) {
     idle(*b.world);
     need(params, "params");
     set_model_params(b, *params);
+    b.world->wake(b);
+  });
+}
+
+dfm_status dfm_body_wake(dfm_body body) {
+  return guard([&] {
+    Body &b = body_of(body);
+    idle(*b.world).wake(b);
+  });
+}
+
+dfm_status dfm_body_is_asleep(dfm_body body, bool *asleep) {
+  return guard([&] {
+    const Body &b = body_of(body);
+    need(asleep, "asleep");
+    *asleep = b.slumber.asleep;
   });
 }
 

@@ -104,6 +104,7 @@ dfm_status dfm_world_add_friction(dfm_world world, const dfm_friction_def *given
     w.friction.reserve(w.friction.size() + 1);
     rule.law = w.add_law(def.law, {def.params.values, def.params.n});
     w.friction.push_back(std::move(rule));
+    w.wake_all();
     w.changed = true;
   });
 }
@@ -112,6 +113,7 @@ dfm_status dfm_world_filter_pair(dfm_world world, const char *a, const char *b, 
   return guard([&] {
     World &w = idle(world_of(world));
     w.filters.push_back({{side(w, a, false), side(w, b, false)}, collide});
+    w.wake_all();
     w.changed = true;
   });
 }
@@ -207,6 +209,7 @@ dfm_status dfm_world_hold_begin(dfm_world world) {
     w.holding = true, w.hold_start = w.time;
     std::fill(w.store.held.begin(), w.store.held.end(), uint8_t(0));
     std::fill(w.store.path.begin(), w.store.path.end(), 0.0);
+    w.hold_sleepers();
   });
 }
 

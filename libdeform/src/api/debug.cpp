@@ -44,7 +44,7 @@ dfm_status dfm_debug_write_surface(dfm_body body, const char *path) {
     need(path, "path");
     const uint32_t n = b.surface.nsurfel;
     std::vector<double> x(size_t(3) * n), v(size_t(3) * n), u(size_t(3) * n), force(size_t(3) * n);
-    const double h = b.world->report.h;
+    const double h = b.impulse_time();
     for (uint32_t s = 0; s < n; ++s) {
       store3(&x[size_t(3) * s], surfel_vector(b, b.p.x, s)), store3(&v[size_t(3) * s], surfel_vector(b, b.p.v, s));
       const Vec3 rest = load3(b.surface.identity() ? &b.p.rest[size_t(3) * b.surface.point[s]] : &b.surface.rest[size_t(3) * s]);

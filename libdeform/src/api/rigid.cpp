@@ -92,9 +92,10 @@ dfm_status dfm_rigid_get_state(dfm_rigid rigid, dfm_rigid_state *out) {
 dfm_status dfm_rigid_set_state(dfm_rigid rigid, const dfm_rigid_state *state) {
   return guard([&] {
     Obstacle &o = rigid_of(rigid);
-    idle(*o.world);
+    World &w = idle(*o.world);
     need(state, "state");
     set_rigid_state(o, *state);
+    w.wake_all();   // it may have been put where someone sleeps
   });
 }
 

@@ -31,7 +31,7 @@ dfm_status dfm_surface_velocities(dfm_body body, uint32_t capacity, double *xyz,
 
 dfm_status dfm_surface_forces(dfm_body body, uint32_t capacity, double *xyz, uint32_t *n) {
   return column(body, capacity, xyz, n, [](const Body &b, uint32_t s) {
-    const double h = b.world->report.h;
+    const double h = b.impulse_time();
     return b.world->plan.touches() && h > 0 ? (1 / h) * load3(&b.surfel_impulse[size_t(3) * s]) : Vec3{};
   });
 }

@@ -36,6 +36,7 @@ dfm_world_def dfm_world_def_default(void) {
   d.size = sizeof d;
   d.gravity[2] = -9.81;
   d.max_sweeps = 50, d.max_passes = 20, d.max_substeps = 10000;
+  d.sleep_speed = 0.01, d.sleep_time = 0.5;
   return d;
 }
 
@@ -50,6 +51,8 @@ dfm_status dfm_world_create(dfm_context *context, const dfm_world_def *def, dfm_
       fail(DFM_E_ARG, "contact_offset (m) and contact_tolerance (m/s) must be zero (automatic) or positive");
     if (w->def.max_sweeps == 0 || w->def.max_passes == 0 || w->def.max_substeps == 0)
       fail(DFM_E_ARG, "max_sweeps, max_passes and max_substeps must be at least 1");
+    if (w->def.sleep > 1) fail(DFM_E_ARG, "sleep is %u; it must be 0 (off) or 1 (on)", w->def.sleep);
+    if (!(w->def.sleep_speed > 0 && w->def.sleep_time > 0)) fail(DFM_E_ARG, "sleep_speed (m/s) and sleep_time (s) must be positive; the defaults are 0.01 and 0.5");
     if (w->def.method != DFM_METHOD_AUTO && w->def.method != DFM_METHOD_VELOCITY) fail(DFM_E_UNSUPPORTED, "contact method %d is not available; use DFM_METHOD_AUTO or DFM_METHOD_VELOCITY", w->def.method);
     if (w->def.integrator != DFM_INTEGRATOR_AUTO && w->def.integrator != DFM_INTEGRATOR_SYMPLECTIC_EULER)
       fail(DFM_E_UNSUPPORTED, "integrator %d is not available; use DFM_INTEGRATOR_AUTO or DFM_INTEGRATOR_SYMPLECTIC_EULER", w->def.integrator);
@@ -83,6 +86,7 @@ dfm_status dfm_world_set_gravity(dfm_world world, const double gravity[3]) {
       if (!std::isfinite(gravity[k])) fail(DFM_E_ARG, "gravity is not finite; give m/s2");
     store3(w.def.gravity, load3(gravity));
     w.gravity_keys.clear();
+    w.wake_all();
     w.changed = true;
   });
 }
@@ -94,6 +98,16 @@ dfm_status dfm_world_set_gravity_keys(dfm_world world, uint32_t n, const dfm_vec
     std::vector<dfm_vector_key> copy(keys, keys + n);
     check_keys(copy, "gravity");
     w.gravity_keys = std::move(copy);
+    w.wake_all();
+    w.changed = true;
+  });
+}
+
+dfm_status dfm_world_set_sleep(dfm_world world, bool sleep) {
+  return guard([&] {
+    World &w = idle(world_of(world));
+    w.wake_all();
+    w.def.sleep = sleep;
     w.changed = true;
   });
 }
@@ -192,7 +206,7 @@ dfm_status dfm_world_get_stats(dfm_world world, dfm_world_stats *out) {
     dfm_world_stats s = w.stats;
     s.rebuilds = w.broad.stats().rebuilds, s.refits = w.broad.stats().refits;
     s.threads = w.context->tasks.threads();
-    s.time = w.time;
+    s.time = w.time, s.asleep = w.sleepers;
     give(out, s);
   });
 }

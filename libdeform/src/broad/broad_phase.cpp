@@ -118,8 +118,11 @@ void BroadPhase::match(std::span<const BodyView> bodies, std::span<const Obstacl
 
 bool BroadPhase::find_dirty(std::span<const BodyView> bodies, std::span<const ObstacleView> obstacles, double h, double offset) {
   bool any = false;
-  for (Body &b : bodies_) {
-    if (!b.dirty) {
+  for (size_t i = 0; i < bodies_.size(); ++i) {
+    Body &b = bodies_[i];
+    const bool stays = b.asleep && bodies[i].asleep;
+    b.asleep = bodies[i].asleep;
+    if (!b.dirty && !stays) {
       const double moved = largest_norm(b.surface->nsurfel, b.surface->x.data(), b.x.data());
       b.dirty = !(kRounding * (moved + reach_share(h, offset, largest_speed(*b.surface))) <= b.margin);
     }

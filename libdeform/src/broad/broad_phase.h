@@ -46,6 +46,7 @@ class BroadPhase {
     const Surface *surface = nullptr;
     double margin = -1;     // negative: no lists yet
     bool dirty = true, usable = false;  // usable: all positions finite
+    bool asleep = false;    // at the last update: nothing has moved if it still is
     BoxTree tree;
     Array<double> x;        // [nsurfel,4] when the lists were made
     explicit Side(const Memory &m) : tree(m), x(HookAllocator<double>(m)) {}

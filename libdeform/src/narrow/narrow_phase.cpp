@@ -126,6 +126,7 @@ void find_contacts(std::span<const BodyView> bodies, std::span<const ObstacleVie
     const narrow::Run run(&c, end - i);
     i = end;
     const BodyView &a = *find_slot(bodies, c.slot_a);
+    if (a.asleep && !(c.obstacle ? find_slot(obstacles, c.slot_b)->moves() : !find_slot(bodies, c.slot_b)->asleep)) continue;
     if (c.obstacle) {
       const ObstacleView &view = *find_slot(obstacles, c.slot_b);
       if (view.shape == Shape::mesh) {

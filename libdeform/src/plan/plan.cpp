@@ -57,6 +57,7 @@ const char *stage_name(StageId id) {
     case StageId::commit: return "commit";
     case StageId::rigid_predict: return "rigid predict";
     case StageId::rigid_commit: return "rigid commit";
+    case StageId::sleep: return "sleep";
     case StageId::step: return "step";
   }
   return "?";
@@ -105,6 +106,8 @@ Plan make_plan(const SceneFacts &f) {
   }
   if (f.rigid_bodies) run(StageId::rigid_commit, "ends of " + rigids);
   if (f.bodies) run(StageId::commit, "positions and velocities at the end of the sub-step");
+  if (f.bodies && f.sleep) run(StageId::sleep, "islands at rest leave the stages above until something reaches them (contact.sleep)");
+  else leave("sleep", f.bodies ? "not asked for (contact.sleep)" : "no body");
   leave("self contact", "not asked for");
   leave("guard", "not available yet: contacts are made from the closest points at the start of each sub-step");
   return plan;

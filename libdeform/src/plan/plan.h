@@ -6,7 +6,7 @@
 
 namespace dfm {
 
-enum class StageId { motion, model, predict, gather, broad, narrow, solve, distribute, commit, rigid_predict, rigid_commit, step };
+enum class StageId { motion, model, predict, gather, broad, narrow, solve, distribute, commit, rigid_predict, rigid_commit, sleep, step };
 const char *stage_name(StageId id);
 
 // What the plan is derived from.
@@ -22,6 +22,7 @@ struct SceneFacts {
   std::vector<Provider> idle;                          // by models that the scene uses, if their parameters called for it
   std::vector<Provider> available;                     // by every loaded plugin
   bool effects_listed = false;
+  bool sleep = false;                                  // islands at rest may sleep
   std::vector<std::string> asked;                      // where listed
 };
 

@@ -303,7 +303,8 @@ void read_contact(const Node &scene, Definition &def, const ReadContext &context
   const Node contact = scene.member("contact");
   contact.object("contact");
   if (contact.word("method", "auto", "method") == "velocity") def.method = DFM_METHOD_VELOCITY;
-  for (const char *later : {"self", "untangle", "sleep"})
+  def.sleep = contact.boolean("sleep", false);
+  for (const char *later : {"self", "untangle"})
     if (contact.boolean(later, false)) contact.member(later).not_yet();
   if (contact.has("tolerance")) def.tolerance = contact.member("tolerance").number(kPositive);
   if (contact.has("offset")) def.offset = contact.member("offset").number(kPositive);

@@ -12,6 +12,7 @@ struct BodyView {
   uint32_t category, collides_with;
   uint64_t id;                        // rises with creation: decides order, never a pointer
   const Surface *surface;             // surface->x: start of the sub-step; surface->v: velocity without contact (mean over the sub-step)
+  bool asleep = false;                // x stays as it is; it meets only what is awake or moves
 };
 
 enum class Shape : uint8_t { plane = 0, sphere = 1, box = 2, capsule = 3, mesh = 4, voxels = 5 };
@@ -32,6 +33,7 @@ struct ObstacleView {
   const VoxelGrid *grid = nullptr;    // voxels: in the obstacle's frame
   Vec3 velocity, spin;                // of the pose over the sub-step, world frame, spin about position
   Vec3 belt;                          // velocity_surface: slips along, moves nothing
+  bool moves() const { return norm2(velocity) + norm2(spin) != 0; }
   // Mean over the sub-step, from p to where the turn carries it: (exp(h spin) - 1) r / h to third order. The first term alone is the tangent, and
   // what sticks to a turntable would creep outwards by h spin^2 r / 2.
   Vec3 velocity_at(Vec3 p, double h) const {

@@ -118,6 +118,7 @@ Body &create_body(World &w, const dfm_body_def &def) {
   b.model.create(type, w.context->host, mesh, m, std::move(values));
 
   w.bodies.reserve(w.bodies.size() + 1);
+  w.reserve_sleep(static_cast<uint32_t>(w.bodies.size() + 1));
   b.id = w.next_id;
   b.handle = handle_create(Kind::body, &b);
   ++w.next_id;
@@ -225,6 +226,7 @@ Obstacle &create_obstacle(World &w, const dfm_obstacle_def &def) {
   ++w.next_id;
   o.def.name = o.name.c_str();
   w.obstacles.push_back(std::move(owned));
+  w.wake_all();   // it may stand where someone sleeps
   w.changed = true;
   return o;
 }
@@ -232,7 +234,8 @@ Obstacle &create_obstacle(World &w, const dfm_obstacle_def &def) {
 namespace {
 
 // What remembers the removed thing: its contacts end with an event, its friction work leaves the books.
-void forget(World &w, uint64_t id, uint64_t handle) {
+void forget(World &w, uint64_t id, bool obstacle, uint64_t handle) {
+  w.close_slot(id, obstacle);
   ContactStore &s = w.store;
   w.reserve_events(s.n);
   for (uint32_t i = 0; i < s.n; ++i)
@@ -242,7 +245,6 @@ void forget(World &w, uint64_t id, uint64_t handle) {
     }
   std::erase_if(w.work, [&](const PairWork &p) { return p.a == id || p.b == id; });
   handle_destroy(handle);
-  w.report.n = 0;
   w.changed = true;
 }
 
@@ -250,14 +252,14 @@ void forget(World &w, uint64_t id, uint64_t handle) {
 
 void destroy_body(Body &b) {
   World &w = *b.world;
-  forget(w, b.id, b.handle);
+  forget(w, b.id, false, b.handle);
   std::erase_if(w.bodies, [&](auto &p) { return p.get() == &b; });
   w.worst_body = nullptr;
 }
 
 void destroy_obstacle(Obstacle &o) {
   World &w = *o.world;
-  forget(w, o.id, o.handle);
+  forget(w, o.id, true, o.handle);
   std::erase_if(w.obstacles, [&](auto &p) { return p.get() == &o; });
 }
 

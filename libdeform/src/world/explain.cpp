@@ -39,6 +39,7 @@ std::string cost(const World &w, StageId id) {
     case StageId::broad: return format("%zu surfels every sub-step; %zu triangles whenever a skin is used up", surfels, triangles);
     case StageId::narrow: return "candidate pairs";
     case StageId::solve: return "contacts x sweeps, laws once per pass";
+    case StageId::sleep: return format("velocities of %zu awake bodies of %zu", w.active.size(), w.bodies.size());
     case StageId::distribute: return format("contacts and %zu surfels", surfels);
     default: return "what is prescribed";
   }

@@ -29,7 +29,7 @@ dfm_body_measure measure(Body &b) {
     m.volume += b.share.empty() ? v : b.share[t / 4] * v, m.inverted += v < 0;
   }
   store3(m.com, com), store3(m.velocity, velocity), store3(m.momentum, momentum), store3(m.angular, angular);
-  store3(m.contact_impulse, b.contact_impulse);
+  store3(m.contact_impulse, b.contact_impulse + (b.slumber.asleep ? b.world->time - b.slumber.since : 0) * b.slumber.force);
   m.kinetic = kinetic, m.speed_max = std::sqrt(fastest);
   m.elastic = NAN;
   if ((b.model.ops->caps & DFM_CAP_ENERGY) && b.model.ops->energy) {

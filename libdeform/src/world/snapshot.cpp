@@ -5,13 +5,14 @@
 
 #include "core/error.h"
 #include "core/hash.h"
+#include "surfel/make_surface.h"
 #include "world/measure.h"
 #include "world/world.h"
 
 namespace dfm {
 namespace {
 
-constexpr char kMagic[8] = {'d', 'f', 'm', 's', 'n', 'a', 'p', '2'};
+constexpr char kMagic[8] = {'d', 'f', 'm', 's', 'n', 'a', 'p', '3'};
 
 void zone(Hash &h, const SurfaceZones::Zone &z) {
   h.add(z.group.data(), z.group.size()), h.add(z.material.data(), z.material.size()), h.add(z.friction);
@@ -106,6 +107,8 @@ struct StagedBody {
   std::vector<Load> loads;
   std::vector<HeldMotion> motions;
   uint32_t next_load = 1, category = 1, collides_with = ~0u;
+  Slumber slumber;
+  std::vector<double> surfel_impulse, anchor;
 };
 struct StagedObstacle { Pose pose, target; bool has_target; std::vector<dfm_pose_key> keys; dfm_obstacle_def def; };
 struct StagedRigids { std::vector<dfm_rigid_state> state; std::vector<double> extra, total; };
@@ -113,7 +116,7 @@ struct StagedLaw { std::string id; std::vector<double> params; };
 struct Staged {
   double time, stable, offset, hold_start;
   uint64_t step_count, next_id;
-  uint32_t inverted;
+  uint32_t inverted, sleepers;
   bool holding;
   uint32_t bound_age;
   dfm_world_stats stats;
@@ -128,7 +131,8 @@ struct Staged {
   std::vector<FilterRule> filters;
   ContactStore store;
   std::vector<PairWork> work;
-  explicit Staged(const Memory &m) : store(m) {}
+  Report report;
+  explicit Staged(const Memory &m) : store(m) { use_memory(m, report.contacts, report.frame, report.impulse, report.slip, report.mode); }
 };
 
 template <class T>
@@ -141,11 +145,16 @@ void fields(Stream &s, W &w) {
   s.value(w.time), s.value(w.step_count), s.value(w.stable), s.value(w.inverted), s.value(w.bound_age), s.value(w.offset);
   s.value(w.hold_start), s.value(w.holding);
   s.value(w.stats), s.value(w.gravity), s.value(w.def.gravity), s.value(w.next_id), s.array(w.gravity_keys);
+  s.value(w.def.sleep), s.value(w.sleepers);
   s.each(w.bodies, [&](auto &entry) {
     auto &b = object(entry);
     s.array(b.p.x), s.array(b.p.v), s.array(b.p.held), s.array(b.p.load), s.array(b.model.state), s.array(b.model.params);
     s.value(b.contact_impulse), s.value(b.next_load), s.value(b.category), s.value(b.collides_with);
     s.each(b.loads, [&](auto &l) { s.value(l.number), s.array(l.points), s.array(l.force), s.array(l.keys), s.value(l.sine); });
+    Slumber &z = b.slumber;
+    s.value(z.asleep), s.value(z.calm), s.value(z.since), s.value(z.h), s.value(z.force);
+    if (z.asleep) s.array(b.surfel_impulse);
+    if (w.def.sleep) s.array(b.anchor);
     s.each(b.motions, [&](auto &m) { s.array(m.points), s.array(m.start), s.array(m.keys), s.value(m.sine); });
   });
   s.each(w.obstacles, [&](auto &entry) {
@@ -164,6 +173,9 @@ void fields(Stream &s, W &w) {
   s.array(c.key), s.array(c.id_a), s.array(c.id_b), s.array(c.by_key), s.array(c.normal), s.array(c.tangent), s.array(c.impulse), s.array(c.bristle);
   s.array(c.law), s.array(c.dwell), s.array(c.path), s.array(c.touching), s.array(c.held), s.array(c.began);
   s.array(w.work);
+  if (w.sleepers == 0) return;   // contacts that sleep are reported from what the last sub-step left
+  auto &r = w.report;
+  s.value(r.n), s.value(r.h), s.array(r.contacts), s.array(r.frame), s.array(r.impulse), s.array(r.slip), s.array(r.mode);
 }
 
 void write_laws(Writer &s, const World &w) {
@@ -199,6 +211,19 @@ void check(const Staged &t, const World &w) {
          c.tangent.size() == 3 * n && c.impulse.size() == 3 * n && c.bristle.size() == n * c.nstate && c.law.size() == n && c.dwell.size() == n &&
          c.path.size() == 2 * n && c.touching.size() == n && c.held.size() == n && c.began.size() == n;
   for (uint32_t i : c.by_key) good = good && i < n;
+  uint32_t sleepers = 0;
+  for (size_t i = 0; good && i < t.bodies.size(); ++i) {
+    const StagedBody &from = t.bodies[i];
+    sleepers += from.slumber.asleep;
+    good = (!from.slumber.asleep || from.surfel_impulse.size() == w.bodies[i]->surfel_impulse.size()) &&
+           (!t.def.sleep || from.anchor.size() == w.bodies[i]->p.x.size());
+  }
+  good = good && sleepers == t.sleepers && t.def.sleep <= 1;
+  if (const Report &r = t.report; sleepers > 0) {
+    good = good && r.n == n && r.contacts.size() == n && r.frame.size() == 9 * n && r.impulse.size() == 3 * n && r.slip.size() == 2 * n && r.mode.size() == n;
+    for (const ContactPoint &p : r.contacts)
+      good = good && p.slot_a < w.bodies.size() && p.slot_b < (p.obstacle ? w.obstacles.size() : w.bodies.size());
+  }
   for (const FrictionRule &r : t.friction) good = good && r.law < t.laws.size();
   if (!good) fail(DFM_E_FORMAT, "the snapshot is damaged: its arrays do not fit this world; nothing was restored");
 }
@@ -246,6 +271,9 @@ void put(World &w, Staged &t) noexcept {
     copy(from.p.x, b.p.x), copy(from.p.v, b.p.v), copy(from.p.held, b.p.held), copy(from.p.load, b.p.load), copy(from.model.state, b.model.state);
     b.loads.swap(from.loads), b.motions.swap(from.motions);
     b.contact_impulse = from.contact_impulse, b.next_load = from.next_load, b.category = from.category, b.collides_with = from.collides_with;
+    b.slumber = from.slumber, b.bound.known = false;
+    if (t.def.sleep) copy(from.anchor, b.anchor);
+    if (b.slumber.asleep) copy(from.surfel_impulse, b.surfel_impulse), gather_surface(b.surface, b.p.x.data(), b.p.v.data());
     update_inverse_mass(b.p);
   }
   for (size_t i = 0; i < w.obstacles.size(); ++i) {
@@ -264,7 +292,8 @@ void put(World &w, Staged &t) noexcept {
   std::swap(w.store, t.store);
   w.time = t.time, w.step_count = t.step_count, w.hold_start = t.hold_start, w.holding = t.holding, w.stats = t.stats, w.next_id = t.next_id;
   w.worst_body = nullptr, w.worst_point = 0;
-  w.report.n = 0, w.report.h = 0;
+  w.def.sleep = t.def.sleep, w.sleepers = 0;   // prepare() counts them
+  std::swap(w.report, t.report);
   w.events.clear();
 }
 
@@ -281,6 +310,8 @@ uint64_t world_hash(const World &w) {
   const ContactStore &c = w.store;
   h.add(c.key.data(), c.key.size() * sizeof(uint64_t));
   h.add(c.bristle.data(), c.bristle.size() * sizeof(double));
+  if (w.def.sleep)
+    for (auto &b : w.bodies) h.add(b->slumber.asleep), h.add(b->slumber.calm), h.add(b->slumber.since);
   return h.value;
 }
 
@@ -316,6 +347,8 @@ void world_restore(World &w, const void *data, size_t bytes) {
   fields(s, staged);
   check(staged, w);
   std::vector<std::unique_ptr<LawInstance>> laws = make_laws(w, staged);
+  if (staged.def.sleep)
+    for (auto &b : w.bodies) b->anchor.resize(b->p.x.size());
   put_parameters(w, staged);
   w.laws.swap(laws);
   put(w, staged);

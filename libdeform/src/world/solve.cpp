@@ -149,12 +149,13 @@ bool World::stage_solve(uint32_t *trouble) {
 
 // All memory that keep_contacts() will need, so that it cannot fail once the bodies have moved.
 void World::reserve_contacts() {
-  const uint32_t n = rows.n, S = state.nstate;
+  const uint32_t n = rows.n + (sleepers ? store.n : 0), S = state.nstate;
   ContactStore &to = next_store;
+  Report &next = sleepers ? last_report : report;   // the one that keep_contacts() will write
   auto room = [&](size_t entries, auto &...arrays) { (arrays.reserve(entries), ...); };
-  room(n, to.key, to.id_a, to.id_b, to.by_key, to.law, to.dwell, to.touching, to.held, to.began, report.contacts, report.mode);
-  room(size_t(2) * n, to.path, report.slip), room(size_t(3) * n, to.normal, to.tangent, to.impulse, report.impulse);
-  room(size_t(S) * n, to.bristle), room(size_t(9) * n, report.frame);
+  room(n, to.key, to.id_a, to.id_b, to.by_key, to.law, to.dwell, to.touching, to.held, to.began, next.contacts, next.mode);
+  room(size_t(2) * n, to.path, next.slip), room(size_t(3) * n, to.normal, to.tangent, to.impulse, next.impulse);
+  room(size_t(S) * n, to.bristle), room(size_t(9) * n, next.frame);
   work.reserve(std::min(work.size() + n, bodies.size() * (bodies.size() + obstacles.size())));
   reserve_events(size_t(n) + store.n);
 }
@@ -173,6 +174,7 @@ void World::add_event(uint32_t kind, uint64_t a, uint64_t b, uint64_t key, doubl
 void World::keep_contacts() {
   const uint32_t n = rows.n, S = state.nstate;
   ContactStore &to = next_store;
+  if (sleepers) std::swap(report, last_report);
   to.n = n, to.nstate = S, to.h = h;
   to.key.resize(n), to.id_a.resize(n), to.id_b.resize(n), to.by_key.resize(n), to.law.resize(n), to.dwell.resize(n);
   to.normal.resize(size_t(3) * n), to.tangent.resize(size_t(3) * n), to.impulse.resize(size_t(3) * n), to.path.resize(size_t(2) * n);
@@ -220,8 +222,9 @@ void World::keep_contacts() {
     }
   }
   std::sort(to.by_key.begin(), to.by_key.end(), [&](uint32_t i, uint32_t j) { return to.key[i] < to.key[j]; });
+  if (sleepers) carry_sleepers(&touching, &sticking);
   for (uint32_t m = 0; m < store.n; ++m)
-    if (store.touching[m] && to.find(store.key[m]) == kNone) add_event(DFM_EVENT_END, store.id_a[m], store.id_b[m], store.key[m], time + h);
+    if (store.touching[m] && !sleeps(m) && to.find(store.key[m]) == kNone) add_event(DFM_EVENT_END, store.id_a[m], store.id_b[m], store.key[m], time + h);
   std::swap(store, next_store);
 
   stats.contacts = touching, stats.sticking = sticking, stats.pairs_tested = static_cast<uint32_t>(broad.candidates().size());

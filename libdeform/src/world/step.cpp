@@ -1,6 +1,6 @@
 // One step, from top to bottom:
 //
-//   bound -> n sub-steps of { motion -> model -> predict -> broad -> narrow -> contact <-> friction -> distribute -> commit }
+//   bound -> n sub-steps of { motion -> model -> predict -> broad -> narrow -> contact <-> friction -> distribute -> commit -> sleep }
 //
 // The list of stages is the plan's (plan/plan.cpp): what a scene does not call for is not in it. Sub-steps are equal and the contact solve
 // runs in each; detection keeps its candidate lists while nothing has moved further than their skin.
@@ -12,7 +12,6 @@
 
 #include "core/error.h"
 #include "integrate/symplectic_euler.h"
-#include "narrow/narrow_phase.h"
 #include "surfel/make_surface.h"
 #include "world/world.h"
 
@@ -78,12 +77,13 @@ bool run_stage(World &w, StageId id, uint32_t *trouble) {
     case StageId::predict: return w.stage_predict(trouble);
     case StageId::gather: w.stage_gather(); return true;
     case StageId::broad: w.stage_broad(); return true;
-    case StageId::narrow: w.stage_narrow(); return true;
+    case StageId::narrow: return w.stage_narrow(trouble);
     case StageId::solve: return w.stage_solve(trouble);
     case StageId::distribute: w.stage_distribute(); return true;
     case StageId::commit: return w.stage_commit(trouble);
     case StageId::rigid_predict: return w.stage_rigid_predict(trouble);
     case StageId::rigid_commit: return w.stage_rigid_commit(trouble);
+    case StageId::sleep: w.stage_sleep(); return true;
     case StageId::step: return true;
   }
   return true;
@@ -156,7 +156,8 @@ dfm_status World::step(double dt, uint32_t *trouble) {
     const double end = last ? goal : from + span * (double(k + 1) / cut);
     h = end - time;
     view_obstacles(*this, time, h, goal - time);
-    if (!sub_step(trouble)) return DFM_E_DIVERGED;
+    if (idle()) stats.contacts_mean += (stats.contacts - stats.contacts_mean) / double(stats.substeps + 1);
+    else if (!sub_step(trouble)) return DFM_E_DIVERGED;
     move_obstacles(*this, time, h, goal - time, last);
     time = end;
     ++stats.substeps, ++bound_age;
@@ -187,17 +188,11 @@ void World::update_bound() {
   inverted = 0;
   double fastest = 0;
   for (auto &b : bodies) {
-    inverted += inverted_cells(*b);
-    if (b->model.stepper || !b->model.ops->bound) continue;
-    fastest = std::max(fastest, strain_rate(*b));
-    std::fill(b->ksum.begin(), b->ksum.end(), 0.0), std::fill(b->csum.begin(), b->csum.end(), 0.0);
-    double cell = std::numeric_limits<double>::infinity();
-    const dfm_kin k = b->kin(time, 0, nullptr);
-    if (b->model.call("bound", [&] { return b->model.ops->bound(b->model.self, &k, b->ksum.data(), b->csum.data(), &cell); }) != DFM_OK)
-      fail(DFM_E_FATAL, "model '%s' of body '%s' gives no step bound", b->model.type->id, b->name.c_str());
-    uint32_t worst;
-    const double own = std::min(cell, stable_step(b->p, b->ksum.data(), b->csum.data(), &worst));
-    if (own < stable) stable = own, worst_body = b.get(), worst_point = worst;
+    const bool stays = b->slumber.asleep && b->bound.known;
+    if (!stays) ask_bound(*b);   // who sleeps counts too: the step must not change when it wakes
+    inverted += b->bound.inverted;
+    if (!stays && !b->model.stepper && b->model.ops->bound) fastest = std::max(fastest, strain_rate(*b));
+    if (b->bound.step < stable) stable = b->bound.step, worst_body = b.get(), worst_point = b->bound.point;
   }
   stable *= kBoundShare;
   stats.stable_step = stable, stats.inverted_max = std::max(stats.inverted_max, inverted);
@@ -205,10 +200,22 @@ void World::update_bound() {
   bound_age = keeps >= kBoundEvery || !(fastest > 0) ? 0 : kBoundEvery - std::max(1u, static_cast<uint32_t>(keeps));
 }
 
+void World::ask_bound(Body &b) {
+  b.bound = {true, std::numeric_limits<double>::infinity(), 0, inverted_cells(b)};
+  if (b.model.stepper || !b.model.ops->bound) return;
+  std::fill(b.ksum.begin(), b.ksum.end(), 0.0), std::fill(b.csum.begin(), b.csum.end(), 0.0);
+  double cell = std::numeric_limits<double>::infinity();
+  const dfm_kin k = b.kin(time, 0, nullptr);
+  if (b.model.call("bound", [&] { return b.model.ops->bound(b.model.self, &k, b.ksum.data(), b.csum.data(), &cell); }) != DFM_OK)
+    fail(DFM_E_FATAL, "model '%s' of body '%s' gives no step bound", b.model.type->id, b.name.c_str());
+  b.bound.step = std::min(cell, stable_step(b.p, b.ksum.data(), b.csum.data(), &b.bound.point));
+}
+
 void World::stage_motion() {
   // Held velocities are the one part of the state that changes before a sub-step is known to succeed; what was there is kept.
   if (!gravity_keys.empty()) gravity = vector_at(gravity_keys, time + h);
   for (auto &b : bodies) {
+    if (b->slumber.asleep) continue;
     if (b->loads_vary()) {
       std::fill(b->p.load.begin(), b->p.load.end(), 0.0);
       for (const Load &load : b->loads) {
@@ -244,8 +251,8 @@ void World::undo_motion() {
 
 bool World::stage_model(uint32_t *trouble) {
   FirstFailure failed;
-  context->tasks.parallel_for(static_cast<uint32_t>(bodies.size()), 1, [&](uint32_t begin, uint32_t end) {
-    for (uint32_t i = begin; i < end; ++i) {
+  context->tasks.parallel_for(static_cast<uint32_t>(active.size()), 1, [&](uint32_t begin, uint32_t end) {
+    for (const uint32_t i : std::span(active).subspan(begin, end - begin)) {
       Body &b = *bodies[i];
       if (b.model.stepper) continue;
       std::copy(b.p.load.begin(), b.p.load.end(), b.p.f.begin());
@@ -264,8 +271,8 @@ bool World::stage_model(uint32_t *trouble) {
 bool World::stage_predict(uint32_t *trouble) {
   const bool touches = plan.touches();
   FirstFailure failed;
-  context->tasks.parallel_for(static_cast<uint32_t>(bodies.size()), 1, [&](uint32_t begin, uint32_t end) {
-    for (uint32_t i = begin; i < end; ++i) {
+  context->tasks.parallel_for(static_cast<uint32_t>(active.size()), 1, [&](uint32_t begin, uint32_t end) {
+    for (const uint32_t i : std::span(active).subspan(begin, end - begin)) {
       Body &b = *bodies[i];
       bool good = true;
       if (b.model.stepper) {
@@ -299,7 +306,8 @@ bool World::stage_predict(uint32_t *trouble) {
 
 // Surfels that hang on several phyxels: rows of N are independent of each other, so they are cut among the threads.
 void World::stage_gather() {
-  for (auto &b : bodies) {
+  for (const uint32_t i : active) {
+    const auto &b = bodies[i];
     if (b->surface.identity()) continue;
     const double *const v = b->model.stepper ? nullptr : b->p.v_free.data();   // a self-stepping model has answered its surfels' velocities
     context->tasks.parallel_for(b->surface.nsurfel, 1024, [&](uint32_t begin, uint32_t end) {
@@ -317,8 +325,6 @@ void World::stage_broad() {
   }
 }
 
-void World::stage_narrow() { find_contacts(body_views, obstacle_views, broad.candidates(), h, offset, lent, contacts); }
-
 void World::stage_distribute() {
   distribute(contacts, rows.frame.data(), rows.impulse.data(), sinks);
 }
@@ -326,8 +332,8 @@ void World::stage_distribute() {
 // Self-stepping bodies write their end of the sub-step beside the present state, so that one that fails leaves all bodies as they were.
 bool World::commit_steppers(uint32_t *trouble) {
   FirstFailure failed;
-  context->tasks.parallel_for(static_cast<uint32_t>(bodies.size()), 1, [&](uint32_t begin, uint32_t end) {
-    for (uint32_t i = begin; i < end; ++i) {
+  context->tasks.parallel_for(static_cast<uint32_t>(active.size()), 1, [&](uint32_t begin, uint32_t end) {
+    for (const uint32_t i : std::span(active).subspan(begin, end - begin)) {
       Body &b = *bodies[i];
       if (!b.model.stepper) continue;
       if (!plan.touches()) std::fill(b.surfel_impulse.begin(), b.surfel_impulse.end(), 0.0);
@@ -355,8 +361,8 @@ bool World::stage_commit(uint32_t *trouble) {
   const bool steppers = std::any_of(bodies.begin(), bodies.end(), [](auto &b) { return b->model.stepper != nullptr; });
   if (steppers && !commit_steppers(trouble)) return false;
   const bool touched = plan.touches() && rows.n > 0;
-  context->tasks.parallel_for(static_cast<uint32_t>(bodies.size()), 1, [&](uint32_t begin, uint32_t end) {
-    for (uint32_t i = begin; i < end; ++i) {
+  context->tasks.parallel_for(static_cast<uint32_t>(active.size()), 1, [&](uint32_t begin, uint32_t end) {
+    for (const uint32_t i : std::span(active).subspan(begin, end - begin)) {
       Body &b = *bodies[i];
       if (b.model.stepper) b.p.x.swap(b.p.f), b.p.v.swap(b.p.v_free);
       else commit(b.p, touched, h);

@@ -12,6 +12,8 @@ bool Body::loads_vary() const {
   return std::any_of(loads.begin(), loads.end(), [](const Load &l) { return !l.keys.empty() || l.sine.amplitude[0] != 0; });
 }
 
+double Body::impulse_time() const { return slumber.asleep ? slumber.h : world->report.h; }
+
 dfm_kin Body::kin(double t, double h, double *state_out) const {
   dfm_kin k{};
   k.size = sizeof k, k.stride = kStride, k.t = t, k.dt = h;
@@ -27,10 +29,11 @@ Pose Obstacle::pose_at_time(double t) const {
 }
 
 World::World(dfm_context *c)
-    : context(c), broad(c->memory), rows(c->memory), acceleration(c->memory), store(c->memory), next_store(c->memory), batches(c->memory) {
+    : context(c), broad(c->memory), rows(c->memory), acceleration(c->memory), store(c->memory), next_store(c->memory), batches(c->memory), islands(c->memory) {
   const Memory &m = c->memory;
   use_memory(m, driven, lent, contacts, tolerance.tangent, disturbance, best_impulse, tangents, match, block_surfels, block_impulse, block_velocity);
-  use_memory(m, report.contacts, report.frame, report.impulse, report.slip, report.mode);
+  for (Report *r : {&report, &last_report}) use_memory(m, r->contacts, r->frame, r->impulse, r->slip, r->mode);
+  use_memory(m, active, woken, stirred);
   use_memory(m, state.law, state.fn, state.vt, state.ft_stop, state.area, state.dwell, state.bristle, state.ft, state.dft_dvt, state.dft_dfn, state.limit,
              state.bristle_out, state.mode, state.set_valued);
   stats.size = sizeof stats;
@@ -94,9 +97,9 @@ void World::prepare() {
   const uint32_t nb = static_cast<uint32_t>(bodies.size()), no = static_cast<uint32_t>(obstacles.size()), width = nb + no;
   SceneFacts facts;
   facts.bodies = nb, facts.obstacles = no;
-  facts.gravity_keys = !gravity_keys.empty();
+  facts.gravity_keys = !gravity_keys.empty(), facts.sleep = def.sleep != 0;
 
-  body_views.clear(), obstacle_views.clear(), sources.clear(), sinks.clear();
+  body_views.clear(), obstacle_views.clear(), sources.clear();
   uint32_t node = 0, point = 0;
   for (uint32_t i = 0; i < nb; ++i) {
     Body &b = *bodies[i];
@@ -107,7 +110,6 @@ void World::prepare() {
     body_views.push_back({i, node, b.category, b.collides_with, b.id, &s});
     sources.push_back({node, s.nsurfel, point, b.p.n, &s, b.model.stepper ? nullptr : b.p.inv_mass.data(),
                        b.model.stepper ? s.v.data() : b.p.v_free.data()});
-    sinks.push_back({node, s.nsurfel, b.p.n, &s, b.surfel_impulse.data(), b.model.stepper ? nullptr : b.p.impulse.data()});
     if (!s.identity()) ++facts.coupled, facts.coupled_surfels += s.nsurfel;
     node += s.nsurfel, point += b.p.n;
     for (const std::string &e : effects(*b.model.type)) (b.model.works(e) ? facts.offered : facts.idle).push_back({e, b.model.type->id});
@@ -173,7 +175,14 @@ void World::prepare() {
 
   // While contacts live it only falls: a larger one would turn their rest into a depth, and push them apart at 0.1 d_c / h.
   const double wanted = contact_offset(*this);
+  const double before = offset;
   offset = def.contact_offset > 0 ? def.contact_offset : store.n > 0 ? std::min(offset, wanted) : wanted;
+  for (auto &b : bodies)
+    if (def.sleep && b->anchor.empty()) b->anchor = b->p.x;
+  active.reserve(nb), sinks.reserve(nb);
+  reserve_sleep(nb);
+  if (sleepers > 0 && offset != before) wake_all();   // contacts rest at another distance now
+  gather_active();
   gravity = load3(def.gravity);
   if (!gravity_keys.empty()) gravity = vector_at(gravity_keys, time);
   bound_age = kNone;

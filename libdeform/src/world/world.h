@@ -20,8 +20,10 @@
 #include "surfel/views.h"
 #include "surfel/voxel_grid.h"
 #include "surfel/zones.h"
+#include "world/islands.h"
 #include "world/motion.h"
 #include "world/rigid.h"
+#include "world/sleep.h"
 
 namespace dfm {
 
@@ -70,8 +72,12 @@ struct Body {
   Vec3 contact_impulse;              // N s since creation
   Array<double> surfel_impulse;      // [nsurfel,3] N s of the last sub-step
   Array<double> ksum, csum;          // [n] row sums of the step bound
+  struct { bool known = false; double step = 0; uint32_t point = 0, inverted = 0; } bound;   // as last asked for; holds while asleep
+  Slumber slumber;
+  Array<double> anchor;              // [n,4] m, positions since which it is calm; empty where nothing may sleep
 
   bool loads_vary() const;
+  double impulse_time() const;       // s that surfel_impulse belongs to
   dfm_kin kin(double t, double h, double *state_out) const;
 };
 
@@ -173,11 +179,17 @@ struct World {
   Residual residual;
   uint32_t passes = 0, sweeps = 0;
 
-  Report report;
+  Report report, last_report;                          // last_report: scratch
   std::vector<PairWork> work;                          // sorted by (a, b)
   std::vector<dfm_contact_event> events;
   double hold_start = 0;
   bool holding = false;
+
+  // Sleep. With nobody asleep `active` holds all bodies.
+  Islands islands;
+  Array<uint32_t> active, woken;                       // slots that the stages work on, ascending; slots woken in this sub-step
+  Array<uint8_t> stirred;                              // [island] scratch
+  uint32_t sleepers = 0;
 
   dfm_world_stats stats{};
   std::array<double, 16> stage_seconds{};
@@ -204,6 +216,7 @@ struct World {
   bool sub_step(uint32_t *trouble);
   void undo_motion();                                  // held velocities as before stage_motion()
   void update_bound();                                 // stable, worst_body, worst_point
+  void ask_bound(Body &b);
 
   // stages of a sub-step, each in the file of its name
   void stage_motion();
@@ -214,11 +227,24 @@ struct World {
   void keep_rigids();                                  // rigid.cpp: once the sub-step is known to succeed
   void stage_gather();
   void stage_broad();
-  void stage_narrow();
+  bool stage_narrow(uint32_t *trouble);                // sleep.cpp
   bool stage_solve(uint32_t *trouble);                 // solve.cpp
   void stage_distribute();
   bool stage_commit(uint32_t *trouble);
   bool commit_steppers(uint32_t *trouble);
+  void stage_sleep();                                  // sleep.cpp, as are the next ones
+  void gather_active();
+  void reserve_sleep(uint32_t n);                      // waking and falling asleep allocate nothing, and cannot fail
+  void wake(Body &b);                                  // and its island
+  void wake_all();
+  void wake_touching(uint64_t obstacle);
+  void rouse(std::span<const uint32_t> slots);
+  void fall_asleep(Body &b, double end);
+  bool idle() const;
+  void carry_sleepers(uint32_t *touching, uint32_t *sticking);
+  bool sleeps(uint32_t m) const;
+  void close_slot(uint64_t id, bool obstacle);
+  void hold_sleepers();                                // hold_begin() while contacts sleep
   void reserve_events(size_t more);
   void add_event(uint32_t kind, uint64_t a, uint64_t b, uint64_t key, double t);   // a, b: ids
   void reserve_contacts();                             // solve.cpp: memory for keep_contacts()

@@ -1,0 +1,52 @@
+// Every scene is cut in the middle of its contact: a new process takes the snapshot and ends with the same bits.
+// The program runs itself as `PROGRAM --continue SCENE FILE STEPS THREADS`.
+#include <cstdlib>
+#include <cstring>
+
+#include "scenes.h"
+#include "support.h"
+
+int main(int argc, char **argv) {
+  if (argc == 6 && std::strcmp(argv[1], "--continue") == 0) {
+    const test::Context c{uint32_t(std::atoi(argv[5]))};
+    for (const scenes::Scene &s : scenes::all) {
+      if (s.name != std::string(argv[2])) continue;
+      const dfm_world w = s.build(c);
+      const std::string data = test::read_file(argv[3]);
+      if (dfm_world_restore(w, data.data(), data.size()) != DFM_OK) return std::fprintf(stderr, "%s\n", dfm_last_error()), 1;
+      scenes::advance(w, std::atoi(argv[4]));
+      std::printf("%s\n", scenes::hex(dfm_world_hash(w)).c_str());
+    }
+    return 0;
+  }
+  testing::InitGoogleTest(&argc, argv);
+  return RUN_ALL_TESTS();
+}
+
+namespace {
+
+class Process : public testing::TestWithParam<scenes::Scene> {};
+INSTANTIATE_TEST_SUITE_P(Scenes, Process, testing::ValuesIn(scenes::all), [](const auto &i) { return std::string(i.param.name); });
+
+TEST_P(Process, ThatRestoresASnapshotTakenInContact_EndsWithTheSameBits) {
+  const scenes::Scene s = GetParam();
+  const int before = s.steps * 6 / 10, after = s.steps - before;
+  const test::Context c;
+  const dfm_world w = s.build(c);
+  scenes::advance(w, before);
+  EXPECT_GT(test::stats(w).contacts, 0u) << "nothing touches: the snapshot shows little";
+  EXPECT_EQ(test::stats(w).asleep > 0, s.name == std::string("woken"));
+  size_t bytes = 0;
+  test::ok(dfm_world_snapshot(w, nullptr, &bytes));
+  std::string data(bytes, '\0');
+  test::ok(dfm_world_snapshot(w, data.data(), &bytes));
+  const std::string file = test::scratch(std::string("process_") + s.name) + "/cut.bin";
+  test::write_file(file, data);
+  scenes::advance(w, after);
+  if (s.name == std::string("woken")) EXPECT_EQ(test::stats(w).asleep, 1u) << "the ball has woken one of two";
+  const test::CommandResult r = test::run({"/proc/self/exe", "--continue", s.name, file, std::to_string(after), "3"});
+  EXPECT_EQ(r.exit_code, 0) << r.err;
+  EXPECT_EQ(r.out, scenes::hex(dfm_world_hash(w)) + "\n");
+}
+
+}  // namespace
