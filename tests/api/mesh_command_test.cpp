@@ -7,6 +7,7 @@
 #include <filesystem>
 
 #include "deform/deform.h"
+#include "logged_context.h"
 #include "support.h"
 
 namespace {
@@ -23,18 +24,6 @@ void expect_refused(const std::vector<std::string> &args, const std::vector<std:
   EXPECT_TRUE(r.out.empty()) << r.out;
   for (const auto &word : words) EXPECT_TRUE(has(r.err, word)) << "no '" << word << "' in: " << r.err;
 }
-
-struct Context {
-  dfm_context *context = nullptr;
-  std::string log;
-  Context() {
-    dfm_context_def def = dfm_context_def_default();
-    def.user = this;
-    def.log = [](void *user, int32_t, const char *text) { static_cast<Context *>(user)->log += std::string(text) + "\n"; };
-    EXPECT_EQ(dfm_context_create(&def, &context), DFM_OK);
-  }
-  ~Context() { dfm_context_destroy(context); }
-};
 
 }  // namespace
 
@@ -207,7 +196,7 @@ TEST(MeshCommand, BadInput_ExitsTwoWithOneSentence) {
 }
 
 TEST(MeshApi, Read_TellsWarningsAndLends) {
-  Context c;
+  test::LoggedContext c;
   dfm_tetmesh mesh = 0;
   ASSERT_EQ(dfm_tetmesh_read(c.context, own("cube_msh41_bin_be.msh").c_str(), &mesh), DFM_OK) << dfm_last_error();
   EXPECT_TRUE(has(c.log, "cube_msh41_bin_be.msh: 1 point that no tetrahedron uses was dropped")) << c.log;
@@ -235,7 +224,7 @@ TEST(MeshApi, Read_TellsWarningsAndLends) {
 }
 
 TEST(MeshApi, OlderInfoStruct_IsFilledAsFarAsItGoes) {
-  Context c;
+  test::LoggedContext c;
   dfm_tetmesh mesh = 0;
   const double size[3] = {0.1, 0, 0};
   ASSERT_EQ(dfm_tetmesh_make(c.context, "ball", size, 100, &mesh), DFM_OK);
@@ -251,14 +240,14 @@ TEST(MeshApi, ContextDestroyed_TakesItsMeshesAlong) {
   dfm_tetmesh mesh = 0;
   const double size[3] = {1, 1, 1};
   {
-    Context c;
+    test::LoggedContext c;
     ASSERT_EQ(dfm_tetmesh_make(c.context, "beam", size, 10, &mesh), DFM_OK);
   }
   EXPECT_EQ(dfm_tetmesh_data(mesh, nullptr, nullptr, nullptr), DFM_E_HANDLE);
 }
 
 TEST(MeshApi, WrongArguments_LeaveTheOutputAlone) {
-  Context c;
+  test::LoggedContext c;
   dfm_tetmesh mesh = 77;
   const double size[3] = {1, 1, 1};
   EXPECT_EQ(dfm_tetmesh_make(c.context, "cone", size, 10, &mesh), DFM_E_ARG);
@@ -276,7 +265,7 @@ TEST(MeshApi, SurfaceGroupInAScene_HoldsItsPoints) {
     const std::string scene = folder() + "/group" + std::to_string(fix.size()) + ".json";
     test::write_file(scene, "{\"format\": \"deform-scene\", \"version\": 1, \"time\": {\"duration\": 1, \"step\": 0.0001}, \"bodies\": "
                             "[{\"name\": \"cube\", \"mesh\": \"" + own("cube_msh41_ascii.msh") + "\"" + fix + "}]}");
-    Context c;
+    test::LoggedContext c;
     dfm_world world = 0;
     dfm_body body = 0;
     double x[24] = {};

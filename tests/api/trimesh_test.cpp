@@ -7,24 +7,13 @@
 #include <limits>
 
 #include "deform/deform.h"
+#include "logged_context.h"
 #include "support.h"
 
 namespace {
 
 std::string folder() { return test::scratch("trimesh"); }
 bool has(const std::string &text, const std::string &word) { return text.find(word) != std::string::npos; }
-
-struct Context {
-  dfm_context *context = nullptr;
-  std::string log;
-  Context() {
-    dfm_context_def def = dfm_context_def_default();
-    def.user = this;
-    def.log = [](void *user, int32_t, const char *text) { static_cast<Context *>(user)->log += std::string(text) + "\n"; };
-    EXPECT_EQ(dfm_context_create(&def, &context), DFM_OK);
-  }
-  ~Context() { dfm_context_destroy(context); }
-};
 
 // A tetrahedron, each triangle with its own corners, the second turned, and a point that nothing uses.
 const double kPoints[39] = {0, 0, 0, 0, 1, 0, 1, 0, 0, /**/ 0, 0, 0, 0, 0, 1, 1, 0, 0, /**/ 0, 0, 0, 0, 0, 1, 0, 1, 0,
@@ -41,7 +30,7 @@ dfm_trimesh_info info_of(dfm_trimesh mesh) {
 }  // namespace
 
 TEST(TrimeshApi, Create_RepairsTellsAndLends) {
-  Context c;
+  test::LoggedContext c;
   dfm_trimesh mesh = 0;
   ASSERT_EQ(dfm_trimesh_create(c.context, 13, kPoints, 4, kTriangles, &mesh), DFM_OK) << dfm_last_error();
   const dfm_trimesh_info i = info_of(mesh);
@@ -78,7 +67,7 @@ TEST(TrimeshApi, Create_RepairsTellsAndLends) {
 }
 
 TEST(TrimeshApi, WriteAndRead_KeepsTheSurface) {
-  Context c;
+  test::LoggedContext c;
   const double size[3] = {0.3, 0.1, 0};
   dfm_trimesh mesh = 0, back = 0;
   ASSERT_EQ(dfm_trimesh_make(c.context, "torus", size, 400, &mesh), DFM_OK) << dfm_last_error();
@@ -99,7 +88,7 @@ TEST(TrimeshApi, WriteAndRead_KeepsTheSurface) {
 }
 
 TEST(TrimeshApi, ReadCells_GivesTheirBoundary) {
-  Context c;
+  test::LoggedContext c;
   const double size[3] = {0.2, 0.5, 0};
   const std::string path = folder() + "/cylinder.msh";
   dfm_tetmesh cells = 0;
@@ -115,7 +104,7 @@ TEST(TrimeshApi, ReadCells_GivesTheirBoundary) {
 }
 
 TEST(TrimeshApi, OlderInfoStruct_IsFilledAsFarAsItGoes) {
-  Context c;
+  test::LoggedContext c;
   dfm_trimesh mesh = 0;
   ASSERT_EQ(dfm_trimesh_create(c.context, 13, kPoints, 4, kTriangles, &mesh), DFM_OK);
   dfm_trimesh_info info;
@@ -129,14 +118,14 @@ TEST(TrimeshApi, OlderInfoStruct_IsFilledAsFarAsItGoes) {
 TEST(TrimeshApi, ContextDestroyed_TakesItsSurfacesAlong) {
   dfm_trimesh mesh = 0;
   {
-    Context c;
+    test::LoggedContext c;
     ASSERT_EQ(dfm_trimesh_create(c.context, 13, kPoints, 4, kTriangles, &mesh), DFM_OK);
   }
   EXPECT_EQ(dfm_trimesh_data(mesh, nullptr, nullptr, nullptr), DFM_E_HANDLE);
 }
 
 TEST(TrimeshApi, CellsAndSurfaces_AreNotMixedUp) {
-  Context c;
+  test::LoggedContext c;
   dfm_trimesh surface = 0;
   dfm_tetmesh cells = 0;
   const double size[3] = {0.1, 0, 0};
@@ -148,7 +137,7 @@ TEST(TrimeshApi, CellsAndSurfaces_AreNotMixedUp) {
 }
 
 TEST(TrimeshApi, WrongArguments_LeaveTheOutputAlone) {
-  Context c;
+  test::LoggedContext c;
   dfm_trimesh mesh = 77;
   const double size[3] = {1, 1, 1};
   uint32_t far[12];

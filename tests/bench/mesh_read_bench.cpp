@@ -7,9 +7,9 @@
 #include <cstdlib>
 #include <cstring>
 #include <filesystem>
-#include <fstream>
 #include <limits>
 
+#include "machine.h"
 #include "mesh/raw_mesh.h"
 #include "support.h"
 
@@ -38,21 +38,6 @@ double cpu_seconds() {
   rusage u{};
   getrusage(RUSAGE_SELF, &u);
   return double(u.ru_utime.tv_sec + u.ru_stime.tv_sec) + 1e-6 * double(u.ru_utime.tv_usec + u.ru_stime.tv_usec);
-}
-
-std::string compiler() {
-#if defined(__clang__)
-  return "clang " __clang_version__;
-#else
-  return "gcc " __VERSION__;
-#endif
-}
-
-std::string machine() {
-  std::ifstream in("/proc/cpuinfo");
-  for (std::string line; std::getline(in, line);)
-    if (line.rfind("model name", 0) == 0) return line.substr(line.find(':') + 2);
-  return "unknown";
 }
 
 }  // namespace
@@ -86,7 +71,7 @@ int main(int argc, char **argv) {
     std::filesystem::remove(path);
     std::printf("%-10s %10u %8.0f %10.2f %10.2f %12.0f %12.0f\n", name, beam.ntet(), megabytes, parse, whole, double(peak) / each, double(held) / each);
     if (!csv.empty())
-      std::ofstream(csv, std::ios::app) << machine() << ',' << compiler() << ',' << name << ',' << beam.ntet() << ',' << megabytes << ','
+      std::ofstream(csv, std::ios::app) << bench::machine() << ',' << bench::compiler() << ',' << name << ',' << beam.ntet() << ',' << megabytes << ','
                                         << parse << ',' << whole << ',' << double(peak) / each << ',' << double(held) / each << '\n';
   }
   return 0;

@@ -5,11 +5,11 @@
 
 #include <cstdio>
 #include <cstring>
-#include <fstream>
 #include <string>
 #include <vector>
 
 #include "deform/deform.h"
+#include "machine.h"
 #include "support.h"
 
 namespace {
@@ -30,21 +30,6 @@ double cpu_seconds() {
 [[noreturn]] void die(const std::string &what) {
   std::fprintf(stderr, "scene_bench: %s: %s\n", what.c_str(), dfm_last_error());
   std::exit(2);
-}
-
-std::string compiler() {
-#if defined(__clang__)
-  return "clang " __clang_version__;
-#else
-  return "gcc " __VERSION__;
-#endif
-}
-
-std::string machine() {
-  std::ifstream in("/proc/cpuinfo");
-  for (std::string line; std::getline(in, line);)
-    if (line.rfind("model name", 0) == 0) return line.substr(line.find(':') + 2);
-  return "unknown";
 }
 
 void run(dfm_context *context, const Case &c, std::FILE *csv, const std::string &commit) {
@@ -103,7 +88,7 @@ void run(dfm_context *context, const Case &c, std::FILE *csv, const std::string 
   for (uint32_t i = 0; i < n; ++i) all += t1[i].seconds - t0[i].seconds;
   for (uint32_t i = 0; i < n; ++i) std::printf("    %-18s %5.1f %%\n", t1[i].name, 100 * (t1[i].seconds - t0[i].seconds) / all);
   if (csv)
-    std::fprintf(csv, "%s,%s,%s,%s,%.0f,%.0f,%.0f,%.1f,%.2f\n", machine().c_str(), compiler().c_str(), commit.c_str(), c.name, rate, fastest, c.reach,
+    std::fprintf(csv, "%s,%s,%s,%s,%.0f,%.0f,%.0f,%.1f,%.2f\n", bench::machine().c_str(), bench::compiler(), commit.c_str(), c.name, rate, fastest, c.reach,
                  double(contacts) / double(slices), substeps);
   dfm_scene_close(scene);
 }

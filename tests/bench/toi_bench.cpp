@@ -7,10 +7,10 @@
 #include <chrono>
 #include <cstdio>
 #include <cstring>
-#include <fstream>
 
 #include "../unit/narrow/toi_support.h"
 #include "../unit/surfel/detect_scene.h"
+#include "machine.h"
 #include "narrow/toi_finders.h"
 #include "narrow/toi_guard.h"
 
@@ -24,21 +24,6 @@ struct Sink {
   std::FILE *csv = nullptr;
   std::string head;   // machine, compiler, commit
 };
-
-std::string compiler() {
-#if defined(__clang__)
-  return "clang " __clang_version__;
-#else
-  return "gcc " __VERSION__;
-#endif
-}
-
-std::string machine() {
-  std::ifstream in("/proc/cpuinfo");
-  for (std::string line; std::getline(in, line);)
-    if (line.rfind("model name", 0) == 0) return line.substr(line.find(':') + 2);
-  return "unknown";
-}
 
 // ---- the source's functions ----------------------------------------------------------------------------------------------------------
 
@@ -253,7 +238,7 @@ int main(int argc, char **argv) {
     if (!std::strcmp(argv[n], "--csv")) sink.csv = std::fopen(argv[n + 1], "a");
     if (!std::strcmp(argv[n], "--commit")) commit = argv[n + 1];
   }
-  sink.head = machine() + "," + compiler() + "," + commit;
+  sink.head = bench::machine() + "," + bench::compiler() + "," + commit;
   if (sink.csv && std::ftell(sink.csv) == 0)
     std::fprintf(sink.csv, "machine,compiler,commit,set,finder,queries,hits,evaluations,evaluations_max,ns_per_query,missed,false,late,late_by_max\n");
   std::printf("%-10s %-14s %6s %6s %9s %6s %6s %7s %6s %5s %9s\n", "set", "finder", "number", "hits", "values", "most", "ns", "missed", "false", "late", "by");

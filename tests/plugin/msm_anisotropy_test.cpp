@@ -136,20 +136,7 @@ TEST(MsmAnisotropy, Force_IsMinusTheGradientOfTheEnergyOverDecades) {
         p.slope = slope;
         Instance b(host, kuhn_bar(3, 2, 2, 0.1, 0.2), p);
         b.shake(amount, 0);
-        b.forces();
-        // Central differences: 2 h^2 of the third derivative against rounding of the energy over h.
-        const double scale = b.largest_force(), h = 1e-3 * amount;
-        for (uint32_t i = 0; i < b.size(); i += 5)
-          for (int a = 0; a < 3; ++a) {
-            double &x = b.x[4 * i + a];
-            const double keep = x;
-            x = keep + h;
-            const double more = b.energy();
-            x = keep - h;
-            const double less = b.energy();
-            x = keep;
-            EXPECT_NEAR(b.f[4 * i + a], -(more - less) / (2 * h), 3e-6 * scale) << name << " " << slope << " " << amount;
-          }
+        expect_force_is_gradient(b, 1e-3 * amount, 3e-6, std::string(name) + " slope " + std::to_string(slope) + " amount " + std::to_string(amount));
       }
 }
 

@@ -189,19 +189,7 @@ TEST(MsmDamper, ForceAtFixedDashpots_IsMinusTheGradientOfTheEnergy) {
       p.damping_stiffness = 0;
       Instance b(host, kuhn_bar(3, 2, 2, 0.1, 0.2), p);
       b.shake(amount, 0), pull_dashpots(b);  // kept = 1: the branch's stretch follows the spring, its dashpot stands
-      b.forces();
-      const double scale = b.largest_force(), h = 1e-6;
-      for (uint32_t i = 0; i < b.size(); i += 5)
-        for (int a = 0; a < 3; ++a) {
-          double &x = b.x[4 * i + a];
-          const double keep = x;
-          x = keep + h;
-          const double more = b.energy();
-          x = keep - h;
-          const double less = b.energy();
-          x = keep;
-          EXPECT_NEAR(b.f[4 * i + a], -(more - less) / (2 * h), 1e-6 * scale) << amount;
-        }
+      expect_force_is_gradient(b, 1e-6, 1e-6, "amount " + std::to_string(amount));
     }
 }
 

@@ -73,19 +73,7 @@ TEST(MsmForces, Force_IsMinusTheGradientOfTheEnergyOverDecades) {
     for (double volume : {0.0, 0.1, 10.0}) {
       Instance b(host, kuhn_bar(3, 2, 2, 0.1, 0.2), {young, 0.35, 0, 0, volume});
       b.shake(0.01, 0);
-      b.forces();
-      const double scale = b.largest_force(), h = 1e-6;
-      for (uint32_t i = 0; i < b.size(); i += 5)
-        for (int a = 0; a < 3; ++a) {
-          double &x = b.x[4 * i + a];
-          const double keep = x;
-          x = keep + h;
-          const double more = b.energy();
-          x = keep - h;
-          const double less = b.energy();
-          x = keep;
-          EXPECT_NEAR(b.f[4 * i + a], -(more - less) / (2 * h), 2e-7 * scale) << young << " " << volume << " " << i;
-        }
+      expect_force_is_gradient(b, 1e-6, 2e-7, "young " + std::to_string(young) + " volume " + std::to_string(volume));
     }
 }
 
