@@ -8,6 +8,7 @@
 #include <cstdio>
 #include <cstring>
 #include <fstream>
+#include <numeric>
 
 #include "../unit/narrow/toi_support.h"
 #include "../unit/surfel/detect_scene.h"
@@ -231,10 +232,12 @@ void guard(const Sink &sink) {
     const double floor = scene.offset / 2, margin = 0.1 * floor;
     dfm::Array<dfm::GuardHit> hits;
     const size_t pairs = broad.candidates().size();
+    std::vector<uint32_t> which(pairs);
+    std::iota(which.begin(), which.end(), 0u);
     double best = HUGE_VAL;
     for (int repetition = 0; repetition < kRepetitions; ++repetition) {
       const auto begin = std::chrono::steady_clock::now();
-      dfm::guard_pairs(scene.bodies, ends, broad.candidates(), floor, margin, hits);
+      dfm::guard_pairs(scene.bodies, ends, broad.candidates(), which, floor, margin, hits);
       const std::chrono::duration<double> spent = std::chrono::steady_clock::now() - begin;
       best = std::min(best, 1e9 * spent.count() / double(pairs));
     }

@@ -70,6 +70,25 @@ bool BroadPhase::update(std::span<const BodyView> bodies, std::span<const Obstac
   ++stats_.updates;
   match(bodies, obstacles, filter);
   if (!find_dirty(bodies, obstacles, h, offset)) return false;
+  renew(bodies, obstacles, filter, h, offset);
+  return true;
+}
+
+bool BroadPhase::cover(std::span<const BodyView> bodies, std::span<const ObstacleView> obstacles, const PairFilter &filter, double h, double offset,
+                       std::span<const double> speed) {
+  bool any = false;
+  for (size_t i = 0; i < bodies_.size(); ++i) {
+    Body &b = bodies_[i];
+    if (!b.usable || kRounding * (b.moved + offset + h * speed[i]) <= b.margin) continue;
+    b.dirty = any = true;
+    b.expected = speed[i];
+  }
+  if (any) renew(bodies, obstacles, filter, h, offset);
+  return any;
+}
+
+void BroadPhase::renew(std::span<const BodyView> bodies, std::span<const ObstacleView> obstacles, const PairFilter &filter, double h,
+                       double offset) {
   ++stats_.renewals;
   for (Body &b : bodies_)
     if (b.dirty) renew_body(b, h, offset);
@@ -87,7 +106,6 @@ bool BroadPhase::update(std::span<const BodyView> bodies, std::span<const Obstac
   assemble();
   for (Body &b : bodies_) b.dirty = !b.usable;
   for (Thing &t : things_) t.dirty = false;
-  return true;
 }
 
 // Brings bodies_ and things_ in line with the views; what is new, gone or changed in kind loses its lists.
@@ -117,8 +135,8 @@ bool BroadPhase::find_dirty(std::span<const BodyView> bodies, std::span<const Ob
   bool any = false;
   for (Body &b : bodies_) {
     if (!b.dirty) {
-      const double moved = largest_norm(b.surface->nsurfel, b.surface->x.data(), b.x.data());
-      b.dirty = !(kRounding * (moved + reach_share(h, offset, largest_speed(*b.surface))) <= b.margin);
+      b.moved = largest_norm(b.surface->nsurfel, b.surface->x.data(), b.x.data()), b.speed = largest_speed(*b.surface), b.expected = 0;
+      b.dirty = !(kRounding * (b.moved + reach_share(h, offset, b.speed)) <= b.margin);
     }
     any |= b.dirty;
   }
@@ -158,9 +176,10 @@ void BroadPhase::renew_body(Body &body, double h, double offset) {
     body.tree.build(s, body.x.data());
     ++stats_.rebuilds;
   }
-  const double speed = largest_speed(s);
+  const double speed = body.speed = largest_speed(s);
   const double skin = std::clamp(skin_steps_ * h * speed, kSkinLeast * s.median_edge, kSkinMost * s.median_edge);
-  body.margin = kRounding * reach_share(h, offset, kSpeedGrowth * speed) + skin;
+  body.margin = kRounding * std::max(reach_share(h, offset, kSpeedGrowth * speed), 2 * offset + kSpeedGrowth * h * body.expected) + skin;
+  body.moved = 0;
 }
 
 void BroadPhase::bound_bodies() {

@@ -1,43 +1,13 @@
 #include "narrow/toi_guard.h"
 
-#include <algorithm>
-#include <cmath>
-
-#include "narrow/toi.h"
+#include "narrow/toi_guard_motion.h"
 #include "surfel/contact_set.h"
+#include "surfel/obstacle_shape.h"
 
 namespace dfm {
 namespace {
 
-constexpr double kSharp = 1e-3;     // share of the margin to which hit times are found
-constexpr double kShare = 0.5;      // of the way to the floor that a pair which starts within the margin may go; of its distance, one below the floor
-
-struct PairMotion {
-  dfm_motion m[4];
-  bool edges;
-
-  ToiHit touch(double distance, double within) const {
-    const dfm_toi_options options = {sizeof options, DFM_TOI_CONSERVATIVE, 0, distance, 0};
-    return edges ? toi_edge_edge(m, m + 2, options, within) : toi_point_triangle(m[0], m + 1, options, within);
-  }
-  double distance(double t) const { return edges ? distance_edge_edge(m, m + 2, t) : distance_point_triangle(m[0], m + 1, t); }
-
-  // The boxes of the two swept features, grown by the floor, do not meet: nearly all pairs of a list end here.
-  bool far_apart(double floor) const {
-    const int split = edges ? 2 : 1;
-    for (int i = 0; i < 3; ++i) {
-      double low[2] = {HUGE_VAL, HUGE_VAL}, high[2] = {-HUGE_VAL, -HUGE_VAL};
-      for (int k = 0; k < 4; ++k) {
-        const int side = k >= split;
-        low[side] = std::min({low[side], m[k].p0[i], m[k].p1[i]});
-        high[side] = std::max({high[side], m[k].p0[i], m[k].p1[i]});
-      }
-      const double grown = floor * (1 + 1e-12);   // rounding of the differences: a bit more than the floor
-      if (low[0] - high[1] > grown || low[1] - high[0] > grown) return true;
-    }
-    return false;
-  }
-};
+using narrow::PairMotion;
 
 dfm_motion path(const BodyView &body, const double *end, uint32_t surfel) {
   dfm_motion m;
@@ -61,29 +31,96 @@ PairMotion motion_of(const Candidate &c, std::span<const BodyView> bodies, std::
   return pair;
 }
 
+
+// Boxes around points that lie four doubles apart, half a point at a time: every listed pair passes here in every sub-step.
+using Half = double __attribute__((vector_size(16)));
+struct Extent {
+  Half lo[2], hi[2];
+  explicit Extent(const double *p) : lo{load(p), load(p + 2)}, hi{lo[0], lo[1]} {}
+  static Half load(const double *p) { return *reinterpret_cast<const Half *>(p); }
+  void add(const double *p) {
+    for (int k = 0; k < 2; ++k) {
+      const Half q = load(p + 2 * k);
+      lo[k] = q < lo[k] ? q : lo[k], hi[k] = q > hi[k] ? q : hi[k];
+    }
+  }
+  bool apart(const Extent &b, double by) const {
+    const Half far = {by, by};
+    const auto any = ((lo[0] - b.hi[0] > far) | (b.lo[0] - hi[0] > far)) | ((lo[1] - b.hi[1] > far) | (b.lo[1] - hi[1] > far));
+    return (any[0] | any[1]) != 0;
+  }
+};
+
+Extent extent_of(const Surface &s, int kind, uint32_t feature) {   // 0: a surfel, 1: an edge, 2: a triangle
+  const double *const x = s.x.data();
+  const uint32_t *const c = kind == 2 ? &s.tri[3 * size_t{feature}] : kind == 1 ? &s.edge[2 * size_t{feature}] : &feature;
+  Extent e(x + 4 * size_t{c[0]});
+  for (int k = 1; k <= kind; ++k) e.add(x + 4 * size_t{c[k]});
+  return e;
+}
+
+// Pairs of one run, all of one kind and between the same two.
+void near_bodies(const Surface &a, const Surface &b, const Array<Candidate> &list, size_t begin, size_t end, double reach, Array<uint32_t> &near) {
+  const bool edges = list[begin].kind == kEdgeEdge;
+  for (size_t i = begin; i < end;) {
+    const uint32_t feature = list[i].feature_a;
+    const Extent own = extent_of(a, edges, feature);
+    for (; i < end && list[i].feature_a == feature; ++i)
+      if (!own.apart(extent_of(b, edges ? 1 : 2, list[i].feature_b), reach)) near.push_back(static_cast<uint32_t>(i));
+  }
+}
+
+void near_obstacle(const Surface &a, const ObstacleView &view, double h, const Array<Candidate> &list, size_t begin, size_t end, double reach,
+                   Array<uint32_t> &near) {
+  const ObstacleShape shape(view);
+  if (view.shape == Shape::plane) {
+    if (norm2(view.spin) > 0) reach = HUGE_VAL;   // how far it sweeps depends on where one stands
+    reach += h * std::fabs(dot(shape.axis(2), view.velocity));
+    for (size_t i = begin; i < end; ++i)
+      if (dot(shape.axis(2), load3(&a.x[4 * size_t{list[i].feature_a}]) - view.position) <= reach) near.push_back(static_cast<uint32_t>(i));
+    return;
+  }
+  alignas(16) double lo[4] = {}, hi[4] = {};
+  shape.bounds(lo, hi);
+  Extent bounds(lo);
+  bounds.add(hi);
+  reach += h * (norm(view.velocity) + norm(view.spin) * shape.extent());
+  for (size_t i = begin; i < end; ++i)
+    if (!extent_of(a, list[i].kind, list[i].feature_a).apart(bounds, reach)) near.push_back(static_cast<uint32_t>(i));
+}
+
 }  // namespace
 
-double guard_pairs(std::span<const BodyView> bodies, std::span<const double *const> end, const Array<Candidate> &candidates, double floor,
-                   double margin, Array<GuardHit> &out) {
+void guard_near(std::span<const BodyView> bodies, std::span<const double> travel, std::span<const ObstacleView> obstacles, double h,
+                const Array<Candidate> &candidates, double floor, Array<uint32_t> &near) {
+  near.clear();
+  for (size_t i = 0; i < candidates.size();) {
+    const Candidate &c = candidates[i];
+    size_t end = i + 1;
+    while (end < candidates.size() && candidates[end].slot_a == c.slot_a && candidates[end].slot_b == c.slot_b &&
+           candidates[end].obstacle == c.obstacle && candidates[end].kind == c.kind)
+      ++end;
+    const Surface &a = *bodies[c.slot_a].surface;
+    const double rounded = 1 + 1e-9;   // bounds of motion are rounded too
+    if (c.obstacle) near_obstacle(a, obstacles[c.slot_b], h, candidates, i, end, rounded * (floor + travel[c.slot_a]), near);
+    else near_bodies(a, *bodies[c.slot_b].surface, candidates, i, end, rounded * (floor + travel[c.slot_a] + travel[c.slot_b]), near);
+    i = end;
+  }
+}
+
+double guard_pairs(std::span<const BodyView> bodies, std::span<const double *const> end, const Array<Candidate> &candidates,
+                   std::span<const uint32_t> which, double floor, double margin, Array<GuardHit> &out) {
   out.clear();
   double least = 1;
-  for (size_t i = 0; i < candidates.size(); ++i) {
+  for (const uint32_t i : which) {
     if (candidates[i].obstacle) continue;
     const PairMotion pair = motion_of(candidates[i], bodies, end);
-    if (pair.far_apart(floor)) continue;
-    ToiHit hit = pair.touch(floor, kSharp * margin);
-    if (!(hit.t <= 1)) continue;
-    const double start = pair.distance(0);
-    double own = floor;
-    if (hit.t == 0) {   // it starts at or below the floor: it may rise, or come down to half of what it has
-      own = std::min(floor, kShare * start);
-      if (start > 0) hit = pair.touch(own, kSharp * std::min(margin, own));
-      if (!(hit.t <= 1)) continue;
-    }
-    const double above = std::min(margin, kShare * (start - own));
-    const double safe = above > 0 ? std::min(hit.t, pair.touch(own + above, kSharp * above).t) : 0;
-    out.push_back({static_cast<uint32_t>(i), hit.t, safe, start, {hit.at[0], hit.at[1], hit.at[2]}});
-    least = std::min(least, safe);
+    GuardHit hit{i, 0, 0, 0, 0, {}};
+    if (pair.far_apart(floor) || !narrow::judge([&](double d, double within) { return pair.touch(d, within); }, [&] { return pair.distance(0); }, floor,
+                                                margin, hit))
+      continue;
+    out.push_back(hit);
+    least = std::min(least, hit.safe);
   }
   return least;
 }

@@ -54,6 +54,7 @@ const char *stage_name(StageId id) {
     case StageId::narrow: return "narrow";
     case StageId::solve: return "contact+friction";
     case StageId::distribute: return "distribute";
+    case StageId::guard: return "guard";
     case StageId::commit: return "commit";
     case StageId::step: return "step";
   }
@@ -93,13 +94,14 @@ Plan make_plan(const SceneFacts &f) {
     run(StageId::narrow, who);
     run(StageId::solve, who);
     run(StageId::distribute, who);
+    if (!f.unguarded) run(StageId::guard, who);
+    else leave("guard", "switched off (contact.guard): what moves further than contacts reach in one sub-step may cross");
   } else {
     const std::string why = f.bodies < 2 && !f.obstacles ? "one body and nothing to touch" : "filters let no pair touch";
-    for (StageId id : {StageId::gather, StageId::broad, StageId::narrow, StageId::solve, StageId::distribute}) leave(stage_name(id), why);
+    for (StageId id : {StageId::gather, StageId::broad, StageId::narrow, StageId::solve, StageId::distribute, StageId::guard}) leave(stage_name(id), why);
   }
   if (f.bodies) run(StageId::commit, "positions and velocities at the end of the sub-step");
   leave("self contact", "not asked for");
-  leave("guard", "not available yet: contacts are made from the closest points at the start of each sub-step");
   return plan;
 }
 

@@ -6,7 +6,7 @@
 
 namespace dfm {
 
-enum class StageId { motion, model, predict, gather, broad, narrow, solve, distribute, commit, step };
+enum class StageId { motion, model, predict, gather, broad, narrow, solve, distribute, guard, commit, step };
 const char *stage_name(StageId id);
 
 // What the plan is derived from.
@@ -14,7 +14,7 @@ struct SceneFacts {
   unsigned bodies = 0, self_stepping = 0, obstacles = 0;
   unsigned coupled = 0, coupled_surfels = 0;           // bodies with a surface of their own, and its surfels
   unsigned body_pairs = 0, obstacle_pairs = 0;         // pairs that may touch, filters applied
-  bool gravity_keys = false, loads_vary = false, held_move = false, obstacles_move = false;
+  bool gravity_keys = false, loads_vary = false, held_move = false, obstacles_move = false, unguarded = false;
   struct Provider { std::string effect, plugin; };
   std::vector<Provider> offered;                       // by models and laws that the scene uses, as their parameters stand
   std::vector<Provider> idle;                          // by models that the scene uses, if their parameters called for it

@@ -41,7 +41,7 @@ const Table &objects() {
         {"cells", false}}},
       {"obstacle_pose", {{"position", true}, {"rotation", true}}},
       {"contact",
-       {{"method", true}, {"self", true}, {"untangle", true}, {"sleep", true}, {"tolerance", true}, {"offset", true},
+       {{"method", true}, {"self", true}, {"untangle", true}, {"sleep", true}, {"tolerance", true}, {"offset", true}, {"guard", true},
         {"friction", true}, {"filter", true}}},
       {"friction", {{"between", true}, {"law", true}, {"params", true}}},
       {"filter", {{"between", true}, {"collide", true}}},

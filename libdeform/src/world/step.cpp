@@ -1,6 +1,6 @@
 // One step, from top to bottom:
 //
-//   bound -> n sub-steps of { motion -> model -> predict -> broad -> narrow -> contact <-> friction -> distribute -> commit }
+//   bound -> n sub-steps of { motion -> model -> predict -> broad -> narrow -> contact <-> friction -> distribute -> guard -> commit }
 //
 // The list of stages is the plan's (plan/plan.cpp): what a scene does not call for is not in it. Sub-steps are equal and the contact solve
 // runs in each; detection keeps its candidate lists while nothing has moved further than their skin.
@@ -67,6 +67,7 @@ bool run_stage(World &w, StageId id, uint32_t *trouble) {
     case StageId::narrow: w.stage_narrow(); return true;
     case StageId::solve: return w.stage_solve(trouble);
     case StageId::distribute: w.stage_distribute(); return true;
+    case StageId::guard: return w.stage_guard(trouble);
     case StageId::commit: return w.stage_commit(trouble);
     case StageId::step: return true;
   }
@@ -94,17 +95,27 @@ void view_obstacles(World &w, double t, double h, double left) {
 // Where the obstacles are at the end of the sub-step; `last`: of the step, so that a target is met exactly.
 void move_obstacles(World &w, double t, double h, double left, bool last) {
   for (auto &o : w.obstacles) {
-    if (o->has_target) {
-      const double s = last ? 1 : h / left;
-      o->pose = {o->pose.position + s * (o->target.position - o->pose.position), slerp(o->pose.rotation, o->target.rotation, s < 1 ? s : 0)};
-      if (last) o->pose = o->target, o->has_target = false;
-    } else if (o->moves()) {
-      o->pose = o->pose_at_time(t + h);
-    }
+    if (o->has_target || o->moves()) o->pose = last && o->has_target ? o->target : o->end_pose(t, h, left);
+    if (last) o->has_target = false;
+  }
+}
+
+// Where the guard let the bodies go a share of their way only. Obstacles come to their poses in the sub-steps after.
+void move_obstacles_by(World &w, double share) {
+  for (auto &o : w.obstacles) {
+    if (!o->has_target && !o->moves()) continue;
+    const Pose end = o->end_pose(w.time, w.h, w.left);
+    o->pose = {o->pose.position + share * (end.position - o->pose.position), slerp(o->pose.rotation, end.rotation, share)};
   }
 }
 
 }  // namespace
+
+Pose Obstacle::end_pose(double t, double h, double left) const {
+  if (!has_target) return moves() ? pose_at_time(t + h) : pose;
+  const double s = h / left;
+  return {pose.position + s * (target.position - pose.position), slerp(pose.rotation, target.rotation, s < 1 ? s : 1)};
+}
 
 dfm_status World::step(double dt, uint32_t *trouble) {
   prepare();
@@ -123,16 +134,38 @@ dfm_status World::step(double dt, uint32_t *trouble) {
   stats.last_substeps = n, stats.substeps_max = std::max(stats.substeps_max, n);
   for (uint32_t k = 0; k < n; ++k) {
     const double end = k + 1 == n ? start + dt : start + dt * (double(k + 1) / n);
-    h = end - time;
-    view_obstacles(*this, time, h, start + dt - time);
-    if (!sub_step(trouble)) return DFM_E_DIVERGED;
-    move_obstacles(*this, time, h, start + dt - time, k + 1 == n);
-    time = end;
-    ++stats.substeps, ++bound_age;
+    guard.pieces = 0;
+    for (bool whole = false; !whole;) {
+      h = end - time, left = start + dt - time;
+      const double planned = h;
+      if (!piece(trouble)) return DFM_E_DIVERGED;
+      whole = h == planned;
+      if (guard.motion < 1) move_obstacles_by(*this, guard.motion);
+      else move_obstacles(*this, time, h, left, whole && k + 1 == n);
+      time = whole ? end : time + h;
+      ++stats.substeps, ++bound_age;
+    }
   }
   ++step_count;
   stats.steps = step_count, stats.time = time;
   return DFM_OK;
+}
+
+// Shortens h until the guard has nothing against it.
+bool World::piece(uint32_t *trouble) {
+  const uint32_t before = *trouble;
+  const uint64_t unconverged = stats.unconverged;
+  guard.acted = false;
+  for (;;) {
+    guard.cut = guard.motion = 1;
+    view_obstacles(*this, time, h, left);
+    if (sub_step(trouble)) break;
+    if (!(guard.cut < 1)) return false;
+    h *= guard.cut;
+    *trouble = before, stats.unconverged = unconverged;
+  }
+  stats.guard_steps += guard.acted;
+  return true;
 }
 
 // All stages, or none: where one fails or throws, the state is that of the sub-step before.
@@ -317,13 +350,19 @@ bool World::commit_steppers(uint32_t *trouble) {
 
 bool World::stage_commit(uint32_t *trouble) {
   const bool steppers = std::any_of(bodies.begin(), bodies.end(), [](auto &b) { return b->model.stepper != nullptr; });
-  if (steppers && !commit_steppers(trouble)) return false;
+  if (steppers && !guard.stepped && !commit_steppers(trouble)) return false;
+  guard.stepped = false;
+  const double way = h * guard.motion;   // the guard may leave some of it out
   const bool touched = plan.touches() && rows.n > 0;
   context->tasks.parallel_for(static_cast<uint32_t>(bodies.size()), 1, [&](uint32_t begin, uint32_t end) {
     for (uint32_t i = begin; i < end; ++i) {
       Body &b = *bodies[i];
-      if (b.model.stepper) b.p.x.swap(b.p.f), b.p.v.swap(b.p.v_free);
-      else commit(b.p, touched, h);
+      if (b.model.stepper) {
+        for (size_t j = 0; guard.motion < 1 && j < b.p.x.size(); ++j) b.p.f[j] = b.p.x[j] + guard.motion * (b.p.f[j] - b.p.x[j]);
+        b.p.x.swap(b.p.f), b.p.v.swap(b.p.v_free);
+      } else {
+        commit(b.p, touched, way);
+      }
       b.model.commit_state();
       if (!plan.touches()) continue;
       Vec3 sum;

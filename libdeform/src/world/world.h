@@ -17,6 +17,7 @@
 #include "plugin/context.h"
 #include "plugin/params.h"
 #include "surfel/views.h"
+#include "world/guard.h"
 #include "world/motion.h"
 
 namespace dfm {
@@ -81,6 +82,7 @@ struct Obstacle {
   bool has_target = false;
   bool moves() const { return !keys.empty() || def.sine.amplitude[0] != 0 || def.sine.amplitude[1] != 0 || def.sine.amplitude[2] != 0; }
   Pose pose_at_time(double t) const;
+  Pose end_pose(double t, double h, double left) const;   // of a sub-step, in a step that lasts for `left` from t
 };
 
 struct FrictionRule { std::string between[2]; uint32_t law; };
@@ -152,7 +154,8 @@ struct World {
   struct Driven { double *velocity, before; };
   Array<Driven> driven;                                // held components that this sub-step's motion stage has set
   Vec3 gravity;
-  double h = 0;
+  double h = 0, left = 0;                              // s: of the sub-step; from its start to the end of the step
+  Guard guard;
   Residual residual;
   uint32_t passes = 0, sweeps = 0;
 
@@ -180,6 +183,7 @@ struct World {
   // step.cpp
   dfm_status step(double dt, uint32_t *trouble);
   bool sub_step(uint32_t *trouble);
+  bool piece(uint32_t *trouble);                       // sub_step(), shorter where the guard asks for it
   void undo_motion();                                  // held velocities as before stage_motion()
   void update_bound();                                 // stable, worst_body, worst_point
 
@@ -192,6 +196,7 @@ struct World {
   void stage_narrow();
   bool stage_solve(uint32_t *trouble);                 // solve.cpp
   void stage_distribute();
+  bool stage_guard(uint32_t *trouble);                 // guard.cpp
   bool stage_commit(uint32_t *trouble);
   bool commit_steppers(uint32_t *trouble);
   void reserve_events(size_t more);

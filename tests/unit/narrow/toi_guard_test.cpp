@@ -1,6 +1,8 @@
 // The guard's question to detection: how far may a sub-step go. Bodies are boxes and spheres; ends are free motion, as if no contact held.
 #include <gtest/gtest.h>
 
+#include <numeric>
+
 #include "../surfel/detect_scene.h"
 #include "narrow/toi_guard.h"
 #include "toi_support.h"
@@ -28,7 +30,10 @@ struct Guard {
   double safe() {
     std::vector<const double *> ends;
     for (const auto &e : end) ends.push_back(e.data());
-    return dfm::guard_pairs(scene.bodies, ends, scene.all(), kFloor, kMargin, hits);
+    const dfm::Array<dfm::Candidate> &all = scene.all();
+    std::vector<uint32_t> which(all.size());
+    std::iota(which.begin(), which.end(), 0u);
+    return dfm::guard_pairs(scene.bodies, ends, all, which, kFloor, kMargin, hits);
   }
   // Least distance of all pairs at t, by the tests' own arithmetic.
   double least(double t) const {
