@@ -120,6 +120,7 @@ dfm_status dfm_body_set_state(dfm_body body, uint32_t n, const double *x, const 
         if (v) b.p.v[size_t(i) * kStride + size_t(k)] = v[size_t(3) * i + size_t(k)];
       }
     b.world->bound_age = kNone;
+    b.world->guard.forget();
   });
 }
 

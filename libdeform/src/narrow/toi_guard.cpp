@@ -1,6 +1,7 @@
 #include "narrow/toi_guard.h"
 
 #include "narrow/toi_guard_motion.h"
+#include "surfel/closest.h"
 #include "surfel/contact_set.h"
 #include "surfel/obstacle_shape.h"
 
@@ -32,6 +33,8 @@ PairMotion motion_of(const Candidate &c, std::span<const BodyView> bodies, std::
 }
 
 
+constexpr double kRounding = 1 + 1e-6;   // bounds hold in spite of rounding; nothing next to the margin
+
 // Boxes around points that lie four doubles apart, half a point at a time: every listed pair passes here in every sub-step.
 using Half = double __attribute__((vector_size(16)));
 struct Extent {
@@ -59,15 +62,14 @@ Extent extent_of(const Surface &s, int kind, uint32_t feature) {   // 0: a surfe
   return e;
 }
 
-// Pairs of one run, all of one kind and between the same two.
-void near_bodies(const Surface &a, const Surface &b, const Array<Candidate> &list, size_t begin, size_t end, double reach, Array<uint32_t> &near) {
-  const bool edges = list[begin].kind == kEdgeEdge;
-  for (size_t i = begin; i < end;) {
-    const uint32_t feature = list[i].feature_a;
-    const Extent own = extent_of(a, edges, feature);
-    for (; i < end && list[i].feature_a == feature; ++i)
-      if (!own.apart(extent_of(b, edges ? 1 : 2, list[i].feature_b), reach)) near.push_back(static_cast<uint32_t>(i));
+double distance_of(const Candidate &c, const Surface &a, const Surface &b) {
+  const auto at = [](const Surface &s, uint32_t surfel) { return load3(&s.x[4 * size_t{surfel}]); };
+  if (c.kind == kEdgeEdge) {
+    const uint32_t *const ea = &a.edge[2 * size_t{c.feature_a}], *const eb = &b.edge[2 * size_t{c.feature_b}];
+    return std::sqrt(closest_segments(at(a, ea[0]), at(a, ea[1]), at(b, eb[0]), at(b, eb[1])).distance2);
   }
+  const uint32_t *const t = &b.tri[3 * size_t{c.feature_b}];
+  return std::sqrt(closest_on_triangle(at(a, c.feature_a), at(b, t[0]), at(b, t[1]), at(b, t[2])).distance2);
 }
 
 void near_obstacle(const Surface &a, const ObstacleView &view, double h, const Array<Candidate> &list, size_t begin, size_t end, double reach,
@@ -91,9 +93,11 @@ void near_obstacle(const Surface &a, const ObstacleView &view, double h, const A
 
 }  // namespace
 
-void guard_near(std::span<const BodyView> bodies, std::span<const double> travel, std::span<const ObstacleView> obstacles, double h,
-                const Array<Candidate> &candidates, double floor, Array<uint32_t> &near) {
+void guard_near(std::span<const BodyView> bodies, std::span<const double> travel, std::span<const double> way,
+                std::span<const ObstacleView> obstacles, double h, const Array<Candidate> &candidates, double floor, Array<double> &rest,
+                Array<uint32_t> &near) {
   near.clear();
+  if (rest.size() != candidates.size()) rest.assign(candidates.size(), -1.0);
   for (size_t i = 0; i < candidates.size();) {
     const Candidate &c = candidates[i];
     size_t end = i + 1;
@@ -101,10 +105,18 @@ void guard_near(std::span<const BodyView> bodies, std::span<const double> travel
            candidates[end].obstacle == c.obstacle && candidates[end].kind == c.kind)
       ++end;
     const Surface &a = *bodies[c.slot_a].surface;
-    const double rounded = 1 + 1e-9;   // bounds of motion are rounded too
-    if (c.obstacle) near_obstacle(a, obstacles[c.slot_b], h, candidates, i, end, rounded * (floor + travel[c.slot_a]), near);
-    else near_bodies(a, *bodies[c.slot_b].surface, candidates, i, end, rounded * (floor + travel[c.slot_a] + travel[c.slot_b]), near);
-    i = end;
+    if (c.obstacle) {
+      near_obstacle(a, obstacles[c.slot_b], h, candidates, i, end, kRounding * floor + kRounding * travel[c.slot_a], near);
+      i = end;
+      continue;
+    }
+    const Surface &b = *bodies[c.slot_b].surface;
+    const double before = way[c.slot_a] + way[c.slot_b], now = kRounding * (before + travel[c.slot_a] + travel[c.slot_b]);
+    for (; i < end; ++i) {
+      if (now <= rest[i]) continue;
+      rest[i] = before + distance_of(candidates[i], a, b) - kRounding * floor;
+      if (!(now <= rest[i])) near.push_back(static_cast<uint32_t>(i));
+    }
   }
 }
 
@@ -116,7 +128,7 @@ double guard_pairs(std::span<const BodyView> bodies, std::span<const double *con
     if (candidates[i].obstacle) continue;
     const PairMotion pair = motion_of(candidates[i], bodies, end);
     GuardHit hit{i, 0, 0, 0, 0, {}};
-    if (pair.far_apart(floor) || !narrow::judge([&](double d, double within) { return pair.touch(d, within); }, [&] { return pair.distance(0); }, floor,
+    if (pair.far_apart(floor) || pair.plane_apart(floor) || !narrow::judge([&](double d, double within) { return pair.touch(d, within); }, [&] { return pair.distance(0); }, floor,
                                                 margin, hit))
       continue;
     out.push_back(hit);

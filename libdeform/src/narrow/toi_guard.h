@@ -26,9 +26,13 @@ struct GuardHit {
 struct GuardPose { Vec3 position; Quat rotation; };
 
 // The pairs of the list whose features are nearer to each other at the start than `floor` and their bodies' motion allow; all that the other
-// functions need to be asked about. travel: m, by body slot, bound of the way of any of its surfels.
-void guard_near(std::span<const BodyView> bodies, std::span<const double> travel, std::span<const ObstacleView> obstacles, double h,
-                const Array<Candidate> &candidates, double floor, Array<uint32_t> &near);
+// functions need to be asked about.
+//   travel, way   m, by body slot: bounds of the way of any surfel in this sub-step; in all committed ones since `rest` was cleared
+//   rest          m, by place in the list: sum of ways up to which a pair of bodies stays clear of the floor. Distances are taken only where it is
+//                 used up. As long as the list and `floor` stand; empty: nothing is known
+void guard_near(std::span<const BodyView> bodies, std::span<const double> travel, std::span<const double> way,
+                std::span<const ObstacleView> obstacles, double h, const Array<Candidate> &candidates, double floor, Array<double> &rest,
+                Array<uint32_t> &near);
 
 // bodies: by slot; surface->x is the start. end: by slot, [nsurfel,4] positions at the end. Only the pairs of the list that `which` names (ascending);
 // those with an obstacle are passed over, and those that touch at the start: what is through already cannot be kept out. out is cleared; hits come

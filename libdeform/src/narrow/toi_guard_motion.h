@@ -23,6 +23,20 @@ struct PairMotion {
   }
   double distance(double t) const { return (edges ? distance_edge_edge(m, m + 2, t) : distance_point_triangle(m[0], m + 1, t)) - round; }
 
+  // The plane of the triangle, or along both edges, as it stands at the start, keeps them apart up to the end: heights over it change linearly.
+  bool plane_apart(double floor) const {
+    const int split = edges ? 2 : 1;
+    Vec3 from[4], to[4];
+    for (int k = 0; k < 4; ++k) from[k] = load3(m[k].p0), to[k] = load3(m[k].p1);
+    Vec3 n = edges ? cross(from[1] - from[0], from[3] - from[2]) : cross(from[2] - from[1], from[3] - from[1]);
+    if (dot(n, from[0] - from[split]) < 0) n = -n;
+    double least = HUGE_VAL;
+    for (int i = 0; i < split; ++i)
+      for (int k = split; k < 4; ++k) least = std::min({least, dot(n, from[i] - from[k]), dot(n, to[i] - to[k])});
+    const double grown = (floor + round) * (1 + 1e-9);
+    return least > 0 && least * least > grown * grown * norm2(n);
+  }
+
   // The boxes of the two swept features, grown by the floor, do not meet: nearly all pairs of a list end here.
   bool far_apart(double floor) const {
     const int split = edges ? 2 : 1;

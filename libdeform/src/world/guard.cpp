@@ -6,10 +6,11 @@
 //   3  all that moves takes the safe share of its way; velocities stay, so no momentum is lost, only way
 //
 // What is not listed is not asked: broad/ covers the motion after the solve too (BroadPhase::cover). Why the order is this one and the cut is the whole
-// world's: doc/decisions/0013-guard-cuts-time.md.
+// world's: doc/decisions/0020-guard-cuts-time.md.
 #include "world/guard.h"
 
 #include <algorithm>
+#include <array>
 
 #include "narrow/detail.h"
 #include "surfel/obstacle_shape.h"
@@ -18,7 +19,7 @@
 namespace dfm {
 namespace {
 
-constexpr uint32_t kSolves = 4, kCuts = 8, kShares = 40;
+constexpr uint32_t kSolves = 4, kCuts = 8, kShares = 40, kMostHits = 128;
 constexpr double kLeastCut = 0.25;
 
 double floor_of(const World &w) { return 0.5 * w.offset; }
@@ -241,6 +242,25 @@ uint64_t free_key(const World &w, const ContactPoint &c) {
   }
 }
 
+// Of each feature's hits with one other side the earliest, and of those the earliest kMostHits: one impact trips all pairs around it, what the first
+// ones leave is asked again, and a solve with thousands of nearly equal rows would not converge.
+void choose_hits(World &w) {
+  Array<GuardHit> &hits = w.guard.hits;
+  const Array<Candidate> &list = w.broad.candidates();
+  const auto side = [&](const GuardHit &h) {
+    const Candidate &c = list[h.candidate];
+    return std::array<uint32_t, 5>{c.slot_a, c.obstacle, c.slot_b, c.kind, c.feature_a};
+  };
+  const auto earlier = [](const GuardHit &l, const GuardHit &r) { return std::pair(l.t, std::pair(l.candidate, l.part)) < std::pair(r.t, std::pair(r.candidate, r.part)); };
+  std::sort(hits.begin(), hits.end(), [&](const GuardHit &l, const GuardHit &r) {
+    const auto a = side(l), b = side(r);
+    return a != b ? a < b : earlier(l, r);
+  });
+  hits.erase(std::unique(hits.begin(), hits.end(), [&](const GuardHit &l, const GuardHit &r) { return side(l) == side(r); }), hits.end());
+  std::sort(hits.begin(), hits.end(), earlier);
+  if (hits.size() > kMostHits) hits.resize(kMostHits);
+}
+
 // Hits join the contacts of the sub-step, in their order; one that has a contact already turns it to how it stands at the hit.
 void add_hits(World &w) {
   Guard &g = w.guard;
@@ -321,12 +341,15 @@ bool World::stage_guard(uint32_t *trouble) {
     if (steppers && !commit_steppers(trouble)) return false;
     bound_motion(*this);
     broad.cover(body_views, obstacle_views, filter, h, offset, guard.speed);
-    guard_near(body_views, guard.travel, obstacle_views, h, broad.candidates(), floor_of(*this), guard.near);
+    if (guard.lists != broad.stats().renewals || guard.way.size() != bodies.size()) guard.forget();
+    if (guard.rest.empty()) guard.way.assign(bodies.size(), 0.0), guard.lists = broad.stats().renewals;
+    guard_near(body_views, guard.travel, guard.way, obstacle_views, h, broad.candidates(), floor_of(*this), guard.rest, guard.near);
     safe = find_hits(*this);
     guard.stepped = steppers;
     if (guard.hits.empty()) return true;
     guard.acted = true;
     if (solve == kSolves) break;
+    choose_hits(*this);
     add_hits(*this);
     if (residual.share > 1) --stats.unconverged;   // counted once, by the last solve
     guard.resolving = true;

@@ -1,4 +1,5 @@
-// What the guard keeps between its questions of one sub-step; doc/concepts/guard.md. It has no state that outlives the sub-step.
+// What the guard keeps between its questions of one sub-step; doc/concepts/guard.md. What outlives
+// the sub-step (way, rest) saves work and changes nothing.
 #pragma once
 #include <vector>
 
@@ -13,6 +14,8 @@ struct Guard {
   Array<uint32_t> near;                  // candidates that may reach the floor
   Array<GuardHit> hits;
   Array<double> speed, travel;           // by body slot, m/s and m: bounds of what the sub-step does after its solve
+  Array<double> way, rest;               // m: of all committed sub-steps since `rest` is known; guard_near
+  uint64_t lists = 0;                    // renewals of broad/ at which `rest` was last cleared
   std::vector<Array<double>> end;        // by body slot, [nsurfel,4] where the sub-step leads; filled where `stamp` says `round`
   std::vector<Array<uint32_t>> stamp;
   uint32_t round = 0;
@@ -29,6 +32,8 @@ struct Guard {
   bool acted = false;                    // in this sub-step
   double cut = 1;                        // < 1: the sub-step is to be taken anew, this much as long
   double motion = 1;                     // < 1: share of its way that is taken
+
+  void forget() { rest.clear(); }        // positions or d_c have changed otherwise than by a step
 };
 
 // In the middle of a solve's preparation, where guard.resolving: impulses and rates of `kept`.

@@ -230,6 +230,7 @@ void put(World &w, Staged &t) noexcept {
   std::swap(w.store, t.store);
   w.time = t.time, w.step_count = t.step_count, w.hold_start = t.hold_start, w.holding = t.holding, w.stats = t.stats, w.next_id = t.next_id;
   w.worst_body = nullptr, w.worst_point = 0;
+  w.guard.forget();
   w.report.n = 0, w.report.h = 0;
   w.events.clear();
 }

@@ -165,6 +165,7 @@ bool World::piece(uint32_t *trouble) {
     *trouble = before, stats.unconverged = unconverged;
   }
   stats.guard_steps += guard.acted;
+  for (size_t i = 0; i < guard.way.size(); ++i) guard.way[i] += guard.travel[i];
   return true;
 }
 
