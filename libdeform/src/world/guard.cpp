@@ -279,7 +279,8 @@ void add_hits(World &w) {
     ContactPoint c;
     double along;
     if (!HitContact(w, hit).make(c, along)) continue;
-    const double target = std::min(w.offset, std::max(hit.start, 0.8 * w.offset));
+    // One that starts nearer than d_c comes no nearer; what it lacks to 0.8 d_c closes in the time that the sub-step was planned with.
+    const double target = hit.start < w.offset ? hit.start + std::max(0.0, 0.8 * w.offset - hit.start) * (w.h / g.planned) : w.offset;
     const double rate = (along - target) / w.h;
     const auto same = std::find_if(w.contacts.begin(), w.contacts.end(), [&](const ContactPoint &o) { return same_features(o, c); });
     if (same != w.contacts.end()) {

@@ -28,6 +28,7 @@ struct Guard {
   bool resolving = false;                // a solve that starts from `kept`
   bool stepped = false;                  // self-stepping bodies have written their ends for the impulses as they are
 
+  double planned = 0;                    // s, the sub-step before it was cut
   uint32_t pieces = 0;                   // cuts of this planned sub-step
   bool acted = false;                    // in this sub-step
   double cut = 1;                        // < 1: the sub-step is to be taken anew, this much as long

@@ -137,9 +137,10 @@ dfm_status World::step(double dt, uint32_t *trouble) {
     guard.pieces = 0;
     for (bool whole = false; !whole;) {
       h = end - time, left = start + dt - time;
-      const double planned = h;
+      const double rest = h;
+      if (guard.pieces == 0) guard.planned = h;
       if (!piece(trouble)) return DFM_E_DIVERGED;
-      whole = h == planned;
+      whole = h == rest;
       if (guard.motion < 1) move_obstacles_by(*this, guard.motion);
       else move_obstacles(*this, time, h, left, whole && k + 1 == n);
       time = whole ? end : time + h;
