@@ -81,7 +81,7 @@ void gap(Scene &s) {   // 30 mm wide, for a ball of 36 mm
 }
 void spike_on_wedge(Scene &s) {   // a corner comes down on an edge
   s.add("beam", {0.08, 0.2, 0.08}, 60, {-0.0566, -0.1, 0}, {}, {0, 0.3827, 0, 0.9239});
-  s.add("beam", {0.06, 0.06, 0.06}, 60, {s.jitter(0.01), s.jitter(0.03), 0.09}, {s.jitter(2), s.jitter(2), -50}, {0.3251, -0.3251, 0, 0.8881});
+  s.add("beam", {0.06, 0.06, 0.06}, 60, {s.jitter(0.01), s.jitter(0.03), 0.09}, {s.jitter(2), s.jitter(2), -80}, {0.3251, -0.3251, 0, 0.8881});
 }
 void pile(Scene &s) {
   test::add_plane(s.world, "floor", {0, 0, -0.005});

@@ -128,9 +128,9 @@ double guard_pairs(std::span<const BodyView> bodies, std::span<const double *con
     if (candidates[i].obstacle) continue;
     const PairMotion pair = motion_of(candidates[i], bodies, end);
     GuardHit hit{i, 0, 0, 0, 0, {}};
-    if (pair.far_apart(floor) || pair.plane_apart(floor) || !narrow::judge([&](double d, double within) { return pair.touch(d, within); }, [&] { return pair.distance(0); }, floor,
-                                                margin, hit))
-      continue;
+    if (pair.far_apart(floor) || pair.plane_apart(floor)) continue;
+    const auto touch = [&](double d, double within) { return pair.touch(d, within); };
+    if (!narrow::judge(touch, [&] { return pair.distance(0); }, floor, margin, hit)) continue;
     out.push_back(hit);
     least = std::min(least, hit.safe);
   }

@@ -251,7 +251,9 @@ void choose_hits(World &w) {
     const Candidate &c = list[h.candidate];
     return std::array<uint32_t, 5>{c.slot_a, c.obstacle, c.slot_b, c.kind, c.feature_a};
   };
-  const auto earlier = [](const GuardHit &l, const GuardHit &r) { return std::pair(l.t, std::pair(l.candidate, l.part)) < std::pair(r.t, std::pair(r.candidate, r.part)); };
+  const auto earlier = [](const GuardHit &l, const GuardHit &r) {
+    return std::pair(l.t, std::pair(l.candidate, l.part)) < std::pair(r.t, std::pair(r.candidate, r.part));
+  };
   std::sort(hits.begin(), hits.end(), [&](const GuardHit &l, const GuardHit &r) {
     const auto a = side(l), b = side(r);
     return a != b ? a < b : earlier(l, r);

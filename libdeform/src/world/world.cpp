@@ -28,7 +28,8 @@ Pose Obstacle::pose_at_time(double t) const {
 World::World(dfm_context *c)
     : context(c), broad(c->memory), rows(c->memory), acceleration(c->memory), store(c->memory), next_store(c->memory), batches(c->memory) {
   const Memory &m = c->memory;
-  use_memory(m, driven, guard.near, guard.hits, guard.speed, guard.travel, guard.way, guard.rest, guard.kept, lent, contacts, tolerance.tangent, disturbance, best_impulse, tangents, match, block_surfels, block_impulse, block_velocity);
+  use_memory(m, driven, lent, contacts, tolerance.tangent, disturbance, best_impulse, tangents, match, block_surfels, block_impulse, block_velocity);
+  use_memory(m, guard.near, guard.hits, guard.speed, guard.travel, guard.way, guard.rest, guard.kept);
   use_memory(m, report.contacts, report.frame, report.impulse, report.slip, report.mode);
   use_memory(m, state.law, state.fn, state.vt, state.ft_stop, state.area, state.dwell, state.bristle, state.ft, state.dft_dvt, state.dft_dfn, state.limit,
              state.bristle_out, state.mode, state.set_valued);
