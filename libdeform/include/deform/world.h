@@ -10,6 +10,7 @@ extern "C" {
 enum { DFM_METHOD_AUTO = 0, DFM_METHOD_VELOCITY = 1 };
 enum { DFM_INTEGRATOR_AUTO = 0, DFM_INTEGRATOR_SYMPLECTIC_EULER = 1 };
 
+enum { DFM_WORLD_UNGUARDED = 1 };   /* dfm_world_def.flags: without the guard against crossing (concepts/guard.md), to see what it does */
 typedef struct dfm_world_def {
   uint32_t size, flags;
   double gravity[3];            /* m/s2 */
@@ -93,6 +94,8 @@ typedef struct dfm_world_stats {
   double stable_step;                     /* s, 0.9 of the bound at its last evaluation */
   uint32_t asleep, reserved;              /* bodies that sleep now */
   double sleep_energy, sleep_momentum[3]; /* J and N s that bodies still had when they fell asleep, since creation */
+  uint64_t guard_solves, guard_cuts;      /* since creation: solves with hits as contacts; sub-steps taken anew, shorter */
+  double guard_lost;                      /* s since creation: motion left out where neither was enough */
 } dfm_world_stats;
 /** @return DFM_OK; DFM_E_HANDLE. Threads: Any thread. Not during step. Since 0.1. */
 DFM_API dfm_status dfm_world_get_stats(dfm_world world, dfm_world_stats *out);

@@ -123,6 +123,7 @@ dfm_status dfm_body_set_state(dfm_body body, uint32_t n, const double *x, const 
       }
     b.world->wake(b);
     b.world->bound_age = kNone;
+    b.world->guard.forget();
   });
 }
 

@@ -49,6 +49,7 @@ dfm_status dfm_world_create(dfm_context *context, const dfm_world_def *def, dfm_
       if (!std::isfinite(g)) fail(DFM_E_ARG, "gravity is not finite; give m/s2");
     if (!(w->def.contact_offset >= 0) || !(w->def.contact_tolerance >= 0))
       fail(DFM_E_ARG, "contact_offset (m) and contact_tolerance (m/s) must be zero (automatic) or positive");
+    if (w->def.flags & ~uint32_t{DFM_WORLD_UNGUARDED}) fail(DFM_E_ARG, "flags 0x%x: the only one known is DFM_WORLD_UNGUARDED (1)", w->def.flags);
     if (w->def.max_sweeps == 0 || w->def.max_passes == 0 || w->def.max_substeps == 0)
       fail(DFM_E_ARG, "max_sweeps, max_passes and max_substeps must be at least 1");
     if (w->def.sleep > 1) fail(DFM_E_ARG, "sleep is %u; it must be 0 (off) or 1 (on)", w->def.sleep);

@@ -54,6 +54,7 @@ const char *stage_name(StageId id) {
     case StageId::narrow: return "narrow";
     case StageId::solve: return "contact+friction";
     case StageId::distribute: return "distribute";
+    case StageId::guard: return "guard";
     case StageId::commit: return "commit";
     case StageId::rigid_predict: return "rigid predict";
     case StageId::rigid_commit: return "rigid commit";
@@ -102,14 +103,15 @@ Plan make_plan(const SceneFacts &f) {
     run(StageId::distribute, who);
   } else {
     const std::string why = f.bodies < 2 && !f.obstacles ? "one body and nothing to touch" : "filters let no pair touch";
-    for (StageId id : {StageId::gather, StageId::broad, StageId::narrow, StageId::solve, StageId::distribute}) leave(stage_name(id), why);
+    for (StageId id : {StageId::gather, StageId::broad, StageId::narrow, StageId::solve, StageId::distribute, StageId::guard}) leave(stage_name(id), why);
   }
   if (f.rigid_bodies) run(StageId::rigid_commit, "ends of " + rigids);
+  if (pairs && !f.unguarded) run(StageId::guard, "nothing crosses at the end of a sub-step: " + count(pairs, "pair", "pairs"));
+  else if (pairs) leave("guard", "switched off (contact.guard): what moves further than contacts reach in one sub-step may cross");
   if (f.bodies) run(StageId::commit, "positions and velocities at the end of the sub-step");
   if (f.bodies && f.sleep) run(StageId::sleep, "islands at rest leave the stages above until something reaches them (contact.sleep)");
   else leave("sleep", f.bodies ? "not asked for (contact.sleep)" : "no body");
   leave("self contact", "not asked for");
-  leave("guard", "not available yet: contacts are made from the closest points at the start of each sub-step");
   return plan;
 }
 

@@ -6,7 +6,7 @@
 
 namespace dfm {
 
-enum class StageId { motion, model, predict, gather, broad, narrow, solve, distribute, commit, rigid_predict, rigid_commit, sleep, step };
+enum class StageId { motion, model, predict, gather, broad, narrow, solve, distribute, commit, rigid_predict, rigid_commit, sleep, guard, step };
 const char *stage_name(StageId id);
 
 // What the plan is derived from.
@@ -16,7 +16,7 @@ struct SceneFacts {
   unsigned body_pairs = 0, obstacle_pairs = 0;         // pairs that may touch, filters applied
   unsigned rigid_bodies = 0, rigid_joints = 0;
   std::string rigid_hosts;                             // names
-  bool gravity_keys = false, loads_vary = false, held_move = false, obstacles_move = false;
+  bool gravity_keys = false, loads_vary = false, held_move = false, obstacles_move = false, unguarded = false;
   struct Provider { std::string effect, plugin; };
   std::vector<Provider> offered;                       // by models and laws that the scene uses, as their parameters stand
   std::vector<Provider> idle;                          // by models that the scene uses, if their parameters called for it

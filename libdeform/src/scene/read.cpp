@@ -306,6 +306,7 @@ void read_contact(const Node &scene, Definition &def, const ReadContext &context
   def.sleep = contact.boolean("sleep", false);
   for (const char *later : {"self", "untangle"})
     if (contact.boolean(later, false)) contact.member(later).not_yet();
+  def.guard = contact.boolean("guard", true);
   if (contact.has("tolerance")) def.tolerance = contact.member("tolerance").number(kPositive);
   if (contact.has("offset")) def.offset = contact.member("offset").number(kPositive);
   for (const Node &entry : contact.items("friction")) {

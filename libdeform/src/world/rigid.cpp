@@ -112,6 +112,13 @@ bool World::stage_rigid_commit(uint32_t *trouble) {
 
 void World::keep_rigids() {
   for (auto &set : rigid_sets) {
+    for (uint32_t i = 0; guard.motion < 1 && i < set->defs.size(); ++i) {   // the share of their way that the guard has left
+      const dfm_rigid_state &from = set->state[i];
+      dfm_rigid_state &to = set->next[i];
+      const Quat q = slerp(rotation_of(from), rotation_of(to), guard.motion);
+      store3(to.position, load3(from.position) + guard.motion * (load3(to.position) - load3(from.position)));
+      to.rotation[0] = q.x, to.rotation[1] = q.y, to.rotation[2] = q.z, to.rotation[3] = q.w;
+    }
     set->state.swap(set->next), set->extra.swap(set->next_extra);
     for (uint32_t i = 0; i < set->defs.size(); ++i)
       for (uint32_t k = 0; k < 3; ++k) set->total[3 * i + k] += set->impulse[6 * i + k];

@@ -294,6 +294,7 @@ void put(World &w, Staged &t) noexcept {
   w.worst_body = nullptr, w.worst_point = 0;
   w.def.sleep = t.def.sleep, w.sleepers = 0;   // prepare() counts them
   std::swap(w.report, t.report);
+  w.guard.forget();
   w.events.clear();
 }
 

@@ -54,7 +54,8 @@ void prepare_rows(World &w) {
   fill_responses(w);
   w.tangents.resize(size_t(3) * n), w.match.resize(n);
   warm_start(w.store, w.contacts, w.h, w.rows, w.state, w.tangents.data(), w.match.data());
-  w.rows.finish(w.contacts, w.tangents.data(), w.h, w.offset);
+  w.rows.finish(w.contacts, w.tangents.data(), w.h, w.guard.planned, w.offset);
+  if (w.guard.resolving) guard_adjust(w);
   for (uint32_t i = 0; i < n; ++i) {
     double *const l = &w.rows.impulse[size_t(i) * 3];
     if (!(w.rows.wn[i] > 0)) l[0] = l[1] = l[2] = 0;

@@ -34,6 +34,7 @@ World::World(dfm_context *c)
   use_memory(m, driven, lent, contacts, tolerance.tangent, disturbance, best_impulse, tangents, match, block_surfels, block_impulse, block_velocity);
   for (Report *r : {&report, &last_report}) use_memory(m, r->contacts, r->frame, r->impulse, r->slip, r->mode);
   use_memory(m, active, woken, stirred);
+  use_memory(m, guard.near, guard.hits, guard.speed, guard.kept, guard.memory.runs, guard.memory.rest, guard.memory.normal);
   use_memory(m, state.law, state.fn, state.vt, state.ft_stop, state.area, state.dwell, state.bristle, state.ft, state.dft_dvt, state.dft_dfn, state.limit,
              state.bristle_out, state.mode, state.set_valued);
   stats.size = sizeof stats;
@@ -171,6 +172,7 @@ void World::prepare() {
   for (const dfm_type *t : context->registry.list()) offer(*t, facts.available);
   facts.effects_listed = def.effects != nullptr;
   facts.asked = asked_effects;
+  facts.unguarded = def.flags & DFM_WORLD_UNGUARDED;
   plan = make_plan(facts);
 
   // While contacts live it only falls: a larger one would turn their rest into a depth, and push them apart at 0.1 d_c / h.
@@ -186,6 +188,7 @@ void World::prepare() {
   gravity = load3(def.gravity);
   if (!gravity_keys.empty()) gravity = vector_at(gravity_keys, time);
   bound_age = kNone;
+  guard.forget();
   changed = false;
 }
 

@@ -20,6 +20,7 @@
 #include "surfel/views.h"
 #include "surfel/voxel_grid.h"
 #include "surfel/zones.h"
+#include "world/guard.h"
 #include "world/islands.h"
 #include "world/motion.h"
 #include "world/rigid.h"
@@ -100,6 +101,7 @@ struct Obstacle {
   std::unique_ptr<ObstacleMesh> mesh;
   std::unique_ptr<VoxelGrid> grid;
   Pose pose_at_time(double t) const;
+  Pose end_pose(double t, double h, double left) const;   // of a sub-step, in a step that lasts for `left` from t
 };
 
 struct FrictionRule { std::string between[2]; uint32_t law; };
@@ -175,7 +177,8 @@ struct World {
   struct Driven { double *velocity, before; };
   Array<Driven> driven;                                // held components that this sub-step's motion stage has set
   Vec3 gravity;
-  double h = 0;
+  double h = 0, left = 0;                              // s: of the sub-step; from its start to the end of the step
+  Guard guard;
   Residual residual;
   uint32_t passes = 0, sweeps = 0;
 
@@ -214,6 +217,8 @@ struct World {
   // step.cpp
   dfm_status step(double dt, uint32_t *trouble);
   bool sub_step(uint32_t *trouble);
+  bool advance(double end, double goal, bool last, uint32_t *trouble);
+  bool piece(uint32_t *trouble);                       // sub_step(), shorter where the guard asks for it
   void undo_motion();                                  // held velocities as before stage_motion()
   void update_bound();                                 // stable, worst_body, worst_point
   void ask_bound(Body &b);
@@ -230,6 +235,7 @@ struct World {
   bool stage_narrow(uint32_t *trouble);                // sleep.cpp
   bool stage_solve(uint32_t *trouble);                 // solve.cpp
   void stage_distribute();
+  bool stage_guard(uint32_t *trouble);                 // guard.cpp
   bool stage_commit(uint32_t *trouble);
   bool commit_steppers(uint32_t *trouble);
   void stage_sleep();                                  // sleep.cpp, as are the next ones
