@@ -1,70 +1,13 @@
 // The guard's promise: at the end of no step do bodies cross, however fast they are. Each scene runs ten times with jitter, and crosses without the guard.
-#include <functional>
-#include <random>
-
-#include "coupled.h"
-#include "crossing.h"
+#include "shot.h"
 
 namespace {
 
-using Vec = std::array<double, 3>;
-
-struct Scene {
-  test::Context context;
-  dfm_world world = 0;
-  std::mt19937 random;
-  std::vector<dfm_body> bodies;
-  std::vector<std::vector<uint32_t>> triangles;
-
-  Scene(bool guarded, unsigned seed, uint32_t threads = 1) : context(threads), random(seed) {
-    dfm_world_def d = dfm_world_def_default();
-    d.flags = guarded ? 0 : DFM_WORLD_UNGUARDED;
-    d.gravity[2] = 0;
-    test::ok(dfm_world_create(context, &d, &world));
-    test::set_friction(world, 0.3);
-  }
-  double jitter(double by) { return by * std::uniform_real_distribution<double>(-1, 1)(random); }
-  void add(const char *kind, Vec size, uint32_t cells, Vec at, Vec velocity, std::array<double, 4> turn = {0, 0, 0, 1}, double young = 1e6) {
-    test::BodyOptions o;
-    o.young = young, o.damping_stiffness = 1e-4;
-    const std::string name = "body" + std::to_string(bodies.size());
-    o.name = name;
-    o.position = at, o.velocity = velocity, o.rotation = turn;
-    bodies.push_back(test::make_body(context, world, kind, size, cells, o));
-    triangles.push_back(test::surface_triangles(bodies.back()));
-  }
-  void add_box(Vec at, Vec half) {
-    dfm_obstacle_def d = dfm_obstacle_def_default();
-    d.name = "box", d.shape = DFM_SHAPE_BOX;
-    for (int k = 0; k < 3; ++k) d.pose.position[k] = at[k], d.half_size[k] = half[k];
-    dfm_obstacle o = 0;
-    test::ok(dfm_obstacle_create(world, &d, &o));
-  }
-  size_t crossings() const {
-    std::vector<std::vector<double>> x;
-    std::vector<crossing::Surface> surfaces;
-    size_t own = 0;
-    for (const dfm_body b : bodies) x.push_back(test::surface_positions(b));
-    for (size_t i = 0; i < bodies.size(); ++i) {
-      surfaces.push_back({x[i].data(), uint32_t(x[i].size() / 3), triangles[i].data(), uint32_t(triangles[i].size() / 3)});
-      own += crossing::Counter().count({surfaces.back()}, crossing::Touching::counts);   // a body folded onto itself is not the guard's affair
-    }
-    return crossing::Counter().count(surfaces, crossing::Touching::counts) - own;
-  }
-  Vec momentum(double *scale = nullptr) const {
-    Vec sum{};
-    for (const dfm_body b : bodies) {
-      const dfm_body_measure m = test::measure(b);
-      for (int k = 0; k < 3; ++k) {
-        sum[size_t(k)] += m.momentum[k];
-        if (scale) *scale += std::fabs(m.momentum[k]);
-      }
-    }
-    return sum;
-  }
-};
-
-using Setup = std::function<void(Scene &)>;
+using test::Outcome;
+using test::run;
+using test::ten_times;
+using test::Vec;
+using Scene = test::Shot;
 
 void sheets(Scene &s) {
   s.add("beam", {0.12, 0.12, 0.012}, 30, {}, {});
@@ -89,44 +32,6 @@ void pile(Scene &s) {
     s.add("beam", {0.1, 0.04, 0.02}, 24, {s.jitter(0.02), s.jitter(0.02), 0.03 * i}, {0, 0, -8.0 - 6 * i}, {0, 0, s.jitter(0.5), 1});
 }
 
-struct Outcome { size_t crossed = 0; uint64_t steps = 0; double lost = 0; bool finite = true; };
-Outcome run(Scene &s, int steps, double dt) {
-  Outcome out;
-  for (int i = 0; i < steps; ++i) {
-    uint32_t trouble = 0;
-    if (dfm_world_step(s.world, dt, &trouble) != DFM_OK) return out.finite = false, out;
-    out.crossed += s.crossings();
-    for (const dfm_body b : s.bodies)
-      for (const double x : test::surface_positions(b)) out.finite &= std::isfinite(x);
-  }
-  const dfm_world_stats stats = test::stats(s.world);
-  out.steps = stats.guard_steps, out.lost = stats.guard_lost;
-  return out;
-}
-
-void ten_times(const Setup &setup, int steps, double dt) {
-  size_t without = 0;
-  uint64_t acted = 0;
-  for (unsigned seed = 1; seed <= 10; ++seed) {
-    Scene guarded(true, seed), bare(false, seed);
-    setup(guarded), setup(bare);
-    ASSERT_EQ(guarded.crossings(), 0u) << "the scene itself";
-    const Outcome with = run(guarded, steps, dt);
-    EXPECT_EQ(with.crossed, 0u) << "seed " << seed;
-    EXPECT_TRUE(with.finite) << "seed " << seed;
-    EXPECT_LE(with.lost, 0.5 * steps * dt) << "seed " << seed << ": the world goes on";
-    acted += with.steps;
-    const Outcome off = run(bare, steps, dt);
-    without += off.crossed;
-    EXPECT_EQ(off.steps, 0u);
-    const dfm_world_stats s = test::stats(guarded.world);
-    std::printf("%u: %g of %g sub-steps, %g solves, %g cuts, %g s lost; unguarded: %zu crossings\n", seed, double(s.guard_steps), double(s.substeps),
-                double(s.guard_solves), double(s.guard_cuts), s.guard_lost, off.crossed);
-  }
-  EXPECT_GT(acted, 0u);
-  EXPECT_GT(without, 0u) << "the scene does not need the guard";
-}
-
 }  // namespace
 
 TEST(Guard, SheetOnSheetAt100MetresPerSecond_NeverCross) { ten_times(sheets, 2, 5e-4); }
@@ -139,7 +44,11 @@ TEST(Guard, PileDroppedHard_NeverCrosses) { ten_times(pile, 3, 1e-3); }
 TEST(Guard, SheetOnBoxObstacle_StaysOutside) {
   for (unsigned seed = 1; seed <= 10; ++seed) {
     Scene s(true, seed);
-    s.add_box({0, 0, -0.01}, {0.05, 0.05, 0.002});
+    dfm_obstacle_def box = dfm_obstacle_def_default();
+    box.name = "box", box.shape = DFM_SHAPE_BOX, box.pose.position[2] = -0.01;
+    box.half_size[0] = box.half_size[1] = 0.05, box.half_size[2] = 0.002;
+    dfm_obstacle obstacle = 0;
+    test::ok(dfm_obstacle_create(s.world, &box, &obstacle));
     s.add("beam", {0.12, 0.12, 0.012}, 50, {-0.06 + s.jitter(0.02), -0.06 + s.jitter(0.02), 0.02}, {0, 0, -100}, {0.1, s.jitter(0.1), 0, 1});
     EXPECT_TRUE(run(s, 3, 5e-4).finite);
     for (const dfm_body b : s.bodies) {
