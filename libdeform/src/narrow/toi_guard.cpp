@@ -20,18 +20,20 @@ constexpr double kRounding = 1 + 1e-6;   // bounds hold in spite of rounding; no
 // What stays above this never trips: whether a pair is asked about does not change the answer, whatever is known of it from before.
 double clear_of(const GuardScene &scene) { return kRounding * (scene.floor + 2 * narrow::kSharp * scene.margin); }
 
-// Least height of the features over each other along n, at one time.
-double height(const Features &f, Vec3 n, const double *(*at)(const Features &, int)) {
-  double low = HUGE_VAL, high = -HUGE_VAL;
-  for (int k = 0; k < 4; ++k) {
-    const double d = dot(n, load3(at(f, k)));
-    if (k < f.split) low = std::min(low, d);
-    else high = std::max(high, d);
-  }
-  return low - high;
+// Least height of the features over each other along n.
+double height(const double *const at[4], int split, Vec3 n) {
+  double d[4];
+  for (int k = 0; k < 4; ++k) d[k] = n.x * at[k][0] + n.y * at[k][1] + n.z * at[k][2];
+  const double far = std::max(d[2], d[3]);
+  return split == 2 ? std::min(d[0], d[1]) - far : d[0] - std::max(d[1], far);
 }
-const double *at_start(const Features &f, int k) { return f.start[k]; }
-const double *at_end(const Features &f, int k) { return f.end[k]; }
+
+// Between the middles, of length one: a guess of a direction that keeps the features apart.
+Vec3 between_middles(const Features &f) {
+  Vec3 a, b;
+  for (int k = 0; k < 4; ++k) (k < f.split ? a : b) += load3(f.start[k]);
+  return normalized(f.split == 2 ? a - b : 3.0 * a - b);
+}
 
 // From the second feature to the first, as they start.
 Vec3 apart(const Features &f) {
@@ -51,31 +53,39 @@ class NearPairs {
   NearPairs(GuardScene &scene, const Array<Candidate> &list, GuardMemory &memory, Array<uint32_t> &near)
       : scene_(scene), list_(list), memory_(memory), near_(near), floor_(clear_of(scene)) {}
 
-  void look(const GuardRun &run) {
-    const double now = kRounding * (run.way + run.travel);
+  void look(const GuardMemory::Run &run) {
+    const double now = kRounding * (run.way + run.travel), *const rest = memory_.rest.data();
+    a_ = &scene_.side(list_[run.begin], false), b_ = &scene_.side(list_[run.begin], true);
     for (uint32_t i = run.begin; i < run.end; ++i)
-      if (!(now < memory_.rest[i])) look(i, run.way, now);
+      if (!(now < rest[i])) look(i, run.way, now);
   }
 
  private:
+  // The height along any direction is a lower bound of the distance, so what is found for the start is kept.
   void look(uint32_t i, double way, double now) {
-    const Features f(scene_, list_[i]);
+    Features f(*a_, *b_, list_[i]);
     double *const known = &memory_.normal[3 * size_t{i}], &rest = memory_.rest[i];
-    const Vec3 last = load3(known);
-    if (norm2(last) > 0 && clear(f, last, way, rest)) return;
+    Vec3 n = load3(known);
+    const bool fresh = norm2(n) == 0;
+    if (fresh) n = between_middles(f), store3(known, n);
+    const double start = height(f.start, f.split, n);
+    rest = way + start - floor_;
+    if (now < rest) return;
+    if (!fresh && stays_apart(f, n, start)) return;
     const Vec3 v = apart(f);
     const double d = norm(v);
-    rest = way + d - floor_;
-    if (!(d > 0)) return near_.push_back(i);
-    const Vec3 n = (1 / d) * v;
-    store3(known, n);
-    if (!(now < rest) && !clear(f, n, way, rest)) near_.push_back(i);
+    if (d > 0) {
+      n = (1 / d) * v;
+      store3(known, n);
+      rest = way + d - floor_;
+      if (now < rest || stays_apart(f, n, height(f.start, f.split, n))) return;
+    }
+    near_.push_back(i);
   }
-  // The height along n is a lower bound of the distance, so what is found for the start is kept.
-  bool clear(const Features &f, Vec3 n, double way, double &rest) {
-    const double start = height(f, n, at_start);
-    rest = std::max(rest, way + start - floor_);
-    return start > floor_ && height(f, n, at_end) > floor_;
+  bool stays_apart(Features &f, Vec3 n, double start) {
+    if (!(start > floor_)) return false;
+    f.find_ends(scene_);
+    return height(f.end, f.split, n) > floor_;
   }
 
   GuardScene &scene_;
@@ -83,6 +93,7 @@ class NearPairs {
   GuardMemory &memory_;
   Array<uint32_t> &near_;
   double floor_;
+  GuardSide *a_ = nullptr, *b_ = nullptr;   // of the run
 };
 
 // A surface and a closed-form shape or voxels, in the frame of the obstacle.
@@ -91,7 +102,7 @@ class NearObstacle {
   NearObstacle(GuardScene &scene, const Array<Candidate> &list, GuardMemory &memory, Array<uint32_t> &near)
       : scene_(scene), list_(list), memory_(memory), near_(near), floor_(clear_of(scene)) {}
 
-  void look(const GuardRun &run) {
+  void look(const GuardMemory::Run &run) {
     const Candidate &first = list_[run.begin];
     const ObstacleView &view = scene_.obstacles[first.slot_b];
     const double now = kRounding * (run.way + run.travel);
@@ -108,18 +119,31 @@ class NearObstacle {
   }
 
  private:
-  // A convex shape lies behind the plane at its point nearest to the feature's middle.
+  // A convex shape lies behind the plane at its point nearest to the feature's middle; a box also behind each of its faces.
   bool clear(const narrow::ObstacleFrame &frame, GuardSide &body, uint32_t i, double way) {
     const Candidate &c = list_[i];
     const uint32_t *const corner = narrow::corners_of(*body.surface, c.kind, c.feature_a);
-    Vec3 from[3], middle;
+    Vec3 from[3], middle, normal, on;
     for (int k = 0; k <= c.kind; ++k) from[k] = frame.at_start(load3(&body.surface->x[4 * size_t{corner[k]}])), middle += from[k];
-    const ObstaclePoint p = frame.shape.closest((1.0 / (c.kind + 1)) * middle);
-    double start = HUGE_VAL, end = HUGE_VAL;
-    for (int k = 0; k <= c.kind; ++k) start = std::min(start, dot(p.normal, from[k] - p.point));
+    const auto lowest = [&](Vec3 n, Vec3 p) {
+      double low = HUGE_VAL;
+      for (int k = 0; k <= c.kind; ++k) low = std::min(low, dot(n, from[k] - p));
+      return low;
+    };
+    double start = -HUGE_VAL;
+    if (c.kind > 0 && frame.shape.view().shape == Shape::box)
+      for (uint32_t f = 0; f < 6; ++f) {
+        const Vec3 n = frame.shape.face_normal(f), p = frame.shape.view().half_size[int(f >> 1)] * n;
+        if (const double low = lowest(n, p); low > start) start = low, normal = n, on = p;
+      }
+    if (!(start > floor_)) {
+      const ObstaclePoint p = frame.shape.closest((1.0 / (c.kind + 1)) * middle);
+      if (const double low = lowest(p.normal, p.point); low > start) start = low, normal = p.normal, on = p.point;
+    }
     memory_.rest[i] = way + start - floor_;
     if (!(start > floor_)) return false;
-    for (int k = 0; k <= c.kind; ++k) end = std::min(end, dot(p.normal, frame.at_end(load3(scene_.end(body, corner[k]))) - p.point));
+    double end = HUGE_VAL;
+    for (int k = 0; k <= c.kind; ++k) end = std::min(end, dot(normal, frame.at_end(load3(scene_.end(body, corner[k]))) - on));
     return end > floor_;
   }
   bool far(const narrow::ObstacleFrame &frame, GuardSide &body, uint32_t i, double way, double now) {
@@ -134,18 +158,6 @@ class NearObstacle {
   Array<uint32_t> &near_;
   double floor_;
 };
-
-void find_runs(const Array<Candidate> &list, GuardMemory &memory) {
-  memory.rest.assign(list.size(), -1.0), memory.normal.assign(3 * list.size(), 0.0);
-  for (uint32_t i = 0; i < list.size();) {
-    const Candidate &c = list[i];
-    uint32_t end = i + 1;
-    while (end < list.size() && list[end].slot_a == c.slot_a && list[end].slot_b == c.slot_b && list[end].obstacle == c.obstacle && list[end].kind == c.kind)
-      ++end;
-    memory.runs.push_back({i, end, 0, 0});
-    i = end;
-  }
-}
 
 }  // namespace
 
@@ -167,16 +179,44 @@ void GuardScene::find_end(GuardSide &s, uint32_t surfel) {
   store3(out, x + share * way);
 }
 
+void GuardMemory::follow(const Array<Candidate> &list) {
+  old_runs.swap(runs), old_features.swap(features), old_rest.swap(rest), old_normal.swap(normal);
+  runs.clear();
+  const size_t n = list.size();
+  features.resize(n), rest.resize(n), normal.resize(3 * n);
+  for (uint32_t i = 0; i < n; ++i) {
+    const Candidate &c = list[i];
+    features[i] = uint64_t{c.feature_a} << 32 | c.feature_b;
+    const Run *const last = runs.empty() ? nullptr : &runs.back();
+    if (!last || last->slot_a != c.slot_a || last->slot_b != c.slot_b || last->obstacle != c.obstacle || last->kind != c.kind)
+      runs.push_back({i, i, c.slot_a, c.slot_b, c.obstacle, c.kind, 0, 0});
+    runs.back().end = i + 1;
+  }
+  // Runs come in one order in all lists, pairs in a run by their features.
+  size_t next = 0;
+  for (Run &run : runs) {
+    const auto same = [&](const Run &o) { return o.slot_a == run.slot_a && o.slot_b == run.slot_b && o.obstacle == run.obstacle && o.kind == run.kind; };
+    const auto found = std::find_if(old_runs.begin() + std::ptrdiff_t(next), old_runs.end(), same);
+    uint32_t j = 0, last = 0;
+    if (found != old_runs.end()) run.way = found->way, j = found->begin, last = found->end, next = size_t(found - old_runs.begin()) + 1;
+    for (uint32_t i = run.begin; i < run.end; ++i) {
+      while (j < last && old_features[j] < features[i]) ++j;
+      const bool known = j < last && old_features[j] == features[i];
+      rest[i] = known ? old_rest[j] : -1;
+      for (size_t k = 0; k < 3; ++k) normal[3 * size_t{i} + k] = known ? old_normal[3 * size_t{j} + k] : 0;
+    }
+  }
+}
+
 void guard_near(GuardScene &scene, const Array<Candidate> &list, GuardMemory &memory, Array<uint32_t> &near) {
   near.clear();
-  if (memory.runs.empty()) find_runs(list, memory);
   NearPairs pairs(scene, list, memory, near);
   NearObstacle obstacles(scene, list, memory, near);
-  for (GuardRun &run : memory.runs) {
+  for (GuardMemory::Run &run : memory.runs) {
     const Candidate &c = list[run.begin];
     const GuardSide &a = scene.side(c, false), &b = scene.side(c, true);
-    run.travel = a.travel + b.travel;
-    if (run.travel == 0) continue;   // both stay where they are
+    run.travel = std::min(a.travel + b.travel, norm(a.drift - b.drift) + a.spread + b.spread);
+    if (a.still && b.still) continue;
     if (c.obstacle && scene.obstacles[c.slot_b].shape != Shape::mesh) obstacles.look(run);
     else pairs.look(run);
   }
@@ -188,7 +228,9 @@ double guard_pairs(GuardScene &scene, const Array<Candidate> &list, std::span<co
   for (const uint32_t i : which) {
     const Candidate &c = list[i];
     if (c.obstacle && scene.obstacles[c.slot_b].shape != Shape::mesh) continue;
-    const PairMotion pair(Features(scene, c));
+    Features f(scene.side(c, false), scene.side(c, true), c);
+    f.find_ends(scene);
+    const PairMotion pair(f);
     GuardHit hit{i, 0, 0, 0, 0, {}};
     if (pair.far_apart(scene.floor) || pair.plane_apart(scene.floor)) continue;
     const auto touch = [&](double d, double within) { return pair.touch(d, within); };

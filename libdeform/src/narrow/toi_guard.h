@@ -36,6 +36,8 @@ struct GuardSide {
   const double *local = nullptr;                                        // or: [nsurfel,3] a mesh in its frame, which ends at `pose`
   GuardPose pose;
   double travel = 0;                  // m, bounds the way of any surfel
+  Vec3 drift;                         // m, a way common to all surfels, from which
+  double spread = 0;                  // m, none differs by more
   Array<double> end;                  // [nsurfel,4], where `stamp` is the scene's round
   Array<uint32_t> stamp;
 };
@@ -58,23 +60,25 @@ struct GuardScene {
   void find_end(GuardSide &s, uint32_t surfel);
 };
 
-// A run of the list: one pair of sides, one kind.
-struct GuardRun {
-  uint32_t begin, end;
-  double way, travel;                 // m, bounds of the motion of the two sides against each other: in all sub-steps since the run is known; in this one
-};
-
-// What is known of the listed pairs, as long as the list, d_c and the surfaces stand; saves work and changes nothing.
+// What is known of the listed pairs; saves work and changes nothing. Holds as long as d_c and the bodies stand; what two lists share is carried over.
 struct GuardMemory {
-  Array<GuardRun> runs;               // empty: nothing is known
-  Array<double> rest;                 // m, by candidate: `way` up to which it stays clear of the floor
-  Array<double> normal;               // [n,3] direction along which it was last found to be apart; zero: none
+  struct Run {                        // of the list: one pair of sides, one kind
+    uint32_t begin, end, slot_a, slot_b;
+    uint8_t obstacle, kind;
+    double way, travel;               // m, bounds of the motion of the two sides against each other: in all sub-steps since the run is known; in this one
+  };
+  Array<Run> runs, old_runs;
+  Array<uint64_t> features, old_features;   // by candidate: feature a, feature b
+  Array<double> rest, old_rest;             // m, `way` up to which it stays clear of the floor
+  Array<double> normal, old_normal;         // [n,3] direction along which it was last found to be apart; zero: none
+
+  void follow(const Array<Candidate> &list);
   void forget() { runs.clear(); }
-  void keep() { for (GuardRun &r : runs) r.way += r.travel; }   // the sub-step has been taken
+  void keep() { for (Run &r : runs) r.way += r.travel; }   // the sub-step has been taken
 };
 
 // The candidates that may come to the floor, ascending: all that the other functions need to be asked about. Nearly all of a list ends at the first
-// comparison (way + travel < rest), nearly all others at a plane that keeps the two features apart at the start and at the end.
+// comparison (way + travel < rest), nearly all others at a plane that keeps the two features apart at the start and at the end. memory follows the list.
 void guard_near(GuardScene &scene, const Array<Candidate> &list, GuardMemory &memory, Array<uint32_t> &near);
 
 // Of the candidates that `which` names, those between two surfaces; those that touch at the start are passed over: what is through already cannot be

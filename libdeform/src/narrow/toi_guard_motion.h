@@ -18,20 +18,24 @@ inline const uint32_t *corners_of(const Surface &s, int kind, const uint32_t &fe
   return kind == 2 ? &s.tri[3 * size_t{feature}] : kind == 1 ? &s.edge[2 * size_t{feature}] : &feature;
 }
 
-// Where the corners of a pair of surfaces start and end: the first `split` are the first feature's.
+// Where the corners of a pair of surfaces start, and end once they are asked for: the first `split` are the first feature's.
 struct Features {
   const double *start[4], *end[4];
+  GuardSide *side[2];
+  const uint32_t *corner[2];
   int split;
-  Features(GuardScene &scene, const Candidate &c) {
-    GuardSide *a = &scene.side(c, false), *b = &scene.side(c, true);
-    if (c.obstacle && c.kind == 2) std::swap(a, b);   // a vertex of the mesh and a triangle of the body
+
+  // Of sides a and b as the candidate names them.
+  Features(GuardSide &a, GuardSide &b, const Candidate &c) : side{&a, &b} {
+    if (c.obstacle && c.kind == 2) std::swap(side[0], side[1]);   // a vertex of the mesh and a triangle of the body
     split = c.kind == kEdgeEdge ? 2 : 1;
-    const uint32_t *const of_a = corners_of(*a->surface, split - 1, c.feature_a), *const of_b = corners_of(*b->surface, 3 - split, c.feature_b);
-    for (int k = 0; k < 4; ++k) {
-      GuardSide &s = k < split ? *a : *b;
-      const uint32_t surfel = k < split ? of_a[k] : of_b[k - split];
-      start[k] = &s.surface->x[4 * size_t{surfel}], end[k] = scene.end(s, surfel);
-    }
+    corner[0] = corners_of(*side[0]->surface, split - 1, c.feature_a), corner[1] = corners_of(*side[1]->surface, 3 - split, c.feature_b);
+    const double *const x[2] = {side[0]->surface->x.data(), side[1]->surface->x.data()};
+    for (int k = 0; k < 4; ++k) start[k] = x[k >= split] + 4 * size_t{surfel(k)};
+  }
+  uint32_t surfel(int k) const { return k < split ? corner[0][k] : corner[1][k - split]; }
+  void find_ends(GuardScene &scene) {
+    for (int k = 0; k < 4; ++k) end[k] = scene.end(*side[k >= split], surfel(k));
   }
 };
 

@@ -2,6 +2,8 @@
 // time, its slope is the normal's share of the motion, and Newton's steps from the left never pass its first root. Edges and triangles meet the shape's
 // edges, axis, corners and centres as features that do not move. Joined distances of voxels are cubic along a line from cell to cell; a face is looked at
 // where it ends, and its lowest place, if that is below the floor, is a surfel.
+#include <optional>
+
 #include "narrow/detail.h"
 #include "narrow/toi_guard_motion.h"
 
@@ -37,7 +39,8 @@ class Judge {
   double least() const { return least_; }
 
   void pair(uint32_t candidate, const Candidate &c) {
-    const ObstacleFrame frame(scene_.obstacles[c.slot_b], scene_.poses[c.slot_b]);
+    if (c.slot_b != slot_) frame_.emplace(scene_.obstacles[c.slot_b], scene_.poses[c.slot_b]), slot_ = c.slot_b;
+    const ObstacleFrame &frame = *frame_;
     GuardSide &body = scene_.side(c, false);
     const uint32_t *const corner = narrow::corners_of(*body.surface, c.kind, c.feature_a);
     dfm_motion path[3];
@@ -53,18 +56,23 @@ class Judge {
 
  private:
   bool surfel(GuardHit hit, const ObstacleShape &shape, Vec3 from, Vec3 to) {
+    return surfel(hit, shape, from, to, scene_.floor, scene_.margin);
+  }
+  bool surfel(GuardHit hit, const ObstacleShape &shape, Vec3 from, Vec3 to, double floor, double margin) {
     const double start = shape.closest(from).distance;
     if (!(start > 0)) return false;
     const auto touch = [&](double d, double within) { return surfel_touch(shape, from, to - from, d, within); };
-    return keep(narrow::judge(touch, [&] { return start; }, scene_.floor, scene_.margin, hit), hit);
+    return keep(narrow::judge(touch, [&] { return start; }, floor, margin, hit), hit);
   }
+  // The lowest place jumps from cell to cell as the face slides, and its contact with it: a face is kept out of the surface, not out of the floor.
   void voxel_face(uint32_t candidate, const ObstacleShape &shape, const dfm_motion path[3]) {
+    const double floor = scene_.margin, margin = 0.1 * floor;
     Vec3 end[3], p, q;
     for (int k = 0; k < 3; ++k) end[k] = load3(path[k].p1);
     double w[3], distance;
-    if (!narrow::dips(*shape.view().grid, end, scene_.floor, 2 * narrow::kLeastDip * scene_.floor, w, distance) || !(distance < scene_.floor)) return;
+    if (!narrow::dips(*shape.view().grid, end, floor, 2 * narrow::kLeastDip * scene_.floor, w, distance) || !(distance < floor)) return;
     for (int k = 0; k < 3; ++k) p += w[k] * load3(path[k].p0), q += w[k] * end[k];
-    if (surfel({candidate, 0, 0, 0, 0, {}}, shape, p, q)) std::copy_n(w, 3, out_.back().at);
+    if (surfel({candidate, 0, 0, 0, 0, {}}, shape, p, q, floor, margin)) std::copy_n(w, 3, out_.back().at);
   }
   void edge(uint32_t candidate, const ObstacleShape &shape, const dfm_motion path[2]) {
     narrow::PairMotion m;
@@ -110,6 +118,8 @@ class Judge {
   }
 
   GuardScene &scene_;
+  std::optional<ObstacleFrame> frame_;   // of the obstacle that was asked about last
+  uint32_t slot_ = kNone;
   double least_ = 1;
   Array<GuardHit> &out_;
 };

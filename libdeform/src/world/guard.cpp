@@ -21,23 +21,34 @@ namespace {
 
 constexpr uint32_t kSolves = 4, kCuts = 8, kShares = 40;
 constexpr double kLeastCut = 0.25;
+constexpr double kSlow = 0.01;   // of d_g: what moves by less needs no closer look at how it does
 
-// The surfels' greatest speed after the solve, m/s: only what contacts have touched moves otherwise than predicted.
+// The mean of the surfels' predicted velocities, and how far any of them is from it.
+void split_motion(const Surface &s, Vec3 &mean, double &spread) {
+  Vec3 sum;
+  for (uint32_t i = 0; i < s.nsurfel; ++i) sum += load3(&s.v[size_t{4} * i]);
+  mean = (1.0 / s.nsurfel) * sum;
+  double most = 0;
+  for (uint32_t i = 0; i < s.nsurfel; ++i) most = std::max(most, norm2(load3(&s.v[size_t{4} * i]) - mean));
+  spread = std::sqrt(most);
+}
+
+// Only what contacts have touched moves otherwise than predicted.
 void bound_speeds(World &w) {
   Guard &g = w.guard;
-  g.speed.assign(w.bodies.size(), 0.0);
+  g.speed.assign(w.bodies.size(), 0.0), g.change.assign(w.bodies.size(), 0.0);
   for (uint32_t d = 0; d < w.rows.ndof; ++d) {
     const uint32_t i = w.rows.source[d];
     if (i == kNone) continue;
     const Body &b = *w.bodies[i];
     if (b.model.stepper) continue;
     const Vec3 y = load3(&w.rows.y[size_t(d) * kStride]), change = y - load3(&b.p.v_free[size_t(w.rows.point[d]) * kStride]);
-    g.speed[i] = std::max(g.speed[i], norm2(b.surface.identity() ? y : change));
+    g.speed[i] = std::max(g.speed[i], norm2(y)), g.change[i] = std::max(g.change[i], norm2(change));
   }
   for (const uint32_t i : w.active) {
     const Body &b = *w.bodies[i];
     double &speed = g.speed[i];
-    speed = std::sqrt(speed);
+    speed = std::sqrt(speed), g.change[i] = b.surface.weight_sum * std::sqrt(g.change[i]);
     if (b.model.stepper) {   // has written its end beside its start
       for (uint32_t s = 0; s < b.surface.nsurfel; ++s) {
         Vec3 x;
@@ -45,7 +56,7 @@ void bound_speeds(World &w) {
         speed = std::max(speed, norm(x - load3(&b.surface.x[size_t(s) * 4])) / w.h);
       }
     } else {
-      speed = b.surface.identity() ? std::max(speed, w.broad.speed(i)) : w.broad.speed(i) + b.surface.weight_sum * speed;
+      speed = b.surface.identity() ? std::max(speed, w.broad.speed(i)) : w.broad.speed(i) + g.change[i];
     }
   }
 }
@@ -67,7 +78,11 @@ void set_sides(World &w) {
     const Body &b = *w.bodies[i];
     GuardSide &s = scene.sides[i];
     make_room(s, b.surface);
-    s.still = b.slumber.asleep, s.travel = w.h * w.guard.speed[i];
+    s.still = b.slumber.asleep, s.travel = s.spread = w.h * w.guard.speed[i], s.drift = {};
+    if (s.travel > kSlow * scene.floor && !b.model.stepper) {
+      split_motion(b.surface, s.drift, s.spread);
+      s.drift = w.h * s.drift, s.spread = w.h * (s.spread + w.guard.change[i]);
+    }
     s.v = b.p.v_free.data(), s.inv_mass = b.p.inv_mass.data(), s.impulse = touched ? b.p.impulse.data() : nullptr;
     s.to = b.model.stepper ? b.p.f.data() : nullptr, s.local = nullptr;
   }
@@ -75,7 +90,9 @@ void set_sides(World &w) {
     const ObstacleView &v = w.obstacle_views[o];
     GuardSide &s = scene.sides[nb + o];
     const double turn = norm(v.spin);
-    s.travel = w.h * (norm(v.velocity) + (turn > 0 ? turn * (v.shape == Shape::plane ? HUGE_VAL : ObstacleShape(v).extent()) : 0));
+    s.drift = w.h * v.velocity;
+    s.spread = turn > 0 ? w.h * turn * (v.shape == Shape::plane ? HUGE_VAL : ObstacleShape(v).extent()) : 0;
+    s.travel = norm(s.drift) + s.spread;
     s.still = !v.moves();
     if (v.shape != Shape::mesh) continue;
     make_room(s, *v.surface);
@@ -173,7 +190,7 @@ bool World::stage_guard(uint32_t *trouble) {
     if (solve > 0 && !rigid_sets.empty() && !stage_rigid_commit(trouble)) return false;
     bound_speeds(*this);
     broad.cover(body_views, obstacle_views, filter, h, offset, guard.speed);
-    if (guard.lists != broad.stats().renewals) guard.forget(), guard.lists = broad.stats().renewals;
+    if (guard.memory.runs.empty() || guard.lists != broad.stats().renewals) guard.memory.follow(broad.candidates()), guard.lists = broad.stats().renewals;
     set_sides(*this), set_share(*this, 1);
     guard_near(guard.scene, broad.candidates(), guard.memory, guard.near);
     safe = find_hits(*this);

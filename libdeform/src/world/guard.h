@@ -14,7 +14,7 @@ struct Guard {
   GuardMemory memory;
   Array<uint32_t> near;                  // candidates that may reach the floor
   Array<GuardHit> hits;
-  Array<double> speed;                   // m/s by body slot, then by obstacle slot: bounds of what the sub-step does after its solve
+  Array<double> speed, change;           // m/s by body slot: bounds of the surfels' speeds after the solve; of what the solve has changed of a phyxel's
   uint64_t lists = 0;                    // renewals of broad/ at which `memory` was begun
   struct Through { uint32_t a, b; bool obstacle, yes; };
   std::vector<Through> through;          // pairs that were looked at: do they cross at the start?

@@ -32,9 +32,11 @@ World::World(dfm_context *c)
     : context(c), broad(c->memory), rows(c->memory), acceleration(c->memory), store(c->memory), next_store(c->memory), batches(c->memory), islands(c->memory) {
   const Memory &m = c->memory;
   use_memory(m, driven, lent, contacts, tolerance.tangent, disturbance, best_impulse, tangents, match, block_surfels, block_impulse, block_velocity);
+  GuardMemory &known = guard.memory;
+  use_memory(m, known.runs, known.old_runs, known.features, known.old_features, known.rest, known.old_rest, known.normal, known.old_normal);
   for (Report *r : {&report, &last_report}) use_memory(m, r->contacts, r->frame, r->impulse, r->slip, r->mode);
   use_memory(m, active, woken, stirred);
-  use_memory(m, guard.near, guard.hits, guard.speed, guard.kept, guard.memory.runs, guard.memory.rest, guard.memory.normal);
+  use_memory(m, guard.near, guard.hits, guard.speed, guard.change, guard.kept);
   use_memory(m, state.law, state.fn, state.vt, state.ft_stop, state.area, state.dwell, state.bristle, state.ft, state.dft_dvt, state.dft_dfn, state.limit,
              state.bristle_out, state.mode, state.set_valued);
   stats.size = sizeof stats;
