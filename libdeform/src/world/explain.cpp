@@ -40,6 +40,7 @@ std::string cost(const World &w, StageId id) {
     case StageId::narrow: return "candidate pairs";
     case StageId::solve: return "contacts x sweeps, laws once per pass";
     case StageId::sleep: return format("velocities of %zu awake bodies of %zu", w.active.size(), w.bodies.size());
+    case StageId::guard: return "candidate pairs that may come nearer than d_c / 2 within the sub-step";
     case StageId::distribute: return format("contacts and %zu surfels", surfels);
     default: return "what is prescribed";
   }
