@@ -28,13 +28,6 @@ double height(const double *const at[4], int split, Vec3 n) {
   return split == 2 ? std::min(d[0], d[1]) - far : d[0] - std::max(d[1], far);
 }
 
-// Between the middles, of length one: a guess of a direction that keeps the features apart.
-Vec3 between_middles(const Features &f) {
-  Vec3 a, b;
-  for (int k = 0; k < 4; ++k) (k < f.split ? a : b) += load3(f.start[k]);
-  return normalized(f.split == 2 ? a - b : 3.0 * a - b);
-}
-
 // From the second feature to the first, as they start.
 Vec3 apart(const Features &f) {
   Vec3 x[4];
@@ -66,12 +59,11 @@ class NearPairs {
     Features f(*a_, *b_, list_[i]);
     double *const known = &memory_.normal[3 * size_t{i}], &rest = memory_.rest[i];
     Vec3 n = load3(known);
-    const bool fresh = norm2(n) == 0;
-    if (fresh) n = between_middles(f), store3(known, n);
-    const double start = height(f.start, f.split, n);
-    rest = way + start - floor_;
-    if (now < rest) return;
-    if (!fresh && stays_apart(f, n, start)) return;
+    if (norm2(n) > 0) {
+      const double start = height(f.start, f.split, n);
+      rest = way + start - floor_;
+      if (now < rest || stays_apart(f, n, start)) return;
+    }
     const Vec3 v = apart(f);
     const double d = norm(v);
     if (d > 0) {
