@@ -62,7 +62,8 @@ TEST(Guard, BlockSpinningPastVoxels_StaysOutside) {
       const Vec half{0.02, 0.06, 0.02};
       test::add_mesh(s.world, "wall", test::box_surface(half, 2), DFM_SHAPE_VOXELS, 20000);
       const double cell = 0.0018;
-      s.add("beam", {0.12, 0.03, 0.03}, 60, {s.jitter(0.01) - 0.03, s.jitter(0.01), 0.05}, {s.jitter(20), s.jitter(20), -60}, {0, 0.3, 0, 0.954}, 1e6, {0, 800, 0});
+      const Vec at{s.jitter(0.01) - 0.03, s.jitter(0.01), 0.05}, velocity{s.jitter(20), s.jitter(20), -40};
+      s.add("beam", {0.12, 0.03, 0.03}, 60, at, velocity, {0, 0.3, 0, 0.954}, 1e6, {0, 2000, 0});
       for (int step = 0; step < 6; ++step) {
         EXPECT_TRUE(test::run(s, 1, 5e-4).finite);
         for (const dfm_body b : s.bodies) {

@@ -111,7 +111,8 @@ void set_share(World &w, double share) {
     to = {v.position, v.rotation};
     if (!v.moves()) continue;
     const Pose end = w.obstacles[o]->end_pose(w.time, w.h, w.left);
-    to = share < 1 ? GuardPose{v.position + share * (end.position - v.position), slerp(v.rotation, end.rotation, share)} : GuardPose{end.position, end.rotation};
+    to = {end.position, end.rotation};
+    if (share < 1) to = {v.position + share * (end.position - v.position), slerp(v.rotation, end.rotation, share)};
     scene.sides[w.bodies.size() + o].pose = to;
   }
 }

@@ -17,7 +17,8 @@ constexpr uint32_t kMostHits = 128;
 // start, which is what a straight motion is added to.
 class HitContact {
  public:
-  HitContact(World &w, const GuardHit &hit) : w_(w), hit_(hit), c_(w.broad.candidates()[hit.candidate]), end_(c_.obstacle ? w.guard.scene.poses[c_.slot_b] : GuardPose{}) {}
+  HitContact(World &w, const GuardHit &hit)
+      : w_(w), hit_(hit), c_(w.broad.candidates()[hit.candidate]), end_(c_.obstacle ? w.guard.scene.poses[c_.slot_b] : GuardPose{}) {}
 
   bool make(ContactPoint &out, double &along) {
     out = {};
