@@ -118,6 +118,14 @@ void edge_box(Edge &e, Array<ContactPoint> &out) {
   }
 }
 
+// Off a box's edge or corner the direction is free, and the surfel must stick out along it; where it does not, the edges and faces beside it are nearer.
+bool off_an_edge(const ObstacleShape &shape, const ObstaclePoint &o) {
+  if (shape.view().shape != Shape::box || !(o.distance > 0)) return false;
+  for (int k = 0; k < 3; ++k)
+    if (std::fabs(dot(o.normal, shape.axis(k))) > 1 - 1e-12) return false;
+  return true;
+}
+
 }  // namespace
 
 void surfel_obstacle(const Pair &pair, Run run, Array<ContactPoint> &out) {
@@ -126,6 +134,7 @@ void surfel_obstacle(const Pair &pair, Run run, Array<ContactPoint> &out) {
     const Vec3 x = pair.xa(s);
     const ObstaclePoint o = pair.shape->closest(x);
     if (!(o.distance < reach_of(pair, {&s, 1}, o.point))) continue;
+    if (off_an_edge(*pair.shape, o) && !vertex_cone_has(*pair.a.surface, s, -o.normal)) continue;
     ContactPoint c = blank(pair, kPrimitive, 0, s, o.face);
     add_node(c, pair.a.first_node + s, 1);
     c.area = facing_area(*pair.a.surface, s, -o.normal);

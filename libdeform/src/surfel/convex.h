@@ -1,5 +1,10 @@
-// Which edges stick out: only such an edge can meet another one before the surfels beside it do.
+// Which features stick out, and where to: an edge or a vertex can be the first of its surface to meet something only along a direction that lies in
+// its cone of normals. Along any other the surface beside it is nearer, and the contact is that feature's. Of a flat patch the edges' cones are
+// empty and the vertices' have one direction; a patch that stays flat (a rigid mesh's) needs neither.
 #pragma once
+#include <algorithm>
+#include <cmath>
+
 #include "math/vec3.h"
 #include "surfel/surface.h"
 
@@ -23,6 +28,35 @@ inline bool edge_convex(const Surface &surface, uint32_t edge, double ahead = 0)
   const Vec3 c0 = cross(e, r0), c1 = cross(r1, e);
   const double fold = dot(c0, r1);
   return fold < 0 && fold * fold * norm2(e) > kConvex * kConvex * norm2(c0) * norm2(c1);
+}
+
+// Is the unit direction d, which leaves the surface, in the cone of normals of this vertex? p + s e of an edge e comes nearer to what lies along d if
+// e . d > 0. Where the surface is hollow no direction passes; there the vertex is what bears until the hollow is gone, and the cone is widened
+// so that it holds the mean normal m of the faces around:
+//     e . d <= max(0, e . m)  for every edge e at the vertex.
+inline bool vertex_cone_has(const Surface &surface, uint32_t vertex, Vec3 d) {
+  const Vec3 p = load3(&surface.x[4 * size_t{vertex}]);
+  const uint32_t begin = surface.fan_begin[vertex], end = surface.fan_begin[vertex + 1];
+  const auto sides = [&](uint32_t k, Vec3 out[2]) {   // the triangle is p, p + out[0], p + out[1]
+    const uint32_t *c = &surface.tri[3 * size_t{surface.fan[k]}];
+    const int at = c[0] == vertex ? 0 : c[1] == vertex ? 1 : 2;
+    for (int i = 0; i < 2; ++i) out[i] = load3(&surface.x[4 * size_t{c[(at + 1 + i) % 3]}]) - p;
+  };
+  Vec3 e[2], mean;
+  bool leans = false;
+  for (uint32_t k = begin; k < end; ++k) {
+    sides(k, e);
+    mean += cross(e[0], e[1]);
+    for (const Vec3 &side : e) leans |= dot(side, d) > kConvex * norm(side);
+  }
+  if (!leans) return true;
+  mean = normalized(mean);
+  for (uint32_t k = begin; k < end; ++k) {
+    sides(k, e);
+    for (const Vec3 &side : e)
+      if (dot(side, d) > std::max(0.0, dot(side, mean)) + kConvex * norm(side)) return false;
+  }
+  return true;
 }
 
 }  // namespace dfm
