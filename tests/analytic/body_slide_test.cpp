@@ -65,6 +65,7 @@ TEST(BodySlide, Frictionless_IsThatOnPlane) {
     EXPECT_LT(leaning, 10 * lean) << cells;
     EXPECT_LT(rise, 2 * lean * kThick) << "no more than the dent; " << cells;
     EXPECT_GE(least, 6u) << cells;
-    std::printf("%u cells of %.0e Pa: %.2e m/s off the plane's, normals lean by %.1e, rises by %.1e m\n", cells, young, got.velocity[0] - want.velocity[0], leaning, rise);
+    const double off = got.velocity[0] - want.velocity[0];
+    std::printf("%u cells of %.0e Pa: %.2e m/s off the plane's, normals lean by %.1e, rises by %.1e m\n", cells, young, off, leaning, rise);
   }
 }
