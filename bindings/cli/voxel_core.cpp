@@ -35,28 +35,25 @@ double voxel_cell(const dfm_obstacle_def &def) {
 }
 
 std::vector<double> voxel_core(const dfm_obstacle_def &def) {
+  // Projections onto the half-spaces n . way <= -half in turn: each point ends where all its planes want it, by a short way.
+  constexpr int kPasses = 32;
   const double half = 0.5 * voxel_cell(def);
-  std::vector<Vector> mean(def.npoint, Vector{});
-  for (uint32_t t = 0; t < def.ntriangle; ++t) {
-    const Vector n = unit_normal(def, t);
-    for (size_t k = 0; k < 3; ++k)
-      for (size_t i = 0; i < 3; ++i) mean[def.triangles[3 * size_t(t) + k]][i] += n[i];
-  }
-  for (Vector &m : mean) {
-    const double length = std::sqrt(dot(m, m));
-    for (double &x : m) x = length > 0 ? x / length : 0;
-  }
-  std::vector<double> least(def.npoint, 1);   // share of the way along the mean normal that the planes around move
-  for (uint32_t t = 0; t < def.ntriangle; ++t) {
-    const Vector n = unit_normal(def, t);
-    for (size_t k = 0; k < 3; ++k) {
-      const uint32_t p = def.triangles[3 * size_t(t) + k];
-      least[p] = std::min(least[p], dot(n, mean[p]));
+  std::vector<Vector> way(def.npoint, Vector{});
+  for (int pass = 0; pass < kPasses; ++pass)
+    for (uint32_t t = 0; t < def.ntriangle; ++t) {
+      const Vector n = unit_normal(def, t);
+      if (dot(n, n) == 0) continue;
+      for (size_t k = 0; k < 3; ++k) {
+        Vector &w = way[def.triangles[3 * size_t(t) + k]];
+        const double missing = half + dot(n, w);
+        for (size_t i = 0; missing > 0 && i < 3; ++i) w[i] -= missing * n[i];
+      }
     }
-  }
   std::vector<double> out(def.points, def.points + 3 * size_t(def.npoint));
-  for (size_t p = 0; p < def.npoint; ++p)
-    for (size_t i = 0; i < 3; ++i) out[3 * p + i] -= half / std::max(0.5, least[p]) * mean[p][i];
+  for (size_t p = 0; p < def.npoint; ++p) {
+    const double length = std::sqrt(dot(way[p], way[p])), share = length > 2 * half ? 2 * half / length : 1;
+    for (size_t i = 0; i < 3; ++i) out[3 * p + i] += share * way[p][i];
+  }
   return out;
 }
 

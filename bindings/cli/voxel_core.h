@@ -9,8 +9,7 @@ namespace cli {
 
 // Edge of the cubes by which def.cells fill the box of its points, m.
 double voxel_cell(const dfm_obstacle_def &def);
-// The points of def, each moved so far in that all planes of the triangles around it move by half a cell (at a spike: by more, at most a cell in all);
-// [npoint,3].
+// The points of def, each moved in so far that all planes of the triangles around it move by half a cell; at a spike by less, a cell's way in all. [npoint,3]
 std::vector<double> voxel_core(const dfm_obstacle_def &def);
 
 }  // namespace cli
