@@ -7,6 +7,7 @@
 #include "json_text.h"
 #include "messages.h"
 #include "run.h"
+#include "voxel_core.h"
 
 namespace cli {
 
@@ -51,6 +52,17 @@ dfm_body_measure rigid_measure(const RigidView &rigid) {
   return m;
 }
 
+Checker::Checker(const SceneFile &scene) : scene_(scene), positions_(scene.bodies().size()) {
+  for (const ObstacleView &obstacle : scene.obstacles()) {
+    if (obstacle.def.shape != DFM_SHAPE_MESH && obstacle.def.shape != DFM_SHAPE_VOXELS) continue;
+    solids_.push_back(obstacle);
+    if (obstacle.def.shape != DFM_SHAPE_VOXELS) continue;
+    cores_.push_back(voxel_core(obstacle.def));
+    solids_.back().def.points = cores_.back().data();
+  }
+  placed_.resize(solids_.size());
+}
+
 void Checker::check(bool start_state) {
   ++checks_.states;
   surfaces_.clear();
@@ -79,9 +91,8 @@ void Checker::check(bool start_state) {
     if (!std::exchange(checks_.too_far, true)) keep_warning("a body is further than 1e90 m away: crossings cannot be counted in such a state");
     return;
   }
-  for (size_t o = 0; o < placed_.size(); ++o) {
-    const ObstacleView &obstacle = scene_.obstacles()[o];
-    if (obstacle.def.shape != DFM_SHAPE_MESH) continue;
+  for (size_t o = 0; o < solids_.size(); ++o) {
+    const ObstacleView &obstacle = solids_[o];
     place_points(obstacle, placed_[o]);
     surfaces_.push_back({placed_[o].data(), obstacle.def.npoint, obstacle.def.triangles, obstacle.def.ntriangle, true});
   }

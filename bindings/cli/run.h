@@ -53,13 +53,15 @@ struct Checks {
 // Judges one state: crossings, inverted cells, finiteness.
 class Checker {
  public:
-  explicit Checker(const SceneFile &scene) : scene_(scene), positions_(scene.bodies().size()), placed_(scene.obstacles().size()) {}
+  explicit Checker(const SceneFile &scene);
+  Checker(const Checker &) = delete;   // solids_ points into cores_
   void check(bool start_state);
   const Checks &result() const { return checks_; }
 
  private:
   const SceneFile &scene_;
-  std::vector<std::vector<double>> positions_, placed_;   // of bodies; of obstacles of triangles
+  std::vector<ObstacleView> solids_;                              // obstacles of triangles, and the cores of voxels
+  std::vector<std::vector<double>> cores_, positions_, placed_;   // of voxels; of bodies; of solids
   std::vector<crossing::Surface> surfaces_;
   std::vector<double> state_;  // x and v of one body
   crossing::Counter counter_;
