@@ -1,4 +1,5 @@
 // contact.method rollback: what it refuses, what the plan says, what a snapshot of it holds.
+#include "bristle_law.h"
 #include "coupled.h"
 #include "rigid.h"
 #include "rollback_cases.h"
@@ -76,6 +77,12 @@ TEST(RollbackWorld, WhatItCannotDo_IsRefusedWhereItIsMade) {
   dfm_body worn = 0;
   refused(dfm_body_create(w.world, &d, &worn), "body 'worn': a surface of its own");
   test::ok(dfm_tetmesh_destroy(mesh));
+
+  test::ok(dfm_plugin_register_static(w.context, dfm_plugin_entry_bristle, "bristle"));
+  const double mu = 0.5;
+  const dfm_param_value value{"mu", &mu, 1};
+  const dfm_friction_def memory = {sizeof memory, 0, {"*", "*"}, "test.bristle", {sizeof(dfm_params), 1, &value}};
+  refused(dfm_world_add_friction(w.world, &memory), "friction law 'test.bristle': a memory");
 
   dfm_world_def sleepy = dfm_world_def_default();
   sleepy.method = DFM_METHOD_ROLLBACK, sleepy.sleep = 1;
