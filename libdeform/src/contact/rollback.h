@@ -7,17 +7,12 @@
 
 namespace dfm::rollback {
 
-// (4.5): where a vertex is at the impact. Printed per vertex, with a time of its own; here t is that of its island.
-inline Vec3 rolled_back(Vec3 start, Vec3 end, double t) { return start + t * (end - start); }
-
-// Position Verlet, the source's integrator, reads its velocity from positions: (x(t) - x(0)) / h, t times that of the full way. The text does not say.
+// (4.5): a vertex is where it is at its impact, x + t h v, t that of its island (printed: of its own). Position Verlet, the source's integrator, then
+// reads the velocity from positions, (x(t) - x(0)) / h: t times that of the full way. The text does not say.
 inline Vec3 velocity_after(Vec3 velocity, double t) { return t * velocity; }
 
 // A safety factor on impact times; with it the next sub-step does not begin in the touch that this one ended in.
 inline constexpr double kSafety = 0.9;
-
-// (5.21), (5.25): the part of a vector across the unit normal. Printed with a cross product in place of the dot product.
-inline Vec3 across(Vec3 v, Vec3 n) { return v - dot(v, n) * n; }
 
 // (5.23), (5.24): normal force, N, >= 0. Printed as a choice between dot products of the forces of point and triangle in which the normal does not
 // occur, and which is zero but where both are equally large. inverse_mass: n^T J M^-1 J^T n of the pair, 1/kg; speed: relative velocity along n at the

@@ -122,7 +122,7 @@ void find_islands(World &w) {
 
 // Colliding points: of each vertex with one other side the earliest hit. A pair of edges counts only where none of its ends is such a point: the source
 // has no edges, and what both have would push twice.
-void find_contacts(World &w) {
+void find_points(World &w) {
   Rollback &r = w.rollback;
   const Array<Candidate> &list = w.broad.candidates();
   const ImpactQuery query(w.body_views, w.obstacle_views, w.h, w.offset);
@@ -236,7 +236,7 @@ bool World::stage_rollback(uint32_t *trouble) {
   rollback.shares.clear();
   for (const BodyView &v : body_views) rollback.shares.push_back(&rollback.share[v.first_node]);
   find_islands(*this);
-  find_contacts(*this);
+  find_points(*this);
   make_rows();
   set_forces(*this);
   if (const LawInstance *bad = batches.evaluate(h, state)) return *trouble |= DFM_TROUBLE_PLUGIN, tell_failed_solve(bad), false;

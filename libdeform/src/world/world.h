@@ -195,8 +195,8 @@ struct World {
   uint32_t sleepers = 0;
 
   dfm_world_stats stats{};
-  std::array<double, 16> stage_seconds{};
-  std::array<uint64_t, 16> stage_calls{};
+  std::array<double, 24> stage_seconds{};
+  std::array<uint64_t, 24> stage_calls{};
 
   explicit World(dfm_context *c);
   const Memory &memory() const { return context->memory; }
