@@ -2,8 +2,7 @@
 // (Zerbato 2010, (4.5), (5.21), (5.24), (5.25), (5.27)).
 #include "contact/rollback.h"
 
-#include <functional>
-
+#include "obstacle.h"
 #include "rollback_cases.h"
 
 namespace {
@@ -196,6 +195,18 @@ TEST(Rollback, VertexHeldUpByAnother_TiesWhatFollowsIt) {
   for (int k = 0; k < 3; ++k) EXPECT_NEAR(state(a).x[k][2], 0.05 - 0.1 * t, 1e-6);
   EXPECT_NEAR(state(b).x[0][2], 0.103 - 0.1 * t, 1e-6);
   EXPECT_NEAR(state(b).x[1][2], 0.103, 1e-12) << "its other vertices collide with nothing";
+}
+
+// Over the middle of a floor of triangles, where six of them meet: the point is pressed once, not six times.
+TEST(Rollback, VertexWhereTrianglesMeet_IsOneContact) {
+  Scene s({0, 0, 0}, 0.5);
+  test::add_mesh(s.world, "floor", test::box_surface({1, 1, 0.5}, 2));
+  const dfm_body b = s.add(pointer("tet", {0, 0, 0.5 + kOffset + 0.01}, 0.3, {0, 0, -2}));
+  s.step(0.01);
+  const auto contacts = test::contacts(s.world);
+  ASSERT_EQ(contacts.size(), 1u);
+  EXPECT_NEAR(contacts[0].fn, vertex_mass(b) * 2 / 0.01, 1e-6 * vertex_mass(b) / 0.01);
+  EXPECT_NEAR(state(b).v[0][2], -2 * 0.45, 1e-4);
 }
 
 // At rest t = 0: frozen, across the plane as much as into it. What parts is free, at once and in full.
