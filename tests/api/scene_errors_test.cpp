@@ -146,7 +146,6 @@ TEST(SceneErrors, NotDelivered_IsNeverIgnored) {
       {"/time/integrator=\"verlet\"", "/time/integrator"},
       {"/time/integrator=\"implicit_euler\"", "/time/integrator"},
       {"/contact/method=\"implicit\"", "/contact/method"},
-      {"/contact/method=\"rollback\"", "/contact/method"},
       {"/contact/self=true", "/contact/self"},
       {"/contact/untangle=true", "/contact/untangle"},
       {"/output/color=\"stress\"", "/output/color"},

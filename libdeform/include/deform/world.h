@@ -7,7 +7,9 @@
 #ifdef __cplusplus
 extern "C" {
 #endif
-enum { DFM_METHOD_AUTO = 0, DFM_METHOD_VELOCITY = 1 };
+/* How contacts are solved. AUTO is VELOCITY. ROLLBACK is the source's scheme, to compare and not to use: it freezes what slides and loses momentum
+ * (doc/concepts/rollback.md); what it cannot do is refused with DFM_E_UNSUPPORTED where it is made. 2 is kept for implicit. Since 0.2 (ROLLBACK). */
+enum { DFM_METHOD_AUTO = 0, DFM_METHOD_VELOCITY = 1, DFM_METHOD_ROLLBACK = 3 };
 enum { DFM_INTEGRATOR_AUTO = 0, DFM_INTEGRATOR_SYMPLECTIC_EULER = 1 };
 
 typedef struct dfm_world_def {

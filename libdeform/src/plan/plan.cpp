@@ -58,13 +58,19 @@ const char *stage_name(StageId id) {
     case StageId::rigid_predict: return "rigid predict";
     case StageId::rigid_commit: return "rigid commit";
     case StageId::sleep: return "sleep";
+    case StageId::lagged: return "lagged friction";
+    case StageId::rollback: return "rollback";
     case StageId::step: return "step";
   }
   return "?";
 }
 
 bool Plan::touches() const {
-  return std::any_of(stages.begin(), stages.end(), [](const PlannedStage &s) { return s.id == StageId::solve; });
+  return std::any_of(stages.begin(), stages.end(), [](const PlannedStage &s) { return s.id == StageId::solve || s.id == StageId::rollback; });
+}
+
+bool Plan::rolls_back() const {
+  return std::any_of(stages.begin(), stages.end(), [](const PlannedStage &s) { return s.id == StageId::rollback; });
 }
 
 Plan make_plan(const SceneFacts &f) {
@@ -96,10 +102,14 @@ Plan make_plan(const SceneFacts &f) {
     const std::string coupled = count(f.coupled_surfels, "surfel", "surfels") + " of " + count(f.coupled, "body", "bodies");
     if (f.coupled) run(StageId::gather, coupled + " hang on several points each");
     else leave("gather", "every surfel is a point of its body");
-    run(StageId::broad, who);
-    run(StageId::narrow, who);
-    run(StageId::solve, who);
-    run(StageId::distribute, who);
+    if (f.rollback) {
+      run(StageId::lagged, "friction that the last sub-step found");
+      run(StageId::broad, who);
+      run(StageId::rollback, "contact.method rollback: vertices that collide go back to their time of impact; there to compare, not to use");
+      for (StageId id : {StageId::narrow, StageId::solve, StageId::distribute}) leave(stage_name(id), "contact.method is rollback");
+    } else {
+      for (StageId id : {StageId::broad, StageId::narrow, StageId::solve, StageId::distribute}) run(id, who);
+    }
   } else {
     const std::string why = f.bodies < 2 && !f.obstacles ? "one body and nothing to touch" : "filters let no pair touch";
     for (StageId id : {StageId::gather, StageId::broad, StageId::narrow, StageId::solve, StageId::distribute}) leave(stage_name(id), why);

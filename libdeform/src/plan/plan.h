@@ -6,7 +6,7 @@
 
 namespace dfm {
 
-enum class StageId { motion, model, predict, gather, broad, narrow, solve, distribute, commit, rigid_predict, rigid_commit, sleep, step };
+enum class StageId { motion, model, predict, gather, broad, narrow, solve, distribute, commit, rigid_predict, rigid_commit, sleep, lagged, rollback, step };
 const char *stage_name(StageId id);
 
 // What the plan is derived from.
@@ -23,6 +23,7 @@ struct SceneFacts {
   std::vector<Provider> available;                     // by every loaded plugin
   bool effects_listed = false;
   bool sleep = false;                                  // islands at rest may sleep
+  bool rollback = false;                               // contact.method
   std::vector<std::string> asked;                      // where listed
 };
 
@@ -35,6 +36,7 @@ struct Plan {
   std::vector<AbsentStage> absent;
   std::vector<PlannedEffect> effects;
   bool touches() const;                                // has contact stages
+  bool rolls_back() const;                             // and they are those of the roll-back
 };
 
 // Throws Error(DFM_E_ARG) where a listed effect is provided by nothing in the scene; names who could.

@@ -302,7 +302,8 @@ void read_contact(const Node &scene, Definition &def, const ReadContext &context
   if (!scene.has("contact")) scene.value()["contact"] = json::object();
   const Node contact = scene.member("contact");
   contact.object("contact");
-  if (contact.word("method", "auto", "method") == "velocity") def.method = DFM_METHOD_VELOCITY;
+  const std::string method = contact.word("method", "auto", "method");
+  def.method = method == "velocity" ? DFM_METHOD_VELOCITY : method == "rollback" ? DFM_METHOD_ROLLBACK : DFM_METHOD_AUTO;
   def.sleep = contact.boolean("sleep", false);
   for (const char *later : {"self", "untangle"})
     if (contact.boolean(later, false)) contact.member(later).not_yet();

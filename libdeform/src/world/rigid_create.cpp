@@ -106,6 +106,7 @@ void destroy_rigids(RigidSet &set) {
 }
 
 void create_rigids(World &w, const char *host, const dfm_rigid_set_def &def, uint64_t *out) {
+  rollback_refuse(w, "rigid bodies, which a host moves,");
   if (!def.nbody || !def.bodies) fail(DFM_E_ARG, "a set of rigid bodies needs at least one body");
   if (def.njoint && !def.joints) fail(DFM_E_ARG, "%u joints are announced, but joints is NULL", def.njoint);
   auto owned = std::make_unique<RigidSet>(w, host ? host : "builtin");

@@ -29,7 +29,8 @@ Pose Obstacle::pose_at_time(double t) const {
 }
 
 World::World(dfm_context *c)
-    : context(c), broad(c->memory), rows(c->memory), acceleration(c->memory), store(c->memory), next_store(c->memory), batches(c->memory), islands(c->memory) {
+    : context(c), broad(c->memory), rows(c->memory), acceleration(c->memory), store(c->memory), next_store(c->memory), batches(c->memory), rollback(c->memory),
+      islands(c->memory) {
   const Memory &m = c->memory;
   use_memory(m, driven, lent, contacts, tolerance.tangent, disturbance, best_impulse, tangents, match, block_surfels, block_impulse, block_velocity);
   for (Report *r : {&report, &last_report}) use_memory(m, r->contacts, r->frame, r->impulse, r->slip, r->mode);
@@ -64,7 +65,9 @@ uint32_t World::add_law(const char *name, std::span<const dfm_param_value> value
   std::vector<double> packed = pack_params(type, values);
   for (uint32_t i = 0; i < laws.size(); ++i)
     if (laws[i]->type == &type && laws[i]->params == packed) return i;
-  laws.push_back(std::make_unique<LawInstance>(type, context->host, std::move(packed)));
+  auto law = std::make_unique<LawInstance>(type, context->host, std::move(packed));
+  rollback_check_law(*this, name, law->nstate);
+  laws.push_back(std::move(law));
   return static_cast<uint32_t>(laws.size() - 1);
 }
 
@@ -97,7 +100,7 @@ void World::prepare() {
   const uint32_t nb = static_cast<uint32_t>(bodies.size()), no = static_cast<uint32_t>(obstacles.size()), width = nb + no;
   SceneFacts facts;
   facts.bodies = nb, facts.obstacles = no;
-  facts.gravity_keys = !gravity_keys.empty(), facts.sleep = def.sleep != 0;
+  facts.gravity_keys = !gravity_keys.empty(), facts.sleep = def.sleep != 0, facts.rollback = def.method == DFM_METHOD_ROLLBACK;
 
   body_views.clear(), obstacle_views.clear(), sources.clear();
   uint32_t node = 0, point = 0;
