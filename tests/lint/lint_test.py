@@ -32,6 +32,7 @@ GOOD = {
     "examples/01_hello.c": HELLO,
     "libdeform/include/deform/base.h": HEADER,
     "libdeform/include/deform/deform.h": '#ifndef DEFORM_DEFORM_H\n#define DEFORM_DEFORM_H\n#include "deform/base.h"\n#endif\n',
+    "libdeform/include/deform/deform.hpp": "inline int hello() { return dfm_hello() + dfm_hello_loud(); }\n",
     "libdeform/src/core/error.h": "#pragma once\n#include <string>\n",
     "libdeform/src/math/elementary.h": "#pragma once\ninline double exp_check(double x) { return std::exp(x); }\n",
     "libdeform/src/broad/tree.cpp": '#include "core/error.h"\n// std::pow( and Eigen:: in a comment say nothing\nint log(int);\n',
@@ -87,6 +88,8 @@ BAD = {
                        ("libdeform/include/deform/body.h", "=#pragma once\n"),
                        ("libdeform/include/deform/deform.h", "=#ifndef DEFORM_DEFORM_H\n#define DEFORM_DEFORM_H\n#endif\n"),
                        ("libdeform/include/deform/base.h", "=#ifndef DEFORM_BASE_H\n#define DEFORM_BASE_H\nDFM_API int dfm_a(void);\n#endif\n")],
+    "cpp_complete": [("libdeform/include/deform/deform.hpp", "=// dfm_hello() and dfm_hello_loud() in a comment reach nothing\n"),
+                     ("libdeform/include/deform/deform.hpp", "=inline int hello() { return dfm_hello(); }\n")],
     "threads": [("libdeform/include/deform/base.h", "\nDFM_API int dfm_silent(void);\n"),
                 ("libdeform/include/deform/base.h", "\n/** Says nothing of threads. */\nDFM_API int dfm_silent(int a,\n  int b);\n")],
 }
