@@ -201,6 +201,9 @@ TEST(Hpp, Meshes_LendTheirArrays) {
   const auto again = context.make_surface(shape.points, shape.triangles);
   EXPECT_EQ(again.info().ntriangle, surface.info().ntriangle);
   EXPECT_THROW((void)context.make_tets("bal", {0.1}, 100), deform::Error);
+  const auto read = context.read_mesh(std::string(DEFORM_SOURCE_DIR) + "/tests/data/surfaces/cube_obj.obj");
+  EXPECT_FALSE(read.cells);
+  EXPECT_EQ(read.surface.info().ntriangle, 12u);
 }
 
 TEST(Hpp, RigidBodies_GoByTheirSet) {

@@ -232,6 +232,12 @@ class TriMesh : public Handle<dfm_trimesh> {
   }
 };
 
+template <class E>
+struct AnyMesh {
+  Unique<TetMesh<E>> cells;
+  Unique<TriMesh<E>> surface;
+};
+
 // ---- bodies -----------------------------------------------------------------------------------------------------------------------
 template <class E>
 class Body : public Handle<dfm_body> {
@@ -506,6 +512,10 @@ class Context : public Handle<dfm_context *> {
     return produce<E, Unique<Law<E>>>([&](auto &law) { return dfm_law_open(raw_, id_or_path.c_str, law.put()); });
   }
 
+  // Cells, or where the file has none the surface: the other one refers to nothing.
+  auto read_mesh(Text path) const {
+    return produce<E, AnyMesh<E>>([&](AnyMesh<E> &m) { return dfm_mesh_read(raw_, path.c_str, m.cells.put(), m.surface.put()); });
+  }
   auto read_tets(Text path) const {
     return produce<E, Unique<TetMesh<E>>>([&](auto &m) { return dfm_tetmesh_read(raw_, path.c_str, m.put()); });
   }
