@@ -16,17 +16,20 @@ inline void *counted_alloc(size_t bytes, size_t align) {
   throw std::bad_alloc();
 }
 
+// Out of line: where a compiler sees free() behind its own operator new, it calls them mismatched.
+[[gnu::noinline]] inline void counted_free(void *p) noexcept { std::free(p); }
+
 }  // namespace test
 
 void *operator new(size_t bytes) { return test::counted_alloc(bytes, 0); }
 void *operator new[](size_t bytes) { return test::counted_alloc(bytes, 0); }
 void *operator new(size_t bytes, std::align_val_t align) { return test::counted_alloc(bytes, size_t(align)); }
 void *operator new[](size_t bytes, std::align_val_t align) { return test::counted_alloc(bytes, size_t(align)); }
-void operator delete(void *p) noexcept { std::free(p); }
-void operator delete[](void *p) noexcept { std::free(p); }
-void operator delete(void *p, size_t) noexcept { std::free(p); }
-void operator delete[](void *p, size_t) noexcept { std::free(p); }
-void operator delete(void *p, std::align_val_t) noexcept { std::free(p); }
-void operator delete[](void *p, std::align_val_t) noexcept { std::free(p); }
-void operator delete(void *p, size_t, std::align_val_t) noexcept { std::free(p); }
-void operator delete[](void *p, size_t, std::align_val_t) noexcept { std::free(p); }
+void operator delete(void *p) noexcept { test::counted_free(p); }
+void operator delete[](void *p) noexcept { test::counted_free(p); }
+void operator delete(void *p, size_t) noexcept { test::counted_free(p); }
+void operator delete[](void *p, size_t) noexcept { test::counted_free(p); }
+void operator delete(void *p, std::align_val_t) noexcept { test::counted_free(p); }
+void operator delete[](void *p, std::align_val_t) noexcept { test::counted_free(p); }
+void operator delete(void *p, size_t, std::align_val_t) noexcept { test::counted_free(p); }
+void operator delete[](void *p, size_t, std::align_val_t) noexcept { test::counted_free(p); }
