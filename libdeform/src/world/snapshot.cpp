@@ -52,6 +52,7 @@ uint64_t structure(const World &w) {
     h.add(set->group.data(), set->group.size() * sizeof(uint32_t));
     for (const dfm_rigid_def &d : set->defs) h.add(d.mass), h.add(d.inertia);
   }
+  if (asks_self_contact(w)) h.add(uint8_t(1));
   return h.value;
 }
 

@@ -23,6 +23,7 @@
 #include "world/islands.h"
 #include "world/motion.h"
 #include "world/rigid.h"
+#include "world/self_contact.h"
 #include "world/sleep.h"
 
 namespace dfm {
@@ -159,6 +160,7 @@ struct World {
   std::vector<DofSource> sources;
   std::vector<ImpulseSink> sinks;
   BroadPhase broad;
+  std::vector<std::unique_ptr<SelfBody>> self_bodies;  // in id order; those that may touch themselves
   Array<ContactPoint> contacts;
   Array<uint8_t> lent;                                 // scratch of the narrow phase
   ContactRows rows;
@@ -228,6 +230,7 @@ struct World {
   void stage_gather();
   void stage_broad();
   bool stage_narrow(uint32_t *trouble);                // sleep.cpp
+  void stage_self();                                   // self_contact.cpp
   bool stage_solve(uint32_t *trouble);                 // solve.cpp
   void stage_distribute();
   bool stage_commit(uint32_t *trouble);
