@@ -90,7 +90,7 @@ bool SelfList::update(double h, double offset) {
   const double now = share(h, offset, kSpeedGrowth, 0);
   const double skin = std::clamp(skin_steps_ * 0.5 * (now - offset), kSkinLeast * s.median_edge, kSkinMost * s.median_edge);
   margin_ = kRounding * now + skin;
-  list(kRounding * 2 * margin_ + edge_recovery_depth(s, s));
+  list(kRounding * 2 * margin_ + self_recovery_depth(s));
   return true;
 }
 

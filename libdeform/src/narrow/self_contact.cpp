@@ -41,12 +41,12 @@ struct Self {
   const BodyView &body;
   const SelfRest &rest;
   const Surface &s;
-  double h, offset, depth;             // depth: m, recovery
+  double h, offset, depth, edge_depth;  // depth: m, recovery
   Pair pair;
   Array<ContactPoint> &out;
 
   Self(const BodyView &b, const SelfRest &r, double step, double d_c, Array<ContactPoint> &to)
-      : body(b), rest(r), s(*b.surface), h(step), offset(d_c), depth(edge_recovery_depth(s, s)), pair{b, &b, nullptr, step, d_c, 0}, out(to) {}
+      : body(b), rest(r), s(*b.surface), h(step), offset(d_c), depth(self_recovery_depth(s)), edge_depth(edge_recovery_depth(s, s)), pair{b, &b, nullptr, step, d_c, 0}, out(to) {}
 
   Vec3 x(uint32_t surfel) const { return pair.xa(surfel); }
   Vec3 v(uint32_t surfel) const { return pair.va(surfel); }
@@ -153,16 +153,16 @@ void Self::vertex_face(uint32_t surfel, uint32_t t) {
   const Vec3 p = x(surfel), a = x(c[0]), u = x(c[1]) - a, w = x(c[2]) - a, n = cross(u, w);
   double speed2 = 0;
   for (int k = 0; k < 3; ++k) speed2 = std::max(speed2, norm2(v(surfel) - v(c[k])));
-  const double reach = contact_reach(h, offset, std::sqrt(speed2)), along = dot(n, p - a), nn = norm2(n);
-  if (along * along > reach * reach * (1 + kNearer) * nn && nn > 1e-12 * norm2(u) * norm2(w)) return;
+  const double reach = contact_reach(h, offset, std::sqrt(speed2)), widest = std::max(reach, depth), along = dot(n, p - a), nn = norm2(n);
+  if (along * along > widest * widest * (1 + kNearer) * nn && nn > 1e-12 * norm2(u) * norm2(w)) return;
   const TrianglePoint at = closest(t, p);
-  if (!(at.distance2 < reach * reach) || !minimum(surfel, t, at)) return;
+  if (!(at.distance2 < widest * widest) || !minimum(surfel, t, at)) return;
   const bool face = at.feature == TriangleFeature::face;
   const Vec3 up = outward(surfel, t, at);
   const double distance = std::sqrt(at.distance2), now = (face ? along : dot(up, p - at.point)) < 0 ? -1 : 1;
   const Kin k = kin_of_face(surfel, t);
   const double side = k.side != 0 ? k.side : now;
-  if (!(k.apart > 0) || (now != side && !(face && distance <= depth))) return;
+  if (!(k.apart > 0) || !(now == side ? distance < reach : face && distance <= depth)) return;
   if (!face && !(distance > 1e-9 * s.median_edge)) return;
   const Vec3 normal = face ? side * up : (1 / distance) * (p - at.point);
   if (!(norm2(normal) > 0)) return;
@@ -186,19 +186,19 @@ void Self::edge_edge(uint32_t a, uint32_t b) {
   double speed2 = 0;
   for (int i = 0; i < 2; ++i)
     for (int j = 0; j < 2; ++j) speed2 = std::max(speed2, norm2(v(ea[i]) - v(eb[j])));
-  const double reach = contact_reach(h, offset, std::sqrt(speed2)), widest = std::max(reach, depth);
+  const double reach = contact_reach(h, offset, std::sqrt(speed2)), widest = std::max(reach, edge_depth);
   if (!(nr * nr < widest * widest * nn)) return;
   if (!between_ends(on_a, 2 * h * std::sqrt(speed2 / uu)) || !between_ends(on_b, 2 * h * std::sqrt(speed2 / ww))) return;
   const Kin k = kin_of_edges(a, b);
-  const bool within = k.side < 0;
-  const auto sticks_out = [&](uint32_t e) { return within ? edge_becomes_concave(s, e, h) : edge_becomes_convex(s, e, h); };
-  if (!(k.apart > 0) || !sticks_out(a) || !sticks_out(b)) return;
+  const bool outside = k.side >= 0 && edge_becomes_convex(s, a, h) && edge_becomes_convex(s, b, h);
+  const bool within = !outside && k.side <= 0 && edge_becomes_concave(s, a, h) && edge_becomes_concave(s, b, h);
+  if (!(k.apart > 0) || !(outside || within)) return;
   const EdgeFaces fa = edge_faces(s, a), fb = edge_faces(s, b);
   const Vec3 up_a = within ? -fa.outward() : fa.outward(), up_b = within ? -fb.outward() : fb.outward();
   Vec3 normal = (1 / std::sqrt(nn)) * n;
   if (dot(normal, up_b) < dot(normal, up_a)) normal = -normal;
   const double distance = dot(normal, r);
-  if (!(distance < reach && distance >= -depth)) return;
+  if (!(distance < reach && distance >= -edge_depth)) return;
   const double slack = kCone + std::min(0.3, reach / std::sqrt(std::min(uu, ww)));
   if (!fb.leans_out(normal, slack) || !fa.leans_out(-normal, slack)) return;
   ContactPoint c = blank(pair, kEdgeEdge, 1, a, b);

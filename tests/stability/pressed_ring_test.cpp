@@ -1,0 +1,32 @@
+// A ring pressed flat between two plates until its walls meet, the plates drawn apart sideways, and let go.
+#include "scenes.h"
+
+namespace {
+
+// Height of the ring's hole, m, in record i of two probes.
+double hole(const test::SceneRun &run, size_t i) { return run.probe_rows("roof")[i][3] - run.probe_rows("ground")[i][3]; }
+
+bool opens_again(const test::SceneRun &run) { return hole(run, run.probe_rows("roof").size() - 1) > 0.9 * hole(run, 0); }
+
+}  // namespace
+
+TEST(PressedRing, WallsMeet_CarryAndPart) {
+  const test::SceneRun run("pressed_ring", {"--set", "/output/every=0.01"});
+  run.expect_sound(20, "ring");
+  EXPECT_EQ(run.number("intersections_self_max"), 0);
+  double least = 1;
+  for (size_t i = 0; i < run.probe_rows("roof").size(); ++i) least = std::min(least, hole(run, i));
+  EXPECT_GT(least, 0) << "the walls keep their distance";
+  EXPECT_LT(least, 1e-3) << "and have met";
+  EXPECT_TRUE(opens_again(run));
+}
+
+TEST(PressedRing, WithoutTheEffect_Crosses) {
+  const test::SceneRun run("pressed_ring", {"--time", "0.6", "--set", "/contact/self=false"});
+  EXPECT_GT(run.number("intersections_self_max"), 10);
+  EXPECT_EQ(run.number("intersections_between_max"), 0);
+  EXPECT_EQ(run.number("intersections_max"), run.number("intersections_self_max"));
+}
+
+TEST(PressedRing, JitteredRuns1To5_DoNotCross) { test::expect_jittered("pressed_ring", 1, 5, {}, 20, opens_again); }
+TEST(PressedRing, JitteredRuns6To10_DoNotCross) { test::expect_jittered("pressed_ring", 6, 10, {}, 20, opens_again); }
