@@ -75,15 +75,16 @@ TEST(SelfContact, LegsThrownTogether_StayApartWhereItIsOnAndPassWhereItIsOff) {
   for (const bool self : {true, false}) {
     const dfm_world w = test::make_self_world(c, self);
     test::HookOptions o;
-    o.young = 1e4, o.damping_stiffness = 1e-3, o.close = 2, o.held = true;
+    o.young = 2e4, o.damping_stiffness = 1e-3, o.close = 1.2, o.held = true;
     const dfm_body b = test::make_hook(w, o);
     double least = 1;
     for (int i = 0; i < 60; ++i) {
       test::run(w, 5e-4, 5e-4);
       least = std::min(least, tip_gap(b));
     }
-    if (self) EXPECT_GT(least, 0);
-    else EXPECT_LT(least, -1e-3);
+    // The legs tilt as they meet, so their tips' middles pass each other by a little; through each other they pass by more than their thickness.
+    if (self) EXPECT_GT(least, -0.0025);
+    else EXPECT_LT(least, -0.02);
   }
 }
 

@@ -24,8 +24,20 @@ namespace {
 
 using namespace narrow;
 
-// From within, this edge sticks out, or will.
-bool edge_becomes_concave(const Surface &s, uint32_t edge, double h) { return edge_concave(s, edge, 0) || edge_concave(s, edge, 2 * h); }
+// Sine of the fold at the positions x + ahead v: negative where the edge is convex; an open edge is as convex as can be (surfel/convex.h).
+double fold(const Surface &s, uint32_t edge, double ahead) {
+  const uint32_t *const ends = &s.edge[2 * size_t{edge}], *const tris = &s.edge_tri[2 * size_t{edge}];
+  if (tris[0] == kNone || tris[1] == kNone) return -1;
+  const auto x = [&](uint32_t i) { return load3(&s.x[4 * size_t{i}]) + ahead * load3(&s.v[4 * size_t{i}]); };
+  const auto far_corner = [&](uint32_t t) {
+    const uint32_t *const c = &s.tri[3 * size_t{t}];
+    return c[0] + c[1] + c[2] - ends[0] - ends[1];
+  };
+  const Vec3 from = x(ends[0]), e = x(ends[1]) - from, r1 = x(far_corner(tris[1])) - from;
+  const Vec3 c0 = cross(e, x(far_corner(tris[0])) - from), c1 = cross(r1, e);
+  const double size2 = norm2(c0) * norm2(c1);
+  return size2 > 0 ? dot(c0, r1) * norm(e) / std::sqrt(size2) : 0;
+}
 
 constexpr double kNearer = 1e-9;      // relative: a triangle beside the feature counts as nearer only beyond this
 constexpr double kThrough = 0.25;     // cosine to the outward normal beyond which a pair at rest looks through the material, or away from it
@@ -190,9 +202,13 @@ void Self::edge_edge(uint32_t a, uint32_t b) {
   if (!(nr * nr < widest * widest * nn)) return;
   if (!between_ends(on_a, 2 * h * std::sqrt(speed2 / uu)) || !between_ends(on_b, 2 * h * std::sqrt(speed2 / ww))) return;
   const Kin k = kin_of_edges(a, b);
-  const bool outside = k.side >= 0 && edge_becomes_convex(s, a, h) && edge_becomes_convex(s, b, h);
-  const bool within = !outside && k.side <= 0 && edge_becomes_concave(s, a, h) && edge_becomes_concave(s, b, h);
-  if (!(k.apart > 0) || !(outside || within)) return;
+  if (!(k.apart > 0)) return;
+  // An edge that is flat folds out where the blow bends its faces, by what they may move against each other within the sub-step.
+  const double bent = std::min(0.3, 2 * h * std::sqrt(speed2 / std::min(uu, ww))) - kConvex;
+  const auto sticks_out = [&](uint32_t e, double side) { return side * fold(s, e, 0) < bent || side * fold(s, e, 2 * h) < bent; };
+  const bool outside = k.side >= 0 && sticks_out(a, 1) && sticks_out(b, 1);
+  const bool within = !outside && k.side <= 0 && sticks_out(a, -1) && sticks_out(b, -1);
+  if (!(outside || within)) return;
   const EdgeFaces fa = edge_faces(s, a), fb = edge_faces(s, b);
   const Vec3 up_a = within ? -fa.outward() : fa.outward(), up_b = within ? -fb.outward() : fb.outward();
   Vec3 normal = (1 / std::sqrt(nn)) * n;

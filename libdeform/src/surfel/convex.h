@@ -9,12 +9,11 @@ namespace dfm {
 // is felt when it comes or goes.
 inline constexpr double kConvex = 2e-5;
 
-// At the positions x + ahead v. Between two faces the sine of the fold is c0 . r1 |e| / (|c0| |c1|), with r1 to the second face's far corner and c the
-// faces' normals times twice their areas; it is negative where the second face falls away from the first. -1 convex, 1 concave, 0 flat; an open
-// edge is as convex as can be.
-inline int edge_fold(const Surface &surface, uint32_t edge, double ahead = 0) {
+// At the positions x + ahead v. An open edge is as convex as can be. Between two faces the sine of the fold is c0 . r1 |e| / (|c0| |c1|), with r1
+// to the second face's far corner and c the faces' normals times twice their areas; it is negative where the second face falls away from the first.
+inline bool edge_convex(const Surface &surface, uint32_t edge, double ahead = 0) {
   const uint32_t *ends = &surface.edge[2 * size_t{edge}], *tris = &surface.edge_tri[2 * size_t{edge}];
-  if (tris[0] == kNone || tris[1] == kNone) return -1;
+  if (tris[0] == kNone || tris[1] == kNone) return true;
   const auto x = [&](uint32_t s) { return load3(&surface.x[4 * size_t{s}]) + ahead * load3(&surface.v[4 * size_t{s}]); };
   const auto far_corner = [&](uint32_t t) {
     const uint32_t *c = &surface.tri[3 * size_t{t}];
@@ -23,10 +22,7 @@ inline int edge_fold(const Surface &surface, uint32_t edge, double ahead = 0) {
   const Vec3 from = x(ends[0]), e = x(ends[1]) - from, r0 = x(far_corner(tris[0])) - from, r1 = x(far_corner(tris[1])) - from;
   const Vec3 c0 = cross(e, r0), c1 = cross(r1, e);
   const double fold = dot(c0, r1);
-  if (!(fold * fold * norm2(e) > kConvex * kConvex * norm2(c0) * norm2(c1))) return 0;
-  return fold < 0 ? -1 : 1;
+  return fold < 0 && fold * fold * norm2(e) > kConvex * kConvex * norm2(c0) * norm2(c1);
 }
-inline bool edge_convex(const Surface &surface, uint32_t edge, double ahead = 0) { return edge_fold(surface, edge, ahead) < 0; }
-inline bool edge_concave(const Surface &surface, uint32_t edge, double ahead = 0) { return edge_fold(surface, edge, ahead) > 0; }
 
 }  // namespace dfm
