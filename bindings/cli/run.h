@@ -45,7 +45,8 @@ struct RunResult {
 // What recorded states showed. "Recorded" is every state written to bodies.csv, and with --check every step.
 struct Checks {
   uint64_t states = 0;
-  size_t intersections_max = 0;
+  size_t intersections_max = 0;                   // pairs of one state: all, and by whether two surfaces cross or one crosses itself
+  size_t between_max = 0, self_max = 0;
   uint32_t inverted_max = 0;
   bool finite = true, too_far = false;
 };

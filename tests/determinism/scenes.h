@@ -1,6 +1,7 @@
 // Scenes whose state hash must be the same on every build, cut and processor.
 #pragma once
 #include "coupled.h"
+#include "hook.h"
 #include "obstacle.h"
 
 namespace scenes {
@@ -136,6 +137,17 @@ inline dfm_world rolled_back(dfm_context *c) {
   return w;
 }
 
+// A hook is thrown on the floor while its legs are pressed together: they meet, slide on each other and stick.
+inline dfm_world folded(dfm_context *c) {
+  const dfm_world w = test::make_self_world(c, true, {0, 0, -9.81});
+  test::add_plane(w, "floor");
+  test::set_friction(w, 0.4);
+  test::HookOptions o;
+  o.young = 3e4, o.damping_stiffness = 1e-3, o.damping_mass = 5, o.position = {0, 0, 0.0005}, o.velocity = {0.1, 0, -0.3}, o.spin = {0, 2, 1}, o.close = 0.5, o.pinch = 0.03;
+  test::make_hook(w, o);
+  return w;
+}
+
 struct Scene {
   const char *name;
   dfm_world (*build)(dfm_context *);
@@ -145,7 +157,8 @@ inline const Scene all[] = {{"ball_on_floor", ball_on_floor, 150}, {"crossing_be
                             {"fine_ball", fine_ball, 20}, {"coupled_pair", coupled_pair, 80},
                             {"dale", dale, 100},
                             {"woken", woken, 220},
-                            {"rolled_back", rolled_back, 120}};
+                            {"rolled_back", rolled_back, 120},
+                            {"folded", folded, 120}};
 
 inline void advance(dfm_world w, int steps) {
   for (int i = 0; i < steps; ++i) ASSERT_EQ(dfm_world_step(w, 1e-3, nullptr), DFM_OK) << dfm_last_error();

@@ -25,6 +25,9 @@ typedef struct dfm_world_def {
   const char *const *effects;   /* NULL-terminated list the scene asks for; NULL: what its content calls for */
   double sleep_speed;           /* m/s, 0.01: what falls asleep has been slower in every point, and has stayed within half of d_c, */
   double sleep_time;            /* s, 0.5: for so long */
+  uint32_t self_contact;        /* 1: every surface touches itself too, as the effect "self_contact" in the list does; 0: only where another effect needs
+                                   it. dfm_world_filter_pair with one body's name twice decides for this body (doc/concepts/self_contact.md) */
+  uint32_t reserved;
 } dfm_world_def;
 
 /** Gravity (0,0,-9.81), everything automatic. Threads: Any thread. Since 0.1. */

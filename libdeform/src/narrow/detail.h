@@ -97,5 +97,6 @@ struct EdgeFaces {
 };
 EdgeFaces edge_faces(const Surface &surface, uint32_t edge);
 bool edge_becomes_convex(const Surface &surface, uint32_t edge, double h);
+bool between_ends(double at, double slide);
 
 }  // namespace dfm::narrow

@@ -1,6 +1,6 @@
 // One step, from top to bottom:
 //
-//   bound -> n sub-steps of { motion -> model -> predict -> broad -> narrow -> contact <-> friction -> distribute -> commit -> sleep }
+//   bound -> n sub-steps of { motion -> model -> predict -> broad -> narrow -> self -> contact <-> friction -> distribute -> commit -> sleep }
 //
 // The list of stages is the plan's (plan/plan.cpp): what a scene does not call for is not in it (and rollback.cpp stands for narrow to distribute
 // where it is asked for). Sub-steps are equal and the contact solve
@@ -79,6 +79,7 @@ bool run_stage(World &w, StageId id, uint32_t *trouble) {
     case StageId::gather: w.stage_gather(); return true;
     case StageId::broad: w.stage_broad(); return true;
     case StageId::narrow: return w.stage_narrow(trouble);
+    case StageId::self: w.stage_self(); return true;
     case StageId::solve: return w.stage_solve(trouble);
     case StageId::distribute: w.stage_distribute(); return true;
     case StageId::lagged: w.stage_lagged(); return true;

@@ -168,12 +168,15 @@ void World::prepare() {
       for (uint32_t law : used) offer(*laws[law]->type, facts.offered);
     }
   }
+  facts.effects_listed = def.effects != nullptr;
+  facts.asked = asked_effects;
+  choose_self_bodies(*this, facts, used);
   law_list.clear();
   for (auto &l : laws) law_list.push_back(l.get());
 
   for (const dfm_type *t : context->registry.list()) offer(*t, facts.available);
-  facts.effects_listed = def.effects != nullptr;
-  facts.asked = asked_effects;
+  facts.available.push_back({kSelfContact, "contact"});
+  if (nb && facts.effects_listed) facts.offered.push_back({kSelfContact, "contact"});
   plan = make_plan(facts);
 
   // While contacts live it only falls: a larger one would turn their rest into a depth, and push them apart at 0.1 d_c / h.

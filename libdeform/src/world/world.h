@@ -24,6 +24,7 @@
 #include "world/motion.h"
 #include "world/rigid.h"
 #include "world/rollback.h"
+#include "world/self_contact.h"
 #include "world/sleep.h"
 
 namespace dfm {
@@ -161,6 +162,7 @@ struct World {
   std::vector<DofSource> sources;
   std::vector<ImpulseSink> sinks;
   BroadPhase broad;
+  std::vector<std::unique_ptr<SelfBody>> self_bodies;  // in id order; those that may touch themselves
   Array<ContactPoint> contacts;
   Array<uint8_t> lent;                                 // scratch of the narrow phase
   ContactRows rows;
@@ -231,6 +233,7 @@ struct World {
   void stage_gather();
   void stage_broad();
   bool stage_narrow(uint32_t *trouble);                // sleep.cpp
+  void stage_self();                                   // self_contact.cpp
   bool stage_solve(uint32_t *trouble);                 // solve.cpp
   void make_rows();                                    // solve.cpp: contacts as rows, with what they kept
   void tell_failed_solve(const LawInstance *law);      // solve.cpp: to dfm_last_error(); null: not finite

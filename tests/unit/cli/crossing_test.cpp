@@ -130,7 +130,7 @@ struct BoxMesh {
 
 size_t count(const std::vector<Surface> &s, Touching touching) {
   Counter counter;
-  return counter.count(s, touching);
+  return counter.count(s, touching).all();
 }
 
 }  // namespace
