@@ -229,6 +229,7 @@ struct World {
   void stage_broad();
   bool stage_narrow(uint32_t *trouble);                // sleep.cpp
   bool stage_solve(uint32_t *trouble);                 // solve.cpp
+  const LawInstance *solve_rows();
   void stage_distribute();
   bool stage_commit(uint32_t *trouble);
   bool commit_steppers(uint32_t *trouble);
