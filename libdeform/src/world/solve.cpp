@@ -57,6 +57,8 @@ const Body &fastest(const World &w) {
   return *fast;
 }
 
+constexpr uint32_t kMostRevisions = 6;   // of what rigid hosts take for granted, within a sub-step
+
 // The cap on sweeps bounds the cost of what is not exact, not of what lets bodies through: where a normal residual would eat more than a tenth
 // of the rest distance within the sub-step, up to kBeyondCap times as many are done (many surfels on few phyxels, struck hard).
 constexpr uint32_t kBeyondCap = 8;
@@ -117,29 +119,41 @@ void World::tell_failed_solve(const LawInstance *law) {
                             : "the contact solve is not finite").c_str());
 }
 
+// Passes until the true residual is good enough; a law that failed, or null.
+const LawInstance *World::solve_rows() {
+  const double gap_margin = 0.01 * (0.5 * offset) / h;
+  const double least = def.contact_tolerance > 0 ? def.contact_tolerance : std::min(1e-6, gap_margin);
+  tolerance.normal = gap_margin;
+  for (;;) {
+    set_trial(rows, h, state);
+    if (const LawInstance *bad = batches.evaluate(h, state)) return bad;
+    ++passes;
+    if (!sweeps) set_tolerance(rows, state, contacts, h, least, static_cast<uint32_t>(bodies.size()), disturbance, tolerance);
+    else {
+      residual = true_residual(rows, state, h, tolerance);
+      if (residual.share <= 1 || !may_sweep(*this, residual) || passes > def.max_passes) return nullptr;
+    }
+    // at least one sweep on a warm start is part of the method
+    sweep_until_good(*this, acceleration, tolerance);
+  }
+}
+
 bool World::stage_solve(uint32_t *trouble) {
   passes = sweeps = 0;
   residual = {};
   make_rows();
   apply_last(rows);
   if (rows.n == 0) return reserve_contacts(), true;
-  const double gap_margin = 0.01 * (0.5 * offset) / h;
-  const double least = def.contact_tolerance > 0 ? def.contact_tolerance : std::min(1e-6, gap_margin);
-  tolerance.normal = gap_margin;
+  uint32_t passes_before = 0, sweeps_before = 0;
   const LawInstance *bad = nullptr;
-  for (;;) {
-    set_trial(rows, h, state);
-    bad = batches.evaluate(h, state);
-    if (bad) break;
-    ++passes;
-    if (!sweeps) set_tolerance(rows, state, contacts, h, least, static_cast<uint32_t>(bodies.size()), disturbance, tolerance);
-    else {
-      residual = true_residual(rows, state, h, tolerance);
-      if (residual.share <= 1 || !may_sweep(*this, residual) || passes > def.max_passes) break;
-    }
-    // at least one sweep on a warm start is part of the method
-    sweep_until_good(*this, acceleration, tolerance);
+  for (uint32_t revision = 0;; ++revision) {
+    bad = solve_rows();
+    if (bad || revision == kMostRevisions || rows.rigid.empty() || !revise_rigids(*this)) break;
+    // A motor holds or lets go: the same problem with another response, from the impulses that were found.
+    rows.finish(contacts, tangents.data(), h, offset);
+    passes_before += passes, sweeps_before += sweeps, passes = sweeps = 0;
   }
+  passes += passes_before, sweeps += sweeps_before;
   double poison = 0;
   for (double l : rows.impulse) poison += 0.0 * l;
   if (bad || poison != 0) {

@@ -239,6 +239,7 @@ struct World {
   void tell_failed_solve(const LawInstance *law);      // solve.cpp: to dfm_last_error(); null: not finite
   void stage_lagged();                                 // rollback.cpp
   bool stage_rollback(uint32_t *trouble);              // rollback.cpp
+  const LawInstance *solve_rows();
   void stage_distribute();
   bool stage_commit(uint32_t *trouble);
   bool commit_steppers(uint32_t *trouble);
