@@ -12,6 +12,7 @@ namespace {
 // Contacts at once that a run has at least, jittered ones included; 0: nothing touches. begins: s, by then there are so many. needs_shared: its
 // meshes lie in ../shared.
 struct Row { const char *scene; double least_contacts, begins; bool needs_shared; };
+void PrintTo(const Row &row, std::ostream *out) { *out << row.scene; }
 constexpr Row kRows[] = {
     {"ball_incline", 3, 0.3, false},        {"basin", 8, 0.8, false},
     {"fill_drop", 30, 0.4, false},          {"fill_drop_organs", 20, 0.2, true},
