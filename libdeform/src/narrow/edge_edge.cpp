@@ -23,13 +23,10 @@ EdgeFaces edge_faces(const Surface &surface, uint32_t edge) {
   return f;
 }
 
-namespace {
-
 // Where the crossing at `at` (0 and 1: the ends) lies on an edge: kNowhere on it, between its ends, or so close to one of them that the end itself may
 // make the contact (vertex-face); a second one in the same place with nearly the same normal would only make the solve ill-conditioned. Where
 // the crossing may slide in over an end within the sub-step (by `slide`, in lengths of the edge), the edges would be through each other
 // before they were seen: then the edge counts as that much longer.
-constexpr int kNowhere = -2, kBetween = -1;   // else the end: 0 or 1
 int place_on_edge(double at, double slide) {
   if (slide > kEnd) {
     const double margin = std::min(slide, kPast);
@@ -38,6 +35,8 @@ int place_on_edge(double at, double slide) {
   if (!(at > 0 && at < 1)) return kNowhere;
   return at <= kEnd ? 0 : at >= 1 - kEnd ? 1 : kBetween;
 }
+
+namespace {
 
 // Does a vertex this near an edge make a contact of its own there: over one of the edge's faces, or off the edge in the vertex's cone of normals?
 bool end_touches(const Surface &surface, uint32_t vertex, Vec3 from, Vec3 to, const EdgeFaces &faces) {

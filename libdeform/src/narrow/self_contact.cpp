@@ -200,7 +200,7 @@ void Self::edge_edge(uint32_t a, uint32_t b) {
     for (int j = 0; j < 2; ++j) speed2 = std::max(speed2, norm2(v(ea[i]) - v(eb[j])));
   const double reach = contact_reach(h, offset, std::sqrt(speed2)), widest = std::max(reach, edge_depth);
   if (!(nr * nr < widest * widest * nn)) return;
-  if (!between_ends(on_a, 2 * h * std::sqrt(speed2 / uu)) || !between_ends(on_b, 2 * h * std::sqrt(speed2 / ww))) return;
+  if (place_on_edge(on_a, 2 * h * std::sqrt(speed2 / uu)) != kBetween || place_on_edge(on_b, 2 * h * std::sqrt(speed2 / ww)) != kBetween) return;
   const Kin k = kin_of_edges(a, b);
   if (!(k.apart > 0)) return;
   // An edge that is flat folds out where the blow bends its faces, by what they may move against each other within the sub-step.
