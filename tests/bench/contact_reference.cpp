@@ -72,7 +72,8 @@ void blocks(Limits &limits) {
     limits.add(name, rows.size(), " %", [&, belt](size_t i) -> std::pair<std::string, std::vector<Limits::Got>> {
       const auto &r = rows[i];
       const ref::Slide got = ref::slide(std::stod(r[0]), std::stod(r[1]), belt);
-      return {r[0] + " m/s, mu " + r[1], {{"time", percent(got.time, std::stod(r[belt ? 2 : 3])), 2}, {"way", percent(got.distance, std::stod(r[belt ? 3 : 2])), 2}}};
+      return {r[0] + " m/s, mu " + r[1],
+              {{"time", percent(got.time, std::stod(r[belt ? 2 : 3])), 2}, {"way", percent(got.distance, std::stod(r[belt ? 3 : 2])), 2}}};
     });
   }
   const auto toppling = table("incline_toppling");
@@ -117,7 +118,9 @@ void rounds(Limits &limits, const std::string &only) {
       const auto &r = skids[i];
       const ref::Skid got = ref::skid(shape, std::stod(r[1]), std::stod(r[2]));
       return {r[1] + " m/s, mu " + r[2],
-              {{"time", percent(got.time, std::stod(r[3])), 5}, {"speed", percent(got.speed, std::stod(r[4])), 5}, {"way", percent(got.distance, std::stod(r[5])), 5}}};
+              {{"time", percent(got.time, std::stod(r[3])), 5},
+               {"speed", percent(got.speed, std::stod(r[4])), 5},
+               {"way", percent(got.distance, std::stod(r[5])), 5}}};
     });
   }
 }

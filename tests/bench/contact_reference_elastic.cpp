@@ -293,7 +293,8 @@ std::string box_stack() {
             });
           }
   }
-  return run_all({"box_stack", "cells a box", "step, ms", "worst interface force, %", "shortening, %", "springs in all directions, %", "cells inside out"}, jobs);
+  return run_all({"box_stack", "cells a box", "step, ms", "worst interface force, %", "shortening, %", "springs in all directions, %",
+                  "cells inside out"}, jobs);
 }
 
 }  // namespace

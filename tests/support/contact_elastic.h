@@ -103,7 +103,8 @@ struct Pressed {
   std::vector<uint32_t> axis;     // points whose x and y are held
 
   // depth: about what it will be pressed in, at the force `load`; stiffness and drag are taken from it.
-  Pressed(const std::function<Cells(dfm_context *)> &mesh, double radius, bool is_line, double even, double young, double nu, double load, double depth, bool two = false)
+  Pressed(const std::function<Cells(dfm_context *)> &mesh, double radius, bool is_line, double even, double young, double nu, double load,
+          double depth, bool two = false)
       : R(radius), offset(2e-5 * radius), line(is_line) {
     dfm_world_def wd = dfm_world_def_default();
     wd.gravity[2] = 0, wd.contact_offset = offset, wd.max_sweeps = 200;
@@ -278,7 +279,8 @@ inline Line pressed_line(double R, double young, double nu, double load, uint32_
   }
   const double speed = 10;   // statics: a density that makes it so
   BodyOptions o;
-  o.density = young / (speed * speed), o.young = young, o.poisson = nu, o.volume = volume_for(nu), o.damping_mass = 3 * speed / height, o.position = {0, 0, wd.contact_offset};
+  o.density = young / (speed * speed), o.young = young, o.poisson = nu, o.volume = volume_for(nu);
+  o.damping_mass = 3 * speed / height, o.position = {0, 0, wd.contact_offset};
   const dfm_body body = make_body(world, cells, o, nullptr, fixed.data());
   const dfm_obstacle plane = add_plane(world, "plane");
   set_friction(world, 0, "none");

@@ -101,7 +101,8 @@ bool revise_rigids(World &w) {
   for (auto &set : w.rigid_sets) {
     if (!set->host.revise) continue;
     uint32_t changed = 0;
-    if (set->host.revise(set->self, &set->step, set->impulse.data(), set->revised.data(), &changed) != DFM_OK || !finite(set->revised.data(), set->revised.size()))
+    if (set->host.revise(set->self, &set->step, set->impulse.data(), set->revised.data(), &changed) != DFM_OK ||
+        !finite(set->revised.data(), set->revised.size()))
       fail(DFM_E_FATAL, "rigid host '%s' does not answer contact on '%s' and those with it", set->host_name.c_str(), set->defs[0].name);
     if (!changed) continue;
     any = true;
@@ -111,7 +112,8 @@ bool revise_rigids(World &w) {
       for (uint32_t i = 0; i < set->defs.size(); ++i) {
         if (set->group[i] != block.group - set->first_group) continue;
         for (uint32_t k = 0; k < 2; ++k)
-          store3(&w.rows.y[size_t(block.first + 2 * set->place[i] + k) * 4], load3(&set->revised[6 * size_t{i} + 3 * k]) - load3(&set->velocity[6 * size_t{i} + 3 * k]));
+          store3(&w.rows.y[size_t(block.first + 2 * set->place[i] + k) * 4],
+                 load3(&set->revised[6 * size_t{i} + 3 * k]) - load3(&set->velocity[6 * size_t{i} + 3 * k]));
       }
       w.rows.push_rigid(block);
     }

@@ -128,7 +128,8 @@ void create_rigids(World &w, const char *host, const dfm_rigid_set_def &def, uin
   ask_host(set, joints);
 
   const size_t n = set.defs.size();
-  set.state.resize(n), set.next.resize(n), set.velocity.assign(6 * n, 0.0), set.impulse.assign(6 * n, 0.0), set.revised.assign(6 * n, 0.0), set.total.assign(3 * n, 0.0);
+  set.state.resize(n), set.next.resize(n), set.velocity.assign(6 * n, 0.0), set.impulse.assign(6 * n, 0.0), set.revised.assign(6 * n, 0.0);
+  set.total.assign(3 * n, 0.0);
   w.rigid_sets.reserve(w.rigid_sets.size() + 1);
   std::vector<uint64_t> handles;
   try {
