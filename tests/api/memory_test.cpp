@@ -139,13 +139,13 @@ TEST(Memory, ASettledRollbackStep_AllocatesNothing) {
     ASSERT_EQ(test::pairs(w).size(), 2u);
     test::events(w);
     const int64_t hook_calls = hooks.calls;
-    const uint64_t heap = heap_calls;
+    const uint64_t heap = test::heap_calls;
     dfm_status bad = DFM_OK;
     for (int i = 0; i < 500; ++i)
       if (const dfm_status status = dfm_world_step(w, 1e-3, nullptr); status != DFM_OK) bad = status;
     EXPECT_EQ(bad, DFM_OK) << dfm_last_error();
     EXPECT_EQ(hooks.calls - hook_calls, 0) << "calls of the allocation hook";
-    EXPECT_EQ(heap_calls - heap, 0u) << "calls of operator new";
+    EXPECT_EQ(test::heap_calls - heap, 0u) << "calls of operator new";
   }
   dfm_context_destroy(c);
   EXPECT_EQ(hooks.live_bytes, 0);

@@ -19,7 +19,7 @@ size_t crossings(const std::vector<Body> &bodies) {
   for (const Body &b : bodies) x.push_back(test::surface_positions(b.body));
   for (size_t i = 0; i < bodies.size(); ++i)
     surfaces.push_back({x[i].data(), uint32_t(x[i].size() / 3), bodies[i].triangles.data(), uint32_t(bodies[i].triangles.size() / 3)});
-  return crossing::Counter().count(surfaces, crossing::Touching::counts);
+  return crossing::Counter().count(surfaces, crossing::Touching::counts).all();
 }
 
 struct Momentum { double p[3] = {}, scale = 0; };

@@ -18,11 +18,9 @@ size_t crossings(const std::vector<Body> &bodies) {
     return crossing::Surface{x[i].data(), uint32_t(x[i].size() / 3), bodies[i].triangles.data(), uint32_t(bodies[i].triangles.size() / 3), obstacle};
   };
   size_t found = 0;
-  for (size_t j = 0; j + 1 < bodies.size(); ++j) {
-    const size_t within = crossing::Counter().count({surface(j, false)}, crossing::Touching::counts);
+  for (size_t j = 0; j + 1 < bodies.size(); ++j)
     for (size_t i = j + 1; i < bodies.size(); ++i)
-      found += crossing::Counter().count({surface(i, true), surface(j, false)}, crossing::Touching::counts) - within;
-  }
+      found += crossing::Counter().count({surface(i, true), surface(j, false)}, crossing::Touching::counts).between;
   return found;
 }
 
