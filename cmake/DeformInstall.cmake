@@ -29,9 +29,27 @@ write_basic_package_version_file(${CMAKE_BINARY_DIR}/cmake/deformConfigVersion.c
 install(FILES ${CMAKE_BINARY_DIR}/cmake/deformConfig.cmake ${CMAKE_BINARY_DIR}/cmake/deformConfigVersion.cmake
   ${CMAKE_SOURCE_DIR}/cmake/DeformPlugin.cmake ${CMAKE_SOURCE_DIR}/cmake/deform_plugin.map DESTINATION ${deform_cmake_dir})
 
-set(deform_pc_private "")
+# An archive is all there is to link then, so `pkg-config --libs` names what it needs even without --static.
+set(deform_pc_needs "")
 if(NOT DEFORM_SHARED)
-  set(deform_pc_private "-lz -lstdc++ -lm -ldl -pthread")
+  set(deform_pc_needs " -lz -lstdc++ -lm -pthread")
+  if(NOT DEFORM_PLUGINS_STATIC)
+    string(APPEND deform_pc_needs " -ldl")
+  endif()
+endif()
+set(deform_pc_plugin_dir "\${prefix}/${deform_plugin_dir}")
+if(DEFORM_PLUGINS_STATIC)
+  set(deform_pc_plugin_dir "")
 endif()
 configure_file(${CMAKE_SOURCE_DIR}/cmake/deform.pc.in ${CMAKE_BINARY_DIR}/cmake/deform.pc @ONLY)
 install(FILES ${CMAKE_BINARY_DIR}/cmake/deform.pc DESTINATION ${CMAKE_INSTALL_LIBDIR}/pkgconfig)
+
+# The ODE binding, where it was built: component `ode` of the package, deform_ode.pc.
+if(TARGET deform_ode)
+  install(TARGETS deform_ode EXPORT deformOdeTargets
+    LIBRARY DESTINATION ${CMAKE_INSTALL_LIBDIR} ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR})
+  install(DIRECTORY ${CMAKE_SOURCE_DIR}/bindings/ode/include/deform DESTINATION ${CMAKE_INSTALL_INCLUDEDIR} FILES_MATCHING PATTERN "*.h")
+  install(EXPORT deformOdeTargets NAMESPACE deform:: DESTINATION ${deform_cmake_dir})
+  configure_file(${CMAKE_SOURCE_DIR}/cmake/deform_ode.pc.in ${CMAKE_BINARY_DIR}/cmake/deform_ode.pc @ONLY)
+  install(FILES ${CMAKE_BINARY_DIR}/cmake/deform_ode.pc DESTINATION ${CMAKE_INSTALL_LIBDIR}/pkgconfig)
+endif()

@@ -36,10 +36,7 @@ TEST_P(Process, ThatRestoresASnapshotTakenInContact_EndsWithTheSameBits) {
   scenes::advance(w, before);
   EXPECT_GT(test::stats(w).contacts, 0u) << "nothing touches: the snapshot shows little";
   EXPECT_EQ(test::stats(w).asleep > 0, s.name == std::string("woken"));
-  size_t bytes = 0;
-  test::ok(dfm_world_snapshot(w, nullptr, &bytes));
-  std::string data(bytes, '\0');
-  test::ok(dfm_world_snapshot(w, data.data(), &bytes));
+  const std::string data = test::snapshot(w);
   const std::string file = test::scratch(std::string("process_") + s.name) + "/cut.bin";
   test::write_file(file, data);
   scenes::advance(w, after);

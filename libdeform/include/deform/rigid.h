@@ -61,8 +61,8 @@ typedef struct dfm_rigid_step {
   const double *extra;                /* [nextra] */
 } dfm_rigid_step;
 
-/** Per sub-step: predict, then respond for each group that is touched, then commit (again, if the
- * guard asks for other impulses), all with the same dfm_rigid_step. A sub-step that fails is not
+/** Per sub-step: predict, then respond for each group that is touched, revise (and respond again where it changed something), then commit (again,
+ * if the guard asks for other impulses), all with the same dfm_rigid_step. A sub-step that fails is not
  * committed anywhere: the next predict then has the state of the last one that succeeded, so a host with a world of its own writes `state` into it
  * first. Called from the thread that steps the world, never by two threads at once for one instance; results must depend on the arguments alone.
  * Every function returns DFM_OK, or a negative status, which ends the step with DFM_TROUBLE_PLUGIN. */
@@ -86,6 +86,11 @@ typedef struct dfm_rigid_host {
   dfm_status (*set_motor)(void *self, uint32_t joint, double velocity, double max, double *extra);
   /** Angle or path of a hinge or slider since creation (rad, m), its rate, and what its motor did in the last sub-step (N m, N). May be NULL. */
   dfm_status (*joint)(void *self, const dfm_rigid_state *state, const double *extra, uint32_t joint, double *position, double *rate, double *effort);
+  /** Asked when contact is solved: do these impulses leave true what predict and respond took for granted (motors that hold, motors at their limit)?
+   * If not, the host takes something else for granted, *changed is 1 and velocity what predict gives with that; respond is asked again and contact
+   * solved again, a few times at most. May be NULL: predict and respond hold for all impulses. @param impulse [nbody,6] as for commit
+   * @param velocity out, [nbody,6] @param changed out */
+  dfm_status (*revise)(void *self, const dfm_rigid_step *step, const double *impulse, double *velocity, uint32_t *changed);
 } dfm_rigid_host;
 
 /** Makes a host known under a name to every context of the process; the table is copied, its code must stay loaded. "builtin" is always known.

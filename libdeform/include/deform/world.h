@@ -7,7 +7,9 @@
 #ifdef __cplusplus
 extern "C" {
 #endif
-enum { DFM_METHOD_AUTO = 0, DFM_METHOD_VELOCITY = 1 };
+/* How contacts are solved. AUTO is VELOCITY. ROLLBACK is the source's scheme, to compare and not to use: it freezes what slides and loses momentum
+ * (doc/concepts/rollback.md); what it cannot do is refused with DFM_E_UNSUPPORTED where it is made. 2 is kept for implicit. Since 0.2 (ROLLBACK). */
+enum { DFM_METHOD_AUTO = 0, DFM_METHOD_VELOCITY = 1, DFM_METHOD_ROLLBACK = 3 };
 enum { DFM_INTEGRATOR_AUTO = 0, DFM_INTEGRATOR_SYMPLECTIC_EULER = 1 };
 
 enum { DFM_WORLD_UNGUARDED = 1 };   /* dfm_world_def.flags: without the guard against crossing (concepts/guard.md), to see what it does */
@@ -24,6 +26,9 @@ typedef struct dfm_world_def {
   const char *const *effects;   /* NULL-terminated list the scene asks for; NULL: what its content calls for */
   double sleep_speed;           /* m/s, 0.01: what falls asleep has been slower in every point, and has stayed within half of d_c, */
   double sleep_time;            /* s, 0.5: for so long */
+  uint32_t self_contact;        /* 1: every surface touches itself too, as the effect "self_contact" in the list does; 0: only where another effect needs
+                                   it. dfm_world_filter_pair with one body's name twice decides for this body (doc/concepts/self_contact.md) */
+  uint32_t reserved;
 } dfm_world_def;
 
 /** Gravity (0,0,-9.81), everything automatic. Threads: Any thread. Since 0.1. */

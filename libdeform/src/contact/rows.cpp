@@ -242,4 +242,13 @@ void ContactRows::apply(uint32_t i, Vec3 q) {
   }
 }
 
+void ContactRows::push_rigid(const Block &b) {
+  for (uint32_t i = 0; i < n; ++i) {
+    if (rigid[i] == kNone || rigid[i] < b.first || rigid[i] >= b.first + b.count) continue;
+    const double *const f = &frame[size_t(i) * 9], *const q = &impulse[size_t(i) * 3];
+    const Vec3 p = q[0] * load3(f) + q[1] * load3(f + 3) + q[2] * load3(f + 6);
+    response_apply(b, rigid[i], -p), response_apply(b, rigid[i] + 1, -dfm::cross(load3(&arm[size_t(3) * i]), p));
+  }
+}
+
 }  // namespace dfm

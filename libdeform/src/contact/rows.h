@@ -67,6 +67,7 @@ struct ContactRows {
 
   Vec3 velocity(uint32_t i) const;        // relative velocity of contact i in its frame (normal, t1, t2)
   void apply(uint32_t i, Vec3 impulse_frame);   // changes y by an impulse given in the frame
+  void push_rigid(const Block &group);    // changes y of a rigid group by all impulses that act on it: its response has been renewed
 
  private:
   Array<uint32_t> dof_of_point_, dof_of_node_;   // this sub-step's dof of a phyxel, of a surfel of a self-stepping body; kNone

@@ -100,5 +100,7 @@ struct EdgeFaces {
 };
 EdgeFaces edge_faces(const Surface &surface, uint32_t edge);
 bool edge_becomes_convex(const Surface &surface, uint32_t edge, double h);
+constexpr int kNowhere = -2, kBetween = -1;   // else the end: 0 or 1
+int place_on_edge(double at, double slide);
 
 }  // namespace dfm::narrow

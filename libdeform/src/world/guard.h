@@ -35,7 +35,8 @@ struct Guard {
 
 // guard_hits.cpp: the earliest hits as contacts of the sub-step, among those that it has.
 void guard_add_hits(World &w);
-// In the middle of a solve's preparation, where guard.resolving: impulses and rates of `kept`.
-void guard_adjust(World &w);
+// In the middle of a solve's preparation, where guard.resolving: impulses, and rates of hits, of `kept`.
+void guard_impulses(World &w);
+void guard_rates(World &w);
 
 }  // namespace dfm

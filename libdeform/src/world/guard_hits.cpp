@@ -211,15 +211,26 @@ void guard_add_hits(World &w) {
   });
 }
 
-void guard_adjust(World &w) {
+namespace {
+const Guard::Kept *find_kept(const Guard &g, uint64_t key) {
+  const auto k = std::lower_bound(g.kept.begin(), g.kept.end(), key, [](const auto &e, uint64_t v) { return e.key < v; });
+  return k == g.kept.end() || k->key != key ? nullptr : &*k;
+}
+}  // namespace
+
+void guard_impulses(World &w) {
   for (uint32_t i = 0; i < w.rows.n; ++i) {
-    const auto k = std::lower_bound(w.guard.kept.begin(), w.guard.kept.end(), w.contacts[i].key, [](const auto &e, uint64_t key) { return e.key < key; });
-    if (k == w.guard.kept.end() || k->key != w.contacts[i].key) continue;
+    const Guard::Kept *const k = find_kept(w.guard, w.contacts[i].key);
+    if (!k) continue;
     const double *const f = &w.rows.frame[size_t(i) * 9];
     double *const l = &w.rows.impulse[size_t(i) * 3];
     l[0] = std::max(0.0, dot(load3(f), k->impulse)), l[1] = dot(load3(f + 3), k->impulse), l[2] = dot(load3(f + 6), k->impulse);
-    if (k->hit) w.rows.rate[i] = k->rate;
   }
+}
+
+void guard_rates(World &w) {
+  for (uint32_t i = 0; i < w.rows.n; ++i)
+    if (const Guard::Kept *const k = find_kept(w.guard, w.contacts[i].key); k && k->hit) w.rows.rate[i] = k->rate;
 }
 
 }  // namespace dfm

@@ -80,17 +80,49 @@ void rigid_response(World &w, uint32_t group, double *matrix) {
   }
 }
 
-bool World::stage_rigid_commit(uint32_t *trouble) {
-  for (auto &set : rigid_sets) std::fill(set->impulse.begin(), set->impulse.end(), 0.0);
-  if (plan.touches() && !rows.rigid.empty())
-    for (uint32_t i = 0; i < rows.n; ++i) {
-      if (rows.rigid[i] == kNone) continue;
-      const Obstacle &o = *obstacles[contacts[i].slot_b];
-      const double *const f = &rows.frame[size_t(9) * i], *const l = &rows.impulse[size_t(3) * i];
-      const Vec3 p = l[0] * load3(f) + l[1] * load3(f + 3) + l[2] * load3(f + 6);
-      double *const to = &o.rigid->impulse[6 * size_t{o.rigid_body}];
-      store3(to, load3(to) - p), store3(to + 3, load3(to + 3) - cross(load3(&rows.arm[size_t(3) * i]), p));
+void sum_rigid_impulses(World &w) {
+  for (auto &set : w.rigid_sets) std::fill(set->impulse.begin(), set->impulse.end(), 0.0);
+  const ContactRows &rows = w.rows;
+  if (!w.plan.touches() || rows.rigid.empty()) return;
+  for (uint32_t i = 0; i < rows.n; ++i) {
+    if (rows.rigid[i] == kNone) continue;
+    const Obstacle &o = *w.obstacles[w.contacts[i].slot_b];
+    const double *const f = &rows.frame[size_t(9) * i], *const l = &rows.impulse[size_t(3) * i];
+    const Vec3 p = l[0] * load3(f) + l[1] * load3(f + 3) + l[2] * load3(f + 6);
+    double *const to = &o.rigid->impulse[6 * size_t{o.rigid_body}];
+    store3(to, load3(to) - p), store3(to + 3, load3(to + 3) - cross(load3(&rows.arm[size_t(3) * i]), p));
+  }
+}
+
+bool revise_rigids(World &w) {
+  if (std::none_of(w.rigid_sets.begin(), w.rigid_sets.end(), [](auto &set) { return set->host.revise != nullptr; })) return false;
+  sum_rigid_impulses(w);
+  bool any = false;
+  for (auto &set : w.rigid_sets) {
+    if (!set->host.revise) continue;
+    uint32_t changed = 0;
+    if (set->host.revise(set->self, &set->step, set->impulse.data(), set->revised.data(), &changed) != DFM_OK ||
+        !finite(set->revised.data(), set->revised.size()))
+      fail(DFM_E_FATAL, "rigid host '%s' does not answer contact on '%s' and those with it", set->host_name.c_str(), set->defs[0].name);
+    if (!changed) continue;
+    any = true;
+    for (const ContactRows::Block &block : w.rows.blocks) {
+      if (block.group == kNone || block.group < set->first_group || block.group >= set->first_group + set->ngroup) continue;
+      rigid_response(w, block.group, &w.rows.response[block.response]);
+      for (uint32_t i = 0; i < set->defs.size(); ++i) {
+        if (set->group[i] != block.group - set->first_group) continue;
+        for (uint32_t k = 0; k < 2; ++k)
+          store3(&w.rows.y[size_t(block.first + 2 * set->place[i] + k) * 4],
+                 load3(&set->revised[6 * size_t{i} + 3 * k]) - load3(&set->velocity[6 * size_t{i} + 3 * k]));
+      }
+      w.rows.push_rigid(block);
     }
+  }
+  return any;
+}
+
+bool World::stage_rigid_commit(uint32_t *trouble) {
+  sum_rigid_impulses(*this);
   for (auto &set : rigid_sets) {
     RigidSet &s = *set;
     if (s.host.commit(s.self, &s.step, s.impulse.data(), s.next.data(), s.next_extra.data()) != DFM_OK)

@@ -30,6 +30,7 @@ struct RigidSet {
   Array<dfm_rigid_state> state, next;          // [n] now; at the end of the sub-step
   Array<double> extra, next_extra;             // the host's
   Array<double> velocity, impulse;             // [n,6] mean velocity without contact; contact impulse of the last sub-step
+  Array<double> revised;                       // [n,6] the same velocity by what the host takes for granted now
   Array<double> total;                         // [n,3] N s of contact since creation
   double last_h = 0;                           // s, of the last sub-step; 0: none yet
 
@@ -45,6 +46,8 @@ void destroy_rigids(RigidSet &set);
 Obstacle &rigid_obstacle(World &w, uint64_t id);
 void place_rigids(World &w);                   // World::prepare(): slots and groups
 void rigid_response(World &w, uint32_t group, double *matrix);
+void sum_rigid_impulses(World &w);             // of the rows, into every set
+bool revise_rigids(World &w);                  // true: a host answers differently under these impulses; rows have its new response, solve again
 dfm_body_measure measure_rigid(const RigidSet &set, uint32_t body);
 void set_rigid_state(Obstacle &o, const dfm_rigid_state &state);
 void set_rigid_motor(RigidSet &set, uint32_t joint, double velocity, double max);

@@ -1,8 +1,9 @@
 // One step, from top to bottom:
 //
-//   bound -> n sub-steps of { motion -> model -> predict -> broad -> narrow -> contact <-> friction -> distribute -> guard -> commit -> sleep }
+//   bound -> n sub-steps of { motion -> model -> predict -> broad -> narrow -> self -> contact <-> friction -> distribute -> guard -> commit -> sleep }
 //
-// The list of stages is the plan's (plan/plan.cpp): what a scene does not call for is not in it. Sub-steps are equal and the contact solve
+// The list of stages is the plan's (plan/plan.cpp): what a scene does not call for is not in it (and rollback.cpp stands for narrow to distribute
+// where it is asked for). Sub-steps are equal and the contact solve
 // runs in each; detection keeps its candidate lists while nothing has moved further than their skin.
 #include <algorithm>
 #include <atomic>
@@ -78,9 +79,12 @@ bool run_stage(World &w, StageId id, uint32_t *trouble) {
     case StageId::gather: w.stage_gather(); return true;
     case StageId::broad: w.stage_broad(); return true;
     case StageId::narrow: return w.stage_narrow(trouble);
+    case StageId::self: w.stage_self(); return true;
     case StageId::solve: return w.stage_solve(trouble);
     case StageId::distribute: w.stage_distribute(); return true;
     case StageId::guard: return w.stage_guard(trouble);
+    case StageId::lagged: w.stage_lagged(); return true;
+    case StageId::rollback: return w.stage_rollback(trouble);
     case StageId::commit: return w.stage_commit(trouble);
     case StageId::rigid_predict: return w.stage_rigid_predict(trouble);
     case StageId::rigid_commit: return w.stage_rigid_commit(trouble);
@@ -403,7 +407,7 @@ bool World::stage_commit(uint32_t *trouble) {
   if (steppers && !guard.stepped && !commit_steppers(trouble)) return false;
   guard.stepped = false;
   const double way = h * guard.motion;   // the guard may leave some of it out
-  const bool touched = plan.touches() && rows.n > 0;
+  const bool touched = plan.touches() && !plan.rolls_back() && rows.n > 0;
   context->tasks.parallel_for(static_cast<uint32_t>(active.size()), 1, [&](uint32_t begin, uint32_t end) {
     for (const uint32_t i : std::span(active).subspan(begin, end - begin)) {
       Body &b = *bodies[i];
