@@ -59,12 +59,10 @@ struct Shot {
   size_t crossings() const {
     std::vector<std::vector<double>> x;
     std::vector<crossing::Surface> surfaces;
-    size_t own = 0;
     x.reserve(bodies.size() + walls.size());
     for (size_t i = 0; i < bodies.size(); ++i) {
       x.push_back(surface_positions(bodies[i]));
       surfaces.push_back({x[i].data(), uint32_t(x[i].size() / 3), triangles[i].data(), uint32_t(triangles[i].size() / 3)});
-      own += crossing::Counter().count({surfaces.back()}, crossing::Touching::counts);   // a body folded onto itself is not the guard's affair
     }
     for (const Wall &w : walls) {
       dfm_pose pose{};
@@ -82,7 +80,7 @@ struct Shot {
       }
       surfaces.push_back({x.back().data(), uint32_t(x.back().size() / 3), w.surface.tris.data(), uint32_t(w.surface.tris.size() / 3), true});
     }
-    return crossing::Counter().count(surfaces, crossing::Touching::counts) - own;
+    return crossing::Counter().count(surfaces, crossing::Touching::counts).between;   // a body folded onto itself is not the guard's affair
   }
   Vec momentum(double *scale = nullptr) const {
     Vec sum{};
