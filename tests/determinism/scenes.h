@@ -143,7 +143,8 @@ inline dfm_world folded(dfm_context *c) {
   test::add_plane(w, "floor");
   test::set_friction(w, 0.4);
   test::HookOptions o;
-  o.young = 3e4, o.damping_stiffness = 1e-3, o.damping_mass = 5, o.position = {0, 0, 0.0005}, o.velocity = {0.1, 0, -0.3}, o.spin = {0, 2, 1}, o.close = 0.5, o.pinch = 0.03;
+  o.young = 3e4, o.damping_stiffness = 1e-3, o.damping_mass = 5, o.position = {0, 0, 0.0005};
+  o.velocity = {0.1, 0, -0.3}, o.spin = {0, 2, 1}, o.close = 0.5, o.pinch = 0.03;
   test::make_hook(w, o);
   return w;
 }

@@ -17,8 +17,10 @@ constexpr Row kRows[] = {
     {"ball_incline", 3, 0.3, false},        {"basin", 8, 0.8, false},
     {"fill_drop", 30, 0.4, false},          {"fill_drop_organs", 20, 0.2, true},
     {"gravity_anisotropy", 0, 0, false},    {"gravity_beams", 0, 0, false},
-    {"pinched_tube", 8, 0.45, false},       {"rigid_on_ball", 10, 0.4, false},
-    {"rigid_on_bed", 5, 0.3, false},        {"rigid_pinch", 20, 0.6, false},
+    {"guard_shot", 20, 0.02, false},        {"pinched_tube", 8, 0.45, false},
+    {"pressed_ring", 20, 0.2, false},       {"rabbits_slope", 5, 0.6, false},
+    {"rigid_on_ball", 10, 0.4, false},      {"rigid_on_bed", 5, 0.3, false},
+    {"rigid_pinch", 20, 0.6, false},        {"rollback_compare", 15, 0.2, false},
     {"slope_block", 10, 0.2, false},        {"ten_bodies", 60, 0.9, false},
     {"terrain", 12, 0.6, false},            {"two_cylinders", 12, 0.5, false},
     {"two_cylinders_coarse", 20, 0.4, true}, {"two_cylinders_fine", 40, 0.3, true},
@@ -92,6 +94,16 @@ std::vector<Row> contact_rows() {
   return rows;
 }
 INSTANTIATE_TEST_SUITE_P(Shipped, ContactScene, testing::ValuesIn(contact_rows()), [](const auto &i) { return std::string(i.param.scene); });
+
+// What the guard is for: whole flights.
+TEST(GuardShot, TenJitteredRuns_DoNotCross) {
+  test::expect_jittered("guard_shot", 1, 10, {}, row_of("guard_shot").least_contacts,
+                        [](const test::SceneRun &run) { return run.number("guard_steps") > 0; });
+}
+TEST(RabbitsSlope, TenJitteredRuns_DoNotCross) {
+  test::expect_jittered("rabbits_slope", 1, 10, {}, row_of("rabbits_slope").least_contacts,
+                        [](const test::SceneRun &run) { return run.number("guard_steps") > 0; });
+}
 
 // The pairs of the speed figures and the organs, over their landing.
 TEST(TwoCylinders, CoarsePairTenJitteredRuns_DoNotCross) {

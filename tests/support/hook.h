@@ -33,7 +33,8 @@ struct Hook {
       for (int j = 0; j < kWidth; ++j)
         for (int k = 0; k < 3; ++k) {
           if (k == 1 && i > 0) continue;
-          static const int paths[6][3] = {{0, 1, 2}, {1, 2, 0}, {2, 0, 1}, {0, 2, 1}, {1, 0, 2}, {2, 1, 0}};   // six tetrahedra about a diagonal; odd ones are turned
+          // six tetrahedra about a diagonal; odd ones are turned
+          static const int paths[6][3] = {{0, 1, 2}, {1, 2, 0}, {2, 0, 1}, {0, 2, 1}, {1, 0, 2}, {2, 1, 0}};
           for (int p = 0; p < 6; ++p) {
             std::array<int, 3> c{i, j, k};
             uint32_t t[4] = {corner(c[0], c[1], c[2])};

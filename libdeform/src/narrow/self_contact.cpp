@@ -58,7 +58,8 @@ struct Self {
   Array<ContactPoint> &out;
 
   Self(const BodyView &b, const SelfRest &r, double step, double d_c, Array<ContactPoint> &to)
-      : body(b), rest(r), s(*b.surface), h(step), offset(d_c), depth(self_recovery_depth(s)), edge_depth(edge_recovery_depth(s, s)), pair{b, &b, nullptr, step, d_c, 0}, out(to) {}
+      : body(b), rest(r), s(*b.surface), h(step), offset(d_c), depth(self_recovery_depth(s)), edge_depth(edge_recovery_depth(s, s)),
+        pair{b, &b, nullptr, step, d_c, 0}, out(to) {}
 
   Vec3 x(uint32_t surfel) const { return pair.xa(surfel); }
   Vec3 v(uint32_t surfel) const { return pair.va(surfel); }

@@ -257,8 +257,8 @@ void Builtin::predict(const dfm_rigid_step &step, double *velocity) {
     for (const uint32_t j : g.joints) {
       hold_rows(joints_[j], states(step), g.rows);
       const double most = step.extra[kMotor * j + 1], effort = step.extra[kMotor * j + 2];
-      drive_[j] = !(joints_[j].can_drive() && most > 0) ? Drive::off 
-                                                               : std::fabs(effort) < most * (1 - 1e-9) ? Drive::holds
+      drive_[j] = !(joints_[j].can_drive() && most > 0) ? Drive::off
+                  : std::fabs(effort) < most * (1 - 1e-9) ? Drive::holds
                                                                : effort > 0 ? Drive::pushes : Drive::pulls;
       g.drives = g.drives || drive_[j] != Drive::off;
     }
