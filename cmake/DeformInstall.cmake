@@ -43,13 +43,3 @@ if(DEFORM_PLUGINS_STATIC)
 endif()
 configure_file(${CMAKE_SOURCE_DIR}/cmake/deform.pc.in ${CMAKE_BINARY_DIR}/cmake/deform.pc @ONLY)
 install(FILES ${CMAKE_BINARY_DIR}/cmake/deform.pc DESTINATION ${CMAKE_INSTALL_LIBDIR}/pkgconfig)
-
-# The ODE binding, where it was built: component `ode` of the package, deform_ode.pc.
-if(TARGET deform_ode)
-  install(TARGETS deform_ode EXPORT deformOdeTargets
-    LIBRARY DESTINATION ${CMAKE_INSTALL_LIBDIR} ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR})
-  install(DIRECTORY ${CMAKE_SOURCE_DIR}/bindings/ode/include/deform DESTINATION ${CMAKE_INSTALL_INCLUDEDIR} FILES_MATCHING PATTERN "*.h")
-  install(EXPORT deformOdeTargets NAMESPACE deform:: DESTINATION ${deform_cmake_dir})
-  configure_file(${CMAKE_SOURCE_DIR}/cmake/deform_ode.pc.in ${CMAKE_BINARY_DIR}/cmake/deform_ode.pc @ONLY)
-  install(FILES ${CMAKE_BINARY_DIR}/cmake/deform_ode.pc DESTINATION ${CMAKE_INSTALL_LIBDIR}/pkgconfig)
-endif()
