@@ -121,6 +121,15 @@ TEST(SceneErrors, Ranges_AreChecked) {
          {"/gravity={\"keyframes\":[{\"t\":1,\"value\":[0,0,0]},{\"t\":1,\"value\":[0,0,0]}]}", {"/gravity/keyframes/1/t", "rise"}}});
 }
 
+TEST(SceneErrors, Springs_SayWhereTheyPullAndEnd) {
+  check({{"/bodies/0/springs=[{\"to\":[0,0,0],\"stiffness\":1}]", {"/bodies/0/springs/0", "point", "box", "group"}},
+         {"/bodies/0/springs=[{\"point\":[0,0,0],\"stiffness\":1}]", {"/bodies/0/springs/0", "to", "keyframes"}},
+         {"/bodies/0/springs=[{\"point\":[0,0,0],\"to\":[0,0,0]}]", {"/bodies/0/springs/0", "stiffness"}},
+         {"/bodies/0/springs=[{\"point\":[0,0,0],\"keyframes\":[],\"stiffness\":1}]", {"/bodies/0/springs/0/keyframes", "at least one"}},
+         {"/bodies/0/springs=[{\"point\":[9,9,9],\"to\":[0,0,0],\"stiffness\":1}]", {"/bodies/0/springs/0/point", "away"}},
+         {"/bodies/0/springs=[{\"point\":[0,0,0],\"to\":[0,0,0],\"stiffness\":-1}]", {"/bodies/0/springs/0/stiffness"}}});
+}
+
 TEST(SceneErrors, Names_AreUniqueAndKnown) {
   check({{"/bodies/0/material=\"gle\"", {"/bodies/0/material", "did you mean \"gel\"?"}},
          {"/obstacles/0/name=\"block\"", {"/obstacles/0/name", "taken"}},
@@ -148,7 +157,6 @@ TEST(SceneErrors, NotDelivered_IsNeverIgnored) {
       {"/contact/method=\"implicit\"", "/contact/method"},
       {"/contact/untangle=true", "/contact/untangle"},
       {"/output/color=\"stress\"", "/output/color"},
-      {"/bodies/0/springs=[{\"point\":[0,0,0]}]", "/bodies/0/springs"},
       {"/bodies/0/start={\"invert\":true}", "/bodies/0/start"},
       {"/bodies/0/switch=[{\"t\":1}]", "/bodies/0/switch"},
       {"/bodies/0/pressure=5", "/bodies/0/pressure"}};

@@ -94,6 +94,26 @@ DFM_API dfm_status dfm_body_move_held(dfm_body body, uint32_t n, const uint32_t 
 DFM_API dfm_status dfm_body_add_load(dfm_body body, uint32_t n, const uint32_t *points, const double *force,
                                      uint32_t nkey, const dfm_scale_key *keys, const dfm_sine *sine, uint32_t *load);
 DFM_API dfm_status dfm_body_remove_load(dfm_body body, uint32_t load);
+
+/** A spring of rest length zero from a point of the body to a place in the world, F = stiffness (to - x) + damping (v_to - v), where x = sum
+ * weights[i] x[points[i]]; each point takes its weight's share of F. Explicit: it counts in the body's stable step. */
+typedef struct dfm_spring_def {
+  uint32_t size, npoint;
+  const uint32_t *points;      /* [npoint] */
+  const double *weights;       /* [npoint] >= 0, scaled to sum 1; NULL: by mass, so that it pulls at the centre of mass of these points */
+  double to[3];                /* m; counts where nkey is 0 */
+  const dfm_vector_key *keys;  /* [nkey] m, times strictly rising: where it ends, over time; copied */
+  uint32_t nkey, reserved;
+  double stiffness, damping;   /* N/m, N s/m; >= 0 */
+} dfm_spring_def;
+/** Adds a spring. @param spring out, number to name it by; may be NULL. @return DFM_E_ARG for points that do not exist, weights without a sum, values
+ * that are negative or not finite; DFM_E_UNSUPPORTED where the model steps itself and has no step bound. Threads: Not during step. Since 0.2. */
+DFM_API dfm_status dfm_body_add_spring(dfm_body body, const dfm_spring_def *def, uint32_t *spring);
+/** Moves the spring's end to a place; its keys, if it had any, are gone. Threads: Not during step. Since 0.2. */
+DFM_API dfm_status dfm_body_set_spring_target(dfm_body body, uint32_t spring, const double to[3]);
+/** The force with which it pulls at the body now, N. @param force out [3]. Threads: Any thread. Not during step. Since 0.2. */
+DFM_API dfm_status dfm_body_get_spring_force(dfm_body body, uint32_t spring, double force[3]);
+DFM_API dfm_status dfm_body_remove_spring(dfm_body body, uint32_t spring);
 /** Impulse (N s) at a point of space, spread over the nearest surface triangle by barycentric weights. Threads: Not during step. Since 0.1. */
 DFM_API dfm_status dfm_body_apply_impulse(dfm_body body, const double point[3], const double impulse[3]);
 /** Changes runtime parameters of the body's model by key. @return DFM_E_ARG unknown key (nearest valid name), out of range, not a runtime row,

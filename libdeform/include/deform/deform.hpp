@@ -288,6 +288,15 @@ class Body : public Handle<dfm_body> {
     });
   }
   auto remove_load(uint32_t load) const { return E::done(dfm_body_remove_load(raw_, load)); }
+  // Returns the spring's number.
+  auto add_spring(const dfm_spring_def &def) const {
+    return produce<E, uint32_t>([&](uint32_t &spring) { return dfm_body_add_spring(raw_, &def, &spring); });
+  }
+  auto set_spring_target(uint32_t spring, In3 to) const { return E::done(dfm_body_set_spring_target(raw_, spring, to.data())); }
+  auto spring_force(uint32_t spring) const {
+    return produce<E, std::array<double, 3>>([&](std::array<double, 3> &force) { return dfm_body_get_spring_force(raw_, spring, force.data()); });
+  }
+  auto remove_spring(uint32_t spring) const { return E::done(dfm_body_remove_spring(raw_, spring)); }
   auto apply_impulse(In3 point, In3 impulse) const { return E::done(dfm_body_apply_impulse(raw_, point.data(), impulse.data())); }
   auto asleep() const { return produce<E, bool>([&](bool &asleep) { return dfm_body_is_asleep(raw_, &asleep); }); }
   auto wake() const { return E::done(dfm_body_wake(raw_)); }

@@ -4,6 +4,7 @@
 
 #include "api/objects.h"
 #include "surfel/closest.h"
+#include "world/spring.h"
 #include "world/create.h"
 #include "world/measure.h"
 #include "world/queries.h"
@@ -43,6 +44,41 @@ void sum_loads(Body &b) {
     }
   b.world->wake(b);
   b.world->changed = true;
+}
+
+Spring &spring_of(Body &b, uint32_t number) {
+  for (Spring &s : b.springs)
+    if (s.number == number) return s;
+  fail(DFM_E_ARG, "body '%s' has no spring %u", b.name.c_str(), number);
+}
+
+// They count in the step bound and pull from the next sub-step on.
+void springs_changed(Body &b) {
+  sum_loads(b);
+  b.world->bound_age = kNone, b.bound.known = false;
+}
+
+Spring make_spring(const Body &b, const dfm_spring_def &d) {
+  const char *const name = b.name.c_str();
+  if (b.model.stepper) fail(DFM_E_UNSUPPORTED, "body '%s': a spring is explicit, and model '%s' has no step bound to hold it to", name, b.model.type->id);
+  check_points(b, d.npoint, d.points);
+  if (d.npoint == 0) fail(DFM_E_ARG, "body '%s': a spring needs at least one point", name);
+  if (d.nkey && !d.keys) fail(DFM_E_ARG, "body '%s': %u keys are announced, but keys is NULL", name, d.nkey);
+  if (!(d.stiffness >= 0) || !(d.damping >= 0) || std::isinf(d.stiffness) || std::isinf(d.damping))
+    fail(DFM_E_ARG, "body '%s': a spring's stiffness and damping are finite and not negative; found %g N/m and %g N s/m", name, d.stiffness, d.damping);
+  Spring s{b.next_load, {d.points, d.points + d.npoint}, {}, {}, load3(d.to), d.stiffness, d.damping};
+  if (d.nkey) s.keys.assign(d.keys, d.keys + d.nkey);
+  check_keys(s.keys, name);
+  double sum = 0, poison = 0;
+  for (uint32_t i = 0; i < d.npoint; ++i) {
+    const double w = d.weights ? d.weights[i] : b.p.mass[d.points[i]];
+    if (!(w >= 0)) fail(DFM_E_ARG, "body '%s': weight %u of a spring is %g; weights are not negative", name, i, w);
+    s.weights.push_back(w), sum += w;
+  }
+  for (double x : d.to) poison += 0.0 * x;
+  if (!(sum > 0) || std::isinf(sum) || poison != 0) fail(DFM_E_ARG, "body '%s': a spring's end and the sum of its weights must be finite, the sum above 0", name);
+  for (double &w : s.weights) w /= sum;
+  return s;
 }
 
 }  // namespace
@@ -200,6 +236,46 @@ dfm_status dfm_body_remove_load(dfm_body body, uint32_t load) {
     if (std::erase_if(b.loads, [&](const Load &l) { return l.number == load; }) == 0)
       fail(DFM_E_ARG, "body '%s' has no load %u", b.name.c_str(), load);
     sum_loads(b);
+  });
+}
+
+dfm_status dfm_body_add_spring(dfm_body body, const dfm_spring_def *def, uint32_t *spring) {
+  return guard([&] {
+    Body &b = body_of(body);
+    idle(*b.world);
+    b.springs.push_back(make_spring(b, take_def(def, dfm_spring_def{sizeof(dfm_spring_def), 0, nullptr, nullptr, {}, nullptr, 0, 0, 0, 0})));
+    ++b.next_load;
+    if (spring) *spring = b.springs.back().number;
+    springs_changed(b);
+  });
+}
+
+dfm_status dfm_body_set_spring_target(dfm_body body, uint32_t spring, const double to[3]) {
+  return guard([&] {
+    Body &b = body_of(body);
+    idle(*b.world);
+    need(to, "to");
+    Spring &s = spring_of(b, spring);
+    if (!std::isfinite(to[0]) || !std::isfinite(to[1]) || !std::isfinite(to[2])) fail(DFM_E_ARG, "body '%s': a spring's end must be finite", b.name.c_str());
+    s.to = load3(to), s.keys.clear();
+    b.world->wake(b);
+  });
+}
+
+dfm_status dfm_body_get_spring_force(dfm_body body, uint32_t spring, double force[3]) {
+  return guard([&] {
+    Body &b = body_of(body);
+    need(force, "force");
+    store3(force, spring_force(b, spring_of(b, spring), b.world->time, 0));
+  });
+}
+
+dfm_status dfm_body_remove_spring(dfm_body body, uint32_t spring) {
+  return guard([&] {
+    Body &b = body_of(body);
+    idle(*b.world);
+    b.springs.erase(b.springs.begin() + (&spring_of(b, spring) - b.springs.data()));
+    springs_changed(b);
   });
 }
 

@@ -164,6 +164,7 @@ class Builder {
     check(dfm_body_create(world_, &d, &body), b.pointer);
     for (size_t i = 0; i < b.fixes.size(); ++i) move_held(body, b.fixes[i], held[i]);
     add_loads(body, b, mesh, nodal);
+    for (const Spring &s : b.springs) add_spring(body, s, b.name, mesh);
     for (const Probe &p : def_.probes)
       if (p.body == b.name) add_probe(body, p, mesh);
   }
@@ -196,13 +197,34 @@ class Builder {
     check(dfm_body_add_load(body, uint32_t(points.size()), points.data(), forces.data(), 0, nullptr, nullptr, nullptr), b.pointer + "/nodal_bc");
   }
 
+  // The cell that holds a point of the body at rest, or the nearest one where the point lies close by.
+  void locate_near(const double point[3], const std::string &pointer, const std::string &name, const BodyMesh &mesh, uint32_t corners[4], double weights[4]) const {
+    const double away = locate(mesh, point, corners, weights);
+    if (!(away <= 0.25 * mesh.size))
+      fail(DFM_E_ARG, "%s: %s/point: lies %g m away from \"%s\", which at rest, scaled but before its pose, spans [%g, %g, %g] to [%g, %g, %g]",
+           def_.file.c_str(), pointer.c_str(), away, name.c_str(), mesh.lo[0], mesh.lo[1], mesh.lo[2], mesh.hi[0], mesh.hi[1], mesh.hi[2]);
+  }
+
+  void add_spring(dfm_body body, const Spring &s, const std::string &name, const BodyMesh &mesh) const {
+    std::vector<uint32_t> points(4);
+    std::vector<double> weights(4);
+    if (s.at_point) {
+      locate_near(s.point, s.pointer, name, mesh, points.data(), weights.data());
+      for (double &w : weights) w = std::max(w, 0.0);   // a point beside the body pulls at the nearest place of the cell
+    } else {
+      points = select(s.where, mesh, def_.file);
+    }
+    dfm_spring_def d{};
+    d.size = sizeof d, d.npoint = uint32_t(points.size()), d.points = points.data(), d.weights = s.at_point ? weights.data() : nullptr;
+    std::copy_n(s.to, 3, d.to);
+    d.keys = s.keys.data(), d.nkey = uint32_t(s.keys.size()), d.stiffness = s.stiffness, d.damping = s.damping;
+    check(dfm_body_add_spring(body, &d, nullptr), s.pointer);
+  }
+
   void add_probe(dfm_body body, const Probe &p, const BodyMesh &mesh) {
     ProbePoint probe;
     probe.name = p.name, probe.body = body;
-    const double away = locate(mesh, p.point, probe.points, probe.weights);
-    if (!(away <= 0.25 * mesh.size))
-      fail(DFM_E_ARG, "%s: %s/point: lies %g m away from \"%s\", which at rest, scaled but before its pose, spans [%g, %g, %g] to [%g, %g, %g]",
-           def_.file.c_str(), p.pointer.c_str(), away, p.body.c_str(), mesh.lo[0], mesh.lo[1], mesh.lo[2], mesh.hi[0], mesh.hi[1], mesh.hi[2]);
+    locate_near(p.point, p.pointer, p.body, mesh, probe.points, probe.weights);
     // Probes are reported in the scene's order, whatever the order of their bodies.
     if (probes_.size() < def_.probes.size()) probes_.resize(def_.probes.size());
     probes_[size_t(&p - def_.probes.data())] = std::move(probe);

@@ -42,6 +42,14 @@ struct Force {
   dfm_sine sine = {};
 };
 
+struct Spring {
+  std::string pointer;
+  Selection where;       // unless by point
+  bool at_point = false;
+  double point[3] = {}, to[3] = {}, stiffness = 0, damping = 0;
+  std::vector<dfm_vector_key> keys;
+};
+
 // Values of one model parameter for each cell, from a file.
 struct FieldFile {
   std::string pointer, key, path;
@@ -69,6 +77,7 @@ struct Body {
   double scale = 1, velocity[3] = {}, spin[3] = {};
   std::vector<Fix> fixes;
   std::vector<Force> forces;
+  std::vector<Spring> springs;
 };
 
 struct Obstacle {

@@ -120,6 +120,31 @@ Force read_force(const Node &entry) {
   return force;
 }
 
+Spring read_spring(const Node &entry) {
+  Spring spring;
+  entry.object("spring");
+  spring.pointer = entry.pointer();
+  spring.at_point = entry.has("point");
+  if (int(entry.has("point")) + int(entry.has("box")) + int(entry.has("group")) != 1)
+    entry.fail("expected one of \"point\", \"box\" and \"group\" to say where the spring pulls");
+  if (spring.at_point) entry.member("point").vector(spring.point);
+  else spring.where = read_selection(entry);
+  if (entry.has("to") == entry.has("keyframes")) entry.fail("expected either \"to\" or \"keyframes\" to say where the spring ends");
+  if (entry.has("to")) entry.member("to").vector(spring.to);
+  const std::vector<Node> keys = entry.items("keyframes");
+  if (entry.has("keyframes") && keys.empty()) entry.at("keyframes").fail("expected at least one keyframe");
+  for (size_t i = 0; i < keys.size(); ++i) {
+    keys[i].object("spring_key");
+    dfm_vector_key key = {keys[i].at("t").number(), {}};
+    keys[i].at("position").vector(key.value);
+    check_rising(keys[i], i, i ? spring.keys.back().t : 0, key.t);
+    spring.keys.push_back(key);
+  }
+  spring.stiffness = entry.at("stiffness").number(kNotNegative);
+  spring.damping = entry.number("damping", 0.0, kNotNegative);
+  return spring;
+}
+
 Body read_body(const Node &node, ReadContext &context) {
   Body b;
   node.object("body");
@@ -141,6 +166,7 @@ Body read_body(const Node &node, ReadContext &context) {
   node.vector("spin", b.spin, 0, 0, 0);
   for (const Node &entry : node.items("fix")) b.fixes.push_back(read_fix(entry));
   for (const Node &entry : node.items("forces")) b.forces.push_back(read_force(entry));
+  for (const Node &entry : node.items("springs")) b.springs.push_back(read_spring(entry));
   read_carriers(node, type, context, b);
   if (node.has("nodal_bc")) b.nodal_bc = node.member("nodal_bc").text();
   return b;

@@ -35,6 +35,7 @@ double last_time(const std::vector<Key> &keys) { return keys.empty() ? -kForever
 double settled_from(const Body &b) {
   double t = -kForever;
   for (const Load &l : b.loads) t = std::max(t, l.sine.amplitude[0] != 0 && l.sine.frequency != 0 ? kForever : last_time(l.keys));
+  for (const Spring &s : b.springs) t = std::max(t, last_time(s.keys));
   for (const HeldMotion &m : b.motions) {
     const bool swings = m.sine.frequency != 0 && norm2(load3(m.sine.amplitude)) != 0;
     t = std::max(t, swings ? kForever : last_time(m.keys));

@@ -107,6 +107,7 @@ struct StagedBody {
   struct { std::vector<double> state, params; } model;
   Vec3 contact_impulse;
   std::vector<Load> loads;
+  std::vector<Spring> springs;
   std::vector<HeldMotion> motions;
   uint32_t next_load = 1, category = 1, collides_with = ~0u;
   Slumber slumber;
@@ -158,6 +159,9 @@ void fields(Stream &s, W &w) {
     if (z.asleep) s.array(b.surfel_impulse);
     if (w.def.sleep) s.array(b.anchor);
     if (w.def.method == DFM_METHOD_ROLLBACK) s.array(b.lagged);
+    s.each(b.springs, [&](auto &p) {
+      s.value(p.number), s.array(p.points), s.array(p.weights), s.array(p.keys), s.value(p.to), s.value(p.stiffness), s.value(p.damping);
+    });
     s.each(b.motions, [&](auto &m) { s.array(m.points), s.array(m.start), s.array(m.keys), s.value(m.sine); });
   });
   s.each(w.obstacles, [&](auto &entry) {
@@ -197,6 +201,10 @@ void check(const Staged &t, const World &w) {
     for (const Load &l : from.loads) {
       good = good && l.force.size() == 3 * l.points.size();
       for (uint32_t p : l.points) good = good && p < b.p.n;
+    }
+    for (const Spring &p : from.springs) {
+      good = good && p.weights.size() == p.points.size();
+      for (uint32_t at : p.points) good = good && at < b.p.n;
     }
     for (const HeldMotion &m : from.motions) {
       good = good && m.start.size() == 3 * m.points.size();
@@ -272,7 +280,7 @@ void put(World &w, Staged &t) noexcept {
     Body &b = *w.bodies[i];
     StagedBody &from = t.bodies[i];
     copy(from.p.x, b.p.x), copy(from.p.v, b.p.v), copy(from.p.held, b.p.held), copy(from.p.load, b.p.load), copy(from.model.state, b.model.state);
-    b.loads.swap(from.loads), b.motions.swap(from.motions);
+    b.loads.swap(from.loads), b.springs.swap(from.springs), b.motions.swap(from.motions);
     b.contact_impulse = from.contact_impulse, b.next_load = from.next_load, b.category = from.category, b.collides_with = from.collides_with;
     b.slumber = from.slumber, b.bound.known = false;
     if (t.def.sleep) copy(from.anchor, b.anchor);

@@ -14,6 +14,7 @@
 #include "core/error.h"
 #include "integrate/symplectic_euler.h"
 #include "surfel/make_surface.h"
+#include "world/spring.h"
 #include "world/world.h"
 
 namespace dfm {
@@ -253,6 +254,7 @@ void World::ask_bound(Body &b) {
   const dfm_kin k = b.kin(time, 0, nullptr);
   if (b.model.call("bound", [&] { return b.model.ops->bound(b.model.self, &k, b.ksum.data(), b.csum.data(), &cell); }) != DFM_OK)
     fail(DFM_E_FATAL, "model '%s' of body '%s' gives no step bound", b.model.type->id, b.name.c_str());
+  for (const Spring &spring : b.springs) add_spring_bound(b, spring);
   b.bound.step = std::min(cell, stable_step(b.p, b.ksum.data(), b.csum.data(), &b.bound.point));
 }
 
@@ -271,6 +273,7 @@ void World::stage_motion() {
           store3(f, load3(f) + scale * load3(&load.force[3 * i]));
         }
       }
+      for (const Spring &spring : b->springs) add_spring_force(*b, spring, time, h);
     }
     for (const HeldMotion &m : b->motions) {
       const Pose first = m.keys.empty() ? Pose{} : to_pose(m.keys.front().pose), now = m.keys.empty() ? Pose{} : pose_at(m.keys, time + h);

@@ -9,7 +9,7 @@
 namespace dfm {
 
 bool Body::loads_vary() const {
-  return std::any_of(loads.begin(), loads.end(), [](const Load &l) { return !l.keys.empty() || l.sine.amplitude[0] != 0; });
+  return !springs.empty() || std::any_of(loads.begin(), loads.end(), [](const Load &l) { return !l.keys.empty() || l.sine.amplitude[0] != 0; });
 }
 
 double Body::impulse_time() const { return slumber.asleep ? slumber.h : world->report.h; }

@@ -46,6 +46,8 @@ struct CellField { std::string key, from; uint32_t width; Array<double> values; 
 
 // A lasting load: force[i] on points[i], times the keyed scale, times 1 + sine.
 struct Load { uint32_t number; std::vector<uint32_t> points; std::vector<double> force; std::vector<dfm_scale_key> keys; dfm_sine sine{}; };
+// A spring of rest length zero from the weighted mean of points to a place, or a path of places.
+struct Spring { uint32_t number; std::vector<uint32_t> points; std::vector<double> weights; std::vector<dfm_vector_key> keys; Vec3 to; double stiffness, damping; };
 // Held points carried by keyed poses (relative to the first key) and a sine.
 struct HeldMotion { std::vector<uint32_t> points; std::vector<double> start; std::vector<dfm_pose_key> keys; dfm_sine sine{}; };
 
@@ -70,8 +72,9 @@ struct Body {
   Array<double> share;               // [ntet] how much of each cell is material; empty: all
   std::vector<CellField> fields;
   std::vector<Load> loads;
+  std::vector<Spring> springs;
   std::vector<HeldMotion> motions;
-  uint32_t next_load = 1;
+  uint32_t next_load = 1;            // number of the next load or spring
   Vec3 contact_impulse;              // N s since creation
   Array<double> surfel_impulse;      // [nsurfel,3] N s of the last sub-step
   Array<double> lagged;              // [n,4] N, friction for the next sub-step; empty where the method is not rollback
