@@ -84,7 +84,7 @@ def cases():
     slab = {"shape": "block", "size": [0.05, 0.05, 0.02], "cells": 400, "material": {"young": 2e6, "poisson": 0.25, "density": 1000.0, "damping_stiffness": 2e-4}}
     mass, mu_s, mu_c, k, speed = 0.05, 0.6, 0.4, 50.0, 0.05
     period = stick_slip_period(mass, k, mu_s * mass * G, mu_c * mass * G, speed)
-    add("belt_stick_slip", "static_kinetic", {"period": band(period, 0.05)}, body=slab, mu_S=mu_s, mu_C=mu_c, v_s=1e-4, stiffness=k, speed=speed, span=[1.0, 3.0],
+    add("belt_stick_slip", "static_kinetic", {"period": band(period, 0.05)}, body=slab, mu_S=mu_s, mu_C=mu_c, v_s=1e-3, stiffness=k, speed=speed, span=[1.0, 3.0],
         step=2e-4)
     # pressed at its top, pulled to and fro there; the bristles (s0 A) are 40 times softer than the slab's shear
     limit, stiffness, amplitude = 2.0, 1000.0, 0.003

@@ -8,6 +8,8 @@ import math
 import os
 import subprocess
 
+import mesh_file
+
 G = 9.81
 COULOMB_LIKE = ["coulomb", "karnopp", "lugre", "elastoplastic"]
 GAP = 2e-5  # m, start distance: settles without a blow
@@ -29,13 +31,7 @@ class Entry:
         key = json.dumps(body, sort_keys=True)
         if key not in self.meshes:
             path = os.path.join(self.work, "mesh_%d.msh" % len(self.meshes))
-            if body["shape"] == "block":
-                shape = ["beam", "--size", *body["size"]]
-            elif body["shape"] == "ball":
-                shape = ["ball", "--radius", body["radius"]]
-            else:
-                shape = ["cylinder", "--radius", body["radius"], "--length", body["height"]]
-            subprocess.run([self.command, "mesh", "make", *map(str, shape), "--cells", str(body["cells"]), "--out", path, "--quiet"], check=True)
+            mesh_file.make(self.command, body, path)
             self.meshes[key] = path
         return self.meshes[key]
 
@@ -175,12 +171,9 @@ class Entry:
         return scene, measure
 
     def scene_belt_stick_slip(self, case, law):
-        height = case["body"]["size"][2]
         scene = self.floor(self.base(case, law, case["span"][1], 0.002, [0, 0, -G]), velocity_surface=[case["speed"], 0, 0])
-        w, d = case["body"]["size"][0], case["body"]["size"][1]
-        everywhere = [[-1, -1, -1], [1, 1, 1]]
-        scene["bodies"][0]["springs"] = [{"box": everywhere, "stiffness": case["stiffness"], "axes": "x"}]
-        del height, w, d
+        x0 = case["body"]["size"][0] / 2
+        scene["bodies"][0]["springs"] = [{"box": [[-1, -1, -1], [1, 1, 1]], "to": [x0, case["body"]["size"][1] / 2, case["body"]["size"][2] / 2], "stiffness": case["stiffness"]}]
 
         def measure(t):
             time, x = t.body("com_x")

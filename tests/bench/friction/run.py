@@ -76,6 +76,9 @@ def measured_rows(entry, case, configuration):
         return [{"verdict": "error", "note": str(error).replace("\n", " ")[:200]}]
     rows = []
     for quantity, (expected, low, high) in case["answer"].items():
+        if quantity not in values:
+            rows.append({"quantity": quantity, "verdict": "not_run", "note": "the engine does not tell it"})
+            continue
         value = values[quantity]
         rows.append({"quantity": quantity, "measured": "%.6g" % value, "expected": "%.6g" % expected, "low": "%.6g" % low, "high": "%.6g" % high,
                      "verdict": verdict(value, low, high), "cost": "%.3g" % cost})

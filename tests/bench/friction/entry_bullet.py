@@ -1,0 +1,57 @@
+"""Bullet's deformable world (Debian libbullet-dev) as an entry: bullet_entry.cpp, compiled when asked for, on the same tetrahedra.
+
+Its explicit integrator with its implicit damping: with the implicit one our block did not move at all, in SI units and in centimetres and grams. It
+tells no contact forces, so the cases that ask for them are not run, and it has one coefficient of friction.
+"""
+import os
+import subprocess
+import time
+
+import mesh_file
+
+CASES = ["slope_ramp", "slope_slide", "slope_hold", "vibration_drift", "pinch_hold"]
+MOST_SECONDS = 600
+
+
+class Entry:
+    name = "bullet"
+
+    def __init__(self, command, work):
+        self.command, self.work, self.meshes = command, work, {}
+        flags = subprocess.run(["pkg-config", "--cflags", "--libs", "bullet"], capture_output=True, text=True)
+        if flags.returncode:
+            raise SystemExit("bullet: pkg-config does not find it; install libbullet-dev")
+        self.version = subprocess.run(["pkg-config", "--modversion", "bullet"], capture_output=True, text=True).stdout.strip()
+        self.program = os.path.join(work, "bullet_entry")
+        source = os.path.join(os.path.dirname(os.path.abspath(__file__)), "bullet_entry.cpp")
+        subprocess.run(["c++", "-O2", "-std=c++17", source, "-o", self.program, *flags.stdout.split()], check=True)
+
+    def configurations(self, case):
+        return ["explicit"] if case["name"] in CASES else []
+
+    def run(self, case, _):
+        key = str(sorted(case["body"].items(), key=str))
+        if key not in self.meshes:
+            path = os.path.join(self.work, "mesh_%d" % len(self.meshes))
+            mesh_file.make(self.command, case["body"], path + ".msh2")
+            points, tets = mesh_file.read(path + ".msh2")
+            with open(path, "w") as f:
+                f.write("%d %d\n" % (len(points), len(tets)))
+                f.writelines("%.9g %.9g %.9g\n" % tuple(p) for p in points)
+                f.writelines("%d %d %d %d\n" % tuple(t) for t in tets)
+            self.meshes[key] = (path, mesh_file.volume(points, tets))
+        path, volume = self.meshes[key]
+        m = case["body"]["material"]
+        given = {k: v for k, v in case.items() if isinstance(v, float)}
+        given.update(mass=m["density"] * volume, young=m["young"], poisson=m["poisson"], damping=m["damping_stiffness"], begin=case.get("span", [0, 0])[0],
+                     end=case.get("span", [0, 0])[1], radius=case["body"].get("radius", 0.0))
+        started = time.time()
+        try:
+            done = subprocess.run([self.program, case["name"], path, *("%s=%.9g" % kv for kv in given.items())], capture_output=True, text=True, timeout=MOST_SECONDS)
+        except subprocess.TimeoutExpired:
+            raise RuntimeError("took more than %d s" % MOST_SECONDS)
+        if done.returncode:
+            raise RuntimeError(done.stderr.strip() or "ended with %d" % done.returncode)
+        values = dict(line.split("=") for line in done.stdout.split())
+        values = {k: float(v) for k, v in values.items()}
+        return values, (time.time() - started) / values.pop("simulated")

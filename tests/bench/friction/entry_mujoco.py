@@ -1,0 +1,209 @@
+"""MuJoCo (pip install mujoco numpy) as an entry: the same tetrahedra as a three-dimensional flex, elliptic cones, its integrator for flexes.
+
+It has one coefficient of friction and no bristles: the other cases are told as not run. Moving walls are bodies on joints whose position and
+velocity are prescribed in every step (a mocap body would have no velocity in contact). Configurations: its own defaults; the friction impedance that
+its documentation recommends against creep; and its no-slip iterations, which the integrator for flexes does not take, so that they run with the
+explicit one at a tenth of the step.
+"""
+import math
+import os
+import time
+
+import mesh_file
+
+G = 9.81
+MOST_SECONDS = 600.0  # wall time for one case
+CONFIGURATIONS = {  # options, share of the case's step
+    "default": ('integrator="discrete"', 1.0),
+    "impratio 100": ('integrator="discrete" impratio="100"', 1.0),
+    "no-slip 10": ('integrator="Euler" noslip_iterations="10"', 0.1),
+}
+
+
+class Entry:
+    name = "mujoco"
+
+    def __init__(self, command, work):
+        import mujoco
+        self.mj, self.version = mujoco, mujoco.__version__
+        self.command, self.work, self.meshes = command, work, {}
+
+    def configurations(self, case):
+        return list(CONFIGURATIONS) if case["law"] == "coulomb" else []
+
+    def mesh(self, body):
+        key = str(sorted(body.items(), key=str))
+        if key not in self.meshes:
+            path = os.path.join(self.work, "mesh_%d.msh2" % len(self.meshes))
+            mesh_file.make(self.command, body, path)
+            self.meshes[key] = mesh_file.read(path)
+        return self.meshes[key]
+
+    def run(self, case, configuration):
+        started = time.time()
+        values, simulated = getattr(self, "run_" + case["name"])(case, configuration)
+        return values, (time.time() - started) / simulated
+
+    def model(self, case, configuration, walls="", holder="", pin="", lift=0.0):
+        """The soft body over z = lift, in `holder` (a body that carries pinned points) if given; friction of a contact is the larger of both sides."""
+        points, tets = self.mesh(case["body"])
+        m = case["body"]["material"]
+        mass = m["density"] * mesh_file.volume(points, tets)
+        option, share = CONFIGURATIONS[configuration]
+        flex = '<flexcomp name="soft" type="direct" dim="3" mass="%.9g" radius="1e-4" pos="0 0 %g" point="%s" element="%s">' % (
+            mass, lift, " ".join("%.9g" % x for p in points for x in p), " ".join(str(i) for t in tets for i in t))
+        flex += '<elasticity young="%g" poisson="%g" damping="%g"/><edge equality="false"/>' % (m["young"], m["poisson"], m["damping_stiffness"])
+        flex += '<contact selfcollide="none" condim="3" friction="%g 0.005 0.0001"/>%s</flexcomp>' % (case["mu"], pin)
+        xml = '<mujoco><size memory="1G"/><option timestep="%g" cone="elliptic" %s/><default><geom friction="%g 0.005 0.0001"/></default><worldbody>%s%s</worldbody></mujoco>' % (
+            case["step"] * share, option, case["mu"], walls, holder % flex if holder else flex)
+        try:
+            model = self.mj.MjModel.from_xml_string(xml)
+        except ValueError as error:
+            raise RuntimeError(str(error).splitlines()[0])
+        self.mass, self.limit = mass, time.time() + MOST_SECONDS
+        return model, self.mj.MjData(model)
+
+    def steps(self, model, data, end, before=None):
+        """Steps to `end`; `before(t)` prescribes what moves. Yields the time after each step."""
+        for i in range(int(round(end / model.opt.timestep))):
+            if before:
+                before((i + 1) * model.opt.timestep)
+            self.mj.mj_step(model, data)
+            if time.time() > self.limit:
+                raise RuntimeError("took more than %g s for %g of %g s" % (MOST_SECONDS, data.time, end))
+            yield data.time
+
+    FLOOR = '<geom name="floor" type="plane" size="2 2 1"/>'
+    LIFT = 1.2e-4  # the flex's radius and a little
+
+    def centre(self, data, axis):
+        return float(data.flexvert_xpos[:, axis].mean())
+
+    @staticmethod
+    def tilt(model, angle):
+        model.opt.gravity[:] = [G * math.sin(angle), 0, -G * math.cos(angle)]
+
+    def run_slope_ramp(self, case, configuration):
+        model, data = self.model(case, configuration, self.FLOOR, lift=self.LIFT)
+        end = case["settle"] + math.atan(1.2 * case["mu"]) / case["rate"]
+        start, angle = None, lambda t: max(0.0, case["rate"] * (t - case["settle"]))
+        for t in self.steps(model, data, end, lambda t: self.tilt(model, angle(t))):
+            if start is None and t >= case["settle"]:
+                start = self.centre(data, 0)
+            if start is not None and self.centre(data, 0) - start >= case["distance"]:
+                return {"slip_tan": math.tan(angle(t))}, t
+        return {"slip_tan": math.inf}, end
+
+    def run_slope_slide(self, case, configuration):
+        model, data = self.model(case, configuration, self.FLOOR, lift=self.LIFT)
+        self.tilt(model, case["angle"])
+        x = []
+        for t in self.steps(model, data, case["span"][1]):
+            x.append((t, self.centre(data, 0)))
+        # mean speeds of the first and the last tenth of the span
+        inside = [r for r in x if r[0] >= case["span"][0]]
+        n = len(inside) // 10
+        speed = lambda r: (r[-1][1] - r[0][1]) / (r[-1][0] - r[0][0])
+        middle = lambda r: 0.5 * (r[-1][0] + r[0][0])
+        first, last = inside[:n], inside[-n:]
+        return {"acceleration": (speed(last) - speed(first)) / (middle(last) - middle(first))}, case["span"][1]
+
+    def creep(self, model, data, case, axis, before):
+        at = []
+        for t in self.steps(model, data, case["span"][1], before):
+            if t >= case["span"][0] - 1e-9:
+                at.append((t, self.centre(data, axis)))
+        return 1e6 * abs(at[-1][1] - at[0][1]) / (at[-1][0] - at[0][0])
+
+    def run_slope_hold(self, case, configuration):
+        model, data = self.model(case, configuration, self.FLOOR, lift=self.LIFT)
+        share = lambda t: min(1.0, max(0.0, (t - 0.2) / (case["tilt"] - 0.2)))
+        return {"creep_um_per_s": self.creep(model, data, case, 0, lambda t: self.tilt(model, case["angle"] * share(t)))}, case["span"][1]
+
+    @staticmethod
+    def prescribe(data, joint, position, velocity):
+        data.qpos[joint], data.qvel[joint] = position, velocity
+
+    def run_vibration_drift(self, case, configuration):
+        plate = '<body pos="0 0 -0.05" gravcomp="1"><joint name="shake" type="slide" axis="1 0 0"/><geom type="box" size="0.5 0.5 0.05" mass="1e6"/></body>'
+        model, data = self.model(case, configuration, plate, lift=self.LIFT)
+        joint = model.jnt_qposadr[self.mj.mj_name2id(model, self.mj.mjtObj.mjOBJ_JOINT, "shake")]
+        w = 2 * math.pi * case["frequency"]
+        a = case["acceleration"] / w ** 2
+        share = lambda t: min(1.0, max(0.0, (t - 0.2) / (case["tilt"] - 0.2)))
+
+        def before(t):
+            self.tilt(model, case["angle"] * share(t))
+            self.prescribe(data, joint, a * math.sin(w * data.time), a * w * math.cos(w * data.time))
+
+        return {"creep_um_per_s": self.creep(model, data, case, 0, before)}, case["span"][1]
+
+    def wall_force(self, model, data, geoms):
+        """Total contact force of the flex on geoms, N, and its moment about the z axis through the origin, N m."""
+        import numpy
+        force, moment, f6 = numpy.zeros(3), 0.0, numpy.zeros(6)
+        for i in range(data.ncon):
+            c = data.contact[i]
+            geom = c.geom[0] if c.geom[0] >= 0 else c.geom[1]
+            if geom not in geoms:
+                continue
+            self.mj.mj_contactForce(model, data, i, f6)
+            frame = numpy.array(c.frame).reshape(3, 3)
+            f = frame.T @ f6[:3]  # on the second side, from the first
+            f = f if c.geom[1] >= 0 else -f
+            force += f
+            moment += c.pos[0] * f[1] - c.pos[1] * f[0]
+        return force, moment
+
+    def run_pinch_hold(self, case, configuration):
+        r, half = case["body"]["radius"], 0.01
+        walls = ""
+        for name, side in (("left", -1), ("right", 1)):
+            walls += '<body pos="%g 0 0" gravcomp="1"><joint name="%s" type="slide" axis="1 0 0"/><geom type="box" size="%g 0.06 0.06" mass="1e6"/></body>' % (
+                side * (r + half + 1.2e-4), name, half)
+        model, data = self.model(case, configuration, walls)
+        model.opt.gravity[:] = 0
+        joints = [model.jnt_qposadr[self.mj.mj_name2id(model, self.mj.mjtObj.mjOBJ_JOINT, n)] for n in ("left", "right")]
+        close = 0.8 * case["close"]
+
+        def before(t):
+            travel = (case["depth"] + 1.2e-4) * min(1.0, data.time / close)
+            speed = (case["depth"] + 1.2e-4) / close if data.time < close else 0.0
+            self.prescribe(data, joints[0], travel, speed)
+            self.prescribe(data, joints[1], -travel, -speed)
+            model.opt.gravity[2] = -G * min(1.0, max(0.0, (t - case["close"]) / (case["load"] - case["close"])))
+
+        at, lift, count = [], 0.0, 0
+        for t in self.steps(model, data, case["span"][1], before):
+            if t >= case["span"][0] - 1e-9:
+                at.append((t, self.centre(data, 2)))
+                lift, count = lift - self.wall_force(model, data, range(model.ngeom))[0][2], count + 1
+        creep = 1e6 * abs(at[-1][1] - at[0][1]) / (at[-1][0] - at[0][0])
+        return {"creep_um_per_s": creep, "lift_share": lift / count / (self.mass * G)}, case["span"][1]
+
+    def run_rotating_pad(self, case, configuration):
+        height, s, end = case["body"]["height"], case["ratio"], case["span"][1]
+        points, _ = self.mesh(case["body"])
+        top = " ".join(str(i) for i, p in enumerate(points) if p[2] > height - 1e-6)
+        plate = '<body name="plate" pos="0 0 -0.05"><joint name="slide" type="slide" axis="1 0 0"/><joint name="turn" type="hinge" axis="0 0 1"/><geom name="plate" type="box" size="0.5 0.5 0.05" mass="1e6"/></body>'
+        press = '<body name="press" pos="0 0 0"><joint name="press" type="slide" axis="0 0 1"/><inertial pos="0 0 0" mass="1e6" diaginertia="1 1 1"/>%s</body>'
+        model, data = self.model(case, configuration, plate, press, '<pin id="%s"/>' % top, lift=self.LIFT)
+        model.opt.gravity[:] = 0
+        joint = {n: model.jnt_qposadr[self.mj.mj_name2id(model, self.mj.mjtObj.mjOBJ_JOINT, n)] for n in ("slide", "turn", "press")}
+        spin = case["spin"] if s == 0 else case["speed"] / (s * case["body"]["radius"])
+        speed, middle, down = (case["speed"] if s > 0 else 0.0), 0.5 * (case["span"][0] + end), case["depth"] + self.LIFT - 1e-4
+
+        def before(_):
+            t = data.time
+            self.prescribe(data, joint["slide"], speed * (t - middle), speed)
+            self.prescribe(data, joint["turn"], spin * t, spin)
+            self.prescribe(data, joint["press"], -down * min(1.0, t / case["press"]), -down / case["press"] if t < case["press"] else 0.0)
+
+        normal = force = torque = 0.0
+        for t in self.steps(model, data, end, before):
+            if t >= case["span"][0] - 1e-9:
+                f, m = self.wall_force(model, data, range(model.ngeom))
+                normal, force, torque = normal - f[2], force + math.hypot(f[0], f[1]), torque + abs(m)
+        if s == 0:
+            return {"torque_share": torque / (case["mu"] * normal * case["body"]["radius"])}, end
+        return {"force_share": force / (case["mu"] * normal)}, end
