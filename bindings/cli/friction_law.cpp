@@ -124,7 +124,7 @@ RigLaw::RigLaw(const Globals &globals, const FrictionCase &rig, const std::strin
   const std::string name = short_name(law.empty() ? rig.law : law);
   if (name.empty() || name.find(',') != std::string::npos)
     throw Failure(kBadInput, rig.file + ": /law " + (name.empty() ? "is missing" : "lists several laws (" + name + ")") + "; choose one with --law");
-  need(dfm_law_open(context_.get(), name.c_str(), &law_));
+  if (dfm_law_open(context_.get(), name.c_str(), &law_) < 0) throw Failure(kBadInput, (law.empty() ? rig.file + ": /law: " : "--law: ") + dfm_last_error());
   need(dfm_law_type(law_, &type_));
   if (rig.drive == Drive::loaded) fn_ = rig.input.at("F0");
   else if (rig.mass > 0 && rig.gravity > 0) fn_ = rig.mass * rig.gravity;
@@ -313,9 +313,10 @@ class StepSolver {
 
   // The bracket has closed on a jump of the law: the force between its two sides that balances (Filippov). Rounding alone leaves next to nothing.
   StepResult jump(const Point &a, const Point &c) {
-    const Point best = std::fabs(a.r) < std::fabs(c.r) ? a : c;
+    Point best = std::fabs(a.r) < std::fabs(c.r) ? a : c;
     if (best.stopped) return rest();
-    at(best.u);
+    if (a.u * c.u <= 0) best.u = 0;                // a jump at rest holds what rests
+    best = at(best.u);
     const double f = drive_ - m_h_ * best.u;
     const bool open = std::fabs(best.r) > 1e-9 * (std::fabs(f) + std::fabs(m_h_ * best.u) + std::fabs(drive_));
     return {best.u, open ? f : f_, open};

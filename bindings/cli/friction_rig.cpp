@@ -278,8 +278,10 @@ class Rig {
     require(known);
     const double v_s = case_.number_of("v_s", law_.param("v_s", 0));
     if (!(v_s > 0)) throw Failure(kBadInput, case_.file + ": /params/v_s is missing, expected the speed in m/s whose 30-fold ends a ramp");
+    const double slowest = *std::min_element(case_.times.begin(), case_.times.end());
     for (const double rate : case_.times) {
       rate_ = rate;
+      const double h = step_ * slowest / rate;     // the force grows by the same amount in every step of every ramp
       restart();
       double crossed = kNone;
       Peak peak[3] = {{0, elastic_force()}, {0, elastic_force()}, {0, elastic_force()}}, before = peak[1];
@@ -288,8 +290,8 @@ class Rig {
       for (int64_t k = 1; v_.vx < 30 * v_s; ++k) {
         if (double(out_.steps - begun) > kMostSteps / 100) throw Failure(kStopped, "the ramp of " + short_text(rate) + " N/s has not made the mass slide");
         const double slower = v_.vx, earlier = t_;
-        advance(earlier, double(k) * step_);
-        if (std::isnan(crossed) && v_.vx >= v_s) crossed = earlier + step_ * (v_s - slower) / (v_.vx - slower);
+        advance(earlier, double(k) * h);
+        if (std::isnan(crossed) && v_.vx >= v_s) crossed = earlier + h * (v_s - slower) / (v_.vx - slower);
         const Peak now = {t_, elastic_force()};
         if (after) peak[2] = now, after = false;
         if (now.f > peak[1].f) peak[0] = before, peak[1] = now, after = true;

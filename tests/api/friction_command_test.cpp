@@ -82,11 +82,14 @@ TEST(FrictionCommand, Rows_HoldEveryDigitAtExactTimes) {
 
 TEST(FrictionCommand, TimesFromLengthAndSpacing_AreTheSame) {
   const std::string by_list = file("list.json", push()),
-                    by_step = file("step.json", push("\"freq\": 1},", "\"freq\": 1, \"T\": 0.4, \"dt\": 0.1},").replace(0, 0, ""));
+                    by_step = file("step.json", push("\"freq\": 1},", "\"freq\": 1, \"T\": 0.4, \"dt\": 0.1},"));
   std::string text = test::read_file(by_step);
   text.erase(text.find(",\n \"output_times\""), text.rfind(']') + 1 - text.find(",\n \"output_times\""));
   test::write_file(by_step, text);
-  EXPECT_EQ(test::rig::run(by_list).rows.values, test::rig::run(by_step).rows.values);
+  const auto listed = test::rig::run(by_list).rows.values, stepped = test::rig::run(by_step).rows.values;
+  ASSERT_EQ(listed.size(), stepped.size());
+  for (size_t i = 0; i < listed.size(); ++i)
+    for (size_t k = 0; k < 4; ++k) EXPECT_NEAR(listed[i][k], stepped[i][k], 1e-12);
 }
 
 TEST(FrictionCommand, NamesOfTheSet_MeanOurLaws) {
@@ -97,7 +100,7 @@ TEST(FrictionCommand, NamesOfTheSet_MeanOurLaws) {
 
 TEST(FrictionCommand, BadCases_AreRefusedWithTheirPlace) {
   expect_refused({"friction", folder() + "/none.json"}, {"none.json", "No such file"});
-  expect_refused({"friction", file("cut.json", push().substr(0, 90))}, {"cut.json:2:", "not JSON"});
+  expect_refused({"friction", file("cut.json", push().substr(0, 90))}, {"cut.json:3:", "not JSON"});
   expect_refused({"friction", file("list.json", "[1]")}, {"list.json", "object"});
   expect_bad_case("\"input\"", "\"inputs\"", {"/input"});
   expect_bad_case("\"bias_sine_force\"", "\"bias_sin_force\"", {"/input/kind", "bias_sin_force", "did you mean \"bias_sine_force\""});
