@@ -256,22 +256,22 @@ class StepSolver {
   Point at(double u) {
     slip_.vx = u;
     const Resistance f = law_.eval(slip_, true);
-    f_ = f.fx, last_ = u;
+    f_ = f.fx;
     Point p = {u, m_h_ * u - drive_ + f.fx, 0, f.stopped};
     if (f.stopped) p.r = m_h_ * u;               // exactly: the force is the drive
     p.slope = (law_.ops().flags & DFM_FRIC_JACOBIAN) ? m_h_ + f.slope : 0;
     if (p.slope < 0) falls_ = true;
-    return p;
+    return last_ = p;
   }
 
   StepResult finish(const Point &p) {
-    if (last_ != p.u) at(p.u);                   // the trial state is that of the solution
+    if (last_.u != p.u) at(p.u);                 // the trial state is that of the solution
     return {p.u, f_, false};
   }
 
   // A law that stops what slides but does not hold what rests is broken; the force that holds it is taken, and the step counted as a jump.
   StepResult rest() {
-    const Point p = at(0);
+    const Point p = last_.u == 0 ? last_ : at(0);
     return {0, drive_, !p.stopped};
   }
 
@@ -324,7 +324,8 @@ class StepSolver {
 
   RigLaw &law_;
   Slip slip_;
-  double m_h_, drive_, f_ = 0, last_ = NAN;
+  double m_h_, drive_, f_ = 0;
+  Point last_ = {NAN, 0, 0, false};
   bool falls_ = false;
 };
 
