@@ -37,6 +37,7 @@ const Case kCases[] = {
     {"vector_circle_lugre", 1e-4, "zx zy Fx Fy"}, {"vector_turn_lugre", 1e-4, "zx zy Fx Fy"},
     {"vector_turn_ep_associated", 1e-4, "zx zy Fx Fy"}, {"vector_turn_ep_cosine", 1e-4, "zx zy Fx Fy"},
     {"normal_load_lugre_projected", 1e-4, "z F_elastic"},
+    {"sinvel_V1_gms", 1e-4, "F f1 f2 f3 f4"}, {"sinvel_V2_gms", 1e-4, "F f1 f2 f3 f4"}, {"sinvel_presliding_gms", 1e-4, "F f1"},
 };
 
 std::string text_of(const Case &c) { return test::read_file(test::shared_dir() + "/reference/friction/" + c.id + ".json"); }
