@@ -162,7 +162,8 @@ namespace {
 // One input moved by +-d: best agreement over decades of d and over forward, backward and central differences (a law has corners, and next
 // to one only one side is its derivative).
 struct Difference {
-  Difference(const Law &law, const Lanes &at, double h) : base(at), plus(law, at.n), minus(law, at.n), step(h), best(size_t(at.n) * 2, HUGE_VAL), seen(size_t(at.n) * 2, 0.0) {}
+  Difference(const Law &law, const Lanes &at, double h)
+      : base(at), plus(law, at.n), minus(law, at.n), step(h), best(size_t(at.n) * 2, HUGE_VAL), seen(size_t(at.n) * 2, 0.0) {}
   // input(b, i) is the number that moves, size(i) its scale, given(row, i) the law's derivative, floor(i) what counts as nothing.
   template <class Input, class Size, class Given, class Floor>
   void run(Input input, Size size, Given given, Floor floor) {
@@ -205,7 +206,8 @@ std::string derivatives_agree(const Subject &subject) {
     // states by a history of their own, then one slip over the decades
     for (int k = 0; k < 6; ++k) {
       for (uint32_t i = 0; i < n; ++i) {
-        const double heading = random.uniform(0, kTurn), path = s.length() * random.logarithmic(0.01, 3), w = k < 5 ? path / h : std::pow(10.0, -6 + 7.0 * (i % 80) / 79);
+        const double heading = random.uniform(0, kTurn), path = s.length() * random.logarithmic(0.01, 3);
+        const double w = k < 5 ? path / h : std::pow(10.0, -6 + 7.0 * (i % 80) / 79);
         if (law.needs(DFM_NEED_FN)) b.fn[i] = s.fn * (k < 5 ? 1.0 : random.logarithmic(0.3, 3));
         b.slip(i, w * std::cos(heading), w * std::sin(heading));
         const double push = s.level * (i % 3 ? 30 : 0.3);
@@ -220,17 +222,20 @@ std::string derivatives_agree(const Subject &subject) {
       Difference d(law, b, h);
       if (c < 2)
         d.run([&](Lanes &l, uint32_t i) { return &l.vt[size_t(c) * l.stride + i]; }, speed,
-              [&](uint32_t row, uint32_t i) { return b.dv[size_t(2 * row + c) * b.stride + i]; }, [&](uint32_t i) { return 1e-3 * (b.ft(i) + 1e-3 * s.level) / speed(i); });
+              [&](uint32_t row, uint32_t i) { return b.dv[size_t(2 * row + c) * b.stride + i]; },
+              [&](uint32_t i) { return 1e-3 * (b.ft(i) + 1e-3 * s.level) / speed(i); });
       else
         d.run([&](Lanes &l, uint32_t i) { return &l.fn[i]; }, [&](uint32_t i) { return b.fn[i]; },
-              [&](uint32_t row, uint32_t i) { return b.dn[size_t(row) * b.stride + i]; }, [&](uint32_t i) { return 1e-3 * (b.ft(i) + 1e-3 * s.level) / b.fn[i]; });
+              [&](uint32_t row, uint32_t i) { return b.dn[size_t(row) * b.stride + i]; },
+              [&](uint32_t i) { return 1e-3 * (b.ft(i) + 1e-3 * s.level) / b.fn[i]; });
       for (uint32_t i = 0; i < n; ++i)
         for (uint32_t row = 0; row < 2; ++row) {
           worst = std::max(worst, d.best[2 * i + row]);
           if (!(d.best[2 * i + row] <= 1e-4)) {
             const double told = c < 2 ? b.dv[size_t(2 * row + c) * b.stride + i] : b.dn[size_t(row) * b.stride + i];
             broken("%s[%u%u] is given as %.6g and differences say %.6g (slip %.3g m/s, normal force %.3g N, step %g s): the contact solve would overshoot or crawl; derive it from the same update, "
-                   "or drop DFM_FRIC_JACOBIAN and let the host take differences", c < 2 ? "dft_dvt" : "dft_dfn", row, c < 2 ? c : 0, told, d.seen[2 * i + row], speed(i), b.fn[i], h);
+                   "or drop DFM_FRIC_JACOBIAN and let the host take differences",
+                   c < 2 ? "dft_dvt" : "dft_dfn", row, c < 2 ? c : 0, told, d.seen[2 * i + row], speed(i), b.fn[i], h);
           }
         }
     }

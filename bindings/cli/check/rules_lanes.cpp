@@ -82,12 +82,14 @@ std::string same_bits(const Subject &subject) {
     for (uint32_t i = 0; i < first.n; ++i)
       if (!again.same(i, first, i))
         broken("lane %u of the same batch answered (%.17g, %.17g) N and, asked again after another batch, (%.17g, %.17g) N: it keeps something between calls, so a restored or "
-               "repeated step goes elsewhere; move it into a state slot", i, first.out_ft[i], first.out_ft[first.stride + i], again.out_ft[i], again.out_ft[again.stride + i]);
+               "repeated step goes elsewhere; move it into a state slot",
+               i, first.out_ft[i], first.out_ft[first.stride + i], again.out_ft[i], again.out_ft[again.stride + i]);
   }
   stage("a second process is asked for the same batches");
   const uint64_t here = digest(subject), once_more = digest(subject);
   if (here != once_more) broken("the same series of batches gave other bits the second time: it keeps something between calls; move it into a state slot");
-  const Answer other = in_own_process(subject.command, {"plugin", "check", subject.file, "--digest", std::to_string(subject.index), "--seed", std::to_string(subject.seed)}, {});
+  const std::string number = std::to_string(subject.index), seed = std::to_string(subject.seed);
+  const Answer other = in_own_process(subject.command, {"plugin", "check", subject.file, "--digest", number, "--seed", seed}, {});
   const std::string mine = text("%016llx", static_cast<unsigned long long>(here));
   if (!other.spoke) broken("asked in a second process, it %s; a law must not depend on the process it runs in", other.ending.c_str());
   if (other.verdict.detail != mine)
@@ -148,7 +150,8 @@ std::string split_equals_whole(const Subject &subject) {
         for (uint32_t k = 0; k < n; ++k)
           if (!part.same(n - 1 - k, whole, begin + k))
             broken("contact %u answers (%.17g, %.17g) N in a batch of %u and (%.17g, %.17g) N in one of %u: a world would change with the number of its contacts; compute each lane by "
-                   "the same operations wherever it stands", begin + k, whole.out_ft[begin + k], whole.out_ft[whole.stride + begin + k], whole.n, part.out_ft[n - 1 - k],
+                   "the same operations wherever it stands",
+                   begin + k, whole.out_ft[begin + k], whole.out_ft[whole.stride + begin + k], whole.n, part.out_ft[n - 1 - k],
                    part.out_ft[part.stride + n - 1 - k], n);
       }
   }

@@ -27,16 +27,17 @@ namespace {
 
 constexpr const char *kForbidden[] = {
     // memory; the _Z names are operator new in its forms
-    "malloc", "calloc", "realloc", "reallocarray", "free", "posix_memalign", "aligned_alloc", "memalign", "strdup", "mmap", "mmap64", "munmap", "brk", "sbrk",
-    "_Znwm", "_Znam", "_ZnwmSt11align_val_t", "_ZnamSt11align_val_t", "_ZnwmRKSt9nothrow_t", "_ZnamRKSt9nothrow_t", "_ZdlPv", "_ZdaPv", "_ZdlPvm", "_ZdaPvm",
-    "__cxa_allocate_exception",
+    "malloc", "calloc", "realloc", "reallocarray", "free", "posix_memalign", "aligned_alloc", "memalign", "strdup", "mmap", "mmap64",
+    "munmap", "brk", "sbrk", "_Znwm", "_Znam", "_ZnwmSt11align_val_t", "_ZnamSt11align_val_t", "_ZnwmRKSt9nothrow_t", "_ZnamRKSt9nothrow_t",
+    "_ZdlPv", "_ZdaPv", "_ZdlPvm", "_ZdaPvm", "__cxa_allocate_exception",
     // files and streams
-    "open", "open64", "openat", "openat64", "__open_2", "__open64_2", "creat", "fopen", "fopen64", "freopen", "fdopen", "tmpfile", "opendir", "read", "pread", "write", "pwrite",
-    "fread", "fwrite", "fgets", "fputs", "fputc", "putc", "putchar", "puts", "printf", "vprintf", "fprintf", "vfprintf", "dprintf", "__printf_chk", "__fprintf_chk",
-    "__vfprintf_chk", "__vprintf_chk", "perror", "fflush", "stat", "fstat", "access", "unlink", "remove", "rename", "socket", "connect", "pipe", "ioctl", "syscall",
+    "open", "open64", "openat", "openat64", "__open_2", "__open64_2", "creat", "fopen", "fopen64", "freopen", "fdopen", "tmpfile",
+    "opendir", "read", "pread", "write", "pwrite", "fread", "fwrite", "fgets", "fputs", "fputc", "putc", "putchar", "puts", "printf",
+    "vprintf", "fprintf", "vfprintf", "dprintf", "__printf_chk", "__fprintf_chk", "__vfprintf_chk", "__vprintf_chk", "perror", "fflush",
+    "stat", "fstat", "access", "unlink", "remove", "rename", "socket", "connect", "pipe", "ioctl", "syscall",
     // environment and processes
-    "getenv", "secure_getenv", "setenv", "unsetenv", "putenv", "system", "popen", "fork", "execve", "exit", "_exit", "abort", "dlopen", "dlsym", "pthread_create", "sleep",
-    "usleep", "nanosleep"};
+    "getenv", "secure_getenv", "setenv", "unsetenv", "putenv", "system", "popen", "fork", "execve", "exit", "_exit", "abort", "dlopen",
+    "dlsym", "pthread_create", "sleep", "usleep", "nanosleep"};
 constexpr size_t kCount = std::size(kForbidden);
 
 template <size_t I>
