@@ -7,8 +7,8 @@
 
 namespace cli {
 
-// Exit codes of interfaces: 0 done, 2 bad usage or input, 3 the simulation stopped itself.
-enum Exit { kDone = 0, kBadInput = 2, kStopped = 3 };
+// Exit codes of interfaces: 0 done, 2 bad usage or input, 3 the simulation stopped itself. Beside them: 1 a check was made and found something.
+enum Exit { kDone = 0, kFound = 1, kBadInput = 2, kStopped = 3 };
 
 struct Globals {
   bool quiet = false;
@@ -27,6 +27,7 @@ void add_run(CLI::App &app, Globals &globals, int *exit_code);
 void add_explain(CLI::App &app, Globals &globals, int *exit_code);
 void add_mesh(CLI::App &app, Globals &globals, int *exit_code);
 void add_plugin(CLI::App &app, Globals &globals, int *exit_code);
+void add_plugin_check(CLI::App &plugin, Globals &globals, int *exit_code);
 void add_ccd(CLI::App &app, Globals &globals, int *exit_code);
 void add_friction(CLI::App &app, Globals &globals, int *exit_code);
 // Subcommands that interfaces name and later work delivers: they exit 2 and say so.

@@ -171,10 +171,7 @@ void add_plugin(CLI::App &app, Globals &globals, int *exit_code) {
   info_command->add_option("ID", *id, "short name, full id, or path of a plugin file")->required();
   info_command->callback([=, &globals] { *exit_code = info(globals, *id); });
 
-  CLI::App *check_command = plugin->add_subcommand("check", "the validator");
-  auto file = std::make_shared<std::string>();
-  check_command->add_option("FILE", *file, "plugin file")->required();
-  check_command->callback([=] { *exit_code = fail("\"plugin check\" is not available yet; \"plugin info " + *file + "\" loads a file and shows its table"); });
+  add_plugin_check(*plugin, globals, exit_code);
 }
 
 }  // namespace cli

@@ -1,0 +1,191 @@
+#include "check/command.h"
+
+#include <dlfcn.h>
+#include <unistd.h>
+
+#include <cstdio>
+#include <filesystem>
+
+#include "check/plugin.h"
+#include "check/runner.h"
+#include "json_text.h"
+#include "messages.h"
+
+namespace cli::check {
+namespace {
+
+struct Line { const Rule *rule; Verdict verdict; double seconds; };
+struct TypeName { uint32_t kind; std::string id; };
+struct Report { std::vector<Line> file; std::vector<TypeName> types; std::vector<std::vector<Line>> by_type; };
+
+const char *const kNotLoaded = "it does not load (V02 says why)";
+const char *kind_name(uint32_t kind) { return kind == DFM_KIND_FRICTION ? "law" : kind == DFM_KIND_MODEL ? "model" : "solver"; }
+
+// ---- a rule of this file, in this process ------------------------------------------------------------------------------------------
+
+Subject subject_of(const Request &request) {
+  Subject s;
+  s.file = request.file, s.seed = request.seed;
+  s.command = std::filesystem::read_symlink("/proc/self/exe").string();
+  return s;
+}
+
+// type < 0: a rule about the file; V01 needs no loading, and V02 says itself why loading failed.
+Verdict judge(const Request &request, const Rule &rule, int type) {
+  Subject subject = subject_of(request);
+  const std::string id = rule.id;
+  if (id == "V01") return run_here(rule, subject);
+  std::unique_ptr<Plugin> plugin;
+  try {
+    plugin = std::make_unique<Plugin>(request.file);
+  } catch (const Broken &) {
+    if (id != "V02") return {Result::skip, kNotLoaded};
+  }
+  subject.plugin = plugin.get();
+  if (type >= 0) {
+    if (static_cast<size_t>(type) >= plugin->types().size()) return {Result::fail, "the number of its types differs from load to load; hand out constant tables"};
+    subject.index = static_cast<uint32_t>(type), subject.type = plugin->types()[subject.index];
+  }
+  return run_here(rule, subject);
+}
+
+std::string digest_text(const Request &request) {
+  Subject subject = subject_of(request);
+  Plugin plugin(request.file);
+  subject.plugin = &plugin, subject.index = static_cast<uint32_t>(request.digest), subject.type = plugin.types().at(subject.index);
+  return text("%016llx", static_cast<unsigned long long>(digest(subject)));
+}
+
+// "1 org.example.law" by lines: what the file offers.
+std::string listed(const std::string &file) {
+  std::string out;
+  try {
+    const Plugin plugin(file);
+    for (uint32_t i = 0; i < plugin.types().size(); ++i) out += std::to_string(plugin.types()[i]->kind) + " " + name_of(*plugin.types()[i], i) + "\n";
+  } catch (const Broken &) {
+  }
+  return out;
+}
+
+int child(const Request &request) {
+  report_to(request.report);
+  if (request.rule == "types") answer({Result::pass, listed(request.file)});
+  else if (request.digest >= 0) answer({Result::pass, digest_text(request)});
+  else if (const Rule *rule = find_rule(request.rule)) answer(judge(request, *rule, request.type));
+  return kDone;
+}
+
+// ---- all of them -------------------------------------------------------------------------------------------------------------------
+
+std::vector<std::string> arguments(const Request &request, const std::string &rule, int type) {
+  return {"plugin", "check", request.file, "--rule", rule, "--type", std::to_string(type), "--seed", std::to_string(request.seed)};
+}
+
+// What a sanitizer wrote, in one line; empty where it was silent.
+std::string sanitizer_line(const std::string &said) {
+  for (const char *mark : {"SUMMARY: ", "runtime error: "})
+    if (const size_t at = said.find(mark); at != std::string::npos) {
+      const size_t begin = said.rfind('\n', at) == std::string::npos ? 0 : said.rfind('\n', at) + 1;
+      return said.substr(begin, said.find('\n', at) - begin);
+    }
+  return "";
+}
+
+Line run_rule(const Request &request, const Rule &rule, int type) {
+  if (request.in_process) return {&rule, judge(request, rule, type), 0};
+  const Answer a = in_own_process(subject_of(request).command, arguments(request, rule.id, type), {request.limit});
+  Line line{&rule, a.verdict, a.seconds};
+  const std::string found = sanitizer_line(a.said);
+  if (!a.spoke)
+    line.verdict = {Result::fail, "it " + a.ending + (a.at.empty() ? "" : " (" + a.at + ")") + (found.empty() ? "" : ": " + found) +
+                                      ", and would take a world with it; answer every input in bounded time, and touch only the arrays that are given"};
+  else if (!found.empty() && a.verdict.result != Result::fail)
+    line.verdict = {Result::fail, "the sanitizer reports " + found + "; what it names is a mistake even where it goes well"};
+  return line;
+}
+
+Report run_rules(const Request &request, const std::vector<const Rule *> &wanted) {
+  Report report;
+  std::string types = request.in_process ? listed(request.file) : "";
+  if (!request.in_process) types = in_own_process(subject_of(request).command, arguments(request, "types", -1), {request.limit}).verdict.detail;
+  for (size_t at = 0, end; (end = types.find('\n', at)) != std::string::npos; at = end + 1)
+    report.types.push_back({static_cast<uint32_t>(std::stoul(types.substr(at))), types.substr(types.find(' ', at) + 1, end - types.find(' ', at) - 1)});
+  for (const Rule *rule : wanted)
+    if (!rule->by_type) report.file.push_back(run_rule(request, *rule, -1));
+    else if (report.types.empty()) report.file.push_back({rule, {Result::skip, kNotLoaded}, 0});
+  for (size_t t = 0; t < report.types.size(); ++t) {
+    report.by_type.emplace_back();
+    const bool law = report.types[t].kind == DFM_KIND_FRICTION;
+    for (const Rule *rule : wanted)
+      if (rule->by_type && (law || rule->id[0] == 'V')) report.by_type.back().push_back(run_rule(request, *rule, static_cast<int>(t)));
+  }
+  return report;
+}
+
+// ---- report ------------------------------------------------------------------------------------------------------------------------
+
+const char *word(Result r) { return r == Result::pass ? "pass" : r == Result::fail ? "fail" : "skip"; }
+
+std::string json_lines(const std::vector<Line> &lines) {
+  std::vector<std::string> out;
+  for (const Line &l : lines)
+    out.push_back(JsonObject().add("id", quoted(l.rule->id)).add("title", quoted(l.rule->title)).add("result", quoted(word(l.verdict.result)))
+                      .add("detail", quoted(l.verdict.detail)).add("cpu_s", number(l.seconds)).text());
+  return json_array(out);
+}
+
+void print_lines(const std::vector<Line> &lines, bool quiet) {
+  for (const Line &l : lines) {
+    if (l.verdict.result == Result::fail) std::printf("  %s FAIL  %s\n            %s\n", l.rule->id, l.rule->title, l.verdict.detail.c_str());
+    else if (!quiet)
+      std::printf("  %s %s  %s%s%s%s\n", l.rule->id, word(l.verdict.result), l.rule->title, l.verdict.detail.empty() ? "" : " (", l.verdict.detail.c_str(),
+                  l.verdict.detail.empty() ? "" : ")");
+  }
+}
+
+int tell(const Globals &globals, const Request &request, const Report &report) {
+  uint32_t count[3] = {0, 0, 0};
+  for (const auto *lines : {&report.file}) for (const Line &l : *lines) ++count[static_cast<int>(l.verdict.result)];
+  for (const auto &lines : report.by_type) for (const Line &l : lines) ++count[static_cast<int>(l.verdict.result)];
+  const int code = count[static_cast<int>(Result::fail)] ? kFound : kDone;
+  if (globals.json) {
+    std::vector<std::string> types;
+    for (size_t t = 0; t < report.types.size(); ++t)
+      types.push_back(JsonObject().add("kind", quoted(kind_name(report.types[t].kind))).add("id", quoted(report.types[t].id)).add("rules", json_lines(report.by_type[t]))
+                          .text());
+    JsonObject o;
+    o.add("file", quoted(request.file)).add("seed", std::to_string(request.seed)).add("rules", json_lines(report.file)).add("types", json_array(types));
+    o.add("passed", std::to_string(count[0])).add("failed", std::to_string(count[1])).add("skipped", std::to_string(count[2]));
+    std::fputs(indented(o.text()).c_str(), stdout);
+    return code;
+  }
+  std::printf("%s\n", request.file.c_str());
+  print_lines(report.file, globals.quiet);
+  for (size_t t = 0; t < report.types.size(); ++t) {
+    std::printf("%s %s\n", kind_name(report.types[t].kind), report.types[t].id.c_str());
+    print_lines(report.by_type[t], globals.quiet);
+    if (report.types[t].kind == DFM_KIND_MODEL) std::printf("  M01 to M15, the rules for models, are not available yet\n");
+  }
+  std::printf("%u passed, %u failed, %u skipped\n", count[0], count[1], count[2]);
+  return code;
+}
+
+}  // namespace
+
+int run(const Globals &globals, const Request &request) {
+  if (request.report >= 0) return child(request);
+  std::error_code error;
+  if (!std::filesystem::is_regular_file(request.file, error))
+    return fail(request.file + ": " + (std::filesystem::exists(request.file, error) ? "is no file" : "there is no such file") + "; the shared library of a plugin is expected, such as ./mylaw.so");
+  std::vector<const Rule *> wanted;
+  for (const std::string &id : request.only) {
+    const Rule *rule = find_rule(id);
+    if (!rule) return fail("--only: there is no rule \"" + id + "\"; rules are V01 to V10 and F01 to F14");
+    wanted.push_back(rule);
+  }
+  for (const Rule &rule : rules())
+    if (request.only.empty()) wanted.push_back(&rule);
+  return tell(globals, request, run_rules(request, wanted));
+}
+
+}  // namespace cli::check

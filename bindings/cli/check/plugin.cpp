@@ -1,0 +1,154 @@
+#include "check/plugin.h"
+
+#include <dlfcn.h>
+
+#include <algorithm>
+#include <cstdlib>
+#include <cstring>
+
+#include "check/watch.h"
+
+namespace cli::check {
+namespace {
+
+void *aligned(size_t bytes, size_t align) {
+  void *p = nullptr;
+  return posix_memalign(&p, std::max(align, sizeof(void *)), bytes ? bytes : 1) == 0 ? p : nullptr;
+}
+
+// Scratch of one thread, taken beforehand: what eval takes is no call of the C library.
+struct Arena {
+  static constexpr size_t kBytes = size_t(8) << 20;
+  std::unique_ptr<char[]> bytes;
+  size_t used = 0;
+};
+thread_local Arena arena;
+
+// Copies what both sides know of a struct that begins with its size; the rest stays zero.
+template <class T>
+bool copy_struct(T &full, const void *from, size_t head) {
+  uint32_t size = 0;
+  if (!from) return false;
+  std::memcpy(&size, from, sizeof size);
+  if (size < head || size > 65536) return false;
+  std::memcpy(&full, from, std::min<size_t>(size, sizeof full));
+  full.size = sizeof full;
+  return true;
+}
+
+}  // namespace
+
+Host::Host() {
+  table_.size = sizeof table_, table_.abi = DFM_ABI, table_.abi_draft = DFM_ABI_DRAFT, table_.ctx = this;
+  table_.alloc = [](void *ctx, size_t bytes, size_t align) {
+    if (Watch::watching()) Watch::stop("dfm_host.alloc");
+    void *p = aligned(bytes, align);
+    if (p) static_cast<Host *>(ctx)->lent_[p] = bytes;
+    return p;
+  };
+  table_.release = [](void *ctx, void *p, size_t, size_t) {
+    if (Watch::watching()) Watch::stop("dfm_host.release");
+    if (!p) return;
+    static_cast<Host *>(ctx)->lent_.erase(p);
+    std::free(p);
+  };
+  table_.scratch = [](void *, size_t bytes) -> void * {
+    if (!arena.bytes) arena.bytes = std::make_unique<char[]>(Arena::kBytes);
+    const size_t begin = arena.used + (-(reinterpret_cast<uintptr_t>(arena.bytes.get()) + arena.used) & 63);
+    if (bytes > Arena::kBytes || begin > Arena::kBytes - bytes) return nullptr;
+    arena.used = begin + bytes;
+    return arena.bytes.get() + begin;
+  };
+  table_.log = [](void *ctx, int32_t, uint32_t, const char *utf8) {
+    if (Watch::watching()) return;
+    std::string &said = static_cast<Host *>(ctx)->said_;
+    if (utf8 && said.size() < 4096) said += (said.empty() ? "" : "; ") + std::string(utf8, strnlen(utf8, 512));
+  };
+  table_.parallel_for = [](void *, uint32_t n, uint32_t grain, void (*fn)(void *, uint32_t, uint32_t), void *user) {
+    if (Watch::watching()) Watch::stop("dfm_host.parallel_for");
+    for (uint32_t begin = 0; begin < n; begin += std::max(grain, 1u)) fn(user, begin, std::min(n, begin + std::max(grain, 1u)));
+  };
+  table_.extension = [](void *, const char *) -> const void * { return nullptr; };
+}
+
+void Host::give_back_scratch() {
+  if (!arena.bytes) arena.bytes = std::make_unique<char[]>(Arena::kBytes);
+  arena.used = 0;
+}
+
+dfm_plugin_fn entry_of(void *image) { return reinterpret_cast<dfm_plugin_fn>(dlsym(image, "dfm_plugin_entry")); }
+
+Plugin::Plugin(const std::string &file) {
+  char *resolved = realpath(file.c_str(), nullptr);  // dlopen searches the system's libraries for a name without a slash
+  const std::string path = resolved ? resolved : file;
+  std::free(resolved);
+  image_ = dlopen(path.c_str(), RTLD_NOW | RTLD_LOCAL);
+  if (!image_) broken("the dynamic linker refuses it: %s; link what is missing, or leave it out", dlerror());
+  const dfm_plugin_fn entry = entry_of(image_);
+  if (!entry) broken("it has no symbol dfm_plugin_entry, so no host can use it; build it with deform_add_plugin and define the entry of deform/plugin.h");
+  const dfm_plugin *given = entry(&host_.table(), DFM_ABI, DFM_ABI);
+  if (!given)
+    broken("it refuses a host of ABI %u draft %u (%s), so no world can use it; rebuild it against this library's deform/plugin.h", DFM_ABI, DFM_ABI_DRAFT,
+           host_.said().empty() ? "without a reason" : host_.said().c_str());
+  if (given->abi != DFM_ABI || given->abi_draft != DFM_ABI_DRAFT)
+    broken("it was built for ABI %u draft %u and hands itself to a host of ABI %u draft %u, where its structs would be misread; rebuild it against this "
+           "library's deform/plugin.h and refuse other hosts with DFM_ABI_OK", given->abi, given->abi_draft, DFM_ABI, DFM_ABI_DRAFT);
+  dfm_plugin full{};
+  if (!copy_struct(full, given, offsetof(dfm_plugin, types) + sizeof(void *)))
+    broken("dfm_plugin.size is %u, so its fields cannot be told apart; set it to sizeof(dfm_plugin)", given->size);
+  shutdown_ = full.shutdown;
+  if (full.ntype == 0 || full.ntype > 4096 || !full.types) broken("it offers no types (ntype %u); name at least one dfm_type", full.ntype);
+  for (uint32_t i = 0; i < full.ntype; ++i) copy_type(full.types[i], i);
+}
+
+void Plugin::copy_type(const void *from, uint32_t number) {
+  auto copy = std::make_unique<Copy>();
+  dfm_type &type = copy->type;
+  if (!copy_struct(type, from, offsetof(dfm_type, ops) + sizeof(void *)))
+    broken("type #%u is NULL or claims a size that no dfm_type has; set size to sizeof(dfm_type)", number);
+  const uint32_t width = type.param_size;
+  if (type.params && type.nparam <= 4096 && width >= offsetof(dfm_param, names) && width <= 65536)
+    for (uint32_t i = 0; i < type.nparam; ++i) {
+      dfm_param row{};
+      std::memcpy(&row, reinterpret_cast<const char *>(type.params) + size_t(i) * width, std::min<size_t>(width, sizeof row));
+      copy->rows.push_back(row);
+    }
+  if (copy->rows.size() != type.nparam)
+    broken("type #%u: its table has %u rows of %u bytes at %p, so no parameter can be set; set params, nparam and param_size (sizeof(dfm_param))", number,
+           type.nparam, width, static_cast<const void *>(type.params));
+  type.params = copy->rows.data(), type.param_size = sizeof(dfm_param);
+  const void *ops = type.ops;
+  const bool known =
+      type.kind == DFM_KIND_FRICTION ? copy_struct(copy->friction, ops, offsetof(dfm_friction, eval) + sizeof(void *))
+      : type.kind == DFM_KIND_MODEL  ? copy_struct(copy->model, ops, offsetof(dfm_model, destroy) + sizeof(void *))
+                                     : type.kind == DFM_KIND_SOLVER && copy_struct(copy->solver, ops, offsetof(dfm_solver, release) + sizeof(void *));
+  if (!known)
+    broken("type #%u has kind %u and operations that do not fit it, so nothing can be called; set kind, and ops.size to the sizeof of its struct", number,
+           type.kind);
+  type.ops = type.kind == DFM_KIND_FRICTION ? static_cast<const void *>(&copy->friction)
+             : type.kind == DFM_KIND_MODEL  ? static_cast<const void *>(&copy->model)
+                                            : static_cast<const void *>(&copy->solver);
+  types_.push_back(std::move(copy));
+  view_.push_back(&types_.back()->type);
+}
+
+void Plugin::close() {
+  view_.clear(), types_.clear();
+  if (shutdown_) shutdown_();
+  if (image_) dlclose(image_);
+  shutdown_ = nullptr, image_ = nullptr;
+}
+
+Plugin::~Plugin() { close(); }
+
+std::string name_of(const dfm_type &type, uint32_t number) { return type.id && *type.id ? type.id : "#" + std::to_string(number); }
+
+const dfm_friction &law_of(const Subject &subject) { return *static_cast<const dfm_friction *>(subject.type->ops); }
+
+bool promises(const dfm_type &type, const char *effect) {
+  for (const char *const *e = type.effects; e && *e; ++e)
+    if (std::strcmp(*e, effect) == 0) return true;
+  return false;
+}
+
+}  // namespace cli::check

@@ -1,0 +1,161 @@
+// V07, V08, F04: a law is a pure function of each lane. Whatever else it looks at (a static variable, the lane beside it, where it lies in the
+// batch, the address of a table) makes a world depend on how contacts happen to be grouped.
+#include <cmath>
+#include <cstring>
+#include <limits>
+
+#include "check/groups.h"
+#include "check/law.h"
+#include "check/runner.h"
+
+namespace cli::check {
+namespace {
+
+constexpr double kInfinite = std::numeric_limits<double>::infinity();
+
+// Contacts of every kind: open, at rest, in presliding, sliding; with the states that a few steps of their own make.
+void fill(Lanes &b, const Scales &s, Random &random) {
+  for (uint32_t i = 0; i < b.n; ++i) {
+    const double angle = random.uniform(0, 6.283185307179586), w = i % 7 == 0 ? 0 : random.logarithmic(1e-6, 10);
+    if (b.law.needs(DFM_NEED_FN)) b.fn[i] = i % 11 == 0 ? 0 : s.fn * random.logarithmic(1e-2, 1e2);
+    if (b.law.needs(DFM_NEED_VT)) b.vt[i] = w * std::cos(angle), b.vt[b.stride + i] = w * std::sin(angle);
+    const double force = s.level * random.logarithmic(1e-3, 1e3);
+    if (b.law.needs(DFM_NEED_FT_STOP)) b.stop[i] = -force * std::cos(angle), b.stop[b.stride + i] = -force * std::sin(angle);
+    b.area[i] = random.logarithmic(0.1, 10), b.dwell[i] = random.logarithmic(1e-3, 10);
+  }
+}
+
+void settle(Lanes &b, const Scales &s, Random &random, double h) {
+  for (int k = 0; k < 4; ++k) {
+    fill(b, s, random);
+    b.must(h), b.commit();
+  }
+  fill(b, s, random);
+}
+
+uint64_t mix(uint64_t hash, const void *data, size_t bytes) {
+  const unsigned char *p = static_cast<const unsigned char *>(data);
+  for (size_t i = 0; i < bytes; ++i) hash = (hash ^ p[i]) * 0x100000001b3ull;
+  return hash;
+}
+
+uint64_t hash_of(const Lanes &b, uint64_t hash) {
+  const auto columns = [&](const double *p, uint32_t width) {
+    for (uint32_t c = 0; c < width; ++c) hash = mix(hash, p + size_t(c) * b.stride, b.n * sizeof(double));
+  };
+  columns(b.out_ft, 2), columns(b.out_state, b.law.nstate), columns(b.limit, 1), columns(b.stored, 1);
+  if (b.out.dft_dvt) columns(b.dv, 4), columns(b.dn, 2);
+  return mix(hash, b.mode, b.n);
+}
+
+constexpr double kSteps[] = {1e-3, 1.0 / 60, 1e-5};
+
+}  // namespace
+
+uint64_t digest(const Subject &subject) {
+  const Law law(subject, lively_params(subject));
+  const Scales scales = scales_of(law);
+  Random random(subject.seed);
+  uint64_t hash = 0xcbf29ce484222325ull;
+  for (const double h : kSteps) {
+    Lanes b(law, 200);
+    settle(b, scales, random, h);
+    b.must(h);
+    hash = hash_of(b, hash);
+  }
+  return hash;
+}
+
+std::string same_bits(const Subject &subject) {
+  const Law law(subject, lively_params(subject)), plain(subject, default_params(*subject.type));
+  const Scales scales = scales_of(law);
+  Random random(subject.seed);
+  // One batch is asked again after others with another step, other parameters and other inputs came between.
+  Lanes first(law, 200), between(plain, 33);
+  settle(first, scales, random, kSteps[0]), settle(between, scales, random, kSteps[1]);
+  Lanes again(law, 200);
+  for (uint32_t i = 0; i < first.n; ++i) again.take(i, first, i);
+  first.must(kSteps[0]);
+  for (int round = 0; round < 3; ++round) {
+    between.must(kSteps[(round + 1) % 3]);
+    again.must(kSteps[0]);
+    for (uint32_t i = 0; i < first.n; ++i)
+      if (!again.same(i, first, i))
+        broken("lane %u of the same batch answered (%.17g, %.17g) N and, asked again after another batch, (%.17g, %.17g) N: it keeps something between calls, so a restored or "
+               "repeated step goes elsewhere; move it into a state slot",
+               i, first.out_ft[i], first.out_ft[first.stride + i], again.out_ft[i], again.out_ft[again.stride + i]);
+  }
+  stage("a second process is asked for the same batches");
+  const uint64_t here = digest(subject), once_more = digest(subject);
+  if (here != once_more) broken("the same series of batches gave other bits the second time: it keeps something between calls; move it into a state slot");
+  const std::string number = std::to_string(subject.index), seed = std::to_string(subject.seed);
+  const Answer other = in_own_process(subject.command, {"plugin", "check", subject.file, "--digest", number, "--seed", seed}, {});
+  const std::string mine = text("%016llx", static_cast<unsigned long long>(here));
+  if (!other.spoke) broken("asked in a second process, it %s; a law must not depend on the process it runs in", other.ending.c_str());
+  if (other.verdict.detail != mine)
+    broken("the same batches give %s here and %s in another process: it uses an address, the time or something left uninitialised, so results differ from run to run; compute from "
+           "the inputs alone", mine.c_str(), other.verdict.detail.c_str());
+  return "digest " + mine;
+}
+
+std::string bad_lane_stays(const Subject &subject) {
+  const Law law(subject, lively_params(subject));
+  const Scales scales = scales_of(law);
+  Random random(subject.seed);
+  Lanes good(law, 19), spoilt(law, 19);
+  settle(good, scales, random, 1e-3);
+  for (uint32_t i = 0; i < good.n; ++i)
+    if (law.needs(DFM_NEED_FN)) good.fn[i] = scales.fn * random.logarithmic(0.1, 10);     // a contact that is open may answer zero to anything
+  good.must(1e-3);
+  struct Input { const char *name; bool given; double *column; };
+  const size_t S = spoilt.stride;
+  std::vector<Input> inputs = {{"fn", law.needs(DFM_NEED_FN), spoilt.fn},
+                               {"vt", law.needs(DFM_NEED_VT), spoilt.vt}, {"vt", law.needs(DFM_NEED_VT), spoilt.vt + S},
+                               {"ft_stop", law.needs(DFM_NEED_FT_STOP), spoilt.stop}, {"ft_stop", law.needs(DFM_NEED_FT_STOP), spoilt.stop + S},
+                               {"area", law.needs(DFM_NEED_AREA), spoilt.area}, {"dwell", law.needs(DFM_NEED_DWELL), spoilt.dwell}};
+  for (uint32_t c = 0; c < law.nstate; ++c) inputs.push_back({"state", true, spoilt.state + c * S});
+  constexpr uint32_t kBad = 6;
+  for (const Input &input : inputs)
+    for (const double bad : {std::numeric_limits<double>::quiet_NaN(), kInfinite, -kInfinite}) {
+      if (!input.given) continue;
+      for (uint32_t i = 0; i < good.n; ++i) spoilt.take(i, good, i);
+      input.column[kBad] = bad;
+      stage("%s = %g in lane %u", input.name, bad, kBad);
+      if (spoilt.ask(1e-3) != DFM_OK) continue;                // nothing was changed: the host may try smaller
+      for (uint32_t i = 0; i < good.n; ++i)
+        if (i != kBad && !spoilt.same(i, good, i))
+          broken("%s = %g in lane %u changed lane %u from (%.17g, %.17g) to (%.17g, %.17g) N: one broken contact would spoil others; compute each lane from its own inputs", input.name,
+                 bad, kBad, i, good.out_ft[i], good.out_ft[S + i], spoilt.out_ft[i], spoilt.out_ft[S + i]);
+      if (std::isnan(bad) && std::strcmp(input.name, "dwell") != 0 && std::isfinite(spoilt.ft(kBad)))
+        broken("%s = NaN gave a finite force (%.17g, %.17g) N, so the host would not notice that its contact is broken; let the NaN through, or return DFM_DISCARD", input.name,
+               spoilt.out_ft[kBad], spoilt.out_ft[S + kBad]);
+    }
+  return "";
+}
+
+std::string split_equals_whole(const Subject &subject) {
+  const Law law(subject, lively_params(subject));
+  const Scales scales = scales_of(law);
+  Random random(subject.seed);
+  for (const double h : kSteps) {
+    Lanes whole(law, 103);
+    settle(whole, scales, random, h);
+    whole.must(h);
+    for (const uint32_t piece : {1u, 2u, 7u, 8u, 9u, 32u, 64u})
+      for (uint32_t begin = 0; begin < whole.n; begin += piece) {
+        const uint32_t n = std::min(piece, whole.n - begin);
+        Lanes part(law, n, piece == 9 ? 16 : 0);
+        for (uint32_t k = 0; k < n; ++k) part.take(n - 1 - k, whole, begin + k);    // in reverse: neighbours change too
+        part.must(h);
+        for (uint32_t k = 0; k < n; ++k)
+          if (!part.same(n - 1 - k, whole, begin + k))
+            broken("contact %u answers (%.17g, %.17g) N in a batch of %u and (%.17g, %.17g) N in one of %u: a world would change with the number of its contacts; compute each lane by "
+                   "the same operations wherever it stands",
+                   begin + k, whole.out_ft[begin + k], whole.out_ft[whole.stride + begin + k], whole.n, part.out_ft[n - 1 - k],
+                   part.out_ft[part.stride + n - 1 - k], n);
+      }
+  }
+  return "";
+}
+
+}  // namespace cli::check

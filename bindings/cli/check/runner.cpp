@@ -1,0 +1,206 @@
+#include "check/runner.h"
+
+#include <fcntl.h>
+#include <poll.h>
+#include <sys/prctl.h>
+#include <sys/resource.h>
+#include <sys/wait.h>
+#include <time.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <csignal>
+#include <cstdarg>
+#include <cstdio>
+#include <cstdlib>
+#include <cstring>
+
+#include "messages.h"
+
+namespace cli::check {
+namespace {
+
+int report = -1;
+
+std::string formatted(const char *format, va_list args) {
+  char buffer[2048];
+  std::vsnprintf(buffer, sizeof buffer, format, args);
+  return buffer;
+}
+
+// A message is a letter, text and a zero: 's' stage, 'P' 'F' 'S' verdict.
+void send(char letter, const std::string &what) {
+  std::string message = letter + what;
+  message.push_back('\0');
+  for (size_t at = 0; at < message.size();) {
+    const ssize_t n = write(report, message.data() + at, message.size() - at);
+    if (n < 0 && errno != EINTR) return;
+    if (n > 0) at += static_cast<size_t>(n);
+  }
+}
+
+double clock_of(clockid_t clock) {
+  timespec t{};
+  if (clock_gettime(clock, &t) != 0) return -1;
+  return static_cast<double>(t.tv_sec) + 1e-9 * static_cast<double>(t.tv_nsec);
+}
+
+const char *signal_name(int number) {
+  switch (number) {
+    case SIGSEGV: return "SIGSEGV (it touched memory that is not its own)";
+    case SIGBUS: return "SIGBUS (it touched memory that is not there)";
+    case SIGABRT: return "SIGABRT (it called abort, or threw through a C function)";
+    case SIGFPE: return "SIGFPE (a whole number was divided by zero)";
+    case SIGILL: return "SIGILL (an instruction that this processor lacks)";
+    default: return nullptr;
+  }
+}
+
+std::string ending_of(int status) {
+  if (WIFEXITED(status)) return text("left its process by itself with exit code %d", WEXITSTATUS(status));
+  const char *name = signal_name(WTERMSIG(status));
+  return name ? text("ended its process by %s", name) : text("ended its process by signal %d", WTERMSIG(status));
+}
+
+[[noreturn]] void become(const std::string &command, std::vector<std::string> &arguments, int to_report, int to_output) {
+  setpgid(0, 0);
+  prctl(PR_SET_PDEATHSIG, SIGKILL);
+  const rlimit no_core{0, 0};
+  setrlimit(RLIMIT_CORE, &no_core);
+  const int input = open("/dev/null", O_RDONLY);
+  dup2(input, 0), dup2(to_output, 1), dup2(to_output, 2);
+  arguments.push_back("--report-to"), arguments.push_back(std::to_string(to_report));
+  std::vector<char *> argv{const_cast<char *>("deform")};
+  for (std::string &a : arguments) argv.push_back(a.data());
+  argv.push_back(nullptr);
+  setenv("GLIBC_TUNABLES", "glibc.malloc.tcache_count=0", 1);   // a cache of free pieces would look like a leak to V09
+  execv(command.c_str(), argv.data());
+  _exit(127);
+}
+
+void read_reports(Answer &out, std::string &pending) {
+  for (size_t end; (end = pending.find('\0')) != std::string::npos; pending.erase(0, end + 1)) {
+    const char letter = pending[0];
+    const std::string what(pending, 1, end - 1);
+    if (letter == 's') out.at = what;
+    else out.spoke = true, out.verdict = {letter == 'P' ? Result::pass : letter == 'F' ? Result::fail : Result::skip, what};
+  }
+}
+
+}  // namespace
+
+std::string text(const char *format, ...) {
+  va_list args;
+  va_start(args, format);
+  std::string out = formatted(format, args);
+  va_end(args);
+  return out;
+}
+
+void broken(const char *format, ...) {
+  va_list args;
+  va_start(args, format);
+  const std::string sentence = formatted(format, args);
+  va_end(args);
+  throw Broken(sentence);
+}
+
+void skip(const char *format, ...) {
+  va_list args;
+  va_start(args, format);
+  const std::string sentence = formatted(format, args);
+  va_end(args);
+  throw Skipped(sentence);
+}
+
+void report_to(int descriptor) {
+  report = descriptor;
+  if (report >= 0) fcntl(report, F_SETFD, FD_CLOEXEC);
+}
+
+void stage(const char *format, ...) {
+  if (report < 0) return;
+  va_list args;
+  va_start(args, format);
+  send('s', formatted(format, args));
+  va_end(args);
+}
+
+void answer(const Verdict &verdict) {
+  if (report >= 0) send(verdict.result == Result::pass ? 'P' : verdict.result == Result::fail ? 'F' : 'S', verdict.detail);
+}
+
+void fail_now(const char *sentence) {
+  const char letter = 'F';
+  const int to = report >= 0 ? report : STDERR_FILENO;
+  if ((report >= 0 && write(to, &letter, 1) != 1) || write(to, sentence, std::strlen(sentence) + 1) < 0) _exit(1);
+  _exit(1);
+}
+
+Verdict run_here(const Rule &rule, const Subject &subject) {
+  try {
+    const bool model = subject.type && subject.type->kind != DFM_KIND_FRICTION;
+    const auto run = model ? rule.model : rule.law;
+    if (!run) return {Result::skip, "comes with the rules for models (M01 to M15), which are not available yet"};
+    return {Result::pass, run(subject)};
+  } catch (const Broken &b) {
+    return {Result::fail, b.what()};
+  } catch (const Skipped &s) {
+    return {Result::skip, s.what()};
+  } catch (const std::exception &e) {
+    return {Result::fail, text("an exception left the plugin (%s), which ends a program written in C; wrap its entries in dfm::plugin::guarded", e.what())};
+  } catch (...) {
+    return {Result::fail, "an exception left the plugin, which ends a program written in C; wrap its entries in dfm::plugin::guarded"};
+  }
+}
+
+Answer in_own_process(const std::string &command, std::vector<std::string> arguments, const Limits &limits) {
+  int reports[2], output[2];
+  if (pipe2(reports, O_CLOEXEC) != 0) throw Failure(kBadInput, "no pipe is left for the process of a rule; close programs or raise the limit of open files");
+  if (pipe2(output, O_CLOEXEC) != 0) throw Failure(kBadInput, "no pipe is left for the process of a rule; close programs or raise the limit of open files");
+  const pid_t child = fork();
+  if (child == 0) {
+    fcntl(reports[1], F_SETFD, 0);
+    become(command, arguments, reports[1], output[1]);
+  }
+  close(reports[1]), close(output[1]);
+  if (child < 0) throw Failure(kBadInput, "the system starts no further process for a rule; close programs, or say --in-process");
+  Answer out;
+  std::string pending;
+  pollfd ends[2] = {{reports[0], POLLIN, 0}, {output[0], POLLIN, 0}};
+  clockid_t clock;
+  const bool timed = clock_getcpuclockid(child, &clock) == 0;
+  const double begun = clock_of(CLOCK_MONOTONIC);
+  char buffer[4096];
+  int status = 0;
+  bool late = false;
+  for (bool ended = false; !ended;) {
+    poll(ends, 2, 5);
+    for (int k = 0; k < 2; ++k) {
+      if (!(ends[k].revents & (POLLIN | POLLHUP | POLLERR))) continue;
+      const ssize_t n = read(ends[k].fd, buffer, sizeof buffer);
+      if (n <= 0) ends[k].fd = -1 - ends[k].fd;              // at its end: poll passes over negative descriptors
+      else if (k == 0) pending.append(buffer, static_cast<size_t>(n)), read_reports(out, pending);
+      else if (out.said.size() < 65536) out.said.append(buffer, static_cast<size_t>(n));
+    }
+    if (const double used = timed ? clock_of(clock) : -1; used >= 0) out.seconds = used;
+    const bool over = out.seconds > limits.seconds || clock_of(CLOCK_MONOTONIC) - begun > 10 * limits.seconds;
+    if (over && !late) late = true, kill(-child, SIGKILL), kill(child, SIGKILL);
+    ended = waitpid(child, &status, WNOHANG) == child;
+  }
+  for (int k = 0; k < 2; ++k) {                               // what it wrote before it ended; a process it left behind is not waited for
+    const int fd = ends[k].fd < 0 ? -1 - ends[k].fd : ends[k].fd;
+    fcntl(fd, F_SETFL, O_NONBLOCK);
+    for (ssize_t n; (n = read(fd, buffer, sizeof buffer)) > 0;) {
+      if (k == 0) pending.append(buffer, static_cast<size_t>(n));
+      else if (out.said.size() < 65536) out.said.append(buffer, static_cast<size_t>(n));
+    }
+    close(fd);
+  }
+  read_reports(out, pending);
+  kill(-child, SIGKILL);
+  if (!out.spoke) out.ending = late ? text("did not come back within %g s", limits.seconds) : ending_of(status);
+  return out;
+}
+
+}  // namespace cli::check

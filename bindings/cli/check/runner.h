@@ -1,0 +1,34 @@
+// How a rule is run: here, or in a process of its own with a limit, so that what crashes or hangs costs its rule and nothing else.
+#pragma once
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "check/check.h"
+
+namespace cli::check {
+
+struct Limits { double seconds = 20; };   // of processor time for one rule; ten times that of the clock
+
+// What a rule is about to do: named where its process ends without an answer.
+void stage(const char *format, ...) __attribute__((format(printf, 1, 2)));
+
+// The child's side: where stages and the verdict go; -1: this process is the one that was asked.
+void report_to(int descriptor);
+// Writes a failed verdict and ends the process: for signal handlers, so it formats nothing.
+[[noreturn]] void fail_now(const char *sentence);
+
+struct Answer {
+  bool spoke = false;          // the process gave a verdict
+  Verdict verdict;
+  std::string said;            // what it wrote to its standard streams
+  std::string ending;          // where it gave none: "ended by SIGSEGV", "ran past 1 s of processor time"
+  std::string at;              // its last stage
+  double seconds = 0;          // processor time
+};
+// Runs this program with these arguments and waits within the limits. It is told where to report by --report-to.
+Answer in_own_process(const std::string &command, std::vector<std::string> arguments, const Limits &limits);
+// The child's last word.
+void answer(const Verdict &verdict);
+
+}  // namespace cli::check

@@ -1,0 +1,79 @@
+// Catches what eval must not do: calls of the C library that allocate, open, print or read the environment, and touches of memory outside the
+// arrays. Calls are caught by exchanging addresses: every function that a loaded object calls in another one stands in that object's table of
+// addresses (global offset table), so while eval runs, the entries of those names, in the plugin and in every library under it, point to ours.
+// Nothing is forwarded: the first such call ends eval by a jump back to the rule. Not seen: bare system calls in machine code, the
+// variable `environ`, and a C library linked into the plugin.
+#pragma once
+#include <csetjmp>
+#include <cstdint>
+#include <string>
+#include <vector>
+
+namespace cli::check {
+
+class Watch {
+ public:
+  Watch();                                    // finds the entries; the plugin must be loaded
+  // Runs f; the name of the function that it called and may not, or null.
+  template <class F>
+  const char *run(F &&f) {
+    if (sigsetjmp(back, 0) == 0) {
+      exchange(true);
+      f();
+    }
+    exchange(false);
+    const char *name = caught;
+    caught = nullptr;
+    return name;
+  }
+  size_t entries() const { return slots_.size(); }
+  [[noreturn]] static void stop(const char *name);   // for services that have no entry to exchange
+  static bool watching() { return active; }
+
+ private:
+  struct Slot { void **at; void *ours, *theirs; };
+  void exchange(bool ours);
+  static sigjmp_buf back;
+  static const char *caught;
+  static bool active;
+  std::vector<Slot> slots_;
+};
+
+// An array between two pages that may not be touched, at the end or at the start of what lies between them; the rest holds a pattern.
+class Fenced {
+ public:
+  enum Place { at_start, at_end };
+  Fenced(const char *name, size_t bytes, Place place);
+  ~Fenced();
+  Fenced(const Fenced &) = delete;
+  Fenced &operator=(const Fenced &) = delete;
+  void *data() const { return data_; }
+  double *numbers() const { return static_cast<double *>(data_); }
+  void lock();                                // read only from here on
+  // The first byte beside the array that is no longer the pattern, as an offset from its beginning; false where there is none.
+  bool spoilt(long *offset) const;
+
+  // Runs f and turns a touch of a fence into a sentence; empty where there was none.
+  template <class F>
+  static std::string guard(F &&f) {
+    arm();
+    if (sigsetjmp(back, 1) == 0) f();
+    disarm();
+    return sentence;
+  }
+
+ private:
+  static void arm();
+  static void disarm();
+  static void on_fault(int, void *info, void *context);
+  static sigjmp_buf back;
+  static char sentence[256];
+  static std::vector<Fenced *> all;
+  const char *name_;
+  unsigned char *pages_, *middle_;
+  size_t span_, bytes_;
+  void *data_;
+  bool locked_ = false;
+};
+
+}  // namespace cli::check
