@@ -191,7 +191,8 @@ class Entry:
         height = case["body"]["size"][2]
         scene = self.floor(self.base(case, law, case["span"][1], 0.005, [0, 0, 0]))
         top = [[-1, -1, height - 1e-6], [1, 1, height + 1e-6]]
-        scene["bodies"][0]["fix"] = [{"box": top, "axes": "xy", "motion": {"sine": {"amplitude": [case["amplitude"], 0, 0], "frequency": case["frequency"]}}}]
+        above = [[-1, -1, 1e-6], [1, 1, 1]]
+        scene["bodies"][0]["fix"] = [{"box": above, "axes": "xy", "motion": {"sine": {"amplitude": [case["amplitude"], 0, 0], "frequency": case["frequency"]}}}]
         scene["bodies"][0]["forces"] = [{"box": top, "total": [0, 0, -case["normal"]], "keyframes": [{"t": 0, "scale": 0}, {"t": case["press"], "scale": 1}]}]
 
         def measure(t):
