@@ -1,8 +1,9 @@
 /* deform/elementary.h -- exp, log, pow, sinpi and cospi from + - * / alone, for what runs inside a step: a C library picks variants with fused
  * multiply-add by processor, so its last bit differs between machines; these give the same bits everywhere they are compiled without
  * contraction (-ffp-contract=off, which deform_add_plugin sets). Header only, C99 and C++17; no table, no branch on the common path, so
- * loops over them vectorise. Error, measured against 80-bit long double in the tests: dfm_exp and dfm_log below 1 ulp (dfm_exp within
- * half a subnormal where the result is subnormal), dfm_sinpi and dfm_cospi below 1.7 ulp, dfm_pow below 2 ulp where |y log x| <= 40, growing to 40 ulp at the ends of the range. */
+ * loops over them vectorise. Error, measured against 80-bit long double in the tests: dfm_exp and dfm_log below 1 ulp (dfm_exp within half a
+ * subnormal where the result is subnormal), dfm_sinpi and dfm_cospi below 1.7 ulp, dfm_pow below 2 ulp where |y log x| <= 40, growing to 40 ulp
+ * at the ends of the range. */
 #ifndef DEFORM_ELEMENTARY_H
 #define DEFORM_ELEMENTARY_H
 #include <stdint.h>
@@ -44,8 +45,8 @@ static inline void dfm_log2_(double x, double *high, double *low) {
   const int subnormal = x < 0x1p-1022;
   const uint64_t b = dfm_bits_(subnormal ? x * 0x1p54 : x);
   const uint64_t shifted = b - 0x3fe6a09e667f3bcdull;                       /* bits of sqrt 1/2: the exponent then counts from there */
-  const int64_t k = (int64_t)((shifted + ((uint64_t)2048 << 52)) >> 52) - 2048;
-  const double n = (double)(int32_t)((k > 1100 ? k - 4096 : k) - (subnormal ? 54 : 0));
+  const uint64_t k = ((shifted + ((uint64_t)2048 << 52)) >> 52) - 2048;      /* modulo 2^64; added to the bits of DFM_ROUND_ it reads as a double */
+  const double n = (dfm_double_(dfm_bits_(DFM_ROUND_) + k) - DFM_ROUND_) - (subnormal ? 54.0 : 0.0);
   const double m = dfm_double_(0x3fe6a09e667f3bcdull + (shifted & 0x000fffffffffffffull));
   const double f = m - 1.0, d = m + 1.0, dlow = (1.0 - d) + m;              /* f exact; d + dlow = m + 1 exactly */
   const double s = f / d;
