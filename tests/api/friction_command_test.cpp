@@ -102,6 +102,8 @@ TEST(FrictionCommand, BadCases_AreRefusedWithTheirPlace) {
   expect_refused({"friction", folder() + "/none.json"}, {"none.json", "No such file"});
   expect_refused({"friction", file("cut.json", push().substr(0, 90))}, {"cut.json:3:", "not JSON"});
   expect_refused({"friction", file("list.json", "[1]")}, {"list.json", "object"});
+  std::string spring = test::read_file(example("stick_slip"));
+  expect_refused({"friction", file("spring.json", spring.replace(spring.find("\"k\": "), 5, "\"k\": -"))}, {"/input/k", "negative"});
   expect_bad_case("\"input\"", "\"inputs\"", {"/input"});
   expect_bad_case("\"bias_sine_force\"", "\"bias_sin_force\"", {"/input/kind", "bias_sin_force", "did you mean \"bias_sine_force\""});
   expect_bad_case("\"bias_sine_force\"", "\"table\"", {"/input/kind", "table"});
