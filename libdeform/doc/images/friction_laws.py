@@ -1,5 +1,6 @@
 #!/usr/bin/env python3
-"""The figures of the laws' pages, made by `deform friction` from examples/friction: laws_rig.png, laws_breakaway.png, laws_loops.png, laws_sliding.png.
+"""The figures of the laws' pages, made by `deform friction` from examples/friction: laws_rig.png, laws_breakaway.png, laws_loops.png, laws_sliding.png,
+laws_pulled.png.
 
 friction_laws.py DEFORM_COMMAND [FOLDER]
 """
@@ -115,10 +116,24 @@ def sliding(out):
     figure.savefig(out / "laws_sliding.png")
 
 
+def pulled(out):
+    figure, axes = plt.subplots(1, len(LAWS), figsize=(13.5, 3.0), dpi=80, sharey=True)
+    for axis, (law, colour) in zip(axes, LAWS.items()):
+        rows = run("pulled", law)
+        axis.plot(rows["t"], 2 * (0.1 * rows["t"] - rows["x"]), color=colour, linewidth=1.1)
+        axis.set_title(law, fontsize=10)
+        axis.set_xlabel("time (s)")
+        axis.grid(True, alpha=0.25)
+    axes[0].set_ylabel("spring force (N)")
+    figure.suptitle("1 kg pulled at 0.1 m/s by a spring of 2 N/m; F_C 1 N, F_S 1.5 N", fontsize=10)
+    figure.tight_layout()
+    figure.savefig(out / "laws_pulled.png")
+
+
 def main():
     out = pathlib.Path(sys.argv[2]) if len(sys.argv) > 2 else pathlib.Path(__file__).parent
     plt.rcParams.update({"font.size": 9, "axes.spines.top": False, "axes.spines.right": False})
-    for draw in (rig, breakaway, loops, sliding):
+    for draw in (rig, breakaway, loops, sliding, pulled):
         draw(out)
 
 
