@@ -89,7 +89,7 @@ std::string same_bits(const Subject &subject) {
   const uint64_t here = digest(subject), once_more = digest(subject);
   if (here != once_more) broken("the same series of batches gave other bits the second time: it keeps something between calls; move it into a state slot");
   const std::string number = std::to_string(subject.index), seed = std::to_string(subject.seed);
-  const Answer other = in_own_process(subject.command, {"plugin", "check", subject.file, "--digest", number, "--seed", seed}, {});
+  const Answer other = in_fresh_process(subject.command, {"plugin", "check", subject.file, "--digest", number, "--seed", seed}, {});
   const std::string mine = text("%016llx", static_cast<unsigned long long>(here));
   if (!other.spoke) broken("asked in a second process, it %s; a law must not depend on the process it runs in", other.ending.c_str());
   if (other.verdict.detail != mine)

@@ -52,7 +52,7 @@ std::string eval_keeps_to_itself(const Subject &subject) {
       for (int round = 0; round < 4; ++round) {
         Lanes b(law, n);
         vary(b, random, 1);
-        if (round == 3) b.vt[0] = b.fn[0] = std::numeric_limits<double>::quiet_NaN();      // the way out of trouble counts too
+        if (round == 3) b.vt[0] = b.fn[0] = std::numeric_limits<double>::quiet_NaN();  // the way out of trouble counts too
         stage("batch of %u contacts, step %g s", n, h);
         b.in.dt = h;
         const char *name = watch.run([&] { law.ops.eval(&b.in, &b.out); });
@@ -75,6 +75,7 @@ class FencedBatch {
   FencedBatch(const Law &law, Lanes &lanes, Fenced::Place place)
       : lanes_(lanes), in_("dfm_friction_in", sizeof(dfm_friction_in), place), out_("dfm_friction_out", sizeof(dfm_friction_out), place) {
     in() = lanes.in, out() = lanes.out;
+    in().dt = 1e-3;
     params_ = std::make_unique<Fenced>("params", law.params.size() * sizeof(double), place);
     std::copy(law.params.begin(), law.params.end(), params_->numbers());
     in().params = params_->numbers();
@@ -264,7 +265,7 @@ std::string sanitizer_finds_nothing(const Subject &subject) {
   const Law law(subject, lively_params(subject));
   constexpr int kThreads = 4;
   constexpr int kRounds = 20;
-  // Each thread has batches of its own on the heap, where every array has a fence of the sanitizer, and all share params and data.
+  // Each thread has batches of its own; params and data are shared, as in a world.
   std::vector<std::vector<double>> told(kThreads), alone(kThreads);
   const auto work = [&](int t, std::vector<double> &out) {
     Random random(subject.seed + static_cast<uint64_t>(t));
