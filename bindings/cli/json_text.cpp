@@ -104,6 +104,7 @@ class Reader {
     space();
     return i_ == s_.size();
   }
+  size_t at() const { return i_; }
 
  private:
   void space() {
@@ -155,9 +156,11 @@ class Reader {
 
 }  // namespace
 
-bool parse_json(const std::string &text, JsonValue &out) {
+bool parse_json(const std::string &text, JsonValue &out, size_t *where) {
   Reader reader(text);
-  return reader.value(out, 0) && reader.end();
+  const bool good = reader.value(out, 0) && reader.end();
+  if (where) *where = reader.at();
+  return good;
 }
 
 }  // namespace cli

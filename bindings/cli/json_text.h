@@ -33,6 +33,7 @@ struct JsonValue {
   std::string get(const std::string &key) const;  // text of a member, "" where absent
 };
 struct JsonMember { std::string name; JsonValue value; };
-bool parse_json(const std::string &text, JsonValue &out);
+// where: out, the byte at which it stopped to be JSON.
+bool parse_json(const std::string &text, JsonValue &out, size_t *where = nullptr);
 
 }  // namespace cli

@@ -4,8 +4,7 @@
 namespace cli {
 
 void add_later(CLI::App &app, Globals &, int *exit_code) {
-  const std::pair<const char *, const char *> later[] = {{"friction", "runs a friction law on a rig (not available yet)"},
-                                                         {"cost", "what accuracy costs on a scene (not available yet)"}};
+  const std::pair<const char *, const char *> later[] = {{"cost", "what accuracy costs on a scene (not available yet)"}};
   for (const auto &[name, what] : later) {
     CLI::App *sub = app.add_subcommand(name, what);
     sub->allow_extras();

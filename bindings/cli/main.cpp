@@ -143,6 +143,7 @@ int main(int argc, char **argv) {
   cli::add_mesh(app, cli::globals, &exit_code);
   cli::add_plugin(app, cli::globals, &exit_code);
   cli::add_ccd(app, cli::globals, &exit_code);
+  cli::add_friction(app, cli::globals, &exit_code);
   cli::add_later(app, cli::globals, &exit_code);
   cli::add_montage(app, &exit_code);
   cli::add_common(&app);

@@ -67,7 +67,7 @@ TEST_F(Dahl, Loading_IsTheClosedForm) {
     const double s = 1e4 * dx / fc, rest = 1 + (a - 1) * s;
     const double expected = a == 1 ? fc * (1 - std::exp(-s)) : fc * (1 - (rest > 0 ? std::pow(rest, 1 / (1 - a)) : 0.0));
     for (int n : {1000, 2000, 4000}) {
-      Contact k({law.ops, {0.15, 1e4, a}, 2, {0}, false}, 9.8);
+      Contact k({law.ops, {0.15, 1e4, a}, 2, {0}, {}, false}, 9.8);
       const double error = std::fabs(k.path(dx, n, 0.01) - expected);
       EXPECT_LT(error, 1.0 * fc / n) << a;
       if (before > 1e-9) {
@@ -82,7 +82,7 @@ TEST_F(Dahl, SlidingForLong_ReachesTheLevelInOneStepOrMany) {
   for (double a : {1.0, 2.0})
     for (double h : {1e-6, 1e-3, 1.0 / 30})
       for (double w : {1e-4, 1.0, 1e6}) {
-        Contact k({law.ops, {0.15, 1e4, a}, 2, {0}, false}, 9.8);
+        Contact k({law.ops, {0.15, 1e4, a}, 2, {0}, {}, false}, 9.8);
         for (int i = 0; i < 200 || k.x < 0.02; ++i) k.move(w, 0, h > 0.02 / w / 200 ? h : 0.02 / w / 200);
         EXPECT_NEAR(k.last.f[0], 1.47, a > 1 ? 2e-2 : 1e-9) << a << " " << h << " " << w;   // exponent 2 closes as 1/x
         EXPECT_LE(k.last.f[0], 1.47 * (1 + 1e-15));
@@ -160,7 +160,7 @@ TEST_F(Dahl, SteadyCurve_MatchesTheReference) {
 TEST_F(Dahl, PreslidingLoops_MatchTheReference) {
   READ_OR_SKIP(t, "presliding.csv");
   for (int a : {1, 2}) {
-    Contact k({law.ops, {0.15, 1e4, double(a)}, 2, {0}, false}, 9.8);
+    Contact k({law.ops, {0.15, 1e4, double(a)}, 2, {0}, {}, false}, 9.8);
     double worst = 0;
     for (size_t i = 2; i < t.size(); ++i) {
       const double f = k.path(t.at(i, "x") - t.at(i - 1, "x"), 200, 1e-3);

@@ -17,8 +17,18 @@ struct Law {
   std::vector<double> params;
   uint32_t nstate = 0;
   std::vector<uint32_t> pairs;   // first column of every tangent pair of the state
+  std::vector<uint32_t> flags;   // columns that hold 0 or 1
   bool set_valued = false;
 };
+
+inline void read_slots(Law &law) {
+  for (uint32_t s = 0; s < law.ops->nslot; ++s) {
+    const dfm_slot &slot = law.ops->slots[s];
+    for (uint32_t k = 0; slot.kind == DFM_SLOT_TANGENT && k + 1 < slot.width; k += 2) law.pairs.push_back(law.nstate + k);
+    for (uint32_t k = 0; slot.kind == DFM_SLOT_SCALAR && k < slot.width; ++k) law.flags.push_back(law.nstate + k);
+    law.nstate += slot.width;
+  }
+}
 
 inline Law law_of(dfm_law handle, std::vector<double> params) {
   const dfm_type *type = nullptr;
@@ -26,10 +36,7 @@ inline Law law_of(dfm_law handle, std::vector<double> params) {
   Law law;
   law.ops = static_cast<const dfm_friction *>(type->ops), law.params = std::move(params);
   law.set_valued = (law.ops->flags & DFM_FRIC_SET_VALUED) != 0;
-  for (uint32_t s = 0; s < law.ops->nslot; ++s) {
-    for (uint32_t k = 0; law.ops->slots[s].kind == DFM_SLOT_TANGENT && k + 1 < law.ops->slots[s].width; k += 2) law.pairs.push_back(law.nstate + k);
-    law.nstate += law.ops->slots[s].width;
-  }
+  read_slots(law);
   return law;
 }
 
@@ -88,6 +95,7 @@ struct Draw {
       const double r = std::uniform_real_distribution<double>(0, 2)(random) * z_max * in.fn / in.area, t = direction();
       in.state[k] = r * std::cos(t), in.state[k + 1] = r * std::sin(t);
     }
+    for (uint32_t k : law.flags) in.state[k] = random() % 2;
     return in;
   }
 };
@@ -199,6 +207,7 @@ inline void extremes(const Law &law, double z_max) {
             In in;
             in.fn = fn, in.v[0] = v, in.v[1] = -0.5 * v, in.h = h, in.area = area;
             for (uint32_t k : law.pairs) in.state[k] = -z * z_max, in.state[k + 1] = 0.3 * z * z_max;
+            for (uint32_t k : law.flags) in.state[k] = k % 2;
             const Out o = ask(law, in);
             const auto where = [&] { char text[120]; std::snprintf(text, sizeof text, "fn %g v %g z %g h %g area %g", fn, v, z, h, area); return std::string(text); };
             ASSERT_TRUE(std::isfinite(o.f[0]) && std::isfinite(o.f[1]) && o.limit >= 0 && std::isfinite(o.stored)) << where();
@@ -295,6 +304,7 @@ inline double worst_balance(const Law &law, double z_max, int paths, bool runs, 
       const double r = uniform(0, 1) * z_max * in.fn / (law.pairs.size() > 1 ? 4 : 1), t = uniform(0, 6.283185307179586);
       in.state[k] = r * std::cos(t), in.state[k + 1] = r * std::sin(t);
     }
+    for (uint32_t k : law.flags) in.state[k] = random() % 2;
     In rest = in;   // the energy of what was drawn: what the law reports for it at rest, before the cone of another normal force
     const double start = ask(law, rest).stored;
     double sum = start, size = start, w = decades(1e-5, 3), a = uniform(0, 6.283185307179586);
@@ -324,6 +334,7 @@ inline uint64_t hash_of_bits(const Law &law, double z_max) {
     b.fn[i] = 1 + uniform(), b.area[i] = 1 + uniform();
     for (uint32_t k = 0; k < 2; ++k) b.vt[k * b.stride + i] = 0.03 * uniform() * (i % 3 ? 1 : 0.01), b.stop[k * b.stride + i] = 0.7 * uniform();
     for (uint32_t k = 0; k < law.nstate; ++k) b.state[k * b.stride + i] = z_max * uniform();
+    for (uint32_t k : law.flags) b.state[k * b.stride + i] = uniform() > 0 ? 1 : 0;
   }
   EXPECT_EQ(law.ops->eval(&b.in, &b.out), DFM_OK);
   const auto add = [&](const double *column, uint32_t width) {
