@@ -54,7 +54,8 @@ static const dfm_slot slots[] = {SLOTS};
 static const dfm_friction ops = {sizeof(dfm_friction), DFM_NEED_FN | DFM_NEED_VT | DFM_NEED_AREA, FLAGS, sizeof slots / sizeof slots[0], slots, eval,
                                  CHECK, NULL, NULL};
 static const char *const effects[] = {EFFECTS, NULL};
-static const dfm_type type = {sizeof(dfm_type), DFM_KIND_FRICTION, "org.broken.law", "a law of the tests", "1.0", "MIT", SOURCE, rows, 2, sizeof(dfm_param), effects, &ops};
+static const dfm_type type = {sizeof(dfm_type), DFM_KIND_FRICTION, "org.broken.law", "a law of the tests", "1.0", "MIT", SOURCE,
+                              rows, 2, sizeof(dfm_param), effects, &ops};
 static const dfm_type *const types[] = {&type};
 static const dfm_plugin plugin = {sizeof(dfm_plugin), DFM_ABI, DFM_ABI_DRAFT, 1, types, NULL};
 
