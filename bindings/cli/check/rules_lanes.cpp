@@ -126,7 +126,9 @@ std::string bad_lane_stays(const Subject &subject) {
         if (i != kBad && !spoilt.same(i, good, i))
           broken("%s = %g in lane %u changed lane %u from (%.17g, %.17g) to (%.17g, %.17g) N: one broken contact would spoil others; compute each lane from its own inputs", input.name,
                  bad, kBad, i, good.out_ft[i], good.out_ft[S + i], spoilt.out_ft[i], spoilt.out_ft[S + i]);
-      if (std::isnan(bad) && std::strcmp(input.name, "dwell") != 0 && std::isfinite(spoilt.ft(kBad)))
+      bool finite = std::isfinite(spoilt.ft(kBad));
+      for (uint32_t c = 0; c < law.nstate && std::strcmp(input.name, "state") == 0; ++c) finite = finite && std::isfinite(spoilt.out_state[c * S + kBad]);
+      if (std::isnan(bad) && std::strcmp(input.name, "dwell") != 0 && finite)
         broken("%s = NaN gave a finite force (%.17g, %.17g) N, so the host would not notice that its contact is broken; let the NaN through, or return DFM_DISCARD", input.name,
                spoilt.out_ft[kBad], spoilt.out_ft[S + kBad]);
     }

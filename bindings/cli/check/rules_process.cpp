@@ -25,6 +25,10 @@
 #define DEFORM_SANITIZED 0
 #endif
 
+#if DEFORM_SANITIZED
+#include <sanitizer/allocator_interface.h>
+#endif
+
 namespace cli::check {
 namespace {
 
@@ -40,6 +44,17 @@ void vary(Lanes &b, Random &random, double scale) {
 }  // namespace
 
 // ---- V05 ---------------------------------------------------------------------------------------------------------------------------
+
+namespace {
+
+// As its author wrote it.
+std::string spelt(const std::string &name) {
+  if (name.rfind("_Zn", 0) == 0) return "operator new";
+  if (name.rfind("_Zd", 0) == 0) return "operator delete";
+  return name == "__cxa_allocate_exception" ? "throw" : name;
+}
+
+}  // namespace
 
 std::string eval_keeps_to_itself(const Subject &subject) {
   const Law law(subject, lively_params(subject));
@@ -59,7 +74,7 @@ std::string eval_keeps_to_itself(const Subject &subject) {
         subject.plugin->host().give_back_scratch();
         if (name)
           broken("eval calls %s: it runs in every pass of every step from many threads, where this costs time or stops the world; take memory from dfm_host.scratch, make tables in prepare, and "
-                 "leave files and the environment to the host", name);
+                 "leave files and the environment to the host", spelt(name).c_str());
         ++calls;
       }
   return text("%u calls, %zu entries watched", calls, watch.entries());
@@ -193,7 +208,11 @@ std::string stays_in_its_arrays(const Subject &subject) {
 
 namespace {
 
-long heap_in_use() { return DEFORM_SANITIZED ? 0 : static_cast<long>(mallinfo2().uordblks + mallinfo2().hblkhd); }
+#if DEFORM_SANITIZED
+long heap_in_use() { return static_cast<long>(__sanitizer_get_current_allocated_bytes()); }
+#else
+long heap_in_use() { return static_cast<long>(mallinfo2().uordblks + mallinfo2().hblkhd); }
+#endif
 
 long pages_mapped() {
   long pages = 0;
