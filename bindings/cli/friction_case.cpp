@@ -64,6 +64,7 @@ class CaseReader {
     for (const std::string &key : form.needed) c.input[key] = needed(key);
     for (const std::string &key : form.optional) c.input[key] = input_->find(key) ? number_at(*input_->find(key), "/input/" + key) : 0.0;
     if (c.drive == Drive::circle && !(c.input["R"] > 0)) refuse("/input/R", "is not above 0; expected the radius of the circle in m");
+    if (c.drive == Drive::spring && !(c.input["k"] >= 0)) refuse("/input/k", "is negative; expected the stiffness of the spring in N/m");
     read_initial(c);
     if (c.drive == Drive::path) read_path(c);
     else if (c.drive == Drive::ramps) c.times = numbers_at(input("rates", "a list of force rates in N/s"), "/input/rates");

@@ -47,7 +47,8 @@ class Filler {
     if (const dfm_param *row = row_of(type_, "v_s"); row && !given("v_s")) put("v_s", {row->min});
     for (const char *key : {"mu_C", "sigma0"})
       if (shipped(type_) && row_of(type_, key) && !given(key) && !given("mu"))
-        throw Failure(kBadInput, rig_.file + ": /params gives the law " + type_.id + " no " + (key == std::string("mu_C") ? "friction level, expected F_C, mu_C or mu" : "bristle stiffness, expected sigma0 or sigma"));
+        throw Failure(kBadInput, rig_.file + ": /params gives the law " + type_.id + " no " +
+                                     (key == std::string("mu_C") ? "friction level, expected F_C, mu_C or mu" : "bristle stiffness, expected sigma0 or sigma"));
   }
 
   const std::vector<std::string> &used() const { return used_; }
@@ -72,7 +73,8 @@ class Filler {
     if (found == names.end()) {
       std::string all;
       for (const std::string &n : names) all += (all.empty() ? "" : ", ") + n;
-      throw Failure(kBadInput, rig_.file + ": /params/" + p.key + " is \"" + p.word + "\", expected " + (all.empty() ? "a number" : "one of " + all) + " for " + type_.id);
+      throw Failure(kBadInput, rig_.file + ": /params/" + p.key + " is \"" + p.word + "\", expected " + (all.empty() ? "a number" : "one of " + all) +
+                                   " for " + type_.id);
     }
     put(row.key, {double(found - names.begin())});
   }
@@ -232,7 +234,9 @@ namespace {
 
 class StepSolver {
  public:
-  StepSolver(RigLaw &law, const Slip &slip, double m_h, double drive) : law_(law), slip_(slip), m_h_(m_h), drive_(drive) { slip_.stop_x = -drive, slip_.stop_y = 0; }
+  StepSolver(RigLaw &law, const Slip &slip, double m_h, double drive) : law_(law), slip_(slip), m_h_(m_h), drive_(drive) {
+    slip_.stop_x = -drive, slip_.stop_y = 0;
+  }
 
   StepResult solve(double v) {
     Point a = at(v);

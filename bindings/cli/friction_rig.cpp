@@ -168,7 +168,8 @@ class Rig {
         std::string all;
         for (const std::string &k : known) all += (all.empty() ? "" : " ") + k;
         const std::string near = nearest(name, known);
-        throw Failure(kBadInput, case_.file + ": /columns names \"" + name + "\", expected some of " + all + (near.empty() ? "" : "; did you mean \"" + near + "\"?"));
+        throw Failure(kBadInput, case_.file + ": /columns names \"" + name + "\", expected some of " + all +
+                                     (near.empty() ? "" : "; did you mean \"" + near + "\"?"));
       }
   }
 
@@ -181,6 +182,10 @@ class Rig {
   void figure(const std::string &name, double value) { out_.figures.push_back({name, {value}}); }
 
   // ---- the runs ----
+
+  void refuse_too_many(double steps) const {
+    if (steps > kMostSteps) throw Failure(kBadInput, "--step " + short_text(step_) + " s means " + short_text(steps) + " steps, expected 2e9 at most");
+  }
 
   void restart() {
     law_.reset(case_);
@@ -196,7 +201,7 @@ class Rig {
     check_columns();
     restart();
     const double end = case_.times.back();
-    if (end / step_ > kMostSteps) throw Failure(kBadInput, "--step " + short_text(step_) + " s means " + short_text(end / step_) + " steps, expected 2e9 at most");
+    refuse_too_many(end / step_);
     const bool turns = case_.drive == Drive::circle || case_.drive == Drive::turn;
     const auto force_now = [&] { return (turns ? std::hypot(fx_, fy_) : fx_) + 0.0; };
     const auto speed_now = [&] { return std::hypot(v_.vx, v_.vy); };
@@ -255,7 +260,7 @@ class Rig {
     double length = 0, walked = 0;
     for (size_t i = 1; i < case_.path_x.size(); ++i) length += std::fabs(case_.path_x[i] - case_.path_x[i - 1]);
     const double grain = case_.path_speed * step_;
-    if (length / grain > kMostSteps) throw Failure(kBadInput, "--step " + short_text(step_) + " s means " + short_text(length / grain) + " steps along the path, expected 2e9 at most");
+    refuse_too_many(length / grain);
     for (size_t i = 0; i < case_.path_x.size(); ++i) {
       const double dx = i ? case_.path_x[i] - case_.path_x[i - 1] : 0;
       const double n = std::ceil(std::fabs(dx) / grain - 1e-6), h = n > 0 ? std::fabs(dx) / case_.path_speed / n : 0;

@@ -43,16 +43,22 @@ struct Block {
   double m[kLanes], mx[kLanes], my[kLanes], mn[kLanes];   // plastic rate and its total derivatives by v and fn
 };
 
-// Where the columns of eight contacts lie. An output that is not wanted points to a spare column.
+// Where the columns of eight contacts go; one that is not wanted goes to a place of its own, so that no two overlap.
+enum Column { kFx, kFy, kZx, kZy, kXx, kXy, kYx, kYy, kNx, kNy, kLimit, kStored, kColumns };
 struct Columns {
-  double *fx, *fy, *zx, *zy, *xx, *xy, *yx, *yy, *nx, *ny, *limit, *stored;
-  uint8_t *mode;
+  double *to[kColumns], spare[kColumns][kLanes];
+  Columns(dfm_friction_out *out, size_t stride, size_t at) {
+    double *const base[kColumns] = {out->ft, out->ft, out->state, out->state, out->dft_dvt, out->dft_dvt, out->dft_dvt, out->dft_dvt, out->dft_dfn, out->dft_dfn, out->limit, out->stored};
+    constexpr uint32_t column[kColumns] = {0, 1, 0, 1, 0, 1, 2, 3, 0, 1, 0, 0};
+    for (uint32_t c = 0; c < kColumns; ++c) to[c] = base[c] ? base[c] + column[c] * stride + at : spare[c];
+  }
 };
 
 inline void load(const Batch &p, const dfm_friction_in *in, size_t at, Block &b) {
   const size_t stride = in->stride;
-  const double *fn = in->fn + at, *vx = in->vt + at, *vy = vx + stride, *zx = in->state + at, *zy = zx + stride, *area = in->area + at;
-  double cuts = 0, size2[kLanes];
+  const double *const fn = in->fn + at, *const vx = in->vt + at, *const vy = vx + stride, *const zx = in->state + at, *const zy = zx + stride;
+  const double *const area = in->area + at;
+  double cuts = 0, size2[kLanes], over[kLanes];
   for (uint32_t i = 0; i < kLanes; ++i) {
     // 0 where every input is finite, NaN otherwise: no output of a bad lane passes for a good one.
     b.poison[i] = ((0.0 * fn[i] + 0.0 * vx[i]) + (0.0 * vy[i] + 0.0 * zx[i])) + (0.0 * zy[i] + 0.0 * area[i]);
@@ -67,11 +73,12 @@ inline void load(const Batch &p, const dfm_friction_in *in, size_t at, Block &b)
     b.zx[i] = keeps * within(zx[i], kFar), b.zy[i] = keeps * within(zy[i], kFar), b.cut[i] = 0.0;
     const double px = b.k0[i] * b.zx[i], py = b.k0[i] * b.zy[i], cone = p.mu_s * b.fn[i];
     size2[i] = px * px + py * py;
-    cuts += size2[i] > cone * cone ? 1.0 : 0.0;
+    over[i] = size2[i] > cone * cone ? 1.0 : 0.0;
   }
+  for (uint32_t i = 0; i < kLanes; ++i) cuts += over[i];
   if (!(cuts > 0)) return;
   for (uint32_t i = 0; i < kLanes; ++i) {
-    const double cone = p.mu_s * b.fn[i], outside = size2[i] > cone * cone ? 1.0 : 0.0;
+    const double cone = p.mu_s * b.fn[i], outside = over[i];
     const double inverse = 1.0 / std::sqrt(outside > 0 ? size2[i] : 1.0), scale = outside > 0 ? cone * inverse : 1.0;
     b.zx[i] *= scale, b.zy[i] *= scale;
     b.cut[i] = outside / (b.fn[i] > 0 ? b.fn[i] : kMost);
@@ -116,17 +123,18 @@ inline void damping(const Batch &p, const Block &b, double *k1, double *slope, d
   }
 }
 
-template <bool kDamped>
-void answer(const Batch &p, const Block &b, const double *k1, const double *k1_slope, const double *k1_fn, const Columns &to) {
-  double mode[kLanes];
+template <bool kDamped, bool kFlat>
+void answer(const Batch &p, const Block &b, const double *k1, const double *k1_slope, const double *k1_fn, double *__restrict ofx, double *__restrict ofy,
+            double *__restrict ozx, double *__restrict ozy, double *__restrict oxx, double *__restrict oxy, double *__restrict oyx, double *__restrict oyy,
+            double *__restrict onx, double *__restrict ony, double *__restrict olimit, double *__restrict ostored, double *__restrict mode) {
   for (uint32_t i = 0; i < kLanes; ++i) {
     const double k0 = b.k0[i], hk = p.h * k0, g = b.g[i], m = b.m[i], vx = b.vx[i], vy = b.vy[i], z0x = b.zx[i], z0y = b.zy[i];
     const double sum = g + hk * m, divisor = sum > kLeast * 1e-10 ? sum : kLeast * 1e-10, poison = b.poison[i];
     const double q = g / divisor, inverse = 1.0 / divisor;   // q itself: at rest it is 1 to the bit, and a bristle that holds does not fade
     const double tx = z0x + p.h * vx, ty = z0y + p.h * vy, zx = tx * q, zy = ty * q;
     // dm and dg times what they share
-    const double fe = m * inverse * b.fall[i] * b.by_w[i];
-    const double gx = q * b.mx[i] - fe * b.ex[i], gy = q * b.my[i] - fe * b.ey[i];
+    const double fe = kFlat ? 0.0 : m * inverse * b.fall[i] * b.by_w[i];
+    const double gx = kFlat ? q * b.mx[i] : q * b.mx[i] - fe * b.ex[i], gy = kFlat ? q * b.my[i] : q * b.my[i] - fe * b.ey[i];
     const double cx = k0 * inverse * tx, cy = k0 * inverse * ty;
     const double xx = q - cx * gx, xy = -(cx * gy), yx = -(cy * gx), yy = q - cy * gy;   // (dz'/dv)/h = d(dz/dt)/dv
     const double pn = m * b.mu[i] * inverse - q * b.mn[i], ox = b.cut[i] * z0x, oy = b.cut[i] * z0y, fade = k0 * m * inverse;
@@ -144,13 +152,12 @@ void answer(const Batch &p, const Block &b, const double *k1, const double *k1_s
     }
     const double trial2 = (k0 * tx) * (k0 * tx) + (k0 * ty) * (k0 * ty), touches = b.fn[i] > 0 ? 1.0 : 0.0;
     mode[i] = touches + (trial2 > g * g ? touches : 0.0);
-    to.fx[i] = poison - fx, to.fy[i] = poison - fy, to.zx[i] = zx + poison, to.zy[i] = zy + poison;
-    to.xx[i] = poison - dxx, to.xy[i] = poison - dxy, to.yx[i] = poison - dyx, to.yy[i] = poison - dyy;
-    to.nx[i] = poison - fnx, to.ny[i] = poison - fny;
-    to.limit[i] = most + poison;
-    to.stored[i] = 0.5 * (k0 * zx * zx + k0 * zy * zy) + poison;
+    ofx[i] = poison - fx, ofy[i] = poison - fy, ozx[i] = zx + poison, ozy[i] = zy + poison;
+    oxx[i] = poison - dxx, oxy[i] = poison - dxy, oyx[i] = poison - dyx, oyy[i] = poison - dyy;
+    onx[i] = poison - fnx, ony[i] = poison - fny;
+    olimit[i] = most + poison;
+    ostored[i] = 0.5 * (k0 * zx * zx + k0 * zy * zy) + poison;
   }
-  for (uint32_t i = 0; to.mode && i < kLanes; ++i) to.mode[i] = static_cast<uint8_t>(mode[i]);
 }
 
 // Law::batch(params) and Law::flow(params, batch, block), which fills m and its derivatives, are all that a law of the family says.
@@ -159,13 +166,10 @@ struct Run {
   static dfm_status run(const dfm_friction_in *in, dfm_friction_out *out) {
     Batch p = Law::batch(in->params);
     p.h = in->dt;
-    const size_t stride = in->stride;
-    double spare[kLanes];
     for (size_t at = 0; at < in->n; at += kLanes) {  // lanes up to n rounded to 8 may be touched
-      const auto to = [&](double *column, size_t c) { return column ? column + c * stride + at : spare; };
-      const Columns columns = {to(out->ft, 0),      to(out->ft, 1),      to(out->state, 0),   to(out->state, 1),   to(out->dft_dvt, 0),
-                               to(out->dft_dvt, 1), to(out->dft_dvt, 2), to(out->dft_dvt, 3), to(out->dft_dfn, 0), to(out->dft_dfn, 1),
-                               to(out->limit, 0),   to(out->stored, 0),  out->mode ? out->mode + at : nullptr};
+      const Columns columns(out, in->stride, at);
+      double *const *const to = columns.to;
+      double mode[kLanes];
       Block b;
       load(p, in, at, b);
       level(p, b);
@@ -173,10 +177,13 @@ struct Run {
       if (p.sigma1 > 0) {
         double k1[kLanes], slope[kLanes], by_fn[kLanes];
         damping(p, b, k1, slope, by_fn);
-        answer<true>(p, b, k1, slope, by_fn, columns);
+        answer<true, false>(p, b, k1, slope, by_fn, to[kFx], to[kFy], to[kZx], to[kZy], to[kXx], to[kXy], to[kYx], to[kYy], to[kNx], to[kNy], to[kLimit], to[kStored], mode);
+      } else if (Law::kFlat) {
+        answer<false, true>(p, b, nullptr, nullptr, nullptr, to[kFx], to[kFy], to[kZx], to[kZy], to[kXx], to[kXy], to[kYx], to[kYy], to[kNx], to[kNy], to[kLimit], to[kStored], mode);
       } else {
-        answer<false>(p, b, nullptr, nullptr, nullptr, columns);
+        answer<false, false>(p, b, nullptr, nullptr, nullptr, to[kFx], to[kFy], to[kZx], to[kZy], to[kXx], to[kXy], to[kYx], to[kYy], to[kNx], to[kNy], to[kLimit], to[kStored], mode);
       }
+      for (uint32_t i = 0; out->mode && i < kLanes; ++i) out->mode[at + i] = static_cast<uint8_t>(mode[i]);
     }
     return DFM_OK;
   }

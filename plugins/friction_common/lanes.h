@@ -13,23 +13,39 @@ namespace lanes {
 
 constexpr uint32_t kLanes = 8;
 
+enum Width { kNarrow, kAvx2, kAvx512 };
+
 #if defined(__x86_64__) && defined(__GNUC__)
-#define DEFORM_WIDE __attribute__((target("avx2"), flatten))
-#define DEFORM_NARROW __attribute__((flatten))
-inline bool wide() { return __builtin_cpu_supports("avx2"); }
+#ifdef __clang__
+#define DEFORM_AVX512 __attribute__((target("avx512f,avx512vl,avx512dq"), flatten))
 #else
-#define DEFORM_WIDE
+#define DEFORM_AVX512 __attribute__((target("avx512f,avx512vl,avx512dq,prefer-vector-width=512"), flatten))
+#endif
+#define DEFORM_AVX2 __attribute__((target("avx2"), flatten))
+#define DEFORM_NARROW __attribute__((flatten))
+inline Width widest() {
+  if (__builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512vl") && __builtin_cpu_supports("avx512dq")) return kAvx512;
+  return __builtin_cpu_supports("avx2") ? kAvx2 : kNarrow;
+}
+#else
+#define DEFORM_AVX512
+#define DEFORM_AVX2
 #define DEFORM_NARROW
-inline bool wide() { return false; }
+inline Width widest() { return kNarrow; }
 #endif
 
-// Law::run(in, out) compiled twice; the processor chooses. Everything it calls is drawn into the two bodies.
+// Law::run(in, out) compiled once per width, everything it calls drawn in; the processor chooses.
 template <class Law>
-DEFORM_WIDE dfm_status eval_wide(const dfm_friction_in *in, dfm_friction_out *out) { return Law::run(in, out); }
+DEFORM_AVX512 dfm_status eval_avx512(const dfm_friction_in *in, dfm_friction_out *out) { return Law::run(in, out); }
+template <class Law>
+DEFORM_AVX2 dfm_status eval_avx2(const dfm_friction_in *in, dfm_friction_out *out) { return Law::run(in, out); }
 template <class Law>
 DEFORM_NARROW dfm_status eval_narrow(const dfm_friction_in *in, dfm_friction_out *out) { return Law::run(in, out); }
 template <class Law>
-dfm_status eval(const dfm_friction_in *in, dfm_friction_out *out) { return wide() ? eval_wide<Law>(in, out) : eval_narrow<Law>(in, out); }
+dfm_status eval(const dfm_friction_in *in, dfm_friction_out *out) {
+  const Width w = widest();
+  return w == kAvx512 ? eval_avx512<Law>(in, out) : w == kAvx2 ? eval_avx2<Law>(in, out) : eval_narrow<Law>(in, out);
+}
 
 // A NaN becomes `most`: what a lane computes stays finite, and its outputs are spoilt at the end by what came in.
 inline double within(double x, double most) {

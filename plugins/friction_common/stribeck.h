@@ -10,10 +10,7 @@
 //   dft/dv = -[F' v^v^T + (F/w) (1 - v^v^T)],  F = g + sigma2 A w,  F' = g' + sigma2 A,  dft/dfn = -(g/fn) v^
 // A lane with a NaN or an infinite input gives NaN in that lane alone. Each lane runs the same operations at every vector width.
 #pragma once
-#include <cmath>
-#include <cstdio>
-
-#include "deform/plugin.hpp"
+#include "curve.h"
 
 namespace stribeck {
 
@@ -26,14 +23,14 @@ constexpr dfm_param kRows[kShared] = {
     dfm::plugin::param("sigma2", "viscous friction per area", "N s/m^3", 0, 1e12, 0, DFM_PARAM_RUNTIME),
 };
 
-constexpr uint32_t kLanes = 8;
+using lanes::kLanes;
 constexpr double kTiny = 1e-280, kHuge = 1e280;  // squares beyond these have lost digits or are about to
 constexpr double kRest = 1e-100;                 // m/s; below it 1/w is held constant, so that no derivative is infinite
 
 // kinetic_stop: what slides already is stopped by g(w) + sigma2 A w alone (Karnopp), not by F_S.
 struct Batch { double mu_c, mu_s, v_s, delta, sigma2, band; bool kinetic_stop; };
 
-// Eight contacts: where their columns lie. An output that is not wanted points to a spare column.
+// Eight contacts: where their columns lie. An output that is not wanted goes to a place of its own, so that no two overlap.
 struct Block {
   const double *fn, *vx, *vy, *sx, *sy, *area;
   double *fx, *fy, *limit, *xx, *xy, *yx, *yy, *nx, *ny;
@@ -83,6 +80,7 @@ template <bool kKineticStop>
 bool decide(const Batch &p, const Block &b, Passes &t) {
   double slips = 0;
   const double band2 = p.band * p.band;
+  double slip_of[kLanes];
   for (uint32_t i = 0; i < kLanes; ++i) {
     const double stiction = p.mu_s * b.fn[i], s2 = b.sx[i] * b.sx[i] + b.sy[i] * b.sy[i], f2 = stiction * stiction;
     const double v2 = b.vx[i] * b.vx[i] + b.vy[i] * b.vy[i];
@@ -96,31 +94,15 @@ bool decide(const Batch &p, const Block &b, Passes &t) {
     t.w[i] = std::sqrt(slip > 0 ? v2 : 1.0);
     t.inverse[i] = 1.0 / t.w[i];
     t.excess[i] = t.slope[i] = 0.0;
-    slips += slip;
+    slip_of[i] = slip;
   }
+  for (uint32_t i = 0; i < kLanes; ++i) slips += slip_of[i];
   return slips > 0;
 }
 
-inline void stribeck(const Batch &p, Passes &t) {
-  double a[kLanes], e[kLanes];
-  const double inverse = 1.0 / p.v_s;
-  if (p.delta == 2.0) {
-    for (uint32_t i = 0; i < kLanes; ++i) {
-      const double x = t.w[i] * inverse;
-      a[i] = x * x;
-    }
-  } else {
-    for (uint32_t i = 0; i < kLanes; ++i) a[i] = t.mode[i] > 1 ? dfm_pow(t.w[i] * inverse, p.delta) : 0.0;
-  }
-  for (uint32_t i = 0; i < kLanes; ++i) e[i] = dfm_exp(-a[i]);
-  for (uint32_t i = 0; i < kLanes; ++i) {
-    t.excess[i] = e[i];
-    t.slope[i] = e[i] > 0 ? -p.delta * a[i] * e[i] : 0.0;  // a may be infinite where e has vanished
-  }
-}
-
 template <bool kKineticStop>
-void answer(const Batch &p, const Block &b, Passes &t) {
+void answer(const Batch &p, const Block &b, Passes &t, double *__restrict ofx, double *__restrict ofy, double *__restrict olimit, double *__restrict oxx,
+            double *__restrict oxy, double *__restrict oyx, double *__restrict oyy, double *__restrict onx, double *__restrict ony) {
   for (uint32_t i = 0; i < kLanes; ++i) {
     const double fn = b.fn[i], drag = p.sigma2 * b.area[i], vx = b.vx[i], vy = b.vy[i], sx = b.sx[i], sy = b.sy[i];
     // 0 where every input is finite, NaN otherwise: no output of a bad lane passes for a good one.
@@ -131,40 +113,46 @@ void answer(const Batch &p, const Block &b, Passes &t) {
     const bool moves = t.mode[i] > 1, stops = kKineticStop && moves && sx * sx + sy * sy <= level * level;
     const bool slip = moves && !stops, stick = t.mode[i] > 0;
     const double disc = stops ? level : p.mu_s * fn, fs = stick ? disc : 0.0, fx = stick ? sx : 0.0, fy = stick ? sy : 0.0, xy = slip ? -(d * dx * dy) : 0.0;
-    b.fx[i] = (slip ? level * dx : fx) + poison;
-    b.fy[i] = (slip ? level * dy : fy) + poison;
-    b.limit[i] = (slip ? level : fs) + poison;
-    b.nx[i] = (slip ? mu * dx : 0.0) + poison;
-    b.ny[i] = (slip ? mu * dy : 0.0) + poison;
-    b.xx[i] = (slip ? -(across + d * dx * dx) : 0.0) + poison;
-    b.xy[i] = xy + poison;
-    b.yx[i] = xy + poison;
-    b.yy[i] = (slip ? -(across + d * dy * dy) : 0.0) + poison;
+    ofx[i] = (slip ? level * dx : fx) + poison;
+    ofy[i] = (slip ? level * dy : fy) + poison;
+    olimit[i] = (slip ? level : fs) + poison;
+    onx[i] = (slip ? mu * dx : 0.0) + poison;
+    ony[i] = (slip ? mu * dy : 0.0) + poison;
+    oxx[i] = (slip ? -(across + d * dx * dx) : 0.0) + poison;
+    oxy[i] = xy + poison;
+    oyx[i] = xy + poison;
+    oyy[i] = (slip ? -(across + d * dy * dy) : 0.0) + poison;
     if (kKineticStop) t.mode[i] -= stops ? 1.0 : 0.0;
   }
 }
 
-template <bool kKineticStop>
-dfm_status eval(const dfm_friction_in *in, dfm_friction_out *out, double band = 0) {
-  const Batch p = {in->params[kMuC], in->params[kMuS], in->params[kVs], in->params[kDelta], in->params[kSigma2], band, kKineticStop};
-  const size_t stride = in->stride;
-  double spare[kLanes];
-  for (size_t at = 0; at < in->n; at += kLanes) {  // lanes up to n rounded to 8 may be touched
-    const auto to = [&](double *column, size_t c) { return column ? column + c * stride + at : spare; };
-    const Block b = {in->fn + at, in->vt + at, in->vt + stride + at, in->ft_stop + at, in->ft_stop + stride + at, in->area + at,
-                     to(out->ft, 0), to(out->ft, 1), to(out->limit, 0), to(out->dft_dvt, 0), to(out->dft_dvt, 1), to(out->dft_dvt, 2),
-                     to(out->dft_dvt, 3), to(out->dft_dfn, 0), to(out->dft_dfn, 1)};
-    Passes t;
-    const bool slips = decide<kKineticStop>(p, b, t);
-    if (slips && p.mu_s != p.mu_c) stribeck(p, t);
-    answer<kKineticStop>(p, b, t);
-    for (uint32_t i = 0; i < kLanes; ++i)
-      if (t.odd[i] > 0) odd_lane(p, b, t, i);
-    for (uint32_t i = 0; out->mode && i < kLanes; ++i) out->mode[at + i] = static_cast<uint8_t>(t.mode[i]);
-    for (uint32_t i = 0; out->stored && i < kLanes; ++i) out->stored[at + i] = 0;
+// Law::kKineticStop, and Law::band(params), which begins to matter where it is above zero.
+template <class Law>
+struct Run {
+  static dfm_status run(const dfm_friction_in *in, dfm_friction_out *out) {
+    const double *const v = in->params;
+    const Batch p = {v[kMuC], v[kMuS], v[kVs], v[kDelta], v[kSigma2], Law::band(v), Law::kKineticStop};
+    const size_t stride = in->stride;
+    double spare[9][kLanes];
+    for (size_t at = 0; at < in->n; at += kLanes) {  // lanes up to n rounded to 8 may be touched
+      const auto to = [&](double *column, size_t c, uint32_t k) { return column ? column + c * stride + at : spare[k]; };
+      const Block b = {in->fn + at, in->vt + at, in->vt + stride + at, in->ft_stop + at, in->ft_stop + stride + at, in->area + at,
+                       to(out->ft, 0, 0), to(out->ft, 1, 1), to(out->limit, 0, 2), to(out->dft_dvt, 0, 3), to(out->dft_dvt, 1, 4), to(out->dft_dvt, 2, 5),
+                       to(out->dft_dvt, 3, 6), to(out->dft_dfn, 0, 7), to(out->dft_dfn, 1, 8)};
+      Passes t;
+      const bool slips = decide<Law::kKineticStop>(p, b, t);
+      if (slips && p.mu_s != p.mu_c) lanes::curve(p.v_s, p.delta, t.w, t.excess, t.slope);
+      answer<Law::kKineticStop>(p, b, t, b.fx, b.fy, b.limit, b.xx, b.xy, b.yx, b.yy, b.nx, b.ny);
+      double odd = 0;
+      for (uint32_t i = 0; i < kLanes; ++i) odd += t.odd[i];
+      for (uint32_t i = 0; odd > 0 && i < kLanes; ++i)
+        if (t.odd[i] > 0) odd_lane(p, b, t, i);
+      for (uint32_t i = 0; out->mode && i < kLanes; ++i) out->mode[at + i] = static_cast<uint8_t>(t.mode[i]);
+      for (uint32_t i = 0; out->stored && i < kLanes; ++i) out->stored[at + i] = 0;
+    }
+    return DFM_OK;
   }
-  return DFM_OK;
-}
+};
 
 inline dfm_status check(const double *p, char *why, size_t cap) {
   if (p[kMuS] >= p[kMuC]) return DFM_OK;

@@ -5,9 +5,12 @@
 
 namespace {
 
-dfm_status eval(const dfm_friction_in *in, dfm_friction_out *out) { return stribeck::eval<false>(in, out, 0); }
+struct Coulomb : stribeck::Run<Coulomb> {
+  static constexpr bool kKineticStop = false;
+  static double band(const double *) { return 0; }
+};
 
-const dfm_friction law = dfm::plugin::friction(stribeck::kNeeds, stribeck::kFlags, eval, stribeck::check);
+const dfm_friction law = dfm::plugin::friction(stribeck::kNeeds, stribeck::kFlags, lanes::eval<Coulomb>, stribeck::check);
 const char *const effects[] = {"stiction", "stribeck", "viscous", nullptr};
 const dfm_type coulomb = dfm::plugin::type(DFM_KIND_FRICTION, "org.deform.coulomb", "Coulomb friction with stiction, Stribeck effect and viscous part",
                                            "0.1.0", "MIT", "Zerbato 2010, (5.1)-(5.6) corrected: set-valued at rest, odd in v",

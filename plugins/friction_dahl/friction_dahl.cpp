@@ -74,6 +74,7 @@ struct Dahl : bristle::Run<Dahl> {
   static constexpr decltype(dfm_friction::prepare) prepare = nullptr;
   static constexpr decltype(dfm_friction::release) release = nullptr;
 
+  static constexpr bool kFlat = true;
   static void flow(const double *params, const bristle::Batch &p, bristle::Block &b) {
     bristle::all_slips(p, b);
     if (params[kAlpha] == 1.0) return;

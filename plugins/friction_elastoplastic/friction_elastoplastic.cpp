@@ -33,18 +33,20 @@ struct Return { double tx[kLanes], ty[kLanes], by_r[kLanes], load[kLanes], mult[
 // f and its slopes by rho and lambda; left = 1 - f.
 struct Yield { double f, left, slope, by_lambda; };
 
+// kPlain: i = 1, where nothing loops and eight lanes stay in vectors.
+template <bool kPlain>
 inline Yield yield(double rho, double lambda, int i) {
   const double width = 1.0 / (1.0 - lambda), u = (rho - lambda) * width, half = 0.5 * (u > 0 ? (u < 1 ? u : 1.0) : 0.0);
   double s, c;
   dfm_sincospi_(half, &s, &c);
   const double inside = u > 0 && u < 1 ? 0x1.921fb54442d18p+1 : 0.0, alpha = u < 1 ? s * s : 1.0, by_u = inside * s * c, q = 1.0 - alpha * rho;
   double power = 1.0;
-  for (int k = 1; k < i; ++k) power *= std::fabs(q);
-  const double steep = i * power, bend = steep * rho * by_u * width, left = q * power;
+  for (int k = 1; !kPlain && k < i; ++k) power *= std::fabs(q);
+  const double steep = kPlain ? 1.0 : i * power, bend = steep * rho * by_u * width, left = q * power;
   // 1 - q^i = (1 - q)(1 + q + ...): no difference where little yields
   double sum = 1.0, term = 1.0;
-  for (int k = 1; k < i; ++k) term *= q, sum += term;
-  const double f = q >= 0 ? alpha * rho * sum : 1.0 - left;
+  for (int k = 1; !kPlain && k < i; ++k) term *= q, sum += term;
+  const double f = kPlain ? alpha * rho : q >= 0 ? alpha * rho * sum : 1.0 - left;
   return {f, left, steep * alpha + bend, -bend * (1.0 - u)};
 }
 
@@ -66,40 +68,43 @@ inline void trial(const bristle::Batch &p, const Block &b, double kappa, int mul
   }
 }
 
-inline void solve(Return &t, int i) {
+template <bool kPlain>
+void solve(Return &t, int i) {
   double low[kLanes], high[kLanes], active[kLanes], flows = 0;
   for (uint32_t k = 0; k < kLanes; ++k) {
     const double lambda = t.lambda[k], elastic = t.top[k] < lambda ? t.top[k] : lambda, full = t.top[k] / (1.0 + t.p[k]);
     low[k] = elastic, high[k] = full < 1.0 && t.top[k] > 1.0 ? 1.0 : t.top[k];
-    const double middle = lambda + 0.6 * (1.0 - lambda), start = t.p[k] < 0.3 || full >= 1.0 ? (full >= 1.0 ? full : high[k]) : middle;
+    // f <= rho where i = 1, so the root lies above full, which it meets at the level; else from above for a short step, from the steepest part for a long one
+    const double middle = lambda + 0.6 * (1.0 - lambda), start = full >= 1.0 ? full : t.p[k] < 0.3 ? high[k] : full > middle ? full : middle;
     t.rho[k] = start > low[k] ? (start < high[k] ? start : high[k]) : low[k];
     active[k] = t.top[k] > lambda && t.p[k] > 0 ? 1.0 : 0.0;
     t.rho[k] = active[k] > 0 ? t.rho[k] : t.top[k];
-    flows += active[k];
   }
+  for (uint32_t k = 0; k < kLanes; ++k) flows += active[k];
   for (int pass = 0; pass < 100 && flows > 0; ++pass) {
     flows = 0;
     for (uint32_t k = 0; k < kLanes; ++k) {
       const double rho = t.rho[k];
-      const Yield y = yield(rho, t.lambda[k], i);
+      const Yield y = yield<kPlain>(rho, t.lambda[k], i);
       const double far = (rho - t.rest[k]) - t.p[k] * y.left, near = (rho - t.top[k]) + t.p[k] * y.f, excess = y.f > 0.5 ? far : near;
       const double up = excess > 0 ? rho : high[k], down = excess > 0 ? low[k] : rho, next = rho - excess / (1.0 + t.p[k] * y.slope);
       const double to = next >= down && next <= up ? next : 0.5 * (down + up), moved = std::fabs(to - rho);
       high[k] = active[k] > 0 ? up : high[k], low[k] = active[k] > 0 ? down : low[k];
       t.rho[k] = active[k] > 0 ? to : rho;
       active[k] = moved > 4e-16 * rho ? active[k] : 0.0;
-      flows += active[k];
     }
+    for (uint32_t k = 0; k < kLanes; ++k) flows += active[k];
   }
 }
 
 // m and its derivatives:  m = (M/rho) f,  dm = (f/rho) dM + (M/rho) [(f' - f/rho) drho + f_lambda dlambda].
-inline void rates(const bristle::Batch &p, int i, int multiplier, const Return &t, Block &b) {
+template <bool kPlain>
+void rates(const bristle::Batch &p, int i, int multiplier, const Return &t, Block &b) {
   for (uint32_t k = 0; k < kLanes; ++k) {
-    const bool plastic = b.g[k] > 1e-30 * b.fn[k];
-    const double level = plastic ? b.g[k] : 1.0, by_level = 1.0 / level, hk = p.h * b.k0[k] * by_level, rho = t.rho[k];
+    const double plastic = b.g[k] > 1e-30 * b.fn[k] ? 1.0 : 0.0;
+    const double level = plastic > 0 ? b.g[k] : 1.0, by_level = 1.0 / level, hk = p.h * b.k0[k] * by_level, rho = t.rho[k];
     const double by_rho = 1.0 / (rho > 1e-100 ? rho : 1e-100), mult = t.mult[k], load = t.load[k], tx = t.tx[k], ty = t.ty[k];
-    const Yield y = yield(rho, t.lambda[k], i);
+    const Yield y = yield<kPlain>(rho, t.lambda[k], i);
     // dM: of t.v, and of w where the multiplier is the cosine
     const double turn = p.h * t.by_r[k], lx = tx + turn * (b.vx[k] - load * tx), ly = ty + turn * (b.vy[k] - load * ty);
     const double ox = b.cut[k] * b.zx[k], oy = b.cut[k] * b.zy[k], along = tx * ox + ty * oy;
@@ -111,21 +116,27 @@ inline void rates(const bristle::Batch &p, int i, int multiplier, const Return &
     const double rx = by_sum * (hk * (tx - y.f * dx) + (pl - rho) * fx), ry = by_sum * (hk * (ty - y.f * dy) + (pl - rho) * fy);
     const double rn = by_sum * (b.k0[k] * by_level * along - hk * y.f * dn - rho * b.mu[k] * by_level);
     const double e = y.f * by_rho, share = mult * by_rho, bend = share * (y.slope - e), part = -share * y.by_lambda * lambda;
-    b.m[k] = plastic ? mult * e : b.w[k];
-    b.mx[k] = plastic ? e * dx + bend * rx + part * fx : b.ex[k];
-    b.my[k] = plastic ? e * dy + bend * ry + part * fy : b.ey[k];
-    b.mn[k] = plastic ? e * dn + bend * rn : 0.0;
+    b.m[k] = plastic > 0 ? mult * e : b.w[k];
+    b.mx[k] = plastic > 0 ? e * dx + bend * rx + part * fx : b.ex[k];
+    b.my[k] = plastic > 0 ? e * dy + bend * ry + part * fy : b.ey[k];
+    b.mn[k] = plastic > 0 ? e * dn + bend * rn : 0.0;
   }
 }
 
 struct Elastoplastic : bristle::Run<Elastoplastic> {
   static bristle::Batch batch(const double *p) { return lugre::batch(p); }
+  static constexpr bool kFlat = false;
   static void flow(const double *params, const bristle::Batch &p, Block &b) {
     const int i = static_cast<int>(params[kI]), multiplier = static_cast<int>(params[kMultiplier]);
     Return t;
     trial(p, b, params[kKappa], multiplier, t);
-    solve(t, i);
-    rates(p, i, multiplier, t, b);
+    if (i == 1) {
+      solve<true>(t, 1);
+      rates<true>(p, 1, multiplier, t, b);
+    } else {
+      solve<false>(t, i);
+      rates<false>(p, i, multiplier, t, b);
+    }
   }
   static constexpr auto check = lugre::check;
   static constexpr auto prepare = lugre::prepare;

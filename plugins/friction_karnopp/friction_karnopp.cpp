@@ -12,9 +12,12 @@ const dfm_param rows[] = {
     dfm::plugin::param("dv", "speed below which the contact counts as at rest", "m/s", 1e-12, 10, 1e-3, DFM_PARAM_RUNTIME | DFM_PARAM_LOG_SCALE),
 };
 
-dfm_status eval(const dfm_friction_in *in, dfm_friction_out *out) { return stribeck::eval<true>(in, out, in->params[kDv]); }
+struct Karnopp : stribeck::Run<Karnopp> {
+  static constexpr bool kKineticStop = true;
+  static double band(const double *params) { return params[kDv]; }
+};
 
-const dfm_friction law = dfm::plugin::friction(stribeck::kNeeds, stribeck::kFlags, eval, stribeck::check);
+const dfm_friction law = dfm::plugin::friction(stribeck::kNeeds, stribeck::kFlags, lanes::eval<Karnopp>, stribeck::check);
 const char *const effects[] = {"stiction", "stribeck", "viscous", nullptr};
 const dfm_type karnopp = dfm::plugin::type(DFM_KIND_FRICTION, "org.deform.karnopp", "Karnopp friction: a band of rest around zero speed", "0.1.0",
                                            "MIT", "Karnopp 1985; Zerbato 2010, (5.7) corrected: |v|, saturated stick, slip set to zero in the band",

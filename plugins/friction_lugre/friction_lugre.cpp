@@ -12,6 +12,7 @@ constexpr dfm_param kRows[] = {LUGRE_ROWS};
 
 struct Lugre : bristle::Run<Lugre> {
   static bristle::Batch batch(const double *p) { return lugre::batch(p); }
+  static constexpr bool kFlat = false;
   static void flow(const double *, const bristle::Batch &p, bristle::Block &b) { bristle::all_slips(p, b); }
   static constexpr auto check = lugre::check;
   static constexpr auto prepare = lugre::prepare;

@@ -185,3 +185,22 @@ TEST(FrictionRig, SpringOfAnyStiffness_StaysBounded) {
   EXPECT_NEAR(out.rows.column("x").back(), 0.1, 2e-3);
   EXPECT_LT(out.figure("v_max"), 0.3);
 }
+
+// The table of libdeform/doc/laws/choosing.md.
+struct SideBySide { const char *law; double drift, breakaway[3], loop, period; };
+class FrictionLaws : public testing::TestWithParam<SideBySide> {};
+TEST_P(FrictionLaws, SideBySide_ShowWhatThePageSays) {
+  const SideBySide &row = GetParam();
+  const std::vector<double> x = run(example("rig_below"), {"--law", row.law}).rows.column("x");
+  EXPECT_NEAR(x[500] - x[400], row.drift, 5e-7);               // the last of five cycles
+  const std::vector<double> peak = run(example("breakaway"), {"--law", row.law}).rows.column("F_ba");
+  for (size_t k = 0; k < 3; ++k) EXPECT_NEAR(peak[k], row.breakaway[k], 6e-4);
+  const std::vector<double> f = run(example("loops"), {"--law", row.law, "--step", "1e-3"}).rows.column("F");
+  EXPECT_NEAR(f[60] - f[20], row.loop, 6e-4);                   // the same place before and after the inner loop
+  EXPECT_NEAR(run(example("pulled"), {"--law", row.law, "--step", "2e-4"}).figure("period"), row.period, 1e-3);
+}
+INSTANTIATE_TEST_SUITE_P(All, FrictionLaws,
+                         testing::Values(SideBySide{"coulomb", 0, {1.5, 1.5, 1.5}, 0, 6.512}, SideBySide{"karnopp", 0, {1.5, 1.5, 1.5}, 0, 6.517},
+                                         SideBySide{"dahl", 5.195e-5, {1, 1, 1}, -0.356, 4.443}, SideBySide{"lugre", 3.366e-5, {1.432, 1.211, 1}, -0.425, 6.362},
+                                         SideBySide{"elastoplastic", 0, {1.443, 1.310, 1}, -0.129, 6.376}, SideBySide{"gms", 0, {1.496, 1.392, 1.014}, 0, 6.555}),
+                         [](const auto &each) { return std::string(each.param.law); });

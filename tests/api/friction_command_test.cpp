@@ -102,6 +102,8 @@ TEST(FrictionCommand, BadCases_AreRefusedWithTheirPlace) {
   expect_refused({"friction", folder() + "/none.json"}, {"none.json", "No such file"});
   expect_refused({"friction", file("cut.json", push().substr(0, 90))}, {"cut.json:3:", "not JSON"});
   expect_refused({"friction", file("list.json", "[1]")}, {"list.json", "object"});
+  std::string spring = test::read_file(example("stick_slip"));
+  expect_refused({"friction", file("spring.json", spring.replace(spring.find("\"k\": "), 5, "\"k\": -"))}, {"/input/k", "negative"});
   expect_bad_case("\"input\"", "\"inputs\"", {"/input"});
   expect_bad_case("\"bias_sine_force\"", "\"bias_sin_force\"", {"/input/kind", "bias_sin_force", "did you mean \"bias_sine_force\""});
   expect_bad_case("\"bias_sine_force\"", "\"table\"", {"/input/kind", "table"});
@@ -135,7 +137,8 @@ TEST(FrictionCommand, BadUsage_IsRefused) {
 
 TEST(FrictionCommand, LoadWithoutProjection_IsRefused) {
   std::string text = test::read_file(example("load_wave"));
-  expect_refused({"friction", file("form.json", std::string(text).replace(text.find("\"F0\""), 4, "\"form\": \"Fn = F0(1+a sin)\", \"F0\""))}, {"/input", "projection"});
+  const std::string other = std::string(text).replace(text.find("\"F0\""), 4, "\"form\": \"Fn = F0(1+a sin)\", \"F0\"");
+  expect_refused({"friction", file("form.json", other)}, {"/input", "projection"});
   text.replace(text.find("\"F_elastic\""), 11, "\"cone_excess\"");
   expect_refused({"friction", file("excess.json", text)}, {"/input", "projection"});
 }
@@ -183,7 +186,8 @@ TEST(FrictionCommand, LawThatGivesNaN_StopsWithItsRows) {
   EXPECT_TRUE(has(r.err, "step 0") && has(r.err, "org.tiny.nan")) << r.err;
   EXPECT_TRUE(has(r.out, "\"stopped\"")) << r.out;
   EXPECT_EQ(test::read_file(csv), "t,x,v,F\n");
-  expect_refused({"friction", file("word.json", push("\"F_C\": 1.0, \"F_S\": 1.5", "\"where\": \"foot\"")), "--law", tiny("tiny_nan")}, {"/params/where", "foot", "dft_dvt"});
+  const std::string word = file("word.json", push("\"F_C\": 1.0, \"F_S\": 1.5", "\"where\": \"foot\""));
+  expect_refused({"friction", word, "--law", tiny("tiny_nan")}, {"/params/where", "foot", "dft_dvt"});
 }
 
 TEST(FrictionCommand, PlotWithoutMatplotlib_KeepsTheRows) {

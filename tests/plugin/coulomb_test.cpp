@@ -2,7 +2,7 @@
 #include <cstring>
 #include <random>
 
-#include "set_valued_rig.h"
+#include "law_rules.h"
 
 using tiny::Answer;
 using tiny::Batch;
@@ -92,6 +92,23 @@ TEST_F(Coulomb, SlipFromRest_GoesTheWayTheStoppingForcePoints) {
   EXPECT_NEAR(a.fx, 0.6 * 1.2, 1e-15);
   EXPECT_NEAR(a.fy, 0.8 * 1.2, 1e-15);
   for (double d : a.dv) EXPECT_EQ(d, 0);
+}
+
+TEST_F(Coulomb, RulesOfEveryLaw_AreKept) {
+  for (double delta : {2.0, 0.7}) {
+    const rules::Law l = rules::law_of(c.open(std::string(DEFORM_PLUGIN_DIR) + "/friction_coulomb.so"), {0.6, 0.9, 0.01, delta, 0.4});
+    const rules::Draw draw;
+    EXPECT_TRUE(l.set_valued);
+    rules::odd_to_the_bit(l, draw);
+    rules::turns_with_the_frame(l, draw);
+    rules::mirrored_trajectories(l, draw);
+    rules::extremes(l, 0);
+    rules::no_normal_force_is_open(l, 0);
+    rules::bad_lane_stays_in_its_lane(l, draw);
+    rules::same_alone_and_in_any_batch(l, draw);
+    rules::derivatives(l, draw, 1000, 1e-6, [](const rules::In &) { return false; });
+    EXPECT_GE(rules::worst_balance(l, 0, 300, false), 0);
+  }
 }
 
 TEST_F(Coulomb, OppositeSlip_GivesTheOppositeForceToTheBit) {

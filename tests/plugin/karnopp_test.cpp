@@ -1,7 +1,7 @@
 // The law karnopp against its closed forms, the errata's tests of (5.7) and reference histories (friction.md section 2.2).
 #include <cstring>
 
-#include "set_valued_rig.h"
+#include "law_rules.h"
 
 using tiny::Answer;
 using tiny::Batch;
@@ -76,6 +76,25 @@ TEST_F(Karnopp, FarBeyondTheBand_IsCoulombToTheBit) {
       EXPECT_EQ(a.limit, b.limit) << w;
       for (int k = 0; k < 4; ++k) EXPECT_EQ(a.dv[k], b.dv[k]) << w;
     }
+}
+
+TEST_F(Karnopp, RulesOfEveryLaw_AreKept) {
+  for (double delta : {2.0, 0.7}) {
+    const rules::Law l = rules::law_of(c.open(std::string(DEFORM_PLUGIN_DIR) + "/friction_karnopp.so"), {0.6, 0.9, 0.01, delta, 0.4, 1e-3});
+    const rules::Draw draw;
+    EXPECT_TRUE(l.set_valued);
+    rules::odd_to_the_bit(l, draw);
+    rules::turns_with_the_frame(l, draw);
+    rules::mirrored_trajectories(l, draw);
+    rules::extremes(l, 0);
+    rules::no_normal_force_is_open(l, 0);
+    rules::bad_lane_stays_in_its_lane(l, draw);
+    rules::same_alone_and_in_any_batch(l, draw);
+    rules::Law narrow = l;   // within the band the answer follows ft_stop, not the slip
+    narrow.params[5] = 1e-7;
+    rules::derivatives(narrow, draw, 1000, 1e-6, [](const rules::In &) { return false; });
+    EXPECT_GE(rules::worst_balance(l, 0, 300, false), 0);
+  }
 }
 
 TEST_F(Karnopp, OppositeInput_GivesTheOppositeForceToTheBit) {

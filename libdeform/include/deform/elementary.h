@@ -44,8 +44,8 @@ static inline void dfm_log2_(double x, double *high, double *low) {
   const int subnormal = x < 0x1p-1022;
   const uint64_t b = dfm_bits_(subnormal ? x * 0x1p54 : x);
   const uint64_t shifted = b - 0x3fe6a09e667f3bcdull;                       /* bits of sqrt 1/2: the exponent then counts from there */
-  const int64_t k = (int64_t)((shifted + ((uint64_t)2048 << 52)) >> 52) - 2048;
-  const double n = (double)(int32_t)((k > 1100 ? k - 4096 : k) - (subnormal ? 54 : 0));
+  const uint64_t k = ((shifted + ((uint64_t)2048 << 52)) >> 52) - 2048;      /* modulo 2^64; added to the bits of DFM_ROUND_ it reads as a double */
+  const double n = (dfm_double_(dfm_bits_(DFM_ROUND_) + k) - DFM_ROUND_) - (subnormal ? 54.0 : 0.0);
   const double m = dfm_double_(0x3fe6a09e667f3bcdull + (shifted & 0x000fffffffffffffull));
   const double f = m - 1.0, d = m + 1.0, dlow = (1.0 - d) + m;              /* f exact; d + dlow = m + 1 exactly */
   const double s = f / d;
