@@ -126,6 +126,17 @@ TEST(PluginCheck, EveryShippedPlugin_KeepsEveryRule) {
   EXPECT_GE(laws, 3);
 }
 
+// What strangers copy is checked like what is shipped, and is no part of it.
+TEST(PluginCheck, Template_KeepsEveryRuleInUnderSixtyLinesAndIsNotShipped) {
+  const test::CommandResult r = check(std::string(DEFORM_BINARY_DIR) + "/lib/template/template_friction.so");
+  EXPECT_EQ(r.exit_code, 0) << r.out << r.err;
+  EXPECT_GE(rules_that("pass", r.out).size(), 20u) << r.out;
+  const std::string source = test::read_file(std::string(DEFORM_SOURCE_DIR) + "/plugins/template_friction/template_friction.c");
+  EXPECT_GT(source.size(), 1000u);
+  EXPECT_LT(std::count(source.begin(), source.end(), '\n'), 60);
+  EXPECT_FALSE(std::filesystem::exists(shipped("template_friction")));
+}
+
 TEST(PluginCheck, AnotherSeed_FindsTheShippedLawsSoundToo) {
   for (const char *seed : {"2", "77"})
     for (const char *law : {"friction_coulomb", "friction_karnopp"}) EXPECT_EQ(check(shipped(law), {"--seed", seed}).exit_code, 0) << law << " " << seed;
