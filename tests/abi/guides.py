@@ -5,6 +5,8 @@ installed tree has no such file.
 
 guides.py BUILD_DIR SOURCE_DIR SCRATCH_DIR CXX_COMPILER
 """
+import importlib.util
+import json
 import os
 import pathlib
 import re
@@ -18,7 +20,9 @@ def follow(guide, prefix, libdir, scratch):
     folder = scratch / guide.stem
     shutil.copytree(guide.with_suffix(""), folder)
     env = {**clean_environment(), "CMAKE_PREFIX_PATH": str(prefix), "PKG_CONFIG_PATH": str(prefix / libdir / "pkgconfig"),
-           "LD_LIBRARY_PATH": str(prefix / libdir)}
+           "LD_LIBRARY_PATH": str(prefix / libdir), "PATH": f"{prefix / 'bin'}:{os.environ['PATH']}"}
+    if not list(folder.rglob("*.cpp")):
+        env["CXX"] = "/bin/false"  # a guide in C asks for no other compiler
     blocks = re.findall(r"^```sh\n(.*?)^```", guide.read_text(), re.M | re.S)
     tools = " ".join(blocks)
     if "cmake -S" not in tools or "pkg-config" not in tools:
@@ -28,6 +32,22 @@ def follow(guide, prefix, libdir, scratch):
     for block in blocks:
         run("sh", "-ec", block, env=env)
     os.chdir(here)
+    return folder
+
+
+def judge_law(folder):
+    """What the guide of laws leaves behind: a law that holds a block in a scene, and its run on the rig."""
+    summary = json.loads((folder / "out" / "summary.json").read_text())
+    used = [p["file"] for p in summary["plugins"] if p["id"] == "com.example.mylaw"]
+    creep = summary["hold"]["creep_max_um_per_s"]
+    if used != ["build/mylaw.so"] or not summary["finite"] or creep is None or creep > 1:
+        sys.exit(f"the scene of the guide: law from {used}, finite {summary['finite']}, creep {creep} um/s")
+    rows = (folder / "rig.csv").read_text().splitlines()
+    force = [float(row.split(",")[3]) for row in rows[1:]]
+    if rows[0] != "t,x,v,F,z" or len(force) != 301 or not 1.49 < max(force) < 1.5 + 1e-9:
+        sys.exit(f"the rig of the guide: {len(force)} rows of {rows[0]}, largest force {max(force)} N")
+    if importlib.util.find_spec("matplotlib") and not (folder / "rig.png").exists():
+        sys.exit("the rig of the guide drew no picture")
 
 
 def main():
@@ -41,10 +61,12 @@ def main():
         if needs and not (prefix / libdir / needs[1]).exists():
             print(f"{guide.name} passed over: this build has no {needs[1]}")
             continue
-        follow(guide, prefix, libdir, scratch)
+        folder = follow(guide, prefix, libdir, scratch)
+        if guide.stem == "write-a-law":
+            judge_law(folder)
         followed.append(guide.name)
-    if "own_engine.md" not in followed:
-        sys.exit(f"own_engine.md was not followed, only {followed}")
+    if not {"own_engine.md", "write-a-law.md"} <= set(followed):
+        sys.exit(f"own_engine.md and write-a-law.md must be followed, not only {followed}")
 
     # The C++ header, as installed.
     env = clean_environment()

@@ -61,10 +61,4 @@ TEST(PluginCommand, UnknownId_ExitsTwoAndListsWhatThereIs) {
   EXPECT_EQ(test::deform({"plugin"}).exit_code, 2);
 }
 
-TEST(PluginCommand, Check_SaysThatItComesLater) {
-  const auto r = test::deform({"plugin", "check", "x.so"});
-  EXPECT_EQ(r.exit_code, 2);
-  EXPECT_TRUE(has(r.err, "not available yet")) << r.err;
-}
-
 }  // namespace

@@ -53,7 +53,7 @@ Host::Host() {
     std::free(p);
   };
   table_.scratch = [](void *, size_t bytes) -> void * {
-    if (!arena.bytes) arena.bytes = std::make_unique<char[]>(Arena::kBytes);
+    if (!arena.bytes) arena.bytes = std::make_unique_for_overwrite<char[]>(Arena::kBytes);
     const size_t begin = arena.used + (-(reinterpret_cast<uintptr_t>(arena.bytes.get()) + arena.used) & 63);
     if (bytes > Arena::kBytes || begin > Arena::kBytes - bytes) return nullptr;
     arena.used = begin + bytes;
@@ -72,7 +72,7 @@ Host::Host() {
 }
 
 void Host::give_back_scratch() {
-  if (!arena.bytes) arena.bytes = std::make_unique<char[]>(Arena::kBytes);
+  if (!arena.bytes) arena.bytes = std::make_unique_for_overwrite<char[]>(Arena::kBytes);
   arena.used = 0;
 }
 
@@ -86,7 +86,12 @@ Plugin::Plugin(const std::string &file) {
   if (!image_) broken("the dynamic linker refuses it: %s; link what is missing, or leave it out", dlerror());
   const dfm_plugin_fn entry = entry_of(image_);
   if (!entry) broken("it has no symbol dfm_plugin_entry, so no host can use it; build it with deform_add_plugin and define the entry of deform/plugin.h");
-  const dfm_plugin *given = entry(&host_.table(), DFM_ABI, DFM_ABI);
+  const dfm_plugin *given = nullptr;
+  try {
+    given = entry(&host_.table(), DFM_ABI, DFM_ABI);
+  } catch (...) {
+    broken("its entry threw an exception, which ends a host written in C; catch it in the entry, log why, and return NULL");
+  }
   if (!given)
     broken("it refuses a host of ABI %u draft %u (%s), so no world can use it; rebuild it against this library's deform/plugin.h", DFM_ABI, DFM_ABI_DRAFT,
            host_.said().empty() ? "without a reason" : host_.said().c_str());

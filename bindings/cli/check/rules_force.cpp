@@ -27,12 +27,12 @@ std::string rests_at_zero(const Subject &subject) {
       if (law.needs(DFM_NEED_FN)) b.fn[i] = i == 0 ? 0 : s.fn * std::pow(10.0, double(i) - 3);
       b.slip(i, 0, 0);
     }
-    b.must(h);
+    std::fill_n(b.state, size_t(law.nstate) * b.stride, 0.0);
+    // Several steps: a state that ages at rest is no fault, a force that comes of it is.
+    for (int k = 0; k < 5; ++k) b.must(h), b.commit();
     for (uint32_t i = 0; i < b.n; ++i) {
       if (!(b.ft(i) == 0)) broken("at rest, with no state and a normal force of %g N, it pushes with %g N: bodies that only lie there would be set in motion; let the force vanish with slip and state", b.fn[i], b.ft(i));
-      for (uint32_t c = 0; c < law.nstate; ++c)
-        if (!(b.out_state[size_t(c) * b.stride + i] == 0)) broken("at rest its state grows from zero (value %u becomes %g in one step of %g s): zero must mean rest, for it is what a new contact begins with", c, b.out_state[size_t(c) * b.stride + i], h);
-      if (!(b.stored[i] == 0)) broken("at rest it says that %g J are stored in a state of zero; the stored energy must vanish with the state", b.stored[i]);
+      if (law.nstate == 0 && !(b.stored[i] == 0)) broken("at rest it says that %g J are stored although it keeps no state; write 0", b.stored[i]);
     }
   }
   return "";
@@ -250,15 +250,15 @@ std::string bounded_at_every_step(const Subject &subject) {
   const Scales s = scales_of(law);
   constexpr uint32_t kRuns = 48;
   constexpr int kSteps = 150;
-  double reference = 0, state_reference = 0, worst = 0;
-  // The fine step of 1e-4 s says how large force and state are under such slip.
-  std::vector<double> steps{1e-4};
+  double reference = 0, worst = 0;
+  // The fine steps of 1e-6 and 1e-4 s say how large the force is under such slip.
+  std::vector<double> steps{1e-6, 1e-4};
   steps.insert(steps.end(), std::begin(kEverySteps), std::end(kEverySteps));
   for (size_t at = 0; at < steps.size(); ++at) {
     const double h = steps[at];
     Random random(subject.seed);
     Lanes b(law, kRuns);
-    double peak = 0, state_peak = 0;
+    double peak = 0;
     for (int k = 0; k < kSteps; ++k) {
       for (uint32_t i = 0; i < kRuns; ++i) {
         const double heading = random.uniform(0, kTurn), w = random.uniform(0, 1) < 0.1 ? 0 : random.logarithmic(1e-6, 10);
@@ -269,18 +269,17 @@ std::string bounded_at_every_step(const Subject &subject) {
       for (uint32_t i = 0; i < kRuns; ++i) {
         double sum = 0;
         for (uint32_t c = 0; c < law.nstate; ++c) sum += std::fabs(b.state[size_t(c) * b.stride + i]);
-        peak = std::max(peak, b.ft(i)), state_peak = std::max(state_peak, sum);
+        peak = std::max(peak, b.ft(i));
         if (!std::isfinite(b.ft(i)) || !std::isfinite(sum)) broken("at steps of %g s force or state leave the finite numbers after %d steps: a world would lose the contact; update the state implicitly", h, k + 1);
         if (b.mode[i] > 2) broken("it writes mode %u; the host knows 0 open, 1 stick and 2 slip", b.mode[i]);
         if (!(b.limit[i] >= 0)) broken("it writes a limit of %g N; a force without a limit has +inf, none has 0", b.limit[i]);
         if (!(b.stored[i] >= 0) || !std::isfinite(b.stored[i])) broken("it says that %g J are stored; what a state stores is finite and not negative", b.stored[i]);
       }
     }
-    if (at == 0) reference = peak, state_reference = state_peak;
+    if (at < 2) reference = std::max(reference, peak);
     worst = std::max(worst, peak / reference);
-    if (peak > 10 * reference || state_peak > 10 * state_reference)
-      broken("at steps of %g s the force reaches %.3g N where fine steps reach %.3g N (state %.3g against %.3g): long steps would throw bodies apart; update the state implicitly", h, peak, reference,
-             state_peak, state_reference);
+    if (peak > 10 * reference)
+      broken("at steps of %g s the force reaches %.3g N where fine steps reach %.3g N: long steps would throw bodies apart; update the state implicitly", h, peak, reference);
   }
   return reference > 0 ? text("largest force %.2f of that at fine steps", worst) : "";
 }

@@ -89,7 +89,7 @@ std::string same_bits(const Subject &subject) {
   const uint64_t here = digest(subject), once_more = digest(subject);
   if (here != once_more) broken("the same series of batches gave other bits the second time: it keeps something between calls; move it into a state slot");
   const std::string number = std::to_string(subject.index), seed = std::to_string(subject.seed);
-  const Answer other = in_own_process(subject.command, {"plugin", "check", subject.file, "--digest", number, "--seed", seed}, {});
+  const Answer other = in_fresh_process(subject.command, {"plugin", "check", subject.file, "--digest", number, "--seed", seed}, {});
   const std::string mine = text("%016llx", static_cast<unsigned long long>(here));
   if (!other.spoke) broken("asked in a second process, it %s; a law must not depend on the process it runs in", other.ending.c_str());
   if (other.verdict.detail != mine)
@@ -126,7 +126,9 @@ std::string bad_lane_stays(const Subject &subject) {
         if (i != kBad && !spoilt.same(i, good, i))
           broken("%s = %g in lane %u changed lane %u from (%.17g, %.17g) to (%.17g, %.17g) N: one broken contact would spoil others; compute each lane from its own inputs", input.name,
                  bad, kBad, i, good.out_ft[i], good.out_ft[S + i], spoilt.out_ft[i], spoilt.out_ft[S + i]);
-      if (std::isnan(bad) && std::strcmp(input.name, "dwell") != 0 && std::isfinite(spoilt.ft(kBad)))
+      bool finite = std::isfinite(spoilt.ft(kBad));
+      for (uint32_t c = 0; c < law.nstate && std::strcmp(input.name, "state") == 0; ++c) finite = finite && std::isfinite(spoilt.out_state[c * S + kBad]);
+      if (std::isnan(bad) && std::strcmp(input.name, "dwell") != 0 && finite)
         broken("%s = NaN gave a finite force (%.17g, %.17g) N, so the host would not notice that its contact is broken; let the NaN through, or return DFM_DISCARD", input.name,
                spoilt.out_ft[kBad], spoilt.out_ft[S + kBad]);
     }

@@ -62,20 +62,21 @@ std::string ending_of(int status) {
   return name ? text("ended its process by %s", name) : text("ended its process by signal %d", WTERMSIG(status));
 }
 
-[[noreturn]] void become(const std::string &command, std::vector<std::string> &arguments, int to_report, int to_output) {
+[[noreturn]] void become_child(const std::function<void()> &work, int to_report, int to_output) {
   setpgid(0, 0);
   prctl(PR_SET_PDEATHSIG, SIGKILL);
   const rlimit no_core{0, 0};
   setrlimit(RLIMIT_CORE, &no_core);
   const int input = open("/dev/null", O_RDONLY);
   dup2(input, 0), dup2(to_output, 1), dup2(to_output, 2);
-  arguments.push_back("--report-to"), arguments.push_back(std::to_string(to_report));
-  std::vector<char *> argv{const_cast<char *>("deform")};
-  for (std::string &a : arguments) argv.push_back(a.data());
-  argv.push_back(nullptr);
-  setenv("GLIBC_TUNABLES", "glibc.malloc.tcache_count=0", 1);   // a cache of free pieces would look like a leak to V09
-  execv(command.c_str(), argv.data());
-  _exit(127);
+  report_to(to_report);
+  try {
+    work();
+  } catch (...) {                                              // never back into what the parent would do next
+    _exit(1);
+  }
+  std::fflush(nullptr);
+  _exit(0);
 }
 
 void read_reports(Answer &out, std::string &pending) {
@@ -139,9 +140,9 @@ void fail_now(const char *sentence) {
 
 Verdict run_here(const Rule &rule, const Subject &subject) {
   try {
-    const bool model = subject.type && subject.type->kind != DFM_KIND_FRICTION;
-    const auto run = model ? rule.model : rule.law;
-    if (!run) return {Result::skip, "comes with the rules for models (M01 to M15), which are not available yet"};
+    const uint32_t kind = subject.type ? subject.type->kind : uint32_t(DFM_KIND_FRICTION);
+    const auto run = kind == DFM_KIND_FRICTION ? rule.law : rule.model;
+    if (!run) return {Result::skip, kind == DFM_KIND_MODEL ? "comes with the rules for models (M01 to M15), which are not available yet" : "no such rule for solvers is available yet"};
     return {Result::pass, run(subject)};
   } catch (const Broken &b) {
     return {Result::fail, b.what()};
@@ -154,15 +155,27 @@ Verdict run_here(const Rule &rule, const Subject &subject) {
   }
 }
 
-Answer in_own_process(const std::string &command, std::vector<std::string> arguments, const Limits &limits) {
+Answer in_fresh_process(const std::string &command, std::vector<std::string> arguments, const Limits &limits) {
+  const auto become = [&] {
+    fcntl(report, F_SETFD, 0);
+    arguments.push_back("--report-to"), arguments.push_back(std::to_string(report));
+    std::vector<char *> argv{const_cast<char *>("deform")};
+    for (std::string &a : arguments) argv.push_back(a.data());
+    argv.push_back(nullptr);
+    setenv("GLIBC_TUNABLES", "glibc.malloc.tcache_count=0", 1);   // a cache of free pieces would look like a leak to V09
+    execv(command.c_str(), argv.data());
+    _exit(127);
+  };
+  return in_own_process(become, limits);
+}
+
+Answer in_own_process(const std::function<void()> &work, const Limits &limits) {
   int reports[2], output[2];
   if (pipe2(reports, O_CLOEXEC) != 0) throw Failure(kBadInput, "no pipe is left for the process of a rule; close programs or raise the limit of open files");
   if (pipe2(output, O_CLOEXEC) != 0) throw Failure(kBadInput, "no pipe is left for the process of a rule; close programs or raise the limit of open files");
+  std::fflush(nullptr);                                        // or the child would print what waits here once more
   const pid_t child = fork();
-  if (child == 0) {
-    fcntl(reports[1], F_SETFD, 0);
-    become(command, arguments, reports[1], output[1]);
-  }
+  if (child == 0) become_child(work, reports[1], output[1]);
   close(reports[1]), close(output[1]);
   if (child < 0) throw Failure(kBadInput, "the system starts no further process for a rule; close programs, or say --in-process");
   Answer out;
@@ -175,7 +188,7 @@ Answer in_own_process(const std::string &command, std::vector<std::string> argum
   int status = 0;
   bool late = false;
   for (bool ended = false; !ended;) {
-    poll(ends, 2, 5);
+    poll(ends, 2, ends[0].fd < 0 && ends[1].fd < 0 ? 1 : 5);     // both closed: it ends any moment
     for (int k = 0; k < 2; ++k) {
       if (!(ends[k].revents & (POLLIN | POLLHUP | POLLERR))) continue;
       const ssize_t n = read(ends[k].fd, buffer, sizeof buffer);

@@ -26,8 +26,10 @@ struct Answer {
   std::string at;              // its last stage
   double seconds = 0;          // processor time
 };
-// Runs this program with these arguments and waits within the limits. It is told where to report by --report-to.
-Answer in_own_process(const std::string &command, std::vector<std::string> arguments, const Limits &limits);
+// Runs work in a process of its own, which has loaded no plugin before, and waits within the limits.
+Answer in_own_process(const std::function<void()> &work, const Limits &limits);
+// The same in a fresh image of this program, with other addresses; the arguments say what to do, --report-to is added.
+Answer in_fresh_process(const std::string &command, std::vector<std::string> arguments, const Limits &limits);
 // The child's last word.
 void answer(const Verdict &verdict);
 

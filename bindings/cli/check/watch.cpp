@@ -105,7 +105,7 @@ Watch::Watch() {
   for (const auto &[at, k] : object.found) {
     // after relocation the linker makes these pages read only; they stay writable for the rest of this process
     void *begin = reinterpret_cast<void *>(reinterpret_cast<uintptr_t>(at) & ~(page - 1));
-    if (mprotect(begin, 2 * page, PROT_READ | PROT_WRITE) != 0 && mprotect(begin, page, PROT_READ | PROT_WRITE) != 0) continue;
+    if (mprotect(begin, page, PROT_READ | PROT_WRITE) != 0) continue;
     slots_.push_back({at, ours[k], *at});
   }
 }
@@ -158,11 +158,11 @@ void Fenced::lock() {
 
 bool Fenced::spoilt(long *offset) const {
   const unsigned char *begin = static_cast<const unsigned char *>(data_), *end = middle_ + span_ - 2 * page_size();
-  for (const unsigned char *p = middle_; p < end; p = p + 1 == begin ? begin + bytes_ : p + 1) {
-    if (p == begin) p += bytes_;
-    if (p < end && *p != kPattern) return *offset = static_cast<long>(p - begin), true;
-  }
-  return false;
+  const auto other = [](unsigned char byte) { return byte != kPattern; };
+  const unsigned char *p = std::find_if(static_cast<const unsigned char *>(middle_), begin, other);
+  if (p == begin) p = std::find_if(begin + bytes_, end, other);
+  *offset = static_cast<long>(p - begin);
+  return p != end;
 }
 
 // Formats with snprintf in a handler: the fault is the law's own, at a known place of its code, and this process ends with the rule.

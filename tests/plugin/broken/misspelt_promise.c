@@ -1,0 +1,3 @@
+/* V03: promises a word that nobody knows. */
+#define EFFECTS "stictoin"
+#include "law.h"

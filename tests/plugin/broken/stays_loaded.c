@@ -1,0 +1,2 @@
+/* V09: linked so that it is never unloaded (-z nodelete), as a library with unique C++ symbols is. */
+#include "law.h"

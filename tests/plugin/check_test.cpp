@@ -1,0 +1,228 @@
+// `deform plugin check`: every shipped law keeps every rule, and each broken law (tests/plugin/broken) breaks the one rule that is meant for it
+// and no other: a rule that nothing fails would prove nothing, and one that fails with others would not tell what to mend.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "support.h"
+
+#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
+#define SANITIZED 1
+#elif defined(__has_feature)
+#if __has_feature(address_sanitizer) || __has_feature(thread_sanitizer)
+#define SANITIZED 1
+#endif
+#endif
+#ifndef SANITIZED
+#define SANITIZED 0
+#endif
+#if defined(__SANITIZE_THREAD__)
+#define FINDS_RACES 1
+#else
+#define FINDS_RACES 0
+#endif
+
+namespace {
+
+// What a law that hangs costs; a sanitizer slows the sound rules down, too.
+const char *const kLimit = SANITIZED ? "8" : "1";
+
+std::string broken(const std::string &name) { return std::string(DEFORM_BINARY_DIR) + "/lib/broken/" + name + ".so"; }
+std::string shipped(const std::string &name) { return std::string(DEFORM_PLUGIN_DIR) + "/" + name + ".so"; }
+
+test::CommandResult check(const std::string &file, std::vector<std::string> more = {}) {
+  std::vector<std::string> args{"plugin", "check", file, "--limit", kLimit};
+  args.insert(args.end(), more.begin(), more.end());
+  return test::deform(args);
+}
+
+// Rules whose line says `word`.
+std::vector<std::string> rules_that(const std::string &word, const std::string &out) {
+  std::vector<std::string> ids;
+  for (size_t at = 0, end; at < out.size(); at = end + 1) {
+    end = std::min(out.find('\n', at), out.size());
+    const std::string line = out.substr(at, end - at);
+    if (line.size() > 10 && line[5] == ' ' && line.compare(6, word.size() + 1, word + " ") == 0) ids.push_back(line.substr(2, 3));
+  }
+  return ids;
+}
+
+// The sentence under the line of a rule that failed.
+std::string sentence(const std::string &id, const std::string &out) {
+  const size_t at = out.find("  " + id + " FAIL"), begin = at == std::string::npos ? at : out.find('\n', at);
+  return begin == std::string::npos ? "" : out.substr(begin + 1, out.find('\n', begin + 1) - begin - 1);
+}
+
+// ---- broken laws -------------------------------------------------------------------------------------------------------------------
+
+struct Case { const char *law, *rule, *says; };
+std::ostream &operator<<(std::ostream &out, const Case &c) { return out << c.law; }
+
+class BrokenLaw : public testing::TestWithParam<Case> {};
+
+TEST_P(BrokenLaw, FailsTheRuleThatIsMeantForItAndNoOther) {
+  const test::CommandResult r = check(broken(GetParam().law));
+  EXPECT_EQ(r.exit_code, 1) << r.out << r.err;
+  EXPECT_EQ(rules_that("FAIL", r.out), std::vector<std::string>{GetParam().rule}) << r.out;
+  const std::string why = sentence(GetParam().rule, r.out);
+  EXPECT_NE(why.find(GetParam().says), std::string::npos) << why;
+  EXPECT_NE(why.find("; "), std::string::npos) << "a consequence and a remedy: " << why;
+}
+
+INSTANTIATE_TEST_SUITE_P(
+    Plugin, BrokenLaw,
+    testing::Values(
+        Case{"second_symbol", "V01", "broken_helper"},
+        Case{"wrong_abi", "V02", "draft 8"},
+        Case{"deaf_to_abi", "V02", "cannot know"},
+        Case{"no_source", "V03", "\"source\""},
+        Case{"misspelt_promise", "V03", "\"stiction\""},
+        Case{"refuses_its_defaults", "V04", "must be above 0.9"},
+        Case{"not_finite_at_the_end_of_a_range", "V04", "\"mu\" = 0"},
+        Case{"allocates", "V05", "calls malloc"},
+        Case{"reads_the_environment", "V05", "calls getenv"},
+        Case{"writes_past_the_end", "V06", "past the end of limit"},
+        Case{"writes_its_input", "V06", "writes into fn"},
+        Case{"reads_a_null_output", "V06", "NULL"},
+        Case{"remembers", "V07", "keeps something"},
+        Case{"asks_who_it_is", "V07", "in another process"},
+        Case{"spreads_nan", "V08", "changed lane"},
+        Case{"hides_nan", "V08", "finite force"},
+        Case{"hangs", "V08", "did not come back"},
+        Case{"leaks", "V09", "on the heap"},
+        Case{"keeps_host_memory", "V09", "host's memory"},
+        Case{"stays_loaded", "V09", "stays in memory"},
+        Case{"pushes_at_rest", "F01", "at rest"},
+        Case{"axis_by_axis", "F02", "turned by"},
+        Case{"signed_sine", "F02", "turned by"},
+        Case{"wrong_sign", "F03", "closed loop"},
+        Case{"not_passive", "F03", "random steps"},
+        Case{"knows_its_place", "F04", "in a batch of"},
+        Case{"half_the_derivative", "F05", "dft_dvt"},
+        Case{"creeps", "F06", "in 1000 s"},
+        Case{"promises_stribeck", "F07", "falls nowhere"},
+        Case{"promises_viscous", "F08", "does not rise"},
+        Case{"promises_presliding", "F09", "no presliding"},
+        Case{"promises_hysteresis", "F10", "loop of"},
+        Case{"promises_breakaway", "F11", "the peak is"},
+        Case{"explicit_lag", "F12", "at steps of 0.0333"},
+        Case{"drifts", "F13", "per cycle"},
+        Case{"spikes", "F14", "spike"}),
+    [](const auto &one) { return std::string(one.param.law); });
+
+TEST(BrokenLaw, EveryLawOfTheFolder_IsInTheTable) {
+  std::vector<std::string> known{"sound", "shares_a_static"};
+  for (int s = 0; s < testing::UnitTest::GetInstance()->total_test_suite_count(); ++s)
+    for (int t = 0; t < testing::UnitTest::GetInstance()->GetTestSuite(s)->total_test_count(); ++t) {
+      const std::string name = testing::UnitTest::GetInstance()->GetTestSuite(s)->GetTestInfo(t)->name();
+      if (name.find('/') != std::string::npos) known.push_back(name.substr(name.find('/') + 1));
+    }
+  for (const auto &entry : std::filesystem::directory_iterator(std::string(DEFORM_SOURCE_DIR) + "/tests/plugin/broken"))
+    EXPECT_TRUE(entry.path().extension() != ".c" || std::find(known.begin(), known.end(), entry.path().stem().string()) != known.end()) << entry.path();
+}
+
+TEST(BrokenLaw, WhatTheyAreMadeFrom_KeepsEveryRule) {
+  const test::CommandResult r = check(broken("sound"));
+  EXPECT_EQ(r.exit_code, 0) << r.out << r.err;
+  EXPECT_GE(rules_that("pass", r.out).size(), 20u) << r.out;
+}
+
+// A race is what ThreadSanitizer sees; without it the law is right in each single thread and nothing may be said against it.
+TEST(BrokenLaw, SharesAStaticVariable_FailsUnderTheSanitizerOfThreads) {
+  if (SANITIZED && !FINDS_RACES) return;
+  const test::CommandResult r = check(broken("shares_a_static"));
+  EXPECT_EQ(rules_that("FAIL", r.out), FINDS_RACES ? std::vector<std::string>{"V10"} : std::vector<std::string>{}) << r.out;
+}
+
+// ---- shipped plugins ---------------------------------------------------------------------------------------------------------------
+
+TEST(PluginCheck, EveryShippedPlugin_KeepsEveryRule) {
+  int laws = 0;
+  for (const auto &entry : std::filesystem::directory_iterator(DEFORM_PLUGIN_DIR)) {
+    const test::CommandResult r = check(entry.path().string());
+    EXPECT_EQ(r.exit_code, 0) << r.out << r.err;
+    laws += r.out.find("\nlaw ") != std::string::npos;
+  }
+  EXPECT_GE(laws, 3);
+}
+
+// What strangers copy is checked like what is shipped, and is no part of it.
+TEST(PluginCheck, Template_KeepsEveryRuleInUnderSixtyLinesAndIsNotShipped) {
+  const test::CommandResult r = check(std::string(DEFORM_BINARY_DIR) + "/lib/template/template_friction.so");
+  EXPECT_EQ(r.exit_code, 0) << r.out << r.err;
+  EXPECT_GE(rules_that("pass", r.out).size(), 20u) << r.out;
+  const std::string source = test::read_file(std::string(DEFORM_SOURCE_DIR) + "/plugins/template_friction/template_friction.c");
+  EXPECT_GT(source.size(), 1000u);
+  EXPECT_LT(std::count(source.begin(), source.end(), '\n'), 60);
+  EXPECT_FALSE(std::filesystem::exists(shipped("template_friction")));
+}
+
+TEST(PluginCheck, AnotherSeed_FindsTheShippedLawsSoundToo) {
+  for (const char *seed : {"2", "77"})
+    for (const char *law : {"friction_coulomb", "friction_karnopp"}) EXPECT_EQ(check(shipped(law), {"--seed", seed}).exit_code, 0) << law << " " << seed;
+}
+
+TEST(PluginCheck, Model_IsHeldToTheRulesThatApplyAndSaysWhatComesLater) {
+  const test::CommandResult r = check(shipped("model_msm"));
+  EXPECT_EQ(r.exit_code, 0) << r.out;
+  EXPECT_EQ(rules_that("pass", r.out), (std::vector<std::string>{"V01", "V02", "V09", "V03", "V04"})) << r.out;
+  EXPECT_NE(r.out.find("M01 to M15, the rules for models, are not available yet"), std::string::npos);
+  EXPECT_EQ(r.out.find("F01"), std::string::npos);
+}
+
+// ---- the command -------------------------------------------------------------------------------------------------------------------
+
+TEST(PluginCheck, WithoutASanitizer_SkipsThatRuleAndSaysWhy) {
+  if (SANITIZED) return;
+  const test::CommandResult r = check(shipped("friction_coulomb"), {"--only", "V10"});
+  EXPECT_EQ(r.exit_code, 0);
+  EXPECT_EQ(rules_that("skip", r.out), std::vector<std::string>{"V10"}) << r.out;
+  EXPECT_NE(r.out.find("--preset asan"), std::string::npos) << r.out;
+}
+
+TEST(PluginCheck, OneRule_IsRunAlone) {
+  const test::CommandResult r = check(broken("wrong_sign"), {"--only", "F02", "--only", "F03"});
+  EXPECT_EQ(r.exit_code, 1);
+  EXPECT_EQ(rules_that("pass", r.out), std::vector<std::string>{"F02"}) << r.out;
+  EXPECT_EQ(rules_that("FAIL", r.out), std::vector<std::string>{"F03"}) << r.out;
+  EXPECT_EQ(check(broken("wrong_sign"), {"--only", "F02"}).exit_code, 0);
+}
+
+TEST(PluginCheck, InThisProcess_GivesTheSameVerdicts) {
+  for (const char *law : {"sound", "allocates", "writes_past_the_end", "wrong_sign"}) {
+    const test::CommandResult apart = check(broken(law)), here = check(broken(law), {"--in-process"});
+    EXPECT_EQ(apart.exit_code, here.exit_code) << law;
+    EXPECT_EQ(rules_that("FAIL", apart.out), rules_that("FAIL", here.out)) << law;
+  }
+}
+
+TEST(PluginCheck, Json_CarriesEveryRule) {
+  const test::CommandResult r = check(broken("drifts"), {"--json", "--seed", "5"});
+  EXPECT_EQ(r.exit_code, 1);
+  EXPECT_NE(r.out.find("\"seed\": 5"), std::string::npos) << r.out;
+  EXPECT_NE(r.out.find("\"failed\": 1"), std::string::npos) << r.out;
+  EXPECT_NE(r.out.find("\"id\": \"F13\", \"title\": \"stiction: no drift under a biased oscillating load\", \"result\": \"fail\""), std::string::npos) << r.out;
+  for (const char *id : {"V01", "V10", "F01", "F14"}) EXPECT_NE(r.out.find("\"id\": \"" + std::string(id) + "\""), std::string::npos) << id;
+}
+
+TEST(PluginCheck, BadUsage_ExitsTwoWithOneSentence) {
+  const test::CommandResult missing = check("/nowhere/law.so"), rule = check(broken("sound"), {"--only", "F99"}), folder = check(DEFORM_PLUGIN_DIR);
+  EXPECT_EQ(missing.exit_code, 2);
+  EXPECT_NE(missing.err.find("/nowhere/law.so"), std::string::npos) << missing.err;
+  EXPECT_EQ(rule.exit_code, 2);
+  EXPECT_NE(rule.err.find("\"F99\""), std::string::npos) << rule.err;
+  EXPECT_EQ(folder.exit_code, 2);
+}
+
+TEST(PluginCheck, FileThatIsNoLibrary_FailsTheRulesOfTheFile) {
+  const std::string file = test::scratch("plugin_check") + "/text.so";
+  test::write_file(file, "not a library\n");
+  const test::CommandResult r = check(file);
+  EXPECT_EQ(r.exit_code, 1) << r.err;
+  EXPECT_EQ(rules_that("FAIL", r.out), (std::vector<std::string>{"V01", "V02"})) << r.out;
+}
+
+}  // namespace
