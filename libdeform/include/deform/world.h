@@ -93,6 +93,7 @@ typedef struct dfm_world_stats {
   double stable_step;                     /* s, 0.9 of the bound at its last evaluation */
   uint32_t asleep, reserved;              /* bodies that sleep now */
   double sleep_energy, sleep_momentum[3]; /* J and N s that bodies still had when they fell asleep, since creation */
+  uint64_t rigid_again;                   /* times a rigid host had contact solved again (DFM_RIGID_AGAIN), since creation */
 } dfm_world_stats;
 /** @return DFM_OK; DFM_E_HANDLE. Threads: Any thread. Not during step. Since 0.1. */
 DFM_API dfm_status dfm_world_get_stats(dfm_world world, dfm_world_stats *out);

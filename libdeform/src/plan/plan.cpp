@@ -99,12 +99,13 @@ Plan make_plan(const SceneFacts &f) {
     run(StageId::broad, who);
     run(StageId::narrow, who);
     run(StageId::solve, who);
+    if (f.rigid_bodies) run(StageId::rigid_commit, "ends of " + rigids);
     run(StageId::distribute, who);
   } else {
     const std::string why = f.bodies < 2 && !f.obstacles ? "one body and nothing to touch" : "filters let no pair touch";
     for (StageId id : {StageId::gather, StageId::broad, StageId::narrow, StageId::solve, StageId::distribute}) leave(stage_name(id), why);
   }
-  if (f.rigid_bodies) run(StageId::rigid_commit, "ends of " + rigids);
+  if (f.rigid_bodies && !pairs) run(StageId::rigid_commit, "ends of " + rigids);
   if (f.bodies) run(StageId::commit, "positions and velocities at the end of the sub-step");
   if (f.bodies && f.sleep) run(StageId::sleep, "islands at rest leave the stages above until something reaches them (contact.sleep)");
   else leave("sleep", f.bodies ? "not asked for (contact.sleep)" : "no body");

@@ -15,7 +15,7 @@ struct BodyView {
   bool asleep = false;                // x stays as it is; it meets only what is awake or moves
 };
 
-enum class Shape : uint8_t { plane = 0, sphere = 1, box = 2, capsule = 3, mesh = 4, voxels = 5 };
+enum class Shape : uint8_t { plane = 0, sphere = 1, box = 2, capsule = 3, mesh = 4, voxels = 5, none = 6 };
 
 class VoxelGrid;
 

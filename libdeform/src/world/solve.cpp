@@ -50,11 +50,14 @@ void prepare_rows(World &w) {
     w.state.area[i] = c.area;
   }
   if (!w.zone_table.empty()) w.set_zone_laws();
+  if (w.rigid_again) w.best_impulse.assign(w.rows.impulse.begin(), w.rows.impulse.end());
   w.rows.build(w.contacts, w.sources, {w.rigid_places, w.rigid_groups});
+  if (w.rigid_again) correct_rigids(w);
   fill_responses(w);
   w.tangents.resize(size_t(3) * n), w.match.resize(n);
   warm_start(w.store, w.contacts, w.h, w.rows, w.state, w.tangents.data(), w.match.data());
   w.rows.finish(w.contacts, w.tangents.data(), w.h, w.offset);
+  if (w.rigid_again) w.rows.impulse.assign(w.best_impulse.begin(), w.best_impulse.end());
   for (uint32_t i = 0; i < n; ++i) {
     double *const l = &w.rows.impulse[size_t(i) * 3];
     if (!(w.rows.wn[i] > 0)) l[0] = l[1] = l[2] = 0;
