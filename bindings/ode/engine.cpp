@@ -1,0 +1,290 @@
+#include "engine.h"
+
+#include <algorithm>
+#include <chrono>
+
+namespace dfm_ode_detail {
+namespace {
+
+constexpr double kResidual = 0.01;   // share of a jointed body's change by contact that may be missing before contact is solved again
+constexpr double kWakes = 0.05;      // change of the wrench on a disabled body, as a share of it, that wakes it
+
+Quat rotation_of(const dfm_rigid_state &s) { return {s.rotation[0], s.rotation[1], s.rotation[2], s.rotation[3]}; }
+
+Vec inverse(Vec a) { return {1 / a.x, 1 / a.y, 1 / a.z}; }
+
+// Principal axes of a symmetric matrix by Jacobi's rotations.
+void principal(double a[3][3], Vec &moments, Quat &axes) {
+  double e[3][3] = {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}};
+  for (int sweep = 0; sweep < 30; ++sweep) {
+    if (a[0][1] == 0 && a[0][2] == 0 && a[1][2] == 0) break;
+    for (int p = 0; p < 2; ++p)
+      for (int q = p + 1; q < 3; ++q) {
+        if (std::fabs(a[p][q]) <= 1e-18 * std::sqrt(std::fabs(a[p][p] * a[q][q]))) {
+          a[p][q] = a[q][p] = 0;
+          continue;
+        }
+        const double theta = (a[q][q] - a[p][p]) / (2 * a[p][q]);
+        const double t = (theta >= 0 ? 1 : -1) / (std::fabs(theta) + std::sqrt(theta * theta + 1)), c = 1 / std::sqrt(t * t + 1), s = t * c;
+        for (int k = 0; k < 3; ++k) {
+          const double x = a[k][p], y = a[k][q];
+          a[k][p] = c * x - s * y, a[k][q] = s * x + c * y;
+        }
+        for (int k = 0; k < 3; ++k) {
+          const double x = a[p][k], y = a[q][k];
+          a[p][k] = c * x - s * y, a[q][k] = s * x + c * y;
+        }
+        for (int k = 0; k < 3; ++k) {
+          const double x = e[k][p], y = e[k][q];
+          e[k][p] = c * x - s * y, e[k][q] = s * x + c * y;
+        }
+      }
+  }
+  moments = {a[0][0], a[1][1], a[2][2]};
+  // Columns of e, made right-handed, as a quaternion by the largest of its four parts.
+  const Vec x{e[0][0], e[1][0], e[2][0]}, y{e[0][1], e[1][1], e[2][1]};
+  Vec z{e[0][2], e[1][2], e[2][2]};
+  if (dot(cross(x, y), z) < 0) z = -1.0 * z;
+  const double w = 1 + x.x + y.y + z.z, i = 1 + x.x - y.y - z.z, j = 1 - x.x + y.y - z.z, k = 1 - x.x - y.y + z.z;
+  if (w >= i && w >= j && w >= k) axes = unit({y.z - z.y, z.x - x.z, x.y - y.x, w});
+  else if (i >= j && i >= k) axes = unit({i, x.y + y.x, z.x + x.z, y.z - z.y});
+  else if (j >= k) axes = unit({x.y + y.x, j, y.z + z.y, z.x - x.z});
+  else axes = unit({z.x + x.z, y.z + z.y, k, x.y - y.x});
+}
+
+bool finite_turn(dBodyID b) { return dBodyGetFiniteRotationMode(b) != 0; }
+bool damped(dBodyID b) { return dBodyGetLinearDamping(b) != 0 || dBodyGetAngularDamping(b) != 0 || dBodyGetMaxAngularSpeed(b) < dInfinity; }
+
+// Mean spin over h with angular momentum L: w = I^-1(q half way) L.
+Vec mean_spin(Quat q, Vec inverse_moments, Vec L, double h) {
+  Vec w = in_axes(q, inverse_moments, L);
+  for (int k = 0; k < 60; ++k) {
+    const Vec next = in_axes(turn_by(0.5 * h * w) * q, inverse_moments, L), change = next - w;
+    w = next;
+    if (dot(change, change) <= 1e-31 * dot(w, w)) break;
+  }
+  return w;
+}
+
+class Timer {
+ public:
+  explicit Timer(double &to) : to_(to), start_(std::chrono::steady_clock::now()) {}
+  ~Timer() { to_ += std::chrono::duration<double>(std::chrono::steady_clock::now() - start_).count(); }
+
+ private:
+  double &to_;
+  std::chrono::steady_clock::time_point start_;
+};
+
+}  // namespace
+
+Inertia inertia_of(dBodyID body) {
+  dMass m;
+  dBodyGetMass(body, &m);
+  Inertia out;
+  out.mass = m.mass;
+  if (m.I[1] == 0 && m.I[2] == 0 && m.I[6] == 0) {
+    out.moments = {m.I[0], m.I[5], m.I[10]};
+    return out;
+  }
+  double a[3][3];
+  for (int r = 0; r < 3; ++r)
+    for (int c = 0; c < 3; ++c) a[r][c] = 0.5 * (m.I[4 * r + c] + m.I[4 * c + r]);
+  principal(a, out.moments, out.axes);
+  return out;
+}
+
+dfm_rigid_state Member::state() const {
+  dfm_rigid_state s{};
+  const dReal *const x = dBodyGetPosition(body), *const v = dBodyGetLinearVel(body), *const w = dBodyGetAngularVel(body);
+  const Quat q = unit(from_ode(dBodyGetQuaternion(body)) * inertia.axes);
+  for (int k = 0; k < 3; ++k) s.position[k] = x[k], s.velocity[k] = v[k], s.spin[k] = w[k];
+  s.rotation[0] = q.x, s.rotation[1] = q.y, s.rotation[2] = q.z, s.rotation[3] = q.w;
+  return s;
+}
+
+void Member::put(const dfm_rigid_state &s) {
+  dQuaternion q;
+  to_ode(unit(rotation_of(s) * conjugate(inertia.axes)), q);
+  dBodySetPosition(body, s.position[0], s.position[1], s.position[2]);
+  dBodySetQuaternion(body, q);
+  dBodySetLinearVel(body, s.velocity[0], s.velocity[1], s.velocity[2]);
+  dBodySetAngularVel(body, s.spin[0], s.spin[1], s.spin[2]);
+}
+
+Motion Member::answer(const Motion &p) const {
+  if (kind == still) return {};
+  return {(1 / inertia.mass) * p.v, in_axes(rotation_of(start), inverse(inertia.moments), p.w)};
+}
+
+void Engine::begin(const std::vector<dBodyID> &others) {
+  saved_.clear();
+  auto add = [&](dBodyID b) { saved_.push_back({b, load(dBodyGetForce(b)), load(dBodyGetTorque(b)), {}, {}, {}, {}, false}); };
+  for (Member *m : members) m->saved = saved_.size(), add(m->body);
+  for (const dBodyID b : others) add(b);
+  open_ = false, in_step = true;
+}
+
+void Engine::end() {
+  if (contacts) dJointGroupEmpty(contacts);
+  open_ = in_step = false;
+}
+
+void Engine::forget(Member *m) { std::erase(members, m); }
+
+// Bodies as they were at the start of the sub-step.
+void Engine::restore() {
+  for (const Saved &s : saved_) {
+    dQuaternion q;
+    to_ode(s.rotation, q);
+    dBodySetPosition(s.body, s.position.x, s.position.y, s.position.z);
+    dBodySetQuaternion(s.body, q);
+    dBodySetLinearVel(s.body, s.v.x, s.v.y, s.v.z);
+    dBodySetAngularVel(s.body, s.w.x, s.w.y, s.w.z);
+    if (s.enabled != bool(dBodyIsEnabled(s.body))) (s.enabled ? dBodyEnable : dBodyDisable)(s.body);
+  }
+}
+
+void Engine::open(const dfm_rigid_step &step) {
+  if (open_ && step.t == t_) {              // tried again, from the same states
+    if (stepped_) restore();
+  } else {
+    Timer timer(ode_seconds);
+    for (Saved &s : saved_) {
+      s.position = load(dBodyGetPosition(s.body)), s.rotation = from_ode(dBodyGetQuaternion(s.body));
+      s.v = load(dBodyGetLinearVel(s.body)), s.w = load(dBodyGetAngularVel(s.body));
+      s.enabled = dBodyIsEnabled(s.body);
+    }
+    if (contacts) dJointGroupEmpty(contacts);
+    for (const dSpaceID space : spaces) dSpaceCollide(space, near_data, near_callback);
+  }
+  open_ = true, stepped_ = dirty_ = again_ = asked_again_ = false;
+  t_ = step.t, h_ = step.h;
+}
+
+void Engine::classify(Member &m, const dfm_rigid_step &step, const double *extra) {
+  const dBodyID b = m.body;
+  m.start = m.state();
+  const bool disabled = !dBodyIsEnabled(b);
+  const bool moves = !dBodyIsKinematic(b) && (!disabled || m.wakes);
+  const bool plain = dBodyGetNumJoints(b) == 0 && !damped(b);
+  m.kind = !moves ? Member::still : plain ? Member::free : Member::jointed;
+  m.turns = m.kind == Member::free && dBodyGetGyroscopicMode(b) && !finite_turn(b);
+  if (m.kind == Member::free && !m.turns) m.kind = Member::jointed;   // ODE turns it: what it makes of it is in b
+  m.bias = {load(extra), load(extra + 3)}, m.rest_wrench = {load(extra + 6), load(extra + 9)};
+  m.impulse = {};
+  const Vec v = load(m.start.velocity), w = load(m.start.spin);
+  if (m.kind == Member::still) {
+    m.plain = disabled ? Motion{} : Motion{v, w};
+    return;
+  }
+  const Saved &forces = saved_[m.saved];
+  dVector3 g;
+  dWorldGetGravity(world, g);
+  const Vec gravity = dBodyGetGravityMode(b) ? load(g) : Vec{};
+  const Quat q = rotation_of(m.start);
+  m.turn_momentum = in_axes(q, m.inertia.moments, w) + step.h * forces.torque;
+  m.plain.v = v + step.h * (gravity + (1 / m.inertia.mass) * forces.force);
+  m.plain.w = m.turns ? mean_spin(q, inverse(m.inertia.moments), m.turn_momentum, step.h)
+                      : w + step.h * in_axes(q, inverse(m.inertia.moments), forces.torque);
+}
+
+void Engine::predict(Member &m, const dfm_rigid_step &step, uint32_t number, double *velocity) {
+  if (!open_ || step.t != t_ || step.h != h_ || (stepped_ && !again_)) open(step);
+  if (again_ && stepped_) restore(), stepped_ = false;
+  asked_again_ = again_;
+  if (!again_) m.wakes = false;
+  if (!again_ || m.wakes) classify(m, step, step.extra + size_t{Member::kExtra} * number);
+  else if (m.kind == Member::jointed) m.bias = m.next_bias;
+  m.used = m.plain;
+  if (m.kind == Member::jointed) m.used = {m.plain.v + step.h * m.bias.v, m.plain.w + step.h * m.bias.w};
+  store(velocity, m.used.v), store(velocity + 3, m.used.w);
+}
+
+void Engine::respond(const Member &m, double matrix[36]) const {
+  std::fill_n(matrix, 36, 0.0);
+  if (m.kind == Member::still) return;
+  for (int k = 0; k < 3; ++k) {
+    matrix[7 * k] = 1 / m.inertia.mass;
+    const Vec column = in_axes(rotation_of(m.start), inverse(m.inertia.moments), {k == 0 ? 1.0 : 0, k == 1 ? 1.0 : 0, k == 2 ? 1.0 : 0});
+    matrix[6 * 3 + 3 + k] = column.x, matrix[6 * 4 + 3 + k] = column.y, matrix[6 * 5 + 3 + k] = column.z;
+  }
+  for (int r = 3; r < 6; ++r)              // symmetric to the last bit
+    for (int c = 3; c < r; ++c) matrix[6 * r + c] = matrix[6 * c + r] = 0.5 * (matrix[6 * r + c] + matrix[6 * c + r]);
+}
+
+void Engine::push(Member &m, const double *impulse) {
+  m.impulse = {load(impulse), load(impulse + 3)};
+  dirty_ = true;
+}
+
+void Engine::advance(double h) {
+  Timer timer(ode_seconds);
+  if (stepped_) restore();
+  for (const Saved &s : saved_) {
+    dBodySetForce(s.body, s.force.x, s.force.y, s.force.z);
+    dBodySetTorque(s.body, s.torque.x, s.torque.y, s.torque.z);
+  }
+  for (Member *m : members) {
+    if (m->kind == Member::still) continue;
+    if (m->wakes) dBodyEnable(m->body);
+    const Vec f = (1 / h) * m->impulse.v, t = (1 / h) * m->impulse.w;
+    dBodyAddForce(m->body, f.x, f.y, f.z), dBodyAddTorque(m->body, t.x, t.y, t.z);
+  }
+  (quick ? dWorldQuickStep : dWorldStep)(world, h);
+  ++steps;
+  stepped_ = true, dirty_ = false;
+  for (Member *m : members) {
+    if (!m->turns || !dBodyIsEnabled(m->body)) continue;
+    const Vec L = m->turn_momentum + m->impulse.w, inverse_moments = inverse(m->inertia.moments);
+    if (dot(L, L) == 0) continue;
+    const Quat from = rotation_of(m->start), to = unit(turn_by(h * mean_spin(from, inverse_moments, L, h)) * from);
+    const Vec w = in_axes(to, inverse_moments, L);
+    dQuaternion q;
+    to_ode(unit(to * conjugate(m->inertia.axes)), q);
+    dBodySetQuaternion(m->body, q), dBodySetAngularVel(m->body, w.x, w.y, w.z);
+  }
+}
+
+// What constraints added to a jointed body beside its own answer to contact; the share of contact's change that was not foreseen, by energy.
+double Engine::judge(Member &m, double h) {
+  m.next_bias = m.kind == Member::still ? m.bias : Motion{};
+  if (m.kind != Member::jointed || !dBodyIsEnabled(m.body)) return 0;
+  const dfm_rigid_state end = m.state();
+  const Motion got{(1 / h) * (load(end.position) - load(m.start.position)), (1 / h) * turn_of(rotation_of(end) * conjugate(rotation_of(m.start)))};
+  const Motion own = m.answer(m.impulse);
+  m.next_bias = {(1 / h) * (got.v - m.plain.v - own.v), (1 / h) * (got.w - m.plain.w - own.w)};
+  const double contact = dot(m.impulse.v, own.v) + dot(m.impulse.w, own.w);
+  if (!(contact > 0)) return 0;
+  const Vec dv = got.v - m.used.v - own.v, dw = got.w - m.used.w - own.w;
+  const double missing = m.inertia.mass * dot(dv, dv) + dot(dw, in_axes(rotation_of(m.start), m.inertia.moments, dw));
+  return std::sqrt(missing / contact);
+}
+
+bool Engine::commit(Member &m, uint32_t number, dfm_rigid_state *state, double *extra, double h) {
+  bool again = false;
+  if (dirty_ || !stepped_) {
+    // A disabled body that carries another load than when it fell asleep wakes; contact is solved with its mass then.
+    bool woken = false;
+    for (Member *each : members) {
+      if (each->kind != Member::still || dBodyIsKinematic(each->body) || dBodyIsEnabled(each->body)) continue;
+      const Vec df = (1 / h) * each->impulse.v - each->rest_wrench.v;
+      each->wakes = dot(df, df) > kWakes * kWakes * dot(each->rest_wrench.v, each->rest_wrench.v);
+      woken |= each->wakes;
+    }
+    advance(h);
+    residual = 0;
+    for (Member *each : members) residual = std::max(residual, judge(*each, h));
+    again = !asked_again_ && (woken || residual > kResidual);
+    if (again) ++corrections, again_ = true;
+    else residual_max = std::max(residual_max, residual), again_ = false;
+  }
+  state[number] = m.state();
+  double *const keep = extra + size_t{Member::kExtra} * number;
+  const bool asleep = m.kind == Member::still;
+  const Motion wrench = asleep ? m.rest_wrench : Motion{(1 / h) * m.impulse.v, (1 / h) * m.impulse.w};
+  store(keep, m.next_bias.v), store(keep + 3, m.next_bias.w), store(keep + 6, wrench.v), store(keep + 9, wrench.w);
+  return again;
+}
+
+}  // namespace dfm_ode_detail

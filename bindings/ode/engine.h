@@ -1,0 +1,103 @@
+// A dWorldID inside the contact solve: what its bodies would do in a sub-step, how they answer impulses, and where ODE puts them with these.
+//
+//   predict   free body      v = v0 + h (F/m + g); mean spin of constant angular momentum + h T
+//             jointed body   v = v0 + h (F/m + g + b), w alike: b is what ODE's constraints added in the last sub-step beside the answer to contact
+//   respond   M^-1 of the body alone; 0 for kinematic bodies and those that are disabled
+//   commit    dWorldStep with the impulses as forces p / h, which changes v by M^-1 p exactly. b for the next sub-step is what v differs by from
+//             v0 + h (F/m + g) + M^-1 p. Where contact changed a jointed body otherwise than foreseen by more than kResidual, the bodies are put back,
+//             contact is solved again with the new b, and ODE steps once more.
+//
+// ODE's own step of a free body that tumbles loses angular momentum with h; such bodies are turned here instead (midpoint Lie scheme, Krysl 2005).
+#pragma once
+#include <cstdint>
+#include <memory>
+#include <unordered_map>
+#include <vector>
+
+#include "deform/ode.h"
+#include "rigid_math.h"
+
+namespace dfm_ode_detail {
+
+struct Motion { Vec v, w; };            // m/s, rad/s; or N s, N m s
+
+// Mass, principal moments and their axes in the body's frame.
+struct Inertia {
+  double mass = 0;
+  Vec moments{1, 1, 1};
+  Quat axes;
+};
+Inertia inertia_of(dBodyID body);
+
+class Engine;
+
+// A body that soft bodies may touch. Its state, to the world, is that of its principal axes.
+struct Member {
+  enum Kind : uint8_t { free, jointed, still };
+  static constexpr uint32_t kExtra = 12;   // values of a host's `extra`: b (6, m/s2 and rad/s2), wrench of contact when last awake (6)
+  Engine *engine = nullptr;
+  dBodyID body = nullptr;
+  Inertia inertia;
+  size_t saved = 0;                        // where the engine keeps it
+
+  // Of this sub-step.
+  Kind kind = still;
+  bool turns = false;                      // its turn is computed here
+  bool wakes = false;                      // contact wakes it
+  dfm_rigid_state start{};
+  Motion plain, used;                      // without constraints and contact; as predicted
+  Motion bias, next_bias;                  // b
+  Vec turn_momentum;                       // angular, at the start plus h T
+  Motion impulse, rest_wrench;
+
+  dfm_rigid_state state() const;           // of `body` now
+  void put(const dfm_rigid_state &s);      // into ODE
+  Motion answer(const Motion &impulse) const;   // M^-1 p at the start
+};
+
+class Engine {
+ public:
+  dWorldID world = nullptr;
+  bool quick = false;
+  bool in_step = false;                    // members may be asked
+  dJointGroupID contacts = nullptr;
+  std::vector<dSpaceID> spaces;            // collided at the start of each sub-step, each in itself
+  dNearCallback *near_callback = nullptr;
+  void *near_data = nullptr;
+  std::vector<Member *> members;           // of all sets
+
+  uint64_t steps = 0, corrections = 0;
+  double residual = 0, residual_max = 0, ode_seconds = 0;
+
+  // Around a dfm_ode_step: forces that the caller put on bodies act over all of it.
+  void begin(const std::vector<dBodyID> &bodies_without_geoms);
+  void end();
+  void forget(Member *member);
+
+  void predict(Member &m, const dfm_rigid_step &step, uint32_t number, double *velocity);
+  void respond(const Member &m, double matrix[36]) const;
+  void push(Member &m, const double *impulse);
+  // True: solve again.
+  bool commit(Member &m, uint32_t number, dfm_rigid_state *state, double *extra, double h);
+  void reopen() { open_ = false; }         // states have been put into ODE from outside: the next predict begins anew
+  bool is_open() const { return open_; }
+
+ private:
+  struct Saved {
+    dBodyID body;
+    Vec force, torque, position, v, w;
+    Quat rotation;
+    bool enabled;
+  };
+  std::vector<Saved> saved_;               // every body known
+  bool open_ = false, stepped_ = false, dirty_ = false, again_ = false, asked_again_ = false;
+  double t_ = 0, h_ = 0;
+
+  void open(const dfm_rigid_step &step);
+  void restore();
+  void classify(Member &m, const dfm_rigid_step &step, const double *extra);
+  void advance(double h);
+  double judge(Member &m, double h);
+};
+
+}  // namespace dfm_ode_detail
