@@ -200,7 +200,7 @@ dfm_status Adapter::agree(Body &b) {
   const dfm_rigid_state ode = m.state();
   if (same(ode, b.ode) && same(world, b.world)) return DFM_OK;
   if (!same(ode, b.ode)) TRY(dfm_rigid_set_state(b.rigid, &ode));
-  else m.put(world);
+  else m.put(world), dBodyEnable(b.id);
   b.ode = m.state();
   return dfm_rigid_get_state(b.rigid, &b.world);
 }

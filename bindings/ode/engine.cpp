@@ -6,8 +6,8 @@
 namespace dfm_ode_detail {
 namespace {
 
+constexpr double kForget = 0.05;     // s
 constexpr double kResidual = 0.01;   // share of a jointed body's change by contact that may be missing before contact is solved again
-constexpr double kWakes = 0.05;      // change of the wrench on a disabled body, as a share of it, that wakes it
 
 Quat rotation_of(const dfm_rigid_state &s) { return {s.rotation[0], s.rotation[1], s.rotation[2], s.rotation[3]}; }
 
@@ -113,7 +113,6 @@ void Member::put(const dfm_rigid_state &s) {
 }
 
 Motion Member::answer(const Motion &p) const {
-  if (kind == still) return {};
   return {(1 / inertia.mass) * p.v, in_axes(rotation_of(start), inverse(inertia.moments), p.w)};
 }
 
@@ -168,16 +167,13 @@ void Engine::classify(Member &m, const dfm_rigid_step &step, const double *extra
   const bool disabled = !dBodyIsEnabled(b);
   const bool moves = !dBodyIsKinematic(b) && (!disabled || m.wakes);
   const bool plain = dBodyGetNumJoints(b) == 0 && !damped(b);
+  m.asleep = disabled && !m.wakes;
   m.kind = !moves ? Member::still : plain ? Member::free : Member::jointed;
   m.turns = m.kind == Member::free && dBodyGetGyroscopicMode(b) && !finite_turn(b);
   if (m.kind == Member::free && !m.turns) m.kind = Member::jointed;   // ODE turns it: what it makes of it is in b
-  m.bias = {load(extra), load(extra + 3)}, m.rest_wrench = {load(extra + 6), load(extra + 9)};
+  m.bias = {load(extra), load(extra + 3)}, 
   m.impulse = {};
   const Vec v = load(m.start.velocity), w = load(m.start.spin);
-  if (m.kind == Member::still) {
-    m.plain = disabled ? Motion{} : Motion{v, w};
-    return;
-  }
   const Saved &forces = saved_[m.saved];
   dVector3 g;
   dWorldGetGravity(world, g);
@@ -187,6 +183,15 @@ void Engine::classify(Member &m, const dfm_rigid_step &step, const double *extra
   m.plain.v = v + step.h * (gravity + (1 / m.inertia.mass) * forces.force);
   m.plain.w = m.turns ? mean_spin(q, inverse(m.inertia.moments), m.turn_momentum, step.h)
                       : w + step.h * in_axes(q, inverse(m.inertia.moments), forces.torque);
+  const Motion kept{load(extra + 6), load(extra + 9)};
+  m.drift = {};
+  if (!m.asleep) return;
+  if (extra[12] != 0) {
+    m.drift = kept;
+    return;
+  }
+  const Motion carried = m.answer(kept);   // b is what was in balance with this
+  m.bias = {-1.0 * carried.v - (1 / step.h) * (m.plain.v - v), -1.0 * carried.w - (1 / step.h) * (m.plain.w - w)};
 }
 
 void Engine::predict(Member &m, const dfm_rigid_step &step, uint32_t number, double *velocity) {
@@ -196,8 +201,9 @@ void Engine::predict(Member &m, const dfm_rigid_step &step, uint32_t number, dou
   if (!again_) m.wakes = false;
   if (!again_ || m.wakes) classify(m, step, step.extra + size_t{Member::kExtra} * number);
   else if (m.kind == Member::jointed) m.bias = m.next_bias;
-  m.used = m.plain;
-  if (m.kind == Member::jointed) m.used = {m.plain.v + step.h * m.bias.v, m.plain.w + step.h * m.bias.w};
+  if (m.kind == Member::still) m.used = m.asleep ? Motion{} : Motion{load(m.start.velocity), load(m.start.spin)};
+  else if (m.kind == Member::free) m.used = m.plain;
+  else m.used = {m.plain.v + step.h * m.bias.v, m.plain.w + step.h * m.bias.w};
   store(velocity, m.used.v), store(velocity + 3, m.used.w);
 }
 
@@ -226,8 +232,8 @@ void Engine::advance(double h) {
     dBodySetTorque(s.body, s.torque.x, s.torque.y, s.torque.z);
   }
   for (Member *m : members) {
-    if (m->kind == Member::still) continue;
     if (m->wakes) dBodyEnable(m->body);
+    if (m->kind == Member::still) continue;
     const Vec f = (1 / h) * m->impulse.v, t = (1 / h) * m->impulse.w;
     dBodyAddForce(m->body, f.x, f.y, f.z), dBodyAddTorque(m->body, t.x, t.y, t.z);
   }
@@ -261,17 +267,24 @@ double Engine::judge(Member &m, double h) {
   return std::sqrt(missing / contact);
 }
 
+bool Engine::wake_sleepers(double h) {
+  bool woken = false;
+  for (Member *m : members) {
+    if (!m->asleep || dBodyIsKinematic(m->body)) continue;
+    const Motion push = m->answer(m->impulse);
+    const double left = std::max(0.0, 1 - h / kForget);
+    m->drift.v = left * m->drift.v + (m->plain.v - load(m->start.velocity)) + push.v + h * m->bias.v;
+    m->drift.w = left * m->drift.w + (m->plain.w - load(m->start.spin)) + push.w + h * m->bias.w;
+    m->wakes = norm(m->drift.v) > dBodyGetAutoDisableLinearThreshold(m->body) || norm(m->drift.w) > dBodyGetAutoDisableAngularThreshold(m->body);
+    woken |= m->wakes;
+  }
+  return woken;
+}
+
 bool Engine::commit(Member &m, uint32_t number, dfm_rigid_state *state, double *extra, double h) {
   bool again = false;
   if (dirty_ || !stepped_) {
-    // A disabled body that carries another load than when it fell asleep wakes; contact is solved with its mass then.
-    bool woken = false;
-    for (Member *each : members) {
-      if (each->kind != Member::still || dBodyIsKinematic(each->body) || dBodyIsEnabled(each->body)) continue;
-      const Vec df = (1 / h) * each->impulse.v - each->rest_wrench.v;
-      each->wakes = dot(df, df) > kWakes * kWakes * dot(each->rest_wrench.v, each->rest_wrench.v);
-      woken |= each->wakes;
-    }
+    const bool woken = !asked_again_ && wake_sleepers(h);
     advance(h);
     residual = 0;
     for (Member *each : members) residual = std::max(residual, judge(*each, h));
@@ -281,9 +294,9 @@ bool Engine::commit(Member &m, uint32_t number, dfm_rigid_state *state, double *
   }
   state[number] = m.state();
   double *const keep = extra + size_t{Member::kExtra} * number;
-  const bool asleep = m.kind == Member::still;
-  const Motion wrench = asleep ? m.rest_wrench : Motion{(1 / h) * m.impulse.v, (1 / h) * m.impulse.w};
-  store(keep, m.next_bias.v), store(keep + 3, m.next_bias.w), store(keep + 6, wrench.v), store(keep + 9, wrench.w);
+  const Motion load_or_drift = m.asleep ? m.drift : Motion{(1 / h) * m.impulse.v, (1 / h) * m.impulse.w};
+  store(keep, m.next_bias.v), store(keep + 3, m.next_bias.w), store(keep + 6, load_or_drift.v), store(keep + 9, load_or_drift.w);
+  keep[12] = m.asleep;
   return again;
 }
 

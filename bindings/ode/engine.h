@@ -7,6 +7,9 @@
 //             v0 + h (F/m + g) + M^-1 p. Where contact changed a jointed body otherwise than foreseen by more than kResidual, the bodies are put back,
 //             contact is solved again with the new b, and ODE steps once more.
 //
+// A disabled body stands still in the solve; when it fell asleep all forces on it were in balance. Would it, with what contact has changed since, move
+// faster by now than ODE lets bodies that are idle, it wakes, and contact is solved again with its mass. Changes are forgotten within kForget.
+//
 // ODE's own step of a free body that tumbles loses angular momentum with h; such bodies are turned here instead (midpoint Lie scheme, Krysl 2005).
 #pragma once
 #include <cstdint>
@@ -34,7 +37,8 @@ class Engine;
 // A body that soft bodies may touch. Its state, to the world, is that of its principal axes.
 struct Member {
   enum Kind : uint8_t { free, jointed, still };
-  static constexpr uint32_t kExtra = 12;   // values of a host's `extra`: b (6, m/s2 and rad/s2), wrench of contact when last awake (6)
+  static constexpr uint32_t kExtra = 13;   // values of a host's `extra`: b (6, m/s2 and rad/s2); awake: wrench of contact (6, N and
+                                           // N m), asleep: drift (6, m/s and rad/s); 1 if asleep
   Engine *engine = nullptr;
   dBodyID body = nullptr;
   Inertia inertia;
@@ -43,12 +47,14 @@ struct Member {
   // Of this sub-step.
   Kind kind = still;
   bool turns = false;                      // its turn is computed here
+  bool asleep = false;                     // disabled in ODE
   bool wakes = false;                      // contact wakes it
   dfm_rigid_state start{};
   Motion plain, used;                      // without constraints and contact; as predicted
   Motion bias, next_bias;                  // b
   Vec turn_momentum;                       // angular, at the start plus h T
-  Motion impulse, rest_wrench;
+  Motion impulse;
+  Motion drift;                            // of one that sleeps: what it would move at by now
 
   dfm_rigid_state state() const;           // of `body` now
   void put(const dfm_rigid_state &s);      // into ODE
@@ -97,6 +103,7 @@ class Engine {
   void restore();
   void classify(Member &m, const dfm_rigid_step &step, const double *extra);
   void advance(double h);
+  bool wake_sleepers(double h);
   double judge(Member &m, double h);
 };
 

@@ -122,9 +122,9 @@ inline dfm_body soft_bed(Ode &ode, double young = 2e4) {
   hold_bottom(bed);
   return bed;
 }
-inline dfm_body soft_ball(Ode &ode, Vec at, Vec speed = {}, double young = 3e4) {
+inline dfm_body soft_ball(Ode &ode, Vec at, Vec speed = {}, double young = 3e4, double damping_mass = 0) {
   BodyOptions o;
-  o.name = "ball", o.young = young, o.poisson = 0.3, o.damping_stiffness = 0.002, o.position = at, o.velocity = speed;
+  o.name = "ball", o.young = young, o.poisson = 0.3, o.damping_stiffness = 0.002, o.damping_mass = damping_mass, o.position = at, o.velocity = speed;
   return make_body(ode.context, ode.soft, "ball", {0.1}, 400, o);
 }
 

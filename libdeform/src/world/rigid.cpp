@@ -20,10 +20,12 @@ bool finite(const double *p, size_t n) {
 }
 constexpr size_t kStateValues = sizeof(dfm_rigid_state) / sizeof(double);
 
-bool host_failed(const World &w, const RigidSet &set, const char *what, uint32_t *trouble) {
+// said: sentences() before the host was called. Its own reason comes along where it has given one.
+bool host_failed(const World &w, const RigidSet &set, const char *what, uint64_t said, uint32_t *trouble) {
   *trouble |= DFM_TROUBLE_PLUGIN;
-  set_last_error(format("step %llu, rigid body '%s' and those with it: host '%s' %s; take a smaller step or look at its masses and motors",
-                        static_cast<unsigned long long>(w.step_count), set.defs[0].name, set.host_name.c_str(), what).c_str());
+  const std::string why = said != sentences() ? last_error() : "take a smaller step or look at its masses and motors";
+  set_last_error(format("step %llu, rigid body '%s' and those with it: host '%s' %s; %s", static_cast<unsigned long long>(w.step_count),
+                        set.defs[0].name, set.host_name.c_str(), what, why.c_str()).c_str());
   return false;
 }
 
@@ -66,11 +68,12 @@ void place_rigids(World &w) {
 }
 
 bool World::ask_rigids(uint32_t *trouble) {
+  const uint64_t said = sentences();
   for (auto &set : rigid_sets) {
     RigidSet &s = *set;
     std::fill(s.velocity.begin(), s.velocity.end(), 0.0);
-    if (s.host.predict(s.self, &s.step, s.velocity.data()) != DFM_OK) return host_failed(*this, s, "gave no velocities", trouble);
-    if (!finite(s.velocity.data(), s.velocity.size())) return host_failed(*this, s, "gave velocities that are not finite", trouble);
+    if (s.host.predict(s.self, &s.step, s.velocity.data()) != DFM_OK) return host_failed(*this, s, "gave no velocities", said, trouble);
+    if (!finite(s.velocity.data(), s.velocity.size())) return host_failed(*this, s, "gave velocities that are not finite", said, trouble);
   }
   return true;
 }
@@ -134,19 +137,20 @@ void World::sum_rigid_impulses() {
 
 // 1: all have ended their step; 2: somebody asks for another solve; 0: failed.
 int World::ask_rigid_ends(uint32_t *trouble) {
+  const uint64_t said = sentences();
   bool again = false;
   for (auto &set : rigid_sets)
     if (set->host.push && set->host.push(set->self, &set->step, set->impulse.data()) != DFM_OK)
-      return host_failed(*this, *set, "did not take its impulses", trouble);
+      return host_failed(*this, *set, "did not take its impulses", said, trouble);
   for (auto &set : rigid_sets) {
     RigidSet &s = *set;
     const dfm_status status = s.host.commit(s.self, &s.step, s.impulse.data(), s.next.data(), s.next_extra.data());
-    if (status != DFM_OK && status != DFM_RIGID_AGAIN) return host_failed(*this, s, "could not end its step", trouble);
+    if (status != DFM_OK && status != DFM_RIGID_AGAIN) return host_failed(*this, s, "could not end its step", said, trouble);
     again |= status == DFM_RIGID_AGAIN;
     for (uint32_t i = 0; i < s.defs.size(); ++i)
       if (s.group[i] == DFM_RIGID_STILL) s.next[i] = s.state[i];
     if (!finite(reinterpret_cast<const double *>(s.next.data()), kStateValues * s.next.size()) || !finite(s.next_extra.data(), s.next_extra.size()))
-      return host_failed(*this, s, "ended its step with something not finite", trouble);
+      return host_failed(*this, s, "ended its step with something not finite", said, trouble);
   }
   return again ? 2 : 1;
 }
