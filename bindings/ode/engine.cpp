@@ -118,10 +118,26 @@ Motion Member::answer(const Motion &p) const {
 
 void Engine::begin(const std::vector<dBodyID> &others) {
   saved_.clear();
-  auto add = [&](dBodyID b) { saved_.push_back({b, load(dBodyGetForce(b)), load(dBodyGetTorque(b)), {}, {}, {}, {}, false}); };
+  auto add = [&](dBodyID b) {
+    saved_.push_back({b, load(dBodyGetForce(b)), load(dBodyGetTorque(b)), {}, {}, {}, {}, false, dBodyGetGyroscopicMode(b) != 0, inertia_of(b)});
+  };
   for (Member *m : members) m->saved = saved_.size(), add(m->body);
   for (const dBodyID b : others) add(b);
+  find_ties();
   open_ = false, in_step = true;
+}
+
+void Engine::find_ties() {
+  ties_.clear();
+  std::unordered_map<dBodyID, size_t> number;
+  for (size_t i = 0; i < saved_.size(); ++i) number[saved_[i].body] = i;
+  for (size_t i = 0; i < saved_.size(); ++i)
+    for (int k = 0; k < dBodyGetNumJoints(saved_[i].body); ++k) {
+      const dJointID j = dBodyGetJoint(saved_[i].body, k);
+      const dBodyID a = dJointGetBody(j, 0), b = dJointGetBody(j, 1);
+      if (a != saved_[i].body || !b || !dJointIsEnabled(j) || dBodyIsKinematic(a) || dBodyIsKinematic(b) || dJointGetType(j) == dJointTypeContact) continue;
+      ties_.push_back({j, i, number.at(b), {}, nullptr});
+    }
 }
 
 void Engine::end() {
@@ -237,9 +253,39 @@ void Engine::advance(double h) {
     const Vec f = (1 / h) * m->impulse.v, t = (1 / h) * m->impulse.w;
     dBodyAddForce(m->body, f.x, f.y, f.z), dBodyAddTorque(m->body, t.x, t.y, t.z);
   }
+  for (Tie &t : ties_) t.callers = dJointGetFeedback(t.joint), dJointSetFeedback(t.joint, &t.own);
+  for (const Saved &s : saved_) dBodySetGyroscopicMode(s.body, 0);
   (quick ? dWorldQuickStep : dWorldStep)(world, h);
   ++steps;
   stepped_ = true, dirty_ = false;
+  for (const Saved &s : saved_) dBodySetGyroscopicMode(s.body, s.gyroscopic);
+  turn_jointed(h);
+  turn_free(h);
+  for (const Tie &t : ties_) {
+    dJointSetFeedback(t.joint, t.callers);
+    if (t.callers) *t.callers = t.own;
+  }
+}
+
+void Engine::turn_jointed(double h) {
+  turn_.assign(saved_.size(), {});
+  for (const Tie &t : ties_) {
+    const Saved &a = saved_[t.a], &b = saved_[t.b];
+    const dJointFeedback &f = t.own;
+    const Vec couple = cross(a.position, load(f.f1)) + load(f.t1) + cross(b.position, load(f.f2)) + load(f.t2);
+    turn_[t.a] = turn_[t.a] - 0.5 * h * couple, turn_[t.b] = turn_[t.b] - 0.5 * h * couple;
+  }
+  for (size_t i = 0; i < saved_.size(); ++i) {
+    const Saved &s = saved_[i];
+    if (!s.gyroscopic || !dBodyIsEnabled(s.body) || dBodyIsKinematic(s.body)) continue;
+    const Quat from = s.rotation * s.inertia.axes, to = from_ode(dBodyGetQuaternion(s.body)) * s.inertia.axes;
+    const Vec L = in_axes(from, s.inertia.moments, load(dBodyGetAngularVel(s.body))) + turn_[i];
+    const Vec w = in_axes(to, inverse(s.inertia.moments), L);
+    dBodySetAngularVel(s.body, w.x, w.y, w.z);
+  }
+}
+
+void Engine::turn_free(double h) {
   for (Member *m : members) {
     if (!m->turns || !dBodyIsEnabled(m->body)) continue;
     const Vec L = m->turn_momentum + m->impulse.w, inverse_moments = inverse(m->inertia.moments);

@@ -10,7 +10,9 @@
 // A disabled body stands still in the solve; when it fell asleep all forces on it were in balance. Would it, with what contact has changed since, move
 // faster by now than ODE lets bodies that are idle, it wakes, and contact is solved again with its mass. Changes are forgotten within kForget.
 //
-// ODE's own step of a free body that tumbles loses angular momentum with h; such bodies are turned here instead (midpoint Lie scheme, Krysl 2005).
+// Angular momentum: ODE's gyroscopic terms keep it to first order only. Bodies that have them on are turned here instead: free ones by the midpoint Lie
+// scheme (Krysl 2005), and of jointed ones ODE solves I(q0) (w1 - w0) = impulses without these terms, after which w = I(q1)^-1 I(q0) w1. What a
+// joint does at two anchors that stand apart by its error is a couple; it is taken back from both of its bodies.
 #pragma once
 #include <cstdint>
 #include <memory>
@@ -94,8 +96,13 @@ class Engine {
     Vec force, torque, position, v, w;
     Quat rotation;
     bool enabled;
+    bool gyroscopic;                       // as the caller has it
+    Inertia inertia;
   };
+  struct Tie { dJointID joint; size_t a, b; dJointFeedback own, *callers; };   // a, b: in saved_
+  std::vector<Tie> ties_;                  // joints between two bodies that move, but for contacts
   std::vector<Saved> saved_;               // every body known
+  std::vector<Vec> turn_;                  // per body of saved_, N m s
   bool open_ = false, stepped_ = false, dirty_ = false, again_ = false, asked_again_ = false;
   double t_ = 0, h_ = 0;
 
@@ -103,6 +110,9 @@ class Engine {
   void restore();
   void classify(Member &m, const dfm_rigid_step &step, const double *extra);
   void advance(double h);
+  void turn_free(double h);
+  void turn_jointed(double h);
+  void find_ties();
   bool wake_sleepers(double h);
   double judge(Member &m, double h);
 };

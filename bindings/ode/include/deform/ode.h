@@ -8,6 +8,7 @@
 #include <ode/ode.h>
 
 #include "deform/deform.h"
+#include "deform/ode_host.h"
 #ifdef __cplusplus
 extern "C" {
 #endif
@@ -76,10 +77,6 @@ DFM_API dfm_status dfm_ode_set_convex(dfm_ode ode, dGeomID geom, uint32_t npoint
 DFM_API dfm_status dfm_ode_set_heights(dfm_ode ode, dGeomID geom, double width, double depth, uint32_t nx, uint32_t nz, const double *heights);
 /** Reads a geom's triangles again, after dGeomTriMeshDataUpdate or a change of its arrays. Threads: Not during step. Since 0.2. */
 DFM_API dfm_status dfm_ode_refresh(dfm_ode ode, dGeomID geom);
-
-/** Makes the rigid host "ode" known, for scenes and dfm_rigid_create: a dWorldID of its own per set. A second call does nothing.
- * @return DFM_OK; DFM_E_UNSUPPORTED as dfm_ode_attach. Threads: Any thread. Since 0.2. */
-DFM_API dfm_status dfm_ode_register(void);
 #ifdef __cplusplus
 }
 #endif
