@@ -22,7 +22,8 @@ dfm_pose to_pose(const Pose &p) {
 Adapter::Adapter(dfm_world world, const dfm_ode_def &def) : world_(world), space_(def.space), own_group_(!def.contacts), own_near_(!def.near_callback) {
   engine_.world = def.world, engine_.quick = def.flags & DFM_ODE_QUICK;
   engine_.contacts = def.contacts ? def.contacts : dJointGroupCreate(0);
-  near_ = {def.world, engine_.contacts, def.friction, def.most_contacts};
+  near_.world = def.world, near_.group = engine_.contacts, near_.coefficient = def.friction, near_.most = def.most_contacts;
+  engine_.friction = &near_;
   engine_.near_callback = def.near_callback ? def.near_callback : near_callback;
   engine_.near_data = def.near_callback ? def.near_data : &near_;
 }

@@ -25,6 +25,7 @@ class Adapter {
   dfm_status set_geom(dGeomID geom, const dfm_ode_geom &props);
   dfm_status set_arrays(dGeomID geom, int geom_class, Triangles arrays);
   dfm_status refresh(dGeomID geom);
+  RigidFriction &friction() { return near_; }
   dfm_ode_stats stats() const;
   uint32_t trouble = 0;
   dWorldID ode_world() const { return engine_.world; }
@@ -56,7 +57,7 @@ class Adapter {
   dfm_world world_;
   dSpaceID space_;
   Engine engine_;
-  NearCallback near_;
+  RigidFriction near_;
   bool own_group_, own_near_;
   std::vector<std::unique_ptr<Geom>> geoms_;   // in the order they came
   std::vector<std::unique_ptr<Body>> bodies_;

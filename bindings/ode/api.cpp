@@ -161,3 +161,20 @@ dfm_status dfm_ode_set_heights(dfm_ode ode, dGeomID geom, double width, double d
 dfm_status dfm_ode_refresh(dfm_ode ode, dGeomID geom) {
   return with(ode, [&](Adapter &a) { return !geom ? missing("geom") : a.refresh(geom); });
 }
+
+dfm_status dfm_ode_set_friction(dfm_ode ode, dfm_context *context, const char *law, const dfm_params *params, double area) {
+  return with(ode, [&](Adapter &a) {
+    if (!law) return a.friction().clear_law(), dfm_status{DFM_OK};
+    return !context ? missing("context") : a.friction().set_law(context, law, params, area);
+  });
+}
+
+dfm_status dfm_ode_contact(dfm_ode ode, dGeomID a, dGeomID b, int *made) {
+  return with(ode, [&](Adapter &adapter) {
+    if (!a || !b) return missing(!a ? "a" : "b");
+    if (dGeomIsSpace(a) || dGeomIsSpace(b)) return failed(DFM_E_ARG, "a space is no geom; dSpaceCollide2 finds the geoms in it");
+    const int n = adapter.friction().collide(a, b, adapter.friction().h);
+    if (made) *made = n;
+    return dfm_status{DFM_OK};
+  });
+}

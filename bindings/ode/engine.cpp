@@ -141,8 +141,15 @@ void Engine::find_ties() {
 }
 
 void Engine::end() {
-  if (contacts) dJointGroupEmpty(contacts);
+  close();
   open_ = in_step = false;
+}
+
+// The sub-step before has ended for good.
+void Engine::close() {
+  if (friction && stepped_) friction->settle(h_);
+  if (contacts) dJointGroupEmpty(contacts);
+  stepped_ = false;
 }
 
 void Engine::forget(Member *m) { std::erase(members, m); }
@@ -170,7 +177,8 @@ void Engine::open(const dfm_rigid_step &step) {
       s.v = load(dBodyGetLinearVel(s.body)), s.w = load(dBodyGetAngularVel(s.body));
       s.enabled = dBodyIsEnabled(s.body);
     }
-    if (contacts) dJointGroupEmpty(contacts);
+    close();
+    if (friction) friction->h = step.h;
     for (const dSpaceID space : spaces) dSpaceCollide(space, near_data, near_callback);
   }
   open_ = true, stepped_ = dirty_ = again_ = asked_again_ = false;
@@ -187,7 +195,7 @@ void Engine::classify(Member &m, const dfm_rigid_step &step, const double *extra
   m.kind = !moves ? Member::still : plain ? Member::free : Member::jointed;
   m.turns = m.kind == Member::free && dBodyGetGyroscopicMode(b) && !finite_turn(b);
   if (m.kind == Member::free && !m.turns) m.kind = Member::jointed;   // ODE turns it: what it makes of it is in b
-  m.bias = {load(extra), load(extra + 3)}, 
+  m.bias = {load(extra), load(extra + 3)},
   m.impulse = {};
   const Vec v = load(m.start.velocity), w = load(m.start.spin);
   const Saved &forces = saved_[m.saved];

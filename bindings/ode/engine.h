@@ -20,6 +20,7 @@
 #include <vector>
 
 #include "deform/ode.h"
+#include "near.h"
 #include "rigid_math.h"
 
 namespace dfm_ode_detail {
@@ -72,6 +73,7 @@ class Engine {
   std::vector<dSpaceID> spaces;            // collided at the start of each sub-step, each in itself
   dNearCallback *near_callback = nullptr;
   void *near_data = nullptr;
+  RigidFriction *friction = nullptr;
   std::vector<Member *> members;           // of all sets
 
   uint64_t steps = 0, corrections = 0;
@@ -108,6 +110,7 @@ class Engine {
 
   void open(const dfm_rigid_step &step);
   void restore();
+  void close();
   void classify(Member &m, const dfm_rigid_step &step, const double *extra);
   void advance(double h);
   void turn_free(double h);

@@ -39,7 +39,7 @@ class OwnWorld : public Host {
   std::vector<uint32_t> moving_;          // group -> number
   std::vector<Joint> joints_;
   std::vector<dfm_rigid_state> given_;    // as ODE's bodies stand
-  NearCallback near_;
+  RigidFriction near_;
 
   size_t first_joint() const { return size_t{Member::kExtra} * members_.size(); }
   void add_body(const dfm_rigid_def &def, uint32_t number);
@@ -103,6 +103,7 @@ OwnWorld::OwnWorld(const dfm_rigid_set_def &set, uint32_t *group) {
   engine_.spaces = {space_};
   engine_.contacts = dJointGroupCreate(0);
   near_.world = engine_.world, near_.group = engine_.contacts;
+  engine_.friction = &near_;
   engine_.near_callback = near_callback, engine_.near_data = &near_;
   members_.resize(set.nbody), given_.resize(set.nbody);
   for (uint32_t i = 0; i < set.nbody; ++i) {

@@ -61,6 +61,18 @@ DFM_API dfm_status dfm_ode_obstacle(dfm_ode ode, dGeomID geom, dfm_obstacle *out
 /** What stands for a body with at least one geom that takes part. Threads: Not during step. Since 0.2. */
 DFM_API dfm_status dfm_ode_rigid(dfm_ode ode, dBodyID body, dfm_rigid *out);
 
+/** Friction of the rigid bodies among each other by one of the library's laws, in the default callback and in dfm_ode_contact: the coefficient of a
+ * set-valued law follows its curve over the slip; a law with a state keeps it per contact. Not part of a snapshot of the dfm_world.
+ * @param law     as for dfm_law_open; NULL: dfm_ode_def.friction again
+ * @param params  NULL: the law's defaults
+ * @param area    m2 that one contact stands for, where the law's stiffness is per area
+ * @return DFM_OK; as dfm_law_open and dfm_law_pack. Threads: Not during step. Since 0.2. */
+DFM_API dfm_status dfm_ode_set_friction(dfm_ode ode, dfm_context *context, const char *law, const dfm_params *params, double area);
+/** For a near callback of one's own: collides two geoms and makes their contact joints, in the group that the adapter was attached with, with the
+ * friction of dfm_ode_set_friction. @param made  out, contact joints; may be NULL
+ * @return DFM_OK; DFM_E_ARG; DFM_E_HANDLE. Threads: from the near callback, that is: inside dfm_ode_step. Since 0.2. */
+DFM_API dfm_status dfm_ode_contact(dfm_ode ode, dGeomID a, dGeomID b, int *made);
+
 /** What ODE does not know of a geom. Its obstacle is made anew: its contacts end. Geoms nobody names are called "obstacleN". */
 typedef struct dfm_ode_geom {
   uint32_t size, ignore;           /* 1: soft bodies do not see it */
