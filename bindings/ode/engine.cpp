@@ -195,7 +195,7 @@ void Engine::classify(Member &m, const dfm_rigid_step &step, const double *extra
   m.kind = !moves ? Member::still : plain ? Member::free : Member::jointed;
   m.turns = m.kind == Member::free && dBodyGetGyroscopicMode(b) && !finite_turn(b);
   if (m.kind == Member::free && !m.turns) m.kind = Member::jointed;   // ODE turns it: what it makes of it is in b
-  m.bias = {load(extra), load(extra + 3)},
+  m.bias = {load(extra), load(extra + 3)};
   m.impulse = {};
   const Vec v = load(m.start.velocity), w = load(m.start.spin);
   const Saved &forces = saved_[m.saved];

@@ -1,4 +1,4 @@
-/* deform/ode.h -- libdeform_ode: soft bodies in a world of the Open Dynamics Engine (double precision, 0.16). doc/howto/ode.md.
+/* deform/ode.h -- libdeform_ode: soft bodies in a world of the Open Dynamics Engine (double precision, 0.16). doc/concepts/ode.md.
  *
  * An adapter joins a dWorldID and a dSpaceID to a dfm_world. The geoms of the space are what soft bodies touch; bodies feel the same impulses, inside
  * the solve. ODE keeps its joints, motors and rigid contacts; dfm_ode_step steps both. ODE's objects stay the caller's: they may be made, moved,
