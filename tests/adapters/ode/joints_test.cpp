@@ -111,7 +111,6 @@ TEST_P(OdeGripper, LiftsABallAndHoldsIt) {
   const double before = g.held();
   g.ode.run(1, h);
   EXPECT_LT(std::fabs(g.held() - before), 1e-6);
-  std::printf("creep %g um/s, corrections %lu of %lu, residual %g\n", 1e6*(g.held() - before), (unsigned long)g.ode.stats().corrections, (unsigned long)g.ode.stats().ode_steps, g.ode.stats().residual);
 }
 INSTANTIATE_TEST_SUITE_P(Steps, OdeGripper, ::testing::Values(1e-3, 1.0 / 240));
 

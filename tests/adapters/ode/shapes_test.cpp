@@ -36,8 +36,11 @@ const double kTable[8][4] = {{-0.3, -0.3, -0.1, 0}, {0.3, -0.3, -0.1, 0}, {0.3, 
                              {-0.3, -0.3, 0.1, 0}, {0.3, -0.3, 0.1, 0}, {0.3, 0.3, 0.1, 0}, {-0.3, 0.3, 0.1, 0}};
 const dTriIndex kFaces[36] = {0, 2, 1, 0, 3, 2, 4, 5, 6, 4, 6, 7, 0, 1, 5, 0, 5, 4, 1, 2, 6, 1, 6, 5, 2, 3, 7, 2, 7, 6, 3, 0, 4, 3, 4, 7};
 dTriMeshDataID table_data() {
-  const dTriMeshDataID data = dGeomTriMeshDataCreate();
-  dGeomTriMeshDataBuildDouble(data, kTable, sizeof kTable[0], 8, kFaces, 36, 3 * sizeof(dTriIndex));
+  static const dTriMeshDataID data = [] {   // of all stands
+    const dTriMeshDataID made = dGeomTriMeshDataCreate();
+    dGeomTriMeshDataBuildDouble(made, kTable, sizeof kTable[0], 8, kFaces, 36, 3 * sizeof(dTriIndex));
+    return made;
+  }();
   return data;
 }
 
