@@ -37,9 +37,17 @@ write_basic_package_version_file(${CMAKE_BINARY_DIR}/cmake/deformConfigVersion.c
 install(FILES ${CMAKE_BINARY_DIR}/cmake/deformConfig.cmake ${CMAKE_BINARY_DIR}/cmake/deformConfigVersion.cmake
   ${CMAKE_SOURCE_DIR}/cmake/DeformPlugin.cmake ${CMAKE_SOURCE_DIR}/cmake/deform_plugin.map DESTINATION ${deform_cmake_dir})
 
-set(deform_pc_private "")
+# An archive is all there is to link then, so `pkg-config --libs` names what it needs even without --static.
+set(deform_pc_needs "")
 if(NOT DEFORM_SHARED)
-  set(deform_pc_private "-lz -lstdc++ -lm -ldl -pthread")
+  set(deform_pc_needs " -lz -lstdc++ -lm -pthread")
+  if(NOT DEFORM_PLUGINS_STATIC)
+    string(APPEND deform_pc_needs " -ldl")
+  endif()
+endif()
+set(deform_pc_plugin_dir "\${prefix}/${deform_plugin_dir}")
+if(DEFORM_PLUGINS_STATIC)
+  set(deform_pc_plugin_dir "")
 endif()
 configure_file(${CMAKE_SOURCE_DIR}/cmake/deform.pc.in ${CMAKE_BINARY_DIR}/cmake/deform.pc @ONLY)
 install(FILES ${CMAKE_BINARY_DIR}/cmake/deform.pc DESTINATION ${CMAKE_INSTALL_LIBDIR}/pkgconfig)

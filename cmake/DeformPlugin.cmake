@@ -1,7 +1,8 @@
 # deform_add_plugin(NAME SOURCE...) builds a plugin that exports dfm_plugin_entry alone, with the number rules of the library.
+# deform_add_static_plugin(NAME SOURCE...) builds the same sources as an archive to link into a program; the entry is then called
+# dfm_plugin_entry_NAME, and the program hands it to dfm_plugin_register_static.
 set(DEFORM_PLUGIN_MAP ${CMAKE_CURRENT_LIST_DIR}/deform_plugin.map)
-function(deform_add_plugin name)
-  add_library(${name} MODULE ${ARGN})
+function(deform_plugin_rules name)
   if(COMMAND deform_kernel_flags)
     deform_kernel_flags(${ARGN})
   endif()
@@ -11,8 +12,19 @@ function(deform_add_plugin name)
     target_link_libraries(${name} PRIVATE deform::deform_headers)
   endif()
   target_compile_options(${name} PRIVATE -ffp-contract=off)
-  set_target_properties(${name} PROPERTIES PREFIX "" C_VISIBILITY_PRESET hidden CXX_VISIBILITY_PRESET hidden
-    VISIBILITY_INLINES_HIDDEN ON)
+  set_target_properties(${name} PROPERTIES C_VISIBILITY_PRESET hidden CXX_VISIBILITY_PRESET hidden VISIBILITY_INLINES_HIDDEN ON)
+endfunction()
+
+function(deform_add_static_plugin name)
+  add_library(${name} STATIC ${ARGN})
+  deform_plugin_rules(${name} ${ARGN})
+  target_compile_definitions(${name} PRIVATE DFM_STATIC_PLUGIN=${name})
+endfunction()
+
+function(deform_add_plugin name)
+  add_library(${name} MODULE ${ARGN})
+  deform_plugin_rules(${name} ${ARGN})
+  set_target_properties(${name} PROPERTIES PREFIX "")
   target_link_options(${name} PRIVATE -Wl,--version-script=${DEFORM_PLUGIN_MAP})
   set_target_properties(${name} PROPERTIES LINK_DEPENDS ${DEFORM_PLUGIN_MAP})
 endfunction()

@@ -38,10 +38,8 @@ namespace {
 constexpr const char *kIn = "mesh of any format that is read: .msh .vtk .vtu .mesh .obj .ply .stl .off";
 
 bool open(MeshSession &s, const std::string &file, bool as_surface) {
-  uint32_t kind = 0;
-  if (!s.context || dfm_mesh_file_kind(s.context, file.c_str(), &kind) < 0) return false;
-  if (kind == DFM_MESH_TETS && !as_surface) return dfm_tetmesh_read(s.context, file.c_str(), &s.cells) >= 0;
-  return dfm_trimesh_read(s.context, file.c_str(), &s.surface) >= 0;
+  if (!s.context) return false;
+  return (as_surface ? dfm_trimesh_read(s.context, file.c_str(), &s.surface) : dfm_mesh_read(s.context, file.c_str(), &s.cells, &s.surface)) >= 0;
 }
 
 int info(const Globals &globals, const std::string &file) {

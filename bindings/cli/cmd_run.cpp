@@ -92,7 +92,10 @@ class Runner {
       out.push_back("steps were cut into up to " + std::to_string(stats.substeps_max) + " sub-steps: the step is longer than the stable one; deform explain says why");
     if (stats.unconverged > 0) out.push_back("the contact solve met its cap in " + std::to_string(stats.unconverged) + " sub-steps");
     if (trouble_ & DFM_TROUBLE_INVERTED) out.push_back("cells turned inside out: refine the mesh or soften the load");
-    if (checks().intersections_max > 0) out.push_back("surfaces cross: up to " + std::to_string(checks().intersections_max) + " triangle pairs in one state");
+    const auto pairs = [](auto most) { return "up to " + std::to_string(most) + " triangle pairs"; };
+    if (checks().between_max > 0) out.push_back("surfaces cross: " + pairs(checks().between_max) + " of two surfaces in one state");
+    if (checks().self_max > 0)
+      out.push_back("a surface crosses itself: " + pairs(checks().self_max) + " in one state; \"contact\": {\"self\": true} keeps it from that");
     return out;
   }
 

@@ -188,8 +188,8 @@ bool pass_through(const Triangle a, const Triangle b) {
 
 // ---- which pairs to test: a box tree over all triangles, median split ---------------------------------------
 
-size_t Counter::count(const std::vector<Surface> &surfaces, Touching touching) {
-  surfaces_ = &surfaces, touching_ = touching, found_ = 0;
+Found Counter::count(const std::vector<Surface> &surfaces, Touching touching) {
+  surfaces_ = &surfaces, touching_ = touching, found_ = {};
   items_.clear(), nodes_.clear();
   for (uint32_t s = 0; s < surfaces.size(); ++s) {
     for (uint32_t t = 0; t < surfaces[s].ntri; ++t) {
@@ -201,7 +201,7 @@ size_t Counter::count(const std::vector<Surface> &surfaces, Touching touching) {
       items_.push_back(item);
     }
   }
-  if (items_.empty()) return 0;
+  if (items_.empty()) return {};
   within(build(0, uint32_t(items_.size())));
   return found_;
 }
@@ -272,7 +272,7 @@ void Counter::test(const Item &ia, const Item &ib) {
     for (int i = 0; i < 3; ++i)
       for (int j = 0; j < 3; ++j)
         if (ta[i] == tb[j] || std::memcmp(a[i], b[j], 3 * sizeof(double)) == 0) return;
-  if (touching_ == Touching::counts ? meet(a, b) : pass_through(a, b)) ++found_;
+  if (touching_ == Touching::counts ? meet(a, b) : pass_through(a, b)) ++(ia.surface == ib.surface ? found_.within : found_.between);
 }
 
 }  // namespace crossing

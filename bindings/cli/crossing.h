@@ -25,11 +25,17 @@ struct Surface { const double *xyz; uint32_t n; const uint32_t *tri; uint32_t nt
 // Committed states keep a distance between surfaces, so there any shared point counts; a start state is the user's own, and may touch.
 enum class Touching { counts, allowed };
 
+// Triangle pairs of two surfaces, and of one surface with itself.
+struct Found {
+  size_t between = 0, within = 0;
+  size_t all() const { return between + within; }
+};
+
 class Counter {
  public:
   // Pairs within and between surfaces; pairs of one surface that share a vertex (by number or by position) are excepted.
   // Coordinates must be finite, and below 1e90 for the exact signs not to overflow.
-  size_t count(const std::vector<Surface> &surfaces, Touching touching);
+  Found count(const std::vector<Surface> &surfaces, Touching touching);
 
  private:
   struct Box { double lo[3], hi[3]; };
@@ -44,7 +50,7 @@ class Counter {
   Touching touching_ = Touching::counts;
   std::vector<Item> items_;
   std::vector<Node> nodes_;
-  size_t found_ = 0;
+  Found found_;
 };
 
 }  // namespace crossing

@@ -188,22 +188,21 @@ FileNodes Outputs::file_nodes(size_t b) const {
   if (!parse_json(scene_.value(key + "/mesh"), mesh)) throw Failure(kBadInput, "body \"" + body.name + "\" has no mesh file");
   const std::string path = (fs::path(scene_.path()).parent_path() / mesh.text).string();
   FileNodes out;
-  uint32_t kind = 0;
-  need(dfm_mesh_file_kind(scene_.context(), path.c_str(), &kind));
+  dfm_tetmesh cells = 0;
+  dfm_trimesh surface = 0;
+  need(dfm_mesh_read(scene_.context(), path.c_str(), &cells, &surface));
   const uint32_t *file_point = nullptr;
-  if (kind == DFM_MESH_SURFACE) {
+  if (surface) {
     out.surface = scene_.value(key + "/surface/mesh").empty() && scene_.value(key + "/surface/from").empty();
     out.number.resize(out.surface ? body.nsurfel : body.npoint);
     for (uint32_t i = 0; i < out.number.size(); ++i) out.number[i] = i;
-    dfm_trimesh file = 0;
-    if (out.surface) need(dfm_trimesh_read(scene_.context(), path.c_str(), &file)), need(dfm_trimesh_data(file, nullptr, nullptr, &file_point));
-    if (out.surface) std::copy_n(file_point, out.number.size(), out.number.begin()), dfm_trimesh_destroy(file);
+    need(dfm_trimesh_data(surface, nullptr, nullptr, &file_point));
+    if (out.surface) std::copy_n(file_point, out.number.size(), out.number.begin());
+    dfm_trimesh_destroy(surface);
   } else {
-    dfm_tetmesh file = 0;
-    need(dfm_tetmesh_read(scene_.context(), path.c_str(), &file));
-    need(dfm_tetmesh_data(file, nullptr, nullptr, &file_point));
+    need(dfm_tetmesh_data(cells, nullptr, nullptr, &file_point));
     out.number.assign(file_point, file_point + body.npoint);
-    dfm_tetmesh_destroy(file);
+    dfm_tetmesh_destroy(cells);
   }
   out.start = node_positions(body, out);
   return out;

@@ -7,6 +7,7 @@
 #include "json_text.h"
 #include "messages.h"
 #include "run.h"
+#include "voxel_core.h"
 
 namespace cli {
 
@@ -51,6 +52,17 @@ dfm_body_measure rigid_measure(const RigidView &rigid) {
   return m;
 }
 
+Checker::Checker(const SceneFile &scene) : scene_(scene), positions_(scene.bodies().size()) {
+  for (const ObstacleView &obstacle : scene.obstacles()) {
+    if (obstacle.def.shape != DFM_SHAPE_MESH && obstacle.def.shape != DFM_SHAPE_VOXELS) continue;
+    solids_.push_back(obstacle);
+    if (obstacle.def.shape != DFM_SHAPE_VOXELS) continue;
+    cores_.push_back(voxel_core(obstacle.def));
+    solids_.back().def.points = cores_.back().data();
+  }
+  placed_.resize(solids_.size());
+}
+
 void Checker::check(bool start_state) {
   ++checks_.states;
   surfaces_.clear();
@@ -79,14 +91,14 @@ void Checker::check(bool start_state) {
     if (!std::exchange(checks_.too_far, true)) keep_warning("a body is further than 1e90 m away: crossings cannot be counted in such a state");
     return;
   }
-  for (size_t o = 0; o < placed_.size(); ++o) {
-    const ObstacleView &obstacle = scene_.obstacles()[o];
-    if (obstacle.def.shape != DFM_SHAPE_MESH) continue;
+  for (size_t o = 0; o < solids_.size(); ++o) {
+    const ObstacleView &obstacle = solids_[o];
     place_points(obstacle, placed_[o]);
     surfaces_.push_back({placed_[o].data(), obstacle.def.npoint, obstacle.def.triangles, obstacle.def.ntriangle, true});
   }
-  const size_t found = counter_.count(surfaces_, start_state ? crossing::Touching::allowed : crossing::Touching::counts);
-  checks_.intersections_max = std::max(checks_.intersections_max, found);
+  const crossing::Found found = counter_.count(surfaces_, start_state ? crossing::Touching::allowed : crossing::Touching::counts);
+  checks_.intersections_max = std::max(checks_.intersections_max, found.all());
+  checks_.between_max = std::max(checks_.between_max, found.between), checks_.self_max = std::max(checks_.self_max, found.within);
 }
 
 namespace {
@@ -158,13 +170,14 @@ std::string summary_json(const SceneFile &scene, const RunOptions &options, cons
   std::snprintf(hash, sizeof hash, "\"%016llx\"", static_cast<unsigned long long>(dfm_world_hash(scene.world())));
   std::vector<std::string> warning_texts;
   for (const std::string &w : warnings()) warning_texts.push_back(quoted(w));
-  JsonObject ms, solver, hold, effects, contacts, out;
+  JsonObject ms, solver, hold, effects, contacts, guard, out;
   ms.add("median", number(1e3 * run.times.quantile(0.5))).add("p99", number(1e3 * run.times.quantile(0.99)));
   ms.add("max", number(1e3 * run.times.longest()));
   solver.add("passes", std::to_string(stats.passes_max)).add("sweeps", std::to_string(stats.sweeps_max));
   solver.add("residual_max", number(stats.residual_max));
   hold.add("creep_max_um_per_s", run.hold_begun && run.hold_count > 0 ? number(1e6 * run.creep) : "null");
   effects.add("active", names_json(plan, "effects")).add("absent", names_json(plan, "absent"));
+  guard.add("solves", std::to_string(stats.guard_solves)).add("cuts", std::to_string(stats.guard_cuts)).add("lost_s", number(stats.guard_lost));
   contacts.add("max", std::to_string(stats.contacts_max)).add("mean", number(stats.contacts_mean));
   out.add("format", "\"deform-summary\"").add("version", "1").add("library", quoted(dfm_version(nullptr, nullptr, nullptr)));
   out.add("scene", quoted(options.scene)).add("steps", std::to_string(run.steps)).add("substeps", std::to_string(stats.substeps));
@@ -172,8 +185,9 @@ std::string summary_json(const SceneFile &scene, const RunOptions &options, cons
   out.add("ms_per_step", ms.text()).add("stages", stages_json(scene, run.steps)).add("threads", std::to_string(stats.threads));
   out.add("finite", checks.finite ? "true" : "false").add("states_checked", std::to_string(checks.states));
   out.add("intersections_max", std::to_string(checks.intersections_max));
+  out.add("intersections_between_max", std::to_string(checks.between_max)).add("intersections_self_max", std::to_string(checks.self_max));
   out.add("inverted_max", std::to_string(std::max(checks.inverted_max, stats.inverted_max)));
-  out.add("guard_steps", std::to_string(stats.guard_steps)).add("unconverged_steps", std::to_string(stats.unconverged));
+  out.add("guard_steps", std::to_string(stats.guard_steps)).add("guard", guard.text()).add("unconverged_steps", std::to_string(stats.unconverged));
   out.add("solver", solver.text()).add("hold", hold.text()).add("effects", effects.text()).add("plugins", plugins_json(scene));
   out.add("bodies", bodies_json(scene)).add("contacts", contacts.text()).add("swaps", "[]").add("state_hash", hash);
   out.add("stopped", stopped_json(run)).add("warnings", json_array(warning_texts));
@@ -191,9 +205,9 @@ void print_table(const SceneFile &scene, const RunResult &run, const Checks &che
   }
   std::printf("%llu steps, %g s simulated in %.3g s: %.4g steps/s, %.3g x real time\n", static_cast<unsigned long long>(run.steps), run.simulated,
               run.wall, double(run.steps) / run.wall, (run.simulated - run.start) / run.wall);
-  std::printf("contacts: %u at most, %.3g on average; states checked: %llu, crossing triangle pairs: %zu, inverted cells: %u\n", stats.contacts_max,
+  std::printf("contacts: %u at most, %.3g on average; states checked: %llu, crossing triangle pairs: %zu (%zu of a body with itself), inverted cells: %u\n", stats.contacts_max,
               stats.contacts_mean, static_cast<unsigned long long>(checks.states), checks.intersections_max,
-              std::max(checks.inverted_max, stats.inverted_max));
+              checks.self_max, std::max(checks.inverted_max, stats.inverted_max));
 }
 
 void print_profile(const SceneFile &scene, const RunResult &run) {

@@ -45,7 +45,8 @@ struct RunResult {
 // What recorded states showed. "Recorded" is every state written to bodies.csv, and with --check every step.
 struct Checks {
   uint64_t states = 0;
-  size_t intersections_max = 0;
+  size_t intersections_max = 0;                   // pairs of one state: all, and by whether two surfaces cross or one crosses itself
+  size_t between_max = 0, self_max = 0;
   uint32_t inverted_max = 0;
   bool finite = true, too_far = false;
 };
@@ -53,13 +54,15 @@ struct Checks {
 // Judges one state: crossings, inverted cells, finiteness.
 class Checker {
  public:
-  explicit Checker(const SceneFile &scene) : scene_(scene), positions_(scene.bodies().size()), placed_(scene.obstacles().size()) {}
+  explicit Checker(const SceneFile &scene);
+  Checker(const Checker &) = delete;   // solids_ points into cores_
   void check(bool start_state);
   const Checks &result() const { return checks_; }
 
  private:
   const SceneFile &scene_;
-  std::vector<std::vector<double>> positions_, placed_;   // of bodies; of obstacles of triangles
+  std::vector<ObstacleView> solids_;                              // obstacles of triangles, and the cores of voxels
+  std::vector<std::vector<double>> cores_, positions_, placed_;   // of voxels; of bodies; of solids
   std::vector<crossing::Surface> surfaces_;
   std::vector<double> state_;  // x and v of one body
   crossing::Counter counter_;

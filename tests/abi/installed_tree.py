@@ -2,7 +2,7 @@
 """Installs into a scratch prefix, moves it, and does there what a stranger does: build a host with CMake and one with pkg-config, build a
 law with deform_add_plugin, run them, ask the command which plugins it finds. Nothing may point back into the build or source tree.
 
-installed_tree.py BUILD_DIR SOURCE_DIR SCRATCH_DIR C_COMPILER LIBDIR
+installed_tree.py BUILD_DIR SOURCE_DIR SCRATCH_DIR C_COMPILER
 """
 import os
 import pathlib
@@ -21,15 +21,29 @@ def run(*argv, env=None):
     return done.stdout
 
 
-def main():
-    build, source, scratch, compiler, libdir = sys.argv[1:]
-    here = pathlib.Path(__file__).resolve().parent / "stranger"
-    scratch = pathlib.Path(scratch)
+def clean_environment():
+    """Nothing of this process tells a stranger's build where our trees are."""
+    return {k: v for k, v in os.environ.items() if not k.startswith(("DEFORM_", "LD_", "CMAKE_"))}
+
+
+def install(build, source, scratch):
+    """(prefix, name of its library folder) of a tree installed into scratch, then moved, that names neither build nor source tree."""
     shutil.rmtree(scratch, ignore_errors=True)
     scratch.mkdir(parents=True)
-    clean = {k: v for k, v in os.environ.items() if not k.startswith(("DEFORM_", "LD_", "CMAKE_"))}
-    run("cmake", "--install", build, "--prefix", scratch / "first", env=clean)
+    run("cmake", "--install", build, "--prefix", scratch / "first", env=clean_environment())
     prefix = (scratch / "first").rename(scratch / "moved")
+    for path in prefix.rglob("*"):
+        if path.is_file() and path.suffix in (".cmake", ".pc", ".h", ".hpp") and any(str(place) in path.read_text() for place in (build, source)):
+            sys.exit(f"{path} names the build or source tree")
+    return prefix, next(prefix.rglob("deform.pc")).parent.parent.relative_to(prefix)
+
+
+def main():
+    build, source, scratch, compiler = sys.argv[1:]
+    here = pathlib.Path(__file__).resolve().parent / "stranger"
+    scratch = pathlib.Path(scratch)
+    clean = clean_environment()
+    prefix, libdir = install(build, source, scratch)
 
     run("cmake", "-S", here, "-B", scratch / "cmake", f"-DCMAKE_PREFIX_PATH={prefix}", f"-DCMAKE_C_COMPILER={compiler}",
         "-DCMAKE_BUILD_TYPE=Release", env=clean)
@@ -49,9 +63,6 @@ def main():
             sys.exit(f"{command} plugin list does not show {plugin}")
     if f"{build}/lib" in listed:  # the scratch prefix itself lies in the build folder
         sys.exit(f"the installed command found plugins of the build tree in {build}")
-    for path in prefix.rglob("*"):
-        if path.is_file() and path.suffix in (".cmake", ".pc", ".h", ".hpp") and any(place in path.read_text() for place in (build, source)):
-            sys.exit(f"{path} names the build or source tree")
 
 
 if __name__ == "__main__":

@@ -86,33 +86,36 @@ TEST(ContactReference, Toppling_VerdictsMatchOutsideFivePercent) {
   EXPECT_GE(n, 25);
 }
 
-TEST(ContactReference, CylinderOnIncline_RollsOrSlipsWithinFivePercent) {
+// All angles, coefficients and speeds are run by `make bench`; here one of each body.
+TEST(ContactReference, RoundBodiesOnIncline_RollOrSlipWithinFivePercent) {
   NEEDS_TABLES();
   int n = 0;
-  for (const auto &line : test::read_csv(test::shared_dir() + "/reference/contact/tables/rolling_incline.csv")) {
-    if (line[0] != "solid cylinder") continue;
-    const double theta = std::stod(line[1]), mu = std::stod(line[2]), a = std::stod(line[5]), turning = std::stod(line[6]);
-    if ((theta != 10 && theta != 30) || (mu != 0.1 && mu != 0.3)) continue;
-    const ref::Roll got = ref::roll(false, theta, mu);
-    EXPECT_NEAR(got.acceleration, a, 0.05 * a) << theta << " degrees, mu " << mu;
-    EXPECT_NEAR(got.turning, turning, 0.05 * a) << theta << " degrees, mu " << mu;
-    ++n;
-  }
+  for (const ref::RoundShape &shape : ref::kRounds)
+    for (const auto &line : test::read_csv(test::shared_dir() + "/reference/contact/tables/rolling_incline.csv")) {
+      if (line[0] != shape.name) continue;
+      const double theta = std::stod(line[1]), mu = std::stod(line[2]), a = std::stod(line[5]), turning = std::stod(line[6]);
+      if (theta != (shape.thin ? 20 : shape.ball ? 10 : 45) || mu != (shape.thin || shape.ball ? 0.3 : 0.1)) continue;
+      const ref::Roll got = ref::roll(shape, theta, mu);
+      EXPECT_NEAR(got.acceleration, a, 0.05 * a) << shape.name << ", " << theta << " degrees, mu " << mu;
+      EXPECT_NEAR(got.turning, turning, 0.05 * a) << shape.name << ", " << theta << " degrees, mu " << mu;
+      ++n;
+    }
   EXPECT_EQ(n, 4);
 }
 
-TEST(ContactReference, CylinderThrownWithoutSpin_RollsWithinFivePercent) {
+TEST(ContactReference, RoundBodiesThrownWithoutSpin_RollWithinFivePercent) {
   NEEDS_TABLES();
   int n = 0;
-  for (const Row &row : table("skid_to_roll")) {    // v0 mu time speed distance loss
-    if (row.name != "solid cylinder" || row.v[0] != 1 || (row.v[1] != 0.1 && row.v[1] != 0.3)) continue;
-    const ref::Skid got = ref::skid(false, row.v[0], row.v[1]);
-    EXPECT_NEAR(got.time, row.v[2], 0.05 * row.v[2]) << "mu " << row.v[1];
-    EXPECT_NEAR(got.speed, row.v[3], 0.05 * row.v[3]) << "mu " << row.v[1];
-    EXPECT_NEAR(got.distance, row.v[4], 0.05 * row.v[4]) << "mu " << row.v[1];
-    ++n;
-  }
-  EXPECT_EQ(n, 2);
+  for (const ref::RoundShape &shape : ref::kRounds)
+    for (const Row &row : table("skid_to_roll")) {    // v0 mu time speed distance loss
+      if (row.name != shape.name || row.v[0] != 0.5 || row.v[1] != 0.8) continue;
+      const ref::Skid got = ref::skid(shape, row.v[0], row.v[1]);
+      EXPECT_NEAR(got.time, row.v[2], 0.05 * row.v[2]) << shape.name << ", " << row.v[0] << " m/s, mu " << row.v[1];
+      EXPECT_NEAR(got.speed, row.v[3], 0.05 * row.v[3]) << shape.name << ", " << row.v[0] << " m/s, mu " << row.v[1];
+      EXPECT_NEAR(got.distance, row.v[4], 0.05 * row.v[4]) << shape.name << ", " << row.v[0] << " m/s, mu " << row.v[1];
+      ++n;
+    }
+  EXPECT_EQ(n, 3);
 }
 
 TEST(ContactReference, StickSlip_PeriodAndAmplitudeWithinTwoPercent) {

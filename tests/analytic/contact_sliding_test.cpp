@@ -23,11 +23,7 @@ struct Slider {
     test::set_friction(world, mu);
     test::run(world, 0.2, 1e-3);
     test::ok(dfm_world_set_gravity(world, gravity.data()));
-    uint32_t n = 0;
-    test::ok(dfm_body_get_state(body, 0, nullptr, nullptr, &n));
-    std::vector<double> v(size_t(3) * n);
-    for (size_t i = 0; i < v.size(); ++i) v[i] = velocity[i % 3];
-    test::ok(dfm_body_set_state(body, n, nullptr, v.data()));
+    test::set_velocity(body, velocity);
   }
   dfm_body_measure now() const { return test::measure(body); }
 };

@@ -18,13 +18,7 @@ struct Block {
     body = test::make_body(context, world, "beam", {0.1, 0.1, 0.1}, 60, o);
     test::set_friction(world, mu);
   }
-  void push(std::array<double, 3> velocity) const {
-    uint32_t n = 0;
-    test::ok(dfm_body_get_state(body, 0, nullptr, nullptr, &n));
-    std::vector<double> v(size_t(3) * n);
-    for (size_t i = 0; i < v.size(); ++i) v[i] = velocity[i % 3];
-    test::ok(dfm_body_set_state(body, n, nullptr, v.data()));
-  }
+  void push(std::array<double, 3> velocity) const { test::set_velocity(body, velocity); }
   dfm_body_measure now() const { return test::measure(body); }
   double normal_force() const {
     double sum = 0;

@@ -140,6 +140,58 @@ TEST(RigidContact, MotorPress_GivesItsForce) {
   EXPECT_NEAR(mean, 5, 0.01);
 }
 
+// A motor with power to spare runs at its speed while contact brakes it, to rounding, and says what that takes.
+TEST(RigidContact, BrakedMotor_KeepsItsSpeed) {
+  Context c;
+  const dfm_world w = make_world(c, {0, 0, 0});
+  const dfm_body bed = soft_bed(c, w, 5e4);
+  hold_bottom(bed);
+  double centre[3];
+  std::copy_n(measure(bed).com, 3, centre);
+  const double top = top_of(bed);
+  dfm_joint_def j = joint(DFM_JOINT_SLIDER, 0, DFM_RIGID_WORLD, {centre[0], centre[1], top}, {0, 0, -1});
+  j.motor = 1, j.velocity = 0.02, j.max = 1e4;
+  const dfm_rigid press = create(w, {box("press", {0.2, 0.2, 0.02}, 0.1, {centre[0], centre[1], top + 0.0205})}, {j})[0];
+  double force[3] = {}, moment[3] = {}, rate = 0, effort = 0, most = 0;
+  for (int k = 0; k < 500; ++k) {
+    run(w, 1e-3, 1e-3);
+    ok(dfm_rigid_joint(press, 0, nullptr, &rate, &effort));
+    ok(dfm_rigid_contact_wrench(press, force, moment));
+    ASSERT_NEAR(rate, 0.02, 1e-12) << "step " << k;
+    ASSERT_NEAR(effort, force[2], k ? 1e-9 * (1 + force[2]) : 3) << "step " << k;   // the first step also brings it up to speed
+    most = std::max(most, force[2]);
+  }
+  EXPECT_GT(most, 20);   // F h / m would be 0.2 m/s: ten times its speed
+}
+
+// The limit is met on the way in, and left when the speed is told anew: both within the sub-step, so that neither force nor speed is overshot.
+TEST(RigidContact, MotorPress_ReachesItsLimitAndLeavesIt) {
+  Context c;
+  const dfm_world w = make_world(c, {0, 0, 0});
+  const dfm_body bed = soft_bed(c, w, 5e4);
+  hold_bottom(bed);
+  double centre[3];
+  std::copy_n(measure(bed).com, 3, centre);
+  const double top = top_of(bed);
+  dfm_joint_def j = joint(DFM_JOINT_SLIDER, 0, DFM_RIGID_WORLD, {centre[0], centre[1], top}, {0, 0, -1});
+  j.motor = 1, j.velocity = 0.05, j.max = 8;
+  const dfm_rigid press = create(w, {box("press", {0.2, 0.2, 0.02}, 0.5, {centre[0], centre[1], top + 0.021})}, {j})[0];
+  double rate = 0, effort = 0;
+  int limited = 0;
+  for (int k = 0; k < 1000; ++k) {
+    if (k == 800) ok(dfm_rigid_set_motor(press, 0, -0.03, 8));
+    run(w, 1e-3, 1e-3);
+    ok(dfm_rigid_joint(press, 0, nullptr, &rate, &effort));
+    ASSERT_LE(std::fabs(effort), 8 * (1 + 1e-12)) << "step " << k;
+    const bool at_limit = std::fabs(effort) > 8 * (1 - 1e-9);
+    limited += at_limit;
+    if (!at_limit) ASSERT_NEAR(rate, k < 800 ? 0.05 : -0.03, 1e-9) << "step " << k;
+    else ASSERT_LE(effort > 0 ? rate : -rate, (k < 800 ? 0.05 : 0.03) + 1e-9) << "step " << k;   // never faster than told
+  }
+  EXPECT_GT(limited, 300);
+  EXPECT_NEAR(rate, -0.03, 1e-9);
+}
+
 // A heavy rigid body on a light soft one is the hard case of a sequential solve: from landing to rest, at a weight of 20 N whatever the mass.
 // Figures in doc/concepts/rigid.md.
 TEST(RigidContact, MassRatios_Converge) {

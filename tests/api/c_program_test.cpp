@@ -1,4 +1,4 @@
-// The example programs, which are C: each runs, and prints what physics says.
+// The example programs: each runs, and prints what physics says.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -63,4 +63,16 @@ TEST(CProgram, RigidHost_IsCarriedByTheBall) {
   const size_t at = r.out.find("carried with ");
   ASSERT_NE(at, std::string::npos) << r.out;
   EXPECT_NEAR(std::strtod(r.out.c_str() + at + 13, nullptr), 2 * 9.81, 0.02 * 2 * 9.81);
+}
+
+TEST(CppProgram, Cpp_TellsOfTheMissingLawAndOfTheBalls) {
+  const test::CommandResult r = example("05_cpp");
+  ASSERT_EQ(r.exit_code, 0) << r.out << r.err;
+  unsigned contacts = 0;
+  double newton = 0, z = 0;
+  const char *const form = "no such law: DFM_E_UNSUPPORTED\n%u contacts, %lf N between the balls, lower at %lf m";
+  ASSERT_EQ(std::sscanf(r.out.c_str(), form, &contacts, &newton, &z), 3) << r.out;
+  EXPECT_GT(contacts, 3u);
+  EXPECT_GT(newton, 0);
+  EXPECT_TRUE(z > 0.05 && z < 0.12) << z;
 }

@@ -124,18 +124,15 @@ TEST(MeshObstacle, SnapshotInMidContact_GoesOnWithTheSameBits) {
   Mixed a(1, hills()), b(1, hills());
   test::run(a.world, 0.15, 5e-4);
   ASSERT_GT(test::contacts(a.world).size(), 3u);
-  size_t bytes = 0;
-  test::ok(dfm_world_snapshot(a.world, nullptr, &bytes));
-  std::vector<unsigned char> data(bytes);
-  test::ok(dfm_world_snapshot(a.world, data.data(), &bytes));
+  const std::string data = test::snapshot(a.world);
   test::run(a.world, 0.1, 5e-4);
-  test::ok(dfm_world_restore(b.world, data.data(), bytes));
+  test::ok(dfm_world_restore(b.world, data.data(), data.size()));
   test::run(b.world, 0.1, 5e-4);
   EXPECT_EQ(a.hash(), b.hash());
   test::Triangles other = hills();
   other.points[2] += 1e-3;
   Mixed c(1, other);
-  EXPECT_EQ(dfm_world_restore(c.world, data.data(), bytes), DFM_E_FORMAT) << "another floor";
+  EXPECT_EQ(dfm_world_restore(c.world, data.data(), data.size()), DFM_E_FORMAT) << "another floor";
 }
 
 TEST(MeshObstacle, Threads_GiveTheSameBits) {

@@ -148,21 +148,18 @@ TEST(PairTable, SnapshotInMidContact_GoesOnWithTheSameBits) {
   Table a, b;
   rules(a), rules(b);
   test::run(a.world, 0.05, 1e-3);
-  size_t bytes = 0;
-  test::ok(dfm_world_snapshot(a.world, nullptr, &bytes));
-  std::vector<unsigned char> buffer(bytes);
-  test::ok(dfm_world_snapshot(a.world, buffer.data(), &bytes));
-  test::ok(dfm_world_restore(b.world, buffer.data(), bytes));
+  const std::string buffer = test::snapshot(a.world);
+  test::ok(dfm_world_restore(b.world, buffer.data(), buffer.size()));
   test::run(a.world, 0.05, 1e-3), test::run(b.world, 0.05, 1e-3);
   EXPECT_EQ(dfm_world_hash(a.world), dfm_world_hash(b.world));
   // rules are state: a world that had none goes on with those of the snapshot
   Table c;
-  test::ok(dfm_world_restore(c.world, buffer.data(), bytes));
+  test::ok(dfm_world_restore(c.world, buffer.data(), buffer.size()));
   test::run(c.world, 0.05, 1e-3);
   EXPECT_EQ(dfm_world_hash(a.world), dfm_world_hash(c.world));
   // another coefficient of a material is another world
   Table d(0.1);
-  EXPECT_LT(dfm_world_restore(d.world, buffer.data(), bytes), 0);
+  EXPECT_LT(dfm_world_restore(d.world, buffer.data(), buffer.size()), 0);
 }
 
 TEST(PairTable, SceneWithGroups_SlidesByThem) {

@@ -74,14 +74,6 @@ dfm_world falling_on_ball(dfm_context *c, dfm_body *ball, dfm_rigid *plate) {
   return w;
 }
 
-std::string snapshot(dfm_world w) {
-  size_t bytes = 0;
-  ok(dfm_world_snapshot(w, nullptr, &bytes));
-  std::string data(bytes, '\0');
-  ok(dfm_world_snapshot(w, data.data(), &bytes));
-  return data;
-}
-
 }  // namespace
 
 TEST(RigidHost, SomebodyElses_TakesPartInTheSolve) {

@@ -146,8 +146,6 @@ TEST(SceneErrors, NotDelivered_IsNeverIgnored) {
       {"/time/integrator=\"verlet\"", "/time/integrator"},
       {"/time/integrator=\"implicit_euler\"", "/time/integrator"},
       {"/contact/method=\"implicit\"", "/contact/method"},
-      {"/contact/method=\"rollback\"", "/contact/method"},
-      {"/contact/self=true", "/contact/self"},
       {"/contact/untangle=true", "/contact/untangle"},
       {"/output/color=\"stress\"", "/output/color"},
       {"/bodies/0/springs=[{\"point\":[0,0,0]}]", "/bodies/0/springs"},
@@ -219,10 +217,19 @@ TEST(SceneApi, ErrorsLeaveNothingBehind) {
   EXPECT_EQ(dfm_scene_open(nullptr, scene().c_str(), nullptr, &s), DFM_E_ARG);
   EXPECT_EQ(s, 77u);
   EXPECT_EQ(w, 77u);
-  const char *set[] = {"/contact/self=true"};
+  const char *set[] = {"/contact/untangle=true"};
   dfm_scene_options options = {sizeof options, 1, set, 0};
   EXPECT_EQ(dfm_scene_open(context, scene().c_str(), &options, &s), DFM_E_UNSUPPORTED);
-  EXPECT_NE(std::string(dfm_last_error()).find("not available yet: /contact/self"), std::string::npos);
+  EXPECT_NE(std::string(dfm_last_error()).find("not available yet: /contact/untangle"), std::string::npos);
+}
+
+TEST(SceneErrors, SelfContactAskedForAndRefused_SaysSo) {
+  test::Context context;
+  const char *set[] = {"/effects=[\"self_contact\"]", "/contact/self=false"};
+  dfm_scene_options options = {sizeof options, 2, set, 0};
+  dfm_scene s = 0;
+  EXPECT_EQ(dfm_scene_open(context, scene().c_str(), &options, &s), DFM_E_ARG);
+  EXPECT_NE(std::string(dfm_last_error()).find("/contact/self"), std::string::npos) << dfm_last_error();
 }
 
 TEST(SceneApi, OpenScene_AnswersUntilItIsClosed) {

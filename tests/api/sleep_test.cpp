@@ -275,10 +275,7 @@ TEST(Wake, ByWhateverChangesOrReachesABody_TakesItsIslandAndNoOther) {
   };
   Rest s;
   for (dfm_body b : s.bodies()) ASSERT_GE(until_asleep(s.world, b), 0);
-  size_t bytes = 0;
-  test::ok(dfm_world_snapshot(s.world, nullptr, &bytes));
-  std::string data(bytes, '\0');
-  test::ok(dfm_world_snapshot(s.world, data.data(), &bytes));
+  const std::string data = test::snapshot(s.world);
   for (const Waker &w : wakers) {
     const Rest t;   // a world of its own for each, put to sleep by the snapshot
     ASSERT_EQ(dfm_world_restore(t.world, data.data(), data.size()), DFM_OK) << dfm_last_error();
@@ -378,10 +375,7 @@ TEST(Wake, AfterASnapshotOfSleepers_GivesTheSameBits) {
   Rest s;
   for (dfm_body b : s.bodies()) ASSERT_GE(until_asleep(s.world, b), 0);
   steps(s.world, 10);
-  size_t bytes = 0;
-  test::ok(dfm_world_snapshot(s.world, nullptr, &bytes));
-  std::string data(bytes, '\0');
-  test::ok(dfm_world_snapshot(s.world, data.data(), &bytes));
+  const std::string data = test::snapshot(s.world);
   const auto go_on = [](const Rest &r) {
     steps(r.world, 20);
     const double p[3] = {1.05, 0.05, 0.1}, j[3] = {0.05, 0, -0.1};

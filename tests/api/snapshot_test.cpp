@@ -37,14 +37,7 @@ void steps(dfm_world w, int n) {
   for (int i = 0; i < n; ++i) ASSERT_EQ(dfm_world_step(w, 1e-3, nullptr), DFM_OK) << dfm_last_error();
 }
 
-std::string snapshot(dfm_world w) {
-  size_t bytes = 0;
-  test::ok(dfm_world_snapshot(w, nullptr, &bytes));
-  std::string data(bytes, '\0');
-  test::ok(dfm_world_snapshot(w, data.data(), &bytes));
-  return data;
-}
-
+using test::snapshot;
 dfm_status restore(dfm_world w, const std::string &data) { return dfm_world_restore(w, data.data(), data.size()); }
 
 }  // namespace

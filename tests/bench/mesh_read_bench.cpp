@@ -9,30 +9,11 @@
 #include <filesystem>
 #include <limits>
 
+#include "../unit/mesh/mesh_support.h"
 #include "machine.h"
 #include "mesh/raw_mesh.h"
-#include "support.h"
 
 namespace {
-
-struct Counted {
-  size_t held = 0, peak = 0;
-  dfm::Memory hooks;
-  Counted() {
-    hooks.user = this;
-    hooks.alloc = [](void *user, size_t bytes, size_t align) -> void * {
-      Counted &m = *static_cast<Counted *>(user);
-      m.held += bytes, m.peak = std::max(m.peak, m.held);
-      return std::aligned_alloc(align, (std::max<size_t>(bytes, 1) + align - 1) / align * align);
-    };
-    hooks.release = [](void *user, void *p, size_t bytes, size_t) {
-      static_cast<Counted *>(user)->held -= bytes;
-      std::free(p);
-    };
-  }
-  Counted(const Counted &) = delete;
-  Counted &operator=(const Counted &) = delete;
-};
 
 double cpu_seconds() {
   rusage u{};
@@ -60,7 +41,7 @@ int main(int argc, char **argv) {
     size_t peak = 0, held = 0;
     for (int run = 0; run < kRuns; ++run) {
       const double before = cpu_seconds();
-      Counted memory;
+      test::CountedMemory memory;
       dfm::RawMesh raw = dfm::read_raw(memory.hooks, path);
       parse = std::min(parse, cpu_seconds() - before);
       const dfm::TetMesh mesh = dfm::finish_mesh(path, std::move(raw));

@@ -83,6 +83,7 @@ void run(dfm_context *context, const Case &c, std::FILE *csv, const std::string 
   const double substeps = double(after.substeps - before.substeps) / double(total);
   std::printf("%-34s %8.0f (best %.0f)", c.name, rate, fastest);
   if (c.reach > 0) std::printf("  reach %6.0f: %3.0f %%", c.reach, 100 * rate / c.reach);
+  if (after.guard_steps > before.guard_steps) std::printf("  guard acted in %g sub-steps", double(after.guard_steps - before.guard_steps));
   std::printf("  contacts %.0f  sub-steps %.2f  sweeps %.1f\n", double(contacts) / double(slices), substeps, double(sweeps) / double(slices));
   double all = 0;
   for (uint32_t i = 0; i < n; ++i) all += t1[i].seconds - t0[i].seconds;
@@ -119,6 +120,10 @@ int main(int argc, char **argv) {
       {"coarse pair: springs and volume", "two_cylinders_coarse.json", {}, 3, 1, 6000},
       {"own pair (demo)", "two_cylinders.json", {}, 2, 1, 0},
       {"ten bodies", "ten_bodies.json", {}, 1, 0.5, 0},
+      // What the guard costs: the same without it.
+      {"fine pair, unguarded", "two_cylinders_fine.json", {"/contact/guard=false"}, 3, 1, 0},
+      {"own pair, unguarded", "two_cylinders.json", {"/contact/guard=false"}, 2, 1, 0},
+      {"ten bodies, unguarded", "ten_bodies.json", {"/contact/guard=false"}, 1, 0.5, 0},
   };
   std::printf("%-34s %8s\n", "scene", "full steps per second of processor time");
   for (const Case &c : cases) run(context, c, csv, commit);

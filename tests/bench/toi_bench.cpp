@@ -7,12 +7,13 @@
 #include <chrono>
 #include <cstdio>
 #include <cstring>
+#include <numeric>
 
+#include "../unit/narrow/guard_scene.h"
 #include "../unit/narrow/toi_support.h"
 #include "../unit/surfel/detect_scene.h"
 #include "machine.h"
 #include "narrow/toi_finders.h"
-#include "narrow/toi_guard.h"
 
 namespace {
 
@@ -207,19 +208,21 @@ void guard(const Sink &sink) {
     scene.add(moved(ball, {}, dfm::Vec3{0, 0, 0.2 + scene.offset}), velocity);
     dfm::BroadPhase broad(dfm::Memory::standard());
     broad.update(scene.bodies, scene.obstacles, scene.filter, scene.h, scene.offset);
-    std::vector<double> end[2];
-    for (int b = 0; b < 2; ++b) {
-      const dfm::Surface &surface = *scene.surfaces[size_t(b)];
+    std::vector<std::vector<double>> end(2);
+    for (size_t b = 0; b < 2; ++b) {
+      const dfm::Surface &surface = *scene.surfaces[b];
       for (size_t i = 0; i < surface.x.size(); ++i) end[b].push_back(surface.x[i] + scene.h * surface.v[i]);
     }
-    const double *const ends[2] = {end[0].data(), end[1].data()};
-    const double floor = scene.offset / 2, margin = 0.1 * floor;
+    const double floor = scene.offset / 2;
+    dfm::GuardScene asked = test::guard_scene(scene.bodies, end, floor, 0.1 * floor);
     dfm::Array<dfm::GuardHit> hits;
     const size_t pairs = broad.candidates().size();
+    std::vector<uint32_t> which(pairs);
+    std::iota(which.begin(), which.end(), 0u);
     double best = HUGE_VAL;
     for (int repetition = 0; repetition < kRepetitions; ++repetition) {
       const auto begin = std::chrono::steady_clock::now();
-      dfm::guard_pairs(scene.bodies, ends, broad.candidates(), floor, margin, hits);
+      dfm::guard_pairs(asked, broad.candidates(), which, hits);
       const std::chrono::duration<double> spent = std::chrono::steady_clock::now() - begin;
       best = std::min(best, 1e9 * spent.count() / double(pairs));
     }

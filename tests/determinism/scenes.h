@@ -1,6 +1,7 @@
 // Scenes whose state hash must be the same on every build, cut and processor.
 #pragma once
 #include "coupled.h"
+#include "hook.h"
 #include "obstacle.h"
 
 namespace scenes {
@@ -118,6 +119,36 @@ inline dfm_world woken(dfm_context *c) {
   return w;
 }
 
+// The roll-back: a block and a ball thrown onto another block, all frozen where they touch.
+inline dfm_world rolled_back(dfm_context *c) {
+  dfm_world_def d = dfm_world_def_default();
+  d.method = DFM_METHOD_ROLLBACK;
+  dfm_world w = 0;
+  test::ok(dfm_world_create(c, &d, &w));
+  test::add_plane(w, "floor");
+  test::set_friction(w, 0.4);
+  test::BodyOptions o;
+  o.young = 1e5, o.damping_stiffness = 1e-3, o.position = {0, 0, 2e-4}, o.velocity = {0.3, 0, 0};
+  test::make_body(c, w, "beam", {0.1, 0.1, 0.06}, 100, o);
+  o.position = {0.02, -0.13, 0.001}, o.velocity = {0.1, 0.8, 0};
+  test::make_body(c, w, "beam", {0.1, 0.1, 0.06}, 100, o);
+  o.position = {0.06, 0.045, 0.11}, o.velocity = {0.2, 0.1, -1}, o.spin = {3, 1, 0};
+  test::make_body(c, w, "ball", {0.04, 0, 0}, 100, o);
+  return w;
+}
+
+// A hook is thrown on the floor while its legs are pressed together: they meet, slide on each other and stick.
+inline dfm_world folded(dfm_context *c) {
+  const dfm_world w = test::make_self_world(c, true, {0, 0, -9.81});
+  test::add_plane(w, "floor");
+  test::set_friction(w, 0.4);
+  test::HookOptions o;
+  o.young = 3e4, o.damping_stiffness = 1e-3, o.damping_mass = 5, o.position = {0, 0, 0.0005};
+  o.velocity = {0.1, 0, -0.3}, o.spin = {0, 2, 1}, o.close = 0.5, o.pinch = 0.03;
+  test::make_hook(w, o);
+  return w;
+}
+
 struct Scene {
   const char *name;
   dfm_world (*build)(dfm_context *);
@@ -126,7 +157,9 @@ struct Scene {
 inline const Scene all[] = {{"ball_on_floor", ball_on_floor, 150}, {"crossing_beams", crossing_beams, 150}, {"ten_in_a_box", ten_in_a_box, 80},
                             {"fine_ball", fine_ball, 20}, {"coupled_pair", coupled_pair, 80},
                             {"dale", dale, 100},
-                            {"woken", woken, 220}};
+                            {"woken", woken, 220},
+                            {"rolled_back", rolled_back, 120},
+                            {"folded", folded, 120}};
 
 inline void advance(dfm_world w, int steps) {
   for (int i = 0; i < steps; ++i) ASSERT_EQ(dfm_world_step(w, 1e-3, nullptr), DFM_OK) << dfm_last_error();

@@ -32,6 +32,7 @@ GOOD = {
     "examples/01_hello.c": HELLO,
     "libdeform/include/deform/base.h": HEADER,
     "libdeform/include/deform/deform.h": '#ifndef DEFORM_DEFORM_H\n#define DEFORM_DEFORM_H\n#include "deform/base.h"\n#endif\n',
+    "libdeform/include/deform/deform.hpp": "inline int hello() { return dfm_hello() + dfm_hello_loud(); }\n",
     "libdeform/src/core/error.h": "#pragma once\n#include <string>\n",
     "libdeform/src/math/elementary.h": "#pragma once\ninline double exp_check(double x) { return std::exp(x); }\n",
     "libdeform/src/broad/tree.cpp": '#include "core/error.h"\n// std::pow( and Eigen:: in a comment say nothing\nint log(int);\n',
@@ -43,6 +44,8 @@ GOOD = {
     "plugins/friction_common/curve.h": "#pragma once\n",
     "plugins/model_msm/spring_kernel_avx2.cpp": "#include <immintrin.h>\n#include \"spring.h\"\nnamespace {\ninline double half(double x) { return x / 2; }\n}\n",
     "bindings/cli/main.cpp": '#include <CLI/CLI.hpp>\n#include "deform/deform.h"\n',
+    "libdeform/doc/howto/engine.md": "# Engine\n\n```c\nint x;\n```\n", "libdeform/doc/howto/engine/engine.c": "int w;\nint x;\nint y;\n",
+    "libdeform/doc/howto/cpp.md": "```c\nint nowhere;\n```\n",
     "tests/unit/tree_test.cpp": '#include "broad/tree.h"\n',
     "tests/api/hello_test.cpp": '#include "deform/deform.h"\n#include "support.h"\n',
 }
@@ -56,6 +59,7 @@ BAD = {
     "paths": [("README.md", "see /home/me/deform\n"), ("CMakeLists.txt", "set(X /root/x)\n"), ("README.md", "../.lib" + "rary/a\n"),
               ("examples/01_hello.c", '// "/wo' + 'rk/main"\n')],
     "readme": [("examples/01_hello.c", "// more\n"), ("README.md", "=# Title\n"), ("examples/01_hello.c", "\n" * 40)],
+    "guides": [("libdeform/doc/howto/engine.md", "```c\nint z;\n```\n"), ("libdeform/doc/howto/engine.md", "```cmake\nproject(x)\n```\n")],
     "layers": [("libdeform/src/core/error.h", '#include "math/vec3.h"\n'), ("libdeform/src/broad/tree.cpp", '#include "narrow/pair.h"\n'),
                ("libdeform/src/broad/tree.cpp", '#include "../core/error.h"\n'), ("libdeform/src/scene/reader.h", '#include "api/guard.h"\n'),
                ("libdeform/src/mesh/a.h", '=#include "plugin/loader.h"\n'), ("libdeform/src/plan/a.h", '=#include <world/world.h>\n'),
@@ -87,6 +91,8 @@ BAD = {
                        ("libdeform/include/deform/body.h", "=#pragma once\n"),
                        ("libdeform/include/deform/deform.h", "=#ifndef DEFORM_DEFORM_H\n#define DEFORM_DEFORM_H\n#endif\n"),
                        ("libdeform/include/deform/base.h", "=#ifndef DEFORM_BASE_H\n#define DEFORM_BASE_H\nDFM_API int dfm_a(void);\n#endif\n")],
+    "cpp_complete": [("libdeform/include/deform/deform.hpp", "=// dfm_hello() and dfm_hello_loud() in a comment reach nothing\n"),
+                     ("libdeform/include/deform/deform.hpp", "=inline int hello() { return dfm_hello(); }\n")],
     "threads": [("libdeform/include/deform/base.h", "\nDFM_API int dfm_silent(void);\n"),
                 ("libdeform/include/deform/base.h", "\n/** Says nothing of threads. */\nDFM_API int dfm_silent(int a,\n  int b);\n")],
 }

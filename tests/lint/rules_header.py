@@ -58,4 +58,17 @@ def threads(tree):
                 yield path, line_of(content, match.start()), f"{match.group(1)} has no comment that says \"Threads: ...\" (see base.h for the four phrases)"
 
 
-RULES = {"public_headers": public_headers, "threads": threads}
+def cpp_complete(tree):
+    """deform.hpp (with result.hpp) calls every function that the public headers declare."""
+    wrapper = PUBLIC + "deform.hpp"
+    if wrapper not in tree.paths:
+        yield wrapper, 1, "is not there"
+        return
+    parts = [wrapper, *(path for path in [PUBLIC + "result.hpp"] if path in tree.paths)]
+    used = set(re.findall(r"\bdfm_\w+", "".join(without_comments(tree.text(path)) for path in parts)))
+    for path, line, name in declared(tree):
+        if name not in used:
+            yield wrapper, 1, f"does not reach {name} ({path}:{line}); give it a member"
+
+
+RULES = {"public_headers": public_headers, "threads": threads, "cpp_complete": cpp_complete}

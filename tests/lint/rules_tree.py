@@ -87,4 +87,17 @@ def readme(tree):
         yield example, 31, f"has {program.count(chr(10))} lines; the front page promises 30"
 
 
-RULES = {"layout": layout, "text": text, "paths": paths, "readme": readme}
+def guides(tree):
+    """A guide with a folder of files beside it shows nothing that does not stand in one of them, to the letter."""
+    for path in tree.select("libdeform/doc/howto/", ext=(".md",)):
+        folder = path[:-len(".md")] + "/"
+        files = [tree.text(p) for p in tree.paths if p.startswith(folder)]
+        content = tree.text(path)
+        if not files:
+            continue
+        for block in re.finditer(r"^```(c|cpp|cmake)\n(.*?)^```", content, re.M | re.S):
+            if not any(block.group(2) in file for file in files):
+                yield path, line_of(content, block.start()), f"this block stands in no file of {folder}; copy it from there"
+
+
+RULES = {"layout": layout, "text": text, "paths": paths, "readme": readme, "guides": guides}

@@ -97,11 +97,8 @@ TEST(Bristle, LiftedOff_ForgetsItsDeflection) {
 TEST(Bristle, SavedInMidContact_ContinuesWithTheSameBits) {
   World a(0.2, 2e6), b(0.2, 2e6);
   test::run(a.world, 0.2, 1e-3);
-  size_t bytes = 0;
-  test::ok(dfm_world_snapshot(a.world, nullptr, &bytes));
-  std::vector<unsigned char> data(bytes);
-  test::ok(dfm_world_snapshot(a.world, data.data(), &bytes));
-  test::ok(dfm_world_restore(b.world, data.data(), bytes));
+  const std::string data = test::snapshot(a.world);
+  test::ok(dfm_world_restore(b.world, data.data(), data.size()));
   test::run(a.world, 0.2, 1e-3), test::run(b.world, 0.2, 1e-3);
   EXPECT_EQ(dfm_world_hash(a.world), dfm_world_hash(b.world));
 }

@@ -342,6 +342,17 @@ inline void expect_force_is_gradient(Instance &b, double h, double tolerance, co
     }
 }
 
+// Forces as they are now: their sum and their moment about the origin vanish to rounding.
+inline void expect_no_force_or_torque(Instance &b, const std::string &what) {
+  Vec force{}, torque{};
+  double scale = 0;
+  for (uint32_t i = 0; i < b.size(); ++i) {
+    const Vec x = b.get(b.x, i), f = b.get(b.f, i);
+    force = force + f, torque = torque + cross(x, f), scale += norm(f) * std::max(1.0, norm(x));
+  }
+  EXPECT_LT(norm(force) + norm(torque), 1e-12 * scale) << what;
+}
+
 // Rodrigues' rotation about a unit axis.
 inline Vec rotate(Vec x, Vec axis, double angle) {
   return std::cos(angle) * x + std::sin(angle) * cross(axis, x) + (dot(axis, x) * (1 - std::cos(angle))) * axis;

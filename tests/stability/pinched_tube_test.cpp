@@ -32,9 +32,29 @@ TEST(PinchedTube, StifferAlongItsAxis_ResistsMoreAndFarther) {
   EXPECT_GT(stiffer.spread, 1.5 * softer.spread);
 }
 
-TEST(PinchedTube, JitteredRuns_StayBetweenTheRods) {
-  test::expect_jittered("pinched_tube", 1, 3, {"--time", "0.45"}, 8, [](const test::SceneRun &run) {
-    const double upper = run.contact_force("upper"), lower = run.contact_force("lower");
-    return std::fabs(upper - lower) < 0.1 * upper && std::fabs(run.last("tube").com[0]) < 0.005;
-  });
+namespace {
+bool between_the_rods(const test::SceneRun &run) {
+  const double upper = run.contact_force("upper"), lower = run.contact_force("lower");
+  return std::fabs(upper - lower) < 0.1 * upper && std::fabs(run.last("tube").com[0]) < 0.005;
+}
+const std::vector<std::string> kShort = {"--time", "0.45"};
+}  // namespace
+
+TEST(PinchedTube, FiveJitteredRuns_StayBetweenTheRods) { test::expect_jittered("pinched_tube", 1, 5, kShort, 8, between_the_rods); }
+TEST(PinchedTube, FiveMoreJitteredRuns_StayBetweenTheRods) { test::expect_jittered("pinched_tube", 6, 10, kShort, 8, between_the_rods); }
+
+// One rod alone pushes it away.
+TEST(PinchedTube, OneRodAlone_DoesNotHoldIt) {
+  const std::string upper_alone = R"(/contact/filter=[{"between": ["lower", "*"], "collide": false}])";
+  EXPECT_FALSE(between_the_rods(test::SceneRun("pinched_tube", {"--time", "0.45", "--set", upper_alone})));
+}
+
+// The rods stand still from 0.4 s on: so do the contacts. Edges that a straight rod presses flat and that lost their contact for it came and went for ever,
+// 9 to 18 of them, and half of the steps did not converge.
+TEST(PinchedTube, RodsAtRest_KeepTheirContacts) {
+  for (const int seed : {5, 8}) {
+    const test::SceneRun run("pinched_tube", {"--time", "0.6", "--set", "/output/every=0.005", "--jitter", std::to_string(seed)});
+    for (const char *rod : {"upper", "lower"}) EXPECT_EQ(run.contact_counts(rod, 0.45).size(), 1u) << rod << ", seed " << seed;
+    EXPECT_LT(run.number("unconverged_steps"), 0.05 * run.number("steps")) << seed;
+  }
 }

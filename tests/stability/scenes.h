@@ -83,6 +83,15 @@ class SceneRun {
       if (c.size() == 10 && c[0] == contacts_.back()[0] && (c[1] == side || c[2] == side)) sum += std::stod(c[5]);
     return sum;
   }
+  // Counts of contacts with a side in the records from a time on.
+  std::set<int> contact_counts(const std::string &side, double from) const {
+    std::set<int> counts;
+    for (size_t i = 1; i < contacts_.size(); ++i) {
+      const auto &c = contacts_[i];
+      if (c.size() == 10 && std::stod(c[0]) > from && (c[1] == side || c[2] == side)) counts.insert(std::stoi(c[3]));
+    }
+    return counts;
+  }
   // All places of a probe: t, x, y, z.
   std::vector<std::array<double, 4>> probe_rows(const std::string &name) const {
     std::vector<std::array<double, 4>> rows;

@@ -86,20 +86,8 @@ inline Skin ball_skin(double radius, int level) {
   return w.skin;
 }
 
-inline std::vector<double> surface_positions(dfm_body b) {
-  uint32_t n = 0;
-  ok(dfm_surface_positions(b, 0, nullptr, &n));
-  std::vector<double> x(size_t{3} * n);
-  ok(dfm_surface_positions(b, n, x.data(), &n));
-  return x;
-}
-inline std::vector<uint32_t> surface_triangles(dfm_body b) {
-  uint32_t n = 0;
-  ok(dfm_surface_triangles(b, 0, nullptr, &n));
-  std::vector<uint32_t> t(size_t{3} * n);
-  ok(dfm_surface_triangles(b, n, t.data(), &n));
-  return t;
-}
+inline std::vector<double> surface_positions(dfm_body b) { return listed(dfm_surface_positions, b, 3); }
+inline std::vector<uint32_t> surface_triangles(dfm_body b) { return listed(dfm_surface_triangles, b, 3); }
 // The body's own boundary as a surface of its own: the same thing through the matrix.
 inline Skin boundary_skin(dfm_body b) { return {surface_positions(b), surface_triangles(b)}; }
 

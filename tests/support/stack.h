@@ -25,28 +25,7 @@ inline Stack make_stack(dfm_context *c, double drop = 1e-4, double mu = 0.5) {
   return s;
 }
 
-inline std::vector<dfm_contact> contacts(dfm_world w) {
-  uint32_t n = 0;
-  ok(dfm_world_contacts(w, 0, nullptr, &n));
-  std::vector<dfm_contact> out(n);
-  if (n) ok(dfm_world_contacts(w, n, out.data(), &n));
-  return out;
-}
-
-inline std::vector<dfm_pair_report> pairs(dfm_world w) {
-  uint32_t n = 0;
-  ok(dfm_world_pairs(w, 0, nullptr, &n));
-  std::vector<dfm_pair_report> out(n);
-  if (n) ok(dfm_world_pairs(w, n, out.data(), &n));
-  return out;
-}
-
-inline std::vector<dfm_contact_event> events(dfm_world w) {
-  uint32_t n = 0;
-  ok(dfm_world_events(w, 0, nullptr, &n));
-  std::vector<dfm_contact_event> out(n);
-  if (n) ok(dfm_world_events(w, n, out.data(), &n));
-  return out;
-}
+inline std::vector<dfm_pair_report> pairs(dfm_world w) { return listed(dfm_world_pairs, w); }
+inline std::vector<dfm_contact_event> events(dfm_world w) { return listed(dfm_world_events, w); }
 
 }  // namespace test

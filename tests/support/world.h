@@ -35,25 +35,32 @@ struct BodyOptions {
   const dfm_surface_def *surface = nullptr;
 };
 
-// A body from a generator: kind "beam", "cylinder" or "ball".
-inline dfm_body make_body(dfm_context *c, dfm_world w, const char *kind, std::array<double, 3> size, uint32_t cells, const BodyOptions &o) {
-  dfm_tetmesh mesh = 0;
-  ok(dfm_tetmesh_make(c, kind, size.data(), cells, &mesh));
+// Points and cells of a mesh into a def that borrows them.
+inline void lend(dfm_tetmesh mesh, dfm_body_def &d) {
   dfm_tetmesh_info info{};
   info.size = sizeof info;
   ok(dfm_tetmesh_get_info(mesh, &info));
-  const double *points = nullptr;
-  const uint32_t *tets = nullptr;
-  ok(dfm_tetmesh_data(mesh, &points, &tets, nullptr));
+  d.npoint = info.npoint, d.ntet = info.ntet;
+  ok(dfm_tetmesh_data(mesh, &d.points, &d.tets, nullptr));
+}
+
+inline dfm_material make_material(dfm_world w, const BodyOptions &o) {
   dfm_material_def md = dfm_material_def_default();
   md.density = o.density, md.young = o.young, md.poisson = o.poisson;
   md.damping_mass = o.damping_mass, md.damping_stiffness = o.damping_stiffness;
   dfm_material material = 0;
   ok(dfm_material_create(w, &md, &material));
+  return material;
+}
+
+// A body from a generator: kind "beam", "cylinder" or "ball".
+inline dfm_body make_body(dfm_context *c, dfm_world w, const char *kind, std::array<double, 3> size, uint32_t cells, const BodyOptions &o) {
+  dfm_tetmesh mesh = 0;
+  ok(dfm_tetmesh_make(c, kind, size.data(), cells, &mesh));
   dfm_body_def d = dfm_body_def_default();
   d.name = o.name.empty() ? nullptr : o.name.c_str();
   d.model = o.model.empty() ? nullptr : o.model.c_str();
-  d.npoint = info.npoint, d.ntet = info.ntet, d.points = points, d.tets = tets, d.material = material;
+  lend(mesh, d), d.material = make_material(w, o);
   const dfm_param_value volume{"volume", &o.volume, 1};
   if (o.volume >= 0) d.model_params = {sizeof(dfm_params), 1, &volume};
   for (int k = 0; k < 3; ++k) d.pose.position[k] = o.position[k], d.velocity[k] = o.velocity[k], d.spin[k] = o.spin[k];
@@ -63,6 +70,34 @@ inline dfm_body make_body(dfm_context *c, dfm_world w, const char *kind, std::ar
   ok(dfm_body_create(w, &d, &body));
   ok(dfm_tetmesh_destroy(mesh));
   return body;
+}
+
+// What one of the counted functions lists, `width` numbers or structs to a row.
+template <class T>
+std::vector<T> listed(dfm_status (*list)(uint64_t, uint32_t, T *, uint32_t *), uint64_t handle, size_t width = 1) {
+  uint32_t n = 0;
+  ok(list(handle, 0, nullptr, &n));
+  std::vector<T> out(width * n);
+  if (n) ok(list(handle, n, out.data(), &n));
+  return out;
+}
+inline std::vector<dfm_contact> contacts(dfm_world w) { return listed(dfm_world_contacts, w); }
+
+inline std::string snapshot(dfm_world w) {
+  size_t bytes = 0;
+  ok(dfm_world_snapshot(w, nullptr, &bytes));
+  std::string data(bytes, '\0');
+  ok(dfm_world_snapshot(w, data.data(), &bytes));
+  return data;
+}
+
+// Every point at one velocity.
+inline void set_velocity(dfm_body body, std::array<double, 3> velocity) {
+  uint32_t n = 0;
+  ok(dfm_body_get_state(body, 0, nullptr, nullptr, &n));
+  std::vector<double> v(size_t(3) * n);
+  for (size_t i = 0; i < v.size(); ++i) v[i] = velocity[i % 3];
+  ok(dfm_body_set_state(body, n, nullptr, v.data()));
 }
 
 inline dfm_world make_world(dfm_context *c, std::array<double, 3> gravity = {0, 0, -9.81}) {

@@ -19,23 +19,19 @@ struct ZonedOptions : BodyOptions {
 inline dfm_body make_zoned_beam(dfm_context *c, dfm_world w, std::array<double, 3> size, uint32_t cells, const ZonedOptions &o) {
   dfm_tetmesh mesh = 0;
   ok(dfm_tetmesh_make(c, "beam", size.data(), cells, &mesh));
-  dfm_tetmesh_info info{};
-  info.size = sizeof info;
-  ok(dfm_tetmesh_get_info(mesh, &info));
-  const double *points = nullptr;
-  const uint32_t *tets = nullptr;
-  ok(dfm_tetmesh_data(mesh, &points, &tets, nullptr));
+  dfm_body_def d = dfm_body_def_default();
+  lend(mesh, d);
   const auto middle = [&](const uint32_t *corner, int n, double out[3]) {
     for (int k = 0; k < 3; ++k) {
       out[k] = 0;
-      for (int i = 0; i < n; ++i) out[k] += points[3 * corner[i] + uint32_t(k)] / n;
+      for (int i = 0; i < n; ++i) out[k] += d.points[3 * corner[i] + uint32_t(k)] / n;
     }
   };
   std::vector<uint32_t> triangles, group;
   std::vector<dfm_material> materials;
   double x[3];
-  for (uint32_t t = 0; t < info.ntet; ++t) {
-    const uint32_t *const q = tets + 4 * size_t(t);
+  for (uint32_t t = 0; t < d.ntet; ++t) {
+    const uint32_t *const q = d.tets + 4 * size_t(t);
     for (int f = 3; o.group && f >= 0; --f) {
       const uint32_t face[3] = {q[(f + 1) % 4], q[(f + 2) % 4], q[(f + 3) % 4]};
       middle(face, 3, x);
@@ -45,16 +41,11 @@ inline dfm_body make_zoned_beam(dfm_context *c, dfm_world w, std::array<double, 
   }
   const dfm_surface_groups groups{sizeof(dfm_surface_groups), uint32_t(o.groups.size()), o.groups.data(), uint32_t(group.size()), 0,
                                   triangles.data(), group.data()};
-  dfm_material_def md = dfm_material_def_default();
-  md.density = o.density, md.young = o.young, md.poisson = o.poisson, md.damping_mass = o.damping_mass, md.damping_stiffness = o.damping_stiffness;
-  dfm_material material = 0;
-  ok(dfm_material_create(w, &md, &material));
-  dfm_body_def d = dfm_body_def_default();
   d.name = o.name.empty() ? nullptr : o.name.c_str();
-  d.npoint = info.npoint, d.ntet = info.ntet, d.points = points, d.tets = tets, d.material = material;
+  d.material = make_material(w, o);
   if (o.group) d.groups = &groups;
   if (o.material) d.cell_materials = materials.data();
-  const std::vector<uint8_t> fixed(info.npoint, uint8_t(o.held ? 7 : 0));
+  const std::vector<uint8_t> fixed(d.npoint, uint8_t(o.held ? 7 : 0));
   d.fixed = fixed.data();
   for (int k = 0; k < 3; ++k) d.pose.position[k] = o.position[size_t(k)], d.velocity[k] = o.velocity[size_t(k)];
   dfm_body body = 0;
@@ -68,14 +59,6 @@ inline dfm_status friction(dfm_world w, const char *a, const char *b, double mu,
   dfm_friction_def f{};
   f.size = sizeof f, f.between[0] = a, f.between[1] = b, f.law = law, f.params = {sizeof(dfm_params), 1, &v};
   return dfm_world_add_friction(w, &f);
-}
-
-inline std::vector<dfm_contact> contacts(dfm_world w) {
-  uint32_t n = 0;
-  ok(dfm_world_contacts(w, 0, nullptr, &n));
-  std::vector<dfm_contact> out(n);
-  if (n) ok(dfm_world_contacts(w, n, out.data(), &n));
-  return out;
 }
 
 }  // namespace test

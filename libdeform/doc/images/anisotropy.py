@@ -10,7 +10,10 @@ import subprocess
 import sys
 import tempfile
 
+import matplotlib
+matplotlib.use("Agg")
 import matplotlib.image
+import matplotlib.pyplot
 import numpy as np
 
 ROOT = pathlib.Path(__file__).resolve().parents[3]
@@ -55,11 +58,24 @@ def tubes(command, work, pictures):
     matplotlib.image.imsave(pictures / "pinched_tube.png", np.clip(half, 0, 1))
 
 
+def label(frame, out):
+    """Says what stands where: places are shares of the scene's own view, so they follow its size and not its camera."""
+    picture = matplotlib.image.imread(frame)[..., :3]
+    rows, columns = picture.shape[:2]
+    figure = matplotlib.pyplot.figure(figsize=(columns / 100, rows / 100), dpi=100)
+    figure.figimage(picture)
+    words = [(0.12, 0.625, "isotropic"), *((x, 0.85, f"softer along {axis}") for x, axis in ((0.375, "x"), (0.625, "y"), (0.87, "z"))),
+             *((0.283, y, f"slope {slope}") for y, slope in ((0.765, "0.5"), (0.565, "1"), (0.38, "2")))]
+    for x, y, text in words:
+        figure.text(x, y, text, ha="right" if text.startswith("slope") else "center", fontsize=12, color="#1c2733")
+    figure.savefig(out, dpi=100)
+
+
 def beams(command, work, pictures):
     sag, pull = work / "sag", work / "pull"
     run(command, "gravity_anisotropy", sag, frames=2)
     run(command, "gravity_anisotropy", pull, {"/gravity": [9.81, 0, 0]})
-    (pictures / "gravity_anisotropy.png").write_bytes(sorted((sag / "frames").glob("*.png"))[-1].read_bytes())
+    label(sorted((sag / "frames").glob("*.png"))[-1], pictures / "gravity_anisotropy.png")
     scene = json.loads((SCENES / "gravity_anisotropy.json").read_text())
     print(f"\n{'bar':12}{'cos^2':>8}{'sag mm':>10}{'ratio':>8}{'stretch mm':>14}{'ratio':>8}")
     first = None

@@ -59,6 +59,11 @@ enum { DFM_MESH_TETS = 1, DFM_MESH_SURFACE = 2 };
 /** Looks into a file of any format that dfm_tetmesh_read or dfm_trimesh_read take. @param kind out: DFM_MESH_TETS if it has any tetrahedron,
  * else DFM_MESH_SURFACE. @return DFM_OK; as dfm_tetmesh_read. Threads: Any thread. Since 0.2. */
 DFM_API dfm_status dfm_mesh_file_kind(dfm_context *context, const char *path, uint32_t *kind);
+/** Reads a file of either kind once, where dfm_mesh_file_kind and dfm_tetmesh_read or dfm_trimesh_read would read it twice.
+ * @param cells    out: what dfm_tetmesh_read gives, where the file has any tetrahedron; else 0
+ * @param surface  out: what dfm_trimesh_read gives, where it has none; else 0
+ * @return DFM_OK; as dfm_tetmesh_read (both untouched). Threads: Any thread. Since 0.2. */
+DFM_API dfm_status dfm_mesh_read(dfm_context *context, const char *path, dfm_tetmesh *cells, dfm_trimesh *surface);
 
 /** Reads a triangle surface: OBJ, PLY, STL, OFF, and the triangles of MSH, VTK, VTU and Medit files (where such a file has tetrahedra: their
  * boundary). Polygons are cut into triangles. Points at the same place are merged, triangles without area and doubles dropped, triangles

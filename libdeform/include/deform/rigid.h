@@ -63,7 +63,8 @@ typedef struct dfm_rigid_step {
   const double *extra;                /* [nextra] */
 } dfm_rigid_step;
 
-/** Per sub-step and set: predict, respond for each group that is touched, push where there is one, commit, all with the same dfm_rigid_step. Each of
+/** Per sub-step and set: predict, respond for each group that is touched, revise (and respond again where it changed something), push where there is one,
+ * commit (again, if the guard asks for other impulses), all with the same dfm_rigid_step. Each of
  * them runs for all sets of the world before the next one begins, so that sets that share a world of the host's see all impulses (push) before any
  * has to know where it ends (commit). A sub-step may be tried again with another h, and one that fails is not committed anywhere: the next predict
  * then has the state of the last one that succeeded, so a host with a world of its own writes `state` into it first.
@@ -94,6 +95,11 @@ typedef struct dfm_rigid_host {
   dfm_status (*set_motor)(void *self, uint32_t joint, double velocity, double max, double *extra);
   /** Angle or path of a hinge or slider since creation (rad, m), its rate, and what its motor did in the last sub-step (N m, N). May be NULL. */
   dfm_status (*joint)(void *self, const dfm_rigid_state *state, const double *extra, uint32_t joint, double *position, double *rate, double *effort);
+  /** Asked when contact is solved: do these impulses leave true what predict and respond took for granted (motors that hold, motors at their limit)?
+   * If not, the host takes something else for granted, *changed is 1 and velocity what predict gives with that; respond is asked again and contact
+   * solved again, a few times at most. May be NULL: predict and respond hold for all impulses. @param impulse [nbody,6] as for commit
+   * @param velocity out, [nbody,6] @param changed out */
+  dfm_status (*revise)(void *self, const dfm_rigid_step *step, const double *impulse, double *velocity, uint32_t *changed);
   /** The impulses that commit will have, before any set commits. May be NULL. */
   dfm_status (*push)(void *self, const dfm_rigid_step *step, const double *impulse);
 } dfm_rigid_host;

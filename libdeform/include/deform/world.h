@@ -7,9 +7,12 @@
 #ifdef __cplusplus
 extern "C" {
 #endif
-enum { DFM_METHOD_AUTO = 0, DFM_METHOD_VELOCITY = 1 };
+/* How contacts are solved. AUTO is VELOCITY. ROLLBACK is the source's scheme, to compare and not to use: it freezes what slides and loses momentum
+ * (doc/concepts/rollback.md); what it cannot do is refused with DFM_E_UNSUPPORTED where it is made. 2 is kept for implicit. Since 0.2 (ROLLBACK). */
+enum { DFM_METHOD_AUTO = 0, DFM_METHOD_VELOCITY = 1, DFM_METHOD_ROLLBACK = 3 };
 enum { DFM_INTEGRATOR_AUTO = 0, DFM_INTEGRATOR_SYMPLECTIC_EULER = 1 };
 
+enum { DFM_WORLD_UNGUARDED = 1 };   /* dfm_world_def.flags: without the guard against crossing (concepts/guard.md), to see what it does */
 typedef struct dfm_world_def {
   uint32_t size, flags;
   double gravity[3];            /* m/s2 */
@@ -23,6 +26,9 @@ typedef struct dfm_world_def {
   const char *const *effects;   /* NULL-terminated list the scene asks for; NULL: what its content calls for */
   double sleep_speed;           /* m/s, 0.01: what falls asleep has been slower in every point, and has stayed within half of d_c, */
   double sleep_time;            /* s, 0.5: for so long */
+  uint32_t self_contact;        /* 1: every surface touches itself too, as the effect "self_contact" in the list does; 0: only where another effect needs
+                                   it. dfm_world_filter_pair with one body's name twice decides for this body (doc/concepts/self_contact.md) */
+  uint32_t reserved;
 } dfm_world_def;
 
 /** Gravity (0,0,-9.81), everything automatic. Threads: Any thread. Since 0.1. */
@@ -93,6 +99,8 @@ typedef struct dfm_world_stats {
   double stable_step;                     /* s, 0.9 of the bound at its last evaluation */
   uint32_t asleep, reserved;              /* bodies that sleep now */
   double sleep_energy, sleep_momentum[3]; /* J and N s that bodies still had when they fell asleep, since creation */
+  uint64_t guard_solves, guard_cuts;      /* since creation: solves with hits as contacts; sub-steps taken anew, shorter */
+  double guard_lost;                      /* s since creation: motion left out where neither was enough */
   uint64_t rigid_again;                   /* times a rigid host had contact solved again (DFM_RIGID_AGAIN), since creation */
 } dfm_world_stats;
 /** @return DFM_OK; DFM_E_HANDLE. Threads: Any thread. Not during step. Since 0.1. */

@@ -123,6 +123,7 @@ dfm_status dfm_body_set_state(dfm_body body, uint32_t n, const double *x, const 
       }
     b.world->wake(b);
     b.world->bound_age = kNone;
+    b.world->guard.forget();
   });
 }
 
@@ -154,6 +155,7 @@ dfm_status dfm_body_move_held(dfm_body body, uint32_t n, const uint32_t *points,
     idle(*b.world);
     check_points(b, n, points), check_motion(b, nkey, keys, sine);
     if (nkey == 0 && !sine) fail(DFM_E_ARG, "body '%s': a motion needs keys or a sine", b.name.c_str());
+    rollback_refuse(*b.world, ("body '" + b.name + "': a motion of held points, which cannot go back,").c_str());
     HeldMotion m;
     m.points.assign(points, points + n);
     if (nkey) m.keys.assign(keys, keys + nkey);

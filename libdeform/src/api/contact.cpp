@@ -165,8 +165,10 @@ dfm_status dfm_world_pairs(dfm_world world, uint32_t capacity, dfm_pair_report *
       const Vec3 friction = scale * (l[1] * load3(f + 3) + l[2] * load3(f + 6)), force = scale * l[0] * load3(f) + friction;
       ++it->count, it->sticking += l[0] > 0 && w.report.mode[i] == 1;
       it->normal += l[0] / w.report.h;
-      store3(it->force, load3(it->force) + force), store3(it->friction, load3(it->friction) + friction);
-      store3(it->moment, load3(it->moment) + cross(load3(c.point) - com[body], force));
+      if (ia != ib) {   // what a body does to itself sums to nothing
+        store3(it->force, load3(it->force) + force), store3(it->friction, load3(it->friction) + friction);
+        store3(it->moment, load3(it->moment) + cross(load3(c.point) - com[body], force));
+      }
       const double *const slip = &w.report.slip[size_t(2) * i];
       if (l[0] > 0) it->slip_max = std::max(it->slip_max, std::sqrt(slip[0] * slip[0] + slip[1] * slip[1]));
     }
@@ -184,7 +186,7 @@ dfm_status dfm_world_pair_wrench(dfm_world world, uint64_t a, uint64_t b, const 
     Vec3 sum, turn;
     for (uint32_t i = 0; i < w.report.n; ++i) {
       const bool straight = w.store.id_a[i] == ia && w.store.id_b[i] == ib, turned = w.store.id_a[i] == ib && w.store.id_b[i] == ia;
-      if (!touching(w, i) || !(straight || turned)) continue;
+      if (!touching(w, i) || !(straight || turned) || (straight && turned)) continue;
       const double *const f = &w.report.frame[size_t(9) * i], *const l = &w.report.impulse[size_t(3) * i], scale = (turned ? -1 : 1) / w.report.h;
       const Vec3 one = scale * (l[0] * load3(f) + l[1] * load3(f + 3) + l[2] * load3(f + 6));
       sum += one, turn += cross(load3(w.report.contacts[i].point) - about, one);

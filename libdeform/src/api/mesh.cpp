@@ -23,10 +23,18 @@ dfm_status dfm_tetmesh_read(dfm_context *context, const char *path, dfm_tetmesh 
 dfm_status dfm_mesh_file_kind(dfm_context *context, const char *path, uint32_t *kind) {
   return guard([&] {
     need(context, "context"), need(path, "path"), need(kind, "kind");
-    const dfm::RawMesh raw = dfm::read_raw(context->memory, path);
-    if (raw.tets.empty() && raw.tris.empty())
-      fail(DFM_E_FORMAT, "%s: no tetrahedra and no triangles in this file; a body needs one of them", path);
-    *kind = raw.tets.empty() ? DFM_MESH_SURFACE : DFM_MESH_TETS;
+    *kind = dfm::has_cells(path, dfm::read_raw(context->memory, path)) ? DFM_MESH_TETS : DFM_MESH_SURFACE;
+  });
+}
+
+dfm_status dfm_mesh_read(dfm_context *context, const char *path, dfm_tetmesh *cells, dfm_trimesh *surface) {
+  return guard([&] {
+    need(context, "context"), need(path, "path"), need(cells, "cells"), need(surface, "surface");
+    dfm::AnyMesh mesh = dfm::read_any_mesh(context->memory, path);
+    for (const std::string &w : mesh.cells ? mesh.cells->warnings : mesh.surface->warnings) context->logf(DFM_LOG_WARNING, "%s: %s", path, w.c_str());
+    const dfm_tetmesh c = mesh.cells ? Object::keep(*context, std::move(*mesh.cells)) : 0;
+    *surface = mesh.surface ? dfm::TriMeshObject::keep(*context, std::move(*mesh.surface)) : 0;
+    *cells = c;
   });
 }
 

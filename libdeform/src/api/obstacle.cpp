@@ -55,6 +55,7 @@ dfm_status dfm_obstacle_move_to(dfm_obstacle obstacle, const dfm_pose *pose) {
     for (int i = 0; i < 4; ++i)
       if (!std::isfinite(pose->rotation[i]) || (i < 3 && !std::isfinite(pose->position[i])))
         fail(DFM_E_ARG, "obstacle '%s': the target pose is not finite", o.name.c_str());
+    if (o.world->def.method == DFM_METHOD_ROLLBACK) rollback_refuse(*o.world, ("obstacle '" + o.name + "': a motion of its own, which cannot go back,").c_str());
     o.keys.clear();
     o.def.sine = {};
     o.target = to_pose(*pose), o.has_target = true;

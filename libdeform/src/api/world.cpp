@@ -49,11 +49,16 @@ dfm_status dfm_world_create(dfm_context *context, const dfm_world_def *def, dfm_
       if (!std::isfinite(g)) fail(DFM_E_ARG, "gravity is not finite; give m/s2");
     if (!(w->def.contact_offset >= 0) || !(w->def.contact_tolerance >= 0))
       fail(DFM_E_ARG, "contact_offset (m) and contact_tolerance (m/s) must be zero (automatic) or positive");
+    if (w->def.flags & ~uint32_t{DFM_WORLD_UNGUARDED}) fail(DFM_E_ARG, "flags 0x%x: the only one known is DFM_WORLD_UNGUARDED (1)", w->def.flags);
     if (w->def.max_sweeps == 0 || w->def.max_passes == 0 || w->def.max_substeps == 0)
       fail(DFM_E_ARG, "max_sweeps, max_passes and max_substeps must be at least 1");
     if (w->def.sleep > 1) fail(DFM_E_ARG, "sleep is %u; it must be 0 (off) or 1 (on)", w->def.sleep);
+    if (w->def.self_contact > 1) fail(DFM_E_ARG, "self_contact is %u; it must be 0 (off) or 1 (on)", w->def.self_contact);
     if (!(w->def.sleep_speed > 0 && w->def.sleep_time > 0)) fail(DFM_E_ARG, "sleep_speed (m/s) and sleep_time (s) must be positive; the defaults are 0.01 and 0.5");
-    if (w->def.method != DFM_METHOD_AUTO && w->def.method != DFM_METHOD_VELOCITY) fail(DFM_E_UNSUPPORTED, "contact method %d is not available; use DFM_METHOD_AUTO or DFM_METHOD_VELOCITY", w->def.method);
+    if (w->def.method != DFM_METHOD_AUTO && w->def.method != DFM_METHOD_VELOCITY && w->def.method != DFM_METHOD_ROLLBACK)
+      fail(DFM_E_UNSUPPORTED, "contact method %d is not available; use DFM_METHOD_AUTO, DFM_METHOD_VELOCITY or (to compare) DFM_METHOD_ROLLBACK",
+           w->def.method);
+    if (w->def.sleep) rollback_refuse(*w, "sleep (contact.sleep)");
     if (w->def.integrator != DFM_INTEGRATOR_AUTO && w->def.integrator != DFM_INTEGRATOR_SYMPLECTIC_EULER)
       fail(DFM_E_UNSUPPORTED, "integrator %d is not available; use DFM_INTEGRATOR_AUTO or DFM_INTEGRATOR_SYMPLECTIC_EULER", w->def.integrator);
     for (const char *const *e = w->def.effects; e && *e; ++e) w->asked_effects.push_back(*e);
@@ -106,6 +111,7 @@ dfm_status dfm_world_set_gravity_keys(dfm_world world, uint32_t n, const dfm_vec
 dfm_status dfm_world_set_sleep(dfm_world world, bool sleep) {
   return guard([&] {
     World &w = idle(world_of(world));
+    if (sleep) rollback_refuse(w, "sleep (contact.sleep)");
     w.wake_all();
     w.def.sleep = sleep;
     w.changed = true;

@@ -97,6 +97,39 @@ void near_pairs(const BoxTree &a, const BoxTree &b, double margin, Array<PairOfT
   }
 }
 
+// The same of a tree with itself: each pair of different triangles once.
+template <class F>
+void near_self_pairs(const BoxTree &tree, double margin, Array<PairOfTriangles> &stack, F &&f) {
+  if (tree.empty()) return;
+  const double limit = margin * margin;
+  const auto meet = [&](uint32_t p, uint32_t q) {
+    if (const double d2 = box_distance2(tree.triangle_boxes()[p], tree.triangle_boxes()[q]); d2 <= limit) f(p, q, d2);
+  };
+  stack.clear();
+  stack.push_back({0, 0});
+  while (!stack.empty()) {
+    const auto [i, j] = stack.back();
+    stack.pop_back();
+    const BoxTree::Node m = tree.nodes()[i], n = tree.nodes()[j];
+    if (i == j) {
+      for (uint32_t p = m.right; p < m.right + m.count; ++p)
+        for (uint32_t q = p + 1; q < m.right + m.count; ++q) meet(p, q);
+      if (!m.count) stack.push_back({i + 1, i + 1}), stack.push_back({m.right, m.right}), stack.push_back({i + 1, m.right});
+      continue;
+    }
+    if (!(box_distance2(tree.boxes()[i], tree.boxes()[j]) <= limit)) continue;
+    if (m.count && n.count) {
+      for (uint32_t p = m.right; p < m.right + m.count; ++p)
+        if (box_distance2(tree.triangle_boxes()[p], tree.boxes()[j]) <= limit)
+          for (uint32_t q = n.right; q < n.right + n.count; ++q) meet(p, q);
+    } else if (n.count || (!m.count && m.right - i >= n.right - j)) {
+      stack.push_back({i + 1, j}), stack.push_back({m.right, j});
+    } else {
+      stack.push_back({i, j + 1}), stack.push_back({i, n.right});
+    }
+  }
+}
+
 // f(triangle) for all whose boxes pass `near(const Box &)`.
 template <class N, class F>
 void near_triangles(const BoxTree &tree, Array<PairOfTriangles> &stack, N &&near, F &&f) {

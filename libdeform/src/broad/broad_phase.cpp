@@ -70,6 +70,27 @@ bool BroadPhase::update(std::span<const BodyView> bodies, std::span<const Obstac
   ++stats_.updates;
   match(bodies, obstacles, filter);
   if (!find_dirty(bodies, obstacles, h, offset)) return false;
+  renew(bodies, obstacles, filter, h, offset);
+  return true;
+}
+
+bool BroadPhase::cover(std::span<const BodyView> bodies, std::span<const ObstacleView> obstacles, const PairFilter &filter, double h, double offset,
+                       std::span<const double> speed) {
+  bool any = false;
+  for (size_t i = 0; i < bodies_.size(); ++i) {
+    Body &b = bodies_[i];
+    if (!b.usable || kRounding * (b.moved + offset + h * speed[i]) <= b.margin) continue;
+    b.dirty = any = true;
+    b.expected = speed[i];
+  }
+  for (size_t o = 0; o < things_.size(); ++o)
+    if (!holds(things_[o], obstacles[o], h, offset, 1)) things_[o].dirty = any = true;
+  if (any) renew(bodies, obstacles, filter, h, offset);
+  return any;
+}
+
+void BroadPhase::renew(std::span<const BodyView> bodies, std::span<const ObstacleView> obstacles, const PairFilter &filter, double h,
+                       double offset) {
   ++stats_.renewals;
   for (Body &b : bodies_)
     if (b.dirty) renew_body(b, h, offset);
@@ -84,7 +105,6 @@ bool BroadPhase::update(std::span<const BodyView> bodies, std::span<const Obstac
   assemble();
   for (Body &b : bodies_) b.dirty = !b.usable;
   for (Thing &t : things_) t.dirty = false;
-  return true;
 }
 
 // Brings bodies_ and things_ in line with the views; what is new, gone or changed in kind loses its lists.
@@ -121,10 +141,10 @@ bool BroadPhase::find_dirty(std::span<const BodyView> bodies, std::span<const Ob
   for (size_t i = 0; i < bodies_.size(); ++i) {
     Body &b = bodies_[i];
     const bool stays = b.asleep && bodies[i].asleep;
-    b.asleep = bodies[i].asleep;
+    b.asleep = bodies[i].asleep, b.expected = 0;
     if (!b.dirty && !stays) {
-      const double moved = largest_norm(b.surface->nsurfel, b.surface->x.data(), b.x.data());
-      b.dirty = !(kRounding * (moved + reach_share(h, offset, largest_speed(*b.surface))) <= b.margin);
+      b.moved = largest_norm(b.surface->nsurfel, b.surface->x.data(), b.x.data()), b.speed = largest_speed(*b.surface);
+      b.dirty = !(kRounding * (b.moved + reach_share(h, offset, b.speed)) <= b.margin);
     }
     any |= b.dirty;
   }
@@ -135,7 +155,8 @@ bool BroadPhase::find_dirty(std::span<const BodyView> bodies, std::span<const Ob
   return any;
 }
 
-bool BroadPhase::holds(const Thing &thing, const ObstacleView &now, double h, double offset) const {
+// times: how often the obstacle's way of the sub-step is to be covered.
+bool BroadPhase::holds(const Thing &thing, const ObstacleView &now, double h, double offset, double times) const {
   const ObstacleView &then = thing.view;
   double moved, extent;
   if (now.shape == Shape::plane) {
@@ -147,7 +168,7 @@ bool BroadPhase::holds(const Thing &thing, const ObstacleView &now, double h, do
     extent = ObstacleShape(now).extent();
     moved = obstacle_displacement(now, then, extent);
   }
-  return kRounding * (moved + reach_share(h, offset, obstacle_speed(now, extent))) <= thing.margin;
+  return kRounding * (moved + offset + times * h * obstacle_speed(now, extent)) <= thing.margin;
 }
 
 // Brings the side's copy and tree up to date with its surface; false where that is not finite.
@@ -178,9 +199,10 @@ void BroadPhase::renew_thing(Thing &t, const ObstacleView &now, double h, double
 void BroadPhase::renew_body(Body &body, double h, double offset) {
   if (!renew_tree(body)) return;
   const Surface &s = *body.surface;
-  const double speed = largest_speed(s);
+  const double speed = body.speed = largest_speed(s);
   const double skin = std::clamp(skin_steps_ * h * speed, kSkinLeast * s.median_edge, kSkinMost * s.median_edge);
-  body.margin = kRounding * reach_share(h, offset, kSpeedGrowth * speed) + skin;
+  body.margin = kRounding * std::max(reach_share(h, offset, kSpeedGrowth * speed), 2 * offset + kSpeedGrowth * h * body.expected) + skin;
+  body.moved = 0;
 }
 
 void BroadPhase::bound_bodies() {

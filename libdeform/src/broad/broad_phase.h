@@ -24,8 +24,32 @@ class BroadPhase {
   // Renews what is out of date; true if candidates() changed. h in s; offset d_c in m. Views may come in any order.
   bool update(std::span<const BodyView> bodies, std::span<const ObstacleView> obstacles, const PairFilter &filter, double h, double offset);
 
+  // The same lists, made anew where they do not cover the way that the sub-step takes after its solve: speed[i] bounds that of the surfels of body i;
+  // the obstacles' views hold theirs.
+  // After update(), on the same views.
+  bool cover(std::span<const BodyView> bodies, std::span<const ObstacleView> obstacles, const PairFilter &filter, double h, double offset,
+             std::span<const double> speed);
+  // f(triangle of a, triangle of b) for pairs that may meet now; slots of bodies, or of a mesh obstacle.
+  template <class F>
+  void near_triangles_of(uint32_t slot_a, uint32_t slot_b, bool obstacle, F &&f) {
+    const Side *a = nullptr, *b = nullptr;
+    for (const Body &body : bodies_) {
+      if (body.slot == slot_a) a = &body;
+      if (!obstacle && body.slot == slot_b) b = &body;
+    }
+    for (const Thing &thing : things_)
+      if (obstacle && thing.view.slot == slot_b) b = &thing;
+    if (!a || !b || !a->usable || !b->usable) return;
+    near_pairs(a->tree, b->tree, a->margin + b->margin, stack_, [&](uint32_t p, uint32_t q, double) {
+      f(a->tree.triangles()[p], b->tree.triangles()[q]);
+    });
+  }
+
   // In the order that find_contacts expects: (id a, body before obstacle, id b, kind, feature a, feature b).
   const Array<Candidate> &candidates() const { return candidates_; }
+
+  // m/s, largest of view i's surfels, at the last update().
+  double speed(size_t i) const { return bodies_[i].speed; }
 
   // The skin is made to last for about this many sub-steps of the present motion. Results do not depend on it.
   void set_skin_steps(double steps) { skin_steps_ = steps; }
@@ -45,6 +69,8 @@ class BroadPhase {
   struct Side {             // a surface in lists
     const Surface *surface = nullptr;
     double margin = -1;     // negative: no lists yet
+    double moved = 0, speed = 0;        // since the lists were made, at the last update(); largest at that time
+    double expected = 0;    // speed that cover() asks the lists to hold for
     bool dirty = true, usable = false;  // usable: all positions finite
     bool asleep = false;    // at the last update: nothing has moved if it still is
     BoxTree tree;
@@ -70,8 +96,9 @@ class BroadPhase {
 
   void match(std::span<const BodyView> bodies, std::span<const ObstacleView> obstacles, const PairFilter &filter);
   bool find_dirty(std::span<const BodyView> bodies, std::span<const ObstacleView> obstacles, double h, double offset);
-  bool holds(const Thing &thing, const ObstacleView &now, double h, double offset) const;
+  bool holds(const Thing &thing, const ObstacleView &now, double h, double offset, double times = 2) const;
   bool renew_tree(Side &side);
+  void renew(std::span<const BodyView> bodies, std::span<const ObstacleView> obstacles, const PairFilter &filter, double h, double offset);
   void renew_body(Body &body, double h, double offset);
   void renew_thing(Thing &thing, const ObstacleView &now, double h, double offset);
   void bound_bodies();

@@ -176,7 +176,7 @@ Vec3 ContactRows::diagonal(uint32_t i, Vec3 a) const {
   return sum;
 }
 
-void ContactRows::finish(std::span<const ContactPoint> contacts, const double *tangents, double h, double offset) {
+void ContactRows::finish(std::span<const ContactPoint> contacts, const double *tangents, double h, double planned, double offset) {
   frame.resize(size_t(n) * 9), drive.resize(size_t(n) * 3), rate.resize(n), wn.resize(n), wt.resize(n);
   cross.resize(size_t(n) * 2), impulse.resize(size_t(n) * 3);
   for (uint32_t i = 0; i < n; ++i) {
@@ -192,7 +192,7 @@ void ContactRows::finish(std::span<const ContactPoint> contacts, const double *t
     // sub-step, which the contact's straight motion does not see. Nearer than 0.6 d_c the whole of a further depth is closed in the sub-step.
     // Surfaces that are through each other already (a start state) take their time.
     const double slow = std::max(0.2 * gap, -0.1 * offset), near = contacts[i].distance > 0 ? gap + 0.32 * offset : slow;
-    rate[i] = gap > 0 ? gap / h : std::min(slow, near) / h;
+    rate[i] = gap > 0 ? gap / h : std::min(slow, near) / planned;
     const Vec3 w0 = diagonal(i, normal);
     wn[i] = dot(normal, w0), cross[2 * size_t(i)] = dot(t1, w0), cross[2 * size_t(i) + 1] = dot(t2, w0);
     const Vec3 w1 = diagonal(i, t1), w2 = diagonal(i, t2);
@@ -239,6 +239,15 @@ void ContactRows::apply(uint32_t i, Vec3 q) {
     double *const to = &y[size_t(d) * 4];
     const double *const w = &inv_mass[size_t(d) * 4];
     to[0] += weight[j] * (w[0] * p.x), to[1] += weight[j] * (w[1] * p.y), to[2] += weight[j] * (w[2] * p.z);
+  }
+}
+
+void ContactRows::push_rigid(const Block &b) {
+  for (uint32_t i = 0; i < n; ++i) {
+    if (rigid[i] == kNone || rigid[i] < b.first || rigid[i] >= b.first + b.count) continue;
+    const double *const f = &frame[size_t(i) * 9], *const q = &impulse[size_t(i) * 3];
+    const Vec3 p = q[0] * load3(f) + q[1] * load3(f + 3) + q[2] * load3(f + 6);
+    response_apply(b, rigid[i], -p), response_apply(b, rigid[i] + 1, -dfm::cross(load3(&arm[size_t(3) * i]), p));
   }
 }
 

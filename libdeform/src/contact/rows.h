@@ -61,11 +61,13 @@ struct ContactRows {
   explicit ContactRows(const Memory &memory);
   // Expands contacts to dofs. Blocks get their dofs and counts; the caller fills `response`, then calls finish().
   void build(std::span<const ContactPoint> contacts, std::span<const DofSource> sources, const RigidPlaces &rigids = {});
-  // Frames from normals and tangents [n,3], W diagonals, rates.
-  void finish(std::span<const ContactPoint> contacts, const double *tangents, double h, double offset);
+  // Frames from normals and tangents [n,3], W diagonals, rates. planned: s, time in which a depth closes; longer than h where the guard has cut it, or
+  // depths would turn into speed.
+  void finish(std::span<const ContactPoint> contacts, const double *tangents, double h, double planned, double offset);
 
   Vec3 velocity(uint32_t i) const;        // relative velocity of contact i in its frame (normal, t1, t2)
   void apply(uint32_t i, Vec3 impulse_frame);   // changes y by an impulse given in the frame
+  void push_rigid(const Block &group);    // changes y of a rigid group by all impulses that act on it: its response has been renewed
 
  private:
   Array<uint32_t> dof_of_point_, dof_of_node_;   // this sub-step's dof of a phyxel, of a surfel of a self-stepping body; kNone

@@ -1,6 +1,7 @@
 // What a reader hands over: points, tetrahedra and triangles in the file's order, not yet looked at as geometry.
 #pragma once
 #include <map>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -63,6 +64,15 @@ void read_off(Cursor &in, RawMesh &out);
 // Reads any format by file name ending and content; fills tets, tris or both. parse_raw: from bytes in memory.
 RawMesh read_raw(const Memory &memory, const std::string &path);
 RawMesh parse_raw(const Memory &memory, const std::string &path, const char *bytes, size_t size);
+
+// A file of either kind: its cells, or the surface that it holds instead.
+struct AnyMesh {
+  std::optional<TetMesh> cells;
+  std::optional<TriMesh> surface;
+};
+AnyMesh read_any_mesh(const Memory &memory, const std::string &path);
+// Whether a body takes its cells from the file. Throws DFM_E_FORMAT where there is nothing to make a body of.
+bool has_cells(const std::string &path, const RawMesh &raw);
 
 // Repairs what can be repaired, counts it, and refuses what has no volume.
 TetMesh finish_mesh(const std::string &path, RawMesh &&raw);

@@ -127,7 +127,7 @@ const Format &choose(const std::string &path, std::string_view bytes, RawMesh &r
          near.empty() ? "" : (", did you mean ." + near + "?").c_str(), readable().c_str());
   }
   if (!found->read)
-    fail(DFM_E_UNSUPPORTED, "%s: this is a %s file%s; it is not read; %s", path.c_str(), found->name, although.c_str(), found->advice);
+    fail(DFM_E_UNSUPPORTED, "%s: this is a %s file%s, which the library itself does not read; %s", path.c_str(), found->name, although.c_str(), found->advice);
   if (lies) raw.warnings.push_back(format("read as %s%s", found->name, although.c_str()));
   return *found;
 }
@@ -154,7 +154,7 @@ RawMesh parse_raw(const Memory &memory, const std::string &path, const char *byt
 RawMesh read_raw(const Memory &memory, const std::string &path) {
   const Format *const named = format_by_ending(ending(path));
   if (named && !named->read)  // before a large file is read for nothing
-    fail(DFM_E_UNSUPPORTED, "%s: %s files are not read; %s", path.c_str(), named->name, named->advice);
+    fail(DFM_E_UNSUPPORTED, "%s: the library itself reads no %s files; %s", path.c_str(), named->name, named->advice);
   const Array<char> bytes = read_whole_file(memory, path);
   return parse_raw(memory, path, bytes.data(), bytes.size());
 }
@@ -169,6 +169,20 @@ TetMesh read_tet_mesh(const Memory &memory, const std::string &path) {
 
 TriMesh parse_tri_mesh(const Memory &memory, const std::string &path, const char *bytes, size_t size) {
   return finish_with_warnings(finish_surface, path, parse_raw(memory, path, bytes, size));
+}
+
+bool has_cells(const std::string &path, const RawMesh &raw) {
+  if (raw.tets.empty() && raw.tris.empty())
+    fail(DFM_E_FORMAT, "%s: no tetrahedra and no triangles in this file; a body needs one of them", path.c_str());
+  return !raw.tets.empty();
+}
+
+AnyMesh read_any_mesh(const Memory &memory, const std::string &path) {
+  RawMesh raw = read_raw(memory, path);
+  AnyMesh out;
+  if (has_cells(path, raw)) out.cells = finish_with_warnings(finish_mesh, path, std::move(raw));
+  else out.surface = finish_with_warnings(finish_surface, path, std::move(raw));
+  return out;
 }
 
 TriMesh read_tri_mesh(const Memory &memory, const std::string &path) { return finish_with_warnings(finish_surface, path, read_raw(memory, path)); }

@@ -20,6 +20,7 @@ constexpr double kFlat = 1e-3;        // slack of the cones of normals against t
 constexpr double kCone = 0.035;       // 2 degrees: slack of an edge's cone of normals, so that contacts do not flicker at its border
 constexpr double kParallel = 1e-3;    // sine between two edges below which vertex-face contacts stand for them
 constexpr double kPast = 0.25;        // share of an edge by which it may count as longer for what slides in over its ends
+constexpr double kLeastDip = 0.1;     // of the rest offset: what a face's inside is nearer to voxels than its corners by less is left to the corners
 constexpr double kEnd = 1e-3;         // share of an edge next to its ends that is left to vertex-face contacts: no longer than the default d_c
 
 struct Pair {
@@ -80,6 +81,8 @@ void edge_edge(const Pair &pair, Run run, Array<ContactPoint> &out);
 void surfel_obstacle(const Pair &pair, Run run, Array<ContactPoint> &out);
 void edge_obstacle(const Pair &pair, Run run, Array<ContactPoint> &out);
 void triangle_obstacle(const Pair &pair, Run run, Array<ContactPoint> &out);
+// Is a place inside the face x (in the grid's frame) lower than its corners by more than `dip`? Where and how low. Faces above `most` are not looked at.
+bool dips(const VoxelGrid &grid, const Vec3 x[3], double most, double dip, double weight[3], double &distance);
 void voxel_triangle(const Pair &pair, Run run, Array<ContactPoint> &out);
 // A contact on `q` of the body (nodes and weights already set), on `o` of the obstacle.
 void finish(const Pair &pair, ContactPoint &c, Vec3 q, Vec3 o, Vec3 normal, double distance, uint32_t patch, Array<ContactPoint> &out);
@@ -97,5 +100,7 @@ struct EdgeFaces {
 };
 EdgeFaces edge_faces(const Surface &surface, uint32_t edge);
 bool edge_becomes_convex(const Surface &surface, uint32_t edge, double h);
+constexpr int kNowhere = -2, kBetween = -1;   // else the end: 0 or 1
+int place_on_edge(double at, double slide);
 
 }  // namespace dfm::narrow

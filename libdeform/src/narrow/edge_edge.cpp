@@ -4,6 +4,7 @@
 #include <algorithm>
 
 #include "narrow/detail.h"
+#include "surfel/closest.h"
 
 namespace dfm::narrow {
 
@@ -22,14 +23,32 @@ EdgeFaces edge_faces(const Surface &surface, uint32_t edge) {
   return f;
 }
 
-// Is the crossing at `at` (0 and 1: the ends) of an edge its own affair? Closer to an end than a thousandth of the edge the end itself makes the
-// contact (vertex-face), and a second one in the same place with nearly the same normal would only make the solve ill-conditioned. But where
+// Where the crossing at `at` (0 and 1: the ends) lies on an edge: kNowhere on it, between its ends, or so close to one of them that the end itself may
+// make the contact (vertex-face); a second one in the same place with nearly the same normal would only make the solve ill-conditioned. Where
 // the crossing may slide in over an end within the sub-step (by `slide`, in lengths of the edge), the edges would be through each other
 // before they were seen: then the edge counts as that much longer.
-bool between_ends(double at, double slide) {
-  const double margin = slide > kEnd ? -std::min(slide, kPast) : kEnd;
-  return at > margin && at < 1 - margin;
+int place_on_edge(double at, double slide) {
+  if (slide > kEnd) {
+    const double margin = std::min(slide, kPast);
+    return at > -margin && at < 1 + margin ? kBetween : kNowhere;
+  }
+  if (!(at > 0 && at < 1)) return kNowhere;
+  return at <= kEnd ? 0 : at >= 1 - kEnd ? 1 : kBetween;
 }
+
+namespace {
+
+// Does a vertex this near an edge make a contact of its own there: over one of the edge's faces, or off the edge in the vertex's cone of normals?
+bool end_touches(const Surface &surface, uint32_t vertex, Vec3 from, Vec3 to, const EdgeFaces &faces) {
+  const Vec3 p = load3(&surface.x[4 * size_t{vertex}]);
+  const double s = closest_on_segment(p, from, to);
+  const Vec3 off = from + s * (to - from) - p;
+  const double distance = norm(off);
+  if (dot(off, faces.inward[0]) < 0 || dot(off, faces.inward[1]) < 0 || !(distance > 0)) return true;
+  return vertex_cone_has(surface, vertex, (1 / distance) * off);
+}
+
+}  // namespace
 
 // Convex now, or on the way to be within the sub-step: a fold that pops out under an edge that lies on both its faces meets it at once.
 bool edge_becomes_convex(const Surface &surface, uint32_t edge, double h) {
@@ -71,7 +90,8 @@ void edge_edge(const Pair &pair, Run run, Array<ContactPoint> &out) {
     const double reach = contact_reach(pair.h, pair.offset, std::sqrt(speed2));
     const double allowed = std::max(reach, depth);
     if (!(nr * nr < allowed * allowed * nn)) continue;
-    if (!between_ends(s / nn, 2 * pair.h * std::sqrt(speed2 / uu)) || !between_ends(t / nn, 2 * pair.h * std::sqrt(speed2 / ww))) continue;
+    const int place_a = place_on_edge(s / nn, 2 * pair.h * std::sqrt(speed2 / uu)), place_b = place_on_edge(t / nn, 2 * pair.h * std::sqrt(speed2 / ww));
+    if (place_a == kNowhere || place_b == kNowhere) continue;
 
     if (!edge_becomes_convex(sb, candidate.feature_b, pair.h)) continue;
     if (!known) fa = edge_faces(sa, candidate.feature_a);
@@ -84,6 +104,8 @@ void edge_edge(const Pair &pair, Run run, Array<ContactPoint> &out) {
     // As far as the edges can turn within the sub-step, their cones may open.
     const double slack = kCone + std::min(0.3, reach / std::sqrt(std::min(uu, ww)));
     if (!fb.leans_out(normal, slack) || !fa.leans_out(-normal, slack)) continue;
+    if (place_a != kBetween && end_touches(sa, ea[place_a], q0, q0 + w, fb)) continue;
+    if (place_b != kBetween && end_touches(sb, eb[place_b], p0, p0 + u, fa)) continue;
     const double edge_s = s / nn, edge_t = t / nn;
     ContactPoint c = blank(pair, kEdgeEdge, 1, candidate.feature_a, candidate.feature_b);
     add_node(c, pair.a.first_node + ea[0], 1 - edge_s);

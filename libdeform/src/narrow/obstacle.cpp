@@ -53,34 +53,44 @@ struct Edge {
   }
 };
 
-// The inner point s of an edge against a ball around c; normal from c to the edge. `cone` accepts directions that leave the obstacle.
+// The inner point s of an edge against a ball around c; normal from c to the edge. `cone` accepts directions that leave the obstacle. slack: of the edge's own
+// cone of normals, more than kFlat.
 template <class Cone>
-void edge_point(Edge &e, double s, Vec3 c, double radius, uint32_t feature_b, Cone &&cone, Array<ContactPoint> &out) {
+void edge_point(Edge &e, double s, Vec3 c, double radius, uint32_t feature_b, double slack, Cone &&cone, Array<ContactPoint> &out) {
   if (!(s > 0 && s < 1)) return;
   const Vec3 r = e.p + s * e.u - c;
   const double d = norm(r);
   if (!(d > 0) || !(d - radius < reach_of(e.pair, e.ends, c))) return;
   const Vec3 normal = (1 / d) * r;
   const EdgeFaces &f = e.sides();
-  if (!(dot(normal, f.outward()) < 0) || !f.leans_out(-normal, kFlat) || !cone(normal)) return;
+  if (!(dot(normal, f.outward()) < 0) || !f.leans_out(-normal, kFlat + slack) || !cone(normal)) return;
   e.emit(s, c + radius * normal, normal, d - radius, feature_b, out);
 }
 
+// Across a capsule's axis the two lines fix the normal, as between two edges, and what bears is a row of edges that the straight axis presses into
+// one line: flat ones. Left out, each would lose its load where it is pushed flat, spring back and be hit again (a tube between two rods shook for ever).
+// A ball's centre has the faces beside a flat edge.
 void edge_round(Edge &e, Array<ContactPoint> &out) {
-  const ObstacleShape &shape = *e.pair.shape;
+  const Pair &pair = e.pair;
+  const ObstacleShape &shape = *pair.shape;
   const double radius = shape.view().radius;
   const auto any = [](Vec3) { return true; };
+  const auto convex = [&] { return edge_becomes_convex(*pair.a.surface, e.number, pair.h); };
   const Vec3 axis = shape.end(1) - shape.end(0);
   // Nearly parallel to the axis: the ends of the axis, not one point that jumps between them.
   const bool parallel = norm2(cross(e.u, axis)) <= 0.0025 * norm2(e.u) * norm2(axis);
   if (shape.view().shape == Shape::sphere || parallel) {
     const int ends = shape.view().shape == Shape::sphere ? 1 : 2;
-    for (int k = 0; k < ends; ++k)
-      edge_point(e, closest_on_segment(shape.end(k), e.p, e.p + e.u), shape.end(k), radius, uint32_t(k), any, out);
+    for (int k = 0; k < ends && convex(); ++k)
+      edge_point(e, closest_on_segment(shape.end(k), e.p, e.p + e.u), shape.end(k), radius, uint32_t(k), 0, any, out);
     return;
   }
   const SegmentPoints q = closest_segments(e.p, e.p + e.u, shape.end(0), shape.end(1));
-  edge_point(e, q.s, shape.end(0) + q.t * axis, radius, 2, any, out);
+  const bool across = q.t > 0 && q.t < 1;
+  if (!across && !convex()) return;
+  const Vec3 c = shape.end(0) + q.t * axis;
+  const double slack = across ? kCone + std::min(0.3, reach_of(pair, e.ends, c) / norm(e.u)) : 0;
+  edge_point(e, q.s, c, radius, 2, slack, any, out);
 }
 
 // Numbers of box features: edges 0 to 11, corners 12 to 19.
@@ -114,8 +124,16 @@ void edge_box(Edge &e, Array<ContactPoint> &out) {
         if (dot(n, shape.axis(i)) * (k >> i & 1 ? 1 : -1) < -kFlat) return false;
       return true;
     };
-    edge_point(e, closest_on_segment(corner, e.p, e.p + e.u), corner, 0, 12 + k, cone, out);
+    edge_point(e, closest_on_segment(corner, e.p, e.p + e.u), corner, 0, 12 + k, 0, cone, out);
   }
+}
+
+// Off a box's edge or corner the direction is free, and the surfel must stick out along it; where it does not, the edges and faces beside it are nearer.
+bool off_an_edge(const ObstacleShape &shape, const ObstaclePoint &o) {
+  if (shape.view().shape != Shape::box || !(o.distance > 0)) return false;
+  for (int k = 0; k < 3; ++k)
+    if (std::fabs(dot(o.normal, shape.axis(k))) > 1 - 1e-12) return false;
+  return true;
 }
 
 }  // namespace
@@ -126,6 +144,7 @@ void surfel_obstacle(const Pair &pair, Run run, Array<ContactPoint> &out) {
     const Vec3 x = pair.xa(s);
     const ObstaclePoint o = pair.shape->closest(x);
     if (!(o.distance < reach_of(pair, {&s, 1}, o.point))) continue;
+    if (off_an_edge(*pair.shape, o) && !vertex_cone_has(*pair.a.surface, s, -o.normal)) continue;
     ContactPoint c = blank(pair, kPrimitive, 0, s, o.face);
     add_node(c, pair.a.first_node + s, 1);
     c.area = facing_area(*pair.a.surface, s, -o.normal);
@@ -134,10 +153,13 @@ void surfel_obstacle(const Pair &pair, Run run, Array<ContactPoint> &out) {
 }
 
 void edge_obstacle(const Pair &pair, Run run, Array<ContactPoint> &out) {
+  const Surface &surface = *pair.a.surface;
+  const bool box = pair.shape->view().shape == Shape::box;
   for (const Candidate &candidate : run) {
-    if (!edge_becomes_convex(*pair.a.surface, candidate.feature_a, pair.h)) continue;
-    Edge e(pair, candidate.feature_a);
-    if (pair.shape->view().shape == Shape::box) edge_box(e, out);
+    const uint32_t number = candidate.feature_a;
+    if (box ? !edge_becomes_convex(surface, number, pair.h) : edge_hollow(surface, number) && edge_hollow(surface, number, 2 * pair.h)) continue;
+    Edge e(pair, number);
+    if (box) edge_box(e, out);
     else edge_round(e, out);
   }
 }

@@ -40,6 +40,7 @@ class Roots {
       if (touches(0)) return answer_;
     }
     touch_ = q_.separation + 8 * q_.tolerance + 4 * kRound;   // as far as the features may move while t is uncertain
+    if (contacts && !plane_.vanishes && in_order()) return answer_;
     if (contacts) contact();
     else separation();
     std::sort(time_, time_ + ntime_);
@@ -118,6 +119,46 @@ class Roots {
         time_[k] = t;
       }
     }
+  }
+
+  // Nothing can touch between two times: all corners lie on one side along an axis, at both.
+  bool apart_between(double lo, double hi) const {
+    Vec3 at[8];
+    for (int k = 0; k < q_.ncorner; ++k) at[k] = q_.corner(k, lo), at[q_.ncorner + k] = q_.corner(k, hi);
+    for (int axis = 0; axis < 3; ++axis) {
+      double low = at[0][axis], high = low;
+      for (int k = 1; k < 2 * q_.ncorner; ++k) low = std::min(low, at[k][axis]), high = std::max(high, at[k][axis]);
+      if (low > touch_ || high < -touch_) return true;
+    }
+    return false;
+  }
+
+  // Nearly every query. The cubic is monotonic between its turns, so its roots come in order: each is asked at once, and one after a touch is never looked
+  // for, nor one in a piece in which the corners stay on one side. False where a root is not certain: those are sharpened and sorted first.
+  bool in_order() {
+    const Poly &p = plane_.f;
+    double least, largest;
+    p.bounds(least, largest);
+    if (least > plane_.error || largest < -plane_.error) return true;
+    const Poly slope = p.derivative();
+    const auto certain = [&](double t) { return plane_.error <= kSharp * std::fabs(slope(t)); };
+    double end[3];
+    int n = quadratic_roots(slope, end);
+    end[n++] = 1;
+    Bracket b{0, 0, p(0), 0};
+    for (int k = 0; k < n; ++k, b.lo = b.hi, b.f_lo = b.f_hi) {
+      b.hi = end[k], b.f_hi = p(b.hi);
+      ++answer_.evaluations;
+      if (((b.f_lo < 0 && b.f_hi > 0) || (b.f_lo > 0 && b.f_hi < 0)) && !(n > 1 && apart_between(b.lo, b.hi))) {
+        const double t = find_root(method_, p, b, q_.tolerance, q_.max_iterations, answer_.evaluations);
+        if (!certain(t)) return false;
+        if (touches(t)) return true;
+      }
+      if (!(std::fabs(b.f_hi) <= plane_.error)) continue;
+      if (b.hi < 1 || !certain(1)) return false;
+      touches(1);
+    }
+    return true;
   }
 
   void contact() {

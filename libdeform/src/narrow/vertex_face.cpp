@@ -271,7 +271,8 @@ void Group::resolve(Array<ContactPoint> &out) {
       const Vec3 out_here = outward(n);
       rim = norm2(out_here) > 0 && (n.distance <= tiny || dot(out_here, p - n.q) > 0);
       const Vec3 normal = n.distance > tiny ? (1 / n.distance) * (p - n.q) : normalized(out_here);
-      if (rim && !repeated(n, normal)) emit(n, normal, n.distance, n.weight, out);
+      const bool first = n.distance <= tiny || vertex_cone_has(*pair.a.surface, surfel, -normal);
+      if (rim && first && !repeated(n, normal)) emit(n, normal, n.distance, n.weight, out);
     }
     if (!rim && std::fabs(n.plane) < n.reach && (inside || n.plane >= 0) && reachable_across(n, weight))
       emit(n, n.normal, n.plane, weight, out);

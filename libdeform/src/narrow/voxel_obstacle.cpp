@@ -9,7 +9,6 @@
 namespace dfm::narrow {
 namespace {
 
-constexpr double kLeastDip = 0.1;   // of the rest offset: less is left to the corners
 constexpr double kFarthest = 0.58;  // of the longest edge: no place of a triangle is further from its nearest corner (1 / sqrt(3))
 constexpr double kFinest = 0.25;    // of a cell: the grid tells no more about where the lowest place is
 
@@ -52,31 +51,37 @@ bool owned(const Surface &s, uint32_t t, const double w[3]) {
 
 }  // namespace
 
+bool dips(const VoxelGrid &grid, const Vec3 x[3], double most, double dip, double weight[3], double &distance) {
+  const double longest = std::sqrt(std::max({norm2(x[0] - x[1]), norm2(x[1] - x[2]), norm2(x[2] - x[0])}));
+  const Face face{grid, {x[0], x[1], x[2]}, longest};
+  int low = 0;
+  VoxelGrid::Value at[3];
+  for (int k = 0; k < 3; ++k) {
+    at[k] = grid.at(x[k]);
+    if (at[k].distance < at[low].distance) low = k;
+  }
+  if (at[low].distance - kFarthest * longest - 0.25 * grid.cell() > most) return false;
+  // Linear from the corner on, the distance would fall by so much within the face.
+  double fall = 0;
+  for (int k = 0; k < 3; ++k) fall = std::min(fall, dot(at[low].gradient, x[k] - x[low]));
+  if (fall > -dip) return false;
+  std::fill_n(weight, 3, 0.0);
+  weight[low] = 1;
+  distance = lowest_place(face, kFinest * grid.cell(), weight, at[low].distance);
+  return distance < at[low].distance - dip;
+}
+
 void voxel_triangle(const Pair &pair, Run run, Array<ContactPoint> &out) {
   const ObstacleShape &shape = *pair.shape;
   const ObstacleView &view = shape.view();
-  const double dip = kLeastDip * pair.offset, finest = kFinest * view.grid->cell();
+  const double dip = kLeastDip * pair.offset;
   const double widest = contact_reach(pair.h, pair.offset, largest_speed(*pair.a.surface) + norm(view.velocity) + norm(view.spin) * view.extent);
   for (const Candidate &candidate : run) {
     const std::span<const uint32_t> corner(&pair.a.surface->tri[3 * size_t{candidate.feature_a}], 3);
     const Vec3 x[3] = {pair.xa(corner[0]), pair.xa(corner[1]), pair.xa(corner[2])};
-    const double longest = std::sqrt(std::max({norm2(x[0] - x[1]), norm2(x[1] - x[2]), norm2(x[2] - x[0])}));
-    const Face face{*view.grid, {shape.local(x[0]), shape.local(x[1]), shape.local(x[2])}, longest};
-    int low = 0;
-    VoxelGrid::Value at[3];
-    for (int k = 0; k < 3; ++k) {
-      at[k] = face.grid.at(face.x[k]);
-      if (at[k].distance < at[low].distance) low = k;
-    }
-    if (at[low].distance - kFarthest * longest - 0.25 * face.grid.cell() > widest) continue;
-    // Linear from the corner on, the distance would fall by so much within the face.
-    double fall = 0;
-    for (int k = 0; k < 3; ++k) fall = std::min(fall, dot(at[low].gradient, face.x[k] - face.x[low]));
-    if (fall > -dip) continue;
-    double w[3] = {0, 0, 0};
-    w[low] = 1;
-    const double distance = lowest_place(face, finest, w, at[low].distance);
-    if (!(distance < at[low].distance - dip) || !owned(*pair.a.surface, candidate.feature_a, w)) continue;
+    const Vec3 local[3] = {shape.local(x[0]), shape.local(x[1]), shape.local(x[2])};
+    double w[3], distance;
+    if (!dips(*view.grid, local, widest, dip, w, distance) || !owned(*pair.a.surface, candidate.feature_a, w)) continue;
     const Vec3 q = w[0] * x[0] + w[1] * x[1] + w[2] * x[2];
     const ObstaclePoint o = shape.closest(q);
     if (!(o.distance < reach_of(pair, corner, o.point))) continue;

@@ -40,9 +40,35 @@ void plan_effects(const SceneFacts &f, Plan &plan) {
     }
     plan.effects.push_back({name, f.effects_listed ? "effects" : "content", by});
   }
+  const auto listed = [&](const PlannedEffect &e) { return e.name == kSelfContact; };
+  if (f.self_bodies == 0 || std::any_of(plan.effects.begin(), plan.effects.end(), listed)) return;
+  const std::string by = self_asked_by(f);
+  plan.effects.push_back({kSelfContact, by.empty() ? "contact.filter" : by, "contact"});
+}
+
+// Effects that cannot keep their promise without it: what is cut lies on itself, what folds comes to lie on itself.
+constexpr const char *kNeedSelf[] = {"cutting", "folding"};
+
+void plan_self(const SceneFacts &f, Plan &plan) {
+  const std::string by = self_asked_by(f);
+  if (f.self_bodies)
+    plan.stages.push_back({StageId::self, count(f.self_bodies, "body", "bodies") + " may touch themselves (" + (by.empty() ? "contact.filter" : by) + ")"});
+  else
+    plan.absent.push_back({"self contact", by.empty() ? "not asked for (contact.self), and no effect needs it" : f.bodies ? "filters take every body out" : "no body"});
 }
 
 }  // namespace
+
+std::string self_asked_by(const SceneFacts &f) {
+  const auto listed = [&](const std::string &name) { return std::find(f.asked.begin(), f.asked.end(), name) != f.asked.end(); };
+  if (f.effects_listed && listed(kSelfContact)) return "effects";
+  if (f.self) return "contact.self";
+  for (const char *need : kNeedSelf) {
+    const auto offers = [&](const SceneFacts::Provider &p) { return p.effect == need; };
+    if (f.effects_listed ? listed(need) : std::any_of(f.offered.begin(), f.offered.end(), offers)) return need;
+  }
+  return {};
+}
 
 const char *stage_name(StageId id) {
   switch (id) {
@@ -52,22 +78,33 @@ const char *stage_name(StageId id) {
     case StageId::gather: return "gather";
     case StageId::broad: return "broad";
     case StageId::narrow: return "narrow";
+    case StageId::self: return "self contact";
     case StageId::solve: return "contact+friction";
     case StageId::distribute: return "distribute";
+    case StageId::guard: return "guard";
     case StageId::commit: return "commit";
     case StageId::rigid_predict: return "rigid predict";
     case StageId::rigid_commit: return "rigid commit";
     case StageId::sleep: return "sleep";
+    case StageId::lagged: return "lagged friction";
+    case StageId::rollback: return "rollback";
     case StageId::step: return "step";
   }
   return "?";
 }
 
 bool Plan::touches() const {
-  return std::any_of(stages.begin(), stages.end(), [](const PlannedStage &s) { return s.id == StageId::solve; });
+  return std::any_of(stages.begin(), stages.end(), [](const PlannedStage &s) { return s.id == StageId::solve || s.id == StageId::rollback; });
+}
+
+bool Plan::rolls_back() const {
+  return std::any_of(stages.begin(), stages.end(), [](const PlannedStage &s) { return s.id == StageId::rollback; });
 }
 
 Plan make_plan(const SceneFacts &f) {
+  if (f.rollback && f.self_bodies)
+    fail(DFM_E_UNSUPPORTED, "self contact cannot be in a world whose contact method is rollback (it is there to compare: doc/concepts/rollback.md); use the "
+         "method velocity");
   Plan plan;
   plan_effects(f, plan);
   auto run = [&](StageId id, std::string why) { plan.stages.push_back({id, std::move(why)}); };
@@ -90,27 +127,38 @@ Plan make_plan(const SceneFacts &f) {
   if (f.rigid_bodies) run(StageId::rigid_predict, rigids);
   else leave("rigid", "no rigid bodies");
   const unsigned pairs = f.body_pairs + f.obstacle_pairs;
-  if (pairs) {
+  if (pairs || f.self_bodies) {
     const std::string who = count(f.body_pairs, "pair of bodies", "pairs of bodies") + " and " +
                             count(f.obstacle_pairs, "pair of body and obstacle", "pairs of body and obstacle") + " may touch";
     const std::string coupled = count(f.coupled_surfels, "surfel", "surfels") + " of " + count(f.coupled, "body", "bodies");
     if (f.coupled) run(StageId::gather, coupled + " hang on several points each");
     else leave("gather", "every surfel is a point of its body");
-    run(StageId::broad, who);
-    run(StageId::narrow, who);
-    run(StageId::solve, who);
-    if (f.rigid_bodies) run(StageId::rigid_commit, "ends of " + rigids);
-    run(StageId::distribute, who);
+    if (f.rollback) {
+      run(StageId::lagged, "friction that the last sub-step found");
+      run(StageId::broad, who);
+      run(StageId::rollback, "contact.method rollback: vertices that collide go back to their time of impact; there to compare, not to use");
+      for (StageId id : {StageId::narrow, StageId::solve, StageId::distribute}) leave(stage_name(id), "contact.method is rollback");
+    } else {
+      for (StageId id : {StageId::broad, StageId::narrow})
+        if (pairs) run(id, who);
+        else leave(stage_name(id), "no pair may touch");
+      plan_self(f, plan);
+      run(StageId::solve, who);
+      if (f.rigid_bodies) run(StageId::rigid_commit, "ends of " + rigids);
+      run(StageId::distribute, who);
+    }
   } else {
     const std::string why = f.bodies < 2 && !f.obstacles ? "one body and nothing to touch" : "filters let no pair touch";
-    for (StageId id : {StageId::gather, StageId::broad, StageId::narrow, StageId::solve, StageId::distribute}) leave(stage_name(id), why);
+    for (StageId id : {StageId::gather, StageId::broad, StageId::narrow, StageId::solve, StageId::distribute, StageId::guard}) leave(stage_name(id), why);
+    plan_self(f, plan);
   }
-  if (f.rigid_bodies && !pairs) run(StageId::rigid_commit, "ends of " + rigids);
+  if (f.rigid_bodies && !pairs && !f.self_bodies) run(StageId::rigid_commit, "ends of " + rigids);
+  if (f.rollback) leave("guard", "contact.method is rollback");
+  else if (pairs && !f.unguarded) run(StageId::guard, "nothing crosses at the end of a sub-step: " + count(pairs, "pair", "pairs"));
+  else if (pairs) leave("guard", "switched off (contact.guard): what moves further than contacts reach in one sub-step may cross");
   if (f.bodies) run(StageId::commit, "positions and velocities at the end of the sub-step");
   if (f.bodies && f.sleep) run(StageId::sleep, "islands at rest leave the stages above until something reaches them (contact.sleep)");
   else leave("sleep", f.bodies ? "not asked for (contact.sleep)" : "no body");
-  leave("self contact", "not asked for");
-  leave("guard", "not available yet: contacts are made from the closest points at the start of each sub-step");
   return plan;
 }
 

@@ -1,6 +1,5 @@
 #include "plugin/loader.h"
 
-#include <dlfcn.h>
 #include <sys/stat.h>
 
 #include <algorithm>
@@ -11,8 +10,8 @@
 #include <filesystem>
 
 #include "core/error.h"
-#include "plugin/elf_file.h"
 #include "plugin/registry.h"
+#include "plugin/shared_object.h"
 #include "plugin/static_list.h"
 
 namespace dfm {
@@ -29,11 +28,6 @@ std::string real_path(const std::string &path) {
   std::free(resolved);
   return out;
 }
-
-struct Library {
-  void *handle = nullptr;
-  ~Library() { if (handle) dlclose(handle); }
-};
 
 }  // namespace
 
@@ -55,7 +49,7 @@ Loader::~Loader() {
     } catch (...) {
       host_.log(host_.ctx, 2, 0, (module.file + ": its shutdown threw an exception").c_str());
     }
-    if (module.image) dlclose(module.image);
+    SharedObject::close(module.image);
   }
 }
 
@@ -92,13 +86,9 @@ bool Loader::load(const std::string &path) {
   if (!S_ISREG(st.st_mode)) fail(DFM_E_UNSUPPORTED, "%s is not a file", path.c_str());
   for (const Module &module : modules_)
     if (module.image && module.device == st.st_dev && module.inode == st.st_ino) return false;
-  check_elf_plugin(file);
 
-  Library library;
-  library.handle = dlopen(file.c_str(), RTLD_NOW | RTLD_LOCAL);
-  if (!library.handle) fail(DFM_E_UNSUPPORTED, "%s cannot be loaded: %s", path.c_str(), dlerror());
-  const auto entry = reinterpret_cast<dfm_plugin_fn>(dlsym(library.handle, "dfm_plugin_entry"));
-  if (!entry) fail(DFM_E_UNSUPPORTED, "%s is not a plugin: it has no symbol dfm_plugin_entry", path.c_str());
+  SharedObject library(file, path);
+  const dfm_plugin_fn entry = library.entry();
   dfm_plugin plugin;
   enter(entry, path, plugin);
   modules_.reserve(modules_.size() + 1);
@@ -108,8 +98,7 @@ bool Loader::load(const std::string &path) {
     if (plugin.shutdown) plugin.shutdown();
     throw;
   }
-  modules_.push_back({library.handle, st.st_dev, st.st_ino, path, entry, plugin.shutdown});
-  library.handle = nullptr;
+  modules_.push_back({library.release(), st.st_dev, st.st_ino, path, entry, plugin.shutdown});
   return true;
 }
 
@@ -199,22 +188,6 @@ void Loader::discover() {
     begin = end ? end + 1 : nullptr;
   }
   scan_if_there(default_plugin_directory(), false);
-}
-
-std::string default_plugin_directory() {
-  Dl_info info{};
-  std::string self;
-  if (dladdr(reinterpret_cast<void *>(&default_plugin_directory), &info) && info.dli_fname && std::strchr(info.dli_fname, '/'))
-    self = info.dli_fname;
-  std::error_code error;
-  fs::path binary = self.empty() ? fs::path() : fs::canonical(self, error);
-  // For the main program dladdr repeats argv[0], which may name something else.
-  if (self.empty() || error || binary.extension() == "") binary = fs::canonical("/proc/self/exe", error);
-  for (const char *relative : {"deform", "../lib/deform"}) {
-    const fs::path candidate = binary.parent_path() / relative / DEFORM_ABI_DIR;
-    if (fs::is_directory(candidate, error)) return fs::canonical(candidate, error).string();
-  }
-  return DEFORM_INSTALL_PLUGIN_DIR;
 }
 
 }  // namespace dfm

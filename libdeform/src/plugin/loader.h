@@ -41,7 +41,4 @@ class Loader {
   std::vector<Module> modules_;
 };
 
-// Directory of the plugins that belong to this library (build tree or relocated installation), else the configured one.
-std::string default_plugin_directory();
-
 }  // namespace dfm

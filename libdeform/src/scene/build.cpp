@@ -42,7 +42,8 @@ class Builder {
     dfm_world_def w = dfm_world_def_default();
     std::copy_n(def_.gravity, 3, w.gravity);
     w.method = def_.method, w.integrator = def_.integrator;
-    w.contact_offset = def_.offset, w.contact_tolerance = def_.tolerance, w.sleep = def_.sleep;
+    w.contact_offset = def_.offset, w.contact_tolerance = def_.tolerance, w.sleep = def_.sleep, w.self_contact = def_.self;
+    if (!def_.guard) w.flags |= DFM_WORLD_UNGUARDED;
     std::vector<const char *> effects;
     for (const std::string &e : def_.effects) effects.push_back(e.c_str());
     effects.push_back(nullptr);

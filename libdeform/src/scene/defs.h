@@ -121,7 +121,7 @@ struct Definition {
   std::vector<dfm_vector_key> gravity_keys;
   int32_t method = DFM_METHOD_AUTO, integrator = DFM_INTEGRATOR_AUTO;
   double offset = 0, tolerance = 0;
-  bool sleep = false;
+  bool sleep = false, self = false, guard = true;
   bool effects_auto = true;
   std::vector<std::string> effects;
   std::vector<Material> materials;

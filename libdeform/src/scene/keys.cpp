@@ -48,7 +48,7 @@ const Table &objects() {
       {"joint", {{"type", true}, {"with", true}, {"anchor", true}, {"axis", true}, {"motor", true}}},
       {"motor", {{"velocity", true}, {"max", true}}},
       {"contact",
-       {{"method", true}, {"self", true}, {"untangle", true}, {"sleep", true}, {"tolerance", true}, {"offset", true},
+       {{"method", true}, {"self", true}, {"untangle", true}, {"sleep", true}, {"tolerance", true}, {"offset", true}, {"guard", true},
         {"friction", true}, {"filter", true}}},
       {"friction", {{"between", true}, {"law", true}, {"params", true}}},
       {"filter", {{"between", true}, {"collide", true}}},
@@ -65,7 +65,7 @@ const Table &words() {
   static const Table table = {
       {"mode", {{"dynamic", true}, {"static", false}}},
       {"integrator", {{"auto", true}, {"symplectic_euler", true}, {"verlet", false}, {"implicit_euler", false}}},
-      {"method", {{"auto", true}, {"velocity", true}, {"implicit", false}, {"rollback", false}}},
+      {"method", {{"auto", true}, {"velocity", true}, {"implicit", false}, {"rollback", true}}},
       {"shape", {{"plane", true}, {"sphere", true}, {"box", true}, {"capsule", true}, {"mesh", true}, {"voxels", true}}},
       {"rigid_shape", {{"sphere", true}, {"box", true}, {"capsule", true}, {"mesh", false}, {"voxels", false}}},
       {"joint_type", {{"hinge", true}, {"slider", true}, {"ball", true}, {"fixed", true}}},

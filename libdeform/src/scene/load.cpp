@@ -27,10 +27,16 @@ std::string MeshFiles::path_of(const std::string &path) const {
   return p.is_absolute() || def_.folder.empty() ? path : (std::filesystem::path(def_.folder) / p).lexically_normal().string();
 }
 
-uint32_t MeshFiles::kind(const std::string &path, const std::string &pointer) {
-  const auto [at, fresh] = kinds_.try_emplace(path, 0u);
-  if (fresh) check(dfm_mesh_file_kind(context_, path.c_str(), &at->second), pointer);
-  return at->second;
+bool MeshFiles::has_cells(const std::string &path, const std::string &pointer) {
+  if (cells_.count(path)) return true;
+  if (surface_only_.count(path)) return false;
+  dfm_tetmesh cells = 0;
+  dfm_trimesh surface = 0;
+  check(dfm_mesh_read(context_, path.c_str(), &cells, &surface), pointer);
+  if (cells) return cells_[path] = cells, true;
+  surface_only_.insert(path);
+  if (!surfaces_.try_emplace(path, surface).second) check(dfm_trimesh_destroy(surface), pointer);   // known as somebody's skin already
+  return false;
 }
 
 dfm_tetmesh MeshFiles::cells(const std::string &path, const std::string &pointer) {
@@ -106,7 +112,7 @@ void MeshFiles::take_skin(dfm_trimesh mesh, const Body &b, const std::string &po
 BodyMesh MeshFiles::load(const Body &b) {
   const std::string path = path_of(b.mesh), pointer = b.pointer + "/mesh";
   BodyMesh out;
-  out.filled = kind(path, pointer) == DFM_MESH_SURFACE;
+  out.filled = !has_cells(path, pointer);
   check_keys(b, out.filled);
   take_cells(out.filled ? filling(path, b) : cells(path, pointer), b, out);
   out.wears_skin = !b.surface.mesh.empty() || (out.filled && !b.surface.boundary);

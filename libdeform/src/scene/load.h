@@ -1,6 +1,7 @@
 // Mesh files of a scene, each read once; a body whose file is a surface gets its cells by filling it.
 #pragma once
 #include <map>
+#include <set>
 #include <string>
 #include <utility>
 
@@ -26,7 +27,7 @@ class MeshFiles {
  private:
   void check(dfm_status status, const std::string &pointer) const;
   [[noreturn]] void refuse(const std::string &pointer, const std::string &sentence) const;
-  uint32_t kind(const std::string &path, const std::string &pointer);
+  bool has_cells(const std::string &path, const std::string &pointer);   // reads the file; else it has a surface alone
   dfm_tetmesh cells(const std::string &path, const std::string &pointer);
   dfm_trimesh surface(const std::string &path, const std::string &pointer);
   dfm_tetmesh filling(const std::string &path, const Body &body);
@@ -36,7 +37,7 @@ class MeshFiles {
 
   dfm_context *context_;
   const Definition &def_;
-  std::map<std::string, uint32_t> kinds_;
+  std::set<std::string> surface_only_;
   std::map<std::string, dfm_tetmesh> cells_;
   std::map<std::string, dfm_trimesh> surfaces_;
   std::map<std::pair<std::string, uint32_t>, dfm_tetmesh> fillings_;  // by file and number of cells

@@ -3,41 +3,28 @@
 #include <algorithm>
 #include <cmath>
 
+#include "math/vec3.h"
 #include "scene/select.h"
 
 namespace dfm::scene {
 namespace {
 
-void subtract(const double *a, const double *b, double *out) {
-  for (int i = 0; i < 3; ++i) out[i] = a[i] - b[i];
-}
-
-double triple(const double *a, const double *b, const double *c) {
-  return a[0] * (b[1] * c[2] - b[2] * c[1]) + a[1] * (b[2] * c[0] - b[0] * c[2]) + a[2] * (b[0] * c[1] - b[1] * c[0]);
-}
-
-double dot(const double *a, const double *b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
-
 double volume6(const double *const p[4]) {
-  double u[3], v[3], w[3];
-  subtract(p[1], p[0], u), subtract(p[2], p[0], v), subtract(p[3], p[0], w);
-  return triple(u, v, w);
+  const Vec3 a = load3(p[0]);
+  return dot(load3(p[1]) - a, cross(load3(p[2]) - a, load3(p[3]) - a));
 }
 
 // Distance of a point from a segment, and from a triangle: inside its prism the height, else the nearest of its edges.
-double segment_distance(const double *p, const double *a, const double *b) {
-  double u[3], v[3], r[3];
-  subtract(b, a, u), subtract(p, a, v);
+double segment_distance(Vec3 p, Vec3 a, Vec3 b) {
+  const Vec3 u = b - a, v = p - a;
   const double t = std::clamp(dot(u, v) / dot(u, u), 0.0, 1.0);
-  for (int k = 0; k < 3; ++k) r[k] = v[k] - t * u[k];
-  return std::sqrt(dot(r, r));
+  return norm(v - t * u);
 }
 
-double triangle_distance(const double *p, const double *const c[3]) {
-  double u[3], v[3], w[3], n[3];
-  subtract(c[1], c[0], u), subtract(c[2], c[0], v), subtract(p, c[0], w);
-  for (int k = 0; k < 3; ++k) n[k] = u[(k + 1) % 3] * v[(k + 2) % 3] - u[(k + 2) % 3] * v[(k + 1) % 3];
-  const double s = triple(w, v, n), t = triple(u, w, n), whole = dot(n, n);
+double triangle_distance(const double *point, const double *const corner[3]) {
+  const Vec3 p = load3(point), c[3] = {load3(corner[0]), load3(corner[1]), load3(corner[2])};
+  const Vec3 u = c[1] - c[0], v = c[2] - c[0], w = p - c[0], n = cross(u, v);
+  const double s = dot(w, cross(v, n)), t = dot(u, cross(w, n)), whole = dot(n, n);
   if (s >= 0 && t >= 0 && s + t <= whole) return std::fabs(dot(w, n)) / std::sqrt(whole);
   return std::min({segment_distance(p, c[0], c[1]), segment_distance(p, c[1], c[2]), segment_distance(p, c[2], c[0])});
 }

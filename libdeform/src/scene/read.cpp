@@ -302,10 +302,15 @@ void read_contact(const Node &scene, Definition &def, const ReadContext &context
   if (!scene.has("contact")) scene.value()["contact"] = json::object();
   const Node contact = scene.member("contact");
   contact.object("contact");
-  if (contact.word("method", "auto", "method") == "velocity") def.method = DFM_METHOD_VELOCITY;
+  const std::string method = contact.word("method", "auto", "method");
+  def.method = method == "velocity" ? DFM_METHOD_VELOCITY : method == "rollback" ? DFM_METHOD_ROLLBACK : DFM_METHOD_AUTO;
   def.sleep = contact.boolean("sleep", false);
-  for (const char *later : {"self", "untangle"})
-    if (contact.boolean(later, false)) contact.member(later).not_yet();
+  const bool self_given = contact.has("self"), listed = std::find(def.effects.begin(), def.effects.end(), "self_contact") != def.effects.end();
+  def.self = contact.boolean("self", listed);
+  if (self_given && !def.self && listed)
+    contact.member("self").fail("\"self\" is false, but /effects asks for \"self_contact\"; take one of the two away");
+  if (contact.boolean("untangle", false)) contact.member("untangle").not_yet();
+  def.guard = contact.boolean("guard", true);
   if (contact.has("tolerance")) def.tolerance = contact.member("tolerance").number(kPositive);
   if (contact.has("offset")) def.offset = contact.member("offset").number(kPositive);
   for (const Node &entry : contact.items("friction")) {

@@ -4,31 +4,19 @@
 #include <cmath>
 
 #include "core/error.h"
+#include "math/vec3.h"
 #include "mesh/mesh.h"
 
 namespace dfm::scene {
 namespace {
 
-void subtract(const double *a, const double *b, double *out) {
-  for (int i = 0; i < 3; ++i) out[i] = a[i] - b[i];
-}
-
-double triple(const double *a, const double *b, const double *c) {
-  return a[0] * (b[1] * c[2] - b[2] * c[1]) + a[1] * (b[2] * c[0] - b[0] * c[2]) + a[2] * (b[0] * c[1] - b[1] * c[0]);
-}
-
 double triangle_area(const double *a, const double *b, const double *c) {
-  double u[3], v[3];
-  subtract(b, a, u), subtract(c, a, v);
-  const double x = u[1] * v[2] - u[2] * v[1], y = u[2] * v[0] - u[0] * v[2], z = u[0] * v[1] - u[1] * v[0];
-  return 0.5 * std::sqrt(x * x + y * y + z * z);
+  return 0.5 * norm(cross(load3(b) - load3(a), load3(c) - load3(a)));
 }
 
 double tet_volume6(const BodyMesh &mesh, const uint32_t *t) {
-  double u[3], v[3], w[3];
-  const double *a = &mesh.points[3 * t[0]];
-  subtract(&mesh.points[3 * t[1]], a, u), subtract(&mesh.points[3 * t[2]], a, v), subtract(&mesh.points[3 * t[3]], a, w);
-  return triple(u, v, w);
+  const Vec3 a = load3(&mesh.points[3 * t[0]]);
+  return dot(load3(&mesh.points[3 * t[1]]) - a, cross(load3(&mesh.points[3 * t[2]]) - a, load3(&mesh.points[3 * t[3]]) - a));
 }
 
 // Position of each point within the selection; UINT32_MAX: not selected.

@@ -199,12 +199,9 @@ void restore_linear(const Array<Vec3> &point, Vec3 x, Array<RowEntry> &row) {
   }
 }
 
-}  // namespace
-
-Coupling couple_mls(const Memory &memory, const CouplingInput &in) {
-  const Cloud cloud(memory, in);
-  const Array<Vec3> &point = cloud.rest.point;
-  Neighbourhoods near(memory, cloud);
+// One row for each surfel from the phyxels that reach it, but for those that stand back, by `row`; where none does, the row of its cell.
+template <class StandsBack, class Row>
+Coupling couple_by_reach(const Memory &memory, const CouplingInput &in, const Cloud &cloud, const StandsBack &stands_back, const Row &row) {
   RowBuilder build(memory, in.npoint);
   std::optional<RestCells> cells;
   Array<uint32_t> reach(HookAllocator<uint32_t>{memory});
@@ -212,14 +209,28 @@ Coupling couple_mls(const Memory &memory, const CouplingInput &in) {
   for (uint32_t s = 0; s < in.nsurfel; ++s) {
     const Vec3 x = cloud.rest.surfel[s];
     cloud.reaching(x, reach);
-    // A phyxel whose neighbours lie in a plane has no gradient to give: it stands back where others reach the surfel.
-    std::erase_if(reach, [&](uint32_t i) { return near.of(i).state == 2; });
+    std::erase_if(reach, stands_back);
     double sum = 0;
-    for (uint32_t i : reach) sum += kernel(norm2(x - point[i]), cloud.support[i]);
+    for (uint32_t i : reach) sum += kernel(norm2(x - cloud.rest.point[i]), cloud.support[i]);
     if (!(sum > 0)) {
       append_cell_row(memory, in, cloud.rest, s, cells, out);
       continue;
     }
+    Array<RowEntry> &entries = row(x, reach, sum, build);
+    append_row(out, entries.data(), entries.size());
+  }
+  return out;
+}
+
+}  // namespace
+
+Coupling couple_mls(const Memory &memory, const CouplingInput &in) {
+  const Cloud cloud(memory, in);
+  const Array<Vec3> &point = cloud.rest.point;
+  Neighbourhoods near(memory, cloud);
+  // A phyxel whose neighbours lie in a plane has no gradient to give: it stands back where others reach the surfel.
+  const auto stands_back = [&](uint32_t i) { return near.of(i).state == 2; };
+  return couple_by_reach(memory, in, cloud, stands_back, [&](Vec3 x, const Array<uint32_t> &reach, double sum, RowBuilder &build) -> Array<RowEntry> & {
     for (uint32_t i : reach) {
       const Neighbourhoods::Known &k = near.of(i);
       const double share = kernel(norm2(x - point[i]), cloud.support[i]) / sum;
@@ -235,31 +246,17 @@ Coupling couple_mls(const Memory &memory, const CouplingInput &in) {
     }
     Array<RowEntry> &row = build.take();
     for (int pass = 0; pass < 2; ++pass) restore_linear(point, x, row);
-    append_row(out, row.data(), row.size());
-  }
-  return out;
+    return row;
+  });
 }
 
 Coupling couple_thesis(const Memory &memory, const CouplingInput &in) {
   const Cloud cloud(memory, in);
-  RowBuilder build(memory, in.npoint);
-  std::optional<RestCells> cells;
-  Array<uint32_t> reach(HookAllocator<uint32_t>{memory});
-  Coupling out = empty_coupling(memory, in.nsurfel);
-  for (uint32_t s = 0; s < in.nsurfel; ++s) {
-    const Vec3 x = cloud.rest.surfel[s];
-    cloud.reaching(x, reach);
-    double sum = 0;
-    for (uint32_t i : reach) sum += kernel(norm2(x - cloud.rest.point[i]), cloud.support[i]);
-    if (!(sum > 0)) {
-      append_cell_row(memory, in, cloud.rest, s, cells, out);
-      continue;
-    }
+  const auto never = [](uint32_t) { return false; };
+  return couple_by_reach(memory, in, cloud, never, [&](Vec3 x, const Array<uint32_t> &reach, double sum, RowBuilder &build) -> Array<RowEntry> & {
     for (uint32_t i : reach) build.add(i, kernel(norm2(x - cloud.rest.point[i]), cloud.support[i]) / sum);
-    Array<RowEntry> &row = build.take();
-    append_row(out, row.data(), row.size());
-  }
-  return out;
+    return build.take();
+  });
 }
 
 }  // namespace dfm

@@ -137,6 +137,11 @@ void wear_coupling(Coupling &&coupling, Surface &surface) {
   for (uint32_t s = 0; s < surface.nsurfel; ++s) store3(&surface.rest[size_t{3} * s], load3(&surface.x[size_t{4} * s]));
   surface.point.clear();
   surface.point.shrink_to_fit();
+  for (uint32_t s = 0; s < surface.nsurfel; ++s) {
+    double sum = 0;
+    surface.each_phyxel(s, [&](uint32_t, double w) { sum += std::fabs(w); });
+    surface.weight_sum = std::max(surface.weight_sum, sum);
+  }
 }
 
 void gather_rows(Surface &surface, const double *x, const double *v, uint32_t begin, uint32_t end) {

@@ -17,6 +17,8 @@ inline double reach_share(double h, double offset, double speed) { return offset
 inline double recovery_depth(const Surface &faces) { return 0.25 * faces.median_edge; }
 // Edges that have slipped through each other are pushed back from a smaller depth: their cones of normals say less than a face does.
 inline double edge_recovery_depth(const Surface &a, const Surface &b) { return 0.02 * std::min(a.median_edge, b.median_edge); }
+// Within one surface the rest shape tells which side is which, not the nearest face alone.
+inline double self_recovery_depth(const Surface &s) { return 0.1 * s.median_edge; }
 
 // Largest length of the differences of two arrays [n,4] whose fourth components are zero; y null: of x itself. Two points at a time,
 // since every body pays this in every sub-step; a maximum has the same bits in any order.

@@ -25,6 +25,7 @@ struct Surface {
   // point is empty.
   Array<uint32_t> point, row, col;
   Array<double> weight;
+  double weight_sum = 1;       // largest sum of |weight| of a row: how much faster than its phyxels a surfel may be
   Array<double> rest;          // [nsurfel,3] m, as given; where N does not reproduce linear fields this is not N times the phyxels at rest
   bool identity() const { return row.empty(); }
   // f(phyxel, weight) for all that surfel s hangs on.

@@ -212,4 +212,53 @@ bool VoxelGrid::near(Vec3 p, double limit) const {
   return at(p).distance <= (fine ? std::min(kSqrt3 * limit, limit + kSqrt3 * cell_) : kSqrt3 * (limit + kBrick * cell_));
 }
 
+double VoxelGrid::clearance(Vec3 p) const {
+  const double d = at(p).distance, coarse = d / kSqrt3 - kBrick * cell_;
+  if (brick_[index(place(p).brick)] == kNone) return coarse;
+  return std::max(coarse, std::min(std::max(d / kSqrt3, d - kSqrt3 * cell_), kBand * cell_));
+}
+
+namespace {
+
+// First place in [lo, hi] where a cubic, by its Bernstein coefficients there, is not above the limit: it lies above what its coefficients lie above.
+double first_below(const double b[4], double lo, double hi, double limit, int halvings) {
+  if (b[0] <= limit) return lo;
+  if (std::min({b[1], b[2], b[3]}) > limit) return HUGE_VAL;
+  if (halvings == 0) return lo;
+  const double p = 0.5 * (b[0] + b[1]), q = 0.5 * (b[1] + b[2]), r = 0.5 * (b[2] + b[3]), pq = 0.5 * (p + q), qr = 0.5 * (q + r), mid = 0.5 * (pq + qr);
+  const double left[4] = {b[0], p, pq, mid}, right[4] = {mid, qr, r, b[3]};
+  const double first = first_below(left, lo, 0.5 * (lo + hi), limit, halvings - 1);
+  return first < HUGE_VAL ? first : first_below(right, 0.5 * (lo + hi), hi, limit, halvings - 1);
+}
+
+}  // namespace
+
+// Along a line, what is joined trilinearly is a cubic from one cell's border to the next; four places inside give it, borders themselves may belong to
+// either side. Bricks that are not kept are further than the band from the surface.
+double VoxelGrid::touch(Vec3 from, Vec3 way, double limit) const {
+  constexpr int kHalvings = 40;
+  for (double t = 0; t < 1;) {
+    double next = 1;
+    for (int k = 0; k < 3; ++k) {
+      if (way[k] == 0) continue;
+      const double x = (from[k] + t * way[k] - origin_[k]) * per_cell_, border = way[k] > 0 ? std::floor(x + 1e-9) + 1 : std::ceil(x - 1e-9) - 1;
+      next = std::min(next, std::max((origin_[k] + border * cell_ - from[k]) / way[k], t + 1e-12));
+    }
+    const Place middle = place(from + (0.5 * (t + next)) * way);
+    if (brick_[index(middle.brick)] != kNone) {
+      double p[4], b[4];
+      for (int i = 0; i < 4; ++i) p[i] = at(from + (t + (0.125 + 0.25 * i) * (next - t)) * way).distance;
+      // p(v) = a0 + a1 v + a2 v^2 + a3 v^3 through v = -3/2, -1/2, 1/2, 3/2; the ends are v = -2 and 2
+      const double a0 = (9 * (p[1] + p[2]) - p[0] - p[3]) / 16, a1 = (p[0] - p[3] + 27 * (p[2] - p[1])) / 24;
+      const double a2 = (p[0] - p[1] - p[2] + p[3]) / 4, a3 = (p[3] - p[0] + 3 * (p[1] - p[2])) / 6;
+      b[0] = a0 - 2 * a1 + 4 * a2 - 8 * a3, b[3] = a0 + 2 * a1 + 4 * a2 + 8 * a3;
+      b[1] = b[0] + (4.0 / 3) * (a1 - 4 * a2 + 12 * a3), b[2] = b[3] - (4.0 / 3) * (a1 + 4 * a2 + 12 * a3);
+      const double first = first_below(b, t, next, limit, kHalvings);
+      if (first < HUGE_VAL) return first;
+    }
+    t = next;
+  }
+  return HUGE_VAL;
+}
+
 }  // namespace dfm

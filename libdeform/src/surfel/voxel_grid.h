@@ -29,6 +29,11 @@ class VoxelGrid {
   // of a way, since those at corners change by no more than it; and they are off the true distance by at most half the diagonal of what is joined.
   bool near(Vec3 p, double limit) const;
 
+  // How near to p the surface may be for all that is known: no place within `way` of p has a distance below clearance(p) - way.
+  double clearance(Vec3 p) const;
+  // The first share of the way from `from` at which the distance is not above `limit`; infinity: nowhere on it. Never late.
+  double touch(Vec3 from, Vec3 way, double limit) const;
+
   double cell() const { return cell_; }
   double extent() const;               // m, farthest corner of the surface's box from the frame's origin
   Vec3 low() const { return low_; }     // of the surface, not of the grid

@@ -116,6 +116,8 @@ Body &create_body(World &w, const dfm_body_def &def) {
   mesh.nedge = static_cast<uint32_t>(b.edges.size() / 2), mesh.edges = b.edges.data(), mesh.fixed = p.held.data();
   coupling.tell(mesh);
   b.model.create(type, w.context->host, mesh, m, std::move(values));
+  rollback_check(w, b);
+  if (w.def.method == DFM_METHOD_ROLLBACK) make(b.lagged, size_t(kStride) * p.n);
 
   w.bodies.reserve(w.bodies.size() + 1);
   w.reserve_sleep(static_cast<uint32_t>(w.bodies.size() + 1));
@@ -220,6 +222,7 @@ Obstacle &create_obstacle(World &w, const dfm_obstacle_def &def) {
     o.mesh = std::make_unique<ObstacleMesh>(w.memory(), def.npoint, o.points.data(), def.ntriangle, o.triangles.data());
   if (def.shape == DFM_SHAPE_VOXELS) make_voxels(o, w.memory());
   o.pose = o.pose_at_time(w.time);
+  rollback_check(w, o);
   w.obstacles.reserve(w.obstacles.size() + 1);
   o.id = w.next_id;
   o.handle = handle_create(Kind::obstacle, &o);

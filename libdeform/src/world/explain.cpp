@@ -28,6 +28,7 @@ std::string cost(const World &w, StageId id) {
   switch (id) {
     case StageId::model: return format("%zu cells", cells);
     case StageId::predict:
+    case StageId::lagged:
     case StageId::commit: return format("%zu points", points);
     case StageId::rigid_predict:
     case StageId::rigid_commit: {
@@ -38,8 +39,15 @@ std::string cost(const World &w, StageId id) {
     case StageId::gather: return format("%zu weights", weights);
     case StageId::broad: return format("%zu surfels every sub-step; %zu triangles whenever a skin is used up", surfels, triangles);
     case StageId::narrow: return "candidate pairs";
+    case StageId::rollback: return "candidate pairs, again while any is tied";
+    case StageId::self: {
+      size_t n = 0, t = 0;
+      for (auto &s : w.self_bodies) n += s->body->surface.nsurfel, t += s->body->surface.ntri;
+      return format("%zu surfels every sub-step, and what of them is near; %zu triangles whenever a skin is used up", n, t);
+    }
     case StageId::solve: return "contacts x sweeps, laws once per pass";
     case StageId::sleep: return format("velocities of %zu awake bodies of %zu", w.active.size(), w.bodies.size());
+    case StageId::guard: return "candidate pairs that may come nearer than d_c / 2 within the sub-step";
     case StageId::distribute: return format("contacts and %zu surfels", surfels);
     default: return "what is prescribed";
   }

@@ -85,6 +85,7 @@ bool World::stage_rigid_predict(uint32_t *trouble) {
     set->step = {sizeof set->step, n, time, h, {gravity.x, gravity.y, gravity.z}, set->state.data(), set->extra.data()};
   }
   if (!ask_rigids(trouble)) return false;
+  for (auto &set : rigid_sets) set->first.assign(set->velocity.begin(), set->velocity.end());
   for (auto &o : obstacles) {
     if (!o->rigid || o->rigid->group[o->rigid_body] == DFM_RIGID_STILL) continue;
     const dfm_rigid_state &s = o->rigid->state[o->rigid_body];
@@ -122,17 +123,45 @@ void correct_rigids(World &w) {
   }
 }
 
-void World::sum_rigid_impulses() {
-  for (auto &set : rigid_sets) std::fill(set->impulse.begin(), set->impulse.end(), 0.0);
-  if (plan.touches() && !rows.rigid.empty())
-    for (uint32_t i = 0; i < rows.n; ++i) {
-      if (rows.rigid[i] == kNone) continue;
-      const Obstacle &o = *obstacles[contacts[i].slot_b];
-      const double *const f = &rows.frame[size_t(9) * i], *const l = &rows.impulse[size_t(3) * i];
-      const Vec3 p = l[0] * load3(f) + l[1] * load3(f + 3) + l[2] * load3(f + 6);
-      double *const to = &o.rigid->impulse[6 * size_t{o.rigid_body}];
-      store3(to, load3(to) - p), store3(to + 3, load3(to + 3) - cross(load3(&rows.arm[size_t(3) * i]), p));
+void sum_rigid_impulses(World &w) {
+  for (auto &set : w.rigid_sets) std::fill(set->impulse.begin(), set->impulse.end(), 0.0);
+  const ContactRows &rows = w.rows;
+  if (!w.plan.touches() || rows.rigid.empty()) return;
+  for (uint32_t i = 0; i < rows.n; ++i) {
+    if (rows.rigid[i] == kNone) continue;
+    const Obstacle &o = *w.obstacles[w.contacts[i].slot_b];
+    const double *const f = &rows.frame[size_t(9) * i], *const l = &rows.impulse[size_t(3) * i];
+    const Vec3 p = l[0] * load3(f) + l[1] * load3(f + 3) + l[2] * load3(f + 6);
+    double *const to = &o.rigid->impulse[6 * size_t{o.rigid_body}];
+    store3(to, load3(to) - p), store3(to + 3, load3(to + 3) - cross(load3(&rows.arm[size_t(3) * i]), p));
+  }
+}
+
+bool revise_rigids(World &w) {
+  if (std::none_of(w.rigid_sets.begin(), w.rigid_sets.end(), [](auto &set) { return set->host.revise != nullptr; })) return false;
+  sum_rigid_impulses(w);
+  bool any = false;
+  for (auto &set : w.rigid_sets) {
+    if (!set->host.revise) continue;
+    uint32_t changed = 0;
+    if (set->host.revise(set->self, &set->step, set->impulse.data(), set->revised.data(), &changed) != DFM_OK ||
+        !finite(set->revised.data(), set->revised.size()))
+      fail(DFM_E_FATAL, "rigid host '%s' does not answer contact on '%s' and those with it", set->host_name.c_str(), set->defs[0].name);
+    if (!changed) continue;
+    any = true;
+    for (const ContactRows::Block &block : w.rows.blocks) {
+      if (block.group == kNone || block.group < set->first_group || block.group >= set->first_group + set->ngroup) continue;
+      rigid_response(w, block.group, &w.rows.response[block.response]);
+      for (uint32_t i = 0; i < set->defs.size(); ++i) {
+        if (set->group[i] != block.group - set->first_group) continue;
+        for (uint32_t k = 0; k < 2; ++k)
+          store3(&w.rows.y[size_t(block.first + 2 * set->place[i] + k) * 4],
+                 load3(&set->revised[6 * size_t{i} + 3 * k]) - load3(&set->first[6 * size_t{i} + 3 * k]));
+      }
+      w.rows.push_rigid(block);
     }
+  }
+  return any;
 }
 
 // 1: all have ended their step; 2: somebody asks for another solve; 0: failed.
@@ -157,15 +186,14 @@ int World::ask_rigid_ends(uint32_t *trouble) {
 
 bool World::stage_rigid_commit(uint32_t *trouble) {
   for (uint32_t round = 0;; ++round) {
-    sum_rigid_impulses();
+    sum_rigid_impulses(*this);
     const int end = ask_rigid_ends(trouble);
     if (end == 0) return false;
     if (end == 1 || round == DFM_RIGID_MOST_AGAIN || !plan.touches() || rows.n == 0) break;
-    if (round == 0)
-      for (auto &set : rigid_sets) set->first.assign(set->velocity.begin(), set->velocity.end());
     rigid_again = true, ++stats.rigid_again;
     if (!ask_rigids(trouble) || !stage_solve(trouble)) return false;
   }
+  rigid_again = false;
   // What is looked at from here on (the guard) sees how they truly move.
   for (auto &o : obstacles) {
     if (!o->rigid || o->rigid->group[o->rigid_body] == DFM_RIGID_STILL) continue;
@@ -178,6 +206,13 @@ bool World::stage_rigid_commit(uint32_t *trouble) {
 
 void World::keep_rigids() {
   for (auto &set : rigid_sets) {
+    for (uint32_t i = 0; guard.motion < 1 && i < set->defs.size(); ++i) {   // the share of their way that the guard has left
+      const dfm_rigid_state &from = set->state[i];
+      dfm_rigid_state &to = set->next[i];
+      const Quat q = slerp(rotation_of(from), rotation_of(to), guard.motion);
+      store3(to.position, load3(from.position) + guard.motion * (load3(to.position) - load3(from.position)));
+      to.rotation[0] = q.x, to.rotation[1] = q.y, to.rotation[2] = q.z, to.rotation[3] = q.w;
+    }
     set->state.swap(set->next), set->extra.swap(set->next_extra);
     for (uint32_t i = 0; i < set->defs.size(); ++i)
       for (uint32_t k = 0; k < 3; ++k) set->total[3 * i + k] += set->impulse[6 * i + k];

@@ -92,7 +92,7 @@ void ask_host(RigidSet &set, const std::vector<dfm_joint_def> &joints, void *dat
 
 RigidSet::RigidSet(World &w, const std::string &name) : world(&w), host_name(name), host(find_host(name)) {
   const Memory &m = w.memory();
-  use_memory(m, state, next), use_memory(m, extra, next_extra, velocity, impulse, first, total);
+  use_memory(m, state, next), use_memory(m, extra, next_extra, velocity, impulse, first, revised, total);
 }
 
 RigidSet::~RigidSet() {
@@ -128,6 +128,7 @@ Obstacle &add_rigid_shape(Obstacle &body, const dfm_obstacle_def &def) {
 }
 
 void create_rigids(World &w, const char *host, const dfm_rigid_set_def &def, uint64_t *out) {
+  rollback_refuse(w, "rigid bodies, which a host moves,");
   if (!def.nbody || !def.bodies) fail(DFM_E_ARG, "a set of rigid bodies needs at least one body");
   if (def.njoint && !def.joints) fail(DFM_E_ARG, "%u joints are announced, but joints is NULL", def.njoint);
   auto owned = std::make_unique<RigidSet>(w, host ? host : "builtin");
@@ -149,7 +150,8 @@ void create_rigids(World &w, const char *host, const dfm_rigid_set_def &def, uin
   ask_host(set, joints, def.data);
 
   const size_t n = set.defs.size();
-  set.state.resize(n), set.next.resize(n), set.velocity.assign(6 * n, 0.0), set.impulse.assign(6 * n, 0.0), set.total.assign(3 * n, 0.0);
+  set.state.resize(n), set.next.resize(n), set.velocity.assign(6 * n, 0.0), set.impulse.assign(6 * n, 0.0), set.revised.assign(6 * n, 0.0);
+  set.total.assign(3 * n, 0.0);
   w.rigid_sets.reserve(w.rigid_sets.size() + 1);
   std::vector<uint64_t> handles;
   try {

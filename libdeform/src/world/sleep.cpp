@@ -120,7 +120,8 @@ void World::wake_touching(uint64_t obstacle) {
 
 // Nothing moves and nothing will: the sub-step would leave everything as it is. What a rigid host's bodies do only the host knows.
 bool World::idle() const {
-  return sleepers > 0 && active.empty() && rigid_sets.empty() && std::none_of(obstacle_views.begin(), obstacle_views.end(), [](const ObstacleView &o) { return o.moves(); });
+  return sleepers > 0 && active.empty() && rigid_sets.empty() &&
+         std::none_of(obstacle_views.begin(), obstacle_views.end(), [](const ObstacleView &o) { return o.moves(); });
 }
 
 bool World::stage_narrow(uint32_t *trouble) {

@@ -53,6 +53,8 @@ uint64_t structure(const World &w) {
     h.add(set->group.data(), set->group.size() * sizeof(uint32_t));
     for (const dfm_rigid_def &d : set->defs) h.add(d.mass), h.add(d.inertia);
   }
+  if (w.def.method == DFM_METHOD_ROLLBACK) h.add(w.def.method);
+  if (asks_self_contact(w)) h.add(uint8_t(1));
   return h.value;
 }
 
@@ -109,7 +111,7 @@ struct StagedBody {
   std::vector<HeldMotion> motions;
   uint32_t next_load = 1, category = 1, collides_with = ~0u;
   Slumber slumber;
-  std::vector<double> surfel_impulse, anchor;
+  std::vector<double> surfel_impulse, anchor, lagged;
 };
 struct StagedObstacle { Pose pose, target; bool has_target; std::vector<dfm_pose_key> keys; dfm_obstacle_def def; };
 struct StagedRigids { std::vector<dfm_rigid_state> state; std::vector<double> extra, total; };
@@ -156,6 +158,7 @@ void fields(Stream &s, W &w) {
     s.value(z.asleep), s.value(z.calm), s.value(z.since), s.value(z.h), s.value(z.force);
     if (z.asleep) s.array(b.surfel_impulse);
     if (w.def.sleep) s.array(b.anchor);
+    if (w.def.method == DFM_METHOD_ROLLBACK) s.array(b.lagged);
     s.each(b.motions, [&](auto &m) { s.array(m.points), s.array(m.start), s.array(m.keys), s.value(m.sine); });
   });
   s.each(w.obstacles, [&](auto &entry) {
@@ -217,7 +220,7 @@ void check(const Staged &t, const World &w) {
     const StagedBody &from = t.bodies[i];
     sleepers += from.slumber.asleep;
     good = (!from.slumber.asleep || from.surfel_impulse.size() == w.bodies[i]->surfel_impulse.size()) &&
-           (!t.def.sleep || from.anchor.size() == w.bodies[i]->p.x.size());
+           (!t.def.sleep || from.anchor.size() == w.bodies[i]->p.x.size()) && from.lagged.size() == w.bodies[i]->lagged.size();
   }
   good = good && sleepers == t.sleepers && t.def.sleep <= 1;
   if (const Report &r = t.report; sleepers > 0) {
@@ -274,6 +277,7 @@ void put(World &w, Staged &t) noexcept {
     b.contact_impulse = from.contact_impulse, b.next_load = from.next_load, b.category = from.category, b.collides_with = from.collides_with;
     b.slumber = from.slumber, b.bound.known = false;
     if (t.def.sleep) copy(from.anchor, b.anchor);
+    copy(from.lagged, b.lagged);
     if (b.slumber.asleep) copy(from.surfel_impulse, b.surfel_impulse), gather_surface(b.surface, b.p.x.data(), b.p.v.data());
     update_inverse_mass(b.p);
   }
@@ -295,6 +299,7 @@ void put(World &w, Staged &t) noexcept {
   w.worst_body = nullptr, w.worst_point = 0;
   w.def.sleep = t.def.sleep, w.sleepers = 0;   // prepare() counts them
   std::swap(w.report, t.report);
+  w.guard.forget();
   w.events.clear();
 }
 
@@ -311,6 +316,7 @@ uint64_t world_hash(const World &w) {
   const ContactStore &c = w.store;
   h.add(c.key.data(), c.key.size() * sizeof(uint64_t));
   h.add(c.bristle.data(), c.bristle.size() * sizeof(double));
+  for (auto &b : w.bodies) h.add(b->lagged.data(), b->lagged.size() * sizeof(double));
   if (w.def.sleep)
     for (auto &b : w.bodies) h.add(b->slumber.asleep), h.add(b->slumber.calm), h.add(b->slumber.since);
   return h.value;
@@ -344,6 +350,7 @@ void world_restore(World &w, const void *data, size_t bytes) {
          "the snapshot belongs to another world: names, meshes, masses, models, fields and obstacles must be the same; nothing was restored");
   Staged staged(w.memory());
   staged.rigid_sets.resize(w.rigid_sets.size());
+  staged.def.method = w.def.method;
   s.each(staged.laws, [&](StagedLaw &l) { s.array(l.id), s.array(l.params); });
   fields(s, staged);
   check(staged, w);

@@ -39,31 +39,12 @@ void fill_responses(World &w) {
   }
 }
 
-void prepare_rows(World &w) {
-  const uint32_t n = static_cast<uint32_t>(w.contacts.size());
-  uint32_t nstate = 0;
-  for (const LawInstance *law : w.law_list) nstate = std::max(nstate, law->nstate);
-  w.state.resize(n, nstate);
-  for (uint32_t i = 0; i < n; ++i) {
-    const ContactPoint &c = w.contacts[i];
-    w.state.law[i] = w.law_of(c.slot_a, c.obstacle, c.slot_b);
-    w.state.area[i] = c.area;
+void apply_last(ContactRows &rows) {
+  for (uint32_t i = 0; i < rows.n; ++i) {
+    double *const l = &rows.impulse[size_t(i) * 3];
+    if (!(rows.wn[i] > 0)) l[0] = l[1] = l[2] = 0;
+    else if (l[0] != 0) rows.apply(i, load3(l));
   }
-  if (!w.zone_table.empty()) w.set_zone_laws();
-  if (w.rigid_again) w.best_impulse.assign(w.rows.impulse.begin(), w.rows.impulse.end());
-  w.rows.build(w.contacts, w.sources, {w.rigid_places, w.rigid_groups});
-  if (w.rigid_again) correct_rigids(w);
-  fill_responses(w);
-  w.tangents.resize(size_t(3) * n), w.match.resize(n);
-  warm_start(w.store, w.contacts, w.h, w.rows, w.state, w.tangents.data(), w.match.data());
-  w.rows.finish(w.contacts, w.tangents.data(), w.h, w.offset);
-  if (w.rigid_again) w.rows.impulse.assign(w.best_impulse.begin(), w.best_impulse.end());
-  for (uint32_t i = 0; i < n; ++i) {
-    double *const l = &w.rows.impulse[size_t(i) * 3];
-    if (!(w.rows.wn[i] > 0)) l[0] = l[1] = l[2] = 0;
-    else if (l[0] != 0) w.rows.apply(i, load3(l));
-  }
-  w.batches.gather(w.law_list, w.state);
 }
 
 // The body to name when a solve fails: where a load or a parameter is out of bounds, that body is off before contact is.
@@ -75,6 +56,8 @@ const Body &fastest(const World &w) {
       if (!(std::fabs(v) <= most)) most = std::isnan(v) ? INFINITY : std::fabs(v), fast = b.get();
   return *fast;
 }
+
+constexpr uint32_t kMostRevisions = 6;   // of what rigid hosts take for granted, within a sub-step
 
 // The cap on sweeps bounds the cost of what is not exact, not of what lets bodies through: where a normal residual would eat more than a tenth
 // of the rest distance within the sub-step, up to kBeyondCap times as many are done (many surfels on few phyxels, struck hard).
@@ -109,37 +92,79 @@ void sweep_until_good(World &w, Acceleration &acceleration, const Tolerance &tol
 
 }  // namespace
 
-bool World::stage_solve(uint32_t *trouble) {
-  passes = sweeps = 0;
-  residual = {};
-  prepare_rows(*this);
-  if (rows.n == 0) return reserve_contacts(), true;
+// Contacts as rows, with what they kept from the last sub-step: its impulses, not applied yet.
+void World::make_rows() {
+  const uint32_t n = static_cast<uint32_t>(contacts.size());
+  uint32_t nstate = 0;
+  for (const LawInstance *law : law_list) nstate = std::max(nstate, law->nstate);
+  state.resize(n, nstate);
+  for (uint32_t i = 0; i < n; ++i) {
+    const ContactPoint &c = contacts[i];
+    state.law[i] = law_of(c.slot_a, c.obstacle, c.slot_b);
+    state.area[i] = c.area;
+  }
+  if (!zone_table.empty()) set_zone_laws();
+  if (rigid_again) best_impulse.assign(rows.impulse.begin(), rows.impulse.end());
+  rows.build(contacts, sources, {rigid_places, rigid_groups});
+  correct_rigids(*this);
+  fill_responses(*this);
+  tangents.resize(size_t(3) * n), match.resize(n);
+  warm_start(store, contacts, h, rows, state, tangents.data(), match.data());
+  rows.finish(contacts, tangents.data(), h, guard.planned, offset);
+  if (guard.resolving) guard_impulses(*this);
+  if (!guard.kept.empty()) guard_rates(*this);
+  if (rigid_again) rows.impulse.assign(best_impulse.begin(), best_impulse.end());
+  batches.gather(law_list, state);
+}
+
+void World::tell_failed_solve(const LawInstance *law) {
+  set_last_error(format("step %llu, body '%s' (the fastest one): %s; take a smaller step, lessen its loads or change the law",
+                        static_cast<unsigned long long>(step_count), fastest(*this).name.c_str(),
+                        law ? (std::string("friction law '") + law->type->id + "' failed or answered with something not finite").c_str()
+                            : "the contact solve is not finite").c_str());
+}
+
+// Passes until the true residual is good enough; a law that failed, or null.
+const LawInstance *World::solve_rows() {
   const double gap_margin = 0.01 * (0.5 * offset) / h;
   const double least = def.contact_tolerance > 0 ? def.contact_tolerance : std::min(1e-6, gap_margin);
   tolerance.normal = gap_margin;
-  const LawInstance *bad = nullptr;
   for (;;) {
     set_trial(rows, h, state);
-    bad = batches.evaluate(h, state);
-    if (bad) break;
+    if (const LawInstance *bad = batches.evaluate(h, state)) return bad;
     ++passes;
     if (!sweeps) set_tolerance(rows, state, contacts, h, least, static_cast<uint32_t>(bodies.size()), disturbance, tolerance);
     else {
       residual = true_residual(rows, state, h, tolerance);
-      if (residual.share <= 1 || !may_sweep(*this, residual) || passes > def.max_passes) break;
+      if (residual.share <= 1 || !may_sweep(*this, residual) || passes > def.max_passes) return nullptr;
     }
     // at least one sweep on a warm start is part of the method
     sweep_until_good(*this, acceleration, tolerance);
   }
+}
+
+bool World::stage_solve(uint32_t *trouble) {
+  passes = sweeps = 0;
+  residual = {};
+  make_rows();
+  apply_last(rows);
+  if (rows.n == 0) return reserve_contacts(), true;
+  uint32_t passes_before = 0, sweeps_before = 0;
+  const LawInstance *bad = nullptr;
+  for (uint32_t revision = 0;; ++revision) {
+    bad = solve_rows();
+    if (bad || revision == kMostRevisions || rows.rigid.empty() || !revise_rigids(*this)) break;
+    // A motor holds or lets go: the same problem with another response, from the impulses that were found.
+    rows.finish(contacts, tangents.data(), h, guard.planned, offset);
+    if (!guard.kept.empty()) guard_rates(*this);
+    passes_before += passes, sweeps_before += sweeps, passes = sweeps = 0;
+  }
+  passes += passes_before, sweeps += sweeps_before;
   double poison = 0;
   for (double l : rows.impulse) poison += 0.0 * l;
   if (bad || poison != 0) {
     *trouble |= bad ? DFM_TROUBLE_PLUGIN : DFM_TROUBLE_NONFINITE;
-    const Body &fast = fastest(*this);
-    set_last_error(format("step %llu, body '%s' (the fastest one): %s; take a smaller step, lessen its loads or change the law",
-                          static_cast<unsigned long long>(step_count), fast.name.c_str(),
-                          bad ? (std::string("friction law '") + bad->type->id + "' failed or answered with something not finite").c_str()
-                              : "the contact solve is not finite").c_str());
+    tell_failed_solve(bad);
     return false;
   }
   if (residual.share > 1) *trouble |= DFM_TROUBLE_UNCONVERGED, ++stats.unconverged;

@@ -1,8 +1,9 @@
 // One step, from top to bottom:
 //
-//   bound -> n sub-steps of { motion -> model -> predict -> broad -> narrow -> contact <-> friction -> distribute -> commit -> sleep }
+//   bound -> n sub-steps of { motion -> model -> predict -> broad -> narrow -> self -> contact <-> friction -> distribute -> guard -> commit -> sleep }
 //
-// The list of stages is the plan's (plan/plan.cpp): what a scene does not call for is not in it. Sub-steps are equal and the contact solve
+// The list of stages is the plan's (plan/plan.cpp): what a scene does not call for is not in it (and rollback.cpp stands for narrow to distribute
+// where it is asked for). Sub-steps are equal and the contact solve
 // runs in each; detection keeps its candidate lists while nothing has moved further than their skin.
 #include <algorithm>
 #include <atomic>
@@ -78,8 +79,12 @@ bool run_stage(World &w, StageId id, uint32_t *trouble) {
     case StageId::gather: w.stage_gather(); return true;
     case StageId::broad: w.stage_broad(); return true;
     case StageId::narrow: return w.stage_narrow(trouble);
+    case StageId::self: w.stage_self(); return true;
     case StageId::solve: return w.stage_solve(trouble);
     case StageId::distribute: w.stage_distribute(); return true;
+    case StageId::guard: return w.stage_guard(trouble);
+    case StageId::lagged: w.stage_lagged(); return true;
+    case StageId::rollback: return w.stage_rollback(trouble);
     case StageId::commit: return w.stage_commit(trouble);
     case StageId::rigid_predict: return w.stage_rigid_predict(trouble);
     case StageId::rigid_commit: return w.stage_rigid_commit(trouble);
@@ -111,17 +116,28 @@ void view_obstacles(World &w, double t, double h, double left) {
 // Where the obstacles are at the end of the sub-step; `last`: of the step, so that a target is met exactly.
 void move_obstacles(World &w, double t, double h, double left, bool last) {
   for (auto &o : w.obstacles) {
-    if (o->has_target) {
-      const double s = last ? 1 : h / left;
-      o->pose = {o->pose.position + s * (o->target.position - o->pose.position), slerp(o->pose.rotation, o->target.rotation, s < 1 ? s : 0)};
-      if (last) o->pose = o->target, o->has_target = false;
-    } else if (o->moves()) {
-      o->pose = o->pose_at_time(t + h);
-    }
+    if (o->has_target || o->moves()) o->pose = last && o->has_target ? o->target : o->end_pose(t, h, left);
+    if (last) o->has_target = false;
+  }
+}
+
+// Where the guard let the bodies go a share of their way only. Obstacles come to their poses in the sub-steps after.
+void move_obstacles_by(World &w, double share) {
+  for (auto &o : w.obstacles) {
+    if (!o->has_target && !o->moves()) continue;
+    const Pose end = o->end_pose(w.time, w.h, w.left);
+    o->pose = {o->pose.position + share * (end.position - o->pose.position), slerp(o->pose.rotation, end.rotation, share)};
   }
 }
 
 }  // namespace
+
+Pose Obstacle::end_pose(double t, double h, double left) const {
+  if (rigid) return {load3(rigid->next[rigid_body].position), unit_quat(rigid->next[rigid_body].rotation)};
+  if (!has_target) return moves() ? pose_at_time(t + h) : pose;
+  const double s = h / left;
+  return {pose.position + s * (target.position - pose.position), slerp(pose.rotation, target.rotation, s < 1 ? s : 1)};
+}
 
 dfm_status World::step(double dt, uint32_t *trouble) {
   prepare();
@@ -154,18 +170,46 @@ dfm_status World::step(double dt, uint32_t *trouble) {
     }
     const bool last = k + 1 == cut;
     const double end = last ? goal : from + span * (double(k + 1) / cut);
-    h = end - time;
-    view_obstacles(*this, time, h, goal - time);
-    if (idle()) stats.contacts_mean += (stats.contacts - stats.contacts_mean) / double(stats.substeps + 1);
-    else if (!sub_step(trouble)) return DFM_E_DIVERGED;
-    move_obstacles(*this, time, h, goal - time, last);
-    time = end;
-    ++stats.substeps, ++bound_age;
+    if (!advance(end, goal, last, trouble)) return DFM_E_DIVERGED;
   }
   stats.last_substeps = done, stats.substeps_max = std::max(stats.substeps_max, done);
   ++step_count;
   stats.steps = step_count, stats.time = time;
   return DFM_OK;
+}
+
+// One planned sub-step, up to `end`: as a whole, or in the pieces that the guard cuts it into. last: of the step, which ends at `goal`.
+bool World::advance(double end, double goal, bool last, uint32_t *trouble) {
+  guard.pieces = 0, guard.motion = 1, guard.planned = end - time;
+  for (bool whole = false; !whole;) {
+    const double rest = h = end - time;
+    left = goal - time;
+    view_obstacles(*this, time, h, left);
+    if (idle()) stats.contacts_mean += (stats.contacts - stats.contacts_mean) / double(stats.substeps + 1);
+    else if (!piece(trouble)) return false;
+    whole = h == rest;
+    if (guard.motion < 1) move_obstacles_by(*this, guard.motion);
+    else move_obstacles(*this, time, h, left, whole && last);
+    time = whole ? end : time + h;
+    ++stats.substeps, ++bound_age;
+  }
+  return true;
+}
+
+// Shortens h until the guard has nothing against it.
+bool World::piece(uint32_t *trouble) {
+  const uint32_t before = *trouble;
+  const uint64_t unconverged = stats.unconverged;
+  guard.acted = false;
+  while (!sub_step(trouble)) {
+    if (!guard.again) return false;
+    h *= guard.cut;
+    *trouble = before, stats.unconverged = unconverged;
+    view_obstacles(*this, time, h, left);
+  }
+  stats.guard_steps += guard.acted;
+  guard.memory.keep();
+  return true;
 }
 
 // All stages, or none: where one fails or throws, the state is that of the sub-step before.
@@ -176,6 +220,7 @@ bool World::sub_step(uint32_t *trouble) {
     ~Undo() { if (!kept) w.undo_motion(); }
   } undo{*this};
   driven.clear();
+  guard.start();
   for (const PlannedStage &stage : plan.stages)
     if (!run_stage(*this, stage.id, trouble)) return false;
   keep_rigids();
@@ -359,13 +404,19 @@ bool World::commit_steppers(uint32_t *trouble) {
 
 bool World::stage_commit(uint32_t *trouble) {
   const bool steppers = std::any_of(bodies.begin(), bodies.end(), [](auto &b) { return b->model.stepper != nullptr; });
-  if (steppers && !commit_steppers(trouble)) return false;
-  const bool touched = plan.touches() && rows.n > 0;
+  if (steppers && !guard.stepped && !commit_steppers(trouble)) return false;
+  guard.stepped = false;
+  const double way = h * guard.motion;   // the guard may leave some of it out
+  const bool touched = plan.touches() && !plan.rolls_back() && rows.n > 0;
   context->tasks.parallel_for(static_cast<uint32_t>(active.size()), 1, [&](uint32_t begin, uint32_t end) {
     for (const uint32_t i : std::span(active).subspan(begin, end - begin)) {
       Body &b = *bodies[i];
-      if (b.model.stepper) b.p.x.swap(b.p.f), b.p.v.swap(b.p.v_free);
-      else commit(b.p, touched, h);
+      if (b.model.stepper) {
+        for (size_t j = 0; guard.motion < 1 && j < b.p.x.size(); ++j) b.p.f[j] = b.p.x[j] + guard.motion * (b.p.f[j] - b.p.x[j]);
+        b.p.x.swap(b.p.f), b.p.v.swap(b.p.v_free);
+      } else {
+        commit(b.p, touched, way);
+      }
       b.model.commit_state();
       if (!plan.touches()) continue;
       Vec3 sum;

@@ -29,11 +29,15 @@ Pose Obstacle::pose_at_time(double t) const {
 }
 
 World::World(dfm_context *c)
-    : context(c), broad(c->memory), rows(c->memory), acceleration(c->memory), store(c->memory), next_store(c->memory), batches(c->memory), islands(c->memory) {
+    : context(c), broad(c->memory), rows(c->memory), acceleration(c->memory), store(c->memory), next_store(c->memory), batches(c->memory), rollback(c->memory),
+      islands(c->memory) {
   const Memory &m = c->memory;
   use_memory(m, driven, lent, contacts, tolerance.tangent, disturbance, best_impulse, tangents, match, block_surfels, block_impulse, block_velocity);
+  GuardMemory &known = guard.memory;
+  use_memory(m, known.runs, known.old_runs, known.features, known.old_features, known.rest, known.old_rest, known.normal, known.old_normal);
   for (Report *r : {&report, &last_report}) use_memory(m, r->contacts, r->frame, r->impulse, r->slip, r->mode);
   use_memory(m, active, woken, stirred);
+  use_memory(m, guard.near, guard.hits, guard.speed, guard.change, guard.kept);
   use_memory(m, state.law, state.fn, state.vt, state.ft_stop, state.area, state.dwell, state.bristle, state.ft, state.dft_dvt, state.dft_dfn, state.limit,
              state.bristle_out, state.mode, state.set_valued);
   stats.size = sizeof stats;
@@ -64,7 +68,9 @@ uint32_t World::add_law(const char *name, std::span<const dfm_param_value> value
   std::vector<double> packed = pack_params(type, values);
   for (uint32_t i = 0; i < laws.size(); ++i)
     if (laws[i]->type == &type && laws[i]->params == packed) return i;
-  laws.push_back(std::make_unique<LawInstance>(type, context->host, std::move(packed)));
+  auto law = std::make_unique<LawInstance>(type, context->host, std::move(packed));
+  rollback_check_law(*this, name, law->nstate);
+  laws.push_back(std::move(law));
   return static_cast<uint32_t>(laws.size() - 1);
 }
 
@@ -97,7 +103,7 @@ void World::prepare() {
   const uint32_t nb = static_cast<uint32_t>(bodies.size()), no = static_cast<uint32_t>(obstacles.size()), width = nb + no;
   SceneFacts facts;
   facts.bodies = nb, facts.obstacles = no;
-  facts.gravity_keys = !gravity_keys.empty(), facts.sleep = def.sleep != 0;
+  facts.gravity_keys = !gravity_keys.empty(), facts.sleep = def.sleep != 0, facts.rollback = def.method == DFM_METHOD_ROLLBACK;
 
   body_views.clear(), obstacle_views.clear(), sources.clear();
   uint32_t node = 0, point = 0;
@@ -167,12 +173,16 @@ void World::prepare() {
       for (uint32_t law : used) offer(*laws[law]->type, facts.offered);
     }
   }
+  facts.effects_listed = def.effects != nullptr;
+  facts.asked = asked_effects;
+  choose_self_bodies(*this, facts, used);
   law_list.clear();
   for (auto &l : laws) law_list.push_back(l.get());
 
   for (const dfm_type *t : context->registry.list()) offer(*t, facts.available);
-  facts.effects_listed = def.effects != nullptr;
-  facts.asked = asked_effects;
+  facts.unguarded = def.flags & DFM_WORLD_UNGUARDED;
+  facts.available.push_back({kSelfContact, "contact"});
+  if (nb && facts.effects_listed) facts.offered.push_back({kSelfContact, "contact"});
   plan = make_plan(facts);
 
   // While contacts live it only falls: a larger one would turn their rest into a depth, and push them apart at 0.1 d_c / h.
@@ -188,6 +198,7 @@ void World::prepare() {
   gravity = load3(def.gravity);
   if (!gravity_keys.empty()) gravity = vector_at(gravity_keys, time);
   bound_age = kNone;
+  guard.forget();
   changed = false;
 }
 

@@ -20,9 +20,12 @@
 #include "surfel/views.h"
 #include "surfel/voxel_grid.h"
 #include "surfel/zones.h"
+#include "world/guard.h"
 #include "world/islands.h"
 #include "world/motion.h"
 #include "world/rigid.h"
+#include "world/rollback.h"
+#include "world/self_contact.h"
 #include "world/sleep.h"
 
 namespace dfm {
@@ -71,6 +74,7 @@ struct Body {
   uint32_t next_load = 1;
   Vec3 contact_impulse;              // N s since creation
   Array<double> surfel_impulse;      // [nsurfel,3] N s of the last sub-step
+  Array<double> lagged;              // [n,4] N, friction for the next sub-step; empty where the method is not rollback
   Array<double> ksum, csum;          // [n] row sums of the step bound
   struct { bool known = false; double step = 0; uint32_t point = 0, inverted = 0; } bound;   // as last asked for; holds while asleep
   Slumber slumber;
@@ -102,6 +106,7 @@ struct Obstacle {
   std::unique_ptr<ObstacleMesh> mesh;
   std::unique_ptr<VoxelGrid> grid;
   Pose pose_at_time(double t) const;
+  Pose end_pose(double t, double h, double left) const;   // of a sub-step, in a step that lasts for `left` from t
 };
 
 struct FrictionRule { std::string between[2]; uint32_t law; };
@@ -162,6 +167,7 @@ struct World {
   std::vector<DofSource> sources;
   std::vector<ImpulseSink> sinks;
   BroadPhase broad;
+  std::vector<std::unique_ptr<SelfBody>> self_bodies;  // in id order; those that may touch themselves
   Array<ContactPoint> contacts;
   Array<uint8_t> lent;                                 // scratch of the narrow phase
   ContactRows rows;
@@ -178,7 +184,9 @@ struct World {
   struct Driven { double *velocity, before; };
   Array<Driven> driven;                                // held components that this sub-step's motion stage has set
   Vec3 gravity;
-  double h = 0;
+  double h = 0, left = 0;                              // s: of the sub-step; from its start to the end of the step
+  Guard guard;
+  Rollback rollback;
   Residual residual;
   uint32_t passes = 0, sweeps = 0;
 
@@ -195,8 +203,8 @@ struct World {
   uint32_t sleepers = 0;
 
   dfm_world_stats stats{};
-  std::array<double, 16> stage_seconds{};
-  std::array<uint64_t, 16> stage_calls{};
+  std::array<double, 24> stage_seconds{};
+  std::array<uint64_t, 24> stage_calls{};
 
   explicit World(dfm_context *c);
   const Memory &memory() const { return context->memory; }
@@ -217,6 +225,8 @@ struct World {
   // step.cpp
   dfm_status step(double dt, uint32_t *trouble);
   bool sub_step(uint32_t *trouble);
+  bool advance(double end, double goal, bool last, uint32_t *trouble);
+  bool piece(uint32_t *trouble);                       // sub_step(), shorter where the guard asks for it
   void undo_motion();                                  // held velocities as before stage_motion()
   void update_bound();                                 // stable, worst_body, worst_point
   void ask_bound(Body &b);
@@ -229,13 +239,19 @@ struct World {
   bool stage_rigid_commit(uint32_t *trouble);          // rigid.cpp: ends beside the present states, kept by keep_rigids()
   bool ask_rigids(uint32_t *trouble);                  // rigid.cpp
   int ask_rigid_ends(uint32_t *trouble);               // rigid.cpp
-  void sum_rigid_impulses();                           // rigid.cpp
   void keep_rigids();                                  // rigid.cpp: once the sub-step is known to succeed
   void stage_gather();
   void stage_broad();
   bool stage_narrow(uint32_t *trouble);                // sleep.cpp
+  void stage_self();                                   // self_contact.cpp
   bool stage_solve(uint32_t *trouble);                 // solve.cpp
+  void make_rows();                                    // solve.cpp: contacts as rows, with what they kept
+  void tell_failed_solve(const LawInstance *law);      // solve.cpp: to dfm_last_error(); null: not finite
+  void stage_lagged();                                 // rollback.cpp
+  bool stage_rollback(uint32_t *trouble);              // rollback.cpp
+  const LawInstance *solve_rows();
   void stage_distribute();
+  bool stage_guard(uint32_t *trouble);                 // guard.cpp
   bool stage_commit(uint32_t *trouble);
   bool commit_steppers(uint32_t *trouble);
   void stage_sleep();                                  // sleep.cpp, as are the next ones

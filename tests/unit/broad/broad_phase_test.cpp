@@ -159,6 +159,38 @@ TEST(BroadPhase, TwoSkinHistories_GiveTheSameBits) {
   EXPECT_NE(one.stats().renewals, two.stats().renewals);
 }
 
+// Pairs come in the order of ids at every step, whether a list is kept or made anew, and whatever order the bodies are handed over in: the order of contacts,
+// of the solve and of the report rests on it.
+TEST(BroadPhase, Pairs_KeepTheOrderOfIds) {
+  Scene scene = random_scene(9, 1);
+  scene.h = 2e-4;
+  std::mt19937 random(9);
+  BroadPhase forward(Memory::standard()), backward(Memory::standard());
+  uint64_t kept = 0, pairs = 0;
+  for (int step = 0; step < 80; ++step) {
+    const uint64_t before = forward.stats().renewals;
+    forward.update(scene.bodies, scene.obstacles, scene.filter, scene.h, scene.offset);
+    kept += forward.stats().renewals == before;
+    const Array<Candidate> &list = forward.candidates();
+    const auto key = [&](const Candidate &c) {
+      const uint64_t id_b = c.obstacle ? scene.obstacles[c.slot_b].id : scene.bodies[c.slot_b].id;
+      return std::array<uint64_t, 6>{scene.bodies[c.slot_a].id, c.obstacle, id_b, c.kind, c.feature_a, c.feature_b};
+    };
+    for (size_t i = 1; i < list.size(); ++i) ASSERT_LT(key(list[i - 1]), key(list[i])) << "step " << step << ", place " << i;
+    std::vector<BodyView> bodies(scene.bodies.rbegin(), scene.bodies.rend());
+    std::vector<ObstacleView> obstacles(scene.obstacles.rbegin(), scene.obstacles.rend());
+    backward.update(bodies, obstacles, scene.filter, scene.h, scene.offset);
+    const Array<Candidate> &other = backward.candidates();
+    ASSERT_EQ(list.size(), other.size());
+    for (size_t i = 0; i < list.size(); ++i) ASSERT_EQ(key(list[i]), key(other[i])) << "step " << step << ", place " << i;
+    pairs += list.size();
+    advance(scene, random, 0.02);
+  }
+  EXPECT_GT(kept, 10u);
+  EXPECT_LT(kept, 70u);
+  EXPECT_GT(pairs, 10000u);
+}
+
 TEST(BroadPhase, TurningPlane_IsFollowed) {
   Scene scene;
   scene.add(box_mesh({1, 1, 1}, 3, 3, 3));

@@ -130,7 +130,7 @@ struct BoxMesh {
 
 size_t count(const std::vector<Surface> &s, Touching touching) {
   Counter counter;
-  return counter.count(s, touching);
+  return counter.count(s, touching).all();
 }
 
 }  // namespace
@@ -233,7 +233,7 @@ TEST(Counter, Obstacles_CountAgainstBodiesOnly) {
   const double upright[9] = {-1, 0, -1, 1, 0, -1, 0, 0, 1}, level[9] = {-1, -1, 0, 1, -1, 0, 0, 1, 0};
   const uint32_t tri[3] = {0, 1, 2};
   Counter counter;
-  const auto count = [&](bool a, bool b) { return counter.count({{upright, 3, tri, 1, a}, {level, 3, tri, 1, b}}, Touching::counts); };
+  const auto count = [&](bool a, bool b) { return counter.count({{upright, 3, tri, 1, a}, {level, 3, tri, 1, b}}, Touching::counts).all(); };
   EXPECT_EQ(count(false, false), 1u);
   EXPECT_EQ(count(true, false), 1u);
   EXPECT_EQ(count(false, true), 1u);

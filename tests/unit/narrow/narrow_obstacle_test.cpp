@@ -95,18 +95,20 @@ TEST(Sphere, SlidingOverFlatFace_SeesNoBump) {
   }
 }
 
-TEST(Capsule, LyingOnFace_HoldsAtBothEnds) {
+// At the ends by the face, between them by the face's diagonal, flat as it is: of a face that bends it would be what bears.
+TEST(Capsule, LyingOnFace_HoldsAtBothEndsAndAcrossTheDiagonal) {
   Scene scene;
   scene.add(box_mesh({2, 2, 1}, 1, 1, 1));
   ObstacleView &o = scene.add(Shape::capsule, {0.1, 0.2, 0.5 + 0.1 + 5e-4}, turn({0, 1, 0}, M_PI / 2));
   o.radius = 0.1, o.half_length = 0.3;
   const auto c = scene.contacts();
   EXPECT_EQ(flaw(scene, c), "");
-  ASSERT_EQ(c.size(), 2u);
+  ASSERT_EQ(c.size(), 3u);
   for (const ContactPoint &k : c) {
-    EXPECT_EQ(k.type_a, 2);
+    EXPECT_EQ(k.type_a, &k == &c[0] ? 1 : 2);
     EXPECT_NEAR(k.distance, 5e-4, 1e-12);
-    EXPECT_NEAR(std::fabs(k.point[0] - 0.1), 0.3, 1e-9);
+    EXPECT_NEAR(k.normal[2], -1, 1e-12);
+    EXPECT_NEAR(k.type_a == 1 ? std::fabs(std::fabs(k.point[0]) - 0.2) : std::fabs(k.point[0] - 0.1) - 0.3, 0, 1e-9);
   }
 }
 

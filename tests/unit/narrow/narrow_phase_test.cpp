@@ -133,8 +133,10 @@ TEST(VertexFace, OverConvexEdgeAndCorner_OneContactAlongTheDirection) {
   for (int i = 0; i < 300; ++i) {
     const bool corner = i % 2;
     const Vec3 d = 1.5e-3 * normalized(Vec3{unit(random), corner ? unit(random) : 0, unit(random)});
-    const Vec3 tip = Vec3{0.5, corner ? 0.5 : unit(random) - 0.5, 0.5} + d;
-    for (uint32_t k = 0; k < s.nsurfel; ++k) store3(&s.x[4 * k], probe(tip).at(k));
+    const Vec3 tip = Vec3{0.5, corner ? 0.5 : unit(random) - 0.5, 0.5} + d, across = cross({0, 0, 1}, d);
+    const double lean = std::acos(d.z / norm(d));   // the tip points at the box
+    const Mesh pointed = probe(tip, lean > 0 ? turn(across, lean) : Quat{});
+    for (uint32_t k = 0; k < s.nsurfel; ++k) store3(&s.x[4 * k], pointed.at(k));
     const auto c = of_tip(scene, 1, 0);
     ASSERT_EQ(c.size(), 1u);
     EXPECT_NEAR(c[0].distance, 1.5e-3, 1e-12);
@@ -488,7 +490,7 @@ TEST(FindContacts, FixedScene_HasItsGoldenHash) {
   ASSERT_GT(contacts.size(), 20u);
   Hash hash;
   for (const ContactPoint &c : contacts) hash.add(c);
-  EXPECT_EQ(hash.value, 4085627832085423884u);
+  EXPECT_EQ(hash.value, 2760922203296597403u);
 }
 
 TEST(FindContacts, CallOrderOfViews_DoesNotMatter) {

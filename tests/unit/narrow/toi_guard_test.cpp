@@ -1,8 +1,10 @@
 // The guard's question to detection: how far may a sub-step go. Bodies are boxes and spheres; ends are free motion, as if no contact held.
 #include <gtest/gtest.h>
 
+#include <numeric>
+
 #include "../surfel/detect_scene.h"
-#include "narrow/toi_guard.h"
+#include "guard_scene.h"
 #include "toi_support.h"
 
 namespace {
@@ -26,9 +28,11 @@ struct Guard {
     for (uint32_t i = 0; i < s.nsurfel; ++i) dfm::store3(&end[b][4 * i], f(dfm::load3(&s.x[4 * i])));
   }
   double safe() {
-    std::vector<const double *> ends;
-    for (const auto &e : end) ends.push_back(e.data());
-    return dfm::guard_pairs(scene.bodies, ends, scene.all(), kFloor, kMargin, hits);
+    const dfm::Array<dfm::Candidate> &all = scene.all();
+    dfm::GuardScene asked = test::guard_scene(scene.bodies, end, kFloor, kMargin);
+    std::vector<uint32_t> which(all.size());
+    std::iota(which.begin(), which.end(), 0u);
+    return dfm::guard_pairs(asked, all, which, hits);
   }
   // Least distance of all pairs at t, by the tests' own arithmetic.
   double least(double t) const {

@@ -1,6 +1,8 @@
 // All four finders on the exact queries of ../shared/reference/ccd and on the published ones beside them: nothing missed, conservative never late.
 #include <gtest/gtest.h>
 
+#include <algorithm>
+
 #include "toi_support.h"
 
 namespace {
@@ -98,9 +100,43 @@ TEST_P(ToiReference, PermutedAxes_SameVerdict) {
 
 INSTANTIATE_TEST_SUITE_P(Finders, ToiReference, testing::Values(0, 1, 2, 3), [](const auto &i) { return std::string(kFinderNames[i.param]); });
 
+// Query 272, "just outside" by construction: near t = 0.5 the point passes a side of the triangle at 1.1e-14 of the extent (in rational numbers) and
+// touches only at 0.694. The reference is right; the answer is early by 0.19 of the step because the features are nearer there than the
+// tolerance, and nearer than the 1.4e-14 that rounding leaves to tell, so no finer tolerance would help. In lengths, which is what "early by
+// 1 % of the extent" limits, it is nothing.
+TEST(Toi, PassingNearerThanRounding_IsATouch) {
+  if (ccd_folder().empty()) GTEST_SKIP() << "../shared is absent";
+  const std::vector<ToiQuery> queries = reference_queries();
+  const auto found = std::find_if(queries.begin(), queries.end(), [](const ToiQuery &q) { return q.id == "272"; });
+  ASSERT_NE(found, queries.end());
+  for (int method = 0; method < 4; ++method) {
+    const double t = ask(*found, method).t;
+    EXPECT_NEAR(t, 0.5, 1e-6) << kFinderNames[method];
+    EXPECT_LT(distance_at(*found, Real(t)), kTolerance * extent_of(*found)) << kFinderNames[method];
+  }
+}
+
+// Early by more than a millionth of the step only at roots of a higher order, but for 272; in lengths, nowhere by more than 1 % of the extent.
+TEST(Toi, ConservativeTimes_AreEarlyAtDegenerateQueriesAlone) {
+  if (ccd_folder().empty()) GTEST_SKIP() << "../shared is absent";
+  size_t early = 0, hits = 0;
+  for (const ToiQuery &q : reference_queries()) {
+    if (!q.hit) continue;
+    ++hits;
+    const double t = ask(q, DFM_TOI_CONSERVATIVE).t;
+    if (q.toi - t <= 1e-6) continue;
+    ++early;
+    EXPECT_TRUE(q.multiplicity != 1 || q.id == "272") << q.id << " " << q.category << " " << t << " " << q.toi << " x" << q.multiplicity;
+    EXPECT_LE(distance_at(q, Real(t)), 0.01 * q.extent) << q.id;
+  }
+  EXPECT_EQ(hits, 811u);
+  EXPECT_GE(early, 1u);
+  std::printf("%zu of %zu hits early by more than 1e-6 of the step\n", early, hits);
+}
+
 TEST(Toi, ReferenceQueries_NeedLittleWork) {
   if (ccd_folder().empty()) GTEST_SKIP() << "../shared is absent";
-  const double most[4] = {36, 12, 12, 10};   // measured 31.1, 9.6, 9.3, 8.5; the thesis's finders without the errata's form need 42 for one root
+  const double most[4] = {28, 10, 10, 10};   // measured 25.1, 8.4, 8.1, 8.5; the thesis's finders without the errata's form need 42 for one root
   const std::vector<ToiQuery> queries = reference_queries();
   for (int method = 0; method < 4; ++method) {
     double sum = 0;

@@ -1,0 +1,624 @@
+// deform/deform.hpp -- the C API for C++20: handles that end what they own, spans for arrays, errors as exceptions or as values. Header only.
+// Every function costs what the C function costs that it is named after, and allocates only where it returns a std::vector or std::string.
+// Comments of the C headers hold: units, errors, threads. doc/howto/cpp.md
+//
+//   #include <deform/deform.hpp>
+//   auto context = deform::Context::make();                                  // throws deform::Error with the library's sentence
+//   auto world = context.make_world();
+//   world.add_obstacle(deform::ObstacleDef{});
+//   deform::BodyDef def;
+//   const auto mesh = context.make_tets("ball", {0.1}, 500);
+//   def.set_mesh(mesh);
+//   const deform::Body ball = world.add_body(def);
+//   for (int i = 0; i < 500; ++i) world.step(1e-3);
+//
+// The same names in deform::values return Result<T> instead of throwing. Without exceptions (-fno-exceptions), or with
+// DEFORM_ERRORS_AS_VALUES defined, the names in deform are those.
+//
+// Two kinds of handles, both as large as the C handle. A plain one (Body, World, ..) refers: copies are free, nothing ends with it, a stale one
+// answers DFM_E_HANDLE. Unique<Body>, Unique<World>, .. ends what it refers to. What lives in a context (worlds, scenes, meshes, laws) is handed
+// out as Unique; what lives in a world (bodies, obstacles, materials) as a plain handle that ends with the world, or earlier by destroy() or in
+// a Unique.
+#ifndef DEFORM_DEFORM_HPP
+#define DEFORM_DEFORM_HPP
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <type_traits>
+#include <vector>
+
+#include "deform/deform.h"
+#include "deform/result.hpp"
+
+namespace deform {
+
+// ---- defs with the library's defaults ---------------------------------------------------------------------------------------------
+struct ContextDef : dfm_context_def { ContextDef() noexcept : dfm_context_def(dfm_context_def_default()) {} };
+struct WorldDef : dfm_world_def { WorldDef() noexcept : dfm_world_def(dfm_world_def_default()) {} };
+struct MaterialDef : dfm_material_def { MaterialDef() noexcept : dfm_material_def(dfm_material_def_default()) {} };
+struct ObstacleDef : dfm_obstacle_def { ObstacleDef() noexcept : dfm_obstacle_def(dfm_obstacle_def_default()) {} };
+struct RigidDef : dfm_rigid_def { RigidDef() noexcept : dfm_rigid_def(dfm_rigid_def_default()) {} };
+struct BodyDef : dfm_body_def {
+  BodyDef() noexcept : dfm_body_def(dfm_body_def_default()) {}
+  // Borrowed until the body is made: points [n,3], tets [n,4].
+  void set_mesh(std::span<const double> p, std::span<const uint32_t> t) noexcept {
+    npoint = static_cast<uint32_t>(p.size() / 3), points = p.data();
+    ntet = static_cast<uint32_t>(t.size() / 4), tets = t.data();
+  }
+  template <class Mesh>
+  auto set_mesh(const Mesh &mesh) { return mesh.give_to(*this); }
+};
+
+// What world.step() returns. Converts to true where the world advanced.
+struct [[nodiscard]] StepReport {
+  uint32_t trouble = 0;      // DFM_TROUBLE_*
+  bool discarded = false;    // too many sub-steps would have been needed: nothing changed
+  constexpr explicit operator bool() const noexcept { return !discarded; }
+};
+struct StableStep { double dt = 0; dfm_body body = 0; uint32_t point = 0; };
+struct Wrench { Vec3 force{}, moment{}; };
+struct HoldReport { double creep = 0; uint32_t count = 0; };
+struct JointState { double position = 0, rate = 0, effort = 0; };
+struct ProbeState { const char *name = nullptr; Vec3 position{}, velocity{}; };
+struct Touch { double t = 0; Vec3 weights{}; };        // weights of the triangle's vertices
+struct EdgeTouch { double t = 0, a = 0, b = 0; };      // where on each edge
+struct TetData { std::span<const double> points; std::span<const uint32_t> tets, file_point; };
+struct TriData { std::span<const double> points; std::span<const uint32_t> triangles, file_point; };
+struct Groups { std::span<const char *const> names; std::span<const uint32_t> of; };   // of: group of each cell or triangle
+struct GroupTriangles { std::span<const uint32_t> triangles, group; };
+struct GroupPoints { uint32_t dimension = 0; std::span<const uint32_t> points; };
+
+// The classes, with how they tell errors as a parameter: Throw or Values.
+namespace basic {
+
+// ---- materials, laws --------------------------------------------------------------------------------------------------------------
+template <class E>
+class Material : public Handle<dfm_material> {
+ public:
+  using Handle::Handle;
+  static void end(dfm_material m) noexcept { dfm_material_destroy(m); }
+  auto destroy() const { return E::done(dfm_material_destroy(raw_)); }
+};
+
+template <class E>
+class Law : public Handle<dfm_law> {
+ public:
+  using Handle::Handle;
+  static void end(dfm_law law) noexcept { dfm_law_close(law); }
+  auto close() const { return E::done(dfm_law_close(raw_)); }
+  auto type() const { return produce<E, const dfm_type *>([&](const dfm_type *&t) { return dfm_law_type(raw_, &t); }); }
+  // False: the law discarded the batch, nothing in out counts.
+  auto eval(const dfm_friction_in &in, dfm_friction_out &out) const {
+    return produce<E, bool>([&](bool &counts) {
+      const dfm_status s = dfm_law_eval(raw_, &in, &out);
+      counts = s == DFM_OK;
+      return s;
+    });
+  }
+  auto pack(const dfm_params &params, std::span<double> values) const {
+    return produce<E, uint32_t>([&](uint32_t &n) { return dfm_law_pack(raw_, &params, rows(values.size(), 1), values.data(), &n); });
+  }
+  auto pack(const dfm_params &params) const {
+    return produce<E, std::vector<double>>([&](std::vector<double> &out) {
+      uint32_t n = 0;
+      const dfm_status s = dfm_law_pack(raw_, &params, 0, nullptr, &n);
+      if (s < 0 || n == 0) return s;
+      out.resize(n);
+      return dfm_law_pack(raw_, &params, n, out.data(), &n);
+    });
+  }
+};
+
+// ---- meshes -----------------------------------------------------------------------------------------------------------------------
+template <class E>
+class TetMesh : public Handle<dfm_tetmesh> {
+ public:
+  using Handle::Handle;
+  static void end(dfm_tetmesh mesh) noexcept { dfm_tetmesh_destroy(mesh); }
+  auto destroy() const { return E::done(dfm_tetmesh_destroy(raw_)); }
+  auto info() const {
+    return produce<E, dfm_tetmesh_info>([&](dfm_tetmesh_info &i) { return i.size = sizeof i, dfm_tetmesh_get_info(raw_, &i); });
+  }
+  // Spans below are borrowed: valid while the mesh lives.
+  auto data() const {
+    return produce<E, TetData>([&](TetData &d) {
+      const double *points = nullptr;
+      const uint32_t *tets = nullptr, *from = nullptr;
+      return counted([&](const dfm_tetmesh_info &i) {
+        const dfm_status s = dfm_tetmesh_data(raw_, &points, &tets, &from);
+        if (s >= 0) d = {{points, size_t{3} * i.npoint}, {tets, size_t{4} * i.ntet}, {from, i.npoint}};
+        return s;
+      });
+    });
+  }
+  auto groups() const {
+    return produce<E, Groups>([&](Groups &g) {
+      const char *const *names = nullptr;
+      const uint32_t *of = nullptr;
+      return counted([&](const dfm_tetmesh_info &i) {
+        const dfm_status s = dfm_tetmesh_groups(raw_, &names, &of);
+        if (s >= 0) g = {{names, i.ngroup}, {of, of ? i.ntet : 0}};
+        return s;
+      });
+    });
+  }
+  auto triangles() const {
+    return produce<E, GroupTriangles>([&](GroupTriangles &g) {
+      const uint32_t *triangles = nullptr, *group = nullptr;
+      uint32_t n = 0;
+      const dfm_status s = dfm_tetmesh_triangles(raw_, &triangles, &group, &n);
+      if (s >= 0) g = {{triangles, size_t{3} * n}, {group, n}};
+      return s;
+    });
+  }
+  auto group_points(uint32_t group) const {
+    return produce<E, GroupPoints>([&](GroupPoints &g) {
+      const uint32_t *points = nullptr;
+      uint32_t n = 0;
+      const dfm_status s = dfm_tetmesh_group_points(raw_, group, &g.dimension, &points, &n);
+      if (s >= 0) g.points = {points, n};
+      return s;
+    });
+  }
+  auto file_cells() const { return per_cell<uint32_t>(dfm_tetmesh_file_cells); }   // empty: as in the file
+  auto share() const { return per_cell<double>(dfm_tetmesh_share); }               // empty: not filled
+  auto write(Text path) const { return E::done(dfm_tetmesh_write(raw_, path.c_str)); }
+  // Points, cells and share into a def that borrows them.
+  auto give_to(dfm_body_def &def) const {
+    return E::done(counted([&](const dfm_tetmesh_info &i) {
+      const dfm_status s = dfm_tetmesh_data(raw_, &def.points, &def.tets, nullptr);
+      if (s < 0) return s;
+      def.npoint = i.npoint, def.ntet = i.ntet;
+      return dfm_tetmesh_share(raw_, &def.cell_share);
+    }));
+  }
+
+ private:
+  template <class F>
+  dfm_status counted(F &&f) const {
+    dfm_tetmesh_info i = sized<dfm_tetmesh_info>();
+    const dfm_status s = dfm_tetmesh_get_info(raw_, &i);
+    return s < 0 ? s : f(i);
+  }
+  template <class T>
+  auto per_cell(dfm_status (*f)(dfm_tetmesh, const T **)) const {
+    return produce<E, std::span<const T>>([&](std::span<const T> &out) {
+      return counted([&](const dfm_tetmesh_info &i) {
+        const T *values = nullptr;
+        const dfm_status s = f(raw_, &values);
+        if (s >= 0) out = {values, values ? i.ntet : 0};
+        return s;
+      });
+    });
+  }
+};
+
+template <class E>
+class TriMesh : public Handle<dfm_trimesh> {
+ public:
+  using Handle::Handle;
+  static void end(dfm_trimesh mesh) noexcept { dfm_trimesh_destroy(mesh); }
+  auto destroy() const { return E::done(dfm_trimesh_destroy(raw_)); }
+  auto info() const {
+    return produce<E, dfm_trimesh_info>([&](dfm_trimesh_info &i) { return i.size = sizeof i, dfm_trimesh_get_info(raw_, &i); });
+  }
+  // Spans below are borrowed: valid while the mesh lives.
+  auto data() const {
+    return produce<E, TriData>([&](TriData &d) {
+      const double *points = nullptr;
+      const uint32_t *triangles = nullptr, *from = nullptr;
+      dfm_trimesh_info i = sized<dfm_trimesh_info>();
+      dfm_status s = dfm_trimesh_get_info(raw_, &i);
+      if (s >= 0) s = dfm_trimesh_data(raw_, &points, &triangles, &from);
+      if (s >= 0) d = {{points, size_t{3} * i.npoint}, {triangles, size_t{3} * i.ntriangle}, {from, i.npoint}};
+      return s;
+    });
+  }
+  auto groups() const {
+    return produce<E, Groups>([&](Groups &g) {
+      const char *const *names = nullptr;
+      const uint32_t *of = nullptr;
+      dfm_trimesh_info i = sized<dfm_trimesh_info>();
+      dfm_status s = dfm_trimesh_get_info(raw_, &i);
+      if (s >= 0) s = dfm_trimesh_groups(raw_, &names, &of);
+      if (s >= 0) g = {{names, i.ngroup}, {of, of ? i.ntriangle : 0}};
+      return s;
+    });
+  }
+  auto write(Text path) const { return E::done(dfm_trimesh_write(raw_, path.c_str)); }
+  // Tetrahedra inside.
+  auto fill(uint32_t cells) const {
+    return produce<E, Unique<TetMesh<E>>>([&](auto &mesh) { return dfm_tetmesh_fill(raw_, cells, mesh.put()); });
+  }
+};
+
+template <class E>
+struct AnyMesh {
+  Unique<TetMesh<E>> cells;
+  Unique<TriMesh<E>> surface;
+};
+
+// ---- bodies -----------------------------------------------------------------------------------------------------------------------
+template <class E>
+class Body : public Handle<dfm_body> {
+ public:
+  using Handle::Handle;
+  static void end(dfm_body body) noexcept { dfm_body_destroy(body); }
+  auto destroy() const { return E::done(dfm_body_destroy(raw_)); }
+  auto info() const {
+    return produce<E, dfm_body_info>([&](dfm_body_info &i) { return i.size = sizeof i, dfm_body_get_info(raw_, &i); });
+  }
+  auto measure() const {
+    return produce<E, dfm_body_measure>([&](dfm_body_measure &m) { return m.size = sizeof m, dfm_body_get_measure(raw_, &m); });
+  }
+  auto set_user(void *user) const { return E::done(dfm_body_set_user(raw_, user)); }
+  auto set_filter(uint32_t category, uint32_t collides_with) const { return E::done(dfm_body_set_filter(raw_, category, collides_with)); }
+  auto set_params(const dfm_params &params) const { return E::done(dfm_body_set_params(raw_, &params)); }
+
+  // Points: x, v [npoint,3]; an empty span leaves that one out. Returns npoint.
+  auto state(std::span<double> x, std::span<double> v) const {
+    const size_t room = x.empty() ? v.size() : v.empty() ? x.size() : x.size() < v.size() ? x.size() : v.size();
+    return produce<E, uint32_t>([&](uint32_t &n) { return dfm_body_get_state(raw_, rows(room, 3), x.data(), v.data(), &n); });
+  }
+  auto set_state(std::span<const double> x, std::span<const double> v) const {
+    if (!x.empty() && !v.empty() && x.size() != v.size()) return E::done(spans_disagree);
+    return E::done(dfm_body_set_state(raw_, rows(x.empty() ? v.size() : x.size(), 3), x.data(), v.data()));
+  }
+  auto positions() const {
+    return collect<E, 3>(+[](dfm_body b, uint32_t room, double *x, uint32_t *n) { return dfm_body_get_state(b, room, x, nullptr, n); }, raw_);
+  }
+  auto velocities() const {
+    return collect<E, 3>(+[](dfm_body b, uint32_t room, double *v, uint32_t *n) { return dfm_body_get_state(b, room, nullptr, v, n); }, raw_);
+  }
+  auto rest(std::span<double> x, std::span<uint32_t> tets) const {
+    return E::done(dfm_body_get_rest(raw_, rows(x.size(), 3), x.data(), rows(tets.size(), 4), tets.data()));
+  }
+  auto energy_density(std::span<double> out) const { return E::done(dfm_body_energy_density(raw_, rows(out.size(), 1), out.data())); }
+
+  auto hold(std::span<const uint32_t> points, uint8_t axes = 7) const { return E::done(dfm_body_hold(raw_, rows(points.size(), 1), points.data(), axes)); }
+  auto move_held(std::span<const uint32_t> points, std::span<const dfm_pose_key> keys, const dfm_sine *sine = nullptr) const {
+    return E::done(dfm_body_move_held(raw_, rows(points.size(), 1), points.data(), rows(keys.size(), 1), keys.data(), sine));
+  }
+  // force [points.size(), 3] N. Returns the load's number.
+  auto add_load(std::span<const uint32_t> points, std::span<const double> force, std::span<const dfm_scale_key> keys = {},
+                const dfm_sine *sine = nullptr) const {
+    return produce<E, uint32_t>([&](uint32_t &load) {
+      if (force.size() != 3 * points.size()) return spans_disagree;
+      return dfm_body_add_load(raw_, rows(points.size(), 1), points.data(), force.data(), rows(keys.size(), 1), keys.data(), sine, &load);
+    });
+  }
+  auto remove_load(uint32_t load) const { return E::done(dfm_body_remove_load(raw_, load)); }
+  auto apply_impulse(In3 point, In3 impulse) const { return E::done(dfm_body_apply_impulse(raw_, point.data(), impulse.data())); }
+  auto asleep() const { return produce<E, bool>([&](bool &asleep) { return dfm_body_is_asleep(raw_, &asleep); }); }
+  auto wake() const { return E::done(dfm_body_wake(raw_)); }
+
+  // Surface: into the caller's memory, returning how many surfels or triangles, or as a vector.
+  auto surface_positions(std::span<double> out) const { return fill<E, 3>(dfm_surface_positions, raw_, out); }
+  auto surface_velocities(std::span<double> out) const { return fill<E, 3>(dfm_surface_velocities, raw_, out); }
+  auto surface_normals(std::span<double> out) const { return fill<E, 3>(dfm_surface_normals, raw_, out); }
+  auto surface_forces(std::span<double> out) const { return fill<E, 3>(dfm_surface_forces, raw_, out); }
+  auto surface_triangles(std::span<uint32_t> out) const { return fill<E, 3>(dfm_surface_triangles, raw_, out); }
+  auto surface_points(std::span<uint32_t> out) const { return fill<E, 1>(dfm_surface_points, raw_, out); }
+  auto surface_positions() const { return collect<E, 3>(dfm_surface_positions, raw_); }
+  auto surface_velocities() const { return collect<E, 3>(dfm_surface_velocities, raw_); }
+  auto surface_normals() const { return collect<E, 3>(dfm_surface_normals, raw_); }
+  auto surface_forces() const { return collect<E, 3>(dfm_surface_forces, raw_); }
+  auto surface_triangles() const { return collect<E, 3>(dfm_surface_triangles, raw_); }
+  auto surface_points() const { return collect<E, 1>(dfm_surface_points, raw_); }
+
+  auto write(Text path) const { return E::done(dfm_debug_write_body(raw_, path.c_str)); }
+  auto write_surface(Text path) const { return E::done(dfm_debug_write_surface(raw_, path.c_str)); }
+};
+
+// ---- obstacles and rigid bodies ---------------------------------------------------------------------------------------------------
+template <class E>
+class Obstacle : public Handle<dfm_obstacle> {
+ public:
+  using Handle::Handle;
+  static void end(dfm_obstacle obstacle) noexcept { dfm_obstacle_destroy(obstacle); }
+  auto destroy() const { return E::done(dfm_obstacle_destroy(raw_)); }
+  auto pose() const { return produce<E, dfm_pose>([&](dfm_pose &p) { return dfm_obstacle_get_pose(raw_, &p); }); }
+  auto def() const {
+    return produce<E, dfm_obstacle_def>([&](dfm_obstacle_def &d) { return d.size = sizeof d, dfm_obstacle_get_def(raw_, &d); });
+  }
+  auto move_to(const dfm_pose &pose) const { return E::done(dfm_obstacle_move_to(raw_, &pose)); }
+};
+
+// Converts to Obstacle: poses, pair rules and reports take it.
+template <class E>
+class Rigid : public Handle<dfm_rigid> {
+ public:
+  using Handle::Handle;
+  // Of the whole set that the body came with.
+  static void end(dfm_rigid rigid) noexcept { dfm_rigid_destroy(rigid); }
+  auto destroy() const { return E::done(dfm_rigid_destroy(raw_)); }
+  static auto register_host(Text name, const dfm_rigid_host &table) { return E::done(dfm_rigid_host_register(name.c_str, &table)); }
+  operator Obstacle<E>() const noexcept { return Obstacle<E>(raw_); }
+  auto def() const { return produce<E, dfm_rigid_def>([&](dfm_rigid_def &d) { return d.size = sizeof d, dfm_rigid_get_def(raw_, &d); }); }
+  auto state() const { return produce<E, dfm_rigid_state>([&](dfm_rigid_state &s) { return dfm_rigid_get_state(raw_, &s); }); }
+  auto set_state(const dfm_rigid_state &state) const { return E::done(dfm_rigid_set_state(raw_, &state)); }
+  auto measure() const {
+    return produce<E, dfm_body_measure>([&](dfm_body_measure &m) { return m.size = sizeof m, dfm_rigid_get_measure(raw_, &m); });
+  }
+  auto contact_wrench() const {
+    return produce<E, Wrench>([&](Wrench &w) { return dfm_rigid_contact_wrench(raw_, w.force.data(), w.moment.data()); });
+  }
+  auto set_motor(uint32_t joint, double velocity, double max) const { return E::done(dfm_rigid_set_motor(raw_, joint, velocity, max)); }
+  auto joint(uint32_t joint) const {
+    return produce<E, JointState>([&](JointState &j) { return dfm_rigid_joint(raw_, joint, &j.position, &j.rate, &j.effort); });
+  }
+};
+
+// ---- the world --------------------------------------------------------------------------------------------------------------------
+template <class E>
+class World : public Handle<dfm_world> {
+ public:
+  using Handle::Handle;
+  static void end(dfm_world world) noexcept { dfm_world_destroy(world); }
+  auto destroy() const { return E::done(dfm_world_destroy(raw_)); }
+
+  auto step(double dt) const {
+    return produce<E, StepReport>([&](StepReport &r) {
+      uint32_t trouble = 0;
+      const dfm_status s = dfm_world_step(raw_, dt, &trouble);
+      r = {trouble, s == DFM_DISCARD};
+      return s;
+    });
+  }
+  auto stable_step() const {
+    return produce<E, StableStep>([&](StableStep &s) { return dfm_world_stable_step(raw_, &s.dt, &s.body, &s.point); });
+  }
+  double time() const noexcept { return dfm_world_time(raw_); }
+  uint64_t hash() const noexcept { return dfm_world_hash(raw_); }
+  auto set_gravity(In3 g) const { return E::done(dfm_world_set_gravity(raw_, g.data())); }
+  auto set_gravity(std::span<const dfm_vector_key> keys) const { return E::done(dfm_world_set_gravity_keys(raw_, rows(keys.size(), 1), keys.data())); }
+  auto set_sleep(bool sleep) const { return E::done(dfm_world_set_sleep(raw_, sleep)); }
+
+  auto add_material(const dfm_material_def &def) const {
+    return produce<E, Material<E>>([&](Material<E> &m) { return dfm_material_create(raw_, &def, m.put()); });
+  }
+  auto add_body(const dfm_body_def &def) const {
+    return produce<E, Body<E>>([&](Body<E> &b) { return dfm_body_create(raw_, &def, b.put()); });
+  }
+  auto add_obstacle(const dfm_obstacle_def &def) const {
+    return produce<E, Obstacle<E>>([&](Obstacle<E> &o) { return dfm_obstacle_create(raw_, &def, o.put()); });
+  }
+  // One rigid body without joints; host nullptr: "builtin".
+  auto add_rigid(const dfm_rigid_def &def, Text host = nullptr) const {
+    return produce<E, Rigid<E>>([&](Rigid<E> &r) {
+      dfm_rigid_set_def set = sized<dfm_rigid_set_def>();
+      set.nbody = 1, set.bodies = &def;
+      return dfm_rigid_create(raw_, host.c_str, &set, r.put());
+    });
+  }
+  // A set: out [set.nbody].
+  auto add_rigids(const dfm_rigid_set_def &set, std::span<dfm_rigid> out, Text host = nullptr) const {
+    return E::done(out.size() < set.nbody ? spans_disagree : dfm_rigid_create(raw_, host.c_str, &set, out.data()));
+  }
+  auto add_friction(const dfm_friction_def &def) const { return E::done(dfm_world_add_friction(raw_, &def)); }
+  auto add_friction(Text a, Text b, Text law, const dfm_params &params = {}) const {
+    dfm_friction_def def = sized<dfm_friction_def>();
+    def.between[0] = a.c_str, def.between[1] = b.c_str, def.law = law.c_str, def.params = params;
+    return E::done(dfm_world_add_friction(raw_, &def));
+  }
+  auto filter_pair(Text a, Text b, bool collide) const { return E::done(dfm_world_filter_pair(raw_, a.c_str, b.c_str, collide)); }
+
+  auto find_body(Text name) const { return produce<E, Body<E>>([&](Body<E> &b) { return dfm_world_find_body(raw_, name.c_str, b.put()); }); }
+  auto find_rigid(Text name) const { return produce<E, Rigid<E>>([&](Rigid<E> &r) { return dfm_world_find_rigid(raw_, name.c_str, r.put()); }); }
+  auto bodies() const { return collect_handles<E, Body<E>>(dfm_world_bodies, raw_); }
+  auto obstacles() const { return collect_handles<E, Obstacle<E>>(dfm_world_obstacles, raw_); }
+  auto rigids() const { return collect_handles<E, Rigid<E>>(dfm_world_rigids, raw_); }
+  auto bodies(std::span<dfm_body> out) const { return fill<E, 1>(dfm_world_bodies, raw_, out); }
+  auto obstacles(std::span<dfm_obstacle> out) const { return fill<E, 1>(dfm_world_obstacles, raw_, out); }
+  auto rigids(std::span<dfm_rigid> out) const { return fill<E, 1>(dfm_world_rigids, raw_, out); }
+
+  // What a step did: into the caller's memory, returning how many, or as a vector.
+  auto contacts(std::span<dfm_contact> out) const { return fill<E, 1>(dfm_world_contacts, raw_, out); }
+  auto pairs(std::span<dfm_pair_report> out) const { return fill<E, 1>(dfm_world_pairs, raw_, out); }
+  auto events(std::span<dfm_contact_event> out) const { return fill<E, 1>(dfm_world_events, raw_, out); }
+  auto profile(std::span<dfm_stage_time> out) const { return fill<E, 1>(dfm_world_profile, raw_, out); }
+  auto contacts() const { return collect<E, 1>(dfm_world_contacts, raw_); }
+  auto pairs() const { return collect<E, 1>(dfm_world_pairs, raw_); }
+  auto events() const { return collect<E, 1>(dfm_world_events, raw_); }
+  auto profile() const { return collect<E, 1>(dfm_world_profile, raw_); }
+  auto stats() const {
+    return produce<E, dfm_world_stats>([&](dfm_world_stats &s) { return s.size = sizeof s, dfm_world_get_stats(raw_, &s); });
+  }
+  // a, b: handles of bodies, obstacles or rigid bodies. On a, about point.
+  template <class A, class B>
+  auto pair_wrench(A a, B b, In3 point) const {
+    return produce<E, Wrench>([&](Wrench &w) {
+      return dfm_world_pair_wrench(raw_, a.get(), b.get(), point.data(), w.force.data(), w.moment.data());
+    });
+  }
+  auto hold_begin() const { return E::done(dfm_world_hold_begin(raw_)); }
+  auto hold() const { return produce<E, HoldReport>([&](HoldReport &h) { return dfm_world_hold(raw_, &h.creep, &h.count); }); }
+  auto ray(In3 origin, In3 direction, double max_distance) const {
+    return produce<E, dfm_ray_hit>([&](dfm_ray_hit &h) {
+      return h.size = sizeof h, dfm_world_ray(raw_, origin.data(), direction.data(), max_distance, &h);
+    });
+  }
+  auto closest(In3 point, double max_distance) const {
+    return produce<E, dfm_ray_hit>([&](dfm_ray_hit &h) { return h.size = sizeof h, dfm_world_closest(raw_, point.data(), max_distance, &h); });
+  }
+  auto explain() const { return collect_text<E>([&](char *text, size_t *bytes) { return dfm_world_explain(raw_, text, bytes); }); }
+
+  // Returns the bytes used; an empty span only asks how many are needed.
+  auto snapshot(std::span<std::byte> out) const {
+    return produce<E, size_t>([&](size_t &bytes) { return bytes = out.size(), dfm_world_snapshot(raw_, out.data(), &bytes); });
+  }
+  auto snapshot() const {
+    return produce<E, std::vector<std::byte>>([&](std::vector<std::byte> &out) {
+      size_t bytes = 0;
+      const dfm_status s = dfm_world_snapshot(raw_, nullptr, &bytes);
+      if (s < 0) return s;
+      out.resize(bytes);
+      return dfm_world_snapshot(raw_, out.data(), &bytes);
+    });
+  }
+  auto restore(std::span<const std::byte> from) const { return E::done(dfm_world_restore(raw_, from.data(), from.size())); }
+
+  // line(std::span<const double, 3> a, std::span<const double, 3> b, uint32_t rgb) for each; what: DFM_DRAW_*.
+  template <class F>
+  auto draw(uint32_t what, F &&line) const {
+    typename E::template Call<std::remove_reference_t<F>> call{line};
+    const dfm_status s = dfm_debug_draw(raw_, what, [](void *user, const double a[3], const double b[3], uint32_t rgb) {
+      (*static_cast<decltype(call) *>(user))(In3(a, 3), In3(b, 3), rgb);
+    }, &call);
+    call.rethrow();
+    return E::done(s);
+  }
+};
+
+// ---- scenes -----------------------------------------------------------------------------------------------------------------------
+template <class E>
+class Scene : public Handle<dfm_scene> {
+ public:
+  using Handle::Handle;
+  static void end(dfm_scene scene) noexcept { dfm_scene_close(scene); }
+  auto close() const { return E::done(dfm_scene_close(raw_)); }
+  auto world() const { return produce<E, World<E>>([&](World<E> &w) { return dfm_scene_world(raw_, w.put()); }); }
+  auto settings() const {
+    return produce<E, dfm_scene_settings>([&](dfm_scene_settings &s) { return s.size = sizeof s, dfm_scene_get_settings(raw_, &s); });
+  }
+  auto value(Text pointer) const {
+    return collect_text<E>([&](char *text, size_t *bytes) { return dfm_scene_value(raw_, pointer.c_str, text, bytes); });
+  }
+  auto probe(uint32_t index) const {
+    return produce<E, ProbeState>([&](ProbeState &p) { return dfm_scene_probe(raw_, index, &p.name, p.position.data(), p.velocity.data()); });
+  }
+};
+
+// ---- the context ------------------------------------------------------------------------------------------------------------------
+template <class E>
+class Context : public Handle<dfm_context *> {
+ public:
+  using Handle::Handle;
+  static void end(dfm_context *context) noexcept { dfm_context_destroy(context); }
+  static auto make(const dfm_context_def &def = ContextDef()) {
+    return produce<E, Unique<Context>>([&](auto &c) { return dfm_context_create(&def, c.put()); });
+  }
+
+  auto make_world(const dfm_world_def &def = WorldDef()) const {
+    return produce<E, Unique<World<E>>>([&](auto &w) { return dfm_world_create(raw_, &def, w.put()); });
+  }
+  auto load_scene(Text path) const {
+    return produce<E, Unique<World<E>>>([&](auto &w) { return dfm_scene_load(raw_, path.c_str, w.put()); });
+  }
+  auto open_scene(Text path, const dfm_scene_options *options = nullptr) const {
+    return produce<E, Unique<Scene<E>>>([&](auto &s) { return dfm_scene_open(raw_, path.c_str, options, s.put()); });
+  }
+  auto open_law(Text id_or_path) const {
+    return produce<E, Unique<Law<E>>>([&](auto &law) { return dfm_law_open(raw_, id_or_path.c_str, law.put()); });
+  }
+
+  // Cells, or where the file has none the surface: the other one refers to nothing.
+  auto read_mesh(Text path) const {
+    return produce<E, AnyMesh<E>>([&](AnyMesh<E> &m) { return dfm_mesh_read(raw_, path.c_str, m.cells.put(), m.surface.put()); });
+  }
+  auto read_tets(Text path) const {
+    return produce<E, Unique<TetMesh<E>>>([&](auto &m) { return dfm_tetmesh_read(raw_, path.c_str, m.put()); });
+  }
+  auto make_tets(Text kind, const Size &size, uint32_t cells) const {
+    return produce<E, Unique<TetMesh<E>>>([&](auto &m) { return dfm_tetmesh_make(raw_, kind.c_str, size.m, cells, m.put()); });
+  }
+  auto read_surface(Text path) const {
+    return produce<E, Unique<TriMesh<E>>>([&](auto &m) { return dfm_trimesh_read(raw_, path.c_str, m.put()); });
+  }
+  auto make_surface(Text kind, const Size &size, uint32_t triangles) const {
+    return produce<E, Unique<TriMesh<E>>>([&](auto &m) { return dfm_trimesh_make(raw_, kind.c_str, size.m, triangles, m.put()); });
+  }
+  // Of triangles of the host's: points [n,3], triangles [n,3].
+  auto make_surface(std::span<const double> points, std::span<const uint32_t> triangles) const {
+    return produce<E, Unique<TriMesh<E>>>([&](auto &m) {
+      return dfm_trimesh_create(raw_, rows(points.size(), 3), points.data(), rows(triangles.size(), 3), triangles.data(), m.put());
+    });
+  }
+  auto mesh_file_kind(Text path) const {
+    return produce<E, uint32_t>([&](uint32_t &kind) { return dfm_mesh_file_kind(raw_, path.c_str, &kind); });
+  }
+
+  auto load_plugin(Text path) const { return E::done(dfm_plugin_load(raw_, path.c_str)); }
+  auto scan_plugins(Text directory) const {
+    return produce<E, uint32_t>([&](uint32_t &loaded) { return dfm_plugin_scan(raw_, directory.c_str, &loaded); });
+  }
+  auto register_plugin(dfm_plugin_fn entry, Text name) const { return E::done(dfm_plugin_register_static(raw_, entry, name.c_str)); }
+  // visit(const dfm_type &, const char *file) for every type known.
+  template <class F>
+  auto visit_plugins(F &&visit) const {
+    typename E::template Call<std::remove_reference_t<F>> call{visit};
+    const dfm_status s = dfm_plugin_visit(raw_, [](void *user, const dfm_type *type, const char *file) {
+      (*static_cast<decltype(call) *>(user))(*type, file);
+    }, &call);
+    call.rethrow();
+    return E::done(s);
+  }
+  // visit(const char *file, const char *reason) for every file that discovery passed over.
+  template <class F>
+  auto visit_passed(F &&visit) const {
+    typename E::template Call<std::remove_reference_t<F>> call{visit};
+    const dfm_status s = dfm_plugin_visit_passed(raw_, [](void *user, const char *file, const char *reason) {
+      (*static_cast<decltype(call) *>(user))(file, reason);
+    }, &call);
+    call.rethrow();
+    return E::done(s);
+  }
+};
+
+// ---- time of impact ---------------------------------------------------------------------------------------------------------------
+template <class E>
+struct Toi {
+  static auto point_triangle(const dfm_motion &p, std::span<const dfm_motion, 3> triangle, const dfm_toi_options *options = nullptr) {
+    return produce<E, Touch>([&](Touch &t) { return dfm_toi_point_triangle(&p, triangle.data(), options, &t.t, t.weights.data()); });
+  }
+  static auto edge_edge(std::span<const dfm_motion, 2> a, std::span<const dfm_motion, 2> b, const dfm_toi_options *options = nullptr) {
+    return produce<E, EdgeTouch>([&](EdgeTouch &t) {
+      double ab[2] = {};
+      const dfm_status s = dfm_toi_edge_edge(a.data(), b.data(), options, &t.t, ab);
+      t.a = ab[0], t.b = ab[1];
+      return s;
+    });
+  }
+  static uint32_t evaluations() noexcept { return dfm_toi_evaluations(); }
+};
+
+}  // namespace basic
+
+namespace values {
+using Context = basic::Context<Values>;
+using World = basic::World<Values>;
+using Body = basic::Body<Values>;
+using Obstacle = basic::Obstacle<Values>;
+using Rigid = basic::Rigid<Values>;
+using Material = basic::Material<Values>;
+using Law = basic::Law<Values>;
+using Scene = basic::Scene<Values>;
+using TetMesh = basic::TetMesh<Values>;
+using TriMesh = basic::TriMesh<Values>;
+using Toi = basic::Toi<Values>;
+}  // namespace values
+
+#if defined(__cpp_exceptions)
+namespace exceptions {
+using Context = basic::Context<Throw>;
+using World = basic::World<Throw>;
+using Body = basic::Body<Throw>;
+using Obstacle = basic::Obstacle<Throw>;
+using Rigid = basic::Rigid<Throw>;
+using Material = basic::Material<Throw>;
+using Law = basic::Law<Throw>;
+using Scene = basic::Scene<Throw>;
+using TetMesh = basic::TetMesh<Throw>;
+using TriMesh = basic::TriMesh<Throw>;
+using Toi = basic::Toi<Throw>;
+}  // namespace exceptions
+#endif
+
+#if defined(__cpp_exceptions) && !defined(DEFORM_ERRORS_AS_VALUES)
+using namespace exceptions;
+#else
+using namespace values;
+#endif
+
+}  // namespace deform
+#endif

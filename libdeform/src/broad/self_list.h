@@ -1,0 +1,41 @@
+// Which features of one surface may touch each other: lists with a skin, as those of two bodies (broad_phase.h), of a tree against itself.
+//
+// Two differences. A rigid motion of all surfels brings no two of them together, so displacements and speeds are taken against the one that fits
+// best: a body that falls or rolls keeps its lists. And features that share a surfel are no pair: they always touch.
+#pragma once
+#include "broad/box_tree.h"
+#include "core/memory.h"
+#include "math/vec3.h"
+#include "surfel/self_rest.h"
+#include "surfel/surface.h"
+
+namespace dfm {
+
+class SelfList {
+ public:
+  SelfList(const Memory &memory, const Surface &surface);
+
+  // Renews what is out of date; true if the lists changed. h in s; offset d_c in m. Results never depend on when lists were made.
+  bool update(double h, double offset);
+  // Ascending by (a, b).
+  const Array<SelfPair> &vertex_face() const { return vf_; }
+  const Array<SelfPair> &edge_edge() const { return ee_; }
+  // The skin is made to last for about this many sub-steps of the present motion.
+  void set_skin_steps(double steps) { skin_steps_ = steps; }
+
+ private:
+  double displaced();                      // m, largest since the lists were made, beyond a rigid motion
+  double share(double h, double offset, double growth, double moved) const;
+  void list(double limit);
+  const Surface &surface_;
+  double skin_steps_ = 24, margin_ = -1;   // negative: no lists yet
+  BoxTree tree_;
+  Array<double> x_;                        // [nsurfel,4] when the lists were made
+  Vec3 centre_;                            // of x_
+  Quat turn_;                              // that fitted best at the last look
+  double longest_ = 0;                     // m, edge of x_
+  Array<SelfPair> vf_, ee_;
+  Array<PairOfTriangles> stack_;
+};
+
+}  // namespace dfm

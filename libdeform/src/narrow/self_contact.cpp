@@ -1,0 +1,281 @@
+// A surfel p against the other triangles of its own surface, and edges against edges.
+//
+//        p                      The surface around p is at distance 0 of it, so a triangle's nearest point is a minimum of the distance only if no
+//    ____|\____    /            triangle beside it, those of p among them, is nearer: flat and convex parts have none, however fine they are.
+//              \__/ F           In a fold the nearest point lies inside a face, over an edge or over a corner, as between two bodies.
+//
+// Every pair that is near is looked at in the rest shape as well:
+//   - It rests at o = min(d_c, half of its distance at rest) instead of d_c: what is near at rest, as in a sharp fold, carries nothing there.
+//   - Near features that look at each other through the material at rest are the two sides of something thin. They are kept apart from within, by the
+//     same rule for the surface turned inside out: what would pass there turns cells inside out. Seen from outside they make no contact; it would
+//     keep them so.
+//   - The side is that of the rest shape, so what is a little on the wrong one is led back. Near features side by side in one plane may fold either
+//     way: theirs is the side they are on.
+#include "narrow/self_contact.h"
+
+#include <algorithm>
+
+#include "narrow/detail.h"
+#include "surfel/area.h"
+#include "surfel/closest.h"
+
+namespace dfm {
+namespace {
+
+using namespace narrow;
+
+// Sine of the fold at the positions x + ahead v: negative where the edge is convex; an open edge is as convex as can be (surfel/convex.h).
+double fold(const Surface &s, uint32_t edge, double ahead) {
+  const uint32_t *const ends = &s.edge[2 * size_t{edge}], *const tris = &s.edge_tri[2 * size_t{edge}];
+  if (tris[0] == kNone || tris[1] == kNone) return -1;
+  const auto x = [&](uint32_t i) { return load3(&s.x[4 * size_t{i}]) + ahead * load3(&s.v[4 * size_t{i}]); };
+  const auto far_corner = [&](uint32_t t) {
+    const uint32_t *const c = &s.tri[3 * size_t{t}];
+    return c[0] + c[1] + c[2] - ends[0] - ends[1];
+  };
+  const Vec3 from = x(ends[0]), e = x(ends[1]) - from, r1 = x(far_corner(tris[1])) - from;
+  const Vec3 c0 = cross(e, x(far_corner(tris[0])) - from), c1 = cross(r1, e);
+  const double size2 = norm2(c0) * norm2(c1);
+  return size2 > 0 ? dot(c0, r1) * norm(e) / std::sqrt(size2) : 0;
+}
+
+constexpr double kNearer = 1e-9;      // relative: a triangle beside the feature counts as nearer only beyond this
+constexpr double kThrough = 0.25;     // cosine to the outward normal beyond which a pair at rest looks through the material, or away from it
+constexpr double kClosed = 1e-2;      // of d_c: what is nearer at rest lies on itself there, and has no side
+
+// What a pair is at rest.
+struct Kin {
+  double apart;                        // m it rests at; 0: it makes no contact
+  double side;                         // 1: kept apart outside, -1: within, 0: where it is
+};
+
+struct Self {
+  const BodyView &body;
+  const SelfRest &rest;
+  const Surface &s;
+  double h, offset, depth, edge_depth;  // depth: m, recovery
+  Pair pair;
+  Array<ContactPoint> &out;
+
+  Self(const BodyView &b, const SelfRest &r, double step, double d_c, Array<ContactPoint> &to)
+      : body(b), rest(r), s(*b.surface), h(step), offset(d_c), depth(self_recovery_depth(s)), edge_depth(edge_recovery_depth(s, s)),
+        pair{b, &b, nullptr, step, d_c, 0}, out(to) {}
+
+  Vec3 x(uint32_t surfel) const { return pair.xa(surfel); }
+  Vec3 v(uint32_t surfel) const { return pair.va(surfel); }
+  const uint32_t *corners(uint32_t t) const { return &s.tri[3 * size_t{t}]; }
+  bool has(uint32_t t, uint32_t surfel) const {
+    const uint32_t *const c = corners(t);
+    return c[0] == surfel || c[1] == surfel || c[2] == surfel;
+  }
+  TrianglePoint closest(uint32_t t, Vec3 p) const { return closest_on_triangle(p, x(corners(t)[0]), x(corners(t)[1]), x(corners(t)[2])); }
+  Vec3 normal(uint32_t t) const {
+    const uint32_t *const c = corners(t);
+    return normalized(cross(x(c[1]) - x(c[0]), x(c[2]) - x(c[0])));
+  }
+
+  bool yields(uint32_t t, double distance2, uint32_t other, uint32_t surfel) const;
+  bool minimum(uint32_t surfel, uint32_t t, const TrianglePoint &at) const;
+  Vec3 outward(uint32_t surfel, uint32_t t, const TrianglePoint &at) const;
+  Kin kin(double at_rest, double facing) const;
+  Kin kin_of_face(uint32_t surfel, uint32_t t) const;
+  Kin kin_of_edges(uint32_t a, uint32_t b) const;
+  void vertex_face(uint32_t surfel, uint32_t t);
+  void edge_edge(uint32_t a, uint32_t b);
+  void name(size_t begin);
+  void share_areas(size_t begin, size_t edges, Array<uint8_t> &lent);
+};
+
+// Does t leave the feature that it shares with `other` to it: because p is of it, or nearer to it, or over its face, or because it comes first?
+bool Self::yields(uint32_t t, double distance2, uint32_t other, uint32_t surfel) const {
+  if (has(other, surfel)) return true;
+  const TrianglePoint o = closest(other, x(surfel));
+  if (o.distance2 < distance2 * (1 - kNearer)) return true;
+  return o.distance2 <= distance2 * (1 + kNearer) && (o.feature == TriangleFeature::face || other < t);
+}
+
+bool Self::minimum(uint32_t surfel, uint32_t t, const TrianglePoint &at) const {
+  const int f = int(at.feature);
+  if (f == 0) return true;
+  if (f < 4) {
+    const uint32_t *const sides = &s.edge_tri[2 * size_t{s.tri_edge[3 * size_t{t} + size_t(f - 1)]}], beyond = sides[0] == t ? sides[1] : sides[0];
+    return beyond == kNone || !yields(t, at.distance2, beyond, surfel);
+  }
+  const uint32_t corner = corners(t)[f - 4];
+  for (uint32_t k = s.fan_begin[corner]; k < s.fan_begin[corner + 1]; ++k)
+    if (s.fan[k] != t && yields(t, at.distance2, s.fan[k], surfel)) return false;
+  return true;
+}
+
+// Not normalised; its side at the closest point tells outside from inside. At a corner that of the edge there that points to p most.
+Vec3 Self::outward(uint32_t surfel, uint32_t t, const TrianglePoint &at) const {
+  const int f = int(at.feature);
+  if (f == 0) return normal(t);
+  uint32_t edge = kNone;
+  if (f < 4) {
+    edge = s.tri_edge[3 * size_t{t} + size_t(f - 1)];
+  } else {
+    const uint32_t corner = corners(t)[f - 4];
+    const Vec3 to = x(surfel) - x(corner);
+    double most = 0;
+    for (uint32_t k = s.fan_begin[corner]; k < s.fan_begin[corner + 1]; ++k)
+      for (uint32_t i = 0; i < 3; ++i) {
+        const uint32_t e = s.tri_edge[3 * size_t{s.fan[k]} + i], *const ends = &s.edge[2 * size_t{e}];
+        if (ends[0] != corner && ends[1] != corner) continue;
+        const double c = dot(normalized(x(ends[0] == corner ? ends[1] : ends[0]) - x(corner)), to);
+        if (edge == kNone || c > most) edge = e, most = c;
+      }
+  }
+  Vec3 sum;
+  for (const uint32_t side : {s.edge_tri[2 * size_t{edge}], s.edge_tri[2 * size_t{edge} + 1]})
+    if (side != kNone) sum += normal(side);
+  return sum;
+}
+
+// By the distance at rest and the cosine between the way across and the outward normal there.
+Kin Self::kin(double at_rest, double facing) const {
+  if (!(at_rest > kClosed * offset)) return {0, 0};
+  return {std::min(offset, 0.5 * at_rest), at_rest >= rest.thin || facing > kThrough ? 1.0 : facing < -kThrough ? -1.0 : 0.0};
+}
+
+Kin Self::kin_of_face(uint32_t surfel, uint32_t t) const {
+  const uint32_t *const c = corners(t);
+  const Vec3 p = rest.at(surfel), a = rest.at(c[0]), b = rest.at(c[1]), d = rest.at(c[2]);
+  const TrianglePoint q = closest_on_triangle(p, a, b, d);
+  const double distance = std::sqrt(q.distance2);
+  return kin(distance, dot(normalized(cross(b - a, d - a)), p - q.point) / distance);
+}
+
+Kin Self::kin_of_edges(uint32_t a, uint32_t b) const {
+  const uint32_t *const ea = &s.edge[2 * size_t{a}], *const eb = &s.edge[2 * size_t{b}];
+  const Vec3 a0 = rest.at(ea[0]), a1 = rest.at(ea[1]), b0 = rest.at(eb[0]), b1 = rest.at(eb[1]);
+  const SegmentPoints at = closest_segments(a0, a1, b0, b1);
+  const Vec3 across = a0 + at.s * (a1 - a0) - (b0 + at.t * (b1 - b0));
+  Vec3 up;
+  for (const uint32_t t : {s.edge_tri[2 * size_t{b}], s.edge_tri[2 * size_t{b} + 1]}) {
+    if (t == kNone) continue;
+    const uint32_t *const c = corners(t);
+    up += normalized(cross(rest.at(c[1]) - rest.at(c[0]), rest.at(c[2]) - rest.at(c[0])));
+  }
+  const double distance = norm(across);
+  return kin(distance, dot(normalized(up), across) / distance);
+}
+
+void Self::vertex_face(uint32_t surfel, uint32_t t) {
+  const uint32_t *const c = corners(t);
+  const Vec3 p = x(surfel), a = x(c[0]), u = x(c[1]) - a, w = x(c[2]) - a, n = cross(u, w);
+  double speed2 = 0;
+  for (int k = 0; k < 3; ++k) speed2 = std::max(speed2, norm2(v(surfel) - v(c[k])));
+  const double reach = contact_reach(h, offset, std::sqrt(speed2)), widest = std::max(reach, depth), along = dot(n, p - a), nn = norm2(n);
+  if (along * along > widest * widest * (1 + kNearer) * nn && nn > 1e-12 * norm2(u) * norm2(w)) return;
+  const TrianglePoint at = closest(t, p);
+  if (!(at.distance2 < widest * widest) || !minimum(surfel, t, at)) return;
+  const bool face = at.feature == TriangleFeature::face;
+  const Vec3 up = outward(surfel, t, at);
+  const double distance = std::sqrt(at.distance2), now = (face ? along : dot(up, p - at.point)) < 0 ? -1 : 1;
+  const Kin k = kin_of_face(surfel, t);
+  const double side = k.side != 0 ? k.side : now;
+  if (!(k.apart > 0) || !(now == side ? distance < reach : face && distance <= depth)) return;
+  if (!face && !(distance > 1e-9 * s.median_edge)) return;
+  const Vec3 normal = face ? side * up : (1 / distance) * (p - at.point);
+  if (!(norm2(normal) > 0)) return;
+  ContactPoint contact = blank(pair, kVertexFace, 0, surfel, t);
+  add_node(contact, body.first_node + surfel, 1);
+  for (int i = 0; i < 3; ++i) add_node(contact, body.first_node + c[i], -at.weight[i]);
+  place(contact, p, at.point, normal, (now == side ? distance : -distance) + (offset - k.apart));
+  contact.area = 0.5 * facing_area(s, surfel, -side * normal);
+  out.push_back(contact);
+}
+
+// As narrow/edge_edge.cpp, of one surface; from within, with the surface turned inside out.
+void Self::edge_edge(uint32_t a, uint32_t b) {
+  const uint32_t *const ea = &s.edge[2 * size_t{a}], *const eb = &s.edge[2 * size_t{b}];
+  const Vec3 p0 = x(ea[0]), u = x(ea[1]) - p0, q0 = x(eb[0]), w = x(eb[1]) - q0, r = p0 - q0, n = cross(u, w);
+  const double uu = norm2(u), ww = norm2(w), nn = norm2(n), nr = dot(n, r);
+  if (!(nn > kParallel * kParallel * uu * ww)) return;
+  const double uw = dot(u, w), ur = dot(u, r), wr = dot(w, r), past_a = uw * wr - ww * ur, past_b = uu * wr - uw * ur;
+  if (!(past_a > -kPast * nn && past_a < (1 + kPast) * nn && past_b > -kPast * nn && past_b < (1 + kPast) * nn)) return;
+  const double on_a = past_a / nn, on_b = past_b / nn;
+  double speed2 = 0;
+  for (int i = 0; i < 2; ++i)
+    for (int j = 0; j < 2; ++j) speed2 = std::max(speed2, norm2(v(ea[i]) - v(eb[j])));
+  const double reach = contact_reach(h, offset, std::sqrt(speed2)), widest = std::max(reach, edge_depth);
+  if (!(nr * nr < widest * widest * nn)) return;
+  if (place_on_edge(on_a, 2 * h * std::sqrt(speed2 / uu)) != kBetween || place_on_edge(on_b, 2 * h * std::sqrt(speed2 / ww)) != kBetween) return;
+  const Kin k = kin_of_edges(a, b);
+  if (!(k.apart > 0)) return;
+  // An edge that is flat folds out where the blow bends its faces, by what they may move against each other within the sub-step.
+  const double bent = std::min(0.3, 2 * h * std::sqrt(speed2 / std::min(uu, ww))) - kConvex;
+  const auto sticks_out = [&](uint32_t e, double side) { return side * fold(s, e, 0) < bent || side * fold(s, e, 2 * h) < bent; };
+  const bool outside = k.side >= 0 && sticks_out(a, 1) && sticks_out(b, 1);
+  const bool within = !outside && k.side <= 0 && sticks_out(a, -1) && sticks_out(b, -1);
+  if (!(outside || within)) return;
+  const EdgeFaces fa = edge_faces(s, a), fb = edge_faces(s, b);
+  const Vec3 up_a = within ? -fa.outward() : fa.outward(), up_b = within ? -fb.outward() : fb.outward();
+  Vec3 normal = (1 / std::sqrt(nn)) * n;
+  if (dot(normal, up_b) < dot(normal, up_a)) normal = -normal;
+  const double distance = dot(normal, r);
+  if (!(distance < reach && distance >= -edge_depth)) return;
+  const double slack = kCone + std::min(0.3, reach / std::sqrt(std::min(uu, ww)));
+  if (!fb.leans_out(normal, slack) || !fa.leans_out(-normal, slack)) return;
+  ContactPoint c = blank(pair, kEdgeEdge, 1, a, b);
+  add_node(c, body.first_node + ea[0], 1 - on_a), add_node(c, body.first_node + ea[1], on_a);
+  add_node(c, body.first_node + eb[0], on_b - 1), add_node(c, body.first_node + eb[1], -on_b);
+  place(c, p0 + on_a * u, q0 + on_b * w, normal, distance + (offset - k.apart));
+  out.push_back(c);
+}
+
+// Keys, and a surfel's area among the faces that it touches.
+void Self::name(size_t begin) {
+  const auto patch = [&](const ContactPoint &c) {
+    const uint32_t *const sides = &s.edge_tri[2 * size_t{c.feature_b}];
+    return s.patch[c.kind == kVertexFace ? c.feature_b : sides[0] != kNone ? sides[0] : sides[1]];
+  };
+  for (size_t i = begin; i < out.size();) {
+    size_t end = i;
+    uint32_t touching = 0;
+    for (; end < out.size() && out[end].type_a == out[i].type_a && out[end].feature_a == out[i].feature_a; ++end)
+      touching += out[end].distance < 2 * offset;
+    for (size_t k = i; k < end; ++k) {
+      uint32_t ordinal = 0;
+      for (size_t j = i; j < k; ++j) ordinal += patch(out[j]) == patch(out[k]);
+      out[k].key = contact_key(out[k], body.id, body.id, patch(out[k]), ordinal);
+      if (out[k].distance < 2 * offset) out[k].area /= touching;
+    }
+    i = end;
+  }
+}
+
+// An edge contact takes over the area of the nearest of its ends that has no contact of its own; none is given twice.
+void Self::share_areas(size_t begin, size_t edges, Array<uint8_t> &lent) {
+  if (edges == out.size()) return;
+  lent.assign(s.nsurfel, 0);
+  for (size_t i = begin; i < edges; ++i) lent[out[i].feature_a] = 1;
+  for (size_t i = edges; i < out.size(); ++i) {
+    ContactPoint &c = out[i];
+    double nearest = 0;
+    for (int k = 0; k < c.nnode; ++k) {
+      const uint32_t surfel = c.node[k] - body.first_node;
+      const double d2 = norm2(x(surfel) - load3(c.point));
+      if (lent[surfel] || (c.lender && !(d2 < nearest))) continue;
+      nearest = d2, c.lender = c.node[k] + 1;
+      c.area = 0.5 * facing_area(s, surfel, c.weight[k] > 0 ? -load3(c.normal) : load3(c.normal));
+    }
+    if (c.lender) lent[c.lender - 1 - body.first_node] = 1;
+  }
+}
+
+}  // namespace
+
+void find_self_contacts(const BodyView &body, const SelfRest &rest, std::span<const SelfPair> vertex_face, std::span<const SelfPair> edge_edge,
+                        double h, double offset, Array<uint8_t> &lent, Array<ContactPoint> &out) {
+  Self self(body, rest, h, offset, out);
+  const size_t begin = out.size();
+  for (const SelfPair &pair : vertex_face) self.vertex_face(pair.a, pair.b);
+  const size_t edges = out.size();
+  for (const SelfPair &pair : edge_edge) self.edge_edge(pair.a, pair.b);
+  self.name(begin);
+  self.share_areas(begin, edges, lent);
+}
+
+}  // namespace dfm

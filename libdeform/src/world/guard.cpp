@@ -1,0 +1,226 @@
+// No crossing at the end of a sub-step, whatever the speed. Between distribute and commit the way of every surfel is known: a straight line from x to
+// x + h v. Every listed pair of features is asked, conservatively, whether it comes as near as d_g = d_c / 2 on that way (narrow/toi_guard). If so:
+//
+//   1  each hit becomes a contact, linearised at its hit time, and the solve runs again, warm                       at most 4 times
+//   2  the sub-step is taken anew, shorter: up to the safe part of the way, but no less than a quarter               at most 8 times
+//   3  all that moves takes the safe share of its way; velocities stay, so no momentum is lost, only way
+//
+// What is not listed is not asked: broad/ covers the motion after the solve too (BroadPhase::cover). Why the order is this one and the cut is the whole
+// world's: doc/decisions/0020-guard-cuts-time.md.
+#include "world/guard.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "narrow/detail.h"
+#include "surfel/obstacle_shape.h"
+#include "world/world.h"
+
+namespace dfm {
+namespace {
+
+constexpr uint32_t kSolves = 4, kCuts = 8, kShares = 40;
+constexpr double kLeastCut = 0.25;
+constexpr double kSlow = 0.01;   // of d_g: what moves by less needs no closer look at how it does
+
+// The mean of the surfels' predicted velocities, and how far any of them is from it.
+void split_motion(const Surface &s, Vec3 &mean, double &spread) {
+  Vec3 sum;
+  for (uint32_t i = 0; i < s.nsurfel; ++i) sum += load3(&s.v[size_t{4} * i]);
+  mean = (1.0 / s.nsurfel) * sum;
+  double most = 0;
+  for (uint32_t i = 0; i < s.nsurfel; ++i) most = std::max(most, norm2(load3(&s.v[size_t{4} * i]) - mean));
+  spread = std::sqrt(most);
+}
+
+// Only what contacts have touched moves otherwise than predicted.
+void bound_speeds(World &w) {
+  Guard &g = w.guard;
+  g.speed.assign(w.bodies.size(), 0.0), g.change.assign(w.bodies.size(), 0.0);
+  for (uint32_t d = 0; d < w.rows.ndof; ++d) {
+    const uint32_t i = w.rows.source[d];
+    if (i == kNone) continue;
+    const Body &b = *w.bodies[i];
+    if (b.model.stepper) continue;
+    const Vec3 y = load3(&w.rows.y[size_t(d) * kStride]), change = y - load3(&b.p.v_free[size_t(w.rows.point[d]) * kStride]);
+    g.speed[i] = std::max(g.speed[i], norm2(y)), g.change[i] = std::max(g.change[i], norm2(change));
+  }
+  for (const uint32_t i : w.active) {
+    const Body &b = *w.bodies[i];
+    double &speed = g.speed[i];
+    speed = std::sqrt(speed), g.change[i] = b.surface.weight_sum * std::sqrt(g.change[i]);
+    if (b.model.stepper) {   // has written its end beside its start
+      for (uint32_t s = 0; s < b.surface.nsurfel; ++s) {
+        Vec3 x;
+        b.surface.each_phyxel(s, [&](uint32_t p, double weight) { x += weight * load3(&b.p.f[size_t(p) * kStride]); });
+        speed = std::max(speed, norm(x - load3(&b.surface.x[size_t(s) * 4])) / w.h);
+      }
+    } else {
+      speed = b.surface.identity() ? std::max(speed, w.broad.speed(i)) : w.broad.speed(i) + g.change[i];
+    }
+  }
+}
+
+void make_room(GuardSide &s, const Surface &surface) {
+  s.surface = &surface;
+  if (s.stamp.size() != surface.nsurfel) s.stamp.assign(surface.nsurfel, 0), s.end.assign(size_t{4} * surface.nsurfel, 0.0);
+}
+
+// How all sides move as the solve left them.
+void set_sides(World &w) {
+  GuardScene &scene = w.guard.scene;
+  const size_t nb = w.bodies.size();
+  scene.bodies = w.body_views, scene.obstacles = w.obstacle_views;
+  scene.sides.resize(nb + w.obstacles.size()), scene.poses.resize(w.obstacles.size());
+  scene.h = w.h, scene.floor = 0.5 * w.offset, scene.margin = 0.1 * (w.offset - scene.floor);
+  const bool touched = w.rows.n > 0;
+  for (size_t i = 0; i < nb; ++i) {
+    const Body &b = *w.bodies[i];
+    GuardSide &s = scene.sides[i];
+    make_room(s, b.surface);
+    s.still = b.slumber.asleep, s.travel = s.spread = w.h * w.guard.speed[i], s.drift = {};
+    if (s.travel > kSlow * scene.floor && !b.model.stepper) {
+      split_motion(b.surface, s.drift, s.spread);
+      s.drift = w.h * s.drift, s.spread = w.h * (s.spread + w.guard.change[i]);
+    }
+    s.v = b.p.v_free.data(), s.inv_mass = b.p.inv_mass.data(), s.impulse = touched ? b.p.impulse.data() : nullptr;
+    s.to = b.model.stepper ? b.p.f.data() : nullptr, s.local = nullptr;
+  }
+  for (size_t o = 0; o < w.obstacles.size(); ++o) {
+    const ObstacleView &v = w.obstacle_views[o];
+    GuardSide &s = scene.sides[nb + o];
+    const double turn = norm(v.spin);
+    s.drift = w.h * v.velocity;
+    s.spread = turn > 0 ? w.h * turn * (v.shape == Shape::plane ? HUGE_VAL : ObstacleShape(v).extent()) : 0;
+    s.travel = norm(s.drift) + s.spread;
+    s.still = !v.moves();
+    if (v.shape != Shape::mesh) continue;
+    make_room(s, *v.surface);
+    s.local = w.obstacles[o]->mesh->local.data();
+  }
+}
+
+// Everything goes this share of its way.
+void set_share(World &w, double share) {
+  GuardScene &scene = w.guard.scene;
+  w.guard.motion = scene.share = share;
+  ++scene.round;
+  for (size_t o = 0; o < w.obstacles.size(); ++o) {
+    const ObstacleView &v = w.obstacle_views[o];
+    GuardPose &to = scene.poses[o];
+    to = {v.position, v.rotation};
+    if (!v.moves()) continue;
+    const Pose end = w.obstacles[o]->end_pose(w.time, w.h, w.left);
+    to = {end.position, end.rotation};
+    if (share < 1) to = {v.position + share * (end.position - v.position), slerp(v.rotation, end.rotation, share)};
+    scene.sides[w.bodies.size() + o].pose = to;
+  }
+}
+
+bool share_a_corner(const uint32_t *l, const uint32_t *r) {
+  for (int i = 0; i < 9; ++i)
+    if (l[i / 3] == r[i % 3]) return true;
+  return false;
+}
+
+bool pierces(const Surface &s, Vec3 p, Vec3 q, uint32_t triangle) {
+  const uint32_t *const c = &s.tri[3 * size_t{triangle}];
+  Vec3 x[3];
+  for (int k = 0; k < 3; ++k) x[k] = load3(&s.x[4 * size_t{c[k]}]);
+  if (!(tet_volume(x[0], x[1], x[2], p) * tet_volume(x[0], x[1], x[2], q) < 0)) return false;
+  const double v0 = tet_volume(p, q, x[0], x[1]), v1 = tet_volume(p, q, x[1], x[2]), v2 = tet_volume(p, q, x[2], x[0]);
+  return (v0 >= 0 && v1 >= 0 && v2 >= 0) || (v0 <= 0 && v1 <= 0 && v2 <= 0);
+}
+
+// Two surfaces that cross at the start (as given by the user) are let out: what is through cannot be kept out, and to guard it would keep it in.
+bool cross_at_start(World &w, const Candidate &c) {
+  Guard &g = w.guard;
+  const uint32_t slot_a = c.obstacle ? c.slot_a : std::min(c.slot_a, c.slot_b), slot_b = c.obstacle ? c.slot_b : std::max(c.slot_a, c.slot_b);
+  for (const Guard::Through &t : g.through)
+    if (t.a == slot_a && t.b == slot_b && t.obstacle == bool(c.obstacle)) return t.yes;
+  const Surface &a = *w.body_views[slot_a].surface, &b = c.obstacle ? *w.obstacle_views[slot_b].surface : *w.body_views[slot_b].surface;
+  bool yes = false;
+  const auto edges_through = [&](const Surface &from, uint32_t s, const Surface &to, uint32_t t) {
+    for (int k = 0; k < 3 && !yes; ++k)
+      yes = pierces(to, load3(&from.x[4 * size_t{from.tri[3 * size_t{s} + k]}]), load3(&from.x[4 * size_t{from.tri[3 * size_t{s} + (k + 1) % 3]}]), t);
+  };
+  w.broad.near_triangles_of(slot_a, slot_b, c.obstacle, [&](uint32_t s, uint32_t t) {
+    if (&a == &b && share_a_corner(&a.tri[3 * size_t{s}], &b.tri[3 * size_t{t}])) return;
+    if (!yes) edges_through(a, s, b, t);
+    if (!yes) edges_through(b, t, a, s);
+  });
+  g.through.push_back({slot_a, slot_b, bool(c.obstacle), yes});
+  return yes;
+}
+
+// The safe share of the way; 1: nothing comes too near.
+double find_hits(World &w) {
+  Guard &g = w.guard;
+  g.hits.clear();
+  if (g.near.empty()) return 1;
+  const Array<Candidate> &list = w.broad.candidates();
+  guard_pairs(g.scene, list, g.near, g.hits);
+  std::erase_if(g.hits, [&](const GuardHit &hit) { return cross_at_start(w, list[hit.candidate]); });
+  guard_obstacles(g.scene, list, g.near, g.hits);
+  double least = 1;
+  for (const GuardHit &hit : g.hits) least = std::min(least, hit.safe);
+  return least;
+}
+
+// Sleepers that are hit before a contact has woken them.
+bool wake_hit(World &w) {
+  const uint32_t before = w.sleepers;
+  for (const GuardHit &hit : w.guard.hits) {
+    const Candidate &c = w.broad.candidates()[hit.candidate];
+    if (w.sleepers == 0) break;
+    w.wake(*w.bodies[c.slot_a]);
+    if (!c.obstacle) w.wake(*w.bodies[c.slot_b]);
+  }
+  return w.sleepers < before;
+}
+
+}  // namespace
+
+// False: trouble, or guard.again: the sub-step is to be taken anew, guard.cut times as long.
+bool World::stage_guard(uint32_t *trouble) {
+  guard.kept.clear(), guard.through.clear();
+  const bool steppers = std::any_of(bodies.begin(), bodies.end(), [](auto &b) { return b->model.stepper != nullptr; });
+  double safe = 1;
+  for (uint32_t solve = 0;; ++solve) {
+    if (steppers && !commit_steppers(trouble)) return false;
+    if (solve > 0 && !rigid_sets.empty() && !stage_rigid_commit(trouble)) return false;
+    bound_speeds(*this);
+    broad.cover(body_views, obstacle_views, filter, h, offset, guard.speed);
+    if (guard.memory.runs.empty() || guard.lists != broad.stats().renewals) guard.memory.follow(broad.candidates()), guard.lists = broad.stats().renewals;
+    set_sides(*this), set_share(*this, 1);
+    guard_near(guard.scene, broad.candidates(), guard.memory, guard.near);
+    safe = find_hits(*this);
+    guard.stepped = steppers;
+    if (guard.hits.empty()) return true;
+    guard.acted = true;
+    if (sleepers > 0 && wake_hit(*this)) return guard.again = true, false;
+    if (solve == kSolves) break;
+    guard_add_hits(*this);
+    if (residual.share > 1) --stats.unconverged;   // counted once, by the last solve
+    guard.resolving = true;
+    const bool solved = stage_solve(trouble);
+    guard.resolving = false;
+    if (!solved) return false;
+    ++stats.guard_solves;
+    stage_distribute();
+  }
+  if (guard.pieces < kCuts) {
+    ++guard.pieces, ++stats.guard_cuts;
+    guard.cut = std::max(safe, kLeastCut), guard.again = true;
+    return false;
+  }
+  for (uint32_t k = 0; !guard.hits.empty(); ++k) {
+    set_share(*this, k < kShares ? guard.motion * std::min(safe, 0.999) : 0);
+    if (guard.motion == 0) break;
+    safe = find_hits(*this);
+  }
+  stats.guard_lost += (1 - guard.motion) * h;
+  return true;
+}
+
+}  // namespace dfm

@@ -1,0 +1,42 @@
+// What the guard keeps between its questions of one sub-step; doc/concepts/guard.md. What outlives the sub-step (memory) saves work and changes nothing.
+#pragma once
+#include <vector>
+
+#include "narrow/toi_guard.h"
+#include "surfel/contact_set.h"
+
+namespace dfm {
+
+struct World;
+
+struct Guard {
+  GuardScene scene;
+  GuardMemory memory;
+  Array<uint32_t> near;                  // candidates that may reach the floor
+  Array<GuardHit> hits;
+  Array<double> speed, change;           // m/s by body slot: bounds of the surfels' speeds after the solve; of what the solve has changed of a phyxel's
+  uint64_t lists = 0;                    // renewals of broad/ at which `memory` was begun
+  struct Through { uint32_t a, b; bool obstacle, yes; };
+  std::vector<Through> through;          // pairs that were looked at: do they cross at the start?
+  struct Kept { uint64_t key; Vec3 impulse; double rate; bool hit; };
+  Array<Kept> kept;                      // sorted by key: what the solve before left, and the rates of contacts made from hits
+  bool resolving = false;                // a solve that starts from `kept`
+  bool stepped = false;                  // self-stepping bodies have written their ends for the impulses as they are
+
+  double planned = 0;                    // s, the sub-step before it was cut
+  uint32_t pieces = 0;                   // cuts of this planned sub-step
+  bool acted = false, again = false;     // in this sub-step; it is to be taken anew
+  double cut = 1;                        // then: this much as long
+  double motion = 1;                     // < 1: share of its way that is taken
+
+  void start() { kept.clear(), cut = motion = 1, acted = again = stepped = false; }
+  void forget() { memory.forget(); }     // positions or d_c have changed otherwise than by a step
+};
+
+// guard_hits.cpp: the earliest hits as contacts of the sub-step, among those that it has.
+void guard_add_hits(World &w);
+// In the middle of a solve's preparation, where guard.resolving: impulses, and rates of hits, of `kept`.
+void guard_impulses(World &w);
+void guard_rates(World &w);
+
+}  // namespace dfm

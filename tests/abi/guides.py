@@ -1,0 +1,59 @@
+#!/usr/bin/env python3
+"""Every guide of doc/howto that has a folder of files is followed as a stranger would: the folder is copied away from the source tree, and each
+sh block of the guide runs in it against an installed and moved tree. A guide that begins with <!-- needs FILE --> is passed over where the
+installed tree has no such file.
+
+guides.py BUILD_DIR SOURCE_DIR SCRATCH_DIR CXX_COMPILER
+"""
+import os
+import pathlib
+import re
+import shutil
+import sys
+
+from installed_tree import clean_environment, install, run
+
+
+def follow(guide, prefix, libdir, scratch):
+    folder = scratch / guide.stem
+    shutil.copytree(guide.with_suffix(""), folder)
+    env = {**clean_environment(), "CMAKE_PREFIX_PATH": str(prefix), "PKG_CONFIG_PATH": str(prefix / libdir / "pkgconfig"),
+           "LD_LIBRARY_PATH": str(prefix / libdir)}
+    blocks = re.findall(r"^```sh\n(.*?)^```", guide.read_text(), re.M | re.S)
+    tools = " ".join(blocks)
+    if "cmake -S" not in tools or "pkg-config" not in tools:
+        sys.exit(f"{guide} does not show both ways to build: CMake and pkg-config")
+    here = os.getcwd()
+    os.chdir(folder)
+    for block in blocks:
+        run("sh", "-ec", block, env=env)
+    os.chdir(here)
+
+
+def main():
+    build, source, scratch, compiler = sys.argv[1:]
+    scratch = pathlib.Path(scratch).resolve()
+    prefix, libdir = install(build, source, scratch)
+    guides = [path for path in sorted(pathlib.Path(source).glob("libdeform/doc/howto/*.md")) if path.with_suffix("").is_dir()]
+    followed = []
+    for guide in guides:
+        needs = re.match(r"<!-- needs (\S+) -->", guide.read_text())
+        if needs and not (prefix / libdir / needs[1]).exists():
+            print(f"{guide.name} passed over: this build has no {needs[1]}")
+            continue
+        follow(guide, prefix, libdir, scratch)
+        followed.append(guide.name)
+    if "own_engine.md" not in followed:
+        sys.exit(f"own_engine.md was not followed, only {followed}")
+
+    # The C++ header, as installed.
+    env = clean_environment()
+    flags = run("pkg-config", "--cflags", "--libs", "deform", env={**env, "PKG_CONFIG_PATH": str(prefix / libdir / "pkgconfig")}).split()
+    program = scratch / "cpp"
+    run(compiler, "-std=c++20", pathlib.Path(source) / "examples" / "05_cpp.cpp", "-o", program, *flags, env=env)
+    run(program, env={**env, "LD_LIBRARY_PATH": str(prefix / libdir)})
+    print("followed:", *followed)
+
+
+if __name__ == "__main__":
+    main()

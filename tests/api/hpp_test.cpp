@@ -1,0 +1,276 @@
+// deform.hpp: what ends what, errors in both ways, spans and their lengths, callables through the C API, no allocation of its own.
+#include <cmath>
+
+#include <deform/deform.hpp>
+#include <gtest/gtest.h>
+
+#include "heap_calls.h"
+#include "support.h"
+
+namespace {
+
+namespace values = deform::values;
+using deform::Vec3;
+
+deform::ContextDef quiet() {
+  deform::ContextDef def;
+  def.plugin_dir = DEFORM_PLUGIN_DIR, def.log = [](void *, int32_t, const char *) {};
+  return def;
+}
+
+// A ball above a floor, in exceptions.
+struct Scene {
+  deform::Unique<deform::Context> context = deform::Context::make(quiet());
+  deform::Unique<deform::World> world = context.make_world();
+  deform::Body ball;
+  deform::Obstacle floor;
+  Scene() {
+    deform::ObstacleDef plane;
+    plane.name = "floor";
+    floor = world.add_obstacle(plane);
+    const auto mesh = context.make_tets("ball", {0.1}, 200);
+    deform::BodyDef def;
+    def.set_mesh(mesh);
+    def.name = "ball", def.pose.position[2] = 0.1;
+    ball = world.add_body(def);
+  }
+};
+
+}  // namespace
+
+TEST(Hpp, Handles_EndWhatTheyOwnAndOnlyThat) {
+  const auto context = deform::Context::make(quiet());
+  dfm_world raw = 0;
+  {
+    auto world = context.make_world();
+    raw = world.get();
+    const deform::World view = world;   // a plain handle refers
+    auto moved = std::move(world);
+    EXPECT_FALSE(world) << "moved from";   // NOLINT
+    EXPECT_EQ(moved, view);
+    EXPECT_EQ(view.time(), 0.0);
+  }
+  EXPECT_TRUE(std::isnan(dfm_world_time(raw))) << "the world outlived its Unique";
+
+  auto a = context.make_world(), b = context.make_world();
+  const deform::World was_a = a, was_b = b;
+  a = std::move(b);
+  EXPECT_TRUE(std::isnan(was_a.time())) << "what was there before an assignment ends";
+  EXPECT_EQ(was_b.time(), 0.0);
+  const deform::World kept = a.release();
+  EXPECT_FALSE(a);
+  EXPECT_EQ(kept.time(), 0.0);
+  kept.destroy();
+
+  Scene s;
+  {
+    const deform::Unique<deform::Body> owner(s.ball);
+    EXPECT_EQ(s.world.bodies().size(), 1u);
+  }
+  EXPECT_TRUE(s.world.bodies().empty());
+  EXPECT_THROW((void)s.ball.info(), deform::Error) << "a stale handle answers";
+}
+
+TEST(Hpp, Errors_CarryStatusAndSentenceInBothWays) {
+  const Scene s;
+  const char *named = "flor";
+  try {
+    s.world.add_friction("ball", named, "coulomb");
+    FAIL() << "no exception";
+  } catch (const deform::Error &e) {
+    EXPECT_EQ(e.status(), DFM_E_ARG);
+    EXPECT_NE(std::string(e.what()).find("floor"), std::string::npos) << "the nearest name: " << e.what();
+  }
+  const auto r = values::World(s.world.get()).add_friction("ball", named, "coulomb");
+  EXPECT_FALSE(r);
+  EXPECT_EQ(r.status(), DFM_E_ARG);
+  EXPECT_NE(std::string(r.what()).find("floor"), std::string::npos) << r.what();
+
+  const auto good = values::World(s.world.get()).add_friction("ball", "floor", "coulomb", deform::Params({{"mu_C", 0.2}, {"mu_S", 0.3}}));
+  EXPECT_TRUE(good) << good.what();
+  EXPECT_STREQ(good.what(), "");
+  const auto body = values::World(s.world.get()).find_body("nobody");
+  EXPECT_FALSE(body);
+  EXPECT_FALSE(*body) << "a failed call gives a handle that refers to nothing";
+}
+
+TEST(Hpp, Step_TellsADiscardedStepApart) {
+  const auto context = deform::Context::make(quiet());
+  deform::WorldDef def;
+  def.max_substeps = 1;
+  const auto world = context.make_world(def);
+  const auto mesh = context.make_tets("ball", {0.1}, 200);
+  deform::BodyDef body;
+  body.set_mesh(mesh);
+  world.add_body(body);
+  const double stable = world.stable_step().dt;
+  EXPECT_TRUE(world.step(0.5 * stable));
+  const double t = world.time();
+  const deform::StepReport r = world.step(50 * stable);
+  EXPECT_TRUE(r.discarded);
+  EXPECT_FALSE(r);
+  EXPECT_EQ(world.time(), t);
+  const auto v = values::World(world.get()).step(50 * stable);
+  EXPECT_TRUE(v && v->discarded) << "no error: nothing failed, the host may ask for less";
+  EXPECT_EQ(v.status(), DFM_DISCARD);
+  EXPECT_THROW((void)world.step(-1), deform::Error);
+}
+
+TEST(Hpp, Spans_ReadAndWriteWhatTheCFunctionsDo) {
+  const Scene s;
+  for (int i = 0; i < 20; ++i) EXPECT_TRUE(s.world.step(1e-3));
+  const auto info = s.ball.info();
+  std::vector<double> x(3 * info.npoint), v(3 * info.npoint), c(3 * info.npoint);
+  EXPECT_EQ(s.ball.state(x, v), info.npoint);
+  uint32_t n = 0;
+  ASSERT_EQ(dfm_body_get_state(s.ball.get(), info.npoint, c.data(), nullptr, &n), DFM_OK);
+  EXPECT_EQ(x, c);
+  EXPECT_EQ(s.ball.positions(), c);
+  ASSERT_EQ(dfm_body_get_state(s.ball.get(), info.npoint, nullptr, c.data(), &n), DFM_OK);
+  EXPECT_EQ(v, c);
+  EXPECT_EQ(s.ball.velocities(), c);
+
+  std::vector<double> surface(3 * info.nsurfel);
+  EXPECT_EQ(s.ball.surface_positions(surface), info.nsurfel);
+  EXPECT_EQ(s.ball.surface_positions(), surface);
+  EXPECT_EQ(s.ball.surface_triangles().size(), 3 * info.ntriangle);
+  EXPECT_THROW((void)s.ball.surface_positions(std::span(surface).first(3)), deform::Error) << "too short";
+  EXPECT_EQ(s.world.contacts().size(), s.world.stats().contacts);
+  EXPECT_GT(s.world.contacts().size(), 0u);
+
+  // Lengths that disagree never reach the C function.
+  const uint32_t points[2] = {0, 1};
+  const double force[6] = {0, 0, 1, 0, 0, 1};
+  EXPECT_THROW((void)s.ball.add_load(points, std::span(force).first(5)), deform::Error);
+  EXPECT_THROW(s.ball.set_state(x, std::span(v).first(v.size() - 3)), deform::Error);
+  const auto refused = values::Body(s.ball.get()).set_state(x, std::span(v).first(3));
+  EXPECT_EQ(refused.status(), deform::spans_disagree);
+  EXPECT_NE(std::string(refused.what()).find("length"), std::string::npos);
+  EXPECT_STREQ(deform::status_name(refused.status()), "spans_disagree");
+  const uint32_t load = s.ball.add_load(points, force);
+  s.ball.remove_load(load);
+  EXPECT_THROW(s.ball.remove_load(load), deform::Error);
+  EXPECT_TRUE(s.world.ray(Vec3{0, 0, 1}, Vec3{0, 0, -1}, 10).body);
+}
+
+TEST(Hpp, Snapshot_RestoresTheSameBits) {
+  const Scene s;
+  EXPECT_TRUE(s.world.step(1e-3));
+  const auto saved = s.world.snapshot();
+  const uint64_t hash = s.world.hash();
+  EXPECT_EQ(s.world.snapshot(std::span<std::byte>()), saved.size());
+  EXPECT_TRUE(s.world.step(1e-3));
+  EXPECT_NE(s.world.hash(), hash);
+  s.world.restore(saved);
+  EXPECT_EQ(s.world.hash(), hash);
+  EXPECT_EQ(s.world.explain().front(), '{');
+  EXPECT_EQ(s.world.explain().back(), '}') << "without the NUL";
+}
+
+TEST(Hpp, Callables_AreCalledAndWhatTheyThrowArrives) {
+  const Scene s;
+  uint32_t laws = 0, lines = 0;
+  s.context.visit_plugins([&](const dfm_type &type, const char *file) { laws += type.kind == DFM_KIND_FRICTION && *file; });
+  EXPECT_GE(laws, 3u);
+  for (int i = 0; i < 20; ++i) EXPECT_TRUE(s.world.step(1e-3));
+  s.world.draw(DFM_DRAW_CONTACTS, [&](deform::In3 a, deform::In3 b, uint32_t) { lines += a[2] != b[2]; });
+  EXPECT_GT(lines, 0u);
+  uint32_t calls = 0;
+  const auto throws = [&](const dfm_type &, const char *) {
+    ++calls;
+    throw std::runtime_error("enough");
+  };
+  EXPECT_THROW(s.context.visit_plugins(throws), std::runtime_error);
+  EXPECT_EQ(calls, 1u) << "after the first exception the rest passes by";
+}
+
+TEST(Hpp, Meshes_LendTheirArrays) {
+  const auto context = deform::Context::make(quiet());
+  const auto surface = context.make_surface("ball", {0.1}, 400);
+  const auto shape = surface.data();
+  EXPECT_EQ(shape.triangles.size(), 3 * surface.info().ntriangle);
+  const auto filled = surface.fill(800);
+  EXPECT_EQ(filled.share().size(), filled.info().ntet) << "a filled mesh tells how much of each cell is material";
+  const auto made = context.make_tets("beam", {0.1, 0.1, 0.4}, 100);
+  EXPECT_TRUE(made.share().empty());
+  EXPECT_EQ(made.data().tets.size(), 4 * made.info().ntet);
+  deform::BodyDef def;
+  def.set_mesh(filled);
+  EXPECT_EQ(def.cell_share, filled.share().data());
+  EXPECT_EQ(def.npoint, filled.info().npoint);
+  const auto again = context.make_surface(shape.points, shape.triangles);
+  EXPECT_EQ(again.info().ntriangle, surface.info().ntriangle);
+  EXPECT_THROW((void)context.make_tets("bal", {0.1}, 100), deform::Error);
+  const auto read = context.read_mesh(std::string(DEFORM_SOURCE_DIR) + "/tests/data/surfaces/cube_obj.obj");
+  EXPECT_FALSE(read.cells);
+  EXPECT_EQ(read.surface.info().ntriangle, 12u);
+}
+
+TEST(Hpp, RigidBodies_GoByTheirSet) {
+  const Scene s;
+  deform::RigidDef box;
+  box.name = "box", box.shape = DFM_SHAPE_BOX, box.mass = 1, box.pose.position[2] = 1;
+  box.half_size[0] = box.half_size[1] = box.half_size[2] = 0.05;
+  const deform::Rigid rigid = s.world.add_rigid(box);
+  EXPECT_EQ(rigid.state().position[2], 1);
+  EXPECT_TRUE(s.world.step(1e-3));
+  EXPECT_LT(rigid.state().velocity[2], 0);
+  EXPECT_EQ(s.world.find_rigid("box"), rigid);
+  const deform::Obstacle as_obstacle = rigid;
+  EXPECT_EQ(as_obstacle.pose().position[2], rigid.state().position[2]);
+  EXPECT_EQ(s.world.pair_wrench(s.ball, as_obstacle, Vec3{}).force, Vec3{});
+  auto set = deform::sized<dfm_rigid_set_def>();
+  dfm_rigid_def two[2] = {box, box};
+  two[0].name = "a", two[1].name = "b", two[1].pose.position[0] = 1;
+  set.nbody = 2, set.bodies = two;
+  dfm_rigid out[2];
+  EXPECT_THROW(s.world.add_rigids(set, std::span(out).first(1)), deform::Error) << "room for one of two";
+  s.world.add_rigids(set, out);
+  EXPECT_EQ(s.world.rigids().size(), 3u);
+  deform::Rigid(out[1]).destroy();
+  EXPECT_EQ(s.world.rigids().size(), 1u);
+}
+
+TEST(Hpp, SceneAndLaw_AnswerAsInC) {
+  const auto context = deform::Context::make(quiet());
+  const std::string path = DEFORM_SOURCE_DIR "/examples/scenes/slope_block.json";
+  const auto scene = context.open_scene(path);
+  EXPECT_GT(scene.settings().duration, 0);
+  EXPECT_EQ(scene.value("/version"), "1");
+  EXPECT_EQ(scene.world().find_body("block").info().world, scene.world().get());
+  const auto law = context.open_law("karnopp");
+  const deform::Params given({{"mu", 0.25}});
+  const std::vector<double> packed = law.pack(given);
+  EXPECT_EQ(packed.front(), 0.25);
+  const double fn = 2, area = 1e-4, vt[2] = {1, 0}, stop[2] = {-100, 0};
+  double ft[2] = {};
+  auto in = deform::sized<dfm_friction_in>();
+  in.n = in.stride = 1, in.dt = 1e-3, in.params = packed.data(), in.fn = &fn, in.vt = vt, in.ft_stop = stop, in.area = &area;
+  auto out = deform::sized<dfm_friction_out>();
+  out.ft = ft;
+  EXPECT_TRUE(law.eval(in, out));
+  EXPECT_NEAR(ft[0], -0.5, 1e-12);
+  const dfm_motion p = {{0, 0, 1}, {0, 0, -1}}, tri[3] = {{{-1, -1, 0}, {-1, -1, 0}}, {{1, -1, 0}, {1, -1, 0}}, {{0, 1, 0}, {0, 1, 0}}};
+  EXPECT_NEAR(deform::Toi::point_triangle(p, tri).t, 0.5, 1e-9);
+  EXPECT_GT(deform::Toi::evaluations(), 0u);
+}
+
+TEST(Hpp, Calls_AllocateNothing) {
+  const Scene s;
+  for (int i = 0; i < 50; ++i) EXPECT_TRUE(s.world.step(1e-3));
+  const auto info = s.ball.info();
+  std::vector<double> x(3 * info.npoint), v(3 * info.npoint), surface(3 * info.nsurfel);
+  std::vector<dfm_contact> contacts(4096);
+  uint32_t n = 0;
+  const uint64_t before = test::heap_calls;
+  for (int i = 0; i < 20; ++i) {
+    n += s.world.step(1e-3).trouble;
+    n += s.ball.state(x, v) + s.ball.surface_positions(surface) + s.world.contacts(contacts);
+    n += s.ball.measure().size + s.world.stats().size;
+    n += values::World(s.world.get()).ray(Vec3{0, 0, 1}, Vec3{0, 0, -1}, 10)->triangle;
+    s.ball.apply_impulse(Vec3{0, 0, 0.1}, Vec3{0, 0, 1e-6});
+    const deform::Unique<deform::Body> nothing;
+  }
+  EXPECT_EQ(test::heap_calls, before);
+  EXPECT_GT(n, 0u);
+}

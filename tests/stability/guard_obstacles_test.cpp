@@ -1,0 +1,98 @@
+// The guard's promise against what is no soft body: meshes that are closed, open and moving, voxels, and rigid bodies of a host.
+#include <algorithm>
+
+#include "shot.h"
+
+namespace {
+
+using test::Shot;
+using test::ten_times;
+using test::Vec;
+
+void sheet_above(Shot &s, double speed, double above = 0.02) {
+  s.add("beam", {0.12, 0.12, 0.012}, 30, {-0.06 + s.jitter(0.02), -0.06 + s.jitter(0.02), above}, {0, 0, -speed},
+        {0.1 + s.jitter(0.05), s.jitter(0.1), s.jitter(0.3), 1});
+}
+
+void closed_mesh(Shot &s) {
+  s.add_wall(test::box_surface({0.03, 0.05, 0.004}, 2));
+  sheet_above(s, 100);
+}
+void terrain(Shot &s) {
+  s.add_wall(test::height_field(0.2, 8, [](double x, double y) { return 0.03 * std::cos(25 * x) * std::cos(20 * y); }));
+  s.add("ball", {0.05, 0, 0}, 100, {s.jitter(0.05), s.jitter(0.05), 0.09}, {s.jitter(5), s.jitter(5), -30}, {0, 0, 0, 1}, 2e4);
+}
+// A blade that is swung through a block that stands in its way.
+void blade(Shot &s) {
+  const dfm_obstacle o = s.add_wall(test::box_surface({0.004, 0.06, 0.05}, 2));
+  const double up = s.jitter(0.02), tilt = s.jitter(0.2);
+  s.add("beam", {0.05, 0.05, 0.05}, 60, {0.03, -0.025 + s.jitter(0.02), -0.025}, {});
+  s.before = [=](int step) {
+    dfm_pose p{{0.05 * (step + 1), 0, up}, {0, tilt * (step + 1), 0, 1}};
+    const double n = std::sqrt(1 + p.rotation[1] * p.rotation[1]);
+    for (double &q : p.rotation) q /= n;
+    test::ok(dfm_obstacle_move_to(o, &p));
+  };
+}
+void rigid_slab(Shot &s) {
+  s.add("beam", {0.12, 0.12, 0.012}, 30, {-0.06, -0.06, -0.02}, {});
+  s.add_rigid_box({0.03, 0.01, 0.005}, 0.2, {s.jitter(0.04), s.jitter(0.04), 0.02}, {0, 0, -100}, {s.jitter(300), s.jitter(300), s.jitter(300)});
+}
+void rigid_struck(Shot &s) {   // it rests; what hits it moves it faster than its lists were made for
+  s.add_rigid_box({0.04, 0.04, 0.003}, 0.01, {}, {});
+  s.add("ball", {0.02, 0, 0}, 100, {s.jitter(0.02), s.jitter(0.02), 0.05}, {0, 0, -60});
+  s.add("beam", {0.12, 0.12, 0.012}, 30, {-0.06 + s.jitter(0.02), -0.06, -0.03}, {});
+}
+
+}  // namespace
+
+TEST(Guard, SheetOnClosedMeshAt100MetresPerSecond_NeverCross) { ten_times(closed_mesh, 2, 5e-4); }
+TEST(Guard, SoftBallOnTerrainAt30MetresPerSecond_NeverCross) { ten_times(terrain, 4, 1e-3); }
+TEST(Guard, BladeSwungThroughBlock_NeverCrosses) { ten_times(blade, 3, 1e-3); }
+TEST(Guard, SpinningRigidSlabAt100MetresPerSecond_NeverCrossesSheet) { ten_times(rigid_slab, 2, 5e-4); }
+TEST(Guard, RigidPlateStruck_NeverCrosses) { ten_times(rigid_struck, 3, 1e-3); }
+
+// Voxels round off what is below a cell, so crossings with the triangles they came from say little: no surfel is behind a face, away from its edges.
+TEST(Guard, BlockSpinningPastVoxels_StaysOutside) {
+  size_t without = 0;
+  uint64_t acted = 0;
+  for (unsigned seed = 1; seed <= 10; ++seed)
+    for (const bool guarded : {true, false}) {
+      Shot s(guarded, seed);
+      const Vec half{0.02, 0.06, 0.02};
+      test::add_mesh(s.world, "wall", test::box_surface(half, 2), DFM_SHAPE_VOXELS, 20000);
+      const double cell = 0.0018;
+      const Vec at{s.jitter(0.01) - 0.03, s.jitter(0.01), 0.05}, velocity{s.jitter(20), s.jitter(20), -40};
+      s.add("beam", {0.12, 0.03, 0.03}, 60, at, velocity, {0, 0.3, 0, 0.954}, 1e6, {0, 2000, 0});
+      for (int step = 0; step < 6; ++step) {
+        EXPECT_TRUE(test::run(s, 1, 5e-4).finite);
+        for (const dfm_body b : s.bodies) {
+          const std::vector<double> x = test::surface_positions(b);
+          for (size_t i = 0; i < x.size(); i += 3) {
+            Vec depth;
+            for (size_t k = 0; k < 3; ++k) depth[k] = half[k] - std::fabs(x[i + k]);
+            std::sort(depth.begin(), depth.end());
+            const bool inside = depth[0] > 0 && depth[1] > 2 * cell;
+            if (inside && guarded) ADD_FAILURE() << "seed " << seed << ", step " << step << ": surfel " << i / 3 << " inside";
+            without += inside && !guarded;
+          }
+        }
+      }
+      acted += test::stats(s.world).guard_steps;
+    }
+  EXPECT_GT(acted, 0u);
+  EXPECT_GT(without, 0u) << "the scene does not need the guard";
+}
+
+TEST(Guard, RigidAndSoft_KeepMomentum) {
+  for (const auto &setup : {rigid_slab, rigid_struck}) {
+    Shot s(true, 3);
+    setup(s);
+    double scale = 0;
+    const Vec before = s.momentum(&scale);
+    const test::Outcome out = test::run(s, 3, 5e-4);
+    EXPECT_GT(out.steps, 0u);
+    const Vec after = s.momentum();
+    for (size_t k = 0; k < 3; ++k) EXPECT_NEAR(after[k], before[k], 1e-12 * scale);
+  }
+}

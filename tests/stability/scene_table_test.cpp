@@ -1,0 +1,128 @@
+// Every shipped scene: its least contact count, ten jittered runs, and a mutation (contact off) that the judgement of its runs must not survive. What
+// else a scene is for, and the mutations of that (friction off, moduli swapped), stand in its own test beside this one.
+#include <fstream>
+#include <map>
+#include <regex>
+#include <sstream>
+
+#include "scenes.h"
+
+namespace {
+
+// Contacts at once that a run has at least, jittered ones included; 0: nothing touches. begins: s, by then there are so many. needs_shared: its
+// meshes lie in ../shared.
+struct Row { const char *scene; double least_contacts, begins; bool needs_shared; };
+void PrintTo(const Row &row, std::ostream *out) { *out << row.scene; }
+constexpr Row kRows[] = {
+    {"ball_incline", 3, 0.3, false},        {"basin", 8, 0.8, false},
+    {"fill_drop", 30, 0.4, false},          {"fill_drop_organs", 20, 0.2, true},
+    {"gravity_anisotropy", 0, 0, false},    {"gravity_beams", 0, 0, false},
+    {"guard_shot", 20, 0.02, false},        {"pinched_tube", 8, 0.45, false},
+    {"pressed_ring", 20, 0.2, false},       {"rabbits_slope", 5, 0.6, false},
+    {"rigid_on_ball", 10, 0.4, false},      {"rigid_on_bed", 5, 0.3, false},
+    {"rigid_pinch", 20, 0.6, false},        {"rollback_compare", 15, 0.2, false},
+    {"slope_block", 10, 0.2, false},        {"ten_bodies", 60, 0.9, false},
+    {"terrain", 12, 0.6, false},            {"two_cylinders", 12, 0.5, false},
+    {"two_cylinders_coarse", 20, 0.4, true}, {"two_cylinders_fine", 40, 0.3, true},
+    {"two_materials", 0, 0, false},         {"viscoelastic_bars", 0, 0, false},
+};
+
+const Row &row_of(const std::string &scene) {
+  for (const Row &row : kRows)
+    if (scene == row.scene) return row;
+  static const Row none{"", -1, 0, false};
+  return none;
+}
+
+// What every run of a contact scene is held to, here and by expect_jittered.
+bool sound(const test::SceneRun &run, double least_contacts) {
+  return run.finite() && run.number("intersections_max") == 0 && run.contacts_max() >= least_contacts;
+}
+
+std::vector<std::string> until(double time) { return {"--time", std::to_string(time), "--set", "/output/every=0.02"}; }
+
+bool above_the_floor(const test::SceneRun &run) { return run.last("liver").com[2] > 0 && run.last("bunny").com[2] > 0; }
+bool on_top(const test::SceneRun &run) { return run.last("upper").com[2] > 0.85; }
+
+}  // namespace
+
+TEST(SceneTable, EveryShippedScene_HasItsRow) {
+  std::set<std::string> shipped, rows;
+  for (const auto &file : std::filesystem::directory_iterator(std::string(DEFORM_SOURCE_DIR) + "/examples/scenes"))
+    if (file.path().extension() == ".json") shipped.insert(file.path().stem().string());
+  for (const Row &row : kRows) rows.insert(row.scene);
+  EXPECT_EQ(shipped, rows);
+}
+
+// Seeds 1 to 10 of every contact scene are run somewhere in this folder, with a least count that is not below the table's.
+TEST(SceneTable, EveryContactScene_IsRunTenTimesWithJitter) {
+  std::map<std::string, std::set<int>> seeds;
+  const std::regex call(R"re(expect_jittered\("(\w+)", (\d+), (\d+))re");
+  for (const auto &file : std::filesystem::directory_iterator(std::string(DEFORM_SOURCE_DIR) + "/tests/stability")) {
+    std::ifstream in(file.path());
+    std::stringstream text;
+    text << in.rdbuf();
+    const std::string source = text.str();
+    for (std::sregex_iterator it(source.begin(), source.end(), call), end; it != end; ++it)
+      for (int seed = std::stoi((*it)[2]); seed <= std::stoi((*it)[3]); ++seed) seeds[(*it)[1]].insert(seed);
+  }
+  for (const Row &row : kRows)
+    if (row.least_contacts > 0) {
+      EXPECT_EQ(seeds[row.scene], (std::set<int>{1, 2, 3, 4, 5, 6, 7, 8, 9, 10})) << row.scene;
+    }
+}
+
+class ContactScene : public testing::TestWithParam<Row> {};
+
+// The same short run with and without contact: the first is sound, the second must not be.
+TEST_P(ContactScene, WithoutContact_IsNotSound) {
+  const Row &row = GetParam();
+  if (row.needs_shared && test::shared_dir().empty()) GTEST_SKIP() << "../shared is absent";
+  std::vector<std::string> arguments = until(row.begins);
+  const test::SceneRun with(row.scene, arguments);
+  EXPECT_TRUE(sound(with, row.least_contacts)) << with.contacts_max() << " contacts, " << with.number("intersections_max") << " crossings";
+  arguments.insert(arguments.end(), {"--set", R"(/contact/filter=[{"between": ["*", "*"], "collide": false}])"});
+  const test::SceneRun without(row.scene, arguments);
+  EXPECT_FALSE(sound(without, row.least_contacts));
+  EXPECT_EQ(without.contacts_max(), 0);
+}
+
+std::vector<Row> contact_rows() {
+  std::vector<Row> rows;
+  for (const Row &row : kRows)
+    if (row.least_contacts > 0) rows.push_back(row);
+  return rows;
+}
+INSTANTIATE_TEST_SUITE_P(Shipped, ContactScene, testing::ValuesIn(contact_rows()), [](const auto &i) { return std::string(i.param.scene); });
+
+// What the guard is for: whole flights.
+TEST(GuardShot, TenJitteredRuns_DoNotCross) {
+  test::expect_jittered("guard_shot", 1, 10, {}, row_of("guard_shot").least_contacts,
+                        [](const test::SceneRun &run) { return run.number("guard_steps") > 0; });
+}
+TEST(RabbitsSlope, TenJitteredRuns_DoNotCross) {
+  test::expect_jittered("rabbits_slope", 1, 10, {}, row_of("rabbits_slope").least_contacts,
+                        [](const test::SceneRun &run) { return run.number("guard_steps") > 0; });
+}
+
+// The pairs of the speed figures and the organs, over their landing.
+TEST(TwoCylinders, CoarsePairTenJitteredRuns_DoNotCross) {
+  if (test::shared_dir().empty()) GTEST_SKIP() << "../shared is absent";
+  test::expect_jittered("two_cylinders_coarse", 1, 10, until(0.4), row_of("two_cylinders_coarse").least_contacts, on_top);
+}
+TEST(TwoCylinders, FinePairFiveJitteredRuns_DoNotCross) {
+  if (test::shared_dir().empty()) GTEST_SKIP() << "../shared is absent";
+  test::expect_jittered("two_cylinders_fine", 1, 5, until(0.3), row_of("two_cylinders_fine").least_contacts, on_top);
+}
+TEST(TwoCylinders, FinePairFiveMoreJitteredRuns_DoNotCross) {
+  if (test::shared_dir().empty()) GTEST_SKIP() << "../shared is absent";
+  test::expect_jittered("two_cylinders_fine", 6, 10, until(0.3), row_of("two_cylinders_fine").least_contacts, on_top);
+}
+TEST(FillDropOrgans, FiveJitteredRuns_DoNotCross) {
+  if (test::shared_dir().empty()) GTEST_SKIP() << "../shared is absent";
+  test::expect_jittered("fill_drop_organs", 1, 5, until(0.2), row_of("fill_drop_organs").least_contacts, above_the_floor);
+}
+TEST(FillDropOrgans, FiveMoreJitteredRuns_DoNotCross) {
+  if (test::shared_dir().empty()) GTEST_SKIP() << "../shared is absent";
+  test::expect_jittered("fill_drop_organs", 6, 10, until(0.2), row_of("fill_drop_organs").least_contacts, above_the_floor);
+}
