@@ -37,7 +37,6 @@ Obstacle &rigid_obstacle(World &w, uint64_t id) {
   fail(DFM_E_FATAL, "a rigid body has lost its shape");
 }
 
-// Where a shape stands when its body has this state.
 Pose shape_pose(const Obstacle &o, const dfm_rigid_state &s) {
   const Pose body{load3(s.position), rotation_of(s)};
   return o.added ? Pose{place(body, o.local.position), body.rotation * o.local.rotation} : body;

@@ -15,6 +15,7 @@ namespace dfm {
 
 struct World;
 struct Obstacle;
+struct Pose;
 
 struct RigidSet {
   World *world;
@@ -51,6 +52,7 @@ void sum_rigid_impulses(World &w);             // of the rows, into every set
 bool revise_rigids(World &w);                  // true: a host answers differently under these impulses; rows have its new response, solve again
 dfm_body_measure measure_rigid(const RigidSet &set, uint32_t body);
 void set_rigid_state(Obstacle &o, const dfm_rigid_state &state);   // of the body that the shape belongs to
+Pose shape_pose(const Obstacle &shape, const dfm_rigid_state &body);   // where a body's shape stands when the body has this state
 Obstacle &add_rigid_shape(Obstacle &body, const dfm_obstacle_def &def);
 void correct_rigids(World &w);                 // make_rows(): the rows start where the hosts' last answer is
 void set_rigid_motor(RigidSet &set, uint32_t joint, double velocity, double max);

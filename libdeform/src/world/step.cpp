@@ -133,7 +133,7 @@ void move_obstacles_by(World &w, double share) {
 }  // namespace
 
 Pose Obstacle::end_pose(double t, double h, double left) const {
-  if (rigid) return {load3(rigid->next[rigid_body].position), unit_quat(rigid->next[rigid_body].rotation)};
+  if (rigid) return shape_pose(*this, rigid->next[rigid_body]);
   if (!has_target) return moves() ? pose_at_time(t + h) : pose;
   const double s = h / left;
   return {pose.position + s * (target.position - pose.position), slerp(pose.rotation, target.rotation, s < 1 ? s : 1)};
