@@ -26,7 +26,8 @@ install(FILES ${CMAKE_SOURCE_DIR}/LICENSE ${CMAKE_SOURCE_DIR}/README.md ${CMAKE_
 if(TARGET deform_ode)
   install(TARGETS deform_ode EXPORT deformOdeTargets LIBRARY DESTINATION ${CMAKE_INSTALL_LIBDIR} ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR})
   set_target_properties(deform_ode PROPERTIES INSTALL_RPATH "$ORIGIN")
-  install(DIRECTORY ${CMAKE_SOURCE_DIR}/bindings/ode/include/deform DESTINATION ${CMAKE_INSTALL_INCLUDEDIR} FILES_MATCHING PATTERN "*.h")
+  install(DIRECTORY ${CMAKE_SOURCE_DIR}/bindings/ode/include/deform DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}
+    FILES_MATCHING PATTERN "*.h" PATTERN "*.hpp")
   install(EXPORT deformOdeTargets NAMESPACE deform:: DESTINATION ${deform_cmake_dir})
 endif()
 
