@@ -42,11 +42,12 @@ Pose shape_pose(const Obstacle &o, const dfm_rigid_state &s) {
   return o.added ? Pose{place(body, o.local.position), body.rotation * o.local.rotation} : body;
 }
 
-// Mean velocity of a shape's origin while its body moves so, the turn to third order (as ObstacleView::velocity_at).
-Vec3 shape_velocity(const Obstacle &o, Quat rotation, Vec3 velocity, Vec3 spin, double h) {
+// Mean velocity of a shape's origin while its body moves so, as ObstacleView::velocity_at.
+Vec3 shape_velocity(const Obstacle &o, const dfm_rigid_state &start, Vec3 velocity, Vec3 spin, double h) {
   if (!o.added) return velocity;
-  const Vec3 first = cross(spin, rotate(rotation, o.local.position)), second = cross(spin, first), third = cross(spin, second);
-  return velocity + first + (0.5 * h) * second + (h * h / 6) * third;
+  const Vec3 arm = rotate(rotation_of(start), o.local.position), turn = load3(start.spin);
+  const Vec3 first = cross(turn, arm), second = cross(turn, first), third = cross(turn, second);
+  return velocity + cross(spin, arm) + (0.5 * h) * second + (h * h / 6) * third;
 }
 
 void place_rigids(World &w) {
@@ -90,7 +91,7 @@ bool World::stage_rigid_predict(uint32_t *trouble) {
     const dfm_rigid_state &s = o->rigid->state[o->rigid_body];
     const double *const v = &o->rigid->velocity[6 * size_t{o->rigid_body}];
     ObstacleView &view = obstacle_views[o->slot];
-    view.velocity = shape_velocity(*o, rotation_of(s), load3(v), load3(v + 3), h), view.spin = load3(v + 3);
+    view.velocity = shape_velocity(*o, s, load3(v), load3(v + 3), h), view.spin = load3(v + 3), view.linear = view.spin - load3(s.spin);
     if (o->mesh) o->mesh->place(view.position, view.rotation, view.velocity, view.spin);
     rigid_places[o->slot].centre = load3(s.position);
   }
@@ -199,6 +200,7 @@ bool World::stage_rigid_commit(uint32_t *trouble) {
     const Pose from = shape_pose(*o, o->rigid->state[o->rigid_body]), to = shape_pose(*o, o->rigid->next[o->rigid_body]);
     obstacle_views[o->slot].velocity = (1 / h) * (to.position - from.position);
     obstacle_views[o->slot].spin = (1 / h) * rotation_vector(to.rotation * conjugate(from.rotation));
+    obstacle_views[o->slot].linear = {};
   }
   return true;
 }

@@ -100,7 +100,7 @@ void view_obstacles(World &w, double t, double h, double left) {
     const Obstacle &o = *w.obstacles[i];
     ObstacleView &v = w.obstacle_views[i];
     v.position = o.pose.position, v.rotation = o.pose.rotation;
-    v.velocity = v.spin = {};
+    v.velocity = v.spin = v.linear = {};
     if (o.has_target) {
       v.velocity = (1 / left) * (o.target.position - o.pose.position);
       v.spin = spin_between(o.pose.rotation, o.target.rotation, left);
