@@ -77,6 +77,21 @@ TEST(OdeBed, TenJitteredRuns_AllLand) {
 }
 
 TEST(OdeGripper, Ball_IsWhereTheBuiltinHostHasIt) { expect_the_same_on_both_hosts("ode_gripper", lifting(), {"ball", "left", "right"}, 0.1); }
+// What ODE's joints and motors hold is as still as what the builtin host's hold: motion of the ball against a finger over the last of four seconds.
+TEST(OdeGripper, LiftedBall_DoesNotSlip) {
+  if (!test::kHasOde) GTEST_SKIP() << kNotBuilt;
+  for (const char *step : {"0.001", "0.00416666666666667"}) {
+    const SceneRun run("ode_gripper", lasting(4, {"/rigid/bodies/0/joints/0/motor/velocity=0.05", std::string("/time/step=") + step}));
+    run.expect_sound(20, step);
+    const auto ball = run.rows("ball"), finger = run.rows("left");
+    const size_t end = ball.size() - 1, start = end - 2;   // every half second
+    ASSERT_NEAR(ball[end].t - ball[start].t, 1, 1e-6);
+    const double slip = ball[end].com[2] - finger[end].com[2] - ball[start].com[2] + finger[start].com[2];
+    std::printf("  step %s s: %.3g micrometres per second\n", step, 1e6 * slip);
+    EXPECT_LT(std::fabs(slip), 1e-7) << step;
+    EXPECT_GT(ball[end].com[2], 0.25);
+  }
+}
 TEST(OdeGripper, TenJitteredRuns_AllLift) {
   if (!test::kHasOde) GTEST_SKIP() << kNotBuilt;
   test::expect_jittered("ode_gripper", 1, 10, lifting(), 20, lifted);
