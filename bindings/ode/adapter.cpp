@@ -70,6 +70,15 @@ dfm_status Adapter::check(const std::vector<Signature> &signatures) const {
   return DFM_OK;
 }
 
+dfm_status Adapter::ask_restored(bool &restored) {
+  dfm_world_stats now{};
+  now.size = sizeof now;
+  TRY(dfm_world_get_stats(world_, &now));
+  restored = now.time != time_ || now.steps != world_steps_;
+  time_ = now.time, world_steps_ = now.steps;
+  return DFM_OK;
+}
+
 // Nothing that ODE has destroyed is touched: geoms are known alive because the space lists them, bodies because a geom names them.
 dfm_status Adapter::look() {
   seen_.clear(), signatures_.clear(), engine_.spaces.clear();
@@ -97,7 +106,11 @@ dfm_status Adapter::look() {
   if (props_.size() > geoms_.size())
     std::erase_if(props_, [&](const auto &p) { return !by_geom_.count(p.first); });
   for (auto &g : geoms_) TRY(follow(*g));
-  for (auto &b : bodies_) TRY(agree(*b));
+  bool restored = false;
+  TRY(ask_restored(restored));
+  if (restored && !keeps_friction_) near_.forget();
+  if (restored) keeps_friction_ = false;
+  for (auto &b : bodies_) TRY(agree(*b, restored));
   return DFM_OK;
 }
 
@@ -193,15 +206,17 @@ dfm_status Adapter::follow(Geom &g) {
   return dfm_obstacle_move_to(g.obstacle, &pose);
 }
 
-// Who has moved a body since both worlds agreed: the caller in ODE, or a restore in the dfm_world.
-dfm_status Adapter::agree(Body &b) {
+// Who has moved a body since both worlds agreed: the caller in ODE, or a restore in the dfm_world, which counts for all bodies that were there.
+dfm_status Adapter::agree(Body &b, bool restored) {
   Member &m = b.seat->member;
   dfm_rigid_state world;
   TRY(dfm_rigid_get_state(b.rigid, &world));
   const dfm_rigid_state ode = m.state();
+  restored &= !b.fresh;
+  b.fresh = false, m.restored |= restored;
   if (same(ode, b.ode) && same(world, b.world)) return DFM_OK;
-  if (!same(ode, b.ode)) TRY(dfm_rigid_set_state(b.rigid, &ode));
-  else m.put(world), dBodyEnable(b.id);
+  if (restored || same(ode, b.ode)) m.put(world);
+  else TRY(dfm_rigid_set_state(b.rigid, &ode));
   b.ode = m.state();
   return dfm_rigid_get_state(b.rigid, &b.world);
 }
@@ -238,6 +253,8 @@ dfm_status Adapter::step(double dt) {
     if (status != DFM_OK && !same(b->world, m.state())) m.put(b->world);
     b->ode = m.state();
   }
+  bool restored = false;
+  TRY(ask_restored(restored));
   return status;
 }
 

@@ -25,6 +25,8 @@ class Adapter {
   dfm_status set_geom(dGeomID geom, const dfm_ode_geom &props);
   dfm_status set_arrays(dGeomID geom, int geom_class, Triangles arrays);
   dfm_status refresh(dGeomID geom);
+  dfm_status snapshot(void *buffer, size_t *bytes);                // snapshot.cpp
+  dfm_status restore(const void *buffer, size_t bytes);            // snapshot.cpp
   RigidFriction &friction() { return near_; }
   dfm_ode_stats stats() const;
   uint32_t trouble = 0;
@@ -38,7 +40,7 @@ class Adapter {
     dfm_rigid rigid = 0;
     dMass mass;
     dfm_rigid_state ode{}, world{};        // what both worlds had when they agreed last
-    bool found = false;
+    bool found = false, fresh = true;      // fresh: ODE's state counts, whatever the dfm_world has been restored to
   };
   struct Geom {
     dGeomID id;
@@ -67,6 +69,9 @@ class Adapter {
   std::vector<dGeomID> seen_;              // of this sync, in the space's order
   std::vector<Signature> signatures_;
   uint64_t steps_ = 0;
+  double time_ = 0;                        // s, the dfm_world's when both worlds agreed last: another one tells that it has been restored
+  uint64_t world_steps_ = 0;
+  bool keeps_friction_ = false;            // restored with the states of the rigid contacts
   double sync_seconds_ = 0;
 
   void walk(dSpaceID space);
@@ -78,7 +83,8 @@ class Adapter {
   dfm_status unbind(Geom &g);
   dfm_status bind_body(dBodyID body, Body *&out);
   dfm_status follow(Geom &g);
-  dfm_status agree(Body &b);
+  dfm_status agree(Body &b, bool restored);
+  dfm_status ask_restored(bool &restored);
   dfm_status rebind(dGeomID geom);
   std::vector<dBodyID> hidden_bodies() const;
 };

@@ -162,6 +162,14 @@ dfm_status dfm_ode_refresh(dfm_ode ode, dGeomID geom) {
   return with(ode, [&](Adapter &a) { return !geom ? missing("geom") : a.refresh(geom); });
 }
 
+dfm_status dfm_ode_snapshot(dfm_ode ode, void *buffer, size_t *bytes) {
+  return with(ode, [&](Adapter &a) { return !bytes ? missing("bytes") : a.snapshot(buffer, bytes); });
+}
+
+dfm_status dfm_ode_restore(dfm_ode ode, const void *buffer, size_t bytes) {
+  return with(ode, [&](Adapter &a) { return !buffer ? missing("buffer") : a.restore(buffer, bytes); });
+}
+
 dfm_status dfm_ode_set_friction(dfm_ode ode, dfm_context *context, const char *law, const dfm_params *params, double area) {
   return with(ode, [&](Adapter &a) {
     if (!law) return a.friction().clear_law(), dfm_status{DFM_OK};

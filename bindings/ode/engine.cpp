@@ -8,6 +8,9 @@ namespace {
 
 constexpr double kForget = 0.05;     // s
 constexpr double kResidual = 0.01;   // share of a jointed body's change by contact that may be missing before contact is solved again
+constexpr double kSlow = 1e-4;       // m/s: of a body that contact changes by less, what is missing counts against this (then 1e-6 m/s, as in the solve)
+constexpr double kDrifts = 1, kFellAsleep = 2;   // extra[12]
+constexpr int kMostCorrections = 3;  // per sub-step; more than one only where joints or motors jump
 
 Quat rotation_of(const dfm_rigid_state &s) { return {s.rotation[0], s.rotation[1], s.rotation[2], s.rotation[3]}; }
 
@@ -112,6 +115,21 @@ void Member::put(const dfm_rigid_state &s) {
   dBodySetAngularVel(body, s.spin[0], s.spin[1], s.spin[2]);
 }
 
+// ODE's rule, with one sample: only bodies with joints (contacts are some) fall asleep, and one that another has pulled out of its sleep goes back
+// to it at once when it is idle.
+void Member::tire(double h) {
+  next_idle_steps = idle_steps, next_idle_time = idle_time;
+  if (!dBodyIsEnabled(body)) return;
+  next_idle_steps = next_idle_time = 0;
+  if (!dBodyGetAutoDisableFlag(body) || dBodyIsKinematic(body) || dBodyGetNumJoints(body) == 0) return;
+  const double v = dBodyGetAutoDisableLinearThreshold(body), w = dBodyGetAutoDisableAngularThreshold(body);
+  if (norm(load(dBodyGetLinearVel(body))) > v || norm(load(dBodyGetAngularVel(body))) > w || dBodyGetAutoDisableAverageSamplesCount(body) == 0) return;
+  next_idle_steps = idle_steps + 1, next_idle_time = idle_time + h;
+  if (next_idle_steps < dBodyGetAutoDisableSteps(body) || next_idle_time < dBodyGetAutoDisableTime(body)) return;
+  dBodyDisable(body);
+  dBodySetLinearVel(body, 0, 0, 0), dBodySetAngularVel(body, 0, 0, 0);
+}
+
 Motion Member::answer(const Motion &p) const {
   return {(1 / inertia.mass) * p.v, in_axes(rotation_of(start), inverse(inertia.moments), p.w)};
 }
@@ -142,6 +160,16 @@ void Engine::find_ties() {
 
 void Engine::end() {
   close();
+  // The world does not keep bodies without geoms: their quaternions are left such that setting them changes no bit (dfm_ode_restore).
+  for (size_t i = members.size(); i < saved_.size(); ++i)
+    for (int k = 0; k < 8; ++k) {
+      const Quat before = from_ode(dBodyGetQuaternion(saved_[i].body));
+      dQuaternion q;
+      to_ode(before, q);
+      dBodySetQuaternion(saved_[i].body, q);
+      const Quat after = from_ode(dBodyGetQuaternion(saved_[i].body));
+      if (after.x == before.x && after.y == before.y && after.z == before.z && after.w == before.w) break;
+    }
   open_ = in_step = false;
 }
 
@@ -181,8 +209,22 @@ void Engine::open(const dfm_rigid_step &step) {
     if (friction) friction->h = step.h;
     for (const dSpaceID space : spaces) dSpaceCollide(space, near_data, near_callback);
   }
-  open_ = true, stepped_ = dirty_ = again_ = asked_again_ = false;
+  open_ = true, stepped_ = dirty_ = again_ = false;
+  rounds_ = 0;
   t_ = step.t, h_ = step.h;
+}
+
+// ODE gets the world's state each time, so that it is a function of that to the last bit, also after a restore or where the guard left out a part of the way.
+void Engine::take(Member &m, const dfm_rigid_state &given, const double *extra) {
+  Saved &s = saved_[m.saved];
+  if (m.restored && s.enabled != (extra[12] == 0)) {
+    (s.enabled ? dBodyDisable : dBodyEnable)(m.body);
+    s.enabled = !s.enabled;
+  }
+  m.restored = false;
+  m.put(given);
+  s.position = load(dBodyGetPosition(m.body)), s.rotation = from_ode(dBodyGetQuaternion(m.body));
+  s.v = load(dBodyGetLinearVel(m.body)), s.w = load(dBodyGetAngularVel(m.body));
 }
 
 void Engine::classify(Member &m, const dfm_rigid_step &step, const double *extra) {
@@ -196,6 +238,8 @@ void Engine::classify(Member &m, const dfm_rigid_step &step, const double *extra
   m.turns = m.kind == Member::free && dBodyGetGyroscopicMode(b) && !finite_turn(b);
   if (m.kind == Member::free && !m.turns) m.kind = Member::jointed;   // ODE turns it: what it makes of it is in b
   m.bias = {load(extra), load(extra + 3)};
+  const bool was_asleep = extra[12] != 0;
+  m.idle_steps = was_asleep && !disabled ? 0 : extra[13], m.idle_time = was_asleep && !disabled ? 0 : extra[14];   // the caller has woken it
   m.impulse = {};
   const Vec v = load(m.start.velocity), w = load(m.start.spin);
   const Saved &forces = saved_[m.saved];
@@ -210,7 +254,7 @@ void Engine::classify(Member &m, const dfm_rigid_step &step, const double *extra
   const Motion kept{load(extra + 6), load(extra + 9)};
   m.drift = {};
   if (!m.asleep) return;
-  if (extra[12] != 0) {
+  if (extra[12] == kDrifts) {
     m.drift = kept;
     return;
   }
@@ -221,9 +265,9 @@ void Engine::classify(Member &m, const dfm_rigid_step &step, const double *extra
 void Engine::predict(Member &m, const dfm_rigid_step &step, uint32_t number, double *velocity) {
   if (!open_ || step.t != t_ || step.h != h_ || (stepped_ && !again_)) open(step);
   if (again_ && stepped_) restore(), stepped_ = false;
-  asked_again_ = again_;
-  if (!again_) m.wakes = false;
-  if (!again_ || m.wakes) classify(m, step, step.extra + size_t{Member::kExtra} * number);
+  const double *const extra = step.extra + size_t{Member::kExtra} * number;
+  if (!again_) m.wakes = false, take(m, step.state[number], extra);
+  if (!again_ || (m.wakes && m.asleep)) classify(m, step, extra);
   else if (m.kind == Member::jointed) m.bias = m.next_bias;
   if (m.kind == Member::still) m.used = m.asleep ? Motion{} : Motion{load(m.start.velocity), load(m.start.spin)};
   else if (m.kind == Member::free) m.used = m.plain;
@@ -262,6 +306,8 @@ void Engine::advance(double h) {
     dBodyAddForce(m->body, f.x, f.y, f.z), dBodyAddTorque(m->body, t.x, t.y, t.z);
   }
   for (Tie &t : ties_) t.callers = dJointGetFeedback(t.joint), dJointSetFeedback(t.joint, &t.own);
+  for (const Saved &s : saved_)
+    if (dBodyIsEnabled(s.body) && dBodyGetAutoDisableFlag(s.body)) dBodyEnable(s.body);   // its counters begin anew: tire() counts
   for (const Saved &s : saved_) dBodySetGyroscopicMode(s.body, 0);
   (quick ? dWorldQuickStep : dWorldStep)(world, h);
   ++steps;
@@ -316,9 +362,10 @@ double Engine::judge(Member &m, double h) {
   m.next_bias = {(1 / h) * (got.v - m.plain.v - own.v), (1 / h) * (got.w - m.plain.w - own.w)};
   const double contact = dot(m.impulse.v, own.v) + dot(m.impulse.w, own.w);
   if (!(contact > 0)) return 0;
+  const double scale = std::max(contact, m.inertia.mass * (kSlow * kSlow));
   const Vec dv = got.v - m.used.v - own.v, dw = got.w - m.used.w - own.w;
   const double missing = m.inertia.mass * dot(dv, dv) + dot(dw, in_axes(rotation_of(m.start), m.inertia.moments, dw));
-  return std::sqrt(missing / contact);
+  return std::sqrt(missing / scale);
 }
 
 bool Engine::wake_sleepers(double h) {
@@ -338,19 +385,22 @@ bool Engine::wake_sleepers(double h) {
 bool Engine::commit(Member &m, uint32_t number, dfm_rigid_state *state, double *extra, double h) {
   bool again = false;
   if (dirty_ || !stepped_) {
-    const bool woken = !asked_again_ && wake_sleepers(h);
+    const bool woken = rounds_ == 0 && wake_sleepers(h);
     advance(h);
     residual = 0;
     for (Member *each : members) residual = std::max(residual, judge(*each, h));
-    again = !asked_again_ && (woken || residual > kResidual);
-    if (again) ++corrections, again_ = true;
-    else residual_max = std::max(residual_max, residual), again_ = false;
+    again_ = again = woken || (residual > kResidual && rounds_ < kMostCorrections);
+    if (again) ++corrections, ++rounds_;
+    else residual_max = std::max(residual_max, residual);
+    for (Member *each : members)
+      if (!again) each->tire(h);
   }
   state[number] = m.state();
   double *const keep = extra + size_t{Member::kExtra} * number;
-  const Motion load_or_drift = m.asleep ? m.drift : Motion{(1 / h) * m.impulse.v, (1 / h) * m.impulse.w};
+  const bool sleeps = !dBodyIsEnabled(m.body);
+  const Motion load_or_drift = m.asleep && sleeps ? m.drift : Motion{(1 / h) * m.impulse.v, (1 / h) * m.impulse.w};
   store(keep, m.next_bias.v), store(keep + 3, m.next_bias.w), store(keep + 6, load_or_drift.v), store(keep + 9, load_or_drift.w);
-  keep[12] = m.asleep;
+  keep[12] = !sleeps ? 0 : m.asleep ? kDrifts : kFellAsleep, keep[13] = m.next_idle_steps, keep[14] = m.next_idle_time;
   return again;
 }
 

@@ -5,10 +5,11 @@
 //   respond   M^-1 of the body alone; 0 for kinematic bodies and those that are disabled
 //   commit    dWorldStep with the impulses as forces p / h, which changes v by M^-1 p exactly. b for the next sub-step is what v differs by from
 //             v0 + h (F/m + g) + M^-1 p. Where contact changed a jointed body otherwise than foreseen by more than kResidual, the bodies are put back,
-//             contact is solved again with the new b, and ODE steps once more.
+//             contact is solved again with the new b, and ODE steps once more; again, where a motor or a joint acts so suddenly that once is not enough.
 //
 // A disabled body stands still in the solve; when it fell asleep all forces on it were in balance. Would it, with what contact has changed since, move
 // faster by now than ODE lets bodies that are idle, it wakes, and contact is solved again with its mass. Changes are forgotten within kForget.
+// Auto-disable is counted here, in sub-steps that count, by ODE's rule: ODE's own counters run on through corrections and cannot be read.
 //
 // Angular momentum: ODE's gyroscopic terms keep it to first order only. Bodies that have them on are turned here instead: free ones by the midpoint Lie
 // scheme (Krysl 2005), and of jointed ones ODE solves I(q0) (w1 - w0) = impulses without these terms, after which w = I(q1)^-1 I(q0) w1. What a
@@ -40,8 +41,9 @@ class Engine;
 // A body that soft bodies may touch. Its state, to the world, is that of its principal axes.
 struct Member {
   enum Kind : uint8_t { free, jointed, still };
-  static constexpr uint32_t kExtra = 13;   // values of a host's `extra`: b (6, m/s2 and rad/s2); awake: wrench of contact (6, N and
-                                           // N m), asleep: drift (6, m/s and rad/s); 1 if asleep
+  static constexpr uint32_t kExtra = 15;   // values of a host's `extra`: b (6, m/s2 and rad/s2); awake: wrench of contact (6, N and
+                                           // N m), asleep: drift (6, m/s and rad/s); not 0: asleep; idle for how many sub-steps, s
+  bool restored = false;                   // its state comes from a snapshot, with whether it sleeps
   Engine *engine = nullptr;
   dBodyID body = nullptr;
   Inertia inertia;
@@ -58,9 +60,11 @@ struct Member {
   Vec turn_momentum;                       // angular, at the start plus h T
   Motion impulse;
   Motion drift;                            // of one that sleeps: what it would move at by now
+  double idle_steps = 0, idle_time = 0, next_idle_steps = 0, next_idle_time = 0;
 
   dfm_rigid_state state() const;           // of `body` now
   void put(const dfm_rigid_state &s);      // into ODE
+  void tire(double h);                     // ODE's auto-disable
   Motion answer(const Motion &impulse) const;   // M^-1 p at the start
 };
 
@@ -105,12 +109,14 @@ class Engine {
   std::vector<Tie> ties_;                  // joints between two bodies that move, but for contacts
   std::vector<Saved> saved_;               // every body known
   std::vector<Vec> turn_;                  // per body of saved_, N m s
-  bool open_ = false, stepped_ = false, dirty_ = false, again_ = false, asked_again_ = false;
+  bool open_ = false, stepped_ = false, dirty_ = false, again_ = false;
+  int rounds_ = 0;                         // corrections of this sub-step
   double t_ = 0, h_ = 0;
 
   void open(const dfm_rigid_step &step);
   void restore();
   void close();
+  void take(Member &m, const dfm_rigid_state &given, const double *extra);
   void classify(Member &m, const dfm_rigid_step &step, const double *extra);
   void advance(double h);
   void turn_free(double h);

@@ -26,7 +26,7 @@ RigidFriction::~RigidFriction() { clear_law(); }
 
 void RigidFriction::clear_law() {
   if (law_) dfm_law_close(law_);
-  law_ = 0, last_.clear();
+  law_ = 0, nstate_ = 0, last_.clear();
 }
 
 dfm_status RigidFriction::set_law(dfm_context *context, const char *law, const dfm_params *params, double area) {
@@ -164,6 +164,40 @@ void RigidFriction::settle(double dt) {
     last_[c.key].push_back(std::move(c));
   }
   now_.clear();
+}
+
+// nstate, contacts; of each: its geoms, place, normal, first tangent, force, state.
+void RigidFriction::save(const std::function<double(dGeomID)> &number, std::vector<double> &out) const {
+  struct Row { double a, b; const Contact *contact; };
+  std::vector<Row> rows;
+  for (const auto &[key, contacts] : last_) {
+    const double a = number(key.first), b = number(key.second);
+    for (const Contact &c : contacts)
+      if (a >= 0 && b >= 0) rows.push_back({a, b, &c});
+  }
+  std::stable_sort(rows.begin(), rows.end(), [](const Row &l, const Row &r) { return l.a != r.a ? l.a < r.a : l.b < r.b; });
+  out.push_back(nstate_), out.push_back(double(rows.size()));
+  for (const Row &r : rows) {
+    const Contact &c = *r.contact;
+    out.push_back(r.a), out.push_back(r.b);
+    for (const Vec &v : {c.place, c.normal, c.tangent[0]}) out.insert(out.end(), {v.x, v.y, v.z});
+    out.push_back(c.fn), out.insert(out.end(), c.state.begin(), c.state.end());
+  }
+}
+
+bool RigidFriction::read(const std::function<dGeomID(double)> &geom, const double *from, size_t count, Memory &out) const {
+  const size_t row = 12 + size_t{nstate_};
+  if (count < 2 || from[0] != nstate_ || from[1] * double(row) + 2 != double(count)) return false;
+  for (const double *p = from + 2; p != from + count; p += row) {
+    const dGeomID a = geom(p[0]), b = geom(p[1]);
+    if (!a || !b) return false;
+    Contact c{};
+    c.key = {a, b}, c.a = dGeomGetBody(a), c.b = dGeomGetBody(b);
+    c.place = load(p + 2), c.normal = load(p + 5), c.tangent[0] = load(p + 8);
+    c.tangent[1] = cross(c.normal, c.tangent[0]), c.fn = p[11], c.state.assign(p + 12, p + row);
+    out[c.key].push_back(std::move(c));
+  }
+  return true;
 }
 
 void near_callback(void *data, dGeomID a, dGeomID b) {

@@ -68,6 +68,43 @@ TEST(OdeFriction, LawWithAState_BendsAndComesBack) {
   EXPECT_LT(std::fabs(position(box)[0] - start), 0.1 * bent);
 }
 
+// Bent bristles between rigid bodies: the adapter's snapshot has them; the dfm_world's own takes the bodies back, and they begin straight.
+TEST(OdeFriction, SnapshotOfTheAdapter_HasTheBristles) {
+  Ode ode;
+  ok(dfm_plugin_register_static(ode.context, dfm_plugin_entry_bristle, "bristle"));
+  ok(use(ode, "bristle", {{"mu", 0.5}, {"sigma0", 1e6}}));
+  soft_ball(ode, {0, 0, 0.145}, {}, 3e4, 30);
+  dCreatePlane(ode.space, 0, 0, 1, 0);
+  const dBodyID box = ode.box({0.2, 0.2, 0.02}, 2, {0, 0, 0.02});
+  const auto push = [&](int steps) {
+    for (int i = 0; i < steps; ++i) dBodyAddForce(box, 4, 1, 0), ode.step();
+  };
+  push(100);
+  size_t bytes = 0;
+  ok(dfm_ode_snapshot(ode.adapter, nullptr, &bytes));
+  std::vector<unsigned char> shot(bytes), plain;
+  ok(dfm_ode_snapshot(ode.adapter, shot.data(), &bytes));
+  ok(dfm_world_snapshot(ode.soft, nullptr, &bytes));
+  plain.resize(bytes);
+  ok(dfm_world_snapshot(ode.soft, plain.data(), &bytes));
+  push(50);
+  const uint64_t hash = dfm_world_hash(ode.soft);
+  ok(dfm_ode_restore(ode.adapter, shot.data(), shot.size()));
+  push(50);
+  EXPECT_EQ(dfm_world_hash(ode.soft), hash);
+  uint64_t straight[2];
+  for (uint64_t &h : straight) {
+    ok(dfm_world_restore(ode.soft, plain.data(), plain.size()));
+    push(50);
+    h = dfm_world_hash(ode.soft);
+  }
+  EXPECT_NE(straight[0], hash);
+  EXPECT_EQ(straight[0], straight[1]);
+  ok(use(ode, "coulomb", {{"mu", 0.2}}));
+  EXPECT_EQ(dfm_ode_restore(ode.adapter, shot.data(), shot.size()), DFM_E_FORMAT);
+  EXPECT_NE(std::string(dfm_last_error()).find("dfm_ode_set_friction"), std::string::npos) << dfm_last_error();
+}
+
 // A near callback of the caller's that leaves the contact to dfm_ode_contact.
 TEST(OdeFriction, OwnNearCallback_MayUseTheLaw) {
   struct Data { dfm_ode adapter; int made; } data{};

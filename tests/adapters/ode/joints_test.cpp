@@ -110,7 +110,8 @@ TEST_P(OdeGripper, LiftsABallAndHoldsIt) {
   EXPECT_GT(measure(g.ball).com[2], 0.05);
   const double before = g.held();
   g.ode.run(1, h);
-  EXPECT_LT(std::fabs(g.held() - before), 1e-6);
+  EXPECT_LT(std::fabs(g.held() - before), 1e-7);
+  EXPECT_LT(g.ode.stats().residual_max, 0.02);
 }
 INSTANTIATE_TEST_SUITE_P(Steps, OdeGripper, ::testing::Values(1e-3, 1.0 / 240));
 

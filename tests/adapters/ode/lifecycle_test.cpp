@@ -237,6 +237,68 @@ TEST(OdeLifecycle, Restore_TakesTheBodiesBack) {
   EXPECT_EQ(position(box), there);
 }
 
+// Auto-disable counts in the state that is restored: the plate falls asleep at the same step again, and one that slept sleeps.
+TEST(OdeLifecycle, Restore_TakesSleepAndItsCountersBack) {
+  Ode ode;
+  dWorldSetAutoDisableFlag(ode.world, 1), dWorldSetAutoDisableSteps(ode.world, 40), dWorldSetAutoDisableTime(ode.world, 0);
+  set_friction(ode.soft, 0.8);
+  dCreatePlane(ode.space, 0, 0, 1, 0);
+  const dBodyID plate = ode.box({0.2, 0.2, 0.05}, 4, {0, 0, 0.05});
+  soft_ball(ode, {0, 0, 0.203}, {}, 3e4, 30);
+  const auto take = [&](std::vector<unsigned char> &shot) {
+    size_t bytes = 0;
+    ok(dfm_world_snapshot(ode.soft, nullptr, &bytes));
+    shot.resize(bytes);
+    ok(dfm_world_snapshot(ode.soft, shot.data(), &bytes));
+  };
+  std::vector<unsigned char> before, awake, asleep;
+  int fell = 0;
+  take(before);
+  for (; dBodyIsEnabled(plate) && fell < 2000; ++fell) before.swap(awake), ode.run(0.01), take(before);
+  ASSERT_LT(fell, 2000);
+  asleep = before;
+  ode.run(0.02);
+  const uint64_t hash = dfm_world_hash(ode.soft);
+  for (const bool slept : {false, true}) {
+    const std::vector<unsigned char> &shot = slept ? asleep : awake;
+    dBodyEnable(plate);                    // whatever ODE's bodies are at
+    ok(dfm_world_restore(ode.soft, shot.data(), shot.size()));
+    ode.run(slept ? 0.02 : 0.03);
+    EXPECT_FALSE(dBodyIsEnabled(plate));
+    EXPECT_EQ(dfm_world_hash(ode.soft), hash);
+  }
+}
+
+// A body without a geom is not the dfm_world's; the adapter's snapshot has it, with dWorldQuickStep's random order.
+TEST(OdeLifecycle, SnapshotOfTheAdapter_HasBodiesWithoutGeomsToo) {
+  Ode ode({0, 0, -9.81}, DFM_ODE_QUICK);
+  soft_bed(ode);
+  const dBodyID box = ode.box({0.08, 0.08, 0.05}, 2, {0.15, 0.15, 0.16}), weight = ode.body(0.5, {1e-3, 1e-3, 1e-3}, {0.15, 0.2, 0.3});
+  const dJointID hinge = dJointCreateHinge(ode.world, nullptr);
+  dJointAttach(hinge, box, weight), dJointSetHingeAnchor(hinge, 0.15, 0.15, 0.25), dJointSetHingeAxis(hinge, 1, 0, 0);
+  ode.run(0.1);
+  size_t bytes = 0;
+  ok(dfm_ode_snapshot(ode.adapter, nullptr, &bytes));
+  std::vector<unsigned char> shot(bytes);
+  size_t few = bytes - 1;
+  EXPECT_EQ(dfm_ode_snapshot(ode.adapter, shot.data(), &few), DFM_E_ARG);
+  EXPECT_EQ(few, bytes);
+  ok(dfm_ode_snapshot(ode.adapter, shot.data(), &bytes));
+  ode.run(0.1);
+  const uint64_t hash = dfm_world_hash(ode.soft);
+  const Vec there = position(weight);
+  ok(dfm_ode_restore(ode.adapter, shot.data(), shot.size()));
+  EXPECT_GT(apart(position(weight), there), 1e-3);
+  ode.run(0.1);
+  EXPECT_EQ(dfm_world_hash(ode.soft), hash);
+  EXPECT_EQ(position(weight), there);
+  for (const size_t wrong : {size_t{0}, size_t{40}, bytes - 8, bytes - 1}) EXPECT_EQ(dfm_ode_restore(ode.adapter, shot.data(), wrong), DFM_E_FORMAT) << wrong;
+  EXPECT_EQ(position(weight), there);
+  shot[60] ^= 1;
+  EXPECT_EQ(dfm_ode_restore(ode.adapter, shot.data(), bytes), DFM_E_FORMAT);
+  EXPECT_EQ(position(weight), there);
+}
+
 TEST(OdeLifecycle, PlainWorldStep_IsRefused) {
   Ode ode;
   ode.ball(0.1, 1, {0, 0, 1});

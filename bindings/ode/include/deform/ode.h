@@ -61,8 +61,17 @@ DFM_API dfm_status dfm_ode_obstacle(dfm_ode ode, dGeomID geom, dfm_obstacle *out
 /** What stands for a body with at least one geom that takes part. Threads: Not during step. Since 0.2. */
 DFM_API dfm_status dfm_ode_rigid(dfm_ode ode, dBodyID body, dfm_rigid *out);
 
+/** The dfm_world's snapshot, and behind it what that does not hold: bodies without geoms that joints lead to, and the states of dfm_ode_set_friction. Of
+ * the bodies with geoms the dfm_world's own snapshot has everything, auto-disable included. buffer NULL: *bytes gets the size needed.
+ * @return DFM_OK; DFM_E_ARG too small (*bytes: the size); as dfm_ode_step. Threads: Not during step. Since 0.2. */
+DFM_API dfm_status dfm_ode_snapshot(dfm_ode ode, void *buffer, size_t *bytes);
+/** Restores both worlds, with the same bodies, geoms in the same order, joints and law; the next steps give the same bits. dfm_world_restore alone also
+ * takes the bodies with geoms back, and rigid contacts forget their states.
+ * @return DFM_OK; DFM_E_FORMAT not of such a scene, or made under another law (nothing changed). Threads: Not during step. Since 0.2. */
+DFM_API dfm_status dfm_ode_restore(dfm_ode ode, const void *buffer, size_t bytes);
+
 /** Friction of the rigid bodies among each other by one of the library's laws, in the default callback and in dfm_ode_contact: the coefficient of a
- * set-valued law follows its curve over the slip; a law with a state keeps it per contact. Not part of a snapshot of the dfm_world.
+ * set-valued law follows its curve over the slip; a law with a state keeps it per contact (dfm_ode_snapshot).
  * @param law     as for dfm_law_open; NULL: dfm_ode_def.friction again
  * @param params  NULL: the law's defaults
  * @param area    m2 that one contact stands for, where the law's stiffness is per area
