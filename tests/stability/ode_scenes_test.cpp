@@ -52,7 +52,8 @@ bool drives(const SceneRun &run) {
   return on;
 }
 
-// What is dragged at a taut line whose end goes along y runs on a tractrix: it comes from (0, 0), the line of length L from (L - 0.06, 0). 0.06: play in the ring.
+// What is dragged at a taut line whose end goes along y runs on a tractrix: it comes from (0, 0), the line of length L from (L - 0.06, 0). 0.06: play in
+// the ring.
 bool dragged(const SceneRun &run) {
   constexpr double kLength = 1.26;
   const double d = run.last("lead").com[1], angle = 2 * std::atan(std::exp(-d / kLength));

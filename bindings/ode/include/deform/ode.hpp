@@ -11,7 +11,8 @@
 
 namespace deform {
 
-struct OdeDef : dfm_ode_def { OdeDef() noexcept : dfm_ode_def(dfm_ode_def_default()) {} };
+// dfm_ode_def_default().
+struct OdeDef : dfm_ode_def { OdeDef() noexcept : dfm_ode_def(dfm_ode_def_for(sizeof(dReal), dODE_VERSION)) {} };
 struct OdeGeom : dfm_ode_geom { OdeGeom() noexcept : dfm_ode_geom(sized<dfm_ode_geom>()) {} };
 
 namespace basic {
@@ -20,6 +21,7 @@ template <class E>
 class Ode : public Handle<dfm_ode> {
  public:
   using Handle::Handle;
+  static auto register_host() { return E::done(dfm_ode_register()); }   // "ode" for scenes and World::add_rigids
   static void end(dfm_ode ode) noexcept { dfm_ode_detach(ode); }
   static auto attach(World<E> world, const dfm_ode_def &def) {
     return produce<E, Unique<Ode>>([&](auto &o) { return dfm_ode_attach(world.get(), &def, o.put()); });
@@ -39,6 +41,11 @@ class Ode : public Handle<dfm_ode> {
   // What stands for a geom and for a body in reports, rules and rays.
   auto obstacle(dGeomID geom) const { return produce<E, Obstacle<E>>([&](Obstacle<E> &o) { return dfm_ode_obstacle(raw_, geom, o.put()); }); }
   auto rigid(dBodyID body) const { return produce<E, Rigid<E>>([&](Rigid<E> &r) { return dfm_ode_rigid(raw_, body, r.put()); }); }
+  // Both worlds, as World has it: returns the bytes used; an empty span only asks how many are needed.
+  auto snapshot(std::span<std::byte> out) const {
+    return produce<E, size_t>([&](size_t &bytes) { return bytes = out.size(), dfm_ode_snapshot(raw_, out.data(), &bytes); });
+  }
+  auto restore(std::span<const std::byte> from) const { return E::done(dfm_ode_restore(raw_, from.data(), from.size())); }
   // Of ODE's own contacts; nullptr: OdeDef.friction again.
   auto set_friction(Context<E> context, Text law, const dfm_params &params = {}, double area = 1) const {
     return E::done(dfm_ode_set_friction(raw_, context.get(), law.c_str, params.size ? &params : nullptr, area));
