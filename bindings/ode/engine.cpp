@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <chrono>
+#include <utility>
 
 namespace dfm_ode_detail {
 namespace {
@@ -57,6 +58,18 @@ void principal(double a[3][3], Vec &moments, Quat &axes) {
 
 bool finite_turn(dBodyID b) { return dBodyGetFiniteRotationMode(b) != 0; }
 bool damped(dBodyID b) { return dBodyGetLinearDamping(b) != 0 || dBodyGetAngularDamping(b) != 0 || dBodyGetMaxAngularSpeed(b) < dInfinity; }
+
+// ODE's rule, with one sample: only bodies with joints (contacts are some) fall asleep. Who sleeps keeps what it has counted. True: idle for long enough.
+bool tire(dBodyID b, double h, const Engine::Idle &idle, Engine::Idle &next) {
+  next = idle;
+  if (!dBodyIsEnabled(b)) return false;
+  next = {};
+  if (!dBodyGetAutoDisableFlag(b) || dBodyGetNumJoints(b) == 0 || dBodyGetAutoDisableAverageSamplesCount(b) == 0) return false;
+  if (norm(load(dBodyGetLinearVel(b))) > dBodyGetAutoDisableLinearThreshold(b)) return false;
+  if (norm(load(dBodyGetAngularVel(b))) > dBodyGetAutoDisableAngularThreshold(b)) return false;
+  next = {idle[0] + 1, idle[1] + h};
+  return next[0] >= dBodyGetAutoDisableSteps(b) && next[1] >= dBodyGetAutoDisableTime(b);
+}
 
 // Mean spin over h with angular momentum L: w = I^-1(q half way) L.
 Vec mean_spin(Quat q, Vec inverse_moments, Vec L, double h) {
@@ -115,21 +128,6 @@ void Member::put(const dfm_rigid_state &s) {
   dBodySetAngularVel(body, s.spin[0], s.spin[1], s.spin[2]);
 }
 
-// ODE's rule, with one sample: only bodies with joints (contacts are some) fall asleep, and one that another has pulled out of its sleep goes back
-// to it at once when it is idle.
-void Member::tire(double h) {
-  next_idle_steps = idle_steps, next_idle_time = idle_time;
-  if (!dBodyIsEnabled(body)) return;
-  next_idle_steps = next_idle_time = 0;
-  if (!dBodyGetAutoDisableFlag(body) || dBodyIsKinematic(body) || dBodyGetNumJoints(body) == 0) return;
-  const double v = dBodyGetAutoDisableLinearThreshold(body), w = dBodyGetAutoDisableAngularThreshold(body);
-  if (norm(load(dBodyGetLinearVel(body))) > v || norm(load(dBodyGetAngularVel(body))) > w || dBodyGetAutoDisableAverageSamplesCount(body) == 0) return;
-  next_idle_steps = idle_steps + 1, next_idle_time = idle_time + h;
-  if (next_idle_steps < dBodyGetAutoDisableSteps(body) || next_idle_time < dBodyGetAutoDisableTime(body)) return;
-  dBodyDisable(body);
-  dBodySetLinearVel(body, 0, 0, 0), dBodySetAngularVel(body, 0, 0, 0);
-}
-
 Motion Member::answer(const Motion &p) const {
   return {(1 / inertia.mass) * p.v, in_axes(rotation_of(start), inverse(inertia.moments), p.w)};
 }
@@ -140,28 +138,34 @@ void Engine::begin(const std::vector<dBodyID> &others) {
     saved_.push_back({b, load(dBodyGetForce(b)), load(dBodyGetTorque(b)), {}, {}, {}, {}, false, dBodyGetGyroscopicMode(b) != 0, inertia_of(b)});
   };
   for (Member *m : members) m->saved = saved_.size(), add(m->body);
-  for (const dBodyID b : others) add(b);
+  for (const dBodyID b : others) add(b), saved_.back().next_idle = idle(b);
+  idle_.clear();
   find_ties();
   open_ = false, in_step = true;
 }
 
+Engine::Idle Engine::idle(dBodyID body) const {
+  const auto known = idle_.find(body);
+  return known == idle_.end() ? Idle{} : known->second;
+}
+
 void Engine::find_ties() {
-  ties_.clear();
-  std::unordered_map<dBodyID, size_t> number;
-  for (size_t i = 0; i < saved_.size(); ++i) number[saved_[i].body] = i;
+  ties_.clear(), number_.clear();
+  for (size_t i = 0; i < saved_.size(); ++i) number_[saved_[i].body] = i;
   for (size_t i = 0; i < saved_.size(); ++i)
     for (int k = 0; k < dBodyGetNumJoints(saved_[i].body); ++k) {
       const dJointID j = dBodyGetJoint(saved_[i].body, k);
       const dBodyID a = dJointGetBody(j, 0), b = dJointGetBody(j, 1);
       if (a != saved_[i].body || !b || !dJointIsEnabled(j) || dBodyIsKinematic(a) || dBodyIsKinematic(b) || dJointGetType(j) == dJointTypeContact) continue;
-      ties_.push_back({j, i, number.at(b), {}, nullptr});
+      ties_.push_back({j, i, number_.at(b), {}, nullptr});
     }
 }
 
 void Engine::end() {
   close();
   // The world does not keep bodies without geoms: their quaternions are left such that setting them changes no bit (dfm_ode_restore).
-  for (size_t i = members.size(); i < saved_.size(); ++i)
+  for (size_t i = members.size(); i < saved_.size(); ++i) {
+    idle_[saved_[i].body] = saved_[i].next_idle;
     for (int k = 0; k < 8; ++k) {
       const Quat before = from_ode(dBodyGetQuaternion(saved_[i].body));
       dQuaternion q;
@@ -170,6 +174,7 @@ void Engine::end() {
       const Quat after = from_ode(dBodyGetQuaternion(saved_[i].body));
       if (after.x == before.x && after.y == before.y && after.z == before.z && after.w == before.w) break;
     }
+  }
   open_ = in_step = false;
 }
 
@@ -195,6 +200,57 @@ void Engine::restore() {
   }
 }
 
+template <class F>
+void Engine::flood(std::vector<size_t> open, F &&reach) {
+  while (!open.empty()) {
+    const dBodyID b = saved_[open.back()].body;
+    open.pop_back();
+    for (int k = 0; k < dBodyGetNumJoints(b); ++k) {
+      const dJointID j = dBodyGetJoint(b, k);
+      const dBodyID first = dJointGetBody(j, 0), other = first == b ? dJointGetBody(j, 1) : first;
+      if (!other || !dJointIsEnabled(j) || (dBodyIsKinematic(b) && dBodyIsKinematic(other))) continue;
+      const auto known = number_.find(other);
+      if (known != number_.end() && reach(known->second)) open.push_back(known->second);
+    }
+  }
+}
+
+// Whatever hangs on something awake is awake, as in dWorldStep.
+void Engine::pull_awake() {
+  for (Member *m : members) m->pulled = false;
+  std::vector<size_t> awake;
+  for (size_t i = 0; i < saved_.size(); ++i)
+    if (saved_[i].enabled && dBodyGetNumJoints(saved_[i].body) > 0) awake.push_back(i);
+  if (awake.size() == saved_.size()) return;
+  flood(std::move(awake), [&](size_t i) {
+    if (saved_[i].enabled) return false;
+    dBodyEnable(saved_[i].body);
+    if (i < members.size()) members[i]->pulled = true;
+    return saved_[i].enabled = true;
+  });
+}
+
+// A body sleeps when all that it hangs together with has idled for long enough.
+void Engine::fall_asleep(double h) {
+  std::vector<uint8_t> due(saved_.size(), 0);
+  bool any = false;
+  for (size_t i = 0; i < saved_.size(); ++i) {
+    Saved &s = saved_[i];
+    Member *const m = i < members.size() ? members[i] : nullptr;
+    any |= due[i] = tire(s.body, h, m ? m->idle : s.idle, m ? m->next_idle : s.next_idle);
+  }
+  if (!any) return;
+  std::vector<size_t> awake;
+  for (size_t i = 0; i < saved_.size(); ++i)
+    if (!due[i] && dBodyIsEnabled(saved_[i].body)) awake.push_back(i);
+  flood(std::move(awake), [&](size_t i) { return std::exchange(due[i], 0) != 0; });
+  for (size_t i = 0; i < saved_.size(); ++i) {
+    if (!due[i]) continue;
+    dBodyDisable(saved_[i].body);
+    dBodySetLinearVel(saved_[i].body, 0, 0, 0), dBodySetAngularVel(saved_[i].body, 0, 0, 0);
+  }
+}
+
 void Engine::open(const dfm_rigid_step &step) {
   if (open_ && step.t == t_) {              // tried again, from the same states
     if (stepped_) restore();
@@ -204,10 +260,12 @@ void Engine::open(const dfm_rigid_step &step) {
       s.position = load(dBodyGetPosition(s.body)), s.rotation = from_ode(dBodyGetQuaternion(s.body));
       s.v = load(dBodyGetLinearVel(s.body)), s.w = load(dBodyGetAngularVel(s.body));
       s.enabled = dBodyIsEnabled(s.body);
+      s.idle = s.next_idle;
     }
     close();
     if (friction) friction->h = step.h;
     for (const dSpaceID space : spaces) dSpaceCollide(space, near_data, near_callback);
+    pull_awake();
   }
   open_ = true, stepped_ = dirty_ = again_ = false;
   rounds_ = 0;
@@ -239,7 +297,8 @@ void Engine::classify(Member &m, const dfm_rigid_step &step, const double *extra
   if (m.kind == Member::free && !m.turns) m.kind = Member::jointed;   // ODE turns it: what it makes of it is in b
   m.bias = {load(extra), load(extra + 3)};
   const bool was_asleep = extra[12] != 0;
-  m.idle_steps = was_asleep && !disabled ? 0 : extra[13], m.idle_time = was_asleep && !disabled ? 0 : extra[14];   // the caller has woken it
+  const bool woken = was_asleep && !disabled && !m.pulled;   // by the caller; who is only pulled goes back to sleep at once when it idles
+  m.idle = woken ? Idle{} : Idle{extra[13], extra[14]};
   m.impulse = {};
   const Vec v = load(m.start.velocity), w = load(m.start.spin);
   const Saved &forces = saved_[m.saved];
@@ -392,15 +451,14 @@ bool Engine::commit(Member &m, uint32_t number, dfm_rigid_state *state, double *
     again_ = again = woken || (residual > kResidual && rounds_ < kMostCorrections);
     if (again) ++corrections, ++rounds_;
     else residual_max = std::max(residual_max, residual);
-    for (Member *each : members)
-      if (!again) each->tire(h);
+    if (!again) fall_asleep(h);
   }
   state[number] = m.state();
   double *const keep = extra + size_t{Member::kExtra} * number;
   const bool sleeps = !dBodyIsEnabled(m.body);
   const Motion load_or_drift = m.asleep && sleeps ? m.drift : Motion{(1 / h) * m.impulse.v, (1 / h) * m.impulse.w};
   store(keep, m.next_bias.v), store(keep + 3, m.next_bias.w), store(keep + 6, load_or_drift.v), store(keep + 9, load_or_drift.w);
-  keep[12] = !sleeps ? 0 : m.asleep ? kDrifts : kFellAsleep, keep[13] = m.next_idle_steps, keep[14] = m.next_idle_time;
+  keep[12] = !sleeps ? 0 : m.asleep ? kDrifts : kFellAsleep, keep[13] = m.next_idle[0], keep[14] = m.next_idle[1];
   return again;
 }
 

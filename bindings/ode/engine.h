@@ -9,12 +9,14 @@
 //
 // A disabled body stands still in the solve; when it fell asleep all forces on it were in balance. Would it, with what contact has changed since, move
 // faster by now than ODE lets bodies that are idle, it wakes, and contact is solved again with its mass. Changes are forgotten within kForget.
-// Auto-disable is counted here, in sub-steps that count, by ODE's rule: ODE's own counters run on through corrections and cannot be read.
+// Auto-disable is counted here, in sub-steps that count, by ODE's rule: ODE's own counters run on through corrections and cannot be read. And what ODE
+// would wake in its step because it hangs on something awake is woken before the solve, which else would push what stands still.
 //
 // Angular momentum: ODE's gyroscopic terms keep it to first order only. Bodies that have them on are turned here instead: free ones by the midpoint Lie
 // scheme (Krysl 2005), and of jointed ones ODE solves I(q0) (w1 - w0) = impulses without these terms, after which w = I(q1)^-1 I(q0) w1. What a
 // joint does at two anchors that stand apart by its error is a couple; it is taken back from both of its bodies.
 #pragma once
+#include <array>
 #include <cstdint>
 #include <memory>
 #include <unordered_map>
@@ -54,17 +56,17 @@ struct Member {
   bool turns = false;                      // its turn is computed here
   bool asleep = false;                     // disabled in ODE
   bool wakes = false;                      // contact wakes it
+  bool pulled = false;                     // a joint or contact of ODE has woken it
   dfm_rigid_state start{};
   Motion plain, used;                      // without constraints and contact; as predicted
   Motion bias, next_bias;                  // b
   Vec turn_momentum;                       // angular, at the start plus h T
   Motion impulse;
   Motion drift;                            // of one that sleeps: what it would move at by now
-  double idle_steps = 0, idle_time = 0, next_idle_steps = 0, next_idle_time = 0;
+  std::array<double, 2> idle{}, next_idle{};   // sub-steps, s
 
   dfm_rigid_state state() const;           // of `body` now
   void put(const dfm_rigid_state &s);      // into ODE
-  void tire(double h);                     // ODE's auto-disable
   Motion answer(const Motion &impulse) const;   // M^-1 p at the start
 };
 
@@ -93,6 +95,9 @@ class Engine {
   void push(Member &m, const double *impulse);
   // True: solve again.
   bool commit(Member &m, uint32_t number, dfm_rigid_state *state, double *extra, double h);
+  using Idle = std::array<double, 2>;      // sub-steps, s
+  Idle idle(dBodyID body) const;           // of one without geoms, between steps; what members count is in their `extra`
+  void set_idle(dBodyID body, Idle idle) { idle_[body] = idle; }
   void reopen() { open_ = false; }         // states have been put into ODE from outside: the next predict begins anew
   bool is_open() const { return open_; }
 
@@ -104,10 +109,13 @@ class Engine {
     bool enabled;
     bool gyroscopic;                       // as the caller has it
     Inertia inertia;
+    Idle idle{}, next_idle{};              // of bodies without geoms
   };
   struct Tie { dJointID joint; size_t a, b; dJointFeedback own, *callers; };   // a, b: in saved_
+  std::unordered_map<dBodyID, size_t> number_;   // in saved_
   std::vector<Tie> ties_;                  // joints between two bodies that move, but for contacts
-  std::vector<Saved> saved_;               // every body known
+  std::vector<Saved> saved_;               // every body known: members in their order, then bodies without geoms
+  std::unordered_map<dBodyID, Idle> idle_;
   std::vector<Vec> turn_;                  // per body of saved_, N m s
   bool open_ = false, stepped_ = false, dirty_ = false, again_ = false;
   int rounds_ = 0;                         // corrections of this sub-step
@@ -123,6 +131,9 @@ class Engine {
   void turn_jointed(double h);
   void find_ties();
   bool wake_sleepers(double h);
+  void pull_awake();
+  void fall_asleep(double h);
+  template <class F> void flood(std::vector<size_t> from, F &&reach);   // along joints that hold; reach: goes on from there?
   double judge(Member &m, double h);
 };
 

@@ -46,11 +46,11 @@ inline Quat turn_by(Vec r) {
   for (; halvings > 1; --halvings) q = q * q;
   return unit(q);
 }
-// The rotation vector of a turn along the shorter arc; asin by its series after halving the arc five times.
+// The rotation vector of a turn along the shorter arc; asin by its series, of an arc that is halved until it is short, five times at most.
 inline Vec turn_of(Quat q) {
   if (q.w < 0) q = {-q.x, -q.y, -q.z, -q.w};
   double scale = 2;
-  for (int i = 0; i < 5; ++i) q = unit({q.x, q.y, q.z, q.w + 1}), scale *= 2;
+  for (int i = 0; i < 5 && q.x * q.x + q.y * q.y + q.z * q.z > 1e-3; ++i) q = unit({q.x, q.y, q.z, q.w + 1}), scale *= 2;
   const Vec v{q.x, q.y, q.z};
   const double s = dot(v, v);
   return (scale * (1 + s * (1.0 / 6 + s * (3.0 / 40 + s * (15.0 / 336 + s * (105.0 / 3456)))))) * v;

@@ -47,11 +47,15 @@ int main() {
     ode.run(kSteps * 1e-3);
     const Parts after = now(ode);
     Parts p{0, after.ode - before.ode, after.soft - before.soft, after.sync - before.sync, after.host - before.host};
-    p.total = p.ode + p.soft + p.sync + p.host;
     windows.push_back(p);
   }
-  std::sort(windows.begin(), windows.end(), [](const Parts &a, const Parts &b) { return a.total < b.total; });
-  const Parts p = windows[kWindows / 2];
+  // The median of each part by itself: a window in which another process was let in spoils one part of it, seldom the same.
+  const auto median = [&](double Parts::*part) {
+    std::sort(windows.begin(), windows.end(), [&](const Parts &a, const Parts &b) { return a.*part < b.*part; });
+    return windows[kWindows / 2].*part;
+  };
+  Parts p{0, median(&Parts::ode), median(&Parts::soft), median(&Parts::sync), median(&Parts::host)};
+  p.total = p.ode + p.soft + p.sync + p.host;
   const double ms = 1e3 / kSteps;
   const dfm_world_stats w = test::stats(ode.soft);
   std::printf("machine,compiler,rigid,touching contacts,sub-steps,step ms,ODE ms,soft ms,look over the space ms,solve's questions ms,adapter share\n");

@@ -100,18 +100,28 @@ inline void add(Momenta &to, dBodyID b) {
 }
 inline double apart(Vec a, Vec b) { return norm({a[0] - b[0], a[1] - b[1], a[2] - b[2]}); }
 
-inline void hold_bottom(dfm_body bed) {
+inline std::vector<double> points(dfm_body b) {
   dfm_body_info info{};
   info.size = sizeof info;
-  ok(dfm_body_get_info(bed, &info));
+  ok(dfm_body_get_info(b, &info));
   std::vector<double> x(3 * info.npoint);
   uint32_t n = 0;
-  ok(dfm_body_get_state(bed, info.npoint, x.data(), nullptr, &n));
+  ok(dfm_body_get_state(b, info.npoint, x.data(), nullptr, &n));
+  return x;
+}
+inline double lowest(dfm_body b) {
   double low = 1e9;
-  for (uint32_t i = 0; i < n; ++i) low = std::min(low, x[3 * i + 2]);
+  const std::vector<double> x = points(b);
+  for (size_t i = 2; i < x.size(); i += 3) low = std::min(low, x[i]);
+  return low;
+}
+
+inline void hold_bottom(dfm_body bed) {
+  const std::vector<double> x = points(bed);
+  const double low = lowest(bed);
   std::vector<uint32_t> held;
-  for (uint32_t i = 0; i < n; ++i)
-    if (x[3 * i + 2] < low + 1e-9) held.push_back(i);
+  for (uint32_t i = 0; i < x.size() / 3; ++i)
+    if (x[3 * size_t{i} + 2] < low + 1e-9) held.push_back(i);
   ok(dfm_body_hold(bed, uint32_t(held.size()), held.data(), 7));
 }
 

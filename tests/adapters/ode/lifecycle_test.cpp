@@ -185,6 +185,50 @@ TEST(OdeLifecycle, AutoDisabledPlate_SleepsUnderABallAndWakesWithoutIt) {
   EXPECT_TRUE(woke);
 }
 
+// What hangs on something awake does not sleep, idle as it is: asleep it would stand still in the solve while ODE moves it without its load.
+TEST(OdeLifecycle, PlateWithASwingingPendulum_StaysAwakeUntilThatHangsStill) {
+  Ode ode;
+  dWorldSetAutoDisableFlag(ode.world, 1), dWorldSetAutoDisableSteps(ode.world, 20), dWorldSetAutoDisableTime(ode.world, 0);
+  dCreatePlane(ode.space, 0, 0, 1, 0);
+  const dBodyID plate = ode.box({0.2, 0.2, 0.05}, 4, {0, 0, 0.05}), bob = ode.body(0.01, {1e-5, 1e-5, 1e-5}, {0.3, 0.03, -0.1});
+  soft_ball(ode, {0, 0, 0.203}, {}, 3e4, 30);
+  const dJointID hinge = dJointCreateHinge(ode.world, nullptr);
+  dJointAttach(hinge, plate, bob), dJointSetHingeAnchor(hinge, 0.3, 0, 0.05), dJointSetHingeAxis(hinge, 1, 0, 0);
+  for (int i = 0; i < 800; ++i) {
+    ode.step();
+    ASSERT_TRUE(dBodyIsEnabled(plate) && dBodyIsEnabled(bob)) << i;
+  }
+  dBodySetAngularDamping(bob, 0.2), dBodySetAngularDampingThreshold(bob, 0);
+  ode.run(1);
+  EXPECT_FALSE(dBodyIsEnabled(plate));
+  EXPECT_FALSE(dBodyIsEnabled(bob));
+}
+
+// A sleeping plate that a soft ball leans on is struck by a rigid one: in that very sub-step it takes the impulses of both.
+TEST(OdeLifecycle, SleepingPlateStruckByARigidBall_IsAwakeInTheSolveAtOnce) {
+  Ode ode({0, 0, 0});
+  const dfm_body ball = soft_ball(ode, {0, 0, 0}, {0, 0, -0.005});
+  const double low = lowest(ball);
+  const dBodyID plate = ode.box({0.2, 0.2, 0.05}, 4, {0, 0, low - 0.0502});
+  const dBodyID striker = ode.ball(0.05, 3, {0.1, 0, low - 0.2302}, {0, 0, 1});
+  dBodyDisable(plate);
+  for (int i = 0; i < 200 && !dBodyIsEnabled(plate); ++i) {
+    Momenta start, end;
+    add(start, ball), add(start, plate), add(start, striker);
+    ode.step();
+    if (!dBodyIsEnabled(plate)) continue;
+    add(end, ball), add(end, plate), add(end, striker);
+    dfm_rigid rigid = 0;
+    ok(dfm_ode_rigid(ode.adapter, plate, &rigid));
+    double force[3], moment[3];
+    ok(dfm_rigid_contact_wrench(rigid, force, moment));
+    EXPECT_LT(force[2], 0);
+    EXPECT_GT(velocity(plate)[2], 0.1);
+    EXPECT_LT(apart(start.linear, end.linear), 1e-14 * start.size);
+  }
+  EXPECT_TRUE(dBodyIsEnabled(plate));
+}
+
 // The forces that a body has when dfm_ode_step is called act over all of its sub-steps.
 TEST(OdeLifecycle, ForcesOfTheCaller_ActOverTheWholeStep) {
   Ode ode({0, 0, 0});

@@ -31,8 +31,9 @@ typedef struct dfm_ode_def {
 
 typedef struct dfm_ode_stats {
   uint32_t size, bodies, shapes, refused;   /* rigid bodies and shapes that take part now; geoms left out: ignored, rays, disabled */
-  uint64_t steps, ode_steps, corrections;   /* dfm_ode_step calls; dWorldStep calls; contact solved again for a joint's reaction; since attach */
-  double residual;                          /* of the last sub-step, after the correction: share of a jointed body's change by contact that it did not take */
+  uint64_t steps, ode_steps, corrections;   /* dfm_ode_step calls; dWorldStep calls; contact solved again, for a joint's reaction or a sleeper; since attach */
+  double residual;                          /* of the last sub-step, after the corrections: share of a jointed body's change by contact (of
+                                               1e-4 m/s at least) that it did not take */
   double residual_max;                      /* since attach */
   double sync_seconds, ode_seconds;         /* since attach: looking for what the caller changed; collision of the rigid bodies and dWorldStep */
 } dfm_ode_stats;
