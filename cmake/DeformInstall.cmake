@@ -25,6 +25,15 @@ install(DIRECTORY ${deform_templates} DESTINATION ${CMAKE_INSTALL_DATADIR}/defor
 install(FILES ${CMAKE_SOURCE_DIR}/LICENSE ${CMAKE_SOURCE_DIR}/README.md ${CMAKE_SOURCE_DIR}/CHANGELOG.md
   DESTINATION ${CMAKE_INSTALL_DOCDIR})
 
+# libdeform_ode has an export of its own, so that who does not ask for it (find_package(deform COMPONENTS ode)) needs no ODE.
+if(TARGET deform_ode)
+  install(TARGETS deform_ode EXPORT deformOdeTargets LIBRARY DESTINATION ${CMAKE_INSTALL_LIBDIR} ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR})
+  set_target_properties(deform_ode PROPERTIES INSTALL_RPATH "$ORIGIN")
+  install(DIRECTORY ${CMAKE_SOURCE_DIR}/bindings/ode/include/deform DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}
+    FILES_MATCHING PATTERN "*.h" PATTERN "*.hpp")
+  install(EXPORT deformOdeTargets NAMESPACE deform:: DESTINATION ${deform_cmake_dir})
+endif()
+
 install(EXPORT deformTargets NAMESPACE deform:: DESTINATION ${deform_cmake_dir})
 configure_package_config_file(${CMAKE_SOURCE_DIR}/cmake/deformConfig.cmake.in ${CMAKE_BINARY_DIR}/cmake/deformConfig.cmake
   INSTALL_DESTINATION ${deform_cmake_dir} PATH_VARS deform_plugin_dir)
@@ -46,3 +55,11 @@ if(DEFORM_PLUGINS_STATIC)
 endif()
 configure_file(${CMAKE_SOURCE_DIR}/cmake/deform.pc.in ${CMAKE_BINARY_DIR}/cmake/deform.pc @ONLY)
 install(FILES ${CMAKE_BINARY_DIR}/cmake/deform.pc DESTINATION ${CMAKE_INSTALL_LIBDIR}/pkgconfig)
+if(TARGET deform_ode)
+  set(deform_ode_pc_private "")
+  if(NOT DEFORM_SHARED)
+    set(deform_ode_pc_private "-lstdc++ -lm")
+  endif()
+  configure_file(${CMAKE_SOURCE_DIR}/cmake/deform_ode.pc.in ${CMAKE_BINARY_DIR}/cmake/deform_ode.pc @ONLY)
+  install(FILES ${CMAKE_BINARY_DIR}/cmake/deform_ode.pc DESTINATION ${CMAKE_INSTALL_LIBDIR}/pkgconfig)
+endif()

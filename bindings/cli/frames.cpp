@@ -122,7 +122,7 @@ class OffScreen : public Frames {
         for (int i = 0; i < 4; ++i) box.pose.rotation[i] = pose.rotation[i];
         box.look = {};
         out.boxes.push_back(box);
-      } else {
+      } else if (o.def.shape == DFM_SHAPE_CAPSULE) {
         render::Capsule capsule = {};
         for (int i = 0; i < 3; ++i) capsule.a[i] = p[i] - o.def.half_length * axis[i], capsule.b[i] = p[i] + o.def.half_length * axis[i];
         capsule.radius = o.def.radius, capsule.look = {};

@@ -5,6 +5,9 @@
 #include <cstring>
 
 #include "cli.h"
+#ifdef DEFORM_HAVE_ODE
+#include "deform/ode_host.h"
+#endif
 #include "messages.h"
 
 namespace cli {
@@ -128,6 +131,9 @@ dfm_context *make_context(const Globals &g) {
   def.log = on_log;
   dfm_context *context = nullptr;
   if (dfm_context_create(&def, &context) < 0) std::exit(fail(dfm_last_error()));
+#ifdef DEFORM_HAVE_ODE
+  if (dfm_ode_register() != DFM_OK) on_log(nullptr, DFM_LOG_WARNING, dfm_last_error());
+#endif
   return context;
 }
 

@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Every guide of doc/howto that has a folder of files is followed as a stranger would: the folder is copied away from the source tree, and each
 sh block of the guide runs in it against an installed and moved tree. A guide that begins with <!-- needs FILE --> is passed over where the
-installed tree has no such file.
+installed tree has no such file. So are examples/05_cpp.cpp and, where there is libdeform_ode, examples/ode.
 
 guides.py BUILD_DIR SOURCE_DIR SCRATCH_DIR CXX_COMPILER
 """
@@ -74,6 +74,19 @@ def main():
     program = scratch / "cpp"
     run(compiler, "-std=c++20", pathlib.Path(source) / "examples" / "05_cpp.cpp", "-o", program, *flags, env=env)
     run(program, env={**env, "LD_LIBRARY_PATH": str(prefix / libdir)})
+
+    # The examples beside an ODE world, by CMake and without it.
+    if (prefix / libdir / "libdeform_ode.so").exists():
+        folder = scratch / "examples_ode"
+        shutil.copytree(pathlib.Path(source) / "examples" / "ode", folder)
+        env = {**env, "CMAKE_PREFIX_PATH": str(prefix), "PKG_CONFIG_PATH": str(prefix / libdir / "pkgconfig"), "LD_LIBRARY_PATH": str(prefix / libdir)}
+        run("cmake", "-S", folder, "-B", folder / "build", "-DCMAKE_BUILD_TYPE=Release", env=env)
+        run("cmake", "--build", folder / "build", env=env)
+        flags = run("pkg-config", "--cflags", "--libs", "deform_ode", env=env).split()
+        run("cc", "-O2", folder / "gripper.c", "-o", folder / "gripper", *flags, "-lm", env=env)
+        run(compiler, "-std=c++20", folder / "cart.cpp", "-o", folder / "cart", *flags, env=env)
+        run(folder / "gripper", env=env)
+        run(folder / "build" / "cart", env=env)
     print("followed:", *followed)
 
 

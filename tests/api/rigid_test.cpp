@@ -52,7 +52,7 @@ struct Set {
   std::vector<dfm_rigid_def> bodies;
   std::vector<dfm_joint_def> joints;
   dfm_status create(dfm_world w, const char *host = nullptr) const {
-    const dfm_rigid_set_def set = {sizeof set, uint32_t(bodies.size()), uint32_t(joints.size()), 0, bodies.data(), joints.data()};
+    const dfm_rigid_set_def set = {sizeof set, uint32_t(bodies.size()), uint32_t(joints.size()), 0, bodies.data(), joints.data(), nullptr};
     std::vector<dfm_rigid> out(bodies.size() + 1);
     return dfm_rigid_create(w, host, &set, out.data());
   }

@@ -56,7 +56,7 @@ TEST(RollbackWorld, WhatItCannotDo_IsRefusedWhereItIsMade) {
   refused(dfm_body_move_held(b, 1, &point, 2, keys, nullptr), "body 'block': a motion of held points");
   refused(dfm_world_set_sleep(w.world, true), "sleep (contact.sleep)");
   const dfm_rigid_def box = test::box("crate", {0.1, 0.1, 0.1}, 1);
-  const dfm_rigid_set_def set = {sizeof set, 1, 0, 0, &box, nullptr};
+  const dfm_rigid_set_def set = {sizeof set, 1, 0, 0, &box, nullptr, nullptr};
   dfm_rigid rigid = 0;
   refused(dfm_rigid_create(w.world, nullptr, &set, &rigid), "rigid bodies");
 

@@ -92,7 +92,8 @@ BAD = {
                        ("libdeform/include/deform/deform.h", "=#ifndef DEFORM_DEFORM_H\n#define DEFORM_DEFORM_H\n#endif\n"),
                        ("libdeform/include/deform/base.h", "=#ifndef DEFORM_BASE_H\n#define DEFORM_BASE_H\nDFM_API int dfm_a(void);\n#endif\n")],
     "cpp_complete": [("libdeform/include/deform/deform.hpp", "=// dfm_hello() and dfm_hello_loud() in a comment reach nothing\n"),
-                     ("libdeform/include/deform/deform.hpp", "=inline int hello() { return dfm_hello(); }\n")],
+                     ("libdeform/include/deform/deform.hpp", "=inline int hello() { return dfm_hello(); }\n"),
+                     ("bindings/ode/include/deform/ode.h", "=DFM_API int dfm_ode_hello(void);\n")],
     "threads": [("libdeform/include/deform/base.h", "\nDFM_API int dfm_silent(void);\n"),
                 ("libdeform/include/deform/base.h", "\n/** Says nothing of threads. */\nDFM_API int dfm_silent(int a,\n  int b);\n")],
 }

@@ -11,9 +11,12 @@ NOT_IN_UMBRELLA = {"deform.h", "elementary.h"}  # elementary.h is for plugins, n
 DECLARATION = re.compile(r"^DFM_API\b[^;{]*?\b(dfm_\w+)\s*\(", re.M)
 
 
-def declared(tree):
-    """(path, line, name) of every function that the public headers export."""
-    for path in tree.select(PUBLIC, ext=(".h",)):
+ODE = "bindings/ode/include/deform/"
+
+
+def declared(tree, folder=PUBLIC):
+    """(path, line, name) of every function that the public headers of a folder export."""
+    for path in tree.select(folder, ext=(".h",)):
         code = without_comments(tree.text(path))
         for match in DECLARATION.finditer(code):
             yield path, line_of(code, match.start()), match.group(1)
@@ -59,16 +62,17 @@ def threads(tree):
 
 
 def cpp_complete(tree):
-    """deform.hpp (with result.hpp) calls every function that the public headers declare."""
-    wrapper = PUBLIC + "deform.hpp"
-    if wrapper not in tree.paths:
-        yield wrapper, 1, "is not there"
-        return
-    parts = [wrapper, *(path for path in [PUBLIC + "result.hpp"] if path in tree.paths)]
-    used = set(re.findall(r"\bdfm_\w+", "".join(without_comments(tree.text(path)) for path in parts)))
-    for path, line, name in declared(tree):
-        if name not in used:
-            yield wrapper, 1, f"does not reach {name} ({path}:{line}); give it a member"
+    """deform.hpp (with result.hpp) calls every function that the public headers declare, ode.hpp those of the binding."""
+    for folder, name, more in (PUBLIC, "deform.hpp", ["result.hpp"]), (ODE, "ode.hpp", []):
+        wrapper, functions = folder + name, list(declared(tree, folder))
+        if wrapper not in tree.paths and (functions or folder == PUBLIC):
+            yield wrapper, 1, "is not there"
+            continue
+        parts = [path for path in [wrapper, *(folder + other for other in more)] if path in tree.paths]
+        used = set(re.findall(r"\bdfm_\w+", "".join(without_comments(tree.text(path)) for path in parts)))
+        for path, line, function in functions:
+            if function not in used:
+                yield wrapper, 1, f"does not reach {function} ({path}:{line}); give it a member"
 
 
 RULES = {"public_headers": public_headers, "threads": threads, "cpp_complete": cpp_complete}

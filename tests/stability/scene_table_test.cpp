@@ -10,14 +10,17 @@
 namespace {
 
 // Contacts at once that a run has at least, jittered ones included; 0: nothing touches. begins: s, by then there are so many. needs_shared: its
-// meshes lie in ../shared.
-struct Row { const char *scene; double least_contacts, begins; bool needs_shared; };
+// meshes lie in ../shared. needs_ode: its rigid bodies are ODE's.
+struct Row { const char *scene; double least_contacts, begins; bool needs_shared, needs_ode = false; };
 void PrintTo(const Row &row, std::ostream *out) { *out << row.scene; }
 constexpr Row kRows[] = {
     {"ball_incline", 3, 0.3, false},        {"basin", 8, 0.8, false},
     {"fill_drop", 30, 0.4, false},          {"fill_drop_organs", 20, 0.2, true},
     {"gravity_anisotropy", 0, 0, false},    {"gravity_beams", 0, 0, false},
     {"guard_shot", 20, 0.02, false},        {"pinched_tube", 8, 0.45, false},
+    {"ode_bed", 30, 0.4, false, true},      {"ode_cart", 60, 0.3, false, true},
+    {"ode_chain", 30, 0.2, false, true},    {"ode_gripper", 20, 0.5, false, true},
+    {"ode_seesaw", 40, 0.6, false, true},
     {"pressed_ring", 20, 0.2, false},       {"rabbits_slope", 5, 0.6, false},
     {"rigid_on_ball", 10, 0.4, false},      {"rigid_on_bed", 5, 0.3, false},
     {"rigid_pinch", 20, 0.6, false},        {"rollback_compare", 15, 0.2, false},
@@ -78,6 +81,7 @@ class ContactScene : public testing::TestWithParam<Row> {};
 TEST_P(ContactScene, WithoutContact_IsNotSound) {
   const Row &row = GetParam();
   if (row.needs_shared && test::shared_dir().empty()) GTEST_SKIP() << "../shared is absent";
+  if (row.needs_ode && !test::kHasOde) GTEST_SKIP() << "built without libdeform_ode";
   std::vector<std::string> arguments = until(row.begins);
   const test::SceneRun with(row.scene, arguments);
   EXPECT_TRUE(sound(with, row.least_contacts)) << with.contacts_max() << " contacts, " << with.number("intersections_max") << " crossings";

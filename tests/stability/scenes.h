@@ -16,6 +16,11 @@
 
 namespace test {
 
+#ifdef DEFORM_HAS_ODE
+constexpr bool kHasOde = true;
+#else
+constexpr bool kHasOde = false;
+#endif
 constexpr const char *kFrictionless = R"(/contact/friction=[{"between": ["*", "*"], "law": "none"}])";
 
 // One row of bodies.csv.

@@ -26,7 +26,7 @@ inline dfm_joint_def joint(uint32_t type, uint32_t body, uint32_t with, Vec anch
 
 inline std::vector<dfm_rigid> create(dfm_world w, const std::vector<dfm_rigid_def> &bodies, const std::vector<dfm_joint_def> &joints = {}) {
   std::vector<dfm_rigid> out(bodies.size());
-  const dfm_rigid_set_def set = {sizeof set, uint32_t(bodies.size()), uint32_t(joints.size()), 0, bodies.data(), joints.data()};
+  const dfm_rigid_set_def set = {sizeof set, uint32_t(bodies.size()), uint32_t(joints.size()), 0, bodies.data(), joints.data(), nullptr};
   ok(dfm_rigid_create(w, nullptr, &set, out.data()));
   return out;
 }

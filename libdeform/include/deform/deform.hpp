@@ -346,6 +346,9 @@ class Rigid : public Handle<dfm_rigid> {
   auto def() const { return produce<E, dfm_rigid_def>([&](dfm_rigid_def &d) { return d.size = sizeof d, dfm_rigid_get_def(raw_, &d); }); }
   auto state() const { return produce<E, dfm_rigid_state>([&](dfm_rigid_state &s) { return dfm_rigid_get_state(raw_, &s); }); }
   auto set_state(const dfm_rigid_state &state) const { return E::done(dfm_rigid_set_state(raw_, &state)); }
+  auto add_shape(const dfm_obstacle_def &def) const {
+    return produce<E, Obstacle<E>>([&](Obstacle<E> &o) { return dfm_rigid_add_shape(raw_, &def, o.put()); });
+  }
   auto measure() const {
     return produce<E, dfm_body_measure>([&](dfm_body_measure &m) { return m.size = sizeof m, dfm_rigid_get_measure(raw_, &m); });
   }

@@ -76,6 +76,9 @@ inline const char *sentence(dfm_status s) noexcept {
   return s == spans_disagree ? "two arrays of one call disagree in length: each point or item needs its row in both" : dfm_last_error();
 }
 
+// Of bindings: sets that sentence.
+inline dfm_status fail(dfm_status s, const char *why) noexcept { return dfm_fail(s, why); }
+
 // A status with what the call gives. `if (result) use(*result); else log(result.what());`
 template <class T>
 class [[nodiscard]] Result {

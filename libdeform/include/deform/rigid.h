@@ -3,13 +3,14 @@
  *
  * A set of rigid bodies belongs to one host. The world keeps their states; the host answers, once per sub-step, how they would move without
  * contact, how they answer impulses, and where they end. Contact is solved with these answers, so both sides feel the same impulses.
- * Rigid bodies touch soft bodies only: neither each other nor obstacles. */
+ * Rigid bodies touch soft bodies only: neither each other nor obstacles. That is their host's business. */
 #ifndef DEFORM_RIGID_H
 #define DEFORM_RIGID_H
 #include "deform/base.h"
 #include "deform/body.h"
 #include "deform/id.h"
 #include "deform/math.h"
+#include "deform/obstacle.h"
 #ifdef __cplusplus
 extern "C" {
 #endif
@@ -21,7 +22,7 @@ enum { DFM_JOINT_HINGE = 0, DFM_JOINT_SLIDER = 1, DFM_JOINT_BALL = 2, DFM_JOINT_
 typedef struct dfm_rigid_state { double position[3], rotation[4], velocity[3], spin[3]; } dfm_rigid_state;   /* m, x y z w, m/s, rad/s */
 
 typedef struct dfm_rigid_def {
-  uint32_t size, shape;               /* DFM_SHAPE_SPHERE, BOX or CAPSULE, centred at the pose */
+  uint32_t size, shape;               /* DFM_SHAPE_SPHERE, BOX or CAPSULE, centred at the pose, or NONE: dfm_rigid_add_shape gives it others */
   const char *name;                   /* unique in the world among bodies and obstacles too */
   dfm_pose pose;
   double half_size[3], radius, half_length;   /* as in dfm_obstacle_def, m */
@@ -49,6 +50,7 @@ typedef struct dfm_rigid_set_def {
   uint32_t size, nbody, njoint, reserved;
   const dfm_rigid_def *bodies;
   const dfm_joint_def *joints;
+  void *data;                         /* for the host's create: what the set stands for in the host's own world; NULL: nothing yet */
 } dfm_rigid_set_def;
 
 /* ---- the table of a host ------------------------------------------------------------------------------------ */
@@ -61,11 +63,18 @@ typedef struct dfm_rigid_step {
   const double *extra;                /* [nextra] */
 } dfm_rigid_step;
 
-/** Per sub-step: predict, then respond for each group that is touched, revise (and respond again where it changed something), then commit (again,
- * if the guard asks for other impulses), all with the same dfm_rigid_step. A sub-step that fails is not
- * committed anywhere: the next predict then has the state of the last one that succeeded, so a host with a world of its own writes `state` into it
- * first. Called from the thread that steps the world, never by two threads at once for one instance; results must depend on the arguments alone.
+/** Per sub-step and set: predict, respond for each group that is touched, revise (and respond again where it changed something), push where there is one,
+ * commit (again, if the guard asks for other impulses), all with the same dfm_rigid_step. Each of
+ * them runs for all sets of the world before the next one begins, so that sets that share a world of the host's see all impulses (push) before any
+ * has to know where it ends (commit). A sub-step may be tried again with another h, and one that fails is not committed anywhere: the next predict
+ * then has the state of the last one that succeeded, so a host with a world of its own writes `state` into it first.
+ * A host whose bodies act on each other beyond its answers (joints, contacts, motors of an engine) may return DFM_RIGID_AGAIN from commit, with its
+ * outputs filled all the same: contact is then solved once more, with the velocities that predict gives now, and pushed and committed again. The
+ * world does so DFM_RIGID_MOST_AGAIN times at most, after that what commit has filled in counts.
+ * Called from the thread that steps the world, never by two threads at once for one instance; results must depend on the arguments alone.
  * Every function returns DFM_OK, or a negative status, which ends the step with DFM_TROUBLE_PLUGIN. */
+enum { DFM_RIGID_AGAIN = 2, DFM_RIGID_MOST_AGAIN = 4 };
+
 typedef struct dfm_rigid_host {
   uint32_t size, flags;               /* flags: 0 */
   void *user;                         /* handed to create */
@@ -91,6 +100,8 @@ typedef struct dfm_rigid_host {
    * solved again, a few times at most. May be NULL: predict and respond hold for all impulses. @param impulse [nbody,6] as for commit
    * @param velocity out, [nbody,6] @param changed out */
   dfm_status (*revise)(void *self, const dfm_rigid_step *step, const double *impulse, double *velocity, uint32_t *changed);
+  /** The impulses that commit will have, before any set commits. May be NULL. */
+  dfm_status (*push)(void *self, const dfm_rigid_step *step, const double *impulse);
 } dfm_rigid_host;
 
 /** Makes a host known under a name to every context of the process; the table is copied, its code must stay loaded. "builtin" is always known.
@@ -106,7 +117,11 @@ DFM_API dfm_rigid_def dfm_rigid_def_default(void);
  * @param out   [nbody]
  * @return DFM_OK; DFM_E_ARG (which body or joint, why; nearest host); DFM_E_FATAL the host refuses. Threads: Not during step. Since 0.2. */
 DFM_API dfm_status dfm_rigid_create(dfm_world world, const char *host, const dfm_rigid_set_def *set, dfm_rigid *out);
-/** Removes the whole set that the body came with; their contacts end. Threads: Not during step. Since 0.2. */
+/** A further shape of a body, at def->pose in the body's frame, whose origin is the centre of mass: any but a plane; no keys, no sine. It touches with
+ * the body's mass and moves with it; a dfm_obstacle with a name, material and filter of its own. dfm_obstacle_destroy removes it alone.
+ * @return DFM_OK; DFM_E_ARG (which entry, why); DFM_E_HANDLE. Threads: Not during step. Since 0.2. */
+DFM_API dfm_status dfm_rigid_add_shape(dfm_rigid rigid, const dfm_obstacle_def *def, dfm_obstacle *out);
+/** Removes the whole set that the body came with, with all shapes; their contacts end. Threads: Not during step. Since 0.2. */
 DFM_API dfm_status dfm_rigid_destroy(dfm_rigid rigid);
 /** All rigid bodies in order of creation; capacity 0 with out NULL only counts. Threads: Any thread. Not during step. Since 0.2. */
 DFM_API dfm_status dfm_world_rigids(dfm_world world, uint32_t capacity, dfm_rigid *out, uint32_t *n);

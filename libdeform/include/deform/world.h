@@ -101,6 +101,7 @@ typedef struct dfm_world_stats {
   double sleep_energy, sleep_momentum[3]; /* J and N s that bodies still had when they fell asleep, since creation */
   uint64_t guard_solves, guard_cuts;      /* since creation: solves with hits as contacts; sub-steps taken anew, shorter */
   double guard_lost;                      /* s since creation: motion left out where neither was enough */
+  uint64_t rigid_again;                   /* times a rigid host had contact solved again (DFM_RIGID_AGAIN), since creation */
 } dfm_world_stats;
 /** @return DFM_OK; DFM_E_HANDLE. Threads: Any thread. Not during step. Since 0.1. */
 DFM_API dfm_status dfm_world_get_stats(dfm_world world, dfm_world_stats *out);

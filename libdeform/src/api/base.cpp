@@ -61,6 +61,11 @@ const char *dfm_status_name(dfm_status s) {
 
 const char *dfm_last_error(void) { return dfm::last_error(); }
 
+dfm_status dfm_fail(dfm_status status, const char *sentence) {
+  dfm::set_last_error(sentence ? sentence : "");
+  return status;
+}
+
 dfm_context_def dfm_context_def_default(void) {
   dfm_context_def def{};
   def.size = sizeof def;

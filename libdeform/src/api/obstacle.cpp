@@ -27,7 +27,7 @@ dfm_status dfm_obstacle_destroy(dfm_obstacle obstacle) {
   return guard([&] {
     Obstacle &o = obstacle_of(obstacle);
     idle(*o.world);
-    if (o.rigid) fail(DFM_E_STATE, "'%s' is a rigid body; dfm_rigid_destroy removes it, with the set it came with", o.name.c_str());
+    if (o.rigid && !o.added) fail(DFM_E_STATE, "'%s' is a rigid body; dfm_rigid_destroy removes it, with the set it came with", o.name.c_str());
     destroy_obstacle(o);
   });
 }

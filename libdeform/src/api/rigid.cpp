@@ -45,14 +45,23 @@ dfm_status dfm_rigid_destroy(dfm_rigid rigid) {
   });
 }
 
+dfm_status dfm_rigid_add_shape(dfm_rigid rigid, const dfm_obstacle_def *def, dfm_obstacle *out) {
+  return guard([&] {
+    Obstacle &o = rigid_of(rigid);
+    idle(*o.world);
+    need(def, "def"), need(out, "out");
+    *out = add_rigid_shape(o, take_def(def, dfm_obstacle_def_default())).handle;
+  });
+}
+
 dfm_status dfm_world_rigids(dfm_world world, uint32_t capacity, dfm_rigid *out, uint32_t *n) {
   return guard([&] {
     const World &w = world_of(world);
     uint32_t count = 0;
-    for (auto &o : w.obstacles) count += o->rigid != nullptr;
+    for (auto &o : w.obstacles) count += o->rigid && !o->added;
     if (!room(count, capacity, out, n)) return;
     for (auto &o : w.obstacles)
-      if (o->rigid) *out++ = o->handle;
+      if (o->rigid && !o->added) *out++ = o->handle;
   });
 }
 
@@ -62,7 +71,7 @@ dfm_status dfm_world_find_rigid(dfm_world world, const char *name, dfm_rigid *ou
     need(name, "name"), need(out, "out");
     std::vector<std::string> names;
     for (auto &o : w.obstacles) {
-      if (!o->rigid) continue;
+      if (!o->rigid || o->added) continue;
       if (o->name == name) {
         *out = o->handle;
         return;

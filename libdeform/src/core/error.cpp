@@ -8,6 +8,7 @@ namespace dfm {
 namespace {
 
 thread_local char last_sentence[1024];
+thread_local uint64_t said = 0;
 
 std::string vformat(const char *format, va_list args) {
   char text[1024];
@@ -51,9 +52,11 @@ std::string format(const char *format, ...) {
 void set_last_error(const char *sentence) noexcept {
   std::strncpy(last_sentence, sentence, sizeof last_sentence - 1);
   last_sentence[sizeof last_sentence - 1] = 0;
+  ++said;
 }
 
 const char *last_error() noexcept { return last_sentence; }
+uint64_t sentences() noexcept { return said; }
 
 std::string nearest(const std::string &wrong, const std::vector<std::string> &valid) {
   std::string best;

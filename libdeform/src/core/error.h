@@ -22,6 +22,7 @@ std::string format(const char *format, ...) __attribute__((format(printf, 1, 2))
 
 void set_last_error(const char *sentence) noexcept;  // thread-local
 const char *last_error() noexcept;
+uint64_t sentences() noexcept;                       // of this thread so far: has what was called said why it failed?
 
 // The valid name nearest to a wrong one (edit distance), for "did you mean"; empty when nothing is near.
 std::string nearest(const std::string &wrong, const std::vector<std::string> &valid);

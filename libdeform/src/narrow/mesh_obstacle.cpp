@@ -40,8 +40,8 @@ void mesh_obstacle(const Pair &pair, const ObstacleView &view, uint8_t kind, Run
     drop_nodes(c, mesh);
     c.kind = kPrimitive, c.obstacle = 1;
     c.area *= 2;
-    const Vec3 normal = load3(c.normal), on_mesh = load3(c.point) - (0.5 * c.distance) * normal;
-    store3(c.velocity, view.velocity_at(on_mesh, pair.h) - dot(view.belt, normal) * normal);
+    const Vec3 normal = load3(c.normal), on_body = load3(c.point) + (0.5 * c.distance) * normal;
+    store3(c.velocity, view.velocity_at(on_body, pair.h) - dot(view.belt, normal) * normal);
   }
   if (kind == 2)
     std::sort(out.begin() + begin, out.end(), [](const ContactPoint &l, const ContactPoint &r) {

@@ -11,9 +11,10 @@ namespace dfm::narrow {
 
 void finish(const Pair &pair, ContactPoint &c, Vec3 q, Vec3 o, Vec3 normal, double distance, uint32_t patch, Array<ContactPoint> &out) {
   place(c, q, o, normal, distance);
-  // A belt slips along its surface; it never pushes what lies beside it.
+  // A belt slips along its surface; it never pushes what lies beside it. Of what turns, it is the place where the body's own point is: what sticks goes
+  // along with the turn at its own radius, and that is also where impulses act (ContactRows::arm), so that a spin which they take back leaves nothing.
   const ObstacleView &view = pair.shape->view();
-  store3(c.velocity, view.velocity_at(o, pair.h) - dot(view.belt, normal) * normal);
+  store3(c.velocity, view.velocity_at(q, pair.h) - dot(view.belt, normal) * normal);
   c.key = contact_key(c, pair.a.id, view.id, patch, 0);
   out.push_back(c);
 }

@@ -144,6 +144,7 @@ Plan make_plan(const SceneFacts &f) {
         else leave(stage_name(id), "no pair may touch");
       plan_self(f, plan);
       run(StageId::solve, who);
+      if (f.rigid_bodies) run(StageId::rigid_commit, "ends of " + rigids);
       run(StageId::distribute, who);
     }
   } else {
@@ -151,7 +152,7 @@ Plan make_plan(const SceneFacts &f) {
     for (StageId id : {StageId::gather, StageId::broad, StageId::narrow, StageId::solve, StageId::distribute, StageId::guard}) leave(stage_name(id), why);
     plan_self(f, plan);
   }
-  if (f.rigid_bodies) run(StageId::rigid_commit, "ends of " + rigids);
+  if (f.rigid_bodies && !pairs && !f.self_bodies) run(StageId::rigid_commit, "ends of " + rigids);
   if (f.rollback) leave("guard", "contact.method is rollback");
   else if (pairs && !f.unguarded) run(StageId::guard, "nothing crosses at the end of a sub-step: " + count(pairs, "pair", "pairs"));
   else if (pairs) leave("guard", "switched off (contact.guard): what moves further than contacts reach in one sub-step may cross");

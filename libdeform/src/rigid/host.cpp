@@ -51,6 +51,7 @@ double solid_volume(const dfm_rigid_def &d) {
   const double r = d.radius, *const a = d.half_size;
   switch (d.shape) {
     case DFM_SHAPE_BOX: return 8 * a[0] * a[1] * a[2];
+    case DFM_SHAPE_NONE: return 0;
     case DFM_SHAPE_CAPSULE: return kPi * r * r * (2 * d.half_length) + 4.0 / 3 * kPi * r * r * r;
     default: return 4.0 / 3 * kPi * r * r * r;
   }

@@ -20,11 +20,12 @@ inline Quat turned(Quat q, Vec3 r) {
   return unit(Quat{v.x, v.y, v.z, sin_turns(half + 0.25)} * q);
 }
 
-// The rotation vector of q along the shorter arc. Halving the arc needs square roots only; asin by its series is exact to rounding after five.
+// The rotation vector of q along the shorter arc. Halving the arc needs square roots only; asin by its series is exact to rounding where it is small
+// enough, that is at once for the turn of a sub-step, after five halvings for the longest arc.
 inline Vec3 rotation_vector(Quat q) {
   if (q.w < 0) q = {-q.x, -q.y, -q.z, -q.w};
   double scale = 2;
-  for (int i = 0; i < 5; ++i) {
+  for (int i = 0; i < 5 && q.x * q.x + q.y * q.y + q.z * q.z > 1e-3; ++i) {
     q = unit({q.x, q.y, q.z, q.w + 1});
     scale *= 2;
   }

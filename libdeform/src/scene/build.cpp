@@ -264,7 +264,7 @@ class Builder {
         joints.push_back(j.def);
       }
     }
-    const dfm_rigid_set_def set = {sizeof set, uint32_t(bodies.size()), uint32_t(joints.size()), 0, bodies.data(), joints.data()};
+    const dfm_rigid_set_def set = {sizeof set, uint32_t(bodies.size()), uint32_t(joints.size()), 0, bodies.data(), joints.data(), nullptr};
     std::vector<dfm_rigid> made(bodies.size());
     check(dfm_rigid_create(world_, rigid.host.c_str(), &set, made.data()), rigid.pointer);
   }

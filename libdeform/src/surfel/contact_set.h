@@ -28,7 +28,7 @@ struct ContactPoint {
   double normal[3];      // unit, from b to a
   double distance;       // m, true distance, >= 0; negative: depth below b's surface, for recovery
   double area;           // m2
-  double velocity[3];    // m/s of the obstacle's surface at the point, belt included; 0 for bodies
+  double velocity[3];    // m/s of the obstacle where a's closest point is, belt included; 0 for bodies
 };
 
 }  // namespace dfm

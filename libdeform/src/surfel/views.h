@@ -15,7 +15,7 @@ struct BodyView {
   bool asleep = false;                // x stays as it is; it meets only what is awake or moves
 };
 
-enum class Shape : uint8_t { plane = 0, sphere = 1, box = 2, capsule = 3, mesh = 4, voxels = 5 };
+enum class Shape : uint8_t { plane = 0, sphere = 1, box = 2, capsule = 3, mesh = 4, voxels = 5, none = 6 };
 
 class VoxelGrid;
 
@@ -32,13 +32,15 @@ struct ObstacleView {
   const Surface *surface = nullptr;   // mesh: in place, v of the pose alone
   const VoxelGrid *grid = nullptr;    // voxels: in the obstacle's frame
   Vec3 velocity, spin;                // of the pose over the sub-step, world frame, spin about position
+  Vec3 linear;                        // the part of `spin` that counts to first order only: what a rigid body's host adds to the spin it starts with.
+                                      // Contact takes most of it back, to first order (its rows are linear); squared it would stay, as creep
   Vec3 belt;                          // velocity_surface: slips along, moves nothing
   bool moves() const { return norm2(velocity) + norm2(spin) != 0; }
   // Mean over the sub-step, from p to where the turn carries it: (exp(h spin) - 1) r / h to third order. The first term alone is the tangent, and
   // what sticks to a turntable would creep outwards by h spin^2 r / 2.
   Vec3 velocity_at(Vec3 p, double h) const {
-    const Vec3 first = cross(spin, p - position), second = cross(spin, first), third = cross(spin, second);
-    return velocity + first + (0.5 * h) * second + (h * h / 6) * third + belt;
+    const Vec3 turn = spin - linear, first = cross(turn, p - position), second = cross(turn, first), third = cross(turn, second);
+    return velocity + cross(spin, p - position) + (0.5 * h) * second + (h * h / 6) * third + belt;
   }
 };
 

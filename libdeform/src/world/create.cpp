@@ -192,7 +192,7 @@ Obstacle &create_obstacle(World &w, const dfm_obstacle_def &def) {
   o.name = def.name ? def.name : "obstacle" + std::to_string(w.next_id);
   check_name(w, o.name, "obstacle");
   const char *const name = o.name.c_str();
-  if (def.shape > DFM_SHAPE_VOXELS)
+  if (def.shape > DFM_SHAPE_NONE)
     fail(DFM_E_ARG, "obstacle '%s': shape %u is unknown; use DFM_SHAPE_PLANE, SPHERE, BOX, CAPSULE, MESH or VOXELS", name, def.shape);
   if (!finite(def.pose.position, 3) || !finite(def.pose.rotation, 4) || !finite(def.velocity_surface, 3) || !finite(def.sine.amplitude, 3) ||
       !finite(&def.sine.frequency, 1) || !finite(&def.sine.phase, 1))

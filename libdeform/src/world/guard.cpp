@@ -188,7 +188,6 @@ bool World::stage_guard(uint32_t *trouble) {
   double safe = 1;
   for (uint32_t solve = 0;; ++solve) {
     if (steppers && !commit_steppers(trouble)) return false;
-    if (solve > 0 && !rigid_sets.empty() && !stage_rigid_commit(trouble)) return false;
     bound_speeds(*this);
     broad.cover(body_views, obstacle_views, filter, h, offset, guard.speed);
     if (guard.memory.runs.empty() || guard.lists != broad.stats().renewals) guard.memory.follow(broad.candidates()), guard.lists = broad.stats().renewals;
@@ -205,7 +204,7 @@ bool World::stage_guard(uint32_t *trouble) {
     guard.resolving = true;
     const bool solved = stage_solve(trouble);
     guard.resolving = false;
-    if (!solved) return false;
+    if (!solved || (!rigid_sets.empty() && !stage_rigid_commit(trouble))) return false;   // a host may have it solved once more
     ++stats.guard_solves;
     stage_distribute();
   }

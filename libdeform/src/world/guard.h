@@ -29,7 +29,7 @@ struct Guard {
   double cut = 1;                        // then: this much as long
   double motion = 1;                     // < 1: share of its way that is taken
 
-  void start() { cut = motion = 1, acted = again = stepped = false; }
+  void start() { kept.clear(), cut = motion = 1, acted = again = stepped = false; }
   void forget() { memory.forget(); }     // positions or d_c have changed otherwise than by a step
 };
 

@@ -103,6 +103,7 @@ double ray_obstacle(const Obstacle &ob, Vec3 origin, Vec3 direction, Vec3 *norma
     case Shape::capsule: t = ray_capsule(o, d, ob.def.radius, ob.def.half_length, &n); break;
     case Shape::mesh:
     case Shape::voxels: t = ray_triangles(ob, o, d, &n); break;
+    case Shape::none: break;
   }
   *normal = rotate(q, n);
   return t;

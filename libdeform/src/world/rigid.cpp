@@ -20,10 +20,12 @@ bool finite(const double *p, size_t n) {
 }
 constexpr size_t kStateValues = sizeof(dfm_rigid_state) / sizeof(double);
 
-bool host_failed(const World &w, const RigidSet &set, const char *what, uint32_t *trouble) {
+// said: sentences() before the host was called. Its own reason comes along where it has given one.
+bool host_failed(const World &w, const RigidSet &set, const char *what, uint64_t said, uint32_t *trouble) {
   *trouble |= DFM_TROUBLE_PLUGIN;
-  set_last_error(format("step %llu, rigid body '%s' and those with it: host '%s' %s; take a smaller step or look at its masses and motors",
-                        static_cast<unsigned long long>(w.step_count), set.defs[0].name, set.host_name.c_str(), what).c_str());
+  const std::string why = said != sentences() ? last_error() : "take a smaller step or look at its masses and motors";
+  set_last_error(format("step %llu, rigid body '%s' and those with it: host '%s' %s; %s", static_cast<unsigned long long>(w.step_count),
+                        set.defs[0].name, set.host_name.c_str(), what, why.c_str()).c_str());
   return false;
 }
 
@@ -33,6 +35,19 @@ Obstacle &rigid_obstacle(World &w, uint64_t id) {
   for (auto &o : w.obstacles)
     if (o->id == id) return *o;
   fail(DFM_E_FATAL, "a rigid body has lost its shape");
+}
+
+Pose shape_pose(const Obstacle &o, const dfm_rigid_state &s) {
+  const Pose body{load3(s.position), rotation_of(s)};
+  return o.added ? Pose{place(body, o.local.position), body.rotation * o.local.rotation} : body;
+}
+
+// Mean velocity of a shape's origin while its body moves so, as ObstacleView::velocity_at.
+Vec3 shape_velocity(const Obstacle &o, const dfm_rigid_state &start, Vec3 velocity, Vec3 spin, double h) {
+  if (!o.added) return velocity;
+  const Vec3 arm = rotate(rotation_of(start), o.local.position), turn = load3(start.spin);
+  const Vec3 first = cross(turn, arm), second = cross(turn, first), third = cross(turn, second);
+  return velocity + cross(spin, arm) + (0.5 * h) * second + (h * h / 6) * third;
 }
 
 void place_rigids(World &w) {
@@ -48,24 +63,37 @@ void place_rigids(World &w) {
   for (auto &o : w.obstacles) {
     if (!o->rigid) continue;
     const uint32_t g = o->rigid->group[o->rigid_body];
-    if (g != DFM_RIGID_STILL) w.rigid_places[o->slot] = {o->rigid->first_group + g, o->rigid->place[o->rigid_body], o->pose.position};
+    if (g != DFM_RIGID_STILL) w.rigid_places[o->slot] = {o->rigid->first_group + g, o->rigid->place[o->rigid_body], {}};
   }
 }
 
-bool World::stage_rigid_predict(uint32_t *trouble) {
+bool World::ask_rigids(uint32_t *trouble) {
+  const uint64_t said = sentences();
   for (auto &set : rigid_sets) {
     RigidSet &s = *set;
-    const uint32_t n = static_cast<uint32_t>(s.defs.size());
-    s.step = {sizeof s.step, n, time, h, {gravity.x, gravity.y, gravity.z}, s.state.data(), s.extra.data()};
     std::fill(s.velocity.begin(), s.velocity.end(), 0.0);
-    if (s.host.predict(s.self, &s.step, s.velocity.data()) != DFM_OK) return host_failed(*this, s, "gave no velocities", trouble);
-    if (!finite(s.velocity.data(), s.velocity.size())) return host_failed(*this, s, "gave velocities that are not finite", trouble);
+    if (s.host.predict(s.self, &s.step, s.velocity.data()) != DFM_OK) return host_failed(*this, s, "gave no velocities", said, trouble);
+    if (!finite(s.velocity.data(), s.velocity.size())) return host_failed(*this, s, "gave velocities that are not finite", said, trouble);
   }
+  return true;
+}
+
+bool World::stage_rigid_predict(uint32_t *trouble) {
+  rigid_again = false;
+  for (auto &set : rigid_sets) {
+    const uint32_t n = static_cast<uint32_t>(set->defs.size());
+    set->step = {sizeof set->step, n, time, h, {gravity.x, gravity.y, gravity.z}, set->state.data(), set->extra.data()};
+  }
+  if (!ask_rigids(trouble)) return false;
+  for (auto &set : rigid_sets) set->first.assign(set->velocity.begin(), set->velocity.end());
   for (auto &o : obstacles) {
     if (!o->rigid || o->rigid->group[o->rigid_body] == DFM_RIGID_STILL) continue;
+    const dfm_rigid_state &s = o->rigid->state[o->rigid_body];
     const double *const v = &o->rigid->velocity[6 * size_t{o->rigid_body}];
-    obstacle_views[o->slot].velocity = load3(v), obstacle_views[o->slot].spin = load3(v + 3);
-    rigid_places[o->slot].centre = o->pose.position;
+    ObstacleView &view = obstacle_views[o->slot];
+    view.velocity = shape_velocity(*o, s, load3(v), load3(v + 3), h), view.spin = load3(v + 3), view.linear = view.spin - load3(s.spin);
+    if (o->mesh) o->mesh->place(view.position, view.rotation, view.velocity, view.spin);
+    rigid_places[o->slot].centre = load3(s.position);
   }
   return true;
 }
@@ -77,6 +105,21 @@ void rigid_response(World &w, uint32_t group, double *matrix) {
     if (set->host.respond(set->self, &set->step, group - set->first_group, matrix) != DFM_OK || !finite(matrix, width * width))
       fail(DFM_E_FATAL, "rigid host '%s' does not answer impulses on '%s' and those with it", set->host_name.c_str(), set->defs[0].name);
     return;
+  }
+}
+
+// A host that says DFM_RIGID_AGAIN knows better now how its bodies move: the same contacts are solved once more with its new velocities. Detection has
+// been done with the first ones, so the difference stands in the rows, as the rigid bodies' change of velocity before any impulse.
+void correct_rigids(World &w) {
+  for (const ContactRows::Block &block : w.rows.blocks) {
+    if (block.group == kNone) continue;
+    for (auto &set : w.rigid_sets)
+      for (uint32_t i = 0; i < set->defs.size(); ++i) {
+        if (set->group[i] == DFM_RIGID_STILL || set->first_group + set->group[i] != block.group) continue;
+        const double *const now = &set->velocity[6 * size_t{i}], *const then = &set->first[6 * size_t{i}];
+        double *const y = &w.rows.y[4 * size_t{block.first + 2 * set->place[i]}];
+        store3(y, load3(now) - load3(then)), store3(y + 4, load3(now + 3) - load3(then + 3));
+      }
   }
 }
 
@@ -113,7 +156,7 @@ bool revise_rigids(World &w) {
         if (set->group[i] != block.group - set->first_group) continue;
         for (uint32_t k = 0; k < 2; ++k)
           store3(&w.rows.y[size_t(block.first + 2 * set->place[i] + k) * 4],
-                 load3(&set->revised[6 * size_t{i} + 3 * k]) - load3(&set->velocity[6 * size_t{i} + 3 * k]));
+                 load3(&set->revised[6 * size_t{i} + 3 * k]) - load3(&set->first[6 * size_t{i} + 3 * k]));
       }
       w.rows.push_rigid(block);
     }
@@ -121,23 +164,43 @@ bool revise_rigids(World &w) {
   return any;
 }
 
-bool World::stage_rigid_commit(uint32_t *trouble) {
-  sum_rigid_impulses(*this);
+// 1: all have ended their step; 2: somebody asks for another solve; 0: failed.
+int World::ask_rigid_ends(uint32_t *trouble) {
+  const uint64_t said = sentences();
+  bool again = false;
+  for (auto &set : rigid_sets)
+    if (set->host.push && set->host.push(set->self, &set->step, set->impulse.data()) != DFM_OK)
+      return host_failed(*this, *set, "did not take its impulses", said, trouble);
   for (auto &set : rigid_sets) {
     RigidSet &s = *set;
-    if (s.host.commit(s.self, &s.step, s.impulse.data(), s.next.data(), s.next_extra.data()) != DFM_OK)
-      return host_failed(*this, s, "could not end its step", trouble);
+    const dfm_status status = s.host.commit(s.self, &s.step, s.impulse.data(), s.next.data(), s.next_extra.data());
+    if (status != DFM_OK && status != DFM_RIGID_AGAIN) return host_failed(*this, s, "could not end its step", said, trouble);
+    again |= status == DFM_RIGID_AGAIN;
     for (uint32_t i = 0; i < s.defs.size(); ++i)
       if (s.group[i] == DFM_RIGID_STILL) s.next[i] = s.state[i];
     if (!finite(reinterpret_cast<const double *>(s.next.data()), kStateValues * s.next.size()) || !finite(s.next_extra.data(), s.next_extra.size()))
-      return host_failed(*this, s, "ended its step with something not finite", trouble);
+      return host_failed(*this, s, "ended its step with something not finite", said, trouble);
   }
+  return again ? 2 : 1;
+}
+
+bool World::stage_rigid_commit(uint32_t *trouble) {
+  for (uint32_t round = 0;; ++round) {
+    sum_rigid_impulses(*this);
+    const int end = ask_rigid_ends(trouble);
+    if (end == 0) return false;
+    if (end == 1 || round == DFM_RIGID_MOST_AGAIN || !plan.touches() || rows.n == 0) break;
+    rigid_again = true, ++stats.rigid_again;
+    if (!ask_rigids(trouble) || !stage_solve(trouble)) return false;
+  }
+  rigid_again = false;
   // What is looked at from here on (the guard) sees how they truly move.
   for (auto &o : obstacles) {
     if (!o->rigid || o->rigid->group[o->rigid_body] == DFM_RIGID_STILL) continue;
-    const dfm_rigid_state &from = o->rigid->state[o->rigid_body], &to = o->rigid->next[o->rigid_body];
-    obstacle_views[o->slot].velocity = (1 / h) * (load3(to.position) - load3(from.position));
-    obstacle_views[o->slot].spin = (1 / h) * rotation_vector(rotation_of(to) * conjugate(rotation_of(from)));
+    const Pose from = shape_pose(*o, o->rigid->state[o->rigid_body]), to = shape_pose(*o, o->rigid->next[o->rigid_body]);
+    obstacle_views[o->slot].velocity = (1 / h) * (to.position - from.position);
+    obstacle_views[o->slot].spin = (1 / h) * rotation_vector(to.rotation * conjugate(from.rotation));
+    obstacle_views[o->slot].linear = {};
   }
   return true;
 }
@@ -158,7 +221,7 @@ void World::keep_rigids() {
   }
   if (!rigid_sets.empty())
     for (auto &o : obstacles)
-      if (o->rigid) o->pose = {load3(o->rigid->state[o->rigid_body].position), rotation_of(o->rigid->state[o->rigid_body])};
+      if (o->rigid) o->pose = shape_pose(*o, o->rigid->state[o->rigid_body]);
 }
 
 dfm_body_measure measure_rigid(const RigidSet &set, uint32_t i) {
@@ -169,7 +232,8 @@ dfm_body_measure measure_rigid(const RigidSet &set, uint32_t i) {
   const Vec3 v = load3(s.velocity), w = load3(s.spin), L = in_axes(rotation_of(s), load3(d.inertia), w);
   store3(m.com, load3(s.position)), store3(m.velocity, v), store3(m.momentum, d.mass * v), store3(m.angular, L);
   m.kinetic = 0.5 * d.mass * norm2(v) + 0.5 * dot(w, L);
-  double reach = d.shape == DFM_SHAPE_BOX ? norm(load3(d.half_size)) : d.radius + (d.shape == DFM_SHAPE_CAPSULE ? d.half_length : 0);
+  const double round = d.shape == DFM_SHAPE_NONE ? 0 : d.radius + (d.shape == DFM_SHAPE_CAPSULE ? d.half_length : 0);
+  const double reach = d.shape == DFM_SHAPE_BOX ? norm(load3(d.half_size)) : round;
   m.speed_max = norm(v) + norm(w) * reach;
   for (uint32_t k = 0; k < 3; ++k) m.contact_impulse[k] = set.total[3 * i + k];
   return m;
@@ -183,7 +247,8 @@ void set_rigid_state(Obstacle &o, const dfm_rigid_state &given) {
   s = given;
   const Quat q = unit_quat(given.rotation);
   s.rotation[0] = q.x, s.rotation[1] = q.y, s.rotation[2] = q.z, s.rotation[3] = q.w;
-  o.pose = {load3(s.position), q};
+  for (auto &shape : o.world->obstacles)
+    if (shape->rigid == &set && shape->rigid_body == o.rigid_body) shape->pose = shape_pose(*shape, s);
   o.world->changed = true;
 }
 

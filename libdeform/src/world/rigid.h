@@ -15,6 +15,7 @@ namespace dfm {
 
 struct World;
 struct Obstacle;
+struct Pose;
 
 struct RigidSet {
   World *world;
@@ -30,6 +31,7 @@ struct RigidSet {
   Array<dfm_rigid_state> state, next;          // [n] now; at the end of the sub-step
   Array<double> extra, next_extra;             // the host's
   Array<double> velocity, impulse;             // [n,6] mean velocity without contact; contact impulse of the last sub-step
+  Array<double> first;                         // [n,6] velocity as detection saw it; the solve starts from what came after
   Array<double> revised;                       // [n,6] the same velocity by what the host takes for granted now
   Array<double> total;                         // [n,3] N s of contact since creation
   double last_h = 0;                           // s, of the last sub-step; 0: none yet
@@ -49,7 +51,10 @@ void rigid_response(World &w, uint32_t group, double *matrix);
 void sum_rigid_impulses(World &w);             // of the rows, into every set
 bool revise_rigids(World &w);                  // true: a host answers differently under these impulses; rows have its new response, solve again
 dfm_body_measure measure_rigid(const RigidSet &set, uint32_t body);
-void set_rigid_state(Obstacle &o, const dfm_rigid_state &state);
+void set_rigid_state(Obstacle &o, const dfm_rigid_state &state);   // of the body that the shape belongs to
+Pose shape_pose(const Obstacle &shape, const dfm_rigid_state &body);   // where a body's shape stands when the body has this state
+Obstacle &add_rigid_shape(Obstacle &body, const dfm_obstacle_def &def);
+void correct_rigids(World &w);                 // make_rows(): the rows start where the hosts' last answer is
 void set_rigid_motor(RigidSet &set, uint32_t joint, double velocity, double max);
 void rigid_joint(RigidSet &set, uint32_t joint, double *position, double *rate, double *effort);
 

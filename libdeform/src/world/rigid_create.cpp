@@ -15,8 +15,10 @@ bool zero(const double *p) { return p[0] == 0 && p[1] == 0 && p[2] == 0; }
 
 // Shape, pose and material are checked where the obstacle is made.
 void check_body(dfm_rigid_def &d, const char *name) {
-  if (d.shape != DFM_SHAPE_SPHERE && d.shape != DFM_SHAPE_BOX && d.shape != DFM_SHAPE_CAPSULE)
-    fail(DFM_E_ARG, "rigid body '%s': shape %u; it can be a sphere, a box or a capsule (what never moves may be an obstacle of any shape)", name, d.shape);
+  if (d.shape != DFM_SHAPE_SPHERE && d.shape != DFM_SHAPE_BOX && d.shape != DFM_SHAPE_CAPSULE && d.shape != DFM_SHAPE_NONE)
+    fail(DFM_E_ARG, "rigid body '%s': shape %u; it can be a sphere, a box or a capsule, or DFM_SHAPE_NONE with any shapes added by dfm_rigid_add_shape",
+         name, d.shape);
+  if (d.shape == DFM_SHAPE_NONE && !d.fixed && zero(d.inertia)) fail(DFM_E_ARG, "rigid body '%s' has no shape to take its inertia from; give all three moments", name);
   if (!finite(d.velocity, 3) || !finite(d.spin, 3)) fail(DFM_E_ARG, "rigid body '%s': velocity and spin must be finite", name);
   if (d.fixed) {
     if (!zero(d.velocity) || !zero(d.spin)) fail(DFM_E_ARG, "rigid body '%s' is fixed and has a velocity; drop one (an obstacle's motion is prescribed)", name);
@@ -61,10 +63,10 @@ Obstacle &make_obstacle(World &w, const dfm_rigid_def &d) {
   return create_obstacle(w, o);
 }
 
-void ask_host(RigidSet &set, const std::vector<dfm_joint_def> &joints) {
+void ask_host(RigidSet &set, const std::vector<dfm_joint_def> &joints, void *data) {
   const uint32_t n = static_cast<uint32_t>(set.defs.size());
   set.group.assign(n, DFM_RIGID_STILL);
-  const dfm_rigid_set_def def = {sizeof def, n, set.njoint, 0, set.defs.data(), joints.data()};
+  const dfm_rigid_set_def def = {sizeof def, n, set.njoint, 0, set.defs.data(), joints.data(), data};
   uint32_t nextra = 0;
   const char *const host = set.host_name.c_str();
   if (set.host.create(set.host.user, &def, &set.self, set.group.data(), &nextra) != DFM_OK)
@@ -90,7 +92,7 @@ void ask_host(RigidSet &set, const std::vector<dfm_joint_def> &joints) {
 
 RigidSet::RigidSet(World &w, const std::string &name) : world(&w), host_name(name), host(find_host(name)) {
   const Memory &m = w.memory();
-  use_memory(m, state, next), use_memory(m, extra, next_extra, velocity, impulse, revised, total);
+  use_memory(m, state, next), use_memory(m, extra, next_extra, velocity, impulse, first, revised, total);
 }
 
 RigidSet::~RigidSet() {
@@ -99,10 +101,30 @@ RigidSet::~RigidSet() {
 
 void destroy_rigids(RigidSet &set) {
   World &w = *set.world;
-  const std::vector<uint64_t> ids = set.obstacle;
+  std::vector<uint64_t> ids;   // with the shapes that were added
+  for (auto &o : w.obstacles)
+    if (o->rigid == &set) ids.push_back(o->id);
   for (const uint64_t id : ids) destroy_obstacle(rigid_obstacle(w, id));
   std::erase_if(w.rigid_sets, [&](auto &s) { return s.get() == &set; });
   w.changed = true;
+}
+
+Obstacle &add_rigid_shape(Obstacle &body, const dfm_obstacle_def &def) {
+  const char *const name = def.name ? def.name : "(unnamed)";
+  if (def.shape == DFM_SHAPE_PLANE || def.shape == DFM_SHAPE_NONE)
+    fail(DFM_E_ARG, "shape '%s' of rigid body '%s' is %s; add a sphere, a box, a capsule, a mesh or voxels", name, body.name.c_str(),
+         def.shape == DFM_SHAPE_PLANE ? "a plane, which has no inside" : "none");
+  if (def.nkey || def.sine.frequency != 0 || def.sine.phase != 0)
+    fail(DFM_E_ARG, "shape '%s' of rigid body '%s' has a motion of its own; it moves with its body", name, body.name.c_str());
+  World &w = *body.world;
+  RigidSet &set = *body.rigid;
+  const uint32_t number = body.rigid_body;
+  Obstacle &o = create_obstacle(w, def);
+  o.rigid = &set, o.rigid_body = number, o.added = true, o.local = o.pose;
+  const dfm_rigid_state &s = set.state[number];
+  const Quat q{s.rotation[0], s.rotation[1], s.rotation[2], s.rotation[3]};
+  o.pose = {rotate(q, o.local.position) + load3(s.position), q * o.local.rotation};
+  return o;
 }
 
 void create_rigids(World &w, const char *host, const dfm_rigid_set_def &def, uint64_t *out) {
@@ -125,7 +147,7 @@ void create_rigids(World &w, const char *host, const dfm_rigid_set_def &def, uin
   const std::vector<dfm_joint_def> joints(def.joints, def.joints + def.njoint);
   set.njoint = def.njoint;
   for (uint32_t k = 0; k < set.njoint; ++k) check_joint(joints[k], k, set.defs);
-  ask_host(set, joints);
+  ask_host(set, joints, def.data);
 
   const size_t n = set.defs.size();
   set.state.resize(n), set.next.resize(n), set.velocity.assign(6 * n, 0.0), set.impulse.assign(6 * n, 0.0), set.revised.assign(6 * n, 0.0);

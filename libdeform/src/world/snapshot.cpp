@@ -46,6 +46,7 @@ uint64_t structure(const World &w) {
     }
     h.add(d.category), h.add(d.collides_with), h.add(o->name.data(), o->name.size()), h.add(o->material.data(), o->material.size());
     h.add(o->zone.friction);
+    if (o->added) h.add(o->rigid_body), h.add(o->local.position), h.add(o->local.rotation);
   }
   for (auto &set : w.rigid_sets) {
     h.add(set->host_name.data(), set->host_name.size()), h.add(set->njoint), h.add(uint64_t(set->extra.size()));

@@ -104,12 +104,16 @@ void World::make_rows() {
     state.area[i] = c.area;
   }
   if (!zone_table.empty()) set_zone_laws();
+  if (rigid_again) best_impulse.assign(rows.impulse.begin(), rows.impulse.end());
   rows.build(contacts, sources, {rigid_places, rigid_groups});
+  correct_rigids(*this);
   fill_responses(*this);
   tangents.resize(size_t(3) * n), match.resize(n);
   warm_start(store, contacts, h, rows, state, tangents.data(), match.data());
   rows.finish(contacts, tangents.data(), h, guard.planned, offset);
-  if (guard.resolving) guard_impulses(*this), guard_rates(*this);
+  if (guard.resolving) guard_impulses(*this);
+  if (!guard.kept.empty()) guard_rates(*this);
+  if (rigid_again) rows.impulse.assign(best_impulse.begin(), best_impulse.end());
   batches.gather(law_list, state);
 }
 
@@ -152,7 +156,7 @@ bool World::stage_solve(uint32_t *trouble) {
     if (bad || revision == kMostRevisions || rows.rigid.empty() || !revise_rigids(*this)) break;
     // A motor holds or lets go: the same problem with another response, from the impulses that were found.
     rows.finish(contacts, tangents.data(), h, guard.planned, offset);
-    if (guard.resolving) guard_rates(*this);
+    if (!guard.kept.empty()) guard_rates(*this);
     passes_before += passes, sweeps_before += sweeps, passes = sweeps = 0;
   }
   passes += passes_before, sweeps += sweeps_before;

@@ -101,7 +101,7 @@ void view_obstacles(World &w, double t, double h, double left) {
     const Obstacle &o = *w.obstacles[i];
     ObstacleView &v = w.obstacle_views[i];
     v.position = o.pose.position, v.rotation = o.pose.rotation;
-    v.velocity = v.spin = {};
+    v.velocity = v.spin = v.linear = {};
     if (o.has_target) {
       v.velocity = (1 / left) * (o.target.position - o.pose.position);
       v.spin = spin_between(o.pose.rotation, o.target.rotation, left);
@@ -134,7 +134,7 @@ void move_obstacles_by(World &w, double share) {
 }  // namespace
 
 Pose Obstacle::end_pose(double t, double h, double left) const {
-  if (rigid) return {load3(rigid->next[rigid_body].position), unit_quat(rigid->next[rigid_body].rotation)};
+  if (rigid) return shape_pose(*this, rigid->next[rigid_body]);
   if (!has_target) return moves() ? pose_at_time(t + h) : pose;
   const double s = h / left;
   return {pose.position + s * (target.position - pose.position), slerp(pose.rotation, target.rotation, s < 1 ? s : 1)};

@@ -126,6 +126,7 @@ void World::prepare() {
     facts.obstacles_move |= o.moves() || o.has_target;
     ObstacleView v{};
     v.slot = i, v.category = o.def.category, v.collides_with = o.def.collides_with, v.id = o.id, v.shape = Shape(o.def.shape);
+    if (v.shape == Shape::none) v.category = v.collides_with = 0;
     v.position = o.pose.position, v.rotation = o.pose.rotation, v.half_size = load3(o.def.half_size);
     v.radius = o.def.radius, v.half_length = o.def.half_length, v.belt = load3(o.def.velocity_surface);
     if (o.mesh) {
@@ -164,6 +165,7 @@ void World::prepare() {
         if (!is_body || i < j) filter.set(bodies[i]->id, id, !is_body, rule->collide);
         touch = rule->collide;
       }
+      if (!is_body && obstacle_views[j - nb].shape == Shape::none) touch = false;
       if (!touch) continue;
       if (is_body) facts.body_pairs += i < j;
       else ++facts.obstacle_pairs;

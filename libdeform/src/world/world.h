@@ -101,6 +101,8 @@ struct Obstacle {
   bool has_target = false;
   RigidSet *rigid = nullptr;         // a body of a rigid host: where it stands in `rigid`
   uint32_t rigid_body = 0;
+  bool added = false;                // a further shape of that body, at `local` in its frame
+  Pose local;
   bool moves() const { return !keys.empty() || def.sine.amplitude[0] != 0 || def.sine.amplitude[1] != 0 || def.sine.amplitude[2] != 0; }
   Array<double> points;              // mesh, voxels: as given, in its frame
   Array<uint32_t> triangles;
@@ -164,6 +166,7 @@ struct World {
   std::vector<ObstacleView> obstacle_views;
   std::vector<RigidPlace> rigid_places;                // by obstacle slot; empty without rigid bodies
   std::vector<uint32_t> rigid_groups;                  // bodies per group, all sets
+  bool rigid_again = false;                            // a host has answered, and the solve goes on from its last impulses
   std::vector<DofSource> sources;
   std::vector<ImpulseSink> sinks;
   BroadPhase broad;
@@ -237,6 +240,8 @@ struct World {
   bool stage_predict(uint32_t *trouble);
   bool stage_rigid_predict(uint32_t *trouble);         // rigid.cpp
   bool stage_rigid_commit(uint32_t *trouble);          // rigid.cpp: ends beside the present states, kept by keep_rigids()
+  bool ask_rigids(uint32_t *trouble);                  // rigid.cpp
+  int ask_rigid_ends(uint32_t *trouble);               // rigid.cpp
   void keep_rigids();                                  // rigid.cpp: once the sub-step is known to succeed
   void stage_gather();
   void stage_broad();

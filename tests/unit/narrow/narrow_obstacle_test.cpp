@@ -35,6 +35,26 @@ TEST(Plane, Surfels_HaveSignedDistanceAreaAndBelt) {
   for (const ContactPoint &k : scene.contacts()) EXPECT_NEAR(k.distance, 5e-4 - 0.1, 1e-15) << "from any depth";
 }
 
+// What sticks to a drum goes round with it at its own radius, not at the drum's; of a rigid body, what its host adds to its spin counts to first order only.
+TEST(Obstacles, Turn_IsToldAtTheBodysPoint) {
+  Scene scene;
+  scene.add(moved(box_mesh({1, 1, 1}, 2, 2, 2), {}, {0, 0, 1.0005}));
+  scene.add(Shape::sphere, {0, 0, 0}).radius = 0.5;
+  const auto velocity = [&](Vec3 spin, Vec3 linear) {
+    scene.obstacles[0].spin = spin, scene.obstacles[0].linear = linear;
+    Vec3 top{};
+    for (const ContactPoint &c : scene.contacts())
+      if (c.normal[2] == 1 && c.type_a == 0) top = load3(c.velocity);
+    return top;
+  };
+  const double w = 4, r = 0.5005, a = w * scene.h;
+  const Vec3 drum = velocity({0, w, 0}, {}), host = velocity({0, w, 0}, {0, w, 0});
+  EXPECT_NEAR(drum.x, r * std::sin(a) / scene.h, 1e-8);
+  EXPECT_NEAR(drum.z, r * (std::cos(a) - 1) / scene.h, 1e-8);
+  EXPECT_NEAR(host.x, r * w, 1e-15);
+  EXPECT_EQ(host.z, 0);
+}
+
 // Reach counts the motion of the shape, not the belt and not the spin of a ball about itself.
 TEST(Obstacles, Reach_CountsWhatMoves) {
   const auto count = [](Vec3 belt, Vec3 velocity, Vec3 spin) {

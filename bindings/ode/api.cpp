@@ -1,0 +1,188 @@
+#include <cmath>
+#include <cstring>
+#include <mutex>
+#include <new>
+
+#include "adapter.h"
+
+using namespace dfm_ode_detail;
+
+namespace {
+
+// Handles count up and are never used twice.
+struct Adapters {
+  std::mutex mutex;
+  std::unordered_map<dfm_ode, std::unique_ptr<Adapter>> all;
+  dfm_ode next = 1;
+};
+Adapters &adapters() {
+  static Adapters a;
+  return a;
+}
+
+Adapter *find(dfm_ode handle) {
+  Adapters &a = adapters();
+  std::lock_guard lock(a.mutex);
+  const auto at = a.all.find(handle);
+  return at == a.all.end() ? nullptr : at->second.get();
+}
+
+template <class F>
+dfm_status with(dfm_ode handle, F &&f) noexcept {
+  try {
+    Adapter *const a = find(handle);
+    if (!a) return failed(DFM_E_HANDLE, "ODE adapter %llu does not exist; it has been detached, or never was", static_cast<unsigned long long>(handle));
+    return f(*a);
+  } catch (const std::bad_alloc &) {
+    return dfm_fail(DFM_E_NOMEM, "ode: out of memory");
+  } catch (...) {
+    return dfm_fail(DFM_E_FATAL, "ode: an exception that should not be");
+  }
+}
+
+dfm_status missing(const char *what) { return failed(DFM_E_ARG, "argument '%s' is NULL", what); }
+
+bool same_version(const char *a, const char *b) { return a && std::strncmp(a, b, 5) == 0; }   // "0.16."
+
+dfm_status check_def(const dfm_ode_def &d) {
+  if (d.size < sizeof d) return failed(DFM_E_ARG, "dfm_ode_def: size is %u, expected %zu; start from dfm_ode_def_default()", d.size, sizeof d);
+  if (d.real_bytes != sizeof(dReal) || !same_version(d.version, dODE_VERSION))
+    return failed(DFM_E_UNSUPPORTED, "this program was compiled against ODE %s with a dReal of %u bytes, libdeform_ode against ODE %s with %zu; compile both against the same",
+                  d.version ? d.version : "?", d.real_bytes, dODE_VERSION, sizeof(dReal));
+  if (const dfm_status s = check_ode(); s != DFM_OK) return s;
+  if (!d.world) return missing("world");
+  if (!d.space) return missing("space");
+  if (d.flags & ~uint32_t{DFM_ODE_QUICK}) return failed(DFM_E_ARG, "dfm_ode_def: flags %u; only DFM_ODE_QUICK is known", d.flags);
+  if (!(d.friction >= 0 && std::isfinite(d.friction))) return failed(DFM_E_ARG, "dfm_ode_def: friction %g; it must not be negative", d.friction);
+  if (d.most_contacts < 1 || d.most_contacts > 64) return failed(DFM_E_ARG, "dfm_ode_def: most_contacts %u; between 1 and 64", d.most_contacts);
+  return DFM_OK;
+}
+
+}  // namespace
+
+dfm_ode_def dfm_ode_def_for(uint32_t real_bytes, const char *version) {
+  dfm_ode_def d{};
+  d.size = sizeof d, d.friction = 0.5, d.most_contacts = 8, d.real_bytes = real_bytes, d.version = version;
+  return d;
+}
+
+dfm_status dfm_ode_register(void) {
+  if (const dfm_status s = check_ode(); s != DFM_OK) return s;
+  return register_host();
+}
+
+dfm_status dfm_ode_attach(dfm_world world, const dfm_ode_def *def, dfm_ode *out) {
+  try {
+    if (!def) return missing("def");
+    if (!out) return missing("out");
+    if (const dfm_status s = check_def(*def); s != DFM_OK) return s;
+    if (const dfm_status s = register_host(); s != DFM_OK) return s;
+    uint32_t n = 0;
+    if (const dfm_status s = dfm_world_bodies(world, 0, nullptr, &n); s != DFM_OK) return s;
+    Adapters &a = adapters();
+    std::lock_guard lock(a.mutex);
+    for (auto &[handle, other] : a.all) {
+      if (other->ode_world() == def->world) return dfm_fail(DFM_E_STATE, "this dWorldID has an adapter already; dfm_ode_detach it first");
+      if (other->ode_space() == def->space) return dfm_fail(DFM_E_STATE, "this dSpaceID has an adapter already; dfm_ode_detach it first");
+    }
+    a.all.emplace(a.next, std::make_unique<Adapter>(world, *def));
+    *out = a.next++;
+    return DFM_OK;
+  } catch (const std::bad_alloc &) {
+    return dfm_fail(DFM_E_NOMEM, "ode: out of memory");
+  }
+}
+
+dfm_status dfm_ode_detach(dfm_ode ode) {
+  return with(ode, [&](Adapter &) {
+    std::unique_ptr<Adapter> gone;
+    Adapters &a = adapters();
+    std::lock_guard lock(a.mutex);
+    gone = std::move(a.all[ode]);
+    a.all.erase(ode);
+    return dfm_status{DFM_OK};
+  });
+}
+
+dfm_status dfm_ode_step(dfm_ode ode, double dt) {
+  return with(ode, [&](Adapter &a) {
+    if (!(dt > 0 && std::isfinite(dt))) return failed(DFM_E_ARG, "dt %g s; it must be positive", dt);
+    return a.step(dt);
+  });
+}
+
+dfm_status dfm_ode_trouble(dfm_ode ode, uint32_t *trouble) {
+  return with(ode, [&](Adapter &a) {
+    if (!trouble) return missing("trouble");
+    *trouble = a.trouble;
+    return dfm_status{DFM_OK};
+  });
+}
+
+dfm_status dfm_ode_get_stats(dfm_ode ode, dfm_ode_stats *out) {
+  return with(ode, [&](Adapter &a) {
+    if (!out) return missing("out");
+    *out = a.stats();
+    return dfm_status{DFM_OK};
+  });
+}
+
+dfm_status dfm_ode_obstacle(dfm_ode ode, dGeomID geom, dfm_obstacle *out) {
+  return with(ode, [&](Adapter &a) { return !geom ? missing("geom") : !out ? missing("out") : a.obstacle(geom, out); });
+}
+
+dfm_status dfm_ode_rigid(dfm_ode ode, dBodyID body, dfm_rigid *out) {
+  return with(ode, [&](Adapter &a) { return !body ? missing("body") : !out ? missing("out") : a.rigid(body, out); });
+}
+
+dfm_status dfm_ode_set_geom(dfm_ode ode, dGeomID geom, const dfm_ode_geom *props) {
+  return with(ode, [&](Adapter &a) { return !geom ? missing("geom") : !props ? missing("props") : a.set_geom(geom, *props); });
+}
+
+dfm_status dfm_ode_set_convex(dfm_ode ode, dGeomID geom, uint32_t npoint, const double *points, uint32_t npolygon, const uint32_t *polygons) {
+  return with(ode, [&](Adapter &a) {
+    if (!geom || !points || !polygons) return missing(!geom ? "geom" : !points ? "points" : "polygons");
+    std::string wrong;
+    Triangles t = convex_triangles(npoint, points, npolygon, polygons, wrong);
+    if (!wrong.empty()) return failed(DFM_E_ARG, "convex: %s", wrong.c_str());
+    return a.set_arrays(geom, dConvexClass, std::move(t));
+  });
+}
+
+dfm_status dfm_ode_set_heights(dfm_ode ode, dGeomID geom, double width, double depth, uint32_t nx, uint32_t nz, const double *heights) {
+  return with(ode, [&](Adapter &a) {
+    if (!geom || !heights) return missing(!geom ? "geom" : "heights");
+    if (nx < 2 || nz < 2 || !(width > 0) || !(depth > 0))
+      return failed(DFM_E_ARG, "heightfield: %u by %u samples over %g by %g m; at least 2 by 2 over a positive size", nx, nz, width, depth);
+    return a.set_arrays(geom, dHeightfieldClass, height_triangles(width, depth, nx, nz, heights));
+  });
+}
+
+dfm_status dfm_ode_refresh(dfm_ode ode, dGeomID geom) {
+  return with(ode, [&](Adapter &a) { return !geom ? missing("geom") : a.refresh(geom); });
+}
+
+dfm_status dfm_ode_snapshot(dfm_ode ode, void *buffer, size_t *bytes) {
+  return with(ode, [&](Adapter &a) { return !bytes ? missing("bytes") : a.snapshot(buffer, bytes); });
+}
+
+dfm_status dfm_ode_restore(dfm_ode ode, const void *buffer, size_t bytes) {
+  return with(ode, [&](Adapter &a) { return !buffer ? missing("buffer") : a.restore(buffer, bytes); });
+}
+
+dfm_status dfm_ode_set_friction(dfm_ode ode, dfm_context *context, const char *law, const dfm_params *params, double area) {
+  return with(ode, [&](Adapter &a) {
+    if (!law) return a.friction().clear_law(), dfm_status{DFM_OK};
+    return !context ? missing("context") : a.friction().set_law(context, law, params, area);
+  });
+}
+
+dfm_status dfm_ode_contact(dfm_ode ode, dGeomID a, dGeomID b, int *made) {
+  return with(ode, [&](Adapter &adapter) {
+    if (!a || !b) return missing(!a ? "a" : "b");
+    if (dGeomIsSpace(a) || dGeomIsSpace(b)) return failed(DFM_E_ARG, "a space is no geom; dSpaceCollide2 finds the geoms in it");
+    const int n = adapter.friction().collide(a, b, adapter.friction().h);
+    if (made) *made = n;
+    return dfm_status{DFM_OK};
+  });
+}

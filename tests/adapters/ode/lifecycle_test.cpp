@@ -1,0 +1,381 @@
+// What the caller does to ODE's world between two steps: things come, go, move, fall asleep, and soft bodies take notice.
+#include <gtest/gtest.h>
+
+#include "ode.h"
+
+namespace {
+
+using namespace test;
+
+double height(dfm_body b) { return measure(b).com[2]; }
+
+// A soft ball at rest on a rigid plate of 4 kg that a hinge-free column would not hold: it stands on ODE's plane.
+struct OnAPlate {
+  Ode ode;
+  dGeomID floor;
+  dBodyID plate;
+  dfm_body ball;
+  OnAPlate() {
+    set_friction(ode.soft, 0.8);
+    floor = dCreatePlane(ode.space, 0, 0, 1, 0);
+    plate = ode.box({0.2, 0.2, 0.05}, 4, {0, 0, 0.05});
+    ball = soft_ball(ode, {0, 0, 0.203}, {}, 3e4, 30);
+    ode.run(0.3);
+  }
+};
+
+}  // namespace
+
+TEST(OdeLifecycle, GeomDestroyedWhileTouched_EndsItsContacts) {
+  OnAPlate s;
+  ASSERT_GT(stats(s.ode.soft).contacts, 0u);
+  EXPECT_NEAR(height(s.ball), 0.19, 0.02);
+  dGeomDestroy(dBodyGetFirstGeom(s.plate));
+  s.ode.step();
+  EXPECT_EQ(s.ode.stats().bodies, 0u);
+  EXPECT_EQ(s.ode.stats().shapes, 1u);
+  s.ode.run(0.3);                          // down to the plane
+  EXPECT_LT(height(s.ball), 0.12);
+  EXPECT_GT(height(s.ball), 0.05);
+}
+
+TEST(OdeLifecycle, BodyDestroyedWhileTouched_LeavesItsGeomInTheWorld) {
+  OnAPlate s;
+  const dGeomID g = dBodyGetFirstGeom(s.plate);
+  dBodyDestroy(s.plate);
+  s.ode.run(0.1);
+  EXPECT_EQ(s.ode.stats().bodies, 0u);
+  EXPECT_EQ(s.ode.stats().shapes, 2u);
+  EXPECT_NEAR(height(s.ball), 0.19, 0.02);   // ODE's rule: a geom without a body stands where it is
+  dGeomDestroy(g);
+  s.ode.run(0.25);
+  EXPECT_LT(height(s.ball), 0.12);
+}
+
+// A body and a geom at the addresses of destroyed ones are new ones.
+TEST(OdeLifecycle, ReplacedBody_IsANewOne) {
+  Ode ode({0, 0, 0});
+  for (int i = 0; i < 20; ++i) {
+    const dBodyID b = ode.ball(0.1 + 0.01 * i, 1 + i, {double(i), 0, 0}, {0, 0, 1});
+    ode.step();
+    EXPECT_EQ(ode.stats().bodies, 1u);
+    EXPECT_NEAR(position(b)[2], 1e-3, 1e-15);
+    dfm_rigid r = 0;
+    ok(dfm_ode_rigid(ode.adapter, b, &r));
+    EXPECT_EQ(rigid_measure(r).mass, 1.0 + i);
+    dGeomDestroy(dBodyGetFirstGeom(b));
+    dBodyDestroy(b);
+  }
+}
+
+TEST(OdeLifecycle, GeomsThatComeAndChange_AreSeenInTheNextStep) {
+  Ode ode;
+  const dfm_body ball = soft_ball(ode, {0, 0, 0.15}, {}, 3e4, 30);
+  const dGeomID box = dCreateBox(ode.space, 1, 1, 0.02);
+  ode.run(0.1);
+  EXPECT_GT(height(ball), 0.08);
+  dGeomBoxSetLengths(box, 1, 1, 0.06);     // thicker by 2 cm on each side, at once: pushed out
+  ode.run(0.5);
+  EXPECT_GT(height(ball), 0.11);
+  dGeomSetPosition(box, 5, 0, -1);         // gone
+  dGeomDestroy(box);
+  ode.run(0.1);
+  EXPECT_LT(height(ball), 0.1);
+}
+
+TEST(OdeLifecycle, KinematicBody_LiftsAndFeelsNothing) {
+  Ode ode;
+  const dBodyID lift = ode.box({0.2, 0.2, 0.05}, 1, {0, 0, -0.05});
+  dBodySetKinematic(lift), dBodySetLinearVel(lift, 0, 0, 0.1);
+  const dfm_body ball = soft_ball(ode, {0, 0, 0.101}, {0, 0, 0.1}, 3e4, 30);
+  ode.run(0.8);
+  EXPECT_NEAR(position(lift)[2], -0.05 + 0.08, 1e-12);
+  EXPECT_NEAR(measure(ball).velocity[2], 0.1, 0.01);
+  EXPECT_GT(height(ball), 0.15);
+  dBodySetDynamic(lift);
+  ode.run(0.1);
+  EXPECT_LT(velocity(lift)[2], -0.5);      // falls, with the ball
+}
+
+// A kinematic body that the caller moves without a velocity, as a geom without a body: the surface comes along within the step.
+TEST(OdeLifecycle, GeomMovedByHand_CarriesByFriction) {
+  Ode ode;
+  set_friction(ode.soft, 0.9);
+  const dGeomID belt = dCreateBox(ode.space, 2, 0.6, 0.1);
+  dGeomSetPosition(belt, 0, 0, -0.05);
+  const dfm_body ball = soft_ball(ode, {0, 0, 0.1}, {}, 3e4, 0);
+  ode.run(0.2);
+  for (int i = 1; i <= 400; ++i) dGeomSetPosition(belt, 0.5 * 0.5e-3 * 1e-3 * i * i, 0, -0.05), ode.step();   // 0.5 m/s2
+  EXPECT_GT(measure(ball).velocity[0], 0.02);
+  const dfm_obstacle none = 0;
+  dfm_obstacle o = none;
+  ok(dfm_ode_obstacle(ode.adapter, belt, &o));
+  dfm_pose pose;
+  ok(dfm_obstacle_get_pose(o, &pose));
+  EXPECT_NEAR(pose.position[0], dGeomGetPosition(belt)[0], 1e-15);
+}
+
+TEST(OdeLifecycle, BodyMovedByHand_IsThereAtOnce) {
+  OnAPlate s;
+  dBodySetPosition(s.plate, 3, 0, 0.05);
+  dBodySetLinearVel(s.plate, 0, 0, 0);
+  s.ode.run(0.02);
+  EXPECT_NEAR(position(s.plate)[0], 3, 1e-3);
+  EXPECT_EQ(stats(s.ode.soft).contacts, 0u);
+  s.ode.run(0.25);
+  EXPECT_LT(height(s.ball), 0.12);
+}
+
+TEST(OdeLifecycle, DisabledBody_StandsUntilSomethingMeetsIt) {
+  Ode ode;
+  const dBodyID box = ode.box({0.1, 0.1, 0.1}, 1, {0, 0, 0});
+  dBodyDisable(box);
+  const dfm_body ball = soft_ball(ode, {0, 0, 0.25}, {}, 3e4);
+  ode.run(0.05);
+  EXPECT_EQ(position(box)[2], 0);          // hangs in the air, as ODE has it
+  EXPECT_FALSE(dBodyIsEnabled(box));
+  ode.run(0.15);
+  EXPECT_TRUE(dBodyIsEnabled(box));
+  EXPECT_LT(velocity(box)[2], -0.1);
+  EXPECT_LT(height(ball), 0.2);
+}
+
+// It stands still in the solve, and its load and weight are in balance: nothing wakes it until that changes.
+TEST(OdeLifecycle, DisabledBoxOnASoftBed_WakesWhenItsLoadChanges) {
+  Ode ode;
+  soft_bed(ode);
+  const dBodyID box = ode.box({0.08, 0.08, 0.05}, 2, {0.15, 0.15, 0.152});
+  ode.run(1);
+  dBodyDisable(box);
+  const double rest = position(box)[2];
+  dfm_rigid rigid = 0;
+  ok(dfm_ode_rigid(ode.adapter, box, &rigid));
+  double force[3], moment[3];
+  ode.run(0.3);
+  EXPECT_FALSE(dBodyIsEnabled(box));
+  EXPECT_EQ(position(box)[2], rest);
+  ok(dfm_rigid_contact_wrench(rigid, force, moment));
+  EXPECT_NEAR(force[2], 2 * 9.81, 0.01 * 2 * 9.81);
+  soft_ball(ode, {0.15, 0.15, rest + 0.17}, {0, 0, -1});
+  ode.run(0.06);
+  EXPECT_TRUE(dBodyIsEnabled(box));
+  EXPECT_LT(position(box)[2], rest - 1e-4);
+}
+
+// ODE lets only bodies with joints fall asleep: here those of the contact with its plane. What they carried goes on being carried.
+TEST(OdeLifecycle, AutoDisabledPlate_SleepsUnderABallAndWakesWithoutIt) {
+  Ode ode;
+  dWorldSetAutoDisableFlag(ode.world, 1), dWorldSetAutoDisableSteps(ode.world, 20), dWorldSetAutoDisableTime(ode.world, 0);
+  set_friction(ode.soft, 0.8);
+  dCreatePlane(ode.space, 0, 0, 1, 0);
+  const dBodyID plate = ode.box({0.2, 0.2, 0.05}, 4, {0, 0, 0.05});
+  const dfm_body ball = soft_ball(ode, {0, 0, 0.203}, {}, 3e4, 30);
+  ode.run(1);
+  EXPECT_FALSE(dBodyIsEnabled(plate));
+  dfm_rigid rigid = 0;
+  ok(dfm_ode_rigid(ode.adapter, plate, &rigid));
+  double force[3], moment[3];
+  ok(dfm_rigid_contact_wrench(rigid, force, moment));
+  EXPECT_NEAR(force[2], -measure(ball).mass * 9.81, 0.02 * measure(ball).mass * 9.81);
+  ode.run(0.3);
+  EXPECT_FALSE(dBodyIsEnabled(plate));
+  ok(dfm_body_destroy(ball));
+  bool woke = false;
+  for (int i = 0; i < 50; ++i) ode.step(), woke |= bool(dBodyIsEnabled(plate));
+  EXPECT_TRUE(woke);
+}
+
+// What hangs on something awake does not sleep, idle as it is: asleep it would stand still in the solve while ODE moves it without its load.
+TEST(OdeLifecycle, PlateWithASwingingPendulum_StaysAwakeUntilThatHangsStill) {
+  Ode ode;
+  dWorldSetAutoDisableFlag(ode.world, 1), dWorldSetAutoDisableSteps(ode.world, 20), dWorldSetAutoDisableTime(ode.world, 0);
+  dCreatePlane(ode.space, 0, 0, 1, 0);
+  const dBodyID plate = ode.box({0.2, 0.2, 0.05}, 4, {0, 0, 0.05}), bob = ode.body(0.01, {1e-5, 1e-5, 1e-5}, {0.3, 0.03, -0.1});
+  soft_ball(ode, {0, 0, 0.203}, {}, 3e4, 30);
+  const dJointID hinge = dJointCreateHinge(ode.world, nullptr);
+  dJointAttach(hinge, plate, bob), dJointSetHingeAnchor(hinge, 0.3, 0, 0.05), dJointSetHingeAxis(hinge, 1, 0, 0);
+  for (int i = 0; i < 800; ++i) {
+    ode.step();
+    ASSERT_TRUE(dBodyIsEnabled(plate) && dBodyIsEnabled(bob)) << i;
+  }
+  dBodySetAngularDamping(bob, 0.2), dBodySetAngularDampingThreshold(bob, 0);
+  ode.run(1);
+  EXPECT_FALSE(dBodyIsEnabled(plate));
+  EXPECT_FALSE(dBodyIsEnabled(bob));
+}
+
+// A sleeping plate that a soft ball leans on is struck by a rigid one: in that very sub-step it takes the impulses of both.
+TEST(OdeLifecycle, SleepingPlateStruckByARigidBall_IsAwakeInTheSolveAtOnce) {
+  Ode ode({0, 0, 0});
+  const dfm_body ball = soft_ball(ode, {0, 0, 0}, {0, 0, -0.005});
+  const double low = lowest(ball);
+  const dBodyID plate = ode.box({0.2, 0.2, 0.05}, 4, {0, 0, low - 0.0502});
+  const dBodyID striker = ode.ball(0.05, 3, {0.1, 0, low - 0.2302}, {0, 0, 1});
+  dBodyDisable(plate);
+  for (int i = 0; i < 200 && !dBodyIsEnabled(plate); ++i) {
+    Momenta start, end;
+    add(start, ball), add(start, plate), add(start, striker);
+    ode.step();
+    if (!dBodyIsEnabled(plate)) continue;
+    add(end, ball), add(end, plate), add(end, striker);
+    dfm_rigid rigid = 0;
+    ok(dfm_ode_rigid(ode.adapter, plate, &rigid));
+    double force[3], moment[3];
+    ok(dfm_rigid_contact_wrench(rigid, force, moment));
+    EXPECT_LT(force[2], 0);
+    EXPECT_GT(velocity(plate)[2], 0.1);
+    EXPECT_LT(apart(start.linear, end.linear), 1e-14 * start.size);
+  }
+  EXPECT_TRUE(dBodyIsEnabled(plate));
+}
+
+// The forces that a body has when dfm_ode_step is called act over all of its sub-steps.
+TEST(OdeLifecycle, ForcesOfTheCaller_ActOverTheWholeStep) {
+  Ode ode({0, 0, 0});
+  soft_ball(ode, {5, 0, 0}, {}, 1e6);
+  const dBodyID free = ode.ball(0.1, 2, {0, 0, 0}), other = ode.body(2, {1, 1, 1}, {1, 0, 0});
+  const dJointID tie = dJointCreateFixed(ode.world, nullptr);
+  dJointAttach(tie, free, other), dJointSetFixed(tie);
+  dBodyAddForce(free, 3, 0, 0), dBodyAddForce(other, 1, 0, 0);   // `other` has no geom: it is known through the joint
+  ode.step(0.02);
+  ASSERT_GT(stats(ode.soft).last_substeps, 5u);
+  EXPECT_NEAR(velocity(free)[0], 0.02, 1e-9);
+  EXPECT_NEAR(velocity(other)[0], 0.02, 1e-9);
+  ode.step(0.02);
+  EXPECT_NEAR(velocity(free)[0], 0.02, 1e-9);
+}
+
+TEST(OdeLifecycle, MassOfALiveBody_CountsFromTheNextStep) {
+  Ode ode({0, 0, 0});
+  const dBodyID b = ode.ball(0.1, 1, {0, 0, 0});
+  const dfm_body ball = soft_ball(ode, {0, 0, 0.205}, {0, 0, -1});
+  ode.step();
+  dMass m;
+  dMassSetSphereTotal(&m, 50, 0.1);
+  dBodySetMass(b, &m);
+  Momenta start, end;
+  add(start, ball), add(start, b);
+  ode.run(0.1);
+  add(end, ball), add(end, b);
+  EXPECT_LT(velocity(b)[2], -0.05);
+  EXPECT_LT(apart(start.linear, end.linear), 1e-12 * start.size);
+}
+
+// A restored world goes on as it did the first time, and takes ODE's bodies with it.
+TEST(OdeLifecycle, Restore_TakesTheBodiesBack) {
+  Ode ode;
+  soft_bed(ode);
+  const dBodyID box = ode.box({0.08, 0.08, 0.05}, 2, {0.15, 0.15, 0.17});
+  dBodySetAngularVel(box, 0.3, 1, 0.2);
+  ode.run(0.2);
+  size_t bytes = 0;
+  ok(dfm_world_snapshot(ode.soft, nullptr, &bytes));
+  std::vector<unsigned char> shot(bytes);
+  ok(dfm_world_snapshot(ode.soft, shot.data(), &bytes));
+  ode.run(0.1);
+  const uint64_t hash = dfm_world_hash(ode.soft);
+  const Vec there = position(box);
+  ok(dfm_world_restore(ode.soft, shot.data(), bytes));
+  ode.run(0.1);
+  EXPECT_EQ(dfm_world_hash(ode.soft), hash);
+  EXPECT_EQ(position(box), there);
+}
+
+// Auto-disable counts in the state that is restored: the plate falls asleep at the same step again, and one that slept sleeps.
+TEST(OdeLifecycle, Restore_TakesSleepAndItsCountersBack) {
+  Ode ode;
+  dWorldSetAutoDisableFlag(ode.world, 1), dWorldSetAutoDisableSteps(ode.world, 40), dWorldSetAutoDisableTime(ode.world, 0);
+  set_friction(ode.soft, 0.8);
+  dCreatePlane(ode.space, 0, 0, 1, 0);
+  const dBodyID plate = ode.box({0.2, 0.2, 0.05}, 4, {0, 0, 0.05});
+  soft_ball(ode, {0, 0, 0.203}, {}, 3e4, 30);
+  const auto take = [&](std::vector<unsigned char> &shot) {
+    size_t bytes = 0;
+    ok(dfm_world_snapshot(ode.soft, nullptr, &bytes));
+    shot.resize(bytes);
+    ok(dfm_world_snapshot(ode.soft, shot.data(), &bytes));
+  };
+  std::vector<unsigned char> before, awake, asleep;
+  int fell = 0;
+  take(before);
+  for (; dBodyIsEnabled(plate) && fell < 2000; ++fell) before.swap(awake), ode.run(0.01), take(before);
+  ASSERT_LT(fell, 2000);
+  asleep = before;
+  ode.run(0.02);
+  const uint64_t hash = dfm_world_hash(ode.soft);
+  for (const bool slept : {false, true}) {
+    const std::vector<unsigned char> &shot = slept ? asleep : awake;
+    dBodyEnable(plate);                    // whatever ODE's bodies are at
+    ok(dfm_world_restore(ode.soft, shot.data(), shot.size()));
+    ode.run(slept ? 0.02 : 0.03);
+    EXPECT_FALSE(dBodyIsEnabled(plate));
+    EXPECT_EQ(dfm_world_hash(ode.soft), hash);
+  }
+}
+
+// A body without a geom is not the dfm_world's; the adapter's snapshot has it, with dWorldQuickStep's random order.
+TEST(OdeLifecycle, SnapshotOfTheAdapter_HasBodiesWithoutGeomsToo) {
+  Ode ode({0, 0, -9.81}, DFM_ODE_QUICK);
+  soft_bed(ode);
+  const dBodyID box = ode.box({0.08, 0.08, 0.05}, 2, {0.15, 0.15, 0.16}), weight = ode.body(0.5, {1e-3, 1e-3, 1e-3}, {0.15, 0.2, 0.3});
+  const dJointID hinge = dJointCreateHinge(ode.world, nullptr);
+  dJointAttach(hinge, box, weight), dJointSetHingeAnchor(hinge, 0.15, 0.15, 0.25), dJointSetHingeAxis(hinge, 1, 0, 0);
+  ode.run(0.1);
+  size_t bytes = 0;
+  ok(dfm_ode_snapshot(ode.adapter, nullptr, &bytes));
+  std::vector<unsigned char> shot(bytes);
+  size_t few = bytes - 1;
+  EXPECT_EQ(dfm_ode_snapshot(ode.adapter, shot.data(), &few), DFM_E_ARG);
+  EXPECT_EQ(few, bytes);
+  ok(dfm_ode_snapshot(ode.adapter, shot.data(), &bytes));
+  ode.run(0.1);
+  const uint64_t hash = dfm_world_hash(ode.soft);
+  const Vec there = position(weight);
+  ok(dfm_ode_restore(ode.adapter, shot.data(), shot.size()));
+  EXPECT_GT(apart(position(weight), there), 1e-3);
+  ode.run(0.1);
+  EXPECT_EQ(dfm_world_hash(ode.soft), hash);
+  EXPECT_EQ(position(weight), there);
+  for (const size_t wrong : {size_t{0}, size_t{40}, bytes - 8, bytes - 1}) EXPECT_EQ(dfm_ode_restore(ode.adapter, shot.data(), wrong), DFM_E_FORMAT) << wrong;
+  EXPECT_EQ(position(weight), there);
+  shot[60] ^= 1;
+  EXPECT_EQ(dfm_ode_restore(ode.adapter, shot.data(), bytes), DFM_E_FORMAT);
+  EXPECT_EQ(position(weight), there);
+}
+
+TEST(OdeLifecycle, PlainWorldStep_IsRefused) {
+  Ode ode;
+  ode.ball(0.1, 1, {0, 0, 1});
+  ode.step();
+  uint32_t trouble = 0;
+  EXPECT_LT(dfm_world_step(ode.soft, 1e-3, &trouble), 0);
+  EXPECT_TRUE(trouble & DFM_TROUBLE_PLUGIN);
+  EXPECT_NE(std::string(dfm_last_error()).find("dfm_ode_step"), std::string::npos) << dfm_last_error();
+  ode.step();
+}
+
+TEST(OdeLifecycle, WrongUse_IsOneSentence) {
+  Ode ode;
+  dfm_ode second = 0;
+  dfm_ode_def d = dfm_ode_def_default();
+  const auto refused = [&](dfm_status expected, const char *word) {
+    EXPECT_EQ(dfm_ode_attach(ode.soft, &d, &second), expected);
+    EXPECT_NE(std::string(dfm_last_error()).find(word), std::string::npos) << dfm_last_error();
+  };
+  refused(DFM_E_ARG, "world");
+  d.world = ode.world;
+  refused(DFM_E_ARG, "space");
+  d.space = ode.space;
+  refused(DFM_E_STATE, "adapter already");
+  d.real_bytes = 4;
+  refused(DFM_E_UNSUPPORTED, "4 bytes");
+  d.real_bytes = 8, d.version = "0.13.1";
+  refused(DFM_E_UNSUPPORTED, "0.13.1");
+  d.version = dODE_VERSION, d.most_contacts = 0;
+  refused(DFM_E_ARG, "most_contacts");
+  EXPECT_EQ(dfm_ode_step(ode.adapter, 0), DFM_E_ARG);
+  EXPECT_EQ(dfm_ode_step(12345, 1e-3), DFM_E_HANDLE);
+  EXPECT_EQ(dfm_ode_detach(0), DFM_E_HANDLE);
+  dfm_rigid r = 0;
+  EXPECT_EQ(dfm_ode_rigid(ode.adapter, ode.body(1, {1, 1, 1}), &r), DFM_E_ARG);
+}
