@@ -124,4 +124,30 @@ TEST(Elementary, Bits_MatchTheRecordedHash) {
   EXPECT_EQ(hash.value, 849428759766298756ull);
 }
 
+TEST(Elementary, SineAndCosineOfPi_AreBelowTwoUlp) {
+  std::mt19937_64 random(5);
+  const long double pi = 3.14159265358979323846264338327950288L;
+  for (double reach : {1e-12, 0.1, 0.5, 1.0, 30.0}) {
+    std::uniform_real_distribution<double> x(-reach, reach);
+    // the distance to the nearest even integer is exact, and so is the reduction to a quarter turn
+    const auto near = [](double a) { return static_cast<long double>(a) - 2 * std::round(static_cast<long double>(a) / 2); };
+    const auto sine = [&](long double t) { return t > 0.5L ? std::sin(pi * (1 - t)) : t < -0.5L ? -std::sin(pi * (1 + t)) : std::sin(pi * t); };
+    EXPECT_LT(worst(dfm_sinpi, [&](double a) { return sine(near(a)); }, [&] { return x(random); }, 200000), 1.7) << reach;
+    EXPECT_LT(worst(dfm_cospi, [&](double a) { return sine(0.5L - std::fabs(near(a))); }, [&] { return x(random); }, 200000), 1.7) << reach;
+  }
+}
+
+TEST(Elementary, SineAndCosineOfPiAtTheEnds_AreExact) {
+  for (double n : {0.0, 1.0, 2.0, -3.0, 1e15, 4503599627370497.0, 9007199254740994.0, 1e300}) {
+    EXPECT_EQ(dfm_sinpi(n), 0.0) << n;
+    EXPECT_EQ(std::fabs(dfm_cospi(n)), 1.0) << n;
+  }
+  EXPECT_EQ(dfm_cospi(4503599627370497.0), -1.0);
+  EXPECT_EQ(dfm_cospi(-1.0), -1.0);
+  EXPECT_EQ(dfm_sinpi(0.5), 1.0);
+  EXPECT_EQ(dfm_sinpi(-1.5), 1.0);
+  EXPECT_EQ(dfm_cospi(0.5), 0.0);
+  EXPECT_TRUE(std::isnan(dfm_sinpi(kInf)) && std::isnan(dfm_cospi(-kInf)) && std::isnan(dfm_sinpi(std::nan(""))));
+}
+
 }  // namespace

@@ -1,0 +1,196 @@
+// Laws whose memory is one elastic bristle per contact: dahl, lugre, elastoplastic. One idea behind them: the tangential displacement is an
+// elastic part z, kept as a vector in the tangent plane, and a plastic rest that flows against it at the rate m (m/s) that the law chooses,
+//
+//   dz/dt = v - (K0 m / g) z,        F = K0 z + K1 dz/dt + K2 v,        ft = -F                         K0 = sigma0 A, K1 = sigma1 A, K2 = sigma2 A
+//
+// g(w) the Stribeck level (N), w = |v|. LuGre and Dahl: m = w (Canudas de Wit et al. 1995, (1)-(3); Dahl 1976); elastoplastic: m = alpha M.
+// One step of length h is an implicit radial return at the new slip and the new normal force (friction.md U2), after the old bristle has been
+// brought into the new cone, z0 = z min(1, F_S / |K0 z|), which only lowers the stored energy K0 |z|^2 / 2:
+//
+//   zt = z0 + h v,   D = g + h K0 m,   z' = zt g/D,   dz/dt = (g v - K0 m z0)/D
+//
+// Nothing divides by w, fn or h, so rest, open contacts and h = 0 are points like any other. With the total derivatives dm/dv and dm/dfn,
+//
+//   dz'/dv  = h [ (g/D) 1 - (K0/D^2) zt (g dm/dv - m dg/dv)^T ]
+//   dz'/dfn = (g/D) dz0/dfn + (h K0/D^2) zt (m dg/dfn - g dm/dfn),      dz0/dfn = z0/fn where the old bristle was cut, else 0
+//
+// and those of dz/dt are the same over h less dz0. Any m >= 0 is dissipative: V = K0 |z|^2/2 gives (K0 z).v - V' = K0 m K0 |z|^2/g. The micro-damping
+// is passive for every y = K0 z iff K1^2 w <= 4 g (K1 + K2); the default K1 / (1 + K1 w/(4 g)) meets that with any parameters.
+#pragma once
+#include "curve.h"
+
+namespace bristle {
+
+using lanes::kLanes;
+using lanes::within;
+
+enum Form { kPassive, kConstant, kFalling };
+
+// mu_s = mu_c: no Stribeck curve. sigma1 = 0: no micro-damping.
+struct Batch { double h, mu_c, mu_s, v_s, delta, sigma0, sigma1; int form; double v_d, sigma2; };
+
+constexpr double kLeast = 1e-140, kMost = 1e140;  // N: a smaller normal force counts as none; the square of a greater one has no double
+constexpr double kFar = 1e100;                    // m/s and m: greater ones count as this
+constexpr double kWide = 1e20;                    // m^2
+
+// A block of eight contacts on its way through the passes.
+struct Block {
+  double poison[kLanes], fn[kLanes], k0[kLanes], k1[kLanes], k2[kLanes];
+  double vx[kLanes], vy[kLanes], w[kLanes], by_w[kLanes];   // by_w = 1/w, held at its value for 1e-140 m/s below it
+  double zx[kLanes], zy[kLanes], cut[kLanes];       // z0, and 1/fn where the cone cut the old bristle, else 0
+  double mu[kLanes], g[kLanes], fall[kLanes];       // g = mu fn, fall = w g'(w)
+  double ex[kLanes], ey[kLanes];                    // v/w, 0 at rest
+  double m[kLanes], mx[kLanes], my[kLanes], mn[kLanes];   // plastic rate and its total derivatives by v and fn
+};
+
+// Where the columns of eight contacts lie. An output that is not wanted points to a spare column.
+struct Columns {
+  double *fx, *fy, *zx, *zy, *xx, *xy, *yx, *yy, *nx, *ny, *limit, *stored;
+  uint8_t *mode;
+};
+
+inline void load(const Batch &p, const dfm_friction_in *in, size_t at, Block &b) {
+  const size_t stride = in->stride;
+  const double *fn = in->fn + at, *vx = in->vt + at, *vy = vx + stride, *zx = in->state + at, *zy = zx + stride, *area = in->area + at;
+  double cuts = 0, size2[kLanes];
+  for (uint32_t i = 0; i < kLanes; ++i) {
+    // 0 where every input is finite, NaN otherwise: no output of a bad lane passes for a good one.
+    b.poison[i] = ((0.0 * fn[i] + 0.0 * vx[i]) + (0.0 * vy[i] + 0.0 * zx[i])) + (0.0 * zy[i] + 0.0 * area[i]);
+    const double touches = fn[i] > kLeast ? fn[i] : 0.0, a = area[i] > 0 ? area[i] : 0.0, A = a < kWide ? a : kWide;
+    b.fn[i] = touches < kMost ? touches : kMost;
+    b.k0[i] = p.sigma0 * A, b.k1[i] = p.sigma1 * A, b.k2[i] = p.sigma2 * A;
+    const double x = within(vx[i], kFar), y = within(vy[i], kFar), square = x * x + y * y, moves = square > kLeast * kLeast ? 1.0 : 0.0;
+    b.vx[i] = x * moves, b.vy[i] = y * moves, b.w[i] = std::sqrt(square * moves);
+    b.by_w[i] = 1.0 / (b.w[i] > kLeast ? b.w[i] : kLeast);
+    b.ex[i] = b.vx[i] * b.by_w[i], b.ey[i] = b.vy[i] * b.by_w[i];
+    const double keeps = touches > 0 ? 1.0 : 0.0;
+    b.zx[i] = keeps * within(zx[i], kFar), b.zy[i] = keeps * within(zy[i], kFar), b.cut[i] = 0.0;
+    const double px = b.k0[i] * b.zx[i], py = b.k0[i] * b.zy[i], cone = p.mu_s * b.fn[i];
+    size2[i] = px * px + py * py;
+    cuts += size2[i] > cone * cone ? 1.0 : 0.0;
+  }
+  if (!(cuts > 0)) return;
+  for (uint32_t i = 0; i < kLanes; ++i) {
+    const double cone = p.mu_s * b.fn[i], outside = size2[i] > cone * cone ? 1.0 : 0.0;
+    const double inverse = 1.0 / std::sqrt(outside > 0 ? size2[i] : 1.0), scale = outside > 0 ? cone * inverse : 1.0;
+    b.zx[i] *= scale, b.zy[i] *= scale;
+    b.cut[i] = outside / (b.fn[i] > 0 ? b.fn[i] : kMost);
+  }
+}
+
+inline void level(const Batch &p, Block &b) {
+  double excess[kLanes], slope[kLanes];
+  if (p.mu_s != p.mu_c) {
+    lanes::curve(p.v_s, p.delta, b.w, excess, slope);
+    for (uint32_t i = 0; i < kLanes; ++i) {
+      b.mu[i] = b.fn[i] > 0 ? p.mu_c + (p.mu_s - p.mu_c) * excess[i] : 0.0;
+      b.g[i] = b.mu[i] * b.fn[i];
+      b.fall[i] = (p.mu_s - p.mu_c) * b.fn[i] * slope[i];
+    }
+  } else {
+    for (uint32_t i = 0; i < kLanes; ++i) b.mu[i] = b.fn[i] > 0 ? p.mu_c : 0.0, b.g[i] = p.mu_c * b.fn[i], b.fall[i] = 0.0;
+  }
+}
+
+// The plastic rate of Dahl (exponent 1) and LuGre: every motion slips.
+inline void all_slips(const Batch &, Block &b) {
+  for (uint32_t i = 0; i < kLanes; ++i) b.m[i] = b.w[i], b.mx[i] = b.ex[i], b.my[i] = b.ey[i], b.mn[i] = 0.0;
+}
+
+// Micro-damping at the speed w: its value, w times its slope, and its derivative by fn.
+inline void damping(const Batch &p, const Block &b, double *k1, double *slope, double *by_fn) {
+  if (p.form == kPassive) {
+    for (uint32_t i = 0; i < kLanes; ++i) {
+      const double level4 = 4.0 * b.g[i], kw = b.k1[i] * b.w[i], sum = level4 + kw, inverse = 1.0 / (sum > kLeast ? sum : kLeast);
+      const double share = level4 * inverse, rest = kw * inverse;  // K1e = K1 share; at g = w = 0 a limit of no interest: nothing touches
+      k1[i] = b.k1[i] * share;
+      slope[i] = -4.0 * b.k1[i] * rest * ((b.g[i] - b.fall[i]) * inverse);
+      by_fn[i] = 4.0 * b.k1[i] * rest * (b.mu[i] * inverse);
+    }
+  } else if (p.form == kConstant) {
+    for (uint32_t i = 0; i < kLanes; ++i) k1[i] = b.k1[i], slope[i] = by_fn[i] = 0.0;
+  } else {
+    double s[kLanes];
+    lanes::curve(p.v_d, 2.0, b.w, s, slope);
+    for (uint32_t i = 0; i < kLanes; ++i) k1[i] = b.k1[i] * s[i], slope[i] *= b.k1[i], by_fn[i] = 0.0;
+  }
+}
+
+template <bool kDamped>
+void answer(const Batch &p, const Block &b, const double *k1, const double *k1_slope, const double *k1_fn, const Columns &to) {
+  double mode[kLanes];
+  for (uint32_t i = 0; i < kLanes; ++i) {
+    const double k0 = b.k0[i], hk = p.h * k0, g = b.g[i], m = b.m[i], vx = b.vx[i], vy = b.vy[i], z0x = b.zx[i], z0y = b.zy[i];
+    const double sum = g + hk * m, divisor = sum > kLeast * 1e-10 ? sum : kLeast * 1e-10, poison = b.poison[i];
+    const double q = g / divisor, inverse = 1.0 / divisor;   // q itself: at rest it is 1 to the bit, and a bristle that holds does not fade
+    const double tx = z0x + p.h * vx, ty = z0y + p.h * vy, zx = tx * q, zy = ty * q;
+    // dm and dg times what they share
+    const double fe = m * inverse * b.fall[i] * b.by_w[i];
+    const double gx = q * b.mx[i] - fe * b.ex[i], gy = q * b.my[i] - fe * b.ey[i];
+    const double cx = k0 * inverse * tx, cy = k0 * inverse * ty;
+    const double xx = q - cx * gx, xy = -(cx * gy), yx = -(cy * gx), yy = q - cy * gy;   // (dz'/dv)/h = d(dz/dt)/dv
+    const double pn = m * b.mu[i] * inverse - q * b.mn[i], ox = b.cut[i] * z0x, oy = b.cut[i] * z0y, fade = k0 * m * inverse;
+    const double nx = q * ox + p.h * (cx * pn), ny = q * oy + p.h * (cy * pn);
+    const double cone = p.mu_s * b.fn[i], k2 = b.fn[i] > 0 ? b.k2[i] : 0.0;
+    double fx = k0 * zx + k2 * vx, fy = k0 * zy + k2 * vy, fnx = k0 * nx, fny = k0 * ny, most = cone + k2 * b.w[i];
+    double dxx = hk * xx + k2, dxy = hk * xy, dyx = hk * yx, dyy = hk * yy + k2;
+    if (kDamped) {
+      const double k = k1[i], rx = (g * vx - k0 * m * z0x) * inverse, ry = (g * vy - k0 * m * z0y) * inverse;   // dz/dt
+      fx += k * rx, fy += k * ry;
+      const double s = k1_slope[i] * b.by_w[i];
+      dxx += k * xx + s * (rx * b.ex[i]), dxy += k * xy + s * (rx * b.ey[i]), dyx += k * yx + s * (ry * b.ex[i]), dyy += k * yy + s * (ry * b.ey[i]);
+      fnx += k * (cx * pn - fade * ox) + k1_fn[i] * rx, fny += k * (cy * pn - fade * oy) + k1_fn[i] * ry;
+      most += k * b.w[i] * ((g + cone) * inverse);
+    }
+    const double trial2 = (k0 * tx) * (k0 * tx) + (k0 * ty) * (k0 * ty), touches = b.fn[i] > 0 ? 1.0 : 0.0;
+    mode[i] = touches + (trial2 > g * g ? touches : 0.0);
+    to.fx[i] = poison - fx, to.fy[i] = poison - fy, to.zx[i] = zx + poison, to.zy[i] = zy + poison;
+    to.xx[i] = poison - dxx, to.xy[i] = poison - dxy, to.yx[i] = poison - dyx, to.yy[i] = poison - dyy;
+    to.nx[i] = poison - fnx, to.ny[i] = poison - fny;
+    to.limit[i] = most + poison;
+    to.stored[i] = 0.5 * (k0 * zx * zx + k0 * zy * zy) + poison;
+  }
+  for (uint32_t i = 0; to.mode && i < kLanes; ++i) to.mode[i] = static_cast<uint8_t>(mode[i]);
+}
+
+// Law::batch(params) and Law::flow(params, batch, block), which fills m and its derivatives, are all that a law of the family says.
+template <class Law>
+struct Run {
+  static dfm_status run(const dfm_friction_in *in, dfm_friction_out *out) {
+    Batch p = Law::batch(in->params);
+    p.h = in->dt;
+    const size_t stride = in->stride;
+    double spare[kLanes];
+    for (size_t at = 0; at < in->n; at += kLanes) {  // lanes up to n rounded to 8 may be touched
+      const auto to = [&](double *column, size_t c) { return column ? column + c * stride + at : spare; };
+      const Columns columns = {to(out->ft, 0),      to(out->ft, 1),      to(out->state, 0),   to(out->state, 1),   to(out->dft_dvt, 0),
+                               to(out->dft_dvt, 1), to(out->dft_dvt, 2), to(out->dft_dvt, 3), to(out->dft_dfn, 0), to(out->dft_dfn, 1),
+                               to(out->limit, 0),   to(out->stored, 0),  out->mode ? out->mode + at : nullptr};
+      Block b;
+      load(p, in, at, b);
+      level(p, b);
+      Law::flow(in->params, p, b);
+      if (p.sigma1 > 0) {
+        double k1[kLanes], slope[kLanes], by_fn[kLanes];
+        damping(p, b, k1, slope, by_fn);
+        answer<true>(p, b, k1, slope, by_fn, columns);
+      } else {
+        answer<false>(p, b, nullptr, nullptr, nullptr, columns);
+      }
+    }
+    return DFM_OK;
+  }
+};
+
+constexpr uint32_t kNeeds = DFM_NEED_FN | DFM_NEED_VT | DFM_NEED_AREA;
+constexpr uint32_t kFlags = DFM_FRIC_ISOTROPIC | DFM_FRIC_PASSIVE | DFM_FRIC_JACOBIAN;
+constexpr dfm_slot kSlots[] = {{DFM_PER_CONTACT, 2, DFM_SLOT_TANGENT, 0}};
+
+template <class Law>
+constexpr dfm_friction ops() {
+  dfm_friction f = dfm::plugin::friction(kNeeds, kFlags, lanes::eval<Law>, Law::check);
+  f.nslot = 1, f.slots = kSlots, f.prepare = Law::prepare, f.release = Law::release;
+  return f;
+}
+
+}  // namespace bristle

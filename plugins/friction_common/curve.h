@@ -1,0 +1,41 @@
+// The Stribeck curve of eight lanes:  g(w) = fn (mu_C + (mu_S - mu_C) s),  s = exp(-a),  a = (w/v_s)^delta;  w g'(w) = fn (mu_S - mu_C) slope,
+// slope = w s'(w) = -delta a s.
+#pragma once
+#include "lanes.h"
+
+namespace lanes {
+
+// dfm_pow for a base in (0, 1e300) and an exponent in [0.1, 10]: the same operations without its branches, so the same bits in every lane.
+inline double power(double x, double y) {
+  double high, low;
+  dfm_log2_(x, &high, &low);
+  const double p = y * high;
+  const double yh = dfm_double_(dfm_bits_(y) & 0xfffffffff8000000ull), yl = y - yh;
+  const double lh = dfm_double_(dfm_bits_(high) & 0xfffffffff8000000ull), ll = high - lh;
+  const double plow = (((yh * lh - p) + yh * ll) + yl * lh) + yl * ll + y * low;
+  return dfm_exp2_(p, p < 711.0 && p > -751.0 ? plow : 0.0);
+}
+
+// excess = s, slope = w s'(w) at the speeds w, 0 <= w < 1e200.
+inline void curve(double v_s, double delta, const double *w, double *excess, double *slope) {
+  double a[kLanes], e[kLanes];
+  const double inverse = 1.0 / v_s;
+  if (delta == 2.0) {
+    for (uint32_t i = 0; i < kLanes; ++i) {
+      const double x = w[i] * inverse;
+      a[i] = x * x;
+    }
+  } else {
+    double x[kLanes];
+    for (uint32_t i = 0; i < kLanes; ++i) x[i] = w[i] * inverse;
+    for (uint32_t i = 0; i < kLanes; ++i) a[i] = power(x[i] > 1e-300 ? x[i] : 1e-300, delta);
+    for (uint32_t i = 0; i < kLanes; ++i) a[i] = x[i] > 0 ? a[i] : 0.0;
+  }
+  for (uint32_t i = 0; i < kLanes; ++i) e[i] = dfm_exp(-a[i]);
+  for (uint32_t i = 0; i < kLanes; ++i) {
+    excess[i] = e[i];
+    slope[i] = e[i] > 0 ? -delta * a[i] * e[i] : 0.0;  // a may be infinite where e has vanished
+  }
+}
+
+}  // namespace lanes

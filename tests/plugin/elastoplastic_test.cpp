@@ -1,0 +1,238 @@
+// The law elastoplastic: nothing is lost below the elastic limit, LuGre's steady curve above it, the reference files, and the rules of every law
+// (friction.md section 2.6).
+#include "bristle_rig.h"
+
+using rig::Contact;
+using rules::In;
+using rules::Law;
+using rules::Out;
+
+namespace {
+
+constexpr double kPi = 3.14159265358979323846;
+
+struct Elastoplastic : testing::Test {
+  tiny::Context c;
+  dfm_law handle = 0;
+  Law dev, constant, cosine, cubic;
+  void SetUp() override {
+    handle = rules::open(c, "friction_elastoplastic");
+    // mu_C mu_S v_s delta sigma0 sigma1 form v_d sigma2 kappa i multiplier: F_C 1.47 N, F_S 1.96 N, elastic limit 1.029 N at 9.8 N
+    dev = make({0.15, 0.20, 0.01, 2, 1e4, 20, 0, 0.01, 0.4, 0.7, 1, 0});
+    constant = make({0.15, 0.20, 0.01, 2, 1e4, 20, 1, 0.01, 0.4, 0.7, 1, 0}), cosine = make({0.15, 0.20, 0.01, 2, 1e4, 20, 1, 0.01, 0.4, 0.7, 1, 1});
+    cubic = make({0.15, 0.20, 0.01, 1.3, 1e4, 20, 0, 0.01, 0.4, 0.5, 3, 0});
+  }
+  Law make(std::vector<double> params) const { return rules::law_of(handle, std::move(params)); }
+  rules::Draw draw() const { return {std::mt19937(11), 0.20 / 1e4}; }
+  static double g(double w) { return 9.8 * (0.15 + 0.05 * std::exp(-w * w / 1e-4)); }
+};
+
+TEST_F(Elastoplastic, SelfDescription_SaysWhatItIs) {
+  const dfm_type *type = nullptr;
+  ASSERT_EQ(dfm_law_type(handle, &type), DFM_OK);
+  EXPECT_STREQ(type->id, "org.deform.elastoplastic");
+  EXPECT_EQ(dev.ops->flags, uint32_t(DFM_FRIC_ISOTROPIC | DFM_FRIC_PASSIVE | DFM_FRIC_JACOBIAN));
+  const char *keys[] = {"mu_C", "mu_S", "v_s", "delta", "sigma0", "sigma1", "sigma1_form", "v_d", "sigma2", "kappa", "i", "multiplier"};
+  ASSERT_EQ(type->nparam, 12u);
+  for (int i = 0; i < 12; ++i) EXPECT_STREQ(type->params[i].key, keys[i]);
+  EXPECT_STREQ(type->params[11].names[0], "associated");
+  EXPECT_STREQ(type->params[11].names[1], "cosine");
+  EXPECT_STREQ(type->effects[0], "stiction");
+}
+
+TEST_F(Elastoplastic, RulesOfEveryLaw_AreKept) {
+  for (const Law &l : {dev, cosine, cubic}) {
+    rules::odd_to_the_bit(l, draw());
+    rules::turns_with_the_frame(l, draw());
+    rules::mirrored_trajectories(l, draw());
+    rules::extremes(l, 2e-5);
+    rules::no_normal_force_is_open(l, 1e-5);
+    rules::bad_lane_stays_in_its_lane(l, draw());
+    rules::same_alone_and_in_any_batch(l, draw());
+  }
+}
+
+TEST_F(Elastoplastic, Derivatives_MatchDifferences) {
+  // kinks: where the cone begins to cut, where the slip turns from unloading to loading
+  const auto kink = [](const In &in) {
+    const double z = rules::norm(in.state), cut = std::min(1.0, 0.20 * in.fn / (1e4 * in.area) / z);
+    const double x = cut * in.state[0] + in.h * in.v[0], y = cut * in.state[1] + in.h * in.v[1];
+    return std::fabs(z * 1e4 * in.area / (0.20 * in.fn) - 1) < 1e-3 || std::fabs(x * in.v[0] + y * in.v[1]) < 1e-3 * std::hypot(x, y) * rules::norm(in.v);
+  };
+  for (const Law &l : {dev, constant, cosine}) rules::derivatives(l, draw(), 1000, 2e-6, kink);
+  rules::derivatives(cubic, draw(), 1000, 1e-4, kink);
+}
+
+TEST_F(Elastoplastic, Bits_MatchTheRecordedHash) {
+  EXPECT_EQ(rules::hash_of_bits(dev, 2e-5), 16890951850962088441u);
+  EXPECT_EQ(rules::hash_of_bits(cosine, 2e-5), 13455767884846001377u);
+  EXPECT_EQ(rules::hash_of_bits(cubic, 2e-5), 6631069580605700212u);
+}
+
+TEST_F(Elastoplastic, PassiveForm_CreatesNoWork) {
+  for (double multiplier : {0.0, 1.0})
+    for (double sigma1 : {20.0, 316.0})
+      for (double i : {1.0, 2.0}) {
+        const Law l = make({0.15, 0.20, 0.01, 2, 1e4, sigma1, 0, 0.01, 0, 0.7, i, multiplier});
+        EXPECT_GE(rules::worst_balance(l, 2e-5, 200, false), -1e-12) << sigma1 << " " << i;
+        EXPECT_GE(rules::worst_balance(l, 2e-5, 200, true), -1e-12) << sigma1 << " " << i;
+      }
+}
+
+TEST_F(Elastoplastic, PublishedParametersWithConstantSigma1_FailThatTest) {
+  EXPECT_LT(rules::worst_balance(make({1, 1.5, 0.001, 2, 1e5, 316.22776601683796, 1, 0.01, 0.4, 0.7, 1, 0}), 1.5e-5, 200, false), -0.01);
+}
+
+// Any path inside the elastic zone: the bristle is the displacement, to rounding, after any number of steps.
+TEST_F(Elastoplastic, InsideTheElasticZone_NothingIsLost) {
+  for (const Law &l : {dev, cosine, cubic}) {
+    Contact k(l, 9.8);
+    const double reach = l.params[9] * 1.47e-4 * 0.999;
+    for (int n = 0; n < 20000; ++n) {
+      const double t = 1e-3 * (n + 1);
+      const double x = 0.7 * reach * std::sin(13 * t), y = 0.7 * reach * std::cos(29 * t) * std::min(1.0, t), h = n % 3 ? 1e-3 : 1.0 / 60;
+      k.move((x - k.in.state[0]) / h, (y - k.in.state[1]) / h, h);
+      ASSERT_NEAR(k.in.state[0], x, 1e-15 * reach * 100) << n;
+      ASSERT_NEAR(k.in.state[1], y, 1e-15 * reach * 100) << n;
+      ASSERT_EQ(k.last.mode, 1);
+    }
+  }
+}
+
+// A load that cycles below the elastic limit leaves no drift: exactly none where the steps return to the same loads.
+TEST_F(Elastoplastic, BiasedLoadBelowTheElasticLimit_DoesNotDrift) {
+  Contact k(dev, 9.8);
+  double x0 = 0, x1 = 0;
+  for (int cycle = 0; cycle < 200; ++cycle) {
+    for (int i = 1; i <= 50; ++i) k.carry(0.4 + 0.55 * std::sin(2 * kPi * i / 50.0), 1e-2);
+    if (cycle == 1) x0 = k.x;
+    x1 = k.x;
+  }
+  EXPECT_LT(std::fabs(x1 - x0), 1e-15);
+}
+
+// Above the elastic limit it drifts, by less than LuGre: friction.md gives 1.59e-6 against 8.0e-5 m per cycle with inertia.
+TEST_F(Elastoplastic, BiasedLoadAboveTheElasticLimit_DriftsLessThanLugre) {
+  const Law lugre = rules::law_of(rules::open(c, "friction_lugre"), std::vector<double>(dev.params.begin(), dev.params.begin() + 9));
+  double drift[2];
+  int n = 0;
+  for (const Law &l : {dev, lugre}) {
+    Contact k(l, 9.8);
+    double x0 = 0;
+    for (int cycle = 0; cycle < 4; ++cycle) {
+      x0 = k.x;
+      for (int i = 1; i <= 400; ++i) k.carry(0.2 + 1.1 * std::sin(2 * kPi * i / 400.0), 0.1);
+    }
+    drift[n++] = k.x - x0;
+  }
+  EXPECT_GT(drift[0], 1e-9);
+  EXPECT_LT(drift[0], 0.1 * drift[1]);
+}
+
+TEST_F(Elastoplastic, SlidingForLong_IsTheSteadyCurveAtAnyStep) {
+  for (const Law &l : {dev, cosine})
+    for (double w = 1e-6; w < 1e3; w *= 7)
+      for (double h : {1e-6, 1e-3, 1.0 / 30}) {
+        Contact k(l, 9.8);
+        for (int i = 0; i < 60; ++i) k.move(w, 0, 1e-3 / w);
+        for (int i = 0; i < 100; ++i) k.move(w, 0, h);
+        EXPECT_NEAR(k.last.f[0], g(w) + 0.4 * w, 1e-12 * (g(w) + 0.4 * w)) << w << " " << h;
+      }
+}
+
+TEST_F(Elastoplastic, HugeStep_EndsOnTheLevel) {
+  for (double i : {1.0, 2.0, 5.0}) {
+    Contact k(make({0.15, 0.20, 0.01, 2, 1e9, 20, 0, 0.01, 0.4, 0.7, i, 0}), 9.8);
+    k.move(44.1e3, 0, 1.0 / 30);
+    EXPECT_LE(k.last.state[0] * 1e9, 1.47 * (1 + 1e-12));
+    for (int n = 0; n < 3; ++n) k.move(-44.1e3, 0, 1.0 / 30);
+    EXPECT_NEAR(k.last.f[0], -(1.47 + 0.4 * 44.1e3), i == 1 ? 1e-8 : 0.1);
+    EXPECT_TRUE(std::isfinite(k.last.dv[0]));
+  }
+}
+
+TEST_F(Elastoplastic, HeldAtAnyLoad_KeepsItsBristleToTheBit) {
+  for (double reach : {5e-5, 1.2e-4, 1e-2}) {
+    Contact k(dev, 9.8);
+    k.path(reach, 1000, 1e-4);
+    const double z = k.in.state[0];
+    for (int i = 0; i < 100000; ++i) k.move(0, 0, 1.0 / 60);
+    EXPECT_EQ(k.in.state[0], z);
+  }
+}
+
+TEST_F(Elastoplastic, FallingNormalForce_CutsTheBristleFirst) {
+  Contact k(dev, 9.8);
+  k.path(1e-2, 100, 1e-4);
+  k.in.fn = 1;
+  k.move(0, 0, 1e-3);
+  EXPECT_NEAR(k.last.f[0], 0.20, 1e-15);
+}
+
+// The yield share alpha out of one small step at a held speed: m = w - g dz/dt /(K0 z), as the file's table gives it for both directions of motion.
+TEST_F(Elastoplastic, AlphaMap_MatchesTheReference) {
+  READ_OR_SKIP(t, "curves_alpha.csv");
+  int compared = 0;
+  for (size_t i = 1; i < t.size(); ++i) {
+    const double z = t.at(i, "z"), speed = t.at(i, "speed"), level = 1e4 * t.at(i, "z_max");
+    if (std::fabs(z) * 1e4 > 1.96) continue;   // beyond the static cone: no state of this law
+    for (int sign : {1, -1}) {
+      const double w = speed > 0 ? speed : 1e-7;
+      In in;
+      in.fn = 9.8, in.v[0] = sign * w, in.h = 1e-9 / w * 1e-3, in.state[0] = z;
+      const Out o = rules::ask(make({0.15, 0.20, 0.01, 2, 1e4, 0, 0, 0.01, 0, 0.7, 1, 0}), in);
+      const double rate = (o.state[0] - z) / in.h / in.v[0], expected = t.at(i, sign > 0 ? "alpha_moving_plus" : "alpha_moving_minus");
+      EXPECT_NEAR(rate, 1 - expected * 1e4 * std::fabs(z) / level, 2e-6) << z << " " << speed;
+      ++compared;
+    }
+  }
+  EXPECT_GT(compared, 100);
+}
+
+TEST_F(Elastoplastic, SteadyCurve_MatchesTheReference) {
+  READ_OR_SKIP(t, "curves_steady.csv");
+  for (size_t i = 1; i < t.size(); ++i) {
+    const double v = t.at(i, "v");
+    if (v == 0) continue;
+    Contact k(dev, 9.8);
+    for (int n = 0; n < 100; ++n) k.move(v, 0, 1e-2 / std::fabs(v));
+    EXPECT_NEAR(k.last.f[0], t.at(i, "F_steady_lugre_ep_coulomb"), 2e-12);
+  }
+}
+
+TEST_F(Elastoplastic, TurnOfTheSlip_ConvergesToBothReferences) {
+  for (const Law &l : {constant, cosine}) {
+    READ_OR_SKIP(t, l.params[11] > 0 ? "vector_turn_ep_cosine.csv" : "vector_turn_ep_associated.csv");
+    double before = 0;
+    for (int parts : {20, 40}) {
+      Contact k(l, 9.8);
+      double worst = 0;
+      for (size_t i = 2; i < t.size(); ++i) {
+        const double t0 = t.at(i - 1, "t"), t1 = t.at(i, "t"), h = (t1 - t0) / parts;
+        for (int n = 1; n <= parts; ++n) {
+          const double angle = t0 + n * h > 0.2 ? kPi / 2 : 0;
+          k.move(5e-3 * std::cos(angle), 5e-3 * std::sin(angle), h);
+        }
+        if (std::fabs(t1 - 0.2) > 0.01) worst = std::max({worst, std::fabs(k.last.f[0] - t.at(i, "Fx")), std::fabs(k.last.f[1] - t.at(i, "Fy"))});
+      }
+      EXPECT_LT(worst, 0.02);
+      if (before > 0) {
+        EXPECT_NEAR(before / worst, 2, 0.3);
+      }
+      before = worst;
+    }
+  }
+}
+
+TEST_F(Elastoplastic, PreslidingLoops_MatchTheReference) {
+  READ_OR_SKIP(t, "presliding.csv");
+  Contact k(make({0.15, 0.20, 0.01, 2, 1e4, 0, 0, 0.01, 0, 0.7, 1, 0}), 9.8);
+  double worst = 0;
+  for (size_t i = 2; i < t.size(); ++i) {
+    const double f = k.path(t.at(i, "x") - t.at(i - 1, "x"), 200, 1e-6);
+    worst = std::max(worst, std::fabs(f - t.at(i, "F_ep_rate_independent")));
+  }
+  EXPECT_LT(worst, 1e-3);
+}
+
+}  // namespace

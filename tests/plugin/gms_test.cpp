@@ -1,0 +1,184 @@
+// The law gms: return-point memory, the reference histories, passivity in its own form, and the rules of every law (friction.md section 2.8).
+#include "bristle_rig.h"
+
+using rig::Contact;
+using rules::In;
+using rules::Law;
+using rules::Out;
+
+namespace {
+
+constexpr double kPi = 3.14159265358979323846;
+
+struct Gms : testing::Test {
+  tiny::Context c;
+  dfm_law handle = 0;
+  Law dev, maxwell;
+  void SetUp() override {
+    handle = rules::open(c, "friction_gms");
+    // mu_C mu_S v_s delta sigma2 C k[4] nu[4]: F_C 1.47 N, F_S 1.96 N at 9.8 N
+    dev = make({0.15, 0.20, 0.01, 2, 0.4, 60, 4000, 3000, 2000, 1000, 0.2, 0.3, 0.3, 0.2});
+    maxwell = make({0.20, 0.20, 0.01, 2, 0, 60, 4000, 3000, 2000, 1000, 0.2, 0.3, 0.3, 0.2});   // one level: Maxwell-slip
+  }
+  Law make(std::vector<double> params) const { return rules::law_of(handle, std::move(params)); }
+  rules::Draw draw() const { return {std::mt19937(11), 2e-5}; }
+  static double g(double w) { return 9.8 * (0.15 + 0.05 * std::exp(-w * w / 1e-4)); }
+};
+
+TEST_F(Gms, SelfDescription_SaysWhatItIs) {
+  const dfm_type *type = nullptr;
+  ASSERT_EQ(dfm_law_type(handle, &type), DFM_OK);
+  EXPECT_STREQ(type->id, "org.deform.gms");
+  const char *keys[] = {"mu_C", "mu_S", "v_s", "delta", "sigma2", "C", "k", "nu"};
+  ASSERT_EQ(type->nparam, 8u);
+  for (int i = 0; i < 8; ++i) EXPECT_STREQ(type->params[i].key, keys[i]);
+  EXPECT_EQ(type->params[6].width, 4u);
+  EXPECT_EQ(type->params[7].width, 4u);
+  EXPECT_EQ(dev.nstate, 13u);
+  EXPECT_EQ(dev.pairs, (std::vector<uint32_t>{0, 2, 4, 6}));
+  EXPECT_EQ(dev.flags, (std::vector<uint32_t>{8, 9, 10, 11, 12}));
+}
+
+TEST_F(Gms, RulesOfEveryLaw_AreKept) {
+  for (const Law &l : {dev, maxwell}) {
+    rules::odd_to_the_bit(l, draw());
+    rules::turns_with_the_frame(l, draw());
+    rules::mirrored_trajectories(l, draw());
+    rules::extremes(l, 2e-5);
+    rules::no_normal_force_is_open(l, 1e-5);
+    rules::bad_lane_stays_in_its_lane(l, draw());
+    rules::same_alone_and_in_any_batch(l, draw());
+    EXPECT_GE(rules::worst_balance(l, 2e-5, 300, false), -1e-13);
+    EXPECT_GE(rules::worst_balance(l, 2e-5, 300, true), -1e-13);
+  }
+}
+
+TEST_F(Gms, Derivatives_MatchDifferences) {
+  for (const Law &l : {dev, maxwell}) rules::derivatives(l, draw(), 1000, 1e-6, [](const In &) { return false; });
+}
+
+TEST_F(Gms, Bits_MatchTheRecordedHash) {
+  EXPECT_EQ(rules::hash_of_bits(dev, 2e-5), 11651326787384591426u);
+  EXPECT_EQ(rules::hash_of_bits(maxwell, 2e-5), 17960434241992963629u);
+}
+
+TEST_F(Gms, ParametersThatDoNotFit_AreRefused) {
+  const auto refusal = [&](std::vector<double> p) {
+    char why[256] = "";
+    EXPECT_EQ(dev.ops->check(p.data(), why, sizeof why), DFM_E_ARG);
+    return std::string(why);
+  };
+  EXPECT_NE(refusal({0.15, 0.20, 0.01, 2, 0, 60, 4000, 3000, 2000, 1000, 0.2, 0.3, 0.3, 0.3}).find("add up to 1; 0.2 + 0.3 + 0.3 + 0.3 = 1.1"), std::string::npos);
+  EXPECT_NE(refusal({0.15, 0.20, 0.01, 2, 0, 60, 4000, 0, 2000, 1000, 0.2, 0.3, 0.3, 0.2}).find("for element 2"), std::string::npos);
+  EXPECT_NE(refusal({0.25, 0.20, 0.01, 2, 0, 60, 0, 0, 0, 0, 0, 0, 0, 0}).find("mu_S (0.2)"), std::string::npos);
+  char why[256] = "";
+  const std::vector<double> usual{0.5, 0.5, 0.01, 2, 0, 1e5, 0, 0, 0, 0, 0, 0, 0, 0};
+  EXPECT_EQ(dev.ops->check(usual.data(), why, sizeof why), DFM_OK);
+  Contact k(make(usual));
+  EXPECT_NEAR(k.path(1e-10, 1, 1e-3), 1e8 * 1e-10, 1e-15) << "the usual four stiffnesses together";
+}
+
+// An inner loop closes where it began, to rounding: the force at a displacement depends on the extremes before it, not on the way between.
+TEST_F(Gms, InnerLoops_CloseAtTheirReturnPoints) {
+  Contact k(maxwell, 9.8);
+  const double outer = k.path(2e-4, 200, 1e-3);
+  k.path(-1.2e-4, 120, 1e-3);
+  const double inner = k.path(4e-5, 40, 1e-3);
+  k.path(-3e-5, 30, 1e-3);
+  EXPECT_NEAR(k.path(3e-5, 30, 1e-3), inner, 1e-12) << "the loop within the loop";
+  EXPECT_NEAR(k.path(8e-5, 80, 1e-3), outer, 1e-12) << "the loop";
+}
+
+TEST_F(Gms, OneLevel_IsMaxwellSlipInAnyStep) {
+  const double stiffness[] = {4000, 3000, 2000, 1000}, share[] = {0.2, 0.3, 0.3, 0.2};
+  Contact k(maxwell, 9.8);
+  double f[4] = {};
+  std::mt19937 random(2);
+  for (int n = 0; n < 500; ++n) {
+    const double dx = std::normal_distribution<double>(0, 1e-4)(random), h = n % 2 ? 1e-3 : 1.0 / 30;
+    double sum = 0;
+    for (int e = 0; e < 4; ++e) f[e] = std::clamp(f[e] + stiffness[e] * dx, -share[e] * 1.96, share[e] * 1.96), sum += f[e];
+    EXPECT_NEAR(k.move(dx / h, 0, h).f[0], sum, 1e-12) << n;
+  }
+}
+
+// At a crawl after sliding the elements rise to the static level, as published; the energy for that is what sliding has paid, and it is paid once.
+TEST_F(Gms, CrawlAfterSliding_RisesOnWhatSlidingHasPaid) {
+  Contact k(dev, 9.8);
+  k.path(0.05, 500, 0.1);
+  EXPECT_NEAR(k.last.f[0], g(0.1) + 0.04, 1e-9);
+  Contact poor = k;
+  poor.in.state[12] = 0;   // nothing in the budget
+  for (int i = 0; i < 10000; ++i) k.move(1e-12, 0, 1e-3), poor.move(1e-12, 0, 1e-3);
+  EXPECT_NEAR(k.last.f[0], 1.96, 0.05) << "10 s at 1e-12 m/s";
+  EXPECT_NEAR(poor.last.f[0], 1.47, 1e-6);
+  EXPECT_LT(k.in.state[12], 2.5e-4) << "the budget is bounded by the elastic energy at the static level";
+}
+
+TEST_F(Gms, SlidingForLong_IsTheSteadyCurveAtAnyStep) {
+  for (double w = 1e-5; w < 1e3; w *= 7)
+    for (double h : {1e-3, 1.0 / 30}) {
+      Contact k(dev, 9.8);
+      for (int i = 0; i < 100; ++i) k.move(w, 0, 1e-4 / w);
+      for (int i = 0; i < 1000; ++i) k.move(w, 0, h);
+      EXPECT_NEAR(k.last.f[0], g(w) + 0.4 * w, 1e-10 * (g(w) + 0.4 * w)) << w << " " << h;
+      EXPECT_EQ(k.last.mode, 2) << w;
+    }
+}
+
+TEST_F(Gms, BiasedLoadBelowBreakaway_DoesNotDriftAfterTheFirstCycle) {
+  for (const Law &l : {maxwell, dev}) {
+    Contact k(l, 9.8);
+    std::vector<double> ends;
+    for (int cycle = 0; cycle < 60; ++cycle) {
+      for (int i = 1; i <= 100; ++i) k.carry(0.5 + 0.9 * std::sin(2 * kPi * i / 100.0), 1.0);
+      ends.push_back(k.x);
+    }
+    EXPECT_LT(std::fabs(ends.back() - ends[10]), 1e-12);
+  }
+}
+
+TEST_F(Gms, HeldAtAnyLoad_KeepsItsElementsToTheBit) {
+  Contact k(dev, 9.8);
+  k.path(1e-4, 1000, 1e-4);
+  k.move(0, 0, 1e-3);
+  const In held = k.in;
+  for (int i = 0; i < 100000; ++i) k.move(0, 0, 1.0 / 60);
+  for (int e = 0; e < 8; ++e) EXPECT_EQ(k.in.state[e], held.state[e]);
+}
+
+TEST_F(Gms, FallingNormalForce_CutsTheElementsFirst) {
+  Contact k(dev, 9.8);
+  k.path(1e-2, 100, 1e-4);
+  k.in.fn = 1;
+  k.move(0, 0, 1e-3);
+  EXPECT_NEAR(k.last.f[0], 0.20, 1e-15);
+}
+
+TEST_F(Gms, SineVelocities_ConvergeToTheReference) {
+  for (const auto &[file, speed] : {std::pair{"sinvel_V1_gms.csv", 0.01}, {"sinvel_V2_gms.csv", 0.02}, {"sinvel_presliding_gms.csv", 0.0004}}) {
+    READ_OR_SKIP(t, file);
+    double top = 0, worst = 0;
+    Contact k(dev, 9.8);
+    for (size_t i = 2; i < t.size(); ++i) {
+      const double t0 = t.at(i - 1, "t"), h = (t.at(i, "t") - t0) / 100;   // 1e-4 s
+      for (int n = 1; n <= 100; ++n) k.move(speed * std::sin(2 * kPi * (t0 + n * h)), 0, h);
+      top = std::max(top, std::fabs(t.at(i, "F")));
+      worst = std::max(worst, std::fabs(k.last.f[0] - t.at(i, "F")));
+    }
+    EXPECT_LT(worst, 2e-3 * top) << file;
+  }
+}
+
+TEST_F(Gms, PreslidingLoops_MatchTheReference) {
+  READ_OR_SKIP(t, "presliding.csv");
+  // the file has five elements: four in one contact, the fifth in another, cut into four equal ones
+  Contact a(make({0.20, 0.20, 0.01, 2, 0, 60, 4900, 2450, 1633.3333333333333, 1225, 0.25, 0.25, 0.25, 0.25}), 7.84);
+  Contact b(make({0.20, 0.20, 0.01, 2, 0, 60, 245, 245, 245, 245, 0.25, 0.25, 0.25, 0.25}), 1.96);
+  for (size_t i = 2; i < t.size(); ++i) {
+    const double dx = t.at(i, "x") - t.at(i - 1, "x");
+    EXPECT_NEAR(a.path(dx, 1, 1e-3) + b.path(dx, 1, 1e-3), t.at(i, "F_maxwell_slip"), 1e-11) << i;
+  }
+}
+
+}  // namespace
