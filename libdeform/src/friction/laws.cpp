@@ -31,7 +31,7 @@ LawBatches::LawBatches(const Memory &m)
 void LawBatches::gather(const std::vector<LawInstance *> &laws, ContactState &state) {
   batches_.clear();
   order_.clear();
-  smooth_ = false;
+  smooth_ = remembers_ = false;
   for (uint32_t l = 0; l < laws.size(); ++l) {
     const uint32_t begin = static_cast<uint32_t>(order_.size());
     for (uint32_t i = 0; i < state.n; ++i)
@@ -39,8 +39,9 @@ void LawBatches::gather(const std::vector<LawInstance *> &laws, ContactState &st
         order_.push_back(i);
         state.set_valued[i] = (laws[l]->ops->flags & DFM_FRIC_SET_VALUED) != 0;
       }
-    if (order_.size() > begin) smooth_ |= !(laws[l]->ops->flags & DFM_FRIC_SET_VALUED);
-    if (order_.size() > begin) batches_.push_back({laws[l], begin, static_cast<uint32_t>(order_.size()) - begin});
+    if (order_.size() == begin) continue;
+    smooth_ |= !(laws[l]->ops->flags & DFM_FRIC_SET_VALUED), remembers_ |= laws[l]->nstate > 0;
+    batches_.push_back({laws[l], begin, static_cast<uint32_t>(order_.size()) - begin});
   }
 }
 

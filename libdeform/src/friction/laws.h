@@ -39,7 +39,8 @@ class LawBatches {
   //   wt     [n] 1/kg, how much slip an impulse makes at its own contact; with it ft_stop tells the slip that others leave
   //   least  m/s, below which a slip need not be known
   const LawInstance *answer(double h, const double *wt, double least, ContactState &state);
-  bool smooth() const { return smooth_; }   // is any law of this sub-step not set-valued?
+  bool smooth() const { return smooth_; }          // is any law of this sub-step not set-valued?
+  bool remembers() const { return remembers_; }    // has any a state?
 
  private:
   struct Batch { const LawInstance *law; uint32_t begin, n; };
@@ -52,7 +53,7 @@ class LawBatches {
   Array<uint8_t> mode_;
   Array<Local> local_;
   Array<uint32_t> asked_;         // contacts of local_ that are asked together
-  bool smooth_ = false;
+  bool smooth_ = false, remembers_ = false;
   const LawInstance *evaluate(const LawInstance &law, std::span<const uint32_t> contacts, double h, ContactState &state);
   const LawInstance *settle(const Batch &batch, double h, const double *wt, double least, ContactState &state);
   bool difference(const LawInstance &law, dfm_friction_in in, const double *ft, double *dv, double *dn);

@@ -60,6 +60,10 @@ const Body &fastest(const World &w) {
 
 constexpr uint32_t kMostRevisions = 6;   // of what rigid hosts take for granted, within a sub-step
 
+// Where laws remember, errors of the normal force do not average out: each time a force falls by one, the cone cuts off a part of the bristle that does
+// not come back when it rises, and what is held creeps by it. This share of the normal tolerance then holds (doc/decisions/0028).
+constexpr double kRememberedShare = 0.05;
+
 // The cap on sweeps bounds the cost of what is not exact, not of what lets bodies through: where a normal residual would eat more than a tenth
 // of the rest distance within the sub-step, up to kBeyondCap times as many are done (many surfels on few phyxels, struck hard).
 constexpr uint32_t kBeyondCap = 8;
@@ -126,7 +130,7 @@ void World::tell_failed_solve(const LawInstance *law) {
 const LawInstance *World::solve_rows() {
   const double gap_margin = 0.01 * (0.5 * offset) / h;
   const double least = def.contact_tolerance > 0 ? def.contact_tolerance : std::min(1e-6, gap_margin);
-  tolerance.normal = gap_margin;
+  tolerance.normal = batches.remembers() ? kRememberedShare * gap_margin : gap_margin;
   for (;;) {
     set_trial(rows, h, state);
     if (const LawInstance *bad = batches.answer(h, rows.wt.data(), least, state)) return bad;
