@@ -5,12 +5,13 @@ JOBS ?= $(shell nproc)
 SETUP = @cmake/setup.sh
 BUILD = @cmake --build --preset
 
-.PHONY: help demo test bench lint asan tsan fuzz install clean setup setup-bench setup-fuzz
+.PHONY: help demo test bench soak lint asan tsan fuzz install clean setup setup-bench setup-fuzz
 
 help:
 	@echo "make demo             two soft cylinders with and without friction: table, picture, out/demo/"
 	@echo "make test             the whole test suite"
 	@echo "make bench            the figures: kernels and full steps"
+	@echo "make soak             what holds, and how much it creeps: hours; goes on where it was stopped"
 	@echo "make lint             layout, includes, headers, text"
 	@echo "make asan, make tsan  the suite under the sanitizers"
 	@echo "make fuzz             the readers under libFuzzer"
@@ -48,6 +49,11 @@ asan tsan: %: setup build/%/build.ninja
 bench: setup-bench build/bench/build.ninja
 	$(BUILD) bench
 	$(BUILD) bench --target run_bench
+
+# Rows that are in the table already are not run again.
+soak: setup-bench build/bench/build.ninja
+	$(BUILD) bench --target hold_soak
+	nice -n 19 build/bench/bin/hold_soak tests/bench/results/hold_soak.csv
 
 fuzz: setup-fuzz build/fuzz/build.ninja
 	$(BUILD) fuzz --target run_fuzz

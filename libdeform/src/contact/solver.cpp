@@ -40,17 +40,7 @@ Pair friction_impulse(const ContactRows &rows, const ContactState &s, uint32_t i
     if (size <= radius) return {a, b};
     return {radius / size * a, radius / size * b};
   }
-  // Symmetric part of D, its positive eigenvalue removed: D- = D - e+ q q^T.
-  double d11 = s.dft_dvt[i], d22 = s.dft_dvt[3 * n + i], d12 = 0.5 * (s.dft_dvt[n + i] + s.dft_dvt[2 * n + i]);
-  const double mean = 0.5 * (d11 + d22), dev = 0.5 * (d11 - d22), spread = std::sqrt(dev * dev + d12 * d12);
-  const double top = mean + spread, bottom = mean - spread;
-  if (bottom >= 0) {
-    d11 = d22 = d12 = 0;
-  } else if (top > 0) {  // keep only bottom * p p^T, p p^T = (top I - D) / (top - bottom)
-    const double scale = bottom / (top - bottom);
-    const double n11 = scale * (top - d11), n22 = scale * (top - d22), n12 = scale * -d12;
-    d11 = n11, d22 = n22, d12 = n12;
-  }
+  const auto [d11, d12, d22] = dissipative_slope(s, i);
   const double dfn = ln / h - fn;
   const double v1 = u1 - wt * l1 - s.vt[i], v2 = u2 - wt * l2 - s.vt[n + i];
   const double r1 = h * (s.ft[i] + d11 * v1 + d12 * v2 + s.dft_dfn[i] * dfn), r2 = h * (s.ft[n + i] + d12 * v1 + d22 * v2 + s.dft_dfn[n + i] * dfn);
@@ -78,6 +68,13 @@ void set_trial(const ContactRows &rows, double h, ContactState &s) {
     const double wt = rows.wt[i];
     s.ft_stop[i] = wt > 0 ? (l[1] - u.y / wt) / h : 0;
     s.ft_stop[s.stride + i] = wt > 0 ? (l[2] - u.z / wt) / h : 0;
+  }
+}
+
+void set_slips(const ContactRows &rows, ContactState &s) {
+  for (uint32_t i = 0; i < rows.n; ++i) {
+    const Vec3 u = rows.velocity(i);
+    s.vt[i] = u.y, s.vt[s.stride + i] = u.z;
   }
 }
 

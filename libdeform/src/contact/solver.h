@@ -8,6 +8,8 @@ namespace dfm {
 
 // Sets the trial of every contact from the rows' present state: fn, vt, ft_stop.
 void set_trial(const ContactRows &rows, double h, ContactState &state);
+// The slips that were solved for, where the laws were asked beside them.
+void set_slips(const ContactRows &rows, ContactState &state);
 
 // One sweep in contact order. Every contact first gets its normal impulse, then its friction impulse with that new normal impulse.
 void sweep(ContactRows &rows, const ContactState &law, double h);

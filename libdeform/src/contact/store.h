@@ -19,7 +19,7 @@ struct ContactStore {
   Array<double> impulse;              // [n,3] in the frame
   Array<double> bristle;              // [n,nstate] row-major
   Array<uint32_t> law;                // the law the bristles belong to
-  Array<double> dwell;                // s in contact
+  Array<double> dwell, area;          // s in contact, m2
   Array<double> path;                 // [n,2] m, net slip since hold_begin, in the frame
   Array<uint8_t> touching, held;      // held: touched and stuck in every sub-step since hold_begin
   Array<uint8_t> began;               // touched for the first time in the last step

@@ -10,7 +10,11 @@ namespace dfm {
 
 LawInstance::LawInstance(const dfm_type &t, const dfm_host &h, std::vector<double> values)
     : type(&t), ops(static_cast<const dfm_friction *>(t.ops)), params(std::move(values)), host(&h) {
-  for (uint32_t s = 0; s < ops->nslot; ++s) nstate += ops->slots[s].width;
+  for (uint32_t s = 0; s < ops->nslot; ++s) {
+    nstate += ops->slots[s].width;
+    tangent.resize(nstate, ops->slots[s].kind == DFM_SLOT_TANGENT);
+    turns |= ops->slots[s].kind == DFM_SLOT_TANGENT;
+  }
   // check() was asked by pack_params
   if (ops->prepare && call_plugin(h, t, "prepare", [&] { return ops->prepare(host, params.data(), &data); }) != DFM_OK)
     fail(DFM_E_FATAL, "law '%s' could not prepare its tables; the log says why", t.id);
@@ -22,11 +26,12 @@ LawInstance::~LawInstance() {
 
 LawBatches::LawBatches(const Memory &m)
     : order_(HookAllocator<uint32_t>(m)), in_(HookAllocator<double>(m)), out_(HookAllocator<double>(m)), moved_(HookAllocator<double>(m)),
-      answer_(HookAllocator<double>(m)), mode_(HookAllocator<uint8_t>(m)) {}
+      answer_(HookAllocator<double>(m)), mode_(HookAllocator<uint8_t>(m)), local_(HookAllocator<Local>(m)), asked_(HookAllocator<uint32_t>(m)) {}
 
 void LawBatches::gather(const std::vector<LawInstance *> &laws, ContactState &state) {
   batches_.clear();
   order_.clear();
+  smooth_ = remembers_ = false;
   for (uint32_t l = 0; l < laws.size(); ++l) {
     const uint32_t begin = static_cast<uint32_t>(order_.size());
     for (uint32_t i = 0; i < state.n; ++i)
@@ -34,26 +39,26 @@ void LawBatches::gather(const std::vector<LawInstance *> &laws, ContactState &st
         order_.push_back(i);
         state.set_valued[i] = (laws[l]->ops->flags & DFM_FRIC_SET_VALUED) != 0;
       }
-    if (order_.size() > begin) batches_.push_back({laws[l], begin, static_cast<uint32_t>(order_.size()) - begin});
+    if (order_.size() == begin) continue;
+    smooth_ |= !(laws[l]->ops->flags & DFM_FRIC_SET_VALUED), remembers_ |= laws[l]->nstate > 0;
+    batches_.push_back({laws[l], begin, static_cast<uint32_t>(order_.size()) - begin});
   }
 }
 
 const LawInstance *LawBatches::evaluate(double h, ContactState &state) {
   for (const Batch &batch : batches_)
-    if (const LawInstance *bad = evaluate(batch, h, state)) return bad;
+    if (const LawInstance *bad = evaluate(*batch.law, {&order_[batch.begin], batch.n}, h, state)) return bad;
   return nullptr;
 }
 
-const LawInstance *LawBatches::evaluate(const Batch &batch, double h, ContactState &state) {
-  const LawInstance &law = *batch.law;
-  const uint32_t n = batch.n, stride = (n + 7) & ~7u, S = law.nstate;
+const LawInstance *LawBatches::evaluate(const LawInstance &law, std::span<const uint32_t> index, double h, ContactState &state) {
+  const uint32_t n = static_cast<uint32_t>(index.size()), stride = (n + 7) & ~7u, S = law.nstate;
   const size_t column = stride;
   in_.assign(column * (7 + S), 0.0);
   out_.resize(column * (11 + S));
   mode_.resize(stride);
   double *const fn = in_.data(), *const vt = fn + column, *const stop = vt + 2 * column, *const area = stop + 2 * column,
                 *const dwell = area + column, *const bristle = dwell + column;
-  const uint32_t *const index = &order_[batch.begin];
   for (uint32_t k = 0; k < n; ++k) {
     const uint32_t i = index[k];
     fn[k] = state.fn[i], area[k] = state.area[i], dwell[k] = state.dwell[i];

@@ -1,6 +1,7 @@
 // Friction laws of a world, and the one place where they are asked: contacts are gathered into one batch per law, evaluated by the plugin,
 // screened, and scattered back to the contacts' columns.
 #pragma once
+#include <span>
 #include <string>
 #include <vector>
 
@@ -18,6 +19,8 @@ struct LawInstance {
   void *data = nullptr;           // what prepare() made
   const dfm_host *host = nullptr;
   uint32_t nstate = 0;
+  std::vector<uint8_t> tangent;   // [nstate] 1: a component of a vector in the tangent plane
+  bool turns = false;             // any
 
   LawInstance(const dfm_type &t, const dfm_host &h, std::vector<double> values);   // throws where check() or prepare() refuses
   LawInstance(const LawInstance &) = delete;
@@ -32,15 +35,27 @@ class LawBatches {
   void gather(const std::vector<LawInstance *> &laws, ContactState &state);
   // Asks every batch at the trial in state. nullptr, or the law that failed or answered with something not finite.
   const LawInstance *evaluate(double h, ContactState &state);
+  // The same, but a smooth law is asked where the contact would come to rest alone (friction/local_solve.cpp): state.vt moves there.
+  //   wt     [n] 1/kg, how much slip an impulse makes at its own contact; with it ft_stop tells the slip that others leave
+  //   least  m/s, below which a slip need not be known
+  const LawInstance *answer(double h, const double *wt, double least, ContactState &state);
+  bool smooth() const { return smooth_; }          // is any law of this sub-step not set-valued?
+  bool remembers() const { return remembers_; }    // has any a state?
 
  private:
   struct Batch { const LawInstance *law; uint32_t begin, n; };
+  // A contact whose own answer is still looked for: the best slip so far, what it leaves of its equation, and the step tried from there.
+  struct Local { uint32_t contact; bool from_zero, last; double v[2], left, step[2], share; };
   std::vector<Batch> batches_;
   Array<uint32_t> order_;         // contacts by law, in contact order within each
   Array<double> in_, out_;        // columns of one batch
   Array<double> moved_, answer_;  // inputs and force beside the trial, for laws without derivatives
   Array<uint8_t> mode_;
-  const LawInstance *evaluate(const Batch &batch, double h, ContactState &state);
+  Array<Local> local_;
+  Array<uint32_t> asked_;         // contacts of local_ that are asked together
+  bool smooth_ = false, remembers_ = false;
+  const LawInstance *evaluate(const LawInstance &law, std::span<const uint32_t> contacts, double h, ContactState &state);
+  const LawInstance *settle(const Batch &batch, double h, const double *wt, double least, ContactState &state);
   bool difference(const LawInstance &law, dfm_friction_in in, const double *ft, double *dv, double *dn);
 };
 

@@ -1,6 +1,7 @@
 // What contact/ and friction/ exchange while they solve one sub-step: columns over the contacts, in the contacts' order.
 // Pairs in the tangent plane are [2,stride], 2x2 matrices [4,stride] row-major; stride is a multiple of 8.
 #pragma once
+#include <cmath>
 #include <cstdint>
 
 #include "core/memory.h"
@@ -34,5 +35,18 @@ struct ContactState {
     law.resize(stride), mode.resize(stride), set_valued.resize(stride);
   }
 };
+
+// The part of a law's dft/dvt that dissipates: its symmetric part without the positive eigenvalue. [a b; b c], N s/m, negative semidefinite.
+struct Slope { double a, b, c; };
+inline Slope dissipative_slope(const ContactState &s, uint32_t i) {
+  const uint32_t n = s.stride;
+  const double a = s.dft_dvt[i], c = s.dft_dvt[3 * size_t(n) + i], b = 0.5 * (s.dft_dvt[size_t(n) + i] + s.dft_dvt[2 * size_t(n) + i]);
+  const double mean = 0.5 * (a + c), dev = 0.5 * (a - c), spread = std::sqrt(dev * dev + b * b);
+  const double top = mean + spread, bottom = mean - spread;
+  if (bottom >= 0) return {0, 0, 0};
+  if (!(top > 0)) return {a, b, c};
+  const double scale = bottom / (top - bottom);   // keep only bottom * p p^T, p p^T = (top I - D) / (top - bottom)
+  return {scale * (top - a), scale * -b, scale * (top - c)};
+}
 
 }  // namespace dfm

@@ -29,8 +29,8 @@ Pose Obstacle::pose_at_time(double t) const {
 }
 
 World::World(dfm_context *c)
-    : context(c), broad(c->memory), rows(c->memory), acceleration(c->memory), store(c->memory), next_store(c->memory), batches(c->memory), rollback(c->memory),
-      islands(c->memory) {
+    : context(c), broad(c->memory), rows(c->memory), acceleration(c->memory), store(c->memory), next_store(c->memory), batches(c->memory), areas(c->memory),
+      rollback(c->memory), islands(c->memory) {
   const Memory &m = c->memory;
   use_memory(m, driven, lent, contacts, tolerance.tangent, disturbance, best_impulse, tangents, match, block_surfels, block_impulse, block_velocity);
   GuardMemory &known = guard.memory;

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "broad/broad_phase.h"
+#include "contact/areas.h"
 #include "contact/solver.h"
 #include "contact/store.h"
 #include "deform/deform.h"
@@ -180,6 +181,7 @@ struct World {
   Array<double> disturbance, best_impulse;
   ContactStore store, next_store;
   LawBatches batches;
+  AreaShares areas;
   Array<double> tangents;
   Array<uint32_t> match;
   Array<uint32_t> block_surfels;                       // scratch of self-stepping bodies

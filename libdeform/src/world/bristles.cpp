@@ -1,0 +1,115 @@
+// Bristles between sub-steps.
+//
+//   normal turns    contact/store.cpp, transport(): by the smallest rotation that takes it along
+//   surfaces spin   here: about the normal, by half of what each of the two turns
+//   area changes    here: sigma0 A z is kept where A grows, z where A shrinks
+//
+// A surface's turn about n within the sub-step is what its points near the contact did, x -> x': with r from their middle, in the plane of n,
+//     tan(angle) = sum n . (r x r') / sum r . r'
+// is the rotation of least squares (Kabsch 1976, in the plane); exact for a rigid motion, whatever its size.
+#include "world/bristles.h"
+
+#include <algorithm>
+
+#include "world/world.h"
+
+namespace dfm {
+namespace {
+
+// A turn in the plane of n: cosine and sine.
+struct Turn { double c, s; };
+Turn unit_turn(double c, double s) {
+  const double size = std::sqrt(c * c + s * s);
+  return size > 0 ? Turn{c / size, s / size} : Turn{1, 0};
+}
+
+// Points of a surface around a contact's feature: corners of the triangles that have it.
+class Neighbourhood {
+ public:
+  explicit Neighbourhood(const Body &b) : body_(b) {}
+
+  void around(uint8_t type, uint32_t feature) {
+    const Surface &s = body_.surface;
+    if (type == 0)
+      for (uint32_t k = s.fan_begin[feature]; k < s.fan_begin[feature + 1]; ++k) triangle(s.fan[k]);
+    else if (type == 1)
+      for (int k = 0; k < 2; ++k) triangle(s.edge_tri[2 * size_t{feature} + size_t(k)]);
+    else triangle(feature);
+  }
+
+  Turn turn(Vec3 n) const {
+    if (count_ == 0) return {1, 0};
+    const Vec3 from = (1.0 / count_) * before_, to = (1.0 / count_) * after_;
+    double c = 0, s = 0;
+    for (uint32_t k = 0; k < count_; ++k) {
+      const Vec3 r = at_[k] - from, q = moved_[k] - to;
+      c += dot(r, q) - dot(n, r) * dot(n, q), s += dot(n, cross(r, q));
+    }
+    return unit_turn(c, s);
+  }
+
+ private:
+  static constexpr uint32_t kMost = 36;   // corners, counted once per triangle; the first twelve triangles of a fan tell its turn
+  const Body &body_;
+  uint32_t count_ = 0;
+  Vec3 at_[kMost], moved_[kMost], before_, after_;
+
+  void triangle(uint32_t t) {
+    if (t == kNone || count_ + 3 > kMost) return;
+    for (int k = 0; k < 3; ++k) {
+      const uint32_t surfel = body_.surface.tri[3 * size_t{t} + size_t(k)];
+      Vec3 now;
+      body_.surface.each_phyxel(surfel, [&](uint32_t phyxel, double weight) { now += weight * load3(&body_.p.x[size_t(phyxel) * kStride]); });
+      at_[count_] = load3(&body_.surface.x[4 * size_t{surfel}]), moved_[count_] = now;
+      before_ += at_[count_], after_ += now, ++count_;
+    }
+  }
+};
+
+Turn turn_of(const Body &b, uint8_t type, uint32_t feature, Vec3 n) {
+  Neighbourhood near(b);
+  near.around(type, feature);
+  return near.turn(n);
+}
+
+Turn turn_of(const World &w, const Obstacle &o, Vec3 n) {
+  if (!o.rigid && !o.has_target && !o.moves()) return {1, 0};
+  const double a = w.guard.motion * dot(n, spin_between(o.pose.rotation, o.end_pose(w.time, w.h, w.left).rotation, 1));
+  const double half = 0.5 * a * (1 + a * a / 12);   // tan(a / 2) up to a^5
+  return unit_turn(1 - half * half, 2 * half);
+}
+
+}  // namespace
+
+void share_areas(World &w) {
+  const auto counts = [](const LawInstance *law) { return (law->ops->needs & DFM_NEED_AREA) && !(law->ops->flags & DFM_FRIC_SET_VALUED); };
+  if (std::any_of(w.law_list.begin(), w.law_list.end(), counts)) w.areas.share(w.contacts, w.rows.impulse.data(), w.state.area.data());
+}
+
+void fit_bristles(World &w) {
+  ContactState &s = w.state;
+  if (s.nstate == 0) return;
+  for (uint32_t i = 0; i < w.rows.n; ++i) {
+    const uint32_t m = w.match[i];
+    if (m == kNone || !(w.store.area[m] < s.area[i])) continue;
+    const LawInstance &law = *w.law_list[s.law[i]];
+    for (uint32_t k = 0; k < law.nstate; ++k)
+      if (law.tangent[k]) s.bristle[size_t(k) * s.stride + i] *= w.store.area[m] / s.area[i];
+  }
+}
+
+void turn_frames(World &w) {
+  ContactStore &to = w.next_store;
+  for (uint32_t i = 0; i < w.rows.n; ++i) {
+    const LawInstance &law = *w.law_list[w.state.law[i]];
+    if (!law.turns || !to.touching[i]) continue;
+    const ContactPoint &c = w.contacts[i];
+    const Vec3 n = load3(c.normal), t = load3(&to.tangent[3 * size_t{i}]);
+    const Turn a = turn_of(*w.bodies[c.slot_a], c.type_a, c.feature_a, n);
+    const Turn b = c.obstacle ? turn_of(w, *w.obstacles[c.slot_b], n) : turn_of(*w.bodies[c.slot_b], c.kind == kEdgeEdge ? 1 : 2, c.feature_b, n);
+    const Turn both{a.c * b.c - a.s * b.s, a.c * b.s + a.s * b.c}, mean = unit_turn(1 + both.c, both.s);   // half of the sum
+    store3(&to.tangent[3 * size_t{i}], mean.c * t + mean.s * cross(n, t));
+  }
+}
+
+}  // namespace dfm

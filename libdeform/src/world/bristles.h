@@ -1,0 +1,15 @@
+// What a law's state goes through between two sub-steps beside the contact solve; doc/concepts/friction_memory.md.
+#pragma once
+
+namespace dfm {
+
+struct World;
+
+// state.area, where some law has bristles per area (contact/areas.h). After the warm start.
+void share_areas(World &w);
+// Where a contact's area has changed: its bristles keep their force where it has grown, their deflection where it has shrunk; what they store never rises.
+void fit_bristles(World &w);
+// After the commit: frames of laws with tangent state (next_store.tangent) turn with the mean spin of the two surfaces about the normal.
+void turn_frames(World &w);
+
+}  // namespace dfm

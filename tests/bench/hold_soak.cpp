@@ -1,0 +1,82 @@
+// The hold bound, in full: scenes of support/hold.h for all laws, steps and meshes, one row of a table each. Rows that the table has are left alone, so
+// that the run may be stopped and taken up again. Exits with 1 where something that should hold crept by more than a micrometre per second, or what
+// drifts by its law does so at more than 1.25 times the rate of its formula.
+//
+//   hold_soak TABLE.csv [--only TEXT] [--seconds N]     rows whose name contains TEXT; begins no row after N seconds
+#include <cstdio>
+#include <cstring>
+#include <set>
+
+#include "hold.h"
+#include "machine.h"
+#include "support.h"
+
+namespace {
+
+using namespace test::hold;
+
+struct Place { const char *scene; double level, cycles; };
+constexpr Place kPlaces[] = {{"slope", 0.5, 0}, {"slope", 0.9, 0}, {"slope", 0.99, 0}, {"pull", 0.5, 0}, {"pull", 0.9, 0}, {"pull", 0.99, 0},
+                             {"pinch", 1.05, 0}, {"pinch", 2, 0}, {"pinch", 20, 0}, {"pinch", 95, 0}, {"vibration", 0.5, 10000}};
+constexpr const char *kLaws[] = {"coulomb", "karnopp", "dahl", "lugre", "elastoplastic", "gms"};
+struct Step { const char *name; double seconds; };
+constexpr Step kSteps[] = {{"1/1000", 1e-3}, {"1/60", 1.0 / 60}, {"1/240", 1.0 / 240}, {"1/10000", 1e-4}};
+
+std::string name_of(const Place &p, const char *law, const char *mesh, const Step &step) {
+  char text[160];
+  std::snprintf(text, sizeof text, "%s,%s,%g,%s,%s", p.scene, law, p.level, mesh, step.name);
+  return text;
+}
+
+// Rows that are there, by their first five columns.
+std::set<std::string> known(const std::string &path) {
+  std::set<std::string> names;
+  std::FILE *f = std::fopen(path.c_str(), "r");
+  if (!f) return names;
+  char line[1024];
+  while (std::fgets(line, sizeof line, f)) {
+    const char *end = line;
+    for (int commas = 0; *end && commas < 5; ++end) commas += *end == ',';
+    if (end > line) names.insert(std::string(line, size_t(end - line - 1)));
+  }
+  std::fclose(f);
+  return names;
+}
+
+}  // namespace
+
+int main(int argc, char **argv) {
+  if (argc < 2) return std::fprintf(stderr, "hold_soak TABLE.csv [--only TEXT] [--seconds N]\n"), 2;
+  std::string only;
+  double seconds = 1e9;
+  for (int i = 2; i + 1 < argc; ++i) {
+    if (!std::strcmp(argv[i], "--only")) only = argv[i + 1];
+    if (!std::strcmp(argv[i], "--seconds")) seconds = std::atof(argv[i + 1]);
+  }
+  const std::set<std::string> done = known(argv[1]);
+  std::FILE *table = std::fopen(argv[1], "a");
+  if (!table) return std::perror(argv[1]), 2;
+  if (done.empty()) std::fprintf(table, "scene,law,level,mesh,step_s,creep_m_s,worst_contact_m_s,law_drift_m_s,stuck,substeps,unconverged,cpu_s,machine,compiler\n");
+  const auto start = std::chrono::steady_clock::now();
+  int bad = 0;
+  // Coarse meshes and short runs first: what is stopped early has seen every law.
+  for (const bool fine : {false, true})
+    for (const Step &step : kSteps)
+      for (const Place &p : kPlaces)
+        for (const char *law : kLaws) {
+          if (p.cycles > 0 && fine) continue;   // a quarter of an hour each
+          const std::string name = name_of(p, law, fine ? "fine" : "coarse", step);
+          if (done.count(name) || name.find(only) == std::string::npos) continue;
+          if (std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count() > seconds) continue;
+          const Result r = run_case({p.scene, law, p.level, step.seconds, fine, p.cycles});
+          const bool holds = r.drift > 0 ? r.creep < 1.25 * r.drift : r.creep < 1e-6;
+          bad += !holds;
+          std::fprintf(table, "%s,%.3g,%.3g,%.3g,%u,%llu,%llu,%.2f,%s,%s\n", name.c_str(), r.creep, r.contact, r.drift, r.stuck,
+                       static_cast<unsigned long long>(r.substeps), static_cast<unsigned long long>(r.unconverged), r.seconds, bench::machine().c_str(),
+                       bench::compiler());
+          std::fflush(table);
+          std::printf("%-48s creep %9.3g m/s  law's drift %9.3g  %s\n", name.c_str(), r.creep, r.drift, holds ? "" : "TOO MUCH");
+        }
+  std::fclose(table);
+  return bad > 0;
+}
