@@ -48,9 +48,11 @@ enum Column { kFx, kFy, kZx, kZy, kXx, kXy, kYx, kYy, kNx, kNy, kLimit, kStored,
 struct Columns {
   double *to[kColumns], spare[kColumns][kLanes];
   Columns(dfm_friction_out *out, size_t stride, size_t at) {
-    double *const base[kColumns] = {out->ft, out->ft, out->state, out->state, out->dft_dvt, out->dft_dvt, out->dft_dvt, out->dft_dvt, out->dft_dfn, out->dft_dfn, out->limit, out->stored};
-    constexpr uint32_t column[kColumns] = {0, 1, 0, 1, 0, 1, 2, 3, 0, 1, 0, 0};
-    for (uint32_t c = 0; c < kColumns; ++c) to[c] = base[c] ? base[c] + column[c] * stride + at : spare[c];
+    const auto place = [&](uint32_t first, double *base, uint32_t n) {
+      for (uint32_t c = 0; c < n; ++c) to[first + c] = base ? base + c * stride + at : spare[first + c];
+    };
+    place(kFx, out->ft, 2), place(kZx, out->state, 2), place(kXx, out->dft_dvt, 4), place(kNx, out->dft_dfn, 2);
+    place(kLimit, out->limit, 1), place(kStored, out->stored, 1);
   }
 };
 
@@ -123,6 +125,7 @@ inline void damping(const Batch &p, const Block &b, double *k1, double *slope, d
   }
 }
 
+// kDamped: sigma1 > 0; kFlat: g does not depend on the speed. Pointers that overlap nothing, as arguments, or the compiler would not use vectors.
 template <bool kDamped, bool kFlat>
 void answer(const Batch &p, const Block &b, const double *k1, const double *k1_slope, const double *k1_fn, double *__restrict ofx, double *__restrict ofy,
             double *__restrict ozx, double *__restrict ozy, double *__restrict oxx, double *__restrict oxy, double *__restrict oyx, double *__restrict oyy,
@@ -160,6 +163,13 @@ void answer(const Batch &p, const Block &b, const double *k1, const double *k1_s
   }
 }
 
+template <bool kDamped, bool kFlat>
+void answer(const Batch &p, const Block &b, const double *k1, const double *slope, const double *by_fn, const Columns &c, double *mode) {
+  double *const *const to = c.to;
+  answer<kDamped, kFlat>(p, b, k1, slope, by_fn, to[kFx], to[kFy], to[kZx], to[kZy], to[kXx], to[kXy], to[kYx], to[kYy], to[kNx], to[kNy], to[kLimit],
+                         to[kStored], mode);
+}
+
 // Law::batch(params) and Law::flow(params, batch, block), which fills m and its derivatives, are all that a law of the family says.
 template <class Law>
 struct Run {
@@ -167,8 +177,7 @@ struct Run {
     Batch p = Law::batch(in->params);
     p.h = in->dt;
     for (size_t at = 0; at < in->n; at += kLanes) {  // lanes up to n rounded to 8 may be touched
-      const Columns columns(out, in->stride, at);
-      double *const *const to = columns.to;
+      const Columns to(out, in->stride, at);
       double mode[kLanes];
       Block b;
       load(p, in, at, b);
@@ -177,11 +186,11 @@ struct Run {
       if (p.sigma1 > 0) {
         double k1[kLanes], slope[kLanes], by_fn[kLanes];
         damping(p, b, k1, slope, by_fn);
-        answer<true, false>(p, b, k1, slope, by_fn, to[kFx], to[kFy], to[kZx], to[kZy], to[kXx], to[kXy], to[kYx], to[kYy], to[kNx], to[kNy], to[kLimit], to[kStored], mode);
+        answer<true, false>(p, b, k1, slope, by_fn, to, mode);
       } else if (Law::kFlat) {
-        answer<false, true>(p, b, nullptr, nullptr, nullptr, to[kFx], to[kFy], to[kZx], to[kZy], to[kXx], to[kXy], to[kYx], to[kYy], to[kNx], to[kNy], to[kLimit], to[kStored], mode);
+        answer<false, true>(p, b, nullptr, nullptr, nullptr, to, mode);
       } else {
-        answer<false, false>(p, b, nullptr, nullptr, nullptr, to[kFx], to[kFy], to[kZx], to[kZy], to[kXx], to[kXy], to[kYx], to[kYy], to[kNx], to[kNy], to[kLimit], to[kStored], mode);
+        answer<false, false>(p, b, nullptr, nullptr, nullptr, to, mode);
       }
       for (uint32_t i = 0; out->mode && i < kLanes; ++i) out->mode[at + i] = static_cast<uint8_t>(mode[i]);
     }

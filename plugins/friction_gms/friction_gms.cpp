@@ -13,8 +13,8 @@
 //
 // At a crawl the force of a slipping element rises in time without motion (L > |ft|), up to nu F_S: the published law takes that work from nowhere, as much as
 // sum nu_i^2 (F_S^2 - F_C^2)/(2 k_i). Here it is paid for: a budget E gathers what sliding dissipates, up to sum (nu_i F_S)^2/(2 K_i), and a step may
-// rise by f' = ft + theta (L t - ft), theta = min(1, E/N), where N >= the elastic energy that this step could gain. A radial return loses energy and the loss is
-// concave in f' along t, so with elastic energy plus E as storage the law is passive with any parameters (decision 0030).
+// rise by f' = ft + theta (L t - ft), theta = min(1, E/N), where N >= the elastic energy that this step could gain. A radial return loses energy and the
+// loss is concave in f' along t, so with elastic energy plus E as storage the law is passive with any parameters (decision 0030).
 #include "../friction_common/curve.h"
 
 namespace {

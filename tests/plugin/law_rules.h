@@ -57,7 +57,9 @@ inline void put(const Law &law, const In &in, tiny::Batch &b, uint32_t i) {
 
 inline Out get(const Law &law, const tiny::Batch &b, uint32_t i) {
   const uint32_t s = b.stride;
-  Out o{{-b.ft[i], -b.ft[s + i]}, {-b.dv[i], -b.dv[s + i], -b.dv[2 * s + i], -b.dv[3 * s + i]}, {-b.dn[i], -b.dn[s + i]}, b.limit[i], b.stored[i], {}, b.mode[i]};
+  Out o{{-b.ft[i], -b.ft[s + i]},
+        {-b.dv[i], -b.dv[s + i], -b.dv[2 * s + i], -b.dv[3 * s + i]},
+        {-b.dn[i], -b.dn[s + i]}, b.limit[i], b.stored[i], {}, b.mode[i]};
   for (uint32_t k = 0; k < law.nstate; ++k) o.state[k] = b.state_out[k * s + i];
   return o;
 }
@@ -209,7 +211,11 @@ inline void extremes(const Law &law, double z_max) {
             for (uint32_t k : law.pairs) in.state[k] = -z * z_max, in.state[k + 1] = 0.3 * z * z_max;
             for (uint32_t k : law.flags) in.state[k] = k % 2;
             const Out o = ask(law, in);
-            const auto where = [&] { char text[120]; std::snprintf(text, sizeof text, "fn %g v %g z %g h %g area %g", fn, v, z, h, area); return std::string(text); };
+            const auto where = [&] {
+              char text[120];
+              std::snprintf(text, sizeof text, "fn %g v %g z %g h %g area %g", fn, v, z, h, area);
+              return std::string(text);
+            };
             ASSERT_TRUE(std::isfinite(o.f[0]) && std::isfinite(o.f[1]) && o.limit >= 0 && std::isfinite(o.stored)) << where();
             for (double d : o.dv) ASSERT_TRUE(std::isfinite(d)) << where();
             for (double d : o.dn) ASSERT_TRUE(std::isfinite(d)) << where();

@@ -1,8 +1,9 @@
 /* deform/elementary.h -- exp, log, pow, sinpi and cospi from + - * / alone, for what runs inside a step: a C library picks variants with fused
  * multiply-add by processor, so its last bit differs between machines; these give the same bits everywhere they are compiled without
  * contraction (-ffp-contract=off, which deform_add_plugin sets). Header only, C99 and C++17; no table, no branch on the common path, so
- * loops over them vectorise. Error, measured against 80-bit long double in the tests: dfm_exp and dfm_log below 1 ulp (dfm_exp within
- * half a subnormal where the result is subnormal), dfm_sinpi and dfm_cospi below 1.7 ulp, dfm_pow below 2 ulp where |y log x| <= 40, growing to 40 ulp at the ends of the range. */
+ * loops over them vectorise. Error, measured against 80-bit long double in the tests: dfm_exp and dfm_log below 1 ulp (dfm_exp within half a
+ * subnormal where the result is subnormal), dfm_sinpi and dfm_cospi below 1.7 ulp, dfm_pow below 2 ulp where |y log x| <= 40, growing to 40 ulp
+ * at the ends of the range. */
 #ifndef DEFORM_ELEMENTARY_H
 #define DEFORM_ELEMENTARY_H
 #include <stdint.h>

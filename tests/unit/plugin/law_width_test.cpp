@@ -74,7 +74,7 @@ TEST(LawWidth, Lugre_HasOneAnswer) {
 
 TEST(LawWidth, Elastoplastic_HasOneAnswer) {
   for (double i : {1.0, 3.0})
-    for (double multiplier : {0.0, 1.0}) 
+    for (double multiplier : {0.0, 1.0})
       all_widths<elastoplastic_inside::Elastoplastic>({0.15, 0.20, 0.01, 1.3, 1e4, 20, 0, 0.01, 0.4, 0.7, i, multiplier}, elastoplastic_inside::law);
 }
 
