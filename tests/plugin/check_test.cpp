@@ -66,7 +66,9 @@ class BrokenLaw : public testing::TestWithParam<Case> {};
 TEST_P(BrokenLaw, FailsTheRuleThatIsMeantForItAndNoOther) {
   const test::CommandResult r = check(broken(GetParam().law));
   EXPECT_EQ(r.exit_code, 1) << r.out << r.err;
-  EXPECT_EQ(rules_that("FAIL", r.out), std::vector<std::string>{GetParam().rule}) << r.out;
+  std::vector<std::string> expected{GetParam().rule};
+  if (FINDS_RACES && GetParam().law == std::string("remembers")) expected.push_back("V10");  // what it remembers, threads share
+  EXPECT_EQ(rules_that("FAIL", r.out), expected) << r.out;
   const std::string why = sentence(GetParam().rule, r.out);
   EXPECT_NE(why.find(GetParam().says), std::string::npos) << why;
   EXPECT_NE(why.find("; "), std::string::npos) << "a consequence and a remedy: " << why;

@@ -127,6 +127,15 @@ TEST_F(Dahl, AroundACircle_LagsByTheClosedForm) {
   EXPECT_NEAR(lag, std::atan(s), 1e-3);
 }
 
+TEST_F(Dahl, NearlyRigidBristles_StayBoundedAndPassiveAtEveryStep) {
+  for (double sigma0 : {1e9, 1e12, 1e15})
+    for (double alpha : {1.0, 3.0}) {
+      const Law l{law.ops, {0.15, sigma0, alpha}, 2, {0}, {}, false};
+      EXPECT_GE(rules::worst_balance(l, 0.15 / sigma0, 200, false), -1e-12) << sigma0;
+      rules::extremes(l, 0.15 / sigma0);
+    }
+}
+
 TEST_F(Dahl, FallingNormalForce_CutsTheBristleFirst) {
   Contact k(law, 9.8);
   k.path(1e-2, 100, 0.1);

@@ -140,6 +140,29 @@ TEST_F(Elastoplastic, SlidingForLong_IsTheSteadyCurveAtAnyStep) {
       }
 }
 
+TEST_F(Elastoplastic, VanishingNormalForce_LeavesTheSlopeOfTheCone) {
+  for (double multiplier : {0.0, 1.0})
+    for (double w : {1e-4, 0.01, 1.0})
+      for (double fn : {1e-9, 1e-30, 1e-100, 1e-139}) {
+        In in;
+        in.fn = fn, in.v[0] = 0.6 * w, in.v[1] = -0.8 * w, in.state[0] = 3e-5, in.state[1] = 1e-5;
+        const Out o = rules::ask(make({0.15, 0.20, 0.01, 2, 1e4, 20, 0, 0.01, 0, 0.7, 1, multiplier}), in);
+        const double mu = 0.15 + 0.05 * std::exp(-w * w / 1e-4);
+        EXPECT_NEAR(o.f[0] / fn, 0.6 * mu, 1e-4 * mu) << w << " " << fn;
+        EXPECT_NEAR(o.f[1] / fn, -0.8 * mu, 1e-4 * mu);
+        EXPECT_NEAR(o.dn[0], 0.6 * mu, 1e-4 * mu);
+        EXPECT_NEAR(o.dn[1], -0.8 * mu, 1e-4 * mu);
+      }
+}
+
+TEST_F(Elastoplastic, NearlyRigidBristles_StayBoundedAndPassiveAtEveryStep) {
+  for (double sigma0 : {1e9, 1e12, 1e15}) {
+    const Law l = make({0.15, 0.20, 0.01, 2, sigma0, 1e-3 * sigma0, 0, 0.01, 0.4, 0.7, 1, 0});
+    EXPECT_GE(rules::worst_balance(l, 0.20 / sigma0, 200, false), -1e-12) << sigma0;
+    rules::extremes(l, 0.20 / sigma0);
+  }
+}
+
 TEST_F(Elastoplastic, HugeStep_EndsOnTheLevel) {
   for (double i : {1.0, 2.0, 5.0}) {
     Contact k(make({0.15, 0.20, 0.01, 2, 1e9, 20, 0, 0.01, 0.4, 0.7, i, 0}), 9.8);

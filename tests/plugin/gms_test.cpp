@@ -147,6 +147,14 @@ TEST_F(Gms, HeldAtAnyLoad_KeepsItsElementsToTheBit) {
   for (int e = 0; e < 8; ++e) EXPECT_EQ(k.in.state[e], held.state[e]);
 }
 
+TEST_F(Gms, NearlyRigidElements_StayBoundedAndPassiveAtEveryStep) {
+  for (double k : {1e9, 1e12, 1e15}) {
+    const Law l = make({0.15, 0.20, 0.01, 2, 0.4, k / 100, 0.4 * k, 0.3 * k, 0.2 * k, 0.1 * k, 0.2, 0.3, 0.3, 0.2});
+    EXPECT_GE(rules::worst_balance(l, 0.20 / k, 200, false), -1e-12) << k;
+    rules::extremes(l, 0.20 / k);
+  }
+}
+
 TEST_F(Gms, FallingNormalForce_CutsTheElementsFirst) {
   Contact k(dev, 9.8);
   k.path(1e-2, 100, 1e-4);

@@ -26,7 +26,7 @@
 #endif
 
 #if DEFORM_SANITIZED
-#include <sanitizer/allocator_interface.h>
+extern "C" size_t __sanitizer_get_current_allocated_bytes();   // not every compiler brings the header that declares it
 #endif
 
 namespace cli::check {
