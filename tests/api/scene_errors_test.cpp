@@ -143,7 +143,7 @@ TEST(SceneErrors, Names_AreUniqueAndKnown) {
          {"/bodies/0/fix/0={\"group\":\"left\"}", {"/bodies/0/fix/0/group", "left"}},
          {"/bodies/0/mesh=\"missing.msh\"", {"/bodies/0/mesh", "missing.msh"}},
          {"/bodies/0/model/type=\"corotational_fem\"", {"/bodies/0/model/type", "msm"}},
-         {"/contact/friction/0/law=\"dahl\"", {"/contact/friction/0/law", "coulomb", "none"}},
+         {"/contact/friction/0/law=\"dalh\"", {"/contact/friction/0/law", "coulomb", "none"}},
          {"/effects=[\"cutting\"]", {"/effects", "cutting"}}});
 }
 

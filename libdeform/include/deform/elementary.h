@@ -24,8 +24,8 @@ static inline double dfm_double_(uint64_t b) { double x; memcpy(&x, &b, sizeof x
 static inline double dfm_exp2_(double high, double low) {
   const double x = high < -750.0 ? -750.0 : high > 710.0 ? 710.0 : high;   /* a NaN falls through */
   const double shifted = x * 0x1.71547652b82fep+0 + DFM_ROUND_, n = shifted - DFM_ROUND_;
-  const int64_t k = (int64_t)(dfm_bits_(shifted) - dfm_bits_(DFM_ROUND_));
-  const int64_t k1 = (int64_t)((uint64_t)(k + 4096) >> 1) - 2048, k2 = k - k1;   /* halves, without a signed shift */
+  const uint64_t k = dfm_bits_(shifted) - dfm_bits_(DFM_ROUND_);
+  const uint64_t k1 = ((k + 4096) >> 1) - 2048, k2 = k - k1;                     /* halves, modulo 2^64: a NaN overflows nothing */
   const double hi = x - n * DFM_LN2_HIGH_, lo = low - n * DFM_LN2_LOW_;
   const double r = hi + lo, tail = (hi - r) + lo, r2 = r * r, r4 = r2 * r2;
   const double p0 = 1.0 / 2 + r * (1.0 / 6), p1 = 1.0 / 24 + r * (1.0 / 120), p2 = 1.0 / 720 + r * (1.0 / 5040);
@@ -33,7 +33,7 @@ static inline double dfm_exp2_(double high, double low) {
   const double p5 = 1.0 / 479001600 + r * (1.0 / 6227020800.0);
   const double p = (p0 + r2 * p1) + r4 * ((p2 + r2 * p3) + r4 * (p4 + r2 * p5));
   const double y = 1.0 + (r + (tail + r2 * p));
-  return y * dfm_double_((uint64_t)(1023 + k1) << 52) * dfm_double_((uint64_t)(1023 + k2) << 52);
+  return y * dfm_double_((1023 + k1) << 52) * dfm_double_((1023 + k2) << 52);
 }
 
 /** e^x; 0 below -745.2, +inf above 709.8, NaN for NaN. */
