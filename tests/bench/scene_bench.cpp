@@ -1,6 +1,6 @@
 // Full steps per second of processor time, on the scene files that are examples and tests too. What is timed is dfm_world_step alone: model,
 // detection, contact and friction, one core. Prints a table with the figure to reach (quality page of the design) and where the time goes;
-// --csv FILE appends rows.
+// --csv FILE appends rows; --only TEXT takes scenes whose name contains it; --law NAME puts that law, with the same coefficient, into their first rule.
 #include <sys/resource.h>
 
 #include <cstdio>
@@ -98,10 +98,12 @@ void run(dfm_context *context, const Case &c, std::FILE *csv, const std::string 
 
 int main(int argc, char **argv) {
   std::FILE *csv = nullptr;
-  std::string commit = "unknown";
+  std::string commit = "unknown", only, law;
   for (int i = 1; i + 1 < argc; ++i) {
     if (!std::strcmp(argv[i], "--csv")) csv = std::fopen(argv[i + 1], "w");
     if (!std::strcmp(argv[i], "--commit")) commit = argv[i + 1];
+    if (!std::strcmp(argv[i], "--only")) only = argv[i + 1];
+    if (!std::strcmp(argv[i], "--law")) law = argv[i + 1];
   }
   if (csv) std::fprintf(csv, "machine,compiler,commit,scene,steps_per_cpu_s,best_slice,reach,contacts,substeps\n");
   dfm_context_def def = dfm_context_def_default();
@@ -126,7 +128,12 @@ int main(int argc, char **argv) {
       {"ten bodies, unguarded", "ten_bodies.json", {"/contact/guard=false"}, 1, 0.5, 0},
   };
   std::printf("%-34s %8s\n", "scene", "full steps per second of processor time");
-  for (const Case &c : cases) run(context, c, csv, commit);
+  for (Case c : cases) {
+    if (std::string(c.name).find(only) == std::string::npos) continue;
+    const char *const params = law == "none" ? "{}" : law == "dahl" ? "{\"mu_C\": 0.8}" : "{\"mu_C\": 0.8, \"mu_S\": 0.8}";
+    if (!law.empty()) c.set.push_back("/contact/friction/0/law=\"" + law + "\""), c.set.push_back(std::string("/contact/friction/0/params=") + params);
+    run(context, c, csv, commit);
+  }
   dfm_context_destroy(context);
   if (csv) std::fclose(csv);
 }

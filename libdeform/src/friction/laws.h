@@ -37,8 +37,8 @@ class LawBatches {
   const LawInstance *evaluate(double h, ContactState &state);
   // The same, but a smooth law is asked where the contact would come to rest alone (friction/local_solve.cpp): state.vt moves there.
   //   wt     [n] 1/kg, how much slip an impulse makes at its own contact; with it ft_stop tells the slip that others leave
-  //   least  m/s, below which a slip need not be known
-  const LawInstance *answer(double h, const double *wt, double least, ContactState &state);
+  //   least, share   m/s, 1: a contact's slip need not be known closer than least + share of it
+  const LawInstance *answer(double h, const double *wt, double least, double share, ContactState &state);
   bool smooth() const { return smooth_; }          // is any law of this sub-step not set-valued?
   bool remembers() const { return remembers_; }    // has any a state?
 
@@ -55,7 +55,7 @@ class LawBatches {
   Array<uint32_t> asked_;         // contacts of local_ that are asked together
   bool smooth_ = false, remembers_ = false;
   const LawInstance *evaluate(const LawInstance &law, std::span<const uint32_t> contacts, double h, ContactState &state);
-  const LawInstance *settle(const Batch &batch, double h, const double *wt, double least, ContactState &state);
+  const LawInstance *settle(const Batch &batch, double h, const double *wt, double least, double share, ContactState &state);
   bool difference(const LawInstance &law, dfm_friction_in in, const double *ft, double *dv, double *dn);
 };
 

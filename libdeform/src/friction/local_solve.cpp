@@ -35,17 +35,17 @@ Residue residue(const ContactState &s, uint32_t i, double m) {
 
 }  // namespace
 
-const LawInstance *LawBatches::answer(double h, const double *wt, double least, ContactState &state) {
+const LawInstance *LawBatches::answer(double h, const double *wt, double least, double share, ContactState &state) {
   for (const Batch &batch : batches_) {
     if (const LawInstance *bad = evaluate(*batch.law, {&order_[batch.begin], batch.n}, h, state)) return bad;
     if (batch.law->ops->flags & DFM_FRIC_SET_VALUED) continue;
-    if (const LawInstance *bad = settle(batch, h, wt, least, state)) return bad;
+    if (const LawInstance *bad = settle(batch, h, wt, least, share, state)) return bad;
   }
   return nullptr;
 }
 
 // All contacts of a batch side by side; those that are done leave it.
-const LawInstance *LawBatches::settle(const Batch &batch, double h, const double *wt, double least, ContactState &s) {
+const LawInstance *LawBatches::settle(const Batch &batch, double h, const double *wt, double least, double share, ContactState &s) {
   const uint32_t n = s.stride;
   local_.clear();
   for (uint32_t k = 0; k < batch.n; ++k)
@@ -57,7 +57,7 @@ const LawInstance *LawBatches::settle(const Batch &batch, double h, const double
       const double m = h * wt[i];
       const Residue g = residue(s, i, m);
       const double size = std::sqrt(s.vt[i] * s.vt[i] + s.vt[n + i] * s.vt[n + i]);
-      if (g.size <= 0.01 * least + 1e-4 * size) continue;
+      if (g.size <= least + share * size) continue;
       // Beyond the crossing, g points along the step: deep in stick it is nearly as large there as it was, so less does not tell.
       const bool nearer = g.size < 0.5 * c.left || (c.from_zero && g.size < c.left && g.a * c.step[0] + g.b * c.step[1] < 0);
       if (std::isinf(c.left) || nearer) {

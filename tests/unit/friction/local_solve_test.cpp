@@ -61,7 +61,7 @@ TEST(LocalSolve, AnyStiffnessAndStep_MeetsTheRadialReturn) {
       }
       batches.gather({&law}, s);
       EXPECT_TRUE(batches.smooth());
-      ASSERT_EQ(batches.answer(h, wt.data(), 1e-6, s), nullptr);
+      ASSERT_EQ(batches.answer(h, wt.data(), 1e-8, 1e-4, s), nullptr);
       for (uint32_t i = 0; i < n; ++i) {
         const auto expected = by_hand(cases[i], sigma0, h);
         const double off = std::hypot(s.ft[i] - expected[0], s.ft[s.stride + i] - expected[1]);
