@@ -21,8 +21,8 @@ def follow(guide, prefix, libdir, scratch):
     shutil.copytree(guide.with_suffix(""), folder)
     env = {**clean_environment(), "CMAKE_PREFIX_PATH": str(prefix), "PKG_CONFIG_PATH": str(prefix / libdir / "pkgconfig"),
            "LD_LIBRARY_PATH": str(prefix / libdir), "PATH": f"{prefix / 'bin'}:{os.environ['PATH']}"}
-    if not list(folder.rglob("*.cpp")):
-        env["CXX"] = "/bin/false"  # a guide in C asks for no other compiler
+    if not any("CXX" in path.read_text() for path in folder.rglob("CMakeLists.txt")):
+        env["CXX"] = "/bin/false"  # a guide whose project is in C asks for no other compiler
     blocks = re.findall(r"^```sh\n(.*?)^```", guide.read_text(), re.M | re.S)
     tools = " ".join(blocks)
     if "cmake -S" not in tools or "pkg-config" not in tools:

@@ -68,7 +68,10 @@ std::vector<Call> body_calls() {
       {"body_move_held", [](uint64_t h) { const dfm_sine s{}; return dfm_body_move_held(h, 1, &index0, 0, nullptr, &s); }},
       {"body_add_load", [](uint64_t h) { return dfm_body_add_load(h, 1, &index0, one3, 0, nullptr, nullptr, nullptr); }},
       {"body_remove_load", [](uint64_t h) { return dfm_body_remove_load(h, 1); }},
-      {"body_add_spring", [](uint64_t h) { const dfm_spring_def d{sizeof d, 1, &index0, nullptr, {}, nullptr, 0, 0, 1, 0}; return dfm_body_add_spring(h, &d, nullptr); }},
+      {"body_add_spring", [](uint64_t h) {
+         const dfm_spring_def d{sizeof d, 1, &index0, nullptr, {}, nullptr, 0, 0, 1, 0};
+         return dfm_body_add_spring(h, &d, nullptr);
+       }},
       {"body_set_spring_target", [](uint64_t h) { return dfm_body_set_spring_target(h, 1, zero3); }},
       {"body_get_spring_force", [](uint64_t h) { return dfm_body_get_spring_force(h, 1, numbers); }},
       {"body_remove_spring", [](uint64_t h) { return dfm_body_remove_spring(h, 1); }},

@@ -198,7 +198,8 @@ class Builder {
   }
 
   // The cell that holds a point of the body at rest, or the nearest one where the point lies close by.
-  void locate_near(const double point[3], const std::string &pointer, const std::string &name, const BodyMesh &mesh, uint32_t corners[4], double weights[4]) const {
+  void locate_near(const double point[3], const std::string &pointer, const std::string &name, const BodyMesh &mesh, uint32_t corners[4],
+                   double weights[4]) const {
     const double away = locate(mesh, point, corners, weights);
     if (!(away <= 0.25 * mesh.size))
       fail(DFM_E_ARG, "%s: %s/point: lies %g m away from \"%s\", which at rest, scaled but before its pose, spans [%g, %g, %g] to [%g, %g, %g]",

@@ -48,7 +48,14 @@ struct CellField { std::string key, from; uint32_t width; Array<double> values; 
 // A lasting load: force[i] on points[i], times the keyed scale, times 1 + sine.
 struct Load { uint32_t number; std::vector<uint32_t> points; std::vector<double> force; std::vector<dfm_scale_key> keys; dfm_sine sine{}; };
 // A spring of rest length zero from the weighted mean of points to a place, or a path of places.
-struct Spring { uint32_t number; std::vector<uint32_t> points; std::vector<double> weights; std::vector<dfm_vector_key> keys; Vec3 to; double stiffness, damping; };
+struct Spring {
+  uint32_t number;
+  std::vector<uint32_t> points;
+  std::vector<double> weights;
+  std::vector<dfm_vector_key> keys;
+  Vec3 to;
+  double stiffness, damping;
+};
 // Held points carried by keyed poses (relative to the first key) and a sine.
 struct HeldMotion { std::vector<uint32_t> points; std::vector<double> start; std::vector<dfm_pose_key> keys; dfm_sine sine{}; };
 

@@ -143,7 +143,8 @@ int run(const std::string &name, const std::string &mesh, const Values &v) {
     return print("creep_um_per_s", 1e6 / kLength * std::fabs(line.slope()), s.time), 0;
   }
   s.load(mesh, v, lift);
-  btRigidBody *const floor = s.wall(btVector3(btScalar(0.5 * kLength), btScalar(0.5 * kLength), btScalar(0.05 * kLength)), btVector3(0, 0, btScalar(-0.05 * kLength)));
+  const btScalar wide = btScalar(0.5 * kLength), thick = btScalar(0.05 * kLength);
+  btRigidBody *const floor = s.wall(btVector3(wide, wide, thick), btVector3(0, 0, -thick));
   if (name == "slope_ramp") {
     double start = NAN, angle = 0;
     while (angle < std::atan(1.2 * v.at("mu"))) {

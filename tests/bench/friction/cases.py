@@ -74,17 +74,20 @@ def cases():
     for mu in (0.5, 1.0):
         add("pinch_hold", "coulomb", {"creep_um_per_s": CREEP, "lift_share": band(1.0, 0.01)}, body=ball, mu=mu, depth=0.006, close=0.3, load=0.6,
             span=[1.6, 2.6], step=5e-4)
-    disc = {"shape": "disc", "radius": 0.05, "height": 0.02, "cells": 3000, "material": {"young": 2e5, "poisson": 0.25, "density": 1000.0, "damping_stiffness": 2e-3}}
+    disc = {"shape": "disc", "radius": 0.05, "height": 0.02, "cells": 3000,
+            "material": {"young": 2e5, "poisson": 0.25, "density": 1000.0, "damping_stiffness": 2e-3}}
     for s in (0.0, 0.5, 1.0, 2.0):
         # mu N R 2/3 of a disc of even pressure that only spins
         answer = {"torque_share": band(2 / 3, 0.05)} if s == 0 else {"force_share": band(disc_force(s), 0.05)}
         add("rotating_pad", "coulomb", answer, body=disc, mu=0.5, ratio=s, speed=0.05, spin=1.0, depth=4e-4, press=0.2, span=[0.7, 1.1], step=5e-4)
     add("vibration_drift", "coulomb", {"creep_um_per_s": CREEP}, body=block, mu=0.5, angle=math.atan(0.25), tilt=1.0, frequency=50.0,
         acceleration=0.2 * 0.5 * G * math.cos(math.atan(0.25)), span=[2.0, 6.0], step=5e-4)
-    slab = {"shape": "block", "size": [0.05, 0.05, 0.02], "cells": 400, "material": {"young": 2e6, "poisson": 0.25, "density": 1000.0, "damping_stiffness": 2e-4}}
+    slab = {"shape": "block", "size": [0.05, 0.05, 0.02], "cells": 400,
+            "material": {"young": 2e6, "poisson": 0.25, "density": 1000.0, "damping_stiffness": 2e-4}}
     mass, mu_s, mu_c, k, speed = 0.05, 0.6, 0.4, 50.0, 0.05
     period = stick_slip_period(mass, k, mu_s * mass * G, mu_c * mass * G, speed)
-    add("belt_stick_slip", "static_kinetic", {"period": band(period, 0.05)}, body=slab, mu_S=mu_s, mu_C=mu_c, v_s=1e-3, stiffness=k, speed=speed, span=[1.0, 3.0],
+    add("belt_stick_slip", "static_kinetic", {"period": band(period, 0.05)}, body=slab, mu_S=mu_s, mu_C=mu_c, v_s=1e-3, stiffness=k,
+        speed=speed, span=[1.0, 3.0],
         step=2e-4)
     # Pressed at its top and moved to and fro, all of it but its foot held sideways: what tilts would make the pressure uneven, and a bristle law is
     # concave in the pressure. The bristles (s0 A) are 100 times softer than the shear of the lowest cells.

@@ -47,7 +47,8 @@ class Entry:
                      end=case.get("span", [0, 0])[1], radius=case["body"].get("radius", 0.0))
         started = time.time()
         try:
-            done = subprocess.run([self.program, case["name"], path, *("%s=%.9g" % kv for kv in given.items())], capture_output=True, text=True, timeout=MOST_SECONDS)
+            arguments = ["%s=%.9g" % pair for pair in given.items()]
+            done = subprocess.run([self.program, case["name"], path, *arguments], capture_output=True, text=True, timeout=MOST_SECONDS)
         except subprocess.TimeoutExpired:
             raise RuntimeError("took more than %d s" % MOST_SECONDS)
         if done.returncode:

@@ -57,7 +57,8 @@ class Entry:
         elif law in ("lugre", "elastoplastic"):  # bristles that give a thousandth of a millimetre at the limit of 1 kPa
             params.update({"sigma0": 1e9, "sigma1": 1e5})
         return {"format": "deform-scene", "version": 1, "gravity": gravity, "time": {"duration": duration, "step": case["step"]},
-                "materials": {"gel": {"density": m["density"], "young": m["young"], "poisson": m["poisson"], "damping": {"mass": 0, "stiffness": m["damping_stiffness"]}}},
+                "materials": {"gel": {"density": m["density"], "young": m["young"], "poisson": m["poisson"],
+                                      "damping": {"mass": 0, "stiffness": m["damping_stiffness"]}}},
                 "bodies": [{"name": "soft", "mesh": self.mesh(case["body"]), "material": "gel", "model": {"type": "msm"}}],
                 "contact": {"friction": [{"between": ["*", "*"], "law": law, "params": params}]}, "output": {"every": every}}
 
@@ -119,7 +120,8 @@ class Entry:
         scene = self.floor(self.base(case, law, case["span"][1], 0.02, self.tilting(0.2, case["tilt"], case["angle"])))
         w = 2 * math.pi * case["frequency"]
         scene["obstacles"][0] = {"name": "floor", "shape": "box", "half_size": [0.5, 0.5, 0.05], "pose": {"position": [0, 0, -0.05]},
-                                 "motion": {"keyframes": [{"t": 0, "position": [0, 0, -0.05]}], "sine": {"amplitude": [case["acceleration"] / w ** 2, 0, 0], "frequency": case["frequency"]}}}
+                                 "motion": {"keyframes": [{"t": 0, "position": [0, 0, -0.05]}],
+                                            "sine": {"amplitude": [case["acceleration"] / w ** 2, 0, 0], "frequency": case["frequency"]}}}
         return scene, self.creep(case, "x")
 
     def scene_pinch_hold(self, case, law):
@@ -137,8 +139,7 @@ class Entry:
             out = self.creep(case, "z")(t)
             time, f = t.body("force_z")
             carried = [u for s, u in zip(time, f) if s >= case["span"][0]]
-            out["lift_share"] = sum(carried) / len(carried) / (t.summary["bodies"]["soft"]["mass"] * G) if "mass" in t.summary["bodies"]["soft"] else \
-                sum(carried) / len(carried) / (case["body"]["material"]["density"] * t.first("volume") * G)
+            out["lift_share"] = sum(carried) / len(carried) / (case["body"]["material"]["density"] * t.first("volume") * G)
             return out
 
         return scene, measure
@@ -172,8 +173,8 @@ class Entry:
 
     def scene_belt_stick_slip(self, case, law):
         scene = self.floor(self.base(case, law, case["span"][1], 0.002, [0, 0, -G]), velocity_surface=[case["speed"], 0, 0])
-        x0 = case["body"]["size"][0] / 2
-        scene["bodies"][0]["springs"] = [{"box": [[-1, -1, -1], [1, 1, 1]], "to": [x0, case["body"]["size"][1] / 2, case["body"]["size"][2] / 2], "stiffness": case["stiffness"]}]
+        middle = [s / 2 for s in case["body"]["size"]]
+        scene["bodies"][0]["springs"] = [{"box": [[-1, -1, -1], [1, 1, 1]], "to": middle, "stiffness": case["stiffness"]}]
 
         def measure(t):
             time, x = t.body("com_x")

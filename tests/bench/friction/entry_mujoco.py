@@ -54,7 +54,8 @@ class Entry:
             mass, lift, " ".join("%.9g" % x for p in points for x in p), " ".join(str(i) for t in tets for i in t))
         flex += '<elasticity young="%g" poisson="%g" damping="%g"/><edge equality="false"/>' % (m["young"], m["poisson"], m["damping_stiffness"])
         flex += '<contact selfcollide="none" condim="3" friction="%g 0.005 0.0001"/>%s</flexcomp>' % (case["mu"], pin)
-        xml = '<mujoco><size memory="1G"/><option timestep="%g" cone="elliptic" %s/><default><geom friction="%g 0.005 0.0001"/></default><worldbody>%s%s</worldbody></mujoco>' % (
+        xml = ('<mujoco><size memory="1G"/><option timestep="%g" cone="elliptic" %s/><default><geom friction="%g 0.005 0.0001"/></default>'
+               '<worldbody>%s%s</worldbody></mujoco>') % (
             case["step"] * share, option, case["mu"], walls, holder % flex if holder else flex)
         try:
             model = self.mj.MjModel.from_xml_string(xml)
@@ -185,7 +186,8 @@ class Entry:
         height, s, end = case["body"]["height"], case["ratio"], case["span"][1]
         points, _ = self.mesh(case["body"])
         top = " ".join(str(i) for i, p in enumerate(points) if p[2] > height - 1e-6)
-        plate = '<body name="plate" pos="0 0 -0.05"><joint name="slide" type="slide" axis="1 0 0"/><joint name="turn" type="hinge" axis="0 0 1"/><geom name="plate" type="box" size="0.5 0.5 0.05" mass="1e6"/></body>'
+        plate = ('<body name="plate" pos="0 0 -0.05"><joint name="slide" type="slide" axis="1 0 0"/><joint name="turn" type="hinge" axis="0 0 1"/>'
+                 '<geom name="plate" type="box" size="0.5 0.5 0.05" mass="1e6"/></body>')
         press = '<body name="press" pos="0 0 0"><joint name="press" type="slide" axis="0 0 1"/><inertial pos="0 0 0" mass="1e6" diaginertia="1 1 1"/>%s</body>'
         model, data = self.model(case, configuration, plate, press, '<pin id="%s"/>' % top, lift=self.LIFT)
         model.opt.gravity[:] = 0

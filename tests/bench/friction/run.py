@@ -63,8 +63,8 @@ def main():
                     if file:
                         writer.writerow(row)
                         file.flush()
-                    print("%-8s %-14s %-16s %-14s %-16s %12s  [%s, %s]  %s %s" % tuple(
-                        row.get(k, "") for k in ("engine", "configuration", "case", "parameters", "quantity", "measured", "low", "high", "verdict", "note")), flush=True)
+                    shown = ("engine", "configuration", "case", "parameters", "quantity", "measured", "low", "high", "verdict", "note")
+                    print("%-8s %-14s %-16s %-14s %-16s %12s  [%s, %s]  %s %s" % tuple(row.get(k, "") for k in shown), flush=True)
 
 
 def measured_rows(entry, case, configuration):
