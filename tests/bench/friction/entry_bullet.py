@@ -10,7 +10,7 @@ import time
 import mesh_file
 
 CASES = ["slope_ramp", "slope_slide", "slope_hold", "vibration_drift", "pinch_hold"]
-MOST_SECONDS = 600
+MOST_SECONDS = 300
 
 
 class Entry:

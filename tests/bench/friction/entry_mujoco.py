@@ -12,7 +12,7 @@ import time
 import mesh_file
 
 G = 9.81
-MOST_SECONDS = 600.0  # wall time for one case
+MOST_SECONDS = 300.0  # wall time for one case
 CONFIGURATIONS = {  # options, share of the case's step
     "default": ('integrator="discrete"', 1.0),
     "impratio 100": ('integrator="discrete" impratio="100"', 1.0),

@@ -1,0 +1,30 @@
+// Stick-slip of a soft pad that a spring holds on a belt, against a point mass in the same rig (reference set, stickslip_*): a pad that is stiff beside
+// the spring has its period and its amplitude. It breaks loose a little early, at its more lightly pressed edge: 1.1 % of the period for LuGre, 0.4 % for
+// Coulomb. The whole range of moduli: tests/bench/belt_study.cpp, doc/concepts/friction_memory.md.
+#include "belt.h"
+
+namespace {
+
+void expect_like_rigid(const char *law) {
+  for (const test::belt::Rigid &rigid : test::belt::kRigid) {
+    if (std::string(rigid.law) != law) continue;
+    const test::belt::Result r = test::belt::run(law, 3e5, 60, 19, 4);
+    ASSERT_GE(r.cycles, 1);
+    EXPECT_NEAR(r.period, rigid.period, 0.015 * rigid.period);
+    EXPECT_NEAR(r.force_max, rigid.force_max, 0.02);
+    EXPECT_NEAR(r.force_min, rigid.force_min, 0.02);
+  }
+}
+
+}  // namespace
+
+TEST(PadOnABelt, Coulomb_SticksAndSlipsAsAPointMass) { expect_like_rigid("coulomb"); }
+TEST(PadOnABelt, LuGre_SticksAndSlipsAsAPointMass) { expect_like_rigid("lugre"); }
+TEST(PadOnABelt, ElastoPlastic_SticksAndSlipsAsAPointMass) { expect_like_rigid("elastoplastic"); }
+
+// Dahl's law has no Stribeck curve and cannot stick and slip: what the spring and the start shook dies out or swings at the spring's own period.
+TEST(PadOnABelt, ALawWithoutStribeck_DoesNotStickAndSlip) {
+  const test::belt::Result r = test::belt::run("dahl", 1e5, 60, 19, 12);
+  EXPECT_LT(r.force_max - r.force_min, 0.4);
+  EXPECT_NEAR(0.5 * (r.force_max + r.force_min), 1, 0.02);
+}
