@@ -179,6 +179,7 @@ class CaseReader {
       c.times = numbers_at(*times, "/output_times");
     } else if (input_->find("T") && input_->find("dt")) {
       const double last = needed("T"), dt = needed("dt");
+      if (!(last >= 0)) refuse("/input/T", "is " + number(last) + " s, expected an end at 0 or later");
       if (!(dt > 0) || !(last / dt < 1e7)) refuse("/input/dt", "is not a time between rows, expected T/dt below 1e7");
       for (int i = 0; i <= int(last / dt + 0.5); ++i) c.times.push_back(i * dt);
     } else {

@@ -103,8 +103,7 @@ dfm_status Adapter::look() {
   if (geoms_.size() != seen_.size())
     for (size_t i = 0; i < seen_.size(); ++i)
       if (!by_geom_.count(seen_[i])) TRY(bind(seen_[i], signatures_[i]));
-  if (props_.size() > geoms_.size())
-    std::erase_if(props_, [&](const auto &p) { return !by_geom_.count(p.first); });
+  std::erase_if(props_, [&](const auto &p) { return !by_geom_.count(p.first); });
   for (auto &g : geoms_) TRY(follow(*g));
   bool restored = false;
   TRY(ask_restored(restored));
@@ -225,6 +224,9 @@ dfm_status Adapter::agree(Body &b, bool restored) {
 std::vector<dBodyID> Adapter::hidden_bodies() const {
   std::vector<dBodyID> found, open;
   for (auto &b : bodies_) open.push_back(b->id);
+  // Bodies whose geoms all stand aside (ignored, disabled, rays): ODE moves them, and what is solved again must take them back too.
+  for (const Signature &s : signatures_)
+    if (s.body && !by_body_.count(s.body) && std::find(found.begin(), found.end(), s.body) == found.end()) found.push_back(s.body), open.push_back(s.body);
   while (!open.empty()) {
     const dBodyID b = open.back();
     open.pop_back();

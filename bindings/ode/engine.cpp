@@ -181,6 +181,7 @@ void Engine::end() {
 // The sub-step before has ended for good.
 void Engine::close() {
   if (friction && stepped_) friction->settle(h_);
+  else if (friction) friction->drop();
   if (contacts) dJointGroupEmpty(contacts);
   stepped_ = false;
 }

@@ -151,7 +151,7 @@ int RigidFriction::collide(dGeomID a, dGeomID b, double dt) {
 }
 
 void RigidFriction::settle(double dt) {
-  if (!law_) return;
+  if (!law_) return drop();
   last_.clear();
   for (Contact &c : now_) {
     const Vec u = velocity_at(c.a, c.point) - velocity_at(c.b, c.point);

@@ -41,6 +41,7 @@ class RigidFriction {
   void clear_law();
   int collide(dGeomID a, dGeomID b, double h);   // contact joints made
   void settle(double h);                   // after ODE's step, while the joints live: forces and states for the next sub-step
+  void drop() { now_.clear(); }            // a sub-step that failed: its contacts end with their joints, their bodies may go next
   void forget() { last_.clear(); }
   // What the contacts keep, as numbers. number: of a geom, -1 where it has none (its contacts are left out); geom: the other way.
   void save(const std::function<double(dGeomID)> &number, std::vector<double> &out) const;

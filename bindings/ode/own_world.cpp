@@ -161,7 +161,9 @@ bool OwnWorld::commit(const dfm_rigid_step &step, dfm_rigid_state *state, double
     const double sign = first ? 1 : -1;
     extra[first_joint() + kMotor * k + 2] = sign * dot(axis, load(j.type == DFM_JOINT_HINGE ? j.feedback.t1 : j.feedback.f1));
   }
-  for (const uint32_t i : moving_) given_[i] = state[i];
+  // Asked for another round, the engine goes back by itself; the world then gives the same start state as before.
+  for (const uint32_t i : moving_)
+    if (!again) given_[i] = state[i];
   return again;
 }
 

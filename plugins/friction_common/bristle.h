@@ -15,7 +15,7 @@
 //   dz'/dfn = (g/D) dz0/dfn + (h K0/D^2) zt (m dg/dfn - g dm/dfn),      dz0/dfn = z0/fn where the old bristle was cut, else 0
 //
 // and those of dz/dt are the same over h less dz0. Any m >= 0 is dissipative: V = K0 |z|^2/2 gives (K0 z).v - V' = K0 m K0 |z|^2/g. The micro-damping
-// is passive for every y = K0 z iff K1^2 w <= 4 g (K1 + K2); the default K1 / (1 + K1 w/(4 g)) meets that with any parameters.
+// is passive for every y = K0 z iff K1^2 m <= 4 g (K1 + K2); with m = w the default K1 / (1 + K1 w/(4 g)) meets that with any parameters.
 #pragma once
 #include "curve.h"
 

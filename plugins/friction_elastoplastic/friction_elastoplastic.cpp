@@ -123,6 +123,17 @@ void rates(const bristle::Batch &p, int i, int multiplier, const Return &t, Bloc
   }
 }
 
+// The passive form of sigma1 counts on a plastic rate m <= w. Where g has fallen with speed below what the bristle holds, r = K0 |z| / g > 1, the rate is
+// m = w (r-1)^i beyond its saturation, and what friction still takes is at least g w [(1 + (r-1)^i) r - 4 (r-1)^i]: a square for i = 1, not negative up to
+// r = 2 for the others, negative just above. r is at most mu_S/mu_C.
+dfm_status check_levels(const double *p, char *why, size_t cap) {
+  const dfm_status levels = lugre::check(p, why, cap);
+  if (levels != DFM_OK || !(p[kI] > 1 && p[lugre::kSigma1] > 0 && p[lugre::kMuS] > 2 * p[lugre::kMuC])) return levels;
+  std::snprintf(why, cap, "with i = %g and sigma1 above 0, mu_S (%g) may be at most twice mu_C (%g), or friction would give energy; take i = 1, sigma1 = 0 or other levels",
+                p[kI], p[lugre::kMuS], p[lugre::kMuC]);
+  return DFM_E_ARG;
+}
+
 struct Elastoplastic : bristle::Run<Elastoplastic> {
   static bristle::Batch batch(const double *p) { return lugre::batch(p); }
   static constexpr bool kFlat = false;
@@ -138,7 +149,7 @@ struct Elastoplastic : bristle::Run<Elastoplastic> {
       rates<false>(p, i, multiplier, t, b);
     }
   }
-  static constexpr auto check = lugre::check;
+  static constexpr auto check = check_levels;
   static constexpr auto prepare = lugre::prepare;
   static constexpr auto release = lugre::release;
 };

@@ -193,6 +193,13 @@ TEST(PluginCheck, OneRule_IsRunAlone) {
   EXPECT_EQ(check(broken("wrong_sign"), {"--only", "F02"}).exit_code, 0);
 }
 
+// A rule of laws cannot pass for want of a law.
+TEST(PluginCheck, OneRuleOfAFileThatDoesNotLoad_Fails) {
+  const test::CommandResult r = check(broken("wrong_abi"), {"--only", "F03"});
+  EXPECT_EQ(r.exit_code, 1) << r.out;
+  EXPECT_EQ(rules_that("FAIL", r.out), std::vector<std::string>{"V02"}) << r.out;
+}
+
 TEST(PluginCheck, InThisProcess_GivesTheSameVerdicts) {
   for (const char *law : {"sound", "allocates", "writes_past_the_end", "wrong_sign"}) {
     const test::CommandResult apart = check(broken(law)), here = check(broken(law), {"--in-process"});

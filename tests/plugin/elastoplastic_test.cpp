@@ -40,6 +40,20 @@ TEST_F(Elastoplastic, SelfDescription_SaysWhatItIs) {
   EXPECT_STREQ(type->effects[0], "stiction");
 }
 
+// With i = 1 the micro-damping is passive at any levels; with a higher power up to mu_S = 2 mu_C, and what is not is refused.
+TEST_F(Elastoplastic, LevelsAtWhichDampingWouldGiveEnergy_AreRefused) {
+  char why[400] = "";
+  const auto accepts = [&](double mu_s, double sigma1, double i) {
+    const std::vector<double> p = {0.15, mu_s, 0.01, 2, 1e4, sigma1, 0, 0.01, 0.4, 0.7, i, 0};
+    return dev.ops->check(p.data(), why, sizeof why) == DFM_OK;
+  };
+  EXPECT_TRUE(accepts(0.6, 20, 1)) << why;
+  EXPECT_TRUE(accepts(0.3, 20, 3)) << why;
+  EXPECT_TRUE(accepts(0.6, 0, 3)) << why;
+  EXPECT_FALSE(accepts(0.31, 20, 2));
+  EXPECT_NE(std::string(why).find("twice mu_C"), std::string::npos) << why;
+}
+
 TEST_F(Elastoplastic, RulesOfEveryLaw_AreKept) {
   for (const Law &l : {dev, cosine, cubic}) {
     rules::odd_to_the_bit(l, draw());

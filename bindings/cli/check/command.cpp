@@ -116,6 +116,9 @@ Report run_rules(const Request &request, const std::vector<const Rule *> &wanted
   for (const Rule *rule : wanted)
     if (!rule->by_type) report.file.push_back(run_rule(request, *rule, -1));
     else if (report.types.empty()) report.file.push_back({rule, {Result::skip, kNotLoaded}, 0});
+  // Rules of laws that cannot run for want of a law are not kept: the rule that says why is asked beside them.
+  const bool loads = std::any_of(wanted.begin(), wanted.end(), [](const Rule *rule) { return rule == find_rule("V02"); });
+  if (report.types.empty() && !loads) report.file.push_back(run_rule(request, *find_rule("V02"), -1));
   for (size_t t = 0; t < report.types.size(); ++t) {
     report.by_type.emplace_back();
     const bool law = report.types[t].kind == DFM_KIND_FRICTION;

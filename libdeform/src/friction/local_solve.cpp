@@ -66,7 +66,7 @@ const LawInstance *LawBatches::settle(const Batch &batch, double h, const double
         const double m11 = 1 - m * d11, m22 = 1 - m * d22, m12 = -m * d12, det = m11 * m22 - m12 * m12;
         c.v[0] = s.vt[i], c.v[1] = s.vt[n + i], c.left = g.size, c.share = 1;
         c.step[0] = -(m22 * g.a - m12 * g.b) / det, c.step[1] = -(m11 * g.b - m12 * g.a) / det;
-      } else if (!c.from_zero) {   // tangents from where it slips lead nowhere
+      } else if (!c.from_zero && asked < kMostAsked) {   // tangents from where it slips lead nowhere
         c = {i, true, false, {0, 0}, INFINITY, {0, 0}, 0};
       } else {
         c.share *= kCut;

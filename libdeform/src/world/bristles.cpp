@@ -76,7 +76,7 @@ Turn turn_of(const World &w, const Obstacle &o, Vec3 n) {
   if (!o.rigid && !o.has_target && !o.moves()) return {1, 0};
   const double a = w.guard.motion * dot(n, spin_between(o.pose.rotation, o.end_pose(w.time, w.h, w.left).rotation, 1));
   const double half = 0.5 * a * (1 + a * a / 12);   // tan(a / 2) up to a^5
-  return unit_turn(1 - half * half, 2 * half);
+  return unit_turn(1 - half * half, 2 * half);   // of length one: what is halved after it counts on that
 }
 
 }  // namespace

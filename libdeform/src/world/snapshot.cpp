@@ -223,6 +223,7 @@ void check(const Staged &t, const World &w) {
          c.tangent.size() == 3 * n && c.impulse.size() == 3 * n && c.bristle.size() == n * c.nstate && c.law.size() == n && c.dwell.size() == n &&
          c.area.size() == n && c.path.size() == 2 * n && c.touching.size() == n && c.held.size() == n && c.began.size() == n;
   for (uint32_t i : c.by_key) good = good && i < n;
+  for (uint32_t l : c.law) good = good && l < t.laws.size();
   uint32_t sleepers = 0;
   for (size_t i = 0; good && i < t.bodies.size(); ++i) {
     const StagedBody &from = t.bodies[i];

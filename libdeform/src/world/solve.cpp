@@ -237,7 +237,8 @@ void World::keep_contacts() {
     store3(&to.normal[size_t(3) * i], load3(&rows.frame[size_t(9) * i]));
     store3(&to.tangent[size_t(3) * i], load3(&rows.frame[size_t(9) * i + 3]));
     store3(&to.impulse[size_t(3) * i], load3(l));
-    for (uint32_t s = 0; s < S; ++s) to.bristle[size_t(S) * i + s] = now ? state.bristle_out[size_t(s) * state.stride + i] : 0;
+    const uint32_t own = now ? law_list[state.law[i]]->nstate : 0;   // its law wrote no further: the rest of the columns is another contact's
+    for (uint32_t s = 0; s < S; ++s) to.bristle[size_t(S) * i + s] = s < own ? state.bristle_out[size_t(s) * state.stride + i] : 0;
     to.dwell[i] = now ? state.dwell[i] + h : 0, to.area[i] = state.area[i];
     const double v1 = state.vt[i], v2 = state.vt[state.stride + i];
     // A hold counts from hold_begin on: what sticks in the first sub-step after it, and in every one since.

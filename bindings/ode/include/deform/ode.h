@@ -95,7 +95,8 @@ DFM_API dfm_status dfm_ode_set_geom(dfm_ode ode, dGeomID geom, const dfm_ode_geo
  * @return DFM_OK; DFM_E_ARG. Threads: Not during step. Since 0.2. */
 DFM_API dfm_status dfm_ode_set_convex(dfm_ode ode, dGeomID geom, uint32_t npoint, const double *points, uint32_t npolygon, const uint32_t *polygons);
 /** The heights of a dHeightfieldClass geom, m: samples [nz,nx] over width (local x) and depth (local z), local y up, scale and offset included; not
- * wrapped. Copied. @return DFM_OK; DFM_E_ARG. Threads: Not during step. Since 0.2. */
+ * wrapped; the geom was created placeable (bPlaceable 1: ODE ends the program where it is asked for another one's place). Copied.
+ * @return DFM_OK; DFM_E_ARG. Threads: Not during step. Since 0.2. */
 DFM_API dfm_status dfm_ode_set_heights(dfm_ode ode, dGeomID geom, double width, double depth, uint32_t nx, uint32_t nz, const double *heights);
 /** Reads a geom's triangles again, after dGeomTriMeshDataUpdate or a change of its arrays. Threads: Not during step. Since 0.2. */
 DFM_API dfm_status dfm_ode_refresh(dfm_ode ode, dGeomID geom);
