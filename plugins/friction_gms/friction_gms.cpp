@@ -36,7 +36,7 @@ constexpr dfm_param kRows[] = {
 };
 constexpr double kUsualK[kElements] = {4e7, 3e7, 2e7, 1e7}, kUsualNu[kElements] = {0.2, 0.3, 0.3, 0.2};
 
-// Four tangent pairs z_i (m); then four flags, 1 while the element slips, and the budget per area (J/m^2).
+// Four tangent pairs z_i (m); then four flags, 1 while the element slips, and the budget (J: an area that grows brings none).
 constexpr dfm_slot kSlots[] = {{DFM_PER_CONTACT, 2, DFM_SLOT_TANGENT, 0}, {DFM_PER_CONTACT, 2, DFM_SLOT_TANGENT, 0}, {DFM_PER_CONTACT, 2, DFM_SLOT_TANGENT, 0},
                                {DFM_PER_CONTACT, 2, DFM_SLOT_TANGENT, 0}, {DFM_PER_CONTACT, 5, DFM_SLOT_SCALAR, 0}};
 constexpr uint32_t kFlag = 2 * kElements, kBudget = kFlag + kElements, kStates = kBudget + 1;
@@ -101,7 +101,7 @@ void pay(const Batch &p, const dfm_friction_in *in, size_t at, Block &b) {
   }
   for (uint32_t i = 0; i < kLanes; ++i) {
     b.poison[i] += 0.0 * budget[i];
-    const double given = budget[i] > 0 ? budget[i] * b.area[i] : 0.0;
+    const double given = budget[i] > 0 ? budget[i] : 0.0;
     b.budget[i] = given < b.most[i] ? given : b.most[i];
     b.theta[i] = b.budget[i] < need[i] ? b.budget[i] / need[i] : 1.0;
     b.theta_fn[i] = b.theta[i] < 1.0 && given > b.most[i] ? 2.0 * b.theta[i] / (b.fn[i] > 0 ? b.fn[i] : kMost) : 0.0;   // the bound goes as fn^2
@@ -170,7 +170,7 @@ struct Gms {
         nx[i] = poison - b.nx[i], ny[i] = poison - b.ny[i];
         limit[i] = p.mu_s * b.fn[i] + drag * b.w[i] + poison;
         const double rest = b.budget[i] + b.lost[i], left = rest > 0 ? rest < b.most[i] ? rest : b.most[i] : 0.0;
-        budget[i] = left / (b.area[i] > kLeast ? b.area[i] : kLeast);
+        budget[i] = left;
         stored[i] = b.stored[i] + left + poison;
       }
       for (uint32_t c = 0; out->state && c < kStates; ++c)

@@ -57,9 +57,33 @@ TEST_F(Gms, Derivatives_MatchDifferences) {
   for (const Law &l : {dev, maxwell}) rules::derivatives(l, draw(), 1000, 1e-6, [](const In &) { return false; });
 }
 
+// A contact whose area grows from one step to the next, as in a patch whose load moves, has no more energy for it: all bristles are let go first, so that
+// only the budget is stored.
+TEST_F(Gms, GrowingArea_BringsNoEnergy) {
+  std::vector<double> state(dev.nstate, 0.0);
+  state[dev.nstate - 1] = 1e-9;   // J: below what the law keeps at most at these forces and areas
+  double last = 0;
+  for (const double area : {1.0, 1.5, 3.0, 10.0}) {
+    alignas(64) double fn[8] = {9.8}, vt[16] = {}, stop[16] = {}, a[8] = {area}, in_state[8 * 16] = {}, out_state[8 * 16] = {}, stored[8] = {};
+    for (uint32_t s = 0; s < dev.nstate; ++s) in_state[8 * s] = state[s];
+    dfm_friction_in in{};
+    in.size = sizeof in, in.n = 1, in.stride = 8, in.dt = 1e-3, in.params = dev.params.data(), in.fn = fn, in.vt = vt;
+    in.ft_stop = stop, in.area = a, in.state = in_state;
+    dfm_friction_out out{};
+    out.size = sizeof out, out.state = out_state, out.stored = stored;
+    ASSERT_EQ(dev.ops->eval(&in, &out), DFM_OK);
+    for (uint32_t s = 0; s < dev.nstate; ++s) state[s] = out_state[8 * s];
+    if (last > 0) {
+      EXPECT_LE(stored[0], last) << area;
+    }
+    last = stored[0];
+  }
+  EXPECT_GT(last, 0);
+}
+
 TEST_F(Gms, Bits_MatchTheRecordedHash) {
-  EXPECT_EQ(rules::hash_of_bits(dev, 2e-5), 11651326787384591426u);
-  EXPECT_EQ(rules::hash_of_bits(maxwell, 2e-5), 17960434241992963629u);
+  EXPECT_EQ(rules::hash_of_bits(dev, 2e-5), 4747621922367920675u);
+  EXPECT_EQ(rules::hash_of_bits(maxwell, 2e-5), 7314650396550818082u);
 }
 
 TEST_F(Gms, ParametersThatDoNotFit_AreRefused) {

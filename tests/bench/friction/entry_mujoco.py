@@ -49,8 +49,8 @@ class Entry:
             mass, lift, " ".join("%.9g" % x for p in points for x in p), " ".join(str(i) for t in tets for i in t))
         flex += '<elasticity young="%g" poisson="%g" damping="%g"/><edge equality="false"/>' % (m["young"], m["poisson"], m["damping_stiffness"])
         flex += '<contact selfcollide="none" condim="3" friction="%g 0.005 0.0001"/>%s</flexcomp>' % (case["mu"], pin)
-        xml = ('<mujoco><size memory="1G"/><option timestep="%g" integrator="discrete" cone="elliptic" %s/><default><geom friction="%g 0.005 0.0001"/></default>'
-               '<worldbody>%s%s</worldbody></mujoco>') % (
+        xml = ('<mujoco><size memory="1G"/><option timestep="%g" integrator="discrete" cone="elliptic" %s/>'
+               '<default><geom friction="%g 0.005 0.0001"/></default><worldbody>%s%s</worldbody></mujoco>') % (
             case["step"], CONFIGURATIONS[configuration], case["mu"], walls, holder % flex if holder else flex)
         try:
             model = self.mj.MjModel.from_xml_string(xml)
