@@ -13,7 +13,7 @@ matplotlib.use("Agg")
 import matplotlib.pyplot as plt
 
 RIGID = {"coulomb": 6.512322, "lugre": 6.362720, "elastoplastic": 6.375861}   # s, a point mass in the same rig (reference set)
-COLORS = {1e4: "#c8553d", 1e5: "#d9a441", 1e6: "#3b8f5c", 1e7: "#2f6db3"}
+COLORS = {3e3: "#c8553d", 1e4: "#d9a441", 1e5: "#3b8f5c", 1e6: "#2f6db3"}
 
 folder = pathlib.Path(sys.argv[1])
 out = sys.argv[2] if len(sys.argv) > 2 else pathlib.Path(__file__).with_name("belt_stick_slip.png")
