@@ -1,6 +1,6 @@
 // Stick-slip of a soft pad that a spring holds on a belt, against a point mass in the same rig (reference set, stickslip_*): a pad that is stiff beside
-// the spring has its period and its amplitude. It breaks loose a little early, at its more lightly pressed edge: 1.1 % of the period for LuGre, 0.4 % for
-// Coulomb. The whole range of moduli: tests/bench/belt_study.cpp, doc/concepts/friction_memory.md.
+// the spring has its period and its amplitude. LuGre's period is about 1 % short and stays so as the pad stiffens further, Coulomb's is not: why is open
+// (doc/concepts/friction_memory.md, Limits), and the bound of 1.5 % is what holds today. The whole range of moduli: tests/bench/belt_study.cpp.
 #include "belt.h"
 
 namespace {

@@ -355,4 +355,15 @@ inline uint64_t hash_of_bits(const Law &law, double z_max) {
   return hash;
 }
 
+// What every law with bristles keeps; z_max (m): the deflections to try at the extremes.
+inline void of_every_bristle(const Law &law, const Draw &draw, double z_max) {
+  odd_to_the_bit(law, draw);
+  turns_with_the_frame(law, draw);
+  mirrored_trajectories(law, draw);
+  extremes(law, z_max);
+  no_normal_force_is_open(law, 1e-5);
+  bad_lane_stays_in_its_lane(law, draw);
+  same_alone_and_in_any_batch(law, draw);
+}
+
 }  // namespace rules

@@ -41,13 +41,7 @@ TEST_F(Lugre, SelfDescription_SaysWhatItIs) {
 
 TEST_F(Lugre, RulesOfEveryLaw_AreKept) {
   for (const Law &l : {dev, constant, falling}) {
-    rules::odd_to_the_bit(l, draw());
-    rules::turns_with_the_frame(l, draw());
-    rules::mirrored_trajectories(l, draw());
-    rules::extremes(l, 2e-5);
-    rules::no_normal_force_is_open(l, 1e-5);
-    rules::bad_lane_stays_in_its_lane(l, draw());
-    rules::same_alone_and_in_any_batch(l, draw());
+    rules::of_every_bristle(l, draw(), 2e-5);
   }
 }
 
