@@ -1,7 +1,6 @@
 #include "own_world.h"
 
 #include <cstring>
-#include <limits>
 
 #include "near.h"
 
@@ -26,12 +25,17 @@ class OwnWorld : public Host {
   dfm_status joint(const dfm_rigid_state *state, const double *extra, uint32_t joint, double *position, double *rate, double *effort) override;
 
  private:
+  // ODE's first body is one that moves: `body`, or `with` where `body` is fixed. (Handed nothing as its first one ODE swaps the two by itself, and turns
+  // round what it says of the joint, but not its motor.)
   struct Joint {
-    dJointID id;
-    uint32_t type;
-    dJointFeedback feedback;
-    uint32_t body, with;                  // of the set; kStill: not a body of ODE
-    Vec axis;                             // in the frame of `with`
+    dJointID id;                          // null: both stand still
+    uint32_t type, body, with;            // numbers in the set; with: DFM_RIGID_WORLD for the world
+    bool swapped;                         // ODE's first body is `with`
+    Vec anchor_body, anchor_with;         // in the frames of the two
+    Vec axis_body, axis_with;             // unit, likewise
+    Quat turn;                            // from the frame of `with` to that of `body`, as created
+    dJointFeedback feedback;              // on ODE's first body, about its centre of mass
+    double sign() const { return swapped ? -1 : 1; }
   };
   Engine engine_;
   dSpaceID space_ = nullptr;
@@ -44,8 +48,27 @@ class OwnWorld : public Host {
   size_t first_joint() const { return size_t{Member::kExtra} * members_.size(); }
   void add_body(const dfm_rigid_def &def, uint32_t number);
   void add_joint(const dfm_joint_def &def);
-  void drive(const Joint &j, const double *extra) const;
+  static void drive(const Joint &j, const double *extra);
+  static double effort(const Joint &j, const dfm_rigid_state *state);
 };
+
+// As `state` has it; the world's is that of the origin.
+Pose pose_of(uint32_t number, const dfm_rigid_state *state) {
+  if (number == DFM_RIGID_WORLD) return {};
+  const double *const q = state[number].rotation;
+  return {load(state[number].position), {q[0], q[1], q[2], q[3]}};
+}
+Motion motion_of(uint32_t number, const dfm_rigid_state *state) {
+  if (number == DFM_RIGID_WORLD) return {};
+  return {load(state[number].velocity), load(state[number].spin)};
+}
+
+dfm_rigid_state state_of(const dfm_rigid_def &def) {
+  dfm_rigid_state s{};
+  std::memcpy(s.position, def.pose.position, sizeof s.position), std::memcpy(s.rotation, def.pose.rotation, sizeof s.rotation);
+  std::memcpy(s.velocity, def.velocity, sizeof s.velocity), std::memcpy(s.spin, def.spin, sizeof s.spin);
+  return s;
+}
 
 void OwnWorld::add_body(const dfm_rigid_def &def, uint32_t number) {
   dGeomID geom = nullptr;
@@ -68,32 +91,35 @@ void OwnWorld::add_body(const dfm_rigid_def &def, uint32_t number) {
   dMassSetParameters(&mass, def.mass, 0, 0, 0, def.inertia[0], def.inertia[1], def.inertia[2], 0, 0, 0);
   dBodySetMass(m.body, &mass);
   m.inertia = inertia_of(m.body);
-  dfm_rigid_state s{};
-  std::memcpy(s.position, def.pose.position, sizeof s.position), std::memcpy(s.rotation, def.pose.rotation, sizeof s.rotation);
-  std::memcpy(s.velocity, def.velocity, sizeof s.velocity), std::memcpy(s.spin, def.spin, sizeof s.spin);
-  m.put(s);
+  m.put(given_[number]);
   if (geom) dGeomSetBody(geom, m.body);
   engine_.members.push_back(&m);
 }
 
 void OwnWorld::add_joint(const dfm_joint_def &def) {
   const dWorldID w = engine_.world;
-  const dBodyID a = members_[def.body].body, b = def.with == DFM_RIGID_WORLD ? nullptr : members_[def.with].body;
-  const double *const p = def.anchor, *const n = def.axis;
-  dJointID j = nullptr;
+  dBodyID first = members_[def.body].body, second = def.with == DFM_RIGID_WORLD ? nullptr : members_[def.with].body;
+  Joint &joint = joints_.emplace_back();
+  joint = {nullptr, def.type, def.body, def.with, !first, {}, {}, {}, {}, {}, {}};
+  const double length = norm(load(def.axis));
+  const Vec anchor = load(def.anchor), axis = length > 0 ? (1 / length) * load(def.axis) : Vec{0, 0, 1};
+  const Pose body = pose_of(def.body, given_.data()), with = pose_of(def.with, given_.data());
+  joint.anchor_body = rotate(conjugate(body.rotation), anchor - body.position), joint.axis_body = rotate(conjugate(body.rotation), axis);
+  joint.anchor_with = rotate(conjugate(with.rotation), anchor - with.position), joint.axis_with = rotate(conjugate(with.rotation), axis);
+  joint.turn = conjugate(with.rotation) * body.rotation;
+  if (!first) std::swap(first, second);
+  if (!first) return;
+  dJointID &j = joint.id;
   switch (def.type) {
     case DFM_JOINT_HINGE:
-      j = dJointCreateHinge(w, nullptr), dJointAttach(j, a, b);
-      dJointSetHingeAnchor(j, p[0], p[1], p[2]), dJointSetHingeAxis(j, n[0], n[1], n[2]);
+      j = dJointCreateHinge(w, nullptr), dJointAttach(j, first, second);
+      dJointSetHingeAnchor(j, anchor.x, anchor.y, anchor.z), dJointSetHingeAxis(j, axis.x, axis.y, axis.z);
       break;
-    case DFM_JOINT_SLIDER: j = dJointCreateSlider(w, nullptr), dJointAttach(j, a, b), dJointSetSliderAxis(j, n[0], n[1], n[2]); break;
-    case DFM_JOINT_BALL: j = dJointCreateBall(w, nullptr), dJointAttach(j, a, b), dJointSetBallAnchor(j, p[0], p[1], p[2]); break;
-    default: j = dJointCreateFixed(w, nullptr), dJointAttach(j, a, b), dJointSetFixed(j); break;
+    case DFM_JOINT_SLIDER: j = dJointCreateSlider(w, nullptr), dJointAttach(j, first, second), dJointSetSliderAxis(j, axis.x, axis.y, axis.z); break;
+    case DFM_JOINT_BALL: j = dJointCreateBall(w, nullptr), dJointAttach(j, first, second), dJointSetBallAnchor(j, anchor.x, anchor.y, anchor.z); break;
+    default: j = dJointCreateFixed(w, nullptr), dJointAttach(j, first, second), dJointSetFixed(j); break;
   }
-  const double length = std::sqrt(n[0] * n[0] + n[1] * n[1] + n[2] * n[2]);
-  Vec axis = length > 0 ? (1 / length) * load(n) : Vec{0, 0, 1};
-  if (b) axis = rotate(conjugate(from_ode(dBodyGetQuaternion(b))), axis);
-  joints_.push_back({j, def.type, {}, def.body, def.with, axis});
+  dJointSetFeedback(j, &joint.feedback);
 }
 
 OwnWorld::OwnWorld(const dfm_rigid_set_def &set, uint32_t *group) {
@@ -107,13 +133,13 @@ OwnWorld::OwnWorld(const dfm_rigid_set_def &set, uint32_t *group) {
   engine_.near_callback = near_callback, engine_.near_data = &near_;
   members_.resize(set.nbody), given_.resize(set.nbody);
   for (uint32_t i = 0; i < set.nbody; ++i) {
+    given_[i] = state_of(set.bodies[i]);
     add_body(set.bodies[i], i);
     group[i] = members_[i].body ? static_cast<uint32_t>(moving_.size()) : DFM_RIGID_STILL;
     if (members_[i].body) moving_.push_back(i);
   }
   joints_.reserve(set.njoint);            // ODE keeps the address of each feedback
   for (uint32_t k = 0; k < set.njoint; ++k) add_joint(set.joints[k]);
-  for (Joint &j : joints_) dJointSetFeedback(j.id, &j.feedback);
   engine_.begin({});
 }
 
@@ -124,9 +150,21 @@ OwnWorld::~OwnWorld() {
   dWorldDestroy(engine_.world);
 }
 
-void OwnWorld::drive(const Joint &j, const double *extra) const {
-  if (j.type == DFM_JOINT_HINGE) dJointSetHingeParam(j.id, dParamVel, extra[0]), dJointSetHingeParam(j.id, dParamFMax, extra[1]);
-  if (j.type == DFM_JOINT_SLIDER) dJointSetSliderParam(j.id, dParamVel, extra[0]), dJointSetSliderParam(j.id, dParamFMax, extra[1]);
+void OwnWorld::drive(const Joint &j, const double *extra) {
+  if (!j.id) return;
+  const double velocity = j.sign() * extra[0];
+  if (j.type == DFM_JOINT_HINGE) dJointSetHingeParam(j.id, dParamVel, velocity), dJointSetHingeParam(j.id, dParamFMax, extra[1]);
+  if (j.type == DFM_JOINT_SLIDER) dJointSetSliderParam(j.id, dParamVel, velocity), dJointSetSliderParam(j.id, dParamFMax, extra[1]);
+}
+
+// What the joint did along its own axis in the sub-step that began at `state` is the motor's doing: alone it is free there. A hinge's is the moment about
+// its anchor, where what the hinge holds with has none.
+double OwnWorld::effort(const Joint &j, const dfm_rigid_state *state) {
+  if (!j.id) return 0;
+  const Quat q = pose_of(j.swapped ? j.with : j.body, state).rotation;
+  const Vec axis = rotate(q, j.swapped ? j.axis_with : j.axis_body), arm = rotate(q, j.swapped ? j.anchor_with : j.anchor_body);
+  const Vec force = load(j.feedback.f1);
+  return j.sign() * dot(axis, j.type == DFM_JOINT_HINGE ? load(j.feedback.t1) - cross(arm, force) : force);
 }
 
 dfm_status OwnWorld::predict(const dfm_rigid_step &step, double *velocity) {
@@ -149,18 +187,7 @@ bool OwnWorld::commit(const dfm_rigid_step &step, dfm_rigid_state *state, double
   std::memcpy(extra, step.extra, sizeof(double) * this->extra());
   std::memcpy(state, step.state, sizeof(dfm_rigid_state) * members_.size());
   for (const uint32_t i : moving_) again |= engine_.commit(members_[i], i, state, extra, step.h);
-  for (size_t k = 0; k < joints_.size(); ++k) {
-    // What the constraint did along its own axis is the motor's doing: the joint alone is free there.
-    const Joint &j = joints_[k];
-    Vec axis = j.axis;
-    if (j.with != DFM_RIGID_WORLD) {
-      const double *const q = step.state[j.with].rotation;
-      axis = rotate({q[0], q[1], q[2], q[3]}, axis);
-    }
-    const bool first = members_[j.body].body != nullptr;   // ODE swaps the bodies of a joint whose first is the world
-    const double sign = first ? 1 : -1;
-    extra[first_joint() + kMotor * k + 2] = sign * dot(axis, load(j.type == DFM_JOINT_HINGE ? j.feedback.t1 : j.feedback.f1));
-  }
+  for (size_t k = 0; k < joints_.size(); ++k) extra[first_joint() + kMotor * k + 2] = effort(joints_[k], step.state);
   // Asked for another round, the engine goes back by itself; the world then gives the same start state as before.
   for (const uint32_t i : moving_)
     if (!again) given_[i] = state[i];
@@ -174,12 +201,20 @@ dfm_status OwnWorld::set_motor(uint32_t joint, double velocity, double max, doub
   return DFM_OK;
 }
 
-dfm_status OwnWorld::joint(const dfm_rigid_state *, const double *extra, uint32_t joint, double *position, double *rate, double *effort) {
+// From what the world has, not from ODE's joint, which after a restore is still where it was.
+dfm_status OwnWorld::joint(const dfm_rigid_state *state, const double *extra, uint32_t joint, double *position, double *rate, double *effort) {
   if (joint >= joints_.size() || joints_[joint].type > DFM_JOINT_SLIDER) return DFM_E_ARG;
   const Joint &j = joints_[joint];
-  const bool hinge = j.type == DFM_JOINT_HINGE;
-  *position = hinge ? dJointGetHingeAngle(j.id) : dJointGetSliderPosition(j.id);
-  *rate = hinge ? dJointGetHingeAngleRate(j.id) : dJointGetSliderPositionRate(j.id);
+  const Pose a = pose_of(j.body, state), b = pose_of(j.with, state);
+  const Motion of_a = motion_of(j.body, state), of_b = motion_of(j.with, state);
+  const Vec axis = rotate(b.rotation, j.axis_with);
+  if (j.type == DFM_JOINT_HINGE) {
+    *position = dot(turn_of(a.rotation * conjugate(b.rotation * j.turn)), axis), *rate = dot(of_a.w - of_b.w, axis);
+  } else {
+    const Vec arm = rotate(a.rotation, j.anchor_body), place = a.position + arm;
+    *position = dot(place - b.position - rotate(b.rotation, j.anchor_with), axis);
+    *rate = dot(of_a.v + cross(of_a.w, arm) - of_b.v - cross(of_b.w, place - b.position), axis);
+  }
   *effort = extra[first_joint() + kMotor * joint + 2];
   return DFM_OK;
 }

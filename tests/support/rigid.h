@@ -24,10 +24,11 @@ inline dfm_joint_def joint(uint32_t type, uint32_t body, uint32_t with, Vec anch
   return j;
 }
 
-inline std::vector<dfm_rigid> create(dfm_world w, const std::vector<dfm_rigid_def> &bodies, const std::vector<dfm_joint_def> &joints = {}) {
+inline std::vector<dfm_rigid> create(dfm_world w, const std::vector<dfm_rigid_def> &bodies, const std::vector<dfm_joint_def> &joints = {},
+                                     const char *host = nullptr) {
   std::vector<dfm_rigid> out(bodies.size());
   const dfm_rigid_set_def set = {sizeof set, uint32_t(bodies.size()), uint32_t(joints.size()), 0, bodies.data(), joints.data(), nullptr};
-  ok(dfm_rigid_create(w, nullptr, &set, out.data()));
+  ok(dfm_rigid_create(w, host, &set, out.data()));
   return out;
 }
 
@@ -35,6 +36,16 @@ inline dfm_rigid_state state(dfm_rigid r) {
   dfm_rigid_state s{};
   ok(dfm_rigid_get_state(r, &s));
   return s;
+}
+
+struct JointReading {
+  double position = 0, rate = 0, effort = 0;
+  bool operator==(const JointReading &) const = default;
+};
+inline JointReading reading(dfm_rigid r, uint32_t joint) {
+  JointReading j;
+  ok(dfm_rigid_joint(r, joint, &j.position, &j.rate, &j.effort));
+  return j;
 }
 
 inline dfm_body_measure rigid_measure(dfm_rigid r) {

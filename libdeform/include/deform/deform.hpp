@@ -58,7 +58,7 @@ struct [[nodiscard]] StepReport {
 struct StableStep { double dt = 0; dfm_body body = 0; uint32_t point = 0; };
 struct Wrench { Vec3 force{}, moment{}; };
 struct HoldReport { double creep = 0; uint32_t count = 0; };
-struct JointState { double position = 0, rate = 0, effort = 0; };
+struct JointState { double position = 0, rate = 0, effort = 0; };   // as dfm_rigid_joint
 struct ProbeState { const char *name = nullptr; Vec3 position{}, velocity{}; };
 struct Touch { double t = 0; Vec3 weights{}; };        // weights of the triangle's vertices
 struct EdgeTouch { double t = 0, a = 0, b = 0; };      // where on each edge

@@ -18,8 +18,9 @@ extern "C" {
 #define DFM_RIGID_STILL UINT32_MAX    /* a body's group: it feels nothing and never moves */
 enum { DFM_JOINT_HINGE = 0, DFM_JOINT_SLIDER = 1, DFM_JOINT_BALL = 2, DFM_JOINT_FIXED = 3 };
 
-/** What moves of one body. World frame; the centre of mass is the pose's position. */
-typedef struct dfm_rigid_state { double position[3], rotation[4], velocity[3], spin[3]; } dfm_rigid_state;   /* m, x y z w, m/s, rad/s */
+/** What moves of one body, in the world's frame: centre of mass (m), from the axes of its moments of inertia to the world's (x y z w, unit), velocity of
+ * the centre of mass (m/s), spin (rad/s). */
+typedef struct dfm_rigid_state { double position[3], rotation[4], velocity[3], spin[3]; } dfm_rigid_state;
 
 typedef struct dfm_rigid_def {
   uint32_t size, shape;               /* DFM_SHAPE_SPHERE, BOX or CAPSULE, centred at the pose, or NONE: dfm_rigid_add_shape gives it others */
@@ -41,8 +42,8 @@ typedef struct dfm_joint_def {
   double anchor[3];                   /* m, world frame, as the bodies stand when they are created */
   double axis[3];                     /* hinge, slider: world frame, any length */
   uint32_t motor, reserved;           /* 1: hinge and slider may have one */
-  double velocity;                    /* of `body` against `with`: rad/s about the axis, m/s along it */
-  double max;                         /* N m, N; what the motor can do at most */
+  double velocity;                    /* of `body` against `with`: rad/s about the axis (right hand), m/s along it */
+  double max;                         /* N m, N; what the motor can do at most, either way */
 } dfm_joint_def;
 
 /** One host's bodies and joints in one world. Strings and arrays are copied. */
@@ -93,7 +94,7 @@ typedef struct dfm_rigid_host {
   dfm_status (*commit)(void *self, const dfm_rigid_step *step, const double *impulse, dfm_rigid_state *state, double *extra);
   /** Changes what extra must say for a motor; extra holds the start values when called right after create. May be NULL: no motors. */
   dfm_status (*set_motor)(void *self, uint32_t joint, double velocity, double max, double *extra);
-  /** Angle or path of a hinge or slider since creation (rad, m), its rate, and what its motor did in the last sub-step (N m, N). May be NULL. */
+  /** What dfm_rigid_joint tells, from state and extra alone (they may just have been restored). May be NULL. */
   dfm_status (*joint)(void *self, const dfm_rigid_state *state, const double *extra, uint32_t joint, double *position, double *rate, double *effort);
   /** Asked when contact is solved: do these impulses leave true what predict and respond took for granted (motors that hold, motors at their limit)?
    * If not, the host takes something else for granted, *changed is 1 and velocity what predict gives with that; respond is asked again and contact
@@ -140,8 +141,12 @@ DFM_API dfm_status dfm_rigid_contact_wrench(dfm_rigid rigid, double force[3], do
 /** Motor of one of the set's joints, numbered as in its def; any body of the set names it. max 0: off.
  * @return DFM_E_ARG no such joint, or no hinge or slider; DFM_E_UNSUPPORTED the host has no motors. Threads: Not during step. Since 0.2. */
 DFM_API dfm_status dfm_rigid_set_motor(dfm_rigid rigid, uint32_t joint, double velocity, double max);
-/** Angle (rad, within a half turn) or path (m) of a hinge or slider since creation, its rate, and what its motor did in the last sub-step; each may be
- * NULL. @return as dfm_rigid_set_motor. Threads: Any thread. Not during step. Since 0.2. */
+/** A hinge or slider, of `body` against `with`, about or along the def's axis as it goes along with `with`; on every host alike. Each out may be NULL.
+ * @param position  rad since creation, within half a turn either way; m of `body`'s anchor from `with`'s
+ * @param rate      rad/s; m/s of `body`'s anchor against the place of `with` that it is at
+ * @param effort    mean of what the motor did to `body` in the last sub-step; to `with` it did the opposite. Hinge: N m, the moment about the axis through
+ *                  the anchor (what the hinge itself holds with has none there). Slider: N along the axis. 0 with the motor off
+ * @return as dfm_rigid_set_motor. Threads: Any thread. Not during step. Since 0.2. */
 DFM_API dfm_status dfm_rigid_joint(dfm_rigid rigid, uint32_t joint, double *position, double *rate, double *effort);
 #ifdef __cplusplus
 }

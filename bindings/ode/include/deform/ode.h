@@ -59,7 +59,10 @@ DFM_API dfm_status dfm_ode_get_stats(dfm_ode ode, dfm_ode_stats *out);
 /** What stands for a geom: reports, pair rules, rays and filters take it. @return DFM_OK; DFM_E_ARG the geom is not in the space or takes no part;
  * DFM_E_UNSUPPORTED as dfm_ode_step. Threads: Not during step. Since 0.2. */
 DFM_API dfm_status dfm_ode_obstacle(dfm_ode ode, dGeomID geom, dfm_obstacle *out);
-/** What stands for a body with at least one geom that takes part. Threads: Not during step. Since 0.2. */
+/** What stands for a body with at least one geom that takes part. Its dfm_rigid_state is in the world's frame, about the centre of mass that ODE has it at;
+ * its rotation is that of the principal axes of dMass.I, the body's own where I is diagonal. Joints are ODE's: dfm_rigid_joint knows none of them,
+ * dJointGetFeedback has their forces, in the world's frame, moments about each body's centre of mass, of the last sub-step.
+ * Threads: Not during step. Since 0.2. */
 DFM_API dfm_status dfm_ode_rigid(dfm_ode ode, dBodyID body, dfm_rigid *out);
 
 /** The dfm_world's snapshot, and behind it what that does not hold: bodies without geoms that joints lead to, and the states of dfm_ode_set_friction. Of

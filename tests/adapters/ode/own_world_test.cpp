@@ -1,0 +1,212 @@
+// Sets on the host "ode" that bring nothing but their defs: their joints mean and say what those of the builtin host do.
+#include <gtest/gtest.h>
+
+#include "ode.h"
+
+namespace {
+
+using namespace test;
+
+// Without a shape: rigid bodies of ODE touch each other, the builtin host's do not.
+dfm_rigid_def part(const char *name, double mass, Vec inertia, Vec position) {
+  dfm_rigid_def d = dfm_rigid_def_default();
+  d.name = name, d.shape = DFM_SHAPE_NONE, d.mass = mass;
+  for (int k = 0; k < 3; ++k) d.inertia[k] = inertia[size_t(k)], d.pose.position[k] = position[size_t(k)];
+  return d;
+}
+// A fixed body that stands askew: 0.8 rad about (1, 2, 2) / 3.
+dfm_rigid_def stand(const char *name, Vec position) {
+  dfm_rigid_def d = part(name, 1, {1, 1, 1}, position);
+  const double s = std::sin(0.4) / 3, q[] = {s, 2 * s, 2 * s, std::cos(0.4)};
+  std::copy(q, q + 4, d.pose.rotation);
+  d.fixed = 1;
+  return d;
+}
+dfm_joint_def driven(dfm_joint_def j, double velocity, double max) {
+  j.motor = 1, j.velocity = velocity, j.max = max;
+  return j;
+}
+
+// Which of the two bodies of a joint the arm is, and what the other one is.
+enum class With { world, still, still_first, moving };
+constexpr With kAll[] = {With::world, With::still, With::still_first, With::moving};
+constexpr const char *kNames[] = {"world", "still", "still_first", "moving"};
+
+// An arm of 2 kg whose centre is 0.3 m along x from its joint in the origin. A body that moves in the arm's stead hangs on the world by a fixed joint.
+struct Rig {
+  dfm_world world;
+  std::vector<dfm_rigid> bodies;
+  Rig(dfm_context *c, const char *host, With with, uint32_t type, Vec axis, double velocity, double max, Vec gravity = {0, 0, -9.81}) {
+    world = make_world(c, gravity);
+    const dfm_rigid_def arm = part("arm", 2, {0.02, 0.03, 0.04}, {0.3, 0, 0});
+    const Vec anchor = {};
+    switch (with) {
+      case With::world: bodies = create(world, {arm}, {driven(joint(type, 0, DFM_RIGID_WORLD, anchor, axis), velocity, max)}, host); return;
+      case With::still:
+        bodies = create(world, {arm, stand("stand", {-0.1, 0.2, 0})}, {driven(joint(type, 0, 1, anchor, axis), velocity, max)}, host);
+        return;
+      case With::still_first:
+        bodies = create(world, {stand("stand", {-0.1, 0.2, 0}), arm}, {driven(joint(type, 0, 1, anchor, axis), velocity, max)}, host);
+        return;
+      case With::moving: break;
+    }
+    dfm_rigid_def base = stand("base", {-0.1, 0.2, 0});
+    base.fixed = 0;
+    bodies = create(world, {base, arm},
+                    {driven(joint(type, 1, 0, anchor, axis), velocity, max), joint(DFM_JOINT_FIXED, 0, DFM_RIGID_WORLD, anchor)}, host);
+  }
+  JointReading read() const { return reading(bodies[0], 0); }
+};
+
+constexpr Vec kAcross = {0, 1, 0}, kSkew = {1, 2, -2};
+
+class OdeOwnWorld : public ::testing::TestWithParam<With> {
+ protected:
+  OdeOwnWorld() { ok(dfm_ode_register()); }
+  Context c;
+};
+
+// Runs both hosts side by side and compares what the joint says; the bounds hold over `seconds`.
+void compare(dfm_context *c, With with, uint32_t type, Vec axis, double velocity, double max, double seconds, JointReading within) {
+  const Rig ode(c, "ode", with, type, axis, velocity, max), own(c, nullptr, with, type, axis, velocity, max);
+  for (double t = 0; t < seconds; t += 0.02) {
+    run(ode.world, 0.02, 1e-3), run(own.world, 0.02, 1e-3);
+    const JointReading a = ode.read(), b = own.read();
+    ASSERT_NEAR(a.position, b.position, within.position) << t;
+    ASSERT_NEAR(a.rate, b.rate, within.rate) << t;
+    ASSERT_NEAR(a.effort, b.effort, within.effort) << t;
+  }
+}
+
+}  // namespace
+
+// A motor that holds an arm still carries its weight at its lever, 0.3 m: about the axis, not about the arm's centre, where the hinge's own force turns too.
+// `body` against `with`: where the arm is the second body, the motor turns the other way round to carry it.
+TEST_P(OdeOwnWorld, HingeThatHoldsAnArm_SaysItsMomentAboutTheHinge) {
+  for (const char *host : {"ode", "builtin"}) {
+    const Rig rig(c, host, GetParam(), DFM_JOINT_HINGE, kAcross, 0, 50);
+    run(rig.world, 0.05, 1e-3);
+    const double sign = GetParam() == With::still_first ? 1 : -1;
+    EXPECT_NEAR(rig.read().effort, sign * 2 * 9.81 * 0.3, 1e-6) << host;
+    EXPECT_NEAR(rig.read().rate, 0, 1e-7) << host;
+  }
+}
+
+TEST_P(OdeOwnWorld, SliderThatHoldsAnArm_SaysItsForceAlongTheAxis) {
+  for (const char *host : {"ode", "builtin"}) {
+    const Rig rig(c, host, GetParam(), DFM_JOINT_SLIDER, kSkew, 0, 50);
+    run(rig.world, 0.05, 1e-3);
+    const double sign = GetParam() == With::still_first ? 1 : -1;
+    EXPECT_NEAR(rig.read().effort, sign * 2 * 9.81 * 2 / 3, 1e-6) << host;
+  }
+}
+
+// The motor's direction: body against with, about the axis as the def has it in the world, however the bodies stand or which of them is fixed.
+TEST_P(OdeOwnWorld, HingeMotor_TurnsAsOnTheBuiltinHost) {
+  for (const double sign : {1.0, -1.0}) {
+    compare(c, GetParam(), DFM_JOINT_HINGE, kSkew, 2 * sign, 50, 0.4, {0.005, 0.01, 0.05});   // moments to 8 N m
+    const Rig rig(c, "ode", GetParam(), DFM_JOINT_HINGE, kSkew, 2 * sign, 50);
+    run(rig.world, 0.4, 1e-3);
+    EXPECT_NEAR(rig.read().position, 0.8 * sign, 0.01);
+  }
+}
+TEST_P(OdeOwnWorld, SliderMotor_MovesAsOnTheBuiltinHost) {
+  for (const double sign : {1.0, -1.0}) {
+    compare(c, GetParam(), DFM_JOINT_SLIDER, kSkew, 0.5 * sign, 5000, 0.4, {1e-6, 1e-6, 1e-4});
+    const Rig rig(c, "ode", GetParam(), DFM_JOINT_SLIDER, kSkew, 0.5 * sign, 5000);
+    run(rig.world, 0.4, 1e-3);
+    EXPECT_NEAR(rig.read().position, 0.2 * sign, 1e-6);
+  }
+}
+
+// One that cannot hold its speed does what it can, and says so with its sign.
+TEST_P(OdeOwnWorld, MotorAtItsLimit_SaysItsLimit) {
+  for (const double sign : {1.0, -1.0}) {
+    compare(c, GetParam(), DFM_JOINT_HINGE, kAcross, 100 * sign, 1.5, 0.4, {0.02, 0.05, 1e-6});
+    compare(c, GetParam(), DFM_JOINT_SLIDER, kSkew, 100 * sign, 3, 0.4, {2e-3, 1e-3, 1e-6});
+    const Rig rig(c, "ode", GetParam(), DFM_JOINT_HINGE, kAcross, 100 * sign, 1.5);
+    run(rig.world, 0.02, 1e-3);
+    EXPECT_NEAR(rig.read().effort, 1.5 * sign, 1e-9);
+  }
+}
+
+// Past half a turn the angle goes on from the other side.
+TEST_P(OdeOwnWorld, HingeAngle_IsWithinHalfATurn) {
+  const Rig ode(c, "ode", GetParam(), DFM_JOINT_HINGE, kSkew, 5, 200), own(c, nullptr, GetParam(), DFM_JOINT_HINGE, kSkew, 5, 200);
+  bool below = false;
+  for (int i = 0; i < 40; ++i) {
+    run(ode.world, 0.04, 1e-3), run(own.world, 0.04, 1e-3);
+    const double a = ode.read().position, b = own.read().position;
+    ASSERT_NEAR(std::remainder(a - b, 2 * 3.141592653589793), 0, 0.02) << i;
+    ASSERT_LE(std::fabs(a), 3.1416);
+    below |= a < -2;
+  }
+  EXPECT_TRUE(below);
+}
+INSTANTIATE_TEST_SUITE_P(All, OdeOwnWorld, ::testing::ValuesIn(kAll), [](const auto &p) { return kNames[int(p.param)]; });
+
+// Two arms on driven hinges, on a fixed body that stands askew; a soft ball under one of them, on it a pile that also leans on the fixed body.
+namespace {
+
+struct Machine {
+  Context c;
+  dfm_world world;
+  std::vector<dfm_rigid> bodies;
+  Machine() {
+    ok(dfm_ode_register());
+    world = make_world(c);
+    set_friction(world, 0.5);
+    add_plane(world, "floor", {0, 0, -0.25});
+    BodyOptions o;
+    o.name = "soft", o.young = 2e4, o.damping_stiffness = 2e-3, o.position = {0.3, 0, -0.152};
+    make_body(c, world, "ball", {0.1}, 200, o);
+    dfm_rigid_def post = stand("post", {0, 0.1, 0.1}), lying = box("lying", {0.05, 0.05, 0.05}, 0.4, {0.11, 0.02, 0.0705});
+    post.shape = DFM_SHAPE_BOX, post.half_size[0] = post.half_size[1] = post.half_size[2] = 0.05;
+    lying.velocity[0] = -0.3, lying.spin[2] = 2;
+    bodies = create(world,
+                    {box("upper", {0.15, 0.04, 0.02}, 1, {0.2, 0, 0}), post, box("lower", {0.15, 0.04, 0.02}, 1, {0.55, 0, 0}), lying,
+                     box("top", {0.06, 0.03, 0.02}, 0.2, {0.13, 0.02, 0.141}), box("end", {0.03, 0.03, 0.03}, 0.2, {0.6, 0, 0.0505})},
+                    {driven(joint(DFM_JOINT_HINGE, 1, 0, {0, 0, 0}, {0, 1, 0}), 0, 12),
+                     driven(joint(DFM_JOINT_HINGE, 2, 0, {0.375, 0, 0}, {0, 1, 0}), -0.5, 4)},
+                    "ode");
+  }
+  std::vector<JointReading> read() const { return {reading(bodies[0], 0), reading(bodies[0], 1)}; }
+};
+
+}  // namespace
+
+// After a restore joints say what they said then, before any step, in this world and in another one; and both go on with the same bits.
+TEST(OdeOwnWorldSnapshot, Restored_SaysWhatTheJointsSaidAndGoesOnBitByBit) {
+  Machine m;
+  run(m.world, 0.15, 1e-3);
+  ASSERT_GT(stats(m.world).contacts, 0u);
+  EXPECT_GT(state(m.bodies[4]).velocity[2], -0.1);   // carried by what lies below
+  const std::string shot = snapshot(m.world);
+  const std::vector<JointReading> then = m.read();
+  run(m.world, 0.15, 1e-3);
+  const uint64_t hash = dfm_world_hash(m.world);
+  const std::vector<JointReading> later = m.read();
+  EXPECT_GT(std::fabs(later[1].position - then[1].position), 1e-2);
+
+  Machine fresh;
+  for (Machine *to : {&m, &fresh}) {
+    ok(dfm_world_restore(to->world, shot.data(), shot.size()));
+    EXPECT_EQ(to->read(), then) << (to == &fresh);
+    run(to->world, 0.15, 1e-3);
+    EXPECT_EQ(to->read(), later) << (to == &fresh);
+    EXPECT_EQ(dfm_world_hash(to->world), hash) << (to == &fresh);
+  }
+}
+
+// A state that is set counts at once.
+TEST(OdeOwnWorldSnapshot, SetState_IsWhatTheJointSays) {
+  Context c;
+  ok(dfm_ode_register());
+  const Rig rig(c, "ode", With::still, DFM_JOINT_SLIDER, {1, 0, 0}, 0, 50, {0, 0, 0});
+  run(rig.world, 0.01, 1e-3);
+  dfm_rigid_state s = state(rig.bodies[0]);
+  s.position[0] += 0.25, s.velocity[0] = 0.5;
+  ok(dfm_rigid_set_state(rig.bodies[0], &s));
+  EXPECT_NEAR(rig.read().position, 0.25, 1e-9);
+  EXPECT_NEAR(rig.read().rate, 0.5, 1e-9);
+}
