@@ -17,6 +17,19 @@ dfm_pose to_pose(const Pose &p) {
   return {{p.position.x, p.position.y, p.position.z}, {q.x, q.y, q.z, q.w}};
 }
 
+// ODE's bodies are the engine's while the dfm_world steps, however that ends.
+class Stepping {
+ public:
+  Stepping(Engine &engine, dfm_world world, const std::vector<dBodyID> &hidden) : engine_(engine), world_(world) { engine.begin(hidden, dfm_world_time(world)); }
+  ~Stepping() { engine_.end(dfm_world_time(world_)); }
+  Stepping(const Stepping &) = delete;
+  Stepping &operator=(const Stepping &) = delete;
+
+ private:
+  Engine &engine_;
+  dfm_world world_;
+};
+
 }  // namespace
 
 Adapter::Adapter(dfm_world world, const dfm_ode_def &def) : world_(world), space_(def.space), own_group_(!def.contacts), own_near_(!def.near_callback) {
@@ -244,20 +257,23 @@ std::vector<dBodyID> Adapter::hidden_bodies() const {
 dfm_status Adapter::step(double dt) {
   trouble = 0;
   TRY(sync());
-  engine_.begin(hidden_bodies());
-  const dfm_status status = dfm_world_step(world_, dt, &trouble);
-  engine_.end();
+  dfm_status status = DFM_OK;
+  {
+    const Stepping stepping(engine_, world_, hidden_bodies());
+    status = dfm_world_step(world_, dt, &trouble);
+  }
   ++steps_;
+  dfm_status told = DFM_OK;                // what the bodies say of it comes after the step's own verdict, and one of them does not keep it from the next
   for (auto &b : bodies_) {
     Member &m = b->seat->member;
-    TRY(dfm_rigid_get_state(b->rigid, &b->world));
-    // A step that failed half way leaves the dfm_world where its last good sub-step ended; ODE may be one ahead.
-    if (status != DFM_OK && !same(b->world, m.state())) m.put(b->world);
+    const dfm_status of_body = dfm_rigid_get_state(b->rigid, &b->world);
+    if (told == DFM_OK) told = of_body;
+    if (status != DFM_OK && of_body == DFM_OK && !same(b->world, m.state())) m.put(b->world);
     b->ode = m.state();
   }
   bool restored = false;
   TRY(ask_restored(restored));
-  return status;
+  return status != DFM_OK ? status : told;
 }
 
 dfm_status Adapter::obstacle(dGeomID geom, dfm_obstacle *out) {

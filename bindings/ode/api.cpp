@@ -9,15 +9,16 @@ using namespace dfm_ode_detail;
 
 namespace {
 
-// Handles count up and are never used twice.
+// Handles count up and are never used twice. Never destroyed: an adapter that nobody has detached stands in worlds of the dfm_world and of ODE, which at
+// the program's end may be gone before it or stay longer than it, and what detaches as late as that must still find it.
 struct Adapters {
   std::mutex mutex;
   std::unordered_map<dfm_ode, std::unique_ptr<Adapter>> all;
   dfm_ode next = 1;
 };
 Adapters &adapters() {
-  static Adapters a;
-  return a;
+  static Adapters *const a = new Adapters;
+  return *a;
 }
 
 Adapter *find(dfm_ode handle) {

@@ -56,6 +56,7 @@ void principal(double a[3][3], Vec &moments, Quat &axes) {
   else axes = unit({z.x + x.z, y.z + z.y, k, x.y - y.x});
 }
 
+void carry(dBodyID b, Vec force, Vec torque) { dBodySetForce(b, force.x, force.y, force.z), dBodySetTorque(b, torque.x, torque.y, torque.z); }
 bool finite_turn(dBodyID b) { return dBodyGetFiniteRotationMode(b) != 0; }
 bool damped(dBodyID b) { return dBodyGetLinearDamping(b) != 0 || dBodyGetAngularDamping(b) != 0 || dBodyGetMaxAngularSpeed(b) < dInfinity; }
 
@@ -132,16 +133,16 @@ Motion Member::answer(const Motion &p) const {
   return {(1 / inertia.mass) * p.v, in_axes(rotation_of(start), inverse(inertia.moments), p.w)};
 }
 
-void Engine::begin(const std::vector<dBodyID> &others) {
+void Engine::begin(const std::vector<dBodyID> &others, double time) {
   saved_.clear();
   auto add = [&](dBodyID b) {
-    saved_.push_back({b, load(dBodyGetForce(b)), load(dBodyGetTorque(b)), {}, {}, {}, {}, false, dBodyGetGyroscopicMode(b) != 0, inertia_of(b)});
+    saved_.push_back({b, load(dBodyGetForce(b)), load(dBodyGetTorque(b)), {}, {}, {}, {}, false, false, dBodyGetGyroscopicMode(b) != 0, inertia_of(b)});
   };
   for (Member *m : members) m->saved = saved_.size(), add(m->body);
   for (const dBodyID b : others) add(b), saved_.back().next_idle = idle(b);
   idle_.clear();
   find_ties();
-  open_ = false, in_step = true;
+  begun_ = time, open_ = false, in_step = true;
 }
 
 Engine::Idle Engine::idle(dBodyID body) const {
@@ -161,7 +162,14 @@ void Engine::find_ties() {
     }
 }
 
-void Engine::end() {
+void Engine::end(double time) {
+  if (open_ && time == t_) {
+    for (Saved &s : saved_) s.enabled = s.given, s.next_idle = s.idle;
+    restore();
+    stepped_ = false;                      // what friction has seen of it does not count
+  }
+  if (time == begun_)
+    for (const Saved &s : saved_) carry(s.body, s.force, s.torque);
   close();
   // The world does not keep bodies without geoms: their quaternions are left such that setting them changes no bit (dfm_ode_restore).
   for (size_t i = members.size(); i < saved_.size(); ++i) {
@@ -178,7 +186,7 @@ void Engine::end() {
   open_ = in_step = false;
 }
 
-// The sub-step before has ended for good.
+// The sub-step before has ended for good, or been taken back.
 void Engine::close() {
   if (friction && stepped_) friction->settle(h_);
   else if (friction) friction->drop();
@@ -260,7 +268,7 @@ void Engine::open(const dfm_rigid_step &step) {
     for (Saved &s : saved_) {
       s.position = load(dBodyGetPosition(s.body)), s.rotation = from_ode(dBodyGetQuaternion(s.body));
       s.v = load(dBodyGetLinearVel(s.body)), s.w = load(dBodyGetAngularVel(s.body));
-      s.enabled = dBodyIsEnabled(s.body);
+      s.enabled = s.given = dBodyIsEnabled(s.body);
       s.idle = s.next_idle;
     }
     close();
@@ -278,7 +286,7 @@ void Engine::take(Member &m, const dfm_rigid_state &given, const double *extra) 
   Saved &s = saved_[m.saved];
   if (m.restored && s.enabled != (extra[12] == 0)) {
     (s.enabled ? dBodyDisable : dBodyEnable)(m.body);
-    s.enabled = !s.enabled;
+    s.enabled = s.given = !s.enabled;
   }
   m.restored = false;
   m.put(given);
@@ -352,33 +360,45 @@ void Engine::push(Member &m, const double *impulse) {
   dirty_ = true;
 }
 
+// For the length of an ODE step, whichever way it ends: joints tell the engine what they do, and ODE keeps its gyroscopic terms out.
+class Engine::Lent {
+ public:
+  explicit Lent(Engine &engine) : engine_(engine) {
+    for (Tie &t : engine.ties_) t.callers = dJointGetFeedback(t.joint), dJointSetFeedback(t.joint, &t.own);
+    for (const Saved &s : engine.saved_) dBodySetGyroscopicMode(s.body, 0);
+  }
+  ~Lent() {
+    for (const Saved &s : engine_.saved_) dBodySetGyroscopicMode(s.body, s.gyroscopic);
+    for (const Tie &t : engine_.ties_) {
+      dJointSetFeedback(t.joint, t.callers);
+      if (t.callers) *t.callers = t.own;
+    }
+  }
+  Lent(const Lent &) = delete;
+  Lent &operator=(const Lent &) = delete;
+
+ private:
+  Engine &engine_;
+};
+
 void Engine::advance(double h) {
   Timer timer(ode_seconds);
   if (stepped_) restore();
-  for (const Saved &s : saved_) {
-    dBodySetForce(s.body, s.force.x, s.force.y, s.force.z);
-    dBodySetTorque(s.body, s.torque.x, s.torque.y, s.torque.z);
-  }
+  for (const Saved &s : saved_) carry(s.body, s.force, s.torque);
   for (Member *m : members) {
     if (m->wakes) dBodyEnable(m->body);
     if (m->kind == Member::still) continue;
     const Vec f = (1 / h) * m->impulse.v, t = (1 / h) * m->impulse.w;
     dBodyAddForce(m->body, f.x, f.y, f.z), dBodyAddTorque(m->body, t.x, t.y, t.z);
   }
-  for (Tie &t : ties_) t.callers = dJointGetFeedback(t.joint), dJointSetFeedback(t.joint, &t.own);
   for (const Saved &s : saved_)
     if (dBodyIsEnabled(s.body) && dBodyGetAutoDisableFlag(s.body)) dBodyEnable(s.body);   // its counters begin anew: tire() counts
-  for (const Saved &s : saved_) dBodySetGyroscopicMode(s.body, 0);
+  const Lent lent(*this);
+  stepped_ = true, dirty_ = false;
   (quick ? dWorldQuickStep : dWorldStep)(world, h);
   ++steps;
-  stepped_ = true, dirty_ = false;
-  for (const Saved &s : saved_) dBodySetGyroscopicMode(s.body, s.gyroscopic);
   turn_jointed(h);
   turn_free(h);
-  for (const Tie &t : ties_) {
-    dJointSetFeedback(t.joint, t.callers);
-    if (t.callers) *t.callers = t.own;
-  }
 }
 
 void Engine::turn_jointed(double h) {

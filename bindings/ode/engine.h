@@ -18,6 +18,7 @@
 #pragma once
 #include <array>
 #include <cstdint>
+#include <limits>
 #include <memory>
 #include <unordered_map>
 #include <vector>
@@ -85,9 +86,10 @@ class Engine {
   uint64_t steps = 0, corrections = 0;
   double residual = 0, residual_max = 0, ode_seconds = 0;
 
-  // Around a dfm_ode_step: forces that the caller put on bodies act over all of it.
-  void begin(const std::vector<dBodyID> &bodies_without_geoms);
-  void end();
+  // Around a dfm_ode_step: forces that the caller put on bodies act over all of it. time: the dfm_world's, s. A sub-step that it has not got past when all
+  // ends has failed, and ODE goes back to where that began; where it was the first one, the caller's forces are on the bodies again.
+  void begin(const std::vector<dBodyID> &bodies_without_geoms, double time = 0);
+  void end(double time = std::numeric_limits<double>::quiet_NaN());
   void forget(Member *member);
 
   void predict(Member &m, const dfm_rigid_step &step, uint32_t number, double *velocity);
@@ -106,11 +108,12 @@ class Engine {
     dBodyID body;
     Vec force, torque, position, v, w;
     Quat rotation;
-    bool enabled;
+    bool enabled, given;                   // for this sub-step; as it was given
     bool gyroscopic;                       // as the caller has it
     Inertia inertia;
     Idle idle{}, next_idle{};              // of bodies without geoms
   };
+  class Lent;
   struct Tie { dJointID joint; size_t a, b; dJointFeedback own, *callers; };   // a, b: in saved_
   std::unordered_map<dBodyID, size_t> number_;   // in saved_
   std::vector<Tie> ties_;                  // joints between two bodies that move, but for contacts
@@ -119,7 +122,7 @@ class Engine {
   std::vector<Vec> turn_;                  // per body of saved_, N m s
   bool open_ = false, stepped_ = false, dirty_ = false, again_ = false;
   int rounds_ = 0;                         // corrections of this sub-step
-  double t_ = 0, h_ = 0;
+  double t_ = 0, h_ = 0, begun_ = 0;
 
   void open(const dfm_rigid_step &step);
   void restore();
