@@ -1,9 +1,10 @@
 // The `deform` command: one cmd_*.cpp per subcommand, each on the public API only.
 #pragma once
-#include <CLI/CLI.hpp>
 #include <string>
 
 #include "deform/deform.h"
+
+namespace CLI { class App; }   // <CLI/CLI.hpp>, 4 s of every compiler's time, is for the files that define subcommands
 
 namespace cli {
 

@@ -1,4 +1,6 @@
 // deform ccd QUERIES.csv: times of impact of the point-triangle and edge-edge queries of a file.
+#include <CLI/CLI.hpp>
+
 #include <algorithm>
 #include <cerrno>
 #include <cmath>

@@ -1,4 +1,6 @@
 // deform explain SCENE.json: the plan of a step, and why.
+#include <CLI/CLI.hpp>
+
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>

@@ -1,4 +1,6 @@
 // deform friction CASE.json: a friction law on a rig.
+#include <CLI/CLI.hpp>
+
 #include <unistd.h>
 
 #include <cmath>

@@ -1,6 +1,8 @@
 // deform mesh info FILE | make SHAPE --out FILE | convert IN OUT | fill SURFACE
 #include "cmd_mesh.h"
 
+#include <CLI/CLI.hpp>
+
 #include <algorithm>
 #include <cctype>
 #include <memory>

@@ -1,4 +1,6 @@
 // deform mesh fill SURFACE --out FILE --cells N
+#include <CLI/CLI.hpp>
+
 #include <chrono>
 #include <cstdio>
 #include <memory>

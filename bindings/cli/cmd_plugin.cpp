@@ -1,4 +1,6 @@
 // deform plugin list | info ID | check FILE
+#include <CLI/CLI.hpp>
+
 #include <cstdio>
 #include <cstring>
 #include <memory>

@@ -1,4 +1,6 @@
 // deform plugin check FILE: the command line of the validator (check/).
+#include <CLI/CLI.hpp>
+
 #include <memory>
 
 #include "cli.h"

@@ -1,4 +1,6 @@
 // deform run SCENE.json: simulates and writes what interfaces promise.
+#include <CLI/CLI.hpp>
+
 #include <csignal>
 #include <ctime>
 

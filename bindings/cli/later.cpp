@@ -1,4 +1,6 @@
 // Subcommands that the interface names and later work delivers: refused, never ignored.
+#include <CLI/CLI.hpp>
+
 #include "cli.h"
 
 namespace cli {

@@ -1,4 +1,6 @@
 // The `deform` command: global options, errors to exit codes.
+#include <CLI/CLI.hpp>
+
 #include <algorithm>
 #include <cstdio>
 #include <cstdlib>

@@ -1,4 +1,6 @@
 // deform montage: pictures of several runs in labelled rows. `make demo` calls it; it is not part of the command's promised surface.
+#include <CLI/CLI.hpp>
+
 #include <memory>
 
 #include "messages.h"
