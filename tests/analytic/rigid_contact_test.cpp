@@ -7,45 +7,6 @@ namespace {
 
 using namespace test;
 
-struct Momenta { double linear[3] = {}, angular[3] = {}, size = 0; };
-
-// Of all bodies, about the origin; size: the sum of the bodies' own, to compare with.
-void add(Momenta &to, const dfm_body_measure &m) {
-  for (int k = 0; k < 3; ++k) {
-    const int i = (k + 1) % 3, j = (k + 2) % 3;
-    to.linear[k] += m.momentum[k];
-    to.angular[k] += m.angular[k] + m.com[i] * m.momentum[j] - m.com[j] * m.momentum[i];
-  }
-  to.size += norm(vec(m.momentum));
-}
-
-dfm_body soft_ball(dfm_context *c, dfm_world w, Vec position, Vec velocity = {}) {
-  BodyOptions o;
-  o.name = "ball", o.young = 3e4, o.poisson = 0.3, o.damping_stiffness = 0.002, o.position = position, o.velocity = velocity;
-  return make_body(c, w, "ball", {0.1}, 400, o);
-}
-
-dfm_body soft_bed(dfm_context *c, dfm_world w, double young, uint32_t cells = 3) {
-  BodyOptions o;
-  o.name = "bed", o.young = young, o.poisson = 0.3, o.damping_stiffness = 0.003, o.damping_mass = 4;
-  return make_body(c, w, "beam", {0.3, 0.3, 0.1}, cells, o);
-}
-
-void hold_bottom(dfm_body bed) {
-  dfm_body_info info{};
-  info.size = sizeof info;
-  ok(dfm_body_get_info(bed, &info));
-  std::vector<double> x(3 * info.npoint);
-  uint32_t n = 0;
-  ok(dfm_body_get_state(bed, info.npoint, x.data(), nullptr, &n));
-  double low = 1e9;
-  for (uint32_t i = 0; i < n; ++i) low = std::min(low, x[3 * i + 2]);
-  std::vector<uint32_t> held;
-  for (uint32_t i = 0; i < n; ++i)
-    if (x[3 * i + 2] < low + 1e-9) held.push_back(i);
-  ok(dfm_body_hold(bed, uint32_t(held.size()), held.data(), 7));
-}
-
 double top_of(dfm_body bed) {
   uint32_t n = 0;
   ok(dfm_surface_positions(bed, 0, nullptr, &n));
@@ -54,6 +15,34 @@ double top_of(dfm_body bed) {
   double top = -1e9;
   for (uint32_t i = 0; i < n; ++i) top = std::max(top, x[3 * i + 2]);
   return top;
+}
+
+// A bed, and a plate that a slider presses down on it from `gap` above.
+struct Bed {
+  Context c;
+  dfm_world w;
+  dfm_body bed;
+  Vec centre;
+  double top;
+  explicit Bed(Vec gravity = {}, double young = 5e4, uint32_t cells = 3)
+      : w(make_world(c, gravity)), bed(soft_bed(c, w, young, cells)), centre(vec(measure(bed).com)), top(top_of(bed)) {}
+  dfm_rigid press(double mass, double gap, double velocity, double max) const {
+    dfm_joint_def j = joint(DFM_JOINT_SLIDER, 0, DFM_RIGID_WORLD, {centre[0], centre[1], top}, {0, 0, -1});
+    j.motor = 1, j.velocity = velocity, j.max = max;
+    return create(w, {box("press", {0.2, 0.2, 0.02}, mass, {centre[0], centre[1], top + 0.02 + gap})}, {j})[0];
+  }
+};
+
+Vec contact_force(dfm_rigid r) {
+  Vec force, moment;
+  ok(dfm_rigid_contact_wrench(r, force.data(), moment.data()));
+  return force;
+}
+// Up, of the next `steps` steps of 1 ms.
+double mean_force(dfm_world w, dfm_rigid r, int steps) {
+  double mean = 0;
+  for (int k = 0; k < steps; ++k) run(w, 1e-3, 1e-3), mean += contact_force(r)[2] / steps;
+  return mean;
 }
 
 }  // namespace
@@ -79,7 +68,7 @@ TEST(RigidContact, Collision_KeepsBothMomenta) {
   EXPECT_GT(stats(w).contacts_max, 5u);
   EXPECT_GT(std::fabs(measure(ball).momentum[2] - before), 1);
   EXPECT_GT(norm(vec(rigid_measure(plate).contact_impulse)), 1);
-  for (int k = 0; k < 3; ++k) {
+  for (size_t k = 0; k < 3; ++k) {
     EXPECT_NEAR(end.linear[k], start.linear[k], 1e-12 * start.size);
     EXPECT_NEAR(end.angular[k], start.angular[k], 1e-12 * start.size);
     EXPECT_NEAR(rigid_measure(plate).contact_impulse[k], -measure(ball).contact_impulse[k], 1e-12 * start.size);
@@ -91,25 +80,14 @@ TEST(RigidContact, BoxOnBed_IsCarriedByItsWeight) {
   double sag[3];
   const double masses[3] = {2, 4, 8};
   for (int i = 0; i < 3; ++i) {
-    Context c;
-    const dfm_world w = make_world(c);
-    const dfm_body bed = soft_bed(c, w, 5e4);
-    hold_bottom(bed);
-    const double top = top_of(bed), mass = masses[i];
-    double centre[3];
-    std::copy_n(measure(bed).com, 3, centre);
-    const dfm_rigid weight = create(w, {box("weight", {0.2, 0.2, 0.05}, mass, {centre[0], centre[1], top + 0.0501})})[0];
-    double force[3] = {}, moment[3] = {}, mean = 0;
-    run(w, 1.5, 1e-3);
-    for (int k = 0; k < 200; ++k) {
-      run(w, 1e-3, 1e-3);
-      ok(dfm_rigid_contact_wrench(weight, force, moment));
-      mean += force[2] / 200;
-    }
-    EXPECT_NEAR(mean, mass * 9.81, 1e-3 * mass * 9.81);
+    const Bed on({0, 0, -9.81});
+    const double mass = masses[i];
+    const dfm_rigid weight = create(on.w, {box("weight", {0.2, 0.2, 0.05}, mass, {on.centre[0], on.centre[1], on.top + 0.0501})})[0];
+    run(on.w, 1.5, 1e-3);
+    EXPECT_NEAR(mean_force(on.w, weight, 200), mass * 9.81, 1e-3 * mass * 9.81);
     EXPECT_LT(norm(vec(state(weight).velocity)), 1e-4);
     EXPECT_NEAR(state(weight).rotation[3], 1, 1e-3);
-    sag[i] = top + 0.05 - state(weight).position[2];
+    sag[i] = on.top + 0.05 - state(weight).position[2];
   }
   // Twice the mass, about twice the additional sag; the bed's own weight sags by the same in all three.
   EXPECT_GT(sag[0], 1e-4);
@@ -118,101 +96,65 @@ TEST(RigidContact, BoxOnBed_IsCarriedByItsWeight) {
 
 // A slider with a motor that can do 5 N presses with 5 N, whatever speed it is told.
 TEST(RigidContact, MotorPress_GivesItsForce) {
-  Context c;
-  const dfm_world w = make_world(c, {0, 0, 0});
-  const dfm_body bed = soft_bed(c, w, 5e4);
-  hold_bottom(bed);
-  double centre[3];
-  std::copy_n(measure(bed).com, 3, centre);
-  const double top = top_of(bed);
-  dfm_joint_def j = joint(DFM_JOINT_SLIDER, 0, DFM_RIGID_WORLD, {centre[0], centre[1], top}, {0, 0, -1});
-  j.motor = 1, j.velocity = 0.2, j.max = 5;
-  const dfm_rigid press = create(w, {box("press", {0.2, 0.2, 0.02}, 1, {centre[0], centre[1], top + 0.021})}, {j})[0];
-  run(w, 1.5, 1e-3);
-  double force[3] = {}, moment[3] = {}, effort = 0, mean = 0;
-  for (int k = 0; k < 100; ++k) {
-    run(w, 1e-3, 1e-3);
-    ok(dfm_rigid_contact_wrench(press, force, moment));
-    mean += force[2] / 100;
-  }
-  ok(dfm_rigid_joint(press, 0, nullptr, nullptr, &effort));
-  EXPECT_NEAR(effort, 5, 1e-9);
-  EXPECT_NEAR(mean, 5, 0.01);
+  const Bed on;
+  const dfm_rigid press = on.press(1, 1e-3, 0.2, 5);
+  run(on.w, 1.5, 1e-3);
+  EXPECT_NEAR(mean_force(on.w, press, 100), 5, 0.01);
+  EXPECT_NEAR(reading(press, 0).effort, 5, 1e-9);
 }
 
 // A motor with power to spare runs at its speed while contact brakes it, to rounding, and says what that takes.
 TEST(RigidContact, BrakedMotor_KeepsItsSpeed) {
-  Context c;
-  const dfm_world w = make_world(c, {0, 0, 0});
-  const dfm_body bed = soft_bed(c, w, 5e4);
-  hold_bottom(bed);
-  double centre[3];
-  std::copy_n(measure(bed).com, 3, centre);
-  const double top = top_of(bed);
-  dfm_joint_def j = joint(DFM_JOINT_SLIDER, 0, DFM_RIGID_WORLD, {centre[0], centre[1], top}, {0, 0, -1});
-  j.motor = 1, j.velocity = 0.02, j.max = 1e4;
-  const dfm_rigid press = create(w, {box("press", {0.2, 0.2, 0.02}, 0.1, {centre[0], centre[1], top + 0.0205})}, {j})[0];
-  double force[3] = {}, moment[3] = {}, rate = 0, effort = 0, most = 0;
+  const Bed on;
+  const dfm_rigid press = on.press(0.1, 5e-4, 0.02, 1e4);
+  double most = 0;
   for (int k = 0; k < 500; ++k) {
-    run(w, 1e-3, 1e-3);
-    ok(dfm_rigid_joint(press, 0, nullptr, &rate, &effort));
-    ok(dfm_rigid_contact_wrench(press, force, moment));
-    ASSERT_NEAR(rate, 0.02, 1e-12) << "step " << k;
-    ASSERT_NEAR(effort, force[2], k ? 1e-9 * (1 + force[2]) : 3) << "step " << k;   // the first step also brings it up to speed
-    most = std::max(most, force[2]);
+    run(on.w, 1e-3, 1e-3);
+    const JointReading motor = reading(press, 0);
+    const double force = contact_force(press)[2];
+    ASSERT_NEAR(motor.rate, 0.02, 1e-12) << "step " << k;
+    ASSERT_NEAR(motor.effort, force, k ? 1e-9 * (1 + force) : 3) << "step " << k;   // the first step also brings it up to speed
+    most = std::max(most, force);
   }
   EXPECT_GT(most, 20);   // F h / m would be 0.2 m/s: ten times its speed
 }
 
 // The limit is met on the way in, and left when the speed is told anew: both within the sub-step, so that neither force nor speed is overshot.
 TEST(RigidContact, MotorPress_ReachesItsLimitAndLeavesIt) {
-  Context c;
-  const dfm_world w = make_world(c, {0, 0, 0});
-  const dfm_body bed = soft_bed(c, w, 5e4);
-  hold_bottom(bed);
-  double centre[3];
-  std::copy_n(measure(bed).com, 3, centre);
-  const double top = top_of(bed);
-  dfm_joint_def j = joint(DFM_JOINT_SLIDER, 0, DFM_RIGID_WORLD, {centre[0], centre[1], top}, {0, 0, -1});
-  j.motor = 1, j.velocity = 0.05, j.max = 8;
-  const dfm_rigid press = create(w, {box("press", {0.2, 0.2, 0.02}, 0.5, {centre[0], centre[1], top + 0.021})}, {j})[0];
-  double rate = 0, effort = 0;
+  const Bed on;
+  const dfm_rigid press = on.press(0.5, 1e-3, 0.05, 8);
+  JointReading motor;
   int limited = 0;
   for (int k = 0; k < 1000; ++k) {
     if (k == 800) ok(dfm_rigid_set_motor(press, 0, -0.03, 8));
-    run(w, 1e-3, 1e-3);
-    ok(dfm_rigid_joint(press, 0, nullptr, &rate, &effort));
-    ASSERT_LE(std::fabs(effort), 8 * (1 + 1e-12)) << "step " << k;
-    const bool at_limit = std::fabs(effort) > 8 * (1 - 1e-9);
+    run(on.w, 1e-3, 1e-3);
+    motor = reading(press, 0);
+    ASSERT_LE(std::fabs(motor.effort), 8 * (1 + 1e-12)) << "step " << k;
+    const bool at_limit = std::fabs(motor.effort) > 8 * (1 - 1e-9);
     limited += at_limit;
-    if (!at_limit) ASSERT_NEAR(rate, k < 800 ? 0.05 : -0.03, 1e-9) << "step " << k;
-    else ASSERT_LE(effort > 0 ? rate : -rate, (k < 800 ? 0.05 : 0.03) + 1e-9) << "step " << k;   // never faster than told
+    if (!at_limit) ASSERT_NEAR(motor.rate, k < 800 ? 0.05 : -0.03, 1e-9) << "step " << k;
+    else ASSERT_LE(motor.effort > 0 ? motor.rate : -motor.rate, (k < 800 ? 0.05 : 0.03) + 1e-9) << "step " << k;   // never faster than told
   }
   EXPECT_GT(limited, 300);
-  EXPECT_NEAR(rate, -0.03, 1e-9);
+  EXPECT_NEAR(motor.rate, -0.03, 1e-9);
 }
 
 // A heavy rigid body on a light soft one is the hard case of a sequential solve: from landing to rest, at a weight of 20 N whatever the mass.
 // Figures in doc/concepts/rigid.md.
 TEST(RigidContact, MassRatios_Converge) {
   for (const double ratio : {1.0, 10.0, 100.0, 1000.0}) {
-    Context c;
     const double mass = 9 * ratio;   // of the bed's 9 kg
-    const dfm_world w = make_world(c, {0, 0, -20 / mass});
-    set_friction(w, 0.5);
-    const dfm_body bed = soft_bed(c, w, 1e5, 8);
-    hold_bottom(bed);
-    double centre[3];
-    std::copy_n(measure(bed).com, 3, centre);
-    dfm_rigid_def d = box("weight", {0.12, 0.12, 0.05}, mass, {centre[0], centre[1], top_of(bed) + 0.051});
+    const Bed on({0, 0, -20 / mass}, 1e5, 8);
+    set_friction(on.w, 0.5);
+    dfm_rigid_def d = box("weight", {0.12, 0.12, 0.05}, mass, {on.centre[0], on.centre[1], on.top + 0.051});
     d.velocity[2] = -0.3 / std::sqrt(ratio), d.velocity[0] = 0.02 / std::sqrt(ratio);   // the same energy
-    create(w, {d});
+    create(on.w, {d});
     double sweeps = 0;
     for (int k = 0; k < 500; ++k) {
-      run(w, 1e-3, 1e-3);
-      sweeps += stats(w).sweeps / 500.0;
+      run(on.w, 1e-3, 1e-3);
+      sweeps += stats(on.w).sweeps / 500.0;
     }
-    const dfm_world_stats s = stats(w);
+    const dfm_world_stats s = stats(on.w);
     std::printf("  mass ratio %4g: sweeps per step mean %.1f, most %u; not converged %llu of %llu\n", ratio, sweeps, s.sweeps_max,
                 static_cast<unsigned long long>(s.unconverged), static_cast<unsigned long long>(s.substeps));
     EXPECT_GT(s.contacts_max, 12u);

@@ -33,13 +33,9 @@ struct Cells {
 inline Cells make_cells(dfm_context *c, const char *kind, std::array<double, 3> size, uint32_t cells) {
   dfm_tetmesh mesh = 0;
   ok(dfm_tetmesh_make(c, kind, size.data(), cells, &mesh));
-  dfm_tetmesh_info info{};
-  info.size = sizeof info;
-  ok(dfm_tetmesh_get_info(mesh, &info));
-  const double *points = nullptr;
-  const uint32_t *tets = nullptr;
-  ok(dfm_tetmesh_data(mesh, &points, &tets, nullptr));
-  Cells out{{points, points + 3 * size_t(info.npoint)}, {tets, tets + 4 * size_t(info.ntet)}};
+  dfm_body_def d = dfm_body_def_default();
+  lend(mesh, d);
+  Cells out{{d.points, d.points + 3 * size_t(d.npoint)}, {d.tets, d.tets + 4 * size_t(d.ntet)}};
   ok(dfm_tetmesh_destroy(mesh));
   return out;
 }

@@ -68,25 +68,13 @@ struct Ode {
 inline Vec position(dBodyID b) { return vec(dBodyGetPosition(b)); }
 inline Vec velocity(dBodyID b) { return vec(dBodyGetLinearVel(b)); }
 
-struct Momenta { Vec linear{}, angular{}; double size = 0; };   // angular: about the origin; size: sum of the bodies' own
-
 inline Vec turned(const dReal *R, Vec a, bool back) {
   Vec out{};
   for (size_t r = 0; r < 3; ++r)
     for (size_t c = 0; c < 3; ++c) out[r] += (back ? R[4 * c + r] : R[4 * r + c]) * a[c];
   return out;
 }
-inline void add(Momenta &to, Vec momentum, Vec centre, Vec spin) {
-  for (size_t k = 0; k < 3; ++k) {
-    const size_t i = (k + 1) % 3, j = (k + 2) % 3;
-    to.linear[k] += momentum[k], to.angular[k] += spin[k] + centre[i] * momentum[j] - centre[j] * momentum[i];
-  }
-  to.size += norm(momentum);
-}
-inline void add(Momenta &to, dfm_body b) {
-  const dfm_body_measure m = measure(b);
-  add(to, vec(m.momentum), vec(m.com), vec(m.angular));
-}
+inline void add(Momenta &to, dfm_body b) { add(to, measure(b)); }
 inline void add(Momenta &to, dBodyID b) {
   dMass m;
   dBodyGetMass(b, &m);
@@ -98,44 +86,10 @@ inline void add(Momenta &to, dBodyID b) {
   for (double &x : p) x *= m.mass;
   add(to, p, position(b), turned(R, L, false));
 }
-inline double apart(Vec a, Vec b) { return norm({a[0] - b[0], a[1] - b[1], a[2] - b[2]}); }
 
-inline std::vector<double> points(dfm_body b) {
-  dfm_body_info info{};
-  info.size = sizeof info;
-  ok(dfm_body_get_info(b, &info));
-  std::vector<double> x(3 * info.npoint);
-  uint32_t n = 0;
-  ok(dfm_body_get_state(b, info.npoint, x.data(), nullptr, &n));
-  return x;
-}
-inline double lowest(dfm_body b) {
-  double low = 1e9;
-  const std::vector<double> x = points(b);
-  for (size_t i = 2; i < x.size(); i += 3) low = std::min(low, x[i]);
-  return low;
-}
-
-inline void hold_bottom(dfm_body bed) {
-  const std::vector<double> x = points(bed);
-  const double low = lowest(bed);
-  std::vector<uint32_t> held;
-  for (uint32_t i = 0; i < x.size() / 3; ++i)
-    if (x[3 * size_t{i} + 2] < low + 1e-9) held.push_back(i);
-  ok(dfm_body_hold(bed, uint32_t(held.size()), held.data(), 7));
-}
-
-inline dfm_body soft_bed(Ode &ode, double young = 2e4) {
-  BodyOptions o;
-  o.name = "bed", o.young = young, o.poisson = 0.3, o.damping_stiffness = 0.003, o.damping_mass = 4;
-  const dfm_body bed = make_body(ode.context, ode.soft, "beam", {0.3, 0.3, 0.1}, 3, o);
-  hold_bottom(bed);
-  return bed;
-}
+inline dfm_body soft_bed(Ode &ode, double young = 2e4) { return soft_bed(ode.context, ode.soft, young); }
 inline dfm_body soft_ball(Ode &ode, Vec at, Vec speed = {}, double young = 3e4, double damping_mass = 0) {
-  BodyOptions o;
-  o.name = "ball", o.young = young, o.poisson = 0.3, o.damping_stiffness = 0.002, o.damping_mass = damping_mass, o.position = at, o.velocity = speed;
-  return make_body(ode.context, ode.soft, "ball", {0.1}, 400, o);
+  return soft_ball(ode.context, ode.soft, at, speed, young, damping_mass);
 }
 
 }  // namespace test

@@ -9,6 +9,7 @@ using Vec = std::array<double, 3>;
 inline double dot(Vec a, Vec b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
 inline double norm(Vec a) { return std::sqrt(dot(a, a)); }
 inline Vec vec(const double *p) { return {p[0], p[1], p[2]}; }
+inline double apart(Vec a, Vec b) { return norm({a[0] - b[0], a[1] - b[1], a[2] - b[2]}); }
 
 inline dfm_rigid_def box(const char *name, Vec half, double mass, Vec position = {}) {
   dfm_rigid_def d = dfm_rigid_def_default();
@@ -53,6 +54,54 @@ inline dfm_body_measure rigid_measure(dfm_rigid r) {
   m.size = sizeof m;
   ok(dfm_rigid_get_measure(r, &m));
   return m;
+}
+
+struct Momenta { Vec linear{}, angular{}; double size = 0; };   // angular: about the origin; size: sum of the bodies' own
+
+inline void add(Momenta &to, Vec momentum, Vec centre, Vec spin) {
+  for (size_t k = 0; k < 3; ++k) {
+    const size_t i = (k + 1) % 3, j = (k + 2) % 3;
+    to.linear[k] += momentum[k], to.angular[k] += spin[k] + centre[i] * momentum[j] - centre[j] * momentum[i];
+  }
+  to.size += norm(momentum);
+}
+inline void add(Momenta &to, const dfm_body_measure &m) { add(to, vec(m.momentum), vec(m.com), vec(m.angular)); }
+
+// What rigid bodies fall on: a ball of 0.1 m, a bed of 0.3 by 0.3 by 0.1 m with its bottom held.
+inline std::vector<double> points(dfm_body b) {
+  dfm_body_info info{};
+  info.size = sizeof info;
+  ok(dfm_body_get_info(b, &info));
+  std::vector<double> x(3 * info.npoint);
+  uint32_t n = 0;
+  ok(dfm_body_get_state(b, info.npoint, x.data(), nullptr, &n));
+  return x;
+}
+inline double lowest(dfm_body b) {
+  double low = 1e9;
+  const std::vector<double> x = points(b);
+  for (size_t i = 2; i < x.size(); i += 3) low = std::min(low, x[i]);
+  return low;
+}
+inline void hold_bottom(dfm_body bed) {
+  const std::vector<double> x = points(bed);
+  const double low = lowest(bed);
+  std::vector<uint32_t> held;
+  for (uint32_t i = 0; i < x.size() / 3; ++i)
+    if (x[3 * size_t{i} + 2] < low + 1e-9) held.push_back(i);
+  ok(dfm_body_hold(bed, uint32_t(held.size()), held.data(), 7));
+}
+inline dfm_body soft_bed(dfm_context *c, dfm_world w, double young, uint32_t cells = 3) {
+  BodyOptions o;
+  o.name = "bed", o.young = young, o.poisson = 0.3, o.damping_stiffness = 0.003, o.damping_mass = 4;
+  const dfm_body bed = make_body(c, w, "beam", {0.3, 0.3, 0.1}, cells, o);
+  hold_bottom(bed);
+  return bed;
+}
+inline dfm_body soft_ball(dfm_context *c, dfm_world w, Vec at, Vec speed = {}, double young = 3e4, double damping_mass = 0) {
+  BodyOptions o;
+  o.name = "ball", o.young = young, o.poisson = 0.3, o.damping_stiffness = 0.002, o.damping_mass = damping_mass, o.position = at, o.velocity = speed;
+  return make_body(c, w, "ball", {0.1}, 400, o);
 }
 
 }  // namespace test

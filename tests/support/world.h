@@ -83,13 +83,16 @@ std::vector<T> listed(dfm_status (*list)(uint64_t, uint32_t, T *, uint32_t *), u
 }
 inline std::vector<dfm_contact> contacts(dfm_world w) { return listed(dfm_world_contacts, w); }
 
-inline std::string snapshot(dfm_world w) {
+// What one of the functions writes that tell their size first.
+template <class T>
+std::string written(dfm_status (*write)(dfm_world, T *, size_t *), dfm_world w) {
   size_t bytes = 0;
-  ok(dfm_world_snapshot(w, nullptr, &bytes));
+  ok(write(w, nullptr, &bytes));
   std::string data(bytes, '\0');
-  ok(dfm_world_snapshot(w, data.data(), &bytes));
+  ok(write(w, data.data(), &bytes));
   return data;
 }
+inline std::string snapshot(dfm_world w) { return written(dfm_world_snapshot, w); }
 
 // Every point at one velocity.
 inline void set_velocity(dfm_body body, std::array<double, 3> velocity) {

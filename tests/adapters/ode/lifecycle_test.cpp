@@ -268,14 +268,11 @@ TEST(OdeLifecycle, Restore_TakesTheBodiesBack) {
   const dBodyID box = ode.box({0.08, 0.08, 0.05}, 2, {0.15, 0.15, 0.17});
   dBodySetAngularVel(box, 0.3, 1, 0.2);
   ode.run(0.2);
-  size_t bytes = 0;
-  ok(dfm_world_snapshot(ode.soft, nullptr, &bytes));
-  std::vector<unsigned char> shot(bytes);
-  ok(dfm_world_snapshot(ode.soft, shot.data(), &bytes));
+  const std::string shot = snapshot(ode.soft);
   ode.run(0.1);
   const uint64_t hash = dfm_world_hash(ode.soft);
   const Vec there = position(box);
-  ok(dfm_world_restore(ode.soft, shot.data(), bytes));
+  ok(dfm_world_restore(ode.soft, shot.data(), shot.size()));
   ode.run(0.1);
   EXPECT_EQ(dfm_world_hash(ode.soft), hash);
   EXPECT_EQ(position(box), there);
@@ -289,22 +286,15 @@ TEST(OdeLifecycle, Restore_TakesSleepAndItsCountersBack) {
   dCreatePlane(ode.space, 0, 0, 1, 0);
   const dBodyID plate = ode.box({0.2, 0.2, 0.05}, 4, {0, 0, 0.05});
   soft_ball(ode, {0, 0, 0.203}, {}, 3e4, 30);
-  const auto take = [&](std::vector<unsigned char> &shot) {
-    size_t bytes = 0;
-    ok(dfm_world_snapshot(ode.soft, nullptr, &bytes));
-    shot.resize(bytes);
-    ok(dfm_world_snapshot(ode.soft, shot.data(), &bytes));
-  };
-  std::vector<unsigned char> before, awake, asleep;
+  std::string before = snapshot(ode.soft), awake;
   int fell = 0;
-  take(before);
-  for (; dBodyIsEnabled(plate) && fell < 2000; ++fell) before.swap(awake), ode.run(0.01), take(before);
+  for (; dBodyIsEnabled(plate) && fell < 2000; ++fell) awake = std::move(before), ode.run(0.01), before = snapshot(ode.soft);
   ASSERT_LT(fell, 2000);
-  asleep = before;
+  const std::string asleep = std::move(before);
   ode.run(0.02);
   const uint64_t hash = dfm_world_hash(ode.soft);
   for (const bool slept : {false, true}) {
-    const std::vector<unsigned char> &shot = slept ? asleep : awake;
+    const std::string &shot = slept ? asleep : awake;
     dBodyEnable(plate);                    // whatever ODE's bodies are at
     ok(dfm_world_restore(ode.soft, shot.data(), shot.size()));
     ode.run(slept ? 0.02 : 0.03);
