@@ -13,7 +13,7 @@ help:
 	@echo "make bench            the figures: kernels and full steps"
 	@echo "make soak             what holds, and how much it creeps: hours; goes on where it was stopped"
 	@echo "make lint             layout, includes, headers, text"
-	@echo "make asan, make tsan  the suite under the sanitizers"
+	@echo "make asan, make tsan  the suite under the sanitizers; tsan: what runs on several threads"
 	@echo "make fuzz             the readers under libFuzzer"
 	@echo "make install PREFIX=  library, headers, plugins, command (default $(PREFIX))"
 	@echo "make clean            removes build/ and out/"

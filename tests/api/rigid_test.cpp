@@ -124,7 +124,7 @@ TEST(RigidHost, SomebodyElses_TakesPartInTheSolve) {
   EXPECT_EQ(counts.destroyed, counts.created);
 }
 
-TEST(RigidBodies, HashAndSnapshot_CoverThem) {
+TEST(RigidBodies, HashAndSnapshotOnThreads_CoverThem) {
   Context one, four(4);
   dfm_body ball;
   dfm_rigid plate, other;

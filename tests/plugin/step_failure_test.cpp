@@ -211,7 +211,7 @@ TEST(StepFailure, OfAModelInCreate_RefusesTheBody) {
 }
 
 // A plugin's parallel_for inside a worker runs serially there, under our pool and under a host's that does not know of workers.
-TEST(Tasks, NestedInAWorker_RunSeriallyInTheCaller) {
+TEST(Tasks, NestedInWorkerThreads_RunSeriallyInTheCaller) {
   for (const bool host_hook : {false, true}) {
     Host h(3, host_hook);
     const dfm_world w = test::make_world(h.c);

@@ -41,19 +41,25 @@ TEST(FillDrop, JitteredRuns4To6_DoNotCross) { test::expect_jittered("fill_drop",
 TEST(FillDrop, JitteredRuns7To8_DoNotCross) { test::expect_jittered("fill_drop", 7, 8, kLanding, 30, in_the_corner); }
 TEST(FillDrop, JitteredRuns9To10_DoNotCross) { test::expect_jittered("fill_drop", 9, 10, kLanding, 30, in_the_corner); }
 
-// Their ears and noses fold through themselves on impact where nothing keeps them from it.
-void expect_livers_and_bunny(int from, int to) {
-  if (test::shared_dir().empty()) GTEST_SKIP() << "../shared is not there";
-  test::expect_jittered("fill_drop_organs", from, to, {"--time", "0.5", "--set", "/output/every=0.01"}, 30,
-                        [](const test::SceneRun &run) { return run.number("intersections_self_max") == 0; });
+// Their ears and noses fold through themselves on impact where nothing keeps them from it: by 0.4 s an ear of the bunny has turned inside out (seed 3).
+const std::vector<std::string> kImpact = {"--time", "0.4", "--set", "/output/every=0.01"};
+bool not_folded(const test::SceneRun &run) {
+  return run.number("intersections_self_max") == 0 && run.last("liver").com[2] > 0 && run.last("bunny").com[2] > 0;
 }
-TEST(FillDrop, LiversAndBunnyJittered1_DoNotCrossThemselves) { expect_livers_and_bunny(1, 1); }
-TEST(FillDrop, LiversAndBunnyJittered2_DoNotCrossThemselves) { expect_livers_and_bunny(2, 2); }
-TEST(FillDrop, LiversAndBunnyJittered3_DoNotCrossThemselves) { expect_livers_and_bunny(3, 3); }
-TEST(FillDrop, LiversAndBunnyJittered4_DoNotCrossThemselves) { expect_livers_and_bunny(4, 4); }
-TEST(FillDrop, LiversAndBunnyJittered5_DoNotCrossThemselves) { expect_livers_and_bunny(5, 5); }
-TEST(FillDrop, LiversAndBunnyJittered6_DoNotCrossThemselves) { expect_livers_and_bunny(6, 6); }
-TEST(FillDrop, LiversAndBunnyJittered7_DoNotCrossThemselves) { expect_livers_and_bunny(7, 7); }
-TEST(FillDrop, LiversAndBunnyJittered8_DoNotCrossThemselves) { expect_livers_and_bunny(8, 8); }
-TEST(FillDrop, LiversAndBunnyJittered9_DoNotCrossThemselves) { expect_livers_and_bunny(9, 9); }
-TEST(FillDrop, LiversAndBunnyJittered10_DoNotCrossThemselves) { expect_livers_and_bunny(10, 10); }
+
+class LiversAndBunny : public testing::Test {
+ protected:
+  void SetUp() override {
+    if (test::shared_dir().empty()) GTEST_SKIP() << "../shared is not there";
+  }
+};
+TEST_F(LiversAndBunny, Jittered1_DoNotCrossThemselves) { test::expect_jittered("fill_drop_organs", 1, 1, kImpact, 30, not_folded); }
+TEST_F(LiversAndBunny, Jittered2_DoNotCrossThemselves) { test::expect_jittered("fill_drop_organs", 2, 2, kImpact, 30, not_folded); }
+TEST_F(LiversAndBunny, Jittered3_DoNotCrossThemselves) { test::expect_jittered("fill_drop_organs", 3, 3, kImpact, 30, not_folded); }
+TEST_F(LiversAndBunny, Jittered4_DoNotCrossThemselves) { test::expect_jittered("fill_drop_organs", 4, 4, kImpact, 30, not_folded); }
+TEST_F(LiversAndBunny, Jittered5_DoNotCrossThemselves) { test::expect_jittered("fill_drop_organs", 5, 5, kImpact, 30, not_folded); }
+TEST_F(LiversAndBunny, Jittered6_DoNotCrossThemselves) { test::expect_jittered("fill_drop_organs", 6, 6, kImpact, 30, not_folded); }
+TEST_F(LiversAndBunny, Jittered7_DoNotCrossThemselves) { test::expect_jittered("fill_drop_organs", 7, 7, kImpact, 30, not_folded); }
+TEST_F(LiversAndBunny, Jittered8_DoNotCrossThemselves) { test::expect_jittered("fill_drop_organs", 8, 8, kImpact, 30, not_folded); }
+TEST_F(LiversAndBunny, Jittered9_DoNotCrossThemselves) { test::expect_jittered("fill_drop_organs", 9, 9, kImpact, 30, not_folded); }
+TEST_F(LiversAndBunny, Jittered10_DoNotCrossThemselves) { test::expect_jittered("fill_drop_organs", 10, 10, kImpact, 30, not_folded); }

@@ -44,7 +44,6 @@ bool sound(const test::SceneRun &run, double least_contacts) {
 
 std::vector<std::string> until(double time) { return {"--time", std::to_string(time), "--set", "/output/every=0.02"}; }
 
-bool above_the_floor(const test::SceneRun &run) { return run.last("liver").com[2] > 0 && run.last("bunny").com[2] > 0; }
 bool on_top(const test::SceneRun &run) { return run.last("upper").com[2] > 0.85; }
 
 }  // namespace
@@ -109,7 +108,7 @@ TEST(RabbitsSlope, TenJitteredRuns_DoNotCross) {
                         [](const test::SceneRun &run) { return run.number("guard_steps") > 0; });
 }
 
-// The pairs of the speed figures and the organs, over their landing.
+// The pairs of the speed figures, over their landing.
 TEST(TwoCylinders, CoarsePairTenJitteredRuns_DoNotCross) {
   if (test::shared_dir().empty()) GTEST_SKIP() << "../shared is absent";
   test::expect_jittered("two_cylinders_coarse", 1, 10, until(0.4), row_of("two_cylinders_coarse").least_contacts, on_top);
@@ -121,12 +120,4 @@ TEST(TwoCylinders, FinePairFiveJitteredRuns_DoNotCross) {
 TEST(TwoCylinders, FinePairFiveMoreJitteredRuns_DoNotCross) {
   if (test::shared_dir().empty()) GTEST_SKIP() << "../shared is absent";
   test::expect_jittered("two_cylinders_fine", 6, 10, until(0.3), row_of("two_cylinders_fine").least_contacts, on_top);
-}
-TEST(FillDropOrgans, FiveJitteredRuns_DoNotCross) {
-  if (test::shared_dir().empty()) GTEST_SKIP() << "../shared is absent";
-  test::expect_jittered("fill_drop_organs", 1, 5, until(0.2), row_of("fill_drop_organs").least_contacts, above_the_floor);
-}
-TEST(FillDropOrgans, FiveMoreJitteredRuns_DoNotCross) {
-  if (test::shared_dir().empty()) GTEST_SKIP() << "../shared is absent";
-  test::expect_jittered("fill_drop_organs", 6, 10, until(0.2), row_of("fill_drop_organs").least_contacts, above_the_floor);
 }

@@ -44,11 +44,13 @@ static inline dfm_ode_def dfm_ode_def_default(void) { return dfm_ode_def_for((ui
 /** @return DFM_OK; DFM_E_ARG; DFM_E_STATE world or space has an adapter already; DFM_E_UNSUPPORTED this ODE is of single precision or of another version
  * than the one that libdeform_ode was built with; DFM_E_HANDLE; DFM_E_NOMEM. Threads: Not during step. Since 0.2. */
 DFM_API dfm_status dfm_ode_attach(dfm_world world, const dfm_ode_def *def, dfm_ode *out);
-/** What stood for ODE's geoms leaves the dfm_world; ODE's world stays as it is. Call it before the dfm_world or the dWorldID is destroyed.
+/** What stood for ODE's geoms leaves the dfm_world; ODE's world stays as it is. Call it before the dfm_world or the dWorldID is destroyed;
+ * as late as from the destructors of statics. An adapter that nobody detaches does nothing at the program's end.
  * Threads: Not during step. Since 0.2. */
 DFM_API dfm_status dfm_ode_detach(dfm_ode ode);
 /** Advances both worlds by dt, in the sub-steps that the soft bodies need: in each ODE's own collision, the contact solve, and dWorldStep or
  * dWorldQuickStep with the impulses of that solve. Forces and torques that bodies carry at the call act over all of dt.
+ * A step that fails leaves all bodies where the dfm_world is, at the end of its last good sub-step; where there was none, they keep their forces too.
  * @return as dfm_world_step; DFM_E_UNSUPPORTED a geom of a kind that ODE tells nothing about (which, what to do). Then nothing has moved
  * Threads: One thread at a time per world. Since 0.2. */
 DFM_API dfm_status dfm_ode_step(dfm_ode ode, double dt);
