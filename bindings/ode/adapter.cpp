@@ -20,7 +20,9 @@ dfm_pose to_pose(const Pose &p) {
 // ODE's bodies are the engine's while the dfm_world steps, however that ends.
 class Stepping {
  public:
-  Stepping(Engine &engine, dfm_world world, const std::vector<dBodyID> &hidden) : engine_(engine), world_(world) { engine.begin(hidden, dfm_world_time(world)); }
+  Stepping(Engine &engine, dfm_world world, const std::vector<dBodyID> &hidden) : engine_(engine), world_(world) {
+    engine.begin(hidden, dfm_world_time(world));
+  }
   ~Stepping() { engine_.end(dfm_world_time(world_)); }
   Stepping(const Stepping &) = delete;
   Stepping &operator=(const Stepping &) = delete;
