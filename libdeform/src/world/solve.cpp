@@ -61,8 +61,10 @@ const Body &fastest(const World &w) {
 constexpr uint32_t kMostRevisions = 6;   // of what rigid hosts take for granted, within a sub-step
 
 // Where laws remember, errors of the normal force do not average out: each time a force falls by one, the cone cuts off a part of the bristle that does
-// not come back when it rises, and what is held creeps by it. This share of the normal tolerance then holds (doc/decisions/0028).
-constexpr double kRememberedShare = 0.05;
+// not come back when it rises, and what is held creeps by it; and a velocity to and fro under a bristle of share s stretches it by (1 - s) one way and
+// slackens it by (1 + s) the other. This share of the normal tolerance then holds while bodies shake, and at rest this share of the tangential one
+// (doc/decisions/0028).
+constexpr double kRememberedShare = 0.05, kRememberedRest = 0.05;
 
 // The cap on sweeps bounds the cost of what is not exact, not of what lets bodies through: where a normal residual would eat more than a tenth
 // of the rest distance within the sub-step, up to kBeyondCap times as many are done (many surfels on few phyxels, struck hard).
@@ -134,13 +136,14 @@ void World::tell_failed_solve(const LawInstance *law) {
 const LawInstance *World::solve_rows() {
   const double gap_margin = 0.01 * (0.5 * offset) / h;
   const double least = def.contact_tolerance > 0 ? def.contact_tolerance : std::min(1e-6, gap_margin);
-  tolerance.normal = batches.remembers() ? kRememberedShare * gap_margin : gap_margin;
+  const bool memory = batches.remembers();
+  const ToleranceBounds bounds{least, memory ? kRememberedRest * least : gap_margin, memory ? kRememberedShare * gap_margin : gap_margin};
   for (;;) {
     set_trial(rows, h, state);
     // The sweeps take the next Newton step from there: what is asked a hundredth off is answered to a ten-thousandth.
     if (const LawInstance *bad = batches.answer(h, rows.wt.data(), 0.1 * least, 1e-2, state)) return bad;
     ++passes;
-    if (!sweeps) set_tolerance(rows, state, contacts, h, least, static_cast<uint32_t>(bodies.size()), disturbance, tolerance);
+    if (!sweeps) set_tolerance(rows, state, contacts, h, bounds, static_cast<uint32_t>(bodies.size()), disturbance, tolerance);
     else {
       residual = true_residual(rows, state, h, tolerance);
       if (residual.share <= 1 || !may_sweep(*this, residual) || passes > def.max_passes) return nullptr;
