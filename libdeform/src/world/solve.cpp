@@ -192,7 +192,7 @@ void World::reserve_contacts() {
   ContactStore &to = next_store;
   Report &next = sleepers ? last_report : report;   // the one that keep_contacts() will write
   auto room = [&](size_t entries, auto &...arrays) { (arrays.reserve(entries), ...); };
-  room(n, to.key, to.id_a, to.id_b, to.by_key, to.law, to.dwell, to.area, to.touching, to.held, to.began, next.contacts, next.mode);
+  room(n, to.key, to.id_a, to.id_b, to.by_key, to.law, to.dwell, to.area, to.touching, to.held, to.began, to.crossings, next.contacts, next.mode);
   room(size_t(2) * n, to.path, next.slip), room(size_t(3) * n, to.normal, to.tangent, to.impulse, next.impulse);
   room(size_t(S) * n, to.bristle), room(size_t(9) * n, next.frame);
   work.reserve(std::min(work.size() + n, bodies.size() * (bodies.size() + obstacles.size())));
@@ -207,6 +207,16 @@ void World::reserve_events(size_t more) {
 void World::add_event(uint32_t kind, uint64_t a, uint64_t b, uint64_t key, double t) {
   if (events.size() >= kMostEvents) events.erase(events.begin(), events.begin() + 1024);
   events.push_back({sizeof(dfm_contact_event), kind, handle_of(a), handle_of(b), key, t});
+}
+
+void World::list_crossings() {
+  Array<Crossing> &list = next_store.crossings;
+  list.clear();
+  for (uint32_t i = 0; i < next_store.n; ++i) {
+    const ContactPoint &c = report.contacts[i];
+    if (c.type_a == 1 && next_store.touching[i]) list.push_back({next_store.id_a[i], next_store.id_b[i], c.feature_a, c.feature_b});
+  }
+  std::sort(list.begin(), list.end());
 }
 
 // After the commit: what contacts keep for the next sub-step, their events, the hold measure, friction work and the report.
@@ -267,6 +277,7 @@ void World::keep_contacts() {
   if (sleepers) carry_sleepers(&touching, &sticking);
   for (uint32_t m = 0; m < store.n; ++m)
     if (store.touching[m] && !sleeps(m) && to.find(store.key[m]) == kNone) add_event(DFM_EVENT_END, store.id_a[m], store.id_b[m], store.key[m], time + h);
+  list_crossings();
   std::swap(store, next_store);
 
   stats.contacts = touching, stats.sticking = sticking, stats.pairs_tested = static_cast<uint32_t>(broad.candidates().size());

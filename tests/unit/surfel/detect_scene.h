@@ -181,7 +181,7 @@ struct Scene {
   Array<ContactPoint> contacts(const Array<Candidate> &c) const {
     Array<ContactPoint> out;
     Array<uint8_t> lent;
-    find_contacts(bodies, obstacles, c, h, offset, lent, out);
+    find_contacts(bodies, obstacles, c, h, offset, {}, lent, out);
     return out;
   }
   Array<ContactPoint> contacts() const { return contacts(all()); }
