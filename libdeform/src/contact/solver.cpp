@@ -209,11 +209,12 @@ Residual residual(const ContactRows &rows, const Tolerance &tolerance, Law law) 
     const double *const l = &rows.impulse[size_t(i) * 3];
     const Vec3 u = rows.velocity(i);
     const double normal = normal_residual(rows, i, u);
-    r.share = std::max(r.share, normal / tolerance.normal[i]), r.speed = std::max(r.speed, normal), r.normal = std::max(r.normal, normal);
+    r.share = std::max(r.share, normal / tolerance.normal[i]), r.due = std::max(r.due, normal / tolerance.most_normal);
+    r.speed = std::max(r.speed, normal), r.normal = std::max(r.normal, normal);
     if (!(rows.wt[i] > 0) || !(l[0] > 0)) continue;
     const Pair t = law(i, u);
     const double tangent = tangent_residual(rows, i, t), allowed = std::max(tolerance.tangent[i], 1e-3 * std::sqrt(u.y * u.y + u.z * u.z));
-    r.share = std::max(r.share, tangent / allowed), r.speed = std::max(r.speed, tangent);
+    r.share = std::max(r.share, tangent / allowed), r.due = std::max(r.due, tangent / allowed), r.speed = std::max(r.speed, tangent);
   }
   return r;
 }
@@ -242,10 +243,12 @@ void set_tolerance(const ContactRows &rows, const ContactState &answer, std::spa
     const double normal = normal_residual(rows, i, u), tangent = rubs ? tangent_residual(rows, i, answered(rows, answer, i, h, u)) : 0;
     visit(i, [&](double *d) { d[0] = std::max(d[0], tangent), d[1] = std::max({d[1], tangent, normal}); });
   }
+  tolerance.most_normal = bounds.most_normal;
   tolerance.normal.resize(rows.n), tolerance.tangent.resize(rows.n);
   for (uint32_t i = 0; i < rows.n; ++i) {
-    double normal = bounds.normal, tangent = bounds.tangent;
-    visit(i, [&](const double *d) { tangent = std::max(tangent, 1e-2 * d[0]), normal = std::max(normal, 1e-2 * d[1]); });
+    // what a gap is off by where coordinates are large: a few roundings of them
+    double normal = std::max(bounds.normal, 0x1p-49 * norm(load3(contacts[i].point)) / h), tangent = bounds.tangent;
+    visit(i, [&](const double *d) { tangent = std::max(tangent, 1e-2 * d[0]), normal = std::max(normal, 2e-2 * d[1]); });
     tolerance.normal[i] = std::min(normal, bounds.most_normal), tolerance.tangent[i] = tangent;
   }
 }

@@ -61,10 +61,10 @@ const Body &fastest(const World &w) {
 constexpr uint32_t kMostRevisions = 6;   // of what rigid hosts take for granted, within a sub-step
 
 // Where laws remember, errors of the normal force do not average out: each time a force falls by one, the cone cuts off a part of the bristle that does
-// not come back when it rises, and what is held creeps by it; and a velocity to and fro under a bristle of share s stretches it by (1 - s) one way and
-// slackens it by (1 + s) the other. This share of the normal tolerance then holds while bodies shake, and at rest this share of the tangential one
-// (doc/decisions/0028).
-constexpr double kRememberedShare = 0.05, kRememberedRest = 0.05;
+// not come back when it rises; and a point that shakes under a bristle of share s stretches it by (1 - s) of each way forth and slackens it by
+// (1 + s) of each way back. What is held creeps by both. This share of the normal tolerance then holds while bodies shake, and at rest this share
+// of the tangential one (doc/decisions/0028).
+constexpr double kRememberedShare = 0.05, kRememberedRest = 1e-3;
 
 // The cap on sweeps bounds the cost of what is not exact, not of what lets bodies through: where a normal residual would eat more than a tenth
 // of the rest distance within the sub-step, up to kBeyondCap times as many are done (many surfels on few phyxels, struck hard).
@@ -74,6 +74,10 @@ bool may_sweep(const World &w, const Residual &residual) {
   return residual.normal * w.h > 0.1 * w.offset && w.sweeps < uint64_t{kBeyondCap} * w.def.max_sweeps;
 }
 
+// What goes beyond what must be reached is polish, and this many sweeps of a sub-step are enough for it: the next one goes on from there.
+constexpr uint32_t kPolish = 10;
+bool good(const Residual &left, double share, uint32_t sweeps) { return left.share <= share || (left.due <= share && sweeps >= kPolish); }
+
 // Sweeps on the laws as they were last answered. At the cap the best state seen is taken, not the last one.
 void sweep_until_good(World &w, Acceleration &acceleration, const Tolerance &tolerance) {
   double best = std::numeric_limits<double>::infinity();
@@ -82,7 +86,7 @@ void sweep_until_good(World &w, Acceleration &acceleration, const Tolerance &tol
     sweep(w.rows, w.state, w.h);
     ++w.sweeps;
     const Residual left = inner_residual(w.rows, w.state, w.h, tolerance);
-    if (left.share <= 0.5) return;
+    if (good(left, 0.5, w.sweeps)) return;
     if (left.share < best) best = left.share, w.best_impulse.assign(w.rows.impulse.begin(), w.rows.impulse.end());
     if (!may_sweep(w, left)) break;
     acceleration.follow(w.rows);
@@ -146,7 +150,7 @@ const LawInstance *World::solve_rows() {
     if (!sweeps) set_tolerance(rows, state, contacts, h, bounds, static_cast<uint32_t>(bodies.size()), disturbance, tolerance);
     else {
       residual = true_residual(rows, state, h, tolerance);
-      if (residual.share <= 1 || !may_sweep(*this, residual) || passes > def.max_passes) return nullptr;
+      if (good(residual, 1, sweeps) || !may_sweep(*this, residual) || passes > def.max_passes) return nullptr;
     }
     // at least one sweep on a warm start is part of the method
     sweep_until_good(*this, acceleration, tolerance);
@@ -178,7 +182,7 @@ bool World::stage_solve(uint32_t *trouble) {
     return false;
   }
   if (batches.smooth()) set_slips(rows, state);
-  if (residual.share > 1) *trouble |= DFM_TROUBLE_UNCONVERGED, ++stats.unconverged;
+  if (residual.due > 1) *trouble |= DFM_TROUBLE_UNCONVERGED, ++stats.unconverged;
   stats.passes = passes, stats.sweeps = sweeps, stats.residual = residual.speed;
   stats.passes_max = std::max(stats.passes_max, passes), stats.sweeps_max = std::max(stats.sweeps_max, sweeps);
   stats.residual_max = std::max(stats.residual_max, stats.residual);
