@@ -17,6 +17,7 @@ using namespace test::hold;
 
 struct Place { const char *scene; double level, cycles; };
 constexpr Place kPlaces[] = {{"slope", 0.5, 0}, {"slope", 0.9, 0}, {"slope", 0.99, 0}, {"pull", 0.5, 0}, {"pull", 0.9, 0}, {"pull", 0.99, 0},
+                             {"soft", 0.5, 0}, {"soft", 0.9, 0}, {"soft", 0.99, 0},
                              {"pinch", 1.05, 0}, {"pinch", 2, 0}, {"pinch", 20, 0}, {"pinch", 95, 0}, {"vibration", 0.5, 10000}};
 constexpr const char *kLaws[] = {"coulomb", "karnopp", "dahl", "lugre", "elastoplastic", "gms"};
 struct Step { const char *name; double seconds; };
