@@ -186,7 +186,9 @@ void Acceleration::follow(ContactRows &rows) {
 
 namespace {
 
-double normal_residual(const ContactRows &rows, uint32_t i, Vec3 u) { return std::fabs(std::min(rows.wn[i] * rows.impulse[size_t(i) * 3], u.x + rows.rate[i])); }
+double normal_residual(const ContactRows &rows, uint32_t i, Vec3 u) {
+  return std::fabs(std::min(rows.wn[i] * rows.impulse[size_t(i) * 3], u.x + rows.rate[i]));
+}
 
 double tangent_residual(const ContactRows &rows, uint32_t i, Pair law) {
   const double a = law.a - rows.impulse[size_t(i) * 3 + 1], b = law.b - rows.impulse[size_t(i) * 3 + 2];

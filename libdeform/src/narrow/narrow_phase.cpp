@@ -136,7 +136,8 @@ void find_contacts(std::span<const BodyView> bodies, std::span<const ObstacleVie
       const ObstacleView &view = *find_slot(obstacles, c.slot_b);
       if (view.shape == Shape::mesh) {
         const BodyView mesh{view.slot, nnode, view.category, view.collides_with, view.id, view.surface};
-        narrow::mesh_obstacle({a, &mesh, nullptr, h, offset, norm(view.velocity) + norm(view.spin) * view.extent, of_pair(crossings, a.id, view.id)}, view, c.kind, run, out);
+        const double fastest = norm(view.velocity) + norm(view.spin) * view.extent;
+        narrow::mesh_obstacle({a, &mesh, nullptr, h, offset, fastest, of_pair(crossings, a.id, view.id)}, view, c.kind, run, out);
         continue;
       }
       const ObstacleShape shape(view);

@@ -68,11 +68,13 @@ TEST(AreaShares, CrossingBetweenIdleCorners_StillHasSome) {
 
 // Of redundant contacts in one place some idle: the patch is theirs that bear.
 TEST(AreaShares, CornerThatTouchesIdle_GivesAllToCrossingsBesideIt) {
-  std::vector<ContactPoint> c{corner(0, 1, 0, {{110, 1}}, 1), corner(0, 1, 1, {{111, 1}}, 1), crossing(0, 1, 0.25, 100, 101, 0.5), crossing(0, 1, 0.5, 101, 102, 0.5)};
+  std::vector<ContactPoint> c{corner(0, 1, 0, {{110, 1}}, 1), corner(0, 1, 1, {{111, 1}}, 1), crossing(0, 1, 0.25, 100, 101, 0.5),
+                              crossing(0, 1, 0.5, 101, 102, 0.5)};
   const std::vector<double> idle = shared(c, {0, 1, 1, 1});
   EXPECT_DOUBLE_EQ(idle[1] + idle[2] + idle[3], 4);
   EXPECT_DOUBLE_EQ(idle[2], 2 * 0.75 / 1.25 + 2 * 0.25 / 1.75);
   EXPECT_GT(idle[0], 0) << "and will not start with nothing";
   c[0].distance = 2 * kTouch;
-  EXPECT_DOUBLE_EQ(shared(c, {0, 1, 1, 1})[1] + shared(c, {0, 1, 1, 1})[2] + shared(c, {0, 1, 1, 1})[3], 2) << "a corner that does not touch is no part of the patch";
+  const std::vector<double> apart = shared(c, {0, 1, 1, 1});
+  EXPECT_DOUBLE_EQ(apart[1] + apart[2] + apart[3], 2) << "a corner that does not touch is no part of the patch";
 }
