@@ -117,7 +117,7 @@ TEST(BristleContact, PulledOverASoftMesh_NoAreaIsOwnedTwice) {
 }
 
 // A turntable turns once, and gravity with it: seen from the table nothing changes. Bristles that kept their direction in the world would pull the
-// block about by six times its deflection and more. (On a soft plate crossings of edges come and go, which costs a little of it.)
+// block about by six times its deflection and more.
 TEST(BristleContact, TurnedWithItsTable_KeepsItsDeflectionInTheTablesFrame) {
   constexpr double kTwoPi = 6.283185307179586, kPull = 3, kStart = 0.6, kTurn = 1.4;
   for (const Below below : {Below::plane, Below::soft}) {
@@ -146,7 +146,7 @@ TEST(BristleContact, TurnedWithItsTable_KeepsItsDeflectionInTheTablesFrame) {
       if (k == 599) start[0] = x, start[1] = y;
       if (k > 599) worst = std::max(worst, std::hypot(x - start[0], y - start[1]));
     }
-    EXPECT_LT(worst, (below == Below::plane ? 0.1 : 2) * way) << int(below);
+    EXPECT_LT(worst, (below == Below::plane ? 0.1 : 0.5) * way) << int(below);   // the plate bends too
   }
 }
 

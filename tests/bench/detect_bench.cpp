@@ -86,7 +86,7 @@ void pair_step(benchmark::State &state, bool parallel, double speed) {
       state.ResumeTiming();
     }
     broad.update(s.bodies, s.obstacles, s.filter, s.h, s.offset);
-    find_contacts(s.bodies, s.obstacles, broad.candidates(), s.h, s.offset, lent, contacts);
+    find_contacts(s.bodies, s.obstacles, broad.candidates(), s.h, s.offset, {}, lent, contacts);
     n += double(contacts.size()), candidates += double(broad.candidates().size()), steps += 1;
   }
   state.counters["contacts"] = n / steps;
@@ -194,7 +194,7 @@ void floor_step(benchmark::State &state, Shape shape) {
   Array<uint8_t> lent;
   for (auto _ : state) {
     broad.update(scene.bodies, scene.obstacles, scene.filter, scene.h, scene.offset);
-    find_contacts(scene.bodies, scene.obstacles, broad.candidates(), scene.h, scene.offset, lent, contacts);
+    find_contacts(scene.bodies, scene.obstacles, broad.candidates(), scene.h, scene.offset, {}, lent, contacts);
   }
   state.counters["contacts"] = double(contacts.size());
   state.counters["candidates"] = double(broad.candidates().size());

@@ -17,6 +17,7 @@ using namespace test::hold;
 
 struct Place { const char *scene; double level, cycles; };
 constexpr Place kPlaces[] = {{"slope", 0.5, 0}, {"slope", 0.9, 0}, {"slope", 0.99, 0}, {"pull", 0.5, 0}, {"pull", 0.9, 0}, {"pull", 0.99, 0},
+                             {"soft", 0.5, 0}, {"soft", 0.9, 0}, {"soft", 0.99, 0},
                              {"pinch", 1.05, 0}, {"pinch", 2, 0}, {"pinch", 20, 0}, {"pinch", 95, 0}, {"vibration", 0.5, 10000}};
 constexpr const char *kLaws[] = {"coulomb", "karnopp", "dahl", "lugre", "elastoplastic", "gms"};
 struct Step { const char *name; double seconds; };
@@ -65,6 +66,7 @@ int main(int argc, char **argv) {
       for (const Place &p : kPlaces)
         for (const char *law : kLaws) {
           if (p.cycles > 0 && fine) continue;   // a quarter of an hour each
+          if (!std::strcmp(p.scene, "soft") && p.level > 0.5 && !std::strcmp(law, "gms")) continue;   // doc/laws/gms.md, limits
           const std::string name = name_of(p, law, fine ? "fine" : "coarse", step);
           if (done.count(name) || name.find(only) == std::string::npos) continue;
           if (std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count() > seconds) continue;

@@ -186,6 +186,10 @@ void Acceleration::follow(ContactRows &rows) {
 
 namespace {
 
+double normal_residual(const ContactRows &rows, uint32_t i, Vec3 u) {
+  return std::fabs(std::min(rows.wn[i] * rows.impulse[size_t(i) * 3], u.x + rows.rate[i]));
+}
+
 double tangent_residual(const ContactRows &rows, uint32_t i, Pair law) {
   const double a = law.a - rows.impulse[size_t(i) * 3 + 1], b = law.b - rows.impulse[size_t(i) * 3 + 2];
   return rows.wt[i] * std::sqrt(a * a + b * b);
@@ -206,12 +210,13 @@ Residual residual(const ContactRows &rows, const Tolerance &tolerance, Law law) 
     if (!(rows.wn[i] > 0)) continue;
     const double *const l = &rows.impulse[size_t(i) * 3];
     const Vec3 u = rows.velocity(i);
-    const double normal = std::fabs(std::min(rows.wn[i] * l[0], u.x + rows.rate[i]));
-    r.share = std::max(r.share, normal / tolerance.normal), r.speed = std::max(r.speed, normal), r.normal = std::max(r.normal, normal);
+    const double normal = normal_residual(rows, i, u);
+    r.share = std::max(r.share, normal / tolerance.normal[i]), r.due = std::max(r.due, normal / tolerance.most_normal);
+    r.speed = std::max(r.speed, normal), r.normal = std::max(r.normal, normal);
     if (!(rows.wt[i] > 0) || !(l[0] > 0)) continue;
     const Pair t = law(i, u);
     const double tangent = tangent_residual(rows, i, t), allowed = std::max(tolerance.tangent[i], 1e-3 * std::sqrt(u.y * u.y + u.z * u.z));
-    r.share = std::max(r.share, tangent / allowed), r.speed = std::max(r.speed, tangent);
+    r.share = std::max(r.share, tangent / allowed), r.due = std::max(r.due, tangent / allowed), r.speed = std::max(r.speed, tangent);
   }
   return r;
 }
@@ -226,23 +231,27 @@ Residual true_residual(const ContactRows &rows, const ContactState &answer, doub
   return residual(rows, tolerance, [&](uint32_t i, Vec3 u) { return answered(rows, answer, i, h, u); });
 }
 
-void set_tolerance(const ContactRows &rows, const ContactState &answer, std::span<const ContactPoint> contacts, double h, double least,
-                   uint32_t bodies, Array<double> &disturbance, Tolerance &tolerance) {
-  disturbance.assign(bodies, 0.0);
+void set_tolerance(const ContactRows &rows, const ContactState &answer, std::span<const ContactPoint> contacts, double h,
+                   const ToleranceBounds &bounds, uint32_t bodies, Array<double> &disturbance, Tolerance &tolerance) {
+  disturbance.assign(2 * size_t{bodies}, 0.0);
   auto visit = [&](uint32_t i, auto f) {
-    f(disturbance[contacts[i].slot_a]);
-    if (!contacts[i].obstacle) f(disturbance[contacts[i].slot_b]);
+    f(&disturbance[2 * size_t{contacts[i].slot_a}]);
+    if (!contacts[i].obstacle) f(&disturbance[2 * size_t{contacts[i].slot_b}]);
   };
   for (uint32_t i = 0; i < rows.n; ++i) {
-    if (!(rows.wt[i] > 0) || !(rows.impulse[size_t(i) * 3] > 0 || answer.fn[i] > 0)) continue;
-    const double r = tangent_residual(rows, i, answered(rows, answer, i, h, rows.velocity(i)));
-    visit(i, [&](double &d) { d = std::max(d, r); });
+    if (!(rows.wn[i] > 0)) continue;
+    const Vec3 u = rows.velocity(i);
+    const bool rubs = rows.wt[i] > 0 && (rows.impulse[size_t(i) * 3] > 0 || answer.fn[i] > 0);
+    const double normal = normal_residual(rows, i, u), tangent = rubs ? tangent_residual(rows, i, answered(rows, answer, i, h, u)) : 0;
+    visit(i, [&](double *d) { d[0] = std::max(d[0], tangent), d[1] = std::max({d[1], tangent, normal}); });
   }
-  tolerance.tangent.resize(rows.n);
+  tolerance.most_normal = bounds.most_normal;
+  tolerance.normal.resize(rows.n), tolerance.tangent.resize(rows.n);
   for (uint32_t i = 0; i < rows.n; ++i) {
-    double t = least;
-    visit(i, [&](double d) { t = std::max(t, 1e-2 * d); });
-    tolerance.tangent[i] = t;
+    // what a gap is off by where coordinates are large: a few roundings of them
+    double normal = std::max(bounds.normal, 0x1p-49 * norm(load3(contacts[i].point)) / h), tangent = bounds.tangent;
+    visit(i, [&](const double *d) { tangent = std::max(tangent, 1e-2 * d[0]), normal = std::max(normal, 2e-2 * d[1]); });
+    tolerance.normal[i] = std::min(normal, bounds.most_normal), tolerance.tangent[i] = tangent;
   }
 }
 

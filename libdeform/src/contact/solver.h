@@ -39,19 +39,22 @@ class Acceleration {
 
 // How far a state is from a solution. Per contact, m/s: r_n = |min(w_n lambda_n, u_n + gap/h)|, r_t = w_t |lambda_t - law|.
 // A contact is good where both stay within what they may be off by:
-//   r_n <= 0.01 (d_c - d_g) / h           the gap is then off by less than a hundredth of its margin
-//   r_t <= max(tangent[i], 1e-3 |slip|)   set_tolerance: 1e-6 m/s at rest, which bounds the creep of what sticks
+//   r_n <= normal[i]                      0.01 (d_c - d_g) / h: the gap is then off by less than a hundredth of its margin; less where laws remember
+//   r_t <= max(tangent[i], 1e-3 |slip|)   1e-6 m/s at rest, which bounds the creep of what sticks
 // `share` is the worst contact's residual over its tolerance: at most 1 is converged (doc/decisions/0004-contact-tolerance.md).
-struct Tolerance { double normal = 0; Array<double> tangent; };
+struct Tolerance { double most_normal = 0; Array<double> normal, tangent; };
+struct ToleranceBounds { double tangent, normal, most_normal; };   // m/s: at rest, at rest, ever
+// `due` is the same with most_normal for normal[i]: what must be reached, where the rest may be left to the next sub-step's warm start.
 // `normal` is the worst r_n alone, m/s.
-struct Residual { double share = 0, speed = 0, normal = 0; };
+struct Residual { double share = 0, due = 0, speed = 0, normal = 0; };
 Residual inner_residual(const ContactRows &rows, const ContactState &law, double h, const Tolerance &tolerance);   // of the linearised laws
 Residual true_residual(const ContactRows &rows, const ContactState &answer, double h, const Tolerance &tolerance); // laws asked at this state
 
-// tangent[i] = max(least, 1e-2 d), d: the largest r_t that the warm start leaves at any contact of the two bodies. A contact at rest is warm
-// started at its solution, so d vanishes and `least` rules; while bodies shake, a hundredth of what the sub-step changes is enough, and what
-// is left is part of the next sub-step's d. disturbance: scratch, one entry per body slot.
-void set_tolerance(const ContactRows &rows, const ContactState &answer, std::span<const ContactPoint> contacts, double h, double least,
-                   uint32_t bodies, Array<double> &disturbance, Tolerance &tolerance);
+// tangent[i] = max(bounds.tangent, 1e-2 d), d: the largest r_t that the warm start leaves at any contact of the two bodies. A contact at rest is
+// warm started at its solution, so d vanishes and the bound at rest rules; while bodies shake, a hundredth of what the sub-step changes is enough,
+// and what is left is part of the next sub-step's d. normal[i] = max(bounds.normal, 2e-2 d), d the largest of all r_n and r_t, up to most_normal.
+// disturbance: scratch, two entries per body slot.
+void set_tolerance(const ContactRows &rows, const ContactState &answer, std::span<const ContactPoint> contacts, double h,
+                   const ToleranceBounds &bounds, uint32_t bodies, Array<double> &disturbance, Tolerance &tolerance);
 
 }  // namespace dfm

@@ -1,5 +1,6 @@
 // What the parts of narrow/ share.
 #pragma once
+#include <algorithm>
 #include <cmath>
 #include <cstdint>
 #include <span>
@@ -29,11 +30,20 @@ struct Pair {
   const ObstacleShape *shape;
   double h, offset;
   double speed_b;               // m/s, bound over body b's surfels
+  std::span<const Crossing> crossings{};   // of this pair, in their order
 
   Vec3 xa(uint32_t s) const { return load3(&a.surface->x[4 * size_t{s}]); }
   Vec3 va(uint32_t s) const { return load3(&a.surface->v[4 * size_t{s}]); }
   Vec3 xb(uint32_t s) const { return load3(&b->surface->x[4 * size_t{s}]); }
   Vec3 vb(uint32_t s) const { return load3(&b->surface->v[4 * size_t{s}]); }
+  // Did edge a carry load in the last sub-step, over any edge of b or over this one?
+  bool bears(uint32_t edge_a) const {
+    const auto at = std::lower_bound(crossings.begin(), crossings.end(), edge_a, [](const Crossing &c, uint32_t edge) { return c.edge_a < edge; });
+    return at != crossings.end() && at->edge_a == edge_a;
+  }
+  bool bears(uint32_t edge_a, uint32_t edge_b) const {
+    return std::binary_search(crossings.begin(), crossings.end(), Crossing{a.id, b->id, edge_a, edge_b});
+  }
 };
 
 // Strong enough that a clash of two keys is as likely as an error of the memory.

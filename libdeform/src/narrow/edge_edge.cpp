@@ -1,6 +1,10 @@
 // Two edges cross over each other: closest points of their lines n . r / |n| with n = u x w, both inside the edges, both edges convex,
 // and the direction inside both cones of normals. The faces beside the edges give the sign, so that edges which have slipped through each
 // other by a little are pushed back the way they came.
+//
+// Edges that bore each other in the last sub-step count on, convex or not, within their cones of normals: the load itself presses them flat and a little
+// hollow, and left out there they would lose it, spring back and be hit again, for ever (doc/decisions/0035-edges-that-bear.md). Between hollow edges the lines
+// are further apart than the surfaces, so such a contact keeps nothing away that the others would let come.
 #include <algorithm>
 
 #include "narrow/detail.h"
@@ -63,13 +67,13 @@ void edge_edge(const Pair &pair, Run run, Array<ContactPoint> &out) {
   double uu = 0, widest2 = 0;
   const double depth = edge_recovery_depth(sa, sb);
   EdgeFaces fa;
-  bool known = false, convex = false;   // fa belongs to last_a; so does convex
+  bool known = false, convex = false, bears = false;   // fa belongs to last_a; so do convex and bears
   for (const Candidate &candidate : run) {
     const uint32_t *ea = &sa.edge[2 * size_t{candidate.feature_a}], *eb = &sb.edge[2 * size_t{candidate.feature_b}];
     if (candidate.feature_a != last_a) {
       last_a = candidate.feature_a;
       known = false;
-      convex = edge_becomes_convex(sa, last_a, pair.h);
+      convex = edge_becomes_convex(sa, last_a, pair.h), bears = pair.bears(last_a);
       p0 = pair.xa(ea[0]), u = pair.xa(ea[1]) - p0;
       vp0 = pair.va(ea[0]), vp1 = pair.va(ea[1]);
       uu = norm2(u);
@@ -77,7 +81,7 @@ void edge_edge(const Pair &pair, Run run, Array<ContactPoint> &out) {
       const double widest = std::max(contact_reach(pair.h, pair.offset, speed), depth);
       widest2 = widest * widest;
     }
-    if (!convex) continue;
+    if (!convex && !bears) continue;
     const Vec3 q0 = pair.xb(eb[0]), w = pair.xb(eb[1]) - q0, r = p0 - q0;
     const Vec3 n = cross(u, w);
     const double nn = norm2(n), nr = dot(n, r), ww = norm2(w);
@@ -93,7 +97,7 @@ void edge_edge(const Pair &pair, Run run, Array<ContactPoint> &out) {
     const int place_a = place_on_edge(s / nn, 2 * pair.h * std::sqrt(speed2 / uu)), place_b = place_on_edge(t / nn, 2 * pair.h * std::sqrt(speed2 / ww));
     if (place_a == kNowhere || place_b == kNowhere) continue;
 
-    if (!edge_becomes_convex(sb, candidate.feature_b, pair.h)) continue;
+    if (!(convex && edge_becomes_convex(sb, candidate.feature_b, pair.h)) && !(bears && pair.bears(last_a, candidate.feature_b))) continue;
     if (!known) fa = edge_faces(sa, candidate.feature_a);
     known = true;
     const EdgeFaces fb = edge_faces(sb, candidate.feature_b);

@@ -16,6 +16,11 @@ const View *find_slot(std::span<const View> views, uint32_t slot) {
   return nullptr;
 }
 
+std::span<const Crossing> of_pair(std::span<const Crossing> all, uint64_t id_a, uint64_t id_b) {
+  const auto begin = std::lower_bound(all.begin(), all.end(), Crossing{id_a, id_b, 0, 0});
+  return {begin, std::upper_bound(begin, all.end(), Crossing{id_a, id_b, kNone, kNone})};
+}
+
 // Surfels of one body that have contacts of their own with one other side: a sorted run of the list.
 struct Owners {
   const ContactPoint *begin, *end;
@@ -111,7 +116,7 @@ class Areas {
 }  // namespace
 
 void find_contacts(std::span<const BodyView> bodies, std::span<const ObstacleView> obstacles, const Array<Candidate> &candidates, double h,
-                   double offset, Array<uint8_t> &lent, Array<ContactPoint> &out) {
+                   double offset, std::span<const Crossing> crossings, Array<uint8_t> &lent, Array<ContactPoint> &out) {
   out.clear();
   uint32_t nnode = 0;
   for (const BodyView &b : bodies) nnode = std::max(nnode, b.first_node + b.surface->nsurfel);
@@ -131,7 +136,8 @@ void find_contacts(std::span<const BodyView> bodies, std::span<const ObstacleVie
       const ObstacleView &view = *find_slot(obstacles, c.slot_b);
       if (view.shape == Shape::mesh) {
         const BodyView mesh{view.slot, nnode, view.category, view.collides_with, view.id, view.surface};
-        narrow::mesh_obstacle({a, &mesh, nullptr, h, offset, norm(view.velocity) + norm(view.spin) * view.extent}, view, c.kind, run, out);
+        const double fastest = norm(view.velocity) + norm(view.spin) * view.extent;
+        narrow::mesh_obstacle({a, &mesh, nullptr, h, offset, fastest, of_pair(crossings, a.id, view.id)}, view, c.kind, run, out);
         continue;
       }
       const ObstacleShape shape(view);
@@ -143,7 +149,7 @@ void find_contacts(std::span<const BodyView> bodies, std::span<const ObstacleVie
     const BodyView *b = find_slot(bodies, c.slot_b);
     if (b != fast) speed = largest_speed(*b->surface);
     fast = b;
-    const narrow::Pair pair{a, b, nullptr, h, offset, speed};
+    const narrow::Pair pair{a, b, nullptr, h, offset, speed, of_pair(crossings, a.id, b->id)};
     (c.kind == 0 ? narrow::vertex_face : narrow::edge_edge)(pair, run, out);
   }
   Areas(bodies, obstacles, out, lent).share();

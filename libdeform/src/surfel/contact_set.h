@@ -6,6 +6,7 @@
 //
 // Nodes are world-wide surfel numbers: surfel s of the body in slot k is node first_node[k] + s.
 #pragma once
+#include <compare>
 #include <cstdint>
 
 #include "core/memory.h"
@@ -29,6 +30,13 @@ struct ContactPoint {
   double distance;       // m, true distance, >= 0; negative: depth below b's surface, for recovery
   double area;           // m2
   double velocity[3];    // m/s of the obstacle where a's closest point is, belt included; 0 for bodies
+};
+
+// Two edges that carried load over each other in the last sub-step; b: of a body or of a mesh that has no dofs.
+struct Crossing {
+  uint64_t id_a, id_b;
+  uint32_t edge_a, edge_b;
+  auto operator<=>(const Crossing &) const = default;
 };
 
 }  // namespace dfm

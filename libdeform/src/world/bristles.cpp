@@ -83,7 +83,7 @@ Turn turn_of(const World &w, const Obstacle &o, Vec3 n) {
 
 void share_areas(World &w) {
   const auto counts = [](const LawInstance *law) { return (law->ops->needs & DFM_NEED_AREA) && !(law->ops->flags & DFM_FRIC_SET_VALUED); };
-  if (std::any_of(w.law_list.begin(), w.law_list.end(), counts)) w.areas.share(w.contacts, w.rows.impulse.data(), w.state.area.data());
+  if (std::any_of(w.law_list.begin(), w.law_list.end(), counts)) w.areas.share(w.contacts, w.rows.impulse.data(), 1.1 * w.offset, w.state.area.data());
 }
 
 void fit_bristles(World &w) {

@@ -200,7 +200,7 @@ bool World::stage_guard(uint32_t *trouble) {
     if (sleepers > 0 && wake_hit(*this)) return guard.again = true, false;
     if (solve == kSolves) break;
     guard_add_hits(*this);
-    if (residual.share > 1) --stats.unconverged;   // counted once, by the last solve
+    if (residual.due > 1) --stats.unconverged;   // counted once, by the last solve
     guard.resolving = true;
     const bool solved = stage_solve(trouble);
     guard.resolving = false;

@@ -131,7 +131,7 @@ bool World::stage_narrow(uint32_t *trouble) {
     ~Restored() { w.gather_active(); }
   };
   for (;;) {
-    find_contacts(body_views, obstacle_views, broad.candidates(), h, offset, lent, contacts);
+    find_contacts(body_views, obstacle_views, broad.candidates(), h, offset, store.crossings, lent, contacts);
     woken.clear();
     if (sleepers == 0) return true;
     for (const ContactPoint &c : contacts) {

@@ -61,8 +61,10 @@ const Body &fastest(const World &w) {
 constexpr uint32_t kMostRevisions = 6;   // of what rigid hosts take for granted, within a sub-step
 
 // Where laws remember, errors of the normal force do not average out: each time a force falls by one, the cone cuts off a part of the bristle that does
-// not come back when it rises, and what is held creeps by it. This share of the normal tolerance then holds (doc/decisions/0028).
-constexpr double kRememberedShare = 0.05;
+// not come back when it rises; and a point that shakes under a bristle of share s stretches it by (1 - s) of each way forth and slackens it by
+// (1 + s) of each way back. What is held creeps by both. This share of the normal tolerance then holds while bodies shake, and at rest this share
+// of the tangential one (doc/decisions/0028).
+constexpr double kRememberedShare = 0.05, kRememberedRest = 1e-3;
 
 // The cap on sweeps bounds the cost of what is not exact, not of what lets bodies through: where a normal residual would eat more than a tenth
 // of the rest distance within the sub-step, up to kBeyondCap times as many are done (many surfels on few phyxels, struck hard).
@@ -72,6 +74,10 @@ bool may_sweep(const World &w, const Residual &residual) {
   return residual.normal * w.h > 0.1 * w.offset && w.sweeps < uint64_t{kBeyondCap} * w.def.max_sweeps;
 }
 
+// What goes beyond what must be reached is polish, and this many sweeps of a sub-step are enough for it: the next one goes on from there.
+constexpr uint32_t kPolish = 10;
+bool good(const Residual &left, double share, uint32_t sweeps) { return left.share <= share || (left.due <= share && sweeps >= kPolish); }
+
 // Sweeps on the laws as they were last answered. At the cap the best state seen is taken, not the last one.
 void sweep_until_good(World &w, Acceleration &acceleration, const Tolerance &tolerance) {
   double best = std::numeric_limits<double>::infinity();
@@ -80,7 +86,7 @@ void sweep_until_good(World &w, Acceleration &acceleration, const Tolerance &tol
     sweep(w.rows, w.state, w.h);
     ++w.sweeps;
     const Residual left = inner_residual(w.rows, w.state, w.h, tolerance);
-    if (left.share <= 0.5) return;
+    if (good(left, 0.5, w.sweeps)) return;
     if (left.share < best) best = left.share, w.best_impulse.assign(w.rows.impulse.begin(), w.rows.impulse.end());
     if (!may_sweep(w, left)) break;
     acceleration.follow(w.rows);
@@ -134,16 +140,17 @@ void World::tell_failed_solve(const LawInstance *law) {
 const LawInstance *World::solve_rows() {
   const double gap_margin = 0.01 * (0.5 * offset) / h;
   const double least = def.contact_tolerance > 0 ? def.contact_tolerance : std::min(1e-6, gap_margin);
-  tolerance.normal = batches.remembers() ? kRememberedShare * gap_margin : gap_margin;
+  const bool memory = batches.remembers();
+  const ToleranceBounds bounds{least, memory ? kRememberedRest * least : gap_margin, memory ? kRememberedShare * gap_margin : gap_margin};
   for (;;) {
     set_trial(rows, h, state);
     // The sweeps take the next Newton step from there: what is asked a hundredth off is answered to a ten-thousandth.
     if (const LawInstance *bad = batches.answer(h, rows.wt.data(), 0.1 * least, 1e-2, state)) return bad;
     ++passes;
-    if (!sweeps) set_tolerance(rows, state, contacts, h, least, static_cast<uint32_t>(bodies.size()), disturbance, tolerance);
+    if (!sweeps) set_tolerance(rows, state, contacts, h, bounds, static_cast<uint32_t>(bodies.size()), disturbance, tolerance);
     else {
       residual = true_residual(rows, state, h, tolerance);
-      if (residual.share <= 1 || !may_sweep(*this, residual) || passes > def.max_passes) return nullptr;
+      if (good(residual, 1, sweeps) || !may_sweep(*this, residual) || passes > def.max_passes) return nullptr;
     }
     // at least one sweep on a warm start is part of the method
     sweep_until_good(*this, acceleration, tolerance);
@@ -175,7 +182,7 @@ bool World::stage_solve(uint32_t *trouble) {
     return false;
   }
   if (batches.smooth()) set_slips(rows, state);
-  if (residual.share > 1) *trouble |= DFM_TROUBLE_UNCONVERGED, ++stats.unconverged;
+  if (residual.due > 1) *trouble |= DFM_TROUBLE_UNCONVERGED, ++stats.unconverged;
   stats.passes = passes, stats.sweeps = sweeps, stats.residual = residual.speed;
   stats.passes_max = std::max(stats.passes_max, passes), stats.sweeps_max = std::max(stats.sweeps_max, sweeps);
   stats.residual_max = std::max(stats.residual_max, stats.residual);
@@ -189,7 +196,7 @@ void World::reserve_contacts() {
   ContactStore &to = next_store;
   Report &next = sleepers ? last_report : report;   // the one that keep_contacts() will write
   auto room = [&](size_t entries, auto &...arrays) { (arrays.reserve(entries), ...); };
-  room(n, to.key, to.id_a, to.id_b, to.by_key, to.law, to.dwell, to.area, to.touching, to.held, to.began, next.contacts, next.mode);
+  room(n, to.key, to.id_a, to.id_b, to.by_key, to.law, to.dwell, to.area, to.touching, to.held, to.began, to.crossings, next.contacts, next.mode);
   room(size_t(2) * n, to.path, next.slip), room(size_t(3) * n, to.normal, to.tangent, to.impulse, next.impulse);
   room(size_t(S) * n, to.bristle), room(size_t(9) * n, next.frame);
   work.reserve(std::min(work.size() + n, bodies.size() * (bodies.size() + obstacles.size())));
@@ -204,6 +211,16 @@ void World::reserve_events(size_t more) {
 void World::add_event(uint32_t kind, uint64_t a, uint64_t b, uint64_t key, double t) {
   if (events.size() >= kMostEvents) events.erase(events.begin(), events.begin() + 1024);
   events.push_back({sizeof(dfm_contact_event), kind, handle_of(a), handle_of(b), key, t});
+}
+
+void World::list_crossings() {
+  Array<Crossing> &list = next_store.crossings;
+  list.clear();
+  for (uint32_t i = 0; i < next_store.n; ++i) {
+    const ContactPoint &c = report.contacts[i];
+    if (c.type_a == 1 && next_store.touching[i]) list.push_back({next_store.id_a[i], next_store.id_b[i], c.feature_a, c.feature_b});
+  }
+  std::sort(list.begin(), list.end());
 }
 
 // After the commit: what contacts keep for the next sub-step, their events, the hold measure, friction work and the report.
@@ -264,6 +281,7 @@ void World::keep_contacts() {
   if (sleepers) carry_sleepers(&touching, &sticking);
   for (uint32_t m = 0; m < store.n; ++m)
     if (store.touching[m] && !sleeps(m) && to.find(store.key[m]) == kNone) add_event(DFM_EVENT_END, store.id_a[m], store.id_b[m], store.key[m], time + h);
+  list_crossings();
   std::swap(store, next_store);
 
   stats.contacts = touching, stats.sticking = sticking, stats.pairs_tested = static_cast<uint32_t>(broad.candidates().size());

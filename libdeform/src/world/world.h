@@ -282,7 +282,8 @@ struct World {
   void reserve_events(size_t more);
   void add_event(uint32_t kind, uint64_t a, uint64_t b, uint64_t key, double t);   // a, b: ids
   void reserve_contacts();                             // solve.cpp: memory for keep_contacts()
-  void keep_contacts();                                // solve.cpp: store, events, hold, work; allocates nothing
+  void keep_contacts();
+  void list_crossings();                                // solve.cpp: store, events, hold, work; allocates nothing
 };
 
 // snapshot.cpp

@@ -351,7 +351,7 @@ TEST(BroadPhase, SettledUpdates_DoNotAllocate) {
   for (int step = 0; step < 200; ++step) {
     if (step == 100) settled = allocations;
     broad.update(scene.bodies, scene.obstacles, scene.filter, scene.h, scene.offset);
-    find_contacts(scene.bodies, scene.obstacles, broad.candidates(), scene.h, scene.offset, lent, out);
+    find_contacts(scene.bodies, scene.obstacles, broad.candidates(), scene.h, scene.offset, {}, lent, out);
     for (auto &s : scene.surfaces)       // to and fro, so that lists are renewed but do not grow
       for (uint32_t i = 0; i < s->nsurfel; ++i) s->x[4 * i] += step % 2 ? 0.03 : -0.03;
   }

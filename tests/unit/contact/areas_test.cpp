@@ -9,6 +9,8 @@ namespace {
 
 using dfm::ContactPoint;
 
+constexpr double kTouch = 1e-5;   // m; where a distance is not set it is 0
+
 // Corner `node` of body a on a face of body b, or the other way round; weights on the face's corners.
 ContactPoint corner(uint32_t a, uint32_t b, uint32_t node, std::vector<std::pair<uint32_t, double>> face, double area) {
   ContactPoint c{};
@@ -31,7 +33,7 @@ std::vector<double> shared(const std::vector<ContactPoint> &contacts, const std:
   std::vector<double> impulse(3 * contacts.size()), area(contacts.size());
   for (size_t i = 0; i < load.size(); ++i) impulse[3 * i] = load[i];
   dfm::AreaShares areas(dfm::Memory::standard());
-  areas.share(contacts, impulse.data(), area.data());
+  areas.share(contacts, impulse.data(), kTouch, area.data());
   return area;
 }
 
@@ -62,4 +64,17 @@ TEST(AreaShares, Crossing_TakesFromLoadedCornersAndMakesNone) {
 TEST(AreaShares, CrossingBetweenIdleCorners_StillHasSome) {
   const std::vector<ContactPoint> c{corner(0, 1, 0, {{110, 1}}, 1), crossing(0, 1, 0.25, 100, 101, 0.5)};
   EXPECT_GT(shared(c, {0, 1})[1], 0);
+}
+
+// Of redundant contacts in one place some idle: the patch is theirs that bear.
+TEST(AreaShares, CornerThatTouchesIdle_GivesAllToCrossingsBesideIt) {
+  std::vector<ContactPoint> c{corner(0, 1, 0, {{110, 1}}, 1), corner(0, 1, 1, {{111, 1}}, 1), crossing(0, 1, 0.25, 100, 101, 0.5),
+                              crossing(0, 1, 0.5, 101, 102, 0.5)};
+  const std::vector<double> idle = shared(c, {0, 1, 1, 1});
+  EXPECT_DOUBLE_EQ(idle[1] + idle[2] + idle[3], 4);
+  EXPECT_DOUBLE_EQ(idle[2], 2 * 0.75 / 1.25 + 2 * 0.25 / 1.75);
+  EXPECT_GT(idle[0], 0) << "and will not start with nothing";
+  c[0].distance = 2 * kTouch;
+  const std::vector<double> apart = shared(c, {0, 1, 1, 1});
+  EXPECT_DOUBLE_EQ(apart[1] + apart[2] + apart[3], 2) << "a corner that does not touch is no part of the patch";
 }

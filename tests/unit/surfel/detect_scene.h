@@ -178,10 +178,10 @@ struct Scene {
     }
     return c;
   }
-  Array<ContactPoint> contacts(const Array<Candidate> &c) const {
+  Array<ContactPoint> contacts(const Array<Candidate> &c, std::span<const Crossing> crossings = {}) const {
     Array<ContactPoint> out;
     Array<uint8_t> lent;
-    find_contacts(bodies, obstacles, c, h, offset, lent, out);
+    find_contacts(bodies, obstacles, c, h, offset, crossings, lent, out);
     return out;
   }
   Array<ContactPoint> contacts() const { return contacts(all()); }
