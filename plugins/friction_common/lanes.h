@@ -6,6 +6,8 @@
 #pragma once
 #include <cmath>
 #include <cstdio>
+#include <cstdlib>
+#include <cstring>
 
 #include "deform/plugin.hpp"
 
@@ -41,10 +43,18 @@ template <class Law>
 DEFORM_AVX2 dfm_status eval_avx2(const dfm_friction_in *in, dfm_friction_out *out) { return Law::run(in, out); }
 template <class Law>
 DEFORM_NARROW dfm_status eval_narrow(const dfm_friction_in *in, dfm_friction_out *out) { return Law::run(in, out); }
+
+// DEFORM_SIMD (sse2, avx2, avx512) asks for less than the processor has; read when the plugin is loaded.
+inline Width chosen() {
+  const char *const asked = std::getenv("DEFORM_SIMD");
+  const Width most = widest(), w = !asked ? most : !std::strcmp(asked, "sse2") ? kNarrow : !std::strcmp(asked, "avx2") ? kAvx2 : most;
+  return w < most ? w : most;
+}
+inline const Width kChosen = chosen();
+
 template <class Law>
 dfm_status eval(const dfm_friction_in *in, dfm_friction_out *out) {
-  const Width w = widest();
-  return w == kAvx512 ? eval_avx512<Law>(in, out) : w == kAvx2 ? eval_avx2<Law>(in, out) : eval_narrow<Law>(in, out);
+  return kChosen == kAvx512 ? eval_avx512<Law>(in, out) : kChosen == kAvx2 ? eval_avx2<Law>(in, out) : eval_narrow<Law>(in, out);
 }
 
 // A NaN becomes `most`: what a lane computes stays finite, and its outputs are spoilt at the end by what came in.
