@@ -75,10 +75,10 @@ struct Dahl : bristle::Run<Dahl> {
   static constexpr decltype(dfm_friction::release) release = nullptr;
 
   static constexpr bool kFlat = true;
-  static void flow(const double *params, const bristle::Batch &p, bristle::Block &b) {
-    bristle::all_slips(p, b);
-    if (params[kAlpha] == 1.0) return;
-    for (uint32_t i = 0; i < bristle::kLanes; ++i) bend(params[kAlpha], p, b, i);
+  DEFORM_PASS static bool flow(const double *params, const bristle::Batch &p, bristle::Block &b) {
+    if (params[kAlpha] == 1.0) return false;
+    for (uint32_t i = 0; i < bristle::kLanes; ++i) b.m[i] = b.w[i], b.mx[i] = b.ex[i], b.my[i] = b.ey[i], b.mn[i] = 0.0, bend(params[kAlpha], p, b, i);
+    return true;
   }
 
   // m = w c(1 - kappa rho), so dm = c dw - w c' (kappa drho + rho dkappa), and from the return

@@ -35,7 +35,7 @@ struct Yield { double f, left, slope, by_lambda; };
 
 // kPlain: i = 1, where nothing loops and eight lanes stay in vectors.
 template <bool kPlain>
-inline Yield yield(double rho, double lambda, int i) {
+DEFORM_PASS inline Yield yield(double rho, double lambda, int i) {
   const double width = 1.0 / (1.0 - lambda), u = (rho - lambda) * width, half = 0.5 * (u > 0 ? (u < 1 ? u : 1.0) : 0.0);
   double s, c;
   dfm_sincospi_(half, &s, &c);
@@ -50,8 +50,8 @@ inline Yield yield(double rho, double lambda, int i) {
   return {f, left, steep * alpha + bend, -bend * (1.0 - u)};
 }
 
-inline void trial(const bristle::Batch &p, const Block &b, double kappa, int multiplier, Return &t) {
-  for (uint32_t i = 0; i < kLanes; ++i) {
+DEFORM_PASS inline void trial(const bristle::Batch &p, const Block &b, double kappa, int multiplier, Return &t) {
+  EACH_LANE(i) {
     const double zx = b.zx[i] + p.h * b.vx[i], zy = b.zy[i] + p.h * b.vy[i], square = zx * zx + zy * zy, some = square > 1e-290 ? 1.0 : 0.0;
     const double r = std::sqrt(some > 0 ? square : 1.0), by_r = some / r;
     const double tx = zx * by_r, ty = zy * by_r, load = tx * b.vx[i] + ty * b.vy[i], forward = load > 0 ? load : 0.0;
@@ -69,9 +69,9 @@ inline void trial(const bristle::Batch &p, const Block &b, double kappa, int mul
 }
 
 template <bool kPlain>
-void solve(Return &t, int i) {
+DEFORM_PASS inline void solve(Return &t, int i) {
   double low[kLanes], high[kLanes], active[kLanes], flows = 0;
-  for (uint32_t k = 0; k < kLanes; ++k) {
+  EACH_LANE(k) {
     const double lambda = t.lambda[k], elastic = t.top[k] < lambda ? t.top[k] : lambda, full = t.top[k] / (1.0 + t.p[k]);
     low[k] = elastic, high[k] = full < 1.0 && t.top[k] > 1.0 ? 1.0 : t.top[k];
     // f <= rho where i = 1, so the root lies above full, which it meets at the level; else from above for a short step, from the steepest part for a long one
@@ -80,10 +80,10 @@ void solve(Return &t, int i) {
     active[k] = t.top[k] > lambda && t.p[k] > 0 ? 1.0 : 0.0;
     t.rho[k] = active[k] > 0 ? t.rho[k] : t.top[k];
   }
-  for (uint32_t k = 0; k < kLanes; ++k) flows += active[k];
+  EACH_LANE(k) flows += active[k];
   for (int pass = 0; pass < 100 && flows > 0; ++pass) {
     flows = 0;
-    for (uint32_t k = 0; k < kLanes; ++k) {
+    EACH_LANE(k) {
       const double rho = t.rho[k];
       const Yield y = yield<kPlain>(rho, t.lambda[k], i);
       const double far = (rho - t.rest[k]) - t.p[k] * y.left, near = (rho - t.top[k]) + t.p[k] * y.f, excess = y.f > 0.5 ? far : near;
@@ -93,14 +93,14 @@ void solve(Return &t, int i) {
       t.rho[k] = active[k] > 0 ? to : rho;
       active[k] = moved > 4e-16 * rho ? active[k] : 0.0;
     }
-    for (uint32_t k = 0; k < kLanes; ++k) flows += active[k];
+    EACH_LANE(k) flows += active[k];
   }
 }
 
 // m and its derivatives:  m = (M/rho) f,  dm = (f/rho) dM + (M/rho) [(f' - f/rho) drho + f_lambda dlambda].
 template <bool kPlain>
-void rates(const bristle::Batch &p, int i, int multiplier, const Return &t, Block &b) {
-  for (uint32_t k = 0; k < kLanes; ++k) {
+DEFORM_PASS inline void rates(const bristle::Batch &p, int i, int multiplier, const Return &t, Block &b) {
+  EACH_LANE(k) {
     const double plastic = b.g[k] > 1e-30 * b.fn[k] ? 1.0 : 0.0;
     const double level = plastic > 0 ? b.g[k] : 1.0, by_level = 1.0 / level, hk = p.h * b.k0[k] * by_level, rho = t.rho[k];
     const double by_rho = 1.0 / (rho > 1e-100 ? rho : 1e-100), mult = t.mult[k], load = t.load[k], tx = t.tx[k], ty = t.ty[k];
@@ -137,7 +137,7 @@ dfm_status check_levels(const double *p, char *why, size_t cap) {
 struct Elastoplastic : bristle::Run<Elastoplastic> {
   static bristle::Batch batch(const double *p) { return lugre::batch(p); }
   static constexpr bool kFlat = false;
-  static void flow(const double *params, const bristle::Batch &p, Block &b) {
+  DEFORM_PASS static bool flow(const double *params, const bristle::Batch &p, Block &b) {
     const int i = static_cast<int>(params[kI]), multiplier = static_cast<int>(params[kMultiplier]);
     Return t;
     trial(p, b, params[kKappa], multiplier, t);
@@ -148,6 +148,7 @@ struct Elastoplastic : bristle::Run<Elastoplastic> {
       solve<false>(t, i);
       rates<false>(p, i, multiplier, t, b);
     }
+    return true;
   }
   static constexpr auto check = check_levels;
   static constexpr auto prepare = lugre::prepare;
