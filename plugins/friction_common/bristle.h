@@ -174,7 +174,7 @@ DEFORM_PASS inline void answer(const Batch &p, const Block &b, const double *k1,
       most += k * b.w[i] * ((g + cone) * inverse);
     }
     const double trial2 = (k0 * tx) * (k0 * tx) + (k0 * ty) * (k0 * ty);
-    mode[i] = touches + (trial2 > g * g ? touches : 0.0);
+    mode[i] = touches + touches * (trial2 > g * g ? 1.0 : 0.0);
     ofx[i] = poison - fx, ofy[i] = poison - fy, ozx[i] = zx + poison, ozy[i] = zy + poison;
     oxx[i] = poison - dxx, oxy[i] = poison - dxy, oyx[i] = poison - dyx, oyy[i] = poison - dyy;
     onx[i] = poison - fnx, ony[i] = poison - fny;

@@ -75,12 +75,12 @@ inline void odd_lane(const Batch &p, const Block &b, Passes &t, uint32_t i) {
 }
 
 // The passes below choose by value, not by branch: real batches mix stick and slip, and a mispredicted branch costs more than both sides.
-// Returns whether any lane slips; with kinetic_stop these are the lanes beyond the band, and answer() finds those that stop.
+// Tells whether any lane slips; with kinetic_stop these are the lanes beyond the band, and answer() finds those that stop.
+struct Found { bool slips, odd; };
 template <bool kKineticStop>
-DEFORM_PASS inline bool decide(const Batch &p, const Block &b, Passes &t) {
-  double slips = 0;
+DEFORM_PASS inline Found decide(const Batch &p, const Block &b, Passes &t) {
+  uint64_t slips = 0, odd = 0;
   const double band2 = p.band * p.band;
-  double slip_of[kLanes];
   EACH_LANE(i) {
     const double stiction = p.mu_s * b.fn[i], s2 = b.sx[i] * b.sx[i] + b.sy[i] * b.sy[i], f2 = stiction * stiction;
     const double v2 = b.vx[i] * b.vx[i] + b.vy[i] * b.vy[i];
@@ -91,13 +91,12 @@ DEFORM_PASS inline bool decide(const Batch &p, const Block &b, Passes &t) {
     const double slow = v2 > kTiny ? 0.0 : slip, fast = v2 < kHuge ? 0.0 : slip;
     t.mode[i] = touches + slip;
     t.odd[i] = ((low + high) + (slow + fast)) + starts;
+    slips |= slip > 0 ? uint64_t(1) : uint64_t(0), odd |= t.odd[i] > 0 ? uint64_t(1) : uint64_t(0);
     t.w[i] = std::sqrt(slip > 0 ? v2 : 1.0);
     t.inverse[i] = 1.0 / t.w[i];
     t.excess[i] = t.slope[i] = 0.0;
-    slip_of[i] = slip;
   }
-  EACH_LANE(i) slips += slip_of[i];
-  return slips > 0;
+  return {slips != 0, odd != 0};
 }
 
 template <bool kKineticStop>
@@ -141,12 +140,10 @@ struct Run {
                        to(out->ft, 0, 0), to(out->ft, 1, 1), to(out->limit, 0, 2), to(out->dft_dvt, 0, 3), to(out->dft_dvt, 1, 4), to(out->dft_dvt, 2, 5),
                        to(out->dft_dvt, 3, 6), to(out->dft_dfn, 0, 7), to(out->dft_dfn, 1, 8)};
       Passes t;
-      const bool slips = decide<Law::kKineticStop>(p, b, t);
-      if (slips && p.mu_s != p.mu_c) lanes::curve(p.v_s, p.delta, t.w, t.excess, t.slope);
+      const Found found = decide<Law::kKineticStop>(p, b, t);
+      if (found.slips && p.mu_s != p.mu_c) lanes::curve(p.v_s, p.delta, t.w, t.excess, t.slope);
       answer<Law::kKineticStop>(p, b, t, b.fx, b.fy, b.limit, b.xx, b.xy, b.yx, b.yy, b.nx, b.ny);
-      double odd = 0;
-      EACH_LANE(i) odd += t.odd[i];
-      for (uint32_t i = 0; odd > 0 && i < kLanes; ++i)
+      for (uint32_t i = 0; found.odd && i < kLanes; ++i)
         if (t.odd[i] > 0) odd_lane(p, b, t, i);
       if (out->mode)
         for (uint32_t i = 0; i < kLanes; ++i) out->mode[at + i] = static_cast<uint8_t>(t.mode[i]);
