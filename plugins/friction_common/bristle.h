@@ -15,7 +15,10 @@
 //   dz'/dfn = (g/D) dz0/dfn + (h K0/D^2) zt (m dg/dfn - g dm/dfn),      dz0/dfn = z0/fn where the old bristle was cut, else 0
 //
 // and those of dz/dt are the same over h less dz0. Any m >= 0 is dissipative: V = K0 |z|^2/2 gives (K0 z).v - V' = K0 m K0 |z|^2/g. The micro-damping
-// is passive for every y = K0 z iff K1^2 m <= 4 g (K1 + K2); with m = w the default K1 / (1 + K1 w/(4 g)) meets that with any parameters.
+// is passive for every y = K0 z iff K1^2 m <= 4 g (K1 + K2). So it is damped at the speed W = max(w, m), which is w where m <= w: the default
+// K1e = K1 / (1 + K1 W/(4 g)) has K1e m <= 4 g whatever the parameters. The step inherits that, with d = z' - z0 and y = K0 z':
+//
+//   F.v h - dV = (K0/2 + K1e/h) d^2 + h (m/g) y^2 + K1e (m/g) d.y + K2 w^2 h  >=  0   where (K1e m/g)^2 <= 4 (K1e/h) (h m/g),  the same bound
 #pragma once
 #include "curve.h"
 
@@ -123,29 +126,43 @@ DEFORM_PASS inline void level(const Batch &p, Block &b) {
   }
 }
 
-// Micro-damping at the speed w: its value, w times its slope, and its derivative by fn.
-DEFORM_PASS inline void damping(const Batch &p, const Block &b, double *k1, double *slope, double *by_fn) {
+// Micro-damping and its derivatives by v and fn.
+struct Damping { double k1[kLanes], x[kLanes], y[kLanes], n[kLanes]; };
+
+// kSlips: m = w, so W = w.
+template <bool kSlips>
+DEFORM_PASS inline void damping(const Batch &p, const Block &b, Damping &d) {
+  double W[kLanes], wx[kLanes], wy[kLanes], wn[kLanes];
+  EACH_LANE(i) {
+    const double w = b.w[i], m = kSlips ? 0.0 : b.m[i] < kFar ? b.m[i] : kFar, faster = m > w ? 1.0 : 0.0;
+    W[i] = faster > 0 ? m : w, wx[i] = kSlips || !(faster > 0) ? b.ex[i] : b.mx[i], wy[i] = kSlips || !(faster > 0) ? b.ey[i] : b.my[i];
+    wn[i] = kSlips || !(faster > 0) ? 0.0 : b.mn[i];
+  }
   if (p.form == kPassive) {
     EACH_LANE(i) {
-      const double level4 = 4.0 * b.g[i], kw = b.k1[i] * b.w[i], sum = level4 + kw, inverse = 1.0 / (sum > kLeast ? sum : kLeast);
-      const double share = level4 * inverse, rest = kw * inverse;  // K1e = K1 share; at g = w = 0 a limit of no interest: nothing touches
-      k1[i] = b.k1[i] * share;
-      slope[i] = -4.0 * b.k1[i] * rest * ((b.g[i] - b.fall[i]) * inverse);
-      by_fn[i] = 4.0 * b.k1[i] * rest * (b.mu[i] * inverse);
+      const double level4 = 4.0 * b.g[i], kw = b.k1[i] * W[i], sum = level4 + kw, inverse = 1.0 / (sum > kLeast ? sum : kLeast);
+      const double share = level4 * inverse, rest = kw * inverse;  // K1e = K1 share; at g = W = 0 a limit of no interest: nothing touches
+      const double by_speed = -(b.k1[i] * share) * (b.k1[i] * inverse), by_g = 4.0 * b.k1[i] * rest * inverse, steep = by_g * (b.fall[i] * b.by_w[i]);
+      d.k1[i] = b.k1[i] * share, d.x[i] = by_speed * wx[i] + steep * b.ex[i], d.y[i] = by_speed * wy[i] + steep * b.ey[i];
+      d.n[i] = by_speed * wn[i] + by_g * b.mu[i];
     }
   } else if (p.form == kConstant) {
-    EACH_LANE(i) k1[i] = b.k1[i], slope[i] = by_fn[i] = 0.0;
+    EACH_LANE(i) d.k1[i] = b.k1[i], d.x[i] = d.y[i] = d.n[i] = 0.0;
   } else {
-    double s[kLanes];
-    lanes::curve(p.v_d, 2.0, b.w, s, slope);
-    EACH_LANE(i) k1[i] = b.k1[i] * s[i], slope[i] *= b.k1[i], by_fn[i] = 0.0;
+    double s[kLanes], slope[kLanes];
+    const double by_vd = 1.0 / p.v_d;
+    lanes::curve(p.v_d, 2.0, W, s, slope);
+    EACH_LANE(i) {
+      const double k = b.k1[i] * s[i], by_speed = -2.0 * k * (W[i] * by_vd) * by_vd;
+      d.k1[i] = k, d.x[i] = by_speed * wx[i], d.y[i] = by_speed * wy[i], d.n[i] = by_speed * wn[i];
+    }
   }
 }
 
 // kDamped: sigma1 > 0; kFlat: g does not depend on the speed, and nothing is viscous; kSlips: every motion slips, m = w (Dahl, LuGre).
 // Pointers that overlap nothing, as arguments, or the compiler would not use vectors.
 template <bool kDamped, bool kFlat, bool kSlips>
-DEFORM_PASS inline void answer(const Batch &p, const Block &b, const double *k1, const double *k1_slope, const double *k1_fn, double *__restrict ofx, double *__restrict ofy,
+DEFORM_PASS inline void answer(const Batch &p, const Block &b, const Damping &d, double *__restrict ofx, double *__restrict ofy,
             double *__restrict ozx, double *__restrict ozy, double *__restrict oxx, double *__restrict oxy, double *__restrict oyx, double *__restrict oyy,
             double *__restrict onx, double *__restrict ony, double *__restrict olimit, double *__restrict ostored, double *__restrict mode) {
   EACH_LANE(i) {
@@ -166,12 +183,11 @@ DEFORM_PASS inline void answer(const Batch &p, const Block &b, const double *k1,
     double most = kFlat ? cone : cone + k2 * b.w[i];
     double dxx = kFlat ? hk * xx : hk * xx + k2, dxy = hk * xy, dyx = hk * yx, dyy = kFlat ? hk * yy : hk * yy + k2;
     if (kDamped) {
-      const double k = k1[i], rx = (g * vx - k0 * m * z0x) * inverse, ry = (g * vy - k0 * m * z0y) * inverse;   // dz/dt
+      const double k = d.k1[i], rx = (g * vx - k0 * m * z0x) * inverse, ry = (g * vy - k0 * m * z0y) * inverse;   // dz/dt
       fx += k * rx, fy += k * ry;
-      const double s = k1_slope[i] * b.by_w[i];
-      dxx += k * xx + s * (rx * b.ex[i]), dxy += k * xy + s * (rx * b.ey[i]), dyx += k * yx + s * (ry * b.ex[i]), dyy += k * yy + s * (ry * b.ey[i]);
-      fnx += k * (cx * pn - fade * ox) + k1_fn[i] * rx, fny += k * (cy * pn - fade * oy) + k1_fn[i] * ry;
-      most += k * b.w[i] * ((g + cone) * inverse);
+      dxx += k * xx + d.x[i] * rx, dxy += k * xy + d.y[i] * rx, dyx += k * yx + d.x[i] * ry, dyy += k * yy + d.y[i] * ry;
+      fnx += k * (cx * pn - fade * ox) + d.n[i] * rx, fny += k * (cy * pn - fade * oy) + d.n[i] * ry;
+      most += k * ((g * b.w[i] + m * cone) * inverse);
     }
     const double trial2 = (k0 * tx) * (k0 * tx) + (k0 * ty) * (k0 * ty);
     mode[i] = touches + touches * (trial2 > g * g ? 1.0 : 0.0);
@@ -184,9 +200,9 @@ DEFORM_PASS inline void answer(const Batch &p, const Block &b, const double *k1,
 }
 
 template <bool kDamped, bool kFlat, bool kSlips>
-DEFORM_PASS inline void answer(const Batch &p, const Block &b, const double *k1, const double *slope, const double *by_fn, const Columns &c, size_t at,
+DEFORM_PASS inline void answer(const Batch &p, const Block &b, const Damping &d, const Columns &c, size_t at,
                                double *mode) {
-  answer<kDamped, kFlat, kSlips>(p, b, k1, slope, by_fn, c.to(kFx, at), c.to(kFy, at), c.to(kZx, at), c.to(kZy, at), c.to(kXx, at), c.to(kXy, at), c.to(kYx, at),
+  answer<kDamped, kFlat, kSlips>(p, b, d, c.to(kFx, at), c.to(kFy, at), c.to(kZx, at), c.to(kZy, at), c.to(kXx, at), c.to(kXy, at), c.to(kYx, at),
                                  c.to(kYy, at), c.to(kNx, at), c.to(kNy, at), c.to(kLimit, at), c.to(kStored, at), mode);
 }
 
@@ -202,19 +218,16 @@ struct Run {
     for (size_t at = 0; at < in->n; at += kLanes) {  // lanes up to n rounded to 8 may be touched
       double mode[kLanes];
       Block b;
+      Damping d;
       if (sound(in, at)) load<true, kFlat>(p, in, at, b);
       else load<false, kFlat>(p, in, at, b);
       level<kFlat>(p, b);
       const bool fills = Law::flow(in->params, p, b);
       if (!kFlat && p.sigma1 > 0) {
-        double k1[kLanes], slope[kLanes], by_fn[kLanes];
-        damping(p, b, k1, slope, by_fn);
-        if (fills) answer<true, kFlat, false>(p, b, k1, slope, by_fn, to, at, mode);
-        else answer<true, kFlat, true>(p, b, k1, slope, by_fn, to, at, mode);
-      } else if (fills) {
-        answer<false, kFlat, false>(p, b, nullptr, nullptr, nullptr, to, at, mode);
+        fills ? damping<false>(p, b, d) : damping<true>(p, b, d);
+        fills ? answer<true, kFlat, false>(p, b, d, to, at, mode) : answer<true, kFlat, true>(p, b, d, to, at, mode);
       } else {
-        answer<false, kFlat, true>(p, b, nullptr, nullptr, nullptr, to, at, mode);
+        fills ? answer<false, kFlat, false>(p, b, d, to, at, mode) : answer<false, kFlat, true>(p, b, d, to, at, mode);
       }
       if (out->mode)
         for (uint32_t i = 0; i < kLanes; ++i) out->mode[at + i] = static_cast<uint8_t>(mode[i]);
