@@ -188,7 +188,7 @@ inline const Scene all[] = {{"ball_on_floor", ball_on_floor, 150}, {"crossing_be
                             {"woken", woken, 220},
                             {"rolled_back", rolled_back, 120},
                             {"folded", folded, 120},
-                            {"remembered", remembered, 100}};
+                            {"remembered", remembered, 70}};
 
 inline void advance(dfm_world w, int steps) {
   for (int i = 0; i < steps; ++i) ASSERT_EQ(dfm_world_step(w, 1e-3, nullptr), DFM_OK) << dfm_last_error();
