@@ -101,7 +101,8 @@ DEFORM_PASS inline Found decide(const Batch &p, const Block &b, Passes &t) {
 
 template <bool kKineticStop>
 DEFORM_PASS inline void answer(const Batch &p, const Block &b, Passes &t, double *__restrict ofx, double *__restrict ofy, double *__restrict olimit,
-                               double *__restrict oxx, double *__restrict oxy, double *__restrict oyx, double *__restrict oyy, double *__restrict onx, double *__restrict ony) {
+                               double *__restrict oxx, double *__restrict oxy, double *__restrict oyx, double *__restrict oyy,
+                               double *__restrict onx, double *__restrict ony) {
   EACH_LANE(i) {
     const double fn = b.fn[i], drag = p.sigma2 * b.area[i], vx = b.vx[i], vy = b.vy[i], sx = b.sx[i], sy = b.sy[i];
     // 0 where every input is finite, NaN otherwise: no output of a bad lane passes for a good one.

@@ -1,5 +1,5 @@
-// Any bytes as a friction law at work: which law, its parameters within their ranges, and eight contacts that are moved, pressed and let go for a few steps with
-// the state handed on. What must hold is said by the first thing that does not.
+// Any bytes as a friction law at work: which law, its parameters within their ranges, and eight contacts that are moved, pressed and let go for a few
+// steps with the state handed on. What must hold is said by the first thing that does not.
 #pragma once
 #include <cmath>
 #include <cstdint>
@@ -47,7 +47,8 @@ inline std::string complaint(dfm_context *context, const uint8_t *data, size_t s
     for (uint32_t k = 0; k < p.width; ++k) {
       const uint32_t kind = bytes.next() % 6;
       const double s = bytes.share(), low = p.min > 0 ? p.min : p.max * 1e-18;
-      double value = kind < 2 ? p.def : kind == 2 ? p.min + s * (p.max - p.min) : kind == 3 ? low * std::pow(p.max / low, s) : kind == 4 ? p.def * 2 * s : p.min;
+      double value =
+          kind < 2 ? p.def : kind == 2 ? p.min + s * (p.max - p.min) : kind == 3 ? low * std::pow(p.max / low, s) : kind == 4 ? p.def * 2 * s : p.min;
       value = value < p.min ? p.min : value > p.max ? p.max : value;
       if (p.flags & (DFM_PARAM_INTEGER | DFM_PARAM_ENUM)) value = std::floor(value);
       if (!std::strcmp(p.key, "sigma1_form")) passive = passive && value == 0;
@@ -89,7 +90,8 @@ inline std::string complaint(dfm_context *context, const uint8_t *data, size_t s
       else if (passive && nstate && !(work + before[i] - stored[i] >= -1e-9 * turned)) wrong = "work from nowhere";
       if (wrong.empty()) continue;
       char where[400];
-      std::snprintf(where, sizeof where, " (status %d, step %d, lane %u: h %.17g, fn %.17g, v %.17g %.17g, area %.17g, f %.17g, limit %.17g, work %.17g, energy %.17g -> %.17g)",
+      std::snprintf(where, sizeof where,
+                    " (status %d, step %d, lane %u: h %.17g, fn %.17g, v %.17g %.17g, area %.17g, f %.17g, limit %.17g, work %.17g, energy %.17g -> %.17g)",
                     status, step, i, in.dt, fn[i], vt[i], vt[n + i], area[i], f, limit[i], work, before[i], stored[i]);
       wrong += where;
     }
