@@ -1,4 +1,5 @@
-// Any bytes as a law, its parameters and what happens to eight contacts (support/law_bytes.h): answers are finite, within their limit, and no work comes from nowhere.
+// Any bytes as a law, its parameters and what happens to eight contacts (support/law_bytes.h): answers are finite and within their limit, and no work comes
+// from nowhere.
 #include "../support/law_bytes.h"
 #include "fuzz_file.h"
 

@@ -103,7 +103,8 @@ TEST_F(Elastoplastic, AnyLevelsAndExponents_CreateNoWorkInAnyStep) {
             const Out o = rules::ask(l, in);
             const double work = (o.f[0] * in.v[0] + o.f[1] * in.v[1]) * in.h;
             ASSERT_GE(work + before - o.stored, -1e-12 * (std::fabs(work) + before))
-                << "mu_S/mu_C " << ratio << ", i " << i << ", multiplier " << multiplier << ", form " << form << ", h " << in.h << ", w " << w << ", fn " << in.fn;
+                << "mu_S/mu_C " << ratio << ", i " << i << ", multiplier " << multiplier << ", form " << form
+                << ", h " << in.h << ", w " << w << ", fn " << in.fn;
           }
           if (form == 0) {
             ASSERT_GE(rules::worst_balance(l, 1.5e-5 * ratio, 10, false), -1e-12) << ratio << " " << i;
