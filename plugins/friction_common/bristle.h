@@ -15,7 +15,10 @@
 //   dz'/dfn = (g/D) dz0/dfn + (h K0/D^2) zt (m dg/dfn - g dm/dfn),      dz0/dfn = z0/fn where the old bristle was cut, else 0
 //
 // and those of dz/dt are the same over h less dz0. Any m >= 0 is dissipative: V = K0 |z|^2/2 gives (K0 z).v - V' = K0 m K0 |z|^2/g. The micro-damping
-// is passive for every y = K0 z iff K1^2 m <= 4 g (K1 + K2); with m = w the default K1 / (1 + K1 w/(4 g)) meets that with any parameters.
+// is passive for every y = K0 z iff K1^2 m <= 4 g (K1 + K2). So it is damped at the speed W = max(w, m), which is w where m <= w: the default
+// K1e = K1 / (1 + K1 W/(4 g)) has K1e m <= 4 g whatever the parameters. The step inherits that, with d = z' - z0 and y = K0 z':
+//
+//   F.v h - dV = (K0/2 + K1e/h) d^2 + h (m/g) y^2 + K1e (m/g) d.y + K2 w^2 h  >=  0   where (K1e m/g)^2 <= 4 (K1e/h) (h m/g),  the same bound
 #pragma once
 #include "curve.h"
 
@@ -46,40 +49,60 @@ struct Block {
 // Where the columns of eight contacts go; one that is not wanted goes to a place of its own, so that no two overlap.
 enum Column { kFx, kFy, kZx, kZy, kXx, kXy, kYx, kYy, kNx, kNy, kLimit, kStored, kColumns };
 struct Columns {
-  double *to[kColumns], spare[kColumns][kLanes];
-  Columns(dfm_friction_out *out, size_t stride, size_t at) {
-    const auto place = [&](uint32_t first, double *base, uint32_t n) {
-      for (uint32_t c = 0; c < n; ++c) to[first + c] = base ? base + c * stride + at : spare[first + c];
+  double *first[kColumns], spare[kColumns][kLanes];
+  size_t follows[kColumns];   // all ones: a column of the batch; 0: a spare place
+  DEFORM_PASS Columns(dfm_friction_out *out, size_t stride) {
+    const auto place = [&](uint32_t at, double *base, uint32_t n) DEFORM_PASS {
+      for (uint32_t c = 0; c < n; ++c) first[at + c] = base ? base + c * stride : spare[at + c], follows[at + c] = base ? ~size_t(0) : 0;
     };
     place(kFx, out->ft, 2), place(kZx, out->state, 2), place(kXx, out->dft_dvt, 4), place(kNx, out->dft_dfn, 2);
     place(kLimit, out->limit, 1), place(kStored, out->stored, 1);
   }
+  DEFORM_PASS double *to(Column c, size_t at) const { return first[c] + (at & follows[c]); }
 };
 
-inline void load(const Batch &p, const dfm_friction_in *in, size_t at, Block &b) {
+// Are all eight within the range that the passes compute in? Not where an input is NaN.
+DEFORM_PASS inline bool sound(const dfm_friction_in *in, size_t at) {
   const size_t stride = in->stride;
   const double *const fn = in->fn + at, *const vx = in->vt + at, *const vy = vx + stride, *const zx = in->state + at, *const zy = zx + stride;
   const double *const area = in->area + at;
-  double cuts = 0, size2[kLanes], over[kLanes];
-  for (uint32_t i = 0; i < kLanes; ++i) {
+  uint64_t odd = 0;
+  EACH_LANE(i) {
+    const double n = kFar / kMost * fn[i], a = kFar / kWide * area[i];
+    const double size = (vx[i] * vx[i] + vy[i] * vy[i]) + (zx[i] * zx[i] + zy[i] * zy[i]) + (n * n + a * a);
+    odd |= size < kFar * kFar ? uint64_t(0) : uint64_t(1);
+  }
+  return odd == 0;
+}
+
+// kSound: nothing to hold within bounds, nothing bad to pass on.
+template <bool kSound, bool kFlat>
+DEFORM_PASS inline void load(const Batch &p, const dfm_friction_in *in, size_t at, Block &b) {
+  const size_t stride = in->stride;
+  const double *const fn = in->fn + at, *const vx = in->vt + at, *const vy = vx + stride, *const zx = in->state + at, *const zy = zx + stride;
+  const double *const area = in->area + at;
+  double size2[kLanes], over[kLanes];
+  uint64_t cuts = 0;
+  EACH_LANE(i) {
     // 0 where every input is finite, NaN otherwise: no output of a bad lane passes for a good one.
-    b.poison[i] = ((0.0 * fn[i] + 0.0 * vx[i]) + (0.0 * vy[i] + 0.0 * zx[i])) + (0.0 * zy[i] + 0.0 * area[i]);
-    const double touches = fn[i] > kLeast ? fn[i] : 0.0, a = area[i] > 0 ? area[i] : 0.0, A = a < kWide ? a : kWide;
-    b.fn[i] = touches < kMost ? touches : kMost;
-    b.k0[i] = p.sigma0 * A, b.k1[i] = p.sigma1 * A, b.k2[i] = p.sigma2 * A;
-    const double x = within(vx[i], kFar), y = within(vy[i], kFar), square = x * x + y * y, moves = square > kLeast * kLeast ? 1.0 : 0.0;
-    b.vx[i] = x * moves, b.vy[i] = y * moves, b.w[i] = std::sqrt(square * moves);
-    b.by_w[i] = 1.0 / (b.w[i] > kLeast ? b.w[i] : kLeast);
-    b.ex[i] = b.vx[i] * b.by_w[i], b.ey[i] = b.vy[i] * b.by_w[i];
-    const double keeps = touches > 0 ? 1.0 : 0.0;
-    b.zx[i] = keeps * within(zx[i], kFar), b.zy[i] = keeps * within(zy[i], kFar), b.cut[i] = 0.0;
-    const double px = b.k0[i] * b.zx[i], py = b.k0[i] * b.zy[i], cone = p.mu_s * b.fn[i];
+    b.poison[i] = kSound ? 0.0 : ((0.0 * fn[i] + 0.0 * vx[i]) + (0.0 * vy[i] + 0.0 * zx[i])) + (0.0 * zy[i] + 0.0 * area[i]);
+    const double touches = fn[i] > kLeast ? fn[i] : 0.0, a = area[i] > 0 ? area[i] : 0.0, A = kSound || a < kWide ? a : kWide;
+    b.fn[i] = kSound || touches < kMost ? touches : kMost;
+    b.k0[i] = p.sigma0 * A;
+    if (!kFlat) b.k1[i] = p.sigma1 * A, b.k2[i] = p.sigma2 * A;
+    const double x = kSound ? vx[i] : within(vx[i], kFar), y = kSound ? vy[i] : within(vy[i], kFar), square = x * x + y * y;
+    const double ux = square > kLeast * kLeast ? x : 0.0, uy = square > kLeast * kLeast ? y : 0.0, w = std::sqrt(square > kLeast * kLeast ? square : 0.0);
+    const double by_w = 1.0 / (w > kLeast ? w : kLeast);
+    b.vx[i] = ux, b.vy[i] = uy, b.w[i] = w, b.by_w[i] = by_w, b.ex[i] = ux * by_w, b.ey[i] = uy * by_w;
+    const double old_x = kSound ? zx[i] : within(zx[i], kFar), old_y = kSound ? zy[i] : within(zy[i], kFar);
+    const double ox = touches > 0 ? old_x : 0.0, oy = touches > 0 ? old_y : 0.0, px = b.k0[i] * ox, py = b.k0[i] * oy, cone = p.mu_s * b.fn[i];
+    b.zx[i] = ox, b.zy[i] = oy, b.cut[i] = 0.0;
     size2[i] = px * px + py * py;
     over[i] = size2[i] > cone * cone ? 1.0 : 0.0;
+    cuts |= size2[i] > cone * cone ? uint64_t(1) : uint64_t(0);
   }
-  for (uint32_t i = 0; i < kLanes; ++i) cuts += over[i];
-  if (!(cuts > 0)) return;
-  for (uint32_t i = 0; i < kLanes; ++i) {
+  if (cuts == 0) return;
+  EACH_LANE(i) {
     const double cone = p.mu_s * b.fn[i], outside = over[i];
     const double inverse = 1.0 / std::sqrt(outside > 0 ? size2[i] : 1.0), scale = outside > 0 ? cone * inverse : 1.0;
     b.zx[i] *= scale, b.zy[i] *= scale;
@@ -87,74 +110,87 @@ inline void load(const Batch &p, const dfm_friction_in *in, size_t at, Block &b)
   }
 }
 
-inline void level(const Batch &p, Block &b) {
+template <bool kFlat>
+DEFORM_PASS inline void level(const Batch &p, Block &b) {
   double excess[kLanes], slope[kLanes];
-  if (p.mu_s != p.mu_c) {
+  if (!kFlat && p.mu_s != p.mu_c) {
     lanes::curve(p.v_s, p.delta, b.w, excess, slope);
-    for (uint32_t i = 0; i < kLanes; ++i) {
+    EACH_LANE(i) {
       b.mu[i] = b.fn[i] > 0 ? p.mu_c + (p.mu_s - p.mu_c) * excess[i] : 0.0;
       b.g[i] = b.mu[i] * b.fn[i];
       b.fall[i] = (p.mu_s - p.mu_c) * b.fn[i] * slope[i];
     }
   } else {
-    for (uint32_t i = 0; i < kLanes; ++i) b.mu[i] = b.fn[i] > 0 ? p.mu_c : 0.0, b.g[i] = p.mu_c * b.fn[i], b.fall[i] = 0.0;
+    EACH_LANE(i) b.mu[i] = b.fn[i] > 0 ? p.mu_c : 0.0, b.g[i] = p.mu_c * b.fn[i];
+    if (!kFlat) EACH_LANE(i) b.fall[i] = 0.0;
   }
 }
 
-// The plastic rate of Dahl (exponent 1) and LuGre: every motion slips.
-inline void all_slips(const Batch &, Block &b) {
-  for (uint32_t i = 0; i < kLanes; ++i) b.m[i] = b.w[i], b.mx[i] = b.ex[i], b.my[i] = b.ey[i], b.mn[i] = 0.0;
-}
+// Micro-damping and its derivatives by v and fn.
+struct Damping { double k1[kLanes], x[kLanes], y[kLanes], n[kLanes]; };
 
-// Micro-damping at the speed w: its value, w times its slope, and its derivative by fn.
-inline void damping(const Batch &p, const Block &b, double *k1, double *slope, double *by_fn) {
+// kSlips: m = w, so W = w.
+template <bool kSlips>
+DEFORM_PASS inline void damping(const Batch &p, const Block &b, Damping &d) {
+  double W[kLanes], wx[kLanes], wy[kLanes], wn[kLanes];
+  EACH_LANE(i) {
+    const double w = b.w[i], m = kSlips ? 0.0 : b.m[i] < kFar ? b.m[i] : kFar, faster = m > w ? 1.0 : 0.0;
+    W[i] = faster > 0 ? m : w, wx[i] = kSlips || !(faster > 0) ? b.ex[i] : b.mx[i], wy[i] = kSlips || !(faster > 0) ? b.ey[i] : b.my[i];
+    wn[i] = kSlips || !(faster > 0) ? 0.0 : b.mn[i];
+  }
   if (p.form == kPassive) {
-    for (uint32_t i = 0; i < kLanes; ++i) {
-      const double level4 = 4.0 * b.g[i], kw = b.k1[i] * b.w[i], sum = level4 + kw, inverse = 1.0 / (sum > kLeast ? sum : kLeast);
-      const double share = level4 * inverse, rest = kw * inverse;  // K1e = K1 share; at g = w = 0 a limit of no interest: nothing touches
-      k1[i] = b.k1[i] * share;
-      slope[i] = -4.0 * b.k1[i] * rest * ((b.g[i] - b.fall[i]) * inverse);
-      by_fn[i] = 4.0 * b.k1[i] * rest * (b.mu[i] * inverse);
+    EACH_LANE(i) {
+      const double level4 = 4.0 * b.g[i], kw = b.k1[i] * W[i], sum = level4 + kw, inverse = 1.0 / (sum > kLeast ? sum : kLeast);
+      const double share = level4 * inverse, rest = kw * inverse;  // K1e = K1 share; at g = W = 0 a limit of no interest: nothing touches
+      const double by_speed = -(b.k1[i] * share) * (b.k1[i] * inverse), by_g = 4.0 * b.k1[i] * rest * inverse, steep = by_g * (b.fall[i] * b.by_w[i]);
+      d.k1[i] = b.k1[i] * share, d.x[i] = by_speed * wx[i] + steep * b.ex[i], d.y[i] = by_speed * wy[i] + steep * b.ey[i];
+      d.n[i] = by_speed * wn[i] + by_g * b.mu[i];
     }
   } else if (p.form == kConstant) {
-    for (uint32_t i = 0; i < kLanes; ++i) k1[i] = b.k1[i], slope[i] = by_fn[i] = 0.0;
+    EACH_LANE(i) d.k1[i] = b.k1[i], d.x[i] = d.y[i] = d.n[i] = 0.0;
   } else {
-    double s[kLanes];
-    lanes::curve(p.v_d, 2.0, b.w, s, slope);
-    for (uint32_t i = 0; i < kLanes; ++i) k1[i] = b.k1[i] * s[i], slope[i] *= b.k1[i], by_fn[i] = 0.0;
+    double s[kLanes], slope[kLanes];
+    const double by_vd = 1.0 / p.v_d;
+    lanes::curve(p.v_d, 2.0, W, s, slope);
+    EACH_LANE(i) {
+      const double k = b.k1[i] * s[i], by_speed = -2.0 * k * (W[i] * by_vd) * by_vd;
+      d.k1[i] = k, d.x[i] = by_speed * wx[i], d.y[i] = by_speed * wy[i], d.n[i] = by_speed * wn[i];
+    }
   }
 }
 
-// kDamped: sigma1 > 0; kFlat: g does not depend on the speed. Pointers that overlap nothing, as arguments, or the compiler would not use vectors.
-template <bool kDamped, bool kFlat>
-void answer(const Batch &p, const Block &b, const double *k1, const double *k1_slope, const double *k1_fn, double *__restrict ofx, double *__restrict ofy,
+// kDamped: sigma1 > 0; kFlat: g does not depend on the speed, and nothing is viscous; kSlips: every motion slips, m = w (Dahl, LuGre).
+// Pointers that overlap nothing, as arguments, or the compiler would not use vectors.
+template <bool kDamped, bool kFlat, bool kSlips>
+DEFORM_PASS inline void answer(const Batch &p, const Block &b, const Damping &d, double *__restrict ofx, double *__restrict ofy,
             double *__restrict ozx, double *__restrict ozy, double *__restrict oxx, double *__restrict oxy, double *__restrict oyx, double *__restrict oyy,
             double *__restrict onx, double *__restrict ony, double *__restrict olimit, double *__restrict ostored, double *__restrict mode) {
-  for (uint32_t i = 0; i < kLanes; ++i) {
-    const double k0 = b.k0[i], hk = p.h * k0, g = b.g[i], m = b.m[i], vx = b.vx[i], vy = b.vy[i], z0x = b.zx[i], z0y = b.zy[i];
+  EACH_LANE(i) {
+    const double k0 = b.k0[i], hk = p.h * k0, g = b.g[i], m = kSlips ? b.w[i] : b.m[i], vx = b.vx[i], vy = b.vy[i], z0x = b.zx[i], z0y = b.zy[i];
     const double sum = g + hk * m, divisor = sum > kLeast * 1e-10 ? sum : kLeast * 1e-10, poison = b.poison[i];
     const double q = g / divisor, inverse = 1.0 / divisor;   // q itself: at rest it is 1 to the bit, and a bristle that holds does not fade
     const double tx = z0x + p.h * vx, ty = z0y + p.h * vy, zx = tx * q, zy = ty * q;
     // dm and dg times what they share
+    const double mx = kSlips ? b.ex[i] : b.mx[i], my = kSlips ? b.ey[i] : b.my[i], by_plastic = kSlips ? 0.0 : q * b.mn[i];
     const double fe = kFlat ? 0.0 : m * inverse * b.fall[i] * b.by_w[i];
-    const double gx = kFlat ? q * b.mx[i] : q * b.mx[i] - fe * b.ex[i], gy = kFlat ? q * b.my[i] : q * b.my[i] - fe * b.ey[i];
+    const double gx = kFlat ? q * mx : q * mx - fe * b.ex[i], gy = kFlat ? q * my : q * my - fe * b.ey[i];
     const double cx = k0 * inverse * tx, cy = k0 * inverse * ty;
     const double xx = q - cx * gx, xy = -(cx * gy), yx = -(cy * gx), yy = q - cy * gy;   // (dz'/dv)/h = d(dz/dt)/dv
-    const double pn = m * b.mu[i] * inverse - q * b.mn[i], ox = b.cut[i] * z0x, oy = b.cut[i] * z0y, fade = k0 * m * inverse;
+    const double pn = m * b.mu[i] * inverse - by_plastic, ox = b.cut[i] * z0x, oy = b.cut[i] * z0y, fade = k0 * m * inverse;
     const double nx = q * ox + p.h * (cx * pn), ny = q * oy + p.h * (cy * pn);
-    const double cone = p.mu_s * b.fn[i], k2 = b.fn[i] > 0 ? b.k2[i] : 0.0;
-    double fx = k0 * zx + k2 * vx, fy = k0 * zy + k2 * vy, fnx = k0 * nx, fny = k0 * ny, most = cone + k2 * b.w[i];
-    double dxx = hk * xx + k2, dxy = hk * xy, dyx = hk * yx, dyy = hk * yy + k2;
+    const double touches = b.fn[i] > 0 ? 1.0 : 0.0, cone = kFlat ? g : p.mu_s * b.fn[i], k2 = kFlat ? 0.0 : touches * b.k2[i];
+    double fx = kFlat ? k0 * zx : k0 * zx + k2 * vx, fy = kFlat ? k0 * zy : k0 * zy + k2 * vy, fnx = k0 * nx, fny = k0 * ny;
+    double most = kFlat ? cone : cone + k2 * b.w[i];
+    double dxx = kFlat ? hk * xx : hk * xx + k2, dxy = hk * xy, dyx = hk * yx, dyy = kFlat ? hk * yy : hk * yy + k2;
     if (kDamped) {
-      const double k = k1[i], rx = (g * vx - k0 * m * z0x) * inverse, ry = (g * vy - k0 * m * z0y) * inverse;   // dz/dt
+      const double k = d.k1[i], rx = (g * vx - k0 * m * z0x) * inverse, ry = (g * vy - k0 * m * z0y) * inverse;   // dz/dt
       fx += k * rx, fy += k * ry;
-      const double s = k1_slope[i] * b.by_w[i];
-      dxx += k * xx + s * (rx * b.ex[i]), dxy += k * xy + s * (rx * b.ey[i]), dyx += k * yx + s * (ry * b.ex[i]), dyy += k * yy + s * (ry * b.ey[i]);
-      fnx += k * (cx * pn - fade * ox) + k1_fn[i] * rx, fny += k * (cy * pn - fade * oy) + k1_fn[i] * ry;
-      most += k * b.w[i] * ((g + cone) * inverse);
+      dxx += k * xx + d.x[i] * rx, dxy += k * xy + d.y[i] * rx, dyx += k * yx + d.x[i] * ry, dyy += k * yy + d.y[i] * ry;
+      fnx += k * (cx * pn - fade * ox) + d.n[i] * rx, fny += k * (cy * pn - fade * oy) + d.n[i] * ry;
+      most += k * ((g * b.w[i] + m * cone) * inverse);
     }
-    const double trial2 = (k0 * tx) * (k0 * tx) + (k0 * ty) * (k0 * ty), touches = b.fn[i] > 0 ? 1.0 : 0.0;
-    mode[i] = touches + (trial2 > g * g ? touches : 0.0);
+    const double trial2 = (k0 * tx) * (k0 * tx) + (k0 * ty) * (k0 * ty);
+    mode[i] = touches + touches * (trial2 > g * g ? 1.0 : 0.0);
     ofx[i] = poison - fx, ofy[i] = poison - fy, ozx[i] = zx + poison, ozy[i] = zy + poison;
     oxx[i] = poison - dxx, oxy[i] = poison - dxy, oyx[i] = poison - dyx, oyy[i] = poison - dyy;
     onx[i] = poison - fnx, ony[i] = poison - fny;
@@ -163,36 +199,38 @@ void answer(const Batch &p, const Block &b, const double *k1, const double *k1_s
   }
 }
 
-template <bool kDamped, bool kFlat>
-void answer(const Batch &p, const Block &b, const double *k1, const double *slope, const double *by_fn, const Columns &c, double *mode) {
-  double *const *const to = c.to;
-  answer<kDamped, kFlat>(p, b, k1, slope, by_fn, to[kFx], to[kFy], to[kZx], to[kZy], to[kXx], to[kXy], to[kYx], to[kYy], to[kNx], to[kNy], to[kLimit],
-                         to[kStored], mode);
+template <bool kDamped, bool kFlat, bool kSlips>
+DEFORM_PASS inline void answer(const Batch &p, const Block &b, const Damping &d, const Columns &c, size_t at,
+                               double *mode) {
+  answer<kDamped, kFlat, kSlips>(p, b, d, c.to(kFx, at), c.to(kFy, at), c.to(kZx, at), c.to(kZy, at), c.to(kXx, at), c.to(kXy, at), c.to(kYx, at),
+                                 c.to(kYy, at), c.to(kNx, at), c.to(kNy, at), c.to(kLimit, at), c.to(kStored, at), mode);
 }
 
-// Law::batch(params) and Law::flow(params, batch, block), which fills m and its derivatives, are all that a law of the family says.
+// Law::batch(params), Law::kFlat, and Law::flow(params, batch, block), which fills m and its derivatives or says false: every motion slips. That is all that a
+// law of the family says.
 template <class Law>
 struct Run {
-  static dfm_status run(const dfm_friction_in *in, dfm_friction_out *out) {
+  DEFORM_PASS static dfm_status run(const dfm_friction_in *in, dfm_friction_out *out) {
+    constexpr bool kFlat = Law::kFlat;
     Batch p = Law::batch(in->params);
     p.h = in->dt;
+    const Columns to(out, in->stride);
     for (size_t at = 0; at < in->n; at += kLanes) {  // lanes up to n rounded to 8 may be touched
-      const Columns to(out, in->stride, at);
       double mode[kLanes];
       Block b;
-      load(p, in, at, b);
-      level(p, b);
-      Law::flow(in->params, p, b);
-      if (p.sigma1 > 0) {
-        double k1[kLanes], slope[kLanes], by_fn[kLanes];
-        damping(p, b, k1, slope, by_fn);
-        answer<true, false>(p, b, k1, slope, by_fn, to, mode);
-      } else if (Law::kFlat) {
-        answer<false, true>(p, b, nullptr, nullptr, nullptr, to, mode);
+      Damping d;
+      if (sound(in, at)) load<true, kFlat>(p, in, at, b);
+      else load<false, kFlat>(p, in, at, b);
+      level<kFlat>(p, b);
+      const bool fills = Law::flow(in->params, p, b);
+      if (!kFlat && p.sigma1 > 0) {
+        fills ? damping<false>(p, b, d) : damping<true>(p, b, d);
+        fills ? answer<true, kFlat, false>(p, b, d, to, at, mode) : answer<true, kFlat, true>(p, b, d, to, at, mode);
       } else {
-        answer<false, false>(p, b, nullptr, nullptr, nullptr, to, mode);
+        fills ? answer<false, kFlat, false>(p, b, d, to, at, mode) : answer<false, kFlat, true>(p, b, d, to, at, mode);
       }
-      for (uint32_t i = 0; out->mode && i < kLanes; ++i) out->mode[at + i] = static_cast<uint8_t>(mode[i]);
+      if (out->mode)
+        for (uint32_t i = 0; i < kLanes; ++i) out->mode[at + i] = static_cast<uint8_t>(mode[i]);
     }
     return DFM_OK;
   }

@@ -6,7 +6,7 @@
 namespace lanes {
 
 // dfm_pow for a base in (0, 1e300) and an exponent in [0.1, 10]: the same operations without its branches, so the same bits in every lane.
-inline double power(double x, double y) {
+DEFORM_PASS inline double power(double x, double y) {
   double high, low;
   dfm_log2_(x, &high, &low);
   const double p = y * high;
@@ -17,22 +17,22 @@ inline double power(double x, double y) {
 }
 
 // excess = s, slope = w s'(w) at the speeds w, 0 <= w < 1e200.
-inline void curve(double v_s, double delta, const double *w, double *excess, double *slope) {
+DEFORM_PASS inline void curve(double v_s, double delta, const double *w, double *excess, double *slope) {
   double a[kLanes], e[kLanes];
   const double inverse = 1.0 / v_s;
   if (delta == 2.0) {
-    for (uint32_t i = 0; i < kLanes; ++i) {
+    EACH_LANE(i) {
       const double x = w[i] * inverse;
       a[i] = x * x;
     }
   } else {
     double x[kLanes];
-    for (uint32_t i = 0; i < kLanes; ++i) x[i] = w[i] * inverse;
-    for (uint32_t i = 0; i < kLanes; ++i) a[i] = power(x[i] > 1e-300 ? x[i] : 1e-300, delta);
-    for (uint32_t i = 0; i < kLanes; ++i) a[i] = x[i] > 0 ? a[i] : 0.0;
+    EACH_LANE(i) x[i] = w[i] * inverse;
+    EACH_LANE(i) a[i] = power(x[i] > 1e-300 ? x[i] : 1e-300, delta);
+    EACH_LANE(i) a[i] = x[i] > 0 ? a[i] : 0.0;
   }
-  for (uint32_t i = 0; i < kLanes; ++i) e[i] = dfm_exp(-a[i]);
-  for (uint32_t i = 0; i < kLanes; ++i) {
+  EACH_LANE(i) e[i] = dfm_exp(-a[i]);
+  EACH_LANE(i) {
     excess[i] = e[i];
     slope[i] = e[i] > 0 ? -delta * a[i] * e[i] : 0.0;  // a may be infinite where e has vanished
   }

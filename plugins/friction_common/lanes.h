@@ -6,6 +6,8 @@
 #pragma once
 #include <cmath>
 #include <cstdio>
+#include <cstdlib>
+#include <cstring>
 
 #include "deform/plugin.hpp"
 
@@ -13,9 +15,20 @@ namespace lanes {
 
 constexpr uint32_t kLanes = 8;
 
+// A pass over a block. Columns overlap nowhere, so each lane is on its own; the compiler cannot see that and is told.
+#ifdef __clang__
+#pragma clang diagnostic ignored "-Wpass-failed"   // a build that does not optimise uses no vectors, and that is no fault
+#define EACH_LANE(i) _Pragma("clang loop vectorize(assume_safety) interleave(disable) unroll(disable)") for (uint32_t i = 0; i < lanes::kLanes; ++i)
+#elif defined(__GNUC__)
+#define EACH_LANE(i) _Pragma("GCC ivdep") for (uint32_t i = 0; i < lanes::kLanes; ++i)
+#else
+#define EACH_LANE(i) for (uint32_t i = 0; i < lanes::kLanes; ++i)
+#endif
+
 enum Width { kNarrow, kAvx2, kAvx512 };
 
 #if defined(__x86_64__) && defined(__GNUC__)
+#define DEFORM_PASS __attribute__((always_inline))
 #ifdef __clang__
 #define DEFORM_AVX512 __attribute__((target("avx512f,avx512vl,avx512dq"), flatten))
 #else
@@ -28,27 +41,37 @@ inline Width widest() {
   return __builtin_cpu_supports("avx2") ? kAvx2 : kNarrow;
 }
 #else
+#define DEFORM_PASS
 #define DEFORM_AVX512
 #define DEFORM_AVX2
 #define DEFORM_NARROW
 inline Width widest() { return kNarrow; }
 #endif
 
-// Law::run(in, out) compiled once per width, everything it calls drawn in; the processor chooses.
+// Law::run(in, out) compiled once per width; the processor chooses. What it calls must become part of it, or it would stay at the width that everybody
+// has: gcc draws in whatever a `flatten` function calls, clang only the outermost calls, so each pass says DEFORM_PASS.
 template <class Law>
 DEFORM_AVX512 dfm_status eval_avx512(const dfm_friction_in *in, dfm_friction_out *out) { return Law::run(in, out); }
 template <class Law>
 DEFORM_AVX2 dfm_status eval_avx2(const dfm_friction_in *in, dfm_friction_out *out) { return Law::run(in, out); }
 template <class Law>
 DEFORM_NARROW dfm_status eval_narrow(const dfm_friction_in *in, dfm_friction_out *out) { return Law::run(in, out); }
+
+// DEFORM_SIMD (sse2, avx2, avx512) asks for less than the processor has; read when the plugin is loaded.
+inline Width chosen() {
+  const char *const asked = std::getenv("DEFORM_SIMD");
+  const Width most = widest(), w = !asked ? most : !std::strcmp(asked, "sse2") ? kNarrow : !std::strcmp(asked, "avx2") ? kAvx2 : most;
+  return w < most ? w : most;
+}
+inline const Width kChosen = chosen();
+
 template <class Law>
 dfm_status eval(const dfm_friction_in *in, dfm_friction_out *out) {
-  const Width w = widest();
-  return w == kAvx512 ? eval_avx512<Law>(in, out) : w == kAvx2 ? eval_avx2<Law>(in, out) : eval_narrow<Law>(in, out);
+  return kChosen == kAvx512 ? eval_avx512<Law>(in, out) : kChosen == kAvx2 ? eval_avx2<Law>(in, out) : eval_narrow<Law>(in, out);
 }
 
 // A NaN becomes `most`: what a lane computes stays finite, and its outputs are spoilt at the end by what came in.
-inline double within(double x, double most) {
+DEFORM_PASS inline double within(double x, double most) {
   const double low = x > -most ? x : -most;
   return low < most ? low : most;
 }

@@ -75,13 +75,13 @@ inline void odd_lane(const Batch &p, const Block &b, Passes &t, uint32_t i) {
 }
 
 // The passes below choose by value, not by branch: real batches mix stick and slip, and a mispredicted branch costs more than both sides.
-// Returns whether any lane slips; with kinetic_stop these are the lanes beyond the band, and answer() finds those that stop.
+// Tells whether any lane slips; with kinetic_stop these are the lanes beyond the band, and answer() finds those that stop.
+struct Found { bool slips, odd; };
 template <bool kKineticStop>
-bool decide(const Batch &p, const Block &b, Passes &t) {
-  double slips = 0;
+DEFORM_PASS inline Found decide(const Batch &p, const Block &b, Passes &t) {
+  uint64_t slips = 0, odd = 0;
   const double band2 = p.band * p.band;
-  double slip_of[kLanes];
-  for (uint32_t i = 0; i < kLanes; ++i) {
+  EACH_LANE(i) {
     const double stiction = p.mu_s * b.fn[i], s2 = b.sx[i] * b.sx[i] + b.sy[i] * b.sy[i], f2 = stiction * stiction;
     const double v2 = b.vx[i] * b.vx[i] + b.vy[i] * b.vy[i];
     const double larger = s2 > f2 ? s2 : f2, touches = b.fn[i] > 0 ? 1.0 : 0.0, gives = s2 > f2 ? touches : 0.0;
@@ -91,45 +91,46 @@ bool decide(const Batch &p, const Block &b, Passes &t) {
     const double slow = v2 > kTiny ? 0.0 : slip, fast = v2 < kHuge ? 0.0 : slip;
     t.mode[i] = touches + slip;
     t.odd[i] = ((low + high) + (slow + fast)) + starts;
+    slips |= slip > 0 ? uint64_t(1) : uint64_t(0), odd |= t.odd[i] > 0 ? uint64_t(1) : uint64_t(0);
     t.w[i] = std::sqrt(slip > 0 ? v2 : 1.0);
     t.inverse[i] = 1.0 / t.w[i];
     t.excess[i] = t.slope[i] = 0.0;
-    slip_of[i] = slip;
   }
-  for (uint32_t i = 0; i < kLanes; ++i) slips += slip_of[i];
-  return slips > 0;
+  return {slips != 0, odd != 0};
 }
 
 template <bool kKineticStop>
-void answer(const Batch &p, const Block &b, Passes &t, double *__restrict ofx, double *__restrict ofy, double *__restrict olimit, double *__restrict oxx,
-            double *__restrict oxy, double *__restrict oyx, double *__restrict oyy, double *__restrict onx, double *__restrict ony) {
-  for (uint32_t i = 0; i < kLanes; ++i) {
+DEFORM_PASS inline void answer(const Batch &p, const Block &b, Passes &t, double *__restrict ofx, double *__restrict ofy, double *__restrict olimit,
+                               double *__restrict oxx, double *__restrict oxy, double *__restrict oyx, double *__restrict oyy,
+                               double *__restrict onx, double *__restrict ony) {
+  EACH_LANE(i) {
     const double fn = b.fn[i], drag = p.sigma2 * b.area[i], vx = b.vx[i], vy = b.vy[i], sx = b.sx[i], sy = b.sy[i];
     // 0 where every input is finite, NaN otherwise: no output of a bad lane passes for a good one.
     const double poison = 0.0 * fn + 0.0 * vx + 0.0 * vy + 0.0 * sx + 0.0 * sy + 0.0 * drag;
-    const double mu = p.mu_c + (p.mu_s - p.mu_c) * t.excess[i], w = t.w[i], inverse = t.inverse[i], level = mu * fn + drag * w;
-    const double dx = -vx * inverse, dy = -vy * inverse, across = level * inverse;
-    const double along = ((p.mu_s - p.mu_c) * fn * t.slope[i] + drag * w) * inverse, d = along - across;
-    const bool moves = t.mode[i] > 1, stops = kKineticStop && moves && sx * sx + sy * sy <= level * level;
-    const bool slip = moves && !stops, stick = t.mode[i] > 0;
-    const double disc = stops ? level : p.mu_s * fn, fs = stick ? disc : 0.0, fx = stick ? sx : 0.0, fy = stick ? sy : 0.0, xy = slip ? -(d * dx * dy) : 0.0;
-    ofx[i] = (slip ? level * dx : fx) + poison;
-    ofy[i] = (slip ? level * dy : fy) + poison;
-    olimit[i] = (slip ? level : fs) + poison;
-    onx[i] = (slip ? mu * dx : 0.0) + poison;
-    ony[i] = (slip ? mu * dy : 0.0) + poison;
-    oxx[i] = (slip ? -(across + d * dx * dx) : 0.0) + poison;
-    oxy[i] = xy + poison;
-    oyx[i] = xy + poison;
-    oyy[i] = (slip ? -(across + d * dy * dy) : 0.0) + poison;
-    if (kKineticStop) t.mode[i] -= stops ? 1.0 : 0.0;
+    const double load = fn > 0 ? fn : 0.0, mu = p.mu_c + (p.mu_s - p.mu_c) * t.excess[i], w = t.w[i], inverse = t.inverse[i], level = mu * load + drag * w;
+    const double mode = t.mode[i], moves = mode > 1 ? 1.0 : 0.0, stops = kKineticStop && sx * sx + sy * sy <= level * level ? moves : 0.0, slip = moves - stops;
+    // What does not slip goes through the same operations with no direction and no level.
+    const double fs = slip > 0 ? level : 0.0, ux = slip > 0 ? vx : 0.0, uy = slip > 0 ? vy : 0.0;
+    const double hold = mode - moves - slip, hx = hold > 0 ? sx : 0.0, hy = hold > 0 ? sy : 0.0, stiction = p.mu_s * load;
+    const double dx = -ux * inverse, dy = -uy * inverse, across = fs * inverse;
+    const double along = ((p.mu_s - p.mu_c) * load * t.slope[i] + drag * w) * inverse, d = along - across, xy = -(d * dx * dy) + poison;
+    ofx[i] = (fs * dx + hx) + poison;
+    ofy[i] = (fs * dy + hy) + poison;
+    olimit[i] = (moves > 0 ? level : stiction) + poison;
+    onx[i] = mu * dx + poison;
+    ony[i] = mu * dy + poison;
+    oxx[i] = poison - (across + d * dx * dx);
+    oxy[i] = xy;
+    oyx[i] = xy;
+    oyy[i] = poison - (across + d * dy * dy);
+    if (kKineticStop) t.mode[i] = mode - stops;
   }
 }
 
 // Law::kKineticStop, and Law::band(params), which begins to matter where it is above zero.
 template <class Law>
 struct Run {
-  static dfm_status run(const dfm_friction_in *in, dfm_friction_out *out) {
+  DEFORM_PASS static dfm_status run(const dfm_friction_in *in, dfm_friction_out *out) {
     const double *const v = in->params;
     const Batch p = {v[kMuC], v[kMuS], v[kVs], v[kDelta], v[kSigma2], Law::band(v), Law::kKineticStop};
     const size_t stride = in->stride;
@@ -140,15 +141,15 @@ struct Run {
                        to(out->ft, 0, 0), to(out->ft, 1, 1), to(out->limit, 0, 2), to(out->dft_dvt, 0, 3), to(out->dft_dvt, 1, 4), to(out->dft_dvt, 2, 5),
                        to(out->dft_dvt, 3, 6), to(out->dft_dfn, 0, 7), to(out->dft_dfn, 1, 8)};
       Passes t;
-      const bool slips = decide<Law::kKineticStop>(p, b, t);
-      if (slips && p.mu_s != p.mu_c) lanes::curve(p.v_s, p.delta, t.w, t.excess, t.slope);
+      const Found found = decide<Law::kKineticStop>(p, b, t);
+      if (found.slips && p.mu_s != p.mu_c) lanes::curve(p.v_s, p.delta, t.w, t.excess, t.slope);
       answer<Law::kKineticStop>(p, b, t, b.fx, b.fy, b.limit, b.xx, b.xy, b.yx, b.yy, b.nx, b.ny);
-      double odd = 0;
-      for (uint32_t i = 0; i < kLanes; ++i) odd += t.odd[i];
-      for (uint32_t i = 0; odd > 0 && i < kLanes; ++i)
+      for (uint32_t i = 0; found.odd && i < kLanes; ++i)
         if (t.odd[i] > 0) odd_lane(p, b, t, i);
-      for (uint32_t i = 0; out->mode && i < kLanes; ++i) out->mode[at + i] = static_cast<uint8_t>(t.mode[i]);
-      for (uint32_t i = 0; out->stored && i < kLanes; ++i) out->stored[at + i] = 0;
+      if (out->mode)
+        for (uint32_t i = 0; i < kLanes; ++i) out->mode[at + i] = static_cast<uint8_t>(t.mode[i]);
+      if (out->stored)
+        for (uint32_t i = 0; i < kLanes; ++i) out->stored[at + i] = 0;
     }
     return DFM_OK;
   }

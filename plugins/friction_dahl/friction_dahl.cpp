@@ -5,11 +5,14 @@
 //
 // As vectors: q = 1 - u.v^, u = K0 z / F_C, and the plastic rate m = w c(q), c = (1 - |q|^alpha sgn q)/(1 - q), is that equation in one dimension,
 // isotropic and continuous in two, and dissipative because c >= 0. alpha = 1 gives c = 1. Otherwise the implicit return of bristle.h is one
-// equation in the share rho = |K0 z'|/F_C along the trial direction t, with kappa = t.v^:
+// equation in the share rho = |K0 z'|/F_C along the trial direction t, with kappa = t.v^ and f(rho) = rho c(1 - kappa rho):
 //
-//   rho + p f(rho) = rho_t,   f(rho) = rho c(1 - kappa rho),   f' = alpha |1 - kappa rho|^(alpha - 1) >= 0,   p = h K0 w/F_C:
+//   rho + p f(rho) = rho_t,   p = h K0 w/F_C;      times kappa, with q = 1 - kappa rho:      q + p |q|^alpha sgn q = R,   R = 1 + p - kappa rho_t
 //
-// one root, found by Newton in a bracket. Below 1 the exponent would let a bristle that turns leave the cone, so the range begins there.
+// whose left side is odd and grows: q has the sign of R, and y = |q| is the one root of y + p y^alpha = |R|. Both terms bound it, y <= |R| and
+// y <= (|R|/p)^(1/alpha); the smaller is at most twice the root, and from there Newton steps on a convex curve come down to it without overshoot, eight
+// lanes at a time; a lane that has converged stays as it is. Then rho = rho_t/(1 + p c(q)) loses no digits where kappa vanishes. Below 1 the exponent would
+// let a bristle that turns leave the cone, so the range begins there.
 #include "../friction_common/bristle.h"
 
 namespace {
@@ -21,51 +24,80 @@ constexpr dfm_param kRows[kCount] = {
     dfm::plugin::param("alpha", "exponent of the loading curve", "1", 1, 10, 1, DFM_PARAM_RUNTIME),
 };
 
-// c(q) of exponent a and its slope by q. Near q = 1 both quotients lose their digits to a difference; their series do not.
-struct Curve { double value, slope, power, force; };   // power = a |q|^(a - 1), force = |q|^a sgn q
+using bristle::Block;
+using bristle::kLanes;
 
-Curve curve(double q, double a) {
-  const double x = 1 - q, size = std::fabs(q);
-  if (std::fabs(x) < 1e-5) {
-    const double b = a * (a - 1) / 2, c = b * (a - 2) / 3;
-    const double value = a - x * (b - x * c);
-    return {value, b - 2 * x * c, a - x * (2 * b - 3 * x * c), 1 - x * value};
+// |q|^a, 0 where it has vanished.
+DEFORM_PASS inline double power(double size, double a) {
+  const double s = lanes::power(size > 1e-150 ? size : 1e-150, a);
+  return size > 1e-150 ? s : 0.0;
+}
+
+// The return in shares of the level. A step of many bristle lengths makes p and top = rho_t large and nearly equal, so their difference and those of the
+// directions t and v^ come from the old bristle u: beyond = top - p, aside = 1 - kappa, (lx, ly) = t - v^.
+struct Trial {
+  double on[kLanes], r[kLanes], ux[kLanes], uy[kLanes], p[kLanes], top[kLanes], kappa[kLanes], aside[kLanes], lx[kLanes], ly[kLanes], R[kLanes], y[kLanes];
+};
+
+DEFORM_PASS inline void trial(double a, const bristle::Batch &batch, const Block &b, Trial &t) {
+  const double by_a = 1.0 / a;
+  EACH_LANE(i) {
+    const double tx = b.zx[i] + batch.h * b.vx[i], ty = b.zy[i] + batch.h * b.vy[i], size = std::sqrt(tx * tx + ty * ty), g = b.g[i], w = b.w[i], k0 = b.k0[i];
+    // too little bent for the exponent to be felt: left as it is
+    const double loaded = g > 0 ? 1.0 : 0.0, moving = w > 0 ? loaded : 0.0, on = k0 * size > 1e-100 * g ? moving : 0.0;
+    const double by_g = 1.0 / (on > 0 ? g : 1.0), r = on > 0 ? size : 1.0, by_r = 1.0 / r, ux = tx * by_r, uy = ty * by_r;
+    const double ex = b.ex[i], ey = b.ey[i], p = on > 0 ? batch.h * k0 * w * by_g : 1.0, top = on > 0 ? k0 * r * by_g : 1.0;
+    const double ox = k0 * b.zx[i] * by_g, oy = k0 * b.zy[i] * by_g, n = ox * ox + oy * oy, s = ox * ex + oy * ey;
+    const double by_top = 1.0 / top, beyond = (n + 2.0 * p * s) / (top + p), aside = (n - s * beyond) / (top + p) * by_top, kappa = ux * ex + uy * ey;
+    t.on[i] = on, t.r[i] = r, t.ux[i] = ux, t.uy[i] = uy, t.p[i] = p, t.top[i] = top, t.kappa[i] = kappa, t.aside[i] = aside;
+    t.lx[i] = (ox - beyond * ex) * by_top, t.ly[i] = (oy - beyond * ey) * by_top;
+    t.R[i] = on > 0 ? 1.0 + (p * aside - kappa * beyond) : 1.0;
   }
-  const double s = size > 1e-150 ? dfm_pow(size, a) : 0.0, power = size > 1e-150 ? a * s / size : 0.0, force = q < 0 ? -s : s, value = (1 - force) / x;
-  return {value, (value - power) / x, power, force};
-}
-
-// The return in shares of the level: u the old bristle, top = rho_t. A step of many bristle lengths makes p and top large and nearly equal, so their
-// difference and those of the directions t and v^ come from u: beyond = top - p, aside = 1 - kappa, (lx, ly) = t - v^.
-struct Trial { double p, top, kappa, beyond, aside, lx, ly; };
-
-Trial trial_of(double p, double top, double kappa, double ux, double uy, double ex, double ey) {
-  const double n = ux * ux + uy * uy, s = ux * ex + uy * ey, beyond = (n + 2 * p * s) / (top + p);
-  return {p, top, kappa, beyond, (n - s * beyond) / ((top + p) * top), (ux - beyond * ex) / top, (uy - beyond * ey) / top};
-}
-
-// 1 - f and the residual of rho + p f(rho) = top, without those differences.
-struct Residual { Curve c; double lack, excess; };
-
-Residual residual(const Trial &t, double rho, double a) {
-  const bool far = t.kappa > 0.5;
-  const Curve c = curve(far ? (1 - rho) + rho * t.aside : 1 - t.kappa * rho, a);
-  const double lack = far ? (c.force - t.aside) / t.kappa : 1 - rho * c.value;
-  return {c, lack, far ? rho - t.p * lack - t.beyond : rho + t.p * (rho * c.value) - t.top};
-}
-
-// The root in [0, min(top, 1)]: none leaves the cone.
-double share_of(const Trial &t, double a) {
-  double low = 0, high = t.top < 1 + 1e-15 ? t.top : 1 + 1e-15, rho = t.top / (1 + t.p);   // the root at alpha = 1
-  for (int pass = 0; pass < 200; ++pass) {
-    const Residual r = residual(t, rho, a);
-    if (r.excess > 0) high = rho;
-    else low = rho;
-    const double next = rho - r.excess / (1 + t.p * r.c.power), to = next > low && next < high ? next : 0.5 * (low + high);
-    if (!(std::fabs(to - rho) > 2e-16 * rho) || to == low || to == high) return to;
-    rho = to;
+  EACH_LANE(i) {
+    const double size = std::fabs(t.R[i]), ratio = size / t.p[i], root = power(ratio < 1e280 ? ratio : 1e280, by_a);
+    t.y[i] = root < size ? root : size;
   }
-  return rho;
+}
+
+DEFORM_PASS inline void solve(double a, Trial &t) {
+  double active[kLanes];
+  uint64_t looks = 1;
+  EACH_LANE(i) active[i] = t.on[i];
+  for (int pass = 0; pass < 60 && looks; ++pass) {
+    looks = 0;
+    EACH_LANE(i) {
+      const double y = t.y[i], s = power(y, a), by_y = 1.0 / (y > 1e-150 ? y : 1e-150);
+      const double to = y - ((y - std::fabs(t.R[i])) + t.p[i] * s) / (1.0 + a * (t.p[i] * s) * by_y), next = active[i] > 0 ? to : y;
+      active[i] = y - next > 4e-16 * y ? active[i] : 0.0;
+      looks |= active[i] > 0 ? uint64_t(1) : uint64_t(0);
+      t.y[i] = next > 0 ? next : 0.0;
+    }
+  }
+}
+
+// m = w c(1 - kappa rho), so dm = c dw - w c' (kappa drho + rho dkappa), and from the return, with f' = alpha |q|^(alpha - 1),
+//   (1 + p f') drho = drho_t - f dp + p rho^2 c' dkappa,   drho_t - f dp = (h K0/F_C) (t - f v^) . dv + (K0 t.dz0 - rho dF_C)/F_C
+// Near q = 1 both quotients of c and c' lose their digits to a difference; their series do not.
+DEFORM_PASS inline void rates(double a, const bristle::Batch &batch, const Trial &t, Block &b) {
+  const double c1 = a * (a - 1) / 2, c2 = c1 * (a - 2) / 3;
+  EACH_LANE(i) {
+    const double y = t.y[i], q = t.R[i] < 0 ? -y : y, x = 1.0 - q, close = std::fabs(x) < 1e-5 ? 1.0 : 0.0, by_x = 1.0 / (close > 0 ? 1.0 : x);
+    const double s = power(y, a), force = t.R[i] < 0 ? -s : s, far_value = (1.0 - force) * by_x, near_value = a - x * (c1 - x * c2);
+    const double steep = a * s / (y > 1e-150 ? y : 1e-150), far_slope = (far_value - steep) * by_x, near_slope = c1 - 2.0 * x * c2;
+    const double c = close > 0 ? near_value : far_value, slope = close > 0 ? near_slope : far_slope;
+    const double p = t.p[i], kappa = t.kappa[i], aside = t.aside[i], rho = t.top[i] / (1.0 + p * c), ahead = kappa > 0.5 ? 1.0 : 0.0;
+    const double along_lack = (force - aside) / (ahead > 0 ? kappa : 1.0), lack = ahead > 0 ? along_lack : 1.0 - rho * c;   // 1 - f
+    const double w = b.w[i], by_w = b.by_w[i], by_g = 1.0 / (t.on[i] > 0 ? b.g[i] : 1.0), by_r = 1.0 / t.r[i], hk = batch.h * b.k0[i] * by_g;
+    const double ux = t.ux[i], uy = t.uy[i], lx = t.lx[i], ly = t.ly[i], ex = b.ex[i], ey = b.ey[i], hr = batch.h * by_r;
+    const double by_sum = 1.0 / (1.0 + p * steep), bends = p * rho * rho * slope, falls = w * slope;
+    const double kx = hr * (aside * ux - lx) + (lx + aside * ex) * by_w, ky = hr * (aside * uy - ly) + (ly + aside * ey) * by_w;
+    const double rx = by_sum * (hk * (lx + lack * ex) + bends * kx), ry = by_sum * (hk * (ly + lack * ey) + bends * ky);
+    const double ox = b.cut[i] * b.zx[i], oy = b.cut[i] * b.zy[i], along = ux * ox + uy * oy;
+    const double kn = (ex * (ox - along * ux) + ey * (oy - along * uy)) * by_r, rn = by_sum * ((b.k0[i] * along - rho * b.mu[i]) * by_g + bends * kn);
+    const double mx = c * ex - falls * (kappa * rx + rho * kx), my = c * ey - falls * (kappa * ry + rho * ky), mn = -falls * (kappa * rn + rho * kn);
+    b.m[i] = t.on[i] > 0 ? w * c : w;
+    b.mx[i] = t.on[i] > 0 ? mx : ex, b.my[i] = t.on[i] > 0 ? my : ey, b.mn[i] = t.on[i] > 0 ? mn : 0.0;
+  }
 }
 
 struct Dahl : bristle::Run<Dahl> {
@@ -75,31 +107,14 @@ struct Dahl : bristle::Run<Dahl> {
   static constexpr decltype(dfm_friction::release) release = nullptr;
 
   static constexpr bool kFlat = true;
-  static void flow(const double *params, const bristle::Batch &p, bristle::Block &b) {
-    bristle::all_slips(p, b);
-    if (params[kAlpha] == 1.0) return;
-    for (uint32_t i = 0; i < bristle::kLanes; ++i) bend(params[kAlpha], p, b, i);
-  }
-
-  // m = w c(1 - kappa rho), so dm = c dw - w c' (kappa drho + rho dkappa), and from the return
-  //   (1 + p f') drho = drho_t - f dp + p rho^2 c' dkappa,   drho_t - f dp = (h K0/F_C) (t - f v^) . dv + (K0 t.dz0 - rho dF_C)/F_C
-  static void bend(double a, const bristle::Batch &batch, bristle::Block &b, uint32_t i) {
-    const double hk = batch.h * b.k0[i], w = b.w[i], g = b.g[i], tx = b.zx[i] + batch.h * b.vx[i], ty = b.zy[i] + batch.h * b.vy[i];
-    const double r = std::sqrt(tx * tx + ty * ty), ex = b.ex[i], ey = b.ey[i];
-    if (!(g > 0 && w > 0 && b.k0[i] * r > 1e-100 * g)) return;   // too little bent for the exponent to be felt
-    const double ux = tx / r, uy = ty / r, by_level = 1 / g;
-    const Trial t = trial_of(hk * w * by_level, b.k0[i] * r * by_level, ux * ex + uy * ey, b.k0[i] * b.zx[i] * by_level, b.k0[i] * b.zy[i] * by_level, ex, ey);
-    const double rho = share_of(t, a);
-    const Residual at = residual(t, rho, a);
-    const double by_sum = 1 / (1 + t.p * at.c.power), bends = t.p * rho * rho * at.c.slope, falls = w * at.c.slope, hr = batch.h / r;
-    const double kx = hr * (t.aside * ux - t.lx) + (t.lx + t.aside * ex) / w, ky = hr * (t.aside * uy - t.ly) + (t.ly + t.aside * ey) / w;
-    const double rx = by_sum * (hk * by_level * (t.lx + at.lack * ex) + bends * kx), ry = by_sum * (hk * by_level * (t.ly + at.lack * ey) + bends * ky);
-    const double ox = b.cut[i] * b.zx[i], oy = b.cut[i] * b.zy[i], along = ux * ox + uy * oy;
-    const double kn = (ex * (ox - along * ux) + ey * (oy - along * uy)) / r, rn = by_sum * ((b.k0[i] * along - rho * b.mu[i]) * by_level + bends * kn);
-    b.m[i] = w * at.c.value;
-    b.mx[i] = at.c.value * ex - falls * (t.kappa * rx + rho * kx);
-    b.my[i] = at.c.value * ey - falls * (t.kappa * ry + rho * ky);
-    b.mn[i] = -falls * (t.kappa * rn + rho * kn);
+  DEFORM_PASS static bool flow(const double *params, const bristle::Batch &p, Block &b) {
+    const double a = params[kAlpha];
+    if (a == 1.0) return false;
+    Trial t;
+    trial(a, p, b, t);
+    solve(a, t);
+    rates(a, p, t, b);
+    return true;
   }
 };
 

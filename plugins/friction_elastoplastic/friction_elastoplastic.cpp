@@ -10,6 +10,9 @@
 //
 //   rho + P f(rho) = rho_t      one root, since f' >= 0; Newton in a bracket, eight lanes at a time; a lane that has converged stays as it is
 //   (1 + P f') drho = (h K0/g) (t.dv - f dM) - rho dg/g - P f_lambda dlambda (+ K0 t.dz0/g),      dlambda = -lambda dg/g at constant fn
+//
+// Where g has fallen with speed below what the bristle holds (rho > 1), q = 1 - rho < 0 and the plastic rate is m = M (1 + (rho - 1)^i)/rho: more than w
+// for i > 1 and rho > 2. It, and not w, is what the micro-damping must not outrun, so bristle.h damps at max(w, m).
 #include "../friction_common/lugre_rows.h"
 
 namespace {
@@ -33,25 +36,33 @@ struct Return { double tx[kLanes], ty[kLanes], by_r[kLanes], load[kLanes], mult[
 // f and its slopes by rho and lambda; left = 1 - f.
 struct Yield { double f, left, slope, by_lambda; };
 
-// kPlain: i = 1, where nothing loops and eight lanes stay in vectors.
+// The exponent i as what chooses among the powers of q, so that no lane loops: takes[k] = 1 where q^k is in 1 + q + ... + q^(i-1), and the bits of i - 1.
+struct Exponent {
+  double i, takes[8], one, two, four;
+  DEFORM_PASS explicit Exponent(int n) : i(n), one((n - 1) & 1), two((n - 1) >> 1 & 1), four((n - 1) >> 2 & 1) {
+    for (int k = 0; k < 8; ++k) takes[k] = k < n ? 1.0 : 0.0;
+  }
+};
+
+// kPlain: i = 1.
 template <bool kPlain>
-inline Yield yield(double rho, double lambda, int i) {
+DEFORM_PASS inline Yield yield(double rho, double lambda, const Exponent &e) {
   const double width = 1.0 / (1.0 - lambda), u = (rho - lambda) * width, half = 0.5 * (u > 0 ? (u < 1 ? u : 1.0) : 0.0);
   double s, c;
   dfm_sincospi_(half, &s, &c);
   const double inside = u > 0 && u < 1 ? 0x1.921fb54442d18p+1 : 0.0, alpha = u < 1 ? s * s : 1.0, by_u = inside * s * c, q = 1.0 - alpha * rho;
-  double power = 1.0;
-  for (int k = 1; !kPlain && k < i; ++k) power *= std::fabs(q);
-  const double steep = kPlain ? 1.0 : i * power, bend = steep * rho * by_u * width, left = q * power;
+  const double size = std::fabs(q), q2 = q * q, q4 = q2 * q2;
+  const double power = kPlain ? 1.0 : (e.one * size + (1.0 - e.one)) * (e.two * q2 + (1.0 - e.two)) * (e.four * q4 + (1.0 - e.four));
+  const double steep = kPlain ? 1.0 : e.i * power, bend = steep * rho * by_u * width, left = q * power;
   // 1 - q^i = (1 - q)(1 + q + ...): no difference where little yields
-  double sum = 1.0, term = 1.0;
-  for (int k = 1; !kPlain && k < i; ++k) term *= q, sum += term;
+  const double *const n = e.takes;
+  const double sum = 1.0 + q * (n[1] + q * (n[2] + q * (n[3] + q * (n[4] + q * (n[5] + q * (n[6] + q * n[7]))))));
   const double f = kPlain ? alpha * rho : q >= 0 ? alpha * rho * sum : 1.0 - left;
   return {f, left, steep * alpha + bend, -bend * (1.0 - u)};
 }
 
-inline void trial(const bristle::Batch &p, const Block &b, double kappa, int multiplier, Return &t) {
-  for (uint32_t i = 0; i < kLanes; ++i) {
+DEFORM_PASS inline void trial(const bristle::Batch &p, const Block &b, double kappa, int multiplier, Return &t) {
+  EACH_LANE(i) {
     const double zx = b.zx[i] + p.h * b.vx[i], zy = b.zy[i] + p.h * b.vy[i], square = zx * zx + zy * zy, some = square > 1e-290 ? 1.0 : 0.0;
     const double r = std::sqrt(some > 0 ? square : 1.0), by_r = some / r;
     const double tx = zx * by_r, ty = zy * by_r, load = tx * b.vx[i] + ty * b.vy[i], forward = load > 0 ? load : 0.0;
@@ -69,9 +80,9 @@ inline void trial(const bristle::Batch &p, const Block &b, double kappa, int mul
 }
 
 template <bool kPlain>
-void solve(Return &t, int i) {
+DEFORM_PASS inline void solve(Return &t, const Exponent &e) {
   double low[kLanes], high[kLanes], active[kLanes], flows = 0;
-  for (uint32_t k = 0; k < kLanes; ++k) {
+  EACH_LANE(k) {
     const double lambda = t.lambda[k], elastic = t.top[k] < lambda ? t.top[k] : lambda, full = t.top[k] / (1.0 + t.p[k]);
     low[k] = elastic, high[k] = full < 1.0 && t.top[k] > 1.0 ? 1.0 : t.top[k];
     // f <= rho where i = 1, so the root lies above full, which it meets at the level; else from above for a short step, from the steepest part for a long one
@@ -80,12 +91,12 @@ void solve(Return &t, int i) {
     active[k] = t.top[k] > lambda && t.p[k] > 0 ? 1.0 : 0.0;
     t.rho[k] = active[k] > 0 ? t.rho[k] : t.top[k];
   }
-  for (uint32_t k = 0; k < kLanes; ++k) flows += active[k];
+  EACH_LANE(k) flows += active[k];
   for (int pass = 0; pass < 100 && flows > 0; ++pass) {
     flows = 0;
-    for (uint32_t k = 0; k < kLanes; ++k) {
+    EACH_LANE(k) {
       const double rho = t.rho[k];
-      const Yield y = yield<kPlain>(rho, t.lambda[k], i);
+      const Yield y = yield<kPlain>(rho, t.lambda[k], e);
       const double far = (rho - t.rest[k]) - t.p[k] * y.left, near = (rho - t.top[k]) + t.p[k] * y.f, excess = y.f > 0.5 ? far : near;
       const double up = excess > 0 ? rho : high[k], down = excess > 0 ? low[k] : rho, next = rho - excess / (1.0 + t.p[k] * y.slope);
       const double to = next >= down && next <= up ? next : 0.5 * (down + up), moved = std::fabs(to - rho);
@@ -93,18 +104,18 @@ void solve(Return &t, int i) {
       t.rho[k] = active[k] > 0 ? to : rho;
       active[k] = moved > 4e-16 * rho ? active[k] : 0.0;
     }
-    for (uint32_t k = 0; k < kLanes; ++k) flows += active[k];
+    EACH_LANE(k) flows += active[k];
   }
 }
 
 // m and its derivatives:  m = (M/rho) f,  dm = (f/rho) dM + (M/rho) [(f' - f/rho) drho + f_lambda dlambda].
 template <bool kPlain>
-void rates(const bristle::Batch &p, int i, int multiplier, const Return &t, Block &b) {
-  for (uint32_t k = 0; k < kLanes; ++k) {
+DEFORM_PASS inline void rates(const bristle::Batch &p, const Exponent &exponent, int multiplier, const Return &t, Block &b) {
+  EACH_LANE(k) {
     const double plastic = b.g[k] > 1e-30 * b.fn[k] ? 1.0 : 0.0;
     const double level = plastic > 0 ? b.g[k] : 1.0, by_level = 1.0 / level, hk = p.h * b.k0[k] * by_level, rho = t.rho[k];
     const double by_rho = 1.0 / (rho > 1e-100 ? rho : 1e-100), mult = t.mult[k], load = t.load[k], tx = t.tx[k], ty = t.ty[k];
-    const Yield y = yield<kPlain>(rho, t.lambda[k], i);
+    const Yield y = yield<kPlain>(rho, t.lambda[k], exponent);
     // dM: of t.v, and of w where the multiplier is the cosine
     const double turn = p.h * t.by_r[k], lx = tx + turn * (b.vx[k] - load * tx), ly = ty + turn * (b.vy[k] - load * ty);
     const double ox = b.cut[k] * b.zx[k], oy = b.cut[k] * b.zy[k], along = tx * ox + ty * oy;
@@ -123,33 +134,24 @@ void rates(const bristle::Batch &p, int i, int multiplier, const Return &t, Bloc
   }
 }
 
-// The passive form of sigma1 counts on a plastic rate m <= w. Where g has fallen with speed below what the bristle holds, r = K0 |z| / g > 1, the rate is
-// m = w (r-1)^i beyond its saturation, and what friction still takes is at least g w [(1 + (r-1)^i) r - 4 (r-1)^i]: a square for i = 1, not negative up to
-// r = 2 for the others, negative just above. r is at most mu_S/mu_C.
-dfm_status check_levels(const double *p, char *why, size_t cap) {
-  const dfm_status levels = lugre::check(p, why, cap);
-  if (levels != DFM_OK || !(p[kI] > 1 && p[lugre::kSigma1] > 0 && p[lugre::kMuS] > 2 * p[lugre::kMuC])) return levels;
-  std::snprintf(why, cap, "with i = %g and sigma1 above 0, mu_S (%g) may be at most twice mu_C (%g), or friction would give energy; take i = 1, sigma1 = 0 or other levels",
-                p[kI], p[lugre::kMuS], p[lugre::kMuC]);
-  return DFM_E_ARG;
-}
-
 struct Elastoplastic : bristle::Run<Elastoplastic> {
   static bristle::Batch batch(const double *p) { return lugre::batch(p); }
   static constexpr bool kFlat = false;
-  static void flow(const double *params, const bristle::Batch &p, Block &b) {
+  DEFORM_PASS static bool flow(const double *params, const bristle::Batch &p, Block &b) {
     const int i = static_cast<int>(params[kI]), multiplier = static_cast<int>(params[kMultiplier]);
+    const Exponent e(i);
     Return t;
     trial(p, b, params[kKappa], multiplier, t);
     if (i == 1) {
-      solve<true>(t, 1);
-      rates<true>(p, 1, multiplier, t, b);
+      solve<true>(t, e);
+      rates<true>(p, e, multiplier, t, b);
     } else {
-      solve<false>(t, i);
-      rates<false>(p, i, multiplier, t, b);
+      solve<false>(t, e);
+      rates<false>(p, e, multiplier, t, b);
     }
+    return true;
   }
-  static constexpr auto check = check_levels;
+  static constexpr auto check = lugre::check;
   static constexpr auto prepare = lugre::prepare;
   static constexpr auto release = lugre::release;
 };

@@ -60,10 +60,10 @@ struct Block {
   double budget[kLanes], most[kLanes], theta[kLanes], theta_fn[kLanes], lost[kLanes];   // J; theta: share of the rise that is paid for
 };
 
-void load(const Batch &p, const dfm_friction_in *in, size_t at, Block &b) {
+DEFORM_PASS inline void load(const Batch &p, const dfm_friction_in *in, size_t at, Block &b) {
   const size_t stride = in->stride;
   const double *fn = in->fn + at, *vx = in->vt + at, *vy = vx + stride, *area = in->area + at;
-  for (uint32_t i = 0; i < kLanes; ++i) {
+  EACH_LANE(i) {
     b.poison[i] = (0.0 * fn[i] + 0.0 * vx[i]) + (0.0 * vy[i] + 0.0 * area[i]);
     const double touches = fn[i] > kLeast ? fn[i] : 0.0, a = area[i] > 0 ? area[i] : 0.0;
     b.fn[i] = touches < kMost ? touches : kMost, b.area[i] = a < kWide ? a : kWide;
@@ -77,7 +77,7 @@ void load(const Batch &p, const dfm_friction_in *in, size_t at, Block &b) {
   }
   double excess[kLanes] = {}, fall[kLanes] = {};
   if (p.mu_s != p.mu_c) lanes::curve(p.v_s, p.delta, b.w, excess, fall);
-  for (uint32_t i = 0; i < kLanes; ++i) {
+  EACH_LANE(i) {
     b.mu[i] = b.fn[i] > 0 ? p.mu_c + (p.mu_s - p.mu_c) * excess[i] : 0.0;
     b.g[i] = b.mu[i] * b.fn[i];
     b.slope[i] = (p.mu_s - p.mu_c) * b.fn[i] * fall[i] / (b.w[i] > kLeast ? b.w[i] : kLeast);   // g'(w)
@@ -85,21 +85,21 @@ void load(const Batch &p, const dfm_friction_in *in, size_t at, Block &b) {
 }
 
 // The share of this step's rise that the budget covers. N from the old state alone, so that theta has no slope by v: |f'| <= |f0| + lambda nu.
-void pay(const Batch &p, const dfm_friction_in *in, size_t at, Block &b) {
+DEFORM_PASS inline void pay(const Batch &p, const dfm_friction_in *in, size_t at, Block &b) {
   const size_t stride = in->stride;
   const double *const budget = in->state + kBudget * stride + at;
   double need[kLanes] = {};
-  for (uint32_t i = 0; i < kLanes; ++i) b.most[i] = b.lost[i] = 0.0;
+  EACH_LANE(i) b.most[i] = b.lost[i] = 0.0;
   for (uint32_t e = 0; e < kElements; ++e) {
     const double *zx = in->state + 2 * e * stride + at, *zy = zx + stride, *flag = in->state + (kFlag + e) * stride + at, nu = p.nu[e];
-    for (uint32_t i = 0; i < kLanes; ++i) {
+    EACH_LANE(i) {
       const double K = p.k[e] * b.area[i], by_2k = 0.5 / (K > kLeast ? K : kLeast), cone = nu * p.mu_s * b.fn[i];
       const double x = within(zx[i], kFar), y = within(zy[i], kFar), rise = p.h * p.c * b.area[i] * nu;
       need[i] += flag[i] > 0.5 ? rise * (2.0 * (K * std::sqrt(x * x + y * y)) + rise) * by_2k : 0.0;
       b.most[i] += cone * cone * by_2k;
     }
   }
-  for (uint32_t i = 0; i < kLanes; ++i) {
+  EACH_LANE(i) {
     b.poison[i] += 0.0 * budget[i];
     const double given = budget[i] > 0 ? budget[i] : 0.0;
     b.budget[i] = given < b.most[i] ? given : b.most[i];
@@ -109,13 +109,13 @@ void pay(const Batch &p, const dfm_friction_in *in, size_t at, Block &b) {
 }
 
 // Element e of eight contacts: its new deflection, its share of the sums.
-void element(const Batch &p, uint32_t e, const dfm_friction_in *in, dfm_friction_out *out, size_t at, Block &b) {
+DEFORM_PASS inline void element(const Batch &p, uint32_t e, const dfm_friction_in *in, dfm_friction_out *out, size_t at, Block &b) {
   const size_t stride = in->stride;
   const double *zx = in->state + 2 * e * stride + at, *zy = zx + stride, *flag = in->state + (kFlag + e) * stride + at, nu = p.nu[e];
   double spare[kLanes];
   const auto to = [&](size_t c) { return out->state ? out->state + c * stride + at : spare; };
   double *const ox = to(2 * e), *const oy = to(2 * e + 1), *const oflag = to(kFlag + e);
-  for (uint32_t i = 0; i < kLanes; ++i) {
+  EACH_LANE(i) {
     b.poison[i] += (0.0 * zx[i] + 0.0 * zy[i]) + 0.0 * flag[i];
     const double K = p.k[e] * b.area[i], hk = p.h * K, g = b.g[i], keeps = b.fn[i] > 0 ? 1.0 : 0.0, cone = nu * p.mu_s * b.fn[i];
     const double ax = K * (keeps * within(zx[i], kFar)), ay = K * (keeps * within(zy[i], kFar)), a2 = ax * ax + ay * ay;
@@ -150,7 +150,7 @@ void element(const Batch &p, uint32_t e, const dfm_friction_in *in, dfm_friction
 }
 
 struct Gms {
-  static dfm_status run(const dfm_friction_in *in, dfm_friction_out *out) {
+  DEFORM_PASS static dfm_status run(const dfm_friction_in *in, dfm_friction_out *out) {
     const Batch p(in->params, in->dt);
     const size_t stride = in->stride;
     double spare[kLanes];
@@ -163,7 +163,7 @@ struct Gms {
       double *const fx = to(out->ft, 0), *const fy = to(out->ft, 1), *const xx = to(out->dft_dvt, 0), *const xy = to(out->dft_dvt, 1);
       double *const yx = to(out->dft_dvt, 2), *const yy = to(out->dft_dvt, 3), *const nx = to(out->dft_dfn, 0), *const ny = to(out->dft_dfn, 1);
       double *const limit = to(out->limit, 0), *const stored = to(out->stored, 0), *const budget = to(out->state, kBudget);
-      for (uint32_t i = 0; i < kLanes; ++i) {
+      EACH_LANE(i) {
         const double poison = b.poison[i], drag = b.fn[i] > 0 ? p.sigma2 * b.area[i] : 0.0;
         fx[i] = poison - b.fx[i], fy[i] = poison - b.fy[i];
         xx[i] = poison - b.xx[i], xy[i] = poison - b.xy[i], yx[i] = poison - b.yx[i], yy[i] = poison - b.yy[i];
@@ -174,7 +174,7 @@ struct Gms {
         stored[i] = b.stored[i] + left + poison;
       }
       for (uint32_t c = 0; out->state && c < kStates; ++c)
-        for (uint32_t i = 0; i < kLanes; ++i) out->state[c * stride + at + i] += b.poison[i];
+        EACH_LANE(i) out->state[c * stride + at + i] += b.poison[i];
       for (uint32_t i = 0; out->mode && i < kLanes; ++i)
         out->mode[at + i] = static_cast<uint8_t>(b.fn[i] > 0 ? b.slips[i] > 3.5 ? 2 : 1 : 0);
     }

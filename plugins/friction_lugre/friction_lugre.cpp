@@ -11,9 +11,9 @@ namespace {
 constexpr dfm_param kRows[] = {LUGRE_ROWS};
 
 struct Lugre : bristle::Run<Lugre> {
-  static bristle::Batch batch(const double *p) { return lugre::batch(p); }
+  DEFORM_PASS static bristle::Batch batch(const double *p) { return lugre::batch(p); }
   static constexpr bool kFlat = false;
-  static void flow(const double *, const bristle::Batch &p, bristle::Block &b) { bristle::all_slips(p, b); }
+  DEFORM_PASS static bool flow(const double *, const bristle::Batch &, bristle::Block &) { return false; }
   static constexpr auto check = lugre::check;
   static constexpr auto prepare = lugre::prepare;
   static constexpr auto release = lugre::release;

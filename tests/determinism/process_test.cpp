@@ -1,5 +1,7 @@
 // Every scene is cut in the middle of its contact: a new process takes the snapshot and ends with the same bits.
 // The program runs itself as `PROGRAM --continue SCENE FILE STEPS THREADS`.
+#include <bit>
+#include <cmath>
 #include <cstdlib>
 #include <cstring>
 
@@ -36,6 +38,14 @@ TEST_P(Process, ThatRestoresASnapshotTakenInContact_EndsWithTheSameBits) {
   scenes::advance(w, before);
   EXPECT_GT(test::stats(w).contacts, 0u) << "nothing touches: the snapshot shows little";
   EXPECT_EQ(test::stats(w).asleep > 0, s.name == std::string("woken"));
+  if (s.name == std::string("remembered")) {
+    uint32_t loaded = 0, n = 0;
+    test::ok(dfm_world_contacts(w, 0, nullptr, &n));
+    std::vector<dfm_contact> contacts(n);
+    test::ok(dfm_world_contacts(w, n, contacts.data(), &n));
+    for (const dfm_contact &k : contacts) loaded |= std::hypot(k.bristle[0], k.bristle[1]) > 0 ? 1u << k.law : 0;
+    EXPECT_EQ(std::popcount(loaded), 4) << "bristles of all four laws are loaded where the run is cut";
+  }
   const std::string data = test::snapshot(w);
   const std::string file = test::scratch(std::string("process_") + s.name) + "/cut.bin";
   test::write_file(file, data);

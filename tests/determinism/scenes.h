@@ -149,6 +149,34 @@ inline dfm_world folded(dfm_context *c) {
   return w;
 }
 
+// Every law with memory at once: three blocks on the floor and a ball thrown on one of them, each pair with a law of its own, pushed so that some contacts
+// hold on loaded bristles and others slide.
+inline dfm_world remembered(dfm_context *c) {
+  const dfm_world w = test::make_world(c);
+  test::add_plane(w, "floor");
+  const auto law = [&](const char *a, const char *b, const char *name, std::vector<dfm_param_value> values) {
+    dfm_friction_def f{};
+    f.size = sizeof f, f.between[0] = a, f.between[1] = b, f.law = name;
+    f.params = {sizeof(dfm_params), uint32_t(values.size()), values.data()};
+    test::ok(dfm_world_add_friction(w, &f));
+  };
+  const double low = 0.3, high = 0.9, soft = 1e7, bent = 1.5, cubic = 3;
+  test::BodyOptions o;
+  o.young = 1e5, o.damping_stiffness = 1e-3;
+  const char *const names[] = {"dahl", "elastoplastic", "gms"};
+  for (int i = 0; i < 3; ++i) {
+    o.name = names[i], o.position = {0, 0.15 * i, 1e-4}, o.velocity = {0.05 + 0.1 * i, 0.02 * i, 0};
+    test::make_body(c, w, "beam", {0.1, 0.1, 0.06}, 60, o);
+  }
+  o.name = "ball", o.position = {0.05, 0.05, 0.1008}, o.velocity = {0.1, 0.05, -0.2}, o.spin = {3, 1, 2};
+  test::make_body(c, w, "ball", {0.04, 0, 0}, 100, o);
+  law("dahl", "floor", "dahl", {{"mu", &low, 1}, {"sigma0", &soft, 1}, {"alpha", &bent, 1}});
+  law("elastoplastic", "floor", "elastoplastic", {{"mu_C", &low, 1}, {"mu_S", &high, 1}, {"sigma0", &soft, 1}, {"i", &cubic, 1}});
+  law("gms", "floor", "gms", {{"mu_C", &low, 1}, {"mu_S", &high, 1}});
+  law("ball", "dahl", "lugre", {{"mu_C", &low, 1}, {"mu_S", &high, 1}, {"delta", &bent, 1}, {"sigma0", &soft, 1}});
+  return w;
+}
+
 struct Scene {
   const char *name;
   dfm_world (*build)(dfm_context *);
@@ -159,7 +187,8 @@ inline const Scene all[] = {{"ball_on_floor", ball_on_floor, 150}, {"crossing_be
                             {"dale", dale, 100},
                             {"woken", woken, 220},
                             {"rolled_back", rolled_back, 120},
-                            {"folded", folded, 120}};
+                            {"folded", folded, 120},
+                            {"remembered", remembered, 70}};
 
 inline void advance(dfm_world w, int steps) {
   for (int i = 0; i < steps; ++i) ASSERT_EQ(dfm_world_step(w, 1e-3, nullptr), DFM_OK) << dfm_last_error();

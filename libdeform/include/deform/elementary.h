@@ -12,8 +12,15 @@
 extern "C" {
 #endif
 
-static inline uint64_t dfm_bits_(double x) { uint64_t b; memcpy(&b, &x, sizeof b); return b; }
-static inline double dfm_double_(uint64_t b) { double x; memcpy(&x, &b, sizeof x); return x; }
+/* Part of the caller always: one that is compiled for a wider instruction set would else call code that is not. */
+#if defined(__GNUC__)
+#define DFM_ELEMENTARY_ static inline __attribute__((always_inline))
+#else
+#define DFM_ELEMENTARY_ static inline
+#endif
+
+DFM_ELEMENTARY_ uint64_t dfm_bits_(double x) { uint64_t b; memcpy(&b, &x, sizeof b); return b; }
+DFM_ELEMENTARY_ double dfm_double_(uint64_t b) { double x; memcpy(&x, &b, sizeof x); return x; }
 
 #define DFM_ROUND_ 6755399441055744.0            /* 1.5 * 2^52: adding it rounds to the nearest integer, kept in the low bits */
 #define DFM_LN2_HIGH_ 0x1.62e42fefa0000p-1       /* upper 33 bits of ln 2: exact times any exponent */
@@ -21,7 +28,7 @@ static inline double dfm_double_(uint64_t b) { double x; memcpy(&x, &b, sizeof x
 
 /* e^(high + low) with |low| far below an ulp of high. x = n ln 2 + r, |r| <= 0.347; e^r = 1 + (r + r^2 P(r)), P the Taylor series up to
  * r^13/13! (truncation below 4e-18); 2^n in two factors, so that results near both ends of the range come out rounded once. */
-static inline double dfm_exp2_(double high, double low) {
+DFM_ELEMENTARY_ double dfm_exp2_(double high, double low) {
   const double x = high < -750.0 ? -750.0 : high > 710.0 ? 710.0 : high;   /* a NaN falls through */
   const double shifted = x * 0x1.71547652b82fep+0 + DFM_ROUND_, n = shifted - DFM_ROUND_;
   const uint64_t k = dfm_bits_(shifted) - dfm_bits_(DFM_ROUND_);
@@ -37,11 +44,11 @@ static inline double dfm_exp2_(double high, double low) {
 }
 
 /** e^x; 0 below -745.2, +inf above 709.8, NaN for NaN. */
-static inline double dfm_exp(double x) { return dfm_exp2_(x, 0.0); }
+DFM_ELEMENTARY_ double dfm_exp(double x) { return dfm_exp2_(x, 0.0); }
 
 /* ln x = high + low to about 2^-63 relative, x > 0 and finite. x = 2^k m, m in [sqrt 1/2, sqrt 2); s = (m-1)/(m+1); ln m = 2 s + s q(s^2),
  * q = 2 (s^2/3 + s^4/5 + ...), 12 terms (truncation below 1e-19). The leading 2 s is carried in two doubles. */
-static inline void dfm_log2_(double x, double *high, double *low) {
+DFM_ELEMENTARY_ void dfm_log2_(double x, double *high, double *low) {
   const int subnormal = x < 0x1p-1022;
   const uint64_t b = dfm_bits_(subnormal ? x * 0x1p54 : x);
   const uint64_t shifted = b - 0x3fe6a09e667f3bcdull;                       /* bits of sqrt 1/2: the exponent then counts from there */
@@ -64,7 +71,7 @@ static inline void dfm_log2_(double x, double *high, double *low) {
 }
 
 /** Natural logarithm; -inf at 0, NaN below, +inf and NaN pass through. */
-static inline double dfm_log(double x) {
+DFM_ELEMENTARY_ double dfm_log(double x) {
   double high, low;
   dfm_log2_(x, &high, &low);
   if (!(x > 0.0)) return x == 0.0 ? -1.0 / 0.0 : (x - x) / 0.0;
@@ -72,7 +79,7 @@ static inline double dfm_log(double x) {
 }
 
 /** x^y for x >= 0 (friction levels, not signed powers): x^0 = 1, 0^y = 0 for y > 0 and +inf below, NaN for x < 0 and for a NaN. */
-static inline double dfm_pow(double x, double y) {
+DFM_ELEMENTARY_ double dfm_pow(double x, double y) {
   double high, low;
   if (y == 0.0) return 1.0;
   if (!(x > 0.0) || x > 1.7976931348623157e308) {
@@ -94,7 +101,7 @@ static inline double dfm_pow(double x, double y) {
 
 /* sin(pi x) and cos(pi x), 0 <= x <= 1/2: both Taylor series at the distance y <= 1/4 from the nearer end, up to (pi y)^19/19! and
  * (pi y)^18/18! (truncation below 1e-19 of the value), then chosen. Exact at 0 and 1/2. */
-static inline void dfm_sincospi_(double x, double *sine, double *cosine) {
+DFM_ELEMENTARY_ void dfm_sincospi_(double x, double *sine, double *cosine) {
   const double y = x < 0.25 ? x : 0.5 - x, z = y * y, z2 = z * z, z4 = z2 * z2;
   const double s1 = (-0x1.4abbce625be53p+2 + z * 0x1.466bc6775aae2p+1) + z2 * (-0x1.32d2cce62bd86p-1 + z * 0x1.50783487ee782p-4);
   const double s2 = (-0x1.e3074fde8871fp-8 + z * 0x1.e8f434d018d63p-12) + z2 * (-0x1.6fadb9f155744p-16 + z * 0x1.aaec32af93359p-21);
@@ -107,14 +114,14 @@ static inline void dfm_sincospi_(double x, double *sine, double *cosine) {
 }
 
 /* x less the nearest even integer, in [-1, 1]; beyond 2^52 every double is an integer, beyond 2^53 an even one. NaN and infinite: NaN. */
-static inline double dfm_turn_(double x) {
+DFM_ELEMENTARY_ double dfm_turn_(double x) {
   const double size = x < 0.0 ? -x : x, whole = size >= 9007199254740992.0 ? 0.0 : size - 4503599627370496.0;
   const double y = size >= 4503599627370496.0 ? (x < 0.0 ? -whole : whole) : x, half = 0.5 * y;
   return (y - 2.0 * ((half + DFM_ROUND_) - DFM_ROUND_)) + 0.0 * x;
 }
 
 /** sin(pi x): 0 at every integer, for any x; NaN for NaN and infinite. */
-static inline double dfm_sinpi(double x) {
+DFM_ELEMENTARY_ double dfm_sinpi(double x) {
   const double t = dfm_turn_(x), size = t < 0.0 ? -t : t;
   double s, c;
   dfm_sincospi_(size > 0.5 ? 1.0 - size : size, &s, &c);
@@ -122,7 +129,7 @@ static inline double dfm_sinpi(double x) {
 }
 
 /** cos(pi x); NaN for NaN and infinite. */
-static inline double dfm_cospi(double x) {
+DFM_ELEMENTARY_ double dfm_cospi(double x) {
   const double t = dfm_turn_(x), size = t < 0.0 ? -t : t;
   double s, c;
   dfm_sincospi_(size > 0.5 ? 1.0 - size : size, &s, &c);
