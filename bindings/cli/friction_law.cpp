@@ -196,6 +196,14 @@ void RigLaw::reset(const FrictionCase &rig) {
   trial_ = state_;
 }
 
+void RigLaw::extrapolate(const std::vector<Column> &whole) {
+  size_t at = 0;
+  for (uint32_t i = 0; i < ops().nslot; at += ops().slots[i].width, ++i) {
+    if (ops().slots[i].kind != DFM_SLOT_TANGENT) continue;
+    for (size_t k = at; k < at + ops().slots[i].width; ++k) state_[k].lane[0] = 2 * state_[k].lane[0] - whole[k].lane[0];
+  }
+}
+
 Resistance RigLaw::eval(const Slip &slip, bool derivative) {
   Column fn, vt[2], stop[2], area, dwell, ft[2], dvt[4], limit, stored;
   alignas(64) uint8_t mode[8] = {};
@@ -239,6 +247,15 @@ class StepSolver {
   }
 
   StepResult solve(double v) {
+    StepResult r = search(v);
+    r.falls = falls_;
+    return r;
+  }
+
+ private:
+  struct Point { double u, r, slope; bool stopped; };
+
+  StepResult search(double v) {
     Point a = at(v);
     if (a.stopped) return rest();
     if (a.r == 0) return finish(a);
@@ -253,9 +270,6 @@ class StepSolver {
     else if (falls_) cut_evenly(a, c);
     return newton(a, c);
   }
-
- private:
-  struct Point { double u, r, slope; bool stopped; };
 
   Point at(double u) {
     slip_.vx = u;

@@ -24,6 +24,8 @@ struct Resistance {
 
 class RigLaw {
  public:
+  struct alignas(64) Column { double lane[8] = {}; };
+
   RigLaw(const Globals &globals, const FrictionCase &rig, const std::string &law);
   RigLaw(const RigLaw &) = delete;
   RigLaw &operator=(const RigLaw &) = delete;
@@ -36,6 +38,9 @@ class RigLaw {
   // The trial state is kept until commit() or the next evaluation. Throws Failure(kStopped) where the law gives nothing finite.
   Resistance eval(const Slip &slip, bool derivative = false);
   void commit() { state_ = trial_; }
+  const std::vector<Column> &memory() const { return state_; }
+  void recall(const std::vector<Column> &memory) { state_ = memory; }
+  void extrapolate(const std::vector<Column> &whole);   // 2 state - whole, of what is a vector in the tangent plane; the rest stays
   void reset(const FrictionCase &rig);           // state at rest, or the case's initial z
   double state(uint32_t i) const { return i < state_.size() ? state_[i].lane[0] : 0.0; }
   double trial(uint32_t i) const { return i < trial_.size() ? trial_[i].lane[0] : 0.0; }
@@ -44,7 +49,6 @@ class RigLaw {
   uint64_t evaluations() const { return evaluations_; }
 
  private:
-  struct alignas(64) Column { double lane[8] = {}; };
   void fill_params(const FrictionCase &rig);
   void warn_of(const FrictionCase &rig, const std::vector<std::string> &used) const;
 
@@ -60,7 +64,7 @@ class RigLaw {
 // Solves  m_h u + f(u) = drive  for the speed u at the end of a step: m_h = m/h (plus what else is linear in u), drive = m v/h + the rest of the
 // applied force. Where a falling Stribeck curve leaves several solutions it is the first that is met from the old speed in the direction in which
 // the mass accelerates: the one that continues the motion as the step is made smaller.
-struct StepResult { double u, f; bool on_jump; };
+struct StepResult { double u, f; bool on_jump, falls = false; };   // falls: R was seen to, so there may be several solutions
 StepResult implicit_step(RigLaw &law, Slip slip, double m_h, double drive, double v);
 
 }  // namespace cli

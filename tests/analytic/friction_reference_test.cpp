@@ -18,22 +18,23 @@ struct Case {
   double ratio = 1.89;
 };
 
-// The rigs below break-away ring on their bristles and the drifts add up 40 cycles: there the first order shows at steps of some 1e-5 s. Of stick-slip
-// the path is compared, whose error is that of the events' times; of ramps what does not hang on which step the peak falls into.
+// A mass on bristles is of second order, an eighth less for what adds up over many rings; where it turns within a step of its own slip (gross) the kink of
+// |v| makes the factor jump about. All else is of the law's first order. Of stick-slip the path is compared, whose error is that of the events'
+// times; of ramps what does not hang on which step the peak falls into.
 const Case kCases[] = {
     {"rig_sub_coulomb"}, {"rig_sub_karnopp"},
-    {"rig_sub_dahl", 2e-5, "x v F z", 1.85}, {"rig_sub_lugre", 2e-5, "x v F z"}, {"rig_sub_ep", 2e-5, "x v F z"},
-    {"rig_gross_coulomb", 1e-4, "x v F"}, {"rig_gross_karnopp", 1e-4, "x v F"}, {"rig_gross_dahl", 1e-4, "x v F z"},
-    {"rig_gross_lugre", 1e-4, "x v F z"}, {"rig_gross_ep", 1e-4, "x v F z"},
+    {"rig_sub_dahl", 2e-4, "x v F z", 3.5}, {"rig_sub_lugre", 2e-4, "x v F z", 3.5}, {"rig_sub_ep", 2e-4, "x v F z", 3.5},
+    {"rig_gross_coulomb", 1e-4, "x v F"}, {"rig_gross_karnopp", 1e-4, "x v F"}, {"rig_gross_dahl", 2e-4, "x v F z", 2},
+    {"rig_gross_lugre", 2e-4, "x v F z", 2}, {"rig_gross_ep", 2e-4, "x v F z", 2},
     {"sinvel_V1_coulomb", 1e-4, "F"}, {"sinvel_V1_dahl", 1e-4, "F z"}, {"sinvel_V1_lugre", 1e-4, "F z"}, {"sinvel_V1_ep", 1e-4, "F z"},
     {"sinvel_V2_coulomb", 1e-4, "F"}, {"sinvel_V2_dahl", 1e-4, "F z"}, {"sinvel_V2_lugre", 1e-4, "F z"}, {"sinvel_V2_ep", 1e-4, "F z"},
     {"sinvel_presliding_coulomb", 1e-4, "F"}, {"sinvel_presliding_dahl", 1e-4, "F z"}, {"sinvel_presliding_lugre", 1e-4, "F z"},
     {"sinvel_presliding_ep", 1e-4, "F z"},
-    {"stickslip_coulomb_plain", 2e-4, "x"}, {"stickslip_coulomb", 2e-4, "x"}, {"stickslip_karnopp", 2e-4, "x"}, {"stickslip_dahl", 2e-4, "x"},
-    {"stickslip_lugre", 2e-4, "x"}, {"stickslip_ep", 2e-4, "x"},
-    {"breakaway_lugre", 1e-4, "F_ba t_v_eq_v_s"}, {"breakaway_ep", 1e-4, "F_ba t_v_eq_v_s"},
-    {"drift_elastic_dahl", 5e-5, "x F z", 1.8}, {"drift_elastic_lugre", 5e-5, "x F z", 1.8}, {"drift_elastic_ep", 5e-5, "x F z", 1.8},
-    {"drift_plastic_dahl", 5e-5, "x F z", 1.8}, {"drift_plastic_lugre", 5e-5, "x F z", 1.8}, {"drift_plastic_ep", 5e-5, "x F z", 1.8},
+    {"stickslip_coulomb_plain", 2e-4, "x"}, {"stickslip_coulomb", 2e-4, "x"}, {"stickslip_karnopp", 2e-4, "x"}, {"stickslip_dahl", 2e-4, "x", 2.8},
+    {"stickslip_lugre", 2e-4, "x", 3.5}, {"stickslip_ep", 2e-4, "x", 3.5},
+    {"breakaway_lugre", 2e-4, "F_ba t_v_eq_v_s", 3.5}, {"breakaway_ep", 2e-4, "F_ba t_v_eq_v_s", 3.5},
+    {"drift_elastic_dahl", 2e-4, "x v F z", 2.8}, {"drift_elastic_lugre", 2e-4, "x v F z", 2.8}, {"drift_elastic_ep", 2e-4, "x v F z", 2.8},
+    {"drift_plastic_dahl", 2e-4, "x v F z", 2.8}, {"drift_plastic_lugre", 2e-4, "x v F z", 2.8}, {"drift_plastic_ep", 2e-4, "x v F z", 2.8},
     {"vector_circle_lugre", 1e-4, "zx zy Fx Fy"}, {"vector_turn_lugre", 1e-4, "zx zy Fx Fy"},
     {"vector_turn_ep_associated", 1e-4, "zx zy Fx Fy"}, {"vector_turn_ep_cosine", 1e-4, "zx zy Fx Fy"},
     {"normal_load_lugre_projected", 1e-4, "z F_elastic"},
@@ -108,11 +109,9 @@ TEST_P(FrictionReference, Errors_StayWithinWhatIsStated) {
       const double prototype = test::rig::json_number(block.substr(0, block.find('}')), {name.c_str()});
       if (std::isnan(prototype)) continue;
       EXPECT_LE(e.error, 3 * prototype) << c.id << " " << key << " " << name;
-      // The end position of rig_gross_lugre at 1e-3 s is where the prototype's error of 5.9e-4 m passes through zero; the bound is that of its path.
       const double end = test::rig::json_number(block.substr(0, block.find('}')), {"x_end"});
-      const bool lucky = is(c, "rig_gross_lugre");
       if (name == "x") {
-        EXPECT_LE(std::fabs(out.rows.column("x").back() - ref.column("x").back()), 3 * (lucky ? prototype : end)) << c.id << " " << key;
+        EXPECT_LE(std::fabs(out.rows.column("x").back() - ref.column("x").back()), 3 * end) << c.id << " " << key;
       }
     }
   }
@@ -144,7 +143,8 @@ TEST(FrictionReferenceStickSlip, Periods_AreRightToATenthOfAPercent) {
     const std::string text = text_of(c);
     const auto stated = [&](const char *name) { return test::rig::json_number(text, {"summary", name}); };
     const Outcome out = run(c, "1e-4");
-    EXPECT_NEAR(out.figure("period"), stated("period"), 1e-4 * stated("period")) << id;      // the issue asks for 1e-3
+    const bool jumps = is(c, "coulomb") || is(c, "karnopp");                              // first order, those with bristles second
+    EXPECT_NEAR(out.figure("period"), stated("period"), (jumps ? 1e-4 : 1e-6) * stated("period")) << id;
     EXPECT_NEAR(out.figure("spring_force_max"), stated("spring_force_max"), 1e-4) << id;
     EXPECT_NEAR(out.figure("spring_force_min"), stated("spring_force_min"), 1e-4) << id;
     EXPECT_NEAR(out.figure("v_max"), stated("v_max"), 1e-3 * stated("v_max")) << id;

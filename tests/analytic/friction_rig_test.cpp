@@ -116,7 +116,7 @@ TEST(FrictionRig, LawWithoutDerivatives_IsSolvedAllTheSame) {
     EXPECT_NEAR(v[i], 2 * (1 - std::exp(-1.5 * t[i])), 1e-4);
     EXPECT_NEAR(f[i], 3 * v[i], 1e-11);
   }
-  EXPECT_LT(out.figure("evaluations"), 8 * out.figure("steps"));
+  EXPECT_LT(out.figure("evaluations"), 12 * out.figure("steps"));   // of which each is a whole and two halves
 }
 
 // F_el = g/sqrt(1 + (g/(sigma0 R))^2), behind the slip by atan(g/(sigma0 R)).
@@ -186,7 +186,7 @@ TEST(FrictionRig, SpringOfAnyStiffness_StaysBounded) {
   EXPECT_LT(out.figure("v_max"), 0.3);
 }
 
-// The table of libdeform/doc/laws/choosing.md.
+// The table of libdeform/doc/laws/choosing.md; gms has its period of 6.554 s at half of the step taken here.
 struct SideBySide { const char *law; double drift, breakaway[3], loop, period; };
 class FrictionLaws : public testing::TestWithParam<SideBySide> {};
 TEST_P(FrictionLaws, SideBySide_ShowWhatThePageSays) {
@@ -202,5 +202,5 @@ TEST_P(FrictionLaws, SideBySide_ShowWhatThePageSays) {
 INSTANTIATE_TEST_SUITE_P(All, FrictionLaws,
                          testing::Values(SideBySide{"coulomb", 0, {1.5, 1.5, 1.5}, 0, 6.512}, SideBySide{"karnopp", 0, {1.5, 1.5, 1.5}, 0, 6.517},
                                          SideBySide{"dahl", 5.195e-5, {1, 1, 1}, -0.356, 4.443}, SideBySide{"lugre", 3.366e-5, {1.432, 1.211, 1}, -0.425, 6.362},
-                                         SideBySide{"elastoplastic", 0, {1.443, 1.310, 1}, -0.129, 6.376}, SideBySide{"gms", 0, {1.496, 1.392, 1.014}, 0, 6.555}),
+                                         SideBySide{"elastoplastic", 0, {1.443, 1.310, 1}, -0.129, 6.376}, SideBySide{"gms", 0, {1.500, 1.392, 1.014}, 0, 6.556}),
                          [](const auto &each) { return std::string(each.param.law); });

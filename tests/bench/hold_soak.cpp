@@ -3,6 +3,7 @@
 // drifts by its law does so at more than 1.25 times the rate of its formula.
 //
 //   hold_soak TABLE.csv [--only TEXT] [--seconds N]     rows whose name contains TEXT; begins no row after N seconds
+#include <chrono>
 #include <cstdio>
 #include <cstring>
 #include <set>
@@ -57,7 +58,7 @@ int main(int argc, char **argv) {
   const std::set<std::string> done = known(argv[1]);
   std::FILE *table = std::fopen(argv[1], "a");
   if (!table) return std::perror(argv[1]), 2;
-  if (done.empty()) std::fprintf(table, "scene,law,level,mesh,step_s,creep_m_s,worst_contact_m_s,law_drift_m_s,stuck,substeps,unconverged,cpu_s,machine,compiler\n");
+  if (done.empty()) std::fprintf(table, "scene,law,level,mesh,step_s,creep_m_s,worst_contact_m_s,law_drift_m_s,stuck,substeps,unconverged,simulated_s,cpu_s,machine,compiler\n");
   const auto start = std::chrono::steady_clock::now();
   int bad = 0;
   // Coarse meshes and short runs first: what is stopped early has seen every law.
@@ -73,8 +74,8 @@ int main(int argc, char **argv) {
           const Result r = run_case({p.scene, law, p.level, step.seconds, fine, p.cycles});
           const bool holds = r.drift > 0 ? r.creep < 1.25 * r.drift : r.creep < 1e-6;
           bad += !holds;
-          std::fprintf(table, "%s,%.3g,%.3g,%.3g,%u,%llu,%llu,%.2f,%s,%s\n", name.c_str(), r.creep, r.contact, r.drift, r.stuck,
-                       static_cast<unsigned long long>(r.substeps), static_cast<unsigned long long>(r.unconverged), r.seconds, bench::machine().c_str(),
+          std::fprintf(table, "%s,%.3g,%.3g,%.3g,%u,%llu,%llu,%g,%.2f,%s,%s\n", name.c_str(), r.creep, r.contact, r.drift, r.stuck,
+                       static_cast<unsigned long long>(r.substeps), static_cast<unsigned long long>(r.unconverged), r.simulated, r.seconds, bench::machine().c_str(),
                        bench::compiler());
           std::fflush(table);
           std::printf("%-48s creep %9.3g m/s  law's drift %9.3g  %s\n", name.c_str(), r.creep, r.drift, holds ? "" : "TOO MUCH");
