@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cstdio>
+#include <map>
 
 #include "support.h"
 
@@ -34,3 +35,45 @@ TEST(FrictionBenchmark, OurSlides_AreMeasuredJudgedAndNotRunTwice) {
   EXPECT_EQ(test::read_csv(out).size(), 3u);
 }
 
+
+// A stranger's engine: a file in a folder of its own, as the README tells it. What goes wrong and what takes too long are rows, not ends.
+TEST(FrictionBenchmark, EntryFromOutside_GetsItsRows) {
+  const std::string folder = test::scratch("friction_benchmark_entry");
+  test::write_file(folder + "/entry_sled.py", R"(import cases
+class Entry:
+    name, version = "sled", "1"
+    def __init__(self, command, work):
+        pass
+    def configurations(self, case):
+        return ["good", "slow", "broken"] if case["name"] == "slope_slide" else []
+    def why_not(self, case):
+        return "it only slides"
+    def run(self, case, configuration):
+        if configuration == "slow":
+            raise cases.TooSlow(0.5, 2)
+        if configuration == "broken":
+            raise RuntimeError("the string broke")
+        return {"acceleration": case["answer"]["acceleration"][0]}, 0.25
+)");
+  const std::string out = folder + "/rows.csv";
+  std::remove(out.c_str());
+  const auto call = [&](const char *engine) {
+    return test::run({"python3", script("run.py"), engine, "--entries", folder, "--command", DEFORM_COMMAND, "--out", out});
+  };
+  const test::CommandResult done = call("sled");
+  ASSERT_EQ(done.exit_code, 0) << done.err;
+  std::map<std::string, int> verdicts;
+  std::string notes;
+  const auto rows = test::read_csv(out);
+  for (size_t i = 1; i < rows.size(); ++i) ++verdicts[rows[i][10]], notes += rows[i][12] + "\n";
+  EXPECT_EQ(verdicts["pass"], 2);
+  EXPECT_EQ(verdicts["too_slow"], 2);
+  EXPECT_EQ(verdicts["error"], 2);
+  EXPECT_GT(verdicts["not_run"], 10);
+  for (const char *said : {"too slow: > 300 s for 0.5 of 2 s", "the string broke", "it only slides"}) EXPECT_NE(notes.find(said), std::string::npos) << said;
+
+  const test::CommandResult unknown = call("sledge");
+  EXPECT_NE(unknown.exit_code, 0);
+  EXPECT_NE(unknown.err.find("there is no entry_sledge.py"), std::string::npos) << unknown.err;
+  EXPECT_NE(unknown.err.find("bullet, deform, mujoco, sled"), std::string::npos) << unknown.err;
+}

@@ -12,6 +12,14 @@ import math
 G = 9.81
 GEL = {"young": 1e6, "poisson": 0.25, "density": 1000.0, "damping_stiffness": 1e-3}
 CREEP = (0.0, 0.0, 1.0)  # um/s: a hold that holds
+MOST_SECONDS = 300  # of processor time, for one case
+
+
+class TooSlow(RuntimeError):
+    """Raised by an entry that has used its time up: a result like any other."""
+
+    def __init__(self, done, end):
+        super().__init__("too slow: > %d s for %.3g of %.3g s" % (MOST_SECONDS, done, end))
 
 
 def band(value, share):

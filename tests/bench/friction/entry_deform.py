@@ -6,8 +6,10 @@ import csv
 import json
 import math
 import os
+import resource
 import subprocess
 
+import cases
 import mesh_file
 
 G = 9.81
@@ -41,12 +43,18 @@ class Entry:
         path = os.path.join(self.work, "scene.json")
         with open(path, "w") as f:
             json.dump(scene, f)
-        done = subprocess.run([self.command, "run", path, "--out", folder, "--quiet"], capture_output=True, text=True)
+        most = cases.MOST_SECONDS
+        before = resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime
+        done = subprocess.run([self.command, "run", path, "--out", folder, "--quiet"], capture_output=True, text=True,
+                              preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_CPU, (most, most + 5)))
+        used = resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime - before
+        if done.returncode and used > most - 2:
+            raise cases.TooSlow(0, scene["time"]["duration"])
         if done.returncode:
             raise RuntimeError((done.stderr or done.stdout).strip().splitlines()[-1])
         with open(os.path.join(folder, "summary.json")) as f:
             summary = json.load(f)
-        return measure(Tables(folder)), summary["wall_s"] / summary["simulated_s"]
+        return measure(Tables(folder)), used / summary["simulated_s"]
 
     # What all scenes share. `low`: lowest point of the mesh in its own frame.
     def base(self, case, law, duration, every, gravity):

@@ -2,10 +2,11 @@
 """Runs the friction benchmark with one engine and writes a row per case and configuration.
 
   run.py deform [--command build/release/bin/deform] [--only CASE] [--law LAW] [--out FILE.csv]
-  run.py mujoco | run.py bullet          other engines, by the scripts beside this one
+  run.py mujoco | run.py bullet          other engines, by the scripts beside this one; any NAME with an entry_NAME.py here or in --entries
 
-A row: engine, version, configuration, case, its parameters, quantity, measured, expected, low, high, verdict (pass, fail, error, or not_run where an
-engine has no such law), cost (wall seconds per simulated second), note. A row is written as soon as its case is done; rows that FILE already
+A row: engine, version, configuration, case, its parameters, quantity, measured, expected, low, high, verdict (pass, fail, too_slow, error, or
+not_run where an engine has no such law), cost (seconds of processor time per simulated second), note.
+A row is written as soon as its case is done; rows that FILE already
 holds are not run again, so a run that was stopped goes on where it was.
 """
 import argparse
@@ -19,6 +20,7 @@ import tempfile
 import cases
 
 COLUMNS = ["engine", "version", "configuration", "case", "parameters", "quantity", "measured", "expected", "low", "high", "verdict", "cost", "note"]
+MISSING = "%s: this python3 does not find the module '%s'; install it, or take the python3 that has it"
 PARAMETERS = ["mu", "mu_S", "mu_C", "share", "ratio"]
 
 
@@ -32,12 +34,14 @@ def verdict(value, low, high):
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("engine", choices=["deform", "mujoco", "bullet"])
+    parser.add_argument("engine", metavar="ENGINE", help="NAME of an entry_NAME.py")
+    parser.add_argument("--entries", help="another folder that has entries")
     parser.add_argument("--command", default="build/release/bin/deform", help="the deform command: runs our cases, makes the meshes of all entries")
     parser.add_argument("--only", help="one case by name")
     parser.add_argument("--configuration", help="one configuration of the engine (for deform: a law)")
     parser.add_argument("--out", help="CSV to write or to go on with; without it the rows are printed")
     given = parser.parse_args()
+    make = entry_of(given.engine, given.entries)
     done, file = set(), None
     if given.out:
         fresh = not os.path.exists(given.out)
@@ -49,7 +53,10 @@ def main():
         if fresh:
             writer.writeheader()
     with tempfile.TemporaryDirectory() as work:
-        entry = importlib.import_module("entry_" + given.engine).Entry(given.command, work)
+        try:
+            entry = make(os.path.abspath(given.command), work)
+        except ModuleNotFoundError as error:
+            sys.exit(MISSING % (given.engine, error.name))
         for case in cases.cases():
             if given.only and case["name"] != given.only:
                 continue
@@ -67,11 +74,27 @@ def main():
                     print("%-8s %-14s %-16s %-14s %-16s %12s  [%s, %s]  %s %s" % tuple(row.get(k, "") for k in shown), flush=True)
 
 
+def entry_of(engine, folder):
+    """The class Entry of entry_ENGINE.py; in one sentence what there is where there is none."""
+    folders = ([os.path.abspath(folder)] if folder else []) + [os.path.dirname(os.path.abspath(__file__))]
+    sys.path[:0] = folders
+    try:
+        return importlib.import_module("entry_" + engine).Entry
+    except ModuleNotFoundError as error:
+        if error.name != "entry_" + engine:
+            sys.exit(MISSING % (engine, error.name))
+        known = sorted(n[6:-3] for d in folders if os.path.isdir(d) for n in os.listdir(d) if n.startswith("entry_") and n.endswith(".py"))
+        sys.exit("there is no entry_%s.py in %s; there are: %s" % (engine, " or ".join(folders), ", ".join(known)))
+
+
 def measured_rows(entry, case, configuration):
     if configuration == "none":
-        return [{"verdict": "not_run", "note": "no law with " + case["law"]}]
+        why = getattr(entry, "why_not", lambda _: "no law with " + case["law"])(case)
+        return [{"verdict": "not_run", "note": why}]
     try:
         values, cost = entry.run(case, configuration)
+    except cases.TooSlow as error:
+        return [{"verdict": "too_slow", "note": str(error)}]
     except RuntimeError as error:
         return [{"verdict": "error", "note": str(error).replace("\n", " ")[:200]}]
     rows = []
@@ -86,5 +109,4 @@ def measured_rows(entry, case, configuration):
 
 
 if __name__ == "__main__":
-    sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
     main()

@@ -5,7 +5,7 @@ import sys
 
 
 def shown(row):
-    if row["verdict"] == "error":
+    if row["verdict"] in ("error", "too_slow"):
         return "**" + row["note"].split(" for ")[0] + "**"
     if row["verdict"] == "not_run":
         return "-"
