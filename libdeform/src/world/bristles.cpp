@@ -3,6 +3,7 @@
 //   normal turns    contact/store.cpp, transport(): by the smallest rotation that takes it along
 //   surfaces spin   here: about the normal, by half of what each of the two turns
 //   area changes    here: sigma0 A z is kept where A grows, z where A shrinks
+//   area moves      here: to a neighbour that the mesh puts more load on (contact/exchange.h), and its bristles with it
 //
 // A surface's turn about n within the sub-step is what its points near the contact did, x -> x': with r from their middle, in the plane of n,
 //     tan(angle) = sum n . (r x r') / sum r . r'
@@ -83,7 +84,35 @@ Turn turn_of(const World &w, const Obstacle &o, Vec3 n) {
 
 void share_areas(World &w) {
   const auto counts = [](const LawInstance *law) { return (law->ops->needs & DFM_NEED_AREA) && !(law->ops->flags & DFM_FRIC_SET_VALUED); };
-  if (std::any_of(w.law_list.begin(), w.law_list.end(), counts)) w.areas.share(w.contacts, w.rows.impulse.data(), w.state.area.data());
+  w.exchange.clear();
+  if (std::none_of(w.law_list.begin(), w.law_list.end(), counts)) return;
+  w.areas.share(w.contacts, w.rows.impulse.data(), w.state.area.data());
+  w.sharing.resize(w.rows.n);
+  for (uint32_t i = 0; i < w.rows.n; ++i) w.sharing[i] = counts(w.law_list[w.state.law[i]]) ? w.state.law[i] : kNone;
+  w.exchange.share(w.contacts, w.sources, w.sharing.data(), w.rows.impulse.data(), w.state.area.data());
+}
+
+// One move after the other: of a contact that gives and takes, what it took may go on. Each keeps sigma0 A z of the two together and, as a mean, stores less.
+void hand_over(World &w) {
+  ContactStore &to = w.next_store;
+  for (const AreaExchange::Move &m : w.exchange.moves(w.rows.impulse.data())) {
+    const double area = std::min(m.area, to.area[m.from]), sum = to.area[m.to] + area;
+    if (!(area > 0)) continue;
+    to.area[m.from] -= area, to.area[m.to] = sum;
+    if (!to.touching[m.to]) continue;
+    const LawInstance &law = *w.law_list[to.law[m.to]];
+    const Vec3 n = load3(&to.normal[3 * size_t{m.from}]), k = load3(&to.normal[3 * size_t{m.to}]);
+    const Vec3 t1 = load3(&to.tangent[3 * size_t{m.from}]), t2 = cross(n, t1), e1 = load3(&to.tangent[3 * size_t{m.to}]), e2 = cross(k, e1);
+    double *const z = &to.bristle[size_t{to.nstate} * m.to];
+    const double *const given = &to.bristle[size_t{to.nstate} * m.from];
+    for (uint32_t s = 0; s + 1 < law.nstate; ++s) {
+      if (!law.tangent[s]) continue;
+      const Vec3 flat = given[s] * t1 + given[s + 1] * t2, turned = flat - (dot(k, flat) / (1 + dot(n, k))) * (n + k);
+      z[s] = (to.area[m.to] - area) / sum * z[s] + area / sum * dot(e1, turned);
+      z[s + 1] = (to.area[m.to] - area) / sum * z[s + 1] + area / sum * dot(e2, turned);
+      ++s;
+    }
+  }
 }
 
 void fit_bristles(World &w) {

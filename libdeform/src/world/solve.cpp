@@ -259,7 +259,7 @@ void World::keep_contacts() {
       it->work += l[1] * v1 + l[2] * v2;
     }
   }
-  turn_frames(*this);
+  hand_over(*this), turn_frames(*this);
   std::sort(to.by_key.begin(), to.by_key.end(), [&](uint32_t i, uint32_t j) { return to.key[i] < to.key[j]; });
   if (sleepers) carry_sleepers(&touching, &sticking);
   for (uint32_t m = 0; m < store.n; ++m)

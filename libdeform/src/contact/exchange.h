@@ -1,0 +1,51 @@
+// Even pressure where the load is even: the areas of neighbouring contacts follow the shares in which the mesh carries the normal force.
+//
+// Detection gives a corner a third of the triangles around it. What a uniform pressure puts on a corner is another share: it depends on how the body's
+// model hands force to its points (springs, lumped masses), and on a pad of regular cells the pressures fn/A of neighbours differ by a factor of two,
+// however fine the mesh is. Rigid-plastic friction does not see it. A bristle does, since its force K A z is bounded by mu fn: a level that is
+// concave in the pressure, so corners with little force slip early, those with much lag behind, and the patch breaks loose below its limit.
+//
+// So each triangle of the patch, of area w, hands area between its corners in proportion to what they carry. With p_i = fn_i / A_i of the last sub-step,
+//
+//     A_i += sum over triangles T, their other corners j of  w (p_i - p_j) / (3 sum_T p) min(1, 2 min(p_i, p_j) / max(p_i, p_j))            (1)
+//
+// Without the last factor that is A_i = sum_T w p_i / sum_T p, or 1/p_i' = mean over the fan of 1/mean_T p: the pressure averaged over a ring of
+// triangles. What passes is antisymmetric, so that the patch keeps its area; evens out within a ring what alternates from corner to corner; and cancels
+// where the pressure changes linearly, so that a pressure that falls towards a rim stays one. The last factor makes it continuous where a
+// corner begins to carry.
+//
+// Area that moves takes its bristles along (moves()): A_j z_j' = (A_j) z_j + dA z_i keeps the patch's force and, z being a mean, stores no more than before.
+#pragma once
+#include <span>
+
+#include "contact/rows.h"
+#include "core/memory.h"
+#include "surfel/contact_set.h"
+
+namespace dfm {
+
+class AreaExchange {
+ public:
+  struct Move { uint32_t from, to; double area; };   // contacts, m2
+
+  explicit AreaExchange(const Memory &memory);
+  // sources: by body slot. law: [n], only contacts of one law hand area to each other, none where kNone. impulse: [n,3], normal part first, of the last
+  // sub-step. area: [n] m2, changed.
+  void share(std::span<const ContactPoint> contacts, std::span<const DofSource> sources, const uint32_t *law, const double *impulse, double *area);
+  void clear() { triangles_.clear(); }
+  // What passes between the contacts of the last share() once they carry `impulse` instead; in a fixed order. Allocates nothing.
+  std::span<const Move> moves(const double *impulse);
+
+ private:
+  struct Corner { uint32_t node, other, contact; };
+  struct Triangle { uint32_t contact[3]; double area[3]; };   // as each corner sees it; kNone, 0 where a corner does not take part
+  Array<Corner> corners_;
+  Array<Triangle> triangles_;
+  Array<double> area_, before_, now_;   // [n] as detection has it; fn/A: those that count, those to come
+  Array<Move> moves_;
+  void list_corners(std::span<const ContactPoint> contacts, const uint32_t *law, const double *area);
+  uint32_t contact_at(uint32_t node, uint32_t other) const;
+  void list_triangles(std::span<const ContactPoint> contacts, std::span<const DofSource> sources, const uint32_t *law);
+};
+
+}  // namespace dfm
