@@ -32,20 +32,22 @@ class AreaExchange {
   // sources: by body slot. law: [n], only contacts of one law hand area to each other, none where kNone. impulse: [n,3], normal part first, of the last
   // sub-step. area: [n] m2, changed.
   void share(std::span<const ContactPoint> contacts, std::span<const DofSource> sources, const uint32_t *law, const double *impulse, double *area);
-  void clear() { triangles_.clear(); }
+  void clear() { triangles_.clear(), last_.clear(); }
   // What passes between the contacts of the last share() once they carry `impulse` instead; in a fixed order. Allocates nothing.
   std::span<const Move> moves(const double *impulse);
 
  private:
-  struct Corner { uint32_t node, other, contact; };
-  struct Triangle { uint32_t contact[3]; double area[3]; };   // as each corner sees it; kNone, 0 where a corner does not take part
-  Array<Corner> corners_;
+  struct Corner { uint32_t node, other, contact, law; };
+  // A triangle of the surface in slot_a of its contacts; what each corner sees of it, and what each has taken from the next one. kNone: takes no part.
+  struct Triangle { uint32_t slot, number, contact[3]; double area[3], taken[3]; };
+  Array<Corner> corners_, last_;        // of this sub-step; of the one that triangles_ were listed for
   Array<Triangle> triangles_;
-  Array<double> area_, before_, now_;   // [n] as detection has it; fn/A: those that count, those to come
+  Array<double> area_, pressure_;       // [n] as detection has it; fn/A
   Array<Move> moves_;
-  void list_corners(std::span<const ContactPoint> contacts, const uint32_t *law, const double *area);
-  uint32_t contact_at(uint32_t node, uint32_t other) const;
-  void list_triangles(std::span<const ContactPoint> contacts, std::span<const DofSource> sources, const uint32_t *law);
+  bool list_corners(std::span<const ContactPoint> contacts, const uint32_t *law, const double *area);
+  const Corner *find(uint32_t node, uint32_t other) const;
+  void list_triangles(std::span<const ContactPoint> contacts, std::span<const DofSource> sources);
+  double taken(const Triangle &t, int corner) const;
 };
 
 }  // namespace dfm

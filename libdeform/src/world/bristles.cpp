@@ -84,8 +84,7 @@ Turn turn_of(const World &w, const Obstacle &o, Vec3 n) {
 
 void share_areas(World &w) {
   const auto counts = [](const LawInstance *law) { return (law->ops->needs & DFM_NEED_AREA) && !(law->ops->flags & DFM_FRIC_SET_VALUED); };
-  w.exchange.clear();
-  if (std::none_of(w.law_list.begin(), w.law_list.end(), counts)) return;
+  if (std::none_of(w.law_list.begin(), w.law_list.end(), counts)) return w.exchange.clear();
   w.areas.share(w.contacts, w.rows.impulse.data(), w.state.area.data());
   w.sharing.resize(w.rows.n);
   for (uint32_t i = 0; i < w.rows.n; ++i) w.sharing[i] = counts(w.law_list[w.state.law[i]]) ? w.state.law[i] : kNone;
@@ -102,14 +101,14 @@ void hand_over(World &w) {
     if (!to.touching[m.to]) continue;
     const LawInstance &law = *w.law_list[to.law[m.to]];
     const Vec3 n = load3(&to.normal[3 * size_t{m.from}]), k = load3(&to.normal[3 * size_t{m.to}]);
+    const double kept = 1 - area / sum, moved = dot(n, k) > -0.5 ? area / sum : 0;   // turned by more, nothing is taken along (contact/store.h)
     const Vec3 t1 = load3(&to.tangent[3 * size_t{m.from}]), t2 = cross(n, t1), e1 = load3(&to.tangent[3 * size_t{m.to}]), e2 = cross(k, e1);
     double *const z = &to.bristle[size_t{to.nstate} * m.to];
     const double *const given = &to.bristle[size_t{to.nstate} * m.from];
     for (uint32_t s = 0; s + 1 < law.nstate; ++s) {
       if (!law.tangent[s]) continue;
-      const Vec3 flat = given[s] * t1 + given[s + 1] * t2, turned = flat - (dot(k, flat) / (1 + dot(n, k))) * (n + k);
-      z[s] = (to.area[m.to] - area) / sum * z[s] + area / sum * dot(e1, turned);
-      z[s + 1] = (to.area[m.to] - area) / sum * z[s + 1] + area / sum * dot(e2, turned);
+      const Vec3 flat = given[s] * t1 + given[s + 1] * t2, turned = flat - (dot(k, flat) / std::max(0.5, 1 + dot(n, k))) * (n + k);
+      z[s] = kept * z[s] + moved * dot(e1, turned), z[s + 1] = kept * z[s + 1] + moved * dot(e2, turned);
       ++s;
     }
   }

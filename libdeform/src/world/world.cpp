@@ -105,7 +105,7 @@ void World::prepare() {
   facts.bodies = nb, facts.obstacles = no;
   facts.gravity_keys = !gravity_keys.empty(), facts.sleep = def.sleep != 0, facts.rollback = def.method == DFM_METHOD_ROLLBACK;
 
-  body_views.clear(), obstacle_views.clear(), sources.clear();
+  body_views.clear(), obstacle_views.clear(), sources.clear(), exchange.clear();
   uint32_t node = 0, point = 0;
   for (uint32_t i = 0; i < nb; ++i) {
     Body &b = *bodies[i];
