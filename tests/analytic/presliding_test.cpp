@@ -1,7 +1,8 @@
 // The presliding loop of a soft sheet: heavy, on a floor that moves to and fro under it, on Dahl's bristles, against the closed form of one bristle that
 // carries the whole force. All of the sheet but its foot is held sideways and the
 // bristles are a thousandth as stiff as the lowest cells, so the loop is the contact's alone. Whatever the mesh, each contact must have bristles for
-// what it carries (contact/exchange.h), or corners with little force slip early and the loop is too thin: by 14 % with a third of the triangles each.
+// what it carries (contact/exchange.h), or corners with little force slip early and the loop is too thin: by 3.4 % of its peak
+// and 2.5 % of its work with a third of the triangles each (300 cells).
 #include "world.h"
 
 namespace {
@@ -59,11 +60,8 @@ Loop measured(uint32_t cells) {
 
 }  // namespace
 
-TEST(PreslidingLoop, ThinSheetOfSoFewCells_TakesTheWorkOfOneBristle) {
-  const Loop expected = closed_form();
-  for (const uint32_t cells : {80u, 300u}) {
-    const Loop loop = measured(cells);
-    EXPECT_NEAR(loop.work, expected.work, 0.02 * expected.work) << cells;
-    EXPECT_NEAR(loop.peak, expected.peak, 0.02 * expected.peak) << cells;
-  }
+TEST(PreslidingLoop, SheetOf300Cells_TakesTheWorkOfOneBristle) {
+  const Loop expected = closed_form(), loop = measured(300);
+  EXPECT_NEAR(loop.work, expected.work, 0.01 * expected.work);
+  EXPECT_NEAR(loop.peak, expected.peak, 0.02 * expected.peak);
 }

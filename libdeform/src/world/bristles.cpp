@@ -3,7 +3,7 @@
 //   normal turns    contact/store.cpp, transport(): by the smallest rotation that takes it along
 //   surfaces spin   here: about the normal, by half of what each of the two turns
 //   area changes    here: sigma0 A z is kept where A grows, z where A shrinks
-//   area moves      here: to a neighbour that the mesh puts more load on (contact/exchange.h), and its bristles with it
+//   bristles slide  here: areas follow the load (contact/exchange.h)
 //
 // A surface's turn about n within the sub-step is what its points near the contact did, x -> x': with r from their middle, in the plane of n,
 //     tan(angle) = sum n . (r x r') / sum r . r'
@@ -84,34 +84,41 @@ Turn turn_of(const World &w, const Obstacle &o, Vec3 n) {
 
 void share_areas(World &w) {
   const auto counts = [](const LawInstance *law) { return (law->ops->needs & DFM_NEED_AREA) && !(law->ops->flags & DFM_FRIC_SET_VALUED); };
-  if (std::none_of(w.law_list.begin(), w.law_list.end(), counts)) return w.exchange.clear();
+  if (std::none_of(w.law_list.begin(), w.law_list.end(), counts)) return w.exchange.clear(), w.share.clear();
   w.areas.share(w.contacts, w.rows.impulse.data(), w.state.area.data());
-  w.sharing.resize(w.rows.n);
-  for (uint32_t i = 0; i < w.rows.n; ++i) w.sharing[i] = counts(w.law_list[w.state.law[i]]) ? w.state.law[i] : kNone;
-  w.exchange.share(w.contacts, w.sources, w.sharing.data(), w.rows.impulse.data(), w.state.area.data());
+  const uint32_t n = w.rows.n;
+  w.sharing.resize(n), w.share.assign(n, 1.0), w.ways.resize(n);
+  for (uint32_t i = 0; i < n; ++i) w.sharing[i] = counts(w.law_list[w.state.law[i]]) ? w.state.law[i] : kNone;
+  w.exchange.list(w.contacts, w.sources, w.sharing.data(), w.state.area.data());
+  if (w.store.share.empty()) return;
+  for (uint32_t i = 0; i < n; ++i) {
+    const uint32_t m = w.match[i];
+    if (m != kNone && w.sharing[i] != kNone && w.store.law[m] == w.state.law[i]) w.share[i] = w.store.share[m], w.state.area[i] *= w.share[i];
+  }
 }
 
-// One move after the other: of a contact that gives and takes, what it took may go on. Each keeps sigma0 A z of the two together and, as a mean, stores less.
-void hand_over(World &w) {
+// Slid on: beyond what the bristles have taken up. The slip that a law was asked at is known to a hundredth (friction/local_solve.cpp); five count as none.
+void follow_load(World &w) {
   ContactStore &to = w.next_store;
-  for (const AreaExchange::Move &m : w.exchange.moves(w.rows.impulse.data())) {
-    const double area = std::min(m.area, to.area[m.from]), sum = to.area[m.to] + area;
-    if (!(area > 0)) continue;
-    to.area[m.from] -= area, to.area[m.to] = sum;
-    if (!to.touching[m.to]) continue;
-    const LawInstance &law = *w.law_list[to.law[m.to]];
-    const Vec3 n = load3(&to.normal[3 * size_t{m.from}]), k = load3(&to.normal[3 * size_t{m.to}]);
-    const double kept = 1 - area / sum, moved = dot(n, k) > -0.5 ? area / sum : 0;   // turned by more, nothing is taken along (contact/store.h)
-    const Vec3 t1 = load3(&to.tangent[3 * size_t{m.from}]), t2 = cross(n, t1), e1 = load3(&to.tangent[3 * size_t{m.to}]), e2 = cross(k, e1);
-    double *const z = &to.bristle[size_t{to.nstate} * m.to];
-    const double *const given = &to.bristle[size_t{to.nstate} * m.from];
-    for (uint32_t s = 0; s + 1 < law.nstate; ++s) {
-      if (!law.tangent[s]) continue;
-      const Vec3 flat = given[s] * t1 + given[s + 1] * t2, turned = flat - (dot(k, flat) / std::max(0.5, 1 + dot(n, k))) * (n + k);
-      z[s] = kept * z[s] + moved * dot(e1, turned), z[s + 1] = kept * z[s + 1] + moved * dot(e2, turned);
-      ++s;
+  const ContactState &s = w.state;
+  for (uint32_t i = 0; i < w.share.size(); ++i) {
+    w.ways[i] = {0, 0};
+    if (w.sharing[i] == kNone || !(w.rows.impulse[3 * size_t{i}] > 0)) continue;
+    const LawInstance &law = *w.law_list[s.law[i]];
+    const double x = w.h * s.vt[i], y = w.h * s.vt[s.stride + i], far = std::sqrt(x * x + y * y);
+    double pairs = 0;
+    for (uint32_t k = 0; k + 1 < law.nstate; ++k) {
+      if (!law.tangent[k]) continue;
+      const double *const z = &s.bristle[size_t{k} * s.stride + i], *const after = &s.bristle_out[size_t{k} * s.stride + i];
+      const double a = x - (after[0] - z[0]), b = y - (after[s.stride] - z[s.stride]);
+      w.ways[i].slid += std::max(0.0, std::sqrt(a * a + b * b) - 0.05 * far);
+      w.ways[i].out += std::sqrt(after[0] * after[0] + after[s.stride] * after[s.stride]);
+      ++pairs, ++k;
     }
+    if (pairs == 0) w.ways[i].slid = far;
   }
+  w.exchange.follow(w.rows.impulse.data(), w.ways.data(), w.share.data());
+  to.share.assign(w.share.begin(), w.share.end());
 }
 
 void fit_bristles(World &w) {
