@@ -9,7 +9,8 @@ namespace {
 
 using namespace test;
 
-constexpr double kEdge = 0.05, kHeight = 0.02, kMass = 1000 * kEdge * kEdge * kHeight, kLimit = 2, kMu = 0.5, kStiffness = 100, kAmplitude = 0.03, kFrequency = 1;
+constexpr double kEdge = 0.05, kHeight = 0.02, kMass = 1000 * kEdge * kEdge * kHeight, kLimit = 2, kMu = 0.5, kStiffness = 100, kAmplitude = 0.03;
+constexpr double kFrequency = 1;
 
 struct Loop { double work, peak; };
 

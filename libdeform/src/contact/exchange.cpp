@@ -49,7 +49,8 @@ void AreaExchange::list_triangles(std::span<const ContactPoint> contacts, std::s
     return std::tuple(contacts[l.contact].slot_a, l.other) < std::tuple(contacts[r.contact].slot_a, r.other);
   });
   for (size_t k = 0; k < corners_.size(); ++k) {
-    const bool another = k == 0 || corners_[k - 1].other != corners_[k].other || contacts[corners_[k - 1].contact].slot_a != contacts[corners_[k].contact].slot_a;
+    const bool another = k == 0 || corners_[k - 1].other != corners_[k].other ||
+                         contacts[corners_[k - 1].contact].slot_a != contacts[corners_[k].contact].slot_a;
     if (another) patches_.push_back({});
     corners_[k].patch = uint32_t(patches_.size() - 1);
   }

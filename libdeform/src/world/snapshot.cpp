@@ -221,7 +221,8 @@ void check(const Staged &t, const World &w) {
   const size_t n = c.n;
   good = good && c.key.size() == n && c.id_a.size() == n && c.id_b.size() == n && c.by_key.size() == n && c.normal.size() == 3 * n &&
          c.tangent.size() == 3 * n && c.impulse.size() == 3 * n && c.bristle.size() == n * c.nstate && c.law.size() == n && c.dwell.size() == n &&
-         c.area.size() == n && (c.share.empty() || c.share.size() == n) && c.path.size() == 2 * n && c.touching.size() == n && c.held.size() == n && c.began.size() == n;
+         c.area.size() == n && (c.share.empty() || c.share.size() == n) &&
+         c.path.size() == 2 * n && c.touching.size() == n && c.held.size() == n && c.began.size() == n;
   for (uint32_t i : c.by_key) good = good && i < n;
   for (uint32_t l : c.law) good = good && l < t.laws.size();
   uint32_t sleepers = 0;

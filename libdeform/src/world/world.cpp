@@ -32,7 +32,8 @@ World::World(dfm_context *c)
     : context(c), broad(c->memory), rows(c->memory), acceleration(c->memory), store(c->memory), next_store(c->memory), batches(c->memory), areas(c->memory),
       exchange(c->memory), rollback(c->memory), islands(c->memory) {
   const Memory &m = c->memory;
-  use_memory(m, driven, lent, contacts, tolerance.tangent, disturbance, best_impulse, tangents, match, sharing, share, ways, block_surfels, block_impulse, block_velocity);
+  use_memory(m, driven, lent, contacts, tolerance.tangent, disturbance, best_impulse, tangents, match, sharing, share, ways,
+             block_surfels, block_impulse, block_velocity);
   GuardMemory &known = guard.memory;
   use_memory(m, known.runs, known.old_runs, known.features, known.old_features, known.rest, known.old_rest, known.normal, known.old_normal);
   for (Report *r : {&report, &last_report}) use_memory(m, r->contacts, r->frame, r->impulse, r->slip, r->mode);
