@@ -1,12 +1,29 @@
 // Stick-slip of a soft pad against that of a point mass, as the pad stiffens: belt_study FOLDER writes belt_stick_slip.csv (a row per law and modulus) and
-// belt_trace.csv (spring force over time), which libdeform/doc/images/belt_stick_slip.py draws.
+// belt_trace.csv (spring force over time), which libdeform/doc/images/belt_stick_slip.py draws. belt_study --wav FILE [LAW] writes what it sounds like.
 #include <cstdio>
 
 #include "belt.h"
 #include "machine.h"
+#include "wav.h"
+
+namespace {
+
+// The pad's speed as sound, a hundred times as fast as it is: a slip of two seconds is a pulse of 20 ms, and 16 of them come in a second.
+int sound(const char *file, const std::string &law) {
+  constexpr double kSeconds = 300, kFaster = 100;
+  bool known = false;
+  for (const test::belt::Rigid &rigid : test::belt::kRigid) known |= law == rigid.law;
+  if (!known) return std::fprintf(stderr, "belt_study: '%s' does not stick and slip here; give coulomb, lugre or elastoplastic\n", law.c_str()), 2;
+  const test::belt::Result r = test::belt::run(law, 1e5, 60, kSeconds, 8);
+  if (!test::write_wav(file, r.speed, kFaster / test::belt::kStep)) return std::fprintf(stderr, "belt_study: cannot write %s\n", file), 2;
+  return std::printf("%s: %s, period %.4f s, heard %g times as fast: %.2f Hz\n", file, law.c_str(), r.period, kFaster, kFaster / r.period), 0;
+}
+
+}  // namespace
 
 int main(int argc, char **argv) {
-  if (argc != 2) return std::fprintf(stderr, "usage: belt_study FOLDER\n"), 2;
+  if ((argc == 3 || argc == 4) && std::string(argv[1]) == "--wav") return sound(argv[2], argc == 4 ? argv[3] : "lugre");
+  if (argc != 2) return std::fprintf(stderr, "usage: belt_study FOLDER | belt_study --wav FILE [LAW]\n"), 2;
   const std::string folder = argv[1];
   std::FILE *const table = std::fopen((folder + "/belt_stick_slip.csv").c_str(), "w"), *const trace = std::fopen((folder + "/belt_trace.csv").c_str(), "w");
   if (!table || !trace) return std::fprintf(stderr, "belt_study: cannot write to %s; give a folder that exists\n", argv[1]), 2;

@@ -15,11 +15,13 @@ constexpr Rigid kRigid[] = {{"coulomb", 6.512322313761814, 1.5278225050875456, 0
                             {"elastoplastic", 6.375860727916319, 1.5097574406065437, 0.7401094644137878}};
 
 struct Sample { double t, force; };
+inline constexpr double kStep = 1e-3;
 struct Result {
   double period = 0, force_max = 0, force_min = 0;
   int cycles = 0;
   uint64_t substeps = 0;
   std::vector<Sample> trace;   // every 5 ms
+  std::vector<double> speed;   // m/s, of the pad's centre of mass, every kStep
 };
 
 inline void set_law(dfm_world w, const std::string &law) {
@@ -77,10 +79,11 @@ inline Result run(const std::string &law, double young, uint32_t cells, double s
   ok(dfm_body_add_spring(pad, &d, nullptr));
 
   Result r;
-  constexpr double kStep = 1e-3;
   for (int i = 1; i * kStep <= seconds; ++i) {
     ok(dfm_world_step(world, kStep, nullptr));
-    if (i % 5 == 0) r.trace.push_back({i * kStep, kStiffness * (measure(pad).com[0] - rest.com[0])});
+    const dfm_body_measure now = measure(pad);
+    r.speed.push_back(now.velocity[0]);
+    if (i % 5 == 0) r.trace.push_back({i * kStep, kStiffness * (now.com[0] - rest.com[0])});
   }
   r.substeps = stats(world).substeps;
   judge(r, from);

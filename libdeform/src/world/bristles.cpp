@@ -3,6 +3,7 @@
 //   normal turns    contact/store.cpp, transport(): by the smallest rotation that takes it along
 //   surfaces spin   here: about the normal, by half of what each of the two turns
 //   area changes    here: sigma0 A z is kept where A grows, z where A shrinks
+//   bristles slide  here: areas follow the load (contact/exchange.h)
 //
 // A surface's turn about n within the sub-step is what its points near the contact did, x -> x': with r from their middle, in the plane of n,
 //     tan(angle) = sum n . (r x r') / sum r . r'
@@ -83,7 +84,41 @@ Turn turn_of(const World &w, const Obstacle &o, Vec3 n) {
 
 void share_areas(World &w) {
   const auto counts = [](const LawInstance *law) { return (law->ops->needs & DFM_NEED_AREA) && !(law->ops->flags & DFM_FRIC_SET_VALUED); };
-  if (std::any_of(w.law_list.begin(), w.law_list.end(), counts)) w.areas.share(w.contacts, w.rows.impulse.data(), 1.1 * w.offset, w.state.area.data());
+  if (std::none_of(w.law_list.begin(), w.law_list.end(), counts)) return w.exchange.clear(), w.share.clear();
+  w.areas.share(w.contacts, w.rows.impulse.data(), 1.1 * w.offset, w.state.area.data());
+  const uint32_t n = w.rows.n;
+  w.sharing.resize(n), w.share.assign(n, 1.0), w.ways.resize(n);
+  for (uint32_t i = 0; i < n; ++i) w.sharing[i] = counts(w.law_list[w.state.law[i]]) ? w.state.law[i] : kNone;
+  w.exchange.list(w.contacts, w.sources, w.sharing.data(), w.state.area.data());
+  if (w.store.share.empty()) return;
+  for (uint32_t i = 0; i < n; ++i) {
+    const uint32_t m = w.match[i];
+    if (m != kNone && w.sharing[i] != kNone && w.store.law[m] == w.state.law[i]) w.share[i] = w.store.share[m], w.state.area[i] *= w.share[i];
+  }
+}
+
+// Slid on: beyond what the bristles have taken up. The slip that a law was asked at is known to a hundredth (friction/local_solve.cpp); five count as none.
+void follow_load(World &w) {
+  ContactStore &to = w.next_store;
+  const ContactState &s = w.state;
+  for (uint32_t i = 0; i < w.share.size(); ++i) {
+    w.ways[i] = {0, 0};
+    if (w.sharing[i] == kNone || !(w.rows.impulse[3 * size_t{i}] > 0)) continue;
+    const LawInstance &law = *w.law_list[s.law[i]];
+    const double x = w.h * s.vt[i], y = w.h * s.vt[s.stride + i], far = std::sqrt(x * x + y * y);
+    double pairs = 0;
+    for (uint32_t k = 0; k + 1 < law.nstate; ++k) {
+      if (!law.tangent[k]) continue;
+      const double *const z = &s.bristle[size_t{k} * s.stride + i], *const after = &s.bristle_out[size_t{k} * s.stride + i];
+      const double a = x - (after[0] - z[0]), b = y - (after[s.stride] - z[s.stride]);
+      w.ways[i].slid += std::max(0.0, std::sqrt(a * a + b * b) - 0.05 * far);
+      w.ways[i].out += std::sqrt(after[0] * after[0] + after[s.stride] * after[s.stride]);
+      ++pairs, ++k;
+    }
+    if (pairs == 0) w.ways[i].slid = far;
+  }
+  w.exchange.follow(w.rows.impulse.data(), w.ways.data(), w.share.data());
+  to.share.assign(w.share.begin(), w.share.end());
 }
 
 void fit_bristles(World &w) {

@@ -9,6 +9,8 @@ struct World;
 void share_areas(World &w);
 // Where a contact's area has changed: its bristles keep their force where it has grown, their deflection where it has shrunk; what they store never rises.
 void fit_bristles(World &w);
+// After the commit: as bristles slide, contacts' shares of the area follow the load (next_store.share).
+void follow_load(World &w);
 // After the commit: frames of laws with tangent state (next_store.tangent) turn with the mean spin of the two surfaces about the normal.
 void turn_frames(World &w);
 

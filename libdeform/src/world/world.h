@@ -7,6 +7,7 @@
 
 #include "broad/broad_phase.h"
 #include "contact/areas.h"
+#include "contact/exchange.h"
 #include "contact/solver.h"
 #include "contact/store.h"
 #include "deform/deform.h"
@@ -189,6 +190,10 @@ struct World {
   ContactStore store, next_store;
   LawBatches batches;
   AreaShares areas;
+  AreaExchange exchange;
+  Array<uint32_t> sharing;                             // law of contacts whose areas follow the load, else kNone
+  Array<double> share;                                 // [contacts] of their areas; empty where no law counts by area
+  Array<AreaExchange::Way> ways;
   Array<double> tangents;
   Array<uint32_t> match;
   Array<uint32_t> block_surfels;                       // scratch of self-stepping bodies

@@ -1,0 +1,59 @@
+// Even pressure where the load is even: the areas of neighbouring contacts follow the shares in which the mesh carries the normal force.
+//
+// Detection gives a corner a third of the triangles around it. What a uniform pressure puts on a corner is another share: it depends on how the body's
+// model hands force to its points (springs, lumped masses), and on a pad of regular cells the pressures fn/A of neighbours differ by a factor of two,
+// however fine the mesh is. Rigid-plastic friction does not see it. A bristle does, since its force K A z is bounded by mu fn: a level that is
+// concave in the pressure, so corners with little force slip early, those with much lag behind, and the patch breaks loose below its limit.
+//
+// So each triangle of the patch, of area w, hands area between its corners in proportion to what they carry. With p_i = fn_i / A_i,
+//
+//     A_i* = A_i + sum over triangles T, their other corners j of  w (p_i - p_j) / (3 sum_T p) min(1, 2 min(p_i, p_j) / max(p_i, p_j))         (1)
+//
+// Without the last factor that is A_i* = sum_T w p_i / sum_T p, or 1/p_i* = mean over the fan of 1/mean_T p: the pressure averaged over a ring of
+// triangles. What passes is antisymmetric, so that the patch keeps its area; evens out within a ring what alternates from corner to corner; and cancels
+// where the pressure changes linearly, so that a pressure that falls towards a rim stays one. The last factor makes it continuous where a
+// corner begins to carry.
+//
+// Bristles stand on the surface. Area that moved with every change of load would mix deflections that differ, and a patch that is rocked would forget
+// where it stood. So a contact keeps its share A_i*/A_i while its patch sticks, and it follows (1) as fast as the bristles are renewed: over a sub-step by
+//
+//     r = min(1, sum fn |h v - dz| / sum fn |z|)     over the patch: how far points slid on, dz being what their bristles took up,               (2)
+//
+// one number for the patch, so that its area stays. Sliding steadily that is the way over the deflection; without bristles it is 1.
+#pragma once
+#include <span>
+
+#include "contact/rows.h"
+#include "core/memory.h"
+#include "surfel/contact_set.h"
+
+namespace dfm {
+
+class AreaExchange {
+ public:
+  explicit AreaExchange(const Memory &memory);
+  // Which contacts' areas depend on each other. sources: by body slot. law: [n], contacts of one law hand area to each other, none where kNone.
+  // area: [n] m2, as detection and AreaShares (contact/areas.h) have it.
+  void list(std::span<const ContactPoint> contacts, std::span<const DofSource> sources, const uint32_t *law, const double *area);
+  void clear() { triangles_.clear(), last_.clear(), corners_.clear(); }
+  // How far a contact has slid on and how far its bristles are out, m.
+  struct Way { double slid, out; };
+  // share: [n], A*/A, moves towards (1) and (2) for the contacts listed; impulse: [n,3], normal part first. Allocates nothing.
+  void follow(const double *impulse, const Way *ways, double *share);
+
+ private:
+  struct Corner { uint32_t node, other, contact, law, patch; };   // patch: contacts of one body with one other side
+  // A triangle of the surface in slot_a of its contacts, and what each corner sees of it. kNone: takes no part.
+  struct Triangle { uint32_t slot, number, contact[3]; double area[3]; };
+  struct Patch { double slid, out; };
+  Array<Corner> corners_, last_;        // those that take part, by node; all, as they were when the triangles were listed
+  Array<Corner> fresh_;
+  Array<Triangle> triangles_;
+  Array<Patch> patches_;
+  Array<double> area_, pressure_, target_;       // [n] as detection has it; fn/A; A*/A
+  const Corner *find(uint32_t node, uint32_t other) const;
+  void list_triangles(std::span<const ContactPoint> contacts, std::span<const DofSource> sources);
+  double taken(const Triangle &t, int corner) const;
+};
+
+}  // namespace dfm
