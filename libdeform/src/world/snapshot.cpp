@@ -179,7 +179,8 @@ void fields(Stream &s, W &w) {
   auto &c = w.store;
   s.value(c.n), s.value(c.nstate), s.value(c.h);
   s.array(c.key), s.array(c.id_a), s.array(c.id_b), s.array(c.by_key), s.array(c.normal), s.array(c.tangent), s.array(c.impulse), s.array(c.bristle);
-  s.array(c.law), s.array(c.dwell), s.array(c.area), s.array(c.share), s.array(c.path), s.array(c.touching), s.array(c.held), s.array(c.began), s.array(c.crossings);
+  s.array(c.law), s.array(c.dwell), s.array(c.area), s.array(c.share), s.array(c.path), s.array(c.touching), s.array(c.held), s.array(c.began);
+  s.array(c.crossings);
   s.array(w.work);
   if (w.sleepers == 0) return;   // contacts that sleep are reported from what the last sub-step left
   auto &r = w.report;
