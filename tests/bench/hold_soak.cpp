@@ -75,8 +75,8 @@ int main(int argc, char **argv) {
           const bool holds = r.drift > 0 ? r.creep < 1.25 * r.drift : r.creep < 1e-6;
           bad += !holds;
           std::fprintf(table, "%s,%.3g,%.3g,%.3g,%u,%llu,%llu,%g,%.2f,%s,%s\n", name.c_str(), r.creep, r.contact, r.drift, r.stuck,
-                       static_cast<unsigned long long>(r.substeps), static_cast<unsigned long long>(r.unconverged), r.simulated, r.seconds, bench::machine().c_str(),
-                       bench::compiler());
+                       static_cast<unsigned long long>(r.substeps), static_cast<unsigned long long>(r.unconverged), r.simulated, r.seconds,
+                       bench::machine().c_str(), bench::compiler());
           std::fflush(table);
           std::printf("%-48s creep %9.3g m/s  law's drift %9.3g  %s\n", name.c_str(), r.creep, r.drift, holds ? "" : "TOO MUCH");
         }
