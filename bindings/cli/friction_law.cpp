@@ -196,11 +196,21 @@ void RigLaw::reset(const FrictionCase &rig) {
   trial_ = state_;
 }
 
-void RigLaw::extrapolate(const std::vector<Column> &whole) {
+bool RigLaw::differs(const std::vector<Column> &other) const {
+  size_t at = 0;
+  for (uint32_t i = 0; i < ops().nslot; at += ops().slots[i].width, ++i)
+    for (size_t k = at; k < at + ops().slots[i].width; ++k) {
+      const double a = state_[k].lane[0], b = other[k].lane[0];
+      if (ops().slots[i].kind != DFM_SLOT_TANGENT && a != b && a == std::floor(a) && b == std::floor(b)) return true;
+    }
+  return false;
+}
+
+void RigLaw::extrapolate(const std::vector<Column> &whole, double share) {
   size_t at = 0;
   for (uint32_t i = 0; i < ops().nslot; at += ops().slots[i].width, ++i) {
     if (ops().slots[i].kind != DFM_SLOT_TANGENT) continue;
-    for (size_t k = at; k < at + ops().slots[i].width; ++k) state_[k].lane[0] = 2 * state_[k].lane[0] - whole[k].lane[0];
+    for (size_t k = at; k < at + ops().slots[i].width; ++k) state_[k].lane[0] += share * (state_[k].lane[0] - whole[k].lane[0]);
   }
 }
 
@@ -248,7 +258,7 @@ class StepSolver {
 
   StepResult solve(double v) {
     StepResult r = search(v);
-    r.falls = falls_;
+    r.falls = falls_ || !(law_.ops().flags & DFM_FRIC_JACOBIAN), r.limit = limit_;
     return r;
   }
 
@@ -274,7 +284,7 @@ class StepSolver {
   Point at(double u) {
     slip_.vx = u;
     const Resistance f = law_.eval(slip_, true);
-    f_ = f.fx;
+    f_ = f.fx, limit_ = f.limit;
     Point p = {u, m_h_ * u - drive_ + f.fx, 0, f.stopped};
     if (f.stopped) p.r = m_h_ * u;               // exactly: the force is the drive
     p.slope = (law_.ops().flags & DFM_FRIC_JACOBIAN) ? m_h_ + f.slope : 0;
@@ -342,7 +352,7 @@ class StepSolver {
 
   RigLaw &law_;
   Slip slip_;
-  double m_h_, drive_, f_ = 0;
+  double m_h_, drive_, f_ = 0, limit_ = 0;
   Point last_ = {NAN, 0, 0, false};
   bool falls_ = false;
 };

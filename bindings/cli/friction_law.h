@@ -40,7 +40,8 @@ class RigLaw {
   void commit() { state_ = trial_; }
   const std::vector<Column> &memory() const { return state_; }
   void recall(const std::vector<Column> &memory) { state_ = memory; }
-  void extrapolate(const std::vector<Column> &whole);   // 2 state - whole, of what is a vector in the tangent plane; the rest stays
+  bool differs(const std::vector<Column> &other) const;               // in a flag: whole numbers in a slot that is no vector in the tangent plane
+  void extrapolate(const std::vector<Column> &whole, double share);   // state + share (state - whole), of what is one
   void reset(const FrictionCase &rig);           // state at rest, or the case's initial z
   double state(uint32_t i) const { return i < state_.size() ? state_[i].lane[0] : 0.0; }
   double trial(uint32_t i) const { return i < trial_.size() ? trial_[i].lane[0] : 0.0; }
@@ -64,7 +65,8 @@ class RigLaw {
 // Solves  m_h u + f(u) = drive  for the speed u at the end of a step: m_h = m/h (plus what else is linear in u), drive = m v/h + the rest of the
 // applied force. Where a falling Stribeck curve leaves several solutions it is the first that is met from the old speed in the direction in which
 // the mass accelerates: the one that continues the motion as the step is made smaller.
-struct StepResult { double u, f; bool on_jump, falls = false; };   // falls: R was seen to, so there may be several solutions
+// falls: R was seen to, or could not be seen, so there may be several solutions; limit: N, what the law can carry there.
+struct StepResult { double u, f; bool on_jump, falls = false; double limit = 0; };
 StepResult implicit_step(RigLaw &law, Slip slip, double m_h, double drive, double v);
 
 }  // namespace cli

@@ -95,7 +95,7 @@ class Rig {
     if (!std::isfinite(x_)) throw Failure(kStopped, "the mass has left every finite place");
   }
 
-  // Implicit Euler. The spring pulls as at x + h (v' - (1 - s) v): s = 1 is x'; s = 1/2 is the leapfrog method with the stiffness k/(1 + k h^2/2m), since
+  // Implicit Euler. The spring pulls as at x + h (s v' - (1 - s) v): s = 1 is x'; s = 1/2 is the leapfrog method with the stiffness k/(1 + k h^2/2m), since
   // x' = x + h v'. That neither damps the slip phase, whose length sets the period, as a spring at x' would, nor bounds the step as one at x would.
   StepResult euler(double t, double t1, double s) {
     const double h = t1 - t, kh = case_.drive == Drive::spring ? h * in("k") : 0, m_h = case_.mass / h + s * kh;
@@ -107,7 +107,8 @@ class Rig {
 
   // Implicit Euler once over the whole step and once over its halves: 2 halves - whole is of second order and still damps what is stiff (Deuflhard 1985, SIAM
   // Review 27, p. 505; Hairer and Wanner, Solving ODEs II, IV.9). The first order alone would damp a mass that rings on its bristles by a share
-  // of h omega / 2. Where there may be several solutions, or a jump held the mass, both need not have taken the same one: the halves stand.
+  // of h omega / 2. Where there may be several solutions, or a jump held the mass, both need not have taken the same one: the halves stand. Force and
+  // bristles are taken as far as the law can carry them, and as the halves have them where those differ from the whole in a flag.
   void extrapolated(double t, double t1) {
     const double middle = 0.5 * (t + t1), x = x_, v = v_.vx;
     before_ = law_.memory();
@@ -122,8 +123,10 @@ class Rig {
     const bool jumps = whole.on_jump || first.on_jump || second.on_jump;
     out_.jumps += jumps;
     if (jumps || whole.falls || first.falls || second.falls) return;
-    law_.extrapolate(whole_);
-    x_ = 2 * x_ - whole_x, v_.vx = 2 * second.u - whole.u, fx_ = 2 * second.f - whole.f;
+    const double more = second.f - whole.f, room = std::copysign(second.limit, more) - second.f;
+    const double share = law_.differs(whole_) ? 0 : std::fabs(second.f + more) > second.limit ? std::clamp(room / more, 0.0, 1.0) : 1;
+    law_.extrapolate(whole_, share);
+    x_ = 2 * x_ - whole_x, v_.vx = 2 * second.u - whole.u, fx_ = second.f + share * more;
   }
 
   void lead(double t, double t1, double h, const Motion &mean) {

@@ -31,23 +31,28 @@ inline dfm_status check(const double *p, char *why, size_t cap) {
 
 constexpr int32_t kWarning = 2;  // DFM_LOG_WARNING of base.h, which plugins do not see
 
-// Nothing is prepared: this is where a law may speak.
-inline dfm_status prepare(const dfm_host *host, const double *p, void **data) {
-  *data = nullptr;
+// What constant micro-damping can push with at most, against the viscous part that must brake it; `excess` as the law's flow has it.
+inline void warn(const dfm_host *host, const double *p, double excess, const char *as) {
   char text[320] = "";
   const int form = static_cast<int>(p[kForm]);
-  const double sigma1 = p[kSigma1], excess = sigma1 * (p[kMuS] - p[kMuC]), present = p[kSigma2] * p[kMuC];
+  const double sigma1 = p[kSigma1], present = p[kSigma2] * p[kMuC];
   if (form == bristle::kConstant && excess > present)
     std::snprintf(text, sizeof text,
-                  "constant sigma1 can push instead of brake: sigma2 mu_C >= sigma1 (mu_S - mu_C) is violated, %g < %g (sigma1 %g, sigma2 %g, mu_C %g, "
+                  "constant sigma1 can push instead of brake: sigma2 mu_C >= sigma1 %s is violated, %g < %g (sigma1 %g, sigma2 %g, mu_C %g, "
                   "mu_S %g); \"sigma1_form\": \"passive\" is safe with any parameters",
-                  present, excess, sigma1, p[kSigma2], p[kMuC], p[kMuS]);
+                  as, present, excess, sigma1, p[kSigma2], p[kMuC], p[kMuS]);
   if (form == bristle::kFalling && sigma1 > 0)
     std::snprintf(text, sizeof text,
                   "falling sigma1 is passive only where v_d <= 4 mu_C p/(0.4289 sigma1), that is above a contact pressure p of %g Pa (sigma1 %g, v_d %g, "
                   "mu_C %g); \"sigma1_form\": \"passive\" is safe at any pressure",
                   0.4289 * sigma1 * p[kVd] / (4 * p[kMuC]), sigma1, p[kVd], p[kMuC]);
   if (*text && host && host->log) host->log(host->ctx, kWarning, 0, text);
+}
+
+// Nothing is prepared: this is where a law may speak.
+inline dfm_status prepare(const dfm_host *host, const double *p, void **data) {
+  *data = nullptr;
+  warn(host, p, p[kSigma1] * (p[kMuS] - p[kMuC]), "(mu_S - mu_C)");
   return DFM_OK;
 }
 

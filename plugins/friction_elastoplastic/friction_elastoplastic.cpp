@@ -71,7 +71,8 @@ DEFORM_PASS inline void trial(const bristle::Batch &p, const Block &b, double ka
     const double by_top = 1.0 / (top > 1e-200 ? top : 1e-200), beside = (n + along * s) * by_top, beyond = (n + 2.0 * along * s) / (top + along + 1e-200);
     // rho_t less h K0 w/g, and less h K0 (t.v)/g; where the slip unloads, P = 0
     t.tx[i] = tx, t.ty[i] = ty, t.by_r[i] = by_r, t.load[i] = load, t.top[i] = top;
-    t.mult[i] = multiplier == kCosine ? 0.5 * (b.w[i] + load) : forward;
+    const double both = 0.5 * (b.w[i] + load);   // rounds below 0 where slip and bristle are exactly opposed
+    t.mult[i] = multiplier == kCosine ? (both > 0 ? both : 0.0) : forward;
     t.p[i] = p.h * k * t.mult[i];
     t.rest[i] = multiplier == kCosine ? 0.5 * (beyond + beside) : load > 0 ? beside : top;
     const double limit = kappa * p.mu_c / (b.mu[i] > 1e-30 ? b.mu[i] : 1e-30);
@@ -152,7 +153,16 @@ struct Elastoplastic : bristle::Run<Elastoplastic> {
     return true;
   }
   static constexpr auto check = lugre::check;
-  static constexpr auto prepare = lugre::prepare;
+  // The flow is 1 + (rho - 1)^i beyond the cone, which a falling level leaves at rho = mu_S/mu_C: with i > 1 that is more than LuGre's rho above 2.
+  static dfm_status prepare(const dfm_host *host, const double *params, void **data) {
+    *data = nullptr;
+    const double beyond = params[lugre::kMuC] > 0 ? params[lugre::kMuS] / params[lugre::kMuC] - 1 : 0;
+    double power = beyond;
+    for (int k = 1; k < static_cast<int>(params[kI]); ++k) power *= beyond;
+    const bool steep = power > beyond;
+    lugre::warn(host, params, params[lugre::kSigma1] * params[lugre::kMuC] * (steep ? power : beyond), steep ? "mu_C (mu_S/mu_C - 1)^i" : "(mu_S - mu_C)");
+    return DFM_OK;
+  }
   static constexpr auto release = lugre::release;
 };
 

@@ -82,7 +82,7 @@ TEST_F(Elastoplastic, PassiveForm_CreatesNoWork) {
 // no single step gives more than the bristle loses, whatever levels and exponent. Damping that counts with the slip fails this between 2 and 4.
 TEST_F(Elastoplastic, AnyLevelsAndExponents_CreateNoWorkInAnyStep) {
   char why[400] = "";
-  for (double ratio : {1.0, 2.1, 2.5, 3.0, 5.0, 10.0})
+  for (double ratio : {1.0, 2.1, 3.0, 10.0, 30.0, 300.0})
     for (double i : {1.0, 2.0, 3.0, 8.0})
       for (double multiplier : {0.0, 1.0})
         for (double form : {0.0, 2.0}) {
@@ -99,7 +99,8 @@ TEST_F(Elastoplastic, AnyLevelsAndExponents_CreateNoWorkInAnyStep) {
             const double z = uniform(0, 1) * 1.5e-5 * ratio * in.fn;
             in.v[0] = w * std::cos(at), in.v[1] = w * std::sin(at);
             in.state[0] = z * std::cos(at + off), in.state[1] = z * std::sin(at + off);
-            const double before = 0.5 * 1e4 * z * z;
+            if (n % 4 == 3) in.state[0] = -(z / w) * in.v[0], in.state[1] = -(z / w) * in.v[1];   // opposed but for rounding, as in any reversal
+            const double before = 0.5 * 1e4 * (in.state[0] * in.state[0] + in.state[1] * in.state[1]);
             const Out o = rules::ask(l, in);
             const double work = (o.f[0] * in.v[0] + o.f[1] * in.v[1]) * in.h;
             ASSERT_GE(work + before - o.stored, -1e-12 * (std::fabs(work) + before))

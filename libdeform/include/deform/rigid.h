@@ -145,7 +145,7 @@ DFM_API dfm_status dfm_rigid_set_motor(dfm_rigid rigid, uint32_t joint, double v
  * @param position  rad since creation, within half a turn either way; m of `body`'s anchor from `with`'s
  * @param rate      rad/s; m/s of `body`'s anchor against the place of `with` that it is at
  * @param effort    mean of what the motor did to `body` in the last sub-step; to `with` it did the opposite. Hinge: N m, the moment about the axis through
- *                  the anchor (what the hinge itself holds with has none there). Slider: N along the axis. 0 with the motor off
+ *                  the anchor (what the hinge itself holds with has none there). Slider: N along the axis. 0 to rounding with the motor off
  * @return as dfm_rigid_set_motor. Threads: Any thread. Not during step. Since 0.2. */
 DFM_API dfm_status dfm_rigid_joint(dfm_rigid rigid, uint32_t joint, double *position, double *rate, double *effort);
 #ifdef __cplusplus

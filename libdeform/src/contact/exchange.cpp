@@ -27,8 +27,9 @@ void AreaExchange::list(std::span<const ContactPoint> contacts, std::span<const 
     for (int j = 0; j < 3; ++j) {
       if (t.contact[j] == kNone) continue;
       const ContactPoint &p = contacts[t.contact[j]];
-      // Between two meshes a contact may stand for less than its triangles, of which detection gives it half: of each of them for the same share.
-      const double part = p.obstacle || !(p.area > 0) ? 1 : std::min(1.0, area_[t.contact[j]] / (2 * p.area));
+      // A contact may stand for less than its triangles, of which detection gives it half between two meshes, and for none where the guard added it: of
+      // each of them for the same share.
+      const double part = p.area > 0 ? std::min(1.0, area_[t.contact[j]] / ((p.obstacle ? 1 : 2) * p.area)) : 0;
       t.area[j] = part * std::max(0.0, -0.5 * dot(load3(p.normal), twice));
     }
   }
@@ -43,7 +44,8 @@ const AreaExchange::Corner *AreaExchange::find(uint32_t node, uint32_t other) co
 
 // Triangles of which two corners or more take part, each once: by the first of them. A corner that touches the other side twice takes no part.
 void AreaExchange::list_triangles(std::span<const ContactPoint> contacts, std::span<const DofSource> sources) {
-  last_.assign(fresh_.begin(), fresh_.end()), corners_.assign(fresh_.begin(), fresh_.end()), triangles_.clear(), patches_.clear();
+  last_.clear();   // what is half listed when memory runs out is listed anew
+  corners_.assign(fresh_.begin(), fresh_.end()), triangles_.clear(), patches_.clear();
   // by body, for a body's nodes are a run of numbers, and other side: what one body and one other side share is one patch
   std::sort(corners_.begin(), corners_.end(), [&](const Corner &l, const Corner &r) {
     return std::tuple(contacts[l.contact].slot_a, l.other) < std::tuple(contacts[r.contact].slot_a, r.other);
@@ -76,6 +78,7 @@ void AreaExchange::list_triangles(std::span<const ContactPoint> contacts, std::s
       if (first == surfel && count > 1) triangles_.push_back(t);
     }
   }
+  last_.assign(fresh_.begin(), fresh_.end());
 }
 
 // What a corner takes from the next one of its triangle: a term of (1).
@@ -103,7 +106,8 @@ void AreaExchange::follow(const double *impulse, const Way *ways, double *share)
     }
   for (const Corner &c : corners_) {
     const Patch &p = patches_[c.patch];
-    share[c.contact] += (p.slid < p.out ? p.slid / p.out : 1) * (target_[c.contact] - share[c.contact]);
+    const double renewed = p.slid < p.out ? p.slid / p.out : p.slid > 0 ? 1 : 0;
+    share[c.contact] += renewed * (target_[c.contact] - share[c.contact]);
   }
 }
 

@@ -24,7 +24,7 @@ struct ContactStore {
   Array<double> path;                 // [n,2] m, net slip since hold_begin, in the frame
   Array<uint8_t> touching, held;      // held: touched and stuck in every sub-step since hold_begin
   Array<uint8_t> began;               // touched for the first time in the last step
-  Array<Crossing> crossings;          // edges that carried load over each other, ascending
+  Array<Crossing> crossings;          // edges that touch each other, ascending
 
   explicit ContactStore(const Memory &memory);
   uint32_t find(uint64_t key) const;  // index, or kNone

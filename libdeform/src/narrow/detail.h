@@ -36,7 +36,7 @@ struct Pair {
   Vec3 va(uint32_t s) const { return load3(&a.surface->v[4 * size_t{s}]); }
   Vec3 xb(uint32_t s) const { return load3(&b->surface->x[4 * size_t{s}]); }
   Vec3 vb(uint32_t s) const { return load3(&b->surface->v[4 * size_t{s}]); }
-  // Did edge a carry load in the last sub-step, over any edge of b or over this one?
+  // Did edge a touch any edge of b, or this one, at the end of the last sub-step?
   bool bears(uint32_t edge_a) const {
     const auto at = std::lower_bound(crossings.begin(), crossings.end(), edge_a, [](const Crossing &c, uint32_t edge) { return c.edge_a < edge; });
     return at != crossings.end() && at->edge_a == edge_a;

@@ -32,7 +32,7 @@ struct ContactPoint {
   double velocity[3];    // m/s of the obstacle where a's closest point is, belt included; 0 for bodies
 };
 
-// Two edges that carried load over each other in the last sub-step; b: of a body or of a mesh that has no dofs.
+// Two edges that touched each other at the end of the last sub-step; b: of a body or of a mesh that has no dofs.
 struct Crossing {
   uint64_t id_a, id_b;
   uint32_t edge_a, edge_b;

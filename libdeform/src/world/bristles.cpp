@@ -84,7 +84,8 @@ Turn turn_of(const World &w, const Obstacle &o, Vec3 n) {
 
 void share_areas(World &w) {
   const auto counts = [](const LawInstance *law) { return (law->ops->needs & DFM_NEED_AREA) && !(law->ops->flags & DFM_FRIC_SET_VALUED); };
-  if (std::none_of(w.law_list.begin(), w.law_list.end(), counts)) return w.exchange.clear(), w.share.clear();
+  w.shares = std::any_of(w.law_list.begin(), w.law_list.end(), counts);
+  if (!w.shares) return w.exchange.clear(), w.share.clear();
   w.areas.share(w.contacts, w.rows.impulse.data(), 1.1 * w.offset, w.state.area.data());
   const uint32_t n = w.rows.n;
   w.sharing.resize(n), w.share.assign(n, 1.0), w.ways.resize(n);

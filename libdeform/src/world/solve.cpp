@@ -87,7 +87,7 @@ void sweep_until_good(World &w, Acceleration &acceleration, const Tolerance &tol
     ++w.sweeps;
     const Residual left = inner_residual(w.rows, w.state, w.h, tolerance);
     if (good(left, 0.5, w.sweeps)) return;
-    if (left.share < best) best = left.share, w.best_impulse.assign(w.rows.impulse.begin(), w.rows.impulse.end());
+    if (left.due < best) best = left.due, w.best_impulse.assign(w.rows.impulse.begin(), w.rows.impulse.end());
     if (!may_sweep(w, left)) break;
     acceleration.follow(w.rows);
   }

@@ -192,7 +192,8 @@ struct World {
   AreaShares areas;
   AreaExchange exchange;
   Array<uint32_t> sharing;                             // law of contacts whose areas follow the load, else kNone
-  Array<double> share;                                 // [contacts] of their areas; empty where no law counts by area
+  bool shares = false;                                 // does any law count by area?
+  Array<double> share;                                 // [contacts] of their areas, if so
   Array<AreaExchange::Way> ways;
   Array<double> tangents;
   Array<uint32_t> match;
