@@ -9,6 +9,7 @@
 #include <cstdlib>
 #include <cstring>
 
+#define DFM_ELEMENTARY_ALWAYS_INLINE   // a law's passes are compiled for several widths
 #include "deform/plugin.hpp"
 
 namespace lanes {

@@ -12,8 +12,9 @@
 extern "C" {
 #endif
 
-/* Part of the caller always: one that is compiled for a wider instruction set would else call code that is not. */
-#if defined(__GNUC__)
+/* A function that is compiled for a wider instruction set than the rest of its file must not call code that is not: such a file defines
+ * DFM_ELEMENTARY_ALWAYS_INLINE before it includes this header, and then passes none of these functions on by its address. */
+#if defined(DFM_ELEMENTARY_ALWAYS_INLINE) && defined(__GNUC__)
 #define DFM_ELEMENTARY_ static inline __attribute__((always_inline))
 #else
 #define DFM_ELEMENTARY_ static inline
