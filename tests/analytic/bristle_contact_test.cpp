@@ -185,3 +185,42 @@ TEST(BristleContact, TwoPadsOfTwoRefinements_RestOnTheSameArea) {
   }
   EXPECT_NEAR(rests_on[0], rests_on[1], 0.05 * rests_on[1]);
 }
+
+// A block slides, stops and sleeps; the shares of its patch that sliding has made are there when it wakes, also where all that was awake meanwhile was in
+// the air, with no contact at all.
+TEST(BristleContact, SharesOfASleeper_AreKeptWhileAnotherBodyFalls) {
+  Context context;
+  const dfm_world world = make_world(context, {0, 0, -9.81});
+  add_plane(world, "floor");
+  BodyOptions o;
+  o.name = "block", o.young = 2e5, o.damping_stiffness = 1e-3, o.damping_mass = 24, o.position = {-0.02, -0.02, 2e-5}, o.velocity = {0.4, 0, 0};
+  const dfm_body block = make_body(context, world, "beam", {0.04, 0.04, 0.02}, 300, o);
+  o.name = "other", o.damping_mass = 0, o.position = {1, 1, 100}, o.velocity = {};
+  make_body(context, world, "beam", {0.04, 0.04, 0.02}, 20, o);
+  set_bristles(context, world, 3e5, 0.3);
+  ok(dfm_world_set_sleep(world, true));
+  const auto areas = [&] {
+    std::vector<double> a;
+    for (const dfm_contact &c : contacts(world)) a.push_back(c.area);
+    return a;
+  };
+  bool asleep = false;
+  std::vector<double> before;
+  for (int k = 0; k < 2000 && !asleep; ++k) {
+    before = areas();
+    run(world, 1e-3, 1e-3);
+    ok(dfm_body_is_asleep(block, &asleep));
+  }
+  ASSERT_TRUE(asleep);
+  run(world, 5e-3, 1e-3);
+  ok(dfm_body_wake(block));
+  run(world, 1e-3, 1e-3);
+  const std::vector<double> after = areas();
+  ASSERT_EQ(after.size(), before.size());
+  double uneven = 0;
+  for (size_t i = 0; i < after.size(); ++i) {
+    EXPECT_NEAR(after[i], before[i], 0.01 * before[i]);
+    uneven = std::max(uneven, before[i] / before[0]);
+  }
+  EXPECT_GT(uneven, 1.5);
+}

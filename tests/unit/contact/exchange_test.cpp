@@ -121,3 +121,15 @@ TEST(AreaExchange, TwoLaws_KeepWhatTheyHave) {
   }
   EXPECT_NEAR(with, before, 1e-12);
 }
+
+// On an obstacle's vertices, which take a part of a corner's area, the corner stands for less than its triangles: it hands on no more than it has.
+TEST(AreaExchange, CornerOfWhichOthersHaveTaken_KeepsSome) {
+  Sheet sheet(true);
+  const uint32_t middle = kCount / 2;
+  sheet.area[middle] *= 0.2;
+  for (int k = 0; k < 50; ++k) sheet.follow([&](uint32_t s) { return s == middle ? 0.01 : 1.0; });
+  for (uint32_t s = 0; s < kCount; ++s) EXPECT_GT(sheet.share[s], 0) << s;
+  sheet.contacts[middle].area = 0;   // added by the guard: detection gave it none
+  for (int k = 0; k < 50; ++k) sheet.follow([&](uint32_t s) { return s == middle ? 0.01 : 1.0; });
+  EXPECT_EQ(sheet.share[middle], 1);
+}
