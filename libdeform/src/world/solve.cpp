@@ -75,7 +75,7 @@ bool may_sweep(const World &w, const Residual &residual) {
 }
 
 // What goes beyond what must be reached is polish, and this many sweeps of a sub-step are enough for it: the next one goes on from there.
-constexpr uint32_t kPolish = 10;
+constexpr uint32_t kPolish = 20;
 bool good(const Residual &left, double share, uint32_t sweeps) { return left.share <= share || (left.due <= share && sweeps >= kPolish); }
 
 // Sweeps on the laws as they were last answered. At the cap the best state seen is taken, not the last one.
