@@ -44,7 +44,7 @@ DFM_API const char *dfm_status_name(dfm_status s);
 DFM_API const char *dfm_last_error(void);
 
 /** For what is built on the library (bindings, rigid hosts): makes a sentence the last error of this thread. @return status
- * Threads: Any thread. Since 0.2. */
+ * Threads: Any thread. Since 0.1. */
 DFM_API dfm_status dfm_fail(dfm_status status, const char *sentence);
 
 enum { DFM_LOG_DEBUG = 0, DFM_LOG_INFO = 1, DFM_LOG_WARNING = 2, DFM_LOG_ERROR = 3 };

@@ -21,7 +21,7 @@ typedef struct dfm_surface_def {
 
 /** Groups of a body's surface triangles, for friction by "body:GROUP". With `triangles`: any of the surface's triangles by their points (the
  * body's, or those of a surface of its own), in any order and turn; those inside the body are passed over, one that is named twice keeps its first
- * group. Without: one entry for every triangle in the order of dfm_surface_triangles. Since 0.2. */
+ * group. Without: one entry for every triangle in the order of dfm_surface_triangles. Since 0.1. */
 typedef struct dfm_surface_groups {
   uint32_t size, ngroup;
   const char *const *names;         /* [ngroup] */
@@ -107,11 +107,11 @@ typedef struct dfm_spring_def {
   double stiffness, damping;   /* N/m, N s/m; >= 0 */
 } dfm_spring_def;
 /** Adds a spring. @param spring out, number to name it by; may be NULL. @return DFM_E_ARG for points that do not exist, weights without a sum, values
- * that are negative or not finite; DFM_E_UNSUPPORTED where the model steps itself and has no step bound. Threads: Not during step. Since 0.2. */
+ * that are negative or not finite; DFM_E_UNSUPPORTED where the model steps itself and has no step bound. Threads: Not during step. Since 0.1. */
 DFM_API dfm_status dfm_body_add_spring(dfm_body body, const dfm_spring_def *def, uint32_t *spring);
-/** Moves the spring's end to a place; its keys, if it had any, are gone. Threads: Not during step. Since 0.2. */
+/** Moves the spring's end to a place; its keys, if it had any, are gone. Threads: Not during step. Since 0.1. */
 DFM_API dfm_status dfm_body_set_spring_target(dfm_body body, uint32_t spring, const double to[3]);
-/** The force with which it pulls at the body now, N. @param force out [3]. Threads: Any thread. Not during step. Since 0.2. */
+/** The force with which it pulls at the body now, N. @param force out [3]. Threads: Any thread. Not during step. Since 0.1. */
 DFM_API dfm_status dfm_body_get_spring_force(dfm_body body, uint32_t spring, double force[3]);
 DFM_API dfm_status dfm_body_remove_spring(dfm_body body, uint32_t spring);
 /** Impulse (N s) at a point of space, spread over the nearest surface triangle by barycentric weights. Threads: Not during step. Since 0.1. */
@@ -122,9 +122,9 @@ DFM_API dfm_status dfm_body_apply_impulse(dfm_body body, const double point[3], 
 DFM_API dfm_status dfm_body_set_params(dfm_body body, const dfm_params *params);
 
 /** Wakes the body and those it touches, directly or through others; awake, it starts to count its calm anew. Whatever changes a body, or
- * reaches it, wakes it by itself. Threads: Not during step. Since 0.2. */
+ * reaches it, wakes it by itself. Threads: Not during step. Since 0.1. */
 DFM_API dfm_status dfm_body_wake(dfm_body body);
-/** Does the body sleep (dfm_world_def.sleep)? @param asleep out. Threads: Any thread. Not during step. Since 0.2. */
+/** Does the body sleep (dfm_world_def.sleep)? @param asleep out. Threads: Any thread. Not during step. Since 0.1. */
 DFM_API dfm_status dfm_body_is_asleep(dfm_body body, bool *asleep);
 
 /** Sums over the body, in SI units. angular: about the centre of mass. contact_impulse: total contact impulse on the body since it was

@@ -50,7 +50,7 @@ DFM_API dfm_status dfm_world_pairs(dfm_world world, uint32_t capacity, dfm_pair_
  * @param point   m, world
  * @param force   out, N; zero where the two do not touch. May be NULL
  * @param moment  out, N m, about point. May be NULL
- * @return DFM_OK; DFM_E_ARG; DFM_E_HANDLE a or b is none of this world. Threads: Any thread. Not during step. Since 0.2. */
+ * @return DFM_OK; DFM_E_ARG; DFM_E_HANDLE a or b is none of this world. Threads: Any thread. Not during step. Since 0.1. */
 DFM_API dfm_status dfm_world_pair_wrench(dfm_world world, uint64_t a, uint64_t b, const double point[3], double force[3], double moment[3]);
 
 typedef struct dfm_contact_event { uint32_t size, kind; uint64_t a, b, key; double t; } dfm_contact_event;

@@ -39,7 +39,7 @@ DFM_API dfm_status dfm_tetmesh_data(dfm_tetmesh mesh, const double **points, con
  * Each out may be NULL; valid while the mesh lives. Threads: Any thread. Since 0.1. */
 DFM_API dfm_status dfm_tetmesh_groups(dfm_tetmesh mesh, const char *const **names, const uint32_t **cell_group);
 /** Triangles of the file that belong to a group, [n,3] points, and the group of each, [n]: a body takes them as dfm_body_def.groups. They may
- * lie inside. Each out may be NULL; borrowed. Threads: Any thread. Since 0.2. */
+ * lie inside. Each out may be NULL; borrowed. Threads: Any thread. Since 0.1. */
 DFM_API dfm_status dfm_tetmesh_triangles(dfm_tetmesh mesh, const uint32_t **triangles, const uint32_t **group, uint32_t *n);
 /** Points of the elements of a group, ascending: a named surface may be held or loaded by them.
  * @param dimension  out, of the group's elements: 0 points, 1 lines, 2 triangles, 3 cells
@@ -52,32 +52,32 @@ DFM_API dfm_status dfm_tetmesh_group_points(dfm_tetmesh mesh, uint32_t group, ui
  * @return DFM_OK; DFM_E_IO; DFM_E_UNSUPPORTED another ending. Threads: Any thread. Since 0.1. */
 DFM_API dfm_status dfm_tetmesh_write(dfm_tetmesh mesh, const char *path);
 /** Place of each cell among the file's tetrahedra, [ntet], from 0; NULL where reading dropped none (they stand as in the file). Borrowed.
- * Threads: Any thread. Since 0.2. */
+ * Threads: Any thread. Since 0.1. */
 DFM_API dfm_status dfm_tetmesh_file_cells(dfm_tetmesh mesh, const uint32_t **file_cell);
 /** What a mesh file holds. Decides whether a body takes its cells from the file or is filled from its surface. */
 enum { DFM_MESH_TETS = 1, DFM_MESH_SURFACE = 2 };
 /** Looks into a file of any format that dfm_tetmesh_read or dfm_trimesh_read take. @param kind out: DFM_MESH_TETS if it has any tetrahedron,
- * else DFM_MESH_SURFACE. @return DFM_OK; as dfm_tetmesh_read. Threads: Any thread. Since 0.2. */
+ * else DFM_MESH_SURFACE. @return DFM_OK; as dfm_tetmesh_read. Threads: Any thread. Since 0.1. */
 DFM_API dfm_status dfm_mesh_file_kind(dfm_context *context, const char *path, uint32_t *kind);
 /** Reads a file of either kind once, where dfm_mesh_file_kind and dfm_tetmesh_read or dfm_trimesh_read would read it twice.
  * @param cells    out: what dfm_tetmesh_read gives, where the file has any tetrahedron; else 0
  * @param surface  out: what dfm_trimesh_read gives, where it has none; else 0
- * @return DFM_OK; as dfm_tetmesh_read (both untouched). Threads: Any thread. Since 0.2. */
+ * @return DFM_OK; as dfm_tetmesh_read (both untouched). Threads: Any thread. Since 0.1. */
 DFM_API dfm_status dfm_mesh_read(dfm_context *context, const char *path, dfm_tetmesh *cells, dfm_trimesh *surface);
 
 /** Reads a triangle surface: OBJ, PLY, STL, OFF, and the triangles of MSH, VTK, VTU and Medit files (where such a file has tetrahedra: their
  * boundary). Polygons are cut into triangles. Points at the same place are merged, triangles without area and doubles dropped, triangles
  * turned so that neighbours agree and closed pieces face outward; holes are counted, not closed. Each repair is one sentence of warnings.
- * @return as dfm_tetmesh_read. Threads: Any thread. Since 0.2. */
+ * @return as dfm_tetmesh_read. Threads: Any thread. Since 0.1. */
 DFM_API dfm_status dfm_trimesh_read(dfm_context *context, const char *path, dfm_trimesh *out);
-/** The same repair for triangles of the host: points [npoint,3] m, triangles [ntriangle,3]. Threads: Any thread. Since 0.2. */
+/** The same repair for triangles of the host: points [npoint,3] m, triangles [ntriangle,3]. Threads: Any thread. Since 0.1. */
 DFM_API dfm_status dfm_trimesh_create(dfm_context *context, uint32_t npoint, const double *points, uint32_t ntriangle,
                                       const uint32_t *triangles, dfm_trimesh *out);
 /** Generators of closed surfaces, SI units, about `triangles` near-equilateral triangles: "cylinder", "beam", "ball" and "tube" as for
  * dfm_tetmesh_make; "torus": size = {ring radius, tube radius, 0}, about the origin, axis z.
- * @return DFM_OK; DFM_E_ARG; DFM_E_NOMEM. Threads: Any thread. Since 0.2. */
+ * @return DFM_OK; DFM_E_ARG; DFM_E_NOMEM. Threads: Any thread. Since 0.1. */
 DFM_API dfm_status dfm_trimesh_make(dfm_context *context, const char *kind, const double size[3], uint32_t triangles, dfm_trimesh *out);
-/** @return DFM_OK; DFM_E_HANDLE. Threads: Any thread, with nobody using the mesh or its arrays. Since 0.2. */
+/** @return DFM_OK; DFM_E_HANDLE. Threads: Any thread, with nobody using the mesh or its arrays. Since 0.1. */
 DFM_API dfm_status dfm_trimesh_destroy(dfm_trimesh mesh);
 typedef struct dfm_trimesh_info {
   uint32_t size, npoint, ntriangle, nedge, npiece, ngroup;
@@ -88,17 +88,17 @@ typedef struct dfm_trimesh_info {
   double lo[3], hi[3];
   const char *warnings;                                                              /* one sentence a line; valid while the mesh lives */
 } dfm_trimesh_info;
-/** Counts, sizes and what reading repaired, as far as out->size goes. @return DFM_OK; DFM_E_ARG; DFM_E_HANDLE. Threads: Any thread. Since 0.2. */
+/** Counts, sizes and what reading repaired, as far as out->size goes. @return DFM_OK; DFM_E_ARG; DFM_E_HANDLE. Threads: Any thread. Since 0.1. */
 DFM_API dfm_status dfm_trimesh_get_info(dfm_trimesh mesh, dfm_trimesh_info *out);
 /** Borrowed arrays, valid while the mesh lives: points [npoint,3], triangles [ntriangle,3] outward, file_point [npoint] 0-based place in the
- * file. Each out may be NULL. Threads: Any thread. Since 0.2. */
+ * file. Each out may be NULL. Threads: Any thread. Since 0.1. */
 DFM_API dfm_status dfm_trimesh_data(dfm_trimesh mesh, const double **points, const uint32_t **triangles, const uint32_t **file_point);
 /** Groups of triangles, [ngroup]: physical groups, OBJ groups or materials, PLY and STL solids; per triangle its group (UINT32_MAX none).
- * Each out may be NULL; valid while the mesh lives. Threads: Any thread. Since 0.2. */
+ * Each out may be NULL; valid while the mesh lives. Threads: Any thread. Since 0.1. */
 DFM_API dfm_status dfm_trimesh_groups(dfm_trimesh mesh, const char *const **names, const uint32_t **triangle_group);
 /** Writes OBJ, PLY (binary), STL (binary), OFF, legacy VTK or VTU by file name ending; to a temporary name first, so never half a file.
  * Groups survive in OBJ, VTK and VTU, in PLY by number. STL holds single precision.
- * @return DFM_OK; DFM_E_IO; DFM_E_UNSUPPORTED another ending. Threads: Any thread. Since 0.2. */
+ * @return DFM_OK; DFM_E_IO; DFM_E_UNSUPPORTED another ending. Threads: Any thread. Since 0.1. */
 DFM_API dfm_status dfm_trimesh_write(dfm_trimesh mesh, const char *path);
 
 /** Lattice cells inside a closed surface, so that a surface alone becomes a body. Small holes, flipped or touching triangles do no harm:
@@ -107,10 +107,10 @@ DFM_API dfm_status dfm_trimesh_write(dfm_trimesh mesh, const char *path);
  * @param cells    wanted number of tetrahedra; the lattice offers one near it
  * @param out      cells that cover the inside; the surface lies within them. dfm_tetmesh_share tells how much of each is material
  * @return DFM_OK; DFM_E_ARG cells below 1 or above 1e8; DFM_E_FORMAT; DFM_E_NOMEM; DFM_E_HANDLE
- * Threads: Any thread. Since 0.2. */
+ * Threads: Any thread. Since 0.1. */
 DFM_API dfm_status dfm_tetmesh_fill(dfm_trimesh surface, uint32_t cells, dfm_tetmesh *out);
 /** Share of each cell that is material, [ntet], in (0,1]; NULL for a mesh that was not filled. VTK and VTU files keep it. Borrowed.
- * @return DFM_OK; DFM_E_HANDLE. Threads: Any thread. Since 0.2. */
+ * @return DFM_OK; DFM_E_HANDLE. Threads: Any thread. Since 0.1. */
 DFM_API dfm_status dfm_tetmesh_share(dfm_tetmesh mesh, const double **share);
 
 #ifdef __cplusplus

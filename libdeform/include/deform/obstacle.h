@@ -24,7 +24,7 @@ typedef struct dfm_obstacle_def {
   dfm_material material;            /* for pair rules by material; 0: none */
   uint32_t category, collides_with;
   void *user;
-  /* Since 0.2. mesh, voxels: a triangle surface in the obstacle's frame; copied. Points of one place must be one point (dfm_trimesh_read and
+  /* Since 0.1. mesh, voxels: a triangle surface in the obstacle's frame; copied. Points of one place must be one point (dfm_trimesh_read and
    * dfm_trimesh_create see to that). A mesh may be open: it acts on the side that its triangles face. Voxels need a closed one. */
   uint32_t npoint, ntriangle;
   const double *points;             /* [npoint,3] m */

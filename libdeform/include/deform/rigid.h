@@ -106,47 +106,47 @@ typedef struct dfm_rigid_host {
 } dfm_rigid_host;
 
 /** Makes a host known under a name to every context of the process; the table is copied, its code must stay loaded. "builtin" is always known.
- * @return DFM_OK; DFM_E_ARG an entry is missing; DFM_E_STATE the name is taken. Threads: Any thread. Since 0.2. */
+ * @return DFM_OK; DFM_E_ARG an entry is missing; DFM_E_STATE the name is taken. Threads: Any thread. Since 0.1. */
 DFM_API dfm_status dfm_rigid_host_register(const char *name, const dfm_rigid_host *table);
 
 /* ---- bodies ------------------------------------------------------------------------------------------------- */
 
-/** A ball of 1 kg and radius 0.5 m at the origin, category 1, collides with all. Threads: Any thread. Since 0.2. */
+/** A ball of 1 kg and radius 0.5 m at the origin, category 1, collides with all. Threads: Any thread. Since 0.1. */
 DFM_API dfm_rigid_def dfm_rigid_def_default(void);
 /** Makes a set of bodies. A dfm_rigid is a dfm_obstacle too: poses, defs, rays, pair rules and reports take it; it moves by itself only.
  * @param host  "builtin" or a registered name; NULL: "builtin"
  * @param out   [nbody]
- * @return DFM_OK; DFM_E_ARG (which body or joint, why; nearest host); DFM_E_FATAL the host refuses. Threads: Not during step. Since 0.2. */
+ * @return DFM_OK; DFM_E_ARG (which body or joint, why; nearest host); DFM_E_FATAL the host refuses. Threads: Not during step. Since 0.1. */
 DFM_API dfm_status dfm_rigid_create(dfm_world world, const char *host, const dfm_rigid_set_def *set, dfm_rigid *out);
 /** A further shape of a body, at def->pose in the body's frame, whose origin is the centre of mass: any but a plane; no keys, no sine. It touches with
  * the body's mass and moves with it; a dfm_obstacle with a name, material and filter of its own. dfm_obstacle_destroy removes it alone.
- * @return DFM_OK; DFM_E_ARG (which entry, why); DFM_E_HANDLE. Threads: Not during step. Since 0.2. */
+ * @return DFM_OK; DFM_E_ARG (which entry, why); DFM_E_HANDLE. Threads: Not during step. Since 0.1. */
 DFM_API dfm_status dfm_rigid_add_shape(dfm_rigid rigid, const dfm_obstacle_def *def, dfm_obstacle *out);
-/** Removes the whole set that the body came with, with all shapes; their contacts end. Threads: Not during step. Since 0.2. */
+/** Removes the whole set that the body came with, with all shapes; their contacts end. Threads: Not during step. Since 0.1. */
 DFM_API dfm_status dfm_rigid_destroy(dfm_rigid rigid);
-/** All rigid bodies in order of creation; capacity 0 with out NULL only counts. Threads: Any thread. Not during step. Since 0.2. */
+/** All rigid bodies in order of creation; capacity 0 with out NULL only counts. Threads: Any thread. Not during step. Since 0.1. */
 DFM_API dfm_status dfm_world_rigids(dfm_world world, uint32_t capacity, dfm_rigid *out, uint32_t *n);
-/** @return DFM_OK; DFM_E_ARG none of that name (nearest one). Threads: Any thread. Not during step. Since 0.2. */
+/** @return DFM_OK; DFM_E_ARG none of that name (nearest one). Threads: Any thread. Not during step. Since 0.1. */
 DFM_API dfm_status dfm_world_find_rigid(dfm_world world, const char *name, dfm_rigid *out);
-/** Its def as created (name valid while it lives). Threads: Any thread. Not during step. Since 0.2. */
+/** Its def as created (name valid while it lives). Threads: Any thread. Not during step. Since 0.1. */
 DFM_API dfm_status dfm_rigid_get_def(dfm_rigid rigid, dfm_rigid_def *out);
 DFM_API dfm_status dfm_rigid_get_state(dfm_rigid rigid, dfm_rigid_state *out);
 /** Puts a body somewhere, at once; a body with joints must fit them (what does not is pulled back in the next step).
- * @return DFM_E_ARG not finite, or the body is fixed. Threads: Not during step. Since 0.2. */
+ * @return DFM_E_ARG not finite, or the body is fixed. Threads: Not during step. Since 0.1. */
 DFM_API dfm_status dfm_rigid_set_state(dfm_rigid rigid, const dfm_rigid_state *state);
-/** Mass, momenta and energies as of a soft body: elastic 0, volume that of the shape. Threads: Any thread. Not during step. Since 0.2. */
+/** Mass, momenta and energies as of a soft body: elastic 0, volume that of the shape. Threads: Any thread. Not during step. Since 0.1. */
 DFM_API dfm_status dfm_rigid_get_measure(dfm_rigid rigid, dfm_body_measure *out);
-/** Mean force (N) and moment about the centre of mass (N m) that contact put on it in the last sub-step. Threads: Any thread. Not during step. Since 0.2. */
+/** Mean force (N) and moment about the centre of mass (N m) that contact put on it in the last sub-step. Threads: Any thread. Not during step. Since 0.1. */
 DFM_API dfm_status dfm_rigid_contact_wrench(dfm_rigid rigid, double force[3], double moment[3]);
 /** Motor of one of the set's joints, numbered as in its def; any body of the set names it. max 0: off.
- * @return DFM_E_ARG no such joint, or no hinge or slider; DFM_E_UNSUPPORTED the host has no motors. Threads: Not during step. Since 0.2. */
+ * @return DFM_E_ARG no such joint, or no hinge or slider; DFM_E_UNSUPPORTED the host has no motors. Threads: Not during step. Since 0.1. */
 DFM_API dfm_status dfm_rigid_set_motor(dfm_rigid rigid, uint32_t joint, double velocity, double max);
 /** A hinge or slider, of `body` against `with`, about or along the def's axis as it goes along with `with`; on every host alike. Each out may be NULL.
  * @param position  rad since creation, within half a turn either way; m of `body`'s anchor from `with`'s
  * @param rate      rad/s; m/s of `body`'s anchor against the place of `with` that it is at
  * @param effort    mean of what the motor did to `body` in the last sub-step; to `with` it did the opposite. Hinge: N m, the moment about the axis through
  *                  the anchor (what the hinge itself holds with has none there). Slider: N along the axis. 0 to rounding with the motor off
- * @return as dfm_rigid_set_motor. Threads: Any thread. Not during step. Since 0.2. */
+ * @return as dfm_rigid_set_motor. Threads: Any thread. Not during step. Since 0.1. */
 DFM_API dfm_status dfm_rigid_joint(dfm_rigid rigid, uint32_t joint, double *position, double *rate, double *effort);
 #ifdef __cplusplus
 }

@@ -28,16 +28,16 @@ enum { DFM_TOI_BISECTION = 0, DFM_TOI_REGULA_FALSI = 1, DFM_TOI_BRENT = 2, DFM_T
  * @param t     out: the time; 0 where they touch from the start; +INFINITY: they never touch
  * @param bary  out, may be NULL: weights of the triangle's vertices at the nearest point at t; left as it is for a miss
  * @return DFM_OK; DFM_E_ARG an argument is NULL, a coordinate or option is not finite or out of range (nothing is written).
- * Threads: Any thread. Since 0.2. */
+ * Threads: Any thread. Since 0.1. */
 DFM_API dfm_status dfm_toi_point_triangle(const dfm_motion *p, const dfm_motion tri[3], const dfm_toi_options *options, double *t, double bary[3]);
 
 /** First time in [0,1] at which two closed edges touch; the same bits for swapped edges and ends.
  * @param ab  out, may be NULL: where on a (0: a[0], 1: a[1]) and where on b at t; left as it is for a miss. Else as above.
- * Threads: Any thread. Since 0.2. */
+ * Threads: Any thread. Since 0.1. */
 DFM_API dfm_status dfm_toi_edge_edge(const dfm_motion a[2], const dfm_motion b[2], const dfm_toi_options *options, double *t, double ab[2]);
 
 /** Work of this thread's last dfm_toi_* query that returned DFM_OK: values of the root function (and of its like for a separation) plus
- * distances between the features. Threads: Any thread. Since 0.2. */
+ * distances between the features. Threads: Any thread. Since 0.1. */
 DFM_API uint32_t dfm_toi_evaluations(void);
 #ifdef __cplusplus
 }

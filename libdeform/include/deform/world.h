@@ -8,7 +8,7 @@
 extern "C" {
 #endif
 /* How contacts are solved. AUTO is VELOCITY. ROLLBACK is the source's scheme, to compare and not to use: it freezes what slides and loses momentum
- * (doc/concepts/rollback.md); what it cannot do is refused with DFM_E_UNSUPPORTED where it is made. 2 is kept for implicit. Since 0.2 (ROLLBACK). */
+ * (doc/concepts/rollback.md); what it cannot do is refused with DFM_E_UNSUPPORTED where it is made. 2 is kept for implicit. Since 0.1 (ROLLBACK). */
 enum { DFM_METHOD_AUTO = 0, DFM_METHOD_VELOCITY = 1, DFM_METHOD_ROLLBACK = 3 };
 enum { DFM_INTEGRATOR_AUTO = 0, DFM_INTEGRATOR_SYMPLECTIC_EULER = 1 };
 
@@ -44,7 +44,7 @@ DFM_API dfm_status dfm_world_set_gravity(dfm_world world, const double gravity[3
 /** Gravity that varies; times in s, strictly rising. n = 0 removes it. Threads: Not during step. Since 0.1. */
 DFM_API dfm_status dfm_world_set_gravity_keys(dfm_world world, uint32_t n, const dfm_vector_key *keys);
 
-/** Lets islands at rest sleep, or (false) wakes all and keeps them awake. Threads: Not during step. Since 0.2. */
+/** Lets islands at rest sleep, or (false) wakes all and keeps them awake. Threads: Not during step. Since 0.1. */
 DFM_API dfm_status dfm_world_set_sleep(dfm_world world, bool sleep);
 
 /* ---- step -------------------------------------------------------------------------------------------------- */
