@@ -4,6 +4,8 @@ PREFIX ?= /usr/local
 JOBS ?= $(shell nproc)
 SETUP = @cmake/setup.sh
 BUILD = @cmake --build --preset
+# The set-up's own, as in cmake/DeformPython.cmake.
+PYTHON ?= $(firstword $(wildcard /usr/bin/python3) python3)
 
 .PHONY: help demo test bench soak lint asan tsan fuzz install clean setup setup-bench setup-fuzz
 
@@ -33,7 +35,7 @@ build/%/build.ninja: | setup
 
 demo: setup build/release/build.ninja
 	$(BUILD) release --target deform_command
-	@python3 cmake/demo.py build/release/bin/deform out/demo
+	@$(PYTHON) cmake/demo.py build/release/bin/deform out/demo
 
 test: setup build/release/build.ninja
 	$(BUILD) release
@@ -60,7 +62,7 @@ fuzz: setup-fuzz build/fuzz/build.ninja
 
 install: setup build/release/build.ninja
 	$(BUILD) release --target deform_command
-	@cmake --install build/release --prefix $(abspath $(PREFIX))
+	@cmake --install build/release --strip --prefix $(abspath $(PREFIX))
 
 clean:
 	rm -rf build out

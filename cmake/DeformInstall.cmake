@@ -8,7 +8,13 @@ file(RELATIVE_PATH deform_bin_to_lib /${CMAKE_INSTALL_BINDIR} /${CMAKE_INSTALL_L
 file(RELATIVE_PATH deform_pc_to_prefix /${CMAKE_INSTALL_LIBDIR}/pkgconfig /)
 string(REGEX REPLACE "/$" "" deform_pc_to_prefix ${deform_pc_to_prefix})
 
-set_target_properties(deform_cli PROPERTIES INSTALL_RPATH "$ORIGIN/${deform_bin_to_lib}")
+# The build tree has the same run paths as the installed one. With a run path of its own CMake would pad it with empty entries to the length of the
+# installed one, and the dynamic linker reads an empty entry as the current folder: a library lying there would be loaded.
+set(deform_cli_rpath "$ORIGIN/${deform_bin_to_lib}")
+if(NOT deform_bin_to_lib STREQUAL "../lib")
+  list(APPEND deform_cli_rpath "$ORIGIN/../lib")   # where the build tree has it
+endif()
+set_target_properties(deform_cli PROPERTIES INSTALL_RPATH "${deform_cli_rpath}" BUILD_WITH_INSTALL_RPATH ON)
 install(TARGETS deform_cli RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR})
 install(TARGETS deform deform_headers EXPORT deformTargets
   LIBRARY DESTINATION ${CMAKE_INSTALL_LIBDIR} ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR})
@@ -28,7 +34,7 @@ install(FILES ${CMAKE_SOURCE_DIR}/LICENSE ${CMAKE_SOURCE_DIR}/README.md ${CMAKE_
 # libdeform_ode has an export of its own, so that who does not ask for it (find_package(deform COMPONENTS ode)) needs no ODE.
 if(TARGET deform_ode)
   install(TARGETS deform_ode EXPORT deformOdeTargets LIBRARY DESTINATION ${CMAKE_INSTALL_LIBDIR} ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR})
-  set_target_properties(deform_ode PROPERTIES INSTALL_RPATH "$ORIGIN")
+  set_target_properties(deform_ode PROPERTIES INSTALL_RPATH "$ORIGIN" BUILD_WITH_INSTALL_RPATH ON)
   install(DIRECTORY ${CMAKE_SOURCE_DIR}/bindings/ode/include/deform DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}
     FILES_MATCHING PATTERN "*.h" PATTERN "*.hpp")
   install(EXPORT deformOdeTargets NAMESPACE deform:: DESTINATION ${deform_cmake_dir})

@@ -91,7 +91,7 @@ void picture(const FrictionOptions &options, const FrictionCase &rig, const RigL
   if (options.csv.empty()) std::remove(csv.c_str());
   if (made) return;
   if (options.csv.empty()) write_whole(kept, rows);
-  warn("no picture: python3 with matplotlib is not there (Debian: python3-matplotlib); the rows are in " + kept);
+  warn("no picture: no python3 with matplotlib was found; install it (Debian: python3-matplotlib) or name one in DEFORM_PYTHON; the rows are in " + kept);
 }
 
 int friction(const FrictionOptions &options, const Globals &globals) {

@@ -6,6 +6,7 @@ installed_tree.py BUILD_DIR SOURCE_DIR SCRATCH_DIR C_COMPILER
 """
 import os
 import pathlib
+import re
 import shutil
 import subprocess
 import sys
@@ -30,7 +31,7 @@ def install(build, source, scratch):
     """(prefix, name of its library folder) of a tree installed into scratch, then moved, that names neither build nor source tree."""
     shutil.rmtree(scratch, ignore_errors=True)
     scratch.mkdir(parents=True)
-    run("cmake", "--install", build, "--prefix", scratch / "first", env=clean_environment())
+    run("cmake", "--install", build, "--strip", "--prefix", scratch / "first", env=clean_environment())
     prefix = (scratch / "first").rename(scratch / "moved")
     for path in prefix.rglob("*"):
         if path.is_file() and path.suffix in (".cmake", ".pc", ".h", ".hpp") and any(str(place) in path.read_text() for place in (build, source)):
@@ -55,6 +56,15 @@ def main():
     host = scratch / "host_by_pkg_config"
     run(compiler, "-std=c99", "-Wall", "-Wextra", "-Werror", "-Wno-missing-field-initializers", here / "host.c", "-o", host, *flags, "-lm", env=clean)
     run(host, slab, env={**clean, "LD_LIBRARY_PATH": str(prefix / libdir)})
+
+    # The front page's line for its program, to the letter; it needs no LD_LIBRARY_PATH to run.
+    line = re.search(r"^cc hello\.c .*$", (pathlib.Path(source) / "README.md").read_text(), re.M).group(0)
+    shutil.copy(pathlib.Path(source) / "examples" / "01_hello.c", scratch / "hello.c")
+    run("sh", "-ec", f"cd '{scratch}' && {line} && ./hello", env={**clean, "PKG_CONFIG_PATH": str(prefix / libdir / "pkgconfig")})
+
+    library = (prefix / libdir / "libdeform.so").resolve()
+    if b".debug_info" in library.read_bytes():
+        sys.exit(f"{library} has debug information ({library.stat().st_size} bytes)")
 
     command = prefix / "bin" / "deform"
     listed = run(command, "plugin", "list", env=clean)

@@ -16,7 +16,7 @@ std::string script(const char *name) { return std::string(DEFORM_SOURCE_DIR) + "
 TEST(FrictionBenchmark, OurSlides_AreMeasuredJudgedAndNotRunTwice) {
   const std::string out = test::scratch("friction_benchmark") + "/rows.csv";
   std::remove(out.c_str());
-  const std::vector<std::string> call = {"python3", script("run.py"), "deform", "--command", DEFORM_COMMAND, "--only", "slope_slide",
+  const std::vector<std::string> call = {DEFORM_TEST_PYTHON, script("run.py"), "deform", "--command", DEFORM_COMMAND, "--only", "slope_slide",
                                          "--configuration", "coulomb", "--out", out};
   const test::CommandResult first = test::run(call);
   ASSERT_EQ(first.exit_code, 0) << first.err;
@@ -58,7 +58,7 @@ class Entry:
   const std::string out = folder + "/rows.csv";
   std::remove(out.c_str());
   const auto call = [&](const char *engine) {
-    return test::run({"python3", script("run.py"), engine, "--entries", folder, "--command", DEFORM_COMMAND, "--out", out});
+    return test::run({DEFORM_TEST_PYTHON, script("run.py"), engine, "--entries", folder, "--command", DEFORM_COMMAND, "--out", out});
   };
   const test::CommandResult done = call("sled");
   ASSERT_EQ(done.exit_code, 0) << done.err;
@@ -76,4 +76,21 @@ class Entry:
   EXPECT_NE(unknown.exit_code, 0);
   EXPECT_NE(unknown.err.find("there is no entry_sledge.py"), std::string::npos) << unknown.err;
   EXPECT_NE(unknown.err.find("bullet, deform, mujoco, sled"), std::string::npos) << unknown.err;
+}
+
+// From a folder that has no build/ of its own.
+TEST(FrictionBenchmark, CommandThatIsNotThere_IsOneSentence) {
+  const test::CommandResult r = test::run({"/usr/bin/env", "-C", test::scratch("friction_benchmark_elsewhere"), DEFORM_TEST_PYTHON, script("run.py"), "deform",
+                                           "--command", "no/such/deform", "--only", "slope_slide"});
+  EXPECT_EQ(r.exit_code, 1);
+  EXPECT_NE(r.err.find("no/such/deform: no such command; build it with `make demo`"), std::string::npos) << r.err;
+  EXPECT_EQ(r.err.find("Traceback"), std::string::npos) << r.err;
+}
+
+TEST(FrictionBenchmark, CalledFromAnotherFolder_FindsTheCommandOfItsCheckout) {
+  const std::string folder = test::scratch("friction_benchmark_elsewhere");
+  const test::CommandResult r = test::run({"/usr/bin/env", "-C", folder, DEFORM_TEST_PYTHON, script("run.py"), "--help"});
+  EXPECT_EQ(r.exit_code, 0) << r.err;
+  const test::CommandResult unknown = test::run({"/usr/bin/env", "-C", folder, DEFORM_TEST_PYTHON, script("run.py"), "nobody"});
+  EXPECT_NE(unknown.err.find("there is no entry_nobody.py"), std::string::npos) << unknown.err;
 }

@@ -251,6 +251,7 @@ TEST(RigidBodies, SceneErrors_NameTheirPlace) {
     for (const std::string &word : words) EXPECT_NE(r.err.find(word), std::string::npos) << set << ": " << r.err;
   };
   refused("/rigid/host=bulit", {"/rigid", "builtin"});
+  refused("/rigid={\"host\":\"bulit\",\"bodies\":[]}", {"/rigid/host", "builtin"});
   refused("/rigid/bodies/0/mass=0", {"/rigid/bodies/0/mass"});
   refused("/rigid/bodies/1/shape=plane", {"/rigid/bodies/1/shape", "sphere", "capsule"});
   refused("/rigid/bodies/1/shape=voxels", {"not available yet: /rigid/bodies/1/shape"});

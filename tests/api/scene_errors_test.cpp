@@ -159,6 +159,7 @@ TEST(SceneErrors, NotDelivered_IsNeverIgnored) {
       {"/output/color=\"stress\"", "/output/color"},
       {"/bodies/0/start={\"invert\":true}", "/bodies/0/start"},
       {"/bodies/0/switch=[{\"t\":1}]", "/bodies/0/switch"},
+      {"/bodies/0/switch=[]", "/bodies/0/switch"},
       {"/bodies/0/pressure=5", "/bodies/0/pressure"}};
   for (const auto &[set, pointer] : later) expect_refused(run({scene(), "--set", set}), {"not available yet: " + std::string(pointer) + "\n"}, set);
 }

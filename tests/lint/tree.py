@@ -8,7 +8,8 @@ CODE = (".c", ".cpp", ".h", ".hpp", ".inl")
 
 
 class Tree:
-    """Text files below root: what git knows or would add; without git, everything but build/, out/ and dot folders."""
+    """Text files below root: what git tracks, so that a stray file in the checkout is not judged; without git, everything but build/, out/ and
+    dot folders."""
 
     def __init__(self, root):
         self.root = pathlib.Path(root)
@@ -17,7 +18,7 @@ class Tree:
 
     def _list(self):
         if (self.root / ".git").exists() and shutil.which("git"):
-            out = subprocess.run(["git", "-c", "safe.directory=*", "-C", self.root, "ls-files", "-co", "--exclude-standard", "-z"],
+            out = subprocess.run(["git", "-c", "safe.directory=*", "-C", self.root, "ls-files", "-c", "-z"],
                                  capture_output=True, text=True)
             if out.returncode == 0:
                 return [p for p in out.stdout.split("\0") if p]

@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "core/error.h"
+#include "rigid/host.h"
 #include "scene/load.h"
 
 namespace dfm::scene {
@@ -64,11 +65,11 @@ class Builder {
 
   dfm_material material(const std::string &name) const { return name.empty() ? 0 : materials_.at(name); }
 
-  // Reads one of a body's tables; complaints say which key of the scene named it.
-  template <class Read>
-  auto table(const std::string &pointer, Read &&read) const {
+  // Errors of what is called say which key of the scene asked for it.
+  template <class Call>
+  auto with_pointer(const std::string &pointer, Call &&call) const {
     try {
-      return read();
+      return call();
     } catch (const Error &e) {
       fail(e.status, "%s: %s: %s", def_.file.c_str(), pointer.c_str(), e.what());
     }
@@ -121,11 +122,11 @@ class Builder {
     const std::vector<dfm_material> materials = materials_by_group(b, mesh);
     mesh.cell_weight = cell_weights(mesh, materials);
     std::vector<NodalRow> nodal;
-    if (!b.nodal_bc.empty()) nodal = table(b.pointer + "/nodal_bc", [&] { return read_nodal(files_.path_of(b.nodal_bc), mesh); });
+    if (!b.nodal_bc.empty()) nodal = with_pointer(b.pointer + "/nodal_bc", [&] { return read_nodal(files_.path_of(b.nodal_bc), mesh); });
     std::vector<std::vector<double>> values;
     std::vector<dfm_cell_field> fields;
     for (const FieldFile &f : b.fields) {
-      values.push_back(table(f.pointer, [&] { return read_field(files_.path_of(f.path), f, mesh); }));
+      values.push_back(with_pointer(f.pointer, [&] { return read_field(files_.path_of(f.path), f, mesh); }));
       fields.push_back({f.key.c_str(), values.back().data(), f.width});
     }
     std::vector<uint8_t> fixed(mesh.npoint, 0);
@@ -243,7 +244,10 @@ class Builder {
   }
 
   void create_rigid(Rigid &rigid) {
-    if (rigid.bodies.empty()) return;
+    if (rigid.bodies.empty()) {
+      with_pointer(rigid.pointer + "/host", [&] { return find_host(rigid.host), 0; });   // a host that is not there is an error all the same
+      return;
+    }
     std::vector<dfm_rigid_def> bodies;
     std::vector<dfm_joint_def> joints;
     for (RigidBody &b : rigid.bodies) {

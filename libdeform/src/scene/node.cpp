@@ -64,11 +64,7 @@ void Node::object(const std::string &kind, const std::vector<std::string> &furth
     bool extra = false;
     for (const std::string &name : further) extra = extra || name == it.key();
     const Node child(&it.value(), pointer_ + "/" + escape_pointer(it.key()), file_);
-    if (known && !known->delivered) {
-      // An empty list asks for nothing, so nothing is left out by accepting it.
-      if (it.value().is_array() && it.value().empty()) continue;
-      child.not_yet();
-    }
+    if (known && !known->delivered) child.not_yet();
     if (known || extra) continue;
     std::vector<std::string> valid;
     for (const Key &k : keys) valid.push_back(k.name);

@@ -19,6 +19,7 @@ import tempfile
 
 import cases
 
+ROOT = os.path.join(os.path.dirname(os.path.abspath(__file__)), *[os.pardir] * 3)
 COLUMNS = ["engine", "version", "configuration", "case", "parameters", "quantity", "measured", "expected", "low", "high", "verdict", "cost", "note"]
 MISSING = "%s: this python3 does not find the module '%s'; install it, or take the python3 that has it"
 PARAMETERS = ["mu", "mu_S", "mu_C", "share", "ratio"]
@@ -36,12 +37,16 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("engine", metavar="ENGINE", help="NAME of an entry_NAME.py")
     parser.add_argument("--entries", help="another folder that has entries")
-    parser.add_argument("--command", default="build/release/bin/deform", help="the deform command: runs our cases, makes the meshes of all entries")
+    parser.add_argument("--command", default=os.path.join(ROOT, "build", "release", "bin", "deform"),
+                        help="the deform command: runs our cases, makes the meshes of all entries (that of this checkout, as `make demo` builds it)")
     parser.add_argument("--only", help="one case by name")
     parser.add_argument("--configuration", help="one configuration of the engine (for deform: a law)")
     parser.add_argument("--out", help="CSV to write or to go on with; without it the rows are printed")
     given = parser.parse_args()
     make = entry_of(given.engine, given.entries)
+    given.command = os.path.abspath(given.command)
+    if not os.access(given.command, os.X_OK):
+        sys.exit("%s: no such command; build it with `make demo`, or name another with --command" % given.command)
     done, file = set(), None
     if given.out:
         fresh = not os.path.exists(given.out)
@@ -54,7 +59,7 @@ def main():
             writer.writeheader()
     with tempfile.TemporaryDirectory() as work:
         try:
-            entry = make(os.path.abspath(given.command), work)
+            entry = make(given.command, work)
         except ModuleNotFoundError as error:
             sys.exit(MISSING % (given.engine, error.name))
         for case in cases.cases():
