@@ -5,6 +5,8 @@
 #include <cstdio>
 #include <cstdlib>
 #include <cstring>
+#include <exception>
+#include <new>
 
 #include "cli.h"
 #ifdef DEFORM_HAVE_ODE
@@ -141,7 +143,18 @@ dfm_context *make_context(const Globals &g) {
 
 }  // namespace cli
 
-int main(int argc, char **argv) {
+namespace {
+
+// CLI11's validators are globals that take memory before main() and its handlers: where there is none the command ends there with its sentence.
+std::terminate_handler before_main;
+[[gnu::constructor(101)]] void say_before_main() {
+  before_main = std::set_terminate([] {
+    std::fputs("deform: the command could not start: out of memory\n", stderr);
+    std::_Exit(cli::kBadInput);
+  });
+}
+
+int run(int argc, char **argv) {
   int exit_code = cli::kDone;
   CLI::App app{"Deformable bodies in contact with real friction.", "deform"};
   app.set_version_flag("--version", dfm_version(nullptr, nullptr, nullptr));
@@ -164,10 +177,21 @@ int main(int argc, char **argv) {
   } catch (const cli::Failure &failure) {
     cli::fail(failure.what());
     return failure.exit_code;
-  } catch (const std::bad_alloc &) {
-    return cli::fail("out of memory");
-  } catch (const std::exception &error) {
-    return cli::fail(error.what());
   }
   return exit_code;
+}
+
+}  // namespace
+
+// Whatever run() throws, its own set-up and its error paths included, ends in an exit code; the sentence takes no memory.
+int main(int argc, char **argv) {
+  std::set_terminate(before_main);
+  try {
+    return run(argc, argv);
+  } catch (const std::bad_alloc &) {
+    std::fputs("deform: out of memory\n", stderr);
+  } catch (const std::exception &error) {
+    std::fprintf(stderr, "deform: %s\n", error.what());
+  }
+  return cli::kBadInput;
 }

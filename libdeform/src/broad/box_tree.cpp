@@ -34,11 +34,15 @@ BoxTree::BoxTree(const Memory &memory)
     : node_(HookAllocator<Node>(memory)), box_(HookAllocator<Box>(memory)), tri_box_(HookAllocator<Box>(memory)),
       tri_(HookAllocator<uint32_t>(memory)), centroid_(HookAllocator<Centroid>(memory)) {}
 
+// All memory first: where one allocation is refused the tree stays what it was, nodes and boxes in step with each other.
 void BoxTree::build(const Surface &surface, const double *x) {
+  const size_t leaves = (size_t{surface.ntri} + kLeaf - 1) / kLeaf, nodes = leaves ? 2 * leaves - 1 : 0;
+  node_.reserve(nodes), box_.reserve(nodes);
+  tri_.reserve(surface.ntri), tri_box_.reserve(surface.ntri), centroid_.reserve(surface.ntri);
   node_.clear();
   centroid_.resize(surface.ntri);
   for (uint32_t t = 0; t < surface.ntri; ++t) {
-    const Box b = triangle_box(&surface.tri[3 * t], x);
+    const Box b = triangle_box(&surface.tri[3 * size_t{t}], x);
     for (int k = 0; k < 3; ++k) centroid_[t].x[k] = b.lo[k] + b.hi[k];
     centroid_[t].tri = t;
   }

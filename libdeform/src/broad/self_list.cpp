@@ -79,6 +79,7 @@ bool SelfList::update(double h, double offset) {
     const double moved = displaced();
     if (kRounding * (moved + share(h, offset, 1, moved)) <= margin_) return false;
   }
+  margin_ = -1;   // until the lists are whole: a refused allocation leaves none that anyone believes
   x_.assign(s.x.begin(), s.x.end());
   Vec3 sum;
   for (uint32_t i = 0; i < s.nsurfel; ++i) sum += load3(&x_[4 * size_t{i}]);
@@ -89,8 +90,9 @@ bool SelfList::update(double h, double offset) {
   if (tree_.empty() || tree_.quality() > kQualityLimit) tree_.build(s, x_.data());
   const double now = share(h, offset, kSpeedGrowth, 0);
   const double skin = std::clamp(skin_steps_ * 0.5 * (now - offset), kSkinLeast * s.median_edge, kSkinMost * s.median_edge);
-  margin_ = kRounding * now + skin;
-  list(kRounding * 2 * margin_ + self_recovery_depth(s));
+  const double margin = kRounding * now + skin;
+  list(kRounding * 2 * margin + self_recovery_depth(s));
+  margin_ = margin;
   return true;
 }
 

@@ -58,6 +58,16 @@ struct Tasks::Pool {
   void (*fn)(void *, uint32_t, uint32_t) = nullptr;
   void *task = nullptr;
 
+  // Also where a later worker could not be started and the pool never came to be.
+  ~Pool() {
+    {
+      const std::lock_guard lock(mutex);
+      stop = true;
+    }
+    start.notify_all();
+    for (auto &worker : workers) worker.join();
+  }
+
   void drain() {
     const Inside inside;
     for (;;) {
@@ -101,18 +111,11 @@ Tasks::Tasks(uint32_t threads, HostFor host_for, void *host_user)
     : threads_(threads ? threads : std::max(1u, std::thread::hardware_concurrency())), host_for_(host_for), host_user_(host_user) {
   if (host_for_ || threads_ == 1) return;
   pool_ = std::make_unique<Pool>();
-  for (uint32_t i = 1; i < threads_; ++i) pool_->workers.emplace_back([this] { pool_->work(); });
+  pool_->workers.reserve(threads_ - 1);
+  for (uint32_t i = 1; i < threads_; ++i) pool_->workers.emplace_back([pool = pool_.get()] { pool->work(); });
 }
 
-Tasks::~Tasks() {
-  if (!pool_) return;
-  {
-    std::lock_guard lock(pool_->mutex);
-    pool_->stop = true;
-  }
-  pool_->start.notify_all();
-  for (auto &worker : pool_->workers) worker.join();
-}
+Tasks::~Tasks() = default;
 
 void Tasks::run(uint32_t n, uint32_t grain, void (*fn)(void *, uint32_t, uint32_t), void *task) {
   grain = std::max(1u, grain);

@@ -73,8 +73,14 @@ dfm_context::~dfm_context() {
 }
 
 void dfm_context::log(int32_t level, const char *utf8) const noexcept {
-  if (hooks.log) hooks.log(hooks.user, level, utf8);
-  else if (level >= DFM_LOG_WARNING) std::fprintf(stderr, "deform: %s: %s\n", level >= DFM_LOG_ERROR ? "error" : "warning", utf8);
+  if (hooks.log) {
+    try {
+      hooks.log(hooks.user, level, utf8);
+    } catch (...) {   // a hook in C++ that ran out of memory: what it had to say is lost, the caller's work is not
+    }
+  } else if (level >= DFM_LOG_WARNING) {
+    std::fprintf(stderr, "deform: %s: %s\n", level >= DFM_LOG_ERROR ? "error" : "warning", utf8);
+  }
 }
 
 void dfm_context::logf(int32_t level, const char *format, ...) const noexcept {

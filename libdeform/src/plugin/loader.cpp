@@ -1,15 +1,18 @@
 #include "plugin/loader.h"
 
+#include <dirent.h>
 #include <sys/stat.h>
 
 #include <algorithm>
 #include <cerrno>
 #include <climits>
+#include <cstdio>
 #include <cstdlib>
 #include <cstring>
-#include <filesystem>
+#include <memory>
 
 #include "core/error.h"
+#include "deform/base.h"
 #include "plugin/registry.h"
 #include "plugin/shared_object.h"
 #include "plugin/static_list.h"
@@ -17,17 +20,39 @@
 namespace dfm {
 namespace {
 
-namespace fs = std::filesystem;
-
 thread_local std::string *entry_log = nullptr;
 
 std::string real_path(const std::string &path) {
   char *resolved = realpath(path.c_str(), nullptr);  // dlopen searches the system's libraries for a name without a slash
   if (!resolved) fail(DFM_E_IO, "cannot open plugin \"%s\": %s", path.c_str(), std::strerror(errno));
-  std::string out = resolved;
-  std::free(resolved);
-  return out;
+  const std::unique_ptr<char, decltype(&std::free)> freed(resolved, &std::free);
+  return resolved;
 }
+
+bool is_directory(const std::string &path) {
+  struct stat st{};
+  return stat(path.c_str(), &st) == 0 && S_ISDIR(st.st_mode);
+}
+
+bool is_link(const std::string &path) {
+  struct stat st{};
+  return lstat(path.c_str(), &st) == 0 && S_ISLNK(st.st_mode);
+}
+
+// By readdir: the iterators of the standard library allocate inside functions that must not throw, so memory that runs out there ends the process.
+std::vector<std::string> entries(const std::string &directory) {
+  const std::unique_ptr<DIR, int (*)(DIR *)> open(opendir(directory.c_str()), &closedir);
+  if (!open) fail(errno == ENOMEM ? DFM_E_NOMEM : DFM_E_IO, "cannot read plugin directory \"%s\": %s", directory.c_str(), std::strerror(errno));
+  std::vector<std::string> names;
+  errno = 0;
+  for (const dirent *entry; (entry = readdir(open.get()));)
+    if (const std::string name = entry->d_name; name != "." && name != "..") names.push_back(name);
+  if (errno) fail(DFM_E_IO, "cannot read plugin directory \"%s\": %s", directory.c_str(), std::strerror(errno));
+  std::sort(names.begin(), names.end());  // the same order on every file system
+  return names;
+}
+
+bool ends_in_so(const std::string &name) { return name.size() > 3 && name.compare(name.size() - 3, 3, ".so") == 0; }
 
 }  // namespace
 
@@ -40,14 +65,17 @@ void Loader::note_log(const char *text) noexcept {
   }
 }
 
+// Takes no memory: it may be memory that has run out.
 Loader::~Loader() {
   while (!modules_.empty()) {
-    const Module module = modules_.back();
+    const Module module = std::move(modules_.back());
     modules_.pop_back();
     try {
       if (module.shutdown) module.shutdown();
     } catch (...) {
-      host_.log(host_.ctx, 2, 0, (module.file + ": its shutdown threw an exception").c_str());
+      char text[512];
+      std::snprintf(text, sizeof text, "%s: its shutdown threw an exception", module.file.c_str());
+      host_.log(host_.ctx, DFM_LOG_WARNING, 0, text);
     }
     SharedObject::close(module.image);
   }
@@ -91,35 +119,36 @@ bool Loader::load(const std::string &path) {
   const dfm_plugin_fn entry = library.entry();
   dfm_plugin plugin;
   enter(entry, path, plugin);
-  modules_.reserve(modules_.size() + 1);
+  keep({nullptr, st.st_dev, st.st_ino, path, entry, plugin.shutdown}, plugin);
+  modules_.back().image = library.release();
+  return true;
+}
+
+// Into the registry and the list of modules, or into neither.
+void Loader::keep(Module &&module, const dfm_plugin &plugin) {
   try {
-    registry_.add(plugin, path);
+    modules_.reserve(modules_.size() + 1);
+    registry_.add(plugin, module.file);
   } catch (...) {
     if (plugin.shutdown) plugin.shutdown();
     throw;
   }
-  modules_.push_back({library.release(), st.st_dev, st.st_ino, path, entry, plugin.shutdown});
-  return true;
+  modules_.push_back(std::move(module));
 }
 
 uint32_t Loader::scan(const std::string &directory) {
-  std::error_code error;
-  std::vector<std::string> names;
-  for (fs::directory_iterator it(directory, error), end; !error && it != end; it.increment(error))
-    names.push_back(it->path().filename().string());
-  if (error) fail(DFM_E_IO, "cannot read plugin directory \"%s\": %s", directory.c_str(), error.message().c_str());
-  std::sort(names.begin(), names.end());  // the same order on every file system
+  const std::vector<std::string> names = entries(directory);
   uint32_t loaded = 0;
   for (const std::string &name : names) {
     const std::string path = directory + (directory.back() == '/' ? "" : "/") + name;
-    if (fs::is_directory(path, error)) {
+    if (is_directory(path)) {
       registry_.pass_over(path, "a directory: plugins lie directly in the plugin directory");
-    } else if (fs::path(name).extension() != ".so") {
+    } else if (!ends_in_so(name)) {
       registry_.pass_over(path, "its name does not end in .so");
     } else {
       try {
         if (load(path)) ++loaded;
-        else if (fs::is_symlink(path, error)) registry_.pass_over(path, "a link to a plugin that is loaded already");
+        else if (is_link(path)) registry_.pass_over(path, "a link to a plugin that is loaded already");
       } catch (const Error &e) {
         registry_.pass_over(path, e.sentence);
       }
@@ -134,14 +163,7 @@ void Loader::add_static(dfm_plugin_fn entry, const std::string &name) {
   const std::string file = "static:" + name;
   dfm_plugin plugin;
   enter(entry, file, plugin);
-  modules_.reserve(modules_.size() + 1);
-  try {
-    registry_.add(plugin, file);
-  } catch (...) {
-    if (plugin.shutdown) plugin.shutdown();
-    throw;
-  }
-  modules_.push_back({nullptr, 0, 0, file, entry, plugin.shutdown});
+  keep({nullptr, 0, 0, file, entry, plugin.shutdown}, plugin);
 }
 
 std::vector<const dfm_type *> Loader::types_of(const std::string &path) const {
@@ -156,9 +178,8 @@ std::vector<const dfm_type *> Loader::types_of(const std::string &path) const {
 }
 
 void Loader::scan_if_there(const std::string &directory, bool asked_for) {
-  std::error_code error;
   if (directory.empty()) return;
-  if (!fs::is_directory(directory, error)) {
+  if (!is_directory(directory)) {
     if (asked_for) registry_.pass_over(directory, "named in DEFORM_PLUGIN_PATH, but there is no such directory");
     return;
   }

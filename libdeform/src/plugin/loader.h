@@ -34,6 +34,7 @@ class Loader {
 
  private:
   struct Module { void *image; uint64_t device, inode; std::string file; dfm_plugin_fn entry; void (*shutdown)(void); };
+  void keep(Module &&module, const dfm_plugin &plugin);
   void enter(dfm_plugin_fn entry, const std::string &file, dfm_plugin &plugin);
   void scan_if_there(const std::string &directory, bool asked_for);
   Registry &registry_;

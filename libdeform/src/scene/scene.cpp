@@ -7,7 +7,22 @@
 
 namespace dfm::scene {
 
-struct Scene::Tree { json root; };
+namespace {
+
+// The destructor of a JSON container allocates (it lists its children, not to recurse), which without memory ends the process. Emptied from below it
+// has nothing to list. The parser bounds the depth.
+void dismantle(json &value) noexcept {
+  if (!value.is_structured()) return;
+  for (json &child : value) dismantle(child);
+  value.clear();
+}
+
+}  // namespace
+
+struct Scene::Tree {
+  json root;
+  ~Tree() { dismantle(root); }
+};
 
 Scene::Scene(dfm_context *context, const std::string &path, const dfm_scene_options *options)
     : context_(context), tree_(std::make_unique<Tree>()) {

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <new>
 
 #include "core/error.h"
 #include "rigid/turn.h"
@@ -20,8 +21,14 @@ bool finite(const double *p, size_t n) {
 }
 constexpr size_t kStateValues = sizeof(dfm_rigid_state) / sizeof(double);
 
+// A host without memory is no fault of what it was asked: the sub-step ends as where the library itself finds none.
+void need_memory(dfm_status status) {
+  if (status == DFM_E_NOMEM) throw std::bad_alloc();
+}
+
 // said: sentences() before the host was called. Its own reason comes along where it has given one.
-bool host_failed(const World &w, const RigidSet &set, const char *what, uint64_t said, uint32_t *trouble) {
+bool host_failed(const World &w, const RigidSet &set, dfm_status status, const char *what, uint64_t said, uint32_t *trouble) {
+  need_memory(status);
   *trouble |= DFM_TROUBLE_PLUGIN;
   const std::string why = said != sentences() ? last_error() : "take a smaller step or look at its masses and motors";
   set_last_error(format("step %llu, rigid body '%s' and those with it: host '%s' %s; %s", static_cast<unsigned long long>(w.step_count),
@@ -72,8 +79,9 @@ bool World::ask_rigids(uint32_t *trouble) {
   for (auto &set : rigid_sets) {
     RigidSet &s = *set;
     std::fill(s.velocity.begin(), s.velocity.end(), 0.0);
-    if (s.host.predict(s.self, &s.step, s.velocity.data()) != DFM_OK) return host_failed(*this, s, "gave no velocities", said, trouble);
-    if (!finite(s.velocity.data(), s.velocity.size())) return host_failed(*this, s, "gave velocities that are not finite", said, trouble);
+    if (const dfm_status status = s.host.predict(s.self, &s.step, s.velocity.data()); status != DFM_OK)
+      return host_failed(*this, s, status, "gave no velocities", said, trouble);
+    if (!finite(s.velocity.data(), s.velocity.size())) return host_failed(*this, s, DFM_OK, "gave velocities that are not finite", said, trouble);
   }
   return true;
 }
@@ -102,7 +110,9 @@ void rigid_response(World &w, uint32_t group, double *matrix) {
   for (auto &set : w.rigid_sets) {
     if (group < set->first_group || group >= set->first_group + set->ngroup) continue;
     const size_t width = 6 * size_t{w.rigid_groups[group]};
-    if (set->host.respond(set->self, &set->step, group - set->first_group, matrix) != DFM_OK || !finite(matrix, width * width))
+    const dfm_status status = set->host.respond(set->self, &set->step, group - set->first_group, matrix);
+    need_memory(status);
+    if (status != DFM_OK || !finite(matrix, width * width))
       fail(DFM_E_FATAL, "rigid host '%s' does not answer impulses on '%s' and those with it", set->host_name.c_str(), set->defs[0].name);
     return;
   }
@@ -144,8 +154,9 @@ bool revise_rigids(World &w) {
   for (auto &set : w.rigid_sets) {
     if (!set->host.revise) continue;
     uint32_t changed = 0;
-    if (set->host.revise(set->self, &set->step, set->impulse.data(), set->revised.data(), &changed) != DFM_OK ||
-        !finite(set->revised.data(), set->revised.size()))
+    const dfm_status status = set->host.revise(set->self, &set->step, set->impulse.data(), set->revised.data(), &changed);
+    need_memory(status);
+    if (status != DFM_OK || !finite(set->revised.data(), set->revised.size()))
       fail(DFM_E_FATAL, "rigid host '%s' does not answer contact on '%s' and those with it", set->host_name.c_str(), set->defs[0].name);
     if (!changed) continue;
     any = true;
@@ -169,17 +180,17 @@ int World::ask_rigid_ends(uint32_t *trouble) {
   const uint64_t said = sentences();
   bool again = false;
   for (auto &set : rigid_sets)
-    if (set->host.push && set->host.push(set->self, &set->step, set->impulse.data()) != DFM_OK)
-      return host_failed(*this, *set, "did not take its impulses", said, trouble);
+    if (const dfm_status status = set->host.push ? set->host.push(set->self, &set->step, set->impulse.data()) : DFM_OK; status != DFM_OK)
+      return host_failed(*this, *set, status, "did not take its impulses", said, trouble);
   for (auto &set : rigid_sets) {
     RigidSet &s = *set;
     const dfm_status status = s.host.commit(s.self, &s.step, s.impulse.data(), s.next.data(), s.next_extra.data());
-    if (status != DFM_OK && status != DFM_RIGID_AGAIN) return host_failed(*this, s, "could not end its step", said, trouble);
+    if (status != DFM_OK && status != DFM_RIGID_AGAIN) return host_failed(*this, s, status, "could not end its step", said, trouble);
     again |= status == DFM_RIGID_AGAIN;
     for (uint32_t i = 0; i < s.defs.size(); ++i)
       if (s.group[i] == DFM_RIGID_STILL) s.next[i] = s.state[i];
     if (!finite(reinterpret_cast<const double *>(s.next.data()), kStateValues * s.next.size()) || !finite(s.next_extra.data(), s.next_extra.size()))
-      return host_failed(*this, s, "ended its step with something not finite", said, trouble);
+      return host_failed(*this, s, DFM_OK, "ended its step with something not finite", said, trouble);
   }
   return again ? 2 : 1;
 }

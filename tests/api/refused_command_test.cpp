@@ -1,0 +1,54 @@
+// The command with one operator new refused, at places spread over its whole life: it ends by itself, with a documented exit code and a sentence.
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "support.h"
+
+namespace {
+
+test::CommandResult deform_without(long n, const std::string &count, const std::vector<std::string> &args) {
+  std::vector<std::string> argv{"/usr/bin/env", "LD_PRELOAD=" DEFORM_REFUSE_NEW, "REFUSE_NEW=" + std::to_string(n)};
+  argv.insert(argv.end(), {"REFUSE_NEW_COUNT=" + count, DEFORM_COMMAND});
+  argv.insert(argv.end(), args.begin(), args.end());
+  return test::run(argv);
+}
+
+// Every allocation in turn would be thousands of runs: the first ones of the set-up each by itself, the others in strides that grow, and the last ones.
+void walk(const std::string &name, const std::vector<std::string> &args, int runs) {
+#ifdef DEFORM_SANITIZED
+  GTEST_SKIP() << "a sanitizer brings its own operator new";
+#endif
+  const std::string folder = test::scratch("refused_" + name), count = folder + "/count";
+  std::vector<std::string> with = args;
+  if (args[0] == "run") with.insert(with.end(), {"--out", folder + "/out"});
+  const test::CommandResult whole = deform_without(-1, count, with);
+  ASSERT_EQ(whole.exit_code, 0) << whole.err;
+  const long total = std::atol(test::read_file(count).c_str());
+  ASSERT_GT(total, 100);
+  int refused = 0;
+  for (int i = 0; i < runs; ++i) {
+    const long n = long(std::llround(std::pow(double(total), double(i) / (runs - 1)))) - 1;
+    const test::CommandResult r = deform_without(n, count, with);
+    EXPECT_TRUE(r.exit_code == 0 || r.exit_code == 2 || r.exit_code == 3)
+        << name << ", allocation " << n << " of " << total << ": exit " << r.exit_code << "\n" << r.err;
+    refused += r.exit_code != 0;
+    if (r.exit_code != 0) {
+      EXPECT_NE(r.err.find("deform: "), std::string::npos) << "allocation " << n << " of " << total << ": " << r.err;
+    }
+  }
+  EXPECT_GT(refused, runs / 2);
+}
+
+}  // namespace
+
+TEST(RefusedCommand, RunOfAScene_EndsWithASentence) {
+  walk("run", {"run", DEFORM_SOURCE_DIR "/examples/scenes/slope_block.json", "--time", "0.002", "--quiet"}, 500);
+}
+TEST(RefusedCommand, RunOfRigidBodies_EndsWithASentence) {
+  walk("rigid", {"run", DEFORM_SOURCE_DIR "/examples/scenes/rigid_on_bed.json", "--time", "0.002", "--quiet"}, 200);
+}
+TEST(RefusedCommand, Explain_EndsWithASentence) {
+  walk("explain", {"explain", DEFORM_SOURCE_DIR "/examples/scenes/two_cylinders_coarse.json"}, 200);
+}
+TEST(RefusedCommand, PluginList_EndsWithASentence) { walk("list", {"plugin", "list"}, 150); }

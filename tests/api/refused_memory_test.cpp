@@ -1,0 +1,161 @@
+// One allocation is refused, whichever it is, of the context's hooks or of operator new: the call fails cleanly or does without, the world is what it
+// was, and once memory is back everything ends with the bits of a world that never missed any.
+#include "refused_memory.h"
+
+#include <functional>
+
+#include "bristle_law.h"
+#include "hook.h"
+#include "obstacle.h"
+#include "rigid.h"
+
+namespace {
+
+using test::Refusal;
+using Build = std::function<dfm_world(dfm_context *)>;
+constexpr int kSteps = 10;
+constexpr double kStep = 1e-4;   // s, below every bound: a step is one sub-step
+
+dfm_context *make_context() {
+  dfm_context_def d = test::refusing_context();
+  d.plugin_dir = DEFORM_PLUGIN_DIR;
+  dfm_context *c = nullptr;
+  EXPECT_EQ(dfm_context_create(&d, &c), DFM_OK) << dfm_last_error();
+  EXPECT_EQ(dfm_plugin_register_static(c, dfm_plugin_entry_bristle, "bristle"), DFM_OK) << dfm_last_error();
+  return c;
+}
+
+// Two legs that close on each other.
+dfm_world self_contact(dfm_context *c) {
+  const dfm_world w = test::make_self_world(c);
+  test::HookOptions o;
+  o.young = 1e4, o.cell = 0.002, o.close = 1.5;
+  test::make_hook(w, o);
+  return w;
+}
+
+// Two small boxes: one falls asleep at once, one drops on it and wakes it.
+dfm_world sleepers(dfm_context *c) {
+  dfm_world_def d = dfm_world_def_default();
+  d.sleep = 1, d.sleep_speed = 0.5, d.sleep_time = 3e-4;
+  dfm_world w = 0;
+  test::ok(dfm_world_create(c, &d, &w));
+  test::add_plane(w, "floor");
+  test::BodyOptions o;
+  o.young = 2e5, o.damping_stiffness = 2e-3, o.damping_mass = 20, o.position = {0, 0, 4e-5};
+  test::make_body(c, w, "beam", {0.1, 0.1, 0.1}, 10, o);
+  o.position = {0.02, 0.03, 0.1009}, o.velocity = {0, 0, -1};
+  test::make_body(c, w, "beam", {0.1, 0.1, 0.1}, 10, o);
+  return w;
+}
+
+// A box on a hinge whose motor turns it into a soft one, and a free one that falls on that.
+dfm_world rigid_host(dfm_context *c) {
+  const dfm_world w = test::make_world(c);
+  test::add_plane(w, "floor");
+  test::BodyOptions o;
+  o.young = 2e5, o.damping_stiffness = 1e-3, o.position = {0, 0, 4e-5};
+  test::make_body(c, w, "beam", {0.1, 0.1, 0.1}, 10, o);
+  dfm_joint_def hinge = test::joint(DFM_JOINT_HINGE, 0, DFM_RIGID_WORLD, {0.3, 0, 0.1202}, {0, 1, 0});
+  hinge.motor = 1, hinge.velocity = -2, hinge.max = 5;
+  dfm_rigid_def falling = test::box("free", {0.1, 0.1, 0.02}, 0.2, {0, 0, 0.1202});
+  falling.velocity[2] = -1;
+  test::create(w, {test::box("arm", {0.2, 0.02, 0.02}, 0.5, {0.1, 0, 0.1202}), falling}, {hinge});
+  return w;
+}
+
+// A law that remembers, two materials in contact, triangles below.
+dfm_world bristles(dfm_context *c) {
+  const dfm_world w = test::make_world(c, {2, 0, -9.81});
+  const test::Triangles slab = test::box_surface({0.3, 0.3, 0.05}, 1);
+  test::add_mesh(w, "slab", slab);
+  dfm_friction_def f{};
+  f.size = sizeof f, f.between[0] = f.between[1] = "*", f.law = "test.bristle";
+  test::ok(dfm_world_add_friction(w, &f));
+  test::BodyOptions o;
+  o.young = 2e5, o.damping_stiffness = 1e-3, o.position = {0, 0, 0.0501};
+  test::make_body(c, w, "beam", {0.1, 0.1, 0.1}, 10, o);
+  o.position = {0.013, 0.007, 0.1503};
+  test::make_body(c, w, "beam", {0.1, 0.1, 0.1}, 10, o);
+  return w;
+}
+
+// Steps with the n-th allocation from here on refused; what failed is tried again with memory back. Whether the n-th was reached.
+bool walk(const Build &build, int64_t n, uint64_t expected, int *refused) {
+  dfm_context *const c = make_context();
+  const dfm_world w = build(c);
+  Refusal::arm(n);
+  bool armed = true, came = false;
+  for (int i = 0; i < kSteps; ++i) {
+    const int64_t kept = Refusal::refuse;
+    const uint64_t before = dfm_world_hash(w);
+    dfm_status status = dfm_world_step(w, kStep, nullptr);
+    if (armed && Refusal::calls > kept) Refusal::disarm(), armed = false, came = true;
+    if (status == DFM_OK) continue;
+    ++*refused;
+    EXPECT_EQ(status, DFM_E_NOMEM) << "allocation " << n << ", step " << i << ": " << dfm_last_error();
+    EXPECT_EQ(dfm_world_hash(w), before) << "allocation " << n << ", step " << i;
+    status = dfm_world_step(w, kStep, nullptr);
+    EXPECT_EQ(status, DFM_OK) << "allocation " << n << ", step " << i << ": " << dfm_last_error();
+  }
+  if (armed) Refusal::disarm();
+  EXPECT_EQ(dfm_world_hash(w), expected) << "allocation " << n;
+  dfm_context_destroy(c);
+  return came;
+}
+
+void walk_all(const Build &build, int least) {
+  uint64_t expected = 0;
+  int refused = 0;
+  ASSERT_FALSE(walk(build, int64_t(1) << 40, [&] {
+    dfm_context *const c = make_context();
+    const dfm_world w = build(c);
+    for (int i = 0; i < kSteps; ++i) EXPECT_EQ(dfm_world_step(w, kStep, nullptr), DFM_OK) << dfm_last_error();
+    EXPECT_EQ(test::stats(w).substeps_max, 1u);
+    EXPECT_GT(test::contacts(w).size(), 0u) << "the scene has no contact: the walk would show little";
+    expected = dfm_world_hash(w);
+    dfm_context_destroy(c);
+    return expected;
+  }(), &refused));
+  int64_t n = 0;
+  while (!testing::Test::HasFailure() && walk(build, n, expected, &refused)) ++n;
+  EXPECT_GT(n, least);
+  EXPECT_GT(refused, least / 2);
+}
+
+}  // namespace
+
+TEST(RefusedMemory, InAStepWithSelfContact_LeavesTheWorldAsItWas) { walk_all(self_contact, 40); }
+TEST(RefusedMemory, InAStepThatFallsAsleepAndWakes_LeavesTheWorldAsItWas) { walk_all(sleepers, 40); }
+TEST(RefusedMemory, InAStepWithARigidHost_LeavesTheWorldAsItWas) { walk_all(rigid_host, 40); }
+TEST(RefusedMemory, InAStepOfALawThatRemembers_LeavesTheWorldAsItWas) { walk_all(bristles, 40); }
+
+// Context, world and bodies: what was refused is not there, and nothing is left of it.
+TEST(RefusedMemory, InTheSetUp_EndsInAnErrorAndLeaksNothing) {
+  int refused = 0;
+  bool through = false;
+  for (int64_t n = 0; !through && n < 100000; n += n < 400 ? 1 : 7) {
+    const int64_t live = Refusal::live;
+    {
+      dfm_context_def d = test::refusing_context();
+      dfm_context *c = nullptr;
+      dfm_world w = 0;
+      dfm_tetmesh mesh = 0;
+      const double size[3] = {0.1, 0.1, 0.1};
+      Refusal::arm(n);
+      dfm_status status = dfm_context_create(&d, &c);
+      if (status == DFM_OK) status = dfm_world_create(c, nullptr, &w);
+      if (status == DFM_OK) status = dfm_tetmesh_make(c, "beam", size, 10, &mesh);
+      through = !Refusal::disarm();
+      if (status != DFM_OK) {
+        ++refused;
+        EXPECT_TRUE(status == DFM_E_NOMEM || status == DFM_E_IO) << "allocation " << n << ": " << dfm_status_name(status) << ": " << dfm_last_error();
+      }
+      dfm_context_destroy(c);
+    }
+    if (n > 400) {   // tables of the process have their size by then
+      EXPECT_EQ(Refusal::live, live) << "allocation " << n;
+    }
+  }
+  EXPECT_GT(refused, 100);
+}
