@@ -18,7 +18,7 @@ extern "C" {
 #endif
 /** Says hello. Threads: Any thread. Since 0.1. */
 DFM_API int dfm_hello(void);
-/** As above, louder. */
+/** As above, louder. Threads: Any thread. Since 0.1. */
 DFM_API int dfm_hello_loud(void);
 #ifdef __cplusplus
 }
@@ -95,7 +95,8 @@ BAD = {
                      ("libdeform/include/deform/deform.hpp", "=inline int hello() { return dfm_hello(); }\n"),
                      ("bindings/ode/include/deform/ode.h", "=DFM_API int dfm_ode_hello(void);\n")],
     "threads": [("libdeform/include/deform/base.h", "\nDFM_API int dfm_silent(void);\n"),
-                ("libdeform/include/deform/base.h", "\n/** Says nothing of threads. */\nDFM_API int dfm_silent(int a,\n  int b);\n")],
+                ("libdeform/include/deform/base.h", "\n/** Says nothing of threads. */\nDFM_API int dfm_silent(int a,\n  int b);\n"),
+                ("libdeform/include/deform/base.h", "\n/** Both. Threads: Any thread. */\nDFM_API int dfm_said(void);\nDFM_API int dfm_silent(void);\n")],
 }
 
 

@@ -46,18 +46,13 @@ def public_headers(tree):
 
 
 def threads(tree):
-    """Each function says from which thread it may be called. A comment covers its declaration and those below it up to the next
-    empty line, so that a group shares one."""
+    """Each function says in a comment of its own, right above it, from which thread it may be called."""
     for path in tree.select(PUBLIC, ext=(".h",)):
         content = tree.text(path)
         code = without_comments(content)
         for match in DECLARATION.finditer(code):
-            start = content.rfind("\n\n", 0, match.start())
-            # A blank line inside a comment does not end its group.
-            while start > 0 and content.rfind("/*", 0, start) > content.rfind("*/", 0, start):
-                start = content.rfind("\n\n", 0, start)
-            end = content.find("\n", match.end())
-            if "Threads:" not in content[max(start, 0):end]:
+            above = content[:match.start()].rstrip()
+            if not above.endswith("*/") or "Threads:" not in above[above.rfind("/*"):]:
                 yield path, line_of(content, match.start()), f"{match.group(1)} has no comment that says \"Threads: ...\" (see base.h for the four phrases)"
 
 

@@ -71,15 +71,20 @@ typedef struct dfm_body_info {
 } dfm_body_info;
 /** What it is made of. Threads: Any thread. Not during step. Since 0.1. */
 DFM_API dfm_status dfm_body_get_info(dfm_body body, dfm_body_info *out);
-/** Changes what its def gave. Threads: Not during step. Since 0.1. */
+/** Changes the user pointer that its def gave. @return DFM_OK; DFM_E_HANDLE. Threads: Not during step. Since 0.1. */
 DFM_API dfm_status dfm_body_set_user(dfm_body body, void *user);
+/** Changes the collision filter that its def gave (dfm_body_def). @return DFM_OK; DFM_E_HANDLE. Threads: Not during step. Since 0.1. */
 DFM_API dfm_status dfm_body_set_filter(dfm_body body, uint32_t category, uint32_t collides_with);
 
-/** Positions and velocities of all phyxels, [npoint,3] each; either may be NULL. Setting keeps held points where they are told to be.
+/** Positions and velocities of all phyxels, [npoint,3] each, m and m/s; either may be NULL.
+ * @param capacity of x and v in phyxels; 0 with both NULL only counts. @return DFM_OK; DFM_E_ARG capacity too small (untouched, *n set); DFM_E_HANDLE.
  * Threads: Not during step. Since 0.1. */
 DFM_API dfm_status dfm_body_get_state(dfm_body body, uint32_t capacity, double *x, double *v, uint32_t *n);
+/** Sets them, [n,3] each, m and m/s; either may be NULL. Held components stay where they are told to be. @param n number of phyxels
+ * @return DFM_OK; DFM_E_ARG n is another number, or a value is not finite (nothing changed); DFM_E_HANDLE. Threads: Not during step. Since 0.1. */
 DFM_API dfm_status dfm_body_set_state(dfm_body body, uint32_t n, const double *x, const double *v);
-/** Rest positions, [npoint,3], m, pose not applied; cells [ntet,4]. Either may be NULL. */
+/** Rest positions, [npoint,3], m, pose not applied; cells [ntet,4], phyxel numbers. Either may be NULL.
+ * @return DFM_OK; DFM_E_ARG a capacity too small (untouched); DFM_E_HANDLE. Threads: Any thread. Not during step. Since 0.1. */
 DFM_API dfm_status dfm_body_get_rest(dfm_body body, uint32_t capacity_points, double *x, uint32_t capacity_tets, uint32_t *tets);
 
 /** Holds (bits 1 x, 2 y, 4 z) or releases (0) components of points. Threads: Not during step. Since 0.1. */
@@ -93,6 +98,7 @@ DFM_API dfm_status dfm_body_move_held(dfm_body body, uint32_t n, const uint32_t 
  * (its amplitude[0] counts). @param load out, number to remove it by; may be NULL. Threads: Not during step. Since 0.1. */
 DFM_API dfm_status dfm_body_add_load(dfm_body body, uint32_t n, const uint32_t *points, const double *force,
                                      uint32_t nkey, const dfm_scale_key *keys, const dfm_sine *sine, uint32_t *load);
+/** Removes a load by its number. @return DFM_OK; DFM_E_ARG no such load; DFM_E_HANDLE. Threads: Not during step. Since 0.1. */
 DFM_API dfm_status dfm_body_remove_load(dfm_body body, uint32_t load);
 
 /** A spring of rest length zero from a point of the body to a place in the world, F = stiffness (to - x) + damping (v_to - v), where x = sum
@@ -113,6 +119,7 @@ DFM_API dfm_status dfm_body_add_spring(dfm_body body, const dfm_spring_def *def,
 DFM_API dfm_status dfm_body_set_spring_target(dfm_body body, uint32_t spring, const double to[3]);
 /** The force with which it pulls at the body now, N. @param force out [3]. Threads: Any thread. Not during step. Since 0.1. */
 DFM_API dfm_status dfm_body_get_spring_force(dfm_body body, uint32_t spring, double force[3]);
+/** Removes a spring by its number. @return DFM_OK; DFM_E_ARG no such spring; DFM_E_HANDLE. Threads: Not during step. Since 0.1. */
 DFM_API dfm_status dfm_body_remove_spring(dfm_body body, uint32_t spring);
 /** Impulse (N s) at a point of space, spread over the nearest surface triangle by barycentric weights. Threads: Not during step. Since 0.1. */
 DFM_API dfm_status dfm_body_apply_impulse(dfm_body body, const double point[3], const double impulse[3]);
@@ -131,11 +138,16 @@ DFM_API dfm_status dfm_body_is_asleep(dfm_body body, bool *asleep);
  * created (N s): divide differences by the interval for a mean force. elastic is NAN if the model has no energy. */
 typedef struct dfm_body_measure {
   uint32_t size, inverted;
-  double mass, com[3], velocity[3], momentum[3], angular[3], kinetic, elastic, volume, rest_volume, speed_max, contact_impulse[3];
+  double mass, com[3], velocity[3];            /* kg; m, m/s of the center of mass */
+  double momentum[3], angular[3];              /* kg m/s; kg m2/s about the center of mass */
+  double kinetic, elastic;                     /* J; elastic NAN where the model gives no energy */
+  double volume, rest_volume, speed_max;       /* m3 of the cells, signed; m/s of the fastest phyxel */
+  double contact_impulse[3];                   /* N s that contact has given it since creation */
 } dfm_body_measure;
 /** @return DFM_OK; DFM_E_HANDLE; DFM_E_ARG. Threads: Any thread. Not during step. Since 0.1. */
 DFM_API dfm_status dfm_body_get_measure(dfm_body body, dfm_body_measure *out);
-/** Per-cell strain energy density, J/m3, [ntet]; DFM_E_UNSUPPORTED if the model offers none. */
+/** Strain energy density of each cell, J/m3, [ntet]. @param capacity of out in cells
+ * @return DFM_OK; DFM_E_UNSUPPORTED the model offers none; DFM_E_ARG capacity too small; DFM_E_HANDLE. Threads: Any thread. Not during step. Since 0.1. */
 DFM_API dfm_status dfm_body_energy_density(dfm_body body, uint32_t capacity, double *out);
 #ifdef __cplusplus
 }

@@ -22,13 +22,22 @@ DFM_API dfm_status dfm_world_add_friction(dfm_world world, const dfm_friction_de
 /** Lets two named sides pass or touch, whatever their filters say. Threads: Not during step. Since 0.1. */
 DFM_API dfm_status dfm_world_filter_pair(dfm_world world, const char *a, const char *b, bool collide);
 
-/** One contact of the last sub-step. Forces act on side a, in N: fn along normal, ft[0] along tangent, ft[1] along normal x tangent. */
-typedef struct { uint32_t size, flags; uint64_t body_a, body_b, key;   /* b 0: obstacle that feels nothing; flags 1 sticking, 2 began */
-                 uint32_t feature_a, feature_b, kind, law;             /* kind 0 vertex-face, 1 edge-edge, 2 primitive */
-                 double point[3], normal[3], tangent[3];               /* normal from b to a; 2nd tangent = normal x tangent */
-                 double gap, area, fn, ft[2], slip[2], bristle[2]; } dfm_contact;
+/** One contact of the last sub-step. Forces act on side a; components in the plane of contact: [0] along tangent, [1] along normal x tangent. */
+typedef struct {
+  uint32_t size, flags;             /* flags: DFM_CONTACT_* */
+  uint64_t body_a, body_b, key;     /* body_b 0: an obstacle that feels nothing; key: the same for as long as the contact lasts */
+  uint32_t feature_a, feature_b;    /* surfel, edge or triangle number on each side; kind 2: feature_b is the obstacle's number */
+  uint32_t kind, law;               /* 0 vertex-face, 1 edge-edge, 2 primitive; law: number of its friction law in the world */
+  double point[3];                  /* m, world */
+  double normal[3], tangent[3];     /* unit; normal from b to a */
+  double gap;                       /* m, distance of the surfaces less the rest distance d_c; a contact at rest has 0 */
+  double area;                      /* m2, of the surface that the contact stands for; forces per area count with it */
+  double fn, ft[2];                 /* N, mean over the sub-step */
+  double slip[2];                   /* m/s, of a relative to b */
+  double bristle[2];                /* m, deflection of the law's bristles; 0 for laws without memory */
+} dfm_contact;
 enum { DFM_CONTACT_STICKING = 1, DFM_CONTACT_BEGAN = 2 };
-/** @param capacity of out in contacts; 0 with out NULL only counts. Contacts come in key order. kind 2: feature_b is the obstacle's number.
+/** All contacts of the last sub-step, in key order. @param capacity of out in contacts; 0 with out NULL only counts.
  * @return DFM_OK; DFM_E_ARG capacity too small (out untouched, *n set); DFM_E_HANDLE. Threads: Any thread. Not during step. Since 0.1. */
 DFM_API dfm_status dfm_world_contacts(dfm_world world, uint32_t capacity, dfm_contact *out, uint32_t *n);
 
@@ -53,7 +62,11 @@ DFM_API dfm_status dfm_world_pairs(dfm_world world, uint32_t capacity, dfm_pair_
  * @return DFM_OK; DFM_E_ARG; DFM_E_HANDLE a or b is none of this world. Threads: Any thread. Not during step. Since 0.1. */
 DFM_API dfm_status dfm_world_pair_wrench(dfm_world world, uint64_t a, uint64_t b, const double point[3], double force[3], double moment[3]);
 
-typedef struct dfm_contact_event { uint32_t size, kind; uint64_t a, b, key; double t; } dfm_contact_event;
+typedef struct dfm_contact_event {
+  uint32_t size, kind;              /* DFM_EVENT_* */
+  uint64_t a, b, key;               /* handles of body and body or obstacle; key of the contact */
+  double t;                         /* s, simulated time */
+} dfm_contact_event;
 enum { DFM_EVENT_BEGIN = 1, DFM_EVENT_END = 2 };
 /** Begin and end of contacts since the last call; empties the list (it keeps the newest 65,536). Threads: Not during step. Since 0.1. */
 DFM_API dfm_status dfm_world_events(dfm_world world, uint32_t capacity, dfm_contact_event *out, uint32_t *n);

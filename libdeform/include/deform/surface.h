@@ -13,15 +13,17 @@ extern "C" {
  * @return DFM_OK; DFM_E_HANDLE; DFM_E_ARG capacity too small (xyz untouched, *n set)
  * Threads: Any thread. Not during step. Since 0.1. */
 DFM_API dfm_status dfm_surface_positions(dfm_body body, uint32_t capacity, double *xyz, uint32_t *n);
-/** As above: velocities m/s, [n,3]. */
+/** Velocities of all surfels, m/s, [n,3]; capacity and errors as for dfm_surface_positions. Threads: Any thread. Not during step. Since 0.1. */
 DFM_API dfm_status dfm_surface_velocities(dfm_body body, uint32_t capacity, double *xyz, uint32_t *n);
-/** Area-weighted unit normals, outward, [n,3]. */
+/** Area-weighted unit normals of all surfels, outward, [n,3]; capacity and errors as for dfm_surface_positions. Threads: Any thread. Not during step. Since 0.1. */
 DFM_API dfm_status dfm_surface_normals(dfm_body body, uint32_t capacity, double *xyz, uint32_t *n);
-/** Contact force on each surfel in the last sub-step, N, [n,3]. */
+/** Contact force on each surfel in the last sub-step, N, [n,3]; capacity and errors as for dfm_surface_positions. Threads: Any thread. Not during step. Since 0.1. */
 DFM_API dfm_status dfm_surface_forces(dfm_body body, uint32_t capacity, double *xyz, uint32_t *n);
-/** Triangles, [n,3] surfel numbers, counter-clockwise seen from outside. */
+/** Triangles, [n,3] surfel numbers, counter-clockwise seen from outside. @param capacity of tri in triangles; else as dfm_surface_positions.
+ * Threads: Any thread. Not during step. Since 0.1. */
 DFM_API dfm_status dfm_surface_triangles(dfm_body body, uint32_t capacity, uint32_t *tri, uint32_t *n);
-/** Phyxel under each surfel, [n]; DFM_E_UNSUPPORTED unless the coupling is identity. */
+/** Phyxel under each surfel, [n]; capacity as for dfm_surface_positions. @return DFM_OK; DFM_E_UNSUPPORTED unless the coupling is identity;
+ * DFM_E_ARG; DFM_E_HANDLE. Threads: Any thread. Not during step. Since 0.1. */
 DFM_API dfm_status dfm_surface_points(dfm_body body, uint32_t capacity, uint32_t *point, uint32_t *n);
 
 typedef struct dfm_ray_hit { uint32_t size, triangle; dfm_body body; dfm_obstacle obstacle; double distance, point[3], normal[3]; } dfm_ray_hit;

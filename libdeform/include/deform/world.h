@@ -67,7 +67,8 @@ DFM_API dfm_status dfm_world_step(dfm_world world, double dt, uint32_t *trouble)
 /** Largest step the current state allows without sub-steps (0.9 of the proven bound), s; +INFINITY if nothing bounds it.
  * @param body,point  out, the element that bounds it; may be NULL. Threads: Not during step. Since 0.1. */
 DFM_API dfm_status dfm_world_stable_step(dfm_world world, double *dt, dfm_body *body, uint32_t *point);
-DFM_API double dfm_world_time(dfm_world world);        /* s; NAN for a stale handle */
+/** Simulated time, s; NAN for a stale handle. Threads: Any thread. Not during step. Since 0.1. */
+DFM_API double dfm_world_time(dfm_world world);
 
 /** FNV-1a 64 of x, v, model state, contact keys and bristles, in id order; 0 for a stale handle.
  * Threads: Any thread. Not during step. Since 0.1. */
@@ -84,6 +85,7 @@ DFM_API dfm_status dfm_world_restore(dfm_world world, const void *buffer, size_t
 DFM_API dfm_status dfm_world_find_body(dfm_world world, const char *name, dfm_body *out);
 /** Bodies in id order. capacity 0 with bodies NULL only counts. Threads: Any thread. Not during step. Since 0.1. */
 DFM_API dfm_status dfm_world_bodies(dfm_world world, uint32_t capacity, dfm_body *bodies, uint32_t *n);
+/** Obstacles in id order; capacity as for dfm_world_bodies. Threads: Any thread. Not during step. Since 0.1. */
 DFM_API dfm_status dfm_world_obstacles(dfm_world world, uint32_t capacity, dfm_obstacle *obstacles, uint32_t *n);
 
 /* ---- what a step did --------------------------------------------------------------------------------------- */
@@ -106,9 +108,9 @@ typedef struct dfm_world_stats {
 /** @return DFM_OK; DFM_E_HANDLE. Threads: Any thread. Not during step. Since 0.1. */
 DFM_API dfm_status dfm_world_get_stats(dfm_world world, dfm_world_stats *out);
 
+typedef struct dfm_stage_time { const char *name; double seconds; uint64_t calls; } dfm_stage_time;   /* name: static storage */
 /** Seconds spent in each stage of the plan since creation (CPU time of the stepping thread is not separated from waiting).
- * names are static storage. Threads: Not during step. Since 0.1. */
-typedef struct dfm_stage_time { const char *name; double seconds; uint64_t calls; } dfm_stage_time;
+ * @param capacity of out in stages; 0 with out NULL only counts. @return DFM_OK; DFM_E_ARG; DFM_E_HANDLE. Threads: Not during step. Since 0.1. */
 DFM_API dfm_status dfm_world_profile(dfm_world world, uint32_t capacity, dfm_stage_time *out, uint32_t *n);
 
 /** The plan as JSON text (UTF-8, NUL-terminated): {"effects":[{"name","asked_by","provided_by"}], "stages":[{"name","why","cost"}],
