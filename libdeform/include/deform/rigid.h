@@ -130,7 +130,8 @@ DFM_API dfm_status dfm_world_rigids(dfm_world world, uint32_t capacity, dfm_rigi
 DFM_API dfm_status dfm_world_find_rigid(dfm_world world, const char *name, dfm_rigid *out);
 /** Its def as created (name valid while it lives). Threads: Any thread. Not during step. Since 0.1. */
 DFM_API dfm_status dfm_rigid_get_def(dfm_rigid rigid, dfm_rigid_def *out);
-/** Pose and velocities now: m, unit quaternion, m/s of the center of mass, rad/s. @return DFM_OK; DFM_E_HANDLE. Threads: Any thread. Not during step. Since 0.1. */
+/** Pose and velocities now: m, unit quaternion, m/s of the center of mass, rad/s.
+ * @return DFM_OK; DFM_E_HANDLE. Threads: Any thread. Not during step. Since 0.1. */
 DFM_API dfm_status dfm_rigid_get_state(dfm_rigid rigid, dfm_rigid_state *out);
 /** Puts a body somewhere, at once; a body with joints must fit them (what does not is pulled back in the next step).
  * @return DFM_E_ARG not finite, or the body is fixed. Threads: Not during step. Since 0.1. */

@@ -13,11 +13,14 @@ extern "C" {
  * @return DFM_OK; DFM_E_HANDLE; DFM_E_ARG capacity too small (xyz untouched, *n set)
  * Threads: Any thread. Not during step. Since 0.1. */
 DFM_API dfm_status dfm_surface_positions(dfm_body body, uint32_t capacity, double *xyz, uint32_t *n);
-/** Velocities of all surfels, m/s, [n,3]; capacity and errors as for dfm_surface_positions. Threads: Any thread. Not during step. Since 0.1. */
+/** Velocities of all surfels, m/s, [n,3]; capacity and errors as for dfm_surface_positions.
+ * Threads: Any thread. Not during step. Since 0.1. */
 DFM_API dfm_status dfm_surface_velocities(dfm_body body, uint32_t capacity, double *xyz, uint32_t *n);
-/** Area-weighted unit normals of all surfels, outward, [n,3]; capacity and errors as for dfm_surface_positions. Threads: Any thread. Not during step. Since 0.1. */
+/** Area-weighted unit normals of all surfels, outward, [n,3]; capacity and errors as for dfm_surface_positions.
+ * Threads: Any thread. Not during step. Since 0.1. */
 DFM_API dfm_status dfm_surface_normals(dfm_body body, uint32_t capacity, double *xyz, uint32_t *n);
-/** Contact force on each surfel in the last sub-step, N, [n,3]; capacity and errors as for dfm_surface_positions. Threads: Any thread. Not during step. Since 0.1. */
+/** Contact force on each surfel in the last sub-step, N, [n,3]; capacity and errors as for dfm_surface_positions.
+ * Threads: Any thread. Not during step. Since 0.1. */
 DFM_API dfm_status dfm_surface_forces(dfm_body body, uint32_t capacity, double *xyz, uint32_t *n);
 /** Triangles, [n,3] surfel numbers, counter-clockwise seen from outside. @param capacity of tri in triangles; else as dfm_surface_positions.
  * Threads: Any thread. Not during step. Since 0.1. */
