@@ -13,6 +13,7 @@
 #include <memory>
 
 #include "frames.h"
+#include "impulses.h"
 #include "messages.h"
 #include "output.h"
 #include "progress.h"
@@ -62,7 +63,7 @@ class Runner {
   Runner(const SceneFile &scene, const RunOptions &options, const Globals &globals)
       : scene_(scene), options_(options), world_(scene.world()), duration_(options.time > 0 ? options.time : scene.settings().duration),
         check_every_step_(options.check || scene.settings().check), progress_(!globals.quiet && !globals.json),
-        outputs_(scene, options.out), checker_(scene), record_(scene.settings().every), frame_(frame_interval()) {
+        outputs_(scene, options.out), checker_(scene), impulses_(scene), record_(scene.settings().every), frame_(frame_interval()) {
     if (frame_interval() > 0) frames_ = Frames::create(scene, options.out + "/frames");
   }
 
@@ -80,6 +81,7 @@ class Runner {
     if (result_.interrupted || result_.stopped) outputs_.write_last();
     if (result_.hold_begun) end_hold();
     outputs_.write_nodes();
+    result_.impulses = impulses_.json();
   }
 
   const RunResult &result() const { return result_; }
@@ -133,6 +135,7 @@ class Runner {
     if (status != DFM_OK) return stop(status, step), false;
     ++result_.steps;
     trouble_ |= trouble;
+    impulses_.add_step();
     result_.simulated = dfm_world_time(world_);
     return true;
   }
@@ -197,6 +200,7 @@ class Runner {
   Progress progress_;
   Outputs outputs_;
   Checker checker_;
+  Impulses impulses_;
   Schedule record_, frame_;
   std::unique_ptr<Frames> frames_;
   RunResult result_;

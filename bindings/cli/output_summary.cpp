@@ -189,7 +189,7 @@ std::string summary_json(const SceneFile &scene, const RunOptions &options, cons
   out.add("inverted_max", std::to_string(std::max(checks.inverted_max, stats.inverted_max)));
   out.add("guard_steps", std::to_string(stats.guard_steps)).add("guard", guard.text()).add("unconverged_steps", std::to_string(stats.unconverged));
   out.add("solver", solver.text()).add("hold", hold.text()).add("effects", effects.text()).add("plugins", plugins_json(scene));
-  out.add("bodies", bodies_json(scene)).add("contacts", contacts.text()).add("swaps", "[]").add("state_hash", hash);
+  out.add("bodies", bodies_json(scene)).add("contacts", contacts.text()).add("impulse", run.impulses).add("swaps", "[]").add("state_hash", hash);
   out.add("stopped", stopped_json(run)).add("warnings", json_array(warning_texts));
   return indented(out.text());
 }

@@ -35,6 +35,7 @@ struct RunResult {
   uint64_t steps = 0;
   double start = 0, simulated = 0, wall = 0, cpu = 0;  // s; wall and cpu are of the steps, without outputs and checks
   StepTimes times;
+  std::string impulses = "{}";   // JSON, Impulses::json()
   bool interrupted = false, stopped = false;
   std::string stop_reason, stop_body;
   bool hold_begun = false;

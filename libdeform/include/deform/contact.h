@@ -62,6 +62,22 @@ DFM_API dfm_status dfm_world_pairs(dfm_world world, uint32_t capacity, dfm_pair_
  * @return DFM_OK; DFM_E_ARG; DFM_E_HANDLE a or b is none of this world. Threads: Any thread. Not during step. Since 0.1. */
 DFM_API dfm_status dfm_world_pair_wrench(dfm_world world, uint64_t a, uint64_t b, const double point[3], double force[3], double moment[3]);
 
+/** What contact did between two things over the whole last dfm_world_step, all its sub-steps: what a sound, a damage model or a force display needs. A
+ * blow that began and ended within the step is in it, though no contact of it is left to report. */
+typedef struct dfm_pair_impulse {
+  uint32_t size, reserved;
+  uint64_t a, b;                    /* as in dfm_pair_report */
+  double impulse[3];                /* N s, on a, friction included; equal to the momentum that a got from b */
+  double normal_impulse;            /* N s, sum of normal impulses */
+  double peak_normal, peak_force;   /* N, largest sum of normal forces, and norm of the resultant, each a mean over one sub-step */
+  double point[3];                  /* m, world: mean of the points of contact, weighted with their normal impulses */
+  double touching;                  /* s of the step in which the contact carried something */
+} dfm_pair_impulse;
+/** Pairs that pressed on each other during the last step, in the order in which their sides were created, a first; capacity as for
+ * dfm_world_contacts. After a step that failed: of the sub-steps that were taken. A side that has been destroyed since is 0.
+ * @return DFM_OK; DFM_E_ARG capacity too small (out untouched, *n set); DFM_E_HANDLE. Threads: Any thread. Not during step. Since 0.1. */
+DFM_API dfm_status dfm_world_pair_impulses(dfm_world world, uint32_t capacity, dfm_pair_impulse *out, uint32_t *n);
+
 typedef struct dfm_contact_event {
   uint32_t size, kind;              /* DFM_EVENT_* */
   uint64_t a, b, key;               /* handles of body and body or obstacle; key of the contact */

@@ -431,6 +431,8 @@ class World : public Handle<dfm_world> {
   auto profile(std::span<dfm_stage_time> out) const { return fill<E, 1>(dfm_world_profile, raw_, out); }
   auto contacts() const { return collect<E, 1>(dfm_world_contacts, raw_); }
   auto pairs() const { return collect<E, 1>(dfm_world_pairs, raw_); }
+  auto pair_impulses(std::span<dfm_pair_impulse> out) const { return fill<E, 1>(dfm_world_pair_impulses, raw_, out); }
+  auto pair_impulses() const { return collect<E, 1>(dfm_world_pair_impulses, raw_); }
   auto events() const { return collect<E, 1>(dfm_world_events, raw_); }
   auto profile() const { return collect<E, 1>(dfm_world_profile, raw_); }
   auto stats() const {

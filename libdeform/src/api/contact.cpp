@@ -196,6 +196,22 @@ dfm_status dfm_world_pair_wrench(dfm_world world, uint64_t a, uint64_t b, const 
   });
 }
 
+dfm_status dfm_world_pair_impulses(dfm_world world, uint32_t capacity, dfm_pair_impulse *out, uint32_t *n) {
+  return guard([&] {
+    const World &w = world_of(world);
+    Array<StepImpulses::Pair> pairs(HookAllocator<StepImpulses::Pair>(w.memory()));
+    list_impulses(w, pairs);
+    if (!room(static_cast<uint32_t>(pairs.size()), capacity, out, n)) return;
+    for (const StepImpulses::Pair &p : pairs) {
+      dfm_pair_impulse r{};
+      r.size = sizeof r, r.a = w.handle_of(p.a), r.b = w.handle_of(p.b);
+      store3(r.impulse, p.impulse), store3(r.point, (1 / p.normal) * p.place);
+      r.normal_impulse = p.normal, r.peak_normal = p.peak_normal, r.peak_force = p.peak_force, r.touching = p.touching;
+      *out++ = r;
+    }
+  });
+}
+
 dfm_status dfm_world_events(dfm_world world, uint32_t capacity, dfm_contact_event *out, uint32_t *n) {
   return guard([&] {
     World &w = idle(world_of(world));

@@ -201,6 +201,7 @@ void World::reserve_contacts() {
   room(size_t(S) * n, to.bristle), room(size_t(9) * n, next.frame);
   work.reserve(std::min(work.size() + n, bodies.size() * (bodies.size() + obstacles.size())));
   reserve_events(size_t(n) + store.n);
+  reserve_impulses(*this, n);
 }
 
 void World::reserve_events(size_t more) {

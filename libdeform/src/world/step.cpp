@@ -153,6 +153,7 @@ dfm_status World::step(double dt, uint32_t *trouble) {
   if (n > 1) *trouble |= DFM_TROUBLE_SUBSTEPS;
   if (inverted) *trouble |= DFM_TROUBLE_INVERTED;
 
+  begin_impulses(step_impulses);
   const double goal = time + dt;
   double from = time, span = dt;   // `cut` equal sub-steps since `from`; the rest of the step is cut anew where the bound has fallen
   uint32_t cut = n, done = 0;
@@ -186,7 +187,7 @@ bool World::advance(double end, double goal, bool last, uint32_t *trouble) {
     const double rest = h = end - time;
     left = goal - time;
     view_obstacles(*this, time, h, left);
-    if (idle()) stats.contacts_mean += (stats.contacts - stats.contacts_mean) / double(stats.substeps + 1);
+    if (idle()) stats.contacts_mean += (stats.contacts - stats.contacts_mean) / double(stats.substeps + 1), step_impulses.idle += h;
     else if (!piece(trouble)) return false;
     whole = h == rest;
     if (guard.motion < 1) move_obstacles_by(*this, guard.motion);
@@ -427,7 +428,7 @@ bool World::stage_commit(uint32_t *trouble) {
       b.contact_impulse += sum;
     }
   });
-  if (plan.touches()) keep_contacts();
+  if (plan.touches()) keep_contacts(), add_impulses(*this);
   return true;
 }
 

@@ -29,6 +29,7 @@
 #include "world/rollback.h"
 #include "world/self_contact.h"
 #include "world/sleep.h"
+#include "world/step_impulses.h"
 
 namespace dfm {
 
@@ -211,6 +212,7 @@ struct World {
   Report report, last_report;                          // last_report: scratch
   std::vector<PairWork> work;                          // sorted by (a, b)
   std::vector<dfm_contact_event> events;
+  StepImpulses step_impulses;
   double hold_start = 0;
   bool holding = false;
 
