@@ -16,10 +16,11 @@ const char *const kDampers[] = {"voigt", "maxwell", "sls", nullptr};
 
 const dfm_param kParams[kParamCount] = {
     {"young", "Young's modulus", "Pa", 1e-3, 1e13, 1e5, kRun | DFM_PARAM_LOG_SCALE | kCell, 1, nullptr},
-    {"poisson", "Poisson ratio that the volume term aims at (springs alone: 1/4)", "1", -0.99, 0.4999, 0.3, kRun | kCell, 1, nullptr},
+    {"poisson", "Poisson ratio; the model gives 1/4 and more", "1", -0.99, 0.4999, 0.3, kRun | kCell, 1, nullptr},
     {"damping_stiffness", "damper over stiffness of each spring", "s", 0, 1e3, 0, kRun | kCell, 1, nullptr},
     {"damping_mass", "drag over mass of each point", "1/s", 0, 1e6, 0, kRun | kCell, 1, nullptr},
-    {"volume", "volume stiffness in bulk moduli E/(3(1-2 nu)); 0: off", "1", 0, 1e6, 0, kRun | kCell, 1, nullptr},
+    {"volume", "volume stiffness in bulk moduli E/(3(1-2 nu)); 0: off; -1: what makes poisson the body's ratio", "1", kFromPoisson, 1e6, kFromPoisson, kRun | kCell, 1, nullptr},
+    {"collapse", "stiffness against collapse of a cell below 0.6 of its volume, over young; 0: off", "1", 0, 1e3, 3, kRun | kCell, 1, nullptr},
     {"anisotropy_slope", "slope of the extra coordinates; 0: isotropic", "1", 0, 1e3, 0, kRun | kCell, 1, nullptr},
     {"anisotropy_kind", "what the body is along the axis", "1", 0, 1, kSofter, kRun | DFM_PARAM_ENUM, 1, kKinds},
     {"anisotropy_form", "force of a tilted spring: projected (B) or turned back (A)", "1", 0, 1, kFormB, DFM_PARAM_ENUM, 1, kForces},
@@ -45,6 +46,8 @@ bool check_params(const dfm_host *h, const double *values) {
     snprintf(text, sizeof text, "parameter %s = %g %s is outside %g .. %g", p.key, values[n], p.unit, p.min, p.max);
     return complain(h, text), false;
   }
+  if (values[kVolume] < 0 && values[kVolume] != kFromPoisson)
+    return complain(h, "parameter volume lies between -1 (from poisson) and 0 (off); give one of them, or more"), false;
   const double *a = values + kAxis;
   if (!(a[0] != 0 || a[1] != 0 || a[2] != 0)) return complain(h, "parameter anisotropy_axis is zero; give a direction"), false;
   if (uint32_t(values[kAxisForm]) == kFormA && uint32_t(values[kDamper]) != kVoigt)

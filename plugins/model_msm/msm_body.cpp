@@ -18,7 +18,7 @@ void force_pass(void *user, uint32_t begin, uint32_t end) {
     body.kernels->load(b, call.k->x, damping != kUndamped ? call.k->v : nullptr, call.k->stride);
     if (call.branch) body.kernels->branches[damping](b, damp, *call.branch);
     else body.kernels->springs[body.form()][damping](b, damp);
-    if (body.volume_on) body.kernels->cells(b);
+    if (body.cells_on) body.kernels->cells(b);
   }
 }
 

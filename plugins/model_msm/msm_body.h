@@ -14,15 +14,19 @@ namespace msm {
 
 // Rows of the parameter table; a row's value begins at its number, the last row is three wide.
 enum Param : uint32_t {
-  kYoung, kPoisson, kDampingStiffness, kDampingMass, kVolume, kSlope, kAxisKind, kAxisForm, kDamper, kRelaxationRatio, kRelaxationTime, kAxis,
+  kYoung, kPoisson, kDampingStiffness, kDampingMass, kVolume, kCollapse, kSlope, kAxisKind, kAxisForm, kDamper, kRelaxationRatio, kRelaxationTime, kAxis,
   kParamCount, kValueCount = kAxis + 3
 };
 enum Kind : uint32_t { kSofter, kStiffer };
 enum Force : uint32_t { kFormB, kFormA };
 enum Damper : uint32_t { kVoigt, kMaxwell, kStandardLinear };
 extern const dfm_param kParams[kParamCount];
+constexpr double kFromPoisson = -1;  // of `volume`: what gives the body the ratio `poisson`
 struct Refused {};  // thrown after the reason was logged
 void complain(const dfm_host *h, const char *what);
+
+// `volume` that gives Poisson's ratio nu; springs alone give 1/4 and no volume modulus that is not negative gives less.
+inline double volume_for(double nu) { return nu > 0.25 ? 3 * (4 * nu - 1) / (2 * (1 + nu)) : 0; }
 
 // Array in the host's memory; cleared on creation.
 template <class T>
@@ -76,6 +80,7 @@ struct Body {
   Buffer<double> cell_volume6;
   Buffer<double> rest_point;           // [npoint,3]
   Buffer<double> weight;               // [npoint] of the row sums
+  Buffer<double> rest_rows;            // [npoint] rows at rest: no shape counts as less stiff, for it may be left in a few steps
   Buffer<double> spring_sum, coupled;  // [npoint] sum of the springs' stiffness k; sum of k w_other / w_own
 
   // What an effect that is off leaves empty.
@@ -88,7 +93,7 @@ struct Body {
   // In block order.
   Buffer<Block> block;
   Buffer<uint32_t> point, spring_edge, cell_id;
-  Buffer<double> p, f, stiffness, rest, bulk, volume6, slot_weight, row;
+  Buffer<double> p, f, stiffness, rest, bulk, collapse, volume6, slot_weight, row;
   Buffer<double> tilt, damp, rest_now;     // as the springs'; rest_now: of plain springs with the same forces as those with branches
   Buffer<Quad> quad;
   Buffer<Cell> cell;
@@ -96,7 +101,8 @@ struct Body {
   Buffer<uint32_t> merge_begin, slot_begin;  // [nblock + 1]
 
   uint32_t choice(Param which) const { return uint32_t(params[which]); }
-  bool volume_on = false, damping_on = false, drag_on = false;
+  bool volume_on = false, cells_on = false;  // the volume term; that or the resistance to collapse
+  bool damping_on = false, drag_on = false;
   Form form() const { return edge_tilt.empty() ? kPlain : choice(kAxisForm) == kFormA ? kTurned : kTilted; }
   Damping damping() const { return !damping_on ? kUndamped : edge_damp.empty() ? kUniform : kPerSpring; }
 
@@ -109,13 +115,18 @@ struct Body {
 
   double at(Param which, uint32_t c) const { return field[which].empty() ? params[which] : field[which][c]; }
   // Moduli over Young's: the springs' scale and the volume modulus kV. See doc/models/msm.md.
-  double volume_ratio(uint32_t c) const { return at(kVolume, c) / (3 * (1 - 2 * at(kPoisson, c))); }
+  double volume_of(uint32_t c) const {
+    const double given = at(kVolume, c);
+    return given < 0 ? volume_for(at(kPoisson, c)) : given;
+  }
+  double volume_ratio(uint32_t c) const { return volume_of(c) / (3 * (1 - 2 * at(kPoisson, c))); }
   // Of spring e with its branch, switched off or not; its damper over that; its rest length as it counts.
   double full_stiffness(uint32_t e) const { return scale * shape[e]; }
   double stiffness_of(uint32_t e) const { return edge_off.empty() || !edge_off[e] ? scale * shape[e] : 0; }
   double damp_scale() const { return choice(kDamper) == kStandardLinear ? 1 / (1 + params[kRelaxationRatio]) : 1; }
   double rest_length(uint32_t e) const { return edge_rest.empty() ? edge_length[e] : edge_rest[e]; }
-  double bulk_of(uint32_t c) const;
+  struct CellStiffness { double bulk, collapse; };  // over 36 V0; both 0 for a cell that is flat at rest or cut
+  CellStiffness cell_stiffness(uint32_t c) const;
   size_t spring_slots() const { return 4 * size_t(block[nblock - 1].quad + block[nblock - 1].quads - quad.data()); }
   size_t cell_slots() const { return size_t(block[nblock - 1].cell + block[nblock - 1].cells - cell.data()); }
 
@@ -159,6 +170,7 @@ struct Body {
   };
   void make_room(Room &room) const;
   double largest_of(Param which) const;
+  double largest_volume() const;
   void find_tilts(Room &room);
   void find_dampers(Room &room);
   void find_effects();
@@ -195,6 +207,12 @@ inline double square_of(const double *x, const double *y) {
   return (d[0] * d[0] + d[1] * d[1]) + d[2] * d[2];
 }
 inline double length_of(const double *x, const double *y) { return __builtin_sqrt(square_of(x, y)); }
+
+// Energy of a cell from its stiffness over 36 V0 and six volumes, now and at rest.
+inline double cell_energy_of(double bulk, double collapse, double now, double rest) {
+  const double more = now - rest, lost = std::max(kCollapseBelow * rest - now, 0.0);
+  return 0.5 * bulk * (more * more) + 0.5 * collapse * (lost * lost);
+}
 
 // Energy of form A over k, the integral of L - L0 over l from rest to l. See msm_energy.cpp.
 double turned_energy(double l, double l0, double tilt2);

@@ -23,7 +23,7 @@ void row_pass(void *user, uint32_t begin, uint32_t end) {
       body.rest_of_branches(n, *call.k), b.rest = body.rest_now.data() + (b.stiffness - body.stiffness.data());
     body.kernels->load(b, call.k->x, nullptr, call.k->stride);
     body.kernels->spring_rows[body.form()](b);
-    if (body.volume_on) body.kernels->cell_rows(b);
+    if (body.cells_on) body.kernels->cell_rows(b);
   }
 }
 
@@ -52,7 +52,7 @@ void merge_row_pass(void *user, uint32_t begin, uint32_t end) {
       }
       const double springs = own + (body.edge_tilt.empty() ? body.coupled[i] : row[3]);
       const double damp = body.damp_most.empty() ? body.damp_scale() * body.params[kDampingStiffness] : body.damp_most[i];
-      call.ksum[i] += springs + row[7];
+      call.ksum[i] += std::max(springs + row[7], body.rest_rows[i]);
       // A damper's n n^T is at most its spring's part of A_i over k.
       call.csum[i] += damp * springs + (body.point_drag.empty() ? body.params[kDampingMass] : body.point_drag[i]) * body.mass[i];
     }
@@ -79,7 +79,7 @@ void Body::find_weights(Room &room) {
   if (volume_on)
     for (uint32_t c = 0; c < ncell; ++c) {
       const uint32_t *q = cells.data() + 4 * size_t(c);
-      const double *x[4], v0 = __builtin_fabs(cell_volume6[c]) / 6;
+      const double *x[4], v0 = cell_volume6[c] / 6;
       for (int a = 0; a < 4; ++a) x[a] = rest_point.data() + 3 * size_t(q[a]);
       for (int a = 0; a < 4; ++a) {
         const double *o = x[(a + 1) & 3], *y = x[(a + 2) & 3], *z = x[(a + 3) & 3];
@@ -112,6 +112,10 @@ void Body::find_weights(Room &room) {
     coupled[i] += full_stiffness(e) * weight[j] / weight[i], coupled[j] += full_stiffness(e) * weight[i] / weight[j];
   }
   for (uint32_t n = 0; n < slot_begin[nblock]; ++n) slot_weight[n] = weight[point[n]];
+  std::fill(rest_rows.data(), rest_rows.data() + npoint, 0.0);
+  std::fill(own.data(), own.data() + npoint, 0.0), std::fill(next.data(), next.data() + npoint, 0.0);
+  bound(at_rest, own.data(), next.data());
+  rest_rows.swap(own);
 }
 
 void Body::bound(const dfm_kin &k, double *ksum, double *csum) {

@@ -28,7 +28,7 @@ void Body::take_mesh(const dfm_mesh &m) {
   npoint = m.npoint, ncell = m.ncell, nedge = m.nedge;
   mass.create(host, npoint), shape.create(host, nedge), edge_volume.create(host, nedge), edge_length.create(host, nedge);
   edge_energy.create(host, nedge), rest_point.create(host, 3 * size_t(npoint));
-  weight.create(host, npoint), spring_sum.create(host, npoint), coupled.create(host, npoint);
+  weight.create(host, npoint), spring_sum.create(host, npoint), coupled.create(host, npoint), rest_rows.create(host, npoint);
   edges.create(host, 2 * size_t(nedge)), cells.create(host, 4 * size_t(ncell)), cell_edge.create(host, 6 * size_t(ncell));
   cell_volume6.create(host, ncell);
   std::copy(m.mass, m.mass + npoint, mass.data());
@@ -38,11 +38,15 @@ void Body::take_mesh(const dfm_mesh &m) {
   for (uint32_t e = 0; e < nedge; ++e)
     edge_length[e] = length_of(m.rest + 3 * size_t(edges[2 * size_t(e)]), m.rest + 3 * size_t(edges[2 * size_t(e) + 1]));
   for (uint32_t c = 0; c < ncell; ++c) {
-    const uint32_t *q = m.cells + 4 * size_t(c);
-    const double *x[4];
-    for (int a = 0; a < 4; ++a) x[a] = m.rest + 3 * size_t(q[a]);
-    cell_volume6[c] = volume6_of(x[0], x[1], x[2], x[3]);
-    const double volume = __builtin_fabs(cell_volume6[c]) / 6;
+    uint32_t *q = cells.data() + 4 * size_t(c);
+    const auto six = [&] {
+      const double *x[4];
+      for (int a = 0; a < 4; ++a) x[a] = m.rest + 3 * size_t(q[a]);
+      return volume6_of(x[0], x[1], x[2], x[3]);
+    };
+    if (six() < 0) std::swap(q[2], q[3]);   // a volume below the one at rest is then less of it
+    cell_volume6[c] = six();
+    const double volume = cell_volume6[c] / 6;
     for (int n = 0; n < 6; ++n) {
       const uint32_t e = find_edge(edges.data(), nedge, q[kEdgeOf[n][0]], q[kEdgeOf[n][1]]);
       if (e == kNone) throw "a cell has an edge that the mesh's edge list lacks";
@@ -141,6 +145,7 @@ size_t Body::fill_springs(const Layout &l, Block &out, uint32_t b, size_t quads_
 
 size_t Body::fill_cells(const Layout &l, Block &out, uint32_t b, size_t cells_at) {
   out.cell = cell.data() + cells_at, out.bulk = bulk.data() + cells_at, out.volume6 = volume6.data() + cells_at;
+  out.collapse = collapse.data() + cells_at;
   out.cells = (l.cell_begin[b + 1] - l.cell_begin[b] + 7) / 8 * 8;
   for (uint32_t n = 0; n < out.cells; ++n, ++cells_at) {
     const bool real = l.cell_begin[b] + n < l.cell_begin[b + 1];
@@ -200,6 +205,7 @@ void Body::build_blocks() {
   p.create(host, 8 * size_t(largest) * ((nblock + grain - 1) / grain)), row.create(host, 8 * nslot), f.create(host, 4 * nslot);
   quad.create(host, nquad), stiffness.create(host, 4 * nquad), rest.create(host, 4 * nquad), spring_edge.create(host, 4 * nquad);
   cell.create(host, ncells), bulk.create(host, ncells), volume6.create(host, ncells), cell_id.create(host, ncells);
+  collapse.create(host, ncells);
 
   std::fill(l.mark.data(), l.mark.data() + npoint, kNone);
   size_t quads_at = 0, cells_at = 0;

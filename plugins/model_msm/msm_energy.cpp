@@ -42,14 +42,13 @@ double Body::energy(const dfm_kin &k) const {
   double springs = 0, volumes = 0;
   const Branch branch = branch_at(k);
   for (uint32_t e = 0; e < nedge; ++e) springs += spring_energy(e, k, branch);
-  if (volume_on)
+  if (cells_on)
     for (size_t c = 0, n = cell_slots(); c < n; ++c) {
       if (cell_id[c] == kNone) continue;
       const uint32_t *q = cells.data() + 4 * size_t(cell_id[c]);
       const double *x[4];
       for (int a = 0; a < 4; ++a) x[a] = k.x + size_t(k.stride) * q[a];
-      const double more = volume6_of(x[0], x[1], x[2], x[3]) - volume6[c];
-      volumes += 0.5 * bulk[c] * (more * more);
+      volumes += cell_energy_of(bulk[c], collapse[c], volume6_of(x[0], x[1], x[2], x[3]), volume6[c]);
     }
   return springs + volumes;
 }
@@ -60,11 +59,11 @@ void Body::cell_energy(const dfm_kin &k, double *density) {
   for (uint32_t c = 0; c < ncell; ++c) {
     double sum = 0;
     for (int n = 0; n < 6; ++n) sum += edge_energy[cell_edge[6 * size_t(c) + n]];
-    const double *x[4], v0 = __builtin_fabs(cell_volume6[c]) / 6;
+    const double *x[4], v0 = cell_volume6[c] / 6;
     for (int a = 0; a < 4; ++a) x[a] = k.x + size_t(k.stride) * cells[4 * size_t(c) + a];
-    if (volume_on && v0 > 0) {
-      const double more = volume6_of(x[0], x[1], x[2], x[3]) - cell_volume6[c];
-      sum += 0.5 * bulk_of(c) * (more * more) / v0;
+    if (cells_on && v0 > 0) {
+      const CellStiffness own = cell_stiffness(c);
+      sum += cell_energy_of(own.bulk, own.collapse, volume6_of(x[0], x[1], x[2], x[3]), cell_volume6[c]) / v0;
     }
     density[c] = sum;
   }

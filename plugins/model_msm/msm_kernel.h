@@ -4,8 +4,9 @@
 //   turned  l = sqrt(d.d),  F = k [(L - L0)/l + damp (dv.d)/(l L)] d                                        (chapter 6, form A)
 //   branch  F = k [(a e + part r)/L + damp (dv.d)/L^2] d,  e = L - L0, and r for the next step              (Fig. 2.5 a, c)
 //   row     f_i += (F0 + F1) + (F2 + F3) per quad of springs, then f_j -= F one spring after the other
-//   cell    6V = a.(b x c),  F_n = -kV/(36 V0) (6V - 6V0) g_n,  F_0 = -((F_1 + F_2) + F_3)                  (2.27 corrected)
-//           four cells at a time, corner after corner in the order 1 2 3 0
+//   cell    6V = a.(b x c),  p = kV/(36 V0) (6V0 - 6V) + kC/(36 V0) max(0, 0.6 6V0 - 6V)                    (2.27 corrected, collapse)
+//           F_n = p g_n,  F_0 = -((F_1 + F_2) + F_3), four cells at a time, corner after corner in the order 1 2 3 0;
+//           four cells without pressure are left out, which changes no bit: sums that begin at +0 never become -0
 // so that the instruction set never shows in a result. Plain data only: kernel files see no STL and nothing with external inline code.
 #pragma once
 #include <stdint.h>
@@ -30,7 +31,8 @@ struct Block {
   const double *tilt, *damp;            // [quads,4] w^2, m^2; damper over stiffness, s; each NULL where nothing calls for it
   const uint32_t *edge;                 // [quads,4] number of the spring in the host's list, ~0 for one that fills up
   const Cell *cell;                     // [cells]
-  const double *bulk, *volume6;         // [cells] kV/(36 V0), 6 V0
+  const double *bulk, *volume6;         // [cells] kV/(36 V0), 6 V0 >= 0
+  const double *collapse;               // [cells] kC/(36 V0)
 };
 
 // Slots of all blocks' f: a halo point of another block, and the point that it stands for.
@@ -62,6 +64,10 @@ struct Kernels {
   void (*merge_rows)(double *row, const Merge *merge, uint32_t n);
   void (*store)(const Block &b, double *f, uint32_t stride);  // adds the owned points' forces to the host's
 };
+
+// The share of its rest volume below which a cell resists collapse, and that below which the step bound counts on it: rows are kept for
+// some steps, and what lies between is what a cell may lose in that time.
+constexpr double kCollapseBelow = 0.6, kCollapseCounted = 0.7;
 
 // Springs shorter than this carry no force: their direction is rounding. The square root of the smallest safe square.
 constexpr double kShortestSquared = 1e-200;

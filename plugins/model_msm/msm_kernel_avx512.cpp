@@ -116,7 +116,11 @@ static void volume_cells8(const Block &b) {
     gather_edges(b, c, 3, o0, o1, o2, o3, e3);
     cross(e2, e3, g1), cross(e3, e1, g2), cross(e1, e2, g3);
     const __m512d volume6 = _mm512_add_pd(_mm512_add_pd(_mm512_mul_pd(e1.x, g1.x), _mm512_mul_pd(e1.y, g1.y)), _mm512_mul_pd(e1.z, g1.z));
-    const __m512d pressure = _mm512_mul_pd(_mm512_load_pd(b.bulk + t), _mm512_sub_pd(_mm512_load_pd(b.volume6 + t), volume6));
+    const __m512d rest = _mm512_load_pd(b.volume6 + t), below = _mm512_mul_pd(_mm512_set1_pd(kCollapseBelow), rest);
+    const __m512d lost = _mm512_max_pd(_mm512_sub_pd(below, volume6), _mm512_setzero_pd());
+    const __m512d pressure = _mm512_add_pd(_mm512_mul_pd(_mm512_load_pd(b.bulk + t), _mm512_sub_pd(rest, volume6)),
+                                           _mm512_mul_pd(_mm512_load_pd(b.collapse + t), lost));
+    if (!_mm512_cmp_pd_mask(pressure, _mm512_setzero_pd(), _CMP_NEQ_UQ)) continue;
     Forces f1, f2, f3, sum;
     forces_at(pressure, g1, f1), forces_at(pressure, g2, f2), forces_at(pressure, g3, f3);
     sum = f1, add(sum, f2), add(sum, f3);

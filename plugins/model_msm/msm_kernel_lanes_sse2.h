@@ -24,6 +24,10 @@ MSM_INLINE v4 abs4(v4 a) { return {_mm_andnot_pd(_mm_set1_pd(-0.0), a.lo), _mm_a
 MSM_INLINE v4 zero_unless_above(v4 value, v4 a, v4 limit) {
   return {_mm_and_pd(value.lo, _mm_cmpgt_pd(a.lo, limit.lo)), _mm_and_pd(value.hi, _mm_cmpgt_pd(a.hi, limit.hi))};
 }
+MSM_INLINE bool all_zero(v4 a) {
+  const __m128d zero = _mm_setzero_pd();
+  return !(_mm_movemask_pd(_mm_cmpneq_pd(a.lo, zero)) | _mm_movemask_pd(_mm_cmpneq_pd(a.hi, zero)));
+}
 MSM_INLINE v4 yzx(v4 a) { return {_mm_shuffle_pd(a.lo, a.hi, 1), _mm_shuffle_pd(a.lo, a.hi, 2)}; }
 template <int kLane>
 MSM_INLINE v4 lane(v4 a) {

@@ -113,13 +113,19 @@ MSM_INLINE void spread(const Block &b, const Cell *c, int n, v4 pressure, const 
   add_to(b, c[0].p[n], f0), add_to(b, c[1].p[n], f1), add_to(b, c[2].p[n], f2), add_to(b, c[3].p[n], f3);
 }
 
+MSM_INLINE v4 pressure_of(const Block &b, uint32_t t, v4 now) {
+  const v4 rest = load4(b.volume6 + t);
+  return load4(b.bulk + t) * (rest - now) + load4(b.collapse + t) * max4(splat(kCollapseBelow) * rest - now, splat(0));
+}
+
 static inline void volume_cells(const Block &b) {
   for (uint32_t t = 0; t < b.cells; t += 4) {
     const Cell *c = b.cell + t;
     Edges4 e1, e2, e3, g1, g2, g3;
     gather_all(b, c, e1, e2, e3);
     cross(e2, e3, g1), cross(e3, e1, g2), cross(e1, e2, g3);
-    const v4 pressure = load4(b.bulk + t) * (load4(b.volume6 + t) - dot(e1, g1));
+    const v4 pressure = pressure_of(b, t, dot(e1, g1));
+    if (all_zero(pressure)) continue;
     v4 s0, s1, s2, s3, f0, f1, f2, f3;
     spread(b, c, 1, pressure, g1, s0, s1, s2, s3);
     spread(b, c, 2, pressure, g2, f0, f1, f2, f3);
@@ -133,7 +139,7 @@ static inline void volume_cells(const Block &b) {
 MSM_INLINE v4 weights(const Block &b, const Cell *c, int n) {
   return set4(b.weight[c[0].p[n]], b.weight[c[1].p[n]], b.weight[c[2].p[n]], b.weight[c[3].p[n]]);
 }
-// Weighted row sums of the second derivative of a cell's energy, (k / w_a) (g_a sum_b g_b w_b + |6V - 6V0| l sum_{b != a} w_b):
+// Weighted row sums of the second derivative of a cell's energy, (1 / w_a) (k g_a sum_b g_b w_b + |p| l sum_{b != a} w_b):
 // g_a = 6 |dV/dx_a|, and l, the longest edge, for the opposite edge that makes each mixed derivative.
 static inline void cell_rows(const Block &b) {
   for (uint32_t t = 0; t < b.cells; t += 4) {
@@ -145,13 +151,14 @@ static inline void cell_rows(const Block &b) {
     const Edges4 a = {e2.x - e1.x, e2.y - e1.y, e2.z - e1.z}, d = {e3.x - e2.x, e3.y - e2.y, e3.z - e2.z};
     const Edges4 h = {e1.x - e3.x, e1.y - e3.y, e1.z - e3.z};
     const v4 longest = sqrt4(max4(max4(max4(dot(e1, e1), dot(e2, e2)), max4(dot(e3, e3), dot(a, a))), max4(dot(d, d), dot(h, h))));
-    const v4 more = abs4(dot(e1, g1) - load4(b.volume6 + t)) * longest, k = load4(b.bulk + t);
+    const v4 now = dot(e1, g1), more = abs4(pressure_of(b, t, now)) * longest;
+    const v4 k = load4(b.bulk + t) + zero_unless_above(load4(b.collapse + t), splat(kCollapseCounted) * load4(b.volume6 + t), now);
     alignas(32) double row[4][4];
     const v4 w0 = weights(b, c, 0), w1 = weights(b, c, 1), w2 = weights(b, c, 2), w3 = weights(b, c, 3), w = (w0 + w1) + (w2 + w3);
     const v4 n0 = sqrt4(dot(g0, g0)), n1 = sqrt4(dot(g1, g1)), n2 = sqrt4(dot(g2, g2)), n3 = sqrt4(dot(g3, g3));
     const v4 sum = (n0 * w0 + n1 * w1) + (n2 * w2 + n3 * w3);
-    store4(row[0], k * (n0 * sum + more * (w - w0)) / w0), store4(row[1], k * (n1 * sum + more * (w - w1)) / w1);
-    store4(row[2], k * (n2 * sum + more * (w - w2)) / w2), store4(row[3], k * (n3 * sum + more * (w - w3)) / w3);
+    store4(row[0], (k * (n0 * sum) + more * (w - w0)) / w0), store4(row[1], (k * (n1 * sum) + more * (w - w1)) / w1);
+    store4(row[2], (k * (n2 * sum) + more * (w - w2)) / w2), store4(row[3], (k * (n3 * sum) + more * (w - w3)) / w3);
     for (int n = 0; n < 4; ++n)
       for (int m = 0; m < 4; ++m) b.row[8 * size_t(c[n].p[m]) + 7] += row[m][n];
   }

@@ -34,7 +34,7 @@ void Body::take_fields(const dfm_mesh &m) {
         double square = 0;
         for (uint32_t w = 0; w < known.width; ++w) {
           const double x = values[size_t(known.width) * c + w];
-          if (!(x >= known.min && x <= known.max)) refuse_field(host, known, c, x);
+          if (!(x >= known.min && x <= known.max) || (r == kVolume && x < 0 && x != kFromPoisson)) refuse_field(host, known, c, x);
           square += x * x;
         }
         if (r == kAxis && !(square > 0)) refuse_field(host, known, c, 0);
@@ -52,7 +52,7 @@ void Body::find_shapes() {
   if (choice(kDamper) == kStandardLinear) scale *= 1 + params[kRelaxationRatio];
   std::fill(shape.data(), shape.data() + nedge, 0.0);
   for (uint32_t c = 0; c < ncell; ++c) {
-    const double volume = __builtin_fabs(cell_volume6[c]) / 6;
+    const double volume = cell_volume6[c] / 6;
     const double share = volume * (stiff ? field[kYoung][c] : 1.0) * (scaled ? spring_scale(volume_ratio(c)) : 1.0);
     for (int n = 0; n < 6; ++n) shape[cell_edge[6 * size_t(c) + n]] += share;
   }
@@ -77,7 +77,7 @@ void Body::find_tilts(Room &room) {
     for (uint32_t c = 0; by_cell && c < ncell; ++c)
       for (int n = 0; n < 6; ++n) {
         const uint32_t e = cell_edge[6 * size_t(c) + n];
-        if (edge_volume[e] > 0) edge_tilt[e] += __builtin_fabs(cell_volume6[c]) / 6 / edge_volume[e] * squared(c, e);
+        if (edge_volume[e] > 0) edge_tilt[e] += cell_volume6[c] / 6 / edge_volume[e] * squared(c, e);
       }
     for (uint32_t e = 0; e < nedge; ++e) {
       if (!by_cell) edge_tilt[e] = squared(0, e);
@@ -101,7 +101,7 @@ void Body::find_dampers(Room &room) {
     Buffer<double> &share = room.damp_share;
     edge_damp.swap(room.edge_damp), damp_most.swap(room.damp_most), damp.swap(room.damp);
     for (uint32_t c = 0; c < ncell; ++c) {
-      const double k = __builtin_fabs(cell_volume6[c]) * at(kYoung, c) * spring_scale(volume_ratio(c));
+      const double k = cell_volume6[c] * at(kYoung, c) * spring_scale(volume_ratio(c));
       for (int n = 0; n < 6; ++n) {
         const uint32_t e = cell_edge[6 * size_t(c) + n];
         edge_damp[e] += k * by_cell[c], share[e] += k;
@@ -125,24 +125,29 @@ void Body::find_dampers(Room &room) {
     for (uint32_t c = 0; c < ncell; ++c)
       for (int a = 0; a < 4; ++a) {
         const uint32_t i = cells[4 * size_t(c) + a];
-        point_drag[i] += __builtin_fabs(cell_volume6[c]) * drag[c], around[i] += __builtin_fabs(cell_volume6[c]);
+        point_drag[i] += cell_volume6[c] * drag[c], around[i] += cell_volume6[c];
       }
     for (uint32_t i = 0; i < npoint; ++i) point_drag[i] = around[i] > 0 ? point_drag[i] / around[i] : 0;
   }
 }
 
 // A cell that is flat at rest has no volume to keep, and neither has one that lost a spring (it is cut).
-double Body::bulk_of(uint32_t c) const {
-  const double v0 = __builtin_fabs(cell_volume6[c]) / 6, side = edge_length[cell_edge[6 * size_t(c)]];
+Body::CellStiffness Body::cell_stiffness(uint32_t c) const {
+  const double v0 = cell_volume6[c] / 6, side = edge_length[cell_edge[6 * size_t(c)]];
   for (int n = 0; !edge_off.empty() && n < 6; ++n)
-    if (edge_off[cell_edge[6 * size_t(c) + n]]) return 0;
-  return v0 > 1e-12 * side * side * side ? volume_ratio(c) * at(kYoung, c) / (36 * v0) : 0;
+    if (edge_off[cell_edge[6 * size_t(c) + n]]) return {0, 0};
+  if (!(v0 > 1e-12 * side * side * side)) return {0, 0};
+  const double unit = at(kYoung, c) / (36 * v0), ratio = volume_ratio(c);
+  return {ratio * unit, std::max(at(kCollapse, c) - ratio, 0.0) * unit};
 }
 
 void Body::fill_stiffness() {
   const size_t springs = spring_slots(), ncells = cell_slots();
   for (size_t s = 0; s < springs; ++s) stiffness[s] = spring_edge[s] == kNone ? 0 : stiffness_of(spring_edge[s]);
-  for (size_t c = 0; c < ncells; ++c) bulk[c] = cell_id[c] == kNone ? 0 : bulk_of(cell_id[c]);
+  for (size_t c = 0; c < ncells; ++c) {
+    const CellStiffness k = cell_id[c] == kNone ? CellStiffness{0, 0} : cell_stiffness(cell_id[c]);
+    bulk[c] = k.bulk, collapse[c] = k.collapse;
+  }
 }
 
 void Body::find_effects() {
@@ -167,6 +172,13 @@ double Body::largest_of(Param which) const {
   return field[which].empty() ? params[which] : *std::max_element(field[which].data(), field[which].data() + ncell);
 }
 
+double Body::largest_volume() const {
+  double most = volume_of(0);
+  const bool by_cell = !field[kVolume].empty() || !field[kPoisson].empty();
+  for (uint32_t c = 1; by_cell && c < ncell; ++c) most = std::max(most, volume_of(c));
+  return most;
+}
+
 void Body::make_room(Room &room) const {
   const size_t slots = spring_slots();
   const bool tilted = largest_of(kSlope) > 0;
@@ -179,7 +191,7 @@ void Body::make_room(Room &room) const {
   if (!field[kDampingMass].empty() && largest_of(kDampingMass) > 0) room.point_drag.create(host, npoint), room.drag_around.create(host, npoint);
   if (has_branch() && rest_now.empty()) room.rest_now.create(host, slots);
   room.own.create(host, npoint), room.next.create(host, npoint);
-  room.gradient.create(host, largest_of(kVolume) > 0 ? 4 * size_t(ncell) : 0);
+  room.gradient.create(host, largest_volume() > 0 ? 4 * size_t(ncell) : 0);
 }
 
 // All or nothing: what may fail comes first.
@@ -194,7 +206,7 @@ void Body::apply_params(const double *values) {
     std::copy(before, before + kValueCount, params);
     throw;
   }
-  volume_on = largest_of(kVolume) > 0;
+  volume_on = largest_volume() > 0, cells_on = volume_on || largest_of(kCollapse) > 0;
   find_shapes();
   find_tilts(room);
   find_dampers(room);

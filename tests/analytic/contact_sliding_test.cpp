@@ -34,10 +34,12 @@ TEST(Sliding, BlockWithSpeed_StopsAfterV2Over2MuG) {
   for (const auto &[v0, mu] : {std::pair{1.0, 0.3}, {0.5, 0.8}}) {
     Slider s(mu, {0, 0, -kG}, {v0, 0, 0});
     const double x0 = s.now().com[0], distance = v0 * v0 / (2 * mu * kG), time = v0 / (mu * kG);
-    double stopped = NAN;
+    double stopped = NAN, before = v0;
     for (int k = 1; k * 1e-3 < time + 0.1; ++k) {
       test::run(s.world, 1e-3, 1e-3);
-      if (std::isnan(stopped) && s.now().velocity[0] <= 0) stopped = k * 1e-3;
+      const double v = s.now().velocity[0];
+      if (std::isnan(stopped) && v <= 0) stopped = (k - v / (v - before)) * 1e-3;   // where the chord between two states crosses zero
+      before = v;
     }
     EXPECT_NEAR(s.now().com[0] - x0, distance, 0.02 * distance) << "v0 " << v0 << ", mu " << mu;
     EXPECT_NEAR(stopped, time, 0.02 * time) << "v0 " << v0 << ", mu " << mu;

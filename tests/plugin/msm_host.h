@@ -203,6 +203,7 @@ inline Mesh read_msh(const std::string &path) {
 
 struct Params {
   double young = 1e5, poisson = 0.3, damping_stiffness = 0, damping_mass = 0, volume = 0;
+  double collapse = 0;
   double slope = 0;
   Vec axis = {1, 0, 0};
   bool stiffer = false, form_a = false;
@@ -257,7 +258,7 @@ struct Instance {
   static std::vector<double> row(const Params &p) {
     std::map<std::string, std::vector<double>> by_key = {
         {"young", {p.young}}, {"poisson", {p.poisson}}, {"damping_stiffness", {p.damping_stiffness}}, {"damping_mass", {p.damping_mass}},
-        {"volume", {p.volume}}, {"anisotropy_slope", {p.slope}}, {"anisotropy_axis", {p.axis.begin(), p.axis.end()}},
+        {"volume", {p.volume}}, {"collapse", {p.collapse}}, {"anisotropy_slope", {p.slope}}, {"anisotropy_axis", {p.axis.begin(), p.axis.end()}},
         {"anisotropy_kind", {double(p.stiffer)}}, {"anisotropy_form", {double(p.form_a)}}, {"damper", {double(p.damper)}},
         {"relaxation_ratio", {p.ratio}}, {"relaxation_time", {p.time}}};
     std::vector<double> values;

@@ -56,7 +56,7 @@ struct Pair {
 
 TEST(CoupledBodies, Collision_KeepsMomentumAndParts) {
   for (const auto &[coupling, support] : {std::pair{DFM_COUPLING_BARYCENTRIC, 0.0}, {DFM_COUPLING_MLS, 1.5}}) {
-    Pair p(coupling, support, {0, 0, 0}, {0.01, 0.007, 0}, 1);
+    Pair p(coupling, support, {0, 0, 0}, {0.01, 0.007, 0}, 1.3);
     const Momentum before = momentum(p.bodies);
     size_t crossed = 0;
     for (int i = 0; i < 60; ++i) test::run(p.world, 2e-3, 1e-3), crossed += crossings(p.bodies);

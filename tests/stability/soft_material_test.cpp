@@ -1,0 +1,66 @@
+// Soft material at the defaults of its parameters: a cube of 10 kPa that a frame of 1/60 s drops on the floor keeps its cells, and Poisson's ratio counts.
+#include "world.h"
+
+namespace {
+
+constexpr double kG = 9.81, kEdge = 0.2, kDensity = 1000, kFrame = 1.0 / 60;
+
+struct Cube {
+  test::Context context;
+  dfm_world world;
+  dfm_body body;
+  Cube(double young, double poisson, double damping_mass, bool friction = true) {
+    world = test::make_world(context, {0, 0, -kG});
+    test::BodyOptions o;
+    o.name = "cube", o.young = young, o.poisson = poisson, o.density = kDensity, o.damping_stiffness = 1e-3, o.damping_mass = damping_mass;
+    o.position = {0, 0, 1e-3};
+    body = test::make_body(context, world, "beam", {kEdge, kEdge, kEdge}, 1500, o);
+    test::add_plane(world, "floor");
+    if (friction) test::set_friction(world, 0.5);
+    else test::set_friction(world, 0, "none");
+  }
+  double share() const { return test::measure(body).volume / test::measure(body).rest_volume; }
+};
+
+}  // namespace
+
+TEST(SoftMaterial, ACubeOfTenKilopascal_DropsWithoutACellInsideOut) {
+  for (double poisson : {-0.5, 0.25, 0.3, 0.49}) {
+    Cube cube(1e4, poisson, 0);
+    for (int frame = 0; frame < 120; ++frame) {
+      test::run(cube.world, kFrame, kFrame);
+      ASSERT_GT(cube.share(), 0.75) << poisson << ", frame " << frame;
+    }
+    EXPECT_EQ(test::stats(cube.world).inverted_max, 0u) << poisson;
+  }
+}
+
+// Under its own weight a column sinks by rho g L^2/(2 E) at its top, by a third of rho g L^2/E in the mean. Strains reach a fifth (10 kPa), two
+// fifths (5 kPa).
+TEST(SoftMaterial, CubesAtRest_SinkAsAColumnDoesAndNoCellIsInsideOut) {
+  for (const auto &[young, poisson] : {std::pair{1e4, 0.0}, {1e4, 0.3}, {1e4, 0.4}, {5e3, 0.2}, {5e3, 0.3}, {1e5, 0.3}}) {
+    Cube cube(young, poisson, 8);
+    const double start = test::measure(cube.body).com[2] - 1e-3, column = kDensity * kG * kEdge * kEdge / (3 * young);
+    test::run(cube.world, 4, kFrame);
+    const dfm_body_measure m = test::measure(cube.body);
+    EXPECT_NEAR(start - m.com[2], column, 0.25 * column) << young << ", poisson " << poisson;
+    EXPECT_LT(m.kinetic, 1e-6) << young << ", poisson " << poisson;
+    EXPECT_EQ(test::stats(cube.world).inverted_max, 0u) << young << ", poisson " << poisson;
+  }
+}
+
+TEST(SoftMaterial, PoissonsRatio_CountsFromAQuarterOn) {
+  const auto share = [](double poisson) {
+    Cube cube(4e4, poisson, 12, false);   // free to grow in width, as a column is
+    test::run(cube.world, 2, kFrame);
+    return cube.share();
+  };
+  const double quarter = share(0.25), third = share(0.33), most = share(0.45);
+  EXPECT_EQ(share(-0.5), quarter);
+  // A column that holds its mean weight rho g L/2 loses (1 - 2 nu) of that over E.
+  const double strain = kDensity * kG * kEdge / 2 / 4e4;
+  EXPECT_NEAR(1 - quarter, 0.5 * strain, 0.1 * strain);
+  EXPECT_NEAR(1 - third, 0.34 * strain, 0.1 * strain);
+  EXPECT_NEAR(1 - most, 0.1 * strain, 0.1 * strain);
+  EXPECT_LT(1 - most, 0.7 * (1 - third));
+}
