@@ -93,7 +93,7 @@ struct Body {
   // In block order.
   Buffer<Block> block;
   Buffer<uint32_t> point, spring_edge, cell_id;
-  Buffer<double> p, f, stiffness, rest, bulk, collapse, volume6, slot_weight, row;
+  Buffer<double> p, f, stiffness, rest, bulk, collapse, limit, volume6, slot_weight, row;
   Buffer<double> tilt, damp, rest_now;     // as the springs'; rest_now: of plain springs with the same forces as those with branches
   Buffer<Quad> quad;
   Buffer<Cell> cell;
@@ -127,6 +127,11 @@ struct Body {
   double rest_length(uint32_t e) const { return edge_rest.empty() ? edge_length[e] : edge_rest[e]; }
   struct CellStiffness { double bulk, collapse; };  // over 36 V0; both 0 for a cell that is flat at rest or cut
   CellStiffness cell_stiffness(uint32_t c) const;
+  double limit_of(uint32_t c) const {
+    double sum = 0;
+    for (int n = 0; n < 6; ++n) sum += edge_length[cell_edge[6 * size_t(c) + n]] * edge_length[cell_edge[6 * size_t(c) + n]];
+    return sum > 0 ? kLimit * sum : 1;   // four points at one place have no volume to keep
+  }
   size_t spring_slots() const { return 4 * size_t(block[nblock - 1].quad + block[nblock - 1].quads - quad.data()); }
   size_t cell_slots() const { return size_t(block[nblock - 1].cell + block[nblock - 1].cells - cell.data()); }
 
@@ -208,11 +213,8 @@ inline double square_of(const double *x, const double *y) {
 }
 inline double length_of(const double *x, const double *y) { return __builtin_sqrt(square_of(x, y)); }
 
-// Energy of a cell from its stiffness over 36 V0 and six volumes, now and at rest.
-inline double cell_energy_of(double bulk, double collapse, double now, double rest) {
-  const double more = now - rest, lost = std::max(kCollapseBelow * rest - now, 0.0);
-  return 0.5 * bulk * (more * more) + 0.5 * collapse * (lost * lost);
-}
+// Energy of a cell from its corners, its stiffness over 36 V0, six volumes at rest and its limit.
+double cell_energy_of(const double *const *x, double bulk, double collapse, double rest, double limit);
 
 // Energy of form A over k, the integral of L - L0 over l from rest to l. See msm_energy.cpp.
 double turned_energy(double l, double l0, double tilt2);

@@ -145,14 +145,14 @@ size_t Body::fill_springs(const Layout &l, Block &out, uint32_t b, size_t quads_
 
 size_t Body::fill_cells(const Layout &l, Block &out, uint32_t b, size_t cells_at) {
   out.cell = cell.data() + cells_at, out.bulk = bulk.data() + cells_at, out.volume6 = volume6.data() + cells_at;
-  out.collapse = collapse.data() + cells_at;
+  out.collapse = collapse.data() + cells_at, out.limit = limit.data() + cells_at;
   out.cells = (l.cell_begin[b + 1] - l.cell_begin[b] + 7) / 8 * 8;
   for (uint32_t n = 0; n < out.cells; ++n, ++cells_at) {
     const bool real = l.cell_begin[b] + n < l.cell_begin[b + 1];
     const uint32_t c = l.cell_order[l.cell_begin[b] + (real ? n : 0)];
     for (int a = 0; a < 4; ++a) cell[cells_at].p[a] = l.local[l.rank[cells[4 * size_t(c) + a]]];
     cell_id[cells_at] = real ? c : kNone;
-    volume6[cells_at] = cell_volume6[c];
+    volume6[cells_at] = cell_volume6[c], limit[cells_at] = limit_of(c);
   }
   return cells_at;
 }
@@ -205,7 +205,7 @@ void Body::build_blocks() {
   p.create(host, 8 * size_t(largest) * ((nblock + grain - 1) / grain)), row.create(host, 8 * nslot), f.create(host, 4 * nslot);
   quad.create(host, nquad), stiffness.create(host, 4 * nquad), rest.create(host, 4 * nquad), spring_edge.create(host, 4 * nquad);
   cell.create(host, ncells), bulk.create(host, ncells), volume6.create(host, ncells), cell_id.create(host, ncells);
-  collapse.create(host, ncells);
+  collapse.create(host, ncells), limit.create(host, ncells);
 
   std::fill(l.mark.data(), l.mark.data() + npoint, kNone);
   size_t quads_at = 0, cells_at = 0;

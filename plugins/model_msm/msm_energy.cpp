@@ -28,6 +28,16 @@ double turned_energy(double l, double l0, double tilt2) {
   return t0 * t0 * 0.25 * (0.5 * (q * q) + q * bq - 0.5 * (bq * bq) - 2 * b * less_log(q, grown));
 }
 
+double cell_energy_of(const double *const *x, double bulk, double collapse, double rest, double limit) {
+  double q = 0;
+  for (int a = 1; a < 4; ++a)
+    for (int b = 0; b < a; ++b) q += square_of(x[a], x[b]);
+  const double u = limit / std::max(q, limit), now = volume6_of(x[0], x[1], x[2], x[3]) * (__builtin_sqrt(u) * u * (2.5 - 1.5 * u));
+  const double kept = std::min(std::max(now, kLeastVolume * rest), kMostVolume * rest), more = kept - rest;
+  const double lost = std::max(kCollapseBelow * rest - kept, 0.0);
+  return 0.5 * bulk * (more * more) + 0.5 * collapse * (lost * lost) + (bulk * more - collapse * lost) * (now - kept);
+}
+
 double Body::spring_energy(uint32_t e, const dfm_kin &k, const Branch &branch) const {
   const uint32_t *ends = edges.data() + 2 * size_t(e);
   const double dd = square_of(k.x + size_t(k.stride) * ends[0], k.x + size_t(k.stride) * ends[1]), stiff = stiffness_of(e);
@@ -48,7 +58,7 @@ double Body::energy(const dfm_kin &k) const {
       const uint32_t *q = cells.data() + 4 * size_t(cell_id[c]);
       const double *x[4];
       for (int a = 0; a < 4; ++a) x[a] = k.x + size_t(k.stride) * q[a];
-      volumes += cell_energy_of(bulk[c], collapse[c], volume6_of(x[0], x[1], x[2], x[3]), volume6[c]);
+      volumes += cell_energy_of(x, bulk[c], collapse[c], volume6[c], limit[c]);
     }
   return springs + volumes;
 }
@@ -63,7 +73,7 @@ void Body::cell_energy(const dfm_kin &k, double *density) {
     for (int a = 0; a < 4; ++a) x[a] = k.x + size_t(k.stride) * cells[4 * size_t(c) + a];
     if (cells_on && v0 > 0) {
       const CellStiffness own = cell_stiffness(c);
-      sum += cell_energy_of(own.bulk, own.collapse, volume6_of(x[0], x[1], x[2], x[3]), cell_volume6[c]) / v0;
+      sum += cell_energy_of(x, own.bulk, own.collapse, cell_volume6[c], limit_of(c)) / v0;
     }
     density[c] = sum;
   }

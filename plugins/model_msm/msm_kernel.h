@@ -5,6 +5,7 @@
 //   branch  F = k [(a e + part r)/L + damp (dv.d)/L^2] d,  e = L - L0, and r for the next step              (Fig. 2.5 a, c)
 //   row     f_i += (F0 + F1) + (F2 + F3) per quad of springs, then f_j -= F one spring after the other
 //   cell    6V = a.(b x c),  p = kV/(36 V0) (6V0 - 6V) + kC/(36 V0) max(0, 0.6 6V0 - 6V)                    (2.27 corrected, collapse)
+//           with 6V kept between -6V0 and 18V0, and taken from a cell whose edges have grown beyond a limit as doc/models/msm.md says
 //           F_n = p g_n,  F_0 = -((F_1 + F_2) + F_3), four cells at a time, corner after corner in the order 1 2 3 0;
 //           four cells without pressure are left out, which changes no bit: sums that begin at +0 never become -0
 // so that the instruction set never shows in a result. Plain data only: kernel files see no STL and nothing with external inline code.
@@ -33,6 +34,7 @@ struct Block {
   const Cell *cell;                     // [cells]
   const double *bulk, *volume6;         // [cells] kV/(36 V0), 6 V0 >= 0
   const double *collapse;               // [cells] kC/(36 V0)
+  const double *limit;                  // [cells] kLimit times the sum of the squared edges at rest, m^2
 };
 
 // Slots of all blocks' f: a halo point of another block, and the point that it stands for.
@@ -68,6 +70,12 @@ struct Kernels {
 // The share of its rest volume below which a cell resists collapse, and that below which the step bound counts on it: rows are kept for
 // some steps, and what lies between is what a cell may lose in that time.
 constexpr double kCollapseBelow = 0.6, kCollapseCounted = 0.7;
+
+// Where the pressure of a cell stops to grow, in rest volumes, and the sum of its squared edges from which on its volume counts less.
+constexpr double kLeastVolume = -1, kMostVolume = 3, kLimit = 3;
+// With Q that sum, Qm the limit and u = Qm/Q <= 1, the volume that counts is V t, t = u^(3/2) (5 - 3 u)/2, dt/dQ = -15/4 u^(3/2) (1 - u)/Q.
+// Norms of its first two derivatives at a cell beyond the limit: 36 |d|^2 <= kFade1 Qm^2 and 6 |d2| <= kFade2 sqrt(Qm), of six volumes.
+constexpr double kFade1 = 0.1287, kFade2 = 4.655;
 
 // Springs shorter than this carry no force: their direction is rounding. The square root of the smallest safe square.
 constexpr double kShortestSquared = 1e-200;

@@ -106,6 +106,40 @@ MSM_INLINE void spread_high(const Block &b, const Cell *c, int n, const Forces &
   add_to(b, c[4].p[n], high(f.f0)), add_to(b, c[5].p[n], high(f.f1)), add_to(b, c[6].p[n], high(f.f2)), add_to(b, c[7].p[n], high(f.f3));
 }
 
+MSM_INLINE __m512d dot(const Edges8 &a, const Edges8 &b) {
+  return _mm512_add_pd(_mm512_add_pd(_mm512_mul_pd(a.x, b.x), _mm512_mul_pd(a.y, b.y)), _mm512_mul_pd(a.z, b.z));
+}
+MSM_INLINE __m512d sum3(__m512d a, __m512d b, __m512d c) { return _mm512_add_pd(_mm512_add_pd(a, b), c); }
+MSM_INLINE Edges8 sum3(const Edges8 &a, const Edges8 &b, const Edges8 &c) { return {sum3(a.x, b.x, c.x), sum3(a.y, b.y, c.y), sum3(a.z, b.z, c.z)}; }
+MSM_INLINE __m512d pressure_of(const Block &b, uint32_t t, __m512d now) {
+  const __m512d rest = _mm512_load_pd(b.volume6 + t), below = _mm512_mul_pd(_mm512_set1_pd(kCollapseBelow), rest);
+  now = _mm512_max_pd(now, _mm512_mul_pd(_mm512_set1_pd(kLeastVolume), rest));
+  now = _mm512_min_pd(now, _mm512_mul_pd(_mm512_set1_pd(kMostVolume), rest));
+  const __m512d lost = _mm512_max_pd(_mm512_sub_pd(below, now), _mm512_setzero_pd());
+  return _mm512_add_pd(_mm512_mul_pd(_mm512_load_pd(b.bulk + t), _mm512_sub_pd(rest, now)), _mm512_mul_pd(_mm512_load_pd(b.collapse + t), lost));
+}
+MSM_INLINE __m512d squares(const Edges8 &e1, const Edges8 &e2, const Edges8 &e3) {
+  const Edges8 sum = sum3(e1, e2, e3);
+  return _mm512_sub_pd(_mm512_mul_pd(_mm512_set1_pd(4), sum3(dot(e1, e1), dot(e2, e2), dot(e3, e3))), dot(sum, sum));
+}
+MSM_INLINE void stretched_forces(const Block &b, uint32_t t, __m512d q, __m512d now, const Edges8 &e1, const Edges8 &e2, const Edges8 &e3, Edges8 &g1, Edges8 &g2,
+                                 Edges8 &g3) {
+  const __m512d limit = _mm512_load_pd(b.limit + t), most = _mm512_max_pd(q, limit), u = _mm512_div_pd(limit, most), one = _mm512_set1_pd(1);
+  const __m512d power = _mm512_mul_pd(_mm512_sqrt_pd(u), u);
+  const __m512d by_q = _mm512_div_pd(_mm512_mul_pd(_mm512_set1_pd(-3.75), _mm512_mul_pd(power, _mm512_sub_pd(one, u))), most);
+  const __m512d share = _mm512_mul_pd(power, _mm512_sub_pd(_mm512_set1_pd(2.5), _mm512_mul_pd(_mm512_set1_pd(1.5), u)));
+  const __m512d p = pressure_of(b, t, _mm512_mul_pd(now, share)), along = _mm512_mul_pd(p, share), quarter = _mm512_set1_pd(0.25);
+  const __m512d inward = _mm512_mul_pd(_mm512_mul_pd(_mm512_set1_pd(8), p), _mm512_mul_pd(now, by_q));
+  const Edges8 sum = sum3(e1, e2, e3), middle = {_mm512_mul_pd(quarter, sum.x), _mm512_mul_pd(quarter, sum.y), _mm512_mul_pd(quarter, sum.z)};
+  const auto part = [&](__m512d g, __m512d e, __m512d m) __attribute__((always_inline)) {
+    return _mm512_add_pd(_mm512_mul_pd(along, g), _mm512_mul_pd(inward, _mm512_sub_pd(e, m)));
+  };
+  const auto turn = [&](const Edges8 &e, Edges8 &g) __attribute__((always_inline)) {
+    g = {part(g.x, e.x, middle.x), part(g.y, e.y, middle.y), part(g.z, e.z, middle.z)};
+  };
+  turn(e1, g1), turn(e2, g2), turn(e3, g3);
+}
+
 static void volume_cells8(const Block &b) {
   for (uint32_t t = 0; t < b.cells; t += 8) {
     const Cell *c = b.cell + t;
@@ -115,12 +149,15 @@ static void volume_cells8(const Block &b) {
     gather_edges(b, c, 2, o0, o1, o2, o3, e2);
     gather_edges(b, c, 3, o0, o1, o2, o3, e3);
     cross(e2, e3, g1), cross(e3, e1, g2), cross(e1, e2, g3);
-    const __m512d volume6 = _mm512_add_pd(_mm512_add_pd(_mm512_mul_pd(e1.x, g1.x), _mm512_mul_pd(e1.y, g1.y)), _mm512_mul_pd(e1.z, g1.z));
-    const __m512d rest = _mm512_load_pd(b.volume6 + t), below = _mm512_mul_pd(_mm512_set1_pd(kCollapseBelow), rest);
-    const __m512d lost = _mm512_max_pd(_mm512_sub_pd(below, volume6), _mm512_setzero_pd());
-    const __m512d pressure = _mm512_add_pd(_mm512_mul_pd(_mm512_load_pd(b.bulk + t), _mm512_sub_pd(rest, volume6)),
-                                           _mm512_mul_pd(_mm512_load_pd(b.collapse + t), lost));
-    if (!_mm512_cmp_pd_mask(pressure, _mm512_setzero_pd(), _CMP_NEQ_UQ)) continue;
+    const __m512d volume6 = dot(e1, g1);
+    const __m512d q = squares(e1, e2, e3);
+    __m512d pressure = _mm512_set1_pd(1);
+    if (_mm512_cmp_pd_mask(q, _mm512_load_pd(b.limit + t), _CMP_GT_OQ)) {
+      stretched_forces(b, t, q, volume6, e1, e2, e3, g1, g2, g3);
+    } else {
+      pressure = pressure_of(b, t, volume6);
+      if (!_mm512_cmp_pd_mask(pressure, _mm512_setzero_pd(), _CMP_NEQ_UQ)) continue;
+    }
     Forces f1, f2, f3, sum;
     forces_at(pressure, g1, f1), forces_at(pressure, g2, f2), forces_at(pressure, g3, f3);
     sum = f1, add(sum, f2), add(sum, f3);

@@ -20,6 +20,9 @@ MSM_INLINE v4 splat(double a) { return _mm256_set1_pd(a); }
 MSM_INLINE v4 set4(double a, double b, double c, double d) { return _mm256_setr_pd(a, b, c, d); }
 MSM_INLINE v4 sqrt4(v4 a) { return _mm256_sqrt_pd(a); }
 MSM_INLINE v4 max4(v4 a, v4 b) { return _mm256_max_pd(a, b); }
+MSM_INLINE v4 min4(v4 a, v4 b) { return _mm256_min_pd(a, b); }
+MSM_INLINE bool any_above(v4 a, v4 limit) { return _mm256_movemask_pd(_mm256_cmp_pd(a, limit, _CMP_GT_OQ)); }
+MSM_INLINE v4 choose_above(v4 a, v4 limit, v4 above, v4 below) { return _mm256_blendv_pd(below, above, _mm256_cmp_pd(a, limit, _CMP_GT_OQ)); }
 MSM_INLINE v4 abs4(v4 a) { return _mm256_andnot_pd(_mm256_set1_pd(-0.0), a); }
 MSM_INLINE v4 zero_unless_above(v4 value, v4 a, v4 limit) { return _mm256_and_pd(value, _mm256_cmp_pd(a, limit, _CMP_GT_OQ)); }
 MSM_INLINE bool all_zero(v4 a) { return !_mm256_movemask_pd(_mm256_cmp_pd(a, _mm256_setzero_pd(), _CMP_NEQ_UQ)); }

@@ -20,6 +20,12 @@ MSM_INLINE v4 splat(double a) { return {_mm_set1_pd(a), _mm_set1_pd(a)}; }
 MSM_INLINE v4 set4(double a, double b, double c, double d) { return {_mm_setr_pd(a, b), _mm_setr_pd(c, d)}; }
 MSM_INLINE v4 sqrt4(v4 a) { return {_mm_sqrt_pd(a.lo), _mm_sqrt_pd(a.hi)}; }
 MSM_INLINE v4 max4(v4 a, v4 b) { return {_mm_max_pd(a.lo, b.lo), _mm_max_pd(a.hi, b.hi)}; }
+MSM_INLINE v4 min4(v4 a, v4 b) { return {_mm_min_pd(a.lo, b.lo), _mm_min_pd(a.hi, b.hi)}; }
+MSM_INLINE bool any_above(v4 a, v4 limit) { return _mm_movemask_pd(_mm_cmpgt_pd(a.lo, limit.lo)) | _mm_movemask_pd(_mm_cmpgt_pd(a.hi, limit.hi)); }
+MSM_INLINE __m128d choose(__m128d mask, __m128d yes, __m128d no) { return _mm_or_pd(_mm_and_pd(mask, yes), _mm_andnot_pd(mask, no)); }
+MSM_INLINE v4 choose_above(v4 a, v4 limit, v4 above, v4 below) {
+  return {choose(_mm_cmpgt_pd(a.lo, limit.lo), above.lo, below.lo), choose(_mm_cmpgt_pd(a.hi, limit.hi), above.hi, below.hi)};
+}
 MSM_INLINE v4 abs4(v4 a) { return {_mm_andnot_pd(_mm_set1_pd(-0.0), a.lo), _mm_andnot_pd(_mm_set1_pd(-0.0), a.hi)}; }
 MSM_INLINE v4 zero_unless_above(v4 value, v4 a, v4 limit) {
   return {_mm_and_pd(value.lo, _mm_cmpgt_pd(a.lo, limit.lo)), _mm_and_pd(value.hi, _mm_cmpgt_pd(a.hi, limit.hi))};

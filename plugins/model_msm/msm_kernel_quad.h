@@ -115,7 +115,30 @@ MSM_INLINE void spread(const Block &b, const Cell *c, int n, v4 pressure, const 
 
 MSM_INLINE v4 pressure_of(const Block &b, uint32_t t, v4 now) {
   const v4 rest = load4(b.volume6 + t);
+  now = min4(max4(now, splat(kLeastVolume) * rest), splat(kMostVolume) * rest);
   return load4(b.bulk + t) * (rest - now) + load4(b.collapse + t) * max4(splat(kCollapseBelow) * rest - now, splat(0));
+}
+// Sum of the squares of the six edges.
+MSM_INLINE v4 squares(const Edges4 &e1, const Edges4 &e2, const Edges4 &e3) {
+  const Edges4 sum = {(e1.x + e2.x) + e3.x, (e1.y + e2.y) + e3.y, (e1.z + e2.z) + e3.z};
+  return splat(4) * ((dot(e1, e1) + dot(e2, e2)) + dot(e3, e3)) - dot(sum, sum);
+}
+// Share of the volume that counts, and its derivative by the sum of squares q.
+MSM_INLINE v4 fade(v4 q, v4 limit, v4 &derivative) {
+  const v4 most = max4(q, limit), u = limit / most, power = sqrt4(u) * u;
+  derivative = splat(-3.75) * (power * (splat(1) - u)) / most;
+  return power * (splat(2.5) - splat(1.5) * u);
+}
+// Forces of four cells of which one at least is beyond its limit; for the others they are pressure * g, to the bit.
+MSM_INLINE void stretched_forces(const Block &b, uint32_t t, v4 q, v4 now, const Edges4 &e1, const Edges4 &e2, const Edges4 &e3, Edges4 &g1, Edges4 &g2, Edges4 &g3) {
+  v4 by_q;
+  const v4 share = fade(q, load4(b.limit + t), by_q), p = pressure_of(b, t, now * share);
+  const v4 along = p * share, inward = (splat(8) * p) * (now * by_q), quarter = splat(0.25);
+  const Edges4 middle = {quarter * ((e1.x + e2.x) + e3.x), quarter * ((e1.y + e2.y) + e3.y), quarter * ((e1.z + e2.z) + e3.z)};
+  const auto turn = [&](const Edges4 &e, Edges4 &g) __attribute__((always_inline)) {
+    g.x = along * g.x + inward * (e.x - middle.x), g.y = along * g.y + inward * (e.y - middle.y), g.z = along * g.z + inward * (e.z - middle.z);
+  };
+  turn(e1, g1), turn(e2, g2), turn(e3, g3);
 }
 
 static inline void volume_cells(const Block &b) {
@@ -124,8 +147,14 @@ static inline void volume_cells(const Block &b) {
     Edges4 e1, e2, e3, g1, g2, g3;
     gather_all(b, c, e1, e2, e3);
     cross(e2, e3, g1), cross(e3, e1, g2), cross(e1, e2, g3);
-    const v4 pressure = pressure_of(b, t, dot(e1, g1));
-    if (all_zero(pressure)) continue;
+    const v4 now = dot(e1, g1), q = squares(e1, e2, e3);
+    v4 pressure = splat(1);
+    if (any_above(q, load4(b.limit + t))) {
+      stretched_forces(b, t, q, now, e1, e2, e3, g1, g2, g3);
+    } else {
+      pressure = pressure_of(b, t, now);
+      if (all_zero(pressure)) continue;
+    }
     v4 s0, s1, s2, s3, f0, f1, f2, f3;
     spread(b, c, 1, pressure, g1, s0, s1, s2, s3);
     spread(b, c, 2, pressure, g2, f0, f1, f2, f3);
@@ -151,14 +180,19 @@ static inline void cell_rows(const Block &b) {
     const Edges4 a = {e2.x - e1.x, e2.y - e1.y, e2.z - e1.z}, d = {e3.x - e2.x, e3.y - e2.y, e3.z - e2.z};
     const Edges4 h = {e1.x - e3.x, e1.y - e3.y, e1.z - e3.z};
     const v4 longest = sqrt4(max4(max4(max4(dot(e1, e1), dot(e2, e2)), max4(dot(e3, e3), dot(a, a))), max4(dot(d, d), dot(h, h))));
-    const v4 now = dot(e1, g1), more = abs4(pressure_of(b, t, now)) * longest;
+    const v4 limit = load4(b.limit + t), q = squares(e1, e2, e3);
+    v4 by_q;
+    const v4 now = dot(e1, g1) * fade(q, limit, by_q), pressure = abs4(pressure_of(b, t, now)), more = pressure * longest;
     const v4 k = load4(b.bulk + t) + zero_unless_above(load4(b.collapse + t), splat(kCollapseCounted) * load4(b.volume6 + t), now);
     alignas(32) double row[4][4];
     const v4 w0 = weights(b, c, 0), w1 = weights(b, c, 1), w2 = weights(b, c, 2), w3 = weights(b, c, 3), w = (w0 + w1) + (w2 + w3);
     const v4 n0 = sqrt4(dot(g0, g0)), n1 = sqrt4(dot(g1, g1)), n2 = sqrt4(dot(g2, g2)), n3 = sqrt4(dot(g3, g3));
     const v4 sum = (n0 * w0 + n1 * w1) + (n2 * w2 + n3 * w3);
-    store4(row[0], (k * (n0 * sum) + more * (w - w0)) / w0), store4(row[1], (k * (n1 * sum) + more * (w - w1)) / w1);
-    store4(row[2], (k * (n2 * sum) + more * (w - w2)) / w2), store4(row[3], (k * (n3 * sum) + more * (w - w3)) / w3);
+    const v4 beyond = k * (splat(kFade1) * (limit * limit)) + pressure * (splat(kFade2) * sqrt4(limit));
+    const auto store = [&](int corner, v4 own, v4 weight) __attribute__((always_inline)) {
+      store4(row[corner], choose_above(q, limit, beyond, (k * (own * sum) + more * (w - weight)) / weight));
+    };
+    store(0, n0, w0), store(1, n1, w1), store(2, n2, w2), store(3, n3, w3);
     for (int n = 0; n < 4; ++n)
       for (int m = 0; m < 4; ++m) b.row[8 * size_t(c[n].p[m]) + 7] += row[m][n];
   }

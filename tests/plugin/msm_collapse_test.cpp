@@ -95,6 +95,45 @@ TEST(MsmCollapse, Force_IsMinusTheGradientOfTheEnergyOverDecades) {
     }
 }
 
+// A share of the points is thrown `far` edges of the mesh away, so that the cells around them are needles, sheets and balloons of any orientation.
+void scatter(Instance &b, double edge, double far, unsigned seed = 4) {
+  std::mt19937 random(seed);
+  std::normal_distribution<double> normal;
+  for (uint32_t i = 0; i < b.size(); ++i) {
+    const Vec away = {normal(random), normal(random), normal(random)};
+    b.set(b.x, i, b.get(b.x, i) + (i % 3 ? 0.2 * edge : far * edge) * away);
+  }
+}
+
+TEST(MsmCollapse, ForceOfStretchedCells_IsMinusTheGradientOfTheEnergy) {
+  Host host;
+  for (double nu : {0.0, 0.3, 0.49})
+    for (double far : {1.0, 2.0, 10.0, 100.0}) {
+      Instance b(host, kuhn_bar(3, 2, 2, 0.1, 0.2), defaults(nu));
+      scatter(b, 0.1, far);
+      expect_force_is_gradient(b, 1e-6 * std::max(1.0, far), 2e-6, "poisson " + std::to_string(nu) + " far " + std::to_string(far));
+      b.forces();
+      expect_no_force_or_torque(b, "scattered");
+    }
+}
+
+TEST(MsmCollapse, StepBound_NeverFallsFarBelowThatAtRest) {
+  Host host;
+  for (double nu : {0.0, 0.3, 0.45})
+    for (const Mesh &mesh : {regular_tet(), kuhn_bar(4, 3, 3, 0.1, 0.2)}) {
+      Instance b(host, mesh, defaults(nu));
+      const double edge = norm(mesh.at(1) - mesh.at(0)), rest = b.bound();
+      double least = rest;
+      for (double far = 0.1; far < 1e6; far *= 1.7)
+        for (unsigned seed = 0; seed < 4; ++seed) {
+          for (uint32_t i = 0; i < b.size(); ++i) b.set(b.x, i, mesh.at(i));
+          scatter(b, edge, far, seed);
+          least = std::min(least, b.bound());
+        }
+      EXPECT_GT(least, 0.07 * rest) << "poisson " << nu << ", " << mesh.ncell() << " cells";
+    }
+}
+
 TEST(MsmCollapse, CellEnergy_SumsToTheEnergy) {
   Host host;
   Instance b(host, kuhn_bar(5, 3, 2, 0.1, 0.2), defaults(0.3));
@@ -140,7 +179,8 @@ TEST(MsmCollapse, SquashedFlatAndInvertedBodies_ComeBack) {
       {"flat", [](Vec x, double, uint32_t) { return Vec{x[0], x[1], 0}; }},
       {"points pushed through a cell", [](Vec x, double size, uint32_t i) { return i % 7 ? x : x - (0.5 * size / norm(x)) * x; }},
       {"mirrored", [](Vec x, double, uint32_t) { return Vec{x[0], x[1], -x[2]}; }},
-      {"in a point", [](Vec x, double, uint32_t) { return 0.05 * x; }}};
+      {"in a point", [](Vec x, double, uint32_t) { return 0.01 * x; }},
+      {"blown up", [](Vec x, double, uint32_t) { return 20.0 * x; }}};
   for (const Mesh &mesh : {regular_tet(), irregular_tet(), kuhn_bar(3, 3, 3, 0.1, 0.2)}) {
     Vec middle{};
     double size = 0;
