@@ -17,10 +17,10 @@ void sheet_and_box(Scene &s) {
   s.add("beam", {0.05, 0.05, 0.05}, 40, {0.03, 0.03, -0.06}, {});
   s.add("beam", {0.12, 0.12, 0.012}, 50, {s.jitter(0.02), s.jitter(0.02), 0.04}, {0, 0, -100}, {s.jitter(0.1), 0.1 + s.jitter(0.05), s.jitter(0.3), 1});
 }
-void gap(Scene &s) {   // 30 mm wide, for a ball of 36 mm
-  s.add("beam", {0.1, 0.1, 0.02}, 100, {-0.115, -0.05, 0}, {});
-  s.add("beam", {0.1, 0.1, 0.02}, 100, {0.015, -0.05, 0}, {});
-  s.add("ball", {0.018, 0, 0}, 100, {s.jitter(0.005), s.jitter(0.02), 0.05}, {0, 0, -40});
+void gap(Scene &s) {   // 30 mm wide, for a ball of 36 mm; soft enough to cross where nothing guards them
+  s.add("beam", {0.1, 0.1, 0.02}, 100, {-0.115, -0.05, 0}, {}, {0, 0, 0, 1}, 3e5);
+  s.add("beam", {0.1, 0.1, 0.02}, 100, {0.015, -0.05, 0}, {}, {0, 0, 0, 1}, 3e5);
+  s.add("ball", {0.018, 0, 0}, 100, {s.jitter(0.005), s.jitter(0.02), 0.05}, {0, 0, -40}, {0, 0, 0, 1}, 3e5);
 }
 void spike_on_wedge(Scene &s) {   // a corner comes down on an edge
   s.add("beam", {0.08, 0.2, 0.08}, 60, {-0.0566, -0.1, 0}, {}, {0, 0.3827, 0, 0.9239});
