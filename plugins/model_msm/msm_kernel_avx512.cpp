@@ -122,8 +122,8 @@ MSM_INLINE __m512d squares(const Edges8 &e1, const Edges8 &e2, const Edges8 &e3)
   const Edges8 sum = sum3(e1, e2, e3);
   return _mm512_sub_pd(_mm512_mul_pd(_mm512_set1_pd(4), sum3(dot(e1, e1), dot(e2, e2), dot(e3, e3))), dot(sum, sum));
 }
-MSM_INLINE void stretched_forces(const Block &b, uint32_t t, __m512d q, __m512d now, const Edges8 &e1, const Edges8 &e2, const Edges8 &e3, Edges8 &g1, Edges8 &g2,
-                                 Edges8 &g3) {
+MSM_INLINE void stretched_forces(const Block &b, uint32_t t, __m512d q, __m512d now, const Edges8 &e1, const Edges8 &e2, const Edges8 &e3, Edges8 &g1,
+                                 Edges8 &g2, Edges8 &g3) {
   const __m512d limit = _mm512_load_pd(b.limit + t), most = _mm512_max_pd(q, limit), u = _mm512_div_pd(limit, most), one = _mm512_set1_pd(1);
   const __m512d power = _mm512_mul_pd(_mm512_sqrt_pd(u), u);
   const __m512d by_q = _mm512_div_pd(_mm512_mul_pd(_mm512_set1_pd(-3.75), _mm512_mul_pd(power, _mm512_sub_pd(one, u))), most);

@@ -130,7 +130,8 @@ MSM_INLINE v4 fade(v4 q, v4 limit, v4 &derivative) {
   return power * (splat(2.5) - splat(1.5) * u);
 }
 // Forces of four cells of which one at least is beyond its limit; for the others they are pressure * g, to the bit.
-MSM_INLINE void stretched_forces(const Block &b, uint32_t t, v4 q, v4 now, const Edges4 &e1, const Edges4 &e2, const Edges4 &e3, Edges4 &g1, Edges4 &g2, Edges4 &g3) {
+MSM_INLINE void stretched_forces(const Block &b, uint32_t t, v4 q, v4 now, const Edges4 &e1, const Edges4 &e2, const Edges4 &e3, Edges4 &g1, Edges4 &g2,
+                                 Edges4 &g3) {
   v4 by_q;
   const v4 share = fade(q, load4(b.limit + t), by_q), p = pressure_of(b, t, now * share);
   const v4 along = p * share, inward = (splat(8) * p) * (now * by_q), quarter = splat(0.25);

@@ -75,7 +75,8 @@ TEST(MsmBound, RowSums_BoundTheTrueSpectrumInEveryShape) {
   for (const auto &[p, fields] : std::initializer_list<std::pair<Params, Fields>>{
            {{1e5, 0.3, 0, 0, 0}, {}}, {{1e5, 0.3, 0.004, 3, 0}, {}}, {{1e5, 0.45, 0.001, 0, 1}, {}}, {{1e5, 0.45, 0, 0, 20}, {}},
            {tilted(0, 0, 2, false), {}}, {tilted(0.004, 0, 2, false), {}}, {tilted(0.004, 1, 10, false), {}}, {tilted(0, 0, 2, true), {}},
-           {tilted(0.004, 0, 10, true), {}}, {collapsing(0.2), {}}, {collapsing(0.3), {}}, {tilted(0.01, 0, 1, false, true), {}}, {tilted(0.01, 1, 1, true, true), {}}, {{}, uneven}})
+           {tilted(0.004, 0, 10, true), {}},
+           {collapsing(0.2), {}}, {collapsing(0.3), {}}, {tilted(0.01, 0, 1, false, true), {}}, {tilted(0.01, 1, 1, true, true), {}}, {{}, uneven}})
     for (double size : {1.0, 0.3, 2.0, -1.0, 10.0, -30.0}) {
       Host host;
       Instance b(host, mesh, p, 4, fields);

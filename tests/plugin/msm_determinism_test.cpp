@@ -54,7 +54,8 @@ TEST(MsmDeterminism, Compiler_NeverShowsInAResult) {
 
 TEST(MsmDeterminism, InstructionSet_NeverShowsInAResult) {
   for (const Mesh &mesh : {irregular_tet(), kuhn_bar(4, 3, 2, 0.1, 0.2), large_bar()})
-    for (const Params &p : {Params{2e5, 0.4, 0.003, 0.5, 1.5}, Params{2e5, 0.4, 0, 0, 1.5}, Params{2e5, 0.4, 0.003, 0, 0}, Params{}, at_defaults(0.3), at_defaults(0)}) {
+    for (const Params &p : {Params{2e5, 0.4, 0.003, 0.5, 1.5}, Params{2e5, 0.4, 0, 0, 1.5}, Params{2e5, 0.4, 0.003, 0, 0}, Params{},
+                            at_defaults(0.3), at_defaults(0)}) {
       Host host;
       const std::vector<double> baseline = results(host, "sse2", mesh, p);
       for (const char *simd : {"avx2", "avx512"}) {
