@@ -56,7 +56,8 @@ enum {
   DFM_TROUBLE_INVERTED = 8,      /* a cell is inside out (looked for when the step bound is asked): refine, soften the load */
   DFM_TROUBLE_PLUGIN = 16        /* a plugin failed: see the log */
 };
-/** Advances the world by dt. A step longer than the stable one is cut into equal sub-steps with the contact solve in each.
+/** Advances the world by dt. A step longer than the stable one is cut into equal sub-steps with the contact solve in each; their number
+ * is 1, 2, 3 or (4, 5, 6, 7) 2^k.
  * @param dt       s, > 0
  * @param trouble  out, DFM_TROUBLE_* bits; may be NULL
  * @return DFM_OK; DFM_DISCARD too many sub-steps, nothing changed; DFM_E_DIVERGED a sub-step could not be taken (a value that is not
@@ -64,8 +65,11 @@ enum {
  *         DFM_E_NOMEM likewise; DFM_E_FATAL a plugin gave no step bound; DFM_E_ARG; DFM_E_HANDLE; DFM_E_BUSY called from inside a step
  * Threads: One thread at a time per world. Since 0.1. */
 DFM_API dfm_status dfm_world_step(dfm_world world, double dt, uint32_t *trouble);
-/** Largest step the current state allows without sub-steps (0.9 of the proven bound), s; +INFINITY if nothing bounds it.
- * @param body,point  out, the element that bounds it; may be NULL. Threads: Not during step. Since 0.1. */
+/** A step that is not cut into sub-steps: (4, 5, 6, 7) 2^k s, at most 0.9 of the proven bound; +INFINITY if nothing bounds it. It may be fed back at each step: it
+ * follows the bound down at once and up with delay, so that steps change rarely (doc/concepts/step.md). dfm_world_stats.stable_step has the bound itself.
+ * @param dt          out, s
+ * @param body,point  out, the element that bounds it; may be NULL
+ * @return DFM_OK; DFM_E_HANDLE; DFM_E_FATAL a plugin gave no step bound. Threads: Not during step. Since 0.1. */
 DFM_API dfm_status dfm_world_stable_step(dfm_world world, double *dt, dfm_body *body, uint32_t *point);
 /** Simulated time, s; NAN for a stale handle. Threads: Any thread. Not during step. Since 0.1. */
 DFM_API double dfm_world_time(dfm_world world);

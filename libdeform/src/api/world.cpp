@@ -139,9 +139,9 @@ dfm_status dfm_world_stable_step(dfm_world world, double *dt, dfm_body *body, ui
     World &w = idle(world_of(world));
     need(dt, "dt");
     w.prepare();
-    // The value the next step uses: asked anew only when it would ask, so that reading it changes no result.
-    if (w.bound_age == kNone) w.update_bound();
-    *dt = w.stable;
+    // The bound that the next step uses: asked anew only when it would ask, so that reading it changes no result.
+    if (w.bound_due()) w.update_bound();
+    *dt = offered_step(w.sizes, w.stable);
     if (body) *body = w.worst_body ? w.worst_body->handle : 0;
     if (point) *point = w.worst_point;
   });
@@ -233,7 +233,7 @@ dfm_status dfm_world_explain(dfm_world world, char *text, size_t *bytes) {
   return guard([&] {
     World &w = idle(world_of(world));
     w.prepare();
-    if (w.bound_age == kNone) w.update_bound();
+    if (w.bound_due()) w.update_bound();
     const std::string json = explain(w);
     give_bytes(json.c_str(), json.size() + 1, text, bytes);
   });

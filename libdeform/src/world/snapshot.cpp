@@ -12,7 +12,7 @@
 namespace dfm {
 namespace {
 
-constexpr char kMagic[8] = {'d', 'f', 'm', 's', 'n', 'a', 'p', '5'};
+constexpr char kMagic[8] = {'d', 'f', 'm', 's', 'n', 'a', 'p', '6'};
 
 void zone(Hash &h, const SurfaceZones::Zone &z) {
   h.add(z.group.data(), z.group.size()), h.add(z.material.data(), z.material.size()), h.add(z.friction);
@@ -123,6 +123,7 @@ struct Staged {
   uint32_t inverted, sleepers;
   bool holding;
   uint32_t bound_age;
+  StepSizes sizes;
   dfm_world_stats stats;
   Vec3 gravity;
   dfm_world_def def;
@@ -147,6 +148,7 @@ T &object(const std::unique_ptr<T> &x) { return *x; }
 template <class Stream, class W>
 void fields(Stream &s, W &w) {
   s.value(w.time), s.value(w.step_count), s.value(w.stable), s.value(w.inverted), s.value(w.bound_age), s.value(w.offset);
+  for (auto *r : {&w.sizes.cut, &w.sizes.offer}) s.value(r->size), s.value(r->calm), s.value(r->patience);
   s.value(w.hold_start), s.value(w.holding);
   s.value(w.stats), s.value(w.gravity), s.value(w.def.gravity), s.value(w.next_id), s.array(w.gravity_keys);
   s.value(w.def.sleep), s.value(w.sleepers);
@@ -241,6 +243,7 @@ void check(const Staged &t, const World &w) {
       good = good && p.slot_a < w.bodies.size() && p.slot_b < (p.obstacle ? w.obstacles.size() : w.bodies.size());
   }
   for (const FrictionRule &r : t.friction) good = good && r.law < t.laws.size();
+  good = good && sound(t.sizes);
   if (!good) fail(DFM_E_FORMAT, "the snapshot is damaged: its arrays do not fit this world; nothing was restored");
 }
 
@@ -377,6 +380,7 @@ void world_restore(World &w, const void *data, size_t bytes) {
   w.changed = true;
   w.prepare();
   w.gravity = staged.gravity, w.stable = staged.stable, w.inverted = staged.inverted, w.offset = staged.offset, w.bound_age = staged.bound_age;
+  w.sizes = staged.sizes;
 }
 
 }  // namespace dfm

@@ -15,6 +15,7 @@
 #include "integrate/symplectic_euler.h"
 #include "surfel/make_surface.h"
 #include "world/spring.h"
+#include "world/step_sizes.h"
 #include "world/world.h"
 
 namespace dfm {
@@ -142,30 +143,30 @@ Pose Obstacle::end_pose(double t, double h, double left) const {
 
 dfm_status World::step(double dt, uint32_t *trouble) {
   prepare();
-  if (bound_age >= kBoundEvery) update_bound();
-  const double count = std::ceil(dt / stable - 1e-9);   // stable is infinite where nothing bounds the step
-  if (!(count <= def.max_substeps)) {
+  if (bound_due()) update_bound();
+  const double needed = std::ceil(dt / stable - 1e-9);   // stable is infinite where nothing bounds the step
+  if (!(needed <= def.max_substeps)) {
     set_last_error(format("a step of %g s needs %.0f sub-steps of %g s (max_substeps %u): soften or coarsen body '%s', or take a shorter step",
-                          dt, count, stable, def.max_substeps, worst_body ? worst_body->name.c_str() : "?").c_str());
+                          dt, needed, stable, def.max_substeps, worst_body ? worst_body->name.c_str() : "?").c_str());
     return DFM_DISCARD;
   }
-  const uint32_t n = std::max(1u, static_cast<uint32_t>(count));
+  const uint32_t n = static_cast<uint32_t>(std::min<double>(def.max_substeps, choose_pieces(sizes, dt, stable)));
   if (n > 1) *trouble |= DFM_TROUBLE_SUBSTEPS;
   if (inverted) *trouble |= DFM_TROUBLE_INVERTED;
 
   begin_impulses(step_impulses);
   const double goal = time + dt;
-  double from = time, span = dt;   // `cut` equal sub-steps since `from`; the rest of the step is cut anew where the bound has fallen
+  double from = time, span = dt;   // `cut` equal sub-steps since `from`; the rest of the step is cut finer where the bound has fallen
   uint32_t cut = n, done = 0;
   for (uint32_t k = 0; k < cut; ++k, ++done) {
-    if (bound_age >= kBoundEvery) {
+    if (bound_due()) {
       update_bound();
       if (inverted) *trouble |= DFM_TROUBLE_INVERTED;
-      const double more = std::ceil((goal - time) / stable - 1e-9);
+      const double more = (cut - k) * cut_finer(sizes, span / cut, stable);
       if (!(done + more <= def.max_substeps)) {
         set_last_error(format("step %llu: the shape of body '%s' has changed so much that the rest of the step needs %.0f sub-steps of %g s "
                               "(max_substeps %u); take a shorter step", static_cast<unsigned long long>(step_count),
-                              worst_body ? worst_body->name.c_str() : "?", more, stable, def.max_substeps).c_str());
+                              worst_body ? worst_body->name.c_str() : "?", std::ceil((goal - time) / stable), stable, def.max_substeps).c_str());
         return DFM_E_DIVERGED;
       }
       if (more > cut - k) from = time, span = goal - time, cut = static_cast<uint32_t>(more), k = 0, *trouble |= DFM_TROUBLE_SUBSTEPS;
@@ -173,6 +174,7 @@ dfm_status World::step(double dt, uint32_t *trouble) {
     const bool last = k + 1 == cut;
     const double end = last ? goal : from + span * (double(k + 1) / cut);
     if (!advance(end, goal, last, trouble)) return DFM_E_DIVERGED;
+    pass(sizes);
   }
   stats.last_substeps = done, stats.substeps_max = std::max(stats.substeps_max, done);
   ++step_count;
@@ -228,6 +230,8 @@ bool World::sub_step(uint32_t *trouble) {
   keep_rigids();
   return undo.kept = true;
 }
+
+bool World::bound_due() const { return bound_age >= kBoundEvery; }
 
 void World::update_bound() {
   stable = std::numeric_limits<double>::infinity();

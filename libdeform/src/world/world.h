@@ -30,6 +30,7 @@
 #include "world/self_contact.h"
 #include "world/sleep.h"
 #include "world/step_impulses.h"
+#include "world/step_sizes.h"
 
 namespace dfm {
 
@@ -165,6 +166,7 @@ struct World {
 
   // Time.
   double time = 0, stable = 0;                         // s; stable: 0.9 of the bound at its last evaluation
+  StepSizes sizes;
   uint64_t step_count = 0;
   Body *worst_body = nullptr;
   uint32_t inverted = 0;                               // cells inside out at the last evaluation of the bound
@@ -249,6 +251,7 @@ struct World {
   bool piece(uint32_t *trouble);                       // sub_step(), shorter where the guard asks for it
   void undo_motion();                                  // held velocities as before stage_motion()
   void update_bound();                                 // stable, worst_body, worst_point
+  bool bound_due() const;                              // does the next step ask for it?
   void ask_bound(Body &b);
 
   // stages of a sub-step, each in the file of its name

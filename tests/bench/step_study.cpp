@@ -1,0 +1,99 @@
+// Undamped bodies at "auto": 1e6 steps of what dfm_world_stable_step answers, on every mesh that is shipped and on meshes of the thesis, a row each
+// (doc/concepts/step.md). Rows that the table has are left alone, so that the run may be stopped and taken up again.
+//
+//   step_study TABLE.csv [--commit ID] [--only TEXT] [--steps N] [--seconds N]     rows whose name contains TEXT; begins no row after N seconds
+#include <chrono>
+#include <cstdio>
+#include <cstring>
+#include <ctime>
+#include <filesystem>
+#include <set>
+
+#include "machine.h"
+#include "step_energy.h"
+#include "support.h"
+
+namespace {
+
+using namespace test::step_energy;
+
+constexpr const char *kThesis[] = {"cyl_222", "cyl_coarse", "cyl_coarse_q", "cyl_fine_q"};
+
+// Each mesh once before any mesh twice, small ones first.
+std::vector<Case> cases() {
+  std::vector<std::pair<uintmax_t, std::string>> meshes = {{20000, "beam"}, {20000, "cylinder"}, {20000, "ball"}};   // size of the file; made here: about
+  for (const auto &entry : std::filesystem::directory_iterator(DEFORM_SOURCE_DIR "/examples/data"))
+    if (entry.path().extension() == ".msh") meshes.push_back({entry.file_size(), entry.path().string()});
+  for (const char *name : {"rabbit", "organ"}) meshes.push_back({100000, std::string(DEFORM_SOURCE_DIR "/examples/data/") + name + ".obj"});
+  for (const char *name : kThesis) {
+    const std::string path = test::shared_dir() + "/meshes/thesis/" + name + ".msh";
+    if (std::filesystem::exists(path)) meshes.push_back({std::filesystem::file_size(path), path});
+  }
+  std::sort(meshes.begin(), meshes.end());
+  std::vector<Case> out;
+  for (const auto &[motion, volume] : {std::pair{"spin", 1.0}, {"spin", 0.0}, {"hung", 1.0}, {"ring", 1.0}, {"hung", 0.0}, {"ring", 0.0}, {"wrung", 1.0}})
+    for (const auto &[size, path] : meshes)
+      out.push_back({(path.find('.') == std::string::npos ? "made_" : "") + std::filesystem::path(path).stem().string() + "," + motion + (volume > 0 ? ",1" : ",0"), path, motion, volume});
+  return out;
+}
+
+// Rows that are there, by the columns of their name, which stand after machine, compiler and commit.
+std::set<std::string> known(const std::string &path) {
+  std::set<std::string> names;
+  std::FILE *f = std::fopen(path.c_str(), "r");
+  if (!f) return names;
+  char line[1024];
+  while (std::fgets(line, sizeof line, f)) {
+    const char *begin = line, *end;
+    for (int commas = 0; *begin && commas < 3; ++begin) commas += *begin == ',';
+    end = begin;
+    for (int commas = 0; *end && commas < 3; ++end) commas += *end == ',';
+    if (end > begin) names.insert(std::string(begin, size_t(end - begin - 1)));
+  }
+  std::fclose(f);
+  return names;
+}
+
+double cpu_seconds() { return double(std::clock()) / CLOCKS_PER_SEC; }
+
+}  // namespace
+
+int main(int argc, char **argv) {
+  if (argc < 2) return std::fprintf(stderr, "step_study TABLE.csv [--commit ID] [--only TEXT] [--steps N] [--seconds N]\n"), 2;
+  std::string only, commit = "unknown";
+  double seconds = 1e9;
+  uint64_t steps = 1000000;
+  for (int i = 2; i + 1 < argc; ++i) {
+    if (!std::strcmp(argv[i], "--only")) only = argv[i + 1];
+    if (!std::strcmp(argv[i], "--commit")) commit = argv[i + 1];
+    if (!std::strcmp(argv[i], "--seconds")) seconds = std::atof(argv[i + 1]);
+    if (!std::strcmp(argv[i], "--steps")) steps = uint64_t(std::atof(argv[i + 1]));
+  }
+  const std::set<std::string> done = known(argv[1]);
+  std::FILE *table = std::fopen(argv[1], "a");
+  if (!table) return std::perror(argv[1]), 2;
+  if (done.empty())
+    std::fprintf(table, "machine,compiler,commit,mesh,motion,volume,steps,substeps,changes,energy_J,block_least,block_most,trend_per_1e6,sample_least,sample_most,inverted,cpu_s\n");
+  const auto start = std::chrono::steady_clock::now();
+  test::Context context;
+  int bad = 0;
+  std::printf("%-30s %9s %7s %12s %10s %10s %10s\n", "mesh,motion,volume", "steps", "changes", "energy J", "least", "most", "trend");
+  for (const Case &c : cases()) {
+    if (done.count(c.name) || c.name.find(only) == std::string::npos) continue;
+    if (std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count() > seconds) continue;
+    const double cpu = cpu_seconds();
+    const Result r = run_case(context, c, steps, 100);
+    const bool keeps = !r.stopped && r.least > -0.02 && r.most < 0.02;
+    bad += !keeps;
+    std::fprintf(table, "%s,%s,%s,%s,%llu,%llu,%llu,%.6g,%.3g,%.3g,%.3g,%.3g,%.3g,%llu,%.1f\n", bench::machine().c_str(), bench::compiler(), commit.c_str(),
+                 c.name.c_str(), static_cast<unsigned long long>(r.steps), static_cast<unsigned long long>(r.substeps),
+                 static_cast<unsigned long long>(r.changes), r.scale, r.least, r.most, r.trend, r.lowest, r.highest,
+                 static_cast<unsigned long long>(r.inverted), cpu_seconds() - cpu);
+    std::fflush(table);
+    std::printf("%-30s %9llu %7llu %12.4g %10.2e %10.2e %10.2e %s\n", c.name.c_str(), static_cast<unsigned long long>(r.steps),
+                static_cast<unsigned long long>(r.changes), r.scale, r.least, r.most, r.trend, keeps ? "" : "NOT KEPT");
+    std::fflush(stdout);
+  }
+  std::fclose(table);
+  return bad > 0;
+}
