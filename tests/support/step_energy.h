@@ -22,7 +22,8 @@ struct Result {
 // The energy that symplectic Euler keeps where forces are linear: U(x_n) + v_n.M v_(n+1) / 2 (doc/concepts/step.md).
 class Sampler {
  public:
-  Sampler(dfm_world world, dfm_body body, const double *gravity, const std::vector<double> &share) : world_(world), body_(body), gravity_(gravity, gravity + 3) {
+  Sampler(dfm_world world, dfm_body body, const double *gravity, const std::vector<double> &share)
+      : world_(world), body_(body), gravity_(gravity, gravity + 3) {
     uint32_t n = 0;
     ok(dfm_body_get_state(body, 0, nullptr, nullptr, &n));
     x_.resize(3 * size_t(n)), v_.resize(x_.size()), after_.resize(x_.size()), mass_.assign(n, 0.0);

@@ -65,8 +65,9 @@ enum {
  *         DFM_E_NOMEM likewise; DFM_E_FATAL a plugin gave no step bound; DFM_E_ARG; DFM_E_HANDLE; DFM_E_BUSY called from inside a step
  * Threads: One thread at a time per world. Since 0.1. */
 DFM_API dfm_status dfm_world_step(dfm_world world, double dt, uint32_t *trouble);
-/** A step that is not cut into sub-steps: (4, 5, 6, 7) 2^k s, at most 0.9 of the proven bound; +INFINITY if nothing bounds it. It may be fed back at each step: it
- * follows the bound down at once and up with delay, so that steps change rarely (doc/concepts/step.md). dfm_world_stats.stable_step has the bound itself.
+/** A step that is not cut into sub-steps: (4, 5, 6, 7) 2^k s, at most 0.9 of the proven bound; +INFINITY if nothing bounds it. It may be
+ * fed back at each step: it follows the bound down at once and up with delay, so that steps change rarely
+ * (doc/concepts/step.md). dfm_world_stats.stable_step has the bound itself.
  * @param dt          out, s
  * @param body,point  out, the element that bounds it; may be NULL
  * @return DFM_OK; DFM_E_HANDLE; DFM_E_FATAL a plugin gave no step bound. Threads: Not during step. Since 0.1. */
