@@ -19,7 +19,9 @@ using namespace test::hold;
 struct Place { const char *scene; double level, cycles; };
 constexpr Place kPlaces[] = {{"slope", 0.5, 0}, {"slope", 0.9, 0}, {"slope", 0.99, 0}, {"pull", 0.5, 0}, {"pull", 0.9, 0}, {"pull", 0.99, 0},
                              {"soft", 0.5, 0}, {"soft", 0.9, 0}, {"soft", 0.99, 0},
-                             {"pinch", 1.05, 0}, {"pinch", 2, 0}, {"pinch", 20, 0}, {"pinch", 95, 0}, {"vibration", 0.5, 10000}};
+                             {"pinch", 1.05, 0}, {"pinch", 2, 0}, {"pinch", 20, 0}, {"pinch", 95, 0},
+                             {"stack", 3, 0}, {"stack", 5, 0}, {"grip", 1.05, 0}, {"grip", 2, 0}, {"grip", 20, 0}, {"vee", 0, 0}, {"vee", 10, 0},
+                             {"taper", 2, 0}, {"taper", 5, 0}, {"wedges", 0, 0}, {"wedges", 3, 0}, {"vibration", 0.5, 10000}};
 constexpr const char *kLaws[] = {"coulomb", "karnopp", "dahl", "lugre", "elastoplastic", "gms"};
 struct Step { const char *name; double seconds; };
 constexpr Step kSteps[] = {{"1/1000", 1e-3}, {"1/60", 1.0 / 60}, {"1/240", 1.0 / 240}, {"1/10000", 1e-4}};

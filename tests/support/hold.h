@@ -5,6 +5,11 @@
 //   pull       a wide pad, pressed on a plane by five times its weight, pulled by `level` of what that holds
 //   soft       the same on a soft bed
 //   vibration  the first pad pad pulled by 0 to 1/2 of it, up and down at 50 Hz
+//   stack      `level` soft cubes on each other, each turned by 7 degrees and shifted by 3 mm against the one below; as they come, with little damping
+//   grip       the pinch with a soft block for the capsule
+//   vee        a soft block, turned by `level` degrees about the vertical, in a right-angled groove
+//   taper      a soft block pushed into a groove of 2 x 15 degrees, which holds it by friction alone once it is let go
+//   wedges     a soft block that narrows downwards, turned by `level` degrees, between two soft wedges
 #pragma once
 #include <ctime>
 
@@ -81,19 +86,27 @@ struct Scene {
   dfm_world world = 0;
   dfm_body body = 0;             // what is held, or
   dfm_rigid rigid = 0;
-  double settle = 1.6, measured = 0.5, ahead = 1;   // s; along which what is measured counts: x, or z where a capsule falls
+  double settle = 1.6, measured = 0.5;   // s
+  bool any_way = false;          // what is held may creep in any direction; else along x, or down where a capsule falls
 
   explicit Scene(const Case &c) {
-    if (c.scene == "pinch") pinch(c);
+    if (c.scene == "pinch" || c.scene == "grip") pinch(c);
     else if (c.scene == "slope") slope(c);
+    else if (c.scene == "stack") stack(c);
+    else if (c.scene == "vee") vee(c);
+    else if (c.scene == "taper") taper(c);
+    else if (c.scene == "wedges") wedges(c);
     else pad(c);
   }
-  // Where it is, m, along the way that it would slip.
-  double at() const {
-    if (body) return measure(body).com[0];
+  // Where it is, m.
+  Vec at() const {
+    if (body) {
+      const dfm_body_measure m = measure(body);
+      return any_way ? Vec{m.com[0], m.com[1], m.com[2]} : Vec{m.com[0], 0, 0};
+    }
     dfm_rigid_state s{};
     ok(dfm_rigid_get_state(rigid, &s));
-    return -s.position[2];
+    return {0, 0, s.position[2]};
   }
 
  private:
@@ -146,8 +159,10 @@ struct Scene {
   }
   void pinch(const Case &c) {
     world = make_world(context, {0, 0, -kG});
-    rigid_capsule();
-    const double capsule = 0.01, grip = c.level * capsule * kG / (2 * kMu);
+    const bool soft_load = c.scene == "grip";
+    if (soft_load) soft_block(c);
+    else rigid_capsule();
+    const double load = soft_load ? measure(body).mass : 0.01, grip = c.level * load * kG / (2 * kMu);
     for (const int side : {-1, 1}) {
       BodyOptions o = soft(1e5);
       o.name = side < 0 ? "left" : "right", o.position = {side < 0 ? -0.04 - kRadius - 2e-5 : kRadius + 2e-5, -0.02, -0.017};
@@ -160,6 +175,93 @@ struct Scene {
     std::vector<dfm_vector_key> keys;
     for (const dfm_scale_key &k : ramp(0.4, 0.8)) keys.push_back({k.t, {0, 0, -kG * k.value}});
     ok(dfm_world_set_gravity_keys(world, uint32_t(keys.size()), keys.data()));
+  }
+  void soft_block(const Case &c) {
+    BodyOptions o = soft(1e5);
+    o.name = "block", o.position = {-kRadius, -0.013, -0.011}, any_way = true;
+    body = make_body(context, world, "beam", {2 * kRadius, 0.026, 0.022}, c.fine ? 400 : 60, o);
+  }
+  static std::array<double, 4> about_z(double angle) { return {0, 0, std::sin(angle / 2), std::cos(angle / 2)}; }
+  void stack(const Case &c) {
+    constexpr double kSide = 0.1, kDegree = 0.017453292519943295;
+    world = make_world(context, {0, 0, -kG}), any_way = true;
+    add_plane(world, "floor");
+    for (int i = 0; i < int(c.level); ++i) {
+      const double turn = 7 * kDegree * i, x = std::cos(turn), y = std::sin(turn);
+      BodyOptions o;
+      o.young = 1e5, o.damping_stiffness = 1e-3, o.damping_mass = 8;
+      o.name = "cube " + std::to_string(i), o.rotation = about_z(turn);
+      o.position = {0.003 * i - 0.5 * kSide * (x - y), -0.5 * kSide * (x + y), i * kSide + (i + 1) * 1e-4};
+      body = make_body(context, world, "beam", {kSide, kSide, kSide}, c.fine ? 600 : 60, o);
+    }
+    set_law(world, c.law);
+    settle = 5, measured = 1;
+  }
+  // A groove along y, its walls `slant` off the vertical.
+  void groove(double slant) {
+    for (const int side : {-1, 1}) {
+      const double half = 0.5 * side * (1.5707963267948966 - slant);   // the plane's normal, from z towards the middle
+      add_plane(world, side < 0 ? "left" : "right", {}, {0, -std::sin(half), 0, std::cos(half)});
+    }
+  }
+  void vee(const Case &c) {
+    constexpr double kSide = 0.04, kQuarter = 0.78539816339744831;
+    world = make_world(context, {0, 0, -kG}), any_way = true;
+    groove(kQuarter);
+    BodyOptions o = soft(1e5);
+    const double turn = c.level * 0.017453292519943295, s = std::sin(kQuarter / 2), q = std::cos(kQuarter / 2);
+    o.name = "block", o.position = {0, -0.03, 0.004 + 0.06 * std::sin(turn)};
+    // about y by 45 degrees, then about z
+    o.rotation = {-std::sin(turn / 2) * s, std::cos(turn / 2) * s, std::sin(turn / 2) * q, std::cos(turn / 2) * q};
+    o.position[0] -= kSide * std::sqrt(0.5) * std::cos(turn) - 0.03 * std::sin(turn), o.position[2] += kSide * std::sqrt(0.5);
+    body = make_body(context, world, "beam", {kSide, 0.06, kSide}, c.fine ? 600 : 80, o);
+    set_law(world, c.law);
+    settle = 1.5, measured = 0.5;
+  }
+  void taper(const Case &c) {
+    constexpr double kWide = 0.04, kSlant = 0.2617993877991494;
+    world = make_world(context, {0, 0, -kG}), any_way = true;
+    groove(kSlant);
+    BodyOptions o = soft(1e5);
+    o.name = "block", o.position = {-0.5 * kWide, -0.025, 0.5 * kWide / std::tan(kSlant) + 1e-4};
+    body = make_body(context, world, "beam", {kWide, 0.05, 0.04}, c.fine ? 600 : 80, o);
+    set_law(world, c.law);
+    const double press = c.level * weight(body);
+    auto keys = ramp(0, 0.3);
+    for (const dfm_scale_key &k : ramp(0.5, 1.0, 1, 0)) keys.push_back(k);
+    pull(body, {0, 0, -press}, keys);
+    settle = 1.5, measured = 0.5;
+  }
+  static constexpr double kLean = 0.6;   // of the wedges' faces, way over height
+  void wedge(const Case &c, int side) {
+    constexpr double kLong = 0.06, kHigh = 0.05, kFoot = 0.06;
+    Cells cells = make_cells(context, "beam", {kFoot, kLong, kHigh}, c.fine ? 500 : 120);
+    std::vector<uint8_t> fixed(cells.npoint());
+    for (uint32_t i = 0; i < cells.npoint(); ++i) {
+      double *const p = &cells.points[3 * size_t(i)];
+      p[0] *= 1 - kLean * p[2] / kFoot;
+      if (side > 0) p[0] = kFoot - p[0];
+      fixed[i] = p[2] < 1e-9 ? 7 : 0;
+    }
+    for (uint32_t t = 0; side > 0 && t < cells.ntet(); ++t) std::swap(cells.tets[4 * size_t(t)], cells.tets[4 * size_t(t) + 1]);   // mirrored
+    BodyOptions o = soft(2e5);
+    o.name = side < 0 ? "left" : "right", o.position = {side < 0 ? -kFoot - 0.002 : 0.002, -0.5 * kLong, 0};
+    make_body(world, cells, o, nullptr, fixed.data());
+  }
+  void wedges(const Case &c) {
+    constexpr double kBelow = 0.02, kLong = 0.045, kHigh = 0.03;   // m wide at its lower face, and so on
+    world = make_world(context, {0, 0, -kG}), any_way = true;
+    for (const int side : {-1, 1}) wedge(c, side);
+    Cells cells = make_cells(context, "beam", {kBelow, kLong, kHigh}, c.fine ? 400 : 80);
+    for (uint32_t i = 0; i < cells.npoint(); ++i) {
+      double *const p = &cells.points[3 * size_t(i)];
+      p[0] = (p[0] - 0.5 * kBelow) * (1 + kLean * p[2] / (0.5 * kBelow)), p[1] -= 0.5 * kLong;
+    }
+    BodyOptions o = soft(1e5);
+    o.name = "block", o.position = {0, 0.002, (0.5 * kBelow - 0.002) / kLean + 0.0015}, o.rotation = about_z(c.level * 0.017453292519943295);
+    body = make_body(world, cells, o);
+    set_law(world, c.law);
+    settle = 1.5, measured = 0.5;
   }
   static constexpr double kRadius = 0.01;
   void rigid_capsule() {
@@ -204,9 +306,10 @@ inline Result run_case(const Case &c) {
   };
   if (!steps(s.settle)) return r;
   ok(dfm_world_hold_begin(s.world));
-  const double x0 = s.at();
+  const Vec before = s.at();
   if (!steps(s.measured)) return r;
-  r.creep = std::fabs(s.at() - x0) / s.measured;
+  const Vec after = s.at();
+  r.creep = std::hypot(after[0] - before[0], after[1] - before[1], after[2] - before[2]) / s.measured;
   ok(dfm_world_hold(s.world, &r.contact, &r.stuck));
   if (c.scene == "vibration" && !promises_stiction(c.law)) r.drift = kFrequency * drift_per_cycle(6 * weight(s.body) / 0.01, 0, 0.5);
   const dfm_world_stats st = stats(s.world);

@@ -7,14 +7,14 @@
 
 namespace dfm {
 
-AreaExchange::AreaExchange(const Memory &m) { use_memory(m, corners_, last_, fresh_, triangles_, patches_, area_, pressure_, target_); }
+AreaExchange::AreaExchange(const Memory &m) { use_memory(m, corners_, last_, fresh_, triangles_, area_, pressure_); }
 
 void AreaExchange::list(std::span<const ContactPoint> contacts, std::span<const DofSource> sources, const uint32_t *law, const double *area) {
   const size_t n = contacts.size();
-  area_.assign(area, area + n), pressure_.resize(n), target_.resize(n), fresh_.clear();
+  area_.assign(area, area + n), pressure_.resize(n), fresh_.clear();
   for (uint32_t i = 0; i < n; ++i) {
     const ContactPoint &c = contacts[i];
-    if (c.type_a == 0 && law[i] != kNone && area[i] > 0) fresh_.push_back({c.node[0], c.slot_b | (c.obstacle ? 0x80000000u : 0u), i, law[i], 0});
+    if (c.type_a == 0 && law[i] != kNone && area[i] > 0) fresh_.push_back({c.node[0], c.slot_b | (c.obstacle ? 0x80000000u : 0u), i, law[i]});
   }
   const bool same = std::equal(fresh_.begin(), fresh_.end(), last_.begin(), last_.end(), [](const Corner &l, const Corner &r) {
     return l.node == r.node && l.other == r.other && l.contact == r.contact && l.law == r.law;
@@ -45,17 +45,7 @@ const AreaExchange::Corner *AreaExchange::find(uint32_t node, uint32_t other) co
 // Triangles of which two corners or more take part, each once: by the first of them. A corner that touches the other side twice takes no part.
 void AreaExchange::list_triangles(std::span<const ContactPoint> contacts, std::span<const DofSource> sources) {
   last_.clear();   // what is half listed when memory runs out is listed anew
-  corners_.assign(fresh_.begin(), fresh_.end()), triangles_.clear(), patches_.clear();
-  // by body, for a body's nodes are a run of numbers, and other side: what one body and one other side share is one patch
-  std::sort(corners_.begin(), corners_.end(), [&](const Corner &l, const Corner &r) {
-    return std::tuple(contacts[l.contact].slot_a, l.other) < std::tuple(contacts[r.contact].slot_a, r.other);
-  });
-  for (size_t k = 0; k < corners_.size(); ++k) {
-    const bool another = k == 0 || corners_[k - 1].other != corners_[k].other ||
-                         contacts[corners_[k - 1].contact].slot_a != contacts[corners_[k].contact].slot_a;
-    if (another) patches_.push_back({});
-    corners_[k].patch = uint32_t(patches_.size() - 1);
-  }
+  corners_.assign(fresh_.begin(), fresh_.end()), triangles_.clear();
   std::sort(corners_.begin(), corners_.end(),
             [](const Corner &l, const Corner &r) { return std::tie(l.node, l.other, l.contact) < std::tie(r.node, r.other, r.contact); });
   size_t kept = 0;
@@ -91,24 +81,13 @@ double AreaExchange::taken(const Triangle &t, int corner) const {
   return low > 0 ? std::min(t.area[corner], t.area[next]) * (mine - its) / (3 * sum) * std::min(1.0, 2 * low / high) : 0;
 }
 
-void AreaExchange::follow(const double *impulse, const Way *ways, double *share) {
-  for (const Corner &c : corners_) pressure_[c.contact] = impulse[3 * size_t{c.contact}] / area_[c.contact], target_[c.contact] = 1;
-  for (Patch &p : patches_) p = {0, 0};
-  for (const Corner &c : corners_) {
-    const double fn = impulse[3 * size_t{c.contact}];
-    patches_[c.patch].slid += fn * ways[c.contact].slid, patches_[c.patch].out += fn * ways[c.contact].out;
-  }
+void AreaExchange::pass(const double *impulse, double *area) {
+  for (const Corner &c : corners_) pressure_[c.contact] = impulse[3 * size_t{c.contact}] / area_[c.contact];
   for (const Triangle &t : triangles_)
     for (int j = 0; j < 3; ++j) {
       const double moved = taken(t, j);
-      const uint32_t mine = t.contact[j], next = t.contact[(j + 1) % 3];
-      if (moved != 0) target_[mine] += moved / area_[mine], target_[next] -= moved / area_[next];
+      if (moved != 0) area[t.contact[j]] += moved, area[t.contact[(j + 1) % 3]] -= moved;
     }
-  for (const Corner &c : corners_) {
-    const Patch &p = patches_[c.patch];
-    const double renewed = p.slid < p.out ? p.slid / p.out : p.slid > 0 ? 1 : 0;
-    share[c.contact] += renewed * (target_[c.contact] - share[c.contact]);
-  }
 }
 
 }  // namespace dfm

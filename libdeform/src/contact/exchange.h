@@ -14,12 +14,7 @@
 // where the pressure changes linearly, so that a pressure that falls towards a rim stays one. The last factor makes it continuous where a
 // corner begins to carry.
 //
-// Bristles stand on the surface. Area that moved with every change of load would mix deflections that differ, and a patch that is rocked would forget
-// where it stood. So a contact keeps its share A_i*/A_i while its patch sticks, and it follows (1) as fast as the bristles are renewed: over a sub-step by
-//
-//     r = min(1, sum fn |h v - dz| / sum fn |z|)     over the patch: how far points slid on, dz being what their bristles took up,               (2)
-//
-// one number for the patch, so that its area stays. Sliding steadily that is the way over the deflection; without bristles it is 1.
+// Areas go there as fast as sliding renews the bristles: contact/renewal.h.
 #pragma once
 #include <span>
 
@@ -36,21 +31,17 @@ class AreaExchange {
   // area: [n] m2, as detection and AreaShares (contact/areas.h) have it.
   void list(std::span<const ContactPoint> contacts, std::span<const DofSource> sources, const uint32_t *law, const double *area);
   void clear() { triangles_.clear(), last_.clear(), corners_.clear(); }
-  // How far a contact has slid on and how far its bristles are out, m.
-  struct Way { double slid, out; };
-  // share: [n], A*/A, moves towards (1) and (2) for the contacts listed; impulse: [n,3], normal part first. Allocates nothing.
-  void follow(const double *impulse, const Way *ways, double *share);
+  // area: [n] m2, as listed; becomes A* for the contacts that take part. impulse: [n,3], normal part first. Allocates nothing.
+  void pass(const double *impulse, double *area);
 
  private:
-  struct Corner { uint32_t node, other, contact, law, patch; };   // patch: contacts of one body with one other side
+  struct Corner { uint32_t node, other, contact, law; };
   // A triangle of the surface in slot_a of its contacts, and what each corner sees of it. kNone: takes no part.
   struct Triangle { uint32_t slot, number, contact[3]; double area[3]; };
-  struct Patch { double slid, out; };
   Array<Corner> corners_, last_;        // those that take part, by node; all, as they were when the triangles were listed
   Array<Corner> fresh_;
   Array<Triangle> triangles_;
-  Array<Patch> patches_;
-  Array<double> area_, pressure_, target_;       // [n] as detection has it; fn/A; A*/A
+  Array<double> area_, pressure_;       // [n] as listed; fn/A
   const Corner *find(uint32_t node, uint32_t other) const;
   void list_triangles(std::span<const ContactPoint> contacts, std::span<const DofSource> sources);
   double taken(const Triangle &t, int corner) const;

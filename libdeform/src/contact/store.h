@@ -20,7 +20,7 @@ struct ContactStore {
   Array<double> bristle;              // [n,nstate] row-major
   Array<uint32_t> law;                // the law the bristles belong to
   Array<double> dwell, area;          // s in contact, m2
-  Array<double> share;                // of the area (contact/exchange.h); empty where no law counts by area
+  Array<double> due;                  // m2, area in the next sub-step (contact/renewal.h); empty where no law counts by area
   Array<double> path;                 // [n,2] m, net slip since hold_begin, in the frame
   Array<uint8_t> touching, held;      // held: touched and stuck in every sub-step since hold_begin
   Array<uint8_t> began;               // touched for the first time in the last step

@@ -3,7 +3,8 @@
 //   normal turns    contact/store.cpp, transport(): by the smallest rotation that takes it along
 //   surfaces spin   here: about the normal, by half of what each of the two turns
 //   area changes    here: sigma0 A z is kept where A grows, z where A shrinks
-//   bristles slide  here: areas follow the load (contact/exchange.h)
+//   bristles slide  here: areas go where the load asks for them (contact/areas.h, contact/exchange.h), as far as sliding renews the bristles
+//                   (contact/renewal.h)
 //
 // A surface's turn about n within the sub-step is what its points near the contact did, x -> x': with r from their middle, in the plane of n,
 //     tan(angle) = sum n . (r x r') / sum r . r'
@@ -85,24 +86,30 @@ Turn turn_of(const World &w, const Obstacle &o, Vec3 n) {
 void share_areas(World &w) {
   const auto counts = [](const LawInstance *law) { return (law->ops->needs & DFM_NEED_AREA) && !(law->ops->flags & DFM_FRIC_SET_VALUED); };
   w.shares = std::any_of(w.law_list.begin(), w.law_list.end(), counts);
-  if (!w.shares) return w.exchange.clear(), w.share.clear();
-  w.areas.share(w.contacts, w.rows.impulse.data(), 1.1 * w.offset, w.state.area.data());
+  if (!w.shares) return w.exchange.clear(), w.aim.clear();
   const uint32_t n = w.rows.n;
-  w.sharing.resize(n), w.share.assign(n, 1.0), w.ways.resize(n);
+  w.sharing.resize(n), w.aim.resize(n), w.stands.resize(n), w.ways.resize(n), w.renewed.resize(n);
+  w.areas.share(w.contacts, w.rows.impulse.data(), 1.1 * w.offset, w.aim.data());
   for (uint32_t i = 0; i < n; ++i) w.sharing[i] = counts(w.law_list[w.state.law[i]]) ? w.state.law[i] : kNone;
-  w.exchange.list(w.contacts, w.sources, w.sharing.data(), w.state.area.data());
-  if (w.store.share.empty()) return;
+  w.exchange.list(w.contacts, w.sources, w.sharing.data(), w.aim.data());
+  w.renewal.list(w.contacts, w.rows.impulse.data());
   for (uint32_t i = 0; i < n; ++i) {
     const uint32_t m = w.match[i];
-    if (m != kNone && w.sharing[i] != kNone && w.store.law[m] == w.state.law[i]) w.share[i] = w.store.share[m], w.state.area[i] *= w.share[i];
+    const bool carries = w.sharing[i] != kNone && w.rows.impulse[3 * size_t{i}] > 0;
+    w.stands[i] = carries && m < w.store.due.size() && w.store.law[m] == w.state.law[i] && w.store.due[m] > 0;
+    w.state.area[i] = w.stands[i] ? w.store.due[m] : w.aim[i];
   }
+  w.renewal.fill(w.stands.data(), w.aim.data(), w.state.area.data());
 }
 
 // Slid on: beyond what the bristles have taken up. The slip that a law was asked at is known to a hundredth (friction/local_solve.cpp); five count as none.
 void follow_load(World &w) {
   ContactStore &to = w.next_store;
   const ContactState &s = w.state;
-  for (uint32_t i = 0; i < w.share.size(); ++i) {
+  const uint32_t n = static_cast<uint32_t>(w.aim.size());
+  to.due.resize(n);
+  if (n == 0) return;
+  for (uint32_t i = 0; i < n; ++i) {
     w.ways[i] = {0, 0};
     if (w.sharing[i] == kNone || !(w.rows.impulse[3 * size_t{i}] > 0)) continue;
     const LawInstance &law = *w.law_list[s.law[i]];
@@ -118,8 +125,9 @@ void follow_load(World &w) {
     }
     if (pairs == 0) w.ways[i].slid = far;
   }
-  w.exchange.follow(w.rows.impulse.data(), w.ways.data(), w.share.data());
-  to.share.assign(w.share.begin(), w.share.end());
+  w.renewal.measure(w.h, w.rows.impulse.data(), w.ways.data(), s.dwell.data(), w.renewed.data());
+  w.exchange.pass(w.rows.impulse.data(), w.aim.data());
+  for (uint32_t i = 0; i < n; ++i) to.due[i] = s.area[i] + w.renewed[i] * (w.aim[i] - s.area[i]);
 }
 
 void fit_bristles(World &w) {

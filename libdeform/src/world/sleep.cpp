@@ -226,8 +226,7 @@ void World::carry_sleepers(uint32_t *touching, uint32_t *sticking) {
     };
     copy(store.key, to.key, 1), copy(store.id_a, to.id_a, 1), copy(store.id_b, to.id_b, 1), copy(store.law, to.law, 1);
     copy(store.dwell, to.dwell, 1), copy(store.area, to.area, 1);
-    if (shares && !store.share.empty()) copy(store.share, to.share, 1);
-    else if (shares) to.share.insert(to.share.end(), end - from, 1.0);
+    if (shares) copy(store.due.empty() ? store.area : store.due, to.due, 1);
     copy(store.touching, to.touching, 1), copy(store.held, to.held, 1), copy(store.path, to.path, 2);
     copy(store.normal, to.normal, 3), copy(store.tangent, to.tangent, 3), copy(store.impulse, to.impulse, 3);
     copy(last_report.contacts, report.contacts, 1), copy(last_report.frame, report.frame, 9), copy(last_report.slip, report.slip, 2);

@@ -181,7 +181,7 @@ void fields(Stream &s, W &w) {
   auto &c = w.store;
   s.value(c.n), s.value(c.nstate), s.value(c.h);
   s.array(c.key), s.array(c.id_a), s.array(c.id_b), s.array(c.by_key), s.array(c.normal), s.array(c.tangent), s.array(c.impulse), s.array(c.bristle);
-  s.array(c.law), s.array(c.dwell), s.array(c.area), s.array(c.share), s.array(c.path), s.array(c.touching), s.array(c.held), s.array(c.began);
+  s.array(c.law), s.array(c.dwell), s.array(c.area), s.array(c.due), s.array(c.path), s.array(c.touching), s.array(c.held), s.array(c.began);
   s.array(c.crossings);
   s.array(w.work);
   if (w.sleepers == 0) return;   // contacts that sleep are reported from what the last sub-step left
@@ -224,7 +224,7 @@ void check(const Staged &t, const World &w) {
   const size_t n = c.n;
   good = good && c.key.size() == n && c.id_a.size() == n && c.id_b.size() == n && c.by_key.size() == n && c.normal.size() == 3 * n &&
          c.tangent.size() == 3 * n && c.impulse.size() == 3 * n && c.bristle.size() == n * c.nstate && c.law.size() == n && c.dwell.size() == n &&
-         c.area.size() == n && (c.share.empty() || c.share.size() == n) &&
+         c.area.size() == n && (c.due.empty() || c.due.size() == n) &&
          c.path.size() == 2 * n && c.touching.size() == n && c.held.size() == n && c.began.size() == n;
   good = good && c.crossings.size() <= n && std::is_sorted(c.crossings.begin(), c.crossings.end());
   for (uint32_t i : c.by_key) good = good && i < n;
@@ -331,7 +331,7 @@ uint64_t world_hash(const World &w) {
   const ContactStore &c = w.store;
   h.add(c.key.data(), c.key.size() * sizeof(uint64_t));
   h.add(c.bristle.data(), c.bristle.size() * sizeof(double));
-  h.add(c.share.data(), c.share.size() * sizeof(double));
+  h.add(c.due.data(), c.due.size() * sizeof(double));
   for (auto &b : w.bodies) h.add(b->lagged.data(), b->lagged.size() * sizeof(double));
   if (w.def.sleep)
     for (auto &b : w.bodies) h.add(b->slumber.asleep), h.add(b->slumber.calm), h.add(b->slumber.since);

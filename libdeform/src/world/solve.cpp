@@ -196,7 +196,7 @@ void World::reserve_contacts() {
   ContactStore &to = next_store;
   Report &next = sleepers ? last_report : report;   // the one that keep_contacts() will write
   auto room = [&](size_t entries, auto &...arrays) { (arrays.reserve(entries), ...); };
-  room(n, to.key, to.id_a, to.id_b, to.by_key, to.law, to.dwell, to.area, to.share, to.touching, to.held, to.began, to.crossings, next.contacts, next.mode);
+  room(n, to.key, to.id_a, to.id_b, to.by_key, to.law, to.dwell, to.area, to.due, to.touching, to.held, to.began, to.crossings, next.contacts, next.mode);
   room(size_t(2) * n, to.path, next.slip), room(size_t(3) * n, to.normal, to.tangent, to.impulse, next.impulse);
   room(size_t(S) * n, to.bristle), room(size_t(9) * n, next.frame);
   work.reserve(std::min(work.size() + n, bodies.size() * (bodies.size() + obstacles.size())));

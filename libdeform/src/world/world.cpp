@@ -30,9 +30,9 @@ Pose Obstacle::pose_at_time(double t) const {
 
 World::World(dfm_context *c)
     : context(c), broad(c->memory), rows(c->memory), acceleration(c->memory), store(c->memory), next_store(c->memory), batches(c->memory), areas(c->memory),
-      exchange(c->memory), rollback(c->memory), islands(c->memory) {
+      exchange(c->memory), renewal(c->memory), rollback(c->memory), islands(c->memory) {
   const Memory &m = c->memory;
-  use_memory(m, driven, lent, contacts, tolerance.normal, tolerance.tangent, disturbance, best_impulse, tangents, match, sharing, share, ways,
+  use_memory(m, driven, lent, contacts, tolerance.normal, tolerance.tangent, disturbance, best_impulse, tangents, match, sharing, aim, stands, ways, renewed,
              block_surfels, block_impulse, block_velocity);
   GuardMemory &known = guard.memory;
   use_memory(m, known.runs, known.old_runs, known.features, known.old_features, known.rest, known.old_rest, known.normal, known.old_normal);

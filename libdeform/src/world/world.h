@@ -8,6 +8,7 @@
 #include "broad/broad_phase.h"
 #include "contact/areas.h"
 #include "contact/exchange.h"
+#include "contact/renewal.h"
 #include "contact/solver.h"
 #include "contact/store.h"
 #include "deform/deform.h"
@@ -196,8 +197,11 @@ struct World {
   AreaExchange exchange;
   Array<uint32_t> sharing;                             // law of contacts whose areas follow the load, else kNone
   bool shares = false;                                 // does any law count by area?
-  Array<double> share;                                 // [contacts] of their areas, if so
-  Array<AreaExchange::Way> ways;
+  Array<double> aim;                                   // [contacts] m2, what they should stand for, if so
+  Renewal renewal;
+  Array<uint8_t> stands;                               // [contacts] carries, and has an area that it keeps
+  Array<Renewal::Way> ways;
+  Array<double> renewed;
   Array<double> tangents;
   Array<uint32_t> match;
   Array<uint32_t> block_surfels;                       // scratch of self-stepping bodies
