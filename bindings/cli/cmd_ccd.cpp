@@ -2,16 +2,15 @@
 #include <CLI/CLI.hpp>
 
 #include <algorithm>
-#include <cerrno>
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>
-#include <cstring>
 #include <ctime>
 #include <memory>
 #include <string>
 #include <vector>
 
+#include "file.h"
 #include "json_text.h"
 #include "messages.h"
 #include "run.h"
@@ -20,6 +19,8 @@ namespace cli {
 namespace {
 
 const std::vector<std::string> kRoots = {"bisection", "regula_falsi", "brent", "conservative"};   // at their DFM_TOI_* values
+
+constexpr uint64_t kMaxBytes = uint64_t(1) << 30;   // some two million queries of 17 digits
 
 struct CcdOptions {
   std::string file, csv, root = "conservative";
@@ -44,12 +45,7 @@ std::vector<std::string> cells_of(const std::string &line) {
 class QueryFile {
  public:
   explicit QueryFile(const std::string &path) : path_(path) {
-    const std::unique_ptr<FILE, int (*)(FILE *)> file(std::fopen(path.c_str(), "rb"), std::fclose);
-    if (!file) throw Failure(kBadInput, "cannot read " + path + ": " + std::strerror(errno));
-    std::string text;
-    char block[1 << 16];
-    while (const size_t n = std::fread(block, 1, sizeof block, file.get())) text.append(block, n);
-    if (std::ferror(file.get())) throw Failure(kBadInput, "cannot read " + path + ": " + std::strerror(errno));
+    const std::string text = read_file(path, kMaxBytes, "a table of queries (CSV)");
     for (size_t at = 0; at < text.size();) {
       const size_t end = std::min(text.find('\n', at), text.size());
       ++line_;
@@ -186,7 +182,7 @@ void print(const CcdOptions &options, const Globals &globals, size_t n, const Ta
     }
     std::fputs(indented(out.text()).c_str(), stdout);
   } else if (!globals.quiet) {
-    std::printf("%s\n", options.file.c_str());
+    std::printf("%s\n", shown(options.file).c_str());
     std::printf("  finder       %s\n  queries      %zu (%zu point-triangle, %zu edge-edge)\n", options.root.c_str(), n, n - t.edges, t.edges);
     std::printf("  touch        %zu\n  evaluations  %.2f per query, at most %u\n  time         %.0f ns per query\n", t.hits, mean, t.most, ns);
     if (t.labelled)

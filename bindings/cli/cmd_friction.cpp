@@ -10,6 +10,7 @@
 #include <string>
 #include <vector>
 
+#include "file.h"
 #include "friction_plot.h"
 #include "friction_rig.h"
 #include "json_text.h"
@@ -61,7 +62,7 @@ void print(const FrictionOptions &options, const Globals &globals, const Frictio
     if (!result.stopped.empty()) out.add("stopped", quoted(result.stopped));
     std::fputs(indented(out.text()).c_str(), stdout);
   } else if (!globals.quiet) {
-    std::printf("%s\n  law          %s\n  drive        %s\n  steps        %llu of at most %g s, %.2f evaluations each\n  rows         %zu\n", options.file.c_str(),
+    std::printf("%s\n  law          %s\n  drive        %s\n  steps        %llu of at most %g s, %.2f evaluations each\n  rows         %zu\n", shown(options.file).c_str(),
                 law.type().id, rig.kind.c_str(), static_cast<unsigned long long>(result.steps), options.step,
                 result.steps ? double(law.evaluations()) / double(result.steps) : 0.0, result.rows.size());
     for (const auto &[name, values] : result.figures) {

@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "cli.h"
+#include "shown.h"
 
 namespace cli {
 

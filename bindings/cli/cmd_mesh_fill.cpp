@@ -63,13 +63,13 @@ void print_json(const std::string &in, const std::string &file, uint32_t wanted,
 }
 
 void print_table(const std::string &in, const std::string &file, const Filled &f) {
-  std::printf("%s: %u triangles, filled into %s\n", in.c_str(), f.surface.ntriangle, file.c_str());
+  std::printf("%s: %u triangles, filled into %s\n", shown(in).c_str(), f.surface.ntriangle, shown(file).c_str());
   std::printf("  cells             %u\n  points            %u\n  pieces            %u\n", f.cells.ntet, f.cells.npoint, f.cells.npiece);
   std::printf("  enclosed volume   %.6g m3\n", f.volume);
   std::printf("  share of material mean %.3f, least %.3f\n", f.mean_share, f.least_share);
   std::printf("  edge length       %.4g to %.4g m\n", f.cells.edge_min, f.cells.edge_max);
   std::printf("  seconds           %.2f\n", f.seconds);
-  for (const std::string &w : f.warnings) std::printf("  warning: %s\n", w.c_str());
+  for (const std::string &w : f.warnings) std::printf("  warning: %s\n", shown(w).c_str());
   if (f.surface.warnings[0] == 0 && f.cells.warnings[0] == 0) std::printf("  the surface is clean\n");
 }
 

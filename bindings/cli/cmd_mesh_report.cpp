@@ -119,7 +119,7 @@ void print_json(const std::string &file, const Report &r, const std::vector<std:
 
 void print_table(const std::string &file, const Report &r) {
   constexpr uint32_t kBar = 40;
-  std::printf("%s\n", file.c_str());
+  std::printf("%s\n", shown(file).c_str());
   for (const auto &[name, value] : r.lines) std::printf("  %-17s %s\n", name.c_str(), value.c_str());
   std::printf("  box               %g %g %g to %g %g %g m\n", r.lo[0], r.lo[1], r.lo[2], r.hi[0], r.hi[1], r.hi[2]);
   std::printf("  edge length       %.4g to %.4g m, median %.4g\n", r.edge_min, r.edge_max, r.edge_median);
@@ -132,9 +132,9 @@ void print_table(const std::string &file, const Report &r) {
   }
   static const char *const kElements[4] = {"points", "lines", "triangles", "cells"};
   for (const Group &g : r.groups)
-    if (g.by_triangles) std::printf("  group             %s (%u triangles)\n", g.name.c_str(), g.count);
-    else std::printf("  group             %s (%s, %u points)\n", g.name.c_str(), kElements[std::min(g.dimension, 3u)], g.count);
-  for (const std::string &w : r.warnings) std::printf("  warning: %s\n", w.c_str());
+    if (g.by_triangles) std::printf("  group             %s (%u triangles)\n", shown(g.name).c_str(), g.count);
+    else std::printf("  group             %s (%s, %u points)\n", shown(g.name).c_str(), kElements[std::min(g.dimension, 3u)], g.count);
+  for (const std::string &w : r.warnings) std::printf("  warning: %s\n", shown(w).c_str());
 }
 
 }  // namespace
@@ -156,9 +156,9 @@ int report_mesh(const Globals &globals, const std::string &file, const MeshSessi
   if (globals.json) print_json(file, r, notes);
   else if (asked) print_table(file, r);
   else if (!globals.quiet) {
-    for (const std::string &w : r.warnings) std::fprintf(stderr, "deform: warning: %s\n", w.c_str());
-    for (const std::string &n : notes) std::fprintf(stderr, "deform: not kept: %s\n", n.c_str());
-    std::printf("%s: %s\n", file.c_str(), r.summary.c_str());
+    for (const std::string &w : r.warnings) std::fprintf(stderr, "deform: warning: %s\n", shown(w).c_str());
+    for (const std::string &n : notes) std::fprintf(stderr, "deform: not kept: %s\n", shown(n).c_str());
+    std::printf("%s: %s\n", shown(file).c_str(), r.summary.c_str());
   }
   return kDone;
 }

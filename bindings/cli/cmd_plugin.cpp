@@ -72,10 +72,10 @@ int list(const Globals &globals, const std::vector<std::string> &directories) {
   }
   for (const Type &t : found.types)
     std::printf("%-6s %-28s %-8s %s\n       effects: %s\n       %s\n", kind_name(t.type->kind), t.type->id, t.type->version, t.type->name,
-                joined(effects(*t.type)).c_str(), t.file.c_str());
+                joined(effects(*t.type)).c_str(), shown(t.file).c_str());
   if (found.types.empty()) std::printf("no plugin is loaded; set DEFORM_PLUGIN_PATH, or name directories with --dir\n");
   if (!found.passed.empty()) std::printf("\npassed over:\n");
-  for (const Passed &p : found.passed) std::printf("  %s\n    %s\n", p.file.c_str(), p.reason.c_str());
+  for (const Passed &p : found.passed) std::printf("  %s\n    %s\n", shown(p.file).c_str(), shown(p.reason).c_str());
   return kDone;
 }
 
@@ -99,7 +99,7 @@ std::vector<std::string> names_of(const dfm_param &row) {
 void print_info(const Type &t) {
   const dfm_type &type = *t.type;
   std::printf("%s %s, version %s\n  name     %s\n  licence  %s\n  source   %s\n  file     %s\n  effects  %s\n", kind_name(type.kind), type.id,
-              type.version, type.name, type.licence, type.source, t.file.c_str(), joined(effects(type)).c_str());
+              type.version, type.name, type.licence, type.source, shown(t.file).c_str(), joined(effects(type)).c_str());
   if (type.nparam) std::printf("\n  %-18s %-10s %-16s %-10s %s\n", "parameter", "default", "range", "unit", "meaning");
   for (uint32_t i = 0; i < type.nparam; ++i) {
     const dfm_param &row = type.params[i];

@@ -224,7 +224,7 @@ int run(RunOptions options, const Globals &globals) {
   if (globals.json) std::printf("%s", summary.c_str());
   else if (!globals.quiet) {
     print_table(scene, result, checks);
-    std::printf("written: %s\n", options.out.c_str());
+    std::printf("written: %s\n", shown(options.out).c_str());
   }
   if (options.profile && !globals.json) print_profile(scene, result);
   if (result.stopped) {

@@ -1,12 +1,12 @@
 #include "frames.h"
 
 #include "messages.h"
+#include "run_folder.h"
 
 #ifdef DEFORM_HAVE_RENDER
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
-#include <filesystem>
 #include <limits>
 
 #include "render/render.h"
@@ -169,13 +169,7 @@ std::unique_ptr<Frames> Frames::create(const SceneFile &scene, const std::string
     warn("no pictures: " + why);
     return nullptr;
   }
-  std::error_code error;
-  std::filesystem::create_directories(folder, error);
-  if (error) throw Failure(kBadInput, folder + ": the folder cannot be made: " + error.message());
-  for (const auto &entry : std::filesystem::directory_iterator(folder, error)) {
-    const std::string name = entry.path().filename().string();
-    if (name.rfind("frame_", 0) == 0 && entry.path().extension() == ".png") std::filesystem::remove(entry.path(), error);
-  }
+  make_folder(folder);
   return std::make_unique<OffScreen>(scene, folder, std::move(renderer));
 }
 

@@ -1,13 +1,11 @@
 #include "friction_case.h"
 
 #include <algorithm>
-#include <cerrno>
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>
-#include <cstring>
-#include <memory>
 
+#include "file.h"
 #include "json_text.h"
 #include "messages.h"
 
@@ -34,18 +32,16 @@ const std::vector<DriveForm> kDrives = {
 const double kPathSpeed = 1e-5;                  // m/s, of a quasi-static path whose case gives none
 const int kPathRows = 20;                        // of a straight piece, where the case lists no x
 
+constexpr uint64_t kMaxBytes = uint64_t(64) << 20;
+
 class CaseReader {
  public:
   explicit CaseReader(const std::string &file) : file_(file) {
-    const std::unique_ptr<FILE, int (*)(FILE *)> handle(std::fopen(file.c_str(), "rb"), std::fclose);
-    if (!handle) throw Failure(kBadInput, "cannot read " + file + ": " + std::strerror(errno));
-    char block[1 << 14];
-    while (const size_t n = std::fread(block, 1, sizeof block, handle.get())) text_.append(block, n);
-    if (std::ferror(handle.get())) throw Failure(kBadInput, "cannot read " + file + ": " + std::strerror(errno));
+    text_ = read_file(file, kMaxBytes, "a friction case (JSON)");
     size_t where = 0;
-    if (!parse_json(text_, root_, &where)) {
+    if (std::string why; !parse_json(text_, root_, &where, &why)) {
       const auto line = 1 + std::count(text_.begin(), text_.begin() + long(std::min(where, text_.size())), '\n');
-      throw Failure(kBadInput, file + ":" + std::to_string(line) + ": this is not JSON; expected a case as ../shared/reference/friction has them");
+      throw Failure(kBadInput, file + ":" + std::to_string(line) + ": " + why + "; expected a case as libdeform/doc/concepts/friction_rig.md shows it");
     }
     if (root_.kind != JsonValue::object) refuse("", "is not an object; expected the keys law, params, input and output_times");
   }

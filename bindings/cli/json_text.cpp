@@ -3,7 +3,8 @@
 #include <charconv>
 #include <cmath>
 #include <cstdio>
-#include <cstdlib>
+#include <cstdint>
+#include <set>
 
 namespace cli {
 
@@ -105,6 +106,7 @@ class Reader {
     return i_ == s_.size();
   }
   size_t at() const { return i_; }
+  const std::string &why() const { return why_; }
 
  private:
   void space() {
@@ -118,18 +120,39 @@ class Reader {
   bool string(std::string &out) {
     if (!take('"')) return false;
     for (; i_ < s_.size() && s_[i_] != '"'; ++i_) {
+      if (static_cast<unsigned char>(s_[i_]) < 0x20) return false;
       if (s_[i_] != '\\') {
         out += s_[i_];
         continue;
       }
       if (++i_ >= s_.size()) return false;
       const char c = s_[i_];
-      if (c == 'u' && i_ + 4 < s_.size()) {
-        out += static_cast<char>(std::strtol(s_.substr(i_ + 1, 4).c_str(), nullptr, 16));  // control characters only, as we write them
-        i_ += 4;
-      } else out += c == 'n' ? '\n' : c == 't' ? '\t' : c == 'r' ? '\r' : c;
+      if (c == 'u') {
+        if (!character(out)) return false;
+      } else out += c == 'n' ? '\n' : c == 't' ? '\t' : c == 'r' ? '\r' : c == 'b' ? '\b' : c == 'f' ? '\f' : c;
     }
     return take('"');
+  }
+  // The four digits behind \u, at i_; leaves i_ on the last one.
+  bool unit(uint32_t &out) {
+    const char *const from = s_.data() + i_ + 1;
+    if (i_ + 4 >= s_.size() || std::from_chars(from, from + 4, out, 16).ptr != from + 4) return false;
+    return i_ += 4, true;
+  }
+  bool character(std::string &out) {
+    uint32_t code = 0, low = 0;
+    if (!unit(code)) return false;
+    if (code >= 0xd800 && code < 0xe000) {   // half of a pair
+      if (code >= 0xdc00 || s_.compare(i_ + 1, 2, "\\u") != 0 || (i_ += 2, !unit(low)) || low < 0xdc00 || low >= 0xe000) return false;
+      code = 0x10000 + ((code - 0xd800) << 10) + (low - 0xdc00);
+    }
+    const auto add = [&](uint32_t byte) { out += static_cast<char>(byte); };
+    if (code < 0x80) return add(code), true;
+    if (code < 0x800) add(0xc0 | code >> 6);
+    else if (code < 0x10000) add(0xe0 | code >> 12);
+    else add(0xf0 | code >> 18), add(0x80 | (code >> 12 & 0x3f));
+    if (code >= 0x800) add(0x80 | (code >> 6 & 0x3f));
+    return add(0x80 | (code & 0x3f)), true;
   }
   bool array(JsonValue &out, int depth) {
     out.kind = JsonValue::array;
@@ -143,23 +166,28 @@ class Reader {
   bool object(JsonValue &out, int depth) {
     out.kind = JsonValue::object;
     if (take('{'), take('}')) return true;
+    std::set<std::string> names;
     do {
       out.members.emplace_back();
       space();
-      if (!string(out.members.back().name) || !take(':') || !value(out.members.back().value, depth + 1)) return false;
+      if (!string(out.members.back().name)) return false;
+      if (!names.insert(out.members.back().name).second) return why_ = "a key is given twice in one object; keep one", false;
+      if (!take(':') || !value(out.members.back().value, depth + 1)) return false;
     } while (take(','));
     return take('}');
   }
   const std::string &s_;
   size_t i_ = 0;
+  std::string why_ = "this is not JSON";
 };
 
 }  // namespace
 
-bool parse_json(const std::string &text, JsonValue &out, size_t *where) {
+bool parse_json(const std::string &text, JsonValue &out, size_t *where, std::string *why) {
   Reader reader(text);
   const bool good = reader.value(out, 0) && reader.end();
   if (where) *where = reader.at();
+  if (why) *why = reader.why();
   return good;
 }
 

@@ -23,7 +23,7 @@ std::vector<std::string> kept_warnings;
 void on_log(void *, int32_t level, const char *utf8) {
   if (level < DFM_LOG_WARNING) return;
   if (level == DFM_LOG_WARNING) kept_warnings.push_back(utf8);
-  if (!globals.quiet || level > DFM_LOG_WARNING) std::fprintf(stderr, "deform: %s: %s\n", level == DFM_LOG_WARNING ? "warning" : "error", utf8);
+  if (!globals.quiet || level > DFM_LOG_WARNING) std::fprintf(stderr, "deform: %s: %s\n", level == DFM_LOG_WARNING ? "warning" : "error", shown(utf8).c_str());
 }
 
 size_t edit_distance(const std::string &a, const std::string &b) {
@@ -119,7 +119,7 @@ std::string nearest(const std::string &word, const std::vector<std::string> &val
 
 int fail(const std::string &sentence) {
   std::fflush(stdout);
-  std::fprintf(stderr, "deform: %s\n", sentence.c_str());
+  std::fprintf(stderr, "deform: %s\n", shown(sentence).c_str());
   return kBadInput;
 }
 

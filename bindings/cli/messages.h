@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "cli.h"
+#include "shown.h"
 
 namespace cli {
 

@@ -1,9 +1,7 @@
 #include "output.h"
 
 #include <algorithm>
-#include <cerrno>
 #include <cmath>
-#include <cstring>
 #include <filesystem>
 
 #include "json_text.h"
@@ -14,51 +12,15 @@ namespace fs = std::filesystem;
 namespace cli {
 namespace {
 
-[[noreturn]] void cannot_write(const std::string &path) {
-  throw Failure(kBadInput, path + ": cannot be written: " + std::strerror(errno));
-}
-
-void make_folder(const std::string &path) {
-  std::error_code error;
-  fs::create_directories(path, error);
-  if (error || !fs::is_directory(path))
-    throw Failure(kBadInput, path + ": the folder cannot be made: " + (error ? error.message() : "a file of that name is there"));
-}
-
-// Numbered files of an earlier run would read as later states of this one.
-void remove_numbered(const std::string &folder, const char *ending) {
-  std::error_code error;
-  for (const auto &entry : fs::directory_iterator(folder, error)) {
-    const std::string stem = entry.path().stem().string();
-    const size_t mark = stem.rfind('_');
-    const bool numbered = mark != std::string::npos && stem.size() == mark + 7 && stem.find_first_not_of("0123456789", mark + 1) == std::string::npos;
-    if (entry.path().extension() == ending && (numbered || stem.rfind("last_", 0) == 0)) fs::remove(entry.path(), error);
-  }
-}
-
 double norm(const double v[3]) { return std::sqrt(v[0] * v[0] + v[1] * v[1] + v[2] * v[2]); }
 
 }  // namespace
 
 static std::string csv_number(double x) { return std::isfinite(x) ? number(x) : std::isnan(x) ? "nan" : x > 0 ? "inf" : "-inf"; }
 
-void write_whole(const std::string &path, const std::string &text) {
-  const std::string temporary = path + ".part";
-  FILE *file = std::fopen(temporary.c_str(), "wb");
-  if (!file) cannot_write(path);
-  const bool written = std::fwrite(text.data(), 1, text.size(), file) == text.size();
-  if (std::fclose(file) != 0 || !written || std::rename(temporary.c_str(), path.c_str()) != 0) {
-    const int reason = errno;
-    std::remove(temporary.c_str());
-    errno = reason;
-    cannot_write(path);
-  }
-}
-
 // ---- tables ------------------------------------------------------------------------------------------------
 
-Csv::Csv(const std::string &path, const std::string &header) : path_(path), file_(std::fopen(path.c_str(), "wb"), std::fclose) {
-  if (!file_) cannot_write(path);
+Csv::Csv(const std::string &path, const std::string &header) : path_(path), file_(new_file(path)) {
   block_ = header + "\n";
   flush();
 }
@@ -66,7 +28,10 @@ Csv::Csv(const std::string &path, const std::string &header) : path_(path), file
 Csv &Csv::cell(const std::string &text) {
   if (!first_) block_ += ',';
   first_ = false;
-  block_ += text;
+  if (text.find_first_of(",\"\r\n") == std::string::npos) return block_ += text, *this;
+  block_ += '"';
+  for (const char c : text) block_ += c == '"' ? "\"\"" : std::string(1, c);
+  block_ += '"';
   return *this;
 }
 
@@ -87,7 +52,7 @@ void Csv::flush() {
 // ---- a run's files -----------------------------------------------------------------------------------------
 
 Outputs::Outputs(const SceneFile &scene, const std::string &folder)
-    : scene_(scene), folder_((make_folder(folder), folder)),
+    : scene_(scene), folder_(folder), held_(folder),
       bodies_(folder + "/bodies.csv",
               "t,body,com_x,com_y,com_z,vel_x,vel_y,vel_z,ang_x,ang_y,ang_z,kinetic_J,elastic_J,volume,force_x,force_y,force_z") {
   const dfm_scene_settings &s = scene.settings();
@@ -95,7 +60,6 @@ Outputs::Outputs(const SceneFile &scene, const std::string &folder)
     contacts_ = std::make_unique<Csv>(folder + "/contacts.csv",
                                       "t,body_a,body_b,count,sticking,normal_N,friction_N,moment_Nm,slip_max,friction_work_J");
   probes_ = std::make_unique<Csv>(folder + "/probes.csv", "t,probe,x,y,z,vx,vy,vz");
-  remove_numbered(folder + "/states", ".vtu");
   if (s.states) {
     make_folder(folder + "/states");
     index_ = std::make_unique<Csv>(folder + "/states/index.csv", "index,t");

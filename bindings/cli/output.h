@@ -5,7 +5,9 @@
 #include <string>
 #include <vector>
 
+#include "file.h"
 #include "run.h"
+#include "run_folder.h"
 
 namespace cli {
 
@@ -21,7 +23,7 @@ class Csv {
 
  private:
   std::string path_, block_;
-  std::unique_ptr<FILE, int (*)(FILE *)> file_;
+  File file_;
   bool first_ = true;
 };
 
@@ -52,6 +54,7 @@ class Outputs {
 
   const SceneFile &scene_;
   std::string folder_;
+  RunFolder held_;
   Csv bodies_;
   std::unique_ptr<Csv> contacts_, probes_, index_;
   uint32_t recorded_ = 0;

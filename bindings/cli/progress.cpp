@@ -6,6 +6,8 @@
 #include <cstdio>
 #include <string>
 
+#include "shown.h"
+
 namespace cli {
 
 Progress::Progress(bool wanted) : on_(wanted && isatty(STDERR_FILENO)), begin_(Clock::now()), next_(begin_ + std::chrono::seconds(2)) {}
@@ -28,7 +30,7 @@ void Progress::show(double done, double total, double steps_per_second) {
   drawn_ = true;
 }
 
-Patience::Patience(bool wanted, std::string what, std::chrono::milliseconds wait) : what_(std::move(what)) {
+Patience::Patience(bool wanted, std::string what, std::chrono::milliseconds wait) : what_(shown(what)) {
   if (wanted && isatty(STDERR_FILENO)) thread_ = std::thread([this, wait] { run(wait); });
 }
 

@@ -77,7 +77,5 @@ void print_profile(const SceneFile &scene, const RunResult &run);
 dfm_world_stats world_stats(const SceneFile &scene);
 dfm_body_measure body_measure(const BodyView &body);
 dfm_body_measure rigid_measure(const RigidView &rigid);
-// To a temporary name first, then renamed: nobody reads half a file.
-void write_whole(const std::string &path, const std::string &text);
 
 }  // namespace cli

@@ -94,6 +94,16 @@ TEST(Hpp, Errors_CarryStatusAndSentenceInBothWays) {
   EXPECT_FALSE(*body) << "a failed call gives a handle that refers to nothing";
 }
 
+TEST(Hpp, Files_AreReadAndWrittenWhole) {
+  const std::string path = test::scratch("hpp") + "/file.txt";
+  ASSERT_EQ(deform::write_file(path.c_str(), "text", 4), DFM_OK);
+  std::string got;
+  EXPECT_EQ(deform::read_file(path.c_str(), 4, "a text", [&](const char *bytes, size_t n) { got.assign(bytes, n); }), DFM_OK);
+  EXPECT_EQ(got, "text");
+  EXPECT_EQ(deform::read_file(path.c_str(), 3, "a text", [&](const char *, size_t) { got = "called"; }), DFM_E_FORMAT);
+  EXPECT_EQ(got, "text");
+}
+
 TEST(Hpp, Step_TellsADiscardedStepApart) {
   const auto context = deform::Context::make(quiet());
   deform::WorldDef def;

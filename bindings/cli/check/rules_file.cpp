@@ -9,14 +9,13 @@
 #include <cmath>
 #include <cstring>
 #include <filesystem>
-#include <fstream>
-#include <iterator>
 #include <cstdlib>
 #include <limits>
 
 #include "check/groups.h"
 #include "check/law.h"
 #include "check/runner.h"
+#include "file.h"
 #include "messages.h"
 
 namespace cli::check {
@@ -33,8 +32,7 @@ std::vector<T> part(const std::string &bytes, uint64_t offset, uint64_t count) {
 
 // Defined symbols of the dynamic table that others may bind to.
 std::vector<std::string> exported(const std::string &file) {
-  std::ifstream in(file, std::ios::binary);
-  const std::string bytes{std::istreambuf_iterator<char>(in), {}};
+  const std::string bytes = read_file(file, uint64_t(1) << 30, "a plugin (a shared library)");
   const auto header = part<ElfW(Ehdr)>(bytes, 0, 1);
   if (header.empty() || std::memcmp(header[0].e_ident, ELFMAG, SELFMAG) != 0) broken("it is no shared library (ELF), so nothing can load it; build it with deform_add_plugin");
   const auto sections = part<ElfW(Shdr)>(bytes, header[0].e_shoff, header[0].e_shentsize == sizeof(ElfW(Shdr)) ? header[0].e_shnum : 0);

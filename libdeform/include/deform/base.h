@@ -47,6 +47,19 @@ DFM_API const char *dfm_last_error(void);
  * Threads: Any thread. Since 0.1. */
 DFM_API dfm_status dfm_fail(dfm_status status, const char *sentence);
 
+typedef void (*dfm_file_take_fn)(void *user, const char *bytes, size_t n);
+/** For what is built on the library: the bytes of a file that somebody names, read as the library reads its own. Devices and pipes are refused
+ * at once instead of being waited for; /dev/stdin is standard input, if that is a file or a pipe.
+ * @param limit     bytes that such a file may have; a larger one is refused before anything is allocated
+ * @param expected  what is wanted, with its article ("a table of queries"), for the sentence
+ * @param take      called once with the bytes, which are borrowed until it returns; not called on failure
+ * @return DFM_OK; DFM_E_ARG; DFM_E_IO; DFM_E_FORMAT larger than limit; DFM_E_NOMEM. Threads: Any thread. Since 0.1. */
+DFM_API dfm_status dfm_file_read(const char *path, uint64_t limit, const char *expected, dfm_file_take_fn take, void *user);
+/** Writes a file whole or not at all: under no name or another name first, then renamed. What stood at path before, a link included, is
+ * replaced; a device or a pipe is written to.
+ * @return DFM_OK; DFM_E_ARG; DFM_E_IO. Threads: Any thread. Since 0.1. */
+DFM_API dfm_status dfm_file_write(const char *path, const void *bytes, size_t n);
+
 enum { DFM_LOG_DEBUG = 0, DFM_LOG_INFO = 1, DFM_LOG_WARNING = 2, DFM_LOG_ERROR = 3 };
 
 typedef struct dfm_context dfm_context; /* the only pointer of the API: hooks, loaded plugins, worlds */

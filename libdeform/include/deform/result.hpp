@@ -78,6 +78,13 @@ inline const char *sentence(dfm_status s) noexcept {
 
 // Of bindings: sets that sentence.
 inline dfm_status fail(dfm_status s, const char *why) noexcept { return dfm_fail(s, why); }
+// Of bindings: files as the library reads and writes its own. take(bytes, n) is called once and does not throw.
+template <class Take>
+dfm_status read_file(const char *path, uint64_t limit, const char *expected, Take &&take) noexcept {
+  const auto call = [](void *user, const char *bytes, size_t n) { (*static_cast<std::remove_reference_t<Take> *>(user))(bytes, n); };
+  return dfm_file_read(path, limit, expected, call, const_cast<void *>(static_cast<const void *>(&take)));
+}
+inline dfm_status write_file(const char *path, const void *bytes, size_t n) noexcept { return dfm_file_write(path, bytes, n); }
 
 // A status with what the call gives. `if (result) use(*result); else log(result.what());`
 template <class T>

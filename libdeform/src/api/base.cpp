@@ -4,6 +4,7 @@
 #include <cstring>
 
 #include "api/guard.h"
+#include "core/file.h"
 #include "plugin/context.h"
 
 using dfm::fail;
@@ -64,6 +65,23 @@ const char *dfm_last_error(void) { return dfm::last_error(); }
 dfm_status dfm_fail(dfm_status status, const char *sentence) {
   dfm::set_last_error(sentence ? sentence : "");
   return status;
+}
+
+dfm_status dfm_file_read(const char *path, uint64_t limit, const char *expected, dfm_file_take_fn take, void *user) {
+  return dfm::guard([&] {
+    if (!path || !*path || !expected || !take) dfm::fail(DFM_E_ARG, "dfm_file_read: path is empty, or path, expected or take is NULL");
+    const dfm::Array<char> bytes = dfm::read_whole_file(dfm::Memory::standard(), path, limit, expected);
+    take(user, bytes.data(), bytes.size());
+  });
+}
+
+dfm_status dfm_file_write(const char *path, const void *bytes, size_t n) {
+  return dfm::guard([&] {
+    if (!path || !*path || (n && !bytes)) dfm::fail(DFM_E_ARG, "dfm_file_write: path is empty, or path or bytes is NULL");
+    dfm::AtomicFile file(path);
+    file.write(bytes, n);
+    file.commit();
+  });
 }
 
 dfm_context_def dfm_context_def_default(void) {

@@ -10,6 +10,29 @@ namespace {
 thread_local char last_sentence[1024];
 thread_local uint64_t said = 0;
 
+// Appends bytes as long as they and the closing zero fit.
+class Line {
+ public:
+  Line(char *out, size_t capacity) : out_(out), left_(capacity - 1) {}
+  ~Line() { *out_ = 0; }
+  void add(const char *bytes, size_t n) {
+    if (n > left_) left_ = 0;
+    else std::memcpy(out_, bytes, n), out_ += n, left_ -= n;
+  }
+
+ private:
+  char *out_;
+  size_t left_;
+};
+
+// Bytes of the UTF-8 character at `s`; 0: it is none.
+size_t character(const unsigned char *s) {
+  const size_t n = s[0] < 0x80 ? 1 : s[0] >= 0xc2 && s[0] < 0xe0 ? 2 : (s[0] & 0xf0) == 0xe0 ? 3 : s[0] >= 0xf0 && s[0] < 0xf5 ? 4 : 0;
+  for (size_t i = 1; i < n; ++i)
+    if ((s[i] & 0xc0) != 0x80) return 0;   // the closing zero too
+  return n;
+}
+
 std::string vformat(const char *format, va_list args) {
   char text[1024];
   std::vsnprintf(text, sizeof text, format, args);
@@ -49,9 +72,23 @@ std::string format(const char *format, ...) {
   return text;
 }
 
+void printable(const char *text, char *out, size_t capacity) noexcept {
+  Line line(out, capacity);
+  for (const unsigned char *s = reinterpret_cast<const unsigned char *>(text); *s;) {
+    const size_t n = character(s);
+    const unsigned code = n == 2 ? (s[0] & 0x1fu) << 6 | (s[1] & 0x3fu) : s[0];
+    char escape[8];
+    if (n == 0) line.add("?", 1);
+    else if (n <= 2 && (code < 0x20 || (code >= 0x7f && code < 0xa0))) line.add(escape, size_t(std::snprintf(escape, sizeof escape, "\\u%04x", code)));
+    else line.add(text + (reinterpret_cast<const char *>(s) - text), n);
+    s += std::max<size_t>(n, 1);
+  }
+}
+
 void set_last_error(const char *sentence) noexcept {
-  std::strncpy(last_sentence, sentence, sizeof last_sentence - 1);
-  last_sentence[sizeof last_sentence - 1] = 0;
+  char text[sizeof last_sentence];
+  printable(sentence, text, sizeof text);   // by way of a copy: the sentence may be a part of the last one
+  std::memcpy(last_sentence, text, sizeof text);
   ++said;
 }
 

@@ -4,7 +4,7 @@
 #include <cctype>
 
 #include "core/error.h"
-#include "mesh/file.h"
+#include "core/file.h"
 #include "mesh/raw_mesh.h"
 
 namespace dfm {
@@ -155,7 +155,7 @@ RawMesh read_raw(const Memory &memory, const std::string &path) {
   const Format *const named = format_by_ending(ending(path));
   if (named && !named->read)  // before a large file is read for nothing
     fail(DFM_E_UNSUPPORTED, "%s: the library itself reads no %s files; %s", path.c_str(), named->name, named->advice);
-  const Array<char> bytes = read_whole_file(memory, path);
+  const Array<char> bytes = read_whole_file(memory, path, kMaxMeshBytes, "a mesh file");
   return parse_raw(memory, path, bytes.data(), bytes.size());
 }
 

@@ -29,7 +29,7 @@ class MeditReader {
       else in_.refuse("expected a keyword such as Vertices, Tetrahedra or End, found %s", Cursor::quote(word).c_str());
     }
     if (!points) in_.refuse("no Vertices section; the file is truncated or holds no mesh");
-    if (!ended) in_.refuse("End is missing: the file is truncated");
+    if (!ended) out_.warnings.push_back("End is missing; every section has as many lines as it promises, so the mesh was taken as complete");
   }
 
  private:

@@ -5,7 +5,7 @@
 #include <charconv>
 
 #include "core/error.h"
-#include "mesh/file.h"
+#include "core/file.h"
 #include "mesh/vtk.h"
 
 namespace dfm {

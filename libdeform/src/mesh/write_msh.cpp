@@ -3,7 +3,7 @@
 #include <cmath>
 
 #include "core/error.h"
-#include "mesh/file.h"
+#include "core/file.h"
 #include "mesh/mesh.h"
 
 namespace dfm {

@@ -7,7 +7,7 @@
 
 #include "core/error.h"
 #include "math/vec3.h"
-#include "mesh/file.h"
+#include "core/file.h"
 #include "mesh/tri_mesh.h"
 
 namespace dfm {

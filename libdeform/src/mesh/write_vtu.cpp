@@ -1,7 +1,7 @@
 // VTU: an XML head that names arrays by their offsets, then the arrays as raw bytes, each behind its length.
 #include <bit>
 
-#include "mesh/file.h"
+#include "core/file.h"
 #include "mesh/vtk.h"
 
 namespace dfm {

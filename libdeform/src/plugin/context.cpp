@@ -89,7 +89,9 @@ void dfm_context::logf(int32_t level, const char *format, ...) const noexcept {
   va_start(args, format);
   std::vsnprintf(text, sizeof text, format, args);
   va_end(args);
-  log(level, text);
+  char line[sizeof text];
+  dfm::printable(text, line, sizeof line);
+  log(level, line);
 }
 
 void dfm_context::add_live(uint64_t handle, void (*destroy)(uint64_t)) {

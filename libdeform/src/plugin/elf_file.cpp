@@ -1,36 +1,27 @@
 #include "plugin/elf_file.h"
 
 #include <elf.h>
-#include <fcntl.h>
 #include <link.h>
-#include <sys/stat.h>
 #include <unistd.h>
 
-#include <cerrno>
 #include <cstring>
 #include <vector>
 
 #include "core/error.h"
+#include "core/file.h"
 
 namespace dfm {
 namespace {
 
-struct File {
-  int descriptor;
-  uint64_t bytes = 0;
-  explicit File(const std::string &path) : descriptor(open(path.c_str(), O_RDONLY | O_CLOEXEC)) {
-    struct stat st{};
-    if (descriptor < 0 || fstat(descriptor, &st) != 0) fail(DFM_E_IO, "cannot read \"%s\": %s", path.c_str(), std::strerror(errno));
-    bytes = static_cast<uint64_t>(st.st_size);
-  }
-  ~File() { if (descriptor >= 0) close(descriptor); }
+struct File : InputFile {
+  explicit File(const std::string &path) : InputFile(path, "a plugin (a shared library)") {}
   bool read(uint64_t offset, void *to, size_t n) const {
-    if (n > bytes || offset > bytes - n) return false;
-    return pread(descriptor, to, n, static_cast<off_t>(offset)) == static_cast<ssize_t>(n);
+    if (n > bytes() || offset > bytes() - n) return false;
+    return pread(descriptor(), to, n, static_cast<off_t>(offset)) == static_cast<ssize_t>(n);
   }
   template <class T>
   bool read_all(uint64_t offset, uint64_t count, std::vector<T> &to) const {
-    if (count > bytes / sizeof(T)) return false;
+    if (count > bytes() / sizeof(T)) return false;
     to.resize(count);
     return count == 0 || read(offset, to.data(), count * sizeof(T));
   }
@@ -82,9 +73,9 @@ void check_elf_plugin(const std::string &path) {
   std::vector<ElfW(Phdr)> segments;
   bool whole = header.e_phentsize == sizeof(ElfW(Phdr)) && file.read_all(header.e_phoff, header.e_phnum, segments);
   for (const auto &segment : segments)
-    if (segment.p_type == PT_LOAD) whole &= segment.p_filesz <= file.bytes && segment.p_offset <= file.bytes - segment.p_filesz;
+    if (segment.p_type == PT_LOAD) whole &= segment.p_filesz <= file.bytes() && segment.p_offset <= file.bytes() - segment.p_filesz;
   if (!whole) fail(DFM_E_UNSUPPORTED, "%s is cut short: parts that its header names lie beyond its %llu bytes", name,
-                   static_cast<unsigned long long>(file.bytes));
+                   static_cast<unsigned long long>(file.bytes()));
   bool known;
   if (!defines_entry(file, header, &known) && known)
     fail(DFM_E_UNSUPPORTED, "%s is not a plugin: it has no symbol dfm_plugin_entry", name);

@@ -37,22 +37,23 @@ void make_unit(double *v) {
 std::vector<double> read_field(const std::string &path, const FieldFile &field, const BodyMesh &mesh) {
   const std::string plain = columns_of(field.width), numbered = "cell," + plain;
   const std::string expected = plain + " or " + numbered;
-  std::ifstream in = open_table(path, "with the header " + expected);
-  std::string text, header;
-  if (std::getline(in, text)) header = tidy(text);
+  const uint32_t nfile = mesh.ntet + mesh.dropped_cells, w = field.width;
+  Table table(path, expected, nfile, int(w) + 1);
+  std::string header;
+  std::string_view text;
+  if (table.next(text)) header = tidy(text);
   if (field.width == 1 && header == field.key) header = plain;
   if (field.width == 1 && header == "cell," + field.key) header = numbered;
   if (header != plain && header != numbered) fail(DFM_E_FORMAT, "%s:1: expected the header %s", path.c_str(), expected.c_str());
   const bool has_cell = header == numbered;
   const int columns = int(field.width) + has_cell;
 
-  const uint32_t nfile = mesh.ntet + mesh.dropped_cells, w = field.width;
   std::vector<uint32_t> cell_of(nfile, UINT32_MAX);
   for (uint32_t t = 0; t < mesh.ntet; ++t) cell_of[mesh.file_cell ? mesh.file_cell[t] : t] = t;
   std::vector<uint8_t> seen(nfile, 0);
   std::vector<double> out(size_t(mesh.ntet) * w), row(static_cast<size_t>(columns));
   uint32_t next = 0;
-  for (size_t line = 2; std::getline(in, text); ++line) {
+  for (size_t line = 2; table.next(text); ++line) {
     const std::string_view trimmed = trim(text);
     if (trimmed.empty()) continue;
     split_row(path, line, trimmed, header.c_str(), columns, row.data());

@@ -13,15 +13,15 @@ constexpr const char *kHeader = "node,fixx,fixy,fixz,fx,fy,fz";
 }  // namespace
 
 std::vector<NodalRow> read_nodal(const std::string &path, const BodyMesh &mesh) {
-  std::ifstream in = open_table(path, std::string("with the header ") + kHeader);
   uint32_t highest = 0;
   for (uint32_t i = 0; i < mesh.npoint; ++i) highest = std::max(highest, mesh.file_point[i]);
+  Table table(path, kHeader, highest + uint64_t(1), 7);
   std::vector<uint32_t> point_of(size_t(highest) + 1, UINT32_MAX);
   for (uint32_t i = 0; i < mesh.npoint; ++i) point_of[mesh.file_point[i]] = i;
   std::vector<NodalRow> rows;
-  std::string text;
+  std::string_view text;
   size_t line = 1;
-  for (; std::getline(in, text); ++line) {
+  for (; table.next(text); ++line) {
     const std::string_view trimmed = trim(text);
     if (line == 1) {
       if (trimmed != kHeader) fail(DFM_E_FORMAT, "%s:1: expected the header %s", path.c_str(), kHeader);

@@ -160,6 +160,9 @@ std::string Node::name() const {
   const std::string s = text();
   if (s.size() > 100) fail("a name has at most 100 bytes, found %zu", s.size());
   if (s[0] == '.') fail("a name does not begin with a dot, found \"%s\"", s.c_str());
+  for (size_t i = 0; i + 1 < s.size(); ++i)
+    if (s[i] == '\xc2' && static_cast<unsigned char>(s[i + 1]) >= 0x80 && static_cast<unsigned char>(s[i + 1]) < 0xa0)
+      fail("a name holds no control characters, found %s", excerpt(*value_).c_str());
   for (unsigned char c : s)
     if (c < 0x20 || c == 0x7f || std::string("/\\,:*=\"").find(char(c)) != std::string::npos)
       fail("a name holds no control characters and none of / \\ , : * = \", since it stands in file names, tables and \"between\"; found %s",

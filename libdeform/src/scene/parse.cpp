@@ -2,16 +2,15 @@
 // use can exhaust the stack) and finds keys given twice, which the parser would silently drop.
 #include <cctype>
 #include <cstring>
-#include <filesystem>
-#include <fstream>
 #include <set>
 
+#include "core/file.h"
 #include "scene/node.h"
 
 namespace dfm::scene {
 namespace {
 
-constexpr size_t kMaxBytes = size_t(64) << 20;
+constexpr uint64_t kMaxBytes = 64 * kMiB;
 constexpr size_t kMaxDepth = 64;
 
 struct Place { size_t line = 1, column = 1; };
@@ -33,6 +32,10 @@ size_t string_end(const std::string &text, size_t i) {
 }
 
 void scan(const std::string &text, const std::string &file) {
+  if (const size_t nul = text.find('\0'); nul != std::string::npos) {
+    const Place p = place_of(text, nul);
+    fail(DFM_E_FORMAT, "%s:%zu:%zu: a NUL character, which no JSON text holds; whatever follows would be passed over", file.c_str(), p.line, p.column);
+  }
   std::vector<std::set<std::string>> keys;  // of each open object; arrays hold none
   for (size_t i = 0; i < text.size(); ++i) {
     const char c = text[i];
@@ -49,7 +52,9 @@ void scan(const std::string &text, const std::string &file) {
       size_t next = end + 1;
       while (next < text.size() && std::strchr(" \t\r\n", text[next])) ++next;
       if (next < text.size() && text[next] == ':' && !keys.empty()) {
-        const std::string key = text.substr(i + 1, end - i - 1);
+        std::string key = text.substr(i + 1, end - i - 1);
+        if (key.find('\\') != std::string::npos)   // "\u0061" is "a" as well
+          if (const json plain = json::parse(text.substr(i, end - i + 1), nullptr, false); plain.is_string()) key = plain.get<std::string>();
         if (!keys.back().insert(key).second) {
           const Place p = place_of(text, i);
           fail(DFM_E_FORMAT, "%s:%zu:%zu: the key \"%.60s\" is given twice in one object; keep one", file.c_str(), p.line, p.column,
@@ -99,20 +104,8 @@ json parse_text(const std::string &text, const std::string &file) {
 }
 
 json parse_file(const std::string &path) {
-  std::error_code error;
-  const auto status = std::filesystem::status(path, error);
-  if (!std::filesystem::exists(status)) fail(DFM_E_IO, "%s: no such file; expected a scene (JSON)", path.c_str());
-  if (std::filesystem::is_directory(status)) fail(DFM_E_IO, "%s: is a folder; expected a scene file (JSON)", path.c_str());
-  std::ifstream in(path, std::ios::binary);
-  if (!in) fail(DFM_E_IO, "%s: cannot be opened for reading: %s", path.c_str(), std::strerror(errno));
-  // Read in pieces rather than by the size that the system claims, which means nothing for pipes and devices.
-  std::string text;
-  char piece[65536];
-  while (in.read(piece, sizeof piece) || in.gcount() > 0) {
-    text.append(piece, static_cast<size_t>(in.gcount()));
-    if (text.size() > kMaxBytes) fail(DFM_E_FORMAT, "%s: larger than %zu MiB; a scene refers to its meshes, it does not hold them", path.c_str(), kMaxBytes >> 20);
-  }
-  return parse_text(text, path);
+  const Array<char> bytes = read_whole_file(Memory::standard(), path, kMaxBytes, "a scene file (JSON), which refers to its meshes and tables");
+  return parse_text(std::string(bytes.begin(), bytes.end()), path);
 }
 
 namespace {

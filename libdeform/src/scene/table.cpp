@@ -1,21 +1,30 @@
 #include "scene/table.h"
 
-#include <cerrno>
 #include <charconv>
 #include <cmath>
 #include <cstring>
-#include <filesystem>
 
 #include "core/error.h"
+#include "core/file.h"
 
 namespace dfm::scene {
 
-std::ifstream open_table(const std::string &path, const std::string &expected) {
-  std::error_code unknown;
-  if (std::filesystem::is_directory(path, unknown)) fail(DFM_E_IO, "%s: is a directory; expected a table %s", path.c_str(), expected.c_str());
-  std::ifstream in(path);
-  if (!in) fail(DFM_E_IO, "%s: cannot be opened: %s; expected a table %s", path.c_str(), std::strerror(errno), expected.c_str());
-  return in;
+namespace {
+
+constexpr uint64_t kCellBytes = 64;   // a number of 17 digits has 24
+
+}  // namespace
+
+Table::Table(const std::string &path, const std::string &header, uint64_t rows, int columns)
+    : bytes_(read_whole_file(Memory::standard(), path, std::max(kMiB, 2 * rows * uint64_t(columns) * kCellBytes),
+                             ("a table with the header " + header).c_str())) {}
+
+bool Table::next(std::string_view &line) {
+  if (at_ >= bytes_.size()) return false;
+  const std::string_view rest(bytes_.data() + at_, bytes_.size() - at_);
+  line = rest.substr(0, rest.find('\n'));
+  at_ += line.size() + 1;
+  return true;
 }
 
 std::string_view trim(std::string_view s) {

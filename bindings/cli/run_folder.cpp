@@ -1,0 +1,68 @@
+#include "run_folder.h"
+
+#include <fcntl.h>
+#include <sys/file.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <cstring>
+#include <filesystem>
+#include <regex>
+
+#include "messages.h"
+
+namespace fs = std::filesystem;
+
+namespace cli {
+namespace {
+
+void remove_matching(const std::string &folder, const char *pattern) {
+  const std::regex names(pattern);
+  std::error_code error;
+  std::vector<fs::path> found;
+  for (const auto &entry : fs::directory_iterator(folder, error))
+    if (std::regex_match(entry.path().filename().string(), names)) found.push_back(entry.path());
+  for (const fs::path &path : found) {
+    std::error_code refused;
+    if (!fs::remove(path, refused) && refused) throw Failure(kBadInput, path.string() + ": left by an earlier run, and cannot be removed: " + refused.message());
+  }
+}
+
+// Files of an earlier run would read as results of this one. The summary goes first: without one nobody takes the rest for a whole run. Files that
+// a killed process was writing go too.
+void remove_earlier(const std::string &folder) {
+  remove_matching(folder, "summary\\.json");
+  remove_matching(folder, "(bodies|contacts|probes)\\.csv|(summary\\.json|.*\\.csv)\\.part[0-9]*(-[0-9]+)?");
+  remove_matching(folder + "/states", "(.*_[0-9]{6}|last_.*)\\.vtu|index\\.csv|.*\\.(vtu|csv)\\.part[0-9]*(-[0-9]+)?");
+  remove_matching(folder + "/nodes", ".*\\.csv(\\.part[0-9]*(-[0-9]+)?)?");
+  remove_matching(folder + "/frames", "frame_.*\\.png(\\.part[0-9]*(-[0-9]+)?)?");
+}
+
+}  // namespace
+
+void make_folder(const std::string &path) {
+  std::error_code error;
+  fs::create_directories(path, error);
+  if (error || !fs::is_directory(path))
+    throw Failure(kBadInput, path + ": the folder cannot be made: " + (error ? error.message() : "a file of that name is there"));
+}
+
+RunFolder::RunFolder(const std::string &path) {
+  make_folder(path);
+  descriptor_ = open(path.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
+  if (descriptor_ < 0) throw Failure(kBadInput, path + ": the folder cannot be opened: " + std::strerror(errno));
+  try {
+    if (flock(descriptor_, LOCK_EX | LOCK_NB) != 0) {
+      if (errno == EWOULDBLOCK) throw Failure(kBadInput, path + ": another run is writing into this folder; wait for its end, or give another one with --out");
+      warn(path + ": this file system cannot lock the folder (" + std::strerror(errno) + "); let no other run write into it meanwhile");
+    }
+    remove_earlier(path);
+  } catch (...) {
+    close(descriptor_);
+    throw;
+  }
+}
+
+RunFolder::~RunFolder() { close(descriptor_); }
+
+}  // namespace cli

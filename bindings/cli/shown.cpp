@@ -1,0 +1,21 @@
+#include "shown.h"
+
+#include <cstdio>
+
+namespace cli {
+
+std::string shown(const std::string &text) {
+  std::string out;
+  for (size_t i = 0; i < text.size(); ++i) {
+    const unsigned char c = static_cast<unsigned char>(text[i]), next = i + 1 < text.size() ? static_cast<unsigned char>(text[i + 1]) : 0;
+    const bool second = c == 0xc2 && next >= 0x80 && next < 0xa0;   // the control characters of ISO 6429 in UTF-8
+    char escape[8];
+    std::snprintf(escape, sizeof escape, "\\u%04x", second ? next : c);
+    if (c < 0x20 || c == 0x7f || second) out += escape;
+    else out += text[i];
+    i += second;
+  }
+  return out;
+}
+
+}  // namespace cli

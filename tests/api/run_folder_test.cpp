@@ -1,0 +1,143 @@
+// The folder of a run: one run at a time, nothing of an earlier one, no link followed; and text of others on its way to terminal and tables.
+#include <gtest/gtest.h>
+
+#include <fcntl.h>
+#include <signal.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <filesystem>
+
+#include "support.h"
+
+namespace {
+
+namespace fs = std::filesystem;
+
+const std::string kScene = R"({"format": "deform-scene", "version": 1, "time": {"duration": 0.002, "step": 0.001},
+  "bodies": [{"name": "block", "mesh": ")" + std::string(DEFORM_SOURCE_DIR) + R"(/examples/data/block.msh"}]})";
+
+std::string fresh(const std::string &name) {
+  const std::string dir = test::scratch("run_folder_" + std::to_string(getpid())) + "/" + name;
+  fs::remove_all(dir);
+  fs::create_directories(dir);
+  test::write_file(dir + "/scene.json", kScene);
+  return dir;
+}
+
+test::CommandResult run(const std::string &dir, const std::vector<std::string> &more = {}) {
+  std::vector<std::string> arguments = {"run", dir + "/scene.json", "--quiet", "--out", dir + "/out"};
+  arguments.insert(arguments.end(), more.begin(), more.end());
+  return test::deform(arguments);
+}
+
+// A run that does not end by itself, once it has begun to write.
+pid_t start_endless(const std::string &dir) {
+  const pid_t child = fork();
+  if (child == 0) {
+    const int null = open("/dev/null", O_RDWR);
+    dup2(null, 0), dup2(null, 1), dup2(null, 2);
+    execl(DEFORM_COMMAND, "deform", "run", (dir + "/scene.json").c_str(), "--quiet", "--time", "1e9", "--out", (dir + "/out").c_str(), nullptr);
+    _exit(127);
+  }
+  for (int i = 0; i < 2000 && !fs::exists(dir + "/out/probes.csv"); ++i) usleep(10000);
+  return child;
+}
+
+void expect_sentence(const test::CommandResult &r, const std::vector<std::string> &parts) {
+  EXPECT_EQ(r.exit_code, 2) << r.err;
+  EXPECT_EQ(std::count(r.err.begin(), r.err.end(), '\n'), 1) << r.err;
+  EXPECT_TRUE(std::all_of(r.err.begin(), r.err.end(), [](char c) { return c == '\n' || static_cast<unsigned char>(c) >= 0x20; })) << r.err;
+  for (const std::string &part : parts) EXPECT_NE(r.err.find(part), std::string::npos) << "expected " << part << " in\n" << r.err;
+}
+
+}  // namespace
+
+TEST(RunFolder, SecondRunIntoIt_IsRefusedAndAKilledOneLetsGo) {
+  const std::string dir = fresh("two");
+  const pid_t first = start_endless(dir);
+  ASSERT_TRUE(fs::exists(dir + "/out/probes.csv"));
+  expect_sentence(run(dir), {dir + "/out", "another run", "--out"});
+  kill(first, SIGKILL);
+  waitpid(first, nullptr, 0);
+  EXPECT_EQ(run(dir).exit_code, 0);
+}
+
+TEST(RunFolder, KilledRerun_LeavesNoSummaryOfTheEarlierRunAndNoHalfFiles) {
+  const std::string dir = fresh("killed");
+  ASSERT_EQ(run(dir, {"--set", "/output/states=true"}).exit_code, 0);
+  ASSERT_TRUE(fs::exists(dir + "/out/summary.json"));
+  fs::remove(dir + "/out/probes.csv");   // start_endless waits for it
+  const pid_t second = start_endless(dir);
+  kill(second, SIGKILL);
+  waitpid(second, nullptr, 0);
+  EXPECT_FALSE(fs::exists(dir + "/out/summary.json"));
+  EXPECT_TRUE(fs::is_empty(dir + "/out/states")) << "of the earlier run";
+  for (const auto &entry : fs::recursive_directory_iterator(dir)) EXPECT_EQ(entry.path().string().find(".part"), std::string::npos) << entry.path();
+}
+
+TEST(RunFolder, LeftoversOfKilledRuns_AreRemovedAndOtherFilesKept) {
+  const std::string dir = fresh("leftovers");
+  fs::create_directories(dir + "/out/states"), fs::create_directories(dir + "/out/frames"), fs::create_directories(dir + "/out/nodes");
+  for (const char *name : {"summary.json.part", "summary.json.part12-3", "bodies.csv.part", "states/block_000003.vtu.part77-0", "states/last_block.vtu",
+                           "frames/frame_000001.png.part12", "frames/frame_000001.png", "nodes/ghost.csv", "contacts.csv"})
+    test::write_file(dir + "/out/" + name, "old");
+  for (const char *name : {"notes.txt", "states/own.vtu", "frames/film.mp4", "my_table.csv"}) test::write_file(dir + "/out/" + name, "own");
+  ASSERT_EQ(run(dir, {"--set", "/output/contacts=false"}).exit_code, 0);
+  size_t files = 0;
+  for (const auto &entry : fs::recursive_directory_iterator(dir + "/out")) {
+    if (!entry.is_regular_file()) continue;
+    ++files;
+    EXPECT_NE(test::read_file(entry.path()), "old") << entry.path();
+  }
+  EXPECT_EQ(files, 7u) << "three of the run, four of the user";
+}
+
+TEST(RunFolder, LinksInItsPlace_AreReplacedAndNotFollowed) {
+  const std::string dir = fresh("links");
+  fs::create_directories(dir + "/out");
+  const std::vector<std::string> names = {"bodies.csv", "contacts.csv", "probes.csv", "summary.json", "summary.json.part"};
+  for (const std::string &name : names) {
+    test::write_file(dir + "/victim_" + name, "precious");
+    fs::create_symlink(dir + "/victim_" + name, dir + "/out/" + name);
+  }
+  ASSERT_EQ(run(dir).exit_code, 0);
+  for (const std::string &name : names) EXPECT_EQ(test::read_file(dir + "/victim_" + name), "precious") << name;
+  for (const char *name : {"bodies.csv", "contacts.csv", "probes.csv", "summary.json"}) EXPECT_FALSE(fs::is_symlink(dir + "/out/" + name)) << name;
+}
+
+TEST(SceneText, BytesBehindANul_AreRefused) {
+  const std::string dir = fresh("nul");
+  test::write_file(dir + "/scene.json", kScene + std::string(1, '\0') + "{\"time\": 7}");
+  expect_sentence(run(dir), {"scene.json:2:", "NUL"});
+  test::write_file(dir + "/case.json", "{\"law\": \"coulomb\"}" + std::string(1, '\0'));
+  expect_sentence(test::deform({"friction", dir + "/case.json"}), {"case.json:1: this is not JSON"});
+}
+
+TEST(SceneText, KeysDoubledByEscapes_AreRefused) {
+  const std::string dir = fresh("doubled");
+  std::string twice = kScene;
+  twice.insert(1, R"("gravity": [0, 0, 1], "gr\u0061vity": [0, 0, -1], )");
+  test::write_file(dir + "/scene.json", twice);
+  expect_sentence(run(dir), {"scene.json:1:", "\"gravity\" is given twice"});
+  expect_sentence(run(fresh("doubled"), {"--set", R"(/time={"step": 1, "\u0073tep": 2})"}), {"given twice"});
+  test::write_file(dir + "/case.json", R"({"law": "coulomb", "l\u0061w": "dahl"})");
+  expect_sentence(test::deform({"friction", dir + "/case.json"}), {"case.json:1:", "given twice"});
+}
+
+TEST(Terminal, ControlCharactersOfNamesAndPaths_AreShownAndNotSent) {
+  const std::string dir = fresh("control");
+  std::string scene = kScene;
+  scene.insert(1, R"("\u001b[2J\nred\u009b": 1, )");
+  test::write_file(dir + "/scene.json", scene);
+  expect_sentence(run(dir), {"\\u001b[2J\\u000ared"});
+  const std::string path = dir + "/a\x1b[31m\nb.obj";
+  test::write_file(path, "v 0 0 0\n");
+  expect_sentence(test::deform({"mesh", "info", path}), {"a\\u001b[31m\\u000ab.obj"});
+  const test::CommandResult made = test::deform({"mesh", "make", "ball", "--surface", "--cells", "100", "--out", path});
+  ASSERT_EQ(made.exit_code, 0) << made.err;
+  const test::CommandResult info = test::deform({"mesh", "info", path});
+  EXPECT_EQ(info.out.find('\x1b'), std::string::npos) << info.out;
+  EXPECT_EQ(run(fresh("named"), {"--set", "/bodies/0/name=\"a\u009bb\""}).exit_code, 2);
+}
