@@ -177,15 +177,15 @@ TEST(SceneErrors, Files_AreRefusedWithTheirPlace) {
       {"{\"gravity\": [0, 0, 1e400]}", {"bad.json"}},
       {"{\"a\": 1, \"a\": 2}", {"bad.json:1:10", "twice"}},
       {std::string(10 << 20, '['), {"bad.json:1:65", "nested deeper"}},
-      {std::string("\x7f" "ELF\0\1\2", 7), {"bad.json:1:1", "not JSON"}},
+      {std::string("\x7f" "ELF\0\1\2", 7), {"bad.json:1:5", "not JSON", "NUL"}},
       {"{\"version\": 1}", {"\"format\" is missing"}},
   };
   for (const auto &[text, parts] : texts) {
     test::write_file(file, text);
     expect_refused(run({file}), parts, text.substr(0, 40));
   }
-  expect_refused(run({folder() + "/nothing.json"}), {"nothing.json", "no such file"}, "missing file");
-  expect_refused(run({folder()}), {"folder"}, "a folder");
+  expect_refused(run({folder() + "/nothing.json"}), {"nothing.json", "No such file", "a scene file (JSON)"}, "missing file");
+  expect_refused(run({folder()}), {"is a directory", "a scene file (JSON)"}, "a folder");
 }
 
 TEST(SceneErrors, Arguments_AreRefused) {

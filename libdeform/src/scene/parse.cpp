@@ -34,7 +34,7 @@ size_t string_end(const std::string &text, size_t i) {
 void scan(const std::string &text, const std::string &file) {
   if (const size_t nul = text.find('\0'); nul != std::string::npos) {
     const Place p = place_of(text, nul);
-    fail(DFM_E_FORMAT, "%s:%zu:%zu: a NUL character, which no JSON text holds; whatever follows would be passed over", file.c_str(), p.line, p.column);
+    fail(DFM_E_FORMAT, "%s:%zu:%zu: not JSON: a NUL character; whatever follows would be passed over", file.c_str(), p.line, p.column);
   }
   std::vector<std::set<std::string>> keys;  // of each open object; arrays hold none
   for (size_t i = 0; i < text.size(); ++i) {
@@ -104,7 +104,7 @@ json parse_text(const std::string &text, const std::string &file) {
 }
 
 json parse_file(const std::string &path) {
-  const Array<char> bytes = read_whole_file(Memory::standard(), path, kMaxBytes, "a scene file (JSON), which refers to its meshes and tables");
+  const Array<char> bytes = read_whole_file(Memory::standard(), path, kMaxBytes, "a scene file (JSON)");
   return parse_text(std::string(bytes.begin(), bytes.end()), path);
 }
 
