@@ -46,7 +46,7 @@ Adapter::Adapter(dfm_world world, const dfm_ode_def &def) : world_(world), space
 Adapter::~Adapter() {
   for (auto &g : geoms_)
     if (g->obstacle) dfm_obstacle_destroy(g->obstacle);
-  for (auto &b : bodies_) dfm_rigid_destroy(b->rigid);
+  for (auto &b : bodies_) release(*b);
   if (own_group_) dJointGroupDestroy(engine_.contacts);
 }
 
@@ -137,7 +137,7 @@ dfm_status Adapter::drop() {
   std::erase_if(geoms_, [](const auto &g) { return !g->found; });
   for (auto &b : bodies_) {
     if (b->found) continue;
-    TRY(dfm_rigid_destroy(b->rigid));
+    TRY(release(*b));
     engine_.forget(&b->seat->member);
     by_body_.erase(b->id);
   }
@@ -145,8 +145,15 @@ dfm_status Adapter::drop() {
   return DFM_OK;
 }
 
+dfm_status Adapter::release(Body &b) {
+  b.seat->leaves = true;
+  return dfm_rigid_destroy(b.rigid);
+}
+
+// The caller may have destroyed what stands for a geom: then the geom takes no further part.
 dfm_status Adapter::unbind(Geom &g) {
-  if (g.obstacle) TRY(dfm_obstacle_destroy(g.obstacle));
+  const dfm_status status = g.obstacle ? dfm_obstacle_destroy(g.obstacle) : dfm_status{DFM_OK};
+  if (status != DFM_OK && status != DFM_E_HANDLE) return status;
   g.obstacle = 0;
   return DFM_OK;
 }
@@ -217,7 +224,10 @@ dfm_status Adapter::follow(Geom &g) {
   if (dot(p, p) == 0 && q.x == r.x && q.y == r.y && q.z == r.z && q.w == r.w) return DFM_OK;
   g.pose = now;
   const dfm_pose pose = to_pose(now);
-  return dfm_obstacle_move_to(g.obstacle, &pose);
+  const dfm_status status = dfm_obstacle_move_to(g.obstacle, &pose);
+  if (status != DFM_E_HANDLE) return status;
+  g.obstacle = 0;                          // as in unbind
+  return DFM_OK;
 }
 
 // Who has moved a body since both worlds agreed: the caller in ODE, or a restore in the dfm_world, which counts for all bodies that were there.

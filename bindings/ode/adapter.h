@@ -81,6 +81,7 @@ class Adapter {
   dfm_status drop();
   dfm_status bind(dGeomID geom, const Signature &s);
   dfm_status unbind(Geom &g);
+  static dfm_status release(Body &b);
   dfm_status bind_body(dBodyID body, Body *&out);
   dfm_status follow(Geom &g);
   dfm_status agree(Body &b, bool restored);

@@ -28,7 +28,7 @@ Host &host_of(void *self) { return *static_cast<Host *>(self); }
 // One body of the caller's world.
 class SeatHost : public Host {
  public:
-  explicit SeatHost(Seat &seat) : member_(seat.member) {}
+  explicit SeatHost(Seat &seat) : seat_(seat), member_(seat.member) {}
   dfm_status predict(const dfm_rigid_step &step, double *velocity) override {
     if (!member_.engine->in_step) return dfm_fail(DFM_E_STATE, "a world with an ODE adapter is stepped by dfm_ode_step, not by dfm_world_step");
     member_.engine->predict(member_, step, 0, velocity);
@@ -40,7 +40,14 @@ class SeatHost : public Host {
     return member_.engine->commit(member_, 0, state, extra, step.h);
   }
 
+  dfm_status may_destroy() override {
+    if (seat_.leaves) return DFM_OK;
+    return failed(DFM_E_STATE, "the rigid body stands for ODE's body %p, which owns it, and dfm_rigid_destroy would leave the adapter without it; call dBodyDestroy, or take its "
+                  "geoms out of the adapter's space, and the next dfm_ode_step lets it go; dfm_ode_detach takes all of them away", static_cast<void *>(member_.body));
+  }
+
  private:
+  Seat &seat_;
   Member &member_;
 };
 
@@ -65,6 +72,9 @@ dfm_status push(void *self, const dfm_rigid_step *step, const double *impulse) {
 }
 dfm_status commit(void *self, const dfm_rigid_step *step, const double *, dfm_rigid_state *state, double *extra) {
   return shielded([&] { return host_of(self).commit(*step, state, extra) ? dfm_status{DFM_RIGID_AGAIN} : dfm_status{DFM_OK}; });
+}
+dfm_status may_destroy(void *self) {
+  return shielded([&] { return host_of(self).may_destroy(); });
 }
 dfm_status set_motor(void *self, uint32_t joint, double velocity, double max, double *extra) {
   return shielded([&] { return host_of(self).set_motor(joint, velocity, max, extra); });
@@ -102,7 +112,7 @@ dfm_status register_host() {
   dfm_rigid_host table{};
   table.size = sizeof table;
   table.create = create, table.destroy = destroy, table.predict = predict, table.respond = respond, table.commit = commit, table.push = push;
-  table.set_motor = set_motor, table.joint = joint;
+  table.set_motor = set_motor, table.joint = joint, table.may_destroy = may_destroy;
   const dfm_status status = dfm_rigid_host_register("ode", &table);
   done = status == DFM_OK;
   return status;

@@ -9,6 +9,7 @@ struct Seat {
   static constexpr uint64_t kMagic = 0x6465666f726d6f64ull;
   uint64_t magic = kMagic;
   Member member;
+  bool leaves = false;   // its adapter takes it away
 };
 
 // What the table calls.
@@ -19,6 +20,7 @@ class Host {
   virtual void respond(const dfm_rigid_step &step, uint32_t group, double *matrix) = 0;
   virtual void push(const dfm_rigid_step &step, const double *impulse) = 0;
   virtual bool commit(const dfm_rigid_step &step, dfm_rigid_state *state, double *extra) = 0;   // true: solve again
+  virtual dfm_status may_destroy() { return DFM_OK; }
   virtual dfm_status set_motor(uint32_t, double, double, double *) { return DFM_E_ARG; }
   virtual dfm_status joint(const dfm_rigid_state *, const double *, uint32_t, double *, double *, double *) { return DFM_E_ARG; }
 };

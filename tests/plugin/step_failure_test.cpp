@@ -2,6 +2,7 @@
 // static plugins that do what the test tells them.
 #define DFM_STATIC_PLUGIN misbehaving
 #include <atomic>
+#include <cfenv>
 #include <stdexcept>
 #include <thread>
 
@@ -9,9 +10,9 @@
 
 namespace {
 
-enum class Way { behave, throws, fails, nan_force, nan_limit, negative_limit };
+enum class Way { behave, throws, fails, nan_force, nan_limit, negative_limit, rounds };
 Way law_way = Way::behave;
-enum class Model { behave, throws_forces, fails_forces, nan_force, throws_bound, throws_create, fails_create, nested };
+enum class Model { behave, throws_forces, fails_forces, nan_force, throws_bound, throws_create, fails_create, nested, rounds };
 Model model_way = Model::behave;
 const dfm_host *host_of_model = nullptr;
 std::atomic<int> nested_parallel{0}, nested_calls{0};
@@ -29,6 +30,7 @@ dfm_status law_eval(const dfm_friction_in *in, dfm_friction_out *out) {
     if (out->limit) out->limit[i] = last && law_way == Way::nan_limit ? NAN : last && law_way == Way::negative_limit ? -1 : 0;
     if (out->mode) out->mode[i] = 2;
   }
+  if (law_way == Way::rounds) std::fesetround(FE_UPWARD);
   return DFM_OK;
 }
 
@@ -45,6 +47,7 @@ dfm_status add_forces(void *, const dfm_kin *k, double *f) {
   if (model_way == Model::throws_forces) throw std::runtime_error("boom");
   if (model_way == Model::fails_forces) return DFM_E_FATAL;
   if (model_way == Model::nan_force) f[0] = NAN;
+  if (model_way == Model::rounds) std::fesetround(FE_DOWNWARD);
   if (model_way == Model::nested) {
     // A call from inside a worker runs serially in the caller.
     struct Task { std::thread::id caller; } task{std::this_thread::get_id()};
@@ -164,6 +167,29 @@ TEST(StepFailure, OfAModel_EndsTheStepAndKeepsTheState) {
   EXPECT_EQ(dfm_world_hash(w), before);
   model_way = Model::behave;
   test::run(w, 0.2, 1e-3);
+}
+
+// A law or a model that returns with another rounding mode changes no bit of what the host computes after it.
+TEST(StepFailure, RoundingModeLeftByAPlugin_ChangesNoBit) {
+  uint64_t hash[2] = {};
+  for (const bool rounds : {false, true}) {
+    Host h;
+    const test::Stack s = test::make_stack(h.c);
+    dfm_friction_def f{};
+    f.size = sizeof f, f.between[0] = f.between[1] = "*", f.law = "test.bad_law";
+    test::ok(dfm_world_add_friction(s.world, &f));
+    test::BodyOptions o;
+    o.name = "cloud", o.model = "test.bad_model", o.position = {0.7, 0, 0.3};
+    test::make_body(h.c, s.world, "beam", {0.1, 0.1, 0.1}, 60, o);
+    if (rounds) law_way = Way::rounds, model_way = Model::rounds;
+    test::run(s.world, 0.05, 1e-3);
+    hash[rounds] = dfm_world_hash(s.world);
+    EXPECT_EQ(std::fegetround(), FE_TONEAREST);
+    EXPECT_EQ(rounds, h.log.find("test.bad_law: eval changed the rounding mode") != std::string::npos) << h.log;
+    EXPECT_EQ(rounds, h.log.find("test.bad_model: ") != std::string::npos) << h.log;
+    law_way = Way::behave, model_way = Model::behave;
+  }
+  EXPECT_EQ(hash[0], hash[1]);
 }
 
 // A held point that is moved has a new velocity before the step is known to fail; it is put back.

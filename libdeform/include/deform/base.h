@@ -121,6 +121,12 @@ DFM_API dfm_status dfm_plugin_visit(dfm_context *context, dfm_plugin_visit_fn vi
  * Threads: Not during step. Since 0.1. */
 DFM_API dfm_status dfm_plugin_visit_passed(dfm_context *context, dfm_plugin_passed_fn visit, void *user);
 
+/** Which plugin the calling thread is in: for a handler of a signal or of the end of the process, which can then name it.
+ * @param what  out, what it was asked for ("eval", "create", "load"), or NULL where none; the parameter may be NULL
+ * @return the id of the type, the file while it is loaded, or NULL where the thread is in none; valid while that call lasts
+ * Threads: Any thread, and from a handler of a signal. Since 0.1. */
+DFM_API const char *dfm_plugin_running(const char **what);
+
 /* ---- parameters by key -------------------------------------------------------------------------------------- */
 typedef struct { const char *key; const double *value; uint32_t width; } dfm_param_value;
 typedef struct { uint32_t size, n; const dfm_param_value *values; } dfm_params;

@@ -579,6 +579,9 @@ class Context : public Handle<dfm_context *> {
   }
 };
 
+// The plugin that the calling thread is in, or null (dfm_plugin_running).
+inline const char *running_plugin(const char **what = nullptr) noexcept { return dfm_plugin_running(what); }
+
 // ---- time of impact ---------------------------------------------------------------------------------------------------------------
 template <class E>
 struct Toi {

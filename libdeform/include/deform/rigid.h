@@ -103,6 +103,9 @@ typedef struct dfm_rigid_host {
   dfm_status (*revise)(void *self, const dfm_rigid_step *step, const double *impulse, double *velocity, uint32_t *changed);
   /** The impulses that commit will have, before any set commits. May be NULL. */
   dfm_status (*push)(void *self, const dfm_rigid_step *step, const double *impulse);
+  /** Asked by dfm_rigid_destroy: may the caller remove the set? A host whose engine owns the bodies refuses, with a sentence by dfm_fail that says what
+   * to call instead; not asked when the world ends. May be NULL: the caller may. */
+  dfm_status (*may_destroy)(void *self);
 } dfm_rigid_host;
 
 /** Makes a host known under a name to every context of the process; the table is copied, its code must stay loaded. "builtin" is always known.
@@ -122,7 +125,9 @@ DFM_API dfm_status dfm_rigid_create(dfm_world world, const char *host, const dfm
  * the body's mass and moves with it; a dfm_obstacle with a name, material and filter of its own. dfm_obstacle_destroy removes it alone.
  * @return DFM_OK; DFM_E_ARG (which entry, why); DFM_E_HANDLE. Threads: Not during step. Since 0.1. */
 DFM_API dfm_status dfm_rigid_add_shape(dfm_rigid rigid, const dfm_obstacle_def *def, dfm_obstacle *out);
-/** Removes the whole set that the body came with, with all shapes; their contacts end. Threads: Not during step. Since 0.1. */
+/** Removes the whole set that the body came with, with all shapes; their contacts end.
+ * @return DFM_OK; DFM_E_STATE the body belongs to an engine's adapter, which takes it away itself (the sentence says how); DFM_E_HANDLE; DFM_E_BUSY.
+ * Threads: Not during step. Since 0.1. */
 DFM_API dfm_status dfm_rigid_destroy(dfm_rigid rigid);
 /** All rigid bodies in order of creation; capacity 0 with out NULL only counts. Threads: Any thread. Not during step. Since 0.1. */
 DFM_API dfm_status dfm_world_rigids(dfm_world world, uint32_t capacity, dfm_rigid *out, uint32_t *n);

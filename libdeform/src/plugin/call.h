@@ -1,6 +1,7 @@
-// Every call into a plugin goes through here: what it took as scratch is given back, an exception becomes a status, and a failure is
-// logged under the plugin's name.
+// Every call into a plugin goes through here: what it took as scratch is given back, the floating-point environment is put back, an exception
+// becomes a status, and a failure is logged under the plugin's name.
 #pragma once
+#include "plugin/boundary.h"
 #include "plugin/context.h"
 
 namespace dfm {
@@ -9,14 +10,20 @@ template <class F>
 dfm_status call_plugin(const dfm_host &host, const dfm_type &type, const char *what, F &&f) noexcept {
   dfm_context &context = *static_cast<dfm_context *>(host.ctx);
   const PluginCall call(context.scratch);
+  Boundary boundary(type.id, what);
+  dfm_status status = DFM_E_FATAL;
+  bool threw = false;
   try {
-    const dfm_status status = f();
-    if (status < 0) context.logf(DFM_LOG_ERROR, "%s: %s returned %s", type.id, what, dfm_status_name(status));
-    return status;
+    status = f();
   } catch (...) {
-    context.logf(DFM_LOG_ERROR, "%s: %s threw an exception; a plugin must not (wrap its entries in dfm::plugin::guarded)", type.id, what);
-    return DFM_E_FATAL;
+    threw = true;
   }
+  if (const char *changed = boundary.restore(); changed && context.left_changed.first(&type))
+    context.logf(DFM_LOG_WARNING, "%s: %s changed %s and left it so; it was put back, and is from now on without a word; a plugin must leave the floating-point "
+                 "environment as it finds it", type.id, what, changed);
+  if (threw) context.logf(DFM_LOG_ERROR, "%s: %s threw an exception; a plugin must not (wrap its entries in dfm::plugin::guarded)", type.id, what);
+  else if (status < 0) context.logf(DFM_LOG_ERROR, "%s: %s returned %s", type.id, what, dfm_status_name(status));
+  return status;
 }
 
 }  // namespace dfm

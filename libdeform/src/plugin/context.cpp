@@ -35,8 +35,10 @@ void host_log(void *ctx, int32_t level, uint32_t code, const char *utf8) {
 
 void host_parallel_for(void *ctx, uint32_t n, uint32_t grain, void (*fn)(void *, uint32_t, uint32_t), void *user) {
   dfm_context &context = self(ctx);
+  const dfm::Running caller = dfm::running;
   context.tasks.parallel_for(n, grain, [&](uint32_t begin, uint32_t end) {
     const dfm::PluginCall call(context.scratch);  // what a worker took as scratch is given back when its block is done
+    const dfm::Boundary boundary(caller.who, caller.what);
     fn(user, begin, end);
   });
 }

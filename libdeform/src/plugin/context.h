@@ -8,6 +8,7 @@
 #include "core/memory.h"
 #include "core/tasks.h"
 #include "deform/base.h"
+#include "plugin/boundary.h"
 #include "plugin/loader.h"
 #include "plugin/registry.h"
 #include "plugin/scratch.h"
@@ -35,6 +36,7 @@ struct dfm_context {
   dfm_host host;          // what we lend to plugins
   dfm::Registry registry;
   dfm::Loader loader;
+  dfm::SaidOnce left_changed;   // types that left the floating-point environment changed
 
  private:
   std::mutex live_mutex_;

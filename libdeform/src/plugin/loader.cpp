@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cerrno>
 #include <climits>
+#include <clocale>
 #include <cstdio>
 #include <cstdlib>
 #include <cstring>
@@ -13,6 +14,7 @@
 
 #include "core/error.h"
 #include "deform/base.h"
+#include "plugin/boundary.h"
 #include "plugin/registry.h"
 #include "plugin/shared_object.h"
 #include "plugin/static_list.h"
@@ -54,6 +56,37 @@ std::vector<std::string> entries(const std::string &directory) {
 
 bool ends_in_so(const std::string &name) { return name.size() > 3 && name.compare(name.size() - 3, 3, ".so") == 0; }
 
+// While code of a plugin runs that no world asked for: its initializers and its entry. What makes the host misread or miscompute afterwards, the
+// floating-point environment and the decimal point, is put back.
+class Visit {
+ public:
+  Visit(const dfm_host &host, const std::string &file)
+      : host_(host), file_(file), locale_(std::setlocale(LC_NUMERIC, nullptr)), boundary_(file.c_str(), "load") {}
+  ~Visit() { put_back(); }
+  Visit(const Visit &) = delete;
+  Visit &operator=(const Visit &) = delete;
+  // Says so, too, where something was changed.
+  void end() {
+    char sentence[1024];
+    const char *changed = put_back();
+    if (!changed) return;
+    std::snprintf(sentence, sizeof sentence, "%s: loading it changed %s; it was put back, since the host would compute or read numbers otherwise; a plugin must leave that as it finds it",
+                  file_.c_str(), changed);
+    host_.log(host_.ctx, DFM_LOG_WARNING, 0, sentence);
+  }
+
+ private:
+  const char *put_back() noexcept {
+    const char *changed = boundary_.restore();
+    if (locale_ != std::setlocale(LC_NUMERIC, nullptr)) std::setlocale(LC_NUMERIC, locale_.c_str()), changed = "the locale of numbers";
+    return changed;
+  }
+  const dfm_host &host_;
+  const std::string &file_;
+  const std::string locale_;
+  Boundary boundary_;
+};
+
 }  // namespace
 
 void Loader::note_log(const char *text) noexcept {
@@ -70,6 +103,7 @@ Loader::~Loader() {
   while (!modules_.empty()) {
     const Module module = std::move(modules_.back());
     modules_.pop_back();
+    const Boundary boundary(module.file.c_str(), "shutdown");
     try {
       if (module.shutdown) module.shutdown();
     } catch (...) {
@@ -115,10 +149,12 @@ bool Loader::load(const std::string &path) {
   for (const Module &module : modules_)
     if (module.image && module.device == st.st_dev && module.inode == st.st_ino) return false;
 
+  Visit visit(host_, path);
   SharedObject library(file, path);
   const dfm_plugin_fn entry = library.entry();
   dfm_plugin plugin;
   enter(entry, path, plugin);
+  visit.end();
   keep({nullptr, st.st_dev, st.st_ino, path, entry, plugin.shutdown}, plugin);
   modules_.back().image = library.release();
   return true;
@@ -162,7 +198,9 @@ void Loader::add_static(dfm_plugin_fn entry, const std::string &name) {
     if (module.entry == entry) return;
   const std::string file = "static:" + name;
   dfm_plugin plugin;
+  Visit visit(host_, file);
   enter(entry, file, plugin);
+  visit.end();
   keep({nullptr, 0, 0, file, entry, plugin.shutdown}, plugin);
 }
 

@@ -44,7 +44,7 @@ struct RigidSet {
 
 // Throws Error and leaves the world as it was. out: [nbody] handles.
 void create_rigids(World &w, const char *host, const dfm_rigid_set_def &def, uint64_t *out);
-void destroy_rigids(RigidSet &set);
+void destroy_rigids(RigidSet &set);   // throws Error where the host keeps its bodies
 Obstacle &rigid_obstacle(World &w, uint64_t id);
 void place_rigids(World &w);                   // World::prepare(): slots and groups
 void rigid_response(World &w, uint32_t group, double *matrix);

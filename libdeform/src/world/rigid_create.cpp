@@ -101,6 +101,11 @@ RigidSet::~RigidSet() {
 
 void destroy_rigids(RigidSet &set) {
   World &w = *set.world;
+  const uint64_t said = sentences();
+  if (const dfm_status status = set.host.may_destroy ? set.host.may_destroy(set.self) : dfm_status{DFM_OK}; status != DFM_OK) {
+    const std::string why = sentences() != said ? last_error() : format("rigid host '%s' keeps '%s'; remove it where it was made", set.host_name.c_str(), set.defs[0].name);
+    fail(status < 0 ? status : DFM_E_STATE, "%s", why.c_str());
+  }
   std::vector<uint64_t> ids;   // with the shapes that were added
   for (auto &o : w.obstacles)
     if (o->rigid == &set) ids.push_back(o->id);

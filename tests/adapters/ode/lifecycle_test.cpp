@@ -52,6 +52,34 @@ TEST(OdeLifecycle, BodyDestroyedWhileTouched_LeavesItsGeomInTheWorld) {
   EXPECT_LT(height(s.ball), 0.12);
 }
 
+// What stands for ODE's bodies is the adapter's: the caller cannot take it away, and nothing has happened where he tried.
+TEST(OdeLifecycle, RigidOfTheAdapter_IsNotTheCallersToDestroy) {
+  OnAPlate s;
+  dfm_rigid r = 0;
+  ok(dfm_ode_rigid(s.ode.adapter, s.plate, &r));
+  EXPECT_EQ(dfm_rigid_destroy(r), DFM_E_STATE);
+  const std::string why = dfm_last_error();
+  EXPECT_NE(why.find("dBodyDestroy"), std::string::npos) << why;
+  s.ode.run(0.02);
+  EXPECT_EQ(s.ode.stats().bodies, 1u);
+  EXPECT_EQ(rigid_measure(r).mass, 4.0);
+}
+
+// A shape's obstacle may go: then its geom takes no part, and the adapter works on.
+TEST(OdeLifecycle, ObstacleDestroyedByTheCaller_LeavesTheAdapterAtWork) {
+  OnAPlate s;
+  dfm_obstacle shape = 0, plane = 0;
+  ok(dfm_ode_obstacle(s.ode.adapter, dBodyGetFirstGeom(s.plate), &shape));
+  ok(dfm_ode_obstacle(s.ode.adapter, s.floor, &plane));
+  ok(dfm_obstacle_destroy(shape));
+  ok(dfm_obstacle_destroy(plane));
+  s.ode.run(0.02);
+  dGeomPlaneSetParams(s.floor, 0, 0, 1, -0.1);
+  dGeomDestroy(dBodyGetFirstGeom(s.plate));
+  s.ode.run(0.02);
+  EXPECT_EQ(s.ode.stats().bodies, 0u);
+}
+
 // A body and a geom at the addresses of destroyed ones are new ones.
 TEST(OdeLifecycle, ReplacedBody_IsANewOne) {
   Ode ode({0, 0, 0});
