@@ -1,6 +1,7 @@
 #include "scene_file.h"
 
 #include "messages.h"
+#include "progress.h"
 
 namespace cli {
 
@@ -35,7 +36,10 @@ SceneFile::SceneFile(const Globals &globals, const std::string &path, const std:
   options.nset = uint32_t(assignments.size());
   options.set = assignments.data();
   options.jitter_seed = jitter_seed;
-  need(dfm_scene_open(context_.get(), path.c_str(), &options, &scene_));
+  {
+    const Patience patience(!globals.quiet && !globals.json, "reading " + path);   // surfaces are filled, grids are made
+    need(dfm_scene_open(context_.get(), path.c_str(), &options, &scene_));
+  }
   need(dfm_scene_world(scene_, &world_));
   settings_.size = sizeof settings_;
   need(dfm_scene_get_settings(scene_, &settings_));

@@ -14,6 +14,9 @@ struct Memory {
   static const Memory &standard();  // aligned malloc and free
 };
 
+// Throws Error(DFM_E_NOMEM) where work that is about to begin would need more memory than the machine, or the group of processes, may ever have.
+void need_memory(uint64_t bytes, const char *what);
+
 // Allocator of std::vector over Memory; 64-byte alignment so that kernels may load whole vectors.
 template <class T>
 struct HookAllocator {

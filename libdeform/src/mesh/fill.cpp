@@ -9,6 +9,7 @@
 // Measured on examples/scenes/fill_drop.json (doc/concepts/filling.md): 41 sub-steps a step without a floor, 3 from 0.01 on; 0.1 leaves mass
 // ratios of 60 between points and the fewest steps at the solver's cap, and makes a ball of 5,000 cells 0.8 % wider in its inertia.
 #include <algorithm>
+#include <cfloat>
 #include <cmath>
 
 #include "core/error.h"
@@ -25,6 +26,7 @@ constexpr double kDeviations = 4;        // sampled and summed volume agree with
 constexpr double kCloseEnough = 1.02;    // number of cells over the wanted one, or the reverse
 constexpr double kFarOff = 1.05;
 constexpr int kTries = 12;
+constexpr uint64_t kBytesPerCell = 200;  // at the peak, measured at 1e6 cells
 
 // ---- the pitch -----------------------------------------------------------------------------------------------------
 
@@ -44,20 +46,28 @@ double expected_half_pitch(const FillSurface &s, double cells) {
   return hi;
 }
 
+// As far as a search may go beyond the wanted number.
+uint32_t most_cells(uint32_t cells) { return uint32_t(std::min<uint64_t>(4 * uint64_t(cells) + 1000, kMostCells)); }
+
+// Below it keys do not fit, or the rounding of the coordinates (four times that is what touching allows) reaches 1/20 of the lattice's unit.
+double least_half_pitch(const FillSurface &s) { return std::max(2.0 / kLatticeReach, 80 * s.resolution); }
+
 // Half the pitch that offers the number of cells. The count falls with the pitch to the power of 2 (all surface) to 3 (all inside), and 8/3
 // makes each try some ten times better than the last; where the count jumps the tries are kept between those that were too many and too few.
-// Square roots alone, so that the lattice is the same on every machine. Returns how far the count is off, as a ratio above 1.
+// Square roots alone, so that the lattice is the same on every machine. Returns how far the count is off, as a ratio above 1; infinity: no
+// lattice that was tried has so few cells.
 double seek_pitch(const FillSurface &surface, uint32_t cells, Lattice &lattice) {
-  const uint32_t limit = uint32_t(std::min<uint64_t>(4 * uint64_t(cells) + 1000, kMostCells));
-  double fine = 2.0 / kLatticeReach, coarse = 1, best_apart = HUGE_VAL, next = std::clamp(expected_half_pitch(surface, cells), fine, coarse);
+  const uint32_t limit = most_cells(cells);
+  double fine = least_half_pitch(surface), coarse = 1, best_apart = HUGE_VAL, next = std::clamp(expected_half_pitch(surface, cells), fine, coarse);
   Lattice trial = lattice;
   for (int tries = 0; tries < kTries && best_apart > kCloseEnough; ++tries) {
     trial.half_pitch = next;
-    const double ratio = double(cover(surface, trial, limit).kept) / cells, apart = std::max(ratio, 1 / ratio);
-    if (apart < best_apart) best_apart = apart, lattice = trial;
-    (ratio > 1 ? fine : coarse) = next;
+    const FillCover covered = cover(surface, trial, limit);
+    const double ratio = double(covered.kept) / cells, apart = std::max(ratio, 1 / ratio);
+    if (covered.complete && apart < best_apart) best_apart = apart, lattice = trial;
+    (ratio > 1 || !covered.complete ? fine : coarse) = next;
     next *= std::sqrt(std::sqrt(std::sqrt(ratio * ratio * ratio)));
-    if (!(next > fine && next < coarse)) next = std::sqrt(fine * coarse);
+    if (covered.hopeless || !(next > fine && next < coarse)) next = std::sqrt(fine * coarse);
   }
   return best_apart;
 }
@@ -68,7 +78,12 @@ Lattice choose_lattice(const FillSurface &surface, uint32_t cells) {
   Lattice symmetric, other;
   other.shift = {0.39, 0.27, 0.61};
   const double apart = seek_pitch(surface, cells, symmetric);
-  return apart > kFarOff && seek_pitch(surface, cells, other) < apart ? other : symmetric;
+  const bool better = apart > kFarOff && seek_pitch(surface, cells, other) < apart;
+  if (!better && apart == HUGE_VAL)
+    fail(DFM_E_FORMAT, "about %u cells cannot fill this surface of %zu triangles, %.3g m across with an area of %.3g m2: at every pitch that was tried its triangles enter more than %u; "
+         "stray corners or thin spikes that reach far out do that, so remove them, or ask for more cells",
+         cells, surface.tris.size() / 3, surface.size, surface.area * surface.size * surface.size, most_cells(cells));
+  return better ? other : symmetric;
 }
 
 // ---- the shares ----------------------------------------------------------------------------------------------------
@@ -229,6 +244,14 @@ void refuse_unfit(const TriMesh &surface, const FillSurface &s, uint32_t cells) 
          "the surface is open: %u opening%s of %.3g m2 in all, %.0f %% of the closed surface, the widest %.3g m across where the whole is %.3g m; openings up to %.0f %% are filled across, so close it or give a mesh with tetrahedra",
          s.openings, s.openings == 1 ? "" : "s", s.opening_area * s.size * s.size, 100 * s.opening_area / whole, s.opening_width * s.size, s.size,
          100 * kOpening);
+  const double needed = expected_half_pitch(s, cells), least = least_half_pitch(s);
+  if (needed >= least) return;
+  const double reach = s.resolution / DBL_EPSILON * s.size;
+  if (80 * s.resolution > 2.0 / kLatticeReach)
+    fail(DFM_E_FORMAT, "%u cells need a pitch of %.3g m, and coordinates of up to %.3g m are known to %.3g m only, where the surface is %.3g m across; move it nearer to the origin",
+         cells, 2 * needed * s.size, reach, DBL_EPSILON * reach, s.size);
+  fail(DFM_E_FORMAT, "%u cells need a pitch of %.3g m, which is too fine for a surface that is %.3g m across; its parts lie too far apart, or spikes reach far out: remove them, or ask for fewer cells",
+       cells, 2 * needed * s.size, s.size);
 }
 
 void tell(const FillSurface &s, const Filling &f, double half_pitch, uint32_t cells, bool settled, double sampled, uint32_t empty, TetMesh &out) {
@@ -252,9 +275,10 @@ void tell(const FillSurface &s, const Filling &f, double half_pitch, uint32_t ce
 TetMesh fill_surface(const TriMesh &surface, uint32_t cells) {
   const FillSurface s(surface);
   refuse_unfit(surface, s, cells);
+  need_memory(kBytesPerCell * uint64_t(cells), format("filling a surface with %u cells", cells).c_str());
   const Lattice lattice = choose_lattice(s, cells);
   const double half_pitch = lattice.half_pitch, unit = kLatticeCell * half_pitch * half_pitch * half_pitch;
-  const FillCover covered = cover(s, lattice, UINT32_MAX);
+  const FillCover covered = cover(s, lattice, most_cells(cells));
   const FillShares shares = sample_shares(s, covered, lattice);
   Filling f = arrange(s, covered, shares);
   const double sampled = sum(f.share);

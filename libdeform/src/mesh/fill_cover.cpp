@@ -67,8 +67,9 @@ int32_t first_at_least(double x, int32_t modulus, int32_t rest) {
 // Tests a piece of a triangle, no longer than a few cells, against all cells whose boxes meet its own.
 class PieceTest {
  public:
-  PieceTest(double tolerance, const KeySet *skip, const VisitCrossing &visit)
-      : tolerance_(tolerance), skip_(skip), visit_(visit) {}
+  PieceTest(double tolerance, const KeySet *skip, uint64_t work, const VisitCrossing &visit)
+      : tolerance_(tolerance), skip_(skip), work_(work), visit_(visit) {}
+  uint64_t work() const { return work_; }
 
   bool run(const Vec3 corner[3], uint32_t triangle) {
     Vec3 lo = corner[0], hi = lo;
@@ -101,6 +102,8 @@ class PieceTest {
       for (key[b] = first_at_least(2 * (lo[b] - 1 - t), 4, 2); key[b] <= 2 * (hi[b] + 1 + t); key[b] += 4)
         for (key[c] = first_at_least(2 * (lo[c] - 0.5 - t), 2, 1); key[c] <= 2 * (hi[c] + 0.5 + t); key[c] += 2) {
           const Site at{key[0], key[1], key[2]};
+          if (work_ == 0) return false;
+          --work_;
           if (skip_ && skip_->find(pack(at)) != UINT32_MAX) continue;
           const Vec3 middle = 0.5 * place_of(at), moved[3] = {corner[0] - middle, corner[1] - middle, corner[2] - middle};
           const TetShape &shape = Kinds::all().shape[size_t(Kinds::number(a, b, (key[c] & 2) != 0))];
@@ -111,6 +114,7 @@ class PieceTest {
 
   double tolerance_;
   const KeySet *skip_;
+  uint64_t work_;
   const VisitCrossing &visit_;
 };
 
@@ -177,23 +181,27 @@ void FillSurface::measure_openings() {
 
 double touch_tolerance(const FillSurface &surface, const Lattice &lattice) { return 1e-9 + 4 * surface.resolution / lattice.half_pitch; }
 
-void each_crossing(const FillSurface &surface, const Lattice &lattice, const KeySet *skip, const VisitCrossing &visit) {
-  PieceTest test(touch_tolerance(surface, lattice), skip, visit);
+uint64_t each_crossing(const FillSurface &surface, const Lattice &lattice, const KeySet *skip, uint64_t work, const VisitCrossing &visit) {
+  PieceTest test(touch_tolerance(surface, lattice), skip, work, visit);
   for (uint32_t t = 0; t < surface.tris.size() / 3; ++t) {
     Vec3 corner[3];
     for (int k = 0; k < 3; ++k) corner[k] = lattice.from_box(load3(&surface.points[3 * size_t(surface.tris[3 * size_t(t) + k])]));
-    if (!test.run(corner, t)) return;
+    if (!test.run(corner, t)) break;
   }
+  return test.work();
 }
 
 FillCover cover(const FillSurface &surface, const Lattice &lattice, uint32_t limit) {
   FillCover out(surface.memory);
   KeySet touched(surface.memory);
-  each_crossing(surface, lattice, &out.cells, [&](uint64_t key, uint32_t, bool deep) {
+  const uint64_t most_touched = 8 * uint64_t(limit);
+  out.hopeless = each_crossing(surface, lattice, &out.cells, crossing_work(surface, limit), [&](uint64_t key, uint32_t, bool deep) {
     (deep ? out.cells : touched).add(key);
-    return out.cells.size() <= limit;
-  });
+    return out.cells.size() <= limit && touched.size() <= most_touched;
+  }) == 0;
   const uint32_t crossed = out.kept = out.cells.size();
+  out.complete = !out.hopeless && crossed <= limit && touched.size() <= most_touched;
+  if (!out.complete) return out;
   out.kind.assign(crossed, CellKind::crossed);
   const auto look = [&](uint64_t key, bool surely_inside) {
     bool is_new = false;
@@ -213,6 +221,7 @@ FillCover cover(const FillSurface &surface, const Lattice &lattice, uint32_t lim
   for (uint32_t i = 0; i < out.cells.size() && out.kept <= limit; ++i)
     for (uint32_t face = 0; face < 4 && out.kind[i] != CellKind::outside; ++face)  // nothing lies between neighbours that no triangle touches
       look(pack(neighbour(unpack(out.cells[i]), face)), i >= near && surface.closed && out.kind[i] == CellKind::inside);
+  out.complete = out.kept <= limit;
   return out;
 }
 

@@ -86,14 +86,20 @@ struct FillCover {
   KeySet cells;
   Array<CellKind> kind;                                 // by number; outside for cells that were looked at only
   uint32_t kept = 0;
+  bool complete = true;                                 // false: given up, for more cells than `limit` or more work than it allows
+  bool hopeless = false;                                // given up for the work: long triangles through a lattice far too fine for them
 };
-// `limit`: stops early once more cells are crossed than that.
+// `limit`: most cells. Work is bounded by the triangles and the limit, wherever the corners lie.
 FillCover cover(const FillSurface &surface, const Lattice &lattice, uint32_t limit);
 
 // Calls visit(cell's key, triangle, deep) for every cell within the touch tolerance of a triangle, a pair perhaps more than once; deep: the
-// triangle enters the cell by more than that. Cells in `skip` are not tested. visit returns false to stop.
+// triangle enters the cell by more than that. Cells in `skip` are not tested. visit returns false to stop. Tests `work` pairs of a triangle's
+// piece and a cell at most, and gives back what is left: 0 where that did not suffice.
 using VisitCrossing = std::function<bool(uint64_t key, uint32_t triangle, bool deep)>;
-void each_crossing(const FillSurface &surface, const Lattice &lattice, const KeySet *skip, const VisitCrossing &visit);
+uint64_t each_crossing(const FillSurface &surface, const Lattice &lattice, const KeySet *skip, uint64_t work, const VisitCrossing &visit);
+// What `cells` cells and the triangles of a surface may cost. A piece of a triangle is no longer than three lattice units and is tested against some
+// 150 cells; a triangle of ordinary shape has as many pieces as cells, a sliver as many as it is lattice units long: some hundred are granted.
+inline uint64_t crossing_work(const FillSurface &surface, uint64_t cells) { return 16384 * (surface.tris.size() / 3) + 1024 * cells; }
 double touch_tolerance(const FillSurface &surface, const Lattice &lattice);
 
 // Share of each kept cell that is inside, before any floor. `loose` is the part of the cell that was decided by one sample for each of its

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/error.h"
 #include "mesh/fill_lattice.h"
 
 namespace dfm {
@@ -125,11 +126,16 @@ FillShares sample_shares(const FillSurface &surface, const FillCover &cover, con
   };
   const Memory &memory = surface.memory;
   Array<Pair> pairs{HookAllocator<Pair>(memory)};
-  each_crossing(surface, lattice, nullptr, [&](uint64_t key, uint32_t tri, bool) {
+  // Cutting a cell costs some 170 tests for each triangle in it.
+  const uint64_t most = 128 * (surface.tris.size() / 3 + cover.cells.size()), work = 8 * crossing_work(surface, cover.cells.size());
+  const uint64_t left = each_crossing(surface, lattice, nullptr, work, [&](uint64_t key, uint32_t tri, bool) {
     const Pair pair{cover.cells.find(key), tri};
     if (cover.kind[pair.cell] == CellKind::crossed && (pairs.empty() || !(pairs.back() == pair))) pairs.push_back(pair);
-    return true;
+    return pairs.size() <= most;
   });
+  if (left == 0 || pairs.size() > most)
+    fail(DFM_E_FORMAT, "the %zu triangles enter %u cells more than %llu times: a tangle of long triangles bounds no body; remove those that reach across it, or ask for more cells",
+         surface.tris.size() / 3, cover.cells.size(), static_cast<unsigned long long>(most));
   std::sort(pairs.begin(), pairs.end());
   pairs.erase(std::unique(pairs.begin(), pairs.end()), pairs.end());
   const auto sampled = uint32_t(std::count_if(cover.kind.begin(), cover.kind.end(),

@@ -110,10 +110,13 @@ VoxelGrid::VoxelGrid(const Memory &memory, const double *points, uint32_t ntri, 
     (size.x / s * (size.y / s) * (size.z / s) > cells ? small : large) = s;
   }
   cell_ = large;
+  // A box without height would be filled by cells without size, so the bricks are bounded too: a plate one cell high has cells/8 of them.
+  const auto bricks_of = [&](int k) { return std::ceil((size[k] + 2 * kBand * cell_) / (kBrick * cell_)); };
+  while (bricks_of(0) * bricks_of(1) * bricks_of(2) > 512 + 0.5 * cells) cell_ *= 1.125;
   const double span = cell_ * kBrick;
   margin_ = kBand * cell_, per_cell_ = 1 / cell_;
   for (int k = 0; k < 3; ++k) {
-    bricks_[k] = uint32_t(std::ceil((size[k] + 2 * margin_) / span));
+    bricks_[k] = uint32_t(bricks_of(k));
     origin_[k] = 0.5 * (low_[k] + high_[k]) - 0.5 * span * bricks_[k];
   }
   build(memory, points, ntri, tris);

@@ -125,3 +125,10 @@ TEST(VoxelGrid, Outside_UnderestimatesAndGrows) {
   }
   EXPECT_TRUE(std::isfinite(g.at({NAN, 0, 0}).gradient.x));
 }
+
+TEST(VoxelGrid, BoxWithoutHeight_StaysWithinItsCells) {
+  for (const double height : {1e-2, 1e-6, 1e-12}) {
+    const VoxelGrid grid = grid_of(box_mesh({1, 1, height}, 1, 1, 1), 4096);
+    EXPECT_LT(grid.bytes(), (512u + 2048u) * (VoxelGrid::kNodes + 10) * sizeof(float)) << height;
+  }
+}
