@@ -5,6 +5,7 @@
 #include <ctime>
 
 #include <algorithm>
+#include <atomic>
 #include <chrono>
 #include <cmath>
 #include <cstdio>
@@ -22,8 +23,13 @@ namespace cli {
 namespace {
 
 volatile std::sig_atomic_t interrupted = 0;
+std::atomic<dfm_world> stepping{0};   // the world whose step a signal stops
+static_assert(std::atomic<dfm_world>::is_always_lock_free);
 
-void on_signal(int) { interrupted = 1; }
+void on_signal(int) {
+  interrupted = 1;
+  if (const dfm_world world = stepping) dfm_world_interrupt(world);
+}
 
 // The first signal ends the run in order; a second one ends the process as usual.
 void catch_signals() {
@@ -94,6 +100,8 @@ class Runner {
     const dfm_world_stats stats = world_stats(scene_);
     if (trouble_ & DFM_TROUBLE_SUBSTEPS)
       out.push_back("steps were cut into up to " + std::to_string(stats.substeps_max) + " sub-steps: the step is longer than the stable one; deform explain says why");
+    if (stats.cheapened > 0)
+      out.push_back(std::to_string(stats.cheapened) + " steps used so much of their budget that they went without polish, sweeps or guard pieces (max_work, max_time)");
     if (stats.unconverged > 0) out.push_back("the contact solve met its cap in " + std::to_string(stats.unconverged) + " sub-steps");
     if (trouble_ & DFM_TROUBLE_INVERTED) out.push_back("cells turned inside out: refine the mesh or soften the load");
     const auto pairs = [](auto most) { return "up to " + std::to_string(most) + " triangle pairs"; };
@@ -130,9 +138,12 @@ class Runner {
     if (left < step * (1 + 1e-6) && (automatic || left < step * (1 - 1e-6))) step = left;
     const double begin = wall_seconds();
     uint32_t trouble = 0;
-    const dfm_status status = dfm_world_step(world_, step, &trouble);
+    stepping = world_;
+    const dfm_status status = interrupted ? DFM_DISCARD : dfm_world_step(world_, step, &trouble);
+    stepping = 0;
     result_.times.add(wall_seconds() - begin);
-    if (status != DFM_OK) return stop(status, step), false;
+    if (interrupted && status == DFM_DISCARD) return false;   // the world is as before the step
+    if (status != DFM_OK) return stop(status, step, trouble), false;
     ++result_.steps;
     trouble_ |= trouble;
     impulses_.add_step();
@@ -140,13 +151,13 @@ class Runner {
     return true;
   }
 
-  void stop(dfm_status status, double step) {
+  void stop(dfm_status status, double step, uint32_t trouble) {
     result_.stopped = true;
     result_.stop_reason = dfm_last_error();
     dfm_body body = 0;
     double stable = 0;
     uint32_t point = 0;
-    if (status == DFM_DISCARD) {
+    if (status == DFM_DISCARD && !(trouble & DFM_TROUBLE_BUDGET)) {
       char text[160];
       dfm_world_stable_step(world_, &stable, &body, &point);
       std::snprintf(text, sizeof text, "a step of %g s needs more sub-steps than allowed: the stable step is %g s, bounded by point %u", step, stable, point);

@@ -41,6 +41,7 @@ std::vector<Call> world_calls() {
       {"world_contacts", [](uint64_t h) { return dfm_world_contacts(h, 0, nullptr, &count); }},
       {"world_pairs", [](uint64_t h) { return dfm_world_pairs(h, 0, nullptr, &count); }},
       {"world_events", [](uint64_t h) { return dfm_world_events(h, 0, nullptr, &count); }},
+      {"world_set_budget", [](uint64_t h) { return dfm_world_set_budget(h, 0, 0); }},
       {"world_set_sleep", [](uint64_t h) { return dfm_world_set_sleep(h, true); }},
       {"world_hold_begin", [](uint64_t h) { return dfm_world_hold_begin(h); }},
       {"world_hold", [](uint64_t h) { return dfm_world_hold(h, numbers, nullptr); }},

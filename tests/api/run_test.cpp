@@ -247,6 +247,28 @@ TEST(Run, Interrupt_WritesTheLastStateAndTheSummary) {
   EXPECT_GT(std::stoi(value(summary, "steps")), 10);
 }
 
+// A single step of thousands of sub-steps: the signal does not wait for its end.
+TEST(Run, TerminateInsideAStep_WritesTheStateBeforeIt) {
+  const std::string out = folder() + "/terminated", scene = folder() + "/scene.json";
+  fs::remove_all(out);
+  const pid_t child = fork();
+  if (child == 0) {
+    execl(DEFORM_COMMAND, "deform", "run", scene.c_str(), "--quiet", "--time", "2", "--set", "/time/step=2", "--set", "/time/max_work=1e18", "--out", out.c_str(), nullptr);
+    _exit(127);
+  }
+  for (int i = 0; i < 1000 && !fs::exists(out + "/bodies.csv"); ++i) std::this_thread::sleep_for(std::chrono::milliseconds(1));
+  std::this_thread::sleep_for(std::chrono::milliseconds(20));
+  kill(child, SIGTERM);
+  int status = 0;
+  waitpid(child, &status, 0);
+  ASSERT_TRUE(WIFEXITED(status));
+  EXPECT_EQ(WEXITSTATUS(status), 130);
+  EXPECT_TRUE(fs::exists(out + "/states/last_top.vtu"));
+  const std::string summary = test::read_file(out + "/summary.json");
+  EXPECT_NE(value(summary, "stopped").find("interrupted"), std::string::npos);
+  EXPECT_EQ(value(summary, "steps"), "0");
+}
+
 TEST(Run, EarlierNumberedFiles_AreRemoved) {
   const std::string out = folder() + "/stale";
   fs::create_directories(out + "/states");

@@ -384,6 +384,8 @@ class World : public Handle<dfm_world> {
   uint64_t hash() const noexcept { return dfm_world_hash(raw_); }
   auto set_gravity(In3 g) const { return E::done(dfm_world_set_gravity(raw_, g.data())); }
   auto set_gravity(std::span<const dfm_vector_key> keys) const { return E::done(dfm_world_set_gravity_keys(raw_, rows(keys.size(), 1), keys.data())); }
+  auto set_budget(double max_time, uint64_t max_work) const { return E::done(dfm_world_set_budget(raw_, max_time, max_work)); }
+  auto interrupt() const { return E::done(dfm_world_interrupt(raw_)); }
   auto set_sleep(bool sleep) const { return E::done(dfm_world_set_sleep(raw_, sleep)); }
 
   auto add_material(const dfm_material_def &def) const {

@@ -29,6 +29,9 @@ typedef struct dfm_world_def {
   uint32_t self_contact;        /* 1: every surface touches itself too, as the effect "self_contact" in the list does; 0: only where another effect needs
                                    it. dfm_world_filter_pair with one body's name twice decides for this body (doc/concepts/self_contact.md) */
   uint32_t reserved;
+  double max_time;              /* s of the machine's time for one step, 0: any. A step that this changes depends on the machine and its load */
+  uint64_t max_work;            /* units of work for one step (doc/concepts/budget.md), the same on every machine; 0: automatic, 1000 times what
+                                   the step costs with nothing in contact; UINT64_MAX: any */
 } dfm_world_def;
 
 /** Gravity (0,0,-9.81), everything automatic. Threads: Any thread. Since 0.1. */
@@ -54,17 +57,27 @@ enum {
   DFM_TROUBLE_UNCONVERGED = 2,   /* the contact solve met its cap: raise max_sweeps, or lower mass ratios */
   DFM_TROUBLE_NONFINITE = 4,     /* a plugin or a load made a NaN: the last good sub-step is kept (status DFM_E_DIVERGED) */
   DFM_TROUBLE_INVERTED = 8,      /* a cell is inside out (looked for when the step bound is asked): refine, soften the load */
-  DFM_TROUBLE_PLUGIN = 16        /* a plugin failed: see the log */
+  DFM_TROUBLE_PLUGIN = 16,       /* a plugin failed: see the log */
+  DFM_TROUBLE_BUDGET = 256,      /* the step was cheapened or, with DFM_DISCARD, given up by max_time or max_work: take a shorter step, soften the blow */
+  DFM_TROUBLE_INTERRUPTED = 512  /* DFM_DISCARD because of dfm_world_interrupt */
 };
 /** Advances the world by dt. A step longer than the stable one is cut into equal sub-steps with the contact solve in each; their number
  * is 1, 2, 3 or (4, 5, 6, 7) 2^k.
  * @param dt       s, > 0
  * @param trouble  out, DFM_TROUBLE_* bits; may be NULL
- * @return DFM_OK; DFM_DISCARD too many sub-steps, nothing changed; DFM_E_DIVERGED a sub-step could not be taken (a value that is not
- *         finite, a plugin that failed): the world stays at its last good sub-step, and may step again once the cause is gone;
+ * @return DFM_OK; DFM_DISCARD too many sub-steps, its budget used up (max_time, max_work) or dfm_world_interrupt: nothing changed;
+ *         DFM_E_DIVERGED a sub-step could not be taken (a value that is not finite, a plugin that failed): the world stays at its last good sub-step, and may step again once the cause is gone;
  *         DFM_E_NOMEM likewise; DFM_E_FATAL a plugin gave no step bound; DFM_E_ARG; DFM_E_HANDLE; DFM_E_BUSY called from inside a step
  * Threads: One thread at a time per world. Since 0.1. */
 DFM_API dfm_status dfm_world_step(dfm_world world, double dt, uint32_t *trouble);
+/** What a step may cost from now on, as max_time and max_work of dfm_world_def say it.
+ * @return DFM_OK; DFM_E_ARG max_time below zero or not a number. Threads: Not during step. Since 0.1. */
+DFM_API dfm_status dfm_world_set_budget(dfm_world world, double max_time, uint64_t max_work);
+/** Asks the step that runs, or if none runs the next one, to stop: it returns DFM_DISCARD with DFM_TROUBLE_INTERRUPTED as soon as the sweep, the
+ * guard's question or the stage that it is in has ended, and the state is as before it. A function of a plugin is not cut short.
+ * @return DFM_OK; DFM_E_HANDLE not a world's handle (whether it is stale is not looked at); DFM_E_NOMEM 64 other worlds' requests wait
+ * Threads: Any thread. May be called from a signal handler. Since 0.1. */
+DFM_API dfm_status dfm_world_interrupt(dfm_world world);
 /** A step that is not cut into sub-steps: (4, 5, 6, 7) 2^k s, at most 0.9 of the proven bound; +INFINITY if nothing bounds it. It may be
  * fed back at each step: it follows the bound down at once and up with delay, so that steps change rarely
  * (doc/concepts/step.md). dfm_world_stats.stable_step has the bound itself.
@@ -109,6 +122,8 @@ typedef struct dfm_world_stats {
   uint64_t guard_solves, guard_cuts;      /* since creation: solves with hits as contacts; sub-steps taken anew, shorter */
   double guard_lost;                      /* s since creation: motion left out where neither was enough */
   uint64_t rigid_again;                   /* times a rigid host had contact solved again (DFM_RIGID_AGAIN), since creation */
+  uint64_t work, work_max;                /* units of the last step, also where it was discarded; the most since creation (doc/concepts/budget.md) */
+  uint64_t cheapened, discarded;          /* steps that left something out for their budget; that were given up by it or by dfm_world_interrupt */
 } dfm_world_stats;
 /** @return DFM_OK; DFM_E_HANDLE. Threads: Any thread. Not during step. Since 0.1. */
 DFM_API dfm_status dfm_world_get_stats(dfm_world world, dfm_world_stats *out);

@@ -16,7 +16,12 @@ void destroy_world(uint64_t handle) {
   for (auto &o : w->obstacles) handle_destroy(o->handle);
   for (auto &m : w->materials) handle_destroy(m->handle);
   handle_destroy(handle);
+  forget_stop(handle);
   delete w;
+}
+
+void check_max_time(double seconds) {
+  if (!(seconds >= 0)) fail(DFM_E_ARG, "max_time is %g s; give the machine's time that a step may take, or 0 for any", seconds);
 }
 
 // A text or buffer that the caller sizes first.
@@ -52,6 +57,7 @@ dfm_status dfm_world_create(dfm_context *context, const dfm_world_def *def, dfm_
     if (w->def.flags & ~uint32_t{DFM_WORLD_UNGUARDED}) fail(DFM_E_ARG, "flags 0x%x: the only one known is DFM_WORLD_UNGUARDED (1)", w->def.flags);
     if (w->def.max_sweeps == 0 || w->def.max_passes == 0 || w->def.max_substeps == 0)
       fail(DFM_E_ARG, "max_sweeps, max_passes and max_substeps must be at least 1");
+    check_max_time(w->def.max_time);
     if (w->def.sleep > 1) fail(DFM_E_ARG, "sleep is %u; it must be 0 (off) or 1 (on)", w->def.sleep);
     if (w->def.self_contact > 1) fail(DFM_E_ARG, "self_contact is %u; it must be 0 (off) or 1 (on)", w->def.self_contact);
     if (!(w->def.sleep_speed > 0 && w->def.sleep_time > 0)) fail(DFM_E_ARG, "sleep_speed (m/s) and sleep_time (s) must be positive; the defaults are 0.01 and 0.5");
@@ -128,10 +134,23 @@ dfm_status dfm_world_step(dfm_world world, double dt, uint32_t *trouble) {
       explicit Stepping(World &x) : w(x) { w.stepping = true; }
       ~Stepping() { w.stepping = false; }
     } stepping(w);
-    const dfm_status s = w.step(dt, &bits);
+    const dfm_status s = step_within_budget(w, dt, &bits);
     if (trouble) *trouble = bits;
     return s;
   });
+}
+
+dfm_status dfm_world_set_budget(dfm_world world, double max_time, uint64_t max_work) {
+  return guard([&] {
+    World &w = idle(world_of(world));
+    check_max_time(max_time);
+    w.def.max_time = max_time, w.def.max_work = max_work;
+  });
+}
+
+dfm_status dfm_world_interrupt(dfm_world world) {
+  if (uint8_t(world >> 32) != uint8_t(Kind::world)) return guard([] { fail(DFM_E_HANDLE, "a handle that is no world's cannot be interrupted"); });
+  return request_stop(world) ? DFM_OK : guard([] { fail(DFM_E_NOMEM, "64 other worlds have been asked to stop and have not stepped since"); });
 }
 
 dfm_status dfm_world_stable_step(dfm_world world, double *dt, dfm_body *body, uint32_t *point) {

@@ -44,6 +44,8 @@ class Builder {
     std::copy_n(def_.gravity, 3, w.gravity);
     w.method = def_.method, w.integrator = def_.integrator;
     w.contact_offset = def_.offset, w.contact_tolerance = def_.tolerance, w.sleep = def_.sleep, w.self_contact = def_.self;
+    w.max_time = def_.max_time;
+    w.max_work = def_.max_work < 1.8e19 ? static_cast<uint64_t>(def_.max_work) : UINT64_MAX;
     if (!def_.guard) w.flags |= DFM_WORLD_UNGUARDED;
     std::vector<const char *> effects;
     for (const std::string &e : def_.effects) effects.push_back(e.c_str());

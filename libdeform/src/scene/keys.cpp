@@ -14,7 +14,7 @@ const Table &objects() {
         {"obstacles", true}, {"rigid", true}, {"contact", true}, {"solver", false}, {"probes", true}, {"output", true}}},
       {"gravity", {{"keyframes", true}}},
       {"gravity_key", {{"t", true}, {"value", true}}},
-      {"time", {{"duration", true}, {"step", true}, {"integrator", true}, {"mode", true}}},
+      {"time", {{"duration", true}, {"step", true}, {"integrator", true}, {"max_time", true}, {"max_work", true}, {"mode", true}}},
       // A material may hold, beside these, any parameter of a loaded model.
       {"material", {{"density", true}, {"young", true}, {"poisson", true}, {"damping", true}, {"friction", true}}},
       {"damping", {{"mass", true}, {"stiffness", true}}},

@@ -196,6 +196,8 @@ void read_time(const Node &scene, Definition &def) {
   time.object("time");
   def.duration = time.at("duration").number(kPositive);
   if (!time.has("step")) time.value()["step"] = "auto";
+  if (time.has("max_time")) def.max_time = time.member("max_time").number(kPositive);
+  if (time.has("max_work")) def.max_work = time.member("max_work").number(Range{1, HUGE_VAL, false, true});
   const Node step = time.member("step");
   if (step.value().is_string()) {
     if (step.text() != "auto") step.fail("expected a number of seconds or \"auto\", found \"%s\"", step.text().c_str());

@@ -157,6 +157,7 @@ bool cross_at_start(World &w, const Candidate &c) {
 double find_hits(World &w) {
   Guard &g = w.guard;
   g.hits.clear();
+  charge(w, surface_work(w));
   if (g.near.empty()) return 1;
   const Array<Candidate> &list = w.broad.candidates();
   guard_pairs(g.scene, list, g.near, g.hits);
@@ -198,7 +199,7 @@ bool World::stage_guard(uint32_t *trouble) {
     if (guard.hits.empty()) return true;
     guard.acted = true;
     if (sleepers > 0 && wake_hit(*this)) return guard.again = true, false;
-    if (solve == kSolves) break;
+    if (solve == kSolves || spares(*this, Thrift::pieces)) break;
     guard_add_hits(*this);
     if (residual.due > 1) --stats.unconverged;   // counted once, by the last solve
     guard.resolving = true;
@@ -208,7 +209,7 @@ bool World::stage_guard(uint32_t *trouble) {
     ++stats.guard_solves;
     stage_distribute();
   }
-  if (guard.pieces < kCuts) {
+  if (guard.pieces < kCuts && !spares(*this, Thrift::pieces)) {
     ++guard.pieces, ++stats.guard_cuts;
     guard.cut = std::max(safe, kLeastCut), guard.again = true;
     return false;

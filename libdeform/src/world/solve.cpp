@@ -68,25 +68,29 @@ constexpr double kRememberedShare = 0.05, kRememberedRest = 1e-3;
 
 // The cap on sweeps bounds the cost of what is not exact, not of what lets bodies through: where a normal residual would eat more than a tenth
 // of the rest distance within the sub-step, up to kBeyondCap times as many are done (many surfels on few phyxels, struck hard).
-constexpr uint32_t kBeyondCap = 8;
-bool may_sweep(const World &w, const Residual &residual) {
+constexpr uint32_t kBeyondCap = 8, kFewSweeps = 8;   // kFewSweeps: where the step has to save
+bool may_sweep(World &w, const Residual &residual) {
+  if (w.sweeps >= kFewSweeps && spares(w, Thrift::sweeps)) return false;
   if (w.sweeps < w.def.max_sweeps) return true;
   return residual.normal * w.h > 0.1 * w.offset && w.sweeps < uint64_t{kBeyondCap} * w.def.max_sweeps;
 }
 
 // What goes beyond what must be reached is polish, and this many sweeps of a sub-step are enough for it: the next one goes on from there.
 constexpr uint32_t kPolish = 20;
-bool good(const Residual &left, double share, uint32_t sweeps) { return left.share <= share || (left.due <= share && sweeps >= kPolish); }
+bool good(World &w, const Residual &left, double share) {
+  return left.share <= share || (left.due <= share && (w.sweeps >= kPolish || spares(w, Thrift::polish)));
+}
 
 // Sweeps on the laws as they were last answered. At the cap the best state seen is taken, not the last one.
 void sweep_until_good(World &w, Acceleration &acceleration, const Tolerance &tolerance) {
   double best = std::numeric_limits<double>::infinity();
   acceleration.start(w.rows);
   for (;;) {
+    charge(w, w.rows.n);
     sweep(w.rows, w.state, w.h);
     ++w.sweeps;
     const Residual left = inner_residual(w.rows, w.state, w.h, tolerance);
-    if (good(left, 0.5, w.sweeps)) return;
+    if (good(w, left, 0.5)) return;
     if (left.due < best) best = left.due, w.best_impulse.assign(w.rows.impulse.begin(), w.rows.impulse.end());
     if (!may_sweep(w, left)) break;
     acceleration.follow(w.rows);
@@ -143,6 +147,7 @@ const LawInstance *World::solve_rows() {
   const bool memory = batches.remembers();
   const ToleranceBounds bounds{least, memory ? kRememberedRest * least : gap_margin, memory ? kRememberedShare * gap_margin : gap_margin};
   for (;;) {
+    charge(*this, 4 * uint64_t{rows.n});
     set_trial(rows, h, state);
     // The sweeps take the next Newton step from there: what is asked a hundredth off is answered to a ten-thousandth.
     if (const LawInstance *bad = batches.answer(h, rows.wt.data(), 0.1 * least, 1e-2, state)) return bad;
@@ -150,7 +155,7 @@ const LawInstance *World::solve_rows() {
     if (!sweeps) set_tolerance(rows, state, contacts, h, bounds, static_cast<uint32_t>(bodies.size()), disturbance, tolerance);
     else {
       residual = true_residual(rows, state, h, tolerance);
-      if (good(residual, 1, sweeps) || !may_sweep(*this, residual) || passes > def.max_passes) return nullptr;
+      if (good(*this, residual, 1) || !may_sweep(*this, residual) || passes > def.max_passes) return nullptr;
     }
     // at least one sweep on a warm start is part of the method
     sweep_until_good(*this, acceleration, tolerance);

@@ -151,6 +151,7 @@ dfm_status World::step(double dt, uint32_t *trouble) {
     return DFM_DISCARD;
   }
   const uint32_t n = static_cast<uint32_t>(std::min<double>(def.max_substeps, choose_pieces(sizes, dt, stable)));
+  plan_work(*this, n);
   if (n > 1) *trouble |= DFM_TROUBLE_SUBSTEPS;
   if (inverted) *trouble |= DFM_TROUBLE_INVERTED;
 
@@ -188,6 +189,8 @@ bool World::advance(double end, double goal, bool last, uint32_t *trouble) {
   for (bool whole = false; !whole;) {
     const double rest = h = end - time;
     left = goal - time;
+    if (h < left || sleepers > 0) keep_start(*this);
+    charge(*this, 1);
     view_obstacles(*this, time, h, left);
     if (idle()) stats.contacts_mean += (stats.contacts - stats.contacts_mean) / double(stats.substeps + 1), step_impulses.idle += h;
     else if (!piece(trouble)) return false;
@@ -208,6 +211,7 @@ bool World::piece(uint32_t *trouble) {
   while (!sub_step(trouble)) {
     if (!guard.again) return false;
     h *= guard.cut;
+    keep_start(*this);
     *trouble = before, stats.unconverged = unconverged;
     view_obstacles(*this, time, h, left);
   }
@@ -225,6 +229,7 @@ bool World::sub_step(uint32_t *trouble) {
   } undo{*this};
   driven.clear();
   guard.start();
+  charge(*this, body_work(*this) + surface_work(*this));
   for (const PlannedStage &stage : plan.stages)
     if (!run_stage(*this, stage.id, trouble)) return false;
   keep_rigids();

@@ -23,6 +23,7 @@
 #include "surfel/views.h"
 #include "surfel/voxel_grid.h"
 #include "surfel/zones.h"
+#include "world/budget.h"
 #include "world/guard.h"
 #include "world/islands.h"
 #include "world/motion.h"
@@ -210,6 +211,7 @@ struct World {
   Array<Driven> driven;                                // held components that this sub-step's motion stage has set
   Vec3 gravity;
   double h = 0, left = 0;                              // s: of the sub-step; from its start to the end of the step
+  Budget budget;
   Guard guard;
   Rollback rollback;
   Residual residual;

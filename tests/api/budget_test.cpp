@@ -1,0 +1,169 @@
+// What a step may cost: discarded as a whole, cheapened in a known order, stopped from outside.
+#include <atomic>
+#include <chrono>
+#include <thread>
+
+#include "rigid.h"
+#include "stack.h"
+
+namespace {
+
+constexpr double kStep = 2e-3;
+
+// A stack that falls asleep, a rigid box and a law that remembers, hit by a fast block: all that a step may change is there.
+struct Busy {
+  test::Context context;
+  dfm_world world = 0;
+  dfm_body lower = 0, upper = 0;
+
+  explicit Busy(uint32_t threads = 1) : context(threads) {
+    dfm_world_def d = dfm_world_def_default();
+    d.sleep = 1, d.sleep_time = 0.02, d.sleep_speed = 0.05;
+    test::ok(dfm_world_create(context, &d, &world));
+    test::set_friction(world, 0.4, "coulomb");
+    test::add_plane(world, "floor");
+    test::BodyOptions o;
+    o.damping_stiffness = 1e-3, o.damping_mass = 20, o.volume = 0.5;
+    o.name = "lower", o.position = {0, 0, 1e-5};
+    lower = test::make_body(context, world, "beam", {0.1, 0.1, 0.05}, 60, o);
+    o.name = "upper", o.position = {0.02, 0.02, 0.1}, o.velocity = {0, 0, -3};
+    upper = test::make_body(context, world, "beam", {0.05, 0.05, 0.05}, 60, o);
+    test::create(world, {test::box("flyer", {0.02, 0.02, 0.02}, 0.05, {0.3, 0.3, 0.03})});
+  }
+  void set_work(uint64_t units, double seconds = 0) const { test::ok(dfm_world_set_budget(world, seconds, units)); }
+};
+
+struct Seen {
+  uint64_t hash, steps;
+  std::vector<double> forces;
+  std::string snapshot;
+  explicit Seen(dfm_world w) : hash(dfm_world_hash(w)), steps(test::stats(w).steps) {
+    for (const dfm_contact &c : test::contacts(w)) forces.push_back(c.fn);
+  }
+  bool operator==(const Seen &o) const { return hash == o.hash && steps == o.steps && forces == o.forces; }
+};
+
+}  // namespace
+
+// At every step the budget runs out somewhere else first; then the step is taken in full, and all goes on as if nothing had been tried.
+TEST(Budget, UsedUpAnywhereInAStep_LeavesTheStateAsBefore) {
+  Busy tried, plain;
+  uint64_t discarded = 0, cheapened = 0;
+  for (int i = 0; i < 60; ++i) {
+    uint32_t trouble = 0;
+    test::ok(dfm_world_step(plain.world, kStep, &trouble));
+    const uint64_t work = test::stats(plain.world).work;
+    EXPECT_GT(work, 0u);
+    EXPECT_FALSE(trouble & DFM_TROUBLE_BUDGET);
+    const std::string start = test::snapshot(tried.world);
+    for (int part = 1; part < 8; part += 2) {
+      const Seen before(tried.world);
+      tried.set_work(std::max<uint64_t>(1, work * uint64_t(part) / 8));
+      trouble = 0;
+      const dfm_status s = dfm_world_step(tried.world, kStep, &trouble);
+      EXPECT_TRUE(trouble & DFM_TROUBLE_BUDGET || work * uint64_t(part) / 8 == 0) << i;
+      if (s == DFM_DISCARD) {
+        ++discarded;
+        EXPECT_TRUE(before == Seen(tried.world)) << "step " << i << ", " << part << "/8 of its work";
+        EXPECT_EQ(trouble, uint32_t(DFM_TROUBLE_BUDGET));
+        EXPECT_NE(std::string(dfm_last_error()).find("max_work"), std::string::npos);
+      } else {   // without polish and with fewer sweeps it was enough
+        ++cheapened;
+        test::ok(dfm_world_restore(tried.world, start.data(), start.size()));
+      }
+    }
+    tried.set_work(UINT64_MAX);
+    test::ok(dfm_world_step(tried.world, kStep, nullptr));
+    ASSERT_EQ(dfm_world_hash(tried.world), dfm_world_hash(plain.world)) << "step " << i;
+  }
+  EXPECT_GT(discarded, 100u);
+  const dfm_world_stats s = test::stats(tried.world);
+  EXPECT_GE(s.work_max, test::stats(plain.world).work_max);
+  EXPECT_GT(test::stats(plain.world).contacts_max, 4u);
+  std::printf("%g steps discarded, %g cheapened; %g units at most\n", double(discarded), double(cheapened), double(s.work_max));
+}
+
+// Sheets that hit at 100 m/s: sweeps beyond the usual cap and the guard's pieces are there to be left out.
+TEST(Budget, ThatCheapensAStep_IsToldAndIsTheSameWithAnyThreads) {
+  uint64_t hash[2];
+  for (const uint32_t threads : {1u, 4u}) {
+    test::Context c(threads);
+    const auto make = [&] {
+      const dfm_world w = test::make_world(c, {0, 0, 0});
+      test::set_friction(w, 0.3);
+      test::BodyOptions o;
+      o.young = 1e6, o.damping_stiffness = 1e-4;
+      test::make_body(c, w, "beam", {0.12, 0.12, 0.012}, 30, o);
+      o.position = {0.01, -0.01, 0.03}, o.velocity = {0, 0, -100}, o.rotation = {0.1, 0.05, 0.1, 0.988};
+      test::make_body(c, w, "beam", {0.12, 0.12, 0.012}, 30, o);
+      return w;
+    };
+    const dfm_world full = make(), thrifty = make();
+    uint64_t cheap = 0;
+    for (int i = 0; i < 4; ++i) {
+      test::ok(dfm_world_step(full, 5e-4, nullptr));
+      test::ok(dfm_world_set_budget(thrifty, 0, test::stats(full).work * 3 / 4));
+      uint32_t trouble = 0;
+      const dfm_status s = dfm_world_step(thrifty, 5e-4, &trouble);
+      EXPECT_TRUE(trouble & DFM_TROUBLE_BUDGET) << i;
+      cheap += s == DFM_OK;
+      test::ok(dfm_world_set_budget(thrifty, 0, UINT64_MAX));
+      if (s == DFM_DISCARD) test::ok(dfm_world_step(thrifty, 5e-4, nullptr));
+    }
+    EXPECT_GT(cheap, 0u);
+    EXPECT_EQ(test::stats(thrifty).discarded, 4 - cheap);
+    EXPECT_GE(test::stats(thrifty).cheapened, cheap);
+    hash[threads > 1] = dfm_world_hash(thrifty);
+  }
+  EXPECT_EQ(hash[0], hash[1]);
+}
+
+TEST(Budget, OfTimeThatNothingFitsIn_DiscardsTheStep) {
+  Busy b;
+  const Seen before(b.world);
+  b.set_work(0, 1e-9);
+  uint32_t trouble = 0;
+  EXPECT_EQ(dfm_world_step(b.world, kStep, &trouble), DFM_DISCARD);
+  EXPECT_EQ(trouble, uint32_t(DFM_TROUBLE_BUDGET));
+  EXPECT_NE(std::string(dfm_last_error()).find("max_time"), std::string::npos);
+  EXPECT_TRUE(before == Seen(b.world));
+  EXPECT_EQ(test::stats(b.world).discarded, 1u);
+  b.set_work(0);
+  test::ok(dfm_world_step(b.world, kStep, nullptr));
+  EXPECT_EQ(dfm_world_set_budget(b.world, -1, 0), DFM_E_ARG);
+}
+
+TEST(Interrupt, BetweenSteps_StopsTheNextOneOnce) {
+  Busy b;
+  const Seen before(b.world);
+  test::ok(dfm_world_interrupt(b.world));
+  test::ok(dfm_world_interrupt(b.world));   // counts once
+  uint32_t trouble = 0;
+  EXPECT_EQ(dfm_world_step(b.world, kStep, &trouble), DFM_DISCARD);
+  EXPECT_EQ(trouble, uint32_t(DFM_TROUBLE_INTERRUPTED));
+  EXPECT_TRUE(before == Seen(b.world));
+  test::ok(dfm_world_step(b.world, kStep, nullptr));
+  EXPECT_EQ(dfm_world_interrupt(0), DFM_E_HANDLE);
+}
+
+// A step of thousands of sub-steps, asked to stop from another thread: this one or, should it have been over already, the next.
+TEST(Interrupt, FromAnotherThread_StopsALongStep) {
+  Busy b;
+  double stable = 0;
+  test::ok(dfm_world_stable_step(b.world, &stable, nullptr, nullptr));
+  std::atomic<bool> running{false};
+  std::thread other([&] {
+    while (!running) std::this_thread::yield();
+    std::this_thread::sleep_for(std::chrono::milliseconds(5));
+    test::ok(dfm_world_interrupt(b.world));
+  });
+  const Seen before(b.world);
+  running = true;
+  uint32_t trouble = 0;
+  const dfm_status first = dfm_world_step(b.world, 5000 * stable, &trouble);
+  other.join();
+  if (first == DFM_DISCARD) EXPECT_TRUE(before == Seen(b.world));
+  else EXPECT_EQ(dfm_world_step(b.world, kStep, &trouble), DFM_DISCARD);
+  EXPECT_EQ(trouble, uint32_t(DFM_TROUBLE_INTERRUPTED));
+  test::ok(dfm_world_step(b.world, kStep, nullptr));
+}
