@@ -253,7 +253,8 @@ TEST(Run, TerminateInsideAStep_WritesTheStateBeforeIt) {
   fs::remove_all(out);
   const pid_t child = fork();
   if (child == 0) {
-    execl(DEFORM_COMMAND, "deform", "run", scene.c_str(), "--quiet", "--time", "2", "--set", "/time/step=2", "--set", "/time/max_work=1e18", "--out", out.c_str(), nullptr);
+    execl(DEFORM_COMMAND, "deform", "run", scene.c_str(), "--quiet", "--time", "2", "--set", "/time/step=2", "--set",
+          "/time/max_work=1e18", "--out", out.c_str(), nullptr);
     _exit(127);
   }
   for (int i = 0; i < 1000 && !fs::exists(out + "/bodies.csv"); ++i) std::this_thread::sleep_for(std::chrono::milliseconds(1));

@@ -66,8 +66,9 @@ enum {
  * @param dt       s, > 0
  * @param trouble  out, DFM_TROUBLE_* bits; may be NULL
  * @return DFM_OK; DFM_DISCARD too many sub-steps, its budget used up (max_time, max_work) or dfm_world_interrupt: nothing changed;
- *         DFM_E_DIVERGED a sub-step could not be taken (a value that is not finite, a plugin that failed): the world stays at its last good sub-step, and may step again once the cause is gone;
- *         DFM_E_NOMEM likewise; DFM_E_FATAL a plugin gave no step bound; DFM_E_ARG; DFM_E_HANDLE; DFM_E_BUSY called from inside a step
+ *         DFM_E_DIVERGED a sub-step could not be taken (a value that is not finite, a plugin that failed): the world stays at its last good
+ *         sub-step, and may step again once the cause is gone; DFM_E_NOMEM likewise; DFM_E_FATAL a plugin gave no step bound; DFM_E_ARG;
+ *         DFM_E_HANDLE; DFM_E_BUSY called from inside a step
  * Threads: One thread at a time per world. Since 0.1. */
 DFM_API dfm_status dfm_world_step(dfm_world world, double dt, uint32_t *trouble);
 /** What a step may cost from now on, as max_time and max_work of dfm_world_def say it.
