@@ -404,7 +404,8 @@ dfm_status joint(void *self, const dfm_rigid_state *state, const double *extra, 
 }  // namespace
 
 const dfm_rigid_host &builtin_host() {
-  static const dfm_rigid_host table = {sizeof(dfm_rigid_host), 0, nullptr, create, destroy, predict, respond, commit, set_motor, joint, revise, nullptr};
+  static const dfm_rigid_host table = {sizeof(dfm_rigid_host), 0, nullptr, create, destroy, predict, respond, commit,
+                                       set_motor, joint, revise, nullptr, nullptr};
   return table;
 }
 
