@@ -5,7 +5,7 @@
 namespace dfm {
 
 ContactRows::ContactRows(const Memory &m) {
-  use_memory(m, begin, dof, weight, y, inv_mass, source, point, block, blocks, response, frame, drive, rate, wn, wt, cross, impulse,
+  use_memory(m, begin, dof, weight, y, y_free, inv_mass, source, point, block, blocks, response, frame, drive, rate, wn, wt, cross, impulse,
              dof_of_point_, dof_of_node_, place_, rigid, arm, dof_of_group_);
 }
 
@@ -239,6 +239,14 @@ void ContactRows::apply(uint32_t i, Vec3 q) {
     double *const to = &y[size_t(d) * 4];
     const double *const w = &inv_mass[size_t(d) * 4];
     to[0] += weight[j] * (w[0] * p.x), to[1] += weight[j] * (w[1] * p.y), to[2] += weight[j] * (w[2] * p.z);
+  }
+}
+
+void ContactRows::restore() {
+  y.assign(y_free.begin(), y_free.end());
+  for (uint32_t i = 0; i < n; ++i) {
+    const Vec3 l = load3(&impulse[size_t(i) * 3]);
+    if (l.x != 0 || l.y != 0 || l.z != 0) apply(i, l);
   }
 }
 

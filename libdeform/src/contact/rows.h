@@ -44,6 +44,7 @@ struct ContactRows {
   Array<uint32_t> dof;
   Array<double> weight;
   Array<double> y, inv_mass;              // [ndof,4]; inv_mass zero for dofs of blocks
+  Array<double> y_free;                   // [ndof,4] without impulses
   Array<uint32_t> source, point;          // [ndof] index of the DofSource (rigid: kNone), phyxel (or surfel of a block)
   Array<uint32_t> block;                  // [ndof] kNone or index into blocks
   Array<uint32_t> rigid;                  // [n] dof of the rigid body's velocity, its spin is the next one; kNone. Empty: no contact has any
@@ -67,6 +68,7 @@ struct ContactRows {
 
   Vec3 velocity(uint32_t i) const;        // relative velocity of contact i in its frame (normal, t1, t2)
   void apply(uint32_t i, Vec3 impulse_frame);   // changes y by an impulse given in the frame
+  void restore();                         // y from the impulses alone: sweeps have left it not finite, or with their rounding
   void push_rigid(const Block &group);    // changes y of a rigid group by all impulses that act on it: its response has been renewed
 
  private:

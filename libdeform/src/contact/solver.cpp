@@ -1,6 +1,7 @@
 #include "contact/solver.h"
 
 #include <algorithm>
+#include <limits>
 
 namespace dfm {
 namespace {
@@ -15,8 +16,11 @@ struct Pair { double a, b; };
 // The radius follows the normal impulse: in proportion while it sticks, by the law's dft/dfn while it slips (its viscous part does not).
 //
 // Smooth laws: lambda = h [ft + D (u' - v) + d (fn' - fn)] with u' = u + w_t (lambda - lambda_old): a 2x2 system, positive definite
-// because only the negative semidefinite part of D is used. A contact that stuck when its law was asked is kept inside the law's limit: an
-// elastic bristle that breaks away then slides on the cone at once instead of overshooting it.
+// because only the negative semidefinite part of D is used. The law's limit is kept: an elastic bristle that breaks away then slides on the cone at
+// once instead of overshooting it. A contact that stuck when its law was asked is kept inside the limit in proportion to the normal impulse. One that slid
+// is kept inside what the limit can be at all: limit(fn) is concave (a cone and a bounded part), so never above limit max(1, ln / (h fn)). Without that the
+// sweeps can run away. Where fn is small dft_dfn is steep, by mu^2 sigma1/(4 sigma0 h) with micro-damping, and holds for a hair's breadth alone; each sweep
+// then answers a normal impulse with several times as much friction, that with a normal impulse beside it, and so on until nothing is finite.
 Pair friction_impulse(const ContactRows &rows, const ContactState &s, uint32_t i, double h, double ln, double u1, double u2) {
   const double wt = rows.wt[i], l1 = rows.impulse[size_t(i) * 3 + 1], l2 = rows.impulse[size_t(i) * 3 + 2];
   const uint32_t n = s.stride;
@@ -47,7 +51,8 @@ Pair friction_impulse(const ContactRows &rows, const ContactState &s, uint32_t i
   const double m11 = 1 - h * wt * d11, m22 = 1 - h * wt * d22, m12 = -h * wt * d12, det = m11 * m22 - m12 * m12;
   Pair l{(m22 * r1 - m12 * r2) / det, (m11 * r2 - m12 * r1) / det};
   const double size = std::sqrt(l.a * l.a + l.b * l.b), radius = fn > 0 ? s.limit[i] / fn * ln : 0;
-  if (s.mode[i] == 1 && size > radius) l = {radius / size * l.a, radius / size * l.b};
+  const double most = s.mode[i] == 1 ? radius : std::max(radius, h * s.limit[i]);
+  if (size > most) l = {most / size * l.a, most / size * l.b};
   return l;
 }
 
@@ -206,11 +211,13 @@ Pair answered(const ContactRows &rows, const ContactState &s, uint32_t i, double
 template <class Law>
 Residual residual(const ContactRows &rows, const Tolerance &tolerance, Law law) {
   Residual r;
+  double poison = 0;
   for (uint32_t i = 0; i < rows.n; ++i) {
     if (!(rows.wn[i] > 0)) continue;
     const double *const l = &rows.impulse[size_t(i) * 3];
     const Vec3 u = rows.velocity(i);
     const double normal = normal_residual(rows, i, u);
+    poison += 0.0 * ((u.x + u.y) + (u.z + l[0]));
     r.share = std::max(r.share, normal / tolerance.normal[i]), r.due = std::max(r.due, normal / tolerance.most_normal);
     r.speed = std::max(r.speed, normal), r.normal = std::max(r.normal, normal);
     if (!(rows.wt[i] > 0) || !(l[0] > 0)) continue;
@@ -218,6 +225,7 @@ Residual residual(const ContactRows &rows, const Tolerance &tolerance, Law law) 
     const double tangent = tangent_residual(rows, i, t), allowed = std::max(tolerance.tangent[i], 1e-3 * std::sqrt(u.y * u.y + u.z * u.z));
     r.share = std::max(r.share, tangent / allowed), r.due = std::max(r.due, tangent / allowed), r.speed = std::max(r.speed, tangent);
   }
+  if (poison != 0) r.share = r.due = std::numeric_limits<double>::infinity();   // max() passes over what is no number
   return r;
 }
 

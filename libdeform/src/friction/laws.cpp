@@ -82,13 +82,12 @@ const LawInstance *LawBatches::evaluate(const LawInstance &law, std::span<const 
   const bool given = law.ops->flags & DFM_FRIC_JACOBIAN;
   if (!given) out.dft_dvt = out.dft_dfn = nullptr;
   const auto eval = [&] { return law.ops->eval(&in, &out); };
+  failed_ = kNone;
   if (call_plugin(*law.host, *law.type, "eval", eval) != DFM_OK || (!given && !difference(law, in, ft, dv, dn))) return &law;
 
-  double poison = 0;
-  bool limits = true;
   for (uint32_t k = 0; k < n; ++k) {
     const uint32_t i = index[k];
-    limits &= limit[k] >= 0;  // false for NaN; +inf is an answer: no limit
+    double poison = 0;
     state.ft[i] = ft[k], state.ft[state.stride + i] = ft[column + k];
     for (uint32_t j = 0; j < 4; ++j) state.dft_dvt[size_t(j) * state.stride + i] = dv[j * column + k];
     state.dft_dfn[i] = dn[k], state.dft_dfn[state.stride + i] = dn[column + k];
@@ -96,8 +95,10 @@ const LawInstance *LawBatches::evaluate(const LawInstance &law, std::span<const 
     for (uint32_t s = 0; s < S; ++s) poison += 0.0 * (state.bristle_out[size_t(s) * state.stride + i] = next[s * column + k]);
     poison += 0.0 * (ft[k] + ft[column + k]) + 0.0 * (dv[k] + dv[column + k] + dv[2 * column + k] + dv[3 * column + k]) +
               0.0 * (dn[k] + dn[column + k]);
+    // poison of NaN or infinite: not equal to zero; a limit of +inf is an answer: none
+    if (failed_ == kNone && !(poison == 0 && limit[k] >= 0)) failed_ = i;
   }
-  return poison == 0 && limits ? nullptr : &law;  // poison of NaN or infinite: not equal to zero
+  return failed_ == kNone ? nullptr : &law;
 }
 
 // Derivatives of a law that gives none, by forward differences: without them a steep law (h w_t c > 1) would make the passes diverge. The step

@@ -8,6 +8,7 @@
 #include "core/memory.h"
 #include "deform/plugin.h"
 #include "surfel/contact_state.h"
+#include "surfel/surface.h"
 
 namespace dfm {
 
@@ -41,6 +42,8 @@ class LawBatches {
   const LawInstance *answer(double h, const double *wt, double least, double share, ContactState &state);
   bool smooth() const { return smooth_; }          // is any law of this sub-step not set-valued?
   bool remembers() const { return remembers_; }    // has any a state?
+  // After a law has failed: the contact whose answer is not to be used; kNone: it refused the whole batch.
+  uint32_t failed() const { return failed_; }
 
  private:
   struct Batch { const LawInstance *law; uint32_t begin, n; };
@@ -54,6 +57,7 @@ class LawBatches {
   Array<Local> local_;
   Array<uint32_t> asked_;         // contacts of local_ that are asked together
   bool smooth_ = false, remembers_ = false;
+  uint32_t failed_ = kNone;
   const LawInstance *evaluate(const LawInstance &law, std::span<const uint32_t> contacts, double h, ContactState &state);
   const LawInstance *settle(const Batch &batch, double h, const double *wt, double least, double share, ContactState &state);
   bool difference(const LawInstance &law, dfm_friction_in in, const double *ft, double *dv, double *dn);

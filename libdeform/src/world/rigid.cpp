@@ -166,8 +166,9 @@ bool revise_rigids(World &w) {
       for (uint32_t i = 0; i < set->defs.size(); ++i) {
         if (set->group[i] != block.group - set->first_group) continue;
         for (uint32_t k = 0; k < 2; ++k)
-          store3(&w.rows.y[size_t(block.first + 2 * set->place[i] + k) * 4],
-                 load3(&set->revised[6 * size_t{i} + 3 * k]) - load3(&set->first[6 * size_t{i} + 3 * k]));
+          for (Array<double> *y : {&w.rows.y, &w.rows.y_free})
+            store3(&(*y)[size_t(block.first + 2 * set->place[i] + k) * 4],
+                   load3(&set->revised[6 * size_t{i} + 3 * k]) - load3(&set->first[6 * size_t{i} + 3 * k]));
       }
       w.rows.push_rigid(block);
     }

@@ -239,7 +239,7 @@ bool World::stage_rollback(uint32_t *trouble) {
   find_points(*this);
   make_rows();
   set_forces(*this);
-  if (const LawInstance *bad = batches.evaluate(h, state)) return *trouble |= DFM_TROUBLE_PLUGIN, tell_failed_solve(bad), false;
+  if (const LawInstance *bad = batches.evaluate(h, state)) return *trouble |= tell_failed_solve(bad), false;
   stats.passes = rows.n > 0, stats.sweeps = 0, stats.residual = 0;
   stats.passes_max = std::max(stats.passes_max, stats.passes);
   reserve_contacts();

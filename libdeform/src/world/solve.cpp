@@ -41,21 +41,12 @@ void fill_responses(World &w) {
 }
 
 void apply_last(ContactRows &rows) {
+  rows.y_free.assign(rows.y.begin(), rows.y.end());
   for (uint32_t i = 0; i < rows.n; ++i) {
     double *const l = &rows.impulse[size_t(i) * 3];
     if (!(rows.wn[i] > 0)) l[0] = l[1] = l[2] = 0;
     else if (l[0] != 0) rows.apply(i, load3(l));
   }
-}
-
-// The body to name when a solve fails: where a load or a parameter is out of bounds, that body is off before contact is.
-const Body &fastest(const World &w) {
-  const Body *fast = w.bodies.front().get();
-  double most = -1;
-  for (const auto &b : w.bodies)
-    for (const double v : b->surface.v)
-      if (!(std::fabs(v) <= most)) most = std::isnan(v) ? INFINITY : std::fabs(v), fast = b.get();
-  return *fast;
 }
 
 constexpr uint32_t kMostRevisions = 6;   // of what rigid hosts take for granted, within a sub-step
@@ -81,15 +72,24 @@ bool good(World &w, const Residual &left, double share) {
   return left.share <= share || (left.due <= share && (w.sweeps >= kPolish || spares(w, Thrift::polish)));
 }
 
+// Beyond this times the best residual sweeps are running away: with a jam of strong friction block Gauss-Seidel need not converge, and where laws are affine
+// nothing else stops it before numbers end.
+constexpr double kRunsAway = 1e6;
+
 // Sweeps on the laws as they were last answered. At the cap the best state seen is taken, not the last one.
 void sweep_until_good(World &w, Acceleration &acceleration, const Tolerance &tolerance) {
   double best = std::numeric_limits<double>::infinity();
+  w.best_impulse.assign(w.rows.impulse.begin(), w.rows.impulse.end());
   acceleration.start(w.rows);
   for (;;) {
     charge(w, w.rows.n);
     sweep(w.rows, w.state, w.h);
     ++w.sweeps;
     const Residual left = inner_residual(w.rows, w.state, w.h, tolerance);
+    if (!(left.due <= kRunsAway * std::max(1.0, best)) || !(left.due < std::numeric_limits<double>::max())) {
+      w.rows.impulse.assign(w.best_impulse.begin(), w.best_impulse.end());
+      return w.rows.restore();
+    }
     if (good(w, left, 0.5)) return;
     if (left.due < best) best = left.due, w.best_impulse.assign(w.rows.impulse.begin(), w.rows.impulse.end());
     if (!may_sweep(w, left)) break;
@@ -131,13 +131,6 @@ void World::make_rows() {
   if (!guard.kept.empty()) guard_rates(*this);
   if (rigid_again) rows.impulse.assign(best_impulse.begin(), best_impulse.end());
   batches.gather(law_list, state);
-}
-
-void World::tell_failed_solve(const LawInstance *law) {
-  set_last_error(format("step %llu, body '%s' (the fastest one): %s; take a smaller step, lessen its loads or change the law",
-                        static_cast<unsigned long long>(step_count), fastest(*this).name.c_str(),
-                        law ? (std::string("friction law '") + law->type->id + "' failed or answered with something not finite").c_str()
-                            : "the contact solve is not finite").c_str());
 }
 
 // Passes until the true residual is good enough; a law that failed, or null.
@@ -182,8 +175,7 @@ bool World::stage_solve(uint32_t *trouble) {
   double poison = 0;
   for (double l : rows.impulse) poison += 0.0 * l;
   if (bad || poison != 0) {
-    *trouble |= bad ? DFM_TROUBLE_PLUGIN : DFM_TROUBLE_NONFINITE;
-    tell_failed_solve(bad);
+    *trouble |= tell_failed_solve(bad);
     return false;
   }
   if (batches.smooth()) set_slips(rows, state);

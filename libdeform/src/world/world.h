@@ -275,7 +275,7 @@ struct World {
   void stage_self();                                   // self_contact.cpp
   bool stage_solve(uint32_t *trouble);                 // solve.cpp
   void make_rows();                                    // solve.cpp: contacts as rows, with what they kept
-  void tell_failed_solve(const LawInstance *law);      // solve.cpp: to dfm_last_error(); null: not finite
+  uint32_t tell_failed_solve(const LawInstance *law);  // failed_solve.cpp: to dfm_last_error(), null: not finite; which trouble that is
   void stage_lagged();                                 // rollback.cpp
   bool stage_rollback(uint32_t *trouble);              // rollback.cpp
   const LawInstance *solve_rows();
