@@ -29,6 +29,17 @@ void print_list(const JsonValue &plan, const char *key, const char *title, const
   }
 }
 
+// Parameters that do nothing, or not what they name.
+void print_idle(const JsonValue &plan) {
+  const JsonValue *bodies = plan.find("bodies");
+  for (size_t i = 0; bodies && i < bodies->items.size(); ++i) {
+    const JsonValue *idle = bodies->items[i].find("idle");
+    for (size_t k = 0; idle && k < idle->items.size(); ++k)
+      std::printf("  %-20s  %s has no effect, or not the one it names: %s\n", bodies->items[i].get("name").c_str(), idle->items[k].get("name").c_str(),
+                  idle->items[k].get("why").c_str());
+  }
+}
+
 // What differs from cell to cell, and who says so.
 void print_fields(const JsonValue &plan) {
   const JsonValue *bodies = plan.find("bodies");
@@ -57,6 +68,7 @@ int explain(const Options &options, const Globals &globals) {
   print_list(plan, "absent", "left out", {"why"});
   print_list(plan, "bodies", "bodies", {"model", "surface", "cells", "points", "surfels"});
   print_fields(plan);
+  print_idle(plan);
   if (const JsonValue *step = plan.find("step")) {
     std::printf("step\n  stable %s s", step->get("stable_s").c_str());
     if (const std::string body = step->get("worst_body"); !body.empty())

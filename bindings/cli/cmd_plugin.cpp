@@ -105,7 +105,8 @@ void print_info(const Type &t) {
     const dfm_param &row = type.params[i];
     char range[64], value[32];
     std::snprintf(range, sizeof range, "%g .. %g", row.min, row.max);
-    std::snprintf(value, sizeof value, "%g", row.def);
+    if (row.flags & DFM_PARAM_AUTO) std::snprintf(value, sizeof value, "auto (%g)", row.def);
+    else std::snprintf(value, sizeof value, "%g", row.def);
     const std::string names = row.names ? joined(names_of(row)) : "";
     std::printf("  %-18s %-10s %-16s %-10s %s%s%s%s\n", row.key, value, names.empty() ? range : names.c_str(), row.unit, row.label,
                 row.width > 1 ? (" (" + std::to_string(row.width) + " values)").c_str() : "", row.flags & DFM_PARAM_RUNTIME ? ", may change in a run" : "",
@@ -121,7 +122,7 @@ std::string json_info(const Type &t) {
     JsonObject o;
     o.add("key", quoted(row.key)).add("label", quoted(row.label)).add("unit", quoted(row.unit));
     o.add("min", number(row.min)).add("max", number(row.max)).add("default", number(row.def)).add("width", std::to_string(row.width));
-    o.add("integer", flag(DFM_PARAM_INTEGER)).add("runtime", flag(DFM_PARAM_RUNTIME)).add("per_cell", flag(DFM_PARAM_PER_CELL));
+    o.add("integer", flag(DFM_PARAM_INTEGER)).add("runtime", flag(DFM_PARAM_RUNTIME)).add("per_cell", flag(DFM_PARAM_PER_CELL)).add("auto", flag(DFM_PARAM_AUTO));
     if (row.names) o.add("names", json_array(quoted_all(names_of(row))));
     rows.push_back(o.text());
   }

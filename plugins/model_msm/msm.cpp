@@ -19,7 +19,8 @@ const dfm_param kParams[kParamCount] = {
     {"poisson", "Poisson ratio; the model gives 1/4 and more", "1", -0.99, 0.4999, 0.3, kRun | kCell, 1, nullptr},
     {"damping_stiffness", "damper over stiffness of each spring", "s", 0, 1e3, 0, kRun | kCell, 1, nullptr},
     {"damping_mass", "drag over mass of each point", "1/s", 0, 1e6, 0, kRun | kCell, 1, nullptr},
-    {"volume", "volume stiffness in bulk moduli E/(3(1-2 nu)); 0: off; -1: what makes poisson the body's ratio", "1", kFromPoisson, 1e6, kFromPoisson, kRun | kCell, 1, nullptr},
+    {"volume", "volume stiffness in bulk moduli E/(3(1-2 nu)); 0: off; auto, -1: what makes poisson the body's ratio", "1", kFromPoisson, 1e6, kFromPoisson,
+     kRun | kCell | DFM_PARAM_AUTO, 1, nullptr},
     {"collapse", "stiffness against collapse of a cell below 0.6 of its volume, over young; 0: off", "1", 0, 1e3, 3, kRun | kCell, 1, nullptr},
     {"anisotropy_slope", "slope of the extra coordinates; 0: isotropic", "1", 0, 1e3, 0, kRun | kCell, 1, nullptr},
     {"anisotropy_kind", "what the body is along the axis", "1", 0, 1, kSofter, kRun | DFM_PARAM_ENUM, 1, kKinds},
@@ -146,6 +147,8 @@ dfm_status cell_energy(void *self, const dfm_kin *k, double *density) {
 
 const char *const *active_effects(const void *self) { return static_cast<const Body *>(self)->active_effects; }
 
+const char *idle(const void *self, uint32_t row) { return row < kParamCount ? static_cast<const Body *>(self)->idle(Param(row)) : nullptr; }
+
 dfm_status set_mask(void *self, uint32_t n, const uint32_t *edges, uint8_t on) {
   Body &body = *static_cast<Body *>(self);
   for (uint32_t k = 0; k < n; ++k)
@@ -168,12 +171,14 @@ const dfm_slot kBranchSlots[] = {{DFM_PER_EDGE, 1, DFM_SLOT_SCALAR, 0}, {DFM_PER
 const dfm_cell_energy kCellEnergy = {sizeof(dfm_cell_energy), 0, cell_energy};
 const dfm_slots kNoSlots = {sizeof(dfm_slots), 0, nullptr}, kSlots = {sizeof(dfm_slots), 2, kBranchSlots};
 const dfm_effects kActiveEffects = {sizeof(dfm_effects), 0, active_effects};
+const dfm_idle kIdle = {sizeof(dfm_idle), 0, idle};
 const dfm_spring_mask kSpringMask = {sizeof(dfm_spring_mask), 0, set_mask, get_mask};
 
 const void *extension(const void *self, const char *id) {
   if (!strcmp(id, DFM_EXT_CELL_ENERGY)) return &kCellEnergy;
   if (!strcmp(id, DFM_EXT_SLOTS)) return static_cast<const Body *>(self)->has_branch() ? &kSlots : &kNoSlots;
   if (!strcmp(id, DFM_EXT_EFFECTS)) return &kActiveEffects;
+  if (!strcmp(id, DFM_EXT_IDLE)) return &kIdle;
   if (!strcmp(id, DFM_EXT_SPRING_MASK)) return &kSpringMask;
   return nullptr;
 }

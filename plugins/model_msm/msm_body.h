@@ -100,6 +100,7 @@ struct Body {
   Buffer<Merge> merge;  // by owning block
   Buffer<uint32_t> merge_begin, slot_begin;  // [nblock + 1]
 
+  const char *idle(Param which) const;      // why a parameter does nothing beside the present others; NULL where it does
   uint32_t choice(Param which) const { return uint32_t(params[which]); }
   bool volume_on = false, cells_on = false;  // the volume term; that or the resistance to collapse
   bool damping_on = false, drag_on = false;

@@ -160,6 +160,31 @@ void Body::find_effects() {
   active_effects[n] = nullptr;
 }
 
+const char *Body::idle(Param which) const {
+  switch (which) {
+    case kPoisson: {
+      bool below = false, other = false;
+      for (uint32_t c = 0; c < ncell; ++c) {
+        const double nu = at(kPoisson, c);
+        below |= at(kVolume, c) < 0 && nu < 0.25, other |= nu != 0.25;
+      }
+      if (below) return "springs alone give 1/4, and no volume term that is stable gives less; cells that ask for less have 1/4";
+      return other && !volume_on ? "volume is 0, and springs alone give 1/4 whatever it says; leave volume at auto" : nullptr;
+    }
+    case kCollapse: {
+      bool works = largest_of(kCollapse) == 0;
+      for (uint32_t c = 0; c < ncell && !works; ++c) works = at(kCollapse, c) > volume_ratio(c);
+      return works ? nullptr : "the volume term is as stiff as that already";
+    }
+    case kAxisKind:
+    case kAxisForm:
+    case kAxis: return edge_tilt.empty() ? "anisotropy_slope is 0" : nullptr;
+    case kRelaxationRatio: return choice(kDamper) == kStandardLinear ? nullptr : "only damper sls has a second spring";
+    case kRelaxationTime: return has_branch() ? nullptr : "damper is voigt";
+    default: return nullptr;
+  }
+}
+
 namespace {
 struct Aside {  // the mask, while no spring counts as off
   Buffer<uint8_t> &mask, kept;

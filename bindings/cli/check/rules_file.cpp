@@ -185,7 +185,7 @@ void row_sane(const dfm_type &type, uint32_t i) {
   if ((row.flags & (DFM_PARAM_INTEGER | DFM_PARAM_ENUM)) && row.def != std::floor(row.def))
     broken("parameter \"%s\" is a whole number but its default is %g, which is refused when it is given; round it", k, row.def);
   if ((row.flags & DFM_PARAM_LOG_SCALE) && !(row.min > 0)) broken("parameter \"%s\" has a logarithmic scale that begins at %g, where no slider can begin; let min be above 0", k, row.min);
-  if (row.flags & ~31u) broken("parameter \"%s\" has flags that this ABI does not know (%#x); use DFM_PARAM_*", k, row.flags);
+  if (row.flags & ~63u) broken("parameter \"%s\" has flags that this ABI does not know (%#x); use DFM_PARAM_*", k, row.flags);
   if (row.flags & DFM_PARAM_ENUM) {
     uint32_t n = 0;
     while (row.names && n < 4096 && row.names[n]) ++n;

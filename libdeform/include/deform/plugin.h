@@ -37,7 +37,8 @@ typedef struct dfm_param {            /* a row; values of all rows lie end to en
   const char *const *names;           /* DFM_PARAM_ENUM: value k reads names[k], NULL-terminated; else NULL */
 } dfm_param;
 enum { DFM_PARAM_INTEGER = 1, DFM_PARAM_LOG_SCALE = 2, DFM_PARAM_RUNTIME = 4 /* may change mid-run */,
-       DFM_PARAM_ENUM = 8, DFM_PARAM_PER_CELL = 16 /* may come as a field of the mesh with this key */ };
+       DFM_PARAM_ENUM = 8, DFM_PARAM_PER_CELL = 16 /* may come as a field of the mesh with this key */,
+       DFM_PARAM_AUTO = 32 /* def is no value but a sign, read and shown as "auto": the plugin takes one from the others */ };
 typedef struct dfm_slot { uint32_t unit, width, kind, reserved; } dfm_slot;   /* one block of state */
 enum { DFM_PER_CONTACT = 1, DFM_PER_POINT = 2, DFM_PER_CELL = 3, DFM_PER_EDGE = 4, DFM_PER_INSTANCE = 5 };
 enum { DFM_SLOT_SCALAR = 1, DFM_SLOT_TANGENT = 2 /* pair, turns with the contact frame */, DFM_SLOT_VECTOR = 3,
@@ -154,6 +155,13 @@ typedef struct dfm_effects {
   uint32_t size, reserved;
   const char *const *(*active)(const void *self);                  /* [setup] valid until the next call of set_params */
 } dfm_effects;
+/* Extension "dfm.idle/1" of a model (draft): parameters that do nothing beside the present others, or not what their row says, and why:
+ * part of a sentence without a full stop. Hosts tell it to the user. NULL where the parameter does what it says. */
+#define DFM_EXT_IDLE "dfm.idle/1"
+typedef struct dfm_idle {
+  uint32_t size, reserved;
+  const char *(*why)(const void *self, uint32_t row);              /* [setup] row of dfm_type.params; valid until the next call of set_params */
+} dfm_idle;
 /* Extension "dfm.spring_mask/1" of a model (draft): springs by edge of the mesh, switched off and on. Like a parameter, the mask is the
  * host's to keep: it is no state. Off gives a spring's energy away; on again may bring some. */
 #define DFM_EXT_SPRING_MASK "dfm.spring_mask/1"

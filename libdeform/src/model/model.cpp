@@ -34,6 +34,7 @@ void ModelInstance::create(const dfm_type &t, const dfm_host &h, const dfm_mesh 
       stepper = static_cast<const dfm_stepper *>(ops->extension(self, "dfm.stepper/1"));
       own = static_cast<const dfm_slots *>(ops->extension(self, DFM_EXT_SLOTS));
       effects = static_cast<const dfm_effects *>(ops->extension(self, DFM_EXT_EFFECTS));
+      idle = static_cast<const dfm_idle *>(ops->extension(self, DFM_EXT_IDLE));
       return DFM_OK;
     });
   if (!stepper && !ops->add_forces) fail(DFM_E_UNSUPPORTED, "model '%s' neither adds forces nor steps itself; report it to its author", t.id);
@@ -52,6 +53,12 @@ bool ModelInstance::works(const std::string &effect) const {
   for (; active && *active; ++active)
     if (effect == *active) return true;
   return false;
+}
+
+std::string ModelInstance::idle_reason(uint32_t row) const {
+  const char *why = nullptr;
+  if (idle && idle->why) call("idle", [&] { return why = idle->why(self, row), DFM_OK; });
+  return why ? why : "";
 }
 
 }  // namespace dfm

@@ -15,6 +15,7 @@ struct ModelInstance {
   const dfm_host *host = nullptr;
   const dfm_stepper *stepper = nullptr;      // null: a force model, the host integrates
   const dfm_effects *effects = nullptr;      // null: whatever the type promises is at work
+  const dfm_idle *idle = nullptr;            // null: every parameter does what its row says
   void *self = nullptr;
   std::vector<double> params;
   Array<double> state, state_out;            // slots end to end
@@ -33,6 +34,8 @@ struct ModelInstance {
   dfm_status call(const char *what, F &&f) const noexcept { return call_plugin(*host, *type, what, f); }
   // Is this effect of the type called for by the present parameters?
   bool works(const std::string &effect) const;
+  // Why the parameter of this row does nothing now; empty where it does what it says.
+  std::string idle_reason(uint32_t row) const;
   void commit_state() { if (!state.empty()) state.swap(state_out); }
 };
 

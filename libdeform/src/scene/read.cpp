@@ -77,6 +77,9 @@ dfm_params Params::view() {
   return {sizeof(dfm_params), uint32_t(rows.size()), rows.data()};
 }
 
+// The word for the default of a row that stands for the plugin's own choice.
+constexpr const char *kAuto = "auto";
+
 // A word of an enumeration; its number otherwise.
 static double enum_value(const Node &value, const char *const *names) {
   std::vector<std::string> words;
@@ -89,6 +92,7 @@ static double enum_value(const Node &value, const char *const *names) {
 
 std::vector<double> read_param(const Node &value, const dfm_param &p) {
   if (value.value().is_string()) {
+    if ((p.flags & DFM_PARAM_AUTO) && value.text() == kAuto) return std::vector<double>(p.width ? p.width : 1, p.def);
     const std::string unit = p.unit && std::string(p.unit) != "1" ? p.unit : "";
     if (!(p.flags & DFM_PARAM_ENUM) || !p.names)
       value.fail("expected a number%s%s, found \"%s\"", unit.empty() ? "" : " in ", unit.c_str(), value.text().c_str());
@@ -230,8 +234,9 @@ std::vector<double> read_extra(const Node &value, const std::string &key, const 
   if (value.value().is_string()) {
     for (const dfm_type *model : types.models()) {
       const dfm_param *row = find_row(model, key);
-      if (!row || !(row->flags & DFM_PARAM_ENUM) || !row->names) continue;
-      const double number = enum_value(value, row->names);
+      const bool automatic = row && (row->flags & DFM_PARAM_AUTO) && value.text() == kAuto;
+      if (!automatic && (!row || !(row->flags & DFM_PARAM_ENUM) || !row->names)) continue;
+      const double number = automatic ? row->def : enum_value(value, row->names);
       if (!out.empty() && out[0] != number) value.fail("the models number this word differently; give it in the body's model params");
       out = {number};
     }

@@ -9,6 +9,7 @@
 #include "mesh/mesh.h"
 #include "world/body_surface.h"
 #include "world/body_zones.h"
+#include "world/idle.h"
 #include "world/material.h"
 
 namespace dfm {
@@ -105,6 +106,7 @@ Body &create_body(World &w, const dfm_body_def &def) {
   const dfm_type &type = w.context->registry.find(DFM_KIND_MODEL, def.model ? def.model : "msm");
   const MeshCoupling coupling(m, b.surface);
   std::vector<double> values = model_values(w, b, type, def, materials);
+  find_unused(b, type, materials);
   std::vector<const char *> field_keys;
   std::vector<const double *> fields;
   for (const CellField &f : b.fields) field_keys.push_back(f.key.c_str()), fields.push_back(f.values.data());
@@ -126,6 +128,7 @@ Body &create_body(World &w, const dfm_body_def &def) {
   ++w.next_id;
   w.bodies.push_back(std::move(owned));
   w.changed = true;
+  warn_of_idle(b);
   return b;
 }
 

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "core/error.h"
+#include "world/idle.h"
 
 namespace dfm {
 namespace {
@@ -67,6 +68,9 @@ std::string body(const Body &b) {
     const auto [lo, hi] = std::minmax_element(f.values.begin(), f.values.end());
     out += (i ? "," : "") + ("{\"name\":" + quote(f.key) + ",\"from\":" + quote(f.from) + format(",\"min\":%.9g,\"max\":%.9g}", *lo, *hi));
   }
+  out += "],\"idle\":[";
+  bool first = true;
+  for (const IdleParam &p : idle_params(b)) out += (first ? "" : ",") + ("{\"name\":" + quote(p.key) + ",\"why\":" + quote(p.why) + "}"), first = false;
   return out + "]}";
 }
 

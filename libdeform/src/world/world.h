@@ -48,6 +48,8 @@ struct Material {
 };
 
 // A model parameter that differs from cell to cell, and who said so ("field", "materials", "share").
+// An entry of a material that the body's model has no parameter for.
+struct Unused { std::string key, material; };
 struct CellField { std::string key, from; uint32_t width; Array<double> values; };
 
 // A lasting load: force[i] on points[i], times the keyed scale, times 1 + sine.
@@ -84,6 +86,7 @@ struct Body {
   double mass = 0, rest_volume = 0;
   Array<double> share;               // [ntet] how much of each cell is material; empty: all
   std::vector<CellField> fields;
+  std::vector<Unused> unused;
   std::vector<Load> loads;
   std::vector<Spring> springs;
   std::vector<HeldMotion> motions;

@@ -1,0 +1,70 @@
+#include "world/idle.h"
+
+#include <algorithm>
+#include <cstring>
+
+#include "core/error.h"
+
+namespace dfm {
+namespace {
+
+bool has_row(const dfm_type &type, const std::string &key) {
+  for (uint32_t i = 0; i < type.nparam; ++i)
+    if (key == type.params[i].key) return true;
+  return false;
+}
+
+// What every material has, so that its author may think of it as at work whatever its value.
+bool from_material(const char *key) {
+  for (const char *k : {"young", "poisson", "damping_mass", "damping_stiffness"})
+    if (!std::strcmp(key, k)) return true;
+  return false;
+}
+
+const CellField *field_of(const Body &b, const char *key) {
+  for (const CellField &f : b.fields)
+    if (f.key == key) return &f;
+  return nullptr;
+}
+
+}  // namespace
+
+void find_unused(Body &b, const dfm_type &type, const CellMaterials &cells) {
+  const dfm_material_def plain = dfm_material_def_default();
+  const auto note = [&](const std::string &key, const std::string &material) {
+    const auto same = [&](const Unused &u) { return u.key == key; };
+    if (!has_row(type, key) && std::none_of(b.unused.begin(), b.unused.end(), same)) b.unused.push_back({key, material});
+  };
+  for (const Material *m : cells.list) {
+    const dfm_material_def &d = m->def;
+    if (d.young != plain.young) note("young", m->name);
+    if (d.poisson != plain.poisson) note("poisson", m->name);
+    if (d.damping_mass != plain.damping_mass) note("damping_mass", m->name);
+    if (d.damping_stiffness != plain.damping_stiffness) note("damping_stiffness", m->name);
+    for (const std::string &key : m->extra_keys)
+      if (key != "friction") note(key, m->name);
+  }
+}
+
+std::vector<IdleParam> idle_params(const Body &b) {
+  std::vector<IdleParam> out;
+  const dfm_type &type = *b.model.type;
+  for (const Unused &u : b.unused) out.push_back({u.key, format("%s has no such parameter (material '%s' gives it)", type.id, u.material.c_str()), true});
+  size_t at = 0;
+  for (uint32_t i = 0; i < type.nparam; at += type.params[i++].width) {
+    const dfm_param &row = type.params[i];
+    const std::string why = b.model.idle_reason(i);
+    if (why.empty()) continue;
+    const double *const now = &b.model.params[at];
+    const bool chosen = field_of(b, row.key) || std::any_of(now, now + row.width, [&](double x) { return x != row.def; });
+    if (chosen || from_material(row.key)) out.push_back({row.key, why, chosen});
+  }
+  return out;
+}
+
+void warn_of_idle(const Body &b) {
+  for (const IdleParam &p : idle_params(b))
+    if (p.chosen) b.world->context->logf(DFM_LOG_WARNING, "body '%s': %s has no effect, or not the one it names: %s", b.name.c_str(), p.key.c_str(), p.why.c_str());
+}
+
+}  // namespace dfm
