@@ -104,6 +104,8 @@ class Runner {
       out.push_back(std::to_string(stats.cheapened) + " steps used so much of their budget that they went without polish, sweeps or guard pieces (max_work, max_time)");
     if (stats.unconverged > 0) out.push_back("the contact solve met its cap in " + std::to_string(stats.unconverged) + " sub-steps");
     if (trouble_ & DFM_TROUBLE_INVERTED) out.push_back("cells turned inside out: refine the mesh or soften the load");
+    if (stats.limited_max > 0)
+      out.push_back("up to " + std::to_string(stats.limited_max) + " cells at once were stretched so far that their model limited their stiffness: refine the mesh or soften the load");
     const auto pairs = [](auto most) { return "up to " + std::to_string(most) + " triangle pairs"; };
     if (checks().between_max > 0) out.push_back("surfaces cross: " + pairs(checks().between_max) + " of two surfaces in one state");
     if (checks().self_max > 0)

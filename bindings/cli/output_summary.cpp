@@ -187,7 +187,7 @@ std::string summary_json(const SceneFile &scene, const RunOptions &options, cons
   out.add("finite", checks.finite ? "true" : "false").add("states_checked", std::to_string(checks.states));
   out.add("intersections_max", std::to_string(checks.intersections_max));
   out.add("intersections_between_max", std::to_string(checks.between_max)).add("intersections_self_max", std::to_string(checks.self_max));
-  out.add("inverted_max", std::to_string(std::max(checks.inverted_max, stats.inverted_max)));
+  out.add("inverted_max", std::to_string(std::max(checks.inverted_max, stats.inverted_max))).add("limited_max", std::to_string(stats.limited_max));
   out.add("guard_steps", std::to_string(stats.guard_steps)).add("guard", guard.text()).add("unconverged_steps", std::to_string(stats.unconverged));
   out.add("budget", budget.text());
   out.add("solver", solver.text()).add("hold", hold.text()).add("effects", effects.text()).add("plugins", plugins_json(scene));

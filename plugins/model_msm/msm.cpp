@@ -149,6 +149,13 @@ const char *const *active_effects(const void *self) { return static_cast<const B
 
 const char *idle(const void *self, uint32_t row) { return row < kParamCount ? static_cast<const Body *>(self)->idle(Param(row)) : nullptr; }
 
+uint32_t limited(const void *self) {
+  const Body &body = *static_cast<const Body *>(self);
+  uint32_t n = 0;
+  for (uint32_t b = 0; body.cells_on && b < body.nblock; ++b) n += body.limited[b];
+  return n;
+}
+
 dfm_status set_mask(void *self, uint32_t n, const uint32_t *edges, uint8_t on) {
   Body &body = *static_cast<Body *>(self);
   for (uint32_t k = 0; k < n; ++k)
@@ -172,6 +179,7 @@ const dfm_cell_energy kCellEnergy = {sizeof(dfm_cell_energy), 0, cell_energy};
 const dfm_slots kNoSlots = {sizeof(dfm_slots), 0, nullptr}, kSlots = {sizeof(dfm_slots), 2, kBranchSlots};
 const dfm_effects kActiveEffects = {sizeof(dfm_effects), 0, active_effects};
 const dfm_idle kIdle = {sizeof(dfm_idle), 0, idle};
+const dfm_limited kLimited = {sizeof(dfm_limited), 0, limited};
 const dfm_spring_mask kSpringMask = {sizeof(dfm_spring_mask), 0, set_mask, get_mask};
 
 const void *extension(const void *self, const char *id) {
@@ -179,6 +187,7 @@ const void *extension(const void *self, const char *id) {
   if (!strcmp(id, DFM_EXT_SLOTS)) return static_cast<const Body *>(self)->has_branch() ? &kSlots : &kNoSlots;
   if (!strcmp(id, DFM_EXT_EFFECTS)) return &kActiveEffects;
   if (!strcmp(id, DFM_EXT_IDLE)) return &kIdle;
+  if (!strcmp(id, DFM_EXT_LIMITED)) return &kLimited;
   if (!strcmp(id, DFM_EXT_SPRING_MASK)) return &kSpringMask;
   return nullptr;
 }

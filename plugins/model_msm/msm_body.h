@@ -95,6 +95,7 @@ struct Body {
   Buffer<uint32_t> point, spring_edge, cell_id;
   Buffer<double> p, f, stiffness, rest, bulk, collapse, limit, volume6, slot_weight, row;
   Buffer<double> tilt, damp, rest_now;     // as the springs'; rest_now: of plain springs with the same forces as those with branches
+  Buffer<uint32_t> limited;                // [nblock] cells beyond their limit at the last bound
   Buffer<Quad> quad;
   Buffer<Cell> cell;
   Buffer<Merge> merge;  // by owning block

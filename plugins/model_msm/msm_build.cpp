@@ -152,7 +152,7 @@ size_t Body::fill_cells(const Layout &l, Block &out, uint32_t b, size_t cells_at
     const uint32_t c = l.cell_order[l.cell_begin[b] + (real ? n : 0)];
     for (int a = 0; a < 4; ++a) cell[cells_at].p[a] = l.local[l.rank[cells[4 * size_t(c) + a]]];
     cell_id[cells_at] = real ? c : kNone;
-    volume6[cells_at] = cell_volume6[c], limit[cells_at] = limit_of(c);
+    volume6[cells_at] = cell_volume6[c], limit[cells_at] = real ? limit_of(c) : 1e150;
   }
   return cells_at;
 }
@@ -205,7 +205,7 @@ void Body::build_blocks() {
   p.create(host, 8 * size_t(largest) * ((nblock + grain - 1) / grain)), row.create(host, 8 * nslot), f.create(host, 4 * nslot);
   quad.create(host, nquad), stiffness.create(host, 4 * nquad), rest.create(host, 4 * nquad), spring_edge.create(host, 4 * nquad);
   cell.create(host, ncells), bulk.create(host, ncells), volume6.create(host, ncells), cell_id.create(host, ncells);
-  collapse.create(host, ncells), limit.create(host, ncells);
+  collapse.create(host, ncells), limit.create(host, ncells), limited.create(host, nblock);
 
   std::fill(l.mark.data(), l.mark.data() + npoint, kNone);
   size_t quads_at = 0, cells_at = 0;
@@ -217,7 +217,7 @@ void Body::build_blocks() {
     Block &out = block[b];
     out.owned = owned, out.local = owned + nhalo, out.point = points;
     out.f = f.data() + 4 * size_t(slot_begin[b]);
-    out.edge = spring_edge.data() + 4 * quads_at;
+    out.edge = spring_edge.data() + 4 * quads_at, out.limited = limited.data() + b;
     out.row = row.data() + 8 * size_t(slot_begin[b]), out.weight = slot_weight.data() + slot_begin[b];
     quads_at = fill_springs(l, out, b, quads_at);
     cells_at = fill_cells(l, out, b, cells_at);

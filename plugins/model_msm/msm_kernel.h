@@ -34,6 +34,7 @@ struct Block {
   const Cell *cell;                     // [cells]
   const double *bulk, *volume6;         // [cells] kV/(36 V0), 6 V0 >= 0
   const double *collapse;               // [cells] kC/(36 V0)
+  uint32_t *limited;                    // cells beyond it, counted by cell_rows; those that fill up have none
   const double *limit;                  // [cells] kLimit times the sum of the squared edges at rest, m^2
 };
 

@@ -5,6 +5,7 @@
 #pragma GCC diagnostic ignored "-Wuninitialized"
 #endif
 #include <immintrin.h>
+#include <stdint.h>
 
 #define MSM_INLINE static inline __attribute__((always_inline))
 
@@ -22,6 +23,7 @@ MSM_INLINE v4 sqrt4(v4 a) { return _mm256_sqrt_pd(a); }
 MSM_INLINE v4 max4(v4 a, v4 b) { return _mm256_max_pd(a, b); }
 MSM_INLINE v4 min4(v4 a, v4 b) { return _mm256_min_pd(a, b); }
 MSM_INLINE bool any_above(v4 a, v4 limit) { return _mm256_movemask_pd(_mm256_cmp_pd(a, limit, _CMP_GT_OQ)); }
+MSM_INLINE uint32_t count_above(v4 a, v4 limit) { return uint32_t(__builtin_popcount(uint32_t(_mm256_movemask_pd(_mm256_cmp_pd(a, limit, _CMP_GT_OQ))))); }
 MSM_INLINE v4 choose_above(v4 a, v4 limit, v4 above, v4 below) { return _mm256_blendv_pd(below, above, _mm256_cmp_pd(a, limit, _CMP_GT_OQ)); }
 MSM_INLINE v4 abs4(v4 a) { return _mm256_andnot_pd(_mm256_set1_pd(-0.0), a); }
 MSM_INLINE v4 zero_unless_above(v4 value, v4 a, v4 limit) { return _mm256_and_pd(value, _mm256_cmp_pd(a, limit, _CMP_GT_OQ)); }

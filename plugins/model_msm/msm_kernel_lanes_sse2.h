@@ -1,6 +1,7 @@
 // Four doubles as two SSE2 registers, the baseline of x86-64. Internal linkage only.
 #pragma once
 #include <emmintrin.h>
+#include <stdint.h>
 
 #define MSM_INLINE static inline __attribute__((always_inline))
 
@@ -22,6 +23,9 @@ MSM_INLINE v4 sqrt4(v4 a) { return {_mm_sqrt_pd(a.lo), _mm_sqrt_pd(a.hi)}; }
 MSM_INLINE v4 max4(v4 a, v4 b) { return {_mm_max_pd(a.lo, b.lo), _mm_max_pd(a.hi, b.hi)}; }
 MSM_INLINE v4 min4(v4 a, v4 b) { return {_mm_min_pd(a.lo, b.lo), _mm_min_pd(a.hi, b.hi)}; }
 MSM_INLINE bool any_above(v4 a, v4 limit) { return _mm_movemask_pd(_mm_cmpgt_pd(a.lo, limit.lo)) | _mm_movemask_pd(_mm_cmpgt_pd(a.hi, limit.hi)); }
+MSM_INLINE uint32_t count_above(v4 a, v4 limit) {
+  return uint32_t(__builtin_popcount(uint32_t(_mm_movemask_pd(_mm_cmpgt_pd(a.lo, limit.lo)) | _mm_movemask_pd(_mm_cmpgt_pd(a.hi, limit.hi)) << 2)));
+}
 MSM_INLINE __m128d choose(__m128d mask, __m128d yes, __m128d no) { return _mm_or_pd(_mm_and_pd(mask, yes), _mm_andnot_pd(mask, no)); }
 MSM_INLINE v4 choose_above(v4 a, v4 limit, v4 above, v4 below) {
   return {choose(_mm_cmpgt_pd(a.lo, limit.lo), above.lo, below.lo), choose(_mm_cmpgt_pd(a.hi, limit.hi), above.hi, below.hi)};

@@ -172,6 +172,7 @@ MSM_INLINE v4 weights(const Block &b, const Cell *c, int n) {
 // Weighted row sums of the second derivative of a cell's energy, (1 / w_a) (k g_a sum_b g_b w_b + |p| l sum_{b != a} w_b):
 // g_a = 6 |dV/dx_a|, and l, the longest edge, for the opposite edge that makes each mixed derivative.
 static inline void cell_rows(const Block &b) {
+  uint32_t limited = 0;
   for (uint32_t t = 0; t < b.cells; t += 4) {
     const Cell *c = b.cell + t;
     Edges4 e1, e2, e3, g1, g2, g3;
@@ -185,6 +186,7 @@ static inline void cell_rows(const Block &b) {
     v4 by_q;
     const v4 now = dot(e1, g1) * fade(q, limit, by_q), pressure = abs4(pressure_of(b, t, now)), more = pressure * longest;
     const v4 k = load4(b.bulk + t) + zero_unless_above(load4(b.collapse + t), splat(kCollapseCounted) * load4(b.volume6 + t), now);
+    limited += count_above(q, limit);
     alignas(32) double row[4][4];
     const v4 w0 = weights(b, c, 0), w1 = weights(b, c, 1), w2 = weights(b, c, 2), w3 = weights(b, c, 3), w = (w0 + w1) + (w2 + w3);
     const v4 n0 = sqrt4(dot(g0, g0)), n1 = sqrt4(dot(g1, g1)), n2 = sqrt4(dot(g2, g2)), n3 = sqrt4(dot(g3, g3));
@@ -197,6 +199,7 @@ static inline void cell_rows(const Block &b) {
     for (int n = 0; n < 4; ++n)
       for (int m = 0; m < 4; ++m) b.row[8 * size_t(c[n].p[m]) + 7] += row[m][n];
   }
+  *b.limited = limited;
 }
 
 // Diagonal blocks of the springs' stiffness, k ((1 - s) d d^T/L^2 + s I) with s = max(0, 1 - L0/L): a compressed spring is counted

@@ -117,6 +117,23 @@ TEST(MsmCollapse, ForceOfStretchedCells_IsMinusTheGradientOfTheEnergy) {
     }
 }
 
+TEST(MsmCollapse, LimitedCells_AreCountedWithTheBound) {
+  Host host;
+  for (const char *simd : {"sse2", "avx2", "avx512"}) {
+    setenv("DEFORM_SIMD", simd, 1);
+    Instance b(host, kuhn_bar(3, 2, 2, 0.1, 0.2), defaults(0.3));
+    unsetenv("DEFORM_SIMD");
+    const auto *ext = static_cast<const dfm_limited *>(b.ops->extension(b.self, DFM_EXT_LIMITED));
+    ASSERT_NE(ext, nullptr);
+    b.bound();
+    EXPECT_EQ(ext->count(b.self), 0u) << simd;
+    b.set(b.x, 0, b.get(b.x, 0) + Vec{-5, -4, -3});   // a corner of the bar
+    const auto touching = size_t(std::count(b.mesh.cells.begin(), b.mesh.cells.end(), 0u));
+    b.bound();
+    EXPECT_EQ(ext->count(b.self), touching) << simd;
+  }
+}
+
 TEST(MsmCollapse, StepBound_NeverFallsFarBelowThatAtRest) {
   Host host;
   for (double nu : {0.0, 0.3, 0.45})

@@ -162,6 +162,12 @@ typedef struct dfm_idle {
   uint32_t size, reserved;
   const char *(*why)(const void *self, uint32_t row);              /* [setup] row of dfm_type.params; valid until the next call of set_params */
 } dfm_idle;
+/* Extension "dfm.limited/1" of a model (draft): cells so far from their shape that the model limits their stiffness there. */
+#define DFM_EXT_LIMITED "dfm.limited/1"
+typedef struct dfm_limited {
+  uint32_t size, reserved;
+  uint32_t (*count)(const void *self);                             /* [step] as counted by the last call of bound */
+} dfm_limited;
 /* Extension "dfm.spring_mask/1" of a model (draft): springs by edge of the mesh, switched off and on. Like a parameter, the mask is the
  * host's to keep: it is no state. Off gives a spring's energy away; on again may bring some. */
 #define DFM_EXT_SPRING_MASK "dfm.spring_mask/1"

@@ -125,6 +125,7 @@ typedef struct dfm_world_stats {
   uint64_t rigid_again;                   /* times a rigid host had contact solved again (DFM_RIGID_AGAIN), since creation */
   uint64_t work, work_max;                /* units of the last step, also where it was discarded; the most since creation (doc/concepts/budget.md) */
   uint64_t cheapened, discarded;          /* steps that left something out for their budget; that were given up by it or by dfm_world_interrupt */
+  uint32_t limited_max, reserved_limited; /* cells at once that were so far from their shape that their model limited their stiffness, since creation */
 } dfm_world_stats;
 /** @return DFM_OK; DFM_E_HANDLE. Threads: Any thread. Not during step. Since 0.1. */
 DFM_API dfm_status dfm_world_get_stats(dfm_world world, dfm_world_stats *out);

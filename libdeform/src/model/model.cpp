@@ -35,6 +35,7 @@ void ModelInstance::create(const dfm_type &t, const dfm_host &h, const dfm_mesh 
       own = static_cast<const dfm_slots *>(ops->extension(self, DFM_EXT_SLOTS));
       effects = static_cast<const dfm_effects *>(ops->extension(self, DFM_EXT_EFFECTS));
       idle = static_cast<const dfm_idle *>(ops->extension(self, DFM_EXT_IDLE));
+      limited = static_cast<const dfm_limited *>(ops->extension(self, DFM_EXT_LIMITED));
       return DFM_OK;
     });
   if (!stepper && !ops->add_forces) fail(DFM_E_UNSUPPORTED, "model '%s' neither adds forces nor steps itself; report it to its author", t.id);
@@ -53,6 +54,12 @@ bool ModelInstance::works(const std::string &effect) const {
   for (; active && *active; ++active)
     if (effect == *active) return true;
   return false;
+}
+
+uint32_t ModelInstance::limited_cells() const {
+  uint32_t n = 0;
+  if (limited && limited->count) call("limited", [&] { return n = limited->count(self), DFM_OK; });
+  return n;
 }
 
 std::string ModelInstance::idle_reason(uint32_t row) const {

@@ -16,6 +16,7 @@ struct ModelInstance {
   const dfm_stepper *stepper = nullptr;      // null: a force model, the host integrates
   const dfm_effects *effects = nullptr;      // null: whatever the type promises is at work
   const dfm_idle *idle = nullptr;            // null: every parameter does what its row says
+  const dfm_limited *limited = nullptr;      // null: the model limits nothing, or does not say
   void *self = nullptr;
   std::vector<double> params;
   Array<double> state, state_out;            // slots end to end
@@ -36,6 +37,7 @@ struct ModelInstance {
   bool works(const std::string &effect) const;
   // Why the parameter of this row does nothing now; empty where it does what it says.
   std::string idle_reason(uint32_t row) const;
+  uint32_t limited_cells() const;            // at the last bound
   void commit_state() { if (!state.empty()) state.swap(state_out); }
 };
 

@@ -242,16 +242,18 @@ void World::update_bound() {
   stable = std::numeric_limits<double>::infinity();
   worst_body = nullptr, worst_point = 0;
   inverted = 0;
+  uint32_t limited = 0;
   double fastest = 0;
   for (auto &b : bodies) {
     const bool stays = b->slumber.asleep && b->bound.known;
     if (!stays) ask_bound(*b);   // who sleeps counts too: the step must not change when it wakes
-    inverted += b->bound.inverted;
+    inverted += b->bound.inverted, limited += b->model.limited_cells();
     if (!stays && !b->model.stepper && b->model.ops->bound) fastest = std::max(fastest, strain_rate(*b));
     if (b->bound.step < stable) stable = b->bound.step, worst_body = b.get(), worst_point = b->bound.point;
   }
   stable *= kBoundShare;
   stats.stable_step = stable, stats.inverted_max = std::max(stats.inverted_max, inverted);
+  stats.limited_max = std::max(stats.limited_max, limited);
   const double keeps = kBoundStrain / (fastest * stable);   // sub-steps
   bound_age = keeps >= kBoundEvery || !(fastest > 0) ? 0 : kBoundEvery - std::max(1u, static_cast<uint32_t>(keeps));
 }
