@@ -122,7 +122,8 @@ std::string json_info(const Type &t) {
     JsonObject o;
     o.add("key", quoted(row.key)).add("label", quoted(row.label)).add("unit", quoted(row.unit));
     o.add("min", number(row.min)).add("max", number(row.max)).add("default", number(row.def)).add("width", std::to_string(row.width));
-    o.add("integer", flag(DFM_PARAM_INTEGER)).add("runtime", flag(DFM_PARAM_RUNTIME)).add("per_cell", flag(DFM_PARAM_PER_CELL)).add("auto", flag(DFM_PARAM_AUTO));
+    o.add("integer", flag(DFM_PARAM_INTEGER)).add("runtime", flag(DFM_PARAM_RUNTIME)).add("per_cell", flag(DFM_PARAM_PER_CELL));
+    o.add("auto", flag(DFM_PARAM_AUTO));
     if (row.names) o.add("names", json_array(quoted_all(names_of(row))));
     rows.push_back(o.text());
   }

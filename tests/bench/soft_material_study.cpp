@@ -1,6 +1,6 @@
-// Soft material at the defaults: nine materials, four shapes, three steps. Each body comes to rest under its weight, on a floor without friction or clamped at one
-// end, and is compared with the linear theory of its shape: how far it sinks, what volume is left, and how many cells were ever inside out. Prints a table; with a
-// file as argument writes it there (results/soft_material.csv, doc/models/msm.md).
+// Soft material at the defaults: nine materials, four shapes, three steps. Each body comes to rest under its weight, on a floor without friction or
+// clamped at one end, and is compared with the linear theory of its shape: how far it sinks, what volume is left, and how many cells were ever inside
+// out. Prints a table; with a file as argument writes it there (results/soft_material.csv, doc/models/msm.md).
 #include <cstdio>
 
 #include "../support/world.h"
@@ -100,8 +100,9 @@ int main(int argc, char **argv) {
     for (const Substance &s : kSubstances)
       for (const double step : kSteps) {
         const Result r = settle(shape, s, step);
-        std::fprintf(out, "%s,%g,%g,%g,%.6g,%.6g,%.6g,%.4g,%.3g,%.4f,%u,%.2g,%llu\n", shape.name, s.young, s.density, s.poisson, step, r.sag, r.theory, r.sag / r.theory,
-                     r.theory / shape.size[shape.clamped ? 0 : std::string(shape.kind) == "cylinder" ? 1 : 0], r.share, r.inverted, r.speed, static_cast<unsigned long long>(r.substeps));
+        const double strain = r.theory / shape.size[std::string(shape.kind) == "cylinder" ? 1 : 0];
+        std::fprintf(out, "%s,%g,%g,%g,%.6g,%.6g,%.6g,%.4g,%.3g,%.4f,%u,%.2g,%llu\n", shape.name, s.young, s.density, s.poisson, step, r.sag, r.theory,
+                     r.sag / r.theory, strain, r.share, r.inverted, r.speed, static_cast<unsigned long long>(r.substeps));
         std::fflush(out);
       }
   if (out != stdout) std::fclose(out);

@@ -72,7 +72,7 @@ TEST(Guard, BlockSpinningPastVoxels_StaysOutside) {
             Vec depth;
             for (size_t k = 0; k < 3; ++k) depth[k] = half[k] - std::fabs(x[i + k]);
             std::sort(depth.begin(), depth.end());
-            const bool behind = depth[0] > 0 && depth[1] > 2 * cell, inside = behind && depth[0] > 0.5 * cell;   // the voxels' own face may lie half a cell deep
+            const bool behind = depth[0] > 0 && depth[1] > 2 * cell, inside = behind && depth[0] > 0.5 * cell;   // the voxels' face may lie half a cell deep
             if (inside && guarded) ADD_FAILURE() << "seed " << seed << ", step " << step << ": surfel " << i / 3 << " inside";
             reached += behind;
           }
