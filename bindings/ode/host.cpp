@@ -8,6 +8,7 @@
 #include <new>
 
 #include "own_world.h"
+#include "trap.h"
 
 namespace dfm_ode_detail {
 namespace {
@@ -18,6 +19,8 @@ dfm_status shielded(F &&f) noexcept {
     return f();
   } catch (const std::bad_alloc &) {
     return dfm_fail(DFM_E_NOMEM, "ode: out of memory");
+  } catch (const Refused &refused) {
+    return refused.status;
   } catch (...) {
     return DFM_E_FATAL;
   }

@@ -1,8 +1,11 @@
 #include "own_world.h"
 
+#include <cmath>
 #include <cstring>
+#include <string>
 
 #include "near.h"
+#include "trap.h"
 
 namespace dfm_ode_detail {
 namespace {
@@ -45,6 +48,13 @@ class OwnWorld : public Host {
   std::vector<dfm_rigid_state> given_;    // as ODE's bodies stand
   RigidFriction near_;
 
+  std::string broken_;                    // what ODE said when it stopped in the middle of a call; its world is not touched after that
+
+  // Runs what calls ODE; an assertion of ODE's ends in an error.
+  template <class F>
+  void call(F &&f);
+  void build(const dfm_rigid_set_def &set, uint32_t *group);
+  void predict_all(const dfm_rigid_step &step, double *velocity);
   size_t first_joint() const { return size_t{Member::kExtra} * members_.size(); }
   void add_body(const dfm_rigid_def &def, uint32_t number);
   void add_joint(const dfm_joint_def &def);
@@ -122,7 +132,38 @@ void OwnWorld::add_joint(const dfm_joint_def &def) {
   dJointSetFeedback(j, &joint.feedback);
 }
 
+template <class F>
+void OwnWorld::call(F &&f) {
+  if (broken_.empty()) {
+    try {
+      const Trap trap;
+      return f();
+    } catch (const Assertion &assertion) {
+      broken_ = assertion.message.empty() ? "no reason given" : assertion.message;
+    }
+  }
+  throw Refused{failed(DFM_E_DIVERGED, "host \"ode\": ODE gave up with \"%s\"; rigid bodies, joints or forces are beyond what it can compute: look for huge "
+                                       "positions, speeds, spins or gravity, and for degenerate shapes and inertias", broken_.c_str())};
+}
+
+// What ODE can be given: where a double still resolves a contact (1e-7 m at the bound), and far from where its squares overflow.
+constexpr double kReach = 1e9, kFast = 1e9;   // m; m/s and rad/s
+
+void check(const dfm_rigid_state &s, uint32_t number, const char *when) {
+  const Quat q{s.rotation[0], s.rotation[1], s.rotation[2], s.rotation[3]};
+  const double turn = q.x * q.x + q.y * q.y + q.z * q.z + q.w * q.w;
+  const auto within = [](const double *x, double most) { return std::fabs(x[0]) <= most && std::fabs(x[1]) <= most && std::fabs(x[2]) <= most; };
+  if (within(s.position, kReach) && within(s.velocity, kFast) && within(s.spin, kFast) && turn > 0.5 && turn < 2) return;
+  throw Refused{failed(DFM_E_DIVERGED, "host \"ode\": rigid body %u (counted from 0) is %s at (%g, %g, %g) m with (%g, %g, %g) m/s and (%g, %g, %g) rad/s; ODE is given "
+                                       "bodies within %g m, %g m/s and %g rad/s, turned by unit quaternions", number, when, s.position[0], s.position[1], s.position[2],
+                       s.velocity[0], s.velocity[1], s.velocity[2], s.spin[0], s.spin[1], s.spin[2], kReach, kFast, kFast)};
+}
+
 OwnWorld::OwnWorld(const dfm_rigid_set_def &set, uint32_t *group) {
+  call([&] { build(set, group); });
+}
+
+void OwnWorld::build(const dfm_rigid_set_def &set, uint32_t *group) {
   dInitODE2(0);
   engine_.world = dWorldCreate();
   space_ = dHashSpaceCreate(nullptr);
@@ -134,6 +175,7 @@ OwnWorld::OwnWorld(const dfm_rigid_set_def &set, uint32_t *group) {
   members_.resize(set.nbody), given_.resize(set.nbody);
   for (uint32_t i = 0; i < set.nbody; ++i) {
     given_[i] = state_of(set.bodies[i]);
+    check(given_[i], i, "made");
     add_body(set.bodies[i], i);
     group[i] = members_[i].body ? static_cast<uint32_t>(moving_.size()) : DFM_RIGID_STILL;
     if (members_[i].body) moving_.push_back(i);
@@ -144,6 +186,7 @@ OwnWorld::OwnWorld(const dfm_rigid_set_def &set, uint32_t *group) {
 }
 
 OwnWorld::~OwnWorld() {
+  if (!broken_.empty()) return;           // ODE left its world locked and half stepped: destroying it would end the process
   engine_.end();
   dJointGroupDestroy(engine_.contacts);
   dSpaceDestroy(space_);
@@ -168,6 +211,15 @@ double OwnWorld::effort(const Joint &j, const dfm_rigid_state *state) {
 }
 
 dfm_status OwnWorld::predict(const dfm_rigid_step &step, double *velocity) {
+  for (const uint32_t i : moving_) check(step.state[i], i, "now");
+  for (int k = 0; k < 3; ++k)
+    if (!(std::fabs(step.gravity[k] * step.h) <= kFast))
+      throw Refused{failed(DFM_E_DIVERGED, "host \"ode\": gravity of %g m/s2 changes speeds by more than %g m/s in a sub-step of %g s", step.gravity[k], kFast, step.h)};
+  call([&] { predict_all(step, velocity); });
+  return DFM_OK;
+}
+
+void OwnWorld::predict_all(const dfm_rigid_step &step, double *velocity) {
   dWorldSetGravity(engine_.world, step.gravity[0], step.gravity[1], step.gravity[2]);
   for (size_t k = 0; k < joints_.size(); ++k) drive(joints_[k], step.extra + first_joint() + kMotor * k);
   for (const uint32_t i : moving_)
@@ -175,7 +227,6 @@ dfm_status OwnWorld::predict(const dfm_rigid_step &step, double *velocity) {
   if (!engine_.is_open())
     for (const uint32_t i : moving_) members_[i].put(step.state[i]), given_[i] = step.state[i];
   for (const uint32_t i : moving_) engine_.predict(members_[i], step, i, velocity + 6 * size_t{i});
-  return DFM_OK;
 }
 
 void OwnWorld::push(const dfm_rigid_step &, const double *impulse) {
@@ -186,7 +237,10 @@ bool OwnWorld::commit(const dfm_rigid_step &step, dfm_rigid_state *state, double
   bool again = false;
   std::memcpy(extra, step.extra, sizeof(double) * this->extra());
   std::memcpy(state, step.state, sizeof(dfm_rigid_state) * members_.size());
-  for (const uint32_t i : moving_) again |= engine_.commit(members_[i], i, state, extra, step.h);
+  call([&] {
+    for (const uint32_t i : moving_) again |= engine_.commit(members_[i], i, state, extra, step.h);
+  });
+  for (const uint32_t i : moving_) check(state[i], i, "after the step");
   for (size_t k = 0; k < joints_.size(); ++k) extra[first_joint() + kMotor * k + 2] = effort(joints_[k], step.state);
   // Asked for another round, the engine goes back by itself; the world then gives the same start state as before.
   for (const uint32_t i : moving_)

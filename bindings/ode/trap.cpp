@@ -1,0 +1,50 @@
+#include "trap.h"
+
+#include <ode/ode.h>
+
+#include <cstdarg>
+#include <cstdio>
+#include <mutex>
+
+namespace dfm_ode_detail {
+namespace {
+
+thread_local int inside = 0;                 // calls of ours on this thread
+std::mutex mutex;                            // over what follows
+int traps = 0;
+dMessageFunction *theirs_debug = nullptr, *theirs_error = nullptr;
+
+void caught(int number, const char *message, va_list args, dMessageFunction *theirs) {
+  if (inside > 0) {
+    char text[256];
+    std::vsnprintf(text, sizeof text, message, args);
+    throw Assertion{text};
+  }
+  if (theirs) return theirs(number, message, args);
+  std::fprintf(stderr, "\nODE INTERNAL ERROR %d: ", number);   // ODE's own words where nobody has set a handler; it ends the process after them
+  std::vfprintf(stderr, message, args);
+  std::fprintf(stderr, "\n");
+}
+void on_debug(int number, const char *message, va_list args) { caught(number, message, args, theirs_debug); }
+void on_error(int number, const char *message, va_list args) { caught(number, message, args, theirs_error); }
+
+}  // namespace
+
+Trap::Trap() {
+  const std::lock_guard lock(mutex);
+  if (traps++ == 0) {
+    theirs_debug = dGetDebugHandler(), theirs_error = dGetErrorHandler();
+    dSetDebugHandler(on_debug), dSetErrorHandler(on_error);
+  }
+  ++inside;
+}
+
+Trap::~Trap() {
+  const std::lock_guard lock(mutex);
+  --inside;
+  if (--traps > 0) return;
+  if (dGetDebugHandler() == on_debug) dSetDebugHandler(theirs_debug);   // else somebody has set one meanwhile
+  if (dGetErrorHandler() == on_error) dSetErrorHandler(theirs_error);
+}
+
+}  // namespace dfm_ode_detail
