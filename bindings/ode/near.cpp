@@ -20,6 +20,8 @@ Vec any_tangent(Vec n) {
   return (1 / norm(t)) * t;
 }
 
+bool is_direction(Vec v) { return std::fabs(dot(v, v) - 1) < 1e-3; }
+
 }  // namespace
 
 RigidFriction::~RigidFriction() { clear_law(); }
@@ -195,6 +197,7 @@ bool RigidFriction::read(const std::function<dGeomID(double)> &geom, const doubl
     c.key = {a, b}, c.a = dGeomGetBody(a), c.b = dGeomGetBody(b);
     c.place = load(p + 2), c.normal = load(p + 5), c.tangent[0] = load(p + 8);
     c.tangent[1] = cross(c.normal, c.tangent[0]), c.fn = p[11], c.state.assign(p + 12, p + row);
+    if (!(c.fn >= 0) || !is_direction(c.normal) || !is_direction(c.tangent[0])) return false;
     out[c.key].push_back(std::move(c));
   }
   return true;

@@ -1,9 +1,12 @@
 // What the dfm_world's own snapshot does not hold of an ODE scene, behind it: bodies without geoms that joints lead to, and what friction between rigid
 // bodies remembers. Everything else that a later step depends on is the world's: states, what joints did last, who sleeps and for how long it has idled.
 //
-//   magic, bytes of the world's, geoms in the space, bodies with them, bodies without, numbers of friction, seed
+//   magic, version, bytes of all, checksum, bytes of the world's, geoms in the space, bodies with them, bodies without, numbers of friction, seed
 //   the world's | of bodies with geoms: enabled? | of those without: 16 numbers each | friction
+//
+// A restore reads and checks all of it before it changes anything; the world's own restore comes first and is the only part that can still refuse.
 #include <algorithm>
+#include <cmath>
 #include <cstring>
 
 #include "adapter.h"
@@ -13,9 +16,28 @@ namespace {
 
 #define TRY(call) do { if (const dfm_status status_ = (call); status_ != DFM_OK) return status_; } while (0)
 
-constexpr uint64_t kMagic = 0x315f65646f5f6664ull;
+constexpr uint64_t kMagic = 0x0065646f5f6d6664ull, kVersion = 2;   // "dfm_ode" 0
 constexpr size_t kPerBody = 16;
-struct Head { uint64_t magic, world, geoms, members, bodies, friction, seed; };   // seed: of dWorldQuickStep's order of constraints
+// seed: of dWorldQuickStep's order of constraints
+struct Head { uint64_t magic, version, length, checksum, world, geoms, members, bodies, friction, seed; };
+
+// FNV-1a, 64 bit, of everything but the checksum itself.
+uint64_t checksum_of(const unsigned char *data, size_t bytes) {
+  uint64_t value = 14695981039346656037ull;
+  for (size_t i = 0; i < bytes; ++i)
+    if (i < offsetof(Head, checksum) || i >= offsetof(Head, checksum) + sizeof(uint64_t)) value = (value ^ data[i]) * 1099511628211ull;
+  return value;
+}
+
+bool flag(double x) { return x == 0 || x == 1; }
+
+// As save() writes it: finite, its quaternion of length one, enabled or not, idle for no negative time.
+bool good_body(const double *p) {
+  double poison = 0;
+  for (size_t i = 0; i < kPerBody; ++i) poison += 0.0 * p[i];
+  const double q = p[3] * p[3] + p[4] * p[4] + p[5] * p[5] + p[6] * p[6];
+  return poison == 0 && std::fabs(q - 1) < 1e-3 && flag(p[13]) && p[14] >= 0 && p[15] >= 0;
+}
 
 void save(dBodyID b, const Engine::Idle &idle, std::vector<double> &out) {
   const dReal *const x = dBodyGetPosition(b), *const q = dBodyGetQuaternion(b), *const v = dBodyGetLinearVel(b), *const w = dBodyGetAngularVel(b);
@@ -46,8 +68,8 @@ dfm_status Adapter::snapshot(void *buffer, size_t *bytes) {
   }, numbers);
   size_t world = 0;
   TRY(dfm_world_snapshot(world_, nullptr, &world));
-  const Head head{kMagic, world, seen_.size(), bodies_.size(), hidden.size(), numbers.size() - of_bodies, dRandGetSeed()};
-  const size_t whole = sizeof head + world + numbers.size() * sizeof(double), room = *bytes;
+  Head head{kMagic, kVersion, 0, 0, world, seen_.size(), bodies_.size(), hidden.size(), numbers.size() - of_bodies, dRandGetSeed()};
+  const size_t whole = head.length = sizeof head + world + numbers.size() * sizeof(double), room = *bytes;
   *bytes = whole;
   if (!buffer) return DFM_OK;
   if (room < whole) return failed(DFM_E_ARG, "a snapshot of this scene takes %zu bytes, the buffer has %zu; ask with buffer NULL first", whole, room);
@@ -55,6 +77,8 @@ dfm_status Adapter::snapshot(void *buffer, size_t *bytes) {
   std::memcpy(to, &head, sizeof head), to += sizeof head;
   TRY(dfm_world_snapshot(world_, to, &world));
   std::memcpy(to + world, numbers.data(), numbers.size() * sizeof(double));
+  head.checksum = checksum_of(static_cast<unsigned char *>(buffer), whole);
+  std::memcpy(buffer, &head, sizeof head);
   return DFM_OK;
 }
 
@@ -65,14 +89,23 @@ dfm_status Adapter::restore(const void *buffer, size_t bytes) {
   if (bytes >= sizeof head) std::memcpy(&head, from, sizeof head);
   const std::vector<dBodyID> hidden = hidden_bodies();
   const size_t rest = bytes < sizeof head ? 0 : bytes - sizeof head, fixed = sizeof(double) * (bodies_.size() + kPerBody * hidden.size());
+  if (head.magic == kMagic && head.version != kVersion)
+    return failed(DFM_E_FORMAT, "the snapshot was written by another version of the adapter (format %llu, this one reads %llu); nothing was restored",
+                  static_cast<unsigned long long>(head.version), static_cast<unsigned long long>(kVersion));
+  if (head.magic == kMagic && (head.length != bytes || head.checksum != checksum_of(from, bytes)))
+    return failed(DFM_E_FORMAT, "the snapshot is cut short or damaged (length or checksum); nothing was restored");
   if (head.magic != kMagic || head.world > rest || rest - head.world < fixed || (rest - head.world - fixed) / sizeof(double) != head.friction ||
       (rest - head.world - fixed) % sizeof(double) != 0 || head.geoms != seen_.size() || head.members != bodies_.size() || head.bodies != hidden.size())
     return failed(DFM_E_FORMAT, "this is not a whole snapshot of dfm_ode_snapshot of a scene with %zu geoms and %zu bodies without", seen_.size(), hidden.size());
   const size_t first = bodies_.size(), behind = first + kPerBody * hidden.size();
   std::vector<double> numbers(behind + head.friction);
   std::memcpy(numbers.data(), from + sizeof head + head.world, numbers.size() * sizeof(double));
+  bool good = std::all_of(numbers.begin(), numbers.begin() + std::ptrdiff_t(first), flag);
+  for (size_t i = 0; i < hidden.size(); ++i) good = good && good_body(&numbers[first + kPerBody * i]);
+  good = good && std::all_of(numbers.begin() + std::ptrdiff_t(behind), numbers.end(), [](double x) { return std::isfinite(x); });
+  if (!good) return failed(DFM_E_FORMAT, "the snapshot is damaged: a number of its bodies or of their friction is out of range; nothing was restored");
   RigidFriction::Memory friction;
-  const auto geom = [&](double number) { return number >= 0 && number < double(seen_.size()) ? seen_[size_t(number)] : nullptr; };
+  const auto geom = [&](double number) { return number == std::floor(number) && number >= 0 && number < double(seen_.size()) ? seen_[size_t(number)] : nullptr; };
   if (!near_.read(geom, numbers.data() + behind, head.friction, friction))
     return failed(DFM_E_FORMAT, "the snapshot was made with another law between rigid bodies; call dfm_ode_set_friction with that one first");
   if (const dfm_status status = dfm_world_restore(world_, from + sizeof head, head.world); status != DFM_OK) return status;

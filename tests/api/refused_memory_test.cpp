@@ -130,6 +130,32 @@ TEST(RefusedMemory, InAStepThatFallsAsleepAndWakes_LeavesTheWorldAsItWas) { walk
 TEST(RefusedMemory, InAStepWithARigidHost_LeavesTheWorldAsItWas) { walk_all(rigid_host, 40); }
 TEST(RefusedMemory, InAStepOfALawThatRemembers_LeavesTheWorldAsItWas) { walk_all(bristles, 40); }
 
+// A restore that finds no memory, wherever it misses it, leaves the world that was there; with memory it is done.
+TEST(RefusedMemory, InARestore_LeavesTheWorldAsItWas) {
+  dfm_context *const c = make_context();
+  const dfm_world w = sleepers(c);
+  for (int i = 0; i < 4; ++i) test::ok(dfm_world_step(w, kStep, nullptr));
+  const std::string then = test::snapshot(w);
+  const uint64_t hash_then = dfm_world_hash(w);
+  for (int i = 0; i < 6; ++i) test::ok(dfm_world_step(w, kStep, nullptr));
+  const uint64_t hash = dfm_world_hash(w);
+  const uint32_t asleep = test::stats(w).asleep;
+  int64_t n = 0;
+  for (dfm_status status = DFM_E_NOMEM; status != DFM_OK && n < 10000; ++n) {
+    Refusal::arm(n);
+    status = dfm_world_restore(w, then.data(), then.size());
+    Refusal::disarm();
+    if (status == DFM_OK) break;
+    ASSERT_EQ(status, DFM_E_NOMEM) << "allocation " << n << ": " << dfm_last_error();
+    ASSERT_EQ(dfm_world_hash(w), hash) << "allocation " << n;
+    ASSERT_EQ(test::stats(w).asleep, asleep) << "allocation " << n;
+  }
+  EXPECT_GT(n, 60);
+  EXPECT_EQ(dfm_world_hash(w), hash_then);
+  EXPECT_EQ(test::snapshot(w), then);
+  dfm_context_destroy(c);
+}
+
 // Context, world and bodies: what was refused is not there, and nothing is left of it.
 TEST(RefusedMemory, InTheSetUp_EndsInAnErrorAndLeaksNothing) {
   int refused = 0;

@@ -8,10 +8,10 @@
 
 namespace test {
 
-inline std::atomic<uint64_t> heap_calls{0};
+inline std::atomic<uint64_t> heap_calls{0}, heap_bytes{0};   // since the program began
 
 inline void *counted_alloc(size_t bytes, size_t align) {
-  ++heap_calls;
+  ++heap_calls, heap_bytes += bytes;
   if (void *p = align > sizeof(void *) ? std::aligned_alloc(align, (bytes + align - 1) / align * align) : std::malloc(bytes ? bytes : 1)) return p;
   throw std::bad_alloc();
 }

@@ -97,7 +97,8 @@ DFM_API uint64_t dfm_world_hash(dfm_world world);
 DFM_API dfm_status dfm_world_snapshot(dfm_world world, void *buffer, size_t *bytes);
 /** Restores into a world with the same bodies and obstacles (a scene loaded anew, in another process too): state, contacts, loads, holds,
  * motions, gravity, filters, friction rules, runtime parameters. The next steps give the same bits; events not yet read are dropped.
- * @return DFM_OK; DFM_E_FORMAT not a snapshot of such a world (nothing changed); DFM_E_HANDLE. Threads: Not during step. Since 0.1. */
+ * @return DFM_OK; DFM_E_FORMAT damaged, of another version or not of such a world; DFM_E_UNSUPPORTED a law that is not loaded; DFM_E_NOMEM; DFM_E_HANDLE.
+ * On failure nothing has changed. Threads: Not during step. Since 0.1. */
 DFM_API dfm_status dfm_world_restore(dfm_world world, const void *buffer, size_t bytes);
 
 /** @return DFM_OK; DFM_E_ARG no body of that name (nearest one). Threads: Any thread. Not during step. Since 0.1. */

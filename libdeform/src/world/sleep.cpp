@@ -260,7 +260,11 @@ void World::carry_sleepers(uint32_t *touching, uint32_t *sticking) {
 }
 
 // Is a contact of the old store one of sleepers, which goes on as it is?
-bool World::sleeps(uint32_t m) const { return sleepers > 0 && bodies[last_report.contacts[m].slot_a]->slumber.asleep; }
+bool World::sleeps(uint32_t m) const {
+  if (sleepers == 0) return false;
+  const uint32_t slot = last_report.contacts[m].slot_a;
+  return slot != kNone && bodies[slot]->slumber.asleep;
+}
 
 // Contacts that sleep stick: a hold that begins now counts them from now on.
 void World::hold_sleepers() {
@@ -276,7 +280,8 @@ void World::close_slot(uint64_t id, bool obstacle) {
   else wake(*bodies[slot]);
   if (sleepers == 0) report.n = 0;
   for (ContactPoint &c : report.contacts) {
-    if (!obstacle && c.slot_a > slot) --c.slot_a;
+    if (!obstacle && c.slot_a == slot) c.slot_a = kNone;   // touches no more, and is nobody's until the next sub-step drops it
+    else if (!obstacle && c.slot_a > slot && c.slot_a != kNone) --c.slot_a;
     if (bool(c.obstacle) == obstacle && c.slot_b > slot) --c.slot_b;
   }
 }

@@ -1,18 +1,25 @@
 // Snapshot, restore and hash: everything that a later result depends on, and nothing else. Candidate lists are left out on purpose:
 // contacts come from exact geometry, so lists that are built anew give the same contacts (broad/). What the host may change between two
 // steps (loads, holds, motions, gravity, filters, friction rules, runtime parameters) is state too.
+//
+// A field is one line in one of the ..._fields() functions below: its name, where it lies and what it must be. Writing, reading and the check all
+// follow from it; what must hold between fields stands in check(). A restore reads and checks everything into a Staged before it changes anything,
+// then exchanges it with the world, which cannot fail; where the tables that follow cannot be made it exchanges back.
+#include "world/snapshot.h"
+
+#include <algorithm>
 #include <cstring>
+#include <numeric>
 
 #include "core/error.h"
 #include "core/hash.h"
 #include "surfel/make_surface.h"
 #include "world/measure.h"
+#include "world/snapshot_stream.h"
 #include "world/world.h"
 
 namespace dfm {
 namespace {
-
-constexpr char kMagic[8] = {'d', 'f', 'm', 's', 'n', 'a', 'p', '6'};
 
 void zone(Hash &h, const SurfaceZones::Zone &z) {
   h.add(z.group.data(), z.group.size()), h.add(z.material.data(), z.material.size()), h.add(z.friction);
@@ -58,86 +65,50 @@ uint64_t structure(const World &w) {
   return h.value;
 }
 
-// One list of fields serves writing and reading.
-struct Writer {
-  std::vector<unsigned char> &out;
-  void bytes(const void *p, size_t n) { out.insert(out.end(), static_cast<const unsigned char *>(p), static_cast<const unsigned char *>(p) + n); }
-  template <class T>
-  void value(const T &x) { bytes(&x, sizeof x); }
-  template <class A>
-  void array(const A &a) { value(uint64_t(a.size())), bytes(a.data(), a.size() * sizeof(a[0])); }
-  template <class A, class F>
-  void each(const A &a, F f) {
-    value(uint64_t(a.size()));
-    for (const auto &x : a) f(x);
-  }
-};
-
-struct Reader {
-  const unsigned char *p, *end;
-  void bytes(void *to, size_t n) {
-    if (size_t(end - p) < n) fail(DFM_E_FORMAT, "snapshot is cut short: %zu bytes missing; nothing was restored", n - size_t(end - p));
-    if (n) std::memcpy(to, p, n);
-    p += n;
-  }
-  uint64_t count(size_t entry) {
-    uint64_t n;
-    value(n);
-    if (n > uint64_t(end - p) / entry)
-      fail(DFM_E_FORMAT, "snapshot is damaged: an array of %llu entries does not fit; nothing was restored", static_cast<unsigned long long>(n));
-    return n;
-  }
-  template <class T>
-  void value(T &x) { bytes(&x, sizeof x); }
-  template <class A>
-  void array(A &a) {
-    a.resize(count(sizeof(a[0])));
-    bytes(a.data(), a.size() * sizeof(a[0]));
-  }
-  template <class A, class F>
-  void each(A &a, F f) {
-    a.resize(count(1));
-    for (auto &x : a) f(x);
-  }
-};
-
-// A world's changing part, read in full before anything of it is put in place. Members are named as in World, Body and Obstacle, so that
-// fields() below serves both.
+// A world's changing part, read in full before anything of it is put in place. Members are named as in World, Body and Obstacle, so that the lists
+// of fields serve both.
 struct StagedBody {
-  struct { std::vector<double> x, v, load; std::vector<uint8_t> held; } p;
-  struct { std::vector<double> state, params; } model;
+  struct { Array<double> x, v, load; Array<uint8_t> held; } p;
+  struct { Array<double> state; std::vector<double> params; } model;
   Vec3 contact_impulse;
   std::vector<Load> loads;
   std::vector<Spring> springs;
   std::vector<HeldMotion> motions;
   uint32_t next_load = 1, category = 1, collides_with = ~0u;
   Slumber slumber;
-  std::vector<double> surfel_impulse, anchor, lagged;
+  Array<double> surfel_impulse, anchor, lagged;
 };
-struct StagedObstacle { Pose pose, target; bool has_target; std::vector<dfm_pose_key> keys; dfm_obstacle_def def; };
-struct StagedRigids { std::vector<dfm_rigid_state> state; std::vector<double> extra, total; };
+struct StagedObstacle { Pose pose, target; bool has_target = false; std::vector<dfm_pose_key> keys; dfm_obstacle_def def{}; };
+struct StagedRigids { Array<dfm_rigid_state> state; Array<double> extra, total; double last_h = 0; };
 struct StagedLaw { std::string id; std::vector<double> params; };
 struct Staged {
-  double time, stable, offset, hold_start;
-  uint64_t step_count, next_id;
-  uint32_t inverted, sleepers;
-  bool holding;
-  uint32_t bound_age;
+  double time = 0, stable = 0, offset = 0, hold_start = 0;
+  uint64_t step_count = 0, next_id = 0;
+  uint32_t inverted = 0, sleepers = 0, bound_age = 0;
+  bool holding = false;
   StepSizes sizes;
-  dfm_world_stats stats;
+  dfm_world_stats stats{};
   Vec3 gravity;
-  dfm_world_def def;
+  dfm_world_def def{};
   std::vector<dfm_vector_key> gravity_keys;
   std::vector<StagedBody> bodies;
   std::vector<StagedObstacle> obstacles;
-  std::vector<StagedRigids> rigid_sets;                // as many as the world has, before reading: `structure` vouches for them
+  std::vector<StagedRigids> rigid_sets;
   std::vector<StagedLaw> laws;
   std::vector<FrictionRule> friction;
   std::vector<FilterRule> filters;
   ContactStore store;
   std::vector<PairWork> work;
   Report report;
-  explicit Staged(const Memory &m) : store(m) { use_memory(m, report.contacts, report.frame, report.impulse, report.slip, report.mode); }
+  std::vector<dfm_contact_event> events;   // none
+  explicit Staged(const World &w) : store(w.memory()) {
+    const Memory &m = w.memory();
+    use_memory(m, report.contacts, report.frame, report.impulse, report.slip, report.mode);
+    def.method = w.def.method;
+    bodies.resize(w.bodies.size()), obstacles.resize(w.obstacles.size()), rigid_sets.resize(w.rigid_sets.size());
+    for (StagedBody &b : bodies) use_memory(m, b.p.x, b.p.v, b.p.load, b.p.held, b.model.state, b.surfel_impulse, b.anchor, b.lagged);
+    for (StagedRigids &r : rigid_sets) use_memory(m, r.state, r.extra, r.total);
+  }
 };
 
 template <class T>
@@ -145,118 +116,306 @@ auto &object(T &x) { return x; }
 template <class T>
 T &object(const std::unique_ptr<T> &x) { return *x; }
 
-template <class Stream, class W>
-void fields(Stream &s, W &w) {
-  s.value(w.time), s.value(w.step_count), s.value(w.stable), s.value(w.inverted), s.value(w.bound_age), s.value(w.offset);
-  for (auto *r : {&w.sizes.cut, &w.sizes.offer}) s.value(r->size), s.value(r->calm), s.value(r->patience);
-  s.value(w.hold_start), s.value(w.holding);
-  s.value(w.stats), s.value(w.gravity), s.value(w.def.gravity), s.value(w.next_id), s.array(w.gravity_keys);
-  s.value(w.def.sleep), s.value(w.sleepers);
-  s.each(w.bodies, [&](auto &entry) {
-    auto &b = object(entry);
-    s.array(b.p.x), s.array(b.p.v), s.array(b.p.held), s.array(b.p.load), s.array(b.model.state), s.array(b.model.params);
-    s.value(b.contact_impulse), s.value(b.next_load), s.value(b.category), s.value(b.collides_with);
-    s.each(b.loads, [&](auto &l) { s.value(l.number), s.array(l.points), s.array(l.force), s.array(l.keys), s.value(l.sine); });
-    Slumber &z = b.slumber;
-    s.value(z.asleep), s.value(z.calm), s.value(z.since), s.value(z.h), s.value(z.force);
-    if (z.asleep) s.array(b.surfel_impulse);
-    if (w.def.sleep) s.array(b.anchor);
-    if (w.def.method == DFM_METHOD_ROLLBACK) s.array(b.lagged);
-    s.each(b.springs, [&](auto &p) {
-      s.value(p.number), s.array(p.points), s.array(p.weights), s.array(p.keys), s.value(p.to), s.value(p.stiffness), s.value(p.damping);
-    });
-    s.each(b.motions, [&](auto &m) { s.array(m.points), s.array(m.start), s.array(m.keys), s.value(m.sine); });
-  });
-  s.each(w.obstacles, [&](auto &entry) {
-    auto &o = object(entry);
-    s.value(o.pose), s.value(o.target), s.value(o.has_target), s.array(o.keys), s.value(o.def.sine);
-  });
-  for (auto &entry : w.rigid_sets) {
-    auto &r = object(entry);
-    s.array(r.state), s.array(r.extra), s.array(r.total);
+std::string id_of(const LawInstance &law) { return law.type->id; }
+std::string &id_of(StagedLaw &law) { return law.id; }
+
+// ---- what values must be --------------------------------------------------------------------------------------------------
+
+template <class Key>
+bool rise(const std::vector<Key> &keys) {
+  try {
+    check_keys(keys, "");
+    return true;
+  } catch (const Error &) {
+    return false;
   }
-  auto rule = [&](auto &r) { s.array(r.between[0]), s.array(r.between[1]); };
-  s.each(w.friction, [&](auto &r) { rule(r), s.value(r.law); });
-  s.each(w.filters, [&](auto &r) { rule(r), s.value(r.collide); });
-  auto &c = w.store;
-  s.value(c.n), s.value(c.nstate), s.value(c.h);
-  s.array(c.key), s.array(c.id_a), s.array(c.id_b), s.array(c.by_key), s.array(c.normal), s.array(c.tangent), s.array(c.impulse), s.array(c.bristle);
-  s.array(c.law), s.array(c.dwell), s.array(c.area), s.array(c.due), s.array(c.path), s.array(c.touching), s.array(c.held), s.array(c.began);
-  s.array(c.crossings);
-  s.array(w.work);
+}
+
+// Vectors lie four doubles apart, and detection counts on a fourth that is zero.
+template <class A>
+bool padded(const A &a) {
+  for (size_t i = 3; i < a.size(); i += kStride)
+    if (a[i] != 0) return false;
+  return true;
+}
+
+template <class List>
+bool below(const List &list, uint32_t n) {
+  return std::all_of(list.begin(), list.end(), [n](uint32_t i) { return i < n; });
+}
+
+bool in_range(const dfm_type &type, const std::vector<double> &values) {
+  std::vector<dfm_param_value> given;
+  size_t at = 0;
+  for (uint32_t i = 0; i < type.nparam; at += type.params[i++].width) given.push_back({type.params[i].key, values.data() + at, type.params[i].width});
+  try {
+    pack_params(type, given);
+    return true;
+  } catch (const Error &) {
+    return false;
+  }
+}
+
+bool good_state(const dfm_rigid_state &s) {
+  return must::all_finite(s.position) && must::all_finite(s.velocity) && must::all_finite(s.spin) && must::rotation.is(s.rotation);
+}
+
+bool good_stats(const dfm_world_stats &s) {
+  return s.size == sizeof s && must::all_finite(s.time) && must::all_finite(s.residual) && must::all_finite(s.contacts_mean) &&
+         must::all_finite(s.residual_max) && s.stable_step >= 0 && must::all_finite(s.sleep_energy) && must::all_finite(s.sleep_momentum) &&
+         must::all_finite(s.guard_lost);
+}
+
+constexpr uint64_t kMostIds = uint64_t{1} << 48;   // far more than any run makes, and far from where counting on would wrap
+uint64_t last_id(const World &w) {
+  return std::max(w.bodies.empty() ? 0 : w.bodies.back()->id, w.obstacles.empty() ? 0 : w.obstacles.back()->id);
+}
+
+constexpr double kLeastStep = 1e-15;   // s; no bound of a body in SI units lies below, and a smaller one would never let the world step again
+
+// ---- the fields -----------------------------------------------------------------------------------------------------------
+
+// `like`: the world that is written, or read into.
+template <class Stream, class B>
+void prescribed_fields(Stream &s, B &b, const Body &like) {
+  s.value("next_load", b.next_load, must::any);
+  const auto sine = [&](auto &x) { s.value("sine", x, must::finite); };
+  s.list("loads", b.loads, [&](auto &l) {
+    s.value("load number", l.number, must::any);
+    s.array("load points", l.points, kAnyCount, must::below(like.p.n));
+    s.array("load force", l.force, 3 * l.points.size(), must::finite);
+    s.array("load keys", l.keys, kAnyCount, must::any), sine(l.sine);
+    s.must_hold("load keys", "finite keys at rising times", [&] { return rise(l.keys); });
+    s.must_hold("load number", "a number below the next one", [&] { return l.number < b.next_load; });
+  });
+  s.list("springs", b.springs, [&](auto &p) {
+    s.value("spring number", p.number, must::any);
+    s.array("spring points", p.points, kAnyCount, must::below(like.p.n));
+    s.array("spring weights", p.weights, p.points.size(), must::not_negative);
+    s.array("spring keys", p.keys, kAnyCount, must::any);
+    s.value("spring end", p.to, must::finite);
+    s.value("spring stiffness", p.stiffness, must::not_negative), s.value("spring damping", p.damping, must::not_negative);
+    s.must_hold("spring keys", "finite keys at rising times", [&] { return rise(p.keys); });
+    s.must_hold("spring number", "a number below the next one, on a body that is no self-stepping one",
+                [&] { return p.number < b.next_load && !like.model.stepper; });
+    s.must_hold("spring weights", "weights that sum to one", [&] {
+      return std::fabs(std::accumulate(p.weights.begin(), p.weights.end(), 0.0) - 1) < 1e-9;
+    });
+  });
+  s.list("motions", b.motions, [&](auto &m) {
+    s.array("motion points", m.points, kAnyCount, must::below(like.p.n));
+    s.array("motion start", m.start, 3 * m.points.size(), must::finite);
+    s.array("motion keys", m.keys, kAnyCount, must::any), sine(m.sine);
+    s.must_hold("motion keys", "finite keys at rising times", [&] { return rise(m.keys); });
+  });
+}
+
+template <class Stream, class W, class B>
+void body_fields(Stream &s, W &w, B &b, const Body &like) {
+  s.where("body", like.name);
+  s.array("position", b.p.x, like.p.x.size(), must::finite), s.array("velocity", b.p.v, like.p.v.size(), must::finite);
+  s.array("held", b.p.held, like.p.held.size(), must::at_most(7)), s.array("load sum", b.p.load, like.p.load.size(), must::finite);
+  s.must_hold("position", "a fourth component of zero", [&] { return padded(b.p.x) && padded(b.p.v) && padded(b.p.load); });
+  s.array("model state", b.model.state, like.model.state.size(), must::finite);
+  s.array("model parameters", b.model.params, like.model.params.size(), must::finite);
+  s.must_hold("model parameters", "values in the range of the model's table", [&] { return in_range(*like.model.type, b.model.params); });
+  s.value("contact_impulse", b.contact_impulse, must::finite);
+  s.value("category", b.category, must::any), s.value("collides_with", b.collides_with, must::any);
+  s.value("asleep", b.slumber.asleep, must::flag), s.value("calm", b.slumber.calm, must::not_negative);
+  s.value("asleep since", b.slumber.since, must::not_negative), s.value("sub-step asleep", b.slumber.h, must::not_negative);
+  s.value("force asleep", b.slumber.force, must::finite);
+  s.must_hold("asleep", "a sleep that began in a sub-step before now, where bodies may sleep", [&] {
+    return !b.slumber.asleep || (w.def.sleep && b.slumber.since <= w.time && b.slumber.h > 0);
+  });
+  if (b.slumber.asleep) s.array("surfel impulse", b.surfel_impulse, like.surfel_impulse.size(), must::finite);
+  if (w.def.sleep) s.array("anchor", b.anchor, like.p.x.size(), must::finite);
+  if (w.def.method == DFM_METHOD_ROLLBACK) s.array("lagged friction", b.lagged, like.lagged.size(), must::finite);
+  prescribed_fields(s, b, like);
+  s.where("", "");
+}
+
+template <class Stream, class C>
+void contact_fields(Stream &s, C &c, uint64_t laws) {
+  s.value("contacts", c.n, must::any), s.value("contact states", c.nstate, must::any), s.value("contact sub-step", c.h, must::not_negative);
+  const uint64_t n = c.n;
+  s.array("contact key", c.key, n, must::any), s.array("contact body", c.id_a, n, must::any), s.array("contact partner", c.id_b, n, must::any);
+  s.array("contact normal", c.normal, 3 * n, must::finite), s.array("contact tangent", c.tangent, 3 * n, must::finite);
+  s.array("contact impulse", c.impulse, 3 * n, must::finite), s.array("bristle", c.bristle, n * c.nstate, must::finite);
+  s.array("contact law", c.law, n, must::below(laws)), s.array("dwell", c.dwell, n, must::not_negative);
+  s.array("contact area", c.area, n, must::not_negative), s.array("area due", c.due, kAnyCount, must::not_negative);
+  s.array("hold path", c.path, 2 * n, must::finite), s.array("touching", c.touching, n, must::flag), s.array("in hold", c.held, n, must::flag);
+  s.array("began", c.began, n, must::flag), s.array("crossings", c.crossings, kAnyCount, must::any);
+}
+
+template <class Stream, class W>
+void rule_fields(Stream &s, W &w, uint64_t laws) {
+  const auto between = [&](auto &r) {
+    s.array("rule", r.between[0], kAnyCount, must::any), s.array("rule", r.between[1], kAnyCount, must::any);
+    s.must_hold("rule", "two names", [&] { return !r.between[0].empty() && !r.between[1].empty(); });
+  };
+  s.list("friction rules", w.friction, [&](auto &r) { between(r), s.value("rule's law", r.law, must::below(laws)); });
+  s.list("filter rules", w.filters, [&](auto &r) { between(r), s.value("collide", r.collide, must::flag); });
+}
+
+template <class Stream, class W>
+void fields(Stream &s, W &w, const World &like) {
+  s.list("laws", w.laws, [&](auto &entry) {
+    auto &l = object(entry);
+    s.array("law", id_of(l), kAnyCount, must::any);
+    s.must_hold("law", "the name of a law", [&] { return !id_of(l).empty(); });
+    s.array("law parameters", l.params, kAnyCount, must::finite);
+  });
+  s.value("time", w.time, must::not_negative), s.value("steps", w.step_count, must::any);
+  s.value("step bound", w.stable, must::Be{[](double x) { return x >= 0; }, "a time above zero"});
+  s.value("inverted cells", w.inverted, must::any), s.value("age of the bound", w.bound_age, must::any);
+  s.must_hold("step bound", "a time that a sub-step can have", [&] { return w.bound_age == kNone || w.stable >= kLeastStep; });
+  for (auto *r : {&w.sizes.cut, &w.sizes.offer})
+    s.value("step size", r->size, must::not_negative), s.value("calm of the size", r->calm, must::any), s.value("patience", r->patience, must::any);
+  s.must_hold("step size", "sizes that the library chooses", [&] { return sound(w.sizes); });
+  s.value("contact offset", w.offset, must::positive);
+  s.value("hold start", w.hold_start, must::finite), s.value("holding", w.holding, must::flag);
+  s.value("statistics", w.stats, must::Be{[](const dfm_world_stats &x) { return good_stats(x); }, "finite statistics"});
+  s.value("gravity", w.gravity, must::finite), s.value("gravity", w.def.gravity, must::finite);
+  s.value("next id", w.next_id, must::Be{[&](uint64_t x) { return x > last_id(like) && x < kMostIds; }, "a number above all that are taken"});
+  s.array("gravity keys", w.gravity_keys, kAnyCount, must::any);
+  s.must_hold("gravity keys", "finite keys at rising times", [&] { return rise(w.gravity_keys); });
+  s.value("sleep", w.def.sleep, must::flag), s.value("sleepers", w.sleepers, must::any);
+  s.must_hold("sleep", "no sleep with this contact method", [&] { return !w.def.sleep || like.def.method != DFM_METHOD_ROLLBACK; });
+  size_t at = 0;
+  s.members("bodies", w.bodies, like.bodies.size(), [&](auto &entry) { body_fields(s, w, object(entry), *like.bodies[at++]); });
+  at = 0;
+  s.members("obstacles", w.obstacles, like.obstacles.size(), [&](auto &entry) {
+    auto &o = object(entry);
+    s.where("obstacle", like.obstacles[at++]->name);
+    s.value("pose", o.pose, must::pose), s.value("target", o.target, must::pose), s.value("has a target", o.has_target, must::flag);
+    s.array("keys", o.keys, kAnyCount, must::any), s.value("sine", o.def.sine, must::finite);
+    s.must_hold("keys", "finite keys at rising times", [&] { return rise(o.keys); });
+  });
+  at = 0;
+  s.members("sets of rigid bodies", w.rigid_sets, like.rigid_sets.size(), [&](auto &entry) {
+    auto &r = object(entry);
+    const RigidSet &l = *like.rigid_sets[at++];
+    s.where("rigid body", l.defs[0].name);
+    s.array("rigid state", r.state, l.state.size(), must::Be{[](const dfm_rigid_state &x) { return good_state(x); }, "finite states and unit quaternions"});
+    s.array("host's values", r.extra, l.extra.size(), must::finite), s.array("impulse", r.total, l.total.size(), must::finite);
+  });
+  s.where("", "");
+  rule_fields(s, w, w.laws.size());
+  contact_fields(s, w.store, w.laws.size());
+  s.array("friction work", w.work, kAnyCount, must::Be{[](const PairWork &x) { return must::all_finite(x.work); }, "finite work"});
   if (w.sleepers == 0) return;   // contacts that sleep are reported from what the last sub-step left
   auto &r = w.report;
-  s.value(r.n), s.value(r.h), s.array(r.contacts), s.array(r.frame), s.array(r.impulse), s.array(r.slip), s.array(r.mode);
+  const uint64_t n = w.store.n;
+  s.value("reported contacts", r.n, must::at_most(n)), s.value("reported sub-step", r.h, must::positive), s.array("report", r.contacts, n, must::any);
+  s.array("reported frame", r.frame, 9 * n, must::finite), s.array("reported impulse", r.impulse, 3 * n, must::finite);
+  s.array("reported slip", r.slip, 2 * n, must::finite), s.array("reported mode", r.mode, n, must::at_most(2));
 }
 
-void write_laws(Writer &s, const World &w) {
-  s.each(w.laws, [&](auto &l) { s.array(std::string(l->type->id)), s.array(l->params); });
-}
+// ---- what must hold between fields ----------------------------------------------------------------------------------------
 
-// The checksum vouches for what was written, not for who wrote it: sizes are compared with the world all the same.
-void check(const Staged &t, const World &w) {
-  bool good = t.bodies.size() == w.bodies.size() && t.obstacles.size() == w.obstacles.size();
-  for (size_t i = 0; good && i < t.bodies.size(); ++i) {
-    const StagedBody &from = t.bodies[i];
-    const Body &b = *w.bodies[i];
-    good = from.p.x.size() == b.p.x.size() && from.p.v.size() == b.p.v.size() && from.p.held.size() == b.p.held.size() &&
-           from.p.load.size() == b.p.load.size() && from.model.state.size() == b.model.state.size() &&
-           from.model.params.size() == b.model.params.size();
-    for (const Load &l : from.loads) {
-      good = good && l.force.size() == 3 * l.points.size();
-      for (uint32_t p : l.points) good = good && p < b.p.n;
-    }
-    for (const Spring &p : from.springs) {
-      good = good && p.weights.size() == p.points.size();
-      for (uint32_t at : p.points) good = good && at < b.p.n;
-    }
-    for (const HeldMotion &m : from.motions) {
-      good = good && m.start.size() == 3 * m.points.size();
-      for (uint32_t p : m.points) good = good && p < b.p.n;
-    }
+// Of the world that is restored into; both lists are in id order.
+struct Things {
+  const World &w;
+  const Body *body(uint64_t id) const { return find(w.bodies, id); }
+  const Obstacle *obstacle(uint64_t id) const { return find(w.obstacles, id); }
+  bool known(uint64_t id) const { return body(id) || obstacle(id); }
+  template <class List>
+  static auto find(const List &list, uint64_t id) -> decltype(list[0].get()) {
+    const auto at = std::lower_bound(list.begin(), list.end(), id, [](const auto &x, uint64_t value) { return x->id < value; });
+    return at != list.end() && (*at)->id == id ? at->get() : nullptr;
   }
-  for (size_t i = 0; good && i < t.rigid_sets.size(); ++i) {
-    const StagedRigids &from = t.rigid_sets[i];
-    const RigidSet &set = *w.rigid_sets[i];
-    good = from.state.size() == set.state.size() && from.extra.size() == set.extra.size() && from.total.size() == set.total.size();
+  // Edges of a body or of a mesh.
+  uint32_t edges(uint64_t id) const {
+    if (const Body *const b = body(id)) return b->surface.nedge;
+    const Obstacle *const o = obstacle(id);
+    return o && o->mesh ? o->mesh->surface.nedge : 0;
   }
+};
+
+bool good_contacts(const Staged &t, const Things &things) {
   const ContactStore &c = t.store;
-  const size_t n = c.n;
-  good = good && c.key.size() == n && c.id_a.size() == n && c.id_b.size() == n && c.by_key.size() == n && c.normal.size() == 3 * n &&
-         c.tangent.size() == 3 * n && c.impulse.size() == 3 * n && c.bristle.size() == n * c.nstate && c.law.size() == n && c.dwell.size() == n &&
-         c.area.size() == n && (c.due.empty() || c.due.size() == n) &&
-         c.path.size() == 2 * n && c.touching.size() == n && c.held.size() == n && c.began.size() == n;
-  good = good && c.crossings.size() <= n && std::is_sorted(c.crossings.begin(), c.crossings.end());
-  for (uint32_t i : c.by_key) good = good && i < n;
-  for (uint32_t l : c.law) good = good && l < t.laws.size();
-  uint32_t sleepers = 0;
-  for (size_t i = 0; good && i < t.bodies.size(); ++i) {
-    const StagedBody &from = t.bodies[i];
-    sleepers += from.slumber.asleep;
-    good = (!from.slumber.asleep || from.surfel_impulse.size() == w.bodies[i]->surfel_impulse.size()) &&
-           (!t.def.sleep || from.anchor.size() == w.bodies[i]->p.x.size()) && from.lagged.size() == w.bodies[i]->lagged.size();
+  if (c.n > 0 && !(c.h > 0)) return false;
+  if (!c.due.empty() && c.due.size() != c.n) return false;
+  for (uint32_t i = 0; i < c.n; ++i) {
+    const Vec3 n = load3(&c.normal[3 * size_t{i}]), u = load3(&c.tangent[3 * size_t{i}]);
+    if (!(norm2(n) < 1.01 && norm2(u) < 1.01)) return false;
+    // Of what was removed since, contacts stay until the next sub-step, and touch no more.
+    if (c.id_a[i] >= t.next_id || c.id_b[i] >= t.next_id || (c.touching[i] && !(things.body(c.id_a[i]) && things.known(c.id_b[i])))) return false;
   }
-  good = good && sleepers == t.sleepers && t.def.sleep <= 1;
-  if (const Report &r = t.report; sleepers > 0) {
-    good = good && r.n == n && r.contacts.size() == n && r.frame.size() == 9 * n && r.impulse.size() == 3 * n && r.slip.size() == 2 * n && r.mode.size() == n;
-    for (const ContactPoint &p : r.contacts)
-      good = good && p.slot_a < w.bodies.size() && p.slot_b < (p.obstacle ? w.obstacles.size() : w.bodies.size());
+  if (c.crossings.size() > c.n || !std::is_sorted(c.crossings.begin(), c.crossings.end())) return false;
+  for (const Crossing &x : c.crossings)
+    if (things.known(x.id_a) && things.known(x.id_b) && (x.edge_a >= things.edges(x.id_a) || x.edge_b >= things.edges(x.id_b))) return false;
+  return true;
+}
+
+bool good_work(const std::vector<PairWork> &work, const Things &things) {
+  for (size_t i = 0; i < work.size(); ++i)
+    if (!things.body(work[i].a) || !things.known(work[i].b) ||
+        (i && !(std::pair(work[i - 1].a, work[i - 1].b) < std::pair(work[i].a, work[i].b))))
+      return false;
+  return true;
+}
+
+bool good_report(const Staged &t, const World &w) {
+  const Report &r = t.report;
+  if (r.n != t.store.n) return false;
+  for (uint32_t i = 0; i < r.n; ++i) {
+    const ContactPoint &c = r.contacts[i];
+    const double *const values[] = {c.weight, c.point, c.normal, &c.distance, &c.area, c.velocity};
+    const size_t counts[] = {4, 3, 3, 1, 1, 3};
+    for (int k = 0; k < 6; ++k)
+      if (!must::all_finite(values[k], counts[k])) return false;
+    if (c.key != t.store.key[i] || c.kind > kPrimitive || c.obstacle > 1 || c.nnode > 4 || c.type_a > 2) return false;
+    if (!t.store.touching[i] && c.slot_a == kNone) continue;   // of a body that was removed since
+    if (c.slot_a >= w.bodies.size()) return false;
+    if (!t.store.touching[i]) continue;
+    if (c.slot_b >= (c.obstacle ? w.obstacles.size() : w.bodies.size())) return false;
+    if (w.bodies[c.slot_a]->id != t.store.id_a[i] || (c.obstacle ? w.obstacles[c.slot_b]->id : w.bodies[c.slot_b]->id) != t.store.id_b[i]) return false;
+    const Surface &s = w.bodies[c.slot_a]->surface;
+    if (c.feature_a >= (c.type_a == 0 ? s.nsurfel : c.type_a == 1 ? s.nedge : s.ntri)) return false;
   }
-  for (const FrictionRule &r : t.friction) good = good && r.law < t.laws.size();
-  good = good && sound(t.sizes);
-  if (!good) fail(DFM_E_FORMAT, "the snapshot is damaged: its arrays do not fit this world; nothing was restored");
+  return true;
+}
+
+void check(const SnapshotReader &s, const Staged &t, const World &w) {
+  if (!s.at_end()) s.refuse("the end", "no bytes after the last field");
+  if (!good_contacts(t, {w})) s.refuse("contacts", "contacts of bodies and obstacles that are there");
+  if (!good_work(t.work, {w})) s.refuse("friction work", "pairs that are there, in order");
+  size_t sleepers = 0;
+  for (const StagedBody &b : t.bodies) sleepers += b.slumber.asleep;
+  if (sleepers != t.sleepers) s.refuse("sleepers", "as many as sleep");
+  if (t.sleepers > 0 && !good_report(t, w)) s.refuse("report", "the contacts that are kept");
+  for (size_t i = 0; i < t.rigid_sets.size(); ++i) {
+    const RigidSet &set = *w.rigid_sets[i];
+    for (size_t k = 0; k < set.group.size(); ++k)
+      if (set.group[k] == DFM_RIGID_STILL && std::memcmp(&t.rigid_sets[i].state[k], &set.state[k], sizeof(dfm_rigid_state)) != 0)
+        s.refuse("rigid state", "a fixed body where it stands");
+  }
 }
 
 // Laws stand in the order in which the run first needed them, and contacts remember their law by that place.
-std::vector<std::unique_ptr<LawInstance>> make_laws(const World &w, const Staged &t) {
+std::vector<std::unique_ptr<LawInstance>> make_laws(const SnapshotReader &s, const World &w, const Staged &t) {
   std::vector<std::unique_ptr<LawInstance>> laws;
+  uint32_t most = 0;
   for (const StagedLaw &l : t.laws) {
     const dfm_type &type = w.context->registry.find(DFM_KIND_FRICTION, l.id);
     if (l.params.size() != packed_width(type)) fail(DFM_E_FORMAT, "the snapshot was made with another version of law '%s'; nothing was restored", type.id);
+    if (!in_range(type, l.params)) s.refuse("law parameters", "values in the range of the law's table");
     laws.push_back(std::make_unique<LawInstance>(type, w.context->host, l.params));
+    most = std::max(most, laws.back()->nstate);
   }
+  if (t.store.nstate > most) s.refuse("contact states", "no more than a law has");
   return laws;
 }
+
+// Derived, so it is found anew rather than believed.
+void order_contacts(ContactStore &c) {
+  c.by_key.resize(c.n);
+  std::iota(c.by_key.begin(), c.by_key.end(), 0u);
+  std::sort(c.by_key.begin(), c.by_key.end(), [&](uint32_t i, uint32_t j) { return c.key[i] != c.key[j] ? c.key[i] < c.key[j] : i < j; });
+}
+
+// ---- into the world -------------------------------------------------------------------------------------------------------
 
 void put_parameters(Body &b, const std::vector<double> &values) {
   if (values == b.model.params) return;
@@ -265,57 +424,60 @@ void put_parameters(Body &b, const std::vector<double> &values) {
          b.model.type->id, b.name.c_str());
 }
 
+// Of the first `n` bodies, back to what they were.
+void take_parameters_back(World &w, const Staged &t, size_t n) noexcept {
+  while (n-- > 0) {
+    Body &b = *w.bodies[n];
+    if (t.bodies[n].model.params != b.model.params)
+      b.model.call("set_params", [&] { return b.model.ops->set_params(b.model.self, b.model.params.data()); });
+  }
+}
+
 // All parameters of all models, or none.
-void put_parameters(World &w, Staged &t) {
+void put_parameters(World &w, const Staged &t) {
   size_t done = 0;
   try {
     for (; done < w.bodies.size(); ++done) put_parameters(*w.bodies[done], t.bodies[done].model.params);
   } catch (...) {
-    while (done-- > 0) {
-      Body &b = *w.bodies[done];
-      if (t.bodies[done].model.params != b.model.params)
-        b.model.call("set_params", [&] { return b.model.ops->set_params(b.model.self, b.model.params.data()); });
-    }
+    take_parameters_back(w, t, done);
     throw;
   }
-  for (size_t i = 0; i < w.bodies.size(); ++i) w.bodies[i]->model.params.swap(t.bodies[i].model.params);
 }
 
-// Nothing in here allocates: arrays have the right size already, or change hands.
-void put(World &w, Staged &t) noexcept {
-  auto copy = [](const auto &from, auto &to) { std::copy(from.begin(), from.end(), to.begin()); };
+// Allocates nothing; a second call undoes the first.
+void exchange(World &w, Staged &t) noexcept {
   for (size_t i = 0; i < w.bodies.size(); ++i) {
     Body &b = *w.bodies[i];
-    StagedBody &from = t.bodies[i];
-    copy(from.p.x, b.p.x), copy(from.p.v, b.p.v), copy(from.p.held, b.p.held), copy(from.p.load, b.p.load), copy(from.model.state, b.model.state);
-    b.loads.swap(from.loads), b.springs.swap(from.springs), b.motions.swap(from.motions);
-    b.contact_impulse = from.contact_impulse, b.next_load = from.next_load, b.category = from.category, b.collides_with = from.collides_with;
-    b.slumber = from.slumber, b.bound.known = false;
-    if (t.def.sleep) copy(from.anchor, b.anchor);
-    copy(from.lagged, b.lagged);
-    if (b.slumber.asleep) copy(from.surfel_impulse, b.surfel_impulse), gather_surface(b.surface, b.p.x.data(), b.p.v.data());
+    StagedBody &other = t.bodies[i];
+    b.p.x.swap(other.p.x), b.p.v.swap(other.p.v), b.p.load.swap(other.p.load), b.p.held.swap(other.p.held);
+    b.model.state.swap(other.model.state), b.model.params.swap(other.model.params);
+    b.loads.swap(other.loads), b.springs.swap(other.springs), b.motions.swap(other.motions);
+    std::swap(b.contact_impulse, other.contact_impulse), std::swap(b.next_load, other.next_load);
+    std::swap(b.category, other.category), std::swap(b.collides_with, other.collides_with);
+    std::swap(b.slumber, other.slumber), b.bound.known = false;
+    b.anchor.swap(other.anchor), b.lagged.swap(other.lagged);
+    if (!other.surfel_impulse.empty()) b.surfel_impulse.swap(other.surfel_impulse);
+    if (b.slumber.asleep) gather_surface(b.surface, b.p.x.data(), b.p.v.data());
     update_inverse_mass(b.p);
   }
   for (size_t i = 0; i < w.obstacles.size(); ++i) {
     Obstacle &o = *w.obstacles[i];
-    StagedObstacle &from = t.obstacles[i];
-    o.pose = from.pose, o.target = from.target, o.has_target = from.has_target, o.def.sine = from.def.sine;
-    o.keys.swap(from.keys);
+    StagedObstacle &other = t.obstacles[i];
+    std::swap(o.pose, other.pose), std::swap(o.target, other.target), std::swap(o.has_target, other.has_target);
+    std::swap(o.def.sine, other.def.sine), o.keys.swap(other.keys);
   }
   for (size_t i = 0; i < w.rigid_sets.size(); ++i) {
     RigidSet &set = *w.rigid_sets[i];
-    copy(t.rigid_sets[i].state, set.state), copy(t.rigid_sets[i].extra, set.extra), copy(t.rigid_sets[i].total, set.total);
-    set.last_h = 0;
+    StagedRigids &other = t.rigid_sets[i];
+    set.state.swap(other.state), set.extra.swap(other.extra), set.total.swap(other.total), std::swap(set.last_h, other.last_h);
   }
-  w.friction.swap(t.friction), w.filters.swap(t.filters), w.gravity_keys.swap(t.gravity_keys), w.work.swap(t.work);
-  std::copy(t.def.gravity, t.def.gravity + 3, w.def.gravity);
-  std::swap(w.store, t.store);
-  w.time = t.time, w.step_count = t.step_count, w.hold_start = t.hold_start, w.holding = t.holding, w.stats = t.stats, w.next_id = t.next_id;
+  w.friction.swap(t.friction), w.filters.swap(t.filters), w.gravity_keys.swap(t.gravity_keys), w.work.swap(t.work), w.events.swap(t.events);
+  std::swap(w.def.gravity, t.def.gravity), std::swap(w.def.sleep, t.def.sleep);
+  std::swap(w.store, t.store), std::swap(w.report, t.report), std::swap(w.stats, t.stats);
+  std::swap(w.time, t.time), std::swap(w.step_count, t.step_count), std::swap(w.next_id, t.next_id);
+  std::swap(w.hold_start, t.hold_start), std::swap(w.holding, t.holding), std::swap(w.sizes, t.sizes);
   w.worst_body = nullptr, w.worst_point = 0;
-  w.def.sleep = t.def.sleep, w.sleepers = 0;   // prepare() counts them
-  std::swap(w.report, t.report);
   w.guard.forget();
-  w.events.clear();
 }
 
 }  // namespace
@@ -338,49 +500,67 @@ uint64_t world_hash(const World &w) {
   return h.value;
 }
 
-void world_snapshot(const World &w, std::vector<unsigned char> &out) {
-  Writer s{out};
-  s.bytes(kMagic, sizeof kMagic);
-  s.value(structure(w));
-  write_laws(s, w);
-  fields(s, w);
-  Hash h;
-  h.add(out.data(), out.size());
-  s.value(h.value);
+void world_snapshot(const World &w, std::vector<unsigned char> &out, std::vector<SnapshotField> *map) {
+  out.resize(sizeof(SnapshotHead));
+  SnapshotWriter s(out, map);
+  fields(s, w, w);
+  SnapshotHead head{{}, kSnapshotVersion, 0, out.size(), structure(w), 0};
+  std::memcpy(head.magic, kSnapshotMagic, sizeof head.magic);
+  std::memcpy(out.data(), &head, sizeof head);
+  head.checksum = snapshot_checksum(out.data(), out.size());
+  std::memcpy(out.data(), &head, sizeof head);
 }
+
+namespace {
+
+// Whole, of this version, undamaged and of such a world.
+void check_head(const World &w, const unsigned char *data, size_t bytes) {
+  SnapshotHead head{};
+  std::memcpy(&head, data, std::min(bytes, sizeof head));
+  if (bytes < sizeof head.magic || std::memcmp(head.magic, kSnapshotMagic, sizeof head.magic - 1) != 0)
+    fail(DFM_E_FORMAT, "these %zu bytes are no snapshot; take one with dfm_world_snapshot", bytes);
+  if (bytes < sizeof head) fail(DFM_E_FORMAT, "the snapshot is cut short: %zu bytes, its head alone has %zu; nothing was restored", bytes, sizeof head);
+  if (head.magic[7] != 0 || head.version != kSnapshotVersion || head.zero != 0)
+    fail(DFM_E_FORMAT, "the snapshot was written by another version of the library, or is damaged: this one reads format %u; nothing was restored",
+         kSnapshotVersion);
+  if (head.length != bytes)
+    fail(DFM_E_FORMAT, "the snapshot is cut short or damaged: it says %llu bytes, and %zu were given; nothing was restored",
+         static_cast<unsigned long long>(head.length), bytes);
+  if (head.checksum != snapshot_checksum(data, bytes)) fail(DFM_E_FORMAT, "the snapshot is damaged (checksum); nothing was restored");
+  if (head.structure != structure(w))
+    fail(DFM_E_FORMAT,
+         "the snapshot belongs to another world: names, meshes, masses, models, fields and obstacles must be the same; nothing was restored");
+}
+
+}  // namespace
 
 void world_restore(World &w, const void *data, size_t bytes) {
   const unsigned char *const p = static_cast<const unsigned char *>(data);
-  if (bytes < sizeof kMagic + 16 || std::memcmp(p, kMagic, sizeof kMagic) != 0)
-    fail(DFM_E_FORMAT, "these %zu bytes are no snapshot of this version; take one with dfm_world_snapshot", bytes);
-  Hash h;
-  h.add(p, bytes - sizeof(uint64_t));
-  uint64_t sum;
-  std::memcpy(&sum, p + bytes - sizeof sum, sizeof sum);
-  if (sum != h.value) fail(DFM_E_FORMAT, "the snapshot is cut short or damaged (checksum); nothing was restored");
-  Reader s{p + sizeof kMagic, p + bytes - sizeof sum};
-  uint64_t shape;
-  s.value(shape);
-  if (shape != structure(w))
-    fail(DFM_E_FORMAT,
-         "the snapshot belongs to another world: names, meshes, masses, models, fields and obstacles must be the same; nothing was restored");
-  Staged staged(w.memory());
-  staged.rigid_sets.resize(w.rigid_sets.size());
-  staged.def.method = w.def.method;
-  s.each(staged.laws, [&](StagedLaw &l) { s.array(l.id), s.array(l.params); });
-  fields(s, staged);
-  check(staged, w);
-  std::vector<std::unique_ptr<LawInstance>> laws = make_laws(w, staged);
-  if (staged.def.sleep)
-    for (auto &b : w.bodies) b->anchor.resize(b->p.x.size());
+  check_head(w, p, bytes);
+  SnapshotReader s(p + sizeof(SnapshotHead), p + bytes);
+  Staged staged(w);
+  fields(s, staged, w);
+  check(s, staged, w);
+  order_contacts(staged.store);
+  std::vector<std::unique_ptr<LawInstance>> laws = make_laws(s, w, staged);
+  const double offset = w.offset;
+  const uint32_t sleepers = w.sleepers;
   put_parameters(w, staged);
+  exchange(w, staged);
   w.laws.swap(laws);
-  put(w, staged);
-  // Tables and plan follow from what is there now; what prepare() would choose anew is put back as it was.
-  w.changed = true;
-  w.prepare();
-  w.gravity = staged.gravity, w.stable = staged.stable, w.inverted = staged.inverted, w.offset = staged.offset, w.bound_age = staged.bound_age;
-  w.sizes = staged.sizes;
+  try {
+    // Tables and plan follow from what is there now; what prepare() would choose anew is put back as it was.
+    const RestoredChoice choice{staged.gravity, staged.stable, staged.offset, staged.inverted, staged.bound_age};
+    w.changed = true;
+    w.sleepers = 0;   // prepare() counts them
+    w.prepare(&choice);
+  } catch (...) {     // no memory for the tables: the state is as it was, and the tables are made when next needed
+    exchange(w, staged);
+    take_parameters_back(w, staged, w.bodies.size());
+    w.laws.swap(laws);
+    w.offset = offset, w.sleepers = sleepers;
+    throw;
+  }
 }
 
 }  // namespace dfm

@@ -99,7 +99,7 @@ void offer(const dfm_type &type, std::vector<SceneFacts::Provider> &to) {
 
 }  // namespace
 
-void World::prepare() {
+void World::prepare(const RestoredChoice *restored) {
   if (!changed) return;
   const uint32_t nb = static_cast<uint32_t>(bodies.size()), no = static_cast<uint32_t>(obstacles.size()), width = nb + no;
   SceneFacts facts;
@@ -189,7 +189,7 @@ void World::prepare() {
   // While contacts live it only falls: a larger one would turn their rest into a depth, and push them apart at 0.1 d_c / h.
   const double wanted = contact_offset(*this);
   const double before = offset;
-  offset = def.contact_offset > 0 ? def.contact_offset : store.n > 0 ? std::min(offset, wanted) : wanted;
+  offset = restored ? restored->offset : def.contact_offset > 0 ? def.contact_offset : store.n > 0 ? std::min(offset, wanted) : wanted;
   for (auto &b : bodies)
     if (def.sleep && b->anchor.empty()) b->anchor = b->p.x;
   active.reserve(nb), sinks.reserve(nb);
@@ -199,6 +199,7 @@ void World::prepare() {
   gravity = load3(def.gravity);
   if (!gravity_keys.empty()) gravity = vector_at(gravity_keys, time);
   bound_age = kNone;
+  if (restored) gravity = restored->gravity, stable = restored->stable, inverted = restored->inverted, bound_age = restored->bound_age;
   guard.forget();
   changed = false;
 }

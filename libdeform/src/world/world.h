@@ -31,6 +31,7 @@
 #include "world/rollback.h"
 #include "world/self_contact.h"
 #include "world/sleep.h"
+#include "world/snapshot.h"
 #include "world/step_impulses.h"
 #include "world/step_sizes.h"
 
@@ -241,7 +242,7 @@ struct World {
   const Memory &memory() const { return context->memory; }
 
   // world.cpp
-  void prepare();                                      // plan, pair tables, offset; throws Error
+  void prepare(const RestoredChoice *restored = nullptr);   // plan, pair tables, offset; throws Error
   Body *find_body(const std::string &name);
   Obstacle *find_obstacle(const std::string &name);
   uint64_t handle_of(uint64_t id) const;               // body or obstacle; 0 if gone
@@ -305,10 +306,5 @@ struct World {
   void keep_contacts();
   void list_crossings();                                // solve.cpp: store, events, hold, work; allocates nothing
 };
-
-// snapshot.cpp
-uint64_t world_hash(const World &w);
-void world_snapshot(const World &w, std::vector<unsigned char> &out);
-void world_restore(World &w, const void *data, size_t bytes);
 
 }  // namespace dfm

@@ -1,6 +1,8 @@
 // What the caller does to ODE's world between two steps: things come, go, move, fall asleep, and soft bodies take notice.
 #include <gtest/gtest.h>
 
+#include <cstring>
+
 #include "ode.h"
 
 namespace {
@@ -359,6 +361,54 @@ TEST(OdeLifecycle, SnapshotOfTheAdapter_HasBodiesWithoutGeomsToo) {
   shot[60] ^= 1;
   EXPECT_EQ(dfm_ode_restore(ode.adapter, shot.data(), bytes), DFM_E_FORMAT);
   EXPECT_EQ(position(weight), there);
+}
+
+// Damaged, and forged behind a checksum that holds: refused whole, with the reason.
+TEST(OdeLifecycle, SnapshotThatIsDamaged_IsRefusedAndChangesNothing) {
+  Ode ode;
+  soft_bed(ode);
+  const dBodyID box = ode.box({0.08, 0.08, 0.05}, 2, {0.15, 0.15, 0.16}), weight = ode.body(0.5, {1e-3, 1e-3, 1e-3}, {0.15, 0.2, 0.3});
+  const dJointID hinge = dJointCreateHinge(ode.world, nullptr);
+  dJointAttach(hinge, box, weight), dJointSetHingeAnchor(hinge, 0.15, 0.15, 0.25), dJointSetHingeAxis(hinge, 1, 0, 0);
+  ode.run(0.05);
+  size_t bytes = 0;
+  ok(dfm_ode_snapshot(ode.adapter, nullptr, &bytes));
+  std::vector<unsigned char> good(bytes);
+  ok(dfm_ode_snapshot(ode.adapter, good.data(), &bytes));
+  ode.run(0.05);
+  const uint64_t hash = dfm_world_hash(ode.soft);
+  const Vec there = position(weight);
+  const auto refused = [&](const std::vector<unsigned char> &bad, const char *why) {
+    EXPECT_EQ(dfm_ode_restore(ode.adapter, bad.data(), bad.size()), DFM_E_FORMAT) << why;
+    EXPECT_NE(std::string(dfm_last_error()).find(why), std::string::npos) << dfm_last_error();
+    EXPECT_EQ(dfm_world_hash(ode.soft), hash) << why;
+    EXPECT_EQ(position(weight), there) << why;
+  };
+  for (size_t i = 0; i < 2000; ++i) {
+    std::vector<unsigned char> bad = good;
+    bad[i * 7919 % bytes] ^= static_cast<unsigned char>(1 + i % 255);
+    refused(bad, "");
+  }
+  constexpr size_t kChecksum = 24, kBody = 16 * sizeof(double);
+  const auto forged = [&](size_t at, double value) {
+    std::vector<unsigned char> bad = good;
+    std::memcpy(&bad[at], &value, sizeof value);
+    uint64_t sum = 14695981039346656037ull;
+    for (size_t i = 0; i < bytes; ++i)
+      if (i < kChecksum || i >= kChecksum + 8) sum = (sum ^ bad[i]) * 1099511628211ull;
+    std::memcpy(&bad[kChecksum], &sum, sizeof sum);
+    return bad;
+  };
+  const size_t friction = bytes - 2 * sizeof(double), body = friction - kBody;   // the weight's numbers; it has no geom
+  double x = 0;
+  std::memcpy(&x, &good[body], sizeof x);
+  ok(dfm_ode_restore(ode.adapter, forged(body, x).data(), bytes));   // the seal itself is right
+  ok(dfm_ode_restore(ode.adapter, good.data(), bytes));
+  ode.run(0.05);
+  ASSERT_EQ(dfm_world_hash(ode.soft), hash);
+  for (size_t k = 0; k < 16; ++k) refused(forged(body + 8 * k, NAN), "out of range");
+  refused(forged(body + 8 * 13, 2), "out of range"), refused(forged(body + 8 * 14, -1), "out of range"), refused(forged(body + 8 * 3, 40), "out of range");
+  refused(forged(body - 8, 0.5), "out of range"), refused(forged(friction + 8, INFINITY), "out of range"), refused(forged(friction, 3), "another law");
 }
 
 TEST(OdeLifecycle, PlainWorldStep_IsRefused) {

@@ -1,0 +1,26 @@
+// Snapshot, restore and hash of a world (snapshot.cpp).
+#pragma once
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+#include "math/vec3.h"
+
+namespace dfm {
+
+struct World;
+struct SnapshotField;
+
+// What prepare() would choose anew and a restored world keeps: it was chosen at a state that is past.
+struct RestoredChoice {
+  Vec3 gravity;
+  double stable, offset;
+  uint32_t inverted, bound_age;
+};
+
+uint64_t world_hash(const World &w);
+// map: where each field lies, for tests; may be null.
+void world_snapshot(const World &w, std::vector<unsigned char> &out, std::vector<SnapshotField> *map = nullptr);
+void world_restore(World &w, const void *data, size_t bytes);   // throws Error and leaves the world as it was
+
+}  // namespace dfm

@@ -1,0 +1,213 @@
+// How a snapshot's bytes are written, read and checked. One list of fields (snapshot.cpp) serves both ways: each line says the field's name, where it
+// lies and what it must be, so that nothing is read that was not asked for.
+//
+//   bytes 0  "dfmsnap" 0 | u32 version | u32 0 | u64 length of all | u64 hash of what must be the same in both worlds | u64 checksum | fields
+#pragma once
+#include <cmath>
+#include <cstdint>
+#include <cstring>
+#include <string>
+#include <type_traits>
+#include <vector>
+
+#include "core/error.h"
+#include "core/hash.h"
+#include "deform/math.h"
+#include "math/vec3.h"
+#include "world/motion.h"
+
+namespace dfm {
+
+struct SnapshotHead {
+  char magic[8];
+  uint32_t version, zero;
+  uint64_t length, structure, checksum;   // checksum: of all bytes but itself
+};
+inline constexpr char kSnapshotMagic[8] = {'d', 'f', 'm', 's', 'n', 'a', 'p', 0};
+inline constexpr uint32_t kSnapshotVersion = 7;
+
+inline uint64_t snapshot_checksum(const unsigned char *data, size_t bytes) {
+  Hash h;
+  h.add(data, offsetof(SnapshotHead, checksum));
+  h.add(data + sizeof(SnapshotHead), bytes - sizeof(SnapshotHead));
+  return h.value;
+}
+
+// Where a field of a snapshot lies, for tests that damage each.
+struct SnapshotField {
+  const char *name;
+  size_t at, bytes;          // of its values; of a list's, its count
+  char kind;                 // d: doubles, u: unsigned, f: flags, n: a count
+  bool checked;
+};
+
+// What values must be; `what` completes "expected".
+namespace must {
+
+template <class Is>
+struct Be {
+  Is is;
+  const char *what;
+  bool checked = true;
+};
+template <class Is>
+Be(Is, const char *) -> Be<Is>;
+template <class Is>
+Be(Is, const char *, bool) -> Be<Is>;
+
+inline bool all_finite(double x) { return std::isfinite(x); }
+inline bool all_finite(const double *x, size_t n) {
+  double poison = 0;
+  for (size_t i = 0; i < n; ++i) poison += 0.0 * x[i];
+  return poison == 0;
+}
+inline bool all_finite(const Vec3 &v) { return all_finite(&v.x, 3); }
+template <size_t n>
+bool all_finite(const double (&x)[n]) { return all_finite(x, n); }
+inline bool all_finite(const dfm_sine &s) { return all_finite(s.amplitude) && all_finite(s.frequency) && all_finite(s.phase); }
+
+inline constexpr Be any{[](const auto &) { return true; }, "anything", false};
+inline constexpr Be finite{[](const auto &x) { return all_finite(x); }, "a finite number"};
+inline constexpr Be not_negative{[](double x) { return x >= 0 && std::isfinite(x); }, "a finite number that is not negative"};
+inline constexpr Be positive{[](double x) { return x > 0 && std::isfinite(x); }, "a finite number above zero"};
+// Hosts answer for the length of their quaternions, so it is not asked to a rounding.
+inline constexpr Be rotation{[](const double (&q)[4]) {
+  const double n = q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3];
+  return n > 0.25 && n < 4;
+}, "a unit quaternion"};
+inline constexpr Be pose{[](const Pose &p) {
+  const double q[4] = {p.rotation.x, p.rotation.y, p.rotation.z, p.rotation.w};
+  return all_finite(p.position) && rotation.is(q);
+}, "a finite position and a unit quaternion"};
+inline constexpr Be flag{[](auto x) { return x == 0 || x == 1; }, "0 or 1"};
+inline auto below(uint64_t n) {
+  return Be{[n](uint64_t x) { return x < n; }, "a number of something that is there"};
+}
+inline auto at_most(uint64_t n) {
+  return Be{[n](uint64_t x) { return x <= n; }, "a smaller number"};
+}
+
+}  // namespace must
+
+template <class T>
+constexpr char snapshot_kind() {
+  if constexpr (std::is_same_v<T, bool>) return 'f';
+  else if constexpr (std::is_unsigned_v<T>) return 'u';
+  else return 'd';
+}
+
+// `count` of an array: as many as this; kAnyCount: as many as there are bytes for.
+inline constexpr uint64_t kAnyCount = ~uint64_t{0};
+
+class SnapshotWriter {
+ public:
+  explicit SnapshotWriter(std::vector<unsigned char> &out, std::vector<SnapshotField> *map = nullptr) : out_(out), map_(map) {}
+  void bytes(const void *p, size_t n) {
+    const unsigned char *const from = static_cast<const unsigned char *>(p);
+    if (n) out_.insert(out_.end(), from, from + n);
+  }
+  void where(const char *, const std::string &) {}
+  template <class T, class B>
+  void value(const char *name, const T &x, const B &be) {
+    note(name, sizeof x, snapshot_kind<T>(), be.checked);
+    bytes(&x, sizeof x);
+  }
+  template <class A, class B>
+  void array(const char *name, const A &a, uint64_t, const B &be) {
+    count(name, a.size());
+    using T = std::remove_cvref_t<decltype(a[0])>;
+    if (!a.empty()) note(name, a.size() * sizeof(T), snapshot_kind<T>(), be.checked);
+    bytes(a.data(), a.size() * sizeof(T));
+  }
+  template <class A, class F>
+  void list(const char *name, const A &a, F f) {
+    count(name, a.size());
+    for (const auto &x : a) f(x);
+  }
+  template <class A, class F>
+  void members(const char *name, const A &a, uint64_t, F f) { list(name, a, f); }
+  template <class F>
+  void must_hold(const char *, const char *, F) {}
+
+ private:
+  void count(const char *name, uint64_t n) {
+    note(name, sizeof n, 'n', true);
+    bytes(&n, sizeof n);
+  }
+  void note(const char *name, size_t bytes, char kind, bool checked) {
+    if (map_) map_->push_back({name, out_.size(), bytes, kind, checked});
+  }
+  std::vector<unsigned char> &out_;
+  std::vector<SnapshotField> *map_;
+};
+
+// Takes no more memory than the bytes it was given account for, and refuses whole what does not fit.
+class SnapshotReader {
+ public:
+  SnapshotReader(const unsigned char *begin, const unsigned char *end) : p_(begin), end_(end) {}
+  // In whose fields the reader is now, for the sentence.
+  void where(const char *kind, const std::string &name) { where_ = name.empty() ? std::string() : std::string(kind) + " '" + name + "': "; }
+  bool at_end() const { return p_ == end_; }
+
+  template <class T, class B>
+  void value(const char *name, T &x, const B &be) {
+    static_assert(std::is_trivially_copyable_v<T>);
+    if constexpr (std::is_same_v<T, bool>) {
+      uint8_t byte;
+      bytes(name, &byte, sizeof byte);
+      if (byte > 1) refuse(name, must::flag.what);
+      x = byte;
+    } else {
+      bytes(name, &x, sizeof x);
+      if (!be.is(x)) refuse(name, be.what);
+    }
+  }
+  template <class A, class B>
+  void array(const char *name, A &a, uint64_t expected, const B &be) {
+    using T = std::remove_cvref_t<decltype(a[0])>;
+    static_assert(std::is_trivially_copyable_v<T> && !std::is_same_v<T, bool>);
+    const uint64_t n = count(name, expected, sizeof(T));
+    a.resize(size_t(n));
+    bytes(name, a.data(), size_t(n) * sizeof(T));
+    for (const T &x : a)
+      if (!be.is(x)) refuse(name, be.what);
+  }
+  // Entries of their own; each has at least 8 bytes, and is made only when it is read.
+  template <class A, class F>
+  void list(const char *name, A &a, F f) {
+    const uint64_t n = count(name, kAnyCount, 8);
+    a.clear();
+    for (uint64_t i = 0; i < n; ++i) f(a.emplace_back());
+  }
+  // What the world has as well: as many as there.
+  template <class A, class F>
+  void members(const char *name, A &a, uint64_t expected, F f) {
+    a.resize(size_t(count(name, expected, 1)));
+    for (auto &x : a) f(x);
+  }
+  template <class F>
+  void must_hold(const char *name, const char *what, F holds) {
+    if (!holds()) refuse(name, what);
+  }
+  [[noreturn]] void refuse(const char *name, const char *what) const {
+    fail(DFM_E_FORMAT, "the snapshot is damaged: %s%s: expected %s; nothing was restored", where_.c_str(), name, what);
+  }
+
+ private:
+  void bytes(const char *name, void *to, size_t n) {
+    if (size_t(end_ - p_) < n) refuse(name, "more bytes than there are");
+    if (n) std::memcpy(to, p_, n);
+    p_ += n;
+  }
+  uint64_t count(const char *name, uint64_t expected, size_t entry) {
+    uint64_t n;
+    bytes(name, &n, sizeof n);
+    if (expected != kAnyCount && n != expected) refuse(name, "as many as this world has");
+    if (n > uint64_t(end_ - p_) / entry) refuse(name, "no more than there are bytes for");
+    return n;
+  }
+  const unsigned char *p_, *end_;
+  std::string where_;
+};
+
+}  // namespace dfm
