@@ -87,9 +87,11 @@ DFM_API dfm_status dfm_body_set_state(dfm_body body, uint32_t n, const double *x
  * @return DFM_OK; DFM_E_ARG a capacity too small (untouched); DFM_E_HANDLE. Threads: Any thread. Not during step. Since 0.1. */
 DFM_API dfm_status dfm_body_get_rest(dfm_body body, uint32_t capacity_points, double *x, uint32_t capacity_tets, uint32_t *tets);
 
-/** Holds (bits 1 x, 2 y, 4 z) or releases (0) components of points. Threads: Not during step. Since 0.1. */
+/** Holds (bits 1 x, 2 y, 4 z) or releases (0) components of points. A point that is released loses its motion (dfm_body_move_held); one that stays held
+ * keeps it. Threads: Not during step. Since 0.1. */
 DFM_API dfm_status dfm_body_hold(dfm_body body, uint32_t n, const uint32_t *points, uint8_t axes);
 /** Moves held points together: their start positions carried by the keys' pose (relative to key 0) and, on top, the sine offset.
+ * A point has one motion: a new one replaces what carried the point before, so calling this each frame takes no more memory than calling it once.
  * @param keys  [nkey], times strictly rising; nkey may be 0 when sine is given; copied
  * Threads: Not during step. Since 0.1. */
 DFM_API dfm_status dfm_body_move_held(dfm_body body, uint32_t n, const uint32_t *points, uint32_t nkey, const dfm_pose_key *keys,

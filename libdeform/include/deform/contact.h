@@ -16,10 +16,12 @@ typedef struct dfm_friction_def {
   const char *law;                  /* short name or full id */
   dfm_params params;
 } dfm_friction_def;
-/** @return DFM_OK; DFM_E_ARG unknown name or key (nearest valid one), value out of range; DFM_E_UNSUPPORTED no such law (lists those loaded).
+/** Adds a rule. One for the same two sides, in either order, replaces the one before, so a coefficient may be set anew each frame; a rule that names a body
+ * or obstacle goes when that is destroyed.
+ * @return DFM_OK; DFM_E_ARG unknown name or key (nearest valid one), value out of range; DFM_E_UNSUPPORTED no such law (lists those loaded).
  * Threads: Not during step. Since 0.1. */
 DFM_API dfm_status dfm_world_add_friction(dfm_world world, const dfm_friction_def *def);
-/** Lets two named sides pass or touch, whatever their filters say. Threads: Not during step. Since 0.1. */
+/** Lets two named sides pass or touch, whatever their filters say; replaced and removed as rules of friction are. Threads: Not during step. Since 0.1. */
 DFM_API dfm_status dfm_world_filter_pair(dfm_world world, const char *a, const char *b, bool collide);
 
 /** One contact of the last sub-step. Forces act on side a; components in the plane of contact: [0] along tangent, [1] along normal x tangent. */

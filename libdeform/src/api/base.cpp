@@ -3,12 +3,14 @@
 #include <algorithm>
 #include <cstring>
 
-#include "api/guard.h"
+#include "api/objects.h"
 #include "core/file.h"
 #include "plugin/context.h"
 
 using dfm::fail;
 using dfm::guard;
+using dfm::idle;
+using dfm::used;
 
 namespace {
 
@@ -110,19 +112,27 @@ dfm_status dfm_context_create(const dfm_context_def *def, dfm_context **out) {
   });
 }
 
-void dfm_context_destroy(dfm_context *context) { delete context; }
+void dfm_context_destroy(dfm_context *context) {
+  if (!context) return;
+  if (context->calls != 0 || context->ending.exchange(true)) {
+    dfm::set_last_error("the context is inside a call whose hook, plugin or host asks to destroy it; nothing was destroyed: do it when that call has returned");
+    context->log(DFM_LOG_ERROR, dfm::last_error());
+    return;
+  }
+  delete context;
+}
 
 dfm_status dfm_plugin_load(dfm_context *context, const char *path) {
   return guard([&] {
     if (!path || !*path) fail(DFM_E_ARG, "dfm_plugin_load: the path is empty");
-    require(context).loader.load(path);
+    idle(require(context)).loader.load(path);
   });
 }
 
 dfm_status dfm_plugin_scan(dfm_context *context, const char *directory, uint32_t *loaded) {
   return guard([&] {
     if (!directory || !*directory) fail(DFM_E_ARG, "dfm_plugin_scan: the directory is empty");
-    const uint32_t n = require(context).loader.scan(directory);
+    const uint32_t n = idle(require(context)).loader.scan(directory);
     if (loaded) *loaded = n;
   });
 }
@@ -130,14 +140,14 @@ dfm_status dfm_plugin_scan(dfm_context *context, const char *directory, uint32_t
 dfm_status dfm_plugin_register_static(dfm_context *context, dfm_plugin_fn entry, const char *name) {
   return guard([&] {
     if (!entry || !name || !*name) fail(DFM_E_ARG, "dfm_plugin_register_static: entry and name are needed");
-    require(context).loader.add_static(entry, name);
+    idle(require(context)).loader.add_static(entry, name);
   });
 }
 
 dfm_status dfm_plugin_visit(dfm_context *context, dfm_plugin_visit_fn visit, void *user) {
   return guard([&] {
     if (!visit) fail(DFM_E_ARG, "dfm_plugin_visit: visit is NULL");
-    const dfm::Registry &registry = require(context).registry;
+    const dfm::Registry &registry = used(require(context)).registry;
     for (const dfm_type *type : registry.list()) visit(user, type, registry.file_of(*type).c_str());
   });
 }
@@ -145,6 +155,6 @@ dfm_status dfm_plugin_visit(dfm_context *context, dfm_plugin_visit_fn visit, voi
 dfm_status dfm_plugin_visit_passed(dfm_context *context, dfm_plugin_passed_fn visit, void *user) {
   return guard([&] {
     if (!visit) fail(DFM_E_ARG, "dfm_plugin_visit_passed: visit is NULL");
-    for (const auto &passed : require(context).registry.passed()) visit(user, passed.file.c_str(), passed.reason.c_str());
+    for (const auto &passed : used(require(context)).registry.passed()) visit(user, passed.file.c_str(), passed.reason.c_str());
   });
 }

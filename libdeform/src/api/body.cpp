@@ -6,6 +6,7 @@
 #include "surfel/closest.h"
 #include "world/spring.h"
 #include "world/create.h"
+#include "world/held.h"
 #include "world/measure.h"
 #include "world/queries.h"
 
@@ -177,6 +178,7 @@ dfm_status dfm_body_hold(dfm_body body, uint32_t n, const uint32_t *points, uint
     idle(*b.world);
     check_points(b, n, points);
     if (axes > 7) fail(DFM_E_ARG, "axes is %u; it is a sum of 1 (x), 2 (y) and 4 (z)", unsigned(axes));
+    if (axes == 0) drop_motions(b, {points, n});
     for (uint32_t i = 0; i < n; ++i) b.p.held[points[i]] = axes;
     update_inverse_mass(b.p);
     stop_held(b);
@@ -191,6 +193,7 @@ dfm_status dfm_body_move_held(dfm_body body, uint32_t n, const uint32_t *points,
     idle(*b.world);
     check_points(b, n, points), check_motion(b, nkey, keys, sine);
     if (nkey == 0 && !sine) fail(DFM_E_ARG, "body '%s': a motion needs keys or a sine", b.name.c_str());
+    if (n == 0) fail(DFM_E_ARG, "body '%s': a motion needs points", b.name.c_str());
     rollback_refuse(*b.world, ("body '" + b.name + "': a motion of held points, which cannot go back,").c_str());
     HeldMotion m;
     m.points.assign(points, points + n);
@@ -201,6 +204,8 @@ dfm_status dfm_body_move_held(dfm_body body, uint32_t n, const uint32_t *points,
       if (!b.p.held[points[i]]) fail(DFM_E_ARG, "body '%s': point %u is not held; call dfm_body_hold first", b.name.c_str(), points[i]);
       for (int k = 0; k < 3; ++k) m.start.push_back(b.p.x[size_t(points[i]) * kStride + size_t(k)]);
     }
+    b.motions.reserve(b.motions.size() + 1);
+    drop_motions(b, {points, n});
     b.motions.push_back(std::move(m));
     b.world->wake(b);
     b.world->changed = true;

@@ -91,6 +91,20 @@ uint64_t id_of(const World &w, uint64_t handle, const char *what) {
   fail(DFM_E_HANDLE, "'%s' is no body or obstacle of this world", what);
 }
 
+// Laws that nothing refers to once a rule for `between` has gone: no other rule, no contact, no table of pairs. They make room for new ones, so a
+// coefficient may be set anew each frame.
+std::vector<uint8_t> free_laws(const World &w, const std::string between[2]) {
+  std::vector<uint8_t> free(w.laws.size(), 1);
+  const auto use = [&](uint32_t law) {
+    if (law < free.size()) free[law] = 0;
+  };
+  for (const FrictionRule &r : w.friction)
+    if (!same_pair(r.between, between)) use(r.law);
+  for (const auto *const list : {&w.pair_law, &w.zone_law}) std::for_each(list->begin(), list->end(), use);
+  std::for_each(w.store.law.begin(), w.store.law.end(), use);
+  return free;
+}
+
 }  // namespace
 
 dfm_status dfm_world_add_friction(dfm_world world, const dfm_friction_def *given) {
@@ -102,8 +116,8 @@ dfm_status dfm_world_add_friction(dfm_world world, const dfm_friction_def *given
     if (def.params.n && !def.params.values) fail(DFM_E_ARG, "%u parameters are announced for law '%s', but params.values is NULL", def.params.n, def.law);
     FrictionRule rule{{side(w, def.between[0], true), side(w, def.between[1], true)}, 0};
     w.friction.reserve(w.friction.size() + 1);
-    rule.law = w.add_law(def.law, {def.params.values, def.params.n});
-    w.friction.push_back(std::move(rule));
+    rule.law = w.add_law(def.law, {def.params.values, def.params.n}, free_laws(w, rule.between));
+    add_rule(w.friction, std::move(rule));
     w.wake_all();
     w.changed = true;
   });
@@ -112,7 +126,7 @@ dfm_status dfm_world_add_friction(dfm_world world, const dfm_friction_def *given
 dfm_status dfm_world_filter_pair(dfm_world world, const char *a, const char *b, bool collide) {
   return guard([&] {
     World &w = idle(world_of(world));
-    w.filters.push_back({{side(w, a, false), side(w, b, false)}, collide});
+    add_rule(w.filters, FilterRule{{side(w, a, false), side(w, b, false)}, collide});
     w.wake_all();
     w.changed = true;
   });
@@ -120,7 +134,7 @@ dfm_status dfm_world_filter_pair(dfm_world world, const char *a, const char *b, 
 
 dfm_status dfm_world_contacts(dfm_world world, uint32_t capacity, dfm_contact *out, uint32_t *n) {
   return guard([&] {
-    const World &w = world_of(world);
+    const World &w = settled(world_of(world));
     uint32_t count = 0;
     for (uint32_t i = 0; i < w.report.n; ++i) count += touching(w, i);
     if (!room(count, capacity, out, n)) return;
@@ -133,7 +147,7 @@ dfm_status dfm_world_contacts(dfm_world world, uint32_t capacity, dfm_contact *o
 
 dfm_status dfm_world_pairs(dfm_world world, uint32_t capacity, dfm_pair_report *out, uint32_t *n) {
   return guard([&] {
-    World &w = world_of(world);
+    World &w = settled(world_of(world));
     struct Pair { uint64_t a, b; dfm_pair_report report; };   // ids: the order of creation
     std::vector<Pair> pairs;
     std::vector<Vec3> com(w.bodies.size());
@@ -179,8 +193,10 @@ dfm_status dfm_world_pairs(dfm_world world, uint32_t capacity, dfm_pair_report *
 
 dfm_status dfm_world_pair_wrench(dfm_world world, uint64_t a, uint64_t b, const double point[3], double force[3], double moment[3]) {
   return guard([&] {
-    const World &w = world_of(world);
+    const World &w = settled(world_of(world));
     need(point, "point");
+    for (int k = 0; k < 3; ++k)
+      if (!std::isfinite(point[k])) fail(DFM_E_ARG, "the point about which the moment is taken is not finite");
     const uint64_t ia = id_of(w, a, "a"), ib = id_of(w, b, "b");
     const Vec3 about = load3(point);
     Vec3 sum, turn;
@@ -233,7 +249,7 @@ dfm_status dfm_world_hold_begin(dfm_world world) {
 
 dfm_status dfm_world_hold(dfm_world world, double *creep, uint32_t *count) {
   return guard([&] {
-    const World &w = world_of(world);
+    const World &w = settled(world_of(world));
     need(creep, "creep");
     double longest = 0;
     uint32_t n = 0;

@@ -61,7 +61,7 @@ dfm_status dfm_debug_write_surface(dfm_body body, const char *path) {
 
 dfm_status dfm_debug_draw(dfm_world world, uint32_t what, dfm_draw_line_fn line, void *user) {
   return guard([&] {
-    World &w = world_of(world);
+    const World &w = settled(world_of(world));
     if (!line) fail(DFM_E_ARG, "argument 'line' is NULL");
     double longest = 0;
     for (uint32_t i = 0; i < w.report.n; ++i) longest = std::max(longest, w.report.impulse[size_t(3) * i]);

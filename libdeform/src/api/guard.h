@@ -3,6 +3,7 @@
 #include <new>
 #include <type_traits>
 
+#include "api/call.h"
 #include "core/error.h"
 #include "deform/base.h"
 
@@ -11,6 +12,7 @@ namespace dfm {
 // Runs f and turns what it throws into a status and the sentence of dfm_last_error().
 template <class F>
 dfm_status guard(F &&f) noexcept {
+  Call call;
   try {
     if constexpr (std::is_same_v<std::invoke_result_t<F>, dfm_status>) return f();
     else return f(), DFM_OK;

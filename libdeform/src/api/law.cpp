@@ -7,8 +7,7 @@
 #include <mutex>
 #include <vector>
 
-#include "api/guard.h"
-#include "core/handle.h"
+#include "api/objects.h"
 #include "plugin/call.h"
 #include "plugin/params.h"
 
@@ -53,7 +52,11 @@ void destroy(uint64_t handle) {
   delete law;
 }
 
-Law &law_at(dfm_law handle) { return resolve<Law>(Kind::law, handle); }
+Law &law_at(dfm_law handle) {
+  Law &law = resolve<Law>(Kind::law, handle);
+  Call::now().hold(&law), Call::now().hold(&law.context), Call::now().count(law.context.calls);
+  return law;
+}
 
 uint32_t state_width(const dfm_friction &law) {
   uint32_t n = 0;
@@ -62,7 +65,7 @@ uint32_t state_width(const dfm_friction &law) {
 }
 
 const dfm_type &type_from_file(dfm_context &context, const char *path) {
-  context.loader.load(path);
+  idle(context).loader.load(path);
   std::vector<const dfm_type *> laws;
   std::vector<std::string> ids;
   for (const dfm_type *type : context.loader.types_of(path))
@@ -201,6 +204,7 @@ dfm_status dfm_law_open(dfm_context *context, const char *id_or_path, dfm_law *o
     if (!context || !id_or_path || !*id_or_path || !out) fail(DFM_E_ARG, "dfm_law_open: context, name and out are needed");
     const std::string name = id_or_path;
     const bool path = name.find('/') != std::string::npos || (name.size() > 3 && name.compare(name.size() - 3, 3, ".so") == 0);
+    used(*context);
     const dfm_type &type = path ? type_from_file(*context, id_or_path) : context->registry.find(DFM_KIND_FRICTION, name);
     std::unique_ptr<Law> law(new Law{*context, type, 0, {}, nullptr});
     law->handle = handle_create(Kind::law, law.get());
@@ -216,7 +220,9 @@ dfm_status dfm_law_open(dfm_context *context, const char *id_or_path, dfm_law *o
 
 dfm_status dfm_law_close(dfm_law law) {
   return guard([&] {
-    law_at(law).context.remove_live(law);
+    Law &l = law_at(law);
+    Call::now().need_alone(&l, "law");
+    l.context.remove_live(law);
     destroy(law);
   });
 }

@@ -13,7 +13,7 @@ using Object = dfm::TetMeshObject;
 
 dfm_status dfm_tetmesh_read(dfm_context *context, const char *path, dfm_tetmesh *out) {
   return guard([&] {
-    need(context, "context"), need(path, "path"), need(out, "out");
+    need(context, "context"), dfm::used(*context), need(path, "path"), need(out, "out");
     dfm::TetMesh mesh = dfm::read_tet_mesh(context->memory, path);
     for (const std::string &w : mesh.warnings) context->logf(DFM_LOG_WARNING, "%s: %s", path, w.c_str());
     *out = Object::keep(*context, std::move(mesh));
@@ -22,14 +22,14 @@ dfm_status dfm_tetmesh_read(dfm_context *context, const char *path, dfm_tetmesh 
 
 dfm_status dfm_mesh_file_kind(dfm_context *context, const char *path, uint32_t *kind) {
   return guard([&] {
-    need(context, "context"), need(path, "path"), need(kind, "kind");
+    need(context, "context"), dfm::used(*context), need(path, "path"), need(kind, "kind");
     *kind = dfm::has_cells(path, dfm::read_raw(context->memory, path)) ? DFM_MESH_TETS : DFM_MESH_SURFACE;
   });
 }
 
 dfm_status dfm_mesh_read(dfm_context *context, const char *path, dfm_tetmesh *cells, dfm_trimesh *surface) {
   return guard([&] {
-    need(context, "context"), need(path, "path"), need(cells, "cells"), need(surface, "surface");
+    need(context, "context"), dfm::used(*context), need(path, "path"), need(cells, "cells"), need(surface, "surface");
     dfm::AnyMesh mesh = dfm::read_any_mesh(context->memory, path);
     for (const std::string &w : mesh.cells ? mesh.cells->warnings : mesh.surface->warnings) context->logf(DFM_LOG_WARNING, "%s: %s", path, w.c_str());
     const dfm_tetmesh c = mesh.cells ? Object::keep(*context, std::move(*mesh.cells)) : 0;
@@ -40,7 +40,7 @@ dfm_status dfm_mesh_read(dfm_context *context, const char *path, dfm_tetmesh *ce
 
 dfm_status dfm_tetmesh_make(dfm_context *context, const char *kind, const double size[3], uint32_t cells, dfm_tetmesh *out) {
   return guard([&] {
-    need(context, "context"), need(kind, "kind"), need(size, "size"), need(out, "out");
+    need(context, "context"), dfm::used(*context), need(kind, "kind"), need(size, "size"), need(out, "out");
     const std::string name = kind;
     const dfm::Memory &memory = context->memory;
     if (name == "cylinder") *out = Object::keep(*context, dfm::make_cylinder(memory, size[0], size[1], cells));

@@ -26,7 +26,11 @@ struct MeshObject {
     for (const std::string &w : mesh.warnings) warnings += w + "\n";
   }
 
-  static MeshObject &of(uint64_t handle) { return resolve<MeshObject>(kKind, handle); }
+  static MeshObject &of(uint64_t handle) {
+    MeshObject &object = resolve<MeshObject>(kKind, handle);
+    Call::now().hold(&object), Call::now().hold(&object.context), Call::now().count(object.context.calls);
+    return object;
+  }
 
   // Takes the mesh into the context and returns its handle.
   static uint64_t keep(dfm_context &context, Mesh &&mesh) {
@@ -43,7 +47,9 @@ struct MeshObject {
   }
 
   static void destroy(uint64_t handle) {
-    of(handle).context.remove_live(handle);
+    MeshObject &object = of(handle);
+    Call::now().need_alone(&object, "mesh");
+    object.context.remove_live(handle);
     end(handle);
   }
 

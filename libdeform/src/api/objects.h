@@ -8,15 +8,44 @@
 
 namespace dfm {
 
-inline World &world_of(dfm_world h) { return resolve<World>(Kind::world, h); }
-inline Body &body_of(dfm_body h) { return resolve<Body>(Kind::body, h); }
-inline Obstacle &obstacle_of(dfm_obstacle h) { return resolve<Obstacle>(Kind::obstacle, h); }
-inline Material &material_of(dfm_material h) { return resolve<Material>(Kind::material, h); }
-
-// For calls that say "Not during step."
-inline World &idle(World &w) {
-  if (w.stepping) fail(DFM_E_BUSY, "the world is inside a step; call again when dfm_world_step has returned");
+inline World &held(World &w) {
+  Call::now().hold(&w), Call::now().hold(w.context), Call::now().count(w.context->calls);
   return w;
+}
+inline World &world_of(dfm_world h) { return held(resolve<World>(Kind::world, h)); }
+template <class Part>
+Part &part_of(Kind kind, uint64_t h) {
+  Part &part = resolve<Part>(kind, h);
+  held(*part.world);
+  return part;
+}
+inline Body &body_of(dfm_body h) { return part_of<Body>(Kind::body, h); }
+inline Obstacle &obstacle_of(dfm_obstacle h) { return part_of<Obstacle>(Kind::obstacle, h); }
+inline Material &material_of(dfm_material h) { return part_of<Material>(Kind::material, h); }
+
+// For calls that change the world: no other one may be inside it, neither around this one nor on another thread.
+inline World &idle(World &w) {
+  Call::now().change(&w, w.busy, "world");
+  return w;
+}
+
+// For calls that read arrays which a step has in pieces.
+inline World &settled(World &w) {
+  if (w.busy) Call::refuse("world");
+  return w;
+}
+
+// For calls that make something in a context.
+inline dfm_context &used(dfm_context &context) {
+  if (context.ending) Call::refuse("context");
+  Call::now().hold(&context), Call::now().count(context.calls);
+  return context;
+}
+
+// For calls that change what a context has loaded.
+inline dfm_context &idle(dfm_context &context) {
+  Call::now().need_alone(&context, "context");
+  return used(context);
 }
 
 // The part of a def that the caller's version of the struct has; the rest keeps its default.

@@ -3,8 +3,7 @@
 
 #include <cstring>
 
-#include "api/guard.h"
-#include "core/handle.h"
+#include "api/objects.h"
 #include "plugin/context.h"
 #include "scene/scene.h"
 
@@ -12,10 +11,19 @@ namespace {
 
 using dfm::scene::Scene;
 
-Scene &scene_of(dfm_scene handle) { return dfm::resolve<Scene>(dfm::Kind::scene, handle); }
+Scene &scene_of(dfm_scene handle) {
+  Scene &scene = dfm::resolve<Scene>(dfm::Kind::scene, handle);
+  dfm::Call::now().hold(&scene), dfm::Call::now().hold(scene.context()), dfm::Call::now().count(scene.context()->calls);
+  return scene;
+}
 
 void close_scene(dfm_scene handle) {
   Scene *scene = &scene_of(handle);
+  dfm::Call::now().need_alone(scene, "scene");
+  if (const auto *world = static_cast<dfm::World *>(dfm::handle_find(dfm::Kind::world, scene->world()))) {   // it goes with the scene
+    dfm::Call::now().need_alone(world, "scene's world");
+    if (world->busy) dfm::Call::refuse("scene's world");
+  }
   scene->context()->remove_live(handle);
   dfm::handle_destroy(handle);
   delete scene;
@@ -32,6 +40,7 @@ void check_call(const dfm_context *context, const char *path, const void *out) {
 dfm_status dfm_scene_load(dfm_context *context, const char *path, dfm_world *out) {
   return dfm::guard([&] {
     check_call(context, path, out);
+    dfm::used(*context);
     *out = Scene(context, path, nullptr).release_world();
   });
 }
@@ -39,6 +48,7 @@ dfm_status dfm_scene_load(dfm_context *context, const char *path, dfm_world *out
 dfm_status dfm_scene_open(dfm_context *context, const char *path, const dfm_scene_options *options, dfm_scene *out) {
   return dfm::guard([&] {
     check_call(context, path, out);
+    dfm::used(*context);
     if (options && options->size < sizeof(dfm_scene_options))
       dfm::fail(DFM_E_ARG, "dfm_scene_open: options->size is %u, expected %zu", options->size, sizeof(dfm_scene_options));
     auto scene = std::make_unique<Scene>(context, path, options);

@@ -20,7 +20,7 @@ void log_warnings(const dfm_context &context, const char *what, const dfm::TriMe
 
 dfm_status dfm_trimesh_read(dfm_context *context, const char *path, dfm_trimesh *out) {
   return guard([&] {
-    need(context, "context"), need(path, "path"), need(out, "out");
+    need(context, "context"), dfm::used(*context), need(path, "path"), need(out, "out");
     dfm::TriMesh mesh = dfm::read_tri_mesh(context->memory, path);
     log_warnings(*context, path, mesh);
     *out = Object::keep(*context, std::move(mesh));
@@ -30,7 +30,7 @@ dfm_status dfm_trimesh_read(dfm_context *context, const char *path, dfm_trimesh 
 dfm_status dfm_trimesh_create(dfm_context *context, uint32_t npoint, const double *points, uint32_t ntriangle, const uint32_t *triangles,
                               dfm_trimesh *out) {
   return guard([&] {
-    need(context, "context"), need(points, "points"), need(triangles, "triangles"), need(out, "out");
+    need(context, "context"), dfm::used(*context), need(points, "points"), need(triangles, "triangles"), need(out, "out");
     for (size_t i = 0; i < 3 * size_t(ntriangle); ++i)
       if (triangles[i] >= npoint)
         fail(DFM_E_ARG, "triangle %zu (counted from 0) uses point %u, there are %u; numbers count from 0", i / 3, triangles[i], npoint);
@@ -44,7 +44,7 @@ dfm_status dfm_trimesh_create(dfm_context *context, uint32_t npoint, const doubl
 
 dfm_status dfm_trimesh_make(dfm_context *context, const char *kind, const double size[3], uint32_t triangles, dfm_trimesh *out) {
   return guard([&] {
-    need(context, "context"), need(kind, "kind"), need(size, "size"), need(out, "out");
+    need(context, "context"), dfm::used(*context), need(kind, "kind"), need(size, "size"), need(out, "out");
     const std::string name = kind;
     const dfm::Memory &memory = context->memory;
     if (name == "cylinder") *out = Object::keep(*context, dfm::make_cylinder_surface(memory, size[0], size[1], triangles));

@@ -48,19 +48,22 @@ dfm_world_def dfm_world_def_default(void) {
 dfm_status dfm_world_create(dfm_context *context, const dfm_world_def *def, dfm_world *out) {
   return guard([&] {
     need(context, "context"), need(out, "out");
-    auto w = std::make_unique<World>(context);
+    auto w = std::make_unique<World>(&used(*context));
     w->def = take_def(def, dfm_world_def_default());
     for (double g : w->def.gravity)
       if (!std::isfinite(g)) fail(DFM_E_ARG, "gravity is not finite; give m/s2");
-    if (!(w->def.contact_offset >= 0) || !(w->def.contact_tolerance >= 0))
-      fail(DFM_E_ARG, "contact_offset (m) and contact_tolerance (m/s) must be zero (automatic) or positive");
+    if (!(w->def.contact_offset >= 0 && std::isfinite(w->def.contact_offset)) || !(w->def.contact_tolerance >= 0 && std::isfinite(w->def.contact_tolerance)))
+      fail(DFM_E_ARG, "contact_offset (m) and contact_tolerance (m/s) must be zero (automatic) or positive, and finite; found %g and %g",
+           w->def.contact_offset, w->def.contact_tolerance);
     if (w->def.flags & ~uint32_t{DFM_WORLD_UNGUARDED}) fail(DFM_E_ARG, "flags 0x%x: the only one known is DFM_WORLD_UNGUARDED (1)", w->def.flags);
     if (w->def.max_sweeps == 0 || w->def.max_passes == 0 || w->def.max_substeps == 0)
       fail(DFM_E_ARG, "max_sweeps, max_passes and max_substeps must be at least 1");
     check_max_time(w->def.max_time);
     if (w->def.sleep > 1) fail(DFM_E_ARG, "sleep is %u; it must be 0 (off) or 1 (on)", w->def.sleep);
     if (w->def.self_contact > 1) fail(DFM_E_ARG, "self_contact is %u; it must be 0 (off) or 1 (on)", w->def.self_contact);
-    if (!(w->def.sleep_speed > 0 && w->def.sleep_time > 0)) fail(DFM_E_ARG, "sleep_speed (m/s) and sleep_time (s) must be positive; the defaults are 0.01 and 0.5");
+    for (const double value : {w->def.sleep_speed, w->def.sleep_time})
+      if (!(value > 0 && std::isfinite(value)))
+        fail(DFM_E_ARG, "sleep_speed (m/s) and sleep_time (s) must be positive and finite; the defaults are 0.01 and 0.5, found %g", value);
     if (w->def.method != DFM_METHOD_AUTO && w->def.method != DFM_METHOD_VELOCITY && w->def.method != DFM_METHOD_ROLLBACK)
       fail(DFM_E_UNSUPPORTED, "contact method %d is not available; use DFM_METHOD_AUTO, DFM_METHOD_VELOCITY or (to compare) DFM_METHOD_ROLLBACK",
            w->def.method);
@@ -85,6 +88,7 @@ dfm_status dfm_world_destroy(dfm_world world) {
   return guard([&] {
     World &w = idle(world_of(world));
     w.context->remove_live(world);
+    Call::now().let_go();
     destroy_world(world);
   });
 }
@@ -129,11 +133,6 @@ dfm_status dfm_world_step(dfm_world world, double dt, uint32_t *trouble) {
     World &w = idle(world_of(world));
     if (!(dt > 0 && std::isfinite(dt))) fail(DFM_E_ARG, "a step of %g s; it must be positive and finite", dt);
     uint32_t bits = 0;
-    struct Stepping {
-      World &w;
-      explicit Stepping(World &x) : w(x) { w.stepping = true; }
-      ~Stepping() { w.stepping = false; }
-    } stepping(w);
     const dfm_status s = step_within_budget(w, dt, &bits);
     if (trouble) *trouble = bits;
     return s;
@@ -238,7 +237,7 @@ dfm_status dfm_world_get_stats(dfm_world world, dfm_world_stats *out) {
 
 dfm_status dfm_world_profile(dfm_world world, uint32_t capacity, dfm_stage_time *out, uint32_t *n) {
   return guard([&] {
-    World &w = world_of(world);
+    World &w = idle(world_of(world));
     w.prepare();
     if (!room(static_cast<uint32_t>(w.plan.stages.size()), capacity, out, n)) return;
     for (size_t i = 0; i < w.plan.stages.size(); ++i) {

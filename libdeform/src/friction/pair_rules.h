@@ -37,6 +37,24 @@ inline int rule_weight(const std::string between[2], const PairSide &a, const Pa
   return std::max(both(a, b), both(b, a));
 }
 
+// The same two patterns, in either order: the newer rule holds wherever the older one did, so the older one can go.
+inline bool same_pair(const std::string a[2], const std::string b[2]) {
+  return (a[0] == b[0] && a[1] == b[1]) || (a[0] == b[1] && a[1] == b[0]);
+}
+
+// Puts a rule behind the others and drops the one it supersedes. The vector must have room for one more, or this may throw before it changes anything.
+template <class Rule>
+void add_rule(std::vector<Rule> &rules, Rule &&fresh) {
+  rules.reserve(rules.size() + 1);
+  std::erase_if(rules, [&](const Rule &r) { return same_pair(r.between, fresh.between); });
+  rules.push_back(std::move(fresh));
+}
+
+// Is `name` a body or obstacle that the pattern names, as a whole or by a group?
+inline bool names(std::string_view pattern, std::string_view name) {
+  return pattern == name || (pattern.size() > name.size() && pattern.substr(0, name.size()) == name && pattern[name.size()] == ':');
+}
+
 // nullptr: no rule names the pair.
 template <class Rule>
 const Rule *best_rule(const std::vector<Rule> &rules, const PairSide &a, const PairSide &b) {

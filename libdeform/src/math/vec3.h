@@ -46,10 +46,15 @@ inline Quat operator*(Quat a, Quat b) {
   return {a.w * b.x + a.x * b.w + a.y * b.z - a.z * b.y, a.w * b.y - a.x * b.z + a.y * b.w + a.z * b.x,
           a.w * b.z + a.x * b.y - a.y * b.x + a.z * b.w, a.w * b.w - a.x * b.x - a.y * b.y - a.z * b.z};
 }
-// All zero reads as identity (dfm_pose).
+// All zero reads as identity (dfm_pose). Lengths whose square a double does not hold are brought near one first.
 inline Quat unit_quat(const double q[4]) {
   const double n = std::sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3]);
-  return n > 0 ? Quat{q[0] / n, q[1] / n, q[2] / n, q[3] / n} : Quat{};
+  if (n > 1e-150 && n < 1e150) return {q[0] / n, q[1] / n, q[2] / n, q[3] / n};
+  double most = 0;
+  for (int k = 0; k < 4; ++k) most = std::fabs(q[k]) > most ? std::fabs(q[k]) : most;
+  if (!(most > 0)) return {};
+  const double near[4] = {q[0] / most, q[1] / most, q[2] / most, q[3] / most};
+  return unit_quat(near);
 }
 
 }  // namespace dfm

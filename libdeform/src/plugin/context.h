@@ -1,5 +1,6 @@
 // The context: hooks of the host, what is lent to plugins, what plugins are loaded, and the objects that live in it.
 #pragma once
+#include <atomic>
 #include <cstdint>
 #include <mutex>
 #include <utility>
@@ -37,6 +38,8 @@ struct dfm_context {
   dfm::Registry registry;
   dfm::Loader loader;
   dfm::SaidOnce left_changed;   // types that left the floating-point environment changed
+  std::atomic<uint32_t> calls{0};     // of the API that are in progress in it or in its worlds (api/call.h)
+  std::atomic<bool> ending{false};
 
  private:
   std::mutex live_mutex_;

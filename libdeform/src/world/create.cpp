@@ -6,6 +6,7 @@
 
 #include "core/error.h"
 #include "core/handle.h"
+#include "friction/pair_rules.h"
 #include "mesh/mesh.h"
 #include "world/body_surface.h"
 #include "world/body_zones.h"
@@ -239,8 +240,8 @@ Obstacle &create_obstacle(World &w, const dfm_obstacle_def &def) {
 
 namespace {
 
-// What remembers the removed thing: its contacts end with an event, its friction work leaves the books.
-void forget(World &w, uint64_t id, bool obstacle, uint64_t handle) {
+// What remembers the removed thing: its contacts end with an event, its friction work leaves the books, and rules that name it go with it.
+void forget(World &w, uint64_t id, bool obstacle, uint64_t handle, const std::string &name) {
   w.close_slot(id, obstacle);
   ContactStore &s = w.store;
   w.reserve_events(s.n);
@@ -249,6 +250,11 @@ void forget(World &w, uint64_t id, bool obstacle, uint64_t handle) {
       if (s.touching[i]) w.add_event(DFM_EVENT_END, s.id_a[i], s.id_b[i], s.key[i], w.time);
       s.touching[i] = 0;
     }
+  const auto goes = [&](const std::string &side) {   // "body:GROUP" may also be all of another one's name
+    return names(side, name) && (side == name || (!w.find_body(side) && !w.find_obstacle(side)));
+  };
+  const auto named = [&](const auto &rule) { return goes(rule.between[0]) || goes(rule.between[1]); };
+  std::erase_if(w.friction, named), std::erase_if(w.filters, named);
   std::erase_if(w.work, [&](const PairWork &p) { return p.a == id || p.b == id; });
   handle_destroy(handle);
   w.changed = true;
@@ -258,14 +264,14 @@ void forget(World &w, uint64_t id, bool obstacle, uint64_t handle) {
 
 void destroy_body(Body &b) {
   World &w = *b.world;
-  forget(w, b.id, false, b.handle);
+  forget(w, b.id, false, b.handle, b.name);
   std::erase_if(w.bodies, [&](auto &p) { return p.get() == &b; });
   w.worst_body = nullptr;
 }
 
 void destroy_obstacle(Obstacle &o) {
   World &w = *o.world;
-  forget(w, o.id, true, o.handle);
+  forget(w, o.id, true, o.handle, o.name);
   std::erase_if(w.obstacles, [&](auto &p) { return p.get() == &o; });
 }
 

@@ -19,7 +19,10 @@ void check_body(dfm_rigid_def &d, const char *name) {
     fail(DFM_E_ARG, "rigid body '%s': shape %u; it can be a sphere, a box or a capsule, or DFM_SHAPE_NONE with any shapes added by dfm_rigid_add_shape",
          name, d.shape);
   if (d.shape == DFM_SHAPE_NONE && !d.fixed && zero(d.inertia)) fail(DFM_E_ARG, "rigid body '%s' has no shape to take its inertia from; give all three moments", name);
-  if (!finite(d.velocity, 3) || !finite(d.spin, 3)) fail(DFM_E_ARG, "rigid body '%s': velocity and spin must be finite", name);
+  if (!finite(d.pose.position, 3) || !finite(d.pose.rotation, 4) || !finite(d.velocity, 3) || !finite(d.spin, 3))
+    fail(DFM_E_ARG, "rigid body '%s': pose, velocity and spin must be finite", name);
+  if (!finite(d.half_size, 3) || !finite(&d.radius, 1) || !finite(&d.half_length, 1))
+    fail(DFM_E_ARG, "rigid body '%s': half_size, radius and half_length must be finite", name);
   if (d.fixed) {
     if (!zero(d.velocity) || !zero(d.spin)) fail(DFM_E_ARG, "rigid body '%s' is fixed and has a velocity; drop one (an obstacle's motion is prescribed)", name);
     d.mass = 0, d.inertia[0] = d.inertia[1] = d.inertia[2] = 0;
@@ -48,10 +51,10 @@ void check_joint(const dfm_joint_def &j, uint32_t number, const std::vector<dfm_
   if (!finite(j.anchor, 3) || !finite(j.axis, 3)) fail(DFM_E_ARG, "joint %u of rigid body '%s': anchor and axis must be finite", number, name);
   const bool drives = j.type == DFM_JOINT_HINGE || j.type == DFM_JOINT_SLIDER;
   if (drives && zero(j.axis)) fail(DFM_E_ARG, "joint %u of rigid body '%s': its axis is zero", number, name);
-  if (!j.motor) return;
-  if (!drives) fail(DFM_E_ARG, "joint %u of rigid body '%s': only hinges and sliders have motors", number, name);
   if (!std::isfinite(j.velocity) || !(j.max >= 0 && std::isfinite(j.max)))
     fail(DFM_E_ARG, "joint %u of rigid body '%s': motor velocity %g and max %g must be finite, max not negative", number, name, j.velocity, j.max);
+  if (!j.motor) return;
+  if (!drives) fail(DFM_E_ARG, "joint %u of rigid body '%s': only hinges and sliders have motors", number, name);
 }
 
 Obstacle &make_obstacle(World &w, const dfm_rigid_def &d) {

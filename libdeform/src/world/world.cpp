@@ -64,13 +64,15 @@ uint64_t World::handle_of(uint64_t id) const {
   return 0;
 }
 
-uint32_t World::add_law(const char *name, std::span<const dfm_param_value> values) {
+uint32_t World::add_law(const char *name, std::span<const dfm_param_value> values, std::span<const uint8_t> free) {
   const dfm_type &type = context->registry.find(DFM_KIND_FRICTION, name);
   std::vector<double> packed = pack_params(type, values);
   for (uint32_t i = 0; i < laws.size(); ++i)
     if (laws[i]->type == &type && laws[i]->params == packed) return i;
   auto law = std::make_unique<LawInstance>(type, context->host, std::move(packed));
   rollback_check_law(*this, name, law->nstate);
+  for (uint32_t i = 0; i < free.size(); ++i)
+    if (free[i]) return laws[i] = std::move(law), changed = true, i;
   laws.push_back(std::move(law));
   return static_cast<uint32_t>(laws.size() - 1);
 }

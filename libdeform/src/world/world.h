@@ -1,6 +1,7 @@
 // The world: what it holds, and the buffers of a step. world/step.cpp is the table of contents of what happens to it.
 #pragma once
 #include <array>
+#include <atomic>
 #include <memory>
 #include <string>
 #include <vector>
@@ -177,7 +178,7 @@ struct World {
   Body *worst_body = nullptr;
   uint32_t inverted = 0;                               // cells inside out at the last evaluation of the bound
   uint32_t worst_point = 0;
-  bool stepping = false;
+  std::atomic<bool> busy{false};                       // a call of the API changes it (api/call.h)
 
   // Buffers of a sub-step.
   std::vector<BodyView> body_views;
@@ -246,7 +247,8 @@ struct World {
   Body *find_body(const std::string &name);
   Obstacle *find_obstacle(const std::string &name);
   uint64_t handle_of(uint64_t id) const;               // body or obstacle; 0 if gone
-  uint32_t add_law(const char *name, std::span<const dfm_param_value> values);
+  // Index of the law with these values: one that is there, else a new one, in a place that `free` marks or behind the others.
+  uint32_t add_law(const char *name, std::span<const dfm_param_value> values, std::span<const uint8_t> free = {});
 
   // pair_table.cpp; a, b: bodies by slot, then obstacles
   uint32_t law_of(uint32_t slot_a, bool obstacle, uint32_t slot_b) const;
