@@ -105,7 +105,10 @@ dfm_status Adapter::restore(const void *buffer, size_t bytes) {
   good = good && std::all_of(numbers.begin() + std::ptrdiff_t(behind), numbers.end(), [](double x) { return std::isfinite(x); });
   if (!good) return failed(DFM_E_FORMAT, "the snapshot is damaged: a number of its bodies or of their friction is out of range; nothing was restored");
   RigidFriction::Memory friction;
-  const auto geom = [&](double number) { return number == std::floor(number) && number >= 0 && number < double(seen_.size()) ? seen_[size_t(number)] : nullptr; };
+  const auto geom = [&](double number) {
+    const bool there = number == std::floor(number) && number >= 0 && number < double(seen_.size());
+    return there ? seen_[size_t(number)] : nullptr;
+  };
   if (!near_.read(geom, numbers.data() + behind, head.friction, friction))
     return failed(DFM_E_FORMAT, "the snapshot was made with another law between rigid bodies; call dfm_ode_set_friction with that one first");
   if (const dfm_status status = dfm_world_restore(world_, from + sizeof head, head.world); status != DFM_OK) return status;

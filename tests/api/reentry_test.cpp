@@ -94,7 +94,8 @@ struct Scene {
     static const dfm_type *const types[] = {&type};
     static dfm_plugin plugin{};
     plugin.size = sizeof plugin, plugin.abi = DFM_ABI, plugin.abi_draft = DFM_ABI_DRAFT, plugin.ntype = 1, plugin.types = types;
-    test::ok(dfm_plugin_register_static(c, [](const dfm_host *, uint32_t, uint32_t) -> const dfm_plugin * { return hook("plugin entry"), &plugin; }, "calling"));
+    const dfm_plugin_fn entry = [](const dfm_host *, uint32_t, uint32_t) -> const dfm_plugin * { return hook("plugin entry"), &plugin; };
+    test::ok(dfm_plugin_register_static(c, entry, "calling"));
     w = test::make_world(c);
     floor = test::add_plane(w, "floor");
     dfm_friction_def f{};
@@ -264,7 +265,8 @@ TEST_F(Reentry, FromHooksOfCreation_IsBusy) {
     dfm_obstacle made = 0;
     return dfm_obstacle_create(s.w, &d, &made);
   }, all, {"alloc", "log"});
-  walk([&] { return dfm_world_restore(s.w, s.snapshot.data(), s.snapshot.size()) == DFM_E_FORMAT ? DFM_OK : DFM_E_FATAL; }, all, {});   // of a world that has changed
+  // of a world that has changed since
+  walk([&] { return dfm_world_restore(s.w, s.snapshot.data(), s.snapshot.size()) == DFM_E_FORMAT ? DFM_OK : DFM_E_FATAL; }, all, {});
 }
 
 TEST_F(Reentry, FromTheHostsAnswers_IsBusy) {
