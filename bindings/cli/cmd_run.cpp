@@ -15,6 +15,7 @@
 
 #include "frames.h"
 #include "impulses.h"
+#include "leaving.h"
 #include "messages.h"
 #include "output.h"
 #include "progress.h"
@@ -28,6 +29,7 @@ static_assert(std::atomic<dfm_world>::is_always_lock_free);
 
 void on_signal(int) {
   interrupted = 1;
+  expect_return();
   if (const dfm_world world = stepping) dfm_world_interrupt(world);
 }
 
@@ -78,6 +80,7 @@ class Runner {
     outputs(true);
     mark_ = {wall_seconds(), cpu_seconds()};
     while (!interrupted && !result_.stopped && advance()) outputs(false);
+    came_back();
     count_time();
     if (interrupted) result_.interrupted = true, result_.stop_reason = "interrupted by a signal";
     if (!at_record_) {  // after a stop, too: the world is back at its last good state
@@ -225,6 +228,7 @@ int run(RunOptions options, const Globals &globals) {
   const SceneFile scene(globals, options.scene, options.set, options.jitter);
   RunResult result;
   Checks checks;
+  results_lie_in(options.out);
   catch_signals();
   {
     Runner runner(scene, options, globals);

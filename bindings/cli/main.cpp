@@ -12,6 +12,7 @@
 #ifdef DEFORM_HAVE_ODE
 #include "deform/ode_host.h"
 #endif
+#include "leaving.h"
 #include "messages.h"
 
 namespace cli {
@@ -134,7 +135,7 @@ dfm_context *make_context(const Globals &g) {
   def.threads = g.threads;
   def.log = on_log;
   dfm_context *context = nullptr;
-  if (dfm_context_create(&def, &context) < 0) std::exit(fail(dfm_last_error()));
+  if (dfm_context_create(&def, &context) < 0) std::exit(leave(fail(dfm_last_error())));
 #ifdef DEFORM_HAVE_ODE
   if (dfm_ode_register() != DFM_OK) on_log(nullptr, DFM_LOG_WARNING, dfm_last_error());
 #endif
@@ -186,12 +187,13 @@ int run(int argc, char **argv) {
 // Whatever run() throws, its own set-up and its error paths included, ends in an exit code; the sentence takes no memory.
 int main(int argc, char **argv) {
   std::set_terminate(before_main);
+  cli::guard_leaving();
   try {
-    return run(argc, argv);
+    return cli::leave(run(argc, argv));
   } catch (const std::bad_alloc &) {
     std::fputs("deform: out of memory\n", stderr);
   } catch (const std::exception &error) {
     std::fprintf(stderr, "deform: %s\n", error.what());
   }
-  return cli::kBadInput;
+  return cli::leave(cli::kBadInput);
 }

@@ -27,7 +27,7 @@ static dfm_status eval(const dfm_friction_in *in, dfm_friction_out *out) {
 }
 
 static const dfm_friction law = {sizeof(dfm_friction), DFM_NEED_FN | DFM_NEED_VT | DFM_NEED_AREA, DFM_FRIC_ISOTROPIC | DFM_FRIC_PASSIVE, 2, slots, eval,
-                                 NULL, NULL, NULL};
+                                 NULL, NULL, NULL, NULL};
 static const char *const effects[] = {"presliding", NULL};
 static const dfm_type type = {sizeof(dfm_type), DFM_KIND_FRICTION, "org.tiny.bristle", "bristle", "1.0", "MIT", "Prandtl 1928", rows, 2,
                               sizeof(dfm_param), effects, &law};

@@ -18,7 +18,7 @@ static dfm_status eval(const dfm_friction_in *in, dfm_friction_out *out) {
   return DFM_OK;
 }
 
-static const dfm_friction law = {sizeof(dfm_friction), DFM_NEED_FN | DFM_NEED_VT, DFM_FRIC_ISOTROPIC | DFM_FRIC_PASSIVE, 0, NULL, eval, NULL, NULL, NULL};
+static const dfm_friction law = {sizeof(dfm_friction), DFM_NEED_FN | DFM_NEED_VT, DFM_FRIC_ISOTROPIC | DFM_FRIC_PASSIVE, 0, NULL, eval, NULL, NULL, NULL, NULL};
 static const char *const effects[] = {NULL};
 static const dfm_type type = {sizeof(dfm_type), DFM_KIND_FRICTION, "org.tiny.sign", "sign", "1.0", "MIT", "test", rows, 1, sizeof(dfm_param), effects, &law};
 static const dfm_type *const types[] = {&type};

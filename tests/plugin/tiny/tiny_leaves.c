@@ -1,0 +1,51 @@
+/* A law that ends its process, or never comes back, in the way that its parameter says, at the third hundredth call. */
+#define _DEFAULT_SOURCE
+#include <math.h>
+#include <pthread.h>
+#include <signal.h>
+#include <stdlib.h>
+#include <unistd.h>
+
+#include "deform/plugin.h"
+
+enum { RETURNS, EXITS, UNDERSCORE_EXITS, QUICK_EXITS, ABORTS, ENDS_ITS_THREAD, TOUCHES_NOTHING, HANGS, WAITS };
+
+static void leave(int way) {
+  volatile int round = 1;
+  if (way == EXITS) exit(0);
+  if (way == UNDERSCORE_EXITS) _exit(0);
+  if (way == QUICK_EXITS) quick_exit(0);
+  if (way == ABORTS) abort();
+  if (way == ENDS_ITS_THREAD) pthread_exit(NULL);
+  if (way == TOUCHES_NOTHING) *(volatile int *)8 = 1;
+  while (way == HANGS) round = round % 1000 + 1;
+  while (way == WAITS) pause();
+}
+
+static dfm_status eval(const dfm_friction_in *in, dfm_friction_out *out) {
+  static unsigned calls;
+  uint32_t i, k;
+  if (++calls == 300) leave((int)in->params[0]);
+  for (i = 0; i < in->n; ++i) {
+    for (k = 0; k < 2; ++k) {
+      if (out->ft) out->ft[k * in->stride + i] = -in->vt[k * in->stride + i];
+      if (out->dft_dfn) out->dft_dfn[k * in->stride + i] = 0;
+    }
+    for (k = 0; out->dft_dvt && k < 4; ++k) out->dft_dvt[k * in->stride + i] = k % 3 == 0 ? -1 : 0;
+    if (out->limit) out->limit[i] = HUGE_VAL;
+    if (out->mode) out->mode[i] = 2;
+  }
+  return DFM_OK;
+}
+
+static const dfm_param rows[] = {{"way", "how it leaves", "1", 0, 8, 0, DFM_PARAM_INTEGER, 1, NULL}};
+static const dfm_friction law = {sizeof(dfm_friction), DFM_NEED_VT, DFM_FRIC_ISOTROPIC | DFM_FRIC_PASSIVE | DFM_FRIC_JACOBIAN,
+                                 0, NULL, eval, NULL, NULL, NULL, NULL};
+static const dfm_type type = {sizeof(dfm_type), DFM_KIND_FRICTION, "org.tiny.leaves", "leaves", "1.0", "MIT", "test", rows, 1, sizeof(dfm_param), NULL, &law};
+static const dfm_type *const types[] = {&type};
+static const dfm_plugin plugin = {sizeof(dfm_plugin), DFM_ABI, DFM_ABI_DRAFT, 1, types, NULL};
+
+const dfm_plugin *dfm_plugin_entry(const dfm_host *host, uint32_t host_abi, uint32_t host_abi_min) {
+  (void)host_abi, (void)host_abi_min;
+  return DFM_ABI_OK(host) ? &plugin : NULL;
+}
