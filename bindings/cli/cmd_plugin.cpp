@@ -109,7 +109,8 @@ void print_info(const Type &t) {
     else std::snprintf(value, sizeof value, "%g", row.def);
     const std::string names = row.names ? joined(names_of(row)) : "";
     std::printf("  %-18s %-10s %-16s %-10s %s%s%s%s\n", row.key, value, names.empty() ? range : names.c_str(), row.unit, row.label,
-                row.width > 1 ? (" (" + std::to_string(row.width) + " values)").c_str() : "", row.flags & DFM_PARAM_RUNTIME ? ", may change in a run" : "",
+                row.width > 1 ? (std::string(row.flags & DFM_PARAM_LIST ? " (up to " : " (") + std::to_string(row.width) + " values)").c_str() : "",
+                row.flags & DFM_PARAM_RUNTIME ? ", may change in a run" : "",
                 row.flags & DFM_PARAM_PER_CELL ? ", may vary by cell" : "");
   }
 }

@@ -58,6 +58,7 @@ class RigLaw {
   const dfm_type *type_ = nullptr;
   double fn_ = 1;
   std::vector<double> params_;
+  dfm_slots slots_ = {};                         // what its parameters call for
   std::vector<Column> state_, trial_;
   uint64_t evaluations_ = 0;
 };

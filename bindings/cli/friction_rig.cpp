@@ -179,7 +179,7 @@ class Rig {
     if (name == "Fn") return fn_;
     if (name == "F_elastic") return elastic_force();
     if (name == "closed") return fn_ > 0 ? 1 : 0;
-    return element_force(uint32_t(name[1] - '1'));
+    return element_force(uint32_t(std::stoul(name.substr(1)) - 1));
   }
 
   // Of a law with several bristles: the force of one, which is its state times its stiffness.
@@ -189,7 +189,8 @@ class Rig {
   }
 
   void check_columns() const {
-    const std::vector<std::string> known = {"t", "x", "v", "F", "z", "vx", "vy", "zx", "zy", "Fx", "Fy", "Fn", "F_elastic", "closed", "f1", "f2", "f3", "f4"};
+    std::vector<std::string> known = {"t", "x", "v", "F", "z", "vx", "vy", "zx", "zy", "Fx", "Fy", "Fn", "F_elastic", "closed"};
+    for (int e = 1; e <= 16; ++e) known.push_back("f" + std::to_string(e));   // elements of a law with several bristles
     require(known);
   }
   void require(const std::vector<std::string> &known) const {

@@ -1,5 +1,5 @@
-// Generalised Maxwell-slip friction: four elements in parallel, each a spring k_i that slips at its share nu_i of the Stribeck level. Together they keep a
-// nonlocal memory: an inner loop closes where it began (return points), which no law with one bristle does. Al-Bender, Lampaert, Swevers 2005, (6)-(8).
+// Generalised Maxwell-slip friction: one to sixteen elements in parallel, each a spring k_i that slips at its share nu_i of the Stribeck level. Together they
+// keep a nonlocal memory: an inner loop closes where it began (return points), which no law with one bristle does. Al-Bender, Lampaert, Swevers 2005, (6)-(8).
 //
 //   stuck     df/dt = k v                                until |f| = nu g(w)
 //   slipping  df/dt = sgn v C (nu - |f|/g)               until v turns
@@ -15,6 +15,10 @@
 // sum nu_i^2 (F_S^2 - F_C^2)/(2 k_i). Here it is paid for: a budget E gathers what sliding dissipates, up to sum (nu_i F_S)^2/(2 K_i), and a step may
 // rise by f' = ft + theta (L t - ft), theta = min(1, E/N), where N >= the elastic energy that this step could gain. A radial return loses energy and the
 // loss is concave in f' along t, so with elastic energy plus E as storage the law is passive with any parameters (decision 0030).
+#include <algorithm>
+#include <array>
+#include <utility>
+
 #include "../friction_common/curve.h"
 
 namespace {
@@ -22,8 +26,8 @@ namespace {
 using lanes::kLanes;
 using lanes::within;
 
-constexpr uint32_t kElements = 4;
-enum { kMuC, kMuS, kVs, kDelta, kSigma2, kC, kK, kNu = kK + kElements, kCount = kNu + kElements };
+constexpr uint32_t kMost = 16, kUsual = 4;   // elements
+enum { kMuC, kMuS, kVs, kDelta, kSigma2, kC, kK, kNu = kK + kMost };
 constexpr dfm_param kRows[] = {
     dfm::plugin::param("mu_C", "kinetic friction coefficient", "1", 0, 100, 0.5, DFM_PARAM_RUNTIME),
     dfm::plugin::param("mu_S", "static friction coefficient", "1", 0, 100, 0.5, DFM_PARAM_RUNTIME),
@@ -31,28 +35,47 @@ constexpr dfm_param kRows[] = {
     dfm::plugin::param("delta", "Stribeck exponent", "1", 0.1, 10, 2, DFM_PARAM_RUNTIME),
     dfm::plugin::param("sigma2", "viscous friction per area", "N s/m^3", 0, 1e12, 0, DFM_PARAM_RUNTIME),
     dfm::plugin::param("C", "rate at which slipping elements approach their level, per area", "N/(s m^2)", 0, 1e15, 1e5, DFM_PARAM_RUNTIME),
-    dfm::plugin::param("k", "stiffness of the elements per area; all 0: 4e7 3e7 2e7 1e7", "N/m^3", 0, 1e15, 0, DFM_PARAM_RUNTIME, kElements),
-    dfm::plugin::param("nu", "shares of the level, together 1; all 0: 0.2 0.3 0.3 0.2", "1", 0, 1, 0, DFM_PARAM_RUNTIME, kElements),
+    dfm::plugin::param("k", "stiffness of the elements per area, one for each; none: 4e7 3e7 2e7 1e7", "N/m^3", 0, 1e15, 0, DFM_PARAM_RUNTIME | DFM_PARAM_LIST, kMost),
+    dfm::plugin::param("nu", "shares of the level, together 1; none: 0.2 0.3 0.3 0.2", "1", 0, 1, 0, DFM_PARAM_RUNTIME | DFM_PARAM_LIST, kMost),
 };
-constexpr double kUsualK[kElements] = {4e7, 3e7, 2e7, 1e7}, kUsualNu[kElements] = {0.2, 0.3, 0.3, 0.2};
+constexpr double kUsualK[kUsual] = {4e7, 3e7, 2e7, 1e7}, kUsualNu[kUsual] = {0.2, 0.3, 0.3, 0.2};
 
-// Four tangent pairs z_i (m); then four flags, 1 while the element slips, and the budget (J: an area that grows brings none).
-constexpr dfm_slot kSlots[] = {{DFM_PER_CONTACT, 2, DFM_SLOT_TANGENT, 0}, {DFM_PER_CONTACT, 2, DFM_SLOT_TANGENT, 0}, {DFM_PER_CONTACT, 2, DFM_SLOT_TANGENT, 0},
-                               {DFM_PER_CONTACT, 2, DFM_SLOT_TANGENT, 0}, {DFM_PER_CONTACT, 5, DFM_SLOT_SCALAR, 0}};
-constexpr uint32_t kFlag = 2 * kElements, kBudget = kFlag + kElements, kStates = kBudget + 1;
+// Of n elements: n tangent pairs z_i (m); then n flags, 1 while the element slips, and the budget (J: an area that grows brings none).
+constexpr uint32_t flag_of(uint32_t n) { return 2 * n; }
+constexpr uint32_t budget_of(uint32_t n) { return 3 * n; }
+struct Slots {
+  dfm_slot slot[kMost + 1];
+  constexpr explicit Slots(uint32_t n) : slot{} {
+    for (uint32_t e = 0; e < n; ++e) slot[e] = {DFM_PER_CONTACT, 2, DFM_SLOT_TANGENT, 0};
+    slot[n] = {DFM_PER_CONTACT, n + 1, DFM_SLOT_SCALAR, 0};
+  }
+};
+template <size_t... N>
+constexpr std::array<Slots, kMost> all_slots(std::index_sequence<N...>) { return {Slots(N + 1)...}; }
+constexpr std::array<Slots, kMost> kSlots = all_slots(std::make_index_sequence<kMost>{});
 
-double total(const double *p) { return (p[0] + p[1]) + (p[2] + p[3]); }
+uint32_t given(const double *p) {                       // up to the last that is not 0
+  uint32_t n = kMost;
+  while (n > 0 && p[n - 1] == 0) --n;
+  return n;
+}
+// Parameters that check refuses have no elements; this many keep what is asked for them within its arrays.
+uint32_t elements(const double *params) {
+  const uint32_t k = given(params + kK), nu = given(params + kNu);
+  return std::max(k > 0 ? k : kUsual, nu > 0 ? nu : kUsual);
+}
 
 struct Batch {
-  double h, mu_c, mu_s, v_s, delta, sigma2, c, k[kElements], nu[kElements];
+  double h, mu_c, mu_s, v_s, delta, sigma2, c, k[kMost] = {}, nu[kMost] = {};
+  uint32_t n;                                           // elements
   Batch(const double *p, double dt)
-      : h(dt), mu_c(p[kMuC]), mu_s(p[kMuS]), v_s(p[kVs]), delta(p[kDelta]), sigma2(p[kSigma2]), c(p[kC]) {
-    const bool usual_k = total(p + kK) == 0, usual_nu = total(p + kNu) == 0;
-    for (uint32_t e = 0; e < kElements; ++e) k[e] = usual_k ? kUsualK[e] : p[kK + e], nu[e] = usual_nu ? kUsualNu[e] : p[kNu + e];
+      : h(dt), mu_c(p[kMuC]), mu_s(p[kMuS]), v_s(p[kVs]), delta(p[kDelta]), sigma2(p[kSigma2]), c(p[kC]), n(elements(p)) {
+    const bool own_k = given(p + kK) > 0, own_nu = given(p + kNu) > 0;
+    std::copy_n(own_k ? p + kK : kUsualK, own_k ? n : kUsual, k), std::copy_n(own_nu ? p + kNu : kUsualNu, own_nu ? n : kUsual, nu);
   }
 };
 
-constexpr double kLeast = 1e-140, kMost = 1e140, kFar = 1e100, kWide = 1e20;   // as in bristle.h
+constexpr double kLeast = 1e-140, kLargest = 1e140, kFar = 1e100, kWide = 1e20;   // as in bristle.h
 
 struct Block {
   double poison[kLanes], fn[kLanes], area[kLanes], vx[kLanes], vy[kLanes], w[kLanes], ex[kLanes], ey[kLanes], mu[kLanes], g[kLanes], slope[kLanes];
@@ -66,7 +89,7 @@ DEFORM_PASS inline void load(const Batch &p, const dfm_friction_in *in, size_t a
   EACH_LANE(i) {
     b.poison[i] = (0.0 * fn[i] + 0.0 * vx[i]) + (0.0 * vy[i] + 0.0 * area[i]);
     const double touches = fn[i] > kLeast ? fn[i] : 0.0, a = area[i] > 0 ? area[i] : 0.0;
-    b.fn[i] = touches < kMost ? touches : kMost, b.area[i] = a < kWide ? a : kWide;
+    b.fn[i] = touches < kLargest ? touches : kLargest, b.area[i] = a < kWide ? a : kWide;
     const double x = within(vx[i], kFar), y = within(vy[i], kFar), square = x * x + y * y, moves = square > kLeast * kLeast ? 1.0 : 0.0;
     b.vx[i] = x * moves, b.vy[i] = y * moves, b.w[i] = std::sqrt(square * moves);
     const double by_w = 1.0 / (b.w[i] > kLeast ? b.w[i] : kLeast);
@@ -87,11 +110,11 @@ DEFORM_PASS inline void load(const Batch &p, const dfm_friction_in *in, size_t a
 // The share of this step's rise that the budget covers. N from the old state alone, so that theta has no slope by v: |f'| <= |f0| + lambda nu.
 DEFORM_PASS inline void pay(const Batch &p, const dfm_friction_in *in, size_t at, Block &b) {
   const size_t stride = in->stride;
-  const double *const budget = in->state + kBudget * stride + at;
+  const double *const budget = in->state + budget_of(p.n) * stride + at;
   double need[kLanes] = {};
   EACH_LANE(i) b.most[i] = b.lost[i] = 0.0;
-  for (uint32_t e = 0; e < kElements; ++e) {
-    const double *zx = in->state + 2 * e * stride + at, *zy = zx + stride, *flag = in->state + (kFlag + e) * stride + at, nu = p.nu[e];
+  for (uint32_t e = 0; e < p.n; ++e) {
+    const double *zx = in->state + 2 * e * stride + at, *zy = zx + stride, *flag = in->state + (flag_of(p.n) + e) * stride + at, nu = p.nu[e];
     EACH_LANE(i) {
       const double K = p.k[e] * b.area[i], by_2k = 0.5 / (K > kLeast ? K : kLeast), cone = nu * p.mu_s * b.fn[i];
       const double x = within(zx[i], kFar), y = within(zy[i], kFar), rise = p.h * p.c * b.area[i] * nu;
@@ -104,17 +127,17 @@ DEFORM_PASS inline void pay(const Batch &p, const dfm_friction_in *in, size_t at
     const double given = budget[i] > 0 ? budget[i] : 0.0;
     b.budget[i] = given < b.most[i] ? given : b.most[i];
     b.theta[i] = b.budget[i] < need[i] ? b.budget[i] / need[i] : 1.0;
-    b.theta_fn[i] = b.theta[i] < 1.0 && given > b.most[i] ? 2.0 * b.theta[i] / (b.fn[i] > 0 ? b.fn[i] : kMost) : 0.0;   // the bound goes as fn^2
+    b.theta_fn[i] = b.theta[i] < 1.0 && given > b.most[i] ? 2.0 * b.theta[i] / (b.fn[i] > 0 ? b.fn[i] : kLargest) : 0.0;   // the bound goes as fn^2
   }
 }
 
 // Element e of eight contacts: its new deflection, its share of the sums.
 DEFORM_PASS inline void element(const Batch &p, uint32_t e, const dfm_friction_in *in, dfm_friction_out *out, size_t at, Block &b) {
   const size_t stride = in->stride;
-  const double *zx = in->state + 2 * e * stride + at, *zy = zx + stride, *flag = in->state + (kFlag + e) * stride + at, nu = p.nu[e];
+  const double *zx = in->state + 2 * e * stride + at, *zy = zx + stride, *flag = in->state + (flag_of(p.n) + e) * stride + at, nu = p.nu[e];
   double spare[kLanes];
   const auto to = [&](size_t c) { return out->state ? out->state + c * stride + at : spare; };
-  double *const ox = to(2 * e), *const oy = to(2 * e + 1), *const oflag = to(kFlag + e);
+  double *const ox = to(2 * e), *const oy = to(2 * e + 1), *const oflag = to(flag_of(p.n) + e);
   EACH_LANE(i) {
     b.poison[i] += (0.0 * zx[i] + 0.0 * zy[i]) + 0.0 * flag[i];
     const double K = p.k[e] * b.area[i], hk = p.h * K, g = b.g[i], keeps = b.fn[i] > 0 ? 1.0 : 0.0, cone = nu * p.mu_s * b.fn[i];
@@ -122,7 +145,7 @@ DEFORM_PASS inline void element(const Batch &p, uint32_t e, const dfm_friction_i
     // the old force into the new cone
     const double size = std::sqrt(a2 > kLeast * kLeast ? a2 : 1.0), r = a2 > kLeast * kLeast ? size : 0.0, outside = r > cone ? 1.0 : 0.0;
     const double scale = outside > 0 ? cone / size : 1.0, x0 = scale * (keeps * within(zx[i], kFar)), y0 = scale * (keeps * within(zy[i], kFar));
-    const double f0 = outside > 0 ? cone : r, by_fn = outside / (b.fn[i] > 0 ? b.fn[i] : kMost), cx = K * x0 * by_fn, cy = K * y0 * by_fn;   // df0/dfn
+    const double f0 = outside > 0 ? cone : r, by_fn = outside / (b.fn[i] > 0 ? b.fn[i] : kLargest), cx = K * x0 * by_fn, cy = K * y0 * by_fn;   // df0/dfn
     // trial and limit
     const double tx = x0 + p.h * b.vx[i], ty = y0 + p.h * b.vy[i], px = K * tx, py = K * ty, t2 = px * px + py * py;
     const double t = std::sqrt(t2 > kLeast * kLeast ? t2 : 1.0), n = t2 > kLeast * kLeast ? t : 0.0, ux = n > 0 ? px / t : 0.0, uy = n > 0 ? py / t : 0.0;
@@ -158,11 +181,11 @@ struct Gms {
       Block b;
       load(p, in, at, b);
       pay(p, in, at, b);
-      for (uint32_t e = 0; e < kElements; ++e) element(p, e, in, out, at, b);
+      for (uint32_t e = 0; e < p.n; ++e) element(p, e, in, out, at, b);
       const auto to = [&](double *column, size_t c) { return column ? column + c * stride + at : spare; };
       double *const fx = to(out->ft, 0), *const fy = to(out->ft, 1), *const xx = to(out->dft_dvt, 0), *const xy = to(out->dft_dvt, 1);
       double *const yx = to(out->dft_dvt, 2), *const yy = to(out->dft_dvt, 3), *const nx = to(out->dft_dfn, 0), *const ny = to(out->dft_dfn, 1);
-      double *const limit = to(out->limit, 0), *const stored = to(out->stored, 0), *const budget = to(out->state, kBudget);
+      double *const limit = to(out->limit, 0), *const stored = to(out->stored, 0), *const budget = to(out->state, budget_of(p.n));
       EACH_LANE(i) {
         const double poison = b.poison[i], drag = b.fn[i] > 0 ? p.sigma2 * b.area[i] : 0.0;
         fx[i] = poison - b.fx[i], fy[i] = poison - b.fy[i];
@@ -173,10 +196,10 @@ struct Gms {
         budget[i] = left;
         stored[i] = b.stored[i] + left + poison;
       }
-      for (uint32_t c = 0; out->state && c < kStates; ++c)
+      for (uint32_t c = 0; out->state && c < budget_of(p.n) + 1; ++c)
         EACH_LANE(i) out->state[c * stride + at + i] += b.poison[i];
       for (uint32_t i = 0; out->mode && i < kLanes; ++i)
-        out->mode[at + i] = static_cast<uint8_t>(b.fn[i] > 0 ? b.slips[i] > 3.5 ? 2 : 1 : 0);
+        out->mode[at + i] = static_cast<uint8_t>(b.fn[i] > 0 ? b.slips[i] > p.n - 0.5 ? 2 : 1 : 0);
     }
     return DFM_OK;
   }
@@ -184,33 +207,49 @@ struct Gms {
 
 dfm_status check(const double *p, char *why, size_t cap) {
   const double *const k = p + kK, *const nu = p + kNu;
-  const bool usual_k = total(k) == 0, usual_nu = total(nu) == 0;
+  const uint32_t nk = given(k), nnu = given(nu), n = elements(p);
   if (p[kMuS] < p[kMuC]) {
     std::snprintf(why, cap, "mu_S (%g) must not be below mu_C (%g); give both, or \"mu\" for mu_C = mu_S", p[kMuS], p[kMuC]);
     return DFM_E_ARG;
   }
-  if (!usual_nu && std::fabs(total(nu) - 1) > 1e-9) {
-    std::snprintf(why, cap, "the four nu must add up to 1; %g + %g + %g + %g = %.12g", nu[0], nu[1], nu[2], nu[3], total(nu));
+  if (n != kUsual && (nk == 0 || nnu == 0)) {
+    std::snprintf(why, cap, "%s %u value%s and %s has none, which stands for four; give as many of each", nk ? "k has" : "nu has", nk ? nk : nnu, (nk ? nk : nnu) == 1 ? "" : "s",
+                  nk ? "nu" : "k");
     return DFM_E_ARG;
   }
-  for (uint32_t e = 0; e < kElements; ++e)
-    if (!usual_k && !(k[e] > 0)) {
-      std::snprintf(why, cap, "k must be above zero for each of the four elements (it is %g for element %u), or 0 for all: the usual ones", k[e], e + 1);
+  double sum = 0;
+  for (uint32_t e = 0; e < n; ++e) sum += nu[e];
+  if (nnu > 0 && std::fabs(sum - 1) > 1e-9) {
+    std::snprintf(why, cap, "the %u nu must add up to 1; their sum is %.12g", nnu, sum);
+    return DFM_E_ARG;
+  }
+  for (uint32_t e = 0; e < n; ++e)
+    if (nk > 0 && !(k[e] > 0)) {
+      std::snprintf(why, cap, "k must be above zero for each of the %u elements; it is %g for element %u", n, k[e], e + 1);
       return DFM_E_ARG;
     }
   return DFM_OK;
 }
 
+const dfm_slots *state(const double *params) {
+  static constexpr std::array<dfm_slots, kMost> tables = [] {
+    std::array<dfm_slots, kMost> out{};
+    for (uint32_t n = 1; n <= kMost; ++n) out[n - 1] = {sizeof(dfm_slots), n + 1, kSlots[n - 1].slot};
+    return out;
+  }();
+  return &tables[elements(params) - 1];
+}
+
 constexpr dfm_friction make() {
   dfm_friction f = dfm::plugin::friction(DFM_NEED_FN | DFM_NEED_VT | DFM_NEED_AREA, DFM_FRIC_ISOTROPIC | DFM_FRIC_PASSIVE | DFM_FRIC_JACOBIAN,
                                          lanes::eval<Gms>, check);
-  f.nslot = sizeof kSlots / sizeof kSlots[0], f.slots = kSlots;
+  f.nslot = kMost + 1, f.slots = kSlots[kMost - 1].slot, f.state = state;
   return f;
 }
 
 const dfm_friction law = make();
 const char *const effects[] = {"stiction", "stribeck", "viscous", "presliding", "hysteresis", "breakaway", nullptr};
-const dfm_type gms = dfm::plugin::type(DFM_KIND_FRICTION, "org.deform.gms", "Generalised Maxwell-slip friction: four elements, nonlocal memory", "0.1.0", "MIT",
+const dfm_type gms = dfm::plugin::type(DFM_KIND_FRICTION, "org.deform.gms", "Generalised Maxwell-slip friction: up to 16 elements, nonlocal memory", "0.1.0", "MIT",
                                        "Al-Bender, Lampaert, Swevers 2005, (6)-(8); vector form by radial returns, its rise at a crawl paid for", kRows, effects, &law);
 
 }  // namespace

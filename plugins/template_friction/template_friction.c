@@ -37,7 +37,7 @@ static dfm_status eval(const dfm_friction_in *in, dfm_friction_out *out) {
 
 static const dfm_slot state[] = {{DFM_PER_CONTACT, 2, DFM_SLOT_TANGENT, 0}};        /* the host keeps it, turns it, drops it on lift-off */
 static const dfm_friction law = {sizeof law, DFM_NEED_FN | DFM_NEED_VT | DFM_NEED_AREA, DFM_FRIC_ISOTROPIC | DFM_FRIC_PASSIVE | DFM_FRIC_JACOBIAN,
-                                 1, state, eval, NULL, NULL, NULL};
+                                 1, state, eval, NULL, NULL, NULL, NULL};
 static const char *const effects[] = {"stiction", "presliding", "hysteresis", NULL};
 static const dfm_type type = {sizeof type, DFM_KIND_FRICTION, "org.deform.template_friction", "bristle on a cone", "1.0", "MIT",
                               "Simo and Hughes 1998, box 1.4", params, 2, sizeof params[0], effects, &law};

@@ -35,7 +35,7 @@ static const Row rows[] = {
   M(dfm_friction_out, stored),
   S(dfm_friction),
   M(dfm_friction, size), M(dfm_friction, needs), M(dfm_friction, flags), M(dfm_friction, nslot), M(dfm_friction, slots),
-  M(dfm_friction, eval), M(dfm_friction, check), M(dfm_friction, prepare), M(dfm_friction, release),
+  M(dfm_friction, eval), M(dfm_friction, check), M(dfm_friction, prepare), M(dfm_friction, release), M(dfm_friction, state),
   S(dfm_mesh),
   M(dfm_mesh, size), M(dfm_mesh, npoint), M(dfm_mesh, ncell), M(dfm_mesh, cell), M(dfm_mesh, rest), M(dfm_mesh, cells),
   M(dfm_mesh, mass), M(dfm_mesh, params), M(dfm_mesh, field_keys), M(dfm_mesh, fields), M(dfm_mesh, nedge), M(dfm_mesh, nsurfel),

@@ -40,9 +40,9 @@ dfm_status smoothed(const dfm_friction_in *in, dfm_friction_out *out) {
 
 const dfm_param rows[] = {{"c", "drag per area, or coefficient", "1", 0.0, 1e12, 1.0, 0, 1, nullptr}};
 constexpr uint32_t kNeeds = DFM_NEED_FN | DFM_NEED_VT | DFM_NEED_AREA, kPlain = DFM_FRIC_ISOTROPIC | DFM_FRIC_PASSIVE;
-const dfm_friction with = {sizeof(dfm_friction), kNeeds, kPlain | DFM_FRIC_JACOBIAN, 0, nullptr, viscous, nullptr, nullptr, nullptr};
-const dfm_friction without = {sizeof(dfm_friction), kNeeds, kPlain, 0, nullptr, viscous, nullptr, nullptr, nullptr};
-const dfm_friction smooth = {sizeof(dfm_friction), kNeeds, kPlain | DFM_FRIC_JACOBIAN, 0, nullptr, smoothed, nullptr, nullptr, nullptr};
+const dfm_friction with = {sizeof(dfm_friction), kNeeds, kPlain | DFM_FRIC_JACOBIAN, 0, nullptr, viscous, nullptr, nullptr, nullptr, nullptr};
+const dfm_friction without = {sizeof(dfm_friction), kNeeds, kPlain, 0, nullptr, viscous, nullptr, nullptr, nullptr, nullptr};
+const dfm_friction smooth = {sizeof(dfm_friction), kNeeds, kPlain | DFM_FRIC_JACOBIAN, 0, nullptr, smoothed, nullptr, nullptr, nullptr, nullptr};
 
 dfm_type type(const char *id, const dfm_friction *ops) {
   dfm_type t{};

@@ -10,6 +10,15 @@ namespace {
 
 constexpr double kPi = 3.14159265358979323846;
 
+// mu_C mu_S v_s delta sigma2 C, then as many k as nu: the law's table has sixteen of each, the unused 0.
+std::vector<double> wide(const std::vector<double> &p) {
+  const size_t n = (p.size() - 6) / 2;
+  std::vector<double> out(6 + 32, 0.0);
+  std::copy_n(p.begin(), 6 + n, out.begin());
+  std::copy_n(p.begin() + 6 + static_cast<std::ptrdiff_t>(n), n, out.begin() + 22);
+  return out;
+}
+
 struct Gms : testing::Test {
   tiny::Context c;
   dfm_law handle = 0;
@@ -20,7 +29,7 @@ struct Gms : testing::Test {
     dev = make({0.15, 0.20, 0.01, 2, 0.4, 60, 4000, 3000, 2000, 1000, 0.2, 0.3, 0.3, 0.2});
     maxwell = make({0.20, 0.20, 0.01, 2, 0, 60, 4000, 3000, 2000, 1000, 0.2, 0.3, 0.3, 0.2});   // one level: Maxwell-slip
   }
-  Law make(std::vector<double> params) const { return rules::law_of(handle, std::move(params)); }
+  Law make(const std::vector<double> &params) const { return rules::law_of(handle, wide(params)); }
   rules::Draw draw() const { return {std::mt19937(11), 2e-5}; }
   static double g(double w) { return 9.8 * (0.15 + 0.05 * std::exp(-w * w / 1e-4)); }
 };
@@ -32,8 +41,9 @@ TEST_F(Gms, SelfDescription_SaysWhatItIs) {
   const char *keys[] = {"mu_C", "mu_S", "v_s", "delta", "sigma2", "C", "k", "nu"};
   ASSERT_EQ(type->nparam, 8u);
   for (int i = 0; i < 8; ++i) EXPECT_STREQ(type->params[i].key, keys[i]);
-  EXPECT_EQ(type->params[6].width, 4u);
-  EXPECT_EQ(type->params[7].width, 4u);
+  EXPECT_EQ(type->params[6].width, 16u);
+  EXPECT_EQ(type->params[7].width, 16u);
+  EXPECT_TRUE(type->params[6].flags & type->params[7].flags & DFM_PARAM_LIST);
   EXPECT_EQ(dev.nstate, 13u);
   EXPECT_EQ(dev.pairs, (std::vector<uint32_t>{0, 2, 4, 6}));
   EXPECT_EQ(dev.flags, (std::vector<uint32_t>{8, 9, 10, 11, 12}));
@@ -81,17 +91,19 @@ TEST_F(Gms, Bits_MatchTheRecordedHash) {
 }
 
 TEST_F(Gms, ParametersThatDoNotFit_AreRefused) {
-  const auto refusal = [&](std::vector<double> p) {
+  const auto refusal = [&](const std::vector<double> &p) {
     char why[256] = "";
-    EXPECT_EQ(dev.ops->check(p.data(), why, sizeof why), DFM_E_ARG);
+    EXPECT_EQ(dev.ops->check(wide(p).data(), why, sizeof why), DFM_E_ARG);
     return std::string(why);
   };
-  EXPECT_NE(refusal({0.15, 0.20, 0.01, 2, 0, 60, 4000, 3000, 2000, 1000, 0.2, 0.3, 0.3, 0.3}).find("add up to 1; 0.2 + 0.3 + 0.3 + 0.3 = 1.1"), std::string::npos);
+  EXPECT_NE(refusal({0.15, 0.20, 0.01, 2, 0, 60, 4000, 3000, 2000, 1000, 0.2, 0.3, 0.3, 0.3}).find("the 4 nu must add up to 1; their sum is 1.1"), std::string::npos);
   EXPECT_NE(refusal({0.15, 0.20, 0.01, 2, 0, 60, 4000, 0, 2000, 1000, 0.2, 0.3, 0.3, 0.2}).find("for element 2"), std::string::npos);
   EXPECT_NE(refusal({0.25, 0.20, 0.01, 2, 0, 60, 0, 0, 0, 0, 0, 0, 0, 0}).find("mu_S (0.2)"), std::string::npos);
+  EXPECT_NE(refusal({0.15, 0.20, 0.01, 2, 0, 60, 5, 4, 3, 2, 1, 0, 0, 0, 0, 0}).find("k has 5 values and nu has none"), std::string::npos);
+  EXPECT_NE(refusal({0.15, 0.20, 0.01, 2, 0, 60, 0, 0, 0, 0, 0, 0.2, 0.2, 0.2, 0.2, 0.2}).find("nu has 5 values and k has none"), std::string::npos);
   char why[256] = "";
   const std::vector<double> usual{0.5, 0.5, 0.01, 2, 0, 1e5, 0, 0, 0, 0, 0, 0, 0, 0};
-  EXPECT_EQ(dev.ops->check(usual.data(), why, sizeof why), DFM_OK);
+  EXPECT_EQ(dev.ops->check(wide(usual).data(), why, sizeof why), DFM_OK);
   Contact k(make(usual));
   EXPECT_NEAR(k.path(1e-10, 1, 1e-3), 1e8 * 1e-10, 1e-15) << "the usual four stiffnesses together";
 }
@@ -198,13 +210,74 @@ TEST_F(Gms, SineVelocities_ConvergeToTheReference) {
 
 TEST_F(Gms, PreslidingLoops_MatchTheReference) {
   READ_OR_SKIP(t, "presliding.csv");
-  // the file has five elements: four in one contact, the fifth in another, cut into four equal ones
-  Contact a(make({0.20, 0.20, 0.01, 2, 0, 60, 4900, 2450, 1633.3333333333333, 1225, 0.25, 0.25, 0.25, 0.25}), 7.84);
-  Contact b(make({0.20, 0.20, 0.01, 2, 0, 60, 245, 245, 245, 245, 0.25, 0.25, 0.25, 0.25}), 1.96);
-  for (size_t i = 2; i < t.size(); ++i) {
-    const double dx = t.at(i, "x") - t.at(i - 1, "x");
-    EXPECT_NEAR(a.path(dx, 1, 1e-3) + b.path(dx, 1, 1e-3), t.at(i, "F_maxwell_slip"), 1e-11) << i;
+  Contact a(make({0.20, 0.20, 0.01, 2, 0, 60, 4900, 2450, 1633.3333333333333, 1225, 980, 0.2, 0.2, 0.2, 0.2, 0.2}), 9.8);
+  for (size_t i = 2; i < t.size(); ++i) EXPECT_NEAR(a.path(t.at(i, "x") - t.at(i - 1, "x"), 1, 1e-3), t.at(i, "F_maxwell_slip"), 1e-11) << i;
+}
+
+// ---- any number of elements --------------------------------------------------------------------------------------------------------
+
+std::vector<double> spread(uint32_t n, double mu_s = 0.20) {
+  std::vector<double> p{0.15, mu_s, 0.01, 2, 0.4, 60};
+  if (mu_s == 0.15) p[4] = 0;
+  for (uint32_t e = 0; e < n; ++e) p.push_back(1e4 * 2 * (n - e) / (n * (n + 1.0)));
+  for (uint32_t e = 0; e < n; ++e) p.push_back(1.0 / n);
+  return p;
+}
+
+TEST_F(Gms, OneToSixteenElements_KeepTheStateThatTheyNeedAndTheRules) {
+  for (const uint32_t n : {1u, 2u, 5u, 16u}) {
+    const Law l = make(spread(n));
+    EXPECT_EQ(l.nstate, 3 * n + 1);
+    EXPECT_EQ(l.pairs.size(), n);
+    EXPECT_GE(rules::worst_balance(l, 2e-5, 60, true), -1e-13) << n;
+    rules::derivatives(l, draw(), 200, 1e-6, [](const In &) { return false; });
+    rules::turns_with_the_frame(l, draw());
+    rules::odd_to_the_bit(l, draw());
   }
+}
+
+TEST_F(Gms, SixteenElementsWithOneLevel_AreMaxwellSlipInAnyStep) {
+  for (const uint32_t n : {1u, 5u, 16u}) {
+    const std::vector<double> p = spread(n, 0.15);
+    Contact k(make(p), 9.8);
+    std::vector<double> f(n, 0.0);
+    std::mt19937 random(2);
+    for (int step = 0; step < 300; ++step) {
+      const double dx = std::normal_distribution<double>(0, 1e-4)(random), h = step % 2 ? 1e-3 : 1.0 / 30;
+      double sum = 0;
+      for (uint32_t e = 0; e < n; ++e) f[e] = std::clamp(f[e] + p[6 + e] * dx, -p[6 + n + e] * 1.47, p[6 + n + e] * 1.47), sum += f[e];
+      EXPECT_NEAR(k.move(dx / h, 0, h).f[0], sum, 1e-12) << n << " " << step;
+    }
+  }
+}
+
+TEST_F(Gms, NumberOfElements_IsThatOfTheValuesGiven) {
+  const double k[17] = {5e7, 4e7, 3e7, 2e7, 1e7}, nu[5] = {0.2, 0.2, 0.2, 0.2, 0.2};
+  const auto packed = [&](uint32_t nk, uint32_t nnu) {
+    const dfm_param_value values[] = {{"k", k, nk}, {"nu", nu, nnu}};
+    const dfm_params params{sizeof params, 2, values};
+    std::vector<double> out(38, -1.0);
+    uint32_t n = 0;
+    const dfm_status status = dfm_law_pack(handle, &params, 38, out.data(), &n);
+    return status == DFM_OK ? out : std::vector<double>();
+  };
+  const std::vector<double> five = packed(5, 5);
+  ASSERT_EQ(five.size(), 38u) << dfm_last_error();
+  EXPECT_EQ(five[10], 1e7);
+  EXPECT_EQ(five[11], 0.0);
+  EXPECT_EQ(rules::law_of(handle, five).nstate, 16u);
+  EXPECT_TRUE(packed(17, 5).empty());
+  EXPECT_NE(std::string(dfm_last_error()).find("\"k\" has 17 values, 1 to 16 expected"), std::string::npos) << dfm_last_error();
+}
+
+TEST_F(Gms, CaseWithFiveElements_RunsOnTheRig) {
+  const std::string dir = tiny::folder("gms_case");
+  test::write_file(dir + "/five.json", R"({"scenario": "sinvel", "law": "gms", "columns": [{"name": "t"}, {"name": "F"}, {"name": "f1"}, {"name": "f5"}],
+    "params": {"F_C": 1.47, "F_S": 1.96, "v_s": 0.01, "delta": 2, "sigma2": 0.4, "C": 60, "k": [4000, 3000, 2000, 1000, 500], "nu": [0.2, 0.3, 0.2, 0.2, 0.1]},
+    "initial": {}, "input": {"kind": "sine_velocity", "V": 0.01, "freq": 1, "T": 0.5}, "output_times": [0, 0.1, 0.2]})");
+  const test::CommandResult r = test::deform({"friction", dir + "/five.json", "--csv", dir + "/five.csv"});
+  EXPECT_EQ(r.exit_code, 0) << r.err;
+  EXPECT_EQ(test::read_file(dir + "/five.csv").substr(0, 10), "t,F,f1,f5\n");
 }
 
 }  // namespace

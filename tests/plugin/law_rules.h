@@ -10,7 +10,7 @@
 
 namespace rules {
 
-constexpr uint32_t kMaxState = 16;
+constexpr uint32_t kMaxState = 50;
 
 struct Law {
   const dfm_friction *ops = nullptr;
@@ -22,8 +22,9 @@ struct Law {
 };
 
 inline void read_slots(Law &law) {
-  for (uint32_t s = 0; s < law.ops->nslot; ++s) {
-    const dfm_slot &slot = law.ops->slots[s];
+  const dfm_slots all{sizeof(dfm_slots), law.ops->nslot, law.ops->slots}, own = law.ops->state ? *law.ops->state(law.params.data()) : all;
+  for (uint32_t s = 0; s < own.nslot; ++s) {
+    const dfm_slot &slot = own.slots[s];
     for (uint32_t k = 0; slot.kind == DFM_SLOT_TANGENT && k + 1 < slot.width; k += 2) law.pairs.push_back(law.nstate + k);
     for (uint32_t k = 0; slot.kind == DFM_SLOT_SCALAR && k < slot.width; ++k) law.flags.push_back(law.nstate + k);
     law.nstate += slot.width;

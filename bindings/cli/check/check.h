@@ -30,6 +30,7 @@ struct Subject {
   const dfm_type *type = nullptr;
   uint32_t index = 0;          // of the type in the file
   std::string command;         // this program, for rules that ask a second process
+  double limit = 10;           // s of processor time that the rule may take
 };
 
 struct Rule {

@@ -15,7 +15,7 @@
 namespace cli::check {
 namespace {
 
-struct Line { const Rule *rule; Verdict verdict; double seconds; };
+struct Line { const Rule *rule; Verdict verdict; double seconds; bool late = false; };
 struct TypeName { uint32_t kind; std::string id; };
 struct Report { std::vector<Line> file; std::vector<TypeName> types; std::vector<std::vector<Line>> by_type; };
 
@@ -26,19 +26,19 @@ const char *kind_name(uint32_t kind) { return kind == DFM_KIND_FRICTION ? "law" 
 
 Subject subject_of(const Request &request) {
   Subject s;
-  s.file = request.file, s.seed = request.seed;
+  s.file = std::filesystem::absolute(request.file).string(), s.seed = request.seed, s.limit = request.limit;
   s.command = std::filesystem::read_symlink("/proc/self/exe").string();
   return s;
 }
 
-// type < 0: a rule about the file; V01 needs no loading, and V02 says itself why loading failed.
+// type < 0: a rule about the file; V01 needs no loading, V12 loads it itself, and V02 says itself why loading failed.
 Verdict judge(const Request &request, const Rule &rule, int type) {
   Subject subject = subject_of(request);
   const std::string id = rule.id;
-  if (id == "V01") return run_here(rule, subject);
+  if (id == "V01" || id == "V12") return run_here(rule, subject);
   std::unique_ptr<Plugin> plugin;
   try {
-    plugin = std::make_unique<Plugin>(request.file);
+    plugin = std::make_unique<Plugin>(subject.file);
   } catch (const Broken &) {
     if (id != "V02") return {Result::skip, kNotLoaded};
   }
@@ -52,7 +52,7 @@ Verdict judge(const Request &request, const Rule &rule, int type) {
 
 std::string digest_text(const Request &request) {
   Subject subject = subject_of(request);
-  Plugin plugin(request.file);
+  Plugin plugin(subject.file);
   subject.plugin = &plugin, subject.index = static_cast<uint32_t>(request.digest), subject.type = plugin.types().at(subject.index);
   return text("%016llx", static_cast<unsigned long long>(digest(subject)));
 }
@@ -97,7 +97,7 @@ Line run_rule(const Request &request, const Rule &rule, int type) {
   const bool fresh = std::string(rule.id) == "V09";
   const Answer a = fresh ? in_fresh_process(subject_of(request).command, arguments(request, rule.id, type), {request.limit})
                          : in_own_process([&] { answer(judge(request, rule, type)); }, {request.limit});
-  Line line{&rule, a.verdict, a.seconds};
+  Line line{&rule, a.verdict, a.seconds, a.late};
   const std::string found = sanitizer_line(a.said);
   if (!a.spoke)
     line.verdict = {Result::fail, "it " + a.ending + (a.at.empty() ? "" : " (" + a.at + ")") + (found.empty() ? "" : ": " + found) +
@@ -107,30 +107,71 @@ Line run_rule(const Request &request, const Rule &rule, int type) {
   return line;
 }
 
-Report run_rules(const Request &request, const std::vector<const Rule *> &wanted) {
-  Report report;
-  std::string types = request.in_process ? listed(request.file) : "";
-  if (!request.in_process) types = in_own_process([&] { answer({Result::pass, listed(request.file)}); }, {request.limit}).verdict.detail;
-  for (size_t at = 0, end; (end = types.find('\n', at)) != std::string::npos; at = end + 1)
-    report.types.push_back({static_cast<uint32_t>(std::stoul(types.substr(at))), types.substr(types.find(' ', at) + 1, end - types.find(' ', at) - 1)});
-  for (const Rule *rule : wanted)
-    if (!rule->by_type) report.file.push_back(run_rule(request, *rule, -1));
-    else if (report.types.empty()) report.file.push_back({rule, {Result::skip, kNotLoaded}, 0});
-  // Rules of laws that cannot run for want of a law are not kept: the rule that says why is asked beside them.
-  const bool loads = std::any_of(wanted.begin(), wanted.end(), [](const Rule *rule) { return rule == find_rule("V02"); });
-  if (report.types.empty() && !loads) report.file.push_back(run_rule(request, *find_rule("V02"), -1));
-  for (size_t t = 0; t < report.types.size(); ++t) {
-    report.by_type.emplace_back();
-    const bool law = report.types[t].kind == DFM_KIND_FRICTION;
-    for (const Rule *rule : wanted)
-      if (rule->by_type && (law || rule->id[0] == 'V')) report.by_type.back().push_back(run_rule(request, *rule, static_cast<int>(t)));
-  }
-  return report;
+const char *word(Result r) { return r == Result::pass ? "pass" : r == Result::fail ? "fail" : "skip"; }
+
+void print_line(const Line &l, bool quiet) {
+  if (l.verdict.result == Result::fail) std::printf("  %s FAIL  %s\n            %s\n", l.rule->id, l.rule->title, l.verdict.detail.c_str());
+  else if (!quiet)
+    std::printf("  %s %s  %s%s%s%s\n", l.rule->id, word(l.verdict.result), l.rule->title, l.verdict.detail.empty() ? "" : " (", l.verdict.detail.c_str(),
+                l.verdict.detail.empty() ? "" : ")");
+  std::fflush(stdout);
 }
 
-// ---- report ------------------------------------------------------------------------------------------------------------------------
+// Two rules that do not come back say enough: the rest would cost as long each.
+class Rules {
+ public:
+  Rules(const Globals &globals, const Request &request, const std::vector<const Rule *> &wanted) : globals_(globals), request_(request), wanted_(wanted) {}
+  Report run() {
+    if (!globals_.json) std::printf("%s\n", request_.file.c_str());
+    list_types();
+    for (const Rule *rule : wanted_)
+      if (!rule->by_type) one(report_.file, *rule, -1);
+      else if (report_.types.empty()) add(report_.file, {rule, {Result::skip, kNotLoaded}, 0});
+    // Rules of laws that cannot run for want of a law are not kept: the rule that says why is asked beside them.
+    const bool loads = std::any_of(wanted_.begin(), wanted_.end(), [](const Rule *rule) { return rule == find_rule("V02"); });
+    if (report_.types.empty() && !loads) one(report_.file, *find_rule("V02"), -1);
+    for (size_t t = 0; t < report_.types.size(); ++t) {
+      report_.by_type.emplace_back();
+      const bool law = report_.types[t].kind == DFM_KIND_FRICTION;
+      if (!globals_.json) std::printf("%s %s\n", kind_name(report_.types[t].kind), report_.types[t].id.c_str());
+      for (const Rule *rule : wanted_)
+        if (rule->by_type && (law || rule->id[0] == 'V')) one(report_.by_type.back(), *rule, static_cast<int>(t));
+      if (!globals_.json && report_.types[t].kind == DFM_KIND_MODEL) std::printf("  M01 to M15, the rules for models, are not available yet\n");
+    }
+    return std::move(report_);
+  }
 
-const char *word(Result r) { return r == Result::pass ? "pass" : r == Result::fail ? "fail" : "skip"; }
+ private:
+  void list_types() {
+    std::string types;
+    if (request_.in_process) {
+      types = listed(request_.file);
+    } else {
+      const Answer a = in_own_process([&] { answer({Result::pass, listed(request_.file)}); }, {request_.limit});
+      types = a.verdict.detail, late_ += a.late;
+    }
+    for (size_t at = 0, end; (end = types.find('\n', at)) != std::string::npos; at = end + 1)
+      report_.types.push_back({static_cast<uint32_t>(std::stoul(types.substr(at))), types.substr(types.find(' ', at) + 1, end - types.find(' ', at) - 1)});
+  }
+  void one(std::vector<Line> &to, const Rule &rule, int type) {
+    if (late_ >= kEnough) return add(to, {&rule, {Result::skip, "not asked: others did not come back; mend them first"}, 0});
+    add(to, run_rule(request_, rule, type));
+    late_ += to.back().late;
+  }
+  // A line is printed when it is there: who waits sees what is done.
+  void add(std::vector<Line> &to, Line line) {
+    to.push_back(std::move(line));
+    if (!globals_.json) print_line(to.back(), globals_.quiet);
+  }
+  static constexpr int kEnough = 2;
+  const Globals &globals_;
+  const Request &request_;
+  const std::vector<const Rule *> &wanted_;
+  Report report_;
+  int late_ = 0;
+};
+
+// ---- report ------------------------------------------------------------------------------------------------------------------------
 
 std::string json_lines(const std::vector<Line> &lines) {
   std::vector<std::string> out;
@@ -138,15 +179,6 @@ std::string json_lines(const std::vector<Line> &lines) {
     out.push_back(JsonObject().add("id", quoted(l.rule->id)).add("title", quoted(l.rule->title)).add("result", quoted(word(l.verdict.result)))
                       .add("detail", quoted(l.verdict.detail)).add("cpu_s", number(std::round(1e4 * l.seconds) / 1e4)).text());
   return json_array(out);
-}
-
-void print_lines(const std::vector<Line> &lines, bool quiet) {
-  for (const Line &l : lines) {
-    if (l.verdict.result == Result::fail) std::printf("  %s FAIL  %s\n            %s\n", l.rule->id, l.rule->title, l.verdict.detail.c_str());
-    else if (!quiet)
-      std::printf("  %s %s  %s%s%s%s\n", l.rule->id, word(l.verdict.result), l.rule->title, l.verdict.detail.empty() ? "" : " (", l.verdict.detail.c_str(),
-                  l.verdict.detail.empty() ? "" : ")");
-  }
 }
 
 int tell(const Globals &globals, const Request &request, const Report &report) {
@@ -165,13 +197,6 @@ int tell(const Globals &globals, const Request &request, const Report &report) {
     std::fputs(indented(o.text()).c_str(), stdout);
     return code;
   }
-  std::printf("%s\n", request.file.c_str());
-  print_lines(report.file, globals.quiet);
-  for (size_t t = 0; t < report.types.size(); ++t) {
-    std::printf("%s %s\n", kind_name(report.types[t].kind), report.types[t].id.c_str());
-    print_lines(report.by_type[t], globals.quiet);
-    if (report.types[t].kind == DFM_KIND_MODEL) std::printf("  M01 to M15, the rules for models, are not available yet\n");
-  }
   std::printf("%u passed, %u failed, %u skipped\n", count[0], count[1], count[2]);
   return code;
 }
@@ -186,12 +211,12 @@ int run(const Globals &globals, const Request &request) {
   std::vector<const Rule *> wanted;
   for (const std::string &id : request.only) {
     const Rule *rule = find_rule(id);
-    if (!rule) return fail("--only: there is no rule \"" + id + "\"; rules are V01 to V10 and F01 to F14");
+    if (!rule) return fail("--only: there is no rule \"" + id + "\"; rules are V01 to V14 and F01 to F17");
     wanted.push_back(rule);
   }
   for (const Rule &rule : rules())
     if (request.only.empty()) wanted.push_back(&rule);
-  return tell(globals, request, run_rules(request, wanted));
+  return tell(globals, request, Rules(globals, request, wanted).run());
 }
 
 }  // namespace cli::check

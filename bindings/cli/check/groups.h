@@ -5,6 +5,7 @@
 namespace cli::check {
 
 // rules_file.cpp: the file and what it says of itself
+std::string variable_at(const std::string &file, uint64_t address);   // as its author called it; empty where the file is stripped
 std::string exports_one_symbol(const Subject &);
 std::string refuses_unknown_abi(const Subject &);
 std::string metadata_complete(const Subject &);
@@ -14,10 +15,15 @@ std::string eval_keeps_to_itself(const Subject &);
 std::string stays_in_its_arrays(const Subject &);
 std::string unloads_without_leak(const Subject &);
 std::string sanitizer_finds_nothing(const Subject &);
+std::string writes_no_static(const Subject &);
+// rules_environment.cpp: what it leaves changed
+std::string keeps_rounding(const Subject &);
+std::string keeps_process(const Subject &);
 // rules_lanes.cpp: a pure function of each lane
 std::string same_bits(const Subject &);
 std::string bad_lane_stays(const Subject &);
 std::string split_equals_whole(const Subject &);
+std::string endures(const Subject &);
 // rules_force.cpp: what every friction force is
 std::string rests_at_zero(const Subject &);
 std::string turns_with_frame(const Subject &);
@@ -25,6 +31,10 @@ std::string dissipates(const Subject &);
 std::string derivatives_agree(const Subject &);
 std::string bounded_at_every_step(const Subject &);
 std::string follows_normal_force(const Subject &);
+// rules_course.cpp: how force and state go on
+std::string state_stays_bounded(const Subject &);
+std::string opposes_slip(const Subject &);
+std::string converges_with_step(const Subject &);
 // rules_promises.cpp: what the law's effects promise
 std::string holds_below_threshold(const Subject &);
 std::string falls_with_speed(const Subject &);

@@ -5,14 +5,20 @@
 #include <cstring>
 #include <limits>
 
+#include "check/environment.h"
+
 namespace cli::check {
 namespace {
 
 constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 
-uint32_t width_of_state(const dfm_friction &law) {
+uint32_t width_of_state(const dfm_friction &law, const double *params) {
+  const Kept kept("state");
+  const dfm_slots *own = law.state ? law.state(params) : nullptr;
+  if (law.state && (!own || own->size < sizeof *own || !own->slots || own->nslot > 4096))
+    broken("its function state names no slots for parameters that check accepts, so the host cannot keep its state; return constant tables");
   uint32_t n = 0;
-  for (uint32_t i = 0; law.slots && i < law.nslot; ++i) n += law.slots[i].width;
+  for (uint32_t i = 0; i < (own ? own->nslot : law.nslot); ++i) n += (own ? own->slots : law.slots)[i].width;
   return n;
 }
 
@@ -33,6 +39,7 @@ std::vector<double> default_params(const dfm_type &type) {
 
 std::string refusal(const dfm_friction &law, const std::vector<double> &params) {
   char why[256] = "";
+  const Kept kept("check");
   if (!law.check || law.check(params.data(), why, sizeof why) == DFM_OK) return "";
   why[sizeof why - 1] = 0;
   return *why ? why : "(no reason)";
@@ -53,12 +60,14 @@ std::vector<double> lively_params(const Subject &subject) {
   return refusal(law_of(subject), raised).empty() ? raised : out;
 }
 
-Law::Law(const Subject &s, std::vector<double> values) : subject(s), ops(law_of(s)), params(std::move(values)), nstate(width_of_state(ops)) {
+Law::Law(const Subject &s, std::vector<double> values) : subject(s), ops(law_of(s)), params(std::move(values)), nstate(width_of_state(ops, params.data())) {
+  const Kept kept("prepare");
   if (ops.prepare && ops.prepare(&s.plugin->host().table(), params.data(), &data) != DFM_OK)
     broken("prepare refuses parameters that check accepts, so a scene would fail after it was read; refuse them in check");
 }
 
 Law::~Law() {
+  const Kept kept("release");
   if (ops.prepare && ops.release) ops.release(&subject.plugin->host().table(), data);
 }
 
@@ -82,6 +91,7 @@ Lanes::Lanes(const Law &l, uint32_t count, uint32_t gap) : law(l), n(count), str
 
 dfm_status Lanes::ask(double dt) {
   in.dt = dt;
+  const Kept kept("eval");
   const dfm_status status = law.ops.eval(&in, &out);
   law.subject.plugin->host().give_back_scratch();
   return status;
@@ -103,6 +113,13 @@ void Lanes::slip(uint32_t i, double x, double y) {
   if (!law.needs(DFM_NEED_FT_STOP)) return;
   const double much = law.needs(DFM_NEED_FN) ? 1e6 * std::max(fn[i], 1e-6) : 1e6;
   stop[i] = w > 0 ? -much * x / w : 0, stop[stride + i] = w > 0 ? -much * y / w : 0;
+}
+
+void Lanes::spoil_padding() {
+  const auto columns = [&](double *at, uint32_t width) {
+    for (uint32_t c = 0; c < width; ++c) std::fill(at + size_t(c) * stride + n, at + size_t(c + 1) * stride, kNaN);
+  };
+  columns(fn, 1), columns(vt, 2), columns(stop, 2), columns(area, 1), columns(dwell, 1), columns(state, law.nstate);
 }
 
 double Lanes::ft(uint32_t i) const { return std::hypot(out_ft[i], out_ft[stride + i]); }

@@ -40,6 +40,7 @@ struct Lanes {
   void commit();                      // the trial state becomes the state
   void slip(uint32_t i, double x, double y);   // trial slip; with FT_STOP a stopping force far beyond any level, against it
   double ft(uint32_t i) const;        // norm
+  void spoil_padding();               // NaN in the input lanes beyond n
   // A lane's inputs from another batch, and whether its outputs are those of another lane, bit by bit.
   void take(uint32_t i, const Lanes &from, uint32_t k);
   bool same(uint32_t i, const Lanes &other, uint32_t k) const;

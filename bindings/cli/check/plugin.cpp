@@ -6,6 +6,7 @@
 #include <cstdlib>
 #include <cstring>
 
+#include "check/environment.h"
 #include "check/watch.h"
 
 namespace cli::check {
@@ -82,6 +83,7 @@ Plugin::Plugin(const std::string &file) {
   char *resolved = realpath(file.c_str(), nullptr);  // dlopen searches the system's libraries for a name without a slash
   const std::string path = resolved ? resolved : file;
   std::free(resolved);
+  const Kept kept("loading it");
   image_ = dlopen(path.c_str(), RTLD_NOW | RTLD_LOCAL);
   if (!image_) broken("the dynamic linker refuses it: %s; link what is missing, or leave it out", dlerror());
   const dfm_plugin_fn entry = entry_of(image_);
@@ -139,6 +141,7 @@ void Plugin::copy_type(const void *from, uint32_t number) {
 
 void Plugin::close() {
   view_.clear(), types_.clear();
+  const Kept kept("unloading it");
   if (shutdown_) shutdown_();
   if (image_) dlclose(image_);
   shutdown_ = nullptr, image_ = nullptr;

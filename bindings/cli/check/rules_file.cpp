@@ -12,6 +12,7 @@
 #include <cstdlib>
 #include <limits>
 
+#include "check/environment.h"
 #include "check/groups.h"
 #include "check/law.h"
 #include "check/runner.h"
@@ -30,29 +31,51 @@ std::vector<T> part(const std::string &bytes, uint64_t offset, uint64_t count) {
   return out;
 }
 
-// Defined symbols of the dynamic table that others may bind to.
-std::vector<std::string> exported(const std::string &file) {
-  const std::string bytes = read_file(file, uint64_t(1) << 30, "a plugin (a shared library)");
+std::string bytes_of(const std::string &file) { return read_file(file, uint64_t(1) << 30, "a plugin (a shared library)"); }
+
+struct Symbol { std::string name; ElfW(Sym) entry; };
+// Symbols of the section of that type (SHT_DYNSYM, SHT_SYMTAB); false where the file carries no section headers.
+bool read_symbols(const std::string &bytes, unsigned type, std::vector<Symbol> &out) {
   const auto header = part<ElfW(Ehdr)>(bytes, 0, 1);
-  if (header.empty() || std::memcmp(header[0].e_ident, ELFMAG, SELFMAG) != 0) broken("it is no shared library (ELF), so nothing can load it; build it with deform_add_plugin");
+  if (header.empty()) return false;
   const auto sections = part<ElfW(Shdr)>(bytes, header[0].e_shoff, header[0].e_shentsize == sizeof(ElfW(Shdr)) ? header[0].e_shnum : 0);
-  if (sections.empty()) skip("the file carries no section headers, so its symbols cannot be listed; check it before it is stripped of them");
-  std::vector<std::string> out;
   for (const auto &section : sections) {
-    if (section.sh_type != SHT_DYNSYM || section.sh_link >= sections.size()) continue;
+    if (section.sh_type != type || section.sh_link >= sections.size()) continue;
     const auto &strings = sections[section.sh_link];
     const auto names = part<char>(bytes, strings.sh_offset, strings.sh_size);
-    for (const auto &s : part<ElfW(Sym)>(bytes, section.sh_offset, section.sh_size / sizeof(ElfW(Sym)))) {
-      const int visibility = s.st_other & 3, binding = s.st_info >> 4;
-      if (s.st_shndx == SHN_UNDEF || binding == STB_LOCAL || visibility == STV_HIDDEN || visibility == STV_INTERNAL) continue;
-      if (s.st_name < names.size()) out.emplace_back(&names[s.st_name], strnlen(&names[s.st_name], names.size() - s.st_name));
-    }
+    for (const auto &s : part<ElfW(Sym)>(bytes, section.sh_offset, section.sh_size / sizeof(ElfW(Sym))))
+      out.push_back({s.st_name < names.size() ? std::string(&names[s.st_name], strnlen(&names[s.st_name], names.size() - s.st_name)) : "", s});
+  }
+  return !sections.empty();
+}
+
+// Defined symbols of the dynamic table that others may bind to.
+std::vector<std::string> exported(const std::string &file) {
+  const std::string bytes = bytes_of(file);
+  if (bytes.size() < sizeof(ElfW(Ehdr)) || std::memcmp(bytes.data(), ELFMAG, SELFMAG) != 0) broken("it is no shared library (ELF), so nothing can load it; build it with deform_add_plugin");
+  std::vector<Symbol> symbols;
+  if (!read_symbols(bytes, SHT_DYNSYM, symbols)) skip("the file carries no section headers, so its symbols cannot be listed; check it before it is stripped of them");
+  std::vector<std::string> out;
+  for (const Symbol &s : symbols) {
+    const int visibility = s.entry.st_other & 3, binding = s.entry.st_info >> 4;
+    if (s.entry.st_shndx == SHN_UNDEF || binding == STB_LOCAL || visibility == STV_HIDDEN || visibility == STV_INTERNAL) continue;
+    if (!s.name.empty()) out.push_back(s.name);
   }
   std::sort(out.begin(), out.end());
   return out;
 }
 
 }  // namespace
+
+std::string variable_at(const std::string &file, uint64_t address) {
+  std::vector<Symbol> symbols;
+  read_symbols(bytes_of(file), SHT_SYMTAB, symbols);
+  for (const Symbol &s : symbols) {
+    const bool inside = address >= s.entry.st_value && address - s.entry.st_value < std::max<uint64_t>(s.entry.st_size, 1);
+    if (inside && (s.entry.st_info & 15) == STT_OBJECT) return s.name.substr(0, s.name.find('.'));
+  }
+  return "";
+}
 
 std::string exports_one_symbol(const Subject &subject) {
   std::vector<std::string> names = exported(subject.file);
@@ -68,6 +91,7 @@ std::string exports_one_symbol(const Subject &subject) {
 
 std::string refuses_unknown_abi(const Subject &subject) {
   if (!subject.plugin) {
+    const Kept kept("loading it");
     void *image = dlopen(std::filesystem::absolute(subject.file).c_str(), RTLD_NOW | RTLD_LOCAL);
     if (image && !entry_of(image)) skip("it has no dfm_plugin_entry (V01)");
     const Plugin plugin(subject.file);                        // says why it does not load
@@ -78,6 +102,7 @@ std::string refuses_unknown_abi(const Subject &subject) {
   for (const auto &stranger : strangers) {
     stage("the entry is called by a host of ABI %u draft %u", stranger.abi, stranger.draft);
     Host host;
+    const Kept kept("its entry");
     host.table().abi = stranger.abi, host.table().abi_draft = stranger.draft;
     if (entry(&host.table(), stranger.abi, stranger.abi))
       broken("its entry hands itself to a host of ABI %u draft %u, which it cannot know, and would be called with structs of another shape; return NULL "
@@ -125,7 +150,7 @@ void slots_sound(const dfm_slot *slots, uint32_t n, bool law) {
   }
 }
 
-void law_sound(const dfm_friction &law) {
+void law_sound(const dfm_type &type, const dfm_friction &law) {
   if (!law.eval) broken("a law without eval cannot be evaluated; set dfm_friction.eval");
   if (!law.prepare != !law.release) broken("it has only one of prepare and release, so its tables leak or are never made; give both or neither");
   if (law.needs & ~31u) broken("needs has bits that this ABI does not know (%#x), which no host fills; use DFM_NEED_*", law.needs);
@@ -133,6 +158,12 @@ void law_sound(const dfm_friction &law) {
   if ((law.flags & DFM_FRIC_SET_VALUED) && !(law.needs & DFM_NEED_FT_STOP))
     broken("a set-valued law that does not need FT_STOP cannot hold at rest; add DFM_NEED_FT_STOP to needs");
   slots_sound(law.slots, law.nslot, true);
+  if (!law.state) return;
+  const Kept kept("state");
+  const std::vector<double> params = default_params(type);
+  const dfm_slots *own = law.state(params.data());
+  if (!own || own->size < sizeof *own) broken("its function state names no slots for its defaults, so the host cannot keep its state; return constant tables");
+  slots_sound(own->slots, own->nslot, true);
 }
 
 }  // namespace
@@ -153,7 +184,7 @@ std::string metadata_complete(const Subject &subject) {
       broken("two types of this file have the id \"%s\", so one of them cannot be found; give each its own", type.id);
   effects_known(type);
   if (type.kind == DFM_KIND_FRICTION) {
-    law_sound(law_of(subject));
+    law_sound(type, law_of(subject));
   } else if (type.kind == DFM_KIND_MODEL) {
     const auto &model = *static_cast<const dfm_model *>(type.ops);
     if (!model.create || !model.destroy) broken("a model without create and destroy cannot be made; set both");
@@ -185,7 +216,9 @@ void row_sane(const dfm_type &type, uint32_t i) {
   if ((row.flags & (DFM_PARAM_INTEGER | DFM_PARAM_ENUM)) && row.def != std::floor(row.def))
     broken("parameter \"%s\" is a whole number but its default is %g, which is refused when it is given; round it", k, row.def);
   if ((row.flags & DFM_PARAM_LOG_SCALE) && !(row.min > 0)) broken("parameter \"%s\" has a logarithmic scale that begins at %g, where no slider can begin; let min be above 0", k, row.min);
-  if (row.flags & ~63u) broken("parameter \"%s\" has flags that this ABI does not know (%#x); use DFM_PARAM_*", k, row.flags);
+  if (row.flags & ~127u) broken("parameter \"%s\" has flags that this ABI does not know (%#x); use DFM_PARAM_*", k, row.flags);
+  if ((row.flags & DFM_PARAM_LIST) && !(row.min <= 0 && 0 <= row.max))
+    broken("parameter \"%s\" is a list, whose values that are not given read 0, which its range [%g, %g] excludes; widen it", k, row.min, row.max);
   if (row.flags & DFM_PARAM_ENUM) {
     uint32_t n = 0;
     while (row.names && n < 4096 && row.names[n]) ++n;
@@ -200,6 +233,7 @@ void asks_check(const dfm_friction &law, const std::vector<double> &params) {
   for (size_t cap : {size_t(16), size_t(1), size_t(0)}) {
     std::memset(room, 0x5a, sizeof room);
     room[16] = 0x5a;
+    const Kept kept("check");
     law.check(params.data(), room, cap);
     for (size_t i = cap; i < sizeof room; ++i)
       if (room[i] != 0x5a) broken("check writes %zu bytes past the %zu that it was given for its sentence, over what lies behind; use snprintf(why, cap, ...)", i - cap + 1, cap);

@@ -89,7 +89,7 @@ std::string same_bits(const Subject &subject) {
   const uint64_t here = digest(subject), once_more = digest(subject);
   if (here != once_more) broken("the same series of batches gave other bits the second time: it keeps something between calls; move it into a state slot");
   const std::string number = std::to_string(subject.index), seed = std::to_string(subject.seed);
-  const Answer other = in_fresh_process(subject.command, {"plugin", "check", subject.file, "--digest", number, "--seed", seed}, {});
+  const Answer other = in_fresh_process(subject.command, {"plugin", "check", subject.file, "--digest", number, "--seed", seed}, {0.5 * subject.limit});
   const std::string mine = text("%016llx", static_cast<unsigned long long>(here));
   if (!other.spoke) broken("asked in a second process, it %s; a law must not depend on the process it runs in", other.ending.c_str());
   if (other.verdict.detail != mine)
@@ -147,6 +147,7 @@ std::string split_equals_whole(const Subject &subject) {
       for (uint32_t begin = 0; begin < whole.n; begin += piece) {
         const uint32_t n = std::min(piece, whole.n - begin);
         Lanes part(law, n, piece == 9 ? 16 : 0);
+        part.spoil_padding();                                                       // may be read, and must not matter
         for (uint32_t k = 0; k < n; ++k) part.take(n - 1 - k, whole, begin + k);    // in reverse: neighbours change too
         part.must(h);
         for (uint32_t k = 0; k < n; ++k)
@@ -158,6 +159,38 @@ std::string split_equals_whole(const Subject &subject) {
       }
   }
   return "";
+}
+
+// What counts calls or contacts goes bad only after many; what numbers the contacts of a batch in 16 bits only in large ones.
+std::string endures(const Subject &subject) {
+  const Law law(subject, lively_params(subject));
+  const Scales scales = scales_of(law);
+  Random random(subject.seed);
+  constexpr uint32_t kContacts = 1u << 20, kBatch = 4096, kLarge = 70000;
+  Lanes first(law, 200), again(law, 200), many(law, kBatch);
+  settle(first, scales, random, 1e-3);
+  for (uint32_t i = 0; i < first.n; ++i) again.take(i, first, i);
+  first.must(1e-3);
+  fill(many, scales, random);
+  uint32_t asked = 0;
+  for (; asked < kContacts; asked += kBatch) {
+    stage("%u contacts have been asked for", asked);
+    many.must(kSteps[(asked / kBatch) % 3]);
+  }
+  again.must(1e-3);
+  for (uint32_t i = 0; i < first.n; ++i)
+    if (!again.same(i, first, i))
+      broken("lane %u answered (%.17g, %.17g) N and, after %u other contacts, (%.17g, %.17g) N: it counts or wears out, so a long run goes elsewhere than a short one; keep nothing between calls but state slots",
+             i, first.out_ft[i], first.out_ft[first.stride + i], asked, again.out_ft[i], again.out_ft[again.stride + i]);
+  Lanes large(law, kLarge);
+  for (uint32_t i = 0; i < kLarge; ++i) large.take(i, many, i % kBatch);
+  stage("a batch of %u contacts", kLarge);
+  large.must(1e-3), many.must(1e-3);
+  for (uint32_t i = 0; i < kLarge; ++i)
+    if (!large.same(i, many, i % kBatch))
+      broken("contact %u of a batch of %u answers (%.17g, %.17g) N and the same contact in a batch of %u (%.17g, %.17g) N: large worlds would go wrong; index contacts by uint32_t, and keep no table of fixed size",
+             i, kLarge, large.out_ft[i], large.out_ft[large.stride + i], kBatch, many.out_ft[i % kBatch], many.out_ft[many.stride + i % kBatch]);
+  return text("%u contacts", asked);
 }
 
 }  // namespace cli::check

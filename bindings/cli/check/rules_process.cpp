@@ -9,6 +9,7 @@
 #include <limits>
 #include <thread>
 
+#include "check/environment.h"
 #include "check/groups.h"
 #include "check/law.h"
 #include "check/runner.h"
@@ -70,11 +71,12 @@ std::string eval_keeps_to_itself(const Subject &subject) {
         if (round == 3) b.vt[0] = b.fn[0] = std::numeric_limits<double>::quiet_NaN();  // the way out of trouble counts too
         stage("batch of %u contacts, step %g s", n, h);
         b.in.dt = h;
+        const Kept kept("eval");
         const char *name = watch.run([&] { law.ops.eval(&b.in, &b.out); });
         subject.plugin->host().give_back_scratch();
         if (name)
           broken("eval calls %s: it runs in every pass of every step from many threads, where this costs time or stops the world; take memory from dfm_host.scratch, make tables in prepare, and "
-                 "leave files and the environment to the host", spelt(name).c_str());
+                 "leave files, environment, clock and chance to the host", spelt(name).c_str());
         ++calls;
       }
   return text("%u calls, %zu entries watched", calls, watch.entries());
@@ -147,6 +149,7 @@ void asks_fenced(const Law &law, Lanes &lanes, Fenced::Place place) {
   FencedBatch batch(law, lanes, place);
   dfm_status status = DFM_OK;
   stage("batch of %u contacts, stride %u", lanes.n, lanes.stride);
+  const Kept kept("eval");
   const std::string trouble = Fenced::guard([&] { status = law.ops.eval(&batch.in(), &batch.out()); });
   law.subject.plugin->host().give_back_scratch();
   if (!trouble.empty()) broken("in a batch of %u contacts (stride %u) eval %s: over what lies there in a world; loop to in->n and step columns by in->stride", lanes.n, lanes.stride, trouble.c_str());
@@ -174,6 +177,7 @@ void asks_with_nulls(const Law &law, Lanes &whole) {
     b.in.dt = 1e-3;
     stage("%s %s", alone ? "nothing is wanted but" : "not wanted:", names[one]);
     dfm_status status = DFM_OK;
+    const Kept kept("eval");
     const std::string trouble = Fenced::guard([&] { status = law.ops.eval(&b.in, &out); });
     law.subject.plugin->host().give_back_scratch();
     if (!trouble.empty() || status != DFM_OK)
@@ -306,6 +310,42 @@ std::string sanitizer_finds_nothing(const Subject &subject) {
       broken("evaluated from %d threads at once it gives other forces than alone: it writes something that batches share; keep it in state slots, or in what prepare() makes and eval only reads", kThreads);
   }
   return text("%d threads", kThreads);
+}
+
+// ---- V14 ---------------------------------------------------------------------------------------------------------------------------
+
+// While eval runs the plugin's own writable memory is read only. Tables made at the first call are there by then; what is written after that is memory between
+// calls, or between threads. Thread-local variables are not seen.
+std::string writes_no_static(const Subject &subject) {
+  const Law law(subject, lively_params(subject));
+  Random random(subject.seed);
+  const auto once = [&](uint32_t n, bool locked) {
+    Lanes b(law, n);
+    vary(b, random, 1e-2);
+    b.in.dt = 1e-3;
+    if (!locked) return static_cast<void>(b.must(1e-3));
+    const Kept kept("eval");
+    const void *at = nullptr;
+    uintptr_t base = 0;
+    bool ours = false;
+    stage("batch of %u contacts, static variables read only", n);
+    std::string trouble;
+    {
+      const StaticsLocked statics(reinterpret_cast<const void *>(law.ops.eval));
+      base = statics.base;
+      trouble = Fenced::guard([&] { law.ops.eval(&b.in, &b.out); }, &at);
+      ours = statics.hold(at);
+    }
+    law.subject.plugin->host().give_back_scratch();
+    if (trouble.empty()) return;
+    if (!ours) broken("eval %s; touch only the arrays that are given", trouble.c_str());
+    const std::string name = variable_at(subject.file, reinterpret_cast<uintptr_t>(at) - base);
+    broken("eval writes the static variable %s: threads and worlds share it, so results depend on what else runs; keep it in a state slot, or on the stack",
+           name.empty() ? text("at %#zx of the file", reinterpret_cast<uintptr_t>(at) - base).c_str() : ("\"" + name + "\"").c_str());
+  };
+  for (const bool locked : {false, true})
+    for (const uint32_t n : {8u, 1u, 1000u}) once(n, locked);
+  return "";
 }
 
 }  // namespace cli::check

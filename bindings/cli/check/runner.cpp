@@ -15,6 +15,7 @@
 #include <cstdlib>
 #include <cstring>
 
+#include "leaving.h"
 #include "messages.h"
 
 namespace cli::check {
@@ -26,6 +27,19 @@ std::string formatted(const char *format, va_list args) {
   char buffer[2048];
   std::vsnprintf(buffer, sizeof buffer, format, args);
   return buffer;
+}
+
+// Is the process waiting (not for the processor or a disk)?
+bool waits(pid_t child) {
+  char path[64], line[512];
+  std::snprintf(path, sizeof path, "/proc/%d/stat", static_cast<int>(child));
+  const int fd = open(path, O_RDONLY | O_CLOEXEC);
+  const ssize_t n = fd < 0 ? -1 : read(fd, line, sizeof line - 1);
+  if (fd >= 0) close(fd);
+  if (n <= 0) return false;
+  line[n] = 0;
+  const char *after = std::strrchr(line, ')');                // the name of the program, which stands before it, may hold anything
+  return after && after[1] == ' ' && after[2] == 'S';
 }
 
 // A message is a letter, text and a zero: 's' stage, 'P' 'F' 'S' verdict.
@@ -64,6 +78,7 @@ std::string ending_of(int status) {
 
 [[noreturn]] void become_child(const std::function<void()> &work, int to_report, int to_output) {
   setpgid(0, 0);
+  leave(0);                                                    // how it ends is for the parent to judge
   prctl(PR_SET_PDEATHSIG, SIGKILL);
   const rlimit no_core{0, 0};
   setrlimit(RLIMIT_CORE, &no_core);
@@ -186,7 +201,8 @@ Answer in_own_process(const std::function<void()> &work, const Limits &limits) {
   const double begun = clock_of(CLOCK_MONOTONIC);
   char buffer[4096];
   int status = 0;
-  bool late = false;
+  double moved = begun, counted = 0;                           // when it last computed
+  bool waited = false;
   for (bool ended = false; !ended;) {
     poll(ends, 2, ends[0].fd < 0 && ends[1].fd < 0 ? 1 : 5);     // both closed: it ends any moment
     for (int k = 0; k < 2; ++k) {
@@ -197,8 +213,11 @@ Answer in_own_process(const std::function<void()> &work, const Limits &limits) {
       else if (out.said.size() < 65536) out.said.append(buffer, static_cast<size_t>(n));
     }
     if (const double used = timed ? clock_of(clock) : -1; used >= 0) out.seconds = used;
-    const bool over = out.seconds > limits.seconds || clock_of(CLOCK_MONOTONIC) - begun > 10 * limits.seconds;
-    if (over && !late) late = true, kill(-child, SIGKILL), kill(child, SIGKILL);
+    const double clock_now = clock_of(CLOCK_MONOTONIC);
+    if (out.seconds > counted + 1e-3) counted = out.seconds, moved = clock_now;
+    if (!out.late && clock_now - moved > limits.still && waits(child)) waited = true;
+    const bool over = waited || out.seconds > limits.seconds || clock_now - begun > 10 * limits.seconds;
+    if (over && !out.late) out.late = true, kill(-child, SIGKILL), kill(child, SIGKILL);
     ended = waitpid(child, &status, WNOHANG) == child;
   }
   for (int k = 0; k < 2; ++k) {                               // what it wrote before it ended; a process it left behind is not waited for
@@ -212,7 +231,10 @@ Answer in_own_process(const std::function<void()> &work, const Limits &limits) {
   }
   read_reports(out, pending);
   kill(-child, SIGKILL);
-  if (!out.spoke) out.ending = late ? text("did not come back within %g s", limits.seconds) : ending_of(status);
+  if (!out.spoke)
+    out.ending = waited     ? text("did not come back: it has waited for %g s for something that never comes", limits.still)
+                 : out.late ? text("did not come back within %g s", limits.seconds)
+                            : ending_of(status);
   return out;
 }
 

@@ -8,7 +8,8 @@
 
 namespace cli::check {
 
-struct Limits { double seconds = 20; };   // of processor time for one rule; ten times that of the clock
+// Of processor time for one rule; ten times that of the clock. What neither computes nor may run for `still` seconds waits for something that never comes.
+struct Limits { double seconds = 10, still = 5; };
 
 // What a rule is about to do: named where its process ends without an answer.
 void stage(const char *format, ...) __attribute__((format(printf, 1, 2)));
@@ -25,6 +26,7 @@ struct Answer {
   std::string ending;          // where it gave none: "ended by SIGSEGV", "ran past 1 s of processor time"
   std::string at;              // its last stage
   double seconds = 0;          // processor time
+  bool late = false;           // it was ended because it did not come back
 };
 // Runs work in a process of its own, which has loaded no plugin before, and waits within the limits.
 Answer in_own_process(const std::function<void()> &work, const Limits &limits);

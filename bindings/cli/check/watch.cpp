@@ -21,6 +21,7 @@ const char *Watch::caught;
 bool Watch::active;
 sigjmp_buf Fenced::back;
 char Fenced::sentence[256];
+const void *Fenced::touched;
 std::vector<Fenced *> Fenced::all;
 
 namespace {
@@ -37,7 +38,10 @@ constexpr const char *kForbidden[] = {
     "stat", "fstat", "access", "unlink", "remove", "rename", "socket", "connect", "pipe", "ioctl", "syscall",
     // environment and processes
     "getenv", "secure_getenv", "setenv", "unsetenv", "putenv", "system", "popen", "fork", "execve", "exit", "_exit", "abort", "dlopen",
-    "dlsym", "pthread_create", "sleep", "usleep", "nanosleep"};
+    "dlsym", "pthread_create", "sleep", "usleep", "nanosleep", "quick_exit", "_Exit", "pthread_exit", "setlocale", "chdir", "signal", "sigaction", "umask",
+    // clocks and chance: what they answer differs from run to run
+    "time", "clock", "clock_gettime", "gettimeofday", "timespec_get", "times", "localtime", "gmtime", "rand", "srand", "random", "srandom", "drand48",
+    "lrand48", "getrandom", "getentropy", "arc4random"};
 constexpr size_t kCount = std::size(kForbidden);
 
 template <size_t I>
@@ -124,6 +128,50 @@ void Watch::stop(const char *name) {
   siglongjmp(back, 1);
 }
 
+// ---- static variables ---------------------------------------------------------------------------------------------------------------
+
+namespace {
+
+struct Wanted { uintptr_t inside, base; std::vector<StaticsLocked::Range> *ranges; };
+
+int writable_parts(dl_phdr_info *info, size_t, void *user) {
+  Wanted &wanted = *static_cast<Wanted *>(user);
+  const uintptr_t page = static_cast<uintptr_t>(sysconf(_SC_PAGESIZE)), base = info->dlpi_addr;
+  bool here = false;
+  uintptr_t relro = 0;                                         // the linker has made these read only already
+  for (int i = 0; i < info->dlpi_phnum; ++i) {
+    const ElfW(Phdr) &p = info->dlpi_phdr[i];
+    here |= p.p_type == PT_LOAD && wanted.inside >= base + p.p_vaddr && wanted.inside < base + p.p_vaddr + p.p_memsz;
+    if (p.p_type == PT_GNU_RELRO) relro = (base + p.p_vaddr + p.p_memsz) / page * page;
+  }
+  if (!here) return 0;
+  wanted.base = base;
+  for (int i = 0; i < info->dlpi_phnum; ++i) {
+    const ElfW(Phdr) &p = info->dlpi_phdr[i];
+    if (p.p_type != PT_LOAD || !(p.p_flags & PF_W)) continue;
+    const uintptr_t begin = std::max((base + p.p_vaddr) / page * page, relro), end = (base + p.p_vaddr + p.p_memsz + page - 1) / page * page;
+    if (begin < end) wanted.ranges->push_back({reinterpret_cast<unsigned char *>(begin), reinterpret_cast<unsigned char *>(end)});
+  }
+  return 1;
+}
+
+}  // namespace
+
+StaticsLocked::StaticsLocked(const void *inside) {
+  Wanted wanted{reinterpret_cast<uintptr_t>(inside), 0, &ranges_};
+  dl_iterate_phdr(writable_parts, &wanted);
+  base = wanted.base;
+  protect(false);
+}
+
+void StaticsLocked::protect(bool writable) const {
+  for (const Range &r : ranges_) mprotect(r.begin, static_cast<size_t>(r.end - r.begin), writable ? PROT_READ | PROT_WRITE : PROT_READ);
+}
+
+bool StaticsLocked::hold(const void *at) const {
+  return std::any_of(ranges_.begin(), ranges_.end(), [&](const Range &r) { return at >= r.begin && at < r.end; });
+}
+
 // ---- fenced arrays -----------------------------------------------------------------------------------------------------------------
 
 namespace {
@@ -169,6 +217,7 @@ bool Fenced::spoilt(long *offset) const {
 void Fenced::on_fault(int, void *info, void *context) {
   const unsigned char *at = static_cast<const unsigned char *>(static_cast<siginfo_t *>(info)->si_addr);
   const char *what = "touches";
+  touched = at;
 #if defined(__x86_64__)
   what = static_cast<ucontext_t *>(context)->uc_mcontext.gregs[REG_ERR] & 2 ? "writes" : "reads";
 #endif
@@ -186,7 +235,7 @@ void Fenced::on_fault(int, void *info, void *context) {
 }
 
 void Fenced::arm() {
-  sentence[0] = 0;
+  sentence[0] = 0, touched = nullptr;
   struct sigaction action{};
   action.sa_sigaction = [](int number, siginfo_t *info, void *context) { on_fault(number, info, context); };
   action.sa_flags = SA_SIGINFO | SA_NODEFER;

@@ -39,6 +39,22 @@ class Watch {
   std::vector<Slot> slots_;
 };
 
+// The writable memory of the plugin's own file (its static variables), read only while this lives.
+class StaticsLocked {
+ public:
+  explicit StaticsLocked(const void *inside);   // any address in the plugin
+  ~StaticsLocked() { protect(true); }
+  StaticsLocked(const StaticsLocked &) = delete;
+  StaticsLocked &operator=(const StaticsLocked &) = delete;
+  bool hold(const void *at) const;
+  struct Range { unsigned char *begin, *end; };
+  uintptr_t base = 0;                           // of the loaded file
+
+ private:
+  void protect(bool writable) const;
+  std::vector<Range> ranges_;
+};
+
 // An array between two pages that may not be touched, at the end or at the start of what lies between them; the rest holds a pattern.
 class Fenced {
  public:
@@ -55,10 +71,11 @@ class Fenced {
 
   // Runs f and turns a touch of a fence into a sentence; empty where there was none.
   template <class F>
-  static std::string guard(F &&f) {
+  static std::string guard(F &&f, const void **at = nullptr) {
     arm();
     if (sigsetjmp(back, 1) == 0) f();
     disarm();
+    if (at) *at = touched;
     return sentence;
   }
 
@@ -68,6 +85,7 @@ class Fenced {
   static void on_fault(int, void *info, void *context);
   static sigjmp_buf back;
   static char sentence[256];
+  static const void *touched;                  // where; null where there was no touch
   static std::vector<Fenced *> all;
   const char *name_;
   unsigned char *pages_, *middle_;

@@ -38,11 +38,13 @@ typedef struct dfm_param {            /* a row; values of all rows lie end to en
 } dfm_param;
 enum { DFM_PARAM_INTEGER = 1, DFM_PARAM_LOG_SCALE = 2, DFM_PARAM_RUNTIME = 4 /* may change mid-run */,
        DFM_PARAM_ENUM = 8, DFM_PARAM_PER_CELL = 16 /* may come as a field of the mesh with this key */,
-       DFM_PARAM_AUTO = 32 /* def is no value but a sign, read and shown as "auto": the plugin takes one from the others */ };
+       DFM_PARAM_AUTO = 32 /* def is no value but a sign, read and shown as "auto": the plugin takes one from the others */,
+       DFM_PARAM_LIST = 64 /* 1 to width values may be given, the rest read 0 */ };
 typedef struct dfm_slot { uint32_t unit, width, kind, reserved; } dfm_slot;   /* one block of state */
 enum { DFM_PER_CONTACT = 1, DFM_PER_POINT = 2, DFM_PER_CELL = 3, DFM_PER_EDGE = 4, DFM_PER_INSTANCE = 5 };
 enum { DFM_SLOT_SCALAR = 1, DFM_SLOT_TANGENT = 2 /* pair, turns with the contact frame */, DFM_SLOT_VECTOR = 3,
        DFM_SLOT_ROTATION = 4 /* unit quaternion */ };
+typedef struct dfm_slots { uint32_t size, nslot; const dfm_slot *slots; } dfm_slots;   /* all of an instance */
 typedef struct dfm_type {
   uint32_t size, kind;                /* DFM_KIND_* tells what ops points to */
   const char *id, *name, *version, *licence, *source;  /* "org.deform.lugre" ...; source = paper, eq. no. */
@@ -84,6 +86,9 @@ typedef struct dfm_friction {
   dfm_status (*check)(const double *params, char *why, size_t cap);  /* [any] optional cross-field rules */
   dfm_status (*prepare)(const dfm_host *h, const double *params, void **data); /* [setup] optional tables */
   void (*release)(const dfm_host *h, void *data);                              /* [setup] iff prepare */
+  /* [any] optional (NULL: slots): the state that these parameters call for, where they decide how much there is; it stands in
+   * the place of slots, which then is the most that any parameters call for. Constant data, the same for the same parameters. */
+  const dfm_slots *(*state)(const double *params);
 } dfm_friction;
 /* ---- deformable model: host owns x, v, f and all state; plugin owns only rebuildable caches -------- */
 enum { DFM_CAP_ENERGY = 1, DFM_CAP_STIFFNESS = 2, DFM_CAP_DAMPING = 4, DFM_CAP_TOPOLOGY = 8,
@@ -147,7 +152,6 @@ typedef struct dfm_cell_energy {
 /* Extension "dfm.slots/1" of a model (draft): state of this instance, where its parameters decide how much there is. It stands in the
  * place of dfm_model.slots, is asked for once after create() and stays as it is while the instance lives. */
 #define DFM_EXT_SLOTS "dfm.slots/1"
-typedef struct dfm_slots { uint32_t size, nslot; const dfm_slot *slots; } dfm_slots;
 /* Extension "dfm.effects/1" of a model (draft): those of dfm_type.effects that the instance's present parameters call for,
  * NULL-terminated. Without it all of them are taken to be at work. */
 #define DFM_EXT_EFFECTS "dfm.effects/1"

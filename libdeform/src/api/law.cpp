@@ -58,9 +58,9 @@ Law &law_at(dfm_law handle) {
   return law;
 }
 
-uint32_t state_width(const dfm_friction &law) {
+uint32_t state_width(const Law &law, const double *params) {
   uint32_t n = 0;
-  for (uint32_t i = 0; i < law.nslot; ++i) n += law.slots[i].width;
+  for (const dfm_slot &slot : law_slots(law.type, law.context.host, params)) n += slot.width;
   return n;
 }
 
@@ -182,7 +182,7 @@ dfm_status evaluate(Law &law, const dfm_friction_in *given_in, dfm_friction_out 
   const std::shared_ptr<const Prepared> prepared = ops.prepare ? law.prepare(in.params) : nullptr;
   in.data = prepared ? prepared->data : nullptr;
   const PluginCall scratch(law.context.scratch);
-  const uint32_t nstate = state_width(ops);
+  const uint32_t nstate = state_width(law, in.params);
   Aligned batch(law.context, in, out, nstate);
   const dfm_status status = call_plugin(law.context.host, law.type, "eval", [&] { return ops.eval(batch.in(), batch.out()); });
   if (status < 0) fail(status, "law %s failed with %s", law.type.id, dfm_status_name(status));

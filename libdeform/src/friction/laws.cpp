@@ -5,15 +5,16 @@
 
 #include "core/error.h"
 #include "plugin/call.h"
+#include "plugin/registry.h"
 
 namespace dfm {
 
 LawInstance::LawInstance(const dfm_type &t, const dfm_host &h, std::vector<double> values)
     : type(&t), ops(static_cast<const dfm_friction *>(t.ops)), params(std::move(values)), host(&h) {
-  for (uint32_t s = 0; s < ops->nslot; ++s) {
-    nstate += ops->slots[s].width;
-    tangent.resize(nstate, ops->slots[s].kind == DFM_SLOT_TANGENT);
-    turns |= ops->slots[s].kind == DFM_SLOT_TANGENT;
+  for (const dfm_slot &slot : law_slots(t, h, params.data())) {
+    nstate += slot.width;
+    tangent.resize(nstate, slot.kind == DFM_SLOT_TANGENT);
+    turns |= slot.kind == DFM_SLOT_TANGENT;
   }
   // check() was asked by pack_params
   if (ops->prepare && call_plugin(h, t, "prepare", [&] { return ops->prepare(host, params.data(), &data); }) != DFM_OK)
@@ -26,11 +27,13 @@ LawInstance::~LawInstance() {
 
 LawBatches::LawBatches(const Memory &m)
     : order_(HookAllocator<uint32_t>(m)), in_(HookAllocator<double>(m)), out_(HookAllocator<double>(m)), moved_(HookAllocator<double>(m)),
-      answer_(HookAllocator<double>(m)), mode_(HookAllocator<uint8_t>(m)), local_(HookAllocator<Local>(m)), asked_(HookAllocator<uint32_t>(m)) {}
+      answer_(HookAllocator<double>(m)), origin_(HookAllocator<Origin>(m)), mode_(HookAllocator<uint8_t>(m)),
+      local_(HookAllocator<Local>(m)), asked_(HookAllocator<uint32_t>(m)) {}
 
 void LawBatches::gather(const std::vector<LawInstance *> &laws, ContactState &state) {
   batches_.clear();
   order_.clear();
+  origin_.assign(state.n, {});
   smooth_ = remembers_ = false;
   for (uint32_t l = 0; l < laws.size(); ++l) {
     const uint32_t begin = static_cast<uint32_t>(order_.size());
@@ -51,12 +54,38 @@ const LawInstance *LawBatches::evaluate(double h, ContactState &state) {
   return nullptr;
 }
 
-const LawInstance *LawBatches::evaluate(const LawInstance &law, std::span<const uint32_t> index, double h, ContactState &state) {
+const LawInstance *LawBatches::slopes(double h, ContactState &state) {
+  for (const Batch &batch : batches_) {
+    if (batch.law->ops->flags & DFM_FRIC_JACOBIAN) continue;
+    for (const Slopes which : {kByVt, kByFn}) {
+      asked_.clear();
+      for (uint32_t k = 0; k < batch.n; ++k)
+        if (const uint32_t i = order_[batch.begin + k]; !(origin_[i].hold & which)) asked_.push_back(i);
+      if (asked_.empty()) continue;
+      if (const LawInstance *bad = difference(*batch.law, asked_, h, which, state)) return bad;
+    }
+  }
+  return nullptr;
+}
+
+// Slopes whose prediction of the change of force since they were made is right to a tenth let the passes converge by that tenth; new ones are not worth
+// three answers.
+void LawBatches::look_back(uint32_t i, const ContactState &s) {
+  constexpr double kGood = 0.1;
+  Origin &o = origin_[i];
+  if (!o.made) return;
+  const uint32_t n = s.stride;
+  const double v1 = s.vt[i] - o.v[0], v2 = s.vt[n + i] - o.v[1], fn = s.fn[i] - o.fn;
+  const double p1 = s.dft_dvt[i] * v1 + s.dft_dvt[n + i] * v2 + s.dft_dfn[i] * fn;
+  const double p2 = s.dft_dvt[2 * size_t(n) + i] * v1 + s.dft_dvt[3 * size_t(n) + i] * v2 + s.dft_dfn[n + i] * fn;
+  const double e1 = s.ft[i] - o.f[0] - p1, e2 = s.ft[n + i] - o.f[1] - p2;
+  o.hold = e1 * e1 + e2 * e2 <= kGood * kGood * (p1 * p1 + p2 * p2) ? o.made : uint8_t(kNoSlope);
+}
+
+dfm_friction_in LawBatches::inputs(const LawInstance &law, std::span<const uint32_t> index, double h, const ContactState &state) {
   const uint32_t n = static_cast<uint32_t>(index.size()), stride = (n + 7) & ~7u, S = law.nstate;
   const size_t column = stride;
   in_.assign(column * (7 + S), 0.0);
-  out_.resize(column * (11 + S));
-  mode_.resize(stride);
   double *const fn = in_.data(), *const vt = fn + column, *const stop = vt + 2 * column, *const area = stop + 2 * column,
                 *const dwell = area + column, *const bristle = dwell + column;
   for (uint32_t k = 0; k < n; ++k) {
@@ -74,6 +103,15 @@ const LawInstance *LawBatches::evaluate(const LawInstance &law, std::span<const 
   in.area = needs & DFM_NEED_AREA ? area : nullptr;
   in.dwell = needs & DFM_NEED_DWELL ? dwell : nullptr;
   in.state = bristle;
+  return in;
+}
+
+const LawInstance *LawBatches::evaluate(const LawInstance &law, std::span<const uint32_t> index, double h, ContactState &state) {
+  const dfm_friction_in in = inputs(law, index, h, state);
+  const uint32_t n = in.n, S = law.nstate;
+  const size_t column = in.stride;
+  out_.resize(column * (11 + S));
+  mode_.resize(column);
   double *const ft = out_.data(), *const dv = ft + 2 * column, *const dn = dv + 4 * column, *const limit = dn + 2 * column,
                 *const next = limit + 3 * column;
   dfm_friction_out out{};
@@ -81,20 +119,23 @@ const LawInstance *LawBatches::evaluate(const LawInstance &law, std::span<const 
   out.ft = ft, out.state = next, out.dft_dvt = dv, out.dft_dfn = dn, out.limit = limit, out.mode = mode_.data();
   const bool given = law.ops->flags & DFM_FRIC_JACOBIAN;
   if (!given) out.dft_dvt = out.dft_dfn = nullptr;
-  const auto eval = [&] { return law.ops->eval(&in, &out); };
   failed_ = kNone;
-  if (call_plugin(*law.host, *law.type, "eval", eval) != DFM_OK || (!given && !difference(law, in, ft, dv, dn))) return &law;
+  if (call_plugin(*law.host, *law.type, "eval", [&] { return law.ops->eval(&in, &out); }) != DFM_OK) return &law;
 
   for (uint32_t k = 0; k < n; ++k) {
     const uint32_t i = index[k];
     double poison = 0;
     state.ft[i] = ft[k], state.ft[state.stride + i] = ft[column + k];
-    for (uint32_t j = 0; j < 4; ++j) state.dft_dvt[size_t(j) * state.stride + i] = dv[j * column + k];
-    state.dft_dfn[i] = dn[k], state.dft_dfn[state.stride + i] = dn[column + k];
     state.limit[i] = limit[k], state.mode[i] = mode_[k];
     for (uint32_t s = 0; s < S; ++s) poison += 0.0 * (state.bristle_out[size_t(s) * state.stride + i] = next[s * column + k]);
-    poison += 0.0 * (ft[k] + ft[column + k]) + 0.0 * (dv[k] + dv[column + k] + dv[2 * column + k] + dv[3 * column + k]) +
-              0.0 * (dn[k] + dn[column + k]);
+    poison += 0.0 * (ft[k] + ft[column + k]);
+    if (given) {
+      for (uint32_t j = 0; j < 4; ++j) state.dft_dvt[size_t(j) * state.stride + i] = dv[j * column + k];
+      state.dft_dfn[i] = dn[k], state.dft_dfn[state.stride + i] = dn[column + k];
+      poison += 0.0 * (dv[k] + dv[column + k] + dv[2 * column + k] + dv[3 * column + k]) + 0.0 * (dn[k] + dn[column + k]);
+    } else {
+      look_back(i, state);
+    }
     // poison of NaN or infinite: not equal to zero; a limit of +inf is an answer: none
     if (failed_ == kNone && !(poison == 0 && limit[k] >= 0)) failed_ = i;
   }
@@ -103,24 +144,39 @@ const LawInstance *LawBatches::evaluate(const LawInstance &law, std::span<const 
 
 // Derivatives of a law that gives none, by forward differences: without them a steep law (h w_t c > 1) would make the passes diverge. The step
 // is a millionth of the value, and at least a tenth of the slip and of the force that the solve resolves.
-bool LawBatches::difference(const LawInstance &law, dfm_friction_in in, const double *ft, double *dv, double *dn) {
-  const size_t column = in.stride;
+const LawInstance *LawBatches::difference(const LawInstance &law, std::span<const uint32_t> index, double h, Slopes which, ContactState &state) {
+  dfm_friction_in in = inputs(law, index, h, state);
+  const size_t column = in.stride, n = state.stride;
   const double *const fn = in.fn, *const vt = in.vt;
   answer_.resize(2 * column);
   dfm_friction_out out{};
   out.size = sizeof out, out.ft = answer_.data();
-  const auto ask = [&](const double *at, size_t columns, size_t c, const double *&input, double least, double *to, size_t width) {
+  failed_ = kNone;
+  // to: the column of the 2x2 or 2x1 slope, of `width` columns
+  const auto ask = [&](const double *at, size_t columns, size_t c, const double *&input, double least, Array<double> &to, size_t width) {
     moved_.assign(at, at + columns * column);
-    for (size_t i = 0; i < in.n; ++i) moved_[c * column + i] += std::max(least, 1e-6 * std::fabs(at[c * column + i]));
+    for (size_t k = 0; k < in.n; ++k) moved_[c * column + k] += std::max(least, 1e-6 * std::fabs(at[c * column + k]));
     input = moved_.data();
     const bool answered = call_plugin(*law.host, *law.type, "eval", [&] { return law.ops->eval(&in, &out); }) == DFM_OK;
     input = at;
     for (size_t r = 0; r < 2; ++r)
-      for (size_t i = 0; i < in.n; ++i)
-        to[(r * width + c) * column + i] = (answer_[r * column + i] - ft[r * column + i]) / (moved_[c * column + i] - at[c * column + i]);
+      for (size_t k = 0; k < in.n; ++k) {
+        const double slope = (answer_[r * column + k] - state.ft[r * n + index[k]]) / (moved_[c * column + k] - at[c * column + k]);
+        to[(r * width + c) * n + index[k]] = slope;
+        if (failed_ == kNone && !std::isfinite(slope)) failed_ = index[k];
+      }
     return answered;
   };
-  return ask(vt, 2, 0, in.vt, 1e-7, dv, 2) && ask(vt, 2, 1, in.vt, 1e-7, dv, 2) && ask(fn, 1, 0, in.fn, 1e-9, dn, 1);
+  bool answered = true;
+  if (which & kByVt) answered = ask(vt, 2, 0, in.vt, 1e-7, state.dft_dvt, 2) && ask(vt, 2, 1, in.vt, 1e-7, state.dft_dvt, 2);
+  if (answered && (which & kByFn)) answered = ask(fn, 1, 0, in.fn, 1e-9, state.dft_dfn, 1);
+  for (const uint32_t i : index) {
+    Origin &o = origin_[i];
+    if (!(o.hold & ~which)) o.made = kNoSlope;                   // what was made elsewhere belongs to another force
+    const uint8_t made = o.made | which, hold = o.hold | which;
+    o = {{state.vt[i], state.vt[n + i]}, state.fn[i], {state.ft[i], state.ft[n + i]}, made, hold};
+  }
+  return answered && failed_ == kNone ? nullptr : &law;
 }
 
 }  // namespace dfm

@@ -34,8 +34,12 @@ class LawBatches {
   explicit LawBatches(const Memory &memory);
   // Sorts the contacts into batches by state.law and sets state.set_valued. Call once per sub-step.
   void gather(const std::vector<LawInstance *> &laws, ContactState &state);
-  // Asks every batch at the trial in state. nullptr, or the law that failed or answered with something not finite.
+  // Asks every batch at the trial in state: force, limit, mode, trial state, and the slopes dft_dvt and dft_dfn of laws that give them. nullptr, or the
+  // law that failed or answered with something not finite.
   const LawInstance *evaluate(double h, ContactState &state);
+  // The slopes at the last answer, of laws that give none, by differences of the force; asked for where the solve goes on, since they cost three
+  // more answers. Where the force has followed the slopes of an earlier pass they are kept.
+  const LawInstance *slopes(double h, ContactState &state);
   // The same, but a smooth law is asked where the contact would come to rest alone (friction/local_solve.cpp): state.vt moves there.
   //   wt     [n] 1/kg, how much slip an impulse makes at its own contact; with it ft_stop tells the slip that others leave
   //   least, share   m/s, 1: a contact's slip need not be known closer than least + share of it
@@ -48,19 +52,26 @@ class LawBatches {
  private:
   struct Batch { const LawInstance *law; uint32_t begin, n; };
   // A contact whose own answer is still looked for: the best slip so far, what it leaves of its equation, and the step tried from there.
-  struct Local { uint32_t contact; bool from_zero, last; double v[2], left, step[2], share; };
+  struct Local { uint32_t contact; bool from_zero, last, fresh; double v[2], left, step[2], share; };
+  enum Slopes : uint8_t { kNoSlope = 0, kByVt = 1, kByFn = 2 };
+  // Where slopes were made by differences: the force that they start from, and which of them hold at the present answer.
+  struct Origin { double v[2], fn, f[2]; uint8_t made, hold; };
   std::vector<Batch> batches_;
   Array<uint32_t> order_;         // contacts by law, in contact order within each
   Array<double> in_, out_;        // columns of one batch
   Array<double> moved_, answer_;  // inputs and force beside the trial, for laws without derivatives
+  Array<Origin> origin_;          // [n] of their contacts
   Array<uint8_t> mode_;
   Array<Local> local_;
   Array<uint32_t> asked_;         // contacts of local_ that are asked together
   bool smooth_ = false, remembers_ = false;
   uint32_t failed_ = kNone;
+  dfm_friction_in inputs(const LawInstance &law, std::span<const uint32_t> contacts, double h, const ContactState &state);   // in in_
   const LawInstance *evaluate(const LawInstance &law, std::span<const uint32_t> contacts, double h, ContactState &state);
   const LawInstance *settle(const Batch &batch, double h, const double *wt, double least, double share, ContactState &state);
-  bool difference(const LawInstance &law, dfm_friction_in in, const double *ft, double *dv, double *dn);
+  // Slopes by differences at the present answer. The law where it fails.
+  const LawInstance *difference(const LawInstance &law, std::span<const uint32_t> contacts, double h, Slopes which, ContactState &state);
+  void look_back(uint32_t contact, const ContactState &state);   // do earlier slopes hold at the answer just given?
 };
 
 }  // namespace dfm

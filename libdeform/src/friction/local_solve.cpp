@@ -33,6 +33,15 @@ Residue residue(const ContactState &s, uint32_t i, double m) {
   return {a, b, std::sqrt(a * a + b * b)};
 }
 
+// From the present slip, which becomes v.
+void newton_step(const ContactState &s, uint32_t i, double m, double v[2], double step[2]) {
+  const Residue g = residue(s, i, m);
+  const auto [d11, d12, d22] = dissipative_slope(s, i);
+  const double m11 = 1 - m * d11, m22 = 1 - m * d22, m12 = -m * d12, det = m11 * m22 - m12 * m12;
+  v[0] = s.vt[i], v[1] = s.vt[s.stride + i];
+  step[0] = -(m22 * g.a - m12 * g.b) / det, step[1] = -(m11 * g.b - m12 * g.a) / det;
+}
+
 }  // namespace
 
 const LawInstance *LawBatches::answer(double h, const double *wt, double least, double share, ContactState &state) {
@@ -49,9 +58,11 @@ const LawInstance *LawBatches::settle(const Batch &batch, double h, const double
   const uint32_t n = s.stride;
   local_.clear();
   for (uint32_t k = 0; k < batch.n; ++k)
-    if (const uint32_t i = order_[batch.begin + k]; wt[i] > 0) local_.push_back({i, false, false, {0, 0}, INFINITY, {0, 0}, 0});
+    if (const uint32_t i = order_[batch.begin + k]; wt[i] > 0) local_.push_back({i, false, false, false, {0, 0}, INFINITY, {0, 0}, 0});
+  const bool gives_slopes = batch.law->ops->flags & DFM_FRIC_JACOBIAN;
   for (uint32_t asked = 1; !local_.empty(); ++asked) {
     size_t kept = 0;
+    asked_.clear();
     for (Local &c : local_) {
       const uint32_t i = c.contact;
       const double m = h * wt[i];
@@ -60,25 +71,30 @@ const LawInstance *LawBatches::settle(const Batch &batch, double h, const double
       if (g.size <= least + share * size) continue;
       // Beyond the crossing, g points along the step: deep in stick it is nearly as large there as it was, so less does not tell.
       const bool nearer = g.size < 0.5 * c.left || (c.from_zero && g.size < c.left && g.a * c.step[0] + g.b * c.step[1] < 0);
+      c.fresh = false;
       if (std::isinf(c.left) || nearer) {
         if (asked == kMostAsked) continue;
-        const auto [d11, d12, d22] = dissipative_slope(s, i);
-        const double m11 = 1 - m * d11, m22 = 1 - m * d22, m12 = -m * d12, det = m11 * m22 - m12 * m12;
-        c.v[0] = s.vt[i], c.v[1] = s.vt[n + i], c.left = g.size, c.share = 1;
-        c.step[0] = -(m22 * g.a - m12 * g.b) / det, c.step[1] = -(m11 * g.b - m12 * g.a) / det;
+        c.fresh = true, c.left = g.size, c.share = 1;
+        if (!gives_slopes && !(origin_[i].hold & kByVt)) asked_.push_back(i);
       } else if (!c.from_zero && asked < kMostAsked) {   // tangents from where it slips lead nowhere
-        c = {i, true, false, {0, 0}, INFINITY, {0, 0}, 0};
+        c = {i, true, false, false, {0, 0}, INFINITY, {0, 0}, 0};
       } else {
         c.share *= kCut;
       }
-      // Out of turns, or at the end of what steps can do: the best slip is asked once more and is the answer.
-      c.last = asked >= kMostAsked || (c.share > 0 && c.share < kLeastShare);
-      if (c.last) c.share = 0;
-      s.vt[i] = c.v[0] + c.share * c.step[0], s.vt[n + i] = c.v[1] + c.share * c.step[1];
       local_[kept++] = c;
     }
     local_.resize(kept);
     if (local_.empty()) break;
+    if (!asked_.empty())
+      if (const LawInstance *bad = difference(*batch.law, asked_, h, kByVt, s)) return bad;
+    for (Local &c : local_) {
+      const uint32_t i = c.contact;
+      if (c.fresh) newton_step(s, i, h * wt[i], c.v, c.step);
+      // Out of turns, or at the end of what steps can do: the best slip is asked once more and is the answer.
+      c.last = asked >= kMostAsked || (c.share > 0 && c.share < kLeastShare);
+      if (c.last) c.share = 0;
+      s.vt[i] = c.v[0] + c.share * c.step[0], s.vt[n + i] = c.v[1] + c.share * c.step[1];
+    }
     asked_.clear();
     for (const Local &c : local_) asked_.push_back(c.contact);
     if (const LawInstance *bad = evaluate(*batch.law, asked_, h, s)) return bad;

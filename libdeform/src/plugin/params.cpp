@@ -52,10 +52,11 @@ void check_keys(const dfm_type &type, std::span<const dfm_param_value> given) {
 }
 
 void check_value(const dfm_type &type, const dfm_param &row, const dfm_param_value &value) {
-  if (value.width != row.width)
-    fail(DFM_E_ARG, "%s: parameter \"%s\" has %u value%s, %u expected", type.id, value.key, value.width, value.width == 1 ? "" : "s",
+  const bool list = row.flags & DFM_PARAM_LIST;
+  if (list ? value.width < 1 || value.width > row.width : value.width != row.width)
+    fail(DFM_E_ARG, "%s: parameter \"%s\" has %u value%s, %s%u expected", type.id, value.key, value.width, value.width == 1 ? "" : "s", list ? "1 to " : "",
          row.width);
-  for (uint32_t k = 0; k < row.width; ++k) {
+  for (uint32_t k = 0; k < value.width; ++k) {
     const double x = value.value[k];
     const bool whole = !(row.flags & (DFM_PARAM_INTEGER | DFM_PARAM_ENUM)) || x == std::floor(x);
     if (!(x >= row.min && x <= row.max) || !whole)
@@ -88,7 +89,8 @@ std::vector<double> pack_params(const dfm_type &type, std::span<const dfm_param_
     const dfm_param &row = type.params[i];
     if (const dfm_param_value *value = choose(type, row, given, fallback)) {
       check_value(type, row, *value);
-      packed.insert(packed.end(), value->value, value->value + row.width);
+      packed.insert(packed.end(), value->value, value->value + value->width);
+      packed.insert(packed.end(), row.width - value->width, 0.0);
     } else {
       packed.insert(packed.end(), row.width, row.def);
     }

@@ -6,6 +6,7 @@
 #include <cstring>
 
 #include "core/error.h"
+#include "plugin/call.h"
 
 namespace dfm {
 namespace {
@@ -64,6 +65,8 @@ void check_row(const std::string &id, const dfm_param &row, const std::vector<df
   if (!std::isfinite(row.min) || !std::isfinite(row.max) || !(row.min <= row.def && row.def <= row.max))
     bad(id, format("parameter \"%s\": the range [%g, %g] must be finite and hold the default %g", key.c_str(), row.min, row.max, row.def));
   if (row.width < 1 || row.width > 16) bad(id, format("parameter \"%s\": width %u is not in 1..16", key.c_str(), row.width));
+  if ((row.flags & DFM_PARAM_LIST) && !(row.min <= 0 && 0 <= row.max))
+    bad(id, format("parameter \"%s\" is a list, whose values that are not given read 0, which its range [%g, %g] excludes", key.c_str(), row.min, row.max));
   if (row.flags & DFM_PARAM_ENUM) {
     uint32_t n = 0;
     while (row.names && n < kLargest && row.names[n]) ++n;
@@ -126,6 +129,16 @@ void check_slots(const std::string &id, const dfm_slot *slots, uint32_t n, bool 
     if (law ? s.unit != DFM_PER_CONTACT : s.unit < DFM_PER_POINT || s.unit > DFM_PER_INSTANCE)
       bad(id, format("state slot %u has unit %u, which a %s cannot have", i, s.unit, law ? "law" : "model"));
   }
+}
+
+std::span<const dfm_slot> law_slots(const dfm_type &type, const dfm_host &host, const double *params) {
+  const dfm_friction &law = law_of(type);
+  if (!law.state) return {law.slots, law.nslot};
+  const dfm_slots *own = nullptr;
+  call_plugin(host, type, "state", [&] { return own = law.state(params), DFM_OK; });
+  if (!own || own->size < sizeof(dfm_slots)) bad(type.id, "it does not say what state its parameters call for");
+  check_slots(type.id, own->slots, own->nslot, true);
+  return {own->slots, own->nslot};
 }
 
 const char *kind_name(uint32_t kind) {

@@ -3,6 +3,7 @@
 #pragma once
 #include <cstdint>
 #include <memory>
+#include <span>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -50,6 +51,8 @@ std::string short_name(const dfm_type &type);
 std::vector<std::string> effects(const dfm_type &type);
 // Throws Error naming the type where a slot's unit, kind and width do not agree.
 void check_slots(const std::string &id, const dfm_slot *slots, uint32_t n, bool law);
+// The state slots of a law with these parameters; throws Error where what it answers is none.
+std::span<const dfm_slot> law_slots(const dfm_type &type, const dfm_host &host, const double *params);
 inline const dfm_friction &law_of(const dfm_type &type) { return *static_cast<const dfm_friction *>(type.ops); }
 inline const dfm_model &model_of(const dfm_type &type) { return *static_cast<const dfm_model *>(type.ops); }
 

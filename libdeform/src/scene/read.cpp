@@ -105,7 +105,8 @@ std::vector<double> read_param(const Node &value, const dfm_param &p) {
     for (const Node &item : value.items()) out.push_back(item.number(range));
   else out.push_back(value.number(range));
   const uint32_t width = p.width ? p.width : 1;
-  if (out.size() != width) value.fail("expected %u number%s, found %zu", width, width == 1 ? "" : "s", out.size());
+  if (p.flags & DFM_PARAM_LIST ? out.empty() || out.size() > width : out.size() != width)
+    value.fail("expected %s%u number%s, found %zu", p.flags & DFM_PARAM_LIST ? "1 to " : "", width, width == 1 ? "" : "s", out.size());
   for (double x : out)
     if ((p.flags & (DFM_PARAM_INTEGER | DFM_PARAM_ENUM)) && x != std::floor(x)) value.fail("expected a whole number, found %g", x);
   return out;

@@ -145,11 +145,12 @@ const LawInstance *World::solve_rows() {
     // The sweeps take the next Newton step from there: what is asked a hundredth off is answered to a ten-thousandth.
     if (const LawInstance *bad = batches.answer(h, rows.wt.data(), 0.1 * least, 1e-2, state)) return bad;
     ++passes;
-    if (!sweeps) set_tolerance(rows, state, contacts, h, bounds, static_cast<uint32_t>(bodies.size()), disturbance, tolerance);
-    else {
+    if (sweeps) {
       residual = true_residual(rows, state, h, tolerance);
       if (good(*this, residual, 1) || !may_sweep(*this, residual) || passes > def.max_passes) return nullptr;
     }
+    if (const LawInstance *bad = batches.slopes(h, state)) return bad;
+    if (!sweeps) set_tolerance(rows, state, contacts, h, bounds, static_cast<uint32_t>(bodies.size()), disturbance, tolerance);
     // at least one sweep on a warm start is part of the method
     sweep_until_good(*this, acceleration, tolerance);
   }

@@ -25,7 +25,7 @@ static dfm_status eval(const dfm_friction_in *in, dfm_friction_out *out) {
 }
 
 static const dfm_friction ops = {sizeof(dfm_friction), DFM_NEED_FN | DFM_NEED_FT_STOP, DFM_FRIC_ISOTROPIC | DFM_FRIC_PASSIVE | DFM_FRIC_SET_VALUED,
-                                 0, NULL, eval, NULL, NULL, NULL};
+                                 0, NULL, eval, NULL, NULL, NULL, NULL};
 static const dfm_type type = {sizeof(dfm_type), DFM_KIND_FRICTION, "com.example.slab", "slab", "1.0", "MIT", "C. A. Coulomb, 1785",
                               params, 1, sizeof(dfm_param), effects, &ops};
 static const dfm_type *const types[] = {&type};

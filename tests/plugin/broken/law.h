@@ -1,5 +1,6 @@
 /* The rest of a broken law: eval, tables and entry. Hooks, each a macro with a sound default: EFFECTS and FLAGS what it promises, LANE the update
- * of one contact, BEFORE_EVAL a statement at the head of eval, STEP the step it uses, CHECK, SLOTS, SOURCE; with OWN_ENTRY it brings its entry. */
+ * of one contact, BEFORE_EVAL a statement at the head of eval,
+ * AFTER_LANE one after each contact, STEP the step it uses, CHECK, SLOTS, SOURCE; with OWN_ENTRY it brings its entry. */
 #include "base.h"
 
 #ifndef SOURCE
@@ -16,6 +17,9 @@
 #endif
 #ifndef BEFORE_EVAL
 #define BEFORE_EVAL
+#endif
+#ifndef AFTER_LANE
+#define AFTER_LANE
 #endif
 #ifndef STEP
 #define STEP in->dt
@@ -44,6 +48,7 @@ static dfm_status eval(const dfm_friction_in *in, dfm_friction_out *out) {
     if (out->limit) out->limit[i] = l.limit;
     if (out->mode) out->mode[i] = (uint8_t)l.mode;
     if (out->stored) out->stored[i] = l.stored;
+    AFTER_LANE
   }
   return DFM_OK;
 }
@@ -52,7 +57,7 @@ static const dfm_param rows[] = {{"mu", "friction coefficient", "1", 0.0, 10.0, 
                                  {"sigma0", "bristle stiffness per area", "N/m^3", 1.0, 1e12, 1e8, DFM_PARAM_LOG_SCALE, 1, NULL}};
 static const dfm_slot slots[] = {SLOTS};
 static const dfm_friction ops = {sizeof(dfm_friction), DFM_NEED_FN | DFM_NEED_VT | DFM_NEED_AREA, FLAGS, sizeof slots / sizeof slots[0], slots, eval,
-                                 CHECK, NULL, NULL};
+                                 CHECK, NULL, NULL, NULL};
 static const char *const effects[] = {EFFECTS, NULL};
 static const dfm_type type = {sizeof(dfm_type), DFM_KIND_FRICTION, "org.broken.law", "a law of the tests", "1.0", "MIT", SOURCE,
                               rows, 2, sizeof(dfm_param), effects, &ops};

@@ -1,4 +1,4 @@
-/* V10: a static scratch variable, right in one thread at a time. */
+/* V14: a static scratch variable, right in one thread at a time. */
 #include "base.h"
 
 static struct lane shared;
