@@ -150,6 +150,12 @@ FileNodes Outputs::file_nodes(size_t b) const {
   const std::string key = "/bodies/" + std::to_string(b);
   JsonValue mesh;
   if (!parse_json(scene_.value(key + "/mesh"), mesh)) throw Failure(kBadInput, "body \"" + body.name + "\" has no mesh file");
+  if (mesh.kind == JsonValue::object) {   // made, not read: its points are the body's
+    FileNodes own;
+    for (uint32_t i = 0; i < body.npoint; ++i) own.number.push_back(i);
+    own.start = node_positions(body, own);
+    return own;
+  }
   const std::string path = (fs::path(scene_.path()).parent_path() / mesh.text).string();
   FileNodes out;
   dfm_tetmesh cells = 0;

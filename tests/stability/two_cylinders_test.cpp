@@ -37,7 +37,6 @@ TEST(TwoCylinders, FiveMoreJitteredRuns_AllStay) { test::expect_jittered("two_cy
 
 // The pair of the speed figures, on meshes of fair to poor cells.
 TEST(TwoCylinders, CoarsePair_StaysWithFrictionAndFallsWithout) {
-  if (test::shared_dir().empty()) GTEST_SKIP() << "../shared/meshes is absent";
   const test::SceneRun with("two_cylinders_coarse", {}), without("two_cylinders_coarse", {"--set", test::kFrictionless});
   with.expect_sound(20, "with friction"), without.expect_sound(20, "without friction");
   EXPECT_TRUE(stays(with));
@@ -46,7 +45,6 @@ TEST(TwoCylinders, CoarsePair_StaysWithFrictionAndFallsWithout) {
 }
 
 TEST(TwoCylinders, FinePair_TouchesAtSixtyContactsAndMore) {
-  if (test::shared_dir().empty()) GTEST_SKIP() << "../shared/meshes is absent";
   const test::SceneRun run("two_cylinders_fine", {"--time", "1.2"});
   run.expect_sound(100, "fine pair");
   EXPECT_TRUE(stays(run));

@@ -66,8 +66,16 @@ struct OwnSurface {
   bool boundary = false, coupled = false;  // "from": "boundary" is said; a coupling is said
 };
 
+// A mesh that is made and not read, as dfm_tetmesh_make does.
+struct MadeMesh {
+  std::string kind;          // empty: the mesh is a file
+  double size[3] = {};
+  uint32_t cells = 0;
+};
+
 struct Body {
   std::string pointer, name, mesh, material, model, nodal_bc;
+  MadeMesh made;
   OwnSurface surface;
   uint32_t fill = 0;  // cells; 0: not said
   std::vector<GroupMaterial> by_group;

@@ -39,6 +39,15 @@ bool MeshFiles::has_cells(const std::string &path, const std::string &pointer) {
   return false;
 }
 
+// Under a name that no file can have.
+std::string MeshFiles::make(const Body &b) {
+  const MadeMesh &m = b.made;
+  const std::string name = format("/dev/null/%s %a %a %a %u", m.kind.c_str(), m.size[0], m.size[1], m.size[2], m.cells);
+  dfm_tetmesh &mesh = cells_[name];
+  if (!mesh) check(dfm_tetmesh_make(context_, m.kind.c_str(), m.size, m.cells, &mesh), b.pointer + "/mesh");
+  return name;
+}
+
 dfm_tetmesh MeshFiles::cells(const std::string &path, const std::string &pointer) {
   dfm_tetmesh &mesh = cells_[path];
   if (!mesh) check(dfm_tetmesh_read(context_, path.c_str(), &mesh), pointer);
@@ -110,7 +119,7 @@ void MeshFiles::take_skin(dfm_trimesh mesh, const Body &b, const std::string &po
 }
 
 BodyMesh MeshFiles::load(const Body &b) {
-  const std::string path = path_of(b.mesh), pointer = b.pointer + "/mesh";
+  const std::string path = b.made.kind.empty() ? path_of(b.mesh) : make(b), pointer = b.pointer + "/mesh";
   BodyMesh out;
   out.filled = !has_cells(path, pointer);
   check_keys(b, out.filled);

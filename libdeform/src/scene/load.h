@@ -28,6 +28,7 @@ class MeshFiles {
   void check(dfm_status status, const std::string &pointer) const;
   [[noreturn]] void refuse(const std::string &pointer, const std::string &sentence) const;
   bool has_cells(const std::string &path, const std::string &pointer);   // reads the file; else it has a surface alone
+  std::string make(const Body &body);                                    // gives the name under which `cells` knows it
   dfm_tetmesh cells(const std::string &path, const std::string &pointer);
   dfm_trimesh surface(const std::string &path, const std::string &pointer);
   dfm_tetmesh filling(const std::string &path, const Body &body);

@@ -145,6 +145,37 @@ Spring read_spring(const Node &entry) {
   return spring;
 }
 
+uint32_t read_count(const Node &node, double least, double most) {
+  const double n = node.number();
+  if (!(n >= least && n <= most) || n != std::floor(n)) node.fail("expected a whole number from %.0f to %.0f, found %g", least, most, n);
+  return uint32_t(n);
+}
+
+// {"make": "cylinder", "radius", "length", "cells"} and so on, with the keys of that shape and no others.
+MadeMesh read_made(const Node &node) {
+  MadeMesh made;
+  node.object("made_mesh");
+  made.kind = node.at("make").word("make");
+  const bool round = made.kind != "beam", tube = made.kind == "tube", along = tube || made.kind == "cylinder";
+  const std::pair<const char *, bool> wanted[] = {{"radius", round}, {"inner", tube}, {"length", along}, {"size", !round}};
+  for (const auto &[key, mine] : wanted)
+    if (!mine && node.has(key)) node.member(key).fail("a %s has no \"%s\"", made.kind.c_str(), key);
+  if (round) {
+    const double radius = node.at("radius").number(kPositive);
+    size_t k = 0;
+    if (tube) made.size[k++] = node.at("inner").number({0, radius, true, true});
+    made.size[k++] = radius;
+    if (along) made.size[k] = node.at("length").number(kPositive);
+  } else {
+    node.at("size").vector(made.size);
+    for (const double edge : made.size)
+      if (!(edge > 0)) node.at("size").fail("edges are above 0, found %g", edge);
+  }
+  if (!node.has("cells")) node.value()["cells"] = 1000;
+  made.cells = read_count(node.at("cells"), 1, 1e8);
+  return made;
+}
+
 Body read_body(const Node &node, ReadContext &context) {
   Body b;
   node.object("body");
@@ -152,7 +183,9 @@ Body read_body(const Node &node, ReadContext &context) {
   b.name = node.at("name").name();
   check_fresh(node.at("name"), b.name, context.sides, "body or obstacle");
   context.sides.push_back(b.name);
-  b.mesh = node.at("mesh").text();
+  const Node mesh = node.at("mesh");
+  if (mesh.value().is_object()) b.made = read_made(mesh);
+  else b.mesh = mesh.text();
   if (node.has("material")) b.material = known(node.member("material"), context.materials, "material");
   if (!node.has("model")) node.value()["model"] = json::object();
   const Node model = node.member("model");
@@ -222,12 +255,6 @@ Quaternion read_plane(const Node &node, dfm_obstacle_def &def) {
 }
 
 constexpr double kFewestVoxels = 64, kMostVoxels = 1 << 28;
-
-uint32_t read_count(const Node &node, double least, double most) {
-  const double n = node.number();
-  if (!(n >= least && n <= most) || n != std::floor(n)) node.fail("expected a whole number from %.0f to %.0f, found %g", least, most, n);
-  return uint32_t(n);
-}
 
 Obstacle read_obstacle(const Node &node, ReadContext &context) {
   Obstacle o;
