@@ -140,7 +140,8 @@ class Runner {
       if (left < 2 * step && left > step) step = left / 2;
     }
     if (left <= 1e-6 * std::min(step, duration_)) return false;
-    if (left < step * (1 + 1e-6) && (automatic || left < step * (1 - 1e-6))) step = left;
+    // Rather a last step that is a thousandth longer than one more that is too short to be taken.
+    if (left < step * (1 + (automatic ? 1e-6 : 1e-3)) && (automatic || std::fabs(left - step) > 1e-6 * step)) step = left;
     const double begin = wall_seconds();
     uint32_t trouble = 0;
     stepping = world_;

@@ -170,7 +170,7 @@ std::string summary_json(const SceneFile &scene, const RunOptions &options, cons
   std::snprintf(hash, sizeof hash, "\"%016llx\"", static_cast<unsigned long long>(dfm_world_hash(scene.world())));
   std::vector<std::string> warning_texts;
   for (const std::string &w : warnings()) warning_texts.push_back(quoted(w));
-  JsonObject ms, solver, hold, effects, contacts, guard, budget, out;
+  JsonObject ms, solver, hold, effects, contacts, guard, budget, energy, out;
   ms.add("median", number(1e3 * run.times.quantile(0.5))).add("p99", number(1e3 * run.times.quantile(0.99)));
   ms.add("max", number(1e3 * run.times.longest()));
   solver.add("passes", std::to_string(stats.passes_max)).add("sweeps", std::to_string(stats.sweeps_max));
@@ -179,6 +179,7 @@ std::string summary_json(const SceneFile &scene, const RunOptions &options, cons
   effects.add("active", names_json(plan, "effects")).add("absent", names_json(plan, "absent"));
   guard.add("solves", std::to_string(stats.guard_solves)).add("cuts", std::to_string(stats.guard_cuts)).add("lost_s", number(stats.guard_lost));
   budget.add("work_max", std::to_string(stats.work_max)).add("cheapened", std::to_string(stats.cheapened)).add("discarded", std::to_string(stats.discarded));
+  energy.add("start_J", number(stats.energy_start)).add("max_J", number(stats.energy_max)).add("gain_J", number(stats.energy_gain));
   contacts.add("max", std::to_string(stats.contacts_max)).add("mean", number(stats.contacts_mean));
   out.add("format", "\"deform-summary\"").add("version", "1").add("library", quoted(dfm_version(nullptr, nullptr, nullptr)));
   out.add("scene", quoted(options.scene)).add("steps", std::to_string(run.steps)).add("substeps", std::to_string(stats.substeps));
@@ -190,6 +191,7 @@ std::string summary_json(const SceneFile &scene, const RunOptions &options, cons
   out.add("inverted_max", std::to_string(std::max(checks.inverted_max, stats.inverted_max))).add("limited_max", std::to_string(stats.limited_max));
   out.add("guard_steps", std::to_string(stats.guard_steps)).add("guard", guard.text()).add("unconverged_steps", std::to_string(stats.unconverged));
   out.add("budget", budget.text());
+  out.add("energy", energy.text());
   out.add("solver", solver.text()).add("hold", hold.text()).add("effects", effects.text()).add("plugins", plugins_json(scene));
   out.add("bodies", bodies_json(scene)).add("contacts", contacts.text()).add("impulse", run.impulses).add("swaps", "[]").add("state_hash", hash);
   out.add("stopped", stopped_json(run)).add("warnings", json_array(warning_texts));

@@ -32,6 +32,8 @@ typedef struct dfm_world_def {
   double max_time;              /* s of the machine's time for one step, 0: any. A step that this changes depends on the machine and its load */
   uint64_t max_work;            /* units of work for one step (doc/concepts/budget.md), the same on every machine; 0: automatic, 1000 times what
                                    the step costs with nothing in contact; UINT64_MAX: any */
+  double energy_watch;          /* 0.01: a step stops where a body has gained more than this share of the largest energy so far beyond what loads, motions and
+                                   contact have put into it (doc/concepts/energy_watch.md); 0: never */
 } dfm_world_def;
 
 /** Gravity (0,0,-9.81), everything automatic. Threads: Any thread. Since 0.1. */
@@ -58,16 +60,18 @@ enum {
   DFM_TROUBLE_NONFINITE = 4,     /* a plugin or a load made a NaN: the last good sub-step is kept (status DFM_E_DIVERGED) */
   DFM_TROUBLE_INVERTED = 8,      /* a cell is inside out (looked for when the step bound is asked): refine, soften the load */
   DFM_TROUBLE_PLUGIN = 16,       /* a plugin failed: see the log */
+  DFM_TROUBLE_ENERGY = 64,       /* a body gains energy that nobody gave it (status DFM_E_DIVERGED): shorten the step, or add stiffness damping */
   DFM_TROUBLE_BUDGET = 256,      /* the step was cheapened or, with DFM_DISCARD, given up by max_time or max_work: take a shorter step, soften the blow */
   DFM_TROUBLE_INTERRUPTED = 512  /* DFM_DISCARD because of dfm_world_interrupt */
 };
 /** Advances the world by dt. A step longer than the stable one is cut into equal sub-steps with the contact solve in each; their number
  * is 1, 2, 3 or (4, 5, 6, 7) 2^k.
- * @param dt       s, > 0
+ * @param dt       s, at least 1e-9 for each meter that a body is away from the origin (and for the first one): rounding of positions rules below
  * @param trouble  out, DFM_TROUBLE_* bits; may be NULL
  * @return DFM_OK; DFM_DISCARD too many sub-steps, its budget used up (max_time, max_work) or dfm_world_interrupt: nothing changed;
- *         DFM_E_DIVERGED a sub-step could not be taken (a value that is not finite, a plugin that failed): the world stays at its last good
- *         sub-step, and may step again once the cause is gone; DFM_E_NOMEM likewise; DFM_E_FATAL a plugin gave no step bound; DFM_E_ARG;
+ *         DFM_E_DIVERGED a sub-step could not be taken (a value that is not finite, a plugin that failed, energy out of nothing): the world stays
+ *         at its last good sub-step, and may step again once the cause is gone; DFM_E_NOMEM likewise; DFM_E_FATAL a plugin gave no step
+ *         bound; DFM_E_ARG;
  *         DFM_E_HANDLE; DFM_E_BUSY called from inside a step
  * Threads: One thread at a time per world. Since 0.1. */
 DFM_API dfm_status dfm_world_step(dfm_world world, double dt, uint32_t *trouble);
@@ -127,6 +131,8 @@ typedef struct dfm_world_stats {
   uint64_t work, work_max;                /* units of the last step, also where it was discarded; the most since creation (doc/concepts/budget.md) */
   uint64_t cheapened, discarded;          /* steps that left something out for their budget; that were given up by it or by dfm_world_interrupt */
   uint32_t limited_max, reserved_limited; /* cells at once that were so far from their shape that their model limited their stiffness, since creation */
+  double energy_start, energy_max;        /* J, kinetic and elastic of the bodies that the energy watch looks at: at the first step; the largest seen */
+  double energy_gain;                     /* J, the largest gain seen beyond what loads, motions and contact have put in */
 } dfm_world_stats;
 /** @return DFM_OK; DFM_E_HANDLE. Threads: Any thread. Not during step. Since 0.1. */
 DFM_API dfm_status dfm_world_get_stats(dfm_world world, dfm_world_stats *out);

@@ -36,6 +36,9 @@ void stop_held(Body &b) {
 }
 
 // Lasting loads that do not vary are summed once; varying ones are summed anew by the motion stage.
+// What the host changes is no work of the step's.
+void disturb(Body &b) { b.world->wake(b), forget_energy(b); }
+
 void sum_loads(Body &b) {
   std::fill(b.p.load.begin(), b.p.load.end(), 0.0);
   for (const Load &load : b.loads)
@@ -43,7 +46,7 @@ void sum_loads(Body &b) {
       double *const f = &b.p.load[size_t(load.points[i]) * kStride];
       store3(f, load3(f) + load3(&load.force[3 * i]));
     }
-  b.world->wake(b);
+  disturb(b);
   b.world->changed = true;
 }
 
@@ -128,7 +131,7 @@ dfm_status dfm_body_set_filter(dfm_body body, uint32_t category, uint32_t collid
     Body &b = body_of(body);
     idle(*b.world);
     b.category = category, b.collides_with = collides_with;
-    b.world->wake(b);
+    disturb(b);
     b.world->changed = true;
   });
 }
@@ -158,7 +161,7 @@ dfm_status dfm_body_set_state(dfm_body body, uint32_t n, const double *x, const 
         if (x) b.p.x[size_t(i) * kStride + size_t(k)] = x[size_t(3) * i + size_t(k)];
         if (v) b.p.v[size_t(i) * kStride + size_t(k)] = v[size_t(3) * i + size_t(k)];
       }
-    b.world->wake(b);
+    disturb(b);
     b.world->bound_age = kNone;
     b.world->guard.forget();
   });
@@ -182,7 +185,7 @@ dfm_status dfm_body_hold(dfm_body body, uint32_t n, const uint32_t *points, uint
     for (uint32_t i = 0; i < n; ++i) b.p.held[points[i]] = axes;
     update_inverse_mass(b.p);
     stop_held(b);
-    b.world->wake(b);
+    disturb(b);
     b.world->bound_age = kNone;
   });
 }
@@ -207,7 +210,7 @@ dfm_status dfm_body_move_held(dfm_body body, uint32_t n, const uint32_t *points,
     b.motions.reserve(b.motions.size() + 1);
     drop_motions(b, {points, n});
     b.motions.push_back(std::move(m));
-    b.world->wake(b);
+    disturb(b);
     b.world->changed = true;
   });
 }
@@ -263,7 +266,7 @@ dfm_status dfm_body_set_spring_target(dfm_body body, uint32_t spring, const doub
     Spring &s = spring_of(b, spring);
     if (!std::isfinite(to[0]) || !std::isfinite(to[1]) || !std::isfinite(to[2])) fail(DFM_E_ARG, "body '%s': a spring's end must be finite", b.name.c_str());
     s.to = load3(to), s.keys.clear();
-    b.world->wake(b);
+    disturb(b);
   });
 }
 
@@ -299,7 +302,7 @@ dfm_status dfm_body_apply_impulse(dfm_body body, const double point[3], const do
           closest_on_triangle(load3(point), surfel_vector(b, b.p.x, c[0]), surfel_vector(b, b.p.x, c[1]), surfel_vector(b, b.p.x, c[2]));
       if (q.distance2 < best) best = q.distance2, triangle = t, std::copy(q.weight, q.weight + 3, weight);
     }
-    b.world->wake(b);
+    disturb(b);
     // dv = M^-1 N^T p: of all changes that give the point its new velocity the one of least kinetic energy
     for (int k = 0; k < 3; ++k)
       b.surface.each_phyxel(b.surface.tri[size_t(3) * triangle + size_t(k)], [&](uint32_t phyxel, double w) {
@@ -314,7 +317,7 @@ dfm_status dfm_body_set_params(dfm_body body, const dfm_params *params) {
     idle(*b.world);
     need(params, "params");
     set_model_params(b, *params);
-    b.world->wake(b);
+    disturb(b);
   });
 }
 

@@ -1,5 +1,6 @@
 #include "deform/world.h"
 
+#include <algorithm>
 #include <cmath>
 
 #include "api/objects.h"
@@ -34,6 +35,15 @@ void give_bytes(const void *data, size_t size, void *to, size_t *bytes) {
   std::memcpy(to, data, size);
 }
 
+// Positions are looked at where it could matter: up to a kilometer away.
+double shortest_step(const World &w, double dt) {
+  double reach = 1;
+  if (dt < 1e3 * kShortestStep)
+    for (const auto &b : w.bodies)
+      for (const double x : b->p.x) reach = std::max(reach, std::fabs(x));
+  return kShortestStep * reach;
+}
+
 }  // namespace
 
 dfm_world_def dfm_world_def_default(void) {
@@ -42,6 +52,7 @@ dfm_world_def dfm_world_def_default(void) {
   d.gravity[2] = -9.81;
   d.max_sweeps = 50, d.max_passes = 20, d.max_substeps = 10000;
   d.sleep_speed = 0.01, d.sleep_time = 0.5;
+  d.energy_watch = 0.01;
   return d;
 }
 
@@ -59,6 +70,8 @@ dfm_status dfm_world_create(dfm_context *context, const dfm_world_def *def, dfm_
     if (w->def.max_sweeps == 0 || w->def.max_passes == 0 || w->def.max_substeps == 0)
       fail(DFM_E_ARG, "max_sweeps, max_passes and max_substeps must be at least 1");
     check_max_time(w->def.max_time);
+    if (!(w->def.energy_watch >= 0 && std::isfinite(w->def.energy_watch)))
+      fail(DFM_E_ARG, "energy_watch is %g; it must be a share of the largest energy such as 0.01, or 0 (off)", w->def.energy_watch);
     if (w->def.sleep > 1) fail(DFM_E_ARG, "sleep is %u; it must be 0 (off) or 1 (on)", w->def.sleep);
     if (w->def.self_contact > 1) fail(DFM_E_ARG, "self_contact is %u; it must be 0 (off) or 1 (on)", w->def.self_contact);
     for (const double value : {w->def.sleep_speed, w->def.sleep_time})
@@ -132,6 +145,7 @@ dfm_status dfm_world_step(dfm_world world, double dt, uint32_t *trouble) {
   return guard([&]() -> dfm_status {
     World &w = idle(world_of(world));
     if (!(dt > 0 && std::isfinite(dt))) fail(DFM_E_ARG, "a step of %g s; it must be positive and finite", dt);
+    if (const double floor = shortest_step(w, dt); dt < floor) fail(DFM_E_ARG, "%s", short_step(dt, floor).c_str());
     uint32_t bits = 0;
     const dfm_status s = step_within_budget(w, dt, &bits);
     if (trouble) *trouble = bits;

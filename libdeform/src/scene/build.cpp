@@ -46,6 +46,7 @@ class Builder {
     w.contact_offset = def_.offset, w.contact_tolerance = def_.tolerance, w.sleep = def_.sleep, w.self_contact = def_.self;
     w.max_time = def_.max_time;
     w.max_work = def_.max_work < 1.8e19 ? static_cast<uint64_t>(def_.max_work) : UINT64_MAX;
+    w.energy_watch = def_.energy_watch;
     if (!def_.guard) w.flags |= DFM_WORLD_UNGUARDED;
     std::vector<const char *> effects;
     for (const std::string &e : def_.effects) effects.push_back(e.c_str());

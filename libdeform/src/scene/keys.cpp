@@ -51,7 +51,7 @@ const Table &objects() {
       {"joint", {{"type", true}, {"with", true}, {"anchor", true}, {"axis", true}, {"motor", true}}},
       {"motor", {{"velocity", true}, {"max", true}}},
       {"contact",
-       {{"method", true}, {"self", true}, {"untangle", true}, {"sleep", true}, {"tolerance", true}, {"offset", true}, {"guard", true},
+       {{"method", true}, {"self", true}, {"untangle", true}, {"sleep", true}, {"tolerance", true}, {"offset", true}, {"guard", true}, {"energy_watch", true},
         {"friction", true}, {"filter", true}}},
       {"friction", {{"between", true}, {"law", true}, {"params", true}}},
       {"filter", {{"between", true}, {"collide", true}}},

@@ -6,6 +6,7 @@
 #include <filesystem>
 
 #include "scene/keys.h"
+#include "world/step_sizes.h"
 
 namespace dfm::scene {
 
@@ -208,6 +209,7 @@ void read_time(const Node &scene, Definition &def) {
     if (step.text() != "auto") step.fail("expected a number of seconds or \"auto\", found \"%s\"", step.text().c_str());
   } else {
     def.step = step.number(kPositive);
+    if (def.step < kShortestStep) step.fail("%s", short_step(def.step, kShortestStep).c_str());
     if (def.duration / def.step > 1e12) step.fail("%g s at %g s a step are more than 1e12 steps", def.duration, def.step);
   }
   time.word("mode", "dynamic", "mode");
@@ -319,6 +321,11 @@ void read_contact(const Node &scene, Definition &def, const ReadContext &context
     contact.member("self").fail("\"self\" is false, but /effects asks for \"self_contact\"; take one of the two away");
   if (contact.boolean("untangle", false)) contact.member("untangle").not_yet();
   def.guard = contact.boolean("guard", true);
+  if (contact.has("energy_watch")) {
+    const Node watch = contact.member("energy_watch");
+    if (watch.value().is_boolean()) def.energy_watch = watch.value().get<bool>() ? def.energy_watch : 0;
+    else def.energy_watch = watch.number(kNotNegative);
+  }
   if (contact.has("tolerance")) def.tolerance = contact.member("tolerance").number(kPositive);
   if (contact.has("offset")) def.offset = contact.member("offset").number(kPositive);
   for (const Node &entry : contact.items("friction")) {

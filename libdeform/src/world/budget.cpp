@@ -88,10 +88,10 @@ template <class Stream>
 void changing(Stream &s, World &w) {
   const auto array = [&](auto &a) { s.array(a); };
   s.value(w.time), s.value(w.stable), s.value(w.inverted), s.value(w.bound_age), s.value(w.worst_body), s.value(w.worst_point);
-  s.value(w.gravity), s.value(w.step_count), s.value(w.sleepers);
+  s.value(w.gravity), s.value(w.step_count), s.value(w.sleepers), s.value(w.watch);
   for (auto &b : w.bodies) {
     s.array(b->p.x), s.array(b->p.v), s.array(b->model.state), s.array(b->surfel_impulse), s.array(b->lagged), s.array(b->anchor);
-    s.value(b->contact_impulse), s.value(b->slumber), s.value(b->bound);
+    s.value(b->contact_impulse), s.value(b->energy), s.value(b->slumber), s.value(b->bound);
   }
   for (auto &o : w.obstacles) s.value(o->pose), s.value(o->has_target);
   for (auto &set : w.rigid_sets) s.array(set->state), s.array(set->extra), s.array(set->total), s.array(set->impulse), s.value(set->last_h);

@@ -84,6 +84,7 @@ void set_model_params(Body &b, const dfm_params &params) {
   if (status != DFM_OK)
     fail(DFM_E_ARG, "body '%s': model '%s' refuses these parameters; the log says why", b.name.c_str(), type.id);
   b.model.params = std::move(values);
+  forget_energy(b);
   b.world->bound_age = kNone, b.world->changed = true;   // the plan names the effects that parameters call for
 }
 

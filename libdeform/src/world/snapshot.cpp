@@ -71,6 +71,7 @@ struct StagedBody {
   struct { Array<double> x, v, load; Array<uint8_t> held; } p;
   struct { Array<double> state; std::vector<double> params; } model;
   Vec3 contact_impulse;
+  EnergyBook energy;
   std::vector<Load> loads;
   std::vector<Spring> springs;
   std::vector<HeldMotion> motions;
@@ -87,6 +88,7 @@ struct Staged {
   uint32_t inverted = 0, sleepers = 0, bound_age = 0;
   bool holding = false;
   StepSizes sizes;
+  EnergyWatch watch;
   dfm_world_stats stats{};
   Vec3 gravity;
   dfm_world_def def{};
@@ -220,6 +222,9 @@ void body_fields(Stream &s, W &w, B &b, const Body &like) {
   s.array("model parameters", b.model.params, like.model.params.size(), must::finite);
   s.must_hold("model parameters", "values in the range of the model's table", [&] { return in_range(*like.model.type, b.model.params); });
   s.value("contact_impulse", b.contact_impulse, must::finite);
+  s.value("energy known", b.energy.known, must::at_most(1)), s.value("least energy", b.energy.base, must::finite);
+  s.value("booked work", b.energy.work, must::finite), s.value("kinetic energy", b.energy.kinetic, must::finite);
+  s.must_hold("energy known", "what the energy watch writes", [&] { return sound(b.energy); });
   s.value("category", b.category, must::any), s.value("collides_with", b.collides_with, must::any);
   s.value("asleep", b.slumber.asleep, must::flag), s.value("calm", b.slumber.calm, must::not_negative);
   s.value("asleep since", b.slumber.since, must::not_negative), s.value("sub-step asleep", b.slumber.h, must::not_negative);
@@ -272,6 +277,8 @@ void fields(Stream &s, W &w, const World &like) {
   for (auto *r : {&w.sizes.cut, &w.sizes.offer})
     s.value("step size", r->size, must::not_negative), s.value("calm of the size", r->calm, must::any), s.value("patience", r->patience, must::any);
   s.must_hold("step size", "sizes that the library chooses", [&] { return sound(w.sizes); });
+  s.value("age of the energies", w.watch.age, must::any), s.value("last sub-step", w.watch.last_h, must::not_negative);
+  s.must_hold("last sub-step", "what the energy watch writes", [&] { return sound(w.watch); });
   s.value("contact offset", w.offset, must::positive);
   s.value("hold start", w.hold_start, must::finite), s.value("holding", w.holding, must::flag);
   s.value("statistics", w.stats, must::Be{[](const dfm_world_stats &x) { return good_stats(x); }, "finite statistics"});
@@ -452,7 +459,7 @@ void exchange(World &w, Staged &t) noexcept {
     b.p.x.swap(other.p.x), b.p.v.swap(other.p.v), b.p.load.swap(other.p.load), b.p.held.swap(other.p.held);
     b.model.state.swap(other.model.state), b.model.params.swap(other.model.params);
     b.loads.swap(other.loads), b.springs.swap(other.springs), b.motions.swap(other.motions);
-    std::swap(b.contact_impulse, other.contact_impulse), std::swap(b.next_load, other.next_load);
+    std::swap(b.contact_impulse, other.contact_impulse), std::swap(b.energy, other.energy), std::swap(b.next_load, other.next_load);
     std::swap(b.category, other.category), std::swap(b.collides_with, other.collides_with);
     std::swap(b.slumber, other.slumber), b.bound.known = false;
     b.anchor.swap(other.anchor), b.lagged.swap(other.lagged);
@@ -475,7 +482,7 @@ void exchange(World &w, Staged &t) noexcept {
   std::swap(w.def.gravity, t.def.gravity), std::swap(w.def.sleep, t.def.sleep);
   std::swap(w.store, t.store), std::swap(w.report, t.report), std::swap(w.stats, t.stats);
   std::swap(w.time, t.time), std::swap(w.step_count, t.step_count), std::swap(w.next_id, t.next_id);
-  std::swap(w.hold_start, t.hold_start), std::swap(w.holding, t.holding), std::swap(w.sizes, t.sizes);
+  std::swap(w.hold_start, t.hold_start), std::swap(w.holding, t.holding), std::swap(w.sizes, t.sizes), std::swap(w.watch, t.watch);
   w.worst_body = nullptr, w.worst_point = 0;
   w.guard.forget();
 }

@@ -77,7 +77,7 @@ bool run_stage(World &w, StageId id, uint32_t *trouble) {
   switch (id) {
     case StageId::motion: w.stage_motion(); return true;
     case StageId::model: return w.stage_model(trouble);
-    case StageId::predict: return w.stage_predict(trouble);
+    case StageId::predict: return w.stage_predict(trouble) && watch_energy(w, trouble);
     case StageId::gather: w.stage_gather(); return true;
     case StageId::broad: w.stage_broad(); return true;
     case StageId::narrow: return w.stage_narrow(trouble);
@@ -350,7 +350,7 @@ bool World::stage_predict(uint32_t *trouble) {
         }
         if (b.surface.identity()) gather_surface(b.surface, b.p.x.data(), nullptr);
       } else {
-        good = predict(b.p, gravity, h);
+        good = predict(b.p, gravity, h, &free_kinetic[i]);
         if (touches && b.surface.identity()) gather_surface(b.surface, b.p.x.data(), b.p.v_free.data());
       }
       if (!good) failed.note(i);
@@ -423,6 +423,7 @@ bool World::stage_commit(uint32_t *trouble) {
   guard.stepped = false;
   const double way = h * guard.motion;   // the guard may leave some of it out
   const bool touched = plan.touches() && !plan.rolls_back() && rows.n > 0;
+  book_energy(*this, guard.motion);
   context->tasks.parallel_for(static_cast<uint32_t>(active.size()), 1, [&](uint32_t begin, uint32_t end) {
     for (const uint32_t i : std::span(active).subspan(begin, end - begin)) {
       Body &b = *bodies[i];

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/error.h"
+
 namespace dfm {
 namespace {
 
@@ -81,5 +83,10 @@ double cut_finer(StepSizes &s, double size, double stable) {
 void pass(StepSizes &s) { pass(s.cut), pass(s.offer); }
 
 bool sound(const StepSizes &s) { return sound(s.cut) && sound(s.offer); }
+
+std::string short_step(double dt, double floor) {
+  return format("a step of %g s is below the floor of %g s (1 ns for each meter from the origin, at least one meter): positions are numbers of 16 digits, and "
+                "over such a step their rounding is more than contact may err; take a longer step", dt, floor);
+}
 
 }  // namespace dfm

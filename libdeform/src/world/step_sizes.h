@@ -6,10 +6,15 @@
 // 7 times a power of two seconds, the size goes down at once where the bound asks for it, and up only after patience that doubles each time.
 #pragma once
 #include <cstdint>
+#include <string>
 
 namespace dfm {
 
 inline constexpr uint32_t kFirstPatience = 256, kMostPatience = 65536;   // sub-steps
+
+// A step over which positions, numbers of 16 digits, round by more than a quarter of what contact may err (1e-6 m/s) is refused: 1 ns for each meter
+// that a body is away from the origin, and for the first one.
+inline constexpr double kShortestStep = 1e-9;   // s
 
 struct Rung {
   double size = 0;                       // s; 0: none yet
@@ -29,5 +34,7 @@ double choose_pieces(StepSizes &s, double dt, double stable);         // number 
 double cut_finer(StepSizes &s, double size, double stable);           // in mid-step, where the bound has fallen below size: into how many each one is cut
 void pass(StepSizes &s);                                              // a sub-step has been taken
 bool sound(const StepSizes &s);                                       // could a world have come to it?
+
+std::string short_step(double dt, double floor);                      // the sentence that refuses it
 
 }  // namespace dfm

@@ -37,7 +37,7 @@ World::World(dfm_context *c)
   GuardMemory &known = guard.memory;
   use_memory(m, known.runs, known.old_runs, known.features, known.old_features, known.rest, known.old_rest, known.normal, known.old_normal);
   for (Report *r : {&report, &last_report}) use_memory(m, r->contacts, r->frame, r->impulse, r->slip, r->mode);
-  use_memory(m, active, woken, stirred, step_impulses.pairs);
+  use_memory(m, active, woken, stirred, free_kinetic, step_impulses.pairs);
   use_memory(m, guard.near, guard.hits, guard.speed, guard.change, guard.kept);
   use_memory(m, state.law, state.fn, state.vt, state.ft_stop, state.area, state.dwell, state.bristle, state.ft, state.dft_dvt, state.dft_dfn, state.limit,
              state.bristle_out, state.mode, state.set_valued);
@@ -201,7 +201,9 @@ void World::prepare(const RestoredChoice *restored) {
   gravity = load3(def.gravity);
   if (!gravity_keys.empty()) gravity = vector_at(gravity_keys, time);
   bound_age = kNone;
-  if (restored) gravity = restored->gravity, stable = restored->stable, inverted = restored->inverted, bound_age = restored->bound_age;
+  free_kinetic.resize(nb);
+  if (!restored) forget_energy(*this);
+  else gravity = restored->gravity, stable = restored->stable, inverted = restored->inverted, bound_age = restored->bound_age;
   guard.forget();
   changed = false;
 }

@@ -25,6 +25,7 @@
 #include "surfel/voxel_grid.h"
 #include "surfel/zones.h"
 #include "world/budget.h"
+#include "world/energy_watch.h"
 #include "world/guard.h"
 #include "world/islands.h"
 #include "world/motion.h"
@@ -94,6 +95,7 @@ struct Body {
   std::vector<HeldMotion> motions;
   uint32_t next_load = 1;            // number of the next load or spring
   Vec3 contact_impulse;              // N s since creation
+  EnergyBook energy;
   Array<double> surfel_impulse;      // [nsurfel,3] N s of the last sub-step
   Array<double> lagged;              // [n,4] N, friction for the next sub-step; empty where the method is not rollback
   Array<double> ksum, csum;          // [n] row sums of the step bound
@@ -174,6 +176,8 @@ struct World {
   // Time.
   double time = 0, stable = 0;                         // s; stable: 0.9 of the bound at its last evaluation
   StepSizes sizes;
+  EnergyWatch watch;
+  Array<double> free_kinetic;                           // [bodies] J, without contact; of this sub-step
   uint64_t step_count = 0;
   Body *worst_body = nullptr;
   uint32_t inverted = 0;                               // cells inside out at the last evaluation of the bound

@@ -1,0 +1,160 @@
+#include "world/energy_watch.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "core/error.h"
+#include "world/world.h"
+
+namespace dfm {
+namespace {
+
+// An energy costs about as much as two sub-steps.
+constexpr uint32_t kEvery = 512;
+constexpr double kRounding = 1e-12;       // of the sums that a balance is the difference of
+constexpr double kPositionDigits = 8 * 2.3e-16;
+
+bool watching(const World &w) { return w.def.energy_watch > 0 && !w.plan.rolls_back(); }
+bool watched(const Body &b) { return !b.model.stepper && (b.model.ops->caps & DFM_CAP_ENERGY) && b.model.ops->energy; }
+// Loads that change from sub-step to sub-step have no potential: their work is booked as it is done.
+bool books_loads(const Body &b) { return b.loads_vary(); }
+bool books_gravity(const World &w) { return !w.gravity_keys.empty(); }
+
+struct Look {
+  double kinetic = 0, elastic = 0, balance = 0, gives_back = 0, rounding = 0;   // J
+};
+
+// What holders of driven points do, by the trapezoid of the force: the force at the start of this sub-step counts for half of the way of the one before,
+// and, where `now`, for half of this one's.
+double work_of_holders(const World &w, const Body &b, bool now) {
+  double sum = 0;
+  for (const World::Driven &d : w.driven) {
+    if (d.velocity < b.p.v.data() || d.velocity >= b.p.v.data() + b.p.v.size()) continue;
+    const size_t at = size_t(d.velocity - b.p.v.data());
+    const double force = b.p.f[at] + b.p.mass[at / kStride] * w.gravity[int(at % kStride)];
+    sum -= 0.5 * force * (w.watch.last_h * d.before + (now ? w.h * *d.velocity : 0));
+  }
+  return sum;
+}
+
+// The energy that the scheme keeps, U(x) - F.x + v.M v_free / 2, and a third of the energy of the kick, by which it may rise as stiff modes calm down.
+bool look(World &w, Body &b, Look &out) {
+  const Phyxels &p = b.p;
+  const bool load_booked = books_loads(b), gravity_booked = books_gravity(w);
+  double kinetic = 0, cross = 0, kick = 0, potential = 0, reach = 0;
+  for (uint32_t i = 0; i < p.n; ++i) {
+    const size_t at = size_t(i) * kStride;
+    const double m = p.mass[i];
+    for (size_t k = 0; k < 3; ++k) {
+      const double x = p.x[at + k], v = p.v[at + k], weight = m * w.gravity[int(k)], load = p.load[at + k];
+      reach = std::max(reach, std::fabs(x));
+      const double kept = (load_booked ? 0 : load) + (gravity_booked ? 0 : weight), booked = (load_booked ? load : 0) + (gravity_booked ? weight : 0);
+      potential -= kept * x;
+      if (!(p.inv_mass[at + k] > 0)) continue;
+      const double change = p.v_free[at + k] - v;
+      kinetic += 0.5 * (m * v * v), kick += 0.5 * (m * change * change);
+      cross += 0.5 * v * (m * p.v_free[at + k] - w.h * booked);
+    }
+  }
+  double elastic = 0;
+  const dfm_kin kin = b.kin(w.time, 0, nullptr);
+  if (b.model.call("energy", [&] { return b.model.ops->energy(b.model.self, &kin, &elastic); }) != DFM_OK) return false;
+  const double drift = kPositionDigits * reach / w.h;
+  out = {kinetic, elastic, elastic + potential + cross - (b.energy.work + work_of_holders(w, b, false)), kick / 3,
+         kRounding * (std::fabs(b.energy.work) + std::fabs(potential) + kinetic + elastic) + b.mass * drift * drift};
+  return true;
+}
+
+void book_contact(World &w) {
+  for (uint32_t d = 0; d < w.rows.ndof; ++d) {
+    if (w.rows.source[d] == kNone) continue;
+    Body &b = *w.bodies[w.rows.source[d]];
+    if (b.model.stepper) continue;
+    const size_t at = size_t(w.rows.point[d]) * kStride;
+    double sum = 0;
+    for (size_t k = 0; k < 3; ++k) {
+      const double p = b.p.impulse[at + k], inverse = b.p.inv_mass[at + k];
+      if (inverse > 0) sum += 0.5 * p * (b.p.v[at + k] + (b.p.v_free[at + k] + inverse * p));
+    }
+    b.energy.work += sum;
+  }
+}
+
+// Loads without a potential; and, where the guard left out a part of the way, what the inner forces would have done on it.
+void book_body(World &w, Body &b, bool touched, double motion) {
+  const bool load_booked = books_loads(b), gravity_booked = books_gravity(w);
+  const Phyxels &p = b.p;
+  double sum = 0;
+  for (uint32_t i = 0; i < p.n; ++i)
+    for (size_t k = 0, at = size_t(i) * kStride; k < 3; ++k, ++at) {
+      if (!(p.inv_mass[at] > 0)) continue;
+      const double weight = p.mass[i] * w.gravity[int(k)], end = p.v_free[at] + (touched ? p.inv_mass[at] * p.impulse[at] : 0);
+      const double booked = (load_booked ? p.load[at] : 0) + (gravity_booked ? weight : 0);
+      sum += w.h * booked * 0.5 * (p.v[at] + end);
+      if (motion < 1) sum += (1 - motion) * w.h * end * (p.f[at] + weight - booked);
+    }
+  b.energy.work += sum;
+}
+
+}  // namespace
+
+bool watch_energy(World &w, uint32_t *trouble) {
+  if (!watching(w) || w.guard.planned != w.h) return true;   // pieces of a sub-step are not compared with whole ones
+  const double limit = w.def.energy_watch * w.stats.energy_max;
+  bool due = w.watch.age >= kEvery;
+  for (const uint32_t i : w.active) due = due || (watched(*w.bodies[i]) && w.free_kinetic[i] > 2 * w.bodies[i]->energy.kinetic + limit);
+  if (!due) return true;
+  double total = 0, gain = 0, most = 0;
+  const Body *worst = nullptr;
+  for (const uint32_t i : w.active) {
+    Body &b = *w.bodies[i];
+    Look now;
+    if (!watched(b) || !look(w, b, now)) continue;
+    EnergyBook &e = b.energy;
+    total += now.kinetic + now.elastic;
+    const double rise = now.balance - e.base - now.rounding;
+    if (e.known && rise > 0) gain += rise;
+    if (e.known && rise > most) most = rise, worst = &b;
+    e.base = e.known ? std::min(e.base, now.balance + now.gives_back) : now.balance + now.gives_back;
+    e.known = 1, e.kinetic = now.kinetic;
+  }
+  dfm_world_stats &s = w.stats;
+  if (w.watch.age == ~0u) s.energy_start = total;
+  w.watch.age = 0;
+  if (worst && most > w.def.energy_watch * std::max(s.energy_max, total - most)) {
+    s.energy_gain = std::max(s.energy_gain, gain);
+    *trouble |= DFM_TROUBLE_ENERGY;
+    w.watch.age = kEvery;   // the next step is asked again
+    set_last_error(format("step %llu, body '%s': its energy has grown by %.3g J beyond what loads, motions and contact have put in (limit: %g %% of %.3g J, the largest "
+                          "energy so far); take a shorter step, or give the material stiffness damping (energy_watch sets the limit, 0 switches the watch off)",
+                          static_cast<unsigned long long>(w.step_count), worst->name.c_str(), most, 100 * w.def.energy_watch, s.energy_max).c_str());
+    return false;
+  }
+  s.energy_max = std::max(s.energy_max, total), s.energy_gain = std::max(s.energy_gain, gain);
+  return true;
+}
+
+void book_energy(World &w, double motion) {
+  if (!watching(w)) return;
+  const bool touched = w.plan.touches() && w.rows.n > 0;
+  if (touched) book_contact(w);
+  for (const uint32_t i : w.active) {
+    Body &b = *w.bodies[i];
+    if (!w.driven.empty()) b.energy.work += work_of_holders(w, b, true);
+    if (!b.model.stepper && (motion < 1 || books_loads(b) || books_gravity(w))) book_body(w, b, touched, motion);
+  }
+  w.watch.last_h = motion * w.h;
+  w.watch.age += w.watch.age < kEvery;
+}
+
+void forget_energy(Body &b) { b.energy = {}; }
+
+void forget_energy(World &w) {
+  for (auto &b : w.bodies) forget_energy(*b);
+}
+
+bool sound(const EnergyBook &e) { return e.known <= 1 && std::isfinite(e.base) && std::isfinite(e.work) && e.kinetic >= 0 && std::isfinite(e.kinetic); }
+
+bool sound(const EnergyWatch &e) { return (e.age <= kEvery || e.age == ~0u) && e.last_h >= 0 && std::isfinite(e.last_h); }
+
+}  // namespace dfm

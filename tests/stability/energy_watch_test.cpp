@@ -1,0 +1,160 @@
+// The energy watch: a run that gains energy out of nothing ends early and says so; work that is really done is no gain.
+#include <random>
+
+#include "step_energy.h"
+#include "support.h"
+
+using namespace test::step_energy;
+
+namespace {
+
+const std::string kBar = DEFORM_SOURCE_DIR "/examples/data/bar.msh";
+
+struct Shaken {
+  test::Context context;
+  Setting s;
+  std::mt19937 random{1};
+  double stable = 0;
+  Shaken() : s(make(context, {"bar", kBar, "wrung", 1})) { test::ok(dfm_world_stable_step(s.world, &stable, nullptr, nullptr)); }
+  // A step of random length: each is stable, their sequence pumps.
+  dfm_status step(uint32_t *trouble) { return dfm_world_step(s.world, stable * (0.8 + 0.2 * double(random()) / 4294967296.0), trouble); }
+};
+
+}  // namespace
+
+TEST(EnergyWatch, StepsOfRandomLength_EndBeforeTheEnergyHasGrownByATenth) {
+  Shaken b;
+  uint32_t trouble = 0;
+  dfm_status status = DFM_OK;
+  int i = 0;
+  for (; i < 20000 && status == DFM_OK; ++i) status = b.step(&trouble);
+  ASSERT_EQ(status, DFM_E_DIVERGED) << i;
+  EXPECT_TRUE(trouble & DFM_TROUBLE_ENERGY);
+  const std::string why = dfm_last_error();
+  for (const char *word : {"body1", "step", "energy", "limit: 1 %", "shorter step"}) EXPECT_NE(why.find(word), std::string::npos) << why;
+  const dfm_world_stats stats = test::stats(b.s.world);
+  EXPECT_GT(stats.energy_gain, 0.01 * stats.energy_max);
+  const dfm_body_measure m = test::measure(b.s.body);
+  EXPECT_LT(m.kinetic + m.elastic, 1.2 * stats.energy_max) << "the state is a good one";
+  const uint64_t hash = dfm_world_hash(b.s.world);
+  EXPECT_EQ(b.step(nullptr), DFM_E_DIVERGED) << "the cause is still there";
+  EXPECT_EQ(dfm_world_hash(b.s.world), hash);
+  test::set_velocity(b.s.body, {0, 0, 0});
+  EXPECT_EQ(dfm_world_step(b.s.world, 0.5 * b.stable, nullptr), DFM_OK) << "a new state is a new beginning";
+}
+
+TEST(EnergyWatch, SwitchedOff_StopsNothing) {
+  test::Context context;
+  dfm_world_def d = dfm_world_def_default();
+  EXPECT_EQ(d.energy_watch, 0.01);
+  dfm_world w = 0;
+  for (const double bad : {-1.0, double(NAN), HUGE_VAL}) {
+    d.energy_watch = bad;
+    EXPECT_EQ(dfm_world_create(context, &d, &w), DFM_E_ARG);
+  }
+  d.energy_watch = 0, d.gravity[2] = 0;
+  test::ok(dfm_world_create(context, &d, &w));
+  test::BodyOptions o;
+  o.spin = {0, 0, 40};
+  test::make_body(context, w, "beam", {0.2, 0.05, 0.05}, 60, o);
+  double stable = 0;
+  test::ok(dfm_world_stable_step(w, &stable, nullptr, nullptr));
+  std::mt19937 random(1);
+  for (int i = 0; i < 4000; ++i) ASSERT_EQ(dfm_world_step(w, stable * (0.8 + 0.2 * double(random()) / 4294967296.0), nullptr), DFM_OK);
+  EXPECT_EQ(test::stats(w).energy_gain, 0);
+}
+
+// Held points that are shaken, a load and a gravity that vary, a spring, an obstacle that strikes from below: all put energy in and take it out.
+TEST(EnergyWatch, WorkThatIsDone_IsNoGain) {
+  test::Context context;
+  for (int what = 0; what < 5; ++what) {
+    const dfm_world w = test::make_world(context, {0, 0, what == 4 ? -9.81 : 0.0});
+    test::BodyOptions o;
+    o.position = {0, 0, what == 4 ? 0.05 : 0};
+    const dfm_body b = test::make_body(context, w, "beam", {0.3, 0.06, 0.06}, 150, o);
+    uint32_t n = 0;
+    test::ok(dfm_body_get_state(b, 0, nullptr, nullptr, &n));
+    std::vector<double> x(3 * size_t(n));
+    test::ok(dfm_body_get_state(b, n, x.data(), nullptr, &n));
+    std::vector<uint32_t> end;
+    for (uint32_t i = 0; i < n; ++i)
+      if (x[3 * i] < *std::min_element(x.begin(), x.end()) + 0.02) end.push_back(i);
+    if (what == 0) {
+      test::ok(dfm_body_hold(b, uint32_t(end.size()), end.data(), 7));
+      const dfm_sine sine{{0, 0, 0.01}, 11, 0};
+      test::ok(dfm_body_move_held(b, uint32_t(end.size()), end.data(), 0, nullptr, &sine));
+    } else if (what == 1) {
+      std::vector<double> force(3 * end.size(), 0.0);
+      for (size_t i = 2; i < force.size(); i += 3) force[i] = 0.02;
+      const dfm_sine sine{{50, 0, 0}, 13, 0};
+      test::ok(dfm_body_add_load(b, uint32_t(end.size()), end.data(), force.data(), 0, nullptr, &sine, nullptr));
+    } else if (what == 2) {
+      const dfm_vector_key keys[] = {{0, {0, 0, 0}}, {0.1, {0, 3, 20}}, {0.2, {0, -3, -20}}, {0.5, {0, 0, 5}}};
+      test::ok(dfm_world_set_gravity_keys(w, 4, keys));
+    } else if (what == 3) {
+      dfm_spring_def d{};
+      d.size = sizeof d, d.npoint = uint32_t(end.size()), d.points = end.data(), d.to[2] = 0.1, d.stiffness = 100;
+      test::ok(dfm_body_add_spring(b, &d, nullptr));
+    } else {
+      dfm_obstacle_def d = dfm_obstacle_def_default();
+      d.name = "anvil", d.shape = DFM_SHAPE_PLANE;
+      d.sine = {{0, 0, 0.02}, 5, 0};
+      dfm_obstacle obstacle = 0;
+      test::ok(dfm_obstacle_create(w, &d, &obstacle));
+      test::set_friction(w, 0, "none");
+    }
+    for (int i = 0; i < 500; ++i) ASSERT_EQ(dfm_world_step(w, 1e-3, nullptr), DFM_OK) << what << ": " << dfm_last_error();
+    const dfm_world_stats s = test::stats(w);
+    EXPECT_GT(s.energy_max, 1e-5) << what;
+    EXPECT_LT(s.energy_gain, 1e-3 * s.energy_max) << what;
+    test::ok(dfm_world_destroy(w));
+  }
+}
+
+TEST(EnergyWatch, OfAScene_IsReadAndReported) {
+  const std::string out = test::scratch("energy_watch"), scene = out + "/scene.json";
+  const std::string text = R"({"format": "deform-scene", "version": 1, "time": {"duration": 0.02, "step": "auto"}, "gravity": [0, 0, 0],
+    "bodies": [{"name": "bar", "mesh": ")" + kBar + R"(", "spin": [0, 0, 9]}], "output": {"every": 0.01}})";
+  test::write_file(scene, text);
+  const test::CommandResult r = test::deform({"run", scene, "--out", out + "/run", "--quiet"});
+  EXPECT_EQ(r.exit_code, 0) << r.err;
+  const std::string summary = test::read_file(out + "/run/summary.json");
+  for (const char *key : {"\"energy\"", "\"start_J\"", "\"max_J\"", "\"gain_J\""}) EXPECT_NE(summary.find(key), std::string::npos) << key;
+  for (const char *good : {"0.05", "false", "true", "0"})
+    EXPECT_EQ(test::deform({"run", scene, "--time", "0.001", "--out", out + "/run", "--quiet", "--set", std::string("/contact/energy_watch=") + good})
+                  .exit_code, 0) << good;
+  for (const char *bad : {"-1", "often"}) {
+    const test::CommandResult no =
+        test::deform({"run", scene, "--out", out + "/run", "--quiet", "--set", std::string("/contact/energy_watch=") + bad});
+    EXPECT_EQ(no.exit_code, 2);
+    EXPECT_NE(no.err.find("/contact/energy_watch"), std::string::npos) << no.err;
+  }
+}
+
+// Forces of 940 N were reported at 1e-12 s, of 7e8 N at 1e-15 s.
+TEST(ShortStep, BelowTheFloor_IsRefusedWithASentence) {
+  test::Context context;
+  const dfm_world w = test::make_world(context);
+  const dfm_body b = test::make_body(context, w, "beam", {0.1, 0.1, 0.1}, 60, {});
+  const uint64_t hash = dfm_world_hash(w);
+  for (const double dt : {1e-15, 1e-12, 0.99e-9}) {
+    EXPECT_EQ(dfm_world_step(w, dt, nullptr), DFM_E_ARG) << dt;
+    EXPECT_NE(std::string(dfm_last_error()).find("take a longer step"), std::string::npos) << dfm_last_error();
+  }
+  EXPECT_EQ(dfm_world_hash(w), hash);
+  EXPECT_EQ(dfm_world_step(w, 1e-9, nullptr), DFM_OK);
+  uint32_t n = 0;
+  test::ok(dfm_body_get_state(b, 0, nullptr, nullptr, &n));
+  std::vector<double> x(3 * size_t(n));
+  test::ok(dfm_body_get_state(b, n, x.data(), nullptr, &n));
+  for (size_t i = 0; i < x.size(); i += 3) x[i] += 50;
+  test::ok(dfm_body_set_state(b, n, x.data(), nullptr));
+  EXPECT_EQ(dfm_world_step(w, 1e-8, nullptr), DFM_E_ARG) << "50 m away positions round 50 times as much";
+  EXPECT_EQ(dfm_world_step(w, 1e-7, nullptr), DFM_OK);
+  const std::string out = test::scratch("short_step"), scene = out + "/scene.json";
+  test::write_file(scene, R"({"format": "deform-scene", "version": 1, "time": {"duration": 1e-9, "step": 1e-12},
+    "bodies": [{"name": "bar", "mesh": ")" + kBar + "\"}]}");
+  const test::CommandResult r = test::deform({"explain", scene});
+  EXPECT_EQ(r.exit_code, 2);
+  EXPECT_NE(r.err.find("/time/step"), std::string::npos) << r.err;
+}
