@@ -77,6 +77,7 @@ class Runner {
 
   void run() {
     result_.start = result_.simulated = dfm_world_time(world_);
+    count_overlaps();
     outputs(true);
     mark_ = {wall_seconds(), cpu_seconds()};
     while (!interrupted && !result_.stopped && advance()) outputs(false);
@@ -198,6 +199,13 @@ class Runner {
   void count_time() {
     result_.wall += wall_seconds() - mark_.wall, result_.cpu += cpu_seconds() - mark_.cpu;
     mark_ = {wall_seconds(), cpu_seconds()};
+  }
+
+  void count_overlaps() {
+    need(dfm_world_overlaps(world_, 0, nullptr, &result_.overlaps));
+    std::vector<dfm_overlap> found(result_.overlaps);
+    if (!found.empty()) need(dfm_world_overlaps(world_, result_.overlaps, found.data(), nullptr));
+    for (const dfm_overlap &o : found) result_.untangled += (o.flags & DFM_OVERLAP_SEPARATED) != 0;
   }
 
   void end_hold() {

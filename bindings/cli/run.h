@@ -33,6 +33,7 @@ class StepTimes {
 
 struct RunResult {
   uint64_t steps = 0;
+  uint32_t overlaps = 0, untangled = 0;   // pairs that were through each other at the start; those that were put apart
   double start = 0, simulated = 0, wall = 0, cpu = 0;  // s; wall and cpu are of the steps, without outputs and checks
   StepTimes times;
   std::string impulses = "{}";   // JSON, Impulses::json()

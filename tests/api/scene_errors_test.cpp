@@ -155,7 +155,6 @@ TEST(SceneErrors, NotDelivered_IsNeverIgnored) {
       {"/time/integrator=\"verlet\"", "/time/integrator"},
       {"/time/integrator=\"implicit_euler\"", "/time/integrator"},
       {"/contact/method=\"implicit\"", "/contact/method"},
-      {"/contact/untangle=true", "/contact/untangle"},
       {"/output/color=\"stress\"", "/output/color"},
       {"/bodies/0/start={\"invert\":true}", "/bodies/0/start"},
       {"/bodies/0/switch=[{\"t\":1}]", "/bodies/0/switch"},
@@ -225,10 +224,10 @@ TEST(SceneApi, ErrorsLeaveNothingBehind) {
   EXPECT_EQ(dfm_scene_open(nullptr, scene().c_str(), nullptr, &s), DFM_E_ARG);
   EXPECT_EQ(s, 77u);
   EXPECT_EQ(w, 77u);
-  const char *set[] = {"/contact/untangle=true"};
+  const char *set[] = {"/time/mode=\"static\""};
   dfm_scene_options options = {sizeof options, 1, set, 0};
   EXPECT_EQ(dfm_scene_open(context, scene().c_str(), &options, &s), DFM_E_UNSUPPORTED);
-  EXPECT_NE(std::string(dfm_last_error()).find("not available yet: /contact/untangle"), std::string::npos);
+  EXPECT_NE(std::string(dfm_last_error()).find("not available yet: /time/mode"), std::string::npos);
 }
 
 TEST(SceneErrors, SelfContactAskedForAndRefused_SaysSo) {

@@ -331,6 +331,7 @@ class Obstacle : public Handle<dfm_obstacle> {
     return produce<E, dfm_obstacle_def>([&](dfm_obstacle_def &d) { return d.size = sizeof d, dfm_obstacle_get_def(raw_, &d); });
   }
   auto move_to(const dfm_pose &pose) const { return E::done(dfm_obstacle_move_to(raw_, &pose)); }
+  auto teleport(const dfm_pose &pose) const { return E::done(dfm_obstacle_teleport(raw_, &pose)); }
 };
 
 // Converts to Obstacle: poses, pair rules and reports take it.
@@ -431,12 +432,16 @@ class World : public Handle<dfm_world> {
   auto pairs(std::span<dfm_pair_report> out) const { return fill<E, 1>(dfm_world_pairs, raw_, out); }
   auto events(std::span<dfm_contact_event> out) const { return fill<E, 1>(dfm_world_events, raw_, out); }
   auto profile(std::span<dfm_stage_time> out) const { return fill<E, 1>(dfm_world_profile, raw_, out); }
+  auto overlaps(std::span<dfm_overlap> out) const { return fill<E, 1>(dfm_world_overlaps, raw_, out); }
   auto contacts() const { return collect<E, 1>(dfm_world_contacts, raw_); }
   auto pairs() const { return collect<E, 1>(dfm_world_pairs, raw_); }
   auto pair_impulses(std::span<dfm_pair_impulse> out) const { return fill<E, 1>(dfm_world_pair_impulses, raw_, out); }
   auto pair_impulses() const { return collect<E, 1>(dfm_world_pair_impulses, raw_); }
   auto events() const { return collect<E, 1>(dfm_world_events, raw_); }
   auto profile() const { return collect<E, 1>(dfm_world_profile, raw_); }
+  auto overlaps() const { return collect<E, 1>(dfm_world_overlaps, raw_); }
+  auto untangle() const { return produce<E, uint32_t>([&](uint32_t &left) { return dfm_world_untangle(raw_, &left); }); }   // pairs that overlap still
+  auto find_overlaps() const { return produce<E, uint32_t>([&](uint32_t &n) { return dfm_world_find_overlaps(raw_, &n); }); }
   auto stats() const {
     return produce<E, dfm_world_stats>([&](dfm_world_stats &s) { return s.size = sizeof s, dfm_world_get_stats(raw_, &s); });
   }

@@ -42,8 +42,12 @@ DFM_API dfm_status dfm_obstacle_destroy(dfm_obstacle obstacle);
 DFM_API dfm_status dfm_obstacle_get_pose(dfm_obstacle obstacle, dfm_pose *out);
 /** Its def as created (name, points and triangles valid while it lives; keys are not returned). Threads: Any thread. Not during step. Since 0.1. */
 DFM_API dfm_status dfm_obstacle_get_def(dfm_obstacle obstacle, dfm_obstacle_def *out);
-/** Pose at the end of the next step; its surface moves there at constant rate. Replaces keys. Threads: Not during step. Since 0.1. */
+/** Pose at the end of the next step; its surface moves there at constant rate. Replaces keys. A step in which it would move faster than
+ * dfm_world_def.obstacle_speed is refused with DFM_E_ARG, and nothing changes: take more steps, or teleport. Threads: Not during step. Since 0.1. */
 DFM_API dfm_status dfm_obstacle_move_to(dfm_obstacle obstacle, const dfm_pose *pose);
+/** Puts it there now, without a motion: nothing is pushed or dragged on the way. Replaces keys, sine and target. What it lies in then overlaps, and is
+ * found as after creation (dfm_world_overlaps). Threads: Not during step. Since 0.1. */
+DFM_API dfm_status dfm_obstacle_teleport(dfm_obstacle obstacle, const dfm_pose *pose);
 #ifdef __cplusplus
 }
 #endif

@@ -12,7 +12,8 @@ extern "C" {
 enum { DFM_METHOD_AUTO = 0, DFM_METHOD_VELOCITY = 1, DFM_METHOD_ROLLBACK = 3 };
 enum { DFM_INTEGRATOR_AUTO = 0, DFM_INTEGRATOR_SYMPLECTIC_EULER = 1 };
 
-enum { DFM_WORLD_UNGUARDED = 1 };   /* dfm_world_def.flags: without the guard against crossing (concepts/guard.md), to see what it does */
+enum { DFM_WORLD_UNGUARDED = 1,   /* dfm_world_def.flags: without the guard against crossing (concepts/guard.md), to see what it does */
+       DFM_WORLD_UNTANGLE = 2 };    /* what overlaps when it is made or put somewhere is moved apart before the next step (concepts/overlaps.md) */
 typedef struct dfm_world_def {
   uint32_t size, flags;
   double gravity[3];            /* m/s2 */
@@ -34,6 +35,9 @@ typedef struct dfm_world_def {
                                    the step costs with nothing in contact; UINT64_MAX: any */
   double energy_watch;          /* 0.01: a step stops where a body has gained more than this share of the largest energy so far beyond what loads, motions and
                                    contact have put into it (doc/concepts/energy_watch.md); 0: never */
+  double recovery_speed;        /* m/s, at most, at which contact opens a depth; 0: a tenth of d_c per sub-step. What comes free keeps it, soft
+                                   bodies up to twice of it: 2 m v^2 at most (doc/concepts/contact.md) */
+  double obstacle_speed;        /* m/s: an obstacle that is told to move faster is refused; 0: 200 */
 } dfm_world_def;
 
 /** Gravity (0,0,-9.81), everything automatic. Threads: Any thread. Since 0.1. */
@@ -60,6 +64,8 @@ enum {
   DFM_TROUBLE_NONFINITE = 4,     /* a plugin or a load made a NaN: the last good sub-step is kept (status DFM_E_DIVERGED) */
   DFM_TROUBLE_INVERTED = 8,      /* a cell is inside out (looked for when the step bound is asked): refine, soften the load */
   DFM_TROUBLE_PLUGIN = 16,       /* a plugin failed: see the log */
+  DFM_TROUBLE_OVERLAP = 32,      /* told once, by the step after something was made or put inside something else: dfm_world_overlaps lists the pairs; move
+                                    one of each (doc/concepts/overlaps.md) */
   DFM_TROUBLE_ENERGY = 64,       /* a body gains energy that nobody gave it (status DFM_E_DIVERGED): shorten the step, or add stiffness damping */
   DFM_TROUBLE_BUDGET = 256,      /* the step was cheapened or, with DFM_DISCARD, given up by max_time or max_work: take a shorter step, soften the blow */
   DFM_TROUBLE_INTERRUPTED = 512  /* DFM_DISCARD because of dfm_world_interrupt */
@@ -83,6 +89,32 @@ DFM_API dfm_status dfm_world_set_budget(dfm_world world, double max_time, uint64
  * @return DFM_OK; DFM_E_HANDLE not a world's handle (whether it is stale is not looked at); DFM_E_NOMEM 64 other worlds' requests wait
  * Threads: Any thread. May be called from a signal handler. Since 0.1. */
 DFM_API dfm_status dfm_world_interrupt(dfm_world world);
+/* Two things that were through each other deeper than the rest distance when they were made or put in place. */
+enum { DFM_OVERLAP_OBSTACLE = 1,      /* b is an obstacle or a rigid body */
+       DFM_OVERLAP_ASIDE = 2,         /* deeper than contact leads out: the pair does not touch until it is apart */
+       DFM_OVERLAP_SEPARATED = 4      /* untangled: it is apart */ };
+typedef struct dfm_overlap {
+  uint32_t size, flags;               /* DFM_OVERLAP_* */
+  dfm_body a;
+  uint64_t b;                         /* dfm_body or dfm_obstacle */
+  uint32_t crossings;                 /* pairs of triangles that cross; of a plane, a sphere or a capsule: triangles of a that it cuts */
+  uint32_t enclosed;                  /* surface points of one that lie inside the other */
+  double depth;                       /* m, the deepest of them, from the surface */
+} dfm_overlap;
+/** What the last look found. The library looks once, at the next call that needs the plan (a step at the latest), at what was made, set or restored
+ * since: not in every step. Filtered pairs do not count. capacity 0 with out NULL only counts.
+ * @return DFM_OK; DFM_E_ARG too small; DFM_E_HANDLE; DFM_E_BUSY. Threads: Not during step. Since 0.1. */
+DFM_API dfm_status dfm_world_overlaps(dfm_world world, uint32_t capacity, dfm_overlap *out, uint32_t *n);
+/** Looks at all pairs as they are now, and changes nothing; dfm_world_overlaps then lists these.
+ * @param n  out, pairs; may be NULL. Threads: Not during step. Since 0.1. */
+DFM_API dfm_status dfm_world_find_overlaps(dfm_world world, uint32_t *n);
+
+/** Moves apart what overlaps now, as DFM_WORLD_UNTANGLE does for what is made: whole bodies, by the least way found, neither turned nor bent, so that no
+ * elastic energy and no velocity comes of it. Bodies with held points, obstacles and rigid bodies stay. What cannot be parted keeps its place, and the log
+ * says why.
+ * @param left  out, pairs that overlap still; may be NULL. @return DFM_OK; DFM_E_HANDLE; DFM_E_BUSY. Threads: Not during step. Since 0.1. */
+DFM_API dfm_status dfm_world_untangle(dfm_world world, uint32_t *left);
+
 /** A step that is not cut into sub-steps: (4, 5, 6, 7) 2^k s, at most 0.9 of the proven bound; +INFINITY if nothing bounds it. It may be
  * fed back at each step: it follows the bound down at once and up with delay, so that steps change rarely
  * (doc/concepts/step.md). dfm_world_stats.stable_step has the bound itself.

@@ -4,6 +4,7 @@
 
 #include "api/objects.h"
 #include "surfel/closest.h"
+#include "world/bounds.h"
 #include "world/spring.h"
 #include "world/create.h"
 #include "world/held.h"
@@ -132,6 +133,7 @@ dfm_status dfm_body_set_filter(dfm_body body, uint32_t category, uint32_t collid
     idle(*b.world);
     b.category = category, b.collides_with = collides_with;
     disturb(b);
+    b.world->overlaps.place(b.id);
     b.world->changed = true;
   });
 }
@@ -155,6 +157,11 @@ dfm_status dfm_body_set_state(dfm_body body, uint32_t n, const double *x, const 
     for (size_t i = 0; i < size_t(3) * n; ++i)
       if ((x && !std::isfinite(x[i])) || (v && !std::isfinite(v[i])))
         fail(DFM_E_ARG, "body '%s': the state of point %zu is not finite; nothing was changed", b.name.c_str(), i / 3);
+    for (uint32_t i = 0; v && i < n; ++i) check_velocity("body", b.name.c_str(), load3(v + size_t(3) * i));
+    if (x) {
+      const double far = largest_coordinate(x, n, 3);
+      check_resolved(b.name.c_str(), far, b.surface.median_edge), check_place(*b.world, "body", b.name.c_str(), far);
+    }
     for (uint32_t i = 0; i < n; ++i)
       for (int k = 0; k < 3; ++k) {
         if (b.p.held[i] & (1 << k)) continue;
@@ -164,6 +171,7 @@ dfm_status dfm_body_set_state(dfm_body body, uint32_t n, const double *x, const 
     disturb(b);
     b.world->bound_age = kNone;
     b.world->guard.forget();
+    if (x) b.world->overlaps.place(b.id);
   });
 }
 

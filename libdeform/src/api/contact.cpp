@@ -127,6 +127,7 @@ dfm_status dfm_world_filter_pair(dfm_world world, const char *a, const char *b, 
   return guard([&] {
     World &w = idle(world_of(world));
     add_rule(w.filters, FilterRule{{side(w, a, false), side(w, b, false)}, collide});
+    if (collide) w.overlaps.all = true;
     w.wake_all();
     w.changed = true;
   });

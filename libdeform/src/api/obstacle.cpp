@@ -3,6 +3,7 @@
 #include <cmath>
 
 #include "api/objects.h"
+#include "world/bounds.h"
 #include "world/create.h"
 
 using namespace dfm;
@@ -46,18 +47,42 @@ dfm_status dfm_obstacle_get_def(dfm_obstacle obstacle, dfm_obstacle_def *out) {
   return guard([&] { give(out, obstacle_of(obstacle).def); });
 }
 
+namespace {
+
+// Where a host may put an obstacle; checked.
+Obstacle &movable(dfm_obstacle obstacle, const dfm_pose *pose) {
+  Obstacle &o = obstacle_of(obstacle);
+  idle(*o.world);
+  need(pose, "pose");
+  if (o.rigid) fail(DFM_E_STATE, "'%s' is a rigid body and moves by itself; dfm_rigid_set_state puts it somewhere", o.name.c_str());
+  for (int i = 0; i < 4; ++i)
+    if (!std::isfinite(pose->rotation[i]) || (i < 3 && !std::isfinite(pose->position[i])))
+      fail(DFM_E_ARG, "obstacle '%s': the target pose is not finite", o.name.c_str());
+  check_place(*o.world, "obstacle", o.name.c_str(), largest_coordinate(pose->position, 1, 3));
+  return o;
+}
+
+}  // namespace
+
 dfm_status dfm_obstacle_move_to(dfm_obstacle obstacle, const dfm_pose *pose) {
   return guard([&] {
-    Obstacle &o = obstacle_of(obstacle);
-    idle(*o.world);
-    need(pose, "pose");
-    if (o.rigid) fail(DFM_E_STATE, "'%s' is a rigid body and moves by itself; dfm_rigid_set_state puts it somewhere", o.name.c_str());
-    for (int i = 0; i < 4; ++i)
-      if (!std::isfinite(pose->rotation[i]) || (i < 3 && !std::isfinite(pose->position[i])))
-        fail(DFM_E_ARG, "obstacle '%s': the target pose is not finite", o.name.c_str());
+    Obstacle &o = movable(obstacle, pose);
     if (o.world->def.method == DFM_METHOD_ROLLBACK) rollback_refuse(*o.world, ("obstacle '" + o.name + "': a motion of its own, which cannot go back,").c_str());
     o.keys.clear();
     o.def.sine = {};
     o.target = to_pose(*pose), o.has_target = true;
+  });
+}
+
+dfm_status dfm_obstacle_teleport(dfm_obstacle obstacle, const dfm_pose *pose) {
+  return guard([&] {
+    Obstacle &o = movable(obstacle, pose);
+    World &w = *o.world;
+    w.overlaps.place(o.id);
+    w.wake_all();   // it may have been put where someone sleeps, or taken from under someone
+    o.keys.clear();
+    o.def.sine = {};
+    o.pose = to_pose(*pose), o.has_target = false;
+    w.guard.forget();
   });
 }

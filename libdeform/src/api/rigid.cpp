@@ -104,6 +104,8 @@ dfm_status dfm_rigid_set_state(dfm_rigid rigid, const dfm_rigid_state *state) {
     World &w = idle(*o.world);
     need(state, "state");
     set_rigid_state(o, *state);
+    for (auto &shape : w.obstacles)
+      if (shape->rigid == o.rigid && shape->rigid_body == o.rigid_body) w.overlaps.place(shape->id);
     w.wake_all();   // it may have been put where someone sleeps
   });
 }

@@ -66,7 +66,10 @@ dfm_status dfm_world_create(dfm_context *context, const dfm_world_def *def, dfm_
     if (!(w->def.contact_offset >= 0 && std::isfinite(w->def.contact_offset)) || !(w->def.contact_tolerance >= 0 && std::isfinite(w->def.contact_tolerance)))
       fail(DFM_E_ARG, "contact_offset (m) and contact_tolerance (m/s) must be zero (automatic) or positive, and finite; found %g and %g",
            w->def.contact_offset, w->def.contact_tolerance);
-    if (w->def.flags & ~uint32_t{DFM_WORLD_UNGUARDED}) fail(DFM_E_ARG, "flags 0x%x: the only one known is DFM_WORLD_UNGUARDED (1)", w->def.flags);
+    for (const double speed : {w->def.recovery_speed, w->def.obstacle_speed})
+      if (!(speed >= 0 && std::isfinite(speed))) fail(DFM_E_ARG, "recovery_speed and obstacle_speed are %g m/s; zero (the default) or positive", speed);
+    if (w->def.flags & ~uint32_t{DFM_WORLD_UNGUARDED | DFM_WORLD_UNTANGLE})
+      fail(DFM_E_ARG, "flags 0x%x: known are DFM_WORLD_UNGUARDED (1) and DFM_WORLD_UNTANGLE (2)", w->def.flags);
     if (w->def.max_sweeps == 0 || w->def.max_passes == 0 || w->def.max_substeps == 0)
       fail(DFM_E_ARG, "max_sweeps, max_passes and max_substeps must be at least 1");
     check_max_time(w->def.max_time);
@@ -176,6 +179,41 @@ dfm_status dfm_world_stable_step(dfm_world world, double *dt, dfm_body *body, ui
     *dt = offered_step(w.sizes, w.stable);
     if (body) *body = w.worst_body ? w.worst_body->handle : 0;
     if (point) *point = w.worst_point;
+  });
+}
+
+dfm_status dfm_world_overlaps(dfm_world world, uint32_t capacity, dfm_overlap *out, uint32_t *n) {
+  return guard([&] {
+    World &w = idle(world_of(world));
+    w.prepare();
+    if (!room(static_cast<uint32_t>(w.overlaps.found.size()), capacity, out, n)) return;
+    for (const Overlap &o : w.overlaps.found) {
+      const uint32_t aside = o.aside && !o.separated ? DFM_OVERLAP_ASIDE : 0, parted = o.separated ? DFM_OVERLAP_SEPARATED : 0;
+      *out++ = {sizeof(dfm_overlap), (o.obstacle ? uint32_t{DFM_OVERLAP_OBSTACLE} : 0) | aside | parted, w.handle_of(o.a), w.handle_of(o.b), o.crossings,
+                o.enclosed, o.depth};
+    }
+  });
+}
+
+dfm_status dfm_world_find_overlaps(dfm_world world, uint32_t *n) {
+  return guard([&] {
+    World &w = idle(world_of(world));
+    w.prepare();
+    const bool told = w.overlaps.told;
+    w.overlaps.all = w.overlaps.look_only = true;
+    w.prepare();
+    w.overlaps.told = told;
+    if (n) *n = static_cast<uint32_t>(w.overlaps.found.size());
+  });
+}
+
+dfm_status dfm_world_untangle(dfm_world world, uint32_t *left) {
+  return guard([&] {
+    World &w = idle(world_of(world));
+    w.overlaps.all = w.overlaps.untangle = true;
+    w.prepare();
+    const auto &found = w.overlaps.found;
+    if (left) *left = static_cast<uint32_t>(std::count_if(found.begin(), found.end(), [](const Overlap &o) { return !o.separated; }));
   });
 }
 

@@ -179,6 +179,7 @@ Vec3 ContactRows::diagonal(uint32_t i, Vec3 a) const {
 void ContactRows::finish(std::span<const ContactPoint> contacts, const double *tangents, double h, double planned, double offset) {
   frame.resize(size_t(n) * 9), drive.resize(size_t(n) * 3), rate.resize(n), wn.resize(n), wt.resize(n);
   cross.resize(size_t(n) * 2), impulse.resize(size_t(n) * 3);
+  const double most = recovery > 0 ? recovery * planned : 0.1 * offset;
   for (uint32_t i = 0; i < n; ++i) {
     const Vec3 normal = load3(contacts[i].normal), t1 = load3(tangents + size_t(i) * 3), t2 = dfm::cross(normal, t1);
     double *const f = &frame[size_t(i) * 9];
@@ -191,7 +192,7 @@ void ContactRows::finish(std::span<const ContactPoint> contacts, const double *t
     // But the last of the distance is no tolerance to spend: a point that slides over a face that turns comes nearer by slip times turn in every
     // sub-step, which the contact's straight motion does not see. Nearer than 0.6 d_c the whole of a further depth is closed in the sub-step.
     // Surfaces that are through each other already (a start state) take their time.
-    const double slow = std::max(0.2 * gap, -0.1 * offset), near = contacts[i].distance > 0 ? gap + 0.32 * offset : slow;
+    const double slow = std::max(0.2 * gap, -most), near = contacts[i].distance > 0 ? gap + 0.32 * offset : slow;
     rate[i] = gap > 0 ? gap / h : std::min(slow, near) / planned;
     const Vec3 w0 = diagonal(i, normal);
     wn[i] = dot(normal, w0), cross[2 * size_t(i)] = dot(t1, w0), cross[2 * size_t(i) + 1] = dot(t2, w0);

@@ -59,6 +59,8 @@ struct ContactRows {
   Array<double> cross;                    // [n,2] 1/kg: W_tn, the slip that a unit normal impulse makes at its own contact
   Array<double> impulse;                  // [n,3] N s: normal, two tangents
 
+  double recovery = 0;                    // m/s, at most, at which a depth is opened; 0: a tenth of the rest distance per sub-step
+
   explicit ContactRows(const Memory &memory);
   // Expands contacts to dofs. Blocks get their dofs and counts; the caller fills `response`, then calls finish().
   void build(std::span<const ContactPoint> contacts, std::span<const DofSource> sources, const RigidPlaces &rigids = {});

@@ -48,6 +48,8 @@ class Builder {
     w.max_work = def_.max_work < 1.8e19 ? static_cast<uint64_t>(def_.max_work) : UINT64_MAX;
     w.energy_watch = def_.energy_watch;
     if (!def_.guard) w.flags |= DFM_WORLD_UNGUARDED;
+    if (def_.untangle) w.flags |= DFM_WORLD_UNTANGLE;
+    w.recovery_speed = def_.recovery_speed, w.obstacle_speed = def_.obstacle_speed;
     std::vector<const char *> effects;
     for (const std::string &e : def_.effects) effects.push_back(e.c_str());
     effects.push_back(nullptr);

@@ -319,7 +319,7 @@ void read_contact(const Node &scene, Definition &def, const ReadContext &context
   def.self = contact.boolean("self", listed);
   if (self_given && !def.self && listed)
     contact.member("self").fail("\"self\" is false, but /effects asks for \"self_contact\"; take one of the two away");
-  if (contact.boolean("untangle", false)) contact.member("untangle").not_yet();
+  def.untangle = contact.boolean("untangle", false);
   def.guard = contact.boolean("guard", true);
   if (contact.has("energy_watch")) {
     const Node watch = contact.member("energy_watch");
@@ -328,6 +328,8 @@ void read_contact(const Node &scene, Definition &def, const ReadContext &context
   }
   if (contact.has("tolerance")) def.tolerance = contact.member("tolerance").number(kPositive);
   if (contact.has("offset")) def.offset = contact.member("offset").number(kPositive);
+  if (contact.has("recovery_speed")) def.recovery_speed = contact.member("recovery_speed").number(kPositive);
+  if (contact.has("obstacle_speed")) def.obstacle_speed = contact.member("obstacle_speed").number(kPositive);
   for (const Node &entry : contact.items("friction")) {
     entry.object("friction");
     Friction f;

@@ -10,6 +10,7 @@
 #include "mesh/mesh.h"
 #include "world/body_surface.h"
 #include "world/body_zones.h"
+#include "world/bounds.h"
 #include "world/idle.h"
 #include "world/material.h"
 
@@ -97,9 +98,12 @@ Body &create_body(World &w, const dfm_body_def &def) {
   lump_body(b, def, materials);
   update_inverse_mass(p);
   place_phyxels(b, def);
+  const double far = largest_coordinate(p.x.data(), p.n, kStride);
+  check_velocity("body", b.name.c_str(), load3(def.velocity), load3(def.spin), far);
 
   b.edges = unique_edges(m, def.ntet, b.tets.data());
   make_body_surface(b, def.surface);
+  check_resolved(b.name.c_str(), far, b.surface.median_edge);
   if (def.surface) b.coupling = def.surface->coupling;
   make_zones(b, def, materials, plain);
   make(b.surfel_impulse, size_t(3) * b.surface.nsurfel);
@@ -124,6 +128,7 @@ Body &create_body(World &w, const dfm_body_def &def) {
 
   w.bodies.reserve(w.bodies.size() + 1);
   w.reserve_sleep(static_cast<uint32_t>(w.bodies.size() + 1));
+  w.overlaps.place(w.next_id);
   b.id = w.next_id;
   b.handle = handle_create(Kind::body, &b);
   ++w.next_id;
@@ -226,8 +231,11 @@ Obstacle &create_obstacle(World &w, const dfm_obstacle_def &def) {
     o.mesh = std::make_unique<ObstacleMesh>(w.memory(), def.npoint, o.points.data(), def.ntriangle, o.triangles.data());
   if (def.shape == DFM_SHAPE_VOXELS) make_voxels(o, w.memory());
   o.pose = o.pose_at_time(w.time);
+  check_motion_speed(w, o);
+  check_velocity("obstacle", name, load3(def.velocity_surface));
   rollback_check(w, o);
   w.obstacles.reserve(w.obstacles.size() + 1);
+  w.overlaps.place(w.next_id);
   o.id = w.next_id;
   o.handle = handle_create(Kind::obstacle, &o);
   ++w.next_id;

@@ -1,4 +1,5 @@
 // The two stages of rigid bodies, around the solve: how they would move without contact, and where they end with it.
+#include "world/bounds.h"
 #include "world/rigid.h"
 
 #include <algorithm>
@@ -255,6 +256,8 @@ void set_rigid_state(Obstacle &o, const dfm_rigid_state &given) {
   RigidSet &set = *o.rigid;
   if (set.group[o.rigid_body] == DFM_RIGID_STILL) fail(DFM_E_ARG, "rigid body '%s' is fixed; it cannot be put elsewhere", o.name.c_str());
   if (!finite(reinterpret_cast<const double *>(&given), kStateValues)) fail(DFM_E_ARG, "rigid body '%s': the given state is not finite", o.name.c_str());
+  check_velocity("rigid body", o.name.c_str(), load3(given.velocity), load3(given.spin), 1);
+  check_place(*o.world, "rigid body", o.name.c_str(), largest_coordinate(given.position, 1, 3));
   dfm_rigid_state &s = set.state[o.rigid_body];
   s = given;
   const Quat q = unit_quat(given.rotation);

@@ -3,6 +3,7 @@
 #include <cmath>
 
 #include "core/error.h"
+#include "world/bounds.h"
 #include "world/create.h"
 #include "world/rigid.h"
 #include "world/world.h"
@@ -23,6 +24,7 @@ void check_body(dfm_rigid_def &d, const char *name) {
     fail(DFM_E_ARG, "rigid body '%s': pose, velocity and spin must be finite", name);
   if (!finite(d.half_size, 3) || !finite(&d.radius, 1) || !finite(&d.half_length, 1))
     fail(DFM_E_ARG, "rigid body '%s': half_size, radius and half_length must be finite", name);
+  check_velocity("rigid body", name, load3(d.velocity), load3(d.spin), 1);
   if (d.fixed) {
     if (!zero(d.velocity) || !zero(d.spin)) fail(DFM_E_ARG, "rigid body '%s' is fixed and has a velocity; drop one (an obstacle's motion is prescribed)", name);
     d.mass = 0, d.inertia[0] = d.inertia[1] = d.inertia[2] = 0;

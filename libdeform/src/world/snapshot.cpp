@@ -100,6 +100,7 @@ struct Staged {
   std::vector<FrictionRule> friction;
   std::vector<FilterRule> filters;
   ContactStore store;
+  struct { std::vector<PairAside> aside; } overlaps;
   std::vector<PairWork> work;
   Report report;
   std::vector<dfm_contact_event> events;   // none
@@ -259,6 +260,7 @@ void rule_fields(Stream &s, W &w, uint64_t laws) {
     s.must_hold("rule", "two names", [&] { return !r.between[0].empty() && !r.between[1].empty(); });
   };
   s.list("friction rules", w.friction, [&](auto &r) { between(r), s.value("rule's law", r.law, must::below(laws)); });
+  s.array("pairs that are set aside", w.overlaps.aside, kAnyCount, must::Be{[](const PairAside &x) { return x.obstacle <= 1 && x.a != x.b; }, "two things"});
   s.list("filter rules", w.filters, [&](auto &r) { between(r), s.value("collide", r.collide, must::flag); });
 }
 
@@ -363,6 +365,12 @@ bool good_work(const std::vector<PairWork> &work, const Things &things) {
   return true;
 }
 
+bool good_aside(const std::vector<PairAside> &pairs, const Things &things) {
+  return std::all_of(pairs.begin(), pairs.end(), [&](const PairAside &p) {
+    return things.body(p.a) && (p.obstacle ? things.obstacle(p.b) != nullptr : things.body(p.b) != nullptr);
+  });
+}
+
 bool good_report(const Staged &t, const World &w) {
   const Report &r = t.report;
   if (r.n != t.store.n) return false;
@@ -388,6 +396,7 @@ void check(const SnapshotReader &s, const Staged &t, const World &w) {
   if (!s.at_end()) s.refuse("the end", "no bytes after the last field");
   if (!good_contacts(t, {w})) s.refuse("contacts", "contacts of bodies and obstacles that are there");
   if (!good_work(t.work, {w})) s.refuse("friction work", "pairs that are there, in order");
+  if (!good_aside(t.overlaps.aside, {w})) s.refuse("pairs that are set aside", "bodies and obstacles that are there");
   size_t sleepers = 0;
   for (const StagedBody &b : t.bodies) sleepers += b.slumber.asleep;
   if (sleepers != t.sleepers) s.refuse("sleepers", "as many as sleep");
@@ -478,7 +487,7 @@ void exchange(World &w, Staged &t) noexcept {
     StagedRigids &other = t.rigid_sets[i];
     set.state.swap(other.state), set.extra.swap(other.extra), set.total.swap(other.total), std::swap(set.last_h, other.last_h);
   }
-  w.friction.swap(t.friction), w.filters.swap(t.filters), w.gravity_keys.swap(t.gravity_keys), w.work.swap(t.work), w.events.swap(t.events);
+  w.friction.swap(t.friction), w.filters.swap(t.filters), w.overlaps.aside.swap(t.overlaps.aside), w.gravity_keys.swap(t.gravity_keys), w.work.swap(t.work), w.events.swap(t.events);
   std::swap(w.def.gravity, t.def.gravity), std::swap(w.def.sleep, t.def.sleep);
   std::swap(w.store, t.store), std::swap(w.report, t.report), std::swap(w.stats, t.stats);
   std::swap(w.time, t.time), std::swap(w.step_count, t.step_count), std::swap(w.next_id, t.next_id);
@@ -559,6 +568,7 @@ void world_restore(World &w, const void *data, size_t bytes) {
     // Tables and plan follow from what is there now; what prepare() would choose anew is put back as it was.
     const RestoredChoice choice{staged.gravity, staged.stable, staged.offset, staged.inverted, staged.bound_age};
     w.changed = true;
+    w.overlaps.all = w.overlaps.look_only = true;
     w.sleepers = 0;   // prepare() counts them
     w.prepare(&choice);
   } catch (...) {     // no memory for the tables: the state is as it was, and the tables are made when next needed

@@ -126,6 +126,7 @@ void World::make_rows() {
   tangents.resize(size_t(3) * n), match.resize(n);
   warm_start(store, contacts, h, rows, state, tangents.data(), match.data());
   share_areas(*this), fit_bristles(*this);
+  rows.recovery = def.recovery_speed;
   rows.finish(contacts, tangents.data(), h, guard.planned, offset);
   if (guard.resolving) guard_impulses(*this);
   if (!guard.kept.empty()) guard_rates(*this);

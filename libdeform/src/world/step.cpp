@@ -10,10 +10,12 @@
 #include <chrono>
 #include <cmath>
 #include <limits>
+#include <utility>
 
 #include "core/error.h"
 #include "integrate/symplectic_euler.h"
 #include "surfel/make_surface.h"
+#include "world/bounds.h"
 #include "world/spring.h"
 #include "world/step_sizes.h"
 #include "world/world.h"
@@ -143,6 +145,9 @@ Pose Obstacle::end_pose(double t, double h, double left) const {
 
 dfm_status World::step(double dt, uint32_t *trouble) {
   prepare();
+  check_target_speeds(*this, dt);
+  release_overlaps(*this);
+  if (!std::exchange(overlaps.told, true)) *trouble |= DFM_TROUBLE_OVERLAP;
   if (bound_due()) update_bound();
   const double needed = std::ceil(dt / stable - 1e-9);   // stable is infinite where nothing bounds the step
   if (!(needed <= def.max_substeps)) {

@@ -5,6 +5,7 @@
 
 #include "core/error.h"
 #include "friction/pair_rules.h"
+#include "world/bounds.h"
 
 namespace dfm {
 
@@ -79,14 +80,15 @@ uint32_t World::add_law(const char *name, std::span<const dfm_param_value> value
 
 namespace {
 
-// Rest distance d_c: 1e-3 of the median surface edge, at least 64 rounding units of the largest coordinate, at most 0.1 of the thinnest part;
-// as the thinnest part is not measured, a tenth of the shortest median edge stands for it.
+// Rest distance d_c: 1e-3 of the median surface edge, at least 64 rounding units of the largest coordinate, at most 0.1 of the thinnest part:
+// of the least mean thickness and of the shortest median edge.
 double contact_offset(const World &w) {
   double edge = 0, shortest = 0, extent = 0;
   std::vector<double> edges;
   for (auto &b : w.bodies) {
     edges.push_back(b->surface.median_edge);
-    shortest = shortest == 0 ? b->surface.median_edge : std::min(shortest, b->surface.median_edge);
+    const double thin = std::min(b->surface.median_edge, thickness(*b));
+    shortest = shortest == 0 ? thin : std::min(shortest, thin);
     for (double x : b->p.x) extent = std::max(extent, std::fabs(x));
   }
   if (edges.empty()) return 1e-6;
@@ -102,7 +104,7 @@ void offer(const dfm_type &type, std::vector<SceneFacts::Provider> &to) {
 }  // namespace
 
 void World::prepare(const RestoredChoice *restored) {
-  if (!changed) return;
+  if (!changed) return settle_overlaps(*this);
   const uint32_t nb = static_cast<uint32_t>(bodies.size()), no = static_cast<uint32_t>(obstacles.size()), width = nb + no;
   SceneFacts facts;
   facts.bodies = nb, facts.obstacles = no;
@@ -176,6 +178,7 @@ void World::prepare(const RestoredChoice *restored) {
       for (uint32_t law : used) offer(*laws[law]->type, facts.offered);
     }
   }
+  keep_overlaps_aside(*this);
   facts.effects_listed = def.effects != nullptr;
   facts.asked = asked_effects;
   choose_self_bodies(*this, facts, used);
@@ -192,6 +195,7 @@ void World::prepare(const RestoredChoice *restored) {
   const double wanted = contact_offset(*this);
   const double before = offset;
   offset = restored ? restored->offset : def.contact_offset > 0 ? def.contact_offset : store.n > 0 ? std::min(offset, wanted) : wanted;
+  if (!restored) check_offset(*this);
   for (auto &b : bodies)
     if (def.sleep && b->anchor.empty()) b->anchor = b->p.x;
   active.reserve(nb), sinks.reserve(nb);
@@ -206,6 +210,7 @@ void World::prepare(const RestoredChoice *restored) {
   else gravity = restored->gravity, stable = restored->stable, inverted = restored->inverted, bound_age = restored->bound_age;
   guard.forget();
   changed = false;
+  settle_overlaps(*this);
 }
 
 }  // namespace dfm

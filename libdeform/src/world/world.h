@@ -29,6 +29,7 @@
 #include "world/guard.h"
 #include "world/islands.h"
 #include "world/motion.h"
+#include "world/overlap.h"
 #include "world/rigid.h"
 #include "world/rollback.h"
 #include "world/self_contact.h"
@@ -161,6 +162,7 @@ struct World {
   std::vector<std::unique_ptr<LawInstance>> laws;      // the first is the default law, made when first needed
   std::vector<FrictionRule> friction;
   std::vector<FilterRule> filters;
+  Overlaps overlaps;
   uint64_t next_id = 1;
 
   // Derived from the above by prepare() whenever something changed.

@@ -1,0 +1,201 @@
+// Things that are through each other when they are made or put somewhere: found, named, listed; and what the steps after cost and do.
+#include <cstring>
+
+#include "logged_context.h"
+#include "obstacle.h"
+#include "world.h"
+
+namespace {
+
+dfm_body ball(dfm_context *c, dfm_world w, const char *name, std::array<double, 3> at, double radius = 0.1, uint32_t cells = 1000) {
+  test::BodyOptions o;
+  o.name = name, o.position = at, o.damping_stiffness = 1e-3;
+  return test::make_body(c, w, "ball", {radius, 0, 0}, cells, o);
+}
+
+std::vector<dfm_overlap> overlaps(dfm_world w) { return test::listed(dfm_world_overlaps, w); }
+
+dfm_obstacle thing(dfm_world w, uint32_t shape, double size, const test::Triangles *t = nullptr) {
+  dfm_obstacle_def d = dfm_obstacle_def_default();
+  d.name = "thing", d.shape = shape, d.radius = size, d.half_length = size;
+  for (double &h : d.half_size) h = size;
+  if (t) d.npoint = uint32_t(t->points.size() / 3), d.points = t->points.data(), d.ntriangle = uint32_t(t->tris.size() / 3), d.triangles = t->tris.data();
+  dfm_obstacle o = 0;
+  test::ok(dfm_obstacle_create(w, &d, &o));
+  return o;
+}
+
+test::Triangles cube(double half) {
+  test::Triangles t;
+  for (int i = 0; i < 8; ++i)
+    for (int k = 0; k < 3; ++k) t.points.push_back(i >> k & 1 ? half : -half);
+  t.tris = {0, 2, 1, 1, 2, 3, 4, 5, 6, 5, 7, 6, 0, 1, 4, 1, 5, 4, 2, 6, 3, 3, 6, 7, 0, 4, 2, 2, 4, 6, 1, 3, 5, 3, 7, 5};
+  return t;
+}
+
+}  // namespace
+
+TEST(Overlap, OfTwoBalls_IsFoundNamedAndToldOnce) {
+  test::LoggedContext logged;
+  dfm_context *const c = logged.context;
+  const dfm_world w = test::make_world(c, {});
+  const dfm_body a = ball(c, w, "left", {}), b = ball(c, w, "right", {0.15, 0, 0});
+  uint32_t trouble = 0;
+  ASSERT_EQ(dfm_world_step(w, 1e-3, &trouble), DFM_OK) << dfm_last_error();
+  EXPECT_TRUE(trouble & DFM_TROUBLE_OVERLAP);
+  const auto found = overlaps(w);
+  ASSERT_EQ(found.size(), 1u);
+  EXPECT_EQ(found[0].a, a);
+  EXPECT_EQ(found[0].b, b);
+  EXPECT_GT(found[0].crossings, 10u);
+  EXPECT_GT(found[0].enclosed, 10u);
+  EXPECT_NEAR(found[0].depth, 0.05, 0.005);
+  EXPECT_NE(logged.log.find("body 'left' and body 'right' overlap by"), std::string::npos) << logged.log;
+  ASSERT_EQ(dfm_world_step(w, 1e-3, &trouble), DFM_OK);
+  EXPECT_FALSE(trouble & DFM_TROUBLE_OVERLAP);
+  dfm_world_destroy(w);
+}
+
+TEST(Overlap, OfTwoBallsAtAnyDistance_ThrowsNothingAndSolvesNothing) {
+  for (const double apart : {0.0, 1e-9, 0.05, 0.1, 0.15}) {
+    test::Context c;
+    const dfm_world w = test::make_world(c, {});
+    const dfm_body a = ball(c, w, "a", {}), b = ball(c, w, "b", {apart, 0, 0});
+    for (int i = 0; i < 100; ++i) ASSERT_EQ(dfm_world_step(w, 1e-3, nullptr), DFM_OK) << dfm_last_error();
+    EXPECT_LT(test::measure(a).speed_max, 1e-9) << apart;
+    EXPECT_LT(test::measure(b).speed_max, 1e-9) << apart;
+    EXPECT_EQ(test::stats(w).contacts_max, 0u) << apart;
+    EXPECT_EQ(overlaps(w).size(), 1u) << apart;
+    dfm_world_destroy(w);
+  }
+}
+
+TEST(Overlap, OfPairThatComesApart_TouchesFromThenOn) {
+  test::Context c;
+  const dfm_world w = test::make_world(c, {});
+  const dfm_body a = ball(c, w, "a", {}), b = ball(c, w, "b", {0.15, 0, 0});
+  test::set_velocity(a, {-1, 0, 0});
+  test::run(w, 0.1, 1e-3);   // 0.25 apart
+  uint32_t n = 1;
+  test::ok(dfm_world_find_overlaps(w, &n));
+  EXPECT_EQ(n, 0u);
+  test::set_velocity(a, {1, 0, 0});
+  test::run(w, 0.1, 1e-3);
+  EXPECT_GT(test::measure(b).velocity[0], 0.3);
+  dfm_world_destroy(w);
+}
+
+TEST(Overlap, OfTouchingBodies_IsNone) {
+  test::Context c;
+  const dfm_world w = test::make_world(c);
+  test::BodyOptions o;
+  o.name = "low";
+  test::make_body(c, w, "beam", {0.1, 0.1, 0.1}, 300, o);
+  o.name = "high", o.position = {0.013, 0.007, 0.1};
+  test::make_body(c, w, "beam", {0.1, 0.1, 0.1}, 300, o);
+  test::add_plane(w, "floor");
+  uint32_t trouble = 0;
+  ASSERT_EQ(dfm_world_step(w, 1e-3, &trouble), DFM_OK);
+  EXPECT_FALSE(trouble & DFM_TROUBLE_OVERLAP);
+  EXPECT_TRUE(overlaps(w).empty());
+  dfm_world_destroy(w);
+}
+
+TEST(Overlap, OfCubesOnOneGrid_IsFoundThoughNoEdgeCrosses) {
+  for (const double shift : {0.0, 0.05}) {
+    test::Context c;
+    const dfm_world w = test::make_world(c, {});
+    test::BodyOptions o;
+    o.name = "a";
+    test::make_body(c, w, "beam", {0.1, 0.1, 0.1}, 40, o);
+    o.name = "b", o.position = {shift, 0, 0};
+    test::make_body(c, w, "beam", {0.1, 0.1, 0.1}, 40, o);
+    EXPECT_EQ(overlaps(w).size(), 1u) << shift;
+    test::run(w, 0.02, 1e-3);
+    dfm_world_destroy(w);
+  }
+}
+
+TEST(Overlap, OfBodyWithEveryShapeOfObstacle_IsFound) {
+  const test::Triangles box = cube(0.03), large = cube(0.5);
+  for (const bool around : {false, true})   // the obstacle holds the body, or lies inside it
+    for (const uint32_t shape : {DFM_SHAPE_SPHERE, DFM_SHAPE_BOX, DFM_SHAPE_CAPSULE, DFM_SHAPE_MESH, DFM_SHAPE_VOXELS}) {
+      test::Context c;
+      const dfm_world w = test::make_world(c, {});
+      ball(c, w, "ball", {0.01, 0.002, 0.003});
+      thing(w, shape, around ? 0.5 : 0.03, shape == DFM_SHAPE_MESH || shape == DFM_SHAPE_VOXELS ? (around ? &large : &box) : nullptr);
+      const auto found = overlaps(w);
+      ASSERT_EQ(found.size(), 1u) << shape << around;
+      EXPECT_TRUE(found[0].flags & DFM_OVERLAP_OBSTACLE);
+      EXPECT_GT(found[0].depth, 0.01) << shape << around;
+      dfm_world_destroy(w);
+    }
+}
+
+TEST(Overlap, OfBodyWithPlane_IsLedOutSlowly) {
+  test::Context c;
+  const dfm_world w = test::make_world(c, {});
+  const dfm_body b = ball(c, w, "ball", {0, 0, 0.08});
+  test::add_plane(w, "floor");
+  ASSERT_EQ(overlaps(w).size(), 1u);
+  EXPECT_NEAR(overlaps(w)[0].depth, 0.02, 0.002);
+  test::run(w, 0.5, 1e-3);
+  EXPECT_LT(test::measure(b).speed_max, 0.05);
+  dfm_world_destroy(w);
+}
+
+TEST(Overlap, OfBodyInsideBody_IsFoundAndOfBodyInRoomIsNot) {
+  test::Context c;
+  const dfm_world w = test::make_world(c, {});
+  ball(c, w, "large", {}), ball(c, w, "small", {0.01, 0, 0}, 0.03, 300);
+  const auto found = overlaps(w);
+  ASSERT_EQ(found.size(), 1u);
+  EXPECT_EQ(found[0].crossings, 0u);
+  EXPECT_GT(found[0].enclosed, 50u);
+  test::Triangles room = cube(0.5);
+  for (size_t i = 0; i < room.tris.size(); i += 3) std::swap(room.tris[i], room.tris[i + 1]);
+  thing(w, DFM_SHAPE_MESH, 0, &room);
+  EXPECT_EQ(overlaps(w).size(), 0u);   // of what was made since: the room
+  dfm_world_destroy(w);
+}
+
+TEST(Overlap, AfterSetStateAndRestore_IsFound) {
+  test::Context c;
+  const dfm_world w = test::make_world(c, {});
+  ball(c, w, "a", {});
+  const dfm_body b = ball(c, w, "b", {0.3, 0, 0});
+  test::run(w, 0.01, 1e-3);
+  EXPECT_TRUE(overlaps(w).empty());
+  uint32_t n = 0;
+  test::ok(dfm_body_get_state(b, 0, nullptr, nullptr, &n));
+  std::vector<double> x(3 * n), v(3 * n);
+  test::ok(dfm_body_get_state(b, n, x.data(), v.data(), &n));
+  for (size_t i = 0; i < x.size(); i += 3) x[i] -= 0.2;
+  test::ok(dfm_body_set_state(b, n, x.data(), nullptr));
+  uint32_t trouble = 0;
+  ASSERT_EQ(dfm_world_step(w, 1e-3, &trouble), DFM_OK);
+  EXPECT_TRUE(trouble & DFM_TROUBLE_OVERLAP);
+  ASSERT_EQ(overlaps(w).size(), 1u);
+
+  const std::string kept = test::snapshot(w);
+  const dfm_world other = test::make_world(c, {});
+  ball(c, other, "a", {}), ball(c, other, "b", {0.3, 0, 0});
+  test::ok(dfm_world_restore(other, kept.data(), kept.size()));
+  EXPECT_EQ(overlaps(other).size(), 1u);
+  for (int i = 0; i < 20; ++i) {
+    test::ok(dfm_world_step(w, 1e-3, nullptr)), test::ok(dfm_world_step(other, 1e-3, nullptr));
+    ASSERT_EQ(dfm_world_hash(w), dfm_world_hash(other)) << i;
+  }
+  dfm_world_destroy(w), dfm_world_destroy(other);
+}
+
+TEST(Overlap, OfFilteredPair_DoesNotCount) {
+  test::Context c;
+  const dfm_world w = test::make_world(c, {});
+  ball(c, w, "a", {}), ball(c, w, "b", {0.1, 0, 0});
+  test::ok(dfm_world_filter_pair(w, "a", "b", false));
+  EXPECT_TRUE(overlaps(w).empty());
+  test::ok(dfm_world_filter_pair(w, "a", "b", true));
+  EXPECT_EQ(overlaps(w).size(), 1u);
+  dfm_world_destroy(w);
+}
