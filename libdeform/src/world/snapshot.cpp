@@ -260,7 +260,8 @@ void rule_fields(Stream &s, W &w, uint64_t laws) {
     s.must_hold("rule", "two names", [&] { return !r.between[0].empty() && !r.between[1].empty(); });
   };
   s.list("friction rules", w.friction, [&](auto &r) { between(r), s.value("rule's law", r.law, must::below(laws)); });
-  s.array("pairs that are set aside", w.overlaps.aside, kAnyCount, must::Be{[](const PairAside &x) { return x.obstacle <= 1 && x.a != x.b; }, "two things"});
+  s.array("pairs that are set aside", w.overlaps.aside, kAnyCount, must::Be{[](const PairAside &x) { return x.obstacle <= 1 && x.a != x.b; },
+          "two things"});
   s.list("filter rules", w.filters, [&](auto &r) { between(r), s.value("collide", r.collide, must::flag); });
 }
 
