@@ -52,7 +52,7 @@ const Table &objects() {
       {"motor", {{"velocity", true}, {"max", true}}},
       {"contact",
        {{"method", true}, {"self", true}, {"untangle", true}, {"sleep", true}, {"tolerance", true}, {"offset", true}, {"guard", true}, {"energy_watch", true},
-         {"recovery_speed", true}, {"obstacle_speed", true},
+        {"recovery_speed", true}, {"obstacle_speed", true},
         {"friction", true}, {"filter", true}}},
       {"friction", {{"between", true}, {"law", true}, {"params", true}}},
       {"filter", {{"between", true}, {"collide", true}}},
