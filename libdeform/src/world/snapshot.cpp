@@ -488,7 +488,8 @@ void exchange(World &w, Staged &t) noexcept {
     StagedRigids &other = t.rigid_sets[i];
     set.state.swap(other.state), set.extra.swap(other.extra), set.total.swap(other.total), std::swap(set.last_h, other.last_h);
   }
-  w.friction.swap(t.friction), w.filters.swap(t.filters), w.overlaps.aside.swap(t.overlaps.aside), w.gravity_keys.swap(t.gravity_keys), w.work.swap(t.work), w.events.swap(t.events);
+  w.friction.swap(t.friction), w.filters.swap(t.filters), w.overlaps.aside.swap(t.overlaps.aside);
+  w.gravity_keys.swap(t.gravity_keys), w.work.swap(t.work), w.events.swap(t.events);
   std::swap(w.def.gravity, t.def.gravity), std::swap(w.def.sleep, t.def.sleep);
   std::swap(w.store, t.store), std::swap(w.report, t.report), std::swap(w.stats, t.stats);
   std::swap(w.time, t.time), std::swap(w.step_count, t.step_count), std::swap(w.next_id, t.next_id);

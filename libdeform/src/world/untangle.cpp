@@ -203,7 +203,7 @@ class Untangler {
       w_.context->logf(DFM_LOG_INFO, "untangle moved body '%s' by (%.4g, %.4g, %.4g) m; its energy in gravity and springs changed by %.3g J", b.name.c_str(),
                        by.x, by.y, by.z, potential(b, by));
       for (uint32_t k = 0; k < b.p.n; ++k) store3(&b.p.x[size_t(k) * kStride], load3(&b.p.x[size_t(k) * kStride]) + by);
-      w_.wake(b);
+      w_.wake(b), forget_energy(b);   // the change of potential is nobody's work
       w_.guard.forget();
     }
   }
