@@ -10,7 +10,11 @@ struct Case { const char *name; double slope, speed; int steps; };   // steps th
 // Largest kinetic plus elastic energy over that at the start, of a free body whose points all start with velocities of their own.
 double growth(const Case &c) {
   test::Context context;
-  const dfm_world w = test::make_world(context, {0, 0, 0});
+  // Cells that points cross in a few sub-steps gain energy that is real and bounded: the bound is asked about here, not the watch.
+  dfm_world_def def = dfm_world_def_default();
+  def.gravity[2] = 0, def.energy_watch = 0;
+  dfm_world w = 0;
+  test::ok(dfm_world_create(context, &def, &w));
   test::BodyOptions o;
   o.young = 1e5;   // waves run at 10 m/s
   const dfm_body b = test::make_body(context, w, "beam", {0.3, 0.1, 0.1}, 300, o);

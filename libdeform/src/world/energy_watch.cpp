@@ -11,6 +11,10 @@ namespace {
 
 // An energy costs about as much as two sub-steps.
 constexpr uint32_t kEvery = 512;
+// Of the energy of the kick: a third is what stiff modes give back on average as they calm down, and a look sees it at one instant.
+constexpr double kGivesBack = 0.5;
+// Stiff modes that hold their energy as motion alone show it in the kick within a quarter of their period: so long a base is being taken.
+constexpr uint32_t kSettles = 8;          // sub-steps
 constexpr double kRounding = 1e-12;       // of the sums that a balance is the difference of
 constexpr double kPositionDigits = 8 * 2.3e-16;
 
@@ -37,7 +41,7 @@ double work_of_holders(const World &w, const Body &b, bool now) {
   return sum;
 }
 
-// The energy that the scheme keeps, U(x) - F.x + v.M v_free / 2, and a third of the energy of the kick, by which it may rise as stiff modes calm down.
+// The energy that the scheme keeps, U(x) - F.x + v.M v_free / 2, and half of the energy of the kick, by which it may rise as stiff modes calm down.
 bool look(World &w, Body &b, Look &out) {
   const Phyxels &p = b.p;
   const bool load_booked = books_loads(b), gravity_booked = books_gravity(w);
@@ -60,7 +64,7 @@ bool look(World &w, Body &b, Look &out) {
   const dfm_kin kin = b.kin(w.time, 0, nullptr);
   if (b.model.call("energy", [&] { return b.model.ops->energy(b.model.self, &kin, &elastic); }) != DFM_OK) return false;
   const double drift = kPositionDigits * reach / w.h;
-  out = {kinetic, elastic, elastic + potential + cross - (b.energy.work + work_of_holders(w, b, false)), kick / 3,
+  out = {kinetic, elastic, elastic + potential + cross - (b.energy.work + work_of_holders(w, b, false)), kGivesBack * kick,
          kRounding * (std::fabs(b.energy.work) + std::fabs(potential) + kinetic + elastic) + b.mass * drift * drift};
   return true;
 }
@@ -102,7 +106,10 @@ bool watch_energy(World &w, uint32_t *trouble) {
   if (!watching(w) || w.guard.planned != w.h) return true;   // pieces of a sub-step are not compared with whole ones
   const double limit = w.def.energy_watch * w.stats.energy_max;
   bool due = w.watch.age >= kEvery;
-  for (const uint32_t i : w.active) due = due || (watched(*w.bodies[i]) && w.free_kinetic[i] > 2 * w.bodies[i]->energy.kinetic + limit);
+  for (const uint32_t i : w.active) {
+    const EnergyBook &e = w.bodies[i]->energy;
+    due = due || (watched(*w.bodies[i]) && ((e.known > 0 && e.known < kSettles) || w.free_kinetic[i] > 2 * e.kinetic + limit));
+  }
   if (!due) return true;
   double total = 0, gain = 0, most = 0;
   const Body *worst = nullptr;
@@ -112,11 +119,12 @@ bool watch_energy(World &w, uint32_t *trouble) {
     if (!watched(b) || !look(w, b, now)) continue;
     EnergyBook &e = b.energy;
     total += now.kinetic + now.elastic;
-    const double rise = now.balance - e.base - now.rounding;
-    if (e.known && rise > 0) gain += rise;
-    if (e.known && rise > most) most = rise, worst = &b;
-    e.base = e.known ? std::min(e.base, now.balance + now.gives_back) : now.balance + now.gives_back;
-    e.known = 1, e.kinetic = now.kinetic;
+    const double rise = now.balance - e.base - now.rounding, level = now.balance + now.gives_back;
+    const bool settled = e.known == kSettles;
+    if (settled && rise > 0) gain += rise;
+    if (settled && rise > most) most = rise, worst = &b;
+    e.base = settled ? std::min(e.base, level) : e.known ? std::max(e.base, level) : level;
+    e.known += !settled, e.kinetic = now.kinetic;
   }
   dfm_world_stats &s = w.stats;
   if (w.watch.age == ~0u) s.energy_start = total;
@@ -153,7 +161,7 @@ void forget_energy(World &w) {
   for (auto &b : w.bodies) forget_energy(*b);
 }
 
-bool sound(const EnergyBook &e) { return e.known <= 1 && std::isfinite(e.base) && std::isfinite(e.work) && e.kinetic >= 0 && std::isfinite(e.kinetic); }
+bool sound(const EnergyBook &e) { return e.known <= kSettles && std::isfinite(e.base) && std::isfinite(e.work) && e.kinetic >= 0 && std::isfinite(e.kinetic); }
 
 bool sound(const EnergyWatch &e) { return (e.age <= kEvery || e.age == ~0u) && e.last_h >= 0 && std::isfinite(e.last_h); }
 

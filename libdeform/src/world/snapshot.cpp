@@ -223,7 +223,7 @@ void body_fields(Stream &s, W &w, B &b, const Body &like) {
   s.array("model parameters", b.model.params, like.model.params.size(), must::finite);
   s.must_hold("model parameters", "values in the range of the model's table", [&] { return in_range(*like.model.type, b.model.params); });
   s.value("contact_impulse", b.contact_impulse, must::finite);
-  s.value("energy known", b.energy.known, must::at_most(1)), s.value("least energy", b.energy.base, must::finite);
+  s.value("energy known", b.energy.known, must::at_most(8)), s.value("least energy", b.energy.base, must::finite);
   s.value("booked work", b.energy.work, must::finite), s.value("kinetic energy", b.energy.kinetic, must::finite);
   s.must_hold("energy known", "what the energy watch writes", [&] { return sound(b.energy); });
   s.value("category", b.category, must::any), s.value("collides_with", b.collides_with, must::any);
