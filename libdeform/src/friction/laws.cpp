@@ -59,8 +59,13 @@ const LawInstance *LawBatches::slopes(double h, ContactState &state) {
     if (batch.law->ops->flags & DFM_FRIC_JACOBIAN) continue;
     for (const Slopes which : {kByVt, kByFn}) {
       asked_.clear();
-      for (uint32_t k = 0; k < batch.n; ++k)
-        if (const uint32_t i = order_[batch.begin + k]; !(origin_[i].hold & which)) asked_.push_back(i);
+      for (uint32_t k = 0; k < batch.n; ++k) {
+        const uint32_t i = order_[batch.begin + k];
+        if (origin_[i].hold & which) continue;
+        // What sticks hangs on its bristle, not on its normal force; where that is not quite so the passes notice.
+        if (which == kByFn && state.mode[i] == 1) state.dft_dfn[i] = state.dft_dfn[state.stride + i] = 0, origin_[i].made |= which, origin_[i].hold |= which;
+        else asked_.push_back(i);
+      }
       if (asked_.empty()) continue;
       if (const LawInstance *bad = difference(*batch.law, asked_, h, which, state)) return bad;
     }
