@@ -32,11 +32,6 @@ namespace elastoplastic_inside {
 #include "../../../plugins/friction_elastoplastic/friction_elastoplastic.cpp"
 }
 #undef dfm_plugin_entry
-#define dfm_plugin_entry gms_entry
-namespace gms_inside {
-#include "../../../plugins/friction_gms/friction_gms.cpp"
-}
-#undef dfm_plugin_entry
 
 namespace {
 
@@ -76,10 +71,6 @@ TEST(LawWidth, Elastoplastic_HasOneAnswer) {
   for (double i : {1.0, 3.0})
     for (double multiplier : {0.0, 1.0})
       all_widths<elastoplastic_inside::Elastoplastic>({0.15, 0.20, 0.01, 1.3, 1e4, 20, 0, 0.01, 0.4, 0.7, i, multiplier}, elastoplastic_inside::law);
-}
-
-TEST(LawWidth, Gms_HasOneAnswer) {
-  for (double delta : {2.0, 0.7}) all_widths<gms_inside::Gms>({0.15, 0.20, 0.01, delta, 0.4, 60, 4000, 3000, 2000, 1000, 0.2, 0.3, 0.3, 0.2}, gms_inside::law);
 }
 
 }  // namespace
