@@ -1,5 +1,6 @@
 /* A law that ends its process, or never comes back, in the way that its parameter says, at the third hundredth call. */
 #define _DEFAULT_SOURCE
+#define _ISOC11_SOURCE   /* quick_exit */
 #include <math.h>
 #include <pthread.h>
 #include <signal.h>
@@ -12,12 +13,13 @@ enum { RETURNS, EXITS, UNDERSCORE_EXITS, QUICK_EXITS, ABORTS, ENDS_ITS_THREAD, T
 
 static void leave(int way) {
   volatile int round = 1;
+  volatile uintptr_t nowhere = 8;
   if (way == EXITS) exit(0);
   if (way == UNDERSCORE_EXITS) _exit(0);
   if (way == QUICK_EXITS) quick_exit(0);
   if (way == ABORTS) abort();
   if (way == ENDS_ITS_THREAD) pthread_exit(NULL);
-  if (way == TOUCHES_NOTHING) *(volatile int *)8 = 1;
+  if (way == TOUCHES_NOTHING) *(volatile int *)nowhere = 1;
   while (way == HANGS) round = round % 1000 + 1;
   while (way == WAITS) pause();
 }

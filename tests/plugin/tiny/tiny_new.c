@@ -17,7 +17,7 @@ static dfm_status eval(const dfm_friction_in *in, dfm_friction_out *out) {
   return DFM_OK;
 }
 
-static const struct new_friction law = {{sizeof(struct new_friction), 0, 0, 0, NULL, eval, NULL, NULL, NULL}, {NULL, NULL, NULL, NULL}};
+static const struct new_friction law = {{sizeof(struct new_friction), 0, 0, 0, NULL, eval, NULL, NULL, NULL, NULL}, {NULL, NULL, NULL, NULL}};
 static const struct new_type type = {{sizeof(struct new_type), DFM_KIND_FRICTION, "org.tiny.new", "new", "1.0", "MIT", "test",
                                       (const dfm_param *)rows, 2, sizeof(struct new_param), NULL, &law}, {NULL, NULL, NULL, NULL}};
 static const dfm_type *const types[] = {&type.known};
