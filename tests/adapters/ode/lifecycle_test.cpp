@@ -175,7 +175,7 @@ TEST(OdeLifecycle, DisabledBoxOnASoftBed_WakesWhenItsLoadChanges) {
   Ode ode;
   soft_bed(ode);
   const dBodyID box = ode.box({0.08, 0.08, 0.05}, 2, {0.15, 0.15, 0.152});
-  ode.run(1);
+  ode.run(3);
   dBodyDisable(box);
   const double rest = position(box)[2];
   dfm_rigid rigid = 0;
