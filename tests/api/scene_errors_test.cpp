@@ -80,7 +80,7 @@ TEST(SceneErrors, UnknownKeys_NameTheNearest) {
          {"/bodies/0/mesg=\"x\"", {"/bodies/0/mesg", "did you mean \"mesh\"?"}},
          {"/bodies/0/pose/positon=[0,0,0]", {"/bodies/0/pose/positon", "position"}},
          {"/materials/gel/yuong=1", {"/materials/gel/yuong", "young"}},
-         {"/time/zzzzzzzz=1", {"/time/zzzzzzzz", "expected one of: duration, step, integrator, mode"}},
+         {"/time/zzzzzzzz=1", {"/time/zzzzzzzz", "expected one of: duration, step, integrator, max_time, max_work, mode"}},
          {"/bodies/0/model/params/volum=1", {"/bodies/0/model/params/volum", "volume"}},
          {"/contact/friction/0/params/mu_X=1", {"/contact/friction/0/params/mu_X", "mu_"}},
          {"/obstacles/0/radius=1", {"/obstacles/0/radius", "the shape plane has no \"radius\""}}});

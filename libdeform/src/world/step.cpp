@@ -194,7 +194,7 @@ bool World::advance(double end, double goal, bool last, uint32_t *trouble) {
   for (bool whole = false; !whole;) {
     const double rest = h = end - time;
     left = goal - time;
-    if (h < left || sleepers > 0) keep_start(*this);
+    if (h < left || (def.sleep && !idle())) keep_start(*this);   // waking changes what a later failure must put back
     charge(*this, 1);
     view_obstacles(*this, time, h, left);
     if (idle()) stats.contacts_mean += (stats.contacts - stats.contacts_mean) / double(stats.substeps + 1), step_impulses.idle += h;

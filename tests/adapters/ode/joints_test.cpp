@@ -123,7 +123,7 @@ TEST_P(OdeGripper, LiftsABallAndHoldsIt) {
   dJointSetSliderParam(g.lift, dParamVel, 0.2);
   g.ode.run(0.5, h);
   dJointSetSliderParam(g.lift, dParamVel, 0);
-  g.ode.run(1, h);
+  g.ode.run(2, h);
   EXPECT_NEAR(position(g.palm)[2], 0.15 + 0.1, 2e-3);
   EXPECT_GT(measure(g.ball).com[2], 0.05);
   const double before = g.held();
