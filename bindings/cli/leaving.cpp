@@ -157,9 +157,9 @@ void came_back() { alarm(0); }
 // The dynamic linker binds the calls of every library to the program's own function first, so these see a plugin's _exit, too; a system call in its own machine
 // code they do not.
 #if DEFORM_OWN_EXIT
-extern "C" [[noreturn, gnu::visibility("default")]] void _exit(int code) {
+extern "C" [[gnu::visibility("default")]] void _exit(int code) {   // noreturn by its declaration
   cli::on_leave();
   cli::end_now(code);
 }
-extern "C" [[noreturn, gnu::visibility("default")]] void _Exit(int code) noexcept { _exit(code); }
+extern "C" [[gnu::visibility("default")]] void _Exit(int code) noexcept { _exit(code); }
 #endif

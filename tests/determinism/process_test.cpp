@@ -32,7 +32,7 @@ INSTANTIATE_TEST_SUITE_P(Scenes, Process, testing::ValuesIn(scenes::all), [](con
 
 TEST_P(Process, ThatRestoresASnapshotTakenInContact_EndsWithTheSameBits) {
   const scenes::Scene s = GetParam();
-  int before = s.steps * 6 / 10;
+  int before = s.steps * (s.name == std::string("ball_on_floor") ? 1 : 6) / 10;   // the ball bounces early
   const test::Context c;
   const dfm_world w = s.build(c);
   scenes::advance(w, before);

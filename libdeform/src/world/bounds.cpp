@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdio>
 
 #include "core/error.h"
 #include "surfel/obstacle_shape.h"
@@ -96,8 +97,12 @@ void check_motion_speed(const World &w, const Obstacle &o) {
 }
 
 void check_target_speeds(const World &w, double dt) {
-  for (auto &o : w.obstacles)
-    if (o->has_target) check_speed(w, *o, speed_of(*o, o->pose, o->target, dt), format("in a step of %g s", dt).c_str());
+  for (auto &o : w.obstacles) {
+    if (!o->has_target) continue;
+    char when[40];   // no string: a step allocates nothing
+    std::snprintf(when, sizeof when, "in a step of %g s", dt);
+    check_speed(w, *o, speed_of(*o, o->pose, o->target, dt), when);
+  }
 }
 
 }  // namespace dfm
