@@ -26,7 +26,8 @@ def state_hash(build, scene, folder, threads):
 
 def meshes_present(scene):
     """Some scenes stand on meshes that lie beside the repository and not in it."""
-    return all((scene.parent / body["mesh"]).exists() for body in json.loads(scene.read_text())["bodies"])
+    meshes = [body["mesh"] for body in json.loads(scene.read_text())["bodies"]]
+    return all((scene.parent / mesh).exists() for mesh in meshes if isinstance(mesh, str))  # an object is made, not read
 
 
 def main():

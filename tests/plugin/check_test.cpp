@@ -75,9 +75,14 @@ class BrokenLaw : public testing::TestWithParam<Case> {};
 TEST_P(BrokenLaw, FailsTheRuleThatIsMeantForItAndNoOther) {
   const test::CommandResult r = check(broken(GetParam().law));
   EXPECT_EQ(r.exit_code, 1) << r.out << r.err;
-  std::vector<std::string> expected{GetParam().rule};
-  if (FINDS_RACES && GetParam().law == std::string("shares_a_static")) expected.insert(expected.begin(), "V10");
-  EXPECT_EQ(rules_that("FAIL", r.out), expected) << r.out;
+  const std::vector<std::string> expected{GetParam().rule};
+  std::vector<std::string> failed = rules_that("FAIL", r.out);
+  // A sanitizer build asks a law from several threads (V10). They collide in a shared variable by chance, which ThreadSanitizer does not depend on.
+  if (SANITIZED && GetParam().law == std::string("shares_a_static")) {
+    const bool found = std::erase(failed, "V10") == 1;
+    EXPECT_TRUE(found || !FINDS_RACES) << r.out;
+  }
+  EXPECT_EQ(failed, expected) << r.out;
   const std::string why = sentence(GetParam().rule, r.out);
   EXPECT_NE(lower(why).find(lower(GetParam().says)), std::string::npos) << why;   // a sanitizer that sees it first says "null pointer"
   EXPECT_NE(why.find("; "), std::string::npos) << "a consequence and a remedy: " << why;

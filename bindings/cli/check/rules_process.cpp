@@ -296,7 +296,10 @@ std::string sanitizer_finds_nothing(const Subject &subject) {
     for (int k = 0; k < kRounds; ++k) {
       vary(b, random, 1e-2);
       b.in.dt = 1e-3;
-      law.ops.eval(&b.in, &b.out);
+      {
+        const Kept kept("eval");
+        law.ops.eval(&b.in, &b.out);
+      }
       b.commit();
       for (uint32_t i = 0; i < b.n; ++i) out.push_back(b.out_ft[i]);
     }
