@@ -1,5 +1,4 @@
 // Every law of the shelf at every scale of its inputs: answers are finite, within their limit, and the same bits at the narrowest and the widest vectors.
-#include <filesystem>
 #include <random>
 
 #include "tiny_support.h"
@@ -14,13 +13,8 @@ struct Shelf {
   std::vector<double> params;
   uint32_t nstate = 0;
 
-  // A copy, so that the law chooses its vectors anew.
   Shelf(const std::string &name, const char *simd) {
-    const std::string copy = tiny::folder(std::string("extremes_") + simd) + "/" + name + ".so";
-    std::filesystem::copy_file(std::string(DEFORM_PLUGIN_DIR) + "/" + name + ".so", copy);
-    setenv("DEFORM_SIMD", simd, 1);
-    const dfm_law law = context.open(copy);
-    unsetenv("DEFORM_SIMD");
+    const dfm_law law = tiny::open_at_width(context, name, simd);
     const dfm_type *type = nullptr;
     EXPECT_EQ(dfm_law_type(law, &type), DFM_OK) << dfm_last_error();
     ops = static_cast<const dfm_friction *>(type->ops);

@@ -85,6 +85,16 @@ struct Context {
   }
 };
 
+// A law of the shelf at this width of vectors: a law chooses when its file is loaded, so a copy of the file is loaded.
+inline dfm_law open_at_width(const Context &c, const std::string &name, const char *simd) {
+  const std::string copy = folder("width") + "/" + name + "_" + simd + ".so";
+  std::filesystem::copy_file(std::string(DEFORM_PLUGIN_DIR) + "/" + name + ".so", copy);
+  setenv("DEFORM_SIMD", simd, 1);
+  const dfm_law law = c.open(copy);
+  unsetenv("DEFORM_SIMD");
+  return law;
+}
+
 // A batch of n contacts with every column there is; stride and base are aligned as a plugin may expect.
 struct Batch {
   uint32_t n, stride, nstate;
