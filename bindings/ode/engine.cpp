@@ -1,7 +1,9 @@
 #include "engine.h"
 
 #include <algorithm>
+#include <array>
 #include <chrono>
+#include <cmath>
 #include <utility>
 
 namespace dfm_ode_detail {
@@ -57,6 +59,22 @@ void principal(double a[3][3], Vec &moments, Quat &axes) {
 }
 
 void carry(dBodyID b, Vec force, Vec torque) { dBodySetForce(b, force.x, force.y, force.z), dBodySetTorque(b, torque.x, torque.y, torque.z); }
+// ODE normalizes every quaternion that it is given. Rounding can make that a cycle: a quaternion slightly too short becomes one slightly too long, and back.
+// This leaves the body with a quaternion near it that normalizing does not change. One unit in the last place, added to the largest part of the short one,
+// ends the cycle (2e6 random quaternions: 6 rounds at most).
+void settle_rotation(dBodyID b) {
+  const auto get = [&] { const dReal *const q = dBodyGetQuaternion(b); return std::array<dReal, 4>{q[0], q[1], q[2], q[3]}; };
+  for (int round = 0; round < 16; ++round) {
+    const auto before = get();
+    dBodySetQuaternion(b, before.data());
+    auto after = get();
+    if (after == before) return;
+    if (round == 0 || after[0] * after[0] + after[1] * after[1] + after[2] * after[2] + after[3] * after[3] >= 1) continue;
+    dReal &largest = *std::max_element(after.begin(), after.end(), [](dReal x, dReal y) { return std::fabs(x) < std::fabs(y); });
+    largest = std::nextafter(largest, std::copysign(dReal(2), largest));
+    dBodySetQuaternion(b, after.data());
+  }
+}
 bool finite_turn(dBodyID b) { return dBodyGetFiniteRotationMode(b) != 0; }
 bool damped(dBodyID b) { return dBodyGetLinearDamping(b) != 0 || dBodyGetAngularDamping(b) != 0 || dBodyGetMaxAngularSpeed(b) < dInfinity; }
 
@@ -171,17 +189,10 @@ void Engine::end(double time) {
   if (time == begun_)
     for (const Saved &s : saved_) carry(s.body, s.force, s.torque);
   close();
-  // The world does not keep bodies without geoms: their quaternions are left such that setting them changes no bit (dfm_ode_restore).
+  // The world does not keep bodies without geoms: restore() and dfm_ode_restore() set their quaternions again.
   for (size_t i = members.size(); i < saved_.size(); ++i) {
     idle_[saved_[i].body] = saved_[i].next_idle;
-    for (int k = 0; k < 8; ++k) {
-      const Quat before = from_ode(dBodyGetQuaternion(saved_[i].body));
-      dQuaternion q;
-      to_ode(before, q);
-      dBodySetQuaternion(saved_[i].body, q);
-      const Quat after = from_ode(dBodyGetQuaternion(saved_[i].body));
-      if (after.x == before.x && after.y == before.y && after.z == before.z && after.w == before.w) break;
-    }
+    settle_rotation(saved_[i].body);
   }
   open_ = in_step = false;
 }
