@@ -220,10 +220,11 @@ TEST(Run, StepFarTooLong_StopsWithTheLastGoodState) {
 TEST(Run, ForceBeyondAllBounds_StopsWithTheLastGoodState) {
   const Outcome r = run("diverged", {"--set", "/bodies/1/forces=[{\"box\":[[-1,-1,-1],[1,1,1]],\"total\":[1e300,1e300,0]}]"});
   EXPECT_EQ(r.result.exit_code, 3) << r.result.err;
-  EXPECT_NE(r.result.err.find("body '"), std::string::npos) << r.result.err;   // the one that is pushed, or the one that it strikes first
-  EXPECT_NE(value(value(r.summary, "stopped"), "body"), "null");
+  EXPECT_NE(r.result.err.find("step 0, body 'top'"), std::string::npos) << r.result.err;   // which is pushed, not the one that it would strike
+  EXPECT_EQ(value(value(r.summary, "stopped"), "body"), "\"top\"");
   EXPECT_TRUE(fs::exists(r.out + "/states/last_low.vtu"));
   EXPECT_EQ(value(r.summary, "finite"), "true") << "the state that is kept is the last good one";
+  EXPECT_EQ(value(r.summary, "kinetic_J"), "0");
 }
 
 TEST(Run, Interrupt_WritesTheLastStateAndTheSummary) {

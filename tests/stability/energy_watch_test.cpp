@@ -1,4 +1,5 @@
 // The energy watch: a run that gains energy out of nothing ends early and says so; work that is really done is no gain.
+#include <filesystem>
 #include <random>
 
 #include "step_energy.h"
@@ -129,6 +130,35 @@ TEST(EnergyWatch, OfAScene_IsReadAndReported) {
     EXPECT_EQ(no.exit_code, 2);
     EXPECT_NE(no.err.find("/contact/energy_watch"), std::string::npos) << no.err;
   }
+}
+
+// A model whose dampers push instead of braking, beside a body that is sound: the run stops, says which and when, and keeps its last good state.
+TEST(EnergyWatch, OfARunThatAModelPumps_ExitsWithThree) {
+  const std::string out = test::scratch("energy_watch_pumped"), scene = out + "/scene.json";
+  test::write_file(scene, R"({"format": "deform-scene", "version": 1, "time": {"duration": 30, "step": "auto"},
+    "bodies": [{"name": "sound", "mesh": ")" + kBar + R"(", "pose": {"position": [0, 2, 0]}, "spin": [0, 0, 9]},
+               {"name": "pumped", "mesh": ")" + kBar + R"(", "model": {"type": "org.tiny.pump"}, "spin": [0, 0, 9]}],
+    "gravity": [0, 0, 0], "output": {"every": 1, "states": true}})");
+  std::filesystem::create_directories(out + "/plugins");
+  std::filesystem::copy_file(std::string(DEFORM_BINARY_DIR) + "/lib/tiny/tiny_pump.so", out + "/plugins/tiny_pump.so",
+                             std::filesystem::copy_options::overwrite_existing);
+  const auto run = [&](const std::vector<std::string> &more) {
+    std::vector<std::string> all{"run", scene, "--quiet", "--out", out + "/run"};
+    all.insert(all.end(), more.begin(), more.end());
+    setenv("DEFORM_PLUGIN_PATH", (out + "/plugins").c_str(), 1);
+    const test::CommandResult result = test::deform(all);
+    unsetenv("DEFORM_PLUGIN_PATH");
+    return result;
+  };
+  const test::CommandResult r = run({});
+  EXPECT_EQ(r.exit_code, 3) << r.err;
+  for (const char *part : {"stopped at step ", "body 'pumped'", "beyond what loads, motions and contact have put in", "last good state"})
+    EXPECT_NE(r.err.find(part), std::string::npos) << part << ": " << r.err;
+  EXPECT_TRUE(std::filesystem::exists(out + "/run/states/last_pumped.vtu"));
+  const std::string summary = test::read_file(out + "/run/summary.json");
+  EXPECT_NE(summary.find("\"body\": \"pumped\""), std::string::npos) << summary;
+  const test::CommandResult blind = run({"--time", "0.5", "--set", "/contact/energy_watch=0"});
+  EXPECT_EQ(blind.exit_code, 0) << blind.err;
 }
 
 // Forces of 940 N were reported at 1e-12 s, of 7e8 N at 1e-15 s.

@@ -61,7 +61,7 @@ DFM_API dfm_status dfm_world_set_sleep(dfm_world world, bool sleep);
 enum {
   DFM_TROUBLE_SUBSTEPS = 1,      /* dt is above the stable step, sub-steps were taken: soften, coarsen, or accept the cost */
   DFM_TROUBLE_UNCONVERGED = 2,   /* the contact solve met its cap: raise max_sweeps, or lower mass ratios */
-  DFM_TROUBLE_NONFINITE = 4,     /* a plugin or a load made a NaN: the last good sub-step is kept (status DFM_E_DIVERGED) */
+  DFM_TROUBLE_NONFINITE = 4,     /* a plugin or a load made a NaN or a velocity above that of light: the last good sub-step is kept (DFM_E_DIVERGED) */
   DFM_TROUBLE_INVERTED = 8,      /* a cell is inside out (looked for when the step bound is asked): refine, soften the load */
   DFM_TROUBLE_PLUGIN = 16,       /* a plugin failed: see the log */
   DFM_TROUBLE_OVERLAP = 32,      /* told once, by the step after something was made or put inside something else: dfm_world_overlaps lists the pairs; move

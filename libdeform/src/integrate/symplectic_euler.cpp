@@ -13,19 +13,21 @@ Point *points(Array<double> &a) { return reinterpret_cast<Point *>(a.data()); }
 
 }  // namespace
 
-bool predict(Phyxels &p, Vec3 gravity, double h, double *kinetic) {
+bool predict(Phyxels &p, Vec3 gravity, double h, double limit, double *kinetic) {
   const Point g{gravity.x, gravity.y, gravity.z, 0};
   const Point *const v = points(p.v), *const w = points(p.inv_mass), *const f = points(p.f);
   Point *const free = points(p.v_free);
-  Point poison{0, 0, 0, 0};  // stays zero unless a value is infinite or NaN
+  const Point most = Point{} + limit * limit;
+  auto fits = most == most;   // all bits set, until a value is too large or none
   Point square{0, 0, 0, 0};
   for (uint32_t i = 0; i < p.n; ++i) {
     free[i] = v[i] + h * (w[i] * (f[i] + p.mass[i] * g));
-    poison += free[i] * 0.0;
-    square += p.mass[i] * (free[i] * free[i]);
+    const Point squares = free[i] * free[i];
+    fits &= squares <= most;
+    square += p.mass[i] * squares;
   }
   *kinetic = 0.5 * ((square[0] + square[1]) + square[2]);
-  return poison[0] + poison[1] + poison[2] + poison[3] == 0;
+  return (fits[0] & fits[1] & fits[2]) != 0;
 }
 
 void commit(Phyxels &p, bool touched, double h) {

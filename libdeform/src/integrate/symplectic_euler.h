@@ -5,8 +5,9 @@
 
 namespace dfm {
 
-// v_free for free components; held components keep the velocity they carry. Returns false if a value is not finite. kinetic: J, of v_free.
-bool predict(Phyxels &p, Vec3 gravity, double h, double *kinetic);
+// v_free for free components; held components keep the velocity they carry. Returns false if a component is not finite or above limit (m/s).
+// kinetic: J, of v_free.
+bool predict(Phyxels &p, Vec3 gravity, double h, double limit, double *kinetic);
 // v = v_free + M^-1 impulse (impulse may be absent: `touched` false), x += h v.
 void commit(Phyxels &p, bool touched, double h);
 

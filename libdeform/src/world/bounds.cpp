@@ -11,7 +11,6 @@
 namespace dfm {
 namespace {
 
-constexpr double kLight = 299792458;            // m/s
 constexpr double kUnit = 2.220446049250313e-16; // spacing of doubles at 1
 constexpr double kUnits = 64;                   // of them a rest distance has to span
 constexpr double kOfThickness = 0.1;            // the rest distance is no more than this share of the thinnest body

@@ -6,6 +6,7 @@
 
 namespace dfm {
 
+inline constexpr double kLight = 299792458;     // m/s: no component of a velocity is above it
 inline constexpr double kObstacleSpeed = 200;   // m/s, unless the world's def says otherwise
 
 struct Body;
