@@ -78,8 +78,9 @@ inline dfm_body make_hook(dfm_world w, const HookOptions &o) {
   return body;
 }
 
-inline dfm_world make_self_world(dfm_context *c, bool self = true, std::array<double, 3> gravity = {0, 0, 0}) {
+inline dfm_world make_self_world(dfm_context *c, bool self = true, std::array<double, 3> gravity = {0, 0, 0}, uint32_t flags = 0) {
   dfm_world_def d = dfm_world_def_default();
+  d.flags = flags;
   for (int k = 0; k < 3; ++k) d.gravity[k] = gravity[k];
   d.self_contact = self;
   dfm_world w = 0;

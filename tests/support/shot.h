@@ -30,8 +30,9 @@ struct Shot {
   std::vector<Wall> walls;                       // obstacles and rigid bodies that are looked at, as triangles in their frames
   std::function<void(int)> before;               // each step
 
-  Shot(bool guarded, unsigned seed, uint32_t threads = 1) : context(threads), random(seed) {
+  Shot(bool guarded, unsigned seed, uint32_t threads = 1, uint32_t self = 0) : context(threads), random(seed) {
     dfm_world_def d = dfm_world_def_default();
+    d.self_contact = self;
     d.flags = guarded ? 0 : DFM_WORLD_UNGUARDED;
     d.gravity[2] = 0;
     ok(dfm_world_create(context, &d, &world));
@@ -56,7 +57,9 @@ struct Shot {
     for (int k = 0; k < 3; ++k) d.velocity[k] = velocity[size_t(k)], d.spin[k] = spin[size_t(k)];
     walls.push_back({box_surface(half, 1), 0, create(world, {d})[0]});
   }
-  size_t crossings() const {
+  // Between two surfaces; what a body does to itself counts where the world's self contact is on.
+  size_t crossings() const { return count().between; }
+  crossing::Found count() const {
     std::vector<std::vector<double>> x;
     std::vector<crossing::Surface> surfaces;
     x.reserve(bodies.size() + walls.size());
@@ -80,7 +83,7 @@ struct Shot {
       }
       surfaces.push_back({x.back().data(), uint32_t(x.back().size() / 3), w.surface.tris.data(), uint32_t(w.surface.tris.size() / 3), true});
     }
-    return crossing::Counter().count(surfaces, crossing::Touching::counts).between;   // a body folded onto itself is not the guard's affair
+    return crossing::Counter().count(surfaces, crossing::Touching::counts);
   }
   Vec momentum(double *scale = nullptr) const {
     Vec sum{};

@@ -34,15 +34,19 @@ Fit fit(uint32_t n, Point r, Vector d) {
   return {(1.0 / n) * sum, theta};
 }
 
+Vec3 mean_place(const Surface &s) {
+  Vec3 sum;
+  for (uint32_t i = 0; i < s.nsurfel; ++i) sum += load3(&s.x[4 * size_t{i}]);
+  return (1.0 / s.nsurfel) * sum;
+}
+
 }  // namespace
 
 SelfList::SelfList(const Memory &m, const Surface &surface) : surface_(surface), tree_(m) { use_memory(m, x_, vf_, ee_, stack_); }
 
 double SelfList::displaced() {
   const Surface &s = surface_;
-  Vec3 sum;
-  for (uint32_t i = 0; i < s.nsurfel; ++i) sum += load3(&s.x[4 * size_t{i}]);
-  const Vec3 now = (1.0 / s.nsurfel) * sum;
+  const Vec3 now = mean_place(s);
   const auto place = [&](uint32_t i) { return rotate(turn_, load3(&x_[4 * size_t{i}]) - centre_); };
   const auto off = [&](uint32_t i) { return load3(&s.x[4 * size_t{i}]) - now - place(i); };
   const Vec3 half = 0.5 * fit(s.nsurfel, place, off).theta;
@@ -55,11 +59,11 @@ double SelfList::displaced() {
   return std::sqrt(most);
 }
 
-// What one of two features adds to the reach of their contact. Velocities are v = mean + omega x r + rest, and two vertices of a pair are no
-// further apart than the reach and two edges, so |relative speed| <= 2 |rest| + |omega| (reach + 2 edges).
-double SelfList::share(double h, double offset, double growth, double moved) const {
+// Velocities are v = mean + omega x r + rest.
+SelfList::Motion SelfList::motion(double h) const {
   const Surface &s = surface_;
-  const auto place = [&](uint32_t i) { return load3(&s.x[4 * size_t{i}]) - centre_; };
+  const Vec3 centre = mean_place(s);
+  const auto place = [&](uint32_t i) { return load3(&s.x[4 * size_t{i}]) - centre; };
   const auto v = [&](uint32_t i) { return load3(&s.v[4 * size_t{i}]); };
   Fit f = fit(s.nsurfel, place, v);
   if (!(4 * h * norm(f.theta) < 1)) f.theta = {};
@@ -68,32 +72,52 @@ double SelfList::share(double h, double offset, double growth, double moved) con
   const Vec3 mean = (1.0 / s.nsurfel) * sum;
   double most = 0;
   for (uint32_t i = 0; i < s.nsurfel; ++i) most = std::max(most, norm2(v(i) - cross(f.theta, place(i)) - mean));
-  const double turn = growth * h * norm(f.theta);
-  return (reach_share(h, offset, growth * std::sqrt(most)) + 2 * turn * (longest_ + 2 * moved)) / (1 - 2 * std::min(turn, 0.3));
+  return {norm(f.theta), std::sqrt(most)};
 }
+
+// What one of two features adds to the reach of their contact. Two vertices of a pair are no further apart than the reach and two edges, so
+// |relative speed| <= 2 |rest| + |omega| (reach + 2 edges).
+double SelfList::share(double h, double offset, double growth) const {
+  const double turn = growth * h * motion_.turn;
+  return (reach_share(h, offset, growth * motion_.speed) + 2 * turn * (longest_ + 2 * moved_)) / (1 - 2 * std::min(turn, 0.3));
+}
+
+// What one of two features adds to the distance from which they come to each other in the sub-step. On straight ways the rigid part of a motion is
+// |r + h omega x r| >= |r|: it brings nothing together.
+double SelfList::covers(double h, double offset, double change) const { return offset + h * (motion_.speed + change); }
 
 bool SelfList::update(double h, double offset) {
   const Surface &s = surface_;
   if (s.ntri == 0) return false;
+  motion_ = motion(h);
   if (margin_ >= 0) {
-    const double moved = displaced();
-    if (kRounding * (moved + share(h, offset, 1, moved)) <= margin_) return false;
+    moved_ = displaced();
+    if (kRounding * (moved_ + share(h, offset, 1)) <= margin_) return false;
   }
+  renew(h, offset, 0);
+  return true;
+}
+
+bool SelfList::cover(double h, double offset, double change) {
+  if (surface_.ntri == 0 || kRounding * (moved_ + covers(h, offset, change)) <= margin_) return false;
+  renew(h, offset, change);
+  return true;
+}
+
+void SelfList::renew(double h, double offset, double change) {
+  const Surface &s = surface_;
   margin_ = -1;   // until the lists are whole: a refused allocation leaves none that anyone believes
   x_.assign(s.x.begin(), s.x.end());
-  Vec3 sum;
-  for (uint32_t i = 0; i < s.nsurfel; ++i) sum += load3(&x_[4 * size_t{i}]);
-  centre_ = (1.0 / s.nsurfel) * sum, turn_ = {}, longest_ = 0;
+  centre_ = mean_place(s), turn_ = {}, longest_ = moved_ = 0;
   for (uint32_t e = 0; e < s.nedge; ++e)
     longest_ = std::max(longest_, norm(load3(&x_[4 * size_t{s.edge[2 * size_t{e}]}]) - load3(&x_[4 * size_t{s.edge[2 * size_t{e} + 1]}])));
   if (!tree_.empty()) tree_.refit(s, x_.data());
   if (tree_.empty() || tree_.quality() > kQualityLimit) tree_.build(s, x_.data());
-  const double now = share(h, offset, kSpeedGrowth, 0);
+  const double now = std::max(share(h, offset, kSpeedGrowth), covers(h, offset, kSpeedGrowth * change));
   const double skin = std::clamp(skin_steps_ * 0.5 * (now - offset), kSkinLeast * s.median_edge, kSkinMost * s.median_edge);
   const double margin = kRounding * now + skin;
   list(kRounding * 2 * margin + self_recovery_depth(s));
-  margin_ = margin;
-  return true;
+  margin_ = margin, ++renewals_;
 }
 
 void SelfList::list(double limit) {

@@ -17,6 +17,18 @@ class SelfList {
 
   // Renews what is out of date; true if the lists changed. h in s; offset d_c in m. Results never depend on when lists were made.
   bool update(double h, double offset);
+  // After update(), at the same positions: the same lists, made anew where they do not cover the way that the sub-step takes after its solve. change: m/s, by
+  // how much the solve has changed the velocity of any surfel.
+  bool cover(double h, double offset, double change);
+  // m/s: no surfel was faster than that at the last update(), beyond the rigid motion that fits best.
+  double deforming() const { return motion_.speed; }
+  // How often the lists were made.
+  uint64_t renewals() const { return renewals_; }
+  // f(triangle, triangle) for pairs whose boxes may meet now; each pair once.
+  template <class F>
+  void near_triangles(F &&f) {
+    near_self_pairs(tree_, (1 + 1e-9) * 2 * moved_, stack_, [&](uint32_t p, uint32_t q, double) { f(tree_.triangles()[p], tree_.triangles()[q]); });
+  }
   // Ascending by (a, b).
   const Array<SelfPair> &vertex_face() const { return vf_; }
   const Array<SelfPair> &edge_edge() const { return ee_; }
@@ -24,8 +36,12 @@ class SelfList {
   void set_skin_steps(double steps) { skin_steps_ = steps; }
 
  private:
+  struct Motion { double turn = 0, speed = 0; };   // rad/s; m/s, largest beyond the rigid motion that fits best
   double displaced();                      // m, largest since the lists were made, beyond a rigid motion
-  double share(double h, double offset, double growth, double moved) const;
+  Motion motion(double h) const;
+  double share(double h, double offset, double growth) const;
+  double covers(double h, double offset, double change) const;
+  void renew(double h, double offset, double change);
   void list(double limit);
   const Surface &surface_;
   double skin_steps_ = 24, margin_ = -1;   // negative: no lists yet
@@ -33,7 +49,9 @@ class SelfList {
   Array<double> x_;                        // [nsurfel,4] when the lists were made
   Vec3 centre_;                            // of x_
   Quat turn_;                              // that fitted best at the last look
-  double longest_ = 0;                     // m, edge of x_
+  double longest_ = 0, moved_ = 0;         // m, edge of x_; what displaced() said at the last update()
+  Motion motion_;
+  uint64_t renewals_ = 0;
   Array<SelfPair> vf_, ee_;
   Array<PairOfTriangles> stack_;
 };

@@ -14,6 +14,7 @@
 #include "narrow/self_contact.h"
 
 #include <algorithm>
+#include <initializer_list>
 
 #include "narrow/detail.h"
 #include "surfel/area.h"
@@ -49,18 +50,60 @@ struct Kin {
   double side;                         // 1: kept apart outside, -1: within, 0: where it is
 };
 
+class RestShape {
+ public:
+  RestShape(const Surface &surface, const SelfRest &rest, double offset) : s_(surface), rest_(rest), offset_(offset) {}
+
+  Kin of_face(uint32_t surfel, uint32_t t) const {
+    const uint32_t *const c = &s_.tri[3 * size_t{t}];
+    const Vec3 p = rest_.at(surfel), a = rest_.at(c[0]), b = rest_.at(c[1]), d = rest_.at(c[2]);
+    const TrianglePoint q = closest_on_triangle(p, a, b, d);
+    const double distance = std::sqrt(q.distance2);
+    return kin(distance, dot(normalized(cross(b - a, d - a)), p - q.point) / distance);
+  }
+  Kin of_edges(uint32_t a, uint32_t b) const {
+    const uint32_t *const ea = &s_.edge[2 * size_t{a}], *const eb = &s_.edge[2 * size_t{b}];
+    const Vec3 a0 = rest_.at(ea[0]), a1 = rest_.at(ea[1]), b0 = rest_.at(eb[0]), b1 = rest_.at(eb[1]);
+    const SegmentPoints at = closest_segments(a0, a1, b0, b1);
+    const Vec3 across = a0 + at.s * (a1 - a0) - (b0 + at.t * (b1 - b0));
+    Vec3 up;
+    for (const uint32_t t : {s_.edge_tri[2 * size_t{b}], s_.edge_tri[2 * size_t{b} + 1]}) {
+      if (t == kNone) continue;
+      const uint32_t *const c = &s_.tri[3 * size_t{t}];
+      up += normalized(cross(rest_.at(c[1]) - rest_.at(c[0]), rest_.at(c[2]) - rest_.at(c[0])));
+    }
+    const double distance = norm(across);
+    return kin(distance, dot(normalized(up), across) / distance);
+  }
+
+ private:
+  // By the distance at rest and the cosine between the way across and the outward normal there.
+  Kin kin(double at_rest, double facing) const {
+    if (!(at_rest > kClosed * offset_)) return {0, 0};
+    return {std::min(offset_, 0.5 * at_rest), at_rest >= rest_.thin || facing > kThrough ? 1.0 : facing < -kThrough ? -1.0 : 0.0};
+  }
+  const Surface &s_;
+  const SelfRest &rest_;
+  double offset_;
+};
+
 struct Self {
   const BodyView &body;
-  const SelfRest &rest;
   const Surface &s;
+  RestShape rest;
   double h, offset, depth, edge_depth;  // depth: m, recovery
+  const Tangled &tangled;
   Pair pair;
   Array<ContactPoint> &out;
 
-  Self(const BodyView &b, const SelfRest &r, double step, double d_c, Array<ContactPoint> &to)
-      : body(b), rest(r), s(*b.surface), h(step), offset(d_c), depth(self_recovery_depth(s)), edge_depth(edge_recovery_depth(s, s)),
-        pair{b, &b, nullptr, step, d_c, 0}, out(to) {}
+  Self(const BodyView &b, const SelfRest &r, double step, double d_c, const Tangled &t, Array<ContactPoint> &to)
+      : body(b), s(*b.surface), rest(s, r, d_c), h(step), offset(d_c), depth(self_recovery_depth(s)), edge_depth(edge_recovery_depth(s, s)),
+        tangled(t), pair{b, &b, nullptr, step, d_c, 0}, out(to) {}
 
+  // Is what stands on the wrong side really through?
+  bool through(std::initializer_list<uint32_t> a, std::initializer_list<uint32_t> b) const {
+    return !tangled || (std::any_of(a.begin(), a.end(), tangled) && std::any_of(b.begin(), b.end(), tangled));
+  }
   Vec3 x(uint32_t surfel) const { return pair.xa(surfel); }
   Vec3 v(uint32_t surfel) const { return pair.va(surfel); }
   const uint32_t *corners(uint32_t t) const { return &s.tri[3 * size_t{t}]; }
@@ -77,9 +120,6 @@ struct Self {
   bool yields(uint32_t t, double distance2, uint32_t other, uint32_t surfel) const;
   bool minimum(uint32_t surfel, uint32_t t, const TrianglePoint &at) const;
   Vec3 outward(uint32_t surfel, uint32_t t, const TrianglePoint &at) const;
-  Kin kin(double at_rest, double facing) const;
-  Kin kin_of_face(uint32_t surfel, uint32_t t) const;
-  Kin kin_of_edges(uint32_t a, uint32_t b) const;
   void vertex_face(uint32_t surfel, uint32_t t);
   void edge_edge(uint32_t a, uint32_t b);
   void name(size_t begin);
@@ -132,35 +172,6 @@ Vec3 Self::outward(uint32_t surfel, uint32_t t, const TrianglePoint &at) const {
   return sum;
 }
 
-// By the distance at rest and the cosine between the way across and the outward normal there.
-Kin Self::kin(double at_rest, double facing) const {
-  if (!(at_rest > kClosed * offset)) return {0, 0};
-  return {std::min(offset, 0.5 * at_rest), at_rest >= rest.thin || facing > kThrough ? 1.0 : facing < -kThrough ? -1.0 : 0.0};
-}
-
-Kin Self::kin_of_face(uint32_t surfel, uint32_t t) const {
-  const uint32_t *const c = corners(t);
-  const Vec3 p = rest.at(surfel), a = rest.at(c[0]), b = rest.at(c[1]), d = rest.at(c[2]);
-  const TrianglePoint q = closest_on_triangle(p, a, b, d);
-  const double distance = std::sqrt(q.distance2);
-  return kin(distance, dot(normalized(cross(b - a, d - a)), p - q.point) / distance);
-}
-
-Kin Self::kin_of_edges(uint32_t a, uint32_t b) const {
-  const uint32_t *const ea = &s.edge[2 * size_t{a}], *const eb = &s.edge[2 * size_t{b}];
-  const Vec3 a0 = rest.at(ea[0]), a1 = rest.at(ea[1]), b0 = rest.at(eb[0]), b1 = rest.at(eb[1]);
-  const SegmentPoints at = closest_segments(a0, a1, b0, b1);
-  const Vec3 across = a0 + at.s * (a1 - a0) - (b0 + at.t * (b1 - b0));
-  Vec3 up;
-  for (const uint32_t t : {s.edge_tri[2 * size_t{b}], s.edge_tri[2 * size_t{b} + 1]}) {
-    if (t == kNone) continue;
-    const uint32_t *const c = corners(t);
-    up += normalized(cross(rest.at(c[1]) - rest.at(c[0]), rest.at(c[2]) - rest.at(c[0])));
-  }
-  const double distance = norm(across);
-  return kin(distance, dot(normalized(up), across) / distance);
-}
-
 void Self::vertex_face(uint32_t surfel, uint32_t t) {
   const uint32_t *const c = corners(t);
   const Vec3 p = x(surfel), a = x(c[0]), u = x(c[1]) - a, w = x(c[2]) - a, n = cross(u, w);
@@ -173,8 +184,9 @@ void Self::vertex_face(uint32_t surfel, uint32_t t) {
   const bool face = at.feature == TriangleFeature::face;
   const Vec3 up = outward(surfel, t, at);
   const double distance = std::sqrt(at.distance2), now = (face ? along : dot(up, p - at.point)) < 0 ? -1 : 1;
-  const Kin k = kin_of_face(surfel, t);
-  const double side = k.side != 0 ? k.side : now;
+  const Kin k = rest.of_face(surfel, t);
+  double side = k.side != 0 ? k.side : now;
+  if (now != side && face && distance <= depth && !through({surfel}, {c[0], c[1], c[2]})) side = now;
   if (!(k.apart > 0) || !(now == side ? distance < reach : face && distance <= depth)) return;
   if (!face && !(distance > 1e-9 * s.median_edge)) return;
   const Vec3 normal = face ? side * up : (1 / distance) * (p - at.point);
@@ -202,7 +214,7 @@ void Self::edge_edge(uint32_t a, uint32_t b) {
   const double reach = contact_reach(h, offset, std::sqrt(speed2)), widest = std::max(reach, edge_depth);
   if (!(nr * nr < widest * widest * nn)) return;
   if (place_on_edge(on_a, 2 * h * std::sqrt(speed2 / uu)) != kBetween || place_on_edge(on_b, 2 * h * std::sqrt(speed2 / ww)) != kBetween) return;
-  const Kin k = kin_of_edges(a, b);
+  const Kin k = rest.of_edges(a, b);
   if (!(k.apart > 0)) return;
   // An edge that is flat folds out where the blow bends its faces, by what they may move against each other within the sub-step.
   const double bent = std::min(0.3, 2 * h * std::sqrt(speed2 / std::min(uu, ww))) - kConvex;
@@ -215,7 +227,7 @@ void Self::edge_edge(uint32_t a, uint32_t b) {
   Vec3 normal = (1 / std::sqrt(nn)) * n;
   if (dot(normal, up_b) < dot(normal, up_a)) normal = -normal;
   const double distance = dot(normal, r);
-  if (!(distance < reach && distance >= -edge_depth)) return;
+  if (!(distance < reach && distance >= -edge_depth) || (distance < 0 && !through({ea[0], ea[1]}, {eb[0], eb[1]}))) return;
   const double slack = kCone + std::min(0.3, reach / std::sqrt(std::min(uu, ww)));
   if (!fb.leans_out(normal, slack) || !fa.leans_out(-normal, slack)) return;
   ContactPoint c = blank(pair, kEdgeEdge, 1, a, b);
@@ -268,14 +280,19 @@ void Self::share_areas(size_t begin, size_t edges, Array<uint8_t> &lent) {
 }  // namespace
 
 void find_self_contacts(const BodyView &body, const SelfRest &rest, std::span<const SelfPair> vertex_face, std::span<const SelfPair> edge_edge,
-                        double h, double offset, Array<uint8_t> &lent, Array<ContactPoint> &out) {
-  Self self(body, rest, h, offset, out);
+                        double h, double offset, const Tangled &tangled, Array<uint8_t> &lent, Array<ContactPoint> &out) {
+  Self self(body, rest, h, offset, tangled, out);
   const size_t begin = out.size();
   for (const SelfPair &pair : vertex_face) self.vertex_face(pair.a, pair.b);
   const size_t edges = out.size();
   for (const SelfPair &pair : edge_edge) self.edge_edge(pair.a, pair.b);
   self.name(begin);
   self.share_areas(begin, edges, lent);
+}
+
+double self_apart(const Surface &surface, const SelfRest &rest, ContactKind kind, uint32_t a, uint32_t b, double offset) {
+  const RestShape shape(surface, rest, offset);
+  return (kind == kEdgeEdge ? shape.of_edges(a, b) : shape.of_face(a, b)).apart;
 }
 
 }  // namespace dfm

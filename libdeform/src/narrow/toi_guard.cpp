@@ -207,7 +207,7 @@ void guard_near(GuardScene &scene, const Array<Candidate> &list, GuardMemory &me
   for (GuardMemory::Run &run : memory.runs) {
     const Candidate &c = list[run.begin];
     const GuardSide &a = scene.side(c, false), &b = scene.side(c, true);
-    run.travel = std::min(a.travel + b.travel, norm(a.drift - b.drift) + a.spread + b.spread);
+    run.travel = &a == &b ? 2 * a.deform : std::min(a.travel + b.travel, norm(a.drift - b.drift) + a.spread + b.spread);
     if (a.still && b.still) continue;
     if (c.obstacle && scene.obstacles[c.slot_b].shape != Shape::mesh) obstacles.look(run);
     else pairs.look(run);

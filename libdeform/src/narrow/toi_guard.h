@@ -38,6 +38,7 @@ struct GuardSide {
   double travel = 0;                  // m, bounds the way of any surfel
   Vec3 drift;                         // m, a way common to all surfels, from which
   double spread = 0;                  // m, none differs by more
+  double deform = 0;                  // m, none moves by more beyond a rigid motion of all; of bodies that may touch themselves
   Array<double> end;                  // [nsurfel,4], where `stamp` is the scene's round
   Array<uint32_t> stamp;
 };

@@ -93,13 +93,11 @@ const char *stage_name(StageId id) {
   return "?";
 }
 
-bool Plan::touches() const {
-  return std::any_of(stages.begin(), stages.end(), [](const PlannedStage &s) { return s.id == StageId::solve || s.id == StageId::rollback; });
+bool Plan::has(StageId id) const {
+  return std::any_of(stages.begin(), stages.end(), [&](const PlannedStage &s) { return s.id == id; });
 }
-
-bool Plan::rolls_back() const {
-  return std::any_of(stages.begin(), stages.end(), [](const PlannedStage &s) { return s.id == StageId::rollback; });
-}
+bool Plan::touches() const { return has(StageId::solve) || has(StageId::rollback); }
+bool Plan::rolls_back() const { return has(StageId::rollback); }
 
 Plan make_plan(const SceneFacts &f) {
   if (f.rollback && f.self_bodies)
@@ -154,8 +152,10 @@ Plan make_plan(const SceneFacts &f) {
   }
   if (f.rigid_bodies && !pairs && !f.self_bodies) run(StageId::rigid_commit, "ends of " + rigids);
   if (f.rollback) leave("guard", "contact.method is rollback");
-  else if (pairs && !f.unguarded) run(StageId::guard, "nothing crosses at the end of a sub-step: " + count(pairs, "pair", "pairs"));
-  else if (pairs) leave("guard", "switched off (contact.guard): what moves further than contacts reach in one sub-step may cross");
+  else if ((pairs || f.self_bodies) && !f.unguarded)
+    run(StageId::guard, "nothing crosses at the end of a sub-step: " + count(pairs, "pair", "pairs") +
+                            (f.self_bodies ? ", " + count(f.self_bodies, "body with itself", "bodies with themselves") : ""));
+  else if (pairs || f.self_bodies) leave("guard", "switched off (contact.guard): what moves further than contacts reach in one sub-step may cross");
   if (f.bodies) run(StageId::commit, "positions and velocities at the end of the sub-step");
   if (f.bodies && f.sleep) run(StageId::sleep, "islands at rest leave the stages above until something reaches them (contact.sleep)");
   else leave("sleep", f.bodies ? "not asked for (contact.sleep)" : "no body");

@@ -39,6 +39,7 @@ struct Plan {
   std::vector<PlannedStage> stages;                    // in the order of a sub-step
   std::vector<AbsentStage> absent;
   std::vector<PlannedEffect> effects;
+  bool has(StageId id) const;
   bool touches() const;                                // has contact stages
   bool rolls_back() const;                             // and they are those of the roll-back
 };

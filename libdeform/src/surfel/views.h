@@ -53,4 +53,8 @@ struct Candidate {
                                       // triangle of the mesh, two edges, vertex of the mesh and triangle of a (kind 2)
 };
 
+// Of a Candidate or a ContactPoint: does a body meet itself?
+template <class Pair>
+bool of_one_body(const Pair &p) { return !p.obstacle && p.slot_a == p.slot_b; }
+
 }  // namespace dfm

@@ -14,6 +14,8 @@
 
 #include "narrow/detail.h"
 #include "surfel/obstacle_shape.h"
+#include "surfel/pierce.h"
+#include "surfel/reach.h"
 #include "world/world.h"
 
 namespace dfm {
@@ -45,8 +47,10 @@ void bound_speeds(World &w) {
     const Vec3 y = load3(&w.rows.y[size_t(d) * kStride]), change = y - load3(&b.p.v_free[size_t(w.rows.point[d]) * kStride]);
     g.speed[i] = std::max(g.speed[i], norm2(y)), g.change[i] = std::max(g.change[i], norm2(change));
   }
+  const bool listed = w.plan.has(StageId::broad);   // else nothing has looked at the speeds before the solve
   for (const uint32_t i : w.active) {
     const Body &b = *w.bodies[i];
+    const double before = listed ? w.broad.speed(i) : largest_speed(b.surface);
     double &speed = g.speed[i];
     speed = std::sqrt(speed), g.change[i] = b.surface.weight_sum * std::sqrt(g.change[i]);
     if (b.model.stepper) {   // has written its end beside its start
@@ -56,9 +60,26 @@ void bound_speeds(World &w) {
         speed = std::max(speed, norm(x - load3(&b.surface.x[size_t(s) * 4])) / w.h);
       }
     } else {
-      speed = b.surface.identity() ? std::max(speed, w.broad.speed(i)) : w.broad.speed(i) + g.change[i];
+      speed = b.surface.identity() ? std::max(speed, before) : before + g.change[i];
     }
   }
+}
+
+// All pairs that may come near: candidates of two sides, behind them those of bodies with themselves.
+void follow_lists(World &w) {
+  Guard &g = w.guard;
+  const bool pairs = w.plan.has(StageId::broad);
+  if (pairs) w.broad.cover(w.body_views, w.obstacle_views, w.filter, w.h, w.offset, g.speed);
+  const bool fresh = cover_self(w);
+  const uint64_t renewals = w.broad.stats().renewals;
+  if (!fresh && !g.memory.runs.empty() && g.lists == renewals) return;
+  g.list = &w.broad.candidates(), g.lists = renewals;
+  if (!w.self_bodies.empty()) {
+    g.joined.clear();
+    if (pairs) g.joined.insert(g.joined.end(), g.list->begin(), g.list->end());
+    join_self(w, g.joined), g.list = &g.joined;
+  }
+  g.memory.follow(*g.list);
 }
 
 void make_room(GuardSide &s, const Surface &surface) {
@@ -85,6 +106,10 @@ void set_sides(World &w) {
     }
     s.v = b.p.v_free.data(), s.inv_mass = b.p.inv_mass.data(), s.impulse = touched ? b.p.impulse.data() : nullptr;
     s.to = b.model.stepper ? b.p.f.data() : nullptr, s.local = nullptr;
+  }
+  for (const auto &b : w.self_bodies) {
+    GuardSide &s = scene.sides[b->body->slot];
+    s.deform = b->body->model.stepper ? s.travel : w.h * (b->list.deforming() + w.guard.change[b->body->slot]);
   }
   for (size_t o = 0; o < w.obstacles.size(); ++o) {
     const ObstacleView &v = w.obstacle_views[o];
@@ -117,21 +142,6 @@ void set_share(World &w, double share) {
   }
 }
 
-bool share_a_corner(const uint32_t *l, const uint32_t *r) {
-  for (int i = 0; i < 9; ++i)
-    if (l[i / 3] == r[i % 3]) return true;
-  return false;
-}
-
-bool pierces(const Surface &s, Vec3 p, Vec3 q, uint32_t triangle) {
-  const uint32_t *const c = &s.tri[3 * size_t{triangle}];
-  Vec3 x[3];
-  for (int k = 0; k < 3; ++k) x[k] = load3(&s.x[4 * size_t{c[k]}]);
-  if (!(tet_volume(x[0], x[1], x[2], p) * tet_volume(x[0], x[1], x[2], q) < 0)) return false;
-  const double v0 = tet_volume(p, q, x[0], x[1]), v1 = tet_volume(p, q, x[1], x[2]), v2 = tet_volume(p, q, x[2], x[0]);
-  return (v0 >= 0 && v1 >= 0 && v2 >= 0) || (v0 <= 0 && v1 <= 0 && v2 <= 0);
-}
-
 // Two surfaces that cross at the start (as given by the user) are let out: what is through cannot be kept out, and to guard it would keep it in.
 bool cross_at_start(World &w, const Candidate &c) {
   Guard &g = w.guard;
@@ -140,15 +150,8 @@ bool cross_at_start(World &w, const Candidate &c) {
     if (t.a == slot_a && t.b == slot_b && t.obstacle == bool(c.obstacle)) return t.yes;
   const Surface &a = *w.body_views[slot_a].surface, &b = c.obstacle ? *w.obstacle_views[slot_b].surface : *w.body_views[slot_b].surface;
   bool yes = false;
-  const auto edges_through = [&](const Surface &from, uint32_t s, const Surface &to, uint32_t t) {
-    for (int k = 0; k < 3 && !yes; ++k)
-      yes = pierces(to, load3(&from.x[4 * size_t{from.tri[3 * size_t{s} + k]}]), load3(&from.x[4 * size_t{from.tri[3 * size_t{s} + (k + 1) % 3]}]), t);
-  };
-  w.broad.near_triangles_of(slot_a, slot_b, c.obstacle, [&](uint32_t s, uint32_t t) {
-    if (&a == &b && share_a_corner(&a.tri[3 * size_t{s}], &b.tri[3 * size_t{t}])) return;
-    if (!yes) edges_through(a, s, b, t);
-    if (!yes) edges_through(b, t, a, s);
-  });
+  w.broad.near_triangles_of(slot_a, slot_b, c.obstacle,
+                            [&](uint32_t s, uint32_t t) { yes = yes || edges_pierce(a, s, b, t) || edges_pierce(b, t, a, s); });
   g.through.push_back({slot_a, slot_b, bool(c.obstacle), yes});
   return yes;
 }
@@ -159,9 +162,12 @@ double find_hits(World &w) {
   g.hits.clear();
   charge(w, surface_work(w));
   if (g.near.empty()) return 1;
-  const Array<Candidate> &list = w.broad.candidates();
+  const Array<Candidate> &list = *g.list;
   guard_pairs(g.scene, list, g.near, g.hits);
-  std::erase_if(g.hits, [&](const GuardHit &hit) { return cross_at_start(w, list[hit.candidate]); });
+  std::erase_if(g.hits, [&](const GuardHit &hit) {
+    const Candidate &c = list[hit.candidate];
+    return of_one_body(c) ? !(guarded_apart(w, c) > 0) : cross_at_start(w, c);
+  });
   guard_obstacles(g.scene, list, g.near, g.hits);
   double least = 1;
   for (const GuardHit &hit : g.hits) least = std::min(least, hit.safe);
@@ -172,7 +178,7 @@ double find_hits(World &w) {
 bool wake_hit(World &w) {
   const uint32_t before = w.sleepers;
   for (const GuardHit &hit : w.guard.hits) {
-    const Candidate &c = w.broad.candidates()[hit.candidate];
+    const Candidate &c = (*w.guard.list)[hit.candidate];
     if (w.sleepers == 0) break;
     w.wake(*w.bodies[c.slot_a]);
     if (!c.obstacle) w.wake(*w.bodies[c.slot_b]);
@@ -190,10 +196,9 @@ bool World::stage_guard(uint32_t *trouble) {
   for (uint32_t solve = 0;; ++solve) {
     if (steppers && !commit_steppers(trouble)) return false;
     bound_speeds(*this);
-    broad.cover(body_views, obstacle_views, filter, h, offset, guard.speed);
-    if (guard.memory.runs.empty() || guard.lists != broad.stats().renewals) guard.memory.follow(broad.candidates()), guard.lists = broad.stats().renewals;
+    follow_lists(*this);
     set_sides(*this), set_share(*this, 1);
-    guard_near(guard.scene, broad.candidates(), guard.memory, guard.near);
+    guard_near(guard.scene, *guard.list, guard.memory, guard.near);
     safe = find_hits(*this);
     guard.stepped = steppers;
     if (guard.hits.empty()) return true;

@@ -18,7 +18,7 @@ constexpr uint32_t kMostHits = 128;
 class HitContact {
  public:
   HitContact(World &w, const GuardHit &hit)
-      : w_(w), hit_(hit), c_(w.broad.candidates()[hit.candidate]), end_(c_.obstacle ? w.guard.scene.poses[c_.slot_b] : GuardPose{}) {}
+      : w_(w), hit_(hit), c_((*w.guard.list)[hit.candidate]), end_(c_.obstacle ? w.guard.scene.poses[c_.slot_b] : GuardPose{}) {}
 
   bool make(ContactPoint &out, double &along) {
     out = {};
@@ -145,7 +145,7 @@ uint64_t free_key(const World &w, const ContactPoint &c) {
 // ones leave is asked again, and a solve with thousands of nearly equal rows would not converge.
 void choose_hits(World &w) {
   Array<GuardHit> &hits = w.guard.hits;
-  const Array<Candidate> &list = w.broad.candidates();
+  const Array<Candidate> &list = *w.guard.list;
   const auto side = [&](const GuardHit &h) {
     const Candidate &c = list[h.candidate];
     return std::array<uint32_t, 5>{c.slot_a, c.obstacle, c.slot_b, c.kind, c.feature_a};
@@ -184,7 +184,10 @@ void guard_add_hits(World &w) {
     double along;
     if (!HitContact(w, hit).make(c, along)) continue;
     // One that starts nearer than d_c comes no nearer; what it lacks to 0.8 d_c closes in the time that the sub-step was planned with.
-    const double target = hit.start < w.offset ? hit.start + std::max(0.0, 0.8 * w.offset - hit.start) * (w.h / g.planned) : w.offset;
+    const Candidate &pair = (*g.list)[hit.candidate];
+    const double apart = of_one_body(pair) ? guarded_apart(w, pair) : w.offset;
+    const double target = hit.start < apart ? hit.start + std::max(0.0, 0.8 * apart - hit.start) * (w.h / g.planned) : apart;
+    c.distance += w.offset - apart;
     const double rate = (along - target) / w.h;
     const auto same = std::find_if(w.contacts.begin(), w.contacts.end(), [&](const ContactPoint &o) { return same_features(o, c); });
     if (same != w.contacts.end()) {
@@ -201,6 +204,7 @@ void guard_add_hits(World &w) {
   std::sort(g.kept.begin(), g.kept.end(), [](const auto &l, const auto &r) { return l.key < r.key; });
   const auto id_b = [&](const ContactPoint &c) { return c.obstacle ? w.obstacles[c.slot_b]->id : w.bodies[c.slot_b]->id; };
   std::sort(w.contacts.begin(), w.contacts.end(), [&](const ContactPoint &l, const ContactPoint &r) {
+    if (of_one_body(l) != of_one_body(r)) return of_one_body(r);
     if (l.slot_a != r.slot_a) return w.bodies[l.slot_a]->id < w.bodies[r.slot_a]->id;
     if (l.obstacle != r.obstacle) return l.obstacle < r.obstacle;
     if (l.slot_b != r.slot_b) return id_b(l) < id_b(r);

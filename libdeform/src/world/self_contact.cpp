@@ -11,6 +11,8 @@
 #include <algorithm>
 
 #include "narrow/self_contact.h"
+#include "narrow/toi_guard_motion.h"
+#include "surfel/pierce.h"
 #include "world/world.h"
 
 namespace dfm {
@@ -34,8 +36,24 @@ bool promises(const Body &b) {
   return std::find(words.begin(), words.end(), kSelfContact) != words.end() && b.model.works(kSelfContact);
 }
 
-bool has_stage(const Plan &plan, StageId id) {
-  return std::any_of(plan.stages.begin(), plan.stages.end(), [&](const PlannedStage &s) { return s.id == id; });
+SelfBody *self_body(World &w, uint32_t slot) {
+  const auto at = std::lower_bound(w.self_bodies.begin(), w.self_bodies.end(), slot, [](auto &s, uint32_t v) { return s->body->slot < v; });
+  return at != w.self_bodies.end() && (*at)->body->slot == slot ? at->get() : nullptr;
+}
+
+void find_tangled(SelfBody &b) {
+  const Surface &s = b.body->surface;
+  b.tangled.assign(s.nsurfel, 0), b.looked = true;
+  b.list.near_triangles([&](uint32_t t, uint32_t u) {
+    const uint32_t *const c = &s.tri[3 * size_t{t}], *const d = &s.tri[3 * size_t{u}];
+    if (share_a_corner(c, d) || !(edges_pierce(s, t, s, u) || edges_pierce(s, u, s, t))) return;
+    for (int k = 0; k < 3; ++k) b.tangled[c[k]] = b.tangled[d[k]] = 1;
+  });
+}
+
+bool is_tangled(SelfBody &b, uint32_t surfel) {
+  if (!b.looked) find_tangled(b);
+  return b.tangled[surfel];
 }
 
 }  // namespace
@@ -75,13 +93,46 @@ void choose_self_bodies(World &w, SceneFacts &facts, std::vector<uint32_t> &used
 }
 
 void World::stage_self() {
-  if (!has_stage(plan, StageId::narrow)) contacts.clear();
+  if (!plan.has(StageId::narrow)) contacts.clear();
   for (auto &s : self_bodies) {
     const BodyView &view = body_views[s->body->slot];
+    s->looked = false;
     if (view.asleep) continue;
     s->list.update(h, offset);
-    find_self_contacts(view, s->rest, s->list.vertex_face(), s->list.edge_edge(), h, offset, lent, contacts);
+    SelfBody *const self = s.get();
+    const Tangled tangled = [self](uint32_t surfel) { return is_tangled(*self, surfel); };
+    find_self_contacts(view, s->rest, s->list.vertex_face(), s->list.edge_edge(), h, offset, plan.has(StageId::guard) ? tangled : nullptr, lent, contacts);
   }
+}
+
+bool cover_self(World &w) {
+  bool fresh = false;
+  for (auto &s : w.self_bodies) {
+    const uint32_t slot = s->body->slot;
+    if (w.body_views[slot].asleep) continue;
+    s->list.cover(w.h, w.offset, s->body->model.stepper ? w.guard.speed[slot] : w.guard.change[slot]);
+    fresh |= s->joined != s->list.renewals();
+  }
+  return fresh;
+}
+
+void join_self(World &w, Array<Candidate> &to) {
+  for (auto &s : w.self_bodies) {
+    const uint32_t slot = s->body->slot;
+    for (const SelfPair &p : s->list.vertex_face()) to.push_back({slot, slot, p.a, p.b, kVertexFace, 0});
+    for (const SelfPair &p : s->list.edge_edge()) to.push_back({slot, slot, p.a, p.b, kEdgeEdge, 0});
+    s->joined = s->list.renewals();
+  }
+}
+
+double guarded_apart(World &w, const Candidate &c) {
+  SelfBody &b = *self_body(w, c.slot_a);
+  const Surface &s = b.body->surface;
+  const bool edges = c.kind == kEdgeEdge;
+  const auto any = [&](const uint32_t *corner, int n) { return std::any_of(corner, corner + n, [&](uint32_t surfel) { return is_tangled(b, surfel); }); };
+  const bool a_is = any(narrow::corners_of(s, edges ? 1 : 0, c.feature_a), edges ? 2 : 1);
+  const bool b_is = any(narrow::corners_of(s, edges ? 1 : 2, c.feature_b), edges ? 2 : 3);
+  return a_is && b_is ? 0 : self_apart(s, b.rest, ContactKind(c.kind), c.feature_a, c.feature_b, w.offset);
 }
 
 }  // namespace dfm

@@ -2,6 +2,7 @@
 #pragma once
 #include "broad/self_list.h"
 #include "plan/plan.h"
+#include "surfel/views.h"
 
 namespace dfm {
 
@@ -13,6 +14,9 @@ struct SelfBody {
   const Body *body;
   SelfRest rest;
   SelfList list;
+  uint64_t joined = 0;           // renewals of `list` that the guard's list was made of
+  Array<uint8_t> tangled;        // [nsurfel] of a triangle that crosses another one at the start of the sub-step; where `looked`
+  bool looked = false;
   SelfBody(const Memory &memory, const Body &b);
 };
 
@@ -20,5 +24,12 @@ struct SelfBody {
 bool asks_self_contact(const World &w);
 // Of prepare(): fills w.self_bodies and what the plan is told of them; laws of the pairs of a body with itself are found, `used` is scratch.
 void choose_self_bodies(World &w, SceneFacts &facts, std::vector<uint32_t> &used);
+
+// Of the guard. Lists that do not cover the ways after the solve are made anew; true if any has changed since it was joined.
+bool cover_self(World &w);
+void join_self(World &w, Array<Candidate> &to);
+// m that the two features of a candidate of one body rest apart; 0 where the guard has nothing to keep: they lie on each other at rest, or cross at the start
+// of the sub-step, and what is through already must be let out.
+double guarded_apart(World &w, const Candidate &c);
 
 }  // namespace dfm

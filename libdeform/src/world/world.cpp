@@ -39,7 +39,7 @@ World::World(dfm_context *c)
   use_memory(m, known.runs, known.old_runs, known.features, known.old_features, known.rest, known.old_rest, known.normal, known.old_normal);
   for (Report *r : {&report, &last_report}) use_memory(m, r->contacts, r->frame, r->impulse, r->slip, r->mode);
   use_memory(m, active, woken, stirred, free_kinetic, step_impulses.pairs);
-  use_memory(m, guard.near, guard.hits, guard.speed, guard.change, guard.kept);
+  use_memory(m, guard.joined, guard.near, guard.hits, guard.speed, guard.change, guard.kept);
   use_memory(m, state.law, state.fn, state.vt, state.ft_stop, state.area, state.dwell, state.bristle, state.ft, state.dft_dvt, state.dft_dfn, state.limit,
              state.bristle_out, state.mode, state.set_valued);
   stats.size = sizeof stats;
