@@ -150,7 +150,7 @@ class Runner {
     stepping = 0;
     result_.times.add(wall_seconds() - begin);
     if (interrupted && status == DFM_DISCARD) return false;   // the world is as before the step
-    if (status != DFM_OK) return stop(status, step, trouble), false;
+    if (status != DFM_OK) return stop(), false;
     ++result_.steps;
     trouble_ |= trouble;
     impulses_.add_step();
@@ -158,20 +158,9 @@ class Runner {
     return true;
   }
 
-  void stop(dfm_status status, double step, uint32_t trouble) {
+  void stop() {
     result_.stopped = true;
     result_.stop_reason = dfm_last_error();
-    dfm_body body = 0;
-    double stable = 0;
-    uint32_t point = 0;
-    if (status == DFM_DISCARD && !(trouble & DFM_TROUBLE_BUDGET)) {
-      char text[160];
-      dfm_world_stable_step(world_, &stable, &body, &point);
-      std::snprintf(text, sizeof text, "a step of %g s needs more sub-steps than allowed: the stable step is %g s, bounded by point %u", step, stable, point);
-      result_.stop_reason = text;
-      result_.stop_body = body ? scene_.name_of(body) : "";
-      return;
-    }
     for (const BodyView &b : scene_.bodies())  // the sentence names the body in quotes
       if (result_.stop_reason.find("'" + b.name + "'") != std::string::npos) result_.stop_body = b.name;
   }
@@ -256,9 +245,7 @@ int run(RunOptions options, const Globals &globals) {
   if (result.stopped) {
     char text[160];
     std::snprintf(text, sizeof text, "stopped at step %llu, t = %g s", static_cast<unsigned long long>(result.steps), result.simulated);
-    const bool named = result.stop_body.empty() || result.stop_reason.find("'" + result.stop_body + "'") != std::string::npos;
-    throw Failure(kStopped, options.scene + ": " + text + (named ? "" : ", body '" + result.stop_body + "'") + ": " + result.stop_reason +
-                                "; the last good state is in " + options.out + "/states/last_*.vtu");
+    throw Failure(kStopped, options.scene + ": " + text + ": " + result.stop_reason + "; the last good state is in " + options.out + "/states/last_*.vtu");
   }
   return result.interrupted ? int(kInterrupted) : int(kDone);
 }

@@ -151,8 +151,8 @@ dfm_status World::step(double dt, uint32_t *trouble) {
   if (bound_due()) update_bound();
   const double needed = std::ceil(dt / stable - 1e-9);   // stable is infinite where nothing bounds the step
   if (!(needed <= def.max_substeps)) {
-    set_last_error(format("a step of %g s needs %.0f sub-steps of %g s (max_substeps %u): soften or coarsen body '%s', or take a shorter step",
-                          dt, needed, stable, def.max_substeps, worst_body ? worst_body->name.c_str() : "?").c_str());
+    set_last_error(format("a step of %g s needs %.0f sub-steps of %g s (max_substeps %u): soften or coarsen body '%s', whose point %u bounds the step, lower "
+                          "its damping, or take a shorter step", dt, needed, stable, def.max_substeps, worst_body ? worst_body->name.c_str() : "?", worst_point).c_str());
     return DFM_DISCARD;
   }
   const uint32_t n = static_cast<uint32_t>(std::min<double>(def.max_substeps, choose_pieces(sizes, dt, stable)));
