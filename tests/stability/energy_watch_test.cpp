@@ -1,4 +1,5 @@
 // The energy watch: a run that gains energy out of nothing ends early and says so; work that is really done is no gain.
+#define DFM_STATIC_PLUGIN counting_looks
 #include <filesystem>
 #include <random>
 
@@ -11,17 +12,38 @@ namespace {
 
 const std::string kBar = DEFORM_SOURCE_DIR "/examples/data/bar.msh";
 
+// Points without forces between them, whose energy is asked for: how often?
+uint32_t looks = 0;
+dfm_status create(const dfm_host *, const dfm_mesh *, void **self) { return *self = &looks, DFM_OK; }
+void destroy(void *) {}
+dfm_status no_forces(void *, const dfm_kin *, double *) { return DFM_OK; }
+dfm_status no_energy(void *, const dfm_kin *, double *joule) { return *joule = 0, ++looks, DFM_OK; }
+
 struct Shaken {
   test::Context context;
   Setting s;
   std::mt19937 random{1};
   double stable = 0;
-  Shaken() : s(make(context, {"bar", kBar, "wrung", 1})) { test::ok(dfm_world_stable_step(s.world, &stable, nullptr, nullptr)); }
+  explicit Shaken(const char *motion = "wrung") : s(make(context, {"bar", kBar, motion, 1})) { test::ok(dfm_world_stable_step(s.world, &stable, nullptr, nullptr)); }
   // A step of random length: each is stable, their sequence pumps.
   dfm_status step(uint32_t *trouble) { return dfm_world_step(s.world, stable * (0.8 + 0.2 * double(random()) / 4294967296.0), trouble); }
 };
 
 }  // namespace
+
+extern "C" const dfm_plugin *dfm_plugin_entry_counting_looks(const dfm_host *host, uint32_t, uint32_t) {
+  if (!DFM_ABI_OK(host)) return nullptr;
+  static const char *const effects[] = {nullptr};
+  static dfm_model ops{};
+  ops.size = sizeof ops, ops.caps = DFM_CAP_ENERGY, ops.cells = DFM_CELL_TET;
+  ops.create = create, ops.destroy = destroy, ops.add_forces = no_forces, ops.energy = no_energy;
+  static dfm_type type{};
+  type.size = sizeof type, type.kind = DFM_KIND_MODEL, type.id = "test.counting_looks", type.name = "points", type.version = "1", type.licence = "MIT";
+  type.source = "test", type.param_size = sizeof(dfm_param), type.effects = effects, type.ops = &ops;
+  static const dfm_type *const types[] = {&type};
+  static const dfm_plugin plugin{sizeof(dfm_plugin), DFM_ABI, DFM_ABI_DRAFT, 1, types, nullptr};
+  return &plugin;
+}
 
 TEST(EnergyWatch, StepsOfRandomLength_EndBeforeTheEnergyHasGrownByATenth) {
   Shaken b;
@@ -63,6 +85,53 @@ TEST(EnergyWatch, SwitchedOff_StopsNothing) {
   std::mt19937 random(1);
   for (int i = 0; i < 4000; ++i) ASSERT_EQ(dfm_world_step(w, stable * (0.8 + 0.2 * double(random()) / 4294967296.0), nullptr), DFM_OK);
   EXPECT_EQ(test::stats(w).energy_gain, 0);
+}
+
+TEST(EnergyWatch, StepsOfRandomLengthAndGentlerMotions_EndBeforeTheEnergyHasGrownByATwentieth) {
+  for (const char *motion : {"ring", "spin"}) {
+    Shaken b(motion);
+    int i = 0;
+    while (i < 20000 && b.step(nullptr) == DFM_OK) ++i;
+    EXPECT_LT(i, 20000) << motion;
+    const dfm_world_stats stats = test::stats(b.s.world);
+    EXPECT_GT(stats.energy_gain, 0.01 * stats.energy_max) << motion;
+    EXPECT_LT(stats.energy_gain, 0.05 * stats.energy_max) << motion << " after " << i << " steps";
+  }
+}
+
+// The bound shortens the sub-steps in a blow, which moves the body from one nearby energy to another: no gain, though nothing damps it.
+TEST(EnergyWatch, UndampedBodyThatBounces_IsNoGain) {
+  for (const double step : {1.0 / 60, 1e-3}) {
+    test::Context context;
+    const dfm_world w = test::make_world(context);
+    test::BodyOptions o;
+    o.position = {0, 0, 0.2};
+    test::make_body(context, w, "beam", {0.2, 0.1, 0.1}, 600, o);
+    const dfm_obstacle_def d = dfm_obstacle_def_default();
+    dfm_obstacle floor = 0;
+    test::ok(dfm_obstacle_create(w, &d, &floor));
+    for (int i = 0; i * step < 2; ++i) ASSERT_EQ(dfm_world_step(w, step, nullptr), DFM_OK) << step << ": " << dfm_last_error();
+    EXPECT_GT(test::stats(w).substeps_max, uint32_t(step * 1000)) << "the blow asks for shorter sub-steps";
+    test::ok(dfm_world_destroy(w));
+  }
+}
+
+// A base costs eight looks. A host that changes something before every step would have a new one all the time.
+TEST(EnergyWatch, HostThatChangesEveryStep_CostsFewLooks) {
+  test::Context context;
+  test::ok(dfm_plugin_register_static(context, dfm_plugin_entry_counting_looks, "counting_looks"));
+  const dfm_world w = test::make_world(context);
+  test::BodyOptions o;
+  o.model = "test.counting_looks";
+  const dfm_body b = test::make_body(context, w, "beam", {0.1, 0.1, 0.1}, 60, o);
+  looks = 0;
+  const uint32_t steps = 10000;
+  for (uint32_t i = 0; i < steps; ++i) {
+    if (i % 10 == 0) test::set_velocity(b, {0, 0, 1});
+    test::ok(dfm_world_step(w, 1e-3, nullptr));
+  }
+  EXPECT_GE(looks, steps / 512);
+  EXPECT_LE(looks, 16 + steps / 256);
 }
 
 // Held points that are shaken, a load and a gravity that vary, a spring, an obstacle that strikes from below: all put energy in and take it out.

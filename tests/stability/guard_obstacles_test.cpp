@@ -52,36 +52,26 @@ TEST(Guard, BladeSwungThroughBlock_NeverCrosses) { ten_times(blade, 3, 1e-3); }
 TEST(Guard, SpinningRigidSlabAt100MetresPerSecond_NeverCrossesSheet) { ten_times(rigid_slab, 2, 5e-4); }
 TEST(Guard, RigidPlateStruck_NeverCrosses) { ten_times(rigid_struck, 3, 1e-3); }
 
-// Voxels round off what is below a cell, so crossings with the triangles they came from say little: no surfel is behind a face, away from its edges.
-TEST(Guard, BlockSpinningPastVoxels_StaysOutside) {
-  size_t reached = 0;
-  uint64_t acted = 0;
-  for (unsigned seed = 1; seed <= 10; ++seed)
-    for (const bool guarded : {true, false}) {
+// Voxels round off what is below a cell, so crossings with the triangles they came from say little: no surfel is beyond the middle of the wall, away from its
+// edges. Without the guard some are.
+TEST(Guard, SoftSheetAgainstVoxelsAt90MetresPerSecond_StaysOnItsSide) {
+  size_t beyond[2] = {0, 0};
+  for (unsigned seed = 1; seed <= 12; ++seed)
+    for (const bool guarded : {false, true}) {
       Shot s(guarded, seed);
-      const Vec half{0.02, 0.06, 0.02};
+      const Vec half{0.06, 0.06, 0.004};
       test::add_mesh(s.world, "wall", test::box_surface(half, 2), DFM_SHAPE_VOXELS, 20000);
-      const double cell = 0.0018;
-      const Vec at{s.jitter(0.01) - 0.03, s.jitter(0.01), 0.05}, velocity{s.jitter(20), s.jitter(20), -40};
-      s.add("beam", {0.12, 0.03, 0.03}, 60, at, velocity, {0, 0.3, 0, 0.954}, 1e6, {0, 2000, 0});
+      const Vec at{s.jitter(0.02) - 0.01, s.jitter(0.02) - 0.01, 0.03}, velocity{s.jitter(18), s.jitter(18), -90};
+      s.add("beam", {0.06, 0.06, 0.006}, 60, at, velocity, {0, 0.1, 0, 0.995}, 3e4);
       for (int step = 0; step < 6; ++step) {
-        EXPECT_TRUE(test::run(s, 1, 5e-4).finite);
-        for (const dfm_body b : s.bodies) {
-          const std::vector<double> x = test::surface_positions(b);
-          for (size_t i = 0; i < x.size(); i += 3) {
-            Vec depth;
-            for (size_t k = 0; k < 3; ++k) depth[k] = half[k] - std::fabs(x[i + k]);
-            std::sort(depth.begin(), depth.end());
-            const bool behind = depth[0] > 0 && depth[1] > 2 * cell, inside = behind && depth[0] > 0.5 * cell;   // the voxels' face may lie half a cell deep
-            if (inside && guarded) ADD_FAILURE() << "seed " << seed << ", step " << step << ": surfel " << i / 3 << " inside";
-            reached += behind;
-          }
-        }
+        EXPECT_TRUE(test::run(s, 1, 2.5e-4).finite);
+        const std::vector<double> x = test::surface_positions(s.bodies[0]);
+        for (size_t i = 0; i < x.size(); i += 3)
+          beyond[guarded] += std::fabs(x[i]) < half[0] - 0.01 && std::fabs(x[i + 1]) < half[1] - 0.01 && x[i + 2] < 0;
       }
-      acted += test::stats(s.world).guard_steps;
     }
-  EXPECT_GT(acted, 0u);
-  EXPECT_GT(reached, 0u) << "the block flies past the wall";
+  EXPECT_EQ(beyond[true], 0u);
+  EXPECT_GT(beyond[false], 0u) << "the case needs no guard";
 }
 
 TEST(Guard, RigidAndSoft_KeepMomentum) {

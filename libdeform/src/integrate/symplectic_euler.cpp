@@ -17,17 +17,16 @@ bool predict(Phyxels &p, Vec3 gravity, double h, double limit, double *kinetic) 
   const Point g{gravity.x, gravity.y, gravity.z, 0};
   const Point *const v = points(p.v), *const w = points(p.inv_mass), *const f = points(p.f);
   Point *const free = points(p.v_free);
-  const Point most = Point{} + limit * limit;
-  auto fits = most == most;   // all bits set, until a value is too large or none
+  const double overflows = std::numeric_limits<double>::max() / limit;   // what is above the limit becomes infinite, and a comparison is not needed
+  Point poison{0, 0, 0, 0};  // stays zero unless a value is too large, infinite or NaN
   Point square{0, 0, 0, 0};
   for (uint32_t i = 0; i < p.n; ++i) {
     free[i] = v[i] + h * (w[i] * (f[i] + p.mass[i] * g));
-    const Point squares = free[i] * free[i];
-    fits &= squares <= most;
-    square += p.mass[i] * squares;
+    poison += (free[i] * overflows) * 0.0;
+    square += p.mass[i] * (free[i] * free[i]);
   }
   *kinetic = 0.5 * ((square[0] + square[1]) + square[2]);
-  return (fits[0] & fits[1] & fits[2]) != 0;
+  return poison[0] + poison[1] + poison[2] + poison[3] == 0;
 }
 
 void commit(Phyxels &p, bool touched, double h) {

@@ -11,6 +11,8 @@ namespace {
 
 // An energy costs about as much as two sub-steps.
 constexpr uint32_t kEvery = 512;
+// So a look for every so many sub-steps costs less than 1 %.
+constexpr uint32_t kLookCosts = 256;
 // Of the energy of the kick: a third is what stiff modes give back on average as they calm down, and a look sees it at one instant.
 constexpr double kGivesBack = 0.5;
 // Stiff modes that hold their energy as motion alone show it in the kick within a quarter of their period: so long a base is being taken.
@@ -41,6 +43,22 @@ double work_of_holders(const World &w, const Body &b, bool now) {
   return sum;
 }
 
+// Another size h of the sub-steps makes of G = .. + v.M v* / 2 another quantity that the scheme keeps, which is larger by (h2 - h1) v.f / 2. The changes that
+// the library makes itself are few, so what they bring is bounded and no instability.
+double work_of_new_size(const World &w, const Body &b) {
+  if (!w.watch.new_size || !(w.watch.last_h > 0)) return 0;
+  const bool load_booked = books_loads(b), gravity_booked = books_gravity(w);
+  const Phyxels &p = b.p;
+  double sum = 0;
+  for (uint32_t i = 0; i < p.n; ++i)
+    for (size_t k = 0, at = size_t(i) * kStride; k < 3; ++k, ++at) {
+      if (!(p.inv_mass[at] > 0)) continue;
+      const double booked = (load_booked ? p.load[at] : 0) + (gravity_booked ? p.mass[i] * w.gravity[int(k)] : 0);
+      sum += p.v[at] * (p.mass[i] * (p.v_free[at] - p.v[at]) - w.h * booked);
+    }
+  return 0.5 * (1 - w.watch.last_h / w.h) * sum;
+}
+
 // The energy that the scheme keeps, U(x) - F.x + v.M v_free / 2, and half of the energy of the kick, by which it may rise as stiff modes calm down.
 bool look(World &w, Body &b, Look &out) {
   const Phyxels &p = b.p;
@@ -64,7 +82,7 @@ bool look(World &w, Body &b, Look &out) {
   const dfm_kin kin = b.kin(w.time, 0, nullptr);
   if (b.model.call("energy", [&] { return b.model.ops->energy(b.model.self, &kin, &elastic); }) != DFM_OK) return false;
   const double drift = kPositionDigits * reach / w.h;
-  out = {kinetic, elastic, elastic + potential + cross - (b.energy.work + work_of_holders(w, b, false)), kGivesBack * kick,
+  out = {kinetic, elastic, elastic + potential + cross - (b.energy.work + work_of_holders(w, b, false) + work_of_new_size(w, b)), kGivesBack * kick,
          kRounding * (std::fabs(b.energy.work) + std::fabs(potential) + kinetic + elastic) + b.mass * drift * drift};
   return true;
 }
@@ -104,13 +122,18 @@ void book_body(World &w, Body &b, bool touched, double motion) {
 
 bool watch_energy(World &w, uint32_t *trouble) {
   if (!watching(w) || w.guard.planned != w.h) return true;   // pieces of a sub-step are not compared with whole ones
+  double moving = 0;
+  for (const uint32_t i : w.active) moving += watched(*w.bodies[i]) ? w.free_kinetic[i] : 0;
   const double limit = w.def.energy_watch * w.stats.energy_max;
   bool due = w.watch.age >= kEvery;
   for (const uint32_t i : w.active) {
     const EnergyBook &e = w.bodies[i]->energy;
-    due = due || (watched(*w.bodies[i]) && ((e.known > 0 && e.known < kSettles) || w.free_kinetic[i] > 2 * e.kinetic + limit));
+    const bool faster = w.free_kinetic[i] > 2 * e.kinetic + limit, wants_base = e.known < kSettles && (e.known > 0 || faster);
+    due = due || (watched(*w.bodies[i]) && (e.known == kSettles ? faster : wants_base && w.watch.credit >= kLookCosts));
   }
-  if (!due) return true;
+  dfm_world_stats &s = w.stats;
+  if (!due) return s.energy_max = std::max(s.energy_max, moving), true;
+  w.watch.credit -= std::min(w.watch.credit, kLookCosts);
   double total = 0, gain = 0, most = 0;
   const Body *worst = nullptr;
   for (const uint32_t i : w.active) {
@@ -126,7 +149,6 @@ bool watch_energy(World &w, uint32_t *trouble) {
     e.base = settled ? std::min(e.base, level) : e.known ? std::max(e.base, level) : level;
     e.known += !settled, e.kinetic = now.kinetic;
   }
-  dfm_world_stats &s = w.stats;
   if (w.watch.age == ~0u) s.energy_start = total;
   w.watch.age = 0;
   if (worst && most > w.def.energy_watch * std::max(s.energy_max, total - most)) {
@@ -138,7 +160,7 @@ bool watch_energy(World &w, uint32_t *trouble) {
                           static_cast<unsigned long long>(w.step_count), worst->name.c_str(), most, 100 * w.def.energy_watch, s.energy_max).c_str());
     return false;
   }
-  s.energy_max = std::max(s.energy_max, total), s.energy_gain = std::max(s.energy_gain, gain);
+  s.energy_max = std::max({s.energy_max, total, moving}), s.energy_gain = std::max(s.energy_gain, gain);
   return true;
 }
 
@@ -149,10 +171,12 @@ void book_energy(World &w, double motion) {
   for (const uint32_t i : w.active) {
     Body &b = *w.bodies[i];
     if (!w.driven.empty()) b.energy.work += work_of_holders(w, b, true);
+    if (!b.model.stepper && w.guard.planned == w.h) b.energy.work += work_of_new_size(w, b);
     if (!b.model.stepper && (motion < 1 || books_loads(b) || books_gravity(w))) book_body(w, b, touched, motion);
   }
   w.watch.last_h = motion * w.h;
-  w.watch.age += w.watch.age < kEvery;
+  w.watch.new_size = w.watch.new_size && w.guard.planned != w.h;
+  w.watch.age += w.watch.age < kEvery, w.watch.credit += w.watch.credit < kMostCredit;
 }
 
 void forget_energy(Body &b) { b.energy = {}; }
@@ -163,6 +187,6 @@ void forget_energy(World &w) {
 
 bool sound(const EnergyBook &e) { return e.known <= kSettles && std::isfinite(e.base) && std::isfinite(e.work) && e.kinetic >= 0 && std::isfinite(e.kinetic); }
 
-bool sound(const EnergyWatch &e) { return (e.age <= kEvery || e.age == ~0u) && e.last_h >= 0 && std::isfinite(e.last_h); }
+bool sound(const EnergyWatch &e) { return (e.age <= kEvery || e.age == ~0u) && e.credit <= kMostCredit && e.last_h >= 0 && std::isfinite(e.last_h); }
 
 }  // namespace dfm

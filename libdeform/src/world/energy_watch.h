@@ -17,10 +17,14 @@ struct EnergyBook {
   double kinetic = 0;      // J, when last looked at
 };
 
+inline constexpr uint32_t kMostCredit = 4096;   // sub-steps
+
 // Of the world. Lasts.
 struct EnergyWatch {
+  uint32_t credit = kMostCredit;   // sub-steps without a look, less what looks have cost: new bases wait for it where the host changes something all the time
   uint32_t age = ~0u;      // sub-steps since the energies were last looked at
   double last_h = 0;       // s, of the last sub-step
+  bool new_size = false;   // the next one is longer or shorter because the step's bound has it so; not state: said anew by each step
 };
 
 // After predict. False: a body has gained too much; the sentence says which.

@@ -155,7 +155,9 @@ dfm_status World::step(double dt, uint32_t *trouble) {
                           "its damping, or take a shorter step", dt, needed, stable, def.max_substeps, worst_body ? worst_body->name.c_str() : "?", worst_point).c_str());
     return DFM_DISCARD;
   }
+  const StepSizes before = sizes;
   const uint32_t n = static_cast<uint32_t>(std::min<double>(def.max_substeps, choose_pieces(sizes, dt, stable)));
+  watch.new_size = earned(before, sizes, stable);
   plan_work(*this, n);
   if (n > 1) *trouble |= DFM_TROUBLE_SUBSTEPS;
   if (inverted) *trouble |= DFM_TROUBLE_INVERTED;
@@ -175,7 +177,7 @@ dfm_status World::step(double dt, uint32_t *trouble) {
                               worst_body ? worst_body->name.c_str() : "?", std::ceil((goal - time) / stable), stable, def.max_substeps).c_str());
         return DFM_E_DIVERGED;
       }
-      if (more > cut - k) from = time, span = goal - time, cut = static_cast<uint32_t>(more), k = 0, *trouble |= DFM_TROUBLE_SUBSTEPS;
+      if (more > cut - k) from = time, span = goal - time, cut = static_cast<uint32_t>(more), k = 0, watch.new_size = true, *trouble |= DFM_TROUBLE_SUBSTEPS;
     }
     const bool last = k + 1 == cut;
     const double end = last ? goal : from + span * (double(k + 1) / cut);

@@ -80,6 +80,14 @@ double cut_finer(StepSizes &s, double size, double stable) {
   return parts;
 }
 
+bool earned(const StepSizes &before, const StepSizes &now, double stable) {
+  const Rung &r = before.cut;
+  if (now.cut.size == r.size || !(r.size > 0)) return false;
+  if (now.offer.size != before.offer.size) return true;
+  const double gain = now.cut.size / r.size;
+  return gain < 1 ? r.size > stable * (1 + kRounding) : r.calm >= kLeastCalm && r.calm * (gain * gain) >= r.patience;
+}
+
 void pass(StepSizes &s) { pass(s.cut), pass(s.offer); }
 
 bool sound(const StepSizes &s) { return sound(s.cut) && sound(s.offer); }

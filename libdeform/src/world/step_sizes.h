@@ -32,6 +32,8 @@ struct StepSizes {
 double offered_step(const StepSizes &s, double stable);               // s, a step that is not cut, and changes its size rarely if taken again and again
 double choose_pieces(StepSizes &s, double dt, double stable);         // number of sub-steps of the step dt, which may be too many for an integer
 double cut_finer(StepSizes &s, double size, double stable);           // in mid-step, where the bound has fallen below size: into how many each one is cut
+// Is a change of the sub-steps' size one of the rare ones, which the bound has forced or patience has earned? Changes of the host's own are not.
+bool earned(const StepSizes &before, const StepSizes &now, double stable);
 void pass(StepSizes &s);                                              // a sub-step has been taken
 bool sound(const StepSizes &s);                                       // could a world have come to it?
 
