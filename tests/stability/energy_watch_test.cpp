@@ -24,7 +24,9 @@ struct Shaken {
   Setting s;
   std::mt19937 random{1};
   double stable = 0;
-  explicit Shaken(const char *motion = "wrung") : s(make(context, {"bar", kBar, motion, 1})) { test::ok(dfm_world_stable_step(s.world, &stable, nullptr, nullptr)); }
+  explicit Shaken(const char *motion = "wrung") : s(make(context, {"bar", kBar, motion, 1})) {
+    test::ok(dfm_world_stable_step(s.world, &stable, nullptr, nullptr));
+  }
   // A step of random length: each is stable, their sequence pumps.
   dfm_status step(uint32_t *trouble) { return dfm_world_step(s.world, stable * (0.8 + 0.2 * double(random()) / 4294967296.0), trouble); }
 };

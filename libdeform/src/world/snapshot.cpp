@@ -280,7 +280,8 @@ void fields(Stream &s, W &w, const World &like) {
   for (auto *r : {&w.sizes.cut, &w.sizes.offer})
     s.value("step size", r->size, must::not_negative), s.value("calm of the size", r->calm, must::any), s.value("patience", r->patience, must::any);
   s.must_hold("step size", "sizes that the library chooses", [&] { return sound(w.sizes); });
-  s.value("age of the energies", w.watch.age, must::any), s.value("credit of the energies", w.watch.credit, must::any), s.value("last sub-step", w.watch.last_h, must::not_negative);
+  s.value("age of the energies", w.watch.age, must::any), s.value("credit of the energies", w.watch.credit, must::any);
+  s.value("last sub-step", w.watch.last_h, must::not_negative);
   s.must_hold("last sub-step", "what the energy watch writes", [&] { return sound(w.watch); });
   s.value("contact offset", w.offset, must::positive);
   s.value("hold start", w.hold_start, must::finite), s.value("holding", w.holding, must::flag);
