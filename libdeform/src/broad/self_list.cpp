@@ -15,65 +15,9 @@ constexpr double kSkinMost = 0.2;           // wider than this, every surfel wou
 constexpr double kSpeedGrowth = 1.25;
 constexpr double kQualityLimit = 2;         // boxes that have grown this much in sum are worth a new tree
 
-// Sums over points r about their mean and vectors d: what the best rigid field theta x r + mean takes of d.
-struct Fit {
-  Vec3 mean, theta;
-};
-template <class Point, class Vector>
-Fit fit(uint32_t n, Point r, Vector d) {
-  Vec3 sum, moment;
-  double xx = 0, yy = 0, zz = 0, xy = 0, yz = 0, zx = 0;
-  for (uint32_t s = 0; s < n; ++s) {
-    const Vec3 a = r(s), b = d(s);
-    sum += b, moment += cross(a, b);
-    xx += a.x * a.x, yy += a.y * a.y, zz += a.z * a.z, xy += a.x * a.y, yz += a.y * a.z, zx += a.z * a.x;
-  }
-  const Vec3 i{yy + zz, -xy, -zx}, j{-xy, xx + zz, -yz}, k{-zx, -yz, xx + yy}, jk = cross(j, k);
-  const double det = dot(i, jk);
-  const Vec3 theta = det > 0 ? (1 / det) * Vec3{dot(moment, jk), dot(moment, cross(k, i)), dot(moment, cross(i, j))} : Vec3{};
-  return {(1.0 / n) * sum, theta};
-}
-
-Vec3 mean_place(const Surface &s) {
-  Vec3 sum;
-  for (uint32_t i = 0; i < s.nsurfel; ++i) sum += load3(&s.x[4 * size_t{i}]);
-  return (1.0 / s.nsurfel) * sum;
-}
-
 }  // namespace
 
-SelfList::SelfList(const Memory &m, const Surface &surface) : surface_(surface), tree_(m) { use_memory(m, x_, vf_, ee_, stack_); }
-
-double SelfList::displaced() {
-  const Surface &s = surface_;
-  const Vec3 now = mean_place(s);
-  const auto place = [&](uint32_t i) { return rotate(turn_, load3(&x_[4 * size_t{i}]) - centre_); };
-  const auto off = [&](uint32_t i) { return load3(&s.x[4 * size_t{i}]) - now - place(i); };
-  const Vec3 half = 0.5 * fit(s.nsurfel, place, off).theta;
-  const double q[4] = {half.x, half.y, half.z, 1};
-  turn_ = unit_quat(q) * turn_;
-  const double unit[4] = {turn_.x, turn_.y, turn_.z, turn_.w};
-  turn_ = unit_quat(unit);
-  double most = 0;
-  for (uint32_t i = 0; i < s.nsurfel; ++i) most = std::max(most, norm2(off(i)));
-  return std::sqrt(most);
-}
-
-// Velocities are v = mean + omega x r + rest.
-SelfList::Motion SelfList::motion(double h) const {
-  const Surface &s = surface_;
-  const Vec3 centre = mean_place(s);
-  const auto place = [&](uint32_t i) { return load3(&s.x[4 * size_t{i}]) - centre; };
-  const auto v = [&](uint32_t i) { return load3(&s.v[4 * size_t{i}]); };
-  Fit f = fit(s.nsurfel, place, v);
-  if (!(4 * h * norm(f.theta) < 1)) f.theta = {};
-  Vec3 sum;   // the mean of what the turn leaves
-  for (uint32_t i = 0; i < s.nsurfel; ++i) sum += v(i) - cross(f.theta, place(i));
-  const Vec3 mean = (1.0 / s.nsurfel) * sum;
-  double most = 0;
-  for (uint32_t i = 0; i < s.nsurfel; ++i) most = std::max(most, norm2(v(i) - cross(f.theta, place(i)) - mean));
-  return {norm(f.theta), std::sqrt(most)};
-}
+SelfList::SelfList(const Memory &m, const Surface &surface) : surface_(surface), tree_(m), at_(m) { use_memory(m, vf_, ee_, stack_); }
 
 // What one of two features adds to the reach of their contact. Two vertices of a pair are no further apart than the reach and two edges, so
 // |relative speed| <= 2 |rest| + |omega| (reach + 2 edges).
@@ -89,9 +33,9 @@ double SelfList::covers(double h, double offset, double change) const { return o
 bool SelfList::update(double h, double offset) {
   const Surface &s = surface_;
   if (s.ntri == 0) return false;
-  motion_ = motion(h);
+  motion_ = deforming_motion(s, h);
   if (margin_ >= 0) {
-    moved_ = displaced();
+    moved_ = at_.displaced(s);
     if (kRounding * (moved_ + share(h, offset, 1)) <= margin_) return false;
   }
   renew(h, offset, 0);
@@ -107,12 +51,10 @@ bool SelfList::cover(double h, double offset, double change) {
 void SelfList::renew(double h, double offset, double change) {
   const Surface &s = surface_;
   margin_ = -1;   // until the lists are whole: a refused allocation leaves none that anyone believes
-  x_.assign(s.x.begin(), s.x.end());
-  centre_ = mean_place(s), turn_ = {}, longest_ = moved_ = 0;
-  for (uint32_t e = 0; e < s.nedge; ++e)
-    longest_ = std::max(longest_, norm(load3(&x_[4 * size_t{s.edge[2 * size_t{e}]}]) - load3(&x_[4 * size_t{s.edge[2 * size_t{e} + 1]}])));
-  if (!tree_.empty()) tree_.refit(s, x_.data());
-  if (tree_.empty() || tree_.quality() > kQualityLimit) tree_.build(s, x_.data());
+  at_.set(s);
+  longest_ = longest_edge(s), moved_ = 0;
+  if (!tree_.empty()) tree_.refit(s, s.x.data());
+  if (tree_.empty() || tree_.quality() > kQualityLimit) tree_.build(s, s.x.data());
   const double now = std::max(share(h, offset, kSpeedGrowth), covers(h, offset, kSpeedGrowth * change));
   const double skin = std::clamp(skin_steps_ * 0.5 * (now - offset), kSkinLeast * s.median_edge, kSkinMost * s.median_edge);
   const double margin = kRounding * now + skin;
@@ -123,7 +65,7 @@ void SelfList::renew(double h, double offset, double change) {
 void SelfList::list(double limit) {
   const Surface &s = surface_;
   const auto corner = [&](uint32_t t, uint32_t k) { return s.tri[3 * size_t{t} + k % 3]; };
-  const auto at = [&](uint32_t surfel) { return load3(&x_[4 * size_t{surfel}]); };
+  const auto at = [&](uint32_t surfel) { return load3(&s.x[4 * size_t{surfel}]); };
   const auto vertices = [&](uint32_t from, uint32_t face) {
     const uint32_t c0 = corner(face, 0), c1 = corner(face, 1), c2 = corner(face, 2);
     for (uint32_t k = 0; k < 3; ++k) {

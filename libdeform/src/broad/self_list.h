@@ -4,6 +4,7 @@
 // best: a body that falls or rolls keeps its lists. And features that share a surfel are no pair: they always touch.
 #pragma once
 #include "broad/box_tree.h"
+#include "broad/rigid_fit.h"
 #include "core/memory.h"
 #include "math/vec3.h"
 #include "surfel/self_rest.h"
@@ -36,9 +37,6 @@ class SelfList {
   void set_skin_steps(double steps) { skin_steps_ = steps; }
 
  private:
-  struct Motion { double turn = 0, speed = 0; };   // rad/s; m/s, largest beyond the rigid motion that fits best
-  double displaced();                      // m, largest since the lists were made, beyond a rigid motion
-  Motion motion(double h) const;
   double share(double h, double offset, double growth) const;
   double covers(double h, double offset, double change) const;
   void renew(double h, double offset, double change);
@@ -46,11 +44,9 @@ class SelfList {
   const Surface &surface_;
   double skin_steps_ = 24, margin_ = -1;   // negative: no lists yet
   BoxTree tree_;
-  Array<double> x_;                        // [nsurfel,4] when the lists were made
-  Vec3 centre_;                            // of x_
-  Quat turn_;                              // that fitted best at the last look
-  double longest_ = 0, moved_ = 0;         // m, edge of x_; what displaced() said at the last update()
-  Motion motion_;
+  RigidReference at_;                      // when the lists were made
+  double longest_ = 0, moved_ = 0;         // m, edge of that time; what displaced() said at the last update()
+  DeformingMotion motion_;
   uint64_t renewals_ = 0;
   Array<SelfPair> vf_, ee_;
   Array<PairOfTriangles> stack_;

@@ -1,0 +1,77 @@
+#include "broad/rigid_fit.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace dfm {
+namespace {
+
+// Sums over points r about their mean and vectors d: what the best rigid field theta x r + mean takes of d.
+struct Fit {
+  Vec3 mean, theta;
+};
+template <class Point, class Vector>
+Fit fit(uint32_t n, Point r, Vector d) {
+  Vec3 sum, moment;
+  double xx = 0, yy = 0, zz = 0, xy = 0, yz = 0, zx = 0;
+  for (uint32_t s = 0; s < n; ++s) {
+    const Vec3 a = r(s), b = d(s);
+    sum += b, moment += cross(a, b);
+    xx += a.x * a.x, yy += a.y * a.y, zz += a.z * a.z, xy += a.x * a.y, yz += a.y * a.z, zx += a.z * a.x;
+  }
+  const Vec3 i{yy + zz, -xy, -zx}, j{-xy, xx + zz, -yz}, k{-zx, -yz, xx + yy}, jk = cross(j, k);
+  const double det = dot(i, jk);
+  const Vec3 theta = det > 0 ? (1 / det) * Vec3{dot(moment, jk), dot(moment, cross(k, i)), dot(moment, cross(i, j))} : Vec3{};
+  return {(1.0 / n) * sum, theta};
+}
+
+Vec3 mean_place(const Surface &s) {
+  Vec3 sum;
+  for (uint32_t i = 0; i < s.nsurfel; ++i) sum += load3(&s.x[4 * size_t{i}]);
+  return (1.0 / s.nsurfel) * sum;
+}
+
+}  // namespace
+
+void RigidReference::set(const Surface &s) {
+  x_.assign(s.x.begin(), s.x.end());
+  centre_ = mean_place(s), turn_ = {};
+}
+
+double RigidReference::displaced(const Surface &s) {
+  const Vec3 now = mean_place(s);
+  const auto place = [&](uint32_t i) { return rotate(turn_, load3(&x_[4 * size_t{i}]) - centre_); };
+  const auto off = [&](uint32_t i) { return load3(&s.x[4 * size_t{i}]) - now - place(i); };
+  const Vec3 half = 0.5 * fit(s.nsurfel, place, off).theta;
+  const double q[4] = {half.x, half.y, half.z, 1};
+  turn_ = unit_quat(q) * turn_;
+  const double unit[4] = {turn_.x, turn_.y, turn_.z, turn_.w};
+  turn_ = unit_quat(unit);
+  double most = 0;
+  for (uint32_t i = 0; i < s.nsurfel; ++i) most = std::max(most, norm2(off(i)));
+  return std::sqrt(most);
+}
+
+// Velocities are v = mean + omega x r + rest.
+DeformingMotion deforming_motion(const Surface &s, double h) {
+  const Vec3 centre = mean_place(s);
+  const auto place = [&](uint32_t i) { return load3(&s.x[4 * size_t{i}]) - centre; };
+  const auto v = [&](uint32_t i) { return load3(&s.v[4 * size_t{i}]); };
+  Fit f = fit(s.nsurfel, place, v);
+  if (!(4 * h * norm(f.theta) < 1)) f.theta = {};
+  Vec3 sum;   // the mean of what the turn leaves
+  for (uint32_t i = 0; i < s.nsurfel; ++i) sum += v(i) - cross(f.theta, place(i));
+  const Vec3 mean = (1.0 / s.nsurfel) * sum;
+  double most = 0;
+  for (uint32_t i = 0; i < s.nsurfel; ++i) most = std::max(most, norm2(v(i) - cross(f.theta, place(i)) - mean));
+  return {norm(f.theta), std::sqrt(most)};
+}
+
+double longest_edge(const Surface &s) {
+  double most = 0;
+  const auto x = [&](size_t k) { return load3(&s.x[4 * size_t{s.edge[k]}]); };
+  for (size_t e = 0; e < 2 * size_t{s.nedge}; e += 2) most = std::max(most, norm2(x(e) - x(e + 1)));
+  return std::sqrt(most);
+}
+
+}  // namespace dfm

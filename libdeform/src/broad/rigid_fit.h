@@ -1,0 +1,27 @@
+// How a surface has moved, and moves, beyond a rigid motion: only that brings parts of it together.
+#pragma once
+#include "core/memory.h"
+#include "math/vec3.h"
+#include "surfel/surface.h"
+
+namespace dfm {
+
+// Positions of a surface at one time, and the rotation that fits best since.
+class RigidReference {
+ public:
+  explicit RigidReference(const Memory &memory) : x_(HookAllocator<double>(memory)) {}
+  void set(const Surface &surface);
+  double displaced(const Surface &surface);   // m, largest since set(), beyond the rigid motion that fits best
+  const Array<double> &x() const { return x_; }
+
+ private:
+  Array<double> x_;                           // [nsurfel,4]
+  Vec3 centre_;                               // of x_
+  Quat turn_;                                 // that fitted best at the last look
+};
+
+struct DeformingMotion { double turn = 0, speed = 0; };   // rad/s; m/s, largest beyond the rigid motion that fits best
+DeformingMotion deforming_motion(const Surface &surface, double h);
+double longest_edge(const Surface &surface);              // m, now
+
+}  // namespace dfm
