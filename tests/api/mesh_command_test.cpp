@@ -1,10 +1,15 @@
 // `deform mesh` as a user calls it, and the mesh functions of the C API.
 #include <gtest/gtest.h>
+#include <signal.h>
+#include <sys/wait.h>
+#include <unistd.h>
 
 #include <algorithm>
+#include <chrono>
 #include <cstddef>
 #include <cstring>
 #include <filesystem>
+#include <thread>
 
 #include "deform/deform.h"
 #include "logged_context.h"
@@ -42,6 +47,35 @@ TEST(MeshCommand, InfoAsJson_HoldsTheSame) {
   for (const char *word : {"\"points\": 8", "\"tets\": 6", "\"surface_triangles\": 12", "\"edges\": 19", "\"pieces\": 1",
                            "\"dropped_points\": 1", "\"name\": \"high end\""})
     EXPECT_TRUE(has(r.out, word)) << word << " not in\n" << r.out;
+}
+
+// Ctrl-C in work that would take long: the command ends by the signal, and what lay under the name that it was to write is still there, alone.
+TEST(MeshCommand, InterruptedWork_EndsAndLeavesTheOldFile) {
+  const std::string dir = folder() + "/interrupted", ball = folder() + "/interrupted_ball.obj";
+  ASSERT_EQ(test::deform({"mesh", "make", "ball", "--surface", "--cells", "2000", "--quiet", "--out", ball}).exit_code, 0);
+  const std::string out = dir + "/old.msh";
+  const std::vector<std::vector<std::string>> work = {{"deform", "mesh", "fill", ball, "--cells", "50000000", "--quiet", "--out", out},
+                                                      {"deform", "mesh", "make", "ball", "--cells", "50000000", "--quiet", "--out", out}};
+  for (const auto &arguments : work) {
+    std::filesystem::remove_all(dir);
+    std::filesystem::create_directories(dir);
+    test::write_file(out, "mine");
+    std::vector<char *> argv;
+    for (const std::string &a : arguments) argv.push_back(const_cast<char *>(a.c_str()));
+    argv.push_back(nullptr);
+    const pid_t child = fork();
+    if (child == 0) {
+      execv(DEFORM_COMMAND, argv.data());
+      _exit(127);
+    }
+    std::this_thread::sleep_for(std::chrono::milliseconds(300));
+    kill(child, SIGINT);
+    int status = 0;
+    waitpid(child, &status, 0);
+    EXPECT_TRUE(WIFSIGNALED(status) && WTERMSIG(status) == SIGINT) << arguments[2] << ": status " << status;
+    EXPECT_EQ(test::read_file(out), "mine");
+    EXPECT_EQ(std::distance(std::filesystem::directory_iterator(dir), {}), 1);
+  }
 }
 
 TEST(MeshCommand, Make_WritesEachShape) {
