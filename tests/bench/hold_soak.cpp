@@ -32,21 +32,6 @@ std::string name_of(const Place &p, const char *law, const char *mesh, const Ste
   return text;
 }
 
-// Rows that are there, by their first five columns.
-std::set<std::string> known(const std::string &path) {
-  std::set<std::string> names;
-  std::FILE *f = std::fopen(path.c_str(), "r");
-  if (!f) return names;
-  char line[1024];
-  while (std::fgets(line, sizeof line, f)) {
-    const char *end = line;
-    for (int commas = 0; *end && commas < 5; ++end) commas += *end == ',';
-    if (end > line) names.insert(std::string(line, size_t(end - line - 1)));
-  }
-  std::fclose(f);
-  return names;
-}
-
 }  // namespace
 
 int main(int argc, char **argv) {
@@ -57,7 +42,7 @@ int main(int argc, char **argv) {
     if (!std::strcmp(argv[i], "--only")) only = argv[i + 1];
     if (!std::strcmp(argv[i], "--seconds")) seconds = std::atof(argv[i + 1]);
   }
-  const std::set<std::string> done = known(argv[1]);
+  const std::set<std::string> done = bench::names_in(argv[1], 0, 5);
   std::FILE *table = std::fopen(argv[1], "a");
   if (!table) return std::perror(argv[1]), 2;
   if (done.empty()) std::fprintf(table, "scene,law,level,mesh,step_s,creep_m_s,worst_contact_m_s,law_drift_m_s,stuck,substeps,unconverged,simulated_s,cpu_s,machine,compiler\n");

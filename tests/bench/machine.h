@@ -1,6 +1,8 @@
-// Where figures were taken: the first two columns of results/*.csv.
+// Where figures were taken: the first two columns of results/*.csv. Which rows such a table has already.
 #pragma once
+#include <algorithm>
 #include <fstream>
+#include <set>
 #include <string>
 
 namespace bench {
@@ -18,6 +20,20 @@ inline std::string machine() {
   for (std::string line; std::getline(in, line);)
     if (line.rfind("model name", 0) == 0) return line.substr(line.find(':') + 2);
   return "unknown";
+}
+
+// Of each row the text of `count` columns after the first `skip`.
+inline std::set<std::string> names_in(const std::string &path, int skip, int count) {
+  std::set<std::string> names;
+  std::ifstream in(path);
+  for (std::string line; std::getline(in, line);) {
+    size_t begin = 0;
+    for (int i = 0; i < skip && begin < line.size(); ++i) begin = std::min(line.find(',', begin), line.size() - 1) + 1;
+    size_t end = begin;
+    for (int i = 0; i < count && end < line.size(); ++i) end = std::min(line.find(',', end + (i > 0)), line.size());
+    if (end > begin) names.insert(line.substr(begin, end - begin));
+  }
+  return names;
 }
 
 }  // namespace bench

@@ -37,23 +37,6 @@ std::vector<Case> cases() {
   return out;
 }
 
-// Rows that are there, by the columns of their name, which stand after machine, compiler and commit.
-std::set<std::string> known(const std::string &path) {
-  std::set<std::string> names;
-  std::FILE *f = std::fopen(path.c_str(), "r");
-  if (!f) return names;
-  char line[1024];
-  while (std::fgets(line, sizeof line, f)) {
-    const char *begin = line, *end;
-    for (int commas = 0; *begin && commas < 3; ++begin) commas += *begin == ',';
-    end = begin;
-    for (int commas = 0; *end && commas < 3; ++end) commas += *end == ',';
-    if (end > begin) names.insert(std::string(begin, size_t(end - begin - 1)));
-  }
-  std::fclose(f);
-  return names;
-}
-
 double cpu_seconds() { return double(std::clock()) / CLOCKS_PER_SEC; }
 
 }  // namespace
@@ -69,7 +52,7 @@ int main(int argc, char **argv) {
     if (!std::strcmp(argv[i], "--seconds")) seconds = std::atof(argv[i + 1]);
     if (!std::strcmp(argv[i], "--steps")) steps = uint64_t(std::atof(argv[i + 1]));
   }
-  const std::set<std::string> done = known(argv[1]);
+  const std::set<std::string> done = bench::names_in(argv[1], 3, 3);   // after machine, compiler and commit
   std::FILE *table = std::fopen(argv[1], "a");
   if (!table) return std::perror(argv[1]), 2;
   if (done.empty())
