@@ -6,7 +6,7 @@
 
 #include "deform/deform.h"
 #include "fuzz_file.h"
-#include "world/snapshot_stream.h"
+#include "unit/world/sealed_snapshot.h"
 
 namespace {
 
@@ -55,15 +55,6 @@ struct Scene {
   }
 };
 
-void seal(std::vector<uint8_t> &b) {
-  dfm::SnapshotHead head;
-  std::memcpy(&head, b.data(), sizeof head);
-  head.length = b.size();
-  std::memcpy(b.data(), &head, sizeof head);
-  head.checksum = dfm::snapshot_checksum(b.data(), b.size());
-  std::memcpy(b.data(), &head, sizeof head);
-}
-
 }  // namespace
 
 extern "C" int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
@@ -72,12 +63,13 @@ extern "C" int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
   std::vector<uint8_t> bytes;
   if (data[0] % 2 == 0) {
     bytes.assign(data + 1, data + size);
-    if (data[0] % 4 == 0 && bytes.size() >= sizeof(dfm::SnapshotHead)) std::memcpy(bytes.data(), scene.good.data(), sizeof(dfm::SnapshotHead)), seal(bytes);
+    if (data[0] % 4 == 0 && bytes.size() >= sizeof(dfm::SnapshotHead))
+      std::memcpy(bytes.data(), scene.good.data(), sizeof(dfm::SnapshotHead)), test::seal(bytes);
   } else {
     bytes = scene.good;
     const size_t head = sizeof(dfm::SnapshotHead), fields = bytes.size() - head;
     for (size_t i = 1; i + 2 < size; i += 3) bytes[head + size_t(data[i] | data[i + 1] << 8) % fields] = data[i + 2];
-    seal(bytes);
+    test::seal(bytes);
   }
   const dfm_status status = dfm_world_restore(scene.world, bytes.data(), bytes.size());
   if (status != DFM_OK) return dfm_last_error()[0] ? 0 : (std::abort(), 0);

@@ -8,7 +8,7 @@
 #include "core/handle.h"
 #include "heap_calls.h"
 #include "rigid.h"
-#include "world/snapshot_stream.h"
+#include "sealed_snapshot.h"
 #include "world/world.h"
 
 namespace {
@@ -72,15 +72,7 @@ Taken take(dfm_world w) {
   return t;
 }
 
-void seal(Bytes &b) {
-  if (b.size() < sizeof(dfm::SnapshotHead)) return;
-  dfm::SnapshotHead head;
-  std::memcpy(&head, b.data(), sizeof head);
-  head.length = b.size();
-  std::memcpy(b.data(), &head, sizeof head);
-  head.checksum = dfm::snapshot_checksum(b.data(), b.size());
-  std::memcpy(b.data(), &head, sizeof head);
-}
+using test::seal;
 
 dfm_status restore(dfm_world w, const Bytes &b) { return dfm_world_restore(w, b.data(), b.size()); }
 
