@@ -7,16 +7,8 @@ namespace {
 
 void refused(dfm_status status, std::initializer_list<const char *> parts) {
   EXPECT_EQ(status, DFM_E_ARG);
-  const std::string sentence = dfm_last_error();
-  for (const char *part : parts) EXPECT_NE(sentence.find(part), std::string::npos) << "'" << part << "' is missing in: " << sentence;
+  test::says(parts);
 }
-
-struct Tet {
-  double points[12] = {0, 0, 0, 0.1, 0, 0, 0, 0.1, 0, 0, 0, 0.1};
-  uint32_t cells[4] = {0, 1, 2, 3};
-  dfm_body_def def = dfm_body_def_default();
-  Tet() { def.name = "tet", def.npoint = 4, def.ntet = 1, def.points = points, def.tets = cells; }
-};
 
 dfm_pose at(double z) { return {{0, 0, z}, {0, 0, 0, 1}}; }
 
@@ -34,7 +26,7 @@ dfm_obstacle box(dfm_world w, double z) {
 TEST(Bounds, PlacesThatNumbersDoNotResolve_AreRefused) {
   test::Context c;
   const dfm_world w = test::make_world(c, {});
-  Tet t;
+  test::Tet t("tet");
   dfm_body b = 0;
   t.def.pose.position[0] = 1e15;
   refused(dfm_body_create(w, &t.def, &b), {"'tet'", "1e+15", "origin"});
@@ -57,7 +49,7 @@ TEST(Bounds, FarObstacle_IsRefusedByTheFirstStep) {
   test::Context c;
   const dfm_world w = test::make_world(c, {});
   box(w, 1e15);
-  Tet t;
+  test::Tet t("tet");
   dfm_body b = 0;
   test::ok(dfm_body_create(w, &t.def, &b));
   refused(dfm_world_step(w, 1e-4, nullptr), {"obstacle 'jaw'", "origin"});
@@ -67,7 +59,7 @@ TEST(Bounds, FarObstacle_IsRefusedByTheFirstStep) {
 TEST(Bounds, SpeedsAboveThatOfLight_AreRefused) {
   test::Context c;
   const dfm_world w = test::make_world(c, {});
-  Tet t;
+  test::Tet t("tet");
   dfm_body b = 0;
   t.def.velocity[1] = 1e200;
   refused(dfm_body_create(w, &t.def, &b), {"'tet'", "1e+200", "light"});

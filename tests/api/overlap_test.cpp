@@ -25,13 +25,7 @@ dfm_obstacle thing(dfm_world w, uint32_t shape, double size, const test::Triangl
   return o;
 }
 
-test::Triangles cube(double half) {
-  test::Triangles t;
-  for (int i = 0; i < 8; ++i)
-    for (int k = 0; k < 3; ++k) t.points.push_back(i >> k & 1 ? half : -half);
-  t.tris = {0, 2, 1, 1, 2, 3, 4, 5, 6, 5, 7, 6, 0, 1, 4, 1, 5, 4, 2, 6, 3, 3, 6, 7, 0, 4, 2, 2, 4, 6, 1, 3, 5, 3, 7, 5};
-  return t;
-}
+test::Triangles cube(double half) { return test::box_surface({half, half, half}, 1); }
 
 }  // namespace
 

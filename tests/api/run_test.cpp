@@ -87,6 +87,34 @@ std::string hash_of(const std::string &name, const std::vector<std::string> &arg
   return value(r.summary, "state_hash");
 }
 
+// A run of the scene into the folder `out`, left to itself.
+pid_t start(const std::string &out, std::vector<std::string> more) {
+  fs::remove_all(out);
+  std::vector<std::string> arguments{"deform", "run", folder() + "/scene.json", "--quiet", "--out", out};
+  arguments.insert(arguments.end(), more.begin(), more.end());
+  std::vector<char *> argv;
+  for (std::string &a : arguments) argv.push_back(a.data());
+  argv.push_back(nullptr);
+  const pid_t child = fork();
+  if (child == 0) {
+    execv(DEFORM_COMMAND, argv.data());
+    _exit(127);
+  }
+  return child;
+}
+
+// It ends by the signal as a run that was interrupted, with its last state; returns the summary.
+std::string stop(pid_t child, int signal, const std::string &out) {
+  kill(child, signal);
+  int status = 0;
+  waitpid(child, &status, 0);
+  EXPECT_TRUE(WIFEXITED(status) && WEXITSTATUS(status) == 130) << status;
+  EXPECT_TRUE(fs::exists(out + "/states/last_top.vtu"));
+  const std::string summary = test::read_file(out + "/summary.json");
+  EXPECT_NE(value(summary, "stopped").find("interrupted"), std::string::npos);
+  return summary;
+}
+
 }  // namespace
 
 TEST(Run, Outputs_HaveTheirColumnsAndKeys) {
@@ -229,47 +257,20 @@ TEST(Run, ForceBeyondAllBounds_StopsWithTheLastGoodState) {
 }
 
 TEST(Run, Interrupt_WritesTheLastStateAndTheSummary) {
-  const std::string out = folder() + "/interrupted", scene = folder() + "/scene.json";
-  fs::remove_all(out);
-  const pid_t child = fork();
-  if (child == 0) {
-    execl(DEFORM_COMMAND, "deform", "run", scene.c_str(), "--quiet", "--time", "1e5", "--out", out.c_str(), nullptr);
-    _exit(127);
-  }
+  const std::string out = folder() + "/interrupted";
+  const pid_t child = start(out, {"--time", "1e5"});
   // Recorded rows show that the run is under way.
   for (int i = 0; i < 1000 && test::read_csv(out + "/bodies.csv").size() < 8; ++i) std::this_thread::sleep_for(std::chrono::milliseconds(10));
-  kill(child, SIGINT);
-  int status = 0;
-  waitpid(child, &status, 0);
-  ASSERT_TRUE(WIFEXITED(status));
-  EXPECT_EQ(WEXITSTATUS(status), 130);
-  EXPECT_TRUE(fs::exists(out + "/states/last_top.vtu"));
-  const std::string summary = test::read_file(out + "/summary.json");
-  EXPECT_NE(value(summary, "stopped").find("interrupted"), std::string::npos);
-  EXPECT_GT(std::stoi(value(summary, "steps")), 10);
+  EXPECT_GT(std::stoi(value(stop(child, SIGINT, out), "steps")), 10);
 }
 
 // A single step of thousands of sub-steps: the signal does not wait for its end.
 TEST(Run, TerminateInsideAStep_WritesTheStateBeforeIt) {
-  const std::string out = folder() + "/terminated", scene = folder() + "/scene.json";
-  fs::remove_all(out);
-  const pid_t child = fork();
-  if (child == 0) {
-    execl(DEFORM_COMMAND, "deform", "run", scene.c_str(), "--quiet", "--time", "2", "--set", "/time/step=2", "--set",
-          "/time/max_work=1e18", "--out", out.c_str(), nullptr);
-    _exit(127);
-  }
+  const std::string out = folder() + "/terminated";
+  const pid_t child = start(out, {"--time", "2", "--set", "/time/step=2", "--set", "/time/max_work=1e18"});
   for (int i = 0; i < 1000 && !fs::exists(out + "/bodies.csv"); ++i) std::this_thread::sleep_for(std::chrono::milliseconds(1));
   std::this_thread::sleep_for(std::chrono::milliseconds(20));
-  kill(child, SIGTERM);
-  int status = 0;
-  waitpid(child, &status, 0);
-  ASSERT_TRUE(WIFEXITED(status));
-  EXPECT_EQ(WEXITSTATUS(status), 130);
-  EXPECT_TRUE(fs::exists(out + "/states/last_top.vtu"));
-  const std::string summary = test::read_file(out + "/summary.json");
-  EXPECT_NE(value(summary, "stopped").find("interrupted"), std::string::npos);
-  EXPECT_EQ(value(summary, "steps"), "0");
+  EXPECT_EQ(value(stop(child, SIGTERM, out), "steps"), "0");
 }
 
 TEST(Run, EarlierNumberedFiles_AreRemoved) {

@@ -7,19 +7,7 @@
 
 namespace {
 
-// The sentence of the last error, which must hold all of the parts.
-void says(std::initializer_list<const char *> parts) {
-  const std::string sentence = dfm_last_error();
-  for (const char *part : parts) EXPECT_NE(sentence.find(part), std::string::npos) << "'" << part << "' is missing in: " << sentence;
-}
-
-// Four points, one cell: the smallest body.
-struct Tet {
-  double points[12] = {0, 0, 0, 0.1, 0, 0, 0, 0.1, 0, 0, 0, 0.1};
-  uint32_t cells[4] = {0, 1, 2, 3};
-  dfm_body_def def = dfm_body_def_default();
-  Tet() { def.npoint = 4, def.ntet = 1, def.points = points, def.tets = cells; }
-};
+using test::says, test::Tet;
 
 void steps(dfm_world w, int n) {
   for (int i = 0; i < n; ++i) ASSERT_EQ(dfm_world_step(w, 1e-3, nullptr), DFM_OK) << dfm_last_error();

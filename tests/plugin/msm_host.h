@@ -326,6 +326,18 @@ struct Instance {
   }
 };
 
+// J, from the energy per volume of each cell.
+inline double energy_of_cells(Instance &b) {
+  const auto *ext = static_cast<const dfm_cell_energy *>(b.ops->extension(b.self, DFM_EXT_CELL_ENERGY));
+  if (!ext) return ADD_FAILURE() << "no energy per cell", 0;
+  std::vector<double> density(b.mesh.ncell());
+  const dfm_kin k = b.kin();
+  EXPECT_EQ(ext->cell_energy(b.self, &k, density.data()), DFM_OK);
+  double sum = 0;
+  for (uint32_t c = 0; c < b.mesh.ncell(); ++c) sum += density[c] * b.mesh.volume(c);
+  return sum;
+}
+
 // Central differences of the energy at every fifth point: 2 h^2 of its third derivative against its rounding over h. `scale` is the largest force.
 inline void expect_force_is_gradient(Instance &b, double h, double tolerance, const std::string &what) {
   b.forces();

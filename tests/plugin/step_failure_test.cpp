@@ -105,10 +105,7 @@ struct Host {
   ~Host() { dfm_context_destroy(c); }
 };
 
-void says(std::initializer_list<const char *> parts) {
-  const std::string sentence = dfm_last_error();
-  for (const char *part : parts) EXPECT_NE(sentence.find(part), std::string::npos) << "'" << part << "' is missing in: " << sentence;
-}
+using test::says;
 
 }  // namespace
 

@@ -4,6 +4,7 @@
 
 #include <array>
 #include <cmath>
+#include <initializer_list>
 #include <string>
 #include <vector>
 
@@ -26,6 +27,20 @@ struct Context {
 
 #define DFM_OK_OR_DIE(call) ASSERT_EQ(call, DFM_OK) << dfm_last_error()
 inline void ok(dfm_status s) { EXPECT_EQ(s, DFM_OK) << dfm_last_error(); }
+
+// The sentence of the last error holds all of the parts.
+inline void says(std::initializer_list<const char *> parts) {
+  const std::string sentence = dfm_last_error();
+  for (const char *part : parts) EXPECT_NE(sentence.find(part), std::string::npos) << "'" << part << "' is missing in: " << sentence;
+}
+
+// Four points, one cell: the smallest body.
+struct Tet {
+  double points[12] = {0, 0, 0, 0.1, 0, 0, 0, 0.1, 0, 0, 0, 0.1};
+  uint32_t cells[4] = {0, 1, 2, 3};
+  dfm_body_def def = dfm_body_def_default();
+  explicit Tet(const char *name = nullptr) { def.name = name, def.npoint = 4, def.ntet = 1, def.points = points, def.tets = cells; }
+};
 
 struct BodyOptions {
   std::string name, model;

@@ -26,6 +26,14 @@ struct OnAPlate {
   }
 };
 
+// On the bed; on a hinge a weight that has no geom, which is returned.
+dBodyID box_with_a_weight(Ode &ode) {
+  const dBodyID box = ode.box({0.08, 0.08, 0.05}, 2, {0.15, 0.15, 0.16}), weight = ode.body(0.5, {1e-3, 1e-3, 1e-3}, {0.15, 0.2, 0.3});
+  const dJointID hinge = dJointCreateHinge(ode.world, nullptr);
+  dJointAttach(hinge, box, weight), dJointSetHingeAnchor(hinge, 0.15, 0.15, 0.25), dJointSetHingeAxis(hinge, 1, 0, 0);
+  return weight;
+}
+
 }  // namespace
 
 TEST(OdeLifecycle, GeomDestroyedWhileTouched_EndsItsContacts) {
@@ -337,9 +345,7 @@ TEST(OdeLifecycle, Restore_TakesSleepAndItsCountersBack) {
 TEST(OdeLifecycle, SnapshotOfTheAdapter_HasBodiesWithoutGeomsToo) {
   Ode ode({0, 0, -9.81}, DFM_ODE_QUICK);
   soft_bed(ode);
-  const dBodyID box = ode.box({0.08, 0.08, 0.05}, 2, {0.15, 0.15, 0.16}), weight = ode.body(0.5, {1e-3, 1e-3, 1e-3}, {0.15, 0.2, 0.3});
-  const dJointID hinge = dJointCreateHinge(ode.world, nullptr);
-  dJointAttach(hinge, box, weight), dJointSetHingeAnchor(hinge, 0.15, 0.15, 0.25), dJointSetHingeAxis(hinge, 1, 0, 0);
+  const dBodyID weight = box_with_a_weight(ode);
   ode.run(0.1);
   size_t bytes = 0;
   ok(dfm_ode_snapshot(ode.adapter, nullptr, &bytes));
@@ -367,9 +373,7 @@ TEST(OdeLifecycle, SnapshotOfTheAdapter_HasBodiesWithoutGeomsToo) {
 TEST(OdeLifecycle, SnapshotThatIsDamaged_IsRefusedAndChangesNothing) {
   Ode ode;
   soft_bed(ode);
-  const dBodyID box = ode.box({0.08, 0.08, 0.05}, 2, {0.15, 0.15, 0.16}), weight = ode.body(0.5, {1e-3, 1e-3, 1e-3}, {0.15, 0.2, 0.3});
-  const dJointID hinge = dJointCreateHinge(ode.world, nullptr);
-  dJointAttach(hinge, box, weight), dJointSetHingeAnchor(hinge, 0.15, 0.15, 0.25), dJointSetHingeAxis(hinge, 1, 0, 0);
+  const dBodyID weight = box_with_a_weight(ode);
   ode.run(0.05);
   size_t bytes = 0;
   ok(dfm_ode_snapshot(ode.adapter, nullptr, &bytes));
