@@ -35,12 +35,14 @@ struct Busy {
 
 struct Seen {
   uint64_t hash, steps;
+  uint32_t events = 0;   // that wait to be read
   std::vector<double> forces;
   std::string snapshot;
   explicit Seen(dfm_world w) : hash(dfm_world_hash(w)), steps(test::stats(w).steps) {
     for (const dfm_contact &c : test::contacts(w)) forces.push_back(c.fn);
+    dfm_world_events(w, 0, nullptr, &events);
   }
-  bool operator==(const Seen &o) const { return hash == o.hash && steps == o.steps && forces == o.forces; }
+  bool operator==(const Seen &o) const { return hash == o.hash && steps == o.steps && events == o.events && forces == o.forces; }
 };
 
 }  // namespace

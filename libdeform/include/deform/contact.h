@@ -86,7 +86,8 @@ typedef struct dfm_contact_event {
   double t;                         /* s, simulated time */
 } dfm_contact_event;
 enum { DFM_EVENT_BEGIN = 1, DFM_EVENT_END = 2 };
-/** Begin and end of contacts since the last call; empties the list (it keeps the newest 65,536). Threads: Not during step. Since 0.1. */
+/** Begin and end of contacts since the last call; empties the list. Where more than 65,536 wait, the oldest are left out.
+ * Threads: Not during step. Since 0.1. */
 DFM_API dfm_status dfm_world_events(dfm_world world, uint32_t capacity, dfm_contact_event *out, uint32_t *n);
 
 /** Starts measuring holds: from now on, contacts that touch and stick in every step qualify. Threads: Not during step. Since 0.1. */

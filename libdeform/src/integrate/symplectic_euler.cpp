@@ -13,20 +13,20 @@ Point *points(Array<double> &a) { return reinterpret_cast<Point *>(a.data()); }
 
 }  // namespace
 
-bool predict(Phyxels &p, Vec3 gravity, double h, double limit, double *kinetic) {
+double predict(Phyxels &p, Vec3 gravity, double h) {
   const Point g{gravity.x, gravity.y, gravity.z, 0};
   const Point *const v = points(p.v), *const w = points(p.inv_mass), *const f = points(p.f);
   Point *const free = points(p.v_free);
-  const double overflows = std::numeric_limits<double>::max() / limit;   // what is above the limit becomes infinite, and a comparison is not needed
-  Point poison{0, 0, 0, 0};  // stays zero unless a value is too large, infinite or NaN
-  Point square{0, 0, 0, 0};
-  for (uint32_t i = 0; i < p.n; ++i) {
+  Point square[2] = {};   // two sums, so that one addition does not wait for the one before
+  const auto one = [&](uint32_t i, Point &sum) {
     free[i] = v[i] + h * (w[i] * (f[i] + p.mass[i] * g));
-    poison += (free[i] * overflows) * 0.0;
-    square += p.mass[i] * (free[i] * free[i]);
-  }
-  *kinetic = 0.5 * ((square[0] + square[1]) + square[2]);
-  return poison[0] + poison[1] + poison[2] + poison[3] == 0;
+    sum += p.mass[i] * (free[i] * free[i]);
+  };
+  uint32_t i = 0;
+  for (; i + 2 <= p.n; i += 2) one(i, square[0]), one(i + 1, square[1]);
+  if (i < p.n) one(i, square[0]);
+  const Point sum = square[0] + square[1];
+  return 0.5 * ((sum[0] + sum[1]) + sum[2]);
 }
 
 void commit(Phyxels &p, bool touched, double h) {

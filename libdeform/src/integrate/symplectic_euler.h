@@ -5,9 +5,8 @@
 
 namespace dfm {
 
-// v_free for free components; held components keep the velocity they carry. Returns false if a component is not finite or above limit (m/s).
-// kinetic: J, of v_free.
-bool predict(Phyxels &p, Vec3 gravity, double h, double limit, double *kinetic);
+// v_free for free components; held components keep the velocity they carry. Returns its kinetic energy, J, which is not finite where a component is not.
+double predict(Phyxels &p, Vec3 gravity, double h);
 // v = v_free + M^-1 impulse (impulse may be absent: `touched` false), x += h v.
 void commit(Phyxels &p, bool touched, double h);
 

@@ -1,5 +1,7 @@
 #include "phyxel/phyxels.h"
 
+#include <algorithm>
+
 namespace dfm {
 
 double tet_volume(const double *x, uint32_t stride, const uint32_t t[4]) {
@@ -25,6 +27,7 @@ LumpedMass lump_mass(uint32_t npoint, const double *rest, uint32_t ntet, const u
 void update_inverse_mass(Phyxels &p) {
   for (uint32_t i = 0; i < p.n; ++i)
     for (int k = 0; k < 3; ++k) p.inv_mass[size_t(i) * kStride + k] = p.held[i] & (1 << k) ? 0 : 1 / p.mass[i];
+  p.least_mass = p.n ? *std::min_element(p.mass.begin(), p.mass.end()) : 0;
 }
 
 }  // namespace dfm

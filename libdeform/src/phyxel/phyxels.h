@@ -19,6 +19,7 @@ struct Phyxels {
   Array<double> load;       // [n,4] N: sum of lasting loads at the current time
   Array<double> impulse;    // [n,4] N s: contact impulses of the sub-step, J^T lambda
   Array<double> mass;       // [n] kg, lumped
+  double least_mass = 0;    // kg
   Array<double> inv_mass;   // [n,4] 1/kg, zero where a component is held
   Array<uint8_t> held;      // [n] bits 1 x, 2 y, 4 z
 };
@@ -28,7 +29,7 @@ struct Phyxels {
 struct LumpedMass { double volume, mass; };
 LumpedMass lump_mass(uint32_t npoint, const double *rest, uint32_t ntet, const uint32_t *tets, double density, const double *cell_density,
                      const double *share, double *mass);
-void update_inverse_mass(Phyxels &p);
+void update_inverse_mass(Phyxels &p);   // and least_mass
 
 double tet_volume(const double *x, uint32_t stride, const uint32_t tet[4]);
 

@@ -61,6 +61,8 @@ struct Keep {
     const auto *const p = reinterpret_cast<const unsigned char *>(a.data());
     out.insert(out.end(), p, p + a.size() * sizeof(a[0]));
   }
+  template <class A>
+  void length(const A &a) { value(uint64_t(a.size())); }
 };
 struct PutBack {
   const unsigned char *at;
@@ -73,6 +75,12 @@ struct PutBack {
     a.resize(n);
     if (n) std::memcpy(static_cast<void *>(a.data()), at, n * sizeof(a[0]));
     at += n * sizeof(a[0]);
+  }
+  template <class A>
+  void length(A &a) {
+    uint64_t n;
+    value(n);
+    a.resize(n);
   }
 };
 
@@ -97,7 +105,8 @@ void changing(Stream &s, World &w) {
   for (auto &set : w.rigid_sets) s.array(set->state), s.array(set->extra), s.array(set->total), s.array(set->impulse), s.value(set->last_h);
   s.value(w.store.n), s.value(w.store.nstate), s.value(w.store.h), each_column(w.store, array);
   s.value(w.report.n), s.value(w.report.h), each_column_of_report(w.report, array);
-  s.array(w.work), s.array(w.events);
+  s.array(w.work);
+  s.length(w.events);   // a step only adds to it, and it may wait for the host for many steps
 }
 
 // The two stores and the two reports change places as sub-steps end, so what is put back may have to fit into the other one.
@@ -199,6 +208,7 @@ dfm_status step_within_budget(World &w, double dt, uint32_t *trouble) {
     ++w.stats.discarded;
   }
   if (b.used != Thrift::none) *trouble |= DFM_TROUBLE_BUDGET, ++w.stats.cheapened;
+  if (w.events.size() > kMostEvents) w.events.erase(w.events.begin(), w.events.end() - kMostEvents + kEventsAtOnce);
   w.stats.work = b.work, w.stats.work_max = std::max(w.stats.work_max, b.work);
   return status;
 }

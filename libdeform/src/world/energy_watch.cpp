@@ -24,7 +24,6 @@ bool watching(const World &w) { return w.def.energy_watch > 0 && !w.plan.rolls_b
 bool watched(const Body &b) { return !b.model.stepper && (b.model.ops->caps & DFM_CAP_ENERGY) && b.model.ops->energy; }
 // Loads that change from sub-step to sub-step have no potential: their work is booked as it is done.
 bool books_loads(const Body &b) { return b.loads_vary(); }
-bool books_gravity(const World &w) { return !w.gravity_keys.empty(); }
 
 struct Look {
   double kinetic = 0, elastic = 0, balance = 0, gives_back = 0, rounding = 0;   // J
@@ -47,35 +46,31 @@ double work_of_holders(const World &w, const Body &b, bool now) {
 // the library makes itself are few, so what they bring is bounded and no instability.
 double work_of_new_size(const World &w, const Body &b) {
   if (!w.watch.new_size || !(w.watch.last_h > 0)) return 0;
-  const bool load_booked = books_loads(b), gravity_booked = books_gravity(w);
+  const bool load_booked = books_loads(b);
   const Phyxels &p = b.p;
   double sum = 0;
   for (uint32_t i = 0; i < p.n; ++i)
-    for (size_t k = 0, at = size_t(i) * kStride; k < 3; ++k, ++at) {
-      if (!(p.inv_mass[at] > 0)) continue;
-      const double booked = (load_booked ? p.load[at] : 0) + (gravity_booked ? p.mass[i] * w.gravity[int(k)] : 0);
-      sum += p.v[at] * (p.mass[i] * (p.v_free[at] - p.v[at]) - w.h * booked);
-    }
+    for (size_t k = 0, at = size_t(i) * kStride; k < 3; ++k, ++at)
+      if (p.inv_mass[at] > 0) sum += p.v[at] * (p.mass[i] * (p.v_free[at] - p.v[at]) - (load_booked ? w.h * p.load[at] : 0));
   return 0.5 * (1 - w.watch.last_h / w.h) * sum;
 }
 
 // The energy that the scheme keeps, U(x) - F.x + v.M v_free / 2, and half of the energy of the kick, by which it may rise as stiff modes calm down.
 bool look(World &w, Body &b, Look &out) {
   const Phyxels &p = b.p;
-  const bool load_booked = books_loads(b), gravity_booked = books_gravity(w);
+  const bool load_booked = books_loads(b);
   double kinetic = 0, cross = 0, kick = 0, potential = 0, reach = 0;
   for (uint32_t i = 0; i < p.n; ++i) {
     const size_t at = size_t(i) * kStride;
     const double m = p.mass[i];
     for (size_t k = 0; k < 3; ++k) {
-      const double x = p.x[at + k], v = p.v[at + k], weight = m * w.gravity[int(k)], load = p.load[at + k];
+      const double x = p.x[at + k], v = p.v[at + k], load = p.load[at + k];
       reach = std::max(reach, std::fabs(x));
-      const double kept = (load_booked ? 0 : load) + (gravity_booked ? 0 : weight), booked = (load_booked ? load : 0) + (gravity_booked ? weight : 0);
-      potential -= kept * x;
+      potential -= (m * w.gravity[int(k)] + (load_booked ? 0 : load)) * x;
       if (!(p.inv_mass[at + k] > 0)) continue;
       const double change = p.v_free[at + k] - v;
       kinetic += 0.5 * (m * v * v), kick += 0.5 * (m * change * change);
-      cross += 0.5 * v * (m * p.v_free[at + k] - w.h * booked);
+      cross += 0.5 * v * (m * p.v_free[at + k] - (load_booked ? w.h * load : 0));
     }
   }
   double elastic = 0;
@@ -104,21 +99,36 @@ void book_contact(World &w) {
 
 // Loads without a potential; and, where the guard left out a part of the way, what the inner forces would have done on it.
 void book_body(World &w, Body &b, bool touched, double motion) {
-  const bool load_booked = books_loads(b), gravity_booked = books_gravity(w);
+  const bool load_booked = books_loads(b);
   const Phyxels &p = b.p;
   double sum = 0;
   for (uint32_t i = 0; i < p.n; ++i)
     for (size_t k = 0, at = size_t(i) * kStride; k < 3; ++k, ++at) {
-      if (!(p.inv_mass[at] > 0)) continue;
-      const double weight = p.mass[i] * w.gravity[int(k)], end = p.v_free[at] + (touched ? p.inv_mass[at] * p.impulse[at] : 0);
-      const double booked = (load_booked ? p.load[at] : 0) + (gravity_booked ? weight : 0);
+      const double booked = load_booked ? p.load[at] : 0;
+      if (!(p.inv_mass[at] > 0) || (booked == 0 && motion == 1)) continue;
+      const double end = p.v_free[at] + (touched ? p.inv_mass[at] * p.impulse[at] : 0);
       sum += w.h * booked * 0.5 * (p.v[at] + end);
-      if (motion < 1) sum += (1 - motion) * w.h * end * (p.f[at] + weight - booked);
+      if (motion < 1) sum += (1 - motion) * w.h * end * (p.f[at] + p.mass[i] * w.gravity[int(k)] - booked);
     }
   b.energy.work += sum;
 }
 
 }  // namespace
+
+// Of G = U(x) - m g.x + v.M v* / 2 with v* = v + h g + ..: a weight that changes does work at the places x - h v / 2, whatever the motion. The sub-step may fail
+// after this and be tried again with another gravity, from the same state: then the rest is booked.
+void change_gravity(World &w, Vec3 gravity) {
+  const Vec3 by = gravity - w.gravity;
+  w.gravity = gravity;
+  if (!watching(w) || norm2(by) == 0) return;
+  for (auto &b : w.bodies) {
+    if (!watched(*b)) continue;
+    const Phyxels &p = b->p;
+    for (uint32_t i = 0; i < p.n; ++i)
+      for (size_t k = 0, at = size_t(i) * kStride; k < 3; ++k, ++at)
+        b->energy.work -= p.mass[i] * by[int(k)] * (p.x[at] - (p.inv_mass[at] > 0 ? 0.5 * w.watch.last_h * p.v[at] : 0));
+  }
+}
 
 bool watch_energy(World &w, uint32_t *trouble) {
   if (!watching(w) || w.guard.planned != w.h) return true;   // pieces of a sub-step are not compared with whole ones
@@ -172,7 +182,7 @@ void book_energy(World &w, double motion) {
     Body &b = *w.bodies[i];
     if (!w.driven.empty()) b.energy.work += work_of_holders(w, b, true);
     if (!b.model.stepper && w.guard.planned == w.h) b.energy.work += work_of_new_size(w, b);
-    if (!b.model.stepper && (motion < 1 || books_loads(b) || books_gravity(w))) book_body(w, b, touched, motion);
+    if (!b.model.stepper && (motion < 1 || books_loads(b))) book_body(w, b, touched, motion);
   }
   w.watch.last_h = motion * w.h;
   w.watch.new_size = w.watch.new_size && w.guard.planned != w.h;

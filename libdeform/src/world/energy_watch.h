@@ -4,6 +4,8 @@
 #pragma once
 #include <cstdint>
 
+#include "math/vec3.h"
+
 namespace dfm {
 
 struct World;
@@ -27,6 +29,8 @@ struct EnergyWatch {
   bool new_size = false;   // the next one is longer or shorter because the step's bound has it so; not state: said anew by each step
 };
 
+// Gravity that varies: sets the present one, and books what that does to the potentials.
+void change_gravity(World &w, Vec3 gravity);
 // After predict. False: a body has gained too much; the sentence says which.
 bool watch_energy(World &w, uint32_t *trouble);
 // Before commit: what this sub-step puts into the bodies.

@@ -204,12 +204,11 @@ void World::reserve_contacts() {
 }
 
 void World::reserve_events(size_t more) {
-  const size_t most = std::min(kMostEvents, events.size() + more);
-  if (events.capacity() < most) events.reserve(std::min(kMostEvents, 2 * most));
+  const size_t most = events.size() + more;
+  if (events.capacity() < most) events.reserve(2 * most);
 }
 
 void World::add_event(uint32_t kind, uint64_t a, uint64_t b, uint64_t key, double t) {
-  if (events.size() >= kMostEvents) events.erase(events.begin(), events.begin() + 1024);
   events.push_back({sizeof(dfm_contact_event), kind, handle_of(a), handle_of(b), key, t});
 }
 

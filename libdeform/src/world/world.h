@@ -146,7 +146,8 @@ struct Report {
   Array<uint8_t> mode;
 };
 
-inline constexpr size_t kMostEvents = 65536;           // the list keeps the newest ones
+inline constexpr size_t kMostEvents = 65536;           // between steps; with more, so many of the oldest go that
+inline constexpr size_t kEventsAtOnce = 1024;          // the next steps find room
 
 struct World {
   dfm_context *context;
