@@ -115,8 +115,8 @@ void book_body(World &w, Body &b, bool touched, double motion) {
 
 }  // namespace
 
-// Of G = U(x) - m g.x + v.M v* / 2 with v* = v + h g + ..: a weight that changes does work at the places x - h v / 2, whatever the motion. The sub-step may fail
-// after this and be tried again with another gravity, from the same state: then the rest is booked.
+// Of G = U(x) - m g.x + v.M v* / 2 with v* = v + h g + ..: a weight that changes does work at the places x - h v / 2, whatever the motion. The sub-step may
+// fail after this and be tried again with another gravity, from the same state: then the rest is booked.
 void change_gravity(World &w, Vec3 gravity) {
   const Vec3 by = gravity - w.gravity;
   w.gravity = gravity;
