@@ -21,12 +21,13 @@ TEST(MsmMaterial, YoungField_ScalesTheSpringsOfItsCells) {
 }
 
 // The weights by direction belong to the whole body, so what a part is made of depends on the rest; it stays within three times. Without that limit
-// the cube beside a sheet would be 133 times as stiff.
+// the cube beside a sheet would be 133 times as stiff. Nor does the sheet lose what the limit keeps from the cube.
 TEST(MsmMaterial, ACubeBesideASheet_KeepsTheOrderOfItsStiffness) {
   Host host;
   const Mesh cube = kuhn_bar(3, 3, 3, 0.1);
   Mesh both = kuhn_bar(20, 20, 1, 1);
   for (uint32_t i = 0; i < both.npoint(); ++i) both.rest[3 * i + 2] *= 0.01;
+  const Mesh sheet = both;
   const uint32_t first = both.npoint();
   for (uint32_t i = 0; i < cube.npoint(); ++i) both.rest.insert(both.rest.end(), {cube.at(i)[0] + 50, cube.at(i)[1], cube.at(i)[2]});
   for (uint32_t c : cube.cells) both.cells.push_back(first + c);
@@ -41,6 +42,16 @@ TEST(MsmMaterial, ACubeBesideASheet_KeepsTheOrderOfItsStiffness) {
     const double ratio = beside.energy() / alone.energy();
     EXPECT_GT(ratio, 1.0 / 3) << k;
     EXPECT_LT(ratio, 3) << k;
+  }
+  Instance flat(host, sheet, {}), under(host, both, {});
+  for (int k = 0; k < 2; ++k) {
+    for (uint32_t i = 0; i < first; ++i) {
+      Vec a = sheet.at(i);
+      a[k] *= 1.001;
+      flat.set(flat.x, i, a), under.set(under.x, i, a);
+    }
+    EXPECT_GT(under.energy() / flat.energy(), 1.0 / 3) << k;
+    EXPECT_LT(under.energy() / flat.energy(), 3) << k;
   }
 }
 

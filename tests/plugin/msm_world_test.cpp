@@ -88,9 +88,9 @@ TEST(MsmWorld, MaxwellBar_FlowsUnderGravityWhereAVoigtBarStands) {
     test::ok(dfm_body_get_measure(s.body, &after));
     return before.com[2] - after.com[2];
   };
-  const double voigt = sag(0, 4000), sls = sag(2, 4000), maxwell = sag(1, 400);
+  const double voigt = sag(0, 4000), sls = sag(2, 4000), maxwell = sag(1, 4000);
   EXPECT_NEAR(sls, voigt, 0.01 * voigt);  // the same spring carries both in the end
-  EXPECT_GT(maxwell, 2 * voigt);
+  EXPECT_GT(maxwell, 3 * voigt);   // 0.31 m of a bar of 0.5 m
 }
 
 TEST(MsmWorld, Plan_ListsTheEffectsThatParametersCallFor) {
