@@ -37,7 +37,7 @@ TEST(PairImpulses, OfEachFrame_AreTheMomentumThatTheBodyGot) {
     ASSERT_LE(list.size(), 1u);
     const dfm_pair_impulse p = list.empty() ? dfm_pair_impulse{} : list[0];
     for (int k = 0; k < 3; ++k) EXPECT_NEAR(p.impulse[k], after.momentum[k] - before.momentum[k], 1e-12 * scale) << frame;
-    EXPECT_NEAR(p.normal_impulse, p.impulse[2], 1e-9 * scale);   // on a plane all normals point up
+    EXPECT_NEAR(p.normal_impulse, p.impulse[2], 1e-12 * scale);   // on a plane all normals point up
     if (!list.empty()) {
       EXPECT_EQ(p.a, t.ball);
       EXPECT_EQ(p.b, t.floor);
@@ -45,7 +45,7 @@ TEST(PairImpulses, OfEachFrame_AreTheMomentumThatTheBodyGot) {
       EXPECT_LE(p.touching, 1.0 / 60 * (1 + 1e-12));
       EXPECT_GE(p.peak_normal, p.normal_impulse / p.touching * (1 - 1e-12));
       EXPECT_GE(p.peak_force, p.peak_normal * (1 - 1e-12));
-      EXPECT_NEAR(p.point[2], 0, 2e-3);
+      EXPECT_NEAR(p.point[2], 0, 2e-5);   // within the contact offset
     }
     most = std::max(most, p.normal_impulse);
     before = after;
@@ -87,9 +87,9 @@ TEST(PairImpulses, SumAndPeak_AreThoseOfTheSameTimeInManySteps) {
   }
   const auto list = impulses(whole.world);
   ASSERT_EQ(list.size(), 1u);
-  EXPECT_NEAR(list[0].normal_impulse, normal, 1e-9 * normal);
-  EXPECT_NEAR(list[0].peak_normal, peak, 1e-9 * peak);
-  EXPECT_NEAR(list[0].peak_force, force, 1e-9 * force);
+  EXPECT_NEAR(list[0].normal_impulse, normal, 1e-12 * normal);
+  EXPECT_NEAR(list[0].peak_normal, peak, 1e-12 * peak);
+  EXPECT_NEAR(list[0].peak_force, force, 1e-12 * force);
 }
 
 // Before it falls asleep, in the frame in which it does, and while it sleeps.
@@ -97,22 +97,23 @@ TEST(PairImpulses, OfAStackAtRest_AreItsWeight_AlsoWhileItSleeps) {
   test::Context context;
   test::Stack s = test::make_stack(context, 1e-5);
   test::ok(dfm_world_set_sleep(s.world, true));
-  const double dt = 1.0 / 60, weight = 9.81 * test::measure(s.upper).mass;
+  const double rest = 2e-5, dt = 1.0 / 60, mass = test::measure(s.upper).mass, weight = 9.81 * mass;
   dfm_world_stats stats{};
   stats.size = sizeof stats;
   int checked = 0;
   for (int frame = 0; frame < 600 && checked < 20; ++frame) {
     test::ok(dfm_world_step(s.world, dt, nullptr));
     test::ok(dfm_world_get_stats(s.world, &stats));
-    if (stats.asleep == 0 && checked == 0 && test::measure(s.upper).speed_max > 2e-5) continue;
+    if (stats.asleep == 0 && checked == 0 && test::measure(s.upper).speed_max > rest) continue;
     std::map<std::pair<uint64_t, uint64_t>, dfm_pair_impulse> of;
     for (const dfm_pair_impulse &p : impulses(s.world)) of[{p.a, p.b}] = p;
     ASSERT_EQ(of.size(), 2u);
     const dfm_pair_impulse between = of[{s.lower, s.upper}], below = of[{s.lower, s.floor}];
-    EXPECT_NEAR(between.impulse[2], -weight * dt, 5e-3 * weight * dt);   // on the lower one
-    EXPECT_NEAR(below.impulse[2], 2 * weight * dt, 5e-3 * weight * dt);
-    EXPECT_NEAR(between.peak_normal, weight, 5e-2 * weight);
-    EXPECT_NEAR(between.touching, dt, 1e-9);
+    // What a body that moves slower than `rest` has gained in momentum is missing in the impulses.
+    EXPECT_NEAR(between.impulse[2], -weight * dt, rest * mass);   // on the lower one
+    EXPECT_NEAR(below.impulse[2], 2 * weight * dt, 2 * rest * mass);
+    EXPECT_NEAR(between.peak_normal, weight, 3e-4 * weight);   // it still rings with 9e-5 of the weight
+    EXPECT_NEAR(between.touching, dt, 1e-12);
     checked += stats.asleep == 2;
   }
   EXPECT_EQ(checked, 20);
