@@ -2,7 +2,6 @@
 #include <gtest/gtest.h>
 #include <signal.h>
 #include <sys/wait.h>
-#include <unistd.h>
 
 #include <algorithm>
 #include <chrono>
@@ -54,20 +53,13 @@ TEST(MeshCommand, InterruptedWork_EndsAndLeavesTheOldFile) {
   const std::string dir = folder() + "/interrupted", ball = folder() + "/interrupted_ball.obj";
   ASSERT_EQ(test::deform({"mesh", "make", "ball", "--surface", "--cells", "2000", "--quiet", "--out", ball}).exit_code, 0);
   const std::string out = dir + "/old.msh";
-  const std::vector<std::vector<std::string>> work = {{"deform", "mesh", "fill", ball, "--cells", "50000000", "--quiet", "--out", out},
-                                                      {"deform", "mesh", "make", "ball", "--cells", "50000000", "--quiet", "--out", out}};
+  const std::vector<std::vector<std::string>> work = {{DEFORM_COMMAND, "mesh", "fill", ball, "--cells", "50000000", "--quiet", "--out", out},
+                                                      {DEFORM_COMMAND, "mesh", "make", "ball", "--cells", "50000000", "--quiet", "--out", out}};
   for (const auto &arguments : work) {
     std::filesystem::remove_all(dir);
     std::filesystem::create_directories(dir);
     test::write_file(out, "mine");
-    std::vector<char *> argv;
-    for (const std::string &a : arguments) argv.push_back(const_cast<char *>(a.c_str()));
-    argv.push_back(nullptr);
-    const pid_t child = fork();
-    if (child == 0) {
-      execv(DEFORM_COMMAND, argv.data());
-      _exit(127);
-    }
+    const pid_t child = test::start(arguments);
     std::this_thread::sleep_for(std::chrono::milliseconds(300));
     kill(child, SIGINT);
     int status = 0;

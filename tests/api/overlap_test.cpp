@@ -25,8 +25,6 @@ dfm_obstacle thing(dfm_world w, uint32_t shape, double size, const test::Triangl
   return o;
 }
 
-test::Triangles cube(double half) { return test::box_surface({half, half, half}, 1); }
-
 }  // namespace
 
 TEST(Overlap, OfTwoBalls_IsFoundNamedAndToldOnce) {
@@ -111,7 +109,7 @@ TEST(Overlap, OfCubesOnOneGrid_IsFoundThoughNoEdgeCrosses) {
 }
 
 TEST(Overlap, OfBodyWithEveryShapeOfObstacle_IsFound) {
-  const test::Triangles box = cube(0.03), large = cube(0.5);
+  const test::Triangles box = test::box_surface({0.03, 0.03, 0.03}, 1), large = test::box_surface({0.5, 0.5, 0.5}, 1);
   for (const bool around : {false, true})   // the obstacle holds the body, or lies inside it
     for (const uint32_t shape : {DFM_SHAPE_SPHERE, DFM_SHAPE_BOX, DFM_SHAPE_CAPSULE, DFM_SHAPE_MESH, DFM_SHAPE_VOXELS}) {
       test::Context c;
@@ -146,8 +144,7 @@ TEST(Overlap, OfBodyInsideBody_IsFoundAndOfBodyInRoomIsNot) {
   ASSERT_EQ(found.size(), 1u);
   EXPECT_EQ(found[0].crossings, 0u);
   EXPECT_GT(found[0].enclosed, 50u);
-  test::Triangles room = cube(0.5);
-  for (size_t i = 0; i < room.tris.size(); i += 3) std::swap(room.tris[i], room.tris[i + 1]);
+  const test::Triangles room = test::inside_out(test::box_surface({0.5, 0.5, 0.5}, 1));
   thing(w, DFM_SHAPE_MESH, 0, &room);
   EXPECT_EQ(overlaps(w).size(), 0u);   // of what was made since: the room
   dfm_world_destroy(w);

@@ -1,7 +1,6 @@
 // The folder of a run: one run at a time, nothing of an earlier one, no link followed; and text of others on its way to terminal and tables.
 #include <gtest/gtest.h>
 
-#include <fcntl.h>
 #include <signal.h>
 #include <sys/wait.h>
 #include <unistd.h>
@@ -34,13 +33,7 @@ test::CommandResult run(const std::string &dir, const std::vector<std::string> &
 
 // A run that does not end by itself, once it has begun to write.
 pid_t start_endless(const std::string &dir) {
-  const pid_t child = fork();
-  if (child == 0) {
-    const int null = open("/dev/null", O_RDWR);
-    dup2(null, 0), dup2(null, 1), dup2(null, 2);
-    execl(DEFORM_COMMAND, "deform", "run", (dir + "/scene.json").c_str(), "--quiet", "--time", "1e9", "--out", (dir + "/out").c_str(), nullptr);
-    _exit(127);
-  }
+  const pid_t child = test::start({DEFORM_COMMAND, "run", dir + "/scene.json", "--quiet", "--time", "1e9", "--out", dir + "/out"});
   for (int i = 0; i < 2000 && !fs::exists(dir + "/out/probes.csv"); ++i) usleep(10000);
   return child;
 }

@@ -90,17 +90,8 @@ std::string hash_of(const std::string &name, const std::vector<std::string> &arg
 // A run of the scene into the folder `out`, left to itself.
 pid_t start(const std::string &out, std::vector<std::string> more) {
   fs::remove_all(out);
-  std::vector<std::string> arguments{"deform", "run", folder() + "/scene.json", "--quiet", "--out", out};
-  arguments.insert(arguments.end(), more.begin(), more.end());
-  std::vector<char *> argv;
-  for (std::string &a : arguments) argv.push_back(a.data());
-  argv.push_back(nullptr);
-  const pid_t child = fork();
-  if (child == 0) {
-    execv(DEFORM_COMMAND, argv.data());
-    _exit(127);
-  }
-  return child;
+  more.insert(more.begin(), {DEFORM_COMMAND, "run", folder() + "/scene.json", "--quiet", "--out", out});
+  return test::start(more);
 }
 
 // It ends by the signal as a run that was interrupted, with its last state; returns the summary.

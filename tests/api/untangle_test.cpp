@@ -52,8 +52,6 @@ void expect_calm(dfm_world w, std::initializer_list<dfm_body> bodies) {
   }
 }
 
-test::Triangles cube(double half) { return test::box_surface({half, half, half}, 1); }
-
 }  // namespace
 
 TEST(Untangle, TwoBallsAtAnyDistance_ComeApartWithoutSpeed) {
@@ -94,7 +92,7 @@ TEST(Untangle, BodyInEveryShapeOfObstacle_ComesOut) {
       test::Context c;
       const dfm_world w = untangling(c);
       const dfm_body b = ball(c, w, {0.01, 0.02, -0.01}, 0.1, 400);
-      const test::Triangles t = cube(size);
+      const test::Triangles t = test::box_surface({size, size, size}, 1);
       dfm_obstacle_def d = dfm_obstacle_def_default();
       d.shape = shape, d.radius = d.half_length = d.half_size[0] = d.half_size[1] = d.half_size[2] = size;
       if (shape == DFM_SHAPE_MESH || shape == DFM_SHAPE_VOXELS)
@@ -165,12 +163,7 @@ TEST(Untangle, BodyLargerThanItsRoom_StaysAndIsNamed) {
   dfm_context *const c = logged.context;
   const dfm_world w = untangling(c);
   const dfm_body b = ball(c, w, {}, 0.1, 400);
-  test::Triangles room = cube(0.08);
-  for (size_t i = 0; i < room.tris.size(); i += 3) std::swap(room.tris[i], room.tris[i + 1]);
-  dfm_obstacle_def d = dfm_obstacle_def_default();
-  d.shape = DFM_SHAPE_MESH, d.npoint = 8, d.points = room.points.data(), d.ntriangle = 12, d.triangles = room.tris.data();
-  dfm_obstacle o = 0;
-  test::ok(dfm_obstacle_create(w, &d, &o));
+  test::add_mesh(w, "room", test::inside_out(test::box_surface({0.08, 0.08, 0.08}, 1)));
   ASSERT_EQ(overlaps(w).size(), 1u);
   EXPECT_FALSE(overlaps(w)[0].flags & DFM_OVERLAP_SEPARATED);
   EXPECT_NEAR(test::measure(b).com[0], 0, 1e-9);

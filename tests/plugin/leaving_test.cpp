@@ -1,5 +1,4 @@
 // A plugin that ends the process, or never comes back, does not make a run look done: the exit code is not 0, a sentence names it, and what was recorded stays.
-#include <fcntl.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
@@ -91,12 +90,7 @@ TEST_F(Leaving, LawThatHangs_EndsSomeTimeAfterASignalAndAtOnceAfterASecond) {
   for (const bool twice : {false, true}) {
     test::write_file(dir + "/scene.json", scene_with(twice ? 8 : 7));
     const std::string words = dir + "/words.txt";
-    const pid_t child = fork();
-    if (child == 0) {
-      dup2(open(words.c_str(), O_CREAT | O_TRUNC | O_WRONLY, 0600), 2);
-      execl(DEFORM_COMMAND, "deform", "run", (dir + "/scene.json").c_str(), "--out", out.c_str(), static_cast<char *>(nullptr));
-      _exit(1);
-    }
+    const pid_t child = test::start({DEFORM_COMMAND, "run", dir + "/scene.json", "--out", out}, "/dev/null", words);
     const auto wait = [](double seconds) { std::this_thread::sleep_for(std::chrono::duration<double>(seconds)); };
     for (int k = 0; k < 600 && recorded() < 3; ++k) wait(0.1);
     wait(1);

@@ -168,10 +168,7 @@ TEST(MsmBound, LargeMotionAtNineTenthsOfTheBound_StaysBounded) {
   for (int n = 0; n < 5000; ++n) {
     if (n % 16 == 0) h = 0.9 * b.bound();
     b.forces();
-    for (uint32_t i = 0; i < b.size(); ++i) {
-      b.set(b.v, i, b.get(b.v, i) + (h / b.mesh.mass[i]) * b.get(b.f, i));
-      b.set(b.x, i, b.get(b.x, i) + h * b.get(b.v, i));
-    }
+    b.move(h);
     if (n % 100 == 99) {
       ASSERT_LT(total(), start) << n;
     }

@@ -176,10 +176,7 @@ void settle(Instance &b, double periods, double period) {
   for (double t = 0; t < periods * period && n < 20000; t += h, ++n) {
     h = 0.9 * b.bound();
     b.forces();
-    for (uint32_t i = 0; i < b.size(); ++i) {
-      b.set(b.v, i, b.get(b.v, i) + (h / b.mesh.mass[i]) * b.get(b.f, i));
-      b.set(b.x, i, b.get(b.x, i) + h * b.get(b.v, i));
-    }
+    b.move(h);
   }
 }
 

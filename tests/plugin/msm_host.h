@@ -293,6 +293,13 @@ struct Instance {
     const dfm_kin k = kin();
     EXPECT_EQ(ops->add_forces(self, &k, f), DFM_OK);
   }
+  // Velocities by the forces, then positions by the velocities: symplectic Euler.
+  void move(double h) {
+    for (uint32_t i = 0; i < size(); ++i) {
+      set(v, i, get(v, i) + (h / mesh.mass[i]) * get(f, i));
+      set(x, i, get(x, i) + h * get(v, i));
+    }
+  }
   double energy() const {
     const dfm_kin k = kin();
     double joule = 0;

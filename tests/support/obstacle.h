@@ -66,6 +66,11 @@ inline Triangles box_surface(std::array<double, 3> half, uint32_t n) {
   return m;
 }
 
+inline Triangles inside_out(Triangles m) {
+  for (size_t i = 0; i < m.tris.size(); i += 3) std::swap(m.tris[i], m.tris[i + 1]);
+  return m;
+}
+
 inline dfm_obstacle_def mesh_def(const char *name, const Triangles &m, uint32_t shape = DFM_SHAPE_MESH, uint32_t cells = 0) {
   dfm_obstacle_def d = dfm_obstacle_def_default();
   d.name = name, d.shape = shape;

@@ -57,6 +57,13 @@ struct Ode {
     const long n = std::lround(seconds / dt);
     for (long i = 0; i < n && !::testing::Test::HasFatalFailure(); ++i) step(dt);
   }
+  std::vector<unsigned char> snapshot() const {
+    size_t bytes = 0;
+    ok(dfm_ode_snapshot(adapter, nullptr, &bytes));
+    std::vector<unsigned char> shot(bytes);
+    ok(dfm_ode_snapshot(adapter, shot.data(), &bytes));
+    return shot;
+  }
   dfm_ode_stats stats() const {
     dfm_ode_stats s{};
     s.size = sizeof s;

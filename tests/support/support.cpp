@@ -25,21 +25,24 @@ class SkipsFail : public testing::EmptyTestEventListener {
 
 }  // namespace
 
+pid_t start(const std::vector<std::string> &argv, const std::string &out, const std::string &err) {
+  const pid_t child = fork();
+  if (child != 0) return child;
+  std::vector<char *> args;
+  for (const auto &a : argv) args.push_back(const_cast<char *>(a.c_str()));
+  args.push_back(nullptr);
+  const int fo = open(out.c_str(), O_CREAT | O_TRUNC | O_WRONLY, 0644), fe = open(err.c_str(), O_CREAT | O_TRUNC | O_WRONLY, 0644);
+  const int in = open("/dev/null", O_RDONLY);
+  dup2(in, 0), dup2(fo, 1), dup2(fe, 2);
+  execvp(args[0], args.data());
+  _exit(127);
+}
+
 CommandResult run(const std::vector<std::string> &argv) {
   static int counter = 0;
   const std::string base = scratch("run") + "/" + std::to_string(getpid()) + "_" + std::to_string(counter++);
   const std::string out = base + ".out", err = base + ".err";
-  const pid_t child = fork();
-  if (child == 0) {
-    std::vector<char *> args;
-    for (const auto &a : argv) args.push_back(const_cast<char *>(a.c_str()));
-    args.push_back(nullptr);
-    const int fo = open(out.c_str(), O_CREAT | O_TRUNC | O_WRONLY, 0644), fe = open(err.c_str(), O_CREAT | O_TRUNC | O_WRONLY, 0644);
-    const int in = open("/dev/null", O_RDONLY);
-    dup2(in, 0), dup2(fo, 1), dup2(fe, 2);
-    execvp(args[0], args.data());
-    _exit(127);
-  }
+  const pid_t child = start(argv, out, err);
   int status = 0;
   waitpid(child, &status, 0);
   CommandResult result;

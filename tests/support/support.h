@@ -1,9 +1,14 @@
 // What several test programs share: where things lie, running the command, reference data.
 #pragma once
+#include <sys/types.h>
+
 #include <string>
 #include <vector>
 
 namespace test {
+
+// Starts a program (no shell) that has nothing to read; what it writes goes into the two files. Its end is for the caller to wait for.
+pid_t start(const std::vector<std::string> &argv, const std::string &out = "/dev/null", const std::string &err = "/dev/null");
 
 struct CommandResult { int exit_code; std::string out, err; };
 // Runs a program (no shell) with its own HOME and waits for it; exit_code is 128+signal where a signal ended it.

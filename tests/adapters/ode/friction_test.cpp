@@ -80,10 +80,9 @@ TEST(OdeFriction, SnapshotOfTheAdapter_HasTheBristles) {
     for (int i = 0; i < steps; ++i) dBodyAddForce(box, 4, 1, 0), ode.step();
   };
   push(100);
+  const std::vector<unsigned char> shot = ode.snapshot();
+  std::vector<unsigned char> plain;
   size_t bytes = 0;
-  ok(dfm_ode_snapshot(ode.adapter, nullptr, &bytes));
-  std::vector<unsigned char> shot(bytes), plain;
-  ok(dfm_ode_snapshot(ode.adapter, shot.data(), &bytes));
   ok(dfm_world_snapshot(ode.soft, nullptr, &bytes));
   plain.resize(bytes);
   ok(dfm_world_snapshot(ode.soft, plain.data(), &bytes));

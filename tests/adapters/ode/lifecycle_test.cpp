@@ -375,10 +375,8 @@ TEST(OdeLifecycle, SnapshotThatIsDamaged_IsRefusedAndChangesNothing) {
   soft_bed(ode);
   const dBodyID weight = box_with_a_weight(ode);
   ode.run(0.05);
-  size_t bytes = 0;
-  ok(dfm_ode_snapshot(ode.adapter, nullptr, &bytes));
-  std::vector<unsigned char> good(bytes);
-  ok(dfm_ode_snapshot(ode.adapter, good.data(), &bytes));
+  const std::vector<unsigned char> good = ode.snapshot();
+  const size_t bytes = good.size();
   ode.run(0.05);
   const uint64_t hash = dfm_world_hash(ode.soft);
   const Vec there = position(weight);
