@@ -262,7 +262,7 @@ void World::update_bound() {
   stats.stable_step = stable, stats.inverted_max = std::max(stats.inverted_max, inverted);
   stats.limited_max = std::max(stats.limited_max, limited);
   const double keeps = kBoundStrain / (fastest * stable);   // sub-steps
-  bound_age = keeps >= kBoundEvery || !(fastest > 0) ? 0 : kBoundEvery - std::max(1u, static_cast<uint32_t>(keeps));
+  bound_age = keeps >= kBoundEvery || !(fastest > 0) ? 0 : kBoundEvery - static_cast<uint32_t>(std::max(1.0, keeps));
 }
 
 void World::ask_bound(Body &b) {
