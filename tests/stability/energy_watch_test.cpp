@@ -228,6 +228,11 @@ TEST(EnergyWatch, OfARunThatAModelPumps_ExitsWithThree) {
   EXPECT_TRUE(std::filesystem::exists(out + "/run/states/last_pumped.vtu"));
   const std::string summary = test::read_file(out + "/run/summary.json");
   EXPECT_NE(summary.find("\"body\": \"pumped\""), std::string::npos) << summary;
+  const size_t at = r.err.find("stopped at step ") + 16;
+  const std::string step = r.err.substr(at, r.err.find_first_not_of("0123456789", at) - at);
+  EXPECT_GT(std::stoi(step), 0);
+  EXPECT_NE(summary.find("\"steps\": " + step + ","), std::string::npos) << "the steps before it are done: " << summary;
+  EXPECT_NE(summary.find("\"finite\": true"), std::string::npos) << summary;
   const test::CommandResult blind = run({"--time", "0.5", "--set", "/contact/energy_watch=0"});
   EXPECT_EQ(blind.exit_code, 0) << blind.err;
 }
