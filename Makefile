@@ -62,7 +62,7 @@ fuzz: setup-fuzz build/fuzz/build.ninja
 
 install: setup build/release/build.ninja
 	$(BUILD) release --target deform_command
-	@cmake --install build/release --strip --prefix $(abspath $(PREFIX))
+	@cmake --install build/release --strip --prefix "$$(realpath -m -- "$(PREFIX)")"
 
 clean:
 	rm -rf build out

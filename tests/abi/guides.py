@@ -20,7 +20,7 @@ def follow(guide, prefix, libdir, scratch):
     folder = scratch / guide.stem
     shutil.copytree(guide.with_suffix(""), folder)
     env = {**clean_environment(), "CMAKE_PREFIX_PATH": str(prefix), "PKG_CONFIG_PATH": str(prefix / libdir / "pkgconfig"),
-           "LD_LIBRARY_PATH": str(prefix / libdir), "PATH": f"{prefix / 'bin'}:{os.environ['PATH']}"}
+           "PATH": f"{prefix / 'bin'}:{os.environ['PATH']}"}
     if not any("CXX" in path.read_text() for path in folder.rglob("CMakeLists.txt")):
         env["CXX"] = "/bin/false"  # a guide whose project is in C asks for no other compiler
     blocks = re.findall(r"^```sh\n(.*?)^```", guide.read_text(), re.M | re.S)
