@@ -113,7 +113,7 @@ class Runner {
     const auto pairs = [](auto most) { return "up to " + std::to_string(most) + " triangle pairs"; };
     if (checks().between_max > 0) out.push_back("surfaces cross: " + pairs(checks().between_max) + " of two surfaces in one state");
     if (checks().self_max > 0)
-      out.push_back("a surface crosses itself: " + pairs(checks().self_max) + " in one state; \"contact\": {\"self\": true} keeps it from that");
+      out.push_back("a surface crosses itself: " + pairs(checks().self_max) + " in one state; \"contact\": {\"self\": \"auto\"} keeps it from that");
     return out;
   }
 

@@ -190,6 +190,7 @@ std::string summary_json(const SceneFile &scene, const RunOptions &options, cons
   out.add("intersections_between_max", std::to_string(checks.between_max)).add("intersections_self_max", std::to_string(checks.self_max));
   out.add("overlaps_at_start", std::to_string(run.overlaps)).add("untangled", std::to_string(run.untangled));
   out.add("inverted_max", std::to_string(std::max(checks.inverted_max, stats.inverted_max))).add("limited_max", std::to_string(stats.limited_max));
+  out.add("self_bodies_max", std::to_string(stats.self_max));
   out.add("guard_steps", std::to_string(stats.guard_steps)).add("guard", guard.text()).add("unconverged_steps", std::to_string(stats.unconverged));
   out.add("budget", budget.text());
   out.add("energy", energy.text());

@@ -197,9 +197,9 @@ TEST(SelfContact, EffectInTheList_TurnsItOn) {
   DFM_OK_OR_DIE(dfm_world_create(c, &d, &w));
   test::make_hook(w, {});
   EXPECT_NE(test::explain(w).find("\"name\":\"self_contact\",\"asked_by\":\"effects\",\"provided_by\":\"contact\""), std::string::npos) << test::explain(w);
-  d.effects = nullptr, d.self_contact = 2;
+  d.effects = nullptr, d.self_contact = 3;
   EXPECT_EQ(dfm_world_create(c, &d, &w), DFM_E_ARG);
-  EXPECT_NE(std::string(dfm_last_error()).find("self_contact is 2"), std::string::npos);
+  EXPECT_NE(std::string(dfm_last_error()).find("self_contact is 3"), std::string::npos);
 }
 
 TEST(SelfContact, FrictionOfABodyWithItself_FollowsThePairRules) {

@@ -239,6 +239,15 @@ TEST(SceneErrors, SelfContactAskedForAndRefused_SaysSo) {
   EXPECT_NE(std::string(dfm_last_error()).find("/contact/self"), std::string::npos) << dfm_last_error();
 }
 
+TEST(SceneErrors, SelfContactThatIsNoneOfItsWords_SaysWhatItMayBe) {
+  test::Context context;
+  const char *set[] = {"/contact/self=\"sometimes\""};
+  dfm_scene_options options = {sizeof options, 1, set, 0};
+  dfm_scene s = 0;
+  EXPECT_EQ(dfm_scene_open(context, scene().c_str(), &options, &s), DFM_E_ARG);
+  EXPECT_NE(std::string(dfm_last_error()).find("/contact/self"), std::string::npos) << dfm_last_error();
+}
+
 TEST(SceneApi, OpenScene_AnswersUntilItIsClosed) {
   test::Context context;
   const char *set[] = {"/time/duration=0.5", "/output/color=speed"};

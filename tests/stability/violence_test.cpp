@@ -52,16 +52,18 @@ void tip_into_sheet(Shot &s, double speed) {
   s.add("beam", {0.12, 0.12, 0.01}, 100, {}, {});
   add_cells(s, tip(s.context), {0.06 + s.jitter(0.01), 0.06, 0.012}, {0, 0, -speed});
 }
-void costs_little(const std::function<void(Shot &)> &setup, int steps, double dt) {
+void costs_little(const std::function<void(Shot &)> &setup, int steps, double dt, uint32_t self = DFM_SELF_OFF) {
   for (unsigned seed = 1; seed <= 2; ++seed) {
-    Shot s(true, seed);
+    Shot s(true, seed, 1, self);
     setup(s);
     std::vector<double> work;
     for (int i = 0; i < steps; ++i) {
       uint32_t trouble = 0;
       ASSERT_EQ(dfm_world_step(s.world, dt, &trouble), DFM_OK) << "seed " << seed << ", step " << i << ": " << dfm_last_error();
       work.push_back(double(test::stats(s.world).work));
-      EXPECT_EQ(s.crossings(), 0u) << "seed " << seed << ", step " << i;
+      const crossing::Found found = s.count();
+      EXPECT_EQ(found.between, 0u) << "seed " << seed << ", step " << i;
+      EXPECT_EQ(self == DFM_SELF_OFF ? 0u : found.within, 0u) << "seed " << seed << ", step " << i;
     }
     std::nth_element(work.begin(), work.begin() + long(work.size() / 2), work.end());
     const double median = work[work.size() / 2], worst = *std::max_element(work.begin(), work.end());
@@ -77,3 +79,6 @@ void costs_little(const std::function<void(Shot &)> &setup, int steps, double dt
 TEST(Violence, SpikedBallsAt5MetresPerSecond_WorstStepIsBounded) { costs_little([](Shot &s) { spikes(s, 5); }, 40, 1e-3); }
 TEST(Violence, SpikedBallsAt50MetresPerSecond_WorstStepIsBounded) { costs_little([](Shot &s) { spikes(s, 50); }, 8, 1e-3); }
 TEST(Violence, TipIntoSheetAt50MetresPerSecond_WorstStepIsBounded) { costs_little([](Shot &s) { tip_into_sheet(s, 50); }, 8, 1e-3); }
+TEST(Violence, TipIntoSheetAt50MetresPerSecondWithSelfAuto_IsBoundedAndCrossesNowhere) {
+  costs_little([](Shot &s) { tip_into_sheet(s, 50); }, 8, 1e-3, DFM_SELF_AUTO);
+}

@@ -14,6 +14,7 @@ enum { DFM_INTEGRATOR_AUTO = 0, DFM_INTEGRATOR_SYMPLECTIC_EULER = 1 };
 
 enum { DFM_WORLD_UNGUARDED = 1,   /* dfm_world_def.flags: without the guard against crossing (concepts/guard.md), to see what it does */
        DFM_WORLD_UNTANGLE = 2 };    /* what overlaps when it is made or put somewhere is moved apart before the next step (concepts/overlaps.md) */
+enum { DFM_SELF_OFF = 0, DFM_SELF_ON = 1, DFM_SELF_AUTO = 2 };   /* dfm_world_def.self_contact */
 typedef struct dfm_world_def {
   uint32_t size, flags;
   double gravity[3];            /* m/s2 */
@@ -27,8 +28,9 @@ typedef struct dfm_world_def {
   const char *const *effects;   /* NULL-terminated list the scene asks for; NULL: what its content calls for */
   double sleep_speed;           /* m/s, 0.01: what falls asleep has been slower in every point, and has stayed within half of d_c, */
   double sleep_time;            /* s, 0.5: for so long */
-  uint32_t self_contact;        /* 1: every surface touches itself too, as the effect "self_contact" in the list does; 0: only where another effect needs
-                                   it. dfm_world_filter_pair with one body's name twice decides for this body (doc/concepts/self_contact.md) */
+  uint32_t self_contact;        /* DFM_SELF_ON: every surface touches itself too, as the effect "self_contact" in the list does; DFM_SELF_AUTO: while
+                                   it folds or is squeezed so far that it may; DFM_SELF_OFF: only where another effect needs it.
+                                   dfm_world_filter_pair with one body's name twice decides for this body (doc/concepts/self_contact.md) */
   uint32_t reserved;
   double max_time;              /* s of the machine's time for one step, 0: any. A step that this changes depends on the machine and its load */
   uint64_t max_work;            /* units of work for one step (doc/concepts/budget.md), the same on every machine; 0: automatic, 1000 times what
@@ -155,14 +157,15 @@ typedef struct dfm_world_stats {
   uint64_t unconverged, guard_steps, rebuilds, refits;                        /* since creation */
   uint32_t inverted_max, substeps_max;    /* since creation */
   double stable_step;                     /* s, 0.9 of the bound at its last evaluation */
-  uint32_t asleep, reserved;              /* bodies that sleep now */
+  uint32_t asleep, self_bodies;           /* bodies that sleep now; whose self contact was on in the last sub-step */
   double sleep_energy, sleep_momentum[3]; /* J and N s that bodies still had when they fell asleep, since creation */
   uint64_t guard_solves, guard_cuts;      /* since creation: solves with hits as contacts; sub-steps taken anew, shorter */
   double guard_lost;                      /* s since creation: motion left out where neither was enough */
   uint64_t rigid_again;                   /* times a rigid host had contact solved again (DFM_RIGID_AGAIN), since creation */
   uint64_t work, work_max;                /* units of the last step, also where it was discarded; the most since creation (doc/concepts/budget.md) */
   uint64_t cheapened, discarded;          /* steps that left something out for their budget; that were given up by it or by dfm_world_interrupt */
-  uint32_t limited_max, reserved_limited; /* cells at once that were so far from their shape that their model limited their stiffness, since creation */
+  uint32_t limited_max, self_max;         /* cells at once that were so far from their shape that their model limited their stiffness, bodies at once whose
+                                             self contact was on: since creation */
   double energy_start, energy_max;        /* J, kinetic and elastic of the bodies that the energy watch looks at: at the first step; the largest seen */
   double energy_gain;                     /* J, the largest gain seen beyond what loads, motions and contact have put in */
 } dfm_world_stats;

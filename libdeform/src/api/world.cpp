@@ -76,7 +76,8 @@ dfm_status dfm_world_create(dfm_context *context, const dfm_world_def *def, dfm_
     if (!(w->def.energy_watch >= 0 && std::isfinite(w->def.energy_watch)))
       fail(DFM_E_ARG, "energy_watch is %g; it must be a share of the largest energy such as 0.01, or 0 (off)", w->def.energy_watch);
     if (w->def.sleep > 1) fail(DFM_E_ARG, "sleep is %u; it must be 0 (off) or 1 (on)", w->def.sleep);
-    if (w->def.self_contact > 1) fail(DFM_E_ARG, "self_contact is %u; it must be 0 (off) or 1 (on)", w->def.self_contact);
+    if (w->def.self_contact > DFM_SELF_AUTO)
+      fail(DFM_E_ARG, "self_contact is %u; it must be DFM_SELF_OFF (0), DFM_SELF_ON (1) or DFM_SELF_AUTO (2)", w->def.self_contact);
     for (const double value : {w->def.sleep_speed, w->def.sleep_time})
       if (!(value > 0 && std::isfinite(value)))
         fail(DFM_E_ARG, "sleep_speed (m/s) and sleep_time (s) must be positive and finite; the defaults are 0.01 and 0.5, found %g", value);

@@ -9,7 +9,6 @@
 namespace dfm {
 namespace {
 
-constexpr double kRounding = 1 + 1e-9;      // margins hold in spite of rounded distances
 constexpr double kSkinLeast = 0.02;         // of the median edge
 constexpr double kSkinMost = 0.2;           // wider than this, every surfel would list the triangles of the second ring around it
 constexpr double kSpeedGrowth = 1.25;
@@ -36,14 +35,14 @@ bool SelfList::update(double h, double offset) {
   motion_ = deforming_motion(s, h);
   if (margin_ >= 0) {
     moved_ = at_.displaced(s);
-    if (kRounding * (moved_ + share(h, offset, 1)) <= margin_) return false;
+    if (kDistanceRounding * (moved_ + share(h, offset, 1)) <= margin_) return false;
   }
   renew(h, offset, 0);
   return true;
 }
 
 bool SelfList::cover(double h, double offset, double change) {
-  if (surface_.ntri == 0 || kRounding * (moved_ + covers(h, offset, change)) <= margin_) return false;
+  if (surface_.ntri == 0 || kDistanceRounding * (moved_ + covers(h, offset, change)) <= margin_) return false;
   renew(h, offset, change);
   return true;
 }
@@ -56,9 +55,10 @@ void SelfList::renew(double h, double offset, double change) {
   if (!tree_.empty()) tree_.refit(s, s.x.data());
   if (tree_.empty() || tree_.quality() > kQualityLimit) tree_.build(s, s.x.data());
   const double now = std::max(share(h, offset, kSpeedGrowth), covers(h, offset, kSpeedGrowth * change));
-  const double skin = std::clamp(skin_steps_ * 0.5 * (now - offset), kSkinLeast * s.median_edge, kSkinMost * s.median_edge);
-  const double margin = kRounding * now + skin;
-  list(kRounding * 2 * margin + self_recovery_depth(s));
+  const double edge = s.median_edge, skin = wide_ ? kSkinMost * edge : std::clamp(skin_steps_ * 0.5 * (now - offset), kSkinLeast * edge, kSkinMost * edge);
+  const double margin = kDistanceRounding * now + skin;
+  limit_ = kDistanceRounding * 2 * margin + self_recovery_depth(s);
+  list(limit_);
   margin_ = margin, ++renewals_;
 }
 

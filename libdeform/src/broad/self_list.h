@@ -28,15 +28,20 @@ class SelfList {
   // f(triangle, triangle) for pairs whose boxes may meet now; each pair once.
   template <class F>
   void near_triangles(F &&f) {
-    near_self_pairs(tree_, (1 + 1e-9) * 2 * moved_, stack_, [&](uint32_t p, uint32_t q, double) { f(tree_.triangles()[p], tree_.triangles()[q]); });
+    near_self_pairs(tree_, kDistanceRounding * 2 * moved_, stack_, [&](uint32_t p, uint32_t q, double) { f(tree_.triangles()[p], tree_.triangles()[q]); });
   }
   // Ascending by (a, b).
   const Array<SelfPair> &vertex_face() const { return vf_; }
   const Array<SelfPair> &edge_edge() const { return ee_; }
+  // m: every pair that is nearer than this now is listed. After update(), at the same positions.
+  double covered() const { return limit_ - kDistanceRounding * 2 * moved_; }
+  // Wide: at the next renewal the skin is as wide as it ever is, whatever the motion; for a body that waits to touch itself, whose list is not gone through.
+  void set_wide(bool wide) { wide_ = wide; }
   // The skin is made to last for about this many sub-steps of the present motion.
   void set_skin_steps(double steps) { skin_steps_ = steps; }
 
  private:
+  static constexpr double kDistanceRounding = 1 + 1e-9;   // margins hold in spite of rounded distances
   double share(double h, double offset, double growth) const;
   double covers(double h, double offset, double change) const;
   void renew(double h, double offset, double change);
@@ -46,6 +51,8 @@ class SelfList {
   BoxTree tree_;
   RigidReference at_;                      // when the lists were made
   double longest_ = 0, moved_ = 0;         // m, edge of that time; what displaced() said at the last update()
+  double limit_ = 0;                       // m, that the lists were made with
+  bool wide_ = false;
   DeformingMotion motion_;
   uint64_t renewals_ = 0;
   Array<SelfPair> vf_, ee_;

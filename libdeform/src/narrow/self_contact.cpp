@@ -42,7 +42,6 @@ double fold(const Surface &s, uint32_t edge, double ahead) {
 
 constexpr double kNearer = 1e-9;      // relative: a triangle beside the feature counts as nearer only beyond this
 constexpr double kThrough = 0.25;     // cosine to the outward normal beyond which a pair at rest looks through the material, or away from it
-constexpr double kClosed = 1e-2;      // of d_c: what is nearer at rest lies on itself there, and has no side
 
 // What a pair is at rest.
 struct Kin {
@@ -79,7 +78,7 @@ class RestShape {
  private:
   // By the distance at rest and the cosine between the way across and the outward normal there.
   Kin kin(double at_rest, double facing) const {
-    if (!(at_rest > kClosed * offset_)) return {0, 0};
+    if (!(at_rest > kClosedAtRest * offset_)) return {0, 0};
     return {std::min(offset_, 0.5 * at_rest), at_rest >= rest_.thin || facing > kThrough ? 1.0 : facing < -kThrough ? -1.0 : 0.0};
   }
   const Surface &s_;

@@ -7,6 +7,8 @@
 namespace dfm {
 namespace {
 
+constexpr char kSelfAuto[] = "contact.self auto";
+
 std::string count(unsigned n, const char *noun, const char *plural) { return std::to_string(n) + " " + (n == 1 ? noun : plural); }
 
 void plan_effects(const SceneFacts &f, Plan &plan) {
@@ -52,7 +54,8 @@ constexpr const char *kNeedSelf[] = {"cutting", "folding"};
 void plan_self(const SceneFacts &f, Plan &plan) {
   const std::string by = self_asked_by(f);
   if (f.self_bodies)
-    plan.stages.push_back({StageId::self, count(f.self_bodies, "body", "bodies") + " may touch themselves (" + (by.empty() ? "contact.filter" : by) + ")"});
+    plan.stages.push_back({StageId::self, count(f.self_bodies, "body", "bodies") + " may touch themselves (" + (by.empty() ? "contact.filter" : by) + ")" +
+                                                    (by == kSelfAuto ? ", each only while it folds so far that it may" : "")});
   else
     plan.absent.push_back({"self contact", by.empty() ? "not asked for (contact.self), and no effect needs it" : f.bodies ? "filters take every body out" : "no body"});
 }
@@ -67,6 +70,7 @@ std::string self_asked_by(const SceneFacts &f) {
     const auto offers = [&](const SceneFacts::Provider &p) { return p.effect == need; };
     if (f.effects_listed ? listed(need) : std::any_of(f.offered.begin(), f.offered.end(), offers)) return need;
   }
+  if (f.self_auto) return kSelfAuto;
   return {};
 }
 

@@ -26,7 +26,7 @@ struct SceneFacts {
   bool effects_listed = false;
   bool sleep = false;                                  // islands at rest may sleep
   bool rollback = false;                               // contact.method
-  bool self = false;                                   // contact.self
+  bool self = false, self_auto = false;                // contact.self
   unsigned self_bodies = 0;                            // bodies that may touch themselves, filters applied
   std::vector<std::string> asked;                      // where listed
 };

@@ -138,7 +138,8 @@ struct Definition {
   std::vector<dfm_vector_key> gravity_keys;
   int32_t method = DFM_METHOD_AUTO, integrator = DFM_INTEGRATOR_AUTO;
   double offset = 0, tolerance = 0, max_time = 0, max_work = 0, recovery_speed = 0, obstacle_speed = 0, energy_watch = dfm_world_def_default().energy_watch;
-  bool sleep = false, self = false, guard = true, untangle = false;
+  uint32_t self = DFM_SELF_OFF;
+  bool sleep = false, guard = true, untangle = false;
   bool effects_auto = true;
   std::vector<std::string> effects;
   std::vector<Material> materials;

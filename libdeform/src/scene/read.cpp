@@ -316,9 +316,11 @@ void read_contact(const Node &scene, Definition &def, const ReadContext &context
   def.method = method == "velocity" ? DFM_METHOD_VELOCITY : method == "rollback" ? DFM_METHOD_ROLLBACK : DFM_METHOD_AUTO;
   def.sleep = contact.boolean("sleep", false);
   const bool self_given = contact.has("self"), listed = std::find(def.effects.begin(), def.effects.end(), "self_contact") != def.effects.end();
-  def.self = contact.boolean("self", listed);
-  if (self_given && !def.self && listed)
-    contact.member("self").fail("\"self\" is false, but /effects asks for \"self_contact\"; take one of the two away");
+  if (self_given && contact.value()["self"] == "auto") def.self = DFM_SELF_AUTO;
+  else if (self_given && !contact.value()["self"].is_boolean()) contact.member("self").fail("expected true, false or \"auto\"");
+  else def.self = contact.boolean("self", listed) ? DFM_SELF_ON : DFM_SELF_OFF;
+  if (self_given && def.self != DFM_SELF_ON && listed)
+    contact.member("self").fail("\"self\" is not true, but /effects asks for \"self_contact\"; take one of the two away");
   def.untangle = contact.boolean("untangle", false);
   def.guard = contact.boolean("guard", true);
   if (contact.has("energy_watch")) {

@@ -22,15 +22,16 @@ inline double self_recovery_depth(const Surface &s) { return 0.1 * s.median_edge
 
 // Largest length of the differences of two arrays [n,4] whose fourth components are zero; y null: of x itself. Two points at a time,
 // since every body pays this in every sub-step; a maximum has the same bits in any order.
-inline double largest_norm(uint32_t n, const double *x, const double *y) {
+//   common   [4] is taken from each difference
+inline double largest_norm(uint32_t n, const double *x, const double *y, const double *common = nullptr) {
   using Two = double __attribute__((vector_size(16)));
-  const Two *p = reinterpret_cast<const Two *>(x), *q = reinterpret_cast<const Two *>(y);
-  const Two zero = {0, 0};
+  const Two *p = reinterpret_cast<const Two *>(x), *q = reinterpret_cast<const Two *>(y), *less = reinterpret_cast<const Two *>(common);
+  const Two zero = {0, 0}, f = less ? less[0] : zero, g = less ? less[1] : zero;
   Two most = zero;
   for (uint32_t s = 0; s < n; s += 2) {
     const uint32_t i = 2 * s, j = s + 1 < n ? i + 2 : i;
-    const Two a = p[i] - (q ? q[i] : zero), b = p[i + 1] - (q ? q[i + 1] : zero);
-    const Two c = p[j] - (q ? q[j] : zero), d = p[j + 1] - (q ? q[j + 1] : zero);
+    const Two a = p[i] - (q ? q[i] : zero) - f, b = p[i + 1] - (q ? q[i + 1] : zero) - g;
+    const Two c = p[j] - (q ? q[j] : zero) - f, d = p[j + 1] - (q ? q[j + 1] : zero) - g;
     const Two u = a * a + b * b, v = c * c + d * d;
     const Two sum = __builtin_shufflevector(u, v, 0, 2) + __builtin_shufflevector(u, v, 1, 3);
     most = sum > most ? sum : most;

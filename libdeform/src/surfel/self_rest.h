@@ -11,6 +11,8 @@ struct SelfRest {
   Vec3 at(uint32_t surfel) const { return load3(&x[4 * size_t{surfel}]); }
 };
 
+inline constexpr double kClosedAtRest = 1e-2;   // of d_c: what is nearer at rest lies on itself there, and has no side
+
 // Two features of one surface: surfel and triangle that does not have it, or two edges without a common end, the lower one first.
 struct SelfPair { uint32_t a, b; };
 

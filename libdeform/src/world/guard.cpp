@@ -73,12 +73,8 @@ void follow_lists(World &w) {
   const bool fresh = cover_self(w);
   const uint64_t renewals = w.broad.stats().renewals;
   if (!fresh && !g.memory.runs.empty() && g.lists == renewals) return;
-  g.list = &w.broad.candidates(), g.lists = renewals;
-  if (!w.self_bodies.empty()) {
-    g.joined.clear();
-    if (pairs) g.joined.insert(g.joined.end(), g.list->begin(), g.list->end());
-    join_self(w, g.joined), g.list = &g.joined;
-  }
+  g.lists = renewals;
+  g.list = join_self(w, pairs ? &w.broad.candidates() : nullptr, g.joined) ? &g.joined : &w.broad.candidates();
   g.memory.follow(*g.list);
 }
 
@@ -109,7 +105,7 @@ void set_sides(World &w) {
   }
   for (const auto &b : w.self_bodies) {
     GuardSide &s = scene.sides[b->body->slot];
-    s.deform = b->body->model.stepper ? s.travel : w.h * (b->list.deforming() + w.guard.change[b->body->slot]);
+    if (b->on) s.deform = b->body->model.stepper ? s.travel : w.h * (b->list.deforming() + w.guard.change[b->body->slot]);
   }
   for (size_t o = 0; o < w.obstacles.size(); ++o) {
     const ObstacleView &v = w.obstacle_views[o];

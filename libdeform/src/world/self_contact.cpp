@@ -1,6 +1,6 @@
 // Self contact. A body's surface touches itself where the effect is on for it:
 //
-//   the scene asks    contact.self, or "self_contact" among its effects
+//   the scene asks    contact.self, or "self_contact" among its effects; "auto": while the body folds so far that it may (broad/self_watch.h)
 //   an effect needs   plan/plan.cpp: cutting, folding
 //   a filter rule     that names the body on both sides decides for this body, whatever the above say
 //
@@ -25,9 +25,9 @@ double median(std::vector<double> &v) {
 }
 
 // The last rule that names the body on both sides.
-bool rule_of(const World &w, const Body &b, bool otherwise) {
+uint8_t rule_of(const World &w, const Body &b, uint8_t otherwise) {
   for (const FilterRule &rule : w.filters)
-    if (rule.between[0] == b.name && rule.between[1] == b.name) otherwise = rule.collide;
+    if (rule.between[0] == b.name && rule.between[1] == b.name) otherwise = rule.collide ? DFM_SELF_ON : DFM_SELF_OFF;
   return otherwise;
 }
 
@@ -72,19 +72,26 @@ SelfBody::SelfBody(const Memory &m, const Body &b) : id(b.id), body(&b), list(m,
   rest.thin = 2 * std::max(s.median_edge, median(cells));
 }
 
-bool asks_self_contact(const World &w) {
-  return w.def.self_contact || std::find(w.asked_effects.begin(), w.asked_effects.end(), kSelfContact) != w.asked_effects.end();
+uint8_t asks_self_contact(const World &w) {
+  const bool listed = std::find(w.asked_effects.begin(), w.asked_effects.end(), kSelfContact) != w.asked_effects.end();
+  return listed ? uint8_t{DFM_SELF_ON} : static_cast<uint8_t>(w.def.self_contact);
 }
 
 void choose_self_bodies(World &w, SceneFacts &facts, std::vector<uint32_t> &used) {
-  facts.self = w.def.self_contact != 0;
-  const bool asked = !self_asked_by(facts).empty();
+  facts.self = w.def.self_contact == DFM_SELF_ON;
+  const bool always = !self_asked_by(facts).empty();
+  facts.self_auto = w.def.self_contact == DFM_SELF_AUTO;
+  const uint8_t asked = always ? DFM_SELF_ON : facts.self_auto ? DFM_SELF_AUTO : DFM_SELF_OFF;
   std::vector<std::unique_ptr<SelfBody>> before;
   before.swap(w.self_bodies);
   for (auto &b : w.bodies) {
-    if (promises(*b) || !rule_of(w, *b, asked)) continue;
+    const uint8_t when = rule_of(w, *b, asked);
+    if (promises(*b) || when == DFM_SELF_OFF) continue;
     const auto same = std::find_if(before.begin(), before.end(), [&](auto &s) { return s && s->id == b->id; });
     w.self_bodies.push_back(same != before.end() ? std::move(*same) : std::make_unique<SelfBody>(w.memory(), *b));
+    SelfBody &self = *w.self_bodies.back();
+    if (when == DFM_SELF_ON) self.watch.reset();
+    else if (!self.watch) self.watch = std::make_unique<SelfWatch>(w.memory(), b->surface, self.rest, self.list);
     w.find_law(b->slot, b->slot, used);
     for (const uint32_t law : used)
       for (const std::string &e : effects(*w.laws[law]->type)) facts.offered.push_back({e, w.laws[law]->type->id});
@@ -92,37 +99,83 @@ void choose_self_bodies(World &w, SceneFacts &facts, std::vector<uint32_t> &used
   facts.self_bodies = static_cast<unsigned>(w.self_bodies.size());
 }
 
+namespace {
+
+void switch_to(SelfBody &s, bool on) {
+  s.on = on;
+  s.list.set_wide(!on);
+}
+
+void count_self(World &w) {
+  w.stats.self_bodies = static_cast<uint32_t>(std::count_if(w.self_bodies.begin(), w.self_bodies.end(), [](auto &s) { return s->on; }));
+  w.stats.self_max = std::max(w.stats.self_max, w.stats.self_bodies);
+}
+
+// How fast a surfel goes to its end of the sub-step, as the solve left it.
+Vec3 velocity_after(const World &w, const Body &b, uint32_t surfel) {
+  Vec3 sum;
+  if (b.model.stepper) {   // has written its end beside its start
+    b.surface.each_phyxel(surfel, [&](uint32_t p, double weight) { sum += weight * load3(&b.p.f[size_t(p) * kStride]); });
+    return (1 / w.h) * (sum - load3(&b.surface.x[size_t(surfel) * 4]));
+  }
+  const bool touched = w.rows.n > 0;
+  b.surface.each_phyxel(surfel, [&](uint32_t p, double weight) {
+    sum += weight * load3(&b.p.v_free[size_t(p) * kStride]);
+    if (touched) sum += weight * b.p.inv_mass[p] * load3(&b.p.impulse[size_t(p) * kStride]);
+  });
+  return sum;
+}
+
+}  // namespace
+
 void World::stage_self() {
   if (!plan.has(StageId::narrow)) contacts.clear();
+  const bool listed = plan.has(StageId::broad);   // which has looked at the speeds
   for (auto &s : self_bodies) {
     const BodyView &view = body_views[s->body->slot];
     s->looked = false;
     if (view.asleep) continue;
+    switch_to(*s, !s->watch || s->watch->near(h, offset, listed ? broad.speed(s->body->slot) : HUGE_VAL));
+    if (!s->on) continue;
     s->list.update(h, offset);
     SelfBody *const self = s.get();
     const Tangled tangled = [self](uint32_t surfel) { return is_tangled(*self, surfel); };
     find_self_contacts(view, s->rest, s->list.vertex_face(), s->list.edge_edge(), h, offset, plan.has(StageId::guard) ? tangled : nullptr, lent, contacts);
   }
+  count_self(*this);
 }
 
 bool cover_self(World &w) {
   bool fresh = false;
   for (auto &s : w.self_bodies) {
-    const uint32_t slot = s->body->slot;
-    if (w.body_views[slot].asleep) continue;
-    s->list.cover(w.h, w.offset, s->body->model.stepper ? w.guard.speed[slot] : w.guard.change[slot]);
-    fresh |= s->joined != s->list.renewals();
+    const Body &b = *s->body;
+    if (w.body_views[b.slot].asleep) continue;
+    const double change = b.model.stepper ? w.guard.speed[b.slot] : w.guard.change[b.slot];
+    // A blow may fold within the sub-step what was far from itself before the solve.
+    if (!s->on && s->watch->meets(w.h, w.offset, change, [&](uint32_t surfel) { return velocity_after(w, b, surfel); })) switch_to(*s, true);
+    if (s->on) s->list.cover(w.h, w.offset, change);
+    fresh |= s->joined != (s->on ? s->list.renewals() : 0);
   }
+  if (fresh) count_self(w);
   return fresh;
 }
 
-void join_self(World &w, Array<Candidate> &to) {
+bool join_self(World &w, const Array<Candidate> *pairs, Array<Candidate> &to) {
+  if (std::none_of(w.self_bodies.begin(), w.self_bodies.end(), [](auto &s) { return s->on; })) {
+    for (auto &s : w.self_bodies) s->joined = 0;
+    return false;
+  }
+  to.clear();
+  if (pairs) to.insert(to.end(), pairs->begin(), pairs->end());
   for (auto &s : w.self_bodies) {
     const uint32_t slot = s->body->slot;
+    s->joined = 0;
+    if (!s->on) continue;
     for (const SelfPair &p : s->list.vertex_face()) to.push_back({slot, slot, p.a, p.b, kVertexFace, 0});
     for (const SelfPair &p : s->list.edge_edge()) to.push_back({slot, slot, p.a, p.b, kEdgeEdge, 0});
     s->joined = s->list.renewals();
   }
+  return true;
 }
 
 double guarded_apart(World &w, const Candidate &c) {

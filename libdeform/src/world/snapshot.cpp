@@ -61,7 +61,7 @@ uint64_t structure(const World &w) {
     for (const dfm_rigid_def &d : set->defs) h.add(d.mass), h.add(d.inertia);
   }
   if (w.def.method == DFM_METHOD_ROLLBACK) h.add(w.def.method);
-  if (asks_self_contact(w)) h.add(uint8_t(1));
+  if (const uint8_t asked = asks_self_contact(w)) h.add(asked);
   return h.value;
 }
 
