@@ -13,7 +13,7 @@ import re
 import shutil
 import sys
 
-from installed_tree import clean_environment, install, run
+from installed_tree import clean_environment, install, run, without_spaces
 
 
 def follow(guide, prefix, libdir, scratch):
@@ -52,7 +52,7 @@ def judge_law(folder):
 
 def main():
     build, source, scratch, compiler = sys.argv[1:]
-    scratch = pathlib.Path(scratch).resolve()
+    scratch = without_spaces(scratch)
     prefix, libdir = install(build, source, scratch)
     guides = [path for path in sorted(pathlib.Path(source).glob("libdeform/doc/howto/*.md")) if path.with_suffix("").is_dir()]
     followed = []

@@ -4,12 +4,14 @@ law with deform_add_plugin, run them, ask the command which plugins it finds. No
 
 installed_tree.py BUILD_DIR SOURCE_DIR SCRATCH_DIR C_COMPILER
 """
+import atexit
 import os
 import pathlib
 import re
 import shutil
 import subprocess
 import sys
+import tempfile
 
 
 def run(*argv, env=None):
@@ -27,6 +29,15 @@ def clean_environment():
     return {k: v for k, v in os.environ.items() if not k.startswith(("DEFORM_", "LD_", "CMAKE_"))}
 
 
+def without_spaces(folder):
+    """The folder, or one elsewhere: a shell splits what pkg-config prints at spaces, so the lines of the guides need a prefix without any."""
+    folder = pathlib.Path(folder).resolve()
+    if " " in str(folder):
+        folder = pathlib.Path(tempfile.mkdtemp()) / folder.name
+        atexit.register(shutil.rmtree, folder.parent)
+    return folder
+
+
 def install(build, source, scratch):
     """(prefix, name of its library folder) of a tree installed into scratch, then moved, that names neither build nor source tree."""
     shutil.rmtree(scratch, ignore_errors=True)
@@ -42,7 +53,7 @@ def install(build, source, scratch):
 def main():
     build, source, scratch, compiler = sys.argv[1:]
     here = pathlib.Path(__file__).resolve().parent / "stranger"
-    scratch = pathlib.Path(scratch)
+    scratch = without_spaces(scratch)
     clean = clean_environment()
     prefix, libdir = install(build, source, scratch)
 

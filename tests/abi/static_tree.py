@@ -10,7 +10,7 @@ import shutil
 import subprocess
 import sys
 
-from installed_tree import clean_environment, install, run
+from installed_tree import clean_environment, install, run, without_spaces
 
 SCENE, STEPS = "examples/scenes/slope_block.json", 200
 DYNAMIC_LINKER = {"dlopen", "dlsym", "dlclose", "dlerror", "dladdr"}
@@ -34,7 +34,7 @@ def hash_of_the_dynamic_build(build, source, scratch, step):
 def main():
     static_build, source, scratch, dynamic_build, *rest = sys.argv[1:]
     compiler = rest[0] if rest else "cc"
-    scratch = pathlib.Path(scratch).resolve()
+    scratch = without_spaces(scratch)
     here = pathlib.Path(__file__).resolve().parent / "embedded"
     env = clean_environment()
     prefix, libdir = install(static_build, source, scratch)

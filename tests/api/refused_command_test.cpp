@@ -2,13 +2,17 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <filesystem>
 
 #include "support.h"
 
 namespace {
 
 test::CommandResult deform_without(long n, const std::string &count, const std::vector<std::string> &args) {
-  std::vector<std::string> argv{"/usr/bin/env", "LD_PRELOAD=" DEFORM_REFUSE_NEW, "REFUSE_NEW=" + std::to_string(n)};
+  // By its name in a folder: LD_PRELOAD is split at spaces, which a path may hold.
+  const std::filesystem::path preload = DEFORM_REFUSE_NEW;
+  std::vector<std::string> argv{"/usr/bin/env", "LD_LIBRARY_PATH=" + preload.parent_path().string(), "LD_PRELOAD=" + preload.filename().string(),
+                                "REFUSE_NEW=" + std::to_string(n)};
   argv.insert(argv.end(), {"REFUSE_NEW_COUNT=" + count, DEFORM_COMMAND});
   argv.insert(argv.end(), args.begin(), args.end());
   return test::run(argv);

@@ -19,7 +19,7 @@ def configure(folder: Path, real: str | None, version: str | None, wanted: str) 
     (folder / "include" / "ode").mkdir(parents=True)
     (folder / "CMakeLists.txt").write_text("cmake_minimum_required(VERSION 3.22)\nproject(refused C CXX)\nadd_library(deform INTERFACE)\n"
                                            "add_library(deform_flags INTERFACE)\nset(DEFORM_SHARED ON)\n"
-                                           f"add_subdirectory({source}/bindings/ode ode)\n")
+                                           f'add_subdirectory("{source}/bindings/ode" ode)\n')
     if real:
         (folder / "include" / "ode" / "ode.h").write_text(HEADER % real)
         (folder / "ode.pc").write_text(f"Name: ode\nDescription: a stand-in\nVersion: {version}\nCflags: -I{folder}/include\n")
