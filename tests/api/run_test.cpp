@@ -131,8 +131,8 @@ TEST(Run, Outputs_HaveTheirColumnsAndKeys) {
 
   for (const char *key :
        {"format", "version", "steps", "simulated_s", "wall_s", "cpu_s", "ms_per_step", "median", "p99", "max", "stages", "threads", "finite",
-        "states_checked", "intersections_max", "inverted_max", "limited_max", "guard_steps", "solver", "passes", "sweeps", "residual_max", "hold",
-        "creep_max_um_per_s", "effects", "active", "absent", "plugins", "bodies", "com", "velocity", "kinetic_J", "elastic_J", "volume_ratio",
+        "states_checked", "intersections_max", "inverted_max", "limited_max", "self_bodies_max", "guard_steps", "solver", "passes", "sweeps", "residual_max",
+        "hold", "creep_max_um_per_s", "effects", "active", "absent", "plugins", "bodies", "com", "velocity", "kinetic_J", "elastic_J", "volume_ratio",
         "speed_max", "dofs", "cells", "contacts", "mean", "impulse", "low/top", "normal_Ns", "peak_N", "swaps", "state_hash", "warnings"})
     EXPECT_NE(value(r.summary, key), "") << key;
   EXPECT_EQ(value(r.summary, "steps"), "200");

@@ -248,6 +248,20 @@ TEST(SceneErrors, SelfContactThatIsNoneOfItsWords_SaysWhatItMayBe) {
   EXPECT_NE(std::string(dfm_last_error()).find("/contact/self"), std::string::npos) << dfm_last_error();
 }
 
+TEST(SceneApi, SelfContactAuto_IsReadAndIsOffWhereNothingFolds) {
+  test::Context context;
+  const char *set[] = {"/contact/self=\"auto\""};
+  dfm_scene_options options = {sizeof options, 1, set, 0};
+  dfm_scene s = 0;
+  test::ok(dfm_scene_open(context, scene().c_str(), &options, &s));
+  dfm_world w = 0;
+  test::ok(dfm_scene_world(s, &w));
+  EXPECT_NE(test::written(dfm_world_explain, w).find("contact.self auto"), std::string::npos);
+  test::ok(dfm_world_step(w, 1e-3, nullptr));
+  EXPECT_EQ(test::stats(w).self_max, 0u);
+  test::ok(dfm_scene_close(s));
+}
+
 TEST(SceneApi, OpenScene_AnswersUntilItIsClosed) {
   test::Context context;
   const char *set[] = {"/time/duration=0.5", "/output/color=speed"};

@@ -35,7 +35,7 @@ double largest_beside_first(uint32_t n, const double *x, const double *y) {
 
 SelfWatch::SelfWatch(const Memory &m, const Surface &surface, const SelfRest &rest, SelfList &list)
     : surface_(surface), rest_(rest), list_(list), now_([&surface](uint32_t i) { return load3(&surface.v[4 * size_t{i}]); }) {
-  use_memory(m, x_, apart_);
+  use_memory(m, x_, apart_, safe_);
 }
 
 // Two features have moved, and move, against each other by no more than twice what a surfel does against the first.
@@ -49,13 +49,13 @@ bool SelfWatch::near(double h, double offset, double speed) {
   speed_ = largest_beside_first(s.nsurfel, s.v.data(), nullptr);
   if (kRounding * 4 * h * speed_ < left_) return false;
   list_.update(h, offset);
-  return any_near(offset, {2 * h, HUGE_VAL, now_});
+  return any_near(offset, {2 * h, HUGE_VAL, 4 * h * speed_, now_});
 }
 
 bool SelfWatch::meets(double h, double offset, double change, const std::function<Vec3(uint32_t)> &velocity) {
   if (surface_.ntri == 0 || kRounding * 2 * h * (speed_ + change) < left_) return false;
   list_.update(h, offset), list_.cover(h, offset, change);
-  return any_near(offset, {h, 2 * h * (list_.deforming() + change), velocity});
+  return any_near(offset, {h, 2 * h * (list_.deforming() + change), 2 * h * (speed_ + change), velocity});
 }
 
 // What is not listed is not near: update() and cover() list all that is within the reach of a contact, or deeper than what is led back.
@@ -63,17 +63,27 @@ bool SelfWatch::any_near(double offset, const Ask &ask) {
   const Surface &s = surface_;
   const Array<SelfPair> &faces = list_.vertex_face(), &edges = list_.edge_edge();
   slack_ = left_ = -1;
-  if (renewals_ != list_.renewals()) {
+  if (!x_.empty()) way_ += kRounding * 2 * largest_beside_first(s.nsurfel, s.x.data(), x_.data());
+  x_.assign(s.x.begin(), s.x.end());
+  if (renewals_ != list_.renewals() || offset != offset_) {
+    renewals_ = 0;   // until it is whole
     apart_.clear();
     for (const SelfPair &pair : faces) apart_.push_back(face_distance(s, pair, rest_.x.data()));
     for (const SelfPair &pair : edges) apart_.push_back(edge_distance(s, pair, rest_.x.data()));
-    renewals_ = list_.renewals();
+    safe_.assign(apart_.size(), -HUGE_VAL), way_ = 0;
+    renewals_ = list_.renewals(), offset_ = offset;
   }
   const double least = std::max(2 * offset, self_recovery_depth(s));
   double left = list_.covered() - least;
+  const double needs = kRounding * ask.fall;
+  const auto is_safe = [&](size_t k) {
+    const bool safe = safe_[k] - way_ > needs;
+    if (safe) left = std::min(left, safe_[k] - way_);
+    return safe || !(apart_[k] > kClosedAtRest * offset);
+  };
   const auto is_near = [&](size_t k, double distance, std::span<const uint32_t> a, std::span<const uint32_t> b) {
-    if (!(apart_[k] > kClosedAtRest * offset)) return false;
     const double reach = std::min(2 * offset, kNear * apart_[k]), closest = std::min(least, kNear * apart_[k]);
+    safe_[k] = way_ + distance - closest;
     left = std::min(left, distance - closest);
     if (distance >= std::max(closest, reach + ask.most)) return false;
     double speed2 = 0;
@@ -82,13 +92,13 @@ bool SelfWatch::any_near(double offset, const Ask &ask) {
     return distance < std::max(closest, reach + std::min(ask.time * std::sqrt(speed2), ask.most));
   };
   for (size_t k = 0; k < faces.size(); ++k)
-    if (is_near(k, face_distance(s, faces[k], s.x.data()), {&faces[k].a, 1}, {&s.tri[3 * size_t{faces[k].b}], 3})) return true;
+    if (!is_safe(k) && is_near(k, face_distance(s, faces[k], s.x.data()), {&faces[k].a, 1}, {&s.tri[3 * size_t{faces[k].b}], 3})) return true;
   for (size_t k = 0; k < edges.size(); ++k) {
+    if (is_safe(faces.size() + k)) continue;
     const uint32_t *const a = &s.edge[2 * size_t{edges[k].a}], *const b = &s.edge[2 * size_t{edges[k].b}];
     if (is_near(faces.size() + k, edge_distance(s, edges[k], s.x.data()), {a, 2}, {b, 2})) return true;
   }
-  x_.assign(s.x.begin(), s.x.end());
-  slack_ = left_ = left, offset_ = offset;
+  slack_ = left_ = left;
   return false;
 }
 

@@ -36,7 +36,8 @@ class SelfWatch {
   bool meets(double h, double offset, double change, const std::function<Vec3(uint32_t surfel)> &velocity);
 
  private:
-  struct Ask { double time, most; const std::function<Vec3(uint32_t surfel)> &velocity; };   // m = min(time * |relative velocity|, most)
+  // m = min(time * |relative velocity|, most), and no more than fall for any pair.
+  struct Ask { double time, most, fall; const std::function<Vec3(uint32_t surfel)> &velocity; };
   bool any_near(double offset, const Ask &ask);
 
   const Surface &surface_;
@@ -46,8 +47,9 @@ class SelfWatch {
   // m, least d - max(l, min(r, 0.6 D)) of all pairs at the last look that found none near, and d_c then; negative: no such look
   double slack_ = -1, offset_ = 0;
   double left_ = -1, speed_ = -1;        // of this sub-step: m, of that slack; m/s, no surfel is faster, or than the first one
-  Array<double> x_;                      // [nsurfel,4] positions then
-  Array<double> apart_;                  // m, D of the listed pairs, vertex_face() first
+  Array<double> x_;                      // [nsurfel,4] positions at the last look
+  double way_ = 0;                       // m, by which distances can have fallen since the list was made, up to the last look
+  Array<double> apart_, safe_;           // m, D of the listed pairs, vertex_face() first; `way_` up to which a pair has slack
   uint64_t renewals_ = 0;                // of the list that apart_ is of
 };
 
