@@ -175,7 +175,7 @@ TEST(BrokenLaw, ThatAlwaysHangs_EndsAfterTwoRulesThatDidNotComeBack) {
 
 // What waits uses no processor time, so it is not that which ends it; the line of the rule before is there meanwhile.
 TEST(BrokenLaw, ThatWaitsForEver_IsEndedWhileResultsArePrintedAsTheyCome) {
-  FILE *command = popen((std::string(DEFORM_COMMAND) + " plugin check " + broken("sleeps_for_ever") + " --only V01 --only F01").c_str(), "r");
+  FILE *command = popen(("'" + std::string(DEFORM_COMMAND) + "' plugin check '" + broken("sleeps_for_ever") + "' --only V01 --only F01").c_str(), "r");
   ASSERT_NE(command, nullptr);
   setvbuf(command, nullptr, _IONBF, 0);
   char line[512] = "";
