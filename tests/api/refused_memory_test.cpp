@@ -26,13 +26,19 @@ dfm_context *make_context() {
 }
 
 // Two legs that close on each other.
-dfm_world self_contact(dfm_context *c) {
-  const dfm_world w = test::make_self_world(c);
+dfm_world close_legs(dfm_context *c, uint32_t self) {
+  dfm_world_def d = dfm_world_def_default();
+  d.gravity[2] = 0, d.self_contact = self;
+  dfm_world w = 0;
+  test::ok(dfm_world_create(c, &d, &w));
   test::HookOptions o;
   o.young = 1e4, o.cell = 0.002, o.close = 1.5;
   test::make_hook(w, o);
   return w;
 }
+
+dfm_world self_contact(dfm_context *c) { return close_legs(c, DFM_SELF_ON); }
+dfm_world self_auto(dfm_context *c) { return close_legs(c, DFM_SELF_AUTO); }
 
 // Two small boxes: one falls asleep at once, one drops on it and wakes it.
 dfm_world sleepers(dfm_context *c) {
@@ -126,6 +132,7 @@ void walk_all(const Build &build, int least) {
 }  // namespace
 
 TEST(RefusedMemory, InAStepWithSelfContact_LeavesTheWorldAsItWas) { walk_all(self_contact, 40); }
+TEST(RefusedMemory, InAStepWithSelfContactOnAuto_LeavesTheWorldAsItWas) { walk_all(self_auto, 40); }
 TEST(RefusedMemory, InAStepThatFallsAsleepAndWakes_LeavesTheWorldAsItWas) { walk_all(sleepers, 40); }
 TEST(RefusedMemory, InAStepWithARigidHost_LeavesTheWorldAsItWas) { walk_all(rigid_host, 40); }
 TEST(RefusedMemory, InAStepOfALawThatRemembers_LeavesTheWorldAsItWas) { walk_all(bristles, 40); }
