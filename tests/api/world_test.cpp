@@ -412,11 +412,15 @@ TEST(Step, ThatNeedsTooManySubSteps_IsDiscardedAndNothingChanges) {
   dfm_body body = 0;
   test::ok(dfm_world_stable_step(w, &dt, &body, nullptr));
   const uint64_t hash = dfm_world_hash(w);
-  EXPECT_EQ(dfm_world_step(w, 5 * dt, nullptr), DFM_DISCARD);
-  says({"'stiff'", "max_substeps 2"});
+  uint32_t trouble = 0;
+  EXPECT_EQ(dfm_world_step(w, 5 * dt, &trouble), DFM_DISCARD);
+  EXPECT_EQ(trouble, uint32_t(DFM_TROUBLE_SUBSTEPS));
+  says({"'stiff'", "needs 5 sub-steps", "max_substeps 2"});
+  EXPECT_EQ(dfm_world_step(w, 1e300, nullptr), DFM_DISCARD);
+  says({"e+30", "max_substeps 2"});
+  EXPECT_LT(std::strlen(dfm_last_error()), 300u) << dfm_last_error();
   EXPECT_EQ(dfm_world_hash(w), hash);
   EXPECT_EQ(dfm_world_time(w), 0);
-  uint32_t trouble = 0;
   EXPECT_EQ(dfm_world_step(w, 1.9 * dt, &trouble), DFM_OK);
   EXPECT_EQ(trouble, uint32_t(DFM_TROUBLE_SUBSTEPS));
   EXPECT_EQ(test::stats(w).last_substeps, 2u);

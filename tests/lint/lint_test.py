@@ -97,6 +97,7 @@ BAD = {
     "threads": [("libdeform/include/deform/base.h", "\nDFM_API int dfm_silent(void);\n"),
                 ("libdeform/include/deform/base.h", "\n/** Says nothing of threads. */\nDFM_API int dfm_silent(int a,\n  int b);\n"),
                 ("libdeform/include/deform/base.h", "\n/** Both. Threads: Any thread. */\nDFM_API int dfm_said(void);\nDFM_API int dfm_silent(void);\n")],
+    "versions": [("libdeform/include/deform/base.h", "\n#define DFM_VERSION_MAJOR 0\n#define DFM_VERSION_MINOR 1\n/* Since 0.1; this one since 0.2. */\n")],
 }
 
 

@@ -70,4 +70,17 @@ def cpp_complete(tree):
                 yield wrapper, 1, f"does not reach {function} ({path}:{line}); give it a member"
 
 
-RULES = {"public_headers": public_headers, "threads": threads, "cpp_complete": cpp_complete}
+def versions(tree):
+    """What a public header says has come "since" a version has not come since one that is still to be."""
+    base = tree.text(PUBLIC + "base.h")
+    own = re.search(r"#define DFM_VERSION_MAJOR (\d+)\s+#define DFM_VERSION_MINOR (\d+)", base)
+    if not own:
+        return
+    for path in tree.select(PUBLIC, ODE, ext=(".h", ".hpp")):
+        content = tree.text(path)
+        for match in re.finditer(r"\bsince (\d+)\.(\d+)", content, re.I):
+            if (int(match[1]), int(match[2])) > (int(own[1]), int(own[2])):
+                yield path, line_of(content, match.start()), f"says \"{match[0]}\", and the version is {own[1]}.{own[2]}"
+
+
+RULES = {"public_headers": public_headers, "threads": threads, "cpp_complete": cpp_complete, "versions": versions}

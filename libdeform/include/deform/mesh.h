@@ -16,7 +16,7 @@ DFM_API dfm_status dfm_tetmesh_read(dfm_context *context, const char *path, dfm_
 /** Generators, SI units, about `cells` tetrahedra: a number near it that the shape's lattice offers, more where cells would otherwise be
  * longer than twice their width.
  * "cylinder": size = {radius, length, 0}, axis z from 0 to length, base at the origin; "beam": size = {x, y, z} edges from the origin;
- * "ball": size = {radius, 0, 0}, about the origin; "tube": size = {inner radius, outer radius, length}, as the cylinder (since 0.2).
+ * "ball": size = {radius, 0, 0}, about the origin; "tube": size = {inner radius, outer radius, length}, as the cylinder.
  * @return DFM_OK; DFM_E_ARG; DFM_E_NOMEM. Threads: Any thread. Since 0.1. */
 DFM_API dfm_status dfm_tetmesh_make(dfm_context *context, const char *kind, const double size[3], uint32_t cells, dfm_tetmesh *out);
 /** @return DFM_OK; DFM_E_HANDLE. Threads: Any thread, with nobody using the mesh or its arrays. Since 0.1. */

@@ -8,8 +8,8 @@
 extern "C" {
 #endif
 enum { DFM_SHAPE_PLANE = 0, DFM_SHAPE_SPHERE = 1, DFM_SHAPE_BOX = 2, DFM_SHAPE_CAPSULE = 3,
-       DFM_SHAPE_MESH = 4, DFM_SHAPE_VOXELS = 5,  /* since 0.2 */
-       DFM_SHAPE_NONE = 6                         /* since 0.2: a rigid body that has only the shapes added to it, or none */ };
+       DFM_SHAPE_MESH = 4, DFM_SHAPE_VOXELS = 5,
+       DFM_SHAPE_NONE = 6                         /* a rigid body that has only the shapes added to it, or none */ };
 typedef struct dfm_obstacle_def {
   uint32_t size, shape;             /* DFM_SHAPE_* */
   const char *name;                 /* unique in the world */

@@ -61,7 +61,8 @@ DFM_API dfm_status dfm_world_set_sleep(dfm_world world, bool sleep);
 /* ---- step -------------------------------------------------------------------------------------------------- */
 /** Trouble inside a step; each bit with its remedy. */
 enum {
-  DFM_TROUBLE_SUBSTEPS = 1,      /* dt is above the stable step, sub-steps were taken: soften, coarsen, or accept the cost */
+  DFM_TROUBLE_SUBSTEPS = 1,      /* dt is above the stable step, sub-steps were taken or, with DFM_DISCARD, more than max_substeps would have been needed:
+                                    soften, coarsen, take a shorter step, or accept the cost */
   DFM_TROUBLE_UNCONVERGED = 2,   /* the contact solve met its cap: raise max_sweeps, or lower mass ratios */
   DFM_TROUBLE_NONFINITE = 4,     /* a plugin or a load made a NaN or a velocity above that of light: the last good sub-step is kept (DFM_E_DIVERGED) */
   DFM_TROUBLE_INVERTED = 8,      /* a cell is inside out (looked for when the step bound is asked): refine, soften the load */

@@ -151,9 +151,9 @@ dfm_status World::step(double dt, uint32_t *trouble) {
   if (bound_due()) update_bound();
   const double needed = std::ceil(dt / stable - 1e-9);   // stable is infinite where nothing bounds the step
   if (!(needed <= def.max_substeps)) {
-    set_last_error(format("a step of %g s needs %.0f sub-steps of %g s (max_substeps %u): soften or coarsen body '%s', whose point %u bounds the step, lower "
+    set_last_error(format("a step of %g s needs %g sub-steps of %g s (max_substeps %u): soften or coarsen body '%s', whose point %u bounds the step, lower "
                           "its damping, or take a shorter step", dt, needed, stable, def.max_substeps, worst_body ? worst_body->name.c_str() : "?", worst_point).c_str());
-    return DFM_DISCARD;
+    return *trouble |= DFM_TROUBLE_SUBSTEPS, DFM_DISCARD;
   }
   const StepSizes before = sizes;
   const uint32_t n = static_cast<uint32_t>(std::min<double>(def.max_substeps, choose_pieces(sizes, dt, stable)));
@@ -172,7 +172,7 @@ dfm_status World::step(double dt, uint32_t *trouble) {
       if (inverted) *trouble |= DFM_TROUBLE_INVERTED;
       const double more = (cut - k) * cut_finer(sizes, span / cut, stable);
       if (!(done + more <= def.max_substeps)) {
-        set_last_error(format("step %llu: the shape of body '%s' has changed so much that the rest of the step needs %.0f sub-steps of %g s "
+        set_last_error(format("step %llu: the shape of body '%s' has changed so much that the rest of the step needs %g sub-steps of %g s "
                               "(max_substeps %u); take a shorter step", static_cast<unsigned long long>(step_count),
                               worst_body ? worst_body->name.c_str() : "?", std::ceil((goal - time) / stable), stable, def.max_substeps).c_str());
         return DFM_E_DIVERGED;
