@@ -129,6 +129,7 @@ struct Body {
   double rest_length(uint32_t e) const { return edge_rest.empty() ? edge_length[e] : edge_rest[e]; }
   struct CellStiffness { double bulk, collapse; };  // over 36 V0; both 0 for a cell that is flat at rest or cut
   CellStiffness cell_stiffness(uint32_t c) const;
+  double collapse_share(uint32_t c) const;
   double limit_of(uint32_t c) const {
     double sum = 0;
     for (int n = 0; n < 6; ++n) sum += edge_length[cell_edge[6 * size_t(c) + n]] * edge_length[cell_edge[6 * size_t(c) + n]];

@@ -31,9 +31,9 @@ std::vector<Case> cases() {
   }
   std::sort(meshes.begin(), meshes.end());
   std::vector<Case> out;
-  for (const auto &[motion, volume] : {std::pair{"spin", 1.0}, {"spin", 0.0}, {"hung", 1.0}, {"ring", 1.0}, {"hung", 0.0}, {"ring", 0.0}, {"wrung", 1.0}})
+  for (const auto &[motion, volume] : {std::pair{"spin", 1.0}, {"spin", 0.0}, {"hung", 1.0}, {"ring", 1.0}, {"hung", 0.0}, {"ring", 0.0}, {"wrung", 1.0}, {"whirl", -1.0}})
     for (const auto &[size, path] : meshes)
-      out.push_back({(path.find('.') == std::string::npos ? "made_" : "") + std::filesystem::path(path).stem().string() + "," + motion + (volume > 0 ? ",1" : ",0"), path, motion, volume});
+      out.push_back({(path.find('.') == std::string::npos ? "made_" : "") + std::filesystem::path(path).stem().string() + "," + motion + (volume > 0 ? ",1" : volume < 0 ? ",auto" : ",0"), path, motion, volume});
   return out;
 }
 

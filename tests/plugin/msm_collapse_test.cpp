@@ -151,6 +151,31 @@ TEST(MsmCollapse, StepBound_NeverFallsFarBelowThatAtRest) {
     }
 }
 
+// Such a cell turns over within a step wherever the body vibrates: with the full resistance the bound of the whole body falls each time.
+TEST(MsmCollapse, FlatCellBelowSixTenths_LeavesTheStepBoundOfItsBody) {
+  Host host;
+  Mesh mesh = kuhn_bar(4, 4, 4, 0.1);
+  const auto inner = [&](uint32_t i) {
+    return std::all_of(&mesh.rest[3 * i], &mesh.rest[3 * i] + 3, [](double v) { return v > 0.19 && v < 0.21; });
+  };
+  for (uint32_t c = 0; c < mesh.ncell(); ++c) {
+    const uint32_t *const q = &mesh.cells[4 * c];
+    const auto a = std::find_if(q, q + 4, inner);
+    if (a == q + 4) continue;
+    const Vec face = mesh.at(q[a == q]), n = cross(mesh.at(q[a <= q + 1 ? 2 : 1]) - face, mesh.at(q[a == q + 3 ? 2 : 3]) - face);
+    const Vec height = (dot(mesh.at(*a) - face, n) / dot(n, n)) * n;
+    Mesh flat = mesh;
+    for (size_t k = 0; k < 3; ++k) flat.rest[3 * *a + k] -= 0.97 * height[k];
+    Instance b(host, flat, defaults(0.2));
+    ASSERT_EQ(b.status, DFM_OK) << host.logged;
+    const double rest = b.bound();
+    b.set(b.x, *a, flat.at(*a) - 0.012 * height);   // to 0.6 of what is left of the cell
+    EXPECT_GT(b.bound(), 0.8 * rest);
+    return;
+  }
+  FAIL() << "no inner point";
+}
+
 TEST(MsmCollapse, CellEnergy_SumsToTheEnergy) {
   Host host;
   Instance b(host, kuhn_bar(5, 3, 2, 0.1, 0.2), defaults(0.3));

@@ -7,7 +7,7 @@
 
 namespace test::step_energy {
 
-// spin: turns freely, the fastest point at a fifth of the speed of waves. ring: let go 1 % longer and 0.6 % thinner, turning slowly. wrung: 5 % and 3 %.
+// spin: turns freely, the fastest point at a fifth of the speed of waves. whirl: at a third, let go unstretched. ring: let go 1 % longer and 0.6 % thinner, turning slowly. wrung: 5 % and 3 %.
 // hung: held at one end and let go under gravity; as stiff as bends a solid bar of this length and thickness by a twentieth of its length.
 struct Case { std::string name, mesh, motion; double volume; };
 
@@ -113,7 +113,7 @@ inline Setting make(dfm_context *context, const Case &c) {
   d.material = make_material(s.world, o);
   // Waves run at about 10 m/s in the other material.
   const double reach = 0.5 * std::hypot(size[0], size[1]);
-  d.spin[2] = c.motion == "spin" ? 2 / reach : hung ? 0 : 0.2 / reach;
+  d.spin[2] = c.motion == "spin" ? 2 / reach : c.motion == "whirl" ? 3.3 / reach : hung ? 0 : 0.2 / reach;
   std::vector<uint8_t> fixed(d.npoint, 0);
   for (uint32_t i = 0; hung && i < d.npoint; ++i) fixed[i] = d.points[3 * i + size_t(longest)] < lo[longest] + 0.05 * size[longest] ? 7 : 0;
   if (hung) d.fixed = fixed.data();
