@@ -31,9 +31,12 @@ std::vector<Case> cases() {
   }
   std::sort(meshes.begin(), meshes.end());
   std::vector<Case> out;
-  for (const auto &[motion, volume] : {std::pair{"spin", 1.0}, {"spin", 0.0}, {"hung", 1.0}, {"ring", 1.0}, {"hung", 0.0}, {"ring", 0.0}, {"wrung", 1.0}, {"whirl", -1.0}})
-    for (const auto &[size, path] : meshes)
-      out.push_back({(path.find('.') == std::string::npos ? "made_" : "") + std::filesystem::path(path).stem().string() + "," + motion + (volume > 0 ? ",1" : volume < 0 ? ",auto" : ",0"), path, motion, volume});
+  struct Run { const char *motion; double volume; };   // negative: as it follows from Poisson's ratio
+  for (const Run &run : {Run{"spin", 1}, {"spin", 0}, {"hung", 1}, {"ring", 1}, {"hung", 0}, {"ring", 0}, {"wrung", 1}, {"whirl", -1}})
+    for (const auto &[size, path] : meshes) {
+      const char *const made = path.find('.') == std::string::npos ? "made_" : "", *const volume = run.volume > 0 ? ",1" : run.volume < 0 ? ",auto" : ",0";
+      out.push_back({made + std::filesystem::path(path).stem().string() + "," + run.motion + volume, path, run.motion, run.volume});
+    }
   return out;
 }
 

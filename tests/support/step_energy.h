@@ -7,7 +7,8 @@
 
 namespace test::step_energy {
 
-// spin: turns freely, the fastest point at a fifth of the speed of waves. whirl: at a third, let go unstretched. ring: let go 1 % longer and 0.6 % thinner, turning slowly. wrung: 5 % and 3 %.
+// spin: turns freely, the fastest point at a fifth of the speed of waves. whirl: at a third.
+// ring: let go 1 % longer and 0.6 % thinner, turning slowly. wrung: 5 % and 3 %.
 // hung: held at one end and let go under gravity; as stiff as bends a solid bar of this length and thickness by a twentieth of its length.
 struct Case { std::string name, mesh, motion; double volume; };
 
