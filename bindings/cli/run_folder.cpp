@@ -28,6 +28,15 @@ void remove_matching(const std::string &folder, const char *pattern) {
   }
 }
 
+// What a link leads to may hold files of the same names that are no run's. A folder is not replaced as a file is: the link may be meant.
+void refuse_linked_folders(const std::string &folder) {
+  for (const char *name : {"/states", "/nodes", "/frames"}) {
+    std::error_code error;
+    if (fs::is_symlink(folder + name, error))
+      throw Failure(kBadInput, folder + name + ": a link, and a run removes and writes files there; remove the link, or give another folder with --out (which may itself be a link)");
+  }
+}
+
 // Files of an earlier run would read as results of this one. The summary goes first: without one nobody takes the rest for a whole run. Files that
 // a killed process was writing go too.
 void remove_earlier(const std::string &folder) {
@@ -56,6 +65,7 @@ RunFolder::RunFolder(const std::string &path) {
       if (errno == EWOULDBLOCK) throw Failure(kBadInput, path + ": another run is writing into this folder; wait for its end, or give another one with --out");
       warn(path + ": this file system cannot lock the folder (" + std::strerror(errno) + "); let no other run write into it meanwhile");
     }
+    refuse_linked_folders(path);
     remove_earlier(path);
   } catch (...) {
     close(descriptor_);

@@ -54,7 +54,7 @@ dfm_status check_def(const dfm_ode_def &d) {
   if (!d.world) return missing("world");
   if (!d.space) return missing("space");
   if (d.flags & ~uint32_t{DFM_ODE_QUICK}) return failed(DFM_E_ARG, "dfm_ode_def: flags %u; only DFM_ODE_QUICK is known", d.flags);
-  if (!(d.friction >= 0 && std::isfinite(d.friction))) return failed(DFM_E_ARG, "dfm_ode_def: friction %g; it must not be negative", d.friction);
+  if (!(d.friction >= 0 && std::isfinite(d.friction))) return failed(DFM_E_ARG, "dfm_ode_def: friction %g; it must be finite and not negative", d.friction);
   if (d.most_contacts < 1 || d.most_contacts > 64) return failed(DFM_E_ARG, "dfm_ode_def: most_contacts %u; between 1 and 64", d.most_contacts);
   return DFM_OK;
 }
@@ -107,7 +107,7 @@ dfm_status dfm_ode_detach(dfm_ode ode) {
 
 dfm_status dfm_ode_step(dfm_ode ode, double dt) {
   return with(ode, [&](Adapter &a) {
-    if (!(dt > 0 && std::isfinite(dt))) return failed(DFM_E_ARG, "dt %g s; it must be positive", dt);
+    if (!(dt > 0 && std::isfinite(dt))) return failed(DFM_E_ARG, "dt %g s; it must be positive and finite", dt);
     return a.step(dt);
   });
 }

@@ -32,7 +32,7 @@ void RigidFriction::clear_law() {
 }
 
 dfm_status RigidFriction::set_law(dfm_context *context, const char *law, const dfm_params *params, double area) {
-  if (!(area > 0 && std::isfinite(area))) return failed(DFM_E_ARG, "area %g m2; a contact's area is positive", area);
+  if (!(area > 0 && std::isfinite(area))) return failed(DFM_E_ARG, "area %g m2; a contact's area is positive and finite", area);
   dfm_law opened = 0;
   if (const dfm_status s = dfm_law_open(context, law, &opened); s != DFM_OK) return s;
   const dfm_type *type = nullptr;

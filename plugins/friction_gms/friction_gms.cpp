@@ -212,7 +212,11 @@ dfm_status check(const double *p, char *why, size_t cap) {
     std::snprintf(why, cap, "mu_S (%g) must not be below mu_C (%g); give both, or \"mu\" for mu_C = mu_S", p[kMuS], p[kMuC]);
     return DFM_E_ARG;
   }
-  if (n != kUsual && (nk == 0 || nnu == 0)) {
+  if (nk > 0 && nnu > 0 && nk != nnu) {
+    std::snprintf(why, cap, "k has %u value%s and nu has %u (zeros at the end do not count); give as many of each, one for each element", nk, nk == 1 ? "" : "s", nnu);
+    return DFM_E_ARG;
+  }
+  if ((nk == 0) != (nnu == 0) && nk + nnu != kUsual) {
     std::snprintf(why, cap, "%s %u value%s and %s has none, which stands for four; give as many of each", nk ? "k has" : "nu has", nk ? nk : nnu, (nk ? nk : nnu) == 1 ? "" : "s",
                   nk ? "nu" : "k");
     return DFM_E_ARG;

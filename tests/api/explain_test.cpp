@@ -50,6 +50,21 @@ TEST(Explain, Step_NamesBoundAndSubSteps) {
   EXPECT_NE(result.out.find("the scene asks for 0.1 s"), std::string::npos) << result.out;
 }
 
+TEST(Explain, Step_SaysWhetherStiffnessOrDampingBoundsIt) {
+  const auto damped = [](const std::string &name, const std::string &damping) {
+    const std::string path = scene(name, R"("materials": {"m": {"young": 1e5, "damping": {)" + damping + R"(}}}, "bodies": [{"name": "lone", "mesh": "block.msh", "material": "m"}])");
+    return test::deform({"explain", path}).out;
+  };
+  const std::string stiff = damped("stiff", R"("stiffness": 1e-5)"), slow = damped("slow", R"("stiffness": 1)"), heavy = damped("heavy", R"("mass": 1e6)");
+  EXPECT_NE(stiff.find("the stiffest point for its mass"), std::string::npos) << stiff;
+  EXPECT_NE(stiff.find("soften or coarsen"), std::string::npos) << stiff;
+  for (const std::string &out : {slow, heavy}) {
+    EXPECT_NE(out.find("damping bounds it"), std::string::npos) << out;
+    EXPECT_NE(out.find("lower the damping"), std::string::npos) << out;
+    EXPECT_EQ(out.find("stiffest"), std::string::npos) << out;
+  }
+}
+
 TEST(Explain, Json_IsOneObject) {
   const test::CommandResult result = test::deform({"explain", scene("json", kOnFloor), "--json"});
   ASSERT_EQ(result.exit_code, 0) << result.err;

@@ -91,6 +91,8 @@ TEST(RigidHost, SomebodyElses_TakesPartInTheSolve) {
     o.young = 3e4, o.damping_stiffness = 4e-3, o.damping_mass = 10, o.position = {0, 0, 0.101}, o.name = "ball";
     const dfm_body ball = make_body(c, w, "ball", {0.1}, 300, o);
     Set set{{box("plate", {0.1, 0.1, 0.02}, 1, {0, 0, 0.23})}, {}};
+    EXPECT_EQ(Set({{box("one", {0.1, 0.1, 0.1}, 1), box("two", {0.1, 0.1, 0.1}, 1, {1, 0, 0})}, {}}).create(w, "lift"), DFM_E_FATAL);
+    EXPECT_NE(std::strstr(dfm_last_error(), "gives no reason; look for"), nullptr) << dfm_last_error();
     EXPECT_EQ(set.create(w, "lfit"), DFM_E_ARG);
     EXPECT_NE(std::strstr(dfm_last_error(), "did you mean 'lift'"), nullptr) << dfm_last_error();
     ASSERT_EQ(set.create(w, "lift"), DFM_OK) << dfm_last_error();
@@ -220,7 +222,7 @@ TEST(RigidBodies, BadDefs_AreRefused) {
   };
   refused({}, {"at least one body"});
   refused(with([](dfm_rigid_def &d) { d.mass = 0; }), {"'a'", "mass"});
-  refused(with([](dfm_rigid_def &d) { d.mass = NAN; }), {"'a'", "mass"});
+  refused(with([](dfm_rigid_def &d) { d.mass = INFINITY; }), {"'a'", "mass", "finite"});
   refused(with([](dfm_rigid_def &d) { d.shape = DFM_SHAPE_PLANE; }), {"sphere, a box or a capsule"});
   refused(with([](dfm_rigid_def &d) { d.inertia[0] = 5, d.inertia[1] = 1, d.inertia[2] = 1; }), {"inertia", "sum"});
   refused(with([](dfm_rigid_def &d) { d.inertia[0] = 1; }), {"inertia", "positive"});

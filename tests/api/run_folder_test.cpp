@@ -100,6 +100,18 @@ TEST(RunFolder, LinksInItsPlace_AreReplacedAndNotFollowed) {
   for (const char *name : {"bodies.csv", "contacts.csv", "probes.csv", "summary.json"}) EXPECT_FALSE(fs::is_symlink(dir + "/out/" + name)) << name;
 }
 
+TEST(RunFolder, LinkToAnotherFolderInIt_IsRefused) {
+  for (const std::string name : {"states", "nodes", "frames"}) {
+    const std::string dir = fresh("linked_" + name);
+    fs::create_directories(dir + "/out"), fs::create_directories(dir + "/other");
+    const std::vector<std::string> files = {"/other/b_000000.vtu", "/other/last_b.vtu", "/other/index.csv", "/other/frame_000000.png", "/out/summary.json"};
+    for (const std::string &file : files) test::write_file(dir + file, "precious");
+    fs::create_directory_symlink(dir + "/other", dir + "/out/" + name);
+    expect_sentence(run(dir, {"--set", "/output/states=true"}), {"/out/" + name, "a link", "--out"});
+    for (const std::string &file : files) EXPECT_EQ(test::read_file(dir + file), "precious") << file;
+  }
+}
+
 TEST(SceneText, BytesBehindANul_AreRefused) {
   const std::string dir = fresh("nul");
   test::write_file(dir + "/scene.json", kScene + std::string(1, '\0') + "{\"time\": 7}");

@@ -192,6 +192,9 @@ TEST(Arguments, Wrong_AreRefusedInOneSentenceAndChangeNothing) {
       {DFM_E_ARG, [&] { return obstacle([](auto &d) { d.shape = DFM_SHAPE_SPHERE, d.radius = 0; }); }, {"radius"}},
       {DFM_E_ARG, [&] { return obstacle([](auto &d) { d.shape = DFM_SHAPE_BOX, d.half_size[1] = -1; }); }, {"half_size"}},
       {DFM_E_ARG, [&] { return obstacle([](auto &d) { d.shape = DFM_SHAPE_CAPSULE, d.half_length = -1; }); }, {"half_length"}},
+      {DFM_E_ARG, [&] { return obstacle([](auto &d) { d.shape = DFM_SHAPE_CAPSULE, d.half_length = INFINITY; }); }, {"half_length inf", "finite"}},
+      {DFM_E_ARG, [&] { return obstacle([](auto &d) { d.shape = DFM_SHAPE_SPHERE, d.radius = INFINITY; }); }, {"radius inf", "finite"}},
+      {DFM_E_ARG, [&] { return obstacle([](auto &d) { d.shape = DFM_SHAPE_BOX, d.half_size[1] = INFINITY; }); }, {"half_size inf", "finite"}},
       {DFM_E_ARG, [&] { return obstacle([](auto &d) { d.name = "floor"; }); }, {"taken"}},
       {DFM_E_ARG, [&] { return obstacle([](auto &d) { d.nkey = 2; }); }, {"keys is NULL"}},
       {DFM_E_ARG, [&] { return obstacle([&](auto &d) { d.nkey = 2, d.keys = falling; }); }, {"rise"}},
@@ -200,6 +203,7 @@ TEST(Arguments, Wrong_AreRefusedInOneSentenceAndChangeNothing) {
       {DFM_E_ARG, [&] { return material([](auto &d) { d.density = 0; }); }, {"density", "positive"}},
       {DFM_E_ARG, [&] { return material([](auto &d) { d.poisson = 0.5; }); }, {"poisson", "(-1, 0.5)"}},
       {DFM_E_ARG, [&] { return material([](auto &d) { d.damping_stiffness = -1; }); }, {"damping_stiffness"}},
+      {DFM_E_ARG, [&] { return material([](auto &d) { d.damping_mass = INFINITY; }); }, {"damping_mass is inf", "finite"}},
       {DFM_E_ARG, [&] { return material([](auto &d) { static const dfm_param_value v{"x", nullptr, 1}; d.extra = {sizeof(dfm_params), 1, &v}; }); }, {"no value"}},
       // friction
       {DFM_E_ARG, [&] { return friction("upper", "flor", "coulomb", {}); }, {"'flor'", "'floor'"}},

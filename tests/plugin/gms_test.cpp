@@ -101,6 +101,10 @@ TEST_F(Gms, ParametersThatDoNotFit_AreRefused) {
   EXPECT_NE(refusal({0.25, 0.20, 0.01, 2, 0, 60, 0, 0, 0, 0, 0, 0, 0, 0}).find("mu_S (0.2)"), std::string::npos);
   EXPECT_NE(refusal({0.15, 0.20, 0.01, 2, 0, 60, 5, 4, 3, 2, 1, 0, 0, 0, 0, 0}).find("k has 5 values and nu has none"), std::string::npos);
   EXPECT_NE(refusal({0.15, 0.20, 0.01, 2, 0, 60, 0, 0, 0, 0, 0, 0.2, 0.2, 0.2, 0.2, 0.2}).find("nu has 5 values and k has none"), std::string::npos);
+  EXPECT_NE(refusal({0.15, 0.20, 0.01, 2, 0, 60, 5, 4, 3, 0, 0.5, 0.5, 0, 0}).find("k has 3 values and nu has 2 "), std::string::npos);
+  EXPECT_NE(refusal({0.15, 0.20, 0.01, 2, 0, 60, 5, 0, 0, 0, 0.5, 0.5, 0, 0}).find("k has 1 value and nu has 2 "), std::string::npos);
+  EXPECT_NE(refusal({0.15, 0.20, 0.01, 2, 0, 60, 5, 4, 3, 0, 0, 0, 0, 0}).find("k has 3 values and nu has none"), std::string::npos);
+  EXPECT_NE(refusal({0.15, 0.20, 0.01, 2, 0, 60, 0, 0, 0, 0, 0.5, 0.5, 0, 0}).find("nu has 2 values and k has none"), std::string::npos);
   char why[256] = "";
   const std::vector<double> usual{0.5, 0.5, 0.01, 2, 0, 1e5, 0, 0, 0, 0, 0, 0, 0, 0};
   EXPECT_EQ(dev.ops->check(wide(usual).data(), why, sizeof why), DFM_OK);

@@ -67,14 +67,14 @@ dfm_status dfm_world_create(dfm_context *context, const dfm_world_def *def, dfm_
       fail(DFM_E_ARG, "contact_offset (m) and contact_tolerance (m/s) must be zero (automatic) or positive, and finite; found %g and %g",
            w->def.contact_offset, w->def.contact_tolerance);
     for (const double speed : {w->def.recovery_speed, w->def.obstacle_speed})
-      if (!(speed >= 0 && std::isfinite(speed))) fail(DFM_E_ARG, "recovery_speed and obstacle_speed are %g m/s; zero (the default) or positive", speed);
+      if (!(speed >= 0 && std::isfinite(speed))) fail(DFM_E_ARG, "recovery_speed and obstacle_speed must be zero (the default) or positive, and finite; found %g m/s", speed);
     if (w->def.flags & ~uint32_t{DFM_WORLD_UNGUARDED | DFM_WORLD_UNTANGLE})
       fail(DFM_E_ARG, "flags 0x%x: known are DFM_WORLD_UNGUARDED (1) and DFM_WORLD_UNTANGLE (2)", w->def.flags);
     if (w->def.max_sweeps == 0 || w->def.max_passes == 0 || w->def.max_substeps == 0)
       fail(DFM_E_ARG, "max_sweeps, max_passes and max_substeps must be at least 1");
     check_max_time(w->def.max_time);
     if (!(w->def.energy_watch >= 0 && std::isfinite(w->def.energy_watch)))
-      fail(DFM_E_ARG, "energy_watch is %g; it must be a share of the largest energy such as 0.01, or 0 (off)", w->def.energy_watch);
+      fail(DFM_E_ARG, "energy_watch is %g; it must be a finite share of the largest energy such as 0.01, or 0 (off)", w->def.energy_watch);
     if (w->def.sleep > 1) fail(DFM_E_ARG, "sleep is %u; it must be 0 (off) or 1 (on)", w->def.sleep);
     if (w->def.self_contact > DFM_SELF_AUTO)
       fail(DFM_E_ARG, "self_contact is %u; it must be DFM_SELF_OFF (0), DFM_SELF_ON (1) or DFM_SELF_AUTO (2)", w->def.self_contact);

@@ -207,12 +207,12 @@ Obstacle &create_obstacle(World &w, const dfm_obstacle_def &def) {
       !finite(&def.sine.frequency, 1) || !finite(&def.sine.phase, 1))
     fail(DFM_E_ARG, "obstacle '%s': pose, sine and velocity_surface must be finite", name);
   if ((def.shape == DFM_SHAPE_SPHERE || def.shape == DFM_SHAPE_CAPSULE) && !(def.radius > 0 && std::isfinite(def.radius)))
-    fail(DFM_E_ARG, "obstacle '%s': radius %g m; it must be positive", name, def.radius);
+    fail(DFM_E_ARG, "obstacle '%s': radius %g m; it must be positive and finite", name, def.radius);
   if (def.shape == DFM_SHAPE_CAPSULE && !(def.half_length >= 0 && std::isfinite(def.half_length)))
-    fail(DFM_E_ARG, "obstacle '%s': half_length %g m; it must not be negative", name, def.half_length);
+    fail(DFM_E_ARG, "obstacle '%s': half_length %g m; it must be finite and not negative", name, def.half_length);
   if (def.shape == DFM_SHAPE_BOX)
     for (double s : def.half_size)
-      if (!(s > 0 && std::isfinite(s))) fail(DFM_E_ARG, "obstacle '%s': half_size %g m; all three must be positive", name, s);
+      if (!(s > 0 && std::isfinite(s))) fail(DFM_E_ARG, "obstacle '%s': half_size %g m; all three must be positive and finite", name, s);
   if (def.material) {
     const Material &m = resolve<Material>(Kind::material, def.material);
     if (m.world != &w) fail(DFM_E_HANDLE, "obstacle '%s': its material belongs to another world", name);

@@ -74,6 +74,24 @@ std::string body(const Body &b) {
   return out + "]}";
 }
 
+std::string seconds(double s) { return std::isfinite(s) ? format("%.3g s", s) : "any step"; }
+
+// Which term rules at the worst point, from the sums that the bound was made of: h = 4 m / (c + sqrt(c^2 + 4 m k)) is 2 sqrt(m / k) without damping
+// and 2 m / c without stiffness.
+std::string reason(const World &w) {
+  if (!w.worst_body) return "nothing bounds the step";
+  const Body &b = *w.worst_body;
+  const std::string cut = "; longer steps are cut into equal sub-steps";
+  const double m = w.worst_point < b.p.n ? b.p.mass[w.worst_point] : 0, k = m > 0 ? b.ksum[w.worst_point] : 0, c = m > 0 ? b.csum[w.worst_point] : 0;
+  if (!(k > 0 || c > 0)) return "0.9 of the bound that its model gives" + cut;
+  const double share = w.stable / b.bound.step;
+  const std::string stiffness = seconds(share * 2 * std::sqrt(m / k)), damping = seconds(share * 2 * m / c);
+  return "0.9 of the proven bound: " +
+         (c * c > m * k ? "damping bounds it (alone it allows " + damping + ", stiffness alone " + stiffness + "); lower the damping of this body or of its springs"
+                        : "the stiffest point for its mass (alone its stiffness allows " + stiffness + ", its damping " + damping + "); soften or coarsen this body") +
+         cut;
+}
+
 }  // namespace
 
 std::string explain(const World &w) {
@@ -97,8 +115,7 @@ std::string explain(const World &w) {
   out += "],\"step\":{\"stable_s\":" + (std::isfinite(w.stable) ? format("%.9g", w.stable) : std::string("null")) +
          ",\"worst_body\":" + (w.worst_body ? quote(w.worst_body->name) : "null") + ",\"worst_point\":" + std::to_string(w.worst_point) +
          ",\"contact_offset_m\":" + format("%.9g", w.offset) + ",\"reason\":" +
-         quote(w.worst_body ? "0.9 of the proven bound: the stiffest point for its mass; longer steps are cut into equal sub-steps"
-                            : "nothing bounds the step") + "}}";
+         quote(reason(w)) + "}}";
   return out;
 }
 

@@ -30,11 +30,11 @@ void check_body(dfm_rigid_def &d, const char *name) {
     d.mass = 0, d.inertia[0] = d.inertia[1] = d.inertia[2] = 0;
     return;
   }
-  if (!(d.mass > 0 && std::isfinite(d.mass))) fail(DFM_E_ARG, "rigid body '%s': mass %g kg; it must be positive, or the body fixed", name, d.mass);
+  if (!(d.mass > 0 && std::isfinite(d.mass))) fail(DFM_E_ARG, "rigid body '%s': mass %g kg; it must be positive and finite, or the body fixed", name, d.mass);
   if (zero(d.inertia)) solid_inertia(d, d.inertia);
   const double *const i = d.inertia, slack = 1e-9 * (i[0] + i[1] + i[2]);
   for (int k = 0; k < 3; ++k)
-    if (!(i[k] > 0 && std::isfinite(i[k]))) fail(DFM_E_ARG, "rigid body '%s': moment of inertia %g kg m2; all three must be positive", name, i[k]);
+    if (!(i[k] > 0 && std::isfinite(i[k]))) fail(DFM_E_ARG, "rigid body '%s': moment of inertia %g kg m2; all three must be positive and finite", name, i[k]);
   for (int k = 0; k < 3; ++k)
     if (i[k] > i[(k + 1) % 3] + i[(k + 2) % 3] + slack)
       fail(DFM_E_ARG, "rigid body '%s': moments of inertia %g, %g, %g kg m2; no body has one above the sum of the other two", name, i[0], i[1], i[2]);
@@ -74,8 +74,11 @@ void ask_host(RigidSet &set, const std::vector<dfm_joint_def> &joints, void *dat
   const dfm_rigid_set_def def = {sizeof def, n, set.njoint, 0, set.defs.data(), joints.data(), data};
   uint32_t nextra = 0;
   const char *const host = set.host_name.c_str();
-  if (set.host.create(set.host.user, &def, &set.self, set.group.data(), &nextra) != DFM_OK)
-    fail(DFM_E_FATAL, "rigid host '%s' refuses this set of %u bodies and %u joints", host, n, set.njoint);
+  const uint64_t said = sentences();
+  if (set.host.create(set.host.user, &def, &set.self, set.group.data(), &nextra) != DFM_OK) {
+    const std::string why = sentences() != said ? last_error() : "it gives no reason; look for huge positions and speeds, and for masses, inertias and joints that it cannot take";
+    fail(DFM_E_FATAL, "rigid host '%s' refuses the set of rigid body '%s' (bodies: %u, joints: %u): %s", host, set.defs[0].name, n, set.njoint, why.c_str());
+  }
   std::vector<uint32_t> members;
   for (const uint32_t g : set.group) {
     if (g == DFM_RIGID_STILL) {

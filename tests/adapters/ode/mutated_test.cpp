@@ -44,6 +44,12 @@ INSTANTIATE_TEST_SUITE_P(
                     Mutation{"ode_chain", "/rigid/bodies/1/joints/0/anchor/0=1e30"}, Mutation{"ode_cart", "/rigid/bodies/0/spin=[1e6,1e6,1e6]"},
                     Mutation{"ode_gripper", "/rigid/bodies/0/mass=1e30"}, Mutation{"ode_seesaw", "/gravity/2=-1e200"}));
 
+TEST(OdeHost, BodyThatItCannotTake_IsRefusedWithItsReason) {
+  const test::CommandResult r = run({"ode_bed", "/rigid/bodies/0/pose/position/0=1e15"});
+  EXPECT_EQ(r.exit_code, 2);
+  for (const char *part : {"refuses", "(1e+15, ", "within 1e+09 m"}) EXPECT_NE(r.err.find(part), std::string::npos) << part << " in\n" << r.err;
+}
+
 // The scene whose joint is 1e15 m off makes ODE fail an assertion in its step.
 TEST(OdeAssertion, InAStep_IsAnErrorAndTheCallersHandlersStay) {
   ASSERT_EQ(dfm_ode_register(), DFM_OK);
