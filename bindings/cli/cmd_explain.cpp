@@ -77,7 +77,7 @@ int explain(const Options &options, const Globals &globals) {
     std::printf("\n");
     const double stable = std::strtod(step->get("stable_s").c_str(), nullptr), asked = scene.settings().step;
     if (asked > 0 && stable > 0)
-      std::printf("  the scene asks for %g s: %g sub-step%s each\n", asked, std::ceil(asked / stable - 1e-9), asked > stable ? "s" : "");
+      std::printf("  the scene asks for %g s: %s%g sub-step%s each\n", asked, asked > stable ? "at least " : "", std::ceil(asked / stable - 1e-9), asked > stable ? "s" : "");
   }
   return kDone;
 }

@@ -20,7 +20,7 @@ dfm_rigid_host lift_table(Lift *counts) {
   dfm_rigid_host t{};
   t.size = sizeof t, t.user = counts;
   t.create = [](void *user, const dfm_rigid_set_def *set, void **self, uint32_t *group, uint32_t *nextra) {
-    if (set->nbody != 1) return dfm_status(DFM_E_ARG);
+    if (set->nbody != 1) return dfm_status(set->nbody == 2 ? DFM_E_ARG : DFM_E_NOMEM);
     ++static_cast<Lift *>(user)->created;
     *self = user, group[0] = 0, *nextra = 1;
     return dfm_status(DFM_OK);
@@ -93,6 +93,8 @@ TEST(RigidHost, SomebodyElses_TakesPartInTheSolve) {
     Set set{{box("plate", {0.1, 0.1, 0.02}, 1, {0, 0, 0.23})}, {}};
     EXPECT_EQ(Set({{box("one", {0.1, 0.1, 0.1}, 1), box("two", {0.1, 0.1, 0.1}, 1, {1, 0, 0})}, {}}).create(w, "lift"), DFM_E_FATAL);
     EXPECT_NE(std::strstr(dfm_last_error(), "gives no reason; look for"), nullptr) << dfm_last_error();
+    Set three{{box("one", {0.1, 0.1, 0.1}, 1), box("two", {0.1, 0.1, 0.1}, 1, {1, 0, 0}), box("three", {0.1, 0.1, 0.1}, 1, {2, 0, 0})}, {}};
+    EXPECT_EQ(three.create(w, "lift"), DFM_E_NOMEM) << dfm_last_error();
     EXPECT_EQ(set.create(w, "lfit"), DFM_E_ARG);
     EXPECT_NE(std::strstr(dfm_last_error(), "did you mean 'lift'"), nullptr) << dfm_last_error();
     ASSERT_EQ(set.create(w, "lift"), DFM_OK) << dfm_last_error();

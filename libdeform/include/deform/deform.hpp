@@ -52,7 +52,7 @@ struct BodyDef : dfm_body_def {
 // What world.step() returns. Converts to true where the world advanced.
 struct [[nodiscard]] StepReport {
   uint32_t trouble = 0;      // DFM_TROUBLE_*
-  bool discarded = false;    // too many sub-steps would have been needed: nothing changed
+  bool discarded = false;    // too many sub-steps, its budget used up, or interrupted (trouble says which): nothing changed
   constexpr explicit operator bool() const noexcept { return !discarded; }
 };
 struct StableStep { double dt = 0; dfm_body body = 0; uint32_t point = 0; };

@@ -119,7 +119,8 @@ DFM_API dfm_rigid_def dfm_rigid_def_default(void);
 /** Makes a set of bodies. A dfm_rigid is a dfm_obstacle too: poses, defs, rays, pair rules and reports take it; it moves by itself only.
  * @param host  "builtin" or a registered name; NULL: "builtin"
  * @param out   [nbody]
- * @return DFM_OK; DFM_E_ARG (which body or joint, why; nearest host); DFM_E_FATAL the host refuses. Threads: Not during step. Since 0.1. */
+ * @return DFM_OK; DFM_E_ARG (which body or joint, why; nearest host); DFM_E_FATAL the host refuses (the sentence gives its reason); DFM_E_NOMEM.
+ * Threads: Not during step. Since 0.1. */
 DFM_API dfm_status dfm_rigid_create(dfm_world world, const char *host, const dfm_rigid_set_def *set, dfm_rigid *out);
 /** A further shape of a body, at def->pose in the body's frame, whose origin is the centre of mass: any but a plane; no keys, no sine. It touches with
  * the body's mass and moves with it; a dfm_obstacle with a name, material and filter of its own. dfm_obstacle_destroy removes it alone.

@@ -22,11 +22,6 @@ bool finite(const double *p, size_t n) {
 }
 constexpr size_t kStateValues = sizeof(dfm_rigid_state) / sizeof(double);
 
-// A host without memory is no fault of what it was asked: the sub-step ends as where the library itself finds none.
-void need_memory(dfm_status status) {
-  if (status == DFM_E_NOMEM) throw std::bad_alloc();
-}
-
 // said: sentences() before the host was called. Its own reason comes along where it has given one.
 bool host_failed(const World &w, const RigidSet &set, dfm_status status, const char *what, uint64_t said, uint32_t *trouble) {
   need_memory(status);
@@ -38,6 +33,10 @@ bool host_failed(const World &w, const RigidSet &set, dfm_status status, const c
 }
 
 }  // namespace
+
+void need_memory(dfm_status status) {
+  if (status == DFM_E_NOMEM) throw std::bad_alloc();
+}
 
 Obstacle &rigid_obstacle(World &w, uint64_t id) {
   for (auto &o : w.obstacles)

@@ -46,6 +46,7 @@ struct RigidSet {
 void create_rigids(World &w, const char *host, const dfm_rigid_set_def &def, uint64_t *out);
 void destroy_rigids(RigidSet &set);   // throws Error where the host keeps its bodies
 Obstacle &rigid_obstacle(World &w, uint64_t id);
+void need_memory(dfm_status status);           // a host without memory is no fault of what it was asked: ends as where the library itself finds none
 void place_rigids(World &w);                   // World::prepare(): slots and groups
 void rigid_response(World &w, uint32_t group, double *matrix);
 void sum_rigid_impulses(World &w);             // of the rows, into every set

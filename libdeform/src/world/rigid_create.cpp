@@ -75,7 +75,9 @@ void ask_host(RigidSet &set, const std::vector<dfm_joint_def> &joints, void *dat
   uint32_t nextra = 0;
   const char *const host = set.host_name.c_str();
   const uint64_t said = sentences();
-  if (set.host.create(set.host.user, &def, &set.self, set.group.data(), &nextra) != DFM_OK) {
+  const dfm_status status = set.host.create(set.host.user, &def, &set.self, set.group.data(), &nextra);
+  need_memory(status);
+  if (status != DFM_OK) {
     const std::string why = sentences() != said ? last_error() : "it gives no reason; look for huge positions and speeds, and for masses, inertias and joints that it cannot take";
     fail(DFM_E_FATAL, "rigid host '%s' refuses the set of rigid body '%s' (bodies: %u, joints: %u): %s", host, set.defs[0].name, n, set.njoint, why.c_str());
   }
