@@ -29,8 +29,8 @@ struct CcdOptions {
 
 struct CcdQuery {
   std::string id;
-  bool edges = false, labelled = false, hit = false;
-  double latest = 0;             // labelled hits: the exact time or the next number above it
+  bool edges = false, labeled = false, hit = false;
+  double latest = 0;             // labeled hits: the exact time or the next number above it
   dfm_motion motion[4];
 };
 
@@ -114,7 +114,7 @@ class QueryFile {
     if (hit_ >= 0 && !cells[size_t(hit_)].empty()) {
       const double hit = number_at(cells, hit_);
       if (hit != 0 && hit != 1) refuse("hit is \"" + cells[size_t(hit_)] + "\", expected 0 or 1");
-      q.labelled = true, q.hit = hit == 1;
+      q.labeled = true, q.hit = hit == 1;
       if (q.hit && latest_ >= 0) q.latest = number_at(cells, latest_);
       else if (q.hit && toi_ >= 0) q.latest = std::nextafter(number_at(cells, toi_), 2.0);
       else q.latest = 1;
@@ -130,7 +130,7 @@ class QueryFile {
 };
 
 struct Tally {
-  size_t edges = 0, hits = 0, labelled = 0, missed = 0, false_hits = 0, late = 0;
+  size_t edges = 0, hits = 0, labeled = 0, missed = 0, false_hits = 0, late = 0;
   double latest = 0;             // largest t - exact time
   uint64_t evaluations = 0;
   uint32_t most = 0;
@@ -155,8 +155,8 @@ Tally answer(const CcdOptions &options, const std::vector<CcdQuery> &queries, st
     const double t = times[k];
     const bool hit = t <= 1;
     tally.edges += q.edges, tally.hits += hit, tally.evaluations += evaluations[k], tally.most = std::max(tally.most, evaluations[k]);
-    if (q.labelled) {
-      ++tally.labelled;
+    if (q.labeled) {
+      ++tally.labeled;
       tally.missed += q.hit && !hit, tally.false_hits += !q.hit && hit;
       if (q.hit && hit && t > q.latest) ++tally.late, tally.latest = std::max(tally.latest, t - q.latest);
     }
@@ -175,9 +175,9 @@ void print(const CcdOptions &options, const Globals &globals, size_t n, const Ta
     work.add("mean", number(mean)).add("max", whole(t.most));
     out.add("file", quoted(options.file)).add("root", quoted(options.root)).add("queries", whole(n)).add("edge_edge", whole(t.edges));
     out.add("hits", whole(t.hits)).add("evaluations", work.text()).add("ns_per_query", number(ns));
-    if (t.labelled) {
+    if (t.labeled) {
       JsonObject labels;
-      labels.add("queries", whole(t.labelled)).add("missed", whole(t.missed)).add("false", whole(t.false_hits));
+      labels.add("queries", whole(t.labeled)).add("missed", whole(t.missed)).add("false", whole(t.false_hits));
       out.add("labels", labels.add("late", whole(t.late)).add("late_by_max", number(t.latest)).text());
     }
     std::fputs(indented(out.text()).c_str(), stdout);
@@ -185,8 +185,8 @@ void print(const CcdOptions &options, const Globals &globals, size_t n, const Ta
     std::printf("%s\n", shown(options.file).c_str());
     std::printf("  finder       %s\n  queries      %zu (%zu point-triangle, %zu edge-edge)\n", options.root.c_str(), n, n - t.edges, t.edges);
     std::printf("  touch        %zu\n  evaluations  %.2f per query, at most %u\n  time         %.0f ns per query\n", t.hits, mean, t.most, ns);
-    if (t.labelled)
-      std::printf("  labels       %zu: missed %zu, false alarms %zu, late %zu (by at most %.2g)\n", t.labelled, t.missed, t.false_hits, t.late, t.latest);
+    if (t.labeled)
+      std::printf("  labels       %zu: missed %zu, false alarms %zu, late %zu (by at most %.2g)\n", t.labeled, t.missed, t.false_hits, t.late, t.latest);
   }
 }
 

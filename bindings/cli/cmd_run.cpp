@@ -129,7 +129,7 @@ class Runner {
     return rate > 0 ? 1 / rate : 0;
   }
 
-  // One step towards the end; false when there.
+  // One step toward the end; false when there.
   bool advance() {
     const double left = result_.start + duration_ - result_.simulated;
     double step = scene_.settings().step;

@@ -19,7 +19,7 @@ constexpr uint32_t kWidth = 960, kHeight = 720;
 class OffScreen : public Frames {
  public:
   OffScreen(const SceneFile &scene, std::string folder, std::unique_ptr<render::Renderer> renderer)
-      : scene_(scene), folder_(std::move(folder)), renderer_(std::move(renderer)), colour_(scene.settings().color) {
+      : scene_(scene), folder_(std::move(folder)), renderer_(std::move(renderer)), color_(scene.settings().color) {
     for (const BodyView &body : scene.bodies()) {
       Buffers b;
       b.xyz.resize(3 * size_t(body.nsurfel)), b.vectors.resize(3 * size_t(body.nsurfel)), b.scalar.resize(body.nsurfel);
@@ -45,7 +45,7 @@ class OffScreen : public Frames {
       camera_ = camera;
     }
     picture_scene.extent = extent_, picture_scene.camera = camera_;
-    if (colour_ == "displacement") picture_scene.map = render::ColourMap::lagoon;
+    if (color_ == "displacement") picture_scene.map = render::ColourMap::lagoon;
     render::Image image;
     std::string why;
     if (!renderer_->draw(picture_scene, image, &why)) throw Failure(kBadInput, "frame " + std::to_string(drawn_) + ": " + why);
@@ -58,12 +58,12 @@ class OffScreen : public Frames {
  private:
   struct Buffers { std::vector<double> xyz, start, vectors; std::vector<float> scalar; };
 
-  // Fills the scalars of one body in their own unit; false where the scene colours by body.
+  // Fills the scalars of one body in their own unit; false where the scene colors by body.
   bool fill_values(const BodyView &body, Buffers &b) {
     uint32_t n = 0;
-    if (colour_ == "body") return false;
-    if (colour_ == "speed") need(dfm_surface_velocities(body.handle, body.nsurfel, b.vectors.data(), &n));
-    else if (colour_ == "contact") need(dfm_surface_forces(body.handle, body.nsurfel, b.vectors.data(), &n));
+    if (color_ == "body") return false;
+    if (color_ == "speed") need(dfm_surface_velocities(body.handle, body.nsurfel, b.vectors.data(), &n));
+    else if (color_ == "contact") need(dfm_surface_forces(body.handle, body.nsurfel, b.vectors.data(), &n));
     else
       for (size_t i = 0; i < b.xyz.size(); ++i) b.vectors[i] = b.xyz[i] - b.start[i];
     for (size_t i = 0; i < b.scalar.size(); ++i) {
@@ -75,26 +75,26 @@ class OffScreen : public Frames {
 
   void add_bodies(render::Scene &out) {
     float top = 0;
-    bool coloured = false;
+    bool colored = false;
     for (size_t i = 0; i < buffers_.size(); ++i) {
       const BodyView &body = scene_.bodies()[i];
       uint32_t n = 0;
       need(dfm_surface_positions(body.handle, body.nsurfel, buffers_[i].xyz.data(), &n));
-      coloured = fill_values(body, buffers_[i]);
+      colored = fill_values(body, buffers_[i]);
       for (float x : buffers_[i].scalar) top = std::max(top, x);
     }
-    // The scale of a film only grows, so colours of neighbouring frames can be compared.
+    // The scale of a film only grows, so colors of neighboring frames can be compared.
     scale_ = std::max(scale_, top);
     for (size_t i = 0; i < buffers_.size(); ++i) {
       Buffers &b = buffers_[i];
-      const render::Colour own = render::palette(uint32_t(i));
+      const render::Color own = render::palette(uint32_t(i));
       render::Surface s;
       s.xyz = b.xyz.data(), s.n = uint32_t(b.xyz.size() / 3);
       s.tri = scene_.bodies()[i].triangles.data(), s.ntri = uint32_t(scene_.bodies()[i].triangles.size() / 3);
       s.rgb[0] = own.r, s.rgb[1] = own.g, s.rgb[2] = own.b;
-      if (coloured) {
-        // Where nothing touches the body keeps its own colour.
-        for (float &x : b.scalar) x = colour_ == "contact" && x == 0 ? std::numeric_limits<float>::quiet_NaN() : scale_ > 0 ? x / scale_ : 0;
+      if (colored) {
+        // Where nothing touches the body keeps its own color.
+        for (float &x : b.scalar) x = color_ == "contact" && x == 0 ? std::numeric_limits<float>::quiet_NaN() : scale_ > 0 ? x / scale_ : 0;
         s.scalar = b.scalar.data();
       }
       out.surfaces.push_back(s);
@@ -135,7 +135,7 @@ class OffScreen : public Frames {
     place_points(o, placed);
     render::Surface s;
     s.xyz = placed.data(), s.n = o.def.npoint, s.tri = o.def.triangles, s.ntri = o.def.ntriangle;
-    s.rgb[0] = 0.72f, s.rgb[1] = 0.73f, s.rgb[2] = 0.75f;   // no body's colour
+    s.rgb[0] = 0.72f, s.rgb[1] = 0.73f, s.rgb[2] = 0.75f;   // no body's color
     out.surfaces.push_back(s);
   }
 
@@ -143,15 +143,15 @@ class OffScreen : public Frames {
     char text[40];
     std::snprintf(text, sizeof text, "t = %.3f s", t);
     render::draw_text(image, 16, 28, 14, text, {0.15f, 0.17f, 0.2f});
-    if (colour_ == "speed") render::legend(image, map, 0, scale_, "speed", "m/s");
-    if (colour_ == "contact") render::legend(image, map, 0, scale_, "contact force", "N");
-    if (colour_ == "displacement") render::legend(image, map, 0, scale_, "displacement", "m");
+    if (color_ == "speed") render::legend(image, map, 0, scale_, "speed", "m/s");
+    if (color_ == "contact") render::legend(image, map, 0, scale_, "contact force", "N");
+    if (color_ == "displacement") render::legend(image, map, 0, scale_, "displacement", "m");
   }
 
   const SceneFile &scene_;
   std::string folder_;
   std::unique_ptr<render::Renderer> renderer_;
-  std::string colour_;
+  std::string color_;
   std::vector<Buffers> buffers_;
   std::vector<std::vector<double>> placed_;   // of obstacles of triangles
   std::optional<render::Bounds> extent_;

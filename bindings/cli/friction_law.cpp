@@ -278,7 +278,7 @@ class StepSolver {
       if (!std::isfinite(c.u) || std::fabs(c.u) > 1e150) throw Failure(kStopped, "no speed balances the force: friction drives the mass faster and faster");
     }
     if (c.stopped && c.u != 0) c = at(0);        // its solution is rest, wherever it was asked
-    if (a.u * c.u <= 0 && a.u != 0) cut_towards_rest(a, c);
+    if (a.u * c.u <= 0 && a.u != 0) cut_toward_rest(a, c);
     else if (falls_) cut_evenly(a, c);
     return newton(a, c);
   }
@@ -305,8 +305,8 @@ class StepSolver {
     return {0, drive_, !p.stopped};
   }
 
-  // Keeps the first change of sign from a on, over points that crowd towards rest where the Stribeck curve is.
-  void cut_towards_rest(Point &a, Point &c) {
+  // Keeps the first change of sign from a on, over points that crowd toward rest where the Stribeck curve is.
+  void cut_toward_rest(Point &a, Point &c) {
     for (double u = 0.5 * a.u, least = std::ldexp(a.u, -16); std::fabs(u) > std::fabs(least); u *= 0.5)
       if (take(a, c, u)) return;
     take(a, c, 0);

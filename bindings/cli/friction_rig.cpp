@@ -339,7 +339,7 @@ class Rig {
     }
   }
 
-  // The top of the parabola through a peak and its neighbours; a kink is its own top.
+  // The top of the parabola through a peak and its neighbors; a kink is its own top.
   static Peak refined(const Peak (&p)[3]) {
     const double left = p[1].f - p[0].f, right = p[1].f - p[2].f, h = p[2].t - p[1].t, bend = left + right;
     if (!(left > 0 && right > 0 && left < 4 * right && right < 4 * left)) return p[1];

@@ -1,4 +1,4 @@
-// deform montage: pictures of several runs in labelled rows. `make demo` calls it; it is not part of the command's promised surface.
+// deform montage: pictures of several runs in labeled rows. `make demo` calls it; it is not part of the command's promised surface.
 #include <CLI/CLI.hpp>
 
 #include <memory>
@@ -47,7 +47,7 @@ int montage(const Options &) { return fail("montage: this deform was built witho
 
 void add_montage(CLI::App &app, int *exit_code) {
   auto options = std::make_shared<Options>();
-  CLI::App *sub = app.add_subcommand("montage", "pictures in labelled rows");
+  CLI::App *sub = app.add_subcommand("montage", "pictures in labeled rows");
   sub->group("");
   CLI::Option *row = sub->add_option("--row", options->rows, "LABEL FILE...; may be repeated")->required()->type_name("LABEL FILE...");
   row->inject_separator();

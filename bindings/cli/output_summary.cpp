@@ -202,7 +202,7 @@ std::string summary_json(const SceneFile &scene, const RunOptions &options, cons
 
 void print_table(const SceneFile &scene, const RunResult &run, const Checks &checks) {
   const dfm_world_stats stats = world_stats(scene);
-  std::printf("%-16s %9s %8s  %-30s %10s %9s\n", "body", "points", "cells", "centre of mass / m", "speed m/s", "volume");
+  std::printf("%-16s %9s %8s  %-30s %10s %9s\n", "body", "points", "cells", "center of mass / m", "speed m/s", "volume");
   for (const BodyView &body : scene.bodies()) {
     const dfm_body_measure m = body_measure(body);
     char com[64];

@@ -37,7 +37,7 @@ class OwnWorld : public Host {
     Vec anchor_body, anchor_with;         // in the frames of the two
     Vec axis_body, axis_with;             // unit, likewise
     Quat turn;                            // from the frame of `with` to that of `body`, as created
-    dJointFeedback feedback;              // on ODE's first body, about its centre of mass
+    dJointFeedback feedback;              // on ODE's first body, about its center of mass
     double sign() const { return swapped ? -1 : 1; }
   };
   Engine engine_;

@@ -1,4 +1,4 @@
-// OSMesa: GL into main memory. Its own colour buffer is a stub; we draw into our own framebuffer object as with EGL.
+// OSMesa: GL into main memory. Its own color buffer is a stub; we draw into our own framebuffer object as with EGL.
 #include "context.h"
 
 #include <dlfcn.h>

@@ -93,14 +93,14 @@ double distance(Point p, Point a, Point b) {
   return std::hypot(p.x - a.x - t * dx, p.y - a.y - t * dy);
 }
 
-void blend(Image &picture, long x, long y, Colour c, double cover) {
+void blend(Image &picture, long x, long y, Color c, double cover) {
   if (x < 0 || y < 0 || x >= long(picture.width) || y >= long(picture.height)) return;
   uint8_t *p = &picture.rgb[(size_t(y) * picture.width + size_t(x)) * 3];
   const float rgb[3] = {c.r, c.g, c.b};
   for (int k = 0; k < 3; ++k) p[k] = uint8_t(std::lround(p[k] + cover * (255.0 * rgb[k] - p[k])));
 }
 
-void fill(Image &picture, long x0, long y0, long x1, long y1, Colour c, double cover = 1) {
+void fill(Image &picture, long x0, long y0, long x1, long y1, Color c, double cover = 1) {
   for (long y = y0; y < y1; ++y)
     for (long x = x0; x < x1; ++x) blend(picture, x, y, c, cover);
 }
@@ -117,7 +117,7 @@ std::string number(double x) {
   return text;
 }
 
-constexpr Colour kInk{0.16f, 0.19f, 0.24f};
+constexpr Color kInk{0.16f, 0.19f, 0.24f};
 
 }  // namespace
 
@@ -127,7 +127,7 @@ double text_width(double size, const std::string &text) {
   return text.empty() ? 0 : (units - kGap) * size / kCapital;
 }
 
-void draw_text(Image &picture, double x, double y, double size, const std::string &text, Colour colour) {
+void draw_text(Image &picture, double x, double y, double size, const std::string &text, Color color) {
   const double scale = size / kCapital, pen = std::max(kPen * scale, 0.5);
   for (const char c : text) {
     const std::vector<Stroke> strokes = c == ' ' ? std::vector<Stroke>{} : strokes_of(c);
@@ -139,7 +139,7 @@ void draw_text(Image &picture, double x, double y, double size, const std::strin
         for (const Stroke &s : strokes)
           for (size_t i = 0; i + 1 < s.size(); ++i) nearest = std::min(nearest, distance(p, s[i], s[i + 1]));
         const double cover = std::clamp(pen + 0.5 - nearest * scale, 0.0, 1.0);
-        if (cover > 0) blend(picture, column, row, colour, cover);
+        if (cover > 0) blend(picture, column, row, color, cover);
       }
     x += wide;
   }
@@ -157,7 +157,7 @@ void legend(Image &picture, ColourMap map, double min, double max, const std::st
   const long x = x0 + pad, top = y0 + pad + std::lround(1.9 * size);
   draw_text(picture, double(x), double(y0 + pad) + size, size, head, kInk);
   for (long i = 0; i < wide; ++i)
-    fill(picture, x + i, top, x + i + 1, top + bar, map_colour(map, float(i) / float(std::max(wide - 1, 1L))));
+    fill(picture, x + i, top, x + i + 1, top + bar, map_color(map, float(i) / float(std::max(wide - 1, 1L))));
   const double line = double(top + bar) + 1.8 * size;
   draw_text(picture, double(x), line, size, low, kInk);
   draw_text(picture, double(x + wide) - text_width(size, high), line, size, high, kInk);

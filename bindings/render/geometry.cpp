@@ -35,7 +35,7 @@ Faces faces_of(const Surface &s) {
   return f;
 }
 
-// Angle-weighted mean of the neighbours' normals across edges that are flat enough.
+// Angle-weighted mean of the neighbors' normals across edges that are flat enough.
 Vec corner_normal(const Surface &s, const Faces &f, uint32_t t, uint32_t v) {
   Vec sum;
   for (uint32_t i = f.first[v]; i < f.first[v + 1]; ++i) {
@@ -91,12 +91,12 @@ Mat4 perspective(const View &v, double aspect, double near, double far) {
                     {-v.back.x, -v.back.y, -v.back.z, -tz}});
 }
 
-Mat4 orthographic(const Vec &towards_light, const Vec &centre, double radius) {
-  const Vec z = unit(towards_light), x = square_to(z), y = cross(z, x);
+Mat4 orthographic(const Vec &toward_light, const Vec &center, double radius) {
+  const Vec z = unit(toward_light), x = square_to(z), y = cross(z, x);
   const double s = 1 / radius;
-  return from_rows({{s * x.x, s * x.y, s * x.z, -s * dot(x, centre)},
-                    {s * y.x, s * y.y, s * y.z, -s * dot(y, centre)},
-                    {-s * z.x, -s * z.y, -s * z.z, s * dot(z, centre)},
+  return from_rows({{s * x.x, s * x.y, s * x.z, -s * dot(x, center)},
+                    {s * y.x, s * y.y, s * y.z, -s * dot(y, center)},
+                    {-s * z.x, -s * z.y, -s * z.z, s * dot(z, center)},
                     {0, 0, 0, 1}});
 }
 
@@ -154,10 +154,10 @@ void Shape::surface(const Surface &s) {
   }
 }
 
-void Shape::box(const Vec &centre, const Vec axes[3], const float rgb[3]) {
+void Shape::box(const Vec &center, const Vec axes[3], const float rgb[3]) {
   for (int k = 0; k < 3; ++k)
     for (const double side : {-1.0, 1.0}) {
-      const Vec n = unit(axes[k] * side), c = centre + axes[k] * side;
+      const Vec n = unit(axes[k] * side), c = center + axes[k] * side;
       const Vec u = axes[(k + 1) % 3] * side, w = axes[(k + 2) % 3];  // `side` keeps the winding outward
       const Vec corner[4] = {c - u - w, c + u - w, c + u + w, c - u + w};
       const Vec normals[3] = {n, n, n};
@@ -205,7 +205,7 @@ void Shape::capsule(const Capsule &c) {
 }
 
 void Shape::sphere(const Sphere &s) {
-  Capsule c{{s.centre[0], s.centre[1], s.centre[2]}, {s.centre[0], s.centre[1], s.centre[2]}, s.radius, s.look};
+  Capsule c{{s.center[0], s.center[1], s.center[2]}, {s.center[0], s.center[1], s.center[2]}, s.radius, s.look};
   capsule(c);
 }
 
@@ -240,8 +240,8 @@ Bounds bounds(const Scene &scene) {
     }
   }
   Bounds all = bodies;
-  const auto add = [&](const Vec &centre, const Vec &half) {
-    const Vec low = centre - half, high = centre + half;
+  const auto add = [&](const Vec &center, const Vec &half) {
+    const Vec low = center - half, high = center + half;
     double lo[3] = {low.x, low.y, low.z}, hi[3] = {high.x, high.y, high.z};
     if (!limit.empty())
       for (int k = 0; k < 3; ++k) {
@@ -258,7 +258,7 @@ Bounds bounds(const Scene &scene) {
     for (const Vec &axis : a) half = half + Vec{std::abs(axis.x), std::abs(axis.y), std::abs(axis.z)};
     add(vec(b.pose.position), half);
   }
-  for (const Sphere &s : scene.spheres) add(vec(s.centre), {s.radius, s.radius, s.radius});
+  for (const Sphere &s : scene.spheres) add(vec(s.center), {s.radius, s.radius, s.radius});
   for (const Capsule &c : scene.capsules)
     for (const double *end : {c.a, c.b}) add(vec(end), {c.radius, c.radius, c.radius});
   return all;
@@ -269,21 +269,21 @@ Camera auto_camera(const Bounds &given, double aspect, const double up_in[3]) {
   const Vec lo = given.empty() ? Vec{-1, -1, -1} : vec(given.lo), hi = given.empty() ? Vec{1, 1, 1} : vec(given.hi);
   const double azimuth = -0.95, elevation = 0.36;  // radians: from the front right, a little above
   const Vec away = (across * std::sin(azimuth) + ahead * std::cos(azimuth)) * std::cos(elevation) + up * std::sin(elevation);
-  const Vec centre = (lo + hi) * 0.5;
+  const Vec center = (lo + hi) * 0.5;
   Camera camera;
-  const Vec towards = centre + away;
+  const Vec toward = center + away;
   const auto set = [](double out[3], const Vec &v) { out[0] = v.x, out[1] = v.y, out[2] = v.z; };
-  set(camera.look_at, centre);
+  set(camera.look_at, center);
   set(camera.up, up);
-  set(camera.eye, towards);
+  set(camera.eye, toward);
   const View v = view_of(camera);
   double distance = 1e-6;
   for (int i = 0; i < 8; ++i) {  // the least distance from which this corner is inside the frame with a margin
-    const Vec d = Vec{i & 1 ? hi.x : lo.x, i & 2 ? hi.y : lo.y, i & 4 ? hi.z : lo.z} - centre;
+    const Vec d = Vec{i & 1 ? hi.x : lo.x, i & 2 ? hi.y : lo.y, i & 4 ? hi.z : lo.z} - center;
     const double wide = std::abs(dot(d, v.right)) / (v.tan_half * aspect), high = std::abs(dot(d, v.up)) / v.tan_half;
     distance = std::max(distance, 1.1 * std::max(wide, high) + dot(d, v.back));
   }
-  set(camera.eye, centre + away * distance);
+  set(camera.eye, center + away * distance);
   return camera;
 }
 
@@ -334,7 +334,7 @@ Camera auto_camera(const Scene &scene, double aspect) {
     const Slab s = slab_of(p, up, room);
     for (const double side : {-1.0, 1.0})
       for (const double end : {-1.0, 1.0}) {
-        const Vec q = s.centre + s.axes[0] * side + s.axes[1] * end;
+        const Vec q = s.center + s.axes[0] * side + s.axes[1] * end;
         shown.add(&q.x);
       }
   }

@@ -1,5 +1,5 @@
 // Triangles for the GPU: surfaces with creased normals, solids, ribbons. Everything becomes one kind of vertex, three to a triangle, placed
-// relative to the scene's centre so that single precision suffices far from the origin.
+// relative to the scene's center so that single precision suffices far from the origin.
 #pragma once
 #include <array>
 #include <cmath>
@@ -29,8 +29,8 @@ using Mat4 = std::array<float, 16>;  // columns, as GL reads them
 struct View { Vec eye, right, up, back; double tan_half; };
 View view_of(const Camera &camera);
 Mat4 perspective(const View &view, double aspect, double near, double far);
-// Looks against `towards_light` at a ball of that radius around the origin; clip coordinates -1..1.
-Mat4 orthographic(const Vec &towards_light, const Vec &centre, double radius);
+// Looks against `toward_light` at a ball of that radius around the origin; clip coordinates -1..1.
+Mat4 orthographic(const Vec &toward_light, const Vec &center, double radius);
 // Clip coordinates -1..1 to texture coordinates and depth 0..1.
 Mat4 to_texture(const Mat4 &clip);
 
@@ -41,7 +41,7 @@ struct Shape {
   Vec origin;
   void triangle(const Vec p[3], const Vec n[3], const float rgb[3]);
   void surface(const Surface &s);
-  void box(const Vec &centre, const Vec axes[3], const float rgb[3]);  // axes carry the half lengths
+  void box(const Vec &center, const Vec axes[3], const float rgb[3]);  // axes carry the half lengths
   void sphere(const Sphere &s);
   void capsule(const Capsule &c);
   void ribbons(const Lines &lines, const View &view, double pixels_high);
@@ -57,7 +57,7 @@ inline constexpr double kLevel = 0.9999, kRamp = 0.3;
 // Never empty: Scene::extent, or bounds(), or a box of 2 m around the origin.
 Bounds extent_of(const Scene &scene);
 Bounds room_of(const Scene &scene, const Vec &up, const Bounds &extent);
-struct Slab { Vec centre, axes[3]; };
+struct Slab { Vec center, axes[3]; };
 Slab slab_of(const Plane &p, const Vec &up, const Bounds &extent);
 
 }  // namespace render

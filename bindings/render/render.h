@@ -1,5 +1,5 @@
 // Surfaces -> picture, off-screen: EGL surfaceless first, OSMesa second, the same GL code on both. Plain structs in, 8-bit RGB out; nothing
-// here knows the library, and no GL name leaves this folder. Lengths in metres, colours as sRGB in 0..1, quaternions x, y, z, w.
+// here knows the library, and no GL name leaves this folder. Lengths in meters, colors as sRGB in 0..1, quaternions x, y, z, w.
 #pragma once
 #include <cstdint>
 #include <memory>
@@ -51,8 +51,8 @@ struct Look {
 // plane whose back faces the camera is left out.
 struct Plane { double point[3], normal[3]; Look look; };
 struct Box { Pose pose; double half[3]; Look look; };
-struct Sphere { double centre[3]; double radius; Look look; };
-struct Capsule { double a[3], b[3]; double radius; Look look; };  // a and b are the centres of its caps
+struct Sphere { double center[3]; double radius; Look look; };
+struct Capsule { double a[3], b[3]; double radius; Look look; };  // a and b are the centers of its caps
 // Segments as ribbons that face the camera, e.g. contact normals.
 struct Lines {
   const double *xyz = nullptr;  // [2 n,3]: start, end, start, end
@@ -62,7 +62,7 @@ struct Lines {
   bool on_top = false;  // not hidden by what lies before them
 };
 
-enum class ColourMap { ember, lagoon, balance };  // our own paths through OKLab: dark to light warm, dark to light cool, blue-grey-red
+enum class ColourMap { ember, lagoon, balance };  // our own paths through OKLab: dark to light warm, dark to light cool, blue-gray-red
 
 struct Scene {
   std::vector<Surface> surfaces;
@@ -98,18 +98,18 @@ class Renderer {
   virtual const char *device() const = 0;   // what GL calls itself, e.g. "llvmpipe (LLVM 15.0.6, 256 bits)"
 };
 
-struct Colour { float r, g, b; };
-// Distinct colours for bodies, repeating after ten.
-Colour palette(uint32_t i);
+struct Color { float r, g, b; };
+// Distinct colors for bodies, repeating after ten.
+Color palette(uint32_t i);
 // t is clamped to 0..1.
-Colour map_colour(ColourMap map, float t);
+Color map_color(ColourMap map, float t);
 
 // Through a temporary file and a rename, so that nobody reads half a picture. False: *why_not is one sentence.
 bool write_png(const std::string &path, const Image &picture, std::string *why_not);
 bool read_png(const std::string &path, Image &picture, std::string *why_not);
 
 // Text (ASCII; our own stroke font, anti-aliased). `size` is the height of a capital in pixels; x, y the left end of its base line.
-void draw_text(Image &picture, double x, double y, double size, const std::string &text, Colour colour);
+void draw_text(Image &picture, double x, double y, double size, const std::string &text, Color color);
 double text_width(double size, const std::string &text);
 
 // A bar of the map in the lower right corner with its ends, e.g. legend(p, ColourMap::ember, 0, 1.5, "speed", "m/s").

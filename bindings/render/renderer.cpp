@@ -42,7 +42,7 @@ struct Batch {
   double depth = 0;  // of its middle, for the order of what is seen through
 };
 
-struct Ground { Vec centre, x, y; double spacing, radius; bool present = false; };
+struct Ground { Vec center, x, y; double spacing, radius; bool present = false; };
 
 struct Frame {
   Shape shape;
@@ -50,7 +50,7 @@ struct Frame {
   Ground ground;
   View view;
   Vec up, key;
-  Vec centre;         // of the casters, relative to the origin
+  Vec center;         // of the casters, relative to the origin
   double radius = 1;  // of the casters
   double extent = 1;  // half the diagonal of what grid and slabs are sized to
 };
@@ -108,7 +108,7 @@ void add_planes(const Scene &scene, Frame &frame, const Bounds &extent) {
     }
     batch(frame, solid(p.look), [&] {
       const Slab s = slab_of(p, frame.up, room);
-      frame.shape.box(s.centre, s.axes, p.look.rgb);
+      frame.shape.box(s.center, s.axes, p.look.rgb);
     });
   }
   if (!floor) return;
@@ -124,12 +124,12 @@ void add_planes(const Scene &scene, Frame &frame, const Bounds &extent) {
   const double two = 2 * g.spacing;
   const auto beyond = [&](const Vec &axis) { return axis * (dot(foot, axis) - two * std::round(dot(foot, axis) / two)); };
   const Vec snapped = foot - beyond(g.x) - beyond(g.y);
-  g.centre = snapped - frame.shape.origin;
+  g.center = snapped - frame.shape.origin;
   Batch b;
   b.kind = Kind::floor;
   b.shadow = false;
   b.alpha = floor->look.alpha;
-  // Looks of obstacles are grey by default; a floor is lighter, so that shadows have room to fall.
+  // Looks of obstacles are gray by default; a floor is lighter, so that shadows have room to fall.
   const bool own = !std::equal(floor->look.rgb, floor->look.rgb + 3, Look{}.rgb);
   const float light[3] = {0.90f, 0.905f, 0.915f};
   batch(frame, b, [&] {
@@ -156,7 +156,7 @@ void fit_casters(Frame &frame, const Bounds &box) {
         all.add(p);
       }
   if (all.empty()) return;
-  frame.centre = (vec(all.lo) + vec(all.hi)) * 0.5;
+  frame.center = (vec(all.lo) + vec(all.hi)) * 0.5;
   frame.radius = std::max(0.5 * norm(vec(all.hi) - vec(all.lo)), 1e-9);
 }
 
@@ -238,7 +238,7 @@ class GlRenderer final : public Renderer {
   void use(GLuint program) { current_ = program; gl_.UseProgram(program); }
   void upload(const Frame &frame, ColourMap map);
   void draw_shadows(const Frame &frame, const Mat4 &key, const std::array<Mat4, kSkyLights> &sky);
-  void draw_colours(const Frame &frame, const Mat4 &key, const std::array<Mat4, kSkyLights> &sky,
+  void draw_colors(const Frame &frame, const Mat4 &key, const std::array<Mat4, kSkyLights> &sky,
                     const std::array<Vec, kSkyLights> &directions);
   void read(Image &picture);
 
@@ -282,7 +282,7 @@ GLuint GlRenderer::program(const char *vertex, const char *fragment, std::string
     gl_.DeleteShader(s);
     if (!ok) return 0;
   }
-  const char *names[] = {"position", "normal", "colour", "value"};
+  const char *names[] = {"position", "normal", "color", "value"};
   for (GLuint i = 0; i < 4; ++i) gl_.BindAttribLocation(p, i, names[i]);
   gl_.LinkProgram(p);
   GLint ok = 0;
@@ -386,7 +386,7 @@ void GlRenderer::upload(const Frame &frame, ColourMap map) {
   gl_.BufferData(GL_ARRAY_BUFFER, GLsizeiptr(frame.shape.vertices.size() * sizeof(Vertex)), frame.shape.vertices.data(), GL_STREAM_DRAW);
   uint8_t table[257][4];  // an odd number: a map may have its kink in the middle
   for (int i = 0; i < 257; ++i) {
-    const Colour c = map_colour(map, float(i) / 256);
+    const Color c = map_color(map, float(i) / 256);
     const float rgb[3] = {c.r, c.g, c.b};
     for (int k = 0; k < 3; ++k) table[i][k] = uint8_t(std::lround(255 * rgb[k]));
     table[i][3] = 255;
@@ -424,7 +424,7 @@ void GlRenderer::draw_shadows(const Frame &frame, const Mat4 &key, const std::ar
   gl_.Disable(GL_POLYGON_OFFSET_FILL);
 }
 
-void GlRenderer::draw_colours(const Frame &frame, const Mat4 &key, const std::array<Mat4, kSkyLights> &sky,
+void GlRenderer::draw_colors(const Frame &frame, const Mat4 &key, const std::array<Mat4, kSkyLights> &sky,
                               const std::array<Vec, kSkyLights> &directions) {
   gl_.BindFramebuffer(GL_FRAMEBUFFER, sampled_target_);
   gl_.Viewport(0, 0, GLsizei(width_), GLsizei(height_));
@@ -435,7 +435,7 @@ void GlRenderer::draw_colours(const Frame &frame, const Mat4 &key, const std::ar
   gl_.DrawArrays(GL_TRIANGLES, 0, 3);
 
   use(main_);
-  const double distance = norm(frame.view.eye - frame.centre);
+  const double distance = norm(frame.view.eye - frame.center);
   const double near = std::max(distance - 1.8 * frame.radius - frame.extent, 0.02 * distance + 1e-9);
   const double far = distance + frame.radius + (frame.ground.present ? 2 * frame.ground.radius : 0) + 4 * frame.extent;
   set("to_clip", perspective(frame.view, double(width_) / height_, near, far));
@@ -445,7 +445,7 @@ void GlRenderer::draw_colours(const Frame &frame, const Mat4 &key, const std::ar
   set("key_map", to_texture(key));
   set("key_texel", 2 * frame.radius / kKeySide);
   set("sky_texel", 2 * frame.radius / kSkySide);
-  set("casters", frame.centre);
+  set("casters", frame.center);
   set("casters_radius", frame.radius);
   double open = 0;
   for (int i = 0; i < kSkyLights; ++i) {
@@ -457,7 +457,7 @@ void GlRenderer::draw_colours(const Frame &frame, const Mat4 &key, const std::ar
     open += dot(directions[size_t(i)], frame.up);
   }
   set("sky_scale", 1 / open);
-  set("floor_centre", frame.ground.centre);
+  set("floor_center", frame.ground.center);
   set("floor_x", frame.ground.x);
   set("floor_y", frame.ground.y);
   gl_.Uniform2f(gl_.GetUniformLocation(current_, "floor_size"), float(frame.ground.spacing), float(frame.ground.radius));
@@ -504,14 +504,14 @@ bool GlRenderer::draw(const Scene &scene, Image &picture, std::string *why_not) 
     const FloatingPoint keep;
     const Frame frame = compose(scene, double(width_) / height_, height_);
     const std::array<Vec, kSkyLights> directions = sky_directions(frame.up);
-    const Mat4 key = orthographic(frame.key, frame.centre, 1.02 * frame.radius);
+    const Mat4 key = orthographic(frame.key, frame.center, 1.02 * frame.radius);
     std::array<Mat4, kSkyLights> sky;
-    for (size_t i = 0; i < sky.size(); ++i) sky[i] = orthographic(directions[i], frame.centre, 1.02 * frame.radius);
+    for (size_t i = 0; i < sky.size(); ++i) sky[i] = orthographic(directions[i], frame.center, 1.02 * frame.radius);
     Current current(*context_);
     if (current.ok) {
       upload(frame, scene.map);
       draw_shadows(frame, key, sky);
-      draw_colours(frame, key, sky, directions);
+      draw_colors(frame, key, sky, directions);
       read(picture);
       const GLenum error = gl_.GetError();
       if (error == GL_NO_ERROR) return true;

@@ -7,7 +7,7 @@ namespace render {
 const char *const kVertexShader = R"(#version 330 core
 in vec3 position;
 in vec3 normal;
-in vec3 colour;
+in vec3 color;
 in vec2 value;
 uniform mat4 to_clip;
 centroid out vec3 p;
@@ -18,7 +18,7 @@ centroid out vec3 corner;
 void main() {
   p = position;
   n = normal;
-  rgb = colour;
+  rgb = color;
   scalar = value;
   int k = gl_VertexID % 3;
   corner = vec3(k == 0, k == 1, k == 2);
@@ -30,25 +30,25 @@ const char *const kFragmentShader = R"(#version 330 core
 const int SKY = 48;
 centroid in vec3 p;
 centroid in vec3 n;
-flat in vec3 rgb;     // one colour a body: interpolation over triangles seen edge-on would round it
+flat in vec3 rgb;     // one color a body: interpolation over triangles seen edge-on would round it
 centroid in vec2 scalar;
 centroid in vec3 corner;
-uniform int kind;            // 0 lit, 1 floor, 2 plain colour
+uniform int kind;            // 0 lit, 1 floor, 2 plain color
 uniform int edges;
-uniform float fade;          // values below it run out into the plain colour
+uniform float fade;          // values below it run out into the plain color
 uniform float alpha;
 uniform vec3 eye;
 uniform vec3 up;
-uniform vec3 key;            // towards the key light
+uniform vec3 key;            // toward the key light
 uniform mat4 key_map;
 uniform float key_texel;     // of the map, in lengths of the scene
 uniform mat4 sky_map[SKY];
-uniform vec3 sky[SKY];       // towards that piece of sky
+uniform vec3 sky[SKY];       // toward that piece of sky
 uniform float sky_texel;
-uniform vec3 casters;        // centre of what casts shadows
+uniform vec3 casters;        // center of what casts shadows
 uniform float casters_radius;
 uniform float sky_scale;     // makes open level ground receive 1
-uniform vec3 floor_centre;
+uniform vec3 floor_center;
 uniform vec3 floor_x;
 uniform vec3 floor_y;
 uniform vec2 floor_size;     // grid spacing, radius where it has faded
@@ -63,7 +63,7 @@ vec3 encoded(vec3 c) {
   return mix(c * 12.92, 1.055 * pow(c, vec3(1.0 / 2.4)) - 0.055, step(0.0031308, c));
 }
 
-// Sixteen points of a sunflower, each compared with its four neighbours by the sampler.
+// Sixteen points of a sunflower, each compared with its four neighbors by the sampler.
 float key_light(vec3 nn) {
   vec3 q = (key_map * vec4(p + nn * (2.5 * key_texel), 1.0)).xyz;
   float depth = min(q.z - 0.0005, 1.0), lit = 0.0;
@@ -103,8 +103,8 @@ void main() {
   vec3 base = linear(mix(rgb, texture(map, vec2(value * 256.0 / 257.0 + 0.5 / 257.0, 0.5)).rgb, valued));
   float a = alpha, gloss = 0.16;
   if (kind == 1) {
-    vec2 x = vec2(dot(p - floor_centre, floor_x), dot(p - floor_centre, floor_y)) / floor_size.x;
-    float far = length(p - floor_centre) / floor_size.y, plain = clamp(1.6 - 4.0 * max(fwidth(x.x), fwidth(x.y)), 0.0, 1.0);
+    vec2 x = vec2(dot(p - floor_center, floor_x), dot(p - floor_center, floor_y)) / floor_size.x;
+    float far = length(p - floor_center) / floor_size.y, plain = clamp(1.6 - 4.0 * max(fwidth(x.x), fwidth(x.y)), 0.0, 1.0);
     float odd = mod(floor(x.x) + floor(x.y), 2.0);
     base *= 1.0 - 0.035 * odd * plain - 0.09 * lines_of(x, 1.2);
     a *= 1.0 - smoothstep(0.12, 1.0, far);

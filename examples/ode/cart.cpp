@@ -35,7 +35,7 @@ struct OdeWorld {
     dMassSetBoxTotal(&m, mass, size[0], size[1], size[2]);
     return body(dCreateBox(space, size[0], size[1], size[2]), m, at);
   }
-  // Along y; length: between the centres of its caps.
+  // Along y; length: between the centers of its caps.
   dBodyID capsule(double mass, double radius, double length, Vec3 at) const {
     dMass m;
     dMassSetCapsuleTotal(&m, mass, 3, radius, length);

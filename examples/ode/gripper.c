@@ -102,7 +102,7 @@ int main(void) {
   if (run(ode, 2)) return 1;                                         /* hold */
   const double slip = fabs(above_palm(&g, ball) - before) / 2;
   TRY(dfm_body_get_measure(ball, &m));
-  printf("the ball of %.3f kg is %.3f m above the floor and slips by %.3f micrometres per second\n", m.mass, m.com[2], 1e6 * slip);
+  printf("the ball of %.3f kg is %.3f m above the floor and slips by %.3f micrometers per second\n", m.mass, m.com[2], 1e6 * slip);
 
   TRY(dfm_ode_detach(ode));                                          /* before either world goes */
   dfm_context_destroy(context);

@@ -18,7 +18,7 @@ constexpr uint32_t kLanes = 8;
 
 // A pass over a block. Columns overlap nowhere, so each lane is on its own; the compiler cannot see that and is told.
 #ifdef __clang__
-#pragma clang diagnostic ignored "-Wpass-failed"   // a build that does not optimise uses no vectors, and that is no fault
+#pragma clang diagnostic ignored "-Wpass-failed"   // a build that does not optimize uses no vectors, and that is no fault
 #define EACH_LANE(i) _Pragma("clang loop vectorize(assume_safety) interleave(disable) unroll(disable)") for (uint32_t i = 0; i < lanes::kLanes; ++i)
 #elif defined(__GNUC__)
 #define EACH_LANE(i) _Pragma("GCC ivdep") for (uint32_t i = 0; i < lanes::kLanes; ++i)

@@ -1,4 +1,4 @@
-// Generalised Maxwell-slip friction: one to sixteen elements in parallel, each a spring k_i that slips at its share nu_i of the Stribeck level. Together they
+// Generalized Maxwell-slip friction: one to sixteen elements in parallel, each a spring k_i that slips at its share nu_i of the Stribeck level. Together they
 // keep a nonlocal memory: an inner loop closes where it began (return points), which no law with one bristle does. Al-Bender, Lampaert, Swevers 2005, (6)-(8).
 //
 //   stuck     df/dt = k v                                until |f| = nu g(w)
@@ -253,7 +253,7 @@ constexpr dfm_friction make() {
 
 const dfm_friction law = make();
 const char *const effects[] = {"stiction", "stribeck", "viscous", "presliding", "hysteresis", "breakaway", nullptr};
-const dfm_type gms = dfm::plugin::type(DFM_KIND_FRICTION, "org.deform.gms", "Generalised Maxwell-slip friction: up to 16 elements, nonlocal memory", "0.1.0", "MIT",
+const dfm_type gms = dfm::plugin::type(DFM_KIND_FRICTION, "org.deform.gms", "Generalized Maxwell-slip friction: up to 16 elements, nonlocal memory", "0.1.0", "MIT",
                                        "Al-Bender, Lampaert, Swevers 2005, (6)-(8); vector form by radial returns, its rise at a crawl paid for", kRows, effects, &law);
 
 }  // namespace

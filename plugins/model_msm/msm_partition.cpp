@@ -1,6 +1,6 @@
 // Order of the points: recursive bisection of the rest shape across its longest side. Every range of the order is a compact
 // piece of the body, so a block of consecutive points fits the first-level cache together with its halo whatever the size of
-// the body, and neighbours lie close to each other within it. Depends on rest positions and point numbers alone.
+// the body, and neighbors lie close to each other within it. Depends on rest positions and point numbers alone.
 #include <algorithm>
 
 #include "msm_body.h"

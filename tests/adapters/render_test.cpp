@@ -116,7 +116,7 @@ TEST_P(Pixels, RedBallOnFloor_IsRedInTheMiddleOnTheBackground) {
     EXPECT_GT(brightness(pixel(with, x, 0)), 600);
     for (int k = 0; k < 3; ++k) EXPECT_EQ(pixel(with, x, 0)[k], pixel(without, x, 0)[k]);
   }
-  EXPECT_GT(pixel(with, 0, 0)[2], pixel(with, 0, 0)[0]) << "the background's top is blue-grey";
+  EXPECT_GT(pixel(with, 0, 0)[2], pixel(with, 0, 0)[0]) << "the background's top is blue-gray";
   const auto at = [&](int dx, int dy) { return brightness(pixel(with, uint32_t(int(kWide) / 2 + dx), uint32_t(int(kHigh) / 2 + dy))); };
   EXPECT_GT(at(0, -20), at(0, 20) + 60) << "lit from above";
   EXPECT_GT(at(-20, 0), at(20, 0) + 30) << "and from the left";
@@ -164,7 +164,7 @@ TEST_P(Pixels, Scalars_TakeTheColoursOfTheMap) {
   const Ball ball(0, 0, 1, 1);
   for (const ColourMap map : {ColourMap::ember, ColourMap::lagoon, ColourMap::balance})
     for (const float t : {0.f, 0.5f, 1.f}) {
-      const Colour c = map_colour(map, t);
+      const Color c = map_color(map, t);
       const std::vector<float> values(ball.xyz.size() / 3, t);
       Scene mapped = scene_of({ball.surface(0, 1, 0)});
       mapped.surfaces[0].scalar = values.data();
@@ -238,7 +238,7 @@ TEST_P(Pixels, SameScene_GivesTheSameBytesAndKeepsTheHostsRounding) {
 }
 
 TEST_P(Pixels, SceneFarFromTheOrigin_LooksTheSame) {
-  const double away = 4e6;  // single precision alone would be off by half a metre
+  const double away = 4e6;  // single precision alone would be off by half a meter
   const Ball here(0, 0, 1, 1), there(away, 0, 1, 1);
   Scene s = scene_of({there.surface(0.9f, 0.1f, 0.1f)});
   s.camera->eye[0] += away, s.camera->look_at[0] += away;
@@ -395,29 +395,29 @@ TEST(Camera, AutoCamera_HoldsTheBox) {
     }
 }
 
-TEST(Colours, Maps_GrowLighterSteadily) {
-  const auto lightness = [](Colour c) {  // CIE L*
+TEST(Colors, Maps_GrowLighterSteadily) {
+  const auto lightness = [](Color c) {  // CIE L*
     const auto linear = [](double x) { return x <= 0.04045 ? x / 12.92 : std::pow((x + 0.055) / 1.055, 2.4); };
     const double y = 0.2126 * linear(c.r) + 0.7152 * linear(c.g) + 0.0722 * linear(c.b);
     return y > 0.008856 ? 116 * std::cbrt(y) - 16 : 903.3 * y;
   };
   for (const ColourMap map : {ColourMap::ember, ColourMap::lagoon}) {
-    const double span = lightness(map_colour(map, 1)) - lightness(map_colour(map, 0));
+    const double span = lightness(map_color(map, 1)) - lightness(map_color(map, 0));
     EXPECT_GT(span, 60);
     for (int i = 0; i < 32; ++i) {
-      const double step = lightness(map_colour(map, float(i + 1) / 32)) - lightness(map_colour(map, float(i) / 32));
+      const double step = lightness(map_color(map, float(i + 1) / 32)) - lightness(map_color(map, float(i) / 32));
       EXPECT_GT(step, 0.3 * span / 32) << i;
       EXPECT_LT(step, 2.0 * span / 32) << i;
     }
   }
-  EXPECT_EQ(map_colour(ColourMap::ember, -3).r, map_colour(ColourMap::ember, 0).r);
-  EXPECT_EQ(map_colour(ColourMap::ember, 3).r, map_colour(ColourMap::ember, 1).r);
+  EXPECT_EQ(map_color(ColourMap::ember, -3).r, map_color(ColourMap::ember, 0).r);
+  EXPECT_EQ(map_color(ColourMap::ember, 3).r, map_color(ColourMap::ember, 1).r);
 }
 
-TEST(Colours, Palette_IsDistinct) {
+TEST(Colors, Palette_IsDistinct) {
   for (uint32_t i = 0; i < 10; ++i)
     for (uint32_t j = 0; j < i; ++j) {
-      const Colour a = palette(i), b = palette(j);
+      const Color a = palette(i), b = palette(j);
       EXPECT_GT(std::hypot(a.r - b.r, a.g - b.g, a.b - b.b), 0.12f) << i << ' ' << j;
     }
 }
@@ -480,14 +480,14 @@ TEST(Text, Words_FillTheirWidthAndAreCutAtTheBorder) {
 
 TEST(Montage, Grid_HoldsEveryPictureAndItsLabels) {
   const std::vector<std::vector<Image>> rows{{blank(60, 40, 10), blank(60, 40, 20)}, {blank(60, 40, 30)}};
-  const Image bare = montage(rows, {}, {}), labelled = montage(rows, {"with friction", "without"}, {"0 s", "1 s"}, "two cylinders");
-  for (const Image *m : {&bare, &labelled}) {
+  const Image bare = montage(rows, {}, {}), labeled = montage(rows, {"with friction", "without"}, {"0 s", "1 s"}, "two cylinders");
+  for (const Image *m : {&bare, &labeled}) {
     std::map<uint8_t, int> count;
     for (uint32_t i = 0; i < m->width * m->height; ++i) ++count[m->rgb[3 * i]];
-    for (const uint8_t grey : {10, 20, 30}) EXPECT_GE(count[grey], 60 * 40) << int(grey);
+    for (const uint8_t gray : {10, 20, 30}) EXPECT_GE(count[gray], 60 * 40) << int(gray);
   }
-  EXPECT_GT(labelled.width, bare.width);
-  EXPECT_GT(labelled.height, bare.height);
+  EXPECT_GT(labeled.width, bare.width);
+  EXPECT_GT(labeled.height, bare.height);
   EXPECT_TRUE(montage({}, {}, {}).rgb.empty());
 }
 
@@ -495,7 +495,7 @@ TEST(Legend, Bar_RunsFromEndToEndOfTheMap) {
   Image p = blank(1600, 900, 128);
   legend(p, ColourMap::ember, 0, 1.5, "speed", "m/s");
   const auto holds = [&](float t) {
-    const Colour c = map_colour(ColourMap::ember, t);
+    const Color c = map_color(ColourMap::ember, t);
     for (uint32_t i = 0; i < p.width * p.height; ++i) {
       const uint8_t *q = &p.rgb[3 * size_t(i)];
       if (std::abs(q[0] - 255 * c.r) + std::abs(q[1] - 255 * c.g) + std::abs(q[2] - 255 * c.b) < 3) return true;

@@ -27,7 +27,7 @@ struct Rig {
   dfm_body block;
   dfm_obstacle table = 0;
   double ground = 0;   // height of `table`, which is what lies undermost
-  Rig(Below below, double sigma0, double drag, std::array<double, 3> gravity, double mu = 10, bool centred = false) {
+  Rig(Below below, double sigma0, double drag, std::array<double, 3> gravity, double mu = 10, bool centered = false) {
     world = make_world(context, gravity);
     if (below == Below::plane) table = add_plane(world, "floor");
     if (below == Below::mesh) add_mesh(world, "floor", height_field(0.1, 23, [](double, double) { return 0.0; }));
@@ -41,9 +41,9 @@ struct Rig {
       ground = -0.03 - 2e-5;
       table = add_plane(world, "ground", {0, 0, ground});
       o.name = "plate", o.young = 5e5, o.damping_stiffness = 1e-3, o.damping_mass = drag;
-      const std::array<double, 3> size = centred ? std::array<double, 3>{0.08, 0.08, 0.03} : std::array<double, 3>{0.14, 0.1, 0.03};
+      const std::array<double, 3> size = centered ? std::array<double, 3>{0.08, 0.08, 0.03} : std::array<double, 3>{0.14, 0.1, 0.03};
       o.position = {-0.5 * size[0], -0.5 * size[1], -0.03};
-      make_body(context, world, "beam", size, centred ? 60 : 200, o);
+      make_body(context, world, "beam", size, centered ? 60 : 200, o);
     }
     o.name = "block", o.young = 5e5, o.damping_stiffness = 1e-3, o.position = {-0.5 * kWide, -0.5 * kWide, 2e-5}, o.damping_mass = drag;
     block = make_body(context, world, "beam", {kWide, kWide, kTall}, 80, o);

@@ -24,7 +24,7 @@ Totals totals(std::initializer_list<dfm_body> bodies) {
 
 namespace {
 
-// A turning cube hits a softer ball off its centre; they part again.
+// A turning cube hits a softer ball off its center; they part again.
 struct Crash {
   test::Context context;
   dfm_world world = 0;

@@ -113,7 +113,7 @@ TEST(Report, ContactsOfAPair_SumToItsForces) {
       }
       double com[3];
       const dfm_body_measure m = test::measure(pair.a == s.cube ? s.cube : s.ball);
-      // pair.moment is about the centre as it was at the start of the last sub-step, when the contact points were there
+      // pair.moment is about the center as it was at the start of the last sub-step, when the contact points were there
       for (int i = 0; i < 3; ++i) com[i] = m.com[i] - 1e-3 / test::stats(s.world).last_substeps * m.velocity[i];
       const Wrench about = wrench(s.world, pair.a, pair.b, com);
       for (int i = 0; i < 3; ++i) EXPECT_NEAR(about.moment[i], pair.moment[i], near);

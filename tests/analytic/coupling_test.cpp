@@ -157,7 +157,7 @@ TEST(Coupled, Queries_SpeakOfTheSurfaceGiven) {
     EXPECT_NEAR(at[0], std::cos(1.0) * p[0] - std::sin(1.0) * p[1], 1e-14);
     EXPECT_NEAR(at[1], std::sin(1.0) * p[0] + std::cos(1.0) * p[1], 1e-14);
     EXPECT_NEAR(at[2], p[2], 1e-14);
-    EXPECT_NEAR(v[i], 1 - 2 * at[1], 1e-13) << "rotation about the centre of mass, which is the ball's to rounding";
+    EXPECT_NEAR(v[i], 1 - 2 * at[1], 1e-13) << "rotation about the center of mass, which is the ball's to rounding";
     EXPECT_NEAR(v[i + 1], 2 * at[0], 1e-13);
     EXPECT_GT((normal[i] * at[0] + normal[i + 1] * at[1] + normal[i + 2] * at[2]) / norm(at), 0.99);
   }
@@ -188,7 +188,7 @@ TEST(Coupled, Impulse_AtASurfelGivesItsMomentumAndTurnsTheBody) {
     for (int k = 0; k < 3; ++k) EXPECT_NEAR(m.momentum[k], impulse[k], 1e-15);
     for (int k = 0; k < 3; ++k) {
       const int i = (k + 1) % 3, j = (k + 2) % 3;
-      EXPECT_NEAR(m.angular[k], -(com[i] * impulse[j] - com[j] * impulse[i]), 1e-14 * 0.4) << "to the rounding of the centre of mass, 0.5 m from zero";
+      EXPECT_NEAR(m.angular[k], -(com[i] * impulse[j] - com[j] * impulse[i]), 1e-14 * 0.4) << "to the rounding of the center of mass, 0.5 m from zero";
     }
     // power: what the surfel's new velocity says of the work done is the kinetic energy, as for any linear map and its transpose
     const std::vector<double> x = test::surface_positions(b);

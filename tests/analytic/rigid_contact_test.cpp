@@ -22,14 +22,14 @@ struct Bed {
   Context c;
   dfm_world w;
   dfm_body bed;
-  Vec centre;
+  Vec center;
   double top;
   explicit Bed(Vec gravity = {}, double young = 5e4, uint32_t cells = 3)
-      : w(make_world(c, gravity)), bed(soft_bed(c, w, young, cells)), centre(vec(measure(bed).com)), top(top_of(bed)) {}
+      : w(make_world(c, gravity)), bed(soft_bed(c, w, young, cells)), center(vec(measure(bed).com)), top(top_of(bed)) {}
   dfm_rigid press(double mass, double gap, double velocity, double max) const {
-    dfm_joint_def j = joint(DFM_JOINT_SLIDER, 0, DFM_RIGID_WORLD, {centre[0], centre[1], top}, {0, 0, -1});
+    dfm_joint_def j = joint(DFM_JOINT_SLIDER, 0, DFM_RIGID_WORLD, {center[0], center[1], top}, {0, 0, -1});
     j.motor = 1, j.velocity = velocity, j.max = max;
-    return create(w, {box("press", {0.2, 0.2, 0.02}, mass, {centre[0], centre[1], top + 0.02 + gap})}, {j})[0];
+    return create(w, {box("press", {0.2, 0.2, 0.02}, mass, {center[0], center[1], top + 0.02 + gap})}, {j})[0];
   }
 };
 
@@ -82,7 +82,7 @@ TEST(RigidContact, BoxOnBed_IsCarriedByItsWeight) {
   for (int i = 0; i < 3; ++i) {
     const Bed on({0, 0, -9.81});
     const double mass = masses[i];
-    const dfm_rigid weight = create(on.w, {box("weight", {0.2, 0.2, 0.05}, mass, {on.centre[0], on.centre[1], on.top + 0.0501})})[0];
+    const dfm_rigid weight = create(on.w, {box("weight", {0.2, 0.2, 0.05}, mass, {on.center[0], on.center[1], on.top + 0.0501})})[0];
     run(on.w, 1.5, 1e-3);
     EXPECT_NEAR(mean_force(on.w, weight, 200), mass * 9.81, 1e-3 * mass * 9.81);
     EXPECT_LT(norm(vec(state(weight).velocity)), 1e-4);
@@ -146,7 +146,7 @@ TEST(RigidContact, MassRatios_Converge) {
     const double mass = 9 * ratio;   // of the bed's 9 kg
     const Bed on({0, 0, -20 / mass}, 1e5, 8);
     set_friction(on.w, 0.5);
-    dfm_rigid_def d = box("weight", {0.12, 0.12, 0.05}, mass, {on.centre[0], on.centre[1], on.top + 0.051});
+    dfm_rigid_def d = box("weight", {0.12, 0.12, 0.05}, mass, {on.center[0], on.center[1], on.top + 0.051});
     d.velocity[2] = -0.3 / std::sqrt(ratio), d.velocity[0] = 0.02 / std::sqrt(ratio);   // the same energy
     create(on.w, {d});
     double sweeps = 0;

@@ -192,7 +192,7 @@ TEST(Rigid, FixedJoint_MovesAsOneBody) {
   EXPECT_NEAR(angle, 3, 1e-5);
 }
 
-// Joints take no speed: about a hinge off its centre a body turns on as fast as it was, where projecting its velocity would take h w^2 / 2 per second.
+// Joints take no speed: about a hinge off its center a body turns on as fast as it was, where projecting its velocity would take h w^2 / 2 per second.
 TEST(Rigid, JointedBodies_KeepTheirSpeed) {
   test::Context c;
   const dfm_world w = test::make_world(c, {0, 0, 0});

@@ -65,10 +65,10 @@ TEST(CcdCommand, EveryRoot_WritesOneRowPerQuery) {
 TEST(CcdCommand, Summary_CountsAndComparesWithLabels) {
   std::string text = header();
   text.insert(text.find('\n'), ",hit,toi_hi");
-  const auto labelled = [](std::string row, const std::string &label) { return row.substr(0, row.find_first_of("\r\n")) + label + "\n"; };
+  const auto labeled = [](std::string row, const std::string &label) { return row.substr(0, row.find_first_of("\r\n")) + label + "\n"; };
   // The exact time of the second is said to be earlier than it is, the third is said to touch.
-  text += labelled(kFalls, ",1,0.25") + labelled(kCrosses, ",1,0.25") + labelled(kMisses, ",1,0.5");
-  const test::CommandResult table = test::deform({"ccd", file("labelled.csv", text)}), json = test::deform({"ccd", folder() + "/labelled.csv", "--json"});
+  text += labeled(kFalls, ",1,0.25") + labeled(kCrosses, ",1,0.25") + labeled(kMisses, ",1,0.5");
+  const test::CommandResult table = test::deform({"ccd", file("labeled.csv", text)}), json = test::deform({"ccd", folder() + "/labeled.csv", "--json"});
   ASSERT_EQ(table.exit_code, 0) << table.err;
   for (const char *word : {"conservative", "3 (2 point-triangle, 1 edge-edge)", "missed 1", "false alarms 0", "late 1"})
     EXPECT_NE(table.out.find(word), std::string::npos) << word << " in " << table.out;

@@ -27,7 +27,7 @@ Vec force(const dfm_contact &c) {
   return f;
 }
 
-// Two balls that meet off centre in free space, with spin so that friction acts.
+// Two balls that meet off center in free space, with spin so that friction acts.
 struct Impact {
   test::Context context;
   dfm_world world;
@@ -178,5 +178,5 @@ TEST(Report, OfABodyAtRest_CarriesItsWeight) {
   EXPECT_NEAR(floor_force, 2 * weight, 0.01 * weight);
   EXPECT_NEAR(between, -weight, 0.01 * weight) << "the upper one presses the lower one down";
   EXPECT_NEAR((test::measure(s.lower).contact_impulse[2] - before) / 0.5, weight, 0.01 * weight) << "net: carries itself";
-  EXPECT_NEAR(moment, weight * std::hypot(0.013, 0.007), 0.1 * weight * 0.015) << "the upper one stands off centre";
+  EXPECT_NEAR(moment, weight * std::hypot(0.013, 0.007), 0.1 * weight * 0.015) << "the upper one stands off center";
 }

@@ -54,7 +54,7 @@ struct Block {
     return (e[0][0] * (e[1][1] * e[2][2] - e[1][2] * e[2][1]) - e[0][1] * (e[1][0] * e[2][2] - e[1][2] * e[2][0]) +
             e[0][2] * (e[1][0] * e[2][1] - e[1][1] * e[2][0])) / 6;
   }
-  double centre_z(uint32_t t) const {
+  double center_z(uint32_t t) const {
     double z = 0;
     for (int k = 0; k < 4; ++k) z += def.points[size_t(3) * def.tets[size_t(4) * t + size_t(k)] + 2] / 4;
     return z;
@@ -65,7 +65,7 @@ struct Block {
 template <class T>
 std::vector<T> halves(const Block &b, T lower, T upper) {
   std::vector<T> out(b.info.ntet);
-  for (uint32_t t = 0; t < b.info.ntet; ++t) out[t] = b.centre_z(t) > 0.05 ? upper : lower;
+  for (uint32_t t = 0; t < b.info.ntet; ++t) out[t] = b.center_z(t) > 0.05 ? upper : lower;
   return out;
 }
 
@@ -140,8 +140,8 @@ TEST(Fields, DensityByCell_IsLumpedAndMovesTheCentre) {
   const dfm_body_measure m = test::measure(b.create());
   double mass = 0, moment = 0, volume = 0;
   for (uint32_t t = 0; t < b.info.ntet; ++t) {
-    const double part = b.volume(t) * (b.centre_z(t) > 0.05 ? 2000 : 500);
-    mass += part, moment += part * b.centre_z(t), volume += b.volume(t);
+    const double part = b.volume(t) * (b.center_z(t) > 0.05 ? 2000 : 500);
+    mass += part, moment += part * b.center_z(t), volume += b.volume(t);
   }
   EXPECT_NEAR(m.mass, mass, 1e-13);
   EXPECT_NEAR(m.rest_volume, volume, 1e-16);

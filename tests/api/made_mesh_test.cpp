@@ -61,7 +61,7 @@ TEST(MadeMesh, WhatDoesNotFit_IsRefusedWithItsPointer) {
       {R"({"make": "beam", "size": [0.1, 0.1, 0.1], "radius": 0.1})", "/bodies/0/mesh/radius", "beam"},
       {R"({"make": "ball", "radius": 0.1, "cells": 0})", "/bodies/0/mesh/cells", "whole number"},
       {R"({"make": "ball", "radius": 0.1, "cells": 10.5})", "/bodies/0/mesh/cells", "whole number"},
-      {R"({"make": "ball", "radius": 0.1, "colour": 1})", "/bodies/0/mesh", "colour"}};
+      {R"({"make": "ball", "radius": 0.1, "color": 1})", "/bodies/0/mesh", "color"}};
   for (const auto &c : cases) {
     const Outcome r = run(folder, c.mesh);
     EXPECT_EQ(r.result.exit_code, 2) << c.mesh;

@@ -251,7 +251,7 @@ TEST(Numbers, ThatAreHuge_AreRefusedWithASentenceOrTaken) {
   }
 }
 
-// Poses say "normalised on use": any length but zero, which is no rotation.
+// Poses say "normalized on use": any length but zero, which is no rotation.
 TEST(Numbers, QuaternionsOfAnyLength_AreNormalized) {
   Scene s;
   for (const double length : {1e-300, 1e-30, 3.0, 1e30, 1e300}) {

@@ -60,7 +60,7 @@ TEST(Ray, MeetsTheSphereFromOutsideAndInside) {
   const dfm_world w = test::make_world(c);
   add(w, DFM_SHAPE_SPHERE, {1, 2, 3});
   expect(ray(w, {1, 2, 10}, {0, 0, -1}), 6.8, {1, 2, 3.2}, {0, 0, 1}, "top");
-  expect(ray(w, {-1, 2.12, 3}, {1, 0, 0}), 2 - 0.16, {0.84, 2.12, 3}, {-0.8, 0.6, 0}, "off centre");
+  expect(ray(w, {-1, 2.12, 3}, {1, 0, 0}), 2 - 0.16, {0.84, 2.12, 3}, {-0.8, 0.6, 0}, "off center");
   expect(ray(w, {1, 2, 3}, {0, 1, 0}), 0.2, {1, 2.2, 3}, {0, 1, 0}, "from inside");
   expect_nothing(ray(w, {-1, 2.21, 3}, {1, 0, 0}), "past it");
   expect_nothing(ray(w, {1, 2, 2}, {0, 0, -1}), "behind");

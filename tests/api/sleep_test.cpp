@@ -55,7 +55,7 @@ double offset(dfm_world w) {   // d_c
   return std::stod(text.substr(text.find("contact_offset_m") + 18));
 }
 
-// A block that rests on the floor, another on top, and a third one a metre away.
+// A block that rests on the floor, another on top, and a third one a meter away.
 struct Rest {
   test::Context context;
   dfm_world world;

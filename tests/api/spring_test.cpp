@@ -41,7 +41,7 @@ struct Hung {
 
 }  // namespace
 
-// A body on a spring at its centre of mass swings as a point mass: x = A cos(w t), w = sqrt(k/m), and the scheme's own frequency differs by
+// A body on a spring at its center of mass swings as a point mass: x = A cos(w t), w = sqrt(k/m), and the scheme's own frequency differs by
 // (w h)^2 / 24 only.
 TEST(Spring, AtTheCentreOfMass_SwingsAsAPointMass) {
   Hung s;
@@ -140,7 +140,7 @@ TEST(Spring, ThatMakesNoSense_IsRefusedWithASentence) {
   EXPECT_EQ(dfm_body_set_spring_target(s.body, s.spring(1, 0, {}), to), DFM_E_ARG);
 }
 
-// From the scene file: by box (its points' centre of mass) and by a point inside a cell, to a place and along keyframes.
+// From the scene file: by box (its points' center of mass) and by a point inside a cell, to a place and along keyframes.
 TEST(Spring, OfASceneFile_PullsWhereItSays) {
   const std::string folder = test::scratch("spring_scene");
   ASSERT_EQ(test::deform({"mesh", "make", "beam", "--size", "0.1", "0.1", "0.1", "--cells", "60", "--out", folder + "/cube.msh"}).exit_code, 0);

@@ -65,7 +65,7 @@ TEST(Untangle, TwoBallsAtAnyDistance_ComeApartWithoutSpeed) {
     EXPECT_EQ(left(w), 0u) << apart;
     const dfm_body_measure ma = test::measure(a), mb = test::measure(b);
     EXPECT_LT(distance(ma, mb), 0.205) << apart;
-    for (int k = 0; k < 3; ++k)   // their common centre stays
+    for (int k = 0; k < 3; ++k)   // their common center stays
       EXPECT_NEAR(ma.com[k] + mb.com[k], (k == 0 ? 0.6 : k == 1 ? 0.8 : 0) * apart, 1e-4) << apart;
     uint32_t trouble = 0;
     test::ok(dfm_world_step(w, 1e-3, &trouble));

@@ -3,7 +3,7 @@
 //
 //   twist   x turns about z by z / R radians            poke   a bump of 0.2 R, exp(-d2 / (0.35 R)2) around one pole
 //
-// and the surface is compared with the same motion of its own points: distance, and roughness: how much the angle between neighbouring
+// and the surface is compared with the same motion of its own points: distance, and roughness: how much the angle between neighboring
 // triangles differs. Forces: torque and power that arrive at the phyxels, by the transpose and by the source's own rule (3.12), whose kernel is
 // the truncated Gaussian (3.10). Tip: a bar of mass-springs, clamped, its end pulled down through the surface. Prints a table; with a folder as
 // argument writes coupling_study.csv and coupling_profile.csv there (coupling_study.py draws them).
@@ -84,7 +84,7 @@ Match compare(const Study &k, const Surface &s, Vec3 (*motion)(Vec3)) {
 
 struct Loss { double torque = 0, power = 0; };   // share that does not arrive
 
-// Forces of a twist about z, 1 N per metre from the axis; velocities: the twist's own.
+// Forces of a twist about z, 1 N per meter from the axis; velocities: the twist's own.
 Loss loss(const Study &k, const Surface &s, const std::vector<Vec3> &arrives) {
   const auto turning = [](Vec3 x) { return (x.z / kRadius) * cross({0, 0, 1}, x); };
   double torque_in = 0, torque_out = 0, power_in = 0, power_out = 0;

@@ -28,7 +28,7 @@ def main(folder, out):
     for (name, support), points in lines.items():
         color, dash = STYLE[name]
         left.plot(*zip(*sorted(points)), color=color, linestyle=dash or DASH[support], label=label(name, support), linewidth=2.5 if name == "exact" else 1.2)
-    left.set(xlim=(-90, 90), xlabel="angle from the pole that is poked, degrees", ylabel="distance from the centre / R", title="a bump of 0.2 R on the ball")
+    left.set(xlim=(-90, 90), xlabel="angle from the pole that is poked, degrees", ylabel="distance from the center / R", title="a bump of 0.2 R on the ball")
     left.legend(fontsize=7, ncol=4, loc=(0.04, 0.22))
 
     names = [label(r["coupling"], float(r["support"])) for r in study]

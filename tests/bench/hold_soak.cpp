@@ -1,5 +1,5 @@
 // The hold bound, in full: scenes of support/hold.h for all laws, steps and meshes, one row of a table each. Rows that the table has are left alone, so
-// that the run may be stopped and taken up again. Exits with 1 where something that should hold crept by more than a micrometre per second, or what
+// that the run may be stopped and taken up again. Exits with 1 where something that should hold crept by more than a micrometer per second, or what
 // drifts by its law does so at more than 1.25 times the rate of its formula.
 //
 //   hold_soak TABLE.csv [--only TEXT] [--seconds N]     rows whose name contains TEXT; begins no row after N seconds

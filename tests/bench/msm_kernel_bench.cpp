@@ -42,7 +42,7 @@ void through_abi(benchmark::State &state, const char *isa, const Params &p, bool
 
 // Flat arrays for the plain kernels, points in the plugin's order so that both see the same locality.
 struct Flat {
-  std::vector<uint32_t> order, i, j, begin, neighbour;
+  std::vector<uint32_t> order, i, j, begin, neighbor;
   std::vector<double> storage;
   double *stiffness, *rest, *row_stiffness, *row_rest, *x[3], *v[3], *f;  // x, v: padded, packed, split
   uint32_t npoint;
@@ -84,13 +84,13 @@ struct Flat {
       const auto [a, b] = pairs[n];
       i.push_back(a), j.push_back(b), rest[n] = norm(where(b) - where(a)), stiffness[n] = n < size_t(springs()) ? 10 : 0;
     }
-    neighbour.assign(nr, 0);
+    neighbor.assign(nr, 0);
     for (uint32_t n = 0; n < npoint; ++n)
       for (size_t k = 0; k < begin[n / 4 + 1] - begin[n / 4]; ++k) {
         const size_t to = 4 * (begin[n / 4] + k) + n % 4;
         const bool real = k < of[n].size();
-        neighbour[to] = real ? of[n][k] : of[n].empty() ? n : of[n][0];
-        row_stiffness[to] = real ? 10 : 0, row_rest[to] = real ? norm(where(neighbour[to]) - where(n)) : 0;
+        neighbor[to] = real ? of[n][k] : of[n].empty() ? n : of[n][0];
+        row_stiffness[to] = real ? 10 : 0, row_rest[to] = real ? norm(where(neighbor[to]) - where(n)) : 0;
       }
     std::mt19937 random(1);
     std::uniform_real_distribution<double> u(-1, 1);
@@ -100,7 +100,7 @@ struct Flat {
         x[0][4 * n + a] = x[1][3 * n + a] = x[2][a * npoint + n] = px;
         v[0][4 * n + a] = v[1][3 * n + a] = v[2][a * npoint + n] = pv;
       }
-    s = {npoint, uint32_t(ns), i.data(), j.data(), stiffness, rest, npoint / 4, 0, begin.data(), neighbour.data(),
+    s = {npoint, uint32_t(ns), i.data(), j.data(), stiffness, rest, npoint / 4, 0, begin.data(), neighbor.data(),
          row_stiffness, row_rest, 0.002};
   }
 };

@@ -99,14 +99,14 @@ struct Figures {
 };
 
 template <class Ask>   // double ask(query, evaluations &)
-Figures measure(const std::vector<ToiQuery> &queries, bool labelled, const Ask &ask_one) {
+Figures measure(const std::vector<ToiQuery> &queries, bool labeled, const Ask &ask_one) {
   Figures f;
   for (const ToiQuery &q : queries) {
     uint32_t evaluations = 0;
     const double t = ask_one(q, evaluations);
     const bool hit = t <= 1;
     f.hits += hit, f.evaluations += evaluations, f.most = std::max(f.most, evaluations);
-    if (!labelled) continue;
+    if (!labeled) continue;
     f.missed += q.hit && !hit, f.false_alarms += !q.hit && hit;
     if (q.hit && hit && t > q.latest) ++f.late, f.late_by = std::max(f.late_by, t - q.latest);
   }
@@ -122,19 +122,19 @@ Figures measure(const std::vector<ToiQuery> &queries, bool labelled, const Ask &
   return f;
 }
 
-void row(const Sink &sink, const char *set, const char *finder, size_t n, bool labelled, const Figures &f) {
+void row(const Sink &sink, const char *set, const char *finder, size_t n, bool labeled, const Figures &f) {
   std::printf("%-10s %-14s %6zu %6zu %9.2f %6u %6.0f", set, finder, n, f.hits, f.evaluations, f.most, f.ns);
-  if (labelled) std::printf(" %7zu %6zu %5zu %9.1e", f.missed, f.false_alarms, f.late, f.late_by);
+  if (labeled) std::printf(" %7zu %6zu %5zu %9.1e", f.missed, f.false_alarms, f.late, f.late_by);
   std::printf("\n");
   if (!sink.csv) return;
   std::fprintf(sink.csv, "%s,%s,%s,%zu,%zu,%.2f,%u,%.0f", sink.head.c_str(), set, finder, n, f.hits, f.evaluations, f.most, f.ns);
-  if (labelled) std::fprintf(sink.csv, ",%zu,%zu,%zu,%.2g\n", f.missed, f.false_alarms, f.late, f.late_by);
+  if (labeled) std::fprintf(sink.csv, ",%zu,%zu,%zu,%.2g\n", f.missed, f.false_alarms, f.late, f.late_by);
   else std::fprintf(sink.csv, ",,,,\n");
 }
 
-void queries(const Sink &sink, const char *set, const std::vector<ToiQuery> &all, bool labelled) {
+void queries(const Sink &sink, const char *set, const std::vector<ToiQuery> &all, bool labeled) {
   if (all.empty()) return;
-  row(sink, set, "source", all.size(), labelled, measure(all, labelled, source_scheme));
+  row(sink, set, "source", all.size(), labeled, measure(all, labeled, source_scheme));
   for (int method = 0; method < 4; ++method) {
     const dfm_toi_options options = {sizeof options, method, 0, 0, 0};
     const auto ours = [&](const ToiQuery &q, uint32_t &evaluations) {
@@ -144,7 +144,7 @@ void queries(const Sink &sink, const char *set, const std::vector<ToiQuery> &all
       evaluations = dfm_toi_evaluations();
       return t;
     };
-    row(sink, set, kFinderNames[method], all.size(), labelled, measure(all, labelled, ours));
+    row(sink, set, kFinderNames[method], all.size(), labeled, measure(all, labeled, ours));
   }
 }
 

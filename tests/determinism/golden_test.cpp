@@ -1,4 +1,4 @@
-// The hash of each scene is the same number for gcc and clang, with and without optimisation, on every processor: golden.csv holds it.
+// The hash of each scene is the same number for gcc and clang, with and without optimization, on every processor: golden.csv holds it.
 // A change of the method changes it: look at why, then write it anew with DEFORM_WRITE_GOLDEN=1.
 #include <cstdlib>
 

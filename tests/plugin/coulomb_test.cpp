@@ -262,7 +262,7 @@ TEST_F(Coulomb, EveryLane_IsTheSameAloneAndInAnyBatch) {
   for (int count : modes) EXPECT_GT(count, 20) << "the batch holds every case";
 }
 
-// Every compiler, optimisation level and vector width must give these bits (house rule; the inputs use + - * / alone as well).
+// Every compiler, optimization level and vector width must give these bits (house rule; the inputs use + - * / alone as well).
 TEST_F(Coulomb, Bits_MatchTheRecordedHash) {
   uint64_t seed = 88172645463325252ull, hash = 14695981039346656037ull;
   const auto uniform = [&] {

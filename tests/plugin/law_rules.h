@@ -329,7 +329,7 @@ inline double worst_balance(const Law &law, double z_max, int paths, bool runs, 
   return worst;
 }
 
-// Every compiler, optimisation level and vector width must give these bits; the inputs use + - * / alone as well.
+// Every compiler, optimization level and vector width must give these bits; the inputs use + - * / alone as well.
 inline uint64_t hash_of_bits(const Law &law, double z_max) {
   uint64_t seed = 88172645463325252ull, hash = 14695981039346656037ull;
   const auto uniform = [&] {

@@ -83,15 +83,15 @@ TEST(MsmForces, EnlargedCell_ContractsByTheVolumeTermAlone) {
   for (const Mesh &m : {regular_tet(), irregular_tet()})
     for (double size : {1.01, 0.99, -1.0}) {
       Instance both(host, m, {1.0, 0.25, 0, 0, 1e6}), springs(host, m, {1.0, 0.25, 0, 0, 0});
-      Vec centre{};
-      for (uint32_t i = 0; i < 4; ++i) centre = centre + 0.25 * m.at(i);
+      Vec center{};
+      for (uint32_t i = 0; i < 4; ++i) center = center + 0.25 * m.at(i);
       for (uint32_t i = 0; i < 4; ++i) {
-        const Vec x = centre + size * (m.at(i) - centre);  // -1: inverted, pushed through itself back to its volume
+        const Vec x = center + size * (m.at(i) - center);  // -1: inverted, pushed through itself back to its volume
         both.set(both.x, i, x), springs.set(springs.x, i, x);
       }
       both.forces(), springs.forces();
       for (uint32_t i = 0; i < 4; ++i) {
-        const double outward = dot(both.get(both.f, i), m.at(i) - centre);
+        const double outward = dot(both.get(both.f, i), m.at(i) - center);
         if (size > 1) EXPECT_LT(outward, 0);
         else EXPECT_GT(outward, 0);
         EXPECT_GT(norm(both.get(both.f, i)), 1e3 * norm(springs.get(springs.f, i)));
@@ -106,7 +106,7 @@ TEST(MsmForces, DamperAtUnitStretchRate_IsItsConstantWhateverTheLength) {
     for (double &x : m.rest) x *= length;
     m.finish();
     Instance b(host, m, {1000, 0.3, 0.25, 0, 0});
-    // Edge 0-1 stretches at 1 m/s. Points 2 and 3 move towards its middle and apart so that no other edge changes its length.
+    // Edge 0-1 stretches at 1 m/s. Points 2 and 3 move toward its middle and apart so that no other edge changes its length.
     const Vec middle = 0.5 * (m.at(0) + m.at(1));
     const Vec u2 = (1 / norm(m.at(2) - middle)) * (m.at(2) - middle), u3 = (1 / norm(m.at(3) - middle)) * (m.at(3) - middle);
     const double a = 0.5 * 0.5 / std::sqrt(0.75), co = dot(u2, u3), si = std::sqrt(1 - co * co), apart = a * (1 - co) / si;

@@ -32,7 +32,7 @@ Momentum momentum(const std::vector<Body> &bodies) {
   return sum;
 }
 
-// A ball meets a block off its centre. 100 to 400 cells, 258 to 1,538 surfels.
+// A ball meets a block off its center. 100 to 400 cells, 258 to 1,538 surfels.
 struct Pair {
   test::Context context;
   dfm_world world;

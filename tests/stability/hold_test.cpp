@@ -1,4 +1,4 @@
-// What friction alone holds stays: one block per law of the table that `make soak` makes. A micrometre per second is the bound for laws that promise
+// What friction alone holds stays: one block per law of the table that `make soak` makes. A micrometer per second is the bound for laws that promise
 // stiction; Dahl's and LuGre's laws hold a steady load and drift under vibration by their closed form.
 #include "hold.h"
 
@@ -43,7 +43,7 @@ TEST_P(Hold, PulledOnASoftBed_DoesNotCreep) {
   expect_held({"soft", GetParam(), GetParam() == std::string("gms") ? 0.5 : 0.9, 1.0 / 240, false});   // gms: its page, limits
 }
 
-// Of nearly redundant contacts some carry nothing, and which is chance. While the areas of their neighbours went by that, each turn took force off the patch
+// Of nearly redundant contacts some carry nothing, and which is chance. While the areas of their neighbors went by that, each turn took force off the patch
 // and shook the stack, which took the next turn: the top cube walked by 2e-6 to 5e-6 m/s without an end (doc/decisions/0054).
 TEST_P(Hold, StackOfThreeCubes_ComesToRest) { expect_at_rest({"stack", GetParam(), 3, 1e-3, false}); }
 

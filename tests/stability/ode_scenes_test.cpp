@@ -88,7 +88,7 @@ TEST(OdeGripper, LiftedBall_DoesNotSlip) {
     const size_t end = ball.size() - 1, start = end - 2;   // every half second
     ASSERT_NEAR(ball[end].t - ball[start].t, 1, 1e-6);
     const double slip = ball[end].com[2] - finger[end].com[2] - ball[start].com[2] + finger[start].com[2];
-    std::printf("  step %s s: %.3g micrometres per second\n", step, 1e6 * slip);
+    std::printf("  step %s s: %.3g micrometers per second\n", step, 1e6 * slip);
     EXPECT_LT(std::fabs(slip), 1e-7) << step;
     EXPECT_GT(ball[end].com[2], 0.25);
   }

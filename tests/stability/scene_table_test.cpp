@@ -1,4 +1,4 @@
-// Every shipped scene: its least contact count, ten jittered runs, and a mutation (contact off) that the judgement of its runs must not survive. What
+// Every shipped scene: its least contact count, ten jittered runs, and a mutation (contact off) that the judgment of its runs must not survive. What
 // else a scene is for, and the mutations of that (friction off, moduli swapped), stand in its own test beside this one.
 #include <fstream>
 #include <map>

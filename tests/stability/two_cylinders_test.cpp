@@ -28,7 +28,7 @@ TEST(TwoCylinders, WithoutFriction_UpperSlidesOffAndFalls) {
   EXPECT_FALSE(stays(run));
   const test::BodyRow upper = run.last("upper");
   EXPECT_LT(upper.com[2], 0.16) << "lies on the floor: its radius is 0.14 m";
-  EXPECT_LT(upper.com[1], -0.5) << "went over the side it was laid towards";
+  EXPECT_LT(upper.com[1], -0.5) << "went over the side it was laid toward";
 }
 
 // At 1.8 s the frictionless one has long left.

@@ -21,7 +21,7 @@ struct Result {
   int cycles = 0;
   uint64_t substeps = 0;
   std::vector<Sample> trace;   // every 5 ms
-  std::vector<double> speed;   // m/s, of the pad's centre of mass, every kStep
+  std::vector<double> speed;   // m/s, of the pad's center of mass, every kStep
 };
 
 inline void set_law(dfm_world w, const std::string &law) {

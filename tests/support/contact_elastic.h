@@ -14,7 +14,7 @@ using Vector = std::array<double, 3>;
 // The volume term that gives a Poisson ratio of 1/4 or more exactly (doc/models/msm.md).
 inline double volume_for(double nu) { return nu > 0.25 ? 3 * (4 * nu - 1) / (2 * (1 + nu)) : 0; }
 
-// A ball whose cells become finer towards its south pole, (1 + s)/(1 - s) times those of the plain one there and as much coarser at the other.
+// A ball whose cells become finer toward its south pole, (1 + s)/(1 - s) times those of the plain one there and as much coarser at the other.
 // The map is a Moebius map of the ball onto itself (Ahlfors 1981): it keeps angles, hence the shape of cells and the even directions of springs.
 // The poles are the middles of two faces of the generator's icosahedron, points of the mesh where 3 divides the layers: the lattice is regular
 // there. A corner, where five cones meet, is stiff along the axis and soft across it: depth -5 %, tangential shift +35 %.

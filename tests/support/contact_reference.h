@@ -53,7 +53,7 @@ struct Block {
   ~Block() { dfm_world_destroy(world); }
   dfm_body_measure now() const { return measure(body); }
   void mark() { std::copy_n(now().com, 3, start.begin()); }
-  double travelled() const { return now().com[0] - start[0]; }
+  double traveled() const { return now().com[0] - start[0]; }
   void push(double speed) { add_speed(body, speed); }
 };
 
@@ -66,8 +66,8 @@ inline Incline incline(double theta_deg, double mu) {
   const double v = b.now().velocity[0];
   run(b.world, 0.4, 1e-3);
   const double a = (b.now().velocity[0] - v) / 0.4;
-  if (std::fabs(b.travelled()) < 0.01) run(b.world, 0.5, 1e-3);   // it holds: watch it for the whole second
-  return {a, b.travelled()};
+  if (std::fabs(b.traveled()) < 0.01) run(b.world, 0.5, 1e-3);   // it holds: watch it for the whole second
+  return {a, b.traveled()};
 }
 
 // Pushed to v0 over a floor at rest, or held back to rest on a belt of that speed: time and way until both move as one.
@@ -89,7 +89,7 @@ inline Slide slide(double v0, double mu, bool belt) {
     }
     before = left;
   }
-  return {t, std::fabs((belt ? v0 * steps * h : 0) - b.travelled())};
+  return {t, std::fabs((belt ? v0 * steps * h : 0) - b.traveled())};
 }
 
 // Thrown across an incline: where it is and how fast at the given times.
@@ -144,7 +144,7 @@ inline void feet(dfm_body body, std::vector<uint32_t> *points, std::vector<doubl
     if (force[3 * s + 2] > 0) points->push_back(point[s]), shares->push_back(force[3 * s + 2] / sum);
 }
 
-// A mass on a belt, held by a spring to the ground. The spring pulls at the feet, each by its share of the load: pulled at its centre the
+// A mass on a belt, held by a spring to the ground. The spring pulls at the feet, each by its share of the load: pulled at its center the
 // block would lean, and the contacts that carry less would slip before the others, as those of a real block do.
 struct StickSlip { double period, x_max, x_min; int cycles; };
 inline StickSlip stick_slip(double m, double k, double f_s, double f_k, double belt, double h, double until, double dv, const char *law = "karnopp") {
@@ -166,11 +166,11 @@ inline StickSlip stick_slip(double m, double k, double f_s, double f_k, double b
   int tops = 0;
   bool rising = true;
   for (double t = 0; t < until; t += h) {
-    for (size_t i = 0; i < points.size(); ++i) force[3 * i] = -k * b.travelled() * weights[i];
+    for (size_t i = 0; i < points.size(); ++i) force[3 * i] = -k * b.traveled() * weights[i];
     if (load) ok(dfm_body_remove_load(b.body, load));
     ok(dfm_body_add_load(b.body, uint32_t(points.size()), points.data(), force.data(), 0, nullptr, nullptr, &load));
     run(b.world, h, h);
-    const double x = b.travelled();
+    const double x = b.traveled();
     if (rising && x > top) top = x, t_top = t;
     if (!rising && x < low) low = x;
     if (rising && x < top - enough) {

@@ -200,7 +200,7 @@ struct Scene {
   // A groove along y, its walls `slant` off the vertical.
   void groove(double slant) {
     for (const int side : {-1, 1}) {
-      const double half = 0.5 * side * (1.5707963267948966 - slant);   // the plane's normal, from z towards the middle
+      const double half = 0.5 * side * (1.5707963267948966 - slant);   // the plane's normal, from z toward the middle
       add_plane(world, side < 0 ? "left" : "right", {}, {0, -std::sin(half), 0, std::cos(half)});
     }
   }

@@ -14,7 +14,7 @@ namespace test {
 
 struct HookOptions : BodyOptions {
   double cell = 0.01, close = 0;   // m; m/s, speed at which each leg's tip moves to the other
-  double pinch = 0;                // N on each tip, towards the other
+  double pinch = 0;                // N on each tip, toward the other
   bool held = false;               // by its back
 };
 

@@ -58,10 +58,10 @@ inline dfm_body_measure rigid_measure(dfm_rigid r) {
 
 struct Momenta { Vec linear{}, angular{}; double size = 0; };   // angular: about the origin; size: sum of the bodies' own
 
-inline void add(Momenta &to, Vec momentum, Vec centre, Vec spin) {
+inline void add(Momenta &to, Vec momentum, Vec center, Vec spin) {
   for (size_t k = 0; k < 3; ++k) {
     const size_t i = (k + 1) % 3, j = (k + 2) % 3;
-    to.linear[k] += momentum[k], to.angular[k] += spin[k] + centre[i] * momentum[j] - centre[j] * momentum[i];
+    to.linear[k] += momentum[k], to.angular[k] += spin[k] + center[i] * momentum[j] - center[j] * momentum[i];
   }
   to.size += norm(momentum);
 }

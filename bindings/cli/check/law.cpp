@@ -184,7 +184,7 @@ Scales measure(const Law &law, double fn) {
 
 }  // namespace
 
-// The normal force is chosen for a presliding displacement near 10 micrometres, so that absolute bounds mean something for every stiffness.
+// The normal force is chosen for a presliding displacement near 10 micrometers, so that absolute bounds mean something for every stiffness.
 Scales scales_of(const Law &law) {
   Scales s = measure(law, 1);
   if (s.z > 0) s = measure(law, std::clamp(1e-5 / s.z, 1e-3, 1e6));

@@ -148,7 +148,7 @@ std::string split_equals_whole(const Subject &subject) {
         const uint32_t n = std::min(piece, whole.n - begin);
         Lanes part(law, n, piece == 9 ? 16 : 0);
         part.spoil_padding();                                                       // may be read, and must not matter
-        for (uint32_t k = 0; k < n; ++k) part.take(n - 1 - k, whole, begin + k);    // in reverse: neighbours change too
+        for (uint32_t k = 0; k < n; ++k) part.take(n - 1 - k, whole, begin + k);    // in reverse: neighbors change too
         part.must(h);
         for (uint32_t k = 0; k < n; ++k)
           if (!part.same(n - 1 - k, whole, begin + k))

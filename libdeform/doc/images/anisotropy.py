@@ -40,7 +40,7 @@ def last(out, name):
 
 def tubes(command, work, pictures):
     rows = {view: [] for view in VIEWS}
-    print(f"{'tube':24}{'force N':>10}{'centre wider mm':>18}{'ends higher mm':>18}{'of centre':>12}")
+    print(f"{'tube':24}{'force N':>10}{'center wider mm':>18}{'ends higher mm':>18}{'of center':>12}")
     for n, (name, settings) in enumerate(TUBES.items()):
         for view, (eye, look_at) in VIEWS.items():
             out = work / f"tube_{n}_{view.replace(' ', '_')}"

@@ -41,11 +41,11 @@ def run(case, law, step="1e-4", change=None):
 
 def rig(out):
     figure, axes = plt.subplots(3, len(LAWS), figsize=(13.5, 6.6), dpi=80, sharex="row", sharey="row")
-    for column, (law, colour) in enumerate(LAWS.items()):
+    for column, (law, color) in enumerate(LAWS.items()):
         below, gross = run("rig_below", law), run("rig", law)
-        axes[0, column].plot(below["t"], 1e6 * below["x"], color=colour, linewidth=1)
-        axes[1, column].plot(gross["t"], gross["v"], color=colour, linewidth=1)
-        axes[2, column].plot(gross["t"], gross["F"], color=colour, linewidth=1)
+        axes[0, column].plot(below["t"], 1e6 * below["x"], color=color, linewidth=1)
+        axes[1, column].plot(gross["t"], gross["v"], color=color, linewidth=1)
+        axes[2, column].plot(gross["t"], gross["F"], color=color, linewidth=1)
         axes[0, column].set_title(law, fontsize=10)
         axes[2, column].set_xlabel("time (s)")
     for row, label in enumerate(("below break-away:\ndisplacement (\u00b5m)", "sliding:\nvelocity (m/s)", "sliding:\nfriction force (N)")):
@@ -60,10 +60,10 @@ def rig(out):
 def breakaway(out):
     rates = [0.5, 1, 2, 5, 10, 20, 50, 100]
     figure, axis = plt.subplots(figsize=(6.2, 4.0), dpi=90)
-    for law, colour in LAWS.items():
+    for law, color in LAWS.items():
         rows = run("breakaway", law, change=lambda case: case["input"].update(rates=rates))
         line = "s--" if law == "karnopp" else "o-"  # it lies on coulomb
-        axis.semilogx(rows["rate"], rows["F_ba"], line, color=colour, markersize=4, linewidth=1.2, label=law)
+        axis.semilogx(rows["rate"], rows["F_ba"], line, color=color, markersize=4, linewidth=1.2, label=law)
     axis.axhline(1.0, color="#999999", linewidth=0.8, linestyle=":")
     axis.axhline(1.5, color="#999999", linewidth=0.8, linestyle=":")
     axis.text(0.75, 1.008, "F_C", fontsize=8, color="#777777")
@@ -103,10 +103,10 @@ def loops(out):
 
 def sliding(out):
     figure, axes = plt.subplots(1, len(LAWS), figsize=(13.5, 3.0), dpi=80, sharey=True)
-    for axis, (law, colour) in zip(axes, LAWS.items()):
+    for axis, (law, color) in zip(axes, LAWS.items()):
         rows = run("sliding_sine", law)
         second = rows["t"] >= 1
-        axis.plot(1e3 * rows["v"][second], rows["F"][second], color=colour, linewidth=1.1)
+        axis.plot(1e3 * rows["v"][second], rows["F"][second], color=color, linewidth=1.1)
         axis.set_title(law, fontsize=10)
         axis.set_xlabel("velocity (mm/s)")
         axis.grid(True, alpha=0.25)
@@ -118,9 +118,9 @@ def sliding(out):
 
 def pulled(out):
     figure, axes = plt.subplots(1, len(LAWS), figsize=(13.5, 3.0), dpi=80, sharey=True)
-    for axis, (law, colour) in zip(axes, LAWS.items()):
+    for axis, (law, color) in zip(axes, LAWS.items()):
         rows = run("pulled", law)
-        axis.plot(rows["t"], 2 * (0.1 * rows["t"] - rows["x"]), color=colour, linewidth=1.1)
+        axis.plot(rows["t"], 2 * (0.1 * rows["t"] - rows["x"]), color=color, linewidth=1.1)
         axis.set_title(law, fontsize=10)
         axis.set_xlabel("time (s)")
         axis.grid(True, alpha=0.25)

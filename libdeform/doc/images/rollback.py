@@ -17,7 +17,7 @@ import matplotlib.pyplot as plt
 
 ROOT = pathlib.Path(__file__).resolve().parents[3]
 SCENE = ROOT / "examples/scenes/rollback_compare.json"
-COLOURS = {"velocity": "#2f6db3", "rollback": "#c8553d"}
+COLORS = {"velocity": "#2f6db3", "rollback": "#c8553d"}
 TIMES = (0.1, 0.2, 0.4)  # s, of the frames
 
 
@@ -37,13 +37,13 @@ def main():
     plt.rcParams.update({"font.size": 9, "axes.spines.top": False, "axes.spines.right": False})
     figure, axes = plt.subplots(3, 3, figsize=(10.2, 8.6), dpi=100, gridspec_kw={"height_ratios": (1, 1, 0.85)})
     with tempfile.TemporaryDirectory() as folder:
-        for row, method in enumerate(COLOURS):
+        for row, method in enumerate(COLORS):
             series, frames = run(sys.argv[1], method, pathlib.Path(folder) / method)
             for axis, frame, t in zip(axes[row], frames, TIMES):
                 axis.imshow(frame)
                 axis.axis("off")
-                axis.set_title(f"{method}, t = {t} s", color=COLOURS[method], fontsize=9)
-            style = {"color": COLOURS[method], "label": method}
+                axis.set_title(f"{method}, t = {t} s", color=COLORS[method], fontsize=9)
+            style = {"color": COLORS[method], "label": method}
             thrown, ball, flying, struck = (series[n] for n in ("thrown", "bouncing", "flying", "struck"))
             axes[2][0].plot(thrown["t"], thrown["vel_x"], **style)
             axes[2][1].plot(ball["t"], ball["vel_x"], **style)

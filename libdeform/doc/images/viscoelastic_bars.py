@@ -75,16 +75,16 @@ def main():
 
     plt.rcParams.update({"font.size": 9, "axes.spines.top": False, "axes.spines.right": False})
     figure, axis = plt.subplots(figsize=(7.2, 4.0), dpi=130)
-    for (kind, name), colour in zip(KINDS.items(), ("#2f6db3", "#c8553d", "#3f8f5b")):
+    for (kind, name), color in zip(KINDS.items(), ("#2f6db3", "#c8553d", "#3f8f5b")):
         t, u = runs[kind]
         params = next(b for b in scene["bodies"] if b["name"] == kind)["model"]["params"]
         fine = np.linspace(0, t[-1], 1501)
         arguments = (modulus, gel["density"], gel["damping"]["mass"], gravity)
         error = np.max(np.abs(u - closed_form(kind, params, t, *arguments))) / rest
         print(f"{kind}: largest difference {100 * error:.2f} % of the stretch at rest")
-        axis.plot(fine, closed_form(kind, params, fine, *arguments) / rest, color=colour, lw=1.3, label=f"{name}, closed form")
-        axis.plot(fine, massless(kind, params, fine), color=colour, lw=0.8, ls=":")
-        axis.plot(t[::2], u[::2] / rest, "o", ms=3.2, mfc="white", mec=colour, label=f"{name}, bar of tetrahedra")
+        axis.plot(fine, closed_form(kind, params, fine, *arguments) / rest, color=color, lw=1.3, label=f"{name}, closed form")
+        axis.plot(fine, massless(kind, params, fine), color=color, lw=0.8, ls=":")
+        axis.plot(t[::2], u[::2] / rest, "o", ms=3.2, mfc="white", mec=color, label=f"{name}, bar of tetrahedra")
     axis.plot([], [], color="0.4", lw=0.8, ls=":", label="without mass")
     axis.set(xlabel="time since gravity began, s", ylabel="stretch over that of the springs at rest", xlim=(0, None), ylim=(0, None))
     axis.legend(frameon=False, fontsize=8, loc="upper left")

@@ -42,7 +42,7 @@ typedef struct dfm_body_def {
   const char *model;                /* short name or full id; NULL: "msm" */
   dfm_params model_params;
   dfm_pose pose;
-  double velocity[3], spin[3];      /* m/s of the centre of mass; rad/s about it */
+  double velocity[3], spin[3];      /* m/s of the center of mass; rad/s about it */
   const uint8_t *fixed;             /* [npoint] held components, bits 1 x, 2 y, 4 z; NULL: none */
   uint32_t category, collides_with; /* collision filter: a pair touches if (a.category & b.collides_with) and (b.category & a.collides_with) */
   void *user;
@@ -108,7 +108,7 @@ DFM_API dfm_status dfm_body_remove_load(dfm_body body, uint32_t load);
 typedef struct dfm_spring_def {
   uint32_t size, npoint;
   const uint32_t *points;      /* [npoint] */
-  const double *weights;       /* [npoint] >= 0, scaled to sum 1; NULL: by mass, so that it pulls at the centre of mass of these points */
+  const double *weights;       /* [npoint] >= 0, scaled to sum 1; NULL: by mass, so that it pulls at the center of mass of these points */
   double to[3];                /* m; counts where nkey is 0 */
   const dfm_vector_key *keys;  /* [nkey] m, times strictly rising: where it ends, over time; copied */
   uint32_t nkey, reserved;
@@ -136,7 +136,7 @@ DFM_API dfm_status dfm_body_wake(dfm_body body);
 /** Does the body sleep (dfm_world_def.sleep)? @param asleep out. Threads: Any thread. Not during step. Since 0.1. */
 DFM_API dfm_status dfm_body_is_asleep(dfm_body body, bool *asleep);
 
-/** Sums over the body, in SI units. angular: about the centre of mass. contact_impulse: total contact impulse on the body since it was
+/** Sums over the body, in SI units. angular: about the center of mass. contact_impulse: total contact impulse on the body since it was
  * created (N s): divide differences by the interval for a mean force. elastic is NAN if the model has no energy. */
 typedef struct dfm_body_measure {
   uint32_t size, inverted;

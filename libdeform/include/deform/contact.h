@@ -49,7 +49,7 @@ typedef struct dfm_pair_report {
   uint64_t a, b;
   double normal;                    /* N, sum of normal forces */
   double force[3], friction[3];     /* N, resultants on a: total, friction alone */
-  double moment[3];                 /* N m, of the total force on a about its centre of mass */
+  double moment[3];                 /* N m, of the total force on a about its center of mass */
   double slip_max;                  /* m/s */
   double friction_work;             /* J, done by friction on both sides since the pair first touched; <= 0 but for rounding */
 } dfm_pair_report;

@@ -5,7 +5,7 @@
 #ifdef __cplusplus
 extern "C" {
 #endif
-/** Rigid placement: x = rotation * X + position. Quaternion x, y, z, w; all zero reads as no rotation; normalised on use. */
+/** Rigid placement: x = rotation * X + position. Quaternion x, y, z, w; all zero reads as no rotation; normalized on use. */
 typedef struct dfm_pose { double position[3], rotation[4]; } dfm_pose;
 typedef struct dfm_aabb { double lo[3], hi[3]; } dfm_aabb;
 

@@ -67,7 +67,7 @@ DFM_API dfm_status dfm_mesh_read(dfm_context *context, const char *path, dfm_tet
 
 /** Reads a triangle surface: OBJ, PLY, STL, OFF, and the triangles of MSH, VTK, VTU and Medit files (where such a file has tetrahedra: their
  * boundary). Polygons are cut into triangles. Points at the same place are merged, triangles without area and doubles dropped, triangles
- * turned so that neighbours agree and closed pieces face outward; holes are counted, not closed. Each repair is one sentence of warnings.
+ * turned so that neighbors agree and closed pieces face outward; holes are counted, not closed. Each repair is one sentence of warnings.
  * @return as dfm_tetmesh_read. Threads: Any thread. Since 0.1. */
 DFM_API dfm_status dfm_trimesh_read(dfm_context *context, const char *path, dfm_trimesh *out);
 /** The same repair for triangles of the host: points [npoint,3] m, triangles [ntriangle,3]. Threads: Any thread. Since 0.1. */

@@ -16,7 +16,7 @@ typedef struct dfm_obstacle_def {
   dfm_pose pose;                    /* plane: through position, normal = rotation * (0,0,1) */
   double half_size[3];              /* box, m */
   double radius;                    /* sphere, capsule, m */
-  double half_length;               /* capsule: half of the axis between the centres of its caps, along local z, m */
+  double half_length;               /* capsule: half of the axis between the centers of its caps, along local z, m */
   uint32_t nkey, reserved;
   const dfm_pose_key *keys;         /* absolute poses over time, replace pose; copied */
   dfm_sine sine;                    /* offset on top */

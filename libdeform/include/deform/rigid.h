@@ -18,18 +18,18 @@ extern "C" {
 #define DFM_RIGID_STILL UINT32_MAX    /* a body's group: it feels nothing and never moves */
 enum { DFM_JOINT_HINGE = 0, DFM_JOINT_SLIDER = 1, DFM_JOINT_BALL = 2, DFM_JOINT_FIXED = 3 };
 
-/** What moves of one body, in the world's frame: centre of mass (m), from the axes of its moments of inertia to the world's (x y z w, unit), velocity of
- * the centre of mass (m/s), spin (rad/s). */
+/** What moves of one body, in the world's frame: center of mass (m), from the axes of its moments of inertia to the world's (x y z w, unit), velocity of
+ * the center of mass (m/s), spin (rad/s). */
 typedef struct dfm_rigid_state { double position[3], rotation[4], velocity[3], spin[3]; } dfm_rigid_state;
 
 typedef struct dfm_rigid_def {
-  uint32_t size, shape;               /* DFM_SHAPE_SPHERE, BOX or CAPSULE, centred at the pose, or NONE: dfm_rigid_add_shape gives it others */
+  uint32_t size, shape;               /* DFM_SHAPE_SPHERE, BOX or CAPSULE, centered at the pose, or NONE: dfm_rigid_add_shape gives it others */
   const char *name;                   /* unique in the world among bodies and obstacles too */
   dfm_pose pose;
   double half_size[3], radius, half_length;   /* as in dfm_obstacle_def, m */
   double mass;                        /* kg; > 0 unless fixed */
   double inertia[3];                  /* kg m2, principal moments about the body's own axes; all zero: solid of uniform density */
-  double velocity[3], spin[3];        /* m/s of the centre of mass, rad/s, world frame */
+  double velocity[3], spin[3];        /* m/s of the center of mass, rad/s, world frame */
   uint32_t fixed, category;
   uint32_t collides_with, reserved;
   dfm_material material;              /* for pair rules by material; 0: none */
@@ -84,12 +84,12 @@ typedef struct dfm_rigid_host {
    * @param nextra out, values of further state that the world keeps for this instance (motors, caches that must survive restore); they start at 0 */
   dfm_status (*create)(void *user, const dfm_rigid_set_def *set, void **self, uint32_t *group, uint32_t *nextra);
   void (*destroy)(void *self);
-  /** Mean velocity over the sub-step with everything but contact: [nbody,6] linear of the centre of mass, angular; world frame. */
+  /** Mean velocity over the sub-step with everything but contact: [nbody,6] linear of the center of mass, angular; world frame. */
   dfm_status (*predict)(void *self, const dfm_rigid_step *step, double *velocity);
   /** Change of that mean velocity per unit impulse: [6g,6g] row-major, symmetric, positive semidefinite; per body of the group, in rising order,
-   * linear at the centre of mass, then angular (1/kg, 1/(kg m2)). */
+   * linear at the center of mass, then angular (1/kg, 1/(kg m2)). */
   dfm_status (*respond)(void *self, const dfm_rigid_step *step, uint32_t group, double *matrix);
-  /** End of the sub-step. @param impulse [nbody,6] of contact: N s, and N m s about the centre of mass at the start
+  /** End of the sub-step. @param impulse [nbody,6] of contact: N s, and N m s about the center of mass at the start
    * @param state  out, [nbody]; @param extra out, [nextra]. Neither aliases *step. */
   dfm_status (*commit)(void *self, const dfm_rigid_step *step, const double *impulse, dfm_rigid_state *state, double *extra);
   /** Changes what extra must say for a motor; extra holds the start values when called right after create. May be NULL: no motors. */
@@ -122,7 +122,7 @@ DFM_API dfm_rigid_def dfm_rigid_def_default(void);
  * @return DFM_OK; DFM_E_ARG (which body or joint, why; nearest host); DFM_E_FATAL the host refuses (the sentence gives its reason); DFM_E_NOMEM.
  * Threads: Not during step. Since 0.1. */
 DFM_API dfm_status dfm_rigid_create(dfm_world world, const char *host, const dfm_rigid_set_def *set, dfm_rigid *out);
-/** A further shape of a body, at def->pose in the body's frame, whose origin is the centre of mass: any but a plane; no keys, no sine. It touches with
+/** A further shape of a body, at def->pose in the body's frame, whose origin is the center of mass: any but a plane; no keys, no sine. It touches with
  * the body's mass and moves with it; a dfm_obstacle with a name, material and filter of its own. dfm_obstacle_destroy removes it alone.
  * @return DFM_OK; DFM_E_ARG (which entry, why); DFM_E_HANDLE. Threads: Not during step. Since 0.1. */
 DFM_API dfm_status dfm_rigid_add_shape(dfm_rigid rigid, const dfm_obstacle_def *def, dfm_obstacle *out);
@@ -144,7 +144,7 @@ DFM_API dfm_status dfm_rigid_get_state(dfm_rigid rigid, dfm_rigid_state *out);
 DFM_API dfm_status dfm_rigid_set_state(dfm_rigid rigid, const dfm_rigid_state *state);
 /** Mass, momenta and energies as of a soft body: elastic 0, volume that of the shape. Threads: Any thread. Not during step. Since 0.1. */
 DFM_API dfm_status dfm_rigid_get_measure(dfm_rigid rigid, dfm_body_measure *out);
-/** Mean force (N) and moment about the centre of mass (N m) that contact put on it in the last sub-step. Threads: Any thread. Not during step. Since 0.1. */
+/** Mean force (N) and moment about the center of mass (N m) that contact put on it in the last sub-step. Threads: Any thread. Not during step. Since 0.1. */
 DFM_API dfm_status dfm_rigid_contact_wrench(dfm_rigid rigid, double force[3], double moment[3]);
 /** Motor of one of the set's joints, numbered as in its def; any body of the set names it. max 0: off.
  * @return DFM_E_ARG no such joint, or no hinge or slider; DFM_E_UNSUPPORTED the host has no motors. Threads: Not during step. Since 0.1. */

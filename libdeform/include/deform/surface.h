@@ -30,7 +30,7 @@ DFM_API dfm_status dfm_surface_triangles(dfm_body body, uint32_t capacity, uint3
 DFM_API dfm_status dfm_surface_points(dfm_body body, uint32_t capacity, uint32_t *point, uint32_t *n);
 
 typedef struct dfm_ray_hit { uint32_t size, triangle; dfm_body body; dfm_obstacle obstacle; double distance, point[3], normal[3]; } dfm_ray_hit;
-/** First surface a ray meets. @param direction need not be unit; distance is in metres. hit->body and hit->obstacle are both 0: nothing met.
+/** First surface a ray meets. @param direction need not be unit; distance is in meters. hit->body and hit->obstacle are both 0: nothing met.
  * Threads: Any thread. Not during step. Since 0.1. */
 DFM_API dfm_status dfm_world_ray(dfm_world world, const double origin[3], const double direction[3], double max_distance, dfm_ray_hit *hit);
 /** Closest point of any body's surface within max_distance. Same result struct. Threads: Any thread. Not during step. Since 0.1. */

@@ -171,7 +171,7 @@ dfm_status dfm_world_pairs(dfm_world world, uint32_t capacity, dfm_pair_report *
       }
       dfm_pair_report *const it = &at->report;
       const uint32_t body = turned ? c.slot_b : c.slot_a;
-      if (!known[body]) {  // where the centre was when the contact points were there: at the start of the sub-step
+      if (!known[body]) {  // where the center was when the contact points were there: at the start of the sub-step
         const dfm_body_measure m = measure(*w.bodies[body]);
         com[body] = load3(m.com) - w.report.h * load3(m.velocity), known[body] = 1;
       }

@@ -300,13 +300,13 @@ void BroadPhase::list_voxels(uint32_t i, uint32_t o) {
   vf_.clear();
   fv_.clear();
   near_triangles(a.tree, stack_, [&](const Box &b) { return box_distance2(b, bounds) <= near * near; }, [&](uint32_t t) {
-    const Vec3 x[3] = {fa.corner(t, 0), fa.corner(t, 1), fa.corner(t, 2)}, centre = (1.0 / 3) * (x[0] + x[1] + x[2]);
+    const Vec3 x[3] = {fa.corner(t, 0), fa.corner(t, 1), fa.corner(t, 2)}, center = (1.0 / 3) * (x[0] + x[1] + x[2]);
     double size2 = 0;
     for (int k = 0; k < 3; ++k) {
       if (fa.surface.tri_owns[t] >> k & 1 && shape.voxels_near(x[k], near)) vf_.push_back(uint64_t{fa.surface.tri[3 * size_t{t} + k]} << 32);
-      size2 = std::max(size2, norm2(x[k] - centre));
+      size2 = std::max(size2, norm2(x[k] - center));
     }
-    if (shape.voxels_near(centre, near + std::sqrt(size2))) fv_.push_back(uint64_t{t} << 32);
+    if (shape.voxels_near(center, near + std::sqrt(size2))) fv_.push_back(uint64_t{t} << 32);
   });
   add_segment(i, o, true, 0, vf_);
   add_segment(i, o, true, 2, fv_);

@@ -35,12 +35,12 @@ Vec3 mean_place(const Surface &s) {
 
 void RigidReference::set(const Surface &s) {
   x_.assign(s.x.begin(), s.x.end());
-  centre_ = mean_place(s), turn_ = {};
+  center_ = mean_place(s), turn_ = {};
 }
 
 double RigidReference::displaced(const Surface &s) {
   const Vec3 now = mean_place(s);
-  const auto place = [&](uint32_t i) { return rotate(turn_, load3(&x_[4 * size_t{i}]) - centre_); };
+  const auto place = [&](uint32_t i) { return rotate(turn_, load3(&x_[4 * size_t{i}]) - center_); };
   const auto off = [&](uint32_t i) { return load3(&s.x[4 * size_t{i}]) - now - place(i); };
   const Vec3 half = 0.5 * fit(s.nsurfel, place, off).theta;
   const double q[4] = {half.x, half.y, half.z, 1};
@@ -54,8 +54,8 @@ double RigidReference::displaced(const Surface &s) {
 
 // Velocities are v = mean + omega x r + rest.
 DeformingMotion deforming_motion(const Surface &s, double h) {
-  const Vec3 centre = mean_place(s);
-  const auto place = [&](uint32_t i) { return load3(&s.x[4 * size_t{i}]) - centre; };
+  const Vec3 center = mean_place(s);
+  const auto place = [&](uint32_t i) { return load3(&s.x[4 * size_t{i}]) - center; };
   const auto v = [&](uint32_t i) { return load3(&s.v[4 * size_t{i}]); };
   Fit f = fit(s.nsurfel, place, v);
   if (!(4 * h * norm(f.theta) < 1)) f.theta = {};

@@ -16,7 +16,7 @@ class RigidReference {
 
  private:
   Array<double> x_;                           // [nsurfel,4]
-  Vec3 centre_;                               // of x_
+  Vec3 center_;                               // of x_
   Quat turn_;                                 // that fitted best at the last look
 };
 

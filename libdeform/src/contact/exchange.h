@@ -1,7 +1,7 @@
-// Even pressure where the load is even: the areas of neighbouring contacts follow the shares in which the mesh carries the normal force.
+// Even pressure where the load is even: the areas of neighboring contacts follow the shares in which the mesh carries the normal force.
 //
 // Detection gives a corner a third of the triangles around it. What a uniform pressure puts on a corner is another share: it depends on how the body's
-// model hands force to its points (springs, lumped masses), and on a pad of regular cells the pressures fn/A of neighbours differ by a factor of two,
+// model hands force to its points (springs, lumped masses), and on a pad of regular cells the pressures fn/A of neighbors differ by a factor of two,
 // however fine the mesh is. Rigid-plastic friction does not see it. A bristle does, since its force K A z is bounded by mu fn: a level that is
 // concave in the pressure, so corners with little force slip early, those with much lag behind, and the patch breaks loose below its limit.
 //
@@ -11,7 +11,7 @@
 //
 // Without the last factor that is A_i* = sum_T w p_i / sum_T p, or 1/p_i* = mean over the fan of 1/mean_T p: the pressure averaged over a ring of
 // triangles. What passes is antisymmetric, so that the patch keeps its area; evens out within a ring what alternates from corner to corner; and cancels
-// where the pressure changes linearly, so that a pressure that falls towards a rim stays one. The last factor makes it continuous where a
+// where the pressure changes linearly, so that a pressure that falls toward a rim stays one. The last factor makes it continuous where a
 // corner begins to carry.
 //
 // Areas go there as fast as sliding renews the bristles: contact/renewal.h.

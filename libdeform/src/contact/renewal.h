@@ -3,7 +3,7 @@
 // Bristles stand on the surface. Area that moved with every change of load would mix deflections that differ, and a patch that is rocked would forget
 // where it stood. Worse, which of several redundant contacts carries a load is chance, down to the last digits of the solve: where an area follows at once,
 // each turn takes bristles off one contact and gives bare area to another, the patch loses force, what it holds gives way, the loads change, and they take
-// turns again. A stack of cubes walked by micrometres per second on that. So what does not move changes nothing:
+// turns again. A stack of cubes walked by micrometers per second on that. So what does not move changes nothing:
 //
 //   a contact that carries nothing   has no bristle out, and gets its aim when it begins to carry
 //   one that carries                 keeps its area, except that

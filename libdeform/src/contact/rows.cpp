@@ -26,7 +26,7 @@ void ContactRows::build_rigid(std::span<const ContactPoint> contacts, const Rigi
   }
 }
 
-// From the rigid body's centre to where the impulse acts on the soft body: the same point on both sides, so that angular momentum is kept to rounding.
+// From the rigid body's center to where the impulse acts on the soft body: the same point on both sides, so that angular momentum is kept to rounding.
 void ContactRows::set_arms(std::span<const ContactPoint> contacts, std::span<const DofSource> sources, const RigidPlaces &rigids) {
   uint32_t s = 0;
   for (uint32_t i = 0; i < n; ++i) {
@@ -39,7 +39,7 @@ void ContactRows::set_arms(std::span<const ContactPoint> contacts, std::span<con
       while (c.node[k] < sources[s].first_node || c.node[k] >= sources[s].first_node + sources[s].nnode) s = (s + 1) % uint32_t(sources.size());
       at += c.weight[k] * load3(&sources[s].surface->x[size_t(c.node[k] - sources[s].first_node) * 4]);
     }
-    store3(&arm[size_t(3) * i], at - r.centre);
+    store3(&arm[size_t(3) * i], at - r.center);
   }
 }
 

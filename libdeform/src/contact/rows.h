@@ -4,7 +4,7 @@
 // that the host integrates, surfels of bodies that step themselves. An impulse p at the contact changes them by
 //     y_k += w_ik M_k^-1 p                     (phyxel; M per component, infinite where held)
 //     y_j += R_jk w_ik p for all j of the body (self-stepping body; R is its own symmetric response, dense over its touched surfels)
-// A contact with a rigid body also sees the change (dv, dw) of that body's mean velocity, at the arm r from its centre to the contact:
+// A contact with a rigid body also sees the change (dv, dw) of that body's mean velocity, at the arm r from its center to the contact:
 //     u_i -= dv + dw x r,   (dv, dw)_j -= R_jk (p, r x p)  for all bodies j of its group (joints tie them)
 // which is W = J B J^T of doc/concepts/contact.md without ever forming it.
 #pragma once
@@ -28,7 +28,7 @@ struct DofSource {
 // The rigid body that an obstacle is: its number in a group of bodies that answer each other's impulses.
 struct RigidPlace {
   uint32_t group = kNone, place = 0;      // world-wide; kNone: an obstacle that feels nothing
-  Vec3 centre;                            // of mass, at the start of the sub-step
+  Vec3 center;                            // of mass, at the start of the sub-step
 };
 struct RigidPlaces {
   std::span<const RigidPlace> of_obstacle;      // by obstacle slot; empty: no rigid bodies

@@ -8,7 +8,7 @@ namespace {
 
 struct Pair { double a, b; };
 
-// Friction impulse that the linearised law wants, given the contact's present impulse (l1, l2), slip (u1, u2) and new normal impulse.
+// Friction impulse that the linearized law wants, given the contact's present impulse (l1, l2), slip (u1, u2) and new normal impulse.
 //
 // Set-valued laws: lambda* = lambda - u / w_t would stop the slip. Inside the disc it is taken (stick); outside the contact slides along
 // lambda* on a disc whose radius grows with the slip speed s by the law's slope c = -v^ . (dft/dv) v^ >= 0 (viscous part):
@@ -128,7 +128,7 @@ void Acceleration::start(const ContactRows &rows) {
   std::copy(rows.impulse.begin(), rows.impulse.end(), from_.begin());
 }
 
-// gamma that makes |f - sum gamma_j df_j| least: normal equations by Cholesky, slightly regularised. False: not usable.
+// gamma that makes |f - sum gamma_j df_j| least: normal equations by Cholesky, slightly regularized. False: not usable.
 bool Acceleration::combine(const double *f, double *gamma) const {
   double l[kWindow][kWindow], y[kWindow], trace = 0;
   for (uint32_t j = 0; j < count_; ++j) trace += gram_[j][j];

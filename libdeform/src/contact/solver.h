@@ -1,4 +1,4 @@
-// Normal contact and friction of one sub-step: inner sweeps of block Gauss-Seidel on the laws as they were linearised by the last outer
+// Normal contact and friction of one sub-step: inner sweeps of block Gauss-Seidel on the laws as they were linearized by the last outer
 // pass. The outer loop (which asks the laws) is world/solve.cpp; the mathematics is doc/concepts/contact.md.
 #pragma once
 #include "contact/rows.h"
@@ -47,7 +47,7 @@ struct ToleranceBounds { double tangent, normal, most_normal; };   // m/s: at re
 // `due` is the same with most_normal for normal[i]: what must be reached, where the rest may be left to the next sub-step's warm start.
 // `normal` is the worst r_n alone, m/s.
 struct Residual { double share = 0, due = 0, speed = 0, normal = 0; };
-Residual inner_residual(const ContactRows &rows, const ContactState &law, double h, const Tolerance &tolerance);   // of the linearised laws
+Residual inner_residual(const ContactRows &rows, const ContactState &law, double h, const Tolerance &tolerance);   // of the linearized laws
 Residual true_residual(const ContactRows &rows, const ContactState &answer, double h, const Tolerance &tolerance); // laws asked at this state
 
 // tangent[i] = max(bounds.tangent, 1e-2 d), d: the largest r_t that the warm start leaves at any contact of the two bodies. A contact at rest is

@@ -13,7 +13,7 @@
 //          zero  v now             there which the passes use. Passes are then the semi-smooth Newton method on the natural map (Alart 1997).
 //
 // The crossing itself by Newton: g(v) = v - m (ft(v) - f_stop) has slope >= 1. A law that saturates is concave in |v|, so that Newton steps that start at
-// no slip stay on this side of the crossing and grow towards it. The present slip is tried first: it mostly is the answer.
+// no slip stay on this side of the crossing and grow toward it. The present slip is tried first: it mostly is the answer.
 #include <algorithm>
 #include <cmath>
 

@@ -1,4 +1,4 @@
-// Faces of cells, sorted so that equal ones are neighbours.
+// Faces of cells, sorted so that equal ones are neighbors.
 #pragma once
 #include <cstdint>
 #include <tuple>

@@ -5,7 +5,7 @@
 // small a share is: K = sum s_c K_c and M = sum s_c M_c give x.Kx <= max_c(lambda_c) x.Mx. What suffers is contact, and springs whose weights
 // come from all cells around: a corner that only cells of tiny share know has next to no mass, an impulse on a surfel near it throws it
 // through its cell, and mass ratios have no bound. So no cell has less than kShareFloor of what the fullest cell around it has; the mass for it
-// comes from the full cells around it, so that the body's mass stays and its centre moves by less than a cell times the little that is moved.
+// comes from the full cells around it, so that the body's mass stays and its center moves by less than a cell times the little that is moved.
 // Measured on examples/scenes/fill_drop.json (doc/concepts/filling.md): 41 sub-steps a step without a floor, 3 from 0.01 on; 0.1 leaves mass
 // ratios of 60 between points and the fewest steps at the solver's cap, and makes a ball of 5,000 cells 0.8 % wider in its inertia.
 #include <algorithm>

@@ -133,7 +133,7 @@ FillSurface::FillSurface(const TriMesh &surface)
 }
 
 // The edges that are passed more often one way than the other form closed loops; a loop's vector area is that of any patch that closes it
-// without turning back, at most its area. A triangle that faces the wrong way among its neighbours counts twice: so does its harm.
+// without turning back, at most its area. A triangle that faces the wrong way among its neighbors counts twice: so does its harm.
 void FillSurface::measure_openings() {
   struct Edge { uint32_t a, b; int32_t way; };
   Array<Edge> edges{HookAllocator<Edge>(memory)};
@@ -219,8 +219,8 @@ FillCover cover(const FillSurface &surface, const Lattice &lattice, uint32_t lim
   for (uint32_t i = 0; i < touched.size(); ++i) look(touched[i], false);
   const uint32_t near = out.cells.size();
   for (uint32_t i = 0; i < out.cells.size() && out.kept <= limit; ++i)
-    for (uint32_t face = 0; face < 4 && out.kind[i] != CellKind::outside; ++face)  // nothing lies between neighbours that no triangle touches
-      look(pack(neighbour(unpack(out.cells[i]), face)), i >= near && surface.closed && out.kind[i] == CellKind::inside);
+    for (uint32_t face = 0; face < 4 && out.kind[i] != CellKind::outside; ++face)  // nothing lies between neighbors that no triangle touches
+      look(pack(neighbor(unpack(out.cells[i]), face)), i >= near && surface.closed && out.kind[i] == CellKind::inside);
   out.complete = out.kept <= limit;
   return out;
 }

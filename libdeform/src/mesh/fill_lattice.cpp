@@ -24,18 +24,18 @@ Axes axes_of(Site key) {
 
 void corners_of(Site key, Site corner[4]) {
   const Axes axes = axes_of(key);
-  // Half the key is the middle of the cell; along c the grid points lie on the even side of it and the centres on the odd one.
+  // Half the key is the middle of the cell; along c the grid points lie on the even side of it and the centers on the odd one.
   const int32_t low = (component(key, axes.c) - 1) / 2, even = low % 2 == 0 ? low : low + 1, odd = even == low ? low + 1 : low;
-  int32_t grid[3], centre[3];
-  for (int k = 0; k < 3; ++k) grid[k] = centre[k] = component(key, k) / 2;
-  grid[axes.c] = even, centre[axes.c] = odd;
-  const Site g{grid[0], grid[1], grid[2]}, m{centre[0], centre[1], centre[2]};
+  int32_t grid[3], center[3];
+  for (int k = 0; k < 3; ++k) grid[k] = center[k] = component(key, k) / 2;
+  grid[axes.c] = even, center[axes.c] = odd;
+  const Site g{grid[0], grid[1], grid[2]}, m{center[0], center[1], center[2]};
   corner[0] = moved(g, axes.b, -1), corner[1] = moved(g, axes.b, 1), corner[2] = moved(m, axes.a, -1), corner[3] = moved(m, axes.a, 1);
   const Vec3 o = place_of(corner[0]);
   if (dot(cross(place_of(corner[1]) - o, place_of(corner[2]) - o), place_of(corner[3]) - o) < 0) std::swap(corner[2], corner[3]);
 }
 
-Site neighbour(Site key, uint32_t face) {
+Site neighbor(Site key, uint32_t face) {
   // The cells around an edge are turned by a quarter each: the corner across a face is the old one mirrored in the opposite edge's middle.
   Site p[4];
   corners_of(key, p);

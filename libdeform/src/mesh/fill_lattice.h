@@ -1,8 +1,8 @@
-// The body-centred cubic lattice that surfaces are filled with, and the cells of it that a surface needs.
+// The body-centered cubic lattice that surfaces are filled with, and the cells of it that a surface needs.
 //
-// Unit of length is half the pitch h of the grid: grid points have even coordinates, centres of the cubes odd ones. A cell spans two
-// neighbouring grid points along axis b and two neighbouring centres along axis a, at distance 1 along axis c; its volume is 2/3 (h^3/12).
-// Its key is twice its centre, a vector of integers: 0 mod 4 along a, 2 mod 4 along b, odd along c. All cells are congruent (mean ratio 0.95).
+// Unit of length is half the pitch h of the grid: grid points have even coordinates, centers of the cubes odd ones. A cell spans two
+// neighboring grid points along axis b and two neighboring centers along axis a, at distance 1 along axis c; its volume is 2/3 (h^3/12).
+// Its key is twice its center, a vector of integers: 0 mod 4 along a, 2 mod 4 along b, odd along c. All cells are congruent (mean ratio 0.95).
 #pragma once
 #include <cstdint>
 #include <functional>
@@ -25,8 +25,8 @@ inline Site unpack(uint64_t p) {
   return {int32_t(p >> 42 & kMask) - kLatticeReach, int32_t(p >> 21 & kMask) - kLatticeReach, int32_t(p & kMask) - kLatticeReach};
 }
 
-void corners_of(Site key, Site corner[4]);              // two grid points, then two centres; positive volume
-Site neighbour(Site key, uint32_t face);                // across the face opposite that corner of corners_of
+void corners_of(Site key, Site corner[4]);              // two grid points, then two centers; positive volume
+Site neighbor(Site key, uint32_t face);                // across the face opposite that corner of corners_of
 
 // A tetrahedron with its planes, for overlaps with triangles.
 struct TetShape {

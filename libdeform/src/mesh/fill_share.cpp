@@ -40,7 +40,7 @@ class Sampler {
     return shape.meets(c, 0);
   }
 
-  // Evenly distributed over tetrahedra: steps of the generalised golden ratio in the cube, sorted, so that the gaps are weights that sum to one.
+  // Evenly distributed over tetrahedra: steps of the generalized golden ratio in the cube, sorted, so that the gaps are weights that sum to one.
   Vec3 any_place(const Vec3 corner[4]) {
     double u[3];
     for (int k = 0; k < 3; ++k) {

@@ -1,6 +1,6 @@
 // From what a file says to a mesh a body can be made of. Order matters: unsound input is refused first (flat cells), then cells are turned,
 // doubles dropped and points renumbered; what was done is counted and told. All thresholds are relative: a cell counts as flat when its
-// volume is not above the rounding of its own coordinates, so bodies of nanometres and of 100 km load alike.
+// volume is not above the rounding of its own coordinates, so bodies of nanometers and of 100 km load alike.
 #include <algorithm>
 #include <array>
 #include <cfloat>

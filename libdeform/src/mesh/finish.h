@@ -20,7 +20,7 @@ inline const char *plural(uint32_t n) { return n == 1 ? "" : "s"; }
 inline const char *is_are(uint32_t n) { return n == 1 ? "is" : "are"; }
 inline const char *was_were(uint32_t n) { return n == 1 ? "was" : "were"; }
 
-// Turns triangles so that neighbours agree across every edge of two triangles, solid pieces face outward and the inner surface of a hollow
+// Turns triangles so that neighbors agree across every edge of two triangles, solid pieces face outward and the inner surface of a hollow
 // one into its hole. Returns how many were turned; `twisted` counts the pieces that have no two sides (left as they were).
 uint32_t orient_triangles(const Memory &memory, const Array<double> &points, Array<uint32_t> &tris, uint32_t *twisted);
 

@@ -79,7 +79,7 @@ class Orienter {
   }
 
  private:
-  // Scaled to a box of edge one at the origin, so that neither nanometres nor light years leave the range of a double.
+  // Scaled to a box of edge one at the origin, so that neither nanometers nor light years leave the range of a double.
   Vec3 at(uint32_t p) const { return scale_ * (load3(&points_[3 * size_t(p)]) - origin_); }
   Corners corners(uint32_t t) const {
     const uint32_t *c = &tris_[3 * size_t(t)];

@@ -1,5 +1,5 @@
 // From loose triangles to a surface with two sides. Order matters: points at one place become one (an STL file has each corner anew), which
-// makes neighbours; triangles without area go, and where one lies flat along a neighbour's side that neighbour is split, so that no slit
+// makes neighbors; triangles without area go, and where one lies flat along a neighbor's side that neighbor is split, so that no slit
 // opens; doubles go; what is left is turned to agree and to face outward. Nothing is closed or smoothed. All thresholds are relative.
 #include <algorithm>
 #include <array>
@@ -131,7 +131,7 @@ uint32_t longest_edge(const RawMesh &raw, uint32_t t) {
 }
 
 //        d                 d
-//       / \               /|\        the flat triangle a b c and its neighbour c a d
+//       / \               /|\        the flat triangle a b c and its neighbor c a d
 //      /   \     ->      / | \       become a b d and b c d
 //     a--b--c           a--b--c
 uint32_t split_beside_flat(RawMesh &raw) {
@@ -166,7 +166,7 @@ uint32_t split_beside_flat(RawMesh &raw) {
 // ---- doubles -------------------------------------------------------------------------------------------------------
 
 // Triangles that lie twice in the surface are either listed twice, or a wall where two pieces touch, which is inside and must go. They
-// differ at their rim: across it a triangle listed twice has one neighbour, a wall two. A sheet that is doubled everywhere keeps one side.
+// differ at their rim: across it a triangle listed twice has one neighbor, a wall two. A sheet that is doubled everywhere keeps one side.
 class Walls {
  public:
   Walls(const RawMesh &raw, const Array<uint8_t> &drop, const Array<uint8_t> &twice) : parent_(count(raw)) {
@@ -266,7 +266,7 @@ void add_warnings(TriMesh &mesh, const Repairs &done) {
     warn(format("%u point%s %s merged with another at exactly the same place", mesh.merged_points, plural(mesh.merged_points),
                 was_were(mesh.merged_points)));
   if (done.split)
-    warn(format("%u triangle%s without area %s taken up by splitting the neighbour", done.split, plural(done.split), was_were(done.split)));
+    warn(format("%u triangle%s without area %s taken up by splitting the neighbor", done.split, plural(done.split), was_were(done.split)));
   if (done.flat) warn(format("%u triangle%s without area %s dropped", done.flat, plural(done.flat), was_were(done.flat)));
   if (done.doubles) warn(format("%u duplicate triangle%s %s dropped", done.doubles, plural(done.doubles), was_were(done.doubles)));
   if (done.walls)

@@ -1,11 +1,11 @@
 // Structured bodies with near-isotropic cells and no preferred direction. Coordinates come from + - * / sqrt alone, so their bits are the
 // same on every machine.
 //
-//   beam      body-centred cubic lattice: grid points and cell centres; four cells around each inner grid face (mean ratio 0.95), two on
-//             each boundary face with alternating diagonals. All inner points have 14 neighbours.
+//   beam      body-centered cubic lattice: grid points and cell centers; four cells around each inner grid face (mean ratio 0.95), two on
+//             each boundary face with alternating diagonals. All inner points have 14 neighbors.
 //   cylinder  rings of 6, 12, 18 .. points (a triangular lattice bent into a disc), extruded; each prism is cut in three by the lattice's
-//             three colours, layers mirrored in turn, so that the surface diagonals zigzag and nothing twists.
-//   ball      icosahedron around the centre, each of its 20 cells cut into n^3 by the tetrahedral-octahedral lattice, layers pushed out to
+//             three colors, layers mirrored in turn, so that the surface diagonals zigzag and nothing twists.
+//   ball      icosahedron around the center, each of its 20 cells cut into n^3 by the tetrahedral-octahedral lattice, layers pushed out to
 //             spheres: the surface triangles are nearly equilateral.
 #include <algorithm>
 #include <array>
@@ -85,7 +85,7 @@ struct Grid {
   uint32_t n[3];
   uint32_t slab() const { return (n[1] + 1) * (n[2] + 1) + n[1] * n[2]; }
   uint32_t corner(uint32_t i, uint32_t j, uint32_t k) const { return i * slab() + j * (n[2] + 1) + k; }
-  uint32_t centre(uint32_t i, uint32_t j, uint32_t k) const { return i * slab() + (n[1] + 1) * (n[2] + 1) + j * n[2] + k; }
+  uint32_t center(uint32_t i, uint32_t j, uint32_t k) const { return i * slab() + (n[1] + 1) * (n[2] + 1) + j * n[2] + k; }
 };
 
 // Tries cubes of the size that gives the number of cells, and smaller ones, each edge's number rounded down and up.
@@ -120,7 +120,7 @@ class BallBuilder {
   }
 
  private:
-  using Lattice = std::array<uint32_t, 4>;  // weights of the centre and of the face's three corners; they sum to n
+  using Lattice = std::array<uint32_t, 4>;  // weights of the center and of the face's three corners; they sum to n
 
   void number_edges() {
     uint32_t e = 0;
@@ -129,7 +129,7 @@ class BallBuilder {
         if (ico_.near(a, b)) edge_[a][b] = e, ends_[e++] = {a, b};
   }
 
-  uint32_t first_of_layer(uint32_t k) const {  // 1 centre and 10 q^2 + 2 points in each layer q < k
+  uint32_t first_of_layer(uint32_t k) const {  // 1 center and 10 q^2 + 2 points in each layer q < k
     return 1 + 2 * (k - 1) + 10 * ((k - 1) * k * (2 * k - 1) / 6);
   }
 
@@ -256,15 +256,15 @@ TetMesh make_beam(const Memory &memory, double x, double y, double z, uint32_t c
       corner[q] = g.corner(p[0], p[1], p[2]);
       if (q == 0) even = (p[0] + p[1] + p[2]) % 2;  // the diagonal starts at an even corner
     }
-    const uint32_t centre = g.centre(c[0], c[1], c[2]);
+    const uint32_t center = g.center(c[0], c[1], c[2]);
     if (!high || c[axis] + 1 == g.n[axis]) {
-      add_tet(mesh, corner[even], corner[even + 1], corner[even + 2], centre);
-      add_tet(mesh, corner[even], corner[even + 2], corner[(even + 3) % 4], centre);
+      add_tet(mesh, corner[even], corner[even + 1], corner[even + 2], center);
+      add_tet(mesh, corner[even], corner[even + 2], corner[(even + 3) % 4], center);
       return;
     }
     uint32_t next[3] = {c[0], c[1], c[2]};
     ++next[axis];
-    for (uint32_t q = 0; q < 4; ++q) add_tet(mesh, corner[q], corner[(q + 1) % 4], centre, g.centre(next[0], next[1], next[2]));
+    for (uint32_t q = 0; q < 4; ++q) add_tet(mesh, corner[q], corner[(q + 1) % 4], center, g.center(next[0], next[1], next[2]));
   };
   uint32_t c[3];
   for (c[0] = 0; c[0] < g.n[0]; ++c[0])
@@ -283,24 +283,24 @@ TetMesh make_cylinder(const Memory &memory, double radius, double length, uint32
   choose_rings(radius, length, cells, &n, &m);
   const Disc disc{n};
   TetMesh mesh(memory);
-  // The disc: points, and their colours in the triangular lattice (axial coordinates of hexagon directions, difference modulo 3).
+  // The disc: points, and their colors in the triangular lattice (axial coordinates of hexagon directions, difference modulo 3).
   static constexpr int kAxial[7][2] = {{1, 0}, {0, 1}, {-1, 1}, {-1, 0}, {0, -1}, {1, -1}, {1, 0}};
   const double half = 0.5, root = std::sqrt(3.0) / 2, third = 1.0471975511965977462;  // pi/3
   const double turn[6][2] = {{1, 0}, {half, root}, {-half, root}, {-1, 0}, {-half, -root}, {half, -root}};
   std::vector<Vec3> flat{{}};
-  std::vector<int> colour{0};
+  std::vector<int> color{0};
   for (int k = 1; k <= int(n); ++k)
     for (int s = 0; s < 6; ++s)
       for (int t = 0; t < k; ++t) {
         const Vec3 u = (radius * (double(k) / n)) * unit_on_circle(third * (double(t) / k));
         flat.push_back({turn[s][0] * u.x - turn[s][1] * u.y, turn[s][1] * u.x + turn[s][0] * u.y, 0});
         const int q = (k - t) * kAxial[s][0] + t * kAxial[s + 1][0], r = (k - t) * kAxial[s][1] + t * kAxial[s + 1][1];
-        colour.push_back(((q - r) % 3 + 3) % 3);
+        color.push_back(((q - r) % 3 + 3) % 3);
       }
   for (uint32_t layer = 0; layer <= m; ++layer)
     for (const Vec3 &p : flat) add_point(mesh, {p.x, p.y, length * (double(layer) / m)});
   const auto add_prism = [&](uint32_t layer, std::array<uint32_t, 3> v) {
-    std::sort(v.begin(), v.end(), [&](uint32_t a, uint32_t b) { return layer % 2 ? colour[a] > colour[b] : colour[a] < colour[b]; });
+    std::sort(v.begin(), v.end(), [&](uint32_t a, uint32_t b) { return layer % 2 ? color[a] > color[b] : color[a] < color[b]; });
     const uint32_t low = layer * disc.npoint(), up = low + disc.npoint();
     add_tet(mesh, low + v[0], low + v[1], low + v[2], up + v[2]);
     add_tet(mesh, low + v[0], low + v[1], up + v[1], up + v[2]);

@@ -54,7 +54,7 @@ struct Icosahedron {
   Vec3 corner[12];
   std::array<std::array<uint32_t, 3>, 20> face;  // corners ascending, faces too
   Icosahedron();
-  // Neighbours are 1.05 apart, the next points 1.70.
+  // Neighbors are 1.05 apart, the next points 1.70.
   bool near(uint32_t a, uint32_t b) const { return norm2(corner[a] - corner[b]) < 2; }
 };
 

@@ -1,5 +1,5 @@
 // Tube: the triangular lattice bent into an annulus, rings of equal number, each shifted by half a step against the last; extruded, and each
-// prism cut in three by the lattice's three colours with layers mirrored in turn, as in the cylinder: nothing twists, nothing is preferred.
+// prism cut in three by the lattice's three colors with layers mirrored in turn, as in the cylinder: nothing twists, nothing is preferred.
 #include "mesh/generate.h"
 
 namespace dfm {
@@ -9,7 +9,7 @@ constexpr double kMostElongated = 20;  // beyond it cells are all but flat
 
 struct Tube { uint32_t around, across, along; };
 
-// Tries every number of rings in the wall; what goes around in threes (the colours close), what goes along by both rules.
+// Tries every number of rings in the wall; what goes around in threes (the colors close), what goes along by both rules.
 Tube choose(double inner, double outer, double length, uint32_t cells) {
   const double wall = outer - inner, round = kTwoPi * (0.5 * (inner + outer));
   Tube best{3, 1, 1};
@@ -47,10 +47,10 @@ TetMesh make_tube(const Memory &memory, double inner, double outer, double lengt
         const Vec3 p = on_annulus(inner, outer, k, tube.across, j, n);
         add_point(mesh, {p.x, p.y, length * (double(layer) / tube.along)});
       }
-  // Colours go 0 1 2 along a ring; a shifted ring begins with 2, so that each triangle has all three.
-  const auto colour = [&](uint32_t p) { return (p % n + 2 * (p / n % 2)) % 3; };
+  // Colors go 0 1 2 along a ring; a shifted ring begins with 2, so that each triangle has all three.
+  const auto color = [&](uint32_t p) { return (p % n + 2 * (p / n % 2)) % 3; };
   const auto add_prism = [&](uint32_t layer, std::array<uint32_t, 3> v) {
-    std::sort(v.begin(), v.end(), [&](uint32_t a, uint32_t b) { return layer % 2 ? colour(a) > colour(b) : colour(a) < colour(b); });
+    std::sort(v.begin(), v.end(), [&](uint32_t a, uint32_t b) { return layer % 2 ? color(a) > color(b) : color(a) < color(b); });
     const uint32_t low = layer * slab, up = low + slab;
     add_tet(mesh, low + v[0], low + v[1], low + v[2], up + v[2]);
     add_tet(mesh, low + v[0], low + v[1], up + v[1], up + v[2]);

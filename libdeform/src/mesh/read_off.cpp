@@ -1,5 +1,5 @@
-// OFF: "OFF" (perhaps with ST, C and N before it, which add texture, colour and normal to each vertex), the numbers of vertices, faces and
-// edges, vertices, and faces as "n i1 .. in" from 0 with perhaps a colour behind. Binary OFF holds the same as big-endian 32-bit numbers.
+// OFF: "OFF" (perhaps with ST, C and N before it, which add texture, color and normal to each vertex), the numbers of vertices, faces and
+// edges, vertices, and faces as "n i1 .. in" from 0 with perhaps a color behind. Binary OFF holds the same as big-endian 32-bit numbers.
 #include <bit>
 
 #include "mesh/raw_mesh.h"
@@ -46,7 +46,7 @@ class OffReader {
 
   void read_point() {
     for (int k = 0; k < 3; ++k) out_.points.push_back(in_.binary ? in_.binary_real<float>("a vertex's coordinate") : in_.real("a vertex's coordinate"));
-    if (in_.binary) in_.skip(4 * extra_, "a vertex's colour or normal");
+    if (in_.binary) in_.skip(4 * extra_, "a vertex's color or normal");
     else in_.line();
   }
 
@@ -61,7 +61,7 @@ class OffReader {
       corners_.push_back(static_cast<uint32_t>(p));
     }
     out_.add_polygon(in_, corners_.data(), corners_.size(), kNoGroup);
-    if (in_.binary) in_.skip(4 * in_.count(number("a face's number of colours"), 4, "colours of a face"), "a face's colour");
+    if (in_.binary) in_.skip(4 * in_.count(number("a face's number of colors"), 4, "colors of a face"), "a face's color");
     else in_.line();
   }
 

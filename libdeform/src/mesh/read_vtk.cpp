@@ -241,7 +241,7 @@ class VtkReader {
       else if (keyword == "scalars") read_scalars(of_cells, n);
       else if (keyword == "color_scalars" || keyword == "lookup_table") {
         in_.word();
-        const int64_t k = in_.integer("a number of colours");
+        const int64_t k = in_.integer("a number of colors");
         skip_values(in_.binary ? Number::u8 : Number::f32, keyword == "lookup_table" ? product(4, k) : product(k, n));
       } else if (const int64_t width = attribute_width(keyword)) {
         in_.word();

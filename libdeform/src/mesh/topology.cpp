@@ -65,7 +65,7 @@ double tet_volume(const double *points, const uint32_t *tet) {
 double tet_quality(const double *points, const uint32_t *tet) {
   double sum = 0;
   for (const auto &e : kTetEdge) sum += norm2(load3(points + 3 * size_t(tet[e[0]])) - load3(points + 3 * size_t(tet[e[1]])));
-  // Lengths relative to the edges' mean, so that neither nanometres nor kilometres leave the range of a double.
+  // Lengths relative to the edges' mean, so that neither nanometers nor kilometers leave the range of a double.
   const double length = std::sqrt(sum / 6);
   if (!(length > 0)) return 0;
   const Vec3 a = load3(points + 3 * size_t(tet[0]));

@@ -10,7 +10,7 @@ struct TriMesh {
         file_point(HookAllocator<uint32_t>(m)) {}
   const Memory *memory;
   Array<double> points;          // [npoint,3], m
-  Array<uint32_t> tris;          // [ntri,3], neighbours agree; closed pieces face outward
+  Array<uint32_t> tris;          // [ntri,3], neighbors agree; closed pieces face outward
   Array<uint32_t> tri_group;     // [ntri] index into groups, kNoGroup without
   Array<uint32_t> file_point;    // [npoint] 0-based position of the point in its file (the first of those merged)
   std::vector<MeshGroup> groups;
@@ -50,8 +50,8 @@ struct TriMeshStatistics {
 };
 TriMeshStatistics tri_mesh_statistics(const TriMesh &mesh);
 
-// Cells of a body-centred cubic lattice that cover the inside of the surface, about `cells` of them, with `share` filled in. The surface
-// need not be clean: inside is where the generalised winding number exceeds one half. Throws Error(FORMAT) where nothing is inside.
+// Cells of a body-centered cubic lattice that cover the inside of the surface, about `cells` of them, with `share` filled in. The surface
+// need not be clean: inside is where the generalized winding number exceeds one half. Throws Error(FORMAT) where nothing is inside.
 TetMesh fill_surface(const TriMesh &surface, uint32_t cells);
 
 }  // namespace dfm

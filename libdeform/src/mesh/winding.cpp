@@ -56,18 +56,18 @@ void add_triangle(AngleSum &sum, Vec3 a, Vec3 b, Vec3 c) {
 
 WindingTree::WindingTree(const Memory &memory, const double *points, uint32_t ntri, const uint32_t *tris)
     : boxes_(HookAllocator<Box>(memory)), corners_(HookAllocator<Vec3>(memory)) {
-  Array<Vec3> centres{HookAllocator<Vec3>(memory)};
+  Array<Vec3> centers{HookAllocator<Vec3>(memory)};
   Array<uint32_t> order{HookAllocator<uint32_t>(memory)};
-  centres.reserve(ntri), order.reserve(ntri), corners_.reserve(3 * size_t(ntri));
+  centers.reserve(ntri), order.reserve(ntri), corners_.reserve(3 * size_t(ntri));
   for (uint32_t t = 0; t < ntri; ++t) {
     const uint32_t *c = tris + 3 * size_t(t);
-    centres.push_back((1.0 / 3) * (load3(points + 3 * size_t(c[0])) + load3(points + 3 * size_t(c[1])) + load3(points + 3 * size_t(c[2]))));
+    centers.push_back((1.0 / 3) * (load3(points + 3 * size_t(c[0])) + load3(points + 3 * size_t(c[1])) + load3(points + 3 * size_t(c[2]))));
     order.push_back(t);
   }
-  if (ntri) build(points, tris, centres, order, 0, ntri);
+  if (ntri) build(points, tris, centers, order, 0, ntri);
 }
 
-uint32_t WindingTree::build(const double *points, const uint32_t *tris, Array<Vec3> &centres, Array<uint32_t> &order, uint32_t begin,
+uint32_t WindingTree::build(const double *points, const uint32_t *tris, Array<Vec3> &centers, Array<uint32_t> &order, uint32_t begin,
                             uint32_t end) {
   const uint32_t number = uint32_t(boxes_.size());
   boxes_.push_back({});
@@ -76,17 +76,17 @@ uint32_t WindingTree::build(const double *points, const uint32_t *tris, Array<Ve
     for (uint32_t i = begin; i < end; ++i)
       for (int k = 0; k < 3; ++k) corners_.push_back(load3(points + 3 * size_t(tris[3 * size_t(order[i]) + k])));
   } else {
-    Vec3 lo = centres[order[begin]], hi = lo;
+    Vec3 lo = centers[order[begin]], hi = lo;
     for (uint32_t i = begin; i < end; ++i)
-      for (int k = 0; k < 3; ++k) lo[k] = std::min(lo[k], centres[order[i]][k]), hi[k] = std::max(hi[k], centres[order[i]][k]);
+      for (int k = 0; k < 3; ++k) lo[k] = std::min(lo[k], centers[order[i]][k]), hi[k] = std::max(hi[k], centers[order[i]][k]);
     const Vec3 size = hi - lo;
     const int axis = size.x >= size.y && size.x >= size.z ? 0 : size.y >= size.z ? 1 : 2;
     const uint32_t middle = begin + (end - begin) / 2;
     std::nth_element(order.begin() + begin, order.begin() + middle, order.begin() + end, [&](uint32_t i, uint32_t j) {
-      return centres[i][axis] != centres[j][axis] ? centres[i][axis] < centres[j][axis] : i < j;
+      return centers[i][axis] != centers[j][axis] ? centers[i][axis] < centers[j][axis] : i < j;
     });
-    build(points, tris, centres, order, begin, middle);
-    const uint32_t right = build(points, tris, centres, order, middle, end);
+    build(points, tris, centers, order, begin, middle);
+    const uint32_t right = build(points, tris, centers, order, middle, end);
     boxes_[number].right = right;
   }
   sum_up(boxes_[number]);
@@ -98,21 +98,21 @@ void WindingTree::sum_up(Box &box) const {
   const auto area_of = [&](uint32_t t) {
     return 0.5 * cross(corners_[3 * size_t(t) + 1] - corners_[3 * size_t(t)], corners_[3 * size_t(t) + 2] - corners_[3 * size_t(t)]);
   };
-  const auto centre_of = [&](uint32_t t) {
+  const auto center_of = [&](uint32_t t) {
     return (1.0 / 3) * (corners_[3 * size_t(t)] + corners_[3 * size_t(t) + 1] + corners_[3 * size_t(t) + 2]);
   };
   for (uint32_t t = box.begin; t < box.end; ++t) {
     const Vec3 area = area_of(t);
     const double size = norm(area);
-    weight += size, box.area += area, box.centre += size * centre_of(t);
+    weight += size, box.area += area, box.center += size * center_of(t);
   }
-  box.centre = weight > 0 ? (1 / weight) * box.centre : corners_[3 * size_t(box.begin)];
+  box.center = weight > 0 ? (1 / weight) * box.center : corners_[3 * size_t(box.begin)];
   double reach2 = 0;
   for (uint32_t t = box.begin; t < box.end; ++t) {
-    const Vec3 area = area_of(t), from = centre_of(t) - box.centre;
+    const Vec3 area = area_of(t), from = center_of(t) - box.center;
     for (int i = 0; i < 3; ++i)
       for (int j = 0; j < 3; ++j) box.moment[i][j] += from[i] * area[j];
-    for (int k = 0; k < 3; ++k) reach2 = std::max(reach2, norm2(corners_[3 * size_t(t) + k] - box.centre));
+    for (int k = 0; k < 3; ++k) reach2 = std::max(reach2, norm2(corners_[3 * size_t(t) + k] - box.center));
   }
   box.reach = std::sqrt(reach2);
 }
@@ -125,7 +125,7 @@ double WindingTree::at(Vec3 place) const {
   while (top) {
     const uint32_t number = stack[--top];
     const Box &box = boxes_[number];
-    const Vec3 r = box.centre - place;
+    const Vec3 r = box.center - place;
     const double r2 = norm2(r), far_off = kFarWinding * box.reach;
     if (r2 > far_off * far_off) {
       // Dipole and its derivative: f = r/r^3, df_j/dr_i = delta_ij/r^3 - 3 r_i r_j/r^5 (Barill et al. 2018, eq. 13 and 14).

@@ -44,7 +44,7 @@ void ModelInstance::create(const dfm_type &t, const dfm_host &h, const dfm_mesh 
   state = Array<double>(nstate, 0.0, HookAllocator<double>(memory));
   state_out = state;
   if (nstate && ops->state_init && call("state_init", [&] { return ops->state_init(self, state.data()); }) != DFM_OK)
-    fail(DFM_E_FATAL, "model '%s' could not initialise its state", t.id);
+    fail(DFM_E_FATAL, "model '%s' could not initialize its state", t.id);
 }
 
 bool ModelInstance::works(const std::string &effect) const {

@@ -70,7 +70,7 @@ void edge_point(Edge &e, double s, Vec3 c, double radius, uint32_t feature_b, do
 
 // Across a capsule's axis the two lines fix the normal, as between two edges, and what bears is a row of edges that the straight axis presses into
 // one line: flat ones. Left out, each would lose its load where it is pushed flat, spring back and be hit again (a tube between two rods shook for ever).
-// A ball's centre has the faces beside a flat edge.
+// A ball's center has the faces beside a flat edge.
 void edge_round(Edge &e, Array<ContactPoint> &out) {
   const Pair &pair = e.pair;
   const ObstacleShape &shape = *pair.shape;
@@ -165,7 +165,7 @@ void edge_obstacle(const Pair &pair, Run run, Array<ContactPoint> &out) {
   }
 }
 
-// Faces against the centre of a sphere, the ends of a capsule's axis, the corners of a box.
+// Faces against the center of a sphere, the ends of a capsule's axis, the corners of a box.
 void triangle_obstacle(const Pair &pair, Run run, Array<ContactPoint> &out) {
   const ObstacleShape &shape = *pair.shape;
   const bool box = shape.view().shape == Shape::box;

@@ -146,7 +146,7 @@ bool Self::minimum(uint32_t surfel, uint32_t t, const TrianglePoint &at) const {
   return true;
 }
 
-// Not normalised; its side at the closest point tells outside from inside. At a corner that of the edge there that points to p most.
+// Not normalized; its side at the closest point tells outside from inside. At a corner that of the edge there that points to p most.
 Vec3 Self::outward(uint32_t surfel, uint32_t t, const TrianglePoint &at) const {
   const int f = int(at.feature);
   if (f == 0) return normal(t);

@@ -1,4 +1,4 @@
-// The straight motion of two features, and the judgement of the guard on it. Shared by the parts of narrow/toi_guard.
+// The straight motion of two features, and the judgment of the guard on it. Shared by the parts of narrow/toi_guard.
 #pragma once
 #include <algorithm>
 #include <cmath>

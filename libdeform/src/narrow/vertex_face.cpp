@@ -139,7 +139,7 @@ bool Group::local_minimum(const Near &n) const {
   return true;
 }
 
-// Not normalised; its side at n's closest point tells inside from outside.
+// Not normalized; its side at n's closest point tells inside from outside.
 Vec3 Group::outward(const Near &n) const {
   if (n.feature == TriangleFeature::face) return n.normal;
   Vec3 sum;

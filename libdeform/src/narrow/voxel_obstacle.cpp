@@ -1,4 +1,4 @@
-// Faces of a body against a grid of distances. Surfels answer for a face wherever the distance falls towards one of its corners; where it falls from
+// Faces of a body against a grid of distances. Surfels answer for a face wherever the distance falls toward one of its corners; where it falls from
 // the lowest corner into the face, something there is sharper than the face, and the face gets one contact of its own at the lowest place.
 //
 // Limits: one such contact to a face, and what the grid rounds off (everything smaller than a cell) is not there.

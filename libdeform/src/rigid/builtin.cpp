@@ -22,7 +22,7 @@ namespace {
 
 constexpr double kDrift = 1e-10;       // m and rad: what a joint may be off by at the end of a sub-step
 constexpr uint32_t kMostCorrections = 12;
-constexpr uint32_t kMostSteps = 12;    // towards joints that are kept
+constexpr uint32_t kMostSteps = 12;    // toward joints that are kept
 constexpr double kLeastRate = 1e-11;   // m/s and rad/s: what a joint may move apart at
 constexpr size_t kMotor = 3;           // values of extra per joint: speed, limit, effort of the last sub-step
 

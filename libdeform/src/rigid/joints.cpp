@@ -8,7 +8,7 @@ namespace {
 Quat rotation_of(const dfm_rigid_state &s) { return {s.rotation[0], s.rotation[1], s.rotation[2], s.rotation[3]}; }
 
 // Where one side of a joint stands.
-struct Side { Vec3 centre; Quat turn; };
+struct Side { Vec3 center; Quat turn; };
 Side side(uint32_t part, std::span<const dfm_rigid_state> state) {
   if (part == DFM_RIGID_WORLD) return {};
   return {load3(state[part].position), rotation_of(state[part])};
@@ -47,7 +47,7 @@ RigidJoint make_joint(const dfm_joint_def &def, std::span<const dfm_rigid_def> b
   const Side a = stand(j.a), b = stand(j.b);
   const Vec3 anchor = load3(def.anchor), axis = j.can_drive() ? normalized(load3(def.axis)) : Vec3{0, 0, 1};
   const Vec3 side = any_tangent(axis);
-  j.anchor_a = rotate_back(a.turn, anchor - a.centre), j.anchor_b = rotate_back(b.turn, anchor - b.centre);
+  j.anchor_a = rotate_back(a.turn, anchor - a.center), j.anchor_b = rotate_back(b.turn, anchor - b.center);
   j.axis_a = rotate_back(a.turn, axis), j.axis_b = rotate_back(b.turn, axis);
   j.side_b[0] = rotate_back(b.turn, side), j.side_b[1] = rotate_back(b.turn, cross(axis, side));
   j.turn = conjugate(b.turn) * a.turn;
@@ -57,7 +57,7 @@ RigidJoint make_joint(const dfm_joint_def &def, std::span<const dfm_rigid_def> b
 void hold_rows(const RigidJoint &j, std::span<const dfm_rigid_state> state, std::vector<JointRow> &out) {
   const Side a = side(j.a, state), b = side(j.b, state);
   const Vec3 arm_a = rotate(a.turn, j.anchor_a), arm_b = rotate(b.turn, j.anchor_b);
-  const Vec3 apart = a.centre + arm_a - (b.centre + arm_b);
+  const Vec3 apart = a.center + arm_a - (b.center + arm_b);
   if (j.type == DFM_JOINT_SLIDER) {
     // Sides and axis belong to b, so the force acts on b where a's anchor is.
     for (const Vec3 &s : j.side_b) {
@@ -83,7 +83,7 @@ JointRow drive_row(const RigidJoint &j, std::span<const dfm_rigid_state> state) 
   const Side a = side(j.a, state), b = side(j.b, state);
   const Vec3 axis = rotate(b.turn, j.axis_b);
   if (j.type == DFM_JOINT_HINGE) return spin_row(j, axis, dot(rotation_vector(a.turn * conjugate(b.turn * j.turn)), axis));
-  const Vec3 arm_a = rotate(a.turn, j.anchor_a), arm_b = rotate(b.turn, j.anchor_b), apart = a.centre + arm_a - (b.centre + arm_b);
+  const Vec3 arm_a = rotate(a.turn, j.anchor_a), arm_b = rotate(b.turn, j.anchor_b), apart = a.center + arm_a - (b.center + arm_b);
   return point_row(j, arm_a, arm_b + apart, axis, dot(apart, axis));
 }
 

@@ -160,8 +160,8 @@ class Builder {
     const dfm_surface_groups groups = groups_of(mesh);
     if (groups.ngroup) d.groups = &groups;
     if (jittered_) {
-      const double centre[3] = {(mesh.lo[0] + mesh.hi[0]) / 2, (mesh.lo[1] + mesh.hi[1]) / 2, (mesh.lo[2] + mesh.hi[2]) / 2};
-      jitter_.apply(mesh.size, centre, b.pose, b.velocity, b.spin);
+      const double center[3] = {(mesh.lo[0] + mesh.hi[0]) / 2, (mesh.lo[1] + mesh.hi[1]) / 2, (mesh.lo[2] + mesh.hi[2]) / 2};
+      jitter_.apply(mesh.size, center, b.pose, b.velocity, b.spin);
     }
     d.pose = b.pose;
     std::copy_n(b.velocity, 3, d.velocity);
@@ -262,9 +262,9 @@ class Builder {
       for (const RigidBody &other : rigid.bodies)
         for (const Joint &j : other.joints) tied = tied || &other == &b || j.with == b.name;
       if (jittered_ && !tied) {   // what hangs on joints stands where they say
-        const double centre[3] = {0, 0, 0}, *const a = b.def.half_size;
+        const double center[3] = {0, 0, 0}, *const a = b.def.half_size;
         const double size = b.def.shape == DFM_SHAPE_BOX ? 2 * std::max({a[0], a[1], a[2]}) : 2 * (b.def.radius + b.def.half_length);
-        jitter_.apply(size, centre, b.def.pose, b.def.velocity, b.def.spin);
+        jitter_.apply(size, center, b.def.pose, b.def.velocity, b.def.spin);
       }
       bodies.push_back(b.def);
       for (Joint &j : b.joints) {

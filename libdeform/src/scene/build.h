@@ -16,8 +16,8 @@ class Jitter {
  public:
   explicit Jitter(uint64_t seed) : state_(seed) {}
   double symmetric();  // in [-1, 1)
-  // Positions +-1e-3 of `size`, angle +-0.5 degrees about an axis through `centre` (rest frame), velocities +-1 %.
-  void apply(double size, const double centre[3], dfm_pose &pose, double velocity[3], double spin[3]);
+  // Positions +-1e-3 of `size`, angle +-0.5 degrees about an axis through `center` (rest frame), velocities +-1 %.
+  void apply(double size, const double center[3], dfm_pose &pose, double velocity[3], double spin[3]);
 
  private:
   uint64_t state_;

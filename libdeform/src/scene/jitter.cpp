@@ -14,7 +14,7 @@ double Jitter::symmetric() {
   return double(z >> 11) * 0x1p-52 - 1.0;
 }
 
-void Jitter::apply(double size, const double centre[3], dfm_pose &pose, double velocity[3], double spin[3]) {
+void Jitter::apply(double size, const double center[3], dfm_pose &pose, double velocity[3], double spin[3]) {
   double shift[3], axis[3];
   for (double &s : shift) s = 1e-3 * size * symmetric();
   for (double &a : axis) a = symmetric();
@@ -23,8 +23,8 @@ void Jitter::apply(double size, const double centre[3], dfm_pose &pose, double v
   const Quaternion turn = rotation(axis, angle), old{pose.rotation[0], pose.rotation[1], pose.rotation[2], pose.rotation[3]};
   const Quaternion turned = multiply(turn, old);
   double before[3], after[3];
-  rotate(old, centre, before);
-  rotate(turned, centre, after);
+  rotate(old, center, before);
+  rotate(turned, center, after);
   for (int i = 0; i < 3; ++i) pose.position[i] += before[i] - after[i] + shift[i];
   pose.rotation[0] = turned.x, pose.rotation[1] = turned.y, pose.rotation[2] = turned.z, pose.rotation[3] = turned.w;
   const double faster = 1 + 0.01 * symmetric(), spinning = 1 + 0.01 * symmetric();

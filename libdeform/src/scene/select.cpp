@@ -26,7 +26,7 @@ std::vector<uint32_t> ranks(const std::vector<uint32_t> &points, uint32_t npoint
   return rank;
 }
 
-void normalise(std::vector<double> &weights) {
+void normalize(std::vector<double> &weights) {
   double sum = 0;
   for (double w : weights) sum += w;
   for (double &w : weights) w /= sum;
@@ -151,7 +151,7 @@ std::vector<double> share_by_mass(const std::vector<uint32_t> &points, const Bod
     for (int k = 0; k < 4; ++k)
       if (rank[t[k]] != UINT32_MAX) weights[rank[t[k]]] += quarter;
   }
-  normalise(weights);
+  normalize(weights);
   return weights;
 }
 
@@ -168,7 +168,7 @@ std::vector<double> share_by_area(const std::vector<uint32_t> &points, const Bod
     for (uint32_t k : r) weights[k] += third;
   }
   if (!any) return {};
-  normalise(weights);
+  normalize(weights);
   return weights;
 }
 
@@ -191,7 +191,7 @@ Shared share_on_skin(const std::vector<uint32_t> &triangles, const BodyMesh &mes
   }
   Shared out;
   for (uint32_t i : marked(touched)) out.points.push_back(i), out.weights.push_back(point[i]);
-  normalise(out.weights);
+  normalize(out.weights);
   return out;
 }
 

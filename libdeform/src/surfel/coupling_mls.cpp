@@ -14,7 +14,7 @@ namespace dfm {
 namespace {
 
 constexpr uint32_t kNeighbours = 10;   // whose mean distance is the unit of the support
-constexpr double kFlat = 1e-10;        // det(A / trace A) below this: the neighbours lie in a plane (1/27 for a sphere of them)
+constexpr double kFlat = 1e-10;        // det(A / trace A) below this: the neighbors lie in a plane (1/27 for a sphere of them)
 
 // (3.11) without its constant factor, which cancels in every quotient; (1 - r2/h2)^3 / h^3 neither over- nor underflows at any scale of length.
 double kernel(double r2, double h) {
@@ -109,7 +109,7 @@ class Cloud {
 class Neighbourhoods {
  public:
   Neighbourhoods(const Memory &memory, const Cloud &cloud)
-      : cloud_(cloud), known_(cloud.support.size(), Known{}, HookAllocator<Known>(memory)), neighbour_(HookAllocator<uint32_t>(memory)),
+      : cloud_(cloud), known_(cloud.support.size(), Known{}, HookAllocator<Known>(memory)), neighbor_(HookAllocator<uint32_t>(memory)),
         list_(HookAllocator<uint32_t>(memory)) {}
   struct Known { size_t begin = 0, end = 0; Symmetric inverse; uint8_t state = 0; };   // state 0 not looked at, 1 spans space, 2 flat
   const Known &of(uint32_t i) {
@@ -117,9 +117,9 @@ class Neighbourhoods {
     if (k.state) return k;
     list_.clear();
     cloud_.around(i, list_);
-    k.begin = neighbour_.size();
-    neighbour_.insert(neighbour_.end(), list_.begin(), list_.end());
-    k.end = neighbour_.size();
+    k.begin = neighbor_.size();
+    neighbor_.insert(neighbor_.end(), list_.begin(), list_.end());
+    k.end = neighbor_.size();
     Symmetric a;
     for (uint32_t j : list_) {
       const Vec3 d = cloud_.rest.point[j] - cloud_.rest.point[i];
@@ -128,12 +128,12 @@ class Neighbourhoods {
     k.state = invert(a, k.inverse) ? 1 : 2;
     return k;
   }
-  uint32_t operator[](size_t k) const { return neighbour_[k]; }
+  uint32_t operator[](size_t k) const { return neighbor_[k]; }
 
  private:
   const Cloud &cloud_;
   Array<Known> known_;
-  Array<uint32_t> neighbour_, list_;
+  Array<uint32_t> neighbor_, list_;
 };
 
 // One row by scattering into a dense column, with the list of what was touched.
@@ -164,7 +164,7 @@ class RowBuilder {
   Array<RowEntry> row_;
 };
 
-// Rounding in A^-1 of a flat neighbourhood grows with its condition: the row is given back the linear fields that it lost, by the least change
+// Rounding in A^-1 of a flat neighborhood grows with its condition: the row is given back the linear fields that it lost, by the least change
 // relative to |w_j|:  w_j += |w_j| p_j . M^-1 (p_s - sum w p),  p = (1, X - X_s),  M = sum |w| p p^T.
 void restore_linear(const Array<Vec3> &point, Vec3 x, Array<RowEntry> &row) {
   double extent2 = 0;
@@ -228,7 +228,7 @@ Coupling couple_mls(const Memory &memory, const CouplingInput &in) {
   const Cloud cloud(memory, in);
   const Array<Vec3> &point = cloud.rest.point;
   Neighbourhoods near(memory, cloud);
-  // A phyxel whose neighbours lie in a plane has no gradient to give: it stands back where others reach the surfel.
+  // A phyxel whose neighbors lie in a plane has no gradient to give: it stands back where others reach the surfel.
   const auto stands_back = [&](uint32_t i) { return near.of(i).state == 2; };
   return couple_by_reach(memory, in, cloud, stands_back, [&](Vec3 x, const Array<uint32_t> &reach, double sum, RowBuilder &build) -> Array<RowEntry> & {
     for (uint32_t i : reach) {

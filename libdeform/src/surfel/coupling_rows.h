@@ -9,7 +9,7 @@ namespace dfm {
 
 struct RowEntry { uint32_t col; double weight; };
 
-// Positions about the first point: differences of neighbours are exact there, so that a body far from the world's origin gets the weights
+// Positions about the first point: differences of neighbors are exact there, so that a body far from the world's origin gets the weights
 // that it would have at home.
 struct LocalRest {
   Array<Vec3> point, surfel;

@@ -112,10 +112,10 @@ double ObstacleShape::extent() const {
 
 void ObstacleShape::bounds(double lo[3], double hi[3]) const {
   if (view_.shape == Shape::voxels) {
-    const Vec3 half = 0.5 * (view_.grid->high() - view_.grid->low()), centre = 0.5 * (view_.grid->high() + view_.grid->low());
+    const Vec3 half = 0.5 * (view_.grid->high() - view_.grid->low()), center = 0.5 * (view_.grid->high() + view_.grid->low());
     for (int k = 0; k < 3; ++k) {
       double c = view_.position[k], r = 0;
-      for (int i = 0; i < 3; ++i) c += axis_[i][k] * centre[i], r += std::fabs(axis_[i][k]) * half[i];
+      for (int i = 0; i < 3; ++i) c += axis_[i][k] * center[i], r += std::fabs(axis_[i][k]) * half[i];
       lo[k] = c - r, hi[k] = c + r;
     }
     return;

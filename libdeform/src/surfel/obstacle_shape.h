@@ -20,9 +20,9 @@ class ObstacleShape {
   explicit ObstacleShape(const ObstacleView &view);
   const ObstacleView &view() const { return view_; }
   Vec3 axis(int k) const { return axis_[k]; }        // local x, y, z
-  Vec3 end(int k) const { return end_[k]; }          // sphere: the centre, twice; capsule: centres of its caps
+  Vec3 end(int k) const { return end_[k]; }          // sphere: the center, twice; capsule: centers of its caps
 
-  // Box: corner i lies at + along axis k where bit k is set. Edges 4k..4k+3 run along axis k. Faces 2k (towards -axis k), 2k+1 (towards +).
+  // Box: corner i lies at + along axis k where bit k is set. Edges 4k..4k+3 run along axis k. Faces 2k (toward -axis k), 2k+1 (toward +).
   Vec3 corner(uint32_t i) const;
   void edge(uint32_t i, Vec3 &from, Vec3 &to, uint32_t faces[2]) const;
   Vec3 face_normal(uint32_t i) const { return i & 1 ? axis_[i >> 1] : -axis_[i >> 1]; }

@@ -10,7 +10,7 @@ namespace dfm {
 
 struct RestBox { Vec3 lo, hi; };
 
-// Cut in the middle of the longest side of the boxes' centres, items in order of (centre, number): the tree depends on its input alone.
+// Cut in the middle of the longest side of the boxes' centers, items in order of (center, number): the tree depends on its input alone.
 class RestTree {
  public:
   RestTree(const Memory &memory, const Array<RestBox> &boxes);

@@ -142,8 +142,8 @@ void VoxelGrid::build(const Memory &memory, const double *points, uint32_t ntri,
   for (uint32_t k = 0; k < bricks_[2]; ++k)
     for (uint32_t j = 0; j < bricks_[1]; ++j)
       for (uint32_t i = 0; i < bricks_[0]; ++i) {
-        const Vec3 centre = brick_corner(i, j, k) + 0.5 * span * Vec3{1, 1, 1};
-        const double near = surface.unsigned_at(centre, std::fabs(double(coarse_[corner(i, j, k)])) + 1.001 * half_diagonal);
+        const Vec3 center = brick_corner(i, j, k) + 0.5 * span * Vec3{1, 1, 1};
+        const double near = surface.unsigned_at(center, std::fabs(double(coarse_[corner(i, j, k)])) + 1.001 * half_diagonal);
         if (near > kBand * cell_ + half_diagonal) continue;
         const uint32_t b[3] = {i, j, k};
         brick_[index(b)] = kept;
@@ -160,9 +160,9 @@ void VoxelGrid::build(const Memory &memory, const double *points, uint32_t ntri,
         add_signs(kBrick + 1, kBrick + 1, kBrick + 1, cell_, surface, place, at);
       }
   for (uint32_t t = 0; t < ntri; ++t) {
-    Vec3 centre;
-    for (int i = 0; i < 3; ++i) centre += (1.0 / 3) * load3(points + 3 * size_t{tris[3 * size_t{t} + i]});
-    error_ = std::max(error_, std::fabs(at(centre).distance));
+    Vec3 center;
+    for (int i = 0; i < 3; ++i) center += (1.0 / 3) * load3(points + 3 * size_t{tris[3 * size_t{t} + i]});
+    error_ = std::max(error_, std::fabs(at(center).distance));
   }
 }
 

@@ -39,7 +39,7 @@ class VoxelGrid {
   Vec3 low() const { return low_; }     // of the surface, not of the grid
   Vec3 high() const { return high_; }
   uint64_t bytes() const { return value_.size() * sizeof(float) + coarse_.size() * sizeof(float) + brick_.size() * sizeof(uint32_t); }
-  // Largest |distance| at the centres of the surface's triangles, m: the walls are thicker than the grid can tell where it is far below a cell.
+  // Largest |distance| at the centers of the surface's triangles, m: the walls are thicker than the grid can tell where it is far below a cell.
   double error() const { return error_; }
 
  private:

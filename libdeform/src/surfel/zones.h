@@ -20,7 +20,7 @@ struct SurfaceZones {
 };
 
 // The zone of a contact's feature. A triangle has its own. An edge and a surfel belong to the patch (surfel/surface.h) of their triangles that
-// faces the other side most, `outward` being the unit normal towards it, and there to the lowest-numbered triangle: on the line between two
+// faces the other side most, `outward` being the unit normal toward it, and there to the lowest-numbered triangle: on the line between two
 // zones of one face the choice then rests on numbers alone, never on rounding. type: ContactPoint::type_a.
 uint32_t zone_of(const Surface &surface, const Array<uint32_t> &of, uint8_t type, uint32_t feature, Vec3 outward);
 

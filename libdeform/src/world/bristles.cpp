@@ -26,9 +26,9 @@ Turn unit_turn(double c, double s) {
 }
 
 // Points of a surface around a contact's feature: corners of the triangles that have it.
-class Neighbourhood {
+class Neighborhood {
  public:
-  explicit Neighbourhood(const Body &b) : body_(b) {}
+  explicit Neighborhood(const Body &b) : body_(b) {}
 
   void around(uint8_t type, uint32_t feature) {
     const Surface &s = body_.surface;
@@ -69,7 +69,7 @@ class Neighbourhood {
 };
 
 Turn turn_of(const Body &b, uint8_t type, uint32_t feature, Vec3 n) {
-  Neighbourhood near(b);
+  Neighborhood near(b);
   near.around(type, feature);
   return near.turn(n);
 }

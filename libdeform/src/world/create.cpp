@@ -185,7 +185,7 @@ void make_voxels(Obstacle &o, const Memory &memory) {
     fail(DFM_E_ARG, "obstacle '%s': its surface encloses no volume or faces inward; turn its triangles (dfm_trimesh_create does)", name);
   o.grid = std::make_unique<VoxelGrid>(memory, o.points.data(), o.def.ntriangle, o.triangles.data(), cells);
   const VoxelGrid &g = *o.grid;
-  o.world->context->logf(DFM_LOG_INFO, "obstacle '%s': voxels of %g m in %.1f MB; distances are wrong by at most %g m at the centres of its triangles",
+  o.world->context->logf(DFM_LOG_INFO, "obstacle '%s': voxels of %g m in %.1f MB; distances are wrong by at most %g m at the centers of its triangles",
                          name, g.cell(), 1e-6 * double(g.bytes()), g.error());
   if (g.error() > 0.25 * g.cell())
     o.world->context->logf(DFM_LOG_WARNING, "obstacle '%s': its voxels of %g m are too coarse: distances are wrong by %g m somewhere, as where walls are "

@@ -1,7 +1,7 @@
 // No crossing at the end of a sub-step, whatever the speed. Between distribute and commit the way of every surfel is known: a straight line from x to
 // x + h v. Every listed pair of features is asked, conservatively, whether it comes as near as d_g = d_c / 2 on that way (narrow/toi_guard). If so:
 //
-//   1  each hit becomes a contact, linearised at its hit time, and the solve runs again, warm                       at most 4 times
+//   1  each hit becomes a contact, linearized at its hit time, and the solve runs again, warm                       at most 4 times
 //   2  the sub-step is taken anew, shorter: up to the safe part of the way, but no less than a quarter               at most 8 times
 //   3  all that moves takes the safe share of its way; velocities stay, so no momentum is lost, only way
 //

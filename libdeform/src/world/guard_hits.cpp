@@ -1,4 +1,4 @@
-// Hits of the guard as contacts: linearised at their hit times, so that the straight motion that the solve sees ends outside.
+// Hits of the guard as contacts: linearized at their hit times, so that the straight motion that the solve sees ends outside.
 #include <algorithm>
 #include <array>
 

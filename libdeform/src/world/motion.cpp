@@ -43,7 +43,7 @@ bool all_finite(const double *p, int n) {
 
 Pose to_pose(const dfm_pose &p) { return {load3(p.position), unit_quat(p.rotation)}; }
 
-// Halving the arc needs square roots only: the midpoint of two unit quaternions is their normalised sum. 52 halvings follow the bits of s.
+// Halving the arc needs square roots only: the midpoint of two unit quaternions is their normalized sum. 52 halvings follow the bits of s.
 Quat slerp(Quat a, Quat b, double s) {
   if (a.x * b.x + a.y * b.y + a.z * b.z + a.w * b.w < 0) b = {-b.x, -b.y, -b.z, -b.w};
   for (int bit = 0; bit < 52 && s > 0; ++bit) {

@@ -247,7 +247,7 @@ Crossed OverlapSides::look(const OverlapPair &p, double least, bool yes_or_no) {
   return round(p) ? cross_shape(body(p.a), shape(p), least) : cross_skins(body(p.a), other(p), least, yes_or_no, stack_);
 }
 
-Vec3 OverlapSides::centre(const OverlapPair &p) {
+Vec3 OverlapSides::center(const OverlapPair &p) {
   return round(p) ? w_.obstacles[p.b]->pose.position : 0.5 * (other(p).lo() + other(p).hi());
 }
 

@@ -75,7 +75,7 @@ class OverlapSides {
   // Of side b.
   ObstacleShape shape(const OverlapPair &p) const;
   bool plane(const OverlapPair &p) const;
-  Vec3 centre(const OverlapPair &p);
+  Vec3 center(const OverlapPair &p);
   double reach(const OverlapPair &p, Vec3 direction);   // m, its farthest point along a direction
   double slack(const OverlapPair &p);                   // m, OverlapSkin::slack()
 

@@ -101,7 +101,7 @@ bool World::stage_rigid_predict(uint32_t *trouble) {
     ObstacleView &view = obstacle_views[o->slot];
     view.velocity = shape_velocity(*o, s, load3(v), load3(v + 3), h), view.spin = load3(v + 3), view.linear = view.spin - load3(s.spin);
     if (o->mesh) o->mesh->place(view.position, view.rotation, view.velocity, view.spin);
-    rigid_places[o->slot].centre = load3(s.position);
+    rigid_places[o->slot].center = load3(s.position);
   }
   return true;
 }

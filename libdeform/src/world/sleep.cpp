@@ -1,7 +1,7 @@
 // Sleep and waking.
 //
 //   end of a sub-step    a body whose points are all slower than sleep_speed, and within half of d_c of where they were when its calm began,
-//                        stays calm. Speed alone would let slow drift pass, and never let a stiff body sleep that shivers by a nanometre
+//                        stays calm. Speed alone would let slow drift pass, and never let a stiff body sleep that shivers by a nanometer
 //                        an island sleeps when all its bodies have been calm for sleep_time, none of its contacts slides or meets
 //                        an obstacle that moves or a rigid host's body, and nothing that is prescribed for its bodies lies ahead
 //   asleep               x, contacts and their forces stay, v = 0; no stage works on the body. Detection keeps its shape as a partner:

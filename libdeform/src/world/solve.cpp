@@ -3,7 +3,7 @@
 //   warm start: last impulses of the same keys, times h/h_old, applied before the first sweep
 //   repeat   ask all laws once, in batches, at the present slip and normal force
 //            residual of the true laws below tolerance: done
-//            sweep the linearised laws until their own residual is below tolerance
+//            sweep the linearized laws until their own residual is below tolerance
 #include <algorithm>
 #include <cmath>
 #include <limits>

@@ -84,7 +84,7 @@ class Untangler {
     shift_[i] += by, sides_.body(i).shift(by);
   }
 
-  // Both go their share, by their masses, so that their common centre stays; false: there is no way.
+  // Both go their share, by their masses, so that their common center stays; false: there is no way.
   bool separate(const OverlapPair &p) {
     if (!overlap(p)) return true;
     if (!moves(p)) return false;
@@ -146,7 +146,7 @@ class Untangler {
   std::vector<Vec3> directions(const OverlapPair &p) {
     std::vector<Vec3> out;
     const OverlapSkin &a = sides_.body(p.a);
-    const Vec3 between = 0.5 * (a.lo() + a.hi()) - sides_.centre(p);
+    const Vec3 between = 0.5 * (a.lo() + a.hi()) - sides_.center(p);
     if (norm2(between) > 0) out.push_back(normalized(between)), out.push_back(-normalized(between));
     for (int k = 0; k < 27; ++k)
       if (k != 13) out.push_back(normalized({double(k / 9 - 1), double(k / 3 % 3 - 1), double(k % 3 - 1)}));

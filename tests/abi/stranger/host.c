@@ -44,7 +44,7 @@ int main(int argc, char **argv) {
   for (int i = 0; i < 100; ++i) TRY(dfm_world_step(world, 1e-3, NULL));
   dfm_body_measure measure = {sizeof measure};
   TRY(dfm_body_get_measure(body, &measure));
-  printf("centre at %.4f m after %.3f s\n", measure.com[2], dfm_world_time(world));
+  printf("center at %.4f m after %.3f s\n", measure.com[2], dfm_world_time(world));
   dfm_context_destroy(context);
   return isfinite(measure.com[2]) && measure.com[2] > 0.05 && measure.com[2] < 0.101 ? 0 : 1;
 }

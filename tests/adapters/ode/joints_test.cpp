@@ -119,7 +119,7 @@ class OdeGripper : public ::testing::TestWithParam<double> {};
 TEST_P(OdeGripper, LiftsABallAndHoldsIt) {
   Gripper g;
   const double h = GetParam();
-  g.ode.run(0.05, h);                      // grip; the ball has fallen by a centimetre at most
+  g.ode.run(0.05, h);                      // grip; the ball has fallen by a centimeter at most
   dJointSetSliderParam(g.lift, dParamVel, 0.2);
   g.ode.run(0.5, h);
   dJointSetSliderParam(g.lift, dParamVel, 0);

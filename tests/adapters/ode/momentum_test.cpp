@@ -65,7 +65,7 @@ TEST(OdeMomentum, BodyOfThreeGeoms_AnswersAsOne) {
   const Momenta end = total(ball, {bar});
   EXPECT_EQ(ode.stats().bodies, 1u);
   EXPECT_EQ(ode.stats().shapes, 3u);
-  EXPECT_GT(norm(vec(dBodyGetAngularVel(bar))), 1);   // struck off its centre
+  EXPECT_GT(norm(vec(dBodyGetAngularVel(bar))), 1);   // struck off its center
   EXPECT_LT(apart(start.linear, end.linear), 1e-12 * start.size);
   EXPECT_LT(apart(start.angular, end.angular), 1e-12 * start.size);
 }

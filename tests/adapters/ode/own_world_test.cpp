@@ -32,7 +32,7 @@ enum class With { world, still, still_first, moving };
 constexpr With kAll[] = {With::world, With::still, With::still_first, With::moving};
 constexpr const char *kNames[] = {"world", "still", "still_first", "moving"};
 
-// An arm of 2 kg whose centre is 0.3 m along x from its joint in the origin. A body that moves in the arm's stead hangs on the world by a fixed joint.
+// An arm of 2 kg whose center is 0.3 m along x from its joint in the origin. A body that moves in the arm's stead hangs on the world by a fixed joint.
 struct Rig {
   dfm_world world;
   std::vector<dfm_rigid> bodies;
@@ -80,7 +80,7 @@ void compare(dfm_context *c, With with, uint32_t type, Vec axis, double velocity
 
 }  // namespace
 
-// A motor that holds an arm still carries its weight at its lever, 0.3 m: about the axis, not about the arm's centre, where the hinge's own force turns too.
+// A motor that holds an arm still carries its weight at its lever, 0.3 m: about the axis, not about the arm's center, where the hinge's own force turns too.
 // `body` against `with`: where the arm is the second body, the motor turns the other way round to carry it.
 TEST_P(OdeOwnWorld, HingeThatHoldsAnArm_SaysItsMomentAboutTheHinge) {
   for (const char *host : {"ode", "builtin"}) {

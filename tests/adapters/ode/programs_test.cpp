@@ -17,7 +17,7 @@ TEST(OdePrograms, Gripper_LiftsTheBallAndHoldsIt) {
   const test::CommandResult r = example("gripper");
   ASSERT_EQ(r.exit_code, 0) << r.out << r.err;
   double mass = 0, height = 0, slip = 1e9;
-  const char *const form = "the ball of %lf kg is %lf m above the floor and slips by %lf micrometres per second";
+  const char *const form = "the ball of %lf kg is %lf m above the floor and slips by %lf micrometers per second";
   ASSERT_EQ(std::sscanf(r.out.c_str(), form, &mass, &height, &slip), 3) << r.out;
   EXPECT_NEAR(mass, 0.1, 0.005);
   EXPECT_NEAR(height, 0.05 + 0.1, 0.015);

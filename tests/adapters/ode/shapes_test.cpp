@@ -19,7 +19,7 @@ struct Stand {
 
 double above_plane(Vec p) { return p[2] - kTop; }
 double from_axis(Vec p) { return std::hypot(p[1], p[2] - (kTop - 0.5)) - 0.5; }
-double from_centre(Vec p) { return std::hypot(p[0], p[1], p[2] - (kTop - 0.5)) - 0.5; }
+double from_center(Vec p) { return std::hypot(p[0], p[1], p[2] - (kTop - 0.5)) - 0.5; }
 
 dGeomID at(dGeomID g, double z) {
   dGeomSetPosition(g, 0, 0, z);
@@ -56,7 +56,7 @@ dGeomID transformed(Ode &o) {
 
 const Stand kStands[] = {
     {"box", [](Ode &o) { return at(dCreateBox(o.space, 0.6, 0.6, 0.2), kTop - 0.1); }, above_plane},
-    {"sphere", [](Ode &o) { return at(dCreateSphere(o.space, 0.5), kTop - 0.5); }, from_centre},
+    {"sphere", [](Ode &o) { return at(dCreateSphere(o.space, 0.5), kTop - 0.5); }, from_center},
     {"capsule", [](Ode &o) { return lying(dCreateCapsule(o.space, 0.5, 1), kTop - 0.5); }, from_axis},
     {"cylinder_standing", [](Ode &o) { return at(dCreateCylinder(o.space, 0.4, 0.3), kTop - 0.15); }, above_plane},
     {"cylinder_lying", [](Ode &o) { return lying(dCreateCylinder(o.space, 0.5, 1), kTop - 0.5); }, [](Vec p) { return from_axis(p) + 0.001; }},

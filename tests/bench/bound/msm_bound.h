@@ -9,9 +9,9 @@ struct Springs {
   uint32_t npoint, nspring;             // nspring: rounded up to a multiple of 8 with springs of stiffness zero
   const uint32_t *i, *j;                // [nspring] ends
   const double *stiffness, *rest;       // [nspring]
-  uint32_t nslice, reserved;            // sliced ELLPACK: slices of 4 points, each with `width` neighbours
+  uint32_t nslice, reserved;            // sliced ELLPACK: slices of 4 points, each with `width` neighbors
   const uint32_t *slice_begin;          // [nslice + 1] in rows of 4
-  const uint32_t *neighbour;            // [rows, 4]
+  const uint32_t *neighbor;            // [rows, 4]
   const double *row_stiffness, *row_rest;  // [rows, 4]
   double damp;
 };

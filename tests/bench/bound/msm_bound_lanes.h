@@ -79,7 +79,7 @@ static inline void rows_padded(const Springs &s, const Points &p) {
     transpose(vx, vy, vz, unused);
     v4 fx = splat(0), fy = splat(0), fz = splat(0);
     for (uint32_t r = s.slice_begin[slice]; r < s.slice_begin[slice + 1]; ++r) {
-      const uint32_t *j = s.neighbour + 4 * size_t(r);
+      const uint32_t *j = s.neighbor + 4 * size_t(r);
       v4 dx = load4(p.x + 4 * size_t(j[0])), dy = load4(p.x + 4 * size_t(j[1]));
       v4 dz = load4(p.x + 4 * size_t(j[2])), dw = load4(p.x + 4 * size_t(j[3]));
       transpose(dx, dy, dz, dw);
@@ -105,7 +105,7 @@ static inline void rows_split(const Springs &s, const Points &p) {
     v4 x[3], v[3], f[3];
     for (size_t a = 0; a < 3; ++a) x[a] = load4(p.x + a * m + first), v[a] = load4(p.v + a * m + first), f[a] = load4(p.f + a * m + first);
     for (uint32_t r = s.slice_begin[slice]; r < s.slice_begin[slice + 1]; ++r) {
-      const uint32_t *j = s.neighbour + 4 * size_t(r);
+      const uint32_t *j = s.neighbor + 4 * size_t(r);
       v4 d[3], e[3];
       for (size_t a = 0; a < 3; ++a) d[a] = gather4(p.x + a * m, j) - x[a], e[a] = gather4(p.v + a * m, j) - v[a];
       const v4 scale = scale_of((d[0] * d[0] + d[1] * d[1]) + d[2] * d[2], (d[0] * e[0] + d[1] * e[1]) + d[2] * e[2],

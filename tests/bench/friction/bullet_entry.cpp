@@ -21,7 +21,7 @@
 
 namespace {
 
-// Centimetres and grams: its solvers stop at absolute tolerances that a small body in SI units does not exceed. Values arrive in SI units.
+// Centimeters and grams: its solvers stop at absolute tolerances that a small body in SI units does not exceed. Values arrive in SI units.
 constexpr double kLength = 100, kMass = 1000, kStress = kMass / kLength, kG = 9.81 * kLength;
 constexpr btScalar kMargin = btScalar(1e-3 * kLength);
 using Values = std::map<std::string, double>;
@@ -98,7 +98,7 @@ struct Scene {
     body->getMotionState()->setWorldTransform(btTransform(btQuaternion::getIdentity(), btVector3(btScalar(x), 0, btScalar(z))));
   }
 
-  double centre(int axis) const {
+  double center(int axis) const {
     double sum = 0;
     for (int i = 0; i < soft->m_nodes.size(); ++i) sum += soft->m_nodes[i].m_x[axis];
     return sum / soft->m_nodes.size();
@@ -109,7 +109,7 @@ struct Scene {
     world.stepSimulation(btScalar(step), 0, btScalar(step));
     time += step;
     if (std::floor(time / 0.1) > std::floor((time - step) / 0.1)) std::fprintf(stderr, "at %g\n", time);   // how far it came, should it be stopped
-    if (!std::isfinite(centre(0))) std::fprintf(stderr, "not finite at %g s\n", time), std::exit(1);
+    if (!std::isfinite(center(0))) std::fprintf(stderr, "not finite at %g s\n", time), std::exit(1);
   }
 
   void tilt(double angle) { gravity->m_gravity = btVector3(btScalar(kG * std::sin(angle)), 0, btScalar(-kG * std::cos(angle))); }
@@ -142,7 +142,7 @@ int run(const std::string &name, const std::string &mesh, const Values &v) {
         Scene::move(left, -x, 0), Scene::move(right, x, 0);
         s.gravity->m_gravity = btVector3(0, 0, btScalar(-kG * ramp(t, v.at("close"), v.at("load"))));
       });
-      if (s.time >= v.at("begin")) line.add(s.time, s.centre(2));
+      if (s.time >= v.at("begin")) line.add(s.time, s.center(2));
     }
     return print("creep_um_per_s", 1e6 / kLength * std::fabs(line.slope()), s.time), 0;
   }
@@ -153,8 +153,8 @@ int run(const std::string &name, const std::string &mesh, const Values &v) {
     double start = NAN, angle = 0;
     while (angle < std::atan(1.2 * v.at("mu"))) {
       s.advance([&](double t) { s.tilt(angle = std::max(0.0, v.at("rate") * (t - v.at("settle")))); });
-      if (std::isnan(start) && s.time >= v.at("settle")) start = s.centre(0);
-      if (s.centre(0) - start >= kLength * v.at("distance")) return print("slip_tan", std::tan(angle), s.time), 0;
+      if (std::isnan(start) && s.time >= v.at("settle")) start = s.center(0);
+      if (s.center(0) - start >= kLength * v.at("distance")) return print("slip_tan", std::tan(angle), s.time), 0;
     }
     return print("slip_tan", INFINITY, s.time), 0;
   }
@@ -167,7 +167,7 @@ int run(const std::string &name, const std::string &mesh, const Values &v) {
       if (shakes) Scene::move(floor, kLength * v.at("acceleration") / (w * w) * std::sin(w * t), -0.05 * kLength);
     });
     if (s.time < begin) continue;
-    all.add(s.time, s.centre(0)), (s.time < middle ? first : last).add(s.time, s.centre(0));
+    all.add(s.time, s.center(0)), (s.time < middle ? first : last).add(s.time, s.center(0));
   }
   // an even acceleration: the slopes of both halves are the speeds in their middles
   if (slide) return print("acceleration", (last.slope() - first.slope()) / (0.5 * (v.at("end") - begin)) / kLength, s.time), 0;

@@ -62,7 +62,7 @@ class Entry:
         params = {"mu": case["mu"]} if "mu" in case else {"mu_S": case["mu_S"], "mu_C": case["mu_C"], "v_s": case["v_s"]}
         if law == "dahl":
             params = {"mu_C": case["mu"], "sigma0": case["sigma0"]}
-        elif law in ("lugre", "elastoplastic"):  # bristles that give a thousandth of a millimetre at the limit of 1 kPa
+        elif law in ("lugre", "elastoplastic"):  # bristles that give a thousandth of a millimeter at the limit of 1 kPa
             params.update({"sigma0": 1e9, "sigma1": 1e5})
         return {"format": "deform-scene", "version": 1, "gravity": gravity, "time": {"duration": duration, "step": case["step"]},
                 "materials": {"gel": {"density": m["density"], "young": m["young"], "poisson": m["poisson"],

@@ -84,7 +84,7 @@ class Entry:
     FLOOR = '<geom name="floor" type="plane" size="2 2 1"/>'
     LIFT = 1.2e-4  # the flex's radius and a little
 
-    def centre(self, data, axis):
+    def center(self, data, axis):
         return float(data.flexvert_xpos[:, axis].mean())
 
     @staticmethod
@@ -97,8 +97,8 @@ class Entry:
         start, angle = None, lambda t: max(0.0, case["rate"] * (t - case["settle"]))
         for t in self.steps(model, data, end, lambda t: self.tilt(model, angle(t))):
             if start is None and t >= case["settle"]:
-                start = self.centre(data, 0)
-            if start is not None and self.centre(data, 0) - start >= case["distance"]:
+                start = self.center(data, 0)
+            if start is not None and self.center(data, 0) - start >= case["distance"]:
                 return {"slip_tan": math.tan(angle(t))}, t
         return {"slip_tan": math.inf}, end
 
@@ -107,7 +107,7 @@ class Entry:
         self.tilt(model, case["angle"])
         x = []
         for t in self.steps(model, data, case["span"][1]):
-            x.append((t, self.centre(data, 0)))
+            x.append((t, self.center(data, 0)))
         # mean speeds of the first and the last tenth of the span
         inside = [r for r in x if r[0] >= case["span"][0]]
         n = len(inside) // 10
@@ -120,7 +120,7 @@ class Entry:
         at = []
         for t in self.steps(model, data, case["span"][1], before):
             if t >= case["span"][0] - 1e-9:
-                at.append((t, self.centre(data, axis)))
+                at.append((t, self.center(data, axis)))
         return 1e6 * abs(at[-1][1] - at[0][1]) / (at[-1][0] - at[0][0])
 
     def run_slope_hold(self, case, configuration):
@@ -184,7 +184,7 @@ class Entry:
         at, lift, count = [], 0.0, 0
         for t in self.steps(model, data, case["span"][1], before):
             if t >= case["span"][0] - 1e-9:
-                at.append((t, self.centre(data, 2)))
+                at.append((t, self.center(data, 2)))
                 lift, count = lift - self.wall_force(model, data, range(model.ngeom))[0][2], count + 1
         creep = 1e6 * abs(at[-1][1] - at[0][1]) / (at[-1][0] - at[0][0])
         return {"creep_um_per_s": creep, "lift_share": lift / count / (self.mass * G)}, case["span"][1]

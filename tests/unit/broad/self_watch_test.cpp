@@ -115,7 +115,7 @@ TEST(SelfWatch, BlowThatFoldsWithinTheSubStep_IsMet) {
   const double h = 1e-3;
   for (const double speed : {0.0, 500.0, 990.0, 2000.0}) {
     ASSERT_FALSE(watch.near(h, kOffset, 0));
-    const auto velocity = [&](uint32_t i) { return i == thrown ? Vec3{speed, 0, 0} : Vec3{}; };   // towards a triangle that is one edge away
+    const auto velocity = [&](uint32_t i) { return i == thrown ? Vec3{speed, 0, 0} : Vec3{}; };   // toward a triangle that is one edge away
     EXPECT_EQ(watch.meets(h, kOffset, speed, velocity), speed > 700) << speed << " m/s";
   }
 }

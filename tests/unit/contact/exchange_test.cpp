@@ -12,7 +12,7 @@ using dfm::ContactPoint;
 
 constexpr uint32_t kSide = 7, kCount = kSide * kSide;
 
-// A sheet of unit squares, seen from below (normals of the body down, of the contacts up). alternate: the diagonals of neighbours mirror each other, so
+// A sheet of unit squares, seen from below (normals of the body down, of the contacts up). alternate: the diagonals of neighbors mirror each other, so
 // that corners have eight triangles and four in turn.
 struct Sheet {
   dfm::Surface surface;

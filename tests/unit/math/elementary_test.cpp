@@ -110,7 +110,7 @@ TEST(Elementary, PowOfWholeExponents_IsExactWhereTheProductIs) {
   EXPECT_TRUE(std::isnan(dfm_pow(2.0, std::nan(""))));
 }
 
-// Every compiler, optimisation level and vector width must give these bits.
+// Every compiler, optimization level and vector width must give these bits.
 TEST(Elementary, Bits_MatchTheRecordedHash) {
   dfm::Hash hash;
   uint64_t state = 88172645463325252ull;

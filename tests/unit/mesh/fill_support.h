@@ -27,7 +27,7 @@ inline dfm::TriMesh box_surface(dfm::Vec3 lo, dfm::Vec3 hi) {
 }
 
 // Octahedron, each triangle cut into four `cuts` times, pushed out to the sphere.
-inline dfm::TriMesh sphere_surface(double radius, int cuts, dfm::Vec3 centre = {}) {
+inline dfm::TriMesh sphere_surface(double radius, int cuts, dfm::Vec3 center = {}) {
   std::vector<dfm::Vec3> p{{1, 0, 0}, {-1, 0, 0}, {0, 1, 0}, {0, -1, 0}, {0, 0, 1}, {0, 0, -1}};
   std::vector<std::array<uint32_t, 3>> t{{0, 2, 4}, {2, 1, 4}, {1, 3, 4}, {3, 0, 4}, {2, 0, 5}, {1, 2, 5}, {3, 1, 5}, {0, 3, 5}};
   for (int c = 0; c < cuts; ++c) {
@@ -44,7 +44,7 @@ inline dfm::TriMesh sphere_surface(double radius, int cuts, dfm::Vec3 centre = {
     }
     t = finer;
   }
-  for (dfm::Vec3 &x : p) x = centre + radius * x;
+  for (dfm::Vec3 &x : p) x = center + radius * x;
   return surface_of(p, t);
 }
 

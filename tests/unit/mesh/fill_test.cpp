@@ -180,7 +180,7 @@ TEST(Fill, Ball_MassCentreAndInertiaWithinOnePercent) {
   const TriMesh s = test::sphere_surface(r, 6, {0.3, -0.2, 0.1});
   const TetMesh m = fill_surface(s, 20000);
   double mass = 0, inertia = 0;
-  Vec3 centre;
+  Vec3 center;
   for (uint32_t t = 0; t < m.ntet(); ++t) {
     const double v = m.share[t] * dfm::tet_volume(m.points.data(), &m.tets[4 * size_t(t)]);
     Vec3 sum;
@@ -189,12 +189,12 @@ TEST(Fill, Ball_MassCentreAndInertiaWithinOnePercent) {
       const Vec3 x = corner(m, t, k) - Vec3{0.3, -0.2, 0.1};
       sum += x, squares += x.x * x.x + x.y * x.y;
     }
-    mass += v, centre += (v / 4) * sum;
+    mass += v, center += (v / 4) * sum;
     inertia += v / 20 * (squares + sum.x * sum.x + sum.y * sum.y);  // of a tetrahedron of even density, about z
   }
   const double truth = 4 * M_PI / 3 * r * r * r;
   EXPECT_NEAR(mass, truth, 0.01 * truth);
-  EXPECT_LT(norm((1 / mass) * centre), 0.01 * r);
+  EXPECT_LT(norm((1 / mass) * center), 0.01 * r);
   EXPECT_NEAR(inertia, 0.4 * truth * r * r, 0.01 * 0.4 * truth * r * r);
 }
 

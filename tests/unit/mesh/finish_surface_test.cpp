@@ -119,7 +119,7 @@ TEST(FinishSurface, MinusZero_IsZero) {
   EXPECT_EQ(finished(s).npoint(), 8u);
 }
 
-// A neighbour one rounding away is another point: what lies apart in the file stays apart.
+// A neighbor one rounding away is another point: what lies apart in the file stays apart.
 TEST(FinishSurface, OneRoundingApart_IsNotMerged) {
   Soup s = loose(box({}, {1, 1, 1}));
   s.points[1].x = std::nextafter(s.points[1].x, 2);
@@ -246,7 +246,7 @@ TEST(FinishSurface, WithoutArea_IsDropped) {
   EXPECT_EQ(all_warnings(m), "3 triangles without area were dropped\n2 points that no triangle uses were dropped\n");
 }
 
-// A flat triangle that closes a T-junction: dropping it would open a slit, so its neighbour is split.
+// A flat triangle that closes a T-junction: dropping it would open a slit, so its neighbor is split.
 TEST(FinishSurface, FlatAlongANeighboursSide_LeavesNoSlit) {
   Soup s = kTetrahedron;
   s.points.push_back({0.5, 0, 0});  // on the edge 0-1
@@ -257,7 +257,7 @@ TEST(FinishSurface, FlatAlongANeighboursSide_LeavesNoSlit) {
   EXPECT_EQ(m.ntri(), 6u);
   EXPECT_NEAR(st.volume, 1.0 / 6, 1e-16);
   EXPECT_GT(st.quality_min, 0.3);
-  EXPECT_EQ(all_warnings(m), "1 triangle without area was taken up by splitting the neighbour\n");
+  EXPECT_EQ(all_warnings(m), "1 triangle without area was taken up by splitting the neighbor\n");
 }
 
 TEST(FinishSurface, FlatBesideFlat_IsTakenUpInTurn) {

@@ -91,7 +91,7 @@ TEST(WriteSurface, StlNormals_PointOutward) {
   }
 }
 
-// Numbers that no short text holds, from nanometres to the largest that is read.
+// Numbers that no short text holds, from nanometers to the largest that is read.
 TEST(WriteSurface, ExtremeCoordinates_SurviveText) {
   for (const double scale : {1e-9 / 3, 1e5 / 3, 1e99 / 3}) {
     TriMesh m = make_ball_surface(Memory::standard(), 1, 20);

@@ -260,7 +260,7 @@ TEST(FindContacts, NearestContact_IsTheDistanceOfTheBodies) {
                                                    load3(&b.x[4 * b.edge[2 * f]]), load3(&b.x[4 * b.edge[2 * f + 1]])).distance2);
       return std::sqrt(least);
     };
-    // From far away towards each other until they are 0.03 to 0.09 apart.
+    // From far away toward each other until they are 0.03 to 0.09 apart.
     const Vec3 way = normalized({normal(random), normal(random), normal(random)});
     for (uint32_t v = 0; v < b.nsurfel; ++v) store3(&b.x[4 * v], load3(&b.x[4 * v]) + 3.0 * way);
     double d = distance();

@@ -12,7 +12,7 @@ namespace {
 using namespace dfm;
 using namespace test;
 
-// A surfel at the origin with six neighbours, the first in direction x, at the heights h.
+// A surfel at the origin with six neighbors, the first in direction x, at the heights h.
 Surface fan(const std::array<double, 6> &h) {
   Mesh m;
   m.add({0, 0, 0});

@@ -272,7 +272,7 @@ TEST(ToiConservative, Separation_AllFindersAgree) {
   EXPECT_GT(hits, 1000);
 }
 
-// The same bits from every compiler, optimisation and vector width; a change of the method changes the number, a change of the build may not.
+// The same bits from every compiler, optimization and vector width; a change of the method changes the number, a change of the build may not.
 TEST(Toi, Bits_AreThoseOfEveryBuild) {
   Random random(9);
   uint64_t hash = 14695981039346656037ull;   // FNV-1a

@@ -109,17 +109,17 @@ TEST(Rotation, OntoDirection_TurnsZ) {
 }
 
 TEST(Jitter, StaysWithinItsBounds_AndFollowsTheSeed) {
-  const double centre[3] = {0.5, 0, 2};
+  const double center[3] = {0.5, 0, 2};
   dfm_pose first = {};
   for (uint64_t seed = 1; seed <= 200; ++seed) {
     Jitter jitter(seed);
     dfm_pose pose = {{1, 2, 3}, {0, 0, 0, 1}};
     double v[3] = {1, -2, 0}, spin[3] = {0, 0, 4};
-    jitter.apply(2.0, centre, pose, v, spin);
+    jitter.apply(2.0, center, pose, v, spin);
     const Quaternion q{pose.rotation[0], pose.rotation[1], pose.rotation[2], pose.rotation[3]};
     double moved[3];
-    rotate(q, centre, moved);
-    for (int k = 0; k < 3; ++k) EXPECT_LE(std::fabs(moved[k] + pose.position[k] - (centre[k] + 1 + k)), 2e-3 + 1e-12);
+    rotate(q, center, moved);
+    for (int k = 0; k < 3; ++k) EXPECT_LE(std::fabs(moved[k] + pose.position[k] - (center[k] + 1 + k)), 2e-3 + 1e-12);
     EXPECT_LE(2 * std::acos(std::min(1.0, q.w)) * 180 / M_PI, 0.5 + 1e-6);
     EXPECT_LE(std::fabs(v[0] - 1), 0.01 + 1e-12);
     EXPECT_EQ(v[1], -2 * v[0]);

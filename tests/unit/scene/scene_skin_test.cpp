@@ -75,12 +75,12 @@ TEST(ShareOnSkin, ForceAndTorque_AreThoseOfTheTraction) {
   const uint32_t triangles[] = {0, 1, 2, 1, 3, 2};
   skin.points = {0.1, 0.1, 0.2, 0.8, 0.15, 0.3, 0.3, 0.4, 0.45, 0.9, 0.45, 0.1};
   skin.triangles = triangles, skin.npoint = 4, skin.ntriangle = 2;
-  double area[2], centre[2][3] = {};
+  double area[2], center[2][3] = {};
   for (int t = 0; t < 2; ++t) {
     const double *p[3];
     for (int k = 0; k < 3; ++k) p[k] = &skin.points[3 * size_t(triangles[3 * t + k])];
     double u[3], v[3];
-    for (int k = 0; k < 3; ++k) u[k] = p[1][k] - p[0][k], v[k] = p[2][k] - p[0][k], centre[t][k] = (p[0][k] + p[1][k] + p[2][k]) / 3;
+    for (int k = 0; k < 3; ++k) u[k] = p[1][k] - p[0][k], v[k] = p[2][k] - p[0][k], center[t][k] = (p[0][k] + p[1][k] + p[2][k]) / 3;
     area[t] = 0.5 * std::hypot(u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]);
   }
   const Shared shared = share_on_skin({0, 1}, c.body);
@@ -90,7 +90,7 @@ TEST(ShareOnSkin, ForceAndTorque_AreThoseOfTheTraction) {
     for (int k = 0; k < 3; ++k) middle[k] += shared.weights[i] * c.body.points[3 * size_t(shared.points[i]) + size_t(k)];
   }
   EXPECT_NEAR(sum, 1, 1e-14);
-  for (int k = 0; k < 3; ++k) EXPECT_NEAR(middle[k], (area[0] * centre[0][k] + area[1] * centre[1][k]) / (area[0] + area[1]), 1e-14) << "where the force acts";
+  for (int k = 0; k < 3; ++k) EXPECT_NEAR(middle[k], (area[0] * center[0][k] + area[1] * center[1][k]) / (area[0] + area[1]), 1e-14) << "where the force acts";
 }
 
 TEST(SelectOnFilled, Box_TakesTheSurfaceInIt) {

@@ -61,9 +61,9 @@ DFM_API dfm_status dfm_ode_get_stats(dfm_ode ode, dfm_ode_stats *out);
 /** What stands for a geom: reports, pair rules, rays and filters take it. @return DFM_OK; DFM_E_ARG the geom is not in the space or takes no part;
  * DFM_E_UNSUPPORTED as dfm_ode_step. Threads: Not during step. Since 0.1. */
 DFM_API dfm_status dfm_ode_obstacle(dfm_ode ode, dGeomID geom, dfm_obstacle *out);
-/** What stands for a body with at least one geom that takes part. Its dfm_rigid_state is in the world's frame, about the centre of mass that ODE has it at;
+/** What stands for a body with at least one geom that takes part. Its dfm_rigid_state is in the world's frame, about the center of mass that ODE has it at;
  * its rotation is that of the principal axes of dMass.I, the body's own where I is diagonal. Joints are ODE's: dfm_rigid_joint knows none of them,
- * dJointGetFeedback has their forces, in the world's frame, moments about each body's centre of mass, of the last sub-step.
+ * dJointGetFeedback has their forces, in the world's frame, moments about each body's center of mass, of the last sub-step.
  * Threads: Not during step. Since 0.1. */
 DFM_API dfm_status dfm_ode_rigid(dfm_ode ode, dBodyID body, dfm_rigid *out);
 

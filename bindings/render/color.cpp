@@ -1,4 +1,4 @@
-// Colours of bodies and of values. The maps are straight lines of lightness through OKLab (B. Ottosson 2020) with our own course of hue
+// Colors of bodies and of values. The maps are straight lines of lightness through OKLab (B. Ottosson 2020) with our own course of hue
 // and chroma, so that equal steps of a value look like equal steps of lightness; they are our approximations, not a published map.
 #include <algorithm>
 #include <cmath>
@@ -29,8 +29,8 @@ void oklab_to_linear(float lightness, float a, float b, float (&rgb)[3]) {
   rgb[2] = -0.0041960863f * l - 0.7034186147f * m + 1.7076147010f * s;
 }
 
-// Where a colour leaves the screen's range its chroma is lowered, never its lightness.
-Colour from_lch(float lightness, float chroma, float hue_deg) {
+// Where a color leaves the screen's range its chroma is lowered, never its lightness.
+Color from_lch(float lightness, float chroma, float hue_deg) {
   const float h = hue_deg * 3.14159265f / 180;
   float rgb[3], low = 0, high = chroma, c = chroma;
   for (int i = 0; i < 14; ++i) {
@@ -43,7 +43,7 @@ Colour from_lch(float lightness, float chroma, float hue_deg) {
 }
 
 template <size_t N>
-Colour along(const Lch (&path)[N], float t) {
+Color along(const Lch (&path)[N], float t) {
   size_t i = 0;
   while (i + 2 < N && t > path[i + 1].t) ++i;
   const Lch &p = path[i], &q = path[i + 1];
@@ -60,14 +60,14 @@ constexpr Lch kWarm[] = {{0, 0.90f, 0.005f, 30}, {1, 0.45f, 0.17f, 30}};
 
 }  // namespace
 
-Colour palette(uint32_t i) {
-  static constexpr Colour colours[] = {
+Color palette(uint32_t i) {
+  static constexpr Color colors[] = {
       {0.890f, 0.365f, 0.286f}, {0.243f, 0.510f, 0.796f}, {0.957f, 0.706f, 0.243f}, {0.180f, 0.631f, 0.557f}, {0.557f, 0.431f, 0.757f},
       {0.510f, 0.690f, 0.310f}, {0.886f, 0.494f, 0.643f}, {0.388f, 0.471f, 0.573f}, {0.690f, 0.498f, 0.361f}, {0.376f, 0.741f, 0.847f}};
-  return colours[i % std::size(colours)];
+  return colors[i % std::size(colors)];
 }
 
-Colour map_colour(ColourMap map, float t) {
+Color map_color(ColourMap map, float t) {
   t = t > 0 ? std::min(t, 1.f) : 0.f;
   switch (map) {
     case ColourMap::lagoon: return along(kLagoon, t);
