@@ -111,8 +111,8 @@ void copy_ops(RegisteredType &out) {
     out.type.ops = &out.model;
   } else {
     copy_struct(out.solver, ops, kSolverHead, id, "dfm_solver");
-    if (!out.solver.analyze || !out.solver.factor || !out.solver.solve || !out.solver.release)
-      bad(id, "a solver needs analyze, factor, solve and release");
+    if (!out.solver.analyse || !out.solver.factor || !out.solver.solve || !out.solver.release)
+      bad(id, "a solver needs analyse, factor, solve and release");
     out.type.ops = &out.solver;
   }
 }
