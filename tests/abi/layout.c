@@ -51,7 +51,7 @@ static const Row rows[] = {
   M(dfm_stepper, size), M(dfm_stepper, reserved), M(dfm_stepper, predict), M(dfm_stepper, respond), M(dfm_stepper, diagonal),
   M(dfm_stepper, commit), M(dfm_stepper, fetch),
   S(dfm_solver),
-  M(dfm_solver, size), M(dfm_solver, flags), M(dfm_solver, analyze), M(dfm_solver, factor), M(dfm_solver, solve),
+  M(dfm_solver, size), M(dfm_solver, flags), M(dfm_solver, analyse), M(dfm_solver, factor), M(dfm_solver, solve),
   M(dfm_solver, release),
   S(dfm_plugin),
   M(dfm_plugin, size), M(dfm_plugin, abi), M(dfm_plugin, abi_draft), M(dfm_plugin, ntype), M(dfm_plugin, types),

@@ -193,7 +193,7 @@ std::string metadata_complete(const Subject &subject) {
     slots_sound(model.slots, model.nslot, false);
   } else {
     const auto &solver = *static_cast<const dfm_solver *>(type.ops);
-    if (!solver.analyze || !solver.factor || !solver.solve || !solver.release) broken("a solver needs analyze, factor, solve and release; set all four");
+    if (!solver.analyse || !solver.factor || !solver.solve || !solver.release) broken("a solver needs analyse, factor, solve and release; set all four");
   }
   return text("%s %s, %s", type.id, type.version, type.licence);
 }
