@@ -6,7 +6,7 @@
 
 #include "core/handle.h"
 #include "scenes.h"
-#include "world/world.h"
+#include "world/context.h"
 
 namespace {
 
@@ -63,7 +63,7 @@ TEST_P(Determinism, LivesOfCandidateLists_DoNotShow) {
   for (double skin : {1.0, 90.0}) {
     const test::Context c;
     const dfm_world w = GetParam().build(c);
-    static_cast<dfm::World *>(dfm::handle_find(dfm::Kind::world, w))->broad.set_skin_steps(skin);
+    static_cast<dfm::World *>(dfm::handle_find(dfm::Kind::world, w))->steps->broad.set_skin_steps(skin);
     scenes::advance(w, GetParam().steps);
     EXPECT_EQ(dfm_world_hash(w), usual) << "skin of " << skin << " steps";
   }
@@ -73,7 +73,7 @@ TEST_P(Determinism, LivesOfCandidateLists_DoNotShow) {
 TEST_P(Determinism, ForgottenCandidateLists_DoNotShow) {
   const test::Context c;
   const dfm_world w = GetParam().build(c);
-  dfm::BroadPhase &broad = static_cast<dfm::World *>(dfm::handle_find(dfm::Kind::world, w))->broad;
+  dfm::BroadPhase &broad = static_cast<dfm::World *>(dfm::handle_find(dfm::Kind::world, w))->steps->broad;
   std::mt19937 random(3);
   for (int i = 0; i < GetParam().steps; ++i) {
     if (random() % 5 == 0) broad.clear();

@@ -10,6 +10,8 @@
 #include "world/held.h"
 #include "world/measure.h"
 #include "world/queries.h"
+#include "world/context.h"
+#include "world/stages.h"
 
 using namespace dfm;
 
@@ -38,7 +40,7 @@ void stop_held(Body &b) {
 
 // Lasting loads that do not vary are summed once; varying ones are summed anew by the motion stage.
 // What the host changes is no work of the step's.
-void disturb(Body &b) { b.world->wake(b), forget_energy(b); }
+void disturb(Body &b) { wake(*b.world, b), forget_energy(b); }
 
 void sum_loads(Body &b) {
   std::fill(b.p.load.begin(), b.p.load.end(), 0.0);
@@ -170,7 +172,7 @@ dfm_status dfm_body_set_state(dfm_body body, uint32_t n, const double *x, const 
       }
     disturb(b);
     b.world->bound_age = kNone;
-    b.world->guard.forget();
+    ++b.world->placements;
     if (x) b.world->overlaps.place(b.id);
   });
 }
@@ -332,7 +334,7 @@ dfm_status dfm_body_set_params(dfm_body body, const dfm_params *params) {
 dfm_status dfm_body_wake(dfm_body body) {
   return guard([&] {
     Body &b = body_of(body);
-    idle(*b.world).wake(b);
+    wake(idle(*b.world), b);
   });
 }
 

@@ -6,6 +6,8 @@
 #include "api/objects.h"
 #include "friction/pair_rules.h"
 #include "world/measure.h"
+#include "world/context.h"
+#include "world/stages.h"
 
 using namespace dfm;
 
@@ -118,7 +120,7 @@ dfm_status dfm_world_add_friction(dfm_world world, const dfm_friction_def *given
     w.friction.reserve(w.friction.size() + 1);
     rule.law = w.add_law(def.law, {def.params.values, def.params.n}, free_laws(w, rule.between));
     add_rule(w.friction, std::move(rule));
-    w.wake_all();
+    wake_all(w);
     w.changed = true;
   });
 }
@@ -128,7 +130,7 @@ dfm_status dfm_world_filter_pair(dfm_world world, const char *a, const char *b, 
     World &w = idle(world_of(world));
     add_rule(w.filters, FilterRule{{side(w, a, false), side(w, b, false)}, collide});
     if (collide) w.overlaps.all = true;
-    w.wake_all();
+    wake_all(w);
     w.changed = true;
   });
 }
@@ -244,7 +246,7 @@ dfm_status dfm_world_hold_begin(dfm_world world) {
     w.holding = true, w.hold_start = w.time;
     std::fill(w.store.held.begin(), w.store.held.end(), uint8_t(0));
     std::fill(w.store.path.begin(), w.store.path.end(), 0.0);
-    w.hold_sleepers();
+    hold_sleepers(w);
   });
 }
 

@@ -10,6 +10,8 @@
 #include "api/objects.h"
 #include "plugin/call.h"
 #include "plugin/params.h"
+#include "world/context.h"
+#include "world/stages.h"
 
 namespace dfm {
 namespace {

@@ -5,6 +5,8 @@
 #include "api/objects.h"
 #include "world/bounds.h"
 #include "world/create.h"
+#include "world/context.h"
+#include "world/stages.h"
 
 using namespace dfm;
 
@@ -79,10 +81,10 @@ dfm_status dfm_obstacle_teleport(dfm_obstacle obstacle, const dfm_pose *pose) {
     Obstacle &o = movable(obstacle, pose);
     World &w = *o.world;
     w.overlaps.place(o.id);
-    w.wake_all();   // it may have been put where someone sleeps, or taken from under someone
+    wake_all(w);   // it may have been put where someone sleeps, or taken from under someone
     o.keys.clear();
     o.def.sine = {};
     o.pose = to_pose(*pose), o.has_target = false;
-    w.guard.forget();
+    ++w.placements;
   });
 }

@@ -1,6 +1,8 @@
 #include "deform/rigid.h"
 
 #include "api/objects.h"
+#include "world/context.h"
+#include "world/stages.h"
 
 using namespace dfm;
 
@@ -106,7 +108,7 @@ dfm_status dfm_rigid_set_state(dfm_rigid rigid, const dfm_rigid_state *state) {
     set_rigid_state(o, *state);
     for (auto &shape : w.obstacles)
       if (shape->rigid == o.rigid && shape->rigid_body == o.rigid_body) w.overlaps.place(shape->id);
-    w.wake_all();   // it may have been put where someone sleeps
+    wake_all(w);   // it may have been put where someone sleeps
   });
 }
 

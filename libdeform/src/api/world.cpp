@@ -5,6 +5,9 @@
 
 #include "api/objects.h"
 #include "world/explain.h"
+#include "world/step_bound.h"
+#include "world/context.h"
+#include "world/stages.h"
 
 using namespace dfm;
 
@@ -88,7 +91,7 @@ dfm_status dfm_world_create(dfm_context *context, const dfm_world_def *def, dfm_
     if (w->def.integrator != DFM_INTEGRATOR_AUTO && w->def.integrator != DFM_INTEGRATOR_SYMPLECTIC_EULER)
       fail(DFM_E_UNSUPPORTED, "integrator %d is not available; use DFM_INTEGRATOR_AUTO or DFM_INTEGRATOR_SYMPLECTIC_EULER", w->def.integrator);
     for (const char *const *e = w->def.effects; e && *e; ++e) w->asked_effects.push_back(*e);
-    w->prepare();
+    prepare(*w);
     w->changed = true;
     w->handle = handle_create(Kind::world, w.get());
     try {
@@ -118,7 +121,7 @@ dfm_status dfm_world_set_gravity(dfm_world world, const double gravity[3]) {
       if (!std::isfinite(gravity[k])) fail(DFM_E_ARG, "gravity is not finite; give m/s2");
     store3(w.def.gravity, load3(gravity));
     w.gravity_keys.clear();
-    w.wake_all();
+    wake_all(w);
     w.changed = true;
   });
 }
@@ -130,7 +133,7 @@ dfm_status dfm_world_set_gravity_keys(dfm_world world, uint32_t n, const dfm_vec
     std::vector<dfm_vector_key> copy(keys, keys + n);
     check_keys(copy, "gravity");
     w.gravity_keys = std::move(copy);
-    w.wake_all();
+    wake_all(w);
     w.changed = true;
   });
 }
@@ -139,7 +142,7 @@ dfm_status dfm_world_set_sleep(dfm_world world, bool sleep) {
   return guard([&] {
     World &w = idle(world_of(world));
     if (sleep) rollback_refuse(w, "sleep (contact.sleep)");
-    w.wake_all();
+    wake_all(w);
     w.def.sleep = sleep;
     w.changed = true;
   });
@@ -174,9 +177,9 @@ dfm_status dfm_world_stable_step(dfm_world world, double *dt, dfm_body *body, ui
   return guard([&] {
     World &w = idle(world_of(world));
     need(dt, "dt");
-    w.prepare();
+    prepare(w);
     // The bound that the next step uses: asked anew only when it would ask, so that reading it changes no result.
-    if (w.bound_due()) w.update_bound();
+    if (bound_due(w)) update_bound(w);
     *dt = offered_step(w.sizes, w.stable);
     if (body) *body = w.worst_body ? w.worst_body->handle : 0;
     if (point) *point = w.worst_point;
@@ -186,7 +189,7 @@ dfm_status dfm_world_stable_step(dfm_world world, double *dt, dfm_body *body, ui
 dfm_status dfm_world_overlaps(dfm_world world, uint32_t capacity, dfm_overlap *out, uint32_t *n) {
   return guard([&] {
     World &w = idle(world_of(world));
-    w.prepare();
+    prepare(w);
     if (!room(static_cast<uint32_t>(w.overlaps.found.size()), capacity, out, n)) return;
     for (const Overlap &o : w.overlaps.found) {
       const uint32_t aside = o.aside && !o.separated ? DFM_OVERLAP_ASIDE : 0, parted = o.separated ? DFM_OVERLAP_SEPARATED : 0;
@@ -199,10 +202,10 @@ dfm_status dfm_world_overlaps(dfm_world world, uint32_t capacity, dfm_overlap *o
 dfm_status dfm_world_find_overlaps(dfm_world world, uint32_t *n) {
   return guard([&] {
     World &w = idle(world_of(world));
-    w.prepare();
+    prepare(w);
     const bool told = w.overlaps.told;
     w.overlaps.all = w.overlaps.look_only = true;
-    w.prepare();
+    prepare(w);
     w.overlaps.told = told;
     if (n) *n = static_cast<uint32_t>(w.overlaps.found.size());
   });
@@ -212,7 +215,7 @@ dfm_status dfm_world_untangle(dfm_world world, uint32_t *left) {
   return guard([&] {
     World &w = idle(world_of(world));
     w.overlaps.all = w.overlaps.untangle = true;
-    w.prepare();
+    prepare(w);
     const auto &found = w.overlaps.found;
     if (left) *left = static_cast<uint32_t>(std::count_if(found.begin(), found.end(), [](const Overlap &o) { return !o.separated; }));
   });
@@ -231,7 +234,7 @@ uint64_t dfm_world_hash(dfm_world world) {
 dfm_status dfm_world_snapshot(dfm_world world, void *buffer, size_t *bytes) {
   return guard([&] {
     World &w = idle(world_of(world));
-    w.prepare();
+    prepare(w);
     std::vector<unsigned char> data;
     world_snapshot(w, data);
     give_bytes(data.data(), data.size(), buffer, bytes);
@@ -281,7 +284,7 @@ dfm_status dfm_world_get_stats(dfm_world world, dfm_world_stats *out) {
   return guard([&] {
     const World &w = world_of(world);
     dfm_world_stats s = w.stats;
-    s.rebuilds = w.broad.stats().rebuilds, s.refits = w.broad.stats().refits;
+    s.rebuilds = w.steps->broad.stats().rebuilds, s.refits = w.steps->broad.stats().refits;
     s.threads = w.context->tasks.threads();
     s.time = w.time, s.asleep = w.sleepers;
     give(out, s);
@@ -291,11 +294,11 @@ dfm_status dfm_world_get_stats(dfm_world world, dfm_world_stats *out) {
 dfm_status dfm_world_profile(dfm_world world, uint32_t capacity, dfm_stage_time *out, uint32_t *n) {
   return guard([&] {
     World &w = idle(world_of(world));
-    w.prepare();
+    prepare(w);
     if (!room(static_cast<uint32_t>(w.plan.stages.size()), capacity, out, n)) return;
     for (size_t i = 0; i < w.plan.stages.size(); ++i) {
       const StageId id = w.plan.stages[i].id;
-      out[i] = {stage_name(id), w.stage_seconds[size_t(id)], w.stage_calls[size_t(id)]};
+      out[i] = {stage_name(id), w.steps->stage_seconds[size_t(id)], w.steps->stage_calls[size_t(id)]};
     }
   });
 }
@@ -303,8 +306,8 @@ dfm_status dfm_world_profile(dfm_world world, uint32_t capacity, dfm_stage_time 
 dfm_status dfm_world_explain(dfm_world world, char *text, size_t *bytes) {
   return guard([&] {
     World &w = idle(world_of(world));
-    w.prepare();
-    if (w.bound_due()) w.update_bound();
+    prepare(w);
+    if (bound_due(w)) update_bound(w);
     const std::string json = explain(w);
     give_bytes(json.c_str(), json.size() + 1, text, bytes);
   });

@@ -13,6 +13,8 @@
 
 #include <algorithm>
 
+#include "world/context.h"
+#include "world/stages.h"
 #include "world/world.h"
 
 namespace dfm {
@@ -74,67 +76,67 @@ Turn turn_of(const Body &b, uint8_t type, uint32_t feature, Vec3 n) {
   return near.turn(n);
 }
 
-Turn turn_of(const World &w, const Obstacle &o, Vec3 n) {
+Turn turn_of(const World &w, const StepContext &step, const Obstacle &o, Vec3 n) {
   if (!o.rigid && !o.has_target && !o.moves()) return {1, 0};
-  const double a = w.guard.motion * dot(n, spin_between(o.pose.rotation, o.end_pose(w.time, w.h, w.left).rotation, 1));
+  const double a = step.guard.motion * dot(n, spin_between(o.pose.rotation, o.end_pose(w.time, step.h, step.left).rotation, 1));
   const double half = 0.5 * a * (1 + a * a / 12);   // tan(a / 2) up to a^5
   return unit_turn(1 - half * half, 2 * half);   // of length one: what is halved after it counts on that
 }
 
 }  // namespace
 
-void share_areas(World &w) {
+void share_areas(World &w, StepContext &step) {
   const auto counts = [](const LawInstance *law) { return (law->ops->needs & DFM_NEED_AREA) && !(law->ops->flags & DFM_FRIC_SET_VALUED); };
-  w.shares = std::any_of(w.law_list.begin(), w.law_list.end(), counts);
-  if (!w.shares) return w.exchange.clear(), w.aim.clear();
-  const uint32_t n = w.rows.n;
-  w.sharing.resize(n), w.aim.resize(n), w.stands.resize(n), w.ways.resize(n), w.renewed.resize(n);
-  w.areas.share(w.contacts, w.rows.impulse.data(), 1.1 * w.offset, w.aim.data());
-  for (uint32_t i = 0; i < n; ++i) w.sharing[i] = counts(w.law_list[w.state.law[i]]) ? w.state.law[i] : kNone;
-  w.exchange.list(w.contacts, w.sources, w.sharing.data(), w.aim.data());
-  w.renewal.list(w.contacts, w.rows.impulse.data());
+  step.shares = std::any_of(w.law_list.begin(), w.law_list.end(), counts);
+  if (!step.shares) return step.exchange.clear(), step.aim.clear();
+  const uint32_t n = step.rows.n;
+  step.sharing.resize(n), step.aim.resize(n), step.stands.resize(n), step.ways.resize(n), step.renewed.resize(n);
+  step.areas.share(step.contacts, step.rows.impulse.data(), 1.1 * w.offset, step.aim.data());
+  for (uint32_t i = 0; i < n; ++i) step.sharing[i] = counts(w.law_list[step.state.law[i]]) ? step.state.law[i] : kNone;
+  step.exchange.list(step.contacts, step.sources, step.sharing.data(), step.aim.data());
+  step.renewal.list(step.contacts, step.rows.impulse.data());
   for (uint32_t i = 0; i < n; ++i) {
-    const uint32_t m = w.match[i];
-    const bool carries = w.sharing[i] != kNone && w.rows.impulse[3 * size_t{i}] > 0;
-    w.stands[i] = carries && m < w.store.due.size() && w.store.law[m] == w.state.law[i] && w.store.due[m] > 0;
-    w.state.area[i] = w.stands[i] ? w.store.due[m] : w.aim[i];
+    const uint32_t m = step.match[i];
+    const bool carries = step.sharing[i] != kNone && step.rows.impulse[3 * size_t{i}] > 0;
+    step.stands[i] = carries && m < w.store.due.size() && w.store.law[m] == step.state.law[i] && w.store.due[m] > 0;
+    step.state.area[i] = step.stands[i] ? w.store.due[m] : step.aim[i];
   }
-  w.renewal.fill(w.stands.data(), w.aim.data(), w.state.area.data());
+  step.renewal.fill(step.stands.data(), step.aim.data(), step.state.area.data());
 }
 
 // Slid on: beyond what the bristles have taken up. The slip that a law was asked at is known to a hundredth (friction/local_solve.cpp); five count as none.
-void follow_load(World &w) {
-  ContactStore &to = w.next_store;
-  const ContactState &s = w.state;
-  const uint32_t n = static_cast<uint32_t>(w.aim.size());
+void follow_load(World &w, StepContext &step) {
+  ContactStore &to = step.next_store;
+  const ContactState &s = step.state;
+  const uint32_t n = static_cast<uint32_t>(step.aim.size());
   to.due.resize(n);
   if (n == 0) return;
   for (uint32_t i = 0; i < n; ++i) {
-    w.ways[i] = {0, 0};
-    if (w.sharing[i] == kNone || !(w.rows.impulse[3 * size_t{i}] > 0)) continue;
+    step.ways[i] = {0, 0};
+    if (step.sharing[i] == kNone || !(step.rows.impulse[3 * size_t{i}] > 0)) continue;
     const LawInstance &law = *w.law_list[s.law[i]];
-    const double x = w.h * s.vt[i], y = w.h * s.vt[s.stride + i], far = std::sqrt(x * x + y * y);
+    const double x = step.h * s.vt[i], y = step.h * s.vt[s.stride + i], far = std::sqrt(x * x + y * y);
     double pairs = 0;
     for (uint32_t k = 0; k + 1 < law.nstate; ++k) {
       if (!law.tangent[k]) continue;
       const double *const z = &s.bristle[size_t{k} * s.stride + i], *const after = &s.bristle_out[size_t{k} * s.stride + i];
       const double a = x - (after[0] - z[0]), b = y - (after[s.stride] - z[s.stride]);
-      w.ways[i].slid += std::max(0.0, std::sqrt(a * a + b * b) - 0.05 * far);
-      w.ways[i].out += std::sqrt(after[0] * after[0] + after[s.stride] * after[s.stride]);
+      step.ways[i].slid += std::max(0.0, std::sqrt(a * a + b * b) - 0.05 * far);
+      step.ways[i].out += std::sqrt(after[0] * after[0] + after[s.stride] * after[s.stride]);
       ++pairs, ++k;
     }
-    if (pairs == 0) w.ways[i].slid = far;
+    if (pairs == 0) step.ways[i].slid = far;
   }
-  w.renewal.measure(w.h, w.rows.impulse.data(), w.ways.data(), s.dwell.data(), w.renewed.data());
-  w.exchange.pass(w.rows.impulse.data(), w.aim.data());
-  for (uint32_t i = 0; i < n; ++i) to.due[i] = s.area[i] + w.renewed[i] * (w.aim[i] - s.area[i]);
+  step.renewal.measure(step.h, step.rows.impulse.data(), step.ways.data(), s.dwell.data(), step.renewed.data());
+  step.exchange.pass(step.rows.impulse.data(), step.aim.data());
+  for (uint32_t i = 0; i < n; ++i) to.due[i] = s.area[i] + step.renewed[i] * (step.aim[i] - s.area[i]);
 }
 
-void fit_bristles(World &w) {
-  ContactState &s = w.state;
+void fit_bristles(World &w, StepContext &step) {
+  ContactState &s = step.state;
   if (s.nstate == 0) return;
-  for (uint32_t i = 0; i < w.rows.n; ++i) {
-    const uint32_t m = w.match[i];
+  for (uint32_t i = 0; i < step.rows.n; ++i) {
+    const uint32_t m = step.match[i];
     if (m == kNone || !(w.store.area[m] < s.area[i])) continue;
     const LawInstance &law = *w.law_list[s.law[i]];
     for (uint32_t k = 0; k < law.nstate; ++k)
@@ -142,15 +144,15 @@ void fit_bristles(World &w) {
   }
 }
 
-void turn_frames(World &w) {
-  ContactStore &to = w.next_store;
-  for (uint32_t i = 0; i < w.rows.n; ++i) {
-    const LawInstance &law = *w.law_list[w.state.law[i]];
+void turn_frames(World &w, StepContext &step) {
+  ContactStore &to = step.next_store;
+  for (uint32_t i = 0; i < step.rows.n; ++i) {
+    const LawInstance &law = *w.law_list[step.state.law[i]];
     if (!law.turns || !to.touching[i]) continue;
-    const ContactPoint &c = w.contacts[i];
+    const ContactPoint &c = step.contacts[i];
     const Vec3 n = load3(c.normal), t = load3(&to.tangent[3 * size_t{i}]);
     const Turn a = turn_of(*w.bodies[c.slot_a], c.type_a, c.feature_a, n);
-    const Turn b = c.obstacle ? turn_of(w, *w.obstacles[c.slot_b], n) : turn_of(*w.bodies[c.slot_b], c.kind == kEdgeEdge ? 1 : 2, c.feature_b, n);
+    const Turn b = c.obstacle ? turn_of(w, step, *w.obstacles[c.slot_b], n) : turn_of(*w.bodies[c.slot_b], c.kind == kEdgeEdge ? 1 : 2, c.feature_b, n);
     const Turn both{a.c * b.c - a.s * b.s, a.c * b.s + a.s * b.c}, mean = unit_turn(1 + both.c, both.s);   // half of the sum
     store3(&to.tangent[3 * size_t{i}], mean.c * t + mean.s * cross(n, t));
   }

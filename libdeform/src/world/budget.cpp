@@ -8,6 +8,8 @@
 
 #include "core/error.h"
 #include "surfel/make_surface.h"
+#include "world/context.h"
+#include "world/stages.h"
 #include "world/world.h"
 
 namespace dfm {
@@ -39,8 +41,8 @@ bool take_request(uint64_t world) noexcept {
 
 double now() { return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count(); }
 
-double used_share(const World &w) {
-  const Budget &b = w.budget;
+double used_share(const StepContext &step) {
+  const Budget &b = step.budget;
   double share = b.limit ? double(b.work) / double(b.limit) : 0;
   if (b.end > 0) share = std::max(share, 1 - (b.end - now()) / b.span);
   return share;
@@ -110,89 +112,90 @@ void changing(Stream &s, World &w) {
 }
 
 // The two stores and the two reports change places as sub-steps end, so what is put back may have to fit into the other one.
-void reserve_others(World &w) {
+void reserve_others(World &w, StepContext &step) {
   std::array<size_t, 17> size{};
   size_t k = 0;
   each_column(w.store, [&](auto &a) { size[k++] = a.size(); });
-  k = 0, each_column(w.next_store, [&](auto &a) { a.reserve(size[k++]); });
+  k = 0, each_column(step.next_store, [&](auto &a) { a.reserve(size[k++]); });
   k = 0, each_column_of_report(w.report, [&](auto &a) { size[k++] = a.size(); });
-  k = 0, each_column_of_report(w.last_report, [&](auto &a) { a.reserve(size[k++]); });
+  k = 0, each_column_of_report(step.last_report, [&](auto &a) { a.reserve(size[k++]); });
 }
 
 // What the step changes at its start, before it is known whether more has to be kept.
 template <class Stream>
 void changed_at_once(Stream &s, World &w) { s.array(w.step_impulses.pairs), s.value(w.step_impulses.idle), s.value(w.sizes); }
 
-void return_to_start(World &w) {
-  PutBack from{w.budget.start.data()};
+void return_to_start(World &w, StepContext &step) {
+  PutBack from{step.budget.start.data()};
   changed_at_once(from, w);
-  if (w.budget.kept) {
+  if (step.budget.kept) {
     changing(from, w);
     for (auto &b : w.bodies)
       if (b->slumber.asleep) gather_surface(b->surface, b->p.x.data(), b->p.v.data());
-    w.gather_active();
+    gather_active(w);
   }
   const uint64_t cheapened = w.stats.cheapened;
-  w.stats = w.budget.stats, w.stats.cheapened = cheapened;
-  w.guard.forget();
+  w.stats = step.budget.stats, w.stats.cheapened = cheapened;
+  step.guard.forget();
 }
 
-void tell(const World &w, StepStopped::Why why, double dt) {
-  const unsigned long long step = w.step_count;
-  if (why == StepStopped::asked) return set_last_error(format("step %llu was asked to stop; the state is as before it", step).c_str());
+void tell(const World &w, const StepContext &step, StepStopped::Why why, double dt) {
+  const unsigned long long number = w.step_count;
+  if (why == StepStopped::asked) return set_last_error(format("step %llu was asked to stop; the state is as before it", number).c_str());
   const char *const body = w.worst_body ? w.worst_body->name.c_str() : "?";
   if (why == StepStopped::time)
     return set_last_error(format("step %llu: %g s of simulated time took longer than max_time (%g s); the state is as before it; take a shorter step, or "
-                                 "give it more time", step, dt, w.def.max_time).c_str());
+                                 "give it more time", number, dt, w.def.max_time).c_str());
   set_last_error(format("step %llu: %g s of simulated time need more than %llu units of work (max_work), in contact or in body '%s', whose step bound is the "
-                        "least; the state is as before it; take a shorter step, soften the blow, or raise max_work", step, dt,
-                        static_cast<unsigned long long>(w.budget.limit), body).c_str());
+                        "least; the state is as before it; take a shorter step, soften the blow, or raise max_work", number, dt,
+                        static_cast<unsigned long long>(step.budget.limit), body).c_str());
 }
 
 }  // namespace
 
-uint64_t body_work(const World &w) {
+uint64_t body_work(const World &w, const StepContext &step) {
   uint64_t sum = 1;
-  for (const uint32_t i : w.active) sum += w.bodies[i]->p.n + w.bodies[i]->tets.size() / 4;
+  for (const uint32_t i : step.active) sum += w.bodies[i]->p.n + w.bodies[i]->tets.size() / 4;
   return sum;
 }
 
-uint64_t surface_work(const World &w) {
+uint64_t surface_work(const World &w, const StepContext &step) {
   uint64_t sum = 1;
-  for (const uint32_t i : w.active) sum += w.bodies[i]->surface.nsurfel;
+  for (const uint32_t i : step.active) sum += w.bodies[i]->surface.nsurfel;
   return sum;
 }
 
-void plan_work(World &w, uint32_t substeps) {
-  w.budget.limit = w.def.max_work ? w.def.max_work : kAutomaticFactor * substeps * (body_work(w) + surface_work(w));
+void plan_work(World &w, StepContext &step, uint32_t substeps) {
+  step.budget.limit = w.def.max_work ? w.def.max_work : kAutomaticFactor * substeps * (body_work(w, step) + surface_work(w, step));
 }
 
-void charge(World &w, uint64_t units) {
-  Budget &b = w.budget;
+void charge(World &w, StepContext &step, uint64_t units) {
+  Budget &b = step.budget;
   b.work += units;
   if (b.limit && b.work > b.limit) throw StepStopped{StepStopped::work};
   if (b.end > 0 && now() > b.end) throw StepStopped{StepStopped::time};
   if (waiting.load(std::memory_order_relaxed) != 0 && take_request(w.handle)) throw StepStopped{StepStopped::asked};
 }
 
-bool spares(World &w, Thrift what) {
+bool spares(StepContext &step, Thrift what) {
   const double from = what == Thrift::polish ? kNoPolishAt : what == Thrift::sweeps ? kFewSweepsAt : kNoPiecesAt;
-  if (!(used_share(w) > from)) return false;
-  w.budget.used = std::max(w.budget.used, what);
+  if (!(used_share(step) > from)) return false;
+  step.budget.used = std::max(step.budget.used, what);
   return true;
 }
 
-void keep_start(World &w) {
-  Budget &b = w.budget;
+void keep_start(World &w, StepContext &step) {
+  Budget &b = step.budget;
   if (b.kept) return;
   Keep to{b.start};
   changing(to, w);
-  reserve_others(w);
+  reserve_others(w, step);
   b.kept = true;
 }
 
 dfm_status step_within_budget(World &w, double dt, uint32_t *trouble) {
-  Budget &b = w.budget;
+  StepContext &step = *w.steps;
+  Budget &b = step.budget;
   b.work = b.limit = 0, b.kept = false, b.used = Thrift::none, b.stats = w.stats;
   b.span = w.def.max_time, b.end = b.span > 0 ? now() + b.span : 0;
   b.start.clear();
@@ -200,10 +203,10 @@ dfm_status step_within_budget(World &w, double dt, uint32_t *trouble) {
   changed_at_once(to, w);
   dfm_status status = DFM_DISCARD;
   try {
-    status = w.step(dt, trouble);
+    status = run_step(w, step, dt, trouble);
   } catch (const StepStopped &stopped) {
-    return_to_start(w);
-    tell(w, stopped.why, dt);
+    return_to_start(w, step);
+    tell(w, step, stopped.why, dt);
     *trouble = stopped.why == StepStopped::asked ? DFM_TROUBLE_INTERRUPTED : DFM_TROUBLE_BUDGET;
     ++w.stats.discarded;
   }

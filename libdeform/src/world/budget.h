@@ -9,6 +9,7 @@
 
 namespace dfm {
 
+struct StepContext;
 struct World;
 
 // What a step leaves out once it has used this much of its budget. Each entry contains those before it.
@@ -29,16 +30,16 @@ struct Budget {
 dfm_status step_within_budget(World &w, double dt, uint32_t *trouble);
 
 // Of World::step(): the step is going to be cut into so many sub-steps.
-void plan_work(World &w, uint32_t substeps);
+void plan_work(World &w, StepContext &step, uint32_t substeps);
 // Adds units and throws where the step has to end here. Called by the stepping thread only, never while another stage's threads run.
-void charge(World &w, uint64_t units);
+void charge(World &w, StepContext &step, uint64_t units);
 // Units of one pass over the bodies that are awake: points and cells; surfels.
-uint64_t body_work(const World &w);
-uint64_t surface_work(const World &w);
+uint64_t body_work(const World &w, const StepContext &step);
+uint64_t surface_work(const World &w, const StepContext &step);
 // Does the step go without this by now? Counts as used where it is so.
-bool spares(World &w, Thrift what);
+bool spares(StepContext &step, Thrift what);
 // The state before the step is written down, once, before anything of it changes.
-void keep_start(World &w);
+void keep_start(World &w, StepContext &step);
 
 // Asks the present step of a world, or if none runs the next one, to stop. Async-signal-safe. False: too many requests wait.
 bool request_stop(uint64_t world) noexcept;

@@ -13,6 +13,8 @@
 #include "world/bounds.h"
 #include "world/idle.h"
 #include "world/material.h"
+#include "world/context.h"
+#include "world/stages.h"
 
 namespace dfm {
 namespace {
@@ -68,6 +70,7 @@ void place_phyxels(Body &b, const dfm_body_def &def) {
 }  // namespace
 
 Body &create_body(World &w, const dfm_body_def &def) {
+  StepContext &step = *w.steps;
   auto owned = std::make_unique<Body>();
   Body &b = *owned;
   b.world = &w;
@@ -127,7 +130,7 @@ Body &create_body(World &w, const dfm_body_def &def) {
   if (w.def.method == DFM_METHOD_ROLLBACK) make(b.lagged, size_t(kStride) * p.n);
 
   w.bodies.reserve(w.bodies.size() + 1);
-  w.reserve_sleep(static_cast<uint32_t>(w.bodies.size() + 1));
+  reserve_sleep(w, step, static_cast<uint32_t>(w.bodies.size() + 1));
   w.overlaps.place(w.next_id);
   b.id = w.next_id;
   b.handle = handle_create(Kind::body, &b);
@@ -241,7 +244,7 @@ Obstacle &create_obstacle(World &w, const dfm_obstacle_def &def) {
   ++w.next_id;
   o.def.name = o.name.c_str();
   w.obstacles.push_back(std::move(owned));
-  w.wake_all();   // it may stand where someone sleeps
+  wake_all(w);   // it may stand where someone sleeps
   w.changed = true;
   return o;
 }
@@ -250,12 +253,12 @@ namespace {
 
 // What remembers the removed thing: its contacts end with an event, its friction work leaves the books, and rules that name it go with it.
 void forget(World &w, uint64_t id, bool obstacle, uint64_t handle, const std::string &name) {
-  w.close_slot(id, obstacle);
+  close_slot(w, id, obstacle);
   ContactStore &s = w.store;
-  w.reserve_events(s.n);
+  reserve_events(w, s.n);
   for (uint32_t i = 0; i < s.n; ++i)
     if ((s.id_a[i] == id || s.id_b[i] == id)) {
-      if (s.touching[i]) w.add_event(DFM_EVENT_END, s.id_a[i], s.id_b[i], s.key[i], w.time);
+      if (s.touching[i]) add_event(w, DFM_EVENT_END, s.id_a[i], s.id_b[i], s.key[i], w.time);
       s.touching[i] = 0;
     }
   const auto goes = [&](const std::string &side) {   // "body:GROUP" may also be all of another one's name

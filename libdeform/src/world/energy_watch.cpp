@@ -4,6 +4,8 @@
 #include <cmath>
 
 #include "core/error.h"
+#include "world/context.h"
+#include "world/stages.h"
 #include "world/world.h"
 
 namespace dfm {
@@ -31,32 +33,32 @@ struct Look {
 
 // What holders of driven points do, by the trapezoid of the force: the force at the start of this sub-step counts for half of the way of the one before,
 // and, where `now`, for half of this one's.
-double work_of_holders(const World &w, const Body &b, bool now) {
+double work_of_holders(const World &w, const StepContext &step, const Body &b, bool now) {
   double sum = 0;
-  for (const World::Driven &d : w.driven) {
+  for (const StepContext::Driven &d : step.driven) {
     if (d.velocity < b.p.v.data() || d.velocity >= b.p.v.data() + b.p.v.size()) continue;
     const size_t at = size_t(d.velocity - b.p.v.data());
     const double force = b.p.f[at] + b.p.mass[at / kStride] * w.gravity[int(at % kStride)];
-    sum -= 0.5 * force * (w.watch.last_h * d.before + (now ? w.h * *d.velocity : 0));
+    sum -= 0.5 * force * (w.watch.last_h * d.before + (now ? step.h * *d.velocity : 0));
   }
   return sum;
 }
 
 // Another size h of the sub-steps makes of G = .. + v.M v* / 2 another quantity that the scheme keeps, which is larger by (h2 - h1) v.f / 2. The changes that
 // the library makes itself are few, so what they bring is bounded and no instability.
-double work_of_new_size(const World &w, const Body &b) {
+double work_of_new_size(const World &w, const StepContext &step, const Body &b) {
   if (!w.watch.new_size || !(w.watch.last_h > 0)) return 0;
   const bool load_booked = books_loads(b);
   const Phyxels &p = b.p;
   double sum = 0;
   for (uint32_t i = 0; i < p.n; ++i)
     for (size_t k = 0, at = size_t(i) * kStride; k < 3; ++k, ++at)
-      if (p.inv_mass[at] > 0) sum += p.v[at] * (p.mass[i] * (p.v_free[at] - p.v[at]) - (load_booked ? w.h * p.load[at] : 0));
-  return 0.5 * (1 - w.watch.last_h / w.h) * sum;
+      if (p.inv_mass[at] > 0) sum += p.v[at] * (p.mass[i] * (p.v_free[at] - p.v[at]) - (load_booked ? step.h * p.load[at] : 0));
+  return 0.5 * (1 - w.watch.last_h / step.h) * sum;
 }
 
 // The energy that the scheme keeps, U(x) - F.x + v.M v_free / 2, and half of the energy of the kick, by which it may rise as stiff modes calm down.
-bool look(World &w, Body &b, Look &out) {
+bool look(World &w, StepContext &step, Body &b, Look &out) {
   const Phyxels &p = b.p;
   const bool load_booked = books_loads(b);
   double kinetic = 0, cross = 0, kick = 0, potential = 0, reach = 0;
@@ -70,24 +72,24 @@ bool look(World &w, Body &b, Look &out) {
       if (!(p.inv_mass[at + k] > 0)) continue;
       const double change = p.v_free[at + k] - v;
       kinetic += 0.5 * (m * v * v), kick += 0.5 * (m * change * change);
-      cross += 0.5 * v * (m * p.v_free[at + k] - (load_booked ? w.h * load : 0));
+      cross += 0.5 * v * (m * p.v_free[at + k] - (load_booked ? step.h * load : 0));
     }
   }
   double elastic = 0;
   const dfm_kin kin = b.kin(w.time, 0, nullptr);
   if (b.model.call("energy", [&] { return b.model.ops->energy(b.model.self, &kin, &elastic); }) != DFM_OK) return false;
-  const double drift = kPositionDigits * reach / w.h;
-  out = {kinetic, elastic, elastic + potential + cross - (b.energy.work + work_of_holders(w, b, false) + work_of_new_size(w, b)), kGivesBack * kick,
+  const double drift = kPositionDigits * reach / step.h;
+  out = {kinetic, elastic, elastic + potential + cross - (b.energy.work + work_of_holders(w, step, b, false) + work_of_new_size(w, step, b)), kGivesBack * kick,
          kRounding * (std::fabs(b.energy.work) + std::fabs(potential) + kinetic + elastic) + b.mass * drift * drift};
   return true;
 }
 
-void book_contact(World &w) {
-  for (uint32_t d = 0; d < w.rows.ndof; ++d) {
-    if (w.rows.source[d] == kNone) continue;
-    Body &b = *w.bodies[w.rows.source[d]];
+void book_contact(World &w, StepContext &step) {
+  for (uint32_t d = 0; d < step.rows.ndof; ++d) {
+    if (step.rows.source[d] == kNone) continue;
+    Body &b = *w.bodies[step.rows.source[d]];
     if (b.model.stepper) continue;
-    const size_t at = size_t(w.rows.point[d]) * kStride;
+    const size_t at = size_t(step.rows.point[d]) * kStride;
     double sum = 0;
     for (size_t k = 0; k < 3; ++k) {
       const double p = b.p.impulse[at + k], inverse = b.p.inv_mass[at + k];
@@ -98,7 +100,7 @@ void book_contact(World &w) {
 }
 
 // Loads without a potential; and, where the guard left out a part of the way, what the inner forces would have done on it.
-void book_body(World &w, Body &b, bool touched, double motion) {
+void book_body(World &w, StepContext &step, Body &b, bool touched, double motion) {
   const bool load_booked = books_loads(b);
   const Phyxels &p = b.p;
   double sum = 0;
@@ -107,8 +109,8 @@ void book_body(World &w, Body &b, bool touched, double motion) {
       const double booked = load_booked ? p.load[at] : 0;
       if (!(p.inv_mass[at] > 0) || (booked == 0 && motion == 1)) continue;
       const double end = p.v_free[at] + (touched ? p.inv_mass[at] * p.impulse[at] : 0);
-      sum += w.h * booked * 0.5 * (p.v[at] + end);
-      if (motion < 1) sum += (1 - motion) * w.h * end * (p.f[at] + p.mass[i] * w.gravity[int(k)] - booked);
+      sum += step.h * booked * 0.5 * (p.v[at] + end);
+      if (motion < 1) sum += (1 - motion) * step.h * end * (p.f[at] + p.mass[i] * w.gravity[int(k)] - booked);
     }
   b.energy.work += sum;
 }
@@ -130,15 +132,15 @@ void change_gravity(World &w, Vec3 gravity) {
   }
 }
 
-bool watch_energy(World &w, uint32_t *trouble) {
-  if (!watching(w) || w.guard.planned != w.h) return true;   // pieces of a sub-step are not compared with whole ones
+bool watch_energy(World &w, StepContext &step, uint32_t *trouble) {
+  if (!watching(w) || step.guard.planned != step.h) return true;   // pieces of a sub-step are not compared with whole ones
   double moving = 0;
-  for (const uint32_t i : w.active) moving += watched(*w.bodies[i]) ? w.free_kinetic[i] : 0;
+  for (const uint32_t i : step.active) moving += watched(*w.bodies[i]) ? step.free_kinetic[i] : 0;
   const double limit = w.def.energy_watch * w.stats.energy_max;
   bool due = w.watch.age >= kEvery;
-  for (const uint32_t i : w.active) {
+  for (const uint32_t i : step.active) {
     const EnergyBook &e = w.bodies[i]->energy;
-    const bool faster = w.free_kinetic[i] > 2 * e.kinetic + limit, wants_base = e.known < kSettles && (e.known > 0 || faster);
+    const bool faster = step.free_kinetic[i] > 2 * e.kinetic + limit, wants_base = e.known < kSettles && (e.known > 0 || faster);
     due = due || (watched(*w.bodies[i]) && (e.known == kSettles ? faster : wants_base && w.watch.credit >= kLookCosts));
   }
   dfm_world_stats &s = w.stats;
@@ -146,10 +148,10 @@ bool watch_energy(World &w, uint32_t *trouble) {
   w.watch.credit -= std::min(w.watch.credit, kLookCosts);
   double total = 0, gain = 0, most = 0;
   const Body *worst = nullptr;
-  for (const uint32_t i : w.active) {
+  for (const uint32_t i : step.active) {
     Body &b = *w.bodies[i];
     Look now;
-    if (!watched(b) || !look(w, b, now)) continue;
+    if (!watched(b) || !look(w, step, b, now)) continue;
     EnergyBook &e = b.energy;
     total += now.kinetic + now.elastic;
     const double rise = now.balance - e.base - now.rounding, level = now.balance + now.gives_back;
@@ -174,18 +176,18 @@ bool watch_energy(World &w, uint32_t *trouble) {
   return true;
 }
 
-void book_energy(World &w, double motion) {
+void book_energy(World &w, StepContext &step, double motion) {
   if (!watching(w)) return;
-  const bool touched = w.plan.touches() && w.rows.n > 0;
-  if (touched) book_contact(w);
-  for (const uint32_t i : w.active) {
+  const bool touched = w.plan.touches() && step.rows.n > 0;
+  if (touched) book_contact(w, step);
+  for (const uint32_t i : step.active) {
     Body &b = *w.bodies[i];
-    if (!w.driven.empty()) b.energy.work += work_of_holders(w, b, true);
-    if (!b.model.stepper && w.guard.planned == w.h) b.energy.work += work_of_new_size(w, b);
-    if (!b.model.stepper && (motion < 1 || books_loads(b))) book_body(w, b, touched, motion);
+    if (!step.driven.empty()) b.energy.work += work_of_holders(w, step, b, true);
+    if (!b.model.stepper && step.guard.planned == step.h) b.energy.work += work_of_new_size(w, step, b);
+    if (!b.model.stepper && (motion < 1 || books_loads(b))) book_body(w, step, b, touched, motion);
   }
-  w.watch.last_h = motion * w.h;
-  w.watch.new_size = w.watch.new_size && w.guard.planned != w.h;
+  w.watch.last_h = motion * step.h;
+  w.watch.new_size = w.watch.new_size && step.guard.planned != step.h;
   w.watch.age += w.watch.age < kEvery, w.watch.credit += w.watch.credit < kMostCredit;
 }
 

@@ -8,6 +8,7 @@
 
 namespace dfm {
 
+struct StepContext;
 struct World;
 struct Body;
 
@@ -32,9 +33,9 @@ struct EnergyWatch {
 // Gravity that varies: sets the present one, and books what that does to the potentials.
 void change_gravity(World &w, Vec3 gravity);
 // After predict. False: a body has gained too much; the sentence says which.
-bool watch_energy(World &w, uint32_t *trouble);
+bool watch_energy(World &w, StepContext &step, uint32_t *trouble);
 // Before commit: what this sub-step puts into the bodies.
-void book_energy(World &w, double motion);
+void book_energy(World &w, StepContext &step, double motion);
 // The host changes what only it can: the next look takes a new base.
 void forget_energy(Body &b);
 void forget_energy(World &w);

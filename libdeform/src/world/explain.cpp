@@ -5,6 +5,8 @@
 
 #include "core/error.h"
 #include "world/idle.h"
+#include "world/context.h"
+#include "world/stages.h"
 
 namespace dfm {
 namespace {
@@ -21,6 +23,7 @@ std::string quote(const std::string &s) {
 
 // What a stage costs grows with this; counts of the present scene, not seconds.
 std::string cost(const World &w, StageId id) {
+  const StepContext &step = *w.steps;
   size_t points = 0, cells = 0, surfels = 0, triangles = 0, weights = 0;
   for (auto &b : w.bodies) {
     points += b->p.n, cells += b->tets.size() / 4;
@@ -43,11 +46,11 @@ std::string cost(const World &w, StageId id) {
     case StageId::rollback: return "candidate pairs, again while any is tied";
     case StageId::self: {
       size_t n = 0, t = 0;
-      for (auto &s : w.self_bodies) n += s->body->surface.nsurfel, t += s->body->surface.ntri;
+      for (auto &s : step.self_bodies) n += s->body->surface.nsurfel, t += s->body->surface.ntri;
       return format("%zu surfels every sub-step, and what of them is near; %zu triangles whenever a skin is used up", n, t);
     }
     case StageId::solve: return "contacts x sweeps, laws once per pass";
-    case StageId::sleep: return format("velocities of %zu awake bodies of %zu", w.active.size(), w.bodies.size());
+    case StageId::sleep: return format("velocities of %zu awake bodies of %zu", step.active.size(), w.bodies.size());
     case StageId::guard: return "candidate pairs that may come nearer than d_c / 2 within the sub-step";
     case StageId::distribute: return format("contacts and %zu surfels", surfels);
     default: return "what is prescribed";

@@ -3,6 +3,8 @@
 #include <string>
 
 #include "core/error.h"
+#include "world/context.h"
+#include "world/stages.h"
 #include "world/world.h"
 
 namespace dfm {
@@ -19,30 +21,30 @@ const Body &fastest(const World &w) {
 }
 
 // The first contact that the solve has left with something not finite, or kNone.
-uint32_t spoilt(const World &w) {
-  for (uint32_t i = 0; i < w.rows.n; ++i)
+uint32_t spoilt(const StepContext &step) {
+  for (uint32_t i = 0; i < step.rows.n; ++i)
     for (size_t k = 0; k < 3; ++k)
-      if (!std::isfinite(w.rows.impulse[3 * size_t{i} + k])) return i;
+      if (!std::isfinite(step.rows.impulse[3 * size_t{i} + k])) return i;
   return kNone;
 }
 
-std::string sides(const World &w, uint32_t i) {
-  if (i >= w.contacts.size()) return format("body '%s' (the fastest one)", fastest(w).name.c_str());
-  const ContactPoint &c = w.contacts[i];
+std::string sides(const World &w, const StepContext &step, uint32_t i) {
+  if (i >= step.contacts.size()) return format("body '%s' (the fastest one)", fastest(w).name.c_str());
+  const ContactPoint &c = step.contacts[i];
   if (c.obstacle) return format("body '%s' on obstacle '%s'", w.bodies[c.slot_a]->name.c_str(), w.obstacles[c.slot_b]->name.c_str());
   return format("bodies '%s' and '%s'", w.bodies[c.slot_a]->name.c_str(), w.bodies[c.slot_b]->name.c_str());
 }
 
 // What the law was asked at a contact, and whether all of it is finite.
 struct Asked { std::string text; bool sound; };
-Asked asked(const World &w, const LawInstance &law, uint32_t i) {
-  const ContactState &s = w.state;
+Asked asked(const StepContext &step, const LawInstance &law, uint32_t i) {
+  const ContactState &s = step.state;
   const size_t n = s.stride;
   double sum = 0;
   const auto number = [&](double v) { return sum += 0.0 * v, format("%.9g", v); };
   std::string text = "normal force " + number(s.fn[i]) + " N, slip " + number(s.vt[i]) + " " + number(s.vt[n + i]) + " m/s, force that stops it " +
                      number(s.ft_stop[i]) + " " + number(s.ft_stop[n + i]) + " N, area " + number(s.area[i]) + " m2, in contact for " + number(s.dwell[i]) +
-                     " s, step " + number(w.h) + " s, state";
+                     " s, step " + number(step.h) + " s, state";
   for (uint32_t k = 0; k < law.nstate; ++k) text += " " + number(s.bristle[size_t{k} * n + i]);
   if (law.nstate == 0) text += " none";
   return {text, sum == 0};
@@ -50,11 +52,11 @@ Asked asked(const World &w, const LawInstance &law, uint32_t i) {
 
 }  // namespace
 
-uint32_t World::tell_failed_solve(const LawInstance *law) {
-  const uint32_t at = law ? batches.failed() : spoilt(*this);
-  const std::string where = format("step %llu, %s", static_cast<unsigned long long>(step_count), sides(*this, at).c_str());
+uint32_t tell_failed_solve(World &w, StepContext &step, const LawInstance *law) {
+  const uint32_t at = law ? step.batches.failed() : spoilt(step);
+  const std::string where = format("step %llu, %s", static_cast<unsigned long long>(w.step_count), sides(w, step, at).c_str());
   constexpr const char *kDo = "take a smaller step, lessen the loads or change the law";
-  const Asked in = law && at != kNone ? asked(*this, *law, at) : Asked{"", true};
+  const Asked in = law && at != kNone ? asked(step, *law, at) : Asked{"", true};
   if (!law || !in.sound) {
     set_last_error(format("%s: the contact solve is not finite%s; %s", where.c_str(), law ? (", so that law '" + std::string(law->type->id) + "' was asked at " +
                           in.text).c_str() : "", kDo).c_str());

@@ -16,6 +16,8 @@
 #include "surfel/obstacle_shape.h"
 #include "surfel/pierce.h"
 #include "surfel/reach.h"
+#include "world/context.h"
+#include "world/stages.h"
 #include "world/world.h"
 
 namespace dfm {
@@ -36,28 +38,28 @@ void split_motion(const Surface &s, Vec3 &mean, double &spread) {
 }
 
 // Only what contacts have touched moves otherwise than predicted.
-void bound_speeds(World &w) {
-  Guard &g = w.guard;
+void bound_speeds(World &w, StepContext &step) {
+  Guard &g = step.guard;
   g.speed.assign(w.bodies.size(), 0.0), g.change.assign(w.bodies.size(), 0.0);
-  for (uint32_t d = 0; d < w.rows.ndof; ++d) {
-    const uint32_t i = w.rows.source[d];
+  for (uint32_t d = 0; d < step.rows.ndof; ++d) {
+    const uint32_t i = step.rows.source[d];
     if (i == kNone) continue;
     const Body &b = *w.bodies[i];
     if (b.model.stepper) continue;
-    const Vec3 y = load3(&w.rows.y[size_t(d) * kStride]), change = y - load3(&b.p.v_free[size_t(w.rows.point[d]) * kStride]);
+    const Vec3 y = load3(&step.rows.y[size_t(d) * kStride]), change = y - load3(&b.p.v_free[size_t(step.rows.point[d]) * kStride]);
     g.speed[i] = std::max(g.speed[i], norm2(y)), g.change[i] = std::max(g.change[i], norm2(change));
   }
   const bool listed = w.plan.has(StageId::broad);   // else nothing has looked at the speeds before the solve
-  for (const uint32_t i : w.active) {
+  for (const uint32_t i : step.active) {
     const Body &b = *w.bodies[i];
-    const double before = listed ? w.broad.speed(i) : largest_speed(b.surface);
+    const double before = listed ? step.broad.speed(i) : largest_speed(b.surface);
     double &speed = g.speed[i];
     speed = std::sqrt(speed), g.change[i] = b.surface.weight_sum * std::sqrt(g.change[i]);
     if (b.model.stepper) {   // has written its end beside its start
       for (uint32_t s = 0; s < b.surface.nsurfel; ++s) {
         Vec3 x;
         b.surface.each_phyxel(s, [&](uint32_t p, double weight) { x += weight * load3(&b.p.f[size_t(p) * kStride]); });
-        speed = std::max(speed, norm(x - load3(&b.surface.x[size_t(s) * 4])) / w.h);
+        speed = std::max(speed, norm(x - load3(&b.surface.x[size_t(s) * 4])) / step.h);
       }
     } else {
       speed = b.surface.identity() ? std::max(speed, before) : before + g.change[i];
@@ -66,15 +68,15 @@ void bound_speeds(World &w) {
 }
 
 // All pairs that may come near: candidates of two sides, behind them those of bodies with themselves.
-void follow_lists(World &w) {
-  Guard &g = w.guard;
+void follow_lists(World &w, StepContext &step) {
+  Guard &g = step.guard;
   const bool pairs = w.plan.has(StageId::broad);
-  if (pairs) w.broad.cover(w.body_views, w.obstacle_views, w.filter, w.h, w.offset, g.speed);
-  const bool fresh = cover_self(w);
-  const uint64_t renewals = w.broad.stats().renewals;
+  if (pairs) step.broad.cover(step.body_views, step.obstacle_views, w.filter, step.h, w.offset, g.speed);
+  const bool fresh = cover_self(w, step);
+  const uint64_t renewals = step.broad.stats().renewals;
   if (!fresh && !g.memory.runs.empty() && g.lists == renewals) return;
   g.lists = renewals;
-  g.list = join_self(w, pairs ? &w.broad.candidates() : nullptr, g.joined) ? &g.joined : &w.broad.candidates();
+  g.list = join_self(step, pairs ? &step.broad.candidates() : nullptr, g.joined) ? &g.joined : &step.broad.candidates();
   g.memory.follow(*g.list);
 }
 
@@ -84,35 +86,35 @@ void make_room(GuardSide &s, const Surface &surface) {
 }
 
 // How all sides move as the solve left them.
-void set_sides(World &w) {
-  GuardScene &scene = w.guard.scene;
+void set_sides(World &w, StepContext &step) {
+  GuardScene &scene = step.guard.scene;
   const size_t nb = w.bodies.size();
-  scene.bodies = w.body_views, scene.obstacles = w.obstacle_views;
+  scene.bodies = step.body_views, scene.obstacles = step.obstacle_views;
   scene.sides.resize(nb + w.obstacles.size()), scene.poses.resize(w.obstacles.size());
-  scene.h = w.h, scene.floor = 0.5 * w.offset, scene.margin = 0.1 * (w.offset - scene.floor);
-  const bool touched = w.rows.n > 0;
+  scene.h = step.h, scene.floor = 0.5 * w.offset, scene.margin = 0.1 * (w.offset - scene.floor);
+  const bool touched = step.rows.n > 0;
   for (size_t i = 0; i < nb; ++i) {
     const Body &b = *w.bodies[i];
     GuardSide &s = scene.sides[i];
     make_room(s, b.surface);
-    s.still = b.slumber.asleep, s.travel = s.spread = w.h * w.guard.speed[i], s.drift = {};
+    s.still = b.slumber.asleep, s.travel = s.spread = step.h * step.guard.speed[i], s.drift = {};
     if (s.travel > kSlow * scene.floor && !b.model.stepper) {
       split_motion(b.surface, s.drift, s.spread);
-      s.drift = w.h * s.drift, s.spread = w.h * (s.spread + w.guard.change[i]);
+      s.drift = step.h * s.drift, s.spread = step.h * (s.spread + step.guard.change[i]);
     }
     s.v = b.p.v_free.data(), s.inv_mass = b.p.inv_mass.data(), s.impulse = touched ? b.p.impulse.data() : nullptr;
     s.to = b.model.stepper ? b.p.f.data() : nullptr, s.local = nullptr;
   }
-  for (const auto &b : w.self_bodies) {
+  for (const auto &b : step.self_bodies) {
     GuardSide &s = scene.sides[b->body->slot];
-    if (b->on) s.deform = b->body->model.stepper ? s.travel : w.h * (b->list.deforming() + w.guard.change[b->body->slot]);
+    if (b->on) s.deform = b->body->model.stepper ? s.travel : step.h * (b->list.deforming() + step.guard.change[b->body->slot]);
   }
   for (size_t o = 0; o < w.obstacles.size(); ++o) {
-    const ObstacleView &v = w.obstacle_views[o];
+    const ObstacleView &v = step.obstacle_views[o];
     GuardSide &s = scene.sides[nb + o];
     const double turn = norm(v.spin);
-    s.drift = w.h * v.velocity;
-    s.spread = turn > 0 ? w.h * turn * (v.shape == Shape::plane ? HUGE_VAL : ObstacleShape(v).extent()) : 0;
+    s.drift = step.h * v.velocity;
+    s.spread = turn > 0 ? step.h * turn * (v.shape == Shape::plane ? HUGE_VAL : ObstacleShape(v).extent()) : 0;
     s.travel = norm(s.drift) + s.spread;
     s.still = !v.moves();
     if (v.shape != Shape::mesh) continue;
@@ -122,16 +124,16 @@ void set_sides(World &w) {
 }
 
 // Everything goes this share of its way.
-void set_share(World &w, double share) {
-  GuardScene &scene = w.guard.scene;
-  w.guard.motion = scene.share = share;
+void set_share(World &w, StepContext &step, double share) {
+  GuardScene &scene = step.guard.scene;
+  step.guard.motion = scene.share = share;
   ++scene.round;
   for (size_t o = 0; o < w.obstacles.size(); ++o) {
-    const ObstacleView &v = w.obstacle_views[o];
+    const ObstacleView &v = step.obstacle_views[o];
     GuardPose &to = scene.poses[o];
     to = {v.position, v.rotation};
     if (!v.moves()) continue;
-    const Pose end = w.obstacles[o]->end_pose(w.time, w.h, w.left);
+    const Pose end = w.obstacles[o]->end_pose(w.time, step.h, step.left);
     to = {end.position, end.rotation};
     if (share < 1) to = {v.position + share * (end.position - v.position), slerp(v.rotation, end.rotation, share)};
     scene.sides[w.bodies.size() + o].pose = to;
@@ -139,30 +141,30 @@ void set_share(World &w, double share) {
 }
 
 // Two surfaces that cross at the start (as given by the user) are let out: what is through cannot be kept out, and to guard it would keep it in.
-bool cross_at_start(World &w, const Candidate &c) {
-  Guard &g = w.guard;
+bool cross_at_start(StepContext &step, const Candidate &c) {
+  Guard &g = step.guard;
   const uint32_t slot_a = c.obstacle ? c.slot_a : std::min(c.slot_a, c.slot_b), slot_b = c.obstacle ? c.slot_b : std::max(c.slot_a, c.slot_b);
   for (const Guard::Through &t : g.through)
     if (t.a == slot_a && t.b == slot_b && t.obstacle == bool(c.obstacle)) return t.yes;
-  const Surface &a = *w.body_views[slot_a].surface, &b = c.obstacle ? *w.obstacle_views[slot_b].surface : *w.body_views[slot_b].surface;
+  const Surface &a = *step.body_views[slot_a].surface, &b = c.obstacle ? *step.obstacle_views[slot_b].surface : *step.body_views[slot_b].surface;
   bool yes = false;
-  w.broad.near_triangles_of(slot_a, slot_b, c.obstacle,
+  step.broad.near_triangles_of(slot_a, slot_b, c.obstacle,
                             [&](uint32_t s, uint32_t t) { yes = yes || edges_pierce(a, s, b, t) || edges_pierce(b, t, a, s); });
   g.through.push_back({slot_a, slot_b, bool(c.obstacle), yes});
   return yes;
 }
 
 // The safe share of the way; 1: nothing comes too near.
-double find_hits(World &w) {
-  Guard &g = w.guard;
+double find_hits(World &w, StepContext &step) {
+  Guard &g = step.guard;
   g.hits.clear();
-  charge(w, surface_work(w));
+  charge(w, step, surface_work(w, step));
   if (g.near.empty()) return 1;
   const Array<Candidate> &list = *g.list;
   guard_pairs(g.scene, list, g.near, g.hits);
   std::erase_if(g.hits, [&](const GuardHit &hit) {
     const Candidate &c = list[hit.candidate];
-    return of_one_body(c) ? !(guarded_apart(w, c) > 0) : cross_at_start(w, c);
+    return of_one_body(c) ? !(guarded_apart(w, step, c) > 0) : cross_at_start(step, c);
   });
   guard_obstacles(g.scene, list, g.near, g.hits);
   double least = 1;
@@ -171,13 +173,13 @@ double find_hits(World &w) {
 }
 
 // Sleepers that are hit before a contact has woken them.
-bool wake_hit(World &w) {
+bool wake_hit(World &w, StepContext &step) {
   const uint32_t before = w.sleepers;
-  for (const GuardHit &hit : w.guard.hits) {
-    const Candidate &c = (*w.guard.list)[hit.candidate];
+  for (const GuardHit &hit : step.guard.hits) {
+    const Candidate &c = (*step.guard.list)[hit.candidate];
     if (w.sleepers == 0) break;
-    w.wake(*w.bodies[c.slot_a]);
-    if (!c.obstacle) w.wake(*w.bodies[c.slot_b]);
+    wake(w, *w.bodies[c.slot_a]);
+    if (!c.obstacle) wake(w, *w.bodies[c.slot_b]);
   }
   return w.sleepers < before;
 }
@@ -185,42 +187,42 @@ bool wake_hit(World &w) {
 }  // namespace
 
 // False: trouble, or guard.again: the sub-step is to be taken anew, guard.cut times as long.
-bool World::stage_guard(uint32_t *trouble) {
-  guard.kept.clear(), guard.through.clear();
-  const bool steppers = std::any_of(bodies.begin(), bodies.end(), [](auto &b) { return b->model.stepper != nullptr; });
+bool stage_guard(World &w, StepContext &step, uint32_t *trouble) {
+  step.guard.kept.clear(), step.guard.through.clear();
+  const bool steppers = std::any_of(w.bodies.begin(), w.bodies.end(), [](auto &b) { return b->model.stepper != nullptr; });
   double safe = 1;
   for (uint32_t solve = 0;; ++solve) {
-    if (steppers && !commit_steppers(trouble)) return false;
-    bound_speeds(*this);
-    follow_lists(*this);
-    set_sides(*this), set_share(*this, 1);
-    guard_near(guard.scene, *guard.list, guard.memory, guard.near);
-    safe = find_hits(*this);
-    guard.stepped = steppers;
-    if (guard.hits.empty()) return true;
-    guard.acted = true;
-    if (sleepers > 0 && wake_hit(*this)) return guard.again = true, false;
-    if (solve == kSolves || spares(*this, Thrift::pieces)) break;
-    guard_add_hits(*this);
-    if (residual.due > 1) --stats.unconverged;   // counted once, by the last solve
-    guard.resolving = true;
-    const bool solved = stage_solve(trouble);
-    guard.resolving = false;
-    if (!solved || (!rigid_sets.empty() && !stage_rigid_commit(trouble))) return false;   // a host may have it solved once more
-    ++stats.guard_solves;
-    stage_distribute();
+    if (steppers && !commit_steppers(w, step, trouble)) return false;
+    bound_speeds(w, step);
+    follow_lists(w, step);
+    set_sides(w, step), set_share(w, step, 1);
+    guard_near(step.guard.scene, *step.guard.list, step.guard.memory, step.guard.near);
+    safe = find_hits(w, step);
+    step.guard.stepped = steppers;
+    if (step.guard.hits.empty()) return true;
+    step.guard.acted = true;
+    if (w.sleepers > 0 && wake_hit(w, step)) return step.guard.again = true, false;
+    if (solve == kSolves || spares(step, Thrift::pieces)) break;
+    guard_add_hits(w, step);
+    if (step.residual.due > 1) --w.stats.unconverged;   // counted once, by the last solve
+    step.guard.resolving = true;
+    const bool solved = stage_solve(w, step, trouble);
+    step.guard.resolving = false;
+    if (!solved || (!w.rigid_sets.empty() && !stage_rigid_commit(w, step, trouble))) return false;   // a host may have it solved once more
+    ++w.stats.guard_solves;
+    stage_distribute(step);
   }
-  if (guard.pieces < kCuts && !spares(*this, Thrift::pieces)) {
-    ++guard.pieces, ++stats.guard_cuts;
-    guard.cut = std::max(safe, kLeastCut), guard.again = true;
+  if (step.guard.pieces < kCuts && !spares(step, Thrift::pieces)) {
+    ++step.guard.pieces, ++w.stats.guard_cuts;
+    step.guard.cut = std::max(safe, kLeastCut), step.guard.again = true;
     return false;
   }
-  for (uint32_t k = 0; !guard.hits.empty(); ++k) {
-    set_share(*this, k < kShares ? guard.motion * std::min(safe, 0.999) : 0);
-    if (guard.motion == 0) break;
-    safe = find_hits(*this);
+  for (uint32_t k = 0; !step.guard.hits.empty(); ++k) {
+    set_share(w, step, k < kShares ? step.guard.motion * std::min(safe, 0.999) : 0);
+    if (step.guard.motion == 0) break;
+    safe = find_hits(w, step);
   }
-  stats.guard_lost += (1 - guard.motion) * h;
+  w.stats.guard_lost += (1 - step.guard.motion) * step.h;
   return true;
 }
 

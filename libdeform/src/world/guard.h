@@ -7,6 +7,7 @@
 
 namespace dfm {
 
+struct StepContext;
 struct World;
 
 struct Guard {
@@ -36,9 +37,9 @@ struct Guard {
 };
 
 // guard_hits.cpp: the earliest hits as contacts of the sub-step, among those that it has.
-void guard_add_hits(World &w);
+void guard_add_hits(World &w, StepContext &step);
 // In the middle of a solve's preparation, where guard.resolving: impulses, and rates of hits, of `kept`.
-void guard_impulses(World &w);
-void guard_rates(World &w);
+void guard_impulses(StepContext &step);
+void guard_rates(StepContext &step);
 
 }  // namespace dfm

@@ -6,6 +6,8 @@
 #include "narrow/toi_guard_motion.h"
 #include "rigid/turn.h"
 #include "world/guard.h"
+#include "world/context.h"
+#include "world/stages.h"
 #include "world/world.h"
 
 namespace dfm {
@@ -17,8 +19,8 @@ constexpr uint32_t kMostHits = 128;
 // start, which is what a straight motion is added to.
 class HitContact {
  public:
-  HitContact(World &w, const GuardHit &hit)
-      : w_(w), hit_(hit), c_((*w.guard.list)[hit.candidate]), end_(c_.obstacle ? w.guard.scene.poses[c_.slot_b] : GuardPose{}) {}
+  HitContact(World &w, StepContext &step, const GuardHit &hit)
+      : w_(w), step_(step), hit_(hit), c_((*step.guard.list)[hit.candidate]), end_(c_.obstacle ? step.guard.scene.poses[c_.slot_b] : GuardPose{}) {}
 
   bool make(ContactPoint &out, double &along) {
     out = {};
@@ -28,7 +30,7 @@ class HitContact {
       on_body(out);
     } else {
       out.kind = kPrimitive;
-      if (w_.obstacle_views[c_.slot_b].shape == Shape::mesh) on_mesh(out);
+      if (step_.obstacle_views[c_.slot_b].shape == Shape::mesh) on_mesh(out);
       else on_shape(out);
     }
     const double length = norm(now_);
@@ -36,7 +38,7 @@ class HitContact {
     const Vec3 n = (1 / length) * now_;
     store3(out.normal, n), store3(out.point, middle_);
     if (c_.obstacle) {
-      const Vec3 belt = w_.obstacle_views[c_.slot_b].belt;
+      const Vec3 belt = step_.obstacle_views[c_.slot_b].belt;
       store3(out.velocity, obstacle_way_ + belt - dot(belt, n) * n);
     }
     along = dot(n, start_);
@@ -46,15 +48,15 @@ class HitContact {
  private:
   // Adds weight times a surfel to one side.
   void add(ContactPoint &out, uint32_t slot, uint32_t surfel, double weight) {
-    const BodyView &b = w_.body_views[slot];
-    const Vec3 x = load3(&b.surface->x[4 * size_t{surfel}]), end = load3(w_.guard.scene.end(w_.guard.scene.sides[slot], surfel));
+    const BodyView &b = step_.body_views[slot];
+    const Vec3 x = load3(&b.surface->x[4 * size_t{surfel}]), end = load3(step_.guard.scene.end(step_.guard.scene.sides[slot], surfel));
     narrow::add_node(out, b.first_node + surfel, weight);
     start_ += weight * x;
     const Vec3 at = x + hit_.t * (end - x);
     now_ += weight * at, (weight < 0 ? on_b_ : on_a_) += std::fabs(weight) * at;
   }
   void on_body(ContactPoint &out) {
-    const Surface &a = *w_.body_views[c_.slot_a].surface, &b = *w_.body_views[c_.slot_b].surface;
+    const Surface &a = *step_.body_views[c_.slot_a].surface, &b = *step_.body_views[c_.slot_b].surface;
     out.kind = c_.kind;
     if (c_.kind == kEdgeEdge) {
       out.type_a = 1;
@@ -68,16 +70,16 @@ class HitContact {
     middle_ = 0.5 * (on_a_ + on_b_);
   }
   void add_feature(ContactPoint &out, int kind, uint32_t feature) {
-    const uint32_t *const corner = narrow::corners_of(*w_.body_views[c_.slot_a].surface, kind, feature);
+    const uint32_t *const corner = narrow::corners_of(*step_.body_views[c_.slot_a].surface, kind, feature);
     if (kind == 0) add(out, c_.slot_a, corner[0], 1);
     if (kind == 1) add(out, c_.slot_a, corner[0], 1 - hit_.at[0]), add(out, c_.slot_a, corner[1], hit_.at[0]);
     for (int k = 0; kind == 2 && k < 3; ++k) add(out, c_.slot_a, corner[k], hit_.at[k]);
   }
   // The obstacle's point: from where it is to where it would get without this contact.
-  void carry(Vec3 from, Vec3 to) { start_ -= from, obstacle_way_ = (1 / w_.h) * (to - from); }
+  void carry(Vec3 from, Vec3 to) { start_ -= from, obstacle_way_ = (1 / step_.h) * (to - from); }
 
   void on_shape(ContactPoint &out) {
-    const ObstacleView &v = w_.obstacle_views[c_.slot_b];
+    const ObstacleView &v = step_.obstacle_views[c_.slot_b];
     out.type_a = c_.kind;
     add_feature(out, c_.kind, c_.feature_a);
     // The shape's point of the hit: nearest to the body's as the shape stands then.
@@ -92,12 +94,12 @@ class HitContact {
     GuardPose to = end_;
     if (const Obstacle &rigid = *w_.obstacles[c_.slot_b]; rigid.rigid && rigid.rigid->group[rigid.rigid_body] != DFM_RIGID_STILL) {
       const double *const free = &rigid.rigid->velocity[6 * size_t{rigid.rigid_body}];
-      to = {v.position + w_.h * load3(free), turned(v.rotation, w_.h * load3(free + 3))};
+      to = {v.position + step_.h * load3(free), turned(v.rotation, step_.h * load3(free + 3))};
     }
     carry(v.position + rotate(v.rotation, local), to.position + rotate(to.rotation, local));
   }
   void on_mesh(ContactPoint &out) {
-    GuardScene &scene = w_.guard.scene;
+    GuardScene &scene = step_.guard.scene;
     GuardSide &mesh = scene.side(c_, true);
     const bool vertex = c_.kind == 2;   // of the mesh
     out.type_a = c_.kind;
@@ -116,6 +118,7 @@ class HitContact {
   }
 
   World &w_;
+  StepContext &step_;
   const GuardHit &hit_;
   const Candidate &c_;
   const GuardPose end_;   // of the obstacle
@@ -127,7 +130,7 @@ bool same_features(const ContactPoint &l, const ContactPoint &r) {
          l.feature_a == r.feature_a && l.feature_b == r.feature_b;
 }
 
-uint64_t free_key(const World &w, const ContactPoint &c) {
+uint64_t free_key(const World &w, const StepContext &step, const ContactPoint &c) {
   const uint64_t id_a = w.bodies[c.slot_a]->id, id_b = c.obstacle ? w.obstacles[c.slot_b]->id : w.bodies[c.slot_b]->id;
   uint32_t patch = c.feature_b;
   if (!c.obstacle) {
@@ -137,15 +140,15 @@ uint64_t free_key(const World &w, const ContactPoint &c) {
   }
   for (uint32_t ordinal = 0;; ++ordinal) {
     const uint64_t key = narrow::contact_key(c, id_a, id_b, patch, ordinal);
-    if (std::none_of(w.contacts.begin(), w.contacts.end(), [&](const ContactPoint &o) { return o.key == key; })) return key;
+    if (std::none_of(step.contacts.begin(), step.contacts.end(), [&](const ContactPoint &o) { return o.key == key; })) return key;
   }
 }
 
 // Of each feature's hits with one other side the earliest, and of those the earliest kMostHits: one impact trips all pairs around it, what the first
 // ones leave is asked again, and a solve with thousands of nearly equal rows would not converge.
-void choose_hits(World &w) {
-  Array<GuardHit> &hits = w.guard.hits;
-  const Array<Candidate> &list = *w.guard.list;
+void choose_hits(StepContext &step) {
+  Array<GuardHit> &hits = step.guard.hits;
+  const Array<Candidate> &list = *step.guard.list;
   const auto side = [&](const GuardHit &h) {
     const Candidate &c = list[h.candidate];
     return std::array<uint32_t, 5>{c.slot_a, c.obstacle, c.slot_b, c.kind, c.feature_a};
@@ -165,45 +168,45 @@ void choose_hits(World &w) {
 }  // namespace
 
 // Hits join the contacts of the sub-step, in their order; one that has a contact already turns it to how it stands at the hit.
-void guard_add_hits(World &w) {
-  Guard &g = w.guard;
-  choose_hits(w);
+void guard_add_hits(World &w, StepContext &step) {
+  Guard &g = step.guard;
+  choose_hits(step);
   const auto kept = [&](uint64_t key) {
     return std::find_if(g.kept.begin(), g.kept.end(), [&](const Guard::Kept &k) { return k.key == key; });
   };
   Array<Guard::Kept> before;
   before.swap(g.kept);
-  for (uint32_t i = 0; i < w.rows.n; ++i) {
-    const double *const f = &w.rows.frame[size_t(i) * 9], *const l = &w.rows.impulse[size_t(i) * 3];
-    g.kept.push_back({w.contacts[i].key, l[0] * load3(f) + l[1] * load3(f + 3) + l[2] * load3(f + 6), w.rows.rate[i], false});
+  for (uint32_t i = 0; i < step.rows.n; ++i) {
+    const double *const f = &step.rows.frame[size_t(i) * 9], *const l = &step.rows.impulse[size_t(i) * 3];
+    g.kept.push_back({step.contacts[i].key, l[0] * load3(f) + l[1] * load3(f + 3) + l[2] * load3(f + 6), step.rows.rate[i], false});
   }
   for (const Guard::Kept &k : before)
     if (k.hit) kept(k.key)->hit = true;
   for (const GuardHit &hit : g.hits) {
     ContactPoint c;
     double along;
-    if (!HitContact(w, hit).make(c, along)) continue;
+    if (!HitContact(w, step, hit).make(c, along)) continue;
     // One that starts nearer than d_c comes no nearer; what it lacks to 0.8 d_c closes in the time that the sub-step was planned with.
     const Candidate &pair = (*g.list)[hit.candidate];
-    const double apart = of_one_body(pair) ? guarded_apart(w, pair) : w.offset;
-    const double target = hit.start < apart ? hit.start + std::max(0.0, 0.8 * apart - hit.start) * (w.h / g.planned) : apart;
+    const double apart = of_one_body(pair) ? guarded_apart(w, step, pair) : w.offset;
+    const double target = hit.start < apart ? hit.start + std::max(0.0, 0.8 * apart - hit.start) * (step.h / g.planned) : apart;
     c.distance += w.offset - apart;
-    const double rate = (along - target) / w.h;
-    const auto same = std::find_if(w.contacts.begin(), w.contacts.end(), [&](const ContactPoint &o) { return same_features(o, c); });
-    if (same != w.contacts.end()) {
+    const double rate = (along - target) / step.h;
+    const auto same = std::find_if(step.contacts.begin(), step.contacts.end(), [&](const ContactPoint &o) { return same_features(o, c); });
+    if (same != step.contacts.end()) {
       c.key = same->key, c.area = same->area, c.lender = same->lender;
       *same = c;
       const auto k = kept(c.key);
       k->rate = rate, k->hit = true;
     } else {
-      c.key = free_key(w, c);
-      w.contacts.push_back(c);
+      c.key = free_key(w, step, c);
+      step.contacts.push_back(c);
       g.kept.push_back({c.key, {}, rate, true});
     }
   }
   std::sort(g.kept.begin(), g.kept.end(), [](const auto &l, const auto &r) { return l.key < r.key; });
   const auto id_b = [&](const ContactPoint &c) { return c.obstacle ? w.obstacles[c.slot_b]->id : w.bodies[c.slot_b]->id; };
-  std::sort(w.contacts.begin(), w.contacts.end(), [&](const ContactPoint &l, const ContactPoint &r) {
+  std::sort(step.contacts.begin(), step.contacts.end(), [&](const ContactPoint &l, const ContactPoint &r) {
     if (of_one_body(l) != of_one_body(r)) return of_one_body(r);
     if (l.slot_a != r.slot_a) return w.bodies[l.slot_a]->id < w.bodies[r.slot_a]->id;
     if (l.obstacle != r.obstacle) return l.obstacle < r.obstacle;
@@ -222,19 +225,19 @@ const Guard::Kept *find_kept(const Guard &g, uint64_t key) {
 }
 }  // namespace
 
-void guard_impulses(World &w) {
-  for (uint32_t i = 0; i < w.rows.n; ++i) {
-    const Guard::Kept *const k = find_kept(w.guard, w.contacts[i].key);
+void guard_impulses(StepContext &step) {
+  for (uint32_t i = 0; i < step.rows.n; ++i) {
+    const Guard::Kept *const k = find_kept(step.guard, step.contacts[i].key);
     if (!k) continue;
-    const double *const f = &w.rows.frame[size_t(i) * 9];
-    double *const l = &w.rows.impulse[size_t(i) * 3];
+    const double *const f = &step.rows.frame[size_t(i) * 9];
+    double *const l = &step.rows.impulse[size_t(i) * 3];
     l[0] = std::max(0.0, dot(load3(f), k->impulse)), l[1] = dot(load3(f + 3), k->impulse), l[2] = dot(load3(f + 6), k->impulse);
   }
 }
 
-void guard_rates(World &w) {
-  for (uint32_t i = 0; i < w.rows.n; ++i)
-    if (const Guard::Kept *const k = find_kept(w.guard, w.contacts[i].key); k && k->hit) w.rows.rate[i] = k->rate;
+void guard_rates(StepContext &step) {
+  for (uint32_t i = 0; i < step.rows.n; ++i)
+    if (const Guard::Kept *const k = find_kept(step.guard, step.contacts[i].key); k && k->hit) step.rows.rate[i] = k->rate;
 }
 
 }  // namespace dfm

@@ -7,6 +7,8 @@
 #include "surfel/reach.h"
 #include "world/overlap_sides.h"
 #include "world/untangle.h"
+#include "world/context.h"
+#include "world/stages.h"
 #include "world/world.h"
 
 namespace dfm {

@@ -1,5 +1,7 @@
 #include "world/overlap_sides.h"
 
+#include "world/context.h"
+
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -210,14 +212,14 @@ Crossed cross_shape(OverlapSkin &a, const ObstacleShape &b, double offset) {
 }
 
 OverlapSides::OverlapSides(World &w)
-    : w_(w), bodies_(w.bodies.size()), obstacles_(w.obstacles.size()), stack_(HookAllocator<PairOfTriangles>(w.memory())) {}
+    : w_(w), step_(*w.steps), bodies_(w.bodies.size()), obstacles_(w.obstacles.size()), stack_(HookAllocator<PairOfTriangles>(w.memory())) {}
 
 bool OverlapSides::may_touch(const OverlapPair &p) const {
-  const BodyView &a = w_.body_views[p.a];
-  const uint64_t b = p.obstacle ? w_.obstacle_views[p.b].id : w_.body_views[p.b].id;
-  if (p.obstacle && w_.obstacle_views[p.b].shape == Shape::none) return false;
+  const BodyView &a = step_.body_views[p.a];
+  const uint64_t b = p.obstacle ? step_.obstacle_views[p.b].id : step_.body_views[p.b].id;
+  if (p.obstacle && step_.obstacle_views[p.b].shape == Shape::none) return false;
   return w_.overlaps.is_aside(a.id, b, p.obstacle) ||
-         (p.obstacle ? w_.filter.may_touch(a, w_.obstacle_views[p.b]) : w_.filter.may_touch(a, w_.body_views[p.b]));
+         (p.obstacle ? w_.filter.may_touch(a, step_.obstacle_views[p.b]) : w_.filter.may_touch(a, step_.body_views[p.b]));
 }
 
 OverlapSkin &OverlapSides::body(uint32_t i) {
@@ -238,7 +240,7 @@ bool OverlapSides::round(const OverlapPair &p) const {
 }
 
 ObstacleShape OverlapSides::shape(const OverlapPair &p) const {
-  ObstacleView v = w_.obstacle_views[p.b];
+  ObstacleView v = step_.obstacle_views[p.b];
   v.position = w_.obstacles[p.b]->pose.position, v.rotation = w_.obstacles[p.b]->pose.rotation;
   return ObstacleShape(v);
 }

@@ -83,6 +83,7 @@ class OverlapSides {
   bool round(const OverlapPair &p) const;
   OverlapSkin &other(const OverlapPair &p);
   World &w_;
+  const StepContext &step_;
   std::vector<std::unique_ptr<OverlapSkin>> bodies_, obstacles_;
   Array<PairOfTriangles> stack_;
 };

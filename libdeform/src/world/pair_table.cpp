@@ -5,6 +5,8 @@
 #include <cmath>
 
 #include "friction/pair_rules.h"
+#include "world/context.h"
+#include "world/stages.h"
 #include "world/world.h"
 
 namespace dfm {
@@ -63,24 +65,24 @@ void World::find_law(uint32_t a, uint32_t b, std::vector<uint32_t> &used) {
   zone_law.insert(zone_law.end(), laws_of.begin(), laws_of.end());
 }
 
-void World::set_zone_laws() {
-  const size_t nb = bodies.size(), width = nb + obstacles.size();
-  for (uint32_t i = 0; i < contacts.size(); ++i) {
-    const ContactPoint &c = contacts[i];
-    const uint32_t table = zone_table[c.slot_a * width + (c.obstacle ? nb : 0) + c.slot_b];
+void set_zone_laws(World &w, StepContext &step) {
+  const size_t nb = w.bodies.size(), width = nb + w.obstacles.size();
+  for (uint32_t i = 0; i < step.contacts.size(); ++i) {
+    const ContactPoint &c = step.contacts[i];
+    const uint32_t table = w.zone_table[c.slot_a * width + (c.obstacle ? nb : 0) + c.slot_b];
     if (table == kNone) continue;
     const Vec3 normal = load3(c.normal);
     const auto zone = [](const Body &b, uint8_t type, uint32_t feature, Vec3 outward) {
       return b.zones.of.empty() ? 0 : zone_of(b.surface, b.zones.of, type, feature, outward);
     };
-    const uint32_t za = zone(*bodies[c.slot_a], c.type_a, c.feature_a, -normal);
+    const uint32_t za = zone(*w.bodies[c.slot_a], c.type_a, c.feature_a, -normal);
     if (c.obstacle) {
-      state.law[i] = zone_law[table + za];
+      step.state.law[i] = w.zone_law[table + za];
       continue;
     }
-    const Body &b = *bodies[c.slot_b];
+    const Body &b = *w.bodies[c.slot_b];
     const uint32_t zb = zone(b, c.kind == kEdgeEdge ? 1 : 2, c.feature_b, normal);
-    state.law[i] = zone_law[table + za * b.zones.list.size() + zb];
+    step.state.law[i] = w.zone_law[table + za * b.zones.list.size() + zb];
   }
 }
 

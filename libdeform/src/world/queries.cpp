@@ -4,6 +4,7 @@
 #include <limits>
 
 #include "surfel/closest.h"
+#include "surfel/views.h"
 
 namespace dfm {
 namespace {

@@ -8,6 +8,8 @@
 
 #include "core/error.h"
 #include "rigid/turn.h"
+#include "world/context.h"
+#include "world/stages.h"
 #include "world/world.h"
 
 namespace dfm {
@@ -58,58 +60,59 @@ Vec3 shape_velocity(const Obstacle &o, const dfm_rigid_state &start, Vec3 veloci
 }
 
 void place_rigids(World &w) {
-  w.rigid_places.clear(), w.rigid_groups.clear();
+  StepContext &step = *w.steps;
+  step.rigid_places.clear(), step.rigid_groups.clear();
   if (w.rigid_sets.empty()) return;
-  w.rigid_places.resize(w.obstacles.size());
+  step.rigid_places.resize(w.obstacles.size());
   for (auto &set : w.rigid_sets) {
-    set->first_group = static_cast<uint32_t>(w.rigid_groups.size());
-    w.rigid_groups.resize(w.rigid_groups.size() + set->ngroup);
+    set->first_group = static_cast<uint32_t>(step.rigid_groups.size());
+    step.rigid_groups.resize(step.rigid_groups.size() + set->ngroup);
     for (uint32_t g : set->group)
-      if (g != DFM_RIGID_STILL) ++w.rigid_groups[set->first_group + g];
+      if (g != DFM_RIGID_STILL) ++step.rigid_groups[set->first_group + g];
   }
   for (auto &o : w.obstacles) {
     if (!o->rigid) continue;
     const uint32_t g = o->rigid->group[o->rigid_body];
-    if (g != DFM_RIGID_STILL) w.rigid_places[o->slot] = {o->rigid->first_group + g, o->rigid->place[o->rigid_body], {}};
+    if (g != DFM_RIGID_STILL) step.rigid_places[o->slot] = {o->rigid->first_group + g, o->rigid->place[o->rigid_body], {}};
   }
 }
 
-bool World::ask_rigids(uint32_t *trouble) {
+bool ask_rigids(World &w, uint32_t *trouble) {
   const uint64_t said = sentences();
-  for (auto &set : rigid_sets) {
+  for (auto &set : w.rigid_sets) {
     RigidSet &s = *set;
     std::fill(s.velocity.begin(), s.velocity.end(), 0.0);
     if (const dfm_status status = s.host.predict(s.self, &s.step, s.velocity.data()); status != DFM_OK)
-      return host_failed(*this, s, status, "gave no velocities", said, trouble);
-    if (!finite(s.velocity.data(), s.velocity.size())) return host_failed(*this, s, DFM_OK, "gave velocities that are not finite", said, trouble);
+      return host_failed(w, s, status, "gave no velocities", said, trouble);
+    if (!finite(s.velocity.data(), s.velocity.size())) return host_failed(w, s, DFM_OK, "gave velocities that are not finite", said, trouble);
   }
   return true;
 }
 
-bool World::stage_rigid_predict(uint32_t *trouble) {
-  rigid_again = false;
-  for (auto &set : rigid_sets) {
+bool stage_rigid_predict(World &w, StepContext &step, uint32_t *trouble) {
+  step.rigid_again = false;
+  for (auto &set : w.rigid_sets) {
     const uint32_t n = static_cast<uint32_t>(set->defs.size());
-    set->step = {sizeof set->step, n, time, h, {gravity.x, gravity.y, gravity.z}, set->state.data(), set->extra.data()};
+    set->step = {sizeof set->step, n, w.time, step.h, {w.gravity.x, w.gravity.y, w.gravity.z}, set->state.data(), set->extra.data()};
   }
-  if (!ask_rigids(trouble)) return false;
-  for (auto &set : rigid_sets) set->first.assign(set->velocity.begin(), set->velocity.end());
-  for (auto &o : obstacles) {
+  if (!ask_rigids(w, trouble)) return false;
+  for (auto &set : w.rigid_sets) set->first.assign(set->velocity.begin(), set->velocity.end());
+  for (auto &o : w.obstacles) {
     if (!o->rigid || o->rigid->group[o->rigid_body] == DFM_RIGID_STILL) continue;
     const dfm_rigid_state &s = o->rigid->state[o->rigid_body];
     const double *const v = &o->rigid->velocity[6 * size_t{o->rigid_body}];
-    ObstacleView &view = obstacle_views[o->slot];
-    view.velocity = shape_velocity(*o, s, load3(v), load3(v + 3), h), view.spin = load3(v + 3), view.linear = view.spin - load3(s.spin);
+    ObstacleView &view = step.obstacle_views[o->slot];
+    view.velocity = shape_velocity(*o, s, load3(v), load3(v + 3), step.h), view.spin = load3(v + 3), view.linear = view.spin - load3(s.spin);
     if (o->mesh) o->mesh->place(view.position, view.rotation, view.velocity, view.spin);
-    rigid_places[o->slot].center = load3(s.position);
+    step.rigid_places[o->slot].center = load3(s.position);
   }
   return true;
 }
 
-void rigid_response(World &w, uint32_t group, double *matrix) {
+void rigid_response(World &w, StepContext &step, uint32_t group, double *matrix) {
   for (auto &set : w.rigid_sets) {
     if (group < set->first_group || group >= set->first_group + set->ngroup) continue;
-    const size_t width = 6 * size_t{w.rigid_groups[group]};
+    const size_t width = 6 * size_t{step.rigid_groups[group]};
     const dfm_status status = set->host.respond(set->self, &set->step, group - set->first_group, matrix);
     need_memory(status);
     if (status != DFM_OK || !finite(matrix, width * width))
@@ -120,26 +123,26 @@ void rigid_response(World &w, uint32_t group, double *matrix) {
 
 // A host that says DFM_RIGID_AGAIN knows better now how its bodies move: the same contacts are solved once more with its new velocities. Detection has
 // been done with the first ones, so the difference stands in the rows, as the rigid bodies' change of velocity before any impulse.
-void correct_rigids(World &w) {
-  for (const ContactRows::Block &block : w.rows.blocks) {
+void correct_rigids(World &w, StepContext &step) {
+  for (const ContactRows::Block &block : step.rows.blocks) {
     if (block.group == kNone) continue;
     for (auto &set : w.rigid_sets)
       for (uint32_t i = 0; i < set->defs.size(); ++i) {
         if (set->group[i] == DFM_RIGID_STILL || set->first_group + set->group[i] != block.group) continue;
         const double *const now = &set->velocity[6 * size_t{i}], *const then = &set->first[6 * size_t{i}];
-        double *const y = &w.rows.y[4 * size_t{block.first + 2 * set->place[i]}];
+        double *const y = &step.rows.y[4 * size_t{block.first + 2 * set->place[i]}];
         store3(y, load3(now) - load3(then)), store3(y + 4, load3(now + 3) - load3(then + 3));
       }
   }
 }
 
-void sum_rigid_impulses(World &w) {
+void sum_rigid_impulses(World &w, StepContext &step) {
   for (auto &set : w.rigid_sets) std::fill(set->impulse.begin(), set->impulse.end(), 0.0);
-  const ContactRows &rows = w.rows;
+  const ContactRows &rows = step.rows;
   if (!w.plan.touches() || rows.rigid.empty()) return;
   for (uint32_t i = 0; i < rows.n; ++i) {
     if (rows.rigid[i] == kNone) continue;
-    const Obstacle &o = *w.obstacles[w.contacts[i].slot_b];
+    const Obstacle &o = *w.obstacles[step.contacts[i].slot_b];
     const double *const f = &rows.frame[size_t(9) * i], *const l = &rows.impulse[size_t(3) * i];
     const Vec3 p = l[0] * load3(f) + l[1] * load3(f + 3) + l[2] * load3(f + 6);
     double *const to = &o.rigid->impulse[6 * size_t{o.rigid_body}];
@@ -147,9 +150,9 @@ void sum_rigid_impulses(World &w) {
   }
 }
 
-bool revise_rigids(World &w) {
+bool revise_rigids(World &w, StepContext &step) {
   if (std::none_of(w.rigid_sets.begin(), w.rigid_sets.end(), [](auto &set) { return set->host.revise != nullptr; })) return false;
-  sum_rigid_impulses(w);
+  sum_rigid_impulses(w, step);
   bool any = false;
   for (auto &set : w.rigid_sets) {
     if (!set->host.revise) continue;
@@ -160,79 +163,79 @@ bool revise_rigids(World &w) {
       fail(DFM_E_FATAL, "rigid host '%s' does not answer contact on '%s' and those with it", set->host_name.c_str(), set->defs[0].name);
     if (!changed) continue;
     any = true;
-    for (const ContactRows::Block &block : w.rows.blocks) {
+    for (const ContactRows::Block &block : step.rows.blocks) {
       if (block.group == kNone || block.group < set->first_group || block.group >= set->first_group + set->ngroup) continue;
-      rigid_response(w, block.group, &w.rows.response[block.response]);
+      rigid_response(w, step, block.group, &step.rows.response[block.response]);
       for (uint32_t i = 0; i < set->defs.size(); ++i) {
         if (set->group[i] != block.group - set->first_group) continue;
         for (uint32_t k = 0; k < 2; ++k)
-          for (Array<double> *y : {&w.rows.y, &w.rows.y_free})
+          for (Array<double> *y : {&step.rows.y, &step.rows.y_free})
             store3(&(*y)[size_t(block.first + 2 * set->place[i] + k) * 4],
                    load3(&set->revised[6 * size_t{i} + 3 * k]) - load3(&set->first[6 * size_t{i} + 3 * k]));
       }
-      w.rows.push_rigid(block);
+      step.rows.push_rigid(block);
     }
   }
   return any;
 }
 
 // 1: all have ended their step; 2: somebody asks for another solve; 0: failed.
-int World::ask_rigid_ends(uint32_t *trouble) {
+int ask_rigid_ends(World &w, uint32_t *trouble) {
   const uint64_t said = sentences();
   bool again = false;
-  for (auto &set : rigid_sets)
+  for (auto &set : w.rigid_sets)
     if (const dfm_status status = set->host.push ? set->host.push(set->self, &set->step, set->impulse.data()) : DFM_OK; status != DFM_OK)
-      return host_failed(*this, *set, status, "did not take its impulses", said, trouble);
-  for (auto &set : rigid_sets) {
+      return host_failed(w, *set, status, "did not take its impulses", said, trouble);
+  for (auto &set : w.rigid_sets) {
     RigidSet &s = *set;
     const dfm_status status = s.host.commit(s.self, &s.step, s.impulse.data(), s.next.data(), s.next_extra.data());
-    if (status != DFM_OK && status != DFM_RIGID_AGAIN) return host_failed(*this, s, status, "could not end its step", said, trouble);
+    if (status != DFM_OK && status != DFM_RIGID_AGAIN) return host_failed(w, s, status, "could not end its step", said, trouble);
     again |= status == DFM_RIGID_AGAIN;
     for (uint32_t i = 0; i < s.defs.size(); ++i)
       if (s.group[i] == DFM_RIGID_STILL) s.next[i] = s.state[i];
     if (!finite(reinterpret_cast<const double *>(s.next.data()), kStateValues * s.next.size()) || !finite(s.next_extra.data(), s.next_extra.size()))
-      return host_failed(*this, s, DFM_OK, "ended its step with something not finite", said, trouble);
+      return host_failed(w, s, DFM_OK, "ended its step with something not finite", said, trouble);
   }
   return again ? 2 : 1;
 }
 
-bool World::stage_rigid_commit(uint32_t *trouble) {
+bool stage_rigid_commit(World &w, StepContext &step, uint32_t *trouble) {
   for (uint32_t round = 0;; ++round) {
-    sum_rigid_impulses(*this);
-    const int end = ask_rigid_ends(trouble);
+    sum_rigid_impulses(w, step);
+    const int end = ask_rigid_ends(w, trouble);
     if (end == 0) return false;
-    if (end == 1 || round == DFM_RIGID_MOST_AGAIN || !plan.touches() || rows.n == 0) break;
-    rigid_again = true, ++stats.rigid_again;
-    if (!ask_rigids(trouble) || !stage_solve(trouble)) return false;
+    if (end == 1 || round == DFM_RIGID_MOST_AGAIN || !w.plan.touches() || step.rows.n == 0) break;
+    step.rigid_again = true, ++w.stats.rigid_again;
+    if (!ask_rigids(w, trouble) || !stage_solve(w, step, trouble)) return false;
   }
-  rigid_again = false;
+  step.rigid_again = false;
   // What is looked at from here on (the guard) sees how they truly move.
-  for (auto &o : obstacles) {
+  for (auto &o : w.obstacles) {
     if (!o->rigid || o->rigid->group[o->rigid_body] == DFM_RIGID_STILL) continue;
     const Pose from = shape_pose(*o, o->rigid->state[o->rigid_body]), to = shape_pose(*o, o->rigid->next[o->rigid_body]);
-    obstacle_views[o->slot].velocity = (1 / h) * (to.position - from.position);
-    obstacle_views[o->slot].spin = (1 / h) * rotation_vector(to.rotation * conjugate(from.rotation));
-    obstacle_views[o->slot].linear = {};
+    step.obstacle_views[o->slot].velocity = (1 / step.h) * (to.position - from.position);
+    step.obstacle_views[o->slot].spin = (1 / step.h) * rotation_vector(to.rotation * conjugate(from.rotation));
+    step.obstacle_views[o->slot].linear = {};
   }
   return true;
 }
 
-void World::keep_rigids() {
-  for (auto &set : rigid_sets) {
-    for (uint32_t i = 0; guard.motion < 1 && i < set->defs.size(); ++i) {   // the share of their way that the guard has left
+void keep_rigids(World &w, StepContext &step) {
+  for (auto &set : w.rigid_sets) {
+    for (uint32_t i = 0; step.guard.motion < 1 && i < set->defs.size(); ++i) {   // the share of their way that the guard has left
       const dfm_rigid_state &from = set->state[i];
       dfm_rigid_state &to = set->next[i];
-      const Quat q = slerp(rotation_of(from), rotation_of(to), guard.motion);
-      store3(to.position, load3(from.position) + guard.motion * (load3(to.position) - load3(from.position)));
+      const Quat q = slerp(rotation_of(from), rotation_of(to), step.guard.motion);
+      store3(to.position, load3(from.position) + step.guard.motion * (load3(to.position) - load3(from.position)));
       to.rotation[0] = q.x, to.rotation[1] = q.y, to.rotation[2] = q.z, to.rotation[3] = q.w;
     }
     set->state.swap(set->next), set->extra.swap(set->next_extra);
     for (uint32_t i = 0; i < set->defs.size(); ++i)
       for (uint32_t k = 0; k < 3; ++k) set->total[3 * i + k] += set->impulse[6 * i + k];
-    set->last_h = h;
+    set->last_h = step.h;
   }
-  if (!rigid_sets.empty())
-    for (auto &o : obstacles)
+  if (!w.rigid_sets.empty())
+    for (auto &o : w.obstacles)
       if (o->rigid) o->pose = shape_pose(*o, o->rigid->state[o->rigid_body]);
 }
 

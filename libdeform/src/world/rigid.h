@@ -13,6 +13,7 @@
 
 namespace dfm {
 
+struct StepContext;
 struct World;
 struct Obstacle;
 struct Pose;
@@ -48,14 +49,14 @@ void destroy_rigids(RigidSet &set);   // throws Error where the host keeps its b
 Obstacle &rigid_obstacle(World &w, uint64_t id);
 void need_memory(dfm_status status);           // a host without memory is no fault of what it was asked: ends as where the library itself finds none
 void place_rigids(World &w);                   // World::prepare(): slots and groups
-void rigid_response(World &w, uint32_t group, double *matrix);
-void sum_rigid_impulses(World &w);             // of the rows, into every set
-bool revise_rigids(World &w);                  // true: a host answers differently under these impulses; rows have its new response, solve again
+void rigid_response(World &w, StepContext &step, uint32_t group, double *matrix);
+void sum_rigid_impulses(World &w, StepContext &step);             // of the rows, into every set
+bool revise_rigids(World &w, StepContext &step);   // true: a host answers differently under these impulses; rows have its new response, solve again
 dfm_body_measure measure_rigid(const RigidSet &set, uint32_t body);
 void set_rigid_state(Obstacle &o, const dfm_rigid_state &state);   // of the body that the shape belongs to
 Pose shape_pose(const Obstacle &shape, const dfm_rigid_state &body);   // where a body's shape stands when the body has this state
 Obstacle &add_rigid_shape(Obstacle &body, const dfm_obstacle_def &def);
-void correct_rigids(World &w);                 // make_rows(): the rows start where the hosts' last answer is
+void correct_rigids(World &w, StepContext &step);                 // make_rows(): the rows start where the hosts' last answer is
 void set_rigid_motor(RigidSet &set, uint32_t joint, double velocity, double max);
 void rigid_joint(RigidSet &set, uint32_t joint, double *position, double *rate, double *effort);
 

@@ -6,6 +6,7 @@
 #include "world/bounds.h"
 #include "world/create.h"
 #include "world/rigid.h"
+#include "world/rollback.h"
 #include "world/world.h"
 
 namespace dfm {

@@ -15,6 +15,8 @@
 #include "contact/rollback.h"
 #include "core/error.h"
 #include "surfel/make_surface.h"
+#include "world/context.h"
+#include "world/stages.h"
 #include "world/world.h"
 
 namespace dfm {
@@ -44,12 +46,12 @@ void rollback_check_law(const World &w, const char *law, uint32_t nstate) {
   if (nstate) rollback_refuse(w, format("friction law '%s': a memory, which would see no slip of what is frozen,", law).c_str());
 }
 
-void World::stage_lagged() {
-  for (const auto &b : bodies) {
+void stage_lagged(World &w, StepContext &step) {
+  for (const auto &b : w.bodies) {
     Phyxels &p = b->p;
     bool any = false;
     for (size_t i = 0; i < p.v_free.size(); ++i)
-      if (b->lagged[i] != 0) any = true, p.v_free[i] += h * (p.inv_mass[i] * b->lagged[i]);
+      if (b->lagged[i] != 0) any = true, p.v_free[i] += step.h * (p.inv_mass[i] * b->lagged[i]);
     if (any) gather_surface(b->surface, p.x.data(), p.v_free.data());
   }
 }
@@ -60,10 +62,10 @@ constexpr uint32_t kGrain = 64;
 
 // The first time of every candidate that `wanted`, each into its own place.
 template <class Wanted>
-void ask(World &w, std::span<const double *const> share, Wanted &&wanted) {
-  Rollback &r = w.rollback;
-  const Array<Candidate> &list = w.broad.candidates();
-  const ImpactQuery query(w.body_views, w.obstacle_views, w.h, w.offset);
+void ask(World &w, StepContext &step, std::span<const double *const> share, Wanted &&wanted) {
+  Rollback &r = step.rollback;
+  const Array<Candidate> &list = step.broad.candidates();
+  const ImpactQuery query(step.body_views, step.obstacle_views, step.h, w.offset);
   w.context->tasks.parallel_for(static_cast<uint32_t>(list.size()), kGrain, [&](uint32_t begin, uint32_t end) {
     for (uint32_t i = begin; i < end; ++i) {
       if (!wanted(query, i)) continue;
@@ -81,19 +83,19 @@ bool take_new(Rollback &r) {
 }
 
 // One time per island. `own`: as many of `joined` as have hit on the true motion; the others only tie.
-void set_shares(World &w, const ImpactQuery &query, size_t own) {
-  Rollback &r = w.rollback;
+void set_shares(StepContext &step, const ImpactQuery &query, size_t own) {
+  Rollback &r = step.rollback;
   const uint32_t n = static_cast<uint32_t>(r.share.size());
   r.islands.start(n);
   uint32_t node[4];
   for (const uint32_t i : r.joined) {
-    const uint32_t count = query.nodes(w.broad.candidates()[i], node);
+    const uint32_t count = query.nodes(step.broad.candidates()[i], node);
     for (uint32_t k = 1; k < count; ++k) r.islands.join(node[0], node[k]);
   }
   r.islands.finish();
   r.time.assign(r.islands.count, 1.0);
   for (size_t k = 0; k < own; ++k) {
-    query.nodes(w.broad.candidates()[r.joined[k]], node);
+    query.nodes(step.broad.candidates()[r.joined[k]], node);
     double &t = r.time[r.islands.of[node[0]]];
     t = std::min(t, rollback::kSafety * r.hits[r.joined[k]].t);
   }
@@ -101,17 +103,17 @@ void set_shares(World &w, const ImpactQuery &query, size_t own) {
 }
 
 // Shares of all surfels: every pair that would touch on the ways that they leave is tied.
-void find_islands(World &w) {
-  Rollback &r = w.rollback;
-  const Array<Candidate> &list = w.broad.candidates();
-  const ImpactQuery query(w.body_views, w.obstacle_views, w.h, w.offset);
+void find_islands(World &w, StepContext &step) {
+  Rollback &r = step.rollback;
+  const Array<Candidate> &list = step.broad.candidates();
+  const ImpactQuery query(step.body_views, step.obstacle_views, step.h, w.offset);
   r.hits.resize(list.size()), r.joins.assign(list.size(), 0), r.joined.clear();
-  ask(w, {}, [](const ImpactQuery &, uint32_t) { return true; });
+  ask(w, step, {}, [](const ImpactQuery &, uint32_t) { return true; });
   if (!take_new(r)) return;
   const size_t own = r.joined.size();
   do {
-    set_shares(w, query, own);
-    ask(w, r.shares, [&](const ImpactQuery &q, uint32_t i) {
+    set_shares(step, query, own);
+    ask(w, step, r.shares, [&](const ImpactQuery &q, uint32_t i) {
       if (r.joins[i]) return false;
       uint32_t node[4];
       const uint32_t n = q.nodes(list[i], node);
@@ -122,10 +124,10 @@ void find_islands(World &w) {
 
 // Colliding points: of each vertex with one other side the earliest hit. A pair of edges counts only where none of its ends is such a point: the source
 // has no edges, and what both have would push twice.
-void find_points(World &w) {
-  Rollback &r = w.rollback;
-  const Array<Candidate> &list = w.broad.candidates();
-  const ImpactQuery query(w.body_views, w.obstacle_views, w.h, w.offset);
+void find_points(World &w, StepContext &step) {
+  Rollback &r = step.rollback;
+  const Array<Candidate> &list = step.broad.candidates();
+  const ImpactQuery query(step.body_views, step.obstacle_views, step.h, w.offset);
   const auto edges = [&](const Candidate &c) { return c.kind == 1; };
   const auto same = [&](const Candidate &a, const Candidate &b) {
     return a.slot_a == b.slot_a && a.slot_b == b.slot_b && a.obstacle == b.obstacle && a.kind == b.kind && a.feature_a == b.feature_a;
@@ -142,84 +144,84 @@ void find_points(World &w) {
     const uint32_t n = query.nodes(list[i], node);
     for (uint32_t k = 0; k < n; ++k) r.met[node[k]] = 1;
   }
-  w.contacts.clear();
+  step.contacts.clear();
   for (uint32_t i = 0; i < list.size();) {
     uint32_t end = i, best = kNone;
     for (; end < list.size() && same(list[end], list[i]); ++end)
       if (r.joins[end] && !(edges(list[end]) && marked(list[end])) && (best == kNone || r.hits[end].t < r.hits[best].t)) best = end;
-    if (best != kNone) w.contacts.push_back(query.contact(list[best], r.hits[best]));
+    if (best != kNone) step.contacts.push_back(query.contact(list[best], r.hits[best]));
     i = end;
   }
 }
 
-const Body &body_of_node(const World &w, uint32_t node, uint32_t &surfel) {
+const Body &body_of_node(const World &w, const StepContext &step, uint32_t node, uint32_t &surfel) {
   size_t i = 0;
-  while (i + 1 < w.body_views.size() && w.body_views[i + 1].first_node <= node) ++i;
-  surfel = node - w.body_views[i].first_node;
-  return *w.bodies[w.body_views[i].slot];
+  while (i + 1 < step.body_views.size() && step.body_views[i + 1].first_node <= node) ++i;
+  surfel = node - step.body_views[i].first_node;
+  return *w.bodies[step.body_views[i].slot];
 }
 
 // What the laws are asked: slip on the way as it was predicted, normal force and the force that would end the slip from all forces but friction.
-void set_forces(World &w) {
-  for (uint32_t i = 0; i < w.rows.n; ++i) {
-    const ContactPoint &c = w.contacts[i];
+void set_forces(World &w, StepContext &step) {
+  for (uint32_t i = 0; i < step.rows.n; ++i) {
+    const ContactPoint &c = step.contacts[i];
     Vec3 pull;   // of the lagged friction on the relative velocity, m/s
     for (uint32_t k = 0; k < c.nnode; ++k) {
       uint32_t s;
-      const Body &b = body_of_node(w, c.node[k], s);
+      const Body &b = body_of_node(w, step, c.node[k], s);
       const size_t at = size_t{b.surface.point[s]} * kStride;
-      for (int j = 0; j < 3; ++j) pull[j] += c.weight[k] * (w.h * (b.p.inv_mass[at + size_t(j)] * b.lagged[at + size_t(j)]));
+      for (int j = 0; j < 3; ++j) pull[j] += c.weight[k] * (step.h * (b.p.inv_mass[at + size_t(j)] * b.lagged[at + size_t(j)]));
     }
-    const double *const f = &w.rows.frame[size_t(i) * 9];
-    const Vec3 u = w.rows.velocity(i), free = u - Vec3{dot(load3(f), pull), dot(load3(f + 3), pull), dot(load3(f + 6), pull)};
-    const double stop = w.rows.wt[i] > 0 ? -1 / (w.rows.wt[i] * w.h) : 0;
-    w.state.fn[i] = rollback::normal_force(w.rows.wn[i], free.x, w.h);
-    w.state.vt[i] = u.y, w.state.vt[w.state.stride + i] = u.z;
-    w.state.ft_stop[i] = stop * free.y, w.state.ft_stop[w.state.stride + i] = stop * free.z;
+    const double *const f = &step.rows.frame[size_t(i) * 9];
+    const Vec3 u = step.rows.velocity(i), free = u - Vec3{dot(load3(f), pull), dot(load3(f + 3), pull), dot(load3(f + 6), pull)};
+    const double stop = step.rows.wt[i] > 0 ? -1 / (step.rows.wt[i] * step.h) : 0;
+    step.state.fn[i] = rollback::normal_force(step.rows.wn[i], free.x, step.h);
+    step.state.vt[i] = u.y, step.state.vt[step.state.stride + i] = u.z;
+    step.state.ft_stop[i] = stop * free.y, step.state.ft_stop[step.state.stride + i] = stop * free.z;
   }
 }
 
 // (4.5) for velocities and, by the commit, for positions; the momentum that this and the lagged friction change goes into the books.
-void roll_back(World &w) {
-  for (size_t i = 0; i < w.body_views.size(); ++i) {
-    Body &b = *w.bodies[w.body_views[i].slot];
-    const double *const share = w.rollback.shares[i];
+void roll_back(World &w, StepContext &step) {
+  for (size_t i = 0; i < step.body_views.size(); ++i) {
+    Body &b = *w.bodies[step.body_views[i].slot];
+    const double *const share = step.rollback.shares[i];
     for (uint32_t s = 0; s < b.surface.nsurfel; ++s) {
       const size_t at = size_t{b.surface.point[s]} * kStride;
       const Vec3 before = load3(&b.p.v_free[at]), after = share[s] < 1 ? rollback::velocity_after(before, share[s]) : before;
-      store3(&b.surfel_impulse[3 * size_t{s}], w.h * load3(&b.lagged[at]) + b.p.mass[b.surface.point[s]] * (after - before));
+      store3(&b.surfel_impulse[3 * size_t{s}], step.h * load3(&b.lagged[at]) + b.p.mass[b.surface.point[s]] * (after - before));
       store3(&b.p.v_free[at], after);
     }
   }
 }
 
 // Slip for the report: that of the way which was left.
-void set_slip(World &w) {
-  for (uint32_t i = 0; i < w.rows.n; ++i) {
-    const ContactPoint &c = w.contacts[i];
+void set_slip(World &w, StepContext &step) {
+  for (uint32_t i = 0; i < step.rows.n; ++i) {
+    const ContactPoint &c = step.contacts[i];
     Vec3 v = -load3(c.velocity);
     for (uint32_t k = 0; k < c.nnode; ++k) {
       uint32_t s;
-      const Body &b = body_of_node(w, c.node[k], s);
+      const Body &b = body_of_node(w, step, c.node[k], s);
       v += c.weight[k] * load3(&b.p.v_free[size_t{b.surface.point[s]} * kStride]);
     }
-    const double *const f = &w.rows.frame[size_t(i) * 9];
-    w.state.vt[i] = dot(load3(f + 3), v), w.state.vt[w.state.stride + i] = dot(load3(f + 6), v);
+    const double *const f = &step.rows.frame[size_t(i) * 9];
+    step.state.vt[i] = dot(load3(f + 3), v), step.state.vt[step.state.stride + i] = dot(load3(f + 6), v);
   }
 }
 
 // (5.27)-(5.30): friction on the points of both sides, by their weights at the common place; for the next sub-step.
-void keep_friction(World &w) {
+void keep_friction(World &w, StepContext &step) {
   for (const auto &b : w.bodies) std::fill(b->lagged.begin(), b->lagged.end(), 0.0);
-  for (uint32_t i = 0; i < w.rows.n; ++i) {
-    const ContactPoint &c = w.contacts[i];
-    const double *const f = &w.rows.frame[size_t(i) * 9];
-    double *const l = &w.rows.impulse[size_t(i) * 3];
-    l[0] = w.h * w.state.fn[i], l[1] = w.h * w.state.ft[i], l[2] = w.h * w.state.ft[w.state.stride + i];
-    const Vec3 force = w.state.ft[i] * load3(f + 3) + w.state.ft[w.state.stride + i] * load3(f + 6);
+  for (uint32_t i = 0; i < step.rows.n; ++i) {
+    const ContactPoint &c = step.contacts[i];
+    const double *const f = &step.rows.frame[size_t(i) * 9];
+    double *const l = &step.rows.impulse[size_t(i) * 3];
+    l[0] = step.h * step.state.fn[i], l[1] = step.h * step.state.ft[i], l[2] = step.h * step.state.ft[step.state.stride + i];
+    const Vec3 force = step.state.ft[i] * load3(f + 3) + step.state.ft[step.state.stride + i] * load3(f + 6);
     for (uint32_t k = 0; k < c.nnode; ++k) {
       uint32_t s;
-      const Body &b = body_of_node(w, c.node[k], s);
+      const Body &b = body_of_node(w, step, c.node[k], s);
       double *const to = &w.bodies[b.slot]->lagged[size_t{b.surface.point[s]} * kStride];
       store3(to, load3(to) + c.weight[k] * force);
     }
@@ -228,24 +230,24 @@ void keep_friction(World &w) {
 
 }  // namespace
 
-bool World::stage_rollback(uint32_t *trouble) {
-  passes = sweeps = 0, residual = {};
+bool stage_rollback(World &w, StepContext &step, uint32_t *trouble) {
+  step.passes = step.sweeps = 0, step.residual = {};
   uint32_t nnode = 0;
-  for (const BodyView &v : body_views) nnode = std::max(nnode, v.first_node + v.surface->nsurfel);
-  rollback.share.assign(nnode, 1.0);
-  rollback.shares.clear();
-  for (const BodyView &v : body_views) rollback.shares.push_back(&rollback.share[v.first_node]);
-  find_islands(*this);
-  find_points(*this);
-  make_rows();
-  set_forces(*this);
-  if (const LawInstance *bad = batches.evaluate(h, state)) return *trouble |= tell_failed_solve(bad), false;
-  stats.passes = rows.n > 0, stats.sweeps = 0, stats.residual = 0;
-  stats.passes_max = std::max(stats.passes_max, stats.passes);
-  reserve_contacts();
-  roll_back(*this);      // nothing fails from here on
-  set_slip(*this);
-  keep_friction(*this);
+  for (const BodyView &v : step.body_views) nnode = std::max(nnode, v.first_node + v.surface->nsurfel);
+  step.rollback.share.assign(nnode, 1.0);
+  step.rollback.shares.clear();
+  for (const BodyView &v : step.body_views) step.rollback.shares.push_back(&step.rollback.share[v.first_node]);
+  find_islands(w, step);
+  find_points(w, step);
+  make_rows(w, step);
+  set_forces(w, step);
+  if (const LawInstance *bad = step.batches.evaluate(step.h, step.state)) return *trouble |= tell_failed_solve(w, step, bad), false;
+  w.stats.passes = step.rows.n > 0, w.stats.sweeps = 0, w.stats.residual = 0;
+  w.stats.passes_max = std::max(w.stats.passes_max, w.stats.passes);
+  reserve_contacts(w, step);
+  roll_back(w, step);      // nothing fails from here on
+  set_slip(w, step);
+  keep_friction(w, step);
   return true;
 }
 

@@ -13,6 +13,8 @@
 #include "narrow/self_contact.h"
 #include "narrow/toi_guard_motion.h"
 #include "surfel/pierce.h"
+#include "world/context.h"
+#include "world/stages.h"
 #include "world/world.h"
 
 namespace dfm {
@@ -36,9 +38,9 @@ bool promises(const Body &b) {
   return std::find(words.begin(), words.end(), kSelfContact) != words.end() && b.model.works(kSelfContact);
 }
 
-SelfBody *self_body(World &w, uint32_t slot) {
-  const auto at = std::lower_bound(w.self_bodies.begin(), w.self_bodies.end(), slot, [](auto &s, uint32_t v) { return s->body->slot < v; });
-  return at != w.self_bodies.end() && (*at)->body->slot == slot ? at->get() : nullptr;
+SelfBody *self_body(StepContext &step, uint32_t slot) {
+  const auto at = std::lower_bound(step.self_bodies.begin(), step.self_bodies.end(), slot, [](auto &s, uint32_t v) { return s->body->slot < v; });
+  return at != step.self_bodies.end() && (*at)->body->slot == slot ? at->get() : nullptr;
 }
 
 void find_tangled(SelfBody &b) {
@@ -77,26 +79,26 @@ uint8_t asks_self_contact(const World &w) {
   return listed ? uint8_t{DFM_SELF_ON} : static_cast<uint8_t>(w.def.self_contact);
 }
 
-void choose_self_bodies(World &w, SceneFacts &facts, std::vector<uint32_t> &used) {
+void choose_self_bodies(World &w, StepContext &step, SceneFacts &facts, std::vector<uint32_t> &used) {
   facts.self = w.def.self_contact == DFM_SELF_ON;
   const bool always = !self_asked_by(facts).empty();
   facts.self_auto = w.def.self_contact == DFM_SELF_AUTO;
   const uint8_t asked = always ? DFM_SELF_ON : facts.self_auto ? DFM_SELF_AUTO : DFM_SELF_OFF;
   std::vector<std::unique_ptr<SelfBody>> before;
-  before.swap(w.self_bodies);
+  before.swap(step.self_bodies);
   for (auto &b : w.bodies) {
     const uint8_t when = rule_of(w, *b, asked);
     if (promises(*b) || when == DFM_SELF_OFF) continue;
     const auto same = std::find_if(before.begin(), before.end(), [&](auto &s) { return s && s->id == b->id; });
-    w.self_bodies.push_back(same != before.end() ? std::move(*same) : std::make_unique<SelfBody>(w.memory(), *b));
-    SelfBody &self = *w.self_bodies.back();
+    step.self_bodies.push_back(same != before.end() ? std::move(*same) : std::make_unique<SelfBody>(w.memory(), *b));
+    SelfBody &self = *step.self_bodies.back();
     if (when == DFM_SELF_ON) self.watch.reset();
     else if (!self.watch) self.watch = std::make_unique<SelfWatch>(w.memory(), b->surface, self.rest, self.list);
     w.find_law(b->slot, b->slot, used);
     for (const uint32_t law : used)
       for (const std::string &e : effects(*w.laws[law]->type)) facts.offered.push_back({e, w.laws[law]->type->id});
   }
-  facts.self_bodies = static_cast<unsigned>(w.self_bodies.size());
+  facts.self_bodies = static_cast<unsigned>(step.self_bodies.size());
 }
 
 namespace {
@@ -106,19 +108,19 @@ void switch_to(SelfBody &s, bool on) {
   s.list.set_wide(!on);
 }
 
-void count_self(World &w) {
-  w.stats.self_bodies = static_cast<uint32_t>(std::count_if(w.self_bodies.begin(), w.self_bodies.end(), [](auto &s) { return s->on; }));
+void count_self(World &w, StepContext &step) {
+  w.stats.self_bodies = static_cast<uint32_t>(std::count_if(step.self_bodies.begin(), step.self_bodies.end(), [](auto &s) { return s->on; }));
   w.stats.self_max = std::max(w.stats.self_max, w.stats.self_bodies);
 }
 
 // How fast a surfel goes to its end of the sub-step, as the solve left it.
-Vec3 velocity_after(const World &w, const Body &b, uint32_t surfel) {
+Vec3 velocity_after(const StepContext &step, const Body &b, uint32_t surfel) {
   Vec3 sum;
   if (b.model.stepper) {   // has written its end beside its start
     b.surface.each_phyxel(surfel, [&](uint32_t p, double weight) { sum += weight * load3(&b.p.f[size_t(p) * kStride]); });
-    return (1 / w.h) * (sum - load3(&b.surface.x[size_t(surfel) * 4]));
+    return (1 / step.h) * (sum - load3(&b.surface.x[size_t(surfel) * 4]));
   }
-  const bool touched = w.rows.n > 0;
+  const bool touched = step.rows.n > 0;
   b.surface.each_phyxel(surfel, [&](uint32_t p, double weight) {
     sum += weight * load3(&b.p.v_free[size_t(p) * kStride]);
     if (touched) sum += weight * b.p.inv_mass[p] * load3(&b.p.impulse[size_t(p) * kStride]);
@@ -128,46 +130,47 @@ Vec3 velocity_after(const World &w, const Body &b, uint32_t surfel) {
 
 }  // namespace
 
-void World::stage_self() {
-  if (!plan.has(StageId::narrow)) contacts.clear();
-  const bool listed = plan.has(StageId::broad);   // which has looked at the speeds
-  for (auto &s : self_bodies) {
-    const BodyView &view = body_views[s->body->slot];
+void stage_self(World &w, StepContext &step) {
+  if (!w.plan.has(StageId::narrow)) step.contacts.clear();
+  const bool listed = w.plan.has(StageId::broad);   // which has looked at the speeds
+  for (auto &s : step.self_bodies) {
+    const BodyView &view = step.body_views[s->body->slot];
     s->looked = false;
     if (view.asleep) continue;
-    switch_to(*s, !s->watch || s->watch->near(h, offset, listed ? broad.speed(s->body->slot) : HUGE_VAL));
+    switch_to(*s, !s->watch || s->watch->near(step.h, w.offset, listed ? step.broad.speed(s->body->slot) : HUGE_VAL));
     if (!s->on) continue;
-    s->list.update(h, offset);
+    s->list.update(step.h, w.offset);
     SelfBody *const self = s.get();
     const Tangled tangled = [self](uint32_t surfel) { return is_tangled(*self, surfel); };
-    find_self_contacts(view, s->rest, s->list.vertex_face(), s->list.edge_edge(), h, offset, plan.has(StageId::guard) ? tangled : nullptr, lent, contacts);
+    find_self_contacts(view, s->rest, s->list.vertex_face(), s->list.edge_edge(), step.h, w.offset, w.plan.has(StageId::guard) ? tangled : nullptr, step.lent,
+                       step.contacts);
   }
-  count_self(*this);
+  count_self(w, step);
 }
 
-bool cover_self(World &w) {
+bool cover_self(World &w, StepContext &step) {
   bool fresh = false;
-  for (auto &s : w.self_bodies) {
+  for (auto &s : step.self_bodies) {
     const Body &b = *s->body;
-    if (w.body_views[b.slot].asleep) continue;
-    const double change = b.model.stepper ? w.guard.speed[b.slot] : w.guard.change[b.slot];
+    if (step.body_views[b.slot].asleep) continue;
+    const double change = b.model.stepper ? step.guard.speed[b.slot] : step.guard.change[b.slot];
     // A blow may fold within the sub-step what was far from itself before the solve.
-    if (!s->on && s->watch->meets(w.h, w.offset, change, [&](uint32_t surfel) { return velocity_after(w, b, surfel); })) switch_to(*s, true);
-    if (s->on) s->list.cover(w.h, w.offset, change);
+    if (!s->on && s->watch->meets(step.h, w.offset, change, [&](uint32_t surfel) { return velocity_after(step, b, surfel); })) switch_to(*s, true);
+    if (s->on) s->list.cover(step.h, w.offset, change);
     fresh |= s->joined != (s->on ? s->list.renewals() : 0);
   }
-  if (fresh) count_self(w);
+  if (fresh) count_self(w, step);
   return fresh;
 }
 
-bool join_self(World &w, const Array<Candidate> *pairs, Array<Candidate> &to) {
-  if (std::none_of(w.self_bodies.begin(), w.self_bodies.end(), [](auto &s) { return s->on; })) {
-    for (auto &s : w.self_bodies) s->joined = 0;
+bool join_self(StepContext &step, const Array<Candidate> *pairs, Array<Candidate> &to) {
+  if (std::none_of(step.self_bodies.begin(), step.self_bodies.end(), [](auto &s) { return s->on; })) {
+    for (auto &s : step.self_bodies) s->joined = 0;
     return false;
   }
   to.clear();
   if (pairs) to.insert(to.end(), pairs->begin(), pairs->end());
-  for (auto &s : w.self_bodies) {
+  for (auto &s : step.self_bodies) {
     const uint32_t slot = s->body->slot;
     s->joined = 0;
     if (!s->on) continue;
@@ -178,8 +181,8 @@ bool join_self(World &w, const Array<Candidate> *pairs, Array<Candidate> &to) {
   return true;
 }
 
-double guarded_apart(World &w, const Candidate &c) {
-  SelfBody &b = *self_body(w, c.slot_a);
+double guarded_apart(World &w, StepContext &step, const Candidate &c) {
+  SelfBody &b = *self_body(step, c.slot_a);
   const Surface &s = b.body->surface;
   const bool edges = c.kind == kEdgeEdge;
   const auto any = [&](const uint32_t *corner, int n) { return std::any_of(corner, corner + n, [&](uint32_t surfel) { return is_tangled(b, surfel); }); };

@@ -9,6 +9,7 @@
 
 namespace dfm {
 
+struct StepContext;
 struct World;
 struct Body;
 
@@ -27,15 +28,15 @@ struct SelfBody {
 
 // DFM_SELF_*: what the world asks for (dfm_world_def.self_contact, or the effect in its list).
 uint8_t asks_self_contact(const World &w);
-// Of prepare(): fills w.self_bodies and what the plan is told of them; laws of the pairs of a body with itself are found, `used` is scratch.
-void choose_self_bodies(World &w, SceneFacts &facts, std::vector<uint32_t> &used);
+// Of prepare(): fills step.self_bodies and what the plan is told of them; laws of the pairs of a body with itself are found, `used` is scratch.
+void choose_self_bodies(World &w, StepContext &step, SceneFacts &facts, std::vector<uint32_t> &used);
 
 // Of the guard. Lists that do not cover the ways after the solve are made anew; true if any has changed since it was joined.
-bool cover_self(World &w);
+bool cover_self(World &w, StepContext &step);
 // Fills `to` with `pairs` (null: none) and behind them those of bodies with themselves; false: there are none, and `to` is as it was.
-bool join_self(World &w, const Array<Candidate> *pairs, Array<Candidate> &to);
+bool join_self(StepContext &step, const Array<Candidate> *pairs, Array<Candidate> &to);
 // m that the two features of a candidate of one body rest apart; 0 where the guard has nothing to keep: they lie on each other at rest, or cross at the start
 // of the sub-step, and what is through already must be let out.
-double guarded_apart(World &w, const Candidate &c);
+double guarded_apart(World &w, StepContext &step, const Candidate &c);
 
 }  // namespace dfm

@@ -16,6 +16,8 @@
 #include "surfel/make_surface.h"
 #include "world/measure.h"
 #include "world/snapshot_stream.h"
+#include "world/context.h"
+#include "world/stages.h"
 #include "world/world.h"
 
 namespace dfm {
@@ -496,7 +498,7 @@ void exchange(World &w, Staged &t) noexcept {
   std::swap(w.time, t.time), std::swap(w.step_count, t.step_count), std::swap(w.next_id, t.next_id);
   std::swap(w.hold_start, t.hold_start), std::swap(w.holding, t.holding), std::swap(w.sizes, t.sizes), std::swap(w.watch, t.watch);
   w.worst_body = nullptr, w.worst_point = 0;
-  w.guard.forget();
+  ++w.placements;
 }
 
 }  // namespace
@@ -573,7 +575,7 @@ void world_restore(World &w, const void *data, size_t bytes) {
     w.changed = true;
     w.overlaps.all = w.overlaps.look_only = true;
     w.sleepers = 0;   // prepare() counts them
-    w.prepare(&choice);
+    prepare(w, &choice);
   } catch (...) {     // no memory for the tables: the state is as it was, and the tables are made when next needed
     exchange(w, staged);
     take_parameters_back(w, staged, w.bodies.size());

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <utility>
 
+#include "world/context.h"
+#include "world/stages.h"
 #include "world/world.h"
 
 namespace dfm {

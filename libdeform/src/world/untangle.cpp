@@ -8,6 +8,8 @@
 #include "core/error.h"
 #include "world/overlap_sides.h"
 #include "world/spring.h"
+#include "world/context.h"
+#include "world/stages.h"
 #include "world/world.h"
 
 namespace dfm {
@@ -203,8 +205,8 @@ class Untangler {
       w_.context->logf(DFM_LOG_INFO, "untangle moved body '%s' by (%.4g, %.4g, %.4g) m; its energy in gravity and springs changed by %.3g J", b.name.c_str(),
                        by.x, by.y, by.z, potential(b, by));
       for (uint32_t k = 0; k < b.p.n; ++k) store3(&b.p.x[size_t(k) * kStride], load3(&b.p.x[size_t(k) * kStride]) + by);
-      w_.wake(b), forget_energy(b);   // the change of potential is nobody's work
-      w_.guard.forget();
+      wake(w_, b), forget_energy(b);   // the change of potential is nobody's work
+      ++w_.placements;
     }
   }
 

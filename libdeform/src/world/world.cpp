@@ -1,4 +1,6 @@
 // What the world knows about itself between steps: names, pair tables, offset, plan.
+#include "world/context.h"
+#include "world/stages.h"
 #include "world/world.h"
 
 #include <algorithm>
@@ -29,21 +31,13 @@ Pose Obstacle::pose_at_time(double t) const {
   return p;
 }
 
-World::World(dfm_context *c)
-    : context(c), broad(c->memory), rows(c->memory), acceleration(c->memory), store(c->memory), next_store(c->memory), batches(c->memory), areas(c->memory),
-      exchange(c->memory), renewal(c->memory), rollback(c->memory), islands(c->memory) {
+World::World(dfm_context *c) : context(c), steps(std::make_unique<StepContext>(c->memory)), store(c->memory) {
   const Memory &m = c->memory;
-  use_memory(m, driven, lent, contacts, tolerance.normal, tolerance.tangent, disturbance, best_impulse, tangents, match, sharing, aim, stands, ways, renewed,
-             block_surfels, block_impulse, block_velocity);
-  GuardMemory &known = guard.memory;
-  use_memory(m, known.runs, known.old_runs, known.features, known.old_features, known.rest, known.old_rest, known.normal, known.old_normal);
-  for (Report *r : {&report, &last_report}) use_memory(m, r->contacts, r->frame, r->impulse, r->slip, r->mode);
-  use_memory(m, active, woken, stirred, free_kinetic, step_impulses.pairs);
-  use_memory(m, guard.joined, guard.near, guard.hits, guard.speed, guard.change, guard.kept);
-  use_memory(m, state.law, state.fn, state.vt, state.ft_stop, state.area, state.dwell, state.bristle, state.ft, state.dft_dvt, state.dft_dfn, state.limit,
-             state.bristle_out, state.mode, state.set_valued);
+  use_memory(m, report.contacts, report.frame, report.impulse, report.slip, report.mode, step_impulses.pairs);
   stats.size = sizeof stats;
 }
+
+World::~World() = default;
 
 Body *World::find_body(const std::string &name) {
   for (auto &b : bodies)
@@ -103,30 +97,31 @@ void offer(const dfm_type &type, std::vector<SceneFacts::Provider> &to) {
 
 }  // namespace
 
-void World::prepare(const RestoredChoice *restored) {
-  if (!changed) return settle_overlaps(*this);
-  const uint32_t nb = static_cast<uint32_t>(bodies.size()), no = static_cast<uint32_t>(obstacles.size()), width = nb + no;
+void prepare(World &w, const RestoredChoice *restored) {
+  StepContext &step = *w.steps;
+  if (!w.changed) return settle_overlaps(w);
+  const uint32_t nb = static_cast<uint32_t>(w.bodies.size()), no = static_cast<uint32_t>(w.obstacles.size()), width = nb + no;
   SceneFacts facts;
   facts.bodies = nb, facts.obstacles = no;
-  facts.gravity_keys = !gravity_keys.empty(), facts.sleep = def.sleep != 0, facts.rollback = def.method == DFM_METHOD_ROLLBACK;
+  facts.gravity_keys = !w.gravity_keys.empty(), facts.sleep = w.def.sleep != 0, facts.rollback = w.def.method == DFM_METHOD_ROLLBACK;
 
-  body_views.clear(), obstacle_views.clear(), sources.clear(), exchange.clear();
+  step.body_views.clear(), step.obstacle_views.clear(), step.sources.clear(), step.exchange.clear();
   uint32_t node = 0, point = 0;
   for (uint32_t i = 0; i < nb; ++i) {
-    Body &b = *bodies[i];
+    Body &b = *w.bodies[i];
     b.slot = i;
     facts.self_stepping += b.model.stepper != nullptr;
     facts.loads_vary |= b.loads_vary(), facts.held_move |= !b.motions.empty();
     const Surface &s = b.surface;
-    body_views.push_back({i, node, b.category, b.collides_with, b.id, &s});
-    sources.push_back({node, s.nsurfel, point, b.p.n, &s, b.model.stepper ? nullptr : b.p.inv_mass.data(),
+    step.body_views.push_back({i, node, b.category, b.collides_with, b.id, &s});
+    step.sources.push_back({node, s.nsurfel, point, b.p.n, &s, b.model.stepper ? nullptr : b.p.inv_mass.data(),
                        b.model.stepper ? s.v.data() : b.p.v_free.data()});
     if (!s.identity()) ++facts.coupled, facts.coupled_surfels += s.nsurfel;
     node += s.nsurfel, point += b.p.n;
     for (const std::string &e : effects(*b.model.type)) (b.model.works(e) ? facts.offered : facts.idle).push_back({e, b.model.type->id});
   }
   for (uint32_t i = 0; i < no; ++i) {
-    Obstacle &o = *obstacles[i];
+    Obstacle &o = *w.obstacles[i];
     o.slot = i;
     facts.obstacles_move |= o.moves() || o.has_target;
     ObstacleView v{};
@@ -139,78 +134,79 @@ void World::prepare(const RestoredChoice *restored) {
       v.surface = &o.mesh->surface, v.extent = o.mesh->extent;
     }
     if (o.grid) v.grid = o.grid.get(), v.extent = o.grid->extent();
-    obstacle_views.push_back(v);
+    step.obstacle_views.push_back(v);
   }
 
-  place_rigids(*this);
-  for (auto &set : rigid_sets) {
+  place_rigids(w);
+  for (auto &set : w.rigid_sets) {
     facts.rigid_bodies += static_cast<unsigned>(set->defs.size()), facts.rigid_joints += set->njoint;
     if (facts.rigid_hosts.find(set->host_name) == std::string::npos) facts.rigid_hosts += (facts.rigid_hosts.empty() ? "" : ", ") + set->host_name;
     facts.offered.push_back({"two_way_rigid", "rigid host " + set->host_name});
   }
 
   // Pairs: filters, then laws. The default law is made only when a pair needs it.
-  const uint64_t filter_version = filter.version;   // rises, so that lists made under older rules are renewed
-  filter = PairFilter(memory());
-  filter.version = filter_version + 1;
-  pair_law.assign(size_t(nb) * width, 0);
-  zone_table.clear(), zone_law.clear();
+  const uint64_t filter_version = w.filter.version;   // rises, so that lists made under older rules are renewed
+  w.filter = PairFilter(w.memory());
+  w.filter.version = filter_version + 1;
+  w.pair_law.assign(size_t(nb) * width, 0);
+  w.zone_table.clear(), w.zone_law.clear();
   std::vector<uint32_t> used;
   for (uint32_t i = 0; i < nb; ++i) {
-    const PairSide a{bodies[i]->name, {}, bodies[i]->material};
+    const PairSide a{w.bodies[i]->name, {}, w.bodies[i]->material};
     for (uint32_t j = 0; j < width; ++j) {
       const bool is_body = j < nb;
       if (is_body && j == i) continue;
-      const uint64_t id = is_body ? bodies[j]->id : obstacles[j - nb]->id;
-      const PairSide b = is_body ? PairSide{bodies[j]->name, {}, bodies[j]->material} : PairSide{obstacles[j - nb]->name, {}, obstacles[j - nb]->material};
-      bool touch = is_body ? (bodies[i]->category & bodies[j]->collides_with) && (bodies[j]->category & bodies[i]->collides_with)
-                           : (bodies[i]->category & obstacles[j - nb]->def.collides_with) &&
-                                 (obstacles[j - nb]->def.category & bodies[i]->collides_with);
-      if (const FilterRule *rule = best_rule(filters, a, b)) {
-        if (!is_body || i < j) filter.set(bodies[i]->id, id, !is_body, rule->collide);
+      const uint64_t id = is_body ? w.bodies[j]->id : w.obstacles[j - nb]->id;
+      const PairSide b = is_body ? PairSide{w.bodies[j]->name, {}, w.bodies[j]->material}
+                                 : PairSide{w.obstacles[j - nb]->name, {}, w.obstacles[j - nb]->material};
+      bool touch = is_body ? (w.bodies[i]->category & w.bodies[j]->collides_with) && (w.bodies[j]->category & w.bodies[i]->collides_with)
+                           : (w.bodies[i]->category & w.obstacles[j - nb]->def.collides_with) &&
+                                 (w.obstacles[j - nb]->def.category & w.bodies[i]->collides_with);
+      if (const FilterRule *rule = best_rule(w.filters, a, b)) {
+        if (!is_body || i < j) w.filter.set(w.bodies[i]->id, id, !is_body, rule->collide);
         touch = rule->collide;
       }
-      if (!is_body && obstacle_views[j - nb].shape == Shape::none) touch = false;
+      if (!is_body && step.obstacle_views[j - nb].shape == Shape::none) touch = false;
       if (!touch) continue;
       if (is_body) facts.body_pairs += i < j;
       else ++facts.obstacle_pairs;
-      find_law(i, j, used);
-      for (uint32_t law : used) offer(*laws[law]->type, facts.offered);
+      w.find_law(i, j, used);
+      for (uint32_t law : used) offer(*w.laws[law]->type, facts.offered);
     }
   }
-  keep_overlaps_aside(*this);
-  facts.effects_listed = def.effects != nullptr;
-  facts.asked = asked_effects;
-  choose_self_bodies(*this, facts, used);
-  law_list.clear();
-  for (auto &l : laws) law_list.push_back(l.get());
+  keep_overlaps_aside(w);
+  facts.effects_listed = w.def.effects != nullptr;
+  facts.asked = w.asked_effects;
+  choose_self_bodies(w, step, facts, used);
+  w.law_list.clear();
+  for (auto &l : w.laws) w.law_list.push_back(l.get());
 
-  for (const dfm_type *t : context->registry.list()) offer(*t, facts.available);
-  facts.unguarded = def.flags & DFM_WORLD_UNGUARDED;
+  for (const dfm_type *t : w.context->registry.list()) offer(*t, facts.available);
+  facts.unguarded = w.def.flags & DFM_WORLD_UNGUARDED;
   facts.available.push_back({kSelfContact, "contact"});
   if (nb && facts.effects_listed) facts.offered.push_back({kSelfContact, "contact"});
-  plan = make_plan(facts);
+  w.plan = make_plan(facts);
 
   // While contacts live it only falls: a larger one would turn their rest into a depth, and push them apart at 0.1 d_c / h.
-  const double wanted = contact_offset(*this);
-  const double before = offset;
-  offset = restored ? restored->offset : def.contact_offset > 0 ? def.contact_offset : store.n > 0 ? std::min(offset, wanted) : wanted;
-  if (!restored) check_offset(*this);
-  for (auto &b : bodies)
-    if (def.sleep && b->anchor.empty()) b->anchor = b->p.x;
-  active.reserve(nb), sinks.reserve(nb);
-  reserve_sleep(nb);
-  if (sleepers > 0 && offset != before) wake_all();   // contacts rest at another distance now
-  gather_active();
-  gravity = load3(def.gravity);
-  if (!gravity_keys.empty()) gravity = vector_at(gravity_keys, time);
-  bound_age = kNone;
-  free_kinetic.resize(nb);
-  if (!restored) forget_energy(*this);
-  else gravity = restored->gravity, stable = restored->stable, inverted = restored->inverted, bound_age = restored->bound_age;
-  guard.forget();
-  changed = false;
-  settle_overlaps(*this);
+  const double wanted = contact_offset(w);
+  const double before = w.offset;
+  w.offset = restored ? restored->offset : w.def.contact_offset > 0 ? w.def.contact_offset : w.store.n > 0 ? std::min(w.offset, wanted) : wanted;
+  if (!restored) check_offset(w);
+  for (auto &b : w.bodies)
+    if (w.def.sleep && b->anchor.empty()) b->anchor = b->p.x;
+  step.active.reserve(nb), step.sinks.reserve(nb);
+  reserve_sleep(w, step, nb);
+  if (w.sleepers > 0 && w.offset != before) wake_all(w);   // contacts rest at another distance now
+  gather_active(w);
+  w.gravity = load3(w.def.gravity);
+  if (!w.gravity_keys.empty()) w.gravity = vector_at(w.gravity_keys, w.time);
+  w.bound_age = kNone;
+  step.free_kinetic.resize(nb);
+  if (!restored) forget_energy(w);
+  else w.gravity = restored->gravity, w.stable = restored->stable, w.inverted = restored->inverted, w.bound_age = restored->bound_age;
+  step.guard.forget();
+  w.changed = false;
+  settle_overlaps(w);
 }
 
 }  // namespace dfm

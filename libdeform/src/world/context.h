@@ -1,0 +1,88 @@
+// Buffers of a step, by the stage that writes them. Nothing here is state, and no snapshot has any of it.
+// What lasts is the World's (world/world.h).
+#pragma once
+#include <array>
+#include <vector>
+
+#include "broad/broad_phase.h"
+#include "contact/areas.h"
+#include "contact/exchange.h"
+#include "contact/renewal.h"
+#include "contact/solver.h"
+#include "contact/store.h"
+#include "distribute/distribute.h"
+#include "friction/laws.h"
+#include "surfel/views.h"
+#include "world/budget.h"
+#include "world/guard.h"
+#include "world/islands.h"
+#include "world/rollback.h"
+#include "world/self_contact.h"
+#include "world/world.h"
+
+namespace dfm {
+
+struct StepContext {
+  double h = 0, left = 0;                              // s: of the sub-step; from its start to the end of the step
+  Budget budget;
+  std::array<double, 24> stage_seconds{};
+  std::array<uint64_t, 24> stage_calls{};
+
+  // prepare(): the world's entities as the stages see them
+  std::vector<BodyView> body_views;
+  std::vector<ObstacleView> obstacle_views;
+  std::vector<RigidPlace> rigid_places;                // by obstacle slot; empty without rigid bodies
+  std::vector<uint32_t> rigid_groups;                  // bodies per group, all sets
+  std::vector<DofSource> sources;
+  std::vector<std::unique_ptr<SelfBody>> self_bodies;  // in id order; those that may touch themselves
+
+  // motion
+  struct Driven { double *velocity, before; };
+  Array<Driven> driven;                                // held components that this sub-step's motion stage has set
+  // predict
+  Array<double> free_kinetic;                          // [bodies] J, without contact; of this sub-step
+  // broad, narrow, self
+  BroadPhase broad;
+  Array<ContactPoint> contacts;
+  Array<uint8_t> lent;                                 // scratch of the narrow phase
+
+  // contact <-> friction
+  ContactRows rows;
+  ContactState state;
+  Acceleration acceleration;
+  Tolerance tolerance;
+  Residual residual;
+  uint32_t passes = 0, sweeps = 0;
+  Array<double> disturbance, best_impulse;
+  LawBatches batches;
+  Array<double> tangents;
+  Array<uint32_t> match;                               // [contacts] place in the store that the contact goes on from, or kNone
+  Array<uint32_t> block_surfels;                       // responses of self-stepping bodies
+  Array<double> block_impulse, block_velocity;
+  bool rigid_again = false;                            // a host has answered, and the solve goes on from its last impulses
+  AreaShares areas;
+  AreaExchange exchange;
+  Array<uint32_t> sharing;                             // law of contacts whose areas follow the load, else kNone
+  bool shares = false;                                 // does any law count by area?
+  Array<double> aim;                                   // [contacts] m2, what they should stand for, if so
+  Renewal renewal;
+  Array<uint8_t> stands;                               // [contacts] carries, and has an area that it keeps
+  Array<Renewal::Way> ways;
+  Array<double> renewed;
+  Rollback rollback;                                   // in place of the above, where the method is rollback
+
+  // distribute, guard
+  std::vector<ImpulseSink> sinks;
+  Guard guard;
+  // commit: trades places with the world's
+  ContactStore next_store;
+  Report last_report;
+  // sleep. With nobody asleep `active` holds all bodies.
+  Islands islands;
+  Array<uint32_t> active, woken;                       // slots that the stages work on, ascending; slots woken in this sub-step
+  Array<uint8_t> stirred;                              // [island]
+
+  explicit StepContext(const Memory &memory);
+};
+
+}  // namespace dfm
