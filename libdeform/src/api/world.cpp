@@ -298,7 +298,7 @@ dfm_status dfm_world_profile(dfm_world world, uint32_t capacity, dfm_stage_time 
     if (!room(static_cast<uint32_t>(w.plan.stages.size()), capacity, out, n)) return;
     for (size_t i = 0; i < w.plan.stages.size(); ++i) {
       const StageId id = w.plan.stages[i].id;
-      out[i] = {stage_name(id), w.steps->stage_seconds[size_t(id)], w.steps->stage_calls[size_t(id)]};
+      out[i] = {stage(id).name, w.steps->stage_seconds[size_t(id)], w.steps->stage_calls[size_t(id)]};
     }
   });
 }

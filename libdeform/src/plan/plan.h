@@ -1,15 +1,17 @@
-// The plan: which stages a sub-step runs, derived from what the scene contains. A stage that nothing calls for is not in the list, so it
-// costs no instruction; `deform explain` prints both lists with the reasons.
+// The plan: which stages a sub-step runs, and which effects they are there for, derived from what the scene contains. A stage that nothing calls for is not in
+// the list, so it costs no instruction; `deform explain` prints both lists with the reasons. The order of the stages is that of their table (world/step.cpp).
 #pragma once
+#include <cstddef>
 #include <string>
 #include <vector>
 
 namespace dfm {
 
+// In the order of a sub-step.
 enum class StageId {
-  motion, model, predict, gather, broad, narrow, self, solve, distribute, guard, commit, rigid_predict, rigid_commit, sleep, lagged, rollback, step
+  motion, model, predict, rigid_predict, gather, lagged, broad, rollback, narrow, self, solve, rigid_commit, distribute, guard, commit, sleep, count
 };
-const char *stage_name(StageId id);
+inline constexpr size_t kStages = size_t(StageId::count);
 
 // What the plan is derived from.
 struct SceneFacts {
@@ -31,6 +33,27 @@ struct SceneFacts {
   std::vector<std::string> asked;                      // where listed
 };
 
+// Does a stage run, and why; where it does not: why not, or nothing where that is not worth a line.
+struct StageChoice { bool runs = false; std::string why; };
+namespace when {
+StageChoice motion(const SceneFacts &facts);
+StageChoice model(const SceneFacts &facts);
+StageChoice predict(const SceneFacts &facts);
+StageChoice rigid_predict(const SceneFacts &facts);
+StageChoice gather(const SceneFacts &facts);
+StageChoice lagged(const SceneFacts &facts);
+StageChoice broad(const SceneFacts &facts);
+StageChoice rollback(const SceneFacts &facts);
+StageChoice narrow(const SceneFacts &facts);
+StageChoice self(const SceneFacts &facts);
+StageChoice solve(const SceneFacts &facts);
+StageChoice rigid_commit(const SceneFacts &facts);
+StageChoice distribute(const SceneFacts &facts);
+StageChoice guard(const SceneFacts &facts);
+StageChoice commit(const SceneFacts &facts);
+StageChoice sleep(const SceneFacts &facts);
+}  // namespace when
+
 struct PlannedStage { StageId id; std::string why; };
 struct AbsentStage { std::string name, why; };
 struct PlannedEffect { std::string name, asked_by, provided_by; };
@@ -45,10 +68,11 @@ struct Plan {
 };
 
 inline constexpr char kSelfContact[] = "self_contact";
+inline constexpr char kSelfAuto[] = "contact.self auto";
 // Who calls for self contact: "contact.self", "effects", the effect that needs it; "" where nobody does.
 std::string self_asked_by(const SceneFacts &facts);
 
-// Throws Error(DFM_E_ARG) where a listed effect is provided by nothing in the scene; names who could.
-Plan make_plan(const SceneFacts &facts);
+// The effects. Throws Error(DFM_E_ARG) where a listed one is provided by nothing in the scene; names who could.
+void plan_effects(const SceneFacts &facts, Plan &plan);
 
 }  // namespace dfm

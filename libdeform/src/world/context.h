@@ -25,8 +25,8 @@ namespace dfm {
 struct StepContext {
   double h = 0, left = 0;                              // s: of the sub-step; from its start to the end of the step
   Budget budget;
-  std::array<double, 24> stage_seconds{};
-  std::array<uint64_t, 24> stage_calls{};
+  std::array<double, kStages> stage_seconds{};
+  std::array<uint64_t, kStages> stage_calls{};
 
   // prepare(): the world's entities as the stages see them
   std::vector<BodyView> body_views;

@@ -21,42 +21,6 @@ std::string quote(const std::string &s) {
   return out + "\"";
 }
 
-// What a stage costs grows with this; counts of the present scene, not seconds.
-std::string cost(const World &w, StageId id) {
-  const StepContext &step = *w.steps;
-  size_t points = 0, cells = 0, surfels = 0, triangles = 0, weights = 0;
-  for (auto &b : w.bodies) {
-    points += b->p.n, cells += b->tets.size() / 4;
-    surfels += b->surface.nsurfel, triangles += b->surface.ntri, weights += b->surface.weight.size();
-  }
-  switch (id) {
-    case StageId::model: return format("%zu cells", cells);
-    case StageId::predict:
-    case StageId::lagged:
-    case StageId::commit: return format("%zu points", points);
-    case StageId::rigid_predict:
-    case StageId::rigid_commit: {
-      size_t n = 0;
-      for (auto &set : w.rigid_sets) n += set->defs.size();
-      return format("%zu states", n);
-    }
-    case StageId::gather: return format("%zu weights", weights);
-    case StageId::broad: return format("%zu surfels every sub-step; %zu triangles whenever a skin is used up", surfels, triangles);
-    case StageId::narrow: return "candidate pairs";
-    case StageId::rollback: return "candidate pairs, again while any is tied";
-    case StageId::self: {
-      size_t n = 0, t = 0;
-      for (auto &s : step.self_bodies) n += s->body->surface.nsurfel, t += s->body->surface.ntri;
-      return format("%zu surfels every sub-step, and what of them is near; %zu triangles whenever a skin is used up", n, t);
-    }
-    case StageId::solve: return "contacts x sweeps, laws once per pass";
-    case StageId::sleep: return format("velocities of %zu awake bodies of %zu", step.active.size(), w.bodies.size());
-    case StageId::guard: return "candidate pairs that may come nearer than d_c / 2 within the sub-step";
-    case StageId::distribute: return format("contacts and %zu surfels", surfels);
-    default: return "what is prescribed";
-  }
-}
-
 // Where a body's numbers come from: its cells, its surface, and the parameters that differ by cell.
 std::string body(const Body &b) {
   std::string out = "{\"name\":" + quote(b.name) + ",\"model\":" + quote(b.model.type->id);
@@ -106,7 +70,7 @@ std::string explain(const World &w) {
   out += "],\"stages\":[";
   for (size_t i = 0; i < w.plan.stages.size(); ++i) {
     const PlannedStage &s = w.plan.stages[i];
-    out += (i ? "," : "") + ("{\"name\":" + quote(stage_name(s.id)) + ",\"why\":" + quote(s.why) + ",\"cost\":" + quote(cost(w, s.id)) + "}");
+    out += (i ? "," : "") + ("{\"name\":" + quote(stage(s.id).name) + ",\"why\":" + quote(s.why) + ",\"cost\":" + quote(stage(s.id).cost(w)) + "}");
   }
   out += "],\"absent\":[";
   for (size_t i = 0; i < w.plan.absent.size(); ++i) {

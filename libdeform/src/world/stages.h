@@ -5,6 +5,7 @@
 #include <span>
 
 #include "deform/world.h"
+#include "plan/plan.h"
 
 namespace dfm {
 
@@ -13,6 +14,18 @@ struct LawInstance;
 struct RestoredChoice;
 struct StepContext;
 struct World;
+
+// A row of the table of stages, which stands in world/step.cpp in the order of a sub-step.
+struct Stage {
+  StageId id;
+  const char *name;
+  bool (*run)(World &w, StepContext &step, uint32_t *trouble);   // false: the sub-step cannot be taken, and nothing of it has been committed
+  std::string (*cost)(const World &w);                           // what its cost grows with
+  StageChoice (*when)(const SceneFacts &facts);                  // does it run, and why
+};
+const Stage &stage(StageId id);
+// Throws Error where an effect that is asked for is nowhere provided.
+Plan make_plan(const SceneFacts &facts);
 
 // Plan, pair tables, offset, views of the entities; where nothing has changed it does nothing. Throws Error.
 void prepare(World &w, const RestoredChoice *restored = nullptr);

@@ -1,19 +1,23 @@
 // One step, from top to bottom:
 //
-//   bound -> n sub-steps of { motion -> model -> predict -> broad -> narrow -> self -> contact <-> friction -> distribute -> guard -> commit -> sleep }
-//
-// The list of stages is the plan's (plan/plan.cpp): what a scene does not call for is not in it (and rollback.cpp stands for narrow to distribute
-// where it is asked for). Sub-steps are equal and the contact solve
-// runs in each; detection keeps its candidate lists while nothing has moved further than their skin.
+//   bound                            when it is due: sizes of the sub-steps (step_bound.cpp, step_sizes.cpp)
+//   sub-steps                        run_step(): equal ones, cut finer where the bound has fallen
+//     pieces                         advance(), piece(): shorter where the guard asks for it
+//       stages                       sub_step(): all rows of the table below that the plan has chosen, or none
+//         waking                     narrow runs model to broad again for who has been woken (sleep.cpp)
+//         a rigid host's revision    solve, again, where a motor lets go; rigid commit, where a host asks for another solve (rigid.cpp)
+//         hits                       guard runs solve and distribute again with what would cross (guard.cpp)
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <iterator>
 #include <utility>
 
 #include "core/error.h"
 #include "world/step_bound.h"
 #include "world/context.h"
 #include "world/move_obstacles.h"
+#include "world/stage_costs.h"
 #include "world/stages.h"
 #include "world/bounds.h"
 #include "world/world.h"
@@ -21,47 +25,54 @@
 namespace dfm {
 namespace {
 
-class StageTimer {
- public:
-  StageTimer(World &w, StepContext &step, StageId id) : w_(w), step_(step), id_(id), start_(std::chrono::steady_clock::now()) {
-    w_.context->trace_begin(stage_name(id_));
-  }
-  ~StageTimer() {
-    w_.context->trace_end(stage_name(id_));
-    step_.stage_seconds[size_t(id_)] += std::chrono::duration<double>(std::chrono::steady_clock::now() - start_).count();
-    ++step_.stage_calls[size_t(id_)];
-  }
+template <auto function>
+bool always(World &w, StepContext &step, uint32_t *) {
+  return function(w, step), true;
+}
+bool predict_and_watch(World &w, StepContext &step, uint32_t *trouble) { return stage_predict(w, step, trouble) && watch_energy(w, step, trouble); }
+bool distribute_all(World &, StepContext &step, uint32_t *) { return stage_distribute(step), true; }
 
- private:
-  World &w_;
-  StepContext &step_;
-  StageId id_;
-  std::chrono::steady_clock::time_point start_;
+constexpr Stage kTable[] = {
+    {StageId::motion, "motion", always<stage_motion>, cost::prescribed, when::motion},
+    {StageId::model, "model", stage_model, cost::cells, when::model},
+    {StageId::predict, "predict", predict_and_watch, cost::points, when::predict},
+    {StageId::rigid_predict, "rigid predict", stage_rigid_predict, cost::rigid_states, when::rigid_predict},
+    {StageId::gather, "gather", always<stage_gather>, cost::weights, when::gather},
+    {StageId::lagged, "lagged friction", always<stage_lagged>, cost::points, when::lagged},
+    {StageId::broad, "broad", always<stage_broad>, cost::surfels_and_triangles, when::broad},
+    {StageId::rollback, "rollback", stage_rollback, cost::candidates_again, when::rollback},
+    {StageId::narrow, "narrow", stage_narrow, cost::candidates, when::narrow},
+    {StageId::self, "self contact", always<stage_self>, cost::self_surfels, when::self},
+    {StageId::solve, "contact+friction", stage_solve, cost::contacts_and_sweeps, when::solve},
+    {StageId::rigid_commit, "rigid commit", stage_rigid_commit, cost::rigid_states, when::rigid_commit},
+    {StageId::distribute, "distribute", distribute_all, cost::contacts_and_surfels, when::distribute},
+    {StageId::guard, "guard", stage_guard, cost::candidates_near, when::guard},
+    {StageId::commit, "commit", stage_commit, cost::points, when::commit},
+    {StageId::sleep, "sleep", always<stage_sleep>, cost::awake, when::sleep},
 };
-
-// One stage; false: the sub-step cannot be taken, and nothing of it has been committed.
-bool run_stage(World &w, StepContext &step, StageId id, uint32_t *trouble) {
-  StageTimer timer(w, step, id);
-  switch (id) {
-    case StageId::motion: stage_motion(w, step); return true;
-    case StageId::model: return stage_model(w, step, trouble);
-    case StageId::predict: return stage_predict(w, step, trouble) && watch_energy(w, step, trouble);
-    case StageId::gather: stage_gather(w, step); return true;
-    case StageId::broad: stage_broad(w, step); return true;
-    case StageId::narrow: return stage_narrow(w, step, trouble);
-    case StageId::self: stage_self(w, step); return true;
-    case StageId::solve: return stage_solve(w, step, trouble);
-    case StageId::distribute: stage_distribute(step); return true;
-    case StageId::guard: return stage_guard(w, step, trouble);
-    case StageId::lagged: stage_lagged(w, step); return true;
-    case StageId::rollback: return stage_rollback(w, step, trouble);
-    case StageId::commit: return stage_commit(w, step, trouble);
-    case StageId::rigid_predict: return stage_rigid_predict(w, step, trouble);
-    case StageId::rigid_commit: return stage_rigid_commit(w, step, trouble);
-    case StageId::sleep: stage_sleep(w, step); return true;
-    case StageId::step: return true;
-  }
+constexpr bool in_order() {
+  for (size_t i = 0; i < kStages; ++i)
+    if (size_t(kTable[i].id) != i) return false;
   return true;
+}
+static_assert(std::size(kTable) == kStages && in_order());
+
+// A stage, timed and traced.
+bool run(const Stage &stage, World &w, StepContext &step, uint32_t *trouble) {
+  struct Timer {
+    const Stage &stage;
+    World &w;
+    StepContext &step;
+    std::chrono::steady_clock::time_point start = std::chrono::steady_clock::now();
+    ~Timer() {
+      w.context->trace_end(stage.name);
+      step.stage_seconds[size_t(stage.id)] += std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+      ++step.stage_calls[size_t(stage.id)];
+    }
+  };
+  w.context->trace_begin(stage.name);
+  const Timer timer{stage, w, step};
+  return stage.run(w, step, trouble);
 }
 
 bool advance(World &w, StepContext &step, double end, double goal, bool last, uint32_t *trouble);
@@ -69,6 +80,19 @@ bool piece(World &w, StepContext &step, uint32_t *trouble);
 bool sub_step(World &w, StepContext &step, uint32_t *trouble);
 
 }  // namespace
+
+const Stage &stage(StageId id) { return kTable[size_t(id)]; }
+
+Plan make_plan(const SceneFacts &facts) {
+  Plan plan;
+  plan_effects(facts, plan);
+  for (const Stage &s : kTable) {
+    StageChoice choice = s.when(facts);
+    if (choice.runs) plan.stages.push_back({s.id, std::move(choice.why)});
+    else if (!choice.why.empty()) plan.absent.push_back({s.name, std::move(choice.why)});
+  }
+  return plan;
+}
 
 dfm_status run_step(World &w, StepContext &step, double dt, uint32_t *trouble) {
   prepare(w);
@@ -170,8 +194,8 @@ bool sub_step(World &w, StepContext &step, uint32_t *trouble) {
   step.driven.clear();
   step.guard.start();
   charge(w, step, body_work(w, step) + surface_work(w, step));
-  for (const PlannedStage &stage : w.plan.stages)
-    if (!run_stage(w, step, stage.id, trouble)) return false;
+  for (const PlannedStage &planned : w.plan.stages)
+    if (!run(stage(planned.id), w, step, trouble)) return false;
   keep_rigids(w, step);
   return undo.kept = true;
 }
