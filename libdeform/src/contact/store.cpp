@@ -5,7 +5,7 @@
 namespace dfm {
 
 ContactStore::ContactStore(const Memory &m) {
-  use_memory(m, key, id_a, id_b, by_key, normal, tangent, impulse, bristle, law, dwell, area, due, path, touching, held, began, crossings);
+  each_column([&](const ContactColumn &, auto &column) { use_memory(m, column); }, *this);
 }
 
 uint32_t ContactStore::find(uint64_t k) const {

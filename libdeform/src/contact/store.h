@@ -8,8 +8,21 @@
 
 namespace dfm {
 
+// What all that handles columns alike must know of one. `values`: what a snapshot may hold.
+enum class ColumnValues : uint8_t { any, finite, not_negative, flag, law };
+inline constexpr uint32_t kPerState = ~0u, kOwnLength = ~0u - 1;   // widths: as many as the state has columns; not by contact, or not always there
+struct ContactColumn {
+  const char *name;                   // in a snapshot; null: not in there, follows from the others
+  uint32_t width;                     // values per contact
+  bool hashed = false;                // part of dfm_world_hash()
+  bool carried = true;                // goes on as it is while its contact sleeps
+  uint64_t entries(uint64_t n, uint64_t nstate) const { return n * (width == kPerState ? nstate : width == kOwnLength ? 1 : width); }
+};
+template <ColumnValues kValues>
+struct ColumnOf : ContactColumn { static constexpr ColumnValues values = kValues; };
+
 struct ContactStore {
-  // Columns over the contacts of the last sub-step, in their order.
+  // Columns over the contacts of the last sub-step, in their order. A new one is declared here, named in each_column(), and filled in by keep_contacts().
   uint32_t n = 0, nstate = 0;
   double h = 0;                       // s, the sub-step that the impulses belong to
   Array<uint64_t> key;
@@ -29,6 +42,30 @@ struct ContactStore {
   explicit ContactStore(const Memory &memory);
   uint32_t find(uint64_t key) const;  // index, or kNone
 };
+
+// f(ColumnOf<..>, column of each store). Memory, room, carrying over, the copy that a step's budget puts back, snapshot and hash follow from this list, whose
+// order is that of snapshots and of the hash.
+template <class F, class... Store>
+void each_column(F &&f, Store &...c) {
+  using V = ColumnValues;
+  f(ColumnOf<V::any>{{"contact key", 1, true}}, c.key...);
+  f(ColumnOf<V::any>{{"contact body", 1}}, c.id_a...);
+  f(ColumnOf<V::any>{{"contact partner", 1}}, c.id_b...);
+  f(ColumnOf<V::finite>{{"contact normal", 3}}, c.normal...);
+  f(ColumnOf<V::finite>{{"contact tangent", 3}}, c.tangent...);
+  f(ColumnOf<V::finite>{{"contact impulse", 3}}, c.impulse...);
+  f(ColumnOf<V::finite>{{"bristle", kPerState, true}}, c.bristle...);
+  f(ColumnOf<V::law>{{"contact law", 1}}, c.law...);
+  f(ColumnOf<V::not_negative>{{"dwell", 1}}, c.dwell...);
+  f(ColumnOf<V::not_negative>{{"contact area", 1}}, c.area...);
+  f(ColumnOf<V::not_negative>{{"area due", kOwnLength, true}}, c.due...);
+  f(ColumnOf<V::finite>{{"hold path", 2}}, c.path...);
+  f(ColumnOf<V::flag>{{"touching", 1}}, c.touching...);
+  f(ColumnOf<V::flag>{{"in hold", 1}}, c.held...);
+  f(ColumnOf<V::flag>{{"began", 1, false, false}}, c.began...);
+  f(ColumnOf<V::any>{{"crossings", kOwnLength, false, false}}, c.crossings...);
+  f(ColumnOf<V::any>{{nullptr, 1, false, false}}, c.by_key...);
+}
 
 // Fresh contacts take over what their predecessors kept: the tangent turned with the normal (minimal rotation), impulse times h/h_old,
 // bristles where the law is the same. `tangents` [n,3] out; rows.impulse and state.bristle are filled. match [n] out: index or kNone.

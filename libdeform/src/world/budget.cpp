@@ -86,11 +86,6 @@ struct PutBack {
   }
 };
 
-template <class Store, class F>
-void each_column(Store &c, F f) {
-  f(c.key), f(c.id_a), f(c.id_b), f(c.by_key), f(c.normal), f(c.tangent), f(c.impulse), f(c.bristle), f(c.law), f(c.dwell), f(c.area), f(c.due), f(c.path);
-  f(c.touching), f(c.held), f(c.began), f(c.crossings);
-}
 template <class R, class F>
 void each_column_of_report(R &r, F f) { f(r.contacts), f(r.frame), f(r.impulse), f(r.slip), f(r.mode); }
 
@@ -105,7 +100,8 @@ void changing(Stream &s, World &w) {
   }
   for (auto &o : w.obstacles) s.value(o->pose), s.value(o->has_target);
   for (auto &set : w.rigid_sets) s.array(set->state), s.array(set->extra), s.array(set->total), s.array(set->impulse), s.value(set->last_h);
-  s.value(w.store.n), s.value(w.store.nstate), s.value(w.store.h), each_column(w.store, array);
+  s.value(w.store.n), s.value(w.store.nstate), s.value(w.store.h);
+  each_column([&](const ContactColumn &, auto &column) { s.array(column); }, w.store);
   s.value(w.report.n), s.value(w.report.h), each_column_of_report(w.report, array);
   s.array(w.work);
   s.length(w.events);   // a step only adds to it, and it may wait for the host for many steps
@@ -113,11 +109,10 @@ void changing(Stream &s, World &w) {
 
 // The two stores and the two reports change places as sub-steps end, so what is put back may have to fit into the other one.
 void reserve_others(World &w, StepContext &step) {
-  std::array<size_t, 17> size{};
+  each_column([](const ContactColumn &, const auto &from, auto &to) { to.reserve(from.size()); }, w.store, step.next_store);
+  std::array<size_t, 5> size{};
   size_t k = 0;
-  each_column(w.store, [&](auto &a) { size[k++] = a.size(); });
-  k = 0, each_column(step.next_store, [&](auto &a) { a.reserve(size[k++]); });
-  k = 0, each_column_of_report(w.report, [&](auto &a) { size[k++] = a.size(); });
+  each_column_of_report(w.report, [&](auto &a) { size[k++] = a.size(); });
   k = 0, each_column_of_report(step.last_report, [&](auto &a) { a.reserve(size[k++]); });
 }
 

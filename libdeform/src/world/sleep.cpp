@@ -230,11 +230,10 @@ void carry_sleepers(World &w, StepContext &step, uint32_t *touching, uint32_t *s
     const auto copy = [=](const auto &source, auto &into, size_t width) {
       into.insert(into.end(), source.begin() + std::ptrdiff_t(from * width), source.begin() + std::ptrdiff_t(end * width));
     };
-    copy(w.store.key, to.key, 1), copy(w.store.id_a, to.id_a, 1), copy(w.store.id_b, to.id_b, 1), copy(w.store.law, to.law, 1);
-    copy(w.store.dwell, to.dwell, 1), copy(w.store.area, to.area, 1);
+    each_column([&](const ContactColumn &column, const auto &source, auto &into) {
+      if (column.carried && column.width != kOwnLength && column.width != kPerState) copy(source, into, column.width);
+    }, w.store, to);
     if (step.shares) copy(w.store.due.empty() ? w.store.area : w.store.due, to.due, 1);
-    copy(w.store.touching, to.touching, 1), copy(w.store.held, to.held, 1), copy(w.store.path, to.path, 2);
-    copy(w.store.normal, to.normal, 3), copy(w.store.tangent, to.tangent, 3), copy(w.store.impulse, to.impulse, 3);
     copy(step.last_report.contacts, w.report.contacts, 1), copy(step.last_report.frame, w.report.frame, 9), copy(step.last_report.slip, w.report.slip, 2);
     copy(step.last_report.mode, w.report.mode, 1);
     if (to.nstate == w.store.nstate) copy(w.store.bristle, to.bristle, w.store.nstate);

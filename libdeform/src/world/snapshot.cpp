@@ -246,13 +246,17 @@ template <class Stream, class C>
 void contact_fields(Stream &s, C &c, uint64_t laws) {
   s.value("contacts", c.n, must::any), s.value("contact states", c.nstate, must::any), s.value("contact sub-step", c.h, must::not_negative);
   const uint64_t n = c.n;
-  s.array("contact key", c.key, n, must::any), s.array("contact body", c.id_a, n, must::any), s.array("contact partner", c.id_b, n, must::any);
-  s.array("contact normal", c.normal, 3 * n, must::finite), s.array("contact tangent", c.tangent, 3 * n, must::finite);
-  s.array("contact impulse", c.impulse, 3 * n, must::finite), s.array("bristle", c.bristle, n * c.nstate, must::finite);
-  s.array("contact law", c.law, n, must::below(laws)), s.array("dwell", c.dwell, n, must::not_negative);
-  s.array("contact area", c.area, n, must::not_negative), s.array("area due", c.due, kAnyCount, must::not_negative);
-  s.array("hold path", c.path, 2 * n, must::finite), s.array("touching", c.touching, n, must::flag), s.array("in hold", c.held, n, must::flag);
-  s.array("began", c.began, n, must::flag), s.array("crossings", c.crossings, kAnyCount, must::any);
+  each_column([&](auto column, auto &values) {
+    using V = ColumnValues;
+    constexpr V kind = decltype(column)::values;
+    const uint64_t count = column.width == kOwnLength ? kAnyCount : column.entries(n, c.nstate);
+    if (!column.name) return;
+    if constexpr (kind == V::finite) s.array(column.name, values, count, must::finite);
+    else if constexpr (kind == V::not_negative) s.array(column.name, values, count, must::not_negative);
+    else if constexpr (kind == V::flag) s.array(column.name, values, count, must::flag);
+    else if constexpr (kind == V::law) s.array(column.name, values, count, must::below(laws));
+    else s.array(column.name, values, count, must::any);
+  }, c);
 }
 
 template <class Stream, class W>
@@ -511,10 +515,9 @@ uint64_t world_hash(const World &w) {
   for (auto &set : w.rigid_sets) {
     h.add(set->state.data(), set->state.size() * sizeof(dfm_rigid_state)), h.add(set->extra.data(), set->extra.size() * sizeof(double));
   }
-  const ContactStore &c = w.store;
-  h.add(c.key.data(), c.key.size() * sizeof(uint64_t));
-  h.add(c.bristle.data(), c.bristle.size() * sizeof(double));
-  h.add(c.due.data(), c.due.size() * sizeof(double));
+  each_column([&](const ContactColumn &column, const auto &values) {
+    if (column.hashed) h.add(values.data(), values.size() * sizeof(values[0]));
+  }, w.store);
   for (auto &b : w.bodies) h.add(b->lagged.data(), b->lagged.size() * sizeof(double));
   if (w.def.sleep)
     for (auto &b : w.bodies) h.add(b->slumber.asleep), h.add(b->slumber.calm), h.add(b->slumber.since);

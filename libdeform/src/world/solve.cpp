@@ -198,9 +198,8 @@ void reserve_contacts(World &w, StepContext &step) {
   ContactStore &to = step.next_store;
   Report &next = w.sleepers ? step.last_report : w.report;   // the one that keep_contacts(w, step) will write
   auto room = [&](size_t entries, auto &...arrays) { (arrays.reserve(entries), ...); };
-  room(n, to.key, to.id_a, to.id_b, to.by_key, to.law, to.dwell, to.area, to.due, to.touching, to.held, to.began, to.crossings, next.contacts, next.mode);
-  room(size_t(2) * n, to.path, next.slip), room(size_t(3) * n, to.normal, to.tangent, to.impulse, next.impulse);
-  room(size_t(S) * n, to.bristle), room(size_t(9) * n, next.frame);
+  each_column([&](const ContactColumn &column, auto &values) { values.reserve(column.entries(n, S)); }, to);
+  room(n, next.contacts, next.mode), room(size_t(2) * n, next.slip), room(size_t(3) * n, next.impulse), room(size_t(9) * n, next.frame);
   w.work.reserve(std::min(w.work.size() + n, w.bodies.size() * (w.bodies.size() + w.obstacles.size())));
   reserve_events(w, size_t(n) + w.store.n);
   reserve_impulses(w, n);
@@ -231,9 +230,9 @@ void keep_contacts(World &w, StepContext &step) {
   ContactStore &to = step.next_store;
   if (w.sleepers) std::swap(w.report, step.last_report);
   to.n = n, to.nstate = S, to.h = step.h;
-  to.key.resize(n), to.id_a.resize(n), to.id_b.resize(n), to.by_key.resize(n), to.law.resize(n), to.dwell.resize(n), to.area.resize(n);
-  to.normal.resize(size_t(3) * n), to.tangent.resize(size_t(3) * n), to.impulse.resize(size_t(3) * n), to.path.resize(size_t(2) * n);
-  to.bristle.resize(size_t(S) * n), to.touching.resize(n), to.held.resize(n), to.began.resize(n);
+  each_column([&](const ContactColumn &column, auto &values) {
+    if (column.width != kOwnLength) values.resize(column.entries(n, S));
+  }, to);
   w.report.n = n, w.report.h = step.h;
   w.report.contacts.assign(step.contacts.begin(), step.contacts.end());
   for (uint32_t i = 0; i < n; ++i) w.report.contacts[i].area = step.state.area[i];
