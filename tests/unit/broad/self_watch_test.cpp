@@ -66,16 +66,20 @@ bool near(const Surface &s, const SelfRest &rest, double h) {
   return false;
 }
 
+struct Watched {
+  Surface s = sheet();
+  SelfRest rest;
+  SelfList list{Memory::standard(), s};
+  SelfWatch watch{Memory::standard(), s, rest, list};
+  Watched() { rest.x = s.x, list.set_wide(true); }
+};
+
 }  // namespace
 
 // A sheet that turns, drifts and is rolled up and unrolled: the answer is that of the definition at every look, whatever the watch keeps from the last.
 TEST(SelfWatch, SheetThatRollsUpAndUnrolls_IsNearWhereAnyPairIs) {
-  Surface s = sheet();
-  SelfRest rest;
-  rest.x = s.x;
-  SelfList list(Memory::standard(), s);
-  list.set_wide(true);
-  SelfWatch watch(Memory::standard(), s, rest, list);
+  Watched watched;
+  auto &[s, rest, list, watch] = watched;
   std::mt19937 random(5);
   std::uniform_real_distribution<double> u(-1, 1);
   const double h = 1e-3;
@@ -105,12 +109,8 @@ TEST(SelfWatch, SheetThatRollsUpAndUnrolls_IsNearWhereAnyPairIs) {
 
 // Speeds that a blow has changed, beyond what there was before the solve.
 TEST(SelfWatch, BlowThatFoldsWithinTheSubStep_IsMet) {
-  Surface s = sheet();
-  SelfRest rest;
-  rest.x = s.x;
-  SelfList list(Memory::standard(), s);
-  list.set_wide(true);
-  SelfWatch watch(Memory::standard(), s, rest, list);
+  Watched watched;
+  auto &[s, rest, list, watch] = watched;
   const uint32_t thrown = 0;
   const double h = 1e-3;
   for (const double speed : {0.0, 500.0, 990.0, 2000.0}) {
