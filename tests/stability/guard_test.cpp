@@ -84,6 +84,41 @@ TEST(Guard, ThreadsAndRepetition_SameHash) {
   EXPECT_EQ(hash[0], hash[2]);
 }
 
+// What the guard remembers of a pair holds for the motion of steps alone. Two runs begin apart, one so far that its pairs are not listed; both are then
+// given the same state by dfm_body_set_state(), from which they go on alike.
+TEST(Guard, StateSetBetweenSteps_ForgetsHowFarApartPairsWere) {
+  for (const double speed : {20.0, 60.0, 100.0}) {
+    uint64_t acted[2];
+    std::vector<double> ends[2];
+    for (const bool listed : {false, true}) {
+      Scene s(true, 2);
+      s.add("beam", {0.12, 0.12, 0.012}, 30, {}, {});
+      s.add("beam", {0.12, 0.12, 0.012}, 30, {0.01, 0.01, 0}, {}, {0.02, 0.01, 0.2, 1});
+      const std::vector<double> lower = test::points(s.bodies[0]), upper = test::points(s.bodies[1]);
+      const std::vector<double> still(lower.size());
+      const auto put = [&](double up, double velocity) {
+        std::vector<double> x = upper, v(x.size());
+        for (size_t i = 2; i < x.size(); i += 3) {
+          x[i] += up;
+          v[i] = velocity;
+        }
+        test::ok(dfm_body_set_state(s.bodies[0], uint32_t(lower.size() / 3), lower.data(), still.data()));
+        test::ok(dfm_body_set_state(s.bodies[1], uint32_t(x.size() / 3), x.data(), v.data()));
+      };
+      put(listed ? 0.03 : 10, 40);
+      EXPECT_TRUE(run(s, 1, 1e-4).finite);
+      put(0.018, -speed);
+      const Outcome out = run(s, 3, 5e-4);
+      EXPECT_EQ(out.crossed, 0u) << speed << " m/s";
+      acted[listed] = out.steps;
+      ends[listed] = test::points(s.bodies[1]);
+    }
+    EXPECT_GT(acted[0], 0u) << speed << " m/s: the case needs no guard";
+    EXPECT_EQ(acted[0], acted[1]) << speed << " m/s";
+    EXPECT_EQ(ends[0], ends[1]) << speed << " m/s";
+  }
+}
+
 // Rest and sliding are the contact solve's business: the guard never acts, and the state has the same bits as without it.
 TEST(Guard, RestAndSliding_NeverTrip) {
   uint64_t hash[2];

@@ -11,6 +11,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "narrow/detail.h"
 #include "surfel/obstacle_shape.h"
@@ -73,6 +74,7 @@ void follow_lists(World &w, StepContext &step) {
   const bool pairs = w.plan.has(StageId::broad);
   if (pairs) step.broad.cover(step.body_views, step.obstacle_views, w.filter, step.h, w.offset, g.speed);
   const bool fresh = cover_self(w, step);
+  if (std::exchange(g.placements, w.placements) != w.placements) g.forget();
   const uint64_t renewals = step.broad.stats().renewals;
   if (!fresh && !g.memory.runs.empty() && g.lists == renewals) return;
   g.lists = renewals;

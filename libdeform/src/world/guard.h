@@ -19,6 +19,7 @@ struct Guard {
   Array<GuardHit> hits;
   Array<double> speed, change;           // m/s by body slot: bounds of the surfels' speeds after the solve; of what the solve has changed of a phyxel's
   uint64_t lists = 0;                    // renewals of broad/ at which `memory` was begun
+  uint64_t placements = 0;               // World::placements that `memory` knows of
   struct Through { uint32_t a, b; bool obstacle, yes; };
   std::vector<Through> through;          // pairs that were looked at: do they cross at the start?
   struct Kept { uint64_t key; Vec3 impulse; double rate; bool hit; };
