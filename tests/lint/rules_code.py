@@ -7,7 +7,8 @@ from tree import CODE, includes, line_of, without_comments
 SRC = "libdeform/src/"
 # A folder may include itself and what stands on a lower level; folders of one level never include each other.
 LEVELS = [["core"], ["math"], ["mesh", "plugin"], ["phyxel", "surfel"],
-          ["model", "integrate", "broad", "narrow", "contact", "friction", "distribute", "rigid"], ["plan"], ["world"], ["scene", "api"]]
+          ["model", "integrate", "broad", "narrow", "contact", "friction", "distribute", "rigid"],
+          ["plan"], ["world"], ["rollback"], ["scene", "api"]]
 RANK = {folder: rank for rank, folders in enumerate(LEVELS) for folder in folders}
 # api/ holds one thin file per public header, and scene.h is one of them.
 ALLOWED_BESIDE = {("api", "scene")}
@@ -28,7 +29,7 @@ THIRD_PARTIES = [
 ]
 
 STEP_FOLDERS = tuple(SRC + f + "/" for f in ("math", "phyxel", "surfel", "model", "integrate", "broad", "narrow", "contact",
-                                             "friction", "distribute", "rigid", "world"))
+                                             "friction", "distribute", "rigid", "world", "rollback"))
 LIBM = ("exp exp2 expm1 log2 log10 log1p log sin cos tan asin acos atan atan2 sinh cosh tanh asinh acosh atanh sincos pow cbrt "
         "hypot erf erfc tgamma lgamma").split()
 # elementary.h is header-only and needs nothing of the library: exp and pow with the same bits for everybody.
@@ -41,7 +42,7 @@ def _resolves(tree, path, name):
 
 
 def layers(tree):
-    """core <- math <- {mesh, plugin} <- {phyxel, surfel} <- stages <- plan <- world <- {scene, api}."""
+    """core <- math <- {mesh, plugin} <- {phyxel, surfel} <- stages <- plan <- world <- rollback <- {scene, api}."""
     for path in tree.select(SRC):
         own = path[len(SRC):].split("/")[0]
         for line, _, name in includes(tree.text(path)):

@@ -9,7 +9,7 @@ BELOW = {
     "libdeform": {"CMakeLists.txt", "include", "src", "schema", "doc"},
     "libdeform/include": {"deform"},
     "libdeform/src": {"core", "math", "mesh", "phyxel", "surfel", "plugin", "plan", "model", "integrate", "broad", "narrow",
-                      "contact", "friction", "distribute", "rigid", "world", "scene", "api"},
+                      "contact", "friction", "distribute", "rigid", "world", "rollback", "scene", "api"},
     "libdeform/doc": {"README.md", "concepts", "models", "laws", "howto", "decisions", "images"},
     "bindings": {"CMakeLists.txt", "cli", "render", "ode", "bullet", "python"},
     "tests": {"CMakeLists.txt", "support", "data", "unit", "analytic", "stability", "api", "plugin", "determinism", "adapters",

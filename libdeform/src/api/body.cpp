@@ -11,6 +11,7 @@
 #include "world/measure.h"
 #include "world/queries.h"
 #include "world/context.h"
+#include "world/method.h"
 #include "world/stages.h"
 
 using namespace dfm;
@@ -207,7 +208,7 @@ dfm_status dfm_body_move_held(dfm_body body, uint32_t n, const uint32_t *points,
     check_points(b, n, points), check_motion(b, nkey, keys, sine);
     if (nkey == 0 && !sine) fail(DFM_E_ARG, "body '%s': a motion needs keys or a sine", b.name.c_str());
     if (n == 0) fail(DFM_E_ARG, "body '%s': a motion needs points", b.name.c_str());
-    rollback_refuse(*b.world, ("body '" + b.name + "': a motion of held points, which cannot go back,").c_str());
+    need_ability(*b.world, Ability::held_motion, "body", b.name);
     HeldMotion m;
     m.points.assign(points, points + n);
     if (nkey) m.keys.assign(keys, keys + nkey);

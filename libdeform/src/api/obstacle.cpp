@@ -6,6 +6,7 @@
 #include "world/bounds.h"
 #include "world/create.h"
 #include "world/context.h"
+#include "world/method.h"
 #include "world/stages.h"
 
 using namespace dfm;
@@ -69,7 +70,7 @@ Obstacle &movable(dfm_obstacle obstacle, const dfm_pose *pose) {
 dfm_status dfm_obstacle_move_to(dfm_obstacle obstacle, const dfm_pose *pose) {
   return guard([&] {
     Obstacle &o = movable(obstacle, pose);
-    if (o.world->def.method == DFM_METHOD_ROLLBACK) rollback_refuse(*o.world, ("obstacle '" + o.name + "': a motion of its own, which cannot go back,").c_str());
+    need_ability(*o.world, Ability::obstacle_motion, "obstacle", o.name);
     o.keys.clear();
     o.def.sine = {};
     o.target = to_pose(*pose), o.has_target = true;

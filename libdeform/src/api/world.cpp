@@ -4,7 +4,9 @@
 #include <cmath>
 
 #include "api/objects.h"
+#include "rollback/rollback.h"
 #include "world/explain.h"
+#include "world/method.h"
 #include "world/step_bound.h"
 #include "world/context.h"
 #include "world/stages.h"
@@ -47,6 +49,16 @@ double shortest_step(const World &w, double dt) {
   return kShortestStep * reach;
 }
 
+const ContactMethod &method_of(int32_t number) {
+  switch (number) {
+    case DFM_METHOD_AUTO:
+    case DFM_METHOD_VELOCITY: return velocity_method();
+    case DFM_METHOD_ROLLBACK: return rollback::method();
+  }
+  fail(DFM_E_UNSUPPORTED,
+       "contact method %d is not available; use DFM_METHOD_AUTO, DFM_METHOD_VELOCITY or (to compare) DFM_METHOD_ROLLBACK", number);
+}
+
 }  // namespace
 
 dfm_world_def dfm_world_def_default(void) {
@@ -84,10 +96,8 @@ dfm_status dfm_world_create(dfm_context *context, const dfm_world_def *def, dfm_
     for (const double value : {w->def.sleep_speed, w->def.sleep_time})
       if (!(value > 0 && std::isfinite(value)))
         fail(DFM_E_ARG, "sleep_speed (m/s) and sleep_time (s) must be positive and finite; the defaults are 0.01 and 0.5, found %g", value);
-    if (w->def.method != DFM_METHOD_AUTO && w->def.method != DFM_METHOD_VELOCITY && w->def.method != DFM_METHOD_ROLLBACK)
-      fail(DFM_E_UNSUPPORTED, "contact method %d is not available; use DFM_METHOD_AUTO, DFM_METHOD_VELOCITY or (to compare) DFM_METHOD_ROLLBACK",
-           w->def.method);
-    if (w->def.sleep) rollback_refuse(*w, "sleep (contact.sleep)");
+    use_method(*w, method_of(w->def.method));
+    if (w->def.sleep) need_ability(*w, Ability::sleep);
     if (w->def.integrator != DFM_INTEGRATOR_AUTO && w->def.integrator != DFM_INTEGRATOR_SYMPLECTIC_EULER)
       fail(DFM_E_UNSUPPORTED, "integrator %d is not available; use DFM_INTEGRATOR_AUTO or DFM_INTEGRATOR_SYMPLECTIC_EULER", w->def.integrator);
     for (const char *const *e = w->def.effects; e && *e; ++e) w->asked_effects.push_back(*e);
@@ -141,7 +151,7 @@ dfm_status dfm_world_set_gravity_keys(dfm_world world, uint32_t n, const dfm_vec
 dfm_status dfm_world_set_sleep(dfm_world world, bool sleep) {
   return guard([&] {
     World &w = idle(world_of(world));
-    if (sleep) rollback_refuse(w, "sleep (contact.sleep)");
+    if (sleep) need_ability(w, Ability::sleep);
     wake_all(w);
     w.def.sleep = sleep;
     w.changed = true;
@@ -297,8 +307,9 @@ dfm_status dfm_world_profile(dfm_world world, uint32_t capacity, dfm_stage_time 
     prepare(w);
     if (!room(static_cast<uint32_t>(w.plan.stages.size()), capacity, out, n)) return;
     for (size_t i = 0; i < w.plan.stages.size(); ++i) {
-      const StageId id = w.plan.stages[i].id;
-      out[i] = {stage(id).name, w.steps->stage_seconds[size_t(id)], w.steps->stage_calls[size_t(id)]};
+      const size_t row = w.plan.stages[i].row;
+      const StageTime &time = w.steps->stage_times[row];
+      out[i] = {w.method->table[row].name, time.seconds, time.calls};
     }
   });
 }

@@ -13,9 +13,6 @@ constexpr const char *kNeedSelf[] = {"cutting", "folding"};
 }  // namespace
 
 void plan_effects(const SceneFacts &f, Plan &plan) {
-  if (f.rollback && f.self_bodies)
-    fail(DFM_E_UNSUPPORTED, "self contact cannot be in a world whose contact method is rollback (it is there to compare: doc/concepts/rollback.md); use the "
-         "method velocity");
   auto provider = [](const std::vector<SceneFacts::Provider> &list, const std::string &effect) {
     std::vector<std::string> names;
     for (const auto &p : list)
@@ -64,10 +61,9 @@ std::string self_asked_by(const SceneFacts &f) {
   return {};
 }
 
-bool Plan::has(StageId id) const {
-  return std::any_of(stages.begin(), stages.end(), [&](const PlannedStage &s) { return s.id == id; });
+bool Plan::has(StageRole role) const {
+  return std::any_of(stages.begin(), stages.end(), [&](const PlannedStage &s) { return s.role == role; });
 }
-bool Plan::touches() const { return has(StageId::solve) || has(StageId::rollback); }
-bool Plan::rolls_back() const { return has(StageId::rollback); }
+bool Plan::touches() const { return has(StageRole::solves); }
 
 }  // namespace dfm

@@ -1,5 +1,6 @@
-// The plan: which stages a sub-step runs, and which effects they are there for, derived from what the scene contains. A stage that nothing calls for is not in
-// the list, so it costs no instruction; `deform explain` prints both lists with the reasons. The order of the stages is that of their table (world/step.cpp).
+// The plan: which stages a sub-step runs, and which effects they are there for, derived from what the scene
+// contains. A stage that nothing calls for is not in the list, so it costs no instruction; `deform explain` prints
+// both lists with the reasons. The order of the stages is that of the contact method's table (world/method.h).
 #pragma once
 #include <cstddef>
 #include <string>
@@ -7,11 +8,15 @@
 
 namespace dfm {
 
-// In the order of a sub-step.
-enum class StageId {
-  motion, model, predict, rigid_predict, gather, lagged, broad, rollback, narrow, self, solve, rigid_commit, distribute, guard, commit, sleep, count
+// What a stage does that other stages ask the plan about; most stages are asked for by nobody.
+enum class StageRole {
+  none,
+  lists_pairs,         // candidates of pairs, and how fast surfaces are
+  finds_contacts,      // contacts of pairs
+  solves,              // contacts act on bodies
+  gives_impulses,      // and they do so by impulses on points
+  guards,              // nothing crosses at the end of the sub-step
 };
-inline constexpr size_t kStages = size_t(StageId::count);
 
 // What the plan is derived from.
 struct SceneFacts {
@@ -27,7 +32,6 @@ struct SceneFacts {
   std::vector<Provider> available;                     // by every loaded plugin
   bool effects_listed = false;
   bool sleep = false;                                  // islands at rest may sleep
-  bool rollback = false;                               // contact.method
   bool self = false, self_auto = false;                // contact.self
   unsigned self_bodies = 0;                            // bodies that may touch themselves, filters applied
   std::vector<std::string> asked;                      // where listed
@@ -41,9 +45,7 @@ StageChoice model(const SceneFacts &facts);
 StageChoice predict(const SceneFacts &facts);
 StageChoice rigid_predict(const SceneFacts &facts);
 StageChoice gather(const SceneFacts &facts);
-StageChoice lagged(const SceneFacts &facts);
 StageChoice broad(const SceneFacts &facts);
-StageChoice rollback(const SceneFacts &facts);
 StageChoice narrow(const SceneFacts &facts);
 StageChoice self(const SceneFacts &facts);
 StageChoice solve(const SceneFacts &facts);
@@ -54,7 +56,11 @@ StageChoice commit(const SceneFacts &facts);
 StageChoice sleep(const SceneFacts &facts);
 }  // namespace when
 
-struct PlannedStage { StageId id; std::string why; };
+struct PlannedStage {
+  size_t row;                                          // of the table
+  StageRole role;
+  std::string why;
+};
 struct AbsentStage { std::string name, why; };
 struct PlannedEffect { std::string name, asked_by, provided_by; };
 
@@ -62,9 +68,8 @@ struct Plan {
   std::vector<PlannedStage> stages;                    // in the order of a sub-step
   std::vector<AbsentStage> absent;
   std::vector<PlannedEffect> effects;
-  bool has(StageId id) const;
-  bool touches() const;                                // has contact stages
-  bool rolls_back() const;                             // and they are those of the roll-back
+  bool has(StageRole role) const;
+  bool touches() const;                                // has stages of contact
 };
 
 inline constexpr char kSelfContact[] = "self_contact";

@@ -21,12 +21,10 @@ std::string rigids(const SceneFacts &f) {
   return count(f.rigid_bodies, "rigid body", "rigid bodies") + " and " + count(f.rigid_joints, "joint", "joints") + " of host " + f.rigid_hosts;
 }
 
-// Stages of the solve: not with roll-back, and not where nothing touches.
-StageChoice of_contact(const SceneFacts &f) {
-  if (!touches(f)) return left_out(nobody(f));
-  return f.rollback ? left_out("contact.method is rollback") : runs(who(f));
+StageChoice of_contact(const SceneFacts &f) { return touches(f) ? runs(who(f)) : left_out(nobody(f)); }
+StageChoice of_pairs(const SceneFacts &f) {
+  return touches(f) && !pairs(f) ? left_out("no pair may touch") : of_contact(f);
 }
-StageChoice of_rollback(const SceneFacts &f, const char *why) { return f.rollback && touches(f) ? runs(why) : left_out(); }
 
 }  // namespace
 
@@ -53,36 +51,25 @@ StageChoice gather(const SceneFacts &f) {
   return runs(count(f.coupled_surfels, "surfel", "surfels") + " of " + count(f.coupled, "body", "bodies") + " hang on several points each");
 }
 
-StageChoice lagged(const SceneFacts &f) { return of_rollback(f, "friction that the last sub-step found"); }
+StageChoice broad(const SceneFacts &f) { return of_pairs(f); }
 
-StageChoice broad(const SceneFacts &f) {
-  if (f.rollback && touches(f)) return runs(who(f));
-  return touches(f) && !pairs(f) ? left_out("no pair may touch") : of_contact(f);
-}
-
-StageChoice rollback(const SceneFacts &f) {
-  return of_rollback(f, "contact.method rollback: vertices that collide go back to their time of impact; there to compare, not to use");
-}
-
-StageChoice narrow(const SceneFacts &f) { return !f.rollback && touches(f) && !pairs(f) ? left_out("no pair may touch") : of_contact(f); }
+StageChoice narrow(const SceneFacts &f) { return of_pairs(f); }
 
 StageChoice self(const SceneFacts &f) {
   const std::string by = self_asked_by(f);
   if (f.self_bodies)
     return runs(count(f.self_bodies, "body", "bodies") + " may touch themselves (" + (by.empty() ? "contact.filter" : by) + ")" +
                 (by == kSelfAuto ? ", each only while it folds so far that it may" : ""));
-  if (f.rollback && touches(f)) return left_out();
   return left_out(by.empty() ? "not asked for (contact.self), and no effect needs it" : f.bodies ? "filters take every body out" : "no body");
 }
 
 StageChoice solve(const SceneFacts &f) { return of_contact(f); }
 
-StageChoice rigid_commit(const SceneFacts &f) { return f.rigid_bodies && !(f.rollback && touches(f)) ? runs("ends of " + rigids(f)) : left_out(); }
+StageChoice rigid_commit(const SceneFacts &f) { return f.rigid_bodies ? runs("ends of " + rigids(f)) : left_out(); }
 
 StageChoice distribute(const SceneFacts &f) { return of_contact(f); }
 
 StageChoice guard(const SceneFacts &f) {
-  if (f.rollback) return left_out("contact.method is rollback");
   if (!touches(f)) return left_out(nobody(f));
   if (f.unguarded) return left_out("switched off (contact.guard): what moves further than contacts reach in one sub-step may cross");
   return runs("nothing crosses at the end of a sub-step: " + count(pairs(f), "pair", "pairs") +

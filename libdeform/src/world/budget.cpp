@@ -95,7 +95,7 @@ void changing(Stream &s, World &w) {
   s.value(w.time), s.value(w.stable), s.value(w.inverted), s.value(w.bound_age), s.value(w.worst_body), s.value(w.worst_point);
   s.value(w.gravity), s.value(w.step_count), s.value(w.sleepers), s.value(w.watch);
   for (auto &b : w.bodies) {
-    s.array(b->p.x), s.array(b->p.v), s.array(b->model.state), s.array(b->surfel_impulse), s.array(b->lagged), s.array(b->anchor);
+    s.array(b->p.x), s.array(b->p.v), s.array(b->model.state), s.array(b->surfel_impulse), s.array(b->method_values), s.array(b->anchor);
     s.value(b->contact_impulse), s.value(b->energy), s.value(b->slumber), s.value(b->bound);
   }
   for (auto &o : w.obstacles) s.value(o->pose), s.value(o->has_target);

@@ -46,7 +46,7 @@ bool stage_commit(World &w, StepContext &step, uint32_t *trouble) {
   if (steppers && !step.guard.stepped && !commit_steppers(w, step, trouble)) return false;
   step.guard.stepped = false;
   const double way = step.h * step.guard.motion;   // the guard may leave some of it out
-  const bool touched = w.plan.touches() && !w.plan.rolls_back() && step.rows.n > 0;
+  const bool touched = w.plan.has(StageRole::gives_impulses) && step.rows.n > 0;
   book_energy(w, step, step.guard.motion);
   w.context->tasks.parallel_for(static_cast<uint32_t>(step.active.size()), 1, [&](uint32_t begin, uint32_t end) {
     for (const uint32_t i : std::span(step.active).subspan(begin, end - begin)) {

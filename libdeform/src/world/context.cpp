@@ -3,7 +3,7 @@
 namespace dfm {
 
 StepContext::StepContext(const Memory &m)
-    : broad(m), rows(m), acceleration(m), batches(m), areas(m), exchange(m), renewal(m), rollback(m), next_store(m), islands(m) {
+    : broad(m), rows(m), acceleration(m), batches(m), areas(m), exchange(m), renewal(m), next_store(m), islands(m) {
   use_memory(m, driven, free_kinetic, lent, contacts, tolerance.normal, tolerance.tangent, disturbance, best_impulse, tangents, match, sharing, aim, stands,
              ways, renewed, block_surfels, block_impulse, block_velocity, active, woken, stirred);
   use_memory(m, state.law, state.fn, state.vt, state.ft_stop, state.area, state.dwell, state.bristle, state.ft, state.dft_dvt, state.dft_dfn, state.limit,

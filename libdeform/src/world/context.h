@@ -1,7 +1,7 @@
 // Buffers of a step, by the stage that writes them. Nothing here is state, and no snapshot has any of it.
 // What lasts is the World's (world/world.h).
 #pragma once
-#include <array>
+#include <memory>
 #include <vector>
 
 #include "broad/broad_phase.h"
@@ -16,17 +16,21 @@
 #include "world/budget.h"
 #include "world/guard.h"
 #include "world/islands.h"
-#include "world/rollback.h"
+#include "world/method.h"
 #include "world/self_contact.h"
 #include "world/world.h"
 
 namespace dfm {
 
+struct StageTime {
+  double seconds = 0;
+  uint64_t calls = 0;
+};
+
 struct StepContext {
   double h = 0, left = 0;                              // s: of the sub-step; from its start to the end of the step
   Budget budget;
-  std::array<double, kStages> stage_seconds{};
-  std::array<uint64_t, kStages> stage_calls{};
+  std::vector<StageTime> stage_times;                  // by row of the method's table
 
   // prepare(): the world's entities as the stages see them
   std::vector<BodyView> body_views;
@@ -69,7 +73,7 @@ struct StepContext {
   Array<uint8_t> stands;                               // [contacts] carries, and has an area that it keeps
   Array<Renewal::Way> ways;
   Array<double> renewed;
-  Rollback rollback;                                   // in place of the above, where the method is rollback
+  std::unique_ptr<MethodBuffers> method;               // of stages that the contact method has for itself
 
   // distribute, guard
   std::vector<ImpulseSink> sinks;

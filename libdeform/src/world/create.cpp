@@ -14,6 +14,7 @@
 #include "world/idle.h"
 #include "world/material.h"
 #include "world/context.h"
+#include "world/method.h"
 #include "world/stages.h"
 
 namespace dfm {
@@ -126,8 +127,9 @@ Body &create_body(World &w, const dfm_body_def &def) {
   mesh.nedge = static_cast<uint32_t>(b.edges.size() / 2), mesh.edges = b.edges.data(), mesh.fixed = p.held.data();
   coupling.tell(mesh);
   b.model.create(type, w.context->host, mesh, m, std::move(values));
-  rollback_check(w, b);
-  if (w.def.method == DFM_METHOD_ROLLBACK) make(b.lagged, size_t(kStride) * p.n);
+  if (b.model.stepper) need_ability(w, Ability::self_stepping, "body", b.name);
+  if (!b.surface.identity()) need_ability(w, Ability::own_surface, "body", b.name);
+  if (w.method->point_values) make(b.method_values, size_t(kStride) * p.n);
 
   w.bodies.reserve(w.bodies.size() + 1);
   reserve_sleep(w, step, static_cast<uint32_t>(w.bodies.size() + 1));
@@ -236,7 +238,8 @@ Obstacle &create_obstacle(World &w, const dfm_obstacle_def &def) {
   o.pose = o.pose_at_time(w.time);
   check_motion_speed(w, o);
   check_velocity("obstacle", name, load3(def.velocity_surface));
-  rollback_check(w, o);
+  if (o.def.shape == DFM_SHAPE_VOXELS) need_ability(w, Ability::voxels, "obstacle", o.name);
+  if (o.moves()) need_ability(w, Ability::obstacle_motion, "obstacle", o.name);
   w.obstacles.reserve(w.obstacles.size() + 1);
   w.overlaps.place(w.next_id);
   o.id = w.next_id;

@@ -22,7 +22,10 @@ constexpr uint32_t kSettles = 8;          // sub-steps
 constexpr double kRounding = 1e-12;       // of the sums that a balance is the difference of
 constexpr double kPositionDigits = 8 * 2.3e-16;
 
-bool watching(const World &w) { return w.def.energy_watch > 0 && !w.plan.rolls_back(); }
+// Booked is the work of impulses: contacts that act on bodies in another way leave nothing to balance the energy with.
+bool watching(const World &w) {
+  return w.def.energy_watch > 0 && w.plan.has(StageRole::gives_impulses) == w.plan.touches();
+}
 bool watched(const Body &b) { return !b.model.stepper && (b.model.ops->caps & DFM_CAP_ENERGY) && b.model.ops->energy; }
 // Loads that change from sub-step to sub-step have no potential: their work is booked as it is done.
 bool books_loads(const Body &b) { return b.loads_vary(); }

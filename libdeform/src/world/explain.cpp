@@ -6,7 +6,7 @@
 #include "core/error.h"
 #include "world/idle.h"
 #include "world/context.h"
-#include "world/stages.h"
+#include "world/method.h"
 
 namespace dfm {
 namespace {
@@ -70,7 +70,9 @@ std::string explain(const World &w) {
   out += "],\"stages\":[";
   for (size_t i = 0; i < w.plan.stages.size(); ++i) {
     const PlannedStage &s = w.plan.stages[i];
-    out += (i ? "," : "") + ("{\"name\":" + quote(stage(s.id).name) + ",\"why\":" + quote(s.why) + ",\"cost\":" + quote(stage(s.id).cost(w)) + "}");
+    const Stage &stage = w.method->table[s.row];
+    out += (i ? "," : "") + ("{\"name\":" + quote(stage.name) + ",\"why\":" + quote(s.why));
+    out += ",\"cost\":" + quote(stage.cost(w)) + "}";
   }
   out += "],\"absent\":[";
   for (size_t i = 0; i < w.plan.absent.size(); ++i) {

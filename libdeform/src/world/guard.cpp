@@ -50,7 +50,7 @@ void bound_speeds(World &w, StepContext &step) {
     const Vec3 y = load3(&step.rows.y[size_t(d) * kStride]), change = y - load3(&b.p.v_free[size_t(step.rows.point[d]) * kStride]);
     g.speed[i] = std::max(g.speed[i], norm2(y)), g.change[i] = std::max(g.change[i], norm2(change));
   }
-  const bool listed = w.plan.has(StageId::broad);   // else nothing has looked at the speeds before the solve
+  const bool listed = w.plan.has(StageRole::lists_pairs);   // else nothing has looked at the speeds before the solve
   for (const uint32_t i : step.active) {
     const Body &b = *w.bodies[i];
     const double before = listed ? step.broad.speed(i) : largest_speed(b.surface);
@@ -71,7 +71,7 @@ void bound_speeds(World &w, StepContext &step) {
 // All pairs that may come near: candidates of two sides, behind them those of bodies with themselves.
 void follow_lists(World &w, StepContext &step) {
   Guard &g = step.guard;
-  const bool pairs = w.plan.has(StageId::broad);
+  const bool pairs = w.plan.has(StageRole::lists_pairs);
   if (pairs) step.broad.cover(step.body_views, step.obstacle_views, w.filter, step.h, w.offset, g.speed);
   const bool fresh = cover_self(w, step);
   if (std::exchange(g.placements, w.placements) != w.placements) g.forget();

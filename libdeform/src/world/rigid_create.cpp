@@ -6,7 +6,7 @@
 #include "world/bounds.h"
 #include "world/create.h"
 #include "world/rigid.h"
-#include "world/rollback.h"
+#include "world/method.h"
 #include "world/world.h"
 
 namespace dfm {
@@ -144,7 +144,7 @@ Obstacle &add_rigid_shape(Obstacle &body, const dfm_obstacle_def &def) {
 }
 
 void create_rigids(World &w, const char *host, const dfm_rigid_set_def &def, uint64_t *out) {
-  rollback_refuse(w, "rigid bodies, which a host moves,");
+  need_ability(w, Ability::rigid_bodies);
   if (!def.nbody || !def.bodies) fail(DFM_E_ARG, "a set of rigid bodies needs at least one body");
   if (def.njoint && !def.joints) fail(DFM_E_ARG, "%u joints are announced, but joints is NULL", def.njoint);
   auto owned = std::make_unique<RigidSet>(w, host ? host : "builtin");

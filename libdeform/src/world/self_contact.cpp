@@ -131,8 +131,8 @@ Vec3 velocity_after(const StepContext &step, const Body &b, uint32_t surfel) {
 }  // namespace
 
 void stage_self(World &w, StepContext &step) {
-  if (!w.plan.has(StageId::narrow)) step.contacts.clear();
-  const bool listed = w.plan.has(StageId::broad);   // which has looked at the speeds
+  if (!w.plan.has(StageRole::finds_contacts)) step.contacts.clear();
+  const bool listed = w.plan.has(StageRole::lists_pairs);   // which has looked at the speeds
   for (auto &s : step.self_bodies) {
     const BodyView &view = step.body_views[s->body->slot];
     s->looked = false;
@@ -142,8 +142,8 @@ void stage_self(World &w, StepContext &step) {
     s->list.update(step.h, w.offset);
     SelfBody *const self = s.get();
     const Tangled tangled = [self](uint32_t surfel) { return is_tangled(*self, surfel); };
-    find_self_contacts(view, s->rest, s->list.vertex_face(), s->list.edge_edge(), step.h, w.offset, w.plan.has(StageId::guard) ? tangled : nullptr, step.lent,
-                       step.contacts);
+    find_self_contacts(view, s->rest, s->list.vertex_face(), s->list.edge_edge(), step.h, w.offset,
+                       w.plan.has(StageRole::guards) ? tangled : nullptr, step.lent, step.contacts);
   }
   count_self(w, step);
 }

@@ -17,6 +17,7 @@
 #include "world/measure.h"
 #include "world/snapshot_stream.h"
 #include "world/context.h"
+#include "world/method.h"
 #include "world/stages.h"
 #include "world/world.h"
 
@@ -62,7 +63,7 @@ uint64_t structure(const World &w) {
     h.add(set->group.data(), set->group.size() * sizeof(uint32_t));
     for (const dfm_rigid_def &d : set->defs) h.add(d.mass), h.add(d.inertia);
   }
-  if (w.def.method == DFM_METHOD_ROLLBACK) h.add(w.def.method);
+  if (w.method->point_values) h.add(w.def.method);
   if (const uint8_t asked = asks_self_contact(w)) h.add(asked);
   return h.value;
 }
@@ -79,7 +80,7 @@ struct StagedBody {
   std::vector<HeldMotion> motions;
   uint32_t next_load = 1, category = 1, collides_with = ~0u;
   Slumber slumber;
-  Array<double> surfel_impulse, anchor, lagged;
+  Array<double> surfel_impulse, anchor, method_values;
 };
 struct StagedObstacle { Pose pose, target; bool has_target = false; std::vector<dfm_pose_key> keys; dfm_obstacle_def def{}; };
 struct StagedRigids { Array<dfm_rigid_state> state; Array<double> extra, total; double last_h = 0; };
@@ -111,7 +112,7 @@ struct Staged {
     use_memory(m, report.contacts, report.frame, report.impulse, report.slip, report.mode);
     def.method = w.def.method;
     bodies.resize(w.bodies.size()), obstacles.resize(w.obstacles.size()), rigid_sets.resize(w.rigid_sets.size());
-    for (StagedBody &b : bodies) use_memory(m, b.p.x, b.p.v, b.p.load, b.p.held, b.model.state, b.surfel_impulse, b.anchor, b.lagged);
+    for (StagedBody &b : bodies) use_memory(m, b.p.x, b.p.v, b.p.load, b.p.held, b.model.state, b.surfel_impulse, b.anchor, b.method_values);
     for (StagedRigids &r : rigid_sets) use_memory(m, r.state, r.extra, r.total);
   }
 };
@@ -237,7 +238,8 @@ void body_fields(Stream &s, W &w, B &b, const Body &like) {
   });
   if (b.slumber.asleep) s.array("surfel impulse", b.surfel_impulse, like.surfel_impulse.size(), must::finite);
   if (w.def.sleep) s.array("anchor", b.anchor, like.p.x.size(), must::finite);
-  if (w.def.method == DFM_METHOD_ROLLBACK) s.array("lagged friction", b.lagged, like.lagged.size(), must::finite);
+  if (const char *const name = like.world->method->point_values)
+    s.array(name, b.method_values, like.method_values.size(), must::finite);
   prescribed_fields(s, b, like);
   s.where("", "");
 }
@@ -297,7 +299,7 @@ void fields(Stream &s, W &w, const World &like) {
   s.array("gravity keys", w.gravity_keys, kAnyCount, must::any);
   s.must_hold("gravity keys", "finite keys at rising times", [&] { return rise(w.gravity_keys); });
   s.value("sleep", w.def.sleep, must::flag), s.value("sleepers", w.sleepers, must::any);
-  s.must_hold("sleep", "no sleep with this contact method", [&] { return !w.def.sleep || like.def.method != DFM_METHOD_ROLLBACK; });
+  s.must_hold("sleep", "no sleep with this contact method", [&] { return !w.def.sleep || !lacks(*like.method, Ability::sleep); });
   size_t at = 0;
   s.members("bodies", w.bodies, like.bodies.size(), [&](auto &entry) { body_fields(s, w, object(entry), *like.bodies[at++]); });
   at = 0;
@@ -479,7 +481,7 @@ void exchange(World &w, Staged &t) noexcept {
     std::swap(b.contact_impulse, other.contact_impulse), std::swap(b.energy, other.energy), std::swap(b.next_load, other.next_load);
     std::swap(b.category, other.category), std::swap(b.collides_with, other.collides_with);
     std::swap(b.slumber, other.slumber), b.bound.known = false;
-    b.anchor.swap(other.anchor), b.lagged.swap(other.lagged);
+    b.anchor.swap(other.anchor), b.method_values.swap(other.method_values);
     if (!other.surfel_impulse.empty()) b.surfel_impulse.swap(other.surfel_impulse);
     if (b.slumber.asleep) gather_surface(b.surface, b.p.x.data(), b.p.v.data());
     update_inverse_mass(b.p);
@@ -518,7 +520,7 @@ uint64_t world_hash(const World &w) {
   each_column([&](const ContactColumn &column, const auto &values) {
     if (column.hashed) h.add(values.data(), values.size() * sizeof(values[0]));
   }, w.store);
-  for (auto &b : w.bodies) h.add(b->lagged.data(), b->lagged.size() * sizeof(double));
+  for (auto &b : w.bodies) h.add(b->method_values.data(), b->method_values.size() * sizeof(double));
   if (w.def.sleep)
     for (auto &b : w.bodies) h.add(b->slumber.asleep), h.add(b->slumber.calm), h.add(b->slumber.since);
   return h.value;

@@ -45,8 +45,6 @@ std::string surfels_and_triangles(const World &w) {
 
 std::string candidates(const World &) { return "candidate pairs"; }
 
-std::string candidates_again(const World &) { return "candidate pairs, again while any is tied"; }
-
 std::string candidates_near(const World &) { return "candidate pairs that may come nearer than d_c / 2 within the sub-step"; }
 
 std::string self_surfels(const World &w) {

@@ -14,7 +14,6 @@ std::string rigid_states(const World &w);
 std::string weights(const World &w);
 std::string surfels_and_triangles(const World &w);
 std::string candidates(const World &w);
-std::string candidates_again(const World &w);
 std::string candidates_near(const World &w);
 std::string self_surfels(const World &w);
 std::string contacts_and_sweeps(const World &w);

@@ -1,5 +1,5 @@
-// The stages of a sub-step, and what they share. world/step.cpp has their order. False: the sub-step cannot be taken; `trouble` and dfm_last_error() say why,
-// and nothing of it has been committed.
+// The stages of a sub-step, and what they share. The table of the contact method has their order (world/method.h).
+// False: the sub-step cannot be taken; `trouble` and dfm_last_error() say why, and nothing of it has been committed.
 #pragma once
 #include <cstdint>
 #include <span>
@@ -15,18 +15,6 @@ struct RestoredChoice;
 struct StepContext;
 struct World;
 
-// A row of the table of stages, which stands in world/step.cpp in the order of a sub-step.
-struct Stage {
-  StageId id;
-  const char *name;
-  bool (*run)(World &w, StepContext &step, uint32_t *trouble);   // false: the sub-step cannot be taken, and nothing of it has been committed
-  std::string (*cost)(const World &w);                           // what its cost grows with
-  StageChoice (*when)(const SceneFacts &facts);                  // does it run, and why
-};
-const Stage &stage(StageId id);
-// Throws Error where an effect that is asked for is nowhere provided.
-Plan make_plan(const SceneFacts &facts);
-
 // Plan, pair tables, offset, views of the entities; where nothing has changed it does nothing. Throws Error.
 void prepare(World &w, const RestoredChoice *restored = nullptr);
 dfm_status run_step(World &w, StepContext &step, double dt, uint32_t *trouble);
@@ -35,6 +23,7 @@ void undo_motion(StepContext &step);         // held velocities as before stage_
 void stage_motion(World &w, StepContext &step);
 bool stage_model(World &w, StepContext &step, uint32_t *trouble);
 bool stage_predict(World &w, StepContext &step, uint32_t *trouble);
+bool predict_and_watch(World &w, StepContext &step, uint32_t *trouble);     // as a row of a table: step.cpp
 bool stage_rigid_predict(World &w, StepContext &step, uint32_t *trouble);   // rigid.cpp
 void stage_gather(World &w, StepContext &step);
 void stage_broad(World &w, StepContext &step);
@@ -46,8 +35,6 @@ void stage_distribute(StepContext &step);
 bool stage_guard(World &w, StepContext &step, uint32_t *trouble);           // guard.cpp
 bool stage_commit(World &w, StepContext &step, uint32_t *trouble);
 void stage_sleep(World &w, StepContext &step);                              // sleep.cpp
-void stage_lagged(World &w, StepContext &step);                             // rollback.cpp
-bool stage_rollback(World &w, StepContext &step, uint32_t *trouble);        // rollback.cpp
 
 // model and commit of self-stepping bodies: they write their ends beside their present states.
 bool commit_steppers(World &w, StepContext &step, uint32_t *trouble);

@@ -3,19 +3,19 @@
 //   bound                            when it is due: sizes of the sub-steps (step_bound.cpp, step_sizes.cpp)
 //   sub-steps                        run_step(): equal ones, cut finer where the bound has fallen
 //     pieces                         advance(), piece(): shorter where the guard asks for it
-//       stages                       sub_step(): all rows of the table below that the plan has chosen, or none
+//       stages                       sub_step(): all rows of the method's table that the plan has chosen, or none
 //         waking                     narrow runs model to broad again for who has been woken (sleep.cpp)
 //         a rigid host's revision    solve, again, where a motor lets go; rigid commit, where a host asks for another solve (rigid.cpp)
 //         hits                       guard runs solve and distribute again with what would cross (guard.cpp)
 #include <algorithm>
 #include <chrono>
 #include <cmath>
-#include <iterator>
 #include <utility>
 
 #include "core/error.h"
 #include "world/step_bound.h"
 #include "world/context.h"
+#include "world/method.h"
 #include "world/move_obstacles.h"
 #include "world/stage_costs.h"
 #include "world/stages.h"
@@ -25,53 +25,42 @@
 namespace dfm {
 namespace {
 
-template <auto function>
-bool always(World &w, StepContext &step, uint32_t *) {
-  return function(w, step), true;
-}
-bool predict_and_watch(World &w, StepContext &step, uint32_t *trouble) { return stage_predict(w, step, trouble) && watch_energy(w, step, trouble); }
 bool distribute_all(World &, StepContext &step, uint32_t *) { return stage_distribute(step), true; }
 
 constexpr Stage kTable[] = {
-    {StageId::motion, "motion", always<stage_motion>, cost::prescribed, when::motion},
-    {StageId::model, "model", stage_model, cost::cells, when::model},
-    {StageId::predict, "predict", predict_and_watch, cost::points, when::predict},
-    {StageId::rigid_predict, "rigid predict", stage_rigid_predict, cost::rigid_states, when::rigid_predict},
-    {StageId::gather, "gather", always<stage_gather>, cost::weights, when::gather},
-    {StageId::lagged, "lagged friction", always<stage_lagged>, cost::points, when::lagged},
-    {StageId::broad, "broad", always<stage_broad>, cost::surfels_and_triangles, when::broad},
-    {StageId::rollback, "rollback", stage_rollback, cost::candidates_again, when::rollback},
-    {StageId::narrow, "narrow", stage_narrow, cost::candidates, when::narrow},
-    {StageId::self, "self contact", always<stage_self>, cost::self_surfels, when::self},
-    {StageId::solve, "contact+friction", stage_solve, cost::contacts_and_sweeps, when::solve},
-    {StageId::rigid_commit, "rigid commit", stage_rigid_commit, cost::rigid_states, when::rigid_commit},
-    {StageId::distribute, "distribute", distribute_all, cost::contacts_and_surfels, when::distribute},
-    {StageId::guard, "guard", stage_guard, cost::candidates_near, when::guard},
-    {StageId::commit, "commit", stage_commit, cost::points, when::commit},
-    {StageId::sleep, "sleep", always<stage_sleep>, cost::awake, when::sleep},
+    {"motion", always<stage_motion>, cost::prescribed, when::motion},
+    {"model", stage_model, cost::cells, when::model},
+    {"predict", predict_and_watch, cost::points, when::predict},
+    {"rigid predict", stage_rigid_predict, cost::rigid_states, when::rigid_predict},
+    {"gather", always<stage_gather>, cost::weights, when::gather},
+    {"broad", always<stage_broad>, cost::surfels_and_triangles, when::broad, StageRole::lists_pairs},
+    {"narrow", stage_narrow, cost::candidates, when::narrow, StageRole::finds_contacts},
+    {"self contact", always<stage_self>, cost::self_surfels, when::self},
+    {"contact+friction", stage_solve, cost::contacts_and_sweeps, when::solve, StageRole::solves},
+    {"rigid commit", stage_rigid_commit, cost::rigid_states, when::rigid_commit},
+    {"distribute", distribute_all, cost::contacts_and_surfels, when::distribute, StageRole::gives_impulses},
+    {"guard", stage_guard, cost::candidates_near, when::guard, StageRole::guards},
+    {"commit", stage_commit, cost::points, when::commit},
+    {"sleep", always<stage_sleep>, cost::awake, when::sleep},
 };
-constexpr bool in_order() {
-  for (size_t i = 0; i < kStages; ++i)
-    if (size_t(kTable[i].id) != i) return false;
-  return true;
-}
-static_assert(std::size(kTable) == kStages && in_order());
+constexpr ContactMethod kVelocity{"velocity", kTable};
 
-// A stage, timed and traced.
-bool run(const Stage &stage, World &w, StepContext &step, uint32_t *trouble) {
+// A row of the method's table, timed and traced.
+bool run(size_t row, World &w, StepContext &step, uint32_t *trouble) {
+  const Stage &stage = w.method->table[row];
   struct Timer {
     const Stage &stage;
     World &w;
-    StepContext &step;
+    StageTime &time;
     std::chrono::steady_clock::time_point start = std::chrono::steady_clock::now();
     ~Timer() {
       w.context->trace_end(stage.name);
-      step.stage_seconds[size_t(stage.id)] += std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
-      ++step.stage_calls[size_t(stage.id)];
+      time.seconds += std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+      ++time.calls;
     }
   };
   w.context->trace_begin(stage.name);
-  const Timer timer{stage, w, step};
+  const Timer timer{stage, w, step.stage_times[row]};
   return stage.run(w, step, trouble);
 }
 
@@ -81,17 +70,10 @@ bool sub_step(World &w, StepContext &step, uint32_t *trouble);
 
 }  // namespace
 
-const Stage &stage(StageId id) { return kTable[size_t(id)]; }
+const ContactMethod &velocity_method() { return kVelocity; }
 
-Plan make_plan(const SceneFacts &facts) {
-  Plan plan;
-  plan_effects(facts, plan);
-  for (const Stage &s : kTable) {
-    StageChoice choice = s.when(facts);
-    if (choice.runs) plan.stages.push_back({s.id, std::move(choice.why)});
-    else if (!choice.why.empty()) plan.absent.push_back({s.name, std::move(choice.why)});
-  }
-  return plan;
+bool predict_and_watch(World &w, StepContext &step, uint32_t *trouble) {
+  return stage_predict(w, step, trouble) && watch_energy(w, step, trouble);
 }
 
 dfm_status run_step(World &w, StepContext &step, double dt, uint32_t *trouble) {
@@ -195,7 +177,7 @@ bool sub_step(World &w, StepContext &step, uint32_t *trouble) {
   step.guard.start();
   charge(w, step, body_work(w, step) + surface_work(w, step));
   for (const PlannedStage &planned : w.plan.stages)
-    if (!run(stage(planned.id), w, step, trouble)) return false;
+    if (!run(planned.row, w, step, trouble)) return false;
   keep_rigids(w, step);
   return undo.kept = true;
 }

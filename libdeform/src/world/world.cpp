@@ -1,5 +1,6 @@
 // What the world knows about itself between steps: names, pair tables, offset, plan.
 #include "world/context.h"
+#include "world/method.h"
 #include "world/stages.h"
 #include "world/world.h"
 
@@ -35,6 +36,7 @@ World::World(dfm_context *c) : context(c), steps(std::make_unique<StepContext>(c
   const Memory &m = c->memory;
   use_memory(m, report.contacts, report.frame, report.impulse, report.slip, report.mode, step_impulses.pairs);
   stats.size = sizeof stats;
+  use_method(*this, velocity_method());
 }
 
 World::~World() = default;
@@ -65,7 +67,7 @@ uint32_t World::add_law(const char *name, std::span<const dfm_param_value> value
   for (uint32_t i = 0; i < laws.size(); ++i)
     if (laws[i]->type == &type && laws[i]->params == packed) return i;
   auto law = std::make_unique<LawInstance>(type, context->host, std::move(packed));
-  rollback_check_law(*this, name, law->nstate);
+  if (law->nstate) need_ability(*this, Ability::law_memory, "friction law", name);
   for (uint32_t i = 0; i < free.size(); ++i)
     if (free[i]) return laws[i] = std::move(law), changed = true, i;
   laws.push_back(std::move(law));
@@ -103,7 +105,7 @@ void prepare(World &w, const RestoredChoice *restored) {
   const uint32_t nb = static_cast<uint32_t>(w.bodies.size()), no = static_cast<uint32_t>(w.obstacles.size()), width = nb + no;
   SceneFacts facts;
   facts.bodies = nb, facts.obstacles = no;
-  facts.gravity_keys = !w.gravity_keys.empty(), facts.sleep = w.def.sleep != 0, facts.rollback = w.def.method == DFM_METHOD_ROLLBACK;
+  facts.gravity_keys = !w.gravity_keys.empty(), facts.sleep = w.def.sleep != 0;
 
   step.body_views.clear(), step.obstacle_views.clear(), step.sources.clear(), step.exchange.clear();
   uint32_t node = 0, point = 0;
@@ -185,7 +187,8 @@ void prepare(World &w, const RestoredChoice *restored) {
   facts.unguarded = w.def.flags & DFM_WORLD_UNGUARDED;
   facts.available.push_back({kSelfContact, "contact"});
   if (nb && facts.effects_listed) facts.offered.push_back({kSelfContact, "contact"});
-  w.plan = make_plan(facts);
+  if (facts.self_bodies) need_ability(w, Ability::self_contact);
+  w.plan = make_plan(w.method->table, facts);
 
   // While contacts live it only falls: a larger one would turn their rest into a depth, and push them apart at 0.1 d_c / h.
   const double wanted = contact_offset(w);

@@ -28,6 +28,7 @@
 
 namespace dfm {
 
+struct ContactMethod;
 struct StepContext;
 struct World;
 
@@ -87,7 +88,7 @@ struct Body {
   Vec3 contact_impulse;              // N s since creation
   EnergyBook energy;
   Array<double> surfel_impulse;      // [nsurfel,3] N s of the last sub-step
-  Array<double> lagged;              // [n,4] N, friction for the next sub-step; empty where the method is not rollback
+  Array<double> method_values;       // [n,4] what the contact method keeps of each point; empty where it keeps nothing
   Array<double> ksum, csum;          // [n] row sums of the step bound
   struct { bool known = false; double step = 0; uint32_t point = 0, inverted = 0; } bound;   // as last asked for; holds while asleep
   Slumber slumber;
@@ -165,6 +166,8 @@ struct World {
   std::vector<LawInstance *> law_list;
   double offset = 0;                                   // d_c, m
   uint32_t bound_age = kNone;                          // sub-steps since the bound was asked for; kNone: ask before the next step
+
+  const ContactMethod *method = nullptr;               // its table of stages, and what it cannot do (world/method.h)
 
   // Time.
   double time = 0, stable = 0;                         // s; stable: 0.9 of the bound at its last evaluation

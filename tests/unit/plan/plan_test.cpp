@@ -2,11 +2,16 @@
 #include <gtest/gtest.h>
 
 #include "core/error.h"
-#include "world/stages.h"
+#include "rollback/rollback.h"
+#include "world/method.h"
 
 namespace {
 
-using dfm::StageId;
+using dfm::ContactMethod;
+using dfm::StageRole;
+using Names = std::vector<std::string>;
+
+const ContactMethod &velocity() { return dfm::velocity_method(); }
 
 dfm::SceneFacts two_bodies() {
   dfm::SceneFacts f;
@@ -14,14 +19,14 @@ dfm::SceneFacts two_bodies() {
   return f;
 }
 
-std::vector<StageId> stages(const dfm::SceneFacts &f) {
-  std::vector<StageId> out;
-  for (const auto &s : dfm::make_plan(f).stages) out.push_back(s.id);
+Names stages(const dfm::SceneFacts &f, const ContactMethod &method = velocity()) {
+  Names out;
+  for (const auto &s : dfm::make_plan(method.table, f).stages) out.push_back(method.table[s.row].name);
   return out;
 }
 
-std::string why_not(const dfm::SceneFacts &f, const std::string &name) {
-  for (const auto &s : dfm::make_plan(f).absent)
+std::string why_not(const dfm::SceneFacts &f, const std::string &name, const ContactMethod &method = velocity()) {
+  for (const auto &s : dfm::make_plan(method.table, f).absent)
     if (s.name == name) return s.why;
   return {};
 }
@@ -32,43 +37,42 @@ TEST(Plan, OfAnEmptyWorld_HasNoStage) {
 }
 
 TEST(Plan, OfBodiesThatTouch_HasTheStagesOfContactInOrder) {
-  const std::vector<StageId> want = {StageId::model, StageId::predict, StageId::broad, StageId::narrow, StageId::solve, StageId::distribute, StageId::guard,
-                                     StageId::commit};
+  const Names want = {"model", "predict", "broad", "narrow", "contact+friction", "distribute", "guard", "commit"};
   EXPECT_EQ(stages(two_bodies()), want);
-  EXPECT_TRUE(dfm::make_plan(two_bodies()).touches());
+  EXPECT_TRUE(dfm::make_plan(velocity().table, two_bodies()).touches());
 }
 
 TEST(Plan, OfOneBody_HasNothingOfContact) {
   dfm::SceneFacts f;
   f.bodies = 1;
-  EXPECT_EQ(stages(f), (std::vector<StageId>{StageId::model, StageId::predict, StageId::commit}));
+  EXPECT_EQ(stages(f), (Names{"model", "predict", "commit"}));
   EXPECT_EQ(why_not(f, "guard"), "one body and nothing to touch");
 }
 
 TEST(Plan, OfABodyThatTouchesItselfAlone_LooksForNoPairs) {
   dfm::SceneFacts f;
   f.bodies = 1, f.self_bodies = 1, f.self = true;
-  EXPECT_EQ(stages(f), (std::vector<StageId>{StageId::model, StageId::predict, StageId::self, StageId::solve, StageId::distribute, StageId::guard,
-                                             StageId::commit}));
+  EXPECT_EQ(stages(f), (Names{"model", "predict", "self contact", "contact+friction", "distribute", "guard", "commit"}));
   EXPECT_EQ(why_not(f, "broad"), "no pair may touch");
 }
 
 TEST(Plan, OfRollback_HasItsStagesInPlaceOfTheSolve) {
-  dfm::SceneFacts f = two_bodies();
-  f.rollback = true;
-  EXPECT_EQ(stages(f), (std::vector<StageId>{StageId::model, StageId::predict, StageId::lagged, StageId::broad, StageId::rollback, StageId::commit}));
-  EXPECT_EQ(why_not(f, "guard"), "contact.method is rollback");
-  f.self_bodies = 1;
-  EXPECT_THROW(dfm::make_plan(f), dfm::Error);
+  const ContactMethod &rollback = dfm::rollback::method();
+  EXPECT_EQ(stages(two_bodies(), rollback), (Names{"model", "predict", "lagged friction", "broad", "rollback", "commit"}));
+  for (const char *replaced : {"narrow", "contact+friction", "distribute", "guard"})
+    EXPECT_EQ(why_not(two_bodies(), replaced, rollback), "contact.method is rollback") << replaced;
+  const dfm::Plan plan = dfm::make_plan(rollback.table, two_bodies());
+  EXPECT_TRUE(plan.touches());
+  EXPECT_FALSE(plan.has(StageRole::gives_impulses));
 }
 
 TEST(Plan, OfRigidBodies_EndsThemBeforeImpulsesAreDistributed) {
   dfm::SceneFacts f = two_bodies();
   f.rigid_bodies = 3, f.rigid_hosts = "builtin", f.obstacle_pairs = 1;
-  const std::vector<StageId> all = stages(f);
-  EXPECT_EQ(all[2], StageId::rigid_predict);
-  EXPECT_EQ(all[6], StageId::rigid_commit);
-  EXPECT_EQ(all[7], StageId::distribute);
+  const Names all = stages(f);
+  EXPECT_EQ(all[2], "rigid predict");
+  EXPECT_EQ(all[6], "rigid commit");
+  EXPECT_EQ(all[7], "distribute");
 }
 
 }  // namespace

@@ -1,4 +1,4 @@
-#include "narrow/impact_time.h"
+#include "rollback/impact_time.h"
 
 #include <algorithm>
 #include <cmath>
@@ -9,7 +9,7 @@
 #include "surfel/closest.h"
 #include "surfel/obstacle_shape.h"
 
-namespace dfm {
+namespace dfm::rollback {
 namespace {
 
 constexpr double kSharp = 1e-3;   // share of d_c to which times are found; what is nearer than d_c by twice as much rests
@@ -252,4 +252,4 @@ ContactPoint ImpactQuery::contact(const Candidate &c, const ImpactHit &hit) cons
   return p;
 }
 
-}  // namespace dfm
+}  // namespace dfm::rollback

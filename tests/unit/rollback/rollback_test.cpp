@@ -1,6 +1,6 @@
 // The source's collision solution on cases that are computed by hand, and the errata's tests that tell a wrong form from the right one
 // (Zerbato 2010, (4.5), (5.21), (5.24), (5.25), (5.27)).
-#include "contact/rollback.h"
+#include "rollback/equations.h"
 
 #include "obstacle.h"
 #include "rollback_cases.h"

@@ -10,7 +10,7 @@
 #include "surfel/contact_set.h"
 #include "surfel/views.h"
 
-namespace dfm {
+namespace dfm::rollback {
 
 struct ImpactHit {
   double t;                // share of the sub-step; above 1: never
@@ -54,4 +54,4 @@ class ImpactQuery {
   double h_, touch_;
 };
 
-}  // namespace dfm
+}  // namespace dfm::rollback

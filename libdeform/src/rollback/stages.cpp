@@ -8,50 +8,53 @@
 //
 // Why this ends, and in a state without contact: vertices of one island follow the true motion up to one time, before any of their hits; pairs that go
 // unequal shares have been asked about just that motion; and each round that finds a hit leaves fewer islands.
-#include "world/rollback.h"
+#include "rollback/stages.h"
 
 #include <algorithm>
 
-#include "contact/rollback.h"
 #include "core/error.h"
+#include "rollback/equations.h"
+#include "rollback/impact_time.h"
 #include "surfel/make_surface.h"
 #include "world/context.h"
 #include "world/stages.h"
 #include "world/world.h"
 
-namespace dfm {
+namespace dfm::rollback {
 
-Rollback::Rollback(const Memory &m) : islands(m) { use_memory(m, hits, joins, joined, share, time, met); }
+namespace {
 
-void rollback_refuse(const World &w, const char *what) {
-  if (w.def.method == DFM_METHOD_ROLLBACK)
-    fail(DFM_E_UNSUPPORTED, "%s cannot be in a world whose contact method is rollback (it is there to compare: doc/concepts/rollback.md); use the method "
-         "velocity", what);
-}
+struct Buffers : MethodBuffers {
+  Islands islands;                       // of surfels, world-wide numbers
+  Array<ImpactHit> hits;                 // by candidate
+  Array<uint8_t> joins;                  // by candidate: ties its vertices together
+  Array<uint32_t> joined;                // those candidates, in the order in which they were found
+  Array<double> share;                   // by surfel, of its way
+  Array<double> time;                    // by island
+  Array<uint8_t> met;                    // by surfel: a contact of a point has it
+  std::vector<const double *> shares;    // by body slot, into share
+  explicit Buffers(const Memory &m) : islands(m) { use_memory(m, hits, joins, joined, share, time, met); }
+};
+Buffers &buffers(StepContext &step) { return static_cast<Buffers &>(*step.method); }
 
-void rollback_check(const World &w, const Body &b) {
-  const std::string name = "body '" + b.name + "': ";
-  if (b.model.stepper) rollback_refuse(w, (name + "a model that steps itself, whose vertices nobody else can move,").c_str());
-  if (!b.surface.identity()) rollback_refuse(w, (name + "a surface of its own, for which the source moves no points of the body,").c_str());
-  if (!b.motions.empty()) rollback_refuse(w, (name + "a motion of held points, which cannot go back,").c_str());
-}
+// [n,4] N, friction for the next sub-step.
+Array<double> &lagged(Body &b) { return b.method_values; }
+const Array<double> &lagged(const Body &b) { return b.method_values; }
 
-void rollback_check(const World &w, const Obstacle &o) {
-  const std::string name = "obstacle '" + o.name + "': ";
-  if (o.def.shape == DFM_SHAPE_VOXELS) rollback_refuse(w, (name + "voxels, against which no time of impact is known,").c_str());
-  if (o.moves() || o.has_target) rollback_refuse(w, (name + "a motion of its own, which cannot go back,").c_str());
-}
+}  // namespace
 
-void rollback_check_law(const World &w, const char *law, uint32_t nstate) {
-  if (nstate) rollback_refuse(w, format("friction law '%s': a memory, which would see no slip of what is frozen,", law).c_str());
-}
+std::unique_ptr<MethodBuffers> make_buffers(const Memory &memory) { return std::make_unique<Buffers>(memory); }
 
 void stage_lagged(World &w, StepContext &step) {
   for (const auto &b : w.bodies) {
     Phyxels &p = b->p;
+    const Array<double> &force = lagged(*b);
     bool any = false;
     for (size_t i = 0; i < p.v_free.size(); ++i)
-      if (b->lagged[i] != 0) any = true, p.v_free[i] += step.h * (p.inv_mass[i] * b->lagged[i]);
+      if (force[i] != 0) {
+        any = true;
+        p.v_free[i] += step.h * (p.inv_mass[i] * force[i]);
+      }
     if (any) gather_surface(b->surface, p.x.data(), p.v_free.data());
   }
 }
@@ -63,7 +66,7 @@ constexpr uint32_t kGrain = 64;
 // The first time of every candidate that `wanted`, each into its own place.
 template <class Wanted>
 void ask(World &w, StepContext &step, std::span<const double *const> share, Wanted &&wanted) {
-  Rollback &r = step.rollback;
+  Buffers &r = buffers(step);
   const Array<Candidate> &list = step.broad.candidates();
   const ImpactQuery query(step.body_views, step.obstacle_views, step.h, w.offset);
   w.context->tasks.parallel_for(static_cast<uint32_t>(list.size()), kGrain, [&](uint32_t begin, uint32_t end) {
@@ -75,7 +78,7 @@ void ask(World &w, StepContext &step, std::span<const double *const> share, Want
   });
 }
 
-bool take_new(Rollback &r) {
+bool take_new(Buffers &r) {
   const size_t before = r.joined.size();
   for (uint32_t i = 0; i < r.joins.size(); ++i)
     if (r.joins[i] == 2) r.joins[i] = 1, r.joined.push_back(i);
@@ -84,7 +87,7 @@ bool take_new(Rollback &r) {
 
 // One time per island. `own`: as many of `joined` as have hit on the true motion; the others only tie.
 void set_shares(StepContext &step, const ImpactQuery &query, size_t own) {
-  Rollback &r = step.rollback;
+  Buffers &r = buffers(step);
   const uint32_t n = static_cast<uint32_t>(r.share.size());
   r.islands.start(n);
   uint32_t node[4];
@@ -97,14 +100,14 @@ void set_shares(StepContext &step, const ImpactQuery &query, size_t own) {
   for (size_t k = 0; k < own; ++k) {
     query.nodes(step.broad.candidates()[r.joined[k]], node);
     double &t = r.time[r.islands.of[node[0]]];
-    t = std::min(t, rollback::kSafety * r.hits[r.joined[k]].t);
+    t = std::min(t, kSafety * r.hits[r.joined[k]].t);
   }
   for (uint32_t i = 0; i < n; ++i) r.share[i] = r.time[r.islands.of[i]];
 }
 
 // Shares of all surfels: every pair that would touch on the ways that they leave is tied.
 void find_islands(World &w, StepContext &step) {
-  Rollback &r = step.rollback;
+  Buffers &r = buffers(step);
   const Array<Candidate> &list = step.broad.candidates();
   const ImpactQuery query(step.body_views, step.obstacle_views, step.h, w.offset);
   r.hits.resize(list.size()), r.joins.assign(list.size(), 0), r.joined.clear();
@@ -125,7 +128,7 @@ void find_islands(World &w, StepContext &step) {
 // Colliding points: of each vertex with one other side the earliest hit. A pair of edges counts only where none of its ends is such a point: the source
 // has no edges, and what both have would push twice.
 void find_points(World &w, StepContext &step) {
-  Rollback &r = step.rollback;
+  Buffers &r = buffers(step);
   const Array<Candidate> &list = step.broad.candidates();
   const ImpactQuery query(step.body_views, step.obstacle_views, step.h, w.offset);
   const auto edges = [&](const Candidate &c) { return c.kind == 1; };
@@ -170,12 +173,13 @@ void set_forces(World &w, StepContext &step) {
       uint32_t s;
       const Body &b = body_of_node(w, step, c.node[k], s);
       const size_t at = size_t{b.surface.point[s]} * kStride;
-      for (int j = 0; j < 3; ++j) pull[j] += c.weight[k] * (step.h * (b.p.inv_mass[at + size_t(j)] * b.lagged[at + size_t(j)]));
+      const double *const force = &lagged(b)[at];
+      for (int j = 0; j < 3; ++j) pull[j] += c.weight[k] * (step.h * (b.p.inv_mass[at + size_t(j)] * force[j]));
     }
     const double *const f = &step.rows.frame[size_t(i) * 9];
     const Vec3 u = step.rows.velocity(i), free = u - Vec3{dot(load3(f), pull), dot(load3(f + 3), pull), dot(load3(f + 6), pull)};
     const double stop = step.rows.wt[i] > 0 ? -1 / (step.rows.wt[i] * step.h) : 0;
-    step.state.fn[i] = rollback::normal_force(step.rows.wn[i], free.x, step.h);
+    step.state.fn[i] = normal_force(step.rows.wn[i], free.x, step.h);
     step.state.vt[i] = u.y, step.state.vt[step.state.stride + i] = u.z;
     step.state.ft_stop[i] = stop * free.y, step.state.ft_stop[step.state.stride + i] = stop * free.z;
   }
@@ -185,11 +189,12 @@ void set_forces(World &w, StepContext &step) {
 void roll_back(World &w, StepContext &step) {
   for (size_t i = 0; i < step.body_views.size(); ++i) {
     Body &b = *w.bodies[step.body_views[i].slot];
-    const double *const share = step.rollback.shares[i];
+    const double *const share = buffers(step).shares[i];
     for (uint32_t s = 0; s < b.surface.nsurfel; ++s) {
       const size_t at = size_t{b.surface.point[s]} * kStride;
-      const Vec3 before = load3(&b.p.v_free[at]), after = share[s] < 1 ? rollback::velocity_after(before, share[s]) : before;
-      store3(&b.surfel_impulse[3 * size_t{s}], step.h * load3(&b.lagged[at]) + b.p.mass[b.surface.point[s]] * (after - before));
+      const Vec3 before = load3(&b.p.v_free[at]), after = share[s] < 1 ? velocity_after(before, share[s]) : before;
+      const Vec3 lost = b.p.mass[b.surface.point[s]] * (after - before);
+      store3(&b.surfel_impulse[3 * size_t{s}], step.h * load3(&lagged(b)[at]) + lost);
       store3(&b.p.v_free[at], after);
     }
   }
@@ -212,7 +217,7 @@ void set_slip(World &w, StepContext &step) {
 
 // (5.27)-(5.30): friction on the points of both sides, by their weights at the common place; for the next sub-step.
 void keep_friction(World &w, StepContext &step) {
-  for (const auto &b : w.bodies) std::fill(b->lagged.begin(), b->lagged.end(), 0.0);
+  for (const auto &b : w.bodies) std::fill(lagged(*b).begin(), lagged(*b).end(), 0.0);
   for (uint32_t i = 0; i < step.rows.n; ++i) {
     const ContactPoint &c = step.contacts[i];
     const double *const f = &step.rows.frame[size_t(i) * 9];
@@ -222,7 +227,7 @@ void keep_friction(World &w, StepContext &step) {
     for (uint32_t k = 0; k < c.nnode; ++k) {
       uint32_t s;
       const Body &b = body_of_node(w, step, c.node[k], s);
-      double *const to = &w.bodies[b.slot]->lagged[size_t{b.surface.point[s]} * kStride];
+      double *const to = &lagged(*w.bodies[b.slot])[size_t{b.surface.point[s]} * kStride];
       store3(to, load3(to) + c.weight[k] * force);
     }
   }
@@ -234,9 +239,10 @@ bool stage_rollback(World &w, StepContext &step, uint32_t *trouble) {
   step.passes = step.sweeps = 0, step.residual = {};
   uint32_t nnode = 0;
   for (const BodyView &v : step.body_views) nnode = std::max(nnode, v.first_node + v.surface->nsurfel);
-  step.rollback.share.assign(nnode, 1.0);
-  step.rollback.shares.clear();
-  for (const BodyView &v : step.body_views) step.rollback.shares.push_back(&step.rollback.share[v.first_node]);
+  Buffers &r = buffers(step);
+  r.share.assign(nnode, 1.0);
+  r.shares.clear();
+  for (const BodyView &v : step.body_views) r.shares.push_back(&r.share[v.first_node]);
   find_islands(w, step);
   find_points(w, step);
   make_rows(w, step);
@@ -251,4 +257,4 @@ bool stage_rollback(World &w, StepContext &step, uint32_t *trouble) {
   return true;
 }
 
-}  // namespace dfm
+}  // namespace dfm::rollback
