@@ -51,7 +51,7 @@ void sum_loads(Body &b) {
       store3(f, load3(f) + load3(&load.force[3 * i]));
     }
   disturb(b);
-  b.world->changed = true;
+  values_changed(*b.world);
 }
 
 Spring &spring_of(Body &b, uint32_t number) {
@@ -63,7 +63,7 @@ Spring &spring_of(Body &b, uint32_t number) {
 // They count in the step bound and pull from the next sub-step on.
 void springs_changed(Body &b) {
   sum_loads(b);
-  b.world->bound_age = kNone, b.bound.known = false;
+  b.bound.known = false;
 }
 
 Spring make_spring(const Body &b, const dfm_spring_def &d) {
@@ -222,7 +222,7 @@ dfm_status dfm_body_move_held(dfm_body body, uint32_t n, const uint32_t *points,
     drop_motions(b, {points, n});
     b.motions.push_back(std::move(m));
     disturb(b);
-    b.world->changed = true;
+    values_changed(*b.world);
   });
 }
 

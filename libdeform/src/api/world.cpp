@@ -132,7 +132,8 @@ dfm_status dfm_world_set_gravity(dfm_world world, const double gravity[3]) {
     store3(w.def.gravity, load3(gravity));
     w.gravity_keys.clear();
     wake_all(w);
-    w.changed = true;
+    set_gravity_now(w);
+    values_changed(w);
   });
 }
 
@@ -144,7 +145,8 @@ dfm_status dfm_world_set_gravity_keys(dfm_world world, uint32_t n, const dfm_vec
     check_keys(copy, "gravity");
     w.gravity_keys = std::move(copy);
     wake_all(w);
-    w.changed = true;
+    set_gravity_now(w);
+    values_changed(w);
   });
 }
 

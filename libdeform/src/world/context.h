@@ -33,6 +33,8 @@ struct StepContext {
   std::vector<StageTime> stage_times;                  // by row of the method's table
 
   // prepare(): the world's entities as the stages see them
+  SceneFacts facts;                                    // what the plan was made from
+  struct { uint64_t tables = 0, plans = 0; } made;     // how often prepare() has made all of this anew, and the plan
   std::vector<BodyView> body_views;
   std::vector<ObstacleView> obstacle_views;
   std::vector<RigidPlace> rigid_places;                // by obstacle slot; empty without rigid bodies

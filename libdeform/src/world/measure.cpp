@@ -5,6 +5,8 @@
 #include <cstring>
 
 #include "core/error.h"
+#include "plugin/registry.h"
+#include "world/stages.h"
 
 namespace dfm {
 
@@ -52,6 +54,28 @@ void energy_density(Body &b, double *out) {
     fail(DFM_E_FATAL, "model '%s' could not give its energy per cell", b.model.type->id);
 }
 
+namespace {
+
+// Which effects the parameters call for. changed() allocates nothing.
+class EffectsAtWork {
+ public:
+  explicit EffectsAtWork(const ModelInstance &model) : model_(model), names_(effects(*model.type)) {
+    for (const std::string &name : names_) at_work_.push_back(model.works(name));
+  }
+  bool changed() const {
+    for (size_t i = 0; i < names_.size(); ++i)
+      if (model_.works(names_[i]) != at_work_[i]) return true;
+    return false;
+  }
+
+ private:
+  const ModelInstance &model_;
+  const std::vector<std::string> names_;
+  std::vector<bool> at_work_;
+};
+
+}  // namespace
+
 void set_model_params(Body &b, const dfm_params &params) {
   const dfm_type &type = *b.model.type;
   if (params.n && !params.values) fail(DFM_E_ARG, "body '%s': %u parameters are announced, but params.values is NULL", b.name.c_str(), params.n);
@@ -79,13 +103,14 @@ void set_model_params(Body &b, const dfm_params &params) {
     if (!(type.params[i].flags & DFM_PARAM_RUNTIME) && !std::equal(&values[at], &values[at] + type.params[i].width, &b.model.params[at]))
       fail(DFM_E_ARG, "body '%s': parameter '%s' of model '%s' cannot change while it runs", b.name.c_str(), type.params[i].key, type.id);
   if (!b.model.ops->set_params) fail(DFM_E_UNSUPPORTED, "model '%s' takes no parameters while it runs", type.id);
+  const EffectsAtWork before(b.model);
   const dfm_status status = b.model.call("set_params", [&] { return b.model.ops->set_params(b.model.self, values.data()); });
   if (status == DFM_E_NOMEM) fail(DFM_E_NOMEM, "body '%s': model '%s' found no memory for these parameters; nothing was changed", b.name.c_str(), type.id);
   if (status != DFM_OK)
     fail(DFM_E_ARG, "body '%s': model '%s' refuses these parameters; the log says why", b.name.c_str(), type.id);
   b.model.params = std::move(values);
-  forget_energy(b);
-  b.world->bound_age = kNone, b.world->changed = true;   // the plan names the effects that parameters call for
+  values_changed(*b.world);
+  if (before.changed()) b.world->changed = true;   // the plan names the effects that parameters call for
 }
 
 }  // namespace dfm

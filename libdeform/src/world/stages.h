@@ -17,6 +17,10 @@ struct World;
 
 // Plan, pair tables, offset, views of the entities; where nothing has changed it does nothing. Throws Error.
 void prepare(World &w, const RestoredChoice *restored = nullptr);
+// After a change of values that no table depends on: loads, motions, gravity, parameters of a model or of a law.
+// The step bound is asked for anew and the energy books begin anew; the plan is looked at in the next prepare().
+void values_changed(World &w);
+void set_gravity_now(World &w);              // from what is prescribed, at the present time
 dfm_status run_step(World &w, StepContext &step, double dt, uint32_t *trouble);
 void undo_motion(StepContext &step);         // held velocities as before stage_motion()
 

@@ -97,15 +97,71 @@ void offer(const dfm_type &type, std::vector<SceneFacts::Provider> &to) {
   for (const std::string &e : effects(type)) to.push_back({e, type.id});
 }
 
+// What is prescribed over time, as the plan has to know it.
+struct Prescribed {
+  bool gravity_keys = false;
+  bool loads_vary = false;
+  bool held_move = false;
+  bool obstacles_move = false;
+  bool operator==(const Prescribed &) const = default;
+};
+
+Prescribed prescribed(const World &w) {
+  Prescribed p;
+  p.gravity_keys = !w.gravity_keys.empty();
+  for (auto &b : w.bodies) {
+    p.loads_vary |= b->loads_vary();
+    p.held_move |= !b->motions.empty();
+  }
+  for (auto &o : w.obstacles) p.obstacles_move |= o->moves() || o->has_target;
+  return p;
+}
+
+void put(const Prescribed &p, SceneFacts &facts) {
+  facts.gravity_keys = p.gravity_keys;
+  facts.loads_vary = p.loads_vary;
+  facts.held_move = p.held_move;
+  facts.obstacles_move = p.obstacles_move;
+}
+
+// The plan alone, where values have changed so that another stage is called for.
+void look_at_plan(World &w, StepContext &step) {
+  const SceneFacts &old = step.facts;
+  const Prescribed now = prescribed(w);
+  if (now != Prescribed{old.gravity_keys, old.loads_vary, old.held_move, old.obstacles_move}) {
+    SceneFacts facts = old;
+    put(now, facts);
+    w.plan = make_plan(w.method->table, facts);
+    put(now, step.facts);
+    ++step.made.plans;
+  }
+  w.revalued = false;
+}
+
 }  // namespace
+
+void values_changed(World &w) {
+  w.revalued = true;
+  w.bound_age = kNone;
+  forget_energy(w);
+}
+
+void set_gravity_now(World &w) {
+  w.gravity = w.gravity_keys.empty() ? load3(w.def.gravity) : vector_at(w.gravity_keys, w.time);
+}
 
 void prepare(World &w, const RestoredChoice *restored) {
   StepContext &step = *w.steps;
-  if (!w.changed) return settle_overlaps(w);
+  if (!w.changed) {
+    if (w.revalued) look_at_plan(w, step);
+    return settle_overlaps(w);
+  }
   const uint32_t nb = static_cast<uint32_t>(w.bodies.size()), no = static_cast<uint32_t>(w.obstacles.size()), width = nb + no;
-  SceneFacts facts;
+  SceneFacts &facts = step.facts;
+  facts = {};
   facts.bodies = nb, facts.obstacles = no;
-  facts.gravity_keys = !w.gravity_keys.empty(), facts.sleep = w.def.sleep != 0;
+  facts.sleep = w.def.sleep != 0;
+  put(prescribed(w), facts);
 
   step.body_views.clear(), step.obstacle_views.clear(), step.sources.clear(), step.exchange.clear();
   uint32_t node = 0, point = 0;
@@ -113,7 +169,6 @@ void prepare(World &w, const RestoredChoice *restored) {
     Body &b = *w.bodies[i];
     b.slot = i;
     facts.self_stepping += b.model.stepper != nullptr;
-    facts.loads_vary |= b.loads_vary(), facts.held_move |= !b.motions.empty();
     const Surface &s = b.surface;
     step.body_views.push_back({i, node, b.category, b.collides_with, b.id, &s});
     step.sources.push_back({node, s.nsurfel, point, b.p.n, &s, b.model.stepper ? nullptr : b.p.inv_mass.data(),
@@ -125,7 +180,6 @@ void prepare(World &w, const RestoredChoice *restored) {
   for (uint32_t i = 0; i < no; ++i) {
     Obstacle &o = *w.obstacles[i];
     o.slot = i;
-    facts.obstacles_move |= o.moves() || o.has_target;
     ObstacleView v{};
     v.slot = i, v.category = o.def.category, v.collides_with = o.def.collides_with, v.id = o.id, v.shape = Shape(o.def.shape);
     if (v.shape == Shape::none) v.category = v.collides_with = 0;
@@ -189,6 +243,7 @@ void prepare(World &w, const RestoredChoice *restored) {
   if (nb && facts.effects_listed) facts.offered.push_back({kSelfContact, "contact"});
   if (facts.self_bodies) need_ability(w, Ability::self_contact);
   w.plan = make_plan(w.method->table, facts);
+  ++step.made.plans;
 
   // While contacts live it only falls: a larger one would turn their rest into a depth, and push them apart at 0.1 d_c / h.
   const double wanted = contact_offset(w);
@@ -201,14 +256,14 @@ void prepare(World &w, const RestoredChoice *restored) {
   reserve_sleep(w, step, nb);
   if (w.sleepers > 0 && w.offset != before) wake_all(w);   // contacts rest at another distance now
   gather_active(w);
-  w.gravity = load3(w.def.gravity);
-  if (!w.gravity_keys.empty()) w.gravity = vector_at(w.gravity_keys, w.time);
+  set_gravity_now(w);
   w.bound_age = kNone;
   step.free_kinetic.resize(nb);
   if (!restored) forget_energy(w);
   else w.gravity = restored->gravity, w.stable = restored->stable, w.inverted = restored->inverted, w.bound_age = restored->bound_age;
   step.guard.forget();
-  w.changed = false;
+  w.changed = w.revalued = false;
+  ++step.made.tables;
   settle_overlaps(w);
 }
 

@@ -159,6 +159,7 @@ struct World {
 
   // Derived from the above by prepare() whenever something changed.
   bool changed = true;
+  bool revalued = false;                               // values_changed(): tables hold, the plan is looked at
   Plan plan;
   std::vector<uint32_t> pair_law;                      // [body][body or obstacle] -> index into laws
   std::vector<uint32_t> zone_table, zone_law;          // as pair_law -> first in zone_law [zone a][zone b], kNone: the pair has one law; empty: all have

@@ -1,0 +1,143 @@
+// What changes while a world runs, and what prepare() makes anew for it: values need neither tables nor, as long as the same stages are called for, a plan.
+#include <functional>
+
+#include "core/handle.h"
+#include "obstacle.h"
+#include "stack.h"
+#include "world/context.h"
+#include "world/world.h"
+
+namespace {
+
+dfm::World &inside(dfm_world w) { return *static_cast<dfm::World *>(dfm::handle_find(dfm::Kind::world, w)); }
+
+struct Made {
+  uint64_t tables, plans;
+  bool operator==(const Made &) const = default;
+};
+std::ostream &operator<<(std::ostream &out, const Made &m) { return out << m.tables << " tables, " << m.plans << " plans"; }
+
+struct Running {
+  test::Context c;
+  test::Stack stack = test::make_stack(c);
+  Running() { step(); }
+  void step() { test::ok(dfm_world_step(stack.world, 1e-4, nullptr)); }
+  Made made() const {
+    const dfm::StepContext &s = *inside(stack.world).steps;
+    return {s.made.tables, s.made.plans};
+  }
+  // What one more step makes after a change.
+  Made after(const std::function<void()> &change) {
+    const Made before = made();
+    change();
+    step();
+    const Made now = made();
+    return {now.tables - before.tables, now.plans - before.plans};
+  }
+  uint32_t push(double force, uint32_t nkey = 0, const dfm_scale_key *keys = nullptr) const {
+    const uint32_t point = 1;
+    const double f[3] = {force, 0, 0};
+    uint32_t load = 0;
+    test::ok(dfm_body_add_load(stack.upper, 1, &point, f, nkey, keys, nullptr, &load));
+    return load;
+  }
+};
+
+const Made kNothing{0, 0}, kPlan{0, 1}, kAll{1, 1};
+
+}  // namespace
+
+TEST(Changes, OfALoad_MakeNoTableAndNoPlan) {
+  Running r;
+  uint32_t load = 0;
+  EXPECT_EQ(r.after([&] { load = r.push(0.1); }), kNothing);
+  EXPECT_EQ(r.after([&] { test::ok(dfm_body_remove_load(r.stack.upper, load)); }), kNothing);
+}
+
+TEST(Changes, OfALoadThatVaries_MakeThePlanOnceWhereTheMotionStageComesOrGoes) {
+  Running r;
+  const dfm_scale_key keys[] = {{0, 0}, {1, 1}};
+  uint32_t load = 0;
+  EXPECT_EQ(r.after([&] { load = r.push(0.1, 2, keys); }), kPlan);
+  EXPECT_EQ(r.after([&] {
+    test::ok(dfm_body_remove_load(r.stack.upper, load));
+    load = r.push(0.2, 2, keys);
+  }), kNothing) << "replaced within a frame: loads vary as before";
+  EXPECT_EQ(r.after([&] { test::ok(dfm_body_remove_load(r.stack.upper, load)); }), kPlan);
+}
+
+TEST(Changes, OfSpringsAndHeldPoints_MakeThePlanForTheFirstOnly) {
+  Running r;
+  const uint32_t points[] = {0, 1}, first = 0;
+  const dfm_spring_def def{sizeof def, 2, points, nullptr, {0, 0, 0.3}, nullptr, 0, 0, 3, 0.1};
+  const double to[3] = {0.1, 0, 0.3};
+  uint32_t spring = 0;
+  EXPECT_EQ(r.after([&] { test::ok(dfm_body_add_spring(r.stack.upper, &def, &spring)); }), kPlan);
+  EXPECT_EQ(r.after([&] { test::ok(dfm_body_set_spring_target(r.stack.upper, spring, to)); }), kNothing);
+  EXPECT_EQ(r.after([&] { test::ok(dfm_body_add_spring(r.stack.upper, &def, nullptr)); }), kNothing);
+
+  const dfm_sine sway{{1e-4, 0, 0}, 20, 0};
+  test::ok(dfm_body_hold(r.stack.lower, 1, &first, 7));
+  EXPECT_EQ(r.after([&] { test::ok(dfm_body_move_held(r.stack.lower, 1, &first, 0, nullptr, &sway)); }), kPlan);
+  EXPECT_EQ(r.after([&] { test::ok(dfm_body_move_held(r.stack.lower, 1, &first, 0, nullptr, &sway)); }), kNothing);
+}
+
+TEST(Changes, OfGravityPosesAndParameters_MakeNoTableAndNoPlan) {
+  Running r;
+  const double down[3] = {0, 0, -5};
+  EXPECT_EQ(r.after([&] { test::ok(dfm_world_set_gravity(r.stack.world, down)); }), kNothing);
+  EXPECT_EQ(inside(r.stack.world).gravity.z, -5);
+
+  dfm_obstacle_def d = dfm_obstacle_def_default();
+  d.name = "jaw", d.shape = DFM_SHAPE_BOX, d.pose.position[0] = 3;
+  dfm_obstacle jaw = 0;
+  EXPECT_EQ(r.after([&] { test::ok(dfm_obstacle_create(r.stack.world, &d, &jaw)); }), kAll) << "somebody new is no value";
+  d.pose.position[0] = 3.00001;
+  EXPECT_EQ(r.after([&] { test::ok(dfm_obstacle_move_to(jaw, &d.pose)); }), kNothing);
+
+  const double young = 3e5;
+  const dfm_param_value value{"young", &young, 1};
+  const dfm_params params{sizeof params, 1, &value};
+  EXPECT_EQ(r.after([&] { test::ok(dfm_body_set_params(r.stack.upper, &params)); }), kNothing);
+}
+
+TEST(Changes, OfGravityKeys_MakeThePlanWhereTheyComeOrGo) {
+  Running r;
+  const dfm_vector_key keys[] = {{0, {0, 0, -9}}, {1, {0, 0, -10}}};
+  const double down[3] = {0, 0, -5};
+  EXPECT_EQ(r.after([&] { test::ok(dfm_world_set_gravity_keys(r.stack.world, 2, keys)); }), kPlan);
+  EXPECT_EQ(r.after([&] { test::ok(dfm_world_set_gravity_keys(r.stack.world, 2, keys)); }), kNothing);
+  EXPECT_EQ(r.after([&] { test::ok(dfm_world_set_gravity(r.stack.world, down)); }), kPlan);
+}
+
+// A parameter that switches an effect on or off changes what the plan has to tell.
+TEST(Changes, OfAParameterThatCallsForAnotherEffect_MakeAll) {
+  Running r;
+  const double none = 0;
+  const dfm_param_value value{"damping_stiffness", &none, 1};
+  const dfm_params params{sizeof params, 1, &value};
+  EXPECT_EQ(r.after([&] { test::ok(dfm_body_set_params(r.stack.upper, &params)); }), kAll);
+}
+
+// The same bits as a world that makes all of it anew after each change.
+TEST(Changes, OfValues_LeadToTheSameStateAsMakingAllAnew) {
+  Running a, b;
+  uint32_t load_a = a.push(0), load_b = b.push(0);
+  for (int i = 0; i < 200; ++i) {
+    const auto change = [i](const Running &r, uint32_t &load) {
+      const double down[3] = {0.01 * i, 0, -9.81}, young = 2e5 + 100 * i;
+      const dfm_param_value value{"young", &young, 1};
+      const dfm_params params{sizeof params, 1, &value};
+      if (i % 3 == 0) test::ok(dfm_world_set_gravity(r.stack.world, down));
+      if (i % 5 == 0) test::ok(dfm_body_set_params(r.stack.lower, &params));
+      test::ok(dfm_body_remove_load(r.stack.upper, load));
+      load = r.push(1e-3 * i);
+    };
+    change(a, load_a), change(b, load_b);
+    inside(b.stack.world).changed = true;
+    a.step(), b.step();
+    ASSERT_EQ(dfm_world_hash(a.stack.world), dfm_world_hash(b.stack.world)) << i;
+  }
+  EXPECT_LT(a.made().tables, 3u);
+  EXPECT_GT(b.made().tables, 199u);
+}
