@@ -174,14 +174,15 @@ void OwnWorld::build(const dfm_rigid_set_def &set, uint32_t *group) {
   engine_.near_callback = near_callback, engine_.near_data = &near_;
   members_.resize(set.nbody), given_.resize(set.nbody);
   for (uint32_t i = 0; i < set.nbody; ++i) {
-    given_[i] = state_of(set.bodies[i]);
+    const dfm_rigid_def &def = *dfm_rigid_set_body(&set, i);
+    given_[i] = state_of(def);
     check(given_[i], i, "made");
-    add_body(set.bodies[i], i);
+    add_body(def, i);
     group[i] = members_[i].body ? static_cast<uint32_t>(moving_.size()) : DFM_RIGID_STILL;
     if (members_[i].body) moving_.push_back(i);
   }
   joints_.reserve(set.njoint);            // ODE keeps the address of each feedback
-  for (uint32_t k = 0; k < set.njoint; ++k) add_joint(set.joints[k]);
+  for (uint32_t k = 0; k < set.njoint; ++k) add_joint(*dfm_rigid_set_joint(&set, k));
   engine_.begin({});
 }
 

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""What the shared objects export: the library exactly the functions that the public headers declare, a plugin its entry alone.
+"""What the shared objects export: the library exactly the functions of the public headers, also the inline lists, a plugin its entry alone.
 
 exports.py NM INCLUDE_DIR LIBRARY PLUGIN...
 """
@@ -20,6 +20,7 @@ def declared(include):
     for path in pathlib.Path(include).rglob("*.h"):
         text = re.sub(r"/\*.*?\*/", "", path.read_text(), flags=re.S)
         names |= set(re.findall(r"^DFM_API\b[^;{]*?\b(dfm_\w+)\s*\(", text, re.M))
+        names |= set(re.findall(r"^static inline dfm_status (dfm_world_\w+)\s*\(", text, re.M))
     return names
 
 

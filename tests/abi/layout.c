@@ -1,5 +1,6 @@
-/* Layout of the structs that cross the plugin boundary, against the stored table plugin_layout.csv (LP64). A row that differs means that
- * plugins built yesterday misread today's host: put the member at the end of its struct, or raise the ABI and write the table anew.
+/* Layout of the structs that cross the plugin boundary and of the rows of lists, against the stored table
+ * plugin_layout.csv (LP64). A row that differs means that plugins and programs built yesterday misread today's
+ * library: put the member at the end of its struct, or raise the ABI and write the table anew.
  *
  * layout TABLE           compares; exit 1 and the rows that differ
  * layout --write TABLE   writes the table */
@@ -61,6 +62,37 @@ static const Row rows[] = {
   M(dfm_contact, feature_a), M(dfm_contact, feature_b), M(dfm_contact, kind), M(dfm_contact, law), M(dfm_contact, point),
   M(dfm_contact, normal), M(dfm_contact, tangent), M(dfm_contact, gap), M(dfm_contact, area), M(dfm_contact, fn), M(dfm_contact, ft),
   M(dfm_contact, slip), M(dfm_contact, bristle),
+  S(dfm_pair_report),
+  M(dfm_pair_report, size), M(dfm_pair_report, count), M(dfm_pair_report, sticking),
+  M(dfm_pair_report, law), M(dfm_pair_report, a), M(dfm_pair_report, b), M(dfm_pair_report, normal),
+  M(dfm_pair_report, force), M(dfm_pair_report, friction), M(dfm_pair_report, moment),
+  M(dfm_pair_report, slip_max), M(dfm_pair_report, friction_work),
+  S(dfm_pair_impulse),
+  M(dfm_pair_impulse, size), M(dfm_pair_impulse, reserved), M(dfm_pair_impulse, a),
+  M(dfm_pair_impulse, b), M(dfm_pair_impulse, impulse), M(dfm_pair_impulse, normal_impulse),
+  M(dfm_pair_impulse, peak_normal), M(dfm_pair_impulse, peak_force), M(dfm_pair_impulse, point),
+  M(dfm_pair_impulse, touching),
+  S(dfm_contact_event),
+  M(dfm_contact_event, size), M(dfm_contact_event, kind), M(dfm_contact_event, a),
+  M(dfm_contact_event, b), M(dfm_contact_event, key), M(dfm_contact_event, t),
+  S(dfm_overlap),
+  M(dfm_overlap, size), M(dfm_overlap, flags), M(dfm_overlap, a), M(dfm_overlap, b),
+  M(dfm_overlap, crossings), M(dfm_overlap, enclosed), M(dfm_overlap, depth),
+  S(dfm_stage_time),
+  M(dfm_stage_time, name), M(dfm_stage_time, seconds), M(dfm_stage_time, calls),
+  S(dfm_rigid_state),
+  M(dfm_rigid_state, position), M(dfm_rigid_state, rotation), M(dfm_rigid_state, velocity),
+  M(dfm_rigid_state, spin),
+  S(dfm_rigid_def),
+  M(dfm_rigid_def, size), M(dfm_rigid_def, shape), M(dfm_rigid_def, name), M(dfm_rigid_def, pose),
+  M(dfm_rigid_def, half_size), M(dfm_rigid_def, radius), M(dfm_rigid_def, half_length),
+  M(dfm_rigid_def, mass), M(dfm_rigid_def, inertia), M(dfm_rigid_def, velocity), M(dfm_rigid_def, spin),
+  M(dfm_rigid_def, fixed), M(dfm_rigid_def, category), M(dfm_rigid_def, collides_with),
+  M(dfm_rigid_def, reserved), M(dfm_rigid_def, material), M(dfm_rigid_def, user),
+  S(dfm_joint_def),
+  M(dfm_joint_def, size), M(dfm_joint_def, type), M(dfm_joint_def, body), M(dfm_joint_def, with),
+  M(dfm_joint_def, anchor), M(dfm_joint_def, axis), M(dfm_joint_def, motor), M(dfm_joint_def, reserved),
+  M(dfm_joint_def, velocity), M(dfm_joint_def, max),
   S(dfm_param_value), M(dfm_param_value, key), M(dfm_param_value, value), M(dfm_param_value, width),
   S(dfm_params), M(dfm_params, size), M(dfm_params, n), M(dfm_params, values),
 };

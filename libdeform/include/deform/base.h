@@ -127,6 +127,15 @@ DFM_API dfm_status dfm_plugin_visit_passed(dfm_context *context, dfm_plugin_pass
  * Threads: Any thread, and from a handler of a signal. Since 0.1. */
 DFM_API const char *dfm_plugin_running(const char **what);
 
+/* ---- lists of structs ----------------------------------------------------------------------------------------
+ * Rows of a list grow at their end in later versions, as structs that start with their size do. The function that fills a list,
+ * dfm_world_contacts for one, is inline and hands sizeof the row of the caller's header to the library's function, whose name ends in _sized:
+ * - a caller with an older header than the library gets rows of its own size, without the newer members;
+ * - a caller with a newer header gets the members that the library knows, and zero in those behind.
+ * Where a row starts with `size`, that is the number of bytes that the library has filled in.
+ * row_size is a multiple of 8, at least 8; else DFM_E_ARG. The library also has a symbol for each inline function, for callers that look
+ * functions up by name without a C compiler: it fills rows as they are in 0.1, in every later version too. */
+
 /* ---- parameters by key -------------------------------------------------------------------------------------- */
 typedef struct { const char *key; const double *value; uint32_t width; } dfm_param_value;
 typedef struct { uint32_t size, n; const dfm_param_value *values; } dfm_params;

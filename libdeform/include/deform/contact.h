@@ -24,12 +24,21 @@ DFM_API dfm_status dfm_world_add_friction(dfm_world world, const dfm_friction_de
 /** Lets two named sides pass or touch, whatever their filters say; replaced and removed as rules of friction are. Threads: Not during step. Since 0.1. */
 DFM_API dfm_status dfm_world_filter_pair(dfm_world world, const char *a, const char *b, bool collide);
 
+/** dfm_contact.kind: what touches. VERTEX_FACE: a surfel of side a on a triangle of side b. EDGE_EDGE: an edge of each side. PRIMITIVE: a
+ * surfel, an edge or a triangle of side a (flags) on an obstacle or a rigid body. Since 0.1. */
+enum { DFM_CONTACT_VERTEX_FACE = 0, DFM_CONTACT_EDGE_EDGE = 1, DFM_CONTACT_PRIMITIVE = 2 };
+/** dfm_contact.flags. STICKING: it carries load and its law sticks. BEGAN: it touches since the last sub-step. EDGE_A, TRIANGLE_A: feature_a
+ * is the number of an edge, of a triangle; with neither, of a surfel. Edges of a surface are those of dfm_surface_triangles, each once, as pairs
+ * i < j of surfels in lexicographic order. Since 0.1. */
+enum { DFM_CONTACT_STICKING = 1, DFM_CONTACT_BEGAN = 2, DFM_CONTACT_EDGE_A = 4, DFM_CONTACT_TRIANGLE_A = 8 };
+
 /** One contact of the last sub-step. Forces act on side a; components in the plane of contact: [0] along tangent, [1] along normal x tangent. */
-typedef struct {
-  uint32_t size, flags;             /* flags: DFM_CONTACT_* */
+typedef struct dfm_contact {
+  uint32_t size, flags;             /* flags: DFM_CONTACT_STICKING, BEGAN, EDGE_A, TRIANGLE_A */
   uint64_t body_a, body_b, key;     /* body_b 0: an obstacle that feels nothing; key: the same for as long as the contact lasts */
-  uint32_t feature_a, feature_b;    /* surfel, edge or triangle number on each side; kind 2: feature_b is the obstacle's number */
-  uint32_t kind, law;               /* 0 vertex-face, 1 edge-edge, 2 primitive; law: number of its friction law in the world */
+  uint32_t feature_a, feature_b;    /* surfel, edge or triangle number on each side; PRIMITIVE: feature_b is the place of the
+                                       obstacle or rigid body in dfm_world_obstacles, from 0 */
+  uint32_t kind, law;               /* DFM_CONTACT_VERTEX_FACE, EDGE_EDGE or PRIMITIVE; number of its friction law (dfm_world_law_info) */
   double point[3];                  /* m, world */
   double normal[3], tangent[3];     /* unit; normal from b to a */
   double gap;                       /* m, distance of the surfaces less the rest distance d_c; a contact at rest has 0 */
@@ -38,10 +47,15 @@ typedef struct {
   double slip[2];                   /* m/s, of a relative to b */
   double bristle[2];                /* m, deflection of the law's bristles; 0 for laws without memory */
 } dfm_contact;
-enum { DFM_CONTACT_STICKING = 1, DFM_CONTACT_BEGAN = 2 };
+/** dfm_world_contacts with rows of any size. @param row_size bytes from one row of out to the next (base.h). Since 0.1.
+ * Threads: Any thread. Not during step. */
+DFM_API dfm_status dfm_world_contacts_sized(dfm_world world, uint32_t row_size, uint32_t capacity, dfm_contact *out,
+                                            uint32_t *n);
 /** All contacts of the last sub-step, in key order. @param capacity of out in contacts; 0 with out NULL only counts.
  * @return DFM_OK; DFM_E_ARG capacity too small (out untouched, *n set); DFM_E_HANDLE. Threads: Any thread. Not during step. Since 0.1. */
-DFM_API dfm_status dfm_world_contacts(dfm_world world, uint32_t capacity, dfm_contact *out, uint32_t *n);
+static inline dfm_status dfm_world_contacts(dfm_world world, uint32_t capacity, dfm_contact *out, uint32_t *n) {
+  return dfm_world_contacts_sized(world, (uint32_t)sizeof(dfm_contact), capacity, out, n);
+}
 
 /** Resultants per touching pair of the last sub-step. b: body or obstacle handle (both are 64-bit values). */
 typedef struct dfm_pair_report {
@@ -53,8 +67,14 @@ typedef struct dfm_pair_report {
   double slip_max;                  /* m/s */
   double friction_work;             /* J, done by friction on both sides since the pair first touched; <= 0 but for rounding */
 } dfm_pair_report;
+/** dfm_world_pairs with rows of any size. @param row_size bytes from one row of out to the next (base.h). Since 0.1.
+ * Threads: Any thread. Not during step. */
+DFM_API dfm_status dfm_world_pairs_sized(dfm_world world, uint32_t row_size, uint32_t capacity, dfm_pair_report *out,
+                                         uint32_t *n);
 /** Pairs in the order in which their sides were created, a first; capacity as for dfm_world_contacts. Threads: Any thread. Not during step. Since 0.1. */
-DFM_API dfm_status dfm_world_pairs(dfm_world world, uint32_t capacity, dfm_pair_report *out, uint32_t *n);
+static inline dfm_status dfm_world_pairs(dfm_world world, uint32_t capacity, dfm_pair_report *out, uint32_t *n) {
+  return dfm_world_pairs_sized(world, (uint32_t)sizeof(dfm_pair_report), capacity, out, n);
+}
 
 /** Resultant of the contacts between two things in the last sub-step, friction included, about a point of the caller's choice.
  * @param a, b    body or obstacle handles, in any order: force and moment act on a, those on b are their negatives
@@ -75,10 +95,16 @@ typedef struct dfm_pair_impulse {
   double point[3];                  /* m, world: mean of the points of contact, weighted with their normal impulses */
   double touching;                  /* s of the step in which the contact carried something */
 } dfm_pair_impulse;
+/** dfm_world_pair_impulses with rows of any size. @param row_size bytes from one row of out to the next (base.h). Since 0.1.
+ * Threads: Any thread. Not during step. */
+DFM_API dfm_status dfm_world_pair_impulses_sized(dfm_world world, uint32_t row_size, uint32_t capacity, dfm_pair_impulse *out,
+                                                 uint32_t *n);
 /** Pairs that pressed on each other during the last step, in the order in which their sides were created, a first; capacity as for
  * dfm_world_contacts. After a step that failed: of the sub-steps that were taken. A side that has been destroyed since is 0.
  * @return DFM_OK; DFM_E_ARG capacity too small (out untouched, *n set); DFM_E_HANDLE. Threads: Any thread. Not during step. Since 0.1. */
-DFM_API dfm_status dfm_world_pair_impulses(dfm_world world, uint32_t capacity, dfm_pair_impulse *out, uint32_t *n);
+static inline dfm_status dfm_world_pair_impulses(dfm_world world, uint32_t capacity, dfm_pair_impulse *out, uint32_t *n) {
+  return dfm_world_pair_impulses_sized(world, (uint32_t)sizeof(dfm_pair_impulse), capacity, out, n);
+}
 
 typedef struct dfm_contact_event {
   uint32_t size, kind;              /* DFM_EVENT_* */
@@ -86,9 +112,15 @@ typedef struct dfm_contact_event {
   double t;                         /* s, simulated time */
 } dfm_contact_event;
 enum { DFM_EVENT_BEGIN = 1, DFM_EVENT_END = 2 };
+/** dfm_world_events with rows of any size. @param row_size bytes from one row of out to the next (base.h). Since 0.1.
+ * Threads: Not during step. */
+DFM_API dfm_status dfm_world_events_sized(dfm_world world, uint32_t row_size, uint32_t capacity, dfm_contact_event *out,
+                                          uint32_t *n);
 /** Begin and end of contacts since the last call; empties the list. Where more than 65,536 wait, the oldest are left out.
  * Threads: Not during step. Since 0.1. */
-DFM_API dfm_status dfm_world_events(dfm_world world, uint32_t capacity, dfm_contact_event *out, uint32_t *n);
+static inline dfm_status dfm_world_events(dfm_world world, uint32_t capacity, dfm_contact_event *out, uint32_t *n) {
+  return dfm_world_events_sized(world, (uint32_t)sizeof(dfm_contact_event), capacity, out, n);
+}
 
 /** Starts measuring holds: from now on, contacts that touch and stick in every step qualify. Threads: Not during step. Since 0.1. */
 DFM_API dfm_status dfm_world_hold_begin(dfm_world world);

@@ -428,18 +428,18 @@ class World : public Handle<dfm_world> {
   auto rigids(std::span<dfm_rigid> out) const { return fill<E, 1>(dfm_world_rigids, raw_, out); }
 
   // What a step did: into the caller's memory, returning how many, or as a vector.
-  auto contacts(std::span<dfm_contact> out) const { return fill<E, 1>(dfm_world_contacts, raw_, out); }
-  auto pairs(std::span<dfm_pair_report> out) const { return fill<E, 1>(dfm_world_pairs, raw_, out); }
-  auto events(std::span<dfm_contact_event> out) const { return fill<E, 1>(dfm_world_events, raw_, out); }
-  auto profile(std::span<dfm_stage_time> out) const { return fill<E, 1>(dfm_world_profile, raw_, out); }
-  auto overlaps(std::span<dfm_overlap> out) const { return fill<E, 1>(dfm_world_overlaps, raw_, out); }
-  auto contacts() const { return collect<E, 1>(dfm_world_contacts, raw_); }
-  auto pairs() const { return collect<E, 1>(dfm_world_pairs, raw_); }
-  auto pair_impulses(std::span<dfm_pair_impulse> out) const { return fill<E, 1>(dfm_world_pair_impulses, raw_, out); }
-  auto pair_impulses() const { return collect<E, 1>(dfm_world_pair_impulses, raw_); }
-  auto events() const { return collect<E, 1>(dfm_world_events, raw_); }
-  auto profile() const { return collect<E, 1>(dfm_world_profile, raw_); }
-  auto overlaps() const { return collect<E, 1>(dfm_world_overlaps, raw_); }
+  auto contacts(std::span<dfm_contact> out) const { return fill_rows<E>(dfm_world_contacts_sized, raw_, out); }
+  auto pairs(std::span<dfm_pair_report> out) const { return fill_rows<E>(dfm_world_pairs_sized, raw_, out); }
+  auto events(std::span<dfm_contact_event> out) const { return fill_rows<E>(dfm_world_events_sized, raw_, out); }
+  auto profile(std::span<dfm_stage_time> out) const { return fill_rows<E>(dfm_world_profile_sized, raw_, out); }
+  auto overlaps(std::span<dfm_overlap> out) const { return fill_rows<E>(dfm_world_overlaps_sized, raw_, out); }
+  auto contacts() const { return collect_rows<E>(dfm_world_contacts_sized, raw_); }
+  auto pairs() const { return collect_rows<E>(dfm_world_pairs_sized, raw_); }
+  auto pair_impulses(std::span<dfm_pair_impulse> out) const { return fill_rows<E>(dfm_world_pair_impulses_sized, raw_, out); }
+  auto pair_impulses() const { return collect_rows<E>(dfm_world_pair_impulses_sized, raw_); }
+  auto events() const { return collect_rows<E>(dfm_world_events_sized, raw_); }
+  auto profile() const { return collect_rows<E>(dfm_world_profile_sized, raw_); }
+  auto overlaps() const { return collect_rows<E>(dfm_world_overlaps_sized, raw_); }
   auto untangle() const { return produce<E, uint32_t>([&](uint32_t &left) { return dfm_world_untangle(raw_, &left); }); }   // pairs that overlap still
   auto find_overlaps() const { return produce<E, uint32_t>([&](uint32_t &n) { return dfm_world_find_overlaps(raw_, &n); }); }
   auto stats() const {

@@ -237,6 +237,25 @@ inline auto collect(dfm_status (*f)(uint64_t, uint32_t, T *, uint32_t *), uint64
     return f(handle, n, out.data(), &n);
   });
 }
+// The same for lists of structs, with the row size of this header.
+template <class E, class T>
+inline auto fill_rows(dfm_status (*f)(uint64_t, uint32_t, uint32_t, T *, uint32_t *), uint64_t handle,
+                      std::span<std::type_identity_t<T>> out) {
+  return produce<E, uint32_t>([&](uint32_t &n) {
+    return f(handle, static_cast<uint32_t>(sizeof(T)), rows(out.size(), 1), out.data(), &n);
+  });
+}
+template <class E, class T>
+inline auto collect_rows(dfm_status (*f)(uint64_t, uint32_t, uint32_t, T *, uint32_t *), uint64_t handle) {
+  return produce<E, std::vector<T>>([&](std::vector<T> &out) {
+    constexpr uint32_t size = static_cast<uint32_t>(sizeof(T));
+    uint32_t n = 0;
+    const dfm_status s = f(handle, size, 0, nullptr, &n);
+    if (s < 0 || n == 0) return s;
+    out.resize(n);
+    return f(handle, size, n, out.data(), &n);
+  });
+}
 template <class E, class Ref>
 inline auto collect_handles(dfm_status (*f)(uint64_t, uint32_t, uint64_t *, uint32_t *), uint64_t handle) {
   return produce<E, std::vector<Ref>>([&](std::vector<Ref> &out) {

@@ -46,13 +46,22 @@ typedef struct dfm_joint_def {
   double max;                         /* N m, N; what the motor can do at most, either way */
 } dfm_joint_def;
 
-/** One host's bodies and joints in one world. Strings and arrays are copied. */
+/** One host's bodies and joints in one world. Strings and arrays are copied. The defs of an array have one size and lie that far apart, so that
+ * they may grow: a host takes them by dfm_rigid_set_body and dfm_rigid_set_joint. */
 typedef struct dfm_rigid_set_def {
   uint32_t size, nbody, njoint, reserved;
   const dfm_rigid_def *bodies;
   const dfm_joint_def *joints;
   void *data;                         /* for the host's create: what the set stands for in the host's own world; NULL: nothing yet */
 } dfm_rigid_set_def;
+/** Def of body i of a set, 0 .. nbody - 1, in the rows' own size. Threads: Any thread. Since 0.1. */
+static inline const dfm_rigid_def *dfm_rigid_set_body(const dfm_rigid_set_def *set, uint32_t i) {
+  return (const dfm_rigid_def *)(const void *)((const char *)set->bodies + (size_t)set->bodies->size * i);
+}
+/** Def of joint i of a set, 0 .. njoint - 1, in the rows' own size. Threads: Any thread. Since 0.1. */
+static inline const dfm_joint_def *dfm_rigid_set_joint(const dfm_rigid_set_def *set, uint32_t i) {
+  return (const dfm_joint_def *)(const void *)((const char *)set->joints + (size_t)set->joints->size * i);
+}
 
 /* ---- the table of a host ------------------------------------------------------------------------------------ */
 

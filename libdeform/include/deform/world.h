@@ -104,10 +104,16 @@ typedef struct dfm_overlap {
   uint32_t enclosed;                  /* surface points of one that lie inside the other */
   double depth;                       /* m, the deepest of them, from the surface */
 } dfm_overlap;
+/** dfm_world_overlaps with rows of any size. @param row_size bytes from one row of out to the next (base.h). Since 0.1.
+ * Threads: Not during step. */
+DFM_API dfm_status dfm_world_overlaps_sized(dfm_world world, uint32_t row_size, uint32_t capacity, dfm_overlap *out,
+                                            uint32_t *n);
 /** What the last look found. The library looks once, at the next call that needs the plan (a step at the latest), at what was made, set or restored
  * since: not in every step. Filtered pairs do not count. capacity 0 with out NULL only counts.
  * @return DFM_OK; DFM_E_ARG too small; DFM_E_HANDLE; DFM_E_BUSY. Threads: Not during step. Since 0.1. */
-DFM_API dfm_status dfm_world_overlaps(dfm_world world, uint32_t capacity, dfm_overlap *out, uint32_t *n);
+static inline dfm_status dfm_world_overlaps(dfm_world world, uint32_t capacity, dfm_overlap *out, uint32_t *n) {
+  return dfm_world_overlaps_sized(world, (uint32_t)sizeof(dfm_overlap), capacity, out, n);
+}
 /** Looks at all pairs as they are now, and changes nothing; dfm_world_overlaps then lists these.
  * @param n  out, pairs; may be NULL. Threads: Not during step. Since 0.1. */
 DFM_API dfm_status dfm_world_find_overlaps(dfm_world world, uint32_t *n);
@@ -174,9 +180,15 @@ typedef struct dfm_world_stats {
 DFM_API dfm_status dfm_world_get_stats(dfm_world world, dfm_world_stats *out);
 
 typedef struct dfm_stage_time { const char *name; double seconds; uint64_t calls; } dfm_stage_time;   /* name: static storage */
+/** dfm_world_profile with rows of any size. @param row_size bytes from one row of out to the next (base.h). Since 0.1.
+ * Threads: Not during step. */
+DFM_API dfm_status dfm_world_profile_sized(dfm_world world, uint32_t row_size, uint32_t capacity, dfm_stage_time *out,
+                                           uint32_t *n);
 /** Seconds spent in each stage of the plan since creation (CPU time of the stepping thread is not separated from waiting).
  * @param capacity of out in stages; 0 with out NULL only counts. @return DFM_OK; DFM_E_ARG; DFM_E_HANDLE. Threads: Not during step. Since 0.1. */
-DFM_API dfm_status dfm_world_profile(dfm_world world, uint32_t capacity, dfm_stage_time *out, uint32_t *n);
+static inline dfm_status dfm_world_profile(dfm_world world, uint32_t capacity, dfm_stage_time *out, uint32_t *n) {
+  return dfm_world_profile_sized(world, (uint32_t)sizeof(dfm_stage_time), capacity, out, n);
+}
 
 /** The plan as JSON text (UTF-8, NUL-terminated): {"effects":[{"name","asked_by","provided_by"}], "stages":[{"name","why","cost"}],
  * "absent":[{"name","why"}], "bodies":[{"name","model","cells","points","surfels","surface","filled","fields":[{"name","from","min","max"}],

@@ -71,12 +71,14 @@ dfm_contact report(const World &w, uint32_t i) {
   const ContactPoint &c = w.report.contacts[i];
   const double h = w.report.h, *const f = &w.report.frame[size_t(9) * i], *const l = &w.report.impulse[size_t(3) * i];
   dfm_contact out{};
-  out.size = sizeof out;
-  out.flags = (l[0] > 0 && w.report.mode[i] == 1 ? DFM_CONTACT_STICKING : 0) | (w.store.began[i] ? DFM_CONTACT_BEGAN : 0);
+  if (l[0] > 0 && w.report.mode[i] == 1) out.flags |= DFM_CONTACT_STICKING;
+  if (w.store.began[i]) out.flags |= DFM_CONTACT_BEGAN;
+  if (c.type_a == 1) out.flags |= DFM_CONTACT_EDGE_A;
+  if (c.type_a == 2) out.flags |= DFM_CONTACT_TRIANGLE_A;
   const Sides s = sides(w, c);
   out.body_a = s.a, out.body_b = c.obstacle && !w.obstacles[c.slot_b]->rigid ? 0 : s.b, out.key = c.key;
   out.feature_a = c.feature_a, out.feature_b = c.obstacle ? c.slot_b : c.feature_b;
-  out.kind = c.obstacle ? 2 : c.kind, out.law = w.store.law[i];
+  out.kind = c.obstacle ? uint32_t{DFM_CONTACT_PRIMITIVE} : c.kind, out.law = w.store.law[i];
   std::copy(c.point, c.point + 3, out.point), std::copy(f, f + 3, out.normal), std::copy(f + 3, f + 6, out.tangent);
   out.gap = c.distance - w.offset, out.area = c.area, out.fn = l[0] / h;
   for (int k = 0; k < 2; ++k) out.ft[k] = l[1 + k] / h, out.slip[k] = w.report.slip[size_t(2) * i + size_t(k)];
@@ -135,21 +137,24 @@ dfm_status dfm_world_filter_pair(dfm_world world, const char *a, const char *b, 
   });
 }
 
-dfm_status dfm_world_contacts(dfm_world world, uint32_t capacity, dfm_contact *out, uint32_t *n) {
+dfm_status dfm_world_contacts_sized(dfm_world world, uint32_t row_size, uint32_t capacity, dfm_contact *out,
+                                    uint32_t *n) {
   return guard([&] {
+    Rows<dfm_contact> rows(out, row_size, "dfm_contact");
     const World &w = settled(world_of(world));
     uint32_t count = 0;
     for (uint32_t i = 0; i < w.report.n; ++i) count += touching(w, i);
     if (!room(count, capacity, out, n)) return;
-    uint32_t k = 0;
     if (w.report.n)
       for (uint32_t i : w.store.by_key)
-        if (touching(w, i)) out[k++] = report(w, i);
+        if (touching(w, i)) rows.add(report(w, i));
   });
 }
 
-dfm_status dfm_world_pairs(dfm_world world, uint32_t capacity, dfm_pair_report *out, uint32_t *n) {
+dfm_status dfm_world_pairs_sized(dfm_world world, uint32_t row_size, uint32_t capacity, dfm_pair_report *out,
+                                 uint32_t *n) {
   return guard([&] {
+    Rows<dfm_pair_report> rows(out, row_size, "dfm_pair_report");
     World &w = settled(world_of(world));
     struct Pair { uint64_t a, b; dfm_pair_report report; };   // ids: the order of creation
     std::vector<Pair> pairs;
@@ -166,7 +171,7 @@ dfm_status dfm_world_pairs(dfm_world world, uint32_t capacity, dfm_pair_report *
       auto at = std::lower_bound(pairs.begin(), pairs.end(), std::pair(ia, ib), [](const Pair &p, auto &k) { return std::pair(p.a, p.b) < k; });
       if (at == pairs.end() || at->a != ia || at->b != ib) {
         dfm_pair_report p{};
-        p.size = sizeof p, p.a = s.a, p.b = s.b, p.law = w.store.law[i];
+        p.a = s.a, p.b = s.b, p.law = w.store.law[i];
         for (const PairWork &work : w.work)
           if ((work.a == ia && work.b == ib) || (work.a == ib && work.b == ia)) p.friction_work += work.work;
         at = pairs.insert(at, {ia, ib, p});
@@ -190,7 +195,7 @@ dfm_status dfm_world_pairs(dfm_world world, uint32_t capacity, dfm_pair_report *
       if (l[0] > 0) it->slip_max = std::max(it->slip_max, std::sqrt(slip[0] * slip[0] + slip[1] * slip[1]));
     }
     if (!room(static_cast<uint32_t>(pairs.size()), capacity, out, n)) return;
-    for (const Pair &p : pairs) *out++ = p.report;
+    for (const Pair &p : pairs) rows.add(p.report);
   });
 }
 
@@ -215,27 +220,31 @@ dfm_status dfm_world_pair_wrench(dfm_world world, uint64_t a, uint64_t b, const 
   });
 }
 
-dfm_status dfm_world_pair_impulses(dfm_world world, uint32_t capacity, dfm_pair_impulse *out, uint32_t *n) {
+dfm_status dfm_world_pair_impulses_sized(dfm_world world, uint32_t row_size, uint32_t capacity, dfm_pair_impulse *out,
+                                         uint32_t *n) {
   return guard([&] {
+    Rows<dfm_pair_impulse> rows(out, row_size, "dfm_pair_impulse");
     const World &w = world_of(world);
     Array<StepImpulses::Pair> pairs(HookAllocator<StepImpulses::Pair>(w.memory()));
     list_impulses(w, pairs);
     if (!room(static_cast<uint32_t>(pairs.size()), capacity, out, n)) return;
     for (const StepImpulses::Pair &p : pairs) {
       dfm_pair_impulse r{};
-      r.size = sizeof r, r.a = w.handle_of(p.a), r.b = w.handle_of(p.b);
+      r.a = w.handle_of(p.a), r.b = w.handle_of(p.b);
       store3(r.impulse, p.impulse), store3(r.point, (1 / p.normal) * p.place);
       r.normal_impulse = p.normal, r.peak_normal = p.peak_normal, r.peak_force = p.peak_force, r.touching = p.touching;
-      *out++ = r;
+      rows.add(r);
     }
   });
 }
 
-dfm_status dfm_world_events(dfm_world world, uint32_t capacity, dfm_contact_event *out, uint32_t *n) {
+dfm_status dfm_world_events_sized(dfm_world world, uint32_t row_size, uint32_t capacity, dfm_contact_event *out,
+                                  uint32_t *n) {
   return guard([&] {
+    Rows<dfm_contact_event> rows(out, row_size, "dfm_contact_event");
     World &w = idle(world_of(world));
     if (!room(static_cast<uint32_t>(w.events.size()), capacity, out, n)) return;
-    std::copy(w.events.begin(), w.events.end(), out);
+    for (const dfm_contact_event &e : w.events) rows.add(e);
     w.events.clear();
   });
 }

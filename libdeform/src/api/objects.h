@@ -1,6 +1,7 @@
 // Handles to objects for the files of api/: each throws Error(DFM_E_HANDLE).
 #pragma once
 #include <cstring>
+#include <vector>
 
 #include "api/guard.h"
 #include "core/handle.h"
@@ -59,6 +60,24 @@ T take_def(const T *given, const T &defaults) {
   return def;
 }
 
+// Defs that lie side by side, as far apart as the first one's size says: the caller's header may be older or newer.
+template <class T>
+std::vector<T> take_defs(const T *given, uint32_t n, const T &defaults, const char *what, const char *from) {
+  constexpr uint32_t kMost = 4096;   // no header has such a def: a size that nobody has set
+  std::vector<T> defs;
+  if (!given || n == 0) return defs;
+  const uint32_t step = given->size;
+  if (step < 2 * sizeof(uint32_t) || step % alignof(T) != 0 || step > kMost)
+    fail(DFM_E_ARG, "%s 0: size is %u, expected %zu; %s", what, step, sizeof(T), from);
+  defs.reserve(n);
+  for (uint32_t i = 0; i < n; ++i) {
+    const T *const at = reinterpret_cast<const T *>(reinterpret_cast<const unsigned char *>(given) + size_t{step} * i);
+    if (at->size != step) fail(DFM_E_ARG, "%s %u: size is %u, that of the first is %u; %s", what, i, at->size, step, from);
+    defs.push_back(take_def(at, defaults));
+  }
+  return defs;
+}
+
 // Fills the part of an out struct that the caller's version has. size 0: taken as today's size.
 template <class T>
 void give(T *out, T value) {
@@ -79,5 +98,30 @@ inline bool room(uint32_t count, uint32_t capacity, const void *out, uint32_t *n
   if (capacity < count || !out) fail(DFM_E_ARG, "capacity %u is too small for %u entries; call with capacity 0 to learn the number", capacity, count);
   return true;
 }
+
+// The rows of a list in the caller's memory, row_size bytes each: members that the caller's header lacks are left out, those that this library
+// lacks read zero. `size`, where the row has one, says how many bytes are filled in.
+template <class T>
+class Rows {
+ public:
+  Rows(T *out, uint32_t row_size, const char *type) : at_(reinterpret_cast<unsigned char *>(out)), step_(row_size) {
+    if (row_size < kLeast || row_size % kLeast != 0)
+      fail(DFM_E_ARG, "row_size %u is no size of a %s: it is a multiple of %zu, %zu in this version; pass sizeof(%s)", row_size, type, kLeast,
+           sizeof(T), type);
+  }
+  void add(T row) {
+    const size_t known = step_ < sizeof(T) ? step_ : sizeof(T);
+    if constexpr (requires { row.size; }) row.size = static_cast<uint32_t>(known);
+    std::memcpy(at_, &row, known);
+    std::memset(at_ + known, 0, step_ - known);
+    at_ += step_;
+  }
+
+ private:
+  static constexpr size_t kLeast = 8;   // `size` and one more; rows are aligned to it
+  static_assert(sizeof(T) % kLeast == 0);
+  unsigned char *at_;
+  size_t step_;
+};
 
 }  // namespace dfm

@@ -35,7 +35,12 @@ dfm_status dfm_rigid_create(dfm_world world, const char *host, const dfm_rigid_s
   return guard([&] {
     World &w = idle(world_of(world));
     need(set, "set"), need(out, "out");
-    create_rigids(w, host, take_def(set, dfm_rigid_set_def{}), out);
+    dfm_rigid_set_def def = take_def(set, dfm_rigid_set_def{});
+    const auto bodies = take_defs(def.bodies, def.nbody, dfm_rigid_def_default(), "rigid body", "start from dfm_rigid_def_default()");
+    const auto joints = take_defs(def.joints, def.njoint, dfm_joint_def{}, "joint", "set it to sizeof");
+    if (def.bodies) def.bodies = bodies.data();
+    if (def.joints) def.joints = joints.data();
+    create_rigids(w, host, def, out);
   });
 }
 

@@ -198,15 +198,17 @@ dfm_status dfm_world_stable_step(dfm_world world, double *dt, dfm_body *body, ui
   });
 }
 
-dfm_status dfm_world_overlaps(dfm_world world, uint32_t capacity, dfm_overlap *out, uint32_t *n) {
+dfm_status dfm_world_overlaps_sized(dfm_world world, uint32_t row_size, uint32_t capacity, dfm_overlap *out,
+                                    uint32_t *n) {
   return guard([&] {
+    Rows<dfm_overlap> rows(out, row_size, "dfm_overlap");
     World &w = idle(world_of(world));
     prepare(w);
     if (!room(static_cast<uint32_t>(w.overlaps.found.size()), capacity, out, n)) return;
     for (const Overlap &o : w.overlaps.found) {
       const uint32_t aside = o.aside && !o.separated ? DFM_OVERLAP_ASIDE : 0, parted = o.separated ? DFM_OVERLAP_SEPARATED : 0;
-      *out++ = {sizeof(dfm_overlap), (o.obstacle ? uint32_t{DFM_OVERLAP_OBSTACLE} : 0) | aside | parted, w.handle_of(o.a), w.handle_of(o.b), o.crossings,
-                o.enclosed, o.depth};
+      const uint32_t flags = (o.obstacle ? uint32_t{DFM_OVERLAP_OBSTACLE} : 0) | aside | parted;
+      rows.add({0, flags, w.handle_of(o.a), w.handle_of(o.b), o.crossings, o.enclosed, o.depth});
     }
   });
 }
@@ -303,15 +305,17 @@ dfm_status dfm_world_get_stats(dfm_world world, dfm_world_stats *out) {
   });
 }
 
-dfm_status dfm_world_profile(dfm_world world, uint32_t capacity, dfm_stage_time *out, uint32_t *n) {
+dfm_status dfm_world_profile_sized(dfm_world world, uint32_t row_size, uint32_t capacity, dfm_stage_time *out,
+                                   uint32_t *n) {
   return guard([&] {
+    Rows<dfm_stage_time> rows(out, row_size, "dfm_stage_time");
     World &w = idle(world_of(world));
     prepare(w);
     if (!room(static_cast<uint32_t>(w.plan.stages.size()), capacity, out, n)) return;
     for (size_t i = 0; i < w.plan.stages.size(); ++i) {
       const size_t row = w.plan.stages[i].row;
       const StageTime &time = w.steps->stage_times[row];
-      out[i] = {w.method->table[row].name, time.seconds, time.calls};
+      rows.add({w.method->table[row].name, time.seconds, time.calls});
     }
   });
 }

@@ -42,7 +42,6 @@ void check_body(dfm_rigid_def &d, const char *name) {
 }
 
 void check_joint(const dfm_joint_def &j, uint32_t number, const std::vector<dfm_rigid_def> &bodies) {
-  if (j.size < sizeof(dfm_joint_def)) fail(DFM_E_ARG, "joint %u: size is %u, expected %zu; set it to sizeof", number, j.size, sizeof(dfm_joint_def));
   if (j.type > DFM_JOINT_FIXED) fail(DFM_E_ARG, "joint %u: type %u is unknown; use DFM_JOINT_HINGE, SLIDER, BALL or FIXED", number, j.type);
   const uint32_t n = static_cast<uint32_t>(bodies.size());
   if (j.body >= n || (j.with >= n && j.with != DFM_RIGID_WORLD))
@@ -152,7 +151,6 @@ void create_rigids(World &w, const char *host, const dfm_rigid_set_def &def, uin
   std::vector<std::string> names;
   for (uint32_t i = 0; i < def.nbody; ++i) {
     dfm_rigid_def d = def.bodies[i];
-    if (d.size < sizeof d) fail(DFM_E_ARG, "rigid body %u: size is %u, expected %zu; start from dfm_rigid_def_default()", i, d.size, sizeof d);
     names.push_back(d.name ? d.name : "rigid" + std::to_string(w.next_id + i));
     check_body(d, names.back().c_str());
     const Quat q = unit_quat(d.pose.rotation);

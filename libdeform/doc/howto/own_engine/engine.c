@@ -17,8 +17,10 @@ static dfm_status create(void *user, const dfm_rigid_set_def *set, void **self, 
   (void)user;
   if (!e) return set->njoint ? DFM_E_UNSUPPORTED : DFM_E_NOMEM;
   for (uint32_t i = 0; i < set->nbody; ++i) {
-    memcpy(e->crate[i].inertia, set->bodies[i].inertia, sizeof e->crate[i].inertia);
-    e->crate[i].mass = set->bodies[i].mass, group[i] = i;          /* free bodies: none answers another's impulses */
+    const dfm_rigid_def *body = dfm_rigid_set_body(set, i);
+    memcpy(e->crate[i].inertia, body->inertia, sizeof e->crate[i].inertia);
+    e->crate[i].mass = body->mass;
+    group[i] = i;                                                  /* free bodies: none answers another's impulses */
   }
   e->n = set->nbody, *self = e, *nextra = 0;
   return DFM_OK;
