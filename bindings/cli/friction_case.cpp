@@ -149,7 +149,7 @@ class CaseReader {
     }
   }
 
-  // Of the load cases only the one that is projected on the cone is what the laws compute (friction.md, section 4).
+  // Of the load cases only the one that is projected on the cone is what the laws compute (doc/laws/formulas.md (7)).
   void refuse_other_loads(const FrictionCase &c) const {
     if (c.drive != Drive::loaded) return;
     const std::string form = input_->get("form");

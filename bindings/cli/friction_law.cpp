@@ -249,7 +249,7 @@ Resistance RigLaw::eval(const Slip &slip, bool derivative) {
 //
 // From the old speed v the search walks against the sign of R, first by the step R/m_h that suffices where f rises with u, then by twice that,
 // until R changes sign. Newton's method inside that bracket, bisection where a step leaves it. Between rest and the old speed, and wherever the
-// slope of R was seen below zero (g falls faster than m_h, friction.md 2.1), the bracket is first cut up and its first change of sign taken.
+// slope of R was seen below zero (g falls faster than m_h, doc/laws/formulas.md (2)), the bracket is first cut up and its first change of sign taken.
 namespace {
 
 class StepSolver {

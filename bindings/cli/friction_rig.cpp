@@ -1,7 +1,7 @@
-// Every step is implicit: the law answers at the speed of its end, m (v' - v)/h = f(t') - F(v'), x' = x + h v', so the slip that the law sees is
-// v' exactly, nothing that rests moves, and a spring of any stiffness stays stable. That is first order, as the laws' own updates are (friction.md,
-// section 5, U2); a mass under a law that does not jump at rest is taken to the second by extrapolation. Where the motion is prescribed the law is
-// given its mean over the step and left to its own order.
+// Every step is implicit: the law answers at the speed of its end, m (v' - v)/h = f(t') - F(v'), x' = x + h v'. The slip that the law sees is
+// v' exactly, nothing that rests moves, and a spring of any stiffness stays stable. That is first order, as the laws' own updates are
+// (doc/laws/formulas.md (8)); a mass under a law that does not jump at rest is taken to second order by extrapolation. Where the motion is
+// prescribed the law is given its mean over the step and left to its own order.
 #include "friction_rig.h"
 
 #include <algorithm>

@@ -4,7 +4,7 @@
 //   dz/dt = v - (K0 m / g) z,        F = K0 z + K1 dz/dt + K2 v,        ft = -F                         K0 = sigma0 A, K1 = sigma1 A, K2 = sigma2 A
 //
 // g(w) the Stribeck level (N), w = |v|. LuGre and Dahl: m = w (Canudas de Wit et al. 1995, (1)-(3); Dahl 1976); elastoplastic: m = alpha M.
-// One step of length h is an implicit radial return at the new slip and the new normal force (friction.md U2), after the old bristle has been
+// One step of length h is an implicit radial return at the new slip and the new normal force (doc/laws/formulas.md (7), (8)), after the old bristle has been
 // brought into the new cone, z0 = z min(1, F_S / |K0 z|), which only lowers the stored energy K0 |z|^2 / 2:
 //
 //   zt = z0 + h v,   D = g + h K0 m,   z' = zt g/D,   dz/dt = (g v - K0 m z0)/D

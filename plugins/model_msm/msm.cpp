@@ -1,5 +1,5 @@
 // org.deform.msm: mass-spring model on the edges of tetrahedra, dampers along the springs, a volume term per cell, anisotropy by extra
-// coordinates. Thesis 2.2, equations (2.25), (2.26), (2.27), Fig. 2.5 and chapter 6, as corrected in doc/models/msm.md, which derives the
+// coordinates. Zerbato 2010, 2.2, (2.25), (2.26), (2.27), Fig. 2.5 and chapter 6, as corrected in doc/models/msm.md, which derives the
 // constants.
 #include <stdio.h>
 

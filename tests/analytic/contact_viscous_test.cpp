@@ -1,6 +1,6 @@
 // Viscous layers and smoothed friction under a block, by laws of three kinds: smooth with derivatives, smooth without, and set-valued with a viscous
 // part. A block on a layer of c per area loses its speed as exp(-c A t / m); on mu fn v / sqrt(v^2 + e^2) it creeps down a slope at a speed that is
-// known. Sources: closed forms; friction page section 2.3 (creep of smoothed laws).
+// known. Sources: closed forms; doc/laws/formulas.md (16), creep of smoothed laws.
 #include "world.h"
 
 namespace {

@@ -43,7 +43,7 @@ TEST(FrictionRig, SteadyPush_AcceleratesByWhatIsLeft) {
   EXPECT_EQ(out.rows.column("F")[0], 1.5);                      // the limit that 2 N passes
 }
 
-// Plain Coulomb pulled by a spring: friction.md, section 6, 9.
+// Plain Coulomb pulled by a spring: doc/laws/formulas.md (15).
 TEST(FrictionRig, StickSlip_HasThePeriodOfTheClosedForm) {
   const double k = 4, V = 0.1, dF = 0.25, w = std::sqrt(k), period = 2 / w * (kPi - std::atan(dF * w / (k * V))) + 2 * dF / (k * V);
   double before = 0;
@@ -142,7 +142,7 @@ TEST(FrictionRig, LoadWave_StaysOnTheConeAndOpens) {
   EXPECT_GT(open, 20);
 }
 
-// The drift of a cycle between F1 and F2, quasi-static: friction.md 2.4; the elasto-plastic law comes back to where it was.
+// The drift of a cycle between F1 and F2, quasi-static: doc/laws/formulas.md (12); the elasto-plastic law comes back to where it was.
 TEST(FrictionRig, SlowShake_DriftsAsDahlMustAndNotAsElastoplastic) {
   const double level = 1.5, f1 = -0.5, f2 = 0.9;
   const double drift = level / 1e4 * std::log((1 - f1 * f1 / level / level) / (1 - f2 * f2 / level / level));

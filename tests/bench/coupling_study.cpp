@@ -1,10 +1,10 @@
-// What the support radius of a coupling buys and costs: thesis chapter 3 shows 1.5, 3 and 4.5 mean distances. A sphere of 4,098 surfels hangs on
+// What the support radius of a coupling buys and costs: Zerbato 2010, chapter 3, shows 1.5, 3 and 4.5 mean distances. A sphere of 4,098 surfels hangs on
 // a ball of 400 cells by each coupling; two motions whose shape is known everywhere are given to its phyxels:
 //
 //   twist   x turns about z by z / R radians            poke   a bump of 0.2 R, exp(-d2 / (0.35 R)2) around one pole
 //
 // and the surface is compared with the same motion of its own points: distance, and roughness: how much the angle between neighboring
-// triangles differs. Forces: torque and power that arrive at the phyxels, by the transpose and by the source's own rule (3.12), whose kernel is
+// triangles differs. Forces: torque and power that arrive at the phyxels, by the transpose and by the printed rule (3.12), whose kernel is
 // the truncated Gaussian (3.10). Tip: a bar of mass-springs, clamped, its end pulled down through the surface. Prints a table; with a folder as
 // argument writes coupling_study.csv and coupling_profile.csv there (coupling_study.py draws them).
 #include <chrono>

@@ -1,5 +1,5 @@
 // Full steps per second of processor time, on the scene files that are examples and tests too. What is timed is dfm_world_step alone: model,
-// detection, contact and friction, one core. Prints a table with the figure to reach (quality page of the design) and where the time goes;
+// detection, contact and friction, one core. Prints a table with the figure to reach and where the time goes;
 // --csv FILE appends rows; --only TEXT takes scenes whose name contains it; --law NAME puts that law, with the same coefficient, into their first rule.
 #include <sys/resource.h>
 

@@ -1,6 +1,6 @@
-// The finders of the time of impact against each other and against the source's scheme: evaluations, time, what they miss, what they find late.
+// The finders of the time of impact against each other and against the scheme of Zerbato 2010 (4.2): evaluations, time, what they miss, what they find late.
 // 1. Queries: ours through the C API on the exact reference queries, the published ones (both from ../shared) and random ones; beside them the scheme of
-//    the thesis (4.2): one bracket [0,1], a change of sign of the distance, an inside test at the one root.
+//    Zerbato 2010, 4.2: one bracket [0,1], a change of sign of the distance, an inside test at the one root.
 // 2. Roots: values of the function per root to 1e-12, for (4.7) as printed, for the distance to the plane and for the cubic.
 // 3. Guard: the whole list of feature pairs of two fine spheres that roll on each other and of two that crash, per listed pair.
 // --csv FILE --commit ID appends the figures. Of the repetitions the least time counts: others share the machine.
@@ -26,7 +26,7 @@ struct Sink {
   std::string head;   // machine, compiler, commit
 };
 
-// ---- the source's functions ----------------------------------------------------------------------------------------------------------
+// ---- the functions of Zerbato 2010 ----------------------------------------------------------------------------------------------------------
 
 struct D3 { double x, y, z; };
 D3 minus(D3 a, D3 b) { return {a.x - b.x, a.y - b.y, a.z - b.z}; }
@@ -75,7 +75,7 @@ double plain_regula_falsi(const F &f, dfm::toi::Bracket b, double width, int mos
   return x;
 }
 
-// Thesis 4.2: a change of sign over the step, one root, is it inside.
+// Zerbato 2010, 4.2: a change of sign over the step, one root, is it inside.
 double source_scheme(const ToiQuery &q, uint32_t &evaluations) {
   const auto f = [&](double t) { return plane_distance(q, t); };
   const dfm::toi::Bracket b = {0, 1, f(0), f(1)};

@@ -1,4 +1,4 @@
-// The laws none and coulomb against their closed forms (friction.md sections 2.1 and 6).
+// The laws none and coulomb against their closed forms (doc/laws/coulomb.md).
 #include <cstring>
 #include <random>
 

@@ -1,4 +1,4 @@
-// The law dahl against its closed forms (friction.md section 2.4) and the rules of every law.
+// The law dahl against its closed forms (doc/laws/formulas.md (11) to (14)) and the rules of every law.
 #include "bristle_rig.h"
 
 using rig::Contact;

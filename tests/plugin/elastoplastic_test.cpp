@@ -1,5 +1,5 @@
 // The law elastoplastic: nothing is lost below the elastic limit, LuGre's steady curve above it, the reference files, and the rules of every law
-// (friction.md section 2.6).
+// (doc/laws/elastoplastic.md).
 #include "bristle_rig.h"
 
 using rig::Contact;
@@ -145,7 +145,7 @@ TEST_F(Elastoplastic, BiasedLoadBelowTheElasticLimit_DoesNotDrift) {
   EXPECT_LT(std::fabs(x1 - x0), 1e-15);
 }
 
-// Above the elastic limit it drifts, by less than LuGre: friction.md gives 1.59e-6 against 8.0e-5 m per cycle with inertia.
+// Above the elastic limit it drifts, by less than LuGre: doc/laws/formulas.md has 1.59e-6 against 8.0e-5 m per cycle with inertia.
 TEST_F(Elastoplastic, BiasedLoadAboveTheElasticLimit_DriftsLessThanLugre) {
   const Law lugre = rules::law_of(rules::open(c, "friction_lugre"), std::vector<double>(dev.params.begin(), dev.params.begin() + 9));
   double drift[2];

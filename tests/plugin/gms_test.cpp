@@ -1,4 +1,4 @@
-// The law gms: return-point memory, the reference histories, passivity in its own form, and the rules of every law (friction.md section 2.8).
+// The law gms: return-point memory, the reference histories, passivity in its own form, and the rules of every law (doc/laws/gms.md).
 #include "bristle_rig.h"
 
 using rig::Contact;

@@ -1,4 +1,4 @@
-// The law karnopp against its closed forms, the errata's tests of (5.7) and reference histories (friction.md section 2.2).
+// The law karnopp against its closed forms, the three tests of (5.7) and reference histories (doc/laws/karnopp.md).
 #include <cstring>
 
 #include "law_rules.h"
@@ -172,7 +172,7 @@ TEST_F(Karnopp, ThrownBlock_EndsAtExactlyZeroAndStaysThere) {
   EXPECT_EQ(rig.x, there) << "below the cone nothing creeps";
 }
 
-// The spring-driven mass of friction.md: with the band of 1e-4 m/s the period is 6.5173 s, where the law without a band has 6.5123 s.
+// The spring-driven mass of doc/laws/formulas.md: with the band of 1e-4 m/s the period is 6.5173 s, where the law without a band has 6.5123 s.
 TEST_F(Karnopp, StickSlipPeriod_IsThatOfTheReference) {
   const std::vector<double> p{1, 1.5, 1e-3, 2, 0.4, 1e-4};
   const double k = 2, pull = 0.1, h = 2e-5;

@@ -1,4 +1,4 @@
-// What every friction law must keep, written once: the tests of each law call these with its parameters (friction.md section 6). A set-valued law is
+// What every friction law must keep, written once: the tests of each law call these with its parameters (doc/laws/formulas.md). A set-valued law is
 // asked while it slides: its ft_stop is far outside the cone, against the slip, unless the test says otherwise.
 #pragma once
 #include <cstdint>

@@ -1,4 +1,4 @@
-// The law lugre against its closed forms (friction.md section 2.5), its passivity, the reference files, and the rules of every law.
+// The law lugre against its closed forms (doc/laws/lugre.md), its passivity, the reference files, and the rules of every law.
 #include "bristle_rig.h"
 
 using rig::Contact;

@@ -1,4 +1,4 @@
-// Anisotropy by frozen extra coordinates (thesis chapter 6): one spring in closed form, both forms, frames, fields by cell.
+// Anisotropy by frozen extra coordinates (Zerbato 2010, chapter 6): one spring in closed form, both forms, frames, fields by cell.
 #include "msm_host.h"
 
 namespace msm_test {

@@ -35,6 +35,6 @@ TEST(AutoStep, HostThatTakesAShareOfIt_ChangesRarelyToo) {
 
 TEST(AutoStep, ThesisCylinderThatSpins_KeepsItsEnergy) {
   const std::string mesh = test::shared_dir() + "/meshes/thesis/cyl_coarse.msh";
-  if (test::shared_dir().empty()) GTEST_SKIP() << "no meshes of the thesis";
+  if (test::shared_dir().empty()) GTEST_SKIP() << "the shared meshes are not here";
   keeps({"cyl_coarse", mesh, "spin", 1}, 8000);
 }

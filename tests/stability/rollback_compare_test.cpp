@@ -1,5 +1,5 @@
 // A block thrown along a floor, a ball that bounces without friction, two balls that collide: closed forms that hold for the contact method in use, and
-// the source's roll-back as the mutation that fails every one of them.
+// Zerbato's roll-back as the mutation that fails every one of them.
 #include "scenes.h"
 
 namespace {

@@ -290,7 +290,7 @@ struct Scene {
   }
 };
 
-// Friction page of the design, 2.4 and 2.5: way per cycle of a load between F1 and F2, shares of F_C, dx = (F_C / sigma0) ln [(1 - F1^2) / (1 - F2^2)].
+// doc/laws/formulas.md (12): way per cycle of a load between F1 and F2, shares of F_C, dx = (F_C / sigma0) ln [(1 - F1^2) / (1 - F2^2)].
 inline double drift_per_cycle(double pressure, double low, double high) {
   return kMu * pressure / kSigma0 * std::log((1 - low * low) / (1 - high * high));
 }

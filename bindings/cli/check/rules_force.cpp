@@ -109,7 +109,7 @@ void loops_dissipate(const Law &law, const Scales &s) {
   }
 }
 
-// friction.md section 6, test 3: random slip, steps and normal forces; at no time has more come out than was stored.
+// doc/laws/formulas.md, rule 3 of every law: random slip, steps and normal forces; at no time has more come out than was stored.
 void gives_back_no_more(const Law &law, const Scales &s, Random &random) {
   constexpr uint32_t kRuns = 64;
   constexpr int kSteps = 2500;

@@ -9,7 +9,7 @@ extern "C" {
 #endif
 /** How a surface of its own hangs on the body's points: x_s = N x_p, rows of N sum to one; forces go back by the transpose.
  * BARYCENTRIC: in the cell that holds the surfel, or the nearest one. MLS: moving least squares over the points within the support; both
- * reproduce linear fields. THESIS: the source's weights, literally, to compare: torque and power are wrong (doc/concepts/couplings.md). */
+ * reproduce linear fields. THESIS: as Zerbato (2010) prints (3.9), to compare: torque and power are wrong (doc/concepts/couplings.md). */
 enum { DFM_COUPLING_BARYCENTRIC = 0, DFM_COUPLING_MLS = 1, DFM_COUPLING_THESIS = 2 };
 typedef struct dfm_surface_def {
   uint32_t size; int32_t coupling;

@@ -7,7 +7,7 @@
 #ifdef __cplusplus
 extern "C" {
 #endif
-/* How contacts are solved. AUTO is VELOCITY. ROLLBACK is the source's scheme, to compare and not to use: it freezes what slides and loses momentum
+/* How contacts are solved. AUTO is VELOCITY. ROLLBACK is the scheme of Zerbato (2010, 4.2), to compare only: it freezes what slides and loses momentum
  * (doc/concepts/rollback.md); what it cannot do is refused with DFM_E_UNSUPPORTED where it is made. 2 is kept for implicit. Since 0.1 (ROLLBACK). */
 enum { DFM_METHOD_AUTO = 0, DFM_METHOD_VELOCITY = 1, DFM_METHOD_ROLLBACK = 3 };
 enum { DFM_INTEGRATOR_AUTO = 0, DFM_INTEGRATOR_SYMPLECTIC_EULER = 1 };

@@ -31,7 +31,7 @@ struct Owners {
 };
 
 // An edge or triangle contact takes over the area of the nearest of its corners that carries no contact of its own with the other side;
-// none is given twice; 0 where none is free (mechanics, section 5). lender holds the node that gave.
+// none is given twice; 0 where none is free (doc/concepts/detection.md). lender holds the node that gave.
 class Areas {
  public:
   Areas(std::span<const BodyView> bodies, std::span<const ObstacleView> obstacles, Array<ContactPoint> &contacts, Array<uint8_t> &lent)

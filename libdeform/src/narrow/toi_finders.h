@@ -1,4 +1,4 @@
-// Root finders on a bracket [lo, hi] with f of opposite sign at its ends: the thesis's three (4.2.2), ending with a bracket narrower than
+// Root finders on a bracket [lo, hi] with f of opposite sign at its ends: those of Zerbato 2010, 4.2.2, ending with a bracket narrower than
 // `width` that holds the root. They return the best estimate inside it and add the values of f that they took to `evaluations`.
 #pragma once
 #include <cmath>

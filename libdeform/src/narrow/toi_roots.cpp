@@ -1,5 +1,5 @@
 // Time of impact by roots: where features first touch, one of a few polynomials is zero. All their roots are isolated between the roots of their
-// derivatives, sorted, and the earliest at which the true distance confirms a touch is the answer (errata on (4.2) to (4.7): up to three roots,
+// derivatives, sorted, and the earliest at which the true distance confirms a touch is the answer (Zerbato 2010, (4.2) to (4.7), corrected: up to three roots,
 // each with its inside test; even roots and motions in one plane have no change of sign).
 //
 //   without separation   the coplanarity cubic; where it vanishes altogether (motion in one plane, parallel edges, flat triangles) a first touch

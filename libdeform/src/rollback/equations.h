@@ -1,4 +1,4 @@
-// The source's equations for a colliding point, one by one (Zerbato 2010, sections 4.2 and 5.4), in the form that can be computed; what is printed and
+// The equations of Zerbato (2010, sections 4.2 and 5.4) for a colliding point, one by one, in the form that can be computed; what is printed and
 // why it cannot be is told at each. doc/concepts/rollback.md shows what they do to sliding, momentum and force.
 #pragma once
 #include <algorithm>
@@ -7,7 +7,7 @@
 
 namespace dfm::rollback {
 
-// (4.5): a vertex is where it is at its impact, x + t h v, t that of its island (printed: of its own). Position Verlet, the source's integrator, then
+// (4.5): a vertex is where it is at its impact, x + t h v, t that of its island (printed: of its own). Position Verlet, Zerbato's integrator, then
 // reads the velocity from positions, (x(t) - x(0)) / h: t times that of the full way. The text does not say.
 inline Vec3 velocity_after(Vec3 velocity, double t) { return t * velocity; }
 

@@ -51,7 +51,7 @@ constexpr Stage kTable[] = {
 
 constexpr Inability kUnable[] = {
     {Ability::self_stepping, "a model that steps itself, whose vertices nobody else can move,"},
-    {Ability::own_surface, "a surface of its own, for which the source moves no points of the body,"},
+    {Ability::own_surface, "a surface of its own, for which Zerbato (2010) moves no points of the body,"},
     {Ability::held_motion, "a motion of held points, which cannot go back,"},
     {Ability::voxels, "voxels, against which no time of impact is known,"},
     {Ability::obstacle_motion, "a motion of its own, which cannot go back,"},

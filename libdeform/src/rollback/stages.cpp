@@ -125,8 +125,8 @@ void find_islands(World &w, StepContext &step) {
   } while (take_new(r));
 }
 
-// Colliding points: of each vertex with one other side the earliest hit. A pair of edges counts only where none of its ends is such a point: the source
-// has no edges, and what both have would push twice.
+// Colliding points: of each vertex with one other side the earliest hit. A pair of edges counts only where none of its ends is such a point: Zerbato
+// (2010) has no edges, and what both have would push twice.
 void find_points(World &w, StepContext &step) {
   Buffers &r = buffers(step);
   const Array<Candidate> &list = step.broad.candidates();

@@ -1,4 +1,4 @@
-// A surfel takes the motion of the phyxels that reach it, each carried on to the surfel by its own gradient (thesis (3.9), with the corrections
+// A surfel takes the motion of the phyxels that reach it, each carried on to the surfel by its own gradient (Zerbato 2010, (3.9), with the corrections
 // of doc/concepts/couplings.md):
 //
 //   u_s = sum_i W_i (u_i + H_i (X_s - X_i)),   W_i = w(|X_s - X_i|, h_i) / sum,   H_i = sum_j w_ij (u_j - u_i) X_ij^T A_i^-1,

@@ -8,7 +8,7 @@
 namespace dfm {
 namespace {
 
-constexpr double kPatchCosine = 0.5;  // faces within 60 degrees are one patch (mechanics, section 4)
+constexpr double kPatchCosine = 0.5;  // faces within 60 degrees are one patch (doc/concepts/detection.md)
 
 struct Side {
   uint64_t key;      // {lower surfel, higher surfel}

@@ -300,7 +300,7 @@ Scene crossed_tetrahedra(double gap) {
   return scene;
 }
 
-// Only edges meet; no vertex of either is near the other (errata 4.2: the source misses this case).
+// Only edges meet; no vertex of either is near the other (Zerbato 2010, 4.2, misses this case).
 TEST(EdgeEdge, CrossedTetrahedra_MeetEdgeOnEdge) {
   Scene scene = crossed_tetrahedra(1e-3);
   const auto c = scene.contacts();

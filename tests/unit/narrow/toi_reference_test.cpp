@@ -136,7 +136,7 @@ TEST(Toi, ConservativeTimes_AreEarlyAtDegenerateQueriesAlone) {
 
 TEST(Toi, ReferenceQueries_NeedLittleWork) {
   if (ccd_folder().empty()) GTEST_SKIP() << "../shared is absent";
-  const double most[4] = {28, 10, 10, 10};   // measured 25.1, 8.4, 8.1, 8.5; the thesis's finders without the errata's form need 42 for one root
+  const double most[4] = {28, 10, 10, 10};   // measured 25.1, 8.4, 8.1, 8.5; (4.7) as printed needs 42 for one root
   const std::vector<ToiQuery> queries = reference_queries();
   for (int method = 0; method < 4; ++method) {
     double sum = 0;

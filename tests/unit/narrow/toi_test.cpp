@@ -68,7 +68,7 @@ TEST(Toi, EdgeOverEdge_TimeAndPlaces) {
   }
 }
 
-// The counter-example of the errata to (4.5): the triangle's three vertices move differently.
+// The counter-example to (4.5) in doc/concepts/zerbato.md: the triangle's three vertices move differently.
 TEST(Toi, DeformingTriangle_MeetsPointAtRest) {
   const P o = {0, 0, 0};
   const ToiQuery q = query(false, {o, P{-1, -1, 0.2}, P{3, -1, 0.2}, P{-1, 1, 0.6}}, {o, P{-1, -1, 0.6}, P{3, -1, 0.6}, P{-1, 1, -1.4}});
@@ -243,7 +243,7 @@ TEST(Toi, IterationCap_StaysOnTheSafeSide) {
   EXPECT_GT(capped, 100);
 }
 
-// Errata on (4.7): with the distance to the plane 42, 7.5 and 7 values for one root at 1e-12; Brent below 15.
+// Zerbato 2010, (4.7), corrected: with the distance to the plane 42, 7.5 and 7 values for one root at 1e-12; Brent below 15.
 TEST(Toi, Evaluations_AreThoseOfTheMethods) {
   Random random(4);
   double sum[3] = {};

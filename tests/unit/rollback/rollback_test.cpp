@@ -1,5 +1,5 @@
-// The source's collision solution on cases that are computed by hand, and the errata's tests that tell a wrong form from the right one
-// (Zerbato 2010, (4.5), (5.21), (5.24), (5.25), (5.27)).
+// Zerbato's collision solution on cases that are computed by hand, and tests that tell a printed form that is wrong from the right one
+// (Zerbato 2010, doc/concepts/zerbato.md: (4.5), (5.21), (5.24), (5.25), (5.27)).
 #include "rollback/equations.h"
 
 #include "obstacle.h"
@@ -137,8 +137,8 @@ TEST(Rollback, VertexAgainstFace_BothBodiesLoseTheirOwnMomentum) {
   EXPECT_NEAR(contacts[0].fn, m_eff * 2.5 / h, 1e-6 * m_eff / h);
 }
 
-// The errata's counter-example to (4.5): a triangle comes down on a point, t = 1/2; two of its vertices touch something else at t = 0.1. With a time
-// for each vertex it ends below the point.
+// The counter-example to (4.5) in doc/concepts/zerbato.md: a triangle comes down on a point, t = 1/2; two of its vertices touch something else
+// at t = 0.1. With a time for each vertex it ends below the point.
 TEST(Rollback, OneTimePerIsland_KeepsTheTriangleAboveThePoint) {
   Scene s({0, 0, 0}, 0);
   const Tet falling{"falling", {{-1, -1, 0.2}, {1, -1, 0.2}, {0, 1, 0.6}, {0, 0, 2}}, {{0, 0, 0.4}, {0, 0, 0.4}, {0, 0, -2}, {0, 0, 0}}};
@@ -163,7 +163,7 @@ TEST(Rollback, OneTimePerIsland_KeepsTheTriangleAboveThePoint) {
   EXPECT_EQ(state(a).x[0][2], 0);
 }
 
-// Two edges cross; no vertex of either comes near the other body. The six vertex-face pairs of the source alone see nothing.
+// Two edges cross; no vertex of either comes near the other body. The six vertex-face pairs of Zerbato (2010, 4.2) alone see nothing.
 TEST(Rollback, EdgeAgainstEdge_GoesBackToo) {
   Scene s({0, 0, 0}, 0);
   const Tet lower{"lower", {{-1, 0, 0}, {1, 0, 0}, {0, -0.3, -1}, {0, 0.3, -1}}, {}};

@@ -203,7 +203,7 @@ TEST(Mls, ThinSheet_StaysLinear) {
   }
 }
 
-// Errata of chapter 3: Shepard weights draw the surface inwards, and lose torque and power where the linear-exact ones do not.
+// Zerbato 2010, chapter 3: Shepard weights draw the surface inwards, and lose torque and power where the linear-exact ones do not.
 TEST(Thesis, Surface_ShrinksAndTorqueAndPowerAreLost) {
   const Case k = ball();
   const Coupling c = couple(kThesis, k.in());
