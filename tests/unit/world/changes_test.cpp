@@ -1,15 +1,14 @@
 // What changes while a world runs, and what prepare() makes anew for it: values need neither tables nor, as long as the same stages are called for, a plan.
 #include <functional>
 
-#include "core/handle.h"
+#include "inside.h"
 #include "obstacle.h"
 #include "stack.h"
 #include "world/context.h"
-#include "world/world.h"
 
 namespace {
 
-dfm::World &inside(dfm_world w) { return *static_cast<dfm::World *>(dfm::handle_find(dfm::Kind::world, w)); }
+using test::inside;
 
 struct Made {
   uint64_t tables, plans;

@@ -5,11 +5,10 @@
 #include <random>
 
 #include "bristle_law.h"
-#include "core/handle.h"
 #include "heap_calls.h"
+#include "inside.h"
 #include "rigid.h"
 #include "sealed_snapshot.h"
-#include "world/world.h"
 
 namespace {
 
@@ -60,7 +59,7 @@ dfm_world build(dfm_context *c) {
   return w;
 }
 
-dfm::World &inside(dfm_world w) { return *static_cast<dfm::World *>(dfm::handle_find(dfm::Kind::world, w)); }
+using test::inside;
 
 struct Taken {
   Bytes bytes;
