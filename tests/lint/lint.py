@@ -10,10 +10,11 @@ import sys
 
 import rules_code
 import rules_header
+import rules_pages
 import rules_tree
 from tree import Tree
 
-RULES = {**rules_tree.RULES, **rules_code.RULES, **rules_header.RULES}
+RULES = {**rules_tree.RULES, **rules_code.RULES, **rules_header.RULES, **rules_pages.RULES}
 
 
 def check(root, names=None):

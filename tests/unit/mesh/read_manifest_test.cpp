@@ -1,4 +1,4 @@
-// The shared mesh collection, every file of it: MANIFEST.md says how many points, tetrahedra and triangles other programs see, the folders'
+// The shared mesh collection, every file of it: its manifest says how many points, tetrahedra and triangles other programs see, the folders'
 // EXPECTED.csv what must become of a file (read, report, reject, error). Formats that are not ours are refused with the way to convert them.
 #include <gtest/gtest.h>
 

@@ -1,0 +1,59 @@
+"""Rules about pages: what is cited is here, and every page is in the reading order."""
+import posixpath
+import re
+
+from tree import CODE, line_of
+
+PAGES = "libdeform/doc/"
+HISTORY = ("CHANGELOG.md", PAGES + "decisions/")   # may name pages that are gone
+
+
+def slugs(text):
+    """Anchors that a page's headings have."""
+    text = re.sub(r"^```.*?^```", "", text, flags=re.M | re.S)
+    return {re.sub(r"[^\w\- ]", "", heading.lower()).replace(" ", "-") for heading in re.findall(r"^#+ (.*)$", text, re.M)}
+
+
+def links(tree):
+    """A link leads to a file and heading that exist."""
+    for path in tree.select("", ext=(".md",)):
+        content = tree.text(path)
+        for match in re.finditer(r"\]\(([^)\s]+)\)", content):
+            target, _, anchor = match.group(1).partition("#")
+            if re.match(r"[a-z]+:", target):
+                continue
+            file = posixpath.normpath(posixpath.join(posixpath.dirname(path), target)) if target else path
+            if file not in tree.paths and not any(p.startswith(file + "/") for p in tree.paths):
+                yield path, line_of(content, match.start()), f"the link {match.group(1)} leads nowhere"
+            elif anchor and anchor not in slugs(tree.text(file) or ""):
+                yield path, line_of(content, match.start()), f"{file} has no heading #{anchor}"
+
+
+def citations(tree):
+    """Comments, messages and pages name only documents of the repository."""
+    ends = {path[i + 1:] for path in tree.paths if path.endswith(".md") for i in [-1, *(k for k, c in enumerate(path) if c == "/")]}
+    numbers = {m.group(1) for p in tree.paths if (m := re.match(PAGES + r"decisions/(\d{4})", p))}
+    for path in tree.select("", ext=(*CODE, ".py", ".txt", ".cmake", ".json", ".md")):
+        if path.startswith(("tests/lint/", "tests/data/", "examples/data/", *HISTORY)):
+            continue
+        content = tree.text(path)
+        for match in re.finditer(r"(?<![\w./*:}-])[\w./-]*\w\.md\b(?!\")", content):   # a name in quotes is a file that is read
+            if not {match.group(0), posixpath.normpath(posixpath.join(posixpath.dirname(path), match.group(0)))} & (ends | set(tree.paths)):
+                yield path, line_of(content, match.start()), f"{match.group(0)} is not in the repository; say it in a page here and cite that"
+        for match in re.finditer(r"decisions?[ /](\d{4})\b", content):
+            if match.group(1) not in numbers:
+                yield path, line_of(content, match.start()), f"there is no decision {match.group(1)}"
+
+
+def reading_order(tree):
+    """Every page is in the list of pages."""
+    order = PAGES + "README.md"
+    if order not in tree.paths:
+        return
+    listed = {posixpath.normpath(PAGES + target.partition("#")[0]) for target in re.findall(r"\]\(([^)\s]+)\)", tree.text(order))}
+    for path in tree.select(PAGES, ext=(".md",)):
+        if path != order and not path.startswith(PAGES + "decisions/") and path not in listed:
+            yield path, 1, f"is not in {order}; say there in a line what it answers"
+
+
+RULES = {"links": links, "citations": citations, "reading_order": reading_order}
