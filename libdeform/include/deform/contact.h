@@ -57,6 +57,20 @@ static inline dfm_status dfm_world_contacts(dfm_world world, uint32_t capacity, 
   return dfm_world_contacts_sized(world, (uint32_t)sizeof(dfm_contact), capacity, out, n);
 }
 
+/** A friction law of a world with its parameters. Pointers are borrowed: they are valid until a rule of friction is added, changed or removed,
+ * until the world is restored, or ends. */
+typedef struct dfm_law_info {
+  uint32_t size, reserved;
+  const char *id, *name;            /* "org.deform.lugre", "LuGre" */
+  const dfm_type *type;             /* its description: label, unit and range of each parameter */
+  dfm_params params;                /* all parameters with their values, in the order of type->params; dfm_friction_def takes them as they are */
+} dfm_law_info;
+/** The law behind dfm_contact.law and dfm_pair_report.law. The number holds as long as the pointers of dfm_law_info do.
+ * @param law   number of the law in the world, from 0
+ * @param info  out, as far as info->size goes
+ * @return DFM_OK; DFM_E_ARG no such law; DFM_E_HANDLE; DFM_E_BUSY. Threads: Any thread. Not during step. Since 0.1. */
+DFM_API dfm_status dfm_world_law_info(dfm_world world, uint32_t law, dfm_law_info *info);
+
 /** Resultants per touching pair of the last sub-step. b: body or obstacle handle (both are 64-bit values). */
 typedef struct dfm_pair_report {
   uint32_t size, count, sticking, law;   /* law: of its first contact in key order; friction by group or material may differ within the pair */

@@ -442,6 +442,13 @@ class World : public Handle<dfm_world> {
   auto overlaps() const { return collect_rows<E>(dfm_world_overlaps_sized, raw_); }
   auto untangle() const { return produce<E, uint32_t>([&](uint32_t &left) { return dfm_world_untangle(raw_, &left); }); }   // pairs that overlap still
   auto find_overlaps() const { return produce<E, uint32_t>([&](uint32_t &n) { return dfm_world_find_overlaps(raw_, &n); }); }
+  // The law behind dfm_contact.law; its pointers are borrowed until a rule of friction changes.
+  auto law_info(uint32_t law) const {
+    return produce<E, dfm_law_info>([&](dfm_law_info &info) {
+      info.size = sizeof info;
+      return dfm_world_law_info(raw_, law, &info);
+    });
+  }
   auto stats() const {
     return produce<E, dfm_world_stats>([&](dfm_world_stats &s) { return s.size = sizeof s, dfm_world_get_stats(raw_, &s); });
   }

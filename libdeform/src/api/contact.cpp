@@ -151,6 +151,22 @@ dfm_status dfm_world_contacts_sized(dfm_world world, uint32_t row_size, uint32_t
   });
 }
 
+dfm_status dfm_world_law_info(dfm_world world, uint32_t law, dfm_law_info *info) {
+  return guard([&] {
+    const World &w = settled(world_of(world));
+    if (law >= w.laws.size())
+      fail(DFM_E_ARG, "law %u is none of this world, which has %zu; take the number from a dfm_contact or a dfm_pair_report", law,
+           w.laws.size());
+    const LawInstance &l = *w.laws[law];
+    dfm_law_info out{};
+    out.id = l.type->id;
+    out.name = l.type->name;
+    out.type = l.type;
+    out.params = {sizeof(dfm_params), static_cast<uint32_t>(l.by_key.size()), l.by_key.data()};
+    give(info, out);
+  });
+}
+
 dfm_status dfm_world_pairs_sized(dfm_world world, uint32_t row_size, uint32_t capacity, dfm_pair_report *out,
                                  uint32_t *n) {
   return guard([&] {

@@ -5,12 +5,13 @@
 
 #include "core/error.h"
 #include "plugin/call.h"
+#include "plugin/params.h"
 #include "plugin/registry.h"
 
 namespace dfm {
 
 LawInstance::LawInstance(const dfm_type &t, const dfm_host &h, std::vector<double> values)
-    : type(&t), ops(static_cast<const dfm_friction *>(t.ops)), params(std::move(values)), host(&h) {
+    : type(&t), ops(static_cast<const dfm_friction *>(t.ops)), params(std::move(values)), by_key(param_rows(t, params)), host(&h) {
   for (const dfm_slot &slot : law_slots(t, h, params.data())) {
     nstate += slot.width;
     tangent.resize(nstate, slot.kind == DFM_SLOT_TANGENT);

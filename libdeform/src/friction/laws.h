@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "core/memory.h"
-#include "deform/plugin.h"
+#include "deform/base.h"
 #include "surfel/contact_state.h"
 #include "surfel/surface.h"
 
@@ -17,6 +17,7 @@ struct LawInstance {
   const dfm_type *type = nullptr;
   const dfm_friction *ops = nullptr;
   std::vector<double> params;
+  std::vector<dfm_param_value> by_key;   // params, for dfm_world_law_info
   void *data = nullptr;           // what prepare() made
   const dfm_host *host = nullptr;
   uint32_t nstate = 0;

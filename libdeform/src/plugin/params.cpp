@@ -81,6 +81,21 @@ uint32_t packed_width(const dfm_type &type) {
   return n;
 }
 
+std::vector<dfm_param_value> param_rows(const dfm_type &type, const std::vector<double> &packed) {
+  std::vector<dfm_param_value> rows;
+  size_t at = 0;
+  for (uint32_t i = 0; i < type.nparam; ++i) {
+    const dfm_param &row = type.params[i];
+    uint32_t width = row.width;
+    // Zeros behind a list that was given short are no values where the range leaves zero out.
+    if ((row.flags & DFM_PARAM_LIST) && row.min > 0)
+      while (width > 1 && packed[at + width - 1] == 0) --width;
+    rows.push_back({row.key, &packed[at], width});
+    at += row.width;
+  }
+  return rows;
+}
+
 std::vector<double> pack_params(const dfm_type &type, std::span<const dfm_param_value> given, const ParamLookup &fallback) {
   check_keys(type, given);
   std::vector<double> packed;
