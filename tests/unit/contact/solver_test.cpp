@@ -6,12 +6,14 @@
 
 #include <cmath>
 
+#include "near.h"
 #include "rows_case.h"
 
 namespace {
 
 using namespace dfm;
 using test::Dense;
+using test::expect_near;
 using test::RowsCase;
 
 // A point of 1 kg pressed into a groove of two walls, 45 degrees each: what friction on one wall pushes, the
@@ -94,10 +96,6 @@ struct Problem : RowsCase {
   Vec3 impulse(uint32_t i) const { return load3(&rows.impulse[3 * size_t{i}]); }
 };
 
-void expect_near(Vec3 a, Vec3 b, double tolerance) {
-  for (int k = 0; k < 3; ++k) EXPECT_NEAR(a[k], b[k], tolerance) << k;
-}
-
 Tolerance same_tolerance(uint32_t n, double normal, double tangent) {
   Tolerance t;
   t.normal.assign(n, normal);
@@ -108,9 +106,9 @@ Tolerance same_tolerance(uint32_t n, double normal, double tangent) {
 
 }  // namespace
 
-// A point of mass m = 1 / w that meets a wall at (-1, 0.3, 0.4) m/s stops along the normal by m. Friction ends the
-// slip of 0.5 m/s by m (-0.3, -0.4) where mu allows half of the normal impulse. Below that it takes mu m/s along the
-// slip and leaves 0.5 - mu. One answer of the law and one sweep are exact.
+// A point of mass m = 1 / w that meets a wall at (-1, 0.3, 0.4) m/s stops along the normal by m. Friction
+// ends the slip of 0.5 m/s by m (-0.3, -0.4) where mu allows half of the normal impulse. Below that it takes
+// mu m/s along the slip and leaves 0.5 - mu. One answer of the law and one sweep are exact.
 TEST(Solver, OnePoint_SticksOrSlidesByTheClosedForm) {
   const double m = 1 / 1.75;
   const Vec3 brought = m * Vec3{1, -0.3, -0.4};
@@ -129,8 +127,8 @@ TEST(Solver, OnePointThatLeaves_FeelsNothing) {
   expect_near(p.impulse(0), {}, 0);
 }
 
-// The normal impulse p_n = -u_n / W_nn changes the slip by W_tn p_n, and friction answers that: in the same sweep it is
-// -(u_t + W_tn p_n) / w_t where it sticks.
+// The normal impulse p_n = -u_n / W_nn changes the slip by W_tn p_n, and friction answers that: in the same
+// sweep it is -(u_t + W_tn p_n) / w_t where it sticks.
 TEST(Solver, FrictionOfASweep_FollowsTheNewNormalImpulse) {
   Problem p({2}, 10, {{1, -0.3, 0.4}});
   const std::vector<double> u = p.velocities();
@@ -138,7 +136,9 @@ TEST(Solver, FrictionOfASweep_FollowsTheNewNormalImpulse) {
   p.pass(1);
   const double normal = -u[0] / w(0, 0);
   const double wt = p.rows.wt[0];
-  expect_near(p.impulse(0), {normal, -(u[1] + w(1, 0) * normal) / wt, -(u[2] + w(2, 0) * normal) / wt}, 1e-13);
+  const double first = -(u[1] + w(1, 0) * normal) / wt;
+  const double second = -(u[2] + w(2, 0) * normal) / wt;
+  expect_near(p.impulse(0), {normal, first, second}, 1e-13);
 }
 
 // Where all contacts close and stick the impulses solve W p = -u, and no others do: W has full rank. The

@@ -25,7 +25,8 @@ Names stages(const dfm::SceneFacts &f, const ContactMethod &method = velocity())
   return out;
 }
 
-std::string why_not(const dfm::SceneFacts &f, const std::string &name, const ContactMethod &method = velocity()) {
+std::string why_not(const dfm::SceneFacts &f, const std::string &name,
+                    const ContactMethod &method = velocity()) {
   for (const auto &s : dfm::make_plan(method.table, f).absent)
     if (s.name == name) return s.why;
   return {};
@@ -37,7 +38,8 @@ TEST(Plan, OfAnEmptyWorld_HasNoStage) {
 }
 
 TEST(Plan, OfBodiesThatTouch_HasTheStagesOfContactInOrder) {
-  const Names want = {"model", "predict", "broad", "narrow", "contact+friction", "distribute", "guard", "commit"};
+  const Names want = {"model",            "predict",    "broad", "narrow",
+                      "contact+friction", "distribute", "guard", "commit"};
   EXPECT_EQ(stages(two_bodies()), want);
   EXPECT_TRUE(dfm::make_plan(velocity().table, two_bodies()).touches());
 }
@@ -52,13 +54,15 @@ TEST(Plan, OfOneBody_HasNothingOfContact) {
 TEST(Plan, OfABodyThatTouchesItselfAlone_LooksForNoPairs) {
   dfm::SceneFacts f;
   f.bodies = 1, f.self_bodies = 1, f.self = true;
-  EXPECT_EQ(stages(f), (Names{"model", "predict", "self contact", "contact+friction", "distribute", "guard", "commit"}));
+  const Names want = {"model", "predict", "self contact", "contact+friction", "distribute", "guard", "commit"};
+  EXPECT_EQ(stages(f), want);
   EXPECT_EQ(why_not(f, "broad"), "no pair may touch");
 }
 
 TEST(Plan, OfRollback_HasItsStagesInPlaceOfTheSolve) {
   const ContactMethod &rollback = dfm::rollback::method();
-  EXPECT_EQ(stages(two_bodies(), rollback), (Names{"model", "predict", "lagged friction", "broad", "rollback", "commit"}));
+  const Names want = {"model", "predict", "lagged friction", "broad", "rollback", "commit"};
+  EXPECT_EQ(stages(two_bodies(), rollback), want);
   for (const char *replaced : {"narrow", "contact+friction", "distribute", "guard"})
     EXPECT_EQ(why_not(two_bodies(), replaced, rollback), "contact.method is rollback") << replaced;
   const dfm::Plan plan = dfm::make_plan(rollback.table, two_bodies());
@@ -73,6 +77,150 @@ TEST(Plan, OfRigidBodies_EndsThemBeforeImpulsesAreDistributed) {
   EXPECT_EQ(all[2], "rigid predict");
   EXPECT_EQ(all[6], "rigid commit");
   EXPECT_EQ(all[7], "distribute");
+}
+
+TEST(Plan, OfWhatIsPrescribed_SaysWhatMoves) {
+  dfm::SceneFacts f = two_bodies();
+  EXPECT_EQ(why_not(f, "motion"), "nothing is prescribed over time");
+  f.loads_vary = true;
+  f.obstacles_move = true;
+  const dfm::Plan plan = dfm::make_plan(velocity().table, f);
+  ASSERT_EQ(stages(f)[0], "motion");
+  EXPECT_EQ(plan.stages[0].why, "loads vary, obstacles move");
+}
+
+TEST(Plan, OfCoupledSurfaces_GathersThemWhereTheyMayTouch) {
+  dfm::SceneFacts f = two_bodies();
+  EXPECT_EQ(why_not(f, "gather"), "every surfel is a point of its body");
+  f.coupled = 1;
+  f.coupled_surfels = 50;
+  EXPECT_EQ(stages(f)[2], "gather");
+  f.body_pairs = 0;
+  EXPECT_EQ(why_not(f, "gather"), "filters let no pair touch");
+}
+
+TEST(Plan, OfAnUnguardedWorld_HasNoGuard) {
+  dfm::SceneFacts f = two_bodies();
+  EXPECT_TRUE(dfm::make_plan(velocity().table, f).has(StageRole::guards));
+  f.unguarded = true;
+  EXPECT_FALSE(dfm::make_plan(velocity().table, f).has(StageRole::guards));
+  EXPECT_NE(why_not(f, "guard").find("contact.guard"), std::string::npos);
+}
+
+TEST(Plan, OfAWorldThatMaySleep_EndsWithThatStage) {
+  dfm::SceneFacts f = two_bodies();
+  f.sleep = true;
+  EXPECT_EQ(stages(f).back(), "sleep");
+}
+
+// Over all combinations of facts: the stages stand in the order of the table, none of them is among those
+// left out too, contact is there where something may touch, and then it gives impulses to points. `f` has the
+// facts of the mask `bits`.
+TEST(Plan, OfAnyFacts_HasTheOrderOfTheTable) {
+  for (uint32_t bits = 0; bits < 1u << 11; ++bits) {
+    const auto bit = [&](uint32_t k) { return (bits >> k & 1) != 0; };
+    dfm::SceneFacts f;
+    f.bodies = 2 * bit(0);
+    f.self_stepping = f.bodies && bit(1);
+    f.obstacles = bit(2);
+    f.body_pairs = f.bodies && bit(3);
+    f.obstacle_pairs = f.bodies && f.obstacles && bit(4);
+    f.self_bodies = f.bodies && bit(5);
+    f.coupled = f.bodies && bit(6);
+    f.rigid_bodies = bit(7);
+    f.gravity_keys = bit(8);
+    f.sleep = bit(9);
+    f.unguarded = bit(10);
+    const dfm::Plan plan = dfm::make_plan(velocity().table, f);
+    for (size_t k = 0; k < plan.stages.size(); ++k) {
+      if (k > 0) {
+        ASSERT_LT(plan.stages[k - 1].row, plan.stages[k].row);
+      }
+      const std::string name = velocity().table[plan.stages[k].row].name;
+      for (const auto &absent : plan.absent) ASSERT_NE(absent.name, name);
+    }
+    const bool touches = f.body_pairs || f.obstacle_pairs || f.self_bodies;
+    ASSERT_EQ(plan.touches(), touches);
+    ASSERT_EQ(plan.has(StageRole::gives_impulses), touches);
+    ASSERT_EQ(plan.has(StageRole::guards), touches && !f.unguarded);
+  }
+}
+
+// A row without a function says why a stage is not there. What the method cannot do is refused where it is
+// made, and with what is left no such row is ever planned.
+TEST(Plan, OfRollback_RunsNoRowWithoutAFunction) {
+  const ContactMethod &rollback = dfm::rollback::method();
+  using dfm::Ability;
+  for (const Ability a : {Ability::own_surface, Ability::rigid_bodies, Ability::sleep, Ability::self_contact})
+    EXPECT_TRUE(dfm::lacks(rollback, a));
+  for (uint32_t bits = 0; bits < 1u << 4; ++bits) {
+    dfm::SceneFacts f;
+    f.bodies = 2;
+    f.body_pairs = bits & 1;
+    f.obstacles = bits >> 1 & 1;
+    f.obstacle_pairs = bits >> 1 & 1;
+    f.loads_vary = bits >> 2 & 1;
+    f.unguarded = bits >> 3 & 1;
+    for (const auto &s : dfm::make_plan(rollback.table, f).stages) {
+      EXPECT_NE(rollback.table[s.row].run, nullptr) << rollback.table[s.row].name;
+      EXPECT_NE(rollback.table[s.row].cost, nullptr) << rollback.table[s.row].name;
+    }
+  }
+}
+
+// An effect of the content is there without being asked for; one that is asked for needs somebody who
+// provides it.
+TEST(PlanEffects, OfTheContent_NameTheirProviders) {
+  dfm::SceneFacts f = two_bodies();
+  f.offered = {{"volume", "model.a"}, {"stiction", "law.b"}, {"volume", "model.c"}};
+  const dfm::Plan plan = dfm::make_plan(velocity().table, f);
+  ASSERT_EQ(plan.effects.size(), 2u);
+  EXPECT_EQ(plan.effects[0].name, "stiction");
+  EXPECT_EQ(plan.effects[1].name, "volume");
+  EXPECT_EQ(plan.effects[1].asked_by, "content");
+  EXPECT_EQ(plan.effects[1].provided_by, "model.a, model.c");
+}
+
+TEST(PlanEffects, ThatNobodyProvides_AreRefusedWithThoseWhoCould) {
+  const auto refusal = [](const dfm::SceneFacts &f) {
+    try {
+      dfm::make_plan(velocity().table, f);
+    } catch (const dfm::Error &e) {
+      return std::string(e.what());
+    }
+    return std::string();
+  };
+  dfm::SceneFacts f = two_bodies();
+  f.effects_listed = true;
+  f.asked = {"volume"};
+  EXPECT_NE(refusal(f).find("no loaded plugin could"), std::string::npos) << refusal(f);
+  f.available = {{"volume", "model.a"}};
+  EXPECT_NE(refusal(f).find("these loaded plugins could: model.a"), std::string::npos) << refusal(f);
+  f.idle = {{"volume", "model.a"}};
+  EXPECT_NE(refusal(f).find("the parameters of every body leave it off"), std::string::npos) << refusal(f);
+  f.offered = {{"volume", "model.a"}};
+  EXPECT_EQ(refusal(f), "");
+  dfm::SceneFacts empty;   // whoever comes first may provide it
+  empty.effects_listed = true;
+  empty.asked = {"volume"};
+  empty.available = {{"volume", "model.a"}};
+  EXPECT_EQ(refusal(empty), "");
+}
+
+// What is cut or folds comes to lie on itself, so these effects call for self contact.
+TEST(PlanEffects, ThatFold_CallForSelfContact) {
+  dfm::SceneFacts f;
+  f.bodies = 1;
+  EXPECT_EQ(dfm::self_asked_by(f), "");
+  f.offered = {{"folding", "model.a"}};
+  EXPECT_EQ(dfm::self_asked_by(f), "folding");
+  f.self = true;
+  EXPECT_EQ(dfm::self_asked_by(f), "contact.self");
+  f.self_bodies = 1;
+  const dfm::Plan plan = dfm::make_plan(velocity().table, f);
+  ASSERT_EQ(plan.effects.size(), 2u);
+  EXPECT_EQ(plan.effects[1].name, dfm::kSelfContact);
+  EXPECT_EQ(plan.effects[1].asked_by, "contact.self");
 }
 
 }  // namespace

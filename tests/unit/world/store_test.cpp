@@ -11,13 +11,14 @@
 #include <set>
 
 #include "inside.h"
-#include "math/trig.h"
+#include "near.h"
 #include "rigid/turn.h"
 #include "world.h"
 
 namespace {
 
 using namespace dfm;
+using test::expect_near;
 using test::inside;
 using test::Refusal;
 
@@ -65,10 +66,6 @@ struct Warm {
   Vec3 impulse(uint32_t i) const { return load3(&rows.impulse[3 * size_t{i}]); }
   double bristle(uint32_t i, uint32_t s) const { return state.bristle[size_t{s} * state.stride + i]; }
 };
-
-void expect_near(Vec3 a, Vec3 b, double tolerance) {
-  for (int k = 0; k < 3; ++k) EXPECT_NEAR(a[k], b[k], tolerance) << k;
-}
 
 // Every column as bytes, beside what else the store, the events and the bodies of its world hold.
 std::vector<std::string> all_of(const World &w) {
