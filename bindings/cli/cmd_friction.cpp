@@ -121,7 +121,7 @@ int friction(const FrictionOptions &options, const Globals &globals) {
 void add_friction(CLI::App &app, Globals &globals, int *exit_code) {
   const auto options = std::make_shared<FrictionOptions>();
   CLI::App *sub = app.add_subcommand("friction", "runs a friction law on a rig: a driven mass, a prescribed slip, a spring, ramps");
-  sub->add_option("CASE", options->file, "JSON with law, params, input, output_times (libdeform/doc/concepts/friction_rig.md)")->required();
+  sub->add_option("CASE", options->file, "JSON with law, params, input, output_times (libdeform/doc/reference/friction_rig.md)")->required();
   sub->add_option("--law", options->law, "short name, full id, or path of a plugin file; otherwise the case's")->type_name("ID");
   sub->add_option("--step", options->step, "longest step, s")->capture_default_str()->type_name("H");
   sub->add_option("--csv", options->csv, "the case's columns at its output times")->type_name("OUT");

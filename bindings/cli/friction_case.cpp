@@ -41,7 +41,7 @@ class CaseReader {
     size_t where = 0;
     if (std::string why; !parse_json(text_, root_, &where, &why)) {
       const auto line = 1 + std::count(text_.begin(), text_.begin() + long(std::min(where, text_.size())), '\n');
-      throw Failure(kBadInput, file + ":" + std::to_string(line) + ": " + why + "; expected a case as libdeform/doc/concepts/friction_rig.md shows it");
+      throw Failure(kBadInput, file + ":" + std::to_string(line) + ": " + why + "; expected a case as libdeform/doc/reference/friction_rig.md shows it");
     }
     if (root_.kind != JsonValue::object) refuse("", "is not an object; expected the keys law, params, input and output_times");
   }

@@ -1,5 +1,5 @@
 // Rigid limits of ../shared/reference/contact at the tolerances of its README, with stiff `msm` bodies. All rows, and the elastic cases with
-// the model's own error, are printed by tests/bench/contact_reference.cpp (doc/concepts/contact_reference.md). The spheres' rows and the oblique
+// the model's own error, are printed by tests/bench/contact_reference.cpp (doc/reference/contact_reference.md). The spheres' rows and the oblique
 // incline have tests of their own: ball_incline_test.cpp, oblique_test.cpp.
 #include "contact_reference.h"
 

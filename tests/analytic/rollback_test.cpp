@@ -1,5 +1,5 @@
 // What the roll-back does to sliding, momentum and force, beside the velocity method: the figures of doc/concepts/rollback.md (rollback_bench prints
-// them in full). These are errors of the scheme, not of its implementation: the tests of (4.5) in doc/concepts/zerbato.md, which it has to fail.
+// them in full). These are errors of the scheme, not of its implementation: the tests of (4.5) in doc/reference/zerbato.md, which it has to fail.
 #include "rollback_cases.h"
 
 namespace {

@@ -1,5 +1,5 @@
 // Every row of the tables in ../shared/reference/contact that a soft body can be put to: the rigid limits against the tables' tolerances, the
-// elastic cases with the model's own error. libdeform/doc/concepts/contact_reference.md holds what it prints.
+// elastic cases with the model's own error. libdeform/doc/reference/contact_reference.md holds what it prints.
 //
 //   contact_reference [rigid|elastic|TABLE|BODY] [--write PAGE]      exit code 1: a rigid limit is missed
 //

@@ -10,7 +10,7 @@ BELOW = {
     "libdeform/include": {"deform"},
     "libdeform/src": {"core", "math", "mesh", "phyxel", "surfel", "plugin", "plan", "model", "integrate", "broad", "narrow",
                       "contact", "friction", "distribute", "rigid", "world", "rollback", "scene", "api"},
-    "libdeform/doc": {"README.md", "concepts", "models", "laws", "howto", "decisions", "images"},
+    "libdeform/doc": {"README.md", "concepts", "reference", "models", "laws", "howto", "decisions", "images"},
     "bindings": {"CMakeLists.txt", "cli", "render", "ode", "bullet", "python"},
     "tests": {"CMakeLists.txt", "support", "data", "unit", "analytic", "stability", "api", "plugin", "determinism", "adapters",
               "fuzz", "lint", "bench", "abi", "render"},

@@ -193,7 +193,7 @@ struct RoundShape { const char *name; bool ball, thin; };
 inline constexpr RoundShape kRounds[] = {{"solid sphere", true, false}, {"thin hollow sphere", true, true},
                                          {"solid cylinder", false, false}, {"thin hoop", false, true}};
 struct RoundMesh { uint32_t cells, facets; double young; };
-// What a skid is short of is the facets' doing (doc/concepts/contact_reference.md); light cells cost many sub-steps.
+// What a skid is short of is the facets' doing (doc/reference/contact_reference.md); light cells cost many sub-steps.
 inline RoundMesh round_mesh(const RoundShape &shape, bool skids) {
   const bool fine = skids && !shape.thin;
   return {fine ? 4000u : 2500u, fine ? 24000u : 6000u, 2e6};

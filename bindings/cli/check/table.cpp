@@ -1,4 +1,4 @@
-// The rules, in the order in which they are run and printed. What the letters and numbers mean to an author: doc/concepts/plugin_check.md.
+// The rules, in the order in which they are run and printed. What the letters and numbers mean to an author: doc/reference/plugin_check.md.
 #include <cstring>
 
 #include "check/groups.h"

@@ -6,7 +6,7 @@
 #ifdef __cplusplus
 extern "C" {
 #endif
-/** Reads the tetrahedra of MSH 2.2 and 4.1, legacy VTK 2.0 to 5.1, VTU and Medit files (ASCII and binary; doc/concepts/mesh_files.md). What a
+/** Reads the tetrahedra of MSH 2.2 and 4.1, legacy VTK 2.0 to 5.1, VTU and Medit files (ASCII and binary; doc/reference/mesh_files.md). What a
  * file is its first bytes say, else its name's ending. Memory is bounded by the file's size.
  * Negative cells are turned, unused points and duplicate cells dropped, each with a count in a warning on the log and in dfm_tetmesh_info.
  * A cell without volume is refused: it has no rest shape.

@@ -68,7 +68,7 @@ TEST(Toi, EdgeOverEdge_TimeAndPlaces) {
   }
 }
 
-// The counter-example to (4.5) in doc/concepts/zerbato.md: the triangle's three vertices move differently.
+// The counter-example to (4.5) in doc/reference/zerbato.md: the triangle's three vertices move differently.
 TEST(Toi, DeformingTriangle_MeetsPointAtRest) {
   const P o = {0, 0, 0};
   const ToiQuery q = query(false, {o, P{-1, -1, 0.2}, P{3, -1, 0.2}, P{-1, 1, 0.6}}, {o, P{-1, -1, 0.6}, P{3, -1, 0.6}, P{-1, 1, -1.4}});

@@ -1,5 +1,5 @@
 // Zerbato's collision solution on cases that are computed by hand, and tests that tell a printed form that is wrong from the right one
-// (Zerbato 2010, doc/concepts/zerbato.md: (4.5), (5.21), (5.24), (5.25), (5.27)).
+// (Zerbato 2010, doc/reference/zerbato.md: (4.5), (5.21), (5.24), (5.25), (5.27)).
 #include "rollback/equations.h"
 
 #include "obstacle.h"
@@ -137,7 +137,7 @@ TEST(Rollback, VertexAgainstFace_BothBodiesLoseTheirOwnMomentum) {
   EXPECT_NEAR(contacts[0].fn, m_eff * 2.5 / h, 1e-6 * m_eff / h);
 }
 
-// The counter-example to (4.5) in doc/concepts/zerbato.md: a triangle comes down on a point, t = 1/2; two of its vertices touch something else
+// The counter-example to (4.5) in doc/reference/zerbato.md: a triangle comes down on a point, t = 1/2; two of its vertices touch something else
 // at t = 0.1. With a time for each vertex it ends below the point.
 TEST(Rollback, OneTimePerIsland_KeepsTheTriangleAboveThePoint) {
   Scene s({0, 0, 0}, 0);
