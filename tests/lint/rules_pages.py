@@ -56,4 +56,22 @@ def reading_order(tree):
             yield path, 1, f"is not in {order}; say there in a line what it answers"
 
 
-RULES = {"links": links, "citations": citations, "reading_order": reading_order}
+def names(tree):
+    """A source file or public name that a page writes as code is there, so that pages follow when files move."""
+    files = {path.rpartition("/")[2] for path in tree.paths}
+    headers = "".join(tree.text(path) for path in tree.paths if "/include/" in path and path.endswith(CODE))
+    for path in tree.select("", ext=(".md",)):
+        if path.startswith(HISTORY):
+            continue
+        content = re.sub(r"^```.*?^```", lambda m: re.sub(r"[^\n]", " ", m.group(0)), tree.text(path), flags=re.M | re.S)
+        for code in re.finditer(r"`[^`]+`", content):
+            for match in re.finditer(r"(?<![\w*{}./-])(?:[\w-]+/)*([a-z0-9_]+\.(?:cpp|hpp|h|c|py))\b|\b(dfm_[a-z0-9_]+|DFM_[A-Z0-9_]+)", code.group(0)):
+                file, name = match.groups()
+                line = line_of(content, code.start() + match.start())
+                if file and file not in files:
+                    yield path, line, f"there is no file {file}"
+                if name and name.rstrip("_") not in headers:
+                    yield path, line, f"{name} is in no public header"
+
+
+RULES = {"names": names, "links": links, "citations": citations, "reading_order": reading_order}
