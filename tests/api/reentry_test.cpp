@@ -139,6 +139,12 @@ Calls world_calls(Scene &s, bool step_only) {
       {"world_set_gravity_keys", [&] { return dfm_world_set_gravity_keys(s.w, 0, nullptr); }},
       {"world_set_sleep", [&] { return dfm_world_set_sleep(s.w, true); }},
       {"world_filter_pair", [&] { return dfm_world_filter_pair(s.w, "*", "*", false); }},
+      {"world_remove_filter", [&] { return dfm_world_remove_filter(s.w, "*", "*"); }},
+      {"world_set_friction", [&] {
+         const dfm_params p{sizeof p, 0, nullptr};
+         return dfm_world_set_friction(s.w, "*", "*", &p);
+       }},
+      {"world_remove_friction", [&] { return dfm_world_remove_friction(s.w, "*", "*"); }},
       {"world_add_friction", [&] {
          dfm_friction_def f{};
          f.size = sizeof f, f.between[0] = f.between[1] = "*", f.law = "none";

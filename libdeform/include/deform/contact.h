@@ -16,13 +16,32 @@ typedef struct dfm_friction_def {
   const char *law;                  /* short name or full id */
   dfm_params params;
 } dfm_friction_def;
-/** Adds a rule. One for the same two sides, in either order, replaces the one before, so a coefficient may be set anew each frame; a rule that names a body
- * or obstacle goes when that is destroyed.
+/** Adds a rule. One for the same two sides, in either order, replaces the one before; a rule that names a body or obstacle goes when that is destroyed.
+ * The same two sides with the same law: as dfm_world_set_friction with all parameters, those that are not given at their defaults.
  * @return DFM_OK; DFM_E_ARG unknown name or key (nearest valid one), value out of range; DFM_E_UNSUPPORTED no such law (lists those loaded).
  * Threads: Not during step. Since 0.1. */
 DFM_API dfm_status dfm_world_add_friction(dfm_world world, const dfm_friction_def *def);
+/** Changes parameters of a rule while the world runs: the coefficient behind a slider. Those that are not given keep their values. No table and
+ * no plan is made anew, and memory does not grow, however often it is called. Touching contacts keep their state: a bristle is a
+ * displacement in m and stays, its stiffness changes. The state starts anew only where the parameters change which values the law keeps. Sleeping
+ * bodies wake, except where all values stay as they are.
+ * @param a, b    the two sides as the rule has them, in either order
+ * @param params  keys and values of the rule's law
+ * @return DFM_OK; DFM_E_ARG no rule for these sides (lists the rules), unknown key (nearest valid one), value out of range: nothing was
+ * changed; DFM_E_NOMEM. Threads: Not during step. Since 0.1. */
+DFM_API dfm_status dfm_world_set_friction(dfm_world world, const char *a, const char *b, const dfm_params *params);
+/** Removes a rule. Its contacts fall to the next rule that matches, or to the law of pairs without a rule; where that is another law, or has other
+ * parameters, their state starts anew. Bodies wake; the next step makes the tables anew.
+ * @param a, b  the two sides as the rule has them, in either order
+ * @return DFM_OK; DFM_E_ARG no rule for these sides (lists the rules). Threads: Not during step. Since 0.1. */
+DFM_API dfm_status dfm_world_remove_friction(dfm_world world, const char *a, const char *b);
 /** Lets two named sides pass or touch, whatever their filters say; replaced and removed as rules of friction are. Threads: Not during step. Since 0.1. */
 DFM_API dfm_status dfm_world_filter_pair(dfm_world world, const char *a, const char *b, bool collide);
+
+/** Removes what dfm_world_filter_pair has said of two sides, in either order: their own filters, or the next rule, decide again. Bodies wake; where the
+ * two overlap they are set aside as at the start (dfm_world_overlaps).
+ * @return DFM_OK; DFM_E_ARG no filter for these sides. Threads: Not during step. Since 0.1. */
+DFM_API dfm_status dfm_world_remove_filter(dfm_world world, const char *a, const char *b);
 
 /** dfm_contact.kind: what touches. VERTEX_FACE: a surfel of side a on a triangle of side b. EDGE_EDGE: an edge of each side. PRIMITIVE: a
  * surfel, an edge or a triangle of side a (flags) on an obstacle or a rigid body. Since 0.1. */

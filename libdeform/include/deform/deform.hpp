@@ -416,6 +416,11 @@ class World : public Handle<dfm_world> {
     def.between[0] = a.c_str, def.between[1] = b.c_str, def.law = law.c_str, def.params = params;
     return E::done(dfm_world_add_friction(raw_, &def));
   }
+  auto set_friction(Text a, Text b, const dfm_params &params) const {
+    return E::done(dfm_world_set_friction(raw_, a.c_str, b.c_str, &params));
+  }
+  auto remove_friction(Text a, Text b) const { return E::done(dfm_world_remove_friction(raw_, a.c_str, b.c_str)); }
+  auto remove_filter(Text a, Text b) const { return E::done(dfm_world_remove_filter(raw_, a.c_str, b.c_str)); }
   auto filter_pair(Text a, Text b, bool collide) const { return E::done(dfm_world_filter_pair(raw_, a.c_str, b.c_str, collide)); }
 
   auto find_body(Text name) const { return produce<E, Body<E>>([&](Body<E> &b) { return dfm_world_find_body(raw_, name.c_str, b.put()); }); }

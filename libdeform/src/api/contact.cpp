@@ -5,6 +5,7 @@
 
 #include "api/objects.h"
 #include "friction/pair_rules.h"
+#include "world/friction_rules.h"
 #include "world/measure.h"
 #include "world/context.h"
 #include "world/stages.h"
@@ -95,18 +96,10 @@ uint64_t id_of(const World &w, uint64_t handle, const char *what) {
   fail(DFM_E_HANDLE, "'%s' is no body or obstacle of this world", what);
 }
 
-// Laws that nothing refers to once a rule for `between` has gone: no other rule, no contact, no table of pairs. They make room for new ones, so a
-// coefficient may be set anew each frame.
-std::vector<uint8_t> free_laws(const World &w, const std::string between[2]) {
-  std::vector<uint8_t> free(w.laws.size(), 1);
-  const auto use = [&](uint32_t law) {
-    if (law < free.size()) free[law] = 0;
-  };
-  for (const FrictionRule &r : w.friction)
-    if (!same_pair(r.between, between)) use(r.law);
-  for (const auto *const list : {&w.pair_law, &w.zone_law}) std::for_each(list->begin(), list->end(), use);
-  std::for_each(w.store.law.begin(), w.store.law.end(), use);
-  return free;
+// The values of a def; `what` names them where they are missing.
+std::span<const dfm_param_value> values_of(const dfm_params &params, const char *what) {
+  if (params.n && !params.values) fail(DFM_E_ARG, "%u parameters are announced for %s, but params.values is NULL", params.n, what);
+  return {params.values, params.n};
 }
 
 }  // namespace
@@ -117,13 +110,27 @@ dfm_status dfm_world_add_friction(dfm_world world, const dfm_friction_def *given
     need(given, "def");
     const dfm_friction_def def = take_def(given, dfm_friction_def{});
     need(def.law, "law");
-    if (def.params.n && !def.params.values) fail(DFM_E_ARG, "%u parameters are announced for law '%s', but params.values is NULL", def.params.n, def.law);
-    FrictionRule rule{{side(w, def.between[0], true), side(w, def.between[1], true)}, 0};
-    w.friction.reserve(w.friction.size() + 1);
-    rule.law = w.add_law(def.law, {def.params.values, def.params.n}, free_laws(w, rule.between));
-    add_rule(w.friction, std::move(rule));
-    wake_all(w);
-    w.changed = true;
+    const auto values = values_of(def.params, ("law '" + std::string(def.law) + "'").c_str());
+    add_friction_rule(w, side(w, def.between[0], true), side(w, def.between[1], true), def.law, values);
+  });
+}
+
+dfm_status dfm_world_set_friction(dfm_world world, const char *a, const char *b, const dfm_params *params) {
+  return guard([&] {
+    World &w = idle(world_of(world));
+    need(a, "a");
+    need(b, "b");
+    need(params, "params");
+    set_friction_rule(w, a, b, values_of(*params, "a rule of friction"));
+  });
+}
+
+dfm_status dfm_world_remove_friction(dfm_world world, const char *a, const char *b) {
+  return guard([&] {
+    World &w = idle(world_of(world));
+    need(a, "a");
+    need(b, "b");
+    remove_friction_rule(w, a, b);
   });
 }
 
@@ -132,6 +139,21 @@ dfm_status dfm_world_filter_pair(dfm_world world, const char *a, const char *b, 
     World &w = idle(world_of(world));
     add_rule(w.filters, FilterRule{{side(w, a, false), side(w, b, false)}, collide});
     if (collide) w.overlaps.all = true;
+    wake_all(w);
+    w.changed = true;
+  });
+}
+
+dfm_status dfm_world_remove_filter(dfm_world world, const char *a, const char *b) {
+  return guard([&] {
+    World &w = idle(world_of(world));
+    need(a, "a");
+    need(b, "b");
+    const std::string between[2] = {a, b};
+    const auto rule = std::find_if(w.filters.begin(), w.filters.end(), [&](const FilterRule &r) { return same_pair(r.between, between); });
+    if (rule == w.filters.end()) fail(DFM_E_ARG, "no filter is for ['%s', '%s']; dfm_world_filter_pair makes one", a, b);
+    if (!rule->collide) w.overlaps.all = true;
+    w.filters.erase(rule);
     wake_all(w);
     w.changed = true;
   });

@@ -23,6 +23,7 @@ struct LawInstance {
   uint32_t nstate = 0;
   std::vector<uint8_t> tangent;   // [nstate] 1: a component of a vector in the tangent plane
   bool turns = false;             // any
+  bool by_default = false;        // pairs without a rule have it
 
   LawInstance(const dfm_type &t, const dfm_host &h, std::vector<double> values);   // throws where check() or prepare() refuses
   LawInstance(const LawInstance &) = delete;

@@ -124,4 +124,13 @@ std::vector<double> pack_params(const dfm_type &type, std::span<const dfm_param_
   return packed;
 }
 
+std::vector<double> changed_params(const dfm_type &type, std::span<const dfm_param_value> given, const std::vector<double> &present) {
+  const std::vector<dfm_param_value> rows = param_rows(type, present);
+  return pack_params(type, given, [&](const char *key) -> const dfm_param_value * {
+    for (const dfm_param_value &row : rows)
+      if (std::strcmp(row.key, key) == 0) return &row;
+    return nullptr;
+  });
+}
+
 }  // namespace dfm

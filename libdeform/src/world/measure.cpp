@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstring>
 
 #include "core/error.h"
 #include "plugin/registry.h"
@@ -79,26 +78,14 @@ class EffectsAtWork {
 void set_model_params(Body &b, const dfm_params &params) {
   const dfm_type &type = *b.model.type;
   if (params.n && !params.values) fail(DFM_E_ARG, "body '%s': %u parameters are announced, but params.values is NULL", b.name.c_str(), params.n);
-  std::vector<dfm_param_value> given(params.values, params.values + params.n);
+  const std::span<const dfm_param_value> given(params.values, params.n);
   for (const dfm_param_value &value : given)
     for (const CellField &f : b.fields)
       if (value.key && f.key == value.key)
         fail(DFM_E_ARG, "body '%s': parameter '%s' differs by cell (from %s), so one value cannot replace it while it runs; make the body anew",
              b.name.c_str(), f.key.c_str(), f.from.c_str());
-  // What is not given keeps its present value.
-  std::vector<dfm_param_value> present;
+  std::vector<double> values = changed_params(type, given, b.model.params);
   size_t at = 0;
-  for (uint32_t i = 0; i < type.nparam; ++i) {
-    const dfm_param &row = type.params[i];
-    present.push_back({row.key, &b.model.params[at], row.width});
-    at += row.width;
-  }
-  std::vector<double> values = pack_params(type, given, [&](const char *key) -> const dfm_param_value * {
-    for (const auto &p : present)
-      if (std::strcmp(p.key, key) == 0) return &p;
-    return nullptr;
-  });
-  at = 0;
   for (uint32_t i = 0; i < type.nparam; at += type.params[i++].width)
     if (!(type.params[i].flags & DFM_PARAM_RUNTIME) && !std::equal(&values[at], &values[at] + type.params[i].width, &b.model.params[at]))
       fail(DFM_E_ARG, "body '%s': parameter '%s' of model '%s' cannot change while it runs", b.name.c_str(), type.params[i].key, type.id);

@@ -214,6 +214,16 @@ void add_event(World &w, uint32_t kind, uint64_t a, uint64_t b, uint64_t key, do
   w.events.push_back({sizeof(dfm_contact_event), kind, w.handle_of(a), w.handle_of(b), key, t});
 }
 
+void end_contacts(World &w) {
+  ContactStore &s = w.store;
+  reserve_events(w, s.n);
+  for (uint32_t i = 0; i < s.n; ++i)
+    if (s.touching[i]) add_event(w, DFM_EVENT_END, s.id_a[i], s.id_b[i], s.key[i], w.time);
+  each_column([](const ContactColumn &, auto &values) { values.clear(); }, s);
+  s.n = w.report.n = 0;
+  w.stats.contacts = w.stats.sticking = 0;
+}
+
 void list_crossings(World &w, StepContext &step) {
   Array<Crossing> &list = step.next_store.crossings;
   list.clear();

@@ -2,6 +2,7 @@
 // False: the sub-step cannot be taken; `trouble` and dfm_last_error() say why, and nothing of it has been committed.
 #pragma once
 #include <cstdint>
+#include <memory>
 #include <span>
 
 #include "deform/world.h"
@@ -10,6 +11,7 @@
 namespace dfm {
 
 struct Body;
+struct FrictionRule;
 struct LawInstance;
 struct RestoredChoice;
 struct StepContext;
@@ -48,8 +50,12 @@ void keep_rigids(World &w, StepContext &step);         // once the sub-step is k
 void make_rows(World &w, StepContext &step);           // contacts as rows, with what they kept
 uint32_t tell_failed_solve(World &w, StepContext &step, const LawInstance *law);   // to dfm_last_error(), null: not finite; which trouble that is
 void set_zone_laws(World &w, StepContext &step);       // pair_table.cpp: state.law of this sub-step's contacts where a pair has a table
+void rename_law(World &w, const FrictionRule &rule, uint32_t to);   // pair_table.cpp: in the store, of contacts that the rule holds for
+// In a place that `free` marks, or behind the others.
+uint32_t place_law(World &w, std::unique_ptr<LawInstance> law, std::span<const uint8_t> free);
 void reserve_contacts(World &w, StepContext &step);    // memory for keep_contacts()
 void keep_contacts(World &w, StepContext &step);       // store, events, hold, work, report; allocates nothing
+void end_contacts(World &w);                           // all, with their events, where no stage of a plan looks after them
 void reserve_events(World &w, size_t more);
 void add_event(World &w, uint32_t kind, uint64_t a, uint64_t b, uint64_t key, double t);   // a, b: ids
 

@@ -68,10 +68,19 @@ uint32_t World::add_law(const char *name, std::span<const dfm_param_value> value
     if (laws[i]->type == &type && laws[i]->params == packed) return i;
   auto law = std::make_unique<LawInstance>(type, context->host, std::move(packed));
   if (law->nstate) need_ability(*this, Ability::law_memory, "friction law", name);
-  for (uint32_t i = 0; i < free.size(); ++i)
-    if (free[i]) return laws[i] = std::move(law), changed = true, i;
-  laws.push_back(std::move(law));
-  return static_cast<uint32_t>(laws.size() - 1);
+  return place_law(*this, std::move(law), free);
+}
+
+uint32_t place_law(World &w, std::unique_ptr<LawInstance> law, std::span<const uint8_t> free) {
+  const auto found = std::find(free.begin(), free.end(), uint8_t(1));
+  if (found == free.end()) {
+    w.laws.push_back(std::move(law));
+    return static_cast<uint32_t>(w.laws.size() - 1);
+  }
+  const uint32_t place = static_cast<uint32_t>(found - free.begin());
+  w.laws[place] = std::move(law);
+  w.changed = true;
+  return place;
 }
 
 namespace {
@@ -206,6 +215,7 @@ void prepare(World &w, const RestoredChoice *restored) {
   w.filter.version = filter_version + 1;
   w.pair_law.assign(size_t(nb) * width, 0);
   w.zone_table.clear(), w.zone_law.clear();
+  for (auto &law : w.laws) law->by_default = false;
   std::vector<uint32_t> used;
   for (uint32_t i = 0; i < nb; ++i) {
     const PairSide a{w.bodies[i]->name, {}, w.bodies[i]->material};
@@ -244,6 +254,7 @@ void prepare(World &w, const RestoredChoice *restored) {
   if (facts.self_bodies) need_ability(w, Ability::self_contact);
   w.plan = make_plan(w.method->table, facts);
   ++step.made.plans;
+  if (!restored && !w.plan.touches()) end_contacts(w);
 
   // While contacts live it only falls: a larger one would turn their rest into a depth, and push them apart at 0.1 d_c / h.
   const double wanted = contact_offset(w);

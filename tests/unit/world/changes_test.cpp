@@ -33,6 +33,21 @@ struct Running {
     const Made now = made();
     return {now.tables - before.tables, now.plans - before.plans};
   }
+  void friction(double mu, const char *a = "*", const char *b = "*") const {
+    const dfm_param_value v{"mu", &mu, 1};
+    const dfm_params params{sizeof params, 1, &v};
+    test::ok(dfm_world_set_friction(stack.world, a, b, &params));
+  }
+  void add_friction(double mu, const char *a, const char *b, const char *law = "coulomb") const {
+    const dfm_param_value v{"mu", &mu, 1};
+    dfm_friction_def f{};
+    f.size = sizeof f;
+    f.between[0] = a;
+    f.between[1] = b;
+    f.law = law;
+    f.params = {sizeof(dfm_params), 1, &v};
+    test::ok(dfm_world_add_friction(stack.world, &f));
+  }
   uint32_t push(double force, uint32_t nkey = 0, const dfm_scale_key *keys = nullptr) const {
     const uint32_t point = 1;
     const double f[3] = {force, 0, 0};
@@ -139,4 +154,52 @@ TEST(Changes, OfValues_LeadToTheSameStateAsMakingAllAnew) {
   }
   EXPECT_LT(a.made().tables, 3u);
   EXPECT_GT(b.made().tables, 199u);
+}
+
+TEST(Changes, OfACoefficient_MakeNothingAndKeepTheLaw) {
+  Running r;
+  const size_t laws = inside(r.stack.world).laws.size();
+  EXPECT_EQ(r.after([&] { r.friction(0.3); }), kNothing);
+  EXPECT_EQ(r.after([&] { r.add_friction(0.4, "*", "*"); }), kNothing) << "given again with another value";
+  EXPECT_EQ(r.after([&] { test::ok(dfm_world_remove_friction(r.stack.world, "*", "*")); }), kAll);
+  EXPECT_LE(inside(r.stack.world).laws.size(), laws + 1) << "the law of pairs without a rule";
+}
+
+TEST(Changes, OfARuleThatSharesItsLaw_MakeTheTablesOnce) {
+  Running r;
+  EXPECT_EQ(r.after([&] { r.add_friction(0.5, "lower", "floor"); }), kAll);
+  EXPECT_EQ(r.after([&] { r.friction(0.6, "floor", "lower"); }), kAll) << "shared with the rule for all: a law of its own, once";
+  for (int i = 0; i < 5; ++i) {
+    EXPECT_EQ(r.after([&] { r.friction(0.6 + 0.01 * i, "lower", "floor"); }), kNothing);
+    EXPECT_EQ(r.after([&] { r.friction(0.5 + 0.01 * i); }), kNothing);
+  }
+  EXPECT_EQ(r.after([&] { r.add_friction(0.7, "lower", "floor"); }), kNothing) << "moved behind the others, which weigh less";
+}
+
+// Of rules that weigh the same the last given wins: given again, the first one may hold elsewhere.
+TEST(Changes, OfARuleThatMovesBehindItsEquals_MakeAll) {
+  Running r;
+  r.add_friction(0.1, "lower", "*");
+  r.add_friction(0.9, "upper", "*");
+  r.step();
+  dfm::World &w = inside(r.stack.world);
+  const auto between_cubes = [&] { return w.laws[w.law_of(0, false, 1)]->params[0]; };
+  EXPECT_EQ(between_cubes(), 0.9);
+  EXPECT_EQ(r.after([&] { r.add_friction(0.2, "*", "lower"); }), kAll);
+  EXPECT_EQ(between_cubes(), 0.2);
+}
+
+// An hour of a slider that is read 55 times a second.
+TEST(Changes, OfACoefficientForAnHour_MakeNothing) {
+  Running r;
+  r.step();
+  const Made before = r.made();
+  const size_t laws = inside(r.stack.world).laws.size();
+  for (int i = 0; i < 200000; ++i) {
+    r.friction(0.1 + 1e-6 * i);
+    if (i % 1000 == 0) r.step();
+  }
+  EXPECT_EQ(r.made(), before);
+  EXPECT_EQ(inside(r.stack.world).laws.size(), laws);
+  EXPECT_EQ(inside(r.stack.world).friction.size(), 1u);
 }

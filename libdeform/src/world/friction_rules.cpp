@@ -1,0 +1,117 @@
+// A law that only one rule refers to takes new parameters in its place: numbers of laws, tables and plan stand, and contacts keep their
+// memory. A law that others share is left to them, and the rule gets one of its own, once.
+#include "world/friction_rules.h"
+
+#include <algorithm>
+
+#include "core/error.h"
+#include "friction/pair_rules.h"
+#include "plugin/params.h"
+#include "world/context.h"
+#include "world/method.h"
+#include "world/stages.h"
+#include "world/world.h"
+
+namespace dfm {
+namespace {
+
+// Laws that no rule but `but`, no contact and no table of pairs refers to. They make room for new ones.
+std::vector<uint8_t> free_laws(const World &w, const FrictionRule *but) {
+  std::vector<uint8_t> free(w.laws.size(), 1);
+  const auto use = [&](uint32_t law) {
+    if (law < free.size()) free[law] = 0;
+  };
+  for (const FrictionRule &r : w.friction)
+    if (&r != but) use(r.law);
+  for (const auto *const list : {&w.pair_law, &w.zone_law}) std::for_each(list->begin(), list->end(), use);
+  std::for_each(w.store.law.begin(), w.store.law.end(), use);
+  return free;
+}
+
+FrictionRule *find_rule(World &w, const std::string between[2]) {
+  const auto at = std::find_if(w.friction.begin(), w.friction.end(), [&](const FrictionRule &r) { return same_pair(r.between, between); });
+  return at == w.friction.end() ? nullptr : &*at;
+}
+
+FrictionRule &need_rule(World &w, const char *a, const char *b) {
+  const std::string between[2] = {a, b};
+  if (FrictionRule *const rule = find_rule(w, between)) return *rule;
+  std::vector<std::string> known;
+  for (const FrictionRule &r : w.friction) known.push_back("['" + r.between[0] + "', '" + r.between[1] + "']");
+  fail(DFM_E_ARG, "no rule of friction is for ['%s', '%s'] (rules: %s); dfm_world_add_friction makes one", a, b,
+       known.empty() ? "none" : join(known).c_str());
+}
+
+bool shared(const World &w, const FrictionRule &rule) {
+  const auto refers = [&](const FrictionRule &r) { return &r != &rule && r.law == rule.law; };
+  return w.laws[rule.law]->by_default || std::any_of(w.friction.begin(), w.friction.end(), refers);
+}
+
+bool same_memory(const LawInstance &a, const LawInstance &b) { return a.type == b.type && a.tangent == b.tangent; }
+
+// The rule's law, with other values of its parameters.
+void put_params(World &w, FrictionRule &rule, std::vector<double> values) {
+  std::unique_ptr<LawInstance> &law = w.laws[rule.law];
+  auto fresh = std::make_unique<LawInstance>(*law->type, w.context->host, std::move(values));
+  if (fresh->nstate) need_ability(w, Ability::law_memory, "friction law", law->type->id);
+  const bool remembers = same_memory(*law, *fresh);
+  if (remembers && !shared(w, rule)) {
+    law.swap(fresh);
+    if (rule.law < w.law_list.size()) w.law_list[rule.law] = law.get();
+    return;
+  }
+  const uint32_t own = place_law(w, std::move(fresh), free_laws(w, nullptr));
+  if (remembers) rename_law(w, rule, own);
+  rule.law = own;
+  w.changed = true;
+}
+
+// Does it hold for one pair of things, as a whole? Then its place among the others of this sort does not matter.
+bool names_things(World &w, const FrictionRule &rule) {
+  return std::all_of(rule.between, rule.between + 2, [&](const std::string &side) { return w.find_body(side) || w.find_obstacle(side); });
+}
+
+// The last given wins of rules that weigh the same.
+void move_to_end(World &w, FrictionRule *rule) {
+  FrictionRule *const end = w.friction.data() + w.friction.size();
+  if (std::any_of(rule, end, [&](const FrictionRule &r) { return !names_things(w, r); }) && rule + 1 != end) w.changed = true;
+  std::rotate(rule, rule + 1, end);
+}
+
+}  // namespace
+
+void add_friction_rule(World &w, std::string a, std::string b, const char *law, std::span<const dfm_param_value> given) {
+  FrictionRule rule{{std::move(a), std::move(b)}, 0};
+  w.friction.reserve(w.friction.size() + 1);
+  FrictionRule *const before = find_rule(w, rule.between);
+  const dfm_type &type = w.context->registry.find(DFM_KIND_FRICTION, law);
+  if (before && w.laws[before->law]->type == &type) {
+    put_params(w, *before, pack_params(type, given));
+    move_to_end(w, before);
+  } else {
+    rule.law = w.add_law(law, given, free_laws(w, before));
+    add_rule(w.friction, std::move(rule));
+    w.changed = true;
+  }
+  wake_all(w);
+  values_changed(w);
+}
+
+void set_friction_rule(World &w, const char *a, const char *b, std::span<const dfm_param_value> given) {
+  FrictionRule &rule = need_rule(w, a, b);
+  const LawInstance &law = *w.laws[rule.law];
+  std::vector<double> values = changed_params(*law.type, given, law.params);
+  if (values == law.params) return;
+  put_params(w, rule, std::move(values));
+  wake_all(w);
+  values_changed(w);
+}
+
+void remove_friction_rule(World &w, const char *a, const char *b) {
+  FrictionRule &rule = need_rule(w, a, b);
+  w.friction.erase(w.friction.begin() + (&rule - w.friction.data()));
+  wake_all(w);
+  w.changed = true;
+}
+
+}  // namespace dfm
