@@ -4,12 +4,15 @@
 
 #include "deform/deform.h"
 
-namespace CLI { class App; }   // <CLI/CLI.hpp>, 4 s of every compiler's time, is for the files that define subcommands
+// <CLI/CLI.hpp>, 4 s of every compiler's time, is for the files that define subcommands
+namespace CLI {
+class App;
+}
 
 namespace cli {
 
-// Exit codes of interfaces: 0 done, 2 bad usage or input, 3 the simulation stopped itself. Beside them: 1 a check was made and found
-// something, 4 a plugin ended the process (leaving.h), 130 a signal did.
+// Exit codes of interfaces: 0 done, 2 bad usage or input, 3 the simulation stopped itself. Beside them: 1 a
+// check was made and found something, 4 a plugin ended the process (leaving.h), 130 a signal did.
 enum Exit { kDone = 0, kFound = 1, kBadInput = 2, kStopped = 3 };
 
 struct Globals {

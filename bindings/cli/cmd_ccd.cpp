@@ -18,9 +18,10 @@
 namespace cli {
 namespace {
 
-const std::vector<std::string> kRoots = {"bisection", "regula_falsi", "brent", "conservative"};   // at their DFM_TOI_* values
+// at their DFM_TOI_* values
+const std::vector<std::string> kRoots = {"bisection", "regula_falsi", "brent", "conservative"};
 
-constexpr uint64_t kMaxBytes = uint64_t(1) << 30;   // some two million queries of 17 digits
+constexpr uint64_t kMaxBytes = uint64_t(1) << 30;  // some two million queries of 17 digits
 
 struct CcdOptions {
   std::string file, csv, root = "conservative";
@@ -30,7 +31,7 @@ struct CcdOptions {
 struct CcdQuery {
   std::string id;
   bool edges = false, labeled = false, hit = false;
-  double latest = 0;             // labeled hits: the exact time or the next number above it
+  double latest = 0;  // labeled hits: the exact time or the next number above it
   dfm_motion motion[4];
 };
 
@@ -55,12 +56,15 @@ class QueryFile {
       if (names_.empty()) header(cells);
       else row(cells);
     }
-    if (names_.empty()) throw Failure(kBadInput, path + " is empty; expected a line of column names and one line per query");
+    if (names_.empty())
+      throw Failure(kBadInput, path + " is empty; expected a line of column names and one line per query");
   }
   const std::vector<CcdQuery> &queries() const { return queries_; }
 
  private:
-  [[noreturn]] void refuse(const std::string &what) const { throw Failure(kBadInput, path_ + ":" + std::to_string(line_) + ": " + what); }
+  [[noreturn]] void refuse(const std::string &what) const {
+    throw Failure(kBadInput, path_ + ":" + std::to_string(line_) + ": " + what);
+  }
 
   static std::string coordinate_name(int p, int end, int axis) {
     return "p" + std::to_string(p) + "_t" + std::to_string(end) + "_" + "xyz"[axis];
@@ -68,8 +72,11 @@ class QueryFile {
 
   void header(const std::vector<std::string> &cells) {
     names_ = cells;
-    id_ = column("id", true), kind_ = column("kind", true), hit_ = column("hit", false);
-    toi_ = column("toi", false), latest_ = column("toi_hi", false);
+    id_ = column("id", true);
+    kind_ = column("kind", true);
+    hit_ = column("hit", false);
+    toi_ = column("toi", false);
+    latest_ = column("toi_hi", false);
     for (int p = 0; p < 4; ++p)
       for (int end = 0; end < 2; ++end)
         for (int axis = 0; axis < 3; ++axis)
@@ -80,7 +87,7 @@ class QueryFile {
     const auto found = std::find(names_.begin(), names_.end(), name);
     if (found != names_.end()) return int(found - names_.begin());
     if (!needed) return -1;
-    std::vector<std::string> strange = names_;   // a right name is not a misspelt one
+    std::vector<std::string> strange = names_;  // a right name is not a misspelt one
     for (int p = 0; p < 4; ++p)
       for (int end = 0; end < 2; ++end)
         for (int axis = 0; axis < 3; ++axis) std::erase(strange, coordinate_name(p, end, axis));
@@ -94,17 +101,20 @@ class QueryFile {
     char *end = nullptr;
     const double x = std::strtod(cell.c_str(), &end);
     if (end == cell.c_str() || *end || !std::isfinite(x))
-      refuse(names_[size_t(at)] + " is \"" + cell + "\", expected a finite number (decimal or C99 hexadecimal)");
+      refuse(names_[size_t(at)] + " is \"" + cell +
+             "\", expected a finite number (decimal or C99 hexadecimal)");
     return x;
   }
 
   void row(const std::vector<std::string> &cells) {
     if (cells.size() != names_.size())
-      refuse(std::to_string(cells.size()) + " cells, expected " + std::to_string(names_.size()) + " as the first line has");
+      refuse(std::to_string(cells.size()) + " cells, expected " + std::to_string(names_.size()) +
+             " as the first line has");
     CcdQuery q;
     q.id = cells[size_t(id_)];
     const std::string &kind = cells[size_t(kind_)];
-    if (kind != "vf" && kind != "ee") refuse("kind is \"" + kind + "\", expected \"vf\" (vertex, triangle) or \"ee\" (edge, edge)");
+    if (kind != "vf" && kind != "ee")
+      refuse("kind is \"" + kind + "\", expected \"vf\" (vertex, triangle) or \"ee\" (edge, edge)");
     q.edges = kind == "ee";
     for (int p = 0; p < 4; ++p)
       for (int axis = 0; axis < 3; ++axis) {
@@ -114,7 +124,8 @@ class QueryFile {
     if (hit_ >= 0 && !cells[size_t(hit_)].empty()) {
       const double hit = number_at(cells, hit_);
       if (hit != 0 && hit != 1) refuse("hit is \"" + cells[size_t(hit_)] + "\", expected 0 or 1");
-      q.labeled = true, q.hit = hit == 1;
+      q.labeled = true;
+      q.hit = hit == 1;
       if (q.hit && latest_ >= 0) q.latest = number_at(cells, latest_);
       else if (q.hit && toi_ >= 0) q.latest = std::nextafter(number_at(cells, toi_), 2.0);
       else q.latest = 1;
@@ -131,7 +142,7 @@ class QueryFile {
 
 struct Tally {
   size_t edges = 0, hits = 0, labeled = 0, missed = 0, false_hits = 0, late = 0;
-  double latest = 0;             // largest t - exact time
+  double latest = 0;  // largest t - exact time
   uint64_t evaluations = 0;
   uint32_t most = 0;
   double seconds = 0;
@@ -143,10 +154,11 @@ Tally answer(const CcdOptions &options, const std::vector<CcdQuery> &queries, st
   Tally tally;
   std::vector<double> times(queries.size());
   std::vector<uint32_t> evaluations(queries.size());
-  const std::clock_t begin = std::clock();   // processor time: others share the machine
+  const std::clock_t begin = std::clock();  // processor time: others share the machine
   for (size_t k = 0; k < queries.size(); ++k) {
     const dfm_motion *const m = queries[k].motion;
-    need(queries[k].edges ? dfm_toi_edge_edge(m, m + 2, &toi, &times[k], nullptr) : dfm_toi_point_triangle(m, m + 1, &toi, &times[k], nullptr));
+    need(queries[k].edges ? dfm_toi_edge_edge(m, m + 2, &toi, &times[k], nullptr)
+                          : dfm_toi_point_triangle(m, m + 1, &toi, &times[k], nullptr));
     evaluations[k] = dfm_toi_evaluations();
   }
   tally.seconds = double(std::clock() - begin) / CLOCKS_PER_SEC;
@@ -154,11 +166,18 @@ Tally answer(const CcdOptions &options, const std::vector<CcdQuery> &queries, st
     const CcdQuery &q = queries[k];
     const double t = times[k];
     const bool hit = t <= 1;
-    tally.edges += q.edges, tally.hits += hit, tally.evaluations += evaluations[k], tally.most = std::max(tally.most, evaluations[k]);
+    tally.edges += q.edges;
+    tally.hits += hit;
+    tally.evaluations += evaluations[k];
+    tally.most = std::max(tally.most, evaluations[k]);
     if (q.labeled) {
       ++tally.labeled;
-      tally.missed += q.hit && !hit, tally.false_hits += !q.hit && hit;
-      if (q.hit && hit && t > q.latest) ++tally.late, tally.latest = std::max(tally.latest, t - q.latest);
+      tally.missed += q.hit && !hit;
+      tally.false_hits += !q.hit && hit;
+      if (q.hit && hit && t > q.latest) {
+        ++tally.late;
+        tally.latest = std::max(tally.latest, t - q.latest);
+      }
     }
     char row[64];
     std::snprintf(row, sizeof row, ",%d,%.17g,%u\n", hit, t, evaluations[k]);
@@ -173,27 +192,37 @@ void print(const CcdOptions &options, const Globals &globals, size_t n, const Ta
     const auto whole = [](uint64_t x) { return std::to_string(x); };
     JsonObject out, work;
     work.add("mean", number(mean)).add("max", whole(t.most));
-    out.add("file", quoted(options.file)).add("root", quoted(options.root)).add("queries", whole(n)).add("edge_edge", whole(t.edges));
+    out.add("file", quoted(options.file))
+        .add("root", quoted(options.root))
+        .add("queries", whole(n))
+        .add("edge_edge", whole(t.edges));
     out.add("hits", whole(t.hits)).add("evaluations", work.text()).add("ns_per_query", number(ns));
     if (t.labeled) {
       JsonObject labels;
-      labels.add("queries", whole(t.labeled)).add("missed", whole(t.missed)).add("false", whole(t.false_hits));
+      labels.add("queries", whole(t.labeled))
+          .add("missed", whole(t.missed))
+          .add("false", whole(t.false_hits));
       out.add("labels", labels.add("late", whole(t.late)).add("late_by_max", number(t.latest)).text());
     }
     std::fputs(indented(out.text()).c_str(), stdout);
   } else if (!globals.quiet) {
     std::printf("%s\n", shown(options.file).c_str());
-    std::printf("  finder       %s\n  queries      %zu (%zu point-triangle, %zu edge-edge)\n", options.root.c_str(), n, n - t.edges, t.edges);
-    std::printf("  touch        %zu\n  evaluations  %.2f per query, at most %u\n  time         %.0f ns per query\n", t.hits, mean, t.most, ns);
+    std::printf("  finder       %s\n  queries      %zu (%zu point-triangle, %zu edge-edge)\n",
+                options.root.c_str(), n, n - t.edges, t.edges);
+    std::printf(
+        "  touch        %zu\n  evaluations  %.2f per query, at most %u\n  time         %.0f ns per query\n",
+        t.hits, mean, t.most, ns);
     if (t.labeled)
-      std::printf("  labels       %zu: missed %zu, false alarms %zu, late %zu (by at most %.2g)\n", t.labeled, t.missed, t.false_hits, t.late, t.latest);
+      std::printf("  labels       %zu: missed %zu, false alarms %zu, late %zu (by at most %.2g)\n", t.labeled,
+                  t.missed, t.false_hits, t.late, t.latest);
   }
 }
 
 int ccd(const CcdOptions &options, const Globals &globals) {
   if (std::find(kRoots.begin(), kRoots.end(), options.root) == kRoots.end()) {
     const std::string near = nearest(options.root, kRoots);
-    throw Failure(kBadInput, "--root is \"" + options.root + "\", expected bisection, regula_falsi, brent or conservative" +
+    throw Failure(kBadInput, "--root is \"" + options.root +
+                                 "\", expected bisection, regula_falsi, brent or conservative" +
                                  (near.empty() ? "" : "; did you mean \"" + near + "\"?"));
   }
   const QueryFile file(options.file);
@@ -209,10 +238,17 @@ int ccd(const CcdOptions &options, const Globals &globals) {
 void add_ccd(CLI::App &app, Globals &globals, int *exit_code) {
   const auto options = std::make_shared<CcdOptions>();
   CLI::App *sub = app.add_subcommand("ccd", "times of impact of point-triangle and edge-edge queries");
-  sub->add_option("QUERIES", options->file, "CSV with the columns id, kind (vf or ee), p0_t0_x to p3_t1_z; hit and toi_hi are compared with")->required();
-  sub->add_option("--root", options->root, "bisection, regula_falsi, brent or conservative")->capture_default_str()->type_name("FINDER");
-  sub->add_option("--csv", options->csv, "answers: id,hit,t,evaluations (t inf for a miss)")->type_name("OUT");
-  sub->add_option("--tolerance", options->tolerance, "conservative: a distance, as a share of the extent; else a width of t; 0: 1e-12");
+  sub->add_option(
+         "QUERIES", options->file,
+         "CSV with the columns id, kind (vf or ee), p0_t0_x to p3_t1_z; hit and toi_hi are compared with")
+      ->required();
+  sub->add_option("--root", options->root, "bisection, regula_falsi, brent or conservative")
+      ->capture_default_str()
+      ->type_name("FINDER");
+  sub->add_option("--csv", options->csv, "answers: id,hit,t,evaluations (t inf for a miss)")
+      ->type_name("OUT");
+  sub->add_option("--tolerance", options->tolerance,
+                  "conservative: a distance, as a share of the extent; else a width of t; 0: 1e-12");
   sub->add_option("--separation", options->separation, "touching is a distance of at most that, m");
   sub->callback([=, &globals] { *exit_code = ccd(*options, globals); });
 }

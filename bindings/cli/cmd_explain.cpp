@@ -13,9 +13,13 @@
 namespace cli {
 namespace {
 
-struct Options { std::string scene; std::vector<std::string> set; };
+struct Options {
+  std::string scene;
+  std::vector<std::string> set;
+};
 
-void print_list(const JsonValue &plan, const char *key, const char *title, const std::vector<std::string> &columns) {
+void print_list(const JsonValue &plan, const char *key, const char *title,
+                const std::vector<std::string> &columns) {
   const JsonValue *list = plan.find(key);
   std::printf("%s\n", title);
   if (!list || list->items.empty()) std::printf("  none\n");
@@ -35,7 +39,8 @@ void print_idle(const JsonValue &plan) {
   for (size_t i = 0; bodies && i < bodies->items.size(); ++i) {
     const JsonValue *idle = bodies->items[i].find("idle");
     for (size_t k = 0; idle && k < idle->items.size(); ++k)
-      std::printf("  %-20s  %s has no effect, or not the one it names: %s\n", bodies->items[i].get("name").c_str(), idle->items[k].get("name").c_str(),
+      std::printf("  %-20s  %s has no effect, or not the one it names: %s\n",
+                  bodies->items[i].get("name").c_str(), idle->items[k].get("name").c_str(),
                   idle->items[k].get("why").c_str());
   }
 }
@@ -48,8 +53,8 @@ void print_fields(const JsonValue &plan) {
     const JsonValue *fields = body.find("fields");
     for (size_t k = 0; fields && k < fields->items.size(); ++k) {
       const JsonValue &f = fields->items[k];
-      std::printf("  %-20s  %s by cell, from %s: %s to %s\n", body.get("name").c_str(), f.get("name").c_str(), f.get("from").c_str(), f.get("min").c_str(),
-                  f.get("max").c_str());
+      std::printf("  %-20s  %s by cell, from %s: %s to %s\n", body.get("name").c_str(), f.get("name").c_str(),
+                  f.get("from").c_str(), f.get("min").c_str(), f.get("max").c_str());
     }
   }
 }
@@ -58,7 +63,8 @@ int explain(const Options &options, const Globals &globals) {
   SceneFile scene(globals, options.scene, options.set, 0);
   const std::string text = scene.explain();
   JsonValue plan;
-  if (!parse_json(text, plan)) throw Failure(kBadInput, "the library's plan is not JSON: " + text.substr(0, 200));
+  if (!parse_json(text, plan))
+    throw Failure(kBadInput, "the library's plan is not JSON: " + text.substr(0, 200));
   if (globals.json) {
     std::printf("%s\n", text.c_str());
     return kDone;
@@ -77,7 +83,9 @@ int explain(const Options &options, const Globals &globals) {
     std::printf("\n");
     const double stable = std::strtod(step->get("stable_s").c_str(), nullptr), asked = scene.settings().step;
     if (asked > 0 && stable > 0)
-      std::printf("  the scene asks for %g s: %s%g sub-step%s each\n", asked, asked > stable ? "at least " : "", std::ceil(asked / stable - 1e-9), asked > stable ? "s" : "");
+      std::printf("  the scene asks for %g s: %s%g sub-step%s each\n", asked,
+                  asked > stable ? "at least " : "", std::ceil(asked / stable - 1e-9),
+                  asked > stable ? "s" : "");
   }
   return kDone;
 }
@@ -86,9 +94,13 @@ int explain(const Options &options, const Globals &globals) {
 
 void add_explain(CLI::App &app, Globals &globals, int *exit_code) {
   auto options = std::make_shared<Options>();
-  CLI::App *sub = app.add_subcommand("explain", "the plan: effects, stages that run, stages left out and why");
+  CLI::App *sub =
+      app.add_subcommand("explain", "the plan: effects, stages that run, stages left out and why");
   sub->add_option("SCENE", options->scene, "scene file (JSON)")->required();
-  sub->add_option("--set", options->set, "change a value of the scene")->type_name("/json/pointer=value")->take_all()->allow_extra_args(false);
+  sub->add_option("--set", options->set, "change a value of the scene")
+      ->type_name("/json/pointer=value")
+      ->take_all()
+      ->allow_extra_args(false);
   sub->callback([=, &globals] { *exit_code = explain(*options, globals); });
 }
 

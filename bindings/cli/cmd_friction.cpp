@@ -20,7 +20,7 @@
 namespace cli {
 namespace {
 
-const double kStep = 1e-4;   // s, where --step is not given
+const double kStep = 1e-4;  // s, where --step is not given
 
 struct FrictionOptions {
   std::string file, law, csv, plot;
@@ -46,14 +46,23 @@ std::string list_text(const std::vector<double> &values) {
   return json_array(items);
 }
 
-void print(const FrictionOptions &options, const Globals &globals, const FrictionCase &rig, const RigLaw &law, const RigResult &result) {
+void print(const FrictionOptions &options, const Globals &globals, const FrictionCase &rig, const RigLaw &law,
+           const RigResult &result) {
   if (globals.json) {
     JsonObject out;
-    out.add("file", quoted(options.file)).add("case", quoted(rig.id)).add("kind", quoted(rig.kind)).add("law", quoted(law.type().id));
-    out.add("normal_force", number(law.normal_force())).add("step", number(options.step)).add("steps", std::to_string(result.steps));
-    out.add("evaluations", std::to_string(law.evaluations())).add("rows", std::to_string(result.rows.size())).add("jumps", std::to_string(result.jumps));
+    out.add("file", quoted(options.file))
+        .add("case", quoted(rig.id))
+        .add("kind", quoted(rig.kind))
+        .add("law", quoted(law.type().id));
+    out.add("normal_force", number(law.normal_force()))
+        .add("step", number(options.step))
+        .add("steps", std::to_string(result.steps));
+    out.add("evaluations", std::to_string(law.evaluations()))
+        .add("rows", std::to_string(result.rows.size()))
+        .add("jumps", std::to_string(result.jumps));
     for (const auto &[name, values] : result.figures) {
-      const bool list = values.size() != 1 || name.find("times") != std::string::npos || name.find("per_") != std::string::npos;
+      const bool list = values.size() != 1 || name.find("times") != std::string::npos ||
+                        name.find("per_") != std::string::npos;
       out.add(name, list ? list_text(values) : number(values[0]));
     }
     std::vector<std::string> said;
@@ -62,9 +71,12 @@ void print(const FrictionOptions &options, const Globals &globals, const Frictio
     if (!result.stopped.empty()) out.add("stopped", quoted(result.stopped));
     std::fputs(indented(out.text()).c_str(), stdout);
   } else if (!globals.quiet) {
-    std::printf("%s\n  law          %s\n  drive        %s\n  steps        %llu of at most %g s, %.2f evaluations each\n  rows         %zu\n", shown(options.file).c_str(),
-                law.type().id, rig.kind.c_str(), static_cast<unsigned long long>(result.steps), options.step,
-                result.steps ? double(law.evaluations()) / double(result.steps) : 0.0, result.rows.size());
+    std::printf(
+        "%s\n  law          %s\n  drive        %s\n  steps        %llu of at most %g s, %.2f evaluations "
+        "each\n  rows         %zu\n",
+        shown(options.file).c_str(), law.type().id, rig.kind.c_str(),
+        static_cast<unsigned long long>(result.steps), options.step,
+        result.steps ? double(law.evaluations()) / double(result.steps) : 0.0, result.rows.size());
     for (const auto &[name, values] : result.figures) {
       if (values.empty()) continue;
       std::printf("  %-12s", name.c_str());
@@ -72,19 +84,22 @@ void print(const FrictionOptions &options, const Globals &globals, const Frictio
       std::printf(values.size() > 8 ? " ...\n" : "\n");
     }
     if (rig.drive == Drive::ramps)
-      for (const auto &row : result.rows) std::printf("  %-12.4g %.9g\n", row[0], row.size() > 1 ? row[1] : 0.0);
+      for (const auto &row : result.rows)
+        std::printf("  %-12.4g %.9g\n", row[0], row.size() > 1 ? row[1] : 0.0);
   }
 }
 
 // Without matplotlib the rows are kept beside where the picture would be.
-void picture(const FrictionOptions &options, const FrictionCase &rig, const RigLaw &law, const std::string &rows) {
+void picture(const FrictionOptions &options, const FrictionCase &rig, const RigLaw &law,
+             const std::string &rows) {
   const std::string beside = std::filesystem::path(options.plot).replace_extension(".csv").string();
   const std::string kept = options.csv.empty() ? beside : options.csv;
   const std::string csv = options.csv.empty() ? options.plot + ".rows" : options.csv;
   if (options.csv.empty()) write_whole(csv, rows);
   bool made = false;
   try {
-    made = plot_friction(csv, options.plot, rig.kind, (rig.id.empty() ? rig.kind : rig.id) + ", law " + law.type().id);
+    made = plot_friction(csv, options.plot, rig.kind,
+                         (rig.id.empty() ? rig.kind : rig.id) + ", law " + law.type().id);
   } catch (...) {
     if (options.csv.empty()) std::remove(csv.c_str());
     throw;
@@ -92,11 +107,15 @@ void picture(const FrictionOptions &options, const FrictionCase &rig, const RigL
   if (options.csv.empty()) std::remove(csv.c_str());
   if (made) return;
   if (options.csv.empty()) write_whole(kept, rows);
-  warn("no picture: no python3 with matplotlib was found; install it (Debian: python3-matplotlib) or name one in DEFORM_PYTHON; the rows are in " + kept);
+  warn(
+      "no picture: no python3 with matplotlib was found; install it (Debian: python3-matplotlib) or name one "
+      "in DEFORM_PYTHON; the rows are in " +
+      kept);
 }
 
 int friction(const FrictionOptions &options, const Globals &globals) {
-  if (!(options.step > 0) || !std::isfinite(options.step)) throw Failure(kBadInput, "--step is not above 0, expected the longest step in s");
+  if (!(options.step > 0) || !std::isfinite(options.step))
+    throw Failure(kBadInput, "--step is not above 0, expected the longest step in s");
   const FrictionCase rig = read_case(options.file);
   RigLaw law(globals, rig, options.law);
   RigResult result;
@@ -105,8 +124,10 @@ int friction(const FrictionOptions &options, const Globals &globals) {
     result = run_rig(rig, law, options.step, progress);
   }
   if (result.jumps)
-    warn("the law " + std::string(law.type().id) + " jumps where it does not say so: " + std::to_string(result.jumps) +
-         " steps took the force between the two sides of a jump; a law that jumps at rest sets DFM_FRIC_SET_VALUED and answers with ft_stop");
+    warn("the law " + std::string(law.type().id) +
+         " jumps where it does not say so: " + std::to_string(result.jumps) +
+         " steps took the force between the two sides of a jump; a law that jumps at rest sets "
+         "DFM_FRIC_SET_VALUED and answers with ft_stop");
   const std::string rows = csv_text(result);
   if (!options.csv.empty()) write_whole(options.csv, rows);
   if (!options.plot.empty() && !result.rows.empty()) picture(options, rig, law, rows);
@@ -120,12 +141,18 @@ int friction(const FrictionOptions &options, const Globals &globals) {
 
 void add_friction(CLI::App &app, Globals &globals, int *exit_code) {
   const auto options = std::make_shared<FrictionOptions>();
-  CLI::App *sub = app.add_subcommand("friction", "runs a friction law on a rig: a driven mass, a prescribed slip, a spring, ramps");
-  sub->add_option("CASE", options->file, "JSON with law, params, input, output_times (libdeform/doc/reference/friction_rig.md)")->required();
-  sub->add_option("--law", options->law, "short name, full id, or path of a plugin file; otherwise the case's")->type_name("ID");
+  CLI::App *sub = app.add_subcommand(
+      "friction", "runs a friction law on a rig: a driven mass, a prescribed slip, a spring, ramps");
+  sub->add_option("CASE", options->file,
+                  "JSON with law, params, input, output_times (libdeform/doc/reference/friction_rig.md)")
+      ->required();
+  sub->add_option("--law", options->law,
+                  "short name, full id, or path of a plugin file; otherwise the case's")
+      ->type_name("ID");
   sub->add_option("--step", options->step, "longest step, s")->capture_default_str()->type_name("H");
   sub->add_option("--csv", options->csv, "the case's columns at its output times")->type_name("OUT");
-  sub->add_option("--plot", options->plot, "a picture of them (python3 with matplotlib)")->type_name("OUT.png");
+  sub->add_option("--plot", options->plot, "a picture of them (python3 with matplotlib)")
+      ->type_name("OUT.png");
   sub->callback([=, &globals] { *exit_code = friction(*options, globals); });
 }
 

@@ -41,7 +41,8 @@ constexpr const char *kIn = "mesh of any format that is read: .msh .vtk .vtu .me
 
 bool open(MeshSession &s, const std::string &file, bool as_surface) {
   if (!s.context) return false;
-  return (as_surface ? dfm_trimesh_read(s.context, file.c_str(), &s.surface) : dfm_mesh_read(s.context, file.c_str(), &s.cells, &s.surface)) >= 0;
+  return (as_surface ? dfm_trimesh_read(s.context, file.c_str(), &s.surface)
+                     : dfm_mesh_read(s.context, file.c_str(), &s.cells, &s.surface)) >= 0;
 }
 
 int info(const Globals &globals, const std::string &file) {
@@ -59,7 +60,8 @@ std::string lost_shares(dfm_tetmesh cells, const std::string &out) {
   const double *share = nullptr;
   const std::string ending = mesh_ending(out);
   if (dfm_tetmesh_share(cells, &share) < 0 || !share || ending == "vtk" || ending == "vtu") return "";
-  return "shares of material, which .vtk and .vtu hold: as a body every cell of ." + ending + " counts whole in mass and stiffness";
+  return "shares of material, which .vtk and .vtu hold: as a body every cell of ." + ending +
+         " counts whole in mass and stiffness";
 }
 
 namespace {
@@ -72,7 +74,8 @@ std::vector<std::string> losses(const MeshSession &s, const std::string &out) {
     dfm_tetmesh_info i = {};
     i.size = sizeof i;
     dfm_tetmesh_get_info(s.cells, &i);
-    if (i.ngroup && ending == "mesh") lost.push_back("names of groups, of which Medit holds the number alone");
+    if (i.ngroup && ending == "mesh")
+      lost.push_back("names of groups, of which Medit holds the number alone");
     if (const std::string shares = lost_shares(s.cells, out); !shares.empty()) lost.push_back(shares);
     return lost;
   }
@@ -82,29 +85,34 @@ std::vector<std::string> losses(const MeshSession &s, const std::string &out) {
   if (ending == "stl") lost.push_back("digits beyond single precision, about 7, which is all that STL holds");
   if (i.ngroup && ending == "ply") lost.push_back("names of groups, of which PLY holds the number alone");
   if (i.ngroup && (ending == "stl" || ending == "off"))
-    lost.push_back(std::to_string(i.ngroup) + (i.ngroup == 1 ? " group" : " groups") + " of triangles, without which ." + ending + " is written");
+    lost.push_back(std::to_string(i.ngroup) + (i.ngroup == 1 ? " group" : " groups") +
+                   " of triangles, without which ." + ending + " is written");
   return lost;
 }
 
 // Reads, drops what `out` cannot hold and says so in `lost`, writes.
-int convert_file(MeshSession &s, const std::string &in, const std::string &out, std::vector<std::string> &lost) {
+int convert_file(MeshSession &s, const std::string &in, const std::string &out,
+                 std::vector<std::string> &lost) {
   std::string sentence;
   if (!s.context) return fail(dfm_last_error());
   if (!import_surface(in, s, sentence)) return fail(sentence);
   if (s.surface) lost.push_back("materials, normals, textures and movement, of which a surface has none");
   else if (!open(s, in, false)) return fail(dfm_last_error());
   if (s.surface && written_by(out) == Writes::cells)
-    return fail(out + ": ." + mesh_ending(out) + " is written with tetrahedra, and " + in + " is a surface; fill it: deform mesh fill " + in +
-                " --out " + out + ", or convert it to .obj, .ply, .stl, .off, .vtk or .vtu");
+    return fail(out + ": ." + mesh_ending(out) + " is written with tetrahedra, and " + in +
+                " is a surface; fill it: deform mesh fill " + in + " --out " + out +
+                ", or convert it to .obj, .ply, .stl, .off, .vtk or .vtu");
   if (s.cells && written_by(out) == Writes::surface) {
     dfm_tetmesh_info i = {};
     i.size = sizeof i;
     dfm_tetmesh_get_info(s.cells, &i);
-    lost.push_back(std::to_string(i.ntet) + (i.ntet == 1 ? " tetrahedron" : " tetrahedra") + ", of which ." + mesh_ending(out) + " holds the boundary alone");
+    lost.push_back(std::to_string(i.ntet) + (i.ntet == 1 ? " tetrahedron" : " tetrahedra") + ", of which ." +
+                   mesh_ending(out) + " holds the boundary alone");
     s.cells = 0;
     if (dfm_trimesh_read(s.context, in.c_str(), &s.surface) < 0) return fail(dfm_last_error());
   }
-  if ((s.surface ? dfm_trimesh_write(s.surface, out.c_str()) : dfm_tetmesh_write(s.cells, out.c_str())) < 0) return fail(dfm_last_error());
+  if ((s.surface ? dfm_trimesh_write(s.surface, out.c_str()) : dfm_tetmesh_write(s.cells, out.c_str())) < 0)
+    return fail(dfm_last_error());
   for (const std::string &l : losses(s, out)) lost.push_back(l);
   return kDone;
 }
@@ -138,19 +146,25 @@ int make(const Globals &globals, const Shape &shape) {
   MeshSession s(globals);
   const std::vector<double> size = shape.size();
   const Writes writes = written_by(shape.out);
-  const bool surface = shape.surface || writes == Writes::surface || (shape.kind == "torus" && writes == Writes::either);
+  const bool surface =
+      shape.surface || writes == Writes::surface || (shape.kind == "torus" && writes == Writes::either);
   if (surface && writes == Writes::cells)
-    return fail(shape.out + ": ." + mesh_ending(shape.out) + " is written with tetrahedra; write a surface as .obj, .ply, .stl, .off, .vtk or .vtu");
+    return fail(shape.out + ": ." + mesh_ending(shape.out) +
+                " is written with tetrahedra; write a surface as .obj, .ply, .stl, .off, .vtk or .vtu");
   if (!s.context) return fail(dfm_last_error());
   if (!surface && shape.kind == "torus")
-    return fail(shape.out + ": a torus is made as a surface; write .obj, .ply, .stl, .off, .vtk or .vtu, then: deform mesh fill SURFACE --out " +
+    return fail(shape.out +
+                ": a torus is made as a surface; write .obj, .ply, .stl, .off, .vtk or .vtu, then: deform "
+                "mesh fill SURFACE --out " +
                 shape.out);
   {
     const Patience patience(told(globals), "making " + shape.out);
-    const dfm_status made = surface ? dfm_trimesh_make(s.context, shape.kind.c_str(), size.data(), shape.cells, &s.surface)
-                                    : dfm_tetmesh_make(s.context, shape.kind.c_str(), size.data(), shape.cells, &s.cells);
+    const dfm_status made =
+        surface ? dfm_trimesh_make(s.context, shape.kind.c_str(), size.data(), shape.cells, &s.surface)
+                : dfm_tetmesh_make(s.context, shape.kind.c_str(), size.data(), shape.cells, &s.cells);
     if (made < 0) return fail(dfm_last_error());
-    if ((surface ? dfm_trimesh_write(s.surface, shape.out.c_str()) : dfm_tetmesh_write(s.cells, shape.out.c_str())) < 0)
+    if ((surface ? dfm_trimesh_write(s.surface, shape.out.c_str())
+                 : dfm_tetmesh_write(s.cells, shape.out.c_str())) < 0)
       return fail(dfm_last_error());
   }
   return report_mesh(globals, shape.out, s, false);
@@ -158,23 +172,39 @@ int make(const Globals &globals, const Shape &shape) {
 
 void add_make(CLI::App *mesh, Globals &globals, int *exit_code) {
   struct Kind { const char *name, *about; };
-  CLI::App *command = mesh->add_subcommand("make", "a cylinder, beam, ball, tube or torus, of near-isotropic cells or as a surface");
+  CLI::App *command = mesh->add_subcommand(
+      "make", "a cylinder, beam, ball, tube or torus, of near-isotropic cells or as a surface");
   command->require_subcommand(1);
-  for (const Kind &kind : {Kind{"cylinder", "axis z, base at the origin"}, Kind{"beam", "edges from the origin"}, Kind{"ball", "about the origin"},
-                           Kind{"tube", "a cylinder with a hole; axis z, base at the origin"}, Kind{"torus", "a surface; about the origin, axis z"}}) {
+  for (const Kind &kind :
+       {Kind{"cylinder", "axis z, base at the origin"}, Kind{"beam", "edges from the origin"},
+        Kind{"ball", "about the origin"}, Kind{"tube", "a cylinder with a hole; axis z, base at the origin"},
+        Kind{"torus", "a surface; about the origin, axis z"}}) {
     const std::string name = kind.name;
     CLI::App *sub = command->add_subcommand(name, kind.about);
     const auto shape = std::make_shared<Shape>();
     shape->kind = name;
     if (name == "ball" || name == "torus") shape->radius = 0.1;
-    sub->add_option("--out", shape->out, "file to write: cells as .msh (MSH 4.1), .msh2 (MSH 2.2), .mesh, .vtk or .vtu, a surface as .obj, .ply, .stl or .off")
-        ->required()->type_name("FILE");
-    sub->add_option("--cells", shape->cells, "about how many tetrahedra, or triangles of a surface")->capture_default_str()->type_name("N");
-    if (name == "beam") sub->add_option("--size", shape->edges, "edges x y z, m")->expected(3)->capture_default_str();
-    else sub->add_option("--radius", shape->radius, name == "tube" ? "outer, m" : name == "torus" ? "of the tube, m" : "m")->capture_default_str();
+    sub->add_option("--out", shape->out,
+                    "file to write: cells as .msh (MSH 4.1), .msh2 (MSH 2.2), .mesh, .vtk or .vtu, a surface "
+                    "as .obj, .ply, .stl or .off")
+        ->required()
+        ->type_name("FILE");
+    sub->add_option("--cells", shape->cells, "about how many tetrahedra, or triangles of a surface")
+        ->capture_default_str()
+        ->type_name("N");
+    if (name == "beam")
+      sub->add_option("--size", shape->edges, "edges x y z, m")->expected(3)->capture_default_str();
+    else
+      sub->add_option("--radius", shape->radius,
+                      name == "tube"    ? "outer, m"
+                      : name == "torus" ? "of the tube, m"
+                                        : "m")
+          ->capture_default_str();
     if (name == "tube") sub->add_option("--inner", shape->inner, "inner radius, m")->capture_default_str();
-    if (name == "torus") sub->add_option("--ring", shape->ring, "radius of the ring, m")->capture_default_str();
-    if (name == "cylinder" || name == "tube") sub->add_option("--length", shape->length, "m")->capture_default_str();
+    if (name == "torus")
+      sub->add_option("--ring", shape->ring, "radius of the ring, m")->capture_default_str();
+    if (name == "cylinder" || name == "tube")
+      sub->add_option("--length", shape->length, "m")->capture_default_str();
     sub->add_flag("--surface", shape->surface, "the surface alone, also as .vtk or .vtu");
     sub->callback([=, &globals] { *exit_code = make(globals, *shape); });
   }
@@ -187,15 +217,23 @@ void add_mesh(CLI::App &app, Globals &globals, int *exit_code) {
   mesh->require_subcommand(1);
   const auto first = std::make_shared<std::string>(), second = std::make_shared<std::string>();
 
-  CLI::App *info_command = mesh->add_subcommand("info", "counts, quality, groups and what had to be repaired");
+  CLI::App *info_command =
+      mesh->add_subcommand("info", "counts, quality, groups and what had to be repaired");
   info_command->add_option("FILE", *first, kIn)->required();
   info_command->callback([=, &globals] { *exit_code = info(globals, *first); });
 
   add_make(mesh, globals, exit_code);
 
-  CLI::App *convert_command = mesh->add_subcommand("convert", "reads IN, writes OUT by its file name ending; of cells the boundary where OUT is a surface");
-  convert_command->add_option("IN", *first, std::string(kIn) + "; glTF, FBX, COLLADA and others where built with assimp")->required();
-  convert_command->add_option("OUT", *second, ".msh (MSH 4.1), .msh2 (MSH 2.2), .mesh, .vtk, .vtu, .obj, .ply, .stl or .off")->required();
+  CLI::App *convert_command = mesh->add_subcommand(
+      "convert",
+      "reads IN, writes OUT by its file name ending; of cells the boundary where OUT is a surface");
+  convert_command
+      ->add_option("IN", *first, std::string(kIn) + "; glTF, FBX, COLLADA and others where built with assimp")
+      ->required();
+  convert_command
+      ->add_option("OUT", *second,
+                   ".msh (MSH 4.1), .msh2 (MSH 2.2), .mesh, .vtk, .vtu, .obj, .ply, .stl or .off")
+      ->required();
   convert_command->callback([=, &globals] { *exit_code = convert(globals, *first, *second); });
 
   add_mesh_fill(mesh, globals, exit_code);

@@ -1,4 +1,5 @@
-// What the subcommands of `deform mesh` share: a quiet context with a mesh of either kind, and how one is told.
+// What the subcommands of `deform mesh` share: a quiet context with a mesh of either kind, and
+// how one is told.
 #pragma once
 #include <string>
 #include <vector>
@@ -19,23 +20,25 @@ struct MeshSession {
   MeshSession &operator=(const MeshSession &) = delete;
 };
 
-// Tells the mesh of the session. asked: all that is known, as a table; else one line and, on stderr, the warnings. --json: everything.
-// `notes` stand beside the warnings: what a conversion could not keep.
+// Tells the mesh of the session. asked: all that is known, as a table; else one line and, on stderr, the
+// warnings. --json: everything. `notes` stand beside the warnings: what a conversion could not keep.
 int report_mesh(const Globals &globals, const std::string &file, const MeshSession &session, bool asked,
                 const std::vector<std::string> &notes = {});
 
 // Where `out` cannot hold how much of each cell is material, and the mesh knows it: the sentence about it.
 std::string lost_shares(dfm_tetmesh cells, const std::string &out);
 std::vector<std::string> lines_of(const char *text);  // what the library's infos hold as one text
-inline bool told(const Globals &globals) { return !globals.quiet && !globals.json; }  // whether a terminal hears how long it takes
+// whether a terminal hears how long it takes
+inline bool told(const Globals &globals) { return !globals.quiet && !globals.json; }
 
-// How a file name ending is written: cells (.msh .msh2 .mesh), a surface (.obj .ply .stl .off) or either (.vtk .vtu, anything unknown).
+// How a file name ending is written: cells (.msh .msh2 .mesh), a surface (.obj .ply .stl .off) or either
+// (.vtk .vtu, anything unknown).
 enum class Writes { cells, surface, either };
 Writes written_by(const std::string &path);
 std::string mesh_ending(const std::string &path);  // lower case, without the dot
 
-// Reads a surface of a format that the library leaves to assimp. False: its message is in `sentence`; true with session.surface 0: not
-// such a format.
+// Reads a surface of a format that the library leaves to assimp. False: its message is in `sentence`; true
+// with session.surface 0: not such a format.
 bool import_surface(const std::string &path, MeshSession &session, std::string &sentence);
 
 void add_mesh_fill(CLI::App *mesh, Globals &globals, int *exit_code);

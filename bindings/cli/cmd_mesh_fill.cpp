@@ -15,7 +15,9 @@ namespace cli {
 namespace {
 
 using Clock = std::chrono::steady_clock;
-double seconds_since(Clock::time_point begin) { return std::chrono::duration<double>(Clock::now() - begin).count(); }
+double seconds_since(Clock::time_point begin) {
+  return std::chrono::duration<double>(Clock::now() - begin).count();
+}
 
 struct Filled {
   dfm_trimesh_info surface = {};
@@ -28,16 +30,20 @@ double cell_volume(const double *x, const uint32_t *tet) {
   double e[3][3];
   for (int k = 0; k < 3; ++k)
     for (int c = 0; c < 3; ++c) e[k][c] = x[3 * size_t(tet[k + 1]) + c] - x[3 * size_t(tet[0]) + c];
-  return (e[0][0] * (e[1][1] * e[2][2] - e[1][2] * e[2][1]) - e[0][1] * (e[1][0] * e[2][2] - e[1][2] * e[2][0]) +
-          e[0][2] * (e[1][0] * e[2][1] - e[1][1] * e[2][0])) / 6;
+  return (e[0][0] * (e[1][1] * e[2][2] - e[1][2] * e[2][1]) -
+          e[0][1] * (e[1][0] * e[2][2] - e[1][2] * e[2][0]) +
+          e[0][2] * (e[1][0] * e[2][1] - e[1][1] * e[2][0])) /
+         6;
 }
 
 bool measure(dfm_trimesh surface, dfm_tetmesh mesh, Filled &out) {
-  out.surface.size = sizeof out.surface, out.cells.size = sizeof out.cells;
+  out.surface.size = sizeof out.surface;
+  out.cells.size = sizeof out.cells;
   const double *points = nullptr, *share = nullptr;
   const uint32_t *tets = nullptr;
   if (dfm_trimesh_get_info(surface, &out.surface) < 0 || dfm_tetmesh_get_info(mesh, &out.cells) < 0 ||
-      dfm_tetmesh_data(mesh, &points, &tets, nullptr) < 0 || dfm_tetmesh_share(mesh, &share) < 0) return false;
+      dfm_tetmesh_data(mesh, &points, &tets, nullptr) < 0 || dfm_tetmesh_share(mesh, &share) < 0)
+    return false;
   for (uint32_t t = 0; t < out.cells.ntet; ++t) {
     out.volume += share[t] * cell_volume(points, tets + 4 * size_t(t));
     out.mean_share += share[t] / out.cells.ntet;
@@ -53,18 +59,31 @@ void print_json(const std::string &in, const std::string &file, uint32_t wanted,
   std::vector<std::string> warnings;
   for (const std::string &w : f.warnings) warnings.push_back(quoted(w));
   JsonObject out;
-  out.add("surface", quoted(in)).add("file", quoted(file)).add("triangles", whole(f.surface.ntriangle)).add("wanted", whole(wanted));
-  out.add("cells", whole(f.cells.ntet)).add("points", whole(f.cells.npoint)).add("pieces", whole(f.cells.npiece));
-  out.add("enclosed_volume", number(f.volume)).add("cells_volume", number(f.cells.volume)).add("mean_share", number(f.mean_share));
-  out.add("least_share", number(f.least_share)).add("edge_median", number(f.cells.edge_median)).add("seconds", number(f.seconds));
-  out.add("open_edges", whole(f.surface.open_edges)).add("holes", whole(f.surface.holes)).add("turned", whole(f.surface.turned));
+  out.add("surface", quoted(in))
+      .add("file", quoted(file))
+      .add("triangles", whole(f.surface.ntriangle))
+      .add("wanted", whole(wanted));
+  out.add("cells", whole(f.cells.ntet))
+      .add("points", whole(f.cells.npoint))
+      .add("pieces", whole(f.cells.npiece));
+  out.add("enclosed_volume", number(f.volume))
+      .add("cells_volume", number(f.cells.volume))
+      .add("mean_share", number(f.mean_share));
+  out.add("least_share", number(f.least_share))
+      .add("edge_median", number(f.cells.edge_median))
+      .add("seconds", number(f.seconds));
+  out.add("open_edges", whole(f.surface.open_edges))
+      .add("holes", whole(f.surface.holes))
+      .add("turned", whole(f.surface.turned));
   out.add("warnings", json_array(warnings));
   std::fputs(indented(out.text()).c_str(), stdout);
 }
 
 void print_table(const std::string &in, const std::string &file, const Filled &f) {
-  std::printf("%s: %u triangles, filled into %s\n", shown(in).c_str(), f.surface.ntriangle, shown(file).c_str());
-  std::printf("  cells             %u\n  points            %u\n  pieces            %u\n", f.cells.ntet, f.cells.npoint, f.cells.npiece);
+  std::printf("%s: %u triangles, filled into %s\n", shown(in).c_str(), f.surface.ntriangle,
+              shown(file).c_str());
+  std::printf("  cells             %u\n  points            %u\n  pieces            %u\n", f.cells.ntet,
+              f.cells.npoint, f.cells.npiece);
   std::printf("  enclosed volume   %.6g m3\n", f.volume);
   std::printf("  share of material mean %.3f, least %.3f\n", f.mean_share, f.least_share);
   std::printf("  edge length       %.4g to %.4g m\n", f.cells.edge_min, f.cells.edge_max);
@@ -88,23 +107,39 @@ int fill(const Globals &globals, const std::string &in, const std::string &out, 
   }
   filled.seconds = seconds_since(begin);
   if (!measure(s.surface, s.cells, filled)) return fail(dfm_last_error());
-  if (const std::string lost = lost_shares(s.cells, out); !lost.empty()) filled.warnings.push_back("not kept: " + lost);
+  if (const std::string lost = lost_shares(s.cells, out); !lost.empty())
+    filled.warnings.push_back("not kept: " + lost);
   if (globals.json) print_json(in, out, cells, filled);
   else if (!globals.quiet) print_table(in, out, filled);
   return kDone;
 }
 
-struct FillOptions { std::string surface, out; uint32_t cells = 5000; };
+struct FillOptions {
+  std::string surface, out;
+  uint32_t cells = 5000;
+};
 
 }  // namespace
 
 void add_mesh_fill(CLI::App *mesh, Globals &globals, int *exit_code) {
-  CLI::App *command = mesh->add_subcommand("fill", "lattice tetrahedra inside a closed surface; a scene does it by itself with the body key \"fill\"");
+  CLI::App *command = mesh->add_subcommand(
+      "fill",
+      "lattice tetrahedra inside a closed surface; a scene does it by itself with the body key \"fill\"");
   const auto options = std::make_shared<FillOptions>();
-  command->add_option("SURFACE", options->surface, "OBJ, PLY, STL, OFF, or any file with triangles that mesh info or mesh convert reads")->required();
-  command->add_option("--out", options->out, "file to write: .msh (MSH 4.1), .msh2 (MSH 2.2), .mesh, .vtk or .vtu")->required()->type_name("FILE");
-  command->add_option("--cells", options->cells, "about how many tetrahedra")->capture_default_str()->type_name("N");
-  command->callback([=, &globals] { *exit_code = fill(globals, options->surface, options->out, options->cells); });
+  command
+      ->add_option("SURFACE", options->surface,
+                   "OBJ, PLY, STL, OFF, or any file with triangles that mesh info or mesh convert reads")
+      ->required();
+  command
+      ->add_option("--out", options->out,
+                   "file to write: .msh (MSH 4.1), .msh2 (MSH 2.2), .mesh, .vtk or .vtu")
+      ->required()
+      ->type_name("FILE");
+  command->add_option("--cells", options->cells, "about how many tetrahedra")
+      ->capture_default_str()
+      ->type_name("N");
+  command->callback(
+      [=, &globals] { *exit_code = fill(globals, options->surface, options->out, options->cells); });
 }
 
 }  // namespace cli

@@ -8,8 +8,15 @@
 namespace cli {
 namespace {
 
-struct Defect { const char *key; uint32_t count; };
-struct Group { std::string name; uint32_t dimension = 0, count = 0; bool by_triangles = false; };
+struct Defect {
+  const char *key;
+  uint32_t count;
+};
+struct Group {
+  std::string name;
+  uint32_t dimension = 0, count = 0;
+  bool by_triangles = false;
+};
 
 // What both kinds of mesh tell, under the same names.
 struct Report {
@@ -34,9 +41,13 @@ std::string text(const char *format, double x) {
 
 template <class Info>
 void take_common(Report &r, const Info &i) {
-  std::copy_n(i.lo, 3, r.lo), std::copy_n(i.hi, 3, r.hi);
-  r.edge_min = i.edge_min, r.edge_median = i.edge_median, r.edge_max = i.edge_max;
-  r.quality_min = i.quality_min, r.quality_mean = i.quality_mean;
+  std::copy_n(i.lo, 3, r.lo);
+  std::copy_n(i.hi, 3, r.hi);
+  r.edge_min = i.edge_min;
+  r.edge_median = i.edge_median;
+  r.edge_max = i.edge_max;
+  r.quality_min = i.quality_min;
+  r.quality_mean = i.quality_mean;
   r.histogram.assign(i.quality_histogram, i.quality_histogram + 10);
   r.warnings = lines_of(i.warnings);
 }
@@ -46,14 +57,29 @@ bool describe_cells(dfm_tetmesh mesh, Report &r) {
   i.size = sizeof i;
   if (dfm_tetmesh_get_info(mesh, &i) < 0) return false;
   take_common(r, i);
-  r.kind = "cells", r.quality = "mean ratio", r.best = "regular";
-  r.counts = {{"points", i.npoint}, {"tets", i.ntet}, {"surface_triangles", i.ntriangle}, {"edges", i.nedge}, {"pieces", i.npiece}};
+  r.kind = "cells";
+  r.quality = "mean ratio";
+  r.best = "regular";
+  r.counts = {{"points", i.npoint},
+              {"tets", i.ntet},
+              {"surface_triangles", i.ntriangle},
+              {"edges", i.nedge},
+              {"pieces", i.npiece}};
   r.measures = {{"volume", i.volume}};
   const auto count = [&](const char *name, uint32_t n) { r.lines.emplace_back(name, std::to_string(n)); };
-  count("points", i.npoint), count("tetrahedra", i.ntet), count("surface triangles", i.ntriangle), count("edges", i.nedge);
-  count("pieces", i.npiece), r.lines.emplace_back("volume", text("%.10g m3", i.volume));
-  r.defects = {{"turned", i.turned}, {"dropped_points", i.dropped_points}, {"dropped_cells", i.dropped_cells}, {"flat_cells", i.flat_cells},
-               {"duplicate_points", i.duplicate_points}, {"nonmanifold_edges", i.nonmanifold_edges}, {"overlapping_faces", i.overlapping_faces}};
+  count("points", i.npoint);
+  count("tetrahedra", i.ntet);
+  count("surface triangles", i.ntriangle);
+  count("edges", i.nedge);
+  count("pieces", i.npiece);
+  r.lines.emplace_back("volume", text("%.10g m3", i.volume));
+  r.defects = {{"turned", i.turned},
+               {"dropped_points", i.dropped_points},
+               {"dropped_cells", i.dropped_cells},
+               {"flat_cells", i.flat_cells},
+               {"duplicate_points", i.duplicate_points},
+               {"nonmanifold_edges", i.nonmanifold_edges},
+               {"overlapping_faces", i.overlapping_faces}};
   const char *const *names = nullptr;
   dfm_tetmesh_groups(mesh, &names, nullptr);
   r.groups.resize(i.ngroup);
@@ -61,8 +87,9 @@ bool describe_cells(dfm_tetmesh mesh, Report &r) {
     r.groups[k].name = names[k];
     dfm_tetmesh_group_points(mesh, k, &r.groups[k].dimension, nullptr, &r.groups[k].count);
   }
-  r.summary = std::to_string(i.npoint) + " points, " + std::to_string(i.ntet) + " tetrahedra, " + std::to_string(i.ntriangle) +
-              " surface triangles, least mean ratio " + text("%.3g", i.quality_min);
+  r.summary = std::to_string(i.npoint) + " points, " + std::to_string(i.ntet) + " tetrahedra, " +
+              std::to_string(i.ntriangle) + " surface triangles, least mean ratio " +
+              text("%.3g", i.quality_min);
   return true;
 }
 
@@ -71,17 +98,30 @@ bool describe_surface(dfm_trimesh mesh, Report &r) {
   i.size = sizeof i;
   if (dfm_trimesh_get_info(mesh, &i) < 0) return false;
   take_common(r, i);
-  r.kind = "surface", r.quality = "quality", r.best = "equilateral";
+  r.kind = "surface";
+  r.quality = "quality";
+  r.best = "equilateral";
   r.counts = {{"points", i.npoint}, {"triangles", i.ntriangle}, {"edges", i.nedge}, {"pieces", i.npiece}};
   r.measures = {{"area", i.area}, {"volume", i.volume}};
   const auto count = [&](const char *name, uint32_t n) { r.lines.emplace_back(name, std::to_string(n)); };
-  count("points", i.npoint), count("triangles", i.ntriangle), count("edges", i.nedge), count("pieces", i.npiece);
-  r.lines.emplace_back("closed", i.closed ? "yes" : "no, " + std::to_string(i.open_edges) + " open edges around " + std::to_string(i.holes) +
-                                                    (i.holes == 1 ? " hole, " : " holes, ") + std::to_string(i.nonmanifold_edges) + " edges of more than two triangles");
+  count("points", i.npoint);
+  count("triangles", i.ntriangle);
+  count("edges", i.nedge);
+  count("pieces", i.npiece);
+  r.lines.emplace_back(
+      "closed", i.closed ? "yes"
+                         : "no, " + std::to_string(i.open_edges) + " open edges around " +
+                               std::to_string(i.holes) + (i.holes == 1 ? " hole, " : " holes, ") +
+                               std::to_string(i.nonmanifold_edges) + " edges of more than two triangles");
   r.lines.emplace_back("area", text("%.10g m2", i.area));
   if (i.closed) r.lines.emplace_back("volume", text("%.10g m3", i.volume));
-  r.defects = {{"merged_points", i.merged_points}, {"dropped_points", i.dropped_points}, {"dropped_triangles", i.dropped_triangles},
-               {"turned", i.turned}, {"open_edges", i.open_edges}, {"holes", i.holes}, {"nonmanifold_edges", i.nonmanifold_edges}};
+  r.defects = {{"merged_points", i.merged_points},
+               {"dropped_points", i.dropped_points},
+               {"dropped_triangles", i.dropped_triangles},
+               {"turned", i.turned},
+               {"open_edges", i.open_edges},
+               {"holes", i.holes},
+               {"nonmanifold_edges", i.nonmanifold_edges}};
   const char *const *names = nullptr;
   const uint32_t *group = nullptr;
   dfm_trimesh_groups(mesh, &names, &group);
@@ -89,7 +129,8 @@ bool describe_surface(dfm_trimesh mesh, Report &r) {
   for (uint32_t k = 0; k < i.ngroup; ++k)
     r.groups[k] = {names[k], 2, static_cast<uint32_t>(std::count(group, group + i.ntriangle, k)), true};
   r.summary = std::to_string(i.npoint) + " points, " + std::to_string(i.ntriangle) + " triangles, " +
-              (i.closed ? "closed" : std::to_string(i.holes) + " holes") + ", least quality " + text("%.3g", i.quality_min);
+              (i.closed ? "closed" : std::to_string(i.holes) + " holes") + ", least quality " +
+              text("%.3g", i.quality_min);
   return true;
 }
 
@@ -103,15 +144,24 @@ void print_json(const std::string &file, const Report &r, const std::vector<std:
   std::vector<std::string> histogram, groups;
   for (const uint32_t n : r.histogram) histogram.push_back(whole(n));
   for (const Group &g : r.groups)
-    groups.push_back(JsonObject().add("name", quoted(g.name)).add("dimension", whole(g.dimension)).add(g.by_triangles ? "triangles" : "points", whole(g.count)).text());
+    groups.push_back(JsonObject()
+                         .add("name", quoted(g.name))
+                         .add("dimension", whole(g.dimension))
+                         .add(g.by_triangles ? "triangles" : "points", whole(g.count))
+                         .text());
   JsonObject out, edge, quality, defects;
   for (const Defect &d : r.defects) defects.add(d.key, whole(d.count));
   edge.add("min", number(r.edge_min)).add("median", number(r.edge_median)).add("max", number(r.edge_max));
-  quality.add("min", number(r.quality_min)).add("mean", number(r.quality_mean)).add("histogram", json_array(histogram));
+  quality.add("min", number(r.quality_min))
+      .add("mean", number(r.quality_mean))
+      .add("histogram", json_array(histogram));
   out.add("file", quoted(file)).add("kind", quoted(r.kind));
   for (const auto &[key, n] : r.counts) out.add(key, whole(n));
   for (const auto &[key, x] : r.measures) out.add(key, number(x));
-  out.add("lo", json_vector(r.lo)).add("hi", json_vector(r.hi)).add("edge", edge.text()).add("quality", quality.text());
+  out.add("lo", json_vector(r.lo))
+      .add("hi", json_vector(r.hi))
+      .add("edge", edge.text())
+      .add("quality", quality.text());
   out.add("defects", defects.text()).add("groups", json_array(groups)).add("warnings", texts(r.warnings));
   if (!notes.empty()) out.add("lost", texts(notes));
   std::fputs(indented(out.text()).c_str(), stdout);
@@ -121,19 +171,26 @@ void print_table(const std::string &file, const Report &r) {
   constexpr uint32_t kBar = 40;
   std::printf("%s\n", shown(file).c_str());
   for (const auto &[name, value] : r.lines) std::printf("  %-17s %s\n", name.c_str(), value.c_str());
-  std::printf("  box               %g %g %g to %g %g %g m\n", r.lo[0], r.lo[1], r.lo[2], r.hi[0], r.hi[1], r.hi[2]);
+  std::printf("  box               %g %g %g to %g %g %g m\n", r.lo[0], r.lo[1], r.lo[2], r.hi[0], r.hi[1],
+              r.hi[2]);
   std::printf("  edge length       %.4g to %.4g m, median %.4g\n", r.edge_min, r.edge_max, r.edge_median);
   std::printf("  %-17s least %.3g, mean %.3g (1: %s)\n", r.quality, r.quality_min, r.quality_mean, r.best);
   const uint32_t most = std::max(1u, *std::max_element(r.histogram.begin(), r.histogram.end()));
   for (size_t bin = 0; bin < r.histogram.size(); ++bin) {
     const uint32_t n = r.histogram[bin];
-    const uint32_t bar = n ? std::max(1u, static_cast<uint32_t>(static_cast<uint64_t>(n) * kBar / most)) : 0;  // a few bad ones show, too
-    if (n) std::printf("    %.1f to %.1f      %-9u %s\n", 0.1 * double(bin), 0.1 * double(bin + 1), n, std::string(bar, '#').c_str());
+    // a few bad ones show, too
+    const uint32_t bar = n ? std::max(1u, static_cast<uint32_t>(static_cast<uint64_t>(n) * kBar / most)) : 0;
+    if (n)
+      std::printf("    %.1f to %.1f      %-9u %s\n", 0.1 * double(bin), 0.1 * double(bin + 1), n,
+                  std::string(bar, '#').c_str());
   }
   static const char *const kElements[4] = {"points", "lines", "triangles", "cells"};
   for (const Group &g : r.groups)
-    if (g.by_triangles) std::printf("  group             %s (%u triangles)\n", shown(g.name).c_str(), g.count);
-    else std::printf("  group             %s (%s, %u points)\n", shown(g.name).c_str(), kElements[std::min(g.dimension, 3u)], g.count);
+    if (g.by_triangles)
+      std::printf("  group             %s (%u triangles)\n", shown(g.name).c_str(), g.count);
+    else
+      std::printf("  group             %s (%s, %u points)\n", shown(g.name).c_str(),
+                  kElements[std::min(g.dimension, 3u)], g.count);
   for (const std::string &w : r.warnings) std::printf("  warning: %s\n", shown(w).c_str());
 }
 
@@ -150,12 +207,16 @@ std::vector<std::string> lines_of(const char *text) {
   return out;
 }
 
-int report_mesh(const Globals &globals, const std::string &file, const MeshSession &session, bool asked, const std::vector<std::string> &notes) {
+int report_mesh(const Globals &globals, const std::string &file, const MeshSession &session, bool asked,
+                const std::vector<std::string> &notes) {
   Report r;
-  if (!(session.cells ? describe_cells(session.cells, r) : describe_surface(session.surface, r))) return fail(dfm_last_error());
-  if (globals.json) print_json(file, r, notes);
-  else if (asked) print_table(file, r);
-  else if (!globals.quiet) {
+  if (!(session.cells ? describe_cells(session.cells, r) : describe_surface(session.surface, r)))
+    return fail(dfm_last_error());
+  if (globals.json) {
+    print_json(file, r, notes);
+  } else if (asked) {
+    print_table(file, r);
+  } else if (!globals.quiet) {
     for (const std::string &w : r.warnings) std::fprintf(stderr, "deform: warning: %s\n", shown(w).c_str());
     for (const std::string &n : notes) std::fprintf(stderr, "deform: not kept: %s\n", shown(n).c_str());
     std::printf("%s: %s\n", shown(file).c_str(), r.summary.c_str());

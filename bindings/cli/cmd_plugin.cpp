@@ -14,18 +14,32 @@
 namespace cli {
 namespace {
 
-struct Type { const dfm_type *type; std::string file; };
+struct Type {
+  const dfm_type *type;
+  std::string file;
+};
 struct Passed { std::string file, reason; };
-struct Found { std::vector<Type> types; std::vector<Passed> passed; };
+struct Found {
+  std::vector<Type> types;
+  std::vector<Passed> passed;
+};
 
 using Context = std::unique_ptr<dfm_context, decltype(&dfm_context_destroy)>;
 
 Found look(dfm_context *context) {
   Found found;
   dfm_plugin_visit(
-      context, [](void *user, const dfm_type *type, const char *file) { static_cast<Found *>(user)->types.push_back({type, file}); }, &found);
+      context,
+      [](void *user, const dfm_type *type, const char *file) {
+        static_cast<Found *>(user)->types.push_back({type, file});
+      },
+      &found);
   dfm_plugin_visit_passed(
-      context, [](void *user, const char *file, const char *reason) { static_cast<Found *>(user)->passed.push_back({file, reason}); }, &found);
+      context,
+      [](void *user, const char *file, const char *reason) {
+        static_cast<Found *>(user)->passed.push_back({file, reason});
+      },
+      &found);
   return found;
 }
 
@@ -53,8 +67,12 @@ std::vector<std::string> quoted_all(const std::vector<std::string> &words) {
 
 JsonObject json_head(const Type &t) {
   JsonObject o;
-  o.add("kind", quoted(kind_name(t.type->kind))).add("id", quoted(t.type->id)).add("name", quoted(t.type->name));
-  o.add("version", quoted(t.type->version)).add("file", quoted(t.file)).add("effects", json_array(quoted_all(effects(*t.type))));
+  o.add("kind", quoted(kind_name(t.type->kind)))
+      .add("id", quoted(t.type->id))
+      .add("name", quoted(t.type->name));
+  o.add("version", quoted(t.type->version))
+      .add("file", quoted(t.file))
+      .add("effects", json_array(quoted_all(effects(*t.type))));
   return o;
 }
 
@@ -66,16 +84,21 @@ int list(const Globals &globals, const std::vector<std::string> &directories) {
   if (globals.json) {
     std::vector<std::string> types, passed;
     for (const Type &t : found.types) types.push_back(json_head(t).text());
-    for (const Passed &p : found.passed) passed.push_back(JsonObject().add("file", quoted(p.file)).add("reason", quoted(p.reason)).text());
-    std::fputs(indented(JsonObject().add("types", json_array(types)).add("passed", json_array(passed)).text()).c_str(), stdout);
+    for (const Passed &p : found.passed)
+      passed.push_back(JsonObject().add("file", quoted(p.file)).add("reason", quoted(p.reason)).text());
+    std::fputs(indented(JsonObject().add("types", json_array(types)).add("passed", json_array(passed)).text())
+                   .c_str(),
+               stdout);
     return kDone;
   }
   for (const Type &t : found.types)
-    std::printf("%-6s %-28s %-8s %s\n       effects: %s\n       %s\n", kind_name(t.type->kind), t.type->id, t.type->version, t.type->name,
-                joined(effects(*t.type)).c_str(), shown(t.file).c_str());
-  if (found.types.empty()) std::printf("no plugin is loaded; set DEFORM_PLUGIN_PATH, or name directories with --dir\n");
+    std::printf("%-6s %-28s %-8s %s\n       effects: %s\n       %s\n", kind_name(t.type->kind), t.type->id,
+                t.type->version, t.type->name, joined(effects(*t.type)).c_str(), shown(t.file).c_str());
+  if (found.types.empty())
+    std::printf("no plugin is loaded; set DEFORM_PLUGIN_PATH, or name directories with --dir\n");
   if (!found.passed.empty()) std::printf("\npassed over:\n");
-  for (const Passed &p : found.passed) std::printf("  %s\n    %s\n", shown(p.file).c_str(), shown(p.reason).c_str());
+  for (const Passed &p : found.passed)
+    std::printf("  %s\n    %s\n", shown(p.file).c_str(), shown(p.reason).c_str());
   return kDone;
 }
 
@@ -98,9 +121,12 @@ std::vector<std::string> names_of(const dfm_param &row) {
 
 void print_info(const Type &t) {
   const dfm_type &type = *t.type;
-  std::printf("%s %s, version %s\n  name     %s\n  licence  %s\n  source   %s\n  file     %s\n  effects  %s\n", kind_name(type.kind), type.id,
-              type.version, type.name, type.licence, type.source, shown(t.file).c_str(), joined(effects(type)).c_str());
-  if (type.nparam) std::printf("\n  %-18s %-10s %-16s %-10s %s\n", "parameter", "default", "range", "unit", "meaning");
+  std::printf(
+      "%s %s, version %s\n  name     %s\n  licence  %s\n  source   %s\n  file     %s\n  effects  %s\n",
+      kind_name(type.kind), type.id, type.version, type.name, type.licence, type.source,
+      shown(t.file).c_str(), joined(effects(type)).c_str());
+  if (type.nparam)
+    std::printf("\n  %-18s %-10s %-16s %-10s %s\n", "parameter", "default", "range", "unit", "meaning");
   for (uint32_t i = 0; i < type.nparam; ++i) {
     const dfm_param &row = type.params[i];
     char range[64], value[32];
@@ -108,8 +134,12 @@ void print_info(const Type &t) {
     if (row.flags & DFM_PARAM_AUTO) std::snprintf(value, sizeof value, "auto (%g)", row.def);
     else std::snprintf(value, sizeof value, "%g", row.def);
     const std::string names = row.names ? joined(names_of(row)) : "";
-    std::printf("  %-18s %-10s %-16s %-10s %s%s%s%s\n", row.key, value, names.empty() ? range : names.c_str(), row.unit, row.label,
-                row.width > 1 ? (std::string(row.flags & DFM_PARAM_LIST ? " (up to " : " (") + std::to_string(row.width) + " values)").c_str() : "",
+    std::printf("  %-18s %-10s %-16s %-10s %s%s%s%s\n", row.key, value, names.empty() ? range : names.c_str(),
+                row.unit, row.label,
+                row.width > 1 ? (std::string(row.flags & DFM_PARAM_LIST ? " (up to " : " (") +
+                                 std::to_string(row.width) + " values)")
+                                    .c_str()
+                              : "",
                 row.flags & DFM_PARAM_RUNTIME ? ", may change in a run" : "",
                 row.flags & DFM_PARAM_PER_CELL ? ", may vary by cell" : "");
   }
@@ -122,13 +152,22 @@ std::string json_info(const Type &t) {
     const auto flag = [&](uint32_t bit) { return row.flags & bit ? "true" : "false"; };
     JsonObject o;
     o.add("key", quoted(row.key)).add("label", quoted(row.label)).add("unit", quoted(row.unit));
-    o.add("min", number(row.min)).add("max", number(row.max)).add("default", number(row.def)).add("width", std::to_string(row.width));
-    o.add("integer", flag(DFM_PARAM_INTEGER)).add("runtime", flag(DFM_PARAM_RUNTIME)).add("per_cell", flag(DFM_PARAM_PER_CELL));
+    o.add("min", number(row.min))
+        .add("max", number(row.max))
+        .add("default", number(row.def))
+        .add("width", std::to_string(row.width));
+    o.add("integer", flag(DFM_PARAM_INTEGER))
+        .add("runtime", flag(DFM_PARAM_RUNTIME))
+        .add("per_cell", flag(DFM_PARAM_PER_CELL));
     o.add("auto", flag(DFM_PARAM_AUTO));
     if (row.names) o.add("names", json_array(quoted_all(names_of(row))));
     rows.push_back(o.text());
   }
-  return json_head(t).add("licence", quoted(t.type->licence)).add("source", quoted(t.type->source)).add("params", json_array(rows)).text();
+  return json_head(t)
+      .add("licence", quoted(t.type->licence))
+      .add("source", quoted(t.type->source))
+      .add("params", json_array(rows))
+      .text();
 }
 
 int info(const Globals &globals, const std::string &id) {
@@ -144,11 +183,13 @@ int info(const Globals &globals, const std::string &id) {
   if (types.empty()) {
     std::vector<std::string> ids, names;
     for (const Type &t : look(context.get()).types) {
-      ids.push_back(t.type->id), names.push_back(t.type->id);
+      ids.push_back(t.type->id);
+      names.push_back(t.type->id);
       if (const char *dot = std::strrchr(t.type->id, '.')) names.push_back(dot + 1);
     }
     const std::string near = nearest(id, names);
-    return fail("no plugin \"" + id + "\" is loaded" + (near.empty() ? "" : ", did you mean \"" + near + "\"") + "; loaded: " + joined(ids));
+    return fail("no plugin \"" + id + "\" is loaded" +
+                (near.empty() ? "" : ", did you mean \"" + near + "\"") + "; loaded: " + joined(ids));
   }
   if (globals.json) {
     std::vector<std::string> all;

@@ -13,13 +13,17 @@ namespace cli {
 #ifdef DEFORM_HAVE_CHECK
 
 void add_plugin_check(CLI::App &plugin, Globals &globals, int *exit_code) {
-  CLI::App *sub = plugin.add_subcommand("check", "holds a plugin to the rules, each in a process of its own; exit 1 where one is broken");
+  CLI::App *sub = plugin.add_subcommand(
+      "check", "holds a plugin to the rules, each in a process of its own; exit 1 where one is broken");
   auto request = std::make_shared<check::Request>();
   sub->add_option("FILE", request->file, "plugin file")->required();
   sub->add_option("--seed", request->seed, "of the random inputs")->type_name("N");
   sub->add_option("--only", request->only, "run this rule alone; may be repeated")->type_name("ID");
-  sub->add_option("--limit", request->limit, "processor time that a rule may take, s")->check(CLI::PositiveNumber)->type_name("SECONDS");
-  sub->add_flag("--in-process", request->in_process, "run the rules in this process, for a debugger: what crashes ends the command");
+  sub->add_option("--limit", request->limit, "processor time that a rule may take, s")
+      ->check(CLI::PositiveNumber)
+      ->type_name("SECONDS");
+  sub->add_flag("--in-process", request->in_process,
+                "run the rules in this process, for a debugger: what crashes ends the command");
   // What the command says to its own processes.
   sub->add_option("--rule", request->rule)->group("");
   sub->add_option("--type", request->type)->group("");
@@ -31,10 +35,16 @@ void add_plugin_check(CLI::App &plugin, Globals &globals, int *exit_code) {
 #else
 
 void add_plugin_check(CLI::App &plugin, Globals &, int *exit_code) {
-  CLI::App *sub = plugin.add_subcommand("check", "holds a plugin to the rules (not in this build, which loads no files)");
+  CLI::App *sub =
+      plugin.add_subcommand("check", "holds a plugin to the rules (not in this build, which loads no files)");
   auto file = std::make_shared<std::string>();
   sub->add_option("FILE", *file, "plugin file")->required();
-  sub->callback([=] { *exit_code = fail("\"plugin check\" opens plugin files, and this command was built to load none (DEFORM_PLUGINS_STATIC); check " + *file + " with a usual build"); });
+  sub->callback([=] {
+    *exit_code = fail(
+        "\"plugin check\" opens plugin files, and this command was built to load none "
+        "(DEFORM_PLUGINS_STATIC); check " +
+        *file + " with a usual build");
+  });
 }
 
 #endif

@@ -24,7 +24,7 @@ namespace cli {
 namespace {
 
 volatile std::sig_atomic_t interrupted = 0;
-std::atomic<dfm_world> stepping{0};   // the world whose step a signal stops
+std::atomic<dfm_world> stepping{0};  // the world whose step a signal stops
 static_assert(std::atomic<dfm_world>::is_always_lock_free);
 
 void on_signal(int) {
@@ -48,10 +48,12 @@ double cpu_seconds() {
   return double(t.tv_sec) + 1e-9 * double(t.tv_nsec);
 }
 
-double wall_seconds() { return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count(); }
+double wall_seconds() {
+  return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
+}
 
-// Multiples of an interval: due() is true once for each that time has passed. Outputs never shape the steps, so a run gives the same
-// bits whatever it writes.
+// Multiples of an interval: due() is true once for each that time has passed. Outputs never shape the steps,
+// so a run gives the same bits whatever it writes.
 class Schedule {
  public:
   explicit Schedule(double interval) : interval_(interval) {}
@@ -69,9 +71,17 @@ class Schedule {
 class Runner {
  public:
   Runner(const SceneFile &scene, const RunOptions &options, const Globals &globals)
-      : scene_(scene), options_(options), world_(scene.world()), duration_(options.time > 0 ? options.time : scene.settings().duration),
-        check_every_step_(options.check || scene.settings().check), progress_(!globals.quiet && !globals.json),
-        outputs_(scene, options.out), checker_(scene), impulses_(scene), record_(scene.settings().every), frame_(frame_interval()) {
+      : scene_(scene),
+        options_(options),
+        world_(scene.world()),
+        duration_(options.time > 0 ? options.time : scene.settings().duration),
+        check_every_step_(options.check || scene.settings().check),
+        progress_(!globals.quiet && !globals.json),
+        outputs_(scene, options.out),
+        checker_(scene),
+        impulses_(scene),
+        record_(scene.settings().every),
+        frame_(frame_interval()) {
     if (frame_interval() > 0) frames_ = Frames::create(scene, options.out + "/frames");
   }
 
@@ -83,7 +93,10 @@ class Runner {
     while (!interrupted && !result_.stopped && advance()) outputs(false);
     came_back();
     count_time();
-    if (interrupted) result_.interrupted = true, result_.stop_reason = "interrupted by a signal";
+    if (interrupted) {
+      result_.interrupted = true;
+      result_.stop_reason = "interrupted by a signal";
+    }
     if (!at_record_) {  // after a stop, too: the world is back at its last good state
       outputs_.record();
       if (!check_every_step_) check(false);
@@ -100,20 +113,30 @@ class Runner {
   // Sentences that the summary must hold whether or not anybody reads the terminal.
   std::vector<std::string> remarks() const {
     std::vector<std::string> out;
-    if (held_nothing_ || !result_.hold_begun) out.push_back("hold.creep_max_um_per_s is null: no pair sticks throughout the last half of the run");
+    if (held_nothing_ || !result_.hold_begun)
+      out.push_back("hold.creep_max_um_per_s is null: no pair sticks throughout the last half of the run");
     const dfm_world_stats stats = world_stats(scene_);
     if (trouble_ & DFM_TROUBLE_SUBSTEPS)
-      out.push_back("steps were cut into up to " + std::to_string(stats.substeps_max) + " sub-steps: the step is longer than the stable one; deform explain says why");
+      out.push_back("steps were cut into up to " + std::to_string(stats.substeps_max) +
+                    " sub-steps: the step is longer than the stable one; deform explain says why");
     if (stats.cheapened > 0)
-      out.push_back(std::to_string(stats.cheapened) + " steps used so much of their budget that they went without polish, sweeps or guard pieces (max_work, max_time)");
-    if (stats.unconverged > 0) out.push_back("the contact solve met its cap in " + std::to_string(stats.unconverged) + " sub-steps");
-    if (trouble_ & DFM_TROUBLE_INVERTED) out.push_back("cells turned inside out: refine the mesh or soften the load");
+      out.push_back(std::to_string(stats.cheapened) +
+                    " steps used so much of their budget that they went without polish, sweeps or guard "
+                    "pieces (max_work, max_time)");
+    if (stats.unconverged > 0)
+      out.push_back("the contact solve met its cap in " + std::to_string(stats.unconverged) + " sub-steps");
+    if (trouble_ & DFM_TROUBLE_INVERTED)
+      out.push_back("cells turned inside out: refine the mesh or soften the load");
     if (stats.limited_max > 0)
-      out.push_back("up to " + std::to_string(stats.limited_max) + " cells at once were stretched so far that their model limited their stiffness: refine the mesh or soften the load");
+      out.push_back("up to " + std::to_string(stats.limited_max) +
+                    " cells at once were stretched so far that their model limited their stiffness: refine "
+                    "the mesh or soften the load");
     const auto pairs = [](auto most) { return "up to " + std::to_string(most) + " triangle pairs"; };
-    if (checks().between_max > 0) out.push_back("surfaces cross: " + pairs(checks().between_max) + " of two surfaces in one state");
+    if (checks().between_max > 0)
+      out.push_back("surfaces cross: " + pairs(checks().between_max) + " of two surfaces in one state");
     if (checks().self_max > 0)
-      out.push_back("a surface crosses itself: " + pairs(checks().self_max) + " in one state; \"contact\": {\"self\": \"auto\"} keeps it from that");
+      out.push_back("a surface crosses itself: " + pairs(checks().self_max) +
+                    " in one state; \"contact\": {\"self\": \"auto\"} keeps it from that");
     return out;
   }
 
@@ -123,7 +146,8 @@ class Runner {
   double frame_interval() const {
     double rate = options_.frame_rate;
     if (rate <= 0 && scene_.settings().frames) {
-      rate = std::strtod(scene_.value("/output/frames").c_str(), nullptr);  // a number is a rate; true: with every record
+      // a number is a rate; true: with every record
+      rate = std::strtod(scene_.value("/output/frames").c_str(), nullptr);
       if (rate <= 0) return scene_.settings().every;
     }
     return rate > 0 ? 1 / rate : 0;
@@ -142,15 +166,19 @@ class Runner {
     }
     if (left <= 1e-6 * std::min(step, duration_)) return false;
     // Rather a last step that is a thousandth longer than one more that is too short to be taken.
-    if (left < step * (1 + (automatic ? 1e-6 : 1e-3)) && (automatic || std::fabs(left - step) > 1e-6 * step)) step = left;
+    if (left < step * (1 + (automatic ? 1e-6 : 1e-3)) && (automatic || std::fabs(left - step) > 1e-6 * step))
+      step = left;
     const double begin = wall_seconds();
     uint32_t trouble = 0;
     stepping = world_;
     const dfm_status status = interrupted ? DFM_DISCARD : dfm_world_step(world_, step, &trouble);
     stepping = 0;
     result_.times.add(wall_seconds() - begin);
-    if (interrupted && status == DFM_DISCARD) return false;   // the world is as before the step
-    if (status != DFM_OK) return stop(), false;
+    if (interrupted && status == DFM_DISCARD) return false;  // the world is as before the step
+    if (status != DFM_OK) {
+      stop();
+      return false;
+    }
     ++result_.steps;
     trouble_ |= trouble;
     impulses_.add_step();
@@ -170,7 +198,8 @@ class Runner {
   // What is due at this time; its cost is kept out of the run's times.
   void outputs(bool start_state) {
     const double t = result_.simulated;
-    if (!result_.hold_begun && t >= result_.start + duration_ / 2) result_.hold_begun = dfm_world_hold_begin(world_) == DFM_OK;
+    if (!result_.hold_begun && t >= result_.start + duration_ / 2)
+      result_.hold_begun = dfm_world_hold_begin(world_) == DFM_OK;
     at_record_ = record_.due(t - result_.start);
     const bool frame_due = frames_ && frame_.due(t - result_.start);
     if (at_record_ || frame_due || check_every_step_) {
@@ -182,11 +211,13 @@ class Runner {
     }
     if (result_.steps % 16 != 0) return;
     const double spent = result_.wall + wall_seconds() - mark_.wall;
-    progress_.show(t - result_.start, duration_, result_.steps && spent > 0 ? double(result_.steps) / spent : 0);
+    progress_.show(t - result_.start, duration_,
+                   result_.steps && spent > 0 ? double(result_.steps) / spent : 0);
   }
 
   void count_time() {
-    result_.wall += wall_seconds() - mark_.wall, result_.cpu += cpu_seconds() - mark_.cpu;
+    result_.wall += wall_seconds() - mark_.wall;
+    result_.cpu += cpu_seconds() - mark_.cpu;
     mark_ = {wall_seconds(), cpu_seconds()};
   }
 
@@ -232,20 +263,24 @@ int run(RunOptions options, const Globals &globals) {
     Runner runner(scene, options, globals);
     runner.run();
     for (const std::string &remark : runner.remarks()) keep_warning(remark);
-    result = runner.result(), checks = runner.checks();
+    result = runner.result();
+    checks = runner.checks();
   }
   const std::string summary = summary_json(scene, options, result, checks);
   write_whole(options.out + "/summary.json", summary);
-  if (globals.json) std::printf("%s", summary.c_str());
-  else if (!globals.quiet) {
+  if (globals.json) {
+    std::printf("%s", summary.c_str());
+  } else if (!globals.quiet) {
     print_table(scene, result, checks);
     std::printf("written: %s\n", shown(options.out).c_str());
   }
   if (options.profile && !globals.json) print_profile(scene, result);
   if (result.stopped) {
     char text[160];
-    std::snprintf(text, sizeof text, "stopped at step %llu, t = %g s", static_cast<unsigned long long>(result.steps), result.simulated);
-    throw Failure(kStopped, options.scene + ": " + text + ": " + result.stop_reason + "; the last good state is in " + options.out + "/states/last_*.vtu");
+    std::snprintf(text, sizeof text, "stopped at step %llu, t = %g s",
+                  static_cast<unsigned long long>(result.steps), result.simulated);
+    throw Failure(kStopped, options.scene + ": " + text + ": " + result.stop_reason +
+                                "; the last good state is in " + options.out + "/states/last_*.vtu");
   }
   return result.interrupted ? int(kInterrupted) : int(kDone);
 }
@@ -257,17 +292,28 @@ void add_run(CLI::App &app, Globals &globals, int *exit_code) {
   const auto positive = [](const std::string &text) {
     char *end = nullptr;
     const double x = std::strtod(text.c_str(), &end);
-    return *end == 0 && x > 0 && std::isfinite(x) ? std::string() : "expected a finite number above 0, found " + text;
+    return *end == 0 && x > 0 && std::isfinite(x) ? std::string()
+                                                  : "expected a finite number above 0, found " + text;
   };
   CLI::App *sub = app.add_subcommand("run", "simulates a scene and writes figures and pictures");
   sub->add_option("SCENE", options->scene, "scene file (JSON)")->required();
   sub->add_option("--out", options->out, "folder for the results (out/SCENE)")->type_name("DIR");
-  sub->add_option("--time", options->time, "seconds to simulate, instead of the scene's")->check(positive)->type_name("T");
-  sub->add_option("--set", options->set, "change a value of the scene")->type_name("/json/pointer=value")->take_all()->allow_extra_args(false);
-  sub->add_option("--frames", options->frame_rate, "pictures per simulated second")->check(positive)->type_name("FPS");
+  sub->add_option("--time", options->time, "seconds to simulate, instead of the scene's")
+      ->check(positive)
+      ->type_name("T");
+  sub->add_option("--set", options->set, "change a value of the scene")
+      ->type_name("/json/pointer=value")
+      ->take_all()
+      ->allow_extra_args(false);
+  sub->add_option("--frames", options->frame_rate, "pictures per simulated second")
+      ->check(positive)
+      ->type_name("FPS");
   sub->add_flag("--profile", options->profile, "time spent in each stage");
-  sub->add_option("--jitter", options->jitter, "small random changes of the start state; the same seed gives the same run")->type_name("SEED");
-  sub->add_flag("--check", options->check, "count crossing triangles in every step, not only in recorded states");
+  sub->add_option("--jitter", options->jitter,
+                  "small random changes of the start state; the same seed gives the same run")
+      ->type_name("SEED");
+  sub->add_flag("--check", options->check,
+                "count crossing triangles in every step, not only in recorded states");
   sub->callback([=, &globals] { *exit_code = run(*options, globals); });
 }
 

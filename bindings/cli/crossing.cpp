@@ -1,7 +1,8 @@
-// Two closed triangles share a point if and only if an edge of one meets the other. Edge against triangle needs signs of volumes only;
-// coplanar cases drop one axis and need signs of areas. All signs are exact, so there is no tolerance to choose: they are taken from
-// floating point where Shewchuk's error bound allows (Adaptive precision floating-point arithmetic, 1997, section 4.3), else from
-// floating-point expansions (his theorem 10).
+// Two closed triangles share a point if and only if an edge of one meets the other. Edge against triangle
+// needs signs of volumes only; coplanar cases drop one axis and need signs of areas. All signs are exact, so
+// there is no tolerance to choose: they are taken from floating point where Shewchuk's error bound allows
+// (Adaptive precision floating-point arithmetic, 1997, section 4.3), else from floating-point expansions
+// (his theorem 10).
 #include "crossing.h"
 
 #include <algorithm>
@@ -13,7 +14,8 @@ namespace {
 
 constexpr double kEps = 0x1p-53;
 
-// A sum of doubles, exactly: components do not overlap and rise in magnitude, so the last one has the sign of the whole.
+// A sum of doubles, exactly: components do not overlap and rise in magnitude, so the last one has the
+// sign of the whole.
 class Expansion {
  public:
   Expansion() = default;
@@ -40,7 +42,8 @@ class Expansion {
   }
   static Expansion difference(double a, double b) {
     Expansion d;
-    d.add(a), d.add(-b);
+    d.add(a);
+    d.add(-b);
     return d;
   }
   int sign() const { return n_ == 0 ? 0 : e_[n_ - 1] > 0 ? 1 : -1; }
@@ -71,11 +74,17 @@ int exact_volume(const double a[3], const double b[3], const double c[3], const 
 }  // namespace
 
 int orientation(const double a[3], const double b[3], const double c[3], const double d[3]) {
-  const double ax = a[0] - d[0], ay = a[1] - d[1], az = a[2] - d[2], bx = b[0] - d[0], by = b[1] - d[1], bz = b[2] - d[2];
+  const double ax = a[0] - d[0];
+  const double ay = a[1] - d[1];
+  const double az = a[2] - d[2];
+  const double bx = b[0] - d[0];
+  const double by = b[1] - d[1];
+  const double bz = b[2] - d[2];
   const double cx = c[0] - d[0], cy = c[1] - d[1], cz = c[2] - d[2];
   const double bcx = by * cz, cbx = bz * cy, bcy = bz * cx, cby = bx * cz, bcz = bx * cy, cbz = by * cx;
   const double det = ax * (bcx - cbx) + ay * (bcy - cby) + az * (bcz - cbz);
-  const double permanent = std::fabs(ax) * (std::fabs(bcx) + std::fabs(cbx)) + std::fabs(ay) * (std::fabs(bcy) + std::fabs(cby)) +
+  const double permanent = std::fabs(ax) * (std::fabs(bcx) + std::fabs(cbx)) +
+                           std::fabs(ay) * (std::fabs(bcy) + std::fabs(cby)) +
                            std::fabs(az) * (std::fabs(bcz) + std::fabs(cbz));
   const double bound = (7 + 56 * kEps) * kEps * permanent;
   // Below this the products may have lost bits to underflow, which the bound does not know.
@@ -95,16 +104,18 @@ int orientation(const double a[3], const double b[3], const double c[3], int u, 
 
 namespace {
 
-bool on_segment(const double a[3], const double b[3], const double p[3], int u, int v) {  // p is known to be collinear with a, b
-  return std::min(a[u], b[u]) <= p[u] && p[u] <= std::max(a[u], b[u]) && std::min(a[v], b[v]) <= p[v] && p[v] <= std::max(a[v], b[v]);
+// p is known to be collinear with a, b
+bool on_segment(const double a[3], const double b[3], const double p[3], int u, int v) {
+  return std::min(a[u], b[u]) <= p[u] && p[u] <= std::max(a[u], b[u]) && std::min(a[v], b[v]) <= p[v] &&
+         p[v] <= std::max(a[v], b[v]);
 }
 
 bool segments_meet(const double a[3], const double b[3], const double c[3], const double d[3], int u, int v) {
   const int sc = orientation(a, b, c, u, v), sd = orientation(a, b, d, u, v);
   const int sa = orientation(c, d, a, u, v), sb = orientation(c, d, b, u, v);
   if (sc * sd < 0 && sa * sb < 0) return true;
-  return (sc == 0 && on_segment(a, b, c, u, v)) || (sd == 0 && on_segment(a, b, d, u, v)) || (sa == 0 && on_segment(c, d, a, u, v)) ||
-         (sb == 0 && on_segment(c, d, b, u, v));
+  return (sc == 0 && on_segment(a, b, c, u, v)) || (sd == 0 && on_segment(a, b, d, u, v)) ||
+         (sa == 0 && on_segment(c, d, a, u, v)) || (sb == 0 && on_segment(c, d, b, u, v));
 }
 
 // Segment and triangle in one plane.
@@ -128,7 +139,8 @@ bool segment_meets(const Triangle t, const double p[3], int side_p, const double
   bool positive = false, negative = false;
   for (int i = 0; i < 3; ++i) {
     const int s = orientation(p, q, t[i], t[(i + 1) % 3]);
-    positive = positive || s > 0, negative = negative || s < 0;
+    positive = positive || s > 0;
+    negative = negative || s < 0;
   }
   return !(positive && negative);
 }
@@ -148,7 +160,9 @@ bool meet(const Triangle a, const Triangle b, Sides &sides) {
   if (Sides::apart(sides.a)) return false;
   for (int i = 0; i < 3; ++i) {
     const int j = (i + 1) % 3;
-    if (segment_meets(a, b[i], sides.b[i], b[j], sides.b[j]) || segment_meets(b, a[i], sides.a[i], a[j], sides.a[j])) return true;
+    if (segment_meets(a, b[i], sides.b[i], b[j], sides.b[j]) ||
+        segment_meets(b, a[i], sides.a[i], a[j], sides.a[j]))
+      return true;
   }
   return false;
 }
@@ -173,9 +187,10 @@ bool meet(const Triangle a, const Triangle b) {
   return meet(a, b, sides);
 }
 
-// Both triangles cut the common line of their planes in intervals; they pass through each other where these overlap by more than a
-// point. Order of the ends by two signs (Devillers and Guigue, Faster triangle-triangle intersection tests, 2002, section 4), once each
-// triangle begins with the corner that is alone on its side, and that side is the positive one.
+// Both triangles cut the common line of their planes in intervals; they pass through each other where these
+// overlap by more than a point. Order of the ends by two signs (Devillers and Guigue, Faster
+// triangle-triangle intersection tests, 2002, section 4), once each triangle begins with the corner that is
+// alone on its side, and that side is the positive one.
 bool pass_through(const Triangle a, const Triangle b) {
   Sides sides;
   if (!meet(a, b, sides) || !Sides::both(sides.a) || !Sides::both(sides.b)) return false;
@@ -186,17 +201,23 @@ bool pass_through(const Triangle a, const Triangle b) {
   return orientation(p[0], p[1], q[0], q[1]) < 0 && orientation(p[0], p[2], q[2], q[0]) < 0;
 }
 
-// ---- which pairs to test: a box tree over all triangles, median split ---------------------------------------
+// ---- which pairs to test: a box tree over all triangles, median split -------------------------------------
 
 Found Counter::count(const std::vector<Surface> &surfaces, Touching touching) {
-  surfaces_ = &surfaces, touching_ = touching, found_ = {};
-  items_.clear(), nodes_.clear();
+  surfaces_ = &surfaces;
+  touching_ = touching;
+  found_ = {};
+  items_.clear();
+  nodes_.clear();
   for (uint32_t s = 0; s < surfaces.size(); ++s) {
     for (uint32_t t = 0; t < surfaces[s].ntri; ++t) {
       Item item = {{{INFINITY, INFINITY, INFINITY}, {-INFINITY, -INFINITY, -INFINITY}}, s, t};
       for (int c = 0; c < 3; ++c) {
         const double *p = surfaces[s].xyz + 3 * size_t(surfaces[s].tri[3 * size_t(t) + c]);
-        for (int k = 0; k < 3; ++k) item.box.lo[k] = std::min(item.box.lo[k], p[k]), item.box.hi[k] = std::max(item.box.hi[k], p[k]);
+        for (int k = 0; k < 3; ++k) {
+          item.box.lo[k] = std::min(item.box.lo[k], p[k]);
+          item.box.hi[k] = std::max(item.box.hi[k], p[k]);
+        }
       }
       items_.push_back(item);
     }
@@ -222,9 +243,12 @@ uint32_t Counter::build(uint32_t begin, uint32_t end) {
     if (node.box.hi[k] - node.box.lo[k] > node.box.hi[axis] - node.box.lo[axis]) axis = k;
   const uint32_t middle = begin + (end - begin) / 2;
   std::nth_element(items_.begin() + begin, items_.begin() + middle, items_.begin() + end,
-                   [axis](const Item &a, const Item &b) { return a.box.lo[axis] + a.box.hi[axis] < b.box.lo[axis] + b.box.hi[axis]; });
+                   [axis](const Item &a, const Item &b) {
+                     return a.box.lo[axis] + a.box.hi[axis] < b.box.lo[axis] + b.box.hi[axis];
+                   });
   const uint32_t left = build(begin, middle), right = build(middle, end);
-  nodes_[index].left = left, nodes_[index].right = right;
+  nodes_[index].left = left;
+  nodes_[index].right = right;
   return index;
 }
 
@@ -240,7 +264,9 @@ bool overlap(const B &a, const B &b) {
 void Counter::within(uint32_t index) {
   const Node node = nodes_[index];
   if (node.left) {
-    within(node.left), within(node.right), between(node.left, node.right);
+    within(node.left);
+    within(node.right);
+    between(node.left, node.right);
     return;
   }
   for (uint32_t i = node.begin; i < node.end; ++i)
@@ -255,9 +281,11 @@ void Counter::between(uint32_t ia, uint32_t ib) {
       if (overlap(items_[i].box, b.box))
         for (uint32_t j = b.begin; j < b.end; ++j) test(items_[i], items_[j]);
   } else if (!b.left || (a.left && a.end - a.begin >= b.end - b.begin)) {
-    between(a.left, ib), between(a.right, ib);
+    between(a.left, ib);
+    between(a.right, ib);
   } else {
-    between(ia, b.left), between(ia, b.right);
+    between(ia, b.left);
+    between(ia, b.right);
   }
 }
 
@@ -267,12 +295,16 @@ void Counter::test(const Item &ia, const Item &ib) {
   if (sa.obstacle && sb.obstacle) return;
   const uint32_t *ta = sa.tri + 3 * size_t(ia.triangle), *tb = sb.tri + 3 * size_t(ib.triangle);
   const double *a[3], *b[3];
-  for (int i = 0; i < 3; ++i) a[i] = sa.xyz + 3 * size_t(ta[i]), b[i] = sb.xyz + 3 * size_t(tb[i]);
+  for (int i = 0; i < 3; ++i) {
+    a[i] = sa.xyz + 3 * size_t(ta[i]);
+    b[i] = sb.xyz + 3 * size_t(tb[i]);
+  }
   if (ia.surface == ib.surface)
     for (int i = 0; i < 3; ++i)
       for (int j = 0; j < 3; ++j)
         if (ta[i] == tb[j] || std::memcmp(a[i], b[j], 3 * sizeof(double)) == 0) return;
-  if (touching_ == Touching::counts ? meet(a, b) : pass_through(a, b)) ++(ia.surface == ib.surface ? found_.within : found_.between);
+  if (touching_ == Touching::counts ? meet(a, b) : pass_through(a, b))
+    ++(ia.surface == ib.surface ? found_.within : found_.between);
 }
 
 }  // namespace crossing

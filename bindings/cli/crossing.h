@@ -1,5 +1,5 @@
-// Triangle pairs that cross, by exact predicates: the judge of "nothing passes through". It shares no code with the library's detection,
-// and sees positions only as the public API reports them.
+// Triangle pairs that cross, by exact predicates: the judge of "nothing passes through". It shares no code
+// with the library's detection, and sees positions only as the public API reports them.
 #pragma once
 #include <cstddef>
 #include <cstdint>
@@ -7,22 +7,31 @@
 
 namespace crossing {
 
-// Sign of the volume of (a, b, c, d): > 0 if d lies on the side of triangle abc from which a, b, c turn clockwise; 0: coplanar. Exact.
+// Sign of the volume of (a, b, c, d): > 0 if d lies on the side of triangle abc from which a, b, c turn
+// clockwise; 0: coplanar. Exact.
 int orientation(const double a[3], const double b[3], const double c[3], const double d[3]);
 // Sign of the area of (a, b, c) in the plane of two axes: > 0 counter-clockwise. Exact.
 int orientation(const double a[3], const double b[3], const double c[3], int axis_u, int axis_v);
 
 using Triangle = const double *[3];
-// The closed triangles share at least one point (touching included). A triangle without area counts as its edges; two of those never meet.
+// The closed triangles share at least one point (touching included). A triangle without area counts as its
+// edges; two of those never meet.
 bool meet(const Triangle a, const Triangle b);
-// They meet along more than a point, and each has corners strictly on both sides of the other's plane: they pass through each other
-// rather than touch.
+// They meet along more than a point, and each has corners strictly on both sides of the other's plane: they
+// pass through each other rather than touch.
 bool pass_through(const Triangle a, const Triangle b);
 
 // obstacle: pairs of its triangles among themselves or with another obstacle's are nobody's affair.
-struct Surface { const double *xyz; uint32_t n; const uint32_t *tri; uint32_t ntri; bool obstacle = false; };
+struct Surface {
+  const double *xyz;
+  uint32_t n;
+  const uint32_t *tri;
+  uint32_t ntri;
+  bool obstacle = false;
+};
 
-// Committed states keep a distance between surfaces, so there any shared point counts; a start state is the user's own, and may touch.
+// Committed states keep a distance between surfaces, so there any shared point counts; a start state is the
+// user's own, and may touch.
 enum class Touching { counts, allowed };
 
 // Triangle pairs of two surfaces, and of one surface with itself.
@@ -33,14 +42,20 @@ struct Found {
 
 class Counter {
  public:
-  // Pairs within and between surfaces; pairs of one surface that share a vertex (by number or by position) are excepted.
-  // Coordinates must be finite, and below 1e90 for the exact signs not to overflow.
+  // Pairs within and between surfaces; pairs of one surface that share a vertex (by number or by position)
+  // are excepted. Coordinates must be finite, and below 1e90 for the exact signs not to overflow.
   Found count(const std::vector<Surface> &surfaces, Touching touching);
 
  private:
   struct Box { double lo[3], hi[3]; };
-  struct Node { Box box; uint32_t begin, end, left, right; };  // left 0: leaf
-  struct Item { Box box; uint32_t surface, triangle; };
+  struct Node {
+    Box box;
+    uint32_t begin, end, left, right;
+  };  // left 0: leaf
+  struct Item {
+    Box box;
+    uint32_t surface, triangle;
+  };
   uint32_t build(uint32_t begin, uint32_t end);
   void within(uint32_t node);
   void between(uint32_t a, uint32_t b);

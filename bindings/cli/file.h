@@ -1,4 +1,5 @@
-// Files that the command itself reads and writes, by the library's own bounded reader and its writer that never leaves half a file.
+// Files that the command itself reads and writes, by the library's own bounded reader and its writer that
+// never leaves half a file.
 #pragma once
 #include <cstdint>
 #include <cstdio>
@@ -7,13 +8,15 @@
 
 namespace cli {
 
-// All bytes of a file of at most `limit` bytes; `expected` says what is wanted, with its article. Throws Failure.
+// All bytes of a file of at most `limit` bytes; `expected` says what is wanted, with its article.
+// Throws Failure.
 std::string read_file(const std::string &path, uint64_t limit, const char *expected);
 // To a temporary name first, then renamed: nobody reads half a file.
 void write_whole(const std::string &path, const std::string &text);
 
 using File = std::unique_ptr<FILE, int (*)(FILE *)>;
-// A new file to write to as results come. What stood there before is removed and not written into, so that a link's target stays what it is.
+// A new file to write to as results come. What stood there before is removed and not written into, so that a
+// link's target stays what it is.
 File new_file(const std::string &path);
 [[noreturn]] void cannot_write(const std::string &path);  // for the reason in errno
 

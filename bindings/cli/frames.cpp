@@ -19,10 +19,15 @@ constexpr uint32_t kWidth = 960, kHeight = 720;
 class OffScreen : public Frames {
  public:
   OffScreen(const SceneFile &scene, std::string folder, std::unique_ptr<render::Renderer> renderer)
-      : scene_(scene), folder_(std::move(folder)), renderer_(std::move(renderer)), color_(scene.settings().color) {
+      : scene_(scene),
+        folder_(std::move(folder)),
+        renderer_(std::move(renderer)),
+        color_(scene.settings().color) {
     for (const BodyView &body : scene.bodies()) {
       Buffers b;
-      b.xyz.resize(3 * size_t(body.nsurfel)), b.vectors.resize(3 * size_t(body.nsurfel)), b.scalar.resize(body.nsurfel);
+      b.xyz.resize(3 * size_t(body.nsurfel));
+      b.vectors.resize(3 * size_t(body.nsurfel));
+      b.scalar.resize(body.nsurfel);
       uint32_t n = 0;
       need(dfm_surface_positions(body.handle, body.nsurfel, b.xyz.data(), &n));
       b.start = b.xyz;
@@ -41,14 +46,19 @@ class OffScreen : public Frames {
       const dfm_scene_settings &s = scene_.settings();
       render::Camera camera = render::auto_camera(picture_scene, double(kWidth) / kHeight);
       if (s.has_camera)
-        for (int i = 0; i < 3; ++i) camera.eye[i] = s.eye[i], camera.look_at[i] = s.look_at[i];
+        for (int i = 0; i < 3; ++i) {
+          camera.eye[i] = s.eye[i];
+          camera.look_at[i] = s.look_at[i];
+        }
       camera_ = camera;
     }
-    picture_scene.extent = extent_, picture_scene.camera = camera_;
+    picture_scene.extent = extent_;
+    picture_scene.camera = camera_;
     if (color_ == "displacement") picture_scene.map = render::ColourMap::lagoon;
     render::Image image;
     std::string why;
-    if (!renderer_->draw(picture_scene, image, &why)) throw Failure(kBadInput, "frame " + std::to_string(drawn_) + ": " + why);
+    if (!renderer_->draw(picture_scene, image, &why))
+      throw Failure(kBadInput, "frame " + std::to_string(drawn_) + ": " + why);
     annotate(image, picture_scene.map, t);
     char name[40];
     std::snprintf(name, sizeof name, "/frame_%06u.png", drawn_++);
@@ -56,7 +66,10 @@ class OffScreen : public Frames {
   }
 
  private:
-  struct Buffers { std::vector<double> xyz, start, vectors; std::vector<float> scalar; };
+  struct Buffers {
+    std::vector<double> xyz, start, vectors;
+    std::vector<float> scalar;
+  };
 
   // Fills the scalars of one body in their own unit; false where the scene colors by body.
   bool fill_values(const BodyView &body, Buffers &b) {
@@ -89,12 +102,19 @@ class OffScreen : public Frames {
       Buffers &b = buffers_[i];
       const render::Color own = render::palette(uint32_t(i));
       render::Surface s;
-      s.xyz = b.xyz.data(), s.n = uint32_t(b.xyz.size() / 3);
-      s.tri = scene_.bodies()[i].triangles.data(), s.ntri = uint32_t(scene_.bodies()[i].triangles.size() / 3);
-      s.rgb[0] = own.r, s.rgb[1] = own.g, s.rgb[2] = own.b;
+      s.xyz = b.xyz.data();
+      s.n = uint32_t(b.xyz.size() / 3);
+      s.tri = scene_.bodies()[i].triangles.data();
+      s.ntri = uint32_t(scene_.bodies()[i].triangles.size() / 3);
+      s.rgb[0] = own.r;
+      s.rgb[1] = own.g;
+      s.rgb[2] = own.b;
       if (colored) {
         // Where nothing touches the body keeps its own color.
-        for (float &x : b.scalar) x = color_ == "contact" && x == 0 ? std::numeric_limits<float>::quiet_NaN() : scale_ > 0 ? x / scale_ : 0;
+        for (float &x : b.scalar)
+          x = color_ == "contact" && x == 0 ? std::numeric_limits<float>::quiet_NaN()
+              : scale_ > 0                  ? x / scale_
+                                            : 0;
         s.scalar = b.scalar.data();
       }
       out.surfaces.push_back(s);
@@ -114,18 +134,27 @@ class OffScreen : public Frames {
       double axis[3];
       rotate(pose.rotation, up, axis);
       const double *p = pose.position;
-      if (o.def.shape == DFM_SHAPE_PLANE) out.planes.push_back({{p[0], p[1], p[2]}, {axis[0], axis[1], axis[2]}, {}});
-      else if (o.def.shape == DFM_SHAPE_SPHERE) out.spheres.push_back({{p[0], p[1], p[2]}, o.def.radius, {}});
-      else if (o.def.shape == DFM_SHAPE_BOX) {
+      if (o.def.shape == DFM_SHAPE_PLANE) {
+        out.planes.push_back({{p[0], p[1], p[2]}, {axis[0], axis[1], axis[2]}, {}});
+      } else if (o.def.shape == DFM_SHAPE_SPHERE) {
+        out.spheres.push_back({{p[0], p[1], p[2]}, o.def.radius, {}});
+      } else if (o.def.shape == DFM_SHAPE_BOX) {
         render::Box box = {};
-        for (int i = 0; i < 3; ++i) box.pose.position[i] = p[i], box.half[i] = o.def.half_size[i];
+        for (int i = 0; i < 3; ++i) {
+          box.pose.position[i] = p[i];
+          box.half[i] = o.def.half_size[i];
+        }
         for (int i = 0; i < 4; ++i) box.pose.rotation[i] = pose.rotation[i];
         box.look = {};
         out.boxes.push_back(box);
       } else if (o.def.shape == DFM_SHAPE_CAPSULE) {
         render::Capsule capsule = {};
-        for (int i = 0; i < 3; ++i) capsule.a[i] = p[i] - o.def.half_length * axis[i], capsule.b[i] = p[i] + o.def.half_length * axis[i];
-        capsule.radius = o.def.radius, capsule.look = {};
+        for (int i = 0; i < 3; ++i) {
+          capsule.a[i] = p[i] - o.def.half_length * axis[i];
+          capsule.b[i] = p[i] + o.def.half_length * axis[i];
+        }
+        capsule.radius = o.def.radius;
+        capsule.look = {};
         out.capsules.push_back(capsule);
       }
     }
@@ -134,8 +163,13 @@ class OffScreen : public Frames {
   void add_triangles(const ObstacleView &o, std::vector<double> &placed, render::Scene &out) const {
     place_points(o, placed);
     render::Surface s;
-    s.xyz = placed.data(), s.n = o.def.npoint, s.tri = o.def.triangles, s.ntri = o.def.ntriangle;
-    s.rgb[0] = 0.72f, s.rgb[1] = 0.73f, s.rgb[2] = 0.75f;   // no body's color
+    s.xyz = placed.data();
+    s.n = o.def.npoint;
+    s.tri = o.def.triangles;
+    s.ntri = o.def.ntriangle;
+    s.rgb[0] = 0.72f;
+    s.rgb[1] = 0.73f;
+    s.rgb[2] = 0.75f;  // no body's color
     out.surfaces.push_back(s);
   }
 
@@ -153,7 +187,7 @@ class OffScreen : public Frames {
   std::unique_ptr<render::Renderer> renderer_;
   std::string color_;
   std::vector<Buffers> buffers_;
-  std::vector<std::vector<double>> placed_;   // of obstacles of triangles
+  std::vector<std::vector<double>> placed_;  // of obstacles of triangles
   std::optional<render::Bounds> extent_;
   std::optional<render::Camera> camera_;
   float scale_ = 0;
@@ -180,7 +214,9 @@ std::unique_ptr<Frames> Frames::create(const SceneFile &scene, const std::string
 namespace cli {
 
 std::unique_ptr<Frames> Frames::create(const SceneFile &, const std::string &) {
-  warn("no pictures: this deform was built without the renderer (cmake -DDEFORM_RENDER=ON, Debian packages libegl-dev or libosmesa6-dev)");
+  warn(
+      "no pictures: this deform was built without the renderer (cmake -DDEFORM_RENDER=ON, Debian packages "
+      "libegl-dev or libosmesa6-dev)");
   return nullptr;
 }
 

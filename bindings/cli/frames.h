@@ -1,4 +1,5 @@
-// Pictures of a run through the off-screen renderer; without one (not built, or no backend here) a warning and no pictures.
+// Pictures of a run through the off-screen renderer; without one (not built, or no backend here) a warning
+// and no pictures.
 #pragma once
 #include <memory>
 #include <string>

@@ -14,8 +14,8 @@ namespace {
 
 struct DriveForm {
   const char *kind;
-  std::vector<std::string> needed, optional;     // numbers of /input
-  std::vector<std::string> columns;              // where the case names none
+  std::vector<std::string> needed, optional;  // numbers of /input
+  std::vector<std::string> columns;           // where the case names none
 };
 
 // In the order of Drive.
@@ -23,14 +23,20 @@ const std::vector<DriveForm> kDrives = {
     {"bias_sine_force", {"bias", "amp", "freq"}, {"phase"}, {"t", "x", "v", "F", "z"}},
     {"sine_velocity", {"V", "freq"}, {"phase"}, {"t", "x", "v", "F", "z"}},
     {"spring_pull", {"k", "V"}, {}, {"t", "x", "v", "F", "z"}},
-    {"force_ramps", {}, {}, {"rate", "F_ba", "t_ba", "f_applied_at_ba", "interior_peak", "t_v_eq_v_s", "f_applied_v_eq_v_s"}},
+    {"force_ramps",
+     {},
+     {},
+     {"rate", "F_ba", "t_ba", "f_applied_at_ba", "interior_peak", "t_v_eq_v_s", "f_applied_v_eq_v_s"}},
     {"displacement_path", {}, {}, {"x", "segment", "F"}},
     {"circle_velocity", {"V", "R"}, {}, {"t", "vx", "vy", "zx", "zy", "Fx", "Fy"}},
     {"turn_velocity", {"V", "t_turn", "turn_angle"}, {}, {"t", "vx", "vy", "zx", "zy", "Fx", "Fy"}},
-    {"sine_velocity_sine_load", {"F0", "a_open", "freq", "V", "vfreq"}, {"vphase"}, {"t", "v", "Fn", "z", "F_elastic", "closed"}},
+    {"sine_velocity_sine_load",
+     {"F0", "a_open", "freq", "V", "vfreq"},
+     {"vphase"},
+     {"t", "v", "Fn", "z", "F_elastic", "closed"}},
 };
-const double kPathSpeed = 1e-5;                  // m/s, of a quasi-static path whose case gives none
-const int kPathRows = 20;                        // of a straight piece, where the case lists no x
+const double kPathSpeed = 1e-5;  // m/s, of a quasi-static path whose case gives none
+const int kPathRows = 20;        // of a straight piece, where the case lists no x
 
 constexpr uint64_t kMaxBytes = uint64_t(64) << 20;
 
@@ -40,10 +46,13 @@ class CaseReader {
     text_ = read_file(file, kMaxBytes, "a friction case (JSON)");
     size_t where = 0;
     if (std::string why; !parse_json(text_, root_, &where, &why)) {
-      const auto line = 1 + std::count(text_.begin(), text_.begin() + long(std::min(where, text_.size())), '\n');
-      throw Failure(kBadInput, file + ":" + std::to_string(line) + ": " + why + "; expected a case as libdeform/doc/reference/friction_rig.md shows it");
+      const auto line =
+          1 + std::count(text_.begin(), text_.begin() + long(std::min(where, text_.size())), '\n');
+      throw Failure(kBadInput, file + ":" + std::to_string(line) + ": " + why +
+                                   "; expected a case as libdeform/doc/reference/friction_rig.md shows it");
     }
-    if (root_.kind != JsonValue::object) refuse("", "is not an object; expected the keys law, params, input and output_times");
+    if (root_.kind != JsonValue::object)
+      refuse("", "is not an object; expected the keys law, params, input and output_times");
   }
 
   FrictionCase read() {
@@ -58,15 +67,20 @@ class CaseReader {
     read_params(c);
     refuse_other_loads(c);
     for (const std::string &key : form.needed) c.input[key] = needed(key);
-    for (const std::string &key : form.optional) c.input[key] = input_->find(key) ? number_at(*input_->find(key), "/input/" + key) : 0.0;
-    if (c.drive == Drive::circle && !(c.input["R"] > 0)) refuse("/input/R", "is not above 0; expected the radius of the circle in m");
-    if (c.drive == Drive::spring && !(c.input["k"] >= 0)) refuse("/input/k", "is negative; expected the stiffness of the spring in N/m");
+    for (const std::string &key : form.optional)
+      c.input[key] = input_->find(key) ? number_at(*input_->find(key), "/input/" + key) : 0.0;
+    if (c.drive == Drive::circle && !(c.input["R"] > 0))
+      refuse("/input/R", "is not above 0; expected the radius of the circle in m");
+    if (c.drive == Drive::spring && !(c.input["k"] >= 0))
+      refuse("/input/k", "is negative; expected the stiffness of the spring in N/m");
     read_initial(c);
     if (c.drive == Drive::path) read_path(c);
-    else if (c.drive == Drive::ramps) c.times = numbers_at(input("rates", "a list of force rates in N/s"), "/input/rates");
+    else if (c.drive == Drive::ramps)
+      c.times = numbers_at(input("rates", "a list of force rates in N/s"), "/input/rates");
     else read_times(c);
     for (const double rate : c.times)
-      if (c.drive == Drive::ramps && !(rate > 0)) refuse("/input/rates", "holds " + number(rate) + ", expected rates above 0 N/s");
+      if (c.drive == Drive::ramps && !(rate > 0))
+        refuse("/input/rates", "holds " + number(rate) + ", expected rates above 0 N/s");
     read_columns(c, form);
     return c;
   }
@@ -80,14 +94,17 @@ class CaseReader {
     char *end = nullptr;
     const double x = std::strtod(v.text.c_str(), &end);
     if (v.kind != JsonValue::literal || v.text.empty() || *end || !std::isfinite(x))
-      refuse(pointer, "is " + (v.text.empty() ? std::string("no number") : "\"" + v.text + "\"") + ", expected a finite number");
+      refuse(pointer, "is " + (v.text.empty() ? std::string("no number") : "\"" + v.text + "\"") +
+                          ", expected a finite number");
     return x;
   }
 
   std::vector<double> numbers_at(const JsonValue &v, const std::string &pointer) const {
-    if (v.kind != JsonValue::array || v.items.empty()) refuse(pointer, "is not a list, expected one of numbers");
+    if (v.kind != JsonValue::array || v.items.empty())
+      refuse(pointer, "is not a list, expected one of numbers");
     std::vector<double> out;
-    for (size_t i = 0; i < v.items.size(); ++i) out.push_back(number_at(v.items[i], pointer + "/" + std::to_string(i)));
+    for (size_t i = 0; i < v.items.size(); ++i)
+      out.push_back(number_at(v.items[i], pointer + "/" + std::to_string(i)));
     return out;
   }
 
@@ -104,12 +121,16 @@ class CaseReader {
     if (!v) refuse("/input/" + key, "is missing, expected " + what + instead(*input_, key));
     return *v;
   }
-  double needed(const std::string &key) const { return number_at(input(key, "a number for input.kind \"" + input_->get("kind") + "\""), "/input/" + key); }
+  double needed(const std::string &key) const {
+    return number_at(input(key, "a number for input.kind \"" + input_->get("kind") + "\""), "/input/" + key);
+  }
 
   double positive(const char *key, bool wanted) const {
     const JsonValue *v = root_.find(key);
     if (!v || v->kind == JsonValue::null) {
-      if (wanted) refuse("/" + std::string(key), "is missing, expected what the force moves, in kg" + instead(root_, key));
+      if (wanted)
+        refuse("/" + std::string(key),
+               "is missing, expected what the force moves, in kg" + instead(root_, key));
       return 0;
     }
     const double x = number_at(*v, "/" + std::string(key));
@@ -119,25 +140,29 @@ class CaseReader {
 
   void read_kind(FrictionCase &c) {
     input_ = root_.find("input");
-    if (!input_ || input_->kind != JsonValue::object) refuse("/input", "is missing, expected an object with kind and the numbers of the drive");
+    if (!input_ || input_->kind != JsonValue::object)
+      refuse("/input", "is missing, expected an object with kind and the numbers of the drive");
     c.kind = input_->get("kind");
     std::vector<std::string> kinds;
     for (const DriveForm &form : kDrives) kinds.push_back(form.kind);
-    if (c.kind == "table") refuse("/input/kind", "is \"table\": values to compare functions with, not a run; there is nothing to simulate");
+    if (c.kind == "table")
+      refuse("/input/kind",
+             "is \"table\": values to compare functions with, not a run; there is nothing to simulate");
     const auto found = std::find(kinds.begin(), kinds.end(), c.kind);
     if (found == kinds.end()) {
       std::string all;
       for (const std::string &k : kinds) all += (all.empty() ? "" : ", ") + k;
       const std::string near = nearest(c.kind, kinds);
-      refuse("/input/kind", (c.kind.empty() ? "is missing" : "is \"" + c.kind + "\"") + ", expected one of " + all +
-                                (near.empty() ? "" : "; did you mean \"" + near + "\"?"));
+      refuse("/input/kind", (c.kind.empty() ? "is missing" : "is \"" + c.kind + "\"") + ", expected one of " +
+                                all + (near.empty() ? "" : "; did you mean \"" + near + "\"?"));
     }
     c.drive = Drive(found - kinds.begin());
   }
 
   void read_params(FrictionCase &c) const {
     const JsonValue *params = root_.find("params");
-    if (!params || params->kind != JsonValue::object) refuse("/params", "is missing, expected an object with the law's parameters");
+    if (!params || params->kind != JsonValue::object)
+      refuse("/params", "is missing, expected an object with the law's parameters");
     for (const auto &[key, value] : params->members) {
       if (value.kind == JsonValue::null) continue;
       const std::string pointer = "/params/" + key;
@@ -149,15 +174,19 @@ class CaseReader {
     }
   }
 
-  // Of the load cases only the one that is projected on the cone is what the laws compute (doc/laws/formulas.md (7)).
+  // Of the load cases only the one that is projected on the cone is what the laws compute
+  // (doc/laws/formulas.md (7)).
   void refuse_other_loads(const FrictionCase &c) const {
     if (c.drive != Drive::loaded) return;
     const std::string form = input_->get("form");
     bool excess = false;
     if (const JsonValue *columns = root_.find("columns"))
-      for (const JsonValue &column : columns->items) excess |= column.get("name") == "cone_excess" || column.text == "cone_excess";
+      for (const JsonValue &column : columns->items)
+        excess |= column.get("name") == "cone_excess" || column.text == "cone_excess";
     if (excess || (!form.empty() && form.find("a_open") == std::string::npos))
-      refuse("/input", "asks for a normal force without projection on the friction cone; only the projected form, Fn = F0(1 + a_open sin), runs");
+      refuse("/input",
+             "asks for a normal force without projection on the friction cone; only the projected form, Fn = "
+             "F0(1 + a_open sin), runs");
   }
 
   void read_initial(FrictionCase &c) const {
@@ -167,7 +196,11 @@ class CaseReader {
     const auto one = [&](const char *key, double &to) {
       if (const JsonValue *v = initial->find(key)) to = number_at(*v, std::string("/initial/") + key);
     };
-    one("x", c.x0), one("v", c.v0), one("z", c.z0[0]), one("zx", c.z0[0]), one("zy", c.z0[1]);
+    one("x", c.x0);
+    one("v", c.v0);
+    one("z", c.z0[0]);
+    one("zx", c.z0[0]);
+    one("zy", c.z0[1]);
   }
 
   void read_times(FrictionCase &c) const {
@@ -176,29 +209,39 @@ class CaseReader {
     } else if (input_->find("T") && input_->find("dt")) {
       const double last = needed("T"), dt = needed("dt");
       if (!(last >= 0)) refuse("/input/T", "is " + number(last) + " s, expected an end at 0 or later");
-      if (!(dt > 0) || !(last / dt < 1e7)) refuse("/input/dt", "is not a time between rows, expected T/dt below 1e7");
+      if (!(dt > 0) || !(last / dt < 1e7))
+        refuse("/input/dt", "is not a time between rows, expected T/dt below 1e7");
       for (int i = 0; i <= int(last / dt + 0.5); ++i) c.times.push_back(i * dt);
     } else {
-      refuse("/output_times", "is missing, expected the times of the rows in s" + instead(root_, "output_times"));
+      refuse("/output_times",
+             "is missing, expected the times of the rows in s" + instead(root_, "output_times"));
     }
     for (size_t i = 0; i < c.times.size(); ++i)
       if (!(c.times[i] >= (i ? c.times[i - 1] : 0.0)) || (i && c.times[i] == c.times[i - 1]))
-        refuse("/output_times/" + std::to_string(i), "is " + number(c.times[i]) + " s, expected times that rise from 0");
+        refuse("/output_times/" + std::to_string(i),
+               "is " + number(c.times[i]) + " s, expected times that rise from 0");
   }
 
   void read_path(FrictionCase &c) const {
     const JsonValue *x = input_->find("x"), *segment = input_->find("segment");
     if (x) {
       c.path_x = numbers_at(*x, "/input/x");
-      c.path_segment = segment ? numbers_at(*segment, "/input/segment") : std::vector<double>(c.path_x.size(), 0.0);
+      c.path_segment =
+          segment ? numbers_at(*segment, "/input/segment") : std::vector<double>(c.path_x.size(), 0.0);
       if (c.path_segment.size() != c.path_x.size())
-        refuse("/input/segment", "has " + std::to_string(c.path_segment.size()) + " numbers, expected one for each of the " + std::to_string(c.path_x.size()) + " of x");
+        refuse("/input/segment", "has " + std::to_string(c.path_segment.size()) +
+                                     " numbers, expected one for each of the " +
+                                     std::to_string(c.path_x.size()) + " of x");
     } else {
-      const std::vector<double> corner = numbers_at(input("path", "the corners of the path in m, or x"), "/input/path");
-      c.path_x = {corner[0]}, c.path_segment = {0};
+      const std::vector<double> corner =
+          numbers_at(input("path", "the corners of the path in m, or x"), "/input/path");
+      c.path_x = {corner[0]};
+      c.path_segment = {0};
       for (size_t i = 1; i < corner.size(); ++i)
-        for (int k = 1; k <= kPathRows; ++k)
-          c.path_x.push_back(corner[i - 1] + (corner[i] - corner[i - 1]) * k / kPathRows), c.path_segment.push_back(double(i - 1));
+        for (int k = 1; k <= kPathRows; ++k) {
+          c.path_x.push_back(corner[i - 1] + (corner[i] - corner[i - 1]) * k / kPathRows);
+          c.path_segment.push_back(double(i - 1));
+        }
     }
     c.path_speed = kPathSpeed;
     for (const JsonValue *v : {root_.find("v_q"), input_->find("v_q")})
@@ -209,10 +252,13 @@ class CaseReader {
   void read_columns(FrictionCase &c, const DriveForm &form) const {
     const JsonValue *columns = root_.find("columns");
     c.columns = form.columns;
-    if (!columns || c.drive == Drive::path) return;     // a path's file lists the columns of several laws: ours has one F
-    if (columns->kind != JsonValue::array || columns->items.empty()) refuse("/columns", "is not a list, expected names or objects with a name");
+    // a path's file lists the columns of several laws: ours has one F
+    if (!columns || c.drive == Drive::path) return;
+    if (columns->kind != JsonValue::array || columns->items.empty())
+      refuse("/columns", "is not a list, expected names or objects with a name");
     c.columns.clear();
-    for (const JsonValue &column : columns->items) c.columns.push_back(column.kind == JsonValue::object ? column.get("name") : column.text);
+    for (const JsonValue &column : columns->items)
+      c.columns.push_back(column.kind == JsonValue::object ? column.get("name") : column.text);
   }
 
   std::string file_, text_;

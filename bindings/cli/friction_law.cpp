@@ -10,9 +10,11 @@
 namespace cli {
 namespace {
 
-// Keys that the cases of the reference set carry for some law; a law that has no use for one of them is not asked about it.
-const std::vector<std::string> kCaseKeys = {"F_C", "F_S", "mu", "mu_C", "mu_S", "v_s", "delta", "sigma", "sigma0", "sigma1", "sigma1_form", "sigma2", "v_d",
-                                            "dv", "z_ba", "kappa", "i", "alpha", "k", "nu", "C", "multiplier"};
+// Keys that the cases of the reference set carry for some law; a law that has no use for one of them is not
+// asked about it.
+const std::vector<std::string> kCaseKeys = {
+    "F_C",    "F_S", "mu", "mu_C", "mu_S",  "v_s", "delta", "sigma", "sigma0", "sigma1", "sigma1_form",
+    "sigma2", "v_d", "dv", "z_ba", "kappa", "i",   "alpha", "k",     "nu",     "C",      "multiplier"};
 
 std::string short_name(const std::string &law) {
   return law == "ep" ? "elastoplastic" : law == "coulomb_plain" ? "coulomb" : law;
@@ -22,7 +24,8 @@ bool shipped(const dfm_type &type) { return std::strncmp(type.id, "org.deform.",
 
 const dfm_param *row_of(const dfm_type &type, const std::string &key) {
   for (uint32_t i = 0; i < type.nparam; ++i) {
-    const auto *row = reinterpret_cast<const dfm_param *>(reinterpret_cast<const char *>(type.params) + size_t(i) * type.param_size);
+    const auto *row = reinterpret_cast<const dfm_param *>(reinterpret_cast<const char *>(type.params) +
+                                                          size_t(i) * type.param_size);
     if (key == row->key) return row;
   }
   return nullptr;
@@ -35,26 +38,32 @@ class Filler {
 
   void fill() {
     for (uint32_t i = 0; i < type_.nparam; ++i) {
-      const auto *row = reinterpret_cast<const dfm_param *>(reinterpret_cast<const char *>(type_.params) + size_t(i) * type_.param_size);
+      const auto *row = reinterpret_cast<const dfm_param *>(reinterpret_cast<const char *>(type_.params) +
+                                                            size_t(i) * type_.param_size);
       if (const CaseParam *p = rig_.param(row->key)) take(*row, *p);
     }
-    level("mu_C", {"F_C"}), level("mu_S", {"F_S", "F_C"});
+    level("mu_C", {"F_C"});
+    level("mu_S", {"F_S", "F_C"});
     if (!row_of(type_, "mu_C")) level("mu", {"F_C"});
-    if (const CaseParam *p = rig_.param("sigma"); p && row_of(type_, "sigma0") && !given("sigma0")) take(*row_of(type_, "sigma0"), *p);
+    if (const CaseParam *p = rig_.param("sigma"); p && row_of(type_, "sigma0") && !given("sigma0"))
+      take(*row_of(type_, "sigma0"), *p);
     kappa();
     sigma1_form();
     // A case that states no curve means that the level falls at once.
     if (const dfm_param *row = row_of(type_, "v_s"); row && !given("v_s")) put("v_s", {row->min});
     for (const char *key : {"mu_C", "sigma0"})
       if (shipped(type_) && row_of(type_, key) && !given(key) && !given("mu"))
-        throw Failure(kBadInput, rig_.file + ": /params gives the law " + type_.id + " no " +
-                                     (key == std::string("mu_C") ? "friction level, expected F_C, mu_C or mu" : "bristle stiffness, expected sigma0 or sigma"));
+        throw Failure(kBadInput,
+                      rig_.file + ": /params gives the law " + type_.id + " no " +
+                          (key == std::string("mu_C") ? "friction level, expected F_C, mu_C or mu"
+                                                      : "bristle stiffness, expected sigma0 or sigma"));
   }
 
   const std::vector<std::string> &used() const { return used_; }
   std::vector<dfm_param_value> values() const {
     std::vector<dfm_param_value> out;
-    for (const auto &[key, value] : filled_) out.push_back({key.c_str(), value.data(), uint32_t(value.size())});
+    for (const auto &[key, value] : filled_)
+      out.push_back({key.c_str(), value.data(), uint32_t(value.size())});
     return out;
   }
 
@@ -73,8 +82,8 @@ class Filler {
     if (found == names.end()) {
       std::string all;
       for (const std::string &n : names) all += (all.empty() ? "" : ", ") + n;
-      throw Failure(kBadInput, rig_.file + ": /params/" + p.key + " is \"" + p.word + "\", expected " + (all.empty() ? "a number" : "one of " + all) +
-                                   " for " + type_.id);
+      throw Failure(kBadInput, rig_.file + ": /params/" + p.key + " is \"" + p.word + "\", expected " +
+                                   (all.empty() ? "a number" : "one of " + all) + " for " + type_.id);
     }
     put(row.key, {double(found - names.begin())});
   }
@@ -88,7 +97,8 @@ class Filler {
     for (const std::string &force : forces)
       if (!p && (p = rig_.param(force))) scale = fn_;
     if (!p) return;
-    if (p->value.size() != 1) throw Failure(kBadInput, rig_.file + ": /params/" + p->key + " is not a number");
+    if (p->value.size() != 1)
+      throw Failure(kBadInput, rig_.file + ": /params/" + p->key + " is not a number");
     used_.push_back(p->key);
     put(key, {p->value[0] / scale});
   }
@@ -99,7 +109,9 @@ class Filler {
     const double kinetic = rig_.param("mu_C") ? rig_.number_of("mu_C", 0) * fn_ : rig_.number_of("F_C", 0);
     const double stiffness = rig_.number_of("sigma0", rig_.number_of("sigma", 0));
     if (!(kinetic > 0) || z_ba->value.size() != 1)
-      throw Failure(kBadInput, rig_.file + ": /params/z_ba needs a number and a level F_C above 0, for kappa = sigma0 z_ba / F_C");
+      throw Failure(
+          kBadInput,
+          rig_.file + ": /params/z_ba needs a number and a level F_C above 0, for kappa = sigma0 z_ba / F_C");
     used_.push_back("z_ba");
     put("kappa", {stiffness * z_ba->value[0] / kinetic});
   }
@@ -122,21 +134,28 @@ class Filler {
 
 }  // namespace
 
-RigLaw::RigLaw(const Globals &globals, const FrictionCase &rig, const std::string &law) : context_(make_context(globals), dfm_context_destroy) {
+RigLaw::RigLaw(const Globals &globals, const FrictionCase &rig, const std::string &law)
+    : context_(make_context(globals), dfm_context_destroy) {
   const std::string name = short_name(law.empty() ? rig.law : law);
   if (name.empty() || name.find(',') != std::string::npos)
-    throw Failure(kBadInput, rig.file + ": /law " + (name.empty() ? "is missing" : "lists several laws (" + name + ")") + "; choose one with --law");
-  if (dfm_law_open(context_.get(), name.c_str(), &law_) < 0) throw Failure(kBadInput, (law.empty() ? rig.file + ": /law: " : "--law: ") + dfm_last_error());
+    throw Failure(kBadInput, rig.file + ": /law " +
+                                 (name.empty() ? "is missing" : "lists several laws (" + name + ")") +
+                                 "; choose one with --law");
+  if (dfm_law_open(context_.get(), name.c_str(), &law_) < 0)
+    throw Failure(kBadInput, (law.empty() ? rig.file + ": /law: " : "--law: ") + dfm_last_error());
   need(dfm_law_type(law_, &type_));
   if (rig.drive == Drive::loaded) fn_ = rig.input.at("F0");
   else if (rig.mass > 0 && rig.gravity > 0) fn_ = rig.mass * rig.gravity;
-  if (!(fn_ > 0)) throw Failure(kBadInput, rig.file + ": /input/F0 is " + number(fn_) + " N, expected a normal force above 0");
+  if (!(fn_ > 0))
+    throw Failure(kBadInput,
+                  rig.file + ": /input/F0 is " + number(fn_) + " N, expected a normal force above 0");
   fill_params(rig);
   uint32_t nstate = 0;
   const dfm_slots *own = ops().state ? ops().state(params_.data()) : nullptr;
   slots_ = own ? *own : dfm_slots{sizeof(dfm_slots), ops().nslot, ops().slots};
   for (uint32_t i = 0; i < slots_.nslot; ++i) nstate += slots_.slots[i].width;
-  state_.resize(nstate), trial_.resize(nstate);
+  state_.resize(nstate);
+  trial_.resize(nstate);
   reset(rig);
 }
 
@@ -146,7 +165,8 @@ void RigLaw::fill_params(const FrictionCase &rig) {
   const std::vector<dfm_param_value> values = filler.values();
   const dfm_params packed = {sizeof packed, uint32_t(values.size()), values.data()};
   uint32_t n = 0;
-  if (dfm_law_pack(law_, &packed, 0, nullptr, &n) < 0) throw Failure(kBadInput, rig.file + ": /params: " + dfm_last_error());
+  if (dfm_law_pack(law_, &packed, 0, nullptr, &n) < 0)
+    throw Failure(kBadInput, rig.file + ": /params: " + dfm_last_error());
   params_.resize(n);
   if (n) need(dfm_law_pack(law_, &packed, n, params_.data(), &n));
   warn_of(rig, filler.used());
@@ -155,7 +175,9 @@ void RigLaw::fill_params(const FrictionCase &rig) {
 void RigLaw::warn_of(const FrictionCase &rig, const std::vector<std::string> &used) const {
   std::vector<std::string> names = kCaseKeys;
   for (uint32_t i = 0; i < type_->nparam; ++i)
-    names.push_back(reinterpret_cast<const dfm_param *>(reinterpret_cast<const char *>(type_->params) + size_t(i) * type_->param_size)->key);
+    names.push_back(reinterpret_cast<const dfm_param *>(reinterpret_cast<const char *>(type_->params) +
+                                                        size_t(i) * type_->param_size)
+                        ->key);
   std::string lacks;
   for (const CaseParam &p : rig.params) {
     if (std::find(used.begin(), used.end(), p.key) != used.end()) continue;
@@ -165,13 +187,16 @@ void RigLaw::warn_of(const FrictionCase &rig, const std::vector<std::string> &us
     const std::string near = known ? "" : nearest(p.key, names);
     if (!near.empty()) lacks += " (did you mean \"" + near + "\"?)";
   }
-  if (!lacks.empty()) warn(rig.file + ": the law " + type_->id + " has no parameter for these keys of /params, they are left out: " + lacks);
+  if (!lacks.empty())
+    warn(rig.file + ": the law " + type_->id +
+         " has no parameter for these keys of /params, they are left out: " + lacks);
 }
 
 double RigLaw::param(const std::string &key, double otherwise, uint32_t at) const {
   size_t offset = 0;
   for (uint32_t i = 0; i < type_->nparam; ++i) {
-    const auto *row = reinterpret_cast<const dfm_param *>(reinterpret_cast<const char *>(type_->params) + size_t(i) * type_->param_size);
+    const auto *row = reinterpret_cast<const dfm_param *>(reinterpret_cast<const char *>(type_->params) +
+                                                          size_t(i) * type_->param_size);
     if (key == row->key && at < row->width) return params_[offset + at];
     offset += row->width;
   }
@@ -203,7 +228,8 @@ bool RigLaw::differs(const std::vector<Column> &other) const {
   for (uint32_t i = 0; i < slots_.nslot; at += slots_.slots[i].width, ++i)
     for (size_t k = at; k < at + slots_.slots[i].width; ++k) {
       const double a = state_[k].lane[0], b = other[k].lane[0];
-      if (slots_.slots[i].kind != DFM_SLOT_TANGENT && a != b && a == std::floor(a) && b == std::floor(b)) return true;
+      if (slots_.slots[i].kind != DFM_SLOT_TANGENT && a != b && a == std::floor(a) && b == std::floor(b))
+        return true;
     }
   return false;
 }
@@ -212,7 +238,8 @@ void RigLaw::extrapolate(const std::vector<Column> &whole, double share) {
   size_t at = 0;
   for (uint32_t i = 0; i < slots_.nslot; at += slots_.slots[i].width, ++i) {
     if (slots_.slots[i].kind != DFM_SLOT_TANGENT) continue;
-    for (size_t k = at; k < at + slots_.slots[i].width; ++k) state_[k].lane[0] += share * (state_[k].lane[0] - whole[k].lane[0]);
+    for (size_t k = at; k < at + slots_.slots[i].width; ++k)
+      state_[k].lane[0] += share * (state_[k].lane[0] - whole[k].lane[0]);
   }
 }
 
@@ -220,52 +247,83 @@ Resistance RigLaw::eval(const Slip &slip, bool derivative) {
   Column fn, vt[2], stop[2], area, dwell, ft[2], dvt[4], limit, stored;
   alignas(64) uint8_t mode[8] = {};
   for (int i = 0; i < 8; ++i) {
-    fn.lane[i] = slip.fn, area.lane[i] = 1, dwell.lane[i] = slip.dwell;
-    vt[0].lane[i] = slip.vx, vt[1].lane[i] = slip.vy, stop[0].lane[i] = slip.stop_x, stop[1].lane[i] = slip.stop_y;
+    fn.lane[i] = slip.fn;
+    area.lane[i] = 1;
+    dwell.lane[i] = slip.dwell;
+    vt[0].lane[i] = slip.vx;
+    vt[1].lane[i] = slip.vy;
+    stop[0].lane[i] = slip.stop_x;
+    stop[1].lane[i] = slip.stop_y;
   }
   const bool slope = derivative && (ops().flags & DFM_FRIC_JACOBIAN);
   dfm_friction_in in = {};
-  in.size = sizeof in, in.n = 1, in.stride = 8, in.dt = slip.dt, in.params = params_.data();
-  in.fn = fn.lane, in.vt = vt[0].lane, in.ft_stop = stop[0].lane, in.area = area.lane, in.dwell = dwell.lane;
+  in.size = sizeof in;
+  in.n = 1;
+  in.stride = 8;
+  in.dt = slip.dt;
+  in.params = params_.data();
+  in.fn = fn.lane;
+  in.vt = vt[0].lane;
+  in.ft_stop = stop[0].lane;
+  in.area = area.lane;
+  in.dwell = dwell.lane;
   in.state = state_.empty() ? nullptr : state_[0].lane;
   dfm_friction_out out = {};
-  out.size = sizeof out, out.ft = ft[0].lane, out.state = trial_.empty() ? nullptr : trial_[0].lane, out.dft_dvt = slope ? dvt[0].lane : nullptr;
-  out.limit = limit.lane, out.mode = mode, out.stored = stored.lane;
+  out.size = sizeof out;
+  out.ft = ft[0].lane;
+  out.state = trial_.empty() ? nullptr : trial_[0].lane;
+  out.dft_dvt = slope ? dvt[0].lane : nullptr;
+  out.limit = limit.lane;
+  out.mode = mode;
+  out.stored = stored.lane;
   ++evaluations_;
   const dfm_status status = dfm_law_eval(law_, &in, &out);
   if (status < 0) throw Failure(kStopped, dfm_last_error());
   if (status != DFM_OK)
-    throw Failure(kStopped, "the law " + std::string(type_->id) + " gave no usable answer at fn " + number(slip.fn) + " N, v " + number(slip.vx) + " m/s");
+    throw Failure(kStopped, "the law " + std::string(type_->id) + " gave no usable answer at fn " +
+                                number(slip.fn) + " N, v " + number(slip.vx) + " m/s");
   Resistance r;
-  r.fx = -ft[0].lane[0], r.fy = -ft[1].lane[0], r.limit = limit.lane[0], r.stored = stored.lane[0], r.mode = mode[0];
+  r.fx = -ft[0].lane[0];
+  r.fy = -ft[1].lane[0];
+  r.limit = limit.lane[0];
+  r.stored = stored.lane[0];
+  r.mode = mode[0];
   r.stopped = jumps_at_rest() && r.mode == 1 && ft[0].lane[0] == slip.stop_x && ft[1].lane[0] == slip.stop_y;
   if (slope) r.slope = -dvt[0].lane[0];
   return r;
 }
 
-// ---- the implicit step -----------------------------------------------------------------------------------------------------------
+// ---- the implicit step ------------------------------------------------------------------------------------
 //
 //   R(u) = m_h u - drive + f(u) = 0
 //
-// From the old speed v the search walks against the sign of R, first by the step R/m_h that suffices where f rises with u, then by twice that,
-// until R changes sign. Newton's method inside that bracket, bisection where a step leaves it. Between rest and the old speed, and wherever the
-// slope of R was seen below zero (g falls faster than m_h, doc/laws/formulas.md (2)), the bracket is first cut up and its first change of sign taken.
+// From the old speed v the search walks against the sign of R, first by the step R/m_h that suffices
+// where f rises with u, then by twice that, until R changes sign. Newton's method inside that bracket,
+// bisection where a step leaves it. Between rest and the old speed, and wherever the slope of R was seen
+// below zero (g falls faster than m_h, doc/laws/formulas.md (2)), the bracket is first cut up and its
+// first change of sign taken.
 namespace {
 
 class StepSolver {
  public:
-  StepSolver(RigLaw &law, const Slip &slip, double m_h, double drive) : law_(law), slip_(slip), m_h_(m_h), drive_(drive) {
-    slip_.stop_x = -drive, slip_.stop_y = 0;
+  StepSolver(RigLaw &law, const Slip &slip, double m_h, double drive)
+      : law_(law), slip_(slip), m_h_(m_h), drive_(drive) {
+    slip_.stop_x = -drive;
+    slip_.stop_y = 0;
   }
 
   StepResult solve(double v) {
     StepResult r = search(v);
-    r.falls = falls_ || !(law_.ops().flags & DFM_FRIC_JACOBIAN), r.limit = limit_;
+    r.falls = falls_ || !(law_.ops().flags & DFM_FRIC_JACOBIAN);
+    r.limit = limit_;
     return r;
   }
 
  private:
-  struct Point { double u, r, slope; bool stopped; };
+  struct Point {
+    double u, r, slope;
+    bool stopped;
+  };
 
   StepResult search(double v) {
     Point a = at(v);
@@ -274,10 +332,13 @@ class StepSolver {
     double step = -a.r / m_h_;
     Point c = at(a.u + step);
     for (int k = 0; k < 2000 && !c.stopped && a.r * c.r > 0; ++k) {
-      step *= 2, a = c, c = at(a.u + step);
-      if (!std::isfinite(c.u) || std::fabs(c.u) > 1e150) throw Failure(kStopped, "no speed balances the force: friction drives the mass faster and faster");
+      step *= 2;
+      a = c;
+      c = at(a.u + step);
+      if (!std::isfinite(c.u) || std::fabs(c.u) > 1e150)
+        throw Failure(kStopped, "no speed balances the force: friction drives the mass faster and faster");
     }
-    if (c.stopped && c.u != 0) c = at(0);        // its solution is rest, wherever it was asked
+    if (c.stopped && c.u != 0) c = at(0);  // its solution is rest, wherever it was asked
     if (a.u * c.u <= 0 && a.u != 0) cut_toward_rest(a, c);
     else if (falls_) cut_evenly(a, c);
     return newton(a, c);
@@ -286,20 +347,22 @@ class StepSolver {
   Point at(double u) {
     slip_.vx = u;
     const Resistance f = law_.eval(slip_, true);
-    f_ = f.fx, limit_ = f.limit;
+    f_ = f.fx;
+    limit_ = f.limit;
     Point p = {u, m_h_ * u - drive_ + f.fx, 0, f.stopped};
-    if (f.stopped) p.r = m_h_ * u;               // exactly: the force is the drive
+    if (f.stopped) p.r = m_h_ * u;  // exactly: the force is the drive
     p.slope = (law_.ops().flags & DFM_FRIC_JACOBIAN) ? m_h_ + f.slope : 0;
     if (p.slope < 0) falls_ = true;
     return last_ = p;
   }
 
   StepResult finish(const Point &p) {
-    if (last_.u != p.u) at(p.u);                 // the trial state is that of the solution
+    if (last_.u != p.u) at(p.u);  // the trial state is that of the solution
     return {p.u, f_, false};
   }
 
-  // A law that stops what slides but does not hold what rests is broken; the force that holds it is taken, and the step counted as a jump.
+  // A law that stops what slides but does not hold what rests is broken; the force that holds it is taken,
+  // and the step counted as a jump.
   StepResult rest() {
     const Point p = last_.u == 0 ? last_ : at(0);
     return {0, drive_, !p.stopped};
@@ -333,7 +396,8 @@ class StepSolver {
       const double low = std::min(a.u, c.u), high = std::max(a.u, c.u);
       const double secant = c.u - c.r * (c.u - a.u) / (c.r - a.r), slope = best.slope > 0 ? best.slope : 0;
       double u = slope > 0 ? best.u - best.r / slope : secant;
-      if (k % 3 == 2 || !(u > low && u < high)) u = 0.5 * (low + high);   // every third time: no one-sided crawl
+      // every third time: no one-sided crawl
+      if (k % 3 == 2 || !(u > low && u < high)) u = 0.5 * (low + high);
       if (u <= low || u >= high || high - low <= 1e-300) return jump(a, c);
       const Point p = at(u);
       (p.r * a.r > 0 ? a : c) = p;
@@ -341,14 +405,16 @@ class StepSolver {
     return jump(a, c);
   }
 
-  // The bracket has closed on a jump of the law: the force between its two sides that balances (Filippov). Rounding alone leaves next to nothing.
+  // The bracket has closed on a jump of the law: the force between its two sides that balances (Filippov).
+  // Rounding alone leaves next to nothing.
   StepResult jump(const Point &a, const Point &c) {
     Point best = std::fabs(a.r) < std::fabs(c.r) ? a : c;
     if (best.stopped) return rest();
-    if (a.u * c.u <= 0) best.u = 0;                // a jump at rest holds what rests
+    if (a.u * c.u <= 0) best.u = 0;  // a jump at rest holds what rests
     best = at(best.u);
     const double f = drive_ - m_h_ * best.u;
-    const bool open = std::fabs(best.r) > 1e-9 * (std::fabs(f) + std::fabs(m_h_ * best.u) + std::fabs(drive_));
+    const bool open =
+        std::fabs(best.r) > 1e-9 * (std::fabs(f) + std::fabs(m_h_ * best.u) + std::fabs(drive_));
     return {best.u, open ? f : f_, open};
   }
 
@@ -361,6 +427,8 @@ class StepSolver {
 
 }  // namespace
 
-StepResult implicit_step(RigLaw &law, Slip slip, double m_h, double drive, double v) { return StepSolver(law, slip, m_h, drive).solve(v); }
+StepResult implicit_step(RigLaw &law, Slip slip, double m_h, double drive, double v) {
+  return StepSolver(law, slip, m_h, drive).solve(v);
+}
 
 }  // namespace cli

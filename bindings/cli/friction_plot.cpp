@@ -15,7 +15,7 @@
 namespace cli {
 namespace {
 
-enum class Drawn { yes, no, cannot };   // cannot: no such interpreter, or it has no matplotlib
+enum class Drawn { yes, no, cannot };  // cannot: no such interpreter, or it has no matplotlib
 
 // isolated: PYTHONHOME and PYTHONPATH are somebody else's settings for another interpreter.
 Drawn draw_with(const std::string &python, bool isolated, const std::vector<std::string> &arguments) {
@@ -38,7 +38,8 @@ Drawn draw_with(const std::string &python, bool isolated, const std::vector<std:
 
 }  // namespace
 
-bool plot_friction(const std::string &csv, const std::string &picture, const std::string &kind, const std::string &title) {
+bool plot_friction(const std::string &csv, const std::string &picture, const std::string &kind,
+                   const std::string &title) {
   const std::vector<std::string> arguments = {csv, picture, kind, title};
   const char *const named = std::getenv("DEFORM_PYTHON");
   Drawn drawn = draw_with(named ? named : DEFORM_PYTHON, !named, arguments);

@@ -15,7 +15,8 @@ void Impulses::add_step() {
   need(dfm_world_pair_impulses(scene_.world(), n, step_.data(), &n));
   for (const dfm_pair_impulse &p : step_) {
     Sum &sum = sums_[{p.a, p.b}];
-    sum.normal += p.normal_impulse, sum.peak = std::max(sum.peak, p.peak_normal);
+    sum.normal += p.normal_impulse;
+    sum.peak = std::max(sum.peak, p.peak_normal);
   }
 }
 

@@ -13,10 +13,10 @@ class Impulses {
  public:
   explicit Impulses(const SceneFile &scene) : scene_(scene) {}
   void add_step();
-  std::string json() const;   // {"A/B": {"normal_Ns", "peak_N"}}
+  std::string json() const;  // {"A/B": {"normal_Ns", "peak_N"}}
 
  private:
-  struct Sum { double normal = 0, peak = 0; };   // N s, N
+  struct Sum { double normal = 0, peak = 0; };  // N s, N
   const SceneFile &scene_;
   std::map<std::pair<uint64_t, uint64_t>, Sum> sums_;
   std::vector<dfm_pair_impulse> step_;

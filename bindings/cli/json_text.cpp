@@ -12,13 +12,18 @@ std::string quoted(const std::string &text) {
   std::string out = "\"";
   for (const char c : text) {
     const unsigned char u = static_cast<unsigned char>(c);
-    if (c == '"' || c == '\\') out += '\\', out += c;
-    else if (c == '\n') out += "\\n";
-    else if (u < 0x20) {
+    if (c == '"' || c == '\\') {
+      out += '\\';
+      out += c;
+    } else if (c == '\n') {
+      out += "\\n";
+    } else if (u < 0x20) {
       char escape[8];
       std::snprintf(escape, sizeof escape, "\\u%04x", u);
       out += escape;
-    } else out += c;
+    } else {
+      out += c;
+    }
   }
   return out + "\"";
 }
@@ -94,7 +99,10 @@ class Reader {
     if (i_ >= s_.size() || depth > 64) return false;
     if (s_[i_] == '{') return object(out, depth);
     if (s_[i_] == '[') return array(out, depth);
-    if (s_[i_] == '"') return out.kind = JsonValue::string, string(out.text);
+    if (s_[i_] == '"') {
+      out.kind = JsonValue::string;
+      return string(out.text);
+    }
     const size_t begin = i_;
     while (i_ < s_.size() && std::string(",]} \t\r\n").find(s_[i_]) == std::string::npos) ++i_;
     out.text = s_.substr(begin, i_ - begin);
@@ -115,7 +123,8 @@ class Reader {
   bool take(char c) {
     space();
     if (i_ >= s_.size() || s_[i_] != c) return false;
-    return ++i_, true;
+    ++i_;
+    return true;
   }
   bool string(std::string &out) {
     if (!take('"')) return false;
@@ -129,7 +138,9 @@ class Reader {
       const char c = s_[i_];
       if (c == 'u') {
         if (!character(out)) return false;
-      } else out += c == 'n' ? '\n' : c == 't' ? '\t' : c == 'r' ? '\r' : c == 'b' ? '\b' : c == 'f' ? '\f' : c;
+      } else {
+        out += c == 'n' ? '\n' : c == 't' ? '\t' : c == 'r' ? '\r' : c == 'b' ? '\b' : c == 'f' ? '\f' : c;
+      }
     }
     return take('"');
   }
@@ -137,22 +148,34 @@ class Reader {
   bool unit(uint32_t &out) {
     const char *const from = s_.data() + i_ + 1;
     if (i_ + 4 >= s_.size() || std::from_chars(from, from + 4, out, 16).ptr != from + 4) return false;
-    return i_ += 4, true;
+    i_ += 4;
+    return true;
   }
   bool character(std::string &out) {
     uint32_t code = 0, low = 0;
     if (!unit(code)) return false;
-    if (code >= 0xd800 && code < 0xe000) {   // half of a pair
-      if (code >= 0xdc00 || s_.compare(i_ + 1, 2, "\\u") != 0 || (i_ += 2, !unit(low)) || low < 0xdc00 || low >= 0xe000) return false;
+    if (code >= 0xd800 && code < 0xe000) {  // half of a pair
+      if (code >= 0xdc00 || s_.compare(i_ + 1, 2, "\\u") != 0 || (i_ += 2, !unit(low)) || low < 0xdc00 ||
+          low >= 0xe000)
+        return false;
       code = 0x10000 + ((code - 0xd800) << 10) + (low - 0xdc00);
     }
     const auto add = [&](uint32_t byte) { out += static_cast<char>(byte); };
-    if (code < 0x80) return add(code), true;
-    if (code < 0x800) add(0xc0 | code >> 6);
-    else if (code < 0x10000) add(0xe0 | code >> 12);
-    else add(0xf0 | code >> 18), add(0x80 | (code >> 12 & 0x3f));
+    if (code < 0x80) {
+      add(code);
+      return true;
+    }
+    if (code < 0x800) {
+      add(0xc0 | code >> 6);
+    } else if (code < 0x10000) {
+      add(0xe0 | code >> 12);
+    } else {
+      add(0xf0 | code >> 18);
+      add(0x80 | (code >> 12 & 0x3f));
+    }
     if (code >= 0x800) add(0x80 | (code >> 6 & 0x3f));
-    return add(0x80 | (code & 0x3f)), true;
+    add(0x80 | (code & 0x3f));
+    return true;
   }
   bool array(JsonValue &out, int depth) {
     out.kind = JsonValue::array;
@@ -171,7 +194,10 @@ class Reader {
       out.members.emplace_back();
       space();
       if (!string(out.members.back().name)) return false;
-      if (!names.insert(out.members.back().name).second) return why_ = "a key is given twice in one object; keep one", false;
+      if (!names.insert(out.members.back().name).second) {
+        why_ = "a key is given twice in one object; keep one";
+        return false;
+      }
       if (!take(':') || !value(out.members.back().value, depth + 1)) return false;
     } while (take(','));
     return take('}');

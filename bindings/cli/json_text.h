@@ -32,8 +32,12 @@ struct JsonValue {
   const JsonValue *find(const std::string &key) const;
   std::string get(const std::string &key) const;  // text of a member, "" where absent
 };
-struct JsonMember { std::string name; JsonValue value; };
-// where: out, the byte at which it stopped to be JSON; why: out, what is wrong there. A key that is given twice is wrong.
+struct JsonMember {
+  std::string name;
+  JsonValue value;
+};
+// where: out, the byte at which it stopped to be JSON; why: out, what is wrong there. A key that is given
+// twice is wrong.
 bool parse_json(const std::string &text, JsonValue &out, size_t *where = nullptr, std::string *why = nullptr);
 
 }  // namespace cli

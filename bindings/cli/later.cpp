@@ -6,7 +6,8 @@
 namespace cli {
 
 void add_later(CLI::App &app, Globals &, int *exit_code) {
-  const std::pair<const char *, const char *> later[] = {{"cost", "what accuracy costs on a scene (not available yet)"}};
+  const std::pair<const char *, const char *> later[] = {
+      {"cost", "what accuracy costs on a scene (not available yet)"}};
   for (const auto &[name, what] : later) {
     CLI::App *sub = app.add_subcommand(name, what);
     sub->allow_extras();

@@ -25,9 +25,9 @@
 namespace cli {
 namespace {
 
-constexpr unsigned kGraceInPlugin = 5, kGrace = 30;   // s
+constexpr unsigned kGraceInPlugin = 5, kGrace = 30;  // s
 volatile std::sig_atomic_t undecided = 0;
-volatile std::sig_atomic_t waited = 0;                // s since expect_return()
+volatile std::sig_atomic_t waited = 0;  // s since expect_return()
 char folder[1024];
 
 // Everything below may run in a handler of a signal: no memory, no locks, write() alone.
@@ -35,7 +35,8 @@ class Sentence {
  public:
   Sentence &operator<<(const char *part) {
     const size_t n = std::min(std::strlen(part), sizeof text_ - 2 - used_);
-    std::memcpy(text_ + used_, part, n), used_ += n;
+    std::memcpy(text_ + used_, part, n);
+    used_ += n;
     return *this;
   }
   void say() {
@@ -78,11 +79,11 @@ void on_leave() {
 }
 
 const char *name_of(int number) {
-  return number == SIGSEGV   ? "SIGSEGV: it touched memory that is not its own"
-         : number == SIGBUS  ? "SIGBUS: it touched memory that is not there"
-         : number == SIGFPE  ? "SIGFPE: a division by zero, or a floating-point exception that was unmasked"
-         : number == SIGILL  ? "SIGILL: an instruction that this processor lacks"
-                             : "SIGABRT: abort, or a failed assertion";
+  return number == SIGSEGV  ? "SIGSEGV: it touched memory that is not its own"
+         : number == SIGBUS ? "SIGBUS: it touched memory that is not there"
+         : number == SIGFPE ? "SIGFPE: a division by zero, or a floating-point exception that was unmasked"
+         : number == SIGILL ? "SIGILL: an instruction that this processor lacks"
+                            : "SIGABRT: abort, or a failed assertion";
 }
 
 // With SA_RESETHAND the signal then ends the process as usual.
@@ -110,14 +111,15 @@ void on_alarm(int) {
 }
 
 void catch_crashes() {
-  static char room[65536];                            // a stack that is full has none left for its handler
+  static char room[65536];  // a stack that is full has none left for its handler
   stack_t stack = {};
-  stack.ss_sp = room, stack.ss_size = sizeof room;
+  stack.ss_sp = room;
+  stack.ss_size = sizeof room;
   sigaltstack(&stack, nullptr);
   for (const int number : {SIGSEGV, SIGBUS, SIGFPE, SIGILL, SIGABRT}) {
     struct sigaction before = {}, action = {};
     sigaction(number, nullptr, &before);
-    if (before.sa_handler != SIG_DFL) continue;       // a sanitizer's
+    if (before.sa_handler != SIG_DFL) continue;  // a sanitizer's
     action.sa_handler = on_crash;
     action.sa_flags = static_cast<int>(SA_RESETHAND | SA_ONSTACK | SA_NODEFER);
     sigaction(number, &action, nullptr);
@@ -138,9 +140,7 @@ int leave(int exit_code) {
   return exit_code;
 }
 
-void results_lie_in(const std::string &where) {
-  std::strncpy(folder, where.c_str(), sizeof folder - 1);
-}
+void results_lie_in(const std::string &where) { std::strncpy(folder, where.c_str(), sizeof folder - 1); }
 
 void expect_return() {
   struct sigaction action = {};
@@ -154,10 +154,10 @@ void came_back() { alarm(0); }
 
 }  // namespace cli
 
-// The dynamic linker binds the calls of every library to the program's own function first, so these see a plugin's _exit, too; a system call in its own machine
-// code they do not.
+// The dynamic linker binds the calls of every library to the program's own function first, so these see a
+// plugin's _exit, too; a system call in its own machine code they do not.
 #if DEFORM_OWN_EXIT
-extern "C" [[gnu::visibility("default")]] void _exit(int code) {   // noreturn by its declaration
+extern "C" [[gnu::visibility("default")]] void _exit(int code) {  // noreturn by its declaration
   cli::on_leave();
   cli::end_now(code);
 }

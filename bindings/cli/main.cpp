@@ -24,7 +24,9 @@ std::vector<std::string> kept_warnings;
 void on_log(void *, int32_t level, const char *utf8) {
   if (level < DFM_LOG_WARNING) return;
   if (level == DFM_LOG_WARNING) kept_warnings.push_back(utf8);
-  if (!globals.quiet || level > DFM_LOG_WARNING) std::fprintf(stderr, "deform: %s: %s\n", level == DFM_LOG_WARNING ? "warning" : "error", shown(utf8).c_str());
+  if (!globals.quiet || level > DFM_LOG_WARNING)
+    std::fprintf(stderr, "deform: %s: %s\n", level == DFM_LOG_WARNING ? "warning" : "error",
+                 shown(utf8).c_str());
 }
 
 size_t edit_distance(const std::string &a, const std::string &b) {
@@ -51,7 +53,9 @@ void add_common(CLI::App *app) {
   for (CLI::App *sub : children(app)) {
     sub->add_flag("--quiet", globals.quiet, "print results and errors only");
     sub->add_flag("--json", globals.json, "machine-readable output");
-    sub->add_option("--threads", globals.threads, "worker threads; 0: one per processor")->check(CLI::Range(0, 1024))->type_name("N");
+    sub->add_option("--threads", globals.threads, "worker threads; 0: one per processor")
+        ->check(CLI::Range(0, 1024))
+        ->type_name("N");
     add_common(sub);
   }
 }
@@ -74,12 +78,14 @@ std::string path_of(CLI::App *app) {
   return app->get_parent() ? path_of(app->get_parent()) + " " + app->get_name() : "deform";
 }
 
-// "Could not convert: --cells = 1e9" says what was read, not what was expected: whole numbers are those whose option is shown as N.
+// "Could not convert: --cells = 1e9" says what was read, not what was expected: whole numbers are those whose
+// option is shown as N.
 std::string not_a_number(const std::string &text, CLI::App *at) {
   for (const CLI::Option *option : at->get_options()) {
     const std::string begin = "Could not convert: " + option->get_name() + " = ";
     if (text.rfind(begin, 0) != 0) continue;
-    return option->get_name() + ": expected " + (option->get_type_name()[0] == 'N' ? "a whole number, 0 or more" : "a number") + ", found \"" +
+    return option->get_name() + ": expected " +
+           (option->get_type_name()[0] == 'N' ? "a whole number, 0 or more" : "a number") + ", found \"" +
            text.substr(begin.size()) + "\"";
   }
   return text;
@@ -93,7 +99,8 @@ int bad_usage(CLI::App &app, const CLI::ParseError &error) {
     text = "\"" + extra[0] + "\" is not expected here";
     const std::string near = nearest_to(extra[0].substr(0, extra[0].find('=')), at);
     if (!near.empty()) text += "; did you mean \"" + near + "\"?";
-  } else if (dynamic_cast<const CLI::RequiredError *>(&error) && at->get_subcommands().empty() && !children(at).empty()) {
+  } else if (dynamic_cast<const CLI::RequiredError *>(&error) && at->get_subcommands().empty() &&
+             !children(at).empty()) {
     std::vector<std::string> names;
     text = "a subcommand is needed:";
     for (const CLI::App *sub : children(at)) text += (text.back() == ':' ? " " : ", ") + sub->get_name();
@@ -114,7 +121,10 @@ std::string nearest(const std::string &word, const std::vector<std::string> &val
   std::string best;
   size_t least = std::max<size_t>(2, word.size() / 3) + 1;
   for (const std::string &name : valid)
-    if (const size_t d = edit_distance(word, name); d < least) least = d, best = name;
+    if (const size_t d = edit_distance(word, name); d < least) {
+      least = d;
+      best = name;
+    }
   return best;
 }
 
@@ -146,7 +156,8 @@ dfm_context *make_context(const Globals &g) {
 
 namespace {
 
-// CLI11's validators are globals that take memory before main() and its handlers: where there is none the command ends there with its sentence.
+// CLI11's validators are globals that take memory before main() and its handlers: where there is none the
+// command ends there with its sentence.
 std::terminate_handler before_main;
 [[gnu::constructor(101)]] void say_before_main() {
   before_main = std::set_terminate([] {
@@ -184,7 +195,8 @@ int run(int argc, char **argv) {
 
 }  // namespace
 
-// Whatever run() throws, its own set-up and its error paths included, ends in an exit code; the sentence takes no memory.
+// Whatever run() throws, its own set-up and its error paths included, ends in an exit code; the sentence
+// takes no memory.
 int main(int argc, char **argv) {
   std::set_terminate(before_main);
   cli::guard_leaving();

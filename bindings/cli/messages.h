@@ -20,7 +20,7 @@ inline void need(dfm_status status) {
   if (status < 0) throw Failure(kBadInput, dfm_last_error());
 }
 
-void warn(const std::string &sentence);  // to stderr, and kept for the summary
+void warn(const std::string &sentence);          // to stderr, and kept for the summary
 void keep_warning(const std::string &sentence);  // for the summary only
 const std::vector<std::string> &warnings();
 // The valid name nearest to a wrong one, for "did you mean"; empty when nothing is near.

@@ -1,4 +1,5 @@
-// deform montage: pictures of several runs in labeled rows. `make demo` calls it; it is not part of the command's promised surface.
+// deform montage: pictures of several runs in labeled rows. `make demo` calls it; it is not part of the
+// command's promised surface.
 #include <CLI/CLI.hpp>
 
 #include <memory>
@@ -12,7 +13,10 @@
 namespace cli {
 namespace {
 
-struct Options { std::vector<std::string> rows, columns; std::string out, title; };
+struct Options {
+  std::vector<std::string> rows, columns;
+  std::string out, title;
+};
 
 #ifdef DEFORM_HAVE_RENDER
 int montage(const Options &options) {
@@ -25,7 +29,8 @@ int montage(const Options &options) {
     if (word.empty()) {
       begin = true;
     } else if (begin) {
-      labels.push_back(word), rows.emplace_back();
+      labels.push_back(word);
+      rows.emplace_back();
       begin = false;
     } else {
       render::Image image;
@@ -49,7 +54,9 @@ void add_montage(CLI::App &app, int *exit_code) {
   auto options = std::make_shared<Options>();
   CLI::App *sub = app.add_subcommand("montage", "pictures in labeled rows");
   sub->group("");
-  CLI::Option *row = sub->add_option("--row", options->rows, "LABEL FILE...; may be repeated")->required()->type_name("LABEL FILE...");
+  CLI::Option *row = sub->add_option("--row", options->rows, "LABEL FILE...; may be repeated")
+                         ->required()
+                         ->type_name("LABEL FILE...");
   row->inject_separator();
   sub->add_option("--columns", options->columns, "labels above the columns");
   sub->add_option("--title", options->title, "title");

@@ -16,9 +16,11 @@ double norm(const double v[3]) { return std::sqrt(v[0] * v[0] + v[1] * v[1] + v[
 
 }  // namespace
 
-static std::string csv_number(double x) { return std::isfinite(x) ? number(x) : std::isnan(x) ? "nan" : x > 0 ? "inf" : "-inf"; }
+static std::string csv_number(double x) {
+  return std::isfinite(x) ? number(x) : std::isnan(x) ? "nan" : x > 0 ? "inf" : "-inf";
+}
 
-// ---- tables ------------------------------------------------------------------------------------------------
+// ---- tables -----------------------------------------------------------------------------------------------
 
 Csv::Csv(const std::string &path, const std::string &header) : path_(path), file_(new_file(path)) {
   block_ = header + "\n";
@@ -28,7 +30,10 @@ Csv::Csv(const std::string &path, const std::string &header) : path_(path), file
 Csv &Csv::cell(const std::string &text) {
   if (!first_) block_ += ',';
   first_ = false;
-  if (text.find_first_of(",\"\r\n") == std::string::npos) return block_ += text, *this;
+  if (text.find_first_of(",\"\r\n") == std::string::npos) {
+    block_ += text;
+    return *this;
+  }
   block_ += '"';
   for (const char c : text) block_ += c == '"' ? "\"\"" : std::string(1, c);
   block_ += '"';
@@ -42,23 +47,32 @@ Csv &Csv::cells(const double *x, int n) {
   return *this;
 }
 
-void Csv::end_row() { block_ += '\n', first_ = true; }
+void Csv::end_row() {
+  block_ += '\n';
+  first_ = true;
+}
 
 void Csv::flush() {
-  if (std::fwrite(block_.data(), 1, block_.size(), file_.get()) != block_.size() || std::fflush(file_.get()) != 0) cannot_write(path_);
+  if (std::fwrite(block_.data(), 1, block_.size(), file_.get()) != block_.size() ||
+      std::fflush(file_.get()) != 0)
+    cannot_write(path_);
   block_.clear();
 }
 
-// ---- a run's files -----------------------------------------------------------------------------------------
+// ---- a run's files ----------------------------------------------------------------------------------------
 
 Outputs::Outputs(const SceneFile &scene, const std::string &folder)
-    : scene_(scene), folder_(folder), held_(folder),
+    : scene_(scene),
+      folder_(folder),
+      held_(folder),
       bodies_(folder + "/bodies.csv",
-              "t,body,com_x,com_y,com_z,vel_x,vel_y,vel_z,ang_x,ang_y,ang_z,kinetic_J,elastic_J,volume,force_x,force_y,force_z") {
+              "t,body,com_x,com_y,com_z,vel_x,vel_y,vel_z,ang_x,ang_y,ang_z,kinetic_J,elastic_J,volume,force_"
+              "x,force_y,force_z") {
   const dfm_scene_settings &s = scene.settings();
   if (s.contacts)
-    contacts_ = std::make_unique<Csv>(folder + "/contacts.csv",
-                                      "t,body_a,body_b,count,sticking,normal_N,friction_N,moment_Nm,slip_max,friction_work_J");
+    contacts_ = std::make_unique<Csv>(
+        folder + "/contacts.csv",
+        "t,body_a,body_b,count,sticking,normal_N,friction_N,moment_Nm,slip_max,friction_work_J");
   probes_ = std::make_unique<Csv>(folder + "/probes.csv", "t,probe,x,y,z,vx,vy,vz");
   if (s.states) {
     make_folder(folder + "/states");
@@ -113,7 +127,12 @@ void Outputs::write_contacts(double t) {
     const dfm_pair_report &p = pairs_[i];
     contacts_->cell(t).cell(scene_.name_of(p.a)).cell(scene_.name_of(p.b));
     contacts_->cell(std::to_string(p.count)).cell(std::to_string(p.sticking));
-    contacts_->cell(p.normal).cell(norm(p.friction)).cell(norm(p.moment)).cell(p.slip_max).cell(p.friction_work).end_row();
+    contacts_->cell(p.normal)
+        .cell(norm(p.friction))
+        .cell(norm(p.moment))
+        .cell(p.slip_max)
+        .cell(p.friction_work)
+        .end_row();
   }
   contacts_->flush();
 }
@@ -143,14 +162,15 @@ void Outputs::write_last() {
   }
 }
 
-// The numbers of the mesh file's nodes and where they are now. Of a filled body they are points of the surface that it wears; where it wears
-// another one, its own points are numbered as they stand.
+// The numbers of the mesh file's nodes and where they are now. Of a filled body they are points of the
+// surface that it wears; where it wears another one, its own points are numbered as they stand.
 FileNodes Outputs::file_nodes(size_t b) const {
   const BodyView &body = scene_.bodies()[b];
   const std::string key = "/bodies/" + std::to_string(b);
   JsonValue mesh;
-  if (!parse_json(scene_.value(key + "/mesh"), mesh)) throw Failure(kBadInput, "body \"" + body.name + "\" has no mesh file");
-  if (mesh.kind == JsonValue::object) {   // made, not read: its points are the body's
+  if (!parse_json(scene_.value(key + "/mesh"), mesh))
+    throw Failure(kBadInput, "body \"" + body.name + "\" has no mesh file");
+  if (mesh.kind == JsonValue::object) {  // made, not read: its points are the body's
     FileNodes own;
     for (uint32_t i = 0; i < body.npoint; ++i) own.number.push_back(i);
     own.start = node_positions(body, own);
@@ -181,7 +201,8 @@ FileNodes Outputs::file_nodes(size_t b) const {
 std::vector<double> Outputs::node_positions(const BodyView &body, const FileNodes &nodes) const {
   uint32_t n = uint32_t(nodes.number.size());
   std::vector<double> x(3 * size_t(n));
-  need(nodes.surface ? dfm_surface_positions(body.handle, n, x.data(), &n) : dfm_body_get_state(body.handle, n, x.data(), nullptr, &n));
+  need(nodes.surface ? dfm_surface_positions(body.handle, n, x.data(), &n)
+                     : dfm_body_get_state(body.handle, n, x.data(), nullptr, &n));
   return x;
 }
 
@@ -194,11 +215,13 @@ void Outputs::write_nodes() {
     const std::vector<double> now = node_positions(body, nodes);
     std::vector<uint32_t> order(nodes.number.size());
     for (uint32_t i = 0; i < order.size(); ++i) order[i] = i;
-    std::sort(order.begin(), order.end(), [&](uint32_t i, uint32_t j) { return nodes.number[i] < nodes.number[j]; });
+    std::sort(order.begin(), order.end(),
+              [&](uint32_t i, uint32_t j) { return nodes.number[i] < nodes.number[j]; });
     std::string text = "node,ux,uy,uz\n";
     for (const uint32_t i : order) {
       text += std::to_string(nodes.number[i]);
-      for (int k = 0; k < 3; ++k) text += "," + csv_number(now[3 * size_t(i) + k] - nodes.start[3 * size_t(i) + k]);
+      for (int k = 0; k < 3; ++k)
+        text += "," + csv_number(now[3 * size_t(i) + k] - nodes.start[3 * size_t(i) + k]);
       text += "\n";
     }
     write_whole(folder_ + "/nodes/" + body.name + ".csv", text);

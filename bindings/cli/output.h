@@ -27,7 +27,8 @@ class Csv {
   bool first_ = true;
 };
 
-// A body's nodes by the numbers of its mesh file; `surface`: they are points of its surface, not of its cells.
+// A body's nodes by the numbers of its mesh file; `surface`: they are points of its surface,
+// not of its cells.
 struct FileNodes {
   bool surface = false;
   std::vector<uint32_t> number;
@@ -59,8 +60,8 @@ class Outputs {
   std::unique_ptr<Csv> contacts_, probes_, index_;
   uint32_t recorded_ = 0;
   double last_time_ = 0;
-  std::vector<double> last_impulse_;              // [nbody,3]
-  std::vector<FileNodes> nodes_;                  // of each body, where the scene asks for them
+  std::vector<double> last_impulse_;  // [nbody,3]
+  std::vector<FileNodes> nodes_;      // of each body, where the scene asks for them
   std::vector<dfm_pair_report> pairs_;
 };
 

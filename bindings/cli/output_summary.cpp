@@ -72,33 +72,42 @@ void Checker::check(bool start_state) {
     const BodyView &body = scene_.bodies()[b];
     uint32_t n = 0;
     state_.resize(6 * size_t(body.npoint));
-    need(dfm_body_get_state(body.handle, body.npoint, state_.data(), state_.data() + 3 * size_t(body.npoint), &n));
+    need(dfm_body_get_state(body.handle, body.npoint, state_.data(), state_.data() + 3 * size_t(body.npoint),
+                            &n));
     finite = finite && std::all_of(state_.begin(), state_.end(), [](double x) { return std::isfinite(x); });
     positions_[b].resize(3 * size_t(body.nsurfel));
     need(dfm_surface_positions(body.handle, body.nsurfel, positions_[b].data(), &n));
     for (double x : positions_[b]) reach = std::max(reach, std::fabs(x));
     checks_.inverted_max = std::max(checks_.inverted_max, body_measure(body).inverted);
-    surfaces_.push_back({positions_[b].data(), n, body.triangles.data(), uint32_t(body.triangles.size() / 3)});
+    surfaces_.push_back(
+        {positions_[b].data(), n, body.triangles.data(), uint32_t(body.triangles.size() / 3)});
   }
   for (const RigidView &rigid : scene_.rigids()) {
     const dfm_body_measure m = rigid_measure(rigid);
-    for (int k = 0; k < 3; ++k) finite = finite && std::isfinite(m.com[k]) && std::isfinite(m.momentum[k]) && std::isfinite(m.angular[k]);
+    for (int k = 0; k < 3; ++k)
+      finite =
+          finite && std::isfinite(m.com[k]) && std::isfinite(m.momentum[k]) && std::isfinite(m.angular[k]);
   }
   checks_.finite = checks_.finite && finite;
   if (!finite) return;
-  // The products of exact signs leave the range of double beyond this; no such state is an answer to anything.
+  // The products of exact signs leave the range of double beyond this; no such state is an
+  // answer to anything.
   if (reach > kExactReach) {
-    if (!std::exchange(checks_.too_far, true)) keep_warning("a body is further than 1e90 m away: crossings cannot be counted in such a state");
+    if (!std::exchange(checks_.too_far, true))
+      keep_warning("a body is further than 1e90 m away: crossings cannot be counted in such a state");
     return;
   }
   for (size_t o = 0; o < solids_.size(); ++o) {
     const ObstacleView &obstacle = solids_[o];
     place_points(obstacle, placed_[o]);
-    surfaces_.push_back({placed_[o].data(), obstacle.def.npoint, obstacle.def.triangles, obstacle.def.ntriangle, true});
+    surfaces_.push_back(
+        {placed_[o].data(), obstacle.def.npoint, obstacle.def.triangles, obstacle.def.ntriangle, true});
   }
-  const crossing::Found found = counter_.count(surfaces_, start_state ? crossing::Touching::allowed : crossing::Touching::counts);
+  const crossing::Found found =
+      counter_.count(surfaces_, start_state ? crossing::Touching::allowed : crossing::Touching::counts);
   checks_.intersections_max = std::max(checks_.intersections_max, found.all());
-  checks_.between_max = std::max(checks_.between_max, found.between), checks_.self_max = std::max(checks_.self_max, found.within);
+  checks_.between_max = std::max(checks_.between_max, found.between);
+  checks_.self_max = std::max(checks_.self_max, found.within);
 }
 
 namespace {
@@ -113,7 +122,8 @@ std::vector<dfm_stage_time> profile(const SceneFile &scene) {
 
 std::string stages_json(const SceneFile &scene, uint64_t steps) {
   JsonObject out;
-  for (const dfm_stage_time &stage : profile(scene)) out.add(stage.name, number(1e3 * stage.seconds / double(std::max<uint64_t>(1, steps))));
+  for (const dfm_stage_time &stage : profile(scene))
+    out.add(stage.name, number(1e3 * stage.seconds / double(std::max<uint64_t>(1, steps))));
   return out.text();
 }
 
@@ -130,7 +140,9 @@ std::string plugins_json(const SceneFile &scene) {
       scene.context(),
       [](void *user, const dfm_type *type, const char *file) {
         JsonObject row;
-        row.add("id", quoted(type->id)).add("version", quoted(type->version ? type->version : "")).add("file", quoted(file ? file : ""));
+        row.add("id", quoted(type->id))
+            .add("version", quoted(type->version ? type->version : ""))
+            .add("file", quoted(file ? file : ""));
         static_cast<std::vector<std::string> *>(user)->push_back(row.text());
       },
       &rows));
@@ -147,7 +159,8 @@ std::string body_json(const dfm_body_measure &m, uint64_t dofs, uint32_t cells) 
 
 std::string bodies_json(const SceneFile &scene) {
   JsonObject out;
-  for (const BodyView &body : scene.bodies()) out.add(body.name, body_json(body_measure(body), 3 * uint64_t(body.npoint), body.ntet));
+  for (const BodyView &body : scene.bodies())
+    out.add(body.name, body_json(body_measure(body), 3 * uint64_t(body.npoint), body.ntet));
   for (const RigidView &rigid : scene.rigids()) out.add(rigid.name, body_json(rigid_measure(rigid), 6, 0));
   return out.text();
 }
@@ -155,19 +168,24 @@ std::string bodies_json(const SceneFile &scene) {
 std::string stopped_json(const RunResult &run) {
   if (!run.stopped && !run.interrupted) return "null";
   JsonObject row;
-  row.add("step", std::to_string(run.steps)).add("t", number(run.simulated)).add("body", run.stop_body.empty() ? "null" : quoted(run.stop_body));
+  row.add("step", std::to_string(run.steps))
+      .add("t", number(run.simulated))
+      .add("body", run.stop_body.empty() ? "null" : quoted(run.stop_body));
   return row.add("reason", quoted(run.stop_reason)).text();
 }
 
 }  // namespace
 
-std::string summary_json(const SceneFile &scene, const RunOptions &options, const RunResult &run, const Checks &checks) {
-  if (checks.states == 0) throw Failure(kStopped, "no state was recorded, so nothing can be said about intersections");
+std::string summary_json(const SceneFile &scene, const RunOptions &options, const RunResult &run,
+                         const Checks &checks) {
+  if (checks.states == 0)
+    throw Failure(kStopped, "no state was recorded, so nothing can be said about intersections");
   const dfm_world_stats stats = world_stats(scene);
   JsonValue plan;
   parse_json(scene.explain(), plan);
   char hash[24];
-  std::snprintf(hash, sizeof hash, "\"%016llx\"", static_cast<unsigned long long>(dfm_world_hash(scene.world())));
+  std::snprintf(hash, sizeof hash, "\"%016llx\"",
+                static_cast<unsigned long long>(dfm_world_hash(scene.world())));
   std::vector<std::string> warning_texts;
   for (const std::string &w : warnings()) warning_texts.push_back(quoted(w));
   JsonObject ms, solver, hold, effects, contacts, guard, budget, energy, out;
@@ -177,43 +195,71 @@ std::string summary_json(const SceneFile &scene, const RunOptions &options, cons
   solver.add("residual_max", number(stats.residual_max));
   hold.add("creep_max_um_per_s", run.hold_begun && run.hold_count > 0 ? number(1e6 * run.creep) : "null");
   effects.add("active", names_json(plan, "effects")).add("absent", names_json(plan, "absent"));
-  guard.add("solves", std::to_string(stats.guard_solves)).add("cuts", std::to_string(stats.guard_cuts)).add("lost_s", number(stats.guard_lost));
-  budget.add("work_max", std::to_string(stats.work_max)).add("cheapened", std::to_string(stats.cheapened)).add("discarded", std::to_string(stats.discarded));
-  energy.add("start_J", number(stats.energy_start)).add("max_J", number(stats.energy_max)).add("gain_J", number(stats.energy_gain));
+  guard.add("solves", std::to_string(stats.guard_solves))
+      .add("cuts", std::to_string(stats.guard_cuts))
+      .add("lost_s", number(stats.guard_lost));
+  budget.add("work_max", std::to_string(stats.work_max))
+      .add("cheapened", std::to_string(stats.cheapened))
+      .add("discarded", std::to_string(stats.discarded));
+  energy.add("start_J", number(stats.energy_start))
+      .add("max_J", number(stats.energy_max))
+      .add("gain_J", number(stats.energy_gain));
   contacts.add("max", std::to_string(stats.contacts_max)).add("mean", number(stats.contacts_mean));
-  out.add("format", "\"deform-summary\"").add("version", "1").add("library", quoted(dfm_version(nullptr, nullptr, nullptr)));
-  out.add("scene", quoted(options.scene)).add("steps", std::to_string(run.steps)).add("substeps", std::to_string(stats.substeps));
+  out.add("format", "\"deform-summary\"")
+      .add("version", "1")
+      .add("library", quoted(dfm_version(nullptr, nullptr, nullptr)));
+  out.add("scene", quoted(options.scene))
+      .add("steps", std::to_string(run.steps))
+      .add("substeps", std::to_string(stats.substeps));
   out.add("simulated_s", number(run.simulated)).add("wall_s", number(run.wall)).add("cpu_s", number(run.cpu));
-  out.add("ms_per_step", ms.text()).add("stages", stages_json(scene, run.steps)).add("threads", std::to_string(stats.threads));
+  out.add("ms_per_step", ms.text())
+      .add("stages", stages_json(scene, run.steps))
+      .add("threads", std::to_string(stats.threads));
   out.add("finite", checks.finite ? "true" : "false").add("states_checked", std::to_string(checks.states));
   out.add("intersections_max", std::to_string(checks.intersections_max));
-  out.add("intersections_between_max", std::to_string(checks.between_max)).add("intersections_self_max", std::to_string(checks.self_max));
+  out.add("intersections_between_max", std::to_string(checks.between_max))
+      .add("intersections_self_max", std::to_string(checks.self_max));
   out.add("overlaps_at_start", std::to_string(run.overlaps)).add("untangled", std::to_string(run.untangled));
-  out.add("inverted_max", std::to_string(std::max(checks.inverted_max, stats.inverted_max))).add("limited_max", std::to_string(stats.limited_max));
+  out.add("inverted_max", std::to_string(std::max(checks.inverted_max, stats.inverted_max)))
+      .add("limited_max", std::to_string(stats.limited_max));
   out.add("self_bodies_max", std::to_string(stats.self_max));
-  out.add("guard_steps", std::to_string(stats.guard_steps)).add("guard", guard.text()).add("unconverged_steps", std::to_string(stats.unconverged));
+  out.add("guard_steps", std::to_string(stats.guard_steps))
+      .add("guard", guard.text())
+      .add("unconverged_steps", std::to_string(stats.unconverged));
   out.add("budget", budget.text());
   out.add("energy", energy.text());
-  out.add("solver", solver.text()).add("hold", hold.text()).add("effects", effects.text()).add("plugins", plugins_json(scene));
-  out.add("bodies", bodies_json(scene)).add("contacts", contacts.text()).add("impulse", run.impulses).add("swaps", "[]").add("state_hash", hash);
+  out.add("solver", solver.text())
+      .add("hold", hold.text())
+      .add("effects", effects.text())
+      .add("plugins", plugins_json(scene));
+  out.add("bodies", bodies_json(scene))
+      .add("contacts", contacts.text())
+      .add("impulse", run.impulses)
+      .add("swaps", "[]")
+      .add("state_hash", hash);
   out.add("stopped", stopped_json(run)).add("warnings", json_array(warning_texts));
   return indented(out.text());
 }
 
 void print_table(const SceneFile &scene, const RunResult &run, const Checks &checks) {
   const dfm_world_stats stats = world_stats(scene);
-  std::printf("%-16s %9s %8s  %-30s %10s %9s\n", "body", "points", "cells", "center of mass / m", "speed m/s", "volume");
+  std::printf("%-16s %9s %8s  %-30s %10s %9s\n", "body", "points", "cells", "center of mass / m", "speed m/s",
+              "volume");
   for (const BodyView &body : scene.bodies()) {
     const dfm_body_measure m = body_measure(body);
     char com[64];
     std::snprintf(com, sizeof com, "%9.4f %9.4f %9.4f", m.com[0], m.com[1], m.com[2]);
-    std::printf("%-16.16s %9u %8u  %-30s %10.3g %8.2f%%\n", body.name.c_str(), body.npoint, body.ntet, com, m.speed_max, 100 * m.volume / m.rest_volume);
+    std::printf("%-16.16s %9u %8u  %-30s %10.3g %8.2f%%\n", body.name.c_str(), body.npoint, body.ntet, com,
+                m.speed_max, 100 * m.volume / m.rest_volume);
   }
-  std::printf("%llu steps, %g s simulated in %.3g s: %.4g steps/s, %.3g x real time\n", static_cast<unsigned long long>(run.steps), run.simulated,
-              run.wall, double(run.steps) / run.wall, (run.simulated - run.start) / run.wall);
-  std::printf("contacts: %u at most, %.3g on average; states checked: %llu, crossing triangle pairs: %zu (%zu of a body with itself), inverted cells: %u\n", stats.contacts_max,
-              stats.contacts_mean, static_cast<unsigned long long>(checks.states), checks.intersections_max,
-              checks.self_max, std::max(checks.inverted_max, stats.inverted_max));
+  std::printf("%llu steps, %g s simulated in %.3g s: %.4g steps/s, %.3g x real time\n",
+              static_cast<unsigned long long>(run.steps), run.simulated, run.wall,
+              double(run.steps) / run.wall, (run.simulated - run.start) / run.wall);
+  std::printf(
+      "contacts: %u at most, %.3g on average; states checked: %llu, crossing triangle pairs: %zu (%zu of a "
+      "body with itself), inverted cells: %u\n",
+      stats.contacts_max, stats.contacts_mean, static_cast<unsigned long long>(checks.states),
+      checks.intersections_max, checks.self_max, std::max(checks.inverted_max, stats.inverted_max));
 }
 
 void print_profile(const SceneFile &scene, const RunResult &run) {
@@ -223,8 +269,10 @@ void print_profile(const SceneFile &scene, const RunResult &run) {
   std::printf("%-20s %10s %12s %8s\n", "stage", "ms/step", "calls/step", "share");
   const double steps = double(std::max<uint64_t>(1, run.steps));
   for (const dfm_stage_time &s : stages)
-    std::printf("%-20s %10.4f %12.2f %7.1f%%\n", s.name, 1e3 * s.seconds / steps, double(s.calls) / steps, sum > 0 ? 100 * s.seconds / sum : 0.0);
-  std::printf("%-20s %10.4f %12s %7.1f%%\n", "outside stages", 1e3 * std::max(0.0, run.wall - sum) / steps, "", run.wall > 0 ? 100 * (run.wall - sum) / run.wall : 0.0);
+    std::printf("%-20s %10.4f %12.2f %7.1f%%\n", s.name, 1e3 * s.seconds / steps, double(s.calls) / steps,
+                sum > 0 ? 100 * s.seconds / sum : 0.0);
+  std::printf("%-20s %10.4f %12s %7.1f%%\n", "outside stages", 1e3 * std::max(0.0, run.wall - sum) / steps,
+              "", run.wall > 0 ? 100 * (run.wall - sum) / run.wall : 0.0);
 }
 
 }  // namespace cli

@@ -10,7 +10,8 @@
 
 namespace cli {
 
-Progress::Progress(bool wanted) : on_(wanted && isatty(STDERR_FILENO)), begin_(Clock::now()), next_(begin_ + std::chrono::seconds(2)) {}
+Progress::Progress(bool wanted)
+    : on_(wanted && isatty(STDERR_FILENO)), begin_(Clock::now()), next_(begin_ + std::chrono::seconds(2)) {}
 
 Progress::~Progress() {
   if (drawn_) std::fprintf(stderr, "\r\033[K");
@@ -24,8 +25,9 @@ void Progress::show(double done, double total, double steps_per_second) {
   const double part = total > 0 ? std::clamp(done / total, 0.0, 1.0) : 0.0;
   const double elapsed = std::chrono::duration<double>(now - begin_).count();
   const int width = 32, filled = int(part * width);
-  std::fprintf(stderr, "\r[%s%s] %3.0f %%  t = %.3f s of %g s  %.0f steps/s  %.0f s left \033[K", std::string(size_t(filled), '#').c_str(),
-               std::string(size_t(width - filled), '.').c_str(), 100 * part, done, total, steps_per_second, part > 0 ? elapsed / part * (1 - part) : 0.0);
+  std::fprintf(stderr, "\r[%s%s] %3.0f %%  t = %.3f s of %g s  %.0f steps/s  %.0f s left \033[K",
+               std::string(size_t(filled), '#').c_str(), std::string(size_t(width - filled), '.').c_str(),
+               100 * part, done, total, steps_per_second, part > 0 ? elapsed / part * (1 - part) : 0.0);
   std::fflush(stderr);
   drawn_ = true;
 }
@@ -51,9 +53,11 @@ void Patience::run(std::chrono::milliseconds wait) {
   bool drawn = false;
   auto next = begin + wait;
   while (!changed_.wait_until(lock, next, [this] { return done_; })) {
-    std::fprintf(stderr, "\r%s, %.0f s \033[K", what_.c_str(), std::chrono::duration<double>(Clock::now() - begin).count());
+    std::fprintf(stderr, "\r%s, %.0f s \033[K", what_.c_str(),
+                 std::chrono::duration<double>(Clock::now() - begin).count());
     std::fflush(stderr);
-    drawn = true, next += std::chrono::seconds(1);
+    drawn = true;
+    next += std::chrono::seconds(1);
   }
   if (drawn) std::fprintf(stderr, "\r\033[K");
 }

@@ -11,7 +11,7 @@ namespace cli {
 class Progress {
  public:
   explicit Progress(bool wanted);
-  ~Progress();  // wipes the line
+  ~Progress();                                                    // wipes the line
   void show(double done, double total, double steps_per_second);  // cheap: draws ten times a second at most
 
  private:
@@ -20,7 +20,8 @@ class Progress {
   Clock::time_point begin_, next_;
 };
 
-// For one call that does not know its end before it has it: a terminal is told what is being done and for how long, as long as this lives.
+// For one call that does not know its end before it has it: a terminal is told what is being done and for how
+// long, as long as this lives.
 class Patience {
  public:
   Patience(bool wanted, std::string what, std::chrono::milliseconds wait = std::chrono::seconds(2));

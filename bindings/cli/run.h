@@ -11,7 +11,7 @@ namespace cli {
 
 struct RunOptions {
   std::string scene, out;
-  double time = 0;    // 0: the scene's duration
+  double time = 0;        // 0: the scene's duration
   double frame_rate = 0;  // 0: what the scene says
   std::vector<std::string> set;
   bool profile = false, check = false;
@@ -33,21 +33,24 @@ class StepTimes {
 
 struct RunResult {
   uint64_t steps = 0;
-  uint32_t overlaps = 0, untangled = 0;   // pairs that were through each other at the start; those that were put apart
-  double start = 0, simulated = 0, wall = 0, cpu = 0;  // s; wall and cpu are of the steps, without outputs and checks
+  // pairs that were through each other at the start; those that were put apart
+  uint32_t overlaps = 0, untangled = 0;
+  // s; wall and cpu are of the steps, without outputs and checks
+  double start = 0, simulated = 0, wall = 0, cpu = 0;
   StepTimes times;
-  std::string impulses = "{}";   // JSON, Impulses::json()
+  std::string impulses = "{}";  // JSON, Impulses::json()
   bool interrupted = false, stopped = false;
   std::string stop_reason, stop_body;
   bool hold_begun = false;
-  double creep = 0;         // m/s, NAN if no pair qualifies
+  double creep = 0;  // m/s, NAN if no pair qualifies
   uint32_t hold_count = 0;
 };
 
 // What recorded states showed. "Recorded" is every state written to bodies.csv, and with --check every step.
 struct Checks {
   uint64_t states = 0;
-  size_t intersections_max = 0;                   // pairs of one state: all, and by whether two surfaces cross or one crosses itself
+  // pairs of one state: all, and by whether two surfaces cross or one crosses itself
+  size_t intersections_max = 0;
   size_t between_max = 0, self_max = 0;
   uint32_t inverted_max = 0;
   bool finite = true, too_far = false;
@@ -57,21 +60,23 @@ struct Checks {
 class Checker {
  public:
   explicit Checker(const SceneFile &scene);
-  Checker(const Checker &) = delete;   // solids_ points into cores_
+  Checker(const Checker &) = delete;  // solids_ points into cores_
   void check(bool start_state);
   const Checks &result() const { return checks_; }
 
  private:
   const SceneFile &scene_;
-  std::vector<ObstacleView> solids_;                              // obstacles of triangles, and the cores of voxels
-  std::vector<std::vector<double>> cores_, positions_, placed_;   // of voxels; of bodies; of solids
+  // obstacles of triangles, and the cores of voxels
+  std::vector<ObstacleView> solids_;
+  std::vector<std::vector<double>> cores_, positions_, placed_;  // of voxels; of bodies; of solids
   std::vector<crossing::Surface> surfaces_;
   std::vector<double> state_;  // x and v of one body
   crossing::Counter counter_;
   Checks checks_;
 };
 
-std::string summary_json(const SceneFile &scene, const RunOptions &options, const RunResult &run, const Checks &checks);
+std::string summary_json(const SceneFile &scene, const RunOptions &options, const RunResult &run,
+                         const Checks &checks);
 void print_table(const SceneFile &scene, const RunResult &run, const Checks &checks);
 void print_profile(const SceneFile &scene, const RunResult &run);
 

@@ -19,7 +19,8 @@ namespace fs = std::filesystem;
 namespace cli {
 namespace {
 
-// By readdir: the iterators of the standard library allocate inside functions that must not throw, so memory that runs out there ends the process.
+// By readdir: the iterators of the standard library allocate inside functions that must not throw, so memory
+// that runs out there ends the process.
 void remove_matching(const std::string &folder, const char *pattern) {
   const std::regex names(pattern);
   std::vector<fs::path> found;
@@ -28,25 +29,31 @@ void remove_matching(const std::string &folder, const char *pattern) {
     if (std::regex_match(entry->d_name, names)) found.push_back(fs::path(folder) / entry->d_name);
   for (const fs::path &path : found) {
     std::error_code refused;
-    if (!fs::remove(path, refused) && refused) throw Failure(kBadInput, path.string() + ": left by an earlier run, and cannot be removed: " + refused.message());
+    if (!fs::remove(path, refused) && refused)
+      throw Failure(kBadInput,
+                    path.string() + ": left by an earlier run, and cannot be removed: " + refused.message());
   }
 }
 
-// What a link leads to may hold files of the same names that are no run's. A folder is not replaced as a file is: the link may be meant.
+// What a link leads to may hold files of the same names that are no run's. A folder is not replaced as a file
+// is: the link may be meant.
 void refuse_linked_folders(const std::string &folder) {
   for (const char *name : {"/states", "/nodes", "/frames"}) {
     std::error_code error;
     if (fs::is_symlink(folder + name, error))
-      throw Failure(kBadInput, folder + name + ": a link, and a run removes and writes files there; remove the link, or give another folder with --out (which may itself be a link)");
+      throw Failure(kBadInput, folder + name +
+                                   ": a link, and a run removes and writes files there; remove the link, or "
+                                   "give another folder with --out (which may itself be a link)");
   }
 }
 
-// Files of an earlier run would read as results of this one. The summary goes first: without one nobody takes the rest for a whole run. Files that
-// a killed process was writing go too.
+// Files of an earlier run would read as results of this one. The summary goes first: without one nobody takes
+// the rest for a whole run. Files that a killed process was writing go too.
 void remove_earlier(const std::string &folder) {
   remove_matching(folder, "summary\\.json");
   remove_matching(folder, "(bodies|contacts|probes)\\.csv|(summary\\.json|.*\\.csv)\\.part[0-9]*(-[0-9]+)?");
-  remove_matching(folder + "/states", "(.*_[0-9]{6}|last_.*)\\.vtu|index\\.csv|.*\\.(vtu|csv)\\.part[0-9]*(-[0-9]+)?");
+  remove_matching(folder + "/states",
+                  "(.*_[0-9]{6}|last_.*)\\.vtu|index\\.csv|.*\\.(vtu|csv)\\.part[0-9]*(-[0-9]+)?");
   remove_matching(folder + "/nodes", ".*\\.csv(\\.part[0-9]*(-[0-9]+)?)?");
   remove_matching(folder + "/frames", "frame_.*\\.png(\\.part[0-9]*(-[0-9]+)?)?");
 }
@@ -57,17 +64,23 @@ void make_folder(const std::string &path) {
   std::error_code error;
   fs::create_directories(path, error);
   if (error || !fs::is_directory(path))
-    throw Failure(kBadInput, path + ": the folder cannot be made: " + (error ? error.message() : "a file of that name is there"));
+    throw Failure(kBadInput, path + ": the folder cannot be made: " +
+                                 (error ? error.message() : "a file of that name is there"));
 }
 
 RunFolder::RunFolder(const std::string &path) {
   make_folder(path);
   descriptor_ = open(path.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
-  if (descriptor_ < 0) throw Failure(kBadInput, path + ": the folder cannot be opened: " + std::strerror(errno));
+  if (descriptor_ < 0)
+    throw Failure(kBadInput, path + ": the folder cannot be opened: " + std::strerror(errno));
   try {
     if (flock(descriptor_, LOCK_EX | LOCK_NB) != 0) {
-      if (errno == EWOULDBLOCK) throw Failure(kBadInput, path + ": another run is writing into this folder; wait for its end, or give another one with --out");
-      warn(path + ": this file system cannot lock the folder (" + std::strerror(errno) + "); let no other run write into it meanwhile");
+      if (errno == EWOULDBLOCK)
+        throw Failure(kBadInput, path +
+                                     ": another run is writing into this folder; wait for its end, or give "
+                                     "another one with --out");
+      warn(path + ": this file system cannot lock the folder (" + std::strerror(errno) +
+           "); let no other run write into it meanwhile");
     }
     refuse_linked_folders(path);
     remove_earlier(path);

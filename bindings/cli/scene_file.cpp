@@ -11,7 +11,9 @@ void rotate(const double q[4], const double v[3], double out[3]) {
     for (int i = 0; i < 3; ++i) out[i] = v[i];
     return;
   }
-  const double s = 2 / n2, u[3] = {q[1] * v[2] - q[2] * v[1] + q[3] * v[0], q[2] * v[0] - q[0] * v[2] + q[3] * v[1], q[0] * v[1] - q[1] * v[0] + q[3] * v[2]};
+  const double s = 2 / n2;
+  const double u[3] = {q[1] * v[2] - q[2] * v[1] + q[3] * v[0], q[2] * v[0] - q[0] * v[2] + q[3] * v[1],
+                       q[0] * v[1] - q[1] * v[0] + q[3] * v[2]};
   out[0] = v[0] + s * (q[1] * u[2] - q[2] * u[1]);
   out[1] = v[1] + s * (q[2] * u[0] - q[0] * u[2]);
   out[2] = v[2] + s * (q[0] * u[1] - q[1] * u[0]);
@@ -27,7 +29,8 @@ void place_points(const ObstacleView &obstacle, std::vector<double> &out) {
   }
 }
 
-SceneFile::SceneFile(const Globals &globals, const std::string &path, const std::vector<std::string> &set, uint64_t jitter_seed)
+SceneFile::SceneFile(const Globals &globals, const std::string &path, const std::vector<std::string> &set,
+                     uint64_t jitter_seed)
     : context_(make_context(globals), dfm_context_destroy), path_(path) {
   std::vector<const char *> assignments;
   for (const std::string &s : set) assignments.push_back(s.c_str());
@@ -37,7 +40,8 @@ SceneFile::SceneFile(const Globals &globals, const std::string &path, const std:
   options.set = assignments.data();
   options.jitter_seed = jitter_seed;
   {
-    const Patience patience(!globals.quiet && !globals.json, "reading " + path);   // surfaces are filled, grids are made
+    // surfaces are filled, grids are made
+    const Patience patience(!globals.quiet && !globals.json, "reading " + path);
     need(dfm_scene_open(context_.get(), path.c_str(), &options, &scene_));
   }
   need(dfm_scene_world(scene_, &world_));
@@ -53,8 +57,13 @@ SceneFile::SceneFile(const Globals &globals, const std::string &path, const std:
     info.size = sizeof info;
     need(dfm_body_get_info(handle, &info));
     BodyView body;
-    body.handle = handle, body.name = info.name, body.model = info.model;
-    body.npoint = info.npoint, body.ntet = info.ntet, body.nsurfel = info.nsurfel, body.rest_volume = info.rest_volume;
+    body.handle = handle;
+    body.name = info.name;
+    body.model = info.model;
+    body.npoint = info.npoint;
+    body.ntet = info.ntet;
+    body.nsurfel = info.nsurfel;
+    body.rest_volume = info.rest_volume;
     body.triangles.resize(3 * size_t(info.ntriangle));
     uint32_t ntriangle = 0;
     need(dfm_surface_triangles(handle, info.ntriangle, body.triangles.data(), &ntriangle));

@@ -35,7 +35,8 @@ void place_points(const ObstacleView &obstacle, std::vector<double> &out);
 
 class SceneFile {
  public:
-  SceneFile(const Globals &globals, const std::string &path, const std::vector<std::string> &set, uint64_t jitter_seed);
+  SceneFile(const Globals &globals, const std::string &path, const std::vector<std::string> &set,
+            uint64_t jitter_seed);
 
   dfm_context *context() const { return context_.get(); }
   dfm_scene scene() const { return scene_; }
@@ -45,7 +46,7 @@ class SceneFile {
   const std::vector<BodyView> &bodies() const { return bodies_; }
   const std::vector<ObstacleView> &obstacles() const { return obstacles_; }
   const std::vector<RigidView> &rigids() const { return rigids_; }
-  const std::string &name_of(uint64_t handle) const;  // of a body or an obstacle
+  const std::string &name_of(uint64_t handle) const;    // of a body or an obstacle
   std::string value(const std::string &pointer) const;  // JSON text; "" where nothing is
   std::string explain() const;
 

@@ -7,8 +7,10 @@ namespace cli {
 std::string shown(const std::string &text) {
   std::string out;
   for (size_t i = 0; i < text.size(); ++i) {
-    const unsigned char c = static_cast<unsigned char>(text[i]), next = i + 1 < text.size() ? static_cast<unsigned char>(text[i + 1]) : 0;
-    const bool second = c == 0xc2 && next >= 0x80 && next < 0xa0;   // the control characters of ISO 6429 in UTF-8
+    const unsigned char c = static_cast<unsigned char>(text[i]);
+    const unsigned char next = i + 1 < text.size() ? static_cast<unsigned char>(text[i + 1]) : 0;
+    // the control characters of ISO 6429 in UTF-8
+    const bool second = c == 0xc2 && next >= 0x80 && next < 0xa0;
     char escape[8];
     std::snprintf(escape, sizeof escape, "\\u%04x", second ? next : c);
     if (c < 0x20 || c == 0x7f || second) out += escape;

@@ -4,7 +4,8 @@
 
 namespace cli {
 
-// On one line, with control characters as \uXXXX, so that no name moves the cursor, colors the screen or fakes a line.
+// On one line, with control characters as \uXXXX, so that no name moves the cursor, colors the screen
+// or fakes a line.
 std::string shown(const std::string &text);
 
 }  // namespace cli

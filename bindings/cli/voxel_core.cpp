@@ -15,7 +15,10 @@ Vector unit_normal(const dfm_obstacle_def &def, uint32_t triangle) {
   const double *p[3];
   for (int k = 0; k < 3; ++k) p[k] = def.points + 3 * size_t(def.triangles[3 * size_t(triangle) + size_t(k)]);
   Vector u, v;
-  for (size_t i = 0; i < 3; ++i) u[i] = p[1][i] - p[0][i], v[i] = p[2][i] - p[0][i];
+  for (size_t i = 0; i < 3; ++i) {
+    u[i] = p[1][i] - p[0][i];
+    v[i] = p[2][i] - p[0][i];
+  }
   Vector n = {u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]};
   const double length = std::sqrt(dot(n, n));
   for (double &x : n) x = length > 0 ? x / length : 0;
@@ -28,14 +31,18 @@ double voxel_cell(const dfm_obstacle_def &def) {
   double volume = 1;
   for (size_t i = 0; i < 3; ++i) {
     double low = def.points[i], high = low;
-    for (size_t p = i; p < 3 * size_t(def.npoint); p += 3) low = std::min(low, def.points[p]), high = std::max(high, def.points[p]);
+    for (size_t p = i; p < 3 * size_t(def.npoint); p += 3) {
+      low = std::min(low, def.points[p]);
+      high = std::max(high, def.points[p]);
+    }
     volume *= high - low;
   }
   return std::cbrt(volume / (def.cells ? def.cells : 262144));
 }
 
 std::vector<double> voxel_core(const dfm_obstacle_def &def) {
-  // Projections onto the half-spaces n . way <= -half in turn: each point ends where all its planes want it, by a short way.
+  // Projections onto the half-spaces n . way <= -half in turn: each point ends where all its planes want it,
+  // by a short way.
   constexpr int kPasses = 32;
   const double half = 0.5 * voxel_cell(def);
   std::vector<Vector> way(def.npoint, Vector{});

@@ -7,7 +7,10 @@
 namespace dfm_ode_detail {
 namespace {
 
-#define TRY(call) do { if (const dfm_status status_ = (call); status_ != DFM_OK) return status_; } while (0)
+#define TRY(call)                                                             \
+  do {                                                                        \
+    if (const dfm_status status_ = (call); status_ != DFM_OK) return status_; \
+  } while (0)
 
 bool same(const dfm_rigid_state &a, const dfm_rigid_state &b) { return std::memcmp(&a, &b, sizeof a) == 0; }
 bool same(const dMass &a, const dMass &b) { return a.mass == b.mass && std::equal(a.I, a.I + 12, b.I); }
@@ -20,7 +23,8 @@ dfm_pose to_pose(const Pose &p) {
 // ODE's bodies are the engine's while the dfm_world steps, however that ends.
 class Stepping {
  public:
-  Stepping(Engine &engine, dfm_world world, const std::vector<dBodyID> &hidden) : engine_(engine), world_(world) {
+  Stepping(Engine &engine, dfm_world world, const std::vector<dBodyID> &hidden)
+      : engine_(engine), world_(world) {
     engine.begin(hidden, dfm_world_time(world));
   }
   ~Stepping() { engine_.end(dfm_world_time(world_)); }
@@ -34,10 +38,15 @@ class Stepping {
 
 }  // namespace
 
-Adapter::Adapter(dfm_world world, const dfm_ode_def &def) : world_(world), space_(def.space), own_group_(!def.contacts), own_near_(!def.near_callback) {
-  engine_.world = def.world, engine_.quick = def.flags & DFM_ODE_QUICK;
+Adapter::Adapter(dfm_world world, const dfm_ode_def &def)
+    : world_(world), space_(def.space), own_group_(!def.contacts), own_near_(!def.near_callback) {
+  engine_.world = def.world;
+  engine_.quick = def.flags & DFM_ODE_QUICK;
   engine_.contacts = def.contacts ? def.contacts : dJointGroupCreate(0);
-  near_.world = def.world, near_.group = engine_.contacts, near_.coefficient = def.friction, near_.most = def.most_contacts;
+  near_.world = def.world;
+  near_.group = engine_.contacts;
+  near_.coefficient = def.friction;
+  near_.most = def.most_contacts;
   engine_.friction = &near_;
   engine_.near_callback = def.near_callback ? def.near_callback : near_callback;
   engine_.near_data = def.near_callback ? def.near_data : &near_;
@@ -73,14 +82,22 @@ dfm_status Adapter::check(const std::vector<Signature> &signatures) const {
     const Part part = part_of(signatures[i]);
     if (part != Part::needs_arrays && part != Part::unknown) continue;
     const auto known = props_.find(seen_[i]);
-    if (known != props_.end() && (known->second.ignore || known->second.arrays_class == signatures[i].inner_class)) continue;
+    if (known != props_.end() &&
+        (known->second.ignore || known->second.arrays_class == signatures[i].inner_class))
+      continue;
     const char *const kind = class_name(signatures[i].inner_class);
-    const char *const name = known != props_.end() && !known->second.name.empty() ? known->second.name.c_str() : "unnamed";
+    const char *const name =
+        known != props_.end() && !known->second.name.empty() ? known->second.name.c_str() : "unnamed";
     if (part == Part::unknown)
-      return failed(DFM_E_UNSUPPORTED, "geom %p (%s) is a %s, which soft bodies cannot touch; call dfm_ode_set_geom with ignore = 1, or stand a trimesh for it",
+      return failed(DFM_E_UNSUPPORTED,
+                    "geom %p (%s) is a %s, which soft bodies cannot touch; call dfm_ode_set_geom with ignore "
+                    "= 1, or stand a trimesh for it",
                     static_cast<void *>(seen_[i]), name, kind);
-    return failed(DFM_E_UNSUPPORTED, "geom %p (%s) is a %s, and ODE does not tell its arrays; hand them to %s, or call dfm_ode_set_geom with ignore = 1",
-                  static_cast<void *>(seen_[i]), name, kind, signatures[i].inner_class == dConvexClass ? "dfm_ode_set_convex" : "dfm_ode_set_heights");
+    return failed(DFM_E_UNSUPPORTED,
+                  "geom %p (%s) is a %s, and ODE does not tell its arrays; hand them to %s, or call "
+                  "dfm_ode_set_geom with ignore = 1",
+                  static_cast<void *>(seen_[i]), name, kind,
+                  signatures[i].inner_class == dConvexClass ? "dfm_ode_set_convex" : "dfm_ode_set_heights");
   }
   return DFM_OK;
 }
@@ -90,15 +107,19 @@ dfm_status Adapter::ask_restored(bool &restored) {
   now.size = sizeof now;
   TRY(dfm_world_get_stats(world_, &now));
   restored = now.time != time_ || now.steps != world_steps_;
-  time_ = now.time, world_steps_ = now.steps;
+  time_ = now.time;
+  world_steps_ = now.steps;
   return DFM_OK;
 }
 
-// Nothing that ODE has destroyed is touched: geoms are known alive because the space lists them, bodies because a geom names them.
+// Nothing that ODE has destroyed is touched: geoms are known alive because the space lists them, bodies
+// because a geom names them.
 dfm_status Adapter::look() {
-  seen_.clear(), signatures_.clear(), engine_.spaces.clear();
+  seen_.clear();
+  signatures_.clear();
+  engine_.spaces.clear();
   walk(space_);
-  if (!own_near_) engine_.spaces.resize(1);   // the caller's callback knows how it wants nested spaces
+  if (!own_near_) engine_.spaces.resize(1);  // the caller's callback knows how it wants nested spaces
   for (const dGeomID g : seen_) signatures_.push_back(signature_of(g));
   TRY(check(signatures_));
   for (auto &g : geoms_) g->found = false;
@@ -112,7 +133,8 @@ dfm_status Adapter::look() {
     }
     const auto geom = by_geom_.find(seen_[i]);
     if (geom == by_geom_.end()) continue;
-    geom->second->found = geom->second->signature == signatures_[i] && (body == by_body_.end() || body->second->found);
+    geom->second->found =
+        geom->second->signature == signatures_[i] && (body == by_body_.end() || body->second->found);
   }
   TRY(drop());
   if (geoms_.size() != seen_.size())
@@ -165,30 +187,43 @@ dfm_status Adapter::bind_body(dBodyID id, Body *&out) {
     return DFM_OK;
   }
   auto body = std::make_unique<Body>();
-  body->id = id, body->seat = std::make_unique<Seat>(), body->found = true;
+  body->id = id;
+  body->seat = std::make_unique<Seat>();
+  body->found = true;
   dBodyGetMass(id, &body->mass);
   Member &m = body->seat->member;
-  m.engine = &engine_, m.body = id, m.inertia = inertia_of(id);
+  m.engine = &engine_;
+  m.body = id;
+  m.inertia = inertia_of(id);
   dfm_rigid_def def = dfm_rigid_def_default();
   const dfm_rigid_state s = m.state();
-  def.shape = DFM_SHAPE_NONE, def.mass = m.inertia.mass;
+  def.shape = DFM_SHAPE_NONE;
+  def.mass = m.inertia.mass;
   store(def.inertia, m.inertia.moments);
-  std::copy(s.position, s.position + 3, def.pose.position), std::copy(s.rotation, s.rotation + 4, def.pose.rotation);
-  std::copy(s.velocity, s.velocity + 3, def.velocity), std::copy(s.spin, s.spin + 3, def.spin);
+  std::copy(s.position, s.position + 3, def.pose.position);
+  std::copy(s.rotation, s.rotation + 4, def.pose.rotation);
+  std::copy(s.velocity, s.velocity + 3, def.velocity);
+  std::copy(s.spin, s.spin + 3, def.spin);
   dfm_rigid_set_def set{};
-  set.size = sizeof set, set.nbody = 1, set.bodies = &def, set.data = body->seat.get();
+  set.size = sizeof set;
+  set.nbody = 1;
+  set.bodies = &def;
+  set.data = body->seat.get();
   TRY(dfm_rigid_create(world_, "ode", &set, &body->rigid));
   body->ode = s;
   TRY(dfm_rigid_get_state(body->rigid, &body->world));
   engine_.members.push_back(&m);
   out = body.get();
-  by_body_[id] = body.get(), bodies_.push_back(std::move(body));
+  by_body_[id] = body.get();
+  bodies_.push_back(std::move(body));
   return DFM_OK;
 }
 
 dfm_status Adapter::bind(dGeomID id, const Signature &s) {
   auto geom = std::make_unique<Geom>();
-  geom->id = id, geom->signature = s, geom->found = true;
+  geom->id = id;
+  geom->signature = s;
+  geom->found = true;
   const auto known = props_.find(id);
   const Props *const props = known != props_.end() ? &known->second : nullptr;
   const Part part = part_of(s);
@@ -196,13 +231,18 @@ dfm_status Adapter::bind(dGeomID id, const Signature &s) {
     dfm_obstacle_def def = dfm_obstacle_def_default();
     Triangles made;
     describe(id, s, props ? &props->arrays : nullptr, def, made);
-    def.category = s.category, def.collides_with = s.collides;
-    if (props) def.name = props->name.empty() ? nullptr : props->name.c_str(), def.material = props->material;
+    def.category = s.category;
+    def.collides_with = s.collides;
+    if (props) {
+      def.name = props->name.empty() ? nullptr : props->name.c_str();
+      def.material = props->material;
+    }
     if (s.body) {
       Body *body = nullptr;
       TRY(bind_body(s.body, body));
       const Quat axes = body->seat->member.inertia.axes;
-      def.pose = to_pose({rotate(conjugate(axes), s.local.position), unit(conjugate(axes) * s.local.rotation)});
+      def.pose =
+          to_pose({rotate(conjugate(axes), s.local.position), unit(conjugate(axes) * s.local.rotation)});
       TRY(dfm_rigid_add_shape(body->rigid, &def, &geom->obstacle));
     } else {
       geom->pose = pose_of(id);
@@ -226,18 +266,20 @@ dfm_status Adapter::follow(Geom &g) {
   const dfm_pose pose = to_pose(now);
   const dfm_status status = dfm_obstacle_move_to(g.obstacle, &pose);
   if (status != DFM_E_HANDLE) return status;
-  g.obstacle = 0;                          // as in unbind
+  g.obstacle = 0;  // as in unbind
   return DFM_OK;
 }
 
-// Who has moved a body since both worlds agreed: the caller in ODE, or a restore in the dfm_world, which counts for all bodies that were there.
+// Who has moved a body since both worlds agreed: the caller in ODE, or a restore in the dfm_world, which
+// counts for all bodies that were there.
 dfm_status Adapter::agree(Body &b, bool restored) {
   Member &m = b.seat->member;
   dfm_rigid_state world;
   TRY(dfm_rigid_get_state(b.rigid, &world));
   const dfm_rigid_state ode = m.state();
   restored &= !b.fresh;
-  b.fresh = false, m.restored |= restored;
+  b.fresh = false;
+  m.restored |= restored;
   if (same(ode, b.ode) && same(world, b.world)) return DFM_OK;
   if (restored || same(ode, b.ode)) m.put(world);
   else TRY(dfm_rigid_set_state(b.rigid, &ode));
@@ -249,9 +291,13 @@ dfm_status Adapter::agree(Body &b, bool restored) {
 std::vector<dBodyID> Adapter::hidden_bodies() const {
   std::vector<dBodyID> found, open;
   for (auto &b : bodies_) open.push_back(b->id);
-  // Bodies whose geoms all stand aside (ignored, disabled, rays): ODE moves them, and what is solved again must take them back too.
+  // Bodies whose geoms all stand aside (ignored, disabled, rays): ODE moves them, and what is solved again
+  // must take them back too.
   for (const Signature &s : signatures_)
-    if (s.body && !by_body_.count(s.body) && std::find(found.begin(), found.end(), s.body) == found.end()) found.push_back(s.body), open.push_back(s.body);
+    if (s.body && !by_body_.count(s.body) && std::find(found.begin(), found.end(), s.body) == found.end()) {
+      found.push_back(s.body);
+      open.push_back(s.body);
+    }
   while (!open.empty()) {
     const dBodyID b = open.back();
     open.pop_back();
@@ -259,8 +305,10 @@ std::vector<dBodyID> Adapter::hidden_bodies() const {
     for (int i = 0; i < n; ++i)
       for (int side = 0; side < 2; ++side) {
         const dBodyID other = dJointGetBody(dBodyGetJoint(b, i), side);
-        if (!other || by_body_.count(other) || std::find(found.begin(), found.end(), other) != found.end()) continue;
-        found.push_back(other), open.push_back(other);
+        if (!other || by_body_.count(other) || std::find(found.begin(), found.end(), other) != found.end())
+          continue;
+        found.push_back(other);
+        open.push_back(other);
       }
   }
   return found;
@@ -275,7 +323,9 @@ dfm_status Adapter::step(double dt) {
     status = dfm_world_step(world_, dt, &trouble);
   }
   ++steps_;
-  dfm_status told = DFM_OK;                // what the bodies say of it comes after the step's own verdict, and one of them does not keep it from the next
+  // what the bodies say of it comes after the step's own verdict, and one of them does not keep
+  // it from the next
+  dfm_status told = DFM_OK;
   for (auto &b : bodies_) {
     Member &m = b->seat->member;
     const dfm_status of_body = dfm_rigid_get_state(b->rigid, &b->world);
@@ -291,9 +341,14 @@ dfm_status Adapter::step(double dt) {
 dfm_status Adapter::obstacle(dGeomID geom, dfm_obstacle *out) {
   TRY(sync());
   const auto known = by_geom_.find(geom);
-  if (known == by_geom_.end()) return failed(DFM_E_ARG, "geom %p is not in the adapter's space; dSpaceAdd puts it there", static_cast<void *>(geom));
+  if (known == by_geom_.end())
+    return failed(DFM_E_ARG, "geom %p is not in the adapter's space; dSpaceAdd puts it there",
+                  static_cast<void *>(geom));
   if (!known->second->obstacle)
-    return failed(DFM_E_ARG, "geom %p takes no part: it is ignored (dfm_ode_set_geom), disabled, a ray or an empty transform", static_cast<void *>(geom));
+    return failed(
+        DFM_E_ARG,
+        "geom %p takes no part: it is ignored (dfm_ode_set_geom), disabled, a ray or an empty transform",
+        static_cast<void *>(geom));
   *out = known->second->obstacle;
   return DFM_OK;
 }
@@ -302,12 +357,15 @@ dfm_status Adapter::rigid(dBodyID body, dfm_rigid *out) {
   TRY(sync());
   const auto known = by_body_.find(body);
   if (known == by_body_.end())
-    return failed(DFM_E_ARG, "body %p has no geom in the adapter's space that takes part; add one", static_cast<void *>(body));
+    return failed(DFM_E_ARG, "body %p has no geom in the adapter's space that takes part; add one",
+                  static_cast<void *>(body));
   *out = known->second->rigid;
   return DFM_OK;
 }
 
-bool Adapter::in_space(dGeomID geom) const { return by_geom_.count(geom) || std::find(seen_.begin(), seen_.end(), geom) != seen_.end(); }
+bool Adapter::in_space(dGeomID geom) const {
+  return by_geom_.count(geom) || std::find(seen_.begin(), seen_.end(), geom) != seen_.end();
+}
 
 dfm_status Adapter::rebind(dGeomID geom) {
   const auto known = by_geom_.find(geom);
@@ -319,39 +377,56 @@ dfm_status Adapter::rebind(dGeomID geom) {
 }
 
 dfm_status Adapter::set_geom(dGeomID geom, const dfm_ode_geom &props) {
-  seen_.clear(), engine_.spaces.clear();
+  seen_.clear();
+  engine_.spaces.clear();
   walk(space_);
-  if (!in_space(geom)) return failed(DFM_E_ARG, "geom %p is not in the adapter's space; dSpaceAdd puts it there", static_cast<void *>(geom));
+  if (!in_space(geom))
+    return failed(DFM_E_ARG, "geom %p is not in the adapter's space; dSpaceAdd puts it there",
+                  static_cast<void *>(geom));
   TRY(rebind(geom));
   Props &p = props_[geom];
-  p.ignore = props.ignore, p.name = props.name ? props.name : "", p.material = props.material;
+  p.ignore = props.ignore;
+  p.name = props.name ? props.name : "";
+  p.material = props.material;
   return DFM_OK;
 }
 
 dfm_status Adapter::set_arrays(dGeomID geom, int geom_class, Triangles arrays) {
-  seen_.clear(), engine_.spaces.clear();
+  seen_.clear();
+  engine_.spaces.clear();
   walk(space_);
-  if (!in_space(geom)) return failed(DFM_E_ARG, "geom %p is not in the adapter's space; dSpaceAdd puts it there", static_cast<void *>(geom));
+  if (!in_space(geom))
+    return failed(DFM_E_ARG, "geom %p is not in the adapter's space; dSpaceAdd puts it there",
+                  static_cast<void *>(geom));
   if (signature_of(geom).inner_class != geom_class)
-    return failed(DFM_E_ARG, "geom %p is no %s; only of those ODE keeps the arrays to itself", static_cast<void *>(geom), class_name(geom_class));
+    return failed(DFM_E_ARG, "geom %p is no %s; only of those ODE keeps the arrays to itself",
+                  static_cast<void *>(geom), class_name(geom_class));
   TRY(rebind(geom));
   Props &p = props_[geom];
-  p.arrays = std::move(arrays), p.arrays_class = geom_class;
+  p.arrays = std::move(arrays);
+  p.arrays_class = geom_class;
   return DFM_OK;
 }
 
 dfm_status Adapter::refresh(dGeomID geom) {
-  if (!by_geom_.count(geom)) return failed(DFM_E_ARG, "geom %p has not taken part in a step yet; nothing is there to be read again", static_cast<void *>(geom));
+  if (!by_geom_.count(geom))
+    return failed(DFM_E_ARG, "geom %p has not taken part in a step yet; nothing is there to be read again",
+                  static_cast<void *>(geom));
   return rebind(geom);
 }
 
 dfm_ode_stats Adapter::stats() const {
   dfm_ode_stats s{};
-  s.size = sizeof s, s.bodies = static_cast<uint32_t>(bodies_.size());
+  s.size = sizeof s;
+  s.bodies = static_cast<uint32_t>(bodies_.size());
   for (auto &g : geoms_) ++(g->obstacle ? s.shapes : s.refused);
-  s.steps = steps_, s.ode_steps = engine_.steps, s.corrections = engine_.corrections;
-  s.residual = engine_.residual, s.residual_max = engine_.residual_max;
-  s.sync_seconds = sync_seconds_, s.ode_seconds = engine_.ode_seconds;
+  s.steps = steps_;
+  s.ode_steps = engine_.steps;
+  s.corrections = engine_.corrections;
+  s.residual = engine_.residual;
+  s.residual_max = engine_.residual_max;
+  s.sync_seconds = sync_seconds_;
+  s.ode_seconds = engine_.ode_seconds;
   return s;
 }
 

@@ -1,4 +1,5 @@
-// An ODE world and space joined to a dfm_world: each step looks at the space first, and what it finds changed there is changed here.
+// An ODE world and space joined to a dfm_world: each step looks at the space first, and what it finds changed
+// there is changed here.
 #pragma once
 #include <memory>
 #include <string>
@@ -18,15 +19,15 @@ class Adapter {
   Adapter(const Adapter &) = delete;
   Adapter &operator=(const Adapter &) = delete;
 
-  dfm_status sync();                       // the geoms and bodies as they are now
+  dfm_status sync();  // the geoms and bodies as they are now
   dfm_status step(double dt);
   dfm_status obstacle(dGeomID geom, dfm_obstacle *out);
   dfm_status rigid(dBodyID body, dfm_rigid *out);
   dfm_status set_geom(dGeomID geom, const dfm_ode_geom &props);
   dfm_status set_arrays(dGeomID geom, int geom_class, Triangles arrays);
   dfm_status refresh(dGeomID geom);
-  dfm_status snapshot(void *buffer, size_t *bytes);                // snapshot.cpp
-  dfm_status restore(const void *buffer, size_t bytes);            // snapshot.cpp
+  dfm_status snapshot(void *buffer, size_t *bytes);      // snapshot.cpp
+  dfm_status restore(const void *buffer, size_t bytes);  // snapshot.cpp
   RigidFriction &friction() { return near_; }
   dfm_ode_stats stats() const;
   uint32_t trouble = 0;
@@ -39,17 +40,18 @@ class Adapter {
     std::unique_ptr<Seat> seat;
     dfm_rigid rigid = 0;
     dMass mass;
-    dfm_rigid_state ode{}, world{};        // what both worlds had when they agreed last
-    bool found = false, fresh = true;      // fresh: ODE's state counts, whatever the dfm_world has been restored to
+    dfm_rigid_state ode{}, world{};  // what both worlds had when they agreed last
+    // fresh: ODE's state counts, whatever the dfm_world has been restored to
+    bool found = false, fresh = true;
   };
   struct Geom {
     dGeomID id;
     Signature signature;
-    Pose pose;                             // without a body: where its obstacle was sent
-    dfm_obstacle obstacle = 0;             // 0: takes no part
+    Pose pose;                  // without a body: where its obstacle was sent
+    dfm_obstacle obstacle = 0;  // 0: takes no part
     bool found = false;
   };
-  struct Props {                           // what the caller has said; kept while the geom is in the space
+  struct Props {  // what the caller has said; kept while the geom is in the space
     bool ignore = false;
     std::string name;
     dfm_material material = 0;
@@ -61,17 +63,18 @@ class Adapter {
   Engine engine_;
   RigidFriction near_;
   bool own_group_, own_near_;
-  std::vector<std::unique_ptr<Geom>> geoms_;   // in the order they came
+  std::vector<std::unique_ptr<Geom>> geoms_;  // in the order they came
   std::vector<std::unique_ptr<Body>> bodies_;
   std::unordered_map<dGeomID, Geom *> by_geom_;
   std::unordered_map<dBodyID, Body *> by_body_;
   std::unordered_map<dGeomID, Props> props_;
-  std::vector<dGeomID> seen_;              // of this sync, in the space's order
+  std::vector<dGeomID> seen_;  // of this sync, in the space's order
   std::vector<Signature> signatures_;
   uint64_t steps_ = 0;
-  double time_ = 0;                        // s, the dfm_world's when both worlds agreed last: another one tells that it has been restored
+  // s, the dfm_world's when both worlds agreed last: another one tells that it has been restored
+  double time_ = 0;
   uint64_t world_steps_ = 0;
-  bool keeps_friction_ = false;            // restored with the states of the rigid contacts
+  bool keeps_friction_ = false;  // restored with the states of the rigid contacts
   double sync_seconds_ = 0;
 
   void walk(dSpaceID space);

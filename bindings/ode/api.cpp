@@ -9,8 +9,9 @@ using namespace dfm_ode_detail;
 
 namespace {
 
-// Handles count up and are never used twice. Never destroyed: an adapter that nobody has detached stands in worlds of the dfm_world and of ODE, which at
-// the program's end may be gone before it or stay longer than it, and what detaches as late as that must still find it.
+// Handles count up and are never used twice. Never destroyed: an adapter that nobody has detached stands in
+// worlds of the dfm_world and of ODE, which at the program's end may be gone before it or stay longer than
+// it, and what detaches as late as that must still find it.
 struct Adapters {
   std::mutex mutex;
   std::unordered_map<dfm_ode, std::unique_ptr<Adapter>> all;
@@ -32,7 +33,9 @@ template <class F>
 dfm_status with(dfm_ode handle, F &&f) noexcept {
   try {
     Adapter *const a = find(handle);
-    if (!a) return failed(DFM_E_HANDLE, "ODE adapter %llu does not exist; it has been detached, or never was", static_cast<unsigned long long>(handle));
+    if (!a)
+      return failed(DFM_E_HANDLE, "ODE adapter %llu does not exist; it has been detached, or never was",
+                    static_cast<unsigned long long>(handle));
     return f(*a);
   } catch (const std::bad_alloc &) {
     return dfm_fail(DFM_E_NOMEM, "ode: out of memory");
@@ -43,19 +46,26 @@ dfm_status with(dfm_ode handle, F &&f) noexcept {
 
 dfm_status missing(const char *what) { return failed(DFM_E_ARG, "argument '%s' is NULL", what); }
 
-bool same_version(const char *a, const char *b) { return a && std::strncmp(a, b, 5) == 0; }   // "0.16."
+bool same_version(const char *a, const char *b) { return a && std::strncmp(a, b, 5) == 0; }  // "0.16."
 
 dfm_status check_def(const dfm_ode_def &d) {
-  if (d.size < sizeof d) return failed(DFM_E_ARG, "dfm_ode_def: size is %u, expected %zu; start from dfm_ode_def_default()", d.size, sizeof d);
+  if (d.size < sizeof d)
+    return failed(DFM_E_ARG, "dfm_ode_def: size is %u, expected %zu; start from dfm_ode_def_default()",
+                  d.size, sizeof d);
   if (d.real_bytes != sizeof(dReal) || !same_version(d.version, dODE_VERSION))
-    return failed(DFM_E_UNSUPPORTED, "this program was compiled against ODE %s with a dReal of %u bytes, libdeform_ode against ODE %s with %zu; compile both against the same",
+    return failed(DFM_E_UNSUPPORTED,
+                  "this program was compiled against ODE %s with a dReal of %u bytes, libdeform_ode against "
+                  "ODE %s with %zu; compile both against the same",
                   d.version ? d.version : "?", d.real_bytes, dODE_VERSION, sizeof(dReal));
   if (const dfm_status s = check_ode(); s != DFM_OK) return s;
   if (!d.world) return missing("world");
   if (!d.space) return missing("space");
-  if (d.flags & ~uint32_t{DFM_ODE_QUICK}) return failed(DFM_E_ARG, "dfm_ode_def: flags %u; only DFM_ODE_QUICK is known", d.flags);
-  if (!(d.friction >= 0 && std::isfinite(d.friction))) return failed(DFM_E_ARG, "dfm_ode_def: friction %g; it must be finite and not negative", d.friction);
-  if (d.most_contacts < 1 || d.most_contacts > 64) return failed(DFM_E_ARG, "dfm_ode_def: most_contacts %u; between 1 and 64", d.most_contacts);
+  if (d.flags & ~uint32_t{DFM_ODE_QUICK})
+    return failed(DFM_E_ARG, "dfm_ode_def: flags %u; only DFM_ODE_QUICK is known", d.flags);
+  if (!(d.friction >= 0 && std::isfinite(d.friction)))
+    return failed(DFM_E_ARG, "dfm_ode_def: friction %g; it must be finite and not negative", d.friction);
+  if (d.most_contacts < 1 || d.most_contacts > 64)
+    return failed(DFM_E_ARG, "dfm_ode_def: most_contacts %u; between 1 and 64", d.most_contacts);
   return DFM_OK;
 }
 
@@ -63,7 +73,11 @@ dfm_status check_def(const dfm_ode_def &d) {
 
 dfm_ode_def dfm_ode_def_for(uint32_t real_bytes, const char *version) {
   dfm_ode_def d{};
-  d.size = sizeof d, d.friction = 0.5, d.most_contacts = 8, d.real_bytes = real_bytes, d.version = version;
+  d.size = sizeof d;
+  d.friction = 0.5;
+  d.most_contacts = 8;
+  d.real_bytes = real_bytes;
+  d.version = version;
   return d;
 }
 
@@ -83,8 +97,10 @@ dfm_status dfm_ode_attach(dfm_world world, const dfm_ode_def *def, dfm_ode *out)
     Adapters &a = adapters();
     std::lock_guard lock(a.mutex);
     for (auto &[handle, other] : a.all) {
-      if (other->ode_world() == def->world) return dfm_fail(DFM_E_STATE, "this dWorldID has an adapter already; dfm_ode_detach it first");
-      if (other->ode_space() == def->space) return dfm_fail(DFM_E_STATE, "this dSpaceID has an adapter already; dfm_ode_detach it first");
+      if (other->ode_world() == def->world)
+        return dfm_fail(DFM_E_STATE, "this dWorldID has an adapter already; dfm_ode_detach it first");
+      if (other->ode_space() == def->space)
+        return dfm_fail(DFM_E_STATE, "this dSpaceID has an adapter already; dfm_ode_detach it first");
     }
     a.all.emplace(a.next, std::make_unique<Adapter>(world, *def));
     *out = a.next++;
@@ -107,7 +123,8 @@ dfm_status dfm_ode_detach(dfm_ode ode) {
 
 dfm_status dfm_ode_step(dfm_ode ode, double dt) {
   return with(ode, [&](Adapter &a) {
-    if (!(dt > 0 && std::isfinite(dt))) return failed(DFM_E_ARG, "dt %g s; it must be positive and finite", dt);
+    if (!(dt > 0 && std::isfinite(dt)))
+      return failed(DFM_E_ARG, "dt %g s; it must be positive and finite", dt);
     return a.step(dt);
   });
 }
@@ -129,18 +146,25 @@ dfm_status dfm_ode_get_stats(dfm_ode ode, dfm_ode_stats *out) {
 }
 
 dfm_status dfm_ode_obstacle(dfm_ode ode, dGeomID geom, dfm_obstacle *out) {
-  return with(ode, [&](Adapter &a) { return !geom ? missing("geom") : !out ? missing("out") : a.obstacle(geom, out); });
+  return with(ode, [&](Adapter &a) {
+    return !geom ? missing("geom") : !out ? missing("out") : a.obstacle(geom, out);
+  });
 }
 
 dfm_status dfm_ode_rigid(dfm_ode ode, dBodyID body, dfm_rigid *out) {
-  return with(ode, [&](Adapter &a) { return !body ? missing("body") : !out ? missing("out") : a.rigid(body, out); });
+  return with(ode, [&](Adapter &a) {
+    return !body ? missing("body") : !out ? missing("out") : a.rigid(body, out);
+  });
 }
 
 dfm_status dfm_ode_set_geom(dfm_ode ode, dGeomID geom, const dfm_ode_geom *props) {
-  return with(ode, [&](Adapter &a) { return !geom ? missing("geom") : !props ? missing("props") : a.set_geom(geom, *props); });
+  return with(ode, [&](Adapter &a) {
+    return !geom ? missing("geom") : !props ? missing("props") : a.set_geom(geom, *props);
+  });
 }
 
-dfm_status dfm_ode_set_convex(dfm_ode ode, dGeomID geom, uint32_t npoint, const double *points, uint32_t npolygon, const uint32_t *polygons) {
+dfm_status dfm_ode_set_convex(dfm_ode ode, dGeomID geom, uint32_t npoint, const double *points,
+                              uint32_t npolygon, const uint32_t *polygons) {
   return with(ode, [&](Adapter &a) {
     if (!geom || !points || !polygons) return missing(!geom ? "geom" : !points ? "points" : "polygons");
     std::string wrong;
@@ -150,11 +174,14 @@ dfm_status dfm_ode_set_convex(dfm_ode ode, dGeomID geom, uint32_t npoint, const 
   });
 }
 
-dfm_status dfm_ode_set_heights(dfm_ode ode, dGeomID geom, double width, double depth, uint32_t nx, uint32_t nz, const double *heights) {
+dfm_status dfm_ode_set_heights(dfm_ode ode, dGeomID geom, double width, double depth, uint32_t nx,
+                               uint32_t nz, const double *heights) {
   return with(ode, [&](Adapter &a) {
     if (!geom || !heights) return missing(!geom ? "geom" : "heights");
     if (nx < 2 || nz < 2 || !(width > 0) || !(depth > 0))
-      return failed(DFM_E_ARG, "heightfield: %u by %u samples over %g by %g m; at least 2 by 2 over a positive size", nx, nz, width, depth);
+      return failed(DFM_E_ARG,
+                    "heightfield: %u by %u samples over %g by %g m; at least 2 by 2 over a positive size", nx,
+                    nz, width, depth);
     return a.set_arrays(geom, dHeightfieldClass, height_triangles(width, depth, nx, nz, heights));
   });
 }
@@ -171,9 +198,13 @@ dfm_status dfm_ode_restore(dfm_ode ode, const void *buffer, size_t bytes) {
   return with(ode, [&](Adapter &a) { return !buffer ? missing("buffer") : a.restore(buffer, bytes); });
 }
 
-dfm_status dfm_ode_set_friction(dfm_ode ode, dfm_context *context, const char *law, const dfm_params *params, double area) {
+dfm_status dfm_ode_set_friction(dfm_ode ode, dfm_context *context, const char *law, const dfm_params *params,
+                                double area) {
   return with(ode, [&](Adapter &a) {
-    if (!law) return a.friction().clear_law(), dfm_status{DFM_OK};
+    if (!law) {
+      a.friction().clear_law();
+      return dfm_status{DFM_OK};
+    }
     return !context ? missing("context") : a.friction().set_law(context, law, params, area);
   });
 }
@@ -181,7 +212,8 @@ dfm_status dfm_ode_set_friction(dfm_ode ode, dfm_context *context, const char *l
 dfm_status dfm_ode_contact(dfm_ode ode, dGeomID a, dGeomID b, int *made) {
   return with(ode, [&](Adapter &adapter) {
     if (!a || !b) return missing(!a ? "a" : "b");
-    if (dGeomIsSpace(a) || dGeomIsSpace(b)) return failed(DFM_E_ARG, "a space is no geom; dSpaceCollide2 finds the geoms in it");
+    if (dGeomIsSpace(a) || dGeomIsSpace(b))
+      return failed(DFM_E_ARG, "a space is no geom; dSpaceCollide2 finds the geoms in it");
     const int n = adapter.friction().collide(a, b, adapter.friction().h);
     if (made) *made = n;
     return dfm_status{DFM_OK};

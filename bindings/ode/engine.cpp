@@ -9,13 +9,18 @@
 namespace dfm_ode_detail {
 namespace {
 
-constexpr double kForget = 0.05;     // s
-constexpr double kResidual = 0.01;   // share of a jointed body's change by contact that may be missing before contact is solved again
-constexpr double kSlow = 1e-4;       // m/s: of a body that contact changes by less, what is missing counts against this (then 1e-6 m/s, as in the solve)
-constexpr double kDrifts = 1, kFellAsleep = 2;   // extra[12]
+constexpr double kForget = 0.05;  // s
+// share of a jointed body's change by contact that may be missing before contact is solved again
+constexpr double kResidual = 0.01;
+// m/s: of a body that contact changes by less, what is missing counts against this (then 1e-6 m/s,
+// as in the solve)
+constexpr double kSlow = 1e-4;
+constexpr double kDrifts = 1, kFellAsleep = 2;  // extra[12]
 constexpr int kMostCorrections = 3;  // per sub-step; more than one only where joints or motors jump
 
-Quat rotation_of(const dfm_rigid_state &s) { return {s.rotation[0], s.rotation[1], s.rotation[2], s.rotation[3]}; }
+Quat rotation_of(const dfm_rigid_state &s) {
+  return {s.rotation[0], s.rotation[1], s.rotation[2], s.rotation[3]};
+}
 
 Vec inverse(Vec a) { return {1 / a.x, 1 / a.y, 1 / a.z}; }
 
@@ -31,18 +36,23 @@ void principal(double a[3][3], Vec &moments, Quat &axes) {
           continue;
         }
         const double theta = (a[q][q] - a[p][p]) / (2 * a[p][q]);
-        const double t = (theta >= 0 ? 1 : -1) / (std::fabs(theta) + std::sqrt(theta * theta + 1)), c = 1 / std::sqrt(t * t + 1), s = t * c;
+        const double t = (theta >= 0 ? 1 : -1) / (std::fabs(theta) + std::sqrt(theta * theta + 1));
+        const double c = 1 / std::sqrt(t * t + 1);
+        const double s = t * c;
         for (int k = 0; k < 3; ++k) {
           const double x = a[k][p], y = a[k][q];
-          a[k][p] = c * x - s * y, a[k][q] = s * x + c * y;
+          a[k][p] = c * x - s * y;
+          a[k][q] = s * x + c * y;
         }
         for (int k = 0; k < 3; ++k) {
           const double x = a[p][k], y = a[q][k];
-          a[p][k] = c * x - s * y, a[q][k] = s * x + c * y;
+          a[p][k] = c * x - s * y;
+          a[q][k] = s * x + c * y;
         }
         for (int k = 0; k < 3; ++k) {
           const double x = e[k][p], y = e[k][q];
-          e[k][p] = c * x - s * y, e[k][q] = s * x + c * y;
+          e[k][p] = c * x - s * y;
+          e[k][q] = s * x + c * y;
         }
       }
   }
@@ -51,39 +61,58 @@ void principal(double a[3][3], Vec &moments, Quat &axes) {
   const Vec x{e[0][0], e[1][0], e[2][0]}, y{e[0][1], e[1][1], e[2][1]};
   Vec z{e[0][2], e[1][2], e[2][2]};
   if (dot(cross(x, y), z) < 0) z = -1.0 * z;
-  const double w = 1 + x.x + y.y + z.z, i = 1 + x.x - y.y - z.z, j = 1 - x.x + y.y - z.z, k = 1 - x.x - y.y + z.z;
+  const double w = 1 + x.x + y.y + z.z;
+  const double i = 1 + x.x - y.y - z.z;
+  const double j = 1 - x.x + y.y - z.z;
+  const double k = 1 - x.x - y.y + z.z;
   if (w >= i && w >= j && w >= k) axes = unit({y.z - z.y, z.x - x.z, x.y - y.x, w});
   else if (i >= j && i >= k) axes = unit({i, x.y + y.x, z.x + x.z, y.z - z.y});
   else if (j >= k) axes = unit({x.y + y.x, j, y.z + z.y, z.x - x.z});
   else axes = unit({z.x + x.z, y.z + z.y, k, x.y - y.x});
 }
 
-void carry(dBodyID b, Vec force, Vec torque) { dBodySetForce(b, force.x, force.y, force.z), dBodySetTorque(b, torque.x, torque.y, torque.z); }
-// ODE normalizes every quaternion that it is given. Rounding can make that a cycle: a quaternion slightly too short becomes one slightly too long, and back.
-// This leaves the body with a quaternion near it that normalizing does not change. One unit in the last place, added to the largest part of the short one,
-// ends the cycle (2e6 random quaternions: 6 rounds at most).
+void carry(dBodyID b, Vec force, Vec torque) {
+  dBodySetForce(b, force.x, force.y, force.z);
+  dBodySetTorque(b, torque.x, torque.y, torque.z);
+}
+// ODE normalizes every quaternion that it is given. Rounding can make that a cycle: a quaternion slightly too
+// short becomes one slightly too long, and back. This leaves the body with a quaternion near it that
+// normalizing does not change. One unit in the last place, added to the largest part of the short one, ends
+// the cycle (2e6 random quaternions: 6 rounds at most).
 void settle_rotation(dBodyID b) {
-  const auto get = [&] { const dReal *const q = dBodyGetQuaternion(b); return std::array<dReal, 4>{q[0], q[1], q[2], q[3]}; };
+  const auto get = [&] {
+    const dReal *const q = dBodyGetQuaternion(b);
+    return std::array<dReal, 4>{q[0], q[1], q[2], q[3]};
+  };
   for (int round = 0; round < 16; ++round) {
     const auto before = get();
     dBodySetQuaternion(b, before.data());
     auto after = get();
     if (after == before) return;
-    if (round == 0 || after[0] * after[0] + after[1] * after[1] + after[2] * after[2] + after[3] * after[3] >= 1) continue;
-    dReal &largest = *std::max_element(after.begin(), after.end(), [](dReal x, dReal y) { return std::fabs(x) < std::fabs(y); });
+    if (round == 0 ||
+        after[0] * after[0] + after[1] * after[1] + after[2] * after[2] + after[3] * after[3] >= 1)
+      continue;
+    dReal &largest = *std::max_element(after.begin(), after.end(),
+                                       [](dReal x, dReal y) { return std::fabs(x) < std::fabs(y); });
     largest = std::nextafter(largest, std::copysign(dReal(2), largest));
     dBodySetQuaternion(b, after.data());
   }
 }
 bool finite_turn(dBodyID b) { return dBodyGetFiniteRotationMode(b) != 0; }
-bool damped(dBodyID b) { return dBodyGetLinearDamping(b) != 0 || dBodyGetAngularDamping(b) != 0 || dBodyGetMaxAngularSpeed(b) < dInfinity; }
+bool damped(dBodyID b) {
+  return dBodyGetLinearDamping(b) != 0 || dBodyGetAngularDamping(b) != 0 ||
+         dBodyGetMaxAngularSpeed(b) < dInfinity;
+}
 
-// ODE's rule, with one sample: only bodies with joints (contacts are some) fall asleep. Who sleeps keeps what it has counted. True: idle for long enough.
+// ODE's rule, with one sample: only bodies with joints (contacts are some) fall asleep. Who sleeps keeps what
+// it has counted. True: idle for long enough.
 bool tire(dBodyID b, double h, const Engine::Idle &idle, Engine::Idle &next) {
   next = idle;
   if (!dBodyIsEnabled(b)) return false;
   next = {};
-  if (!dBodyGetAutoDisableFlag(b) || dBodyGetNumJoints(b) == 0 || dBodyGetAutoDisableAverageSamplesCount(b) == 0) return false;
+  if (!dBodyGetAutoDisableFlag(b) || dBodyGetNumJoints(b) == 0 ||
+      dBodyGetAutoDisableAverageSamplesCount(b) == 0)
+    return false;
   if (norm(load(dBodyGetLinearVel(b))) > dBodyGetAutoDisableLinearThreshold(b)) return false;
   if (norm(load(dBodyGetAngularVel(b))) > dBodyGetAutoDisableAngularThreshold(b)) return false;
   next = {idle[0] + 1, idle[1] + h};
@@ -131,10 +160,19 @@ Inertia inertia_of(dBodyID body) {
 
 dfm_rigid_state Member::state() const {
   dfm_rigid_state s{};
-  const dReal *const x = dBodyGetPosition(body), *const v = dBodyGetLinearVel(body), *const w = dBodyGetAngularVel(body);
+  const dReal *const x = dBodyGetPosition(body);
+  const dReal *const v = dBodyGetLinearVel(body);
+  const dReal *const w = dBodyGetAngularVel(body);
   const Quat q = unit(from_ode(dBodyGetQuaternion(body)) * inertia.axes);
-  for (int k = 0; k < 3; ++k) s.position[k] = x[k], s.velocity[k] = v[k], s.spin[k] = w[k];
-  s.rotation[0] = q.x, s.rotation[1] = q.y, s.rotation[2] = q.z, s.rotation[3] = q.w;
+  for (int k = 0; k < 3; ++k) {
+    s.position[k] = x[k];
+    s.velocity[k] = v[k];
+    s.spin[k] = w[k];
+  }
+  s.rotation[0] = q.x;
+  s.rotation[1] = q.y;
+  s.rotation[2] = q.z;
+  s.rotation[3] = q.w;
   return s;
 }
 
@@ -154,13 +192,31 @@ Motion Member::answer(const Motion &p) const {
 void Engine::begin(const std::vector<dBodyID> &others, double time) {
   saved_.clear();
   auto add = [&](dBodyID b) {
-    saved_.push_back({b, load(dBodyGetForce(b)), load(dBodyGetTorque(b)), {}, {}, {}, {}, false, false, dBodyGetGyroscopicMode(b) != 0, inertia_of(b)});
+    saved_.push_back({b,
+                      load(dBodyGetForce(b)),
+                      load(dBodyGetTorque(b)),
+                      {},
+                      {},
+                      {},
+                      {},
+                      false,
+                      false,
+                      dBodyGetGyroscopicMode(b) != 0,
+                      inertia_of(b)});
   };
-  for (Member *m : members) m->saved = saved_.size(), add(m->body);
-  for (const dBodyID b : others) add(b), saved_.back().next_idle = idle(b);
+  for (Member *m : members) {
+    m->saved = saved_.size();
+    add(m->body);
+  }
+  for (const dBodyID b : others) {
+    add(b);
+    saved_.back().next_idle = idle(b);
+  }
   idle_.clear();
   find_ties();
-  begun_ = time, open_ = false, in_step = true;
+  begun_ = time;
+  open_ = false;
+  in_step = true;
 }
 
 Engine::Idle Engine::idle(dBodyID body) const {
@@ -169,27 +225,34 @@ Engine::Idle Engine::idle(dBodyID body) const {
 }
 
 void Engine::find_ties() {
-  ties_.clear(), number_.clear();
+  ties_.clear();
+  number_.clear();
   for (size_t i = 0; i < saved_.size(); ++i) number_[saved_[i].body] = i;
   for (size_t i = 0; i < saved_.size(); ++i)
     for (int k = 0; k < dBodyGetNumJoints(saved_[i].body); ++k) {
       const dJointID j = dBodyGetJoint(saved_[i].body, k);
       const dBodyID a = dJointGetBody(j, 0), b = dJointGetBody(j, 1);
-      if (a != saved_[i].body || !b || !dJointIsEnabled(j) || dBodyIsKinematic(a) || dBodyIsKinematic(b) || dJointGetType(j) == dJointTypeContact) continue;
+      if (a != saved_[i].body || !b || !dJointIsEnabled(j) || dBodyIsKinematic(a) || dBodyIsKinematic(b) ||
+          dJointGetType(j) == dJointTypeContact)
+        continue;
       ties_.push_back({j, i, number_.at(b), {}, nullptr});
     }
 }
 
 void Engine::end(double time) {
   if (open_ && time == t_) {
-    for (Saved &s : saved_) s.enabled = s.given, s.next_idle = s.idle;
+    for (Saved &s : saved_) {
+      s.enabled = s.given;
+      s.next_idle = s.idle;
+    }
     restore();
-    stepped_ = false;                      // what friction has seen of it does not count
+    stepped_ = false;  // what friction has seen of it does not count
   }
   if (time == begun_)
     for (const Saved &s : saved_) carry(s.body, s.force, s.torque);
   close();
-  // The world does not keep bodies without geoms: restore() and dfm_ode_restore() set their quaternions again.
+  // The world does not keep bodies without geoms: restore() and dfm_ode_restore() set their
+  // quaternions again.
   for (size_t i = members.size(); i < saved_.size(); ++i) {
     idle_[saved_[i].body] = saved_[i].next_idle;
     settle_rotation(saved_[i].body);
@@ -267,18 +330,21 @@ void Engine::fall_asleep(double h) {
   for (size_t i = 0; i < saved_.size(); ++i) {
     if (!due[i]) continue;
     dBodyDisable(saved_[i].body);
-    dBodySetLinearVel(saved_[i].body, 0, 0, 0), dBodySetAngularVel(saved_[i].body, 0, 0, 0);
+    dBodySetLinearVel(saved_[i].body, 0, 0, 0);
+    dBodySetAngularVel(saved_[i].body, 0, 0, 0);
   }
 }
 
 void Engine::open(const dfm_rigid_step &step) {
-  if (open_ && step.t == t_) {              // tried again, from the same states
+  if (open_ && step.t == t_) {  // tried again, from the same states
     if (stepped_) restore();
   } else {
     Timer timer(ode_seconds);
     for (Saved &s : saved_) {
-      s.position = load(dBodyGetPosition(s.body)), s.rotation = from_ode(dBodyGetQuaternion(s.body));
-      s.v = load(dBodyGetLinearVel(s.body)), s.w = load(dBodyGetAngularVel(s.body));
+      s.position = load(dBodyGetPosition(s.body));
+      s.rotation = from_ode(dBodyGetQuaternion(s.body));
+      s.v = load(dBodyGetLinearVel(s.body));
+      s.w = load(dBodyGetAngularVel(s.body));
       s.enabled = s.given = dBodyIsEnabled(s.body);
       s.idle = s.next_idle;
     }
@@ -287,12 +353,15 @@ void Engine::open(const dfm_rigid_step &step) {
     for (const dSpaceID space : spaces) dSpaceCollide(space, near_data, near_callback);
     pull_awake();
   }
-  open_ = true, stepped_ = dirty_ = again_ = false;
+  open_ = true;
+  stepped_ = dirty_ = again_ = false;
   rounds_ = 0;
-  t_ = step.t, h_ = step.h;
+  t_ = step.t;
+  h_ = step.h;
 }
 
-// ODE gets the world's state each time, so that it is a function of that to the last bit, also after a restore or where the guard left out a part of the way.
+// ODE gets the world's state each time, so that it is a function of that to the last bit, also after a
+// restore or where the guard left out a part of the way.
 void Engine::take(Member &m, const dfm_rigid_state &given, const double *extra) {
   Saved &s = saved_[m.saved];
   if (m.restored && s.enabled != (extra[12] == 0)) {
@@ -301,8 +370,10 @@ void Engine::take(Member &m, const dfm_rigid_state &given, const double *extra) 
   }
   m.restored = false;
   m.put(given);
-  s.position = load(dBodyGetPosition(m.body)), s.rotation = from_ode(dBodyGetQuaternion(m.body));
-  s.v = load(dBodyGetLinearVel(m.body)), s.w = load(dBodyGetAngularVel(m.body));
+  s.position = load(dBodyGetPosition(m.body));
+  s.rotation = from_ode(dBodyGetQuaternion(m.body));
+  s.v = load(dBodyGetLinearVel(m.body));
+  s.w = load(dBodyGetAngularVel(m.body));
 }
 
 void Engine::classify(Member &m, const dfm_rigid_step &step, const double *extra) {
@@ -314,10 +385,12 @@ void Engine::classify(Member &m, const dfm_rigid_step &step, const double *extra
   m.asleep = disabled && !m.wakes;
   m.kind = !moves ? Member::still : plain ? Member::free : Member::jointed;
   m.turns = m.kind == Member::free && dBodyGetGyroscopicMode(b) && !finite_turn(b);
-  if (m.kind == Member::free && !m.turns) m.kind = Member::jointed;   // ODE turns it: what it makes of it is in b
+  // ODE turns it: what it makes of it is in b
+  if (m.kind == Member::free && !m.turns) m.kind = Member::jointed;
   m.bias = {load(extra), load(extra + 3)};
   const bool was_asleep = extra[12] != 0;
-  const bool woken = was_asleep && !disabled && !m.pulled;   // by the caller; who is only pulled goes back to sleep at once when it idles
+  // by the caller; who is only pulled goes back to sleep at once when it idles
+  const bool woken = was_asleep && !disabled && !m.pulled;
   m.idle = woken ? Idle{} : Idle{extra[13], extra[14]};
   m.impulse = {};
   const Vec v = load(m.start.velocity), w = load(m.start.spin);
@@ -337,21 +410,30 @@ void Engine::classify(Member &m, const dfm_rigid_step &step, const double *extra
     m.drift = kept;
     return;
   }
-  const Motion carried = m.answer(kept);   // b is what was in balance with this
-  m.bias = {-1.0 * carried.v - (1 / step.h) * (m.plain.v - v), -1.0 * carried.w - (1 / step.h) * (m.plain.w - w)};
+  const Motion carried = m.answer(kept);  // b is what was in balance with this
+  m.bias = {-1.0 * carried.v - (1 / step.h) * (m.plain.v - v),
+            -1.0 * carried.w - (1 / step.h) * (m.plain.w - w)};
 }
 
 void Engine::predict(Member &m, const dfm_rigid_step &step, uint32_t number, double *velocity) {
   if (!open_ || step.t != t_ || step.h != h_ || (stepped_ && !again_)) open(step);
-  if (again_ && stepped_) restore(), stepped_ = false;
+  if (again_ && stepped_) {
+    restore();
+    stepped_ = false;
+  }
   const double *const extra = step.extra + size_t{Member::kExtra} * number;
-  if (!again_) m.wakes = false, take(m, step.state[number], extra);
+  if (!again_) {
+    m.wakes = false;
+    take(m, step.state[number], extra);
+  }
   if (!again_ || (m.wakes && m.asleep)) classify(m, step, extra);
   else if (m.kind == Member::jointed) m.bias = m.next_bias;
-  if (m.kind == Member::still) m.used = m.asleep ? Motion{} : Motion{load(m.start.velocity), load(m.start.spin)};
+  if (m.kind == Member::still)
+    m.used = m.asleep ? Motion{} : Motion{load(m.start.velocity), load(m.start.spin)};
   else if (m.kind == Member::free) m.used = m.plain;
   else m.used = {m.plain.v + step.h * m.bias.v, m.plain.w + step.h * m.bias.w};
-  store(velocity, m.used.v), store(velocity + 3, m.used.w);
+  store(velocity, m.used.v);
+  store(velocity + 3, m.used.w);
 }
 
 void Engine::respond(const Member &m, double matrix[36]) const {
@@ -359,11 +441,15 @@ void Engine::respond(const Member &m, double matrix[36]) const {
   if (m.kind == Member::still) return;
   for (int k = 0; k < 3; ++k) {
     matrix[7 * k] = 1 / m.inertia.mass;
-    const Vec column = in_axes(rotation_of(m.start), inverse(m.inertia.moments), {k == 0 ? 1.0 : 0, k == 1 ? 1.0 : 0, k == 2 ? 1.0 : 0});
-    matrix[6 * 3 + 3 + k] = column.x, matrix[6 * 4 + 3 + k] = column.y, matrix[6 * 5 + 3 + k] = column.z;
+    const Vec column = in_axes(rotation_of(m.start), inverse(m.inertia.moments),
+                               {k == 0 ? 1.0 : 0, k == 1 ? 1.0 : 0, k == 2 ? 1.0 : 0});
+    matrix[6 * 3 + 3 + k] = column.x;
+    matrix[6 * 4 + 3 + k] = column.y;
+    matrix[6 * 5 + 3 + k] = column.z;
   }
-  for (int r = 3; r < 6; ++r)              // symmetric to the last bit
-    for (int c = 3; c < r; ++c) matrix[6 * r + c] = matrix[6 * c + r] = 0.5 * (matrix[6 * r + c] + matrix[6 * c + r]);
+  for (int r = 3; r < 6; ++r)  // symmetric to the last bit
+    for (int c = 3; c < r; ++c)
+      matrix[6 * r + c] = matrix[6 * c + r] = 0.5 * (matrix[6 * r + c] + matrix[6 * c + r]);
 }
 
 void Engine::push(Member &m, const double *impulse) {
@@ -371,11 +457,15 @@ void Engine::push(Member &m, const double *impulse) {
   dirty_ = true;
 }
 
-// For the length of an ODE step, whichever way it ends: joints tell the engine what they do, and ODE keeps its gyroscopic terms out.
+// For the length of an ODE step, whichever way it ends: joints tell the engine what they do, and ODE keeps
+// its gyroscopic terms out.
 class Engine::Lent {
  public:
   explicit Lent(Engine &engine) : engine_(engine) {
-    for (Tie &t : engine.ties_) t.callers = dJointGetFeedback(t.joint), dJointSetFeedback(t.joint, &t.own);
+    for (Tie &t : engine.ties_) {
+      t.callers = dJointGetFeedback(t.joint);
+      dJointSetFeedback(t.joint, &t.own);
+    }
     for (const Saved &s : engine.saved_) dBodySetGyroscopicMode(s.body, 0);
   }
   ~Lent() {
@@ -400,12 +490,15 @@ void Engine::advance(double h) {
     if (m->wakes) dBodyEnable(m->body);
     if (m->kind == Member::still) continue;
     const Vec f = (1 / h) * m->impulse.v, t = (1 / h) * m->impulse.w;
-    dBodyAddForce(m->body, f.x, f.y, f.z), dBodyAddTorque(m->body, t.x, t.y, t.z);
+    dBodyAddForce(m->body, f.x, f.y, f.z);
+    dBodyAddTorque(m->body, t.x, t.y, t.z);
   }
   for (const Saved &s : saved_)
-    if (dBodyIsEnabled(s.body) && dBodyGetAutoDisableFlag(s.body)) dBodyEnable(s.body);   // its counters begin anew: tire() counts
+    // its counters begin anew: tire() counts
+    if (dBodyIsEnabled(s.body) && dBodyGetAutoDisableFlag(s.body)) dBodyEnable(s.body);
   const Lent lent(*this);
-  stepped_ = true, dirty_ = false;
+  stepped_ = true;
+  dirty_ = false;
   (quick ? dWorldQuickStep : dWorldStep)(world, h);
   ++steps;
   turn_jointed(h);
@@ -417,8 +510,10 @@ void Engine::turn_jointed(double h) {
   for (const Tie &t : ties_) {
     const Saved &a = saved_[t.a], &b = saved_[t.b];
     const dJointFeedback &f = t.own;
-    const Vec couple = cross(a.position, load(f.f1)) + load(f.t1) + cross(b.position, load(f.f2)) + load(f.t2);
-    turn_[t.a] = turn_[t.a] - 0.5 * h * couple, turn_[t.b] = turn_[t.b] - 0.5 * h * couple;
+    const Vec couple =
+        cross(a.position, load(f.f1)) + load(f.t1) + cross(b.position, load(f.f2)) + load(f.t2);
+    turn_[t.a] = turn_[t.a] - 0.5 * h * couple;
+    turn_[t.b] = turn_[t.b] - 0.5 * h * couple;
   }
   for (size_t i = 0; i < saved_.size(); ++i) {
     const Saved &s = saved_[i];
@@ -435,27 +530,32 @@ void Engine::turn_free(double h) {
     if (!m->turns || !dBodyIsEnabled(m->body)) continue;
     const Vec L = m->turn_momentum + m->impulse.w, inverse_moments = inverse(m->inertia.moments);
     if (dot(L, L) == 0) continue;
-    const Quat from = rotation_of(m->start), to = unit(turn_by(h * mean_spin(from, inverse_moments, L, h)) * from);
+    const Quat from = rotation_of(m->start);
+    const Quat to = unit(turn_by(h * mean_spin(from, inverse_moments, L, h)) * from);
     const Vec w = in_axes(to, inverse_moments, L);
     dQuaternion q;
     to_ode(unit(to * conjugate(m->inertia.axes)), q);
-    dBodySetQuaternion(m->body, q), dBodySetAngularVel(m->body, w.x, w.y, w.z);
+    dBodySetQuaternion(m->body, q);
+    dBodySetAngularVel(m->body, w.x, w.y, w.z);
   }
 }
 
-// What constraints added to a jointed body beside its own answer to contact; the share of contact's change that was not foreseen, by energy.
+// What constraints added to a jointed body beside its own answer to contact; the share of contact's change
+// that was not foreseen, by energy.
 double Engine::judge(Member &m, double h) {
   m.next_bias = m.kind == Member::still ? m.bias : Motion{};
   if (m.kind != Member::jointed || !dBodyIsEnabled(m.body)) return 0;
   const dfm_rigid_state end = m.state();
-  const Motion got{(1 / h) * (load(end.position) - load(m.start.position)), (1 / h) * turn_of(rotation_of(end) * conjugate(rotation_of(m.start)))};
+  const Motion got{(1 / h) * (load(end.position) - load(m.start.position)),
+                   (1 / h) * turn_of(rotation_of(end) * conjugate(rotation_of(m.start)))};
   const Motion own = m.answer(m.impulse);
   m.next_bias = {(1 / h) * (got.v - m.plain.v - own.v), (1 / h) * (got.w - m.plain.w - own.w)};
   const double contact = dot(m.impulse.v, own.v) + dot(m.impulse.w, own.w);
   if (!(contact > 0)) return 0;
   const double scale = std::max(contact, m.inertia.mass * (kSlow * kSlow));
   const Vec dv = got.v - m.used.v - own.v, dw = got.w - m.used.w - own.w;
-  const double missing = m.inertia.mass * dot(dv, dv) + dot(dw, in_axes(rotation_of(m.start), m.inertia.moments, dw));
+  const double missing =
+      m.inertia.mass * dot(dv, dv) + dot(dw, in_axes(rotation_of(m.start), m.inertia.moments, dw));
   return std::sqrt(missing / scale);
 }
 
@@ -467,7 +567,8 @@ bool Engine::wake_sleepers(double h) {
     const double left = std::max(0.0, 1 - h / kForget);
     m->drift.v = left * m->drift.v + (m->plain.v - load(m->start.velocity)) + push.v + h * m->bias.v;
     m->drift.w = left * m->drift.w + (m->plain.w - load(m->start.spin)) + push.w + h * m->bias.w;
-    m->wakes = norm(m->drift.v) > dBodyGetAutoDisableLinearThreshold(m->body) || norm(m->drift.w) > dBodyGetAutoDisableAngularThreshold(m->body);
+    m->wakes = norm(m->drift.v) > dBodyGetAutoDisableLinearThreshold(m->body) ||
+               norm(m->drift.w) > dBodyGetAutoDisableAngularThreshold(m->body);
     woken |= m->wakes;
   }
   return woken;
@@ -481,16 +582,26 @@ bool Engine::commit(Member &m, uint32_t number, dfm_rigid_state *state, double *
     residual = 0;
     for (Member *each : members) residual = std::max(residual, judge(*each, h));
     again_ = again = woken || (residual > kResidual && rounds_ < kMostCorrections);
-    if (again) ++corrections, ++rounds_;
-    else residual_max = std::max(residual_max, residual);
+    if (again) {
+      ++corrections;
+      ++rounds_;
+    } else {
+      residual_max = std::max(residual_max, residual);
+    }
     if (!again) fall_asleep(h);
   }
   state[number] = m.state();
   double *const keep = extra + size_t{Member::kExtra} * number;
   const bool sleeps = !dBodyIsEnabled(m.body);
-  const Motion load_or_drift = m.asleep && sleeps ? m.drift : Motion{(1 / h) * m.impulse.v, (1 / h) * m.impulse.w};
-  store(keep, m.next_bias.v), store(keep + 3, m.next_bias.w), store(keep + 6, load_or_drift.v), store(keep + 9, load_or_drift.w);
-  keep[12] = !sleeps ? 0 : m.asleep ? kDrifts : kFellAsleep, keep[13] = m.next_idle[0], keep[14] = m.next_idle[1];
+  const Motion load_or_drift =
+      m.asleep && sleeps ? m.drift : Motion{(1 / h) * m.impulse.v, (1 / h) * m.impulse.w};
+  store(keep, m.next_bias.v);
+  store(keep + 3, m.next_bias.w);
+  store(keep + 6, load_or_drift.v);
+  store(keep + 9, load_or_drift.w);
+  keep[12] = !sleeps ? 0 : m.asleep ? kDrifts : kFellAsleep;
+  keep[13] = m.next_idle[0];
+  keep[14] = m.next_idle[1];
   return again;
 }
 

@@ -10,7 +10,8 @@
 namespace dfm_ode_detail {
 namespace {
 
-constexpr size_t kMotor = 3;              // values of extra per joint behind those of the bodies: speed, limit, effort of the last sub-step
+// values of extra per joint behind those of the bodies: speed, limit, effort of the last sub-step
+constexpr size_t kMotor = 3;
 
 class OwnWorld : public Host {
  public:
@@ -21,34 +22,38 @@ class OwnWorld : public Host {
   uint32_t extra() const { return static_cast<uint32_t>(first_joint() + kMotor * joints_.size()); }
 
   dfm_status predict(const dfm_rigid_step &step, double *velocity) override;
-  void respond(const dfm_rigid_step &step, uint32_t group, double *matrix) override { engine_.respond(members_[moving_[group]], matrix); }
+  void respond(const dfm_rigid_step &step, uint32_t group, double *matrix) override {
+    engine_.respond(members_[moving_[group]], matrix);
+  }
   void push(const dfm_rigid_step &step, const double *impulse) override;
   bool commit(const dfm_rigid_step &step, dfm_rigid_state *state, double *extra) override;
   dfm_status set_motor(uint32_t joint, double velocity, double max, double *extra) override;
-  dfm_status joint(const dfm_rigid_state *state, const double *extra, uint32_t joint, double *position, double *rate, double *effort) override;
+  dfm_status joint(const dfm_rigid_state *state, const double *extra, uint32_t joint, double *position,
+                   double *rate, double *effort) override;
 
  private:
-  // ODE's first body is one that moves: `body`, or `with` where `body` is fixed. (Handed nothing as its first one ODE swaps the two by itself, and turns
-  // round what it says of the joint, but not its motor.)
+  // ODE's first body is one that moves: `body`, or `with` where `body` is fixed. (Handed nothing as its first
+  // one ODE swaps the two by itself, and turns round what it says of the joint, but not its motor.)
   struct Joint {
-    dJointID id;                          // null: both stand still
-    uint32_t type, body, with;            // numbers in the set; with: DFM_RIGID_WORLD for the world
-    bool swapped;                         // ODE's first body is `with`
-    Vec anchor_body, anchor_with;         // in the frames of the two
-    Vec axis_body, axis_with;             // unit, likewise
-    Quat turn;                            // from the frame of `with` to that of `body`, as created
-    dJointFeedback feedback;              // on ODE's first body, about its center of mass
+    dJointID id;                   // null: both stand still
+    uint32_t type, body, with;     // numbers in the set; with: DFM_RIGID_WORLD for the world
+    bool swapped;                  // ODE's first body is `with`
+    Vec anchor_body, anchor_with;  // in the frames of the two
+    Vec axis_body, axis_with;      // unit, likewise
+    Quat turn;                     // from the frame of `with` to that of `body`, as created
+    dJointFeedback feedback;       // on ODE's first body, about its center of mass
     double sign() const { return swapped ? -1 : 1; }
   };
   Engine engine_;
   dSpaceID space_ = nullptr;
-  std::vector<Member> members_;           // by number in the set; body null: fixed
-  std::vector<uint32_t> moving_;          // group -> number
+  std::vector<Member> members_;   // by number in the set; body null: fixed
+  std::vector<uint32_t> moving_;  // group -> number
   std::vector<Joint> joints_;
-  std::vector<dfm_rigid_state> given_;    // as ODE's bodies stand
+  std::vector<dfm_rigid_state> given_;  // as ODE's bodies stand
   RigidFriction near_;
 
-  std::string broken_;                    // what ODE said when it stopped in the middle of a call; its world is not touched after that
+  // what ODE said when it stopped in the middle of a call; its world is not touched after that
+  std::string broken_;
 
   // Runs what calls ODE; an assertion of ODE's ends in an error.
   template <class F>
@@ -75,8 +80,10 @@ Motion motion_of(uint32_t number, const dfm_rigid_state *state) {
 
 dfm_rigid_state state_of(const dfm_rigid_def &def) {
   dfm_rigid_state s{};
-  std::memcpy(s.position, def.pose.position, sizeof s.position), std::memcpy(s.rotation, def.pose.rotation, sizeof s.rotation);
-  std::memcpy(s.velocity, def.velocity, sizeof s.velocity), std::memcpy(s.spin, def.spin, sizeof s.spin);
+  std::memcpy(s.position, def.pose.position, sizeof s.position);
+  std::memcpy(s.rotation, def.pose.rotation, sizeof s.rotation);
+  std::memcpy(s.velocity, def.velocity, sizeof s.velocity);
+  std::memcpy(s.spin, def.spin, sizeof s.spin);
   return s;
 }
 
@@ -91,9 +98,15 @@ void OwnWorld::add_body(const dfm_rigid_def &def, uint32_t number) {
   dQuaternion q;
   to_ode(unit({def.pose.rotation[0], def.pose.rotation[1], def.pose.rotation[2], def.pose.rotation[3]}), q);
   const double *const x = def.pose.position;
-  if (geom) dGeomSetCategoryBits(geom, def.category), dGeomSetCollideBits(geom, def.collides_with);
+  if (geom) {
+    dGeomSetCategoryBits(geom, def.category);
+    dGeomSetCollideBits(geom, def.collides_with);
+  }
   if (def.fixed) {
-    if (geom) dGeomSetPosition(geom, x[0], x[1], x[2]), dGeomSetQuaternion(geom, q);
+    if (geom) {
+      dGeomSetPosition(geom, x[0], x[1], x[2]);
+      dGeomSetQuaternion(geom, q);
+    }
     return;
   }
   m.body = dBodyCreate(engine_.world);
@@ -108,26 +121,43 @@ void OwnWorld::add_body(const dfm_rigid_def &def, uint32_t number) {
 
 void OwnWorld::add_joint(const dfm_joint_def &def) {
   const dWorldID w = engine_.world;
-  dBodyID first = members_[def.body].body, second = def.with == DFM_RIGID_WORLD ? nullptr : members_[def.with].body;
+  dBodyID first = members_[def.body].body;
+  dBodyID second = def.with == DFM_RIGID_WORLD ? nullptr : members_[def.with].body;
   Joint &joint = joints_.emplace_back();
   joint = {nullptr, def.type, def.body, def.with, !first, {}, {}, {}, {}, {}, {}};
   const double length = norm(load(def.axis));
   const Vec anchor = load(def.anchor), axis = length > 0 ? (1 / length) * load(def.axis) : Vec{0, 0, 1};
   const Pose body = pose_of(def.body, given_.data()), with = pose_of(def.with, given_.data());
-  joint.anchor_body = rotate(conjugate(body.rotation), anchor - body.position), joint.axis_body = rotate(conjugate(body.rotation), axis);
-  joint.anchor_with = rotate(conjugate(with.rotation), anchor - with.position), joint.axis_with = rotate(conjugate(with.rotation), axis);
+  joint.anchor_body = rotate(conjugate(body.rotation), anchor - body.position);
+  joint.axis_body = rotate(conjugate(body.rotation), axis);
+  joint.anchor_with = rotate(conjugate(with.rotation), anchor - with.position);
+  joint.axis_with = rotate(conjugate(with.rotation), axis);
   joint.turn = conjugate(with.rotation) * body.rotation;
   if (!first) std::swap(first, second);
   if (!first) return;
   dJointID &j = joint.id;
   switch (def.type) {
     case DFM_JOINT_HINGE:
-      j = dJointCreateHinge(w, nullptr), dJointAttach(j, first, second);
-      dJointSetHingeAnchor(j, anchor.x, anchor.y, anchor.z), dJointSetHingeAxis(j, axis.x, axis.y, axis.z);
+      j = dJointCreateHinge(w, nullptr);
+      dJointAttach(j, first, second);
+      dJointSetHingeAnchor(j, anchor.x, anchor.y, anchor.z);
+      dJointSetHingeAxis(j, axis.x, axis.y, axis.z);
       break;
-    case DFM_JOINT_SLIDER: j = dJointCreateSlider(w, nullptr), dJointAttach(j, first, second), dJointSetSliderAxis(j, axis.x, axis.y, axis.z); break;
-    case DFM_JOINT_BALL: j = dJointCreateBall(w, nullptr), dJointAttach(j, first, second), dJointSetBallAnchor(j, anchor.x, anchor.y, anchor.z); break;
-    default: j = dJointCreateFixed(w, nullptr), dJointAttach(j, first, second), dJointSetFixed(j); break;
+    case DFM_JOINT_SLIDER:
+      j = dJointCreateSlider(w, nullptr);
+      dJointAttach(j, first, second);
+      dJointSetSliderAxis(j, axis.x, axis.y, axis.z);
+      break;
+    case DFM_JOINT_BALL:
+      j = dJointCreateBall(w, nullptr);
+      dJointAttach(j, first, second);
+      dJointSetBallAnchor(j, anchor.x, anchor.y, anchor.z);
+      break;
+    default:
+      j = dJointCreateFixed(w, nullptr);
+      dJointAttach(j, first, second);
+      dJointSetFixed(j);
+      break;
   }
   dJointSetFeedback(j, &joint.feedback);
 }
@@ -142,21 +172,32 @@ void OwnWorld::call(F &&f) {
       broken_ = assertion.message.empty() ? "no reason given" : assertion.message;
     }
   }
-  throw Refused{failed(DFM_E_DIVERGED, "host \"ode\": ODE gave up with \"%s\"; rigid bodies, joints or forces are beyond what it can compute: look for huge "
-                                       "positions, speeds, spins or gravity, and for degenerate shapes and inertias", broken_.c_str())};
+  throw Refused{failed(
+      DFM_E_DIVERGED,
+      "host \"ode\": ODE gave up with \"%s\"; rigid bodies, joints or forces are beyond what it can compute: "
+      "look for huge positions, speeds, spins or gravity, and for degenerate shapes and inertias",
+      broken_.c_str())};
 }
 
-// What ODE can be given: where a double still resolves a contact (1e-7 m at the bound), and far from where its squares overflow.
-constexpr double kReach = 1e9, kFast = 1e9;   // m; m/s and rad/s
+// What ODE can be given: where a double still resolves a contact (1e-7 m at the bound), and far from where
+// its squares overflow.
+constexpr double kReach = 1e9, kFast = 1e9;  // m; m/s and rad/s
 
 void check(const dfm_rigid_state &s, uint32_t number, const char *when) {
   const Quat q{s.rotation[0], s.rotation[1], s.rotation[2], s.rotation[3]};
   const double turn = q.x * q.x + q.y * q.y + q.z * q.z + q.w * q.w;
-  const auto within = [](const double *x, double most) { return std::fabs(x[0]) <= most && std::fabs(x[1]) <= most && std::fabs(x[2]) <= most; };
-  if (within(s.position, kReach) && within(s.velocity, kFast) && within(s.spin, kFast) && turn > 0.5 && turn < 2) return;
-  throw Refused{failed(DFM_E_DIVERGED, "host \"ode\": rigid body %u (counted from 0) is %s at (%g, %g, %g) m with (%g, %g, %g) m/s and (%g, %g, %g) rad/s; ODE is given "
-                                       "bodies within %g m, %g m/s and %g rad/s, turned by unit quaternions", number, when, s.position[0], s.position[1], s.position[2],
-                       s.velocity[0], s.velocity[1], s.velocity[2], s.spin[0], s.spin[1], s.spin[2], kReach, kFast, kFast)};
+  const auto within = [](const double *x, double most) {
+    return std::fabs(x[0]) <= most && std::fabs(x[1]) <= most && std::fabs(x[2]) <= most;
+  };
+  if (within(s.position, kReach) && within(s.velocity, kFast) && within(s.spin, kFast) && turn > 0.5 &&
+      turn < 2)
+    return;
+  throw Refused{failed(
+      DFM_E_DIVERGED,
+      "host \"ode\": rigid body %u (counted from 0) is %s at (%g, %g, %g) m with (%g, %g, %g) m/s and (%g, "
+      "%g, %g) rad/s; ODE is given bodies within %g m, %g m/s and %g rad/s, turned by unit quaternions",
+      number, when, s.position[0], s.position[1], s.position[2], s.velocity[0], s.velocity[1], s.velocity[2],
+      s.spin[0], s.spin[1], s.spin[2], kReach, kFast, kFast)};
 }
 
 OwnWorld::OwnWorld(const dfm_rigid_set_def &set, uint32_t *group) {
@@ -169,10 +210,13 @@ void OwnWorld::build(const dfm_rigid_set_def &set, uint32_t *group) {
   space_ = dHashSpaceCreate(nullptr);
   engine_.spaces = {space_};
   engine_.contacts = dJointGroupCreate(0);
-  near_.world = engine_.world, near_.group = engine_.contacts;
+  near_.world = engine_.world;
+  near_.group = engine_.contacts;
   engine_.friction = &near_;
-  engine_.near_callback = near_callback, engine_.near_data = &near_;
-  members_.resize(set.nbody), given_.resize(set.nbody);
+  engine_.near_callback = near_callback;
+  engine_.near_data = &near_;
+  members_.resize(set.nbody);
+  given_.resize(set.nbody);
   for (uint32_t i = 0; i < set.nbody; ++i) {
     const dfm_rigid_def &def = *dfm_rigid_set_body(&set, i);
     given_[i] = state_of(def);
@@ -181,13 +225,14 @@ void OwnWorld::build(const dfm_rigid_set_def &set, uint32_t *group) {
     group[i] = members_[i].body ? static_cast<uint32_t>(moving_.size()) : DFM_RIGID_STILL;
     if (members_[i].body) moving_.push_back(i);
   }
-  joints_.reserve(set.njoint);            // ODE keeps the address of each feedback
+  joints_.reserve(set.njoint);  // ODE keeps the address of each feedback
   for (uint32_t k = 0; k < set.njoint; ++k) add_joint(*dfm_rigid_set_joint(&set, k));
   engine_.begin({});
 }
 
 OwnWorld::~OwnWorld() {
-  if (!broken_.empty()) return;           // ODE left its world locked and half stepped: destroying it would end the process
+  // ODE left its world locked and half stepped: destroying it would end the process
+  if (!broken_.empty()) return;
   engine_.end();
   dJointGroupDestroy(engine_.contacts);
   dSpaceDestroy(space_);
@@ -197,16 +242,23 @@ OwnWorld::~OwnWorld() {
 void OwnWorld::drive(const Joint &j, const double *extra) {
   if (!j.id) return;
   const double velocity = j.sign() * extra[0];
-  if (j.type == DFM_JOINT_HINGE) dJointSetHingeParam(j.id, dParamVel, velocity), dJointSetHingeParam(j.id, dParamFMax, extra[1]);
-  if (j.type == DFM_JOINT_SLIDER) dJointSetSliderParam(j.id, dParamVel, velocity), dJointSetSliderParam(j.id, dParamFMax, extra[1]);
+  if (j.type == DFM_JOINT_HINGE) {
+    dJointSetHingeParam(j.id, dParamVel, velocity);
+    dJointSetHingeParam(j.id, dParamFMax, extra[1]);
+  }
+  if (j.type == DFM_JOINT_SLIDER) {
+    dJointSetSliderParam(j.id, dParamVel, velocity);
+    dJointSetSliderParam(j.id, dParamFMax, extra[1]);
+  }
 }
 
-// What the joint did along its own axis in the sub-step that began at `state` is the motor's doing: alone it is free there. A hinge's is the moment about
-// its anchor, where what the hinge holds with has none.
+// What the joint did along its own axis in the sub-step that began at `state` is the motor's doing: alone it
+// is free there. A hinge's is the moment about its anchor, where what the hinge holds with has none.
 double OwnWorld::effort(const Joint &j, const dfm_rigid_state *state) {
   if (!j.id) return 0;
   const Quat q = pose_of(j.swapped ? j.with : j.body, state).rotation;
-  const Vec axis = rotate(q, j.swapped ? j.axis_with : j.axis_body), arm = rotate(q, j.swapped ? j.anchor_with : j.anchor_body);
+  const Vec axis = rotate(q, j.swapped ? j.axis_with : j.axis_body);
+  const Vec arm = rotate(q, j.swapped ? j.anchor_with : j.anchor_body);
   const Vec force = load(j.feedback.f1);
   return j.sign() * dot(axis, j.type == DFM_JOINT_HINGE ? load(j.feedback.t1) - cross(arm, force) : force);
 }
@@ -215,7 +267,10 @@ dfm_status OwnWorld::predict(const dfm_rigid_step &step, double *velocity) {
   for (const uint32_t i : moving_) check(step.state[i], i, "now");
   for (int k = 0; k < 3; ++k)
     if (!(std::fabs(step.gravity[k] * step.h) <= kFast))
-      throw Refused{failed(DFM_E_DIVERGED, "host \"ode\": gravity of %g m/s2 changes speeds by more than %g m/s in a sub-step of %g s", step.gravity[k], kFast, step.h)};
+      throw Refused{
+          failed(DFM_E_DIVERGED,
+                 "host \"ode\": gravity of %g m/s2 changes speeds by more than %g m/s in a sub-step of %g s",
+                 step.gravity[k], kFast, step.h)};
   call([&] { predict_all(step, velocity); });
   return DFM_OK;
 }
@@ -226,7 +281,10 @@ void OwnWorld::predict_all(const dfm_rigid_step &step, double *velocity) {
   for (const uint32_t i : moving_)
     if (std::memcmp(&given_[i], &step.state[i], sizeof given_[i]) != 0) engine_.reopen();
   if (!engine_.is_open())
-    for (const uint32_t i : moving_) members_[i].put(step.state[i]), given_[i] = step.state[i];
+    for (const uint32_t i : moving_) {
+      members_[i].put(step.state[i]);
+      given_[i] = step.state[i];
+    }
   for (const uint32_t i : moving_) engine_.predict(members_[i], step, i, velocity + 6 * size_t{i});
 }
 
@@ -242,8 +300,10 @@ bool OwnWorld::commit(const dfm_rigid_step &step, dfm_rigid_state *state, double
     for (const uint32_t i : moving_) again |= engine_.commit(members_[i], i, state, extra, step.h);
   });
   for (const uint32_t i : moving_) check(state[i], i, "after the step");
-  for (size_t k = 0; k < joints_.size(); ++k) extra[first_joint() + kMotor * k + 2] = effort(joints_[k], step.state);
-  // Asked for another round, the engine goes back by itself; the world then gives the same start state as before.
+  for (size_t k = 0; k < joints_.size(); ++k)
+    extra[first_joint() + kMotor * k + 2] = effort(joints_[k], step.state);
+  // Asked for another round, the engine goes back by itself; the world then gives the same start
+  // state as before.
   for (const uint32_t i : moving_)
     if (!again) given_[i] = state[i];
   return again;
@@ -252,19 +312,22 @@ bool OwnWorld::commit(const dfm_rigid_step &step, dfm_rigid_state *state, double
 dfm_status OwnWorld::set_motor(uint32_t joint, double velocity, double max, double *extra) {
   if (joint >= joints_.size() || joints_[joint].type > DFM_JOINT_SLIDER) return DFM_E_ARG;
   double *const motor = extra + first_joint() + kMotor * joint;
-  motor[0] = velocity, motor[1] = max;
+  motor[0] = velocity;
+  motor[1] = max;
   return DFM_OK;
 }
 
 // From what the world has, not from ODE's joint, which after a restore is still where it was.
-dfm_status OwnWorld::joint(const dfm_rigid_state *state, const double *extra, uint32_t joint, double *position, double *rate, double *effort) {
+dfm_status OwnWorld::joint(const dfm_rigid_state *state, const double *extra, uint32_t joint,
+                           double *position, double *rate, double *effort) {
   if (joint >= joints_.size() || joints_[joint].type > DFM_JOINT_SLIDER) return DFM_E_ARG;
   const Joint &j = joints_[joint];
   const Pose a = pose_of(j.body, state), b = pose_of(j.with, state);
   const Motion of_a = motion_of(j.body, state), of_b = motion_of(j.with, state);
   const Vec axis = rotate(b.rotation, j.axis_with);
   if (j.type == DFM_JOINT_HINGE) {
-    *position = dot(turn_of(a.rotation * conjugate(b.rotation * j.turn)), axis), *rate = dot(of_a.w - of_b.w, axis);
+    *position = dot(turn_of(a.rotation * conjugate(b.rotation * j.turn)), axis);
+    *rate = dot(of_a.w - of_b.w, axis);
   } else {
     const Vec arm = rotate(a.rotation, j.anchor_body), place = a.position + arm;
     *position = dot(place - b.position - rotate(b.rotation, j.anchor_with), axis);
@@ -278,7 +341,8 @@ dfm_status OwnWorld::joint(const dfm_rigid_state *state, const double *extra, ui
 
 dfm_status create_own_world(const dfm_rigid_set_def &set, void **self, uint32_t *group, uint32_t *nextra) {
   auto *const own = new OwnWorld(set, group);
-  *self = static_cast<Host *>(own), *nextra = own->extra();
+  *self = static_cast<Host *>(own);
+  *nextra = own->extra();
   return DFM_OK;
 }
 

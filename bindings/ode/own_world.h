@@ -1,4 +1,5 @@
-// The host "ode" for a set that brings nothing but its defs (scenes): a dWorldID of its own with these bodies and joints.
+// The host "ode" for a set that brings nothing but its defs (scenes): a dWorldID of its own with these
+// bodies and joints.
 #pragma once
 #include "host.h"
 

@@ -1,6 +1,7 @@
-// Spheres, boxes, capsules and planes are the library's own. Cylinders have flat ends and a rim that the library's primitives have not: they become
-// closed meshes of 64 sides, as wide as to hold the cylinder's volume, so that the side is off by 0.08 % of the radius at most. Trimeshes are read once,
-// triangle by triangle, when they come in; ODE has no getter for the arrays of convexes and heightfields.
+// Spheres, boxes, capsules and planes are the library's own. Cylinders have flat ends and a rim that the
+// library's primitives have not: they become closed meshes of 64 sides, as wide as to hold the cylinder's
+// volume, so that the side is off by 0.08 % of the radius at most. Trimeshes are read once, triangle by
+// triangle, when they come in; ODE has no getter for the arrays of convexes and heightfields.
 #include "shapes.h"
 
 #include <algorithm>
@@ -21,7 +22,9 @@ dGeomID inner_of(dGeomID transform) { return dGeomTransformGetGeom(transform); }
 
 dGeomID shape_of(dGeomID geom) { return dGeomGetClass(geom) == dGeomTransformClass ? inner_of(geom) : geom; }
 
-Pose ode_pose(const dReal *position, const dReal *quaternion) { return {load(position), from_ode(quaternion)}; }
+Pose ode_pose(const dReal *position, const dReal *quaternion) {
+  return {load(position), from_ode(quaternion)};
+}
 Pose ode_pose(dGeomID geom) {
   dQuaternion q;
   dGeomGetQuaternion(geom, q);
@@ -39,7 +42,10 @@ void sizes(dGeomID g, Signature &s) {
     }
     case dCapsuleClass: dGeomCapsuleGetParams(g, &s.size[0], &s.size[1]); break;
     case dCylinderClass: dGeomCylinderGetParams(g, &s.size[0], &s.size[1]); break;
-    case dTriMeshClass: s.mesh = dGeomTriMeshGetData(g), s.triangles = dGeomTriMeshGetTriangleCount(g); break;
+    case dTriMeshClass:
+      s.mesh = dGeomTriMeshGetData(g);
+      s.triangles = dGeomTriMeshGetTriangleCount(g);
+      break;
     default: break;
   }
 }
@@ -55,7 +61,8 @@ Triangles read_trimesh(dGeomID g) {
     dGeomTriMeshGetTriangle(g, i, &v[0], &v[1], &v[2]);
     uint32_t c[3];
     for (int k = 0; k < 3; ++k) {
-      const auto [at, fresh] = known.try_emplace({v[k][0], v[k][1], v[k][2]}, static_cast<uint32_t>(known.size()));
+      const auto [at, fresh] =
+          known.try_emplace({v[k][0], v[k][1], v[k][2]}, static_cast<uint32_t>(known.size()));
       c[k] = at->second;
       if (!fresh) continue;
       const Vec p = back.position + rotate(back.rotation, load(v[k]));
@@ -71,7 +78,8 @@ Triangles cylinder(double radius, double length) {
   Triangles t;
   const double turn = 2 * kPi / kSides, r = radius * std::sqrt(turn / std::sin(turn));
   for (uint32_t i = 0; i < kSides; ++i)
-    for (const double z : {-0.5 * length, 0.5 * length}) t.points.insert(t.points.end(), {r * std::cos(turn * i), r * std::sin(turn * i), z});
+    for (const double z : {-0.5 * length, 0.5 * length})
+      t.points.insert(t.points.end(), {r * std::cos(turn * i), r * std::sin(turn * i), z});
   t.points.insert(t.points.end(), {0, 0, -0.5 * length, 0, 0, 0.5 * length});
   for (uint32_t i = 0; i < kSides; ++i) {
     const uint32_t low = 2 * i, high = low + 1, next_low = 2 * ((i + 1) % kSides), next_high = next_low + 1;
@@ -86,9 +94,10 @@ Triangles cylinder(double radius, double length) {
 bool Signature::operator==(const Signature &o) const {
   const Vec p = local.position - o.local.position;
   const Quat q = local.rotation, r = o.local.rotation;
-  return geom_class == o.geom_class && inner_class == o.inner_class && std::equal(size, size + 3, o.size) && mesh == o.mesh && triangles == o.triangles &&
-         category == o.category && collides == o.collides && enabled == o.enabled && body == o.body && dot(p, p) == 0 && q.x == r.x && q.y == r.y &&
-         q.z == r.z && q.w == r.w;
+  return geom_class == o.geom_class && inner_class == o.inner_class && std::equal(size, size + 3, o.size) &&
+         mesh == o.mesh && triangles == o.triangles && category == o.category && collides == o.collides &&
+         enabled == o.enabled && body == o.body && dot(p, p) == 0 && q.x == r.x && q.y == r.y && q.z == r.z &&
+         q.w == r.w;
 }
 
 Signature signature_of(dGeomID geom) {
@@ -97,7 +106,8 @@ Signature signature_of(dGeomID geom) {
   const dGeomID shape = shape_of(geom);
   s.inner_class = shape ? dGeomGetClass(shape) : -1;
   if (shape) sizes(shape, s);
-  s.category = static_cast<uint32_t>(dGeomGetCategoryBits(geom)), s.collides = static_cast<uint32_t>(dGeomGetCollideBits(geom));
+  s.category = static_cast<uint32_t>(dGeomGetCategoryBits(geom));
+  s.collides = static_cast<uint32_t>(dGeomGetCollideBits(geom));
   s.enabled = dGeomIsEnabled(geom);
   s.body = dGeomGetBody(geom);
   if (s.body) {
@@ -126,9 +136,16 @@ Pose pose_of(dGeomID geom) {
 Part part_of(const Signature &s) {
   if (!s.enabled) return Part::none;
   switch (s.inner_class) {
-    case dSphereClass: case dBoxClass: case dCapsuleClass: case dCylinderClass: case dPlaneClass: case dTriMeshClass: return Part::shape;
-    case dConvexClass: case dHeightfieldClass: return Part::needs_arrays;
-    case dRayClass: case -1: return Part::none;   // -1: a transform that holds nothing yet
+    case dSphereClass:
+    case dBoxClass:
+    case dCapsuleClass:
+    case dCylinderClass:
+    case dPlaneClass:
+    case dTriMeshClass: return Part::shape;
+    case dConvexClass:
+    case dHeightfieldClass: return Part::needs_arrays;
+    case dRayClass:
+    case -1: return Part::none;  // -1: a transform that holds nothing yet
     default: return Part::unknown;
   }
 }
@@ -141,36 +158,56 @@ const char *class_name(int c) {
   }
 }
 
-void describe(dGeomID geom, const Signature &s, const Triangles *own, dfm_obstacle_def &def, Triangles &made) {
+void describe(dGeomID geom, const Signature &s, const Triangles *own, dfm_obstacle_def &def,
+              Triangles &made) {
   const auto mesh = [&](const Triangles &t) {
     def.shape = DFM_SHAPE_MESH;
-    def.npoint = static_cast<uint32_t>(t.points.size() / 3), def.ntriangle = static_cast<uint32_t>(t.corners.size() / 3);
-    def.points = t.points.data(), def.triangles = t.corners.data();
+    def.npoint = static_cast<uint32_t>(t.points.size() / 3);
+    def.ntriangle = static_cast<uint32_t>(t.corners.size() / 3);
+    def.points = t.points.data();
+    def.triangles = t.corners.data();
   };
   switch (s.inner_class) {
-    case dSphereClass: def.shape = DFM_SHAPE_SPHERE, def.radius = s.size[0]; break;
+    case dSphereClass:
+      def.shape = DFM_SHAPE_SPHERE;
+      def.radius = s.size[0];
+      break;
     case dBoxClass:
       def.shape = DFM_SHAPE_BOX;
       for (int k = 0; k < 3; ++k) def.half_size[k] = 0.5 * s.size[k];
       break;
-    case dCapsuleClass: def.shape = DFM_SHAPE_CAPSULE, def.radius = s.size[0], def.half_length = 0.5 * s.size[1]; break;
+    case dCapsuleClass:
+      def.shape = DFM_SHAPE_CAPSULE;
+      def.radius = s.size[0];
+      def.half_length = 0.5 * s.size[1];
+      break;
     case dPlaneClass: def.shape = DFM_SHAPE_PLANE; break;
-    case dCylinderClass: made = cylinder(s.size[0], s.size[1]), mesh(made); break;
-    case dTriMeshClass: made = read_trimesh(shape_of(geom)), mesh(made); break;
+    case dCylinderClass:
+      made = cylinder(s.size[0], s.size[1]);
+      mesh(made);
+      break;
+    case dTriMeshClass:
+      made = read_trimesh(shape_of(geom));
+      mesh(made);
+      break;
     default: mesh(*own); break;
   }
 }
 
-Triangles convex_triangles(uint32_t npoint, const double *points, uint32_t npolygon, const uint32_t *polygons, std::string &wrong) {
+Triangles convex_triangles(uint32_t npoint, const double *points, uint32_t npolygon, const uint32_t *polygons,
+                           std::string &wrong) {
   Triangles t;
   t.points.assign(points, points + size_t{3} * npoint);
   for (uint32_t f = 0; f < npolygon; ++f) {
     const uint32_t n = *polygons++;
     if (n < 3) wrong = "polygon " + std::to_string(f) + " has " + std::to_string(n) + " corners";
     for (uint32_t k = 0; k < n; ++k)
-      if (polygons[k] >= npoint) wrong = "polygon " + std::to_string(f) + " names point " + std::to_string(polygons[k]) + " of " + std::to_string(npoint);
+      if (polygons[k] >= npoint)
+        wrong = "polygon " + std::to_string(f) + " names point " + std::to_string(polygons[k]) + " of " +
+                std::to_string(npoint);
     if (!wrong.empty()) break;
-    for (uint32_t k = 2; k < n; ++k) t.corners.insert(t.corners.end(), {polygons[0], polygons[k - 1], polygons[k]});
+    for (uint32_t k = 2; k < n; ++k)
+      t.corners.insert(t.corners.end(), {polygons[0], polygons[k - 1], polygons[k]});
     polygons += n;
   }
   return t;
@@ -180,11 +217,12 @@ Triangles height_triangles(double width, double depth, uint32_t nx, uint32_t nz,
   Triangles t;
   for (uint32_t z = 0; z < nz; ++z)
     for (uint32_t x = 0; x < nx; ++x)
-      t.points.insert(t.points.end(), {width * (double(x) / (nx - 1) - 0.5), heights[size_t{z} * nx + x], depth * (double(z) / (nz - 1) - 0.5)});
+      t.points.insert(t.points.end(), {width * (double(x) / (nx - 1) - 0.5), heights[size_t{z} * nx + x],
+                                       depth * (double(z) / (nz - 1) - 0.5)});
   for (uint32_t z = 0; z + 1 < nz; ++z)
     for (uint32_t x = 0; x + 1 < nx; ++x) {
       const uint32_t a = z * nx + x, b = a + 1, c = a + nx, d = c + 1;
-      t.corners.insert(t.corners.end(), {a, c, b, b, c, d});   // up is local y
+      t.corners.insert(t.corners.end(), {a, c, b, b, c, d});  // up is local y
     }
   return t;
 }

@@ -9,8 +9,8 @@
 namespace dfm_ode_detail {
 namespace {
 
-thread_local int inside = 0;                 // calls of ours on this thread
-std::mutex mutex;                            // over what follows
+thread_local int inside = 0;  // calls of ours on this thread
+std::mutex mutex;             // over what follows
 int traps = 0;
 dMessageFunction *theirs_debug = nullptr, *theirs_error = nullptr;
 
@@ -21,7 +21,8 @@ void caught(int number, const char *message, va_list args, dMessageFunction *the
     throw Assertion{text};
   }
   if (theirs) return theirs(number, message, args);
-  std::fprintf(stderr, "\nODE INTERNAL ERROR %d: ", number);   // ODE's own words where nobody has set a handler; it ends the process after them
+  // ODE's own words where nobody has set a handler; it ends the process after them
+  std::fprintf(stderr, "\nODE INTERNAL ERROR %d: ", number);
   std::vfprintf(stderr, message, args);
   std::fprintf(stderr, "\n");
 }
@@ -33,8 +34,10 @@ void on_error(int number, const char *message, va_list args) { caught(number, me
 Trap::Trap() {
   const std::lock_guard lock(mutex);
   if (traps++ == 0) {
-    theirs_debug = dGetDebugHandler(), theirs_error = dGetErrorHandler();
-    dSetDebugHandler(on_debug), dSetErrorHandler(on_error);
+    theirs_debug = dGetDebugHandler();
+    theirs_error = dGetErrorHandler();
+    dSetDebugHandler(on_debug);
+    dSetErrorHandler(on_error);
   }
   ++inside;
 }
@@ -43,7 +46,7 @@ Trap::~Trap() {
   const std::lock_guard lock(mutex);
   --inside;
   if (--traps > 0) return;
-  if (dGetDebugHandler() == on_debug) dSetDebugHandler(theirs_debug);   // else somebody has set one meanwhile
+  if (dGetDebugHandler() == on_debug) dSetDebugHandler(theirs_debug);  // else somebody has set one meanwhile
   if (dGetErrorHandler() == on_error) dSetErrorHandler(theirs_error);
 }
 

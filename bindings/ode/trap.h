@@ -1,7 +1,8 @@
-// Assertions of ODE end the process. Inside the worlds that the library makes itself (host "ode" of a scene) they end in an error of ours instead:
-// ODE's handlers are replaced for the length of a call, and theirs throws, on the thread that is in the call. On every other thread, and outside
-// such calls, the handlers that a host program has set are called as ever. What ODE was doing is left half done, so a world that was in it must
-// neither be stepped nor destroyed any more.
+// Assertions of ODE end the process. Inside the worlds that the library makes itself (host "ode" of a scene)
+// they end in an error of ours instead: ODE's handlers are replaced for the length of a call, and theirs
+// throws, on the thread that is in the call. On every other thread, and outside such calls, the handlers that
+// a host program has set are called as ever. What ODE was doing is left half done, so a world that was in it
+// must neither be stepped nor destroyed any more.
 #pragma once
 #include <string>
 
@@ -9,8 +10,8 @@
 
 namespace dfm_ode_detail {
 
-struct Assertion { std::string message; };   // thrown through ODE's frames
-struct Refused { dfm_status status; };       // the sentence is set; ends a call of the host
+struct Assertion { std::string message; };  // thrown through ODE's frames
+struct Refused { dfm_status status; };      // the sentence is set; ends a call of the host
 
 class Trap {
  public:

@@ -1,5 +1,6 @@
-// Colors of bodies and of values. The maps are straight lines of lightness through OKLab (B. Ottosson 2020) with our own course of hue
-// and chroma, so that equal steps of a value look like equal steps of lightness; they are our approximations, not a published map.
+// Colors of bodies and of values. The maps are straight lines of lightness through OKLab (B. Ottosson 2020)
+// with our own course of hue and chroma, so that equal steps of a value look like equal steps of lightness;
+// they are our approximations, not a published map.
 #include <algorithm>
 #include <cmath>
 #include <iterator>
@@ -52,9 +53,13 @@ Color along(const Lch (&path)[N], float t) {
   return from_lch(mix(p.lightness, q.lightness), mix(p.chroma, q.chroma), mix(p.hue_deg, q.hue_deg));
 }
 
-constexpr Lch kEmber[] = {{0, 0.28f, 0.10f, 295}, {0.25f, 0.44f, 0.17f, 335}, {0.5f, 0.60f, 0.20f, 385},
-                          {0.75f, 0.76f, 0.16f, 423}, {1, 0.93f, 0.12f, 462}};
-constexpr Lch kLagoon[] = {{0, 0.30f, 0.11f, 275}, {0.33f, 0.50f, 0.11f, 235}, {0.66f, 0.71f, 0.12f, 180}, {1, 0.93f, 0.14f, 112}};
+constexpr Lch kEmber[] = {{0, 0.28f, 0.10f, 295},
+                          {0.25f, 0.44f, 0.17f, 335},
+                          {0.5f, 0.60f, 0.20f, 385},
+                          {0.75f, 0.76f, 0.16f, 423},
+                          {1, 0.93f, 0.12f, 462}};
+constexpr Lch kLagoon[] = {
+    {0, 0.30f, 0.11f, 275}, {0.33f, 0.50f, 0.11f, 235}, {0.66f, 0.71f, 0.12f, 180}, {1, 0.93f, 0.14f, 112}};
 constexpr Lch kCold[] = {{0, 0.40f, 0.15f, 262}, {1, 0.90f, 0.005f, 262}};
 constexpr Lch kWarm[] = {{0, 0.90f, 0.005f, 30}, {1, 0.45f, 0.17f, 30}};
 
@@ -62,8 +67,9 @@ constexpr Lch kWarm[] = {{0, 0.90f, 0.005f, 30}, {1, 0.45f, 0.17f, 30}};
 
 Color palette(uint32_t i) {
   static constexpr Color colors[] = {
-      {0.890f, 0.365f, 0.286f}, {0.243f, 0.510f, 0.796f}, {0.957f, 0.706f, 0.243f}, {0.180f, 0.631f, 0.557f}, {0.557f, 0.431f, 0.757f},
-      {0.510f, 0.690f, 0.310f}, {0.886f, 0.494f, 0.643f}, {0.388f, 0.471f, 0.573f}, {0.690f, 0.498f, 0.361f}, {0.376f, 0.741f, 0.847f}};
+      {0.890f, 0.365f, 0.286f}, {0.243f, 0.510f, 0.796f}, {0.957f, 0.706f, 0.243f}, {0.180f, 0.631f, 0.557f},
+      {0.557f, 0.431f, 0.757f}, {0.510f, 0.690f, 0.310f}, {0.886f, 0.494f, 0.643f}, {0.388f, 0.471f, 0.573f},
+      {0.690f, 0.498f, 0.361f}, {0.376f, 0.741f, 0.847f}};
   return colors[i % std::size(colors)];
 }
 

@@ -1,4 +1,5 @@
-// A GL context without a window. The drawing code sees this and a table of functions; it cannot tell which library stands behind.
+// A GL context without a window. The drawing code sees this and a table of functions; it cannot tell which
+// library stands behind.
 #pragma once
 #include <memory>
 #include <string>
@@ -20,8 +21,8 @@ class Context {
 std::unique_ptr<Context> create_egl(std::string *why_not);
 std::unique_ptr<Context> create_osmesa(std::string *why_not);
 
-// dlopen of the first name that works; `variable` names the environment variable that replaces the names. The handle is never closed:
-// Mesa's LLVM does not survive being unloaded.
+// dlopen of the first name that works; `variable` names the environment variable that replaces the names. The
+// handle is never closed: Mesa's LLVM does not survive being unloaded.
 void *open_library(const char *variable, std::initializer_list<const char *> names);
 
 }  // namespace render

@@ -1,4 +1,5 @@
-// OSMesa: GL into main memory. Its own color buffer is a stub; we draw into our own framebuffer object as with EGL.
+// OSMesa: GL into main memory. Its own color buffer is a stub; we draw into our own framebuffer
+// object as with EGL.
 #include "context.h"
 
 #include <dlfcn.h>
@@ -35,14 +36,16 @@ struct OsMesa {
 const OsMesa &shared_osmesa() {
   static const OsMesa osmesa = [] {
     OsMesa o;
-    void *library = open_library("DEFORM_RENDER_OSMESA", {"libOSMesa.so.8", "libOSMesa.so.6", "libOSMesa.so"});
+    void *library =
+        open_library("DEFORM_RENDER_OSMESA", {"libOSMesa.so.8", "libOSMesa.so.6", "libOSMesa.so"});
     if (!library) return o;
     const auto get = [&]<class F>(F &f, const char *name) {
       f = reinterpret_cast<F>(dlsym(library, name));
       return f != nullptr;
     };
-    o.ready = get(o.create_context, "OSMesaCreateContextAttribs") && get(o.destroy_context, "OSMesaDestroyContext") &&
-              get(o.make_current, "OSMesaMakeCurrent") && get(o.get_proc_address, "OSMesaGetProcAddress");
+    o.ready = get(o.create_context, "OSMesaCreateContextAttribs") &&
+              get(o.destroy_context, "OSMesaDestroyContext") && get(o.make_current, "OSMesaMakeCurrent") &&
+              get(o.get_proc_address, "OSMesaGetProcAddress");
     return o;
   }();
   return osmesa;
@@ -52,7 +55,9 @@ class OsMesaContext final : public Context {
  public:
   OsMesaContext(const OsMesa &osmesa, OSMesaContext context) : osmesa_(osmesa), context_(context) {}
   ~OsMesaContext() override { osmesa_.destroy_context(context_); }
-  bool make_current() override { return osmesa_.make_current(context_, buffer_.data(), GL_UNSIGNED_BYTE, kSide, kSide); }
+  bool make_current() override {
+    return osmesa_.make_current(context_, buffer_.data(), GL_UNSIGNED_BYTE, kSide, kSide);
+  }
   void release() override { osmesa_.make_current(nullptr, nullptr, GL_UNSIGNED_BYTE, 0, 0); }
   Symbol symbol(const char *name) const override { return osmesa_.get_proc_address(name); }
   const char *name() const override { return "osmesa"; }
@@ -72,8 +77,17 @@ std::unique_ptr<Context> create_osmesa(std::string *why_not) {
     *why_not = "OSMesa: libOSMesa.so.8 cannot be loaded: install Debian's libosmesa6";
     return nullptr;
   }
-  const int attributes[] = {OSMESA_FORMAT, OSMESA_RGBA, OSMESA_DEPTH_BITS, 0, OSMESA_PROFILE, OSMESA_CORE_PROFILE,
-                            OSMESA_CONTEXT_MAJOR_VERSION, 3, OSMESA_CONTEXT_MINOR_VERSION, 3, 0};
+  const int attributes[] = {OSMESA_FORMAT,
+                            OSMESA_RGBA,
+                            OSMESA_DEPTH_BITS,
+                            0,
+                            OSMESA_PROFILE,
+                            OSMESA_CORE_PROFILE,
+                            OSMESA_CONTEXT_MAJOR_VERSION,
+                            3,
+                            OSMESA_CONTEXT_MINOR_VERSION,
+                            3,
+                            0};
   const OSMesaContext context = osmesa.create_context(attributes, nullptr);
   if (!context) {
     *why_not = "OSMesa: no OpenGL 3.3 core context: install the libosmesa6 of Debian 12 or later";

@@ -1,5 +1,5 @@
-// Text without a font library: each sign is a few strokes on a small grid, drawn with a round pen and soft edges, so that one table serves
-// every size. Montage and legend are made of it.
+// Text without a font library: each sign is a few strokes on a small grid, drawn with a round pen and soft
+// edges, so that one table serves every size. Montage and legend are made of it.
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -10,31 +10,102 @@
 namespace render {
 namespace {
 
-// Pairs of digits x, y: base line y = 2, capitals to 9, small letters to 7, tails to 0. A space starts a new stroke; ~ rounds a stroke's
-// corners (quadratic B-spline: it starts and ends at its ends and touches the middle of each side between), closed where its ends meet.
-struct Sign { char c; const char *strokes; };
-constexpr Sign kSigns[] = {
-    {'A', "023962 1454"}, {'B', "0209 ~09494606 ~06565202"}, {'C', "~584909024253"}, {'D', "0209 ~092959522202"}, {'E', "59090252 0646"},
-    {'F', "590902 0646"}, {'G', "~584909025255 5535"}, {'H', "0209 5259 0656"}, {'I', "0209"}, {'J', "~3934321203"},
-    {'K', "0209 5905 1652"},
-    {'L', "090252"}, {'M', "0209356962"}, {'N', "02095259"}, {'O', "~0969620209"}, {'P', "0209 ~092959552505"}, {'Q', "~0969620209 4461"},
-    {'R', "0209 ~092959552505 2552"}, {'S', "~5849090655521203"}, {'T', "0969 3932"}, {'U', "~090502525559"}, {'V', "093269"},
-    {'W', "0922486289"}, {'X', "0952 5902"}, {'Y', "093569 3532"}, {'Z', "09590252"},
-    {'0', "~0959520209"}, {'1', "072922"}, {'2', "~0709595602 0252"}, {'3', "~0819595626 ~2656521203"}, {'4', "42490454"},
-    {'5', "590906 ~062757521203"}, {'6', "~58490904 ~0656520206"}, {'7', "095922"}, {'8', "~0959560609 ~0656520206"},
-    {'9', "~0959550509 ~57521203"},
-    {'a', "~0747420207 4742"}, {'b', "0902 ~0747420207"}, {'c', "~463707023243"}, {'d', "4942 ~0747420207"}, {'e', "0545 ~454707023243"},
-    {'f', "~39191712 0727"}, {'g', "~0747420207 ~4742401001"}, {'h', "0902 ~0507474542"}, {'i', "0702 0909"}, {'j', "~27212000 2929"},
-    {'k', "0902 4704 1542"}, {'l', "0902"}, {'m', "0702 ~0507373532 ~3537676562"}, {'n', "0702 ~0507474542"}, {'o', "~0747420207"},
-    {'p', "0700 ~0747420207"}, {'q', "4740 ~0747420207"}, {'r', "0702 ~050737"}, {'s', "~4637070544421203"}, {'t', "~19141232 0727"},
-    {'u', "~0704024244 4742"}, {'v', "072247"}, {'w', "0712365267"}, {'x', "0742 4702"}, {'y', "0722 4710"}, {'z', "07470242"},
-    {'.', "0202"}, {',', "1201"}, {':', "0202 0606"}, {';', "1201 1616"},
-    {'-', "0535"}, {'_', "0141"}, {'+', "0545 2723"}, {'=', "0646 0444"},
-    {'/', "0149"}, {'(', "~29070320"}, {')', "~09272300"}, {'[', "29090020"}, {']', "09292000"}, {'<', "480542"}, {'>', "084502"},
-    {'%', "0269 ~0929270709 ~4464624244"}, {'*', "2723 0644 0446"}, {'^', "072947"}, {'!', "0904 0202"}, {'?', "~081949462624 2222"},
-    {'\'', "0907"}, {'"', "0907 2927"}, {'#', "1219 3239 0444 0747"}, {'|', "0900"}};
+// Pairs of digits x, y: base line y = 2, capitals to 9, small letters to 7, tails to 0. A space starts a new
+// stroke; ~ rounds a stroke's corners (quadratic B-spline: it starts and ends at its ends and touches the
+// middle of each side between), closed where its ends meet.
+struct Sign {
+  char c;
+  const char *strokes;
+};
+constexpr Sign kSigns[] = {{'A', "023962 1454"},
+                           {'B', "0209 ~09494606 ~06565202"},
+                           {'C', "~584909024253"},
+                           {'D', "0209 ~092959522202"},
+                           {'E', "59090252 0646"},
+                           {'F', "590902 0646"},
+                           {'G', "~584909025255 5535"},
+                           {'H', "0209 5259 0656"},
+                           {'I', "0209"},
+                           {'J', "~3934321203"},
+                           {'K', "0209 5905 1652"},
+                           {'L', "090252"},
+                           {'M', "0209356962"},
+                           {'N', "02095259"},
+                           {'O', "~0969620209"},
+                           {'P', "0209 ~092959552505"},
+                           {'Q', "~0969620209 4461"},
+                           {'R', "0209 ~092959552505 2552"},
+                           {'S', "~5849090655521203"},
+                           {'T', "0969 3932"},
+                           {'U', "~090502525559"},
+                           {'V', "093269"},
+                           {'W', "0922486289"},
+                           {'X', "0952 5902"},
+                           {'Y', "093569 3532"},
+                           {'Z', "09590252"},
+                           {'0', "~0959520209"},
+                           {'1', "072922"},
+                           {'2', "~0709595602 0252"},
+                           {'3', "~0819595626 ~2656521203"},
+                           {'4', "42490454"},
+                           {'5', "590906 ~062757521203"},
+                           {'6', "~58490904 ~0656520206"},
+                           {'7', "095922"},
+                           {'8', "~0959560609 ~0656520206"},
+                           {'9', "~0959550509 ~57521203"},
+                           {'a', "~0747420207 4742"},
+                           {'b', "0902 ~0747420207"},
+                           {'c', "~463707023243"},
+                           {'d', "4942 ~0747420207"},
+                           {'e', "0545 ~454707023243"},
+                           {'f', "~39191712 0727"},
+                           {'g', "~0747420207 ~4742401001"},
+                           {'h', "0902 ~0507474542"},
+                           {'i', "0702 0909"},
+                           {'j', "~27212000 2929"},
+                           {'k', "0902 4704 1542"},
+                           {'l', "0902"},
+                           {'m', "0702 ~0507373532 ~3537676562"},
+                           {'n', "0702 ~0507474542"},
+                           {'o', "~0747420207"},
+                           {'p', "0700 ~0747420207"},
+                           {'q', "4740 ~0747420207"},
+                           {'r', "0702 ~050737"},
+                           {'s', "~4637070544421203"},
+                           {'t', "~19141232 0727"},
+                           {'u', "~0704024244 4742"},
+                           {'v', "072247"},
+                           {'w', "0712365267"},
+                           {'x', "0742 4702"},
+                           {'y', "0722 4710"},
+                           {'z', "07470242"},
+                           {'.', "0202"},
+                           {',', "1201"},
+                           {':', "0202 0606"},
+                           {';', "1201 1616"},
+                           {'-', "0535"},
+                           {'_', "0141"},
+                           {'+', "0545 2723"},
+                           {'=', "0646 0444"},
+                           {'/', "0149"},
+                           {'(', "~29070320"},
+                           {')', "~09272300"},
+                           {'[', "29090020"},
+                           {']', "09292000"},
+                           {'<', "480542"},
+                           {'>', "084502"},
+                           {'%', "0269 ~0929270709 ~4464624244"},
+                           {'*', "2723 0644 0446"},
+                           {'^', "072947"},
+                           {'!', "0904 0202"},
+                           {'?', "~081949462624 2222"},
+                           {'\'', "0907"},
+                           {'"', "0907 2927"},
+                           {'#', "1219 3239 0444 0747"},
+                           {'|', "0900"}};
 constexpr const char *kUnknown = "0209595202";  // an empty frame
-constexpr double kCapital = 7, kBaseLine = 2, kGap = 1.9, kBlank = 2.6, kPen = 0.46, kDot = 0.2;  // a dot is a little thicker than a line
+// a dot is a little thicker than a line
+constexpr double kCapital = 7, kBaseLine = 2, kGap = 1.9, kBlank = 2.6, kPen = 0.46, kDot = 0.2;
 
 struct Point { double x, y; };
 using Stroke = std::vector<Point>;
@@ -47,7 +118,8 @@ Stroke rounded(const Stroke &corner) {
   const auto bend = [&](Point a, Point control, Point b) {
     for (int i = 0; i <= 8; ++i) {
       const double t = i / 8.0, u = 1 - t;
-      out.push_back({u * u * a.x + 2 * u * t * control.x + t * t * b.x, u * u * a.y + 2 * u * t * control.y + t * t * b.y});
+      out.push_back({u * u * a.x + 2 * u * t * control.x + t * t * b.x,
+                     u * u * a.y + 2 * u * t * control.y + t * t * b.y});
     }
   };
   if (closed) {
@@ -57,7 +129,8 @@ Stroke rounded(const Stroke &corner) {
     }
   } else {
     for (size_t i = 1; i + 1 < n; ++i)
-      bend(i == 1 ? corner[0] : middle(corner[i - 1], corner[i]), corner[i], i + 2 == n ? corner[i + 1] : middle(corner[i], corner[i + 1]));
+      bend(i == 1 ? corner[0] : middle(corner[i - 1], corner[i]), corner[i],
+           i + 2 == n ? corner[i + 1] : middle(corner[i], corner[i + 1]));
   }
   return out;
 }
@@ -145,9 +218,12 @@ void draw_text(Image &picture, double x, double y, double size, const std::strin
   }
 }
 
-void legend(Image &picture, ColourMap map, double min, double max, const std::string &title, const std::string &unit) {
+void legend(Image &picture, ColourMap map, double min, double max, const std::string &title,
+            const std::string &unit) {
   const double size = std::max(8.0, picture.height / 46.0);
-  const std::string head = unit.empty() ? title : title + " [" + unit + "]", low = number(min), high = number(max);
+  const std::string head = unit.empty() ? title : title + " [" + unit + "]";
+  const std::string low = number(min);
+  const std::string high = number(max);
   const double words = std::max(text_width(size, head), text_width(size, low + "    " + high));
   const long wide = std::max(long(picture.width) / 5, std::lround(words));
   const long bar = std::lround(0.9 * size), pad = std::lround(1.1 * size), margin = std::lround(1.4 * size);
@@ -188,7 +264,8 @@ Image montage(const std::vector<std::vector<Image>> &rows, const std::vector<std
   draw_text(all, left, gap + 1.6 * size, 1.3 * size, title, kInk);
   for (size_t c = 0; c < std::min<size_t>(column_labels.size(), columns); ++c) {
     const double middle = left + double(c) * (wide + gap) + 0.5 * wide;
-    draw_text(all, middle - 0.5 * text_width(size, column_labels[c]), top - 0.9 * size, size, column_labels[c], kInk);
+    draw_text(all, middle - 0.5 * text_width(size, column_labels[c]), top - 0.9 * size, size,
+              column_labels[c], kInk);
   }
   for (size_t r = 0; r < rows.size(); ++r) {
     const uint32_t y = top + uint32_t(r) * (high + gap);

@@ -6,7 +6,8 @@
 namespace render {
 namespace {
 
-constexpr double kCreaseCosine = 0.766;  // 40 degrees: a cylinder's rim stays sharp, its side with ten or more facets looks round
+// 40 degrees: a cylinder's rim stays sharp, its side with ten or more facets looks round
+constexpr double kCreaseCosine = 0.766;
 
 struct Faces {
   std::vector<Vec> normal;          // unit; zero for a triangle that is not drawn
@@ -19,7 +20,9 @@ Faces faces_of(const Surface &s) {
   f.first.assign(s.n + 1, 0);
   for (uint32_t t = 0; t < s.ntri; ++t) {
     const uint32_t *v = s.tri + 3 * size_t(t);
-    const Vec a = vec(s.xyz + 3 * size_t(v[0])), b = vec(s.xyz + 3 * size_t(v[1])), c = vec(s.xyz + 3 * size_t(v[2]));
+    const Vec a = vec(s.xyz + 3 * size_t(v[0]));
+    const Vec b = vec(s.xyz + 3 * size_t(v[1]));
+    const Vec c = vec(s.xyz + 3 * size_t(v[2]));
     const Vec n = cross(b - a, c - a);
     const double length = norm(n);
     if (!(length > 0) || !std::isfinite(length)) continue;
@@ -43,7 +46,8 @@ Vec corner_normal(const Surface &s, const Faces &f, uint32_t t, uint32_t v) {
     if (dot(f.normal[other], f.normal[t]) < kCreaseCosine) continue;
     const uint32_t *w = s.tri + 3 * size_t(other);
     const Vec p = vec(s.xyz + 3 * size_t(v));
-    const Vec a = unit(vec(s.xyz + 3 * size_t(w[(k + 1) % 3])) - p), b = unit(vec(s.xyz + 3 * size_t(w[(k + 2) % 3])) - p);
+    const Vec a = unit(vec(s.xyz + 3 * size_t(w[(k + 1) % 3])) - p);
+    const Vec b = unit(vec(s.xyz + 3 * size_t(w[(k + 2) % 3])) - p);
     sum = sum + f.normal[other] * std::acos(std::clamp(dot(a, b), -1.0, 1.0));
   }
   return unit(sum, f.normal[t]);
@@ -83,7 +87,10 @@ View view_of(const Camera &camera) {
 }
 
 Mat4 perspective(const View &v, double aspect, double near, double far) {
-  const double sy = 1 / v.tan_half, sx = sy / aspect, a = (far + near) / (near - far), b = 2 * far * near / (near - far);
+  const double sy = 1 / v.tan_half;
+  const double sx = sy / aspect;
+  const double a = (far + near) / (near - far);
+  const double b = 2 * far * near / (near - far);
   const double tx = -dot(v.right, v.eye), ty = -dot(v.up, v.eye), tz = -dot(v.back, v.eye);
   return from_rows({{sx * v.right.x, sx * v.right.y, sx * v.right.z, sx * tx},
                     {sy * v.up.x, sy * v.up.y, sy * v.up.z, sy * ty},
@@ -167,8 +174,10 @@ void Shape::box(const Vec &center, const Vec axes[3], const float rgb[3]) {
     }
 }
 
-// Profile points {radius, height along the axis, normal outward, normal along the axis} turned about the axis through a.
-void Shape::revolve(const Vec &a, const Vec &axis, const std::vector<std::array<double, 4>> &profile, const float rgb[3]) {
+// Profile points {radius, height along the axis, normal outward, normal along the axis} turned about the
+// axis through a.
+void Shape::revolve(const Vec &a, const Vec &axis, const std::vector<std::array<double, 4>> &profile,
+                    const float rgb[3]) {
   constexpr int kSides = 48;
   const Vec u = square_to(axis), w = cross(axis, u);
   const auto ring = [&](int i) {
@@ -185,7 +194,10 @@ void Shape::revolve(const Vec &a, const Vec &axis, const std::vector<std::array<
         p[k] = a + out * q[0] + axis * q[1];
         n[k] = out * q[2] + axis * q[3];
       }
-      const Vec p1[3] = {p[0], p[1], p[2]}, n1[3] = {n[0], n[1], n[2]}, p2[3] = {p[0], p[2], p[3]}, n2[3] = {n[0], n[2], n[3]};
+      const Vec p1[3] = {p[0], p[1], p[2]};
+      const Vec n1[3] = {n[0], n[1], n[2]};
+      const Vec p2[3] = {p[0], p[2], p[3]};
+      const Vec n2[3] = {n[0], n[2], n[3]};
       triangle(p1, n1, rgb);
       triangle(p2, n2, rgb);
     }
@@ -197,7 +209,9 @@ void Shape::capsule(const Capsule &c) {
   std::vector<std::array<double, 4>> profile;
   constexpr int kRings = 24;  // an even number, so that the equator belongs to both caps
   for (int i = 0; i <= kRings; ++i) {
-    const double angle = std::numbers::pi * (double(i) / kRings - 0.5), out = std::cos(angle), along = std::sin(angle);
+    const double angle = std::numbers::pi * (double(i) / kRings - 0.5);
+    const double out = std::cos(angle);
+    const double along = std::sin(angle);
     if (2 * i <= kRings) profile.push_back({c.radius * out, c.radius * along, out, along});
     if (2 * i >= kRings) profile.push_back({c.radius * out, length + c.radius * along, out, along});
   }
@@ -205,7 +219,8 @@ void Shape::capsule(const Capsule &c) {
 }
 
 void Shape::sphere(const Sphere &s) {
-  Capsule c{{s.center[0], s.center[1], s.center[2]}, {s.center[0], s.center[1], s.center[2]}, s.radius, s.look};
+  Capsule c{
+      {s.center[0], s.center[1], s.center[2]}, {s.center[0], s.center[1], s.center[2]}, s.radius, s.look};
   capsule(c);
 }
 
@@ -221,7 +236,9 @@ void Shape::ribbons(const Lines &lines, const View &view, double pixels_high) {
       p[2 * k] = end[k] - half;
       p[2 * k + 1] = end[k] + half;
     }
-    const Vec n[3] = {view.back, view.back, view.back}, first[3] = {p[0], p[1], p[3]}, second[3] = {p[0], p[3], p[2]};
+    const Vec n[3] = {view.back, view.back, view.back};
+    const Vec first[3] = {p[0], p[1], p[3]};
+    const Vec second[3] = {p[0], p[3], p[2]};
     triangle(first, n, lines.rgb);
     triangle(second, n, lines.rgb);
   }
@@ -266,21 +283,29 @@ Bounds bounds(const Scene &scene) {
 
 Camera auto_camera(const Bounds &given, double aspect, const double up_in[3]) {
   const Vec up = unit(vec(up_in)), across = square_to(up), ahead = cross(up, across);
-  const Vec lo = given.empty() ? Vec{-1, -1, -1} : vec(given.lo), hi = given.empty() ? Vec{1, 1, 1} : vec(given.hi);
+  const Vec lo = given.empty() ? Vec{-1, -1, -1} : vec(given.lo);
+  const Vec hi = given.empty() ? Vec{1, 1, 1} : vec(given.hi);
   const double azimuth = -0.95, elevation = 0.36;  // radians: from the front right, a little above
-  const Vec away = (across * std::sin(azimuth) + ahead * std::cos(azimuth)) * std::cos(elevation) + up * std::sin(elevation);
+  const Vec away = (across * std::sin(azimuth) + ahead * std::cos(azimuth)) * std::cos(elevation) +
+                   up * std::sin(elevation);
   const Vec center = (lo + hi) * 0.5;
   Camera camera;
   const Vec toward = center + away;
-  const auto set = [](double out[3], const Vec &v) { out[0] = v.x, out[1] = v.y, out[2] = v.z; };
+  const auto set = [](double out[3], const Vec &v) {
+    out[0] = v.x;
+    out[1] = v.y;
+    out[2] = v.z;
+  };
   set(camera.look_at, center);
   set(camera.up, up);
   set(camera.eye, toward);
   const View v = view_of(camera);
   double distance = 1e-6;
-  for (int i = 0; i < 8; ++i) {  // the least distance from which this corner is inside the frame with a margin
+  // the least distance from which this corner is inside the frame with a margin
+  for (int i = 0; i < 8; ++i) {
     const Vec d = Vec{i & 1 ? hi.x : lo.x, i & 2 ? hi.y : lo.y, i & 4 ? hi.z : lo.z} - center;
-    const double wide = std::abs(dot(d, v.right)) / (v.tan_half * aspect), high = std::abs(dot(d, v.up)) / v.tan_half;
+    const double wide = std::abs(dot(d, v.right)) / (v.tan_half * aspect);
+    const double high = std::abs(dot(d, v.up)) / v.tan_half;
     distance = std::max(distance, 1.1 * std::max(wide, high) + dot(d, v.back));
   }
   set(camera.eye, center + away * distance);
@@ -291,7 +316,10 @@ Bounds extent_of(const Scene &scene) {
   if (scene.extent && !scene.extent->empty()) return *scene.extent;
   Bounds box = bounds(scene);
   if (box.empty())
-    for (int k = 0; k < 3; ++k) box.lo[k] = -1, box.hi[k] = 1;
+    for (int k = 0; k < 3; ++k) {
+      box.lo[k] = -1;
+      box.hi[k] = 1;
+    }
   return box;
 }
 
@@ -299,15 +327,20 @@ Bounds extent_of(const Scene &scene) {
 Slab slab_of(const Plane &p, const Vec &up, const Bounds &extent) {
   const Vec n = unit(vec(p.normal), up), across = unit(cross(up, n), square_to(n)), along = cross(n, across);
   const Vec lo = vec(extent.lo), hi = vec(extent.hi), middle = (lo + hi) * 0.5, half = (hi - lo) * 0.5;
-  const auto reach = [&](const Vec &d) { return std::abs(d.x) * half.x + std::abs(d.y) * half.y + std::abs(d.z) * half.z; };
+  const auto reach = [&](const Vec &d) {
+    return std::abs(d.x) * half.x + std::abs(d.y) * half.y + std::abs(d.z) * half.z;
+  };
   const double size = norm(half), thick = 0.02 * size;
   const bool ramp = dot(n, up) > kRamp;
-  const double wide = ramp ? 0.9 * size : 1.02 * reach(across), high = ramp ? 1.3 * size : 1.02 * reach(along);
+  const double wide = ramp ? 0.9 * size : 1.02 * reach(across);
+  const double high = ramp ? 1.3 * size : 1.02 * reach(along);
   const Vec foot = middle - n * dot(n, middle - vec(p.point));
-  return {foot - n * thick, {across * std::max(wide, 0.1 * size), along * std::max(high, 0.1 * size), n * thick}};
+  return {foot - n * thick,
+          {across * std::max(wide, 0.1 * size), along * std::max(high, 0.1 * size), n * thick}};
 }
 
-// The extent with the places where planes near it lie across from its middle, so that the walls of a room meet each other and the floor.
+// The extent with the places where planes near it lie across from its middle, so that the walls of a room
+// meet each other and the floor.
 Bounds room_of(const Scene &scene, const Vec &up, const Bounds &extent) {
   const Vec middle = (vec(extent.lo) + vec(extent.hi)) * 0.5;
   const double size = norm(vec(extent.hi) - middle);
@@ -327,7 +360,8 @@ Camera auto_camera(const Scene &scene, double aspect) {
     const double slope = dot(unit(vec(p.normal), up), up);
     if (slope < kRamp) continue;
     if (slope > kLevel) {
-      const Vec middle = (vec(extent.lo) + vec(extent.hi)) * 0.5, foot = middle + up * dot(up, vec(p.point) - middle);
+      const Vec middle = (vec(extent.lo) + vec(extent.hi)) * 0.5;
+      const Vec foot = middle + up * dot(up, vec(p.point) - middle);
       if (norm(foot - middle) < 1.5 * norm(vec(extent.hi) - middle)) shown.add(&foot.x);
       continue;
     }

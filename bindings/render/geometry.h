@@ -1,5 +1,6 @@
-// Triangles for the GPU: surfaces with creased normals, solids, ribbons. Everything becomes one kind of vertex, three to a triangle, placed
-// relative to the scene's center so that single precision suffices far from the origin.
+// Triangles for the GPU: surfaces with creased normals, solids, ribbons. Everything becomes one kind of
+// vertex, three to a triangle, placed relative to the scene's center so that single precision suffices far
+// from the origin.
 #pragma once
 #include <array>
 #include <cmath>
@@ -17,7 +18,9 @@ struct Vec {
 };
 inline Vec vec(const double p[3]) { return {p[0], p[1], p[2]}; }
 inline double dot(const Vec &a, const Vec &b) { return a.x * b.x + a.y * b.y + a.z * b.z; }
-inline Vec cross(const Vec &a, const Vec &b) { return {a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x}; }
+inline Vec cross(const Vec &a, const Vec &b) {
+  return {a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
+}
 inline double norm(const Vec &a) { return std::sqrt(dot(a, a)); }
 inline bool finite(const Vec &a) { return std::isfinite(a.x) && std::isfinite(a.y) && std::isfinite(a.z); }
 // `otherwise` where a has no direction.
@@ -26,7 +29,10 @@ Vec unit(const Vec &a, const Vec &otherwise = {0, 0, 1});
 Vec square_to(const Vec &n);
 
 using Mat4 = std::array<float, 16>;  // columns, as GL reads them
-struct View { Vec eye, right, up, back; double tan_half; };
+struct View {
+  Vec eye, right, up, back;
+  double tan_half;
+};
 View view_of(const Camera &camera);
 Mat4 perspective(const View &view, double aspect, double near, double far);
 // Looks against `toward_light` at a ball of that radius around the origin; clip coordinates -1..1.
@@ -47,12 +53,14 @@ struct Shape {
   void ribbons(const Lines &lines, const View &view, double pixels_high);
 
  private:
-  void revolve(const Vec &a, const Vec &axis, const std::vector<std::array<double, 4>> &profile, const float rgb[3]);
+  void revolve(const Vec &a, const Vec &axis, const std::vector<std::array<double, 4>> &profile,
+               const float rgb[3]);
 };
 
 void axes_of(const Box &box, Vec axes[3]);
 
-// Cosines to the up direction from which a plane is the floor, and from which it is a ramp rather than a wall.
+// Cosines to the up direction from which a plane is the floor, and from which it is a ramp
+// rather than a wall.
 inline constexpr double kLevel = 0.9999, kRamp = 0.3;
 // Never empty: Scene::extent, or bounds(), or a box of 2 m around the origin.
 Bounds extent_of(const Scene &scene);

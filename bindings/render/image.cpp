@@ -10,14 +10,17 @@
 
 namespace render {
 
-bool Image::operator==(const Image &other) const { return width == other.width && height == other.height && rgb == other.rgb; }
+bool Image::operator==(const Image &other) const {
+  return width == other.width && height == other.height && rgb == other.rgb;
+}
 
 bool write_png(const std::string &path, const Image &picture, std::string *why_not) {
   const auto refuse = [&](const std::string &reason) {
     if (why_not) *why_not = "cannot write " + path + ": " + reason;
     return false;
   };
-  if (picture.width == 0 || picture.height == 0 || picture.rgb.size() != size_t(picture.width) * picture.height * 3)
+  if (picture.width == 0 || picture.height == 0 ||
+      picture.rgb.size() != size_t(picture.width) * picture.height * 3)
     return refuse("the picture is empty");
   const std::string partial = path + ".part" + std::to_string(getpid());
   std::FILE *file = std::fopen(partial.c_str(), "wb");

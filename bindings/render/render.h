@@ -1,5 +1,6 @@
-// Surfaces -> picture, off-screen: EGL surfaceless first, OSMesa second, the same GL code on both. Plain structs in, 8-bit RGB out; nothing
-// here knows the library, and no GL name leaves this folder. Lengths in meters, colors as sRGB in 0..1, quaternions x, y, z, w.
+// Surfaces -> picture, off-screen: EGL surfaceless first, OSMesa second, the same GL code on both. Plain
+// structs in, 8-bit RGB out; nothing here knows the library, and no GL name leaves this folder. Lengths in
+// meters, colors as sRGB in 0..1, quaternions x, y, z, w.
 #pragma once
 #include <cstdint>
 #include <memory>
@@ -30,29 +31,48 @@ struct Pose {
   double position[3] = {0, 0, 0}, rotation[4] = {0, 0, 0, 1};  // all zero reads as no rotation
 };
 
-// A triangle mesh; the arrays stay the caller's and are read during draw() only. Triangles wind counter-clockwise seen from outside.
+// A triangle mesh; the arrays stay the caller's and are read during draw() only. Triangles wind
+// counter-clockwise seen from outside.
 struct Surface {
   const double *xyz = nullptr;  // [n,3]
   uint32_t n = 0;
   const uint32_t *tri = nullptr;  // [ntri,3]
   uint32_t ntri = 0;
-  const double *normal = nullptr;  // [n,3]; null (the better choice): smooth across flat edges, sharp across rims of more than 40 degrees
+  // [n,3]; null (the better choice): smooth across flat edges, sharp across rims of more than 40 degrees
+  const double *normal = nullptr;
   float rgb[3] = {0.8f, 0.8f, 0.8f};
-  const float *scalar = nullptr;  // [n] 0..1 through Scene::map; NaN shows rgb there; null shows rgb everywhere
-  float fade = 0;                 // values from here down to 0 run out into rgb: 0.25 makes contact patches without a jagged rim
-  bool edges = false;             // triangle edges as thin darker lines
+  // [n] 0..1 through Scene::map; NaN shows rgb there; null shows rgb everywhere
+  const float *scalar = nullptr;
+  // values from here down to 0 run out into rgb: 0.25 makes contact patches without a jagged rim
+  float fade = 0;
+  bool edges = false;  // triangle edges as thin darker lines
 };
 
 struct Look {
   float rgb[3] = {0.72f, 0.75f, 0.79f};
   float alpha = 1;  // below 1: seen through, casts no shadow
 };
-// A plane square to Scene::up is drawn as the floor (the highest one seen from above), any other as a tilted slab sized to the scene. A
-// plane whose back faces the camera is left out.
-struct Plane { double point[3], normal[3]; Look look; };
-struct Box { Pose pose; double half[3]; Look look; };
-struct Sphere { double center[3]; double radius; Look look; };
-struct Capsule { double a[3], b[3]; double radius; Look look; };  // a and b are the centers of its caps
+// A plane square to Scene::up is drawn as the floor (the highest one seen from above), any other as a tilted
+// slab sized to the scene. A plane whose back faces the camera is left out.
+struct Plane {
+  double point[3], normal[3];
+  Look look;
+};
+struct Box {
+  Pose pose;
+  double half[3];
+  Look look;
+};
+struct Sphere {
+  double center[3];
+  double radius;
+  Look look;
+};
+struct Capsule {
+  double a[3], b[3];
+  double radius;
+  Look look;
+};  // a and b are the centers of its caps
 // Segments as ribbons that face the camera, e.g. contact normals.
 struct Lines {
   const double *xyz = nullptr;  // [2 n,3]: start, end, start, end
@@ -62,7 +82,8 @@ struct Lines {
   bool on_top = false;  // not hidden by what lies before them
 };
 
-enum class ColourMap { ember, lagoon, balance };  // our own paths through OKLab: dark to light warm, dark to light cool, blue-gray-red
+// our own paths through OKLab: dark to light warm, dark to light cool, blue-gray-red
+enum class ColourMap { ember, lagoon, balance };
 
 struct Scene {
   std::vector<Surface> surfaces;
@@ -73,26 +94,32 @@ struct Scene {
   std::vector<Lines> lines;
   double up[3] = {0, 0, 1};      // against gravity
   std::optional<Camera> camera;  // none: auto_camera() over `extent`
-  std::optional<Bounds> extent;  // what grid, slabs and camera are sized to; none: bounds(scene). Give one for all frames of a film.
+  // what grid, slabs and camera are sized to; none: bounds(scene). Give one for all frames of a film.
+  std::optional<Bounds> extent;
   ColourMap map = ColourMap::ember;
 };
 
-// Box around surfaces, spheres, capsules and boxes (not planes); a solid far larger than the surfaces counts only near them.
+// Box around surfaces, spheres, capsules and boxes (not planes); a solid far larger than the surfaces counts
+// only near them.
 Bounds bounds(const Scene &scene);
 // Three-quarter view from the front right that just holds the box.
 Camera auto_camera(const Bounds &bounds, double aspect, const double up[3]);
-// The same for the extent of a scene with its ramps and a floor that is near; what draw() takes where the scene has no camera.
+// The same for the extent of a scene with its ramps and a floor that is near; what draw() takes where the
+// scene has no camera.
 Camera auto_camera(const Scene &scene, double aspect);
 
 enum class Backend { automatic, egl, osmesa };
 
 class Renderer {
  public:
-  // Null where no picture can be made here: *why_not is then one sentence that names the Debian package to install. Libraries are loaded at
-  // run time. For Backend::automatic the environment's DEFORM_RENDER_BACKEND (egl, osmesa, none) decides where it is set.
-  static std::unique_ptr<Renderer> create(Backend backend, uint32_t width, uint32_t height, std::string *why_not);
+  // Null where no picture can be made here: *why_not is then one sentence that names the Debian package to
+  // install. Libraries are loaded at run time. For Backend::automatic the environment's DEFORM_RENDER_BACKEND
+  // (egl, osmesa, none) decides where it is set.
+  static std::unique_ptr<Renderer> create(Backend backend, uint32_t width, uint32_t height,
+                                          std::string *why_not);
   virtual ~Renderer() = default;
-  // One thread at a time for each renderer. Makes its context current and releases it again. False: *why_not says what GL refused.
+  // One thread at a time for each renderer. Makes its context current and releases it again. False: *why_not
+  // says what GL refused.
   virtual bool draw(const Scene &scene, Image &picture, std::string *why_not = nullptr) = 0;
   virtual const char *backend() const = 0;  // "egl" or "osmesa"
   virtual const char *device() const = 0;   // what GL calls itself, e.g. "llvmpipe (LLVM 15.0.6, 256 bits)"
@@ -104,18 +131,23 @@ Color palette(uint32_t i);
 // t is clamped to 0..1.
 Color map_color(ColourMap map, float t);
 
-// Through a temporary file and a rename, so that nobody reads half a picture. False: *why_not is one sentence.
+// Through a temporary file and a rename, so that nobody reads half a picture. False: *why_not
+// is one sentence.
 bool write_png(const std::string &path, const Image &picture, std::string *why_not);
 bool read_png(const std::string &path, Image &picture, std::string *why_not);
 
-// Text (ASCII; our own stroke font, anti-aliased). `size` is the height of a capital in pixels; x, y the left end of its base line.
+// Text (ASCII; our own stroke font, anti-aliased). `size` is the height of a capital in pixels; x, y the left
+// end of its base line.
 void draw_text(Image &picture, double x, double y, double size, const std::string &text, Color color);
 double text_width(double size, const std::string &text);
 
-// A bar of the map in the lower right corner with its ends, e.g. legend(p, ColourMap::ember, 0, 1.5, "speed", "m/s").
-void legend(Image &picture, ColourMap map, double min, double max, const std::string &title, const std::string &unit);
+// A bar of the map in the lower right corner with its ends, e.g. legend(p, ColourMap::ember, 0, 1.5,
+// "speed", "m/s").
+void legend(Image &picture, ColourMap map, double min, double max, const std::string &title,
+            const std::string &unit);
 
-// Pictures in a grid, row by row; rows may differ in length. `row_labels` stand to the left and `column_labels` above; either may be empty.
+// Pictures in a grid, row by row; rows may differ in length. `row_labels` stand to the left and
+// `column_labels` above; either may be empty.
 Image montage(const std::vector<std::vector<Image>> &rows, const std::vector<std::string> &row_labels,
               const std::vector<std::string> &column_labels, const std::string &title = "");
 

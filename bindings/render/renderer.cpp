@@ -1,5 +1,6 @@
-// One picture: everything becomes triangles (geometry.cpp), the shadow maps of the key light and of the sky are drawn, then background,
-// floor, bodies, what is seen through (far to near), lines; four samples a pixel are resolved and read back.
+// One picture: everything becomes triangles (geometry.cpp), the shadow maps of the key light and of the sky
+// are drawn, then background, floor, bodies, what is seen through (far to near), lines; four samples a pixel
+// are resolved and read back.
 #include "render.h"
 
 #include <algorithm>
@@ -19,10 +20,14 @@ namespace {
 constexpr int kKeySide = 1536, kSkySide = 160, kSamples = 4;
 constexpr uint32_t kLargest = 8192;
 
-// What host code set for its own arithmetic (rounding, traps) stays as it was: a picture may not change a simulation's bits.
+// What host code set for its own arithmetic (rounding, traps) stays as it was: a picture may not change a
+// simulation's bits.
 struct FloatingPoint {
   std::fenv_t saved;
-  FloatingPoint() { std::fegetenv(&saved); std::fesetenv(FE_DFL_ENV); }
+  FloatingPoint() {
+    std::fegetenv(&saved);
+    std::fesetenv(FE_DFL_ENV);
+  }
   ~FloatingPoint() { std::fesetenv(&saved); }
 };
 
@@ -42,7 +47,11 @@ struct Batch {
   double depth = 0;  // of its middle, for the order of what is seen through
 };
 
-struct Ground { Vec center, x, y; double spacing, radius; bool present = false; };
+struct Ground {
+  Vec center, x, y;
+  double spacing, radius;
+  bool present = false;
+};
 
 struct Frame {
   Shape shape;
@@ -66,7 +75,8 @@ std::string check(const Scene &scene) {
     const Surface &s = scene.surfaces[b];
     for (size_t i = 0; i < 3 * size_t(s.ntri); ++i)
       if (s.tri[i] >= s.n)
-        return "surface " + number(b) + ": triangle " + number(i / 3) + " names vertex " + number(s.tri[i]) + " of " + number(s.n);
+        return "surface " + number(b) + ": triangle " + number(i / 3) + " names vertex " + number(s.tri[i]) +
+               " of " + number(s.n);
   }
   if (scene.camera && !(finite(vec(scene.camera->eye)) && finite(vec(scene.camera->look_at))))
     return "camera: eye and look_at must be finite numbers";
@@ -122,7 +132,9 @@ void add_planes(const Scene &scene, Frame &frame, const Bounds &extent) {
   const Vec level = vec(floor->point) + frame.up * 1e-9;
   const Vec foot = middle + frame.up * dot(frame.up, level - middle);
   const double two = 2 * g.spacing;
-  const auto beyond = [&](const Vec &axis) { return axis * (dot(foot, axis) - two * std::round(dot(foot, axis) / two)); };
+  const auto beyond = [&](const Vec &axis) {
+    return axis * (dot(foot, axis) - two * std::round(dot(foot, axis) / two));
+  };
   const Vec snapped = foot - beyond(g.x) - beyond(g.y);
   g.center = snapped - frame.shape.origin;
   Batch b;
@@ -134,7 +146,8 @@ void add_planes(const Scene &scene, Frame &frame, const Bounds &extent) {
   const float light[3] = {0.90f, 0.905f, 0.915f};
   batch(frame, b, [&] {
     const Vec x = g.x * g.radius, y = g.y * g.radius;
-    const Vec corner[4] = {snapped - x - y, snapped + x - y, snapped + x + y, snapped - x + y}, n[3] = {frame.up, frame.up, frame.up};
+    const Vec corner[4] = {snapped - x - y, snapped + x - y, snapped + x + y, snapped - x + y};
+    const Vec n[3] = {frame.up, frame.up, frame.up};
     for (const int k : {1, 2}) {
       const Vec p[3] = {corner[0], corner[k], corner[k + 1]};
       frame.shape.triangle(p, n, own ? floor->look.rgb : light);
@@ -152,7 +165,8 @@ void fit_casters(Frame &frame, const Bounds &box) {
         const float *q = frame.shape.vertices[size_t(i)].p;
         double p[3] = {q[0], q[1], q[2]};
         const double *o = &frame.shape.origin.x;
-        for (int k = 0; k < 3; ++k) p[k] = std::clamp(p[k], box.lo[k] - o[k] - 0.5 * reach, box.hi[k] - o[k] + 0.5 * reach);
+        for (int k = 0; k < 3; ++k)
+          p[k] = std::clamp(p[k], box.lo[k] - o[k] - 0.5 * reach, box.hi[k] - o[k] + 0.5 * reach);
         all.add(p);
       }
   if (all.empty()) return;
@@ -198,8 +212,11 @@ Frame compose(const Scene &scene, double aspect, double pixels_high) {
     b.on_top = l.on_top;
     batch(frame, b, [&] { frame.shape.ribbons(l, world, pixels_high); });
   }
-  // Floor first (it fades into the background), then what hides, then what is seen through from far to near, lines last.
-  const auto rank = [](const Batch &b) { return b.kind == Kind::floor ? 0 : b.kind == Kind::plain ? 3 + b.on_top : b.alpha >= 1 ? 1 : 2; };
+  // Floor first (it fades into the background), then what hides, then what is seen through from far to
+  // near, lines last.
+  const auto rank = [](const Batch &b) {
+    return b.kind == Kind::floor ? 0 : b.kind == Kind::plain ? 3 + b.on_top : b.alpha >= 1 ? 1 : 2;
+  };
   std::stable_sort(frame.batches.begin(), frame.batches.end(), [&](const Batch &a, const Batch &b) {
     return rank(a) != rank(b) ? rank(a) < rank(b) : rank(a) == 2 && a.depth > b.depth;
   });
@@ -232,14 +249,21 @@ class GlRenderer final : public Renderer {
   bool make_targets(std::string *why_not);
   GLuint depth_map(GLenum target, int side, int layers);
   void set(const char *name, const Vec &v) const;
-  void set(const char *name, const Mat4 &m) const { gl_.UniformMatrix4fv(gl_.GetUniformLocation(current_, name), 1, GL_FALSE, m.data()); }
+  void set(const char *name, const Mat4 &m) const {
+    gl_.UniformMatrix4fv(gl_.GetUniformLocation(current_, name), 1, GL_FALSE, m.data());
+  }
   void set(const char *name, int i) const { gl_.Uniform1i(gl_.GetUniformLocation(current_, name), i); }
-  void set(const char *name, double x) const { gl_.Uniform1f(gl_.GetUniformLocation(current_, name), float(x)); }
-  void use(GLuint program) { current_ = program; gl_.UseProgram(program); }
+  void set(const char *name, double x) const {
+    gl_.Uniform1f(gl_.GetUniformLocation(current_, name), float(x));
+  }
+  void use(GLuint program) {
+    current_ = program;
+    gl_.UseProgram(program);
+  }
   void upload(const Frame &frame, ColourMap map);
   void draw_shadows(const Frame &frame, const Mat4 &key, const std::array<Mat4, kSkyLights> &sky);
   void draw_colors(const Frame &frame, const Mat4 &key, const std::array<Mat4, kSkyLights> &sky,
-                    const std::array<Vec, kSkyLights> &directions);
+                   const std::array<Vec, kSkyLights> &directions);
   void read(Image &picture);
 
   std::unique_ptr<Context> context_;
@@ -267,7 +291,8 @@ GlRenderer::~GlRenderer() {
 
 GLuint GlRenderer::program(const char *vertex, const char *fragment, std::string *why_not) {
   const GLuint p = gl_.CreateProgram();
-  for (const auto &[type, source] : {std::pair{GL_VERTEX_SHADER, vertex}, std::pair{GL_FRAGMENT_SHADER, fragment}}) {
+  for (const auto &[type, source] :
+       {std::pair{GL_VERTEX_SHADER, vertex}, std::pair{GL_FRAGMENT_SHADER, fragment}}) {
     const GLuint s = gl_.CreateShader(GLenum(type));
     gl_.ShaderSource(s, 1, &source, nullptr);
     gl_.CompileShader(s);
@@ -295,8 +320,12 @@ GLuint GlRenderer::depth_map(GLenum target, int side, int layers) {
   GLuint t = 0;
   gl_.GenTextures(1, &t);
   gl_.BindTexture(target, t);
-  if (target == GL_TEXTURE_2D) gl_.TexImage2D(target, 0, GL_DEPTH_COMPONENT24, side, side, 0, GL_DEPTH_COMPONENT, GL_UNSIGNED_INT, nullptr);
-  else gl_.TexImage3D(target, 0, GL_DEPTH_COMPONENT24, side, side, layers, 0, GL_DEPTH_COMPONENT, GL_UNSIGNED_INT, nullptr);
+  if (target == GL_TEXTURE_2D)
+    gl_.TexImage2D(target, 0, GL_DEPTH_COMPONENT24, side, side, 0, GL_DEPTH_COMPONENT, GL_UNSIGNED_INT,
+                   nullptr);
+  else
+    gl_.TexImage3D(target, 0, GL_DEPTH_COMPONENT24, side, side, layers, 0, GL_DEPTH_COMPONENT,
+                   GL_UNSIGNED_INT, nullptr);
   const float lit[4] = {1, 1, 1, 1};  // outside the map nothing stands in the way
   gl_.TexParameterfv(target, GL_TEXTURE_BORDER_COLOR, lit);
   gl_.TexParameteri(target, GL_TEXTURE_WRAP_S, GL_CLAMP_TO_BORDER);
@@ -316,8 +345,10 @@ bool GlRenderer::make_targets(std::string *why_not) {
   gl_.ActiveTexture(GL_TEXTURE2);
   gl_.GenTextures(1, &map_texture_);
   gl_.BindTexture(GL_TEXTURE_2D, map_texture_);
-  for (const GLenum side : {GL_TEXTURE_WRAP_S, GL_TEXTURE_WRAP_T}) gl_.TexParameteri(GL_TEXTURE_2D, side, GL_CLAMP_TO_EDGE);
-  for (const GLenum filter : {GL_TEXTURE_MIN_FILTER, GL_TEXTURE_MAG_FILTER}) gl_.TexParameteri(GL_TEXTURE_2D, filter, GL_LINEAR);
+  for (const GLenum side : {GL_TEXTURE_WRAP_S, GL_TEXTURE_WRAP_T})
+    gl_.TexParameteri(GL_TEXTURE_2D, side, GL_CLAMP_TO_EDGE);
+  for (const GLenum filter : {GL_TEXTURE_MIN_FILTER, GL_TEXTURE_MAG_FILTER})
+    gl_.TexParameteri(GL_TEXTURE_2D, filter, GL_LINEAR);
 
   GLint most = 0;
   gl_.GetIntegerv(GL_MAX_SAMPLES, &most);
@@ -346,12 +377,13 @@ bool GlRenderer::make_targets(std::string *why_not) {
   size_t offset = 0;
   for (GLuint i = 0; i < 4; ++i) {
     gl_.EnableVertexAttribArray(i);
-    gl_.VertexAttribPointer(i, widths[i], GL_FLOAT, GL_FALSE, sizeof(Vertex), reinterpret_cast<const void *>(offset));
+    gl_.VertexAttribPointer(i, widths[i], GL_FLOAT, GL_FALSE, sizeof(Vertex),
+                            reinterpret_cast<const void *>(offset));
     offset += size_t(widths[i]) * sizeof(float);
   }
   if (sampled && resolved && gl_.GetError() == GL_NO_ERROR) return true;
-  *why_not = std::string(context_->name()) + ": " + device_ + " gives no picture of " + std::to_string(width_) + " x " +
-             std::to_string(height_) + " pixels: ask for a smaller one";
+  *why_not = std::string(context_->name()) + ": " + device_ + " gives no picture of " +
+             std::to_string(width_) + " x " + std::to_string(height_) + " pixels: ask for a smaller one";
   return false;
 }
 
@@ -360,11 +392,13 @@ bool GlRenderer::start(std::string *why_not) {
   Current current(*context_);
   std::string missing;
   if (!current.ok) {
-    *why_not = std::string(context_->name()) + ": its context cannot be made current: install Debian's libgl1-mesa-dri";
+    *why_not = std::string(context_->name()) +
+               ": its context cannot be made current: install Debian's libgl1-mesa-dri";
     return false;
   }
   if (!gl_.load(*context_, &missing)) {
-    *why_not = std::string(context_->name()) + ": the driver lacks " + missing + " of OpenGL 3.3: install Debian's libgl1-mesa-dri";
+    *why_not = std::string(context_->name()) + ": the driver lacks " + missing +
+               " of OpenGL 3.3: install Debian's libgl1-mesa-dri";
     return false;
   }
   const GLubyte *text = gl_.GetString(GL_RENDERER);
@@ -372,7 +406,8 @@ bool GlRenderer::start(std::string *why_not) {
   started_ = true;
   return (main_ = program(kVertexShader, kFragmentShader, why_not)) &&
          (depth_ = program(kDepthVertexShader, kDepthFragmentShader, why_not)) &&
-         (background_ = program(kBackgroundVertexShader, kBackgroundFragmentShader, why_not)) && make_targets(why_not);
+         (background_ = program(kBackgroundVertexShader, kBackgroundFragmentShader, why_not)) &&
+         make_targets(why_not);
 }
 
 void GlRenderer::set(const char *name, const Vec &v) const {
@@ -383,7 +418,8 @@ void GlRenderer::set(const char *name, const Vec &v) const {
 void GlRenderer::upload(const Frame &frame, ColourMap map) {
   gl_.BindVertexArray(array_);
   gl_.BindBuffer(GL_ARRAY_BUFFER, buffer_);
-  gl_.BufferData(GL_ARRAY_BUFFER, GLsizeiptr(frame.shape.vertices.size() * sizeof(Vertex)), frame.shape.vertices.data(), GL_STREAM_DRAW);
+  gl_.BufferData(GL_ARRAY_BUFFER, GLsizeiptr(frame.shape.vertices.size() * sizeof(Vertex)),
+                 frame.shape.vertices.data(), GL_STREAM_DRAW);
   uint8_t table[257][4];  // an odd number: a map may have its kink in the middle
   for (int i = 0; i < 257; ++i) {
     const Color c = map_color(map, float(i) / 256);
@@ -425,7 +461,7 @@ void GlRenderer::draw_shadows(const Frame &frame, const Mat4 &key, const std::ar
 }
 
 void GlRenderer::draw_colors(const Frame &frame, const Mat4 &key, const std::array<Mat4, kSkyLights> &sky,
-                              const std::array<Vec, kSkyLights> &directions) {
+                             const std::array<Vec, kSkyLights> &directions) {
   gl_.BindFramebuffer(GL_FRAMEBUFFER, sampled_target_);
   gl_.Viewport(0, 0, GLsizei(width_), GLsizei(height_));
   gl_.ClearColor(1, 1, 1, 1);
@@ -437,7 +473,8 @@ void GlRenderer::draw_colors(const Frame &frame, const Mat4 &key, const std::arr
   use(main_);
   const double distance = norm(frame.view.eye - frame.center);
   const double near = std::max(distance - 1.8 * frame.radius - frame.extent, 0.02 * distance + 1e-9);
-  const double far = distance + frame.radius + (frame.ground.present ? 2 * frame.ground.radius : 0) + 4 * frame.extent;
+  const double far =
+      distance + frame.radius + (frame.ground.present ? 2 * frame.ground.radius : 0) + 4 * frame.extent;
   set("to_clip", perspective(frame.view, double(width_) / height_, near, far));
   set("eye", frame.view.eye);
   set("up", frame.up);
@@ -460,7 +497,8 @@ void GlRenderer::draw_colors(const Frame &frame, const Mat4 &key, const std::arr
   set("floor_center", frame.ground.center);
   set("floor_x", frame.ground.x);
   set("floor_y", frame.ground.y);
-  gl_.Uniform2f(gl_.GetUniformLocation(current_, "floor_size"), float(frame.ground.spacing), float(frame.ground.radius));
+  gl_.Uniform2f(gl_.GetUniformLocation(current_, "floor_size"), float(frame.ground.spacing),
+                float(frame.ground.radius));
   set("key_shadow", 0);
   set("sky_shadow", 1);
   set("map", 2);
@@ -506,7 +544,8 @@ bool GlRenderer::draw(const Scene &scene, Image &picture, std::string *why_not) 
     const std::array<Vec, kSkyLights> directions = sky_directions(frame.up);
     const Mat4 key = orthographic(frame.key, frame.center, 1.02 * frame.radius);
     std::array<Mat4, kSkyLights> sky;
-    for (size_t i = 0; i < sky.size(); ++i) sky[i] = orthographic(directions[i], frame.center, 1.02 * frame.radius);
+    for (size_t i = 0; i < sky.size(); ++i)
+      sky[i] = orthographic(directions[i], frame.center, 1.02 * frame.radius);
     Current current(*context_);
     if (current.ok) {
       upload(frame, scene.map);
@@ -515,7 +554,8 @@ bool GlRenderer::draw(const Scene &scene, Image &picture, std::string *why_not) 
       read(picture);
       const GLenum error = gl_.GetError();
       if (error == GL_NO_ERROR) return true;
-      sentence = std::string(context_->name()) + ": " + device_ + " refuses the picture (GL error " + std::to_string(error) + ")";
+      sentence = std::string(context_->name()) + ": " + device_ + " refuses the picture (GL error " +
+                 std::to_string(error) + ")";
     } else {
       sentence = std::string(context_->name()) + ": its context cannot be made current on this thread";
     }
@@ -526,22 +566,27 @@ bool GlRenderer::draw(const Scene &scene, Image &picture, std::string *why_not) 
 
 }  // namespace
 
-std::unique_ptr<Renderer> Renderer::create(Backend backend, uint32_t width, uint32_t height, std::string *why_not) {
+std::unique_ptr<Renderer> Renderer::create(Backend backend, uint32_t width, uint32_t height,
+                                           std::string *why_not) {
   std::string unused;
   std::string &why = why_not ? *why_not : unused;
   if (width < 1 || height < 1 || width > kLargest || height > kLargest) {
-    why = "a picture of " + std::to_string(width) + " x " + std::to_string(height) + " pixels: each side must be 1 to " +
-          std::to_string(kLargest);
+    why = "a picture of " + std::to_string(width) + " x " + std::to_string(height) +
+          " pixels: each side must be 1 to " + std::to_string(kLargest);
     return nullptr;
   }
   const char *wish = std::getenv("DEFORM_RENDER_BACKEND");
   if (backend == Backend::automatic && wish && *wish) {
     const std::string name = wish;
-    if (name == "egl") backend = Backend::egl;
-    else if (name == "osmesa") backend = Backend::osmesa;
-    else if (name != "auto") {
-      why = name == "none" ? "pictures are switched off by DEFORM_RENDER_BACKEND=none: unset it, or set it to egl or osmesa"
-                           : "DEFORM_RENDER_BACKEND=" + name + " is not a backend: set it to auto, egl, osmesa or none";
+    if (name == "egl") {
+      backend = Backend::egl;
+    } else if (name == "osmesa") {
+      backend = Backend::osmesa;
+    } else if (name != "auto") {
+      why = name == "none"
+                ? "pictures are switched off by DEFORM_RENDER_BACKEND=none: unset it, or set it to egl or "
+                  "osmesa"
+                : "DEFORM_RENDER_BACKEND=" + name + " is not a backend: set it to auto, egl, osmesa or none";
       return nullptr;
     }
   }

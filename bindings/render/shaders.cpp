@@ -1,5 +1,6 @@
-// One key light with a soft shadow map, and a sky of 48 directions with a shadow map each: what the sky does not reach is dark, which is
-// the shade in the gap between two bodies that shows whether they touch. A little light comes back from the ground, a soft rim from behind.
+// One key light with a soft shadow map, and a sky of 48 directions with a shadow map each: what the sky does
+// not reach is dark, which is the shade in the gap between two bodies that shows whether they touch. A little
+// light comes back from the ground, a soft rim from behind.
 #include "shaders.h"
 
 namespace render {

@@ -1,11 +1,12 @@
-// The Stribeck curve of eight lanes:  g(w) = fn (mu_C + (mu_S - mu_C) s),  s = exp(-a),  a = (w/v_s)^delta;  w g'(w) = fn (mu_S - mu_C) slope,
-// slope = w s'(w) = -delta a s.
+// The Stribeck curve of eight lanes:  g(w) = fn (mu_C + (mu_S - mu_C) s),  s = exp(-a),  a = (w/v_s)^delta;
+// w g'(w) = fn (mu_S - mu_C) slope, slope = w s'(w) = -delta a s.
 #pragma once
 #include "lanes.h"
 
 namespace lanes {
 
-// dfm_pow for a base in (0, 1e300) and an exponent in [0.1, 10]: the same operations without its branches, so the same bits in every lane.
+// dfm_pow for a base in (0, 1e300) and an exponent in [0.1, 10]: the same operations without its branches, so
+// the same bits in every lane.
 DEFORM_PASS inline double power(double x, double y) {
   double high, low;
   dfm_log2_(x, &high, &low);
@@ -21,18 +22,18 @@ DEFORM_PASS inline void curve(double v_s, double delta, const double *w, double 
   double a[kLanes], e[kLanes];
   const double inverse = 1.0 / v_s;
   if (delta == 2.0) {
-    EACH_LANE(i) {
+    EACH_LANE (i) {
       const double x = w[i] * inverse;
       a[i] = x * x;
     }
   } else {
     double x[kLanes];
-    EACH_LANE(i) x[i] = w[i] * inverse;
-    EACH_LANE(i) a[i] = power(x[i] > 1e-300 ? x[i] : 1e-300, delta);
-    EACH_LANE(i) a[i] = x[i] > 0 ? a[i] : 0.0;
+    EACH_LANE (i) x[i] = w[i] * inverse;
+    EACH_LANE (i) a[i] = power(x[i] > 1e-300 ? x[i] : 1e-300, delta);
+    EACH_LANE (i) a[i] = x[i] > 0 ? a[i] : 0.0;
   }
-  EACH_LANE(i) e[i] = dfm_exp(-a[i]);
-  EACH_LANE(i) {
+  EACH_LANE (i) e[i] = dfm_exp(-a[i]);
+  EACH_LANE (i) {
     excess[i] = e[i];
     slope[i] = e[i] > 0 ? -delta * a[i] * e[i] : 0.0;  // a may be infinite where e has vanished
   }

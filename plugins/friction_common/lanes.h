@@ -1,25 +1,31 @@
-// Eight contacts at a time, for every law of the shelf: the lanes, the values that they are kept within, and the choice of vector width.
+// Eight contacts at a time, for every law of the shelf: the lanes, the values that they are kept within, and
+// the choice of vector width.
 //
-// The passes over a block choose by value, not by branch: real batches mix stick and slip, and a mispredicted branch costs more than both
-// sides. They run the same operations in the same order at every width, without fused multiply-add, so the wide build of a law gives the bits
-// of the narrow one.
+// The passes over a block choose by value, not by branch: real batches mix stick and slip, and a mispredicted
+// branch costs more than both sides. They run the same operations in the same order at every width, without
+// fused multiply-add, so the wide build of a law gives the bits of the narrow one.
 #pragma once
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>
 #include <cstring>
 
-#define DFM_ELEMENTARY_ALWAYS_INLINE   // a law's passes are compiled for several widths
+#define DFM_ELEMENTARY_ALWAYS_INLINE  // a law's passes are compiled for several widths
 #include "deform/plugin.hpp"
 
 namespace lanes {
 
 constexpr uint32_t kLanes = 8;
 
-// A pass over a block. Columns overlap nowhere, so each lane is on its own; the compiler cannot see that and is told.
+// A pass over a block. Columns overlap nowhere, so each lane is on its own; the compiler cannot see
+// that and is told.
 #ifdef __clang__
-#pragma clang diagnostic ignored "-Wpass-failed"   // a build that does not optimize uses no vectors, and that is no fault
-#define EACH_LANE(i) _Pragma("clang loop vectorize(assume_safety) interleave(disable) unroll(disable)") for (uint32_t i = 0; i < lanes::kLanes; ++i)
+// a build that does not optimize uses no vectors, and that is no fault
+#pragma clang diagnostic ignored "-Wpass-failed"
+#define EACH_LANE(i)                                                                                         \
+  _Pragma("clang loop vectorize(assume_safety) interleave(disable) unroll(disable)") for (uint32_t i = 0;    \
+                                                                                          i < lanes::kLanes; \
+                                                                                          ++i)
 #elif defined(__GNUC__)
 #define EACH_LANE(i) _Pragma("GCC ivdep") for (uint32_t i = 0; i < lanes::kLanes; ++i)
 #else
@@ -38,7 +44,9 @@ enum Width { kNarrow, kAvx2, kAvx512 };
 #define DEFORM_AVX2 __attribute__((target("avx2"), flatten))
 #define DEFORM_NARROW __attribute__((flatten))
 inline Width widest() {
-  if (__builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512vl") && __builtin_cpu_supports("avx512dq")) return kAvx512;
+  if (__builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512vl") &&
+      __builtin_cpu_supports("avx512dq"))
+    return kAvx512;
   return __builtin_cpu_supports("avx2") ? kAvx2 : kNarrow;
 }
 #else
@@ -49,29 +57,43 @@ inline Width widest() {
 inline Width widest() { return kNarrow; }
 #endif
 
-// Law::run(in, out) compiled once per width; the processor chooses. What it calls must become part of it, or it would stay at the width that everybody
-// has: gcc draws in whatever a `flatten` function calls, clang only the outermost calls, so each pass says DEFORM_PASS.
+// Law::run(in, out) compiled once per width; the processor chooses. What it calls must become part of it, or
+// it would stay at the width that everybody has: gcc draws in whatever a `flatten` function calls, clang only
+// the outermost calls, so each pass says DEFORM_PASS.
 template <class Law>
-DEFORM_AVX512 dfm_status eval_avx512(const dfm_friction_in *in, dfm_friction_out *out) { return Law::run(in, out); }
+DEFORM_AVX512 dfm_status eval_avx512(const dfm_friction_in *in, dfm_friction_out *out) {
+  return Law::run(in, out);
+}
 template <class Law>
-DEFORM_AVX2 dfm_status eval_avx2(const dfm_friction_in *in, dfm_friction_out *out) { return Law::run(in, out); }
+DEFORM_AVX2 dfm_status eval_avx2(const dfm_friction_in *in, dfm_friction_out *out) {
+  return Law::run(in, out);
+}
 template <class Law>
-DEFORM_NARROW dfm_status eval_narrow(const dfm_friction_in *in, dfm_friction_out *out) { return Law::run(in, out); }
+DEFORM_NARROW dfm_status eval_narrow(const dfm_friction_in *in, dfm_friction_out *out) {
+  return Law::run(in, out);
+}
 
 // DEFORM_SIMD (sse2, avx2, avx512) asks for less than the processor has; read when the plugin is loaded.
 inline Width chosen() {
   const char *const asked = std::getenv("DEFORM_SIMD");
-  const Width most = widest(), w = !asked ? most : !std::strcmp(asked, "sse2") ? kNarrow : !std::strcmp(asked, "avx2") ? kAvx2 : most;
+  const Width most = widest();
+  const Width w = !asked                        ? most
+                  : !std::strcmp(asked, "sse2") ? kNarrow
+                  : !std::strcmp(asked, "avx2") ? kAvx2
+                                                : most;
   return w < most ? w : most;
 }
 inline const Width kChosen = chosen();
 
 template <class Law>
 dfm_status eval(const dfm_friction_in *in, dfm_friction_out *out) {
-  return kChosen == kAvx512 ? eval_avx512<Law>(in, out) : kChosen == kAvx2 ? eval_avx2<Law>(in, out) : eval_narrow<Law>(in, out);
+  return kChosen == kAvx512 ? eval_avx512<Law>(in, out)
+         : kChosen == kAvx2 ? eval_avx2<Law>(in, out)
+                            : eval_narrow<Law>(in, out);
 }
 
-// A NaN becomes `most`: what a lane computes stays finite, and its outputs are spoilt at the end by what came in.
+// A NaN becomes `most`: what a lane computes stays finite, and its outputs are spoilt at the end
+// by what came in.
 DEFORM_PASS inline double within(double x, double most) {
   const double low = x > -most ? x : -most;
   return low < most ? low : most;

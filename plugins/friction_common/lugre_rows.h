@@ -1,4 +1,5 @@
-// Parameters that lugre and elastoplastic share, their cross-field rule, and the warning about a form of micro-damping that can push.
+// Parameters that lugre and elastoplastic share, their cross-field rule, and the warning about a form of
+// micro-damping that can push.
 #pragma once
 #include "bristle.h"
 
@@ -7,44 +8,52 @@ namespace lugre {
 enum { kMuC, kMuS, kVs, kDelta, kSigma0, kSigma1, kForm, kVd, kSigma2, kShared };
 constexpr const char *kForms[] = {"passive", "constant", "falling", nullptr};
 
-#define LUGRE_ROWS                                                                                                                         \
-  dfm::plugin::param("mu_C", "kinetic friction coefficient", "1", 0, 100, 0.5, DFM_PARAM_RUNTIME),                                          \
-      dfm::plugin::param("mu_S", "static friction coefficient", "1", 0, 100, 0.5, DFM_PARAM_RUNTIME),                                       \
-      dfm::plugin::param("v_s", "Stribeck speed", "m/s", 1e-9, 1e3, 0.01, DFM_PARAM_RUNTIME | DFM_PARAM_LOG_SCALE),                         \
-      dfm::plugin::param("delta", "Stribeck exponent", "1", 0.1, 10, 2, DFM_PARAM_RUNTIME),                                                 \
-      dfm::plugin::param("sigma0", "bristle stiffness per area", "N/m^3", 1, 1e15, 1e8, DFM_PARAM_RUNTIME | DFM_PARAM_LOG_SCALE),           \
-      dfm::plugin::param("sigma1", "bristle damping per area", "N s/m^3", 0, 1e12, 1e5, DFM_PARAM_RUNTIME),                                 \
-      dfm::plugin::enumeration("sigma1_form", "how sigma1 falls with speed", lugre::kForms, bristle::kPassive),                             \
-      dfm::plugin::param("v_d", "speed at which sigma1 of the form falling is e times smaller", "m/s", 1e-9, 1e3, 0.01,                     \
-                         DFM_PARAM_RUNTIME | DFM_PARAM_LOG_SCALE),                                                                         \
+#define LUGRE_ROWS                                                                                           \
+  dfm::plugin::param("mu_C", "kinetic friction coefficient", "1", 0, 100, 0.5, DFM_PARAM_RUNTIME),           \
+      dfm::plugin::param("mu_S", "static friction coefficient", "1", 0, 100, 0.5, DFM_PARAM_RUNTIME),        \
+      dfm::plugin::param("v_s", "Stribeck speed", "m/s", 1e-9, 1e3, 0.01,                                    \
+                         DFM_PARAM_RUNTIME | DFM_PARAM_LOG_SCALE),                                           \
+      dfm::plugin::param("delta", "Stribeck exponent", "1", 0.1, 10, 2, DFM_PARAM_RUNTIME),                  \
+      dfm::plugin::param("sigma0", "bristle stiffness per area", "N/m^3", 1, 1e15, 1e8,                      \
+                         DFM_PARAM_RUNTIME | DFM_PARAM_LOG_SCALE),                                           \
+      dfm::plugin::param("sigma1", "bristle damping per area", "N s/m^3", 0, 1e12, 1e5, DFM_PARAM_RUNTIME),  \
+      dfm::plugin::enumeration("sigma1_form", "how sigma1 falls with speed", lugre::kForms,                  \
+                               bristle::kPassive),                                                           \
+      dfm::plugin::param("v_d", "speed at which sigma1 of the form falling is e times smaller", "m/s", 1e-9, \
+                         1e3, 0.01, DFM_PARAM_RUNTIME | DFM_PARAM_LOG_SCALE),                                \
       dfm::plugin::param("sigma2", "viscous friction per area", "N s/m^3", 0, 1e12, 0, DFM_PARAM_RUNTIME)
 
 inline bristle::Batch batch(const double *p) {
-  return {0, p[kMuC], p[kMuS], p[kVs], p[kDelta], p[kSigma0], p[kSigma1], static_cast<int>(p[kForm]), p[kVd], p[kSigma2]};
+  return {0,      p[kMuC],   p[kMuS], p[kVs], p[kDelta], p[kSigma0], p[kSigma1], static_cast<int>(p[kForm]),
+          p[kVd], p[kSigma2]};
 }
 
 inline dfm_status check(const double *p, char *why, size_t cap) {
   if (p[kMuS] >= p[kMuC]) return DFM_OK;
-  std::snprintf(why, cap, "mu_S (%g) must not be below mu_C (%g); give both, or \"mu\" for mu_C = mu_S", p[kMuS], p[kMuC]);
+  std::snprintf(why, cap, "mu_S (%g) must not be below mu_C (%g); give both, or \"mu\" for mu_C = mu_S",
+                p[kMuS], p[kMuC]);
   return DFM_E_ARG;
 }
 
 constexpr int32_t kWarning = 2;  // DFM_LOG_WARNING of base.h, which plugins do not see
 
-// What constant micro-damping can push with at most, against the viscous part that must brake it; `excess` as the law's flow has it.
+// What constant micro-damping can push with at most, against the viscous part that must brake it; `excess` as
+// the law's flow has it.
 inline void warn(const dfm_host *host, const double *p, double excess, const char *as) {
   char text[320] = "";
   const int form = static_cast<int>(p[kForm]);
   const double sigma1 = p[kSigma1], present = p[kSigma2] * p[kMuC];
   if (form == bristle::kConstant && excess > present)
-    std::snprintf(text, sizeof text,
-                  "constant sigma1 can push instead of brake: sigma2 mu_C >= sigma1 %s is violated, %g < %g (sigma1 %g, sigma2 %g, mu_C %g, "
-                  "mu_S %g); \"sigma1_form\": \"passive\" is safe with any parameters",
-                  as, present, excess, sigma1, p[kSigma2], p[kMuC], p[kMuS]);
+    std::snprintf(
+        text, sizeof text,
+        "constant sigma1 can push instead of brake: sigma2 mu_C >= sigma1 %s is violated, %g < %g (sigma1 "
+        "%g, sigma2 %g, mu_C %g, mu_S %g); \"sigma1_form\": \"passive\" is safe with any parameters",
+        as, present, excess, sigma1, p[kSigma2], p[kMuC], p[kMuS]);
   if (form == bristle::kFalling && sigma1 > 0)
     std::snprintf(text, sizeof text,
-                  "falling sigma1 is passive only where v_d <= 4 mu_C p/(0.4289 sigma1), that is above a contact pressure p of %g Pa (sigma1 %g, v_d %g, "
-                  "mu_C %g); \"sigma1_form\": \"passive\" is safe at any pressure",
+                  "falling sigma1 is passive only where v_d <= 4 mu_C p/(0.4289 sigma1), that is above a "
+                  "contact pressure p of %g Pa (sigma1 %g, v_d %g, mu_C %g); \"sigma1_form\": \"passive\" is "
+                  "safe at any pressure",
                   0.4289 * sigma1 * p[kVd] / (4 * p[kMuC]), sigma1, p[kVd], p[kMuC]);
   if (*text && host && host->log) host->log(host->ctx, kWarning, 0, text);
 }

@@ -2,13 +2,16 @@
 //
 //   g(w) = F_C + (F_S - F_C) exp(-(w/v_s)^delta),   F_C = mu_C fn, F_S = mu_S fn, w = |v|        (Stribeck curve, N)
 //   stick  |ft_stop| <= R:  ft = ft_stop, the force that makes the slip of this step zero
-//   slip   otherwise:       at rest (w <= band)  F_S along ft_stop, which is where the contact is about to go;
+//   slip   otherwise:       at rest (w <= band)  F_S along ft_stop, which is where the contact
+//                           is about to go;
 //                           beyond it            ft = -(g(w) + sigma2 A w) v/w
 //
-// The laws differ in the band that counts as rest and in the disc that holds what slides already. Coulomb: band 0 and R = F_S at every speed.
-// Karnopp: band dv, and beyond it R = g(w) + sigma2 A w: what slides is stopped by kinetic friction alone. Where w > band,
+// The laws differ in the band that counts as rest and in the disc that holds what slides already. Coulomb:
+// band 0 and R = F_S at every speed. Karnopp: band dv, and beyond it R = g(w) + sigma2 A w: what slides is
+// stopped by kinetic friction alone. Where w > band,
 //   dft/dv = -[F' v^v^T + (F/w) (1 - v^v^T)],  F = g + sigma2 A w,  F' = g' + sigma2 A,  dft/dfn = -(g/fn) v^
-// A lane with a NaN or an infinite input gives NaN in that lane alone. Each lane runs the same operations at every vector width.
+// A lane with a NaN or an infinite input gives NaN in that lane alone. Each lane runs the same operations at
+// every vector width.
 #pragma once
 #include "curve.h"
 
@@ -18,29 +21,39 @@ enum { kMuC, kMuS, kVs, kDelta, kSigma2, kShared };  // every law of the family 
 constexpr dfm_param kRows[kShared] = {
     dfm::plugin::param("mu_C", "kinetic friction coefficient", "1", 0, 100, 0.5, DFM_PARAM_RUNTIME),
     dfm::plugin::param("mu_S", "static friction coefficient", "1", 0, 100, 0.5, DFM_PARAM_RUNTIME),
-    dfm::plugin::param("v_s", "Stribeck speed", "m/s", 1e-9, 1e3, 0.01, DFM_PARAM_RUNTIME | DFM_PARAM_LOG_SCALE),
+    dfm::plugin::param("v_s", "Stribeck speed", "m/s", 1e-9, 1e3, 0.01,
+                       DFM_PARAM_RUNTIME | DFM_PARAM_LOG_SCALE),
     dfm::plugin::param("delta", "Stribeck exponent", "1", 0.1, 10, 2, DFM_PARAM_RUNTIME),
     dfm::plugin::param("sigma2", "viscous friction per area", "N s/m^3", 0, 1e12, 0, DFM_PARAM_RUNTIME),
 };
 
 using lanes::kLanes;
 constexpr double kTiny = 1e-280, kHuge = 1e280;  // squares beyond these have lost digits or are about to
-constexpr double kRest = 1e-100;                 // m/s; below it 1/w is held constant, so that no derivative is infinite
+// m/s; below it 1/w is held constant, so that no derivative is infinite
+constexpr double kRest = 1e-100;
 
 // kinetic_stop: what slides already is stopped by g(w) + sigma2 A w alone (Karnopp), not by F_S.
-struct Batch { double mu_c, mu_s, v_s, delta, sigma2, band; bool kinetic_stop; };
+struct Batch {
+  double mu_c, mu_s, v_s, delta, sigma2, band;
+  bool kinetic_stop;
+};
 
-// Eight contacts: where their columns lie. An output that is not wanted goes to a place of its own, so that no two overlap.
+// Eight contacts: where their columns lie. An output that is not wanted goes to a place of its own, so that
+// no two overlap.
 struct Block {
   const double *fn, *vx, *vy, *sx, *sy, *area;
   double *fx, *fy, *limit, *xx, *xy, *yx, *yy, *nx, *ny;
 };
 
-// What the passes over a block hand on: mode 0 open, 1 stick, 2 slip; odd: left to odd_lane; speed and its inverse; excess s = exp(-a),
-// a = (w/v_s)^delta, the share of F_S - F_C at this speed, and slope = w s'(w) = -delta a s.
-struct Passes { double mode[kLanes], odd[kLanes], w[kLanes], inverse[kLanes], excess[kLanes], slope[kLanes]; };
+// What the passes over a block hand on: mode 0 open, 1 stick, 2 slip; odd: left to odd_lane; speed and its
+// inverse; excess s = exp(-a), a = (w/v_s)^delta, the share of F_S - F_C at this speed, and slope = w
+// s'(w) = -delta a s.
+struct Passes {
+  double mode[kLanes], odd[kLanes], w[kLanes], inverse[kLanes], excess[kLanes], slope[kLanes];
+};
 
-// Where squares leave the range of doubles, or slip begins from the band of rest: rare, so one lane at a time, scaled by the larger component.
+// Where squares leave the range of doubles, or slip begins from the band of rest: rare, so one lane at a
+// time, scaled by the larger component.
 struct Polar { double length, x, y; };
 
 inline Polar polar(double x, double y) {
@@ -55,43 +68,70 @@ inline void odd_lane(const Batch &p, const Block &b, Passes &t, uint32_t i) {
   const double poison = 0.0 * fn + 0.0 * b.vx[i] + 0.0 * b.vy[i] + 0.0 * b.sx[i] + 0.0 * b.sy[i] + 0.0 * drag;
   const Polar stop = polar(b.sx[i], b.sy[i]), v = polar(b.vx[i], b.vy[i]);
   const double w = v.length > p.band ? v.length : 0.0;
-  const double x = w / p.v_s, a = p.delta == 2.0 ? x * x : dfm_pow(x, p.delta), s = dfm_exp(-a), slope = s > 0 ? -p.delta * a * s : 0.0;
+  const double x = w / p.v_s;
+  const double a = p.delta == 2.0 ? x * x : dfm_pow(x, p.delta);
+  const double s = dfm_exp(-a);
+  const double slope = s > 0 ? -p.delta * a * s : 0.0;
   const double mu = p.mu_c + (p.mu_s - p.mu_c) * s, level = mu * fn + drag * w;
-  double fx = b.sx[i], fy = b.sy[i], limit = p.kinetic_stop && w > 0 ? level : stiction, nx = 0, ny = 0, xx = 0, xy = 0, yy = 0;
+  double fx = b.sx[i];
+  double fy = b.sy[i];
+  double limit = p.kinetic_stop && w > 0 ? level : stiction;
+  double nx = 0;
+  double ny = 0;
+  double xx = 0;
+  double xy = 0;
+  double yy = 0;
   t.mode[i] = 1;
   if (stop.length > limit) {
     const double dx = w > 0 ? -v.x : stop.x, dy = w > 0 ? -v.y : stop.y;
     limit = level;
-    fx = limit * dx, fy = limit * dy, nx = mu * dx, ny = mu * dy;
+    fx = limit * dx;
+    fy = limit * dy;
+    nx = mu * dx;
+    ny = mu * dy;
     t.mode[i] = 2;
     if (w > 0) {
       const double divisor = w > kRest ? w : kRest, across = limit / divisor;
       const double d = ((p.mu_s - p.mu_c) * fn * slope + drag * w) / divisor - across;
-      xx = -(across + d * dx * dx), xy = -(d * dx * dy), yy = -(across + d * dy * dy);
+      xx = -(across + d * dx * dx);
+      xy = -(d * dx * dy);
+      yy = -(across + d * dy * dy);
     }
   }
-  b.fx[i] = fx + poison, b.fy[i] = fy + poison, b.limit[i] = limit + poison, b.nx[i] = nx + poison, b.ny[i] = ny + poison;
-  b.xx[i] = xx + poison, b.xy[i] = b.yx[i] = xy + poison, b.yy[i] = yy + poison;
+  b.fx[i] = fx + poison;
+  b.fy[i] = fy + poison;
+  b.limit[i] = limit + poison;
+  b.nx[i] = nx + poison;
+  b.ny[i] = ny + poison;
+  b.xx[i] = xx + poison;
+  b.xy[i] = b.yx[i] = xy + poison;
+  b.yy[i] = yy + poison;
 }
 
-// The passes below choose by value, not by branch: real batches mix stick and slip, and a mispredicted branch costs more than both sides.
-// Tells whether any lane slips; with kinetic_stop these are the lanes beyond the band, and answer() finds those that stop.
+// The passes below choose by value, not by branch: real batches mix stick and slip, and a mispredicted branch
+// costs more than both sides. Tells whether any lane slips; with kinetic_stop these are the lanes beyond the
+// band, and answer() finds those that stop.
 struct Found { bool slips, odd; };
 template <bool kKineticStop>
 DEFORM_PASS inline Found decide(const Batch &p, const Block &b, Passes &t) {
   uint64_t slips = 0, odd = 0;
   const double band2 = p.band * p.band;
-  EACH_LANE(i) {
-    const double stiction = p.mu_s * b.fn[i], s2 = b.sx[i] * b.sx[i] + b.sy[i] * b.sy[i], f2 = stiction * stiction;
+  EACH_LANE (i) {
+    const double stiction = p.mu_s * b.fn[i];
+    const double s2 = b.sx[i] * b.sx[i] + b.sy[i] * b.sy[i];
+    const double f2 = stiction * stiction;
     const double v2 = b.vx[i] * b.vx[i] + b.vy[i] * b.vy[i];
-    const double larger = s2 > f2 ? s2 : f2, touches = b.fn[i] > 0 ? 1.0 : 0.0, gives = s2 > f2 ? touches : 0.0;
+    const double larger = s2 > f2 ? s2 : f2;
+    const double touches = b.fn[i] > 0 ? 1.0 : 0.0;
+    const double gives = s2 > f2 ? touches : 0.0;
     const double moves = v2 > band2 ? touches : 0.0, slip = kKineticStop ? moves : gives;
     const double starts = kKineticStop ? gives * (1.0 - moves) : 0.0;
     const double low = larger < kTiny ? touches : 0.0, high = larger > kHuge ? touches : 0.0;
     const double slow = v2 > kTiny ? 0.0 : slip, fast = v2 < kHuge ? 0.0 : slip;
     t.mode[i] = touches + slip;
     t.odd[i] = ((low + high) + (slow + fast)) + starts;
-    slips |= slip > 0 ? uint64_t(1) : uint64_t(0), odd |= t.odd[i] > 0 ? uint64_t(1) : uint64_t(0);
+    slips |= slip > 0 ? uint64_t(1) : uint64_t(0);
+    odd |= t.odd[i] > 0 ? uint64_t(1) : uint64_t(0);
     t.w[i] = std::sqrt(slip > 0 ? v2 : 1.0);
     t.inverse[i] = 1.0 / t.w[i];
     t.excess[i] = t.slope[i] = 0.0;
@@ -100,20 +140,38 @@ DEFORM_PASS inline Found decide(const Batch &p, const Block &b, Passes &t) {
 }
 
 template <bool kKineticStop>
-DEFORM_PASS inline void answer(const Batch &p, const Block &b, Passes &t, double *__restrict ofx, double *__restrict ofy, double *__restrict olimit,
-                               double *__restrict oxx, double *__restrict oxy, double *__restrict oyx, double *__restrict oyy,
+DEFORM_PASS inline void answer(const Batch &p, const Block &b, Passes &t, double *__restrict ofx,
+                               double *__restrict ofy, double *__restrict olimit, double *__restrict oxx,
+                               double *__restrict oxy, double *__restrict oyx, double *__restrict oyy,
                                double *__restrict onx, double *__restrict ony) {
-  EACH_LANE(i) {
-    const double fn = b.fn[i], drag = p.sigma2 * b.area[i], vx = b.vx[i], vy = b.vy[i], sx = b.sx[i], sy = b.sy[i];
+  EACH_LANE (i) {
+    const double fn = b.fn[i];
+    const double drag = p.sigma2 * b.area[i];
+    const double vx = b.vx[i];
+    const double vy = b.vy[i];
+    const double sx = b.sx[i];
+    const double sy = b.sy[i];
     // 0 where every input is finite, NaN otherwise: no output of a bad lane passes for a good one.
     const double poison = 0.0 * fn + 0.0 * vx + 0.0 * vy + 0.0 * sx + 0.0 * sy + 0.0 * drag;
-    const double load = fn > 0 ? fn : 0.0, mu = p.mu_c + (p.mu_s - p.mu_c) * t.excess[i], w = t.w[i], inverse = t.inverse[i], level = mu * load + drag * w;
-    const double mode = t.mode[i], moves = mode > 1 ? 1.0 : 0.0, stops = kKineticStop && sx * sx + sy * sy <= level * level ? moves : 0.0, slip = moves - stops;
+    const double load = fn > 0 ? fn : 0.0;
+    const double mu = p.mu_c + (p.mu_s - p.mu_c) * t.excess[i];
+    const double w = t.w[i];
+    const double inverse = t.inverse[i];
+    const double level = mu * load + drag * w;
+    const double mode = t.mode[i];
+    const double moves = mode > 1 ? 1.0 : 0.0;
+    const double stops = kKineticStop && sx * sx + sy * sy <= level * level ? moves : 0.0;
+    const double slip = moves - stops;
     // What does not slip goes through the same operations with no direction and no level.
     const double fs = slip > 0 ? level : 0.0, ux = slip > 0 ? vx : 0.0, uy = slip > 0 ? vy : 0.0;
-    const double hold = mode - moves - slip, hx = hold > 0 ? sx : 0.0, hy = hold > 0 ? sy : 0.0, stiction = p.mu_s * load;
+    const double hold = mode - moves - slip;
+    const double hx = hold > 0 ? sx : 0.0;
+    const double hy = hold > 0 ? sy : 0.0;
+    const double stiction = p.mu_s * load;
     const double dx = -ux * inverse, dy = -uy * inverse, across = fs * inverse;
-    const double along = ((p.mu_s - p.mu_c) * load * t.slope[i] + drag * w) * inverse, d = along - across, xy = -(d * dx * dy) + poison;
+    const double along = ((p.mu_s - p.mu_c) * load * t.slope[i] + drag * w) * inverse;
+    const double d = along - across;
+    const double xy = -(d * dx * dy) + poison;
     ofx[i] = (fs * dx + hx) + poison;
     ofy[i] = (fs * dy + hy) + poison;
     olimit[i] = (moves > 0 ? level : stiction) + poison;
@@ -136,10 +194,24 @@ struct Run {
     const size_t stride = in->stride;
     double spare[9][kLanes];
     for (size_t at = 0; at < in->n; at += kLanes) {  // lanes up to n rounded to 8 may be touched
-      const auto to = [&](double *column, size_t c, uint32_t k) { return column ? column + c * stride + at : spare[k]; };
-      const Block b = {in->fn + at, in->vt + at, in->vt + stride + at, in->ft_stop + at, in->ft_stop + stride + at, in->area + at,
-                       to(out->ft, 0, 0), to(out->ft, 1, 1), to(out->limit, 0, 2), to(out->dft_dvt, 0, 3), to(out->dft_dvt, 1, 4), to(out->dft_dvt, 2, 5),
-                       to(out->dft_dvt, 3, 6), to(out->dft_dfn, 0, 7), to(out->dft_dfn, 1, 8)};
+      const auto to = [&](double *column, size_t c, uint32_t k) {
+        return column ? column + c * stride + at : spare[k];
+      };
+      const Block b = {in->fn + at,
+                       in->vt + at,
+                       in->vt + stride + at,
+                       in->ft_stop + at,
+                       in->ft_stop + stride + at,
+                       in->area + at,
+                       to(out->ft, 0, 0),
+                       to(out->ft, 1, 1),
+                       to(out->limit, 0, 2),
+                       to(out->dft_dvt, 0, 3),
+                       to(out->dft_dvt, 1, 4),
+                       to(out->dft_dvt, 2, 5),
+                       to(out->dft_dvt, 3, 6),
+                       to(out->dft_dfn, 0, 7),
+                       to(out->dft_dfn, 1, 8)};
       Passes t;
       const Found found = decide<Law::kKineticStop>(p, b, t);
       if (found.slips && p.mu_s != p.mu_c) lanes::curve(p.v_s, p.delta, t.w, t.excess, t.slope);
@@ -157,7 +229,8 @@ struct Run {
 
 inline dfm_status check(const double *p, char *why, size_t cap) {
   if (p[kMuS] >= p[kMuC]) return DFM_OK;
-  std::snprintf(why, cap, "mu_S (%g) must not be below mu_C (%g); give both, or \"mu\" for mu_C = mu_S", p[kMuS], p[kMuC]);
+  std::snprintf(why, cap, "mu_S (%g) must not be below mu_C (%g); give both, or \"mu\" for mu_C = mu_S",
+                p[kMuS], p[kMuC]);
   return DFM_E_ARG;
 }
 

@@ -1,6 +1,6 @@
-// org.deform.msm: mass-spring model on the edges of tetrahedra, dampers along the springs, a volume term per cell, anisotropy by extra
-// coordinates. Zerbato 2010, 2.2, (2.25), (2.26), (2.27), Fig. 2.5 and chapter 6, as corrected in doc/models/msm.md, which derives the
-// constants.
+// org.deform.msm: mass-spring model on the edges of tetrahedra, dampers along the springs, a volume term per
+// cell, anisotropy by extra coordinates. Zerbato 2010, 2.2, (2.25), (2.26), (2.27), Fig. 2.5 and chapter 6,
+// as corrected in doc/models/msm.md, which derives the constants.
 #include <stdio.h>
 
 #include "msm_body.h"
@@ -16,19 +16,29 @@ const char *const kDampers[] = {"voigt", "maxwell", "sls", nullptr};
 
 const dfm_param kParams[kParamCount] = {
     {"young", "Young's modulus", "Pa", 1e-3, 1e13, 1e5, kRun | DFM_PARAM_LOG_SCALE | kCell, 1, nullptr},
-    {"poisson", "Poisson ratio; the model gives 1/4 and more", "1", -0.99, 0.4999, 0.3, kRun | kCell, 1, nullptr},
+    {"poisson", "Poisson ratio; the model gives 1/4 and more", "1", -0.99, 0.4999, 0.3, kRun | kCell, 1,
+     nullptr},
     {"damping_stiffness", "damper over stiffness of each spring", "s", 0, 1e3, 0, kRun | kCell, 1, nullptr},
     {"damping_mass", "drag over mass of each point", "1/s", 0, 1e6, 0, kRun | kCell, 1, nullptr},
-    {"volume", "volume stiffness in bulk moduli E/(3(1-2 nu)); 0: off; auto, -1: what makes poisson the body's ratio", "1", kFromPoisson, 1e6, kFromPoisson,
-     kRun | kCell | DFM_PARAM_AUTO, 1, nullptr},
-    {"collapse", "stiffness against collapse of a cell below 0.6 of its volume, over young; 0: off", "1", 0, 1e3, 3, kRun | kCell, 1, nullptr},
-    {"anisotropy_slope", "slope of the extra coordinates; 0: isotropic", "1", 0, 1e3, 0, kRun | kCell, 1, nullptr},
-    {"anisotropy_kind", "what the body is along the axis", "1", 0, 1, kSofter, kRun | DFM_PARAM_ENUM, 1, kKinds},
-    {"anisotropy_form", "force of a tilted spring: projected (B) or turned back (A)", "1", 0, 1, kFormB, DFM_PARAM_ENUM, 1, kForces},
-    {"damper", "voigt: beside the spring; maxwell: behind it; sls: a spring beside both", "1", 0, 2, kVoigt, DFM_PARAM_ENUM, 1, kDampers},
-    {"relaxation_ratio", "sls: stiffness of the branch over that of the spring", "1", 1e-6, 1e3, 1, kRun, 1, nullptr},
-    {"relaxation_time", "maxwell and sls: dashpot over stiffness of the branch", "s", 1e-9, 1e9, 0.1, kRun | DFM_PARAM_LOG_SCALE, 1, nullptr},
-    {"anisotropy_axis", "axis of the anisotropy; its length does not matter", "1", -1e6, 1e6, 1, kRun | kCell, 3, nullptr},
+    {"volume",
+     "volume stiffness in bulk moduli E/(3(1-2 nu)); 0: off; auto, -1: what makes poisson the body's ratio",
+     "1", kFromPoisson, 1e6, kFromPoisson, kRun | kCell | DFM_PARAM_AUTO, 1, nullptr},
+    {"collapse", "stiffness against collapse of a cell below 0.6 of its volume, over young; 0: off", "1", 0,
+     1e3, 3, kRun | kCell, 1, nullptr},
+    {"anisotropy_slope", "slope of the extra coordinates; 0: isotropic", "1", 0, 1e3, 0, kRun | kCell, 1,
+     nullptr},
+    {"anisotropy_kind", "what the body is along the axis", "1", 0, 1, kSofter, kRun | DFM_PARAM_ENUM, 1,
+     kKinds},
+    {"anisotropy_form", "force of a tilted spring: projected (B) or turned back (A)", "1", 0, 1, kFormB,
+     DFM_PARAM_ENUM, 1, kForces},
+    {"damper", "voigt: beside the spring; maxwell: behind it; sls: a spring beside both", "1", 0, 2, kVoigt,
+     DFM_PARAM_ENUM, 1, kDampers},
+    {"relaxation_ratio", "sls: stiffness of the branch over that of the spring", "1", 1e-6, 1e3, 1, kRun, 1,
+     nullptr},
+    {"relaxation_time", "maxwell and sls: dashpot over stiffness of the branch", "s", 1e-9, 1e9, 0.1,
+     kRun | DFM_PARAM_LOG_SCALE, 1, nullptr},
+    {"anisotropy_axis", "axis of the anisotropy; its length does not matter", "1", -1e6, 1e6, 1, kRun | kCell,
+     3, nullptr},
 };
 
 void complain(const dfm_host *h, const char *what) {
@@ -44,21 +54,33 @@ bool check_params(const dfm_host *h, const double *values) {
     const dfm_param &p = kParams[n < kAxis ? n : uint32_t(kAxis)];
     if (values[n] >= p.min && values[n] <= p.max) continue;
     char text[200];
-    snprintf(text, sizeof text, "parameter %s = %g %s is outside %g .. %g", p.key, values[n], p.unit, p.min, p.max);
-    return complain(h, text), false;
+    snprintf(text, sizeof text, "parameter %s = %g %s is outside %g .. %g", p.key, values[n], p.unit, p.min,
+             p.max);
+    complain(h, text);
+    return false;
   }
-  if (values[kVolume] < 0 && values[kVolume] != kFromPoisson)
-    return complain(h, "parameter volume lies between -1 (from poisson) and 0 (off); give one of them, or more"), false;
+  if (values[kVolume] < 0 && values[kVolume] != kFromPoisson) {
+    complain(h, "parameter volume lies between -1 (from poisson) and 0 (off); give one of them, or more");
+    return false;
+  }
   const double *a = values + kAxis;
-  if (!(a[0] != 0 || a[1] != 0 || a[2] != 0)) return complain(h, "parameter anisotropy_axis is zero; give a direction"), false;
-  if (uint32_t(values[kAxisForm]) == kFormA && uint32_t(values[kDamper]) != kVoigt)
-    return complain(h, "parameter anisotropy_form A takes damper voigt only: with a branch its force has no energy; choose form B"), false;
+  if (!(a[0] != 0 || a[1] != 0 || a[2] != 0)) {
+    complain(h, "parameter anisotropy_axis is zero; give a direction");
+    return false;
+  }
+  if (uint32_t(values[kAxisForm]) == kFormA && uint32_t(values[kDamper]) != kVoigt) {
+    complain(h,
+             "parameter anisotropy_form A takes damper voigt only: with a branch its force has no energy; "
+             "choose form B");
+    return false;
+  }
   return true;
 }
 
 const char *check_mesh(const dfm_mesh &m) {
   if (m.cell != DFM_CELL_TET) return "the cells must be tetrahedra";
-  if (!m.npoint || !m.ncell || !m.nedge || !m.edges || !m.cells || !m.rest || !m.mass) return "the mesh has no cells, points or edges";
+  if (!m.npoint || !m.ncell || !m.nedge || !m.edges || !m.cells || !m.rest || !m.mass)
+    return "the mesh has no cells, points or edges";
   for (size_t n = 0; n < 4 * size_t(m.ncell); ++n)
     if (m.cells[n] >= m.npoint) return "a cell names a point that the mesh lacks";
   for (size_t n = 0; n < 2 * size_t(m.nedge); ++n)
@@ -68,7 +90,10 @@ const char *check_mesh(const dfm_mesh &m) {
 
 dfm_status create(const dfm_host *h, const dfm_mesh *m, void **self) {
   *self = nullptr;
-  if (const char *wrong = check_mesh(*m)) return complain(h, wrong), DFM_E_ARG;
+  if (const char *wrong = check_mesh(*m)) {
+    complain(h, wrong);
+    return DFM_E_ARG;
+  }
   if (!check_params(h, m->params)) return DFM_E_ARG;
   void *memory = h->alloc(h->ctx, sizeof(Body), 64);
   if (!memory) return DFM_E_NOMEM;
@@ -79,11 +104,15 @@ dfm_status create(const dfm_host *h, const dfm_mesh *m, void **self) {
   } catch (const Refused &) {
     status = DFM_E_ARG;
   } catch (const char *wrong) {
-    complain(h, wrong), status = DFM_E_ARG;
+    complain(h, wrong);
+    status = DFM_E_ARG;
   } catch (...) {
     status = DFM_E_NOMEM;
   }
-  if (status == DFM_OK) return *self = body, DFM_OK;
+  if (status == DFM_OK) {
+    *self = body;
+    return DFM_OK;
+  }
   body->~Body();
   h->release(h->ctx, memory, sizeof(Body), 64);
   return status;
@@ -145,9 +174,13 @@ dfm_status cell_energy(void *self, const dfm_kin *k, double *density) {
   return DFM_OK;
 }
 
-const char *const *active_effects(const void *self) { return static_cast<const Body *>(self)->active_effects; }
+const char *const *active_effects(const void *self) {
+  return static_cast<const Body *>(self)->active_effects;
+}
 
-const char *idle(const void *self, uint32_t row) { return row < kParamCount ? static_cast<const Body *>(self)->idle(Param(row)) : nullptr; }
+const char *idle(const void *self, uint32_t row) {
+  return row < kParamCount ? static_cast<const Body *>(self)->idle(Param(row)) : nullptr;
+}
 
 uint32_t limited(const void *self) {
   const Body &body = *static_cast<const Body *>(self);
@@ -159,7 +192,10 @@ uint32_t limited(const void *self) {
 dfm_status set_mask(void *self, uint32_t n, const uint32_t *edges, uint8_t on) {
   Body &body = *static_cast<Body *>(self);
   for (uint32_t k = 0; k < n; ++k)
-    if (edges[k] >= body.nedge) return complain(body.host, "a spring that is to be switched does not exist; nothing was changed"), DFM_E_ARG;
+    if (edges[k] >= body.nedge) {
+      complain(body.host, "a spring that is to be switched does not exist; nothing was changed");
+      return DFM_E_ARG;
+    }
   try {
     body.mask_springs(n, edges, on != 0);
   } catch (...) {
@@ -174,7 +210,8 @@ dfm_status get_mask(const void *self, uint8_t *on) {
   return DFM_OK;
 }
 
-const dfm_slot kBranchSlots[] = {{DFM_PER_EDGE, 1, DFM_SLOT_SCALAR, 0}, {DFM_PER_INSTANCE, 1, DFM_SLOT_SCALAR, 0}};
+const dfm_slot kBranchSlots[] = {{DFM_PER_EDGE, 1, DFM_SLOT_SCALAR, 0},
+                                 {DFM_PER_INSTANCE, 1, DFM_SLOT_SCALAR, 0}};
 const dfm_cell_energy kCellEnergy = {sizeof(dfm_cell_energy), 0, cell_energy};
 const dfm_slots kNoSlots = {sizeof(dfm_slots), 0, nullptr}, kSlots = {sizeof(dfm_slots), 2, kBranchSlots};
 const dfm_effects kActiveEffects = {sizeof(dfm_effects), 0, active_effects};
@@ -192,16 +229,38 @@ const void *extension(const void *self, const char *id) {
   return nullptr;
 }
 
-const char *const kEffects[] = {"volume", "damping", "large_rotation", "anisotropy", "deform.relaxation", nullptr};
+const char *const kEffects[] = {"volume",     "damping",           "large_rotation",
+                                "anisotropy", "deform.relaxation", nullptr};
 
-const dfm_model kModel = {
-    sizeof(dfm_model), DFM_CAP_ENERGY | DFM_CAP_DAMPING | DFM_CAP_ROTATION_INVARIANT | DFM_CAP_PLAUSIBLE, DFM_CELL_TET, 0, nullptr,
-    create, destroy, set_params, state_init, add_forces, bound, energy, nullptr, nullptr, extension};
+const dfm_model kModel = {sizeof(dfm_model),
+                          DFM_CAP_ENERGY | DFM_CAP_DAMPING | DFM_CAP_ROTATION_INVARIANT | DFM_CAP_PLAUSIBLE,
+                          DFM_CELL_TET,
+                          0,
+                          nullptr,
+                          create,
+                          destroy,
+                          set_params,
+                          state_init,
+                          add_forces,
+                          bound,
+                          energy,
+                          nullptr,
+                          nullptr,
+                          extension};
 
-const dfm_type kType = {
-    sizeof(dfm_type), DFM_KIND_MODEL, "org.deform.msm", "mass-spring", "0.2.0", "MIT",
-    "Zerbato 2010, (2.25)-(2.27) and chapter 6 corrected, Fig. 2.5; Van Gelder 1998, Approximate simulation of elastic membranes by triangulated spring meshes",
-    kParams, kParamCount, sizeof(dfm_param), kEffects, &kModel};
+const dfm_type kType = {sizeof(dfm_type),
+                        DFM_KIND_MODEL,
+                        "org.deform.msm",
+                        "mass-spring",
+                        "0.2.0",
+                        "MIT",
+                        "Zerbato 2010, (2.25)-(2.27) and chapter 6 corrected, Fig. 2.5; Van Gelder 1998, "
+                        "Approximate simulation of elastic membranes by triangulated spring meshes",
+                        kParams,
+                        kParamCount,
+                        sizeof(dfm_param),
+                        kEffects,
+                        &kModel};
 
 const dfm_type *const kTypes[] = {&kType};
 const dfm_plugin kPlugin = {sizeof(dfm_plugin), DFM_ABI, DFM_ABI_DRAFT, 1, kTypes, nullptr};

@@ -1,6 +1,6 @@
-// The ops on the blocks. Forces run in two passes: each block loads its points, sums its springs and cells into its own array,
-// halo included; then each block adds up, in block order, what the others' halos hold for its points. No two workers write
-// one place, and the order of every sum is fixed by the mesh.
+// The ops on the blocks. Forces run in two passes: each block loads its points, sums its springs and cells
+// into its own array, halo included; then each block adds up, in block order, what the others' halos hold for
+// its points. No two workers write one place, and the order of every sum is fixed by the mesh.
 #include <deform/elementary.h>
 
 #include "msm_body.h"
@@ -25,12 +25,16 @@ void force_pass(void *user, uint32_t begin, uint32_t end) {
 void merge_pass(void *user, uint32_t begin, uint32_t end) {
   const Call &call = *static_cast<const Call *>(user);
   Body &body = *call.body;
-  const auto drag = [&](uint32_t i) { return body.point_drag.empty() ? body.params[kDampingMass] : body.point_drag[i]; };
+  const auto drag = [&](uint32_t i) {
+    return body.point_drag.empty() ? body.params[kDampingMass] : body.point_drag[i];
+  };
   for (uint32_t n = begin; n < end; ++n) {
     const Block &b = body.block[n];
-    body.kernels->merge(body.f.data(), body.merge.data() + body.merge_begin[n], body.merge_begin[n + 1] - body.merge_begin[n]);
+    body.kernels->merge(body.f.data(), body.merge.data() + body.merge_begin[n],
+                        body.merge_begin[n + 1] - body.merge_begin[n]);
     for (uint32_t i = 0; body.drag_on && i < b.owned; ++i) {
-      const double c = drag(b.point[i]) * body.mass[b.point[i]], *v = call.k->v + size_t(call.k->stride) * b.point[i];
+      const double c = drag(b.point[i]) * body.mass[b.point[i]];
+      const double *v = call.k->v + size_t(call.k->stride) * b.point[i];
       for (int a = 0; a < 3; ++a) b.f[4 * size_t(i) + a] -= c * v[a];
     }
     body.kernels->store(b, call.f, call.k->stride);
@@ -42,7 +46,8 @@ void merge_pass(void *user, uint32_t begin, uint32_t end) {
 const Kernels *choose_kernels(const dfm_host *host) {
   const Kernels *best = kernels_sse2();
   const bool avx2 = __builtin_cpu_supports("avx2");
-  const bool avx512 = __builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512vl") && __builtin_cpu_supports("avx512dq");
+  const bool avx512 = __builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512vl") &&
+                      __builtin_cpu_supports("avx512dq");
   if (avx2) best = kernels_avx2();
   if (avx512) best = kernels_avx512();
   const char *forced = getenv("DEFORM_SIMD");
@@ -50,36 +55,47 @@ const Kernels *choose_kernels(const dfm_host *host) {
   if (!strcmp(forced, "sse2")) return kernels_sse2();
   if (!strcmp(forced, "avx2") && avx2) return kernels_avx2();
   if (!strcmp(forced, "avx512") && avx512) return kernels_avx512();
-  host->log(host->ctx, 2, 0, "msm: DEFORM_SIMD is none of sse2, avx2, avx512 or this processor lacks it; the best it has is used.");
+  host->log(
+      host->ctx, 2, 0,
+      "msm: DEFORM_SIMD is none of sse2, avx2, avx512 or this processor lacks it; the best it has is used.");
   return best;
 }
 
 void Body::for_each_block(uint32_t least_cells, void (*fn)(void *, uint32_t, uint32_t), void *user) {
-  if (ncell >= least_cells && host->parallel_for) return host->parallel_for(host->ctx, nblock, grain, fn, user);
+  if (ncell >= least_cells && host->parallel_for)
+    return host->parallel_for(host->ctx, nblock, grain, fn, user);
   fn(user, 0, nblock);
 }
 
-// Branches: exact for a stretch that grows evenly over a step, dp/dt = de/dt - p/tau, hence p+ = E p + kept (e+ - e) with E = exp(-x),
-// kept = (1 - E)/x, x = h/tau. What is known at the start of the step is r = E p - kept e; the state is that and kept.
+// Branches: exact for a stretch that grows evenly over a step, dp/dt = de/dt - p/tau, hence p+ = E p + kept
+// (e+ - e) with E = exp(-x), kept = (1 - E)/x, x = h/tau. What is known at the start of the step is r = E p -
+// kept e; the state is that and kept.
 Branch Body::branch_at(const dfm_kin &k) const {
   Branch b{};
   if (!has_branch() || !k.state) return b;
   const double x = k.dt / params[kRelaxationTime];
-  b.part = part(), b.state = k.state, b.state_out = k.state_out, b.kept = k.state[nedge];
+  b.part = part();
+  b.state = k.state;
+  b.state_out = k.state_out;
+  b.kept = k.state[nedge];
   b.follow = 1 - b.part * (1 - b.kept);
   if (x > 0.25) {
-    b.keep = dfm_exp(-x), b.next = (1 - b.keep) / x;
+    b.keep = dfm_exp(-x);
+    b.next = (1 - b.keep) / x;
   } else {  // 1 - E would lose digits: its series over x
     double series = 1;
     for (int n = 14; n > 1; --n) series = 1 - x / n * series;
-    b.next = series, b.keep = 1 - x * series;
+    b.next = series;
+    b.keep = 1 - x * series;
   }
   return b;
 }
 
 bool Body::lacks_state(const dfm_kin &k) const {
   if (!has_branch() || k.state) return false;
-  complain(host, "the host gives no state, which dampers other than voigt need: it must ask the instance for the extension " DFM_EXT_SLOTS);
+  complain(host,
+           "the host gives no state, which dampers other than voigt need: it must ask the instance for the "
+           "extension " DFM_EXT_SLOTS);
   return true;
 }
 
@@ -91,7 +107,8 @@ void Body::add_forces(const dfm_kin &k, double *f_out) {
   for_each_block(kParallelMergeCells, merge_pass, &call);
 }
 
-// T = k (L - L0 - part q), q the dashpot's extension: a plain spring of the same stiffness and a rest length of L0 + part q.
+// T = k (L - L0 - part q), q the dashpot's extension: a plain spring of the same stiffness and a rest length
+// of L0 + part q.
 void Body::rest_of_branches(uint32_t n, const dfm_kin &k) {
   const Branch branch = branch_at(k);
   const size_t begin = size_t(block[n].stiffness - stiffness.data());

@@ -1,4 +1,5 @@
-// A mass-spring body: the springs and cells of a mesh, cut into blocks that fit the first-level cache, and the ops on them.
+// A mass-spring body: the springs and cells of a mesh, cut into blocks that fit the first-level cache, and
+// the ops on them.
 #pragma once
 #include <deform/plugin.h>
 
@@ -14,18 +15,32 @@ namespace msm {
 
 // Rows of the parameter table; a row's value begins at its number, the last row is three wide.
 enum Param : uint32_t {
-  kYoung, kPoisson, kDampingStiffness, kDampingMass, kVolume, kCollapse, kSlope, kAxisKind, kAxisForm, kDamper, kRelaxationRatio, kRelaxationTime, kAxis,
-  kParamCount, kValueCount = kAxis + 3
+  kYoung,
+  kPoisson,
+  kDampingStiffness,
+  kDampingMass,
+  kVolume,
+  kCollapse,
+  kSlope,
+  kAxisKind,
+  kAxisForm,
+  kDamper,
+  kRelaxationRatio,
+  kRelaxationTime,
+  kAxis,
+  kParamCount,
+  kValueCount = kAxis + 3
 };
 enum Kind : uint32_t { kSofter, kStiffer };
 enum Force : uint32_t { kFormB, kFormA };
 enum Damper : uint32_t { kVoigt, kMaxwell, kStandardLinear };
 extern const dfm_param kParams[kParamCount];
 constexpr double kFromPoisson = -1;  // of `volume`: what gives the body the ratio `poisson`
-struct Refused {};  // thrown after the reason was logged
+struct Refused {};                   // thrown after the reason was logged
 void complain(const dfm_host *h, const char *what);
 
-// `volume` that gives Poisson's ratio nu; springs alone give 1/4 and no volume modulus that is not negative gives less.
+// `volume` that gives Poisson's ratio nu; springs alone give 1/4 and no volume modulus that is not
+// negative gives less.
 inline double volume_for(double nu) { return nu > 0.25 ? 3 * (4 * nu - 1) / (2 * (1 + nu)) : 0; }
 
 // Array in the host's memory; cleared on creation.
@@ -42,12 +57,17 @@ class Buffer {
   }
   void create(const dfm_host *host, size_t n) {
     drop();
-    host_ = host, size_ = n ? n : 1;
+    host_ = host;
+    size_ = n ? n : 1;
     data_ = static_cast<T *>(host->alloc(host->ctx, size_ * sizeof(T), 64));
     if (!data_) throw std::bad_alloc();
     std::memset(static_cast<void *>(data_), 0, size_ * sizeof(T));
   }
-  void swap(Buffer &other) { std::swap(host_, other.host_), std::swap(data_, other.data_), std::swap(size_, other.size_); }
+  void swap(Buffer &other) {
+    std::swap(host_, other.host_);
+    std::swap(data_, other.data_);
+    std::swap(size_, other.size_);
+  }
   bool empty() const { return !data_; }
   T *data() { return data_; }
   const T *data() const { return data_; }
@@ -62,46 +82,52 @@ class Buffer {
 
 struct Body {
   static constexpr uint32_t kNone = ~0u;
-  // From this size on the blocks go through the host's parallel_for; below it waking a worker costs more than it brings. Adding up
-  // the blocks is a twentieth of the work.
+  // From this size on the blocks go through the host's parallel_for; below it waking a worker costs more than
+  // it brings. Adding up the blocks is a twentieth of the work.
   static constexpr uint32_t kParallelCells = 10000, kParallelMergeCells = 100000;
 
   const dfm_host *host = nullptr;
   const Kernels *kernels = nullptr;
   uint32_t npoint = 0, ncell = 0, nedge = 0, nblock = 0;
-  uint32_t grain = 1, largest = 0;  // blocks per piece of a pass at least; points of the largest block with its halo
+  // blocks per piece of a pass at least; points of the largest block with its halo
+  uint32_t grain = 1, largest = 0;
   double params[kValueCount] = {};
   Buffer<double> field[kParamCount];  // [ncell,width] values by cell in place of a parameter's; empty without
 
   // In the host's order.
-  Buffer<double> mass, shape, edge_volume, edge_length, edge_energy;  // shape: stiffness over `scale`, see find_shapes
-  Buffer<double> per_modulus;          // [nedge] stiffness over the sum of E V around the edge
+  // shape: stiffness over `scale`, see find_shapes
+  Buffer<double> mass, shape, edge_volume, edge_length, edge_energy;
+  Buffer<double> per_modulus;  // [nedge] stiffness over the sum of E V around the edge
   Buffer<uint32_t> edges, cells, cell_edge;
   Buffer<double> cell_volume6;
-  Buffer<double> rest_point;           // [npoint,3]
-  Buffer<double> weight;               // [npoint] of the row sums
-  Buffer<double> rest_rows;            // [npoint] rows at rest: no shape counts as less stiff, for it may be left in a few steps
+  Buffer<double> rest_point;  // [npoint,3]
+  Buffer<double> weight;      // [npoint] of the row sums
+  // [npoint] rows at rest: no shape counts as less stiff, for it may be left in a few steps
+  Buffer<double> rest_rows;
   Buffer<double> spring_sum, coupled;  // [npoint] sum of the springs' stiffness k; sum of k w_other / w_own
 
   // What an effect that is off leaves empty.
-  Buffer<double> edge_tilt, edge_rest;     // [nedge] w^2 and sqrt(L0^2 + w^2)
-  Buffer<double> edge_damp, damp_most;     // [nedge], [npoint] damper over stiffness and its largest around a point, where it differs
-  Buffer<double> point_drag;               // [npoint] drag over mass, where it differs
-  Buffer<uint8_t> edge_off;                // [nedge] springs that are switched off
-  const char *active_effects[8] = {};      // of the present parameters, NULL-terminated
+  Buffer<double> edge_tilt, edge_rest;  // [nedge] w^2 and sqrt(L0^2 + w^2)
+  // [nedge], [npoint] damper over stiffness and its largest around a point, where it differs
+  Buffer<double> edge_damp, damp_most;
+  Buffer<double> point_drag;           // [npoint] drag over mass, where it differs
+  Buffer<uint8_t> edge_off;            // [nedge] springs that are switched off
+  const char *active_effects[8] = {};  // of the present parameters, NULL-terminated
 
   // In block order.
   Buffer<Block> block;
   Buffer<uint32_t> point, spring_edge, cell_id;
   Buffer<double> p, f, stiffness, rest, bulk, collapse, limit, volume6, slot_weight, row;
-  Buffer<double> tilt, damp, rest_now;     // as the springs'; rest_now: of plain springs with the same forces as those with branches
-  Buffer<uint32_t> limited;                // [nblock] cells beyond their limit at the last bound
+  // as the springs'; rest_now: of plain springs with the same forces as those with branches
+  Buffer<double> tilt, damp, rest_now;
+  Buffer<uint32_t> limited;  // [nblock] cells beyond their limit at the last bound
   Buffer<Quad> quad;
   Buffer<Cell> cell;
-  Buffer<Merge> merge;  // by owning block
+  Buffer<Merge> merge;                       // by owning block
   Buffer<uint32_t> merge_begin, slot_begin;  // [nblock + 1]
 
-  const char *idle(Param which) const;      // why a parameter does nothing beside the present others; NULL where it does
+  // why a parameter does nothing beside the present others; NULL where it does
+  const char *idle(Param which) const;
   uint32_t choice(Param which) const { return uint32_t(params[which]); }
   bool volume_on = false, cells_on = false;  // the volume term; that or the resistance to collapse
   bool damping_on = false, drag_on = false;
@@ -111,7 +137,9 @@ struct Body {
   // Branches: a spring of share `part` of the stiffness in series with a dashpot.
   bool has_branch() const { return choice(kDamper) != kVoigt; }
   double part() const {
-    return choice(kDamper) == kMaxwell ? 1 : choice(kDamper) == kVoigt ? 0 : params[kRelaxationRatio] / (1 + params[kRelaxationRatio]);
+    return choice(kDamper) == kMaxwell ? 1
+           : choice(kDamper) == kVoigt ? 0
+                                       : params[kRelaxationRatio] / (1 + params[kRelaxationRatio]);
   }
   Branch branch_at(const dfm_kin &k) const;
 
@@ -125,24 +153,31 @@ struct Body {
   // Of spring e with its branch, switched off or not; its damper over that; its rest length as it counts.
   double full_stiffness(uint32_t e) const { return scale * shape[e]; }
   double stiffness_of(uint32_t e) const { return edge_off.empty() || !edge_off[e] ? scale * shape[e] : 0; }
-  double damp_scale() const { return choice(kDamper) == kStandardLinear ? 1 / (1 + params[kRelaxationRatio]) : 1; }
+  double damp_scale() const {
+    return choice(kDamper) == kStandardLinear ? 1 / (1 + params[kRelaxationRatio]) : 1;
+  }
   double rest_length(uint32_t e) const { return edge_rest.empty() ? edge_length[e] : edge_rest[e]; }
-  struct CellStiffness { double bulk, collapse; };  // over 36 V0; both 0 for a cell that is flat at rest or cut
+  // over 36 V0; both 0 for a cell that is flat at rest or cut
+  struct CellStiffness { double bulk, collapse; };
   CellStiffness cell_stiffness(uint32_t c) const;
   double collapse_share(uint32_t c) const;
   double limit_of(uint32_t c) const {
     double sum = 0;
-    for (int n = 0; n < 6; ++n) sum += edge_length[cell_edge[6 * size_t(c) + n]] * edge_length[cell_edge[6 * size_t(c) + n]];
-    return sum > 0 ? kLimit * sum : 1;   // four points at one place have no volume to keep
+    for (int n = 0; n < 6; ++n)
+      sum += edge_length[cell_edge[6 * size_t(c) + n]] * edge_length[cell_edge[6 * size_t(c) + n]];
+    return sum > 0 ? kLimit * sum : 1;  // four points at one place have no volume to keep
   }
-  size_t spring_slots() const { return 4 * size_t(block[nblock - 1].quad + block[nblock - 1].quads - quad.data()); }
+  size_t spring_slots() const {
+    return 4 * size_t(block[nblock - 1].quad + block[nblock - 1].quads - quad.data());
+  }
   size_t cell_slots() const { return size_t(block[nblock - 1].cell + block[nblock - 1].cells - cell.data()); }
 
   void create(const dfm_host *h, const dfm_mesh &m);
   void apply_params(const double *values);
 
-  // Block n with the packed points of the piece that begins at block `begin`: a piece uses one place for all of its blocks, which
-  // therefore stays in the cache however large the body is. Pieces begin at multiples of the grain, so no two share a place.
+  // Block n with the packed points of the piece that begins at block `begin`: a piece uses one place for all
+  // of its blocks, which therefore stays in the cache however large the body is. Pieces begin at multiples of
+  // the grain, so no two share a place.
   Block lend(uint32_t n, uint32_t begin) {
     Block b = block[n];
     b.p = p.data() + 8 * size_t(largest) * (begin / grain);
@@ -172,7 +207,9 @@ struct Body {
   void build_merge(const Layout &l);
   void take_fields(const dfm_mesh &m);
   void find_shapes();
-  struct Room {  // what new parameters need, taken before anything changes: arrays to swap in, and sums and vectors on the way
+  // what new parameters need, taken before anything changes: arrays to swap in, and sums and
+  // vectors on the way
+  struct Room {
     Buffer<double> edge_tilt, edge_rest, tilt, edge_damp, damp_most, damp, point_drag, rest_now;
     Buffer<double> damp_share, drag_around, own, next, gradient;
   };
@@ -203,9 +240,11 @@ uint32_t partition_capacity(uint32_t npoint);
 // Best kernels of this processor, or those that DEFORM_SIMD names.
 const Kernels *choose_kernels(const dfm_host *host);
 
-// Six volumes and the length of a spring, by the operations of the kernels, so that the rest shape gives exactly zero.
+// Six volumes and the length of a spring, by the operations of the kernels, so that the rest shape
+// gives exactly zero.
 inline double volume6_of(const double *x0, const double *x1, const double *x2, const double *x3) {
-  const double a[3] = {x1[0] - x0[0], x1[1] - x0[1], x1[2] - x0[2]}, c[3] = {x2[0] - x0[0], x2[1] - x0[1], x2[2] - x0[2]};
+  const double a[3] = {x1[0] - x0[0], x1[1] - x0[1], x1[2] - x0[2]};
+  const double c[3] = {x2[0] - x0[0], x2[1] - x0[1], x2[2] - x0[2]};
   const double d[3] = {x3[0] - x0[0], x3[1] - x0[1], x3[2] - x0[2]};
   const double g[3] = {c[1] * d[2] - c[2] * d[1], c[2] * d[0] - c[0] * d[2], c[0] * d[1] - c[1] * d[0]};
   return (a[0] * g[0] + a[1] * g[1]) + a[2] * g[2];

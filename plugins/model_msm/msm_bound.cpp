@@ -1,9 +1,10 @@
-// Row sums for the step bound (doc/models/msm.md). With K and C the stiffness and damping of the body, any D >= K and E >= C that are
-// diagonal (Loewner order) make h^2 D + 2 h E <= 4 M sufficient for symplectic Euler; doc/models/msm.md proves it. The rows are
+// Row sums for the step bound (doc/models/msm.md). With K and C the stiffness and damping of the body, any D
+// >= K and E >= C that are diagonal (Loewner order) make h^2 D + 2 h E <= 4 M sufficient for symplectic
+// Euler; doc/models/msm.md proves it. The rows are
 //   D_i = |A_i| + sum_j k_ij w_j / w_i + cells,   A_i = sum_j k_ij ((1 - s) n n^T + s I),   s = max(0, 1 - L0/L)
-// (the page has A_i and k_ij where extra coordinates count) with positive weights w, chosen once so that the rows are even: they come
-// from a few steps toward the Perron vector of the row-sum operator. Every w gives a bound, a good one gives nearly the true step
-// (0.95 of it on a free mesh, 0.6 for w = 1).
+// (the page has A_i and k_ij where extra coordinates count) with positive weights w, chosen once so that the
+// rows are even: they come from a few steps toward the Perron vector of the row-sum operator. Every w gives a
+// bound, a good one gives nearly the true step (0.95 of it on a free mesh, 0.6 for w = 1).
 #include <algorithm>
 
 #include "msm_body.h"
@@ -19,16 +20,19 @@ void row_pass(void *user, uint32_t begin, uint32_t end) {
   Body &body = *call.body;
   for (uint32_t n = begin; n < end; ++n) {
     Block b = body.lend(n, begin);
-    if (body.has_branch() && call.k->state)
-      body.rest_of_branches(n, *call.k), b.rest = body.rest_now.data() + (b.stiffness - body.stiffness.data());
+    if (body.has_branch() && call.k->state) {
+      body.rest_of_branches(n, *call.k);
+      b.rest = body.rest_now.data() + (b.stiffness - body.stiffness.data());
+    }
     body.kernels->load(b, call.k->x, nullptr, call.k->stride);
     body.kernels->spring_rows[body.form()](b);
     if (body.cells_on) body.kernels->cell_rows(b);
   }
 }
 
-// A bound of |A_i| that turning the body does not change: the largest eigenvalue of a symmetric 3 x 3 matrix is at most
-// mean + sqrt(2/3) |deviator| (equal where the other two eigenvalues are), and each spring adds at most its stiffness.
+// A bound of |A_i| that turning the body does not change: the largest eigenvalue of a symmetric 3 x 3 matrix
+// is at most mean + sqrt(2/3) |deviator| (equal where the other two eigenvalues are), and each spring adds at
+// most its stiffness.
 double norm_of(const double *a, double spring_sum) {
   const double mean = ((a[0] + a[1]) + a[2]) / 3, x = a[0] - mean, y = a[1] - mean, z = a[2] - mean;
   const double deviator2 = ((x * x + y * y) + z * z) + 2 * ((a[4] * a[4] + a[5] * a[5]) + a[6] * a[6]);
@@ -42,7 +46,8 @@ void merge_row_pass(void *user, uint32_t begin, uint32_t end) {
   Body &body = *call.body;
   for (uint32_t n = begin; n < end; ++n) {
     const Block &b = body.block[n];
-    body.kernels->merge_rows(body.row.data(), body.merge.data() + body.merge_begin[n], body.merge_begin[n + 1] - body.merge_begin[n]);
+    body.kernels->merge_rows(body.row.data(), body.merge.data() + body.merge_begin[n],
+                             body.merge_begin[n + 1] - body.merge_begin[n]);
     for (uint32_t s = 0; s < b.owned; ++s) {
       const uint32_t i = b.point[s];
       const double *row = b.row + 8 * size_t(s), own = norm_of(row, body.spring_sum[i]);
@@ -51,10 +56,13 @@ void merge_row_pass(void *user, uint32_t begin, uint32_t end) {
         continue;
       }
       const double springs = own + (body.edge_tilt.empty() ? body.coupled[i] : row[3]);
-      const double damp = body.damp_most.empty() ? body.damp_scale() * body.params[kDampingStiffness] : body.damp_most[i];
+      const double damp =
+          body.damp_most.empty() ? body.damp_scale() * body.params[kDampingStiffness] : body.damp_most[i];
       call.ksum[i] += std::max(springs + row[7], body.rest_rows[i]);
       // A damper's n n^T is at most its spring's part of A_i over k.
-      call.csum[i] += damp * springs + (body.point_drag.empty() ? body.params[kDampingMass] : body.point_drag[i]) * body.mass[i];
+      call.csum[i] +=
+          damp * springs +
+          (body.point_drag.empty() ? body.params[kDampingMass] : body.point_drag[i]) * body.mass[i];
     }
   }
 }
@@ -64,15 +72,18 @@ void merge_row_pass(void *user, uint32_t begin, uint32_t end) {
 void Body::find_weights(Room &room) {
   // Along a spring at rest a tilted one is softer by (L0/L)^2, a turned one by L0/L.
   const auto tangent = [this](uint32_t e) {
-    const double k = full_stiffness(e), ratio = edge_tilt.empty() || !(edge_rest[e] > 0) ? 1 : edge_length[e] / edge_rest[e];
+    const double k = full_stiffness(e);
+    const double ratio = edge_tilt.empty() || !(edge_rest[e] > 0) ? 1 : edge_length[e] / edge_rest[e];
     return form() == kPlain ? k : form() == kTurned ? k * ratio : k * (ratio * ratio);
   };
   std::fill(spring_sum.data(), spring_sum.data() + npoint, 0.0);
   for (uint32_t e = 0; e < nedge; ++e)
     for (int n = 0; n < 2; ++n) spring_sum[edges[2 * size_t(e) + n]] += full_stiffness(e);
-  Buffer<double> &own = room.own, &next = room.next, &gradient = room.gradient;  // gradient: 6 |dV/dx_a| sqrt(kV / (36 V0)) at rest
+  // gradient: 6 |dV/dx_a| sqrt(kV / (36 V0)) at rest
+  Buffer<double> &own = room.own, &next = room.next, &gradient = room.gradient;
   dfm_kin at_rest{};
-  at_rest.x = rest_point.data(), at_rest.stride = 3;
+  at_rest.x = rest_point.data();
+  at_rest.stride = 3;
   RowCall diagonal{{this, &at_rest, nullptr, nullptr}, own.data(), nullptr};
   for_each_block(kParallelCells, row_pass, static_cast<Call *>(&diagonal));
   for_each_block(kParallelMergeCells, merge_row_pass, &diagonal);
@@ -83,7 +94,8 @@ void Body::find_weights(Room &room) {
       for (int a = 0; a < 4; ++a) x[a] = rest_point.data() + 3 * size_t(q[a]);
       for (int a = 0; a < 4; ++a) {
         const double *o = x[(a + 1) & 3], *y = x[(a + 2) & 3], *z = x[(a + 3) & 3];
-        const double u[3] = {y[0] - o[0], y[1] - o[1], y[2] - o[2]}, w[3] = {z[0] - o[0], z[1] - o[1], z[2] - o[2]};
+        const double u[3] = {y[0] - o[0], y[1] - o[1], y[2] - o[2]};
+        const double w[3] = {z[0] - o[0], z[1] - o[1], z[2] - o[2]};
         const double r[3] = {u[1] * w[2] - u[2] * w[1], u[2] * w[0] - u[0] * w[2], u[0] * w[1] - u[1] * w[0]};
         const double k = v0 > 0 ? volume_ratio(c) * at(kYoung, c) / (36 * v0) : 0;
         gradient[4 * size_t(c) + a] = __builtin_sqrt(k * ((r[0] * r[0] + r[1] * r[1]) + r[2] * r[2]));
@@ -94,26 +106,33 @@ void Body::find_weights(Room &room) {
     for (uint32_t i = 0; i < npoint; ++i) next[i] = own[i] * weight[i];
     for (uint32_t e = 0; e < nedge; ++e) {
       const uint32_t i = edges[2 * size_t(e)], j = edges[2 * size_t(e) + 1];
-      next[i] += tangent(e) * weight[j], next[j] += tangent(e) * weight[i];
+      next[i] += tangent(e) * weight[j];
+      next[j] += tangent(e) * weight[i];
     }
     for (uint32_t c = 0; volume_on && c < ncell; ++c) {
       const uint32_t *q = cells.data() + 4 * size_t(c);
       const double *g = gradient.data() + 4 * size_t(c);
-      const double sum = (g[0] * weight[q[0]] + g[1] * weight[q[1]]) + (g[2] * weight[q[2]] + g[3] * weight[q[3]]);
+      const double sum =
+          (g[0] * weight[q[0]] + g[1] * weight[q[1]]) + (g[2] * weight[q[2]] + g[3] * weight[q[3]]);
       for (int a = 0; a < 4; ++a) next[q[a]] += g[a] * sum;
     }
     double most = 0;
-    for (uint32_t i = 0; i < npoint; ++i) next[i] = mass[i] > 0 ? next[i] / mass[i] : 0, most = std::max(most, next[i]);
+    for (uint32_t i = 0; i < npoint; ++i) {
+      next[i] = mass[i] > 0 ? next[i] / mass[i] : 0;
+      most = std::max(most, next[i]);
+    }
     for (uint32_t i = 0; i < npoint; ++i) weight[i] = most > 0 ? std::max(next[i] / most, kLeastWeight) : 1;
   }
   std::fill(coupled.data(), coupled.data() + npoint, 0.0);
   for (uint32_t e = 0; e < nedge; ++e) {
     const uint32_t i = edges[2 * size_t(e)], j = edges[2 * size_t(e) + 1];
-    coupled[i] += full_stiffness(e) * weight[j] / weight[i], coupled[j] += full_stiffness(e) * weight[i] / weight[j];
+    coupled[i] += full_stiffness(e) * weight[j] / weight[i];
+    coupled[j] += full_stiffness(e) * weight[i] / weight[j];
   }
   for (uint32_t n = 0; n < slot_begin[nblock]; ++n) slot_weight[n] = weight[point[n]];
   std::fill(rest_rows.data(), rest_rows.data() + npoint, 0.0);
-  std::fill(own.data(), own.data() + npoint, 0.0), std::fill(next.data(), next.data() + npoint, 0.0);
+  std::fill(own.data(), own.data() + npoint, 0.0);
+  std::fill(next.data(), next.data() + npoint, 0.0);
   bound(at_rest, own.data(), next.data());
   rest_rows.swap(own);
 }

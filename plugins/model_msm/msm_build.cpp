@@ -6,7 +6,8 @@
 namespace msm {
 namespace {
 
-constexpr uint32_t kPieces = 32;  // of a pass over the blocks at most: enough for the workers that one body can feed
+// of a pass over the blocks at most: enough for the workers that one body can feed
+constexpr uint32_t kPieces = 32;
 
 constexpr int kEdgeOf[6][2] = {{0, 1}, {0, 2}, {0, 3}, {1, 2}, {1, 3}, {2, 3}};
 
@@ -15,7 +16,8 @@ uint32_t find_edge(const uint32_t *edges, uint32_t nedge, uint32_t i, uint32_t j
   uint32_t lo = 0, hi = nedge;
   while (lo < hi) {
     const uint32_t mid = lo + (hi - lo) / 2;
-    if (edges[2 * size_t(mid)] < i || (edges[2 * size_t(mid)] == i && edges[2 * size_t(mid) + 1] < j)) lo = mid + 1;
+    if (edges[2 * size_t(mid)] < i || (edges[2 * size_t(mid)] == i && edges[2 * size_t(mid) + 1] < j))
+      lo = mid + 1;
     else hi = mid;
   }
   const bool found = lo < nedge && edges[2 * size_t(lo)] == i && edges[2 * size_t(lo) + 1] == j;
@@ -25,18 +27,30 @@ uint32_t find_edge(const uint32_t *edges, uint32_t nedge, uint32_t i, uint32_t j
 }  // namespace
 
 void Body::take_mesh(const dfm_mesh &m) {
-  npoint = m.npoint, ncell = m.ncell, nedge = m.nedge;
-  mass.create(host, npoint), shape.create(host, nedge), edge_volume.create(host, nedge), edge_length.create(host, nedge);
-  edge_energy.create(host, nedge), rest_point.create(host, 3 * size_t(npoint));
-  weight.create(host, npoint), spring_sum.create(host, npoint), coupled.create(host, npoint), rest_rows.create(host, npoint);
-  edges.create(host, 2 * size_t(nedge)), cells.create(host, 4 * size_t(ncell)), cell_edge.create(host, 6 * size_t(ncell));
+  npoint = m.npoint;
+  ncell = m.ncell;
+  nedge = m.nedge;
+  mass.create(host, npoint);
+  shape.create(host, nedge);
+  edge_volume.create(host, nedge);
+  edge_length.create(host, nedge);
+  edge_energy.create(host, nedge);
+  rest_point.create(host, 3 * size_t(npoint));
+  weight.create(host, npoint);
+  spring_sum.create(host, npoint);
+  coupled.create(host, npoint);
+  rest_rows.create(host, npoint);
+  edges.create(host, 2 * size_t(nedge));
+  cells.create(host, 4 * size_t(ncell));
+  cell_edge.create(host, 6 * size_t(ncell));
   cell_volume6.create(host, ncell);
   std::copy(m.mass, m.mass + npoint, mass.data());
   std::copy(m.rest, m.rest + 3 * size_t(npoint), rest_point.data());
   std::copy(m.edges, m.edges + 2 * size_t(nedge), edges.data());
   std::copy(m.cells, m.cells + 4 * size_t(ncell), cells.data());
   for (uint32_t e = 0; e < nedge; ++e)
-    edge_length[e] = length_of(m.rest + 3 * size_t(edges[2 * size_t(e)]), m.rest + 3 * size_t(edges[2 * size_t(e) + 1]));
+    edge_length[e] =
+        length_of(m.rest + 3 * size_t(edges[2 * size_t(e)]), m.rest + 3 * size_t(edges[2 * size_t(e) + 1]));
   for (uint32_t c = 0; c < ncell; ++c) {
     uint32_t *q = cells.data() + 4 * size_t(c);
     const auto six = [&] {
@@ -44,7 +58,7 @@ void Body::take_mesh(const dfm_mesh &m) {
       for (int a = 0; a < 4; ++a) x[a] = m.rest + 3 * size_t(q[a]);
       return volume6_of(x[0], x[1], x[2], x[3]);
     };
-    if (six() < 0) std::swap(q[2], q[3]);   // a volume below the one at rest is then less of it
+    if (six() < 0) std::swap(q[2], q[3]);  // a volume below the one at rest is then less of it
     cell_volume6[c] = six();
     const double volume = cell_volume6[c] / 6;
     for (int n = 0; n < 6; ++n) {
@@ -59,15 +73,21 @@ void Body::take_mesh(const dfm_mesh &m) {
 
 // What leads from the mesh to the blocks; a rank is a point's place in the order of partition_points.
 struct Body::Layout {
-  Buffer<uint32_t> order, rank, begin, block_of;    // points by rank, ranks by point, first rank of each block, block of a rank
-  Buffer<uint32_t> row, edge;                       // springs by their end of lower rank, other ends ascending
-  Buffer<uint32_t> cell_order, cell_begin;          // cells by block
-  Buffer<uint32_t> mark, local, halo;               // last block that saw a rank, its number there, ranks outside the block
+  // points by rank, ranks by point, first rank of each block, block of a rank
+  Buffer<uint32_t> order, rank, begin, block_of;
+  // springs by their end of lower rank, other ends ascending
+  Buffer<uint32_t> row, edge;
+  Buffer<uint32_t> cell_order, cell_begin;  // cells by block
+  // last block that saw a rank, its number there, ranks outside the block
+  Buffer<uint32_t> mark, local, halo;
 };
 
 void Body::order_springs(Layout &l) const {
-  l.row.create(host, size_t(npoint) + 1), l.edge.create(host, nedge);
-  const auto low = [&](uint32_t e) { return std::min(l.rank[edges[2 * size_t(e)]], l.rank[edges[2 * size_t(e) + 1]]); };
+  l.row.create(host, size_t(npoint) + 1);
+  l.edge.create(host, nedge);
+  const auto low = [&](uint32_t e) {
+    return std::min(l.rank[edges[2 * size_t(e)]], l.rank[edges[2 * size_t(e) + 1]]);
+  };
   for (uint32_t e = 0; e < nedge; ++e) l.edge[e] = e;
   std::sort(l.edge.data(), l.edge.data() + nedge, [&](uint32_t a, uint32_t b) {
     return low(a) != low(b) ? low(a) < low(b) : high_rank(l, a) < high_rank(l, b);
@@ -80,10 +100,13 @@ uint32_t Body::high_rank(const Layout &l, uint32_t e) const {
   return std::max(l.rank[edges[2 * size_t(e)]], l.rank[edges[2 * size_t(e) + 1]]);
 }
 
-// A cell goes to the block that owns most of its points, the first of equals; within the block by its lowest rank.
+// A cell goes to the block that owns most of its points, the first of equals; within the block by
+// its lowest rank.
 void Body::order_cells(Layout &l) const {
   Buffer<uint32_t> block_of_cell;
-  l.cell_order.create(host, ncell), block_of_cell.create(host, ncell), l.cell_begin.create(host, size_t(nblock) + 1);
+  l.cell_order.create(host, ncell);
+  block_of_cell.create(host, ncell);
+  l.cell_begin.create(host, size_t(nblock) + 1);
   const auto lowest = [&](uint32_t c) {
     const uint32_t *q = cells.data() + 4 * size_t(c);
     return std::min(std::min(l.rank[q[0]], l.rank[q[1]]), std::min(l.rank[q[2]], l.rank[q[3]]));
@@ -94,9 +117,14 @@ void Body::order_cells(Layout &l) const {
     std::sort(of, of + 4);
     for (uint32_t n = 0; n < 4; ++n) {
       const uint32_t count = uint32_t(std::count(of, of + 4, of[n]));
-      if (count > best_count) best = of[n], best_count = count;
+      if (count > best_count) {
+        best = of[n];
+        best_count = count;
+      }
     }
-    l.cell_order[c] = c, block_of_cell[c] = best, ++l.cell_begin[best + 1];
+    l.cell_order[c] = c;
+    block_of_cell[c] = best;
+    ++l.cell_begin[best + 1];
   }
   for (uint32_t b = 0; b < nblock; ++b) l.cell_begin[b + 1] += l.cell_begin[b];
   std::sort(l.cell_order.data(), l.cell_order.data() + ncell, [&](uint32_t a, uint32_t b) {
@@ -109,7 +137,10 @@ void Body::order_cells(Layout &l) const {
 uint32_t Body::find_halo(Layout &l, uint32_t b) const {
   uint32_t n = 0;
   const auto see = [&](uint32_t r) {
-    if (l.block_of[r] != b && l.mark[r] != b) l.mark[r] = b, l.halo[n++] = r;
+    if (l.block_of[r] != b && l.mark[r] != b) {
+      l.mark[r] = b;
+      l.halo[n++] = r;
+    }
   };
   for (uint32_t s = l.row[l.begin[b]]; s < l.row[l.begin[b + 1]]; ++s) see(high_rank(l, l.edge[s]));
   for (uint32_t c = l.cell_begin[b]; c < l.cell_begin[b + 1]; ++c)
@@ -118,9 +149,12 @@ uint32_t Body::find_halo(Layout &l, uint32_t b) const {
   return n;
 }
 
-// Rows of springs as quads from quads_at on; a short one is filled up with its first end: no stiffness, and no point of another row.
+// Rows of springs as quads from quads_at on; a short one is filled up with its first end: no stiffness, and
+// no point of another row.
 size_t Body::fill_springs(const Layout &l, Block &out, uint32_t b, size_t quads_at) {
-  out.quad = quad.data() + quads_at, out.stiffness = stiffness.data() + 4 * quads_at, out.rest = rest.data() + 4 * quads_at;
+  out.quad = quad.data() + quads_at;
+  out.stiffness = stiffness.data() + 4 * quads_at;
+  out.rest = rest.data() + 4 * quads_at;
   const size_t first = quads_at;
   for (uint32_t r = l.begin[b]; r < l.begin[b + 1]; ++r)
     for (uint32_t s = l.row[r]; s < l.row[r + 1]; s += 4, ++quads_at) {
@@ -144,15 +178,19 @@ size_t Body::fill_springs(const Layout &l, Block &out, uint32_t b, size_t quads_
 }
 
 size_t Body::fill_cells(const Layout &l, Block &out, uint32_t b, size_t cells_at) {
-  out.cell = cell.data() + cells_at, out.bulk = bulk.data() + cells_at, out.volume6 = volume6.data() + cells_at;
-  out.collapse = collapse.data() + cells_at, out.limit = limit.data() + cells_at;
+  out.cell = cell.data() + cells_at;
+  out.bulk = bulk.data() + cells_at;
+  out.volume6 = volume6.data() + cells_at;
+  out.collapse = collapse.data() + cells_at;
+  out.limit = limit.data() + cells_at;
   out.cells = (l.cell_begin[b + 1] - l.cell_begin[b] + 7) / 8 * 8;
   for (uint32_t n = 0; n < out.cells; ++n, ++cells_at) {
     const bool real = l.cell_begin[b] + n < l.cell_begin[b + 1];
     const uint32_t c = l.cell_order[l.cell_begin[b] + (real ? n : 0)];
     for (int a = 0; a < 4; ++a) cell[cells_at].p[a] = l.local[l.rank[cells[4 * size_t(c) + a]]];
     cell_id[cells_at] = real ? c : kNone;
-    volume6[cells_at] = cell_volume6[c], limit[cells_at] = real ? limit_of(c) : 1e150;
+    volume6[cells_at] = cell_volume6[c];
+    limit[cells_at] = real ? limit_of(c) : 1e150;
   }
   return cells_at;
 }
@@ -178,14 +216,21 @@ void Body::build_merge(const Layout &l) {
 
 void Body::build_blocks() {
   Layout l;
-  l.order.create(host, npoint), l.rank.create(host, npoint), l.block_of.create(host, npoint);
+  l.order.create(host, npoint);
+  l.rank.create(host, npoint);
+  l.block_of.create(host, npoint);
   l.begin.create(host, partition_capacity(npoint));
   nblock = partition_points(rest_point.data(), npoint, l.order.data(), l.begin.data());
   for (uint32_t b = 0; b < nblock; ++b)
-    for (uint32_t r = l.begin[b]; r < l.begin[b + 1]; ++r) l.rank[l.order[r]] = r, l.block_of[r] = b;
+    for (uint32_t r = l.begin[b]; r < l.begin[b + 1]; ++r) {
+      l.rank[l.order[r]] = r;
+      l.block_of[r] = b;
+    }
   order_springs(l);
   order_cells(l);
-  l.mark.create(host, npoint), l.local.create(host, npoint), l.halo.create(host, npoint);
+  l.mark.create(host, npoint);
+  l.local.create(host, npoint);
+  l.halo.create(host, npoint);
   std::fill(l.mark.data(), l.mark.data() + npoint, kNone);
 
   // Sizes, then one allocation per array, then each block's share.
@@ -200,25 +245,47 @@ void Body::build_blocks() {
   }
   grain = (nblock + kPieces - 1) / kPieces;
   const size_t nslot = slot_begin[nblock];
-  block.create(host, nblock), point.create(host, nslot), slot_weight.create(host, nslot);
+  block.create(host, nblock);
+  point.create(host, nslot);
+  slot_weight.create(host, nslot);
   std::fill(slot_weight.data(), slot_weight.data() + nslot, 1.0);
-  p.create(host, 8 * size_t(largest) * ((nblock + grain - 1) / grain)), row.create(host, 8 * nslot), f.create(host, 4 * nslot);
-  quad.create(host, nquad), stiffness.create(host, 4 * nquad), rest.create(host, 4 * nquad), spring_edge.create(host, 4 * nquad);
-  cell.create(host, ncells), bulk.create(host, ncells), volume6.create(host, ncells), cell_id.create(host, ncells);
-  collapse.create(host, ncells), limit.create(host, ncells), limited.create(host, nblock);
+  p.create(host, 8 * size_t(largest) * ((nblock + grain - 1) / grain));
+  row.create(host, 8 * nslot);
+  f.create(host, 4 * nslot);
+  quad.create(host, nquad);
+  stiffness.create(host, 4 * nquad);
+  rest.create(host, 4 * nquad);
+  spring_edge.create(host, 4 * nquad);
+  cell.create(host, ncells);
+  bulk.create(host, ncells);
+  volume6.create(host, ncells);
+  cell_id.create(host, ncells);
+  collapse.create(host, ncells);
+  limit.create(host, ncells);
+  limited.create(host, nblock);
 
   std::fill(l.mark.data(), l.mark.data() + npoint, kNone);
   size_t quads_at = 0, cells_at = 0;
   for (uint32_t b = 0; b < nblock; ++b) {
     const uint32_t owned = l.begin[b + 1] - l.begin[b], nhalo = find_halo(l, b);
     uint32_t *const points = point.data() + slot_begin[b];
-    for (uint32_t n = 0; n < owned; ++n) l.local[l.begin[b] + n] = n, points[n] = l.order[l.begin[b] + n];
-    for (uint32_t n = 0; n < nhalo; ++n) l.local[l.halo[n]] = owned + n, points[owned + n] = l.order[l.halo[n]];
+    for (uint32_t n = 0; n < owned; ++n) {
+      l.local[l.begin[b] + n] = n;
+      points[n] = l.order[l.begin[b] + n];
+    }
+    for (uint32_t n = 0; n < nhalo; ++n) {
+      l.local[l.halo[n]] = owned + n;
+      points[owned + n] = l.order[l.halo[n]];
+    }
     Block &out = block[b];
-    out.owned = owned, out.local = owned + nhalo, out.point = points;
+    out.owned = owned;
+    out.local = owned + nhalo;
+    out.point = points;
     out.f = f.data() + 4 * size_t(slot_begin[b]);
-    out.edge = spring_edge.data() + 4 * quads_at, out.limited = limited.data() + b;
-    out.row = row.data() + 8 * size_t(slot_begin[b]), out.weight = slot_weight.data() + slot_begin[b];
+    out.edge = spring_edge.data() + 4 * quads_at;
+    out.limited = limited.data() + b;
+    out.row = row.data() + 8 * size_t(slot_begin[b]);
+    out.weight = slot_weight.data() + slot_begin[b];
     quads_at = fill_springs(l, out, b, quads_at);
     cells_at = fill_cells(l, out, b, cells_at);
   }
@@ -226,7 +293,8 @@ void Body::build_blocks() {
 }
 
 void Body::create(const dfm_host *h, const dfm_mesh &m) {
-  host = h, kernels = choose_kernels(h);
+  host = h;
+  kernels = choose_kernels(h);
   take_mesh(m);
   take_fields(m);
   build_blocks();

@@ -1,14 +1,18 @@
-// Mass-spring kernels, chosen at run time by instruction set. All of them do the same IEEE operations in the same order:
+// Mass-spring kernels, chosen at run time by instruction set. All of them do the same IEEE operations in
+// the same order:
 //   spring  L = sqrt((dx^2 + dy^2) + dz^2),  F = k [(L - L0)/L + damp (dv.d)/L^2] d                       (2.25), (2.26 corrected)
-//   tilted  L = sqrt(((dx^2 + dy^2) + dz^2) + w^2) in its place, w the frozen extra coordinates' part of d  (chapter 6, form B)
+//   tilted  L = sqrt(((dx^2 + dy^2) + dz^2) + w^2) in its place, w the frozen extra coordinates' part of d
+//   (chapter 6, form B)
 //   turned  l = sqrt(d.d),  F = k [(L - L0)/l + damp (dv.d)/(l L)] d                                        (chapter 6, form A)
 //   branch  F = k [(a e + part r)/L + damp (dv.d)/L^2] d,  e = L - L0, and r for the next step              (Fig. 2.5 a, c)
 //   row     f_i += (F0 + F1) + (F2 + F3) per quad of springs, then f_j -= F one spring after the other
 //   cell    6V = a.(b x c),  p = kV/(36 V0) (6V0 - 6V) + kC/(36 V0) max(0, 0.6 6V0 - 6V)                    (2.27 corrected, collapse)
-//           with 6V kept between -6V0 and 18V0, and taken from a cell whose edges have grown beyond a limit as doc/models/msm.md says
-//           F_n = p g_n,  F_0 = -((F_1 + F_2) + F_3), four cells at a time, corner after corner in the order 1 2 3 0;
-//           four cells without pressure are left out, which changes no bit: sums that begin at +0 never become -0
-// so that the instruction set never shows in a result. Plain data only: kernel files see no STL and nothing with external inline code.
+//           with 6V kept between -6V0 and 18V0, and taken from a cell whose edges have grown beyond a limit
+//           as doc/models/msm.md says F_n = p g_n,  F_0 = -((F_1 + F_2) + F_3), four cells at a time, corner
+//           after corner in the order 1 2 3 0; four cells without pressure are left out, which changes no
+//           bit: sums that begin at +0 never become -0
+// so that the instruction set never shows in a result. Plain data only: kernel files see no STL and nothing
+// with external inline code.
 #pragma once
 #include <stdint.h>
 
@@ -19,35 +23,42 @@ struct Quad { uint32_t i, reserved, j[4]; };
 // A cell: local points, orientation as given.
 struct Cell { uint32_t p[4]; };
 
-// One block of the body: points it owns, then the points of other blocks that its springs and cells touch (halo).
+// One block of the body: points it owns, then the points of other blocks that its springs and
+// cells touch (halo).
 struct Block {
   uint32_t owned, local, quads, cells;  // quads is even, cells a multiple of 8
   const uint32_t *point;                // [local] number of the point in the host's arrays
-  double *p;                            // [local,8] x y z 0 vx vy vz 0: a point with its velocity is one cache line; lent by the pass
-  double *f;                            // [local,4]
-  double *row;                          // [local,8] row sums: the springs' block xx yy zz, coupling (kTilted, kTurned), xy yz zx, then the cells' row
-  const double *weight;                 // [local] of the row sums, see Body::find_weights
-  const Quad *quad;                     // [quads]
-  const double *stiffness, *rest;       // [quads,4] N/m, m
-  const double *tilt, *damp;            // [quads,4] w^2, m^2; damper over stiffness, s; each NULL where nothing calls for it
-  const uint32_t *edge;                 // [quads,4] number of the spring in the host's list, ~0 for one that fills up
-  const Cell *cell;                     // [cells]
-  const double *bulk, *volume6;         // [cells] kV/(36 V0), 6 V0 >= 0
-  const double *collapse;               // [cells] kC/(36 V0)
-  uint32_t *limited;                    // cells beyond it, counted by cell_rows; those that fill up have none
-  const double *limit;                  // [cells] kLimit times the sum of the squared edges at rest, m^2
+  // [local,8] x y z 0 vx vy vz 0: a point with its velocity is one cache line; lent by the pass
+  double *p;
+  double *f;  // [local,4]
+  // [local,8] row sums: the springs' block xx yy zz, coupling (kTilted, kTurned), xy yz zx, then
+  // the cells' row
+  double *row;
+  const double *weight;            // [local] of the row sums, see Body::find_weights
+  const Quad *quad;                // [quads]
+  const double *stiffness, *rest;  // [quads,4] N/m, m
+  // [quads,4] w^2, m^2; damper over stiffness, s; each NULL where nothing calls for it
+  const double *tilt, *damp;
+  // [quads,4] number of the spring in the host's list, ~0 for one that fills up
+  const uint32_t *edge;
+  const Cell *cell;              // [cells]
+  const double *bulk, *volume6;  // [cells] kV/(36 V0), 6 V0 >= 0
+  const double *collapse;        // [cells] kC/(36 V0)
+  uint32_t *limited;             // cells beyond it, counted by cell_rows; those that fill up have none
+  const double *limit;           // [cells] kLimit times the sum of the squared edges at rest, m^2
 };
 
 // Slots of all blocks' f: a halo point of another block, and the point that it stands for.
 struct Merge { uint32_t from, to; };
 
-// A spring with a dashpot in series beside it, for one step: p = r + kept e is the stretch of the branch's spring (doc/models/msm.md).
+// A spring with a dashpot in series beside it, for one step: p = r + kept e is the stretch of the branch's
+// spring (doc/models/msm.md).
 struct Branch {
-  double follow, part;     // a = 1 - part (1 - kept); share of the branch in the stiffness
-  double kept;             // of the step that led here
-  double keep, next;       // exp(-h/tau) and kept of the step that begins
-  const double *state;     // [nedge] r
-  double *state_out;       // [nedge] r of the next step; NULL: not wanted
+  double follow, part;  // a = 1 - part (1 - kept); share of the branch in the stiffness
+  double kept;          // of the step that led here
+  double keep, next;    // exp(-h/tau) and kept of the step that begins
+  const double *state;  // [nedge] r
+  double *state_out;    // [nedge] r of the next step; NULL: not wanted
 };
 
 // How a spring's length counts, and where its damper's constant comes from.
@@ -58,27 +69,33 @@ struct Kernels {
   const char *name;
   // Copies x (and v, unless NULL) of the block's points in and clears f.
   void (*load)(const Block &b, const double *x, const double *v, uint32_t stride);
-  void (*springs[kForms][kDampings])(const Block &b, double damp);                // damp: seconds, of kUniform
-  void (*branches[kDampings])(const Block &b, double damp, const Branch &branch);  // tilted or plain (tilt zero)
+  // damp: seconds, of kUniform
+  void (*springs[kForms][kDampings])(const Block &b, double damp);
+  // tilted or plain (tilt zero)
+  void (*branches[kDampings])(const Block &b, double damp, const Branch &branch);
   void (*cells)(const Block &b);
-  void (*spring_rows[kForms])(const Block &b);  // clears row, then both at the loaded points: what the step bound is made of
+  // clears row, then both at the loaded points: what the step bound is made of
+  void (*spring_rows[kForms])(const Block &b);
   void (*cell_rows)(const Block &b);
   void (*merge)(double *f, const Merge *merge, uint32_t n);
   void (*merge_rows)(double *row, const Merge *merge, uint32_t n);
   void (*store)(const Block &b, double *f, uint32_t stride);  // adds the owned points' forces to the host's
 };
 
-// The share of its rest volume below which a cell resists collapse, and that below which the step bound counts on it: rows are kept for
-// some steps, and what lies between is what a cell may lose in that time.
+// The share of its rest volume below which a cell resists collapse, and that below which the step bound
+// counts on it: rows are kept for some steps, and what lies between is what a cell may lose in that time.
 constexpr double kCollapseBelow = 0.6, kCollapseCounted = 0.7;
 
-// Where the pressure of a cell stops to grow, in rest volumes, and the sum of its squared edges from which on its volume counts less.
+// Where the pressure of a cell stops to grow, in rest volumes, and the sum of its squared edges from which on
+// its volume counts less.
 constexpr double kLeastVolume = -1, kMostVolume = 3, kLimit = 3;
-// With Q that sum, Qm the limit and u = Qm/Q <= 1, the volume that counts is V t, t = u^(3/2) (5 - 3 u)/2, dt/dQ = -15/4 u^(3/2) (1 - u)/Q.
-// Norms of its first two derivatives at a cell beyond the limit: 36 |d|^2 <= kFade1 Qm^2 and 6 |d2| <= kFade2 sqrt(Qm), of six volumes.
+// With Q that sum, Qm the limit and u = Qm/Q <= 1, the volume that counts is V t, t = u^(3/2) (5 - 3 u)/2,
+// dt/dQ = -15/4 u^(3/2) (1 - u)/Q. Norms of its first two derivatives at a cell beyond the limit: 36 |d|^2 <=
+// kFade1 Qm^2 and 6 |d2| <= kFade2 sqrt(Qm), of six volumes.
 constexpr double kFade1 = 0.1287, kFade2 = 4.655;
 
-// Springs shorter than this carry no force: their direction is rounding. The square root of the smallest safe square.
+// Springs shorter than this carry no force: their direction is rounding. The square root of the
+// smallest safe square.
 constexpr double kShortestSquared = 1e-200;
 
 const Kernels *kernels_sse2();

@@ -1,5 +1,6 @@
-// Vectors of eight. A point with its velocity is one load; two quads of springs, or eight cells, share each root and each
-// division. Sums per point run in the order of the other kernels: first quad, then second; cell after cell.
+// Vectors of eight. A point with its velocity is one load; two quads of springs, or eight cells, share each
+// root and each division. Sums per point run in the order of the other kernels: first quad, then second;
+// cell after cell.
 #include "msm_kernel_lanes_avx.h"
 
 #include "msm_kernel_quad.h"
@@ -14,7 +15,8 @@ MSM_INLINE __m256d high(__m512d a) { return _mm512_extractf64x4_pd(a, 1); }
 MSM_INLINE __m512d sum_rows(__m512d s0, __m512d s1, __m512d s2, __m512d s3) {
   const __m512d a = _mm512_add_pd(_mm512_unpacklo_pd(s0, s1), _mm512_unpackhi_pd(s0, s1));
   const __m512d b = _mm512_add_pd(_mm512_unpacklo_pd(s2, s3), _mm512_unpackhi_pd(s2, s3));
-  const __m512i lo = _mm512_setr_epi64(0, 1, 8, 9, 4, 5, 12, 13), hi = _mm512_setr_epi64(2, 3, 10, 11, 6, 7, 14, 15);
+  const __m512i lo = _mm512_setr_epi64(0, 1, 8, 9, 4, 5, 12, 13);
+  const __m512i hi = _mm512_setr_epi64(2, 3, 10, 11, 6, 7, 14, 15);
   return _mm512_add_pd(_mm512_permutex2var_pd(a, lo, b), _mm512_permutex2var_pd(a, hi, b));
 }
 
@@ -23,13 +25,17 @@ MSM_INLINE __m512d products(__m512d de) { return _mm512_mul_pd(_mm512_shuffle_f6
 
 // Forces of four springs to their points; lane kFirst + k of scale belongs to spring k.
 template <int kFirst>
-MSM_INLINE void spread(const Block &b, const Quad &q, __m512d scale, __m512d d0, __m512d d1, __m512d d2, __m512d d3) {
+MSM_INLINE void spread(const Block &b, const Quad &q, __m512d scale, __m512d d0, __m512d d1, __m512d d2,
+                       __m512d d3) {
   const __m256d f0 = _mm256_mul_pd(low(_mm512_permutexvar_pd(_mm512_set1_epi64(kFirst), scale)), low(d0));
   const __m256d f1 = _mm256_mul_pd(low(_mm512_permutexvar_pd(_mm512_set1_epi64(kFirst + 1), scale)), low(d1));
   const __m256d f2 = _mm256_mul_pd(low(_mm512_permutexvar_pd(_mm512_set1_epi64(kFirst + 2), scale)), low(d2));
   const __m256d f3 = _mm256_mul_pd(low(_mm512_permutexvar_pd(_mm512_set1_epi64(kFirst + 3), scale)), low(d3));
   add_to(b, q.i, _mm256_add_pd(_mm256_add_pd(f0, f1), _mm256_add_pd(f2, f3)));
-  take_from(b, q.j[0], f0), take_from(b, q.j[1], f1), take_from(b, q.j[2], f2), take_from(b, q.j[3], f3);
+  take_from(b, q.j[0], f0);
+  take_from(b, q.j[1], f1);
+  take_from(b, q.j[2], f2);
+  take_from(b, q.j[3], f3);
 }
 
 template <Form kForm, Damping kDamping>
@@ -45,18 +51,22 @@ static void springs8(const Block &b, double damp) {
     const __m512d t = sum_rows(products(d4), products(d5), products(d6), products(d7));
     const __m512d dd = _mm512_shuffle_f64x2(s, t, 0x44);
     const __m512d counted = kForm == kPlain ? dd : _mm512_add_pd(dd, _mm512_load_pd(b.tilt + 4 * size_t(n)));
-    const __m512d length = _mm512_sqrt_pd(counted), more = _mm512_sub_pd(length, _mm512_load_pd(b.rest + 4 * size_t(n)));
+    const __m512d length = _mm512_sqrt_pd(counted);
+    const __m512d more = _mm512_sub_pd(length, _mm512_load_pd(b.rest + 4 * size_t(n)));
     // 1/L, or 1/(l L) where the force turns back into the body (kTurned).
-    const __m512d inverse =
-        _mm512_div_pd(_mm512_set1_pd(1.0), kForm == kTurned ? _mm512_mul_pd(_mm512_sqrt_pd(dd), length) : length);
+    const __m512d inverse = _mm512_div_pd(
+        _mm512_set1_pd(1.0), kForm == kTurned ? _mm512_mul_pd(_mm512_sqrt_pd(dd), length) : length);
     __m512d stretch = _mm512_mul_pd(more, kForm == kTurned ? _mm512_mul_pd(inverse, length) : inverse);
     if constexpr (kDamping != kUndamped) {
-      const __m512d factor = kDamping == kPerSpring ? _mm512_load_pd(b.damp + 4 * size_t(n)) : _mm512_set1_pd(damp);
+      const __m512d factor =
+          kDamping == kPerSpring ? _mm512_load_pd(b.damp + 4 * size_t(n)) : _mm512_set1_pd(damp);
       const __m512d rate = _mm512_mul_pd(_mm512_shuffle_f64x2(s, t, 0xee), inverse);
-      stretch = _mm512_add_pd(stretch, _mm512_mul_pd(factor, kForm == kTurned ? rate : _mm512_mul_pd(rate, inverse)));
+      stretch = _mm512_add_pd(stretch,
+                              _mm512_mul_pd(factor, kForm == kTurned ? rate : _mm512_mul_pd(rate, inverse)));
     }
     const __mmask8 has_direction = _mm512_cmp_pd_mask(dd, _mm512_set1_pd(kShortestSquared), _CMP_GT_OQ);
-    const __m512d scale = _mm512_maskz_mul_pd(has_direction, _mm512_load_pd(b.stiffness + 4 * size_t(n)), stretch);
+    const __m512d scale =
+        _mm512_maskz_mul_pd(has_direction, _mm512_load_pd(b.stiffness + 4 * size_t(n)), stretch);
     spread<0>(b, q, scale, d0, d1, d2, d3);
     spread<4>(b, r, scale, d4, d5, d6, d7);
   }
@@ -66,9 +76,12 @@ static void springs8(const Block &b, double damp) {
 MSM_INLINE void transpose(__m512d &r0, __m512d &r1, __m512d &r2, __m512d &r3) {
   const __m512d a = _mm512_unpacklo_pd(r0, r1), b = _mm512_unpackhi_pd(r0, r1);
   const __m512d c = _mm512_unpacklo_pd(r2, r3), d = _mm512_unpackhi_pd(r2, r3);
-  const __m512i lo = _mm512_setr_epi64(0, 1, 8, 9, 4, 5, 12, 13), hi = _mm512_setr_epi64(2, 3, 10, 11, 6, 7, 14, 15);
-  r0 = _mm512_permutex2var_pd(a, lo, c), r1 = _mm512_permutex2var_pd(b, lo, d);
-  r2 = _mm512_permutex2var_pd(a, hi, c), r3 = _mm512_permutex2var_pd(b, hi, d);
+  const __m512i lo = _mm512_setr_epi64(0, 1, 8, 9, 4, 5, 12, 13);
+  const __m512i hi = _mm512_setr_epi64(2, 3, 10, 11, 6, 7, 14, 15);
+  r0 = _mm512_permutex2var_pd(a, lo, c);
+  r1 = _mm512_permutex2var_pd(b, lo, d);
+  r2 = _mm512_permutex2var_pd(a, hi, c);
+  r3 = _mm512_permutex2var_pd(b, hi, d);
 }
 
 // Corner n of cells k and k + 4.
@@ -78,77 +91,117 @@ MSM_INLINE __m512d corner(const Block &b, const Cell *c, int k, int n) {
 }
 
 struct Edges8 { __m512d x, y, z; };
-MSM_INLINE void gather_edges(const Block &b, const Cell *c, int n, __m512d o0, __m512d o1, __m512d o2, __m512d o3, Edges8 &out) {
-  out.x = _mm512_sub_pd(corner(b, c, 0, n), o0), out.y = _mm512_sub_pd(corner(b, c, 1, n), o1);
+MSM_INLINE void gather_edges(const Block &b, const Cell *c, int n, __m512d o0, __m512d o1, __m512d o2,
+                             __m512d o3, Edges8 &out) {
+  out.x = _mm512_sub_pd(corner(b, c, 0, n), o0);
+  out.y = _mm512_sub_pd(corner(b, c, 1, n), o1);
   out.z = _mm512_sub_pd(corner(b, c, 2, n), o2);
   __m512d unused = _mm512_sub_pd(corner(b, c, 3, n), o3);
   transpose(out.x, out.y, out.z, unused);
 }
-MSM_INLINE __m512d minor2(__m512d a, __m512d b, __m512d c, __m512d d) { return _mm512_sub_pd(_mm512_mul_pd(a, b), _mm512_mul_pd(c, d)); }
+MSM_INLINE __m512d minor2(__m512d a, __m512d b, __m512d c, __m512d d) {
+  return _mm512_sub_pd(_mm512_mul_pd(a, b), _mm512_mul_pd(c, d));
+}
 MSM_INLINE void cross(const Edges8 &a, const Edges8 &b, Edges8 &out) {
-  out.x = minor2(a.y, b.z, a.z, b.y), out.y = minor2(a.z, b.x, a.x, b.z), out.z = minor2(a.x, b.y, a.y, b.x);
+  out.x = minor2(a.y, b.z, a.z, b.y);
+  out.y = minor2(a.z, b.x, a.x, b.z);
+  out.z = minor2(a.x, b.y, a.y, b.x);
 }
 
 struct Forces { __m512d f0, f1, f2, f3; };  // of cells k and k + 4 at one corner
 MSM_INLINE void forces_at(__m512d pressure, const Edges8 &g, Forces &f) {
-  f.f0 = _mm512_mul_pd(pressure, g.x), f.f1 = _mm512_mul_pd(pressure, g.y), f.f2 = _mm512_mul_pd(pressure, g.z);
+  f.f0 = _mm512_mul_pd(pressure, g.x);
+  f.f1 = _mm512_mul_pd(pressure, g.y);
+  f.f2 = _mm512_mul_pd(pressure, g.z);
   f.f3 = _mm512_setzero_pd();
   transpose(f.f0, f.f1, f.f2, f.f3);
 }
 MSM_INLINE void add(Forces &a, const Forces &b) {
-  a.f0 = _mm512_add_pd(a.f0, b.f0), a.f1 = _mm512_add_pd(a.f1, b.f1), a.f2 = _mm512_add_pd(a.f2, b.f2), a.f3 = _mm512_add_pd(a.f3, b.f3);
+  a.f0 = _mm512_add_pd(a.f0, b.f0);
+  a.f1 = _mm512_add_pd(a.f1, b.f1);
+  a.f2 = _mm512_add_pd(a.f2, b.f2);
+  a.f3 = _mm512_add_pd(a.f3, b.f3);
 }
-// One cell after the other at each corner, corners 1 2 3 0, four cells at a time: the order of the other kernels.
+// One cell after the other at each corner, corners 1 2 3 0, four cells at a time: the order of the
+// other kernels.
 MSM_INLINE void spread_low(const Block &b, const Cell *c, int n, const Forces &f) {
-  add_to(b, c[0].p[n], low(f.f0)), add_to(b, c[1].p[n], low(f.f1)), add_to(b, c[2].p[n], low(f.f2)), add_to(b, c[3].p[n], low(f.f3));
+  add_to(b, c[0].p[n], low(f.f0));
+  add_to(b, c[1].p[n], low(f.f1));
+  add_to(b, c[2].p[n], low(f.f2));
+  add_to(b, c[3].p[n], low(f.f3));
 }
 MSM_INLINE void spread_high(const Block &b, const Cell *c, int n, const Forces &f) {
-  add_to(b, c[4].p[n], high(f.f0)), add_to(b, c[5].p[n], high(f.f1)), add_to(b, c[6].p[n], high(f.f2)), add_to(b, c[7].p[n], high(f.f3));
+  add_to(b, c[4].p[n], high(f.f0));
+  add_to(b, c[5].p[n], high(f.f1));
+  add_to(b, c[6].p[n], high(f.f2));
+  add_to(b, c[7].p[n], high(f.f3));
 }
 
 MSM_INLINE __m512d dot(const Edges8 &a, const Edges8 &b) {
-  return _mm512_add_pd(_mm512_add_pd(_mm512_mul_pd(a.x, b.x), _mm512_mul_pd(a.y, b.y)), _mm512_mul_pd(a.z, b.z));
+  return _mm512_add_pd(_mm512_add_pd(_mm512_mul_pd(a.x, b.x), _mm512_mul_pd(a.y, b.y)),
+                       _mm512_mul_pd(a.z, b.z));
 }
 MSM_INLINE __m512d sum3(__m512d a, __m512d b, __m512d c) { return _mm512_add_pd(_mm512_add_pd(a, b), c); }
-MSM_INLINE Edges8 sum3(const Edges8 &a, const Edges8 &b, const Edges8 &c) { return {sum3(a.x, b.x, c.x), sum3(a.y, b.y, c.y), sum3(a.z, b.z, c.z)}; }
+MSM_INLINE Edges8 sum3(const Edges8 &a, const Edges8 &b, const Edges8 &c) {
+  return {sum3(a.x, b.x, c.x), sum3(a.y, b.y, c.y), sum3(a.z, b.z, c.z)};
+}
 MSM_INLINE __m512d pressure_of(const Block &b, uint32_t t, __m512d now) {
-  const __m512d rest = _mm512_load_pd(b.volume6 + t), below = _mm512_mul_pd(_mm512_set1_pd(kCollapseBelow), rest);
+  const __m512d rest = _mm512_load_pd(b.volume6 + t);
+  const __m512d below = _mm512_mul_pd(_mm512_set1_pd(kCollapseBelow), rest);
   now = _mm512_max_pd(now, _mm512_mul_pd(_mm512_set1_pd(kLeastVolume), rest));
   now = _mm512_min_pd(now, _mm512_mul_pd(_mm512_set1_pd(kMostVolume), rest));
   const __m512d lost = _mm512_max_pd(_mm512_sub_pd(below, now), _mm512_setzero_pd());
-  return _mm512_add_pd(_mm512_mul_pd(_mm512_load_pd(b.bulk + t), _mm512_sub_pd(rest, now)), _mm512_mul_pd(_mm512_load_pd(b.collapse + t), lost));
+  return _mm512_add_pd(_mm512_mul_pd(_mm512_load_pd(b.bulk + t), _mm512_sub_pd(rest, now)),
+                       _mm512_mul_pd(_mm512_load_pd(b.collapse + t), lost));
 }
 MSM_INLINE __m512d squares(const Edges8 &e1, const Edges8 &e2, const Edges8 &e3) {
   const Edges8 sum = sum3(e1, e2, e3);
-  return _mm512_sub_pd(_mm512_mul_pd(_mm512_set1_pd(4), sum3(dot(e1, e1), dot(e2, e2), dot(e3, e3))), dot(sum, sum));
+  return _mm512_sub_pd(_mm512_mul_pd(_mm512_set1_pd(4), sum3(dot(e1, e1), dot(e2, e2), dot(e3, e3))),
+                       dot(sum, sum));
 }
-MSM_INLINE void stretched_forces(const Block &b, uint32_t t, __m512d q, __m512d now, const Edges8 &e1, const Edges8 &e2, const Edges8 &e3, Edges8 &g1,
-                                 Edges8 &g2, Edges8 &g3) {
-  const __m512d limit = _mm512_load_pd(b.limit + t), most = _mm512_max_pd(q, limit), u = _mm512_div_pd(limit, most), one = _mm512_set1_pd(1);
+MSM_INLINE void stretched_forces(const Block &b, uint32_t t, __m512d q, __m512d now, const Edges8 &e1,
+                                 const Edges8 &e2, const Edges8 &e3, Edges8 &g1, Edges8 &g2, Edges8 &g3) {
+  const __m512d limit = _mm512_load_pd(b.limit + t);
+  const __m512d most = _mm512_max_pd(q, limit);
+  const __m512d u = _mm512_div_pd(limit, most);
+  const __m512d one = _mm512_set1_pd(1);
   const __m512d power = _mm512_mul_pd(_mm512_sqrt_pd(u), u);
-  const __m512d by_q = _mm512_div_pd(_mm512_mul_pd(_mm512_set1_pd(-3.75), _mm512_mul_pd(power, _mm512_sub_pd(one, u))), most);
-  const __m512d share = _mm512_mul_pd(power, _mm512_sub_pd(_mm512_set1_pd(2.5), _mm512_mul_pd(_mm512_set1_pd(1.5), u)));
-  const __m512d p = pressure_of(b, t, _mm512_mul_pd(now, share)), along = _mm512_mul_pd(p, share), quarter = _mm512_set1_pd(0.25);
+  const __m512d by_q =
+      _mm512_div_pd(_mm512_mul_pd(_mm512_set1_pd(-3.75), _mm512_mul_pd(power, _mm512_sub_pd(one, u))), most);
+  const __m512d share =
+      _mm512_mul_pd(power, _mm512_sub_pd(_mm512_set1_pd(2.5), _mm512_mul_pd(_mm512_set1_pd(1.5), u)));
+  const __m512d p = pressure_of(b, t, _mm512_mul_pd(now, share));
+  const __m512d along = _mm512_mul_pd(p, share);
+  const __m512d quarter = _mm512_set1_pd(0.25);
   const __m512d inward = _mm512_mul_pd(_mm512_mul_pd(_mm512_set1_pd(8), p), _mm512_mul_pd(now, by_q));
-  const Edges8 sum = sum3(e1, e2, e3), middle = {_mm512_mul_pd(quarter, sum.x), _mm512_mul_pd(quarter, sum.y), _mm512_mul_pd(quarter, sum.z)};
+  const Edges8 sum = sum3(e1, e2, e3);
+  const Edges8 middle = {_mm512_mul_pd(quarter, sum.x), _mm512_mul_pd(quarter, sum.y),
+                         _mm512_mul_pd(quarter, sum.z)};
   const auto part = [&](__m512d g, __m512d e, __m512d m) __attribute__((always_inline)) {
     return _mm512_add_pd(_mm512_mul_pd(along, g), _mm512_mul_pd(inward, _mm512_sub_pd(e, m)));
   };
   const auto turn = [&](const Edges8 &e, Edges8 &g) __attribute__((always_inline)) {
     g = {part(g.x, e.x, middle.x), part(g.y, e.y, middle.y), part(g.z, e.z, middle.z)};
   };
-  turn(e1, g1), turn(e2, g2), turn(e3, g3);
+  turn(e1, g1);
+  turn(e2, g2);
+  turn(e3, g3);
 }
 
 static void volume_cells8(const Block &b) {
   for (uint32_t t = 0; t < b.cells; t += 8) {
     const Cell *c = b.cell + t;
-    const __m512d o0 = corner(b, c, 0, 0), o1 = corner(b, c, 1, 0), o2 = corner(b, c, 2, 0), o3 = corner(b, c, 3, 0);
+    const __m512d o0 = corner(b, c, 0, 0);
+    const __m512d o1 = corner(b, c, 1, 0);
+    const __m512d o2 = corner(b, c, 2, 0);
+    const __m512d o3 = corner(b, c, 3, 0);
     Edges8 e1, e2, e3, g1, g2, g3;
     gather_edges(b, c, 1, o0, o1, o2, o3, e1);
     gather_edges(b, c, 2, o0, o1, o2, o3, e2);
     gather_edges(b, c, 3, o0, o1, o2, o3, e3);
-    cross(e2, e3, g1), cross(e3, e1, g2), cross(e1, e2, g3);
+    cross(e2, e3, g1);
+    cross(e3, e1, g2);
+    cross(e1, e2, g3);
     const __m512d volume6 = dot(e1, g1);
     const __m512d q = squares(e1, e2, e3);
     __m512d pressure = _mm512_set1_pd(1);
@@ -159,19 +212,32 @@ static void volume_cells8(const Block &b) {
       if (!_mm512_cmp_pd_mask(pressure, _mm512_setzero_pd(), _CMP_NEQ_UQ)) continue;
     }
     Forces f1, f2, f3, sum;
-    forces_at(pressure, g1, f1), forces_at(pressure, g2, f2), forces_at(pressure, g3, f3);
-    sum = f1, add(sum, f2), add(sum, f3);
-    spread_low(b, c, 1, f1), spread_low(b, c, 2, f2), spread_low(b, c, 3, f3);
-    take_from(b, c[0].p[0], low(sum.f0)), take_from(b, c[1].p[0], low(sum.f1));
-    take_from(b, c[2].p[0], low(sum.f2)), take_from(b, c[3].p[0], low(sum.f3));
-    spread_high(b, c, 1, f1), spread_high(b, c, 2, f2), spread_high(b, c, 3, f3);
-    take_from(b, c[4].p[0], high(sum.f0)), take_from(b, c[5].p[0], high(sum.f1));
-    take_from(b, c[6].p[0], high(sum.f2)), take_from(b, c[7].p[0], high(sum.f3));
+    forces_at(pressure, g1, f1);
+    forces_at(pressure, g2, f2);
+    forces_at(pressure, g3, f3);
+    sum = f1;
+    add(sum, f2);
+    add(sum, f3);
+    spread_low(b, c, 1, f1);
+    spread_low(b, c, 2, f2);
+    spread_low(b, c, 3, f3);
+    take_from(b, c[0].p[0], low(sum.f0));
+    take_from(b, c[1].p[0], low(sum.f1));
+    take_from(b, c[2].p[0], low(sum.f2));
+    take_from(b, c[3].p[0], low(sum.f3));
+    spread_high(b, c, 1, f1);
+    spread_high(b, c, 2, f2);
+    spread_high(b, c, 3, f3);
+    take_from(b, c[4].p[0], high(sum.f0));
+    take_from(b, c[5].p[0], high(sum.f1));
+    take_from(b, c[6].p[0], high(sum.f2));
+    take_from(b, c[7].p[0], high(sum.f3));
   }
 }
 
-constexpr Kernels kKernels = {"avx512", load_block, {MSM_SPRINGS(springs8)}, MSM_BRANCHES, volume_cells8,
-                              MSM_ROWS, merge_halo, merge_rows, add_to_host};
+constexpr Kernels kKernels = {"avx512",     load_block,    {MSM_SPRINGS(springs8)},
+                              MSM_BRANCHES, volume_cells8, MSM_ROWS,
+                              merge_halo,   merge_rows,    add_to_host};
 
 }  // namespace
 

@@ -1,6 +1,7 @@
 // Four doubles in one AVX register, for the files compiled with it. Internal linkage only.
 #pragma once
-#if defined(__GNUC__) && !defined(__clang__)  // GCC 12 takes the undefined pass-through of its own unmasked intrinsics for a bug of ours
+// GCC 12 takes the undefined pass-through of its own unmasked intrinsics for a bug of ours
+#if defined(__GNUC__) && !defined(__clang__)
 #pragma GCC diagnostic ignored "-Wmaybe-uninitialized"
 #pragma GCC diagnostic ignored "-Wuninitialized"
 #endif
@@ -16,21 +17,32 @@ typedef __m256d v4;
 
 MSM_INLINE v4 load4(const double *p) { return _mm256_load_pd(p); }
 MSM_INLINE void store4(double *p, v4 a) { _mm256_store_pd(p, a); }
-MSM_INLINE v4 load_xyz(const double *p) { return _mm256_maskload_pd(p, _mm256_setr_epi64x(-1, -1, -1, 0)); }  // masked: never read
+// masked: never read
+MSM_INLINE v4 load_xyz(const double *p) { return _mm256_maskload_pd(p, _mm256_setr_epi64x(-1, -1, -1, 0)); }
 MSM_INLINE v4 splat(double a) { return _mm256_set1_pd(a); }
 MSM_INLINE v4 set4(double a, double b, double c, double d) { return _mm256_setr_pd(a, b, c, d); }
 MSM_INLINE v4 sqrt4(v4 a) { return _mm256_sqrt_pd(a); }
 MSM_INLINE v4 max4(v4 a, v4 b) { return _mm256_max_pd(a, b); }
 MSM_INLINE v4 min4(v4 a, v4 b) { return _mm256_min_pd(a, b); }
 MSM_INLINE bool any_above(v4 a, v4 limit) { return _mm256_movemask_pd(_mm256_cmp_pd(a, limit, _CMP_GT_OQ)); }
-MSM_INLINE uint32_t count_above(v4 a, v4 limit) { return uint32_t(__builtin_popcount(uint32_t(_mm256_movemask_pd(_mm256_cmp_pd(a, limit, _CMP_GT_OQ))))); }
-MSM_INLINE v4 choose_above(v4 a, v4 limit, v4 above, v4 below) { return _mm256_blendv_pd(below, above, _mm256_cmp_pd(a, limit, _CMP_GT_OQ)); }
+MSM_INLINE uint32_t count_above(v4 a, v4 limit) {
+  return uint32_t(__builtin_popcount(uint32_t(_mm256_movemask_pd(_mm256_cmp_pd(a, limit, _CMP_GT_OQ)))));
+}
+MSM_INLINE v4 choose_above(v4 a, v4 limit, v4 above, v4 below) {
+  return _mm256_blendv_pd(below, above, _mm256_cmp_pd(a, limit, _CMP_GT_OQ));
+}
 MSM_INLINE v4 abs4(v4 a) { return _mm256_andnot_pd(_mm256_set1_pd(-0.0), a); }
-MSM_INLINE v4 zero_unless_above(v4 value, v4 a, v4 limit) { return _mm256_and_pd(value, _mm256_cmp_pd(a, limit, _CMP_GT_OQ)); }
-MSM_INLINE bool all_zero(v4 a) { return !_mm256_movemask_pd(_mm256_cmp_pd(a, _mm256_setzero_pd(), _CMP_NEQ_UQ)); }
+MSM_INLINE v4 zero_unless_above(v4 value, v4 a, v4 limit) {
+  return _mm256_and_pd(value, _mm256_cmp_pd(a, limit, _CMP_GT_OQ));
+}
+MSM_INLINE bool all_zero(v4 a) {
+  return !_mm256_movemask_pd(_mm256_cmp_pd(a, _mm256_setzero_pd(), _CMP_NEQ_UQ));
+}
 MSM_INLINE v4 yzx(v4 a) { return _mm256_permute4x64_pd(a, 0xc9); }
 template <int kLane>
-MSM_INLINE v4 lane(v4 a) { return _mm256_permute4x64_pd(a, kLane * 0x55); }
+MSM_INLINE v4 lane(v4 a) {
+  return _mm256_permute4x64_pd(a, kLane * 0x55);
+}
 
 // k-th lane of the result: (s_k.x + s_k.y) + (s_k.z + s_k.w)
 MSM_INLINE v4 sum_rows(v4 s0, v4 s1, v4 s2, v4 s3) {
@@ -39,9 +51,14 @@ MSM_INLINE v4 sum_rows(v4 s0, v4 s1, v4 s2, v4 s3) {
   return _mm256_add_pd(_mm256_permute2f128_pd(a, b, 0x20), _mm256_permute2f128_pd(a, b, 0x31));
 }
 MSM_INLINE void transpose(v4 &r0, v4 &r1, v4 &r2, v4 &r3) {
-  const v4 a = _mm256_unpacklo_pd(r0, r1), b = _mm256_unpackhi_pd(r0, r1), c = _mm256_unpacklo_pd(r2, r3), d = _mm256_unpackhi_pd(r2, r3);
-  r0 = _mm256_permute2f128_pd(a, c, 0x20), r1 = _mm256_permute2f128_pd(b, d, 0x20);
-  r2 = _mm256_permute2f128_pd(a, c, 0x31), r3 = _mm256_permute2f128_pd(b, d, 0x31);
+  const v4 a = _mm256_unpacklo_pd(r0, r1);
+  const v4 b = _mm256_unpackhi_pd(r0, r1);
+  const v4 c = _mm256_unpacklo_pd(r2, r3);
+  const v4 d = _mm256_unpackhi_pd(r2, r3);
+  r0 = _mm256_permute2f128_pd(a, c, 0x20);
+  r1 = _mm256_permute2f128_pd(b, d, 0x20);
+  r2 = _mm256_permute2f128_pd(a, c, 0x31);
+  r3 = _mm256_permute2f128_pd(b, d, 0x31);
 }
 
 }  // namespace

@@ -5,8 +5,9 @@
 
 namespace msm {
 namespace {
-constexpr Kernels kKernels = {"sse2", load_block, {MSM_SPRINGS(springs)}, MSM_BRANCHES, volume_cells,
-                              MSM_ROWS, merge_halo, merge_rows, add_to_host};
+constexpr Kernels kKernels = {"sse2",       load_block,   {MSM_SPRINGS(springs)},
+                              MSM_BRANCHES, volume_cells, MSM_ROWS,
+                              merge_halo,   merge_rows,   add_to_host};
 }  // namespace
 
 const Kernels *kernels_sse2() { return &kKernels; }

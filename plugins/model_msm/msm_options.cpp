@@ -1,5 +1,6 @@
-// From parameters and fields by cell to what the passes read: stiffness per spring, frozen extra coordinates, dampers, drag,
-// springs that are switched off. What nothing calls for stays empty and its kernels are never chosen.
+// From parameters and fields by cell to what the passes read: stiffness per spring, frozen extra
+// coordinates, dampers, drag, springs that are switched off. What nothing calls for stays empty and its
+// kernels are never chosen.
 #include <stdio.h>
 
 #include <algorithm>
@@ -8,18 +9,21 @@
 
 namespace msm {
 
-// Scale of the springs that keeps Young's modulus when the volume term is on: springs give lambda = mu, the term adds kV to
-// lambda, and E = mu (3 lambda + 2 mu) / (lambda + mu) is solved for mu; without it mu = 0.4 E. r = kV/E.
+// Scale of the springs that keeps Young's modulus when the volume term is on: springs give lambda = mu, the
+// term adds kV to lambda, and E = mu (3 lambda + 2 mu) / (lambda + mu) is solved for mu; without it mu =
+// 0.4 E. r = kV/E.
 static double spring_scale(double r) {
   if (r == 0) return 1;
   const double b = 3 * r - 2;
   return (__builtin_sqrt(b * b + 20 * r) - b) / 10 / 0.4;
 }
 
-[[noreturn]] static void refuse_field(const dfm_host *host, const dfm_param &row, uint32_t cell, double value) {
+[[noreturn]] static void refuse_field(const dfm_host *host, const dfm_param &row, uint32_t cell,
+                                      double value) {
   char text[200];
-  snprintf(text, sizeof text, "field %s of cell %u is %g; %g .. %g %s is expected, and an axis that is not zero", row.key, cell, value, row.min,
-           row.max, row.unit);
+  snprintf(text, sizeof text,
+           "field %s of cell %u is %g; %g .. %g %s is expected, and an axis that is not zero", row.key, cell,
+           value, row.min, row.max, row.unit);
   complain(host, text);
   throw Refused{};
 }
@@ -34,7 +38,8 @@ void Body::take_fields(const dfm_mesh &m) {
         double square = 0;
         for (uint32_t w = 0; w < known.width; ++w) {
           const double x = values[size_t(known.width) * c + w];
-          if (!(x >= known.min && x <= known.max) || (r == kVolume && x < 0 && x != kFromPoisson)) refuse_field(host, known, c, x);
+          if (!(x >= known.min && x <= known.max) || (r == kVolume && x < 0 && x != kFromPoisson))
+            refuse_field(host, known, c, x);
           square += x * x;
         }
         if (r == kAxis && !(square > 0)) refuse_field(host, known, c, 0);
@@ -44,8 +49,8 @@ void Body::take_fields(const dfm_mesh &m) {
     }
 }
 
-// Every cell gives each of its edges E V, times what msm_stiffness.cpp finds. What all cells share (Young's modulus, the volume term's
-// correction, a branch) stays outside.
+// Every cell gives each of its edges E V, times what msm_stiffness.cpp finds. What all cells share (Young's
+// modulus, the volume term's correction, a branch) stays outside.
 void Body::find_shapes() {
   const bool scaled = !field[kVolume].empty() || !field[kPoisson].empty(), stiff = !field[kYoung].empty();
   scale = (scaled ? 1.0 : spring_scale(volume_ratio(0))) * (stiff ? 1.0 : params[kYoung]);
@@ -53,24 +58,31 @@ void Body::find_shapes() {
   std::fill(shape.data(), shape.data() + nedge, 0.0);
   for (uint32_t c = 0; c < ncell; ++c) {
     const double volume = cell_volume6[c] / 6;
-    const double share = volume * (stiff ? field[kYoung][c] : 1.0) * (scaled ? spring_scale(volume_ratio(c)) : 1.0);
+    const double share =
+        volume * (stiff ? field[kYoung][c] : 1.0) * (scaled ? spring_scale(volume_ratio(c)) : 1.0);
     for (int n = 0; n < 6; ++n) shape[cell_edge[6 * size_t(c) + n]] += share;
   }
   for (uint32_t e = 0; e < nedge; ++e) shape[e] *= per_modulus[e];
 }
 
-// w^2 of a spring d at rest: softer, g^2 (a.d)^2, one extra coordinate g a.X; stiffer, g^2 (|d|^2 - (a.d)^2), two of them along any two
-// axes across a. Springs between cells that differ take the mean over the volume around them, which knows no sign of an axis.
+// w^2 of a spring d at rest: softer, g^2 (a.d)^2, one extra coordinate g a.X; stiffer, g^2 (|d|^2 - (a.d)^2),
+// two of them along any two axes across a. Springs between cells that differ take the mean over the volume
+// around them, which knows no sign of an axis.
 void Body::find_tilts(Room &room) {
   const bool by_cell = !field[kSlope].empty() || !field[kAxis].empty();
   const double steepest = largest_of(kSlope);
-  edge_tilt.swap(room.edge_tilt), edge_rest.swap(room.edge_rest), tilt.swap(room.tilt);
+  edge_tilt.swap(room.edge_tilt);
+  edge_rest.swap(room.edge_rest);
+  tilt.swap(room.tilt);
   if (steepest > 0) {
     const auto squared = [&](uint32_t c, uint32_t e) {
-      const double *x = rest_point.data() + 3 * size_t(edges[2 * size_t(e)]), *y = rest_point.data() + 3 * size_t(edges[2 * size_t(e) + 1]);
-      const double *axis = field[kAxis].empty() ? params + kAxis : field[kAxis].data() + 3 * size_t(c), slope = at(kSlope, c);
+      const double *x = rest_point.data() + 3 * size_t(edges[2 * size_t(e)]);
+      const double *y = rest_point.data() + 3 * size_t(edges[2 * size_t(e) + 1]);
+      const double *axis = field[kAxis].empty() ? params + kAxis : field[kAxis].data() + 3 * size_t(c);
+      const double slope = at(kSlope, c);
       const double d[3] = {y[0] - x[0], y[1] - x[1], y[2] - x[2]};
-      const double ad = (axis[0] * d[0] + axis[1] * d[1]) + axis[2] * d[2], aa = (axis[0] * axis[0] + axis[1] * axis[1]) + axis[2] * axis[2];
+      const double ad = (axis[0] * d[0] + axis[1] * d[1]) + axis[2] * d[2];
+      const double aa = (axis[0] * axis[0] + axis[1] * axis[1]) + axis[2] * axis[2];
       const double along = ad * ad / aa, all = (d[0] * d[0] + d[1] * d[1]) + d[2] * d[2];
       return slope * slope * (choice(kAxisKind) == kSofter ? along : std::max(all - along, 0.0));
     };
@@ -82,7 +94,9 @@ void Body::find_tilts(Room &room) {
     for (uint32_t e = 0; e < nedge; ++e) {
       if (!by_cell) edge_tilt[e] = squared(0, e);
       const uint32_t *ends = edges.data() + 2 * size_t(e);
-      edge_rest[e] = __builtin_sqrt(square_of(rest_point.data() + 3 * size_t(ends[0]), rest_point.data() + 3 * size_t(ends[1])) + edge_tilt[e]);
+      edge_rest[e] = __builtin_sqrt(
+          square_of(rest_point.data() + 3 * size_t(ends[0]), rest_point.data() + 3 * size_t(ends[1])) +
+          edge_tilt[e]);
     }
   }
   for (size_t s = 0; s < spring_slots(); ++s) {
@@ -90,21 +104,26 @@ void Body::find_tilts(Room &room) {
     rest[s] = e == kNone ? 0 : rest_length(e);
     if (steepest > 0) tilt[s] = e == kNone ? 0 : edge_tilt[e];
   }
-  for (uint32_t b = 0; b < nblock; ++b) block[b].tilt = tilt.empty() ? nullptr : tilt.data() + (block[b].stiffness - stiffness.data());
+  for (uint32_t b = 0; b < nblock; ++b)
+    block[b].tilt = tilt.empty() ? nullptr : tilt.data() + (block[b].stiffness - stiffness.data());
 }
 
-// Dampers by cell add up like the springs: c of an edge is the sum of its cells' damping_stiffness times their share of k.
+// Dampers by cell add up like the springs: c of an edge is the sum of its cells' damping_stiffness times
+// their share of k.
 void Body::find_dampers(Room &room) {
   const Buffer<double> &by_cell = field[kDampingStiffness];
   damping_on = largest_of(kDampingStiffness) > 0;
   if (!by_cell.empty() && damping_on) {
     Buffer<double> &share = room.damp_share;
-    edge_damp.swap(room.edge_damp), damp_most.swap(room.damp_most), damp.swap(room.damp);
+    edge_damp.swap(room.edge_damp);
+    damp_most.swap(room.damp_most);
+    damp.swap(room.damp);
     for (uint32_t c = 0; c < ncell; ++c) {
       const double k = cell_volume6[c] * at(kYoung, c) * spring_scale(volume_ratio(c));
       for (int n = 0; n < 6; ++n) {
         const uint32_t e = cell_edge[6 * size_t(c) + n];
-        edge_damp[e] += k * by_cell[c], share[e] += k;
+        edge_damp[e] += k * by_cell[c];
+        share[e] += k;
       }
     }
     for (uint32_t e = 0; e < nedge; ++e) {
@@ -114,8 +133,10 @@ void Body::find_dampers(Room &room) {
         most = std::max(most, edge_damp[e]);
       }
     }
-    for (size_t s = 0; s < spring_slots(); ++s) damp[s] = spring_edge[s] == kNone ? 0 : edge_damp[spring_edge[s]];
-    for (uint32_t b = 0; b < nblock; ++b) block[b].damp = damp.data() + (block[b].stiffness - stiffness.data());
+    for (size_t s = 0; s < spring_slots(); ++s)
+      damp[s] = spring_edge[s] == kNone ? 0 : edge_damp[spring_edge[s]];
+    for (uint32_t b = 0; b < nblock; ++b)
+      block[b].damp = damp.data() + (block[b].stiffness - stiffness.data());
   }
   const Buffer<double> &drag = field[kDampingMass];
   drag_on = largest_of(kDampingMass) > 0;
@@ -125,23 +146,28 @@ void Body::find_dampers(Room &room) {
     for (uint32_t c = 0; c < ncell; ++c)
       for (int a = 0; a < 4; ++a) {
         const uint32_t i = cells[4 * size_t(c) + a];
-        point_drag[i] += cell_volume6[c] * drag[c], around[i] += cell_volume6[c];
+        point_drag[i] += cell_volume6[c] * drag[c];
+        around[i] += cell_volume6[c];
       }
     for (uint32_t i = 0; i < npoint; ++i) point_drag[i] = around[i] > 0 ? point_drag[i] / around[i] : 0;
   }
 }
 
-// How far resistance to collapse counts in a cell of this shape. Its stiffness against a change of volume is kC sum |grad V|^2 / V0, with |grad V| = A/3 at
-// each point: 0.707 kC L for a regular cell of edge L, and r times that for others, while their springs get softer by 1/r. A flat cell turns over within a step
-// wherever a body vibrates; with the full kC it would bring down the bound of the whole body each time. Beyond r = 1.5, kC falls with 1/r^4, so that beside
-// the springs of the same cell it counts as 1/r^2. The energy with which these springs resist turning over falls as
+// How far resistance to collapse counts in a cell of this shape. Its stiffness against a change of volume is
+// kC sum |grad V|^2 / V0, with |grad V| = A/3 at each point: 0.707 kC L for a regular cell of edge L, and r
+// times that for others, while their springs get softer by 1/r. A flat cell turns over within a step wherever
+// a body vibrates; with the full kC it would bring down the bound of the whole body each time. Beyond r =
+// 1.5, kC falls with 1/r^4, so that beside the springs of the same cell it counts as 1/r^2. The energy with
+// which these springs resist turning over falls as
 // fast, from a sixth of that of kC in a regular cell.
 double Body::collapse_share(uint32_t c) const {
   constexpr double kRegular = 0.70710678118654752, kFull = 1.5;
   const auto at = [&](int a) { return &rest_point[3 * size_t(cells[4 * size_t(c) + size_t(a)])]; };
   double areas = 0, edges_sum = 0;
   for (int a = 0; a < 4; ++a) {
-    const double *const first = at((a + 1) % 4), *const second = at((a + 2) % 4), *const third = at((a + 3) % 4);
+    const double *const first = at((a + 1) % 4);
+    const double *const second = at((a + 2) % 4);
+    const double *const third = at((a + 3) % 4);
     const double u[3] = {second[0] - first[0], second[1] - first[1], second[2] - first[2]};
     const double v[3] = {third[0] - first[0], third[1] - first[1], third[2] - first[2]};
     const double n[3] = {u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]};
@@ -165,10 +191,12 @@ Body::CellStiffness Body::cell_stiffness(uint32_t c) const {
 
 void Body::fill_stiffness() {
   const size_t springs = spring_slots(), ncells = cell_slots();
-  for (size_t s = 0; s < springs; ++s) stiffness[s] = spring_edge[s] == kNone ? 0 : stiffness_of(spring_edge[s]);
+  for (size_t s = 0; s < springs; ++s)
+    stiffness[s] = spring_edge[s] == kNone ? 0 : stiffness_of(spring_edge[s]);
   for (size_t c = 0; c < ncells; ++c) {
     const CellStiffness k = cell_id[c] == kNone ? CellStiffness{0, 0} : cell_stiffness(cell_id[c]);
-    bulk[c] = k.bulk, collapse[c] = k.collapse;
+    bulk[c] = k.bulk;
+    collapse[c] = k.collapse;
   }
 }
 
@@ -188,10 +216,15 @@ const char *Body::idle(Param which) const {
       bool below = false, other = false;
       for (uint32_t c = 0; c < ncell; ++c) {
         const double nu = at(kPoisson, c);
-        below |= at(kVolume, c) < 0 && nu < 0.25, other |= nu != 0.25;
+        below |= at(kVolume, c) < 0 && nu < 0.25;
+        other |= nu != 0.25;
       }
-      if (below) return "springs alone give 1/4, and no volume term that is stable gives less; cells that ask for less have 1/4";
-      return other && !volume_on ? "volume is 0, and springs alone give 1/4 whatever it says; leave volume at auto" : nullptr;
+      if (below)
+        return "springs alone give 1/4, and no volume term that is stable gives less; cells that ask for "
+               "less have 1/4";
+      return other && !volume_on
+                 ? "volume is 0, and springs alone give 1/4 whatever it says; leave volume at auto"
+                 : nullptr;
     }
     case kCollapse: {
       bool works = largest_of(kCollapse) == 0;
@@ -201,7 +234,8 @@ const char *Body::idle(Param which) const {
     case kAxisKind:
     case kAxisForm:
     case kAxis: return edge_tilt.empty() ? "anisotropy_slope is 0" : nullptr;
-    case kRelaxationRatio: return choice(kDamper) == kStandardLinear ? nullptr : "only damper sls has a second spring";
+    case kRelaxationRatio:
+      return choice(kDamper) == kStandardLinear ? nullptr : "only damper sls has a second spring";
     case kRelaxationTime: return has_branch() ? nullptr : "damper is voigt";
     default: return nullptr;
   }
@@ -216,7 +250,8 @@ struct Aside {  // the mask, while no spring counts as off
 }  // namespace
 
 double Body::largest_of(Param which) const {
-  return field[which].empty() ? params[which] : *std::max_element(field[which].data(), field[which].data() + ncell);
+  return field[which].empty() ? params[which]
+                              : *std::max_element(field[which].data(), field[which].data() + ncell);
 }
 
 double Body::largest_volume() const {
@@ -229,15 +264,24 @@ double Body::largest_volume() const {
 void Body::make_room(Room &room) const {
   const size_t slots = spring_slots();
   const bool tilted = largest_of(kSlope) > 0;
-  if (tilted) room.edge_tilt.create(host, nedge), room.edge_rest.create(host, nedge);
+  if (tilted) {
+    room.edge_tilt.create(host, nedge);
+    room.edge_rest.create(host, nedge);
+  }
   if (tilted || has_branch()) room.tilt.create(host, slots);
   if (!field[kDampingStiffness].empty() && largest_of(kDampingStiffness) > 0) {
-    room.edge_damp.create(host, nedge), room.damp_share.create(host, nedge);
-    room.damp_most.create(host, npoint), room.damp.create(host, slots);
+    room.edge_damp.create(host, nedge);
+    room.damp_share.create(host, nedge);
+    room.damp_most.create(host, npoint);
+    room.damp.create(host, slots);
   }
-  if (!field[kDampingMass].empty() && largest_of(kDampingMass) > 0) room.point_drag.create(host, npoint), room.drag_around.create(host, npoint);
+  if (!field[kDampingMass].empty() && largest_of(kDampingMass) > 0) {
+    room.point_drag.create(host, npoint);
+    room.drag_around.create(host, npoint);
+  }
   if (has_branch() && rest_now.empty()) room.rest_now.create(host, slots);
-  room.own.create(host, npoint), room.next.create(host, npoint);
+  room.own.create(host, npoint);
+  room.next.create(host, npoint);
   room.gradient.create(host, largest_volume() > 0 ? 4 * size_t(ncell) : 0);
 }
 
@@ -253,7 +297,8 @@ void Body::apply_params(const double *values) {
     std::copy(before, before + kValueCount, params);
     throw;
   }
-  volume_on = largest_volume() > 0, cells_on = volume_on || largest_of(kCollapse) > 0;
+  volume_on = largest_volume() > 0;
+  cells_on = volume_on || largest_of(kCollapse) > 0;
   find_shapes();
   find_tilts(room);
   find_dampers(room);
@@ -267,7 +312,8 @@ void Body::apply_params(const double *values) {
   if (!edge_off.empty()) fill_stiffness();
 }
 
-// The rows of the step bound keep counting a spring that is off: a bound it stays, and a cut need not look for new weights.
+// The rows of the step bound keep counting a spring that is off: a bound it stays, and a cut need not look
+// for new weights.
 void Body::mask_springs(uint32_t n, const uint32_t *which, bool on) {
   if (edge_off.empty()) edge_off.create(host, nedge);
   for (uint32_t k = 0; k < n; ++k) edge_off[which[k]] = !on;

@@ -1,6 +1,7 @@
-// Order of the points: recursive bisection of the rest shape across its longest side. Every range of the order is a compact
-// piece of the body, so a block of consecutive points fits the first-level cache together with its halo whatever the size of
-// the body, and neighbors lie close to each other within it. Depends on rest positions and point numbers alone.
+// Order of the points: recursive bisection of the rest shape across its longest side. Every range of the
+// order is a compact piece of the body, so a block of consecutive points fits the first-level cache together
+// with its halo whatever the size of the body, and neighbors lie close to each other within it. Depends on
+// rest positions and point numbers alone.
 #include <algorithm>
 
 #include "msm_body.h"
@@ -16,7 +17,10 @@ struct Partition {
   uint32_t nblock = 0;
 
   void split(uint32_t begin, uint32_t end, bool in_block) {
-    if (!in_block && end - begin <= kBlockPoints) block_begin[nblock++] = begin, in_block = true;
+    if (!in_block && end - begin <= kBlockPoints) {
+      block_begin[nblock++] = begin;
+      in_block = true;
+    }
     if (end - begin <= kLeafPoints) return;
     double lo[3], hi[3];
     for (int a = 0; a < 3; ++a) lo[a] = hi[a] = rest[3 * size_t(order[begin]) + a];
@@ -47,12 +51,14 @@ uint32_t partition_points(const double *rest, uint32_t npoint, uint32_t *order, 
   Partition partition{rest, order, block_begin};
   partition.split(0, npoint, false);
   block_begin[partition.nblock] = npoint;
-  // nth_element leaves the order within a half to the library: sort the leaves by number so that it depends on the mesh alone.
+  // nth_element leaves the order within a half to the library: sort the leaves by number so that it depends
+  // on the mesh alone.
   struct Leaves {
     static void sort(uint32_t *o, uint32_t begin, uint32_t end) {
       if (end - begin <= kLeafPoints) return std::sort(o + begin, o + end);
       const uint32_t middle = begin + (end - begin) / 2;
-      sort(o, begin, middle), sort(o, middle, end);
+      sort(o, begin, middle);
+      sort(o, middle, end);
     }
   };
   Leaves::sort(order, 0, npoint);

@@ -1,17 +1,22 @@
-// Stiffness of each spring at rest, a product of two (doc/models/msm.md derives both, doc/decisions/0010 and 0065 say why the second):
+// Stiffness of each spring at rest, a product of two (doc/models/msm.md derives both, doc/decisions/0010 and
+// 0065 say why the second):
 //   Van Gelder   sum of E V over the cells around the edge / L0^2: the size of the cells drops out,
-//   directions   a factor of mean 1, multiplied by m.S m in each step, m = n n^T, S the inverse of the body's mean C = 6 sum w m m^T / sum w, w the
-//                volumes around each edge times the factor so far. One step, up to eight for a stretched mesh.
-// C is the tensor of the body under a uniform strain if every cell had Young's modulus 1, so m.S m = 1 / E(n) is its compliance along
-// the spring: where a mesh has many edges one way (the surface of a bar one cell thick) they soften, where it has few they stiffen.
-// It is the multiplicative algorithm for D-optimal designs (Silvey, Titterington, Torsney 1978), whose fixed point has the
-// largest det C, and that is an isotropic C whenever one can be had (log det is concave). At that point m.S m is 1 for each spring that keeps
-// stiffness and less for the others (Kiefer, Wolfowitz 1960), which tells when to stop. The weighted mean of the factor is 1, it is
-// positive, turns with the body, and is 1 for a single cell and for an even spread of directions.
-// C belongs to the whole body: where nearly all edges lie in a plane or along a line, the few that do not (a knob on a sheet) would take all
-// that the rest lacks, a hundred times their stiffness and more. So the factor is at most 3. A spring of a direction that a stretched mesh has too
-// much of would vanish: the factor is at least 1/8, so that no point loses its hold. What the limits take is given back in the next step: otherwise
-// each step would soften the whole body.
+//   directions   a factor of mean 1, multiplied by m.S m in each step, m = n n^T, S the inverse of the body's
+//                mean C = 6 sum w m m^T / sum w, w the volumes around each edge times the factor so far. One
+//                step, up to eight for a stretched mesh.
+// C is the tensor of the body under a uniform strain if every cell had Young's modulus 1, so m.S m = 1 / E(n)
+// is its compliance along the spring: where a mesh has many edges one way (the surface of a bar one cell
+// thick) they soften, where it has few they stiffen. It is the multiplicative algorithm for D-optimal designs
+// (Silvey, Titterington, Torsney 1978), whose fixed point has the
+// largest det C, and that is an isotropic C whenever one can be had (log det is concave). At that point m.S m
+// is 1 for each spring that keeps stiffness and less for the others (Kiefer, Wolfowitz 1960), which tells
+// when to stop. The weighted mean of the factor is 1, it is positive, turns with the body, and is 1 for a
+// single cell and for an even spread of directions.
+// C belongs to the whole body: where nearly all edges lie in a plane or along a line, the few that do not (a
+// knob on a sheet) would take all that the rest lacks, a hundred times their stiffness and more. So the
+// factor is at most 3. A spring of a direction that a stretched mesh has too much of would vanish: the factor
+// is at least 1/8, so that no point loses its hold. What the limits take is given back in the next step:
+// otherwise each step would soften the whole body.
 #include <algorithm>
 
 #include "msm_body.h"
@@ -20,19 +25,25 @@ namespace msm {
 namespace {
 
 constexpr int kN = 6;
-// Below this share of the mean pivot the edges all but leave out a strain (points in a plane): nothing to even out.
+// Below this share of the mean pivot the edges all but leave out a strain (points in a plane):
+// nothing to even out.
 constexpr double kFlat = 1e-6;
 constexpr double kLeastFactor = 1.0 / 8, kMostFactor = 3;
 constexpr int kMostSteps = 8;
-// A mesh is stretched where, after one step, springs of m.S m < kStiff hold more than the share kStretched of sum w (stretched cylinders: 0.07 to 0.09,
-// others below 0.01). Steps end where no m.S m is above kSoftest.
+// A mesh is stretched where, after one step, springs of m.S m < kStiff hold more than the share kStretched of
+// sum w (stretched cylinders: 0.07 to 0.09, others below 0.01). Steps end where no m.S m is above kSoftest.
 constexpr double kStiff = 0.7, kStretched = 0.04, kSoftest = 1.02;
 
 // Components of n n^T such that the dot product of two is that of the tensors.
 void dyad_of(const double *a, const double *b, double length, double *m) {
-  const double n[3] = {(b[0] - a[0]) / length, (b[1] - a[1]) / length, (b[2] - a[2]) / length}, root2 = __builtin_sqrt(2.0);
-  m[0] = n[0] * n[0], m[1] = n[1] * n[1], m[2] = n[2] * n[2];
-  m[3] = root2 * (n[1] * n[2]), m[4] = root2 * (n[2] * n[0]), m[5] = root2 * (n[0] * n[1]);
+  const double n[3] = {(b[0] - a[0]) / length, (b[1] - a[1]) / length, (b[2] - a[2]) / length};
+  const double root2 = __builtin_sqrt(2.0);
+  m[0] = n[0] * n[0];
+  m[1] = n[1] * n[1];
+  m[2] = n[2] * n[2];
+  m[3] = root2 * (n[1] * n[2]);
+  m[4] = root2 * (n[2] * n[0]);
+  m[5] = root2 * (n[0] * n[1]);
 }
 
 // C = l l^T in place, lower triangle; false where C is not safely positive.
@@ -65,11 +76,13 @@ void Body::find_directions() {
   double m[kN];
   const auto directed = [&](uint32_t e) {  // two points at one place: no direction, no spring
     const bool yes = edge_length[e] * edge_length[e] > kShortestSquared;
-    if (yes) dyad_of(rest_point.data() + 3 * size_t(edges[2 * size_t(e)]), rest_point.data() + 3 * size_t(edges[2 * size_t(e) + 1]), edge_length[e], m);
+    if (yes)
+      dyad_of(rest_point.data() + 3 * size_t(edges[2 * size_t(e)]),
+              rest_point.data() + 3 * size_t(edges[2 * size_t(e) + 1]), edge_length[e], m);
     return yes;
   };
-  for (uint32_t e = 0; e < nedge; ++e) per_modulus[e] = directed(e);   // the factor, until the end
-  double nominal = 0;   // sum w of factor 1
+  for (uint32_t e = 0; e < nedge; ++e) per_modulus[e] = directed(e);  // the factor, until the end
+  double nominal = 0;                                                 // sum w of factor 1
   for (int step = 0; step < kMostSteps; ++step) {
     double c[kN][kN] = {}, total = 0, softest = 0, stiff = 0;
     for (uint32_t e = 0; e < nedge; ++e) {
@@ -91,7 +104,9 @@ void Body::find_directions() {
     }
     if (step > 0 && (softest <= kSoftest || (step == 1 && stiff <= kStretched * total))) break;
     for (uint32_t e = 0; e < nedge; ++e)
-      if (directed(e)) per_modulus[e] = std::clamp(per_modulus[e] * inverse_form(c, m) * (nominal / total), kLeastFactor, kMostFactor);
+      if (directed(e))
+        per_modulus[e] =
+            std::clamp(per_modulus[e] * inverse_form(c, m) * (nominal / total), kLeastFactor, kMostFactor);
   }
   for (uint32_t e = 0; e < nedge; ++e)
     if (directed(e)) per_modulus[e] /= edge_length[e] * edge_length[e];

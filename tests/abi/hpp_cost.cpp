@@ -1,12 +1,14 @@
-// What deform.hpp costs: each pair c_NAME, hpp_NAME does the same through the C API and through the wrapper; hpp_cost.py compares the
-// instructions. Pairs that end in _throw tell errors by exception; their C side calls the same function that throws.
+// What deform.hpp costs: each pair c_NAME, hpp_NAME does the same through the C API and through the wrapper;
+// hpp_cost.py compares the instructions. Pairs that end in _throw tell errors by exception; their C side
+// calls the same function that throws.
 #include <deform/deform.hpp>
 
 #if defined(__cpp_exceptions)
-#define CHECK(status)                                            \
-  do {                                                           \
-    const dfm_status s_ = (status);                              \
-    if (s_ < 0) [[unlikely]] deform::Throw::raise(s_);           \
+#define CHECK(status)               \
+  do {                              \
+    const dfm_status s_ = (status); \
+    if (s_ < 0) [[unlikely]]        \
+      deform::Throw::raise(s_);     \
   } while (0)
 namespace throwing = deform::exceptions;
 #endif
@@ -38,14 +40,17 @@ template class deform::basic::TriMesh<deform::Throw>;
 template struct deform::basic::Toi<deform::Throw>;
 #endif
 
-static_assert(sizeof(deform::World) == sizeof(dfm_world) && sizeof(deform::Unique<deform::World>) == sizeof(dfm_world));
+static_assert(sizeof(deform::World) == sizeof(dfm_world) &&
+              sizeof(deform::Unique<deform::World>) == sizeof(dfm_world));
 static_assert(std::is_trivially_copyable_v<deform::Body> && sizeof(values::Context) == sizeof(dfm_context *));
 static_assert(sizeof(deform::Result<void>) == sizeof(dfm_status));
 
 extern "C" {
 
 dfm_status c_gravity(dfm_world w, const double *g) { return dfm_world_set_gravity(w, g); }
-dfm_status hpp_gravity(dfm_world w, const double *g) { return values::World(w).set_gravity(deform::In3(g, 3)).status(); }
+dfm_status hpp_gravity(dfm_world w, const double *g) {
+  return values::World(w).set_gravity(deform::In3(g, 3)).status();
+}
 
 dfm_status c_step(dfm_world w, double dt, uint32_t *trouble) {
   uint32_t t = 0;
@@ -97,10 +102,16 @@ dfm_status c_friction(dfm_world w) {
   const double mu = 0.5;
   const dfm_param_value row = {"mu", &mu, 1};
   dfm_friction_def def{};
-  def.size = sizeof def, def.between[0] = "a", def.between[1] = "b", def.law = "karnopp", def.params = {sizeof(dfm_params), 1, &row};
+  def.size = sizeof def;
+  def.between[0] = "a";
+  def.between[1] = "b";
+  def.law = "karnopp";
+  def.params = {sizeof(dfm_params), 1, &row};
   return dfm_world_add_friction(w, &def);
 }
-dfm_status hpp_friction(dfm_world w) { return values::World(w).add_friction("a", "b", "karnopp", deform::Params({{"mu", 0.5}})).status(); }
+dfm_status hpp_friction(dfm_world w) {
+  return values::World(w).add_friction("a", "b", "karnopp", deform::Params({{"mu", 0.5}})).status();
+}
 
 #if defined(__cpp_exceptions)
 void c_gravity_throw(dfm_world w, const double *g) { CHECK(dfm_world_set_gravity(w, g)); }
@@ -118,7 +129,9 @@ uint32_t c_contacts_throw(dfm_world w, dfm_contact *out, size_t room) {
   CHECK(dfm_world_contacts(w, static_cast<uint32_t>(room), out, &n));
   return n;
 }
-uint32_t hpp_contacts_throw(dfm_world w, dfm_contact *out, size_t room) { return throwing::World(w).contacts({out, room}); }
+uint32_t hpp_contacts_throw(dfm_world w, dfm_contact *out, size_t room) {
+  return throwing::World(w).contacts({out, room});
+}
 
 void c_measure_throw(dfm_body b, void (*use)(const dfm_body_measure *)) {
   dfm_body_measure m{};

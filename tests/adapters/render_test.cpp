@@ -1,4 +1,5 @@
-// The renderer by its pixels, on both backends. A machine may lack one of them (its tests say so and step aside), never both.
+// The renderer by its pixels, on both backends. A machine may lack one of them (its tests say so and step
+// aside), never both.
 #include "render/render.h"
 
 #include <gtest/gtest.h>
@@ -29,11 +30,16 @@ struct Ball {
     for (uint32_t i = 0; i <= kRings; ++i)
       for (uint32_t j = 0; j < kSides; ++j) {
         const double a = std::numbers::pi * i / kRings, b = 2 * std::numbers::pi * j / kSides;
-        xyz.insert(xyz.end(), {x + radius * std::sin(a) * std::cos(b), y + radius * std::sin(a) * std::sin(b), z + radius * std::cos(a)});
+        xyz.insert(xyz.end(), {x + radius * std::sin(a) * std::cos(b), y + radius * std::sin(a) * std::sin(b),
+                               z + radius * std::cos(a)});
       }
     for (uint32_t i = 0; i < kRings; ++i)
       for (uint32_t j = 0; j < kSides; ++j) {
-        const uint32_t k = (j + 1) % kSides, p = i * kSides + j, q = i * kSides + k, r = p + kSides, s = q + kSides;
+        const uint32_t k = (j + 1) % kSides;
+        const uint32_t p = i * kSides + j;
+        const uint32_t q = i * kSides + k;
+        const uint32_t r = p + kSides;
+        const uint32_t s = q + kSides;
         if (inside_out) tri.insert(tri.end(), {p, s, r, p, q, s});
         else tri.insert(tri.end(), {p, r, s, p, s, q});
       }
@@ -44,7 +50,9 @@ struct Ball {
     s.n = uint32_t(xyz.size() / 3);
     s.tri = tri.data();
     s.ntri = uint32_t(tri.size() / 3);
-    s.rgb[0] = r, s.rgb[1] = g, s.rgb[2] = b;
+    s.rgb[0] = r;
+    s.rgb[1] = g;
+    s.rgb[2] = b;
     return s;
   }
 };
@@ -84,7 +92,8 @@ int largest_difference(const Image &a, const Image &b) {
 int changed(const Image &a, const Image &b) {
   int n = 0;
   for (uint32_t y = 0; y < a.height; ++y)
-    for (uint32_t x = 0; x < a.width; ++x) n += std::abs(brightness(pixel(a, x, y)) - brightness(pixel(b, x, y))) > 30;
+    for (uint32_t x = 0; x < a.width; ++x)
+      n += std::abs(brightness(pixel(a, x, y)) - brightness(pixel(b, x, y))) > 30;
   return n;
 }
 
@@ -117,7 +126,9 @@ TEST_P(Pixels, RedBallOnFloor_IsRedInTheMiddleOnTheBackground) {
     for (int k = 0; k < 3; ++k) EXPECT_EQ(pixel(with, x, 0)[k], pixel(without, x, 0)[k]);
   }
   EXPECT_GT(pixel(with, 0, 0)[2], pixel(with, 0, 0)[0]) << "the background's top is blue-gray";
-  const auto at = [&](int dx, int dy) { return brightness(pixel(with, uint32_t(int(kWide) / 2 + dx), uint32_t(int(kHigh) / 2 + dy))); };
+  const auto at = [&](int dx, int dy) {
+    return brightness(pixel(with, uint32_t(int(kWide) / 2 + dx), uint32_t(int(kHigh) / 2 + dy)));
+  };
   EXPECT_GT(at(0, -20), at(0, 20) + 60) << "lit from above";
   EXPECT_GT(at(-20, 0), at(20, 0) + 30) << "and from the left";
 }
@@ -127,7 +138,8 @@ TEST_P(Pixels, ShadowOnFloor_IsDarkerThanLitFloor) {
   Scene ball = bare, glass = bare;
   ball.spheres = {{{0, 0, 1}, 1, {{0.9f, 0.1f, 0.1f}, 1}}};
   glass.spheres = ball.spheres;
-  glass.spheres[0].look.alpha = 0;  // seen through and without shadow: what remains would not be the shadow's doing
+  // seen through and without shadow: what remains would not be the shadow's doing
+  glass.spheres[0].look.alpha = 0;
   const Image lit = draw(bare), shaded = draw(ball), clear = draw(glass);
   int darker = 0;
   for (uint32_t y = 0; y < kHigh; ++y)
@@ -142,13 +154,15 @@ TEST_P(Pixels, ShadowOnFloor_IsDarkerThanLitFloor) {
 TEST_P(Pixels, GroundBeforeAWall_ReceivesLessSkyButIsNoShadow) {
   Scene wall = scene_of({});
   const Image open = draw(wall);
-  wall.boxes = {{{{0, 0.8, 1.5}, {}}, {2, 0.3, 1.5}, {}}};  // its face at y = 0.5; the key light comes from the camera's side
+  // its face at y = 0.5; the key light comes from the camera's side
+  wall.boxes = {{{{0, 0.8, 1.5}, {}}, {2, 0.3, 1.5}, {}}};
   const Image half = draw(wall);
   const uint32_t row = 83;  // the floor at (0, 0.35, 0)
   const int less = brightness(pixel(open, kWide / 2, row)) - brightness(pixel(half, kWide / 2, row));
   EXPECT_GT(less, 25);
   EXPECT_LT(less, 120);
-  const int front = brightness(pixel(open, kWide / 2, kHigh - 2)) - brightness(pixel(half, kWide / 2, kHigh - 2));
+  const int front =
+      brightness(pixel(open, kWide / 2, kHigh - 2)) - brightness(pixel(half, kWide / 2, kHigh - 2));
   EXPECT_LT(std::abs(front), less / 2) << "and the more open, the less of it";
 }
 
@@ -169,7 +183,8 @@ TEST_P(Pixels, Scalars_TakeTheColoursOfTheMap) {
       Scene mapped = scene_of({ball.surface(0, 1, 0)});
       mapped.surfaces[0].scalar = values.data();
       mapped.map = map;
-      EXPECT_LE(largest_difference(draw(mapped), draw(scene_of({ball.surface(c.r, c.g, c.b)}))), 2) << int(map) << " at " << t;
+      EXPECT_LE(largest_difference(draw(mapped), draw(scene_of({ball.surface(c.r, c.g, c.b)}))), 2)
+          << int(map) << " at " << t;
     }
   const std::vector<float> none(ball.xyz.size() / 3, std::numeric_limits<float>::quiet_NaN());
   Scene plain = scene_of({ball.surface(0.2f, 0.6f, 0.3f)});
@@ -180,7 +195,9 @@ TEST_P(Pixels, Scalars_TakeTheColoursOfTheMap) {
 
 TEST_P(Pixels, InsideOutMesh_LooksTheSame) {
   const Ball out(0, 0, 1, 1), in(0, 0, 1, 1, true);
-  EXPECT_LT(mean_difference(draw(scene_of({out.surface(0.9f, 0.1f, 0.1f)})), draw(scene_of({in.surface(0.9f, 0.1f, 0.1f)}))), 0.5);
+  EXPECT_LT(mean_difference(draw(scene_of({out.surface(0.9f, 0.1f, 0.1f)})),
+                            draw(scene_of({in.surface(0.9f, 0.1f, 0.1f)}))),
+            0.5);
 }
 
 TEST_P(Pixels, Lines_AreHiddenUnlessOnTop) {
@@ -189,7 +206,12 @@ TEST_P(Pixels, Lines_AreHiddenUnlessOnTop) {
   Scene s = scene_of({ball.surface(0.9f, 0.9f, 0.9f)});
   const Image bare = draw(s);
   Lines line;
-  line.xyz = behind, line.n = 1, line.width = 6, line.rgb[0] = 0, line.rgb[1] = 0, line.rgb[2] = 1;
+  line.xyz = behind;
+  line.n = 1;
+  line.width = 6;
+  line.rgb[0] = 0;
+  line.rgb[1] = 0;
+  line.rgb[2] = 1;
   s.lines = {line};
   EXPECT_EQ(draw(s), bare);
   s.lines[0].on_top = true;
@@ -241,14 +263,17 @@ TEST_P(Pixels, SceneFarFromTheOrigin_LooksTheSame) {
   const double away = 4e6;  // single precision alone would be off by half a meter
   const Ball here(0, 0, 1, 1), there(away, 0, 1, 1);
   Scene s = scene_of({there.surface(0.9f, 0.1f, 0.1f)});
-  s.camera->eye[0] += away, s.camera->look_at[0] += away;
-  s.extent->lo[0] += away, s.extent->hi[0] += away;
+  s.camera->eye[0] += away;
+  s.camera->look_at[0] += away;
+  s.extent->lo[0] += away;
+  s.extent->hi[0] += away;
   EXPECT_LT(mean_difference(draw(s), draw(scene_of({here.surface(0.9f, 0.1f, 0.1f)}))), 0.5);
 }
 
 TEST_P(Pixels, BrokenNumbers_AreLeftOutOfThePicture) {
   Ball ball(0, 0, 1, 1);
-  for (const double bad : {std::numeric_limits<double>::quiet_NaN(), std::numeric_limits<double>::infinity()}) {
+  for (const double bad :
+       {std::numeric_limits<double>::quiet_NaN(), std::numeric_limits<double>::infinity()}) {
     ball.xyz[3 * 200] = bad;
     Scene s = scene_of({ball.surface(0.9f, 0.1f, 0.1f)});
     EXPECT_TRUE(reddish(pixel(draw(s), kWide / 2, kHigh / 2)));
@@ -364,26 +389,34 @@ TEST(Renderer, ImpossibleSize_IsRefusedWithASentence) {
 
 TEST(Camera, AutoCamera_HoldsTheBox) {
   for (const double aspect : {0.5, 1.0, 2.0})
-    for (const auto &size : {std::array{1.0, 1.0, 1.0}, std::array{10.0, 0.1, 0.1}, std::array{0.01, 0.02, 3.0}}) {
+    for (const auto &size :
+         {std::array{1.0, 1.0, 1.0}, std::array{10.0, 0.1, 0.1}, std::array{0.01, 0.02, 3.0}}) {
       const Bounds box{{5, 6, 7}, {5 + size[0], 6 + size[1], 7 + size[2]}};
       for (const auto &up : {std::array{0.0, 0.0, 1.0}, std::array{0.0, 1.0, 0.0}}) {
         const Camera c = auto_camera(box, aspect, up.data());
         double back[3], right[3], above[3], n = 0, m = 0;
-        for (int k = 0; k < 3; ++k) back[k] = c.eye[k] - c.look_at[k], n += back[k] * back[k];
+        for (int k = 0; k < 3; ++k) {
+          back[k] = c.eye[k] - c.look_at[k];
+          n += back[k] * back[k];
+        }
         for (int k = 0; k < 3; ++k) back[k] /= std::sqrt(n);
         EXPECT_GT(back[0] * up[0] + back[1] * up[1] + back[2] * up[2], 0.1) << "from above";
         for (int k = 0; k < 3; ++k) {
           const int i = (k + 1) % 3, j = (k + 2) % 3;
-          right[k] = c.up[i] * back[j] - c.up[j] * back[i], m += right[k] * right[k];
+          right[k] = c.up[i] * back[j] - c.up[j] * back[i];
+          m += right[k] * right[k];
         }
         for (int k = 0; k < 3; ++k) right[k] /= std::sqrt(m);
-        for (int k = 0; k < 3; ++k) above[k] = back[(k + 1) % 3] * right[(k + 2) % 3] - back[(k + 2) % 3] * right[(k + 1) % 3];
+        for (int k = 0; k < 3; ++k)
+          above[k] = back[(k + 1) % 3] * right[(k + 2) % 3] - back[(k + 2) % 3] * right[(k + 1) % 3];
         double widest = 0;
         for (int corner = 0; corner < 8; ++corner) {
           double x = 0, y = 0, z = 0;
           for (int k = 0; k < 3; ++k) {
             const double d = (corner >> k & 1 ? box.hi[k] : box.lo[k]) - c.eye[k];
-            x += d * right[k], y += d * above[k], z -= d * back[k];
+            x += d * right[k];
+            y += d * above[k];
+            z -= d * back[k];
           }
           ASSERT_GT(z, 0);
           const double half = std::tan(c.fov_deg * std::numbers::pi / 360) * z;
@@ -397,7 +430,9 @@ TEST(Camera, AutoCamera_HoldsTheBox) {
 
 TEST(Colors, Maps_GrowLighterSteadily) {
   const auto lightness = [](Color c) {  // CIE L*
-    const auto linear = [](double x) { return x <= 0.04045 ? x / 12.92 : std::pow((x + 0.055) / 1.055, 2.4); };
+    const auto linear = [](double x) {
+      return x <= 0.04045 ? x / 12.92 : std::pow((x + 0.055) / 1.055, 2.4);
+    };
     const double y = 0.2126 * linear(c.r) + 0.7152 * linear(c.g) + 0.0722 * linear(c.b);
     return y > 0.008856 ? 116 * std::cbrt(y) - 16 : 903.3 * y;
   };
@@ -405,7 +440,8 @@ TEST(Colors, Maps_GrowLighterSteadily) {
     const double span = lightness(map_color(map, 1)) - lightness(map_color(map, 0));
     EXPECT_GT(span, 60);
     for (int i = 0; i < 32; ++i) {
-      const double step = lightness(map_color(map, float(i + 1) / 32)) - lightness(map_color(map, float(i) / 32));
+      const double step =
+          lightness(map_color(map, float(i + 1) / 32)) - lightness(map_color(map, float(i) / 32));
       EXPECT_GT(step, 0.3 * span / 32) << i;
       EXPECT_LT(step, 2.0 * span / 32) << i;
     }
@@ -422,7 +458,9 @@ TEST(Colors, Palette_IsDistinct) {
     }
 }
 
-Image blank(uint32_t w, uint32_t h, uint8_t value) { return {w, h, std::vector<uint8_t>(size_t(w) * h * 3, value)}; }
+Image blank(uint32_t w, uint32_t h, uint8_t value) {
+  return {w, h, std::vector<uint8_t>(size_t(w) * h * 3, value)};
+}
 
 TEST(Png, RoundTrip_KeepsEveryPixel) {
   Image p = blank(37, 21, 0), q;
@@ -454,7 +492,8 @@ TEST(Png, UnwritablePlace_IsASentenceAndNoFile) {
 
 TEST(Text, EverySign_IsItsOwn) {
   std::set<std::string> seen;
-  const std::string signs = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijkmnopqrstuvwxyz0123456789.,:;-_+=/()[]<>%*^!?'\"#&";
+  const std::string signs =
+      "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijkmnopqrstuvwxyz0123456789.,:;-_+=/()[]<>%*^!?'\"#&";
   for (const char c : signs) {
     Image p = blank(40, 40, 255);
     draw_text(p, 8, 28, 18, std::string(1, c), {0, 0, 0});
@@ -472,7 +511,10 @@ TEST(Text, Words_FillTheirWidthAndAreCutAtTheBorder) {
   uint32_t first = 1000, last = 0;
   for (uint32_t y = 0; y < p.height; ++y)
     for (uint32_t x = 0; x < p.width; ++x)
-      if (pixel(p, x, y)[0] < 128) first = std::min(first, x), last = std::max(last, x);
+      if (pixel(p, x, y)[0] < 128) {
+        first = std::min(first, x);
+        last = std::max(last, x);
+      }
   EXPECT_NEAR(first, 20, 3);
   EXPECT_NEAR(last, 20 + text_width(20, "stays"), 3);
   draw_text(p, -30, 10, 40, "beyond every border", {0, 0, 0});
@@ -480,7 +522,8 @@ TEST(Text, Words_FillTheirWidthAndAreCutAtTheBorder) {
 
 TEST(Montage, Grid_HoldsEveryPictureAndItsLabels) {
   const std::vector<std::vector<Image>> rows{{blank(60, 40, 10), blank(60, 40, 20)}, {blank(60, 40, 30)}};
-  const Image bare = montage(rows, {}, {}), labeled = montage(rows, {"with friction", "without"}, {"0 s", "1 s"}, "two cylinders");
+  const Image bare = montage(rows, {}, {});
+  const Image labeled = montage(rows, {"with friction", "without"}, {"0 s", "1 s"}, "two cylinders");
   for (const Image *m : {&bare, &labeled}) {
     std::map<uint8_t, int> count;
     for (uint32_t i = 0; i < m->width * m->height; ++i) ++count[m->rgb[3 * i]];
@@ -498,7 +541,8 @@ TEST(Legend, Bar_RunsFromEndToEndOfTheMap) {
     const Color c = map_color(ColourMap::ember, t);
     for (uint32_t i = 0; i < p.width * p.height; ++i) {
       const uint8_t *q = &p.rgb[3 * size_t(i)];
-      if (std::abs(q[0] - 255 * c.r) + std::abs(q[1] - 255 * c.g) + std::abs(q[2] - 255 * c.b) < 3) return true;
+      if (std::abs(q[0] - 255 * c.r) + std::abs(q[1] - 255 * c.g) + std::abs(q[2] - 255 * c.b) < 3)
+        return true;
     }
     return false;
   };

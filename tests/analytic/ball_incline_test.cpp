@@ -1,5 +1,6 @@
-// Balls on inclines and skidding balls against rigid rolling. A polyhedron loses a little at every edge: 5 %, on about 1,000 facets.
-// Own copies of ../shared/reference/contact/tables/{rolling_incline,skid_to_roll}.csv (solid sphere).
+// Balls on inclines and skidding balls against rigid rolling. A polyhedron loses a little at every edge: 5 %,
+// on about 1,000 facets. Own copies of ../shared/reference/contact/tables/{rolling_incline,skid_to_roll}.csv
+// (solid sphere).
 #include "support.h"
 #include "world.h"
 
@@ -15,9 +16,13 @@ struct Ball {
   Ball(double mu, std::array<double, 3> gravity, std::array<double, 3> velocity = {}) {
     world = test::make_world(context, gravity);
     test::BodyOptions o;
-    o.young = 1e6, o.damping_stiffness = 2e-5, o.volume = 1, o.velocity = velocity;
+    o.young = 1e6;
+    o.damping_stiffness = 2e-5;
+    o.volume = 1;
+    o.velocity = velocity;
     // turned by 37 degrees about (1 2 3), so that it starts on no face, edge or corner in particular
-    o.rotation = {0.0848, 0.1696, 0.2544, 0.9483}, o.position = {0, 0, 0.0995};
+    o.rotation = {0.0848, 0.1696, 0.2544, 0.9483};
+    o.position = {0, 0, 0.0995};
     body = test::make_body(context, world, "ball", {kR, 0, 0}, 8000, o);
     test::add_plane(world, "incline");
     test::set_friction(world, mu);
@@ -31,7 +36,8 @@ struct Ball {
 
 struct Row { double theta_deg, mu, a, r_alpha; };
 
-// Slopes of speed and of R omega over 0.4 s, by least squares: a polyhedron's turning is uneven from edge to edge.
+// Slopes of speed and of R omega over 0.4 s, by least squares: a polyhedron's turning is uneven
+// from edge to edge.
 void compare(const Row &row) {
   const double theta = radians(row.theta_deg);
   Ball ball(row.mu, {kG * std::sin(theta), 0, -kG * std::cos(theta)});
@@ -40,7 +46,9 @@ void compare(const Row &row) {
   double tt = 0, tv = 0, tw = 0;
   for (int i = 0; i < kSamples; ++i) {
     const double t = (i - 0.5 * (kSamples - 1)) * 4e-3;
-    tt += t * t, tv += t * ball.speed(), tw += t * ball.turning();
+    tt += t * t;
+    tv += t * ball.speed();
+    tw += t * ball.turning();
     test::run(ball.world, 4e-3, 2e-4);
   }
   EXPECT_NEAR(tv / tt, row.a, 0.05 * row.a) << row.theta_deg << " degrees, mu " << row.mu;
@@ -50,8 +58,11 @@ void compare(const Row &row) {
 }  // namespace
 
 TEST(BallOnIncline, RollsOrSlips_AsARigidSphereDoes) {
-  for (const Row &row : {Row{10, 0.3, 1.21677758779, 1.21677758779}, {20, 0.1, 2.43337914503, 2.30459615248}, {20, 0.5, 2.3965840043, 2.3965840043},
-                         {30, 0.1, 4.05542907889, 2.12392730278}, {30, 0.2, 3.50357142857, 3.50357142857}})
+  for (const Row &row : {Row{10, 0.3, 1.21677758779, 1.21677758779},
+                         {20, 0.1, 2.43337914503, 2.30459615248},
+                         {20, 0.5, 2.3965840043, 2.3965840043},
+                         {30, 0.1, 4.05542907889, 2.12392730278},
+                         {30, 0.2, 3.50357142857, 3.50357142857}})
     compare(row);
 }
 
@@ -65,12 +76,14 @@ TEST(BallOnIncline, SharedTable_Matches) {
     const Row row{std::stod(c[1]), std::stod(c[2]), std::stod(c[5]), std::stod(c[6])};
     // below 10 degrees the facets hold the ball back; mu 0 is the frictionless test of the scene
     if (row.theta_deg < 9 || row.theta_deg > 36 || (row.mu != 0.1 && row.mu != 0.3)) continue;
-    compare(row), ++compared;
+    compare(row);
+    ++compared;
   }
   EXPECT_GE(compared, 12);
 }
 
-// Thrown along a plane without spin: skids with mu g, and rolls at 5/7 of the start speed from t = 2 v0/(7 mu g) on.
+// Thrown along a plane without spin: skids with mu g, and rolls at 5/7 of the start speed from t = 2
+// v0/(7 mu g) on.
 TEST(BallOnPlane, ThrownWithoutSpin_RollsAtFiveSeventhsOfItsSpeed) {
   for (const auto &[v0, mu] : {std::pair{1.0, 0.1}, {3.0, 0.3}}) {
     Ball ball(mu, {0, 0, -kG}, {v0, 0, 0});

@@ -1,5 +1,6 @@
-// A clamped beam under its own weight. Euler-Bernoulli with Timoshenko's shear: w = q L^4/(8 E I) + q L^2/(2 k G A), k = 5/6, and for springs
-// alone G = E/(2 (1 + 1/4)). Source: S. Timoshenko, Phil. Mag. 41 (1921); the springs' Poisson ratio: doc/models/msm.md.
+// A clamped beam under its own weight. Euler-Bernoulli with Timoshenko's shear: w = q L^4/(8 E I) + q L^2/(2
+// k G A), k = 5/6, and for springs alone G = E/(2 (1 + 1/4)). Source: S. Timoshenko, Phil. Mag. 41 (1921);
+// the springs' Poisson ratio: doc/models/msm.md.
 #include "world.h"
 
 namespace {
@@ -16,7 +17,10 @@ double sag(double young, uint32_t cells) {
   test::Context context;
   const dfm_world world = test::make_world(context, {0, 0, -kG});
   test::BodyOptions o;
-  o.young = young, o.density = kRho, o.damping_mass = 30, o.damping_stiffness = 2e-5;
+  o.young = young;
+  o.density = kRho;
+  o.damping_mass = 30;
+  o.damping_stiffness = 2e-5;
   const dfm_body body = test::make_body(context, world, "beam", {kL, kH, kH}, cells, o);
   dfm_body_info info{};
   info.size = sizeof info;
@@ -42,10 +46,14 @@ double sag(double young, uint32_t cells) {
 
 TEST(Cantilever, OwnWeight_SagsInverselyToYoung) { EXPECT_NEAR(sag(4e6, 1000) / sag(8e6, 1000), 2, 0.01); }
 
-// Linear cells are too stiff in bending when there are few of them across, and the layer of cells at the surface is of another make than the
-// lattice inside, a share that falls as the cell size: the answer is approached from below, to first order. n cubes across are 60 n^3 cells.
+// Linear cells are too stiff in bending when there are few of them across, and the layer of cells at the
+// surface is of another make than the lattice inside, a share that falls as the cell size: the answer is
+// approached from below, to first order. n cubes across are 60 n^3 cells.
 TEST(Cantilever, OwnWeight_ApproachesTimoshenkoAsTheMeshIsRefined) {
-  const double exact = timoshenko(4e6), coarse = sag(4e6, 60 * 8), medium = sag(4e6, 60 * 27), fine = sag(4e6, 60 * 216);
+  const double exact = timoshenko(4e6);
+  const double coarse = sag(4e6, 60 * 8);
+  const double medium = sag(4e6, 60 * 27);
+  const double fine = sag(4e6, 60 * 216);
   EXPECT_LT(coarse, medium);
   EXPECT_LT(medium, fine);
   EXPECT_LT(fine, exact);

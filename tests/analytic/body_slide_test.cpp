@@ -1,8 +1,10 @@
-// A block slides without friction over a body of triangles, coarse or fine, as over a plane. The ghost of every engine: a flat vertex of the lower body that
-// the leading edge of the upper one meets with a leaning normal.
+// A block slides without friction over a body of triangles, coarse or fine, as over a plane. The ghost of
+// every engine: a flat vertex of the lower body that the leading edge of the upper one meets with a
+// leaning normal.
 //
-// What may differ is the dent. Under the block's pressure p = rho g H the slab of modulus E and thickness t goes down by p t / E, within an edge or so of the
-// rim, so normals lean by some p / E (1e-4, 5e-3 for the soft one) and the weight's part along the slide is at most m g times that.
+// What may differ is the dent. Under the block's pressure p = rho g H the slab of modulus E and thickness t
+// goes down by p t / E, within an edge or so of the rim, so normals lean by some p / E (1e-4, 5e-3 for the
+// soft one) and the weight's part along the slide is at most m g times that.
 #include "obstacle.h"
 
 namespace {
@@ -19,10 +21,16 @@ struct Slide {
     test::set_friction(world, 0);
     test::add_plane(world, "floor", {0, 0, cells ? -kThick - 1e-4 : 0});
     test::BodyOptions o;
-    o.name = "block", o.young = 1e6, o.damping_stiffness = 1e-3, o.position = {-0.05, -0.05, 1e-4};
+    o.name = "block";
+    o.young = 1e6;
+    o.damping_stiffness = 1e-3;
+    o.position = {-0.05, -0.05, 1e-4};
     block = test::make_body(context, world, "beam", {0.1, 0.1, kHeight}, 60, o);
     if (cells) {
-      o.name = "slab", o.young = young, o.damping_stiffness = 1e-4, o.position = {-0.2, -0.2, -kThick};
+      o.name = "slab";
+      o.young = young;
+      o.damping_stiffness = 1e-4;
+      o.position = {-0.2, -0.2, -kThick};
       slab = test::make_body(context, world, "beam", {0.8, 0.4, kThick}, cells, o);
     }
     test::run(world, 0.2, 1e-3);
@@ -61,11 +69,13 @@ TEST(BodySlide, Frictionless_IsThatOnPlane) {
       rise = std::max(rise, std::fabs(test::measure(s.block).com[2] - height));
     }
     const dfm_body_measure got = test::measure(s.block);
-    for (int i = 0; i < 2; ++i) EXPECT_NEAR(got.velocity[i], want.velocity[i], kG * lean * kTime) << cells << " cells, axis " << i;
+    for (int i = 0; i < 2; ++i)
+      EXPECT_NEAR(got.velocity[i], want.velocity[i], kG * lean * kTime) << cells << " cells, axis " << i;
     EXPECT_LT(leaning, 10 * lean) << cells;
     EXPECT_LT(rise, 2 * lean * kThick) << "no more than the dent; " << cells;
     EXPECT_GE(least, 6u) << cells;
     const double off = got.velocity[0] - want.velocity[0];
-    std::printf("%u cells of %.0e Pa: %.2e m/s off the plane's, normals lean by %.1e, rises by %.1e m\n", cells, young, off, leaning, rise);
+    std::printf("%u cells of %.0e Pa: %.2e m/s off the plane's, normals lean by %.1e, rises by %.1e m\n",
+                cells, young, off, leaning, rise);
   }
 }

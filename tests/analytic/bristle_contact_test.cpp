@@ -1,5 +1,6 @@
-// State of a law in contact: carried with the surface point over the edges of the other mesh, turned with the surfaces, never counted twice.
-// Closed form: a block whose bristles do not slide is a mass on a spring, x = m g sin(theta) / (sigma0 A), whatever lies below.
+// State of a law in contact: carried with the surface point over the edges of the other mesh, turned with the
+// surfaces, never counted twice. Closed form: a block whose bristles do not slide is a mass on a spring, x =
+// m g sin(theta) / (sigma0 A), whatever lies below.
 #include "bristle_law.h"
 #include "obstacle.h"
 #include "rigid.h"
@@ -14,7 +15,11 @@ void set_bristles(dfm_context *c, dfm_world w, double sigma0, double mu) {
   ok(dfm_plugin_register_static(c, dfm_plugin_entry_bristle, "bristle"));
   const dfm_param_value values[] = {{"mu", &mu, 1}, {"sigma0", &sigma0, 1}};
   dfm_friction_def f{};
-  f.size = sizeof f, f.between[0] = "block", f.between[1] = "*", f.law = "test.bristle", f.params = {sizeof(dfm_params), 2, values};
+  f.size = sizeof f;
+  f.between[0] = "block";
+  f.between[1] = "*";
+  f.law = "test.bristle";
+  f.params = {sizeof(dfm_params), 2, values};
   ok(dfm_world_add_friction(w, &f));
 }
 
@@ -26,11 +31,13 @@ struct Rig {
   dfm_world world;
   dfm_body block;
   dfm_obstacle table = 0;
-  double ground = 0;   // height of `table`, which is what lies undermost
-  Rig(Below below, double sigma0, double drag, std::array<double, 3> gravity, double mu = 10, bool centered = false) {
+  double ground = 0;  // height of `table`, which is what lies undermost
+  Rig(Below below, double sigma0, double drag, std::array<double, 3> gravity, double mu = 10,
+      bool centered = false) {
     world = make_world(context, gravity);
     if (below == Below::plane) table = add_plane(world, "floor");
-    if (below == Below::mesh) add_mesh(world, "floor", height_field(0.1, 23, [](double, double) { return 0.0; }));
+    if (below == Below::mesh)
+      add_mesh(world, "floor", height_field(0.1, 23, [](double, double) { return 0.0; }));
     if (below == Below::rigid) {
       dfm_rigid_def floor = box("floor", {0.1, 0.1, 0.02}, 1000, {0, 0, -0.02});
       create(world, {floor}, {joint(DFM_JOINT_FIXED, 0, UINT32_MAX, {0, 0, -0.02})});
@@ -40,12 +47,20 @@ struct Rig {
       set_friction(world, 10);
       ground = -0.03 - 2e-5;
       table = add_plane(world, "ground", {0, 0, ground});
-      o.name = "plate", o.young = 5e5, o.damping_stiffness = 1e-3, o.damping_mass = drag;
-      const std::array<double, 3> size = centered ? std::array<double, 3>{0.08, 0.08, 0.03} : std::array<double, 3>{0.14, 0.1, 0.03};
+      o.name = "plate";
+      o.young = 5e5;
+      o.damping_stiffness = 1e-3;
+      o.damping_mass = drag;
+      const std::array<double, 3> size =
+          centered ? std::array<double, 3>{0.08, 0.08, 0.03} : std::array<double, 3>{0.14, 0.1, 0.03};
       o.position = {-0.5 * size[0], -0.5 * size[1], -0.03};
       make_body(context, world, "beam", size, centered ? 60 : 200, o);
     }
-    o.name = "block", o.young = 5e5, o.damping_stiffness = 1e-3, o.position = {-0.5 * kWide, -0.5 * kWide, 2e-5}, o.damping_mass = drag;
+    o.name = "block";
+    o.young = 5e5;
+    o.damping_stiffness = 1e-3;
+    o.position = {-0.5 * kWide, -0.5 * kWide, 2e-5};
+    o.damping_mass = drag;
     block = make_body(context, world, "beam", {kWide, kWide, kTall}, 80, o);
     set_bristles(context, world, sigma0, mu);
   }
@@ -53,14 +68,18 @@ struct Rig {
 
 // Components of a contact's bristle in the world.
 Vec bristle(const dfm_contact &c) {
-  const Vec n = vec(c.normal), t = vec(c.tangent), s{n[1] * t[2] - n[2] * t[1], n[2] * t[0] - n[0] * t[2], n[0] * t[1] - n[1] * t[0]};
-  return {c.bristle[0] * t[0] + c.bristle[1] * s[0], c.bristle[0] * t[1] + c.bristle[1] * s[1], c.bristle[0] * t[2] + c.bristle[1] * s[2]};
+  const Vec n = vec(c.normal);
+  const Vec t = vec(c.tangent);
+  const Vec s{n[1] * t[2] - n[2] * t[1], n[2] * t[0] - n[0] * t[2], n[0] * t[1] - n[1] * t[0]};
+  return {c.bristle[0] * t[0] + c.bristle[1] * s[0], c.bristle[0] * t[1] + c.bristle[1] * s[1],
+          c.bristle[0] * t[2] + c.bristle[1] * s[2]};
 }
 
 }  // namespace
 
-// Pulled 20 mm over triangles of 9 mm, every point of the block has a deflection of 20 mm: what was dropped or started anew on an edge would show less,
-// what two triangles both owned would pull twice. The energy in the bristles is that of one spring.
+// Pulled 20 mm over triangles of 9 mm, every point of the block has a deflection of 20 mm: what was dropped
+// or started anew on an edge would show less, what two triangles both owned would pull twice. The energy in
+// the bristles is that of one spring.
 TEST(BristleContact, PulledOverEdgesOfTheOtherMesh_KeepsOneDeflectionPerPoint) {
   for (const Below below : {Below::plane, Below::mesh, Below::rigid}) {
     const double area = kWide * kWide, sigma0 = 3000, g[2] = {3, 9.81};
@@ -73,7 +92,9 @@ TEST(BristleContact, PulledOverEdgesOfTheOtherMesh_KeepsOneDeflectionPerPoint) {
       double stored = 0, carried = 0, sum = 0;
       for (const dfm_contact &c : contacts(r.world)) {
         const Vec z = bristle(c);
-        stored += 0.5 * sigma0 * c.area * dot(z, z), carried += sigma0 * c.area * z[0], sum += c.area;
+        stored += 0.5 * sigma0 * c.area * dot(z, z);
+        carried += sigma0 * c.area * z[0];
+        sum += c.area;
         if (k > 5) worst = std::max(worst, std::fabs(z[0] - x));
       }
       if (k < 6) continue;
@@ -88,8 +109,9 @@ TEST(BristleContact, PulledOverEdgesOfTheOtherMesh_KeepsOneDeflectionPerPoint) {
   }
 }
 
-// On a soft plate points of both sides come and go. A point of the block has one contact each, with no more deflection than its way; what is carried is
-// what the contacts' areas and deflections say, and no area is owned twice: the sum stays that of the block's face.
+// On a soft plate points of both sides come and go. A point of the block has one contact each, with no more
+// deflection than its way; what is carried is what the contacts' areas and deflections say, and no area is
+// owned twice: the sum stays that of the block's face.
 TEST(BristleContact, PulledOverASoftMesh_NoAreaIsOwnedTwice) {
   Rig r(Below::soft, 3000, 24, {3, 0, -9.81});
   const double x0 = measure(r.block).com[0], area = kWide * kWide;
@@ -113,11 +135,12 @@ TEST(BristleContact, PulledOverASoftMesh_NoAreaIsOwnedTwice) {
     }
   }
   EXPECT_GT(measure(r.block).com[0] - x0, 0.015);
-  EXPECT_LT(measure(r.block).com[0] - x0, 0.024);   // without bristles it would be away by 1.5 m/s^2 (0.5 s)^2
+  // without bristles it would be away by 1.5 m/s^2 (0.5 s)^2
+  EXPECT_LT(measure(r.block).com[0] - x0, 0.024);
 }
 
-// A turntable turns once, and gravity with it: seen from the table nothing changes. Bristles that kept their direction in the world would pull the
-// block about by six times its deflection and more.
+// A turntable turns once, and gravity with it: seen from the table nothing changes. Bristles that kept their
+// direction in the world would pull the block about by six times its deflection and more.
 TEST(BristleContact, TurnedWithItsTable_KeepsItsDeflectionInTheTablesFrame) {
   constexpr double kTwoPi = 6.283185307179586, kPull = 3, kStart = 0.6, kTurn = 1.4;
   for (const Below below : {Below::plane, Below::soft}) {
@@ -133,7 +156,9 @@ TEST(BristleContact, TurnedWithItsTable_KeepsItsDeflectionInTheTablesFrame) {
     const auto turn_to = [&](double t) {
       const double a = kTwoPi * std::min(1.0, std::max(0.0, (t - kStart) / kTurn));
       dfm_pose pose{};
-      pose.position[2] = r.ground, pose.rotation[2] = std::sin(0.5 * a), pose.rotation[3] = std::cos(0.5 * a);
+      pose.position[2] = r.ground;
+      pose.rotation[2] = std::sin(0.5 * a);
+      pose.rotation[3] = std::cos(0.5 * a);
       ok(dfm_obstacle_move_to(r.table, &pose));
       return a;
     };
@@ -142,16 +167,21 @@ TEST(BristleContact, TurnedWithItsTable_KeepsItsDeflectionInTheTablesFrame) {
       const double a = turn_to(1e-3 * (k + 1));
       run(r.world, 1e-3, 1e-3);
       const dfm_body_measure m = measure(r.block);
-      const double x = m.com[0] * std::cos(a) + m.com[1] * std::sin(a), y = m.com[1] * std::cos(a) - m.com[0] * std::sin(a);
-      if (k == 599) start[0] = x, start[1] = y;
+      const double x = m.com[0] * std::cos(a) + m.com[1] * std::sin(a);
+      const double y = m.com[1] * std::cos(a) - m.com[0] * std::sin(a);
+      if (k == 599) {
+        start[0] = x;
+        start[1] = y;
+      }
       if (k > 599) worst = std::max(worst, std::hypot(x - start[0], y - start[1]));
     }
-    EXPECT_LT(worst, (below == Below::plane ? 0.1 : 0.5) * way) << int(below);   // the plate bends too
+    EXPECT_LT(worst, (below == Below::plane ? 0.1 : 0.5) * way) << int(below);  // the plate bends too
   }
 }
 
-// Two pads on each other, pulled by a tenth of what they hold: what carries load has the area of the patch together, whatever the meshes and whichever of
-// their points and crossings that is, and its bristles carry the pull. So sigma0 times that area is what resists.
+// Two pads on each other, pulled by a tenth of what they hold: what carries load has the area of the patch
+// together, whatever the meshes and whichever of their points and crossings that is, and its bristles carry
+// the pull. So sigma0 times that area is what resists.
 TEST(BristleContact, TwoPadsOfTwoRefinements_RestOnTheSameArea) {
   constexpr double kSigma0 = 1e7, kGravity = 9.81, kPatch = 0.05 * 0.05;
   double rests_on[2];
@@ -162,10 +192,15 @@ TEST(BristleContact, TwoPadsOfTwoRefinements_RestOnTheSameArea) {
     set_friction(world, 10);
     add_plane(world, "floor");
     BodyOptions o;
-    o.young = 2e4, o.damping_stiffness = 2e-3, o.damping_mass = 60, o.volume = 0.5;
-    o.name = "pad", o.position = {-0.04, -0.04, 2e-5};
+    o.young = 2e4;
+    o.damping_stiffness = 2e-3;
+    o.damping_mass = 60;
+    o.volume = 0.5;
+    o.name = "pad";
+    o.position = {-0.04, -0.04, 2e-5};
     make_body(context, world, "beam", {0.08, 0.08, 0.03}, cells[k][0], o);
-    o.name = "block", o.position = {-0.025, -0.025, 0.03 + 5e-5};
+    o.name = "block";
+    o.position = {-0.025, -0.025, 0.03 + 5e-5};
     const dfm_body block = make_body(context, world, "beam", {0.05, 0.05, 0.03}, cells[k][1], o);
     set_bristles(context, world, kSigma0, 1);
     run(world, 0.6, 1e-3);
@@ -176,7 +211,8 @@ TEST(BristleContact, TwoPadsOfTwoRefinements_RestOnTheSameArea) {
     for (const dfm_contact &c : contacts(world)) {
       if (c.kind == 2 || !(c.fn > 0)) continue;
       const double side = c.body_a == block ? 1 : -1, x = side * bristle(c)[0];
-      force += kSigma0 * c.area * x, area += c.area;
+      force += kSigma0 * c.area * x;
+      area += c.area;
     }
     const double weight = 0.1 * kGravity * measure(block).mass;
     EXPECT_NEAR(force, weight, 0.02 * weight) << k;
@@ -186,16 +222,24 @@ TEST(BristleContact, TwoPadsOfTwoRefinements_RestOnTheSameArea) {
   EXPECT_NEAR(rests_on[0], rests_on[1], 0.05 * rests_on[1]);
 }
 
-// A block slides, stops and sleeps; the shares of its patch that sliding has made are there when it wakes, also where all that was awake meanwhile was in
-// the air, with no contact at all.
+// A block slides, stops and sleeps; the shares of its patch that sliding has made are there when it wakes,
+// also where all that was awake meanwhile was in the air, with no contact at all.
 TEST(BristleContact, SharesOfASleeper_AreKeptWhileAnotherBodyFalls) {
   Context context;
   const dfm_world world = make_world(context, {0, 0, -9.81});
   add_plane(world, "floor");
   BodyOptions o;
-  o.name = "block", o.young = 2e5, o.damping_stiffness = 1e-3, o.damping_mass = 24, o.position = {-0.02, -0.02, 2e-5}, o.velocity = {0.4, 0, 0};
+  o.name = "block";
+  o.young = 2e5;
+  o.damping_stiffness = 1e-3;
+  o.damping_mass = 24;
+  o.position = {-0.02, -0.02, 2e-5};
+  o.velocity = {0.4, 0, 0};
   const dfm_body block = make_body(context, world, "beam", {0.04, 0.04, 0.02}, 300, o);
-  o.name = "other", o.damping_mass = 0, o.position = {1, 1, 100}, o.velocity = {};
+  o.name = "other";
+  o.damping_mass = 0;
+  o.position = {1, 1, 100};
+  o.velocity = {};
   make_body(context, world, "beam", {0.04, 0.04, 0.02}, 20, o);
   set_bristles(context, world, 3e5, 0.3);
   ok(dfm_world_set_sleep(world, true));

@@ -3,7 +3,10 @@
 
 namespace {
 
-struct Totals { std::array<double, 3> p{}, l{}; double energy = 0; };
+struct Totals {
+  std::array<double, 3> p{}, l{};
+  double energy = 0;
+};
 
 // Linear momentum, angular momentum about the origin, kinetic plus elastic energy.
 Totals totals(std::initializer_list<dfm_body> bodies) {
@@ -32,8 +35,15 @@ struct Crash {
   explicit Crash(double mu) {
     world = test::make_world(context, {0, 0, 0});
     test::BodyOptions a, b;
-    a.name = "cube", a.young = 2e5, a.velocity = {0.8, 0.1, 0}, a.position = {-0.15, -0.045, -0.05}, a.spin = {0, 3, 2};
-    b.name = "ball", b.young = 1e5, b.velocity = {-0.4, 0, 0.2}, b.density = 700;
+    a.name = "cube";
+    a.young = 2e5;
+    a.velocity = {0.8, 0.1, 0};
+    a.position = {-0.15, -0.045, -0.05};
+    a.spin = {0, 3, 2};
+    b.name = "ball";
+    b.young = 1e5;
+    b.velocity = {-0.4, 0, 0.2};
+    b.density = 700;
     cube = test::make_body(context, world, "beam", {0.1, 0.1, 0.1}, 60, a);
     ball = test::make_body(context, world, "ball", {0.05, 0, 0}, 300, b);
     test::set_friction(world, mu);
@@ -47,12 +57,15 @@ TEST(Impact, TwoBodiesWithFriction_KeepMomentumAndLoseEnergy) {
   const Totals before = totals({crash.cube, crash.ball});
   uint32_t most = 0, n = 0;
   dfm_pair_report pair{};
-  double work = 0, torque = 0;   // torque: bound of what friction at two surfaces d_c apart may turn
+  double work = 0, torque = 0;  // torque: bound of what friction at two surfaces d_c apart may turn
   for (int k = 0; k < 400; ++k) {
     test::run(crash.world, 1e-3, 1e-3);
     most = std::max(most, test::stats(crash.world).contacts);
     ASSERT_EQ(dfm_world_pairs(crash.world, 1, &pair, &n), DFM_OK);
-    if (n) work = pair.friction_work, torque += 1e-3 * std::hypot(pair.friction[0], pair.friction[1], pair.friction[2]);
+    if (n) {
+      work = pair.friction_work;
+      torque += 1e-3 * std::hypot(pair.friction[0], pair.friction[1], pair.friction[2]);
+    }
   }
   const Totals after = totals({crash.cube, crash.ball});
   ASSERT_GT(most, 3u);
@@ -61,7 +74,8 @@ TEST(Impact, TwoBodiesWithFriction_KeepMomentumAndLoseEnergy) {
   EXPECT_LT(after.energy, before.energy + 0.9 * work);
   for (size_t k = 0; k < 3; ++k) {
     EXPECT_NEAR(after.p[k], before.p[k], 1e-13);
-    // Friction acts on both surfaces, which are 1e-3 of an edge (5e-5 m) apart, so its couple is no exact zero.
+    // Friction acts on both surfaces, which are 1e-3 of an edge (5e-5 m) apart, so its couple is
+    // no exact zero.
     EXPECT_NEAR(after.l[k], before.l[k], 1e-4 * torque);
   }
 }
@@ -70,7 +84,10 @@ TEST(Impact, TwoBodiesWithoutFriction_KeepAngularMomentum) {
   Crash crash(0);
   const Totals before = totals({crash.cube, crash.ball});
   uint32_t most = 0;
-  for (int k = 0; k < 400; ++k) test::run(crash.world, 1e-3, 1e-3), most = std::max(most, test::stats(crash.world).contacts);
+  for (int k = 0; k < 400; ++k) {
+    test::run(crash.world, 1e-3, 1e-3);
+    most = std::max(most, test::stats(crash.world).contacts);
+  }
   const Totals after = totals({crash.cube, crash.ball});
   ASSERT_GT(most, 3u);
   for (size_t k = 0; k < 3; ++k) {
@@ -79,20 +96,26 @@ TEST(Impact, TwoBodiesWithoutFriction_KeepAngularMomentum) {
   }
 }
 
-// Without gravity and damping the sum of kinetic and elastic energy has no business to rise. The step is well below the bound, where
-// symplectic Euler's own oscillation of the energy is small.
+// Without gravity and damping the sum of kinetic and elastic energy has no business to rise. The step is well
+// below the bound, where symplectic Euler's own oscillation of the energy is small.
 TEST(Impact, UndampedBallOnPlane_NeverGainsEnergy) {
   for (const double young : {1e5, 1e6}) {
     test::Context context;
     const dfm_world world = test::make_world(context, {0, 0, 0});
     test::BodyOptions o;
-    o.name = "ball", o.young = young, o.position = {0, 0, 0.0505}, o.velocity = {0.2, 0, -0.5};
+    o.name = "ball";
+    o.young = young;
+    o.position = {0, 0, 0.0505};
+    o.velocity = {0.2, 0, -0.5};
     const dfm_body ball = test::make_body(context, world, "ball", {0.05, 0, 0}, 300, o);
     test::add_plane(world, "floor");
     test::set_friction(world, 0, "none");
     const double start = totals({ball}).energy;
     double most = 0;
-    for (int k = 0; k < 1600; ++k) test::run(world, 5e-5, 5e-5), most = std::max(most, totals({ball}).energy);
+    for (int k = 0; k < 1600; ++k) {
+      test::run(world, 5e-5, 5e-5);
+      most = std::max(most, totals({ball}).energy);
+    }
     EXPECT_LT(most, 1.001 * start) << "young " << young;
     EXPECT_EQ(test::stats(world).contacts, 0u);
     EXPECT_GT(test::measure(ball).velocity[2], 0.95 * 0.5) << "young " << young;

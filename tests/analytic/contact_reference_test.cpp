@@ -1,6 +1,7 @@
-// Rigid limits of ../shared/reference/contact at the tolerances of its README, with stiff `msm` bodies. All rows, and the elastic cases with
-// the model's own error, are printed by tests/bench/contact_reference.cpp (doc/reference/contact_reference.md). The spheres' rows and the oblique
-// incline have tests of their own: ball_incline_test.cpp, oblique_test.cpp.
+// Rigid limits of ../shared/reference/contact at the tolerances of its README, with stiff `msm` bodies. All
+// rows, and the elastic cases with the model's own error, are printed by tests/bench/contact_reference.cpp
+// (doc/reference/contact_reference.md). The spheres' rows and the oblique incline have tests of their own:
+// ball_incline_test.cpp, oblique_test.cpp.
 #include "contact_reference.h"
 
 #include "support.h"
@@ -31,19 +32,22 @@ std::vector<Row> table(const char *name) {
 }
 
 bool absent() { return test::shared_dir().empty(); }
-#define NEEDS_TABLES() if (absent()) GTEST_SKIP() << "../shared/reference is absent"
+#define NEEDS_TABLES() \
+  if (absent()) GTEST_SKIP() << "../shared/reference is absent"
 
 }  // namespace
 
 TEST(ContactReference, InclineBlock_SlidesAndHoldsAsTheTableSays) {
   NEEDS_TABLES();
   int slid = 0, held = 0;
-  for (const Row &row : table("incline_block")) {   // theta mu slides a v x tan/mu
+  for (const Row &row : table("incline_block")) {  // theta mu slides a v x tan/mu
     const double theta = row.v[0], mu = row.v[1], ratio = row.v[6];
-    if ((mu != 0 && mu != 0.2 && mu != 0.5) || std::fabs(ratio - 1) < 0.01) continue;   // at the limit itself a is 0
+    // at the limit itself a is 0
+    if ((mu != 0 && mu != 0.2 && mu != 0.5) || std::fabs(ratio - 1) < 0.01) continue;
     const ref::Incline got = ref::incline(theta, mu);
     (row.v[2] != 0 ? slid : held)++;
-    if (row.v[2] != 0) EXPECT_NEAR(got.acceleration, row.v[3], 0.02 * row.v[3]) << theta << " degrees, mu " << mu;
+    if (row.v[2] != 0)
+      EXPECT_NEAR(got.acceleration, row.v[3], 0.02 * row.v[3]) << theta << " degrees, mu " << mu;
     else EXPECT_LT(std::fabs(got.creep), 1e-3) << theta << " degrees, mu " << mu;
   }
   EXPECT_GE(slid, 15);
@@ -53,7 +57,7 @@ TEST(ContactReference, InclineBlock_SlidesAndHoldsAsTheTableSays) {
 TEST(ContactReference, SlidingStop_TimeAndWayWithinTwoPercent) {
   NEEDS_TABLES();
   int n = 0;
-  for (const Row &row : table("sliding_stop")) {    // v0 mu distance time
+  for (const Row &row : table("sliding_stop")) {  // v0 mu distance time
     const ref::Slide got = ref::slide(row.v[0], row.v[1], false);
     EXPECT_NEAR(got.distance, row.v[2], 0.02 * row.v[2]) << row.v[0] << " m/s, mu " << row.v[1];
     EXPECT_NEAR(got.time, row.v[3], 0.02 * row.v[3]) << row.v[0] << " m/s, mu " << row.v[1];
@@ -65,7 +69,7 @@ TEST(ContactReference, SlidingStop_TimeAndWayWithinTwoPercent) {
 TEST(ContactReference, Conveyor_SlipTimeAndWayWithinTwoPercent) {
   NEEDS_TABLES();
   int n = 0;
-  for (const Row &row : table("conveyor")) {        // belt mu time distance
+  for (const Row &row : table("conveyor")) {  // belt mu time distance
     const ref::Slide got = ref::slide(row.v[0], row.v[1], true);
     EXPECT_NEAR(got.time, row.v[2], 0.02 * row.v[2]) << row.v[0] << " m/s, mu " << row.v[1];
     EXPECT_NEAR(got.distance, row.v[3], 0.02 * row.v[3]) << row.v[0] << " m/s, mu " << row.v[1];
@@ -77,10 +81,12 @@ TEST(ContactReference, Conveyor_SlipTimeAndWayWithinTwoPercent) {
 TEST(ContactReference, Toppling_VerdictsMatchOutsideFivePercent) {
   NEEDS_TABLES();
   int n = 0;
-  for (const Row &row : table("incline_toppling")) {   // theta w/h topples
+  for (const Row &row : table("incline_toppling")) {  // theta w/h topples
     const double slope = std::tan(row.v[0] * ref::kDegree);
-    if (std::fabs(slope / row.v[1] - 1) < 0.05 || slope > 0.95) continue;   // at mu = 1 it slides from 45 degrees on
-    EXPECT_EQ(ref::topples(row.v[0], row.v[1]), row.v[2] != 0) << row.v[0] << " degrees, width/height " << row.v[1];
+    // at mu = 1 it slides from 45 degrees on
+    if (std::fabs(slope / row.v[1] - 1) < 0.05 || slope > 0.95) continue;
+    EXPECT_EQ(ref::topples(row.v[0], row.v[1]), row.v[2] != 0)
+        << row.v[0] << " degrees, width/height " << row.v[1];
     ++n;
   }
   EXPECT_GE(n, 25);
@@ -91,10 +97,15 @@ TEST(ContactReference, RoundBodiesOnIncline_RollOrSlipWithinFivePercent) {
   NEEDS_TABLES();
   int n = 0;
   for (const ref::RoundShape &shape : ref::kRounds)
-    for (const auto &line : test::read_csv(test::shared_dir() + "/reference/contact/tables/rolling_incline.csv")) {
+    for (const auto &line :
+         test::read_csv(test::shared_dir() + "/reference/contact/tables/rolling_incline.csv")) {
       if (line[0] != shape.name) continue;
-      const double theta = std::stod(line[1]), mu = std::stod(line[2]), a = std::stod(line[5]), turning = std::stod(line[6]);
-      if (theta != (shape.thin ? 20 : shape.ball ? 10 : 45) || mu != (shape.thin || shape.ball ? 0.3 : 0.1)) continue;
+      const double theta = std::stod(line[1]);
+      const double mu = std::stod(line[2]);
+      const double a = std::stod(line[5]);
+      const double turning = std::stod(line[6]);
+      if (theta != (shape.thin ? 20 : shape.ball ? 10 : 45) || mu != (shape.thin || shape.ball ? 0.3 : 0.1))
+        continue;
       const ref::Roll got = ref::roll(shape, theta, mu);
       EXPECT_NEAR(got.acceleration, a, 0.05 * a) << shape.name << ", " << theta << " degrees, mu " << mu;
       EXPECT_NEAR(got.turning, turning, 0.05 * a) << shape.name << ", " << theta << " degrees, mu " << mu;
@@ -107,12 +118,15 @@ TEST(ContactReference, RoundBodiesThrownWithoutSpin_RollWithinFivePercent) {
   NEEDS_TABLES();
   int n = 0;
   for (const ref::RoundShape &shape : ref::kRounds)
-    for (const Row &row : table("skid_to_roll")) {    // v0 mu time speed distance loss
+    for (const Row &row : table("skid_to_roll")) {  // v0 mu time speed distance loss
       if (row.name != shape.name || row.v[0] != 0.5 || row.v[1] != 0.8) continue;
       const ref::Skid got = ref::skid(shape, row.v[0], row.v[1]);
-      EXPECT_NEAR(got.time, row.v[2], 0.05 * row.v[2]) << shape.name << ", " << row.v[0] << " m/s, mu " << row.v[1];
-      EXPECT_NEAR(got.speed, row.v[3], 0.05 * row.v[3]) << shape.name << ", " << row.v[0] << " m/s, mu " << row.v[1];
-      EXPECT_NEAR(got.distance, row.v[4], 0.05 * row.v[4]) << shape.name << ", " << row.v[0] << " m/s, mu " << row.v[1];
+      EXPECT_NEAR(got.time, row.v[2], 0.05 * row.v[2])
+          << shape.name << ", " << row.v[0] << " m/s, mu " << row.v[1];
+      EXPECT_NEAR(got.speed, row.v[3], 0.05 * row.v[3])
+          << shape.name << ", " << row.v[0] << " m/s, mu " << row.v[1];
+      EXPECT_NEAR(got.distance, row.v[4], 0.05 * row.v[4])
+          << shape.name << ", " << row.v[0] << " m/s, mu " << row.v[1];
       ++n;
     }
   EXPECT_EQ(n, 3);
@@ -121,9 +135,11 @@ TEST(ContactReference, RoundBodiesThrownWithoutSpin_RollWithinFivePercent) {
 TEST(ContactReference, StickSlip_PeriodAndAmplitudeWithinTwoPercent) {
   NEEDS_TABLES();
   int n = 0;
-  for (const Row &row : table("stick_slip")) {      // m k Fs Fk V x_slip x_max x_restick x_min ts tslip period rate
+  // m k Fs Fk V x_slip x_max x_restick x_min ts tslip period rate
+  for (const Row &row : table("stick_slip")) {
     const std::vector<double> &v = row.v;
-    const ref::StickSlip got = ref::stick_slip(v[0], v[1], v[2], v[3], v[4], 1e-4, 2.3 * v[11] + v[5] / v[4], 8e-4 * v[4]);
+    const ref::StickSlip got =
+        ref::stick_slip(v[0], v[1], v[2], v[3], v[4], 1e-4, 2.3 * v[11] + v[5] / v[4], 8e-4 * v[4]);
     ASSERT_GE(got.cycles, 1) << "m " << v[0];
     EXPECT_NEAR(got.period, v[11], 0.02 * v[11]) << "m " << v[0];
     EXPECT_NEAR(got.x_max - got.x_min, v[6] - v[8], 0.02 * (v[6] - v[8])) << "m " << v[0];

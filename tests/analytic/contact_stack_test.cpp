@@ -1,5 +1,6 @@
-// Three cubes on each other, a little off their grids, so that edges cross edges and no points face points: the normal force of each interface
-// is the weight above it, and the stack stays. Source: ../shared/reference/contact (box_stack); verification F6, F9.
+// Three cubes on each other, a little off their grids, so that edges cross edges and no points face points:
+// the normal force of each interface is the weight above it, and the stack stays. Source:
+// ../shared/reference/contact (box_stack); verification F6, F9.
 #include "world.h"
 
 TEST(Stack, ThreeCubes_InterfacesCarryTheWeightAboveAndRest) {
@@ -9,7 +10,10 @@ TEST(Stack, ThreeCubes_InterfacesCarryTheWeightAboveAndRest) {
   std::vector<dfm_body> cubes;
   for (int k = 0; k < 3; ++k) {
     test::BodyOptions o;
-    o.name = "cube" + std::to_string(k), o.young = 2e5, o.damping_stiffness = 2e-3, o.damping_mass = 20;
+    o.name = "cube" + std::to_string(k);
+    o.young = 2e5;
+    o.damping_stiffness = 2e-3;
+    o.damping_mass = 20;
     o.position = {0.003 * k, 0.002 * k, kGap + k * (kEdge + kGap)};
     cubes.push_back(test::make_body(context, world, "beam", {kEdge, kEdge, kEdge}, 60, o));
   }
@@ -28,7 +32,8 @@ TEST(Stack, ThreeCubes_InterfacesCarryTheWeightAboveAndRest) {
     for (const dfm_pair_report &p : pairs) {
       if (&p == pairs + n) break;
       const double above = p.b == floor ? 3 : p.a == cubes[0] ? 2 : 1;
-      EXPECT_NEAR(p.normal, above * weight, 1e-3 * above * weight) << "step " << step << ", " << above << " cubes above";
+      EXPECT_NEAR(p.normal, above * weight, 1e-3 * above * weight)
+          << "step " << step << ", " << above << " cubes above";
     }
     EXPECT_LT(test::measure(cubes[2]).speed_max, 1e-5);
   }
@@ -54,8 +59,13 @@ TEST(Stack, CoarseBodyAddedElsewhere_LeavesRestAlone) {
   test::Context context;
   const dfm_world world = test::make_world(context);
   test::BodyOptions small, large;
-  small.name = "small", small.young = 1e6, small.damping_stiffness = 1e-3, small.position = {0, 0, 5e-5};
-  large.name = "large", large.young = 1e6, large.position = {5, 5, 0.01};
+  small.name = "small";
+  small.young = 1e6;
+  small.damping_stiffness = 1e-3;
+  small.position = {0, 0, 5e-5};
+  large.name = "large";
+  large.young = 1e6;
+  large.position = {5, 5, 0.01};
   const dfm_body body = test::make_body(context, world, "beam", {0.1, 0.1, 0.1}, 60, small);
   test::add_plane(world, "floor");
   test::run(world, 0.5, 1e-3);
@@ -67,16 +77,24 @@ TEST(Stack, CoarseBodyAddedElsewhere_LeavesRestAlone) {
   }
 }
 
-// A block that overhangs a narrower box bends over its rim: inner edges of the bending face meet the rim, and everything rests.
+// A block that overhangs a narrower box bends over its rim: inner edges of the bending face meet the rim, and
+// everything rests.
 TEST(Stack, BlockOverhangingABox_ComesToRest) {
   test::Context context;
   const dfm_world world = test::make_world(context);
   test::BodyOptions o;
-  o.young = 2e5, o.damping_stiffness = 2e-3, o.damping_mass = 2, o.position = {-0.1, -0.05, 1e-4};
+  o.young = 2e5;
+  o.damping_stiffness = 2e-3;
+  o.damping_mass = 2;
+  o.position = {-0.1, -0.05, 1e-4};
   const dfm_body block = test::make_body(context, world, "beam", {0.2, 0.1, 0.05}, 300, o);
   dfm_obstacle_def box = dfm_obstacle_def_default();
-  box.name = "box", box.shape = DFM_SHAPE_BOX, box.pose.position[2] = -0.05;
-  box.half_size[0] = 0.06, box.half_size[1] = 0.2, box.half_size[2] = 0.05;
+  box.name = "box";
+  box.shape = DFM_SHAPE_BOX;
+  box.pose.position[2] = -0.05;
+  box.half_size[0] = 0.06;
+  box.half_size[1] = 0.2;
+  box.half_size[2] = 0.05;
   dfm_obstacle obstacle = 0;
   test::ok(dfm_obstacle_create(world, &box, &obstacle));
   test::set_friction(world, 0.5);

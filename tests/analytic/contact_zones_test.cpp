@@ -1,4 +1,5 @@
-// Different friction on different parts of one surface, and contacts that slide from triangle to triangle and from part to part.
+// Different friction on different parts of one surface, and contacts that slide from triangle to triangle and
+// from part to part.
 #include <map>
 #include <set>
 
@@ -24,11 +25,17 @@ struct Sledge {
   test::Context context;
   dfm_world world;
   dfm_body body;
-  explicit Sledge(double ice, double rubber, uint32_t cells = 768) {   // 4 cells along an edge: the line between the parts is one of the mesh
+  // 4 cells along an edge: the line between the parts is one of the mesh
+  explicit Sledge(double ice, double rubber, uint32_t cells = 768) {
     world = test::make_world(context);
     test::ZonedOptions o;
-    o.name = "block", o.young = 1e6, o.poisson = 0, o.damping_stiffness = 1e-3, o.position = {-0.05, -0.05, 2e-5};
-    o.groups = {"ice", "rubber"}, o.group = [](const double x[3]) { return x[1] < 0.05 ? 0u : 1u; };
+    o.name = "block";
+    o.young = 1e6;
+    o.poisson = 0;
+    o.damping_stiffness = 1e-3;
+    o.position = {-0.05, -0.05, 2e-5};
+    o.groups = {"ice", "rubber"};
+    o.group = [](const double x[3]) { return x[1] < 0.05 ? 0u : 1u; };
     body = test::make_zoned_beam(context, world, {0.1, 0.1, 0.1}, cells, o);
     test::add_plane(world, "floor");
     test::ok(test::friction(world, "block:ice", "floor", ice));
@@ -39,9 +46,10 @@ struct Sledge {
 }  // namespace
 
 TEST(Zones, SlidingBlockOnIceAndRubber_IsTurnedByTheClosedForm) {
-  // Uniform pressure W/b2, each half with its own coefficient at a mean lever of b/4: moment W b (rubber - ice) / 8, force W (ice + rubber) / 2.
-  // The surfels on the line between the halves, a quarter of the face at 4 cells along an edge, belong to the part with the lowest triangles: ice.
-  // That moves an eighth of the weight from rubber to ice, and nothing of the moment, as the line runs through the middle.
+  // Uniform pressure W/b2, each half with its own coefficient at a mean lever of b/4: moment W b (rubber -
+  // ice) / 8, force W (ice + rubber) / 2. The surfels on the line between the halves, a quarter of the face
+  // at 4 cells along an edge, belong to the part with the lowest triangles: ice. That moves an eighth of the
+  // weight from rubber to ice, and nothing of the moment, as the line runs through the middle.
   const double ice = 0.05, rubber = 0.35;
   Sledge s(ice, rubber);
   test::run(s.world, 0.3, 1e-3);
@@ -56,7 +64,8 @@ TEST(Zones, SlidingBlockOnIceAndRubber_IsTurnedByTheClosedForm) {
     uint32_t n = 0;
     ASSERT_EQ(dfm_world_pairs(s.world, 1, &pair, &n), DFM_OK) << dfm_last_error();
     ASSERT_EQ(n, 1u);
-    moment += pair.moment[2] / steps, friction += pair.friction[0] / steps;
+    moment += pair.moment[2] / steps;
+    friction += pair.friction[0] / steps;
   }
   EXPECT_NEAR(moment, weight * 0.1 * (rubber - ice) / 8, 0.02 * weight * 0.1 * (rubber - ice) / 8);
   const double force = weight * (0.625 * ice + 0.375 * rubber);
@@ -72,8 +81,10 @@ TEST(Zones, EveryContact_CarriesTheLawOfItsPart) {
   for (int k = 0; k < 20; ++k) {
     test::run(s.world, 1e-3, 1e-3);
     for (const dfm_contact &c : test::contacts(s.world)) {
-      if (!(c.fn > 1e-3) || std::fabs(c.point[1]) < 1e-3) continue;   // surfels on the line between the parts belong to either
-      EXPECT_NEAR(std::hypot(c.ft[0], c.ft[1]), (c.point[1] < 0 ? 0.05 : 0.35) * c.fn, 1e-6 * c.fn) << "y " << c.point[1];
+      // surfels on the line between the parts belong to either
+      if (!(c.fn > 1e-3) || std::fabs(c.point[1]) < 1e-3) continue;
+      EXPECT_NEAR(std::hypot(c.ft[0], c.ft[1]), (c.point[1] < 0 ? 0.05 : 0.35) * c.fn, 1e-6 * c.fn)
+          << "y " << c.point[1];
       ++seen[c.law];
     }
   }
@@ -88,11 +99,16 @@ TEST(Zones, MaterialOfTheCellBehindATriangle_DecidesItsLaw) {
   const char *const names[] = {"ice", "rubber"};
   for (int i = 0; i < 2; ++i) {
     dfm_material_def d = dfm_material_def_default();
-    d.name = names[i], d.young = 1e6, d.poisson = 0, d.damping_stiffness = 1e-3;
+    d.name = names[i];
+    d.young = 1e6;
+    d.poisson = 0;
+    d.damping_stiffness = 1e-3;
     test::ok(dfm_material_create(world, &d, &soft[i]));
   }
   test::ZonedOptions o;
-  o.name = "block", o.position = {-0.05, -0.05, 2e-5}, o.velocity = {2, 0, 0};
+  o.name = "block";
+  o.position = {-0.05, -0.05, 2e-5};
+  o.velocity = {2, 0, 0};
   o.material = [&](const double x[3]) { return soft[x[1] < 0.05 ? 0 : 1]; };
   test::make_zoned_beam(context, world, {0.1, 0.1, 0.1}, 768, o);
   test::add_plane(world, "floor");
@@ -103,7 +119,8 @@ TEST(Zones, MaterialOfTheCellBehindATriangle_DecidesItsLaw) {
     test::run(world, 1e-3, 1e-3);
     for (const dfm_contact &c : test::contacts(world)) {
       if (!(c.fn > 1e-3) || std::fabs(c.point[1]) < 5e-3 || c.flags & DFM_CONTACT_STICKING) continue;
-      EXPECT_NEAR(std::hypot(c.ft[0], c.ft[1]), (c.point[1] < 0 ? 0.05 : 0.35) * c.fn, 1e-6 * c.fn) << "y " << c.point[1];
+      EXPECT_NEAR(std::hypot(c.ft[0], c.ft[1]), (c.point[1] < 0 ? 0.05 : 0.35) * c.fn, 1e-6 * c.fn)
+          << "y " << c.point[1];
       ++seen[c.point[1] < 0 ? 0 : 1];
     }
   }
@@ -113,27 +130,37 @@ TEST(Zones, MaterialOfTheCellBehindATriangle_DecidesItsLaw) {
 
 namespace {
 
-// A narrow block slides along x between two rows of points of a held plate of two parts; both carry the bristle law, softer on the second part.
+// A narrow block slides along x between two rows of points of a held plate of two parts; both carry the
+// bristle law, softer on the second part.
 struct Crossing {
   test::Context context;
   dfm_world world;
   dfm_body plate, block;
-  static constexpr double kSigma[2] = {1e7, 1e6};   // N/m3
+  static constexpr double kSigma[2] = {1e7, 1e6};  // N/m3
   explicit Crossing(bool one_law) {
     test::ok(dfm_plugin_register_static(context, dfm_plugin_entry_bristle, "bristle"));
     world = test::make_world(context);
     test::ZonedOptions p;
-    p.name = "plate", p.held = true, p.position = {0, -0.05, -0.02};
-    p.groups = {"near", "far"}, p.group = [](const double x[3]) { return x[0] < 0.2 ? 0u : 1u; };
-    plate = test::make_zoned_beam(context, world, {0.4, 0.1, 0.02}, 1200, p);   // squares of 0.02 m
+    p.name = "plate";
+    p.held = true;
+    p.position = {0, -0.05, -0.02};
+    p.groups = {"near", "far"};
+    p.group = [](const double x[3]) { return x[0] < 0.2 ? 0u : 1u; };
+    plate = test::make_zoned_beam(context, world, {0.4, 0.1, 0.02}, 1200, p);  // squares of 0.02 m
     test::ZonedOptions o;
-    o.name = "block", o.young = 2e5, o.damping_stiffness = 1e-3, o.position = {0.02, -0.005, 2e-5};
+    o.name = "block";
+    o.young = 2e5;
+    o.damping_stiffness = 1e-3;
+    o.position = {0.02, -0.005, 2e-5};
     block = test::make_zoned_beam(context, world, {0.03, 0.01, 0.01}, 36, o);
     const double mu = 0.1;
     for (int k = 0; k < 2; ++k) {
       const dfm_param_value values[] = {{"mu", &mu, 1}, {"sigma0", &kSigma[one_law ? 0 : k], 1}};
       dfm_friction_def f{};
-      f.size = sizeof f, f.between[0] = "block", f.between[1] = k ? "plate:far" : "plate:near", f.law = "test.bristle";
+      f.size = sizeof f;
+      f.between[0] = "block";
+      f.between[1] = k ? "plate:far" : "plate:near";
+      f.law = "test.bristle";
       f.params = {sizeof(dfm_params), 2, values};
       test::ok(dfm_world_add_friction(world, &f));
     }
@@ -196,7 +223,8 @@ TEST(Identity, ContactThatSlidesIntoAnotherPart_ChangesItsLawAndStartsFromRest) 
       ++crossed;
       EXPECT_EQ(c.key, old->second.key) << "the contact lives on";
       EXPECT_GT(c.point[0], 0.19);
-      // one step of slip at most: the soft bristle of the second part, mu fn / (sigma A) when it slides, is far longer
+      // one step of slip at most: the soft bristle of the second part, mu fn / (sigma A) when it
+      // slides, is far longer
       const double slip = std::hypot(c.slip[0], c.slip[1]), length = std::hypot(c.bristle[0], c.bristle[1]);
       EXPECT_LE(length, 1e-3 * slip * (1 + 1e-9));
       EXPECT_GT(std::hypot(old->second.bristle[0], old->second.bristle[1]), 0);

@@ -17,11 +17,17 @@ struct Block {
   dfm_world world;
   dfm_body body = 0;
   Skin skin = test::box_skin(kSize, 12);
-  Block(int32_t coupling, double mu, std::array<double, 3> gravity, double support = 0, std::array<double, 3> velocity = {}, double height = 2e-5) {
+  Block(int32_t coupling, double mu, std::array<double, 3> gravity, double support = 0,
+        std::array<double, 3> velocity = {}, double height = 2e-5) {
     world = test::make_world(context, gravity);
     const dfm_surface_def surface = skin.def(coupling, support);
     test::BodyOptions o;
-    o.name = "block", o.young = 1e6, o.damping_stiffness = 1e-3, o.velocity = velocity, o.position = {-0.05, -0.05, height}, o.surface = &surface;
+    o.name = "block";
+    o.young = 1e6;
+    o.damping_stiffness = 1e-3;
+    o.velocity = velocity;
+    o.position = {-0.05, -0.05, height};
+    o.surface = &surface;
     body = test::make_body(context, world, "beam", kSize, 60, o);
     test::add_plane(world, "floor");
     test::set_friction(world, mu);
@@ -33,10 +39,12 @@ double norm(const double *a) { return std::sqrt(a[0] * a[0] + a[1] * a[1] + a[2]
 }  // namespace
 
 TEST(Coupled, RestingBlock_CarriesItsWeightAndEveryImpulseArrives) {
-  for (const auto &[coupling, support] : {std::pair{DFM_COUPLING_BARYCENTRIC, 0.0}, {DFM_COUPLING_MLS, 1.5}}) {
+  for (const auto &[coupling, support] :
+       {std::pair{DFM_COUPLING_BARYCENTRIC, 0.0}, {DFM_COUPLING_MLS, 1.5}}) {
     Block b(coupling, 0.5, {0, 0, -kG}, support);
     double worst = 0, weight = 0;
-    uint64_t landing = 0;   // the first touch of 150 surfels that hang on nine phyxels takes all 50 sweeps with mls; rest must not
+    // the first touch of 150 surfels that hang on nine phyxels takes all 50 sweeps with mls; rest must not
+    uint64_t landing = 0;
     const double mass = test::measure(b.body).mass;
     for (int i = 0; i < 400; ++i) {
       const dfm_body_measure before = test::measure(b.body);
@@ -44,7 +52,8 @@ TEST(Coupled, RestingBlock_CarriesItsWeightAndEveryImpulseArrives) {
       const dfm_body_measure after = test::measure(b.body);
       if (i == 9) landing = test::stats(b.world).unconverged;
       for (int k = 0; k < 3; ++k) {
-        const double impulse = after.contact_impulse[k] - before.contact_impulse[k], fall = k == 2 ? -kG * mass * 1e-3 : 0;
+        const double impulse = after.contact_impulse[k] - before.contact_impulse[k];
+        const double fall = k == 2 ? -kG * mass * 1e-3 : 0;
         worst = std::max(worst, std::fabs(after.momentum[k] - before.momentum[k] - fall - impulse));
       }
       if (i >= 350) weight += (after.contact_impulse[2] - before.contact_impulse[2]) / 1e-3 / 50;
@@ -97,7 +106,8 @@ TEST(Coupled, Slope26Point5_HoldsAt05AndSlidesAt049) {
   }
 }
 
-// The boundary of the cells, once as it is and once as a surface of its own: the same motion through N as without it.
+// The boundary of the cells, once as it is and once as a surface of its own: the same motion through N
+// as without it.
 TEST(Coupled, BoundaryThroughTheMatrix_MovesAsTheBoundary) {
   std::vector<double> end[2];
   uint64_t hash[2];
@@ -106,14 +116,18 @@ TEST(Coupled, BoundaryThroughTheMatrix_MovesAsTheBoundary) {
     test::Context context;
     const dfm_world w = test::make_world(context);
     test::BodyOptions o;
-    o.young = 2e5, o.damping_stiffness = 1e-3;
+    o.young = 2e5;
+    o.damping_stiffness = 1e-3;
     if (!through) {
       const dfm_world plain = test::make_world(context);
       skin = test::boundary_skin(test::make_body(context, plain, "beam", kSize, 200, o));
     }
     const dfm_surface_def surface = skin.def();
     if (through) o.surface = &surface;
-    o.position = {0.3, -0.2, 0.05}, o.rotation = {0.1, 0.2, 0.3, std::sqrt(1 - 0.14)}, o.velocity = {1, 0, -1}, o.spin = {3, 2, 1};
+    o.position = {0.3, -0.2, 0.05};
+    o.rotation = {0.1, 0.2, 0.3, std::sqrt(1 - 0.14)};
+    o.velocity = {1, 0, -1};
+    o.spin = {3, 2, 1};
     const dfm_body b = test::make_body(context, w, "beam", kSize, 200, o);
     test::add_plane(w, "floor");
     test::set_friction(w, 0.4);
@@ -122,7 +136,8 @@ TEST(Coupled, BoundaryThroughTheMatrix_MovesAsTheBoundary) {
     end[through] = test::surface_positions(b);
     hash[through] = dfm_world_hash(w);
     const std::string plan = test::explain(w);
-    const std::string running = plan.substr(plan.find("\"stages\""), plan.find("\"absent\"") - plan.find("\"stages\""));
+    const std::string running =
+        plan.substr(plan.find("\"stages\""), plan.find("\"absent\"") - plan.find("\"stages\""));
     EXPECT_EQ(running.find("\"gather\"") != std::string::npos, through == 1) << plan;
     uint32_t n = 0;
     test::ok(dfm_world_profile(w, 0, nullptr, &n));
@@ -130,7 +145,8 @@ TEST(Coupled, BoundaryThroughTheMatrix_MovesAsTheBoundary) {
     test::ok(dfm_world_profile(w, n, stages.data(), &n));
     uint64_t gathers = 0;
     for (const dfm_stage_time &s : stages) gathers += std::string(s.name) == "gather" ? s.calls : 0;
-    EXPECT_EQ(gathers, through ? test::stats(w).substeps : 0) << "a surface that hangs on nothing else costs no stage";
+    EXPECT_EQ(gathers, through ? test::stats(w).substeps : 0)
+        << "a surface that hangs on nothing else costs no stage";
   }
   ASSERT_EQ(end[0].size(), end[1].size());
   for (size_t i = 0; i < end[0].size(); ++i) EXPECT_NEAR(end[0][i], end[1][i], 1e-12);
@@ -143,7 +159,12 @@ TEST(Coupled, Queries_SpeakOfTheSurfaceGiven) {
   const Skin skin = test::ball_skin(0.09, 3);
   const dfm_surface_def surface = skin.def();
   test::BodyOptions o;
-  o.name = "ball", o.surface = &surface, o.position = {1, 2, 3}, o.rotation = {0, 0, std::sin(0.5), std::cos(0.5)}, o.velocity = {1, 0, 0}, o.spin = {0, 0, 2};
+  o.name = "ball";
+  o.surface = &surface;
+  o.position = {1, 2, 3};
+  o.rotation = {0, 0, std::sin(0.5), std::cos(0.5)};
+  o.velocity = {1, 0, 0};
+  o.spin = {0, 0, 2};
   const dfm_body b = test::make_body(context, w, "ball", {0.1, 0, 0}, 300, o);
   const std::vector<double> x = test::surface_positions(b);
   ASSERT_EQ(x.size(), skin.points.size());
@@ -157,7 +178,8 @@ TEST(Coupled, Queries_SpeakOfTheSurfaceGiven) {
     EXPECT_NEAR(at[0], std::cos(1.0) * p[0] - std::sin(1.0) * p[1], 1e-14);
     EXPECT_NEAR(at[1], std::sin(1.0) * p[0] + std::cos(1.0) * p[1], 1e-14);
     EXPECT_NEAR(at[2], p[2], 1e-14);
-    EXPECT_NEAR(v[i], 1 - 2 * at[1], 1e-13) << "rotation about the center of mass, which is the ball's to rounding";
+    EXPECT_NEAR(v[i], 1 - 2 * at[1], 1e-13)
+        << "rotation about the center of mass, which is the ball's to rounding";
     EXPECT_NEAR(v[i + 1], 2 * at[0], 1e-13);
     EXPECT_GT((normal[i] * at[0] + normal[i + 1] * at[1] + normal[i + 2] * at[2]) / norm(at), 0.99);
   }
@@ -179,7 +201,8 @@ TEST(Coupled, Impulse_AtASurfelGivesItsMomentumAndTurnsTheBody) {
     const Skin skin = test::ball_skin(0.09, 3);
     const dfm_surface_def surface = skin.def(coupling, 1.5);
     test::BodyOptions o;
-    o.surface = &surface, o.position = {0.5, 0, 0};
+    o.surface = &surface;
+    o.position = {0.5, 0, 0};
     const dfm_body b = test::make_body(context, w, "ball", {0.1, 0, 0}, 300, o);
     const double point[3] = {0.5 + 0.09, 0, 0}, impulse[3] = {0.1, 0.2, -0.3};
     test::ok(dfm_body_apply_impulse(b, point, impulse));
@@ -188,16 +211,19 @@ TEST(Coupled, Impulse_AtASurfelGivesItsMomentumAndTurnsTheBody) {
     for (int k = 0; k < 3; ++k) EXPECT_NEAR(m.momentum[k], impulse[k], 1e-15);
     for (int k = 0; k < 3; ++k) {
       const int i = (k + 1) % 3, j = (k + 2) % 3;
-      EXPECT_NEAR(m.angular[k], -(com[i] * impulse[j] - com[j] * impulse[i]), 1e-14 * 0.4) << "to the rounding of the center of mass, 0.5 m from zero";
+      EXPECT_NEAR(m.angular[k], -(com[i] * impulse[j] - com[j] * impulse[i]), 1e-14 * 0.4)
+          << "to the rounding of the center of mass, 0.5 m from zero";
     }
-    // power: what the surfel's new velocity says of the work done is the kinetic energy, as for any linear map and its transpose
+    // power: what the surfel's new velocity says of the work done is the kinetic energy, as for any linear
+    // map and its transpose
     const std::vector<double> x = test::surface_positions(b);
     std::vector<double> v(x.size());
     uint32_t n = 0;
     test::ok(dfm_surface_velocities(b, skin.npoint(), v.data(), &n));
     for (size_t i = 0; i < x.size(); i += 3)
       if (std::fabs(x[i] - point[0]) + std::fabs(x[i + 1]) + std::fabs(x[i + 2]) < 1e-12) {
-        EXPECT_NEAR(0.5 * (v[i] * impulse[0] + v[i + 1] * impulse[1] + v[i + 2] * impulse[2]), m.kinetic, 1e-13 * m.kinetic);
+        EXPECT_NEAR(0.5 * (v[i] * impulse[0] + v[i + 1] * impulse[1] + v[i + 2] * impulse[2]), m.kinetic,
+                    1e-13 * m.kinetic);
       }
   }
 }
@@ -208,7 +234,9 @@ TEST(Coupled, HeldPoints_HoldTheSurfaceOverThem) {
   const Skin skin = test::box_skin({0.4, 0.05, 0.05}, 16);
   const dfm_surface_def surface = skin.def();
   test::BodyOptions o;
-  o.surface = &surface, o.young = 1e6, o.damping_stiffness = 1e-3;
+  o.surface = &surface;
+  o.young = 1e6;
+  o.damping_stiffness = 1e-3;
   const dfm_body b = test::make_body(context, w, "beam", {0.4, 0.05, 0.05}, 200, o);
   uint32_t n = 0;
   test::ok(dfm_body_get_state(b, 0, nullptr, nullptr, &n));
@@ -235,14 +263,18 @@ TEST(Coupled, SurfaceFile_HoldsTheTrueDisplacement) {
   const Skin skin = test::box_skin(kSize, 3);
   const dfm_surface_def surface = skin.def();
   test::BodyOptions o;
-  o.surface = &surface, o.position = {0.25, 0.5, -1};
+  o.surface = &surface;
+  o.position = {0.25, 0.5, -1};
   const dfm_body b = test::make_body(context, w, "beam", kSize, 60, o);
   const std::string path = test::scratch("coupling") + "/skin.vtu";
   test::ok(dfm_debug_write_surface(b, path.c_str()));
   const std::string file = test::read_file(path);
-  const size_t head = file.find("Name=\"u\""), at = file.find("offset=\"", head), data = file.find("<AppendedData");
+  const size_t head = file.find("Name=\"u\"");
+  const size_t at = file.find("offset=\"", head);
+  const size_t data = file.find("<AppendedData");
   ASSERT_NE(at, std::string::npos);
-  const char *const first = file.data() + file.find('_', data) + 1 + std::stoul(file.substr(at + 8)) + sizeof(uint64_t);
+  const char *const first =
+      file.data() + file.find('_', data) + 1 + std::stoul(file.substr(at + 8)) + sizeof(uint64_t);
   for (uint32_t i = 0; i < skin.npoint(); ++i) {
     double u[3];
     std::memcpy(u, first + 24 * size_t{i}, sizeof u);
@@ -260,7 +292,12 @@ TEST(Coupled, WrongSurfaces_AreRefusedInOneSentence) {
     dfm_surface_def s = skin.def();
     spoil(s);
     dfm_body_def d = dfm_body_def_default();
-    d.name = "soft", d.npoint = 4, d.ntet = 1, d.points = points, d.tets = tets, d.surface = &s;
+    d.name = "soft";
+    d.npoint = 4;
+    d.ntet = 1;
+    d.points = points;
+    d.tets = tets;
+    d.surface = &s;
     dfm_body b = 7;
     EXPECT_EQ(dfm_body_create(w, &d, &b), DFM_E_ARG) << sentence;
     EXPECT_NE(std::string(dfm_last_error()).find(sentence), std::string::npos) << dfm_last_error();
@@ -279,11 +316,14 @@ TEST(Coupled, WrongSurfaces_AreRefusedInOneSentence) {
   Skin bad = good;
   bad.points[4] = INFINITY;
   refuse(bad, "surface point 1 is not finite", nothing);
-  bad = good, bad.triangles[7] = 1000;
+  bad = good;
+  bad.triangles[7] = 1000;
   refuse(bad, "surface triangle 2 names point 1000 of 26", nothing);
-  bad = good, bad.triangles[4] = bad.triangles[3];
+  bad = good;
+  bad.triangles[4] = bad.triangles[3];
   refuse(bad, "surface triangle 1 names a point twice", nothing);
-  bad = good, bad.points.insert(bad.points.end(), {0, 0, 0});
+  bad = good;
+  bad.points.insert(bad.points.end(), {0, 0, 0});
   refuse(bad, "surface point 26 belongs to no triangle", nothing);
   bad = good;
   for (size_t t = 0; t < bad.triangles.size(); t += 3) std::swap(bad.triangles[t], bad.triangles[t + 1]);

@@ -1,5 +1,5 @@
-// A filled box against elasticity and against the same box meshed by the generator: its lattice lies askew to its walls, so the shares of the
-// cut cells are what gives it the right cross-section.
+// A filled box against elasticity and against the same box meshed by the generator: its lattice lies askew to
+// its walls, so the shares of the cut cells are what gives it the right cross-section.
 #include "support.h"
 #include "coupled.h"
 
@@ -16,7 +16,9 @@ struct Box {
 
   Box(bool filled, uint32_t cells, double density) {
     test::BodyOptions o;
-    o.young = kYoung, o.damping_mass = 20, o.volume = 1;
+    o.young = kYoung;
+    o.damping_mass = 20;
+    o.volume = 1;
     if (!filled) {
       body = test::make_body(context, world, "beam", kSize, cells, o);
     } else {
@@ -36,20 +38,28 @@ struct Box {
   void make(dfm_trimesh skin, dfm_tetmesh mesh, const test::BodyOptions &o) {
     dfm_tetmesh_info info{};
     dfm_trimesh_info surface{};
-    info.size = sizeof info, surface.size = sizeof surface;
-    test::ok(dfm_tetmesh_get_info(mesh, &info)), test::ok(dfm_trimesh_get_info(skin, &surface));
+    info.size = sizeof info;
+    surface.size = sizeof surface;
+    test::ok(dfm_tetmesh_get_info(mesh, &info));
+    test::ok(dfm_trimesh_get_info(skin, &surface));
     dfm_surface_def def{};
-    def.size = sizeof def, def.npoint = surface.npoint, def.ntriangle = surface.ntriangle;
+    def.size = sizeof def;
+    def.npoint = surface.npoint;
+    def.ntriangle = surface.ntriangle;
     test::ok(dfm_trimesh_data(skin, &def.points, &def.triangles, nullptr));
     dfm_body_def d = dfm_body_def_default();
     test::ok(dfm_tetmesh_data(mesh, &d.points, &d.tets, nullptr));
     test::ok(dfm_tetmesh_share(mesh, &d.cell_share));
     dfm_material_def md = dfm_material_def_default();
-    md.young = o.young, md.poisson = 0.3, md.damping_mass = o.damping_mass;
+    md.young = o.young;
+    md.poisson = 0.3;
+    md.damping_mass = o.damping_mass;
     test::ok(dfm_material_create(world, &md, &d.material));
     const dfm_param_value volume{"volume", &o.volume, 1};
     d.model_params = {sizeof(dfm_params), 1, &volume};
-    d.npoint = info.npoint, d.ntet = info.ntet, d.surface = &def;
+    d.npoint = info.npoint;
+    d.ntet = info.ntet;
+    d.surface = &def;
     test::ok(dfm_body_create(world, &d, &body));
   }
 
@@ -61,10 +71,12 @@ struct Box {
       const size_t first = points.size();
       for (uint32_t i = 0; i < rest.size() / 3; ++i)
         if (top ? rest[3 * i + 2] > kSize[2] - kEnd : rest[3 * i + 2] < kEnd) points.push_back(i);
-      const double each = (top ? 1 : -1) * kYoung * kSize[0] * kSize[1] * kStrain / double(points.size() - first);
+      const double each =
+          (top ? 1 : -1) * kYoung * kSize[0] * kSize[1] * kStrain / double(points.size() - first);
       for (size_t i = first; i < points.size(); ++i) force.insert(force.end(), {0, 0, each});
     }
-    test::ok(dfm_body_add_load(body, uint32_t(points.size()), points.data(), force.data(), 0, nullptr, nullptr, nullptr));
+    test::ok(dfm_body_add_load(body, uint32_t(points.size()), points.data(), force.data(), 0, nullptr,
+                               nullptr, nullptr));
     const std::vector<double> before = test::surface_positions(body);
     test::run(world, 1.0, 5e-4);
     const std::vector<double> after = test::surface_positions(body);
@@ -73,7 +85,11 @@ struct Box {
     for (size_t i = 2; i < before.size(); i += 3) {
       const double z = before[i], u = after[i] - before[i];
       if (z < 0.25 * kSize[2] || z > 0.75 * kSize[2]) continue;
-      n += 1, sz += z, su += u, szz += z * z, szu += z * u;
+      n += 1;
+      sz += z;
+      su += u;
+      szz += z * z;
+      szu += z * u;
     }
     return (n * szu - sz * su) / (n * szz - sz * sz);
   }
@@ -85,7 +101,8 @@ TEST(FilledBox, Mass_IsThatOfTheBox) {
   const Box box(true, 1500, 1);
   const double mass = 1000 * kSize[0] * kSize[1] * kSize[2];
   EXPECT_NEAR(test::measure(box.body).mass, mass, 1e-9 * mass);
-  for (int k = 0; k < 3; ++k) EXPECT_NEAR(test::measure(box.body).com[k], kSize[size_t(k)] / 2, 0.002 * kSize[2]);
+  for (int k = 0; k < 3; ++k)
+    EXPECT_NEAR(test::measure(box.body).com[k], kSize[size_t(k)] / 2, 0.002 * kSize[2]);
 }
 
 TEST(FilledBox, Stretch_LikeTheMeshedBeam) {
@@ -93,7 +110,8 @@ TEST(FilledBox, Stretch_LikeTheMeshedBeam) {
   EXPECT_NEAR(meshed, kStrain, 0.04 * kStrain);
   for (const double density : {0.8, 1.0, 1.3}) {  // other pitches: the walls cut the cells elsewhere
     const double filled = Box(true, 2500, density).stretched();
-    RecordProperty("filled_over_meshed_" + std::to_string(int(100 * density)), std::to_string(filled / meshed));
+    RecordProperty("filled_over_meshed_" + std::to_string(int(100 * density)),
+                   std::to_string(filled / meshed));
     EXPECT_NEAR(filled, meshed, 0.04 * meshed) << density;
   }
 }

@@ -1,4 +1,5 @@
-// A body that nothing touches: momentum and angular momentum to rounding, energy bounded. Verification T4, T5.
+// A body that nothing touches: momentum and angular momentum to rounding, energy bounded.
+// Verification T4, T5.
 #include "world.h"
 
 namespace {
@@ -10,7 +11,11 @@ struct Free {
   explicit Free(double damping, double volume) {
     world = test::make_world(context, {0, 0, 0});
     test::BodyOptions o;
-    o.young = 1e5, o.damping_stiffness = damping, o.volume = volume, o.velocity = {0.3, -0.2, 0.1}, o.spin = {3, -5, 8};
+    o.young = 1e5;
+    o.damping_stiffness = damping;
+    o.volume = volume;
+    o.velocity = {0.3, -0.2, 0.1};
+    o.spin = {3, -5, 8};
     body = test::make_body(context, world, "beam", {0.3, 0.1, 0.1}, 150, o);
     // Some deformation to start with.
     dfm_body_info info{};
@@ -18,7 +23,10 @@ struct Free {
     test::ok(dfm_body_get_info(body, &info));
     std::vector<double> x(3 * info.npoint);
     test::ok(dfm_body_get_state(body, info.npoint, x.data(), nullptr, nullptr));
-    for (uint32_t i = 0; i < info.npoint; ++i) x[3 * i] *= 1.05, x[3 * i + 2] *= 0.97;
+    for (uint32_t i = 0; i < info.npoint; ++i) {
+      x[3 * i] *= 1.05;
+      x[3 * i + 2] *= 0.97;
+    }
     test::ok(dfm_body_set_state(body, info.npoint, x.data(), nullptr));
   }
 };

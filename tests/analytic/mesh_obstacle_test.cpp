@@ -1,5 +1,5 @@
-// Obstacles of triangles against what is known in closed form: a flat floor of triangles is a plane, whatever its triangles; weights are carried
-// once; friction holds and slides where it does on a plane.
+// Obstacles of triangles against what is known in closed form: a flat floor of triangles is a plane, whatever
+// its triangles; weights are carried once; friction holds and slides where it does on a plane.
 #include "obstacle.h"
 
 namespace {
@@ -14,7 +14,10 @@ struct Block {
   explicit Block(std::array<double, 3> gravity = {0, 0, -kG}, double mu = 0) {
     world = test::make_world(context, gravity);
     test::BodyOptions o;
-    o.name = "block", o.young = 1e6, o.damping_stiffness = 1e-3, o.position = {-0.05, -0.05, 2e-5};
+    o.name = "block";
+    o.young = 1e6;
+    o.damping_stiffness = 1e-3;
+    o.position = {-0.05, -0.05, 2e-5};
     body = test::make_body(context, world, "beam", {0.1, 0.1, 0.1}, 60, o);
     test::set_friction(world, mu);
   }
@@ -51,12 +54,16 @@ TEST(MeshFloor, FrictionlessSlide_IsThatOnPlane) {
   Block on_plane, on_mesh;
   test::add_plane(on_plane.world, "floor");
   test::add_mesh(on_mesh.world, "floor", irregular_floor());
-  for (Block *b : {&on_plane, &on_mesh}) test::run(b->world, 0.1, 1e-3), b->push({0.7, 0.2, 0});
+  for (Block *b : {&on_plane, &on_mesh}) {
+    test::run(b->world, 0.1, 1e-3);
+    b->push({0.7, 0.2, 0});
+  }
   double upward = 0;
   for (int k = 0; k < 500; ++k) {
     for (Block *b : {&on_plane, &on_mesh}) test::run(b->world, 1e-3, 1e-3);
     const dfm_body_measure p = on_plane.now(), m = on_mesh.now();
-    for (int i = 0; i < 3; ++i) EXPECT_NEAR(m.velocity[i], p.velocity[i], 1e-9 * 0.7) << "step " << k << ", axis " << i;
+    for (int i = 0; i < 3; ++i)
+      EXPECT_NEAR(m.velocity[i], p.velocity[i], 1e-9 * 0.7) << "step " << k << ", axis " << i;
     upward = std::max(upward, std::fabs(m.com[2] - p.com[2]));
     ASSERT_GE(test::contacts(on_mesh.world).size(), 4u);
   }
@@ -102,7 +109,8 @@ TEST(MeshFloor, Friction_HoldsAndSlidesAsOnPlane) {
   Block holds({g[0], 0, g[2]}, 0.5), slides({g[0], 0, g[2]}, 0.4);
   test::add_mesh(holds.world, "floor", irregular_floor());
   test::add_mesh(slides.world, "floor", irregular_floor());
-  test::run(holds.world, 0.3, 1e-3), test::run(slides.world, 0.3, 1e-3);
+  test::run(holds.world, 0.3, 1e-3);
+  test::run(slides.world, 0.3, 1e-3);
   EXPECT_LT(std::fabs(holds.now().velocity[0]), 1e-3);
   const double v0 = slides.now().velocity[0];
   test::run(slides.world, 0.2, 1e-3);
@@ -118,9 +126,15 @@ TEST(MeshFloor, MovingAndBelt_DriveAsPlane) {
       Block b({0, 0, -kG}, 0.5);
       dfm_obstacle_def d = mesh ? test::mesh_def("floor", irregular_floor()) : dfm_obstacle_def_default();
       d.name = "floor";
-      const dfm_pose_key keys[2] = {{0, {{0, 0, 0}, {0, 0, 0, 1}}}, {1, {{0.2, 0.1, 0.05}, {0, 0, 0.05, 0.99874922}}}};
-      if (belt) d.velocity_surface[0] = 0.2, d.velocity_surface[1] = 0.1;
-      else d.nkey = 2, d.keys = keys;
+      const dfm_pose_key keys[2] = {{0, {{0, 0, 0}, {0, 0, 0, 1}}},
+                                    {1, {{0.2, 0.1, 0.05}, {0, 0, 0.05, 0.99874922}}}};
+      if (belt) {
+        d.velocity_surface[0] = 0.2;
+        d.velocity_surface[1] = 0.1;
+      } else {
+        d.nkey = 2;
+        d.keys = keys;
+      }
       dfm_obstacle o = 0;
       test::ok(dfm_obstacle_create(b.world, &d, &o));
       test::run(b.world, 0.4, 1e-3);
@@ -132,14 +146,16 @@ TEST(MeshFloor, MovingAndBelt_DriveAsPlane) {
   }
 }
 
-// Sliding off a flat onto a slope and from a slope onto a flat: no catch at the edge, no way through it, no energy from nowhere.
+// Sliding off a flat onto a slope and from a slope onto a flat: no catch at the edge, no way through it, no
+// energy from nowhere.
 namespace {
 double roof(double x) { return x > 0.1 ? -0.4 * (x - 0.1) : 0; }
 double valley(double x) { return x > 0.1 ? 0.3 * (x - 0.1) : 0; }
 }  // namespace
 
 TEST(MeshFloor, ConvexAndConcaveEdge_ArePassed) {
-  for (const auto &[convex, mu] : {std::pair{true, 0.0}, {false, 0.0}, {true, 0.5}, {false, 0.5}}) {   // sliding, rolling
+  // sliding, rolling
+  for (const auto &[convex, mu] : {std::pair{true, 0.0}, {false, 0.0}, {true, 0.5}, {false, 0.5}}) {
     double (*const height)(double) = convex ? roof : valley;
     // Columns of points on the edge, so that it is where the formula has it.
     test::Triangles m = test::height_field(0.8, 32, flat, 0.2);
@@ -150,7 +166,11 @@ TEST(MeshFloor, ConvexAndConcaveEdge_ArePassed) {
     test::Context context;
     const dfm_world world = test::make_world(context);
     test::BodyOptions o;
-    o.name = "ball", o.young = 2e5, o.damping_stiffness = 1e-3, o.position = {-0.1, 0, 0.0503}, o.velocity = {0.8, 0, 0};
+    o.name = "ball";
+    o.young = 2e5;
+    o.damping_stiffness = 1e-3;
+    o.position = {-0.1, 0, 0.0503};
+    o.velocity = {0.8, 0, 0};
     if (mu > 0) o.spin = {0, 16, 0};
     const dfm_body ball = test::make_body(context, world, "ball", {0.05, 0, 0}, 400, o);
     test::set_friction(world, mu);
@@ -163,7 +183,8 @@ TEST(MeshFloor, ConvexAndConcaveEdge_ArePassed) {
     for (int k = 0; k < 400; ++k) {
       test::run(world, 1e-3, 1e-3);
       const double e = energy();
-      gained += std::max(0.0, e - last), last = e;
+      gained += std::max(0.0, e - last);
+      last = e;
       uint32_t n = 0;
       test::ok(dfm_surface_positions(ball, 0, nullptr, &n));
       std::vector<double> x(size_t(3) * n);
@@ -196,12 +217,14 @@ TEST(MeshObstacle, SpikeUnderFace_CarriesIt) {
   EXPECT_GT(b.now().com[2], 0.045);
 }
 
-// Beside an open mesh there is no inside: what hangs over its rim, or passes below it sideways, is left alone.
+// Beside an open mesh there is no inside: what hangs over its rim, or passes below it sideways,
+// is left alone.
 TEST(MeshObstacle, OpenRim_PullsNothing) {
   Block b({0, 0, 0});
-  const test::Triangles sheet = test::height_field(0.1, 1, flat);   // coarse: it would pull back from 50 mm
+  const test::Triangles sheet = test::height_field(0.1, 1, flat);  // coarse: it would pull back from 50 mm
   dfm_obstacle_def d = test::mesh_def("sheet", sheet);
-  d.pose.position[0] = 0.152, d.pose.position[2] = 0.02;   // 2 mm beside the block, above its lowest points
+  d.pose.position[0] = 0.152;
+  d.pose.position[2] = 0.02;  // 2 mm beside the block, above its lowest points
   dfm_obstacle o = 0;
   test::ok(dfm_obstacle_create(b.world, &d, &o));
   test::run(b.world, 0.05, 1e-3);

@@ -1,5 +1,6 @@
-// A stiff block slides obliquely on an incline: friction points against the velocity, not against each axis, so the path curves downhill.
-// Point mass with mu N against v; own copies of ../shared/reference/contact/tables/oblique_incline.csv, all of it where it is present.
+// A stiff block slides obliquely on an incline: friction points against the velocity, not against each axis,
+// so the path curves downhill. Point mass with mu N against v; own copies of
+// ../shared/reference/contact/tables/oblique_incline.csv, all of it where it is present.
 #include "support.h"
 #include "world.h"
 
@@ -37,7 +38,10 @@ void compare(const std::vector<Row> &rows) {
     test::Context context;
     const dfm_world world = test::make_world(context, {kG * std::sin(theta), 0, -kG * std::cos(theta)});
     test::BodyOptions o;
-    o.young = 1e6, o.damping_stiffness = 5e-4, o.velocity = {0, c.v0, 0}, o.position = {-0.05, -0.05, 2e-5};
+    o.young = 1e6;
+    o.damping_stiffness = 5e-4;
+    o.velocity = {0, c.v0, 0};
+    o.position = {-0.05, -0.05, 2e-5};
     const dfm_body body = test::make_body(context, world, "beam", {0.1, 0.1, 0.1}, 200, o);
     test::add_plane(world, "incline");
     test::set_friction(world, c.mu);
@@ -47,7 +51,8 @@ void compare(const std::vector<Row> &rows) {
       test::run(world, rows[i].t - t, 1e-3);
       t = rows[i].t;
       const dfm_body_measure m = test::measure(body);
-      const std::string where = "theta " + std::to_string(c.theta_deg) + ", mu " + std::to_string(c.mu) + ", t " + std::to_string(t);
+      const std::string where = "theta " + std::to_string(c.theta_deg) + ", mu " + std::to_string(c.mu) +
+                                ", t " + std::to_string(t);
       const double path = std::hypot(rows[i].across, rows[i].down);
       EXPECT_NEAR(m.com[1] - start.com[1], rows[i].across, 0.01 * path) << where;
       EXPECT_NEAR(m.com[0] - start.com[0], rows[i].down, 0.01 * path) << where;

@@ -1,7 +1,9 @@
-// The presliding loop of a soft sheet: heavy, on a floor that moves to and fro under it, on Dahl's bristles, against the closed form of one bristle that
-// carries the whole force. All of the sheet but its foot is held sideways and the
-// bristles are a thousandth as stiff as the lowest cells, so the loop is the contact's alone. Whatever the mesh, each contact must have bristles for
-// what it carries (contact/exchange.h), or corners with little force slip early and the loop is too thin: by 3.4 % of its peak
+// The presliding loop of a soft sheet: heavy, on a floor that moves to and fro under it, on Dahl's bristles,
+// against the closed form of one bristle that carries the whole force. All of the sheet but its foot is held
+// sideways and the
+// bristles are a thousandth as stiff as the lowest cells, so the loop is the contact's alone. Whatever the
+// mesh, each contact must have bristles for what it carries (contact/exchange.h), or corners with little
+// force slip early and the loop is too thin: by 3.4 % of its peak
 // and 2.5 % of its work with a third of the triangles each (300 cells).
 #include "world.h"
 
@@ -9,12 +11,14 @@ namespace {
 
 using namespace test;
 
-constexpr double kEdge = 0.05, kHeight = 0.02, kMass = 1000 * kEdge * kEdge * kHeight, kLimit = 2, kMu = 0.5, kStiffness = 100, kAmplitude = 0.03;
+constexpr double kEdge = 0.05, kHeight = 0.02, kMass = 1000 * kEdge * kEdge * kHeight, kLimit = 2, kMu = 0.5,
+                 kStiffness = 100, kAmplitude = 0.03;
 constexpr double kFrequency = 1;
 
 struct Loop { double work, peak; };
 
-// Rising from -A to A: dF/dx = s (1 - F/F_C), so F = F_C - (F_C + F_A) exp(-s (x + A)/F_C) and F_A = F_C tanh(s A/F_C).
+// Rising from -A to A: dF/dx = s (1 - F/F_C), so F = F_C - (F_C + F_A) exp(-s (x + A)/F_C) and F_A = F_C
+// tanh(s A/F_C).
 Loop closed_form() {
   const double peak = kLimit * std::tanh(kStiffness * kAmplitude / kLimit);
   return {4 * kLimit * (kAmplitude - peak / kStiffness), peak};
@@ -25,16 +29,25 @@ Loop measured(uint32_t cells) {
   Context context;
   const dfm_world world = make_world(context, {0, 0, -kLimit / (kMu * kMass)});
   BodyOptions o;
-  o.young = 5e5, o.poisson = 0.25, o.damping_stiffness = 1e-3, o.position = {0, 0, 1e-5};
+  o.young = 5e5;
+  o.poisson = 0.25;
+  o.damping_stiffness = 1e-3;
+  o.position = {0, 0, 1e-5};
   const dfm_body sheet = make_body(context, world, "beam", {kEdge, kEdge, kHeight}, cells, o);
   dfm_obstacle_def floor = dfm_obstacle_def_default();
-  floor.name = "floor", floor.shape = DFM_SHAPE_PLANE, floor.sine.amplitude[0] = -kAmplitude, floor.sine.frequency = kFrequency;
+  floor.name = "floor";
+  floor.shape = DFM_SHAPE_PLANE;
+  floor.sine.amplitude[0] = -kAmplitude;
+  floor.sine.frequency = kFrequency;
   dfm_obstacle plane = 0;
   ok(dfm_obstacle_create(world, &floor, &plane));
   const double mu = kMu, sigma0 = kStiffness / (kEdge * kEdge);
   const dfm_param_value values[] = {{"mu_C", &mu, 1}, {"sigma0", &sigma0, 1}};
   dfm_friction_def f{};
-  f.size = sizeof f, f.between[0] = f.between[1] = "*", f.law = "dahl", f.params = {sizeof(dfm_params), 2, values};
+  f.size = sizeof f;
+  f.between[0] = f.between[1] = "*";
+  f.law = "dahl";
+  f.params = {sizeof(dfm_params), 2, values};
   ok(dfm_world_add_friction(world, &f));
 
   dfm_body_info info{};
@@ -47,12 +60,14 @@ Loop measured(uint32_t cells) {
     if (rest[3 * i + 2] > 1e-6) above.push_back(i);
   ok(dfm_body_hold(sheet, uint32_t(above.size()), above.data(), 3));
   Loop out{0, 0};
-  run(world, 1, kStep);   // what it began with is forgotten
+  run(world, 1, kStep);  // what it began with is forgotten
   for (int i = 1001; i <= 2000; ++i) {
     ok(dfm_world_step(world, kStep, nullptr));
     double force = 0;
-    for (const dfm_contact &c : contacts(world)) force += c.ft[0] * c.tangent[0] + c.ft[1] * (c.normal[1] * c.tangent[2] - c.normal[2] * c.tangent[1]);
-    out.work += force * kAmplitude * (std::sin(kTurn * (i - 1) * kStep) - std::sin(kTurn * i * kStep)), out.peak = std::max(out.peak, std::fabs(force));
+    for (const dfm_contact &c : contacts(world))
+      force += c.ft[0] * c.tangent[0] + c.ft[1] * (c.normal[1] * c.tangent[2] - c.normal[2] * c.tangent[1]);
+    out.work += force * kAmplitude * (std::sin(kTurn * (i - 1) * kStep) - std::sin(kTurn * i * kStep));
+    out.peak = std::max(out.peak, std::fabs(force));
   }
   ok(dfm_world_destroy(world));
   out.work = std::fabs(out.work);

@@ -25,11 +25,17 @@ struct Bed {
   Vec center;
   double top;
   explicit Bed(Vec gravity = {}, double young = 5e4, uint32_t cells = 3)
-      : w(make_world(c, gravity)), bed(soft_bed(c, w, young, cells)), center(vec(measure(bed).com)), top(top_of(bed)) {}
+      : w(make_world(c, gravity)),
+        bed(soft_bed(c, w, young, cells)),
+        center(vec(measure(bed).com)),
+        top(top_of(bed)) {}
   dfm_rigid press(double mass, double gap, double velocity, double max) const {
     dfm_joint_def j = joint(DFM_JOINT_SLIDER, 0, DFM_RIGID_WORLD, {center[0], center[1], top}, {0, 0, -1});
-    j.motor = 1, j.velocity = velocity, j.max = max;
-    return create(w, {box("press", {0.2, 0.2, 0.02}, mass, {center[0], center[1], top + 0.02 + gap})}, {j})[0];
+    j.motor = 1;
+    j.velocity = velocity;
+    j.max = max;
+    return create(w, {box("press", {0.2, 0.2, 0.02}, mass, {center[0], center[1], top + 0.02 + gap})},
+                  {j})[0];
   }
 };
 
@@ -41,24 +47,30 @@ Vec contact_force(dfm_rigid r) {
 // Up, of the next `steps` steps of 1 ms.
 double mean_force(dfm_world w, dfm_rigid r, int steps) {
   double mean = 0;
-  for (int k = 0; k < steps; ++k) run(w, 1e-3, 1e-3), mean += contact_force(r)[2] / steps;
+  for (int k = 0; k < steps; ++k) {
+    run(w, 1e-3, 1e-3);
+    mean += contact_force(r)[2] / steps;
+  }
   return mean;
 }
 
 }  // namespace
 
-// Without gravity nothing but the two bodies acts: their momenta together stay what they were, linear and angular, while both change a lot.
+// Without gravity nothing but the two bodies acts: their momenta together stay what they were, linear and
+// angular, while both change a lot.
 TEST(RigidContact, Collision_KeepsBothMomenta) {
   Context c;
   const dfm_world w = make_world(c, {0, 0, 0});
   set_friction(w, 0.6);
   const dfm_body ball = soft_ball(c, w, {0, 0, 0.3}, {0.5, 0, -2});
   dfm_rigid_def d = box("plate", {0.15, 0.1, 0.03}, 2, {0.05, 0.02, 0.13});
-  d.spin[2] = 4, d.velocity[2] = 0.3;
+  d.spin[2] = 4;
+  d.velocity[2] = 0.3;
   const dfm_rigid plate = create(w, {d})[0];
   auto momenta = [&] {
     Momenta m;
-    add(m, measure(ball)), add(m, rigid_measure(plate));
+    add(m, measure(ball));
+    add(m, rigid_measure(plate));
     return m;
   };
   const Momenta start = momenta();
@@ -71,7 +83,8 @@ TEST(RigidContact, Collision_KeepsBothMomenta) {
   for (size_t k = 0; k < 3; ++k) {
     EXPECT_NEAR(end.linear[k], start.linear[k], 1e-12 * start.size);
     EXPECT_NEAR(end.angular[k], start.angular[k], 1e-12 * start.size);
-    EXPECT_NEAR(rigid_measure(plate).contact_impulse[k], -measure(ball).contact_impulse[k], 1e-12 * start.size);
+    EXPECT_NEAR(rigid_measure(plate).contact_impulse[k], -measure(ball).contact_impulse[k],
+                1e-12 * start.size);
   }
 }
 
@@ -82,7 +95,8 @@ TEST(RigidContact, BoxOnBed_IsCarriedByItsWeight) {
   for (int i = 0; i < 3; ++i) {
     const Bed on({0, 0, -9.81});
     const double mass = masses[i];
-    const dfm_rigid weight = create(on.w, {box("weight", {0.2, 0.2, 0.05}, mass, {on.center[0], on.center[1], on.top + 0.0501})})[0];
+    const dfm_rigid weight = create(
+        on.w, {box("weight", {0.2, 0.2, 0.05}, mass, {on.center[0], on.center[1], on.top + 0.0501})})[0];
     run(on.w, 1.5, 1e-3);
     EXPECT_NEAR(mean_force(on.w, weight, 200), mass * 9.81, 1e-3 * mass * 9.81);
     EXPECT_LT(norm(vec(state(weight).velocity)), 1e-4);
@@ -103,7 +117,8 @@ TEST(RigidContact, MotorPress_GivesItsForce) {
   EXPECT_NEAR(reading(press, 0).effort, 5, 1e-9);
 }
 
-// A motor with power to spare runs at its speed while contact brakes it, to rounding, and says what that takes.
+// A motor with power to spare runs at its speed while contact brakes it, to rounding, and says
+// what that takes.
 TEST(RigidContact, BrakedMotor_KeepsItsSpeed) {
   const Bed on;
   const dfm_rigid press = on.press(0.1, 5e-4, 0.02, 1e4);
@@ -113,13 +128,15 @@ TEST(RigidContact, BrakedMotor_KeepsItsSpeed) {
     const JointReading motor = reading(press, 0);
     const double force = contact_force(press)[2];
     ASSERT_NEAR(motor.rate, 0.02, 1e-12) << "step " << k;
-    ASSERT_NEAR(motor.effort, force, k ? 1e-9 * (1 + force) : 3) << "step " << k;   // the first step also brings it up to speed
+    // the first step also brings it up to speed
+    ASSERT_NEAR(motor.effort, force, k ? 1e-9 * (1 + force) : 3) << "step " << k;
     most = std::max(most, force);
   }
-  EXPECT_GT(most, 20);   // F h / m would be 0.2 m/s: ten times its speed
+  EXPECT_GT(most, 20);  // F h / m would be 0.2 m/s: ten times its speed
 }
 
-// The limit is met on the way in, and left when the speed is told anew: both within the sub-step, so that neither force nor speed is overshot.
+// The limit is met on the way in, and left when the speed is told anew: both within the sub-step, so that
+// neither force nor speed is overshot.
 TEST(RigidContact, MotorPress_ReachesItsLimitAndLeavesIt) {
   const Bed on;
   const dfm_rigid press = on.press(0.5, 1e-3, 0.05, 8);
@@ -133,21 +150,24 @@ TEST(RigidContact, MotorPress_ReachesItsLimitAndLeavesIt) {
     const bool at_limit = std::fabs(motor.effort) > 8 * (1 - 1e-9);
     limited += at_limit;
     if (!at_limit) ASSERT_NEAR(motor.rate, k < 800 ? 0.05 : -0.03, 1e-9) << "step " << k;
-    else ASSERT_LE(motor.effort > 0 ? motor.rate : -motor.rate, (k < 800 ? 0.05 : 0.03) + 1e-9) << "step " << k;   // never faster than told
+    // never faster than told
+    else
+      ASSERT_LE(motor.effort > 0 ? motor.rate : -motor.rate, (k < 800 ? 0.05 : 0.03) + 1e-9) << "step " << k;
   }
   EXPECT_GT(limited, 300);
   EXPECT_NEAR(motor.rate, -0.03, 1e-9);
 }
 
-// A heavy rigid body on a light soft one is the hard case of a sequential solve: from landing to rest, at a weight of 20 N whatever the mass.
-// Figures in doc/concepts/rigid.md.
+// A heavy rigid body on a light soft one is the hard case of a sequential solve: from landing to rest, at a
+// weight of 20 N whatever the mass. Figures in doc/concepts/rigid.md.
 TEST(RigidContact, MassRatios_Converge) {
   for (const double ratio : {1.0, 10.0, 100.0, 1000.0}) {
-    const double mass = 9 * ratio;   // of the bed's 9 kg
+    const double mass = 9 * ratio;  // of the bed's 9 kg
     const Bed on({0, 0, -20 / mass}, 1e5, 8);
     set_friction(on.w, 0.5);
     dfm_rigid_def d = box("weight", {0.12, 0.12, 0.05}, mass, {on.center[0], on.center[1], on.top + 0.051});
-    d.velocity[2] = -0.3 / std::sqrt(ratio), d.velocity[0] = 0.02 / std::sqrt(ratio);   // the same energy
+    d.velocity[2] = -0.3 / std::sqrt(ratio);
+    d.velocity[0] = 0.02 / std::sqrt(ratio);  // the same energy
     create(on.w, {d});
     double sweeps = 0;
     for (int k = 0; k < 500; ++k) {
@@ -155,8 +175,9 @@ TEST(RigidContact, MassRatios_Converge) {
       sweeps += stats(on.w).sweeps / 500.0;
     }
     const dfm_world_stats s = stats(on.w);
-    std::printf("  mass ratio %4g: sweeps per step mean %.1f, most %u; not converged %llu of %llu\n", ratio, sweeps, s.sweeps_max,
-                static_cast<unsigned long long>(s.unconverged), static_cast<unsigned long long>(s.substeps));
+    std::printf("  mass ratio %4g: sweeps per step mean %.1f, most %u; not converged %llu of %llu\n", ratio,
+                sweeps, s.sweeps_max, static_cast<unsigned long long>(s.unconverged),
+                static_cast<unsigned long long>(s.substeps));
     EXPECT_GT(s.contacts_max, 12u);
     EXPECT_LE(s.unconverged, s.substeps / 100);
   }

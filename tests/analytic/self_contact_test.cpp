@@ -1,4 +1,5 @@
-// A surface that touches itself: what it keeps, what it carries, and what it costs those who do not ask for it.
+// A surface that touches itself: what it keeps, what it carries, and what it costs those who do
+// not ask for it.
 #include <algorithm>
 #include <set>
 
@@ -16,14 +17,18 @@ State state(dfm_body b) {
   return s;
 }
 
-// How far the upper leg's tip is above the lower one's, less what their halves take of it: 0 where they lie on each other.
+// How far the upper leg's tip is above the lower one's, less what their halves take of it: 0 where they lie
+// on each other.
 double tip_gap(dfm_body b) {
   const test::Hook hook(0.01);
   const State s = state(b);
   double sum[4] = {}, n[4] = {};
   for (size_t i = 0; i < s.x.size(); i += 3) {
     const size_t level = size_t(std::lround(hook.points[i + 2] / 0.01));
-    if (hook.points[i] / 0.01 - 0.23 * double(level) > 5.5) sum[level] += s.x[i + 2], ++n[level];
+    if (hook.points[i] / 0.01 - 0.23 * double(level) > 5.5) {
+      sum[level] += s.x[i + 2];
+      ++n[level];
+    }
   }
   return sum[2] / n[2] - sum[1] / n[1];
 }
@@ -37,25 +42,31 @@ std::vector<dfm_contact> contacts(dfm_world w) {
 }
 
 struct Momenta { double linear[3], angular[3]; };
-Momenta momenta(dfm_body b) {   // angular: about the origin
+Momenta momenta(dfm_body b) {  // angular: about the origin
   const dfm_body_measure m = test::measure(b);
   Momenta out{};
   for (int k = 0; k < 3; ++k) {
     const int i = (k + 1) % 3, j = (k + 2) % 3;
-    out.linear[k] = m.momentum[k], out.angular[k] = m.angular[k] + m.com[i] * m.momentum[j] - m.com[j] * m.momentum[i];
+    out.linear[k] = m.momentum[k];
+    out.angular[k] = m.angular[k] + m.com[i] * m.momentum[j] - m.com[j] * m.momentum[i];
   }
   return out;
 }
 
 }  // namespace
 
-// Without the guard: its contacts act on places that are apart at the start of the sub-step, so they keep angular momentum to that distance only.
+// Without the guard: its contacts act on places that are apart at the start of the sub-step, so they keep
+// angular momentum to that distance only.
 TEST(SelfContact, LegsThrownTogether_KeepMomentumAndAngularMomentumToRounding) {
   const test::Context c;
   const dfm_world w = test::make_self_world(c, true, {0, 0, 0}, DFM_WORLD_UNGUARDED);
   test::set_friction(w, 0, "none");
   test::HookOptions o;
-  o.young = 2e4, o.close = 1, o.velocity = {0.3, 0.2, -0.1}, o.spin = {1, 2, 3}, o.position = {0.1, 0, 0.2};
+  o.young = 2e4;
+  o.close = 1;
+  o.velocity = {0.3, 0.2, -0.1};
+  o.spin = {1, 2, 3};
+  o.position = {0.1, 0, 0.2};
   const dfm_body b = test::make_hook(w, o);
   const Momenta before = momenta(b);
   uint32_t most = 0;
@@ -76,14 +87,18 @@ TEST(SelfContact, LegsThrownTogether_StayApartWhereItIsOnAndPassWhereItIsOff) {
   for (const bool self : {true, false}) {
     const dfm_world w = test::make_self_world(c, self);
     test::HookOptions o;
-    o.young = 2e4, o.damping_stiffness = 1e-3, o.close = 1.2, o.held = true;
+    o.young = 2e4;
+    o.damping_stiffness = 1e-3;
+    o.close = 1.2;
+    o.held = true;
     const dfm_body b = test::make_hook(w, o);
     double least = 1;
     for (int i = 0; i < 60; ++i) {
       test::run(w, 5e-4, 5e-4);
       least = std::min(least, tip_gap(b));
     }
-    // The legs tilt as they meet, so their tips' middles pass each other by a little; through each other they pass by more than their thickness.
+    // The legs tilt as they meet, so their tips' middles pass each other by a little; through each other they
+    // pass by more than their thickness.
     if (self) EXPECT_GT(least, -0.0025);
     else EXPECT_LT(least, -0.02);
   }
@@ -94,7 +109,10 @@ TEST(SelfContact, Report_SaysItselfOnBothSidesAndSumsToNothing) {
   const dfm_world w = test::make_self_world(c);
   test::set_friction(w, 0.4);
   test::HookOptions o;
-  o.young = 2e4, o.damping_stiffness = 1e-3, o.close = 1, o.pinch = 0.03;
+  o.young = 2e4;
+  o.damping_stiffness = 1e-3;
+  o.close = 1;
+  o.pinch = 0.03;
   const dfm_body b = test::make_hook(w, o);
   test::run(w, 0.04, 5e-4);
   const auto list = contacts(w);
@@ -102,9 +120,11 @@ TEST(SelfContact, Report_SaysItselfOnBothSidesAndSumsToNothing) {
   std::set<uint64_t> keys;
   double normal = 0;
   for (const dfm_contact &k : list) {
-    EXPECT_EQ(k.body_a, b); EXPECT_EQ(k.body_b, b);
+    EXPECT_EQ(k.body_a, b);
+    EXPECT_EQ(k.body_b, b);
     EXPECT_GT(k.gap, -2e-5);
-    keys.insert(k.key), normal += k.fn;
+    keys.insert(k.key);
+    normal += k.fn;
   }
   EXPECT_EQ(keys.size(), list.size());
   EXPECT_GT(normal, 0);
@@ -113,15 +133,19 @@ TEST(SelfContact, Report_SaysItselfOnBothSidesAndSumsToNothing) {
   pair.size = sizeof pair;
   test::ok(dfm_world_pairs(w, 1, &pair, &n));
   ASSERT_EQ(n, 1u);
-  EXPECT_EQ(pair.a, b); EXPECT_EQ(pair.b, b); EXPECT_EQ(pair.count, list.size());
+  EXPECT_EQ(pair.a, b);
+  EXPECT_EQ(pair.b, b);
+  EXPECT_EQ(pair.count, list.size());
   EXPECT_DOUBLE_EQ(pair.normal, normal);
   EXPECT_LE(pair.friction_work, 0);
   const double origin[3] = {0, 0, 0};
   double force[3] = {1, 1, 1}, moment[3] = {1, 1, 1};
   test::ok(dfm_world_pair_wrench(w, b, b, origin, force, moment));
   for (int k = 0; k < 3; ++k) {
-    EXPECT_EQ(pair.force[k], 0); EXPECT_EQ(pair.moment[k], 0);
-    EXPECT_EQ(force[k], 0); EXPECT_EQ(moment[k], 0);
+    EXPECT_EQ(pair.force[k], 0);
+    EXPECT_EQ(pair.moment[k], 0);
+    EXPECT_EQ(force[k], 0);
+    EXPECT_EQ(moment[k], 0);
   }
   dfm_contact_event events[256];
   test::ok(dfm_world_events(w, 256, events, &n));
@@ -134,7 +158,11 @@ TEST(SelfContact, LegsPressedTogether_DoNotCreep) {
   const dfm_world w = test::make_self_world(c);
   test::set_friction(w, 0.6);
   test::HookOptions o;
-  o.young = 2e4, o.damping_stiffness = 2e-3, o.damping_mass = 60, o.pinch = 0.05, o.held = true;
+  o.young = 2e4;
+  o.damping_stiffness = 2e-3;
+  o.damping_mass = 60;
+  o.pinch = 0.05;
+  o.held = true;
   test::make_hook(w, o);
   test::run(w, 0.8, 1e-3);
   test::ok(dfm_world_hold_begin(w));
@@ -148,15 +176,22 @@ TEST(SelfContact, LegsPressedTogether_DoNotCreep) {
 
 TEST(SelfContact, NothingTouchesAtRest_HoweverItMoves) {
   const test::Context c;
-  struct { const char *kind; std::array<double, 3> size; uint32_t cells; } const shapes[] = {
-      {"beam", {0.2, 0.04, 0.04}, 60}, {"beam", {0.2, 0.1, 0.004}, 600}, {"ball", {0.05, 0, 0}, 300}, {"ball", {0.05, 0, 0}, 3000},
-      {"cylinder", {0.02, 0.2, 0}, 400}, {"tube", {0.03, 0.045, 0.06}, 300}, {"tube", {0.043, 0.045, 0.06}, 1500}};
+  struct {
+    const char *kind;
+    std::array<double, 3> size;
+    uint32_t cells;
+  } const shapes[] = {{"beam", {0.2, 0.04, 0.04}, 60},     {"beam", {0.2, 0.1, 0.004}, 600},
+                      {"ball", {0.05, 0, 0}, 300},         {"ball", {0.05, 0, 0}, 3000},
+                      {"cylinder", {0.02, 0.2, 0}, 400},   {"tube", {0.03, 0.045, 0.06}, 300},
+                      {"tube", {0.043, 0.045, 0.06}, 1500}};
   for (const auto &s : shapes) {
     dfm_body bodies[2];
     for (const bool self : {false, true}) {
       const dfm_world w = test::make_self_world(c, self);
       test::BodyOptions o;
-      o.young = 1e4, o.velocity = {3, 2, -5}, o.spin = {4, 0, 9};
+      o.young = 1e4;
+      o.velocity = {3, 2, -5};
+      o.spin = {4, 0, 9};
       bodies[self] = test::make_body(c, w, s.kind, s.size, s.cells, o);
       test::run(w, 0.01, 5e-4);
       EXPECT_EQ(test::stats(w).contacts_max, 0u) << s.kind << " " << s.cells;
@@ -177,9 +212,12 @@ TEST(SelfContact, PlanHasItsStage_OnlyWhereAskedFor) {
     return text.substr(stages, absent - stages).find("self contact") != std::string::npos;
   };
   EXPECT_FALSE(runs(test::explain(off)));
-  EXPECT_NE(test::explain(off).find("\"self contact\",\"why\":\"not asked for"), std::string::npos) << test::explain(off);
+  EXPECT_NE(test::explain(off).find("\"self contact\",\"why\":\"not asked for"), std::string::npos)
+      << test::explain(off);
   EXPECT_TRUE(runs(test::explain(on)));
-  EXPECT_NE(test::explain(on).find("\"name\":\"self_contact\",\"asked_by\":\"contact.self\""), std::string::npos) << test::explain(on);
+  EXPECT_NE(test::explain(on).find("\"name\":\"self_contact\",\"asked_by\":\"contact.self\""),
+            std::string::npos)
+      << test::explain(on);
   test::ok(dfm_world_filter_pair(off, "hook", "hook", true));
   EXPECT_TRUE(runs(test::explain(off))) << "a rule that names the body twice asks for it";
   test::ok(dfm_world_filter_pair(on, "hook", "hook", false));
@@ -196,8 +234,12 @@ TEST(SelfContact, EffectInTheList_TurnsItOn) {
   dfm_world w = 0;
   DFM_OK_OR_DIE(dfm_world_create(c, &d, &w));
   test::make_hook(w, {});
-  EXPECT_NE(test::explain(w).find("\"name\":\"self_contact\",\"asked_by\":\"effects\",\"provided_by\":\"contact\""), std::string::npos) << test::explain(w);
-  d.effects = nullptr, d.self_contact = 3;
+  EXPECT_NE(
+      test::explain(w).find("\"name\":\"self_contact\",\"asked_by\":\"effects\",\"provided_by\":\"contact\""),
+      std::string::npos)
+      << test::explain(w);
+  d.effects = nullptr;
+  d.self_contact = 3;
   EXPECT_EQ(dfm_world_create(c, &d, &w), DFM_E_ARG);
   EXPECT_NE(std::string(dfm_last_error()).find("self_contact is 3"), std::string::npos);
 }
@@ -208,13 +250,19 @@ TEST(SelfContact, FrictionOfABodyWithItself_FollowsThePairRules) {
     const dfm_world w = test::make_self_world(c);
     test::set_friction(w, 0, "none");
     test::HookOptions o;
-    o.young = 2e4, o.damping_stiffness = 1e-3, o.pinch = 0.03, o.close = 0.5;
+    o.young = 2e4;
+    o.damping_stiffness = 1e-3;
+    o.pinch = 0.03;
+    o.close = 0.5;
     test::make_hook(w, o);
     if (rough) {
       const double mu = 0.7;
       const dfm_param_value v{"mu", &mu, 1};
       dfm_friction_def f{};
-      f.size = sizeof f, f.between[0] = f.between[1] = "hook", f.law = "coulomb", f.params = {sizeof(dfm_params), 1, &v};
+      f.size = sizeof f;
+      f.between[0] = f.between[1] = "hook";
+      f.law = "coulomb";
+      f.params = {sizeof(dfm_params), 1, &v};
       test::ok(dfm_world_add_friction(w, &f));
     }
     test::run(w, 0.05, 5e-4);
@@ -225,7 +273,8 @@ TEST(SelfContact, FrictionOfABodyWithItself_FollowsThePairRules) {
   }
 }
 
-// Surfels of both sides hang on phyxels of one body, some on the same ones: what the rows merge must still answer exactly.
+// Surfels of both sides hang on phyxels of one body, some on the same ones: what the rows merge must still
+// answer exactly.
 TEST(SelfContact, SurfaceOfItsOwn_KeepsMomentum) {
   const test::Context c;
   const dfm_world w = test::make_self_world(c);
@@ -243,7 +292,9 @@ TEST(SelfContact, SurfaceOfItsOwn_KeepsMomentum) {
   }
   const dfm_surface_def surface = fine.skin.def();
   test::HookOptions o;
-  o.young = 2e4, o.close = 1, o.surface = &surface;
+  o.young = 2e4;
+  o.close = 1;
+  o.surface = &surface;
   const dfm_body b = test::make_hook(w, o);
   const Momenta before = momenta(b);
   test::run(w, 0.03, 5e-4);

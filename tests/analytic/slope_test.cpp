@@ -1,5 +1,6 @@
-// A stiff soft block on a plane under tilted gravity. Rigid-limit answers: frictionless g sin(theta), sliding g (sin - mu cos), holds while
-// tan(theta) <= mu. Source: ../shared/reference/contact (incline_block); verification F1, F9.
+// A stiff soft block on a plane under tilted gravity. Rigid-limit answers: frictionless g sin(theta), sliding
+// g (sin - mu cos), holds while tan(theta) <= mu. Source: ../shared/reference/contact (incline_block);
+// verification F1, F9.
 #include "world.h"
 
 namespace {
@@ -12,13 +13,17 @@ struct Block {
   test::Context context;
   dfm_world world;
   dfm_body body;
-  // A block of edge 0.1 m that rests at the contact offset; its own sag is let settle before anything is measured. Its damping is above what
-  // the frictional flutter of an elastic block at the limit needs to die out (with a fifth of it the block shivers downhill at 2 mm/s at any
-  // step: physics, not the solver).
+  // A block of edge 0.1 m that rests at the contact offset; its own sag is let settle before anything is
+  // measured. Its damping is above what the frictional flutter of an elastic block at the limit needs to die
+  // out (with a fifth of it the block shivers downhill at 2 mm/s at any step: physics, not the solver).
   Block(double mu, std::array<double, 3> gravity, std::array<double, 3> velocity = {}, bool none = false) {
     world = test::make_world(context, gravity);
     test::BodyOptions o;
-    o.name = "block", o.young = 1e6, o.damping_stiffness = 1e-3, o.velocity = velocity, o.position = {-0.05, -0.05, 2e-5};
+    o.name = "block";
+    o.young = 1e6;
+    o.damping_stiffness = 1e-3;
+    o.velocity = velocity;
+    o.position = {-0.05, -0.05, 2e-5};
     body = test::make_body(context, world, "beam", {0.1, 0.1, 0.1}, 200, o);
     test::add_plane(world, "floor");
     test::set_friction(world, mu, none ? "none" : "coulomb");
@@ -110,7 +115,8 @@ TEST(Slope, EveryContact_StaysInsideTheCone) {
     uint32_t n = 0;
     ASSERT_EQ(dfm_world_contacts(b.world, 256, c, &n), DFM_OK) << dfm_last_error();
     for (uint32_t k = 0; k < n; ++k) {
-      const double ft = std::hypot(c[k].ft[0], c[k].ft[1]), power = c[k].ft[0] * c[k].slip[0] + c[k].ft[1] * c[k].slip[1];
+      const double ft = std::hypot(c[k].ft[0], c[k].ft[1]);
+      const double power = c[k].ft[0] * c[k].slip[0] + c[k].ft[1] * c[k].slip[1];
       EXPECT_GE(c[k].fn, 0);
       EXPECT_LE(ft, 0.4 * c[k].fn * (1 + 1e-6) + 1e-9);
       EXPECT_LE(power, 1e-9);
@@ -118,7 +124,8 @@ TEST(Slope, EveryContact_StaysInsideTheCone) {
   }
 }
 
-// A belt under the block pulls in every direction: the friction force has the same norm in all of them, and points along the belt.
+// A belt under the block pulls in every direction: the friction force has the same norm in all of them, and
+// points along the belt.
 TEST(Slope, SlipInAnyDirection_GivesTheSameForceNorm) {
   double least = 1e300, most = 0;
   for (int k = 0; k < 24; ++k) {
@@ -126,10 +133,14 @@ TEST(Slope, SlipInAnyDirection_GivesTheSameForceNorm) {
     test::Context context;
     const dfm_world world = test::make_world(context, {0, 0, -kG});
     test::BodyOptions o;
-    o.young = 1e6, o.damping_stiffness = 2e-4, o.position = {-0.05, -0.05, 2e-5};
+    o.young = 1e6;
+    o.damping_stiffness = 2e-4;
+    o.position = {-0.05, -0.05, 2e-5};
     const dfm_body body = test::make_body(context, world, "beam", {0.1, 0.1, 0.1}, 100, o);
     dfm_obstacle_def belt = dfm_obstacle_def_default();
-    belt.name = "belt", belt.velocity_surface[0] = 5 * std::cos(a), belt.velocity_surface[1] = 5 * std::sin(a);
+    belt.name = "belt";
+    belt.velocity_surface[0] = 5 * std::cos(a);
+    belt.velocity_surface[1] = 5 * std::sin(a);
     dfm_obstacle plane = 0;
     test::ok(dfm_obstacle_create(world, &belt, &plane));
     test::set_friction(world, 0.3);
@@ -137,9 +148,11 @@ TEST(Slope, SlipInAnyDirection_GivesTheSameForceNorm) {
     const dfm_body_measure m0 = test::measure(body);
     test::run(world, 0.1, 1e-3);
     const dfm_body_measure m1 = test::measure(body);
-    const double fx = (m1.contact_impulse[0] - m0.contact_impulse[0]) / 0.1, fy = (m1.contact_impulse[1] - m0.contact_impulse[1]) / 0.1;
+    const double fx = (m1.contact_impulse[0] - m0.contact_impulse[0]) / 0.1;
+    const double fy = (m1.contact_impulse[1] - m0.contact_impulse[1]) / 0.1;
     const double norm = std::hypot(fx, fy);
-    least = std::min(least, norm), most = std::max(most, norm);
+    least = std::min(least, norm);
+    most = std::max(most, norm);
     EXPECT_NEAR(std::atan2(fy, fx), std::atan2(std::sin(a), std::cos(a)), 0.01);
   }
   EXPECT_LT(most / least - 1, 2e-3);

@@ -1,4 +1,5 @@
-// Numbers that a step can mean nothing by are refused where they come in, with the reason; obstacles move no faster than they may.
+// Numbers that a step can mean nothing by are refused where they come in, with the reason; obstacles move no
+// faster than they may.
 #include <limits>
 
 #include "world.h"
@@ -14,7 +15,9 @@ dfm_pose at(double z) { return {{0, 0, z}, {0, 0, 0, 1}}; }
 
 dfm_obstacle box(dfm_world w, double z) {
   dfm_obstacle_def d = dfm_obstacle_def_default();
-  d.name = "jaw", d.shape = DFM_SHAPE_BOX, d.pose = at(z);
+  d.name = "jaw";
+  d.shape = DFM_SHAPE_BOX;
+  d.pose = at(z);
   for (double &h : d.half_size) h = 0.1;
   dfm_obstacle o = 0;
   test::ok(dfm_obstacle_create(w, &d, &o));
@@ -63,7 +66,8 @@ TEST(Bounds, SpeedsAboveThatOfLight_AreRefused) {
   dfm_body b = 0;
   t.def.velocity[1] = 1e200;
   refused(dfm_body_create(w, &t.def, &b), {"'tet'", "1e+200", "light"});
-  t.def.velocity[1] = 0, t.def.spin[2] = 1e200;
+  t.def.velocity[1] = 0;
+  t.def.spin[2] = 1e200;
   refused(dfm_body_create(w, &t.def, &b), {"'tet'", "light"});
   t.def.spin[2] = 0;
   test::ok(dfm_body_create(w, &t.def, &b));
@@ -74,10 +78,16 @@ TEST(Bounds, SpeedsAboveThatOfLight_AreRefused) {
   EXPECT_EQ(dfm_world_hash(w), before);
 
   dfm_rigid_def r = dfm_rigid_def_default();
-  r.name = "stone", r.shape = DFM_SHAPE_SPHERE, r.radius = 0.1, r.mass = 1, r.velocity[0] = 1e200;
+  r.name = "stone";
+  r.shape = DFM_SHAPE_SPHERE;
+  r.radius = 0.1;
+  r.mass = 1;
+  r.velocity[0] = 1e200;
   r.pose.position[2] = 5;
   dfm_rigid_set_def set{};
-  set.size = sizeof set, set.nbody = 1, set.bodies = &r;
+  set.size = sizeof set;
+  set.nbody = 1;
+  set.bodies = &r;
   dfm_rigid rigid = 0;
   refused(dfm_rigid_create(w, nullptr, &set, &rigid), {"'stone'", "light"});
   dfm_world_destroy(w);
@@ -91,7 +101,9 @@ TEST(Bounds, OffsetLargerThanATenthOfTheThinnestBody_IsRefused) {
     dfm_world w = 0;
     test::ok(dfm_world_create(c, &d, &w));
     test::BodyOptions o;
-    o.name = "block", o.position = {0, 0, 2e-4}, o.damping_stiffness = 1e-3;
+    o.name = "block";
+    o.position = {0, 0, 2e-4};
+    o.damping_stiffness = 1e-3;
     const dfm_body b = test::make_body(c, w, "beam", {0.1, 0.1, 0.05}, 100, o);
     test::add_plane(w, "floor");
     if (offset > 1e-3) {
@@ -108,7 +120,8 @@ TEST(Bounds, ObstacleToldToMoveTooFast_IsRefusedAndTeleportThrowsNothing) {
   test::Context c;
   const dfm_world w = test::make_world(c, {});
   test::BodyOptions o;
-  o.damping_stiffness = 1e-3, o.position = {0, 0, 0.5};
+  o.damping_stiffness = 1e-3;
+  o.position = {0, 0, 0.5};
   const dfm_body b = test::make_body(c, w, "beam", {0.1, 0.1, 0.1}, 100, o);
   const dfm_obstacle jaw = box(w, -0.5);
   test::run(w, 0.01, 1e-3);
@@ -117,7 +130,7 @@ TEST(Bounds, ObstacleToldToMoveTooFast_IsRefusedAndTeleportThrowsNothing) {
   const uint64_t before = dfm_world_hash(w);
   refused(dfm_world_step(w, 1e-3, nullptr), {"'jaw'", "2000 m/s", "dfm_obstacle_teleport"});
   EXPECT_EQ(dfm_world_hash(w), before);
-  test::ok(dfm_obstacle_move_to(jaw, &near));   // 100 m/s
+  test::ok(dfm_obstacle_move_to(jaw, &near));  // 100 m/s
   test::ok(dfm_world_step(w, 1e-3, nullptr));
   test::ok(dfm_obstacle_teleport(jaw, &above));
   dfm_pose now{};
@@ -143,7 +156,9 @@ TEST(Bounds, ObstacleKeysTooFast_AreRefusedWhenItIsMade) {
     test::ok(dfm_world_create(c, &wd, &w));
     const dfm_pose_key keys[] = {{0, at(0)}, {1e-3, at(2)}};
     dfm_obstacle_def d = dfm_obstacle_def_default();
-    d.name = "jaw", d.nkey = 2, d.keys = keys;
+    d.name = "jaw";
+    d.nkey = 2;
+    d.keys = keys;
     dfm_obstacle o = 0;
     if (limit == 0) refused(dfm_obstacle_create(w, &d, &o), {"'jaw'", "2000 m/s", "obstacle_speed"});
     else test::ok(dfm_obstacle_create(w, &d, &o));
@@ -155,17 +170,20 @@ TEST(Bounds, RecoverySpeed_OpensADepthThatFastAndNoFaster) {
   for (const double speed : {0.0, 0.02, 0.1}) {
     test::Context c;
     dfm_world_def d = dfm_world_def_default();
-    d.gravity[2] = 0, d.recovery_speed = speed;
+    d.gravity[2] = 0;
+    d.recovery_speed = speed;
     dfm_world w = 0;
     test::ok(dfm_world_create(c, &d, &w));
     test::BodyOptions o;
-    o.position = {0, 0, -0.01}, o.damping_stiffness = 1e-3;
+    o.position = {0, 0, -0.01};
+    o.damping_stiffness = 1e-3;
     const dfm_body b = test::make_body(c, w, "beam", {0.1, 0.1, 0.1}, 200, o);
     test::add_plane(w, "floor");
     const double start = test::measure(b).com[2];
     test::run(w, 0.1, 1e-3);
     const double mean = (test::measure(b).com[2] - start) / 0.1;
-    if (speed > 0) EXPECT_NEAR(mean, 1.25 * speed, 0.5 * speed);   // the body swings about the surface that is pushed
+    // the body swings about the surface that is pushed
+    if (speed > 0) EXPECT_NEAR(mean, 1.25 * speed, 0.5 * speed);
     else EXPECT_LT(mean, 0.018);
     test::run(w, 0.6, 1e-3);
     EXPECT_LT(test::measure(b).velocity[2], speed > 0 ? 2 * speed : 0.018);

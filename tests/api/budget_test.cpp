@@ -10,7 +10,8 @@ namespace {
 
 constexpr double kStep = 2e-3;
 
-// A stack that falls asleep, a rigid box and a law that remembers, hit by a fast block: all that a step may change is there.
+// A stack that falls asleep, a rigid box and a law that remembers, hit by a fast block: all that a step may
+// change is there.
 struct Busy {
   test::Context context;
   dfm_world world = 0;
@@ -18,36 +19,48 @@ struct Busy {
 
   explicit Busy(uint32_t threads = 1) : context(threads) {
     dfm_world_def d = dfm_world_def_default();
-    d.sleep = 1, d.sleep_time = 0.02, d.sleep_speed = 0.05;
+    d.sleep = 1;
+    d.sleep_time = 0.02;
+    d.sleep_speed = 0.05;
     test::ok(dfm_world_create(context, &d, &world));
     test::set_friction(world, 0.4, "coulomb");
     test::add_plane(world, "floor");
     test::BodyOptions o;
-    o.damping_stiffness = 1e-3, o.damping_mass = 20, o.volume = 0.5;
-    o.name = "lower", o.position = {0, 0, 1e-5};
+    o.damping_stiffness = 1e-3;
+    o.damping_mass = 20;
+    o.volume = 0.5;
+    o.name = "lower";
+    o.position = {0, 0, 1e-5};
     lower = test::make_body(context, world, "beam", {0.1, 0.1, 0.05}, 60, o);
-    o.name = "upper", o.position = {0.02, 0.02, 0.1}, o.velocity = {0, 0, -3};
+    o.name = "upper";
+    o.position = {0.02, 0.02, 0.1};
+    o.velocity = {0, 0, -3};
     upper = test::make_body(context, world, "beam", {0.05, 0.05, 0.05}, 60, o);
     test::create(world, {test::box("flyer", {0.02, 0.02, 0.02}, 0.05, {0.3, 0.3, 0.03})});
   }
-  void set_work(uint64_t units, double seconds = 0) const { test::ok(dfm_world_set_budget(world, seconds, units)); }
+  void set_work(uint64_t units, double seconds = 0) const {
+    test::ok(dfm_world_set_budget(world, seconds, units));
+  }
 };
 
 struct Seen {
   uint64_t hash, steps;
-  uint32_t events = 0;   // that wait to be read
+  uint32_t events = 0;  // that wait to be read
   std::vector<double> forces;
   std::string snapshot;
   explicit Seen(dfm_world w) : hash(dfm_world_hash(w)), steps(test::stats(w).steps) {
     for (const dfm_contact &c : test::contacts(w)) forces.push_back(c.fn);
     dfm_world_events(w, 0, nullptr, &events);
   }
-  bool operator==(const Seen &o) const { return hash == o.hash && steps == o.steps && events == o.events && forces == o.forces; }
+  bool operator==(const Seen &o) const {
+    return hash == o.hash && steps == o.steps && events == o.events && forces == o.forces;
+  }
 };
 
 }  // namespace
 
-// At every step the budget runs out somewhere else first; then the step is taken in full, and all goes on as if nothing had been tried.
+// At every step the budget runs out somewhere else first; then the step is taken in full, and all goes on as
+// if nothing had been tried.
 TEST(Budget, UsedUpAnywhereInAStep_LeavesTheStateAsBefore) {
   Busy tried, plain;
   uint64_t discarded = 0, cheapened = 0;
@@ -69,7 +82,7 @@ TEST(Budget, UsedUpAnywhereInAStep_LeavesTheStateAsBefore) {
         EXPECT_TRUE(before == Seen(tried.world)) << "step " << i << ", " << part << "/8 of its work";
         EXPECT_EQ(trouble, uint32_t(DFM_TROUBLE_BUDGET));
         EXPECT_NE(std::string(dfm_last_error()).find("max_work"), std::string::npos);
-      } else {   // without polish and with fewer sweeps it was enough
+      } else {  // without polish and with fewer sweeps it was enough
         ++cheapened;
         test::ok(dfm_world_restore(tried.world, start.data(), start.size()));
       }
@@ -82,25 +95,30 @@ TEST(Budget, UsedUpAnywhereInAStep_LeavesTheStateAsBefore) {
   const dfm_world_stats s = test::stats(tried.world);
   EXPECT_GE(s.work_max, test::stats(plain.world).work_max);
   EXPECT_GT(test::stats(plain.world).contacts_max, 4u);
-  std::printf("%g steps discarded, %g cheapened; %g units at most\n", double(discarded), double(cheapened), double(s.work_max));
+  std::printf("%g steps discarded, %g cheapened; %g units at most\n", double(discarded), double(cheapened),
+              double(s.work_max));
 }
 
-// Sheets that hit at 100 m/s: sweeps beyond the usual cap and the guard's pieces are there to be left out. Three times the speed of their waves: the energy
-// watch, which would end some of these steps, is off.
+// Sheets that hit at 100 m/s: sweeps beyond the usual cap and the guard's pieces are there to be left out.
+// Three times the speed of their waves: the energy watch, which would end some of these steps, is off.
 TEST(Budget, ThatCheapensAStep_IsToldAndIsTheSameWithAnyThreads) {
   uint64_t hash[2];
   for (const uint32_t threads : {1u, 4u}) {
     test::Context c(threads);
     const auto make = [&] {
       dfm_world_def d = dfm_world_def_default();
-      d.gravity[2] = 0, d.energy_watch = 0;
+      d.gravity[2] = 0;
+      d.energy_watch = 0;
       dfm_world w = 0;
       test::ok(dfm_world_create(c, &d, &w));
       test::set_friction(w, 0.3);
       test::BodyOptions o;
-      o.young = 1e6, o.damping_stiffness = 1e-4;
+      o.young = 1e6;
+      o.damping_stiffness = 1e-4;
       test::make_body(c, w, "beam", {0.12, 0.12, 0.012}, 30, o);
-      o.position = {0.01, -0.01, 0.03}, o.velocity = {0, 0, -100}, o.rotation = {0.1, 0.05, 0.1, 0.988};
+      o.position = {0.01, -0.01, 0.03};
+      o.velocity = {0, 0, -100};
+      o.rotation = {0.1, 0.05, 0.1, 0.988};
       test::make_body(c, w, "beam", {0.12, 0.12, 0.012}, 30, o);
       return w;
     };
@@ -143,7 +161,7 @@ TEST(Interrupt, BetweenSteps_StopsTheNextOneOnce) {
   Busy b;
   const Seen before(b.world);
   test::ok(dfm_world_interrupt(b.world));
-  test::ok(dfm_world_interrupt(b.world));   // counts once
+  test::ok(dfm_world_interrupt(b.world));  // counts once
   uint32_t trouble = 0;
   EXPECT_EQ(dfm_world_step(b.world, kStep, &trouble), DFM_DISCARD);
   EXPECT_EQ(trouble, uint32_t(DFM_TROUBLE_INTERRUPTED));
@@ -152,7 +170,8 @@ TEST(Interrupt, BetweenSteps_StopsTheNextOneOnce) {
   EXPECT_EQ(dfm_world_interrupt(0), DFM_E_HANDLE);
 }
 
-// A step of thousands of sub-steps, asked to stop from another thread: this one or, should it have been over already, the next.
+// A step of thousands of sub-steps, asked to stop from another thread: this one or, should it have been over
+// already, the next.
 TEST(Interrupt, FromAnotherThread_StopsALongStep) {
   Busy b;
   double stable = 0;

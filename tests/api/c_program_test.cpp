@@ -10,7 +10,8 @@ namespace {
 
 test::CommandResult example(const std::string &name, const std::vector<std::string> &args = {}) {
   const std::string plugins = std::string("DEFORM_PLUGIN_PATH=") + DEFORM_PLUGIN_DIR;
-  std::vector<std::string> line{"/usr/bin/env", plugins, std::string(DEFORM_BINARY_DIR) + "/bin/example_" + name};
+  std::vector<std::string> line{"/usr/bin/env", plugins,
+                                std::string(DEFORM_BINARY_DIR) + "/bin/example_" + name};
   line.insert(line.end(), args.begin(), args.end());
   return test::run(line);
 }
@@ -25,7 +26,8 @@ TEST(CProgram, Hello_PrintsBallsThatPressOnTheFloorAndOnEachOther) {
   for (std::string line; std::getline(lines, line);) {
     double newton = -1, z = -1;
     char what[32] = "";
-    ASSERT_EQ(std::sscanf(line.c_str(), "ball on %31[a-z]: %lf N at z = %lf m", what, &newton, &z), 3) << line;
+    ASSERT_EQ(std::sscanf(line.c_str(), "ball on %31[a-z]: %lf N at z = %lf m", what, &newton, &z), 3)
+        << line;
     EXPECT_GE(newton, 0);
     EXPECT_LT(newton, 200);
     const bool floor = what == std::string("floor");
@@ -51,10 +53,11 @@ TEST(CProgram, Pull_SlidesWhereCoulombSays) {
 TEST(CProgram, Surface_JoinsAndTurnsALooseCube) {
   const test::CommandResult r = example("03_surface", {test::scratch("c_program") + "/cube.obj"});
   ASSERT_EQ(r.exit_code, 0) << r.out << r.err;
-  EXPECT_EQ(r.out, "28 points were merged with another at exactly the same place\n"
-                   "4 of 12 triangles faced the wrong way and were turned\n"
-                   "8 points, 12 triangles, closed, 0.001 m3\n"
-                   "read again: 8 points, closed, nothing to repair: yes\n");
+  EXPECT_EQ(r.out,
+            "28 points were merged with another at exactly the same place\n"
+            "4 of 12 triangles faced the wrong way and were turned\n"
+            "8 points, 12 triangles, closed, 0.001 m3\n"
+            "read again: 8 points, closed, nothing to repair: yes\n");
 }
 
 TEST(CProgram, RigidHost_IsCarriedByTheBall) {
@@ -70,7 +73,8 @@ TEST(CppProgram, Cpp_TellsOfTheMissingLawAndOfTheBalls) {
   ASSERT_EQ(r.exit_code, 0) << r.out << r.err;
   unsigned contacts = 0;
   double newton = 0, z = 0;
-  const char *const form = "no such law: DFM_E_UNSUPPORTED\n%u contacts, %lf N between the balls, lower at %lf m";
+  const char *const form =
+      "no such law: DFM_E_UNSUPPORTED\n%u contacts, %lf N between the balls, lower at %lf m";
   ASSERT_EQ(std::sscanf(r.out.c_str(), form, &contacts, &newton, &z), 3) << r.out;
   EXPECT_GT(contacts, 3u);
   EXPECT_GT(newton, 0);

@@ -16,7 +16,8 @@ std::string header() {
   std::string text = "id,kind";
   for (int end = 0; end < 2; ++end)
     for (int p = 0; p < 4; ++p)
-      for (const char *axis : {"x", "y", "z"}) text += ",p" + std::to_string(p) + "_t" + std::to_string(end) + "_" + axis;
+      for (const char *axis : {"x", "y", "z"})
+        text += ",p" + std::to_string(p) + "_t" + std::to_string(end) + "_" + axis;
   return text + "\n";
 }
 // A point that falls on a triangle at t = 0.25, an edge that crosses one at 0.5, a miss.
@@ -34,7 +35,8 @@ void expect_refused(const std::vector<std::string> &args, const std::vector<std:
   const test::CommandResult r = test::deform(args);
   EXPECT_EQ(r.exit_code, 2) << r.out;
   EXPECT_EQ(std::count(r.err.begin(), r.err.end(), '\n'), 1) << r.err;
-  for (const std::string &word : words) EXPECT_NE(r.err.find(word), std::string::npos) << "no '" << word << "' in: " << r.err;
+  for (const std::string &word : words)
+    EXPECT_NE(r.err.find(word), std::string::npos) << "no '" << word << "' in: " << r.err;
 }
 
 }  // namespace
@@ -65,12 +67,16 @@ TEST(CcdCommand, EveryRoot_WritesOneRowPerQuery) {
 TEST(CcdCommand, Summary_CountsAndComparesWithLabels) {
   std::string text = header();
   text.insert(text.find('\n'), ",hit,toi_hi");
-  const auto labeled = [](std::string row, const std::string &label) { return row.substr(0, row.find_first_of("\r\n")) + label + "\n"; };
+  const auto labeled = [](std::string row, const std::string &label) {
+    return row.substr(0, row.find_first_of("\r\n")) + label + "\n";
+  };
   // The exact time of the second is said to be earlier than it is, the third is said to touch.
   text += labeled(kFalls, ",1,0.25") + labeled(kCrosses, ",1,0.25") + labeled(kMisses, ",1,0.5");
-  const test::CommandResult table = test::deform({"ccd", file("labeled.csv", text)}), json = test::deform({"ccd", folder() + "/labeled.csv", "--json"});
+  const test::CommandResult table = test::deform({"ccd", file("labeled.csv", text)});
+  const test::CommandResult json = test::deform({"ccd", folder() + "/labeled.csv", "--json"});
   ASSERT_EQ(table.exit_code, 0) << table.err;
-  for (const char *word : {"conservative", "3 (2 point-triangle, 1 edge-edge)", "missed 1", "false alarms 0", "late 1"})
+  for (const char *word :
+       {"conservative", "3 (2 point-triangle, 1 edge-edge)", "missed 1", "false alarms 0", "late 1"})
     EXPECT_NE(table.out.find(word), std::string::npos) << word << " in " << table.out;
   for (const char *word : {"\"queries\": 3", "\"hits\": 2", "\"missed\": 1", "\"false\": 0", "\"late\": 1"})
     EXPECT_NE(json.out.find(word), std::string::npos) << word << " in " << json.out;
@@ -104,7 +110,8 @@ TEST(CcdCommand, BadFiles_AreRefusedWithTheirLine) {
 
 TEST(CcdCommand, ReferenceQueries_NoneMissedNoneLate) {
   if (test::shared_dir().empty()) GTEST_SKIP() << "../shared is absent";
-  const test::CommandResult r = test::deform({"ccd", test::shared_dir() + "/reference/ccd/queries.csv", "--json"});
+  const test::CommandResult r =
+      test::deform({"ccd", test::shared_dir() + "/reference/ccd/queries.csv", "--json"});
   ASSERT_EQ(r.exit_code, 0) << r.err;
   EXPECT_NE(r.out.find("\"missed\": 0"), std::string::npos) << r.out;
   EXPECT_NE(r.out.find("\"late\": 0"), std::string::npos) << r.out;

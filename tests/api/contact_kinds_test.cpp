@@ -29,7 +29,8 @@ struct Surface {
   std::vector<uint32_t> triangles;
   std::vector<std::pair<uint32_t, uint32_t>> edges;
   explicit Surface(dfm_body body)
-      : at(test::listed(dfm_surface_positions, body, 3)), triangles(test::listed(dfm_surface_triangles, body, 3)) {
+      : at(test::listed(dfm_surface_positions, body, 3)),
+        triangles(test::listed(dfm_surface_triangles, body, 3)) {
     std::set<std::pair<uint32_t, uint32_t>> all;
     for (size_t t = 0; t < triangles.size(); t += 3)
       for (size_t k = 0; k < 3; ++k) all.insert(std::minmax(triangles[t + k], triangles[t + (k + 1) % 3]));
@@ -46,7 +47,7 @@ struct Surface {
       if (feature >= triangles.size() / 3) return INFINITY;
       const uint32_t *const t = &triangles[3 * size_t{feature}];
       double least = INFINITY;
-      for (int i = 0; i <= 20; ++i) {   // lines from one corner to points of the opposite side
+      for (int i = 0; i <= 20; ++i) {  // lines from one corner to points of the opposite side
         Point end{};
         const double u = i / 20.0;
         for (size_t k = 0; k < 3; ++k) end[k] = (1 - u) * point(t[1])[k] + u * point(t[2])[k];
@@ -54,7 +55,8 @@ struct Surface {
       }
       return least;
     }
-    return feature < at.size() / 3 ? distance_to_segment(p, point(feature), {p[0] + 1e-9, p[1], p[2]}) : INFINITY;
+    return feature < at.size() / 3 ? distance_to_segment(p, point(feature), {p[0] + 1e-9, p[1], p[2]})
+                                   : INFINITY;
   }
 };
 
@@ -62,8 +64,10 @@ void check_features(dfm_world w) {
   for (const dfm_contact &c : test::contacts(w)) {
     const Surface a(c.body_a);
     const Point p{c.point[0], c.point[1], c.point[2]};
-    EXPECT_LT(a.distance(c.flags, c.feature_a, p), 2e-3) << "kind " << c.kind << ", flags " << c.flags << ", feature " << c.feature_a;
-    EXPECT_EQ(c.kind == DFM_CONTACT_EDGE_EDGE, (c.flags & DFM_CONTACT_EDGE_A) && c.body_b != 0 && c.kind != DFM_CONTACT_PRIMITIVE);
+    EXPECT_LT(a.distance(c.flags, c.feature_a, p), 2e-3)
+        << "kind " << c.kind << ", flags " << c.flags << ", feature " << c.feature_a;
+    EXPECT_EQ(c.kind == DFM_CONTACT_EDGE_EDGE,
+              (c.flags & DFM_CONTACT_EDGE_A) && c.body_b != 0 && c.kind != DFM_CONTACT_PRIMITIVE);
   }
 }
 
@@ -112,7 +116,9 @@ TEST(ContactKinds, OfASharpObstacle_NameTheTriangleThatItPointsAt) {
   test::Context c;
   const dfm_world w = test::make_world(c);
   test::BodyOptions o;
-  o.name = "block", o.young = 2e5, o.damping_stiffness = 1e-3;
+  o.name = "block";
+  o.young = 2e5;
+  o.damping_stiffness = 1e-3;
   o.position = {0, 0, 1e-4};
   test::make_body(c, w, "beam", {0.1, 0.1, 0.03}, 40, o);
   const double tip[2] = {0.048, 0.052};

@@ -1,4 +1,5 @@
-// What a step reports: contacts, pairs, events, surface forces; each against the momentum that the bodies really exchanged.
+// What a step reports: contacts, pairs, events, surface forces; each against the momentum that the bodies
+// really exchanged.
 #include <map>
 
 #include "stack.h"
@@ -15,7 +16,8 @@ Vec momentum(dfm_body b) {
 Vec operator-(Vec a, Vec b) { return {a[0] - b[0], a[1] - b[1], a[2] - b[2]}; }
 Vec operator+(Vec a, Vec b) { return {a[0] + b[0], a[1] + b[1], a[2] + b[2]}; }
 void near(Vec a, Vec b, double tolerance, const char *what) {
-  for (int k = 0; k < 3; ++k) EXPECT_NEAR(a[size_t(k)], b[size_t(k)], tolerance) << what << ", component " << k;
+  for (int k = 0; k < 3; ++k)
+    EXPECT_NEAR(a[size_t(k)], b[size_t(k)], tolerance) << what << ", component " << k;
 }
 
 // World-frame force on side a of a contact.
@@ -36,10 +38,18 @@ struct Impact {
     world = test::make_world(context, {0, 0, 0});
     test::set_friction(world, 0.4);
     test::BodyOptions o;
-    o.young = 5e4, o.damping_stiffness = 2e-4;
-    o.name = "left", o.position = {-0.0503, 0, 0}, o.velocity = {0.4, 0, 0.1}, o.spin = {0, 10, 5};
+    o.young = 5e4;
+    o.damping_stiffness = 2e-4;
+    o.name = "left";
+    o.position = {-0.0503, 0, 0};
+    o.velocity = {0.4, 0, 0.1};
+    o.spin = {0, 10, 5};
     left = test::make_body(context, world, "ball", {0.05, 0, 0}, 200, o);
-    o.name = "right", o.position = {0.0503, 0.02, 0.005}, o.velocity = {-0.3, 0.05, 0}, o.spin = {2, 0, -8}, o.density = 700;
+    o.name = "right";
+    o.position = {0.0503, 0.02, 0.005};
+    o.velocity = {-0.3, 0.05, 0};
+    o.spin = {2, 0, -8};
+    o.density = 700;
     right = test::make_body(context, world, "ball", {0.05, 0, 0}, 200, o);
   }
   // A step of one sub-step, so that what is reported of the last sub-step is what the step did.
@@ -76,12 +86,14 @@ TEST(Report, OfAFreeImpact_IsTheMomentumThatWasExchanged) {
     uint32_t sticking = 0;
     double normal = 0;
     const auto contacts = test::contacts(s.world);
-    for (size_t k = 1; k < contacts.size(); ++k) EXPECT_LT(contacts[k - 1].key, contacts[k].key) << "in key order";
+    for (size_t k = 1; k < contacts.size(); ++k)
+      EXPECT_LT(contacts[k - 1].key, contacts[k].key) << "in key order";
     for (const dfm_contact &c : contacts) {
       ASSERT_TRUE((c.body_a == s.left && c.body_b == s.right) || (c.body_a == s.right && c.body_b == s.left));
       const Vec f = force(c);
       for (size_t k = 0; k < 3; ++k) sum[k] += (c.body_a == s.left ? h : -h) * f[k];
-      sticking += (c.flags & DFM_CONTACT_STICKING) != 0, normal += c.fn;
+      sticking += (c.flags & DFM_CONTACT_STICKING) != 0;
+      normal += c.fn;
       EXPECT_GE(c.fn, 0);
       EXPECT_LE(std::hypot(c.ft[0], c.ft[1]), 0.4 * c.fn * (1 + 1e-9) + 1e-12) << "inside Coulomb's cone";
       EXPECT_LT(c.kind, 2u);
@@ -110,7 +122,8 @@ TEST(Report, OfAFreeImpact_IsTheMomentumThatWasExchanged) {
         for (size_t k = 0; k < 3; ++k) total[k] += h * f[3 * j + k];
       near(total, change, 1e-12 * scale, "forces on surfels");
     }
-    touching += p.count > 0, largest = std::max(largest, p.normal);
+    touching += p.count > 0;
+    largest = std::max(largest, p.normal);
   }
   EXPECT_GT(touching, 5);
   EXPECT_GT(largest, 0.1);
@@ -126,7 +139,8 @@ TEST(Events, BeginAndEndOfEachContact_AlternateAndBalance) {
     ASSERT_EQ(dfm_world_step(s.world, s.dt(), nullptr), DFM_OK) << dfm_last_error();
     for (const dfm_contact_event &e : test::events(s.world)) {
       ASSERT_TRUE(e.kind == DFM_EVENT_BEGIN || e.kind == DFM_EVENT_END);
-      EXPECT_EQ(open[e.key], e.kind == DFM_EVENT_END) << "a contact begins when it is not there and ends when it is";
+      EXPECT_EQ(open[e.key], e.kind == DFM_EVENT_END)
+          << "a contact begins when it is not there and ends when it is";
       open[e.key] = e.kind == DFM_EVENT_BEGIN;
       (e.kind == DFM_EVENT_BEGIN ? begins : ends) += 1;
       EXPECT_TRUE((e.a == s.left && e.b == s.right) || (e.a == s.right && e.b == s.left));
@@ -168,7 +182,9 @@ TEST(Report, OfABodyAtRest_CarriesItsWeight) {
     ASSERT_EQ(dfm_world_step(s.world, 1e-3, nullptr), DFM_OK);
     const auto pairs = test::pairs(s.world);
     ASSERT_EQ(pairs.size(), 2u);
-    EXPECT_TRUE(pairs[0].a == s.lower && pairs[0].b == s.floor && pairs[1].a == s.lower && pairs[1].b == s.upper) << "in order of creation";
+    EXPECT_TRUE(pairs[0].a == s.lower && pairs[0].b == s.floor && pairs[1].a == s.lower &&
+                pairs[1].b == s.upper)
+        << "in order of creation";
     for (const auto &p : pairs) {
       (p.b == s.floor ? floor_force : between) += p.force[2] / 500;
       if (p.b == s.floor) moment += std::hypot(p.moment[0], p.moment[1]) / 500;
@@ -177,6 +193,8 @@ TEST(Report, OfABodyAtRest_CarriesItsWeight) {
   const double weight = test::measure(s.upper).mass * 9.81;
   EXPECT_NEAR(floor_force, 2 * weight, 0.01 * weight);
   EXPECT_NEAR(between, -weight, 0.01 * weight) << "the upper one presses the lower one down";
-  EXPECT_NEAR((test::measure(s.lower).contact_impulse[2] - before) / 0.5, weight, 0.01 * weight) << "net: carries itself";
-  EXPECT_NEAR(moment, weight * std::hypot(0.013, 0.007), 0.1 * weight * 0.015) << "the upper one stands off center";
+  EXPECT_NEAR((test::measure(s.lower).contact_impulse[2] - before) / 0.5, weight, 0.01 * weight)
+      << "net: carries itself";
+  EXPECT_NEAR(moment, weight * std::hypot(0.013, 0.007), 0.1 * weight * 0.015)
+      << "the upper one stands off center";
 }

@@ -21,13 +21,19 @@ struct Block {
     info.size = sizeof info;
     test::ok(dfm_tetmesh_get_info(mesh, &info));
     test::ok(dfm_tetmesh_data(mesh, &def.points, &def.tets, nullptr));
-    def.name = "block", def.npoint = info.npoint, def.ntet = info.ntet;
+    def.name = "block";
+    def.npoint = info.npoint;
+    def.ntet = info.ntet;
     def.pose.position[2] = 0.02;
   }
 
   dfm_material material(const char *name, double density, double young, double poisson = 0.3) {
     dfm_material_def d = dfm_material_def_default();
-    d.name = name, d.density = density, d.young = young, d.poisson = poisson, d.damping_stiffness = 1e-3;
+    d.name = name;
+    d.density = density;
+    d.young = young;
+    d.poisson = poisson;
+    d.damping_stiffness = 1e-3;
     dfm_material m = 0;
     test::ok(dfm_material_create(world, &d, &m));
     return m;
@@ -50,9 +56,12 @@ struct Block {
     const uint32_t *c = def.tets + size_t(4) * t;
     double e[3][3];
     for (int i = 0; i < 3; ++i)
-      for (int k = 0; k < 3; ++k) e[i][k] = def.points[size_t(3) * c[i + 1] + size_t(k)] - def.points[size_t(3) * c[0] + size_t(k)];
-    return (e[0][0] * (e[1][1] * e[2][2] - e[1][2] * e[2][1]) - e[0][1] * (e[1][0] * e[2][2] - e[1][2] * e[2][0]) +
-            e[0][2] * (e[1][0] * e[2][1] - e[1][1] * e[2][0])) / 6;
+      for (int k = 0; k < 3; ++k)
+        e[i][k] = def.points[size_t(3) * c[i + 1] + size_t(k)] - def.points[size_t(3) * c[0] + size_t(k)];
+    return (e[0][0] * (e[1][1] * e[2][2] - e[1][2] * e[2][1]) -
+            e[0][1] * (e[1][0] * e[2][2] - e[1][2] * e[2][0]) +
+            e[0][2] * (e[1][0] * e[2][1] - e[1][1] * e[2][0])) /
+           6;
   }
   double center_z(uint32_t t) const {
     double z = 0;
@@ -69,14 +78,18 @@ std::vector<T> halves(const Block &b, T lower, T upper) {
   return out;
 }
 
-uint64_t hash_with(const std::function<void(Block &, std::vector<double> &, std::vector<dfm_material> &)> &prepare) {
+uint64_t hash_with(
+    const std::function<void(Block &, std::vector<double> &, std::vector<dfm_material> &)> &prepare) {
   Block b;
   std::vector<double> values;
   std::vector<dfm_material> materials;
   dfm_cell_field field{"young", nullptr, 1};
   prepare(b, values, materials);
   field.values = values.data();
-  if (!values.empty()) b.def.nfield = 1, b.def.fields = &field;
+  if (!values.empty()) {
+    b.def.nfield = 1;
+    b.def.fields = &field;
+  }
   if (!materials.empty()) b.def.cell_materials = materials.data();
   return b.hash_after_run();
 }
@@ -85,14 +98,17 @@ void expect_refused(Block &b, dfm_status status, const std::vector<std::string> 
   dfm_body body = 77;
   EXPECT_EQ(dfm_body_create(b.world, &b.def, &body), status);
   EXPECT_EQ(body, 77u);
-  for (const std::string &part : parts) EXPECT_NE(std::string(dfm_last_error()).find(part), std::string::npos) << part << " in: " << dfm_last_error();
+  for (const std::string &part : parts)
+    EXPECT_NE(std::string(dfm_last_error()).find(part), std::string::npos)
+        << part << " in: " << dfm_last_error();
 }
 
 }  // namespace
 
 TEST(Fields, SameValueInEveryCell_IsTheParameterToTheBit) {
   // A power of two, so that E * sum V and sum (E V) round alike.
-  const uint64_t one = hash_with([](Block &b, auto &, auto &) { b.def.material = b.material("gel", 1000, 32768); });
+  const uint64_t one =
+      hash_with([](Block &b, auto &, auto &) { b.def.material = b.material("gel", 1000, 32768); });
   auto field = [](double first) {
     return hash_with([=](Block &b, auto &values, auto &) {
       b.def.material = b.material("gel", 1000, 1e4);  // the field wins
@@ -123,8 +139,10 @@ TEST(Fields, MaterialsThatDiffer_AreTheFieldOfTheirValues) {
 }
 
 TEST(Fields, OneMaterialForAllCells_IsTheBodysMaterial) {
-  const uint64_t whole = hash_with([](Block &b, auto &, auto &) { b.def.material = b.material("gel", 1500, 4e4); });
-  const uint64_t by_cell = hash_with([](Block &b, auto &, auto &materials) { materials.assign(b.info.ntet, b.material("gel", 1500, 4e4)); });
+  const uint64_t whole =
+      hash_with([](Block &b, auto &, auto &) { b.def.material = b.material("gel", 1500, 4e4); });
+  const uint64_t by_cell = hash_with(
+      [](Block &b, auto &, auto &materials) { materials.assign(b.info.ntet, b.material("gel", 1500, 4e4)); });
   const uint64_t none = hash_with([](Block &b, auto &, auto &materials) {
     b.def.material = b.material("gel", 1500, 4e4);
     materials.assign(b.info.ntet, 0);
@@ -135,13 +153,16 @@ TEST(Fields, OneMaterialForAllCells_IsTheBodysMaterial) {
 
 TEST(Fields, DensityByCell_IsLumpedAndMovesTheCentre) {
   Block b;
-  const std::vector<dfm_material> materials = halves<dfm_material>(b, b.material("light", 500, 1e5), b.material("heavy", 2000, 1e5));
+  const std::vector<dfm_material> materials =
+      halves<dfm_material>(b, b.material("light", 500, 1e5), b.material("heavy", 2000, 1e5));
   b.def.cell_materials = materials.data();
   const dfm_body_measure m = test::measure(b.create());
   double mass = 0, moment = 0, volume = 0;
   for (uint32_t t = 0; t < b.info.ntet; ++t) {
     const double part = b.volume(t) * (b.center_z(t) > 0.05 ? 2000 : 500);
-    mass += part, moment += part * b.center_z(t), volume += b.volume(t);
+    mass += part;
+    moment += part * b.center_z(t);
+    volume += b.volume(t);
   }
   EXPECT_NEAR(m.mass, mass, 1e-13);
   EXPECT_NEAR(m.rest_volume, volume, 1e-16);
@@ -159,7 +180,8 @@ TEST(Share, HalfOfEveryCell_MovesAsHalfTheDensityAndStiffness) {
   EXPECT_NEAR(test::measure(b).rest_volume, 0.5e-3, 1e-16);
   EXPECT_NEAR(test::measure(b).mass, 0.5, 1e-13);
   EXPECT_NEAR(test::measure(b).volume, 0.5e-3, 1e-16) << "the part of the cells that is material";
-  test::run(full.world, 0.05, 1e-3), test::run(half.world, 0.05, 1e-3);
+  test::run(full.world, 0.05, 1e-3);
+  test::run(half.world, 0.05, 1e-3);
   std::vector<double> xa(3 * full.info.npoint), xb(xa);
   uint32_t n = 0;
   test::ok(dfm_body_get_state(a, full.info.npoint, xa.data(), nullptr, &n));
@@ -174,7 +196,10 @@ TEST(Share, ScalesAFieldAndMaterialsToo) {
     b.def.cell_share = share.data();
     materials = halves<dfm_material>(b, b.material("soft", 1000, 2e4), b.material("stiff", 4000, 8e4));
   });
-  const uint64_t plain = hash_with([](Block &b, auto &values, auto &) { b.def.material = b.material("gel", 1000, 9e4), values.assign(b.info.ntet, 2e4); });
+  const uint64_t plain = hash_with([](Block &b, auto &values, auto &) {
+    b.def.material = b.material("gel", 1000, 9e4);
+    values.assign(b.info.ntet, 2e4);
+  });
   EXPECT_EQ(shared, plain);
 }
 
@@ -182,7 +207,8 @@ TEST(Fields, WrongOnes_AreRefused) {
   Block b;
   std::vector<double> values(3 * size_t(b.info.ntet), 1e4);
   dfm_cell_field f[2] = {{"yuong", values.data(), 1}, {"young", values.data(), 1}};
-  b.def.nfield = 1, b.def.fields = f;
+  b.def.nfield = 1;
+  b.def.fields = f;
   expect_refused(b, DFM_E_ARG, {"'block'", "'yuong'", "did you mean 'young'"});
   f[0].key = "relaxation_time";
   expect_refused(b, DFM_E_ARG, {"relaxation_time", "whole body", "young"});
@@ -194,7 +220,8 @@ TEST(Fields, WrongOnes_AreRefused) {
   expect_refused(b, DFM_E_ARG, {"field 0 has no key"});
   b.def.fields = nullptr;
   expect_refused(b, DFM_E_ARG, {"1 fields are announced"});
-  b.def.fields = f, b.def.nfield = 2;
+  b.def.fields = f;
+  b.def.nfield = 2;
   f[0] = {"young", values.data(), 1};
   expect_refused(b, DFM_E_ARG, {"given twice"});
   b.def.nfield = 1;
@@ -227,11 +254,14 @@ TEST(CellMaterials, WrongOnes_AreRefused) {
   expect_refused(b, DFM_E_HANDLE, {"'far'", "another world"});
   materials[11] = 12345;
   expect_refused(b, DFM_E_HANDLE, {});
-  // What the model takes for the whole body cannot differ, unless the body says it itself. relaxation_time is such a row of msm.
+  // What the model takes for the whole body cannot differ, unless the body says it itself. relaxation_time is
+  // such a row of msm.
   dfm_material_def d = dfm_material_def_default();
   const double slow = 3, time = 0.2;
   const dfm_param_value extra{"relaxation_time", &slow, 1}, given{"relaxation_time", &time, 1};
-  d.name = "slow", d.young = 1e4, d.extra = {sizeof(dfm_params), 1, &extra};
+  d.name = "slow";
+  d.young = 1e4;
+  d.extra = {sizeof(dfm_params), 1, &extra};
   test::ok(dfm_material_create(b.world, &d, &materials[11]));
   expect_refused(b, DFM_E_ARG, {"'relaxation_time'", "'gel'", "'slow'", "differ"});
   b.def.model_params = {sizeof(dfm_params), 1, &given};
@@ -243,13 +273,15 @@ TEST(Fields, ParametersWhileRunning_LeaveTheFieldAlone) {
   b.def.material = b.material("gel", 1000, 1e4);
   const std::vector<double> values = halves<double>(b, 2e4, 8e4);
   const dfm_cell_field f{"young", values.data(), 1};
-  b.def.nfield = 1, b.def.fields = &f;
+  b.def.nfield = 1;
+  b.def.fields = &f;
   const dfm_body body = b.create();
   const double young = 5e4, drag = 2;
   dfm_param_value v{"young", &young, 1};
   const dfm_params p{sizeof(dfm_params), 1, &v};
   EXPECT_EQ(dfm_body_set_params(body, &p), DFM_E_ARG);
-  EXPECT_NE(std::string(dfm_last_error()).find("'young' differs by cell (from field)"), std::string::npos) << dfm_last_error();
+  EXPECT_NE(std::string(dfm_last_error()).find("'young' differs by cell (from field)"), std::string::npos)
+      << dfm_last_error();
   v = {"damping_mass", &drag, 1};
   DFM_OK_OR_DIE(dfm_body_set_params(body, &p));
 }
@@ -259,16 +291,20 @@ TEST(Fields, Snapshot_NeedsTheSameFields) {
     b.def.material = b.material("gel", 1000, 1e4);
     const std::vector<double> values = halves<double>(b, 2e4, upper);
     const dfm_cell_field f{"young", values.data(), 1};
-    b.def.nfield = 1, b.def.fields = &f;
+    b.def.nfield = 1;
+    b.def.fields = &f;
     b.create();
   };
   Block a, same, other;
-  make(a, 8e4), make(same, 8e4), make(other, 9e4);
+  make(a, 8e4);
+  make(same, 8e4);
+  make(other, 9e4);
   test::run(a.world, 0.05, 1e-3);
   const std::string data = test::snapshot(a.world);
   EXPECT_EQ(dfm_world_restore(other.world, data.data(), data.size()), DFM_E_FORMAT);
   EXPECT_NE(std::string(dfm_last_error()).find("fields"), std::string::npos);
   DFM_OK_OR_DIE(dfm_world_restore(same.world, data.data(), data.size()));
-  test::run(a.world, 0.05, 1e-3), test::run(same.world, 0.05, 1e-3);
+  test::run(a.world, 0.05, 1e-3);
+  test::run(same.world, 0.05, 1e-3);
   EXPECT_EQ(dfm_world_hash(a.world), dfm_world_hash(same.world));
 }

@@ -62,14 +62,18 @@ TEST(TetmeshFill, WrongArguments_AreRefusedWithASentence) {
 }
 
 TEST(MeshFillCommand, Surface_BecomesAFileOfCells) {
-  const std::string folder = test::scratch("fill_command"), data = std::string(DEFORM_SOURCE_DIR) + "/examples/data/";
-  const test::CommandResult made = test::deform({"mesh", "fill", data + "organ.obj", "--out", folder + "/organ.vtu", "--cells", "1000", "--json"});
+  const std::string folder = test::scratch("fill_command");
+  const std::string data = std::string(DEFORM_SOURCE_DIR) + "/examples/data/";
+  const test::CommandResult made = test::deform(
+      {"mesh", "fill", data + "organ.obj", "--out", folder + "/organ.vtu", "--cells", "1000", "--json"});
   ASSERT_EQ(made.exit_code, 0) << made.err;
-  for (const char *key : {"\"cells\": ", "\"points\": ", "\"enclosed_volume\": ", "\"mean_share\": ", "\"seconds\": ", "\"warnings\": []"})
+  for (const char *key : {"\"cells\": ", "\"points\": ", "\"enclosed_volume\": ", "\"mean_share\": ",
+                          "\"seconds\": ", "\"warnings\": []"})
     EXPECT_NE(made.out.find(key), std::string::npos) << key << "\n" << made.out;
   const test::CommandResult info = test::deform({"mesh", "info", folder + "/organ.vtu"});
   EXPECT_EQ(info.exit_code, 0) << info.err;
-  const test::CommandResult table = test::deform({"mesh", "fill", data + "rabbit.obj", "--out", folder + "/rabbit.vtk", "--cells", "500"});
+  const test::CommandResult table =
+      test::deform({"mesh", "fill", data + "rabbit.obj", "--out", folder + "/rabbit.vtk", "--cells", "500"});
   EXPECT_NE(table.out.find("the surface is clean"), std::string::npos) << table.out;
 }
 
@@ -92,8 +96,11 @@ struct FromFile {
 
 // What is filled here and loaded there weighs the same, or the loss is told.
 TEST(MeshFillCommand, Shares_SurviveInVtkAndVtu_AndTheirLossIsTold) {
-  const std::string folder = test::scratch("fill_command_shares"), organ = std::string(DEFORM_SOURCE_DIR) + "/examples/data/organ.obj";
-  const auto fill = [&](const std::string &name) { return test::deform({"mesh", "fill", organ, "--out", folder + "/" + name, "--cells", "600"}); };
+  const std::string folder = test::scratch("fill_command_shares");
+  const std::string organ = std::string(DEFORM_SOURCE_DIR) + "/examples/data/organ.obj";
+  const auto fill = [&](const std::string &name) {
+    return test::deform({"mesh", "fill", organ, "--out", folder + "/" + name, "--cells", "600"});
+  };
   EXPECT_EQ(fill("a.vtu").out.find("not kept"), std::string::npos);
   fill("b.vtk");
   const FromFile vtu(folder + "/a.vtu"), vtk(folder + "/b.vtk");
@@ -108,7 +115,8 @@ TEST(MeshFillCommand, Shares_SurviveInVtkAndVtu_AndTheirLossIsTold) {
   EXPECT_LT(mean, 0.8);
   for (const char *name : {"c.msh", "c.msh2", "c.mesh"}) {
     EXPECT_NE(fill(name).out.find("warning: not kept: shares of material"), std::string::npos) << name;
-    const test::CommandResult converted = test::deform({"mesh", "convert", folder + "/a.vtu", folder + "/" + name});
+    const test::CommandResult converted =
+        test::deform({"mesh", "convert", folder + "/a.vtu", folder + "/" + name});
     EXPECT_NE(converted.err.find("not kept: shares of material"), std::string::npos) << name << converted.err;
     EXPECT_EQ(FromFile(folder + "/" + name).share, nullptr);
   }
@@ -116,13 +124,16 @@ TEST(MeshFillCommand, Shares_SurviveInVtkAndVtu_AndTheirLossIsTold) {
 
 TEST(MeshFillCommand, ArrayThatIsNoShare_IsLeftAlone) {
   const std::string file = test::scratch("fill_command_foreign") + "/a.vtk";
-  const std::string mesh = "# vtk DataFile Version 3.0\nt\nASCII\nDATASET UNSTRUCTURED_GRID\nPOINTS 5 double\n0 0 0 1 0 0 0 1 0 0 0 1 1 1 1\n"
-                           "CELLS 4 19\n4 0 1 2 3\n3 0 2 1\n4 0 1 2 3\n4 1 2 3 4\nCELL_TYPES 4\n10 5 10 10\nCELL_DATA 4\n";
-  for (const auto &[array, counts] : {std::pair("SCALARS share double 1\nLOOKUP_TABLE default\n0.5 1 0.5 0.25\n", true),
-                                      std::pair("SCALARS share double 1\nLOOKUP_TABLE default\n0.5 1 0.5 1.5\n", false),
-                                      std::pair("SCALARS share double 1\nLOOKUP_TABLE default\n0.5 1 0.5 0\n", false),
-                                      std::pair("SCALARS share int 1\nLOOKUP_TABLE default\n1 1 1 1\n", false),
-                                      std::pair("VECTORS share double\n1 1 1 1 1 1 1 1 1 1 1 1\n", false)}) {
+  const std::string mesh =
+      "# vtk DataFile Version 3.0\nt\nASCII\nDATASET UNSTRUCTURED_GRID\nPOINTS 5 double\n0 0 0 1 0 0 0 1 0 0 "
+      "0 1 1 1 1\n"
+      "CELLS 4 19\n4 0 1 2 3\n3 0 2 1\n4 0 1 2 3\n4 1 2 3 4\nCELL_TYPES 4\n10 5 10 10\nCELL_DATA 4\n";
+  for (const auto &[array, counts] :
+       {std::pair("SCALARS share double 1\nLOOKUP_TABLE default\n0.5 1 0.5 0.25\n", true),
+        std::pair("SCALARS share double 1\nLOOKUP_TABLE default\n0.5 1 0.5 1.5\n", false),
+        std::pair("SCALARS share double 1\nLOOKUP_TABLE default\n0.5 1 0.5 0\n", false),
+        std::pair("SCALARS share int 1\nLOOKUP_TABLE default\n1 1 1 1\n", false),
+        std::pair("VECTORS share double\n1 1 1 1 1 1 1 1 1 1 1 1\n", false)}) {
     test::write_file(file, mesh + array);
     const FromFile read(file);
     ASSERT_EQ(read.info.ntet, 2u) << "the double is dropped";
@@ -136,9 +147,11 @@ TEST(MeshFillCommand, ArrayThatIsNoShare_IsLeftAlone) {
 TEST(MeshFillCommand, OpenSheet_ExitsTwoAndNamesTheFileAndTheOpening) {
   const std::string folder = test::scratch("fill_command_open");
   test::write_file(folder + "/sheet.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n");
-  const test::CommandResult result = test::deform({"mesh", "fill", folder + "/sheet.obj", "--out", folder + "/x.msh"});
+  const test::CommandResult result =
+      test::deform({"mesh", "fill", folder + "/sheet.obj", "--out", folder + "/x.msh"});
   EXPECT_EQ(result.exit_code, 2);
-  EXPECT_NE(result.err.find("sheet.obj: the surface is open: 1 opening of 0.5 m2"), std::string::npos) << result.err;
+  EXPECT_NE(result.err.find("sheet.obj: the surface is open: 1 opening of 0.5 m2"), std::string::npos)
+      << result.err;
   EXPECT_EQ(test::read_file(folder + "/sheet.obj").substr(0, 1), "v");
   EXPECT_EQ(test::deform({"mesh", "info", folder + "/x.msh"}).exit_code, 2) << "nothing may be written";
 }

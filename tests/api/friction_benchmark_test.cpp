@@ -1,4 +1,5 @@
-// The friction benchmark (tests/bench/friction) as a stranger meets it: rows of CSV, judged, continued where they stopped.
+// The friction benchmark (tests/bench/friction) as a stranger meets it: rows of CSV, judged, continued
+// where they stopped.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -9,23 +10,29 @@
 
 namespace {
 
-std::string script(const char *name) { return std::string(DEFORM_SOURCE_DIR) + "/tests/bench/friction/" + name; }
+std::string script(const char *name) {
+  return std::string(DEFORM_SOURCE_DIR) + "/tests/bench/friction/" + name;
+}
 
 }  // namespace
 
 TEST(FrictionBenchmark, OurSlides_AreMeasuredJudgedAndNotRunTwice) {
   const std::string out = test::scratch("friction_benchmark") + "/rows.csv";
   std::remove(out.c_str());
-  const std::vector<std::string> call = {DEFORM_TEST_PYTHON, script("run.py"), "deform", "--command", DEFORM_COMMAND, "--only", "slope_slide",
-                                         "--configuration", "coulomb", "--out", out};
+  const std::vector<std::string> call = {
+      DEFORM_TEST_PYTHON, script("run.py"), "deform", "--command", DEFORM_COMMAND, "--only", "slope_slide",
+      "--configuration",  "coulomb",        "--out",  out};
   const test::CommandResult first = test::run(call);
   ASSERT_EQ(first.exit_code, 0) << first.err;
   const auto rows = test::read_csv(out);
-  ASSERT_EQ(rows.size(), 3u);   // header, mu 0.2 and 0.5
-  const auto column = [&](const char *name) { return size_t(std::find(rows[0].begin(), rows[0].end(), name) - rows[0].begin()); };
+  ASSERT_EQ(rows.size(), 3u);  // header, mu 0.2 and 0.5
+  const auto column = [&](const char *name) {
+    return size_t(std::find(rows[0].begin(), rows[0].end(), name) - rows[0].begin());
+  };
   for (size_t i = 1; i < rows.size(); ++i) {
     EXPECT_EQ(rows[i][column("verdict")], "pass") << first.out;
-    const double measured = std::stod(rows[i][column("measured")]), expected = std::stod(rows[i][column("expected")]);
+    const double measured = std::stod(rows[i][column("measured")]);
+    const double expected = std::stod(rows[i][column("expected")]);
     EXPECT_NEAR(measured, expected, 0.01 * expected);
   }
   EXPECT_NE(rows[1][column("parameters")], rows[2][column("parameters")]);
@@ -35,8 +42,8 @@ TEST(FrictionBenchmark, OurSlides_AreMeasuredJudgedAndNotRunTwice) {
   EXPECT_EQ(test::read_csv(out).size(), 3u);
 }
 
-
-// A stranger's engine: a file in a folder of its own, as the README tells it. What goes wrong and what takes too long are rows, not ends.
+// A stranger's engine: a file in a folder of its own, as the README tells it. What goes wrong and what takes
+// too long are rows, not ends.
 TEST(FrictionBenchmark, EntryFromOutside_GetsItsRows) {
   const std::string folder = test::scratch("friction_benchmark_entry");
   test::write_file(folder + "/entry_sled.py", R"(import cases
@@ -58,19 +65,24 @@ class Entry:
   const std::string out = folder + "/rows.csv";
   std::remove(out.c_str());
   const auto call = [&](const char *engine) {
-    return test::run({DEFORM_TEST_PYTHON, script("run.py"), engine, "--entries", folder, "--command", DEFORM_COMMAND, "--out", out});
+    return test::run({DEFORM_TEST_PYTHON, script("run.py"), engine, "--entries", folder, "--command",
+                      DEFORM_COMMAND, "--out", out});
   };
   const test::CommandResult done = call("sled");
   ASSERT_EQ(done.exit_code, 0) << done.err;
   std::map<std::string, int> verdicts;
   std::string notes;
   const auto rows = test::read_csv(out);
-  for (size_t i = 1; i < rows.size(); ++i) ++verdicts[rows[i].at(10)], notes += rows[i].back() + "\n";
+  for (size_t i = 1; i < rows.size(); ++i) {
+    ++verdicts[rows[i].at(10)];
+    notes += rows[i].back() + "\n";
+  }
   EXPECT_EQ(verdicts["pass"], 2);
   EXPECT_EQ(verdicts["too_slow"], 2);
   EXPECT_EQ(verdicts["error"], 2);
   EXPECT_GT(verdicts["not_run"], 10);
-  for (const char *said : {"too slow: > 300 s for 0.5 of 2 s", "the string broke", "it only slides"}) EXPECT_NE(notes.find(said), std::string::npos) << said;
+  for (const char *said : {"too slow: > 300 s for 0.5 of 2 s", "the string broke", "it only slides"})
+    EXPECT_NE(notes.find(said), std::string::npos) << said;
 
   const test::CommandResult unknown = call("sledge");
   EXPECT_NE(unknown.exit_code, 0);
@@ -80,17 +92,21 @@ class Entry:
 
 // From a folder that has no build/ of its own.
 TEST(FrictionBenchmark, CommandThatIsNotThere_IsOneSentence) {
-  const test::CommandResult r = test::run({"/usr/bin/env", "-C", test::scratch("friction_benchmark_elsewhere"), DEFORM_TEST_PYTHON, script("run.py"), "deform",
-                                           "--command", "no/such/deform", "--only", "slope_slide"});
+  const test::CommandResult r =
+      test::run({"/usr/bin/env", "-C", test::scratch("friction_benchmark_elsewhere"), DEFORM_TEST_PYTHON,
+                 script("run.py"), "deform", "--command", "no/such/deform", "--only", "slope_slide"});
   EXPECT_EQ(r.exit_code, 1);
-  EXPECT_NE(r.err.find("no/such/deform: no such command; build it with `make demo`"), std::string::npos) << r.err;
+  EXPECT_NE(r.err.find("no/such/deform: no such command; build it with `make demo`"), std::string::npos)
+      << r.err;
   EXPECT_EQ(r.err.find("Traceback"), std::string::npos) << r.err;
 }
 
 TEST(FrictionBenchmark, CalledFromAnotherFolder_FindsTheCommandOfItsCheckout) {
   const std::string folder = test::scratch("friction_benchmark_elsewhere");
-  const test::CommandResult r = test::run({"/usr/bin/env", "-C", folder, DEFORM_TEST_PYTHON, script("run.py"), "--help"});
+  const test::CommandResult r =
+      test::run({"/usr/bin/env", "-C", folder, DEFORM_TEST_PYTHON, script("run.py"), "--help"});
   EXPECT_EQ(r.exit_code, 0) << r.err;
-  const test::CommandResult unknown = test::run({"/usr/bin/env", "-C", folder, DEFORM_TEST_PYTHON, script("run.py"), "nobody"});
+  const test::CommandResult unknown =
+      test::run({"/usr/bin/env", "-C", folder, DEFORM_TEST_PYTHON, script("run.py"), "nobody"});
   EXPECT_NE(unknown.err.find("there is no entry_nobody.py"), std::string::npos) << unknown.err;
 }

@@ -1,4 +1,5 @@
-// `deform friction` as a user calls it: what it refuses, what it writes, what it says about a law that is not ours.
+// `deform friction` as a user calls it: what it refuses, what it writes, what it says about a law
+// that is not ours.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -12,7 +13,9 @@ namespace {
 using test::rig::example;
 
 std::string folder() { return test::scratch("friction_command"); }
-std::string tiny(const std::string &name) { return std::string(DEFORM_BINARY_DIR) + "/lib/tiny/" + name + ".so"; }
+std::string tiny(const std::string &name) {
+  return std::string(DEFORM_BINARY_DIR) + "/lib/tiny/" + name + ".so";
+}
 
 std::string file(const std::string &name, const std::string &text) {
   test::write_file(folder() + "/" + name, text);
@@ -39,7 +42,8 @@ void expect_refused(const std::vector<std::string> &args, const std::vector<std:
   EXPECT_EQ(r.exit_code, 2) << r.out;
   EXPECT_EQ(r.out, "");
   EXPECT_EQ(std::count(r.err.begin(), r.err.end(), '\n'), 1) << r.err;
-  for (const std::string &word : words) EXPECT_NE(r.err.find(word), std::string::npos) << "no '" << word << "' in: " << r.err;
+  for (const std::string &word : words)
+    EXPECT_NE(r.err.find(word), std::string::npos) << "no '" << word << "' in: " << r.err;
 }
 void expect_bad_case(const std::string &from, const std::string &to, std::vector<std::string> words) {
   words.push_back("bad.json");
@@ -52,13 +56,21 @@ bool has(const std::string &text, const std::string &word) { return text.find(wo
 }  // namespace
 
 TEST(FrictionCommand, EveryDrive_WritesItsColumnsAtItsTimes) {
-  const struct { const char *name, *columns; size_t rows; } cases[] = {
-      {"braked_mass", "t,x,v,F", 8},    {"rig", "t,x,v,F,z", 601},       {"stick_slip", "t,x,v,F", 281},
-      {"loops", "x,segment,F", 101},    {"circle", "t,vx,vy,zx,zy,Fx,Fy", 51}, {"load_wave", "t,v,Fn,z,F_elastic,closed,F", 201},
+  const struct {
+    const char *name, *columns;
+    size_t rows;
+  } cases[] = {
+      {"braked_mass", "t,x,v,F", 8},
+      {"rig", "t,x,v,F,z", 601},
+      {"stick_slip", "t,x,v,F", 281},
+      {"loops", "x,segment,F", 101},
+      {"circle", "t,vx,vy,zx,zy,Fx,Fy", 51},
+      {"load_wave", "t,v,Fn,z,F_elastic,closed,F", 201},
       {"breakaway", "rate,F_ba,t_ba,f_applied_at_ba,interior_peak,t_v_eq_v_s,f_applied_v_eq_v_s", 3}};
   for (const auto &c : cases) {
     const std::string csv = folder() + "/rows.csv";
-    const test::CommandResult r = test::deform({"friction", example(c.name), "--law", "coulomb", "--step", "1e-3", "--quiet", "--csv", csv});
+    const test::CommandResult r = test::deform(
+        {"friction", example(c.name), "--law", "coulomb", "--step", "1e-3", "--quiet", "--csv", csv});
     ASSERT_EQ(r.exit_code, 0) << r.err;
     EXPECT_EQ(r.out + r.err, "") << c.name;
     const std::string text = test::read_file(csv);
@@ -68,21 +80,24 @@ TEST(FrictionCommand, EveryDrive_WritesItsColumnsAtItsTimes) {
   }
 }
 
-// Every digit that a double has: 1/3 reads back as 1/3. A step that does not divide the interval is shortened, not rounded.
+// Every digit that a double has: 1/3 reads back as 1/3. A step that does not divide the interval is
+// shortened, not rounded.
 TEST(FrictionCommand, Rows_HoldEveryDigitAtExactTimes) {
-  const std::string f = file("thirds.json", push("[0, 0.1, 0.2, 0.3, 0.4]", "[0, 0.3333333333333333, 0.6666666666666666]"));
+  const std::string f =
+      file("thirds.json", push("[0, 0.1, 0.2, 0.3, 0.4]", "[0, 0.3333333333333333, 0.6666666666666666]"));
   const test::rig::Outcome out = test::rig::run(f, {"--step", "0.01"});
   const std::vector<double> t = out.rows.column("t"), x = out.rows.column("x");
   ASSERT_EQ(t.size(), 3u);
   EXPECT_EQ(t[1], 0.3333333333333333);
   EXPECT_EQ(t[2], 0.6666666666666666);
-  EXPECT_EQ(out.figure("steps"), 68);           // 34 steps of 0.0098 s each time
+  EXPECT_EQ(out.figure("steps"), 68);  // 34 steps of 0.0098 s each time
   EXPECT_EQ(x[2], out.figure("x_end"));
 }
 
 TEST(FrictionCommand, TimesFromLengthAndSpacing_AreTheSame) {
-  const std::string by_list = file("list.json", push()),
-                    by_step = file("step.json", push("\"freq\": 1},", "\"freq\": 1, \"T\": 0.4, \"dt\": 0.1},"));
+  const std::string by_list = file("list.json", push());
+  const std::string by_step =
+      file("step.json", push("\"freq\": 1},", "\"freq\": 1, \"T\": 0.4, \"dt\": 0.1},"));
   std::string text = test::read_file(by_step);
   text.erase(text.find(",\n \"output_times\""), text.rfind(']') + 1 - text.find(",\n \"output_times\""));
   test::write_file(by_step, text);
@@ -94,8 +109,11 @@ TEST(FrictionCommand, TimesFromLengthAndSpacing_AreTheSame) {
 
 TEST(FrictionCommand, NamesOfTheSet_MeanOurLaws) {
   for (const char *law : {"coulomb", "coulomb_plain", "org.deform.coulomb"})
-    EXPECT_TRUE(has(test::rig::run(example("steady_push"), {"--law", law}).figures, "\"law\": \"org.deform.coulomb\"")) << law;
-  EXPECT_TRUE(has(test::rig::run(example("rig_below"), {"--law", "ep"}).figures, "\"law\": \"org.deform.elastoplastic\""));
+    EXPECT_TRUE(has(test::rig::run(example("steady_push"), {"--law", law}).figures,
+                    "\"law\": \"org.deform.coulomb\""))
+        << law;
+  EXPECT_TRUE(has(test::rig::run(example("rig_below"), {"--law", "ep"}).figures,
+                  "\"law\": \"org.deform.elastoplastic\""));
 }
 
 TEST(FrictionCommand, BadCases_AreRefusedWithTheirPlace) {
@@ -103,9 +121,11 @@ TEST(FrictionCommand, BadCases_AreRefusedWithTheirPlace) {
   expect_refused({"friction", file("cut.json", push().substr(0, 90))}, {"cut.json:3:", "not JSON"});
   expect_refused({"friction", file("list.json", "[1]")}, {"list.json", "object"});
   std::string spring = test::read_file(example("stick_slip"));
-  expect_refused({"friction", file("spring.json", spring.replace(spring.find("\"k\": "), 5, "\"k\": -"))}, {"/input/k", "negative"});
+  expect_refused({"friction", file("spring.json", spring.replace(spring.find("\"k\": "), 5, "\"k\": -"))},
+                 {"/input/k", "negative"});
   expect_bad_case("\"input\"", "\"inputs\"", {"/input"});
-  expect_bad_case("\"bias_sine_force\"", "\"bias_sin_force\"", {"/input/kind", "bias_sin_force", "did you mean \"bias_sine_force\""});
+  expect_bad_case("\"bias_sine_force\"", "\"bias_sin_force\"",
+                  {"/input/kind", "bias_sin_force", "did you mean \"bias_sine_force\""});
   expect_bad_case("\"bias_sine_force\"", "\"table\"", {"/input/kind", "table"});
   expect_bad_case("\"amp\": 0", "\"ampl\": 0", {"/input/amp", "missing", "\"ampl\""});
   expect_bad_case("\"amp\": 0", "\"amp\": \"much\"", {"/input/amp", "much", "finite number"});
@@ -137,7 +157,8 @@ TEST(FrictionCommand, BadUsage_IsRefused) {
 
 TEST(FrictionCommand, LoadWithoutProjection_IsRefused) {
   std::string text = test::read_file(example("load_wave"));
-  const std::string other = std::string(text).replace(text.find("\"F0\""), 4, "\"form\": \"Fn = F0(1+a sin)\", \"F0\"");
+  const std::string other =
+      std::string(text).replace(text.find("\"F0\""), 4, "\"form\": \"Fn = F0(1+a sin)\", \"F0\"");
   expect_refused({"friction", file("form.json", other)}, {"/input", "projection"});
   text.replace(text.find("\"F_elastic\""), 11, "\"cone_excess\"");
   expect_refused({"friction", file("excess.json", text)}, {"/input", "projection"});
@@ -148,7 +169,7 @@ TEST(FrictionCommand, ThirdPartyLaw_RunsByPathAndItsMissingKeysAreNamed) {
   EXPECT_TRUE(has(out.figures, "\"law\": \"org.tiny.bristle\""));
   for (const char *key : {"F_S", "v_s", "delta", "sigma1", "sigma2", "dv", "z_ba", "alpha", "nu"})
     EXPECT_TRUE(has(out.err, std::string(" ") + key)) << key << " in " << out.err;
-  EXPECT_FALSE(has(out.err, "F_C,")) << out.err;                // mu came of it
+  EXPECT_FALSE(has(out.err, "F_C,")) << out.err;  // mu came of it
   EXPECT_FALSE(has(out.err, "sigma0")) << out.err;
   EXPECT_TRUE(has(out.figures, "\"warnings\": [\"")) << out.figures;
   EXPECT_NEAR(out.figure("F_max"), 1.47, 1e-12);
@@ -158,11 +179,13 @@ TEST(FrictionCommand, ThirdPartyLaw_RunsByPathAndItsMissingKeysAreNamed) {
 }
 
 TEST(FrictionCommand, StrangeKeyForOurLaw_IsNamedWithTheNearest) {
-  const test::CommandResult r = test::deform({"friction", file("strange.json", push("\"F_S\": 1.5", "\"F_S\": 1.5, \"sigma_2\": 0.4"))});
+  const test::CommandResult r = test::deform(
+      {"friction", file("strange.json", push("\"F_S\": 1.5", "\"F_S\": 1.5, \"sigma_2\": 0.4"))});
   EXPECT_EQ(r.exit_code, 0);
   EXPECT_TRUE(has(r.err, "sigma_2 (did you mean \"sigma2\"?)")) << r.err;
   const test::CommandResult known = test::deform({"friction", example("rig")});
-  EXPECT_EQ(known.err, "");                                     // keys of other laws of the set are no mistake
+  // keys of other laws of the set are no mistake
+  EXPECT_EQ(known.err, "");
 }
 
 TEST(FrictionCommand, LawWithAJump_HoldsAndIsTold) {
@@ -172,7 +195,8 @@ TEST(FrictionCommand, LawWithAJump_HoldsAndIsTold) {
   EXPECT_TRUE(has(held.err, "jumps")) << held.err;
   EXPECT_EQ(held.figure("jumps"), 4000);
   const std::vector<double> f = held.rows.column("F");
-  EXPECT_EQ(f.back(), 0.9);                                     // what holds it, not what the law said on either side
+  // what holds it, not what the law said on either side
+  EXPECT_EQ(f.back(), 0.9);
   const test::rig::Outcome slides = test::rig::run(file("slides.json", push()), {"--law", tiny("tiny_sign")});
   EXPECT_NEAR(slides.rows.column("v").back(), 0.4, 1e-12);
   EXPECT_EQ(slides.figure("jumps"), 0);
@@ -180,8 +204,10 @@ TEST(FrictionCommand, LawWithAJump_HoldsAndIsTold) {
 
 TEST(FrictionCommand, LawThatGivesNaN_StopsWithItsRows) {
   const std::string csv = folder() + "/nan.csv";
-  const std::string f = file("nan.json", push("\"F_C\": 1.0, \"F_S\": 1.5", "\"where\": \"ft\", \"value\": \"nan\""));
-  const test::CommandResult r = test::deform({"friction", f, "--law", tiny("tiny_nan"), "--csv", csv, "--json"});
+  const std::string f =
+      file("nan.json", push("\"F_C\": 1.0, \"F_S\": 1.5", "\"where\": \"ft\", \"value\": \"nan\""));
+  const test::CommandResult r =
+      test::deform({"friction", f, "--law", tiny("tiny_nan"), "--csv", csv, "--json"});
   EXPECT_EQ(r.exit_code, 3);
   EXPECT_TRUE(has(r.err, "step 0") && has(r.err, "org.tiny.nan")) << r.err;
   EXPECT_TRUE(has(r.out, "\"stopped\"")) << r.out;
@@ -191,13 +217,19 @@ TEST(FrictionCommand, LawThatGivesNaN_StopsWithItsRows) {
 }
 
 TEST(FrictionCommand, PlotWithoutMatplotlib_KeepsTheRows) {
-  const std::string good = file("good.json", push()), picture = folder() + "/alone.png", beside = folder() + "/alone.csv", csv = folder() + "/given.csv";
+  const std::string good = file("good.json", push());
+  const std::string picture = folder() + "/alone.png";
+  const std::string beside = folder() + "/alone.csv";
+  const std::string csv = folder() + "/given.csv";
   for (const std::string &old : {picture, beside, csv}) std::filesystem::remove(old);
-  const std::vector<std::string> lost = {"/usr/bin/env", "DEFORM_PYTHON=/nonexistent/python3", DEFORM_COMMAND, "friction", good, "--plot", picture};
+  const std::vector<std::string> lost = {
+      "/usr/bin/env", "DEFORM_PYTHON=/nonexistent/python3", DEFORM_COMMAND, "friction", good, "--plot",
+      picture};
   const test::CommandResult r = test::run(lost);
   EXPECT_EQ(r.exit_code, 0);
   EXPECT_TRUE(has(r.err, "matplotlib") && has(r.err, beside)) << r.err;
-  EXPECT_FALSE(std::filesystem::exists(picture) || std::filesystem::exists(picture + ".part") || std::filesystem::exists(picture + ".rows"));
+  EXPECT_FALSE(std::filesystem::exists(picture) || std::filesystem::exists(picture + ".part") ||
+               std::filesystem::exists(picture + ".rows"));
   EXPECT_EQ(test::read_csv(beside).size(), 6u);
   std::filesystem::remove(beside);
   std::vector<std::string> with_csv = lost;
@@ -209,24 +241,29 @@ TEST(FrictionCommand, PlotWithoutMatplotlib_KeepsTheRows) {
 TEST(FrictionCommand, Plot_WritesAPictureAndNothingElse) {
   const std::string picture = folder() + "/drawn.png";
   std::filesystem::remove(picture);
-  const test::CommandResult r = test::deform({"friction", file("good.json", push()), "--plot", picture, "--quiet"});
+  const test::CommandResult r =
+      test::deform({"friction", file("good.json", push()), "--plot", picture, "--quiet"});
   EXPECT_EQ(r.exit_code, 0) << r.err;
   EXPECT_EQ(r.err, "");
   ASSERT_TRUE(std::filesystem::exists(picture));
   EXPECT_EQ(test::read_file(picture).substr(1, 3), "PNG");
   EXPECT_FALSE(std::filesystem::exists(picture + ".rows") || std::filesystem::exists(picture + ".part"));
-  expect_refused({"friction", file("good.json", push()), "--plot", folder() + "/no/such/place.png"}, {"no/such/place.png"});
+  expect_refused({"friction", file("good.json", push()), "--plot", folder() + "/no/such/place.png"},
+                 {"no/such/place.png"});
 }
 
-// As where a version manager's python3, which has no matplotlib, comes first in PATH, and its settings are in the environment.
+// As where a version manager's python3, which has no matplotlib, comes first in PATH, and its settings are in
+// the environment.
 TEST(FrictionCommand, PlotWithAnotherPythonFirstInPath_DrawsByTheOneOfTheSetUp) {
-  const std::string other = folder() + "/other_python", picture = folder() + "/drawn_with_another_python_first.png";
+  const std::string other = folder() + "/other_python";
+  const std::string picture = folder() + "/drawn_with_another_python_first.png";
   std::filesystem::create_directories(other);
   test::write_file(other + "/python3", "#!/bin/sh\nexit 3\n");
   std::filesystem::permissions(other + "/python3", std::filesystem::perms::owner_all);
   std::filesystem::remove(picture);
-  const test::CommandResult r = test::run({"/usr/bin/env", "PATH=" + other, "PYTHONHOME=" + other, "PYTHONPATH=" + other, DEFORM_COMMAND, "friction",
-                                           file("good.json", push()), "--plot", picture, "--quiet"});
+  const test::CommandResult r =
+      test::run({"/usr/bin/env", "PATH=" + other, "PYTHONHOME=" + other, "PYTHONPATH=" + other,
+                 DEFORM_COMMAND, "friction", file("good.json", push()), "--plot", picture, "--quiet"});
   EXPECT_EQ(r.exit_code, 0) << r.err;
   EXPECT_EQ(r.err, "");
   EXPECT_TRUE(std::filesystem::exists(picture));

@@ -1,4 +1,5 @@
-// Rules of friction and filters that change and go while the world runs, and what contacts remember through it.
+// Rules of friction and filters that change and go while the world runs, and what contacts
+// remember through it.
 #include "bristle_law.h"
 #include "refused_memory.h"
 #include "stack.h"
@@ -21,7 +22,10 @@ struct Scene {
     w = test::make_world(c);
     floor = test::add_plane(w, "floor");
     test::BodyOptions o;
-    o.name = "block", o.young = 2e5, o.damping_stiffness = 2e-3, o.position = {0, 0, 4e-5};
+    o.name = "block";
+    o.young = 2e5;
+    o.damping_stiffness = 2e-3;
+    o.position = {0, 0, 4e-5};
     block = test::make_body(c, w, "beam", {0.1, 0.1, 0.1}, 10, o);
     const double gravity[3] = {push, 0, -9.81};
     test::ok(dfm_world_set_gravity(w, gravity));
@@ -35,7 +39,11 @@ struct Scene {
   dfm_status add(const char *a, const char *b, double mu, const char *law = "coulomb") const {
     const dfm_param_value v{"mu", &mu, 1};
     dfm_friction_def f{};
-    f.size = sizeof f, f.between[0] = a, f.between[1] = b, f.law = law, f.params = {sizeof(dfm_params), 1, &v};
+    f.size = sizeof f;
+    f.between[0] = a;
+    f.between[1] = b;
+    f.law = law;
+    f.params = {sizeof(dfm_params), 1, &v};
     return dfm_world_add_friction(w, &f);
   }
   dfm_status set(const char *a, const char *b, const char *key, double value) const {
@@ -46,7 +54,8 @@ struct Scene {
   // The longest bristle of all contacts, m.
   double bristle() const {
     double most = 0;
-    for (const dfm_contact &contact : test::contacts(w)) most = std::max(most, std::hypot(contact.bristle[0], contact.bristle[1]));
+    for (const dfm_contact &contact : test::contacts(w))
+      most = std::max(most, std::hypot(contact.bristle[0], contact.bristle[1]));
     return most;
   }
   // Along the push, N.
@@ -103,7 +112,8 @@ TEST(FrictionRules, ABristle_StaysWhereItsStiffnessChanges) {
   s.run(1);
   EXPECT_NEAR(s.bristle(), z, 0.03 * z) << "a displacement in m";
   EXPECT_NEAR(s.friction(), 1.5 * force, 0.05 * std::fabs(force)) << "its force follows the stiffness";
-  ASSERT_EQ(s.add("*", "*", 0.45, "test.bristle"), DFM_OK) << "given again, with another coefficient and the stiffness of the table";
+  ASSERT_EQ(s.add("*", "*", 0.45, "test.bristle"), DFM_OK)
+      << "given again, with another coefficient and the stiffness of the table";
   s.run(1);
   EXPECT_NEAR(s.bristle(), z, 0.05 * z);
 }
@@ -141,9 +151,14 @@ TEST(FrictionRules, WhatIsRefused_SaysWhyAndChangesNothing) {
   ASSERT_EQ(s.add("block", "floor", 0.5), DFM_OK);
   s.run(5);
   const size_t bytes = s.bytes();
-  const auto says = [](const char *text) { return std::string(dfm_last_error()).find(text) != std::string::npos; };
+  const auto says = [](const char *text) {
+    return std::string(dfm_last_error()).find(text) != std::string::npos;
+  };
   EXPECT_EQ(s.set("block", "*", "mu", 0.4), DFM_E_ARG);
-  EXPECT_TRUE(says("no rule of friction is for ['block', '*'] (rules: ['block', 'floor']); dfm_world_add_friction makes one")) << dfm_last_error();
+  EXPECT_TRUE(
+      says("no rule of friction is for ['block', '*'] (rules: ['block', 'floor']); dfm_world_add_friction "
+           "makes one"))
+      << dfm_last_error();
   EXPECT_EQ(dfm_world_remove_friction(s.w, "nobody", "*"), DFM_E_ARG);
   EXPECT_TRUE(says("no rule of friction is for ['nobody', '*']")) << dfm_last_error();
   EXPECT_EQ(s.set("block", "floor", "mu_K", 0.4), DFM_E_ARG);
@@ -155,7 +170,8 @@ TEST(FrictionRules, WhatIsRefused_SaysWhyAndChangesNothing) {
   EXPECT_EQ(dfm_world_set_friction(s.w, "block", "floor", nullptr), DFM_E_ARG);
   EXPECT_EQ(dfm_world_set_friction(s.w, nullptr, "floor", &lost), DFM_E_ARG);
   EXPECT_EQ(dfm_world_remove_filter(s.w, "block", "floor"), DFM_E_ARG);
-  EXPECT_TRUE(says("no filter is for ['block', 'floor']; dfm_world_filter_pair makes one")) << dfm_last_error();
+  EXPECT_TRUE(says("no filter is for ['block', 'floor']; dfm_world_filter_pair makes one"))
+      << dfm_last_error();
   EXPECT_EQ(s.bytes(), bytes);
 }
 

@@ -1,4 +1,5 @@
-// Handles: null, stale, of another kind or made up, every call that takes one says so; ends of life in any order.
+// Handles: null, stale, of another kind or made up, every call that takes one says so; ends of
+// life in any order.
 #include <functional>
 #include <limits>
 
@@ -17,7 +18,9 @@ size_t bytes;
 dfm_pose pose{};
 dfm_friction_def friction() {
   dfm_friction_def f{};
-  f.size = sizeof f, f.between[0] = f.between[1] = "*", f.law = "coulomb";
+  f.size = sizeof f;
+  f.between[0] = f.between[1] = "*";
+  f.law = "coulomb";
   return f;
 }
 
@@ -33,11 +36,23 @@ std::vector<Call> world_calls() {
       {"world_find_body", [](uint64_t h) { return dfm_world_find_body(h, "lower", &made); }},
       {"world_bodies", [](uint64_t h) { return dfm_world_bodies(h, 0, nullptr, &count); }},
       {"world_obstacles", [](uint64_t h) { return dfm_world_obstacles(h, 0, nullptr, &count); }},
-      {"world_get_stats", [](uint64_t h) { dfm_world_stats s{}; return dfm_world_get_stats(h, &s); }},
+      {"world_get_stats",
+       [](uint64_t h) {
+         dfm_world_stats s{};
+         return dfm_world_get_stats(h, &s);
+       }},
       {"world_profile", [](uint64_t h) { return dfm_world_profile(h, 0, nullptr, &count); }},
       {"world_explain", [](uint64_t h) { return dfm_world_explain(h, nullptr, &bytes); }},
-      {"world_add_friction", [](uint64_t h) { const dfm_friction_def f = friction(); return dfm_world_add_friction(h, &f); }},
-      {"world_set_friction", [](uint64_t h) { const dfm_params p{sizeof p, 0, nullptr}; return dfm_world_set_friction(h, "*", "*", &p); }},
+      {"world_add_friction",
+       [](uint64_t h) {
+         const dfm_friction_def f = friction();
+         return dfm_world_add_friction(h, &f);
+       }},
+      {"world_set_friction",
+       [](uint64_t h) {
+         const dfm_params p{sizeof p, 0, nullptr};
+         return dfm_world_set_friction(h, "*", "*", &p);
+       }},
       {"world_remove_friction", [](uint64_t h) { return dfm_world_remove_friction(h, "*", "*"); }},
       {"world_filter_pair", [](uint64_t h) { return dfm_world_filter_pair(h, "*", "*", true); }},
       {"world_remove_filter", [](uint64_t h) { return dfm_world_remove_filter(h, "*", "*"); }},
@@ -48,31 +63,63 @@ std::vector<Call> world_calls() {
       {"world_set_sleep", [](uint64_t h) { return dfm_world_set_sleep(h, true); }},
       {"world_hold_begin", [](uint64_t h) { return dfm_world_hold_begin(h); }},
       {"world_hold", [](uint64_t h) { return dfm_world_hold(h, numbers, nullptr); }},
-      {"world_ray", [](uint64_t h) { dfm_ray_hit r{}; return dfm_world_ray(h, zero3, one3, 1, &r); }},
-      {"world_closest", [](uint64_t h) { dfm_ray_hit r{}; return dfm_world_closest(h, zero3, 1, &r); }},
-      {"debug_draw", [](uint64_t h) {
-         return dfm_debug_draw(h, DFM_DRAW_CONTACTS, [](void *, const double *, const double *, uint32_t) {}, nullptr);
+      {"world_ray",
+       [](uint64_t h) {
+         dfm_ray_hit r{};
+         return dfm_world_ray(h, zero3, one3, 1, &r);
        }},
-      {"body_create", [](uint64_t h) { const dfm_body_def d = dfm_body_def_default(); return dfm_body_create(h, &d, &made); }},
-      {"obstacle_create", [](uint64_t h) { const dfm_obstacle_def d = dfm_obstacle_def_default(); return dfm_obstacle_create(h, &d, &made); }},
-      {"material_create", [](uint64_t h) { const dfm_material_def d = dfm_material_def_default(); return dfm_material_create(h, &d, &made); }},
+      {"world_closest",
+       [](uint64_t h) {
+         dfm_ray_hit r{};
+         return dfm_world_closest(h, zero3, 1, &r);
+       }},
+      {"debug_draw",
+       [](uint64_t h) {
+         return dfm_debug_draw(
+             h, DFM_DRAW_CONTACTS, [](void *, const double *, const double *, uint32_t) {}, nullptr);
+       }},
+      {"body_create",
+       [](uint64_t h) {
+         const dfm_body_def d = dfm_body_def_default();
+         return dfm_body_create(h, &d, &made);
+       }},
+      {"obstacle_create",
+       [](uint64_t h) {
+         const dfm_obstacle_def d = dfm_obstacle_def_default();
+         return dfm_obstacle_create(h, &d, &made);
+       }},
+      {"material_create",
+       [](uint64_t h) {
+         const dfm_material_def d = dfm_material_def_default();
+         return dfm_material_create(h, &d, &made);
+       }},
   };
 }
 
 std::vector<Call> body_calls() {
   return {
       {"body_destroy", [](uint64_t h) { return dfm_body_destroy(h); }},
-      {"body_get_info", [](uint64_t h) { dfm_body_info i{}; return dfm_body_get_info(h, &i); }},
+      {"body_get_info",
+       [](uint64_t h) {
+         dfm_body_info i{};
+         return dfm_body_get_info(h, &i);
+       }},
       {"body_set_user", [](uint64_t h) { return dfm_body_set_user(h, nullptr); }},
       {"body_set_filter", [](uint64_t h) { return dfm_body_set_filter(h, 1, 1); }},
       {"body_get_state", [](uint64_t h) { return dfm_body_get_state(h, 0, nullptr, nullptr, &count); }},
       {"body_set_state", [](uint64_t h) { return dfm_body_set_state(h, 1, numbers, numbers); }},
       {"body_get_rest", [](uint64_t h) { return dfm_body_get_rest(h, 1, numbers, 0, nullptr); }},
       {"body_hold", [](uint64_t h) { return dfm_body_hold(h, 1, &index0, 7); }},
-      {"body_move_held", [](uint64_t h) { const dfm_sine s{}; return dfm_body_move_held(h, 1, &index0, 0, nullptr, &s); }},
-      {"body_add_load", [](uint64_t h) { return dfm_body_add_load(h, 1, &index0, one3, 0, nullptr, nullptr, nullptr); }},
+      {"body_move_held",
+       [](uint64_t h) {
+         const dfm_sine s{};
+         return dfm_body_move_held(h, 1, &index0, 0, nullptr, &s);
+       }},
+      {"body_add_load",
+       [](uint64_t h) { return dfm_body_add_load(h, 1, &index0, one3, 0, nullptr, nullptr, nullptr); }},
       {"body_remove_load", [](uint64_t h) { return dfm_body_remove_load(h, 1); }},
-      {"body_add_spring", [](uint64_t h) {
+      {"body_add_spring",
+       [](uint64_t h) {
          const dfm_spring_def d{sizeof d, 1, &index0, nullptr, {}, nullptr, 0, 0, 1, 0};
          return dfm_body_add_spring(h, &d, nullptr);
        }},
@@ -80,10 +127,22 @@ std::vector<Call> body_calls() {
       {"body_get_spring_force", [](uint64_t h) { return dfm_body_get_spring_force(h, 1, numbers); }},
       {"body_remove_spring", [](uint64_t h) { return dfm_body_remove_spring(h, 1); }},
       {"body_apply_impulse", [](uint64_t h) { return dfm_body_apply_impulse(h, zero3, one3); }},
-      {"body_set_params", [](uint64_t h) { const dfm_params p{sizeof p, 0, nullptr}; return dfm_body_set_params(h, &p); }},
+      {"body_set_params",
+       [](uint64_t h) {
+         const dfm_params p{sizeof p, 0, nullptr};
+         return dfm_body_set_params(h, &p);
+       }},
       {"body_wake", [](uint64_t h) { return dfm_body_wake(h); }},
-      {"body_is_asleep", [](uint64_t h) { bool asleep; return dfm_body_is_asleep(h, &asleep); }},
-      {"body_get_measure", [](uint64_t h) { dfm_body_measure m{}; return dfm_body_get_measure(h, &m); }},
+      {"body_is_asleep",
+       [](uint64_t h) {
+         bool asleep;
+         return dfm_body_is_asleep(h, &asleep);
+       }},
+      {"body_get_measure",
+       [](uint64_t h) {
+         dfm_body_measure m{};
+         return dfm_body_get_measure(h, &m);
+       }},
       {"body_energy_density", [](uint64_t h) { return dfm_body_energy_density(h, 64, numbers); }},
       {"surface_positions", [](uint64_t h) { return dfm_surface_positions(h, 0, nullptr, &count); }},
       {"surface_velocities", [](uint64_t h) { return dfm_surface_velocities(h, 0, nullptr, &count); }},
@@ -100,7 +159,11 @@ std::vector<Call> obstacle_calls() {
   return {
       {"obstacle_destroy", [](uint64_t h) { return dfm_obstacle_destroy(h); }},
       {"obstacle_get_pose", [](uint64_t h) { return dfm_obstacle_get_pose(h, &pose); }},
-      {"obstacle_get_def", [](uint64_t h) { dfm_obstacle_def d{}; return dfm_obstacle_get_def(h, &d); }},
+      {"obstacle_get_def",
+       [](uint64_t h) {
+         dfm_obstacle_def d{};
+         return dfm_obstacle_get_def(h, &d);
+       }},
       {"obstacle_move_to", [](uint64_t h) { return dfm_obstacle_move_to(h, &pose); }},
   };
 }
@@ -109,14 +172,28 @@ std::vector<Call> other_calls() {
   return {
       {"material_destroy", [](uint64_t h) { return dfm_material_destroy(h); }},
       {"law_close", [](uint64_t h) { return dfm_law_close(h); }},
-      {"law_type", [](uint64_t h) { const dfm_type *t; return dfm_law_type(h, &t); }},
+      {"law_type",
+       [](uint64_t h) {
+         const dfm_type *t;
+         return dfm_law_type(h, &t);
+       }},
       {"law_pack", [](uint64_t h) { return dfm_law_pack(h, nullptr, 0, nullptr, &count); }},
-      {"law_eval", [](uint64_t h) { dfm_friction_in in{}; dfm_friction_out out{}; return dfm_law_eval(h, &in, &out); }},
+      {"law_eval",
+       [](uint64_t h) {
+         dfm_friction_in in{};
+         dfm_friction_out out{};
+         return dfm_law_eval(h, &in, &out);
+       }},
       {"tetmesh_destroy", [](uint64_t h) { return dfm_tetmesh_destroy(h); }},
-      {"tetmesh_get_info", [](uint64_t h) { dfm_tetmesh_info i{}; return dfm_tetmesh_get_info(h, &i); }},
+      {"tetmesh_get_info",
+       [](uint64_t h) {
+         dfm_tetmesh_info i{};
+         return dfm_tetmesh_get_info(h, &i);
+       }},
       {"tetmesh_data", [](uint64_t h) { return dfm_tetmesh_data(h, nullptr, nullptr, nullptr); }},
       {"tetmesh_groups", [](uint64_t h) { return dfm_tetmesh_groups(h, nullptr, nullptr); }},
-      {"tetmesh_group_points", [](uint64_t h) { return dfm_tetmesh_group_points(h, 0, nullptr, nullptr, nullptr); }},
+      {"tetmesh_group_points",
+       [](uint64_t h) { return dfm_tetmesh_group_points(h, 0, nullptr, nullptr, nullptr); }},
       {"tetmesh_write", [](uint64_t h) { return dfm_tetmesh_write(h, "/nonexistent/x.msh"); }},
       {"scene_close", [](uint64_t h) { return dfm_scene_close(h); }},
       {"scene_world", [](uint64_t h) { return dfm_scene_world(h, &made); }},
@@ -127,7 +204,8 @@ std::vector<Call> other_calls() {
 void all_refuse(const std::vector<Call> &calls, uint64_t handle, const char *what) {
   for (const auto &[name, call] : calls) {
     EXPECT_EQ(call(handle), DFM_E_HANDLE) << name << " on a " << what << " handle";
-    EXPECT_NE(std::string(dfm_last_error()).find("handle 0x"), std::string::npos) << name << ": " << dfm_last_error();
+    EXPECT_NE(std::string(dfm_last_error()).find("handle 0x"), std::string::npos)
+        << name << ": " << dfm_last_error();
   }
 }
 

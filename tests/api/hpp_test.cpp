@@ -1,4 +1,5 @@
-// deform.hpp: what ends what, errors in both ways, spans and their lengths, callables through the C API, no allocation of its own.
+// deform.hpp: what ends what, errors in both ways, spans and their lengths, callables through the C API, no
+// allocation of its own.
 #include <cmath>
 
 #include <deform/deform.hpp>
@@ -14,7 +15,8 @@ using deform::Vec3;
 
 deform::ContextDef quiet() {
   deform::ContextDef def;
-  def.plugin_dir = DEFORM_PLUGIN_DIR, def.log = [](void *, int32_t, const char *) {};
+  def.plugin_dir = DEFORM_PLUGIN_DIR;
+  def.log = [](void *, int32_t, const char *) {};
   return def;
 }
 
@@ -31,7 +33,8 @@ struct Scene {
     const auto mesh = context.make_tets("ball", {0.1}, 200);
     deform::BodyDef def;
     def.set_mesh(mesh);
-    def.name = "ball", def.pose.position[2] = 0.1;
+    def.name = "ball";
+    def.pose.position[2] = 0.1;
     ball = world.add_body(def);
   }
 };
@@ -44,9 +47,9 @@ TEST(Hpp, Handles_EndWhatTheyOwnAndOnlyThat) {
   {
     auto world = context.make_world();
     raw = world.get();
-    const deform::World view = world;   // a plain handle refers
+    const deform::World view = world;  // a plain handle refers
     auto moved = std::move(world);
-    EXPECT_FALSE(world) << "moved from";   // NOLINT
+    EXPECT_FALSE(world) << "moved from";  // NOLINT
     EXPECT_EQ(moved, view);
     EXPECT_EQ(view.time(), 0.0);
   }
@@ -86,7 +89,9 @@ TEST(Hpp, Errors_CarryStatusAndSentenceInBothWays) {
   EXPECT_EQ(r.status(), DFM_E_ARG);
   EXPECT_NE(std::string(r.what()).find("floor"), std::string::npos) << r.what();
 
-  const auto good = values::World(s.world.get()).add_friction("ball", "floor", "coulomb", deform::Params({{"mu_C", 0.2}, {"mu_S", 0.3}}));
+  const auto good =
+      values::World(s.world.get())
+          .add_friction("ball", "floor", "coulomb", deform::Params({{"mu_C", 0.2}, {"mu_S", 0.3}}));
   EXPECT_TRUE(good) << good.what();
   EXPECT_STREQ(good.what(), "");
   const auto body = values::World(s.world.get()).find_body("nobody");
@@ -98,9 +103,12 @@ TEST(Hpp, Files_AreReadAndWrittenWhole) {
   const std::string path = test::scratch("hpp") + "/file.txt";
   ASSERT_EQ(deform::write_file(path.c_str(), "text", 4), DFM_OK);
   std::string got;
-  EXPECT_EQ(deform::read_file(path.c_str(), 4, "a text", [&](const char *bytes, size_t n) { got.assign(bytes, n); }), DFM_OK);
+  EXPECT_EQ(deform::read_file(path.c_str(), 4, "a text",
+                              [&](const char *bytes, size_t n) { got.assign(bytes, n); }),
+            DFM_OK);
   EXPECT_EQ(got, "text");
-  EXPECT_EQ(deform::read_file(path.c_str(), 3, "a text", [&](const char *, size_t) { got = "called"; }), DFM_E_FORMAT);
+  EXPECT_EQ(deform::read_file(path.c_str(), 3, "a text", [&](const char *, size_t) { got = "called"; }),
+            DFM_E_FORMAT);
   EXPECT_EQ(got, "text");
 }
 
@@ -180,7 +188,8 @@ TEST(Hpp, Snapshot_RestoresTheSameBits) {
 TEST(Hpp, Callables_AreCalledAndWhatTheyThrowArrives) {
   const Scene s;
   uint32_t laws = 0, lines = 0;
-  s.context.visit_plugins([&](const dfm_type &type, const char *file) { laws += type.kind == DFM_KIND_FRICTION && *file; });
+  s.context.visit_plugins(
+      [&](const dfm_type &type, const char *file) { laws += type.kind == DFM_KIND_FRICTION && *file; });
   EXPECT_GE(laws, 3u);
   for (int i = 0; i < 20; ++i) EXPECT_TRUE(s.world.step(1e-3));
   s.world.draw(DFM_DRAW_CONTACTS, [&](deform::In3 a, deform::In3 b, uint32_t) { lines += a[2] != b[2]; });
@@ -200,7 +209,8 @@ TEST(Hpp, Meshes_LendTheirArrays) {
   const auto shape = surface.data();
   EXPECT_EQ(shape.triangles.size(), 3 * surface.info().ntriangle);
   const auto filled = surface.fill(800);
-  EXPECT_EQ(filled.share().size(), filled.info().ntet) << "a filled mesh tells how much of each cell is material";
+  EXPECT_EQ(filled.share().size(), filled.info().ntet)
+      << "a filled mesh tells how much of each cell is material";
   const auto made = context.make_tets("beam", {0.1, 0.1, 0.4}, 100);
   EXPECT_TRUE(made.share().empty());
   EXPECT_EQ(made.data().tets.size(), 4 * made.info().ntet);
@@ -219,7 +229,10 @@ TEST(Hpp, Meshes_LendTheirArrays) {
 TEST(Hpp, RigidBodies_GoByTheirSet) {
   const Scene s;
   deform::RigidDef box;
-  box.name = "box", box.shape = DFM_SHAPE_BOX, box.mass = 1, box.pose.position[2] = 1;
+  box.name = "box";
+  box.shape = DFM_SHAPE_BOX;
+  box.mass = 1;
+  box.pose.position[2] = 1;
   box.half_size[0] = box.half_size[1] = box.half_size[2] = 0.05;
   const deform::Rigid rigid = s.world.add_rigid(box);
   EXPECT_EQ(rigid.state().position[2], 1);
@@ -231,8 +244,11 @@ TEST(Hpp, RigidBodies_GoByTheirSet) {
   EXPECT_EQ(s.world.pair_wrench(s.ball, as_obstacle, Vec3{}).force, Vec3{});
   auto set = deform::sized<dfm_rigid_set_def>();
   dfm_rigid_def two[2] = {box, box};
-  two[0].name = "a", two[1].name = "b", two[1].pose.position[0] = 1;
-  set.nbody = 2, set.bodies = two;
+  two[0].name = "a";
+  two[1].name = "b";
+  two[1].pose.position[0] = 1;
+  set.nbody = 2;
+  set.bodies = two;
   dfm_rigid out[2];
   EXPECT_THROW(s.world.add_rigids(set, std::span(out).first(1)), deform::Error) << "room for one of two";
   s.world.add_rigids(set, out);
@@ -255,12 +271,19 @@ TEST(Hpp, SceneAndLaw_AnswerAsInC) {
   const double fn = 2, area = 1e-4, vt[2] = {1, 0}, stop[2] = {-100, 0};
   double ft[2] = {};
   auto in = deform::sized<dfm_friction_in>();
-  in.n = in.stride = 1, in.dt = 1e-3, in.params = packed.data(), in.fn = &fn, in.vt = vt, in.ft_stop = stop, in.area = &area;
+  in.n = in.stride = 1;
+  in.dt = 1e-3;
+  in.params = packed.data();
+  in.fn = &fn;
+  in.vt = vt;
+  in.ft_stop = stop;
+  in.area = &area;
   auto out = deform::sized<dfm_friction_out>();
   out.ft = ft;
   EXPECT_TRUE(law.eval(in, out));
   EXPECT_NEAR(ft[0], -0.5, 1e-12);
-  const dfm_motion p = {{0, 0, 1}, {0, 0, -1}}, tri[3] = {{{-1, -1, 0}, {-1, -1, 0}}, {{1, -1, 0}, {1, -1, 0}}, {{0, 1, 0}, {0, 1, 0}}};
+  const dfm_motion p = {{0, 0, 1}, {0, 0, -1}};
+  const dfm_motion tri[3] = {{{-1, -1, 0}, {-1, -1, 0}}, {{1, -1, 0}, {1, -1, 0}}, {{0, 1, 0}, {0, 1, 0}}};
   EXPECT_NEAR(deform::Toi::point_triangle(p, tri).t, 0.5, 1e-9);
   EXPECT_GT(deform::Toi::evaluations(), 0u);
 }

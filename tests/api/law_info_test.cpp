@@ -101,7 +101,8 @@ TEST(LawInfo, ParamsGivenBack_MakeTheSameRule) {
       add_rule(twice[i].world, "upper", "lower", law, {sizeof(dfm_params), n, lists});
       test::run(twice[i].world, 10e-3, 1e-3);
       if (i == 0) continue;
-      const dfm_law_info info = info_of(twice[i].world, law_between(twice[i].world, twice[i].lower, twice[i].upper));
+      const dfm_law_info info =
+          info_of(twice[i].world, law_between(twice[i].world, twice[i].lower, twice[i].upper));
       add_rule(twice[i].world, "upper", "lower", info.id, info.params);
     }
     for (const test::Stack &s : twice) test::run(s.world, 5e-3, 1e-3);
@@ -115,7 +116,8 @@ TEST(LawInfo, AfterTheRuleWasSetAnew_HasTheNewValue) {
   for (const double mu : {0.2, 0.7}) {
     test::set_friction(s.world, mu);
     test::run(s.world, 5e-3, 1e-3);
-    EXPECT_EQ(value(info_of(s.world, law_between(s.world, s.lower, s.floor)), "mu_C"), std::vector<double>{mu});
+    EXPECT_EQ(value(info_of(s.world, law_between(s.world, s.lower, s.floor)), "mu_C"),
+              std::vector<double>{mu});
   }
 }
 

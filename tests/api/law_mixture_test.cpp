@@ -1,4 +1,5 @@
-// Laws of different memory in one world: what a contact without bristles keeps is nothing, whoever stood in its place before.
+// Laws of different memory in one world: what a contact without bristles keeps is nothing, whoever stood in
+// its place before.
 #include "world.h"
 
 namespace {
@@ -9,19 +10,29 @@ struct Mixture {
   dfm_body lower, upper;
   Mixture() : world(test::make_world(context, {2, 1, -9.81})) {
     test::BodyOptions o;
-    o.young = 5e4, o.damping_stiffness = 2e-3;
-    o.name = "lower", o.position = {0, 0, 1e-3};
+    o.young = 5e4;
+    o.damping_stiffness = 2e-3;
+    o.name = "lower";
+    o.position = {0, 0, 1e-3};
     lower = test::make_body(context, world, "beam", {0.1, 0.1, 0.04}, 120, o);
-    o.name = "upper", o.position = {0.02, 0.02, 0.05}, o.spin = {3, -2, 4};   // comes down on an edge, rocks and slides: contacts come and go
+    o.name = "upper";
+    o.position = {0.02, 0.02, 0.05};
+    o.spin = {3, -2, 4};  // comes down on an edge, rocks and slides: contacts come and go
     upper = test::make_body(context, world, "beam", {0.06, 0.06, 0.04}, 120, o);
     test::add_plane(world, "floor");
-    law("lower", "floor", "coulomb"), law("lower", "upper", "gms"), law("upper", "floor", "dahl");
+    law("lower", "floor", "coulomb");
+    law("lower", "upper", "gms");
+    law("upper", "floor", "dahl");
   }
   void law(const char *a, const char *b, const char *name) {
     const double mu = 0.4;
     const dfm_param_value v{"mu_C", &mu, 1};
     dfm_friction_def f{};
-    f.size = sizeof f, f.between[0] = a, f.between[1] = b, f.law = name, f.params = {sizeof(dfm_params), 1, &v};
+    f.size = sizeof f;
+    f.between[0] = a;
+    f.between[1] = b;
+    f.law = name;
+    f.params = {sizeof(dfm_params), 1, &v};
     test::ok(dfm_world_add_friction(world, &f));
   }
   void run(int steps) {
@@ -55,7 +66,8 @@ TEST(LawMixture, SavedAndRestored_GoesOnWithTheSameBits) {
     const std::string data = test::snapshot(a.world);
     test::ok(dfm_world_restore(b.world, data.data(), data.size()));
     for (int k = 0; k < 5; ++k) {
-      a.run(20), b.run(20);
+      a.run(20);
+      b.run(20);
       ASSERT_EQ(dfm_world_hash(a.world), dfm_world_hash(b.world)) << until << " " << k;
     }
   }

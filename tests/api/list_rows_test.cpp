@@ -1,4 +1,5 @@
-// Lists of structs: rows of the caller's size, whether its header is older or newer than the library, and by the symbol's name alone.
+// Lists of structs: rows of the caller's size, whether its header is older or newer than the library, and by
+// the symbol's name alone.
 #include <cstring>
 
 #include "rigid.h"
@@ -8,7 +9,8 @@
 extern "C" {
 dfm_status contacts_symbol(dfm_world, uint32_t, dfm_contact *, uint32_t *) __asm__("dfm_world_contacts");
 dfm_status pairs_symbol(dfm_world, uint32_t, dfm_pair_report *, uint32_t *) __asm__("dfm_world_pairs");
-dfm_status impulses_symbol(dfm_world, uint32_t, dfm_pair_impulse *, uint32_t *) __asm__("dfm_world_pair_impulses");
+dfm_status impulses_symbol(dfm_world, uint32_t, dfm_pair_impulse *,
+                           uint32_t *) __asm__("dfm_world_pair_impulses");
 dfm_status events_symbol(dfm_world, uint32_t, dfm_contact_event *, uint32_t *) __asm__("dfm_world_events");
 dfm_status overlaps_symbol(dfm_world, uint32_t, dfm_overlap *, uint32_t *) __asm__("dfm_world_overlaps");
 dfm_status profile_symbol(dfm_world, uint32_t, dfm_stage_time *, uint32_t *) __asm__("dfm_world_profile");
@@ -19,7 +21,8 @@ namespace {
 constexpr unsigned char kUntouched = 0xa5;
 using Bytes = std::vector<unsigned char>;
 
-// A world in which every list has rows: the upper cube starts in the lower one, by less than contact leads out.
+// A world in which every list has rows: the upper cube starts in the lower one, by less than
+// contact leads out.
 test::Stack busy_stack(dfm_context *c) {
   const test::Stack s = test::make_stack(c, -1.5e-3);
   test::run(s.world, 10e-3, 1e-3);
@@ -30,13 +33,23 @@ template <class T>
 using Sized = dfm_status (*)(dfm_world, uint32_t, uint32_t, T *, uint32_t *);
 
 struct Range { size_t begin, end; };
-constexpr size_t kTwo = 2 * sizeof(uint64_t);   // handles
-Range differing(const dfm_contact *) { return {offsetof(dfm_contact, body_a), offsetof(dfm_contact, body_a) + kTwo}; }
-Range differing(const dfm_pair_report *) { return {offsetof(dfm_pair_report, a), offsetof(dfm_pair_report, a) + kTwo}; }
-Range differing(const dfm_pair_impulse *) { return {offsetof(dfm_pair_impulse, a), offsetof(dfm_pair_impulse, a) + kTwo}; }
-Range differing(const dfm_contact_event *) { return {offsetof(dfm_contact_event, a), offsetof(dfm_contact_event, a) + kTwo}; }
+constexpr size_t kTwo = 2 * sizeof(uint64_t);  // handles
+Range differing(const dfm_contact *) {
+  return {offsetof(dfm_contact, body_a), offsetof(dfm_contact, body_a) + kTwo};
+}
+Range differing(const dfm_pair_report *) {
+  return {offsetof(dfm_pair_report, a), offsetof(dfm_pair_report, a) + kTwo};
+}
+Range differing(const dfm_pair_impulse *) {
+  return {offsetof(dfm_pair_impulse, a), offsetof(dfm_pair_impulse, a) + kTwo};
+}
+Range differing(const dfm_contact_event *) {
+  return {offsetof(dfm_contact_event, a), offsetof(dfm_contact_event, a) + kTwo};
+}
 Range differing(const dfm_overlap *) { return {offsetof(dfm_overlap, a), offsetof(dfm_overlap, a) + kTwo}; }
-Range differing(const dfm_stage_time *) { return {offsetof(dfm_stage_time, seconds), offsetof(dfm_stage_time, calls)}; }
+Range differing(const dfm_stage_time *) {
+  return {offsetof(dfm_stage_time, seconds), offsetof(dfm_stage_time, calls)};
+}
 
 // What differs between two worlds of equal content reads zero.
 template <class T>
@@ -64,7 +77,8 @@ Bytes rows_of(Sized<T> list, dfm_world w, uint32_t row_size, uint32_t *n) {
   return out;
 }
 
-// Worlds of equal content give equal lists but for handles and times of the machine. Events, which empty their list, need a world for each call.
+// Worlds of equal content give equal lists but for handles and times of the machine. Events, which empty
+// their list, need a world for each call.
 template <class T>
 void check_rows(Sized<T> list, const char *name) {
   SCOPED_TRACE(name);
@@ -72,7 +86,8 @@ void check_rows(Sized<T> list, const char *name) {
   uint32_t n = 0;
   const Bytes today = rows_of(list, busy_stack(c).world, sizeof(T), &n);
   ASSERT_GT(n, 0u);
-  for (const uint32_t row_size : {uint32_t{8}, uint32_t{16}, uint32_t(sizeof(T) - 8), uint32_t(sizeof(T) + 8), uint32_t(sizeof(T) + 64)}) {
+  for (const uint32_t row_size : {uint32_t{8}, uint32_t{16}, uint32_t(sizeof(T) - 8), uint32_t(sizeof(T) + 8),
+                                  uint32_t(sizeof(T) + 64)}) {
     SCOPED_TRACE(row_size);
     uint32_t m = 0;
     const Bytes rows = rows_of(list, busy_stack(c).world, row_size, &m);
@@ -99,14 +114,16 @@ void check_refused(Sized<T> list, dfm_world w, const char *type) {
     EXPECT_EQ(list(w, row_size, 0, nullptr, &n), DFM_E_ARG) << type;
     EXPECT_EQ(n, 77u) << type;
     const std::string said = dfm_last_error();
-    for (const std::string &part : {"row_size " + std::to_string(row_size), "sizeof(" + std::string(type) + ")", std::to_string(sizeof(T))})
+    for (const std::string &part : {"row_size " + std::to_string(row_size),
+                                    "sizeof(" + std::string(type) + ")", std::to_string(sizeof(T))})
       EXPECT_NE(said.find(part), std::string::npos) << said;
   }
 }
 
 // By the symbol alone the rows are those of 0.1, which is what the headers have until one grows.
 template <class T>
-void check_symbol(Sized<T> list, dfm_status (*symbol)(dfm_world, uint32_t, T *, uint32_t *), uint32_t first, const char *name) {
+void check_symbol(Sized<T> list, dfm_status (*symbol)(dfm_world, uint32_t, T *, uint32_t *), uint32_t first,
+                  const char *name) {
   SCOPED_TRACE(name);
   test::Context c;
   uint32_t n = 0, m = 0;
@@ -155,7 +172,9 @@ TEST(ListRows, OfASizeThatNoRowHas_AreRefused) {
 }
 
 TEST(ListRows, BySymbolAlone_AreThoseOfTheFirstVersion) {
-  each_list([](auto list, auto symbol, uint32_t first, const char *name) { check_symbol(list, symbol, first, name); });
+  each_list([](auto list, auto symbol, uint32_t first, const char *name) {
+    check_symbol(list, symbol, first, name);
+  });
 }
 
 TEST(ListRows, OfRigidDefs_HaveTheSizeOfTheFirst) {
@@ -175,13 +194,18 @@ TEST(ListRows, OfRigidDefs_HaveTheSizeOfTheFirst) {
     joints[k].body = k;
     joints[k].with = k + 1;
   }
-  for (const int more : {0, 16, -8}) {   // -8: of a rigid body without its user pointer
+  for (const int more : {0, 16, -8}) {  // -8: of a rigid body without its user pointer
     SCOPED_TRACE(more);
     const dfm_world w = test::make_world(c);
     const Bytes bytes = spread(bodies, uint32_t(int(sizeof(dfm_rigid_def)) + more));
     const Bytes ties = spread(joints, uint32_t(sizeof(dfm_joint_def) + (more > 0 ? 16 : 0)));
-    const dfm_rigid_set_def set = {sizeof set, 3, 2, 0, reinterpret_cast<const dfm_rigid_def *>(bytes.data()),
-                                   reinterpret_cast<const dfm_joint_def *>(ties.data()), nullptr};
+    const dfm_rigid_set_def set = {sizeof set,
+                                   3,
+                                   2,
+                                   0,
+                                   reinterpret_cast<const dfm_rigid_def *>(bytes.data()),
+                                   reinterpret_cast<const dfm_joint_def *>(ties.data()),
+                                   nullptr};
     dfm_rigid out[3] = {};
     ASSERT_EQ(dfm_rigid_create(w, nullptr, &set, out), DFM_OK) << dfm_last_error();
     for (int i = 0; i < 3; ++i) {
@@ -198,9 +222,11 @@ TEST(ListRows, OfRigidDefs_HaveTheSizeOfTheFirst) {
   const dfm_rigid_set_def set = {sizeof set, 3, 0, 0, bodies.data(), nullptr, nullptr};
   bodies[1].size -= 8;
   EXPECT_EQ(dfm_rigid_create(w, nullptr, &set, out), DFM_E_ARG);
-  EXPECT_NE(std::string(dfm_last_error()).find("rigid body 1: size is"), std::string::npos) << dfm_last_error();
+  EXPECT_NE(std::string(dfm_last_error()).find("rigid body 1: size is"), std::string::npos)
+      << dfm_last_error();
   bodies[0].size = 0;
   EXPECT_EQ(dfm_rigid_create(w, nullptr, &set, out), DFM_E_ARG);
-  EXPECT_NE(std::string(dfm_last_error()).find("rigid body 0: size is 0"), std::string::npos) << dfm_last_error();
+  EXPECT_NE(std::string(dfm_last_error()).find("rigid body 0: size is 0"), std::string::npos)
+      << dfm_last_error();
   EXPECT_EQ(out[0], 0u);
 }

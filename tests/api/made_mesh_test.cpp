@@ -7,11 +7,15 @@ namespace {
 
 std::string scene_of(const std::string &mesh) {
   return R"({"format": "deform-scene", "version": 1, "time": {"duration": 0.002, "step": 0.001}, "gravity": [0, 0, -9.81],
-    "bodies": [{"name": "b", "mesh": )" + mesh + R"(, "spin": [1, 2, 3]}], "output": {"every": 1}})";
+    "bodies": [{"name": "b", "mesh": )" +
+         mesh + R"(, "spin": [1, 2, 3]}], "output": {"every": 1}})";
 }
 
 // What is written to the terminal and the hash of the state, without its run's folder.
-struct Outcome { test::CommandResult result; std::string hash; };
+struct Outcome {
+  test::CommandResult result;
+  std::string hash;
+};
 Outcome run(const std::string &folder, const std::string &mesh) {
   test::write_file(folder + "/scene.json", scene_of(mesh));
   Outcome r{test::deform({"run", folder + "/scene.json", "--quiet", "--out", folder + "/out"}), ""};
@@ -25,11 +29,16 @@ Outcome run(const std::string &folder, const std::string &mesh) {
 
 TEST(MadeMesh, OfAScene_IsTheOneThatMeshMakeWrites) {
   const std::string folder = test::scratch("made_mesh");
-  const struct { const char *mesh; std::vector<std::string> arguments; } shapes[] = {
-      {R"({"make": "cylinder", "radius": 0.02, "length": 0.16, "cells": 300})", {"cylinder", "--radius", "0.02", "--length", "0.16"}},
-      {R"({"make": "tube", "inner": 0.01, "radius": 0.02, "length": 0.16, "cells": 300})", {"tube", "--inner", "0.01", "--radius", "0.02", "--length", "0.16"}},
-      {R"({"make": "ball", "radius": 0.05, "cells": 300})", {"ball", "--radius", "0.05"}},
-      {R"({"make": "beam", "size": [0.3, 0.1, 0.2], "cells": 300})", {"beam", "--size", "0.3", "0.1", "0.2"}}};
+  const struct {
+    const char *mesh;
+    std::vector<std::string> arguments;
+  } shapes[] = {{R"({"make": "cylinder", "radius": 0.02, "length": 0.16, "cells": 300})",
+                 {"cylinder", "--radius", "0.02", "--length", "0.16"}},
+                {R"({"make": "tube", "inner": 0.01, "radius": 0.02, "length": 0.16, "cells": 300})",
+                 {"tube", "--inner", "0.01", "--radius", "0.02", "--length", "0.16"}},
+                {R"({"make": "ball", "radius": 0.05, "cells": 300})", {"ball", "--radius", "0.05"}},
+                {R"({"make": "beam", "size": [0.3, 0.1, 0.2], "cells": 300})",
+                 {"beam", "--size", "0.3", "0.1", "0.2"}}};
   std::vector<std::string> hashes;
   for (const auto &shape : shapes) {
     std::vector<std::string> arguments{"mesh", "make"};
@@ -43,13 +52,16 @@ TEST(MadeMesh, OfAScene_IsTheOneThatMeshMakeWrites) {
     hashes.push_back(made.hash);
   }
   EXPECT_NE(hashes[0], hashes[1]);
-  const Outcome usual = run(folder, R"({"make": "ball", "radius": 0.05})"), said = run(folder, R"({"make": "ball", "radius": 0.05, "cells": 1000})");
+  const Outcome usual = run(folder, R"({"make": "ball", "radius": 0.05})");
+  const Outcome said = run(folder, R"({"make": "ball", "radius": 0.05, "cells": 1000})");
   EXPECT_EQ(usual.hash, said.hash);
 }
 
 TEST(MadeMesh, WhatDoesNotFit_IsRefusedWithItsPointer) {
   const std::string folder = test::scratch("made_mesh_refused");
-  const struct { const char *mesh, *pointer, *word; } cases[] = {
+  const struct {
+    const char *mesh, *pointer, *word;
+  } cases[] = {
       {R"({"radius": 0.1})", "/bodies/0/mesh", "make"},
       {R"({"make": "cube", "size": [1, 1, 1]})", "/bodies/0/mesh/make", "tube"},
       {R"({"make": "ball"})", "/bodies/0/mesh", "radius"},

@@ -14,18 +14,21 @@ struct Hooks {
   std::atomic<int64_t> calls{0}, live_bytes{0}, live_blocks{0}, wrong_align{0}, fail_from{-1};
   dfm_context_def def() {
     dfm_context_def d = dfm_context_def_default();
-    d.user = this, d.plugin_dir = DEFORM_PLUGIN_DIR;
+    d.user = this;
+    d.plugin_dir = DEFORM_PLUGIN_DIR;
     d.log = [](void *, int32_t, const char *) {};
     d.alloc = [](void *user, size_t bytes, size_t align) -> void * {
       Hooks &h = *static_cast<Hooks *>(user);
       const int64_t call = h.calls++;
       if (h.fail_from >= 0 && call >= h.fail_from) return nullptr;
-      h.live_bytes += int64_t(bytes), ++h.live_blocks;
+      h.live_bytes += int64_t(bytes);
+      ++h.live_blocks;
       return std::aligned_alloc(align, (bytes + align - 1) / align * align + align);
     };
     d.release = [](void *user, void *p, size_t bytes, size_t align) {
       Hooks &h = *static_cast<Hooks *>(user);
-      h.live_bytes -= int64_t(bytes), --h.live_blocks;
+      h.live_bytes -= int64_t(bytes);
+      --h.live_blocks;
       h.wrong_align += reinterpret_cast<uintptr_t>(p) % align != 0;
       std::free(p);
     };
@@ -44,7 +47,8 @@ TEST(Memory, ASettledStep_AllocatesNothing) {
     const test::Stack s = test::make_stack(c);
     std::vector<dfm_contact> contacts(4096);
     std::vector<double> forces(3 * 4096);
-    for (int i = 0; i < 1500; ++i) ASSERT_EQ(dfm_world_step(s.world, 1e-3, nullptr), DFM_OK) << dfm_last_error();
+    for (int i = 0; i < 1500; ++i)
+      ASSERT_EQ(dfm_world_step(s.world, 1e-3, nullptr), DFM_OK) << dfm_last_error();
     ASSERT_EQ(test::pairs(s.world).size(), 2u) << "the bodies rest on each other and on the floor";
     test::events(s.world);
     std::vector<dfm_contact_event> events(65536);
@@ -52,7 +56,9 @@ TEST(Memory, ASettledStep_AllocatesNothing) {
     const uint64_t heap = test::heap_calls;
     uint64_t sticking = 0;
     dfm_status bad = DFM_OK;
-    auto check = [&](dfm_status status) { if (status != DFM_OK) bad = status; };
+    auto check = [&](dfm_status status) {
+      if (status != DFM_OK) bad = status;
+    };
     for (int i = 0; i < 1000; ++i) {
       uint32_t trouble = 0, n = 0;
       check(dfm_world_step(s.world, 1e-3, &trouble));
@@ -91,16 +97,25 @@ TEST(Memory, ASettledStepOnTrianglesAndVoxels_AllocatesNothing) {
     const dfm_world w = test::make_world(c);
     test::set_friction(w, 0.5);
     test::BodyOptions o;
-    o.young = 2e5, o.damping_stiffness = 2e-3;
-    o.name = "left", o.position = {-0.15, 0, 0.0101};
+    o.young = 2e5;
+    o.damping_stiffness = 2e-3;
+    o.name = "left";
+    o.position = {-0.15, 0, 0.0101};
     test::make_body(c, w, "beam", {0.1, 0.1, 0.1}, 60, o);
-    o.name = "right", o.position = {0.45, 0, 1e-4};
+    o.name = "right";
+    o.position = {0.45, 0, 1e-4};
     test::make_body(c, w, "beam", {0.1, 0.1, 0.1}, 60, o);
-    test::add_mesh(w, "hills", test::height_field(0.3, 20, [](double x, double y) { return 0.01 * std::sin(20 * x) * std::cos(30 * y); }));
+    test::add_mesh(w, "hills", test::height_field(0.3, 20, [](double x, double y) {
+                     return 0.01 * std::sin(20 * x) * std::cos(30 * y);
+                   }));
     dfm_obstacle_def d = test::mesh_def("slab", test::Triangles{}, DFM_SHAPE_VOXELS, 4000);
     const test::Triangles slab = test::box_surface({0.2, 0.2, 0.05}, 1);
-    d.npoint = uint32_t(slab.points.size() / 3), d.ntriangle = uint32_t(slab.tris.size() / 3), d.points = slab.points.data(), d.triangles = slab.tris.data();
-    d.pose.position[0] = 0.55, d.pose.position[2] = -0.05;
+    d.npoint = uint32_t(slab.points.size() / 3);
+    d.ntriangle = uint32_t(slab.tris.size() / 3);
+    d.points = slab.points.data();
+    d.triangles = slab.tris.data();
+    d.pose.position[0] = 0.55;
+    d.pose.position[2] = -0.05;
     dfm_obstacle obstacle = 0;
     test::ok(dfm_obstacle_create(w, &d, &obstacle));
     for (int i = 0; i < 2000; ++i) ASSERT_EQ(dfm_world_step(w, 1e-3, nullptr), DFM_OK) << dfm_last_error();
@@ -132,7 +147,9 @@ TEST(Memory, ASettledRollbackStep_AllocatesNothing) {
     ASSERT_EQ(dfm_world_create(c, &d, &w), DFM_OK) << dfm_last_error();
     test::add_plane(w, "floor");
     test::BodyOptions o;
-    o.young = 2e5, o.damping_stiffness = 2e-3, o.position = {0, 0, 1e-4};
+    o.young = 2e5;
+    o.damping_stiffness = 2e-3;
+    o.position = {0, 0, 1e-4};
     test::make_body(c, w, "beam", {0.1, 0.1, 0.1}, 60, o);
     o.position = {0.013, 0.007, 0.1003};
     test::make_body(c, w, "beam", {0.1, 0.1, 0.1}, 60, o);
@@ -162,7 +179,10 @@ TEST(Memory, ASettledCoupledStep_AllocatesNothing) {
   const test::Skin skin = test::box_skin({0.1, 0.1, 0.1}, 6);
   const dfm_surface_def surface = skin.def();
   test::BodyOptions o;
-  o.young = 1e6, o.damping_stiffness = 1e-3, o.position = {0, 0, 2e-5}, o.surface = &surface;
+  o.young = 1e6;
+  o.damping_stiffness = 1e-3;
+  o.position = {0, 0, 2e-5};
+  o.surface = &surface;
   test::make_body(c, w, "beam", {0.1, 0.1, 0.1}, 60, o);
   test::run(w, 0.5, 1e-3);
   const int64_t hook_calls = hooks.calls;
@@ -185,7 +205,10 @@ TEST(Memory, FallingAsleepAndWaking_AllocatesNothing) {
   test::ok(dfm_world_set_sleep(w, true));
   const dfm_obstacle floor = test::add_plane(w, "floor");
   test::BodyOptions o;
-  o.young = 2e5, o.damping_stiffness = 2e-3, o.damping_mass = 20, o.position = {0, 0, 4e-5};
+  o.young = 2e5;
+  o.damping_stiffness = 2e-3;
+  o.damping_mass = 20;
+  o.position = {0, 0, 4e-5};
   const dfm_body near = test::make_body(c, w, "beam", {0.1, 0.1, 0.1}, 60, o);
   o.position[0] = 1;
   const dfm_body far = test::make_body(c, w, "beam", {0.1, 0.1, 0.1}, 60, o);
@@ -206,7 +229,7 @@ TEST(Memory, FallingAsleepAndWaking_AllocatesNothing) {
     EXPECT_EQ(test::stats(w).asleep, 0u);
     return slept && woke;
   };
-  for (int i = 0; i < 3; ++i) round();   // buffers find their size
+  for (int i = 0; i < 3; ++i) round();  // buffers find their size
   const int64_t hook_calls = hooks.calls;
   const uint64_t heap = test::heap_calls;
   EXPECT_TRUE(round());
@@ -248,7 +271,8 @@ TEST(Memory, ParametersThatFindNoMemory_SayWhyAndChangeNothing) {
   EXPECT_EQ(hooks.live_bytes, 0);
 }
 
-// Everything from the context to a step in contact, with the allocator failing at the n-th call, for all n that are ever reached.
+// Everything from the context to a step in contact, with the allocator failing at the n-th call, for all n
+// that are ever reached.
 TEST(Memory, WhenTheNthAllocationFails_TheCallFailsCleanlyAndNothingLeaks) {
   const test::Triangles slab = test::box_surface({0.2, 0.2, 0.05}, 1);
   int failures[4] = {};
@@ -272,7 +296,9 @@ TEST(Memory, WhenTheNthAllocationFails_TheCallFailsCleanlyAndNothingLeaks) {
       dfm_obstacle floor = 0;
       const dfm_obstacle_def od = dfm_obstacle_def_default();
       dfm_friction_def remembers{};
-      remembers.size = sizeof remembers, remembers.between[0] = remembers.between[1] = "*", remembers.law = "test.bristle";
+      remembers.size = sizeof remembers;
+      remembers.between[0] = remembers.between[1] = "*";
+      remembers.law = "test.bristle";
       if (status == DFM_OK) status = dfm_plugin_register_static(c, dfm_plugin_entry_bristle, "bristle");
       if (status == DFM_OK) status = dfm_world_add_friction(world, &remembers);
       if (status == DFM_OK) status = dfm_obstacle_create(world, &od, &floor);
@@ -288,10 +314,13 @@ TEST(Memory, WhenTheNthAllocationFails_TheCallFailsCleanlyAndNothingLeaks) {
         dfm_tetmesh_info info{};
         test::ok(dfm_tetmesh_get_info(mesh, &info));
         dfm_body_def bd = dfm_body_def_default();
-        bd.npoint = info.npoint, bd.ntet = info.ntet;
+        bd.npoint = info.npoint;
+        bd.ntet = info.ntet;
         test::ok(dfm_tetmesh_data(mesh, &bd.points, &bd.tets, nullptr));
         for (int k = 0; k < 2 && status == DFM_OK; ++k) {
-          bd.pose.position[2] = 0.0501 + 0.1002 * k, bd.velocity[2] = -0.1, bd.surface = k ? &surface : nullptr;
+          bd.pose.position[2] = 0.0501 + 0.1002 * k;
+          bd.velocity[2] = -0.1;
+          bd.surface = k ? &surface : nullptr;
           status = dfm_body_create(world, &bd, &bodies[k]);
         }
       }
@@ -302,10 +331,12 @@ TEST(Memory, WhenTheNthAllocationFails_TheCallFailsCleanlyAndNothingLeaks) {
           status = dfm_world_step(world, 1e-3, nullptr);
           EXPECT_TRUE(status == DFM_OK || dfm_world_hash(world) == before) << "allocation " << n;
         }
-        if (status == DFM_OK) through = true;
-        else {  // with memory again, the world goes on
+        if (status == DFM_OK) {
+          through = true;
+        } else {  // with memory again, the world goes on
           hooks.fail_from = -1;
-          for (int i = 0; i < 3; ++i) EXPECT_EQ(dfm_world_step(world, 1e-3, nullptr), DFM_OK) << dfm_last_error();
+          for (int i = 0; i < 3; ++i)
+            EXPECT_EQ(dfm_world_step(world, 1e-3, nullptr), DFM_OK) << dfm_last_error();
         }
       } else if (world) {  // what was refused is not there; the rest is
         uint32_t count = 0;
@@ -316,7 +347,8 @@ TEST(Memory, WhenTheNthAllocationFails_TheCallFailsCleanlyAndNothingLeaks) {
       }
     }
     if (status != DFM_OK) {
-      EXPECT_EQ(status, DFM_E_NOMEM) << "allocation " << n << " at stage " << stage << ": " << dfm_last_error();
+      EXPECT_EQ(status, DFM_E_NOMEM) << "allocation " << n << " at stage " << stage << ": "
+                                     << dfm_last_error();
       ++failures[stage];
     }
     dfm_context_destroy(c);

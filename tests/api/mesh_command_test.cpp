@@ -17,7 +17,9 @@
 namespace {
 
 std::string folder() { return test::scratch("mesh_command"); }
-std::string own(const std::string &name) { return std::string(DEFORM_SOURCE_DIR) + "/tests/data/meshes/" + name; }
+std::string own(const std::string &name) {
+  return std::string(DEFORM_SOURCE_DIR) + "/tests/data/meshes/" + name;
+}
 bool has(const std::string &text, const std::string &word) { return text.find(word) != std::string::npos; }
 size_t lines(const std::string &text) { return size_t(std::count(text.begin(), text.end(), '\n')); }
 
@@ -34,27 +36,32 @@ void expect_refused(const std::vector<std::string> &args, const std::vector<std:
 TEST(MeshCommand, Info_PrintsCountsGroupsAndWarnings) {
   const auto r = test::deform({"mesh", "info", own("cube_msh41_ascii.msh")});
   EXPECT_EQ(r.exit_code, 0) << r.err;
-  for (const char *word : {"points            8", "tetrahedra        6", "surface triangles 12", "edges             19",
-                           "volume            1 m3", "skin (triangles, 8 points)", "high end (cells, 6 points)",
-                           "warning: 1 point that no tetrahedron uses was dropped"})
+  for (const char *word :
+       {"points            8", "tetrahedra        6", "surface triangles 12", "edges             19",
+        "volume            1 m3", "skin (triangles, 8 points)", "high end (cells, 6 points)",
+        "warning: 1 point that no tetrahedron uses was dropped"})
     EXPECT_TRUE(has(r.out, word)) << word << " not in\n" << r.out;
 }
 
 TEST(MeshCommand, InfoAsJson_HoldsTheSame) {
   const auto r = test::deform({"mesh", "info", "--json", own("cube_msh22_bin_be.msh")});
   EXPECT_EQ(r.exit_code, 0) << r.err;
-  for (const char *word : {"\"points\": 8", "\"tets\": 6", "\"surface_triangles\": 12", "\"edges\": 19", "\"pieces\": 1",
-                           "\"dropped_points\": 1", "\"name\": \"high end\""})
+  for (const char *word : {"\"points\": 8", "\"tets\": 6", "\"surface_triangles\": 12", "\"edges\": 19",
+                           "\"pieces\": 1", "\"dropped_points\": 1", "\"name\": \"high end\""})
     EXPECT_TRUE(has(r.out, word)) << word << " not in\n" << r.out;
 }
 
-// Ctrl-C in work that would take long: the command ends by the signal, and what lay under the name that it was to write is still there, alone.
+// Ctrl-C in work that would take long: the command ends by the signal, and what lay under the name that it
+// was to write is still there, alone.
 TEST(MeshCommand, InterruptedWork_EndsAndLeavesTheOldFile) {
   const std::string dir = folder() + "/interrupted", ball = folder() + "/interrupted_ball.obj";
-  ASSERT_EQ(test::deform({"mesh", "make", "ball", "--surface", "--cells", "2000", "--quiet", "--out", ball}).exit_code, 0);
+  ASSERT_EQ(test::deform({"mesh", "make", "ball", "--surface", "--cells", "2000", "--quiet", "--out", ball})
+                .exit_code,
+            0);
   const std::string out = dir + "/old.msh";
-  const std::vector<std::vector<std::string>> work = {{DEFORM_COMMAND, "mesh", "fill", ball, "--cells", "50000000", "--quiet", "--out", out},
-                                                      {DEFORM_COMMAND, "mesh", "make", "ball", "--cells", "50000000", "--quiet", "--out", out}};
+  const std::vector<std::vector<std::string>> work = {
+      {DEFORM_COMMAND, "mesh", "fill", ball, "--cells", "50000000", "--quiet", "--out", out},
+      {DEFORM_COMMAND, "mesh", "make", "ball", "--cells", "50000000", "--quiet", "--out", out}};
   for (const auto &arguments : work) {
     std::filesystem::remove_all(dir);
     std::filesystem::create_directories(dir);
@@ -72,7 +79,9 @@ TEST(MeshCommand, InterruptedWork_EndsAndLeavesTheOldFile) {
 
 TEST(MeshCommand, Make_WritesEachShape) {
   const std::vector<std::vector<std::string>> shapes = {
-      {"cylinder", "--radius", "0.2", "--length", "1"}, {"beam", "--size", "1", "0.1", "0.2"}, {"ball", "--radius", "0.05"},
+      {"cylinder", "--radius", "0.2", "--length", "1"},
+      {"beam", "--size", "1", "0.1", "0.2"},
+      {"ball", "--radius", "0.05"},
       {"tube", "--inner", "0.1", "--radius", "0.2", "--length", "0.5"}};
   for (const auto &shape : shapes)
     for (const char *ending : {".msh", ".msh2", ".vtk", ".vtu", ".mesh"}) {
@@ -95,8 +104,10 @@ TEST(MeshCommand, Convert_ThereAndBackKeepsTheBytes) {
 }
 
 TEST(MeshCommand, MakeSurface_ByEndingOrByFlag) {
-  const std::vector<std::vector<std::string>> shapes = {{"cylinder", "--radius", "0.2", "--length", "1"}, {"beam", "--size", "1", "0.1", "0.2"},
-                                                        {"ball", "--radius", "0.05"}, {"tube", "--inner", "0.1", "--radius", "0.2"},
+  const std::vector<std::vector<std::string>> shapes = {{"cylinder", "--radius", "0.2", "--length", "1"},
+                                                        {"beam", "--size", "1", "0.1", "0.2"},
+                                                        {"ball", "--radius", "0.05"},
+                                                        {"tube", "--inner", "0.1", "--radius", "0.2"},
                                                         {"torus", "--ring", "0.3", "--radius", "0.1"}};
   for (const auto &shape : shapes)
     for (const char *ending : {".obj", ".ply", ".stl", ".off", ".vtk", ".vtu"}) {
@@ -110,23 +121,29 @@ TEST(MeshCommand, MakeSurface_ByEndingOrByFlag) {
       EXPECT_EQ(told.exit_code, 0) << told.err;
       EXPECT_TRUE(has(told.out, "\"kind\": \"surface\"") && has(told.out, "\"open_edges\": 0")) << told.out;
     }
-  const auto plain = test::deform({"mesh", "make", "ball", "--out", folder() + "/plain.obj", "--cells", "100"});
+  const auto plain =
+      test::deform({"mesh", "make", "ball", "--out", folder() + "/plain.obj", "--cells", "100"});
   EXPECT_TRUE(has(plain.out, "plain.obj: 42 points, 80 triangles, closed, least quality")) << plain.out;
 }
 
 TEST(MeshCommand, InfoOfASurface_TellsHolesGroupsAndRepairs) {
   const std::string file = folder() + "/open.obj";
-  test::write_file(file, "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nv 5 5 5\ng sole\nf 1 3 2\ng side\nf 1 2 4\nf 1 3 4\n");
+  test::write_file(
+      file, "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nv 5 5 5\ng sole\nf 1 3 2\ng side\nf 1 2 4\nf 1 3 4\n");
   const auto r = test::deform({"mesh", "info", file});
   EXPECT_EQ(r.exit_code, 0) << r.err;
-  for (const char *word : {"points            4", "triangles         3", "pieces            1", "group             sole (1 triangles)",
-                           "closed            no, 3 open edges around 1 hole, 0 edges of more than two triangles", "area              1.5 m2",
-                           "0.8 to 0.9      3         ########", "warning: 1 of 3 triangles faced the wrong way and was turned",
-                           "warning: 1 point that no triangle uses was dropped"})
+  for (const char *word :
+       {"points            4", "triangles         3", "pieces            1",
+        "group             sole (1 triangles)",
+        "closed            no, 3 open edges around 1 hole, 0 edges of more than two triangles",
+        "area              1.5 m2", "0.8 to 0.9      3         ########",
+        "warning: 1 of 3 triangles faced the wrong way and was turned",
+        "warning: 1 point that no triangle uses was dropped"})
     EXPECT_TRUE(has(r.out, word)) << word << " not in\n" << r.out;
   const auto json = test::deform({"mesh", "info", "--json", file});
-  for (const char *word : {"\"kind\": \"surface\"", "\"triangles\": 3", "\"turned\": 1", "\"holes\": 1", "\"open_edges\": 3", "\"dropped_points\": 1",
-                           "\"name\": \"side\"", "\"triangles\": 2"})
+  for (const char *word :
+       {"\"kind\": \"surface\"", "\"triangles\": 3", "\"turned\": 1", "\"holes\": 1", "\"open_edges\": 3",
+        "\"dropped_points\": 1", "\"name\": \"side\"", "\"triangles\": 2"})
     EXPECT_TRUE(has(json.out, word)) << word << " not in\n" << json.out;
 }
 
@@ -144,26 +161,37 @@ TEST(MeshCommand, ConvertCellsToASurface_WritesTheBoundaryAndSaysSo) {
 }
 
 TEST(MeshCommand, ConvertSurfaces_ThereAndBackKeepsTheBytes) {
-  const std::string a = folder() + "/s.ply", b = folder() + "/s.obj", c = folder() + "/s.vtu", d = folder() + "/s.off", e = folder() + "/t.ply";
+  const std::string a = folder() + "/s.ply";
+  const std::string b = folder() + "/s.obj";
+  const std::string c = folder() + "/s.vtu";
+  const std::string d = folder() + "/s.off";
+  const std::string e = folder() + "/t.ply";
   ASSERT_EQ(test::deform({"mesh", "make", "torus", "--out", a, "--cells", "300", "--quiet"}).exit_code, 0);
-  for (const auto &[from, to] : {std::pair{a, b}, {b, c}, {c, d}, {d, e}}) ASSERT_EQ(test::deform({"mesh", "convert", from, to}).exit_code, 0);
+  for (const auto &[from, to] : {std::pair{a, b}, {b, c}, {c, d}, {d, e}})
+    ASSERT_EQ(test::deform({"mesh", "convert", from, to}).exit_code, 0);
   EXPECT_EQ(test::read_file(a), test::read_file(e));
 }
 
 TEST(MeshCommand, ConvertWithGroups_SaysWhatIsLost) {
   const std::string file = folder() + "/groups.obj";
   test::write_file(file, "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 1 1 0\ng a\nf 1 2 3\ng b\nf 2 4 3\n");
-  EXPECT_TRUE(has(test::deform({"mesh", "convert", file, folder() + "/groups.off"}).err, "not kept: 2 groups of triangles")) << "OFF has none";
-  EXPECT_TRUE(has(test::deform({"mesh", "convert", file, folder() + "/groups.ply"}).err, "not kept: names of groups")) << "PLY has numbers";
+  EXPECT_TRUE(has(test::deform({"mesh", "convert", file, folder() + "/groups.off"}).err,
+                  "not kept: 2 groups of triangles"))
+      << "OFF has none";
+  EXPECT_TRUE(
+      has(test::deform({"mesh", "convert", file, folder() + "/groups.ply"}).err, "not kept: names of groups"))
+      << "PLY has numbers";
   const auto kept = test::deform({"mesh", "convert", file, folder() + "/groups.vtu"});
   EXPECT_FALSE(has(kept.err, "not kept")) << kept.err;
-  EXPECT_TRUE(has(test::deform({"mesh", "info", folder() + "/groups.vtu"}).out, "group             b (1 triangles)"));
+  EXPECT_TRUE(
+      has(test::deform({"mesh", "info", folder() + "/groups.vtu"}).out, "group             b (1 triangles)"));
 }
 
 // A triangle in glTF: read where the command is built with assimp, else a sentence that says how.
 TEST(MeshCommand, ConvertForeignFormat_ReadsItOrSaysHow) {
   const std::string file = folder() + "/triangle.gltf", out = folder() + "/triangle.obj";
-  test::write_file(file, R"({"asset":{"version":"2.0"},"scene":0,"scenes":[{"nodes":[0]}],"nodes":[{"mesh":0}],
+  test::write_file(file,
+                   R"({"asset":{"version":"2.0"},"scene":0,"scenes":[{"nodes":[0]}],"nodes":[{"mesh":0}],
     "meshes":[{"primitives":[{"attributes":{"POSITION":1},"indices":0}]}],
     "buffers":[{"uri":"data:application/octet-stream;base64,AAABAAIAAAAAAAAAAAAAAAAAAAAAAIA/AAAAAAAAAAAAAAAAAACAPwAAAAA=","byteLength":44}],
     "bufferViews":[{"buffer":0,"byteOffset":0,"byteLength":6,"target":34963},{"buffer":0,"byteOffset":8,"byteLength":36,"target":34962}],
@@ -171,7 +199,8 @@ TEST(MeshCommand, ConvertForeignFormat_ReadsItOrSaysHow) {
       {"bufferView":1,"byteOffset":0,"componentType":5126,"count":3,"type":"VEC3","max":[1,1,0],"min":[0,0,0]}]})");
   const auto r = test::deform({"mesh", "convert", file, out});
   if (has(r.err, "built without")) {
-    expect_refused({"mesh", "convert", file, out}, {"triangle.gltf", ".gltf is read through assimp", "libassimp-dev", "DEFORM_ASSIMP=ON"});
+    expect_refused({"mesh", "convert", file, out},
+                   {"triangle.gltf", ".gltf is read through assimp", "libassimp-dev", "DEFORM_ASSIMP=ON"});
     EXPECT_FALSE(std::filesystem::exists(out));
   } else {
     EXPECT_EQ(r.exit_code, 0) << r.err;
@@ -184,8 +213,9 @@ TEST(MeshCommand, ConvertForeignFormat_ReadsItOrSaysHow) {
 
 TEST(MeshCommand, BadInput_ExitsTwoWithOneSentence) {
   test::write_file(folder() + "/flat.vtk",
-      "# vtk DataFile Version 3.0\nt\nASCII\nDATASET UNSTRUCTURED_GRID\nPOINTS 4 double\n0 0 0\n1 0 0\n0 1 0\n1 1 0\n"
-      "CELLS 1 5\n4 0 1 2 3\nCELL_TYPES 1\n10\n");
+                   "# vtk DataFile Version 3.0\nt\nASCII\nDATASET UNSTRUCTURED_GRID\nPOINTS 4 double\n0 0 "
+                   "0\n1 0 0\n0 1 0\n1 1 0\n"
+                   "CELLS 1 5\n4 0 1 2 3\nCELL_TYPES 1\n10\n");
   test::write_file(folder() + "/points.obj", "v 0 0 0\n");
   test::write_file(folder() + "/sheet.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n");
   test::write_file(folder() + "/line.obj", "v 0 0 0\nv 1 0 0\nv 2 0 0\nf 1 2 3\n");
@@ -201,20 +231,24 @@ TEST(MeshCommand, BadInput_ExitsTwoWithOneSentence) {
   expect_refused({"mesh", "convert", own("cube_vtk20_ascii.vtk"), folder() + "/x.xyz"}, {"x.xyz", ".msh"});
   expect_refused({"mesh", "make", "torus", "--out", ball}, {"torus", "surface", "fill"});
   expect_refused({"mesh", "make", "ball", "--surface", "--out", ball}, {"never.msh", ".obj"});
-  expect_refused({"mesh", "make", "tube", "--inner", "0.3", "--radius", "0.2", "--out", ball}, {"inner radius is 0.3 m"});
-  expect_refused({"mesh", "make", "torus", "--ring", "0.1", "--radius", "0.2", "--out", folder() + "/t.obj"}, {"torus", "0.2 m"});
+  expect_refused({"mesh", "make", "tube", "--inner", "0.3", "--radius", "0.2", "--out", ball},
+                 {"inner radius is 0.3 m"});
+  expect_refused({"mesh", "make", "torus", "--ring", "0.1", "--radius", "0.2", "--out", folder() + "/t.obj"},
+                 {"torus", "0.2 m"});
   expect_refused({"mesh", "make", "ball", "--out", folder() + "/none/b.msh"}, {"none/b.msh", "No such file"});
   expect_refused({"mesh", "make", "ball", "--out", ball, "--radius", "-1"}, {"radius", "-1", "above 0"});
   expect_refused({"mesh", "make", "ball", "--out", ball, "--radius", "nan"}, {"radius"});
   expect_refused({"mesh", "make", "ball", "--out", ball, "--cells", "0"}, {"cells is 0"});
   expect_refused({"mesh", "make", "ball", "--out", folder() + "/b.obj", "--cells", "0"}, {"triangles is 0"});
   for (const char *wrong : {"-5", "1e9", "1.5", "many", "99999999999999999999"})
-    for (const std::vector<std::string> &call : {std::vector<std::string>{"mesh", "make", "ball"}, {"mesh", "fill", sheet}}) {
+    for (const std::vector<std::string> &call :
+         {std::vector<std::string>{"mesh", "make", "ball"}, {"mesh", "fill", sheet}}) {
       std::vector<std::string> args = call;
       args.insert(args.end(), {"--out", ball, "--cells", wrong});
       expect_refused(args, {"--cells", "whole number", std::string("found \"") + wrong + "\""});
     }
-  expect_refused({"mesh", "make", "ball", "--out", ball, "--radius", "wide"}, {"--radius", "expected a number, found \"wide\""});
+  expect_refused({"mesh", "make", "ball", "--out", ball, "--radius", "wide"},
+                 {"--radius", "expected a number, found \"wide\""});
   expect_refused({"mesh", "make", "ball"}, {"--out"});
   expect_refused({"mesh", "make", "bal", "--out", ball}, {"bal", "ball"});
   expect_refused({"mesh", "inof", ball}, {"inof", "info"});
@@ -224,7 +258,8 @@ TEST(MeshCommand, BadInput_ExitsTwoWithOneSentence) {
 TEST(MeshApi, Read_TellsWarningsAndLends) {
   test::LoggedContext c;
   dfm_tetmesh mesh = 0;
-  ASSERT_EQ(dfm_tetmesh_read(c.context, own("cube_msh41_bin_be.msh").c_str(), &mesh), DFM_OK) << dfm_last_error();
+  ASSERT_EQ(dfm_tetmesh_read(c.context, own("cube_msh41_bin_be.msh").c_str(), &mesh), DFM_OK)
+      << dfm_last_error();
   EXPECT_TRUE(has(c.log, "cube_msh41_bin_be.msh: 1 point that no tetrahedron uses was dropped")) << c.log;
   dfm_tetmesh_info info = {};
   info.size = sizeof info;
@@ -289,8 +324,10 @@ TEST(MeshApi, WrongArguments_LeaveTheOutputAlone) {
 TEST(MeshApi, SurfaceGroupInAScene_HoldsItsPoints) {
   const auto top_after_a_step = [](const std::string &fix) {
     const std::string scene = folder() + "/group" + std::to_string(fix.size()) + ".json";
-    test::write_file(scene, "{\"format\": \"deform-scene\", \"version\": 1, \"time\": {\"duration\": 1, \"step\": 0.0001}, \"bodies\": "
-                            "[{\"name\": \"cube\", \"mesh\": \"" + own("cube_msh41_ascii.msh") + "\"" + fix + "}]}");
+    test::write_file(scene,
+                     "{\"format\": \"deform-scene\", \"version\": 1, \"time\": {\"duration\": 1, \"step\": "
+                     "0.0001}, \"bodies\": [{\"name\": \"cube\", \"mesh\": \"" +
+                         own("cube_msh41_ascii.msh") + "\"" + fix + "}]}");
     test::LoggedContext c;
     dfm_world world = 0;
     dfm_body body = 0;

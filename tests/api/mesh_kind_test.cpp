@@ -1,4 +1,5 @@
-// dfm_mesh_file_kind and dfm_mesh_read: whether a body takes its cells from a file or is filled from its surface.
+// dfm_mesh_file_kind and dfm_mesh_read: whether a body takes its cells from a file or is filled
+// from its surface.
 #include <gtest/gtest.h>
 
 #include "deform/deform.h"
@@ -22,7 +23,8 @@ struct Context {
 
 TEST(MeshKind, FileWithAnyTetrahedron_IsTets) {
   Context c;
-  for (const char *name : {"meshes/cube_msh41_ascii.msh", "meshes/cube_vtk51_bin_64.vtk", "meshes/cube_vtu_raw_zlib.vtu", "meshes/cube_medit.mesh"}) {
+  for (const char *name : {"meshes/cube_msh41_ascii.msh", "meshes/cube_vtk51_bin_64.vtk",
+                           "meshes/cube_vtu_raw_zlib.vtu", "meshes/cube_medit.mesh"}) {
     uint32_t kind = 0;
     EXPECT_EQ(dfm_mesh_file_kind(c.context, (kData + name).c_str(), &kind), DFM_OK) << dfm_last_error();
     EXPECT_EQ(kind, uint32_t(DFM_MESH_TETS)) << name;
@@ -31,9 +33,11 @@ TEST(MeshKind, FileWithAnyTetrahedron_IsTets) {
 
 TEST(MeshKind, FileWithTrianglesAlone_IsSurface) {
   Context c;
-  for (const char *name : {"obj.obj", "ply_big.ply", "stl_binary.stl", "off.off", "msh22.msh", "vtk_polydata.vtk", "vtp.vtp", "medit.mesh"}) {
+  for (const char *name : {"obj.obj", "ply_big.ply", "stl_binary.stl", "off.off", "msh22.msh",
+                           "vtk_polydata.vtk", "vtp.vtp", "medit.mesh"}) {
     uint32_t kind = 0;
-    EXPECT_EQ(dfm_mesh_file_kind(c.context, (kData + "surfaces/cube_" + name).c_str(), &kind), DFM_OK) << dfm_last_error();
+    EXPECT_EQ(dfm_mesh_file_kind(c.context, (kData + "surfaces/cube_" + name).c_str(), &kind), DFM_OK)
+        << dfm_last_error();
     EXPECT_EQ(kind, uint32_t(DFM_MESH_SURFACE)) << name;
   }
 }
@@ -45,7 +49,8 @@ TEST(MeshKind, NothingToMakeABodyOf_IsAnError) {
   test::write_file(folder + "/a.inp", "*NODE\n");
   uint32_t kind = 77;
   EXPECT_EQ(dfm_mesh_file_kind(c.context, (folder + "/points.obj").c_str(), &kind), DFM_E_FORMAT);
-  EXPECT_NE(std::string(dfm_last_error()).find("no tetrahedra and no triangles"), std::string::npos) << dfm_last_error();
+  EXPECT_NE(std::string(dfm_last_error()).find("no tetrahedra and no triangles"), std::string::npos)
+      << dfm_last_error();
   EXPECT_EQ(dfm_mesh_file_kind(c.context, (folder + "/a.inp").c_str(), &kind), DFM_E_UNSUPPORTED);
   EXPECT_EQ(dfm_mesh_file_kind(c.context, (folder + "/none.msh").c_str(), &kind), DFM_E_IO);
   EXPECT_EQ(dfm_mesh_file_kind(nullptr, "a.msh", &kind), DFM_E_ARG);
@@ -93,7 +98,9 @@ TEST(MeshKind, ReadOnceOfNothing_IsAnErrorAndTouchesNothing) {
   EXPECT_EQ(dfm_mesh_read(c.context, (folder + "/points.obj").c_str(), &cells, &surface), DFM_E_FORMAT);
   EXPECT_EQ(dfm_mesh_read(c.context, (folder + "/none.msh").c_str(), &cells, &surface), DFM_E_IO);
   EXPECT_EQ(dfm_mesh_read(c.context, (folder + "/a.glb").c_str(), &cells, &surface), DFM_E_UNSUPPORTED);
-  EXPECT_NE(std::string(dfm_last_error()).find("the library itself reads no glTF files; convert it first: deform mesh convert"), std::string::npos)
+  EXPECT_NE(std::string(dfm_last_error())
+                .find("the library itself reads no glTF files; convert it first: deform mesh convert"),
+            std::string::npos)
       << dfm_last_error();
   EXPECT_EQ(dfm_mesh_read(nullptr, "a.msh", &cells, &surface), DFM_E_ARG);
   EXPECT_EQ(dfm_mesh_read(c.context, "a.msh", nullptr, &surface), DFM_E_ARG);

@@ -1,4 +1,5 @@
-// Obstacles of triangles and voxels through the public API: what is refused and how, what comes back, rays, snapshots, threads, the scene's keys.
+// Obstacles of triangles and voxels through the public API: what is refused and how, what comes back, rays,
+// snapshots, threads, the scene's keys.
 #include "obstacle.h"
 
 #include <unistd.h>
@@ -23,15 +24,20 @@ struct Mixed {
   explicit Mixed(uint32_t threads, const test::Triangles &floor) : context(threads) {
     world = test::make_world(context);
     test::BodyOptions o;
-    o.young = 2e5, o.damping_stiffness = 1e-3;
-    o.name = "block", o.position = {-0.05, -0.05, 0.03};
+    o.young = 2e5;
+    o.damping_stiffness = 1e-3;
+    o.name = "block";
+    o.position = {-0.05, -0.05, 0.03};
     test::make_body(context, world, "beam", {0.1, 0.1, 0.1}, 300, o);
-    o.name = "ball", o.position = {0.2, 0, 0.1};
+    o.name = "ball";
+    o.position = {0.2, 0, 0.1};
     test::make_body(context, world, "ball", {0.05, 0, 0}, 300, o);
     test::set_friction(world, 0.4);
     dfm_obstacle_def d = test::mesh_def("floor", floor);
-    const dfm_pose_key keys[2] = {{0, {{0, 0, 0}, {0, 0, 0, 1}}}, {1, {{0.1, 0, 0.02}, {0, 0, 0.1, 0.99498744}}}};
-    d.nkey = 2, d.keys = keys;
+    const dfm_pose_key keys[2] = {{0, {{0, 0, 0}, {0, 0, 0, 1}}},
+                                  {1, {{0.1, 0, 0.02}, {0, 0, 0.1, 0.99498744}}}};
+    d.nkey = 2;
+    d.keys = keys;
     dfm_obstacle obstacle = 0;
     test::ok(dfm_obstacle_create(world, &d, &obstacle));
     d = test::mesh_def("wall", box(), DFM_SHAPE_VOXELS, 8000);
@@ -58,7 +64,10 @@ TEST(MeshObstacle, WhatIsWrong_IsSaid) {
   twice.tris[4] = twice.tris[3];
   for (size_t t = 0; t < inward.tris.size(); t += 3) std::swap(inward.tris[t], inward.tris[t + 1]);
   open.tris.resize(open.tris.size() - 3);
-  struct Case { dfm_obstacle_def def; std::vector<const char *> words; };
+  struct Case {
+    dfm_obstacle_def def;
+    std::vector<const char *> words;
+  };
   dfm_obstacle_def none = test::mesh_def("m", box()), few = test::mesh_def("m", box(), DFM_SHAPE_VOXELS, 63);
   none.points = nullptr;
   const Case cases[] = {
@@ -73,12 +82,13 @@ TEST(MeshObstacle, WhatIsWrong_IsSaid) {
   for (const Case &c : cases) {
     dfm_obstacle o = 0;
     EXPECT_EQ(dfm_obstacle_create(w, &c.def, &o), DFM_E_ARG);
-    for (const char *word : c.words) EXPECT_NE(std::strstr(dfm_last_error(), word), nullptr) << word << " in: " << dfm_last_error();
+    for (const char *word : c.words)
+      EXPECT_NE(std::strstr(dfm_last_error(), word), nullptr) << word << " in: " << dfm_last_error();
   }
   uint32_t n = 1;
   test::ok(dfm_world_obstacles(w, 0, nullptr, &n));
   EXPECT_EQ(n, 0u);
-  test::add_mesh(w, "m", open);   // a mesh may be open, or face inward: a room
+  test::add_mesh(w, "m", open);  // a mesh may be open, or face inward: a room
   test::add_mesh(w, "n", inward);
 }
 
@@ -105,7 +115,9 @@ TEST(MeshObstacle, Ray_MeetsItWhereItIs) {
     test::Context context;
     const dfm_world w = test::make_world(context);
     dfm_obstacle_def d = test::mesh_def("box", box(), shape, 1000);
-    d.pose.position[2] = 1, d.pose.rotation[1] = std::sqrt(0.5), d.pose.rotation[3] = std::sqrt(0.5);   // local x down
+    d.pose.position[2] = 1;
+    d.pose.rotation[1] = std::sqrt(0.5);
+    d.pose.rotation[3] = std::sqrt(0.5);  // local x down
     dfm_obstacle o = 0;
     test::ok(dfm_obstacle_create(w, &d, &o));
     dfm_ray_hit hit{};
@@ -146,7 +158,9 @@ TEST(MeshObstacle, Moved_ByTargetsCarriesAndIsWhereItWasSent) {
   test::Context context;
   const dfm_world w = test::make_world(context);
   test::BodyOptions o;
-  o.young = 1e6, o.damping_stiffness = 1e-3, o.position = {-0.05, -0.05, 0.1001};
+  o.young = 1e6;
+  o.damping_stiffness = 1e-3;
+  o.position = {-0.05, -0.05, 0.1001};
   const dfm_body body = test::make_body(context, w, "beam", {0.1, 0.1, 0.1}, 60, o);
   test::set_friction(w, 0.5);
   const dfm_obstacle slab = test::add_mesh(w, "slab", box());
@@ -178,7 +192,8 @@ TEST(MeshObstacleScene, Keys_AreReadAndChecked) {
     test::ok(dfm_trimesh_create(context, d.npoint, d.points, d.ntriangle, d.triangles, &sheet));
     test::ok(dfm_trimesh_write(sheet, (dir + "/sheet.obj").c_str()));
   }
-  test::write_file(dir + "/scene.json", R"({"format": "deform-scene", "version": 1, "time": {"duration": 0.1, "step": 0.001},
+  test::write_file(dir + "/scene.json",
+                   R"({"format": "deform-scene", "version": 1, "time": {"duration": 0.1, "step": 0.001},
     "bodies": [{"name": "block", "mesh": "block.msh", "pose": {"position": [0.2, 0.2, 0.101]}}],
     "obstacles": [{"name": "slab", "shape": "mesh", "mesh": "slab.ply", "pose": {"scale": 0.5}}], "output": {"every": 0.05}})");
   const auto run = [&](const std::string &set) {
@@ -186,9 +201,10 @@ TEST(MeshObstacleScene, Keys_AreReadAndChecked) {
     if (!set.empty()) arguments.insert(arguments.end(), {"--set", set});
     return test::deform(arguments);
   };
-  const char *const good_sets[] = {"", R"(/obstacles/0/shape="voxels")",
-                                   R"(/obstacles/0={"name":"slab","shape":"voxels","mesh":"slab.ply","cells":4000,"pose":{"scale":0.5}})",
-                                   R"(/obstacles/0={"name":"slab","shape":"mesh","mesh":"block.msh","pose":{"position":[0.2,0.2,0]}})"};
+  const char *const good_sets[] = {
+      "", R"(/obstacles/0/shape="voxels")",
+      R"(/obstacles/0={"name":"slab","shape":"voxels","mesh":"slab.ply","cells":4000,"pose":{"scale":0.5}})",
+      R"(/obstacles/0={"name":"slab","shape":"mesh","mesh":"block.msh","pose":{"position":[0.2,0.2,0]}})"};
   for (const char *good : good_sets) {
     const test::CommandResult r = run(good);
     EXPECT_EQ(r.exit_code, 0) << good << r.err;
@@ -203,16 +219,21 @@ TEST(MeshObstacleScene, Keys_AreReadAndChecked) {
       {R"(/obstacles/0={"name":"s","shape":"mesh"})", {"/obstacles/0", "mesh"}},
       {R"(/obstacles/0/mesh="none.obj")", {"/obstacles/0/mesh", "none.obj"}},
       {R"(/obstacles/0/cells=100)", {"/obstacles/0/cells", "voxels"}},
-      {R"(/obstacles/0={"name":"s","shape":"voxels","mesh":"slab.ply","cells":10})", {"/obstacles/0/cells", "64"}},
-      {R"(/obstacles/0={"name":"s","shape":"voxels","mesh":"slab.ply","cells":100.5})", {"/obstacles/0/cells", "whole"}},
-      {R"(/obstacles/0={"name":"s","shape":"voxels","mesh":"sheet.obj"})", {"/obstacles/0", "closed", "shape mesh"}},
-      {R"(/obstacles/0={"name":"s","shape":"sphere","radius":1,"pose":{"scale":2}})", {"/obstacles/0/pose/scale", "mesh and voxels"}},
+      {R"(/obstacles/0={"name":"s","shape":"voxels","mesh":"slab.ply","cells":10})",
+       {"/obstacles/0/cells", "64"}},
+      {R"(/obstacles/0={"name":"s","shape":"voxels","mesh":"slab.ply","cells":100.5})",
+       {"/obstacles/0/cells", "whole"}},
+      {R"(/obstacles/0={"name":"s","shape":"voxels","mesh":"sheet.obj"})",
+       {"/obstacles/0", "closed", "shape mesh"}},
+      {R"(/obstacles/0={"name":"s","shape":"sphere","radius":1,"pose":{"scale":2}})",
+       {"/obstacles/0/pose/scale", "mesh and voxels"}},
       {R"(/obstacles/0={"name":"s","shape":"plane","mesh":"slab.ply"})", {"/obstacles/0/mesh", "plane"}},
       {R"(/obstacles/0/pose/scale=0)", {"/obstacles/0/pose/scale"}},
   };
   for (const auto &[set, words] : bad) {
     const test::CommandResult r = run(set);
     EXPECT_EQ(r.exit_code, 2) << set;
-    for (const std::string &word : words) EXPECT_NE(r.err.find(word), std::string::npos) << set << ": " << r.err;
+    for (const std::string &word : words)
+      EXPECT_NE(r.err.find(word), std::string::npos) << set << ": " << r.err;
   }
 }

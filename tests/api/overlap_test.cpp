@@ -1,4 +1,5 @@
-// Things that are through each other when they are made or put somewhere: found, named, listed; and what the steps after cost and do.
+// Things that are through each other when they are made or put somewhere: found, named, listed; and what the
+// steps after cost and do.
 #include <cstring>
 
 #include "logged_context.h"
@@ -7,9 +8,12 @@
 
 namespace {
 
-dfm_body ball(dfm_context *c, dfm_world w, const char *name, std::array<double, 3> at, double radius = 0.1, uint32_t cells = 1000) {
+dfm_body ball(dfm_context *c, dfm_world w, const char *name, std::array<double, 3> at, double radius = 0.1,
+              uint32_t cells = 1000) {
   test::BodyOptions o;
-  o.name = name, o.position = at, o.damping_stiffness = 1e-3;
+  o.name = name;
+  o.position = at;
+  o.damping_stiffness = 1e-3;
   return test::make_body(c, w, "ball", {radius, 0, 0}, cells, o);
 }
 
@@ -17,9 +21,17 @@ std::vector<dfm_overlap> overlaps(dfm_world w) { return test::listed(dfm_world_o
 
 dfm_obstacle thing(dfm_world w, uint32_t shape, double size, const test::Triangles *t = nullptr) {
   dfm_obstacle_def d = dfm_obstacle_def_default();
-  d.name = "thing", d.shape = shape, d.radius = size, d.half_length = size;
+  d.name = "thing";
+  d.shape = shape;
+  d.radius = size;
+  d.half_length = size;
   for (double &h : d.half_size) h = size;
-  if (t) d.npoint = uint32_t(t->points.size() / 3), d.points = t->points.data(), d.ntriangle = uint32_t(t->tris.size() / 3), d.triangles = t->tris.data();
+  if (t) {
+    d.npoint = uint32_t(t->points.size() / 3);
+    d.points = t->points.data();
+    d.ntriangle = uint32_t(t->tris.size() / 3);
+    d.triangles = t->tris.data();
+  }
   dfm_obstacle o = 0;
   test::ok(dfm_obstacle_create(w, &d, &o));
   return o;
@@ -67,7 +79,7 @@ TEST(Overlap, OfPairThatComesApart_TouchesFromThenOn) {
   const dfm_world w = test::make_world(c, {});
   const dfm_body a = ball(c, w, "a", {}), b = ball(c, w, "b", {0.15, 0, 0});
   test::set_velocity(a, {-1, 0, 0});
-  test::run(w, 0.1, 1e-3);   // 0.25 apart
+  test::run(w, 0.1, 1e-3);  // 0.25 apart
   uint32_t n = 1;
   test::ok(dfm_world_find_overlaps(w, &n));
   EXPECT_EQ(n, 0u);
@@ -83,7 +95,8 @@ TEST(Overlap, OfTouchingBodies_IsNone) {
   test::BodyOptions o;
   o.name = "low";
   test::make_body(c, w, "beam", {0.1, 0.1, 0.1}, 300, o);
-  o.name = "high", o.position = {0.013, 0.007, 0.1};
+  o.name = "high";
+  o.position = {0.013, 0.007, 0.1};
   test::make_body(c, w, "beam", {0.1, 0.1, 0.1}, 300, o);
   test::add_plane(w, "floor");
   uint32_t trouble = 0;
@@ -100,7 +113,8 @@ TEST(Overlap, OfCubesOnOneGrid_IsFoundThoughNoEdgeCrosses) {
     test::BodyOptions o;
     o.name = "a";
     test::make_body(c, w, "beam", {0.1, 0.1, 0.1}, 40, o);
-    o.name = "b", o.position = {shift, 0, 0};
+    o.name = "b";
+    o.position = {shift, 0, 0};
     test::make_body(c, w, "beam", {0.1, 0.1, 0.1}, 40, o);
     EXPECT_EQ(overlaps(w).size(), 1u) << shift;
     test::run(w, 0.02, 1e-3);
@@ -109,13 +123,16 @@ TEST(Overlap, OfCubesOnOneGrid_IsFoundThoughNoEdgeCrosses) {
 }
 
 TEST(Overlap, OfBodyWithEveryShapeOfObstacle_IsFound) {
-  const test::Triangles box = test::box_surface({0.03, 0.03, 0.03}, 1), large = test::box_surface({0.5, 0.5, 0.5}, 1);
-  for (const bool around : {false, true})   // the obstacle holds the body, or lies inside it
-    for (const uint32_t shape : {DFM_SHAPE_SPHERE, DFM_SHAPE_BOX, DFM_SHAPE_CAPSULE, DFM_SHAPE_MESH, DFM_SHAPE_VOXELS}) {
+  const test::Triangles box = test::box_surface({0.03, 0.03, 0.03}, 1);
+  const test::Triangles large = test::box_surface({0.5, 0.5, 0.5}, 1);
+  for (const bool around : {false, true})  // the obstacle holds the body, or lies inside it
+    for (const uint32_t shape :
+         {DFM_SHAPE_SPHERE, DFM_SHAPE_BOX, DFM_SHAPE_CAPSULE, DFM_SHAPE_MESH, DFM_SHAPE_VOXELS}) {
       test::Context c;
       const dfm_world w = test::make_world(c, {});
       ball(c, w, "ball", {0.01, 0.002, 0.003});
-      thing(w, shape, around ? 0.5 : 0.03, shape == DFM_SHAPE_MESH || shape == DFM_SHAPE_VOXELS ? (around ? &large : &box) : nullptr);
+      thing(w, shape, around ? 0.5 : 0.03,
+            shape == DFM_SHAPE_MESH || shape == DFM_SHAPE_VOXELS ? (around ? &large : &box) : nullptr);
       const auto found = overlaps(w);
       ASSERT_EQ(found.size(), 1u) << shape << around;
       EXPECT_TRUE(found[0].flags & DFM_OVERLAP_OBSTACLE);
@@ -139,14 +156,15 @@ TEST(Overlap, OfBodyWithPlane_IsLedOutSlowly) {
 TEST(Overlap, OfBodyInsideBody_IsFoundAndOfBodyInRoomIsNot) {
   test::Context c;
   const dfm_world w = test::make_world(c, {});
-  ball(c, w, "large", {}), ball(c, w, "small", {0.01, 0, 0}, 0.03, 300);
+  ball(c, w, "large", {});
+  ball(c, w, "small", {0.01, 0, 0}, 0.03, 300);
   const auto found = overlaps(w);
   ASSERT_EQ(found.size(), 1u);
   EXPECT_EQ(found[0].crossings, 0u);
   EXPECT_GT(found[0].enclosed, 50u);
   const test::Triangles room = test::inside_out(test::box_surface({0.5, 0.5, 0.5}, 1));
   thing(w, DFM_SHAPE_MESH, 0, &room);
-  EXPECT_EQ(overlaps(w).size(), 0u);   // of what was made since: the room
+  EXPECT_EQ(overlaps(w).size(), 0u);  // of what was made since: the room
   dfm_world_destroy(w);
 }
 
@@ -170,20 +188,24 @@ TEST(Overlap, AfterSetStateAndRestore_IsFound) {
 
   const std::string kept = test::snapshot(w);
   const dfm_world other = test::make_world(c, {});
-  ball(c, other, "a", {}), ball(c, other, "b", {0.3, 0, 0});
+  ball(c, other, "a", {});
+  ball(c, other, "b", {0.3, 0, 0});
   test::ok(dfm_world_restore(other, kept.data(), kept.size()));
   EXPECT_EQ(overlaps(other).size(), 1u);
   for (int i = 0; i < 20; ++i) {
-    test::ok(dfm_world_step(w, 1e-3, nullptr)), test::ok(dfm_world_step(other, 1e-3, nullptr));
+    test::ok(dfm_world_step(w, 1e-3, nullptr));
+    test::ok(dfm_world_step(other, 1e-3, nullptr));
     ASSERT_EQ(dfm_world_hash(w), dfm_world_hash(other)) << i;
   }
-  dfm_world_destroy(w), dfm_world_destroy(other);
+  dfm_world_destroy(w);
+  dfm_world_destroy(other);
 }
 
 TEST(Overlap, OfFilteredPair_DoesNotCount) {
   test::Context c;
   const dfm_world w = test::make_world(c, {});
-  ball(c, w, "a", {}), ball(c, w, "b", {0.1, 0, 0});
+  ball(c, w, "a", {});
+  ball(c, w, "b", {0.1, 0, 0});
   test::ok(dfm_world_filter_pair(w, "a", "b", false));
   EXPECT_TRUE(overlaps(w).empty());
   test::ok(dfm_world_filter_pair(w, "a", "b", true));

@@ -7,7 +7,8 @@ namespace {
 
 std::vector<dfm_pair_impulse> impulses(dfm_world w) { return test::listed(dfm_world_pair_impulses, w); }
 
-// A ball thrown at the floor, free of gravity: at the stable step, or in frames of 60 Hz that are cut into many sub-steps.
+// A ball thrown at the floor, free of gravity: at the stable step, or in frames of 60 Hz that are cut into
+// many sub-steps.
 struct Throw {
   test::Context context;
   dfm_world world = test::make_world(context, {0, 0, 0});
@@ -16,7 +17,11 @@ struct Throw {
   Throw() {
     test::set_friction(world, 0.3);
     test::BodyOptions o;
-    o.name = "ball", o.young = 2e5, o.damping_stiffness = 1e-4, o.position = {0, 0, 0.051}, o.velocity = {0.5, 0, -2};
+    o.name = "ball";
+    o.young = 2e5;
+    o.damping_stiffness = 1e-4;
+    o.position = {0, 0, 0.051};
+    o.velocity = {0.5, 0, -2};
     ball = test::make_body(context, world, "ball", {0.05, 0, 0}, 400, o);
   }
 };
@@ -36,8 +41,9 @@ TEST(PairImpulses, OfEachFrame_AreTheMomentumThatTheBodyGot) {
     const auto list = impulses(t.world);
     ASSERT_LE(list.size(), 1u);
     const dfm_pair_impulse p = list.empty() ? dfm_pair_impulse{} : list[0];
-    for (int k = 0; k < 3; ++k) EXPECT_NEAR(p.impulse[k], after.momentum[k] - before.momentum[k], 1e-12 * scale) << frame;
-    EXPECT_NEAR(p.normal_impulse, p.impulse[2], 1e-12 * scale);   // on a plane all normals point up
+    for (int k = 0; k < 3; ++k)
+      EXPECT_NEAR(p.impulse[k], after.momentum[k] - before.momentum[k], 1e-12 * scale) << frame;
+    EXPECT_NEAR(p.normal_impulse, p.impulse[2], 1e-12 * scale);  // on a plane all normals point up
     if (!list.empty()) {
       EXPECT_EQ(p.a, t.ball);
       EXPECT_EQ(p.b, t.floor);
@@ -45,12 +51,12 @@ TEST(PairImpulses, OfEachFrame_AreTheMomentumThatTheBodyGot) {
       EXPECT_LE(p.touching, 1.0 / 60 * (1 + 1e-12));
       EXPECT_GE(p.peak_normal, p.normal_impulse / p.touching * (1 - 1e-12));
       EXPECT_GE(p.peak_force, p.peak_normal * (1 - 1e-12));
-      EXPECT_NEAR(p.point[2], 0, 2e-5);   // within the contact offset
+      EXPECT_NEAR(p.point[2], 0, 2e-5);  // within the contact offset
     }
     most = std::max(most, p.normal_impulse);
     before = after;
   }
-  EXPECT_GT(most, 1.0 * before.mass);   // it came with 2 m/s and has left
+  EXPECT_GT(most, 1.0 * before.mass);  // it came with 2 m/s and has left
 }
 
 // The last sub-step of such a step has no contact, so the report of contacts is empty.
@@ -61,19 +67,22 @@ TEST(PairImpulses, OfABlowThatEndsWithinTheStep_AreKept) {
   EXPECT_TRUE(test::pairs(t.world).empty());
   const auto list = impulses(t.world);
   ASSERT_EQ(list.size(), 1u);
-  EXPECT_NEAR(list[0].impulse[2], test::measure(t.ball).momentum[2] - before.momentum[2], 1e-12 * before.mass);
+  EXPECT_NEAR(list[0].impulse[2], test::measure(t.ball).momentum[2] - before.momentum[2],
+              1e-12 * before.mass);
   EXPECT_GT(list[0].peak_normal, 2 * list[0].normal_impulse / 0.1);
   test::ok(dfm_world_step(t.world, 1e-3, nullptr));
-  EXPECT_TRUE(impulses(t.world).empty());   // of the last step alone
+  EXPECT_TRUE(impulses(t.world).empty());  // of the last step alone
 }
 
-// The blow in one long step and in as many short ones. A stiff body far away bounds the sub-steps, so that they are equal whatever the ball does: then nothing
-// but rounding differs.
+// The blow in one long step and in as many short ones. A stiff body far away bounds the sub-steps, so that
+// they are equal whatever the ball does: then nothing but rounding differs.
 TEST(PairImpulses, SumAndPeak_AreThoseOfTheSameTimeInManySteps) {
   Throw whole, parts;
   for (Throw *t : {&whole, &parts}) {
     test::BodyOptions o;
-    o.name = "stiff", o.young = 2e7, o.position = {1, 0, 1};
+    o.name = "stiff";
+    o.young = 2e7;
+    o.position = {1, 0, 1};
     test::make_body(t->context, t->world, "ball", {0.05, 0, 0}, 400, o);
   }
   test::ok(dfm_world_step(whole.world, 0.1, nullptr));
@@ -82,8 +91,11 @@ TEST(PairImpulses, SumAndPeak_AreThoseOfTheSameTimeInManySteps) {
   for (uint32_t i = 0; i < n; ++i) {
     test::ok(dfm_world_step(parts.world, 0.1 / n, nullptr));
     ASSERT_EQ(test::stats(parts.world).last_substeps, 1u);
-    for (const dfm_pair_impulse &p : impulses(parts.world))
-      normal += p.normal_impulse, peak = std::max(peak, p.peak_normal), force = std::max(force, p.peak_force);
+    for (const dfm_pair_impulse &p : impulses(parts.world)) {
+      normal += p.normal_impulse;
+      peak = std::max(peak, p.peak_normal);
+      force = std::max(force, p.peak_force);
+    }
   }
   const auto list = impulses(whole.world);
   ASSERT_EQ(list.size(), 1u);
@@ -110,9 +122,9 @@ TEST(PairImpulses, OfAStackAtRest_AreItsWeight_AlsoWhileItSleeps) {
     ASSERT_EQ(of.size(), 2u);
     const dfm_pair_impulse between = of[{s.lower, s.upper}], below = of[{s.lower, s.floor}];
     // What a body that moves slower than `rest` has gained in momentum is missing in the impulses.
-    EXPECT_NEAR(between.impulse[2], -weight * dt, rest * mass);   // on the lower one
+    EXPECT_NEAR(between.impulse[2], -weight * dt, rest * mass);  // on the lower one
     EXPECT_NEAR(below.impulse[2], 2 * weight * dt, 2 * rest * mass);
-    EXPECT_NEAR(between.peak_normal, weight, 3e-4 * weight);   // it still rings with 9e-5 of the weight
+    EXPECT_NEAR(between.peak_normal, weight, 3e-4 * weight);  // it still rings with 9e-5 of the weight
     EXPECT_NEAR(between.touching, dt, 1e-12);
     checked += stats.asleep == 2;
   }

@@ -1,4 +1,5 @@
-// Which law holds between two things: specificity, order, the default where two materials meet, names that are wrong, and what is saved.
+// Which law holds between two things: specificity, order, the default where two materials meet, names that
+// are wrong, and what is saved.
 #include <gtest/gtest.h>
 
 #include "support.h"
@@ -14,14 +15,21 @@ struct Table {
   dfm_material ice, rubber, steel;
   explicit Table(double ice_friction = -1, double rubber_friction = -1, double steel_friction = -1) {
     world = test::make_world(context);
-    ice = material("ice", ice_friction), rubber = material("rubber", rubber_friction), steel = material("steel", steel_friction);
+    ice = material("ice", ice_friction);
+    rubber = material("rubber", rubber_friction);
+    steel = material("steel", steel_friction);
     test::ZonedOptions o;
-    o.name = "block", o.position = {-0.05, -0.05, 2e-5}, o.velocity = {1, 0, 0};
-    o.groups = {"left", "right"}, o.group = [](const double x[3]) { return x[1] > 0.05 ? 0u : x[1] < 0.05 ? 1u : UINT32_MAX; };
+    o.name = "block";
+    o.position = {-0.05, -0.05, 2e-5};
+    o.velocity = {1, 0, 0};
+    o.groups = {"left", "right"};
+    o.group = [](const double x[3]) { return x[1] > 0.05 ? 0u : x[1] < 0.05 ? 1u : UINT32_MAX; };
     o.material = [this](const double x[3]) { return x[0] < 0.05 ? ice : rubber; };
     block = test::make_zoned_beam(context, world, {0.1, 0.1, 0.1}, 96, o);
     dfm_obstacle_def d = dfm_obstacle_def_default();
-    d.name = "floor", d.shape = DFM_SHAPE_PLANE, d.material = steel;
+    d.name = "floor";
+    d.shape = DFM_SHAPE_PLANE;
+    d.material = steel;
     dfm_obstacle floor = 0;
     test::ok(dfm_obstacle_create(world, &d, &floor));
   }
@@ -29,7 +37,10 @@ struct Table {
   dfm_material material(const char *name, double friction) {
     dfm_material_def d = dfm_material_def_default();
     const dfm_param_value v{"friction", &friction, 1};
-    d.name = name, d.young = 1e6, d.poisson = 0, d.damping_stiffness = 1e-3;
+    d.name = name;
+    d.young = 1e6;
+    d.poisson = 0;
+    d.damping_stiffness = 1e-3;
     if (friction >= 0) d.extra = {sizeof(dfm_params), 1, &v};
     dfm_material m = 0;
     test::ok(dfm_material_create(world, &d, &m));
@@ -43,7 +54,9 @@ struct Table {
         const dfm_body_measure m = test::measure(block);
         const double px = c.point[0] - m.com[0], py = c.point[1] - m.com[1];
         // the corners: the line between the materials and the parts runs through the middle
-        if (px * x < 0.03 * std::fabs(x) || py * y < 0.03 * std::fabs(y) || c.flags & DFM_CONTACT_STICKING || !(c.fn > 1e-2)) continue;
+        if (px * x < 0.03 * std::fabs(x) || py * y < 0.03 * std::fabs(y) || c.flags & DFM_CONTACT_STICKING ||
+            !(c.fn > 1e-2))
+          continue;
         return std::hypot(c.ft[0], c.ft[1]) / c.fn;
       }
     }
@@ -54,8 +67,14 @@ struct Table {
 }  // namespace
 
 TEST(PairTable, MostSpecificRule_WinsInAnyOrderThenTheLast) {
-  struct Rule { const char *a, *b; double mu; };
-  struct Case { std::vector<Rule> rules; double ice_left, rubber_right; };
+  struct Rule {
+    const char *a, *b;
+    double mu;
+  };
+  struct Case {
+    std::vector<Rule> rules;
+    double ice_left, rubber_right;
+  };
   const std::vector<Case> cases = {
       {{}, 0.5, 0.5},
       {{{"*", "*", 0.1}}, 0.1, 0.1},
@@ -74,7 +93,8 @@ TEST(PairTable, MostSpecificRule_WinsInAnyOrderThenTheLast) {
     for (const bool left : {true, false}) {
       Table t;
       for (const Rule &r : k.rules) test::ok(test::friction(t.world, r.a, r.b, r.mu));
-      EXPECT_NEAR(left ? t.mu(-1, 1) : t.mu(1, -1), left ? k.ice_left : k.rubber_right, 1e-6) << "case " << &k - cases.data() << (left ? " left" : " right");
+      EXPECT_NEAR(left ? t.mu(-1, 1) : t.mu(1, -1), left ? k.ice_left : k.rubber_right, 1e-6)
+          << "case " << &k - cases.data() << (left ? " left" : " right");
     }
   }
 }
@@ -84,7 +104,7 @@ TEST(PairTable, WithoutARule_TwoMaterialsMeetAtTheirGeometricMean) {
   EXPECT_NEAR(both.mu(-1, 1), 0.08, 1e-6);
   Table other(0.04, 0.81, 0.16);
   EXPECT_NEAR(other.mu(1, -1), 0.36, 1e-6);
-  Table one(0.08, -1, -1);   // the other side has 0.5
+  Table one(0.08, -1, -1);  // the other side has 0.5
   EXPECT_NEAR(one.mu(-1, 1), 0.2, 1e-6);
   Table none(0, -1, 2);
   EXPECT_NEAR(none.mu(-1, 1), 0, 1e-12);
@@ -96,20 +116,28 @@ TEST(PairTable, WithoutARule_TwoMaterialsMeetAtTheirGeometricMean) {
 TEST(PairTable, WrongNames_AreRefusedWithTheNearest) {
   Table t;
   const auto says = [](const std::vector<std::string> &parts) {
-    for (const std::string &p : parts) EXPECT_NE(std::string(dfm_last_error()).find(p), std::string::npos) << dfm_last_error() << " lacks " << p;
+    for (const std::string &p : parts)
+      EXPECT_NE(std::string(dfm_last_error()).find(p), std::string::npos)
+          << dfm_last_error() << " lacks " << p;
   };
-  EXPECT_EQ(test::friction(t.world, "block:lefd", "*", 0.1), DFM_E_ARG), says({"'lefd'", "did you mean 'left'", "right"});
-  EXPECT_EQ(test::friction(t.world, "blok:left", "*", 0.1), DFM_E_ARG), says({"'blok:left'", "block"});
-  EXPECT_EQ(test::friction(t.world, "floor:left", "*", 0.1), DFM_E_ARG), says({"'floor'", "no surface groups"});
-  EXPECT_EQ(test::friction(t.world, "material=icy", "*", 0.1), DFM_E_ARG), says({"material=ice"});
-  EXPECT_EQ(dfm_world_filter_pair(t.world, "block:left", "floor", false), DFM_E_UNSUPPORTED), says({"block:left", "whole body"});
+  EXPECT_EQ(test::friction(t.world, "block:lefd", "*", 0.1), DFM_E_ARG);
+  says({"'lefd'", "did you mean 'left'", "right"});
+  EXPECT_EQ(test::friction(t.world, "blok:left", "*", 0.1), DFM_E_ARG);
+  says({"'blok:left'", "block"});
+  EXPECT_EQ(test::friction(t.world, "floor:left", "*", 0.1), DFM_E_ARG);
+  says({"'floor'", "no surface groups"});
+  EXPECT_EQ(test::friction(t.world, "material=icy", "*", 0.1), DFM_E_ARG);
+  says({"material=ice"});
+  EXPECT_EQ(dfm_world_filter_pair(t.world, "block:left", "floor", false), DFM_E_UNSUPPORTED);
+  says({"block:left", "whole body"});
   const double minus = -1, two[] = {0.1, 0.2};
   for (const auto &[value, width] : {std::pair{&minus, 1u}, {&two[0], 2u}}) {
     const dfm_param_value v{"friction", value, width};
     dfm_material_def d = dfm_material_def_default();
     d.extra = {sizeof(dfm_params), 1, &v};
     dfm_material m = 0;
-    EXPECT_EQ(dfm_material_create(t.world, &d, &m), DFM_E_ARG), says({"friction"});
+    EXPECT_EQ(dfm_material_create(t.world, &d, &m), DFM_E_ARG);
+    says({"friction"});
   }
 }
 
@@ -121,14 +149,22 @@ TEST(PairTable, WrongGroups_AreRefused) {
   const char *const name = "foot", *const nothing = "";
   const auto create = [&](const dfm_surface_groups &g) {
     dfm_body_def d = dfm_body_def_default();
-    d.npoint = 4, d.ntet = 1, d.points = points, d.tets = tet, d.groups = &g;
+    d.npoint = 4;
+    d.ntet = 1;
+    d.points = points;
+    d.tets = tet;
+    d.groups = &g;
     dfm_body b = 0;
     return dfm_body_create(world, &d, &b);
   };
   const uint32_t size = sizeof(dfm_surface_groups);
   const std::vector<std::pair<dfm_surface_groups, std::string>> wrong = {
-      {{4, 1, &name, 1, 0, face, &group}, "size"},        {{size, 1, nullptr, 1, 0, face, &group}, "names"}, {{size, 1, &nothing, 1, 0, face, &group}, "no name"},
-      {{size, 1, &name, 1, 0, face, nullptr}, "group"},   {{size, 1, &name, 1, 0, far, &group}, "point 9"},  {{size, 1, &name, 1, 0, face, &other}, "group 3 of 1"},
+      {{4, 1, &name, 1, 0, face, &group}, "size"},
+      {{size, 1, nullptr, 1, 0, face, &group}, "names"},
+      {{size, 1, &nothing, 1, 0, face, &group}, "no name"},
+      {{size, 1, &name, 1, 0, face, nullptr}, "group"},
+      {{size, 1, &name, 1, 0, far, &group}, "point 9"},
+      {{size, 1, &name, 1, 0, face, &other}, "group 3 of 1"},
       {{size, 1, &name, 1, 0, nullptr, &group}, "which has 4"}};
   for (const auto &[g, part] : wrong) {
     EXPECT_EQ(create(g), DFM_E_ARG) << part;
@@ -146,11 +182,13 @@ TEST(PairTable, SnapshotInMidContact_GoesOnWithTheSameBits) {
     test::ok(test::friction(t.world, "block:right", "*", 0.3));
   };
   Table a, b;
-  rules(a), rules(b);
+  rules(a);
+  rules(b);
   test::run(a.world, 0.05, 1e-3);
   const std::string buffer = test::snapshot(a.world);
   test::ok(dfm_world_restore(b.world, buffer.data(), buffer.size()));
-  test::run(a.world, 0.05, 1e-3), test::run(b.world, 0.05, 1e-3);
+  test::run(a.world, 0.05, 1e-3);
+  test::run(b.world, 0.05, 1e-3);
   EXPECT_EQ(dfm_world_hash(a.world), dfm_world_hash(b.world));
   // rules are state: a world that had none goes on with those of the snapshot
   Table c;
@@ -168,7 +206,8 @@ TEST(PairTable, SceneWithGroups_SlidesByThem) {
   // a cube of 0.1 m whose six faces are groups of an OBJ file; "foot" lies on the floor
   std::string obj;
   for (int i = 0; i < 8; ++i)
-    obj += "v " + std::to_string(0.1 * (i & 1)) + " " + std::to_string(0.1 * ((i >> 1) & 1)) + " " + std::to_string(0.1 * (i >> 2)) + "\n";
+    obj += "v " + std::to_string(0.1 * (i & 1)) + " " + std::to_string(0.1 * ((i >> 1) & 1)) + " " +
+           std::to_string(0.1 * (i >> 2)) + "\n";
   obj += "g foot\nf 1 3 4 2\ng rest\nf 5 6 8 7\nf 1 2 6 5\nf 3 7 8 4\nf 1 5 7 3\nf 2 4 8 6\n";
   test::write_file(folder + "/cube.obj", obj);
   const auto scene = [&](const std::string &group) {
@@ -177,7 +216,8 @@ TEST(PairTable, SceneWithGroups_SlidesByThem) {
       "materials": {"gel": {"young": 1e6, "damping": {"stiffness": 0.001}, "friction": 0.01}},
       "bodies": [{"name": "cube", "mesh": "cube.obj", "fill": {"cells": 100}, "material": "gel", "pose": {"position": [0, 0, 0.0001]}, "velocity": [1, 0, 0]}],
       "obstacles": [{"name": "floor", "shape": "plane"}],
-      "contact": {"friction": [{"between": ["cube:)" + group + R"(", "floor"], "law": "coulomb", "params": {"mu": 0.4}}]}})");
+      "contact": {"friction": [{"between": ["cube:)" +
+                               group + R"(", "floor"], "law": "coulomb", "params": {"mu": 0.4}}]}})");
     return path;
   };
   dfm_world world = 0;

@@ -10,7 +10,8 @@ bool has(const std::string &text, const std::string &part) { return text.find(pa
 TEST(PluginCommand, List_ShowsTypesWithKindAndFile) {
   const auto r = test::deform({"plugin", "list"});
   EXPECT_EQ(r.exit_code, 0) << r.err;
-  EXPECT_TRUE(has(r.out, "org.deform.coulomb") && has(r.out, "org.deform.none") && has(r.out, "law")) << r.out;
+  EXPECT_TRUE(has(r.out, "org.deform.coulomb") && has(r.out, "org.deform.none") && has(r.out, "law"))
+      << r.out;
   EXPECT_TRUE(has(r.out, "stiction stribeck viscous") && has(r.out, "friction_coulomb.so")) << r.out;
 }
 
@@ -32,18 +33,24 @@ TEST(PluginCommand, ListOfAFolder_GivesAReasonForWhatIsNoPlugin) {
 TEST(PluginCommand, ListAsJson_IsOneObject) {
   const auto r = test::deform({"plugin", "list", "--json"});
   EXPECT_EQ(r.exit_code, 0) << r.err;
-  EXPECT_TRUE(has(r.out, "\"types\": [") && has(r.out, "\"id\": \"org.deform.coulomb\"") && has(r.out, "\"passed\": [")) << r.out;
+  EXPECT_TRUE(has(r.out, "\"types\": [") && has(r.out, "\"id\": \"org.deform.coulomb\"") &&
+              has(r.out, "\"passed\": ["))
+      << r.out;
 }
 
 TEST(PluginCommand, Info_ShowsTheParameterTable) {
   for (const char *id : {"coulomb", "org.deform.coulomb"}) {
     const auto r = test::deform({"plugin", "info", id});
     EXPECT_EQ(r.exit_code, 0) << r.err;
-    for (const char *part : {"mu_C", "mu_S", "v_s", "delta", "sigma2", "N s/m^3", "stribeck", "Zerbato", "MIT"}) EXPECT_TRUE(has(r.out, part)) << part;
+    for (const char *part :
+         {"mu_C", "mu_S", "v_s", "delta", "sigma2", "N s/m^3", "stribeck", "Zerbato", "MIT"})
+      EXPECT_TRUE(has(r.out, part)) << part;
   }
   const auto json = test::deform({"plugin", "info", "coulomb", "--json"});
   EXPECT_EQ(json.exit_code, 0) << json.err;
-  EXPECT_TRUE(has(json.out, "\"key\": \"v_s\"") && has(json.out, "\"default\": 0.01") && has(json.out, "\"unit\": \"m/s\"")) << json.out;
+  EXPECT_TRUE(has(json.out, "\"key\": \"v_s\"") && has(json.out, "\"default\": 0.01") &&
+              has(json.out, "\"unit\": \"m/s\""))
+      << json.out;
 }
 
 TEST(PluginCommand, InfoOfAFile_LoadsIt) {
@@ -55,7 +62,8 @@ TEST(PluginCommand, InfoOfAFile_LoadsIt) {
 TEST(PluginCommand, UnknownId_ExitsTwoAndListsWhatThereIs) {
   const auto r = test::deform({"plugin", "info", "coulob"});
   EXPECT_EQ(r.exit_code, 2);
-  EXPECT_TRUE(has(r.err, "coulob") && has(r.err, "did you mean \"coulomb\"") && has(r.err, "org.deform.none")) << r.err;
+  EXPECT_TRUE(has(r.err, "coulob") && has(r.err, "did you mean \"coulomb\"") && has(r.err, "org.deform.none"))
+      << r.err;
   EXPECT_EQ(test::deform({"plugin", "info", "/nowhere/x.so"}).exit_code, 2);
   EXPECT_EQ(test::deform({"plugin", "info"}).exit_code, 2);
   EXPECT_EQ(test::deform({"plugin"}).exit_code, 2);

@@ -9,10 +9,16 @@ namespace {
 using Vec = std::array<double, 3>;
 
 Vec operator-(Vec a, Vec b) { return {a[0] - b[0], a[1] - b[1], a[2] - b[2]}; }
-Vec cross(Vec a, Vec b) { return {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]}; }
+Vec cross(Vec a, Vec b) {
+  return {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]};
+}
 double dot(Vec a, Vec b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
 
-struct Hit { double distance; Vec point, normal; dfm_ray_hit raw; };
+struct Hit {
+  double distance;
+  Vec point, normal;
+  dfm_ray_hit raw;
+};
 
 Hit ray(dfm_world w, Vec o, Vec d, double most = 100) {
   dfm_ray_hit h{};
@@ -26,11 +32,18 @@ void expect(const Hit &h, double distance, Vec point, Vec normal, const char *wh
   for (size_t k = 0; k < 3; ++k) EXPECT_NEAR(h.normal[k], normal[k], 1e-12) << what;
 }
 
-void expect_nothing(const Hit &h, const char *what) { EXPECT_TRUE(h.raw.body == 0 && h.raw.obstacle == 0 && std::isinf(h.distance)) << what; }
+void expect_nothing(const Hit &h, const char *what) {
+  EXPECT_TRUE(h.raw.body == 0 && h.raw.obstacle == 0 && std::isinf(h.distance)) << what;
+}
 
 dfm_obstacle add(dfm_world w, uint32_t shape, Vec at, std::array<double, 4> q = {0, 0, 0, 1}) {
   dfm_obstacle_def d = dfm_obstacle_def_default();
-  d.shape = shape, d.radius = 0.2, d.half_length = 0.5, d.half_size[0] = 0.1, d.half_size[1] = 0.2, d.half_size[2] = 0.3;
+  d.shape = shape;
+  d.radius = 0.2;
+  d.half_length = 0.5;
+  d.half_size[0] = 0.1;
+  d.half_size[1] = 0.2;
+  d.half_size[2] = 0.3;
   for (size_t k = 0; k < 3; ++k) d.pose.position[k] = at[k];
   for (size_t k = 0; k < 4; ++k) d.pose.rotation[k] = q[k];
   dfm_obstacle o = 0;
@@ -39,7 +52,7 @@ dfm_obstacle add(dfm_world w, uint32_t shape, Vec at, std::array<double, 4> q = 
 }
 
 const double s2 = std::sqrt(0.5);
-const std::array<double, 4> kQuarterX{s2, 0, 0, s2};   // local z to -y, local y to z
+const std::array<double, 4> kQuarterX{s2, 0, 0, s2};  // local z to -y, local y to z
 
 }  // namespace
 
@@ -47,7 +60,8 @@ TEST(Ray, MeetsThePlaneFromBothSides) {
   test::Context c;
   const dfm_world w = test::make_world(c);
   const dfm_obstacle o = add(w, DFM_SHAPE_PLANE, {0, 0, 1});
-  expect(ray(w, {3, 4, 5}, {0, 0, -7}), 4, {3, 4, 1}, {0, 0, 1}, "from above; the direction need not be unit");
+  expect(ray(w, {3, 4, 5}, {0, 0, -7}), 4, {3, 4, 1}, {0, 0, 1},
+         "from above; the direction need not be unit");
   expect(ray(w, {0, 0, 0}, {0, 3, 4}), 1.25, {0, 0.75, 1}, {0, 0, 1}, "from below");
   expect_nothing(ray(w, {0, 0, 5}, {1, 0, 0}), "along it");
   expect_nothing(ray(w, {0, 0, 5}, {0, 0, 1}), "away from it");
@@ -69,7 +83,7 @@ TEST(Ray, MeetsTheSphereFromOutsideAndInside) {
 TEST(Ray, MeetsTheTurnedBoxFromOutsideAndInside) {
   test::Context c;
   const dfm_world w = test::make_world(c);
-  add(w, DFM_SHAPE_BOX, {0, 0, 0}, kQuarterX);   // half sizes in the world: x 0.1, y 0.3, z 0.2
+  add(w, DFM_SHAPE_BOX, {0, 0, 0}, kQuarterX);  // half sizes in the world: x 0.1, y 0.3, z 0.2
   expect(ray(w, {0.05, -2, 0.1}, {0, 1, 0}), 1.7, {0.05, -0.3, 0.1}, {0, -1, 0}, "face -y");
   expect(ray(w, {0.05, 0.1, 2}, {0, 0, -1}), 1.8, {0.05, 0.1, 0.2}, {0, 0, 1}, "face z");
   expect(ray(w, {0.02, 0.1, 0.1}, {1, 0, 0}), 0.08, {0.1, 0.1, 0.1}, {1, 0, 0}, "from inside");
@@ -85,7 +99,8 @@ TEST(Ray, MeetsTheCapsulesSideAndCapsFromOutsideAndInside) {
   expect(ray(w, {0, 0, 3}, {0, 0, -1}), 2.3, {0, 0, 0.7}, {0, 0, 1}, "cap, along the axis");
   expect(ray(w, {0.12, 0, -3}, {0, 0, 1}), 3 - 0.66, {0.12, 0, -0.66}, {0.6, 0, -0.8}, "cap, off the axis");
   expect(ray(w, {0, 0, 0}, {0, 0, 1}), 0.7, {0, 0, 0.7}, {0, 0, 1}, "from inside along the axis");
-  expect(ray(w, {0, 0, 0.45}, {1, 0, 0}), 0.2, {0.2, 0, 0.45}, {1, 0, 0}, "from inside, where a cap's sphere lies deeper");
+  expect(ray(w, {0, 0, 0.45}, {1, 0, 0}), 0.2, {0.2, 0, 0.45}, {1, 0, 0},
+         "from inside, where a cap's sphere lies deeper");
   expect_nothing(ray(w, {2, 0.21, 0}, {-1, 0, 0}), "past it");
   expect_nothing(ray(w, {2, 0, 0.71}, {-1, 0, 0}), "over it");
 }
@@ -109,7 +124,8 @@ TEST(Closest, PointOfABody_OnFaceEdgeAndCorner) {
   test::Context c;
   const dfm_world w = test::make_world(c);
   test::BodyOptions o;
-  o.name = "cube", o.position = {1, 1, 1};
+  o.name = "cube";
+  o.position = {1, 1, 1};
   const dfm_body b = test::make_body(c, w, "beam", {0.1, 0.1, 0.1}, 60, o);
   auto closest = [&](Vec p, double most) {
     dfm_ray_hit h{};
@@ -127,10 +143,14 @@ TEST(Closest, PointOfABody_OnFaceEdgeAndCorner) {
 TEST(Surface, OfEveryGenerator_IsClosedOutwardAndHasTheVolumeOfItsCells) {
   test::Context c;
   const dfm_world w = test::make_world(c);
-  const struct { const char *kind; Vec size; } shapes[] = {{"ball", {0.1, 0, 0}}, {"beam", {0.1, 0.2, 0.3}}, {"cylinder", {0.1, 0.4, 0}}};
+  const struct {
+    const char *kind;
+    Vec size;
+  } shapes[] = {{"ball", {0.1, 0, 0}}, {"beam", {0.1, 0.2, 0.3}}, {"cylinder", {0.1, 0.4, 0}}};
   for (const auto &shape : shapes) {
     test::BodyOptions o;
-    o.position = {0.3, -0.2, 0.5}, o.rotation = {0.1, 0.2, 0.3, 0.9};
+    o.position = {0.3, -0.2, 0.5};
+    o.rotation = {0.1, 0.2, 0.3, 0.9};
     const dfm_body b = test::make_body(c, w, shape.kind, shape.size, 300, o);
     dfm_body_info info{};
     test::ok(dfm_body_get_info(b, &info));
@@ -167,7 +187,8 @@ TEST(Surface, OfEveryGenerator_IsClosedOutwardAndHasTheVolumeOfItsCells) {
     for (uint32_t s = 0; s < info.nsurfel; ++s) {
       const Vec v{normal[3 * s], normal[3 * s + 1], normal[3 * s + 2]};
       EXPECT_NEAR(dot(v, v), 1, 1e-12);
-      EXPECT_GT(dot(v, at(s) - Vec{m.com[0], m.com[1], m.com[2]}), 0) << shape.kind << ": these shapes are convex, so normals point away";
+      EXPECT_GT(dot(v, at(s) - Vec{m.com[0], m.com[1], m.com[2]}), 0)
+          << shape.kind << ": these shapes are convex, so normals point away";
     }
     uint32_t small = 0;
     double canary[3] = {7, 7, 7};
@@ -181,15 +202,17 @@ TEST(Impulse, AtAPoint_ChangesMomentumAndSpinByExactlyThat) {
   test::Context c;
   const dfm_world w = test::make_world(c, {0, 0, 0});
   test::BodyOptions o;
-  o.velocity = {1, 2, 3}, o.spin = {4, 5, 6};
+  o.velocity = {1, 2, 3};
+  o.spin = {4, 5, 6};
   const dfm_body b = test::make_body(c, w, "beam", {0.1, 0.2, 0.3}, 200, o);
   const dfm_body_measure before = test::measure(b);
-  const Vec point{0.033, 0.117, 0.3}, impulse{0.3, -0.2, 0.5};   // on the top face
+  const Vec point{0.033, 0.117, 0.3}, impulse{0.3, -0.2, 0.5};  // on the top face
   test::ok(dfm_body_apply_impulse(b, point.data(), impulse.data()));
   const dfm_body_measure after = test::measure(b);
   const Vec spin = cross(point - Vec{before.com[0], before.com[1], before.com[2]}, impulse);
   for (size_t k = 0; k < 3; ++k) {
-    EXPECT_NEAR(after.momentum[k] - before.momentum[k], impulse[k], 1e-12 * (1 + std::fabs(before.momentum[k])));
+    EXPECT_NEAR(after.momentum[k] - before.momentum[k], impulse[k],
+                1e-12 * (1 + std::fabs(before.momentum[k])));
     EXPECT_NEAR(after.angular[k] - before.angular[k], spin[k], 1e-12);
     EXPECT_EQ(after.com[k], before.com[k]);
   }
@@ -199,7 +222,10 @@ TEST(Measure, OfARigidlyMovingBody_IsThatOfItsPointMasses) {
   test::Context c;
   const dfm_world w = test::make_world(c, {0, 0, 0});
   test::BodyOptions o;
-  o.position = {1, 2, 3}, o.velocity = {0.5, -0.25, 1}, o.spin = {0, 0, 8}, o.density = 800;
+  o.position = {1, 2, 3};
+  o.velocity = {0.5, -0.25, 1};
+  o.spin = {0, 0, 8};
+  o.density = 800;
   const dfm_body b = test::make_body(c, w, "beam", {0.1, 0.2, 0.3}, 400, o);
   const dfm_body_measure m = test::measure(b);
   EXPECT_NEAR(m.mass, 800 * 0.006, 1e-12);
@@ -210,10 +236,12 @@ TEST(Measure, OfARigidlyMovingBody_IsThatOfItsPointMasses) {
   EXPECT_NEAR(m.com[2], 3.15, 5e-3);
   EXPECT_EQ(m.inverted, 0u);
   EXPECT_NEAR(m.elastic, 0, 1e-12);
-  EXPECT_NEAR(m.kinetic, 0.5 * m.mass * (0.25 + 0.0625 + 1) + 0.5 * m.angular[2] * 8, 1e-9) << "translation and spin apart";
+  EXPECT_NEAR(m.kinetic, 0.5 * m.mass * (0.25 + 0.0625 + 1) + 0.5 * m.angular[2] * 8, 1e-9)
+      << "translation and spin apart";
   // lumped masses sit on the corners of cells, so the inertia is above that of the solid
   const double solid = m.mass / 12 * (0.01 + 0.04);
   EXPECT_GT(m.angular[2] / 8, solid);
   EXPECT_LT(m.angular[2] / 8, 1.6 * solid);
-  EXPECT_GE(m.speed_max, std::sqrt(m.velocity[0] * m.velocity[0] + m.velocity[1] * m.velocity[1] + m.velocity[2] * m.velocity[2]));
+  EXPECT_GE(m.speed_max, std::sqrt(m.velocity[0] * m.velocity[0] + m.velocity[1] * m.velocity[1] +
+                                   m.velocity[2] * m.velocity[2]));
 }

@@ -1,4 +1,5 @@
-// The command with one operator new refused, at places spread over its whole life: it ends by itself, with a documented exit code and a sentence.
+// The command with one operator new refused, at places spread over its whole life: it ends by itself, with a
+// documented exit code and a sentence.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -11,14 +12,16 @@ namespace {
 test::CommandResult deform_without(long n, const std::string &count, const std::vector<std::string> &args) {
   // By its name in a folder: LD_PRELOAD is split at spaces, which a path may hold.
   const std::filesystem::path preload = DEFORM_REFUSE_NEW;
-  std::vector<std::string> argv{"/usr/bin/env", "LD_LIBRARY_PATH=" + preload.parent_path().string(), "LD_PRELOAD=" + preload.filename().string(),
+  std::vector<std::string> argv{"/usr/bin/env", "LD_LIBRARY_PATH=" + preload.parent_path().string(),
+                                "LD_PRELOAD=" + preload.filename().string(),
                                 "REFUSE_NEW=" + std::to_string(n)};
   argv.insert(argv.end(), {"REFUSE_NEW_COUNT=" + count, DEFORM_COMMAND});
   argv.insert(argv.end(), args.begin(), args.end());
   return test::run(argv);
 }
 
-// Every allocation in turn would be thousands of runs: the first ones of the set-up each by itself, the others in strides that grow, and the last ones.
+// Every allocation in turn would be thousands of runs: the first ones of the set-up each by itself, the
+// others in strides that grow, and the last ones.
 void walk(const std::string &name, const std::vector<std::string> &args, int runs) {
 #ifdef DEFORM_SANITIZED
   GTEST_SKIP() << "a sanitizer brings its own operator new";
@@ -35,14 +38,17 @@ void walk(const std::string &name, const std::vector<std::string> &args, int run
     const long n = long(std::llround(std::pow(double(total), double(i) / (runs - 1)))) - 1;
     // What an earlier run has left is looked through and removed.
     if (args[0] == "run")
-      for (const char *left : {"summary.json.part1", "bodies.csv.part2", "states/b_000001.vtu", "states/last_b.vtu"})
+      for (const char *left :
+           {"summary.json.part1", "bodies.csv.part2", "states/b_000001.vtu", "states/last_b.vtu"})
         test::write_file(folder + "/out/" + left, "x");
     const test::CommandResult r = deform_without(n, count, with);
     EXPECT_TRUE(r.exit_code == 0 || r.exit_code == 2 || r.exit_code == 3)
-        << name << ", allocation " << n << " of " << total << ": exit " << r.exit_code << "\n" << r.err;
+        << name << ", allocation " << n << " of " << total << ": exit " << r.exit_code << "\n"
+        << r.err;
     refused += r.exit_code != 0;
     if (r.exit_code != 0) {
-      EXPECT_NE(r.err.find("deform: "), std::string::npos) << "allocation " << n << " of " << total << ": " << r.err;
+      EXPECT_NE(r.err.find("deform: "), std::string::npos)
+          << "allocation " << n << " of " << total << ": " << r.err;
     }
   }
   EXPECT_GT(refused, runs / 2);
@@ -51,10 +57,12 @@ void walk(const std::string &name, const std::vector<std::string> &args, int run
 }  // namespace
 
 TEST(RefusedCommand, RunOfAScene_EndsWithASentence) {
-  walk("run", {"run", DEFORM_SOURCE_DIR "/examples/scenes/slope_block.json", "--time", "0.002", "--quiet"}, 500);
+  walk("run", {"run", DEFORM_SOURCE_DIR "/examples/scenes/slope_block.json", "--time", "0.002", "--quiet"},
+       500);
 }
 TEST(RefusedCommand, RunOfRigidBodies_EndsWithASentence) {
-  walk("rigid", {"run", DEFORM_SOURCE_DIR "/examples/scenes/rigid_on_bed.json", "--time", "0.002", "--quiet"}, 200);
+  walk("rigid", {"run", DEFORM_SOURCE_DIR "/examples/scenes/rigid_on_bed.json", "--time", "0.002", "--quiet"},
+       200);
 }
 TEST(RefusedCommand, Explain_EndsWithASentence) {
   walk("explain", {"explain", DEFORM_SOURCE_DIR "/examples/scenes/two_cylinders_coarse.json"}, 200);

@@ -1,5 +1,6 @@
-// One allocation is refused, whichever it is, of the context's hooks or of operator new: the call fails cleanly or does without, the world is what it
-// was, and once memory is back everything ends with the bits of a world that never missed any.
+// One allocation is refused, whichever it is, of the context's hooks or of operator new: the call fails
+// cleanly or does without, the world is what it was, and once memory is back everything ends with the bits of
+// a world that never missed any.
 #include "refused_memory.h"
 
 #include <functional>
@@ -14,7 +15,7 @@ namespace {
 using test::Refusal;
 using Build = std::function<dfm_world(dfm_context *)>;
 constexpr int kSteps = 10;
-constexpr double kStep = 1e-4;   // s, below every bound: a step is one sub-step
+constexpr double kStep = 1e-4;  // s, below every bound: a step is one sub-step
 
 dfm_context *make_context() {
   dfm_context_def d = test::refusing_context();
@@ -28,11 +29,14 @@ dfm_context *make_context() {
 // Two legs that close on each other.
 dfm_world close_legs(dfm_context *c, uint32_t self) {
   dfm_world_def d = dfm_world_def_default();
-  d.gravity[2] = 0, d.self_contact = self;
+  d.gravity[2] = 0;
+  d.self_contact = self;
   dfm_world w = 0;
   test::ok(dfm_world_create(c, &d, &w));
   test::HookOptions o;
-  o.young = 1e4, o.cell = 0.002, o.close = 1.5;
+  o.young = 1e4;
+  o.cell = 0.002;
+  o.close = 1.5;
   test::make_hook(w, o);
   return w;
 }
@@ -43,14 +47,20 @@ dfm_world self_auto(dfm_context *c) { return close_legs(c, DFM_SELF_AUTO); }
 // Two small boxes: one falls asleep at once, one drops on it and wakes it.
 dfm_world sleepers(dfm_context *c) {
   dfm_world_def d = dfm_world_def_default();
-  d.sleep = 1, d.sleep_speed = 0.5, d.sleep_time = 3e-4;
+  d.sleep = 1;
+  d.sleep_speed = 0.5;
+  d.sleep_time = 3e-4;
   dfm_world w = 0;
   test::ok(dfm_world_create(c, &d, &w));
   test::add_plane(w, "floor");
   test::BodyOptions o;
-  o.young = 2e5, o.damping_stiffness = 2e-3, o.damping_mass = 20, o.position = {0, 0, 4e-5};
+  o.young = 2e5;
+  o.damping_stiffness = 2e-3;
+  o.damping_mass = 20;
+  o.position = {0, 0, 4e-5};
   test::make_body(c, w, "beam", {0.1, 0.1, 0.1}, 10, o);
-  o.position = {0.02, 0.03, 0.1009}, o.velocity = {0, 0, -1};
+  o.position = {0.02, 0.03, 0.1009};
+  o.velocity = {0, 0, -1};
   test::make_body(c, w, "beam", {0.1, 0.1, 0.1}, 10, o);
   return w;
 }
@@ -60,10 +70,14 @@ dfm_world rigid_host(dfm_context *c) {
   const dfm_world w = test::make_world(c);
   test::add_plane(w, "floor");
   test::BodyOptions o;
-  o.young = 2e5, o.damping_stiffness = 1e-3, o.position = {0, 0, 4e-5};
+  o.young = 2e5;
+  o.damping_stiffness = 1e-3;
+  o.position = {0, 0, 4e-5};
   test::make_body(c, w, "beam", {0.1, 0.1, 0.1}, 10, o);
   dfm_joint_def hinge = test::joint(DFM_JOINT_HINGE, 0, DFM_RIGID_WORLD, {0.3, 0, 0.1202}, {0, 1, 0});
-  hinge.motor = 1, hinge.velocity = -2, hinge.max = 5;
+  hinge.motor = 1;
+  hinge.velocity = -2;
+  hinge.max = 5;
   dfm_rigid_def falling = test::box("free", {0.1, 0.1, 0.02}, 0.2, {0, 0, 0.1202});
   falling.velocity[2] = -1;
   test::create(w, {test::box("arm", {0.2, 0.02, 0.02}, 0.5, {0.1, 0, 0.1202}), falling}, {hinge});
@@ -76,17 +90,22 @@ dfm_world bristles(dfm_context *c) {
   const test::Triangles slab = test::box_surface({0.3, 0.3, 0.05}, 1);
   test::add_mesh(w, "slab", slab);
   dfm_friction_def f{};
-  f.size = sizeof f, f.between[0] = f.between[1] = "*", f.law = "test.bristle";
+  f.size = sizeof f;
+  f.between[0] = f.between[1] = "*";
+  f.law = "test.bristle";
   test::ok(dfm_world_add_friction(w, &f));
   test::BodyOptions o;
-  o.young = 2e5, o.damping_stiffness = 1e-3, o.position = {0, 0, 0.0501};
+  o.young = 2e5;
+  o.damping_stiffness = 1e-3;
+  o.position = {0, 0, 0.0501};
   test::make_body(c, w, "beam", {0.1, 0.1, 0.1}, 10, o);
   o.position = {0.013, 0.007, 0.1503};
   test::make_body(c, w, "beam", {0.1, 0.1, 0.1}, 10, o);
   return w;
 }
 
-// Steps with the n-th allocation from here on refused; what failed is tried again with memory back. Whether the n-th was reached.
+// Steps with the n-th allocation from here on refused; what failed is tried again with memory back. Whether
+// the n-th was reached.
 bool walk(const Build &build, int64_t n, uint64_t expected, int *refused) {
   dfm_context *const c = make_context();
   const dfm_world w = build(c);
@@ -96,7 +115,11 @@ bool walk(const Build &build, int64_t n, uint64_t expected, int *refused) {
     const int64_t kept = Refusal::refuse;
     const uint64_t before = dfm_world_hash(w);
     dfm_status status = dfm_world_step(w, kStep, nullptr);
-    if (armed && Refusal::calls > kept) Refusal::disarm(), armed = false, came = true;
+    if (armed && Refusal::calls > kept) {
+      Refusal::disarm();
+      armed = false;
+      came = true;
+    }
     if (status == DFM_OK) continue;
     ++*refused;
     EXPECT_EQ(status, DFM_E_NOMEM) << "allocation " << n << ", step " << i << ": " << dfm_last_error();
@@ -113,16 +136,20 @@ bool walk(const Build &build, int64_t n, uint64_t expected, int *refused) {
 void walk_all(const Build &build, int least) {
   uint64_t expected = 0;
   int refused = 0;
-  ASSERT_FALSE(walk(build, int64_t(1) << 40, [&] {
-    dfm_context *const c = make_context();
-    const dfm_world w = build(c);
-    for (int i = 0; i < kSteps; ++i) EXPECT_EQ(dfm_world_step(w, kStep, nullptr), DFM_OK) << dfm_last_error();
-    EXPECT_EQ(test::stats(w).substeps_max, 1u);
-    EXPECT_GT(test::contacts(w).size(), 0u) << "the scene has no contact: the walk would show little";
-    expected = dfm_world_hash(w);
-    dfm_context_destroy(c);
-    return expected;
-  }(), &refused));
+  ASSERT_FALSE(walk(
+      build, int64_t(1) << 40,
+      [&] {
+        dfm_context *const c = make_context();
+        const dfm_world w = build(c);
+        for (int i = 0; i < kSteps; ++i)
+          EXPECT_EQ(dfm_world_step(w, kStep, nullptr), DFM_OK) << dfm_last_error();
+        EXPECT_EQ(test::stats(w).substeps_max, 1u);
+        EXPECT_GT(test::contacts(w).size(), 0u) << "the scene has no contact: the walk would show little";
+        expected = dfm_world_hash(w);
+        dfm_context_destroy(c);
+        return expected;
+      }(),
+      &refused));
   int64_t n = 0;
   while (!testing::Test::HasFailure() && walk(build, n, expected, &refused)) ++n;
   EXPECT_GT(n, least);
@@ -137,7 +164,8 @@ TEST(RefusedMemory, InAStepThatFallsAsleepAndWakes_LeavesTheWorldAsItWas) { walk
 TEST(RefusedMemory, InAStepWithARigidHost_LeavesTheWorldAsItWas) { walk_all(rigid_host, 40); }
 TEST(RefusedMemory, InAStepOfALawThatRemembers_LeavesTheWorldAsItWas) { walk_all(bristles, 40); }
 
-// A restore that finds no memory, wherever it misses it, leaves the world that was there; with memory it is done.
+// A restore that finds no memory, wherever it misses it, leaves the world that was there; with
+// memory it is done.
 TEST(RefusedMemory, InARestore_LeavesTheWorldAsItWas) {
   dfm_context *const c = make_context();
   const dfm_world w = sleepers(c);
@@ -182,11 +210,12 @@ TEST(RefusedMemory, InTheSetUp_EndsInAnErrorAndLeaksNothing) {
       through = !Refusal::disarm();
       if (status != DFM_OK) {
         ++refused;
-        EXPECT_TRUE(status == DFM_E_NOMEM || status == DFM_E_IO) << "allocation " << n << ": " << dfm_status_name(status) << ": " << dfm_last_error();
+        EXPECT_TRUE(status == DFM_E_NOMEM || status == DFM_E_IO)
+            << "allocation " << n << ": " << dfm_status_name(status) << ": " << dfm_last_error();
       }
       dfm_context_destroy(c);
     }
-    if (n > 400) {   // tables of the process have their size by then
+    if (n > 400) {  // tables of the process have their size by then
       EXPECT_EQ(Refusal::live, live) << "allocation " << n;
     }
   }

@@ -18,11 +18,14 @@ struct Lift {
 
 dfm_rigid_host lift_table(Lift *counts) {
   dfm_rigid_host t{};
-  t.size = sizeof t, t.user = counts;
+  t.size = sizeof t;
+  t.user = counts;
   t.create = [](void *user, const dfm_rigid_set_def *set, void **self, uint32_t *group, uint32_t *nextra) {
     if (set->nbody != 1) return dfm_status(set->nbody == 2 ? DFM_E_ARG : DFM_E_NOMEM);
     ++static_cast<Lift *>(user)->created;
-    *self = user, group[0] = 0, *nextra = 1;
+    *self = user;
+    group[0] = 0;
+    *nextra = 1;
     return dfm_status(DFM_OK);
   };
   t.destroy = [](void *self) { ++static_cast<Lift *>(self)->destroyed; };
@@ -33,10 +36,12 @@ dfm_rigid_host lift_table(Lift *counts) {
   };
   t.respond = [](void *self, const dfm_rigid_step *, uint32_t, double *m) {
     ++static_cast<Lift *>(self)->responded;
-    std::fill(m, m + 36, 0.0), m[14] = 1;
+    std::fill(m, m + 36, 0.0);
+    m[14] = 1;
     return dfm_status(DFM_OK);
   };
-  t.commit = [](void *self, const dfm_rigid_step *step, const double *impulse, dfm_rigid_state *state, double *extra) {
+  t.commit = [](void *self, const dfm_rigid_step *step, const double *impulse, dfm_rigid_state *state,
+                double *extra) {
     Lift &lift = *static_cast<Lift *>(self);
     ++lift.committed;
     state[0] = step->state[0];
@@ -52,7 +57,9 @@ struct Set {
   std::vector<dfm_rigid_def> bodies;
   std::vector<dfm_joint_def> joints;
   dfm_status create(dfm_world w, const char *host = nullptr) const {
-    const dfm_rigid_set_def set = {sizeof set, uint32_t(bodies.size()), uint32_t(joints.size()), 0, bodies.data(), joints.data(), nullptr};
+    const dfm_rigid_set_def set = {sizeof set, uint32_t(bodies.size()), uint32_t(joints.size()),
+                                   0,          bodies.data(),           joints.data(),
+                                   nullptr};
     std::vector<dfm_rigid> out(bodies.size() + 1);
     return dfm_rigid_create(w, host, &set, out.data());
   }
@@ -63,12 +70,17 @@ dfm_world falling_on_ball(dfm_context *c, dfm_body *ball, dfm_rigid *plate) {
   set_friction(w, 0.5);
   add_plane(w, "floor");
   BodyOptions o;
-  o.name = "ball", o.young = 3e4, o.damping_stiffness = 2e-3, o.position = {0, 0, 0.101};
+  o.name = "ball";
+  o.young = 3e4;
+  o.damping_stiffness = 2e-3;
+  o.position = {0, 0, 0.101};
   *ball = make_body(c, w, "ball", {0.1}, 300, o);
   dfm_rigid_def d = box("plate", {0.1, 0.08, 0.02}, 1.5, {0.01, 0, 0.226});
   d.spin[0] = 1;
   dfm_joint_def j = joint(DFM_JOINT_HINGE, 0, DFM_RIGID_WORLD, {0.3, 0, 0.226}, {0, 1, 0});
-  j.motor = 1, j.velocity = -1, j.max = 0.5;
+  j.motor = 1;
+  j.velocity = -1;
+  j.max = 0.5;
   d.spin[0] = 0;
   *plate = create(w, {d}, {j})[0];
   return w;
@@ -77,7 +89,7 @@ dfm_world falling_on_ball(dfm_context *c, dfm_body *ball, dfm_rigid *plate) {
 }  // namespace
 
 TEST(RigidHost, SomebodyElses_TakesPartInTheSolve) {
-  static Lift counts;   // the table stays registered for the life of the process
+  static Lift counts;  // the table stays registered for the life of the process
   counts = {};
   const dfm_rigid_host table = lift_table(&counts);
   ASSERT_EQ(dfm_rigid_host_register("lift", &table), DFM_OK) << dfm_last_error();
@@ -88,12 +100,20 @@ TEST(RigidHost, SomebodyElses_TakesPartInTheSolve) {
     const dfm_world w = make_world(c);
     add_plane(w, "floor");
     BodyOptions o;
-    o.young = 3e4, o.damping_stiffness = 4e-3, o.damping_mass = 10, o.position = {0, 0, 0.101}, o.name = "ball";
+    o.young = 3e4;
+    o.damping_stiffness = 4e-3;
+    o.damping_mass = 10;
+    o.position = {0, 0, 0.101};
+    o.name = "ball";
     const dfm_body ball = make_body(c, w, "ball", {0.1}, 300, o);
     Set set{{box("plate", {0.1, 0.1, 0.02}, 1, {0, 0, 0.23})}, {}};
-    EXPECT_EQ(Set({{box("one", {0.1, 0.1, 0.1}, 1), box("two", {0.1, 0.1, 0.1}, 1, {1, 0, 0})}, {}}).create(w, "lift"), DFM_E_FATAL);
+    EXPECT_EQ(Set({{box("one", {0.1, 0.1, 0.1}, 1), box("two", {0.1, 0.1, 0.1}, 1, {1, 0, 0})}, {}})
+                  .create(w, "lift"),
+              DFM_E_FATAL);
     EXPECT_NE(std::strstr(dfm_last_error(), "gives no reason; look for"), nullptr) << dfm_last_error();
-    Set three{{box("one", {0.1, 0.1, 0.1}, 1), box("two", {0.1, 0.1, 0.1}, 1, {1, 0, 0}), box("three", {0.1, 0.1, 0.1}, 1, {2, 0, 0})}, {}};
+    Set three{{box("one", {0.1, 0.1, 0.1}, 1), box("two", {0.1, 0.1, 0.1}, 1, {1, 0, 0}),
+               box("three", {0.1, 0.1, 0.1}, 1, {2, 0, 0})},
+              {}};
     EXPECT_EQ(three.create(w, "lift"), DFM_E_NOMEM) << dfm_last_error();
     EXPECT_EQ(set.create(w, "lfit"), DFM_E_ARG);
     EXPECT_NE(std::strstr(dfm_last_error(), "did you mean 'lift'"), nullptr) << dfm_last_error();
@@ -133,7 +153,8 @@ TEST(RigidBodies, HashAndSnapshotOnThreads_CoverThem) {
   dfm_body ball;
   dfm_rigid plate, other;
   const dfm_world a = falling_on_ball(one, &ball, &plate), b = falling_on_ball(four, &ball, &other);
-  run(a, 0.15, 1e-3), run(b, 0.15, 1e-3);
+  run(a, 0.15, 1e-3);
+  run(b, 0.15, 1e-3);
   EXPECT_GT(stats(a).contacts, 3u);
   EXPECT_EQ(dfm_world_hash(a), dfm_world_hash(b));
   const std::string data = snapshot(a);
@@ -169,11 +190,13 @@ TEST(RigidBodies, ReportsNameThem) {
   uint32_t with_plate = 0, with_floor = 0;
   double force[3] = {}, wrench[3], moment[3];
   for (const dfm_contact &k : contacts) {
-    with_plate += k.body_b == plate, with_floor += k.body_b == 0;
+    with_plate += k.body_b == plate;
+    with_floor += k.body_b == 0;
     if (k.body_b != plate) continue;
     for (int i = 0; i < 3; ++i) {
       const int m = (i + 1) % 3, n2 = (i + 2) % 3;
-      force[i] -= k.fn * k.normal[i] + k.ft[0] * k.tangent[i] + k.ft[1] * (k.normal[m] * k.tangent[n2] - k.normal[n2] * k.tangent[m]);
+      force[i] -= k.fn * k.normal[i] + k.ft[0] * k.tangent[i] +
+                  k.ft[1] * (k.normal[m] * k.tangent[n2] - k.normal[n2] * k.tangent[m]);
     }
   }
   EXPECT_GT(with_plate, 0u);
@@ -183,12 +206,14 @@ TEST(RigidBodies, ReportsNameThem) {
   ok(dfm_world_events(w, 0, nullptr, &n));
   std::vector<dfm_contact_event> events(n);
   ok(dfm_world_events(w, n, events.data(), &n));
-  EXPECT_TRUE(std::any_of(events.begin(), events.end(), [&](auto &e) { return e.kind == DFM_EVENT_BEGIN && e.b == plate; }));
+  EXPECT_TRUE(std::any_of(events.begin(), events.end(),
+                          [&](auto &e) { return e.kind == DFM_EVENT_BEGIN && e.b == plate; }));
   size_t bytes = 0;
   ok(dfm_world_explain(w, nullptr, &bytes));
   std::string text(bytes, '\0');
   ok(dfm_world_explain(w, text.data(), &bytes));
-  for (const char *part : {"rigid predict", "rigid commit", "1 rigid body and 1 joint of host builtin", "two_way_rigid"})
+  for (const char *part :
+       {"rigid predict", "rigid commit", "1 rigid body and 1 joint of host builtin", "two_way_rigid"})
     EXPECT_NE(text.find(part), std::string::npos) << part;
   // It is an obstacle that moves by itself.
   dfm_pose pose{};
@@ -207,7 +232,8 @@ TEST(RigidBodies, BadDefs_AreRefused) {
   const dfm_obstacle floor = add_plane(w, "floor");
   auto refused = [&](const Set &set, std::vector<const char *> words) {
     EXPECT_EQ(set.create(w), DFM_E_ARG);
-    for (const char *word : words) EXPECT_NE(std::strstr(dfm_last_error(), word), nullptr) << word << " in: " << dfm_last_error();
+    for (const char *word : words)
+      EXPECT_NE(std::strstr(dfm_last_error(), word), nullptr) << word << " in: " << dfm_last_error();
     uint32_t n = 1;
     ok(dfm_world_rigids(w, 0, nullptr, &n));
     EXPECT_EQ(n, 0u);
@@ -226,9 +252,18 @@ TEST(RigidBodies, BadDefs_AreRefused) {
   refused(with([](dfm_rigid_def &d) { d.mass = 0; }), {"'a'", "mass"});
   refused(with([](dfm_rigid_def &d) { d.mass = INFINITY; }), {"'a'", "mass", "finite"});
   refused(with([](dfm_rigid_def &d) { d.shape = DFM_SHAPE_PLANE; }), {"sphere, a box or a capsule"});
-  refused(with([](dfm_rigid_def &d) { d.inertia[0] = 5, d.inertia[1] = 1, d.inertia[2] = 1; }), {"inertia", "sum"});
+  refused(with([](dfm_rigid_def &d) {
+            d.inertia[0] = 5;
+            d.inertia[1] = 1;
+            d.inertia[2] = 1;
+          }),
+          {"inertia", "sum"});
   refused(with([](dfm_rigid_def &d) { d.inertia[0] = 1; }), {"inertia", "positive"});
-  refused(with([](dfm_rigid_def &d) { d.fixed = 1, d.velocity[0] = 1; }), {"fixed", "velocity"});
+  refused(with([](dfm_rigid_def &d) {
+            d.fixed = 1;
+            d.velocity[0] = 1;
+          }),
+          {"fixed", "velocity"});
   refused(with([](dfm_rigid_def &d) { d.name = "floor"; }), {"floor", "taken"});
   refused(with([](dfm_rigid_def &d) { d.half_size[1] = -1; }), {"half_size"});
   refused({{good, good}, {}}, {"'a'", "taken"});
@@ -239,7 +274,9 @@ TEST(RigidBodies, BadDefs_AreRefused) {
   dfm_joint_def j = joint(DFM_JOINT_BALL, 0, 1, {});
   j.motor = 1;
   refused(tied(j), {"hinges and sliders"});
-  j = joint(DFM_JOINT_SLIDER, 0, 1, {}), j.motor = 1, j.max = -1;
+  j = joint(DFM_JOINT_SLIDER, 0, 1, {});
+  j.motor = 1;
+  j.max = -1;
   refused(tied(j), {"max -1"});
   dfm_rigid_state s{};
   EXPECT_EQ(dfm_rigid_get_state(floor, &s), DFM_E_HANDLE);
@@ -252,7 +289,8 @@ TEST(RigidBodies, SceneErrors_NameTheirPlace) {
   auto refused = [&](const std::string &set, std::vector<std::string> words) {
     const CommandResult r = deform({"run", scene, "--quiet", "--out", scratch("rigid_errors"), "--set", set});
     EXPECT_EQ(r.exit_code, 2) << set;
-    for (const std::string &word : words) EXPECT_NE(r.err.find(word), std::string::npos) << set << ": " << r.err;
+    for (const std::string &word : words)
+      EXPECT_NE(r.err.find(word), std::string::npos) << set << ": " << r.err;
   };
   refused("/rigid/host=bulit", {"/rigid", "builtin"});
   refused("/rigid={\"host\":\"bulit\",\"bodies\":[]}", {"/rigid/host", "builtin"});

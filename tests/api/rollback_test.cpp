@@ -26,9 +26,11 @@ std::vector<unsigned char> snapshot(dfm_world w) {
 }
 
 struct Thrown : rb::World {
-  explicit Thrown(int32_t method = DFM_METHOD_ROLLBACK, uint32_t threads = 1) : World(method, {0, 0, -rb::kG}, 0.4, threads) {
+  explicit Thrown(int32_t method = DFM_METHOD_ROLLBACK, uint32_t threads = 1)
+      : World(method, {0, 0, -rb::kG}, 0.4, threads) {
     test::add_plane(world, "floor");
-    block("first", {0, 0, 4e-5}, {0.3, 0, -0.2}, 60), block("second", {0.01, -0.12, 0.003}, {0, 0.8, 0}, 60);
+    block("first", {0, 0, 4e-5}, {0.3, 0, -0.2}, 60);
+    block("second", {0.01, -0.12, 0.003}, {0, 0.8, 0}, 60);
   }
 };
 
@@ -42,12 +44,20 @@ TEST(RollbackWorld, WhatItCannotDo_IsRefusedWhereItIsMade) {
   dfm_obstacle_def voxels = dfm_obstacle_def_default();
   const double points[] = {0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0, 1};
   const uint32_t triangles[] = {0, 2, 1, 0, 1, 3, 1, 2, 3, 0, 3, 2};
-  voxels.name = "grid", voxels.shape = DFM_SHAPE_VOXELS, voxels.npoint = 4, voxels.ntriangle = 4, voxels.points = points, voxels.triangles = triangles;
+  voxels.name = "grid";
+  voxels.shape = DFM_SHAPE_VOXELS;
+  voxels.npoint = 4;
+  voxels.ntriangle = 4;
+  voxels.points = points;
+  voxels.triangles = triangles;
   dfm_obstacle o = 0;
   refused(dfm_obstacle_create(w.world, &voxels, &o), "obstacle 'grid': voxels");
   dfm_obstacle_def moving = dfm_obstacle_def_default();
   const dfm_pose_key keys[] = {{0, {{0, 0, 0}, {0, 0, 0, 1}}}, {1, {{0, 0, 1}, {0, 0, 0, 1}}}};
-  moving.name = "lift", moving.shape = DFM_SHAPE_SPHERE, moving.keys = keys, moving.nkey = 2;
+  moving.name = "lift";
+  moving.shape = DFM_SHAPE_SPHERE;
+  moving.keys = keys;
+  moving.nkey = 2;
   refused(dfm_obstacle_create(w.world, &moving, &o), "obstacle 'lift': a motion of its own");
   refused(dfm_obstacle_move_to(floor, &keys[1].pose), "obstacle 'floor': a motion of its own");
 
@@ -73,7 +83,12 @@ TEST(RollbackWorld, WhatItCannotDo_IsRefusedWhereItIsMade) {
   const double *at = nullptr;
   const uint32_t *tets = nullptr;
   test::ok(dfm_tetmesh_data(mesh, &at, &tets, nullptr));
-  d.name = "worn", d.npoint = info.npoint, d.ntet = info.ntet, d.points = at, d.tets = tets, d.surface = &surface;
+  d.name = "worn";
+  d.npoint = info.npoint;
+  d.ntet = info.ntet;
+  d.points = at;
+  d.tets = tets;
+  d.surface = &surface;
   dfm_body worn = 0;
   refused(dfm_body_create(w.world, &d, &worn), "body 'worn': a surface of its own");
   test::ok(dfm_tetmesh_destroy(mesh));
@@ -81,11 +96,13 @@ TEST(RollbackWorld, WhatItCannotDo_IsRefusedWhereItIsMade) {
   test::ok(dfm_plugin_register_static(w.context, dfm_plugin_entry_bristle, "bristle"));
   const double mu = 0.5;
   const dfm_param_value value{"mu", &mu, 1};
-  const dfm_friction_def memory = {sizeof memory, 0, {"*", "*"}, "test.bristle", {sizeof(dfm_params), 1, &value}};
+  const dfm_friction_def memory = {
+      sizeof memory, 0, {"*", "*"}, "test.bristle", {sizeof(dfm_params), 1, &value}};
   refused(dfm_world_add_friction(w.world, &memory), "friction law 'test.bristle': a memory");
 
   dfm_world_def sleepy = dfm_world_def_default();
-  sleepy.method = DFM_METHOD_ROLLBACK, sleepy.sleep = 1;
+  sleepy.method = DFM_METHOD_ROLLBACK;
+  sleepy.sleep = 1;
   dfm_world other = 0;
   refused(dfm_world_create(w.context, &sleepy, &other), "sleep (contact.sleep)");
   // what is refused leaves nothing behind: the world steps on
@@ -111,7 +128,9 @@ TEST(RollbackWorld, Plan_HasItsStagesOnlyWhereAskedFor) {
   const Thrown rolls, solves(DFM_METHOD_VELOCITY);
   const std::string with = test::explain(rolls.world), without = test::explain(solves.world);
   EXPECT_NE(with.find("{\"name\":\"rollback\",\"why\":\"contact.method rollback"), std::string::npos) << with;
-  EXPECT_NE(with.find("{\"name\":\"contact+friction\",\"why\":\"contact.method is rollback\"}"), std::string::npos) << with;
+  EXPECT_NE(with.find("{\"name\":\"contact+friction\",\"why\":\"contact.method is rollback\"}"),
+            std::string::npos)
+      << with;
   EXPECT_NE(with.find("\"lagged friction\""), std::string::npos) << with;
   EXPECT_EQ(without.find("rollback"), std::string::npos) << without;
   EXPECT_EQ(without.find("lagged"), std::string::npos) << without;
@@ -131,7 +150,8 @@ TEST(RollbackWorld, Snapshot_GoesOnWithTheSameBits) {
   test::run(b.world, 0.03, 1e-3);
   EXPECT_EQ(dfm_world_hash(a.world), dfm_world_hash(b.world));
   Thrown other(DFM_METHOD_VELOCITY);
-  EXPECT_EQ(dfm_world_restore(other.world, kept.data(), kept.size()), DFM_E_FORMAT) << "a world of another method";
+  EXPECT_EQ(dfm_world_restore(other.world, kept.data(), kept.size()), DFM_E_FORMAT)
+      << "a world of another method";
 }
 
 TEST(RollbackWorld, OneToEightThreads_GiveTheSameHash) {

@@ -1,4 +1,5 @@
-// The folder of a run: one run at a time, nothing of an earlier one, no link followed; and text of others on its way to terminal and tables.
+// The folder of a run: one run at a time, nothing of an earlier one, no link followed; and text of others on
+// its way to terminal and tables.
 #include <gtest/gtest.h>
 
 #include <signal.h>
@@ -14,8 +15,10 @@ namespace {
 
 namespace fs = std::filesystem;
 
-const std::string kScene = R"({"format": "deform-scene", "version": 1, "time": {"duration": 0.002, "step": 0.001},
-  "bodies": [{"name": "block", "mesh": ")" + std::string(DEFORM_SOURCE_DIR) + R"(/examples/data/block.msh"}]})";
+const std::string kScene =
+    R"({"format": "deform-scene", "version": 1, "time": {"duration": 0.002, "step": 0.001},
+  "bodies": [{"name": "block", "mesh": ")" +
+    std::string(DEFORM_SOURCE_DIR) + R"(/examples/data/block.msh"}]})";
 
 std::string fresh(const std::string &name) {
   const std::string dir = test::scratch("run_folder_" + std::to_string(getpid())) + "/" + name;
@@ -33,7 +36,8 @@ test::CommandResult run(const std::string &dir, const std::vector<std::string> &
 
 // A run that does not end by itself, once it has begun to write.
 pid_t start_endless(const std::string &dir) {
-  const pid_t child = test::start({DEFORM_COMMAND, "run", dir + "/scene.json", "--quiet", "--time", "1e9", "--out", dir + "/out"});
+  const pid_t child = test::start(
+      {DEFORM_COMMAND, "run", dir + "/scene.json", "--quiet", "--time", "1e9", "--out", dir + "/out"});
   for (int i = 0; i < 2000 && !fs::exists(dir + "/out/probes.csv"); ++i) usleep(10000);
   return child;
 }
@@ -41,8 +45,11 @@ pid_t start_endless(const std::string &dir) {
 void expect_sentence(const test::CommandResult &r, const std::vector<std::string> &parts) {
   EXPECT_EQ(r.exit_code, 2) << r.err;
   EXPECT_EQ(std::count(r.err.begin(), r.err.end(), '\n'), 1) << r.err;
-  EXPECT_TRUE(std::all_of(r.err.begin(), r.err.end(), [](char c) { return c == '\n' || static_cast<unsigned char>(c) >= 0x20; })) << r.err;
-  for (const std::string &part : parts) EXPECT_NE(r.err.find(part), std::string::npos) << "expected " << part << " in\n" << r.err;
+  EXPECT_TRUE(std::all_of(r.err.begin(), r.err.end(), [](char c) {
+    return c == '\n' || static_cast<unsigned char>(c) >= 0x20;
+  })) << r.err;
+  for (const std::string &part : parts)
+    EXPECT_NE(r.err.find(part), std::string::npos) << "expected " << part << " in\n" << r.err;
 }
 
 }  // namespace
@@ -61,22 +68,28 @@ TEST(RunFolder, KilledRerun_LeavesNoSummaryOfTheEarlierRunAndNoHalfFiles) {
   const std::string dir = fresh("killed");
   ASSERT_EQ(run(dir, {"--set", "/output/states=true"}).exit_code, 0);
   ASSERT_TRUE(fs::exists(dir + "/out/summary.json"));
-  fs::remove(dir + "/out/probes.csv");   // start_endless waits for it
+  fs::remove(dir + "/out/probes.csv");  // start_endless waits for it
   const pid_t second = start_endless(dir);
   kill(second, SIGKILL);
   waitpid(second, nullptr, 0);
   EXPECT_FALSE(fs::exists(dir + "/out/summary.json"));
   EXPECT_TRUE(fs::is_empty(dir + "/out/states")) << "of the earlier run";
-  for (const auto &entry : fs::recursive_directory_iterator(dir)) EXPECT_EQ(entry.path().string().find(".part"), std::string::npos) << entry.path();
+  for (const auto &entry : fs::recursive_directory_iterator(dir))
+    EXPECT_EQ(entry.path().string().find(".part"), std::string::npos) << entry.path();
 }
 
 TEST(RunFolder, LeftoversOfKilledRuns_AreRemovedAndOtherFilesKept) {
   const std::string dir = fresh("leftovers");
-  fs::create_directories(dir + "/out/states"), fs::create_directories(dir + "/out/frames"), fs::create_directories(dir + "/out/nodes");
-  for (const char *name : {"summary.json.part", "summary.json.part12-3", "bodies.csv.part", "states/block_000003.vtu.part77-0", "states/last_block.vtu",
-                           "frames/frame_000001.png.part12", "frames/frame_000001.png", "nodes/ghost.csv", "contacts.csv"})
+  fs::create_directories(dir + "/out/states");
+  fs::create_directories(dir + "/out/frames");
+  fs::create_directories(dir + "/out/nodes");
+  for (const char *name :
+       {"summary.json.part", "summary.json.part12-3", "bodies.csv.part", "states/block_000003.vtu.part77-0",
+        "states/last_block.vtu", "frames/frame_000001.png.part12", "frames/frame_000001.png",
+        "nodes/ghost.csv", "contacts.csv"})
     test::write_file(dir + "/out/" + name, "old");
-  for (const char *name : {"notes.txt", "states/own.vtu", "frames/film.mp4", "my_table.csv"}) test::write_file(dir + "/out/" + name, "own");
+  for (const char *name : {"notes.txt", "states/own.vtu", "frames/film.mp4", "my_table.csv"})
+    test::write_file(dir + "/out/" + name, "own");
   ASSERT_EQ(run(dir, {"--set", "/output/contacts=false"}).exit_code, 0);
   size_t files = 0;
   for (const auto &entry : fs::recursive_directory_iterator(dir + "/out")) {
@@ -90,21 +103,26 @@ TEST(RunFolder, LeftoversOfKilledRuns_AreRemovedAndOtherFilesKept) {
 TEST(RunFolder, LinksInItsPlace_AreReplacedAndNotFollowed) {
   const std::string dir = fresh("links");
   fs::create_directories(dir + "/out");
-  const std::vector<std::string> names = {"bodies.csv", "contacts.csv", "probes.csv", "summary.json", "summary.json.part"};
+  const std::vector<std::string> names = {"bodies.csv", "contacts.csv", "probes.csv", "summary.json",
+                                          "summary.json.part"};
   for (const std::string &name : names) {
     test::write_file(dir + "/victim_" + name, "precious");
     fs::create_symlink(dir + "/victim_" + name, dir + "/out/" + name);
   }
   ASSERT_EQ(run(dir).exit_code, 0);
-  for (const std::string &name : names) EXPECT_EQ(test::read_file(dir + "/victim_" + name), "precious") << name;
-  for (const char *name : {"bodies.csv", "contacts.csv", "probes.csv", "summary.json"}) EXPECT_FALSE(fs::is_symlink(dir + "/out/" + name)) << name;
+  for (const std::string &name : names)
+    EXPECT_EQ(test::read_file(dir + "/victim_" + name), "precious") << name;
+  for (const char *name : {"bodies.csv", "contacts.csv", "probes.csv", "summary.json"})
+    EXPECT_FALSE(fs::is_symlink(dir + "/out/" + name)) << name;
 }
 
 TEST(RunFolder, LinkToAnotherFolderInIt_IsRefused) {
   for (const std::string name : {"states", "nodes", "frames"}) {
     const std::string dir = fresh("linked_" + name);
-    fs::create_directories(dir + "/out"), fs::create_directories(dir + "/other");
-    const std::vector<std::string> files = {"/other/b_000000.vtu", "/other/last_b.vtu", "/other/index.csv", "/other/frame_000000.png", "/out/summary.json"};
+    fs::create_directories(dir + "/out");
+    fs::create_directories(dir + "/other");
+    const std::vector<std::string> files = {"/other/b_000000.vtu", "/other/last_b.vtu", "/other/index.csv",
+                                            "/other/frame_000000.png", "/out/summary.json"};
     for (const std::string &file : files) test::write_file(dir + file, "precious");
     fs::create_directory_symlink(dir + "/other", dir + "/out/" + name);
     expect_sentence(run(dir, {"--set", "/output/states=true"}), {"/out/" + name, "a link", "--out"});
@@ -140,7 +158,8 @@ TEST(Terminal, ControlCharactersOfNamesAndPaths_AreShownAndNotSent) {
   const std::string path = dir + "/a\x1b[31m\nb.obj";
   test::write_file(path, "v 0 0 0\n");
   expect_sentence(test::deform({"mesh", "info", path}), {"a\\u001b[31m\\u000ab.obj"});
-  const test::CommandResult made = test::deform({"mesh", "make", "ball", "--surface", "--cells", "100", "--out", path});
+  const test::CommandResult made =
+      test::deform({"mesh", "make", "ball", "--surface", "--cells", "100", "--out", path});
   ASSERT_EQ(made.exit_code, 0) << made.err;
   const test::CommandResult info = test::deform({"mesh", "info", path});
   EXPECT_EQ(info.out.find('\x1b'), std::string::npos) << info.out;

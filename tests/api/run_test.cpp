@@ -71,7 +71,8 @@ std::string value(const std::string &json, const std::string &key) {
     if (c == '"' && json[end - 1] != '\\') in_string = !in_string;
     if (in_string) continue;
     if (c == '{' || c == '[') ++depth;
-    if ((c == ',' && depth == 0) || ((c == '}' || c == ']') && depth-- == 0) || (c == '\n' && depth == 0)) break;
+    if ((c == ',' && depth == 0) || ((c == '}' || c == ']') && depth-- == 0) || (c == '\n' && depth == 0))
+      break;
   }
   return json.substr(begin, end - begin);
 }
@@ -113,8 +114,10 @@ TEST(Run, Outputs_HaveTheirColumnsAndKeys) {
   ASSERT_EQ(r.result.exit_code, 0) << r.result.err;
   EXPECT_NE(r.result.out.find("steps/s"), std::string::npos);
   EXPECT_EQ(line(r.out + "/bodies.csv"),
-            "t,body,com_x,com_y,com_z,vel_x,vel_y,vel_z,ang_x,ang_y,ang_z,kinetic_J,elastic_J,volume,force_x,force_y,force_z");
-  EXPECT_EQ(line(r.out + "/contacts.csv"), "t,body_a,body_b,count,sticking,normal_N,friction_N,moment_Nm,slip_max,friction_work_J");
+            "t,body,com_x,com_y,com_z,vel_x,vel_y,vel_z,ang_x,ang_y,ang_z,kinetic_J,elastic_J,volume,force_x,"
+            "force_y,force_z");
+  EXPECT_EQ(line(r.out + "/contacts.csv"),
+            "t,body_a,body_b,count,sticking,normal_N,friction_N,moment_Nm,slip_max,friction_work_J");
   EXPECT_EQ(line(r.out + "/probes.csv"), "t,probe,x,y,z,vx,vy,vz");
   EXPECT_EQ(line(r.out + "/nodes/top.csv"), "node,ux,uy,uz");
   const auto bodies = test::read_csv(r.out + "/bodies.csv");
@@ -129,11 +132,53 @@ TEST(Run, Outputs_HaveTheirColumnsAndKeys) {
   EXPECT_FALSE(fs::exists(r.out + "/states/top_000006.vtu"));
   EXPECT_EQ(test::read_csv(r.out + "/states/index.csv").size(), 7u);
 
-  for (const char *key :
-       {"format", "version", "steps", "simulated_s", "wall_s", "cpu_s", "ms_per_step", "median", "p99", "max", "stages", "threads", "finite",
-        "states_checked", "intersections_max", "inverted_max", "limited_max", "self_bodies_max", "guard_steps", "solver", "passes", "sweeps", "residual_max",
-        "hold", "creep_max_um_per_s", "effects", "active", "absent", "plugins", "bodies", "com", "velocity", "kinetic_J", "elastic_J", "volume_ratio",
-        "speed_max", "dofs", "cells", "contacts", "mean", "impulse", "low/top", "normal_Ns", "peak_N", "swaps", "state_hash", "warnings"})
+  for (const char *key : {"format",
+                          "version",
+                          "steps",
+                          "simulated_s",
+                          "wall_s",
+                          "cpu_s",
+                          "ms_per_step",
+                          "median",
+                          "p99",
+                          "max",
+                          "stages",
+                          "threads",
+                          "finite",
+                          "states_checked",
+                          "intersections_max",
+                          "inverted_max",
+                          "limited_max",
+                          "self_bodies_max",
+                          "guard_steps",
+                          "solver",
+                          "passes",
+                          "sweeps",
+                          "residual_max",
+                          "hold",
+                          "creep_max_um_per_s",
+                          "effects",
+                          "active",
+                          "absent",
+                          "plugins",
+                          "bodies",
+                          "com",
+                          "velocity",
+                          "kinetic_J",
+                          "elastic_J",
+                          "volume_ratio",
+                          "speed_max",
+                          "dofs",
+                          "cells",
+                          "contacts",
+                          "mean",
+                          "impulse",
+                          "low/top",
+                          "normal_Ns",
+                          "peak_N",
+                          "swaps",
+                          "state_hash",
+                          "warnings"})
     EXPECT_NE(value(r.summary, key), "") << key;
   EXPECT_EQ(value(r.summary, "steps"), "200");
   EXPECT_EQ(value(r.summary, "finite"), "true");
@@ -141,7 +186,8 @@ TEST(Run, Outputs_HaveTheirColumnsAndKeys) {
   EXPECT_EQ(value(r.summary, "intersections_max"), "0");
   EXPECT_EQ(value(r.summary, "state_hash").size(), 18u);
   EXPECT_NE(value(r.summary, "active").find("\"stiction\""), std::string::npos);
-  for (const auto &entry : fs::recursive_directory_iterator(r.out)) EXPECT_NE(entry.path().extension(), ".part");
+  for (const auto &entry : fs::recursive_directory_iterator(r.out))
+    EXPECT_NE(entry.path().extension(), ".part");
 }
 
 TEST(Run, ContactForces_MatchTheMomentumChange) {
@@ -153,14 +199,21 @@ TEST(Run, ContactForces_MatchTheMomentumChange) {
   double last_v = 0, last_z = 0, last_t = 0, largest = 0;
   for (size_t i = 1; i < rows.size(); ++i) {
     if (rows[i][1] != "top") continue;
-    const double t = std::stod(rows[i][0]), z = std::stod(rows[i][4]), v = std::stod(rows[i][7]), force = std::stod(rows[i][16]);
+    const double t = std::stod(rows[i][0]);
+    const double z = std::stod(rows[i][4]);
+    const double v = std::stod(rows[i][7]);
+    const double force = std::stod(rows[i][16]);
     if (t > 0) {
-      // Mass damping (2 1/s) is the only other force: its rate times the way, but for the velocity that it takes, the one before each sub-step.
+      // Mass damping (2 1/s) is the only other force: its rate times the way, but for the velocity that it
+      // takes, the one before each sub-step.
       const double damping = -2 * mass * (z - last_z), of_one_step = 2 * mass * std::fabs(v - last_v) * 1e-3;
-      EXPECT_NEAR(mass * (v - last_v), (force - 9.81 * mass) * (t - last_t) + damping, of_one_step + 1e-9) << t;
+      EXPECT_NEAR(mass * (v - last_v), (force - 9.81 * mass) * (t - last_t) + damping, of_one_step + 1e-9)
+          << t;
       largest = std::max(largest, force);
     }
-    last_v = v, last_z = z, last_t = t;
+    last_v = v;
+    last_z = z;
+    last_t = t;
   }
   EXPECT_GT(largest, 1.0) << "the blocks never met, so nothing was tested";
 }
@@ -172,7 +225,8 @@ TEST(Run, Displacements_ComeInTheMeshFilesOrder) {
   ASSERT_GT(rows.size(), 8u);
   for (size_t i = 1; i < rows.size(); ++i) {
     EXPECT_EQ(rows[i][0], std::to_string(i - 1));
-    EXPECT_NEAR(std::stod(rows[i][3]), -0.5 * 9.81 * 0.01 * 0.01, 6e-5);  // free fall; symplectic Euler leads by g t h / 2
+    // free fall; symplectic Euler leads by g t h / 2
+    EXPECT_NEAR(std::stod(rows[i][3]), -0.5 * 9.81 * 0.01 * 0.01, 6e-5);
   }
 }
 
@@ -185,7 +239,9 @@ TEST(Run, SameScene_GivesTheSameHashWhateverItWrites) {
 
 TEST(Run, JitterSeeds_DifferAndRepeat) {
   std::set<std::string> hashes = {hash_of("j0", {"--quiet", "--time", "0.005"})};
-  for (int seed = 1; seed <= 5; ++seed) hashes.insert(hash_of("j" + std::to_string(seed), {"--quiet", "--time", "0.005", "--jitter", std::to_string(seed)}));
+  for (int seed = 1; seed <= 5; ++seed)
+    hashes.insert(hash_of("j" + std::to_string(seed),
+                          {"--quiet", "--time", "0.005", "--jitter", std::to_string(seed)}));
   EXPECT_EQ(hashes.size(), 6u);
   EXPECT_TRUE(hashes.count(hash_of("j3", {"--quiet", "--time", "0.005", "--jitter", "3"})));
 }
@@ -196,9 +252,10 @@ TEST(Run, CheckEveryStep_CountsEveryStep) {
 }
 
 TEST(Run, CrossingBodies_AreCounted) {
-  // Two blocks that start inside each other and may pass: the check must see what detection is told to ignore.
-  const Outcome r = run("crossing", {"--time", "0.002", "--set", "/bodies/1/pose/position=[0.03,0.04,0.05]", "--set",
-                                 "/contact/filter=[{\"between\":[\"low\",\"top\"]}]"});
+  // Two blocks that start inside each other and may pass: the check must see what detection is
+  // told to ignore.
+  const Outcome r = run("crossing", {"--time", "0.002", "--set", "/bodies/1/pose/position=[0.03,0.04,0.05]",
+                                     "--set", "/contact/filter=[{\"between\":[\"low\",\"top\"]}]"});
   ASSERT_EQ(r.result.exit_code, 0) << r.result.err;
   EXPECT_GT(std::stoi(value(r.summary, "intersections_max")), 0);
   EXPECT_NE(value(r.summary, "warnings").find("surfaces cross"), std::string::npos);
@@ -222,7 +279,8 @@ TEST(Run, Json_IsTheSummary) {
 
 TEST(Run, Profile_NamesTheStages) {
   const Outcome r = run("profile", {"--profile", "--time", "0.005"});
-  for (const char *stage : {"model", "predict", "narrow", "commit"}) EXPECT_NE(r.result.out.find(stage), std::string::npos) << stage;
+  for (const char *stage : {"model", "predict", "narrow", "commit"})
+    EXPECT_NE(r.result.out.find(stage), std::string::npos) << stage;
 }
 
 TEST(Run, StepFarTooLong_StopsWithTheLastGoodState) {
@@ -238,9 +296,11 @@ TEST(Run, StepFarTooLong_StopsWithTheLastGoodState) {
 }
 
 TEST(Run, ForceBeyondAllBounds_StopsWithTheLastGoodState) {
-  const Outcome r = run("diverged", {"--set", "/bodies/1/forces=[{\"box\":[[-1,-1,-1],[1,1,1]],\"total\":[1e300,1e300,0]}]"});
+  const Outcome r = run(
+      "diverged", {"--set", "/bodies/1/forces=[{\"box\":[[-1,-1,-1],[1,1,1]],\"total\":[1e300,1e300,0]}]"});
   EXPECT_EQ(r.result.exit_code, 3) << r.result.err;
-  EXPECT_NE(r.result.err.find("step 0, body 'top'"), std::string::npos) << r.result.err;   // which is pushed, not the one that it would strike
+  // which is pushed, not the one that it would strike
+  EXPECT_NE(r.result.err.find("step 0, body 'top'"), std::string::npos) << r.result.err;
   EXPECT_EQ(value(value(r.summary, "stopped"), "body"), "\"top\"");
   EXPECT_TRUE(fs::exists(r.out + "/states/last_low.vtu"));
   EXPECT_EQ(value(r.summary, "finite"), "true") << "the state that is kept is the last good one";
@@ -251,7 +311,8 @@ TEST(Run, Interrupt_WritesTheLastStateAndTheSummary) {
   const std::string out = folder() + "/interrupted";
   const pid_t child = start(out, {"--time", "1e5"});
   // Recorded rows show that the run is under way.
-  for (int i = 0; i < 1000 && test::read_csv(out + "/bodies.csv").size() < 8; ++i) std::this_thread::sleep_for(std::chrono::milliseconds(10));
+  for (int i = 0; i < 1000 && test::read_csv(out + "/bodies.csv").size() < 8; ++i)
+    std::this_thread::sleep_for(std::chrono::milliseconds(10));
   EXPECT_GT(std::stoi(value(stop(child, SIGINT, out), "steps")), 10);
 }
 
@@ -259,7 +320,8 @@ TEST(Run, Interrupt_WritesTheLastStateAndTheSummary) {
 TEST(Run, TerminateInsideAStep_WritesTheStateBeforeIt) {
   const std::string out = folder() + "/terminated";
   const pid_t child = start(out, {"--time", "2", "--set", "/time/step=2", "--set", "/time/max_work=1e18"});
-  for (int i = 0; i < 1000 && !fs::exists(out + "/bodies.csv"); ++i) std::this_thread::sleep_for(std::chrono::milliseconds(1));
+  for (int i = 0; i < 1000 && !fs::exists(out + "/bodies.csv"); ++i)
+    std::this_thread::sleep_for(std::chrono::milliseconds(1));
   std::this_thread::sleep_for(std::chrono::milliseconds(20));
   EXPECT_EQ(value(stop(child, SIGTERM, out), "steps"), "0");
 }
@@ -269,7 +331,8 @@ TEST(Run, EarlierNumberedFiles_AreRemoved) {
   fs::create_directories(out + "/states");
   test::write_file(out + "/states/top_000999.vtu", "old");
   test::write_file(out + "/states/notes.txt", "mine");
-  const test::CommandResult result = test::deform({"run", folder() + "/scene.json", "--quiet", "--time", "0.001", "--out", out});
+  const test::CommandResult result =
+      test::deform({"run", folder() + "/scene.json", "--quiet", "--time", "0.001", "--out", out});
   EXPECT_EQ(result.exit_code, 0) << result.err;
   EXPECT_FALSE(fs::exists(out + "/states/top_000999.vtu"));
   EXPECT_TRUE(fs::exists(out + "/states/notes.txt"));
@@ -279,7 +342,8 @@ TEST(Run, Frames_AreDrawnAtTheirRate) {
   const Outcome r = run("frames", {"--frames", "100", "--time", "0.02", "--set", "/output/color=speed"});
   ASSERT_EQ(r.result.exit_code, 0) << r.result.err;
   if (r.result.err.find("no pictures") != std::string::npos) GTEST_SKIP() << r.result.err;
-  for (const char *file : {"frame_000000.png", "frame_000001.png", "frame_000002.png"}) EXPECT_GT(fs::file_size(r.out + "/frames/" + file), 1000u);
+  for (const char *file : {"frame_000000.png", "frame_000001.png", "frame_000002.png"})
+    EXPECT_GT(fs::file_size(r.out + "/frames/" + file), 1000u);
   EXPECT_FALSE(fs::exists(r.out + "/frames/frame_000003.png"));
 }
 
@@ -295,6 +359,7 @@ TEST(Run, EverySubcommand_HasHelp) {
   for (const char *command : {"run", "explain", "mesh", "plugin", "friction", "cost", "ccd"}) {
     const test::CommandResult result = test::deform({command, "--help"});
     EXPECT_EQ(result.exit_code, 0) << command;
-    for (const char *option : {"--help", "--quiet", "--threads", "--json"}) EXPECT_NE(result.out.find(option), std::string::npos) << command << " " << option;
+    for (const char *option : {"--help", "--quiet", "--threads", "--json"})
+      EXPECT_NE(result.out.find(option), std::string::npos) << command << " " << option;
   }
 }

@@ -1,5 +1,5 @@
-// What a scene says of a body's cells and surface: fields, materials by group, directions, surfaces of their own, filling; and every mistake
-// in them, by file and JSON pointer.
+// What a scene says of a body's cells and surface: fields, materials by group, directions, surfaces of their
+// own, filling; and every mistake in them, by file and JSON pointer.
 #include <unistd.h>
 
 #include <algorithm>
@@ -10,8 +10,8 @@
 
 namespace {
 
-// A column 0.1 x 0.1 x 0.2 m of 48 cells (MSH 2.2) whose halves along z are the groups "lower" and "upper"; "base" is a group of triangles.
-// The first cell stands twice in the file.
+// A column 0.1 x 0.1 x 0.2 m of 48 cells (MSH 2.2) whose halves along z are the groups "lower" and "upper";
+// "base" is a group of triangles. The first cell stands twice in the file.
 std::string grouped_mesh() {
   const int paths[6][3] = {{0, 1, 2}, {0, 2, 1}, {1, 0, 2}, {1, 2, 0}, {2, 0, 1}, {2, 1, 0}};
   auto node = [](int i, int j, int k) { return 1 + i + 3 * (j + 3 * k); };
@@ -28,7 +28,10 @@ std::string grouped_mesh() {
     return [&, k, path](int i, int j) {
       int at[3] = {i, j, k};
       cells += std::to_string(++n) + " 4 2 " + (k ? "2 2" : "1 1") + " " + std::to_string(node(i, j, k));
-      for (int step = 0; step < 3; ++step) ++at[path[step]], cells += " " + std::to_string(node(at[0], at[1], at[2]));
+      for (int step = 0; step < 3; ++step) {
+        ++at[path[step]];
+        cells += " " + std::to_string(node(at[0], at[1], at[2]));
+      }
       cells += "\n";
     };
   };
@@ -38,8 +41,9 @@ std::string grouped_mesh() {
       for (int i = 0; i < 2; ++i)
         for (const auto &path : paths) add(k, path)(i, j);
   cells += std::to_string(++n) + " 2 2 7 7 1 4 2\n";
-  return "$MeshFormat\n2.2 0 8\n$EndMeshFormat\n$PhysicalNames\n3\n3 1 \"lower\"\n3 2 \"upper\"\n2 7 \"base\"\n$EndPhysicalNames\n$Nodes\n27\n" + nodes +
-         "$EndNodes\n$Elements\n" + std::to_string(n) + "\n" + cells + "$EndElements\n";
+  return "$MeshFormat\n2.2 0 8\n$EndMeshFormat\n$PhysicalNames\n3\n3 1 \"lower\"\n3 2 \"upper\"\n2 7 "
+         "\"base\"\n$EndPhysicalNames\n$Nodes\n27\n" +
+         nodes + "$EndNodes\n$Elements\n" + std::to_string(n) + "\n" + cells + "$EndElements\n";
 }
 
 // A closed box 0.1 x 0.1 x 0.2 m, its sides in two groups.
@@ -78,7 +82,9 @@ const std::string &folder() {
     std::string values = "value\n", numbered = "cell,young\n", axes = "x,y,z\n";
     for (int c = 0; c < 49; ++c) {
       const std::string young = c < 25 ? "2e4" : "8e4";  // cell 0 is the double of cell 1
-      values += young + "\n", numbered += std::to_string(48 - c) + "," + (48 - c < 25 ? "2e4" : "8e4") + "\n", axes += c % 2 ? "0,0,3\n" : "0, 0, 0.5\n";
+      values += young + "\n";
+      numbered += std::to_string(48 - c) + "," + (48 - c < 25 ? "2e4" : "8e4") + "\n";
+      axes += c % 2 ? "0,0,3\n" : "0, 0, 0.5\n";
     }
     test::write_file(d + "/values.csv", values);
     test::write_file(d + "/numbered.csv", numbered);
@@ -128,12 +134,14 @@ struct Loaded {
   }
 };
 
-constexpr const char *kPush = R"(/bodies/0/forces=[{"box": [[-1, -1, 0.199], [1, 1, 1]], "total": [0.02, 0, -0.1]}])";
+constexpr const char *kPush =
+    R"(/bodies/0/forces=[{"box": [[-1, -1, 0.199], [1, 1, 1]], "total": [0.02, 0, -0.1]}])";
 
 // The command's last word; warnings about the mesh (a double, turned cells) stand before it.
 std::string verdict(const test::CommandResult &result) {
   std::string text = result.err;
-  while (text.rfind("deform: warning: ", 0) == 0 && text.find('\n') != std::string::npos) text.erase(0, text.find('\n') + 1);
+  while (text.rfind("deform: warning: ", 0) == 0 && text.find('\n') != std::string::npos)
+    text.erase(0, text.find('\n') + 1);
   return text;
 }
 
@@ -144,18 +152,25 @@ void expect_refused(std::vector<const char *> sets, const std::vector<std::strin
   const std::string text = verdict(result);
   EXPECT_EQ(result.exit_code, 2) << sets.back() << "\n" << text;
   EXPECT_EQ(text.find(folder() + "/scene.json: /"), 8u) << text;
-  EXPECT_EQ(std::count(text.begin(), text.end(), '\n'), 1) << sets.back() << ": one sentence, found\n" << text;
-  for (const std::string &part : parts) EXPECT_NE(text.find(part), std::string::npos) << sets.back() << ": expected " << part << " in\n" << text;
+  EXPECT_EQ(std::count(text.begin(), text.end(), '\n'), 1) << sets.back() << ": one sentence, found\n"
+                                                           << text;
+  for (const std::string &part : parts)
+    EXPECT_NE(text.find(part), std::string::npos) << sets.back() << ": expected " << part << " in\n" << text;
 }
-void expect_refused(const char *set, const std::vector<std::string> &parts) { expect_refused(std::vector<const char *>{set}, parts); }
+void expect_refused(const char *set, const std::vector<std::string> &parts) {
+  expect_refused(std::vector<const char *>{set}, parts);
+}
 
 }  // namespace
 
 TEST(SceneFields, Table_IsReadInTheFilesOrder) {
   const uint64_t plain = Loaded({kPush, R"(/bodies/0/fields={"young": "values.csv"})"}).hash_after(20);
-  EXPECT_EQ(plain, Loaded({kPush, R"(/bodies/0/fields={"young": "numbered.csv"})"}).hash_after(20)) << "any order, by the cells' numbers";
+  EXPECT_EQ(plain, Loaded({kPush, R"(/bodies/0/fields={"young": "numbered.csv"})"}).hash_after(20))
+      << "any order, by the cells' numbers";
   // The same moduli as materials of the two groups; a double that reading dropped does not shift the rows.
-  EXPECT_EQ(plain, Loaded({kPush, "/materials/hard/density=500", R"(/bodies/0/materials_by_group={"upper": "hard"})"}).hash_after(20));
+  EXPECT_EQ(plain, Loaded({kPush, "/materials/hard/density=500",
+                           R"(/bodies/0/materials_by_group={"upper": "hard"})"})
+                       .hash_after(20));
   EXPECT_NE(plain, Loaded({kPush}).hash_after(20));
 }
 
@@ -182,14 +197,18 @@ TEST(SceneFields, Tables_AreCheckedWithTheirPlace) {
     all.push_back("/bodies/0");
     expect_refused(R"(/bodies/0/fields={"young": "bad.csv"})", all);
   }
-  expect_refused(R"(/bodies/0/fields={"young": "missing.csv"})", {"/bodies/0/fields/young", "missing.csv", "No such file"});
-  expect_refused(R"(/bodies/0/fields={"young": "."})", {"/bodies/0/fields/young", "is a directory", "value or cell,value"});
+  expect_refused(R"(/bodies/0/fields={"young": "missing.csv"})",
+                 {"/bodies/0/fields/young", "missing.csv", "No such file"});
+  expect_refused(R"(/bodies/0/fields={"young": "."})",
+                 {"/bodies/0/fields/young", "is a directory", "value or cell,value"});
   expect_refused("/bodies/0/nodal_bc=.", {"/bodies/0/nodal_bc", "is a directory", "node,fixx"});
 }
 
 TEST(SceneFields, Keys_AreTheModels) {
-  expect_refused(R"(/bodies/0/fields={"yuong": "values.csv"})", {"/bodies/0/fields/yuong", "did you mean \"young\"?"});
-  expect_refused(R"(/bodies/0/fields={"damper": "values.csv"})", {"/bodies/0/fields/damper", "it has: young"});
+  expect_refused(R"(/bodies/0/fields={"yuong": "values.csv"})",
+                 {"/bodies/0/fields/yuong", "did you mean \"young\"?"});
+  expect_refused(R"(/bodies/0/fields={"damper": "values.csv"})",
+                 {"/bodies/0/fields/damper", "it has: young"});
   expect_refused(R"(/bodies/0/fields=["values.csv"])", {"/bodies/0/fields", "object of files"});
   expect_refused(R"(/bodies/0/fields={"young": 5})", {"/bodies/0/fields/young", "string"});
   expect_refused({R"(/bodies/0/fields={"young": "values.csv"})", R"(/bodies/0/model/params={"young": 3e4})"},
@@ -197,60 +216,101 @@ TEST(SceneFields, Keys_AreTheModels) {
 }
 
 TEST(SceneMaterials, ByGroup_GoToTheirCells) {
-  const Loaded one({}), two({R"(/bodies/0/materials_by_group={"upper": "hard"})"}), all({R"(/bodies/0/materials_by_group={"upper": "hard", "lower": "hard"})"});
+  const Loaded one({}), two({R"(/bodies/0/materials_by_group={"upper": "hard"})"}),
+      all({R"(/bodies/0/materials_by_group={"upper": "hard", "lower": "hard"})"});
   EXPECT_NEAR(test::measure(one.body).mass, 1.0, 1e-12);
   EXPECT_NEAR(test::measure(two.body).mass, 1.5, 1e-12);
   EXPECT_NEAR(test::measure(two.body).com[2], (0.5 * 0.05 + 1.0 * 0.15) / 1.5, 1e-12);
   EXPECT_NEAR(test::measure(all.body).mass, 2.0, 1e-12);
-  EXPECT_NE(two.explain().find("\"fields\":[{\"name\":\"young\",\"from\":\"materials\",\"min\":20000,\"max\":80000}]"), std::string::npos) << two.explain();
+  EXPECT_NE(two.explain().find(
+                "\"fields\":[{\"name\":\"young\",\"from\":\"materials\",\"min\":20000,\"max\":80000}]"),
+            std::string::npos)
+      << two.explain();
   EXPECT_NE(all.explain().find("\"fields\":[]"), std::string::npos) << "the same everywhere is no field";
-  expect_refused(R"(/bodies/0/materials_by_group={"uper": "hard"})", {"/bodies/0/materials_by_group/uper", "did you mean \"upper\"?"});
-  expect_refused(R"(/bodies/0/materials_by_group={"base": "hard"})", {"/bodies/0/materials_by_group/base", "of cells", "lower, upper"});
-  expect_refused(R"(/bodies/0/materials_by_group={"upper": "hrad"})", {"/bodies/0/materials_by_group/upper", "did you mean \"hard\"?"});
-  expect_refused(R"(/bodies/0/materials_by_group="hard")", {"/bodies/0/materials_by_group", "object of materials"});
-  expect_refused(R"(/bodies/0/materials_by_group={"upper": "slow"})", {"/bodies/0: ", "'soft'", "'slow'", "differ"});
+  expect_refused(R"(/bodies/0/materials_by_group={"uper": "hard"})",
+                 {"/bodies/0/materials_by_group/uper", "did you mean \"upper\"?"});
+  expect_refused(R"(/bodies/0/materials_by_group={"base": "hard"})",
+                 {"/bodies/0/materials_by_group/base", "of cells", "lower, upper"});
+  expect_refused(R"(/bodies/0/materials_by_group={"upper": "hrad"})",
+                 {"/bodies/0/materials_by_group/upper", "did you mean \"hard\"?"});
+  expect_refused(R"(/bodies/0/materials_by_group="hard")",
+                 {"/bodies/0/materials_by_group", "object of materials"});
+  expect_refused(R"(/bodies/0/materials_by_group={"upper": "slow"})",
+                 {"/bodies/0: ", "'soft'", "'slow'", "differ"});
 }
 
 TEST(SceneMaterials, Words_StandForEnumerations) {
   const uint64_t word = Loaded({kPush, "/bodies/0/material=slow"}).hash_after(20);
   EXPECT_EQ(word, Loaded({kPush, "/bodies/0/material=slow", "/materials/slow/damper=1"}).hash_after(20));
   EXPECT_NE(word, Loaded({kPush, "/bodies/0/material=slow", "/materials/slow/damper=sls"}).hash_after(20));
-  EXPECT_EQ(word, Loaded({kPush, "/bodies/0/material=slow", R"(/bodies/0/model/params={"damper": "maxwell"})"}).hash_after(20));
-  expect_refused("/materials/slow/damper=maxwel", {"/materials/slow/damper", "expected one of: voigt, maxwell, sls"});
-  expect_refused("/materials/slow/relaxation_time=soon", {"/materials/slow/relaxation_time", "expected a number"});
-  expect_refused(R"(/bodies/0/model/params={"damper": "maxwel"})", {"/bodies/0/model/params/damper", "expected one of: voigt, maxwell, sls"});
+  EXPECT_EQ(word,
+            Loaded({kPush, "/bodies/0/material=slow", R"(/bodies/0/model/params={"damper": "maxwell"})"})
+                .hash_after(20));
+  expect_refused("/materials/slow/damper=maxwel",
+                 {"/materials/slow/damper", "expected one of: voigt, maxwell, sls"});
+  expect_refused("/materials/slow/relaxation_time=soon",
+                 {"/materials/slow/relaxation_time", "expected a number"});
+  expect_refused(R"(/bodies/0/model/params={"damper": "maxwel"})",
+                 {"/bodies/0/model/params/damper", "expected one of: voigt, maxwell, sls"});
 }
 
 TEST(SceneAnisotropy, KeysAndDirections_BecomeTheModels) {
   const uint64_t plain = Loaded({kPush}).hash_after(20);
   const uint64_t along =
-      Loaded({kPush, R"(/bodies/0/model/params={"anisotropy_slope": 0.5, "anisotropy_kind": "stiffer", "anisotropy_axis": [0, 0, 1]})"}).hash_after(20);
+      Loaded(
+          {kPush,
+           R"(/bodies/0/model/params={"anisotropy_slope": 0.5, "anisotropy_kind": "stiffer", "anisotropy_axis": [0, 0, 1]})"})
+          .hash_after(20);
   EXPECT_NE(plain, along);
-  EXPECT_EQ(along, Loaded({kPush, R"(/bodies/0/anisotropy={"axis": [0, 0, 7], "params": {"slope": 0.5, "kind": "stiffer"}})"}).hash_after(20));
-  EXPECT_EQ(along, Loaded({kPush, R"(/bodies/0/anisotropy={"field": "axes.csv", "params": {"anisotropy_slope": 0.5, "kind": "stiffer"}})"}).hash_after(20))
+  EXPECT_EQ(
+      along,
+      Loaded(
+          {kPush, R"(/bodies/0/anisotropy={"axis": [0, 0, 7], "params": {"slope": 0.5, "kind": "stiffer"}})"})
+          .hash_after(20));
+  EXPECT_EQ(
+      along,
+      Loaded(
+          {kPush,
+           R"(/bodies/0/anisotropy={"field": "axes.csv", "params": {"anisotropy_slope": 0.5, "kind": "stiffer"}})"})
+          .hash_after(20))
       << "directions of any length";
-  EXPECT_NE(along, Loaded({kPush, R"(/bodies/0/anisotropy={"axis": [1, 0, 0], "params": {"slope": 0.5, "kind": "stiffer"}})"}).hash_after(20));
+  EXPECT_NE(
+      along,
+      Loaded(
+          {kPush, R"(/bodies/0/anisotropy={"axis": [1, 0, 0], "params": {"slope": 0.5, "kind": "stiffer"}})"})
+          .hash_after(20));
 }
 
 TEST(SceneAnisotropy, Mistakes_AreTold) {
   expect_refused("/bodies/0/anisotropy={}", {"/bodies/0/anisotropy", "either \"axis\" or \"field\""});
-  expect_refused(R"(/bodies/0/anisotropy={"axis": [0, 0, 1], "field": "axes.csv"})", {"/bodies/0/anisotropy", "either \"axis\" or \"field\""});
+  expect_refused(R"(/bodies/0/anisotropy={"axis": [0, 0, 1], "field": "axes.csv"})",
+                 {"/bodies/0/anisotropy", "either \"axis\" or \"field\""});
   expect_refused(R"(/bodies/0/anisotropy={"axis": [0, 0, 0]})", {"/bodies/0/anisotropy/axis", "zero"});
-  expect_refused(R"(/bodies/0/anisotropy={"axes": [0, 0, 1]})", {"/bodies/0/anisotropy/axes", "did you mean \"axis\"?"});
-  expect_refused(R"(/bodies/0/anisotropy={"axis": [0, 0, 1], "params": {"slpoe": 1}})", {"/bodies/0/anisotropy/params/slpoe", "did you mean \"slope\"?"});
-  expect_refused(R"(/bodies/0/anisotropy={"axis": [0, 0, 1], "params": {"kind": "stiff"}})", {"/bodies/0/anisotropy/params/kind", "expected one of: "});
-  expect_refused(R"(/bodies/0/anisotropy={"axis": [0, 0, 1], "params": {"slope": -1}})", {"/bodies/0/anisotropy/params/slope", "number from 0"});
-  expect_refused(R"(/bodies/0/anisotropy={"axis": [0, 0, 1], "params": {"slope": "a"}})", {"/bodies/0/anisotropy/params/slope", "expected a number, found \"a\""});
-  expect_refused(R"(/bodies/0/anisotropy={"field": "values.csv"})", {"/bodies/0/anisotropy/field", "values.csv:1:", "x,y,z"});
-  expect_refused(R"(/bodies/0/anisotropy={"field": "missing.csv"})", {"/bodies/0/anisotropy/field", "missing.csv"});
-  expect_refused({R"(/bodies/0/model/params={"anisotropy_axis": [1, 0, 0]})", R"(/bodies/0/anisotropy={"axis": [0, 0, 1]})"},
+  expect_refused(R"(/bodies/0/anisotropy={"axes": [0, 0, 1]})",
+                 {"/bodies/0/anisotropy/axes", "did you mean \"axis\"?"});
+  expect_refused(R"(/bodies/0/anisotropy={"axis": [0, 0, 1], "params": {"slpoe": 1}})",
+                 {"/bodies/0/anisotropy/params/slpoe", "did you mean \"slope\"?"});
+  expect_refused(R"(/bodies/0/anisotropy={"axis": [0, 0, 1], "params": {"kind": "stiff"}})",
+                 {"/bodies/0/anisotropy/params/kind", "expected one of: "});
+  expect_refused(R"(/bodies/0/anisotropy={"axis": [0, 0, 1], "params": {"slope": -1}})",
+                 {"/bodies/0/anisotropy/params/slope", "number from 0"});
+  expect_refused(R"(/bodies/0/anisotropy={"axis": [0, 0, 1], "params": {"slope": "a"}})",
+                 {"/bodies/0/anisotropy/params/slope", "expected a number, found \"a\""});
+  expect_refused(R"(/bodies/0/anisotropy={"field": "values.csv"})",
+                 {"/bodies/0/anisotropy/field", "values.csv:1:", "x,y,z"});
+  expect_refused(R"(/bodies/0/anisotropy={"field": "missing.csv"})",
+                 {"/bodies/0/anisotropy/field", "missing.csv"});
+  expect_refused({R"(/bodies/0/model/params={"anisotropy_axis": [1, 0, 0]})",
+                  R"(/bodies/0/anisotropy={"axis": [0, 0, 1]})"},
                  {"/bodies/0/anisotropy: the direction is given as"});
 }
 
 // The sentence that refuses the body points to the log, so --quiet keeps the log's errors.
 TEST(SceneAnisotropy, WhatTheModelRefuses_IsToldToTheQuietToo) {
-  const test::CommandResult result = test::deform({"explain", scene(), "--quiet", "--set", R"(/bodies/0/model/params={"damper": "sls", "anisotropy_form": "A"})",
-                                                   "--set", R"(/bodies/0/anisotropy={"axis": [0, 0, 1], "params": {"slope": 1}})"});
+  const test::CommandResult result =
+      test::deform({"explain", scene(), "--quiet", "--set",
+                    R"(/bodies/0/model/params={"damper": "sls", "anisotropy_form": "A"})", "--set",
+                    R"(/bodies/0/anisotropy={"axis": [0, 0, 1], "params": {"slope": 1}})"});
   EXPECT_EQ(result.exit_code, 2);
   EXPECT_NE(result.err.find("choose form B"), std::string::npos) << result.err;
   EXPECT_EQ(result.err.find("warning"), std::string::npos) << result.err;
@@ -269,7 +329,8 @@ TEST(SceneFill, ClosedSurface_BecomesABodyOfItsVolume) {
   EXPECT_NEAR(i.rest_volume, 0.016, 0.0002) << "shares of the cells make up the volume, scaled";
   EXPECT_NEAR(i.mass, 1000 * i.rest_volume, 1e-9);
   EXPECT_NEAR(test::measure(l.body).volume, i.rest_volume, 1e-12);
-  const char *const told = R"("surface":"own, barycentric","filled":true,"fields":[{"name":"young","from":"share")";
+  const char *const told =
+      R"("surface":"own, barycentric","filled":true,"fields":[{"name":"young","from":"share")";
   EXPECT_NE(l.explain().find(told), std::string::npos) << l.explain();
   std::vector<double> x(3 * 8);
   uint32_t n = 0;
@@ -286,13 +347,16 @@ TEST(SceneFill, CellsBySize_AndByDefault) {
   const test::CommandResult silent = test::deform({"explain", scene(), "--set", kBox});
   EXPECT_EQ(said.err.find("holds a surface and no cells"), std::string::npos) << said.err;
   EXPECT_NE(silent.err.find("body 'column': "), std::string::npos) << silent.err;
-  EXPECT_NE(silent.err.find("holds a surface and no cells; it is filled with"), std::string::npos) << silent.err;
+  EXPECT_NE(silent.err.find("holds a surface and no cells; it is filled with"), std::string::npos)
+      << silent.err;
 }
 
 TEST(SceneFill, SurfacesMayBeOthers) {
-  const Loaded boundary({kBox, kFill, R"(/bodies/0/surface={"from": "boundary"})"}), mls({kBox, kFill, R"(/bodies/0/surface={"coupling": "mls", "support": 2.5})"});
+  const Loaded boundary({kBox, kFill, R"(/bodies/0/surface={"from": "boundary"})"}),
+      mls({kBox, kFill, R"(/bodies/0/surface={"coupling": "mls", "support": 2.5})"});
   EXPECT_GT(boundary.info().nsurfel, 8u);
-  EXPECT_NE(boundary.explain().find("\"surface\":\"boundary\",\"filled\":true"), std::string::npos) << boundary.explain();
+  EXPECT_NE(boundary.explain().find("\"surface\":\"boundary\",\"filled\":true"), std::string::npos)
+      << boundary.explain();
   EXPECT_EQ(mls.info().nsurfel, 8u);
   EXPECT_NE(mls.explain().find("\"surface\":\"own, mls\""), std::string::npos) << mls.explain();
   const Loaded tets({R"(/bodies/0/surface={"mesh": "box.obj"})"});
@@ -308,7 +372,8 @@ TEST(SceneFill, GroupsOfTheSurface_HoldAndLoad) {
     test::ok(dfm_world_step(l.world, 1e-5, nullptr));
     const dfm_body_measure m = test::measure(l.body);
     EXPECT_NEAR(m.momentum[2], -2e-5, 1e-12) << where;
-    for (int k = 0; k < 3; ++k) EXPECT_NEAR(m.angular[k], 0, 2e-8) << where << ": a push through the middle turns nothing";
+    for (int k = 0; k < 3; ++k)
+      EXPECT_NEAR(m.angular[k], 0, 2e-8) << where << ": a push through the middle turns nothing";
   }
   for (const char *where : {R"("group": "bottom")", R"("box": [[-1, -1, -0.0001], [1, 1, 0.0001]])"}) {
     const std::string fix = std::string("/bodies/0/fix=[{") + where + "}]";
@@ -319,7 +384,8 @@ TEST(SceneFill, GroupsOfTheSurface_HoldAndLoad) {
     l.hash_after(30);
     test::ok(dfm_surface_positions(l.body, 8, after.data(), &n));
     for (size_t s = 0; s < 8; ++s) {
-      const double moved = std::hypot(after[3 * s] - before[3 * s], after[3 * s + 1] - before[3 * s + 1], after[3 * s + 2] - before[3 * s + 2]);
+      const double moved = std::hypot(after[3 * s] - before[3 * s], after[3 * s + 1] - before[3 * s + 1],
+                                      after[3 * s + 2] - before[3 * s + 2]);
       if (before[3 * s + 2] < 0.1) EXPECT_EQ(moved, 0) << where;
       else EXPECT_GT(moved, 1e-4) << where;
     }
@@ -327,7 +393,8 @@ TEST(SceneFill, GroupsOfTheSurface_HoldAndLoad) {
 }
 
 TEST(SceneFill, Probes_LieOnTheFillingCells) {
-  Loaded l({kBox, kFill, R"(/probes=[{"name": "corner", "body": "column", "point": [0.1, 0.1, 0.2]}])", "/bodies/0/velocity=[1, 0, 0]"});
+  Loaded l({kBox, kFill, R"(/probes=[{"name": "corner", "body": "column", "point": [0.1, 0.1, 0.2]}])",
+            "/bodies/0/velocity=[1, 0, 0]"});
   const char *name = nullptr;
   double x[3], v[3];
   test::ok(dfm_scene_probe(l.s, 0, &name, x, v));
@@ -338,8 +405,9 @@ TEST(SceneFill, Probes_LieOnTheFillingCells) {
 
 TEST(SceneFill, Outputs_AreOfTheFilesSurface) {
   const std::string out = folder() + "/out";
-  const test::CommandResult result = test::deform({"run", scene(), "--quiet", "--out", out, "--set", kBox, "--set", kFill, "--set",
-                                                   "/gravity=[0,0,-9.81]", "--set", "/output={\"nodes\": true, \"states\": true, \"every\": 0.01}"});
+  const test::CommandResult result = test::deform(
+      {"run", scene(), "--quiet", "--out", out, "--set", kBox, "--set", kFill, "--set",
+       "/gravity=[0,0,-9.81]", "--set", "/output={\"nodes\": true, \"states\": true, \"every\": 0.01}"});
   ASSERT_EQ(result.exit_code, 0) << result.err;
   const auto nodes = test::read_csv(out + "/nodes/column.csv");
   ASSERT_EQ(nodes.size(), 9u) << "a header and the eight points of the file";
@@ -347,38 +415,58 @@ TEST(SceneFill, Outputs_AreOfTheFilesSurface) {
     EXPECT_EQ(nodes[i][0], std::to_string(i - 1));
     EXPECT_NEAR(std::stod(nodes[i][3]), -0.5 * 9.81 * 0.01 * 0.011, 1e-9) << "free fall of ten steps";
   }
-  EXPECT_NE(test::read_file(out + "/states/column_surface_000001.vtu").find("NumberOfPoints=\"8\" NumberOfCells=\"12\""), std::string::npos);
-  EXPECT_EQ(test::read_file(out + "/states/column_000001.vtu").find("NumberOfPoints=\"8\""), std::string::npos) << "the cells' points";
+  EXPECT_NE(test::read_file(out + "/states/column_surface_000001.vtu")
+                .find("NumberOfPoints=\"8\" NumberOfCells=\"12\""),
+            std::string::npos);
+  EXPECT_EQ(test::read_file(out + "/states/column_000001.vtu").find("NumberOfPoints=\"8\""),
+            std::string::npos)
+      << "the cells' points";
 }
 
 TEST(SceneFill, Mistakes_AreTold) {
   expect_refused("/bodies/0/fill={\"cells\": 5}", {"/bodies/0/fill", "holds tetrahedra already"});
   expect_refused({kBox, "/bodies/0/fill={\"cells\": 0}"}, {"/bodies/0/fill/cells", "from 1"});
-  expect_refused({kBox, "/bodies/0/fill={\"cells\": 100000001}"}, {"/bodies/0/fill/cells", "from 1 to 100000000, found 100000001"});
+  expect_refused({kBox, "/bodies/0/fill={\"cells\": 100000001}"},
+                 {"/bodies/0/fill/cells", "from 1 to 100000000, found 100000001"});
   expect_refused({kBox, "/bodies/0/fill={\"cells\": null}"}, {"/bodies/0/fill/cells", "found null"});
   expect_refused({kBox, "/bodies/0/fill={\"cells\": 10.5}"}, {"/bodies/0/fill/cells", "whole number"});
   expect_refused({kBox, "/bodies/0/fill={\"cell\": 10}"}, {"/bodies/0/fill/cell", "did you mean \"cells\"?"});
   expect_refused({kBox, "/bodies/0/fill={}"}, {"/bodies/0/fill", "\"cells\" is missing"});
-  expect_refused({kBox, kFill, R"(/bodies/0/fields={"young": "values.csv"})"}, {"/bodies/0/fields/young", "no cells"});
-  expect_refused({kBox, kFill, R"(/bodies/0/materials_by_group={"top": "hard"})"}, {"/bodies/0/materials_by_group/top", "no group"});
+  expect_refused({kBox, kFill, R"(/bodies/0/fields={"young": "values.csv"})"},
+                 {"/bodies/0/fields/young", "no cells"});
+  expect_refused({kBox, kFill, R"(/bodies/0/materials_by_group={"top": "hard"})"},
+                 {"/bodies/0/materials_by_group/top", "no group"});
   expect_refused({kBox, kFill, "/bodies/0/nodal_bc=values.csv"}, {"/bodies/0/nodal_bc", "\"fix\""});
-  expect_refused({kBox, kFill, R"(/bodies/0/fix=[{"group": "botom"}])"}, {"/bodies/0/fix/0/group", "did you mean \"bottom\"?"});
-  expect_refused({kBox, kFill, R"(/bodies/0/forces=[{"group": "tpo", "total": [0, 0, 1]}])"}, {"/bodies/0/forces/0/group", "did you mean \"top\"?"});
-  expect_refused({kBox, kFill, R"(/bodies/0/forces=[{"box": [[-1, -1, 0.05], [1, 1, 0.15]], "total": [0, 0, 1], "by": "area"}])"},
-                 {"/bodies/0/forces/0/by", "no triangle of the surface"});
-  expect_refused({kBox, kFill, R"(/bodies/0/fix=[{"box": [[5, 5, 5], [6, 6, 6]]}])"}, {"/bodies/0/fix/0/box", "no point"});
+  expect_refused({kBox, kFill, R"(/bodies/0/fix=[{"group": "botom"}])"},
+                 {"/bodies/0/fix/0/group", "did you mean \"bottom\"?"});
+  expect_refused({kBox, kFill, R"(/bodies/0/forces=[{"group": "tpo", "total": [0, 0, 1]}])"},
+                 {"/bodies/0/forces/0/group", "did you mean \"top\"?"});
+  expect_refused(
+      {kBox, kFill,
+       R"(/bodies/0/forces=[{"box": [[-1, -1, 0.05], [1, 1, 0.15]], "total": [0, 0, 1], "by": "area"}])"},
+      {"/bodies/0/forces/0/by", "no triangle of the surface"});
+  expect_refused({kBox, kFill, R"(/bodies/0/fix=[{"box": [[5, 5, 5], [6, 6, 6]]}])"},
+                 {"/bodies/0/fix/0/box", "no point"});
 }
 
 TEST(SceneSurface, Mistakes_AreTold) {
   expect_refused(R"(/bodies/0/surface={"mesh": "missing.obj"})", {"/bodies/0/surface/mesh", "missing.obj"});
-  expect_refused(R"(/bodies/0/surface={"from": "boundary", "mesh": "box.obj"})", {"/bodies/0/surface/mesh", "either"});
-  expect_refused(R"(/bodies/0/surface={"coupling": "mls"})", {"/bodies/0/surface/coupling", "needs \"mesh\""});
-  expect_refused(R"(/bodies/0/surface={"from": "boundary", "coupling": "mls"})", {"/bodies/0/surface/coupling", "boundary"});
-  expect_refused(R"(/bodies/0/surface={"mesh": "box.obj", "coupling": "msl"})", {"/bodies/0/surface/coupling", "did you mean \"mls\"?"});
-  expect_refused(R"(/bodies/0/surface={"mesh": "box.obj", "support": 3})", {"/bodies/0/surface/support", "mls and thesis"});
-  expect_refused(R"(/bodies/0/surface={"mesh": "box.obj", "coupling": "mls", "support": 0})", {"/bodies/0/surface/support", "from 0 (excluded) to 10"});
-  expect_refused(R"(/bodies/0/surface={"mesh": "box.obj", "coupling": "mls", "support": 11})", {"/bodies/0/surface/support", "to 10, found 11"});
-  expect_refused(R"(/bodies/0/surface={"mseh": "box.obj"})", {"/bodies/0/surface/mseh", "did you mean \"mesh\"?"});
+  expect_refused(R"(/bodies/0/surface={"from": "boundary", "mesh": "box.obj"})",
+                 {"/bodies/0/surface/mesh", "either"});
+  expect_refused(R"(/bodies/0/surface={"coupling": "mls"})",
+                 {"/bodies/0/surface/coupling", "needs \"mesh\""});
+  expect_refused(R"(/bodies/0/surface={"from": "boundary", "coupling": "mls"})",
+                 {"/bodies/0/surface/coupling", "boundary"});
+  expect_refused(R"(/bodies/0/surface={"mesh": "box.obj", "coupling": "msl"})",
+                 {"/bodies/0/surface/coupling", "did you mean \"mls\"?"});
+  expect_refused(R"(/bodies/0/surface={"mesh": "box.obj", "support": 3})",
+                 {"/bodies/0/surface/support", "mls and thesis"});
+  expect_refused(R"(/bodies/0/surface={"mesh": "box.obj", "coupling": "mls", "support": 0})",
+                 {"/bodies/0/surface/support", "from 0 (excluded) to 10"});
+  expect_refused(R"(/bodies/0/surface={"mesh": "box.obj", "coupling": "mls", "support": 11})",
+                 {"/bodies/0/surface/support", "to 10, found 11"});
+  expect_refused(R"(/bodies/0/surface={"mseh": "box.obj"})",
+                 {"/bodies/0/surface/mseh", "did you mean \"mesh\"?"});
   expect_refused(R"(/bodies/0/surface={"from": "inside"})", {"/bodies/0/surface/from", "boundary"});
 }
 

@@ -1,4 +1,5 @@
-// Everything a user can get wrong in a scene or an argument: exit 2, one sentence that names the file, the place and what was expected.
+// Everything a user can get wrong in a scene or an argument: exit 2, one sentence that names the file, the
+// place and what was expected.
 #include <gtest/gtest.h>
 
 #include <unistd.h>
@@ -51,14 +52,21 @@ test::CommandResult run(std::vector<std::string> arguments) {
   return result;
 }
 
-void expect_refused(const test::CommandResult &result, const std::vector<std::string> &parts, const std::string &what) {
+void expect_refused(const test::CommandResult &result, const std::vector<std::string> &parts,
+                    const std::string &what) {
   EXPECT_EQ(result.exit_code, 2) << what << "\n" << result.err;
   EXPECT_EQ(result.err.rfind("deform: ", 0), 0u) << what << "\n" << result.err;
-  EXPECT_EQ(std::count(result.err.begin(), result.err.end(), '\n'), 1) << what << ": one sentence, found\n" << result.err;
-  for (const std::string &part : parts) EXPECT_NE(result.err.find(part), std::string::npos) << what << ": expected " << part << " in\n" << result.err;
+  EXPECT_EQ(std::count(result.err.begin(), result.err.end(), '\n'), 1) << what << ": one sentence, found\n"
+                                                                       << result.err;
+  for (const std::string &part : parts)
+    EXPECT_NE(result.err.find(part), std::string::npos) << what << ": expected " << part << " in\n"
+                                                        << result.err;
 }
 
-struct Case { const char *set; std::vector<std::string> parts; };
+struct Case {
+  const char *set;
+  std::vector<std::string> parts;
+};
 
 void check(const std::vector<Case> &cases) {
   for (const Case &c : cases) {
@@ -80,7 +88,8 @@ TEST(SceneErrors, UnknownKeys_NameTheNearest) {
          {"/bodies/0/mesg=\"x\"", {"/bodies/0/mesg", "did you mean \"mesh\"?"}},
          {"/bodies/0/pose/positon=[0,0,0]", {"/bodies/0/pose/positon", "position"}},
          {"/materials/gel/yuong=1", {"/materials/gel/yuong", "young"}},
-         {"/time/zzzzzzzz=1", {"/time/zzzzzzzz", "expected one of: duration, step, integrator, max_time, max_work, mode"}},
+         {"/time/zzzzzzzz=1",
+          {"/time/zzzzzzzz", "expected one of: duration, step, integrator, max_time, max_work, mode"}},
          {"/bodies/0/model/params/volum=1", {"/bodies/0/model/params/volum", "volume"}},
          {"/contact/friction/0/params/mu_X=1", {"/contact/friction/0/params/mu_X", "mu_"}},
          {"/obstacles/0/radius=1", {"/obstacles/0/radius", "the shape plane has no \"radius\""}}});
@@ -118,22 +127,29 @@ TEST(SceneErrors, Ranges_AreChecked) {
          {"/contact/friction/0/params/mu=-0.1", {"/contact/friction/0/params/mu", "number from 0"}},
          {"/output/every=0", {"/output/every", "above 0"}},
          {"/output/camera={\"eye\":[1,1,1],\"look_at\":[1,1,1]}", {"/output/camera", "same point"}},
-         {"/gravity={\"keyframes\":[{\"t\":1,\"value\":[0,0,0]},{\"t\":1,\"value\":[0,0,0]}]}", {"/gravity/keyframes/1/t", "rise"}}});
+         {"/gravity={\"keyframes\":[{\"t\":1,\"value\":[0,0,0]},{\"t\":1,\"value\":[0,0,0]}]}",
+          {"/gravity/keyframes/1/t", "rise"}}});
 }
 
 TEST(SceneErrors, Springs_SayWhereTheyPullAndEnd) {
-  check({{"/bodies/0/springs=[{\"to\":[0,0,0],\"stiffness\":1}]", {"/bodies/0/springs/0", "point", "box", "group"}},
-         {"/bodies/0/springs=[{\"point\":[0,0,0],\"stiffness\":1}]", {"/bodies/0/springs/0", "to", "keyframes"}},
+  check({{"/bodies/0/springs=[{\"to\":[0,0,0],\"stiffness\":1}]",
+          {"/bodies/0/springs/0", "point", "box", "group"}},
+         {"/bodies/0/springs=[{\"point\":[0,0,0],\"stiffness\":1}]",
+          {"/bodies/0/springs/0", "to", "keyframes"}},
          {"/bodies/0/springs=[{\"point\":[0,0,0],\"to\":[0,0,0]}]", {"/bodies/0/springs/0", "stiffness"}},
-         {"/bodies/0/springs=[{\"point\":[0,0,0],\"keyframes\":[],\"stiffness\":1}]", {"/bodies/0/springs/0/keyframes", "at least one"}},
-         {"/bodies/0/springs=[{\"point\":[9,9,9],\"to\":[0,0,0],\"stiffness\":1}]", {"/bodies/0/springs/0/point", "away"}},
-         {"/bodies/0/springs=[{\"point\":[0,0,0],\"to\":[0,0,0],\"stiffness\":-1}]", {"/bodies/0/springs/0/stiffness"}}});
+         {"/bodies/0/springs=[{\"point\":[0,0,0],\"keyframes\":[],\"stiffness\":1}]",
+          {"/bodies/0/springs/0/keyframes", "at least one"}},
+         {"/bodies/0/springs=[{\"point\":[9,9,9],\"to\":[0,0,0],\"stiffness\":1}]",
+          {"/bodies/0/springs/0/point", "away"}},
+         {"/bodies/0/springs=[{\"point\":[0,0,0],\"to\":[0,0,0],\"stiffness\":-1}]",
+          {"/bodies/0/springs/0/stiffness"}}});
 }
 
 TEST(SceneErrors, Names_AreUniqueAndKnown) {
   check({{"/bodies/0/material=\"gle\"", {"/bodies/0/material", "did you mean \"gel\"?"}},
          {"/obstacles/0/name=\"block\"", {"/obstacles/0/name", "taken"}},
-         {"/contact/friction/0/between=[\"blok\",\"*\"]", {"/contact/friction/0/between/0", "did you mean \"block\"?"}},
+         {"/contact/friction/0/between=[\"blok\",\"*\"]",
+          {"/contact/friction/0/between/0", "did you mean \"block\"?"}},
          {"/contact/friction/0/between=[\"block\"]", {"/contact/friction/0/between", "two sides"}},
          {"/contact/friction/0/between=[\"material=steel\",\"*\"]", {"/contact/friction/0/between/0", "gel"}},
          {"/probes/0/body=\"floor\"", {"/probes/0/body", "block"}},
@@ -160,7 +176,8 @@ TEST(SceneErrors, NotDelivered_IsNeverIgnored) {
       {"/bodies/0/switch=[{\"t\":1}]", "/bodies/0/switch"},
       {"/bodies/0/switch=[]", "/bodies/0/switch"},
       {"/bodies/0/pressure=5", "/bodies/0/pressure"}};
-  for (const auto &[set, pointer] : later) expect_refused(run({scene(), "--set", set}), {"not available yet: " + std::string(pointer) + "\n"}, set);
+  for (const auto &[set, pointer] : later)
+    expect_refused(run({scene(), "--set", set}), {"not available yet: " + std::string(pointer) + "\n"}, set);
 }
 
 TEST(SceneErrors, Files_AreRefusedWithTheirPlace) {
@@ -176,14 +193,18 @@ TEST(SceneErrors, Files_AreRefusedWithTheirPlace) {
       {"{\"gravity\": [0, 0, 1e400]}", {"bad.json"}},
       {"{\"a\": 1, \"a\": 2}", {"bad.json:1:10", "twice"}},
       {std::string(10 << 20, '['), {"bad.json:1:65", "nested deeper"}},
-      {std::string("\x7f" "ELF\0\1\2", 7), {"bad.json:1:5", "not JSON", "NUL"}},
+      {std::string("\x7f"
+                   "ELF\0\1\2",
+                   7),
+       {"bad.json:1:5", "not JSON", "NUL"}},
       {"{\"version\": 1}", {"\"format\" is missing"}},
   };
   for (const auto &[text, parts] : texts) {
     test::write_file(file, text);
     expect_refused(run({file}), parts, text.substr(0, 40));
   }
-  expect_refused(run({folder() + "/nothing.json"}), {"nothing.json", "No such file", "a scene file (JSON)"}, "missing file");
+  expect_refused(run({folder() + "/nothing.json"}), {"nothing.json", "No such file", "a scene file (JSON)"},
+                 "missing file");
   expect_refused(run({folder()}), {"is a directory", "a scene file (JSON)"}, "a folder");
 }
 
@@ -212,7 +233,8 @@ TEST(SceneErrors, Arguments_AreRefused) {
 
 TEST(SceneErrors, OutputThatCannotBeWritten_IsRefused) {
   test::write_file(folder() + "/file", "in the way");
-  expect_refused(test::deform({"run", scene(), "--quiet", "--out", folder() + "/file"}), {folder() + "/file"}, "a file in the way");
+  expect_refused(test::deform({"run", scene(), "--quiet", "--out", folder() + "/file"}), {folder() + "/file"},
+                 "a file in the way");
 }
 
 TEST(SceneApi, ErrorsLeaveNothingBehind) {

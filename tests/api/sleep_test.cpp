@@ -1,4 +1,5 @@
-// Sleeping and waking: who sleeps, what stays, what wakes, and that a woken body moves as one that never slept.
+// Sleeping and waking: who sleeps, what stays, what wakes, and that a woken body moves as one
+// that never slept.
 #include <functional>
 
 #include "rigid.h"
@@ -30,7 +31,8 @@ std::vector<double> positions(dfm_body b) {
 
 double farthest(const std::vector<double> &x, const std::vector<double> &y) {
   double most = 0;
-  for (size_t i = 0; i < x.size(); i += 3) most = std::max(most, std::hypot(x[i] - y[i], x[i + 1] - y[i + 1], x[i + 2] - y[i + 2]));
+  for (size_t i = 0; i < x.size(); i += 3)
+    most = std::max(most, std::hypot(x[i] - y[i], x[i + 1] - y[i + 1], x[i + 2] - y[i + 2]));
   return most;
 }
 
@@ -47,7 +49,7 @@ int until_asleep(dfm_world w, dfm_body b, int most = 6000) {
   return -1;
 }
 
-double offset(dfm_world w) {   // d_c
+double offset(dfm_world w) {  // d_c
   size_t bytes = 0;
   test::ok(dfm_world_explain(w, nullptr, &bytes));
   std::string text(bytes, '\0');
@@ -66,12 +68,18 @@ struct Rest {
     floor = test::add_plane(world, "floor");
     test::set_friction(world, 0.5);
     test::BodyOptions o;
-    o.young = 2e5, o.damping_stiffness = 2e-3, o.damping_mass = 20, o.volume = 1;
-    o.name = "lower", o.position = {0, 0, 4e-5};
+    o.young = 2e5;
+    o.damping_stiffness = 2e-3;
+    o.damping_mass = 20;
+    o.volume = 1;
+    o.name = "lower";
+    o.position = {0, 0, 4e-5};
     lower = test::make_body(context, world, "beam", {0.1, 0.1, 0.1}, 60, o);
-    o.name = "upper", o.position = {0.013, 0.007, 0.1 + 8e-5};
+    o.name = "upper";
+    o.position = {0.013, 0.007, 0.1 + 8e-5};
     upper = test::make_body(context, world, "beam", {0.1, 0.1, 0.1}, 60, o);
-    o.name = "far", o.position = {1, 0, 4e-5};
+    o.name = "far";
+    o.position = {1, 0, 4e-5};
     far = test::make_body(context, world, "beam", {0.1, 0.1, 0.1}, 60, o);
   }
   std::vector<dfm_body> bodies() const { return {lower, upper, far}; }
@@ -79,10 +87,14 @@ struct Rest {
 
 }  // namespace
 
-// The same steps with and without sleep: until the first one sleeps nothing differs, the last positions included.
+// The same steps with and without sleep: until the first one sleeps nothing differs, the last
+// positions included.
 TEST(Sleep, OfAStack_ComesToBothAtOnceAndNothingDiffersBefore) {
   const Rest s, never(false);
-  while (test::stats(s.world).asleep == 0) steps(s.world, 1), steps(never.world, 1);
+  while (test::stats(s.world).asleep == 0) {
+    steps(s.world, 1);
+    steps(never.world, 1);
+  }
   EXPECT_GE(dfm_world_time(s.world), 0.5);
   for (size_t k = 0; k < 3; ++k) EXPECT_EQ(positions(s.bodies()[k]), positions(never.bodies()[k])) << k;
   EXPECT_EQ(test::stats(never.world).asleep, 0u);
@@ -96,7 +108,8 @@ TEST(Sleep, OfAStack_ComesToBothAtOnceAndNothingDiffersBefore) {
 
 TEST(Sleep, UnderARigidBody_DoesNotCome_AndARigidBodyThatArrivesWakes) {
   const Rest s;
-  const auto rigid = test::create(s.world, {test::box("plate", {0.04, 0.04, 0.01}, 0.5, {0.05, 0.05, 0.215}), test::box("late", {0.04, 0.04, 0.01}, 0.5, {1.05, 0.05, 2})});
+  const auto rigid = test::create(s.world, {test::box("plate", {0.04, 0.04, 0.01}, 0.5, {0.05, 0.05, 0.215}),
+                                            test::box("late", {0.04, 0.04, 0.01}, 0.5, {1.05, 0.05, 2})});
   ASSERT_GE(until_asleep(s.world, s.far, 560), 0) << "the other box is still in the air";
   for (int i = 0; i < 100 && asleep(s.far); ++i) steps(s.world, 1);
   EXPECT_FALSE(asleep(s.far)) << "it has landed";
@@ -112,7 +125,9 @@ TEST(Sleep, OfOneBlock_BooksItsEnergyAndMomentumToRounding) {
   for (int k = 0; k < 2; ++k) {
     world[k] = make_sleepy(c, k == 0, {0, 0, 0});
     test::BodyOptions o;
-    o.velocity = {3e-5, 0, -1e-5}, o.spin = {0, 2e-4, 0}, o.young = 1e4;   // drifts 3e-5 m/s x 0.5 s = 0.36 d_c
+    o.velocity = {3e-5, 0, -1e-5};
+    o.spin = {0, 2e-4, 0};
+    o.young = 1e4;  // drifts 3e-5 m/s x 0.5 s = 0.36 d_c
     body[k] = test::make_body(c, world[k], "beam", {0.1, 0.1, 0.1}, 60, o);
   }
   ASSERT_EQ(until_asleep(world[0], body[0]), 500);
@@ -158,7 +173,8 @@ TEST(Sleep, LeavesEverythingAsItIs_AndRunsNoStage) {
   }
   // the floor goes on carrying both: a mean force is still the difference of impulses over the time
   const double weight = 2 * m.mass * 9.81, upper = m.mass * 9.81;
-  EXPECT_NEAR((test::measure(s.lower).contact_impulse[2] - m.contact_impulse[2]) / 0.5, weight - upper, 1e-3 * weight);
+  EXPECT_NEAR((test::measure(s.lower).contact_impulse[2] - m.contact_impulse[2]) / 0.5, weight - upper,
+              1e-3 * weight);
 }
 
 // One body is awake: the others' contacts and surface forces are still there, beside its own.
@@ -191,7 +207,7 @@ TEST(Sleep, DoesNotComeWhileALoadVaries) {
     test::BodyOptions o;
     const dfm_body b = test::make_body(c, w, "beam", {0.1, 0.1, 0.1}, 60, o);
     const uint32_t point = 0;
-    const double force[3] = {0, 0, 0};   // no force at all: what is promised counts, not what happens
+    const double force[3] = {0, 0, 0};  // no force at all: what is promised counts, not what happens
     const dfm_scale_key keys[] = {{0, 1}, {2, 1}};
     const dfm_sine wobble{{0.5, 0, 0}, 1, 0};
     test::ok(dfm_body_add_load(b, 1, &point, force, sine ? 0 : 2, keys, sine ? &wobble : nullptr, nullptr));
@@ -208,13 +224,18 @@ TEST(Sleep, DoesNotComeOnABeltThatSlides) {
     const dfm_world w = make_sleepy(c, true);
     test::set_friction(w, 0.2);
     dfm_obstacle_def d = dfm_obstacle_def_default();
-    d.name = "belt", d.shape = DFM_SHAPE_PLANE, d.velocity_surface[0] = belt;
+    d.name = "belt";
+    d.shape = DFM_SHAPE_PLANE;
+    d.velocity_surface[0] = belt;
     dfm_obstacle o = 0;
     test::ok(dfm_obstacle_create(w, &d, &o));
     const double s = std::sqrt(0.5);
     test::add_plane(w, "stop", {0.1001, 0, 0}, {0, -s, 0, s});
     test::BodyOptions options;
-    options.young = 2e5, options.damping_stiffness = 2e-3, options.volume = 1, options.position = {0, 0, 4e-5};
+    options.young = 2e5;
+    options.damping_stiffness = 2e-3;
+    options.volume = 1;
+    options.position = {0, 0, 4e-5};
     const dfm_body b = test::make_body(c, w, "beam", {0.1, 0.1, 0.1}, 60, options);
     EXPECT_EQ(until_asleep(w, b, 3000) >= 0, belt == 0) << belt;
   }
@@ -224,7 +245,7 @@ namespace {
 
 struct Waker {
   const char *what;
-  bool lower, upper, far;   // who is awake after one step
+  bool lower, upper, far;  // who is awake after one step
   std::function<void(const Rest &)> act;
 };
 
@@ -237,8 +258,12 @@ dfm_pose moved(dfm_obstacle o, double dz) {
 
 dfm_obstacle add_ball(const Rest &s, double x) {
   dfm_obstacle_def d = dfm_obstacle_def_default();
-  d.name = "ball", d.shape = DFM_SHAPE_SPHERE, d.radius = 0.02;
-  d.pose.position[0] = x, d.pose.position[1] = 0.05, d.pose.position[2] = 0.3;
+  d.name = "ball";
+  d.shape = DFM_SHAPE_SPHERE;
+  d.radius = 0.02;
+  d.pose.position[0] = x;
+  d.pose.position[1] = 0.05;
+  d.pose.position[2] = 0.3;
   dfm_obstacle o = 0;
   test::ok(dfm_obstacle_create(s.world, &d, &o));
   return o;
@@ -254,20 +279,36 @@ TEST(Wake, ByWhateverChangesOrReachesABody_TakesItsIslandAndNoOther) {
   const dfm_params params{sizeof(dfm_params), 1, &young};
   const Waker wakers[] = {
       {"wake", true, true, false, [](const Rest &s) { test::ok(dfm_body_wake(s.upper)); }},
-      {"impulse", true, true, false, [&](const Rest &s) { test::ok(dfm_body_apply_impulse(s.upper, top, up)); }},
-      {"load", true, true, false, [&](const Rest &s) { test::ok(dfm_body_add_load(s.lower, 1, &point, force, 0, nullptr, nullptr, nullptr)); }},
+      {"impulse", true, true, false,
+       [&](const Rest &s) { test::ok(dfm_body_apply_impulse(s.upper, top, up)); }},
+      {"load", true, true, false,
+       [&](const Rest &s) {
+         test::ok(dfm_body_add_load(s.lower, 1, &point, force, 0, nullptr, nullptr, nullptr));
+       }},
       {"hold", false, false, true, [&](const Rest &s) { test::ok(dfm_body_hold(s.far, 1, &point, 7)); }},
-      {"state", false, false, true, [](const Rest &s) {
+      {"state", false, false, true,
+       [](const Rest &s) {
          const auto x = positions(s.far);
          test::ok(dfm_body_set_state(s.far, uint32_t(x.size() / 3), x.data(), nullptr));
        }},
-      {"parameters", false, false, true, [&](const Rest &s) { test::ok(dfm_body_set_params(s.far, &params)); }},
-      {"filter of a body", true, true, false, [](const Rest &s) { test::ok(dfm_body_set_filter(s.lower, 2, ~0u)); }},
+      {"parameters", false, false, true,
+       [&](const Rest &s) { test::ok(dfm_body_set_params(s.far, &params)); }},
+      {"filter of a body", true, true, false,
+       [](const Rest &s) { test::ok(dfm_body_set_filter(s.lower, 2, ~0u)); }},
       {"gravity", true, true, true, [&](const Rest &s) { test::ok(dfm_world_set_gravity(s.world, g)); }},
       {"friction", true, true, true, [](const Rest &s) { test::set_friction(s.world, 0.6); }},
-      {"filter", true, true, true, [](const Rest &s) { test::ok(dfm_world_filter_pair(s.world, "upper", "far", false)); }},
-      {"floor that sinks", true, true, true, [](const Rest &s) { const dfm_pose p = moved(s.floor, -1e-5); test::ok(dfm_obstacle_move_to(s.floor, &p)); }},
-      {"floor told to stay", false, false, false, [](const Rest &s) { const dfm_pose p = moved(s.floor, 0); test::ok(dfm_obstacle_move_to(s.floor, &p)); }},
+      {"filter", true, true, true,
+       [](const Rest &s) { test::ok(dfm_world_filter_pair(s.world, "upper", "far", false)); }},
+      {"floor that sinks", true, true, true,
+       [](const Rest &s) {
+         const dfm_pose p = moved(s.floor, -1e-5);
+         test::ok(dfm_obstacle_move_to(s.floor, &p));
+       }},
+      {"floor told to stay", false, false, false,
+       [](const Rest &s) {
+         const dfm_pose p = moved(s.floor, 0);
+         test::ok(dfm_obstacle_move_to(s.floor, &p));
+       }},
       {"floor removed", true, true, true, [](const Rest &s) { test::ok(dfm_obstacle_destroy(s.floor)); }},
       {"new obstacle", true, true, true, [](const Rest &s) { add_ball(s, 0.05); }},
       {"sleep off", true, true, true, [](const Rest &s) { test::ok(dfm_world_set_sleep(s.world, false)); }},
@@ -277,7 +318,7 @@ TEST(Wake, ByWhateverChangesOrReachesABody_TakesItsIslandAndNoOther) {
   for (dfm_body b : s.bodies()) ASSERT_GE(until_asleep(s.world, b), 0);
   const std::string data = test::snapshot(s.world);
   for (const Waker &w : wakers) {
-    const Rest t;   // a world of its own for each, put to sleep by the snapshot
+    const Rest t;  // a world of its own for each, put to sleep by the snapshot
     ASSERT_EQ(dfm_world_restore(t.world, data.data(), data.size()), DFM_OK) << dfm_last_error();
     ASSERT_EQ(test::stats(t.world).asleep, 3u);
     w.act(t);
@@ -308,8 +349,15 @@ TEST(Wake, OfWhatStoodOnARemovedBody_ComesWithItsRemoval) {
 TEST(Wake, ByAnObstacleOnKeys_ComesWhenItReachesTheBody) {
   Rest s;
   dfm_obstacle_def d = dfm_obstacle_def_default();
-  const dfm_pose_key keys[] = {{0, {{0.06, 0.05, 0.3}, {0, 0, 0, 1}}}, {4, {{0.06, 0.05, 0.3}, {0, 0, 0, 1}}}, {5, {{0.06, 0.05, 0.2}, {0, 0, 0, 1}}}};
-  d.name = "press", d.shape = DFM_SHAPE_BOX, d.half_size[0] = d.half_size[1] = 0.1, d.half_size[2] = 0.02, d.nkey = 3, d.keys = keys;
+  const dfm_pose_key keys[] = {{0, {{0.06, 0.05, 0.3}, {0, 0, 0, 1}}},
+                               {4, {{0.06, 0.05, 0.3}, {0, 0, 0, 1}}},
+                               {5, {{0.06, 0.05, 0.2}, {0, 0, 0, 1}}}};
+  d.name = "press";
+  d.shape = DFM_SHAPE_BOX;
+  d.half_size[0] = d.half_size[1] = 0.1;
+  d.half_size[2] = 0.02;
+  d.nkey = 3;
+  d.keys = keys;
   dfm_obstacle o = 0;
   test::ok(dfm_obstacle_create(s.world, &d, &o));
   while (dfm_world_time(s.world) < 4.75) steps(s.world, 1);
@@ -318,7 +366,8 @@ TEST(Wake, ByAnObstacleOnKeys_ComesWhenItReachesTheBody) {
   EXPECT_TRUE(!asleep(s.upper) && !asleep(s.lower) && asleep(s.far));
 }
 
-// A ball dropped on a stack that sleeps, beside the same one awake all along: within half of d_c after the blow.
+// A ball dropped on a stack that sleeps, beside the same one awake all along: within half of d_c
+// after the blow.
 TEST(Wake, ByAFallingBody_GivesTheMotionOfAStackThatNeverSlept) {
   std::vector<double> lower[2], ball[2];
   double d_c = 0;
@@ -327,21 +376,27 @@ TEST(Wake, ByAFallingBody_GivesTheMotionOfAStackThatNeverSlept) {
     steps(s.world, 1500);
     EXPECT_EQ(asleep(s.lower), sleep);
     test::BodyOptions o;
-    o.name = "dropped", o.young = 1e5, o.damping_stiffness = 1e-3, o.volume = 1, o.position = {0.06, 0.055, 0.28};
+    o.name = "dropped";
+    o.young = 1e5;
+    o.damping_stiffness = 1e-3;
+    o.volume = 1;
+    o.position = {0.06, 0.055, 0.28};
     const dfm_body dropped = test::make_body(s.context, s.world, "ball", {0.04, 0, 0}, 200, o);
     steps(s.world, 50);
     EXPECT_EQ(asleep(s.upper), sleep) << "a body that is still in the air wakes no one";
     steps(s.world, 250);
     EXPECT_FALSE(asleep(s.upper));
     EXPECT_GT(test::measure(dropped).contact_impulse[2], 0.1) << "it has hit";
-    lower[sleep] = positions(s.lower), ball[sleep] = positions(dropped);
+    lower[sleep] = positions(s.lower);
+    ball[sleep] = positions(dropped);
     d_c = offset(s.world);
   }
   EXPECT_LT(farthest(lower[0], lower[1]), 0.5 * d_c);
   EXPECT_LT(farthest(ball[0], ball[1]), 0.5 * d_c);
 }
 
-// A block on a slope of 24 degrees, mu 0.5, woken ten times: no contact slips, and its shape comes to rest to rounding.
+// A block on a slope of 24 degrees, mu 0.5, woken ten times: no contact slips, and its shape comes to
+// rest to rounding.
 TEST(Wake, TenTimesOnASlope_DoesNotCreep) {
   const double a = 24 * 3.14159265358979323846 / 180;
   const test::Context c;
@@ -349,7 +404,9 @@ TEST(Wake, TenTimesOnASlope_DoesNotCreep) {
   test::add_plane(w, "floor");
   test::set_friction(w, 0.5);
   test::BodyOptions o;
-  o.young = 1e6, o.damping_stiffness = 1e-3, o.position = {-0.05, -0.05, 2e-5};
+  o.young = 1e6;
+  o.damping_stiffness = 1e-3;
+  o.position = {-0.05, -0.05, 2e-5};
   const dfm_body b = test::make_body(c, w, "beam", {0.1, 0.1, 0.1}, 200, o);
   steps(w, 1500);
   ASSERT_GE(until_asleep(w, b), 0);
@@ -414,10 +471,14 @@ TEST(Sleep, OfAScene_IsItsContactKey) {
   const test::Context c;
   const char *const set[] = {"/contact/sleep=true"};
   dfm_scene_options options{};
-  options.size = sizeof options, options.nset = 1, options.set = set;
+  options.size = sizeof options;
+  options.nset = 1;
+  options.set = set;
   dfm_scene scene = 0;
   dfm_world w = 0;
-  ASSERT_EQ(dfm_scene_open(c, DEFORM_SOURCE_DIR "/examples/scenes/slope_block.json", &options, &scene), DFM_OK) << dfm_last_error();
+  ASSERT_EQ(dfm_scene_open(c, DEFORM_SOURCE_DIR "/examples/scenes/slope_block.json", &options, &scene),
+            DFM_OK)
+      << dfm_last_error();
   test::ok(dfm_scene_world(scene, &w));
   size_t bytes = 0;
   test::ok(dfm_world_explain(w, nullptr, &bytes));

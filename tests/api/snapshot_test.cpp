@@ -1,5 +1,6 @@
-// Snapshot and restore: in the same world, in a world built anew, in a new process; what is refused, and that nothing changes then.
-// The program runs itself as `PROGRAM --continue FILE STEPS`: builds the scene, restores, steps, prints the hash.
+// Snapshot and restore: in the same world, in a world built anew, in a new process; what is refused, and that
+// nothing changes then. The program runs itself as `PROGRAM --continue FILE STEPS`: builds the scene,
+// restores, steps, prints the hash.
 #include <cstdlib>
 #include <cstring>
 
@@ -8,8 +9,8 @@
 
 namespace {
 
-// Everything that a host can prescribe happens at once, in contact: gravity keys, a varying load, held points that move, a jaw on keys, a
-// ball on a sine.
+// Everything that a host can prescribe happens at once, in contact: gravity keys, a varying load, held points
+// that move, a jaw on keys, a ball on a sine.
 test::Stack build(dfm_context *c) {
   test::Stack s = test::make_stack(c, 1e-4, 0.4);
   const dfm_vector_key gravity[] = {{0, {0, 0, -9.81}}, {0.3, {1, 0, -9}}, {2, {-1, 0.5, -9.81}}};
@@ -22,13 +23,25 @@ test::Stack build(dfm_context *c) {
   test::ok(dfm_body_hold(s.lower, 2, held, 7));
   test::ok(dfm_body_move_held(s.lower, 2, held, 0, nullptr, &sway));
   dfm_obstacle_def jaw = dfm_obstacle_def_default();
-  const dfm_pose_key keys[] = {{0, {{-0.2, 0.05, 0.15}, {0, 0, 0, 1}}}, {1, {{-0.08, 0.05, 0.15}, {0, 0, 0.1, 1}}}};
-  jaw.name = "jaw", jaw.shape = DFM_SHAPE_BOX, jaw.half_size[0] = 0.1, jaw.half_size[1] = 0.1, jaw.half_size[2] = 0.02, jaw.nkey = 2, jaw.keys = keys;
+  const dfm_pose_key keys[] = {{0, {{-0.2, 0.05, 0.15}, {0, 0, 0, 1}}},
+                               {1, {{-0.08, 0.05, 0.15}, {0, 0, 0.1, 1}}}};
+  jaw.name = "jaw";
+  jaw.shape = DFM_SHAPE_BOX;
+  jaw.half_size[0] = 0.1;
+  jaw.half_size[1] = 0.1;
+  jaw.half_size[2] = 0.02;
+  jaw.nkey = 2;
+  jaw.keys = keys;
   dfm_obstacle o = 0;
   test::ok(dfm_obstacle_create(s.world, &jaw, &o));
   dfm_obstacle_def ball = dfm_obstacle_def_default();
-  ball.name = "ball", ball.shape = DFM_SHAPE_SPHERE, ball.radius = 0.05, ball.pose.position[0] = 0.16, ball.pose.position[1] = 0.05;
-  ball.pose.position[2] = 0.05, ball.sine = {{0.02, 0, 0}, 1.5, 0};
+  ball.name = "ball";
+  ball.shape = DFM_SHAPE_SPHERE;
+  ball.radius = 0.05;
+  ball.pose.position[0] = 0.16;
+  ball.pose.position[1] = 0.05;
+  ball.pose.position[2] = 0.05;
+  ball.sine = {{0.02, 0, 0}, 1.5, 0};
   test::ok(dfm_obstacle_create(s.world, &ball, &o));
   return s;
 }
@@ -38,7 +51,9 @@ void steps(dfm_world w, int n) {
 }
 
 using test::snapshot;
-dfm_status restore(dfm_world w, const std::string &data) { return dfm_world_restore(w, data.data(), data.size()); }
+dfm_status restore(dfm_world w, const std::string &data) {
+  return dfm_world_restore(w, data.data(), data.size());
+}
 
 }  // namespace
 
@@ -46,7 +61,10 @@ int main(int argc, char **argv) {
   if (argc == 4 && std::strcmp(argv[1], "--continue") == 0) {
     test::Context c;
     const test::Stack s = build(c);
-    if (restore(s.world, test::read_file(argv[2])) != DFM_OK) return std::fprintf(stderr, "%s\n", dfm_last_error()), 1;
+    if (restore(s.world, test::read_file(argv[2])) != DFM_OK) {
+      std::fprintf(stderr, "%s\n", dfm_last_error());
+      return 1;
+    }
     steps(s.world, std::atoi(argv[3]));
     std::printf("%016llx\n", static_cast<unsigned long long>(dfm_world_hash(s.world)));
     return 0;
@@ -94,7 +112,8 @@ TEST(Snapshot, TakenAtAnyStep_ContinuesWithTheSameBits) {
   for (int i = 0; i < 24; ++i) {
     steps(s.world, 7);
     test::ok(restore(other.world, snapshot(s.world)));
-    steps(other.world, 7), steps(s.world, 7);
+    steps(other.world, 7);
+    steps(s.world, 7);
     ASSERT_EQ(dfm_world_hash(other.world), dfm_world_hash(s.world)) << "after " << 14 * i + 7 << " steps";
   }
 }
@@ -121,10 +140,11 @@ TEST(Snapshot, OfAWorldChangedWhileRunning_HoldsTheChanges) {
   test::ok(dfm_world_obstacles(s.world, 3, obstacles, &n));
   const dfm_pose target{{-0.15, 0.05, 0.15}, {0, 0, 0, 1}};
   test::ok(dfm_obstacle_move_to(obstacles[1], &target));
-  const std::string data = snapshot(s.world);   // with the target not reached yet
+  const std::string data = snapshot(s.world);  // with the target not reached yet
   test::ok(restore(fresh.world, data));
   EXPECT_EQ(dfm_world_hash(fresh.world), dfm_world_hash(s.world));
-  steps(s.world, 400), steps(fresh.world, 400);
+  steps(s.world, 400);
+  steps(fresh.world, 400);
   EXPECT_EQ(dfm_world_hash(fresh.world), dfm_world_hash(s.world));
   EXPECT_TRUE(changed_model) << "young of msm is a runtime parameter: " << dfm_last_error();
 }
@@ -136,7 +156,8 @@ TEST(Snapshot, OfAHoldMeasure_GoesOnMeasuring) {
   test::ok(dfm_world_hold_begin(s.world));
   steps(s.world, 100);
   test::ok(restore(fresh.world, snapshot(s.world)));
-  steps(s.world, 100), steps(fresh.world, 100);
+  steps(s.world, 100);
+  steps(fresh.world, 100);
   double creep = 0, restored = 0;
   uint32_t n = 0, m = 0;
   test::ok(dfm_world_hold(s.world, &creep, &n));
@@ -160,7 +181,8 @@ TEST(Snapshot, DamagedCutOrForeign_IsRefusedAndChangesNothing) {
     EXPECT_NE(std::strlen(dfm_last_error()), 0u);
     EXPECT_EQ(dfm_world_hash(s.world), hash) << what;
   };
-  for (size_t n : {size_t(0), size_t(7), size_t(8), size_t(23), size_t(24), good.size() / 2, good.size() - 8, good.size() - 1})
+  for (size_t n : {size_t(0), size_t(7), size_t(8), size_t(23), size_t(24), good.size() / 2, good.size() - 8,
+                   good.size() - 1})
     refused(good.substr(0, n), "cut short");
   refused(good + "x", "longer than written");
   for (size_t at = 0; at < good.size(); at += good.size() / 97 + 1) {

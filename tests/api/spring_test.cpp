@@ -1,4 +1,5 @@
-// Springs from a body to places in the world: what they pull, and that they count in the step bound, the snapshot and the scene file.
+// Springs from a body to places in the world: what they pull, and that they count in the step bound, the
+// snapshot and the scene file.
 #include <gtest/gtest.h>
 
 #include <numbers>
@@ -14,9 +15,11 @@ struct Hung {
   dfm_body body;
   std::vector<uint32_t> points;
   double mass;
-  explicit Hung(double young = 1e5, std::array<double, 3> gravity = {}, const char *model = "") : world(test::make_world(context, gravity)) {
+  explicit Hung(double young = 1e5, std::array<double, 3> gravity = {}, const char *model = "")
+      : world(test::make_world(context, gravity)) {
     test::BodyOptions o;
-    o.young = young, o.model = model;
+    o.young = young;
+    o.model = model;
     body = test::make_body(context, world, "beam", {0.1, 0.1, 0.1}, 60, o);
     dfm_body_info info{};
     info.size = sizeof info;
@@ -27,7 +30,11 @@ struct Hung {
   // From all points to `to`.
   uint32_t spring(double stiffness, double damping, std::array<double, 3> to) {
     dfm_spring_def d{};
-    d.size = sizeof d, d.npoint = uint32_t(points.size()), d.points = points.data(), d.stiffness = stiffness, d.damping = damping;
+    d.size = sizeof d;
+    d.npoint = uint32_t(points.size());
+    d.points = points.data();
+    d.stiffness = stiffness;
+    d.damping = damping;
     std::copy(to.begin(), to.end(), d.to);
     uint32_t number = 0;
     test::ok(dfm_body_add_spring(body, &d, &number));
@@ -41,8 +48,8 @@ struct Hung {
 
 }  // namespace
 
-// A body on a spring at its center of mass swings as a point mass: x = A cos(w t), w = sqrt(k/m), and the scheme's own frequency differs by
-// (w h)^2 / 24 only.
+// A body on a spring at its center of mass swings as a point mass: x = A cos(w t), w = sqrt(k/m), and the
+// scheme's own frequency differs by (w h)^2 / 24 only.
 TEST(Spring, AtTheCentreOfMass_SwingsAsAPointMass) {
   Hung s;
   const double k = 40, w = std::sqrt(k / s.mass), x0 = s.x();
@@ -80,12 +87,19 @@ TEST(Spring, ThatIsStiff_ShortensTheStableStepAndStaysBounded) {
   EXPECT_LT(std::fabs(s.x() - 0.06), 0.0101);
 }
 
-// The end moves evenly: a damped body follows at its speed, behind by nothing but what gravity and drag would pull.
+// The end moves evenly: a damped body follows at its speed, behind by nothing but what gravity and
+// drag would pull.
 TEST(Spring, WhoseEndMoves_TakesTheBodyAlong) {
   Hung s;
   const dfm_vector_key keys[] = {{0, {0.05, 0.05, 0.05}}, {2, {0.45, 0.05, 0.05}}};
   dfm_spring_def d{};
-  d.size = sizeof d, d.npoint = uint32_t(s.points.size()), d.points = s.points.data(), d.stiffness = 200, d.damping = 20, d.keys = keys, d.nkey = 2;
+  d.size = sizeof d;
+  d.npoint = uint32_t(s.points.size());
+  d.points = s.points.data();
+  d.stiffness = 200;
+  d.damping = 20;
+  d.keys = keys;
+  d.nkey = 2;
   uint32_t number = 0;
   test::ok(dfm_body_add_spring(s.body, &d, &number));
   s.run(1.5, 1e-3);
@@ -103,7 +117,8 @@ TEST(Spring, SavedAndRestored_PullsOnWithTheSameBits) {
   a.run(0.1, 1e-3);
   const std::string data = test::snapshot(a.world);
   test::ok(dfm_world_restore(b.world, data.data(), data.size()));
-  a.run(0.2, 1e-3), b.run(0.2, 1e-3);
+  a.run(0.2, 1e-3);
+  b.run(0.2, 1e-3);
   EXPECT_EQ(dfm_world_hash(a.world), dfm_world_hash(b.world));
   EXPECT_GT(std::fabs(a.x() - 0.05), 1e-3);
 }
@@ -113,7 +128,10 @@ TEST(Spring, ThatMakesNoSense_IsRefusedWithASentence) {
   dfm_spring_def d{};
   const uint32_t none = 100000;
   const double negative = -1, zero = 0;
-  d.size = sizeof d, d.npoint = 1, d.points = s.points.data(), d.stiffness = 1;
+  d.size = sizeof d;
+  d.npoint = 1;
+  d.points = s.points.data();
+  d.stiffness = 1;
   const auto refused = [&](dfm_spring_def bad, const char *word) {
     uint32_t number = 77;
     EXPECT_EQ(dfm_body_add_spring(s.body, &bad, &number), DFM_E_ARG);
@@ -140,19 +158,28 @@ TEST(Spring, ThatMakesNoSense_IsRefusedWithASentence) {
   EXPECT_EQ(dfm_body_set_spring_target(s.body, s.spring(1, 0, {}), to), DFM_E_ARG);
 }
 
-// From the scene file: by box (its points' center of mass) and by a point inside a cell, to a place and along keyframes.
+// From the scene file: by box (its points' center of mass) and by a point inside a cell, to a place and
+// along keyframes.
 TEST(Spring, OfASceneFile_PullsWhereItSays) {
   const std::string folder = test::scratch("spring_scene");
-  ASSERT_EQ(test::deform({"mesh", "make", "beam", "--size", "0.1", "0.1", "0.1", "--cells", "60", "--out", folder + "/cube.msh"}).exit_code, 0);
-  const std::string head = R"({"format": "deform-scene", "version": 1, "gravity": [0, 0, -10], "time": {"duration": 3, "step": 0.001},
+  ASSERT_EQ(test::deform({"mesh", "make", "beam", "--size", "0.1", "0.1", "0.1", "--cells", "60", "--out",
+                          folder + "/cube.msh"})
+                .exit_code,
+            0);
+  const std::string head =
+      R"({"format": "deform-scene", "version": 1, "gravity": [0, 0, -10], "time": {"duration": 3, "step": 0.001},
     "materials": {"gel": {"young": 1e6, "damping": {"mass": 4, "stiffness": 0.001}}},
     "bodies": [{"name": "cube", "mesh": "cube.msh", "material": "gel", "springs": [)";
-  for (const char *spring : {R"({"box": [[0, 0, 0], [0.1, 0.1, 0.1]], "to": [0.05, 0.05, 0.05], "stiffness": 500, "damping": 40})",
-                             R"({"point": [0.05, 0.05, 0.05], "keyframes": [{"t": 0, "position": [0.05, 0.05, 0.05]}], "stiffness": 500, "damping": 40})"}) {
+  for (
+      const char *spring :
+      {R"({"box": [[0, 0, 0], [0.1, 0.1, 0.1]], "to": [0.05, 0.05, 0.05], "stiffness": 500, "damping": 40})",
+       R"({"point": [0.05, 0.05, 0.05], "keyframes": [{"t": 0, "position": [0.05, 0.05, 0.05]}], "stiffness": 500, "damping": 40})"}) {
     test::write_file(folder + "/scene.json", head + spring + "]}]}");
-    const test::CommandResult r = test::deform({"run", folder + "/scene.json", "--out", folder + "/out", "--quiet"});
+    const test::CommandResult r =
+        test::deform({"run", folder + "/scene.json", "--out", folder + "/out", "--quiet"});
     ASSERT_EQ(r.exit_code, 0) << r.err;
     const auto rows = test::read_csv(folder + "/out/bodies.csv");
-    EXPECT_NEAR(std::stod(rows.back()[4]), 0.05 - 10.0 / 500, 2e-4) << spring;   // com_z; the cube gives a little around the point
+    // com_z; the cube gives a little around the point
+    EXPECT_NEAR(std::stod(rows.back()[4]), 0.05 - 10.0 / 500, 2e-4) << spring;
   }
 }

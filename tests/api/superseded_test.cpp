@@ -1,4 +1,5 @@
-// What a host sets anew each frame (the motion of held points, friction of a pair, filters) takes no more memory for it, and holds as the last call said.
+// What a host sets anew each frame (the motion of held points, friction of a pair, filters) takes no more
+// memory for it, and holds as the last call said.
 #include "refused_memory.h"
 
 #include "world.h"
@@ -18,7 +19,10 @@ struct Scene {
     w = test::make_world(c);
     test::add_plane(w, "floor");
     test::BodyOptions o;
-    o.name = "block", o.young = 2e5, o.damping_stiffness = 2e-3, o.position = {0, 0, 4e-5};
+    o.name = "block";
+    o.young = 2e5;
+    o.damping_stiffness = 2e-3;
+    o.position = {0, 0, 4e-5};
     body = test::make_body(c, w, "beam", {0.1, 0.1, 0.1}, 10, o);
   }
   ~Scene() { dfm_context_destroy(c); }
@@ -45,7 +49,11 @@ double speed_of(const Scene &s, uint32_t point) {
 void friction(Scene &s, double mu, const char *a = "block", const char *b = "floor") {
   const dfm_param_value value{"mu", &mu, 1};
   dfm_friction_def f{};
-  f.size = sizeof f, f.between[0] = a, f.between[1] = b, f.law = "coulomb", f.params = {sizeof(dfm_params), 1, &value};
+  f.size = sizeof f;
+  f.between[0] = a;
+  f.between[1] = b;
+  f.law = "coulomb";
+  f.params = {sizeof(dfm_params), 1, &value};
   ASSERT_EQ(dfm_world_add_friction(s.w, &f), DFM_OK) << dfm_last_error();
 }
 
@@ -78,7 +86,7 @@ TEST(Superseded, FrictionAndFilters_TakeTheSameMemoryAfterAMillionCalls) {
   const size_t bytes = s.bytes();
   for (int i = 0; i < 1000000; ++i) set(i);
   test::ok(dfm_world_step(s.w, 1e-4, nullptr));
-  EXPECT_LE(Refusal::live, live + 8);   // an instance of a law more or less
+  EXPECT_LE(Refusal::live, live + 8);  // an instance of a law more or less
   EXPECT_LE(s.bytes(), bytes + 200);
 }
 
@@ -111,14 +119,18 @@ TEST(Superseded, AReleasedPoint_IsNotMovedByItsOldMotionWhenHeldAgain) {
 
 TEST(Superseded, ARule_HoldsAsItWasGivenLast) {
   Scene s;
-  for (const double mu : {0.9, 0.1, 0.4}) friction(s, mu), friction(s, mu, "*", "floor");
+  for (const double mu : {0.9, 0.1, 0.4}) {
+    friction(s, mu);
+    friction(s, mu, "*", "floor");
+  }
   friction(s, 0.7, "floor", "block");
   const double push[3] = {2.5, 0, -9.81};
   test::ok(dfm_world_set_gravity(s.w, push));
   for (int i = 0; i < 3000; ++i) test::ok(dfm_world_step(s.w, 1e-4, nullptr));
   const std::vector<dfm_contact> contacts = test::contacts(s.w);
   ASSERT_FALSE(contacts.empty());
-  EXPECT_NEAR(test::measure(s.body).velocity[0], 0, 1e-2) << "mu 0.7 holds 2.5 m/s2; the 0.1 and 0.4 that went before would not";
+  EXPECT_NEAR(test::measure(s.body).velocity[0], 0, 1e-2)
+      << "mu 0.7 holds 2.5 m/s2; the 0.1 and 0.4 that went before would not";
 }
 
 TEST(Superseded, RulesOfADestroyedBody_GoWithIt) {
@@ -128,7 +140,8 @@ TEST(Superseded, RulesOfADestroyedBody_GoWithIt) {
   for (int i = 0; i < 50; ++i) {
     const std::string name = "guest" + std::to_string(i);
     test::BodyOptions o;
-    o.name = name, o.position = {1, 0, 0.1};
+    o.name = name;
+    o.position = {1, 0, 0.1};
     const dfm_body guest = test::make_body(s.c, w, "beam", {0.1, 0.1, 0.1}, 10, o);
     friction(s, 0.2 + 0.01 * i, name.c_str(), "floor");
     test::ok(dfm_world_filter_pair(w, name.c_str(), "block", false));

@@ -12,7 +12,8 @@ namespace {
 constexpr double kInf = std::numeric_limits<double>::infinity();
 const dfm_motion kFalling = {{0.25, 0.25, 1}, {0.25, 0.25, -1}};
 const dfm_motion kTriangle[3] = {{{0, 0, 0}, {0, 0, 0}}, {{1, 0, 0}, {1, 0, 0}}, {{0, 1, 0}, {0, 1, 0}}};
-const dfm_motion kAbove[2] = {{{0, -1, 1}, {0, -1, -1}}, {{0, 1, 1}, {0, 1, -1}}}, kBelow[2] = {{{-1, 0, 0}, {-1, 0, 0}}, {{1, 0, 0}, {1, 0, 0}}};
+const dfm_motion kAbove[2] = {{{0, -1, 1}, {0, -1, -1}}, {{0, 1, 1}, {0, 1, -1}}},
+                 kBelow[2] = {{{-1, 0, 0}, {-1, 0, 0}}, {{1, 0, 0}, {1, 0, 0}}};
 
 void expect_refused(const dfm_toi_options &options, const std::string &word) {
   double t = 7, at[3] = {7, 7, 7};
@@ -45,7 +46,8 @@ TEST(ToiApi, NoOptions_MeansConservative) {
 
 TEST(ToiApi, ShortOptions_AreCompletedWithDefaults) {
   dfm_toi_options options = {};
-  options.size = offsetof(dfm_toi_options, tolerance);   // what a host that knows of the method alone would say
+  // what a host that knows of the method alone would say
+  options.size = offsetof(dfm_toi_options, tolerance);
   options.method = DFM_TOI_BRENT;
   options.tolerance = -5;
   double t = -1;

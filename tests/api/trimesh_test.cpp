@@ -1,4 +1,5 @@
-// Surfaces through the C API: from the host's triangles, from generators and from files, told, lent and written.
+// Surfaces through the C API: from the host's triangles, from generators and from files, told,
+// lent and written.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -16,8 +17,9 @@ std::string folder() { return test::scratch("trimesh"); }
 bool has(const std::string &text, const std::string &word) { return text.find(word) != std::string::npos; }
 
 // A tetrahedron, each triangle with its own corners, the second turned, and a point that nothing uses.
-const double kPoints[39] = {0, 0, 0, 0, 1, 0, 1, 0, 0, /**/ 0, 0, 0, 0, 0, 1, 1, 0, 0, /**/ 0, 0, 0, 0, 0, 1, 0, 1, 0,
-                            /**/ 1, 0, 0, 0, 1, 0, 0, 0, 1, /**/ 9, 9, 9};
+const double kPoints[39] = {0,      0, 0, 0, 1,      0, 1, 0, 0, /**/ 0, 0, 0, 0, 0,
+                            1,      1, 0, 0, /**/ 0, 0, 0, 0, 0, 1,      0, 1, 0,
+                            /**/ 1, 0, 0, 0, 1,      0, 0, 0, 1, /**/ 9, 9, 9};
 const uint32_t kTriangles[12] = {0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11};
 
 dfm_trimesh_info info_of(dfm_trimesh mesh) {
@@ -147,7 +149,8 @@ TEST(TrimeshApi, WrongArguments_LeaveTheOutputAlone) {
   std::memcpy(bad, kPoints, sizeof bad);
   bad[3] = std::numeric_limits<double>::infinity();
   EXPECT_EQ(dfm_trimesh_create(c.context, 13, kPoints, 4, far, &mesh), DFM_E_ARG);
-  EXPECT_TRUE(has(dfm_last_error(), "triangle 1 (counted from 0) uses point 13, there are 13")) << dfm_last_error();
+  EXPECT_TRUE(has(dfm_last_error(), "triangle 1 (counted from 0) uses point 13, there are 13"))
+      << dfm_last_error();
   EXPECT_EQ(dfm_trimesh_create(c.context, 13, bad, 4, kTriangles, &mesh), DFM_E_FORMAT);
   EXPECT_TRUE(has(dfm_last_error(), "point 1 (counted from 0)")) << dfm_last_error();
   EXPECT_EQ(dfm_trimesh_create(c.context, 13, kPoints, 0, kTriangles, &mesh), DFM_E_FORMAT);

@@ -1,4 +1,5 @@
-// Untangling: what overlaps is moved apart before the first step, without energy and without speed; what cannot be parted is named and stays.
+// Untangling: what overlaps is moved apart before the first step, without energy and without speed; what
+// cannot be parted is named and stays.
 #include <algorithm>
 
 #include "logged_context.h"
@@ -16,9 +17,12 @@ dfm_world untangling(dfm_context *c, std::array<double, 3> gravity = {}) {
   return w;
 }
 
-dfm_body ball(dfm_context *c, dfm_world w, std::array<double, 3> at, double radius = 0.1, uint32_t cells = 1000, double density = 1000) {
+dfm_body ball(dfm_context *c, dfm_world w, std::array<double, 3> at, double radius = 0.1,
+              uint32_t cells = 1000, double density = 1000) {
   test::BodyOptions o;
-  o.position = at, o.damping_stiffness = 1e-3, o.density = density;
+  o.position = at;
+  o.damping_stiffness = 1e-3;
+  o.density = density;
   return test::make_body(c, w, "ball", {radius, 0, 0}, cells, o);
 }
 
@@ -65,7 +69,7 @@ TEST(Untangle, TwoBallsAtAnyDistance_ComeApartWithoutSpeed) {
     EXPECT_EQ(left(w), 0u) << apart;
     const dfm_body_measure ma = test::measure(a), mb = test::measure(b);
     EXPECT_LT(distance(ma, mb), 0.205) << apart;
-    for (int k = 0; k < 3; ++k)   // their common center stays
+    for (int k = 0; k < 3; ++k)  // their common center stays
       EXPECT_NEAR(ma.com[k] + mb.com[k], (k == 0 ? 0.6 : k == 1 ? 0.8 : 0) * apart, 1e-4) << apart;
     uint32_t trouble = 0;
     test::ok(dfm_world_step(w, 1e-3, &trouble));
@@ -87,21 +91,30 @@ TEST(Untangle, BodyInsideBody_ComesOut) {
 }
 
 TEST(Untangle, BodyInEveryShapeOfObstacle_ComesOut) {
-  for (const double size : {0.03, 0.3})   // inside the body; around it
-    for (const uint32_t shape : {DFM_SHAPE_PLANE, DFM_SHAPE_SPHERE, DFM_SHAPE_BOX, DFM_SHAPE_CAPSULE, DFM_SHAPE_MESH, DFM_SHAPE_VOXELS}) {
+  for (const double size : {0.03, 0.3})  // inside the body; around it
+    for (const uint32_t shape : {DFM_SHAPE_PLANE, DFM_SHAPE_SPHERE, DFM_SHAPE_BOX, DFM_SHAPE_CAPSULE,
+                                 DFM_SHAPE_MESH, DFM_SHAPE_VOXELS}) {
       test::Context c;
       const dfm_world w = untangling(c);
       const dfm_body b = ball(c, w, {0.01, 0.02, -0.01}, 0.1, 400);
       const test::Triangles t = test::box_surface({size, size, size}, 1);
       dfm_obstacle_def d = dfm_obstacle_def_default();
-      d.shape = shape, d.radius = d.half_length = d.half_size[0] = d.half_size[1] = d.half_size[2] = size;
-      if (shape == DFM_SHAPE_MESH || shape == DFM_SHAPE_VOXELS)
-        d.npoint = 8, d.points = t.points.data(), d.ntriangle = 12, d.triangles = t.tris.data(), d.cells = 32768;
+      d.shape = shape;
+      d.radius = d.half_length = d.half_size[0] = d.half_size[1] = d.half_size[2] = size;
+      if (shape == DFM_SHAPE_MESH || shape == DFM_SHAPE_VOXELS) {
+        d.npoint = 8;
+        d.points = t.points.data();
+        d.ntriangle = 12;
+        d.triangles = t.tris.data();
+        d.cells = 32768;
+      }
       dfm_obstacle o = 0;
       test::ok(dfm_obstacle_create(w, &d, &o));
       EXPECT_EQ(overlaps(w).size(), 1u) << shape << ' ' << size;
       EXPECT_EQ(left(w), 0u) << shape << ' ' << size;
-      EXPECT_LT(std::abs(test::measure(b).com[0]) + std::abs(test::measure(b).com[1]) + std::abs(test::measure(b).com[2]), 2.5 * (size + 0.1));
+      EXPECT_LT(std::abs(test::measure(b).com[0]) + std::abs(test::measure(b).com[1]) +
+                    std::abs(test::measure(b).com[2]),
+                2.5 * (size + 0.1));
       expect_calm(w, {b});
       dfm_world_destroy(w);
     }
@@ -114,11 +127,12 @@ TEST(Untangle, HeapInACorner_ComesApartAndFallsToRest) {
   const double s = std::sqrt(0.5);
   test::add_plane(w, "wall", {-0.15, 0, 0}, {0, s, 0, s});
   std::vector<dfm_body> all;
-  for (int i = 0; i < 8; ++i) all.push_back(ball(c, w, {0.05 * (i % 2), 0.04 * (i / 2 % 2), 0.05 + 0.05 * (i / 4)}, 0.05, 60));
+  for (int i = 0; i < 8; ++i)
+    all.push_back(ball(c, w, {0.05 * (i % 2), 0.04 * (i / 2 % 2), 0.05 + 0.05 * (i / 4)}, 0.05, 60));
   EXPECT_GT(overlaps(w).size(), 8u);
   EXPECT_EQ(left(w), 0u);
   test::run(w, 0.3, 1e-3);
-  for (const dfm_body b : all) EXPECT_LT(test::measure(b).speed_max, 4.0);   // free fall over 0.3 s: 2.9 m/s
+  for (const dfm_body b : all) EXPECT_LT(test::measure(b).speed_max, 4.0);  // free fall over 0.3 s: 2.9 m/s
   EXPECT_EQ(left(w), 0u);
   dfm_world_destroy(w);
 }
@@ -128,7 +142,8 @@ TEST(Untangle, WhatWasApartedIsGuarded_FromThenOn) {
   const dfm_world w = untangling(c);
   const dfm_body a = ball(c, w, {}, 0.05, 200), b = ball(c, w, {0.05, 0, 0}, 0.05, 200);
   EXPECT_EQ(overlaps(w).size(), 1u);
-  test::set_velocity(a, {5, 0, 0}), test::set_velocity(b, {-5, 0, 0});
+  test::set_velocity(a, {5, 0, 0});
+  test::set_velocity(b, {-5, 0, 0});
   for (int i = 0; i < 20; ++i) {
     test::ok(dfm_world_step(w, 1e-3, nullptr));
     ASSERT_EQ(left(w), 0u) << i;

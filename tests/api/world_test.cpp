@@ -1,5 +1,5 @@
-// Worlds: defs of older and newer callers, wrong arguments (one sentence, nothing changed), bodies that come and go while the world runs,
-// and steps that cannot be taken.
+// Worlds: defs of older and newer callers, wrong arguments (one sentence, nothing changed), bodies that come
+// and go while the world runs, and steps that cannot be taken.
 #include <cstring>
 #include <functional>
 
@@ -21,14 +21,16 @@ uint64_t balance(const std::vector<dfm_contact_event> &events, uint32_t kind) {
 
 }  // namespace
 
-// ---- structs of other versions ---------------------------------------------------------------------------------------------------
+// ---- structs of other versions ----------------------------------------------------------------------------
 
 TEST(Structs, OfAnOlderCaller_KeepDefaultsForWhatTheyLack) {
   test::Context c;
   dfm_world_def wd;
   std::memset(&wd, 0xff, sizeof wd);  // what lies beyond the caller's struct is garbage
-  wd.size = offsetof(dfm_world_def, method), wd.flags = 0;
-  wd.gravity[0] = wd.gravity[1] = 0, wd.gravity[2] = -1;
+  wd.size = offsetof(dfm_world_def, method);
+  wd.flags = 0;
+  wd.gravity[0] = wd.gravity[1] = 0;
+  wd.gravity[2] = -1;
   dfm_world w = 0;
   ASSERT_EQ(dfm_world_create(c, &wd, &w), DFM_OK) << dfm_last_error();
   Tet t;
@@ -41,12 +43,15 @@ TEST(Structs, OfAnOlderCaller_KeepDefaultsForWhatTheyLack) {
   ASSERT_EQ(dfm_body_create(w, &bd, &b), DFM_OK) << dfm_last_error();
   dfm_obstacle_def od;
   std::memset(&od, 0xff, sizeof od);
-  od.size = offsetof(dfm_obstacle_def, name), od.shape = DFM_SHAPE_SPHERE;
+  od.size = offsetof(dfm_obstacle_def, name);
+  od.shape = DFM_SHAPE_SPHERE;
   dfm_obstacle o = 0;
   ASSERT_EQ(dfm_obstacle_create(w, &od, &o), DFM_OK) << dfm_last_error();
   dfm_material_def md;
   std::memset(&md, 0xff, sizeof md);
-  md.size = offsetof(dfm_material_def, young), md.name = nullptr, md.density = 500;
+  md.size = offsetof(dfm_material_def, young);
+  md.name = nullptr;
+  md.density = 500;
   dfm_material m = 0;
   ASSERT_EQ(dfm_material_create(w, &md, &m), DFM_OK) << dfm_last_error();
   steps(w, 3);
@@ -55,7 +60,10 @@ TEST(Structs, OfAnOlderCaller_KeepDefaultsForWhatTheyLack) {
 
 TEST(Structs, OfANewerCaller_AreRead) {
   test::Context c;
-  struct { dfm_world_def known; double added[4]; } wd{dfm_world_def_default(), {7, 7, 7, 7}};
+  struct {
+    dfm_world_def known;
+    double added[4];
+  } wd{dfm_world_def_default(), {7, 7, 7, 7}};
   wd.known.size = sizeof wd;
   dfm_world w = 0;
   ASSERT_EQ(dfm_world_create(c, &wd.known, &w), DFM_OK) << dfm_last_error();
@@ -75,7 +83,8 @@ void never_overrun(const char *name, Get get) {
     uint32_t given;
     std::memcpy(&given, memory, sizeof given);
     EXPECT_EQ(given, size) << name;
-    for (size_t i = size; i < sizeof memory; ++i) ASSERT_EQ(memory[i], 0xa5) << name << " of size " << size << ", byte " << i;
+    for (size_t i = size; i < sizeof memory; ++i)
+      ASSERT_EQ(memory[i], 0xa5) << name << " of size " << size << ", byte " << i;
   }
 }
 
@@ -87,12 +96,14 @@ TEST(Structs, FilledForAnOlderCaller_AreNotOverrun) {
   never_overrun<dfm_world_stats>("stats", [&](auto *out) { return dfm_world_get_stats(s.world, out); });
   never_overrun<dfm_body_info>("info", [&](auto *out) { return dfm_body_get_info(s.lower, out); });
   never_overrun<dfm_body_measure>("measure", [&](auto *out) { return dfm_body_get_measure(s.lower, out); });
-  never_overrun<dfm_obstacle_def>("obstacle def", [&](auto *out) { return dfm_obstacle_get_def(s.floor, out); });
+  never_overrun<dfm_obstacle_def>("obstacle def",
+                                  [&](auto *out) { return dfm_obstacle_get_def(s.floor, out); });
   never_overrun<dfm_ray_hit>("ray", [&](auto *out) { return dfm_world_ray(s.world, origin, up, 10, out); });
-  never_overrun<dfm_ray_hit>("closest", [&](auto *out) { return dfm_world_closest(s.world, origin, 10, out); });
+  never_overrun<dfm_ray_hit>("closest",
+                             [&](auto *out) { return dfm_world_closest(s.world, origin, 10, out); });
 }
 
-// ---- wrong arguments ---------------------------------------------------------------------------------------------------------------
+// ---- wrong arguments --------------------------------------------------------------------------------------
 
 TEST(Arguments, Wrong_AreRefusedInOneSentenceAndChangeNothing) {
   test::Context c;
@@ -108,7 +119,8 @@ TEST(Arguments, Wrong_AreRefusedInOneSentenceAndChangeNothing) {
   Tet t;
   auto body = [&](auto change) {
     Tet copy;
-    copy.def.points = copy.points, copy.def.tets = copy.cells;
+    copy.def.points = copy.points;
+    copy.def.tets = copy.cells;
     change(copy);
     return dfm_body_create(s.world, &copy.def, &b);
   };
@@ -124,7 +136,10 @@ TEST(Arguments, Wrong_AreRefusedInOneSentenceAndChangeNothing) {
   };
   auto friction = [&](const char *one, const char *two, const char *law, dfm_param_value v) {
     dfm_friction_def f{};
-    f.size = sizeof f, f.between[0] = one, f.between[1] = two, f.law = law;
+    f.size = sizeof f;
+    f.between[0] = one;
+    f.between[1] = two;
+    f.law = law;
     if (v.key) f.params = {sizeof(dfm_params), 1, &v};
     return dfm_world_add_friction(s.world, &f);
   };
@@ -132,7 +147,11 @@ TEST(Arguments, Wrong_AreRefusedInOneSentenceAndChangeNothing) {
   const dfm_pose_key falling[2] = {{1, {}}, {1, {}}};
   const dfm_vector_key gravity_back[2] = {{1, {0, 0, 0}}, {0.5, {0, 0, 0}}};
   const dfm_sine nan_sine{{nan, 0, 0}, 1, 0};
-  struct Case { dfm_status status; std::function<dfm_status()> call; std::initializer_list<const char *> parts; };
+  struct Case {
+    dfm_status status;
+    std::function<dfm_status()> call;
+    std::initializer_list<const char *> parts;
+  };
   const Case cases[] = {
       {DFM_E_ARG, [&] { return dfm_world_step(s.world, 0, nullptr); }, {"step of 0 s", "positive"}},
       {DFM_E_ARG, [&] { return dfm_world_step(s.world, -1, nullptr); }, {"-1"}},
@@ -143,16 +162,34 @@ TEST(Arguments, Wrong_AreRefusedInOneSentenceAndChangeNothing) {
       {DFM_E_ARG, [&] { return dfm_world_set_gravity_keys(s.world, 2, gravity_back); }, {"gravity", "rise"}},
       {DFM_E_ARG, [&] { return dfm_world_find_body(s.world, "lowr", &b); }, {"'lowr'", "'lower'"}},
       {DFM_E_ARG, [&] { return dfm_world_find_body(s.world, nullptr, &b); }, {"'name'"}},
-      {DFM_E_ARG, [&] { return dfm_world_filter_pair(s.world, "upper", "flor", false); }, {"'flor'", "'floor'"}},
+      {DFM_E_ARG,
+       [&] { return dfm_world_filter_pair(s.world, "upper", "flor", false); },
+       {"'flor'", "'floor'"}},
       {DFM_E_ARG, [&] { return dfm_world_filter_pair(s.world, nullptr, "floor", false); }, {"NULL"}},
       {DFM_E_ARG, [&] { return dfm_world_ray(s.world, good3, good3, 0, nullptr); }, {"max_distance"}},
       {DFM_E_ARG, [&] { return dfm_world_ray(s.world, bad3, good3, 1, nullptr); }, {"origin"}},
-      {DFM_E_ARG, [&] { dfm_ray_hit h{}; const double none[3] = {0, 0, 0}; return dfm_world_ray(s.world, good3, none, 1, &h); }, {"direction"}},
+      {DFM_E_ARG,
+       [&] {
+         dfm_ray_hit h{};
+         const double none[3] = {0, 0, 0};
+         return dfm_world_ray(s.world, good3, none, 1, &h);
+       },
+       {"direction"}},
       {DFM_E_ARG, [&] { return dfm_world_closest(s.world, good3, 1, nullptr); }, {"out"}},
-      {DFM_E_ARG, [&] { dfm_ray_hit h{}; return dfm_world_closest(s.world, good3, nan, &h); }, {"max_distance"}},
+      {DFM_E_ARG,
+       [&] {
+         dfm_ray_hit h{};
+         return dfm_world_closest(s.world, good3, nan, &h);
+       },
+       {"max_distance"}},
       {DFM_E_ARG, [&] { return dfm_world_get_stats(s.world, nullptr); }, {"NULL"}},
       {DFM_E_ARG, [&] { return dfm_world_hold(s.world, nullptr, nullptr); }, {"'creep'"}},
-      {DFM_E_ARG, [&] { dfm_contact one; return dfm_world_contacts(s.world, 1, &one, &n); }, {"capacity 1"}},
+      {DFM_E_ARG,
+       [&] {
+         dfm_contact one;
+         return dfm_world_contacts(s.world, 1, &one, &n);
+       },
+       {"capacity 1"}},
       // bodies
       {DFM_E_ARG, [&] { return body([](Tet &x) { x.def.name = "lower"; }); }, {"'lower'", "taken"}},
       {DFM_E_ARG, [&] { return body([](Tet &x) { x.def.name = "floor"; }); }, {"'floor'", "taken"}},
@@ -165,46 +202,139 @@ TEST(Arguments, Wrong_AreRefusedInOneSentenceAndChangeNothing) {
       {DFM_E_ARG, [&] { return body([&](Tet &x) { x.def.velocity[1] = nan; }); }, {"velocity"}},
       {DFM_E_UNSUPPORTED, [&] { return body([](Tet &x) { x.def.model = "msn"; }); }, {"msn", "msm"}},
       {DFM_E_HANDLE, [&] { return body([&](Tet &x) { x.def.material = s.lower; }); }, {"material handle"}},
-      {DFM_E_ARG, [&] { return body([&](Tet &x) { static dfm_param_value v; v = {"volum", &half, 1}; x.def.model_params = {sizeof(dfm_params), 1, &v}; }); },
+      {DFM_E_ARG,
+       [&] {
+         return body([&](Tet &x) {
+           static dfm_param_value v;
+           v = {"volum", &half, 1};
+           x.def.model_params = {sizeof(dfm_params), 1, &v};
+         });
+       },
        {"volum", "volume"}},
       {DFM_E_ARG, [&] { return dfm_body_create(s.world, &t.def, nullptr); }, {"'out'"}},
       {DFM_E_ARG, [&] { return dfm_body_create(s.world, nullptr, &b); }, {"0 points"}},
       {DFM_E_ARG, [&] { return dfm_body_hold(s.lower, 1, &far_point, 7); }, {"'lower'", "100000"}},
       {DFM_E_ARG, [&] { return dfm_body_hold(s.lower, 1, &zero, 8); }, {"axes"}},
       {DFM_E_ARG, [&] { return dfm_body_hold(s.lower, 1, nullptr, 7); }, {"'points'"}},
-      {DFM_E_ARG, [&] { return dfm_body_move_held(s.lower, 1, &zero, 0, nullptr, nullptr); }, {"keys or a sine"}},
+      {DFM_E_ARG,
+       [&] { return dfm_body_move_held(s.lower, 1, &zero, 0, nullptr, nullptr); },
+       {"keys or a sine"}},
       {DFM_E_ARG, [&] { return dfm_body_move_held(s.lower, 1, &zero, 2, falling, nullptr); }, {"rise"}},
-      {DFM_E_ARG, [&] { return dfm_body_move_held(s.lower, 1, &zero, 2, nullptr, nullptr); }, {"keys is NULL"}},
-      {DFM_E_ARG, [&] { const dfm_sine x{}; return dfm_body_move_held(s.lower, 1, &zero, 0, nullptr, &x); }, {"not held"}},
-      {DFM_E_ARG, [&] { return dfm_body_add_load(s.lower, 1, &zero, bad3, 0, nullptr, nullptr, nullptr); }, {"'lower'", "finite"}},
-      {DFM_E_ARG, [&] { return dfm_body_add_load(s.lower, 1, &zero, nullptr, 0, nullptr, nullptr, nullptr); }, {"'force'"}},
-      {DFM_E_ARG, [&] { return dfm_body_add_load(s.lower, 1, &zero, good3, 3, nullptr, nullptr, nullptr); }, {"keys is NULL"}},
-      {DFM_E_ARG, [&] { return dfm_body_add_load(s.lower, 1, &zero, good3, 0, nullptr, &nan_sine, nullptr); }, {"sine"}},
+      {DFM_E_ARG,
+       [&] { return dfm_body_move_held(s.lower, 1, &zero, 2, nullptr, nullptr); },
+       {"keys is NULL"}},
+      {DFM_E_ARG,
+       [&] {
+         const dfm_sine x{};
+         return dfm_body_move_held(s.lower, 1, &zero, 0, nullptr, &x);
+       },
+       {"not held"}},
+      {DFM_E_ARG,
+       [&] { return dfm_body_add_load(s.lower, 1, &zero, bad3, 0, nullptr, nullptr, nullptr); },
+       {"'lower'", "finite"}},
+      {DFM_E_ARG,
+       [&] { return dfm_body_add_load(s.lower, 1, &zero, nullptr, 0, nullptr, nullptr, nullptr); },
+       {"'force'"}},
+      {DFM_E_ARG,
+       [&] { return dfm_body_add_load(s.lower, 1, &zero, good3, 3, nullptr, nullptr, nullptr); },
+       {"keys is NULL"}},
+      {DFM_E_ARG,
+       [&] { return dfm_body_add_load(s.lower, 1, &zero, good3, 0, nullptr, &nan_sine, nullptr); },
+       {"sine"}},
       {DFM_E_ARG, [&] { return dfm_body_remove_load(s.lower, 77); }, {"no load 77"}},
       {DFM_E_ARG, [&] { return dfm_body_set_state(s.lower, 3, nullptr, nullptr); }, {"points", "3"}},
       {DFM_E_ARG, [&] { return dfm_body_apply_impulse(s.lower, bad3, good3); }, {"finite"}},
       {DFM_E_ARG, [&] { return dfm_body_apply_impulse(s.lower, good3, nullptr); }, {"'impulse'"}},
-      {DFM_E_ARG, [&] { const dfm_params p{sizeof p, 2, nullptr}; return dfm_body_set_params(s.lower, &p); }, {"params.values is NULL"}},
-      {DFM_E_ARG, [&] { const dfm_param_value v{"yung", &half, 1}; const dfm_params p{sizeof p, 1, &v}; return dfm_body_set_params(s.lower, &p); }, {"young"}},
+      {DFM_E_ARG,
+       [&] {
+         const dfm_params p{sizeof p, 2, nullptr};
+         return dfm_body_set_params(s.lower, &p);
+       },
+       {"params.values is NULL"}},
+      {DFM_E_ARG,
+       [&] {
+         const dfm_param_value v{"yung", &half, 1};
+         const dfm_params p{sizeof p, 1, &v};
+         return dfm_body_set_params(s.lower, &p);
+       },
+       {"young"}},
       {DFM_E_ARG, [&] { return dfm_body_get_measure(s.lower, nullptr); }, {"NULL"}},
       // obstacles and materials
       {DFM_E_ARG, [&] { return obstacle([](auto &d) { d.shape = 9; }); }, {"shape 9"}},
-      {DFM_E_ARG, [&] { return obstacle([](auto &d) { d.shape = DFM_SHAPE_SPHERE, d.radius = 0; }); }, {"radius"}},
-      {DFM_E_ARG, [&] { return obstacle([](auto &d) { d.shape = DFM_SHAPE_BOX, d.half_size[1] = -1; }); }, {"half_size"}},
-      {DFM_E_ARG, [&] { return obstacle([](auto &d) { d.shape = DFM_SHAPE_CAPSULE, d.half_length = -1; }); }, {"half_length"}},
-      {DFM_E_ARG, [&] { return obstacle([](auto &d) { d.shape = DFM_SHAPE_CAPSULE, d.half_length = INFINITY; }); }, {"half_length inf", "finite"}},
-      {DFM_E_ARG, [&] { return obstacle([](auto &d) { d.shape = DFM_SHAPE_SPHERE, d.radius = INFINITY; }); }, {"radius inf", "finite"}},
-      {DFM_E_ARG, [&] { return obstacle([](auto &d) { d.shape = DFM_SHAPE_BOX, d.half_size[1] = INFINITY; }); }, {"half_size inf", "finite"}},
+      {DFM_E_ARG,
+       [&] {
+         return obstacle([](auto &d) {
+           d.shape = DFM_SHAPE_SPHERE;
+           d.radius = 0;
+         });
+       },
+       {"radius"}},
+      {DFM_E_ARG,
+       [&] {
+         return obstacle([](auto &d) {
+           d.shape = DFM_SHAPE_BOX;
+           d.half_size[1] = -1;
+         });
+       },
+       {"half_size"}},
+      {DFM_E_ARG,
+       [&] {
+         return obstacle([](auto &d) {
+           d.shape = DFM_SHAPE_CAPSULE;
+           d.half_length = -1;
+         });
+       },
+       {"half_length"}},
+      {DFM_E_ARG,
+       [&] {
+         return obstacle([](auto &d) {
+           d.shape = DFM_SHAPE_CAPSULE;
+           d.half_length = INFINITY;
+         });
+       },
+       {"half_length inf", "finite"}},
+      {DFM_E_ARG,
+       [&] {
+         return obstacle([](auto &d) {
+           d.shape = DFM_SHAPE_SPHERE;
+           d.radius = INFINITY;
+         });
+       },
+       {"radius inf", "finite"}},
+      {DFM_E_ARG,
+       [&] {
+         return obstacle([](auto &d) {
+           d.shape = DFM_SHAPE_BOX;
+           d.half_size[1] = INFINITY;
+         });
+       },
+       {"half_size inf", "finite"}},
       {DFM_E_ARG, [&] { return obstacle([](auto &d) { d.name = "floor"; }); }, {"taken"}},
       {DFM_E_ARG, [&] { return obstacle([](auto &d) { d.nkey = 2; }); }, {"keys is NULL"}},
-      {DFM_E_ARG, [&] { return obstacle([&](auto &d) { d.nkey = 2, d.keys = falling; }); }, {"rise"}},
+      {DFM_E_ARG,
+       [&] {
+         return obstacle([&](auto &d) {
+           d.nkey = 2;
+           d.keys = falling;
+         });
+       },
+       {"rise"}},
       {DFM_E_ARG, [&] { return obstacle([&](auto &d) { d.sine.frequency = nan; }); }, {"sine"}},
       {DFM_E_ARG, [&] { return dfm_obstacle_move_to(s.floor, nullptr); }, {"'pose'"}},
       {DFM_E_ARG, [&] { return material([](auto &d) { d.density = 0; }); }, {"density", "positive"}},
       {DFM_E_ARG, [&] { return material([](auto &d) { d.poisson = 0.5; }); }, {"poisson", "(-1, 0.5)"}},
       {DFM_E_ARG, [&] { return material([](auto &d) { d.damping_stiffness = -1; }); }, {"damping_stiffness"}},
-      {DFM_E_ARG, [&] { return material([](auto &d) { d.damping_mass = INFINITY; }); }, {"damping_mass is inf", "finite"}},
-      {DFM_E_ARG, [&] { return material([](auto &d) { static const dfm_param_value v{"x", nullptr, 1}; d.extra = {sizeof(dfm_params), 1, &v}; }); }, {"no value"}},
+      {DFM_E_ARG,
+       [&] { return material([](auto &d) { d.damping_mass = INFINITY; }); },
+       {"damping_mass is inf", "finite"}},
+      {DFM_E_ARG,
+       [&] {
+         return material([](auto &d) {
+           static const dfm_param_value v{"x", nullptr, 1};
+           d.extra = {sizeof(dfm_params), 1, &v};
+         });
+       },
+       {"no value"}},
       // friction
       {DFM_E_ARG, [&] { return friction("upper", "flor", "coulomb", {}); }, {"'flor'", "'floor'"}},
       {DFM_E_UNSUPPORTED, [&] { return friction("*", "*", "culomb", {}); }, {"culomb", "coulomb"}},
@@ -212,7 +342,9 @@ TEST(Arguments, Wrong_AreRefusedInOneSentenceAndChangeNothing) {
       {DFM_E_ARG, [&] { return friction("*", "*", "coulomb", {"mu", &minus, 1}); }, {"mu", "-1"}},
       {DFM_E_ARG, [&] { return friction("*", nullptr, "coulomb", {}); }, {"NULL"}},
       {DFM_E_ARG, [&] { return friction("*", "*", nullptr, {}); }, {"'law'"}},
-      {DFM_E_ARG, [&] { return friction("upper:top", "*", "coulomb", {}); }, {"'upper'", "'top'", "no groups"}},
+      {DFM_E_ARG,
+       [&] { return friction("upper:top", "*", "coulomb", {}); },
+       {"'upper'", "'top'", "no groups"}},
       {DFM_E_ARG, [&] { return dfm_world_add_friction(s.world, nullptr); }, {"NULL"}},
   };
   for (const Case &k : cases) {
@@ -228,7 +360,8 @@ TEST(Arguments, Wrong_AreRefusedInOneSentenceAndChangeNothing) {
   EXPECT_EQ(n, 2u);
   // a world that was never asked anything wrong goes the same way
   const test::Stack clean = test::make_stack(c);
-  steps(clean.world, 130), steps(s.world, 100);
+  steps(clean.world, 130);
+  steps(s.world, 100);
   EXPECT_EQ(dfm_world_hash(s.world), dfm_world_hash(clean.world));
 }
 
@@ -239,12 +372,15 @@ TEST(Arguments, OfContextAndWorld_AreChecked) {
   def.alloc = [](void *, size_t, size_t) -> void * { return nullptr; };
   EXPECT_EQ(dfm_context_create(&def, &c), DFM_E_ARG);
   says({"release"});
-  def = dfm_context_def_default(), def.trace_end = [](void *, const char *) {};
+  def = dfm_context_def_default();
+  def.trace_end = [](void *, const char *) {};
   EXPECT_EQ(dfm_context_create(&def, &c), DFM_E_ARG);
-  def = dfm_context_def_default(), def.threads = 5000;
+  def = dfm_context_def_default();
+  def.threads = 5000;
   EXPECT_EQ(dfm_context_create(&def, &c), DFM_E_ARG);
   says({"5000"});
-  def = dfm_context_def_default(), def.plugin_dir = "/nonexistent/plugins";
+  def = dfm_context_def_default();
+  def.plugin_dir = "/nonexistent/plugins";
   EXPECT_EQ(dfm_context_create(&def, &c), DFM_E_ARG);
   says({"/nonexistent/plugins"});
   EXPECT_EQ(c, nullptr);
@@ -256,15 +392,19 @@ TEST(Arguments, OfContextAndWorld_AreChecked) {
   dfm_world_def wd = dfm_world_def_default();
   wd.gravity[1] = INFINITY;
   EXPECT_EQ(dfm_world_create(good, &wd, &w), DFM_E_ARG);
-  wd = dfm_world_def_default(), wd.contact_offset = -1;
+  wd = dfm_world_def_default();
+  wd.contact_offset = -1;
   EXPECT_EQ(dfm_world_create(good, &wd, &w), DFM_E_ARG);
   says({"contact_offset"});
-  wd = dfm_world_def_default(), wd.max_sweeps = 0;
+  wd = dfm_world_def_default();
+  wd.max_sweeps = 0;
   EXPECT_EQ(dfm_world_create(good, &wd, &w), DFM_E_ARG);
-  wd = dfm_world_def_default(), wd.method = 7;
+  wd = dfm_world_def_default();
+  wd.method = 7;
   EXPECT_EQ(dfm_world_create(good, &wd, &w), DFM_E_UNSUPPORTED);
   const char *const effects[] = {"magic", nullptr};
-  wd = dfm_world_def_default(), wd.effects = effects;
+  wd = dfm_world_def_default();
+  wd.effects = effects;
   EXPECT_EQ(dfm_world_create(good, &wd, &w), DFM_E_ARG);
   says({"'magic'"});
   EXPECT_EQ(w, 0u);
@@ -294,7 +434,7 @@ TEST(UserData, OfABody_IsKeptAndChanged) {
   EXPECT_EQ(got.user, &one);
 }
 
-// ---- coming and going while the world runs -----------------------------------------------------------------------------------------
+// ---- coming and going while the world runs ----------------------------------------------------------------
 
 TEST(Running, ABodyRemovedInContact_EndsItsContactsAndTheOthersGoOn) {
   test::Context c;
@@ -309,7 +449,8 @@ TEST(Running, ABodyRemovedInContact_EndsItsContactsAndTheOthersGoOn) {
   log = test::events(s.world);
   EXPECT_EQ(balance(log, DFM_EVENT_END), open);
   for (const auto &e : log) EXPECT_TRUE(e.kind == DFM_EVENT_END && (e.a == s.upper || e.b == s.upper));
-  EXPECT_EQ(test::contacts(s.world).size(), 0u) << "no report of a sub-step that the removed body was part of";
+  EXPECT_EQ(test::contacts(s.world).size(), 0u)
+      << "no report of a sub-step that the removed body was part of";
   steps(s.world, 300);
   for (const auto &k : test::contacts(s.world)) EXPECT_TRUE(k.body_a == s.lower && k.body_b == 0);
   const auto pairs = test::pairs(s.world);
@@ -341,7 +482,10 @@ TEST(Running, ABodyCreatedAmongOthers_TakesPart) {
   const test::Stack s = test::make_stack(c);
   steps(s.world, 200);
   test::BodyOptions o;
-  o.name = "third", o.young = 2e5, o.damping_stiffness = 2e-3, o.position = {0.02, 0.02, 0.2005};
+  o.name = "third";
+  o.young = 2e5;
+  o.damping_stiffness = 2e-3;
+  o.position = {0.02, 0.02, 0.2005};
   const dfm_body third = test::make_body(c, s.world, "beam", {0.06, 0.06, 0.06}, 60, o);
   steps(s.world, 300);
   bool touches = false;
@@ -355,11 +499,14 @@ TEST(Running, FiltersChangedInContact_LetGoAndCatchAgain) {
   const test::Stack s = test::make_stack(c);
   steps(s.world, 300);
   test::events(s.world);
-  test::ok(dfm_body_set_filter(s.upper, 2, ~2u));   // meets nothing of category 2: the floor and the lower cube are of category 1
-  test::ok(dfm_body_set_filter(s.lower, 1, 1));     // and is no longer met by the lower one
+  // meets nothing of category 2: the floor and the lower cube are of category 1
+  test::ok(dfm_body_set_filter(s.upper, 2, ~2u));
+  test::ok(dfm_body_set_filter(s.lower, 1, 1));  // and is no longer met by the lower one
   steps(s.world, 20);
   uint64_t between = 0;
-  for (const auto &e : test::events(s.world)) between += e.kind == DFM_EVENT_END && (e.a == s.upper || e.b == s.upper) && e.b != s.floor && e.a != s.floor;
+  for (const auto &e : test::events(s.world))
+    between +=
+        e.kind == DFM_EVENT_END && (e.a == s.upper || e.b == s.upper) && e.b != s.floor && e.a != s.floor;
   EXPECT_GT(between, 0u);
   EXPECT_LT(test::measure(s.upper).velocity[2], -0.1) << "it falls through the lower one";
   for (const auto &p : test::pairs(s.world)) EXPECT_FALSE(p.a == s.lower && p.b == s.upper);
@@ -369,14 +516,14 @@ TEST(Running, FiltersChangedInContact_LetGoAndCatchAgain) {
   test::ok(dfm_world_filter_pair(named.world, "upper", "lower", false));
   steps(named.world, 10);
   EXPECT_LT(test::measure(named.upper).velocity[2], -0.05);
-  test::ok(dfm_world_filter_pair(named.world, "upper", "lower", true));   // the last rule wins
+  test::ok(dfm_world_filter_pair(named.world, "upper", "lower", true));  // the last rule wins
   steps(named.world, 5);
   bool touches = false;
   for (const auto &p : test::pairs(named.world)) touches |= p.a == named.lower && p.b == named.upper;
   EXPECT_TRUE(touches);
 }
 
-// ---- steps that cannot be taken --------------------------------------------------------------------------------------------------------
+// ---- steps that cannot be taken ---------------------------------------------------------------------------
 
 TEST(Step, WithALoadThatOverflows_DivergesAtTheLastGoodSubStepAndGoesOnWithoutIt) {
   test::Context c;
@@ -384,7 +531,8 @@ TEST(Step, WithALoadThatOverflows_DivergesAtTheLastGoodSubStepAndGoesOnWithoutIt
   steps(s.world, 40);
   const uint32_t point = 4;
   const double huge[3] = {0, 0, 1.7e308};
-  const dfm_scale_key grow[2] = {{0.0415, 0}, {0.0416, 100}};   // starts in the middle of the step from 0.041 s
+  // starts in the middle of the step from 0.041 s
+  const dfm_scale_key grow[2] = {{0.0415, 0}, {0.0416, 100}};
   uint32_t load = 0, trouble = 0;
   test::ok(dfm_body_add_load(s.upper, 1, &point, huge, 2, grow, nullptr, &load));
   steps(s.world, 1);
@@ -410,7 +558,8 @@ TEST(Step, ThatNeedsTooManySubSteps_IsDiscardedAndNothingChanges) {
   dfm_world w = 0;
   test::ok(dfm_world_create(c, &wd, &w));
   test::BodyOptions o;
-  o.name = "stiff", o.young = 1e7;
+  o.name = "stiff";
+  o.young = 1e7;
   test::make_body(c, w, "beam", {0.1, 0.1, 0.1}, 60, o);
   double dt = 0;
   dfm_body body = 0;
@@ -450,14 +599,20 @@ TEST(Step, WithACellInsideOut_SaysSo) {
 }
 
 TEST(Step, CalledFromInsideAStep_IsBusy) {
-  struct Host { dfm_world world = 0; dfm_status step = DFM_OK, destroy = DFM_OK, gravity = DFM_OK; } host;
+  struct Host {
+    dfm_world world = 0;
+    dfm_status step = DFM_OK, destroy = DFM_OK, gravity = DFM_OK;
+  } host;
   dfm_context_def def = dfm_context_def_default();
-  def.plugin_dir = DEFORM_PLUGIN_DIR, def.user = &host;
+  def.plugin_dir = DEFORM_PLUGIN_DIR;
+  def.user = &host;
   def.log = [](void *, int32_t, const char *) {};
   def.trace_begin = [](void *user, const char *) {
     Host &h = *static_cast<Host *>(user);
     const double g[3] = {0, 0, 0};
-    h.step = dfm_world_step(h.world, 1e-3, nullptr), h.destroy = dfm_world_destroy(h.world), h.gravity = dfm_world_set_gravity(h.world, g);
+    h.step = dfm_world_step(h.world, 1e-3, nullptr);
+    h.destroy = dfm_world_destroy(h.world);
+    h.gravity = dfm_world_set_gravity(h.world, g);
   };
   def.trace_end = [](void *, const char *) {};
   dfm_context *c = nullptr;

@@ -1,5 +1,6 @@
-// Detection of two crossed fine cylinders (../shared/meshes/thesis/cyl_fine.msh, or one of our own of that size where it is absent),
-// pressed flat against each other: at rest, and with the upper one rolling at 50 mm/s. Step 0.25 ms; time per step, one core.
+// Detection of two crossed fine cylinders (../shared/meshes/thesis/cyl_fine.msh, or one of our own of that
+// size where it is absent), pressed flat against each other: at rest, and with the upper one rolling at 50
+// mm/s. Step 0.25 ms; time per step, one core.
 #include <benchmark/benchmark.h>
 
 #include <chrono>
@@ -25,14 +26,18 @@ test::Mesh fine_cylinder() {
   const std::string shared = test::shared_dir();
   const std::string path = shared + "/meshes/thesis/cyl_fine.msh";
   const bool have = !shared.empty() && std::filesystem::exists(path);
-  const TetMesh tets = have ? read_tet_mesh(Memory::standard(), path) : make_cylinder(Memory::standard(), 0.02, 0.16, 4);
+  const TetMesh tets =
+      have ? read_tet_mesh(Memory::standard(), path) : make_cylinder(Memory::standard(), 0.02, 0.16, 4);
   const Array<uint32_t> tri = boundary_triangles(tets.tets);
   test::Mesh m;
   m.x.assign(tets.points.begin(), tets.points.end());
   m.tri.assign(tri.begin(), tri.end());
   Vec3 lo{1e9, 1e9, 1e9}, hi{-1e9, -1e9, -1e9};
   for (uint32_t i = 0; i < m.npoint(); ++i)
-    for (int k = 0; k < 3; ++k) lo[k] = std::min(lo[k], m.at(i)[k]), hi[k] = std::max(hi[k], m.at(i)[k]);
+    for (int k = 0; k < 3; ++k) {
+      lo[k] = std::min(lo[k], m.at(i)[k]);
+      hi[k] = std::max(hi[k], m.at(i)[k]);
+    }
   int axis = 0;
   for (int k = 1; k < 3; ++k)
     if (hi[k] - lo[k] > hi[axis] - lo[axis]) axis = k;
@@ -64,7 +69,8 @@ struct Pair {
     angle += speed * kStep / kRadius;
     Surface &upper = *scene.surfaces[1];
     for (uint32_t i = 0; i < upper.nsurfel; ++i) {
-      const Vec3 r = rotate(test::turn({0, 1, 0}, angle), rest.at(upper.point[i])), p = r + Vec3{x, 0, kRadius};
+      const Vec3 r = rotate(test::turn({0, 1, 0}, angle), rest.at(upper.point[i]));
+      const Vec3 p = r + Vec3{x, 0, kRadius};
       store3(&upper.x[4 * i], p);
       store3(&upper.v[4 * i], (speed / kRadius) * Vec3{p.z, 0, x - p.x});
       flatten(upper.x[4 * i + 2], 1);
@@ -82,12 +88,14 @@ void pair_step(benchmark::State &state, bool parallel, double speed) {
   for (auto _ : state) {
     if (speed > 0) {
       state.PauseTiming();
-      pair.roll(std::fmod(steps, 800) < 400 ? speed : -speed);   // to and fro by 5 mm
+      pair.roll(std::fmod(steps, 800) < 400 ? speed : -speed);  // to and fro by 5 mm
       state.ResumeTiming();
     }
     broad.update(s.bodies, s.obstacles, s.filter, s.h, s.offset);
     find_contacts(s.bodies, s.obstacles, broad.candidates(), s.h, s.offset, {}, lent, contacts);
-    n += double(contacts.size()), candidates += double(broad.candidates().size()), steps += 1;
+    n += double(contacts.size());
+    candidates += double(broad.candidates().size());
+    steps += 1;
   }
   state.counters["contacts"] = n / steps;
   state.counters["candidates"] = candidates / steps;
@@ -140,12 +148,15 @@ void tree_refit(benchmark::State &state) {
 }
 BENCHMARK(tree_refit);
 
-// How many times cheaper renewing boxes is than building the tree; issue: at least 10. Medians, interleaved, so that a busy machine hits both.
+// How many times cheaper renewing boxes is than building the tree; issue: at least 10. Medians, interleaved,
+// so that a busy machine hits both.
 void tree_refit_share(benchmark::State &state) {
   Pair pair(false);
   BoxTree tree(Memory::standard());
   const Surface &s = *pair.scene.surfaces[0];
-  const auto clock = [] { return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count(); };
+  const auto clock = [] {
+    return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
+  };
   std::vector<double> build, refit;
   for (auto _ : state) {
     const double t0 = clock();
@@ -153,7 +164,8 @@ void tree_refit_share(benchmark::State &state) {
     const double t1 = clock();
     for (int k = 0; k < 10; ++k) tree.refit(s, s.x.data());
     const double t2 = clock();
-    build.push_back(t1 - t0), refit.push_back((t2 - t1) / 10);
+    build.push_back(t1 - t0);
+    refit.push_back((t2 - t1) / 10);
   }
   std::nth_element(build.begin(), build.begin() + long(build.size() / 2), build.end());
   std::nth_element(refit.begin(), refit.begin() + long(refit.size() / 2), refit.end());
@@ -163,7 +175,8 @@ void tree_refit_share(benchmark::State &state) {
 }
 BENCHMARK(tree_refit_share)->Iterations(400);
 
-// The fine cylinder upright on one of its ends, over a flat floor of 20,000 irregular triangles of its own size, a plane, or a grid.
+// The fine cylinder upright on one of its ends, over a flat floor of 20,000 irregular triangles of its own
+// size, a plane, or a grid.
 void floor_step(benchmark::State &state, Shape shape) {
   Scene scene;
   scene.h = kStep;
@@ -177,7 +190,8 @@ void floor_step(benchmark::State &state, Shape shape) {
   std::uniform_real_distribution<double> u(-0.3, 0.3);
   constexpr int n = 100;
   for (int j = 0; j <= n; ++j)
-    for (int i = 0; i <= n; ++i) floor.add({0.003 * (i - n / 2 + u(random)), 0.003 * (j - n / 2 + u(random)), 0});
+    for (int i = 0; i <= n; ++i)
+      floor.add({0.003 * (i - n / 2 + u(random)), 0.003 * (j - n / 2 + u(random)), 0});
   for (uint32_t j = 0; j < n; ++j)
     for (uint32_t i = 0; i < n; ++i) {
       const uint32_t a = j * (n + 1) + i;
@@ -187,14 +201,22 @@ void floor_step(benchmark::State &state, Shape shape) {
   ObstacleMesh mesh(Memory::standard(), floor.npoint(), floor.x.data(), floor.ntri(), floor.tri.data());
   const VoxelGrid grid(Memory::standard(), slab.x.data(), slab.ntri(), slab.tri.data(), 262144);
   ObstacleView &o = scene.add(shape, {0, 0, low - scene.offset});
-  if (shape == Shape::mesh) o.surface = &mesh.surface, o.extent = mesh.extent, mesh.place(o.position, o.rotation, {}, {});
-  if (shape == Shape::voxels) o.grid = &grid, o.extent = grid.extent();
+  if (shape == Shape::mesh) {
+    o.surface = &mesh.surface;
+    o.extent = mesh.extent;
+    mesh.place(o.position, o.rotation, {}, {});
+  }
+  if (shape == Shape::voxels) {
+    o.grid = &grid;
+    o.extent = grid.extent();
+  }
   BroadPhase broad(Memory::standard());
   Array<ContactPoint> contacts;
   Array<uint8_t> lent;
   for (auto _ : state) {
     broad.update(scene.bodies, scene.obstacles, scene.filter, scene.h, scene.offset);
-    find_contacts(scene.bodies, scene.obstacles, broad.candidates(), scene.h, scene.offset, {}, lent, contacts);
+    find_contacts(scene.bodies, scene.obstacles, broad.candidates(), scene.h, scene.offset, {}, lent,
+                  contacts);
   }
   state.counters["contacts"] = double(contacts.size());
   state.counters["candidates"] = double(broad.candidates().size());
@@ -209,7 +231,8 @@ void voxel_query(benchmark::State &state) {
   std::mt19937 random(1);
   std::normal_distribution<double> g;
   std::vector<Vec3> places;
-  for (int i = 0; i < 4096; ++i) places.push_back((0.5 + 0.01 * g(random)) * normalized(Vec3{g(random), g(random), g(random)}));
+  for (int i = 0; i < 4096; ++i)
+    places.push_back((0.5 + 0.01 * g(random)) * normalized(Vec3{g(random), g(random), g(random)}));
   size_t i = 0;
   for (auto _ : state) benchmark::DoNotOptimize(grid.at(places[i++ & 4095]).distance);
   state.counters["MB"] = 1e-6 * double(grid.bytes());
@@ -218,25 +241,36 @@ BENCHMARK(voxel_query);
 
 void voxel_build(benchmark::State &state) {
   const test::Mesh ball = test::sphere_mesh(0.5, 5);
-  for (auto _ : state) benchmark::DoNotOptimize(VoxelGrid(Memory::standard(), ball.x.data(), ball.ntri(), ball.tri.data(), uint32_t(state.range(0))).cell());
+  for (auto _ : state)
+    benchmark::DoNotOptimize(
+        VoxelGrid(Memory::standard(), ball.x.data(), ball.ntri(), ball.tri.data(), uint32_t(state.range(0)))
+            .cell());
 }
 BENCHMARK(voxel_build)->Arg(32768)->Arg(262144)->Iterations(2)->Unit(benchmark::kMillisecond);
 
-// Error of the grid at 100,000 places of the folded basin's surface, where the true distance is zero; time is that of building.
+// Error of the grid at 100,000 places of the folded basin's surface, where the true distance is zero; time is
+// that of building.
 void voxel_error(benchmark::State &state) {
-  const TriMesh m = read_tri_mesh(Memory::standard(), std::string(DEFORM_SOURCE_DIR) + "/examples/data/basin.obj");
-  const auto corner = [&](uint32_t t, int k) { return load3(&m.points[3 * size_t{m.tris[3 * size_t{t} + size_t(k)]}]); };
+  const TriMesh m =
+      read_tri_mesh(Memory::standard(), std::string(DEFORM_SOURCE_DIR) + "/examples/data/basin.obj");
+  const auto corner = [&](uint32_t t, int k) {
+    return load3(&m.points[3 * size_t{m.tris[3 * size_t{t} + size_t(k)]}]);
+  };
   std::unique_ptr<VoxelGrid> grid;
-  for (auto _ : state) grid = std::make_unique<VoxelGrid>(Memory::standard(), m.points.data(), m.ntri(), m.tris.data(), uint32_t(state.range(0)));
+  for (auto _ : state)
+    grid = std::make_unique<VoxelGrid>(Memory::standard(), m.points.data(), m.ntri(), m.tris.data(),
+                                       uint32_t(state.range(0)));
   std::vector<double> area, errors;
-  for (uint32_t t = 0; t < m.ntri(); ++t) area.push_back(norm(cross(corner(t, 1) - corner(t, 0), corner(t, 2) - corner(t, 0))));
+  for (uint32_t t = 0; t < m.ntri(); ++t)
+    area.push_back(norm(cross(corner(t, 1) - corner(t, 0), corner(t, 2) - corner(t, 0))));
   std::mt19937 random(1);
   std::discrete_distribution<uint32_t> pick(area.begin(), area.end());
   std::uniform_real_distribution<double> u(0, 1);
   for (int i = 0; i < 100000; ++i) {
     const uint32_t t = pick(random);
     const double r = std::sqrt(u(random)), q = u(random);
-    errors.push_back(std::fabs(grid->at((1 - r) * corner(t, 0) + r * (1 - q) * corner(t, 1) + r * q * corner(t, 2)).distance));
+    errors.push_back(std::fabs(
+        grid->at((1 - r) * corner(t, 0) + r * (1 - q) * corner(t, 1) + r * q * corner(t, 2)).distance));
   }
   std::sort(errors.begin(), errors.end());
   state.counters["cell_mm"] = 1e3 * grid->cell();
@@ -245,7 +279,11 @@ void voxel_error(benchmark::State &state) {
   state.counters["max_um"] = 1e6 * errors.back();
   state.counters["MB"] = 1e-6 * double(grid->bytes());
 }
-BENCHMARK(voxel_error)->RangeMultiplier(8)->Range(4096, 2097152)->Iterations(1)->Unit(benchmark::kMillisecond);
+BENCHMARK(voxel_error)
+    ->RangeMultiplier(8)
+    ->Range(4096, 2097152)
+    ->Iterations(1)
+    ->Unit(benchmark::kMillisecond);
 
 }  // namespace
 

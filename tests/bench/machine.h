@@ -28,9 +28,11 @@ inline std::set<std::string> names_in(const std::string &path, int skip, int cou
   std::ifstream in(path);
   for (std::string line; std::getline(in, line);) {
     size_t begin = 0;
-    for (int i = 0; i < skip && begin < line.size(); ++i) begin = std::min(line.find(',', begin), line.size() - 1) + 1;
+    for (int i = 0; i < skip && begin < line.size(); ++i)
+      begin = std::min(line.find(',', begin), line.size() - 1) + 1;
     size_t end = begin;
-    for (int i = 0; i < count && end < line.size(); ++i) end = std::min(line.find(',', end + (i > 0)), line.size());
+    for (int i = 0; i < count && end < line.size(); ++i)
+      end = std::min(line.find(',', end + (i > 0)), line.size());
     if (end > begin) names.insert(line.substr(begin, end - begin));
   }
   return names;

@@ -1,6 +1,7 @@
-// A million tetrahedra read from every format that holds them: processor seconds (the least of several runs) of reading and repair, and bytes
-// per tetrahedron through the context's memory: the most while reading, and what stays. Figures to reach: 5 s, 600 and 400 bytes.
-// --cells N for another number, --csv FILE appends rows.
+// A million tetrahedra read from every format that holds them: processor seconds (the least of several
+// runs) of reading and repair, and bytes per tetrahedron through the context's memory: the most while
+// reading, and what stays. Figures to reach: 5 s, 600 and 400 bytes. --cells N for another number, --csv
+// FILE appends rows.
 #include <sys/resource.h>
 
 #include <cstdio>
@@ -18,7 +19,8 @@ namespace {
 double cpu_seconds() {
   rusage u{};
   getrusage(RUSAGE_SELF, &u);
-  return double(u.ru_utime.tv_sec + u.ru_stime.tv_sec) + 1e-6 * double(u.ru_utime.tv_usec + u.ru_stime.tv_usec);
+  return double(u.ru_utime.tv_sec + u.ru_stime.tv_sec) +
+         1e-6 * double(u.ru_utime.tv_usec + u.ru_stime.tv_usec);
 }
 
 }  // namespace
@@ -33,7 +35,8 @@ int main(int argc, char **argv) {
   constexpr int kRuns = 3;
   const dfm::TetMesh beam = dfm::make_beam(dfm::Memory::standard(), 2, 1, 1, cells);
   const std::string folder = test::scratch("mesh_read_bench");
-  std::printf("%-10s %10s %8s %10s %10s %12s %12s\n", "format", "cells", "MB", "parse s", "whole s", "peak B/cell", "held B/cell");
+  std::printf("%-10s %10s %8s %10s %10s %12s %12s\n", "format", "cells", "MB", "parse s", "whole s",
+              "peak B/cell", "held B/cell");
   for (const char *name : {"a.msh", "a.msh2", "a.vtk", "a.vtu", "a.mesh"}) {
     const std::string path = folder + "/" + name;
     dfm::write_tet_mesh(beam, path);
@@ -46,14 +49,17 @@ int main(int argc, char **argv) {
       parse = std::min(parse, cpu_seconds() - before);
       const dfm::TetMesh mesh = dfm::finish_mesh(path, std::move(raw));
       whole = std::min(whole, cpu_seconds() - before);
-      peak = memory.peak, held = memory.held;
+      peak = memory.peak;
+      held = memory.held;
     }
     const double each = beam.ntet(), megabytes = double(std::filesystem::file_size(path)) / 1e6;
     std::filesystem::remove(path);
-    std::printf("%-10s %10u %8.0f %10.2f %10.2f %12.0f %12.0f\n", name, beam.ntet(), megabytes, parse, whole, double(peak) / each, double(held) / each);
+    std::printf("%-10s %10u %8.0f %10.2f %10.2f %12.0f %12.0f\n", name, beam.ntet(), megabytes, parse, whole,
+                double(peak) / each, double(held) / each);
     if (!csv.empty())
-      std::ofstream(csv, std::ios::app) << bench::machine() << ',' << bench::compiler() << ',' << name << ',' << beam.ntet() << ',' << megabytes << ','
-                                        << parse << ',' << whole << ',' << double(peak) / each << ',' << double(held) / each << '\n';
+      std::ofstream(csv, std::ios::app) << bench::machine() << ',' << bench::compiler() << ',' << name << ','
+                                        << beam.ntet() << ',' << megabytes << ',' << parse << ',' << whole
+                                        << ',' << double(peak) / each << ',' << double(held) / each << '\n';
   }
   return 0;
 }

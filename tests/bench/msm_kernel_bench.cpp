@@ -1,7 +1,8 @@
-// Time of the mass-spring forces per spring and per cell, through the plugin ABI, beside plain kernels (bound/msm_bound.h) for the
-// layouts of the points, each for every instruction set. `--csv FILE --commit ID` appends the figures; --mesh FILE takes another
-// mesh than the fine cylinder; --only options leaves out the plain kernels. The least of the repetitions counts: others share the
-// machine. Options of the model are timed against the same body without them, in turn: the median of eleven pairs counts.
+// Time of the mass-spring forces per spring and per cell, through the plugin ABI, beside plain kernels
+// (bound/msm_bound.h) for the layouts of the points, each for every instruction set. `--csv FILE --commit ID`
+// appends the figures; --mesh FILE takes another mesh than the fine cylinder; --only options leaves out the
+// plain kernels. The least of the repetitions counts: others share the machine. Options of the model are
+// timed against the same body without them, in turn: the median of eleven pairs counts.
 #include <benchmark/benchmark.h>
 #include <sys/utsname.h>
 
@@ -21,7 +22,8 @@ Mesh &mesh() {
   static Mesh m;
   return m;
 }
-const Params kDamped = {1e5, 0.3, 0.002, 0, 0}, kPlain = {1e5, 0.3, 0, 0, 0}, kVolume = {1e5, 0.3, 0.002, 0, 1};
+const Params kDamped = {1e5, 0.3, 0.002, 0, 0}, kPlain = {1e5, 0.3, 0, 0, 0},
+             kVolume = {1e5, 0.3, 0.002, 0, 1};
 double springs() { return double(mesh().edges.size() / 2); }
 
 void through_abi(benchmark::State &state, const char *isa, const Params &p, bool row_sums) {
@@ -51,7 +53,8 @@ struct Flat {
   Flat() {
     const Mesh &m = mesh();
     npoint = (m.npoint() + 3) / 4 * 4;
-    order.resize(m.npoint()), begin.resize(msm::partition_capacity(m.npoint()));
+    order.resize(m.npoint());
+    begin.resize(msm::partition_capacity(m.npoint()));
     msm::partition_points(m.rest.data(), m.npoint(), order.data(), begin.data());
     std::vector<uint32_t> rank(m.npoint());
     for (uint32_t r = 0; r < m.npoint(); ++r) rank[order[r]] = r;
@@ -59,14 +62,19 @@ struct Flat {
     std::vector<std::pair<uint32_t, uint32_t>> pairs;
     for (size_t e = 0; e < m.edges.size(); e += 2) {
       const auto [a, b] = std::minmax(rank[m.edges[e]], rank[m.edges[e + 1]]);
-      pairs.push_back({a, b}), of[a].push_back(b), of[b].push_back(a);
+      pairs.push_back({a, b});
+      of[a].push_back(b);
+      of[b].push_back(a);
     }
     std::sort(pairs.begin(), pairs.end());
     while (pairs.size() % 8) pairs.push_back(pairs.back());
     begin.assign(1, 0);
     for (uint32_t n = 0; n < npoint; n += 4) {
       size_t width = 0;
-      for (uint32_t k = 0; k < 4; ++k) std::sort(of[n + k].begin(), of[n + k].end()), width = std::max(width, of[n + k].size());
+      for (uint32_t k = 0; k < 4; ++k) {
+        std::sort(of[n + k].begin(), of[n + k].end());
+        width = std::max(width, of[n + k].size());
+      }
       begin.push_back(uint32_t(begin.back() + width));
     }
     const size_t ns = pairs.size(), nr = 4 * size_t(begin.back());
@@ -76,13 +84,22 @@ struct Flat {
       while (reinterpret_cast<uintptr_t>(at) % 64) ++at;
       return std::exchange(at, at + n);
     };
-    stiffness = take(ns), rest = take(ns), row_stiffness = take(nr), row_rest = take(nr);
-    for (int k = 0; k < 3; ++k) x[k] = take(4 * npoint), v[k] = take(4 * npoint);
+    stiffness = take(ns);
+    rest = take(ns);
+    row_stiffness = take(nr);
+    row_rest = take(nr);
+    for (int k = 0; k < 3; ++k) {
+      x[k] = take(4 * npoint);
+      v[k] = take(4 * npoint);
+    }
     f = take(4 * npoint);
     const auto where = [&](uint32_t r) { return r < m.npoint() ? m.at(order[r]) : Vec{}; };
     for (size_t n = 0; n < ns; ++n) {
       const auto [a, b] = pairs[n];
-      i.push_back(a), j.push_back(b), rest[n] = norm(where(b) - where(a)), stiffness[n] = n < size_t(springs()) ? 10 : 0;
+      i.push_back(a);
+      j.push_back(b);
+      rest[n] = norm(where(b) - where(a));
+      stiffness[n] = n < size_t(springs()) ? 10 : 0;
     }
     neighbor.assign(nr, 0);
     for (uint32_t n = 0; n < npoint; ++n)
@@ -90,7 +107,8 @@ struct Flat {
         const size_t to = 4 * (begin[n / 4] + k) + n % 4;
         const bool real = k < of[n].size();
         neighbor[to] = real ? of[n][k] : of[n].empty() ? n : of[n][0];
-        row_stiffness[to] = real ? 10 : 0, row_rest[to] = real ? norm(where(neighbor[to]) - where(n)) : 0;
+        row_stiffness[to] = real ? 10 : 0;
+        row_rest[to] = real ? norm(where(neighbor[to]) - where(n)) : 0;
       }
     std::mt19937 random(1);
     std::uniform_real_distribution<double> u(-1, 1);
@@ -100,8 +118,8 @@ struct Flat {
         x[0][4 * n + a] = x[1][3 * n + a] = x[2][a * npoint + n] = px;
         v[0][4 * n + a] = v[1][3 * n + a] = v[2][a * npoint + n] = pv;
       }
-    s = {npoint, uint32_t(ns), i.data(), j.data(), stiffness, rest, npoint / 4, 0, begin.data(), neighbor.data(),
-         row_stiffness, row_rest, 0.002};
+    s = {npoint, uint32_t(ns), i.data(),        j.data(),      stiffness, rest, npoint / 4,
+         0,      begin.data(), neighbor.data(), row_stiffness, row_rest,  0.002};
   }
 };
 
@@ -125,13 +143,15 @@ double thread_ns() {
 
 // What an option costs: median over eleven pairs of (time with it) / (time without), and its time per spring.
 struct Pair { double ratio, ns; };
-Pair cost_of(const char *isa, const Params &without, const Params &with, const Fields &fields, bool row_sums) {
+Pair cost_of(const char *isa, const Params &without, const Params &with, const Fields &fields,
+             bool row_sums) {
   setenv("DEFORM_SIMD", isa, 1);
   Host host;
   Instance plain(host, mesh(), without), option(host, mesh(), with, 4, fields);
   unsetenv("DEFORM_SIMD");
   if (!host.logged.empty()) return {0, 0};
-  plain.shake(1e-3, 0.1), option.shake(1e-3, 0.1);
+  plain.shake(1e-3, 0.1);
+  option.shake(1e-3, 0.1);
   std::vector<double> k(plain.size()), c(plain.size());
   const auto time = [&](Instance &b) {
     dfm_kin kin = b.kin();
@@ -148,42 +168,59 @@ Pair cost_of(const char *isa, const Params &without, const Params &with, const F
     }
     return least;
   };
-  time(plain), time(option);
+  time(plain);
+  time(option);
   std::vector<double> ratio, ns;
   for (int n = 0; n < 11; ++n) {
     const bool first = n % 2;
     const double a = first ? time(option) : time(plain), b = first ? time(plain) : time(option);
-    ratio.push_back(first ? a / b : b / a), ns.push_back(first ? a : b);
+    ratio.push_back(first ? a / b : b / a);
+    ns.push_back(first ? a : b);
   }
-  std::nth_element(ratio.begin(), ratio.begin() + 5, ratio.end()), std::nth_element(ns.begin(), ns.begin() + 5, ns.end());
+  std::nth_element(ratio.begin(), ratio.begin() + 5, ratio.end());
+  std::nth_element(ns.begin(), ns.begin() + 5, ns.end());
   return {ratio[5], ns[5] / springs()};
 }
 
 void print_options(std::ofstream &out, const std::string &head) {
   const auto make = [](double damp, double slope, bool form_a, int damper) {
     Params p = {1e5, 0.3, damp, 0, 0};
-    p.slope = slope, p.axis = {1, 2, 3}, p.form_a = form_a, p.damper = damper;
+    p.slope = slope;
+    p.axis = {1, 2, 3};
+    p.form_a = form_a;
+    p.damper = damper;
     return p;
   };
   const std::vector<double> uneven(mesh().ncell(), 0.002);
-  const struct { const char *name; Params without, with; Fields fields; bool rows; } options[] = {
-      {"anisotropic_B", make(0, 0, false, 0), make(0, 2, false, 0), {}, false},
-      {"anisotropic_B_damped", make(0.002, 0, false, 0), make(0.002, 2, false, 0), {}, false},
-      {"anisotropic_A", make(0, 0, false, 0), make(0, 2, true, 0), {}, false},
-      {"anisotropic_A_damped", make(0.002, 0, false, 0), make(0.002, 2, true, 0), {}, false},
-      {"anisotropic_B_bound", make(0, 0, false, 0), make(0, 2, false, 0), {}, true},
-      {"damping_by_cell", make(0.002, 0, false, 0), make(0.002, 0, false, 0), {{"damping_stiffness", uneven}}, false},
-      {"maxwell", make(0.002, 0, false, 0), make(0, 0, false, 1), {}, false},
-      {"sls", make(0.002, 0, false, 0), make(0, 0, false, 2), {}, false},
-      {"the_same", make(0.002, 0, false, 0), make(0.002, 0, false, 0), {}, false}};
-  std::printf("\noptions, time with over time without, median of eleven pairs (the_same: what the machine's noise leaves)\n");
+  const struct {
+    const char *name;
+    Params without, with;
+    Fields fields;
+    bool rows;
+  } options[] = {{"anisotropic_B", make(0, 0, false, 0), make(0, 2, false, 0), {}, false},
+                 {"anisotropic_B_damped", make(0.002, 0, false, 0), make(0.002, 2, false, 0), {}, false},
+                 {"anisotropic_A", make(0, 0, false, 0), make(0, 2, true, 0), {}, false},
+                 {"anisotropic_A_damped", make(0.002, 0, false, 0), make(0.002, 2, true, 0), {}, false},
+                 {"anisotropic_B_bound", make(0, 0, false, 0), make(0, 2, false, 0), {}, true},
+                 {"damping_by_cell",
+                  make(0.002, 0, false, 0),
+                  make(0.002, 0, false, 0),
+                  {{"damping_stiffness", uneven}},
+                  false},
+                 {"maxwell", make(0.002, 0, false, 0), make(0, 0, false, 1), {}, false},
+                 {"sls", make(0.002, 0, false, 0), make(0, 0, false, 2), {}, false},
+                 {"the_same", make(0.002, 0, false, 0), make(0.002, 0, false, 0), {}, false}};
+  std::printf(
+      "\noptions, time with over time without, median of eleven pairs (the_same: what the machine's noise "
+      "leaves)\n");
   for (const char *isa : {"sse2", "avx2", "avx512"})
     for (const auto &o : options) {
       const Pair p = cost_of(isa, o.without, o.with, o.fields, o.rows);
       if (p.ratio == 0) continue;
       std::printf("  %-7s %-28s %7.3f  %7.2f ns per spring\n", isa, o.name, p.ratio, p.ns);
       if (!out.is_open()) continue;
-      out << head << isa << ",option_" << o.name << "_ratio," << p.ratio << ",\n" << head << isa << ",option_" << o.name << "," << p.ns << ",\n";
+      out << head << isa << ",option_" << o.name << "_ratio," << p.ratio << ",\n"
+          << head << isa << ",option_" << o.name << "," << p.ns << ",\n";
     }
 }
 
@@ -219,23 +256,26 @@ std::string processor() {
   return "unknown";
 }
 
-void print(const Reporter &r, const std::string &csv, const std::string &commit, const std::string &mesh_name) {
+void print(const Reporter &r, const std::string &csv, const std::string &commit,
+           const std::string &mesh_name) {
   const double ns = springs(), nc = mesh().ncell();
   std::ofstream out;
   if (!csv.empty()) {
     const bool fresh = !std::ifstream(csv).good();
     out.open(csv, std::ios::app);
-    if (fresh) out << "machine,compiler,commit,mesh,points,springs,cells,isa,kernel,ns_per_spring,ns_per_cell\n";
+    if (fresh)
+      out << "machine,compiler,commit,mesh,points,springs,cells,isa,kernel,ns_per_spring,ns_per_cell\n";
   }
-  std::printf("\n%s: %u points, %.0f springs, %.0f cells; least of the repetitions\n", mesh_name.c_str(), mesh().npoint(), ns, nc);
+  std::printf("\n%s: %u points, %.0f springs, %.0f cells; least of the repetitions\n", mesh_name.c_str(),
+              mesh().npoint(), ns, nc);
   const auto row = [&](const char *isa, const char *kernel, double per_spring, double per_cell) {
     std::printf("  %-7s %-28s", isa, kernel);
     if (per_spring > 0) std::printf(" %7.2f ns per spring", per_spring);
     if (per_cell > 0) std::printf(" %7.2f ns per cell", per_cell);
     std::printf("\n");
     if (!out.is_open()) return;
-    out << processor() << "," << kCompiler << "," << commit << "," << mesh_name << "," << mesh().npoint() << "," << ns << "," << nc << ","
-        << isa << "," << kernel << ",";
+    out << processor() << "," << kCompiler << "," << commit << "," << mesh_name << "," << mesh().npoint()
+        << "," << ns << "," << nc << "," << isa << "," << kernel << ",";
     if (per_spring > 0) out << per_spring;
     out << ",";
     if (per_cell > 0) out << per_cell;
@@ -245,9 +285,11 @@ void print(const Reporter &r, const std::string &csv, const std::string &commit,
     const std::string at = std::string("/") + isa;
     if (r.of("plugin_damped" + at) == 0) continue;
     double best = 1e300;
-    for (const char *kernel : {"scatter_padded", "scatter_packed", "scatter_split", "rows_padded", "rows_split"}) {
+    for (const char *kernel :
+         {"scatter_padded", "scatter_packed", "scatter_split", "rows_padded", "rows_split"}) {
       const double t = r.of(kernel + at) / ns;
-      row(isa, kernel, t, 0), best = std::min(best, t);
+      row(isa, kernel, t, 0);
+      best = std::min(best, t);
     }
     const double damped = r.of("plugin_damped" + at);
     row(isa, "plugin_undamped", r.of("plugin_undamped" + at) / ns, 0);
@@ -257,24 +299,35 @@ void print(const Reporter &r, const std::string &csv, const std::string &commit,
     std::printf("  %-7s speed against the best plain kernel: %.0f %%\n", isa, 100 * best / (damped / ns));
   }
   std::ostringstream head;
-  head << processor() << "," << kCompiler << "," << commit << "," << mesh_name << "," << mesh().npoint() << "," << ns << "," << nc << ",";
+  head << processor() << "," << kCompiler << "," << commit << "," << mesh_name << "," << mesh().npoint()
+       << "," << ns << "," << nc << ",";
   print_options(out, head.str());
 }
 
 }  // namespace
 
 int main(int argc, char **argv) {
-  std::string csv, commit = "unknown", path = test::shared_dir() + "/meshes/thesis/cyl_fine.msh", name = "cyl_fine.msh";
+  std::string csv;
+  std::string commit = "unknown";
+  std::string path = test::shared_dir() + "/meshes/thesis/cyl_fine.msh";
+  std::string name = "cyl_fine.msh";
   bool only_options = false;
   for (int n = 1; n + 1 < argc; n += 2) {
     const std::string key = argv[n];
     if (key == "--csv") csv = argv[n + 1];
     if (key == "--commit") commit = argv[n + 1];
     if (key == "--only") only_options = argv[n + 1] == std::string("options");
-    if (key == "--mesh") path = argv[n + 1], name = path.substr(path.rfind('/') + 1);
+    if (key == "--mesh") {
+      path = argv[n + 1];
+      name = path.substr(path.rfind('/') + 1);
+    }
   }
-  if (std::ifstream(path).good()) mesh() = read_msh(path);
-  else mesh() = kuhn_bar(25, 10, 10, 0.04, 0.2), name = "bar 25x10x10";
+  if (std::ifstream(path).good()) {
+    mesh() = read_msh(path);
+  } else {
+    mesh() = kuhn_bar(25, 10, 10, 0.04, 0.2);
+    name = "bar 25x10x10";
+  }
 
   const bound::Kernels *tables[] = {bound::kernels_sse2(), bound::kernels_avx2(), bound::kernels_avx512()};
   const bool able[] = {true, bool(__builtin_cpu_supports("avx2")),
@@ -285,13 +338,19 @@ int main(int argc, char **argv) {
     const bound::Kernels &t = *tables[k];
     const std::string at = std::string("/") + isas[k];
     const auto add = [&](const std::string &what, auto &&...args) {
-      benchmark::RegisterBenchmark((what + at).c_str(), std::forward<decltype(args)>(args)...)->Repetitions(15)->MinTime(0.02);
+      benchmark::RegisterBenchmark((what + at).c_str(), std::forward<decltype(args)>(args)...)
+          ->Repetitions(15)
+          ->MinTime(0.02);
     };
-    add("scatter_padded", plain, t.scatter_padded, 0), add("scatter_packed", plain, t.scatter_packed, 1);
+    add("scatter_padded", plain, t.scatter_padded, 0);
+    add("scatter_packed", plain, t.scatter_packed, 1);
     add("scatter_split", plain, t.scatter_split, 2);
-    add("rows_padded", plain, t.rows_padded, 0), add("rows_split", plain, t.rows_split, 2);
-    add("plugin_undamped", through_abi, isas[k], kPlain, false), add("plugin_damped", through_abi, isas[k], kDamped, false);
-    add("plugin_volume", through_abi, isas[k], kVolume, false), add("plugin_bound", through_abi, isas[k], kVolume, true);
+    add("rows_padded", plain, t.rows_padded, 0);
+    add("rows_split", plain, t.rows_split, 2);
+    add("plugin_undamped", through_abi, isas[k], kPlain, false);
+    add("plugin_damped", through_abi, isas[k], kDamped, false);
+    add("plugin_volume", through_abi, isas[k], kVolume, false);
+    add("plugin_bound", through_abi, isas[k], kVolume, true);
   }
   int none = 1;
   benchmark::Initialize(&none, argv);

@@ -1,4 +1,5 @@
-// What contact_reference measures: rows that are run two at a time, printed as Markdown, and put into the page between its markers.
+// What contact_reference measures: rows that are run two at a time, printed as Markdown, and put into the
+// page between its markers.
 #pragma once
 #include <atomic>
 #include <cstdarg>
@@ -48,7 +49,8 @@ struct Table {
   }
 };
 
-// The text between <!-- name --> and <!-- /name --> of a page becomes `text`. False: the page lacks the markers.
+// The text between <!-- name --> and <!-- /name --> of a page becomes `text`. False: the page
+// lacks the markers.
 bool put(const std::string &page, const std::string &name, const std::string &text);
 
 }  // namespace bench

@@ -1,5 +1,6 @@
-// What rest costs. A world of 100 bodies that sleep, per step, with nothing awake and with one body awake among them; the same bodies kept awake;
-// and how even the steps of a resting scene are: percentiles of processor time per step at 1 kHz. Memory is counted in tests/api/memory_test.cpp.
+// What rest costs. A world of 100 bodies that sleep, per step, with nothing awake and with one body awake
+// among them; the same bodies kept awake; and how even the steps of a resting scene are: percentiles of
+// processor time per step at 1 kHz. Memory is counted in tests/api/memory_test.cpp.
 #include <time.h>
 
 #include <algorithm>
@@ -27,7 +28,9 @@ struct Field {
     test::add_plane(world, "floor");
     test::set_friction(world, 0.5);
     test::BodyOptions o;
-    o.young = 2e5, o.damping_stiffness = 2e-3, o.damping_mass = 20;
+    o.young = 2e5;
+    o.damping_stiffness = 2e-3;
+    o.damping_mass = 20;
     for (int i = 0; i < 100; ++i) {
       o.position = {0.3 * (i / 2 % 10), 0.3 * (i / 20), 4e-5 + 0.10004 * (i % 2)};
       bodies.push_back(test::make_body(c, world, "beam", {0.1, 0.1, 0.1}, 100, o));
@@ -51,8 +54,8 @@ Times steps(dfm_world w, int n, double h) {
 }
 
 void row(const char *name, const Times &t) {
-  std::printf("%-44s median %9.2f us   mean %9.2f   99 %% %9.2f   99.9 %% %9.2f (%.2f of the median)\n", name, 1e6 * t.median, 1e6 * t.mean, 1e6 * t.p99,
-              1e6 * t.p999, t.p999 / t.median);
+  std::printf("%-44s median %9.2f us   mean %9.2f   99 %% %9.2f   99.9 %% %9.2f (%.2f of the median)\n", name,
+              1e6 * t.median, 1e6 * t.mean, 1e6 * t.p99, 1e6 * t.p999, t.p999 / t.median);
 }
 
 }  // namespace
@@ -62,7 +65,8 @@ int main() {
   {
     const Field asleep(c, true), awake(c, false);
     int settle = 0;
-    for (; settle < 3000 && test::stats(asleep.world).asleep < 100; ++settle) test::ok(dfm_world_step(asleep.world, 1e-3, nullptr));
+    for (; settle < 3000 && test::stats(asleep.world).asleep < 100; ++settle)
+      test::ok(dfm_world_step(asleep.world, 1e-3, nullptr));
     std::printf("asleep after %d steps: %u of 100\n", settle, test::stats(asleep.world).asleep);
     row("100 bodies asleep", steps(asleep.world, 20000, 1e-3));
     test::ok(dfm_body_wake(asleep.bodies[0]));
@@ -71,7 +75,8 @@ int main() {
     test::ok(dfm_world_profile(asleep.world, 16, before, &n));
     row("2 awake, 98 asleep", steps(asleep.world, 400, 1e-3));
     test::ok(dfm_world_profile(asleep.world, 16, after, &n));
-    for (uint32_t i = 0; i < n; ++i) std::printf("    %-18s %8.2f us\n", after[i].name, 1e6 * (after[i].seconds - before[i].seconds) / 400);
+    for (uint32_t i = 0; i < n; ++i)
+      std::printf("    %-18s %8.2f us\n", after[i].name, 1e6 * (after[i].seconds - before[i].seconds) / 400);
     steps(awake.world, 300, 1e-3);
     row("100 bodies awake", steps(awake.world, 60, 1e-3));
   }
@@ -80,7 +85,9 @@ int main() {
     test::add_plane(w, "floor");
     test::set_friction(w, 0.5);
     test::BodyOptions o;
-    o.young = 2e5, o.damping_stiffness = 2e-3, o.volume = 1;
+    o.young = 2e5;
+    o.damping_stiffness = 2e-3;
+    o.volume = 1;
     o.position = {0, 0, 1e-4};
     test::make_body(c, w, "beam", {0.1, 0.1, 0.1}, 1000, o);
     o.position = {0.013, 0.007, 0.1003};

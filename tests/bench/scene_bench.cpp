@@ -1,6 +1,8 @@
-// Full steps per second of processor time, on the scene files that are examples and tests too. What is timed is dfm_world_step alone: model,
-// detection, contact and friction, one core. Prints a table with the figure to reach and where the time goes;
-// --csv FILE appends rows; --only TEXT takes scenes whose name contains it; --law NAME puts that law, with the same coefficient, into their first rule.
+// Full steps per second of processor time, on the scene files that are examples and tests too. What is timed
+// is dfm_world_step alone: model, detection, contact and friction, one core. Prints a table with the figure
+// to reach and where the time goes;
+// --csv FILE appends rows; --only TEXT takes scenes whose name contains it; --law NAME puts that law, with
+// the same coefficient, into their first rule.
 #include <sys/resource.h>
 
 #include <cstdio>
@@ -17,14 +19,15 @@ namespace {
 struct Case {
   const char *name, *scene;
   std::vector<std::string> set;
-  double settle, timed;   // s simulated before and during the measurement
-  double reach;           // full steps per second; 0: none stated
+  double settle, timed;  // s simulated before and during the measurement
+  double reach;          // full steps per second; 0: none stated
 };
 
 double cpu_seconds() {
   rusage u{};
   getrusage(RUSAGE_SELF, &u);
-  return double(u.ru_utime.tv_sec + u.ru_stime.tv_sec) + 1e-6 * double(u.ru_utime.tv_usec + u.ru_stime.tv_usec);
+  return double(u.ru_utime.tv_sec + u.ru_stime.tv_sec) +
+         1e-6 * double(u.ru_utime.tv_usec + u.ru_stime.tv_usec);
 }
 
 [[noreturn]] void die(const std::string &what) {
@@ -36,11 +39,14 @@ void run(dfm_context *context, const Case &c, std::FILE *csv, const std::string 
   std::vector<const char *> set;
   for (const auto &s : c.set) set.push_back(s.c_str());
   dfm_scene_options options{};
-  options.size = sizeof options, options.nset = static_cast<uint32_t>(set.size()), options.set = set.data();
+  options.size = sizeof options;
+  options.nset = static_cast<uint32_t>(set.size());
+  options.set = set.data();
   dfm_scene scene = 0;
   dfm_world world = 0;
   const std::string path = std::string(DEFORM_SOURCE_DIR) + "/examples/scenes/" + c.scene;
-  if (dfm_scene_open(context, path.c_str(), &options, &scene) != DFM_OK || dfm_scene_world(scene, &world) != DFM_OK) {
+  if (dfm_scene_open(context, path.c_str(), &options, &scene) != DFM_OK ||
+      dfm_scene_world(scene, &world) != DFM_OK) {
     std::printf("%-34s left out: %s\n", c.name, dfm_last_error());
     return;
   }
@@ -75,7 +81,8 @@ void run(dfm_context *context, const Case &c, std::FILE *csv, const std::string 
     const long done = steps(c.timed / double(slices));
     total += done;
     fastest = std::max(fastest, double(done) / (cpu_seconds() - at));
-    contacts += stats().contacts, sweeps += stats().sweeps;
+    contacts += stats().contacts;
+    sweeps += stats().sweeps;
   }
   const double rate = double(total) / (cpu_seconds() - start);
   dfm_world_profile(world, 16, t1, &n);
@@ -83,14 +90,17 @@ void run(dfm_context *context, const Case &c, std::FILE *csv, const std::string 
   const double substeps = double(after.substeps - before.substeps) / double(total);
   std::printf("%-34s %8.0f (best %.0f)", c.name, rate, fastest);
   if (c.reach > 0) std::printf("  reach %6.0f: %3.0f %%", c.reach, 100 * rate / c.reach);
-  if (after.guard_steps > before.guard_steps) std::printf("  guard acted in %g sub-steps", double(after.guard_steps - before.guard_steps));
-  std::printf("  contacts %.0f  sub-steps %.2f  sweeps %.1f\n", double(contacts) / double(slices), substeps, double(sweeps) / double(slices));
+  if (after.guard_steps > before.guard_steps)
+    std::printf("  guard acted in %g sub-steps", double(after.guard_steps - before.guard_steps));
+  std::printf("  contacts %.0f  sub-steps %.2f  sweeps %.1f\n", double(contacts) / double(slices), substeps,
+              double(sweeps) / double(slices));
   double all = 0;
   for (uint32_t i = 0; i < n; ++i) all += t1[i].seconds - t0[i].seconds;
-  for (uint32_t i = 0; i < n; ++i) std::printf("    %-18s %5.1f %%\n", t1[i].name, 100 * (t1[i].seconds - t0[i].seconds) / all);
+  for (uint32_t i = 0; i < n; ++i)
+    std::printf("    %-18s %5.1f %%\n", t1[i].name, 100 * (t1[i].seconds - t0[i].seconds) / all);
   if (csv)
-    std::fprintf(csv, "%s,%s,%s,%s,%.0f,%.0f,%.0f,%.1f,%.2f\n", bench::machine().c_str(), bench::compiler(), commit.c_str(), c.name, rate, fastest, c.reach,
-                 double(contacts) / double(slices), substeps);
+    std::fprintf(csv, "%s,%s,%s,%s,%.0f,%.0f,%.0f,%.1f,%.2f\n", bench::machine().c_str(), bench::compiler(),
+                 commit.c_str(), c.name, rate, fastest, c.reach, double(contacts) / double(slices), substeps);
   dfm_scene_close(scene);
 }
 
@@ -105,14 +115,17 @@ int main(int argc, char **argv) {
     if (!std::strcmp(argv[i], "--only")) only = argv[i + 1];
     if (!std::strcmp(argv[i], "--law")) law = argv[i + 1];
   }
-  if (csv) std::fprintf(csv, "machine,compiler,commit,scene,steps_per_cpu_s,best_slice,reach,contacts,substeps\n");
+  if (csv)
+    std::fprintf(csv, "machine,compiler,commit,scene,steps_per_cpu_s,best_slice,reach,contacts,substeps\n");
   dfm_context_def def = dfm_context_def_default();
   def.plugin_dir = DEFORM_PLUGIN_DIR;
   dfm_context *context = nullptr;
   if (dfm_context_create(&def, &context) != DFM_OK) die("context");
-  // Springs alone carry the pair when they are stiffer (the step still is one sub-step); the bad cells of the coarse mesh need more of it.
+  // Springs alone carry the pair when they are stiffer (the step still is one sub-step); the bad cells of the
+  // coarse mesh need more of it.
   const auto springs = [](const char *soft) {
-    return std::vector<std::string>{"/bodies/0/model/params/volume=0", "/bodies/1/model/params/volume=0", "/materials/firm/young=6e5",
+    return std::vector<std::string>{"/bodies/0/model/params/volume=0", "/bodies/1/model/params/volume=0",
+                                    "/materials/firm/young=6e5",
                                     std::string("/materials/soft/young=") + soft};
   };
   const std::vector<Case> cases{
@@ -130,8 +143,13 @@ int main(int argc, char **argv) {
   std::printf("%-34s %8s\n", "scene", "full steps per second of processor time");
   for (Case c : cases) {
     if (std::string(c.name).find(only) == std::string::npos) continue;
-    const char *const params = law == "none" ? "{}" : law == "dahl" ? "{\"mu_C\": 0.8}" : "{\"mu_C\": 0.8, \"mu_S\": 0.8}";
-    if (!law.empty()) c.set.push_back("/contact/friction/0/law=\"" + law + "\""), c.set.push_back(std::string("/contact/friction/0/params=") + params);
+    const char *const params = law == "none"   ? "{}"
+                               : law == "dahl" ? "{\"mu_C\": 0.8}"
+                                               : "{\"mu_C\": 0.8, \"mu_S\": 0.8}";
+    if (!law.empty()) {
+      c.set.push_back("/contact/friction/0/law=\"" + law + "\"");
+      c.set.push_back(std::string("/contact/friction/0/params=") + params);
+    }
     run(context, c, csv, commit);
   }
   dfm_context_destroy(context);

@@ -1,9 +1,14 @@
-// The finders of the time of impact against each other and against the scheme of Zerbato 2010 (4.2): evaluations, time, what they miss, what they find late.
-// 1. Queries: ours through the C API on the exact reference queries, the published ones (both from ../shared) and random ones; beside them the scheme of
-//    Zerbato 2010, 4.2: one bracket [0,1], a change of sign of the distance, an inside test at the one root.
-// 2. Roots: values of the function per root to 1e-12, for (4.7) as printed, for the distance to the plane and for the cubic.
-// 3. Guard: the whole list of feature pairs of two fine spheres that roll on each other and of two that crash, per listed pair.
-// --csv FILE --commit ID appends the figures. Of the repetitions the least time counts: others share the machine.
+// The finders of the time of impact against each other and against the scheme of Zerbato 2010 (4.2):
+// evaluations, time, what they miss, what they find late.
+// 1. Queries: ours through the C API on the exact reference queries, the published ones (both from ../shared)
+//    and random ones; beside them the scheme of Zerbato 2010, 4.2: one bracket [0,1], a change of sign of the
+//    distance, an inside test at the one root.
+// 2. Roots: values of the function per root to 1e-12, for (4.7) as printed, for the distance to the plane and
+//    for the cubic.
+// 3. Guard: the whole list of feature pairs of two fine spheres that roll on each other and of two that
+//    crash, per listed pair.
+// --csv FILE --commit ID appends the figures. Of the repetitions the least time counts: others
+// share the machine.
 #include <chrono>
 #include <cstdio>
 #include <cstring>
@@ -23,10 +28,10 @@ constexpr int kRepetitions = 15;
 
 struct Sink {
   std::FILE *csv = nullptr;
-  std::string head;   // machine, compiler, commit
+  std::string head;  // machine, compiler, commit
 };
 
-// ---- the functions of Zerbato 2010 ----------------------------------------------------------------------------------------------------------
+// ---- the functions of Zerbato 2010 ------------------------------------------------------------------------
 
 struct D3 { double x, y, z; };
 D3 minus(D3 a, D3 b) { return {a.x - b.x, a.y - b.y, a.z - b.z}; }
@@ -41,7 +46,8 @@ D3 place(const dfm_motion &m, double t) {
 struct Frame { D3 r, e1, e2; };
 Frame frame(const ToiQuery &q, double t) {
   const D3 a = place(q.m[0], t), b = place(q.m[1], t), c = place(q.m[2], t), d = place(q.m[3], t);
-  return q.edges ? Frame{minus(a, c), minus(b, a), minus(d, c)} : Frame{minus(a, b), minus(c, b), minus(d, b)};
+  return q.edges ? Frame{minus(a, c), minus(b, a), minus(d, c)}
+                 : Frame{minus(a, b), minus(c, b), minus(d, b)};
 }
 double cubic(const ToiQuery &q, double t) {
   const Frame f = frame(q, t);
@@ -69,8 +75,13 @@ double plain_regula_falsi(const F &f, dfm::toi::Bracket b, double width, int mos
     const double value = f(x);
     ++evaluations;
     if (value == 0) return x;
-    if ((value > 0) == (b.f_lo > 0)) b.lo = x, b.f_lo = value;
-    else b.hi = x, b.f_hi = value;
+    if ((value > 0) == (b.f_lo > 0)) {
+      b.lo = x;
+      b.f_lo = value;
+    } else {
+      b.hi = x;
+      b.f_hi = value;
+    }
   }
   return x;
 }
@@ -90,7 +101,7 @@ double source_scheme(const ToiQuery &q, uint32_t &evaluations) {
   return inside ? t : kNever;
 }
 
-// ---- queries -------------------------------------------------------------------------------------------------------------------------
+// ---- queries ----------------------------------------------------------------------------------------------
 
 struct Figures {
   size_t hits = 0, missed = 0, false_alarms = 0, late = 0;
@@ -98,17 +109,23 @@ struct Figures {
   uint32_t most = 0;
 };
 
-template <class Ask>   // double ask(query, evaluations &)
+template <class Ask>  // double ask(query, evaluations &)
 Figures measure(const std::vector<ToiQuery> &queries, bool labeled, const Ask &ask_one) {
   Figures f;
   for (const ToiQuery &q : queries) {
     uint32_t evaluations = 0;
     const double t = ask_one(q, evaluations);
     const bool hit = t <= 1;
-    f.hits += hit, f.evaluations += evaluations, f.most = std::max(f.most, evaluations);
+    f.hits += hit;
+    f.evaluations += evaluations;
+    f.most = std::max(f.most, evaluations);
     if (!labeled) continue;
-    f.missed += q.hit && !hit, f.false_alarms += !q.hit && hit;
-    if (q.hit && hit && t > q.latest) ++f.late, f.late_by = std::max(f.late_by, t - q.latest);
+    f.missed += q.hit && !hit;
+    f.false_alarms += !q.hit && hit;
+    if (q.hit && hit && t > q.latest) {
+      ++f.late;
+      f.late_by = std::max(f.late_by, t - q.latest);
+    }
   }
   f.evaluations /= double(queries.size());
   for (int repetition = 0; repetition < kRepetitions; ++repetition) {
@@ -127,7 +144,8 @@ void row(const Sink &sink, const char *set, const char *finder, size_t n, bool l
   if (labeled) std::printf(" %7zu %6zu %5zu %9.1e", f.missed, f.false_alarms, f.late, f.late_by);
   std::printf("\n");
   if (!sink.csv) return;
-  std::fprintf(sink.csv, "%s,%s,%s,%zu,%zu,%.2f,%u,%.0f", sink.head.c_str(), set, finder, n, f.hits, f.evaluations, f.most, f.ns);
+  std::fprintf(sink.csv, "%s,%s,%s,%zu,%zu,%.2f,%u,%.0f", sink.head.c_str(), set, finder, n, f.hits,
+               f.evaluations, f.most, f.ns);
   if (labeled) std::fprintf(sink.csv, ",%zu,%zu,%zu,%.2g\n", f.missed, f.false_alarms, f.late, f.late_by);
   else std::fprintf(sink.csv, ",,,,\n");
 }
@@ -154,27 +172,35 @@ std::vector<ToiQuery> random_queries() {
   for (size_t n = 0; n < out.size(); ++n) {
     out[n].edges = n & 1;
     for (dfm_motion &m : out[n].m)
-      for (int i = 0; i < 3; ++i) m.p0[i] = random.real(-1, 1), m.p1[i] = m.p0[i] + random.real(-0.5, 0.5);
+      for (int i = 0; i < 3; ++i) {
+        m.p0[i] = random.real(-1, 1);
+        m.p1[i] = m.p0[i] + random.real(-0.5, 0.5);
+      }
   }
   return out;
 }
 
-// ---- values of the function per root -------------------------------------------------------------------------------------------------
+// ---- values of the function per root ----------------------------------------------------------------------
 
 void roots(const Sink &sink) {
   Random random(2);
-  std::vector<ToiQuery> crossing;   // one change of sign from 0 to 1
+  std::vector<ToiQuery> crossing;  // one change of sign from 0 to 1
   while (crossing.size() < 300) {
     ToiQuery q;
     for (dfm_motion &m : q.m)
-      for (int i = 0; i < 3; ++i) m.p0[i] = random.real(-1, 1), m.p1[i] = m.p0[i] + random.real(-0.5, 0.5);
+      for (int i = 0; i < 3; ++i) {
+        m.p0[i] = random.real(-1, 1);
+        m.p1[i] = m.p0[i] + random.real(-0.5, 0.5);
+      }
     int changes = 0;
     for (int k = 0; k < 64; ++k) changes += (cubic(q, k / 64.0) > 0) != (cubic(q, (k + 1) / 64.0) > 0);
     if (changes == 1) crossing.push_back(q);
   }
-  std::printf("\n%-24s %10s %22s %22s %8s\n", "values per root to 1e-12", "bisection", "regula falsi (4.9)", "regula falsi, Illinois", "Brent");
+  std::printf("\n%-24s %10s %22s %22s %8s\n", "values per root to 1e-12", "bisection", "regula falsi (4.9)",
+              "regula falsi, Illinois", "Brent");
   using Function = double (*)(const ToiQuery &, double);
-  const std::pair<const char *, Function> functions[] = {{"(4.7) as printed", printed}, {"distance to the plane", plane_distance}, {"cubic", cubic}};
+  const std::pair<const char *, Function> functions[] = {
+      {"(4.7) as printed", printed}, {"distance to the plane", plane_distance}, {"cubic", cubic}};
   for (const auto &[name, function] : functions) {
     double mean[4] = {};
     for (const ToiQuery &q : crossing) {
@@ -190,18 +216,20 @@ void roots(const Sink &sink) {
     std::printf("%-24s %10.1f %22.1f %22.1f %8.1f\n", name, mean[0], mean[1], mean[2], mean[3]);
     static const char *const kColumns[4] = {"bisection", "regula_falsi_plain", "regula_falsi", "brent"};
     for (int k = 0; k < 4 && sink.csv; ++k)
-      std::fprintf(sink.csv, "%s,roots: %s,%s,%zu,%zu,%.2f,,,,,,\n", sink.head.c_str(), name, kColumns[k], crossing.size(), crossing.size(), mean[k]);
+      std::fprintf(sink.csv, "%s,roots: %s,%s,%zu,%zu,%.2f,,,,,,\n", sink.head.c_str(), name, kColumns[k],
+                   crossing.size(), crossing.size(), mean[k]);
   }
 }
 
-// ---- guard ---------------------------------------------------------------------------------------------------------------------------
+// ---- guard ------------------------------------------------------------------------------------------------
 
 void guard(const Sink &sink) {
   std::printf("\n%-24s %10s %8s %14s\n", "guard", "pairs", "hits", "ns per pair");
   for (const bool crash : {false, true}) {
     Scene scene;
     const Mesh ball = sphere_mesh(0.1, 4);
-    scene.offset = 1e-3 * 0.012, scene.h = 1e-3;
+    scene.offset = 1e-3 * 0.012;
+    scene.h = 1e-3;
     const double fall = crash ? -5 : 0, slide = crash ? 0 : 0.5;
     const dfm::Vec3 velocity{slide, 0, fall};
     scene.add(ball);
@@ -228,7 +256,9 @@ void guard(const Sink &sink) {
     }
     const char *const name = crash ? "guard: crash at 5 m/s" : "guard: sliding at rest";
     std::printf("%-24s %10zu %8zu %14.1f\n", name + 7, pairs, hits.size(), best);
-    if (sink.csv) std::fprintf(sink.csv, "%s,%s,guard,%zu,%zu,,,%.1f,,,,\n", sink.head.c_str(), name, pairs, hits.size(), best);
+    if (sink.csv)
+      std::fprintf(sink.csv, "%s,%s,guard,%zu,%zu,,,%.1f,,,,\n", sink.head.c_str(), name, pairs, hits.size(),
+                   best);
   }
 }
 
@@ -243,8 +273,11 @@ int main(int argc, char **argv) {
   }
   sink.head = bench::machine() + "," + bench::compiler() + "," + commit;
   if (sink.csv && std::ftell(sink.csv) == 0)
-    std::fprintf(sink.csv, "machine,compiler,commit,set,finder,queries,hits,evaluations,evaluations_max,ns_per_query,missed,false,late,late_by_max\n");
-  std::printf("%-10s %-14s %6s %6s %9s %6s %6s %7s %6s %5s %9s\n", "set", "finder", "number", "hits", "values", "most", "ns", "missed", "false", "late", "by");
+    std::fprintf(sink.csv,
+                 "machine,compiler,commit,set,finder,queries,hits,evaluations,evaluations_max,ns_per_query,"
+                 "missed,false,late,late_by_max\n");
+  std::printf("%-10s %-14s %6s %6s %9s %6s %6s %7s %6s %5s %9s\n", "set", "finder", "number", "hits",
+              "values", "most", "ns", "missed", "false", "late", "by");
   const bool shared = !ccd_folder().empty();
   if (shared) {
     queries(sink, "reference", reference_queries(), true);

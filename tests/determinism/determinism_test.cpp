@@ -1,4 +1,5 @@
-// One scene, one hash: whatever the threads, the host's way to cut and order work, the instruction set, the lists that detection keeps.
+// One scene, one hash: whatever the threads, the host's way to cut and order work, the instruction set, the
+// lists that detection keeps.
 #include <algorithm>
 #include <cstdlib>
 #include <random>
@@ -11,13 +12,15 @@
 namespace {
 
 class Determinism : public testing::TestWithParam<scenes::Scene> {};
-INSTANTIATE_TEST_SUITE_P(Scenes, Determinism, testing::ValuesIn(scenes::all), [](const auto &i) { return std::string(i.param.name); });
+INSTANTIATE_TEST_SUITE_P(Scenes, Determinism, testing::ValuesIn(scenes::all),
+                         [](const auto &i) { return std::string(i.param.name); });
 
 // A host that cuts at random multiples of grain and hands the pieces, shuffled, to three threads.
 struct RudeHost {
   std::mt19937 random{7};
   uint64_t calls = 0;
-  static void parallel_for(void *user, uint32_t n, uint32_t grain, void (*fn)(void *, uint32_t, uint32_t), void *task) {
+  static void parallel_for(void *user, uint32_t n, uint32_t grain, void (*fn)(void *, uint32_t, uint32_t),
+                           void *task) {
     RudeHost &host = *static_cast<RudeHost *>(user);
     ++host.calls;
     std::vector<std::pair<uint32_t, uint32_t>> pieces;
@@ -38,15 +41,19 @@ struct RudeHost {
 
 TEST_P(Determinism, OneToEightThreads_GiveTheSameHash) {
   scenes::Scene scene = GetParam();
-  scene.steps = std::min(scene.steps, 165);  // eight runs, of the longest one until the ball has woken the block
+  // eight runs, of the longest one until the ball has woken the block
+  scene.steps = std::min(scene.steps, 165);
   const uint64_t one = scenes::run(scene, 1);
-  for (uint32_t threads = 2; threads <= 8; ++threads) EXPECT_EQ(scenes::run(scene, threads), one) << threads << " threads";
+  for (uint32_t threads = 2; threads <= 8; ++threads)
+    EXPECT_EQ(scenes::run(scene, threads), one) << threads << " threads";
 }
 
 TEST_P(Determinism, AHostThatCutsAndShuffles_GivesTheSameHash) {
   RudeHost host;
   dfm_context_def def = dfm_context_def_default();
-  def.user = &host, def.parallel_for = RudeHost::parallel_for, def.plugin_dir = DEFORM_PLUGIN_DIR;
+  def.user = &host;
+  def.parallel_for = RudeHost::parallel_for;
+  def.plugin_dir = DEFORM_PLUGIN_DIR;
   def.log = [](void *, int32_t, const char *) {};
   dfm_context *c = nullptr;
   ASSERT_EQ(dfm_context_create(&def, &c), DFM_OK) << dfm_last_error();
@@ -113,16 +120,20 @@ TEST_P(Determinism, QueriesAndSnapshots_ChangeNothing) {
       case 0: test::ok(dfm_world_stable_step(w, &dt, nullptr, nullptr)); break;
       case 1: test::ok(dfm_world_explain(w, nullptr, &bytes)); break;
       case 2: test::ok(dfm_world_snapshot(w, nullptr, &bytes)); break;
-      case 3: test::measure(bodies[0]), test::stats(w); break;
+      case 3:
+        test::measure(bodies[0]);
+        test::stats(w);
+        break;
       case 4: test::ok(dfm_world_ray(w, origin, down, 10, &hit)); break;
       case 5: test::ok(dfm_world_events(w, 0, nullptr, &n)); break;
-      default: test::ok(dfm_world_contacts(w, 0, nullptr, &n)), test::ok(dfm_world_pairs(w, 0, nullptr, &n));
+      default: test::ok(dfm_world_contacts(w, 0, nullptr, &n)); test::ok(dfm_world_pairs(w, 0, nullptr, &n));
     }
   }
   EXPECT_EQ(dfm_world_hash(w), scenes::run(GetParam()));
 }
 
-// Kernels are chosen when a body is created. Those that the processor lacks are refused by a warning on the log.
+// Kernels are chosen when a body is created. Those that the processor lacks are refused by a
+// warning on the log.
 TEST_P(Determinism, InstructionSets_GiveTheSameHash) {
   const char *const given = std::getenv("DEFORM_SIMD");
   const std::string before = given ? given : "";

@@ -1,5 +1,5 @@
-// Every scene is cut in the middle of its contact: a new process takes the snapshot and ends with the same bits.
-// The program runs itself as `PROGRAM --continue SCENE FILE STEPS THREADS`.
+// Every scene is cut in the middle of its contact: a new process takes the snapshot and ends with the same
+// bits. The program runs itself as `PROGRAM --continue SCENE FILE STEPS THREADS`.
 #include <bit>
 #include <cmath>
 #include <cstdlib>
@@ -15,7 +15,10 @@ int main(int argc, char **argv) {
       if (s.name != std::string(argv[2])) continue;
       const dfm_world w = s.build(c);
       const std::string data = test::read_file(argv[3]);
-      if (dfm_world_restore(w, data.data(), data.size()) != DFM_OK) return std::fprintf(stderr, "%s\n", dfm_last_error()), 1;
+      if (dfm_world_restore(w, data.data(), data.size()) != DFM_OK) {
+        std::fprintf(stderr, "%s\n", dfm_last_error());
+        return 1;
+      }
       scenes::advance(w, std::atoi(argv[4]));
       std::printf("%s\n", scenes::hex(dfm_world_hash(w)).c_str());
     }
@@ -28,15 +31,17 @@ int main(int argc, char **argv) {
 namespace {
 
 class Process : public testing::TestWithParam<scenes::Scene> {};
-INSTANTIATE_TEST_SUITE_P(Scenes, Process, testing::ValuesIn(scenes::all), [](const auto &i) { return std::string(i.param.name); });
+INSTANTIATE_TEST_SUITE_P(Scenes, Process, testing::ValuesIn(scenes::all),
+                         [](const auto &i) { return std::string(i.param.name); });
 
 TEST_P(Process, ThatRestoresASnapshotTakenInContact_EndsWithTheSameBits) {
   const scenes::Scene s = GetParam();
-  int before = s.steps * (s.name == std::string("ball_on_floor") ? 1 : 6) / 10;   // the ball bounces early
+  int before = s.steps * (s.name == std::string("ball_on_floor") ? 1 : 6) / 10;  // the ball bounces early
   const test::Context c;
   const dfm_world w = s.build(c);
   scenes::advance(w, before);
-  for (; test::stats(w).contacts == 0 && before < s.steps * 9 / 10; ++before) scenes::advance(w, 1);   // what bounces is cut while it touches
+  // what bounces is cut while it touches
+  for (; test::stats(w).contacts == 0 && before < s.steps * 9 / 10; ++before) scenes::advance(w, 1);
   const int after = s.steps - before;
   EXPECT_GT(test::stats(w).contacts, 0u) << "nothing touches: the snapshot shows little";
   EXPECT_EQ(test::stats(w).asleep > 0, s.name == std::string("woken"));
@@ -45,15 +50,18 @@ TEST_P(Process, ThatRestoresASnapshotTakenInContact_EndsWithTheSameBits) {
     test::ok(dfm_world_contacts(w, 0, nullptr, &n));
     std::vector<dfm_contact> contacts(n);
     test::ok(dfm_world_contacts(w, n, contacts.data(), &n));
-    for (const dfm_contact &k : contacts) loaded |= std::hypot(k.bristle[0], k.bristle[1]) > 0 ? 1u << k.law : 0;
+    for (const dfm_contact &k : contacts)
+      loaded |= std::hypot(k.bristle[0], k.bristle[1]) > 0 ? 1u << k.law : 0;
     EXPECT_EQ(std::popcount(loaded), 4) << "bristles of all four laws are loaded where the run is cut";
   }
   const std::string data = test::snapshot(w);
   const std::string file = test::scratch(std::string("process_") + s.name) + "/cut.bin";
   test::write_file(file, data);
   scenes::advance(w, after);
-  EXPECT_EQ(test::stats(w).asleep, s.name == std::string("woken") ? 1u : 0u) << "the ball has woken one of two";
-  const test::CommandResult r = test::run({"/proc/self/exe", "--continue", s.name, file, std::to_string(after), "3"});
+  EXPECT_EQ(test::stats(w).asleep, s.name == std::string("woken") ? 1u : 0u)
+      << "the ball has woken one of two";
+  const test::CommandResult r =
+      test::run({"/proc/self/exe", "--continue", s.name, file, std::to_string(after), "3"});
   EXPECT_EQ(r.exit_code, 0) << r.err;
   EXPECT_EQ(r.out, scenes::hex(dfm_world_hash(w)) + "\n");
 }

@@ -12,7 +12,12 @@ inline dfm_world ball_on_floor(dfm_context *c) {
   test::add_plane(w, "floor");
   test::set_friction(w, 0.4);
   test::BodyOptions o;
-  o.name = "ball", o.young = 2e4, o.damping_stiffness = 5e-4, o.position = {0, 0, 0.0503}, o.velocity = {0.3, 0.1, -0.5}, o.spin = {0, 20, 3};
+  o.name = "ball";
+  o.young = 2e4;
+  o.damping_stiffness = 5e-4;
+  o.position = {0, 0, 0.0503};
+  o.velocity = {0.3, 0.1, -0.5};
+  o.spin = {0, 20, 3};
   test::make_body(c, w, "ball", {0.05, 0, 0}, 400, o);
   return w;
 }
@@ -22,7 +27,10 @@ inline dfm_world crossing_beams(dfm_context *c) {
   const dfm_world w = test::make_world(c);
   test::set_friction(w, 0.5);
   test::BodyOptions o;
-  o.name = "lower", o.young = 5e4, o.damping_stiffness = 5e-4, o.position = {-0.1, -0.02, 0};
+  o.name = "lower";
+  o.young = 5e4;
+  o.damping_stiffness = 5e-4;
+  o.position = {-0.1, -0.02, 0};
   const dfm_body lower = test::make_body(c, w, "beam", {0.2, 0.04, 0.04}, 200, o);
   std::vector<double> x(3 * 4096);
   uint32_t n = 0;
@@ -31,7 +39,11 @@ inline dfm_world crossing_beams(dfm_context *c) {
   for (uint32_t i = 0; i < n; ++i)
     if (std::fabs(x[3 * i]) > 0.0999) ends.push_back(i);
   test::ok(dfm_body_hold(lower, uint32_t(ends.size()), ends.data(), 7));
-  o.name = "upper", o.volume = 1, o.position = {-0.017, -0.1, 0.0403}, o.velocity = {0.05, 0, -0.4}, o.spin = {0, 0, 1};
+  o.name = "upper";
+  o.volume = 1;
+  o.position = {-0.017, -0.1, 0.0403};
+  o.velocity = {0.05, 0, -0.4};
+  o.spin = {0, 0, 1};
   test::make_body(c, w, "beam", {0.04, 0.2, 0.04}, 200, o);
   return w;
 }
@@ -41,16 +53,20 @@ inline dfm_world ten_in_a_box(dfm_context *c) {
   const dfm_world w = test::make_world(c);
   const double s = std::sqrt(0.5);
   test::add_plane(w, "floor");
-  test::add_plane(w, "west", {-0.06, 0, 0}, {0, s, 0, s}), test::add_plane(w, "east", {0.06, 0, 0}, {0, -s, 0, s});
-  test::add_plane(w, "south", {0, -0.06, 0}, {-s, 0, 0, s}), test::add_plane(w, "north", {0, 0.06, 0}, {s, 0, 0, s});
+  test::add_plane(w, "west", {-0.06, 0, 0}, {0, s, 0, s});
+  test::add_plane(w, "east", {0.06, 0, 0}, {0, -s, 0, s});
+  test::add_plane(w, "south", {0, -0.06, 0}, {-s, 0, 0, s});
+  test::add_plane(w, "north", {0, 0.06, 0}, {s, 0, 0, s});
   test::set_friction(w, 0.3);
   const char *const kinds[] = {"ball", "beam", "cylinder"};
   const std::array<double, 3> sizes[] = {{0.015, 0, 0}, {0.025, 0.02, 0.02}, {0.012, 0.03, 0}};
   for (int i = 0; i < 10; ++i) {
     test::BodyOptions o;
-    o.young = 1e4, o.damping_stiffness = 1e-3;
+    o.young = 1e4;
+    o.damping_stiffness = 1e-3;
     o.position = {-0.03 + 0.036 * (i % 2), -0.03 + 0.036 * (i / 2 % 2), 0.02 + 0.036 * (i / 4)};
-    o.velocity = {0.2 - 0.04 * i, 0.05 * (i % 5) - 0.1, -0.6}, o.spin = {double(i), 3.0 - i, 1};
+    o.velocity = {0.2 - 0.04 * i, 0.05 * (i % 5) - 0.1, -0.6};
+    o.spin = {double(i), 3.0 - i, 1};
     test::make_body(c, w, kinds[i % 3], sizes[i % 3], 60, o);
   }
   return w;
@@ -62,12 +78,18 @@ inline dfm_world fine_ball(dfm_context *c) {
   test::add_plane(w, "floor");
   test::set_friction(w, 0.4);
   test::BodyOptions o;
-  o.name = "ball", o.young = 2e4, o.volume = 1, o.position = {0, 0, 0.0502}, o.velocity = {0.3, 0.1, -0.5}, o.spin = {0, 20, 3};
+  o.name = "ball";
+  o.young = 2e4;
+  o.volume = 1;
+  o.position = {0, 0, 0.0502};
+  o.velocity = {0.3, 0.1, -0.5};
+  o.spin = {0, 20, 3};
   test::make_body(c, w, "ball", {0.05, 0, 0}, 12000, o);
   return w;
 }
 
-// Two bodies with surfaces of their own: a ball that hangs by moving least squares falls on a block that hangs by cells, on a floor.
+// Two bodies with surfaces of their own: a ball that hangs by moving least squares falls on a block that
+// hangs by cells, on a floor.
 inline dfm_world coupled_pair(dfm_context *c) {
   const dfm_world w = test::make_world(c);
   test::add_plane(w, "floor");
@@ -75,10 +97,17 @@ inline dfm_world coupled_pair(dfm_context *c) {
   const test::Skin box = test::box_skin({0.1, 0.1, 0.06}, 8), ball = test::ball_skin(0.048, 3);
   const dfm_surface_def below = box.def(), above = ball.def(DFM_COUPLING_MLS, 1.5);
   test::BodyOptions o;
-  o.young = 5e4, o.damping_stiffness = 5e-4;
-  o.name = "block", o.position = {-0.05, -0.05, 1e-4}, o.surface = &below;
+  o.young = 5e4;
+  o.damping_stiffness = 5e-4;
+  o.name = "block";
+  o.position = {-0.05, -0.05, 1e-4};
+  o.surface = &below;
   test::make_body(c, w, "beam", {0.1, 0.1, 0.06}, 60, o);
-  o.name = "ball", o.position = {0.01, 0.005, 0.1085}, o.velocity = {0.2, 0.1, -0.6}, o.spin = {0, 10, 3}, o.surface = &above;
+  o.name = "ball";
+  o.position = {0.01, 0.005, 0.1085};
+  o.velocity = {0.2, 0.1, -0.6};
+  o.spin = {0, 10, 3};
+  o.surface = &above;
   test::make_body(c, w, "ball", {0.05, 0, 0}, 100, o);
   return w;
 }
@@ -86,17 +115,25 @@ inline dfm_world coupled_pair(dfm_context *c) {
 // A ball rolls and a beam falls over a dale of irregular triangles that sinks at the same time.
 inline dfm_world dale(dfm_context *c) {
   const dfm_world w = test::make_world(c);
-  const test::Triangles ground = test::height_field(0.15, 12, [](double x, double y) { return 0.8 * (x * x + 0.5 * y * y); });
+  const test::Triangles ground =
+      test::height_field(0.15, 12, [](double x, double y) { return 0.8 * (x * x + 0.5 * y * y); });
   const dfm_pose_key keys[] = {{0, {{0, 0, 0}, {0, 0, 0, 1}}}, {0.2, {{0, 0.002, -0.004}, {0, 0.02, 0, 1}}}};
   dfm_obstacle_def d = test::mesh_def("ground", ground);
-  d.nkey = 2, d.keys = keys;
+  d.nkey = 2;
+  d.keys = keys;
   dfm_obstacle o = 0;
   test::ok(dfm_obstacle_create(w, &d, &o));
   test::set_friction(w, 0.4);
   test::BodyOptions b;
-  b.young = 5e4, b.damping_stiffness = 5e-4, b.position = {-0.03, 0.01, 0.0325}, b.velocity = {0.3, 0, -0.3}, b.spin = {0, 8, 0};
+  b.young = 5e4;
+  b.damping_stiffness = 5e-4;
+  b.position = {-0.03, 0.01, 0.0325};
+  b.velocity = {0.3, 0, -0.3};
+  b.spin = {0, 8, 0};
   test::make_body(c, w, "ball", {0.03, 0, 0}, 200, b);
-  b.position = {0.02, -0.03, 0.035}, b.velocity = {0, 0.1, -0.4}, b.spin = {1, 0, 4};
+  b.position = {0.02, -0.03, 0.035};
+  b.velocity = {0, 0.1, -0.4};
+  b.spin = {1, 0, 4};
   test::make_body(c, w, "beam", {0.06, 0.03, 0.03}, 100, b);
   return w;
 }
@@ -104,17 +141,24 @@ inline dfm_world dale(dfm_context *c) {
 // Two blocks come to rest and sleep; a ball falls on one of them and wakes it, the other sleeps on.
 inline dfm_world woken(dfm_context *c) {
   dfm_world_def d = dfm_world_def_default();
-  d.sleep = 1, d.sleep_time = 0.04, d.contact_offset = 2e-4;
+  d.sleep = 1;
+  d.sleep_time = 0.04;
+  d.contact_offset = 2e-4;
   dfm_world w = 0;
   test::ok(dfm_world_create(c, &d, &w));
   test::add_plane(w, "floor");
   test::set_friction(w, 0.4);
   test::BodyOptions o;
-  o.young = 2e5, o.damping_stiffness = 2e-3, o.damping_mass = 40, o.position = {0, 0, 1.6e-4};
+  o.young = 2e5;
+  o.damping_stiffness = 2e-3;
+  o.damping_mass = 40;
+  o.position = {0, 0, 1.6e-4};
   test::make_body(c, w, "beam", {0.1, 0.1, 0.06}, 100, o);
   o.position[0] = 0.3;
   test::make_body(c, w, "beam", {0.1, 0.1, 0.06}, 100, o);
-  o.damping_mass = 0, o.position = {0.06, 0.045, 0.22}, o.spin = {3, 1, 0};
+  o.damping_mass = 0;
+  o.position = {0.06, 0.045, 0.22};
+  o.spin = {3, 1, 0};
   test::make_body(c, w, "ball", {0.04, 0, 0}, 100, o);
   return w;
 }
@@ -128,52 +172,76 @@ inline dfm_world rolled_back(dfm_context *c) {
   test::add_plane(w, "floor");
   test::set_friction(w, 0.4);
   test::BodyOptions o;
-  o.young = 1e5, o.damping_stiffness = 1e-3, o.position = {0, 0, 2e-4}, o.velocity = {0.3, 0, 0};
+  o.young = 1e5;
+  o.damping_stiffness = 1e-3;
+  o.position = {0, 0, 2e-4};
+  o.velocity = {0.3, 0, 0};
   test::make_body(c, w, "beam", {0.1, 0.1, 0.06}, 100, o);
-  o.position = {0.02, -0.13, 0.001}, o.velocity = {0.1, 0.8, 0};
+  o.position = {0.02, -0.13, 0.001};
+  o.velocity = {0.1, 0.8, 0};
   test::make_body(c, w, "beam", {0.1, 0.1, 0.06}, 100, o);
-  o.position = {0.06, 0.045, 0.11}, o.velocity = {0.2, 0.1, -1}, o.spin = {3, 1, 0};
+  o.position = {0.06, 0.045, 0.11};
+  o.velocity = {0.2, 0.1, -1};
+  o.spin = {3, 1, 0};
   test::make_body(c, w, "ball", {0.04, 0, 0}, 100, o);
   return w;
 }
 
-// A hook is thrown on the floor while its legs are pressed together: they meet, slide on each other and stick.
+// A hook is thrown on the floor while its legs are pressed together: they meet, slide on each
+// other and stick.
 inline dfm_world folded(dfm_context *c) {
   const dfm_world w = test::make_self_world(c, true, {0, 0, -9.81});
   test::add_plane(w, "floor");
   test::set_friction(w, 0.4);
   test::HookOptions o;
-  o.young = 3e4, o.damping_stiffness = 1e-3, o.damping_mass = 5, o.position = {0, 0, 0.0005};
-  o.velocity = {0.1, 0, -0.3}, o.spin = {0, 2, 1}, o.close = 0.5, o.pinch = 0.03;
+  o.young = 3e4;
+  o.damping_stiffness = 1e-3;
+  o.damping_mass = 5;
+  o.position = {0, 0, 0.0005};
+  o.velocity = {0.1, 0, -0.3};
+  o.spin = {0, 2, 1};
+  o.close = 0.5;
+  o.pinch = 0.03;
   test::make_hook(w, o);
   return w;
 }
 
-// Every law with memory at once: three blocks on the floor and a ball thrown on one of them, each pair with a law of its own, pushed so that some contacts
-// hold on loaded bristles and others slide.
+// Every law with memory at once: three blocks on the floor and a ball thrown on one of them, each pair with a
+// law of its own, pushed so that some contacts hold on loaded bristles and others slide.
 inline dfm_world remembered(dfm_context *c) {
   const dfm_world w = test::make_world(c);
   test::add_plane(w, "floor");
   const auto law = [&](const char *a, const char *b, const char *name, std::vector<dfm_param_value> values) {
     dfm_friction_def f{};
-    f.size = sizeof f, f.between[0] = a, f.between[1] = b, f.law = name;
+    f.size = sizeof f;
+    f.between[0] = a;
+    f.between[1] = b;
+    f.law = name;
     f.params = {sizeof(dfm_params), uint32_t(values.size()), values.data()};
     test::ok(dfm_world_add_friction(w, &f));
   };
   const double low = 0.3, high = 0.9, soft = 1e7, bent = 1.5, cubic = 3;
   test::BodyOptions o;
-  o.young = 1e5, o.damping_stiffness = 1e-3;
+  o.young = 1e5;
+  o.damping_stiffness = 1e-3;
   const char *const names[] = {"dahl", "elastoplastic", "gms"};
   for (int i = 0; i < 3; ++i) {
-    o.name = names[i], o.position = {0, 0.15 * i, 1e-4}, o.velocity = {0.05 + 0.1 * i, 0.02 * i, 0};
+    o.name = names[i];
+    o.position = {0, 0.15 * i, 1e-4};
+    o.velocity = {0.05 + 0.1 * i, 0.02 * i, 0};
     test::make_body(c, w, "beam", {0.1, 0.1, 0.06}, 60, o);
   }
-  o.name = "ball", o.position = {0.05, 0.05, 0.1008}, o.velocity = {0.1, 0.05, -0.2}, o.spin = {3, 1, 2};
+  o.name = "ball";
+  o.position = {0.05, 0.05, 0.1008};
+  o.velocity = {0.1, 0.05, -0.2};
+  o.spin = {3, 1, 2};
   test::make_body(c, w, "ball", {0.04, 0, 0}, 100, o);
   law("dahl", "floor", "dahl", {{"mu", &low, 1}, {"sigma0", &soft, 1}, {"alpha", &bent, 1}});
-  law("elastoplastic", "floor", "elastoplastic", {{"mu_C", &low, 1}, {"mu_S", &high, 1}, {"sigma0", &soft, 1}, {"i", &cubic, 1}});
+  law("elastoplastic", "floor", "elastoplastic",
+      {{"mu_C", &low, 1}, {"mu_S", &high, 1}, {"sigma0", &soft, 1}, {"i", &cubic, 1}});
   law("gms", "floor", "gms", {{"mu_C", &low, 1}, {"mu_S", &high, 1}});
-  law("ball", "dahl", "lugre", {{"mu_C", &low, 1}, {"mu_S", &high, 1}, {"delta", &bent, 1}, {"sigma0", &soft, 1}});
+  law("ball", "dahl", "lugre",
+      {{"mu_C", &low, 1}, {"mu_S", &high, 1}, {"delta", &bent, 1}, {"sigma0", &soft, 1}});
   return w;
 }
 
@@ -182,8 +250,11 @@ struct Scene {
   dfm_world (*build)(dfm_context *);
   int steps;
 };
-inline const Scene all[] = {{"ball_on_floor", ball_on_floor, 150}, {"crossing_beams", crossing_beams, 150}, {"ten_in_a_box", ten_in_a_box, 80},
-                            {"fine_ball", fine_ball, 20}, {"coupled_pair", coupled_pair, 80},
+inline const Scene all[] = {{"ball_on_floor", ball_on_floor, 150},
+                            {"crossing_beams", crossing_beams, 150},
+                            {"ten_in_a_box", ten_in_a_box, 80},
+                            {"fine_ball", fine_ball, 20},
+                            {"coupled_pair", coupled_pair, 80},
                             {"dale", dale, 100},
                             {"woken", woken, 220},
                             {"rolled_back", rolled_back, 120},

@@ -1,5 +1,5 @@
-// A file in memory with the fuzzer's bytes, so that readers which take a path are fuzzed without touching a disk. Readers that go by the file
-// name's ending get a link with that ending.
+// A file in memory with the fuzzer's bytes, so that readers which take a path are fuzzed without touching a
+// disk. Readers that go by the file name's ending get a link with that ending.
 #pragma once
 #include <sys/mman.h>
 #include <unistd.h>

@@ -1,5 +1,5 @@
-// Any bytes as a mesh file, one program per reader (DEFORM_FUZZ_READER): an error with a sentence, or a mesh whose numbers hold together; never
-// a crash, never more memory than a small multiple of the bytes.
+// Any bytes as a mesh file, one program per reader (DEFORM_FUZZ_READER): an error with a sentence, or a mesh
+// whose numbers hold together; never a crash, never more memory than a small multiple of the bytes.
 #include <algorithm>
 #include <cmath>
 #include <cstdlib>
@@ -8,7 +8,8 @@
 
 namespace {
 
-// Compressed arrays may unpack to 64 times their file; a polygon's corner of one byte stands for a triangle, which repair sorts.
+// Compressed arrays may unpack to 64 times their file; a polygon's corner of one byte stands for a triangle,
+// which repair sorts.
 constexpr size_t kMultiple = 256, kBase = 65536;
 
 struct Capped {
@@ -51,14 +52,17 @@ extern "C" int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
     dfm::RawMesh raw(memory.hooks);
     dfm::Cursor in("fuzz", reinterpret_cast<const char *>(data), size);
     dfm::DEFORM_FUZZ_READER(in, raw);
-    check(raw, raw.tets, raw.tet_group), check(raw, raw.tris, raw.tri_group);
-    if (raw.tets.size() != 4 * raw.tet_group.size() || raw.tris.size() != 3 * raw.tri_group.size()) std::abort();
+    check(raw, raw.tets, raw.tet_group);
+    check(raw, raw.tris, raw.tri_group);
+    if (raw.tets.size() != 4 * raw.tet_group.size() || raw.tris.size() != 3 * raw.tri_group.size())
+      std::abort();
     if (raw.tets.empty()) {
       const dfm::TriMesh mesh = dfm::finish_surface("fuzz", std::move(raw));
       check(mesh, mesh.tris, mesh.tri_group);
     } else {
       const dfm::TetMesh mesh = dfm::finish_mesh("fuzz", std::move(raw));
-      check(mesh, mesh.tets, mesh.tet_group), check(mesh, mesh.tris, mesh.tri_group);
+      check(mesh, mesh.tets, mesh.tet_group);
+      check(mesh, mesh.tris, mesh.tri_group);
     }
   } catch (const dfm::Error &e) {
     if (e.sentence.empty()) std::abort();

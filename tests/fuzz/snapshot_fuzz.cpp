@@ -1,6 +1,8 @@
-// Any bytes as a snapshot, and any bytes over a good one behind a checksum that holds: refused with a sentence, or a world that answers and takes a step.
+// Any bytes as a snapshot, and any bytes over a good one behind a checksum that holds: refused with a
+// sentence, or a world that answers and takes a step.
 //
-// Input: a byte that chooses. Even: the rest is the snapshot. Odd: the rest is a list of {u16 place, u8 value} that are put into a good one.
+// Input: a byte that chooses. Even: the rest is the snapshot. Odd: the rest is a list of {u16 place, u8
+// value} that are put into a good one.
 #include <cstring>
 #include <vector>
 
@@ -20,7 +22,9 @@ struct Scene {
   Scene() {
     dfm_context *const c = fuzz::context();
     dfm_world_def d = dfm_world_def_default();
-    d.sleep = 1, d.sleep_speed = 0.5, d.sleep_time = 2e-3;
+    d.sleep = 1;
+    d.sleep_speed = 0.5;
+    d.sleep_time = 2e-3;
     need(dfm_world_create(c, &d, &world));
     dfm_obstacle_def floor = dfm_obstacle_def_default();
     floor.name = "floor";
@@ -33,19 +37,24 @@ struct Scene {
     info.size = sizeof info;
     need(dfm_tetmesh_get_info(mesh, &info));
     dfm_body_def b = dfm_body_def_default();
-    b.npoint = info.npoint, b.ntet = info.ntet;
+    b.npoint = info.npoint;
+    b.ntet = info.ntet;
     need(dfm_tetmesh_data(mesh, &b.points, &b.tets, nullptr));
     const char *const names[] = {"sleeper", "lower", "upper"};
     const double places[3][3] = {{2, 0, 4e-5}, {0, 0, 4e-5}, {0.01, 0.01, 0.1001}};
     for (int k = 0; k < 3; ++k) {
-      b.name = names[k], std::memcpy(b.pose.position, places[k], sizeof places[k]);
+      b.name = names[k];
+      std::memcpy(b.pose.position, places[k], sizeof places[k]);
       dfm_body body = 0;
       need(dfm_body_create(world, &b, &body));
       const uint32_t points[] = {0, 1};
       const double force[6] = {0.1};
       const dfm_sine wobble{{0.5, 0, 0}, 30, 0.2};
       if (k == 2) need(dfm_body_add_load(body, 2, points, force, 0, nullptr, &wobble, nullptr));
-      if (k == 1) need(dfm_body_hold(body, 2, points, 7)), need(dfm_body_move_held(body, 2, points, 0, nullptr, &wobble));
+      if (k == 1) {
+        need(dfm_body_hold(body, 2, points, 7));
+        need(dfm_body_move_held(body, 2, points, 0, nullptr, &wobble));
+      }
     }
     for (int i = 0; i < 60; ++i) need(dfm_world_step(world, 2e-4, nullptr));
     size_t bytes = 0;
@@ -63,12 +72,15 @@ extern "C" int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
   std::vector<uint8_t> bytes;
   if (data[0] % 2 == 0) {
     bytes.assign(data + 1, data + size);
-    if (data[0] % 4 == 0 && bytes.size() >= sizeof(dfm::SnapshotHead))
-      std::memcpy(bytes.data(), scene.good.data(), sizeof(dfm::SnapshotHead)), test::seal(bytes);
+    if (data[0] % 4 == 0 && bytes.size() >= sizeof(dfm::SnapshotHead)) {
+      std::memcpy(bytes.data(), scene.good.data(), sizeof(dfm::SnapshotHead));
+      test::seal(bytes);
+    }
   } else {
     bytes = scene.good;
     const size_t head = sizeof(dfm::SnapshotHead), fields = bytes.size() - head;
-    for (size_t i = 1; i + 2 < size; i += 3) bytes[head + size_t(data[i] | data[i + 1] << 8) % fields] = data[i + 2];
+    for (size_t i = 1; i + 2 < size; i += 3)
+      bytes[head + size_t(data[i] | data[i + 1] << 8) % fields] = data[i + 2];
     test::seal(bytes);
   }
   const dfm_status status = dfm_world_restore(scene.world, bytes.data(), bytes.size());

@@ -1,5 +1,5 @@
-// What a plugin leaves changed in the thread that called it is put back: rounding mode, denormals, exception masks, the locale of numbers; the host says once
-// which plugin it was, and can be asked which one runs.
+// What a plugin leaves changed in the thread that called it is put back: rounding mode, denormals, exception
+// masks, the locale of numbers; the host says once which plugin it was, and can be asked which one runs.
 #include <fenv.h>
 
 #include <cfloat>
@@ -31,14 +31,16 @@ TEST(Boundary, LoadingThatChangesTheEnvironment_IsPutBackAndSaid) {
 TEST(Boundary, RefusedPlugin_LeavesTheEnvironmentToo) {
   Context c;
   ASSERT_EQ(dfm_plugin_load(c.c, tiny::plugin("tiny_rounds").c_str()), DFM_OK);
-  const std::string copy = tiny::folder("twice") + "/again.so";   // the id is taken: refused after its constructors ran
+  // the id is taken: refused after its constructors ran
+  const std::string copy = tiny::folder("twice") + "/again.so";
   std::filesystem::copy_file(tiny::plugin("tiny_rounds"), copy);
   EXPECT_EQ(dfm_plugin_load(c.c, copy.c_str()), DFM_E_STATE);
   expect_usual();
 }
 
 TEST(Boundary, EvalThatChangesTheEnvironment_IsPutBackAndNamedOnce) {
-  const char *const words[] = {"", "the rounding mode", "how denormal numbers are treated", "which floating-point exceptions raise a signal", "the rounding mode"};
+  const char *const words[] = {"", "the rounding mode", "how denormal numbers are treated",
+                               "which floating-point exceptions raise a signal", "the rounding mode"};
   for (int way = 1; way <= 4; ++way) {
 #if !defined(__x86_64__)
     if (way == 2) continue;
@@ -54,7 +56,8 @@ TEST(Boundary, EvalThatChangesTheEnvironment_IsPutBackAndNamedOnce) {
       expect_usual();
     }
     int said = 0;
-    for (const tiny::Logged &l : c.log) said += l.text.find(std::string("org.tiny.rounds: eval changed ") + words[way]) != std::string::npos;
+    for (const tiny::Logged &l : c.log)
+      said += l.text.find(std::string("org.tiny.rounds: eval changed ") + words[way]) != std::string::npos;
     EXPECT_EQ(said, 1) << way;
   }
 }
@@ -79,7 +82,8 @@ TEST(Boundary, RunningPlugin_CanBeAskedFor) {
   def.plugin_dir = none.c_str();
   def.log = [](void *user, int32_t, const char *text) {
     const char *what = nullptr, *who = dfm_plugin_running(&what);
-    if (std::string(text) == "eval at work") *static_cast<std::string *>(user) = std::string(who ? who : "-") + " " + (what ? what : "-");
+    if (std::string(text) == "eval at work")
+      *static_cast<std::string *>(user) = std::string(who ? who : "-") + " " + (what ? what : "-");
   };
   dfm_context *context = nullptr;
   ASSERT_EQ(dfm_context_create(&def, &context), DFM_OK);

@@ -1,4 +1,5 @@
-// What the tests of the bristle laws share: histories in one dimension, a load held by quasi-static steps, the reference files.
+// What the tests of the bristle laws share: histories in one dimension, a load held by quasi-static steps,
+// the reference files.
 #pragma once
 #include "law_rules.h"
 
@@ -17,7 +18,9 @@ struct Contact {
   double x = 0;
   explicit Contact(Law l, double fn = 1) : law(std::move(l)) { in.fn = fn; }
   const Out &move(double vx, double vy, double h) {
-    in.v[0] = vx, in.v[1] = vy, in.h = h;
+    in.v[0] = vx;
+    in.v[1] = vy;
+    in.h = h;
     last = ask(law, in);
     std::memcpy(in.state, last.state, sizeof in.state);
     x += h * vx;
@@ -33,7 +36,8 @@ struct Contact {
     in.h = h;
     double v = 0;
     for (int pass = 0; pass < 60; ++pass) {
-      in.v[0] = v, in.v[1] = 0;
+      in.v[0] = v;
+      in.v[1] = 0;
       const Out o = ask(law, in);
       const double next = v - (o.f[0] - load) / o.dv[0];
       if (std::fabs(next - v) <= 1e-15 * std::fabs(v) || next == v) break;
@@ -52,7 +56,7 @@ struct Table {
     return 0;
   }
   double at(size_t row, const std::string &name) const { return std::stod(rows[row][column(name)]); }
-  size_t size() const { return rows.size(); }   // row 0 holds the names
+  size_t size() const { return rows.size(); }  // row 0 holds the names
 };
 
 // False where ../shared is absent: the caller skips.
@@ -64,8 +68,9 @@ inline bool read(const std::string &file, Table &table) {
   return true;
 }
 
-#define READ_OR_SKIP(table, file)                                                                                        \
-  rig::Table table;                                                                                                       \
-  if (!rig::read(file, table)) GTEST_SKIP() << "no ../shared beside the repository; the closed forms of this file cover the law"
+#define READ_OR_SKIP(table, file) \
+  rig::Table table;               \
+  if (!rig::read(file, table))    \
+  GTEST_SKIP() << "no ../shared beside the repository; the closed forms of this file cover the law"
 
 }  // namespace rig

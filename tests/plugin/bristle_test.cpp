@@ -1,5 +1,5 @@
-// A law with state in contact shows that the host owns typed state: it is carried with the contact, committed once per sub-step, dropped on
-// lift-off, saved and restored.
+// A law with state in contact shows that the host owns typed state: it is carried with the contact, committed
+// once per sub-step, dropped on lift-off, saved and restored.
 #include "bristle_law.h"
 
 namespace {
@@ -16,13 +16,19 @@ struct World {
     test::ok(dfm_plugin_register_static(context, dfm_plugin_entry_bristle, "bristle"));
     world = test::make_world(context, {kG * std::sin(theta), 0, -kG * std::cos(theta)});
     test::BodyOptions o;
-    o.young = 1e6, o.damping_stiffness = 1e-3, o.damping_mass = drag, o.position = {-0.05, -0.05, 2e-5};
+    o.young = 1e6;
+    o.damping_stiffness = 1e-3;
+    o.damping_mass = drag;
+    o.position = {-0.05, -0.05, 2e-5};
     body = test::make_body(context, world, "beam", {0.1, 0.1, 0.1}, cells, o);
     test::add_plane(world, "floor");
     const double mu = 0.5;
     const dfm_param_value values[] = {{"mu", &mu, 1}, {"sigma0", &sigma0, 1}};
     dfm_friction_def f{};
-    f.size = sizeof f, f.between[0] = f.between[1] = "*", f.law = "test.bristle", f.params = {sizeof(dfm_params), 2, values};
+    f.size = sizeof f;
+    f.between[0] = f.between[1] = "*";
+    f.law = "test.bristle";
+    f.params = {sizeof(dfm_params), 2, values};
     test::ok(dfm_world_add_friction(world, &f));
   }
   std::vector<dfm_contact> contacts() {
@@ -36,8 +42,8 @@ struct World {
 
 }  // namespace
 
-// At rest on a slope the bristles carry the tangential weight: sum sigma0 A z = m g sin(theta), and with all of the base touching the mean
-// deflection is m g sin(theta) / (sigma0 area of the base), whatever the mesh.
+// At rest on a slope the bristles carry the tangential weight: sum sigma0 A z = m g sin(theta), and with all
+// of the base touching the mean deflection is m g sin(theta) / (sigma0 area of the base), whatever the mesh.
 TEST(Bristle, AtRestOnASlope_DeflectsByWeightOverStiffnessTimesArea) {
   for (uint32_t cells : {100u, 600u}) {
     World w(0.2, 2e6, cells, 30);
@@ -67,7 +73,8 @@ TEST(Bristle, FromSoftToNearlyRigid_HoldsAtTheSameStep) {
     test::run(w.world, 0.5, 1e-3);
     EXPECT_LT(std::fabs(test::measure(w.body).com[0] - x0), 1e-5) << sigma0;
     EXPECT_LT(test::measure(w.body).speed_max, 1e-3) << sigma0;
-    EXPECT_LT(double(test::stats(w.world).unconverged), 0.01 * double(test::stats(w.world).substeps)) << sigma0;
+    EXPECT_LT(double(test::stats(w.world).unconverged), 0.01 * double(test::stats(w.world).substeps))
+        << sigma0;
   }
 }
 
@@ -91,7 +98,8 @@ TEST(Bristle, LiftedOff_ForgetsItsDeflection) {
   const double down[3] = {0, 0, -kG};
   test::ok(dfm_world_set_gravity(w.world, down));
   test::run(w.world, 1.0, 1e-3);
-  for (const dfm_contact &c : w.contacts()) EXPECT_LT(2e6 * c.area * std::hypot(c.bristle[0], c.bristle[1]), 0.5 * c.fn + 1e-9);
+  for (const dfm_contact &c : w.contacts())
+    EXPECT_LT(2e6 * c.area * std::hypot(c.bristle[0], c.bristle[1]), 0.5 * c.fn + 1e-9);
 }
 
 TEST(Bristle, SavedInMidContact_ContinuesWithTheSameBits) {
@@ -99,6 +107,7 @@ TEST(Bristle, SavedInMidContact_ContinuesWithTheSameBits) {
   test::run(a.world, 0.2, 1e-3);
   const std::string data = test::snapshot(a.world);
   test::ok(dfm_world_restore(b.world, data.data(), data.size()));
-  test::run(a.world, 0.2, 1e-3), test::run(b.world, 0.2, 1e-3);
+  test::run(a.world, 0.2, 1e-3);
+  test::run(b.world, 0.2, 1e-3);
   EXPECT_EQ(dfm_world_hash(a.world), dfm_world_hash(b.world));
 }

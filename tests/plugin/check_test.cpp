@@ -1,5 +1,6 @@
-// `deform plugin check`: every shipped law keeps every rule, and each broken law (tests/plugin/broken) breaks the one rule that is meant for it
-// and no other: a rule that nothing fails would prove nothing, and one that fails with others would not tell what to mend.
+// `deform plugin check`: every shipped law keeps every rule, and each broken law (tests/plugin/broken) breaks
+// the one rule that is meant for it and no other: a rule that nothing fails would prove nothing, and one that
+// fails with others would not tell what to mend.
 #include <gtest/gtest.h>
 #include <poll.h>
 #include <sys/wait.h>
@@ -34,7 +35,9 @@ namespace {
 // What a law that hangs costs; a sanitizer slows the sound rules down, too.
 const char *const kLimit = SANITIZED ? "8" : "1";
 
-std::string broken(const std::string &name) { return std::string(DEFORM_BINARY_DIR) + "/lib/broken/" + name + ".so"; }
+std::string broken(const std::string &name) {
+  return std::string(DEFORM_BINARY_DIR) + "/lib/broken/" + name + ".so";
+}
 std::string shipped(const std::string &name) { return std::string(DEFORM_PLUGIN_DIR) + "/" + name + ".so"; }
 
 test::CommandResult check(const std::string &file, std::vector<std::string> more = {}) {
@@ -49,7 +52,8 @@ std::vector<std::string> rules_that(const std::string &word, const std::string &
   for (size_t at = 0, end; at < out.size(); at = end + 1) {
     end = std::min(out.find('\n', at), out.size());
     const std::string line = out.substr(at, end - at);
-    if (line.size() > 10 && line[5] == ' ' && line.compare(6, word.size() + 1, word + " ") == 0) ids.push_back(line.substr(2, 3));
+    if (line.size() > 10 && line[5] == ' ' && line.compare(6, word.size() + 1, word + " ") == 0)
+      ids.push_back(line.substr(2, 3));
   }
   return ids;
 }
@@ -60,7 +64,7 @@ std::string sentence(const std::string &id, const std::string &out) {
   return begin == std::string::npos ? "" : out.substr(begin + 1, out.find('\n', begin + 1) - begin - 1);
 }
 
-// ---- broken laws -------------------------------------------------------------------------------------------------------------------
+// ---- broken laws ------------------------------------------------------------------------------------------
 
 std::string lower(std::string text) {
   for (char &c : text) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
@@ -77,72 +81,53 @@ TEST_P(BrokenLaw, FailsTheRuleThatIsMeantForItAndNoOther) {
   EXPECT_EQ(r.exit_code, 1) << r.out << r.err;
   const std::vector<std::string> expected{GetParam().rule};
   std::vector<std::string> failed = rules_that("FAIL", r.out);
-  // A sanitizer build asks a law from several threads (V10). They collide in a shared variable by chance, which ThreadSanitizer does not depend on.
+  // A sanitizer build asks a law from several threads (V10). They collide in a shared variable by chance,
+  // which ThreadSanitizer does not depend on.
   if (SANITIZED && GetParam().law == std::string("shares_a_static")) {
     const bool found = std::erase(failed, "V10") == 1;
     EXPECT_TRUE(found || !FINDS_RACES) << r.out;
   }
   EXPECT_EQ(failed, expected) << r.out;
   const std::string why = sentence(GetParam().rule, r.out);
-  EXPECT_NE(lower(why).find(lower(GetParam().says)), std::string::npos) << why;   // a sanitizer that sees it first says "null pointer"
+  // a sanitizer that sees it first says "null pointer"
+  EXPECT_NE(lower(why).find(lower(GetParam().says)), std::string::npos) << why;
   EXPECT_NE(why.find("; "), std::string::npos) << "a consequence and a remedy: " << why;
 }
 
 INSTANTIATE_TEST_SUITE_P(
     Plugin, BrokenLaw,
     testing::Values(
-        Case{"second_symbol", "V01", "broken_helper"},
-        Case{"wrong_abi", "V02", "draft 8"},
-        Case{"deaf_to_abi", "V02", "cannot know"},
-        Case{"no_source", "V03", "\"source\""},
+        Case{"second_symbol", "V01", "broken_helper"}, Case{"wrong_abi", "V02", "draft 8"},
+        Case{"deaf_to_abi", "V02", "cannot know"}, Case{"no_source", "V03", "\"source\""},
         Case{"misspelt_promise", "V03", "\"stiction\""},
         Case{"refuses_its_defaults", "V04", "must be above 0.9"},
         Case{"not_finite_at_the_end_of_a_range", "V04", "\"mu\" = 0"},
-        Case{"allocates", "V05", "calls malloc"},
-        Case{"reads_the_environment", "V05", "calls getenv"},
+        Case{"allocates", "V05", "calls malloc"}, Case{"reads_the_environment", "V05", "calls getenv"},
         Case{"writes_past_the_end", "V06", "past the end of limit"},
-        Case{"writes_its_input", "V06", "writes into fn"},
-        Case{"reads_a_null_output", "V06", "NULL"},
-        Case{"remembers", "V07", "keeps something"},
-        Case{"asks_who_it_is", "V07", "in another process"},
-        Case{"spreads_nan", "V08", "changed lane"},
-        Case{"hides_nan", "V08", "finite force"},
-        Case{"hangs", "V08", "did not come back"},
-        Case{"leaks", "V09", "on the heap"},
-        Case{"keeps_host_memory", "V09", "host's memory"},
-        Case{"stays_loaded", "V09", "stays in memory"},
-        Case{"pushes_at_rest", "F01", "at rest"},
-        Case{"axis_by_axis", "F02", "turned by"},
-        Case{"signed_sine", "F02", "turned by"},
-        Case{"wrong_sign", "F03", "closed loop"},
-        Case{"not_passive", "F03", "random steps"},
-        Case{"knows_its_place", "F04", "in a batch of"},
-        Case{"half_the_derivative", "F05", "dft_dvt"},
-        Case{"creeps", "F06", "in 1000 s"},
-        Case{"promises_stribeck", "F07", "falls nowhere"},
-        Case{"promises_viscous", "F08", "does not rise"},
-        Case{"promises_presliding", "F09", "no presliding"},
-        Case{"promises_hysteresis", "F10", "loop of"},
-        Case{"promises_breakaway", "F11", "the peak is"},
-        Case{"explicit_lag", "F12", "at steps of 0.0333"},
-        Case{"drifts", "F13", "per cycle"},
-        Case{"spikes", "F14", "spike"},
+        Case{"writes_its_input", "V06", "writes into fn"}, Case{"reads_a_null_output", "V06", "NULL"},
+        Case{"remembers", "V07", "keeps something"}, Case{"asks_who_it_is", "V07", "in another process"},
+        Case{"spreads_nan", "V08", "changed lane"}, Case{"hides_nan", "V08", "finite force"},
+        Case{"hangs", "V08", "did not come back"}, Case{"leaks", "V09", "on the heap"},
+        Case{"keeps_host_memory", "V09", "host's memory"}, Case{"stays_loaded", "V09", "stays in memory"},
+        Case{"pushes_at_rest", "F01", "at rest"}, Case{"axis_by_axis", "F02", "turned by"},
+        Case{"signed_sine", "F02", "turned by"}, Case{"wrong_sign", "F03", "closed loop"},
+        Case{"not_passive", "F03", "random steps"}, Case{"knows_its_place", "F04", "in a batch of"},
+        Case{"half_the_derivative", "F05", "dft_dvt"}, Case{"creeps", "F06", "in 1000 s"},
+        Case{"promises_stribeck", "F07", "falls nowhere"}, Case{"promises_viscous", "F08", "does not rise"},
+        Case{"promises_presliding", "F09", "no presliding"}, Case{"promises_hysteresis", "F10", "loop of"},
+        Case{"promises_breakaway", "F11", "the peak is"}, Case{"explicit_lag", "F12", "at steps of 0.0333"},
+        Case{"drifts", "F13", "per cycle"}, Case{"spikes", "F14", "spike"},
         Case{"asks_the_time", "V05", "calls time"},
         Case{"rounds_upward_at_load", "V11", "loading it leaves the rounding mode"},
         Case{"rounds_upward_in_eval", "V11", "eval leaves the rounding mode"},
-        Case{"flushes_denormals", "V11", "denormal"},
-        Case{"prints_at_load", "V12", "my law 1.0"},
+        Case{"flushes_denormals", "V11", "denormal"}, Case{"prints_at_load", "V12", "my law 1.0"},
         Case{"changes_folder", "V12", "loading it changes the current folder"},
         Case{"sets_environment", "V12", "OMP_NUM_THREADS"},
-        Case{"sets_locale", "V12", "using it changes the locale"},
-        Case{"catches_signals", "V12", "Ctrl-C"},
+        Case{"sets_locale", "V12", "using it changes the locale"}, Case{"catches_signals", "V12", "Ctrl-C"},
         Case{"closes_output", "V12", "closes standard output"},
-        Case{"changes_umask", "V12", "mask of new files"},
-        Case{"leaves_a_thread", "V12", "1 thread"},
-        Case{"wears_out", "V13", "wears out"},
-        Case{"counts_in_sixteen_bits", "V13", "large worlds"},
-        Case{"shares_a_static", "V14", "\"shared\""},
-        Case{"doubles_its_state", "F15", "no longer finite"},
+        Case{"changes_umask", "V12", "mask of new files"}, Case{"leaves_a_thread", "V12", "1 thread"},
+        Case{"wears_out", "V13", "wears out"}, Case{"counts_in_sixteen_bits", "V13", "large worlds"},
+        Case{"shares_a_static", "V14", "\"shared\""}, Case{"doubles_its_state", "F15", "no longer finite"},
         Case{"turned_by_half_a_radian", "F16", "0.5 rad off"},
         Case{"depends_on_the_step", "F17", "depend on the step"}),
     [](const auto &one) { return std::string(one.param.law); });
@@ -154,8 +139,11 @@ TEST(BrokenLaw, EveryLawOfTheFolder_IsInTheTable) {
       const std::string name = testing::UnitTest::GetInstance()->GetTestSuite(s)->GetTestInfo(t)->name();
       if (name.find('/') != std::string::npos) known.push_back(name.substr(name.find('/') + 1));
     }
-  for (const auto &entry : std::filesystem::directory_iterator(std::string(DEFORM_SOURCE_DIR) + "/tests/plugin/broken"))
-    EXPECT_TRUE(entry.path().extension() != ".c" || std::find(known.begin(), known.end(), entry.path().stem().string()) != known.end()) << entry.path();
+  for (const auto &entry :
+       std::filesystem::directory_iterator(std::string(DEFORM_SOURCE_DIR) + "/tests/plugin/broken"))
+    EXPECT_TRUE(entry.path().extension() != ".c" ||
+                std::find(known.begin(), known.end(), entry.path().stem().string()) != known.end())
+        << entry.path();
 }
 
 TEST(BrokenLaw, WhatTheyAreMadeFrom_KeepsEveryRule) {
@@ -173,9 +161,13 @@ TEST(BrokenLaw, ThatAlwaysHangs_EndsAfterTwoRulesThatDidNotComeBack) {
   EXPECT_NE(r.out.find("not asked: others did not come back"), std::string::npos) << r.out;
 }
 
-// What waits uses no processor time, so it is not that which ends it; the line of the rule before is there meanwhile.
+// What waits uses no processor time, so it is not that which ends it; the line of the rule before is
+// there meanwhile.
 TEST(BrokenLaw, ThatWaitsForEver_IsEndedWhileResultsArePrintedAsTheyCome) {
-  FILE *command = popen(("'" + std::string(DEFORM_COMMAND) + "' plugin check '" + broken("sleeps_for_ever") + "' --only V01 --only F01").c_str(), "r");
+  FILE *command = popen(("'" + std::string(DEFORM_COMMAND) + "' plugin check '" + broken("sleeps_for_ever") +
+                         "' --only V01 --only F01")
+                            .c_str(),
+                        "r");
   ASSERT_NE(command, nullptr);
   setvbuf(command, nullptr, _IONBF, 0);
   char line[512] = "";
@@ -184,7 +176,8 @@ TEST(BrokenLaw, ThatWaitsForEver_IsEndedWhileResultsArePrintedAsTheyCome) {
   while (std::fgets(line, sizeof line, command)) {
     out += line;
     pollfd more{fileno(command), POLLIN, 0};
-    if (out.find("V01 pass") != std::string::npos && out.find("F01") == std::string::npos) waited |= poll(&more, 1, 0) == 0;
+    if (out.find("V01 pass") != std::string::npos && out.find("F01") == std::string::npos)
+      waited |= poll(&more, 1, 0) == 0;
   }
   EXPECT_EQ(WEXITSTATUS(pclose(command)), 1);
   EXPECT_TRUE(waited) << "all came at once";
@@ -192,7 +185,7 @@ TEST(BrokenLaw, ThatWaitsForEver_IsEndedWhileResultsArePrintedAsTheyCome) {
   EXPECT_NE(out.find("waited for 5 s for something that never comes"), std::string::npos) << out;
 }
 
-// ---- shipped plugins ---------------------------------------------------------------------------------------------------------------
+// ---- shipped plugins --------------------------------------------------------------------------------------
 
 TEST(PluginCheck, EveryShippedPlugin_KeepsEveryRule) {
   int laws = 0;
@@ -209,7 +202,8 @@ TEST(PluginCheck, Template_KeepsEveryRuleInUnderSixtyLinesAndIsNotShipped) {
   const test::CommandResult r = check(std::string(DEFORM_BINARY_DIR) + "/lib/template/template_friction.so");
   EXPECT_EQ(r.exit_code, 0) << r.out << r.err;
   EXPECT_GE(rules_that("pass", r.out).size(), 20u) << r.out;
-  const std::string source = test::read_file(std::string(DEFORM_SOURCE_DIR) + "/plugins/template_friction/template_friction.c");
+  const std::string source =
+      test::read_file(std::string(DEFORM_SOURCE_DIR) + "/plugins/template_friction/template_friction.c");
   EXPECT_GT(source.size(), 1000u);
   EXPECT_LT(std::count(source.begin(), source.end(), '\n'), 60);
   EXPECT_FALSE(std::filesystem::exists(shipped("template_friction")));
@@ -217,18 +211,21 @@ TEST(PluginCheck, Template_KeepsEveryRuleInUnderSixtyLinesAndIsNotShipped) {
 
 TEST(PluginCheck, AnotherSeed_FindsTheShippedLawsSoundToo) {
   for (const char *seed : {"2", "77"})
-    for (const char *law : {"friction_coulomb", "friction_karnopp"}) EXPECT_EQ(check(shipped(law), {"--seed", seed}).exit_code, 0) << law << " " << seed;
+    for (const char *law : {"friction_coulomb", "friction_karnopp"})
+      EXPECT_EQ(check(shipped(law), {"--seed", seed}).exit_code, 0) << law << " " << seed;
 }
 
 TEST(PluginCheck, Model_IsHeldToTheRulesThatApplyAndSaysWhatComesLater) {
   const test::CommandResult r = check(shipped("model_msm"));
   EXPECT_EQ(r.exit_code, 0) << r.out;
-  EXPECT_EQ(rules_that("pass", r.out), (std::vector<std::string>{"V01", "V02", "V09", "V12", "V03", "V04", "V11"})) << r.out;
+  EXPECT_EQ(rules_that("pass", r.out),
+            (std::vector<std::string>{"V01", "V02", "V09", "V12", "V03", "V04", "V11"}))
+      << r.out;
   EXPECT_NE(r.out.find("M01 to M15, the rules for models, are not available yet"), std::string::npos);
   EXPECT_EQ(r.out.find("F01"), std::string::npos);
 }
 
-// ---- the command -------------------------------------------------------------------------------------------------------------------
+// ---- the command ------------------------------------------------------------------------------------------
 
 TEST(PluginCheck, WithoutASanitizer_SkipsThatRuleAndSaysWhy) {
   if (SANITIZED) return;
@@ -266,12 +263,18 @@ TEST(PluginCheck, Json_CarriesEveryRule) {
   EXPECT_EQ(r.exit_code, 1);
   EXPECT_NE(r.out.find("\"seed\": 5"), std::string::npos) << r.out;
   EXPECT_NE(r.out.find("\"failed\": 1"), std::string::npos) << r.out;
-  EXPECT_NE(r.out.find("\"id\": \"F13\", \"title\": \"stiction: no drift under a biased oscillating load\", \"result\": \"fail\""), std::string::npos) << r.out;
-  for (const char *id : {"V01", "V10", "F01", "F14"}) EXPECT_NE(r.out.find("\"id\": \"" + std::string(id) + "\""), std::string::npos) << id;
+  EXPECT_NE(r.out.find("\"id\": \"F13\", \"title\": \"stiction: no drift under a biased oscillating load\", "
+                       "\"result\": \"fail\""),
+            std::string::npos)
+      << r.out;
+  for (const char *id : {"V01", "V10", "F01", "F14"})
+    EXPECT_NE(r.out.find("\"id\": \"" + std::string(id) + "\""), std::string::npos) << id;
 }
 
 TEST(PluginCheck, BadUsage_ExitsTwoWithOneSentence) {
-  const test::CommandResult missing = check("/nowhere/law.so"), rule = check(broken("sound"), {"--only", "F99"}), folder = check(DEFORM_PLUGIN_DIR);
+  const test::CommandResult missing = check("/nowhere/law.so");
+  const test::CommandResult rule = check(broken("sound"), {"--only", "F99"});
+  const test::CommandResult folder = check(DEFORM_PLUGIN_DIR);
   EXPECT_EQ(missing.exit_code, 2);
   EXPECT_NE(missing.err.find("/nowhere/law.so"), std::string::npos) << missing.err;
   EXPECT_EQ(rule.exit_code, 2);

@@ -30,10 +30,13 @@ struct Coulomb : testing::Test {
 struct Parameters {
   double mu_c = 0.5, mu_s = 0.5, v_s = 0.01, delta = 2, sigma2 = 0;
   std::vector<double> values() const { return {mu_c, mu_s, v_s, delta, sigma2}; }
-  double level(double fn, double w) const { return fn * (mu_c + (mu_s - mu_c) * std::exp(-std::pow(w / v_s, delta))); }
+  double level(double fn, double w) const {
+    return fn * (mu_c + (mu_s - mu_c) * std::exp(-std::pow(w / v_s, delta)));
+  }
 };
 
-Answer ask(const dfm_friction &ops, const Parameters &p, double fn, double vx, double vy, double sx, double sy, double area = 1) {
+Answer ask(const dfm_friction &ops, const Parameters &p, double fn, double vx, double vy, double sx,
+           double sy, double area = 1) {
   return one_contact(ops, p.values(), fn, vx, vy, sx, sy, area);
 }
 
@@ -47,7 +50,8 @@ TEST_F(Coulomb, SelfDescription_SaysWhatItIs) {
   const dfm_type *type = nullptr;
   ASSERT_EQ(dfm_law_type(law, &type), DFM_OK);
   EXPECT_STREQ(type->id, "org.deform.coulomb");
-  EXPECT_EQ(ops->flags, uint32_t(DFM_FRIC_SET_VALUED | DFM_FRIC_ISOTROPIC | DFM_FRIC_PASSIVE | DFM_FRIC_JACOBIAN));
+  EXPECT_EQ(ops->flags,
+            uint32_t(DFM_FRIC_SET_VALUED | DFM_FRIC_ISOTROPIC | DFM_FRIC_PASSIVE | DFM_FRIC_JACOBIAN));
   EXPECT_EQ(ops->needs, uint32_t(DFM_NEED_FN | DFM_NEED_VT | DFM_NEED_FT_STOP | DFM_NEED_AREA));
   std::vector<std::string> effects;
   for (const char *const *e = type->effects; *e; ++e) effects.push_back(*e);
@@ -96,7 +100,8 @@ TEST_F(Coulomb, SlipFromRest_GoesTheWayTheStoppingForcePoints) {
 
 TEST_F(Coulomb, RulesOfEveryLaw_AreKept) {
   for (double delta : {2.0, 0.7}) {
-    const rules::Law l = rules::law_of(c.open(std::string(DEFORM_PLUGIN_DIR) + "/friction_coulomb.so"), {0.6, 0.9, 0.01, delta, 0.4});
+    const rules::Law l = rules::law_of(c.open(std::string(DEFORM_PLUGIN_DIR) + "/friction_coulomb.so"),
+                                       {0.6, 0.9, 0.01, delta, 0.4});
     const rules::Draw draw;
     EXPECT_TRUE(l.set_valued);
     rules::odd_to_the_bit(l, draw);
@@ -170,7 +175,8 @@ TEST_F(Coulomb, StribeckRangeOfCoefficients_FallsMonotonically) {
 }
 
 TEST_F(Coulomb, Derivatives_MatchDifferencesOverDecades) {
-  for (const Parameters &p : {Parameters{}, Parameters{0.3, 0.5, 0.01, 2, 0.4}, Parameters{0.3, 0.5, 0.01, 0.7, 50}})
+  for (const Parameters &p :
+       {Parameters{}, Parameters{0.3, 0.5, 0.01, 2, 0.4}, Parameters{0.3, 0.5, 0.01, 0.7, 50}})
     for (double w = 1e-7; w < 1e3; w *= 3.1)
       for (double angle : {0.0, 0.4, 2.0, 4.5}) {
         const double v[2] = {w * std::cos(angle), w * std::sin(angle)}, fn = 3, step = 1e-5 * w;
@@ -178,12 +184,14 @@ TEST_F(Coulomb, Derivatives_MatchDifferencesOverDecades) {
         const double scale = std::hypot(a.fx, a.fy) / w;
         for (int k = 0; k < 2; ++k) {
           const double dx = k == 0 ? step : 0, dy = k == 1 ? step : 0;
-          const Answer up = slide(*ops, p, fn, v[0] + dx, v[1] + dy), down = slide(*ops, p, fn, v[0] - dx, v[1] - dy);
+          const Answer up = slide(*ops, p, fn, v[0] + dx, v[1] + dy);
+          const Answer down = slide(*ops, p, fn, v[0] - dx, v[1] - dy);
           EXPECT_NEAR(a.dv[k], (up.fx - down.fx) / (2 * step), 1e-8 * scale) << w << " " << angle;
           EXPECT_NEAR(a.dv[2 + k], (up.fy - down.fy) / (2 * step), 1e-8 * scale) << w << " " << angle;
         }
         const Answer up = slide(*ops, p, fn + 1, v[0], v[1]), down = slide(*ops, p, fn - 1, v[0], v[1]);
-        EXPECT_NEAR(a.dn[0], (up.fx - down.fx) / 2, 1e-15 * (1 + a.limit)) << "linear in fn: only rounding is left";
+        EXPECT_NEAR(a.dn[0], (up.fx - down.fx) / 2, 1e-15 * (1 + a.limit))
+            << "linear in fn: only rounding is left";
         EXPECT_NEAR(a.dn[1], (up.fy - down.fy) / 2, 1e-15 * (1 + a.limit));
       }
 }
@@ -206,9 +214,16 @@ TEST_F(Coulomb, BadLane_StaysInItsLane) {
     for (int input = 0; input < 6; ++input) {
       Batch good(11, p.values()), spoilt(11, p.values());
       for (Batch *b : {&good, &spoilt})
-        for (uint32_t i = 0; i < b->n; ++i)
-          b->fn[i] = 1 + i, b->vt[i] = 0.01 * i, b->vt[b->stride + i] = 0.02, b->stop[i] = -0.3 * i, b->stop[b->stride + i] = 0.2;
-      double *columns[] = {spoilt.fn, spoilt.vt, spoilt.vt + spoilt.stride, spoilt.stop, spoilt.stop + spoilt.stride, spoilt.area};
+        for (uint32_t i = 0; i < b->n; ++i) {
+          b->fn[i] = 1 + i;
+          b->vt[i] = 0.01 * i;
+          b->vt[b->stride + i] = 0.02;
+          b->stop[i] = -0.3 * i;
+          b->stop[b->stride + i] = 0.2;
+        }
+      double *columns[] = {
+          spoilt.fn,  spoilt.vt, spoilt.vt + spoilt.stride, spoilt.stop, spoilt.stop + spoilt.stride,
+          spoilt.area};
       columns[input][6] = bad;
       ASSERT_EQ(ops->eval(&good.in, &good.out), DFM_OK);
       ASSERT_EQ(ops->eval(&spoilt.in, &spoilt.out), DFM_OK);
@@ -225,12 +240,14 @@ TEST_F(Coulomb, BadLane_StaysInItsLane) {
 
 TEST_F(Coulomb, ExtremesOfTheRange_StayFiniteAndInsideTheCone) {
   const double values[] = {0, 5e-324, 1e-310, 1e-200, 1e-160, 1e-30, 1, 1e6, 1e100, 1e160, 1e200};
-  for (const Parameters &p : {Parameters{}, Parameters{0.3, 0.5, 0.01, 2, 0.4}, Parameters{0, 0}, Parameters{0.3, 0.5, 1e-9, 10, 0}})
+  for (const Parameters &p : {Parameters{}, Parameters{0.3, 0.5, 0.01, 2, 0.4}, Parameters{0, 0},
+                              Parameters{0.3, 0.5, 1e-9, 10, 0}})
     for (double fn : values)
       for (double v : values)
         for (double s : values) {
           const Answer a = ask(*ops, p, fn, v, -v, -s, 0.5 * s);
-          EXPECT_TRUE(std::isfinite(a.fx) && std::isfinite(a.fy) && std::isfinite(a.limit)) << fn << " " << v << " " << s;
+          EXPECT_TRUE(std::isfinite(a.fx) && std::isfinite(a.fy) && std::isfinite(a.limit))
+              << fn << " " << v << " " << s;
           for (double d : a.dv) EXPECT_TRUE(std::isfinite(d)) << fn << " " << v << " " << s;
           for (double d : a.dn) EXPECT_TRUE(std::isfinite(d)) << fn << " " << v << " " << s;
           EXPECT_LE(std::hypot(a.fx, a.fy), a.limit * (1 + 1e-15) + 1e-323) << fn << " " << v << " " << s;
@@ -244,14 +261,19 @@ TEST_F(Coulomb, EveryLane_IsTheSameAloneAndInAnyBatch) {
   std::mt19937 random(7);
   std::normal_distribution<double> g;
   for (uint32_t i = 0; i < all.n; ++i) {
-    all.fn[i] = i % 17 == 0 ? 0 : std::fabs(g(random)), all.area[i] = std::fabs(g(random));
-    for (uint32_t k = 0; k < 2; ++k) all.vt[k * all.stride + i] = i % 13 == 0 ? 0 : 0.01 * g(random), all.stop[k * all.stride + i] = 0.4 * g(random);
+    all.fn[i] = i % 17 == 0 ? 0 : std::fabs(g(random));
+    all.area[i] = std::fabs(g(random));
+    for (uint32_t k = 0; k < 2; ++k) {
+      all.vt[k * all.stride + i] = i % 13 == 0 ? 0 : 0.01 * g(random);
+      all.stop[k * all.stride + i] = 0.4 * g(random);
+    }
   }
   ASSERT_EQ(ops->eval(&all.in, &all.out), DFM_OK);
   int modes[3] = {0, 0, 0};
   for (uint32_t i = 0; i < all.n; ++i) {
     const uint32_t S = all.stride;
-    const Answer one = ask(*ops, p, all.fn[i], all.vt[i], all.vt[S + i], all.stop[i], all.stop[S + i], all.area[i]);
+    const Answer one =
+        ask(*ops, p, all.fn[i], all.vt[i], all.vt[S + i], all.stop[i], all.stop[S + i], all.area[i]);
     EXPECT_EQ(one.fx, all.ft[i]);
     EXPECT_EQ(one.fy, all.ft[S + i]);
     EXPECT_EQ(one.limit, all.limit[i]);
@@ -262,18 +284,25 @@ TEST_F(Coulomb, EveryLane_IsTheSameAloneAndInAnyBatch) {
   for (int count : modes) EXPECT_GT(count, 20) << "the batch holds every case";
 }
 
-// Every compiler, optimization level and vector width must give these bits (house rule; the inputs use + - * / alone as well).
+// Every compiler, optimization level and vector width must give these bits (house rule; the inputs use + - *
+// / alone as well).
 TEST_F(Coulomb, Bits_MatchTheRecordedHash) {
   uint64_t seed = 88172645463325252ull, hash = 14695981039346656037ull;
   const auto uniform = [&] {
-    seed ^= seed << 13, seed ^= seed >> 7, seed ^= seed << 17;
+    seed ^= seed << 13;
+    seed ^= seed >> 7;
+    seed ^= seed << 17;
     return static_cast<double>(seed >> 11) * 0x1p-52 - 1;
   };
   for (const double delta : {2.0, 1.0, 0.8}) {
     Batch b(1000, Parameters{0.3, 0.5, 0.01, delta, 0.4}.values());
     for (uint32_t i = 0; i < b.n; ++i) {
-      b.fn[i] = 1 + uniform(), b.area[i] = 1 + uniform();
-      for (uint32_t k = 0; k < 2; ++k) b.vt[k * b.stride + i] = 0.03 * uniform(), b.stop[k * b.stride + i] = 0.7 * uniform();
+      b.fn[i] = 1 + uniform();
+      b.area[i] = 1 + uniform();
+      for (uint32_t k = 0; k < 2; ++k) {
+        b.vt[k * b.stride + i] = 0.03 * uniform();
+        b.stop[k * b.stride + i] = 0.7 * uniform();
+      }
     }
     ASSERT_EQ(ops->eval(&b.in, &b.out), DFM_OK);
     const auto add = [&](const double *column, uint32_t width) {
@@ -284,7 +313,10 @@ TEST_F(Coulomb, Bits_MatchTheRecordedHash) {
           for (unsigned char byte : bytes) hash = (hash ^ byte) * 1099511628211ull;
         }
     };
-    add(b.ft, 2), add(b.limit, 1), add(b.dv, 4), add(b.dn, 2);
+    add(b.ft, 2);
+    add(b.limit, 1);
+    add(b.dv, 4);
+    add(b.dn, 2);
   }
   EXPECT_EQ(hash, 3992741526289013015ull);
 }
@@ -314,14 +346,16 @@ TEST_F(Coulomb, ClosedLoops_Dissipate) {
 TEST_F(Coulomb, BlockBelowTheConeAngle_NeverMoves) {
   Rig rig;
   const double angle = std::atan(0.5) - 1e-9;
-  for (int i = 0; i < 60000; ++i) rig.step(*ops, Parameters{}.values(), 1e-3, 9.81 * std::sin(angle), 9.81 * std::cos(angle));
+  for (int i = 0; i < 60000; ++i)
+    rig.step(*ops, Parameters{}.values(), 1e-3, 9.81 * std::sin(angle), 9.81 * std::cos(angle));
   EXPECT_EQ(rig.x, 0);
 }
 
 TEST_F(Coulomb, SlidingBlock_AcceleratesByGravityLessFriction) {
   Rig rig;
   const double angle = 0.6, expected = 9.81 * (std::sin(angle) - 0.5 * std::cos(angle));
-  for (int i = 0; i < 1000; ++i) rig.step(*ops, Parameters{}.values(), 1e-3, 9.81 * std::sin(angle), 9.81 * std::cos(angle));
+  for (int i = 0; i < 1000; ++i)
+    rig.step(*ops, Parameters{}.values(), 1e-3, 9.81 * std::sin(angle), 9.81 * std::cos(angle));
   EXPECT_NEAR(rig.v, expected, 1e-12);
 }
 
@@ -334,7 +368,8 @@ TEST_F(Coulomb, ThrownBlock_StopsWhereTheEnergyIsSpent) {
   EXPECT_NEAR(rig.x, 2 * 2 / (2 * 0.5 * 9.81), 2 * h);
 }
 
-// A mass pulled through a spring at constant speed: the closed form of the stick-slip cycle between two levels.
+// A mass pulled through a spring at constant speed: the closed form of the stick-slip cycle
+// between two levels.
 TEST_F(Coulomb, StickSlipPeriod_MatchesTheClosedForm) {
   const double k = 2, pull = 0.1, fc = 1, fs = 1.5, w = std::sqrt(k), df = fs - fc, h = 1e-4;
   const double expected = 2 / w * (kPi - std::atan(df * w / (k * pull))) + 2 * df / (k * pull);  // 7.6113 s
@@ -352,7 +387,13 @@ TEST_F(Coulomb, StickSlipPeriod_MatchesTheClosedForm) {
 
 TEST_F(Coulomb, None_IsZeroEverywhere) {
   Batch b(9);
-  for (uint32_t i = 0; i < b.n; ++i) b.fn[i] = i, b.vt[i] = 1, b.stop[i] = -5, b.ft[i] = 7, b.limit[i] = 7;
+  for (uint32_t i = 0; i < b.n; ++i) {
+    b.fn[i] = i;
+    b.vt[i] = 1;
+    b.stop[i] = -5;
+    b.ft[i] = 7;
+    b.limit[i] = 7;
+  }
   ASSERT_EQ(dfm_law_eval(none, &b.in, &b.out), DFM_OK);
   for (uint32_t i = 0; i < b.n; ++i) {
     EXPECT_EQ(b.ft[i], 0);
@@ -363,7 +404,7 @@ TEST_F(Coulomb, None_IsZeroEverywhere) {
   EXPECT_EQ(dfm_law_eval(none, &b.in, &b.out), DFM_DISCARD);
 }
 
-// ---- reference histories, where they lie beside the repository ----------------------------------------------------------------------
+// ---- reference histories, where they lie beside the repository --------------------------------------------
 
 int column_of(const std::vector<std::string> &header, const std::string &name) {
   for (size_t i = 0; i < header.size(); ++i)
@@ -375,7 +416,8 @@ struct Reference : Coulomb {
   const Parameters dev{0.15, 0.20, 0.01, 2, 0.4};  // F_C 1.47 N, F_S 1.96 N at 9.8 N
   void compare(const std::string &file, const std::string &force) {
     const std::string dir = test::shared_dir();
-    if (dir.empty()) GTEST_SKIP() << "no ../shared beside the repository; the closed forms above cover the law";
+    if (dir.empty())
+      GTEST_SKIP() << "no ../shared beside the repository; the closed forms above cover the law";
     const auto rows = test::read_csv(dir + "/reference/friction/" + file);
     ASSERT_GT(rows.size(), 10u);
     const int v = column_of(rows[0], "v"), f = column_of(rows[0], force);
@@ -383,7 +425,8 @@ struct Reference : Coulomb {
     int compared = 0;
     for (size_t i = 1; i < rows.size(); ++i) {
       const double slip = std::stod(rows[i][size_t(v)]), expected = std::stod(rows[i][size_t(f)]);
-      if (std::fabs(slip) < 1e-15) continue;  // set-valued: the file holds sin(k pi) to rounding, and F = 0 there
+      // set-valued: the file holds sin(k pi) to rounding, and F = 0 there
+      if (std::fabs(slip) < 1e-15) continue;
       EXPECT_NEAR(-slide(*ops, dev, 9.8, slip, 0).fx, expected, 2e-12) << "row " << i;
       ++compared;
     }

@@ -12,10 +12,11 @@ constexpr double kPi = 3.14159265358979323846;
 
 struct Dahl : testing::Test {
   tiny::Context c;
-  Law law, bent;   // F_C = 1.47 N at 9.8 N; exponent 1 and 2.5
+  Law law, bent;  // F_C = 1.47 N at 9.8 N; exponent 1 and 2.5
   void SetUp() override {
     const dfm_law handle = rules::open(c, "friction_dahl");
-    law = rules::law_of(handle, {0.15, 1e4, 1}), bent = rules::law_of(handle, {0.15, 1e4, 2.5});
+    law = rules::law_of(handle, {0.15, 1e4, 1});
+    bent = rules::law_of(handle, {0.15, 1e4, 2.5});
   }
   rules::Draw draw() const { return {std::mt19937(11), 0.15 / 1e4}; }
 };
@@ -43,7 +44,9 @@ TEST_F(Dahl, RulesOfEveryLaw_AreKept) {
 }
 
 TEST_F(Dahl, Derivatives_MatchDifferences) {
-  const auto kink = [](const In &in) { return std::fabs(rules::norm(in.state) * 1e4 * in.area / (0.15 * in.fn) - 1) < 1e-3; };
+  const auto kink = [](const In &in) {
+    return std::fabs(rules::norm(in.state) * 1e4 * in.area / (0.15 * in.fn) - 1) < 1e-3;
+  };
   rules::derivatives(law, draw(), 1000, 1e-6, kink);
   rules::derivatives(bent, draw(), 1000, 1e-5, kink);
 }
@@ -53,13 +56,15 @@ TEST_F(Dahl, Bits_MatchTheRecordedHash) {
   EXPECT_EQ(rules::hash_of_bits(bent, 1.5e-5), 7379536935484329877u);
 }
 
-// Closed forms along the path: F = F_C (1 - e^(-sigma x/F_C)) for exponent 1, else (1 - u)^(1-a) = 1 + (a-1) sigma x / F_C.
+// Closed forms along the path: F = F_C (1 - e^(-sigma x/F_C)) for exponent 1, else (1 - u)^(1-a) = 1 + (a-1)
+// sigma x / F_C.
 TEST_F(Dahl, Loading_IsTheClosedForm) {
   const double fc = 1.47, dx = 3e-4;
   for (double a : {1.0, 2.0, 2.5}) {
     double before = 0;
     const double s = 1e4 * dx / fc, rest = 1 + (a - 1) * s;
-    const double expected = a == 1 ? fc * (1 - std::exp(-s)) : fc * (1 - (rest > 0 ? std::pow(rest, 1 / (1 - a)) : 0.0));
+    const double expected =
+        a == 1 ? fc * (1 - std::exp(-s)) : fc * (1 - (rest > 0 ? std::pow(rest, 1 / (1 - a)) : 0.0));
     for (int n : {1000, 2000, 4000}) {
       Contact k({law.ops, {0.15, 1e4, a}, 2, {0}, {}, false}, 9.8);
       const double error = std::fabs(k.path(dx, n, 0.01) - expected);
@@ -78,7 +83,8 @@ TEST_F(Dahl, SlidingForLong_ReachesTheLevelInOneStepOrMany) {
       for (double w : {1e-4, 1.0, 1e6}) {
         Contact k({law.ops, {0.15, 1e4, a}, 2, {0}, {}, false}, 9.8);
         for (int i = 0; i < 200 || k.x < 0.02; ++i) k.move(w, 0, h > 0.02 / w / 200 ? h : 0.02 / w / 200);
-        EXPECT_NEAR(k.last.f[0], 1.47, a > 1 ? 2e-2 : 1e-9) << a << " " << h << " " << w;   // exponent 2 closes as 1/x
+        // exponent 2 closes as 1/x
+        EXPECT_NEAR(k.last.f[0], 1.47, a > 1 ? 2e-2 : 1e-9) << a << " " << h << " " << w;
         EXPECT_LE(k.last.f[0], 1.47 * (1 + 1e-15));
       }
 }
@@ -87,21 +93,29 @@ TEST_F(Dahl, SlidingForLong_ReachesTheLevelInOneStepOrMany) {
 TEST_F(Dahl, Speed_DoesNotMatter) {
   for (const Law &l : {law, bent}) {
     Contact a(l, 9.8), b(l, 9.8);
-    for (double dx : {2e-4, -1.2e-4, 3e-5, -4e-4}) EXPECT_NEAR(a.path(dx, 100, 1e-4), b.path(dx, 100, 0.1), 1e-12);
+    for (double dx : {2e-4, -1.2e-4, 3e-5, -4e-4})
+      EXPECT_NEAR(a.path(dx, 100, 1e-4), b.path(dx, 100, 0.1), 1e-12);
   }
 }
 
-// A load that cycles between F1 and F2 below the level lets the contact creep: per cycle (F_C/sigma) ln{[1 - (F1/F_C)^2]/[1 - (F2/F_C)^2]}.
+// A load that cycles between F1 and F2 below the level lets the contact creep: per cycle (F_C/sigma) ln{[1 -
+// (F1/F_C)^2]/[1 - (F2/F_C)^2]}.
 TEST_F(Dahl, BiasedLoadBelowTheLevel_DriftsByTheClosedForm) {
   const double fc = 1.47, f1 = -0.5, f2 = 0.9;
   const double expected = fc / 1e4 * std::log((1 - f1 * f1 / fc / fc) / (1 - f2 * f2 / fc / fc));
-  const double work = 1e-4 * (-2 * fc * (f2 - f1) + fc * fc * std::log((1 - f1 / fc) * (1 + f2 / fc) / ((1 - f2 / fc) * (1 + f1 / fc))));
+  const double work =
+      1e-4 * (-2 * fc * (f2 - f1) +
+              fc * fc * std::log((1 - f1 / fc) * (1 + f2 / fc) / ((1 - f2 / fc) * (1 + f1 / fc))));
   Contact k(law, 9.8);
   double x0 = 0, done = 0;
   for (int cycle = 0; cycle < 3; ++cycle) {
-    x0 = k.x, done = 0;
+    x0 = k.x;
+    done = 0;
     for (int i = 1; i <= 2000; ++i) {
-      const double t = i / 2000.0, load = f1 + (f2 - f1) * (t < 0.5 ? 2 * t : 2 - 2 * t), before = k.x, force = k.last.f[0];
+      const double t = i / 2000.0;
+      const double load = f1 + (f2 - f1) * (t < 0.5 ? 2 * t : 2 - 2 * t);
+      const double before = k.x;
+      const double force = k.last.f[0];
       k.carry(load, 1e-3);
       done += 0.5 * (force + k.last.f[0]) * (k.x - before);
     }
@@ -110,12 +124,14 @@ TEST_F(Dahl, BiasedLoadBelowTheLevel_DriftsByTheClosedForm) {
   EXPECT_NEAR(done, work, 0.005 * work);
 }
 
-// Sliding around a circle of radius R: the elastic force lags by atan(F_C/(sigma R)) and is F_C/sqrt(1 + (F_C/(sigma R))^2).
+// Sliding around a circle of radius R: the elastic force lags by atan(F_C/(sigma R)) and is F_C/sqrt(1 +
+// (F_C/(sigma R))^2).
 TEST_F(Dahl, AroundACircle_LagsByTheClosedForm) {
   const double r = 5e-4, v = 5e-3, h = 1e-5, s = 1.47 / (1e4 * r);
   Contact k(law, 9.8);
   double t = 0;
-  for (int i = 0; i < 60000; ++i, t += h) k.move(v * std::cos(v / r * (t + h)), v * std::sin(v / r * (t + h)), h);
+  for (int i = 0; i < 60000; ++i, t += h)
+    k.move(v * std::cos(v / r * (t + h)), v * std::sin(v / r * (t + h)), h);
   const double lag = std::remainder(v / r * t - std::atan2(k.last.f[1], k.last.f[0]), 2 * kPi);
   EXPECT_NEAR(rules::norm(k.last.f), 1.47 / std::sqrt(1 + s * s), 1e-3);
   EXPECT_NEAR(lag, std::atan(s), 1e-3);

@@ -1,5 +1,5 @@
-// The law elastoplastic: nothing is lost below the elastic limit, LuGre's steady curve above it, the reference files, and the rules of every law
-// (doc/laws/elastoplastic.md).
+// The law elastoplastic: nothing is lost below the elastic limit, LuGre's steady curve above it, the
+// reference files, and the rules of every law (doc/laws/elastoplastic.md).
 #include "bristle_rig.h"
 
 using rig::Contact;
@@ -17,9 +17,11 @@ struct Elastoplastic : testing::Test {
   Law dev, constant, cosine, cubic;
   void SetUp() override {
     handle = rules::open(c, "friction_elastoplastic");
-    // mu_C mu_S v_s delta sigma0 sigma1 form v_d sigma2 kappa i multiplier: F_C 1.47 N, F_S 1.96 N, elastic limit 1.029 N at 9.8 N
+    // mu_C mu_S v_s delta sigma0 sigma1 form v_d sigma2 kappa i multiplier: F_C 1.47 N, F_S 1.96 N, elastic
+    // limit 1.029 N at 9.8 N
     dev = make({0.15, 0.20, 0.01, 2, 1e4, 20, 0, 0.01, 0.4, 0.7, 1, 0});
-    constant = make({0.15, 0.20, 0.01, 2, 1e4, 20, 1, 0.01, 0.4, 0.7, 1, 0}), cosine = make({0.15, 0.20, 0.01, 2, 1e4, 20, 1, 0.01, 0.4, 0.7, 1, 1});
+    constant = make({0.15, 0.20, 0.01, 2, 1e4, 20, 1, 0.01, 0.4, 0.7, 1, 0});
+    cosine = make({0.15, 0.20, 0.01, 2, 1e4, 20, 1, 0.01, 0.4, 0.7, 1, 1});
     cubic = make({0.15, 0.20, 0.01, 1.3, 1e4, 20, 0, 0.01, 0.4, 0.5, 3, 0});
   }
   Law make(std::vector<double> params) const { return rules::law_of(handle, std::move(params)); }
@@ -32,7 +34,8 @@ TEST_F(Elastoplastic, SelfDescription_SaysWhatItIs) {
   ASSERT_EQ(dfm_law_type(handle, &type), DFM_OK);
   EXPECT_STREQ(type->id, "org.deform.elastoplastic");
   EXPECT_EQ(dev.ops->flags, uint32_t(DFM_FRIC_ISOTROPIC | DFM_FRIC_PASSIVE | DFM_FRIC_JACOBIAN));
-  const char *keys[] = {"mu_C", "mu_S", "v_s", "delta", "sigma0", "sigma1", "sigma1_form", "v_d", "sigma2", "kappa", "i", "multiplier"};
+  const char *keys[] = {"mu_C",        "mu_S", "v_s",    "delta", "sigma0", "sigma1",
+                        "sigma1_form", "v_d",  "sigma2", "kappa", "i",      "multiplier"};
   ASSERT_EQ(type->nparam, 12u);
   for (int i = 0; i < 12; ++i) EXPECT_STREQ(type->params[i].key, keys[i]);
   EXPECT_STREQ(type->params[11].names[0], "associated");
@@ -53,13 +56,15 @@ TEST_F(Elastoplastic, Derivatives_MatchDifferences) {
     rules::derivatives(l, {std::mt19937(11), mu_s / 1e4}, 1000, tolerance, [&](const In &in) {
       const double z = rules::norm(in.state), cut = std::min(1.0, mu_s * in.fn / (1e4 * in.area) / z);
       const double x = cut * in.state[0] + in.h * in.v[0], y = cut * in.state[1] + in.h * in.v[1];
-      return std::fabs(z * 1e4 * in.area / (mu_s * in.fn) - 1) < 1e-3 || std::fabs(x * in.v[0] + y * in.v[1]) < 1e-3 * std::hypot(x, y) * rules::norm(in.v);
+      return std::fabs(z * 1e4 * in.area / (mu_s * in.fn) - 1) < 1e-3 ||
+             std::fabs(x * in.v[0] + y * in.v[1]) < 1e-3 * std::hypot(x, y) * rules::norm(in.v);
     });
   };
   for (const Law &l : {dev, constant, cosine}) compare(l, 2e-6);
   compare(cubic, 1e-4);
   // plastic flow faster than the slip, which the damping then counts with
-  for (double form : {0.0, 2.0}) compare(make({0.15, 0.75, 0.01, 1.3, 1e4, 2000, form, 0.01, 0.4, 0.5, 3, 0}), 1e-4);
+  for (double form : {0.0, 2.0})
+    compare(make({0.15, 0.75, 0.01, 1.3, 1e4, 2000, form, 0.01, 0.4, 0.5, 3, 0}), 1e-4);
 }
 
 TEST_F(Elastoplastic, Bits_MatchTheRecordedHash) {
@@ -78,28 +83,40 @@ TEST_F(Elastoplastic, PassiveForm_CreatesNoWork) {
       }
 }
 
-// Where the level has fallen with speed far below what the bristle holds, the plastic rate of i > 1 is faster than the slip, and damping counts with it:
-// no single step gives more than the bristle loses, whatever levels and exponent. Damping that counts with the slip fails this between 2 and 4.
+// Where the level has fallen with speed far below what the bristle holds, the plastic rate of i > 1 is faster
+// than the slip, and damping counts with it: no single step gives more than the bristle loses, whatever
+// levels and exponent. Damping that counts with the slip fails this between 2 and 4.
 TEST_F(Elastoplastic, AnyLevelsAndExponents_CreateNoWorkInAnyStep) {
   char why[400] = "";
   for (double ratio : {1.0, 2.1, 3.0, 10.0, 30.0, 300.0})
     for (double i : {1.0, 2.0, 3.0, 8.0})
       for (double multiplier : {0.0, 1.0})
         for (double form : {0.0, 2.0}) {
-          const double sigma1 = form == 0 ? 2000 : 4 * 0.15 * 0.05 / (0.4289 * 0.01) * 0.99;   // falling: passive at this v_d from fn = 0.05 N
+          // falling: passive at this v_d from fn = 0.05 N
+          const double sigma1 = form == 0 ? 2000 : 4 * 0.15 * 0.05 / (0.4289 * 0.01) * 0.99;
           const Law l = make({0.15, 0.15 * ratio, 0.01, 2, 1e4, sigma1, form, 0.01, 0, 0.7, i, multiplier});
           ASSERT_TRUE(!l.ops->check || l.ops->check(l.params.data(), why, sizeof why) == DFM_OK) << why;
           std::mt19937 random(7);
-          const auto uniform = [&](double a, double b) { return std::uniform_real_distribution<double>(a, b)(random); };
+          const auto uniform = [&](double a, double b) {
+            return std::uniform_real_distribution<double>(a, b)(random);
+          };
           const auto decades = [&](double a, double b) { return a * std::pow(b / a, uniform(0, 1)); };
           for (int n = 0; n < 500; ++n) {
             In in;
-            in.h = decades(1e-8, 1.0 / 60), in.fn = n % 16 ? decades(0.05, 10) : 0;
-            const double w = decades(1e-5, 3), at = uniform(0, 2 * kPi), off = n % 2 ? 0.1 * uniform(-1, 1) : uniform(-kPi, kPi);
+            in.h = decades(1e-8, 1.0 / 60);
+            in.fn = n % 16 ? decades(0.05, 10) : 0;
+            const double w = decades(1e-5, 3);
+            const double at = uniform(0, 2 * kPi);
+            const double off = n % 2 ? 0.1 * uniform(-1, 1) : uniform(-kPi, kPi);
             const double z = uniform(0, 1) * 1.5e-5 * ratio * in.fn;
-            in.v[0] = w * std::cos(at), in.v[1] = w * std::sin(at);
-            in.state[0] = z * std::cos(at + off), in.state[1] = z * std::sin(at + off);
-            if (n % 4 == 3) in.state[0] = -(z / w) * in.v[0], in.state[1] = -(z / w) * in.v[1];   // opposed but for rounding, as in any reversal
+            in.v[0] = w * std::cos(at);
+            in.v[1] = w * std::sin(at);
+            in.state[0] = z * std::cos(at + off);
+            in.state[1] = z * std::sin(at + off);
+            if (n % 4 == 3) {
+              in.state[0] = -(z / w) * in.v[0];
+              in.state[1] = -(z / w) * in.v[1];  // opposed but for rounding, as in any reversal
+            }
             const double before = 0.5 * 1e4 * (in.state[0] * in.state[0] + in.state[1] * in.state[1]);
             const Out o = rules::ask(l, in);
             const double work = (o.f[0] * in.v[0] + o.f[1] * in.v[1]) * in.h;
@@ -114,7 +131,9 @@ TEST_F(Elastoplastic, AnyLevelsAndExponents_CreateNoWorkInAnyStep) {
 }
 
 TEST_F(Elastoplastic, PublishedParametersWithConstantSigma1_FailThatTest) {
-  EXPECT_LT(rules::worst_balance(make({1, 1.5, 0.001, 2, 1e5, 316.22776601683796, 1, 0.01, 0.4, 0.7, 1, 0}), 1.5e-5, 200, false), -0.01);
+  EXPECT_LT(rules::worst_balance(make({1, 1.5, 0.001, 2, 1e5, 316.22776601683796, 1, 0.01, 0.4, 0.7, 1, 0}),
+                                 1.5e-5, 200, false),
+            -0.01);
 }
 
 // Any path inside the elastic zone: the bristle is the displacement, to rounding, after any number of steps.
@@ -124,7 +143,9 @@ TEST_F(Elastoplastic, InsideTheElasticZone_NothingIsLost) {
     const double reach = l.params[9] * 1.47e-4 * 0.999;
     for (int n = 0; n < 20000; ++n) {
       const double t = 1e-3 * (n + 1);
-      const double x = 0.7 * reach * std::sin(13 * t), y = 0.7 * reach * std::cos(29 * t) * std::min(1.0, t), h = n % 3 ? 1e-3 : 1.0 / 60;
+      const double x = 0.7 * reach * std::sin(13 * t);
+      const double y = 0.7 * reach * std::cos(29 * t) * std::min(1.0, t);
+      const double h = n % 3 ? 1e-3 : 1.0 / 60;
       k.move((x - k.in.state[0]) / h, (y - k.in.state[1]) / h, h);
       ASSERT_NEAR(k.in.state[0], x, 1e-15 * reach * 100) << n;
       ASSERT_NEAR(k.in.state[1], y, 1e-15 * reach * 100) << n;
@@ -133,7 +154,8 @@ TEST_F(Elastoplastic, InsideTheElasticZone_NothingIsLost) {
   }
 }
 
-// A load that cycles below the elastic limit leaves no drift: exactly none where the steps return to the same loads.
+// A load that cycles below the elastic limit leaves no drift: exactly none where the steps return to
+// the same loads.
 TEST_F(Elastoplastic, BiasedLoadBelowTheElasticLimit_DoesNotDrift) {
   Contact k(dev, 9.8);
   double x0 = 0, x1 = 0;
@@ -145,9 +167,11 @@ TEST_F(Elastoplastic, BiasedLoadBelowTheElasticLimit_DoesNotDrift) {
   EXPECT_LT(std::fabs(x1 - x0), 1e-15);
 }
 
-// Above the elastic limit it drifts, by less than LuGre: doc/laws/formulas.md has 1.59e-6 against 8.0e-5 m per cycle with inertia.
+// Above the elastic limit it drifts, by less than LuGre: doc/laws/formulas.md has 1.59e-6 against 8.0e-5 m
+// per cycle with inertia.
 TEST_F(Elastoplastic, BiasedLoadAboveTheElasticLimit_DriftsLessThanLugre) {
-  const Law lugre = rules::law_of(rules::open(c, "friction_lugre"), std::vector<double>(dev.params.begin(), dev.params.begin() + 9));
+  const Law lugre = rules::law_of(rules::open(c, "friction_lugre"),
+                                  std::vector<double>(dev.params.begin(), dev.params.begin() + 9));
   double drift[2];
   int n = 0;
   for (const Law &l : {dev, lugre}) {
@@ -179,7 +203,11 @@ TEST_F(Elastoplastic, VanishingNormalForce_LeavesTheSlopeOfTheCone) {
     for (double w : {1e-4, 0.01, 1.0})
       for (double fn : {1e-9, 1e-30, 1e-100, 1e-139}) {
         In in;
-        in.fn = fn, in.v[0] = 0.6 * w, in.v[1] = -0.8 * w, in.state[0] = 3e-5, in.state[1] = 1e-5;
+        in.fn = fn;
+        in.v[0] = 0.6 * w;
+        in.v[1] = -0.8 * w;
+        in.state[0] = 3e-5;
+        in.state[1] = 1e-5;
         const Out o = rules::ask(make({0.15, 0.20, 0.01, 2, 1e4, 20, 0, 0.01, 0, 0.7, 1, multiplier}), in);
         const double mu = 0.15 + 0.05 * std::exp(-w * w / 1e-4);
         EXPECT_NEAR(o.f[0] / fn, 0.6 * mu, 1e-4 * mu) << w << " " << fn;
@@ -226,19 +254,24 @@ TEST_F(Elastoplastic, FallingNormalForce_CutsTheBristleFirst) {
   EXPECT_NEAR(k.last.f[0], 0.20, 1e-15);
 }
 
-// The yield share alpha out of one small step at a held speed: m = w - g dz/dt /(K0 z), as the file's table gives it for both directions of motion.
+// The yield share alpha out of one small step at a held speed: m = w - g dz/dt /(K0 z), as the file's table
+// gives it for both directions of motion.
 TEST_F(Elastoplastic, AlphaMap_MatchesTheReference) {
   READ_OR_SKIP(t, "curves_alpha.csv");
   int compared = 0;
   for (size_t i = 1; i < t.size(); ++i) {
     const double z = t.at(i, "z"), speed = t.at(i, "speed"), level = 1e4 * t.at(i, "z_max");
-    if (std::fabs(z) * 1e4 > 1.96) continue;   // beyond the static cone: no state of this law
+    if (std::fabs(z) * 1e4 > 1.96) continue;  // beyond the static cone: no state of this law
     for (int sign : {1, -1}) {
       const double w = speed > 0 ? speed : 1e-7;
       In in;
-      in.fn = 9.8, in.v[0] = sign * w, in.h = 1e-9 / w * 1e-3, in.state[0] = z;
+      in.fn = 9.8;
+      in.v[0] = sign * w;
+      in.h = 1e-9 / w * 1e-3;
+      in.state[0] = z;
       const Out o = rules::ask(make({0.15, 0.20, 0.01, 2, 1e4, 0, 0, 0.01, 0, 0.7, 1, 0}), in);
-      const double rate = (o.state[0] - z) / in.h / in.v[0], expected = t.at(i, sign > 0 ? "alpha_moving_plus" : "alpha_moving_minus");
+      const double rate = (o.state[0] - z) / in.h / in.v[0];
+      const double expected = t.at(i, sign > 0 ? "alpha_moving_plus" : "alpha_moving_minus");
       EXPECT_NEAR(rate, 1 - expected * 1e4 * std::fabs(z) / level, 2e-6) << z << " " << speed;
       ++compared;
     }
@@ -270,7 +303,9 @@ TEST_F(Elastoplastic, TurnOfTheSlip_ConvergesToBothReferences) {
           const double angle = t0 + n * h > 0.2 ? kPi / 2 : 0;
           k.move(5e-3 * std::cos(angle), 5e-3 * std::sin(angle), h);
         }
-        if (std::fabs(t1 - 0.2) > 0.01) worst = std::max({worst, std::fabs(k.last.f[0] - t.at(i, "Fx")), std::fabs(k.last.f[1] - t.at(i, "Fy"))});
+        if (std::fabs(t1 - 0.2) > 0.01)
+          worst = std::max(
+              {worst, std::fabs(k.last.f[0] - t.at(i, "Fx")), std::fabs(k.last.f[1] - t.at(i, "Fy"))});
       }
       EXPECT_LT(worst, 0.02);
       if (before > 0) {

@@ -1,4 +1,5 @@
-// The law gms: return-point memory, the reference histories, passivity in its own form, and the rules of every law (doc/laws/gms.md).
+// The law gms: return-point memory, the reference histories, passivity in its own form, and the rules of
+// every law (doc/laws/gms.md).
 #include "bristle_rig.h"
 
 using rig::Contact;
@@ -27,7 +28,8 @@ struct Gms : testing::Test {
     handle = rules::open(c, "friction_gms");
     // mu_C mu_S v_s delta sigma2 C k[4] nu[4]: F_C 1.47 N, F_S 1.96 N at 9.8 N
     dev = make({0.15, 0.20, 0.01, 2, 0.4, 60, 4000, 3000, 2000, 1000, 0.2, 0.3, 0.3, 0.2});
-    maxwell = make({0.20, 0.20, 0.01, 2, 0, 60, 4000, 3000, 2000, 1000, 0.2, 0.3, 0.3, 0.2});   // one level: Maxwell-slip
+    // one level: Maxwell-slip
+    maxwell = make({0.20, 0.20, 0.01, 2, 0, 60, 4000, 3000, 2000, 1000, 0.2, 0.3, 0.3, 0.2});
   }
   Law make(const std::vector<double> &params) const { return rules::law_of(handle, wide(params)); }
   rules::Draw draw() const { return {std::mt19937(11), 2e-5}; }
@@ -58,23 +60,35 @@ TEST_F(Gms, RulesOfEveryLaw_AreKept) {
 }
 
 TEST_F(Gms, Derivatives_MatchDifferences) {
-  for (const Law &l : {dev, maxwell}) rules::derivatives(l, draw(), 1000, 1e-6, [](const In &) { return false; });
+  for (const Law &l : {dev, maxwell})
+    rules::derivatives(l, draw(), 1000, 1e-6, [](const In &) { return false; });
 }
 
-// A contact whose area grows from one step to the next, as in a patch whose load moves, has no more energy for it: all bristles are let go first, so that
-// only the budget is stored.
+// A contact whose area grows from one step to the next, as in a patch whose load moves, has no more energy
+// for it: all bristles are let go first, so that only the budget is stored.
 TEST_F(Gms, GrowingArea_BringsNoEnergy) {
   std::vector<double> state(dev.nstate, 0.0);
-  state[dev.nstate - 1] = 1e-9;   // J: below what the law keeps at most at these forces and areas
+  state[dev.nstate - 1] = 1e-9;  // J: below what the law keeps at most at these forces and areas
   double last = 0;
   for (const double area : {1.0, 1.5, 3.0, 10.0}) {
-    alignas(64) double fn[8] = {9.8}, vt[16] = {}, stop[16] = {}, a[8] = {area}, in_state[8 * 16] = {}, out_state[8 * 16] = {}, stored[8] = {};
+    alignas(64) double fn[8] = {9.8}, vt[16] = {}, stop[16] = {}, a[8] = {area}, in_state[8 * 16] = {},
+                       out_state[8 * 16] = {}, stored[8] = {};
     for (uint32_t s = 0; s < dev.nstate; ++s) in_state[8 * s] = state[s];
     dfm_friction_in in{};
-    in.size = sizeof in, in.n = 1, in.stride = 8, in.dt = 1e-3, in.params = dev.params.data(), in.fn = fn, in.vt = vt;
-    in.ft_stop = stop, in.area = a, in.state = in_state;
+    in.size = sizeof in;
+    in.n = 1;
+    in.stride = 8;
+    in.dt = 1e-3;
+    in.params = dev.params.data();
+    in.fn = fn;
+    in.vt = vt;
+    in.ft_stop = stop;
+    in.area = a;
+    in.state = in_state;
     dfm_friction_out out{};
-    out.size = sizeof out, out.state = out_state, out.stored = stored;
+    out.size = sizeof out;
+    out.state = out_state;
+    out.stored = stored;
     ASSERT_EQ(dev.ops->eval(&in, &out), DFM_OK);
     for (uint32_t s = 0; s < dev.nstate; ++s) state[s] = out_state[8 * s];
     if (last > 0) {
@@ -96,15 +110,32 @@ TEST_F(Gms, ParametersThatDoNotFit_AreRefused) {
     EXPECT_EQ(dev.ops->check(wide(p).data(), why, sizeof why), DFM_E_ARG);
     return std::string(why);
   };
-  EXPECT_NE(refusal({0.15, 0.20, 0.01, 2, 0, 60, 4000, 3000, 2000, 1000, 0.2, 0.3, 0.3, 0.3}).find("the 4 nu must add up to 1; their sum is 1.1"), std::string::npos);
-  EXPECT_NE(refusal({0.15, 0.20, 0.01, 2, 0, 60, 4000, 0, 2000, 1000, 0.2, 0.3, 0.3, 0.2}).find("for element 2"), std::string::npos);
-  EXPECT_NE(refusal({0.25, 0.20, 0.01, 2, 0, 60, 0, 0, 0, 0, 0, 0, 0, 0}).find("mu_S (0.2)"), std::string::npos);
-  EXPECT_NE(refusal({0.15, 0.20, 0.01, 2, 0, 60, 5, 4, 3, 2, 1, 0, 0, 0, 0, 0}).find("k has 5 values and nu has none"), std::string::npos);
-  EXPECT_NE(refusal({0.15, 0.20, 0.01, 2, 0, 60, 0, 0, 0, 0, 0, 0.2, 0.2, 0.2, 0.2, 0.2}).find("nu has 5 values and k has none"), std::string::npos);
-  EXPECT_NE(refusal({0.15, 0.20, 0.01, 2, 0, 60, 5, 4, 3, 0, 0.5, 0.5, 0, 0}).find("k has 3 values and nu has 2 "), std::string::npos);
-  EXPECT_NE(refusal({0.15, 0.20, 0.01, 2, 0, 60, 5, 0, 0, 0, 0.5, 0.5, 0, 0}).find("k has 1 value and nu has 2 "), std::string::npos);
-  EXPECT_NE(refusal({0.15, 0.20, 0.01, 2, 0, 60, 5, 4, 3, 0, 0, 0, 0, 0}).find("k has 3 values and nu has none"), std::string::npos);
-  EXPECT_NE(refusal({0.15, 0.20, 0.01, 2, 0, 60, 0, 0, 0, 0, 0.5, 0.5, 0, 0}).find("nu has 2 values and k has none"), std::string::npos);
+  EXPECT_NE(refusal({0.15, 0.20, 0.01, 2, 0, 60, 4000, 3000, 2000, 1000, 0.2, 0.3, 0.3, 0.3})
+                .find("the 4 nu must add up to 1; their sum is 1.1"),
+            std::string::npos);
+  EXPECT_NE(
+      refusal({0.15, 0.20, 0.01, 2, 0, 60, 4000, 0, 2000, 1000, 0.2, 0.3, 0.3, 0.2}).find("for element 2"),
+      std::string::npos);
+  EXPECT_NE(refusal({0.25, 0.20, 0.01, 2, 0, 60, 0, 0, 0, 0, 0, 0, 0, 0}).find("mu_S (0.2)"),
+            std::string::npos);
+  EXPECT_NE(refusal({0.15, 0.20, 0.01, 2, 0, 60, 5, 4, 3, 2, 1, 0, 0, 0, 0, 0})
+                .find("k has 5 values and nu has none"),
+            std::string::npos);
+  EXPECT_NE(refusal({0.15, 0.20, 0.01, 2, 0, 60, 0, 0, 0, 0, 0, 0.2, 0.2, 0.2, 0.2, 0.2})
+                .find("nu has 5 values and k has none"),
+            std::string::npos);
+  EXPECT_NE(
+      refusal({0.15, 0.20, 0.01, 2, 0, 60, 5, 4, 3, 0, 0.5, 0.5, 0, 0}).find("k has 3 values and nu has 2 "),
+      std::string::npos);
+  EXPECT_NE(
+      refusal({0.15, 0.20, 0.01, 2, 0, 60, 5, 0, 0, 0, 0.5, 0.5, 0, 0}).find("k has 1 value and nu has 2 "),
+      std::string::npos);
+  EXPECT_NE(
+      refusal({0.15, 0.20, 0.01, 2, 0, 60, 5, 4, 3, 0, 0, 0, 0, 0}).find("k has 3 values and nu has none"),
+      std::string::npos);
+  EXPECT_NE(refusal({0.15, 0.20, 0.01, 2, 0, 60, 0, 0, 0, 0, 0.5, 0.5, 0, 0})
+                .find("nu has 2 values and k has none"),
+            std::string::npos);
   char why[256] = "";
   const std::vector<double> usual{0.5, 0.5, 0.01, 2, 0, 1e5, 0, 0, 0, 0, 0, 0, 0, 0};
   EXPECT_EQ(dev.ops->check(wide(usual).data(), why, sizeof why), DFM_OK);
@@ -112,7 +143,8 @@ TEST_F(Gms, ParametersThatDoNotFit_AreRefused) {
   EXPECT_NEAR(k.path(1e-10, 1, 1e-3), 1e8 * 1e-10, 1e-15) << "the usual four stiffnesses together";
 }
 
-// An inner loop closes where it began, to rounding: the force at a displacement depends on the extremes before it, not on the way between.
+// An inner loop closes where it began, to rounding: the force at a displacement depends on the extremes
+// before it, not on the way between.
 TEST_F(Gms, InnerLoops_CloseAtTheirReturnPoints) {
   Contact k(maxwell, 9.8);
   const double outer = k.path(2e-4, 200, 1e-3);
@@ -131,19 +163,26 @@ TEST_F(Gms, OneLevel_IsMaxwellSlipInAnyStep) {
   for (int n = 0; n < 500; ++n) {
     const double dx = std::normal_distribution<double>(0, 1e-4)(random), h = n % 2 ? 1e-3 : 1.0 / 30;
     double sum = 0;
-    for (int e = 0; e < 4; ++e) f[e] = std::clamp(f[e] + stiffness[e] * dx, -share[e] * 1.96, share[e] * 1.96), sum += f[e];
+    for (int e = 0; e < 4; ++e) {
+      f[e] = std::clamp(f[e] + stiffness[e] * dx, -share[e] * 1.96, share[e] * 1.96);
+      sum += f[e];
+    }
     EXPECT_NEAR(k.move(dx / h, 0, h).f[0], sum, 1e-12) << n;
   }
 }
 
-// At a crawl after sliding the elements rise to the static level, as published; the energy for that is what sliding has paid, and it is paid once.
+// At a crawl after sliding the elements rise to the static level, as published; the energy for that is what
+// sliding has paid, and it is paid once.
 TEST_F(Gms, CrawlAfterSliding_RisesOnWhatSlidingHasPaid) {
   Contact k(dev, 9.8);
   k.path(0.05, 500, 0.1);
   EXPECT_NEAR(k.last.f[0], g(0.1) + 0.04, 1e-9);
   Contact poor = k;
-  poor.in.state[12] = 0;   // nothing in the budget
-  for (int i = 0; i < 10000; ++i) k.move(1e-12, 0, 1e-3), poor.move(1e-12, 0, 1e-3);
+  poor.in.state[12] = 0;  // nothing in the budget
+  for (int i = 0; i < 10000; ++i) {
+    k.move(1e-12, 0, 1e-3);
+    poor.move(1e-12, 0, 1e-3);
+  }
   EXPECT_NEAR(k.last.f[0], 1.96, 0.05) << "10 s at 1e-12 m/s";
   EXPECT_NEAR(poor.last.f[0], 1.47, 1e-6);
   EXPECT_LT(k.in.state[12], 2.5e-4) << "the budget is bounded by the elastic energy at the static level";
@@ -183,7 +222,8 @@ TEST_F(Gms, HeldAtAnyLoad_KeepsItsElementsToTheBit) {
 
 TEST_F(Gms, NearlyRigidElements_StayBoundedAndPassiveAtEveryStep) {
   for (double k : {1e9, 1e12, 1e15}) {
-    const Law l = make({0.15, 0.20, 0.01, 2, 0.4, k / 100, 0.4 * k, 0.3 * k, 0.2 * k, 0.1 * k, 0.2, 0.3, 0.3, 0.2});
+    const Law l =
+        make({0.15, 0.20, 0.01, 2, 0.4, k / 100, 0.4 * k, 0.3 * k, 0.2 * k, 0.1 * k, 0.2, 0.3, 0.3, 0.2});
     EXPECT_GE(rules::worst_balance(l, 0.20 / k, 200, false), -1e-12) << k;
     rules::extremes(l, 0.20 / k);
   }
@@ -198,12 +238,14 @@ TEST_F(Gms, FallingNormalForce_CutsTheElementsFirst) {
 }
 
 TEST_F(Gms, SineVelocities_ConvergeToTheReference) {
-  for (const auto &[file, speed] : {std::pair{"sinvel_V1_gms.csv", 0.01}, {"sinvel_V2_gms.csv", 0.02}, {"sinvel_presliding_gms.csv", 0.0004}}) {
+  for (const auto &[file, speed] : {std::pair{"sinvel_V1_gms.csv", 0.01},
+                                    {"sinvel_V2_gms.csv", 0.02},
+                                    {"sinvel_presliding_gms.csv", 0.0004}}) {
     READ_OR_SKIP(t, file);
     double top = 0, worst = 0;
     Contact k(dev, 9.8);
     for (size_t i = 2; i < t.size(); ++i) {
-      const double t0 = t.at(i - 1, "t"), h = (t.at(i, "t") - t0) / 100;   // 1e-4 s
+      const double t0 = t.at(i - 1, "t"), h = (t.at(i, "t") - t0) / 100;  // 1e-4 s
       for (int n = 1; n <= 100; ++n) k.move(speed * std::sin(2 * kPi * (t0 + n * h)), 0, h);
       top = std::max(top, std::fabs(t.at(i, "F")));
       worst = std::max(worst, std::fabs(k.last.f[0] - t.at(i, "F")));
@@ -214,11 +256,14 @@ TEST_F(Gms, SineVelocities_ConvergeToTheReference) {
 
 TEST_F(Gms, PreslidingLoops_MatchTheReference) {
   READ_OR_SKIP(t, "presliding.csv");
-  Contact a(make({0.20, 0.20, 0.01, 2, 0, 60, 4900, 2450, 1633.3333333333333, 1225, 980, 0.2, 0.2, 0.2, 0.2, 0.2}), 9.8);
-  for (size_t i = 2; i < t.size(); ++i) EXPECT_NEAR(a.path(t.at(i, "x") - t.at(i - 1, "x"), 1, 1e-3), t.at(i, "F_maxwell_slip"), 1e-11) << i;
+  Contact a(
+      make({0.20, 0.20, 0.01, 2, 0, 60, 4900, 2450, 1633.3333333333333, 1225, 980, 0.2, 0.2, 0.2, 0.2, 0.2}),
+      9.8);
+  for (size_t i = 2; i < t.size(); ++i)
+    EXPECT_NEAR(a.path(t.at(i, "x") - t.at(i - 1, "x"), 1, 1e-3), t.at(i, "F_maxwell_slip"), 1e-11) << i;
 }
 
-// ---- any number of elements --------------------------------------------------------------------------------------------------------
+// ---- any number of elements -------------------------------------------------------------------------------
 
 std::vector<double> spread(uint32_t n, double mu_s = 0.20) {
   std::vector<double> p{0.15, mu_s, 0.01, 2, 0.4, 60};
@@ -249,7 +294,10 @@ TEST_F(Gms, SixteenElementsWithOneLevel_AreMaxwellSlipInAnyStep) {
     for (int step = 0; step < 300; ++step) {
       const double dx = std::normal_distribution<double>(0, 1e-4)(random), h = step % 2 ? 1e-3 : 1.0 / 30;
       double sum = 0;
-      for (uint32_t e = 0; e < n; ++e) f[e] = std::clamp(f[e] + p[6 + e] * dx, -p[6 + n + e] * 1.47, p[6 + n + e] * 1.47), sum += f[e];
+      for (uint32_t e = 0; e < n; ++e) {
+        f[e] = std::clamp(f[e] + p[6 + e] * dx, -p[6 + n + e] * 1.47, p[6 + n + e] * 1.47);
+        sum += f[e];
+      }
       EXPECT_NEAR(k.move(dx / h, 0, h).f[0], sum, 1e-12) << n << " " << step;
     }
   }
@@ -271,12 +319,15 @@ TEST_F(Gms, NumberOfElements_IsThatOfTheValuesGiven) {
   EXPECT_EQ(five[11], 0.0);
   EXPECT_EQ(rules::law_of(handle, five).nstate, 16u);
   EXPECT_TRUE(packed(17, 5).empty());
-  EXPECT_NE(std::string(dfm_last_error()).find("\"k\" has 17 values, 1 to 16 expected"), std::string::npos) << dfm_last_error();
+  EXPECT_NE(std::string(dfm_last_error()).find("\"k\" has 17 values, 1 to 16 expected"), std::string::npos)
+      << dfm_last_error();
 }
 
 TEST_F(Gms, CaseWithFiveElements_RunsOnTheRig) {
   const std::string dir = tiny::folder("gms_case");
-  test::write_file(dir + "/five.json", R"({"scenario": "sinvel", "law": "gms", "columns": [{"name": "t"}, {"name": "F"}, {"name": "f1"}, {"name": "f5"}],
+  test::write_file(
+      dir + "/five.json",
+      R"({"scenario": "sinvel", "law": "gms", "columns": [{"name": "t"}, {"name": "F"}, {"name": "f1"}, {"name": "f5"}],
     "params": {"F_C": 1.47, "F_S": 1.96, "v_s": 0.01, "delta": 2, "sigma2": 0.4, "C": 60, "k": [4000, 3000, 2000, 1000, 500], "nu": [0.2, 0.3, 0.2, 0.2, 0.1]},
     "initial": {}, "input": {"kind": "sine_velocity", "V": 0.01, "freq": 1, "T": 0.5}, "output_times": [0, 0.1, 0.2]})");
   const test::CommandResult r = test::deform({"friction", dir + "/five.json", "--csv", dir + "/five.csv"});

@@ -1,4 +1,5 @@
-// The law karnopp against its closed forms, the three tests of (5.7) and reference histories (doc/laws/karnopp.md).
+// The law karnopp against its closed forms, the three tests of (5.7) and reference histories
+// (doc/laws/karnopp.md).
 #include <cstring>
 
 #include "law_rules.h"
@@ -15,7 +16,10 @@ struct Karnopp : testing::Test {
   Context c;
   const dfm_friction *ops = nullptr, *coulomb = nullptr;
   const std::vector<double> plain{0.4, 0.6, 0.01, 2, 3, 1e-3};  // mu_C mu_S v_s delta sigma2 dv
-  void SetUp() override { ops = open("friction_karnopp"), coulomb = open("friction_coulomb"); }
+  void SetUp() override {
+    ops = open("friction_karnopp");
+    coulomb = open("friction_coulomb");
+  }
   const dfm_friction *open(const char *name) {
     const dfm_type *type = nullptr;
     dfm_law_type(c.open(std::string(DEFORM_PLUGIN_DIR) + "/" + name + ".so"), &type);
@@ -80,7 +84,8 @@ TEST_F(Karnopp, FarBeyondTheBand_IsCoulombToTheBit) {
 
 TEST_F(Karnopp, RulesOfEveryLaw_AreKept) {
   for (double delta : {2.0, 0.7}) {
-    const rules::Law l = rules::law_of(c.open(std::string(DEFORM_PLUGIN_DIR) + "/friction_karnopp.so"), {0.6, 0.9, 0.01, delta, 0.4, 1e-3});
+    const rules::Law l = rules::law_of(c.open(std::string(DEFORM_PLUGIN_DIR) + "/friction_karnopp.so"),
+                                       {0.6, 0.9, 0.01, delta, 0.4, 1e-3});
     const rules::Draw draw;
     EXPECT_TRUE(l.set_valued);
     rules::odd_to_the_bit(l, draw);
@@ -90,7 +95,7 @@ TEST_F(Karnopp, RulesOfEveryLaw_AreKept) {
     rules::no_normal_force_is_open(l, 0);
     rules::bad_lane_stays_in_its_lane(l, draw);
     rules::same_alone_and_in_any_batch(l, draw);
-    rules::Law narrow = l;   // within the band the answer follows ft_stop, not the slip
+    rules::Law narrow = l;  // within the band the answer follows ft_stop, not the slip
     narrow.params[5] = 1e-7;
     rules::derivatives(narrow, draw, 1000, 1e-6, [](const rules::In &) { return false; });
     EXPECT_GE(rules::worst_balance(l, 0, 300, false), 0);
@@ -100,7 +105,8 @@ TEST_F(Karnopp, RulesOfEveryLaw_AreKept) {
 TEST_F(Karnopp, OppositeInput_GivesTheOppositeForceToTheBit) {
   for (double v : {1e-6, 0.9e-3, 1.1e-3, 0.3})
     for (double s : {0.1, 0.9, 1.3, 20.0}) {
-      const Answer a = one_contact(*ops, plain, 2, v, -2 * v, -s, s), b = one_contact(*ops, plain, 2, -v, 2 * v, s, -s);
+      const Answer a = one_contact(*ops, plain, 2, v, -2 * v, -s, s);
+      const Answer b = one_contact(*ops, plain, 2, -v, 2 * v, s, -s);
       EXPECT_EQ(a.fx, -b.fx) << v << " " << s;
       EXPECT_EQ(a.fy, -b.fy) << v << " " << s;
       EXPECT_EQ(a.mode, b.mode) << v << " " << s;
@@ -112,9 +118,16 @@ TEST_F(Karnopp, BadLane_StaysInItsLane) {
     for (int input = 0; input < 6; ++input) {
       Batch good(11, plain), spoilt(11, plain);
       for (Batch *b : {&good, &spoilt})
-        for (uint32_t i = 0; i < b->n; ++i)
-          b->fn[i] = 1 + i, b->vt[i] = 0.0003 * i, b->vt[b->stride + i] = 0.0002, b->stop[i] = -0.3 * i, b->stop[b->stride + i] = 0.2;
-      double *columns[] = {spoilt.fn, spoilt.vt, spoilt.vt + spoilt.stride, spoilt.stop, spoilt.stop + spoilt.stride, spoilt.area};
+        for (uint32_t i = 0; i < b->n; ++i) {
+          b->fn[i] = 1 + i;
+          b->vt[i] = 0.0003 * i;
+          b->vt[b->stride + i] = 0.0002;
+          b->stop[i] = -0.3 * i;
+          b->stop[b->stride + i] = 0.2;
+        }
+      double *columns[] = {
+          spoilt.fn,  spoilt.vt, spoilt.vt + spoilt.stride, spoilt.stop, spoilt.stop + spoilt.stride,
+          spoilt.area};
       columns[input][6] = bad;
       ASSERT_EQ(ops->eval(&good.in, &good.out), DFM_OK);
       ASSERT_EQ(ops->eval(&spoilt.in, &spoilt.out), DFM_OK);
@@ -129,25 +142,35 @@ TEST_F(Karnopp, EveryLane_IsTheSameAloneAndInAnyBatch) {
   Batch all(1000, plain);
   uint64_t seed = 88172645463325252ull;
   const auto uniform = [&] {
-    seed ^= seed << 13, seed ^= seed >> 7, seed ^= seed << 17;
+    seed ^= seed << 13;
+    seed ^= seed >> 7;
+    seed ^= seed << 17;
     return static_cast<double>(seed >> 11) * 0x1p-52 - 1;
   };
   for (uint32_t i = 0; i < all.n; ++i) {
-    all.fn[i] = i % 17 == 0 ? 0 : std::fabs(uniform()), all.area[i] = std::fabs(uniform());
+    all.fn[i] = i % 17 == 0 ? 0 : std::fabs(uniform());
+    all.area[i] = std::fabs(uniform());
     const double scale = i % 3 ? 0.05 : 7e-4;
-    for (uint32_t k = 0; k < 2; ++k) all.vt[k * all.stride + i] = i % 13 == 0 ? 0 : scale * uniform(), all.stop[k * all.stride + i] = uniform();
+    for (uint32_t k = 0; k < 2; ++k) {
+      all.vt[k * all.stride + i] = i % 13 == 0 ? 0 : scale * uniform();
+      all.stop[k * all.stride + i] = uniform();
+    }
   }
   ASSERT_EQ(ops->eval(&all.in, &all.out), DFM_OK);
   int modes[3] = {0, 0, 0};
   const uint32_t S = all.stride;
   for (uint32_t i = 0; i < all.n; ++i) {
-    const Answer one = one_contact(*ops, plain, all.fn[i], all.vt[i], all.vt[S + i], all.stop[i], all.stop[S + i], all.area[i]);
+    const Answer one = one_contact(*ops, plain, all.fn[i], all.vt[i], all.vt[S + i], all.stop[i],
+                                   all.stop[S + i], all.area[i]);
     EXPECT_EQ(one.fx, all.ft[i]);
     EXPECT_EQ(one.fy, all.ft[S + i]);
     EXPECT_EQ(one.limit, all.limit[i]);
     ASSERT_LT(all.mode[i], 3);
     EXPECT_LE(std::hypot(all.ft[i], all.ft[S + i]), all.limit[i] * (1 + 1e-15));
-    EXPECT_LE(all.mode[i] == 2 && std::hypot(all.vt[i], all.vt[S + i]) > 1e-3 ? all.ft[i] * all.vt[i] + all.ft[S + i] * all.vt[S + i] : 0, 0)
+    EXPECT_LE(all.mode[i] == 2 && std::hypot(all.vt[i], all.vt[S + i]) > 1e-3
+                  ? all.ft[i] * all.vt[i] + all.ft[S + i] * all.vt[S + i]
+                  : 0,
+              0)
         << "what slides is braked";
     ++modes[all.mode[i]];
   }
@@ -172,7 +195,8 @@ TEST_F(Karnopp, ThrownBlock_EndsAtExactlyZeroAndStaysThere) {
   EXPECT_EQ(rig.x, there) << "below the cone nothing creeps";
 }
 
-// The spring-driven mass of doc/laws/formulas.md: with the band of 1e-4 m/s the period is 6.5173 s, where the law without a band has 6.5123 s.
+// The spring-driven mass of doc/laws/formulas.md: with the band of 1e-4 m/s the period is 6.5173 s, where the
+// law without a band has 6.5123 s.
 TEST_F(Karnopp, StickSlipPeriod_IsThatOfTheReference) {
   const std::vector<double> p{1, 1.5, 1e-3, 2, 0.4, 1e-4};
   const double k = 2, pull = 0.1, h = 2e-5;

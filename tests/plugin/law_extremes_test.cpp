@@ -1,4 +1,5 @@
-// Every law of the shelf at every scale of its inputs: answers are finite, within their limit, and the same bits at the narrowest and the widest vectors.
+// Every law of the shelf at every scale of its inputs: answers are finite, within their limit, and the same
+// bits at the narrowest and the widest vectors.
 #include <random>
 
 #include "tiny_support.h"
@@ -18,7 +19,8 @@ struct Shelf {
     const dfm_type *type = nullptr;
     EXPECT_EQ(dfm_law_type(law, &type), DFM_OK) << dfm_last_error();
     ops = static_cast<const dfm_friction *>(type->ops);
-    for (uint32_t i = 0; i < type->nparam; ++i) params.insert(params.end(), type->params[i].width, type->params[i].def);
+    for (uint32_t i = 0; i < type->nparam; ++i)
+      params.insert(params.end(), type->params[i].width, type->params[i].def);
     for (uint32_t s = 0; s < ops->nslot; ++s) nstate += ops->slots[s].width;
   }
 };
@@ -35,8 +37,13 @@ struct Draw {
   void fill(tiny::Batch &b) {
     b.in.dt = std::pow(10.0, -12 + 13 * one());
     for (uint32_t i = 0; i < b.n; ++i) {
-      b.fn[i] = scale(-320, 100, false), b.area[i] = scale(-40, 10, false), b.dwell[i] = scale(-12, 9, false);
-      for (uint32_t k = 0; k < 2; ++k) b.vt[k * b.stride + i] = scale(-320, 80, true), b.stop[k * b.stride + i] = scale(-320, 100, true);
+      b.fn[i] = scale(-320, 100, false);
+      b.area[i] = scale(-40, 10, false);
+      b.dwell[i] = scale(-12, 9, false);
+      for (uint32_t k = 0; k < 2; ++k) {
+        b.vt[k * b.stride + i] = scale(-320, 80, true);
+        b.stop[k * b.stride + i] = scale(-320, 100, true);
+      }
       for (uint32_t k = 0; k < b.nstate; ++k) b.state[k * b.stride + i] = scale(-320, 60, true);
     }
   }
@@ -52,13 +59,15 @@ TEST_P(LawExtremes, InputsOfEveryScale_AnswersAreFiniteAndWithinTheirLimit) {
   for (uint32_t round = 0; round < kBatches; ++round) {
     tiny::Batch a(kContacts, narrow.params, narrow.nstate), b(kContacts, wide.params, wide.nstate);
     Draw again = draw;
-    draw.fill(a), again.fill(b);
+    draw.fill(a);
+    again.fill(b);
     ASSERT_EQ(narrow.ops->eval(&a.in, &a.out), DFM_OK);
     ASSERT_EQ(wide.ops->eval(&b.in, &b.out), DFM_OK);
     for (uint32_t i = 0; i < kContacts; ++i) {
       const auto said = [&] {
-        return testing::Message() << "round " << round << " contact " << i << ": h " << a.in.dt << " fn " << a.fn[i] << " v " << a.vt[i] << ' '
-                                  << a.vt[a.stride + i] << " area " << a.area[i];
+        return testing::Message() << "round " << round << " contact " << i << ": h " << a.in.dt << " fn "
+                                  << a.fn[i] << " v " << a.vt[i] << ' ' << a.vt[a.stride + i] << " area "
+                                  << a.area[i];
       };
       double poison = 0;
       for (uint32_t k = 0; k < 2; ++k) poison += 0.0 * a.ft[k * a.stride + i] + 0.0 * a.dn[k * a.stride + i];
@@ -68,13 +77,15 @@ TEST_P(LawExtremes, InputsOfEveryScale_AnswersAreFiniteAndWithinTheirLimit) {
       ASSERT_GE(a.limit[i], 0) << said();
       ASSERT_LE(std::hypot(a.ft[i], a.ft[a.stride + i]), a.limit[i] * (1 + 1e-9) + 1e-300) << said();
       for (uint32_t k = 0; k < 2; ++k) ASSERT_EQ(a.ft[k * a.stride + i], b.ft[k * b.stride + i]) << said();
-      for (uint32_t k = 0; k < a.nstate; ++k) ASSERT_EQ(a.state_out[k * a.stride + i], b.state_out[k * b.stride + i]) << said();
+      for (uint32_t k = 0; k < a.nstate; ++k)
+        ASSERT_EQ(a.state_out[k * a.stride + i], b.state_out[k * b.stride + i]) << said();
       ASSERT_EQ(a.limit[i], b.limit[i]) << said();
     }
   }
 }
 
 INSTANTIATE_TEST_SUITE_P(Laws, LawExtremes,
-                         testing::Values("friction_none", "friction_coulomb", "friction_karnopp", "friction_dahl", "friction_lugre",
-                                         "friction_elastoplastic", "friction_gms"),
+                         testing::Values("friction_none", "friction_coulomb", "friction_karnopp",
+                                         "friction_dahl", "friction_lugre", "friction_elastoplastic",
+                                         "friction_gms"),
                          [](const auto &p) { return std::string(p.param).substr(9); });

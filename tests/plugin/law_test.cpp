@@ -1,4 +1,5 @@
-// dfm_law_*: handles, what is asked of the caller, what is done with a plugin that misbehaves, what the host lends.
+// dfm_law_*: handles, what is asked of the caller, what is done with a plugin that misbehaves, what
+// the host lends.
 #include <algorithm>
 #include <atomic>
 #include <thread>
@@ -71,7 +72,8 @@ TEST_F(Law, ValueThatIsNotFinite_DiscardsTheBatchUnderTheLawsName) {
     for (double value = 0; value < 3; ++value) {
       c.log.clear();
       Batch b(5, {where, value}, 1);
-      const bool fine = value == 0 || (where == kLimit && value == kInfinity);  // an infinite limit means: none
+      // an infinite limit means: none
+      const bool fine = value == 0 || (where == kLimit && value == kInfinity);
       EXPECT_EQ(dfm_law_eval(spoilt, &b.in, &b.out), fine ? DFM_OK : DFM_DISCARD) << where << " " << value;
       EXPECT_EQ(c.logged("org.tiny.nan"), !fine) << where << " " << value;
     }
@@ -98,7 +100,8 @@ TEST_F(Law, MissingInput_IsNamed) {
   EXPECT_TRUE(says("size")) << dfm_last_error();
   EXPECT_EQ(dfm_law_eval(drag, nullptr, &b.out), DFM_E_ARG);
   b = Batch(4, {2, 0, 0, 0, 4});
-  b.in.n = 0, b.in.vt = b.vt;
+  b.in.n = 0;
+  b.in.vt = b.vt;
   EXPECT_EQ(dfm_law_eval(drag, &b.in, &b.out), DFM_OK);
 }
 
@@ -109,9 +112,14 @@ TEST_F(Law, PlainArraysOfAnyStride_AreCopied) {
   for (int k = 0; k < 10; ++k) vt[k] = k;
   std::vector<double> params{2, 0, 0, 0, 4};
   dfm_friction_in in{};
-  in.size = sizeof in, in.n = 5, in.stride = 5, in.params = params.data(), in.vt = vt;
+  in.size = sizeof in;
+  in.n = 5;
+  in.stride = 5;
+  in.params = params.data();
+  in.vt = vt;
   dfm_friction_out out{};
-  out.size = sizeof out, out.ft = ft;
+  out.size = sizeof out;
+  out.ft = ft;
   ASSERT_EQ(dfm_law_eval(drag, &in, &out), DFM_OK) << dfm_last_error();
   for (int k = 0; k < 10; ++k) EXPECT_EQ(ft[k], -2.0 * k);
   EXPECT_EQ(ft[-1], 7);
@@ -160,7 +168,8 @@ struct Counting { size_t live = 0, calls = 0, fail_at = ~size_t(0); };
 
 dfm_context_def counting(Counting &count, const std::string &dir) {
   dfm_context_def def = dfm_context_def_default();
-  def.user = &count, def.plugin_dir = dir.c_str();
+  def.user = &count;
+  def.plugin_dir = dir.c_str();
   def.alloc = [](void *user, size_t bytes, size_t align) -> void * {
     Counting &n = *static_cast<Counting *>(user);
     if (n.calls++ == n.fail_at) return nullptr;
@@ -220,7 +229,8 @@ TEST(Base, VersionAndStatusNames_AreAsDocumented) {
   EXPECT_STREQ(dfm_version(&major, &minor, &patch), "0.1.0");
   EXPECT_EQ(major * 10000 + minor * 100 + patch, 100);
   EXPECT_STREQ(dfm_version(nullptr, nullptr, nullptr), "0.1.0");
-  for (int s = DFM_E_BUSY; s <= DFM_DISCARD; ++s) EXPECT_NE(std::string(dfm_status_name(s)), "unknown status") << s;
+  for (int s = DFM_E_BUSY; s <= DFM_DISCARD; ++s)
+    EXPECT_NE(std::string(dfm_status_name(s)), "unknown status") << s;
   EXPECT_STREQ(dfm_status_name(12345), "unknown status");
 }
 

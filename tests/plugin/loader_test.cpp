@@ -18,7 +18,8 @@ bool says(const std::string &part) { return std::string(dfm_last_error()).find(p
 struct Environment {
   std::string name, before;
   bool had;
-  Environment(const char *n, const std::string &value) : name(n), before(std::getenv(n) ? std::getenv(n) : ""), had(std::getenv(n)) {
+  Environment(const char *n, const std::string &value)
+      : name(n), before(std::getenv(n) ? std::getenv(n) : ""), had(std::getenv(n)) {
     setenv(n, value.c_str(), 1);
   }
   ~Environment() { had ? setenv(name.c_str(), before.c_str(), 1) : unsetenv(name.c_str()); }
@@ -106,7 +107,8 @@ TEST(Loader, TruncatedFile_IsRefusedAtEveryLength) {
   const std::string whole = test::read_file(plugin("tiny_law")), path = folder("cut") + "/cut.so";
   ASSERT_GT(whole.size(), 4096u);
   Context c;
-  for (size_t n : {size_t(0), size_t(1), size_t(4), size_t(63), size_t(64), size_t(200), size_t(1000), size_t(4096), whole.size() / 2}) {
+  for (size_t n : {size_t(0), size_t(1), size_t(4), size_t(63), size_t(64), size_t(200), size_t(1000),
+                   size_t(4096), whole.size() / 2}) {
     test::write_file(path, whole.substr(0, n));
     EXPECT_EQ(load(c, path), DFM_E_UNSUPPORTED) << n;
   }
@@ -130,7 +132,8 @@ TEST(Loader, AnyByteOfTheHeadersChanged_DoesNotEndTheProcess) {
 
 TEST(Loader, Scan_TakesPluginsInNameOrderAndGivesAReasonForTheRest) {
   const std::string dir = folder("scan");
-  for (const char *name : {"tiny_taken", "tiny_law", "tiny_old", "tiny_foreign", "tiny_noentry", "tiny_throw_entry"})
+  for (const char *name :
+       {"tiny_taken", "tiny_law", "tiny_old", "tiny_foreign", "tiny_noentry", "tiny_throw_entry"})
     fs::copy_file(plugin(name), dir + "/" + name + ".so");
   test::write_file(dir + "/text.so", "this is no library\n");
   test::write_file(dir + "/readme.txt", "text");
@@ -169,7 +172,8 @@ TEST(Loader, PluginPath_ComesBeforeTheLibrarysOwnDirectory) {
   EXPECT_EQ(probe.file_of("org.tiny.drag"), first + "/x.so");
   EXPECT_NE(probe.reason("path_second/x.so").find("is taken by"), std::string::npos);
   EXPECT_NE(probe.reason("/nowhere").find("no such directory"), std::string::npos);
-  EXPECT_NE(probe.file_of("org.deform.coulomb").find(DEFORM_PLUGIN_DIR), std::string::npos) << probe.file_of("org.deform.coulomb");
+  EXPECT_NE(probe.file_of("org.deform.coulomb").find(DEFORM_PLUGIN_DIR), std::string::npos)
+      << probe.file_of("org.deform.coulomb");
   std::swap(probe.c, context);
   dfm_context_destroy(context);
 }
@@ -189,7 +193,8 @@ TEST(Loader, TwoContexts_ShareAFileButNotTheirTypes) {
   EXPECT_EQ(load(a, plugin("tiny_host")), DFM_OK);
   EXPECT_EQ(load(b, plugin("tiny_host")), DFM_OK);
   const dfm_type *ta = nullptr, *tb = nullptr;
-  dfm_law_type(a.open("host"), &ta), dfm_law_type(b.open("host"), &tb);
+  dfm_law_type(a.open("host"), &ta);
+  dfm_law_type(b.open("host"), &tb);
   EXPECT_NE(ta, tb);
 }
 

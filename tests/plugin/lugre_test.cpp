@@ -1,4 +1,5 @@
-// The law lugre against its closed forms (doc/laws/lugre.md), its passivity, the reference files, and the rules of every law.
+// The law lugre against its closed forms (doc/laws/lugre.md), its passivity, the reference files, and the
+// rules of every law.
 #include "bristle_rig.h"
 
 using rig::Contact;
@@ -18,7 +19,8 @@ struct Lugre : testing::Test {
     handle = rules::open(c, "friction_lugre");
     // mu_C mu_S v_s delta sigma0 sigma1 form v_d sigma2: F_C 1.47 N, F_S 1.96 N at 9.8 N
     dev = make({0.15, 0.20, 0.01, 2, 1e4, 20, 0, 0.01, 0.4});
-    constant = make({0.15, 0.20, 0.01, 2, 1e4, 20, 1, 0.01, 0.4}), falling = make({0.15, 0.20, 0.01, 1.3, 1e4, 20, 2, 0.03, 0.4});
+    constant = make({0.15, 0.20, 0.01, 2, 1e4, 20, 1, 0.01, 0.4});
+    falling = make({0.15, 0.20, 0.01, 1.3, 1e4, 20, 2, 0.03, 0.4});
     published = make({1, 1.5, 0.001, 2, 1e5, 316.22776601683796, 1, 0.01, 0.4});
   }
   Law make(std::vector<double> params) const { return rules::law_of(handle, std::move(params)); }
@@ -46,7 +48,9 @@ TEST_F(Lugre, RulesOfEveryLaw_AreKept) {
 }
 
 TEST_F(Lugre, Derivatives_MatchDifferences) {
-  const auto kink = [](const In &in) { return std::fabs(rules::norm(in.state) * 1e4 * in.area / (0.20 * in.fn) - 1) < 1e-3; };
+  const auto kink = [](const In &in) {
+    return std::fabs(rules::norm(in.state) * 1e4 * in.area / (0.20 * in.fn) - 1) < 1e-3;
+  };
   for (const Law &l : {dev, constant, falling}) rules::derivatives(l, draw(), 1000, 1e-6, kink);
 }
 
@@ -56,16 +60,24 @@ TEST_F(Lugre, Bits_MatchTheRecordedHash) {
   EXPECT_EQ(rules::hash_of_bits(falling, 2e-5), 5274140658457432186u);
 }
 
-// Random speeds, steps up to 1/60 s, normal forces including zero: no parameters of the default form create work.
+// Random speeds, steps up to 1/60 s, normal forces including zero: no parameters of the default
+// form create work.
 TEST_F(Lugre, PassiveForm_CreatesNoWork) {
   for (double sigma1 : {20.0, 316.0, 1e6})
     for (double sigma2 : {0.0, 0.4}) {
-      EXPECT_GE(rules::worst_balance(make({0.15, 0.20, 0.01, 2, 1e4, sigma1, 0, 0.01, sigma2}), 2e-5, 300, false), -1e-13) << sigma1;
-      EXPECT_GE(rules::worst_balance(make({0.15, 0.20, 0.01, 2, 1e4, sigma1, 0, 0.01, sigma2}), 2e-5, 300, true), -1e-13) << sigma1;
+      EXPECT_GE(
+          rules::worst_balance(make({0.15, 0.20, 0.01, 2, 1e4, sigma1, 0, 0.01, sigma2}), 2e-5, 300, false),
+          -1e-13)
+          << sigma1;
+      EXPECT_GE(
+          rules::worst_balance(make({0.15, 0.20, 0.01, 2, 1e4, sigma1, 0, 0.01, sigma2}), 2e-5, 300, true),
+          -1e-13)
+          << sigma1;
     }
 }
 
-// The test of the test: the published parameters with constant sigma1 extract work, at their own passive form they do not.
+// The test of the test: the published parameters with constant sigma1 extract work, at their own passive
+// form they do not.
 TEST_F(Lugre, PublishedParametersWithConstantSigma1_FailThatTest) {
   EXPECT_LT(rules::worst_balance(published, 1.5e-5, 300, false), -0.01);
   Law passive = published;
@@ -73,7 +85,9 @@ TEST_F(Lugre, PublishedParametersWithConstantSigma1_FailThatTest) {
   EXPECT_GE(rules::worst_balance(passive, 1.5e-5, 300, false), -1e-13);
   // bristle at F_S, jump to 0.05 m/s: it pushes with 6.4 N
   In in;
-  in.h = 1e-9, in.v[0] = 0.05, in.state[0] = 1.5e-5;
+  in.h = 1e-9;
+  in.v[0] = 0.05;
+  in.state[0] = 1.5e-5;
   EXPECT_NEAR(rules::ask(published, in).f[0], -6.4, 0.1);
   EXPECT_GT(rules::ask(passive, in).f[0], -0.1) << "no more than the stored energy pays for";
 }
@@ -112,13 +126,19 @@ TEST_F(Lugre, SlidingForLong_IsTheSteadyCurveAtAnyStep) {
     }
 }
 
-// As the normal force vanishes the force goes with it, as mu(w) fn v^, and the derivative stays that of a cone: nothing divides by fn.
+// As the normal force vanishes the force goes with it, as mu(w) fn v^, and the derivative stays that of a
+// cone: nothing divides by fn.
 TEST_F(Lugre, VanishingNormalForce_LeavesTheSlopeOfTheCone) {
-  for (const Law &l : {make({0.15, 0.20, 0.01, 2, 1e4, 20, 0, 0.01, 0}), make({0.15, 0.20, 0.01, 2, 1e9, 0, 0, 0.01, 0})})
+  for (const Law &l :
+       {make({0.15, 0.20, 0.01, 2, 1e4, 20, 0, 0.01, 0}), make({0.15, 0.20, 0.01, 2, 1e9, 0, 0, 0.01, 0})})
     for (double w : {1e-4, 0.01, 1.0})
       for (double fn : {1e-9, 1e-30, 1e-100, 1e-139}) {
         In in;
-        in.fn = fn, in.v[0] = 0.6 * w, in.v[1] = -0.8 * w, in.state[0] = 3e-5, in.state[1] = 1e-5;
+        in.fn = fn;
+        in.v[0] = 0.6 * w;
+        in.v[1] = -0.8 * w;
+        in.state[0] = 3e-5;
+        in.state[1] = 1e-5;
         const Out o = rules::ask(l, in);
         const double mu = 0.15 + 0.05 * std::exp(-w * w / 1e-4);
         EXPECT_NEAR(o.f[0] / fn, 0.6 * mu, 1e-4 * mu) << w << " " << fn;
@@ -139,7 +159,7 @@ TEST_F(Lugre, NearlyRigidBristles_StayBoundedAndPassiveAtEveryStep) {
 // A step so long that h sigma0 w / g = 1e12 ends on the level, as every shorter one.
 TEST_F(Lugre, HugeStep_EndsOnTheLevel) {
   Contact k(make({0.15, 0.20, 0.01, 2, 1e9, 20, 0, 0.01, 0.4}), 9.8);
-  k.move(44.1, 0, 1.0 / 30);   // 1e9 * 44.1 / 30 / 1.47 = 1e9
+  k.move(44.1, 0, 1.0 / 30);  // 1e9 * 44.1 / 30 / 1.47 = 1e9
   EXPECT_NEAR(k.last.f[0], 1.47 + 0.4 * 44.1, 1e-7);
   k.move(-44.1e3, 0, 1.0 / 30);
   EXPECT_NEAR(k.last.f[0], -(1.47 + 0.4 * 44.1e3), 1e-6);
@@ -148,7 +168,10 @@ TEST_F(Lugre, HugeStep_EndsOnTheLevel) {
 // While the load stays far below the level the contact is a spring sigma0 with a damper sigma1 + sigma2.
 TEST_F(Lugre, SmallMotion_IsASpringAndADamper) {
   In in;
-  in.fn = 9.8, in.v[0] = 1e-9, in.h = 1e-3, in.state[0] = 1e-9;
+  in.fn = 9.8;
+  in.v[0] = 1e-9;
+  in.h = 1e-3;
+  in.state[0] = 1e-9;
   const Out o = rules::ask(dev, in);
   EXPECT_NEAR(o.f[0], 1e4 * (1e-9 + 1e-12) + 20.4 * 1e-9, 1e-12);
   EXPECT_NEAR(o.dv[0], 1e4 * 1e-3 + 20 + 0.4, 1e-3);
@@ -200,7 +223,8 @@ TEST_F(Lugre, FasterChangeOfSpeed_LagsMore) {
     const double h = 1e-4 / frequency;
     double up = 0, down = 0;
     for (int i = 0; i < 30000; ++i) {
-      const double before = 0.01 + 0.008 * std::sin(2 * kPi * frequency * i * h), v = 0.01 + 0.008 * std::sin(2 * kPi * frequency * (i + 1) * h);
+      const double before = 0.01 + 0.008 * std::sin(2 * kPi * frequency * i * h);
+      const double v = 0.01 + 0.008 * std::sin(2 * kPi * frequency * (i + 1) * h);
       k.move(v, 0, h);
       if (i > 15000 && before < 0.01 && v >= 0.01) up = k.last.f[0];
       if (i > 15000 && before > 0.01 && v <= 0.01) down = k.last.f[0];
@@ -223,7 +247,8 @@ TEST_F(Lugre, SteadyCurve_MatchesTheReference) {
   }
 }
 
-// Histories at prescribed velocity: first order in the step, so the error against the reference halves with it.
+// Histories at prescribed velocity: first order in the step, so the error against the reference
+// halves with it.
 TEST_F(Lugre, CircleAndTurn_ConvergeToTheReference) {
   for (const char *file : {"vector_circle_lugre.csv", "vector_turn_lugre.csv"}) {
     READ_OR_SKIP(t, file);
@@ -240,7 +265,8 @@ TEST_F(Lugre, CircleAndTurn_ConvergeToTheReference) {
         }
         // the file holds dz/dt at the row's own time
         if (circle || std::fabs(t1 - 0.2) > 0.01)
-          worst = std::max({worst, std::fabs(k.last.f[0] - t.at(i, "Fx")), std::fabs(k.last.f[1] - t.at(i, "Fy"))});
+          worst = std::max(
+              {worst, std::fabs(k.last.f[0] - t.at(i, "Fx")), std::fabs(k.last.f[1] - t.at(i, "Fy"))});
       }
       EXPECT_LT(worst, 0.02) << file;
       if (before > 0) {
@@ -268,8 +294,8 @@ TEST_F(Lugre, VaryingNormalForce_MatchesTheProjectedReference) {
     }
     EXPECT_LT(worst, 0.05);
     if (before > 0) {
-        EXPECT_NEAR(before / worst, 2, 0.3);
-      }
+      EXPECT_NEAR(before / worst, 2, 0.3);
+    }
     before = worst;
   }
 }

@@ -1,4 +1,5 @@
-// Static response of bars [0,1] x [0,0.1]^2: Young's modulus along and across, shear and sag, under refinement, over regular and free meshes.
+// Static response of bars [0,1] x [0,0.1]^2: Young's modulus along and across, shear and sag, under
+// refinement, over regular and free meshes.
 #include "msm_host.h"
 
 namespace msm_test {
@@ -6,12 +7,17 @@ namespace {
 
 using Vector = std::vector<double>;
 
-// The body at rest as a linear system. K u by central differences of the forces: the model is smooth, so 1e-7 of a bar leaves 1e-9.
+// The body at rest as a linear system. K u by central differences of the forces: the model is smooth, so 1e-7
+// of a bar leaves 1e-9.
 class Bar {
  public:
-  Bar(const Mesh &mesh, const Params &p) : b_(host_, mesh, p), low_{1e300, 1e300, 1e300}, high_{-1e300, -1e300, -1e300} {
+  Bar(const Mesh &mesh, const Params &p)
+      : b_(host_, mesh, p), low_{1e300, 1e300, 1e300}, high_{-1e300, -1e300, -1e300} {
     for (uint32_t i = 0; i < b_.size(); ++i)
-      for (int a = 0; a < 3; ++a) low_[a] = std::min(low_[a], rest(i, a)), high_[a] = std::max(high_[a], rest(i, a));
+      for (int a = 0; a < 3; ++a) {
+        low_[a] = std::min(low_[a], rest(i, a));
+        high_[a] = std::max(high_[a], rest(i, a));
+      }
     for (uint32_t c = 0; c < mesh.ncell(); ++c) volume_ += std::abs(mesh.volume(c));
   }
 
@@ -21,14 +27,17 @@ class Bar {
   Pull pull(int axis) {
     Vector u(b_.mesh.rest.size(), 0);
     std::vector<char> held(u.size(), 0);
-    for (uint32_t i = 0; i < b_.size(); ++i)
-      u[3 * i + axis] = rest(i, axis), held[3 * i + axis] = at(i, axis, low_) || at(i, axis, high_);
+    for (uint32_t i = 0; i < b_.size(); ++i) {
+      u[3 * i + axis] = rest(i, axis);
+      held[3 * i + axis] = at(i, axis, low_) || at(i, axis, high_);
+    }
     solve(u, held, Vector(u.size(), 0));
     double lateral = 0, square = 0;
     for (uint32_t i = 0; i < b_.size(); ++i)
       for (int a = 0; a < 3; ++a) {
         const double y = a == axis ? 0 : rest(i, a) - 0.5 * (low_[a] + high_[a]);
-        lateral += y * u[3 * i + a], square += y * y;
+        lateral += y * u[3 * i + a];
+        square += y * y;
       }
     return {twice_energy(u) / volume_, -lateral / square};
   }
@@ -58,7 +67,10 @@ class Bar {
     solve(u, held, load);
     double tip = 0, n = 0;
     for (uint32_t i = 0; i < b_.size(); ++i)
-      if (at(i, 0, high_)) tip -= u[3 * i + 2], n += 1;
+      if (at(i, 0, high_)) {
+        tip -= u[3 * i + 2];
+        n += 1;
+      }
     return tip / n / (1000 * 0.01 / (8 * young * (1e-4 / 12)));
   }
 
@@ -95,13 +107,24 @@ class Bar {
     Vector r, p(n), q;
     apply(u, r);
     double rr = 0;
-    for (size_t k = 0; k < n; ++k) r[k] = held[k] ? 0 : load[k] - r[k], p[k] = r[k], rr += r[k] * r[k];
+    for (size_t k = 0; k < n; ++k) {
+      r[k] = held[k] ? 0 : load[k] - r[k];
+      p[k] = r[k];
+      rr += r[k] * r[k];
+    }
     const double start = rr;
     for (int it = 0; it < 6000 && rr > 1e-10 * start; ++it) {
       apply(p, q);
       double pq = 0, next = 0;
-      for (size_t k = 0; k < n; ++k) q[k] = held[k] ? 0 : q[k], pq += p[k] * q[k];
-      for (size_t k = 0; k < n; ++k) u[k] += rr / pq * p[k], r[k] -= rr / pq * q[k], next += r[k] * r[k];
+      for (size_t k = 0; k < n; ++k) {
+        q[k] = held[k] ? 0 : q[k];
+        pq += p[k] * q[k];
+      }
+      for (size_t k = 0; k < n; ++k) {
+        u[k] += rr / pq * p[k];
+        r[k] -= rr / pq * q[k];
+        next += r[k] * r[k];
+      }
       for (size_t k = 0; k < n; ++k) p[k] = r[k] + next / rr * p[k];
       rr = next;
     }
@@ -129,7 +152,8 @@ constexpr double kYoung = 2e4;
 TEST(MsmBars, RegularLattice_HasYoungsModulusWhateverItsSize) {
   for (uint32_t n : {1, 2, 4}) {
     const Mesh mesh = kuhn_bar(10 * n, n, n, 0.1 / n);
-    for (int axis = 0; axis < 3; ++axis) EXPECT_NEAR(Bar(mesh, {kYoung, 0.3, 0, 0, 0}).pull(axis).young / kYoung, 1, 1e-3) << n << " " << axis;
+    for (int axis = 0; axis < 3; ++axis)
+      EXPECT_NEAR(Bar(mesh, {kYoung, 0.3, 0, 0, 0}).pull(axis).young / kYoung, 1, 1e-3) << n << " " << axis;
   }
 }
 
@@ -139,36 +163,50 @@ TEST(MsmBars, HangingBar_StretchesWithinTenPercentOfTheFinest) {
     const std::vector<Mesh> meshes = family(letter);
     if (meshes.empty()) GTEST_SKIP() << "the bars of the shared meshes are absent";
     ASSERT_EQ(meshes.size(), 4u);
-    for (Params p : {Params{kYoung, 0.3, 0, 0, 0}, Params{kYoung, 0.3, 0, 0, 0.231}, Params{kYoung, 0.45, 0, 0, 0.828}}) {
+    for (Params p : {Params{kYoung, 0.3, 0, 0, 0}, Params{kYoung, 0.3, 0, 0, 0.231},
+                     Params{kYoung, 0.45, 0, 0, 0.828}}) {
       double young[4], poisson[4];
       for (int n = 0; n < 4; ++n) {
         const Bar::Pull pull = Bar(meshes[n], p).pull(0);
-        young[n] = pull.young / kYoung, poisson[n] = pull.poisson;
+        young[n] = pull.young / kYoung;
+        poisson[n] = pull.poisson;
       }
-      std::printf("%c  volume %-5.3f  E/young %.3f %.3f %.3f %.3f  nu %.3f %.3f %.3f %.3f\n", letter, p.volume, young[0], young[1], young[2],
-                  young[3], poisson[0], poisson[1], poisson[2], poisson[3]);
+      std::printf("%c  volume %-5.3f  E/young %.3f %.3f %.3f %.3f  nu %.3f %.3f %.3f %.3f\n", letter,
+                  p.volume, young[0], young[1], young[2], young[3], poisson[0], poisson[1], poisson[2],
+                  poisson[3]);
       for (double e : young) EXPECT_NEAR(e / young[3], 1, letter == 's' ? 0.001 : 0.1);
-      if (p.volume == 0) { EXPECT_NEAR(young[3], 1, 0.05); }
-      if (letter == 'u') { EXPECT_NEAR(poisson[3], p.volume > 0 ? p.poisson : 0.25, 0.01); }
+      if (p.volume == 0) {
+        EXPECT_NEAR(young[3], 1, 0.05);
+      }
+      if (letter == 'u') {
+        EXPECT_NEAR(poisson[3], p.volume > 0 ? p.poisson : 0.25, 0.01);
+      }
     }
   }
 }
 
-// u1 has most of its edges in its surface, along the bar: across it stays a quarter too soft (a third with Van Gelder's factor alone).
+// u1 has most of its edges in its surface, along the bar: across it stays a quarter too soft (a third with
+// Van Gelder's factor alone).
 TEST(MsmBars, FreeMesh_IsOneMaterialInEveryDirection) {
   const std::vector<Mesh> meshes = family('u');
   if (meshes.empty()) GTEST_SKIP() << "the bars of the shared meshes are absent";
   for (int n = 0; n < 4; ++n) {
     Bar bar(meshes[n], {kYoung, 0.3, 0, 0, 0});
-    const double along = bar.pull(0).young / kYoung, y = bar.pull(1).young / kYoung, z = bar.pull(2).young / kYoung;
-    const double yz = bar.shear(1, 2) / (0.4 * kYoung), xz = bar.shear(0, 2) / (0.4 * kYoung), xy = bar.shear(0, 1) / (0.4 * kYoung);
-    std::printf("u%d  E/young %.3f %.3f %.3f  G/(0.4 young) %.3f %.3f %.3f\n", n + 1, along, y, z, yz, xz, xy);
+    const double along = bar.pull(0).young / kYoung;
+    const double y = bar.pull(1).young / kYoung;
+    const double z = bar.pull(2).young / kYoung;
+    const double yz = bar.shear(1, 2) / (0.4 * kYoung);
+    const double xz = bar.shear(0, 2) / (0.4 * kYoung);
+    const double xy = bar.shear(0, 1) / (0.4 * kYoung);
+    std::printf("u%d  E/young %.3f %.3f %.3f  G/(0.4 young) %.3f %.3f %.3f\n", n + 1, along, y, z, yz, xz,
+                xy);
     for (double e : {along, y, z}) EXPECT_NEAR(e, 1, n == 0 ? 0.3 : 0.06);
     for (double g : {yz, xz, xy}) EXPECT_NEAR(g, 1, 0.11);
   }
 }
 
-// Printed for doc/models/msm.md; linear tetrahedra sag -78, -49, -21, -6 % of the slender beam on s1..s4. Finer is softer.
+// Printed for doc/models/msm.md; linear tetrahedra sag -78, -49, -21, -6 % of the slender beam on s1..s4.
+// Finer is softer.
 TEST(MsmBars, Cantilever_SagGrowsTowardsTheBeamUnderRefinement) {
   for (char letter : {'s', 'u'}) {
     double last = 0;
@@ -185,13 +223,17 @@ TEST(MsmBars, Cantilever_SagGrowsTowardsTheBeamUnderRefinement) {
   EXPECT_LT(coarse, 0.8 * fine);
 }
 
-// Along and across the axis of springs whose extra coordinates have slope g (doc/models/msm.md, affine network), over Young's modulus.
+// Along and across the axis of springs whose extra coordinates have slope g (doc/models/msm.md, affine
+// network), over Young's modulus.
 Bar::Pull affine(double g, bool form_a) {
-  double m0 = 0, m2 = 0, m4 = 0;  // means of t, t c^2, t c^4 over directions, t the softening of a spring at cosine c to the axis
+  // means of t, t c^2, t c^4 over directions, t the softening of a spring at cosine c to the axis
+  double m0 = 0, m2 = 0, m4 = 0;
   const int n = 20000;
   for (int k = 0; k < n; ++k) {
     const double c = (k + 0.5) / n, s = 1 / (1 + g * g * c * c), t = (form_a ? std::sqrt(s) : s) / n;
-    m0 += t, m2 += t * c * c, m4 += t * c * c * c * c;
+    m0 += t;
+    m2 += t * c * c;
+    m4 += t * c * c * c * c;
   }
   const double c33 = 6 * m4, c11 = 6 * 3.0 / 8 * (m0 - 2 * m2 + m4), c12 = c11 / 3, c13 = 3 * (m2 - m4);
   const double sum = (c11 + c12) * c33 - 2 * c13 * c13;
@@ -207,23 +249,29 @@ TEST(MsmBars, SlopeAlongOneAxis_SoftensAsTheAffineNetworkOnAFreeMesh) {
     double last = 1e300, last_ratio = 0;
     for (double g : {0.0, 1.0, 2.0, 4.0, 12.0}) {
       Params p = {kYoung, 0.3, 0, 0, 0};
-      p.slope = g, p.form_a = form_a;
+      p.slope = g;
+      p.form_a = form_a;
       Bar bar(mesh, p);
       const double along = bar.pull(0).young / kYoung, across = bar.pull(1).young / kYoung;
       const Bar::Pull expected = affine(g, form_a);
-      std::printf("form %c  slope %4.1f  along %.3f (affine %.3f)  across %.3f (%.3f)  ratio %.2f (%.2f)\n", form_a ? 'A' : 'B', g, along,
-                  expected.young, across, expected.poisson, across / along, expected.poisson / expected.young);
+      std::printf("form %c  slope %4.1f  along %.3f (affine %.3f)  across %.3f (%.3f)  ratio %.2f (%.2f)\n",
+                  form_a ? 'A' : 'B', g, along, expected.young, across, expected.poisson, across / along,
+                  expected.poisson / expected.young);
       EXPECT_LT(along, last);
       EXPECT_GT(across / along, last_ratio);
       // Points move less evenly the more springs differ; a regular mesh adds its own directions.
-      if (free_mesh && g <= 2) { EXPECT_NEAR(across / along / (expected.poisson / expected.young), 1, 0.05); }
-      last = along, last_ratio = across / along;
+      if (free_mesh && g <= 2) {
+        EXPECT_NEAR(across / along / (expected.poisson / expected.young), 1, 0.05);
+      }
+      last = along;
+      last_ratio = across / along;
     }
   }
 }
 
-// kV 1 x 1 on top of springs scaled by s: by the Sherman-Morrison formula a lattice whose axes are alike answers to a unit stress along
-// one of them with the strains 1/s - q and -nu/s - q, in 1/E, where b = 1 - 2 nu and q = (b/s)^2 / (1/r + 3 b/s).
+// kV 1 x 1 on top of springs scaled by s: by the Sherman-Morrison formula a lattice whose axes are alike
+// answers to a unit stress along one of them with the strains 1/s - q and -nu/s - q, in 1/E, where b = 1 - 2
+// nu and q = (b/s)^2 / (1/r + 3 b/s).
 TEST(MsmBars, VolumeTerm_AddsItsModulusToTheLatticeInClosedForm) {
   const Mesh mesh = kuhn_bar(20, 2, 2, 0.05);
   const Bar::Pull springs = Bar(mesh, {kYoung, 0.45, 0, 0, 0}).pull(0);
@@ -231,7 +279,8 @@ TEST(MsmBars, VolumeTerm_AddsItsModulusToTheLatticeInClosedForm) {
   double last = springs.poisson;
   for (double volume : {0.1, 1.0, 10.0}) {
     const Bar::Pull p = Bar(mesh, {kYoung, 0.45, 0, 0, volume}).pull(0);
-    const double r = volume / (3 * (1 - 2 * 0.45)), s = (std::sqrt((3 * r - 2) * (3 * r - 2) + 20 * r) - (3 * r - 2)) / 4;
+    const double r = volume / (3 * (1 - 2 * 0.45));
+    const double s = (std::sqrt((3 * r - 2) * (3 * r - 2) + 20 * r) - (3 * r - 2)) / 4;
     const double q = b * b / (s * s) / (1 / r + 3 * b / s);
     EXPECT_NEAR(p.young / springs.young, 1 / (1 / s - q), 2e-3) << volume;
     EXPECT_NEAR(p.poisson, (springs.poisson / s + q) / (1 / s - q), 2e-3) << volume;
@@ -241,7 +290,8 @@ TEST(MsmBars, VolumeTerm_AddsItsModulusToTheLatticeInClosedForm) {
   EXPECT_NEAR(last, 0.5, 0.01);
 }
 
-// One cell already has the largest det C that its six edges can have: its springs are Van Gelder's, k = young V / L0^2, to rounding.
+// One cell already has the largest det C that its six edges can have: its springs are Van Gelder's, k = young
+// V / L0^2, to rounding.
 TEST(MsmBars, SingleCell_HasVanGeldersStiffness) {
   const Mesh mesh = irregular_tet();
   Host host;
@@ -253,13 +303,16 @@ TEST(MsmBars, SingleCell_HasVanGeldersStiffness) {
       for (int side : {1, -1}) {
         Vec x = mesh.at(j);
         x[a] += side * 1e-6;
-        b.set(b.x, j, x), b.forces();
-        for (int c = 0; c < 3; ++c) force[a][c] = (side == 1 ? 0 : force[a][c]) + side * b.get(b.f, i)[c] / 2e-6;
+        b.set(b.x, j, x);
+        b.forces();
+        for (int c = 0; c < 3; ++c)
+          force[a][c] = (side == 1 ? 0 : force[a][c]) + side * b.get(b.f, i)[c] / 2e-6;
       }
       b.set(b.x, j, mesh.at(j));
     }
     const double l = norm(mesh.at(j) - mesh.at(i));
-    EXPECT_NEAR(force[0][0] + force[1][1] + force[2][2], kYoung * mesh.volume(0) / (l * l), 1e-6 * kYoung) << i << " " << j;
+    EXPECT_NEAR(force[0][0] + force[1][1] + force[2][2], kYoung * mesh.volume(0) / (l * l), 1e-6 * kYoung)
+        << i << " " << j;
   }
 }
 
@@ -276,8 +329,10 @@ TEST(MsmBars, TurnedMesh_HasTheSameForcesTurned) {
   Instance a(host, mesh, {kYoung, 0.3, 0, 0, 0}), b(host, turned, {kYoung, 0.3, 0, 0, 0});
   a.shake(0.02, 0);
   for (uint32_t i = 0; i < mesh.npoint(); ++i) b.set(b.x, i, turn(a.get(a.x, i)));
-  a.forces(), b.forces();
-  for (uint32_t i = 0; i < mesh.npoint(); ++i) EXPECT_LT(norm(turn(a.get(a.f, i)) - b.get(b.f, i)), 1e-12 * a.largest_force()) << i;
+  a.forces();
+  b.forces();
+  for (uint32_t i = 0; i < mesh.npoint(); ++i)
+    EXPECT_LT(norm(turn(a.get(a.f, i)) - b.get(b.f, i)), 1e-12 * a.largest_force()) << i;
 }
 
 }  // namespace

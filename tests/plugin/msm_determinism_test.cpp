@@ -1,4 +1,5 @@
-// Same bits for every instruction set, cut and order of parallel_for; nothing depends on an effect that is off.
+// Same bits for every instruction set, cut and order of parallel_for; nothing depends on an
+// effect that is off.
 #include "msm_host.h"
 
 namespace msm_test {
@@ -9,18 +10,22 @@ const Mesh &large_bar() {  // above the size from which blocks are handed to par
   return mesh;
 }
 
-std::vector<double> results(Host &host, const char *simd, const Mesh &mesh, const Params &p, uint32_t stride = 4, const Fields &fields = {}) {
+std::vector<double> results(Host &host, const char *simd, const Mesh &mesh, const Params &p,
+                            uint32_t stride = 4, const Fields &fields = {}) {
   if (simd) setenv("DEFORM_SIMD", simd, 1);
   Instance b(host, mesh, p, stride, fields);
   unsetenv("DEFORM_SIMD");
   b.shake(0.004, 2);
-  for (uint32_t i = 0; i < b.size(); i += 7) b.set(b.x, i, b.get(b.x, i) + Vec{0.03, -0.02, 0.05});  // some inverted cells
+  // some inverted cells
+  for (uint32_t i = 0; i < b.size(); i += 7) b.set(b.x, i, b.get(b.x, i) + Vec{0.03, -0.02, 0.05});
   b.forces();
   std::vector<double> all, ksum, csum;
   for (uint32_t i = 0; i < b.size(); ++i)
     for (double f : b.get(b.f, i)) all.push_back(f);
-  all.push_back(b.energy()), all.push_back(b.bound(&ksum, &csum));
-  all.insert(all.end(), ksum.begin(), ksum.end()), all.insert(all.end(), csum.begin(), csum.end());
+  all.push_back(b.energy());
+  all.push_back(b.bound(&ksum, &csum));
+  all.insert(all.end(), ksum.begin(), ksum.end());
+  all.insert(all.end(), csum.begin(), csum.end());
   return all;
 }
 
@@ -54,8 +59,8 @@ TEST(MsmDeterminism, Compiler_NeverShowsInAResult) {
 
 TEST(MsmDeterminism, InstructionSet_NeverShowsInAResult) {
   for (const Mesh &mesh : {irregular_tet(), kuhn_bar(4, 3, 2, 0.1, 0.2), large_bar()})
-    for (const Params &p : {Params{2e5, 0.4, 0.003, 0.5, 1.5}, Params{2e5, 0.4, 0, 0, 1.5}, Params{2e5, 0.4, 0.003, 0, 0}, Params{},
-                            at_defaults(0.3), at_defaults(0)}) {
+    for (const Params &p : {Params{2e5, 0.4, 0.003, 0.5, 1.5}, Params{2e5, 0.4, 0, 0, 1.5},
+                            Params{2e5, 0.4, 0.003, 0, 0}, Params{}, at_defaults(0.3), at_defaults(0)}) {
       Host host;
       const std::vector<double> baseline = results(host, "sse2", mesh, p);
       for (const char *simd : {"avx2", "avx512"}) {
@@ -69,25 +74,32 @@ TEST(MsmDeterminism, InstructionSet_NeverShowsInAResult) {
 
 Params tilted(double damping, bool form_a) {
   Params p = {2e5, 0.4, damping, 0.5, 1.5};
-  p.slope = 1.3, p.axis = {1, 2, -1}, p.form_a = form_a;
+  p.slope = 1.3;
+  p.axis = {1, 2, -1};
+  p.form_a = form_a;
   return p;
 }
 
 TEST(MsmDeterminism, InstructionSetAndCut_NeverShowInAnyOption) {
   Fields uneven;
   for (uint32_t c = 0; c < large_bar().ncell(); ++c) {
-    uneven["damping_stiffness"].push_back(1e-3 * (c % 3)), uneven["poisson"].push_back(0.1 * (c % 4)), uneven["volume"].push_back(c % 2);
+    uneven["damping_stiffness"].push_back(1e-3 * (c % 3));
+    uneven["poisson"].push_back(0.1 * (c % 4));
+    uneven["volume"].push_back(c % 2);
     uneven["anisotropy_slope"].push_back(c % 5);
   }
   for (const Fields &fields : {Fields{}, uneven})
     for (double damping : {0.0, 0.003})
       for (bool form_a : {false, true}) {
         Host plain;
-        const std::vector<double> baseline = results(plain, "sse2", large_bar(), tilted(damping, form_a), 4, fields);
+        const std::vector<double> baseline =
+            results(plain, "sse2", large_bar(), tilted(damping, form_a), 4, fields);
         for (const char *simd : {"avx2", "avx512", ""}) {
           Host other;
           other.shuffle = *simd ? 0 : 11;
-          EXPECT_TRUE(same_bits(baseline, results(other, simd, large_bar(), tilted(damping, form_a), 4, fields))) << simd << damping << form_a;
+          EXPECT_TRUE(
+              same_bits(baseline, results(other, simd, large_bar(), tilted(damping, form_a), 4, fields)))
+              << simd << damping << form_a;
         }
       }
 }
@@ -97,10 +109,14 @@ TEST(MsmDeterminism, Compiler_NeverShowsInAnyOption) {
   std::vector<double> all = results(host, nullptr, large_bar(), tilted(0.003, false));
   for (double a : results(host, nullptr, large_bar(), tilted(0.003, true))) all.push_back(a);
   Params sls = tilted(0.003, false);
-  sls.damper = 2, sls.time = 1e-3;
+  sls.damper = 2;
+  sls.time = 1e-3;
   Instance b(host, large_bar(), sls);
-  b.shake(0.004, 2), b.forces_and_step(), b.forces_and_step();
-  all.insert(all.end(), b.state.begin(), b.state.end()), all.insert(all.end(), b.f, b.f + 4 * b.size());
+  b.shake(0.004, 2);
+  b.forces_and_step();
+  b.forces_and_step();
+  all.insert(all.end(), b.state.begin(), b.state.end());
+  all.insert(all.end(), b.f, b.f + 4 * b.size());
   EXPECT_EQ(fnv(all), 5564344454605794040ull);
 }
 
@@ -123,7 +139,8 @@ TEST(MsmDeterminism, CutAndOrderOfParallelFor_NeverShow) {
   }
 }
 
-TEST(MsmDeterminism, CutOfAVeryLargeBody_NeverShows) {  // 105,456 cells: adding up the blocks is cut as well, several blocks per piece
+// 105,456 cells: adding up the blocks is cut as well, several blocks per piece
+TEST(MsmDeterminism, CutOfAVeryLargeBody_NeverShows) {
   const Params p = {2e5, 0.4, 0.003, 0.5, 1.5};
   const Mesh mesh = kuhn_bar(26, 26, 26, 0.05, 0.2);
   Host plain, shuffled;
@@ -134,8 +151,10 @@ TEST(MsmDeterminism, CutOfAVeryLargeBody_NeverShows) {  // 105,456 cells: adding
 TEST(MsmDeterminism, Stride_NeverShows) {
   Host host;
   const Params p = {2e5, 0.4, 0.003, 0.5, 1.5};
-  EXPECT_TRUE(same_bits(results(host, nullptr, large_bar(), p, 3), results(host, nullptr, large_bar(), p, 4)));
-  EXPECT_TRUE(same_bits(results(host, nullptr, large_bar(), p, 7), results(host, nullptr, large_bar(), p, 4)));
+  EXPECT_TRUE(
+      same_bits(results(host, nullptr, large_bar(), p, 3), results(host, nullptr, large_bar(), p, 4)));
+  EXPECT_TRUE(
+      same_bits(results(host, nullptr, large_bar(), p, 7), results(host, nullptr, large_bar(), p, 4)));
 }
 
 TEST(MsmDeterminism, SecondCall_GivesTheSameBits) {
@@ -144,7 +163,8 @@ TEST(MsmDeterminism, SecondCall_GivesTheSameBits) {
   b.shake(0.004, 2);
   b.forces();
   const std::vector<double> first(b.f, b.f + 4 * b.size());
-  b.bound(), b.energy();
+  b.bound();
+  b.energy();
   const size_t calls = host.calls;
   b.forces();
   EXPECT_TRUE(same_bits(first, std::vector<double>(b.f, b.f + 4 * b.size())));
@@ -152,13 +172,18 @@ TEST(MsmDeterminism, SecondCall_GivesTheSameBits) {
 }
 
 TEST(MsmDeterminism, VolumeOff_IsThePlainModel) {
-  Host host;  // nothing of the volume term is left, whatever Poisson's ratio asks for; and switching it off brings the plain model back
+  // nothing of the volume term is left, whatever Poisson's ratio asks for; and switching it off brings the
+  // plain model back
+  Host host;
   const std::vector<double> plain = results(host, nullptr, large_bar(), {2e5, 0.25, 0.003, 0, 0});
   EXPECT_TRUE(same_bits(plain, results(host, nullptr, large_bar(), {2e5, 0.49, 0.003, 0, 0})));
   Instance a(host, large_bar(), {2e5, 0.3, 0.003, 0, 0}), b(host, large_bar(), {3e5, 0.4, 0.001, 2, 5});
   const std::vector<double> values = Instance::row({2e5, 0.3, 0.003, 0, 0});
   ASSERT_EQ(b.ops->set_params(b.self, values.data()), DFM_OK);
-  a.shake(0.004, 2), b.shake(0.004, 2), a.forces(), b.forces();
+  a.shake(0.004, 2);
+  b.shake(0.004, 2);
+  a.forces();
+  b.forces();
   EXPECT_EQ(std::memcmp(a.f, b.f, 4 * a.size() * sizeof(double)), 0);
 }
 
@@ -175,8 +200,12 @@ TEST(MsmDeterminism, RenumberedMesh_MovesTheSameToRounding) {
   const Params p = {2e5, 0.4, 0.003, 0.5, 1.5};
   Instance a(host, mesh, p), b(host, other, p);
   a.shake(0.004, 2);
-  for (uint32_t i = 0; i < a.size(); ++i) b.set(b.x, to[i], a.get(a.x, i)), b.set(b.v, to[i], a.get(a.v, i));
-  a.forces(), b.forces();
+  for (uint32_t i = 0; i < a.size(); ++i) {
+    b.set(b.x, to[i], a.get(a.x, i));
+    b.set(b.v, to[i], a.get(a.v, i));
+  }
+  a.forces();
+  b.forces();
   for (uint32_t i = 0; i < a.size(); ++i)
     EXPECT_LT(norm(a.get(a.f, i) - b.get(b.f, to[i])), 1e-12 * a.largest_force());
 }
@@ -189,7 +218,8 @@ TEST(MsmDeterminism, AllocationFailureAtAnyCall_IsReportedAndLeaksNothing) {
     {
       Params p = tilted(0.003, false);
       p.damper = 2;
-      Instance b(host, irregular_tet(), p, 4, {{"damping_stiffness", {0.1}}, {"damping_mass", {1}}, {"anisotropy_axis", {1, 0, 0}}});
+      Instance b(host, irregular_tet(), p, 4,
+                 {{"damping_stiffness", {0.1}}, {"damping_mass", {1}}, {"anisotropy_axis", {1, 0, 0}}});
       status = b.status;
     }
     EXPECT_EQ(host.live, 0u) << n;
@@ -203,7 +233,8 @@ TEST(MsmDeterminism, AllocationFailureAtAnyCall_IsReportedAndLeaksNothing) {
 
 TEST(MsmDeterminism, WrongInput_IsRefusedWithASentence) {
   Host host;
-  for (const Params &p : {Params{-1}, Params{1e5, 0.5}, Params{1e5, 0.3, -1}, Params{std::nan("")}, Params{1e5, 0.3, 0, 0, 1e9}}) {
+  for (const Params &p : {Params{-1}, Params{1e5, 0.5}, Params{1e5, 0.3, -1}, Params{std::nan("")},
+                          Params{1e5, 0.3, 0, 0, 1e9}}) {
     host.logged.clear();
     Instance b(host, irregular_tet(), p);
     EXPECT_EQ(b.status, DFM_E_ARG);

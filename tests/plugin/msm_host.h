@@ -1,5 +1,5 @@
-// A host of a page for the mass-spring plugin: services, meshes, an instance with its arrays. Sees deform/plugin.h alone, as a
-// third party's host would.
+// A host of a page for the mass-spring plugin: services, meshes, an instance with its arrays. Sees
+// deform/plugin.h alone, as a third party's host would.
 #pragma once
 #include <deform/plugin.h>
 #include <dlfcn.h>
@@ -28,7 +28,9 @@ inline Vec operator+(Vec a, Vec b) { return {a[0] + b[0], a[1] + b[1], a[2] + b[
 inline Vec operator-(Vec a, Vec b) { return {a[0] - b[0], a[1] - b[1], a[2] - b[2]}; }
 inline Vec operator*(double s, Vec a) { return {s * a[0], s * a[1], s * a[2]}; }
 inline double dot(Vec a, Vec b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
-inline Vec cross(Vec a, Vec b) { return {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]}; }
+inline Vec cross(Vec a, Vec b) {
+  return {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]};
+}
 inline double norm(Vec a) { return std::sqrt(dot(a, a)); }
 
 // Services. `shuffle` > 0: parallel_for hands out its pieces in a random cut and order.
@@ -39,23 +41,34 @@ struct Host {
   std::string logged;
 
   Host() {
-    table.size = sizeof table, table.abi = DFM_ABI, table.abi_draft = DFM_ABI_DRAFT, table.ctx = this;
+    table.size = sizeof table;
+    table.abi = DFM_ABI;
+    table.abi_draft = DFM_ABI_DRAFT;
+    table.ctx = this;
     table.alloc = [](void *c, size_t bytes, size_t align) -> void * {
       Host &h = *static_cast<Host *>(c);
       if (h.calls++ == h.fail_at) return nullptr;
-      h.live += bytes, h.peak = std::max(h.peak, h.live);
+      h.live += bytes;
+      h.peak = std::max(h.peak, h.live);
       return std::aligned_alloc(align, (bytes + align - 1) / align * align);
     };
-    table.release = [](void *c, void *p, size_t bytes, size_t) { static_cast<Host *>(c)->live -= bytes, std::free(p); };
-    table.log = [](void *c, int32_t, uint32_t, const char *text) { static_cast<Host *>(c)->logged += std::string(text) + "\n"; };
-    table.parallel_for = [](void *c, uint32_t n, uint32_t grain, void (*fn)(void *, uint32_t, uint32_t), void *user) {
+    table.release = [](void *c, void *p, size_t bytes, size_t) {
+      static_cast<Host *>(c)->live -= bytes;
+      std::free(p);
+    };
+    table.log = [](void *c, int32_t, uint32_t, const char *text) {
+      static_cast<Host *>(c)->logged += std::string(text) + "\n";
+    };
+    table.parallel_for = [](void *c, uint32_t n, uint32_t grain, void (*fn)(void *, uint32_t, uint32_t),
+                            void *user) {
       Host &h = *static_cast<Host *>(c);
       if (!h.shuffle) return fn(user, 0, n);
       std::mt19937 random(h.shuffle++);
       std::vector<std::pair<uint32_t, uint32_t>> pieces;
       for (uint32_t at = 0; at < n;) {
         const uint32_t end = std::min<uint32_t>(n, at + grain * (1 + random() % 3));
-        pieces.push_back({at, end}), at = end;
+        pieces.push_back({at, end});
+        at = end;
       }
       std::shuffle(pieces.begin(), pieces.end(), random);
       for (auto [b, e] : pieces) fn(user, b, e);
@@ -94,7 +107,10 @@ struct Mesh {
         for (int b = 0; b < a; ++b) set.insert(std::minmax(cells[4 * c + a], cells[4 * c + b]));
       }
     edges.clear();
-    for (auto [i, j] : set) edges.push_back(i), edges.push_back(j);
+    for (auto [i, j] : set) {
+      edges.push_back(i);
+      edges.push_back(j);
+    }
   }
 };
 
@@ -114,7 +130,8 @@ inline Mesh irregular_tet() {
   return m;
 }
 
-// Bar of nx x ny x nz cubes of side h, six Kuhn tetrahedra each; `noise` moves inner points by that share of h.
+// Bar of nx x ny x nz cubes of side h, six Kuhn tetrahedra each; `noise` moves inner points by
+// that share of h.
 inline Mesh kuhn_bar(uint32_t nx, uint32_t ny, uint32_t nz, double h, double noise = 0) {
   Mesh m;
   const auto id = [&](uint32_t i, uint32_t j, uint32_t k) { return (i * (ny + 1) + j) * (nz + 1) + k; };
@@ -134,7 +151,10 @@ inline Mesh kuhn_bar(uint32_t nx, uint32_t ny, uint32_t nz, double h, double noi
           uint32_t q[3] = {i, j, k};
           const size_t begin = m.cells.size();
           m.cells.push_back(id(q[0], q[1], q[2]));
-          for (int a : axes) ++q[a], m.cells.push_back(id(q[0], q[1], q[2]));
+          for (int a : axes) {
+            ++q[a];
+            m.cells.push_back(id(q[0], q[1], q[2]));
+          }
           if (m.volume(uint32_t(begin / 4)) < 0) std::swap(m.cells[begin], m.cells[begin + 1]);
         } while (std::next_permutation(axes, axes + 3));
       }
@@ -157,7 +177,8 @@ inline Mesh read_msh(const std::string &path) {
   const auto point = [&](size_t tag) {
     Vec x;
     get(x[0], x[1], x[2]);
-    number[tag] = m.npoint(), m.rest.insert(m.rest.end(), x.begin(), x.end());
+    number[tag] = m.npoint();
+    m.rest.insert(m.rest.end(), x.begin(), x.end());
   };
   const auto cell = [&](int type, auto node) {  // type: 1 line, 2 triangle, 4 tetrahedron, 15 point
     for (int k = 0; k < (type == 4 ? 4 : type == 2 ? 3 : type == 1 ? 2 : 1); ++k) {
@@ -169,7 +190,8 @@ inline Mesh read_msh(const std::string &path) {
     int entity[3], id, skip;
     size_t blocks, count, lowest, highest, tag;
     if (word == "$MeshFormat") {
-      in >> version >> skip >> id, binary = skip == 1;
+      in >> version >> skip >> id;
+      binary = skip == 1;
     } else if (version > 4 && (word == "$Nodes" || word == "$Elements")) {
       in.ignore(1);
       get(blocks, count, lowest, highest);
@@ -178,13 +200,21 @@ inline Mesh read_msh(const std::string &path) {
         std::vector<size_t> tags(word == "$Nodes" ? count : 0);
         for (size_t &t : tags) get(t);
         for (size_t t : tags) point(t);
-        for (size_t e = 0; word == "$Elements" && e < count; ++e) get(tag), cell(entity[2], tag);
+        for (size_t e = 0; word == "$Elements" && e < count; ++e) {
+          get(tag);
+          cell(entity[2], tag);
+        }
       }
     } else if (word == "$Nodes") {
-      in >> count, in.ignore(1);
-      for (size_t n = 0; n < count; ++n) get(id), point(size_t(id));
+      in >> count;
+      in.ignore(1);
+      for (size_t n = 0; n < count; ++n) {
+        get(id);
+        point(size_t(id));
+      }
     } else if (word == "$Elements") {
-      in >> count, in.ignore(1);
+      in >> count;
+      in.ignore(1);
       for (size_t e = 0; e < count;) {
         int type, many = 1, tags;
         if (binary) get(type, many, tags);
@@ -229,12 +259,23 @@ struct Instance {
       : host(h), mesh(m), stride(s), ops(static_cast<const dfm_model *>(plugin_type().ops)) {
     std::vector<const char *> keys;
     std::vector<const double *> fields;
-    for (const auto &[key, values] : by_cell) keys.push_back(key.c_str()), fields.push_back(values.data());
+    for (const auto &[key, values] : by_cell) {
+      keys.push_back(key.c_str());
+      fields.push_back(values.data());
+    }
     keys.push_back(nullptr);
     dfm_mesh d{};
-    d.size = sizeof d, d.npoint = m.npoint(), d.ncell = m.ncell(), d.cell = DFM_CELL_TET, d.rest = m.rest.data(), d.cells = m.cells.data();
-    d.mass = m.mass.data(), d.nedge = uint32_t(m.edges.size() / 2), d.edges = m.edges.data();
-    d.field_keys = keys.data(), d.fields = fields.data();
+    d.size = sizeof d;
+    d.npoint = m.npoint();
+    d.ncell = m.ncell();
+    d.cell = DFM_CELL_TET;
+    d.rest = m.rest.data();
+    d.cells = m.cells.data();
+    d.mass = m.mass.data();
+    d.nedge = uint32_t(m.edges.size() / 2);
+    d.edges = m.edges.data();
+    d.field_keys = keys.data();
+    d.fields = fields.data();
     const std::vector<double> values = row(p);
     d.params = values.data();
     status = ops->create(&h.table, &d, &self);
@@ -248,7 +289,8 @@ struct Instance {
     if (status != DFM_OK) return;
     const auto *slots = static_cast<const dfm_slots *>(ops->extension(self, DFM_EXT_SLOTS));
     for (uint32_t n = 0; n < slots->nslot; ++n)
-      state.resize(state.size() + size_t(slots->slots[n].width) * (slots->slots[n].unit == DFM_PER_EDGE ? d.nedge : 1));
+      state.resize(state.size() +
+                   size_t(slots->slots[n].width) * (slots->slots[n].unit == DFM_PER_EDGE ? d.nedge : 1));
     ops->state_init(self, state.data());
     state_out = state;
   }
@@ -256,11 +298,19 @@ struct Instance {
   Instance(const Instance &) = delete;
 
   static std::vector<double> row(const Params &p) {
-    std::map<std::string, std::vector<double>> by_key = {
-        {"young", {p.young}}, {"poisson", {p.poisson}}, {"damping_stiffness", {p.damping_stiffness}}, {"damping_mass", {p.damping_mass}},
-        {"volume", {p.volume}}, {"collapse", {p.collapse}}, {"anisotropy_slope", {p.slope}}, {"anisotropy_axis", {p.axis.begin(), p.axis.end()}},
-        {"anisotropy_kind", {double(p.stiffer)}}, {"anisotropy_form", {double(p.form_a)}}, {"damper", {double(p.damper)}},
-        {"relaxation_ratio", {p.ratio}}, {"relaxation_time", {p.time}}};
+    std::map<std::string, std::vector<double>> by_key = {{"young", {p.young}},
+                                                         {"poisson", {p.poisson}},
+                                                         {"damping_stiffness", {p.damping_stiffness}},
+                                                         {"damping_mass", {p.damping_mass}},
+                                                         {"volume", {p.volume}},
+                                                         {"collapse", {p.collapse}},
+                                                         {"anisotropy_slope", {p.slope}},
+                                                         {"anisotropy_axis", {p.axis.begin(), p.axis.end()}},
+                                                         {"anisotropy_kind", {double(p.stiffer)}},
+                                                         {"anisotropy_form", {double(p.form_a)}},
+                                                         {"damper", {double(p.damper)}},
+                                                         {"relaxation_ratio", {p.ratio}},
+                                                         {"relaxation_time", {p.time}}};
     std::vector<double> values;
     for (uint32_t n = 0; n < plugin_type().nparam; ++n) {
       const std::vector<double> &value = by_key.at(plugin_type().params[n].key);
@@ -269,11 +319,20 @@ struct Instance {
     return values;
   }
   uint32_t size() const { return mesh.npoint(); }
-  Vec get(const double *a, uint32_t i) const { return {a[size_t(stride) * i], a[size_t(stride) * i + 1], a[size_t(stride) * i + 2]}; }
-  void set(double *a, uint32_t i, Vec value) const { std::copy(value.begin(), value.end(), a + size_t(stride) * i); }
+  Vec get(const double *a, uint32_t i) const {
+    return {a[size_t(stride) * i], a[size_t(stride) * i + 1], a[size_t(stride) * i + 2]};
+  }
+  void set(double *a, uint32_t i, Vec value) const {
+    std::copy(value.begin(), value.end(), a + size_t(stride) * i);
+  }
   dfm_kin kin() const {
     dfm_kin k{};
-    k.size = sizeof k, k.stride = stride, k.x = x, k.v = v, k.dt = dt, k.state = state.empty() ? nullptr : state.data();
+    k.size = sizeof k;
+    k.stride = stride;
+    k.x = x;
+    k.v = v;
+    k.dt = dt;
+    k.state = state.empty() ? nullptr : state.data();
     return k;
   }
   // Forces of a step of length dt, whose end is then the present state.
@@ -336,7 +395,10 @@ struct Instance {
 // J, from the energy per volume of each cell.
 inline double energy_of_cells(Instance &b) {
   const auto *ext = static_cast<const dfm_cell_energy *>(b.ops->extension(b.self, DFM_EXT_CELL_ENERGY));
-  if (!ext) return ADD_FAILURE() << "no energy per cell", 0;
+  if (!ext) {
+    ADD_FAILURE() << "no energy per cell";
+    return 0;
+  }
   std::vector<double> density(b.mesh.ncell());
   const dfm_kin k = b.kin();
   EXPECT_EQ(ext->cell_energy(b.self, &k, density.data()), DFM_OK);
@@ -345,7 +407,8 @@ inline double energy_of_cells(Instance &b) {
   return sum;
 }
 
-// Central differences of the energy at every fifth point: 2 h^2 of its third derivative against its rounding over h. `scale` is the largest force.
+// Central differences of the energy at every fifth point: 2 h^2 of its third derivative against its rounding
+// over h. `scale` is the largest force.
 inline void expect_force_is_gradient(Instance &b, double h, double tolerance, const std::string &what) {
   b.forces();
   const double scale = b.largest_force();
@@ -368,14 +431,17 @@ inline void expect_no_force_or_torque(Instance &b, const std::string &what) {
   double scale = 0;
   for (uint32_t i = 0; i < b.size(); ++i) {
     const Vec x = b.get(b.x, i), f = b.get(b.f, i);
-    force = force + f, torque = torque + cross(x, f), scale += norm(f) * std::max(1.0, norm(x));
+    force = force + f;
+    torque = torque + cross(x, f);
+    scale += norm(f) * std::max(1.0, norm(x));
   }
   EXPECT_LT(norm(force) + norm(torque), 1e-12 * scale) << what;
 }
 
 // Rodrigues' rotation about a unit axis.
 inline Vec rotate(Vec x, Vec axis, double angle) {
-  return std::cos(angle) * x + std::sin(angle) * cross(axis, x) + (dot(axis, x) * (1 - std::cos(angle))) * axis;
+  return std::cos(angle) * x + std::sin(angle) * cross(axis, x) +
+         (dot(axis, x) * (1 - std::cos(angle))) * axis;
 }
 
 }  // namespace msm_test

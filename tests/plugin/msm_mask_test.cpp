@@ -1,4 +1,5 @@
-// Springs that are switched off (dfm.spring_mask/1): a cut bar falls apart, nothing is gained, nothing is paid without a mask.
+// Springs that are switched off (dfm.spring_mask/1): a cut bar falls apart, nothing is gained, nothing is
+// paid without a mask.
 #include "msm_host.h"
 
 namespace msm_test {
@@ -13,13 +14,16 @@ std::vector<uint32_t> across(const Mesh &m, double x) {  // edges that cross the
 
 std::vector<uint8_t> get(const Instance &b) {
   std::vector<uint8_t> on(b.mesh.edges.size() / 2, 7);
-  EXPECT_EQ(static_cast<const dfm_spring_mask *>(b.ops->extension(b.self, DFM_EXT_SPRING_MASK))->get(b.self, on.data()), DFM_OK);
+  EXPECT_EQ(static_cast<const dfm_spring_mask *>(b.ops->extension(b.self, DFM_EXT_SPRING_MASK))
+                ->get(b.self, on.data()),
+            DFM_OK);
   return on;
 }
 
 Params soft() {
   Params p = {1e5, 0.4, 0.001, 0, 1};
-  p.slope = 1, p.axis = {0, 1, 1};
+  p.slope = 1;
+  p.axis = {0, 1, 1};
   return p;
 }
 
@@ -39,7 +43,8 @@ TEST(MsmMask, CutBar_FallsApartKeepsMomentumAndGainsNoEnergy) {
   };
   for (uint32_t i = 0; i < b.size(); ++i) {  // stretched, halves that leave each other at 0.2 m/s
     const Vec x = b.mesh.at(i);
-    b.set(b.x, i, {1.05 * x[0], x[1], x[2]}), b.set(b.v, i, {x[0] > 0.45 ? 0.1 : -0.1, 0.02, 0});
+    b.set(b.x, i, {1.05 * x[0], x[1], x[2]});
+    b.set(b.v, i, {x[0] > 0.45 ? 0.1 : -0.1, 0.02, 0});
   }
   const double whole = energy();
   b.mask(across(b.mesh, 0.45), false);
@@ -107,10 +112,13 @@ TEST(MsmMask, OnAgain_IsThePlainBodyToTheBit) {
   std::vector<uint8_t> expected(mesh.edges.size() / 2, 1);
   expected[4] = expected[9] = 0;
   EXPECT_EQ(get(b), expected);
-  ASSERT_EQ(b.ops->set_params(b.self, Instance::row(soft()).data()), DFM_OK);  // parameters leave the mask alone
+  // parameters leave the mask alone
+  ASSERT_EQ(b.ops->set_params(b.self, Instance::row(soft()).data()), DFM_OK);
   EXPECT_EQ(get(b), expected);
-  a.shake(0.02, 1), b.shake(0.02, 1);
-  a.forces(), b.forces();
+  a.shake(0.02, 1);
+  b.shake(0.02, 1);
+  a.forces();
+  b.forces();
   EXPECT_NE(std::memcmp(a.f, b.f, 4 * a.size() * sizeof(double)), 0);
   b.mask({4, 9}, true);
   b.forces();
@@ -121,7 +129,9 @@ TEST(MsmMask, OnAgain_IsThePlainBodyToTheBit) {
 // All or nothing: forces, energy, bound and mask are those of before, to the bit.
 TEST(MsmMask, ParametersThatFindNoMemory_ChangeNothing) {
   Host host;
-  Instance b(host, kuhn_bar(3, 2, 2, 0.1, 0.2), {1e5}, 4, {{"damping_mass", std::vector<double>(72, 1)}, {"damping_stiffness", std::vector<double>(72, 1e-3)}});
+  Instance b(
+      host, kuhn_bar(3, 2, 2, 0.1, 0.2), {1e5}, 4,
+      {{"damping_mass", std::vector<double>(72, 1)}, {"damping_stiffness", std::vector<double>(72, 1e-3)}});
   b.mask({2}, false);
   b.shake(0.01, 1);
   b.forces();
@@ -130,7 +140,8 @@ TEST(MsmMask, ParametersThatFindNoMemory_ChangeNothing) {
   const double energy = b.energy(), bound = b.bound();
   size_t failed = 0;
   for (;; ++failed) {
-    host.calls = 0, host.fail_at = failed;
+    host.calls = 0;
+    host.fail_at = failed;
     const dfm_status status = b.ops->set_params(b.self, Instance::row(soft()).data());
     host.fail_at = ~size_t(0);
     EXPECT_EQ(get(b), mask);

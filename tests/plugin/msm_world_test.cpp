@@ -1,6 +1,6 @@
-// The mass-spring model's options through the library: state by instance is saved, hashed and restored; the plan lists what is at work.
+// The mass-spring model's options through the library: state by instance is saved, hashed and restored; the
+// plan lists what is at work.
 #include "world.h"
-
 
 namespace {
 
@@ -9,7 +9,8 @@ struct Scene {
   dfm_world world = 0;
   dfm_body body = 0;
 
-  explicit Scene(const std::vector<std::pair<const char *, std::vector<double>>> &params, std::vector<const char *> asked = {}, uint32_t threads = 1)
+  explicit Scene(const std::vector<std::pair<const char *, std::vector<double>>> &params,
+                 std::vector<const char *> asked = {}, uint32_t threads = 1)
       : context(threads) {
     dfm_world_def w = dfm_world_def_default();
     asked.push_back(nullptr);
@@ -23,7 +24,8 @@ struct Scene {
     test::ok(dfm_tetmesh_get_info(mesh, &info));
     dfm_body_def d = dfm_body_def_default();
     test::ok(dfm_tetmesh_data(mesh, &d.points, &d.tets, nullptr));
-    d.npoint = info.npoint, d.ntet = info.ntet;
+    d.npoint = info.npoint;
+    d.ntet = info.ntet;
     std::vector<uint8_t> fixed(d.npoint, 0);
     double least = 1e300;
     for (uint32_t i = 0; i < d.npoint; ++i) least = std::min(least, d.points[3 * i]);
@@ -53,10 +55,13 @@ struct Scene {
   }
 };
 
-bool lists(const std::string &plan, const char *effect) { return plan.find("\"name\":\"" + std::string(effect) + "\"") != std::string::npos; }
+bool lists(const std::string &plan, const char *effect) {
+  return plan.find("\"name\":\"" + std::string(effect) + "\"") != std::string::npos;
+}
 
 using Values = std::vector<std::pair<const char *, std::vector<double>>>;
-const Values kSls = {{"damper", {2}}, {"relaxation_ratio", {2}}, {"relaxation_time", {0.02}}, {"anisotropy_slope", {1}}};
+const Values kSls = {
+    {"damper", {2}}, {"relaxation_ratio", {2}}, {"relaxation_time", {0.02}}, {"anisotropy_slope", {1}}};
 
 TEST(MsmWorld, Branches_AreSavedHashedAndRestored) {
   Scene s(kSls), other(kSls);
@@ -80,7 +85,11 @@ TEST(MsmWorld, Branches_AreSavedHashedAndRestored) {
 
 TEST(MsmWorld, MaxwellBar_FlowsUnderGravityWhereAVoigtBarStands) {
   const auto sag = [](double damper, int steps) {
-    Scene s({{"young", {5e5}}, {"damper", {damper}}, {"relaxation_time", {0.05}}, {"damping_stiffness", {0.002}}, {"damping_mass", {8}}});
+    Scene s({{"young", {5e5}},
+             {"damper", {damper}},
+             {"relaxation_time", {0.05}},
+             {"damping_stiffness", {0.002}},
+             {"damping_mass", {8}}});
     dfm_body_measure before{}, after{};
     before.size = after.size = sizeof before;
     test::ok(dfm_body_get_measure(s.body, &before));
@@ -90,7 +99,7 @@ TEST(MsmWorld, MaxwellBar_FlowsUnderGravityWhereAVoigtBarStands) {
   };
   const double voigt = sag(0, 4000), sls = sag(2, 4000), maxwell = sag(1, 4000);
   EXPECT_NEAR(sls, voigt, 0.01 * voigt);  // the same spring carries both in the end
-  EXPECT_GT(maxwell, 3 * voigt);   // 0.31 m of a bar of 0.5 m
+  EXPECT_GT(maxwell, 3 * voigt);          // 0.31 m of a bar of 0.5 m
 }
 
 TEST(MsmWorld, Plan_ListsTheEffectsThatParametersCallFor) {
@@ -98,7 +107,8 @@ TEST(MsmWorld, Plan_ListsTheEffectsThatParametersCallFor) {
   test::ok(plain.advance(1));
   std::string plan = plain.plan();
   EXPECT_TRUE(lists(plan, "large_rotation"));
-  for (const char *effect : {"volume", "damping", "anisotropy", "deform.relaxation"}) EXPECT_FALSE(lists(plan, effect)) << effect;
+  for (const char *effect : {"volume", "damping", "anisotropy", "deform.relaxation"})
+    EXPECT_FALSE(lists(plan, effect)) << effect;
   const double one = 1;
   const dfm_param_value values[] = {{"volume", &one, 1}, {"anisotropy_slope", &one, 1}};
   const dfm_params params = {sizeof params, 2, values};

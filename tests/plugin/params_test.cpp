@@ -7,13 +7,21 @@ using tiny::Context;
 
 namespace {
 
-struct Given { const char *key; std::vector<double> values; };
+struct Given {
+  const char *key;
+  std::vector<double> values;
+};
 
-struct Packed { dfm_status status; std::vector<double> values; std::string why; };
+struct Packed {
+  dfm_status status;
+  std::vector<double> values;
+  std::string why;
+};
 
 Packed pack(dfm_law law, std::initializer_list<Given> given) {
   std::vector<dfm_param_value> list;
-  for (const auto &g : given) list.push_back({g.key, g.values.data(), static_cast<uint32_t>(g.values.size())});
+  for (const auto &g : given)
+    list.push_back({g.key, g.values.data(), static_cast<uint32_t>(g.values.size())});
   const dfm_params params{sizeof params, static_cast<uint32_t>(list.size()), list.data()};
   Packed out{DFM_OK, std::vector<double>(64), ""};
   uint32_t n = 0;
@@ -90,7 +98,8 @@ TEST_F(Params, Mu_StandsForBothCoefficients) {
   const dfm_law law = coulomb();
   EXPECT_EQ(pack(law, {}).values, (std::vector<double>{0.5, 0.5, 0.01, 2, 0}));
   EXPECT_EQ(pack(law, {{"mu", {0.3}}}).values, (std::vector<double>{0.3, 0.3, 0.01, 2, 0}));
-  EXPECT_EQ(pack(law, {{"mu_S", {0.4}}, {"mu", {0.3}}}).values, (std::vector<double>{0.3, 0.4, 0.01, 2, 0})) << "a row's own name wins";
+  EXPECT_EQ(pack(law, {{"mu_S", {0.4}}, {"mu", {0.3}}}).values, (std::vector<double>{0.3, 0.4, 0.01, 2, 0}))
+      << "a row's own name wins";
   EXPECT_EQ(pack(drag(), {{"mu", {0.3}}}).status, DFM_E_ARG) << "a law without coefficients";
 }
 

@@ -1,4 +1,5 @@
-// Types as the library keeps them: of its own size whatever the plugin was built against, checked, found by name.
+// Types as the library keeps them: of its own size whatever the plugin was built against, checked,
+// found by name.
 #include "tiny_support.h"
 
 using tiny::Context;
@@ -57,13 +58,17 @@ TEST(Registry, OldAndNewLaws_AreEvaluatedWithTheirParameters) {
 }
 
 TEST(Registry, BadSelfDescriptions_AreRefusedWithASentence) {
-  const std::pair<const char *, const char *> cases[] = {
-      {"bad_no_source", "lacks \"source\""},       {"bad_bad_id", "reverse-DNS"},   {"bad_bad_range", "\"first\": the range [0, 10]"},
-      {"bad_double_key", "\"first\" stands twice"}, {"bad_foreign_slot", "slot 0"}, {"bad_no_eval", "eval"}};
+  const std::pair<const char *, const char *> cases[] = {{"bad_no_source", "lacks \"source\""},
+                                                         {"bad_bad_id", "reverse-DNS"},
+                                                         {"bad_bad_range", "\"first\": the range [0, 10]"},
+                                                         {"bad_double_key", "\"first\" stands twice"},
+                                                         {"bad_foreign_slot", "slot 0"},
+                                                         {"bad_no_eval", "eval"}};
   for (const auto &[file, part] : cases) {
     Context c;
     EXPECT_EQ(dfm_plugin_load(c.c, plugin(file).c_str()), DFM_E_UNSUPPORTED) << file;
-    EXPECT_NE(std::string(dfm_last_error()).find(part), std::string::npos) << file << ": " << dfm_last_error();
+    EXPECT_NE(std::string(dfm_last_error()).find(part), std::string::npos)
+        << file << ": " << dfm_last_error();
     EXPECT_TRUE(c.ids().empty());
   }
 }
@@ -83,14 +88,17 @@ TEST(Registry, UnknownName_ListsWhatIsLoadedAndTheNearest) {
   EXPECT_STREQ(dfm_last_error(), "no law \"darg\" is loaded, did you mean \"drag\"; loaded: drag, old");
   Context empty;
   EXPECT_EQ(dfm_law_open(empty.c, "coulomb", &law), DFM_E_UNSUPPORTED);
-  EXPECT_NE(std::string(dfm_last_error()).find("no plugin with a law is loaded"), std::string::npos) << dfm_last_error();
+  EXPECT_NE(std::string(dfm_last_error()).find("no plugin with a law is loaded"), std::string::npos)
+      << dfm_last_error();
 }
 
 TEST(Registry, Visit_GoesByKindAndId) {
   Context c;
-  for (const char *name : {"tiny_throw", "tiny_old", "tiny_law"}) ASSERT_EQ(dfm_plugin_load(c.c, plugin(name).c_str()), DFM_OK);
-  EXPECT_EQ(c.ids(), (std::vector<std::string>{"org.tiny.checks", "org.tiny.discards", "org.tiny.drag", "org.tiny.fails", "org.tiny.guarded",
-                                               "org.tiny.old", "org.tiny.throws"}));
+  for (const char *name : {"tiny_throw", "tiny_old", "tiny_law"})
+    ASSERT_EQ(dfm_plugin_load(c.c, plugin(name).c_str()), DFM_OK);
+  EXPECT_EQ(c.ids(), (std::vector<std::string>{"org.tiny.checks", "org.tiny.discards", "org.tiny.drag",
+                                               "org.tiny.fails", "org.tiny.guarded", "org.tiny.old",
+                                               "org.tiny.throws"}));
 }
 
 }  // namespace

@@ -1,23 +1,34 @@
-// What the tests of set-valued laws share: one contact asked by hand, and a mass on a plane driven by a force.
+// What the tests of set-valued laws share: one contact asked by hand, and a mass on a plane
+// driven by a force.
 #pragma once
 #include "tiny_support.h"
 
 namespace tiny {
 
-struct Answer { double fx, fy, limit; int mode; double dv[4], dn[2]; };
+struct Answer {
+  double fx, fy, limit;
+  int mode;
+  double dv[4], dn[2];
+};
 
 // Normal force, slip, stopping force, area. Straight to the plugin, so that a NaN comes back to be looked at.
-inline Answer one_contact(const dfm_friction &ops, std::vector<double> params, double fn, double vx, double vy, double sx, double sy,
-                          double area = 1) {
+inline Answer one_contact(const dfm_friction &ops, std::vector<double> params, double fn, double vx,
+                          double vy, double sx, double sy, double area = 1) {
   Batch b(1, std::move(params));
-  b.fn[0] = fn, b.vt[0] = vx, b.vt[b.stride] = vy, b.stop[0] = sx, b.stop[b.stride] = sy, b.area[0] = area;
+  b.fn[0] = fn;
+  b.vt[0] = vx;
+  b.vt[b.stride] = vy;
+  b.stop[0] = sx;
+  b.stop[b.stride] = sy;
+  b.area[0] = area;
   EXPECT_EQ(ops.eval(&b.in, &b.out), DFM_OK);
   Answer a{b.ft[0], b.ft[b.stride], b.limit[0], b.mode[0], {}, {b.dn[0], b.dn[b.stride]}};
   for (int k = 0; k < 4; ++k) a.dv[k] = b.dv[k * b.stride];
   return a;
 }
 
-// A mass that a force f drives against friction, by implicit steps: the slip under the friction force is the fixed point of the smooth part.
+// A mass that a force f drives against friction, by implicit steps: the slip under the friction force is the
+// fixed point of the smooth part.
 struct Rig {
   double m = 1, v = 0, x = 0, force = 0;
   void step(const dfm_friction &ops, const std::vector<double> &params, double h, double f, double fn) {
@@ -30,7 +41,8 @@ struct Rig {
       if (next == u && pass) break;
       u = next;
     }
-    v = u, x += h * v;
+    v = u;
+    x += h * v;
   }
 };
 

@@ -1,4 +1,5 @@
-// What a law without derivatives costs: how often it is asked, against the same law with them, and that the motion is the same.
+// What a law without derivatives costs: how often it is asked, against the same law with them, and that the
+// motion is the same.
 #include "bristle_law.h"
 
 namespace {
@@ -19,17 +20,26 @@ const dfm_plugin *entry(const dfm_host *host, uint32_t abi, uint32_t least) {
   static const dfm_type *types[2][1] = {{&type[0]}, {&type[1]}};
   static dfm_plugin plugin[2];
   const bool w = with_derivatives;
-  ops[w] = *static_cast<const dfm_friction *>(known->types[0]->ops), type[w] = *known->types[0], plugin[w] = *known;
-  ops[w].eval = counted, ops[w].flags = w ? ops[w].flags | DFM_FRIC_JACOBIAN : ops[w].flags & ~uint32_t{DFM_FRIC_JACOBIAN};
-  type[w].ops = &ops[w], type[w].id = "test.counted", plugin[w].types = types[w];
+  ops[w] = *static_cast<const dfm_friction *>(known->types[0]->ops);
+  type[w] = *known->types[0];
+  plugin[w] = *known;
+  ops[w].eval = counted;
+  ops[w].flags = w ? ops[w].flags | DFM_FRIC_JACOBIAN : ops[w].flags & ~uint32_t{DFM_FRIC_JACOBIAN};
+  type[w].ops = &ops[w];
+  type[w].id = "test.counted";
+  plugin[w].types = types[w];
   return &plugin[w];
 }
 
-struct Slide { uint64_t lanes; double x, z; };
+struct Slide {
+  uint64_t lanes;
+  double x, z;
+};
 
 // A block that is thrown onto a floor, slides, and comes to rest.
 Slide slide(bool derivatives) {
-  with_derivatives = derivatives, lanes = 0;
+  with_derivatives = derivatives;
+  lanes = 0;
   test::Context c;
   test::ok(dfm_plugin_register_static(c, entry, "counted"));
   const dfm_world w = test::make_world(c);
@@ -37,10 +47,17 @@ Slide slide(bool derivatives) {
   const double mu = 0.4, sigma0 = 1e8;
   const dfm_param_value values[] = {{"mu", &mu, 1}, {"sigma0", &sigma0, 1}};
   dfm_friction_def f{};
-  f.size = sizeof f, f.between[0] = f.between[1] = "*", f.law = "test.counted", f.params = {sizeof(dfm_params), 2, values};
+  f.size = sizeof f;
+  f.between[0] = f.between[1] = "*";
+  f.law = "test.counted";
+  f.params = {sizeof(dfm_params), 2, values};
   test::ok(dfm_world_add_friction(w, &f));
   test::BodyOptions o;
-  o.name = "block", o.young = 1e5, o.damping_stiffness = 1e-3, o.position = {0, 0, 0.001}, o.velocity = {0.3, 0.1, 0};
+  o.name = "block";
+  o.young = 1e5;
+  o.damping_stiffness = 1e-3;
+  o.position = {0, 0, 0.001};
+  o.velocity = {0.3, 0.1, 0};
   const dfm_body b = test::make_body(c, w, "beam", {0.1, 0.1, 0.1}, 200, o);
   test::run(w, 0.2, 1e-3);
   const dfm_body_measure m = test::measure(b);
@@ -52,7 +69,8 @@ Slide slide(bool derivatives) {
 TEST(Slopes, LawWithoutDerivatives_IsAskedHardlyMoreThanTwiceAsOften) {
   const Slide with = slide(true), without = slide(false);
   EXPECT_GT(with.lanes, 1000u);
-  EXPECT_LT(static_cast<double>(without.lanes), 2.5 * static_cast<double>(with.lanes)) << without.lanes << " of " << with.lanes;
+  EXPECT_LT(static_cast<double>(without.lanes), 2.5 * static_cast<double>(with.lanes))
+      << without.lanes << " of " << with.lanes;
   EXPECT_NEAR(without.x, with.x, 1e-5);
   EXPECT_NEAR(without.z, with.z, 1e-5);
 }

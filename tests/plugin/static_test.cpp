@@ -1,14 +1,17 @@
 // A plugin linked into the program (tiny_law.c built with -DDFM_STATIC_PLUGIN=tiny_law) and registered by it.
 #include "tiny_support.h"
 
-extern "C" const dfm_plugin *dfm_plugin_entry_tiny_law(const dfm_host *host, uint32_t host_abi, uint32_t host_abi_min);
+extern "C" const dfm_plugin *dfm_plugin_entry_tiny_law(const dfm_host *host, uint32_t host_abi,
+                                                       uint32_t host_abi_min);
 
 namespace {
 
 TEST(StaticPlugin, Registered_IsFoundLikeALoadedOne) {
   tiny::Context c;
-  ASSERT_EQ(dfm_plugin_register_static(c.c, dfm_plugin_entry_tiny_law, "tiny_law"), DFM_OK) << dfm_last_error();
-  ASSERT_EQ(dfm_plugin_register_static(c.c, dfm_plugin_entry_tiny_law, "tiny_law"), DFM_OK) << "twice is harmless";
+  ASSERT_EQ(dfm_plugin_register_static(c.c, dfm_plugin_entry_tiny_law, "tiny_law"), DFM_OK)
+      << dfm_last_error();
+  ASSERT_EQ(dfm_plugin_register_static(c.c, dfm_plugin_entry_tiny_law, "tiny_law"), DFM_OK)
+      << "twice is harmless";
   EXPECT_EQ(c.file_of("org.tiny.drag"), "static:tiny_law");
   tiny::Batch b(1, {2, 0, 0, 0, 4});
   b.vt[0] = 3;

@@ -1,5 +1,5 @@
-// Plugins that fail inside a step: the step says who and where, the world keeps its last good state, the host lives on. Laws and models are
-// static plugins that do what the test tells them.
+// Plugins that fail inside a step: the step says who and where, the world keeps its last good state, the host
+// lives on. Laws and models are static plugins that do what the test tells them.
 #define DFM_STATIC_PLUGIN misbehaving
 #include <atomic>
 #include <cfenv>
@@ -12,7 +12,17 @@ namespace {
 
 enum class Way { behave, throws, fails, nan_force, nan_limit, negative_limit, rounds };
 Way law_way = Way::behave;
-enum class Model { behave, throws_forces, fails_forces, nan_force, throws_bound, throws_create, fails_create, nested, rounds };
+enum class Model {
+  behave,
+  throws_forces,
+  fails_forces,
+  nan_force,
+  throws_bound,
+  throws_create,
+  fails_create,
+  nested,
+  rounds
+};
 Model model_way = Model::behave;
 const dfm_host *host_of_model = nullptr;
 std::atomic<int> nested_parallel{0}, nested_calls{0};
@@ -27,7 +37,10 @@ dfm_status law_eval(const dfm_friction_in *in, dfm_friction_out *out) {
     out->ft[in->stride + i] = 0;
     for (uint32_t k = 0; k < 4 && out->dft_dvt; ++k) out->dft_dvt[k * in->stride + i] = 0;
     for (uint32_t k = 0; k < 2 && out->dft_dfn; ++k) out->dft_dfn[k * in->stride + i] = 0;
-    if (out->limit) out->limit[i] = last && law_way == Way::nan_limit ? NAN : last && law_way == Way::negative_limit ? -1 : 0;
+    if (out->limit)
+      out->limit[i] = last && law_way == Way::nan_limit        ? NAN
+                      : last && law_way == Way::negative_limit ? -1
+                                                               : 0;
     if (out->mode) out->mode[i] = 2;
   }
   if (law_way == Way::rounds) std::fesetround(FE_UPWARD);
@@ -42,7 +55,9 @@ dfm_status create(const dfm_host *host, const dfm_mesh *, void **self) {
   *self = &model_way;
   return DFM_OK;
 }
-void destroy(void *) { if (model_way != Model::behave) throw std::runtime_error("on the way out"); }
+void destroy(void *) {
+  if (model_way != Model::behave) throw std::runtime_error("on the way out");
+}
 dfm_status add_forces(void *, const dfm_kin *k, double *f) {
   if (model_way == Model::throws_forces) throw std::runtime_error("boom");
   if (model_way == Model::fails_forces) return DFM_E_FATAL;
@@ -52,9 +67,12 @@ dfm_status add_forces(void *, const dfm_kin *k, double *f) {
     // A call from inside a worker runs serially in the caller.
     struct Task { std::thread::id caller; } task{std::this_thread::get_id()};
     ++nested_calls;
-    host_of_model->parallel_for(host_of_model->ctx, 1000, 1, [](void *user, uint32_t, uint32_t) {
-      if (std::this_thread::get_id() != static_cast<Task *>(user)->caller) ++nested_parallel;
-    }, &task);
+    host_of_model->parallel_for(
+        host_of_model->ctx, 1000, 1,
+        [](void *user, uint32_t, uint32_t) {
+          if (std::this_thread::get_id() != static_cast<Task *>(user)->caller) ++nested_parallel;
+        },
+        &task);
   }
   (void)k;
   return DFM_OK;
@@ -70,13 +88,33 @@ extern "C" const dfm_plugin *dfm_plugin_entry_misbehaving(const dfm_host *host, 
   if (!DFM_ABI_OK(host)) return nullptr;
   static const char *const effects[] = {nullptr};
   static dfm_friction friction{};
-  friction.size = sizeof friction, friction.needs = 0, friction.flags = DFM_FRIC_SET_VALUED | DFM_FRIC_JACOBIAN, friction.eval = law_eval;
+  friction.size = sizeof friction;
+  friction.needs = 0;
+  friction.flags = DFM_FRIC_SET_VALUED | DFM_FRIC_JACOBIAN;
+  friction.eval = law_eval;
   static dfm_model ops{};
-  ops.size = sizeof ops, ops.cells = DFM_CELL_TET, ops.create = create, ops.destroy = destroy, ops.add_forces = add_forces, ops.bound = bound;
+  ops.size = sizeof ops;
+  ops.cells = DFM_CELL_TET;
+  ops.create = create;
+  ops.destroy = destroy;
+  ops.add_forces = add_forces;
+  ops.bound = bound;
   static dfm_type law{}, model{};
-  law.size = sizeof law, law.kind = DFM_KIND_FRICTION, law.id = "test.bad_law", law.name = "bad law", law.version = "1", law.licence = "MIT";
-  law.source = "test", law.param_size = sizeof(dfm_param), law.effects = effects, law.ops = &friction;
-  model = law, model.kind = DFM_KIND_MODEL, model.id = "test.bad_model", model.name = "bad model", model.ops = &ops;
+  law.size = sizeof law;
+  law.kind = DFM_KIND_FRICTION;
+  law.id = "test.bad_law";
+  law.name = "bad law";
+  law.version = "1";
+  law.licence = "MIT";
+  law.source = "test";
+  law.param_size = sizeof(dfm_param);
+  law.effects = effects;
+  law.ops = &friction;
+  model = law;
+  model.kind = DFM_KIND_MODEL;
+  model.id = "test.bad_model";
+  model.name = "bad model";
+  model.ops = &ops;
   static const dfm_type *const types[] = {&law, &model};
   static const dfm_plugin plugin{sizeof(dfm_plugin), DFM_ABI, DFM_ABI_DRAFT, 2, types, nullptr};
   return &plugin;
@@ -88,12 +126,18 @@ struct Host {
   std::string log;
   dfm_context *c = nullptr;
   explicit Host(uint32_t threads = 1, bool own_parallel_for = false) {
-    law_way = Way::behave, model_way = Model::behave;
+    law_way = Way::behave;
+    model_way = Model::behave;
     dfm_context_def def = dfm_context_def_default();
-    def.plugin_dir = DEFORM_PLUGIN_DIR, def.threads = threads, def.user = this;
-    def.log = [](void *user, int32_t, const char *text) { static_cast<Host *>(user)->log += std::string(text) + "\n"; };
+    def.plugin_dir = DEFORM_PLUGIN_DIR;
+    def.threads = threads;
+    def.user = this;
+    def.log = [](void *user, int32_t, const char *text) {
+      static_cast<Host *>(user)->log += std::string(text) + "\n";
+    };
     if (own_parallel_for)
-      def.parallel_for = [](void *, uint32_t n, uint32_t grain, void (*fn)(void *, uint32_t, uint32_t), void *task) {
+      def.parallel_for = [](void *, uint32_t n, uint32_t grain, void (*fn)(void *, uint32_t, uint32_t),
+                            void *task) {
         std::vector<std::thread> pieces;
         const uint32_t piece = std::max(grain, (n + 3) / 4);
         for (uint32_t at = 0; at < n; at += piece) pieces.emplace_back(fn, task, at, std::min(n, at + piece));
@@ -113,7 +157,9 @@ TEST(StepFailure, OfALaw_EndsTheStepAndKeepsTheState) {
   Host h;
   const test::Stack s = test::make_stack(h.c);
   dfm_friction_def f{};
-  f.size = sizeof f, f.between[0] = f.between[1] = "*", f.law = "test.bad_law";
+  f.size = sizeof f;
+  f.between[0] = f.between[1] = "*";
+  f.law = "test.bad_law";
   test::ok(dfm_world_add_friction(s.world, &f));
   test::run(s.world, 0.05, 1e-3);
   for (const Way way : {Way::throws, Way::fails, Way::nan_force, Way::nan_limit, Way::negative_limit}) {
@@ -121,7 +167,8 @@ TEST(StepFailure, OfALaw_EndsTheStepAndKeepsTheState) {
     const uint64_t before = dfm_world_hash(s.world);
     const double t = dfm_world_time(s.world);
     uint32_t trouble = 0;
-    law_way = way, h.log.clear();
+    law_way = way;
+    h.log.clear();
     EXPECT_EQ(dfm_world_step(s.world, 1e-3, &trouble), DFM_E_DIVERGED);
     EXPECT_TRUE(trouble & DFM_TROUBLE_PLUGIN);
     says({"step ", "'test.bad_law'"});
@@ -138,9 +185,12 @@ TEST(StepFailure, OfAModel_EndsTheStepAndKeepsTheState) {
   const dfm_world w = test::make_world(h.c);
   test::add_plane(w, "floor");
   test::BodyOptions o;
-  o.name = "good", o.position = {0, 0, 0.3};
+  o.name = "good";
+  o.position = {0, 0, 0.3};
   test::make_body(h.c, w, "beam", {0.1, 0.1, 0.1}, 60, o);
-  o.name = "cloud", o.model = "test.bad_model", o.position = {0.5, 0, 0.3};
+  o.name = "cloud";
+  o.model = "test.bad_model";
+  o.position = {0.5, 0, 0.3};
   test::make_body(h.c, w, "beam", {0.1, 0.1, 0.1}, 60, o);
   test::run(w, 0.008, 1e-3);
   for (const Model way : {Model::throws_forces, Model::fails_forces, Model::nan_force}) {
@@ -156,7 +206,8 @@ TEST(StepFailure, OfAModel_EndsTheStepAndKeepsTheState) {
   }
   model_way = Model::throws_bound;
   double dt = 0;
-  EXPECT_EQ(dfm_world_set_gravity(w, std::array<double, 3>{0, 0, -1}.data()), DFM_OK);   // the bound is asked anew
+  // the bound is asked anew
+  EXPECT_EQ(dfm_world_set_gravity(w, std::array<double, 3>{0, 0, -1}.data()), DFM_OK);
   const uint64_t before = dfm_world_hash(w);
   EXPECT_EQ(dfm_world_step(w, 1e-3, nullptr), DFM_E_FATAL);
   says({"'test.bad_model'", "'cloud'", "bound"});
@@ -173,18 +224,27 @@ TEST(StepFailure, RoundingModeLeftByAPlugin_ChangesNoBit) {
     Host h;
     const test::Stack s = test::make_stack(h.c);
     dfm_friction_def f{};
-    f.size = sizeof f, f.between[0] = f.between[1] = "*", f.law = "test.bad_law";
+    f.size = sizeof f;
+    f.between[0] = f.between[1] = "*";
+    f.law = "test.bad_law";
     test::ok(dfm_world_add_friction(s.world, &f));
     test::BodyOptions o;
-    o.name = "cloud", o.model = "test.bad_model", o.position = {0.7, 0, 0.3};
+    o.name = "cloud";
+    o.model = "test.bad_model";
+    o.position = {0.7, 0, 0.3};
     test::make_body(h.c, s.world, "beam", {0.1, 0.1, 0.1}, 60, o);
-    if (rounds) law_way = Way::rounds, model_way = Model::rounds;
+    if (rounds) {
+      law_way = Way::rounds;
+      model_way = Model::rounds;
+    }
     test::run(s.world, 0.05, 1e-3);
     hash[rounds] = dfm_world_hash(s.world);
     EXPECT_EQ(std::fegetround(), FE_TONEAREST);
-    EXPECT_EQ(rounds, h.log.find("test.bad_law: eval changed the rounding mode") != std::string::npos) << h.log;
+    EXPECT_EQ(rounds, h.log.find("test.bad_law: eval changed the rounding mode") != std::string::npos)
+        << h.log;
     EXPECT_EQ(rounds, h.log.find("test.bad_model: ") != std::string::npos) << h.log;
-    law_way = Way::behave, model_way = Model::behave;
+    law_way = Way::behave;
+    model_way = Model::behave;
   }
   EXPECT_EQ(hash[0], hash[1]);
 }
@@ -194,7 +254,8 @@ TEST(StepFailure, WithHeldPointsThatMove_PutsTheirVelocityBack) {
   Host h;
   const dfm_world w = test::make_world(h.c);
   test::BodyOptions o;
-  o.name = "cloud", o.model = "test.bad_model";
+  o.name = "cloud";
+  o.model = "test.bad_model";
   const dfm_body b = test::make_body(h.c, w, "beam", {0.1, 0.1, 0.1}, 60, o);
   const uint32_t points[] = {0, 1, 2};
   const dfm_sine sine{{0.01, 0.02, 0}, 5, 0.3};
@@ -214,7 +275,11 @@ TEST(StepFailure, OfAModelInCreate_RefusesTheBody) {
   const double points[12] = {0, 0, 0, 0.1, 0, 0, 0, 0.1, 0, 0, 0, 0.1};
   const uint32_t cells[4] = {0, 1, 2, 3};
   dfm_body_def d = dfm_body_def_default();
-  d.npoint = 4, d.ntet = 1, d.points = points, d.tets = cells, d.model = "test.bad_model";
+  d.npoint = 4;
+  d.ntet = 1;
+  d.points = points;
+  d.tets = cells;
+  d.model = "test.bad_model";
   dfm_body b = 0;
   model_way = Model::throws_create;
   EXPECT_EQ(dfm_body_create(w, &d, &b), DFM_E_FATAL);
@@ -227,20 +292,22 @@ TEST(StepFailure, OfAModelInCreate_RefusesTheBody) {
   EXPECT_EQ(n, 0u);
   model_way = Model::behave;
   test::ok(dfm_body_create(w, &d, &b));
-  model_way = Model::throws_forces;   // destroy throws too; the host lives
+  model_way = Model::throws_forces;  // destroy throws too; the host lives
   test::ok(dfm_body_destroy(b));
   EXPECT_NE(h.log.find("destroy threw"), std::string::npos) << h.log;
   model_way = Model::behave;
 }
 
-// A plugin's parallel_for inside a worker runs serially there, under our pool and under a host's that does not know of workers.
+// A plugin's parallel_for inside a worker runs serially there, under our pool and under a host's that does
+// not know of workers.
 TEST(Tasks, NestedInWorkerThreads_RunSeriallyInTheCaller) {
   for (const bool host_hook : {false, true}) {
     Host h(3, host_hook);
     const dfm_world w = test::make_world(h.c);
     for (int i = 0; i < 6; ++i) {
       test::BodyOptions o;
-      o.model = "test.bad_model", o.position = {0.3 * i, 0, 0};
+      o.model = "test.bad_model";
+      o.position = {0.3 * i, 0, 0};
       test::make_body(h.c, w, "beam", {0.1, 0.1, 0.1}, 60, o);
     }
     nested_parallel = nested_calls = 0;

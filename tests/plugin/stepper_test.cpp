@@ -1,5 +1,5 @@
-// A toy self-stepping model in contact, through dfm.stepper/1: a body that only translates. Its answers are those of a point mass, so
-// every figure has a closed form.
+// A toy self-stepping model in contact, through dfm.stepper/1: a body that only translates. Its answers are
+// those of a point mass, so every figure has a closed form.
 #define DFM_STATIC_PLUGIN toy_stepper
 #include "coupled.h"
 
@@ -13,7 +13,8 @@ struct Toy {
 };
 
 dfm_status create(const dfm_host *, const dfm_mesh *m, void **self) {
-  Toy *t = new Toy{m->npoint, m->nsurfel, std::vector<double>(m->mass, m->mass + m->npoint), std::vector<uint32_t>(m->row, m->row + m->nsurfel + 1),
+  Toy *t = new Toy{m->npoint, m->nsurfel, std::vector<double>(m->mass, m->mass + m->npoint),
+                   std::vector<uint32_t>(m->row, m->row + m->nsurfel + 1),
                    std::vector<uint32_t>(m->col, m->col + m->row[m->nsurfel])};
   for (double x : t->mass) t->total += x;
   *self = t;
@@ -25,13 +26,14 @@ void destroy(void *self) { delete static_cast<Toy *>(self); }
 void mean_velocity(const Toy &t, const dfm_kin *k, const double *f, double v[3]) {
   for (int c = 0; c < 3; ++c) {
     double p = 0;
-    for (uint32_t i = 0; i < t.npoint; ++i) p += t.mass[i] * k->v[size_t(i) * k->stride + c] + k->dt * f[size_t(i) * k->stride + c];
+    for (uint32_t i = 0; i < t.npoint; ++i)
+      p += t.mass[i] * k->v[size_t(i) * k->stride + c] + k->dt * f[size_t(i) * k->stride + c];
     v[c] = p / t.total;
   }
 }
 
 struct Pending { double v[3]; };
-Pending pending;   // predict and commit see the same external forces; one body in these tests
+Pending pending;  // predict and commit see the same external forces; one body in these tests
 
 dfm_status predict(void *self, const dfm_kin *k, const double *f, double *u) {
   const Toy &t = *static_cast<Toy *>(self);
@@ -79,11 +81,23 @@ const void *extension(const void *, const char *id) {
 extern "C" const dfm_plugin *dfm_plugin_entry_toy_stepper(const dfm_host *host, uint32_t, uint32_t) {
   if (!DFM_ABI_OK(host)) return nullptr;
   static dfm_model ops{};
-  ops.size = sizeof ops, ops.cells = DFM_CELL_TET, ops.create = create, ops.destroy = destroy, ops.extension = extension;
+  ops.size = sizeof ops;
+  ops.cells = DFM_CELL_TET;
+  ops.create = create;
+  ops.destroy = destroy;
+  ops.extension = extension;
   static dfm_type type{};
   static const char *const effects[] = {nullptr};
-  type.size = sizeof type, type.kind = DFM_KIND_MODEL, type.id = "test.toy_stepper", type.name = "translating toy", type.version = "1";
-  type.licence = "MIT", type.source = "Newton 1687", type.param_size = sizeof(dfm_param), type.effects = effects, type.ops = &ops;
+  type.size = sizeof type;
+  type.kind = DFM_KIND_MODEL;
+  type.id = "test.toy_stepper";
+  type.name = "translating toy";
+  type.version = "1";
+  type.licence = "MIT";
+  type.source = "Newton 1687";
+  type.param_size = sizeof(dfm_param);
+  type.effects = effects;
+  type.ops = &ops;
   static const dfm_type *const types[] = {&type};
   static const dfm_plugin plugin{sizeof(dfm_plugin), DFM_ABI, DFM_ABI_DRAFT, 1, types, nullptr};
   return &plugin;
@@ -99,7 +113,10 @@ struct World {
     test::ok(dfm_plugin_register_static(context, dfm_plugin_entry_toy_stepper, "toy_stepper"));
     world = test::make_world(context, gravity);
     test::BodyOptions o;
-    o.name = "toy", o.model = "toy_stepper", o.position = {0, 0, z}, o.surface = surface;
+    o.name = "toy";
+    o.model = "toy_stepper";
+    o.position = {0, 0, z};
+    o.surface = surface;
     body = test::make_body(context, world, "beam", {0.1, 0.1, 0.1}, 60, o);
     test::add_plane(world, "floor");
     test::set_friction(world, mu);
@@ -121,7 +138,7 @@ TEST(Stepper, DroppedOnAFloor_RestsAtTheOffsetAndCarriesItsWeight) {
 
 // Its surface hangs on its points through N: positions come from the host, velocities from the model.
 TEST(Stepper, WithASurfaceOfItsOwn_RestsOnItsSurfels) {
-  const test::Skin skin = test::box_skin({0.1, 0.1, 0.1}, 5);   // no multiple of the cells
+  const test::Skin skin = test::box_skin({0.1, 0.1, 0.1}, 5);  // no multiple of the cells
   const dfm_surface_def surface = skin.def();
   World w(0.5, {0, 0, -9.81}, 0.01, &surface);
   test::run(w.world, 1.0, 1e-3);
@@ -146,10 +163,16 @@ TEST(Stepper, InAWorldThatRollsBack_IsRefused) {
   const double point[] = {0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0, 1};
   const uint32_t cell[] = {0, 1, 2, 3};
   dfm_body_def d = dfm_body_def_default();
-  d.name = "toy", d.model = "toy_stepper", d.npoint = 4, d.ntet = 1, d.points = point, d.tets = cell;
+  d.name = "toy";
+  d.model = "toy_stepper";
+  d.npoint = 4;
+  d.ntet = 1;
+  d.points = point;
+  d.tets = cell;
   dfm_body body = 0;
   EXPECT_EQ(dfm_body_create(world, &d, &body), DFM_E_UNSUPPORTED);
-  EXPECT_NE(std::string(dfm_last_error()).find("body 'toy': a model that steps itself"), std::string::npos) << dfm_last_error();
+  EXPECT_NE(std::string(dfm_last_error()).find("body 'toy': a model that steps itself"), std::string::npos)
+      << dfm_last_error();
 }
 
 TEST(Stepper, OnASlope_SlidesWithCoulombsAcceleration) {
@@ -158,7 +181,8 @@ TEST(Stepper, OnASlope_SlidesWithCoulombsAcceleration) {
   test::run(w.world, 0.1, 1e-3);
   const double v0 = test::measure(w.body).velocity[0];
   test::run(w.world, 0.4, 1e-3);
-  EXPECT_NEAR((test::measure(w.body).velocity[0] - v0) / 0.4, 9.81 * (std::sin(theta) - mu * std::cos(theta)), 1e-3);
+  EXPECT_NEAR((test::measure(w.body).velocity[0] - v0) / 0.4, 9.81 * (std::sin(theta) - mu * std::cos(theta)),
+              1e-3);
 }
 
 TEST(Stepper, OnASlopeBelowTheLimit_Holds) {
@@ -173,7 +197,10 @@ TEST(Stepper, OnASlopeBelowTheLimit_Holds) {
 TEST(Stepper, UnderASoftBall_BothRest) {
   World w(0.5, {0, 0, -9.81}, 1e-4);
   test::BodyOptions o;
-  o.name = "ball", o.young = 5e4, o.damping_stiffness = 2e-3, o.position = {0.05, 0.05, 0.152};
+  o.name = "ball";
+  o.young = 5e4;
+  o.damping_stiffness = 2e-3;
+  o.position = {0.05, 0.05, 0.152};
   const dfm_body ball = test::make_body(w.context, w.world, "ball", {0.05, 0, 0}, 300, o);
   test::run(w.world, 2.0, 1e-3);
   dfm_pair_report pair[4];
@@ -182,7 +209,8 @@ TEST(Stepper, UnderASoftBall_BothRest) {
   ASSERT_EQ(n, 2u);
   const double toy = test::measure(w.body).mass * 9.81, top = test::measure(ball).mass * 9.81;
   double floor_force = 0, between = 0;
-  for (uint32_t i = 0; i < n; ++i) (pair[i].a == w.body && pair[i].b != ball ? floor_force : between) = pair[i].normal;
+  for (uint32_t i = 0; i < n; ++i)
+    (pair[i].a == w.body && pair[i].b != ball ? floor_force : between) = pair[i].normal;
   EXPECT_NEAR(floor_force, toy + top, 0.02 * (toy + top));
   EXPECT_NEAR(between, top, 0.05 * top);
   EXPECT_GT(test::measure(ball).com[2], 0.13);

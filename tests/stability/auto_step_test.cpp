@@ -1,5 +1,5 @@
-// Steps of what dfm_world_stable_step answers, asked anew before each ("step": "auto"): they change rarely, and undamped bodies keep their energy.
-// The whole study: tests/bench/step_study.cpp.
+// Steps of what dfm_world_stable_step answers, asked anew before each ("step": "auto"): they change rarely,
+// and undamped bodies keep their energy. The whole study: tests/bench/step_study.cpp.
 #include "step_energy.h"
 #include "support.h"
 
@@ -20,8 +20,8 @@ void keeps(const Case &c, uint64_t steps, double share = 1) {
 
 }  // namespace
 
-// When a step stood on the bound and flipped between one and two sub-steps these had a thousand times their energy
-// after 2,281, 533, 6,513 and 361 steps.
+// When a step stood on the bound and flipped between one and two sub-steps these had a thousand times their
+// energy after 2,281, 533, 6,513 and 361 steps.
 TEST(AutoStep, UndampedBodies_KeepTheirEnergy) {
   keeps({"tube", kData + std::string("tube.msh"), "spin", 1}, 5000);
   keeps({"cylinder", kData + std::string("cylinder_slim.msh"), "spin", 0}, 5000);
@@ -30,7 +30,8 @@ TEST(AutoStep, UndampedBodies_KeepTheirEnergy) {
 }
 
 TEST(AutoStep, HostThatTakesAShareOfIt_ChangesRarelyToo) {
-  for (const double share : {0.5, 0.7, 0.95, 1.5}) keeps({"bar", kData + std::string("bar.msh"), "ring", 1}, 10000, share);
+  for (const double share : {0.5, 0.7, 0.95, 1.5})
+    keeps({"bar", kData + std::string("bar.msh"), "ring", 1}, 10000, share);
 }
 
 TEST(AutoStep, ThesisCylinderThatSpins_KeepsItsEnergy) {

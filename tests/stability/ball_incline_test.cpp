@@ -1,5 +1,6 @@
-// A ball on an incline of 10 degrees: frictionless it slides and does not turn; with friction it rolls, a = 5/7 g sin(theta), and twice the
-// friction changes nothing. Gravity grows within 0.2 s, so that nothing rings. Source: ../shared/reference/contact/tables/rolling_incline.csv.
+// A ball on an incline of 10 degrees: frictionless it slides and does not turn; with friction it rolls, a =
+// 5/7 g sin(theta), and twice the friction changes nothing. Gravity grows within 0.2 s, so that nothing
+// rings. Source: ../shared/reference/contact/tables/rolling_incline.csv.
 #include "scenes.h"
 
 namespace {
@@ -18,12 +19,15 @@ double acceleration(const test::SceneRun &run) {
 double spin(const test::SceneRun &run) {
   double most = 0;
   for (const test::BodyRow &row : run.rows("ball"))
-    for (double l : row.spin_momentum) most = std::max(most, std::fabs(l) / (0.4 * 1000 * row.volume * 0.1 * 0.1));
+    for (double l : row.spin_momentum)
+      most = std::max(most, std::fabs(l) / (0.4 * 1000 * row.volume * 0.1 * 0.1));
   return most;
 }
 
 // 5 %: the ball is a polyhedron of 720 facets and loses a little at every edge.
-bool rolls(const test::SceneRun &run) { return std::fabs(acceleration(run) / kRoll - 1) < 0.05 && spin(run) > 8; }
+bool rolls(const test::SceneRun &run) {
+  return std::fabs(acceleration(run) / kRoll - 1) < 0.05 && spin(run) > 8;
+}
 
 }  // namespace
 
@@ -42,7 +46,8 @@ TEST(BallIncline, WithFriction_Rolls) {
 }
 
 TEST(BallIncline, TwiceTheFriction_RollsTheSame) {
-  const test::SceneRun once("ball_incline", {}), twice("ball_incline", {"--set", "/contact/friction/0/params/mu=0.6"});
+  const test::SceneRun once("ball_incline", {}),
+      twice("ball_incline", {"--set", "/contact/friction/0/params/mu=0.6"});
   EXPECT_TRUE(rolls(twice));
   EXPECT_NEAR(acceleration(twice), acceleration(once), 0.05 * acceleration(once));
 }
@@ -51,8 +56,11 @@ TEST(BallIncline, TwiceTheFriction_RollsTheSame) {
 TEST(BallIncline, TooLittleFriction_DoesNotRoll) {
   const test::SceneRun run("ball_incline", {"--set", "/contact/friction/0/params/mu=0.02"});
   EXPECT_FALSE(rolls(run));
-  EXPECT_NEAR(acceleration(run), 9.81 * (std::sin(0.174532925199) - 0.02 * std::cos(0.174532925199)), 0.005 * kSlide);
+  EXPECT_NEAR(acceleration(run), 9.81 * (std::sin(0.174532925199) - 0.02 * std::cos(0.174532925199)),
+              0.005 * kSlide);
 }
 
 TEST(BallIncline, FiveJitteredRuns_AllRoll) { test::expect_jittered("ball_incline", 1, 5, {}, 3, rolls); }
-TEST(BallIncline, FiveMoreJitteredRuns_AllRoll) { test::expect_jittered("ball_incline", 6, 10, {}, 3, rolls); }
+TEST(BallIncline, FiveMoreJitteredRuns_AllRoll) {
+  test::expect_jittered("ball_incline", 6, 10, {}, 3, rolls);
+}

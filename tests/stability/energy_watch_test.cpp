@@ -1,4 +1,5 @@
-// The energy watch: a run that gains energy out of nothing ends early and says so; work that is really done is no gain.
+// The energy watch: a run that gains energy out of nothing ends early and says so; work that is really
+// done is no gain.
 #define DFM_STATIC_PLUGIN counting_looks
 #include <filesystem>
 #include <random>
@@ -14,10 +15,17 @@ const std::string kBar = DEFORM_SOURCE_DIR "/examples/data/bar.msh";
 
 // Points without forces between them, whose energy is asked for: how often?
 uint32_t looks = 0;
-dfm_status create(const dfm_host *, const dfm_mesh *, void **self) { return *self = &looks, DFM_OK; }
+dfm_status create(const dfm_host *, const dfm_mesh *, void **self) {
+  *self = &looks;
+  return DFM_OK;
+}
 void destroy(void *) {}
 dfm_status no_forces(void *, const dfm_kin *, double *) { return DFM_OK; }
-dfm_status no_energy(void *, const dfm_kin *, double *joule) { return *joule = 0, ++looks, DFM_OK; }
+dfm_status no_energy(void *, const dfm_kin *, double *joule) {
+  *joule = 0;
+  ++looks;
+  return DFM_OK;
+}
 
 struct Shaken {
   test::Context context;
@@ -28,7 +36,9 @@ struct Shaken {
     test::ok(dfm_world_stable_step(s.world, &stable, nullptr, nullptr));
   }
   // A step of random length: each is stable, their sequence pumps.
-  dfm_status step(uint32_t *trouble) { return dfm_world_step(s.world, stable * (0.8 + 0.2 * double(random()) / 4294967296.0), trouble); }
+  dfm_status step(uint32_t *trouble) {
+    return dfm_world_step(s.world, stable * (0.8 + 0.2 * double(random()) / 4294967296.0), trouble);
+  }
 };
 
 }  // namespace
@@ -37,11 +47,24 @@ extern "C" const dfm_plugin *dfm_plugin_entry_counting_looks(const dfm_host *hos
   if (!DFM_ABI_OK(host)) return nullptr;
   static const char *const effects[] = {nullptr};
   static dfm_model ops{};
-  ops.size = sizeof ops, ops.caps = DFM_CAP_ENERGY, ops.cells = DFM_CELL_TET;
-  ops.create = create, ops.destroy = destroy, ops.add_forces = no_forces, ops.energy = no_energy;
+  ops.size = sizeof ops;
+  ops.caps = DFM_CAP_ENERGY;
+  ops.cells = DFM_CELL_TET;
+  ops.create = create;
+  ops.destroy = destroy;
+  ops.add_forces = no_forces;
+  ops.energy = no_energy;
   static dfm_type type{};
-  type.size = sizeof type, type.kind = DFM_KIND_MODEL, type.id = "test.counting_looks", type.name = "points", type.version = "1", type.licence = "MIT";
-  type.source = "test", type.param_size = sizeof(dfm_param), type.effects = effects, type.ops = &ops;
+  type.size = sizeof type;
+  type.kind = DFM_KIND_MODEL;
+  type.id = "test.counting_looks";
+  type.name = "points";
+  type.version = "1";
+  type.licence = "MIT";
+  type.source = "test";
+  type.param_size = sizeof(dfm_param);
+  type.effects = effects;
+  type.ops = &ops;
   static const dfm_type *const types[] = {&type};
   static const dfm_plugin plugin{sizeof(dfm_plugin), DFM_ABI, DFM_ABI_DRAFT, 1, types, nullptr};
   return &plugin;
@@ -56,7 +79,8 @@ TEST(EnergyWatch, StepsOfRandomLength_EndBeforeTheEnergyHasGrownByATenth) {
   ASSERT_EQ(status, DFM_E_DIVERGED) << i;
   EXPECT_TRUE(trouble & DFM_TROUBLE_ENERGY);
   const std::string why = dfm_last_error();
-  for (const char *word : {"body1", "step", "energy", "limit: 1 %", "shorter step"}) EXPECT_NE(why.find(word), std::string::npos) << why;
+  for (const char *word : {"body1", "step", "energy", "limit: 1 %", "shorter step"})
+    EXPECT_NE(why.find(word), std::string::npos) << why;
   const dfm_world_stats stats = test::stats(b.s.world);
   EXPECT_GT(stats.energy_gain, 0.01 * stats.energy_max);
   const dfm_body_measure m = test::measure(b.s.body);
@@ -77,7 +101,8 @@ TEST(EnergyWatch, SwitchedOff_StopsNothing) {
     d.energy_watch = bad;
     EXPECT_EQ(dfm_world_create(context, &d, &w), DFM_E_ARG);
   }
-  d.energy_watch = 0, d.gravity[2] = 0;
+  d.energy_watch = 0;
+  d.gravity[2] = 0;
   test::ok(dfm_world_create(context, &d, &w));
   test::BodyOptions o;
   o.spin = {0, 0, 40};
@@ -85,7 +110,8 @@ TEST(EnergyWatch, SwitchedOff_StopsNothing) {
   double stable = 0;
   test::ok(dfm_world_stable_step(w, &stable, nullptr, nullptr));
   std::mt19937 random(1);
-  for (int i = 0; i < 4000; ++i) ASSERT_EQ(dfm_world_step(w, stable * (0.8 + 0.2 * double(random()) / 4294967296.0), nullptr), DFM_OK);
+  for (int i = 0; i < 4000; ++i)
+    ASSERT_EQ(dfm_world_step(w, stable * (0.8 + 0.2 * double(random()) / 4294967296.0), nullptr), DFM_OK);
   EXPECT_EQ(test::stats(w).energy_gain, 0);
 }
 
@@ -101,7 +127,8 @@ TEST(EnergyWatch, StepsOfRandomLengthAndGentlerMotions_EndBeforeTheEnergyHasGrow
   }
 }
 
-// The bound shortens the sub-steps in a blow, which moves the body from one nearby energy to another: no gain, though nothing damps it.
+// The bound shortens the sub-steps in a blow, which moves the body from one nearby energy to another: no
+// gain, though nothing damps it.
 TEST(EnergyWatch, UndampedBodyThatBounces_IsNoGain) {
   for (const double step : {1.0 / 60, 1e-3}) {
     test::Context context;
@@ -112,13 +139,15 @@ TEST(EnergyWatch, UndampedBodyThatBounces_IsNoGain) {
     const dfm_obstacle_def d = dfm_obstacle_def_default();
     dfm_obstacle floor = 0;
     test::ok(dfm_obstacle_create(w, &d, &floor));
-    for (int i = 0; i * step < 2; ++i) ASSERT_EQ(dfm_world_step(w, step, nullptr), DFM_OK) << step << ": " << dfm_last_error();
+    for (int i = 0; i * step < 2; ++i)
+      ASSERT_EQ(dfm_world_step(w, step, nullptr), DFM_OK) << step << ": " << dfm_last_error();
     EXPECT_GT(test::stats(w).substeps_max, uint32_t(step * 1000)) << "the blow asks for shorter sub-steps";
     test::ok(dfm_world_destroy(w));
   }
 }
 
-// A base costs eight looks. A host that changes something before every step would have a new one all the time.
+// A base costs eight looks. A host that changes something before every step would have a new
+// one all the time.
 TEST(EnergyWatch, HostThatChangesEveryStep_CostsFewLooks) {
   test::Context context;
   test::ok(dfm_plugin_register_static(context, dfm_plugin_entry_counting_looks, "counting_looks"));
@@ -136,7 +165,8 @@ TEST(EnergyWatch, HostThatChangesEveryStep_CostsFewLooks) {
   EXPECT_LE(looks, 16 + steps / 256);
 }
 
-// Held points that are shaken, a load and a gravity that vary, a spring, an obstacle that strikes from below: all put energy in and take it out.
+// Held points that are shaken, a load and a gravity that vary, a spring, an obstacle that strikes from below:
+// all put energy in and take it out.
 TEST(EnergyWatch, WorkThatIsDone_IsNoGain) {
   test::Context context;
   for (int what = 0; what < 5; ++what) {
@@ -159,23 +189,31 @@ TEST(EnergyWatch, WorkThatIsDone_IsNoGain) {
       std::vector<double> force(3 * end.size(), 0.0);
       for (size_t i = 2; i < force.size(); i += 3) force[i] = 0.02;
       const dfm_sine sine{{50, 0, 0}, 13, 0};
-      test::ok(dfm_body_add_load(b, uint32_t(end.size()), end.data(), force.data(), 0, nullptr, &sine, nullptr));
+      test::ok(
+          dfm_body_add_load(b, uint32_t(end.size()), end.data(), force.data(), 0, nullptr, &sine, nullptr));
     } else if (what == 2) {
-      const dfm_vector_key keys[] = {{0, {0, 0, 0}}, {0.1, {0, 3, 20}}, {0.2, {0, -3, -20}}, {0.5, {0, 0, 5}}};
+      const dfm_vector_key keys[] = {
+          {0, {0, 0, 0}}, {0.1, {0, 3, 20}}, {0.2, {0, -3, -20}}, {0.5, {0, 0, 5}}};
       test::ok(dfm_world_set_gravity_keys(w, 4, keys));
     } else if (what == 3) {
       dfm_spring_def d{};
-      d.size = sizeof d, d.npoint = uint32_t(end.size()), d.points = end.data(), d.to[2] = 0.1, d.stiffness = 100;
+      d.size = sizeof d;
+      d.npoint = uint32_t(end.size());
+      d.points = end.data();
+      d.to[2] = 0.1;
+      d.stiffness = 100;
       test::ok(dfm_body_add_spring(b, &d, nullptr));
     } else {
       dfm_obstacle_def d = dfm_obstacle_def_default();
-      d.name = "anvil", d.shape = DFM_SHAPE_PLANE;
+      d.name = "anvil";
+      d.shape = DFM_SHAPE_PLANE;
       d.sine = {{0, 0, 0.02}, 5, 0};
       dfm_obstacle obstacle = 0;
       test::ok(dfm_obstacle_create(w, &d, &obstacle));
       test::set_friction(w, 0, "none");
     }
-    for (int i = 0; i < 500; ++i) ASSERT_EQ(dfm_world_step(w, 1e-3, nullptr), DFM_OK) << what << ": " << dfm_last_error();
+    for (int i = 0; i < 500; ++i)
+      ASSERT_EQ(dfm_world_step(w, 1e-3, nullptr), DFM_OK) << what << ": " << dfm_last_error();
     const dfm_world_stats s = test::stats(w);
     EXPECT_GT(s.energy_max, 1e-5) << what;
     EXPECT_LT(s.energy_gain, 1e-3 * s.energy_max) << what;
@@ -185,33 +223,44 @@ TEST(EnergyWatch, WorkThatIsDone_IsNoGain) {
 
 TEST(EnergyWatch, OfAScene_IsReadAndReported) {
   const std::string out = test::scratch("energy_watch"), scene = out + "/scene.json";
-  const std::string text = R"({"format": "deform-scene", "version": 1, "time": {"duration": 0.02, "step": "auto"}, "gravity": [0, 0, 0],
-    "bodies": [{"name": "bar", "mesh": ")" + kBar + R"(", "spin": [0, 0, 9]}], "output": {"every": 0.01}})";
+  const std::string text =
+      R"({"format": "deform-scene", "version": 1, "time": {"duration": 0.02, "step": "auto"}, "gravity": [0, 0, 0],
+    "bodies": [{"name": "bar", "mesh": ")" +
+      kBar + R"(", "spin": [0, 0, 9]}], "output": {"every": 0.01}})";
   test::write_file(scene, text);
   const test::CommandResult r = test::deform({"run", scene, "--out", out + "/run", "--quiet"});
   EXPECT_EQ(r.exit_code, 0) << r.err;
   const std::string summary = test::read_file(out + "/run/summary.json");
-  for (const char *key : {"\"energy\"", "\"start_J\"", "\"max_J\"", "\"gain_J\""}) EXPECT_NE(summary.find(key), std::string::npos) << key;
+  for (const char *key : {"\"energy\"", "\"start_J\"", "\"max_J\"", "\"gain_J\""})
+    EXPECT_NE(summary.find(key), std::string::npos) << key;
   for (const char *good : {"0.05", "false", "true", "0"})
-    EXPECT_EQ(test::deform({"run", scene, "--time", "0.001", "--out", out + "/run", "--quiet", "--set", std::string("/contact/energy_watch=") + good})
-                  .exit_code, 0) << good;
+    EXPECT_EQ(test::deform({"run", scene, "--time", "0.001", "--out", out + "/run", "--quiet", "--set",
+                            std::string("/contact/energy_watch=") + good})
+                  .exit_code,
+              0)
+        << good;
   for (const char *bad : {"-1", "often"}) {
-    const test::CommandResult no =
-        test::deform({"run", scene, "--out", out + "/run", "--quiet", "--set", std::string("/contact/energy_watch=") + bad});
+    const test::CommandResult no = test::deform({"run", scene, "--out", out + "/run", "--quiet", "--set",
+                                                 std::string("/contact/energy_watch=") + bad});
     EXPECT_EQ(no.exit_code, 2);
     EXPECT_NE(no.err.find("/contact/energy_watch"), std::string::npos) << no.err;
   }
 }
 
-// A model whose dampers push instead of braking, beside a body that is sound: the run stops, says which and when, and keeps its last good state.
+// A model whose dampers push instead of braking, beside a body that is sound: the run stops, says which and
+// when, and keeps its last good state.
 TEST(EnergyWatch, OfARunThatAModelPumps_ExitsWithThree) {
   const std::string out = test::scratch("energy_watch_pumped"), scene = out + "/scene.json";
-  test::write_file(scene, R"({"format": "deform-scene", "version": 1, "time": {"duration": 30, "step": "auto"},
-    "bodies": [{"name": "sound", "mesh": ")" + kBar + R"(", "pose": {"position": [0, 2, 0]}, "spin": [0, 0, 9]},
-               {"name": "pumped", "mesh": ")" + kBar + R"(", "model": {"type": "org.tiny.pump"}, "spin": [0, 0, 9]}],
+  test::write_file(scene,
+                   R"({"format": "deform-scene", "version": 1, "time": {"duration": 30, "step": "auto"},
+    "bodies": [{"name": "sound", "mesh": ")" +
+                       kBar + R"(", "pose": {"position": [0, 2, 0]}, "spin": [0, 0, 9]},
+               {"name": "pumped", "mesh": ")" +
+                       kBar + R"(", "model": {"type": "org.tiny.pump"}, "spin": [0, 0, 9]}],
     "gravity": [0, 0, 0], "output": {"every": 1, "states": true}})");
   std::filesystem::create_directories(out + "/plugins");
-  std::filesystem::copy_file(std::string(DEFORM_BINARY_DIR) + "/lib/tiny/tiny_pump.so", out + "/plugins/tiny_pump.so",
+  std::filesystem::copy_file(std::string(DEFORM_BINARY_DIR) + "/lib/tiny/tiny_pump.so",
+                             out + "/plugins/tiny_pump.so",
                              std::filesystem::copy_options::overwrite_existing);
   const auto run = [&](const std::vector<std::string> &more) {
     std::vector<std::string> all{"run", scene, "--quiet", "--out", out + "/run"};
@@ -223,7 +272,8 @@ TEST(EnergyWatch, OfARunThatAModelPumps_ExitsWithThree) {
   };
   const test::CommandResult r = run({});
   EXPECT_EQ(r.exit_code, 3) << r.err;
-  for (const char *part : {"stopped at step ", "body 'pumped'", "beyond what loads, motions and contact have put in", "last good state"})
+  for (const char *part : {"stopped at step ", "body 'pumped'",
+                           "beyond what loads, motions and contact have put in", "last good state"})
     EXPECT_NE(r.err.find(part), std::string::npos) << part << ": " << r.err;
   EXPECT_TRUE(std::filesystem::exists(out + "/run/states/last_pumped.vtu"));
   const std::string summary = test::read_file(out + "/run/summary.json");
@@ -231,7 +281,8 @@ TEST(EnergyWatch, OfARunThatAModelPumps_ExitsWithThree) {
   const size_t at = r.err.find("stopped at step ") + 16;
   const std::string step = r.err.substr(at, r.err.find_first_not_of("0123456789", at) - at);
   EXPECT_GT(std::stoi(step), 0);
-  EXPECT_NE(summary.find("\"steps\": " + step + ","), std::string::npos) << "the steps before it are done: " << summary;
+  EXPECT_NE(summary.find("\"steps\": " + step + ","), std::string::npos)
+      << "the steps before it are done: " << summary;
   EXPECT_NE(summary.find("\"finite\": true"), std::string::npos) << summary;
   const test::CommandResult blind = run({"--time", "0.5", "--set", "/contact/energy_watch=0"});
   EXPECT_EQ(blind.exit_code, 0) << blind.err;
@@ -245,7 +296,8 @@ TEST(ShortStep, BelowTheFloor_IsRefusedWithASentence) {
   const uint64_t hash = dfm_world_hash(w);
   for (const double dt : {1e-15, 1e-12, 0.99e-9}) {
     EXPECT_EQ(dfm_world_step(w, dt, nullptr), DFM_E_ARG) << dt;
-    EXPECT_NE(std::string(dfm_last_error()).find("take a longer step"), std::string::npos) << dfm_last_error();
+    EXPECT_NE(std::string(dfm_last_error()).find("take a longer step"), std::string::npos)
+        << dfm_last_error();
   }
   EXPECT_EQ(dfm_world_hash(w), hash);
   EXPECT_EQ(dfm_world_step(w, 1e-9, nullptr), DFM_OK);
@@ -258,8 +310,10 @@ TEST(ShortStep, BelowTheFloor_IsRefusedWithASentence) {
   EXPECT_EQ(dfm_world_step(w, 1e-8, nullptr), DFM_E_ARG) << "50 m away positions round 50 times as much";
   EXPECT_EQ(dfm_world_step(w, 1e-7, nullptr), DFM_OK);
   const std::string out = test::scratch("short_step"), scene = out + "/scene.json";
-  test::write_file(scene, R"({"format": "deform-scene", "version": 1, "time": {"duration": 1e-9, "step": 1e-12},
-    "bodies": [{"name": "bar", "mesh": ")" + kBar + "\"}]}");
+  test::write_file(scene,
+                   R"({"format": "deform-scene", "version": 1, "time": {"duration": 1e-9, "step": 1e-12},
+    "bodies": [{"name": "bar", "mesh": ")" +
+                       kBar + "\"}]}");
   const test::CommandResult r = test::deform({"explain", scene});
   EXPECT_EQ(r.exit_code, 2);
   EXPECT_NE(r.err.find("/time/step"), std::string::npos) << r.err;

@@ -1,15 +1,20 @@
-// Bars held at one end: isotropic, and softer along x, y, z at three strengths. Under gravity down they sag, along x they stretch.
+// Bars held at one end: isotropic, and softer along x, y, z at three strengths. Under gravity down they sag,
+// along x they stretch.
 #include "scenes.h"
 
 namespace {
 
 const char *const kPull = "/gravity=[9.81, 0, 0]";
 
-double sag(const test::SceneRun &run, const std::string &bar, double height) { return height + 0.05 - run.probe(bar)[2]; }
-double stretch(const test::SceneRun &run, const std::string &bar, double place) { return run.probe(bar)[0] - place - 0.32; }
+double sag(const test::SceneRun &run, const std::string &bar, double height) {
+  return height + 0.05 - run.probe(bar)[2];
+}
+double stretch(const test::SceneRun &run, const std::string &bar, double place) {
+  return run.probe(bar)[0] - place - 0.32;
+}
 
-// Over the isotropic bar's, weakest first. A spring at an angle b to the axis has 1/(1 + slope^2 cos^2 b) of its stiffness: no bar can be
-// softer than 1 + slope^2 times.
+// Over the isotropic bar's, weakest first. A spring at an angle b to the axis has 1/(1 + slope^2 cos^2 b) of
+// its stiffness: no bar can be softer than 1 + slope^2 times.
 struct Ratios { double x[3], y[3], z[3]; };
 
 template <class Measure>
@@ -25,13 +30,15 @@ Ratios ratios(Measure measure, double isotropic) {
 }
 
 Ratios sags(const test::SceneRun &run) {
-  return ratios([&](const std::string &bar, double, int n) { return sag(run, bar, 0.3 * (2 - n)); }, sag(run, "isotropic", 0.3));
+  return ratios([&](const std::string &bar, double, int n) { return sag(run, bar, 0.3 * (2 - n)); },
+                sag(run, "isotropic", 0.3));
 }
 
 bool ordered(const test::SceneRun &run) {
   const Ratios r = sags(run);
   bool yes = r.x[0] > 1.1;
-  for (int n = 0; n < 3; ++n) yes = yes && r.x[n] > r.y[n] + 0.1 && r.x[n] > r.z[n] + 0.1 && (n == 0 || r.x[n] > r.x[n - 1] + 0.3);
+  for (int n = 0; n < 3; ++n)
+    yes = yes && r.x[n] > r.y[n] + 0.1 && r.x[n] > r.z[n] + 0.1 && (n == 0 || r.x[n] > r.x[n - 1] + 0.3);
   return yes;
 }
 
@@ -46,7 +53,8 @@ TEST(GravityAnisotropy, Sag_GrowsWithTheSlopeAlongTheBarAndLittleAcross) {
 
 TEST(GravityAnisotropy, Stretch_StaysBelowThatOfASpringAlongTheAxis) {
   const test::SceneRun run("gravity_anisotropy", {"--set", kPull});
-  const Ratios r = ratios([&](const std::string &bar, double place, int) { return stretch(run, bar, place); }, stretch(run, "isotropic", -0.5));
+  const Ratios r = ratios([&](const std::string &bar, double place, int) { return stretch(run, bar, place); },
+                          stretch(run, "isotropic", -0.5));
   const double slope[3] = {0.5, 1, 2};
   for (int n = 0; n < 3; ++n) {
     const double most = 1 + slope[n] * slope[n];
@@ -59,7 +67,10 @@ TEST(GravityAnisotropy, Stretch_StaysBelowThatOfASpringAlongTheAxis) {
 }
 
 TEST(GravityAnisotropy, AxisAcross_LosesTheOrder) {
-  EXPECT_FALSE(ordered(test::SceneRun("gravity_anisotropy", {"--set", "/bodies/3/anisotropy/axis=[0, 1, 0]"})));
+  EXPECT_FALSE(
+      ordered(test::SceneRun("gravity_anisotropy", {"--set", "/bodies/3/anisotropy/axis=[0, 1, 0]"})));
 }
 
-TEST(GravityAnisotropy, TenJitteredRuns_KeepTheOrder) { test::expect_jittered("gravity_anisotropy", 1, 10, {}, 0, ordered); }
+TEST(GravityAnisotropy, TenJitteredRuns_KeepTheOrder) {
+  test::expect_jittered("gravity_anisotropy", 1, 10, {}, 0, ordered);
+}

@@ -5,9 +5,12 @@ namespace {
 
 constexpr double kStart = 0.55;  // height of the tips at rest shape, m
 
-double sag(const test::SceneRun &run, const std::string &beam) { return kStart - run.probe(beam + "_tip")[2]; }
+double sag(const test::SceneRun &run, const std::string &beam) {
+  return kStart - run.probe(beam + "_tip")[2];
+}
 
-// The softer hangs lower, by about the ratio of the moduli: large bending stiffens the softest by a tenth, a still larger spread is wrong.
+// The softer hangs lower, by about the ratio of the moduli: large bending stiffens the softest by a tenth, a
+// still larger spread is wrong.
 bool ordered(const test::SceneRun &run) {
   const double soft = sag(run, "soft"), medium = sag(run, "medium"), stiff = sag(run, "stiff");
   return std::fabs(medium / stiff - 2) < 0.1 && std::fabs(soft / medium - 2) < 0.25;
@@ -23,7 +26,10 @@ TEST(GravityBeams, Tips_HangInTheOrderOfTheirModuli) {
 }
 
 TEST(GravityBeams, ModuliSwapped_LosesTheOrder) {
-  EXPECT_FALSE(ordered(test::SceneRun("gravity_beams", {"--set", "/materials/soft/young=2e6", "--set", "/materials/stiff/young=5e5"})));
+  EXPECT_FALSE(ordered(test::SceneRun(
+      "gravity_beams", {"--set", "/materials/soft/young=2e6", "--set", "/materials/stiff/young=5e5"})));
 }
 
-TEST(GravityBeams, TenJitteredRuns_KeepTheOrder) { test::expect_jittered("gravity_beams", 1, 10, {}, 0, ordered); }
+TEST(GravityBeams, TenJitteredRuns_KeepTheOrder) {
+  test::expect_jittered("gravity_beams", 1, 10, {}, 0, ordered);
+}

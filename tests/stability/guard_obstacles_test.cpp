@@ -1,4 +1,5 @@
-// The guard's promise against what is no soft body: meshes that are closed, open and moving, voxels, and rigid bodies of a host.
+// The guard's promise against what is no soft body: meshes that are closed, open and moving, voxels, and
+// rigid bodies of a host.
 #include <algorithm>
 
 #include "shot.h"
@@ -10,8 +11,8 @@ using test::ten_times;
 using test::Vec;
 
 void sheet_above(Shot &s, double speed, double above = 0.02) {
-  s.add("beam", {0.12, 0.12, 0.012}, 30, {-0.06 + s.jitter(0.02), -0.06 + s.jitter(0.02), above}, {0, 0, -speed},
-        {0.1 + s.jitter(0.05), s.jitter(0.1), s.jitter(0.3), 1});
+  s.add("beam", {0.12, 0.12, 0.012}, 30, {-0.06 + s.jitter(0.02), -0.06 + s.jitter(0.02), above},
+        {0, 0, -speed}, {0.1 + s.jitter(0.05), s.jitter(0.1), s.jitter(0.3), 1});
 }
 
 void closed_mesh(Shot &s) {
@@ -19,8 +20,10 @@ void closed_mesh(Shot &s) {
   sheet_above(s, 100);
 }
 void terrain(Shot &s) {
-  s.add_wall(test::height_field(0.2, 8, [](double x, double y) { return 0.03 * std::cos(25 * x) * std::cos(20 * y); }));
-  s.add("ball", {0.05, 0, 0}, 100, {s.jitter(0.05), s.jitter(0.05), 0.09}, {s.jitter(5), s.jitter(5), -30}, {0, 0, 0, 1}, 2e4);
+  s.add_wall(test::height_field(
+      0.2, 8, [](double x, double y) { return 0.03 * std::cos(25 * x) * std::cos(20 * y); }));
+  s.add("ball", {0.05, 0, 0}, 100, {s.jitter(0.05), s.jitter(0.05), 0.09}, {s.jitter(5), s.jitter(5), -30},
+        {0, 0, 0, 1}, 2e4);
 }
 // A blade that is swung through a block that stands in its way.
 void blade(Shot &s) {
@@ -36,9 +39,10 @@ void blade(Shot &s) {
 }
 void rigid_slab(Shot &s) {
   s.add("beam", {0.12, 0.12, 0.012}, 30, {-0.06, -0.06, -0.02}, {});
-  s.add_rigid_box({0.03, 0.01, 0.005}, 0.2, {s.jitter(0.04), s.jitter(0.04), 0.02}, {0, 0, -100}, {s.jitter(300), s.jitter(300), s.jitter(300)});
+  s.add_rigid_box({0.03, 0.01, 0.005}, 0.2, {s.jitter(0.04), s.jitter(0.04), 0.02}, {0, 0, -100},
+                  {s.jitter(300), s.jitter(300), s.jitter(300)});
 }
-void rigid_struck(Shot &s) {   // it rests; what hits it moves it faster than its lists were made for
+void rigid_struck(Shot &s) {  // it rests; what hits it moves it faster than its lists were made for
   s.add_rigid_box({0.04, 0.04, 0.003}, 0.01, {}, {});
   s.add("ball", {0.02, 0, 0}, 100, {s.jitter(0.02), s.jitter(0.02), 0.05}, {0, 0, -60});
   s.add("beam", {0.12, 0.12, 0.012}, 30, {-0.06 + s.jitter(0.02), -0.06, -0.03}, {});
@@ -52,8 +56,9 @@ TEST(Guard, BladeSwungThroughBlock_NeverCrosses) { ten_times(blade, 3, 1e-3); }
 TEST(Guard, SpinningRigidSlabAt100MetresPerSecond_NeverCrossesSheet) { ten_times(rigid_slab, 2, 5e-4); }
 TEST(Guard, RigidPlateStruck_NeverCrosses) { ten_times(rigid_struck, 3, 1e-3); }
 
-// Voxels round off what is below a cell, so crossings with the triangles they came from say little: their face may lie half a cell below the true one. What
-// hangs over an edge swings under the wall, by 4 mm in this time: 10 mm from the edges no surfel is behind the upper face. Without the guard some are.
+// Voxels round off what is below a cell, so crossings with the triangles they came from say little: their
+// face may lie half a cell below the true one. What hangs over an edge swings under the wall, by 4 mm in this
+// time: 10 mm from the edges no surfel is behind the upper face. Without the guard some are.
 TEST(Guard, SoftSheetAgainstVoxelsAt90MetresPerSecond_StaysOnItsSide) {
   const Vec half{0.06, 0.06, 0.004};
   const uint32_t cells = 20000;
@@ -63,16 +68,18 @@ TEST(Guard, SoftSheetAgainstVoxelsAt90MetresPerSecond_StaysOnItsSide) {
     for (const bool guarded : {false, true}) {
       Shot s(guarded, seed);
       test::add_mesh(s.world, "wall", test::box_surface(half, 2), DFM_SHAPE_VOXELS, cells);
-      const Vec at{s.jitter(0.02) - 0.01, s.jitter(0.02) - 0.01, 0.03}, velocity{s.jitter(18), s.jitter(18), -90};
+      const Vec at{s.jitter(0.02) - 0.01, s.jitter(0.02) - 0.01, 0.03};
+      const Vec velocity{s.jitter(18), s.jitter(18), -90};
       s.add("beam", {0.06, 0.06, 0.006}, 60, at, velocity, {0, 0.1, 0, 0.995}, 3e4);
       for (int step = 0; step < 4; ++step) {
         EXPECT_TRUE(test::run(s, 1, 2.5e-4).finite);
         const std::vector<double> x = test::surface_positions(s.bodies[0]);
         for (size_t i = 0; i < x.size(); i += 3)
-          behind[guarded] += std::fabs(x[i]) < half[0] - 0.01 && std::fabs(x[i + 1]) < half[1] - 0.01 && x[i + 2] < half[2] - 0.5 * cell;
+          behind[guarded] += std::fabs(x[i]) < half[0] - 0.01 && std::fabs(x[i + 1]) < half[1] - 0.01 &&
+                             x[i + 2] < half[2] - 0.5 * cell;
       }
     }
-  EXPECT_EQ(behind[true], 0u);   // the deepest one stays 0.01 mm above the face
+  EXPECT_EQ(behind[true], 0u);  // the deepest one stays 0.01 mm above the face
   EXPECT_GT(behind[false], 0u) << "the case needs no guard";
 }
 

@@ -1,5 +1,5 @@
-// Two filled rabbits on a slope of 12 degrees, the lower one thrown at 1 m/s from under the upper one, which comes down on its ears: surfaces with many
-// surfels on few points, where thin parts meet.
+// Two filled rabbits on a slope of 12 degrees, the lower one thrown at 1 m/s from under the upper one, which
+// comes down on its ears: surfaces with many surfels on few points, where thin parts meet.
 #include "shot.h"
 
 namespace {
@@ -15,13 +15,15 @@ struct Rabbits {
   Rabbits(bool guarded, uint64_t seed) {
     const char *const set[] = {guarded ? "/contact/guard=true" : "/contact/guard=false"};
     const dfm_scene_options options = {sizeof options, 1, set, seed};
-    test::ok(dfm_scene_open(context, DEFORM_SOURCE_DIR "/examples/scenes/rabbits_slope.json", &options, &scene));
+    test::ok(
+        dfm_scene_open(context, DEFORM_SOURCE_DIR "/examples/scenes/rabbits_slope.json", &options, &scene));
     test::ok(dfm_scene_world(scene, &world));
     dfm_scene_settings settings{};
     settings.size = sizeof settings;
     test::ok(dfm_scene_get_settings(scene, &settings));
     step = settings.step;
-    test::ok(dfm_world_find_body(world, "lower", &body[0])), test::ok(dfm_world_find_body(world, "upper", &body[1]));
+    test::ok(dfm_world_find_body(world, "lower", &body[0]));
+    test::ok(dfm_world_find_body(world, "upper", &body[1]));
     for (int k = 0; k < 2; ++k) triangles[k] = test::surface_triangles(body[k]);
   }
   ~Rabbits() { dfm_scene_close(scene); }
@@ -31,11 +33,12 @@ struct Rabbits {
     std::vector<crossing::Surface> both;
     for (int k = 0; k < 2; ++k) {
       x[k] = test::surface_positions(body[k]);
-      both.push_back({x[k].data(), uint32_t(x[k].size() / 3), triangles[k].data(), uint32_t(triangles[k].size() / 3)});
+      both.push_back(
+          {x[k].data(), uint32_t(x[k].size() / 3), triangles[k].data(), uint32_t(triangles[k].size() / 3)});
     }
     return crossing::Counter().count(both, crossing::Touching::counts).between;
   }
-  size_t run(double from, double to) {   // counted from `from` on; before it they fall
+  size_t run(double from, double to) {  // counted from `from` on; before it they fall
     size_t crossed = 0;
     for (long i = 1; double(i) * step <= to; ++i) {
       uint32_t trouble = 0;

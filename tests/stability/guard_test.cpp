@@ -1,4 +1,5 @@
-// The guard's promise: at the end of no step do bodies cross, however fast they are. Each scene runs ten times with jitter, and crosses without the guard.
+// The guard's promise: at the end of no step do bodies cross, however fast they are. Each scene runs ten
+// times with jitter, and crosses without the guard.
 #include "shot.h"
 
 namespace {
@@ -11,25 +12,29 @@ using Scene = test::Shot;
 
 void sheets(Scene &s) {
   s.add("beam", {0.12, 0.12, 0.012}, 30, {}, {});
-  s.add("beam", {0.12, 0.12, 0.012}, 30, {s.jitter(0.02), s.jitter(0.02), 0.03}, {0, 0, -100}, {0.1 + s.jitter(0.05), s.jitter(0.1), s.jitter(0.3), 1});
+  s.add("beam", {0.12, 0.12, 0.012}, 30, {s.jitter(0.02), s.jitter(0.02), 0.03}, {0, 0, -100},
+        {0.1 + s.jitter(0.05), s.jitter(0.1), s.jitter(0.3), 1});
 }
 void sheet_and_box(Scene &s) {
   s.add("beam", {0.05, 0.05, 0.05}, 40, {0.03, 0.03, -0.06}, {});
-  s.add("beam", {0.12, 0.12, 0.012}, 50, {s.jitter(0.02), s.jitter(0.02), 0.04}, {0, 0, -100}, {s.jitter(0.1), 0.1 + s.jitter(0.05), s.jitter(0.3), 1});
+  s.add("beam", {0.12, 0.12, 0.012}, 50, {s.jitter(0.02), s.jitter(0.02), 0.04}, {0, 0, -100},
+        {s.jitter(0.1), 0.1 + s.jitter(0.05), s.jitter(0.3), 1});
 }
-void gap(Scene &s) {   // 30 mm wide, for a ball of 36 mm; soft enough to cross where nothing guards them
+void gap(Scene &s) {  // 30 mm wide, for a ball of 36 mm; soft enough to cross where nothing guards them
   s.add("beam", {0.1, 0.1, 0.02}, 100, {-0.115, -0.05, 0}, {}, {0, 0, 0, 1}, 3e5);
   s.add("beam", {0.1, 0.1, 0.02}, 100, {0.015, -0.05, 0}, {}, {0, 0, 0, 1}, 3e5);
   s.add("ball", {0.018, 0, 0}, 100, {s.jitter(0.005), s.jitter(0.02), 0.05}, {0, 0, -40}, {0, 0, 0, 1}, 3e5);
 }
-void spike_on_wedge(Scene &s) {   // a corner comes down on an edge
+void spike_on_wedge(Scene &s) {  // a corner comes down on an edge
   s.add("beam", {0.08, 0.2, 0.08}, 60, {-0.0566, -0.1, 0}, {}, {0, 0.3827, 0, 0.9239});
-  s.add("beam", {0.06, 0.06, 0.06}, 60, {s.jitter(0.01), s.jitter(0.03), 0.09}, {s.jitter(2), s.jitter(2), -80}, {0.3251, -0.3251, 0, 0.8881});
+  s.add("beam", {0.06, 0.06, 0.06}, 60, {s.jitter(0.01), s.jitter(0.03), 0.09},
+        {s.jitter(2), s.jitter(2), -80}, {0.3251, -0.3251, 0, 0.8881});
 }
 void pile(Scene &s) {
   test::add_plane(s.world, "floor", {0, 0, -0.005});
   for (int i = 0; i < 4; ++i)
-    s.add("beam", {0.1, 0.04, 0.02}, 24, {s.jitter(0.02), s.jitter(0.02), 0.03 * i}, {0, 0, -8.0 - 6 * i}, {0, 0, s.jitter(0.5), 1});
+    s.add("beam", {0.1, 0.04, 0.02}, 24, {s.jitter(0.02), s.jitter(0.02), 0.03 * i}, {0, 0, -8.0 - 6 * i},
+          {0, 0, s.jitter(0.5), 1});
 }
 
 }  // namespace
@@ -42,21 +47,28 @@ TEST(Guard, BallThroughNarrowGap_NeverCrosses) { ten_times(gap, 3, 1e-3); }
 TEST(Guard, CornerOnEdge_NeverCross) { ten_times(spike_on_wedge, 4, 1e-3); }
 TEST(Guard, PileDroppedHard_NeverCrosses) { ten_times(pile, 3, 1e-3); }
 
-// A sheet that would be beyond a box obstacle after one sub-step stays outside it, and the momentum that the box takes is in the report.
+// A sheet that would be beyond a box obstacle after one sub-step stays outside it, and the momentum that the
+// box takes is in the report.
 TEST(Guard, SheetOnBoxObstacle_StaysOutside) {
   for (unsigned seed = 1; seed <= 10; ++seed) {
     Scene s(true, seed);
     dfm_obstacle_def box = dfm_obstacle_def_default();
-    box.name = "box", box.shape = DFM_SHAPE_BOX, box.pose.position[2] = -0.01;
-    box.half_size[0] = box.half_size[1] = 0.05, box.half_size[2] = 0.002;
+    box.name = "box";
+    box.shape = DFM_SHAPE_BOX;
+    box.pose.position[2] = -0.01;
+    box.half_size[0] = box.half_size[1] = 0.05;
+    box.half_size[2] = 0.002;
     dfm_obstacle obstacle = 0;
     test::ok(dfm_obstacle_create(s.world, &box, &obstacle));
-    s.add("beam", {0.12, 0.12, 0.012}, 50, {-0.06 + s.jitter(0.02), -0.06 + s.jitter(0.02), 0.02}, {0, 0, -100}, {0.1, s.jitter(0.1), 0, 1});
+    s.add("beam", {0.12, 0.12, 0.012}, 50, {-0.06 + s.jitter(0.02), -0.06 + s.jitter(0.02), 0.02},
+          {0, 0, -100}, {0.1, s.jitter(0.1), 0, 1});
     EXPECT_TRUE(run(s, 3, 5e-4).finite);
     for (const dfm_body b : s.bodies) {
       const std::vector<double> x = test::surface_positions(b);
       for (size_t i = 0; i < x.size(); i += 3)
-        EXPECT_FALSE(std::fabs(x[i]) < 0.05 && std::fabs(x[i + 1]) < 0.05 && std::fabs(x[i + 2] + 0.01) < 0.002) << "seed " << seed << " inside";
+        EXPECT_FALSE(std::fabs(x[i]) < 0.05 && std::fabs(x[i + 1]) < 0.05 &&
+                     std::fabs(x[i + 2] + 0.01) < 0.002)
+            << "seed " << seed << " inside";
     }
   }
 }
@@ -84,8 +96,9 @@ TEST(Guard, ThreadsAndRepetition_SameHash) {
   EXPECT_EQ(hash[0], hash[2]);
 }
 
-// What the guard remembers of a pair holds for the motion of steps alone. Two runs begin apart, one so far that its pairs are not listed; both are then
-// given the same state by dfm_body_set_state(), from which they go on alike.
+// What the guard remembers of a pair holds for the motion of steps alone. Two runs begin apart, one so far
+// that its pairs are not listed; both are then given the same state by dfm_body_set_state(), from which
+// they go on alike.
 TEST(Guard, StateSetBetweenSteps_ForgetsHowFarApartPairsWere) {
   for (const double speed : {20.0, 60.0, 100.0}) {
     uint64_t acted[2];
@@ -119,7 +132,8 @@ TEST(Guard, StateSetBetweenSteps_ForgetsHowFarApartPairsWere) {
   }
 }
 
-// Rest and sliding are the contact solve's business: the guard never acts, and the state has the same bits as without it.
+// Rest and sliding are the contact solve's business: the guard never acts, and the state has the same bits
+// as without it.
 TEST(Guard, RestAndSliding_NeverTrip) {
   uint64_t hash[2];
   for (const bool guarded : {true, false}) {

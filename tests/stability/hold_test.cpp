@@ -1,12 +1,13 @@
-// What friction alone holds stays: one block per law of the table that `make soak` makes. A micrometer per second is the bound for laws that promise
-// stiction; Dahl's and LuGre's laws hold a steady load and drift under vibration by their closed form.
+// What friction alone holds stays: one block per law of the table that `make soak` makes. A micrometer per
+// second is the bound for laws that promise stiction; Dahl's and LuGre's laws hold a steady load and drift
+// under vibration by their closed form.
 #include "hold.h"
 
 namespace {
 
 using namespace test::hold;
 
-constexpr double kCreep = 1e-6, kRest = 1e-8;   // m/s; of what nothing pulls at but its weight
+constexpr double kCreep = 1e-6, kRest = 1e-8;  // m/s; of what nothing pulls at but its weight
 
 class Hold : public testing::TestWithParam<const char *> {};
 
@@ -32,28 +33,34 @@ TEST_P(Hold, OnASlopeAndPulled_DoesNotCreep) {
   expect_held({"pull", GetParam(), 0.99, 1.0 / 60, false});
 }
 
-TEST_P(Hold, CapsuleGrippedByLittleMoreThanItNeeds_DoesNotCreep) { expect_held({"pinch", GetParam(), 1.05, 1e-3, false}); }
+TEST_P(Hold, CapsuleGrippedByLittleMoreThanItNeeds_DoesNotCreep) {
+  expect_held({"pinch", GetParam(), 1.05, 1e-3, false});
+}
 
 TEST_P(Hold, CapsuleGrippedHard_DoesNotCreep) { expect_held({"pinch", GetParam(), 95, 1.0 / 240, false}); }
 
-// Two soft bodies whose meshes have nothing in common. On them nearly redundant contacts share the load, so that what the solve leaves shows as noise of
-// the normal forces and velocities, and edges are pressed flat: a law with memory turns both into creep, 2e-4 to 6e-4 m/s before they were cured.
+// Two soft bodies whose meshes have nothing in common. On them nearly redundant contacts share the load, so
+// that what the solve leaves shows as noise of the normal forces and velocities, and edges are pressed flat:
+// a law with memory turns both into creep, 2e-4 to 6e-4 m/s before they were cured.
 TEST_P(Hold, PulledOnASoftBed_DoesNotCreep) {
   expect_held({"soft", GetParam(), 0.5, 1e-3, false});
-  expect_held({"soft", GetParam(), GetParam() == std::string("gms") ? 0.5 : 0.9, 1.0 / 240, false});   // gms: its page, limits
+  // gms: its page, limits
+  expect_held({"soft", GetParam(), GetParam() == std::string("gms") ? 0.5 : 0.9, 1.0 / 240, false});
 }
 
-// Of nearly redundant contacts some carry nothing, and which is chance. While the areas of their neighbors went by that, each turn took force off the patch
-// and shook the stack, which took the next turn: the top cube walked by 2e-6 to 5e-6 m/s without an end (doc/decisions/0054).
+// Of nearly redundant contacts some carry nothing, and which is chance. While the areas of their neighbors
+// went by that, each turn took force off the patch and shook the stack, which took the next turn: the top
+// cube walked by 2e-6 to 5e-6 m/s without an end (doc/decisions/0054).
 TEST_P(Hold, StackOfThreeCubes_ComesToRest) { expect_at_rest({"stack", GetParam(), 3, 1e-3, false}); }
 
 TEST_P(Hold, BlockInAGroove_Rests) {
-  expect_at_rest({"vee", GetParam(), 10, 1e-3, false});     // right-angled, the block a little askew
-  expect_at_rest({"taper", GetParam(), 5, 1e-3, false});    // steep, and let go after a push
+  expect_at_rest({"vee", GetParam(), 10, 1e-3, false});   // right-angled, the block a little askew
+  expect_at_rest({"taper", GetParam(), 5, 1e-3, false});  // steep, and let go after a push
 }
 
-// Bristles that yield at any load let a pad walk that is pulled to and fro on one side of zero; those with an elastic zone, and true stiction, do not.
-// The formula is of a rigid block with an even pressure: the pad's edges make it up to a tenth more.
+// Bristles that yield at any load let a pad walk that is pulled to and fro on one side of zero; those with an
+// elastic zone, and true stiction, do not. The formula is of a rigid block with an even pressure: the pad's
+// edges make it up to a tenth more.
 TEST_P(Hold, PulledToAndFro_DriftsByTheLawsFormulaOrNotAtAll) {
   const Result r = run_case({"vibration", GetParam(), 0.5, 1e-3, false, 150});
   if (r.drift > 0) {
@@ -63,7 +70,8 @@ TEST_P(Hold, PulledToAndFro_DriftsByTheLawsFormulaOrNotAtAll) {
   }
 }
 
-// At a step far below what the bodies ask for, the solve's noise has the least time to die away between two sub-steps.
+// At a step far below what the bodies ask for, the solve's noise has the least time to die away between
+// two sub-steps.
 TEST(HoldBound, OnASoftBedInShortSteps_HoldsTheSame) {
   for (const char *law : {"lugre", "elastoplastic"}) expect_held({"soft", law, 0.5, 5e-5, false});
 }
@@ -74,7 +82,10 @@ TEST(HoldBound, SoftOnSoftOnBothSides_Holds) {
 }
 
 // The test can fail: a slope just beyond the limit is not held.
-TEST(HoldBound, BeyondTheLimit_Slides) { EXPECT_GT(run_case({"slope", "elastoplastic", 1.02, 1e-3, false}).creep, 1e-3); }
+TEST(HoldBound, BeyondTheLimit_Slides) {
+  EXPECT_GT(run_case({"slope", "elastoplastic", 1.02, 1e-3, false}).creep, 1e-3);
+}
 
-INSTANTIATE_TEST_SUITE_P(Laws, Hold, testing::Values("coulomb", "karnopp", "dahl", "lugre", "elastoplastic", "gms"),
+INSTANTIATE_TEST_SUITE_P(Laws, Hold,
+                         testing::Values("coulomb", "karnopp", "dahl", "lugre", "elastoplastic", "gms"),
                          [](const auto &p) { return std::string(p.param); });

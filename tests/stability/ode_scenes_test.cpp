@@ -1,5 +1,6 @@
-// Rigid bodies of ODE in scenes: a box lands on a bed, fingers lift a ball, a cart drives over a bump on its tyres, a chain drags a ring, weights tip a
-// seesaw. Rigid bodies do not touch each other there, so the builtin host must bring the same.
+// Rigid bodies of ODE in scenes: a box lands on a bed, fingers lift a ball, a cart drives over a bump on its
+// tyres, a chain drags a ring, weights tip a seesaw. Rigid bodies do not touch each other there, so the
+// builtin host must bring the same.
 #include "scenes.h"
 
 namespace {
@@ -9,7 +10,9 @@ using test::SceneRun;
 constexpr double kG = 9.81;
 constexpr const char *kNotBuilt = "built without libdeform_ode";
 
-double apart(const test::BodyRow &a, const test::BodyRow &b) { return std::hypot(a.com[0] - b.com[0], a.com[1] - b.com[1], a.com[2] - b.com[2]); }
+double apart(const test::BodyRow &a, const test::BodyRow &b) {
+  return std::hypot(a.com[0] - b.com[0], a.com[1] - b.com[1], a.com[2] - b.com[2]);
+}
 double highest(const SceneRun &run, const char *body) {
   double z = -1e9;
   for (const test::BodyRow &row : run.rows(body)) z = std::max(z, row.com[2]);
@@ -22,7 +25,8 @@ std::vector<std::string> lasting(double time, std::vector<std::string> settings 
 }
 
 // 1 % of what the scene measures: `size`.
-void expect_the_same_on_both_hosts(const char *scene, std::vector<std::string> arguments, const std::vector<std::string> &bodies, double size) {
+void expect_the_same_on_both_hosts(const char *scene, std::vector<std::string> arguments,
+                                   const std::vector<std::string> &bodies, double size) {
   if (!test::kHasOde) GTEST_SKIP() << kNotBuilt;
   const SceneRun ode(scene, arguments);
   arguments.insert(arguments.end(), {"--set", "/rigid/host=builtin"});
@@ -34,7 +38,8 @@ void expect_the_same_on_both_hosts(const char *scene, std::vector<std::string> a
 // The box, of 15 kg, lies flat and still on the bed of 0.16 m and in it by no more than a tenth.
 bool landed(const SceneRun &run) {
   const test::BodyRow box = run.last("box");
-  return std::fabs(run.contact_force("box") - 15 * kG) < 0.05 * 15 * kG && box.com[2] > 0.224 && box.com[2] < 0.24 && box.kinetic < 0.02;
+  return std::fabs(run.contact_force("box") - 15 * kG) < 0.05 * 15 * kG && box.com[2] > 0.224 &&
+         box.com[2] < 0.24 && box.kinetic < 0.02;
 }
 
 // In the fingers, whose middle was at 0.11 m as the ball's at 0.1.
@@ -42,50 +47,63 @@ std::vector<std::string> lifting(std::vector<std::string> more = {}) {
   more.push_back("/rigid/bodies/0/joints/0/motor/velocity=0.05");
   return lasting(2, std::move(more));
 }
-bool lifted(const SceneRun &run) { return run.last("left").com[2] > 0.2 && std::fabs(run.last("ball").com[2] - run.last("left").com[2] + 0.02) < 0.015; }
+bool lifted(const SceneRun &run) {
+  return run.last("left").com[2] > 0.2 &&
+         std::fabs(run.last("ball").com[2] - run.last("left").com[2] + 0.02) < 0.015;
+}
 
-// The front wheels have come up the bump, which begins 3 cm before them; every tyre is on its hub, the cart straight.
+// The front wheels have come up the bump, which begins 3 cm before them; every tyre is on its hub, the
+// cart straight.
 bool drives(const SceneRun &run) {
-  bool on = run.last("chassis").com[0] > 0.18 && highest(run, "hub_front_left") > 0.17 && std::fabs(run.last("chassis").com[1]) < 0.03;
+  bool on = run.last("chassis").com[0] > 0.18 && highest(run, "hub_front_left") > 0.17 &&
+            std::fabs(run.last("chassis").com[1]) < 0.03;
   for (const char *wheel : {"front_left", "front_right", "rear_left", "rear_right"})
     on &= apart(run.last(std::string("hub_") + wheel), run.last(std::string("tyre_") + wheel)) < 0.03;
   return on;
 }
 
-// What is dragged at a taut line whose end goes along y runs on a tractrix: it comes from (0, 0), the line of length L from (L - 0.06, 0). 0.06: play in
-// the ring.
+// What is dragged at a taut line whose end goes along y runs on a tractrix: it comes from (0, 0), the line of
+// length L from (L - 0.06, 0). 0.06: play in the ring.
 bool dragged(const SceneRun &run) {
   constexpr double kLength = 1.26;
   const double d = run.last("lead").com[1], angle = 2 * std::atan(std::exp(-d / kLength));
   const test::BodyRow bag = run.last("bag");
-  return std::hypot(bag.com[0] - (1.2 - kLength * std::sin(angle)), bag.com[1] - (d - kLength * std::cos(angle))) < 0.03;
+  return std::hypot(bag.com[0] - (1.2 - kLength * std::sin(angle)),
+                    bag.com[1] - (d - kLength * std::cos(angle))) < 0.03;
 }
 
 // The heavy side is down on the pad; both weights where they were laid.
 bool tipped(const SceneRun &run) {
   const test::BodyRow light = run.last("light"), heavy = run.last("heavy");
-  return light.com[2] - heavy.com[2] > 0.08 && std::fabs(heavy.com[0] - 0.31) < 0.03 && std::fabs(light.com[0] + 0.33) < 0.03 &&
-         run.contact_counts("pad", 0).size() > 1 && std::fabs(run.last("pad").com[0] - 0.45) < 0.02;
+  return light.com[2] - heavy.com[2] > 0.08 && std::fabs(heavy.com[0] - 0.31) < 0.03 &&
+         std::fabs(light.com[0] + 0.33) < 0.03 && run.contact_counts("pad", 0).size() > 1 &&
+         std::fabs(run.last("pad").com[0] - 0.45) < 0.02;
 }
 
 }  // namespace
 
-TEST(OdeBed, Box_RestsAsWithTheBuiltinHost) { expect_the_same_on_both_hosts("ode_bed", {}, {"bed", "box"}, 0.16); }
+TEST(OdeBed, Box_RestsAsWithTheBuiltinHost) {
+  expect_the_same_on_both_hosts("ode_bed", {}, {"bed", "box"}, 0.16);
+}
 TEST(OdeBed, TenJitteredRuns_AllLand) {
   if (!test::kHasOde) GTEST_SKIP() << kNotBuilt;
   test::expect_jittered("ode_bed", 1, 10, lasting(1.3), 30, landed);
   EXPECT_FALSE(landed(SceneRun("ode_bed", lasting(1.3, {"/rigid/bodies/0/velocity=[2,0,0]"}))));
 }
 
-TEST(OdeGripper, Ball_IsWhereTheBuiltinHostHasIt) { expect_the_same_on_both_hosts("ode_gripper", lifting(), {"ball", "left", "right"}, 0.1); }
-// What ODE's joints and motors hold is as still as what the builtin host's hold: motion of the ball against a finger over the last of four seconds.
+TEST(OdeGripper, Ball_IsWhereTheBuiltinHostHasIt) {
+  expect_the_same_on_both_hosts("ode_gripper", lifting(), {"ball", "left", "right"}, 0.1);
+}
+// What ODE's joints and motors hold is as still as what the builtin host's hold: motion of the ball against a
+// finger over the last of four seconds.
 TEST(OdeGripper, LiftedBall_DoesNotSlip) {
   if (!test::kHasOde) GTEST_SKIP() << kNotBuilt;
   for (const char *step : {"0.001", "0.00416666666666667"}) {
-    const SceneRun run("ode_gripper", lasting(4, {"/rigid/bodies/0/joints/0/motor/velocity=0.05", std::string("/time/step=") + step}));
+    const SceneRun run("ode_gripper", lasting(4, {"/rigid/bodies/0/joints/0/motor/velocity=0.05",
+                                                  std::string("/time/step=") + step}));
     run.expect_sound(20, step);
     const auto ball = run.rows("ball"), finger = run.rows("left");
-    const size_t end = ball.size() - 1, start = end - 2;   // every half second
+    const size_t end = ball.size() - 1, start = end - 2;  // every half second
     ASSERT_NEAR(ball[end].t - ball[start].t, 1, 1e-6);
     const double slip = ball[end].com[2] - finger[end].com[2] - ball[start].com[2] + finger[start].com[2];
     std::printf("  step %s s: %.3g micrometers per second\n", step, 1e6 * slip);
@@ -97,14 +115,19 @@ TEST(OdeGripper, TenJitteredRuns_AllLift) {
   if (!test::kHasOde) GTEST_SKIP() << kNotBuilt;
   test::expect_jittered("ode_gripper", 1, 10, lifting(), 20, lifted);
   EXPECT_FALSE(lifted(SceneRun("ode_gripper", lifting({test::kFrictionless}))));
-  EXPECT_FALSE(lifted(SceneRun("ode_gripper", lifting({"/rigid/bodies/1/joints/0/motor/max=12", "/rigid/bodies/2/joints/0/motor/max=12"}))));
+  EXPECT_FALSE(lifted(SceneRun("ode_gripper", lifting({"/rigid/bodies/1/joints/0/motor/max=12",
+                                                       "/rigid/bodies/2/joints/0/motor/max=12"}))));
 }
 
 TEST(OdeCart, Braked_RestsOnItsTyresAsWithTheBuiltinHost) {
-  const std::vector<std::string> brakes = {"/rigid/bodies/3/joints/0/motor/velocity=0", "/rigid/bodies/4/joints/0/motor/velocity=0"};
-  expect_the_same_on_both_hosts("ode_cart", lasting(1, brakes), {"chassis", "tyre_front_left", "tyre_rear_right", "hub_rear_left"}, 0.15);
+  const std::vector<std::string> brakes = {"/rigid/bodies/3/joints/0/motor/velocity=0",
+                                           "/rigid/bodies/4/joints/0/motor/velocity=0"};
+  expect_the_same_on_both_hosts("ode_cart", lasting(1, brakes),
+                                {"chassis", "tyre_front_left", "tyre_rear_right", "hub_rear_left"}, 0.15);
 }
-TEST(OdeCart, Driven_ComesAsFarAsWithTheBuiltinHost) { expect_the_same_on_both_hosts("ode_cart", lasting(1), {"chassis", "tyre_front_left"}, 0.5); }
+TEST(OdeCart, Driven_ComesAsFarAsWithTheBuiltinHost) {
+  expect_the_same_on_both_hosts("ode_cart", lasting(1), {"chassis", "tyre_front_left"}, 0.5);
+}
 TEST(OdeCart, FiveJitteredRuns_AllDriveUpTheBump) {
   if (!test::kHasOde) GTEST_SKIP() << kNotBuilt;
   test::expect_jittered("ode_cart", 1, 5, lasting(0.5), 60, drives);
@@ -115,23 +138,35 @@ TEST(OdeCart, FiveMoreJitteredRuns_AllDriveUpTheBump) {
 }
 TEST(OdeCart, WithoutGripOrBump_DoesNotDriveUpIt) {
   if (!test::kHasOde) GTEST_SKIP() << kNotBuilt;
-  EXPECT_FALSE(drives(SceneRun("ode_cart", lasting(0.5, {R"(/contact/friction=[{"between": ["*", "floor"], "law": "coulomb", "params": {"mu": 0.05}}])"}))));
-  EXPECT_FALSE(drives(SceneRun("ode_cart", lasting(0.5, {R"(/contact/filter=[{"between": ["*", "bump"], "collide": false}])"}))));
+  EXPECT_FALSE(drives(SceneRun(
+      "ode_cart",
+      lasting(
+          0.5,
+          {R"(/contact/friction=[{"between": ["*", "floor"], "law": "coulomb", "params": {"mu": 0.05}}])"}))));
+  EXPECT_FALSE(drives(SceneRun(
+      "ode_cart", lasting(0.5, {R"(/contact/filter=[{"between": ["*", "bump"], "collide": false}])"}))));
 }
 
-TEST(OdeChain, Ring_IsDraggedWhereTheBuiltinHostDragsIt) { expect_the_same_on_both_hosts("ode_chain", {}, {"bag", "link2", "peg"}, 0.15); }
+TEST(OdeChain, Ring_IsDraggedWhereTheBuiltinHostDragsIt) {
+  expect_the_same_on_both_hosts("ode_chain", {}, {"bag", "link2", "peg"}, 0.15);
+}
 TEST(OdeChain, TenJitteredRuns_AllFollowTheTractrix) {
   if (!test::kHasOde) GTEST_SKIP() << kNotBuilt;
   test::expect_jittered("ode_chain", 1, 10, lasting(2), 30, dragged);
   EXPECT_FALSE(dragged(SceneRun("ode_chain", lasting(2, {test::kFrictionless}))));
 }
-// Joints enter the contact solve with what they did in the sub-step before; the error of that is of first order. Against 1/16 of the step.
+// Joints enter the contact solve with what they did in the sub-step before; the error of that is of first
+// order. Against 1/16 of the step.
 TEST(OdeChain, Joints_ConvergeWithTheStep) {
   if (!test::kHasOde) GTEST_SKIP() << kNotBuilt;
-  const auto at = [](const char *step) { return SceneRun("ode_chain", lasting(0.5, {std::string("/time/step=") + step})); };
+  const auto at = [](const char *step) {
+    return SceneRun("ode_chain", lasting(0.5, {std::string("/time/step=") + step}));
+  };
   const SceneRun a = at("0.0005"), b = at("0.00025"), c = at("0.000125"), exact = at("0.00003125");
   for (const char *body : {"bag", "link2"}) {
-    const double ea = apart(a.last(body), exact.last(body)), eb = apart(b.last(body), exact.last(body)), ec = apart(c.last(body), exact.last(body));
+    const double ea = apart(a.last(body), exact.last(body));
+    const double eb = apart(b.last(body), exact.last(body));
+    const double ec = apart(c.last(body), exact.last(body));
     std::printf("  %s: %.3g %.3g %.3g m\n", body, ea, eb, ec);
     EXPECT_LT(ea, 1e-4) << body;
     EXPECT_GT(std::log2(ea / eb), 0.7) << body;
@@ -139,7 +174,9 @@ TEST(OdeChain, Joints_ConvergeWithTheStep) {
   }
 }
 
-TEST(OdeSeesaw, Weights_RestAsWithTheBuiltinHost) { expect_the_same_on_both_hosts("ode_seesaw", {}, {"light", "heavy", "pad", "plank"}, 0.1); }
+TEST(OdeSeesaw, Weights_RestAsWithTheBuiltinHost) {
+  expect_the_same_on_both_hosts("ode_seesaw", {}, {"light", "heavy", "pad", "plank"}, 0.1);
+}
 TEST(OdeSeesaw, TenJitteredRuns_AllTip) {
   if (!test::kHasOde) GTEST_SKIP() << kNotBuilt;
   test::expect_jittered("ode_seesaw", 1, 10, lasting(0.8), 40, tipped);

@@ -1,4 +1,5 @@
-// Random piles with every law: every step is made. `pile_walk` of tests/bench walks a hundred thousand steps of each.
+// Random piles with every law: every step is made. `pile_walk` of tests/bench walks a hundred thousand
+// steps of each.
 #include "pile.h"
 
 namespace {
@@ -15,5 +16,6 @@ TEST_P(Pile, OfRandomBodies_MakesEveryStep) {
   }
 }
 
-INSTANTIATE_TEST_SUITE_P(Laws, Pile, testing::Values("coulomb", "karnopp", "dahl", "lugre", "elastoplastic", "gms"),
+INSTANTIATE_TEST_SUITE_P(Laws, Pile,
+                         testing::Values("coulomb", "karnopp", "dahl", "lugre", "elastoplastic", "gms"),
                          [](const auto &p) { return std::string(p.param); });

@@ -1,16 +1,19 @@
-// A tube pinched between two rods: isotropic, softer along its axis, stiffer along its axis. Across the axis all three have one modulus, so the
-// softer gives way at the rods alone and the stiffer carries the squeeze to its ends.
+// A tube pinched between two rods: isotropic, softer along its axis, stiffer along its axis. Across the
+// axis all three have one modulus, so the softer gives way at the rods alone and the stiffer carries the
+// squeeze to its ends.
 #include "scenes.h"
 
 namespace {
 
 struct Tube { double force, spread; };  // N on a rod; how far the ends rise over how far the middle widens
 
-// Slope 2 leaves cos^2 = 1/5: a tube stiffer along its axis is given five times the modulus, so that it has that of the others across.
+// Slope 2 leaves cos^2 = 1/5: a tube stiffer along its axis is given five times the modulus, so that it has
+// that of the others across.
 Tube tube(const std::string &kind, double slope, double young) {
-  const test::SceneRun run("pinched_tube", {"--time", "0.6", "--set", "/bodies/0/anisotropy/params/kind=" + kind, "--set",
-                                            "/bodies/0/anisotropy/params/slope=" + std::to_string(slope), "--set",
-                                            "/materials/rubber/young=" + std::to_string(young)});
+  const test::SceneRun run("pinched_tube",
+                           {"--time", "0.6", "--set", "/bodies/0/anisotropy/params/kind=" + kind, "--set",
+                            "/bodies/0/anisotropy/params/slope=" + std::to_string(slope), "--set",
+                            "/materials/rubber/young=" + std::to_string(young)});
   run.expect_sound(8, kind);
   EXPECT_LT(run.last("tube").kinetic, 1e-4);
   const std::vector<double> side = run.probe("side"), end = run.probe("end_top");
@@ -40,8 +43,12 @@ bool between_the_rods(const test::SceneRun &run) {
 const std::vector<std::string> kShort = {"--time", "0.45"};
 }  // namespace
 
-TEST(PinchedTube, FiveJitteredRuns_StayBetweenTheRods) { test::expect_jittered("pinched_tube", 1, 5, kShort, 8, between_the_rods); }
-TEST(PinchedTube, FiveMoreJitteredRuns_StayBetweenTheRods) { test::expect_jittered("pinched_tube", 6, 10, kShort, 8, between_the_rods); }
+TEST(PinchedTube, FiveJitteredRuns_StayBetweenTheRods) {
+  test::expect_jittered("pinched_tube", 1, 5, kShort, 8, between_the_rods);
+}
+TEST(PinchedTube, FiveMoreJitteredRuns_StayBetweenTheRods) {
+  test::expect_jittered("pinched_tube", 6, 10, kShort, 8, between_the_rods);
+}
 
 // One rod alone pushes it away.
 TEST(PinchedTube, OneRodAlone_DoesNotHoldIt) {
@@ -49,12 +56,15 @@ TEST(PinchedTube, OneRodAlone_DoesNotHoldIt) {
   EXPECT_FALSE(between_the_rods(test::SceneRun("pinched_tube", {"--time", "0.45", "--set", upper_alone})));
 }
 
-// The rods stand still from 0.4 s on: so do the contacts. Edges that a straight rod presses flat and that lost their contact for it came and went for ever,
+// The rods stand still from 0.4 s on: so do the contacts. Edges that a straight rod presses flat and that
+// lost their contact for it came and went for ever,
 // 9 to 18 of them, and half of the steps did not converge.
 TEST(PinchedTube, RodsAtRest_KeepTheirContacts) {
   for (const int seed : {5, 8}) {
-    const test::SceneRun run("pinched_tube", {"--time", "0.6", "--set", "/output/every=0.005", "--jitter", std::to_string(seed)});
-    for (const char *rod : {"upper", "lower"}) EXPECT_EQ(run.contact_counts(rod, 0.45).size(), 1u) << rod << ", seed " << seed;
+    const test::SceneRun run(
+        "pinched_tube", {"--time", "0.6", "--set", "/output/every=0.005", "--jitter", std::to_string(seed)});
+    for (const char *rod : {"upper", "lower"})
+      EXPECT_EQ(run.contact_counts(rod, 0.45).size(), 1u) << rod << ", seed " << seed;
     EXPECT_LT(run.number("unconverged_steps"), 0.05 * run.number("steps")) << seed;
   }
 }

@@ -4,7 +4,9 @@
 namespace {
 
 // Height of the ring's hole, m, in record i of two probes.
-double hole(const test::SceneRun &run, size_t i) { return run.probe_rows("roof")[i][3] - run.probe_rows("ground")[i][3]; }
+double hole(const test::SceneRun &run, size_t i) {
+  return run.probe_rows("roof")[i][3] - run.probe_rows("ground")[i][3];
+}
 
 double least_hole(const test::SceneRun &run) {
   double least = 1;
@@ -12,7 +14,9 @@ double least_hole(const test::SceneRun &run) {
   return least;
 }
 bool walls_meet(const test::SceneRun &run) { return least_hole(run) > 0 && least_hole(run) < 1e-3; }
-bool opens_again(const test::SceneRun &run) { return hole(run, run.probe_rows("roof").size() - 1) > 0.9 * hole(run, 0); }
+bool opens_again(const test::SceneRun &run) {
+  return hole(run, run.probe_rows("roof").size() - 1) > 0.9 * hole(run, 0);
+}
 
 const std::vector<std::string> kPressed = {"--time", "0.6"};
 
@@ -33,8 +37,18 @@ TEST(PressedRing, WithoutTheEffect_Crosses) {
   EXPECT_EQ(run.number("intersections_max"), run.number("intersections_self_max"));
 }
 
-TEST(PressedRing, JitteredRuns1To2_DoNotCross) { test::expect_jittered("pressed_ring", 1, 2, kPressed, 20, walls_meet); }
-TEST(PressedRing, JitteredRuns3To4_DoNotCross) { test::expect_jittered("pressed_ring", 3, 4, kPressed, 20, walls_meet); }
-TEST(PressedRing, JitteredRuns5To6_DoNotCross) { test::expect_jittered("pressed_ring", 5, 6, kPressed, 20, walls_meet); }
-TEST(PressedRing, JitteredRuns7To8_DoNotCross) { test::expect_jittered("pressed_ring", 7, 8, kPressed, 20, walls_meet); }
-TEST(PressedRing, JitteredRuns9To10_DoNotCross) { test::expect_jittered("pressed_ring", 9, 10, kPressed, 20, walls_meet); }
+TEST(PressedRing, JitteredRuns1To2_DoNotCross) {
+  test::expect_jittered("pressed_ring", 1, 2, kPressed, 20, walls_meet);
+}
+TEST(PressedRing, JitteredRuns3To4_DoNotCross) {
+  test::expect_jittered("pressed_ring", 3, 4, kPressed, 20, walls_meet);
+}
+TEST(PressedRing, JitteredRuns5To6_DoNotCross) {
+  test::expect_jittered("pressed_ring", 5, 6, kPressed, 20, walls_meet);
+}
+TEST(PressedRing, JitteredRuns7To8_DoNotCross) {
+  test::expect_jittered("pressed_ring", 7, 8, kPressed, 20, walls_meet);
+}
+TEST(PressedRing, JitteredRuns9To10_DoNotCross) {
+  test::expect_jittered("pressed_ring", 9, 10, kPressed, 20, walls_meet);
+}

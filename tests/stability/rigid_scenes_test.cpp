@@ -8,24 +8,32 @@ constexpr double kG = 9.81;
 // The box hangs in the air no longer and lies still, where 2 kg lie.
 bool carried(const test::SceneRun &run) {
   const test::BodyRow box = run.last("box");
-  return std::fabs(run.contact_force("box") - 2 * kG) < 0.05 * 2 * kG && std::fabs(box.velocity[2]) < 0.01 && box.com[2] > 0.15;
+  return std::fabs(run.contact_force("box") - 2 * kG) < 0.05 * 2 * kG && std::fabs(box.velocity[2]) < 0.01 &&
+         box.com[2] > 0.15;
 }
 
 // Flat on the bed, which is 0.1 m high and 0.04 m below the box's middle.
 bool landed(const test::SceneRun &run) {
   const test::BodyRow box = run.last("box");
-  return std::fabs(run.contact_force("box") - 0.4 * kG) < 0.05 * 0.4 * kG && box.com[2] > 0.105 && box.com[2] < 0.13 && box.kinetic < 1e-4;
+  return std::fabs(run.contact_force("box") - 0.4 * kG) < 0.05 * 0.4 * kG && box.com[2] > 0.105 &&
+         box.com[2] < 0.13 && box.kinetic < 1e-4;
 }
 
-// The ball goes up with the plates. Its slip against them per second over the last second, in the plates' frame.
+// The ball goes up with the plates. Its slip against them per second over the last second, in the
+// plates' frame.
 double slip(const test::SceneRun &run) {
   const auto ball = run.rows("ball"), plate = run.rows("left");
   double first = 0, t0 = 0;
   for (size_t i = 0; i < ball.size(); ++i)
-    if (ball[i].t > 2 && t0 == 0) first = ball[i].com[2] - plate[i].com[2], t0 = ball[i].t;
+    if (ball[i].t > 2 && t0 == 0) {
+      first = ball[i].com[2] - plate[i].com[2];
+      t0 = ball[i].t;
+    }
   return std::fabs(ball.back().com[2] - plate.back().com[2] - first) / (ball.back().t - t0);
 }
-bool lifted(const test::SceneRun &run) { return run.last("ball").com[2] > 0.2 && slip(run) < 1e-4 && run.last("left").com[2] > 0.24; }
+bool lifted(const test::SceneRun &run) {
+  return run.last("ball").com[2] > 0.2 && slip(run) < 1e-4 && run.last("left").com[2] > 0.24;
+}
 
 }  // namespace
 
@@ -33,11 +41,16 @@ TEST(RigidOnBall, Box_IsCarried) {
   const test::SceneRun run("rigid_on_ball", {});
   run.expect_sound(10, "box on ball");
   EXPECT_TRUE(carried(run));
-  const test::SceneRun apart("rigid_on_ball", {"--set", R"(/contact/filter=[{"between": ["ball", "box"], "collide": false}])"});
+  const test::SceneRun apart(
+      "rigid_on_ball", {"--set", R"(/contact/filter=[{"between": ["ball", "box"], "collide": false}])"});
   EXPECT_FALSE(carried(apart));
 }
-TEST(RigidOnBall, FiveJitteredRuns_AllCarry) { test::expect_jittered("rigid_on_ball", 1, 5, {}, 10, carried); }
-TEST(RigidOnBall, FiveMoreJitteredRuns_AllCarry) { test::expect_jittered("rigid_on_ball", 6, 10, {}, 10, carried); }
+TEST(RigidOnBall, FiveJitteredRuns_AllCarry) {
+  test::expect_jittered("rigid_on_ball", 1, 5, {}, 10, carried);
+}
+TEST(RigidOnBall, FiveMoreJitteredRuns_AllCarry) {
+  test::expect_jittered("rigid_on_ball", 6, 10, {}, 10, carried);
+}
 
 TEST(RigidOnBed, Box_LandsAndRests) {
   const test::SceneRun run("rigid_on_bed", {});
@@ -59,5 +72,9 @@ TEST(RigidPinch, WithoutFrictionOrForce_NothingIsLifted) {
   EXPECT_FALSE(lifted(test::SceneRun("rigid_pinch", {"--set", "/rigid/bodies/1/joints/0/motor/max=20"})));
 }
 TEST(RigidPinch, ThreeJitteredRuns_AllLift) { test::expect_jittered("rigid_pinch", 1, 3, {}, 20, lifted); }
-TEST(RigidPinch, ThreeMoreJitteredRuns_AllLift) { test::expect_jittered("rigid_pinch", 4, 6, {}, 20, lifted); }
-TEST(RigidPinch, FourMoreJitteredRuns_AllLift) { test::expect_jittered("rigid_pinch", 7, 10, {}, 20, lifted); }
+TEST(RigidPinch, ThreeMoreJitteredRuns_AllLift) {
+  test::expect_jittered("rigid_pinch", 4, 6, {}, 20, lifted);
+}
+TEST(RigidPinch, FourMoreJitteredRuns_AllLift) {
+  test::expect_jittered("rigid_pinch", 7, 10, {}, 20, lifted);
+}

@@ -1,5 +1,6 @@
-// A block thrown along a floor, a ball that bounces without friction, two balls that collide: closed forms that hold for the contact method in use, and
-// Zerbato's roll-back as the mutation that fails every one of them.
+// A block thrown along a floor, a ball that bounces without friction, two balls that collide: closed
+// forms that hold for the contact method in use, and Zerbato's roll-back as the mutation that fails
+// every one of them.
 #include "scenes.h"
 
 namespace {
@@ -7,7 +8,7 @@ namespace {
 const std::vector<std::string> kRollback = {"--set", "/contact/method=\"rollback\""};
 
 // Each from where and how it starts, which jitter changes.
-bool slides(const test::SceneRun &run) {   // v^2 / (2 mu g), 0.2446 m for 1.2 m/s
+bool slides(const test::SceneRun &run) {  // v^2 / (2 mu g), 0.2446 m for 1.2 m/s
   const auto rows = run.rows("thrown");
   const double v = rows.front().velocity[0];
   return std::fabs(rows.back().com[0] - rows.front().com[0] - v * v / (2 * 0.3 * 9.81)) < 0.005;
@@ -15,9 +16,12 @@ bool slides(const test::SceneRun &run) {   // v^2 / (2 mu g), 0.2446 m for 1.2 m
 bool bounces(const test::SceneRun &run) {
   return std::fabs(run.last("bouncing").velocity[0] - run.rows("bouncing").front().velocity[0]) < 1e-9;
 }
-bool collides(const test::SceneRun &run) {   // masses are alike
-  const test::BodyRow from[] = {run.rows("flying").front(), run.rows("struck").front()}, to[] = {run.last("flying"), run.last("struck")};
-  return std::fabs(to[0].velocity[0] + to[1].velocity[0] - from[0].velocity[0] - from[1].velocity[0]) < 1e-9 && to[1].velocity[0] > 0.8;
+bool collides(const test::SceneRun &run) {  // masses are alike
+  const test::BodyRow from[] = {run.rows("flying").front(), run.rows("struck").front()};
+  const test::BodyRow to[] = {run.last("flying"), run.last("struck")};
+  return std::fabs(to[0].velocity[0] + to[1].velocity[0] - from[0].velocity[0] - from[1].velocity[0]) <
+             1e-9 &&
+         to[1].velocity[0] > 0.8;
 }
 
 }  // namespace
@@ -41,5 +45,7 @@ TEST(RollbackCompare, Rollback_FailsEachOfThem) {
 }
 
 TEST(RollbackCompare, TenJitteredRuns_MeetTheClosedForms) {
-  test::expect_jittered("rollback_compare", 1, 10, {}, 15, [](const test::SceneRun &run) { return slides(run) && bounces(run) && collides(run); });
+  test::expect_jittered("rollback_compare", 1, 10, {}, 15, [](const test::SceneRun &run) {
+    return slides(run) && bounces(run) && collides(run);
+  });
 }

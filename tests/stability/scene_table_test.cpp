@@ -1,5 +1,6 @@
-// Every shipped scene: its least contact count, ten jittered runs, and a mutation (contact off) that the judgment of its runs must not survive. What
-// else a scene is for, and the mutations of that (friction off, moduli swapped), stand in its own test beside this one.
+// Every shipped scene: its least contact count, ten jittered runs, and a mutation (contact off) that the
+// judgment of its runs must not survive. What else a scene is for, and the mutations of that (friction off,
+// moduli swapped), stand in its own test beside this one.
 #include <fstream>
 #include <map>
 #include <regex>
@@ -9,9 +10,13 @@
 
 namespace {
 
-// Contacts at once that a run has at least, jittered ones included; 0: nothing touches. begins: s, by then there are so many. needs_shared: its
-// meshes lie in ../shared. needs_ode: its rigid bodies are ODE's.
-struct Row { const char *scene; double least_contacts, begins; bool needs_shared, needs_ode = false; };
+// Contacts at once that a run has at least, jittered ones included; 0: nothing touches. begins: s, by then
+// there are so many. needs_shared: its meshes lie in ../shared. needs_ode: its rigid bodies are ODE's.
+struct Row {
+  const char *scene;
+  double least_contacts, begins;
+  bool needs_shared, needs_ode = false;
+};
 void PrintTo(const Row &row, std::ostream *out) { *out << row.scene; }
 constexpr Row kRows[] = {
     {"ball_incline", 3, 0.3, false},        {"basin", 8, 0.8, false},
@@ -20,14 +25,14 @@ constexpr Row kRows[] = {
     {"guard_shot", 20, 0.02, false},        {"pinched_tube", 8, 0.45, false},
     {"ode_bed", 30, 0.4, false, true},      {"ode_cart", 60, 0.3, false, true},
     {"ode_chain", 30, 0.2, false, true},    {"ode_gripper", 20, 0.5, false, true},
-    {"ode_seesaw", 40, 0.6, false, true},
-    {"pressed_ring", 20, 0.2, false},       {"rabbits_slope", 5, 0.6, false},
-    {"rigid_on_ball", 10, 0.4, false},      {"rigid_on_bed", 5, 0.3, false},
-    {"rigid_pinch", 20, 0.6, false},        {"rollback_compare", 15, 0.2, false},
-    {"slope_block", 10, 0.2, false},        {"ten_bodies", 60, 0.9, false},
-    {"terrain", 12, 0.6, false},            {"two_cylinders", 12, 0.5, false},
-    {"two_cylinders_coarse", 20, 0.4, false}, {"two_cylinders_fine", 40, 0.3, false},
-    {"two_materials", 0, 0, false},         {"viscoelastic_bars", 0, 0, false},
+    {"ode_seesaw", 40, 0.6, false, true},   {"pressed_ring", 20, 0.2, false},
+    {"rabbits_slope", 5, 0.6, false},       {"rigid_on_ball", 10, 0.4, false},
+    {"rigid_on_bed", 5, 0.3, false},        {"rigid_pinch", 20, 0.6, false},
+    {"rollback_compare", 15, 0.2, false},   {"slope_block", 10, 0.2, false},
+    {"ten_bodies", 60, 0.9, false},         {"terrain", 12, 0.6, false},
+    {"two_cylinders", 12, 0.5, false},      {"two_cylinders_coarse", 20, 0.4, false},
+    {"two_cylinders_fine", 40, 0.3, false}, {"two_materials", 0, 0, false},
+    {"viscoelastic_bars", 0, 0, false},
 };
 
 const Row &row_of(const std::string &scene) {
@@ -42,7 +47,9 @@ bool sound(const test::SceneRun &run, double least_contacts) {
   return run.finite() && run.number("intersections_max") == 0 && run.contacts_max() >= least_contacts;
 }
 
-std::vector<std::string> until(double time) { return {"--time", std::to_string(time), "--set", "/output/every=0.02"}; }
+std::vector<std::string> until(double time) {
+  return {"--time", std::to_string(time), "--set", "/output/every=0.02"};
+}
 
 bool on_top(const test::SceneRun &run) { return run.last("upper").com[2] > 0.85; }
 
@@ -50,17 +57,20 @@ bool on_top(const test::SceneRun &run) { return run.last("upper").com[2] > 0.85;
 
 TEST(SceneTable, EveryShippedScene_HasItsRow) {
   std::set<std::string> shipped, rows;
-  for (const auto &file : std::filesystem::directory_iterator(std::string(DEFORM_SOURCE_DIR) + "/examples/scenes"))
+  for (const auto &file :
+       std::filesystem::directory_iterator(std::string(DEFORM_SOURCE_DIR) + "/examples/scenes"))
     if (file.path().extension() == ".json") shipped.insert(file.path().stem().string());
   for (const Row &row : kRows) rows.insert(row.scene);
   EXPECT_EQ(shipped, rows);
 }
 
-// Seeds 1 to 10 of every contact scene are run somewhere in this folder, with a least count that is not below the table's.
+// Seeds 1 to 10 of every contact scene are run somewhere in this folder, with a least count that is not
+// below the table's.
 TEST(SceneTable, EveryContactScene_IsRunTenTimesWithJitter) {
   std::map<std::string, std::set<int>> seeds;
   const std::regex call(R"re(expect_jittered\("(\w+)", (\d+), (\d+))re");
-  for (const auto &file : std::filesystem::directory_iterator(std::string(DEFORM_SOURCE_DIR) + "/tests/stability")) {
+  for (const auto &file :
+       std::filesystem::directory_iterator(std::string(DEFORM_SOURCE_DIR) + "/tests/stability")) {
     std::ifstream in(file.path());
     std::stringstream text;
     text << in.rdbuf();
@@ -83,8 +93,10 @@ TEST_P(ContactScene, WithoutContact_IsNotSound) {
   if (row.needs_ode && !test::kHasOde) GTEST_SKIP() << "built without libdeform_ode";
   std::vector<std::string> arguments = until(row.begins);
   const test::SceneRun with(row.scene, arguments);
-  EXPECT_TRUE(sound(with, row.least_contacts)) << with.contacts_max() << " contacts, " << with.number("intersections_max") << " crossings";
-  arguments.insert(arguments.end(), {"--set", R"(/contact/filter=[{"between": ["*", "*"], "collide": false}])"});
+  EXPECT_TRUE(sound(with, row.least_contacts))
+      << with.contacts_max() << " contacts, " << with.number("intersections_max") << " crossings";
+  arguments.insert(arguments.end(),
+                   {"--set", R"(/contact/filter=[{"between": ["*", "*"], "collide": false}])"});
   const test::SceneRun without(row.scene, arguments);
   EXPECT_FALSE(sound(without, row.least_contacts));
   EXPECT_EQ(without.contacts_max(), 0);
@@ -96,7 +108,8 @@ std::vector<Row> contact_rows() {
     if (row.least_contacts > 0) rows.push_back(row);
   return rows;
 }
-INSTANTIATE_TEST_SUITE_P(Shipped, ContactScene, testing::ValuesIn(contact_rows()), [](const auto &i) { return std::string(i.param.scene); });
+INSTANTIATE_TEST_SUITE_P(Shipped, ContactScene, testing::ValuesIn(contact_rows()),
+                         [](const auto &i) { return std::string(i.param.scene); });
 
 // What the guard is for: whole flights.
 TEST(GuardShot, TenJitteredRuns_DoNotCross) {
@@ -110,11 +123,14 @@ TEST(RabbitsSlope, TenJitteredRuns_DoNotCross) {
 
 // The pairs of the speed figures, over their landing.
 TEST(TwoCylinders, CoarsePairTenJitteredRuns_DoNotCross) {
-  test::expect_jittered("two_cylinders_coarse", 1, 10, until(0.4), row_of("two_cylinders_coarse").least_contacts, on_top);
+  test::expect_jittered("two_cylinders_coarse", 1, 10, until(0.4),
+                        row_of("two_cylinders_coarse").least_contacts, on_top);
 }
 TEST(TwoCylinders, FinePairFiveJitteredRuns_DoNotCross) {
-  test::expect_jittered("two_cylinders_fine", 1, 5, until(0.3), row_of("two_cylinders_fine").least_contacts, on_top);
+  test::expect_jittered("two_cylinders_fine", 1, 5, until(0.3), row_of("two_cylinders_fine").least_contacts,
+                        on_top);
 }
 TEST(TwoCylinders, FinePairFiveMoreJitteredRuns_DoNotCross) {
-  test::expect_jittered("two_cylinders_fine", 6, 10, until(0.3), row_of("two_cylinders_fine").least_contacts, on_top);
+  test::expect_jittered("two_cylinders_fine", 6, 10, until(0.3), row_of("two_cylinders_fine").least_contacts,
+                        on_top);
 }

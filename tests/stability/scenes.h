@@ -1,4 +1,5 @@
-// The shipped scenes as tests: each runs through the command, has a criterion, and a mutation of it that must fail the criterion.
+// The shipped scenes as tests: each runs through the command, has a criterion, and a mutation of it that must
+// fail the criterion.
 #pragma once
 #include <gtest/gtest.h>
 #include <unistd.h>
@@ -31,7 +32,9 @@ class SceneRun {
   SceneRun(const std::string &scene, std::vector<std::string> arguments) {
     static int counter = 0;
     out_ = scratch("scenes_" + std::to_string(getpid())) + "/" + scene + "_" + std::to_string(counter++);
-    arguments.insert(arguments.begin(), {"run", std::string(DEFORM_SOURCE_DIR) + "/examples/scenes/" + scene + ".json", "--quiet", "--out", out_});
+    arguments.insert(arguments.begin(),
+                     {"run", std::string(DEFORM_SOURCE_DIR) + "/examples/scenes/" + scene + ".json",
+                      "--quiet", "--out", out_});
     const CommandResult result = deform(arguments);
     EXPECT_EQ(result.exit_code, 0) << scene << ": " << result.err;
     summary_ = read_file(out_ + "/summary.json");
@@ -41,7 +44,8 @@ class SceneRun {
     std::filesystem::remove_all(out_);
   }
 
-  // Number behind a key of the summary; NaN where it is null or absent. A key inside an object is found after the object's own key.
+  // Number behind a key of the summary; NaN where it is null or absent. A key inside an object is found after
+  // the object's own key.
   double number(const std::string &key, const std::string &inside = "") const {
     size_t at = inside.empty() ? 0 : summary_.find("\"" + inside + "\": ");
     if (at != std::string::npos) at = summary_.find("\"" + key + "\": ", at);
@@ -76,7 +80,8 @@ class SceneRun {
   // Last place of a probe.
   std::vector<double> probe(const std::string &name) const {
     for (size_t i = probes_.size(); i-- > 1;)
-      if (probes_[i].size() == 8 && probes_[i][1] == name) return {std::stod(probes_[i][2]), std::stod(probes_[i][3]), std::stod(probes_[i][4])};
+      if (probes_[i].size() == 8 && probes_[i][1] == name)
+        return {std::stod(probes_[i][2]), std::stod(probes_[i][3]), std::stod(probes_[i][4])};
     ADD_FAILURE() << "no probe " << name;
     return {0, 0, 0};
   }
@@ -85,7 +90,8 @@ class SceneRun {
   double contact_force(const std::string &side) const {
     double sum = 0;
     for (const auto &c : contacts_)
-      if (c.size() == 10 && c[0] == contacts_.back()[0] && (c[1] == side || c[2] == side)) sum += std::stod(c[5]);
+      if (c.size() == 10 && c[0] == contacts_.back()[0] && (c[1] == side || c[2] == side))
+        sum += std::stod(c[5]);
     return sum;
   }
   // Counts of contacts with a side in the records from a time on.
@@ -93,7 +99,8 @@ class SceneRun {
     std::set<int> counts;
     for (size_t i = 1; i < contacts_.size(); ++i) {
       const auto &c = contacts_[i];
-      if (c.size() == 10 && std::stod(c[0]) > from && (c[1] == side || c[2] == side)) counts.insert(std::stoi(c[3]));
+      if (c.size() == 10 && std::stod(c[0]) > from && (c[1] == side || c[2] == side))
+        counts.insert(std::stoi(c[3]));
     }
     return counts;
   }
@@ -101,13 +108,14 @@ class SceneRun {
   std::vector<std::array<double, 4>> probe_rows(const std::string &name) const {
     std::vector<std::array<double, 4>> rows;
     for (const auto &c : probes_)
-      if (c.size() == 8 && c[1] == name) rows.push_back({std::stod(c[0]), std::stod(c[2]), std::stod(c[3]), std::stod(c[4])});
+      if (c.size() == 8 && c[1] == name)
+        rows.push_back({std::stod(c[0]), std::stod(c[2]), std::stod(c[3]), std::stod(c[4])});
     EXPECT_FALSE(rows.empty()) << "no probe " << name;
     return rows;
   }
 
-  // What holds in every scene: finite, no crossing triangle pair in any recorded state, and at least so many contacts, so that something
-  // was tested.
+  // What holds in every scene: finite, no crossing triangle pair in any recorded state, and at least so many
+  // contacts, so that something was tested.
   void expect_sound(double least_contacts, const std::string &what) const {
     EXPECT_TRUE(finite()) << what;
     EXPECT_GT(number("states_checked"), 1) << what;
@@ -122,7 +130,8 @@ class SceneRun {
 
 // Runs with seeds from..to: sound, criterion met by each, and no two alike.
 template <class Criterion>
-void expect_jittered(const std::string &scene, int from, int to, std::vector<std::string> arguments, double least_contacts, Criterion meets) {
+void expect_jittered(const std::string &scene, int from, int to, std::vector<std::string> arguments,
+                     double least_contacts, Criterion meets) {
   std::set<std::string> hashes;
   for (int seed = from; seed <= to; ++seed) {
     std::vector<std::string> with_seed = arguments;

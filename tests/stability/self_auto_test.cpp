@@ -1,4 +1,5 @@
-// Self contact that is on only while a body may touch itself: the motion is that of self contact which is always on.
+// Self contact that is on only while a body may touch itself: the motion is that of self contact
+// which is always on.
 #include <memory>
 
 #include "hook.h"
@@ -16,7 +17,8 @@ uint64_t step(dfm_world w, int steps, double dt) {
   return dfm_world_hash(w);
 }
 
-std::unique_ptr<Shot> thrown_at_plane(const char *kind, test::Vec size, double speed, uint32_t self, uint32_t threads = 1) {
+std::unique_ptr<Shot> thrown_at_plane(const char *kind, test::Vec size, double speed, uint32_t self,
+                                      uint32_t threads = 1) {
   auto s = std::make_unique<Shot>(true, 1, threads, self);
   test::add_plane(s->world, "wall");
   const double turn = s->jitter(0.02);
@@ -25,7 +27,8 @@ std::unique_ptr<Shot> thrown_at_plane(const char *kind, test::Vec size, double s
 }
 
 void is_as_always_on(const char *kind, test::Vec size, double speed) {
-  const auto automatic = thrown_at_plane(kind, size, speed, DFM_SELF_AUTO), on = thrown_at_plane(kind, size, speed, DFM_SELF_ON);
+  const auto automatic = thrown_at_plane(kind, size, speed, DFM_SELF_AUTO);
+  const auto on = thrown_at_plane(kind, size, speed, DFM_SELF_ON);
   for (int i = 0; i < 10; ++i) {
     ASSERT_EQ(step(automatic->world, 1, 1e-3), step(on->world, 1, 1e-3)) << "step " << i;
     EXPECT_EQ(automatic->count().within, 0u) << "step " << i;
@@ -36,12 +39,14 @@ void is_as_always_on(const char *kind, test::Vec size, double speed) {
 // Two legs whose tips are thrown at each other, and bounce.
 dfm_world legs(dfm_context *c, uint32_t self) {
   dfm_world_def d = dfm_world_def_default();
-  d.gravity[2] = 0, d.self_contact = self;
+  d.gravity[2] = 0;
+  d.self_contact = self;
   dfm_world w = 0;
   test::ok(dfm_world_create(c, &d, &w));
   test::set_friction(w, 0.3);
   test::HookOptions o;
-  o.young = 2e4, o.close = 1;
+  o.young = 2e4;
+  o.close = 1;
   test::make_hook(w, o);
   return w;
 }
@@ -69,7 +74,8 @@ TEST(SelfAuto, LegsThatMeetAndPart_AreOnWhileTheyAreNear) {
 }
 
 TEST(SelfAuto, RestoredInTheMiddle_GoesOnWithTheSameBits) {
-  auto first = thrown_at_plane("ball", {0.05, 0, 0}, 50, DFM_SELF_AUTO), second = thrown_at_plane("ball", {0.05, 0, 0}, 50, DFM_SELF_AUTO, 3);
+  auto first = thrown_at_plane("ball", {0.05, 0, 0}, 50, DFM_SELF_AUTO);
+  auto second = thrown_at_plane("ball", {0.05, 0, 0}, 50, DFM_SELF_AUTO, 3);
   step(first->world, 2, 1e-3);
   const std::string saved = test::snapshot(first->world);
   const uint64_t later = step(first->world, 3, 1e-3);
@@ -81,7 +87,8 @@ TEST(SelfAuto, RestoredInTheMiddle_GoesOnWithTheSameBits) {
 }
 
 TEST(SelfAuto, BodyThatDoesNotFold_IsNeverOnAndMovesAsWithout) {
-  const auto automatic = thrown_at_plane("ball", {0.05, 0, 0}, 1, DFM_SELF_AUTO), off = thrown_at_plane("ball", {0.05, 0, 0}, 1, DFM_SELF_OFF);
+  const auto automatic = thrown_at_plane("ball", {0.05, 0, 0}, 1, DFM_SELF_AUTO);
+  const auto off = thrown_at_plane("ball", {0.05, 0, 0}, 1, DFM_SELF_OFF);
   EXPECT_EQ(step(automatic->world, 40, 1e-3), step(off->world, 40, 1e-3));
   EXPECT_EQ(test::stats(automatic->world).self_max, 0u);
 }
@@ -89,6 +96,11 @@ TEST(SelfAuto, BodyThatDoesNotFold_IsNeverOnAndMovesAsWithout) {
 TEST(SelfAuto, Explain_SaysWhoAskedAndWhenItIsOn) {
   const test::Context c;
   const std::string plan = test::explain(legs(c, DFM_SELF_AUTO));
-  EXPECT_NE(plan.find("\"name\":\"self_contact\",\"asked_by\":\"contact.self auto\""), std::string::npos) << plan;
-  EXPECT_NE(plan.find("1 body may touch themselves (contact.self auto), each only while it folds so far that it may"), std::string::npos) << plan;
+  EXPECT_NE(plan.find("\"name\":\"self_contact\",\"asked_by\":\"contact.self auto\""), std::string::npos)
+      << plan;
+  EXPECT_NE(
+      plan.find(
+          "1 body may touch themselves (contact.self auto), each only while it folds so far that it may"),
+      std::string::npos)
+      << plan;
 }

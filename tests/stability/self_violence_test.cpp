@@ -1,4 +1,5 @@
-// Bodies that are struck so hard that their surface would pass through itself: above the speed of waves in them, which is 32 m/s here.
+// Bodies that are struck so hard that their surface would pass through itself: above the speed of waves in
+// them, which is 32 m/s here.
 #include "cells.h"
 #include "shot.h"
 
@@ -15,8 +16,13 @@ void throw_at_plane(Shot &s, const char *kind, std::array<double, 3> size, uint3
 void ball(Shot &s, double speed) { throw_at_plane(s, "ball", {0.05, 0, 0}, 300, speed); }
 void cube(Shot &s, double speed) { throw_at_plane(s, "beam", {0.1, 0.1, 0.1}, 300, speed); }
 
-struct Struck { size_t crossed = 0; double energy = 0, lost = 0; };   // crossings with itself, summed over the steps; J, most kinetic energy against the first
-Struck strike(const std::function<void(Shot &, double)> &setup, double speed, uint32_t self, unsigned seed, bool guarded = true) {
+// crossings with itself, summed over the steps; J, most kinetic energy against the first
+struct Struck {
+  size_t crossed = 0;
+  double energy = 0, lost = 0;
+};
+Struck strike(const std::function<void(Shot &, double)> &setup, double speed, uint32_t self, unsigned seed,
+              bool guarded = true) {
   Shot s(guarded, seed, 1, self);
   setup(s, speed);
   const double first = test::measure(s.bodies[0]).kinetic;
@@ -31,8 +37,9 @@ Struck strike(const std::function<void(Shot &, double)> &setup, double speed, ui
   }
   const dfm_world_stats now = test::stats(s.world);
   out.lost = now.guard_lost;
-  std::printf("%g m/s, self %u, seed %u: %zu crossings, %g sub-steps, %g solves, %g cuts, %g s lost\n", speed, self, seed, out.crossed, double(now.substeps),
-              double(now.guard_solves), double(now.guard_cuts), now.guard_lost);
+  std::printf("%g m/s, self %u, seed %u: %zu crossings, %g sub-steps, %g solves, %g cuts, %g s lost\n", speed,
+              self, seed, out.crossed, double(now.substeps), double(now.guard_solves), double(now.guard_cuts),
+              now.guard_lost);
   return out;
 }
 
@@ -41,7 +48,8 @@ void stays_whole(const std::function<void(Shot &, double)> &setup, double speed,
   for (unsigned seed = 1; seed <= 3; ++seed) {
     const Struck on = strike(setup, speed, 1, seed);
     EXPECT_EQ(on.crossed, 0u) << "seed " << seed;
-    EXPECT_LE(on.energy, 1 + 1e-12) << "seed " << seed << ": contact of a body with itself gives it no energy";
+    EXPECT_LE(on.energy, 1 + 1e-12) << "seed " << seed
+                                    << ": contact of a body with itself gives it no energy";
     EXPECT_LE(on.lost, lost) << "seed " << seed;
     without += strike(setup, speed, 0, seed).crossed;
   }

@@ -1,4 +1,5 @@
-// A block on a slope that tilts to 26.5 degrees within 1.6 s (gravity turns): tan 26.5 degrees = 0.4986, so 0.5 holds and 0.49 does not.
+// A block on a slope that tilts to 26.5 degrees within 1.6 s (gravity turns): tan 26.5 degrees = 0.4986, so
+// 0.5 holds and 0.49 does not.
 #include "scenes.h"
 
 namespace {
@@ -10,7 +11,8 @@ bool holds(const test::SceneRun &run) {
   const auto rows = run.rows("block");
   double moved = 0;
   for (const test::BodyRow &row : rows)
-    if (row.t > 2) moved = std::max(moved, std::hypot(row.com[0] - rows.back().com[0], row.com[1] - rows.back().com[1]));
+    if (row.t > 2)
+      moved = std::max(moved, std::hypot(row.com[0] - rows.back().com[0], row.com[1] - rows.back().com[1]));
   return moved < 1e-6 && run.creep_um_per_s() < 1;
 }
 

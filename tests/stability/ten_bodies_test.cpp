@@ -3,13 +3,15 @@
 
 namespace {
 
-const char *const kBodies[] = {"ball1", "ball2", "ball3", "ball4", "bar1", "bar2", "bar3", "rod1", "rod2", "rod3"};
+const char *const kBodies[] = {"ball1", "ball2", "ball3", "ball4", "bar1",
+                               "bar2",  "bar3",  "rod1",  "rod2",  "rod3"};
 
 bool inside_the_box(const test::SceneRun &run) {
   bool inside = true;
   for (const char *body : kBodies) {
     const test::BodyRow row = run.last(body);
-    inside = inside && std::fabs(row.com[0]) < 0.32 && std::fabs(row.com[1]) < 0.32 && row.com[2] > 0.03 && row.com[2] < 2.0;
+    inside = inside && std::fabs(row.com[0]) < 0.32 && std::fabs(row.com[1]) < 0.32 && row.com[2] > 0.03 &&
+             row.com[2] < 2.0;
   }
   return inside;
 }
@@ -30,11 +32,17 @@ TEST(TenBodies, DroppedInABox_ComeToRestWithoutCrossing) {
 }
 
 TEST(TenBodies, TwoKindsThatMayPass_Cross) {
-  const test::SceneRun run("ten_bodies", {"--time", "0.8", "--set", R"(/contact/filter=[{"between": ["material=jelly", "material=gel"]}])"});
+  const test::SceneRun run(
+      "ten_bodies",
+      {"--time", "0.8", "--set", R"(/contact/filter=[{"between": ["material=jelly", "material=gel"]}])"});
   EXPECT_FALSE(apart(run)) << "the crossing check must see what contact is told to ignore";
 }
 
 // Over the landing, where bodies hit hardest, checked every 10 ms.
 const std::vector<std::string> kLanding = {"--time", "0.9", "--set", "/output/every=0.01"};
-TEST(TenBodies, FiveJitteredRuns_DoNotCross) { test::expect_jittered("ten_bodies", 1, 5, kLanding, 60, inside_the_box); }
-TEST(TenBodies, FiveMoreJitteredRuns_DoNotCross) { test::expect_jittered("ten_bodies", 6, 10, kLanding, 60, inside_the_box); }
+TEST(TenBodies, FiveJitteredRuns_DoNotCross) {
+  test::expect_jittered("ten_bodies", 1, 5, kLanding, 60, inside_the_box);
+}
+TEST(TenBodies, FiveMoreJitteredRuns_DoNotCross) {
+  test::expect_jittered("ten_bodies", 6, 10, kLanding, 60, inside_the_box);
+}

@@ -1,5 +1,5 @@
-// The main scene: an upper cylinder laid across one that is held at both ends. With friction it comes to rest, draped over the lower one;
-// without friction it slides off and falls to the floor.
+// The main scene: an upper cylinder laid across one that is held at both ends. With friction it comes to
+// rest, draped over the lower one; without friction it slides off and falls to the floor.
 #include "scenes.h"
 
 namespace {
@@ -32,13 +32,19 @@ TEST(TwoCylinders, WithoutFriction_UpperSlidesOffAndFalls) {
 }
 
 // At 1.8 s the frictionless one has long left.
-TEST(TwoCylinders, FiveJitteredRuns_AllStay) { test::expect_jittered("two_cylinders", 1, 5, {"--time", "1.8", "--set", "/output/every=0.01"}, 12, stays); }
-TEST(TwoCylinders, FiveMoreJitteredRuns_AllStay) { test::expect_jittered("two_cylinders", 6, 10, {"--time", "1.8", "--set", "/output/every=0.01"}, 12, stays); }
+TEST(TwoCylinders, FiveJitteredRuns_AllStay) {
+  test::expect_jittered("two_cylinders", 1, 5, {"--time", "1.8", "--set", "/output/every=0.01"}, 12, stays);
+}
+TEST(TwoCylinders, FiveMoreJitteredRuns_AllStay) {
+  test::expect_jittered("two_cylinders", 6, 10, {"--time", "1.8", "--set", "/output/every=0.01"}, 12, stays);
+}
 
 // The pair of the speed figures, on meshes of fair to poor cells.
 TEST(TwoCylinders, CoarsePair_StaysWithFrictionAndFallsWithout) {
-  const test::SceneRun with("two_cylinders_coarse", {}), without("two_cylinders_coarse", {"--set", test::kFrictionless});
-  with.expect_sound(20, "with friction"), without.expect_sound(20, "without friction");
+  const test::SceneRun with("two_cylinders_coarse", {}),
+      without("two_cylinders_coarse", {"--set", test::kFrictionless});
+  with.expect_sound(20, "with friction");
+  without.expect_sound(20, "without friction");
   EXPECT_TRUE(stays(with));
   EXPECT_FALSE(stays(without));
   EXPECT_LT(without.last("upper").com[2], 0.3);

@@ -1,14 +1,17 @@
-// Two clamped bars of a stiff and a soft half, one with the stiff half at the root, one with the soft; a third has the first's moduli by cell.
+// Two clamped bars of a stiff and a soft half, one with the stiff half at the root, one with the soft; a
+// third has the first's moduli by cell.
 #include "scenes.h"
 
 namespace {
 
 double sag(const test::SceneRun &run, const std::string &bar) { return 0.55 - run.probe(bar + "_tip")[2]; }
 
-// Sag of the tip of a clamped bar of length L and height h under its own weight q, moduli E1 in the root half and E2 in the tip half
-// (Timoshenko): the integral of q s^3 / 2 E I + q s / (5/6 G A) over s = distance to the tip. In units of q L^4 / 8 I:
+// Sag of the tip of a clamped bar of length L and height h under its own weight q, moduli E1 in the root half
+// and E2 in the tip half (Timoshenko): the integral of q s^3 / 2 E I + q s / (5/6 G A) over s = distance to
+// the tip. In units of q L^4 / 8 I:
 double beam(double e1, double e2, double poisson, double slender) {
-  const double shear = 8.0 / 12 / (5.0 / 6) * (1 + poisson) * slender * slender;  // (q L^2 / (2 kappa G A)) / (q L^4 / (8 E I)), G = E / (2 (1 + nu))
+  // (q L^2 / (2 kappa G A)) / (q L^4 / (8 E I)), G = E / (2 (1 + nu))
+  const double shear = 8.0 / 12 / (5.0 / 6) * (1 + poisson) * slender * slender;
   return (15.0 / 16 + 3.0 / 4 * shear) / e1 + (1.0 / 16 + 1.0 / 4 * shear) / e2;
 }
 

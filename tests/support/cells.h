@@ -7,8 +7,8 @@
 namespace test {
 
 struct Cells {
-  std::vector<double> points;    // [n,3]
-  std::vector<uint32_t> tets;    // [m,4]
+  std::vector<double> points;  // [n,3]
+  std::vector<uint32_t> tets;  // [m,4]
   uint32_t npoint() const { return uint32_t(points.size() / 3); }
   uint32_t ntet() const { return uint32_t(tets.size() / 4); }
   const double *point(uint32_t i) const { return &points[3 * size_t(i)]; }
@@ -18,8 +18,10 @@ struct Cells {
     double e[3][3];
     for (int a = 0; a < 3; ++a)
       for (int k = 0; k < 3; ++k) e[a][k] = point(q[a + 1])[k] - point(q[0])[k];
-    return (e[0][0] * (e[1][1] * e[2][2] - e[1][2] * e[2][1]) - e[0][1] * (e[1][0] * e[2][2] - e[1][2] * e[2][0]) +
-            e[0][2] * (e[1][0] * e[2][1] - e[1][1] * e[2][0])) / 6;
+    return (e[0][0] * (e[1][1] * e[2][2] - e[1][2] * e[2][1]) -
+            e[0][1] * (e[1][0] * e[2][2] - e[1][2] * e[2][0]) +
+            e[0][2] * (e[1][0] * e[2][1] - e[1][1] * e[2][0])) /
+           6;
   }
   // A quarter of every cell around a point, by an amount per volume.
   std::vector<double> lumped(const std::function<double(uint32_t cell)> &density) const {
@@ -47,10 +49,15 @@ struct CellMaterials {
   std::function<uint32_t(uint32_t cell)> kind;
 };
 
-inline dfm_body make_body(dfm_world w, const Cells &cells, const BodyOptions &o, const CellMaterials *by_cell = nullptr, const uint8_t *fixed = nullptr) {
+inline dfm_body make_body(dfm_world w, const Cells &cells, const BodyOptions &o,
+                          const CellMaterials *by_cell = nullptr, const uint8_t *fixed = nullptr) {
   const auto material = [&](double density, double young) {
     dfm_material_def md = dfm_material_def_default();
-    md.density = density, md.young = young, md.poisson = o.poisson, md.damping_mass = o.damping_mass, md.damping_stiffness = o.damping_stiffness;
+    md.density = density;
+    md.young = young;
+    md.poisson = o.poisson;
+    md.damping_mass = o.damping_mass;
+    md.damping_stiffness = o.damping_stiffness;
     dfm_material m = 0;
     ok(dfm_material_create(w, &md, &m));
     return m;
@@ -63,14 +70,22 @@ inline dfm_body make_body(dfm_world w, const Cells &cells, const BodyOptions &o,
   dfm_body_def d = dfm_body_def_default();
   d.name = o.name.empty() ? nullptr : o.name.c_str();
   d.model = o.model.empty() ? nullptr : o.model.c_str();
-  d.npoint = cells.npoint(), d.ntet = cells.ntet(), d.points = cells.points.data(), d.tets = cells.tets.data();
+  d.npoint = cells.npoint();
+  d.ntet = cells.ntet();
+  d.points = cells.points.data();
+  d.tets = cells.tets.data();
   d.material = by_cell ? handles[0] : material(o.density, o.young);
   if (by_cell) d.cell_materials = of_cell.data();
   const dfm_param_value volume{"volume", &o.volume, 1};
   if (o.volume >= 0) d.model_params = {sizeof(dfm_params), 1, &volume};
-  for (int k = 0; k < 3; ++k) d.pose.position[k] = o.position[size_t(k)], d.velocity[k] = o.velocity[size_t(k)], d.spin[k] = o.spin[size_t(k)];
+  for (int k = 0; k < 3; ++k) {
+    d.pose.position[k] = o.position[size_t(k)];
+    d.velocity[k] = o.velocity[size_t(k)];
+    d.spin[k] = o.spin[size_t(k)];
+  }
   for (int k = 0; k < 4; ++k) d.pose.rotation[k] = o.rotation[size_t(k)];
-  d.surface = o.surface, d.fixed = fixed;
+  d.surface = o.surface;
+  d.fixed = fixed;
   dfm_body body = 0;
   ok(dfm_body_create(w, &d, &body));
   return body;

@@ -11,7 +11,8 @@ struct Skin {
   std::vector<uint32_t> triangles;
   uint32_t npoint() const { return uint32_t(points.size() / 3); }
   dfm_surface_def def(int32_t coupling = DFM_COUPLING_BARYCENTRIC, double support = 0) const {
-    return {sizeof(dfm_surface_def), coupling, npoint(), uint32_t(triangles.size() / 3), points.data(), triangles.data(), support};
+    return {sizeof(dfm_surface_def), coupling,         npoint(), uint32_t(triangles.size() / 3),
+            points.data(),           triangles.data(), support};
   }
 };
 
@@ -27,7 +28,11 @@ struct Weld {
     if (fresh) skin.points.insert(skin.points.end(), p.begin(), p.end());
     skin.triangles.push_back(at->second);
   }
-  void triangle(Point a, Point b, Point c) { corner(a), corner(b), corner(c); }
+  void triangle(Point a, Point b, Point c) {
+    corner(a);
+    corner(b);
+    corner(c);
+  }
 };
 
 }  // namespace detail
@@ -40,14 +45,21 @@ inline Skin box_skin(std::array<double, 3> size, int n) {
       const int u = (axis + 1) % 3, v = (axis + 2) % 3;
       const auto at = [&](int i, int j) {
         detail::Point p{};
-        p[axis] = side * size[axis], p[u] = size[u] * i / n, p[v] = size[v] * j / n;
+        p[axis] = side * size[axis];
+        p[u] = size[u] * i / n;
+        p[v] = size[v] * j / n;
         return p;
       };
       for (int i = 0; i < n; ++i)
         for (int j = 0; j < n; ++j) {
           const auto a = at(i, j), b = at(i + 1, j), c = at(i + 1, j + 1), d = at(i, j + 1);
-          if (side) w.triangle(a, b, c), w.triangle(a, c, d);
-          else w.triangle(a, c, b), w.triangle(a, d, c);
+          if (side) {
+            w.triangle(a, b, c);
+            w.triangle(a, c, d);
+          } else {
+            w.triangle(a, c, b);
+            w.triangle(a, d, c);
+          }
         }
     }
   return w.skin;

@@ -1,5 +1,5 @@
-// Counts what a test program takes from the heap: its own operator new stands in for the library's, so what the library takes beside the
-// context's hooks is counted too. Include it in one source of the program.
+// Counts what a test program takes from the heap: its own operator new stands in for the library's, so what
+// the library takes beside the context's hooks is counted too. Include it in one source of the program.
 #pragma once
 #include <atomic>
 #include <cstdint>
@@ -8,11 +8,14 @@
 
 namespace test {
 
-inline std::atomic<uint64_t> heap_calls{0}, heap_bytes{0};   // since the program began
+inline std::atomic<uint64_t> heap_calls{0}, heap_bytes{0};  // since the program began
 
 inline void *counted_alloc(size_t bytes, size_t align) {
-  ++heap_calls, heap_bytes += bytes;
-  if (void *p = align > sizeof(void *) ? std::aligned_alloc(align, (bytes + align - 1) / align * align) : std::malloc(bytes ? bytes : 1)) return p;
+  ++heap_calls;
+  heap_bytes += bytes;
+  if (void *p = align > sizeof(void *) ? std::aligned_alloc(align, (bytes + align - 1) / align * align)
+                                       : std::malloc(bytes ? bytes : 1))
+    return p;
   throw std::bad_alloc();
 }
 
@@ -24,7 +27,9 @@ inline void *counted_alloc(size_t bytes, size_t align) {
 void *operator new(size_t bytes) { return test::counted_alloc(bytes, 0); }
 void *operator new[](size_t bytes) { return test::counted_alloc(bytes, 0); }
 void *operator new(size_t bytes, std::align_val_t align) { return test::counted_alloc(bytes, size_t(align)); }
-void *operator new[](size_t bytes, std::align_val_t align) { return test::counted_alloc(bytes, size_t(align)); }
+void *operator new[](size_t bytes, std::align_val_t align) {
+  return test::counted_alloc(bytes, size_t(align));
+}
 void operator delete(void *p) noexcept { test::counted_free(p); }
 void operator delete[](void *p) noexcept { test::counted_free(p); }
 void operator delete(void *p, size_t) noexcept { test::counted_free(p); }

@@ -14,8 +14,10 @@ struct Triangles {
   std::vector<uint32_t> tris;
 };
 
-// z = height(x, y) over [-size, size]^2, n by n squares whose inner corners are moved about and whose diagonals alternate without a pattern.
-inline Triangles height_field(double size, uint32_t n, const std::function<double(double, double)> &height, double disorder = 0.3) {
+// z = height(x, y) over [-size, size]^2, n by n squares whose inner corners are moved about and whose
+// diagonals alternate without a pattern.
+inline Triangles height_field(double size, uint32_t n, const std::function<double(double, double)> &height,
+                              double disorder = 0.3) {
   Triangles m;
   uint64_t seed = 12345;
   const auto next = [&] {
@@ -25,8 +27,9 @@ inline Triangles height_field(double size, uint32_t n, const std::function<doubl
   for (uint32_t j = 0; j <= n; ++j)
     for (uint32_t i = 0; i <= n; ++i) {
       const bool inner = i > 0 && j > 0 && i < n && j < n;
-      const double cell = 2 * size / n, x = -size + cell * (i + (inner ? disorder * (2 * next() - 1) : 0)),
-                   y = -size + cell * (j + (inner ? disorder * (2 * next() - 1) : 0));
+      const double cell = 2 * size / n;
+      const double x = -size + cell * (i + (inner ? disorder * (2 * next() - 1) : 0));
+      const double y = -size + cell * (j + (inner ? disorder * (2 * next() - 1) : 0));
       m.points.insert(m.points.end(), {x, y, height(x, y)});
     }
   for (uint32_t j = 0; j < n; ++j)
@@ -43,7 +46,10 @@ inline Triangles box_surface(std::array<double, 3> half, uint32_t n) {
   Triangles m;
   const auto point = [&](std::array<double, 3> p) {
     for (uint32_t i = 0; i < m.points.size() / 3; ++i)
-      if (std::fabs(m.points[3 * i] - p[0]) + std::fabs(m.points[3 * i + 1] - p[1]) + std::fabs(m.points[3 * i + 2] - p[2]) < 1e-9 * half[0]) return i;
+      if (std::fabs(m.points[3 * i] - p[0]) + std::fabs(m.points[3 * i + 1] - p[1]) +
+              std::fabs(m.points[3 * i + 2] - p[2]) <
+          1e-9 * half[0])
+        return i;
     m.points.insert(m.points.end(), p.begin(), p.end());
     return uint32_t(m.points.size() / 3 - 1);
   };
@@ -71,15 +77,21 @@ inline Triangles inside_out(Triangles m) {
   return m;
 }
 
-inline dfm_obstacle_def mesh_def(const char *name, const Triangles &m, uint32_t shape = DFM_SHAPE_MESH, uint32_t cells = 0) {
+inline dfm_obstacle_def mesh_def(const char *name, const Triangles &m, uint32_t shape = DFM_SHAPE_MESH,
+                                 uint32_t cells = 0) {
   dfm_obstacle_def d = dfm_obstacle_def_default();
-  d.name = name, d.shape = shape;
-  d.npoint = uint32_t(m.points.size() / 3), d.ntriangle = uint32_t(m.tris.size() / 3);
-  d.points = m.points.data(), d.triangles = m.tris.data(), d.cells = cells;
+  d.name = name;
+  d.shape = shape;
+  d.npoint = uint32_t(m.points.size() / 3);
+  d.ntriangle = uint32_t(m.tris.size() / 3);
+  d.points = m.points.data();
+  d.triangles = m.tris.data();
+  d.cells = cells;
   return d;
 }
 
-inline dfm_obstacle add_mesh(dfm_world w, const char *name, const Triangles &m, uint32_t shape = DFM_SHAPE_MESH, uint32_t cells = 0) {
+inline dfm_obstacle add_mesh(dfm_world w, const char *name, const Triangles &m,
+                             uint32_t shape = DFM_SHAPE_MESH, uint32_t cells = 0) {
   const dfm_obstacle_def d = mesh_def(name, m, shape, cells);
   dfm_obstacle o = 0;
   ok(dfm_obstacle_create(w, &d, &o));

@@ -12,19 +12,26 @@ struct Ode {
   dfm_world soft = 0;
   dfm_ode adapter = 0;
 
-  explicit Ode(Vec gravity = {0, 0, -9.81}, uint32_t flags = 0, dNearCallback *near_callback = nullptr, void *near_data = nullptr,
-               dJointGroupID group = nullptr) {
+  explicit Ode(Vec gravity = {0, 0, -9.81}, uint32_t flags = 0, dNearCallback *near_callback = nullptr,
+               void *near_data = nullptr, dJointGroupID group = nullptr) {
     dInitODE2(0);
-    world = dWorldCreate(), space = dHashSpaceCreate(nullptr);
+    world = dWorldCreate();
+    space = dHashSpaceCreate(nullptr);
     dWorldSetGravity(world, gravity[0], gravity[1], gravity[2]);
     soft = make_world(context, {gravity[0], gravity[1], gravity[2]});
     dfm_ode_def d = dfm_ode_def_default();
-    d.world = world, d.space = space, d.flags = flags, d.near_callback = near_callback, d.near_data = near_data, d.contacts = group;
+    d.world = world;
+    d.space = space;
+    d.flags = flags;
+    d.near_callback = near_callback;
+    d.near_data = near_data;
+    d.contacts = group;
     ok(dfm_ode_attach(soft, &d, &adapter));
   }
   ~Ode() {
     ok(dfm_ode_detach(adapter));
-    dSpaceDestroy(space), dWorldDestroy(world);
+    dSpaceDestroy(space);
+    dWorldDestroy(world);
   }
   Ode(const Ode &) = delete;
   Ode &operator=(const Ode &) = delete;
@@ -46,7 +53,8 @@ struct Ode {
   }
   dBodyID box(Vec half, double mass, Vec position, Vec velocity = {}) {
     Vec i;
-    for (size_t k = 0; k < 3; ++k) i[k] = mass / 3 * (half[(k + 1) % 3] * half[(k + 1) % 3] + half[(k + 2) % 3] * half[(k + 2) % 3]);
+    for (size_t k = 0; k < 3; ++k)
+      i[k] = mass / 3 * (half[(k + 1) % 3] * half[(k + 1) % 3] + half[(k + 2) % 3] * half[(k + 2) % 3]);
     const dBodyID b = body(mass, i, position, velocity);
     dGeomSetBody(dCreateBox(space, 2 * half[0], 2 * half[1], 2 * half[2]), b);
     return b;

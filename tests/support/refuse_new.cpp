@@ -1,5 +1,5 @@
-// Preloaded into a program, refuses its n-th operator new (REFUSE_NEW, counted from 0; none: no refusal) and writes how many there were to the file
-// that REFUSE_NEW_COUNT names. Only the tests build it.
+// Preloaded into a program, refuses its n-th operator new (REFUSE_NEW, counted from 0; none: no refusal) and
+// writes how many there were to the file that REFUSE_NEW_COUNT names. Only the tests build it.
 #include <atomic>
 #include <cstdio>
 #include <cstdlib>
@@ -19,14 +19,19 @@ long refused() {
 
 void *take(size_t bytes, size_t align) {
   if (calls++ != refused())
-    if (void *const p = align ? std::aligned_alloc(align, (bytes + align - 1) / align * align) : std::malloc(bytes ? bytes : 1)) return p;
+    if (void *const p = align ? std::aligned_alloc(align, (bytes + align - 1) / align * align)
+                              : std::malloc(bytes ? bytes : 1))
+      return p;
   throw std::bad_alloc();
 }
 
 struct Count {
   ~Count() {
     const char *const path = std::getenv("REFUSE_NEW_COUNT");
-    if (FILE *const file = path ? std::fopen(path, "w") : nullptr) std::fprintf(file, "%ld\n", calls.load()), std::fclose(file);
+    if (FILE *const file = path ? std::fopen(path, "w") : nullptr) {
+      std::fprintf(file, "%ld\n", calls.load());
+      std::fclose(file);
+    }
   }
 } count;
 

@@ -1,5 +1,6 @@
-// Refuses one allocation of a chosen number, whether it is asked of the context's hooks or of operator new, and counts them all. The program's own
-// operator new stands in for the library's. Include it in one source of the program.
+// Refuses one allocation of a chosen number, whether it is asked of the context's hooks or of operator new,
+// and counts them all. The program's own operator new stands in for the library's. Include it in one source
+// of the program.
 #pragma once
 #include <atomic>
 #include <cstdint>
@@ -14,7 +15,10 @@ struct Refusal {
   static inline std::atomic<int64_t> calls{0}, refuse{-1}, live{0};
   // True where this allocation is the one. Only between arm() and disarm().
   static bool now() { return refuse >= 0 && calls++ == refuse; }
-  static void arm(int64_t n) { calls = 0, refuse = n; }
+  static void arm(int64_t n) {
+    calls = 0;
+    refuse = n;
+  }
   // Whether it came to that.
   static bool disarm() {
     const bool came = calls > refuse;
@@ -25,7 +29,8 @@ struct Refusal {
 
 inline void *taken(size_t bytes, size_t align) {
   if (Refusal::now()) return nullptr;
-  void *const p = align > sizeof(void *) ? std::aligned_alloc(align, (bytes + align - 1) / align * align) : std::malloc(bytes ? bytes : 1);
+  void *const p = align > sizeof(void *) ? std::aligned_alloc(align, (bytes + align - 1) / align * align)
+                                         : std::malloc(bytes ? bytes : 1);
   Refusal::live += p != nullptr;
   return p;
 }
@@ -53,8 +58,12 @@ inline dfm_context_def refusing_context() {
 
 void *operator new(size_t bytes) { return test::taken_or_thrown(bytes, 0); }
 void *operator new[](size_t bytes) { return test::taken_or_thrown(bytes, 0); }
-void *operator new(size_t bytes, std::align_val_t align) { return test::taken_or_thrown(bytes, size_t(align)); }
-void *operator new[](size_t bytes, std::align_val_t align) { return test::taken_or_thrown(bytes, size_t(align)); }
+void *operator new(size_t bytes, std::align_val_t align) {
+  return test::taken_or_thrown(bytes, size_t(align));
+}
+void *operator new[](size_t bytes, std::align_val_t align) {
+  return test::taken_or_thrown(bytes, size_t(align));
+}
 void operator delete(void *p) noexcept { test::given_back(p); }
 void operator delete[](void *p) noexcept { test::given_back(p); }
 void operator delete(void *p, size_t) noexcept { test::given_back(p); }

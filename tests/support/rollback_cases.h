@@ -1,4 +1,5 @@
-// The same scenes under both contact methods: what the roll-back does to sliding, bouncing, momentum and force. Tests and rollback_bench share them.
+// The same scenes under both contact methods: what the roll-back does to sliding, bouncing, momentum and
+// force. Tests and rollback_bench share them.
 #pragma once
 #include "stack.h"
 
@@ -19,7 +20,8 @@ inline dfm_world make_world(dfm_context *c, int32_t method, Vector gravity) {
 struct World {
   Context context;
   dfm_world world;
-  World(int32_t method, Vector gravity, double mu, uint32_t threads = 1) : context(threads), world(make_world(context, method, gravity)) {
+  World(int32_t method, Vector gravity, double mu, uint32_t threads = 1)
+      : context(threads), world(make_world(context, method, gravity)) {
     if (mu > 0) set_friction(world, mu);
     else set_friction(world, 0, "none");
   }
@@ -28,14 +30,24 @@ struct World {
   World &operator=(const World &) = delete;
 
   // A cube of 0.1 m and 1 kg.
-  dfm_body block(const char *name, Vector position, Vector velocity = {}, uint32_t cells = 96, double young = 2e5) {
+  dfm_body block(const char *name, Vector position, Vector velocity = {}, uint32_t cells = 96,
+                 double young = 2e5) {
     BodyOptions o;
-    o.name = name, o.young = young, o.damping_stiffness = 2e-3, o.position = position, o.velocity = velocity;
+    o.name = name;
+    o.young = young;
+    o.damping_stiffness = 2e-3;
+    o.position = position;
+    o.velocity = velocity;
     return make_body(context, world, "beam", {0.1, 0.1, 0.1}, cells, o);
   }
   dfm_body ball(const char *name, Vector position, Vector velocity) {
     BodyOptions o;
-    o.name = name, o.young = 5e4, o.damping_stiffness = 1e-4, o.volume = 1, o.position = position, o.velocity = velocity;
+    o.name = name;
+    o.young = 5e4;
+    o.damping_stiffness = 1e-4;
+    o.volume = 1;
+    o.position = position;
+    o.velocity = velocity;
     return make_body(context, world, "ball", {0.1, 0, 0}, 600, o);
   }
 };
@@ -46,7 +58,7 @@ inline Vector momentum(const std::vector<dfm_body> &bodies) {
     for (size_t k = 0; k < 3; ++k) p[k] += measure(b).momentum[k];
   return p;
 }
-inline double energy(const std::vector<dfm_body> &bodies) {   // without that of weight
+inline double energy(const std::vector<dfm_body> &bodies) {  // without that of weight
   double e = 0;
   for (dfm_body b : bodies) e += measure(b).kinetic + measure(b).elastic;
   return e;
@@ -57,8 +69,8 @@ inline double normal_sum(dfm_world w) {
   return sum;
 }
 
-// A block on a plane tilted by theta: mean acceleration along it and way over the last 0.3 s of 0.4 s; normal force as reported and as the momentum
-// says, over that of the weight.
+// A block on a plane tilted by theta: mean acceleration along it and way over the last 0.3 s of 0.4 s; normal
+// force as reported and as the momentum says, over that of the weight.
 struct Slide { double acceleration, way, reported, felt; };
 inline Slide incline(int32_t method, double theta_deg, double mu, double h) {
   World w(method, {kG * std::sin(theta_deg * kDegree), 0, -kG * std::cos(theta_deg * kDegree)}, mu);
@@ -68,7 +80,10 @@ inline Slide incline(int32_t method, double theta_deg, double mu, double h) {
   const dfm_body_measure from = measure(b);
   const long n = std::lround(0.3 / h);
   double reported = 0;
-  for (long i = 0; i < n; ++i) run(w.world, h, h), reported += normal_sum(w.world) / double(n);
+  for (long i = 0; i < n; ++i) {
+    run(w.world, h, h);
+    reported += normal_sum(w.world) / double(n);
+  }
   const dfm_body_measure to = measure(b);
   const double weight = to.mass * kG * std::cos(theta_deg * kDegree);
   return {(to.velocity[0] - from.velocity[0]) / 0.3, to.com[0] - from.com[0], reported / weight,
@@ -83,13 +98,19 @@ inline Throw thrown(int32_t method, double speed, double mu, double h) {
   const dfm_body b = w.block("block", {0, 0, 2e-5}, {speed, 0, 0});
   const double from = measure(b).com[0];
   double t = 0;
-  while (t < 2 && std::fabs(measure(b).velocity[0]) > 0.01 * speed) run(w.world, h, h), t += h;
+  while (t < 2 && std::fabs(measure(b).velocity[0]) > 0.01 * speed) {
+    run(w.world, h, h);
+    t += h;
+  }
   return {measure(b).com[0] - from, t};
 }
 
-// A ball of 4 kg, 3 cm above the floor, thrown at it; when it has left again: its velocity, its energy over that before, and the normal force that was
-// reported over that which it felt, both summed over the impact.
-struct Bounce { Vector velocity; double energy, time, reported; };
+// A ball of 4 kg, 3 cm above the floor, thrown at it; when it has left again: its velocity, its energy over
+// that before, and the normal force that was reported over that which it felt, both summed over the impact.
+struct Bounce {
+  Vector velocity;
+  double energy, time, reported;
+};
 inline Bounce bounce(int32_t method, Vector velocity, double mu, double h) {
   World w(method, {0, 0, 0}, mu);
   add_plane(w.world, "floor");
@@ -105,20 +126,26 @@ inline Bounce bounce(int32_t method, Vector velocity, double mu, double h) {
     if (met && !now && measure(b).com[2] > 0.1) break;
   }
   const dfm_body_measure m = measure(b);
-  return {{m.velocity[0], m.velocity[1], m.velocity[2]}, energy({b}) / before, t, reported / m.contact_impulse[2]};
+  return {{m.velocity[0], m.velocity[1], m.velocity[2]},
+          energy({b}) / before,
+          t,
+          reported / m.contact_impulse[2]};
 }
 
-// Two blocks, one at rest, the other flying at it, face to face: what is left of momentum and energy once they part (or after 0.3 s).
+// Two blocks, one at rest, the other flying at it, face to face: what is left of momentum and energy once
+// they part (or after 0.3 s).
 struct Collision { double momentum, energy, first, second; };
 inline Collision collision(int32_t method, double speed, double h) {
   World w(method, {0, 0, 0}, 0.3);
-  const std::vector<dfm_body> b = {w.block("flying", {-0.11, 0.004, 0.003}, {speed, 0, 0}), w.block("resting", {0, 0, 0})};
+  const std::vector<dfm_body> b = {w.block("flying", {-0.11, 0.004, 0.003}, {speed, 0, 0}),
+                                   w.block("resting", {0, 0, 0})};
   const double p = momentum(b)[0], e = energy(b);
   run(w.world, 0.3, h);
   return {momentum(b)[0] / p, energy(b) / e, measure(b[0]).velocity[0], measure(b[1]).velocity[0]};
 }
 
-// A block on a block on a floor, at rest: what the floor carries and what the lower block carries, over the weight above; as reported and as felt.
+// A block on a block on a floor, at rest: what the floor carries and what the lower block carries, over the
+// weight above; as reported and as felt.
 struct Stacked { double floor_reported, floor_felt, middle_reported, middle_felt; };
 inline Stacked stacked(int32_t method, double h) {
   World w(method, {0, 0, -kG}, 0.5);
@@ -130,10 +157,12 @@ inline Stacked stacked(int32_t method, double h) {
   Stacked s{};
   for (long i = 0; i < n; ++i) {
     run(w.world, h, h);
-    for (const dfm_pair_report &p : pairs(w.world)) (p.b == floor ? s.floor_reported : s.middle_reported) += p.normal / double(n);
+    for (const dfm_pair_report &p : pairs(w.world))
+      (p.b == floor ? s.floor_reported : s.middle_reported) += p.normal / double(n);
   }
   const double above = u.mass * kG, all = above + l.mass * kG;
-  const double up = (measure(upper).contact_impulse[2] - u.contact_impulse[2]) / 0.2, down = (measure(lower).contact_impulse[2] - l.contact_impulse[2]) / 0.2;
+  const double up = (measure(upper).contact_impulse[2] - u.contact_impulse[2]) / 0.2;
+  const double down = (measure(lower).contact_impulse[2] - l.contact_impulse[2]) / 0.2;
   return {s.floor_reported / all, (up + down) / all, s.middle_reported / above, up / above};
 }
 

@@ -17,10 +17,14 @@ inline Stack make_stack(dfm_context *c, double drop = 1e-4, double mu = 0.5) {
   s.floor = add_plane(s.world, "floor");
   set_friction(s.world, mu);
   BodyOptions o;
-  o.young = 2e5, o.damping_stiffness = 2e-3, o.volume = 1;
-  o.name = "lower", o.position = {0, 0, 1e-4};
+  o.young = 2e5;
+  o.damping_stiffness = 2e-3;
+  o.volume = 1;
+  o.name = "lower";
+  o.position = {0, 0, 1e-4};
   s.lower = make_body(c, s.world, "beam", {0.1, 0.1, 0.1}, 60, o);
-  o.name = "upper", o.position = {0.013, 0.007, 0.1 + 2e-4 + drop};
+  o.name = "upper";
+  o.position = {0.013, 0.007, 0.1 + 2e-4 + drop};
   s.upper = make_body(c, s.world, "beam", {0.1, 0.1, 0.1}, 60, o);
   return s;
 }

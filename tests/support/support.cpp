@@ -18,10 +18,12 @@ namespace {
 // Where the shared data are there, nothing has a reason to be left out.
 class SkipsFail : public testing::EmptyTestEventListener {
   void OnTestEnd(const testing::TestInfo &info) override {
-    if (info.result()->Skipped() && !shared_dir().empty()) ADD_FAILURE() << "skipped, although the shared data are present";
+    if (info.result()->Skipped() && !shared_dir().empty())
+      ADD_FAILURE() << "skipped, although the shared data are present";
   }
 };
-[[maybe_unused]] const bool listening = (testing::UnitTest::GetInstance()->listeners().Append(new SkipsFail), true);
+[[maybe_unused]] const bool listening =
+    (testing::UnitTest::GetInstance()->listeners().Append(new SkipsFail), true);
 
 }  // namespace
 
@@ -31,9 +33,12 @@ pid_t start(const std::vector<std::string> &argv, const std::string &out, const 
   std::vector<char *> args;
   for (const auto &a : argv) args.push_back(const_cast<char *>(a.c_str()));
   args.push_back(nullptr);
-  const int fo = open(out.c_str(), O_CREAT | O_TRUNC | O_WRONLY, 0644), fe = open(err.c_str(), O_CREAT | O_TRUNC | O_WRONLY, 0644);
+  const int fo = open(out.c_str(), O_CREAT | O_TRUNC | O_WRONLY, 0644);
+  const int fe = open(err.c_str(), O_CREAT | O_TRUNC | O_WRONLY, 0644);
   const int in = open("/dev/null", O_RDONLY);
-  dup2(in, 0), dup2(fo, 1), dup2(fe, 2);
+  dup2(in, 0);
+  dup2(fo, 1);
+  dup2(fe, 2);
   execvp(args[0], args.data());
   _exit(127);
 }
@@ -47,8 +52,10 @@ CommandResult run(const std::vector<std::string> &argv) {
   waitpid(child, &status, 0);
   CommandResult result;
   result.exit_code = WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status);
-  result.out = read_file(out), result.err = read_file(err);
-  unlink(out.c_str()), unlink(err.c_str());
+  result.out = read_file(out);
+  result.err = read_file(err);
+  unlink(out.c_str());
+  unlink(err.c_str());
   return result;
 }
 

@@ -7,11 +7,17 @@
 
 namespace test {
 
-// Starts a program (no shell) that has nothing to read; what it writes goes into the two files. Its end is for the caller to wait for.
-pid_t start(const std::vector<std::string> &argv, const std::string &out = "/dev/null", const std::string &err = "/dev/null");
+// Starts a program (no shell) that has nothing to read; what it writes goes into the two files. Its end is
+// for the caller to wait for.
+pid_t start(const std::vector<std::string> &argv, const std::string &out = "/dev/null",
+            const std::string &err = "/dev/null");
 
-struct CommandResult { int exit_code; std::string out, err; };
-// Runs a program (no shell) with its own HOME and waits for it; exit_code is 128+signal where a signal ended it.
+struct CommandResult {
+  int exit_code;
+  std::string out, err;
+};
+// Runs a program (no shell) with its own HOME and waits for it; exit_code is 128+signal where a
+// signal ended it.
 CommandResult run(const std::vector<std::string> &argv);
 // The `deform` command of this build.
 CommandResult deform(std::vector<std::string> args);

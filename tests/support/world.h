@@ -17,7 +17,8 @@ struct Context {
   dfm_context *c = nullptr;
   explicit Context(uint32_t threads = 1) {
     dfm_context_def def = dfm_context_def_default();
-    def.threads = threads, def.plugin_dir = DEFORM_PLUGIN_DIR;
+    def.threads = threads;
+    def.plugin_dir = DEFORM_PLUGIN_DIR;
     def.log = [](void *, int32_t, const char *) {};
     EXPECT_EQ(dfm_context_create(&def, &c), DFM_OK) << dfm_last_error();
   }
@@ -31,7 +32,8 @@ inline void ok(dfm_status s) { EXPECT_EQ(s, DFM_OK) << dfm_last_error(); }
 // The sentence of the last error holds all of the parts.
 inline void says(std::initializer_list<const char *> parts) {
   const std::string sentence = dfm_last_error();
-  for (const char *part : parts) EXPECT_NE(sentence.find(part), std::string::npos) << "'" << part << "' is missing in: " << sentence;
+  for (const char *part : parts)
+    EXPECT_NE(sentence.find(part), std::string::npos) << "'" << part << "' is missing in: " << sentence;
 }
 
 // Four points, one cell: the smallest body.
@@ -39,7 +41,13 @@ struct Tet {
   double points[12] = {0, 0, 0, 0.1, 0, 0, 0, 0.1, 0, 0, 0, 0.1};
   uint32_t cells[4] = {0, 1, 2, 3};
   dfm_body_def def = dfm_body_def_default();
-  explicit Tet(const char *name = nullptr) { def.name = name, def.npoint = 4, def.ntet = 1, def.points = points, def.tets = cells; }
+  explicit Tet(const char *name = nullptr) {
+    def.name = name;
+    def.npoint = 4;
+    def.ntet = 1;
+    def.points = points;
+    def.tets = cells;
+  }
 };
 
 struct BodyOptions {
@@ -55,30 +63,40 @@ inline void lend(dfm_tetmesh mesh, dfm_body_def &d) {
   dfm_tetmesh_info info{};
   info.size = sizeof info;
   ok(dfm_tetmesh_get_info(mesh, &info));
-  d.npoint = info.npoint, d.ntet = info.ntet;
+  d.npoint = info.npoint;
+  d.ntet = info.ntet;
   ok(dfm_tetmesh_data(mesh, &d.points, &d.tets, nullptr));
 }
 
 inline dfm_material make_material(dfm_world w, const BodyOptions &o) {
   dfm_material_def md = dfm_material_def_default();
-  md.density = o.density, md.young = o.young, md.poisson = o.poisson;
-  md.damping_mass = o.damping_mass, md.damping_stiffness = o.damping_stiffness;
+  md.density = o.density;
+  md.young = o.young;
+  md.poisson = o.poisson;
+  md.damping_mass = o.damping_mass;
+  md.damping_stiffness = o.damping_stiffness;
   dfm_material material = 0;
   ok(dfm_material_create(w, &md, &material));
   return material;
 }
 
 // A body from a generator: kind "beam", "cylinder" or "ball".
-inline dfm_body make_body(dfm_context *c, dfm_world w, const char *kind, std::array<double, 3> size, uint32_t cells, const BodyOptions &o) {
+inline dfm_body make_body(dfm_context *c, dfm_world w, const char *kind, std::array<double, 3> size,
+                          uint32_t cells, const BodyOptions &o) {
   dfm_tetmesh mesh = 0;
   ok(dfm_tetmesh_make(c, kind, size.data(), cells, &mesh));
   dfm_body_def d = dfm_body_def_default();
   d.name = o.name.empty() ? nullptr : o.name.c_str();
   d.model = o.model.empty() ? nullptr : o.model.c_str();
-  lend(mesh, d), d.material = make_material(w, o);
+  lend(mesh, d);
+  d.material = make_material(w, o);
   const dfm_param_value volume{"volume", &o.volume, 1};
   if (o.volume >= 0) d.model_params = {sizeof(dfm_params), 1, &volume};
-  for (int k = 0; k < 3; ++k) d.pose.position[k] = o.position[k], d.velocity[k] = o.velocity[k], d.spin[k] = o.spin[k];
+  for (int k = 0; k < 3; ++k) {
+    d.pose.position[k] = o.position[k];
+    d.velocity[k] = o.velocity[k];
+    d.spin[k] = o.spin[k];
+  }
   for (int k = 0; k < 4; ++k) d.pose.rotation[k] = o.rotation[k];
   d.surface = o.surface;
   dfm_body body = 0;
@@ -89,7 +107,8 @@ inline dfm_body make_body(dfm_context *c, dfm_world w, const char *kind, std::ar
 
 // What one of the counted functions lists, `width` numbers or structs to a row.
 template <class T>
-std::vector<T> listed(dfm_status (*list)(uint64_t, uint32_t, T *, uint32_t *), uint64_t handle, size_t width = 1) {
+std::vector<T> listed(dfm_status (*list)(uint64_t, uint32_t, T *, uint32_t *), uint64_t handle,
+                      size_t width = 1) {
   uint32_t n = 0;
   ok(list(handle, 0, nullptr, &n));
   std::vector<T> out(width * n);
@@ -126,9 +145,11 @@ inline dfm_world make_world(dfm_context *c, std::array<double, 3> gravity = {0, 
   return w;
 }
 
-inline dfm_obstacle add_plane(dfm_world w, const char *name, std::array<double, 3> point = {}, std::array<double, 4> rotation = {0, 0, 0, 1}) {
+inline dfm_obstacle add_plane(dfm_world w, const char *name, std::array<double, 3> point = {},
+                              std::array<double, 4> rotation = {0, 0, 0, 1}) {
   dfm_obstacle_def d = dfm_obstacle_def_default();
-  d.name = name, d.shape = DFM_SHAPE_PLANE;
+  d.name = name;
+  d.shape = DFM_SHAPE_PLANE;
   for (int k = 0; k < 3; ++k) d.pose.position[k] = point[k];
   for (int k = 0; k < 4; ++k) d.pose.rotation[k] = rotation[k];
   dfm_obstacle o = 0;
@@ -139,7 +160,9 @@ inline dfm_obstacle add_plane(dfm_world w, const char *name, std::array<double, 
 inline void set_friction(dfm_world w, double mu, const char *law = "coulomb") {
   const dfm_param_value v{"mu", &mu, 1};
   dfm_friction_def f{};
-  f.size = sizeof f, f.between[0] = f.between[1] = "*", f.law = law;
+  f.size = sizeof f;
+  f.between[0] = f.between[1] = "*";
+  f.law = law;
   if (std::string(law) != "none") f.params = {sizeof(dfm_params), 1, &v};
   ok(dfm_world_add_friction(w, &f));
 }

@@ -9,14 +9,18 @@
 namespace test {
 
 struct ZonedOptions : BodyOptions {
-  bool held = false;                                             // all points
+  bool held = false;  // all points
   std::vector<const char *> groups;
-  std::function<uint32_t(const double middle[3])> group;         // of a triangle by its middle at rest; UINT32_MAX: none
-  std::function<dfm_material(const double middle[3])> material;  // of a cell by its middle at rest; replaces young, poisson and density
+  // of a triangle by its middle at rest; UINT32_MAX: none
+  std::function<uint32_t(const double middle[3])> group;
+  // of a cell by its middle at rest; replaces young, poisson and density
+  std::function<dfm_material(const double middle[3])> material;
 };
 
-// A beam from the origin. Every face of every cell is offered as a triangle of its group: those inside must be passed over.
-inline dfm_body make_zoned_beam(dfm_context *c, dfm_world w, std::array<double, 3> size, uint32_t cells, const ZonedOptions &o) {
+// A beam from the origin. Every face of every cell is offered as a triangle of its group: those inside must
+// be passed over.
+inline dfm_body make_zoned_beam(dfm_context *c, dfm_world w, std::array<double, 3> size, uint32_t cells,
+                                const ZonedOptions &o) {
   dfm_tetmesh mesh = 0;
   ok(dfm_tetmesh_make(c, "beam", size.data(), cells, &mesh));
   dfm_body_def d = dfm_body_def_default();
@@ -35,29 +39,46 @@ inline dfm_body make_zoned_beam(dfm_context *c, dfm_world w, std::array<double, 
     for (int f = 3; o.group && f >= 0; --f) {
       const uint32_t face[3] = {q[(f + 1) % 4], q[(f + 2) % 4], q[(f + 3) % 4]};
       middle(face, 3, x);
-      triangles.insert(triangles.end(), face, face + 3), group.push_back(o.group(x));
+      triangles.insert(triangles.end(), face, face + 3);
+      group.push_back(o.group(x));
     }
-    if (o.material) middle(q, 4, x), materials.push_back(o.material(x));
+    if (o.material) {
+      middle(q, 4, x);
+      materials.push_back(o.material(x));
+    }
   }
-  const dfm_surface_groups groups{sizeof(dfm_surface_groups), uint32_t(o.groups.size()), o.groups.data(), uint32_t(group.size()), 0,
-                                  triangles.data(), group.data()};
+  const dfm_surface_groups groups{sizeof(dfm_surface_groups),
+                                  uint32_t(o.groups.size()),
+                                  o.groups.data(),
+                                  uint32_t(group.size()),
+                                  0,
+                                  triangles.data(),
+                                  group.data()};
   d.name = o.name.empty() ? nullptr : o.name.c_str();
   d.material = make_material(w, o);
   if (o.group) d.groups = &groups;
   if (o.material) d.cell_materials = materials.data();
   const std::vector<uint8_t> fixed(d.npoint, uint8_t(o.held ? 7 : 0));
   d.fixed = fixed.data();
-  for (int k = 0; k < 3; ++k) d.pose.position[k] = o.position[size_t(k)], d.velocity[k] = o.velocity[size_t(k)];
+  for (int k = 0; k < 3; ++k) {
+    d.pose.position[k] = o.position[size_t(k)];
+    d.velocity[k] = o.velocity[size_t(k)];
+  }
   dfm_body body = 0;
   ok(dfm_body_create(w, &d, &body));
   ok(dfm_tetmesh_destroy(mesh));
   return body;
 }
 
-inline dfm_status friction(dfm_world w, const char *a, const char *b, double mu, const char *law = "coulomb") {
+inline dfm_status friction(dfm_world w, const char *a, const char *b, double mu,
+                           const char *law = "coulomb") {
   const dfm_param_value v{"mu", &mu, 1};
   dfm_friction_def f{};
-  f.size = sizeof f, f.between[0] = a, f.between[1] = b, f.law = law, f.params = {sizeof(dfm_params), 1, &v};
+  f.size = sizeof f;
+  f.between[0] = a;
+  f.between[1] = b;
+  f.law = law;
+  f.params = {sizeof(dfm_params), 1, &v};
   return dfm_world_add_friction(w, &f);
 }
 

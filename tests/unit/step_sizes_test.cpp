@@ -11,7 +11,10 @@ using namespace dfm;
 namespace {
 
 // Sub-steps taken; sizes that differ from the one before.
-struct Count { uint64_t substeps = 0, changes = 0; double last = 0; };
+struct Count {
+  uint64_t substeps = 0, changes = 0;
+  double last = 0;
+};
 
 void step(StepSizes &s, double dt, double stable, Count &c) {
   const double n = choose_pieces(s, dt, stable);
@@ -32,7 +35,7 @@ TEST(StepSizes, FixedStep_IsCutIntoNumbersOfAShortList) {
     EXPECT_GE(n, q - 1e-6);
     EXPECT_LE(n, std::max(1.0, q + 1) * 1.25);
     int e;
-    const double m = std::frexp(n, &e) * 8;   // 4 to 8: three bits are enough
+    const double m = std::frexp(n, &e) * 8;  // 4 to 8: three bits are enough
     EXPECT_EQ(m, std::floor(m)) << n;
   }
   for (const double n : {1, 2, 3, 4, 5, 6, 7, 8, 10, 12, 14, 16, 20, 24, 28, 32}) {
@@ -56,7 +59,8 @@ TEST(StepSizes, OfferedStep_IsARungNotAboveTheStableOneAndNotCut) {
   EXPECT_EQ(choose_pieces(s, 5, none), 1);
 }
 
-// A bound that wobbles by 30 % for ever, at any period: sizes change with the logarithm of the number of sub-steps, then once in some 1e4.
+// A bound that wobbles by 30 % for ever, at any period: sizes change with the logarithm of the number of
+// sub-steps, then once in some 1e4.
 TEST(StepSizes, BoundThatSwings_ChangesThemEverMoreRarely) {
   for (const bool fed_back : {false, true})
     for (const double period : {2.0, 31.0, 700.0, 9000.0, 2e5}) {
@@ -85,7 +89,7 @@ TEST(StepSizes, AfterADeepDip_RecoverSoon) {
   StepSizes s;
   Count c;
   for (int dip = 0; dip < 12; ++dip) {
-    step(s, 1, 1e-3, c);   // patience has grown to its end after these
+    step(s, 1, 1e-3, c);  // patience has grown to its end after these
     const uint64_t start = c.substeps;
     for (int i = 0; i < 100 && c.last < 0.5; ++i) step(s, 1, 1, c);
     EXPECT_GE(c.last, 0.5) << dip;
@@ -93,15 +97,18 @@ TEST(StepSizes, AfterADeepDip_RecoverSoon) {
   }
 }
 
-// Frames of uneven length that a host measures: the number of sub-steps stays, their sizes vary no more than the frames.
+// Frames of uneven length that a host measures: the number of sub-steps stays, their sizes vary no more
+// than the frames.
 TEST(StepSizes, FramesThatDifferALittle_KeepTheirNumberOfSubSteps) {
   std::mt19937 random(5);
   StepSizes s;
   double last = 0, changed = 0;
   for (int i = 0; i < 10000; ++i) {
-    const double dt = (1 + 0.03 * (double(random()) / 2147483648.0 - 1)) / 60, stable = 1.3e-3 * (1 + 0.02 * std::sin(0.1 * i));
+    const double dt = (1 + 0.03 * (double(random()) / 2147483648.0 - 1)) / 60;
+    const double stable = 1.3e-3 * (1 + 0.02 * std::sin(0.1 * i));
     const double n = choose_pieces(s, dt, stable);
-    changed += last > 0 && n != last, last = n;
+    changed += last > 0 && n != last;
+    last = n;
     for (int k = 0; k < int(n); ++k) pass(s);
   }
   EXPECT_LE(changed, 8);

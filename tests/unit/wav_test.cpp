@@ -1,4 +1,5 @@
-// The sound of a series (support/wav.h, belt_study --wav): what the header says, and the period that is heard.
+// The sound of a series (support/wav.h, belt_study --wav): what the header says, and the period
+// that is heard.
 #include "wav.h"
 
 #include <gtest/gtest.h>
@@ -13,7 +14,8 @@ uint32_t number(const std::string &s, size_t at, int bytes) {
 
 }  // namespace
 
-// Stick-slip as on the belt: 0.1 m/s, and every 6.36 s for two seconds a swing back; 60 s at 1 kHz, a hundred times as fast.
+// Stick-slip as on the belt: 0.1 m/s, and every 6.36 s for two seconds a swing back; 60 s at 1 kHz, a hundred
+// times as fast.
 TEST(Wav, StickSlip_HasItsHeaderAndItsPeriod) {
   constexpr double kPeriod = 6.36, kFaster = 100, kRate = 1000;
   std::vector<double> speed;
@@ -37,14 +39,20 @@ TEST(Wav, StickSlip_HasItsHeaderAndItsPeriod) {
 
   std::vector<double> v;
   int most = 0;
-  for (uint32_t i = 0; i < n; ++i) v.push_back(int16_t(number(s, 44 + 2 * size_t(i), 2))), most = std::max(most, std::abs(int(v.back())));
+  for (uint32_t i = 0; i < n; ++i) {
+    v.push_back(int16_t(number(s, 44 + 2 * size_t(i), 2)));
+    most = std::max(most, std::abs(int(v.back())));
+  }
   EXPECT_EQ(most, 32767);
-  uint32_t best = 0;   // lag of the largest autocorrelation beyond half a period
+  uint32_t best = 0;  // lag of the largest autocorrelation beyond half a period
   double top = -INFINITY;
   for (uint32_t lag = 1500; lag < 4500; ++lag) {
     double sum = 0;
     for (uint32_t i = 0; i + 4500 < n; ++i) sum += v[i] * v[i + lag];
-    if (sum > top) top = sum, best = lag;
+    if (sum > top) {
+      top = sum;
+      best = lag;
+    }
   }
   EXPECT_NEAR(best / 44100.0, kPeriod / kFaster, 0.002 * kPeriod / kFaster);
 }

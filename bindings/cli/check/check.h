@@ -1,6 +1,7 @@
-// `deform plugin check`: rules that a plugin must keep, one table (table.cpp), one file per group of rules. A rule is a function that returns
-// (pass, with what it measured), throws Broken (the sentence says what follows from it and what to do) or throws Skipped (with the reason).
-// runner.cpp gives each rule a process of its own.
+// `deform plugin check`: rules that a plugin must keep, one table (table.cpp), one file per group of
+// rules. A rule is a function that returns (pass, with what it measured), throws Broken (the sentence says
+// what follows from it and what to do) or throws Skipped (with the reason). runner.cpp gives each rule a
+// process of its own.
 #pragma once
 #include <cstdint>
 #include <memory>
@@ -19,7 +20,10 @@ struct Skipped : std::runtime_error { using std::runtime_error::runtime_error; }
 std::string text(const char *format, ...) __attribute__((format(printf, 1, 2)));
 
 enum class Result { pass, fail, skip };
-struct Verdict { Result result = Result::pass; std::string detail; };
+struct Verdict {
+  Result result = Result::pass;
+  std::string detail;
+};
 
 class Plugin;
 // What a rule works on. type is null for rules about the file alone.
@@ -28,16 +32,16 @@ struct Subject {
   uint64_t seed = 1;
   Plugin *plugin = nullptr;
   const dfm_type *type = nullptr;
-  uint32_t index = 0;          // of the type in the file
-  std::string command;         // this program, for rules that ask a second process
-  double limit = 10;           // s of processor time that the rule may take
+  uint32_t index = 0;   // of the type in the file
+  std::string command;  // this program, for rules that ask a second process
+  double limit = 10;    // s of processor time that the rule may take
 };
 
 struct Rule {
   const char *id, *title;
-  bool by_type;                            // runs once for each type, else once for the file
-  std::string (*law)(const Subject &);     // also what runs for the file
-  std::string (*model)(const Subject &);   // null: comes with the rules for models
+  bool by_type;                           // runs once for each type, else once for the file
+  std::string (*law)(const Subject &);    // also what runs for the file
+  std::string (*model)(const Subject &);  // null: comes with the rules for models
 };
 const std::vector<Rule> &rules();
 const Rule *find_rule(const std::string &id);
@@ -45,7 +49,8 @@ const Rule *find_rule(const std::string &id);
 // Runs one rule here and now.
 Verdict run_here(const Rule &rule, const Subject &subject);
 
-// Bits of the outputs of a fixed set of batches: what V07 compares with another process (`deform plugin check FILE --digest TYPE`).
+// Bits of the outputs of a fixed set of batches: what V07 compares with another process (`deform plugin check
+// FILE --digest TYPE`).
 uint64_t digest(const Subject &subject);
 
 }  // namespace cli::check

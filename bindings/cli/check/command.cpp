@@ -15,23 +15,40 @@
 namespace cli::check {
 namespace {
 
-struct Line { const Rule *rule; Verdict verdict; double seconds; bool late = false; };
-struct TypeName { uint32_t kind; std::string id; };
-struct Report { std::vector<Line> file; std::vector<TypeName> types; std::vector<std::vector<Line>> by_type; };
+struct Line {
+  const Rule *rule;
+  Verdict verdict;
+  double seconds;
+  bool late = false;
+};
+struct TypeName {
+  uint32_t kind;
+  std::string id;
+};
+struct Report {
+  std::vector<Line> file;
+  std::vector<TypeName> types;
+  std::vector<std::vector<Line>> by_type;
+};
 
 const char *const kNotLoaded = "it does not load (V02 says why)";
-const char *kind_name(uint32_t kind) { return kind == DFM_KIND_FRICTION ? "law" : kind == DFM_KIND_MODEL ? "model" : "solver"; }
+const char *kind_name(uint32_t kind) {
+  return kind == DFM_KIND_FRICTION ? "law" : kind == DFM_KIND_MODEL ? "model" : "solver";
+}
 
-// ---- a rule of this file, in this process ------------------------------------------------------------------------------------------
+// ---- a rule of this file, in this process -----------------------------------------------------------------
 
 Subject subject_of(const Request &request) {
   Subject s;
-  s.file = std::filesystem::absolute(request.file).string(), s.seed = request.seed, s.limit = request.limit;
+  s.file = std::filesystem::absolute(request.file).string();
+  s.seed = request.seed;
+  s.limit = request.limit;
   s.command = std::filesystem::read_symlink("/proc/self/exe").string();
   return s;
 }
 
-// type < 0: a rule about the file; V01 needs no loading, V12 loads it itself, and V02 says itself why loading failed.
+// type < 0: a rule about the file; V01 needs no loading, V12 loads it itself, and V02 says itself why
+// loading failed.
 Verdict judge(const Request &request, const Rule &rule, int type) {
   Subject subject = subject_of(request);
   const std::string id = rule.id;
@@ -44,8 +61,10 @@ Verdict judge(const Request &request, const Rule &rule, int type) {
   }
   subject.plugin = plugin.get();
   if (type >= 0) {
-    if (static_cast<size_t>(type) >= plugin->types().size()) return {Result::fail, "the number of its types differs from load to load; hand out constant tables"};
-    subject.index = static_cast<uint32_t>(type), subject.type = plugin->types()[subject.index];
+    if (static_cast<size_t>(type) >= plugin->types().size())
+      return {Result::fail, "the number of its types differs from load to load; hand out constant tables"};
+    subject.index = static_cast<uint32_t>(type);
+    subject.type = plugin->types()[subject.index];
   }
   return run_here(rule, subject);
 }
@@ -53,7 +72,9 @@ Verdict judge(const Request &request, const Rule &rule, int type) {
 std::string digest_text(const Request &request) {
   Subject subject = subject_of(request);
   Plugin plugin(subject.file);
-  subject.plugin = &plugin, subject.index = static_cast<uint32_t>(request.digest), subject.type = plugin.types().at(subject.index);
+  subject.plugin = &plugin;
+  subject.index = static_cast<uint32_t>(request.digest);
+  subject.type = plugin.types().at(subject.index);
   return text("%016llx", static_cast<unsigned long long>(digest(subject)));
 }
 
@@ -62,9 +83,9 @@ std::string listed(const std::string &file) {
   std::string out;
   try {
     const Plugin plugin(file);
-    for (uint32_t i = 0; i < plugin.types().size(); ++i) out += std::to_string(plugin.types()[i]->kind) + " " + name_of(*plugin.types()[i], i) + "\n";
-  } catch (const Broken &) {
-  }
+    for (uint32_t i = 0; i < plugin.types().size(); ++i)
+      out += std::to_string(plugin.types()[i]->kind) + " " + name_of(*plugin.types()[i], i) + "\n";
+  } catch (const Broken &) {}
   return out;
 }
 
@@ -75,10 +96,18 @@ int child(const Request &request) {
   return kDone;
 }
 
-// ---- all of them -------------------------------------------------------------------------------------------------------------------
+// ---- all of them ------------------------------------------------------------------------------------------
 
 std::vector<std::string> arguments(const Request &request, const std::string &rule, int type) {
-  return {"plugin", "check", request.file, "--rule", rule, "--type", std::to_string(type), "--seed", std::to_string(request.seed)};
+  return {"plugin",
+          "check",
+          request.file,
+          "--rule",
+          rule,
+          "--type",
+          std::to_string(type),
+          "--seed",
+          std::to_string(request.seed)};
 }
 
 // What a sanitizer wrote, in one line; empty where it was silent.
@@ -95,24 +124,30 @@ Line run_rule(const Request &request, const Rule &rule, int type) {
   if (request.in_process) return {&rule, judge(request, rule, type), 0};
   // V09 counts what is on the heap: only a fresh image has a heap without a past.
   const bool fresh = std::string(rule.id) == "V09";
-  const Answer a = fresh ? in_fresh_process(subject_of(request).command, arguments(request, rule.id, type), {request.limit})
+  const Answer a = fresh ? in_fresh_process(subject_of(request).command, arguments(request, rule.id, type),
+                                            {request.limit})
                          : in_own_process([&] { answer(judge(request, rule, type)); }, {request.limit});
   Line line{&rule, a.verdict, a.seconds, a.late};
   const std::string found = sanitizer_line(a.said);
   if (!a.spoke)
-    line.verdict = {Result::fail, "it " + a.ending + (a.at.empty() ? "" : " (" + a.at + ")") + (found.empty() ? "" : ": " + found) +
-                                      ", and would take a world with it; answer every input in bounded time, and touch only the arrays that are given"};
+    line.verdict = {Result::fail, "it " + a.ending + (a.at.empty() ? "" : " (" + a.at + ")") +
+                                      (found.empty() ? "" : ": " + found) +
+                                      ", and would take a world with it; answer every input in bounded time, "
+                                      "and touch only the arrays that are given"};
   else if (!found.empty() && a.verdict.result != Result::fail)
-    line.verdict = {Result::fail, "the sanitizer reports " + found + "; what it names is a mistake even where it goes well"};
+    line.verdict = {Result::fail, "the sanitizer reports " + found +
+                                      "; what it names is a mistake even where it goes well"};
   return line;
 }
 
 const char *word(Result r) { return r == Result::pass ? "pass" : r == Result::fail ? "fail" : "skip"; }
 
 void print_line(const Line &l, bool quiet) {
-  if (l.verdict.result == Result::fail) std::printf("  %s FAIL  %s\n            %s\n", l.rule->id, l.rule->title, l.verdict.detail.c_str());
+  if (l.verdict.result == Result::fail)
+    std::printf("  %s FAIL  %s\n            %s\n", l.rule->id, l.rule->title, l.verdict.detail.c_str());
   else if (!quiet)
-    std::printf("  %s %s  %s%s%s%s\n", l.rule->id, word(l.verdict.result), l.rule->title, l.verdict.detail.empty() ? "" : " (", l.verdict.detail.c_str(),
+    std::printf("  %s %s  %s%s%s%s\n", l.rule->id, word(l.verdict.result), l.rule->title,
+                l.verdict.detail.empty() ? "" : " (", l.verdict.detail.c_str(),
                 l.verdict.detail.empty() ? "" : ")");
   std::fflush(stdout);
 }
@@ -120,23 +155,29 @@ void print_line(const Line &l, bool quiet) {
 // Two rules that do not come back say enough: the rest would cost as long each.
 class Rules {
  public:
-  Rules(const Globals &globals, const Request &request, const std::vector<const Rule *> &wanted) : globals_(globals), request_(request), wanted_(wanted) {}
+  Rules(const Globals &globals, const Request &request, const std::vector<const Rule *> &wanted)
+      : globals_(globals), request_(request), wanted_(wanted) {}
   Report run() {
     if (!globals_.json) std::printf("%s\n", request_.file.c_str());
     list_types();
     for (const Rule *rule : wanted_)
       if (!rule->by_type) one(report_.file, *rule, -1);
       else if (report_.types.empty()) add(report_.file, {rule, {Result::skip, kNotLoaded}, 0});
-    // Rules of laws that cannot run for want of a law are not kept: the rule that says why is asked beside them.
-    const bool loads = std::any_of(wanted_.begin(), wanted_.end(), [](const Rule *rule) { return rule == find_rule("V02"); });
+    // Rules of laws that cannot run for want of a law are not kept: the rule that says why is
+    // asked beside them.
+    const bool loads = std::any_of(wanted_.begin(), wanted_.end(),
+                                   [](const Rule *rule) { return rule == find_rule("V02"); });
     if (report_.types.empty() && !loads) one(report_.file, *find_rule("V02"), -1);
     for (size_t t = 0; t < report_.types.size(); ++t) {
       report_.by_type.emplace_back();
       const bool law = report_.types[t].kind == DFM_KIND_FRICTION;
-      if (!globals_.json) std::printf("%s %s\n", kind_name(report_.types[t].kind), report_.types[t].id.c_str());
+      if (!globals_.json)
+        std::printf("%s %s\n", kind_name(report_.types[t].kind), report_.types[t].id.c_str());
       for (const Rule *rule : wanted_)
-        if (rule->by_type && (law || rule->id[0] == 'V')) one(report_.by_type.back(), *rule, static_cast<int>(t));
-      if (!globals_.json && report_.types[t].kind == DFM_KIND_MODEL) std::printf("  M01 to M15, the rules for models, are not available yet\n");
+        if (rule->by_type && (law || rule->id[0] == 'V'))
+          one(report_.by_type.back(), *rule, static_cast<int>(t));
+      if (!globals_.json && report_.types[t].kind == DFM_KIND_MODEL)
+        std::printf("  M01 to M15, the rules for models, are not available yet\n");
     }
     return std::move(report_);
   }
@@ -147,14 +188,18 @@ class Rules {
     if (request_.in_process) {
       types = listed(request_.file);
     } else {
-      const Answer a = in_own_process([&] { answer({Result::pass, listed(request_.file)}); }, {request_.limit});
-      types = a.verdict.detail, late_ += a.late;
+      const Answer a =
+          in_own_process([&] { answer({Result::pass, listed(request_.file)}); }, {request_.limit});
+      types = a.verdict.detail;
+      late_ += a.late;
     }
     for (size_t at = 0, end; (end = types.find('\n', at)) != std::string::npos; at = end + 1)
-      report_.types.push_back({static_cast<uint32_t>(std::stoul(types.substr(at))), types.substr(types.find(' ', at) + 1, end - types.find(' ', at) - 1)});
+      report_.types.push_back({static_cast<uint32_t>(std::stoul(types.substr(at))),
+                               types.substr(types.find(' ', at) + 1, end - types.find(' ', at) - 1)});
   }
   void one(std::vector<Line> &to, const Rule &rule, int type) {
-    if (late_ >= kEnough) return add(to, {&rule, {Result::skip, "not asked: others did not come back; mend them first"}, 0});
+    if (late_ >= kEnough)
+      return add(to, {&rule, {Result::skip, "not asked: others did not come back; mend them first"}, 0});
     add(to, run_rule(request_, rule, type));
     late_ += to.back().late;
   }
@@ -171,29 +216,44 @@ class Rules {
   int late_ = 0;
 };
 
-// ---- report ------------------------------------------------------------------------------------------------------------------------
+// ---- report -----------------------------------------------------------------------------------------------
 
 std::string json_lines(const std::vector<Line> &lines) {
   std::vector<std::string> out;
   for (const Line &l : lines)
-    out.push_back(JsonObject().add("id", quoted(l.rule->id)).add("title", quoted(l.rule->title)).add("result", quoted(word(l.verdict.result)))
-                      .add("detail", quoted(l.verdict.detail)).add("cpu_s", number(std::round(1e4 * l.seconds) / 1e4)).text());
+    out.push_back(JsonObject()
+                      .add("id", quoted(l.rule->id))
+                      .add("title", quoted(l.rule->title))
+                      .add("result", quoted(word(l.verdict.result)))
+                      .add("detail", quoted(l.verdict.detail))
+                      .add("cpu_s", number(std::round(1e4 * l.seconds) / 1e4))
+                      .text());
   return json_array(out);
 }
 
 int tell(const Globals &globals, const Request &request, const Report &report) {
   uint32_t count[3] = {0, 0, 0};
-  for (const auto *lines : {&report.file}) for (const Line &l : *lines) ++count[static_cast<int>(l.verdict.result)];
-  for (const auto &lines : report.by_type) for (const Line &l : lines) ++count[static_cast<int>(l.verdict.result)];
+  for (const auto *lines : {&report.file})
+    for (const Line &l : *lines) ++count[static_cast<int>(l.verdict.result)];
+  for (const auto &lines : report.by_type)
+    for (const Line &l : lines) ++count[static_cast<int>(l.verdict.result)];
   const int code = count[static_cast<int>(Result::fail)] ? kFound : kDone;
   if (globals.json) {
     std::vector<std::string> types;
     for (size_t t = 0; t < report.types.size(); ++t)
-      types.push_back(JsonObject().add("kind", quoted(kind_name(report.types[t].kind))).add("id", quoted(report.types[t].id)).add("rules", json_lines(report.by_type[t]))
+      types.push_back(JsonObject()
+                          .add("kind", quoted(kind_name(report.types[t].kind)))
+                          .add("id", quoted(report.types[t].id))
+                          .add("rules", json_lines(report.by_type[t]))
                           .text());
     JsonObject o;
-    o.add("file", quoted(request.file)).add("seed", std::to_string(request.seed)).add("rules", json_lines(report.file)).add("types", json_array(types));
-    o.add("passed", std::to_string(count[0])).add("failed", std::to_string(count[1])).add("skipped", std::to_string(count[2]));
+    o.add("file", quoted(request.file))
+        .add("seed", std::to_string(request.seed))
+        .add("rules", json_lines(report.file))
+        .add("types", json_array(types));
+    o.add("passed", std::to_string(count[0]))
+        .add("failed", std::to_string(count[1]))
+        .add("skipped", std::to_string(count[2]));
     std::fputs(indented(o.text()).c_str(), stdout);
     return code;
   }
@@ -207,7 +267,9 @@ int run(const Globals &globals, const Request &request) {
   if (request.report >= 0) return child(request);
   std::error_code error;
   if (!std::filesystem::is_regular_file(request.file, error))
-    return fail(request.file + ": " + (std::filesystem::exists(request.file, error) ? "is no file" : "there is no such file") + "; the shared library of a plugin is expected, such as ./mylaw.so");
+    return fail(request.file + ": " +
+                (std::filesystem::exists(request.file, error) ? "is no file" : "there is no such file") +
+                "; the shared library of a plugin is expected, such as ./mylaw.so");
   std::vector<const Rule *> wanted;
   for (const std::string &id : request.only) {
     const Rule *rule = find_rule(id);

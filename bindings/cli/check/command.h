@@ -13,7 +13,7 @@ struct Request {
   uint64_t seed = 1;
   std::vector<std::string> only;
   bool in_process = false;
-  double limit = 10;             // s of processor time for each rule
+  double limit = 10;  // s of processor time for each rule
   // What this program says to itself: which rule of which type, or whose digest, and where to report.
   std::string rule;
   int type = -1, digest = -1, report = -1;

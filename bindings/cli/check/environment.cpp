@@ -27,11 +27,11 @@ thread_local std::string first_left;
 
 }  // namespace
 
-// ---- floating-point environment ----------------------------------------------------------------------------------------------------
+// ---- floating-point environment ---------------------------------------------------------------------------
 
 Kept::Settings Kept::settings() {
   volatile double least = DBL_MIN, small = DBL_MIN / 4;
-  const bool denormals = least / 4 > 0 && small * 4 > 0;   // neither results nor operands are flushed
+  const bool denormals = least / 4 > 0 && small * 4 > 0;  // neither results nor operands are flushed
   return {std::fegetround(), fegetexcept(), denormals};
 }
 
@@ -39,10 +39,11 @@ Kept::Kept(const char *call) : call_(call), before_(settings()) { std::fegetenv(
 
 Kept::~Kept() {
   const Settings after = settings();
-  const char *changed = after.rounding != before_.rounding      ? "the rounding mode"
-                        : after.denormals != before_.denormals   ? "how denormal numbers are treated"
-                        : after.exceptions != before_.exceptions ? "which floating-point exceptions raise a signal"
-                                                                 : nullptr;
+  const char *changed = after.rounding != before_.rounding     ? "the rounding mode"
+                        : after.denormals != before_.denormals ? "how denormal numbers are treated"
+                        : after.exceptions != before_.exceptions
+                            ? "which floating-point exceptions raise a signal"
+                            : nullptr;
   if (!changed) return;
   std::fesetenv(&environment_);
   if (first_left.empty()) first_left = text("%s leaves %s changed", call_, changed);
@@ -50,7 +51,7 @@ Kept::~Kept() {
 
 const std::string &left_changed() { return first_left; }
 
-// ---- process -----------------------------------------------------------------------------------------------------------------------
+// ---- process ----------------------------------------------------------------------------------------------
 
 namespace {
 
@@ -90,25 +91,41 @@ Process Process::now() {
 
 std::string Process::difference(const Process &later) const {
   if (later.folder_ != folder_)
-    return text("changes the current folder from %s to %s: relative paths of the program lead elsewhere from then on, and results with them; open files by whole paths", folder_.c_str(),
-                later.folder_.c_str());
+    return text(
+        "changes the current folder from %s to %s: relative paths of the program lead elsewhere from then "
+        "on, and results with them; open files by whole paths",
+        folder_.c_str(), later.folder_.c_str());
   if (later.locale_ != locale_)
-    return text("changes the locale from \"%s\" to \"%s\": numbers would be read and written with another decimal point; leave it to the program", locale_.c_str(), later.locale_.c_str());
+    return text(
+        "changes the locale from \"%s\" to \"%s\": numbers would be read and written with another decimal "
+        "point; leave it to the program",
+        locale_.c_str(), later.locale_.c_str());
   for (const auto *both : {&later.environment_, &environment_})
     for (const std::string &entry : *both) {
       const auto &other = both == &environment_ ? later.environment_ : environment_;
       if (std::find(other.begin(), other.end(), entry) == other.end())
-        return text("changes the environment (%s): other threads may be reading it, and other plugins read it later; take parameters instead", entry.substr(0, entry.find('=')).c_str());
+        return text(
+            "changes the environment (%s): other threads may be reading it, and other plugins read it later; "
+            "take parameters instead",
+            entry.substr(0, entry.find('=')).c_str());
     }
   for (const auto &[descriptor, target] : streams_)
     if (later.streams_.at(descriptor) != target)
-      return text("%s %s: what the program prints is lost; leave it open", later.streams_.at(descriptor).empty() ? "closes" : "redirects",
-                  descriptor == 0 ? "standard input" : descriptor == 1 ? "standard output" : "standard error");
+      return text("%s %s: what the program prints is lost; leave it open",
+                  later.streams_.at(descriptor).empty() ? "closes" : "redirects",
+                  descriptor == 0   ? "standard input"
+                  : descriptor == 1 ? "standard output"
+                                    : "standard error");
   if (later.handlers_ != handlers_ || later.mask_ != mask_)
-    return "changes how signals or fatal errors are handled: Ctrl-C and the program's own handlers would no longer work; leave them to the program";
-  if (later.timers_ != timers_) return "leaves a timer running: its signal ends a program that does not expect it; stop it";
+    return "changes how signals or fatal errors are handled: Ctrl-C and the program's own handlers would no "
+           "longer work; leave them to the program";
+  if (later.timers_ != timers_)
+    return "leaves a timer running: its signal ends a program that does not expect it; stop it";
   if (later.file_mask_ != file_mask_)
-    return text("changes the mask of new files from %03o to %03o: what the program writes gets other permissions; leave it to the program", file_mask_, later.file_mask_);
+    return text(
+        "changes the mask of new files from %03o to %03o: what the program writes gets other permissions; "
+        "leave it to the program",
+        file_mask_, later.file_mask_);
   return "";
 }
 
@@ -121,7 +138,7 @@ int Process::threads() {
   return n;
 }
 
-// ---- streams -----------------------------------------------------------------------------------------------------------------------
+// ---- streams ----------------------------------------------------------------------------------------------
 
 Captured::Captured() {
   std::fflush(nullptr);
@@ -136,7 +153,8 @@ Captured::~Captured() {
   std::fflush(nullptr);
   for (int k = 0; k < 2; ++k) {
     dup2(saved_[k], k + 1);
-    close(saved_[k]), close(memory_[k]);
+    close(saved_[k]);
+    close(memory_[k]);
   }
 }
 

@@ -5,7 +5,8 @@
 namespace cli::check {
 
 // rules_file.cpp: the file and what it says of itself
-std::string variable_at(const std::string &file, uint64_t address);   // as its author called it; empty where the file is stripped
+// as its author called it; empty where the file is stripped
+std::string variable_at(const std::string &file, uint64_t address);
 std::string exports_one_symbol(const Subject &);
 std::string refuses_unknown_abi(const Subject &);
 std::string metadata_complete(const Subject &);

@@ -16,7 +16,9 @@ uint32_t width_of_state(const dfm_friction &law, const double *params) {
   const Kept kept("state");
   const dfm_slots *own = law.state ? law.state(params) : nullptr;
   if (law.state && (!own || own->size < sizeof *own || !own->slots || own->nslot > 4096))
-    broken("its function state names no slots for parameters that check accepts, so the host cannot keep its state; return constant tables");
+    broken(
+        "its function state names no slots for parameters that check accepts, so the host cannot keep its "
+        "state; return constant tables");
   uint32_t n = 0;
   for (uint32_t i = 0; i < (own ? own->nslot : law.nslot); ++i) n += (own ? own->slots : law.slots)[i].width;
   return n;
@@ -25,15 +27,20 @@ uint32_t width_of_state(const dfm_friction &law, const double *params) {
 }  // namespace
 
 uint64_t Random::next() {
-  s ^= s >> 12, s ^= s << 25, s ^= s >> 27;
+  s ^= s >> 12;
+  s ^= s << 25;
+  s ^= s >> 27;
   return s * 0x2545f4914f6cdd1dull;
 }
-double Random::uniform(double a, double b) { return a + (b - a) * (static_cast<double>(next() >> 11) * 0x1p-53); }
+double Random::uniform(double a, double b) {
+  return a + (b - a) * (static_cast<double>(next() >> 11) * 0x1p-53);
+}
 double Random::logarithmic(double a, double b) { return a * std::exp(uniform(0, std::log(b / a))); }
 
 std::vector<double> default_params(const dfm_type &type) {
   std::vector<double> out;
-  for (uint32_t i = 0; i < type.nparam; ++i) out.insert(out.end(), std::clamp(type.params[i].width, 1u, 16u), type.params[i].def);
+  for (uint32_t i = 0; i < type.nparam; ++i)
+    out.insert(out.end(), std::clamp(type.params[i].width, 1u, 16u), type.params[i].def);
   return out;
 }
 
@@ -52,7 +59,10 @@ std::vector<double> lively_params(const Subject &subject) {
   double most = 0;
   for (uint32_t i = 0; i < type.nparam; at += std::clamp(type.params[i].width, 1u, 16u), ++i) {
     if (std::strcmp(type.params[i].key, "mu_C") == 0) kinetic = at;
-    if (std::strcmp(type.params[i].key, "mu_S") == 0) level = at, most = type.params[i].max;
+    if (std::strcmp(type.params[i].key, "mu_S") == 0) {
+      level = at;
+      most = type.params[i].max;
+    }
   }
   if (kinetic == out.size() || level == out.size() || out[level] > out[kinetic]) return out;
   std::vector<double> raised = out;
@@ -60,10 +70,13 @@ std::vector<double> lively_params(const Subject &subject) {
   return refusal(law_of(subject), raised).empty() ? raised : out;
 }
 
-Law::Law(const Subject &s, std::vector<double> values) : subject(s), ops(law_of(s)), params(std::move(values)), nstate(width_of_state(ops, params.data())) {
+Law::Law(const Subject &s, std::vector<double> values)
+    : subject(s), ops(law_of(s)), params(std::move(values)), nstate(width_of_state(ops, params.data())) {
   const Kept kept("prepare");
   if (ops.prepare && ops.prepare(&s.plugin->host().table(), params.data(), &data) != DFM_OK)
-    broken("prepare refuses parameters that check accepts, so a scene would fail after it was read; refuse them in check");
+    broken(
+        "prepare refuses parameters that check accepts, so a scene would fail after it was read; refuse them "
+        "in check");
 }
 
 Law::~Law() {
@@ -71,22 +84,56 @@ Law::~Law() {
   if (ops.prepare && ops.release) ops.release(&subject.plugin->host().table(), data);
 }
 
-Lanes::Lanes(const Law &l, uint32_t count, uint32_t gap) : law(l), n(count), stride(((count + 7) & ~7u) + ((gap + 7) & ~7u)) {
+Lanes::Lanes(const Law &l, uint32_t count, uint32_t gap)
+    : law(l), n(count), stride(((count + 7) & ~7u) + ((gap + 7) & ~7u)) {
   const size_t columns = 7 + l.nstate + 10 + l.nstate;
   memory_.assign(columns * stride + stride / 8 + 16, 0.0);
   double *p = reinterpret_cast<double *>((reinterpret_cast<uintptr_t>(memory_.data()) + 63) & ~uintptr_t(63));
-  const auto column = [&](size_t width) { double *at = p; p += width * stride; return at; };
-  fn = column(1), vt = column(2), stop = column(2), area = column(1), dwell = column(1), state = column(l.nstate);
-  out_ft = column(2), out_state = column(l.nstate), dv = column(4), dn = column(2), limit = column(1), stored = column(1);
+  const auto column = [&](size_t width) {
+    double *at = p;
+    p += width * stride;
+    return at;
+  };
+  fn = column(1);
+  vt = column(2);
+  stop = column(2);
+  area = column(1);
+  dwell = column(1);
+  state = column(l.nstate);
+  out_ft = column(2);
+  out_state = column(l.nstate);
+  dv = column(4);
+  dn = column(2);
+  limit = column(1);
+  stored = column(1);
   mode = reinterpret_cast<uint8_t *>(p);
   std::fill_n(area, stride, 1.0);
   if (!l.needs(DFM_NEED_FN)) std::fill_n(fn, stride, kNaN);
   if (!l.needs(DFM_NEED_VT)) std::fill_n(vt, 2 * stride, kNaN);
   if (!l.needs(DFM_NEED_FT_STOP)) std::fill_n(stop, 2 * stride, kNaN);
-  in = {sizeof in, n, stride, 0, 0, l.params.data(), l.data, fn, vt, stop, l.needs(DFM_NEED_AREA) ? area : nullptr,
-        l.needs(DFM_NEED_DWELL) ? dwell : nullptr, l.nstate ? state : nullptr};
+  in = {sizeof in,
+        n,
+        stride,
+        0,
+        0,
+        l.params.data(),
+        l.data,
+        fn,
+        vt,
+        stop,
+        l.needs(DFM_NEED_AREA) ? area : nullptr,
+        l.needs(DFM_NEED_DWELL) ? dwell : nullptr,
+        l.nstate ? state : nullptr};
   const bool derivatives = l.has(DFM_FRIC_JACOBIAN);
-  out = {sizeof out, 0, out_ft, l.nstate ? out_state : nullptr, derivatives ? dv : nullptr, derivatives ? dn : nullptr, limit, mode, stored};
+  out = {sizeof out,
+         0,
+         out_ft,
+         l.nstate ? out_state : nullptr,
+         derivatives ? dv : nullptr,
+         derivatives ? dn : nullptr,
+         limit,
+         mode,
+         stored};
 }
 
 dfm_status Lanes::ask(double dt) {
@@ -99,7 +146,10 @@ dfm_status Lanes::ask(double dt) {
 
 void Lanes::must(double dt) {
   if (const dfm_status status = ask(dt); status != DFM_OK)
-    broken("eval returns %s for finite slip and normal force at a step of %g s, which would stop a world; answer every finite input", dfm_status_name(status), dt);
+    broken(
+        "eval returns %s for finite slip and normal force at a step of %g s, which would stop a world; "
+        "answer every finite input",
+        dfm_status_name(status), dt);
 }
 
 void Lanes::commit() {
@@ -109,17 +159,27 @@ void Lanes::commit() {
 
 void Lanes::slip(uint32_t i, double x, double y) {
   const double w = std::sqrt(x * x + y * y);
-  if (law.needs(DFM_NEED_VT)) vt[i] = x, vt[stride + i] = y;
+  if (law.needs(DFM_NEED_VT)) {
+    vt[i] = x;
+    vt[stride + i] = y;
+  }
   if (!law.needs(DFM_NEED_FT_STOP)) return;
   const double much = law.needs(DFM_NEED_FN) ? 1e6 * std::max(fn[i], 1e-6) : 1e6;
-  stop[i] = w > 0 ? -much * x / w : 0, stop[stride + i] = w > 0 ? -much * y / w : 0;
+  stop[i] = w > 0 ? -much * x / w : 0;
+  stop[stride + i] = w > 0 ? -much * y / w : 0;
 }
 
 void Lanes::spoil_padding() {
   const auto columns = [&](double *at, uint32_t width) {
-    for (uint32_t c = 0; c < width; ++c) std::fill(at + size_t(c) * stride + n, at + size_t(c + 1) * stride, kNaN);
+    for (uint32_t c = 0; c < width; ++c)
+      std::fill(at + size_t(c) * stride + n, at + size_t(c + 1) * stride, kNaN);
   };
-  columns(fn, 1), columns(vt, 2), columns(stop, 2), columns(area, 1), columns(dwell, 1), columns(state, law.nstate);
+  columns(fn, 1);
+  columns(vt, 2);
+  columns(stop, 2);
+  columns(area, 1);
+  columns(dwell, 1);
+  columns(state, law.nstate);
 }
 
 double Lanes::ft(uint32_t i) const { return std::hypot(out_ft[i], out_ft[stride + i]); }
@@ -128,18 +188,24 @@ void Lanes::take(uint32_t i, const Lanes &from, uint32_t k) {
   const auto columns = [&](double *to, const double *at, uint32_t width) {
     for (uint32_t c = 0; c < width; ++c) to[size_t(c) * stride + i] = at[size_t(c) * from.stride + k];
   };
-  columns(fn, from.fn, 1), columns(vt, from.vt, 2), columns(stop, from.stop, 2), columns(area, from.area, 1), columns(dwell, from.dwell, 1);
+  columns(fn, from.fn, 1);
+  columns(vt, from.vt, 2);
+  columns(stop, from.stop, 2);
+  columns(area, from.area, 1);
+  columns(dwell, from.dwell, 1);
   columns(state, from.state, law.nstate);
 }
 
 bool Lanes::same(uint32_t i, const Lanes &other, uint32_t k) const {
   const auto equal = [&](const double *a, const double *b, uint32_t width) {
     for (uint32_t c = 0; c < width; ++c)
-      if (std::memcmp(a + size_t(c) * stride + i, b + size_t(c) * other.stride + k, sizeof(double)) != 0) return false;
+      if (std::memcmp(a + size_t(c) * stride + i, b + size_t(c) * other.stride + k, sizeof(double)) != 0)
+        return false;
     return true;
   };
-  return equal(out_ft, other.out_ft, 2) && equal(out_state, other.out_state, law.nstate) && equal(limit, other.limit, 1) &&
-         equal(stored, other.stored, 1) && mode[i] == other.mode[k] && (!out.dft_dvt || (equal(dv, other.dv, 4) && equal(dn, other.dn, 2)));
+  return equal(out_ft, other.out_ft, 2) && equal(out_state, other.out_state, law.nstate) &&
+         equal(limit, other.limit, 1) && equal(stored, other.stored, 1) && mode[i] == other.mode[k] &&
+         (!out.dft_dvt || (equal(dv, other.dv, 4) && equal(dn, other.dn, 2)));
 }
 
 std::vector<double> decades(double from, double to, int per_decade) {
@@ -151,8 +217,9 @@ std::vector<double> decades(double from, double to, int per_decade) {
 
 namespace {
 
-// Level and presliding stiffness at one normal force: a displacement is made in one step, then held for some, so that only what is elastic
-// is left; the first decade of displacements that leaves a hundredth of the level tells the stiffness.
+// Level and presliding stiffness at one normal force: a displacement is made in one step, then held for some,
+// so that only what is elastic is left; the first decade of displacements that leaves a hundredth of the
+// level tells the stiffness.
 Scales measure(const Law &law, double fn) {
   Scales s;
   s.fn = fn;
@@ -163,19 +230,27 @@ Scales measure(const Law &law, double fn) {
   s.level = one.limit[0];
   if (!std::isfinite(s.level) || s.level <= 0) {
     one.slip(0, 1, 0);
-    for (int i = 0; i < 100; ++i) one.must(1e-3), one.commit();
+    for (int i = 0; i < 100; ++i) {
+      one.must(1e-3);
+      one.commit();
+    }
     s.level = one.ft(0);
   }
   if (law.nstate == 0 || !(s.level > 0) || !std::isfinite(s.level)) return s;
   for (double x = 1e-18; x < 10; x *= 10) {
     std::fill_n(one.state, size_t(law.nstate) * one.stride, 0.0);
     one.slip(0, x / 1e-3, 0);
-    one.must(1e-3), one.commit();
+    one.must(1e-3);
+    one.commit();
     one.slip(0, 0, 0);
-    for (int i = 0; i < 5; ++i) one.must(1e-3), one.commit();
+    for (int i = 0; i < 5; ++i) {
+      one.must(1e-3);
+      one.commit();
+    }
     const double held = one.ft(0);
     if (held < 0.01 * s.level) continue;
-    if (held < 0.9 * s.level || x > 1e-18) s.stiffness = held / x;   // at the smallest displacement the level itself: rigid
+    // at the smallest displacement the level itself: rigid
+    if (held < 0.9 * s.level || x > 1e-18) s.stiffness = held / x;
     break;
   }
   if (s.stiffness > 0) s.z = s.level / s.stiffness;
@@ -184,7 +259,8 @@ Scales measure(const Law &law, double fn) {
 
 }  // namespace
 
-// The normal force is chosen for a presliding displacement near 10 micrometers, so that absolute bounds mean something for every stiffness.
+// The normal force is chosen for a presliding displacement near 10 micrometers, so that absolute bounds mean
+// something for every stiffness.
 Scales scales_of(const Law &law) {
   Scales s = measure(law, 1);
   if (s.z > 0) s = measure(law, std::clamp(1e-5 / s.z, 1e-3, 1e6));
@@ -199,7 +275,10 @@ std::vector<double> steady_force(const Law &law, const Scales &scales, const std
   }
   const double h = 1.0 / 240, slowest = *std::min_element(speeds.begin(), speeds.end());
   const int least = law.nstate ? static_cast<int>(std::min(30000.0, 40 * scales.z / (slowest * h) + 50)) : 1;
-  for (int i = 0; i < least; ++i) b.must(h), b.commit();
+  for (int i = 0; i < least; ++i) {
+    b.must(h);
+    b.commit();
+  }
   std::vector<double> out;
   for (uint32_t i = 0; i < b.n; ++i) out.push_back(-b.out_ft[i]);
   return out;
@@ -210,7 +289,8 @@ Masses::Masses(const Law &law, const Scales &scales, uint32_t n)
   if (law.needs(DFM_NEED_FN)) std::fill_n(lanes.fn, n, scales.fn);
 }
 
-// The root of r(v) = m (v - v0)/h - f - ft(v), by bracket and Illinois steps, in all lanes at once. With FT_STOP the law itself says where it holds.
+// The root of r(v) = m (v - v0)/h - f - ft(v), by bracket and Illinois steps, in all lanes at once. With
+// FT_STOP the law itself says where it holds.
 void Masses::step(const std::vector<double> &force, double h) {
   const uint32_t n = lanes.n;
   roots_.resize(n);
@@ -218,12 +298,18 @@ void Masses::step(const std::vector<double> &force, double h) {
   for (uint32_t i = 0; i < n; ++i) {
     const double free = v[i] + h * force[i] / mass;
     roots_[i] = {0, 0, 0, 0, v[i], mass / h, false, false, false, 0};
-    if (stops) lanes.stop[i] = -mass * free / h, lanes.stop[lanes.stride + i] = 0;
+    if (stops) {
+      lanes.stop[i] = -mass * free / h;
+      lanes.stop[lanes.stride + i] = 0;
+    }
   }
   for (int round = 0; round < 200; ++round) {
     bool all = true;
     for (uint32_t i = 0; i < n; ++i)
-      if (lanes.law.needs(DFM_NEED_VT)) lanes.vt[i] = roots_[i].at, lanes.vt[lanes.stride + i] = 0;
+      if (lanes.law.needs(DFM_NEED_VT)) {
+        lanes.vt[i] = roots_[i].at;
+        lanes.vt[lanes.stride + i] = 0;
+      }
     lanes.must(h);
     for (uint32_t i = 0; i < n; ++i) {
       Root &q = roots_[i];
@@ -233,34 +319,56 @@ void Masses::step(const std::vector<double> &force, double h) {
         continue;
       }
       const double r = mass * (q.at - v[i]) / h - force[i] - lanes.out_ft[i];
-      if (!std::isfinite(r)) broken("a mass of %g kg pushed with %g N meets a force of %g N at %g m/s; the force must stay finite", mass, force[i], lanes.out_ft[i], q.at);
+      if (!std::isfinite(r))
+        broken("a mass of %g kg pushed with %g N meets a force of %g N at %g m/s; the force must stay finite",
+               mass, force[i], lanes.out_ft[i], q.at);
       const double scale = std::fabs(force[i]) + std::fabs(lanes.out_ft[i]) + mass * std::fabs(v[i]) / h;
-      if (std::fabs(r) <= 4e-16 * scale) { q.done = true; continue; }
+      if (std::fabs(r) <= 4e-16 * scale) {
+        q.done = true;
+        continue;
+      }
       all = false;
       if (round == 0) {
-        q.a = q.at, q.ra = r, q.at = q.a - r / q.slope;
+        q.a = q.at;
+        q.ra = r;
+        q.at = q.a - r / q.slope;
       } else if (!q.bracket) {
         if ((r > 0) != (q.ra > 0)) {
-          q.bracket = true, q.b = q.at, q.rb = r;
+          q.bracket = true;
+          q.b = q.at;
+          q.rb = r;
         } else {
-          q.slope *= 0.5;                                    // a wider step: the friction stiffens what the mass alone would do
-          q.a = q.at, q.ra = r, q.at -= r / q.slope;
+          // a wider step: the friction stiffens what the mass alone would do
+          q.slope *= 0.5;
+          q.a = q.at;
+          q.ra = r;
+          q.at -= r / q.slope;
         }
       } else if ((r > 0) == (q.rb > 0)) {
-        q.b = q.at, q.rb = r, q.ra = q.side == 1 ? 0.5 * q.ra : q.ra, q.side = 1;
+        q.b = q.at;
+        q.rb = r;
+        q.ra = q.side == 1 ? 0.5 * q.ra : q.ra;
+        q.side = 1;
       } else {
-        q.a = q.at, q.ra = r, q.rb = q.side == 2 ? 0.5 * q.rb : q.rb, q.side = 2;
+        q.a = q.at;
+        q.ra = r;
+        q.rb = q.side == 2 ? 0.5 * q.rb : q.rb;
+        q.side = 2;
       }
       if (!q.bracket) continue;
       double next = q.b - q.rb * (q.b - q.a) / (q.rb - q.ra);
       if (round % 8 == 7 || !std::isfinite(next)) next = 0.5 * (q.a + q.b);
-      if (next == q.a || next == q.b || std::fabs(q.b - q.a) <= 4e-16 * std::max(std::fabs(q.a), std::fabs(q.b))) q.done = true;
+      if (next == q.a || next == q.b ||
+          std::fabs(q.b - q.a) <= 4e-16 * std::max(std::fabs(q.a), std::fabs(q.b)))
+        q.done = true;
       q.at = next;
     }
     if (all) break;
   }
   for (uint32_t i = 0; i < n; ++i) {
-    v[i] = roots_[i].held ? 0.0 : roots_[i].at, x[i] += h * v[i], resist[i] = -lanes.out_ft[i];
+    v[i] = roots_[i].held ? 0.0 : roots_[i].at;
+    x[i] += h * v[i];
+    resist[i] = -lanes.out_ft[i];
   }
   lanes.commit();
 }

@@ -1,4 +1,5 @@
-// A law under test: its parameters, batches of contacts for it, and how contacts are driven by a given slip or by a force on a mass.
+// A law under test: its parameters, batches of contacts for it, and how contacts are driven by a given slip
+// or by a force on a mass.
 #pragma once
 #include <cstdint>
 #include <functional>
@@ -11,7 +12,8 @@
 namespace cli::check {
 
 std::vector<double> default_params(const dfm_type &type);
-// Defaults, but with a static level above the kinetic one where the table knows both and their defaults agree: what a promise needs to be seen.
+// Defaults, but with a static level above the kinetic one where the table knows both and their defaults
+// agree: what a promise needs to be seen.
 std::vector<double> lively_params(const Subject &subject);
 // What the law's own check says; empty where it accepts.
 std::string refusal(const dfm_friction &law, const std::vector<double> &params);
@@ -30,17 +32,19 @@ struct Law {
   uint32_t nstate = 0;
 };
 
-// n contacts with every column there is. Inputs that the law does not declare hold NaN (area and dwell: NULL, as the host gives them).
+// n contacts with every column there is. Inputs that the law does not declare hold NaN (area and dwell: NULL,
+// as the host gives them).
 struct Lanes {
-  Lanes(const Law &law, uint32_t n, uint32_t gap = 0);   // gap: lanes between n rounded to 8 and the stride
+  Lanes(const Law &law, uint32_t n, uint32_t gap = 0);  // gap: lanes between n rounded to 8 and the stride
   Lanes(const Lanes &) = delete;
   Lanes &operator=(const Lanes &) = delete;
-  dfm_status ask(double dt);          // evaluates; the state stays
-  void must(double dt);               // the same, and Broken where the law does not return DFM_OK
-  void commit();                      // the trial state becomes the state
-  void slip(uint32_t i, double x, double y);   // trial slip; with FT_STOP a stopping force far beyond any level, against it
-  double ft(uint32_t i) const;        // norm
-  void spoil_padding();               // NaN in the input lanes beyond n
+  dfm_status ask(double dt);  // evaluates; the state stays
+  void must(double dt);       // the same, and Broken where the law does not return DFM_OK
+  void commit();              // the trial state becomes the state
+  // trial slip; with FT_STOP a stopping force far beyond any level, against it
+  void slip(uint32_t i, double x, double y);
+  double ft(uint32_t i) const;  // norm
+  void spoil_padding();         // NaN in the input lanes beyond n
   // A lane's inputs from another batch, and whether its outputs are those of another lane, bit by bit.
   void take(uint32_t i, const Lanes &from, uint32_t k);
   bool same(uint32_t i, const Lanes &other, uint32_t k) const;
@@ -58,12 +62,12 @@ struct Lanes {
 
 // How large things are for this law, found by asking it. Rigs press with fn on 1 m2, their mass weighs fn.
 struct Scales {
-  double fn = 1;        // N
-  double level = 0;     // N, largest force at rest, or the force at 1 m/s of a law that has none
-  double stiffness = 0; // N/m of presliding; 0: rigid or none
-  double z = 0;         // m, level / stiffness; 0: none
+  double fn = 1;         // N
+  double level = 0;      // N, largest force at rest, or the force at 1 m/s of a law that has none
+  double stiffness = 0;  // N/m of presliding; 0: rigid or none
+  double z = 0;          // m, level / stiffness; 0: none
   double mass() const { return fn / 9.81; }
-  double length() const { return z > 0 ? z : 1e-5; }   // a displacement that is presliding where there is any
+  double length() const { return z > 0 ? z : 1e-5; }  // a displacement that is presliding where there is any
 };
 Scales scales_of(const Law &law);
 
@@ -77,17 +81,23 @@ struct Masses {
   void step(const std::vector<double> &force, double h);
   Lanes lanes;
   double mass, level;
-  std::vector<double> x, v, resist;   // resist: -ft of the last step
+  std::vector<double> x, v, resist;  // resist: -ft of the last step
 
  private:
-  struct Root { double a, b, ra, rb, at, slope; bool done, bracket, held; int side; };
+  struct Root {
+    double a, b, ra, rb, at, slope;
+    bool done, bracket, held;
+    int side;
+  };
   std::vector<Root> roots_;
 };
 
 // xorshift64*, so that a seed means the same on every machine.
 struct Random {
   uint64_t s;
-  explicit Random(uint64_t seed) : s(seed * 0x9e3779b97f4a7c15ull + 0x853c49e6748fea9bull) { for (int i = 0; i < 8; ++i) next(); }
+  explicit Random(uint64_t seed) : s(seed * 0x9e3779b97f4a7c15ull + 0x853c49e6748fea9bull) {
+    for (int i = 0; i < 8; ++i) next();
+  }
   uint64_t next();
   double uniform(double a, double b);
   double logarithmic(double a, double b);

@@ -40,7 +40,10 @@ bool copy_struct(T &full, const void *from, size_t head) {
 }  // namespace
 
 Host::Host() {
-  table_.size = sizeof table_, table_.abi = DFM_ABI, table_.abi_draft = DFM_ABI_DRAFT, table_.ctx = this;
+  table_.size = sizeof table_;
+  table_.abi = DFM_ABI;
+  table_.abi_draft = DFM_ABI_DRAFT;
+  table_.ctx = this;
   table_.alloc = [](void *ctx, size_t bytes, size_t align) {
     if (Watch::watching()) Watch::stop("dfm_host.alloc");
     void *p = aligned(bytes, align);
@@ -63,11 +66,14 @@ Host::Host() {
   table_.log = [](void *ctx, int32_t, uint32_t, const char *utf8) {
     if (Watch::watching()) return;
     std::string &said = static_cast<Host *>(ctx)->said_;
-    if (utf8 && said.size() < 4096) said += (said.empty() ? "" : "; ") + std::string(utf8, strnlen(utf8, 512));
+    if (utf8 && said.size() < 4096)
+      said += (said.empty() ? "" : "; ") + std::string(utf8, strnlen(utf8, 512));
   };
-  table_.parallel_for = [](void *, uint32_t n, uint32_t grain, void (*fn)(void *, uint32_t, uint32_t), void *user) {
+  table_.parallel_for = [](void *, uint32_t n, uint32_t grain, void (*fn)(void *, uint32_t, uint32_t),
+                           void *user) {
     if (Watch::watching()) Watch::stop("dfm_host.parallel_for");
-    for (uint32_t begin = 0; begin < n; begin += std::max(grain, 1u)) fn(user, begin, std::min(n, begin + std::max(grain, 1u)));
+    for (uint32_t begin = 0; begin < n; begin += std::max(grain, 1u))
+      fn(user, begin, std::min(n, begin + std::max(grain, 1u)));
   };
   table_.extension = [](void *, const char *) -> const void * { return nullptr; };
 }
@@ -77,34 +83,49 @@ void Host::give_back_scratch() {
   arena.used = 0;
 }
 
-dfm_plugin_fn entry_of(void *image) { return reinterpret_cast<dfm_plugin_fn>(dlsym(image, "dfm_plugin_entry")); }
+dfm_plugin_fn entry_of(void *image) {
+  return reinterpret_cast<dfm_plugin_fn>(dlsym(image, "dfm_plugin_entry"));
+}
 
 Plugin::Plugin(const std::string &file) {
-  char *resolved = realpath(file.c_str(), nullptr);  // dlopen searches the system's libraries for a name without a slash
+  // dlopen searches the system's libraries for a name without a slash
+  char *resolved = realpath(file.c_str(), nullptr);
   const std::string path = resolved ? resolved : file;
   std::free(resolved);
   const Kept kept("loading it");
   image_ = dlopen(path.c_str(), RTLD_NOW | RTLD_LOCAL);
   if (!image_) broken("the dynamic linker refuses it: %s; link what is missing, or leave it out", dlerror());
   const dfm_plugin_fn entry = entry_of(image_);
-  if (!entry) broken("it has no symbol dfm_plugin_entry, so no host can use it; build it with deform_add_plugin and define the entry of deform/plugin.h");
+  if (!entry)
+    broken(
+        "it has no symbol dfm_plugin_entry, so no host can use it; build it with deform_add_plugin and "
+        "define the entry of deform/plugin.h");
   const dfm_plugin *given = nullptr;
   try {
     given = entry(&host_.table(), DFM_ABI, DFM_ABI);
   } catch (...) {
-    broken("its entry threw an exception, which ends a host written in C; catch it in the entry, log why, and return NULL");
+    broken(
+        "its entry threw an exception, which ends a host written in C; catch it in the entry, log why, and "
+        "return NULL");
   }
   if (!given)
-    broken("it refuses a host of ABI %u draft %u (%s), so no world can use it; rebuild it against this library's deform/plugin.h", DFM_ABI, DFM_ABI_DRAFT,
-           host_.said().empty() ? "without a reason" : host_.said().c_str());
+    broken(
+        "it refuses a host of ABI %u draft %u (%s), so no world can use it; rebuild it against this "
+        "library's deform/plugin.h",
+        DFM_ABI, DFM_ABI_DRAFT, host_.said().empty() ? "without a reason" : host_.said().c_str());
   if (given->abi != DFM_ABI || given->abi_draft != DFM_ABI_DRAFT)
-    broken("it was built for ABI %u draft %u and hands itself to a host of ABI %u draft %u, where its structs would be misread; rebuild it against this "
-           "library's deform/plugin.h and refuse other hosts with DFM_ABI_OK", given->abi, given->abi_draft, DFM_ABI, DFM_ABI_DRAFT);
+    broken(
+        "it was built for ABI %u draft %u and hands itself to a host of ABI %u draft %u, where its structs "
+        "would be misread; rebuild it against this library's deform/plugin.h and refuse other hosts with "
+        "DFM_ABI_OK",
+        given->abi, given->abi_draft, DFM_ABI, DFM_ABI_DRAFT);
   dfm_plugin full{};
   if (!copy_struct(full, given, offsetof(dfm_plugin, types) + sizeof(void *)))
-    broken("dfm_plugin.size is %u, so its fields cannot be told apart; set it to sizeof(dfm_plugin)", given->size);
+    broken("dfm_plugin.size is %u, so its fields cannot be told apart; set it to sizeof(dfm_plugin)",
+           given->size);
   shutdown_ = full.shutdown;
-  if (full.ntype == 0 || full.ntype > 4096 || !full.types) broken("it offers no types (ntype %u); name at least one dfm_type", full.ntype);
+  if (full.ntype == 0 || full.ntype > 4096 || !full.types)
+    broken("it offers no types (ntype %u); name at least one dfm_type", full.ntype);
   for (uint32_t i = 0; i < full.ntype; ++i) copy_type(full.types[i], i);
 }
 
@@ -117,21 +138,29 @@ void Plugin::copy_type(const void *from, uint32_t number) {
   if (type.params && type.nparam <= 4096 && width >= offsetof(dfm_param, names) && width <= 65536)
     for (uint32_t i = 0; i < type.nparam; ++i) {
       dfm_param row{};
-      std::memcpy(&row, reinterpret_cast<const char *>(type.params) + size_t(i) * width, std::min<size_t>(width, sizeof row));
+      std::memcpy(&row, reinterpret_cast<const char *>(type.params) + size_t(i) * width,
+                  std::min<size_t>(width, sizeof row));
       copy->rows.push_back(row);
     }
   if (copy->rows.size() != type.nparam)
-    broken("type #%u: its table has %u rows of %u bytes at %p, so no parameter can be set; set params, nparam and param_size (sizeof(dfm_param))", number,
-           type.nparam, width, static_cast<const void *>(type.params));
-  type.params = copy->rows.data(), type.param_size = sizeof(dfm_param);
+    broken(
+        "type #%u: its table has %u rows of %u bytes at %p, so no parameter can be set; set params, nparam "
+        "and param_size (sizeof(dfm_param))",
+        number, type.nparam, width, static_cast<const void *>(type.params));
+  type.params = copy->rows.data();
+  type.param_size = sizeof(dfm_param);
   const void *ops = type.ops;
-  const bool known =
-      type.kind == DFM_KIND_FRICTION ? copy_struct(copy->friction, ops, offsetof(dfm_friction, eval) + sizeof(void *))
-      : type.kind == DFM_KIND_MODEL  ? copy_struct(copy->model, ops, offsetof(dfm_model, destroy) + sizeof(void *))
-                                     : type.kind == DFM_KIND_SOLVER && copy_struct(copy->solver, ops, offsetof(dfm_solver, release) + sizeof(void *));
+  const bool known = type.kind == DFM_KIND_FRICTION
+                         ? copy_struct(copy->friction, ops, offsetof(dfm_friction, eval) + sizeof(void *))
+                     : type.kind == DFM_KIND_MODEL
+                         ? copy_struct(copy->model, ops, offsetof(dfm_model, destroy) + sizeof(void *))
+                         : type.kind == DFM_KIND_SOLVER &&
+                               copy_struct(copy->solver, ops, offsetof(dfm_solver, release) + sizeof(void *));
   if (!known)
-    broken("type #%u has kind %u and operations that do not fit it, so nothing can be called; set kind, and ops.size to the sizeof of its struct", number,
-           type.kind);
+    broken(
+        "type #%u has kind %u and operations that do not fit it, so nothing can be called; set kind, and "
+        "ops.size to the sizeof of its struct",
+        number, type.kind);
   type.ops = type.kind == DFM_KIND_FRICTION ? static_cast<const void *>(&copy->friction)
              : type.kind == DFM_KIND_MODEL  ? static_cast<const void *>(&copy->model)
                                             : static_cast<const void *>(&copy->solver);
@@ -140,18 +169,24 @@ void Plugin::copy_type(const void *from, uint32_t number) {
 }
 
 void Plugin::close() {
-  view_.clear(), types_.clear();
+  view_.clear();
+  types_.clear();
   const Kept kept("unloading it");
   if (shutdown_) shutdown_();
   if (image_) dlclose(image_);
-  shutdown_ = nullptr, image_ = nullptr;
+  shutdown_ = nullptr;
+  image_ = nullptr;
 }
 
 Plugin::~Plugin() { close(); }
 
-std::string name_of(const dfm_type &type, uint32_t number) { return type.id && *type.id ? type.id : "#" + std::to_string(number); }
+std::string name_of(const dfm_type &type, uint32_t number) {
+  return type.id && *type.id ? type.id : "#" + std::to_string(number);
+}
 
-const dfm_friction &law_of(const Subject &subject) { return *static_cast<const dfm_friction *>(subject.type->ops); }
+const dfm_friction &law_of(const Subject &subject) {
+  return *static_cast<const dfm_friction *>(subject.type->ops);
+}
 
 bool promises(const dfm_type &type, const char *effect) {
   for (const char *const *e = type.effects; e && *e; ++e)

@@ -1,5 +1,5 @@
-// A plugin opened by the validator itself, not by the library: what the library would refuse at once must stay open to be looked at, and the
-// host it meets counts what it lends.
+// A plugin opened by the validator itself, not by the library: what the library would refuse at once must
+// stay open to be looked at, and the host it meets counts what it lends.
 #pragma once
 #include <map>
 #include <memory>
@@ -18,9 +18,9 @@ class Host {
   Host &operator=(const Host &) = delete;
   const dfm_host &table() const { return table_; }
   dfm_host &table() { return table_; }
-  size_t pieces() const { return lent_.size(); }       // not yet released
+  size_t pieces() const { return lent_.size(); }  // not yet released
   const std::string &said() const { return said_; }
-  void give_back_scratch();                             // of this thread
+  void give_back_scratch();  // of this thread
 
  private:
   dfm_host table_{};
@@ -30,17 +30,26 @@ class Host {
 
 class Plugin {
  public:
-  explicit Plugin(const std::string &file);            // throws Broken where it cannot be opened, refuses, or speaks another ABI
+  // throws Broken where it cannot be opened, refuses, or speaks another ABI
+  explicit Plugin(const std::string &file);
   ~Plugin();
   Plugin(const Plugin &) = delete;
   Plugin &operator=(const Plugin &) = delete;
-  void close();                                        // shutdown and unload; the host can still be asked what it lent
+  // shutdown and unload; the host can still be asked what it lent
+  void close();
   Host &host() { return host_; }
   void *image() const { return image_; }
-  const std::vector<const dfm_type *> &types() const { return view_; }   // full structs, as the library would copy them
+  // full structs, as the library would copy them
+  const std::vector<const dfm_type *> &types() const { return view_; }
 
  private:
-  struct Copy { dfm_type type{}; std::vector<dfm_param> rows; dfm_friction friction{}; dfm_model model{}; dfm_solver solver{}; };
+  struct Copy {
+    dfm_type type{};
+    std::vector<dfm_param> rows;
+    dfm_friction friction{};
+    dfm_model model{};
+    dfm_solver solver{};
+  };
   void copy_type(const void *from, uint32_t number);
   Host host_;
   void *image_ = nullptr;
@@ -51,7 +60,7 @@ class Plugin {
 
 // The entry of an opened image; null where it has none.
 dfm_plugin_fn entry_of(void *image);
-std::string name_of(const dfm_type &type, uint32_t number);   // its id, or "#0"
+std::string name_of(const dfm_type &type, uint32_t number);  // its id, or "#0"
 const dfm_friction &law_of(const Subject &subject);
 bool promises(const dfm_type &type, const char *effect);
 

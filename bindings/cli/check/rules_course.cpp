@@ -18,17 +18,18 @@ void press(Lanes &b, double fn) {
 
 }  // namespace
 
-// ---- F15 ---------------------------------------------------------------------------------------------------------------------------
+// ---- F15 --------------------------------------------------------------------------------------------------
 
-// The same 400 steps again and again, at rest, swinging, sliding and at random: what counts time or path grows in proportion to it, what feeds on itself
-// faster than any power.
+// The same 400 steps again and again, at rest, swinging, sliding and at random: what counts time or path
+// grows in proportion to it, what feeds on itself faster than any power.
 std::string state_stays_bounded(const Subject &subject) {
   const Law law(subject, lively_params(subject));
   if (law.nstate == 0) skip("the law keeps no state");
   const Scales s = scales_of(law);
   constexpr uint32_t kRuns = 32;
   constexpr int kBlocks = 8, kSteps = 400, kFirst = 1;
-  constexpr double kMost = 100;   // growth from the second block to the last; the square of the time grows by 16
+  // growth from the second block to the last; the square of the time grows by 16
+  constexpr double kMost = 100;
   double worst = 0;
   for (const double h : {1e-3, 1.0 / 60}) {
     Lanes b(law, kRuns);
@@ -41,19 +42,27 @@ std::string state_stays_bounded(const Subject &subject) {
       for (int step = 0; step < kSteps; ++step) {
         press(b, s.fn);
         for (uint32_t i = 0; i < kRuns; ++i) {
-          const double heading = random.uniform(0, kTurn), any = random.logarithmic(1e-6, 10), load = random.uniform(0, 2);
-          const double swing = 0.5 * s.length() * (std::sin(kTurn * (step + 1) / 50) - std::sin(kTurn * step / 50)) / h;
+          const double heading = random.uniform(0, kTurn);
+          const double any = random.logarithmic(1e-6, 10);
+          const double load = random.uniform(0, 2);
+          const double swing =
+              0.5 * s.length() * (std::sin(kTurn * (step + 1) / 50) - std::sin(kTurn * step / 50)) / h;
           if (i % 4 == 0) b.slip(i, 0, 0);
           else if (i % 4 == 1) b.slip(i, swing, 0);
           else if (i % 4 == 2) b.slip(i, 1e-3 * std::pow(10.0, i % 3), 0);
           else b.slip(i, any * std::cos(heading), any * std::sin(heading));
           if (i % 4 == 3 && law.needs(DFM_NEED_FN)) b.fn[i] = load < 0.2 ? 0 : s.fn * load;
         }
-        b.must(h), b.commit();
+        b.must(h);
+        b.commit();
         for (uint32_t c = 0; c < law.nstate; ++c)
           for (uint32_t i = 0; i < kRuns; ++i) {
             const double size = std::fabs(b.state[size_t(c) * b.stride + i]);
-            if (!std::isfinite(size)) broken("state %u is no longer finite after %d steps of %g s: the step would be thrown away and the world stand still; let what is kept tend to a value", c, k * kSteps + step + 1, h);
+            if (!std::isfinite(size))
+              broken(
+                  "state %u is no longer finite after %d steps of %g s: the step would be thrown away and "
+                  "the world stand still; let what is kept tend to a value",
+                  c, k * kSteps + step + 1, h);
             block[size_t(c) * kRuns + i] = std::max(block[size_t(c) * kRuns + i], size);
           }
       }
@@ -63,18 +72,22 @@ std::string state_stays_bounded(const Subject &subject) {
       if (!(before[j] > 0)) continue;
       worst = std::max(worst, block[j] / before[j]);
       if (block[j] > kMost * before[j])
-        broken("state %zu grows by %.3g while the same %d steps of %g s are made %d times more: it feeds on itself and ends at infinity, where the world stands still; let what is kept tend to a value, or "
-               "grow with time at most", j / kRuns, block[j] / before[j], kSteps, h, kBlocks - 1 - kFirst);
+        broken(
+            "state %zu grows by %.3g while the same %d steps of %g s are made %d times more: it feeds on "
+            "itself and ends at infinity, where the world stands still; let what is kept tend to a value, or "
+            "grow with time at most",
+            j / kRuns, block[j] / before[j], kSteps, h, kBlocks - 1 - kFirst);
     }
   }
   return text("grows by %.2g at most", worst);
 }
 
-// ---- F16 ---------------------------------------------------------------------------------------------------------------------------
+// ---- F16 --------------------------------------------------------------------------------------------------
 
 namespace {
 
-// From rest along each axis, presliding to gross: an isotropic law knows no other direction. What it does between the axes is F02's to say.
+// From rest along each axis, presliding to gross: an isotropic law knows no other direction. What it does
+// between the axes is F02's to say.
 void stays_on_the_line(const Law &law, const Scales &s) {
   constexpr int kWays[][2] = {{1, 0}, {0, 1}, {-1, 0}, {0, -1}};
   for (const double h : {1e-4, 1e-2}) {
@@ -83,12 +96,15 @@ void stays_on_the_line(const Law &law, const Scales &s) {
     for (int step = 0; step < 60; ++step) {
       const double w = s.length() / h * (step < 20 ? 0.05 : step < 40 ? 1 : 20) * (step % 13 == 12 ? -1 : 1);
       for (uint32_t i = 0; i < b.n; ++i) b.slip(i, w * kWays[i][0], w * kWays[i][1]);
-      b.must(h), b.commit();
+      b.must(h);
+      b.commit();
       for (uint32_t i = 0; i < b.n; ++i) {
         const double across = b.out_ft[b.stride + i] * kWays[i][0] - b.out_ft[i] * kWays[i][1];
         if (!(std::fabs(across) <= 1e-9 * (b.ft(i) + s.level)))
-          broken("slip along one line from rest meets a force that lies %.3g rad off that line: what slides straight would be pushed aside; let the force lie along slip and state",
-                 std::asin(std::min(1.0, std::fabs(across) / b.ft(i))));
+          broken(
+              "slip along one line from rest meets a force that lies %.3g rad off that line: what slides "
+              "straight would be pushed aside; let the force lie along slip and state",
+              std::asin(std::min(1.0, std::fabs(across) / b.ft(i))));
       }
     }
   }
@@ -105,41 +121,53 @@ std::string opposes_slip(const Subject &subject) {
   double worst = 0;
   for (const double h : {1e-4, 1e-2}) {
     constexpr uint32_t kPairs = 32;
-    Lanes b(law, 2 * kPairs);                                 // the second half is the first, mirrored in the x axis
+    // the second half is the first, mirrored in the x axis
+    Lanes b(law, 2 * kPairs);
     press(b, s.fn);
     for (int step = 0; step < 60; ++step) {
       for (uint32_t i = 0; i < kPairs; ++i) {
-        const double heading = random.uniform(0, kTurn), w = s.length() / h * random.logarithmic(0.01, 10), push = s.level * random.logarithmic(0.1, 10);
+        const double heading = random.uniform(0, kTurn);
+        const double w = s.length() / h * random.logarithmic(0.01, 10);
+        const double push = s.level * random.logarithmic(0.1, 10);
         for (uint32_t side = 0; side < 2; ++side) {
           const uint32_t at = i + side * kPairs;
           const double x = std::cos(heading), y = side ? -std::sin(heading) : std::sin(heading);
           b.slip(at, w * x, w * y);
-          if (law.needs(DFM_NEED_FT_STOP)) b.stop[at] = -push * x, b.stop[b.stride + at] = -push * y;
+          if (law.needs(DFM_NEED_FT_STOP)) {
+            b.stop[at] = -push * x;
+            b.stop[b.stride + at] = -push * y;
+          }
         }
       }
-      b.must(h), b.commit();
+      b.must(h);
+      b.commit();
       for (uint32_t i = 0; i < kPairs; ++i) {
-        const double off = std::hypot(b.out_ft[i] - b.out_ft[i + kPairs], b.out_ft[b.stride + i] + b.out_ft[b.stride + i + kPairs]);
+        const double off = std::hypot(b.out_ft[i] - b.out_ft[i + kPairs],
+                                      b.out_ft[b.stride + i] + b.out_ft[b.stride + i + kPairs]);
         const double error = off == 0 ? 0 : off / (b.ft(i) + s.level);
         worst = std::max(worst, error);
         if (!(error <= 1e-12))
-          broken("a history and its mirror image give forces that are not each other's mirror image (off by %.2g): the law prefers a sense of turning, so bodies would curl; use lengths and dot products "
-                 "of the pairs, no cross product", error);
+          broken(
+              "a history and its mirror image give forces that are not each other's mirror image (off by "
+              "%.2g): the law prefers a sense of turning, so bodies would curl; use lengths and dot products "
+              "of the pairs, no cross product",
+              error);
       }
     }
   }
   return text("worst %.1e", worst);
 }
 
-// ---- F17 ---------------------------------------------------------------------------------------------------------------------------
+// ---- F17 --------------------------------------------------------------------------------------------------
 
-// One history of slip, swinging and steady, cut into steps of 1e-3 to 1e-6 s: at the same times the forces must draw near one another.
+// One history of slip, swinging and steady, cut into steps of 1e-3 to 1e-6 s: at the same times the forces
+// must draw near one another.
 std::string converges_with_step(const Subject &subject) {
   const Law law(subject, lively_params(subject));
   const Scales s = scales_of(law);
   constexpr uint32_t kRuns = 8;
   constexpr int kSamples = 10;
-  constexpr double kBetween = 2e-3;                           // s
+  constexpr double kBetween = 2e-3;  // s
   std::vector<std::vector<double>> course;
   const std::vector<int> cuts{2, 20, 200, 2000};
   for (const int cut : cuts) {
@@ -150,24 +178,32 @@ std::string converges_with_step(const Subject &subject) {
     stage("steps of %g s", h);
     for (int k = 0; k < kSamples * cut; ++k) {
       for (uint32_t i = 0; i < kRuns; ++i) {
-        const double amplitude = s.length() * std::pow(4.0, static_cast<double>(i / 2) - 1), t0 = k * h, period = 0.8 * kSamples * kBetween;
-        const double swing = amplitude * (std::sin(kTurn * (t0 + h) / period) - std::sin(kTurn * t0 / period)) / h;
+        const double amplitude = s.length() * std::pow(4.0, static_cast<double>(i / 2) - 1);
+        const double t0 = k * h;
+        const double period = 0.8 * kSamples * kBetween;
+        const double swing =
+            amplitude * (std::sin(kTurn * (t0 + h) / period) - std::sin(kTurn * t0 / period)) / h;
         b.slip(i, i % 2 ? amplitude / (kSamples * kBetween) : swing, 0);
       }
-      b.must(h), b.commit();
+      b.must(h);
+      b.commit();
       if ((k + 1) % cut == 0)
         for (uint32_t i = 0; i < kRuns; ++i) course.back().push_back(b.out_ft[i]);
     }
   }
-  std::vector<double> apart;                                  // shares of the level, from one cut to the next
+  std::vector<double> apart;  // shares of the level, from one cut to the next
   for (size_t c = 1; c < course.size(); ++c) {
     double most = 0;
-    for (size_t j = 0; j < course[c].size(); ++j) most = std::max(most, std::fabs(course[c][j] - course[c - 1][j]) / s.level);
+    for (size_t j = 0; j < course[c].size(); ++j)
+      most = std::max(most, std::fabs(course[c][j] - course[c - 1][j]) / s.level);
     apart.push_back(most);
   }
   if (!(apart[2] <= 0.5 * std::max(apart[0], apart[1]) + 0.02))
-    broken("the same slip cut into steps of 1e-5 and of 1e-6 s gives forces that differ by %.3g of the level (%.3g from 1e-4 to 1e-5 s): there is no force that finer steps tend to, so a result would depend on the step "
-           "for ever; divide by dt nothing but a change of the state", apart[2], apart[1]);
+    broken(
+        "the same slip cut into steps of 1e-5 and of 1e-6 s gives forces that differ by %.3g of the level "
+        "(%.3g from 1e-4 to 1e-5 s): there is no force that finer steps tend to, so a result would depend on "
+        "the step for ever; divide by dt nothing but a change of the state",
+        apart[2], apart[1]);
   return text("%.1e, %.1e, %.1e of the level apart", apart[0], apart[1], apart[2]);
 }
 

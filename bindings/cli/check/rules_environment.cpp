@@ -32,7 +32,10 @@ void use(const Subject &subject) {
 std::string keeps_rounding(const Subject &subject) {
   if (subject.type->kind == DFM_KIND_FRICTION) use(subject);
   if (const std::string &left = left_changed(); !left.empty())
-    broken("%s: the host would compute everything after it with other bits, and read numbers of files otherwise; put back what you change (fegetenv, fesetenv)", left.c_str());
+    broken(
+        "%s: the host would compute everything after it with other bits, and read numbers of files "
+        "otherwise; put back what you change (fegetenv, fesetenv)",
+        left.c_str());
   return "";
 }
 
@@ -43,7 +46,8 @@ std::string keeps_process(const Subject &subject) {
     const Captured streams;
     const Process before = Process::now();
     const auto look = [&](const char *when) {
-      if (const std::string what = before.difference(Process::now()); changed.empty() && !what.empty()) changed = std::string(when) + " " + what;
+      if (const std::string what = before.difference(Process::now()); changed.empty() && !what.empty())
+        changed = std::string(when) + " " + what;
     };
     try {
       Plugin plugin(subject.file);
@@ -51,7 +55,9 @@ std::string keeps_process(const Subject &subject) {
       for (uint32_t i = 0; i < plugin.types().size() && changed.empty(); ++i) {
         if (plugin.types()[i]->kind != DFM_KIND_FRICTION) continue;
         Subject one = subject;
-        one.plugin = &plugin, one.index = i, one.type = plugin.types()[i];
+        one.plugin = &plugin;
+        one.index = i;
+        one.type = plugin.types()[i];
         stage("its type #%u is used", i);
         use(one);
         look("using it");
@@ -73,10 +79,16 @@ std::string keeps_process(const Subject &subject) {
   if (!changed.empty()) broken("%s", changed.c_str());
   for (int k = 0; k < 2; ++k)
     if (!printed[k].empty())
-      broken("it writes to standard %s (\"%s\"): that lands in the middle of the program's own output, which others read; say it through dfm_host.log", k == 0 ? "output" : "error",
-             printed[k].substr(0, std::min<size_t>(printed[k].find('\n'), 60)).c_str());
-  if (threads > 0) broken("%d thread%s of it still run%s after it was unloaded: %s next instruction may be gone; join them in shutdown()", threads, threads == 1 ? "" : "s",
-                          threads == 1 ? "s" : "", threads == 1 ? "its" : "their");
+      broken(
+          "it writes to standard %s (\"%s\"): that lands in the middle of the program's own output, which "
+          "others read; say it through dfm_host.log",
+          k == 0 ? "output" : "error",
+          printed[k].substr(0, std::min<size_t>(printed[k].find('\n'), 60)).c_str());
+  if (threads > 0)
+    broken(
+        "%d thread%s of it still run%s after it was unloaded: %s next instruction may be gone; join them in "
+        "shutdown()",
+        threads, threads == 1 ? "" : "s", threads == 1 ? "s" : "", threads == 1 ? "its" : "their");
   return "";
 }
 

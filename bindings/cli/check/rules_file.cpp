@@ -31,20 +31,31 @@ std::vector<T> part(const std::string &bytes, uint64_t offset, uint64_t count) {
   return out;
 }
 
-std::string bytes_of(const std::string &file) { return read_file(file, uint64_t(1) << 30, "a plugin (a shared library)"); }
+std::string bytes_of(const std::string &file) {
+  return read_file(file, uint64_t(1) << 30, "a plugin (a shared library)");
+}
 
-struct Symbol { std::string name; ElfW(Sym) entry; };
-// Symbols of the section of that type (SHT_DYNSYM, SHT_SYMTAB); false where the file carries no section headers.
+struct Symbol {
+  std::string name;
+  ElfW(Sym) entry;
+};
+// Symbols of the section of that type (SHT_DYNSYM, SHT_SYMTAB); false where the file carries no
+// section headers.
 bool read_symbols(const std::string &bytes, unsigned type, std::vector<Symbol> &out) {
   const auto header = part<ElfW(Ehdr)>(bytes, 0, 1);
   if (header.empty()) return false;
-  const auto sections = part<ElfW(Shdr)>(bytes, header[0].e_shoff, header[0].e_shentsize == sizeof(ElfW(Shdr)) ? header[0].e_shnum : 0);
+  const auto sections = part<ElfW(Shdr)>(bytes, header[0].e_shoff,
+                                         header[0].e_shentsize == sizeof(ElfW(Shdr)) ? header[0].e_shnum : 0);
   for (const auto &section : sections) {
     if (section.sh_type != type || section.sh_link >= sections.size()) continue;
     const auto &strings = sections[section.sh_link];
     const auto names = part<char>(bytes, strings.sh_offset, strings.sh_size);
     for (const auto &s : part<ElfW(Sym)>(bytes, section.sh_offset, section.sh_size / sizeof(ElfW(Sym))))
-      out.push_back({s.st_name < names.size() ? std::string(&names[s.st_name], strnlen(&names[s.st_name], names.size() - s.st_name)) : "", s});
+      out.push_back(
+          {s.st_name < names.size()
+               ? std::string(&names[s.st_name], strnlen(&names[s.st_name], names.size() - s.st_name))
+               : "",
+           s});
   }
   return !sections.empty();
 }
@@ -52,13 +63,19 @@ bool read_symbols(const std::string &bytes, unsigned type, std::vector<Symbol> &
 // Defined symbols of the dynamic table that others may bind to.
 std::vector<std::string> exported(const std::string &file) {
   const std::string bytes = bytes_of(file);
-  if (bytes.size() < sizeof(ElfW(Ehdr)) || std::memcmp(bytes.data(), ELFMAG, SELFMAG) != 0) broken("it is no shared library (ELF), so nothing can load it; build it with deform_add_plugin");
+  if (bytes.size() < sizeof(ElfW(Ehdr)) || std::memcmp(bytes.data(), ELFMAG, SELFMAG) != 0)
+    broken("it is no shared library (ELF), so nothing can load it; build it with deform_add_plugin");
   std::vector<Symbol> symbols;
-  if (!read_symbols(bytes, SHT_DYNSYM, symbols)) skip("the file carries no section headers, so its symbols cannot be listed; check it before it is stripped of them");
+  if (!read_symbols(bytes, SHT_DYNSYM, symbols))
+    skip(
+        "the file carries no section headers, so its symbols cannot be listed; check it before it is "
+        "stripped of them");
   std::vector<std::string> out;
   for (const Symbol &s : symbols) {
     const int visibility = s.entry.st_other & 3, binding = s.entry.st_info >> 4;
-    if (s.entry.st_shndx == SHN_UNDEF || binding == STB_LOCAL || visibility == STV_HIDDEN || visibility == STV_INTERNAL) continue;
+    if (s.entry.st_shndx == SHN_UNDEF || binding == STB_LOCAL || visibility == STV_HIDDEN ||
+        visibility == STV_INTERNAL)
+      continue;
     if (!s.name.empty()) out.push_back(s.name);
   }
   std::sort(out.begin(), out.end());
@@ -71,7 +88,8 @@ std::string variable_at(const std::string &file, uint64_t address) {
   std::vector<Symbol> symbols;
   read_symbols(bytes_of(file), SHT_SYMTAB, symbols);
   for (const Symbol &s : symbols) {
-    const bool inside = address >= s.entry.st_value && address - s.entry.st_value < std::max<uint64_t>(s.entry.st_size, 1);
+    const bool inside =
+        address >= s.entry.st_value && address - s.entry.st_value < std::max<uint64_t>(s.entry.st_size, 1);
     if (inside && (s.entry.st_info & 15) == STT_OBJECT) return s.name.substr(0, s.name.find('.'));
   }
   return "";
@@ -80,12 +98,17 @@ std::string variable_at(const std::string &file, uint64_t address) {
 std::string exports_one_symbol(const Subject &subject) {
   std::vector<std::string> names = exported(subject.file);
   const auto entry = std::find(names.begin(), names.end(), "dfm_plugin_entry");
-  if (entry == names.end()) broken("it exports no dfm_plugin_entry, so no host can use it; define the entry of deform/plugin.h with DFM_EXPORT");
+  if (entry == names.end())
+    broken(
+        "it exports no dfm_plugin_entry, so no host can use it; define the entry of deform/plugin.h with "
+        "DFM_EXPORT");
   names.erase(entry);
   if (!names.empty())
-    broken("it exports %zu symbol%s beside dfm_plugin_entry (%s%s), which another plugin or the host may bind to instead of its own; build it with "
-           "deform_add_plugin, or link with -Wl,--version-script holding { global: dfm_plugin_entry; local: *; };",
-           names.size(), names.size() == 1 ? "" : "s", names[0].c_str(), names.size() > 1 ? ", ..." : "");
+    broken(
+        "it exports %zu symbol%s beside dfm_plugin_entry (%s%s), which another plugin or the host may bind "
+        "to instead of its own; build it with deform_add_plugin, or link with -Wl,--version-script holding { "
+        "global: dfm_plugin_entry; local: *; };",
+        names.size(), names.size() == 1 ? "" : "s", names[0].c_str(), names.size() > 1 ? ", ..." : "");
   return "dfm_plugin_entry";
 }
 
@@ -94,35 +117,42 @@ std::string refuses_unknown_abi(const Subject &subject) {
     const Kept kept("loading it");
     void *image = dlopen(std::filesystem::absolute(subject.file).c_str(), RTLD_NOW | RTLD_LOCAL);
     if (image && !entry_of(image)) skip("it has no dfm_plugin_entry (V01)");
-    const Plugin plugin(subject.file);                        // says why it does not load
+    const Plugin plugin(subject.file);  // says why it does not load
     return "";
   }
   const dfm_plugin_fn entry = entry_of(subject.plugin->image());
-  const struct { uint32_t abi, draft; } strangers[] = {{DFM_ABI + 1, DFM_ABI_DRAFT}, {DFM_ABI, DFM_ABI_DRAFT + 1}, {77, 77}};
+  const struct {
+    uint32_t abi, draft;
+  } strangers[] = {{DFM_ABI + 1, DFM_ABI_DRAFT}, {DFM_ABI, DFM_ABI_DRAFT + 1}, {77, 77}};
   for (const auto &stranger : strangers) {
     stage("the entry is called by a host of ABI %u draft %u", stranger.abi, stranger.draft);
     Host host;
     const Kept kept("its entry");
-    host.table().abi = stranger.abi, host.table().abi_draft = stranger.draft;
+    host.table().abi = stranger.abi;
+    host.table().abi_draft = stranger.draft;
     if (entry(&host.table(), stranger.abi, stranger.abi))
-      broken("its entry hands itself to a host of ABI %u draft %u, which it cannot know, and would be called with structs of another shape; return NULL "
-             "unless DFM_ABI_OK(host)", stranger.abi, stranger.draft);
+      broken(
+          "its entry hands itself to a host of ABI %u draft %u, which it cannot know, and would be called "
+          "with structs of another shape; return NULL unless DFM_ABI_OK(host)",
+          stranger.abi, stranger.draft);
   }
   return text("ABI %u draft %u", DFM_ABI, DFM_ABI_DRAFT);
 }
 
-// ---- V03 ---------------------------------------------------------------------------------------------------------------------------
+// ---- V03 --------------------------------------------------------------------------------------------------
 
 namespace {
 
-const char *const kEffects[] = {"stiction", "stribeck", "viscous", "presliding", "hysteresis", "breakaway", "volume", "anisotropy",
-                                "plasticity", "damping", "large_rotation", "self_contact", "two_way_rigid", "cutting"};
+const char *const kEffects[] = {"stiction",       "stribeck",     "viscous",       "presliding", "hysteresis",
+                                "breakaway",      "volume",       "anisotropy",    "plasticity", "damping",
+                                "large_rotation", "self_contact", "two_way_rigid", "cutting"};
 
 bool reverse_dns(const char *id) {
   bool dot = false;
   char last = '.';
   for (const char *c = id; *c; last = *c++) {
-    if (*c == '.' ? last == '.' : !(std::isalnum(static_cast<unsigned char>(*c)) || *c == '_' || *c == '-')) return false;
+    if (*c == '.' ? last == '.' : !(std::isalnum(static_cast<unsigned char>(*c)) || *c == '_' || *c == '-'))
+      return false;
     dot |= *c == '.';
   }
   return dot && last != '.';
@@ -133,27 +163,42 @@ void effects_known(const dfm_type &type) {
   for (const char *const *e = type.effects; e && *e; ++e) {
     if (std::strchr(*e, '.') || std::find(known.begin(), known.end(), *e) != known.end()) continue;
     const std::string near = nearest(*e, known);
-    broken("it promises \"%s\", a word that no scene can ask for%s%s%s; a word of your own reads \"vendor.word\"", *e, near.empty() ? "" : "; did you mean \"",
-           near.c_str(), near.empty() ? "" : "\"");
+    broken(
+        "it promises \"%s\", a word that no scene can ask for%s%s%s; a word of your own reads "
+        "\"vendor.word\"",
+        *e, near.empty() ? "" : "; did you mean \"", near.c_str(), near.empty() ? "" : "\"");
   }
 }
 
 void slots_sound(const dfm_slot *slots, uint32_t n, bool law) {
-  if (n && !slots) broken("it has %u state slots but slots is NULL, so the host cannot keep its state; name them", n);
+  if (n && !slots)
+    broken("it has %u state slots but slots is NULL, so the host cannot keep its state; name them", n);
   for (uint32_t i = 0; i < n; ++i) {
     const dfm_slot &s = slots[i];
-    const uint32_t width = s.kind == DFM_SLOT_TANGENT ? 2 : s.kind == DFM_SLOT_VECTOR ? 3 : s.kind == DFM_SLOT_ROTATION ? 4 : s.width;
+    const uint32_t width = s.kind == DFM_SLOT_TANGENT    ? 2
+                           : s.kind == DFM_SLOT_VECTOR   ? 3
+                           : s.kind == DFM_SLOT_ROTATION ? 4
+                                                         : s.width;
     if (s.kind < DFM_SLOT_SCALAR || s.kind > DFM_SLOT_ROTATION || s.width == 0 || s.width != width)
-      broken("state slot %u has kind %u and width %u, which do not agree, so the host would turn the wrong numbers; a tangent pair has width 2", i, s.kind, s.width);
+      broken(
+          "state slot %u has kind %u and width %u, which do not agree, so the host would turn the wrong "
+          "numbers; a tangent pair has width 2",
+          i, s.kind, s.width);
     if (law ? s.unit != DFM_PER_CONTACT : s.unit < DFM_PER_POINT || s.unit > DFM_PER_INSTANCE)
-      broken("state slot %u has unit %u, which the host does not keep for it; a law's state is DFM_PER_CONTACT", i, s.unit);
+      broken(
+          "state slot %u has unit %u, which the host does not keep for it; a law's state is DFM_PER_CONTACT",
+          i, s.unit);
   }
 }
 
 void law_sound(const dfm_type &type, const dfm_friction &law) {
   if (!law.eval) broken("a law without eval cannot be evaluated; set dfm_friction.eval");
-  if (!law.prepare != !law.release) broken("it has only one of prepare and release, so its tables leak or are never made; give both or neither");
-  if (law.needs & ~31u) broken("needs has bits that this ABI does not know (%#x), which no host fills; use DFM_NEED_*", law.needs);
+  if (!law.prepare != !law.release)
+    broken(
+        "it has only one of prepare and release, so its tables leak or are never made; give both or neither");
+  if (law.needs & ~31u)
+    broken("needs has bits that this ABI does not know (%#x), which no host fills; use DFM_NEED_*",
+           law.needs);
   if (law.flags & ~15u) broken("flags has bits that this ABI does not know (%#x); use DFM_FRIC_*", law.flags);
   if ((law.flags & DFM_FRIC_SET_VALUED) && !(law.needs & DFM_NEED_FT_STOP))
     broken("a set-valued law that does not need FT_STOP cannot hold at rest; add DFM_NEED_FT_STOP to needs");
@@ -162,7 +207,10 @@ void law_sound(const dfm_type &type, const dfm_friction &law) {
   const Kept kept("state");
   const std::vector<double> params = default_params(type);
   const dfm_slots *own = law.state(params.data());
-  if (!own || own->size < sizeof *own) broken("its function state names no slots for its defaults, so the host cannot keep its state; return constant tables");
+  if (!own || own->size < sizeof *own)
+    broken(
+        "its function state names no slots for its defaults, so the host cannot keep its state; return "
+        "constant tables");
   slots_sound(own->slots, own->nslot, true);
 }
 
@@ -170,35 +218,47 @@ void law_sound(const dfm_type &type, const dfm_friction &law) {
 
 std::string metadata_complete(const Subject &subject) {
   const dfm_type &type = *subject.type;
-  const struct { const char *key, *text, *remedy; } fields[] = {{"name", type.name, "what a list shows"},
-                                                              {"version", type.version, "results are quoted with it"},
-                                                              {"licence", type.licence, "without one nobody may pass it on"},
-                                                              {"source", type.source, "paper and equation: nobody can judge a formula without"}};
+  const struct {
+    const char *key, *text, *remedy;
+  } fields[] = {{"name", type.name, "what a list shows"},
+                {"version", type.version, "results are quoted with it"},
+                {"licence", type.licence, "without one nobody may pass it on"},
+                {"source", type.source, "paper and equation: nobody can judge a formula without"}};
   if (!type.id || !reverse_dns(type.id))
-    broken("its id \"%s\" is not in reverse-DNS form, so two plugins may claim it; call it like \"org.example.mylaw\"", type.id ? type.id : "");
+    broken(
+        "its id \"%s\" is not in reverse-DNS form, so two plugins may claim it; call it like "
+        "\"org.example.mylaw\"",
+        type.id ? type.id : "");
   for (const auto &field : fields)
-    if (!field.text || !*field.text) broken("its metadata lacks \"%s\" (%s), and the library refuses it; fill it in", field.key, field.remedy);
+    if (!field.text || !*field.text)
+      broken("its metadata lacks \"%s\" (%s), and the library refuses it; fill it in", field.key,
+             field.remedy);
   const auto &types = subject.plugin->types();
   for (uint32_t i = 0; i < types.size(); ++i)
     if (i != subject.index && types[i]->id && std::strcmp(types[i]->id, type.id) == 0)
-      broken("two types of this file have the id \"%s\", so one of them cannot be found; give each its own", type.id);
+      broken("two types of this file have the id \"%s\", so one of them cannot be found; give each its own",
+             type.id);
   effects_known(type);
   if (type.kind == DFM_KIND_FRICTION) {
     law_sound(type, law_of(subject));
   } else if (type.kind == DFM_KIND_MODEL) {
     const auto &model = *static_cast<const dfm_model *>(type.ops);
-    if (!model.create || !model.destroy) broken("a model without create and destroy cannot be made; set both");
-    if (!model.add_forces && !model.extension) broken("a model without add_forces and without the extension \"dfm.stepper/1\" cannot move; give one");
-    if (model.cells == 0) broken("a model that accepts no kind of cell fits no mesh; set cells to DFM_CELL_*");
+    if (!model.create || !model.destroy)
+      broken("a model without create and destroy cannot be made; set both");
+    if (!model.add_forces && !model.extension)
+      broken("a model without add_forces and without the extension \"dfm.stepper/1\" cannot move; give one");
+    if (model.cells == 0)
+      broken("a model that accepts no kind of cell fits no mesh; set cells to DFM_CELL_*");
     slots_sound(model.slots, model.nslot, false);
   } else {
     const auto &solver = *static_cast<const dfm_solver *>(type.ops);
-    if (!solver.analyse || !solver.factor || !solver.solve || !solver.release) broken("a solver needs analyse, factor, solve and release; set all four");
+    if (!solver.analyse || !solver.factor || !solver.solve || !solver.release)
+      broken("a solver needs analyse, factor, solve and release; set all four");
   }
   return text("%s %s, %s", type.id, type.version, type.licence);
 }
 
-// ---- V04 ---------------------------------------------------------------------------------------------------------------------------
+// ---- V04 --------------------------------------------------------------------------------------------------
 
 namespace {
 
@@ -208,22 +268,45 @@ void row_sane(const dfm_type &type, uint32_t i) {
   const char *k = key.c_str();
   if (key.empty()) broken("row %u of the table has no key, so nothing can set it; give one", i);
   for (uint32_t j = 0; j < i; ++j)
-    if (type.params[j].key && key == type.params[j].key) broken("parameter \"%s\" stands twice in the table, so the second can never be set; rename one", k);
-  if (!row.label || !*row.label || !row.unit || !*row.unit) broken("parameter \"%s\" lacks a label or a unit, so nobody knows what to give; the unit of a number is \"1\"", k);
+    if (type.params[j].key && key == type.params[j].key)
+      broken("parameter \"%s\" stands twice in the table, so the second can never be set; rename one", k);
+  if (!row.label || !*row.label || !row.unit || !*row.unit)
+    broken(
+        "parameter \"%s\" lacks a label or a unit, so nobody knows what to give; the unit of a number is "
+        "\"1\"",
+        k);
   if (!std::isfinite(row.min) || !std::isfinite(row.max) || !(row.min <= row.def && row.def <= row.max))
-    broken("parameter \"%s\": the range [%g, %g] must be finite and hold the default %g, or the library refuses the table; correct it", k, row.min, row.max, row.def);
-  if (row.width < 1 || row.width > 16) broken("parameter \"%s\" has width %u; 1 to 16 doubles are packed", k, row.width);
+    broken(
+        "parameter \"%s\": the range [%g, %g] must be finite and hold the default %g, or the library refuses "
+        "the table; correct it",
+        k, row.min, row.max, row.def);
+  if (row.width < 1 || row.width > 16)
+    broken("parameter \"%s\" has width %u; 1 to 16 doubles are packed", k, row.width);
   if ((row.flags & (DFM_PARAM_INTEGER | DFM_PARAM_ENUM)) && row.def != std::floor(row.def))
-    broken("parameter \"%s\" is a whole number but its default is %g, which is refused when it is given; round it", k, row.def);
-  if ((row.flags & DFM_PARAM_LOG_SCALE) && !(row.min > 0)) broken("parameter \"%s\" has a logarithmic scale that begins at %g, where no slider can begin; let min be above 0", k, row.min);
-  if (row.flags & ~127u) broken("parameter \"%s\" has flags that this ABI does not know (%#x); use DFM_PARAM_*", k, row.flags);
+    broken(
+        "parameter \"%s\" is a whole number but its default is %g, which is refused when it is given; round "
+        "it",
+        k, row.def);
+  if ((row.flags & DFM_PARAM_LOG_SCALE) && !(row.min > 0))
+    broken(
+        "parameter \"%s\" has a logarithmic scale that begins at %g, where no slider can begin; let min be "
+        "above 0",
+        k, row.min);
+  if (row.flags & ~127u)
+    broken("parameter \"%s\" has flags that this ABI does not know (%#x); use DFM_PARAM_*", k, row.flags);
   if ((row.flags & DFM_PARAM_LIST) && !(row.min <= 0 && 0 <= row.max))
-    broken("parameter \"%s\" is a list, whose values that are not given read 0, which its range [%g, %g] excludes; widen it", k, row.min, row.max);
+    broken(
+        "parameter \"%s\" is a list, whose values that are not given read 0, which its range [%g, %g] "
+        "excludes; widen it",
+        k, row.min, row.max);
   if (row.flags & DFM_PARAM_ENUM) {
     uint32_t n = 0;
     while (row.names && n < 4096 && row.names[n]) ++n;
     if (n == 0 || row.min != 0 || row.max != n - 1)
-      broken("parameter \"%s\" names %u words, which needs the range [0, %g]; a value outside the words would be read otherwise", k, n, n - 1.0);
+      broken(
+          "parameter \"%s\" names %u words, which needs the range [0, %g]; a value outside the words would "
+          "be read otherwise",
+          k, n, n - 1.0);
   }
 }
 
@@ -236,31 +319,44 @@ void asks_check(const dfm_friction &law, const std::vector<double> &params) {
     const Kept kept("check");
     law.check(params.data(), room, cap);
     for (size_t i = cap; i < sizeof room; ++i)
-      if (room[i] != 0x5a) broken("check writes %zu bytes past the %zu that it was given for its sentence, over what lies behind; use snprintf(why, cap, ...)", i - cap + 1, cap);
+      if (room[i] != 0x5a)
+        broken(
+            "check writes %zu bytes past the %zu that it was given for its sentence, over what lies behind; "
+            "use snprintf(why, cap, ...)",
+            i - cap + 1, cap);
   }
 }
 
-// Through the library, as a scene would: a value beside the range must not reach the law. What the library refuses to load is V03's to say.
+// Through the library, as a scene would: a value beside the range must not reach the law. What the library
+// refuses to load is V03's to say.
 void library_refuses(const Subject &subject) {
   std::string folder = (std::filesystem::temp_directory_path() / "deform_check_XXXXXX").string();
   if (!mkdtemp(folder.data())) return;
   dfm_context_def def = dfm_context_def_default();
-  def.plugin_dir = folder.c_str();                              // with nothing in it: no other plugin is to be asked
+  // with nothing in it: no other plugin is to be asked
+  def.plugin_dir = folder.c_str();
   dfm_context *made = nullptr;
   const dfm_status created = dfm_context_create(&def, &made);
   rmdir(folder.c_str());
   const std::unique_ptr<dfm_context, decltype(&dfm_context_destroy)> context(made, dfm_context_destroy);
   dfm_law law = 0;
-  if (created < 0 || dfm_plugin_load(made, subject.file.c_str()) < 0 || dfm_law_open(made, subject.type->id, &law) < 0) return;
-  if (dfm_law_pack(law, nullptr, 0, nullptr, nullptr) < 0) broken("the library refuses its defaults (%s); choose defaults that check accepts", dfm_last_error());
+  if (created < 0 || dfm_plugin_load(made, subject.file.c_str()) < 0 ||
+      dfm_law_open(made, subject.type->id, &law) < 0)
+    return;
+  if (dfm_law_pack(law, nullptr, 0, nullptr, nullptr) < 0)
+    broken("the library refuses its defaults (%s); choose defaults that check accepts", dfm_last_error());
   for (uint32_t i = 0; i < subject.type->nparam; ++i) {
     const dfm_param &row = subject.type->params[i];
-    for (const double outside : {std::nextafter(row.max, HUGE_VAL), std::nextafter(row.min, -HUGE_VAL), std::numeric_limits<double>::quiet_NaN()}) {
+    for (const double outside : {std::nextafter(row.max, HUGE_VAL), std::nextafter(row.min, -HUGE_VAL),
+                                 std::numeric_limits<double>::quiet_NaN()}) {
       const std::vector<double> values(row.width, outside);
       const dfm_param_value value{row.key, values.data(), row.width};
       const dfm_params params{sizeof params, 1, &value};
       if (dfm_law_pack(law, &params, 0, nullptr, nullptr) == DFM_OK)
-        broken("parameter \"%s\" = %.17g lies outside [%g, %g] and is accepted, so the law meets values that it never promised to bear; correct the range", row.key, outside, row.min, row.max);
+        broken(
+            "parameter \"%s\" = %.17g lies outside [%g, %g] and is accepted, so the law meets values that it "
+            "never promised to bear; correct the range",
+            row.key, outside, row.min, row.max);
     }
   }
 }
@@ -274,7 +370,11 @@ std::string parameters_sane(const Subject &subject) {
   const dfm_friction &law = law_of(subject);
   const std::vector<double> defaults = default_params(type);
   stage("check is asked about the defaults");
-  if (const std::string why = refusal(law, defaults); !why.empty()) broken("its own check refuses the defaults (%s), so a scene that names no parameter fails; choose defaults that check accepts", why.c_str());
+  if (const std::string why = refusal(law, defaults); !why.empty())
+    broken(
+        "its own check refuses the defaults (%s), so a scene that names no parameter fails; choose defaults "
+        "that check accepts",
+        why.c_str());
   if (law.check) asks_check(law, defaults);
   library_refuses(subject);
   // The ends of every range, one at a time: check refuses them with a sentence, or eval answers them.
@@ -286,7 +386,11 @@ std::string parameters_sane(const Subject &subject) {
       std::fill_n(params.begin() + static_cast<std::ptrdiff_t>(at), type.params[i].width, end);
       stage("parameter \"%s\" at %g", type.params[i].key, end);
       if (const std::string why = refusal(law, params); !why.empty()) {
-        if (why == "(no reason)") broken("check refuses \"%s\" = %g without a sentence, so the user does not learn what to change; write one into why", type.params[i].key, end);
+        if (why == "(no reason)")
+          broken(
+              "check refuses \"%s\" = %g without a sentence, so the user does not learn what to change; "
+              "write one into why",
+              type.params[i].key, end);
         ++refused;
         continue;
       }
@@ -296,11 +400,15 @@ std::string parameters_sane(const Subject &subject) {
         if (made.needs(DFM_NEED_FN)) b.fn[k] = std::pow(10.0, k % 4);
         b.slip(k, k < 4 ? 0.0 : 1e-3, 0);
       }
-      b.must(1e-3), b.commit(), b.must(1e-3);
+      b.must(1e-3);
+      b.commit();
+      b.must(1e-3);
       for (uint32_t k = 0; k < b.n; ++k)
         if (!std::isfinite(b.ft(k)))
-          broken("with \"%s\" = %g, the end of its range, the force at %g N and %g m/s is not finite and the batch would be discarded; narrow the range, or let check refuse it",
-                 type.params[i].key, end, b.fn[k], k < 4 ? 0.0 : 1e-3);
+          broken(
+              "with \"%s\" = %g, the end of its range, the force at %g N and %g m/s is not finite and the "
+              "batch would be discarded; narrow the range, or let check refuse it",
+              type.params[i].key, end, b.fn[k], k < 4 ? 0.0 : 1e-3);
     }
   return text("%u parameters, %u ends of ranges refused by check", type.nparam, refused);
 }

@@ -29,16 +29,24 @@ std::string rests_at_zero(const Subject &subject) {
     }
     std::fill_n(b.state, size_t(law.nstate) * b.stride, 0.0);
     // Several steps: a state that ages at rest is no fault, a force that comes of it is.
-    for (int k = 0; k < 5; ++k) b.must(h), b.commit();
+    for (int k = 0; k < 5; ++k) {
+      b.must(h);
+      b.commit();
+    }
     for (uint32_t i = 0; i < b.n; ++i) {
-      if (!(b.ft(i) == 0)) broken("at rest, with no state and a normal force of %g N, it pushes with %g N: bodies that only lie there would be set in motion; let the force vanish with slip and state", b.fn[i], b.ft(i));
-      if (law.nstate == 0 && !(b.stored[i] == 0)) broken("at rest it says that %g J are stored although it keeps no state; write 0", b.stored[i]);
+      if (!(b.ft(i) == 0))
+        broken(
+            "at rest, with no state and a normal force of %g N, it pushes with %g N: bodies that only lie "
+            "there would be set in motion; let the force vanish with slip and state",
+            b.fn[i], b.ft(i));
+      if (law.nstate == 0 && !(b.stored[i] == 0))
+        broken("at rest it says that %g J are stored although it keeps no state; write 0", b.stored[i]);
     }
   }
   return "";
 }
 
-// ---- F02: 360 copies of one history, each turned by a degree more -------------------------------------------------------------------
+// ---- F02: 360 copies of one history, each turned by a degree more -----------------------------------------
 
 std::string turns_with_frame(const Subject &subject) {
   if (!(law_of(subject).flags & DFM_FRIC_ISOTROPIC)) skip("the law is not flagged DFM_FRIC_ISOTROPIC");
@@ -51,22 +59,32 @@ std::string turns_with_frame(const Subject &subject) {
     press(b, s.fn);
     for (int step = 0; step < 40; ++step) {
       // straight from rest first, then turns and reversals, from presliding to gross sliding
-      const double heading = step < 5 ? 0 : random.uniform(0, kTurn), w = s.length() / h * (step < 5 ? 0.2 : random.logarithmic(0.01, 10));
+      const double heading = step < 5 ? 0 : random.uniform(0, kTurn);
+      const double w = s.length() / h * (step < 5 ? 0.2 : random.logarithmic(0.01, 10));
       const double push = s.level * random.logarithmic(0.1, 10);
       for (uint32_t i = 0; i < b.n; ++i) {
         const double turn = kTurn * i / 360;
         b.slip(i, w * std::cos(heading + turn), w * std::sin(heading + turn));
-        if (law.needs(DFM_NEED_FT_STOP)) b.stop[i] = -push * std::cos(heading + turn), b.stop[b.stride + i] = -push * std::sin(heading + turn);
+        if (law.needs(DFM_NEED_FT_STOP)) {
+          b.stop[i] = -push * std::cos(heading + turn);
+          b.stop[b.stride + i] = -push * std::sin(heading + turn);
+        }
       }
       b.must(h);
       const double x = b.out_ft[0], y = b.out_ft[b.stride];
       for (uint32_t i = 1; i < b.n; ++i) {
-        const double turn = kTurn * i / 360, ex = x * std::cos(turn) - y * std::sin(turn), ey = x * std::sin(turn) + y * std::cos(turn);
-        const double off = std::hypot(b.out_ft[i] - ex, b.out_ft[b.stride + i] - ey), error = off == 0 ? 0 : off / (b.ft(0) + s.level);
+        const double turn = kTurn * i / 360;
+        const double ex = x * std::cos(turn) - y * std::sin(turn);
+        const double ey = x * std::sin(turn) + y * std::cos(turn);
+        const double off = std::hypot(b.out_ft[i] - ex, b.out_ft[b.stride + i] - ey);
+        const double error = off == 0 ? 0 : off / (b.ft(0) + s.level);
         worst = std::max(worst, error);
         if (!(error <= 1e-12))
-          broken("the same history turned by %u degrees gives %.6g N instead of %.6g N (off by %.2g of it): which way a body slides would depend on how its triangles are numbered; use lengths "
-                 "and dot products of the pairs, never their components", i, b.ft(i), std::hypot(x, y), error);
+          broken(
+              "the same history turned by %u degrees gives %.6g N instead of %.6g N (off by %.2g of it): "
+              "which way a body slides would depend on how its triangles are numbered; use lengths and dot "
+              "products of the pairs, never their components",
+              i, b.ft(i), std::hypot(x, y), error);
       }
       b.commit();
     }
@@ -74,7 +92,7 @@ std::string turns_with_frame(const Subject &subject) {
   return text("worst %.1e", worst);
 }
 
-// ---- F03 ---------------------------------------------------------------------------------------------------------------------------
+// ---- F03 --------------------------------------------------------------------------------------------------
 
 namespace {
 
@@ -91,25 +109,33 @@ void loops_dissipate(const Law &law, const Scales &s) {
       for (int k = 0; k < kPoints; ++k) {
         for (uint32_t i = 0; i < n; ++i) {
           const double a = sizes[i / kinds], p0 = kTurn * k / kPoints, p1 = kTurn * (k + 1) / kPoints;
-          const double dx = a * (std::sin(p1) - std::sin(p0)), round = a * (std::cos(p1) - std::cos(p0)), eight = a * (std::sin(2 * p1) - std::sin(2 * p0));
+          const double dx = a * (std::sin(p1) - std::sin(p0));
+          const double round = a * (std::cos(p1) - std::cos(p0));
+          const double eight = a * (std::sin(2 * p1) - std::sin(2 * p0));
           b.slip(i, dx / h, (i % kinds == 0 ? 0 : i % kinds == 1 ? round : eight) / h);
         }
-        b.must(h), b.commit();
+        b.must(h);
+        b.commit();
         for (uint32_t i = 0; turn == 2 && i < n; ++i) {
-          // slip() pushes with far more than the law holds, so a law that stops a contact anyway did not let it slip: no work
-          const double vx = law.needs(DFM_NEED_VT) ? b.vt[i] : 0, vy = law.needs(DFM_NEED_VT) ? b.vt[b.stride + i] : 0;
+          // slip() pushes with far more than the law holds, so a law that stops a contact anyway did not let
+          // it slip: no work
+          const double vx = law.needs(DFM_NEED_VT) ? b.vt[i] : 0;
+          const double vy = law.needs(DFM_NEED_VT) ? b.vt[b.stride + i] : 0;
           work[i] -= h * (b.out_ft[i] * vx + b.out_ft[b.stride + i] * vy);
           moved[i] += h * b.ft(i) * std::hypot(vx, vy);
         }
       }
     for (uint32_t i = 0; i < n; ++i)
       if (!(work[i] >= -1e-9 * moved[i]))
-        broken("a closed loop of slip of %.3g m at steps of %g s gives %.3g J instead of taking some: bodies in contact would speed up by themselves; the force must oppose the slip (ft = -F)",
-               sizes[i / kinds], h, -work[i]);
+        broken(
+            "a closed loop of slip of %.3g m at steps of %g s gives %.3g J instead of taking some: bodies in "
+            "contact would speed up by themselves; the force must oppose the slip (ft = -F)",
+            sizes[i / kinds], h, -work[i]);
   }
 }
 
-// doc/laws/formulas.md, rule 3 of every law: random slip, steps and normal forces; at no time has more come out than was stored.
+// doc/laws/formulas.md, rule 3 of every law: random slip, steps and normal forces; at no time has more come
+// out than was stored.
 void gives_back_no_more(const Law &law, const Scales &s, Random &random) {
   constexpr uint32_t kRuns = 64;
   constexpr int kSteps = 2500;
@@ -118,17 +144,21 @@ void gives_back_no_more(const Law &law, const Scales &s, Random &random) {
   for (int k = 0; k < kSteps; ++k) {
     const double h = random.logarithmic(1e-5, 1.0 / 60);
     for (uint32_t i = 0; i < kRuns; ++i) {
-      if (law.needs(DFM_NEED_FN)) b.fn[i] = random.uniform(0, 1) < 0.05 ? 0 : s.fn * random.logarithmic(0.05, 20);
+      if (law.needs(DFM_NEED_FN))
+        b.fn[i] = random.uniform(0, 1) < 0.05 ? 0 : s.fn * random.logarithmic(0.05, 20);
       // half of the runs keep their direction for a while: a bristle must be wound up before it can give back
       const bool straight = i % 2 && k % 50;
-      const double w = random.uniform(0, 1) < 0.1 ? 0 : random.logarithmic(1e-5, 3), heading = straight ? kTurn * i / kRuns : random.uniform(0, kTurn);
+      const double w = random.uniform(0, 1) < 0.1 ? 0 : random.logarithmic(1e-5, 3);
+      const double heading = straight ? kTurn * i / kRuns : random.uniform(0, kTurn);
       b.slip(i, w * std::cos(heading), w * std::sin(heading));
       if (law.needs(DFM_NEED_FT_STOP)) {
         const double push = w > 0 ? s.level * random.logarithmic(0.01, 100) : 0;
-        b.stop[i] = -push * std::cos(heading), b.stop[b.stride + i] = -push * std::sin(heading);
+        b.stop[i] = -push * std::cos(heading);
+        b.stop[b.stride + i] = -push * std::sin(heading);
       }
     }
-    b.must(h), b.commit();
+    b.must(h);
+    b.commit();
     for (uint32_t i = 0; i < kRuns; ++i) {
       // a law that holds (FT_STOP, mode 1) has no slip in this step
       const bool held = law.needs(DFM_NEED_FT_STOP) && b.mode[i] == 1;
@@ -136,8 +166,11 @@ void gives_back_no_more(const Law &law, const Scales &s, Random &random) {
       work[i] -= h * (b.out_ft[i] * vx + b.out_ft[b.stride + i] * vy);
       moved[i] += h * b.ft(i) * std::hypot(vx, vy);
       if (!(work[i] >= -1e-9 * moved[i]))
-        broken("after %d random steps of slip and normal force it has given %.3g J although nothing was stored when it began: contacts would feed their bodies with energy; damp the state "
-               "less at high speed, project it on the cone when the normal force falls, or do not flag DFM_FRIC_PASSIVE", k + 1, -work[i]);
+        broken(
+            "after %d random steps of slip and normal force it has given %.3g J although nothing was stored "
+            "when it began: contacts would feed their bodies with energy; damp the state less at high speed, "
+            "project it on the cone when the normal force falls, or do not flag DFM_FRIC_PASSIVE",
+            k + 1, -work[i]);
     }
   }
 }
@@ -155,33 +188,49 @@ std::string dissipates(const Subject &subject) {
   return "";
 }
 
-// ---- F05 ---------------------------------------------------------------------------------------------------------------------------
+// ---- F05 --------------------------------------------------------------------------------------------------
 
 namespace {
 
-// One input moved by +-d: best agreement over decades of d and over forward, backward and central differences (a law has corners, and next
-// to one only one side is its derivative).
+// One input moved by +-d: best agreement over decades of d and over forward, backward and central differences
+// (a law has corners, and next to one only one side is its derivative).
 struct Difference {
   Difference(const Law &law, const Lanes &at, double h)
-      : base(at), plus(law, at.n), minus(law, at.n), step(h), best(size_t(at.n) * 2, HUGE_VAL), seen(size_t(at.n) * 2, 0.0) {}
-  // input(b, i) is the number that moves, size(i) its scale, given(row, i) the law's derivative, floor(i) what counts as nothing.
+      : base(at),
+        plus(law, at.n),
+        minus(law, at.n),
+        step(h),
+        best(size_t(at.n) * 2, HUGE_VAL),
+        seen(size_t(at.n) * 2, 0.0) {}
+  // input(b, i) is the number that moves, size(i) its scale, given(row, i) the law's derivative, floor(i)
+  // what counts as nothing.
   template <class Input, class Size, class Given, class Floor>
   void run(Input input, Size size, Given given, Floor floor) {
     for (int decade = 2; decade <= 7; ++decade) {
       for (uint32_t i = 0; i < base.n; ++i) {
-        plus.take(i, base, i), minus.take(i, base, i);
+        plus.take(i, base, i);
+        minus.take(i, base, i);
         const double d = size(i) * std::pow(10.0, -decade);
-        *input(plus, i) += d, *input(minus, i) -= d;
+        *input(plus, i) += d;
+        *input(minus, i) -= d;
       }
-      plus.must(step), minus.must(step);
+      plus.must(step);
+      minus.must(step);
       for (uint32_t i = 0; i < base.n; ++i)
         for (uint32_t row = 0; row < 2; ++row) {
-          const double up = *input(plus, i), down = *input(minus, i), here = *input(const_cast<Lanes &>(base), i);
+          const double up = *input(plus, i);
+          const double down = *input(minus, i);
+          const double here = *input(const_cast<Lanes &>(base), i);
           const auto f = [&](const Lanes &b) { return b.out_ft[size_t(row) * b.stride + i]; };
           const double told = given(row, i);
-          for (const double seen_now : {(f(plus) - f(minus)) / (up - down), (f(plus) - f(base)) / (up - here), (f(base) - f(minus)) / (here - down)}) {
-            const double off = std::fabs(seen_now - told), error = off == 0 ? 0 : off / (std::fabs(told) + floor(i));
-            if (error < best[2 * i + row]) best[2 * i + row] = error, seen[2 * i + row] = seen_now;
+          for (const double seen_now : {(f(plus) - f(minus)) / (up - down), (f(plus) - f(base)) / (up - here),
+                                        (f(base) - f(minus)) / (here - down)}) {
+            const double off = std::fabs(seen_now - told);
+            const double error = off == 0 ? 0 : off / (std::fabs(told) + floor(i));
+            if (error < best[2 * i + row]) {
+              best[2 * i + row] = error;
+              seen[2 * i + row] = seen_now;
+            }
           }
         }
     }
@@ -195,7 +244,8 @@ struct Difference {
 }  // namespace
 
 std::string derivatives_agree(const Subject &subject) {
-  if (!(law_of(subject).flags & DFM_FRIC_JACOBIAN)) skip("the law gives no derivatives (no DFM_FRIC_JACOBIAN)");
+  if (!(law_of(subject).flags & DFM_FRIC_JACOBIAN))
+    skip("the law gives no derivatives (no DFM_FRIC_JACOBIAN)");
   const Law law(subject, lively_params(subject));
   const Scales s = scales_of(law);
   Random random(subject.seed);
@@ -211,14 +261,19 @@ std::string derivatives_agree(const Subject &subject) {
         if (law.needs(DFM_NEED_FN)) b.fn[i] = s.fn * (k < 5 ? 1.0 : random.logarithmic(0.3, 3));
         b.slip(i, w * std::cos(heading), w * std::sin(heading));
         const double push = s.level * (i % 3 ? 30 : 0.3);
-        if (law.needs(DFM_NEED_FT_STOP)) b.stop[i] = -push * std::cos(heading), b.stop[b.stride + i] = -push * std::sin(heading);
+        if (law.needs(DFM_NEED_FT_STOP)) {
+          b.stop[i] = -push * std::cos(heading);
+          b.stop[b.stride + i] = -push * std::sin(heading);
+        }
       }
       b.must(h);
       if (k < 5) b.commit();
     }
     for (int c = 0; c < 3; ++c) {
       if (!(c < 2 ? law.needs(DFM_NEED_VT) : law.needs(DFM_NEED_FN))) continue;
-      const auto speed = [&](uint32_t i) { return law.needs(DFM_NEED_VT) ? std::hypot(b.vt[i], b.vt[b.stride + i]) : 0; };
+      const auto speed = [&](uint32_t i) {
+        return law.needs(DFM_NEED_VT) ? std::hypot(b.vt[i], b.vt[b.stride + i]) : 0;
+      };
       Difference d(law, b, h);
       if (c < 2)
         d.run([&](Lanes &l, uint32_t i) { return &l.vt[size_t(c) * l.stride + i]; }, speed,
@@ -232,10 +287,14 @@ std::string derivatives_agree(const Subject &subject) {
         for (uint32_t row = 0; row < 2; ++row) {
           worst = std::max(worst, d.best[2 * i + row]);
           if (!(d.best[2 * i + row] <= 1e-4)) {
-            const double told = c < 2 ? b.dv[size_t(2 * row + c) * b.stride + i] : b.dn[size_t(row) * b.stride + i];
-            broken("%s[%u%u] is given as %.6g and differences say %.6g (slip %.3g m/s, normal force %.3g N, step %g s): the contact solve would overshoot or crawl; derive it from the same update, "
-                   "or drop DFM_FRIC_JACOBIAN and let the host take differences",
-                   c < 2 ? "dft_dvt" : "dft_dfn", row, c < 2 ? c : 0, told, d.seen[2 * i + row], speed(i), b.fn[i], h);
+            const double told =
+                c < 2 ? b.dv[size_t(2 * row + c) * b.stride + i] : b.dn[size_t(row) * b.stride + i];
+            broken(
+                "%s[%u%u] is given as %.6g and differences say %.6g (slip %.3g m/s, normal force %.3g N, "
+                "step %g s): the contact solve would overshoot or crawl; derive it from the same update, or "
+                "drop DFM_FRIC_JACOBIAN and let the host take differences",
+                c < 2 ? "dft_dvt" : "dft_dfn", row, c < 2 ? c : 0, told, d.seen[2 * i + row], speed(i),
+                b.fn[i], h);
           }
         }
     }
@@ -243,7 +302,7 @@ std::string derivatives_agree(const Subject &subject) {
   return text("worst %.1e", worst);
 }
 
-// ---- F12 ---------------------------------------------------------------------------------------------------------------------------
+// ---- F12 --------------------------------------------------------------------------------------------------
 
 std::string bounded_at_every_step(const Subject &subject) {
   const Law law(subject, lively_params(subject));
@@ -261,41 +320,55 @@ std::string bounded_at_every_step(const Subject &subject) {
     double peak = 0;
     for (int k = 0; k < kSteps; ++k) {
       for (uint32_t i = 0; i < kRuns; ++i) {
-        const double heading = random.uniform(0, kTurn), w = random.uniform(0, 1) < 0.1 ? 0 : random.logarithmic(1e-6, 10);
+        const double heading = random.uniform(0, kTurn);
+        const double w = random.uniform(0, 1) < 0.1 ? 0 : random.logarithmic(1e-6, 10);
         if (law.needs(DFM_NEED_FN)) b.fn[i] = random.uniform(0, 1) < 0.1 ? 0 : s.fn * random.uniform(0, 2);
         b.slip(i, w * std::cos(heading), w * std::sin(heading));
       }
-      b.must(h), b.commit();
+      b.must(h);
+      b.commit();
       for (uint32_t i = 0; i < kRuns; ++i) {
         double sum = 0;
         for (uint32_t c = 0; c < law.nstate; ++c) sum += std::fabs(b.state[size_t(c) * b.stride + i]);
         peak = std::max(peak, b.ft(i));
-        if (!std::isfinite(b.ft(i)) || !std::isfinite(sum)) broken("at steps of %g s force or state leave the finite numbers after %d steps: a world would lose the contact; update the state implicitly", h, k + 1);
+        if (!std::isfinite(b.ft(i)) || !std::isfinite(sum))
+          broken(
+              "at steps of %g s force or state leave the finite numbers after %d steps: a world would lose "
+              "the contact; update the state implicitly",
+              h, k + 1);
         if (b.mode[i] > 2) broken("it writes mode %u; the host knows 0 open, 1 stick and 2 slip", b.mode[i]);
-        if (!(b.limit[i] >= 0)) broken("it writes a limit of %g N; a force without a limit has +inf, none has 0", b.limit[i]);
-        if (!(b.stored[i] >= 0) || !std::isfinite(b.stored[i])) broken("it says that %g J are stored; what a state stores is finite and not negative", b.stored[i]);
+        if (!(b.limit[i] >= 0))
+          broken("it writes a limit of %g N; a force without a limit has +inf, none has 0", b.limit[i]);
+        if (!(b.stored[i] >= 0) || !std::isfinite(b.stored[i]))
+          broken("it says that %g J are stored; what a state stores is finite and not negative", b.stored[i]);
       }
     }
     if (at < 2) reference = std::max(reference, peak);
     worst = std::max(worst, peak / reference);
     if (peak > 10 * reference)
-      broken("at steps of %g s the force reaches %.3g N where fine steps reach %.3g N: long steps would throw bodies apart; update the state implicitly", h, peak, reference);
+      broken(
+          "at steps of %g s the force reaches %.3g N where fine steps reach %.3g N: long steps would throw "
+          "bodies apart; update the state implicitly",
+          h, peak, reference);
   }
   return reference > 0 ? text("largest force %.2f of that at fine steps", worst) : "";
 }
 
-// ---- F14 ---------------------------------------------------------------------------------------------------------------------------
+// ---- F14 --------------------------------------------------------------------------------------------------
 
 namespace {
 
-// Largest force from the first touch to steady slip, for each speed: what a contact may answer without any spike.
-std::vector<double> from_first_touch(const Law &law, const std::vector<double> &speeds, double fn, double h, int steps) {
+// Largest force from the first touch to steady slip, for each speed: what a contact may answer
+// without any spike.
+std::vector<double> from_first_touch(const Law &law, const std::vector<double> &speeds, double fn, double h,
+                                     int steps) {
   Lanes b(law, static_cast<uint32_t>(speeds.size()));
   press(b, fn);
   std::vector<double> most(speeds.size(), 0.0);
   for (int k = 0; k < steps; ++k) {
     for (uint32_t i = 0; i < b.n; ++i) b.slip(i, speeds[i], 0);
-    b.must(h), b.commit();
+    b.must(h);
+    b.commit();
     for (uint32_t i = 0; i < b.n; ++i) most[i] = std::max(most[i], b.ft(i));
   }
   return most;
@@ -310,11 +383,13 @@ std::string follows_normal_force(const Subject &subject) {
   const double h = 1e-3;
   const int steps = 400;
   const std::vector<double> speeds{0.05 * s.length() / h, 0.5 * s.length() / h, 0.01, 1};
-  // Factors of the normal force, each held for a while: down to nothing and back, down to a tenth, up by 1e6 and back.
+  // Factors of the normal force, each held for a while: down to nothing and back, down to a tenth, up
+  // by 1e6 and back.
   const std::vector<double> path{1, 0.3, 0.1, 1e-3, 0, 1, 0, 1e-6, 1, 1e6, 1, 1e-6, 1};
   std::vector<std::vector<double>> bound;
   for (const double factor : path) bound.push_back(from_first_touch(law, speeds, factor * s.fn, h, steps));
-  Lanes b(law, static_cast<uint32_t>(2 * speeds.size()));    // each speed twice: sliding on, and held where it is after the first leg
+  // each speed twice: sliding on, and held where it is after the first leg
+  Lanes b(law, static_cast<uint32_t>(2 * speeds.size()));
   for (size_t leg = 0; leg < path.size(); ++leg)
     for (int k = 0; k < (leg == 0 ? steps : 60); ++k) {
       press(b, path[leg] * s.fn);
@@ -324,11 +399,19 @@ std::string follows_normal_force(const Subject &subject) {
       }
       b.must(h);
       for (uint32_t i = 0; i < b.n; ++i) {
-        const double most = std::max({1.1 * bound[leg][i / 2], std::isfinite(b.limit[i]) ? 1.1 * s.level * path[leg] : 0.0});
-        if (path[leg] == 0 && !(b.ft(i) == 0)) broken("a contact whose normal force has gone to zero still pulls with %.3g N: bodies that have parted would drag each other; answer zero and rest where fn <= 0", b.ft(i));
+        const double most =
+            std::max({1.1 * bound[leg][i / 2], std::isfinite(b.limit[i]) ? 1.1 * s.level * path[leg] : 0.0});
+        if (path[leg] == 0 && !(b.ft(i) == 0))
+          broken(
+              "a contact whose normal force has gone to zero still pulls with %.3g N: bodies that have "
+              "parted would drag each other; answer zero and rest where fn <= 0",
+              b.ft(i));
         if (!(b.ft(i) <= most * (1 + 1e-9)))
-          broken("when the normal force goes from %.3g to %.3g N the force is %.3g N, where %.3g N is all that a contact under that load makes: a spike that throws bodies apart; project the old state on "
-                 "the cone of the new normal force before the update", (leg ? path[leg - 1] : path[leg]) * s.fn, path[leg] * s.fn, b.ft(i), most / 1.1);
+          broken(
+              "when the normal force goes from %.3g to %.3g N the force is %.3g N, where %.3g N is all that "
+              "a contact under that load makes: a spike that throws bodies apart; project the old state on "
+              "the cone of the new normal force before the update",
+              (leg ? path[leg - 1] : path[leg]) * s.fn, path[leg] * s.fn, b.ft(i), most / 1.1);
       }
       b.commit();
     }

@@ -1,5 +1,6 @@
-// V07, V08, F04: a law is a pure function of each lane. Whatever else it looks at (a static variable, the lane beside it, where it lies in the
-// batch, the address of a table) makes a world depend on how contacts happen to be grouped.
+// V07, V08, F04: a law is a pure function of each lane. Whatever else it looks at (a static variable, the
+// lane beside it, where it lies in the batch, the address of a table) makes a world depend on how contacts
+// happen to be grouped.
 #include <cmath>
 #include <cstring>
 #include <limits>
@@ -13,22 +14,32 @@ namespace {
 
 constexpr double kInfinite = std::numeric_limits<double>::infinity();
 
-// Contacts of every kind: open, at rest, in presliding, sliding; with the states that a few steps of their own make.
+// Contacts of every kind: open, at rest, in presliding, sliding; with the states that a few steps of
+// their own make.
 void fill(Lanes &b, const Scales &s, Random &random) {
   for (uint32_t i = 0; i < b.n; ++i) {
-    const double angle = random.uniform(0, 6.283185307179586), w = i % 7 == 0 ? 0 : random.logarithmic(1e-6, 10);
+    const double angle = random.uniform(0, 6.283185307179586);
+    const double w = i % 7 == 0 ? 0 : random.logarithmic(1e-6, 10);
     if (b.law.needs(DFM_NEED_FN)) b.fn[i] = i % 11 == 0 ? 0 : s.fn * random.logarithmic(1e-2, 1e2);
-    if (b.law.needs(DFM_NEED_VT)) b.vt[i] = w * std::cos(angle), b.vt[b.stride + i] = w * std::sin(angle);
+    if (b.law.needs(DFM_NEED_VT)) {
+      b.vt[i] = w * std::cos(angle);
+      b.vt[b.stride + i] = w * std::sin(angle);
+    }
     const double force = s.level * random.logarithmic(1e-3, 1e3);
-    if (b.law.needs(DFM_NEED_FT_STOP)) b.stop[i] = -force * std::cos(angle), b.stop[b.stride + i] = -force * std::sin(angle);
-    b.area[i] = random.logarithmic(0.1, 10), b.dwell[i] = random.logarithmic(1e-3, 10);
+    if (b.law.needs(DFM_NEED_FT_STOP)) {
+      b.stop[i] = -force * std::cos(angle);
+      b.stop[b.stride + i] = -force * std::sin(angle);
+    }
+    b.area[i] = random.logarithmic(0.1, 10);
+    b.dwell[i] = random.logarithmic(1e-3, 10);
   }
 }
 
 void settle(Lanes &b, const Scales &s, Random &random, double h) {
   for (int k = 0; k < 4; ++k) {
     fill(b, s, random);
-    b.must(h), b.commit();
+    b.must(h);
+    b.commit();
   }
   fill(b, s, random);
 }
@@ -43,8 +54,14 @@ uint64_t hash_of(const Lanes &b, uint64_t hash) {
   const auto columns = [&](const double *p, uint32_t width) {
     for (uint32_t c = 0; c < width; ++c) hash = mix(hash, p + size_t(c) * b.stride, b.n * sizeof(double));
   };
-  columns(b.out_ft, 2), columns(b.out_state, b.law.nstate), columns(b.limit, 1), columns(b.stored, 1);
-  if (b.out.dft_dvt) columns(b.dv, 4), columns(b.dn, 2);
+  columns(b.out_ft, 2);
+  columns(b.out_state, b.law.nstate);
+  columns(b.limit, 1);
+  columns(b.stored, 1);
+  if (b.out.dft_dvt) {
+    columns(b.dv, 4);
+    columns(b.dn, 2);
+  }
   return mix(hash, b.mode, b.n);
 }
 
@@ -72,7 +89,8 @@ std::string same_bits(const Subject &subject) {
   Random random(subject.seed);
   // One batch is asked again after others with another step, other parameters and other inputs came between.
   Lanes first(law, 200), between(plain, 33);
-  settle(first, scales, random, kSteps[0]), settle(between, scales, random, kSteps[1]);
+  settle(first, scales, random, kSteps[0]);
+  settle(between, scales, random, kSteps[1]);
   Lanes again(law, 200);
   for (uint32_t i = 0; i < first.n; ++i) again.take(i, first, i);
   first.must(kSteps[0]);
@@ -81,20 +99,32 @@ std::string same_bits(const Subject &subject) {
     again.must(kSteps[0]);
     for (uint32_t i = 0; i < first.n; ++i)
       if (!again.same(i, first, i))
-        broken("lane %u of the same batch answered (%.17g, %.17g) N and, asked again after another batch, (%.17g, %.17g) N: it keeps something between calls, so a restored or "
-               "repeated step goes elsewhere; move it into a state slot",
-               i, first.out_ft[i], first.out_ft[first.stride + i], again.out_ft[i], again.out_ft[again.stride + i]);
+        broken(
+            "lane %u of the same batch answered (%.17g, %.17g) N and, asked again after another batch, "
+            "(%.17g, %.17g) N: it keeps something between calls, so a restored or repeated step goes "
+            "elsewhere; move it into a state slot",
+            i, first.out_ft[i], first.out_ft[first.stride + i], again.out_ft[i],
+            again.out_ft[again.stride + i]);
   }
   stage("a second process is asked for the same batches");
   const uint64_t here = digest(subject), once_more = digest(subject);
-  if (here != once_more) broken("the same series of batches gave other bits the second time: it keeps something between calls; move it into a state slot");
+  if (here != once_more)
+    broken(
+        "the same series of batches gave other bits the second time: it keeps something between calls; move "
+        "it into a state slot");
   const std::string number = std::to_string(subject.index), seed = std::to_string(subject.seed);
-  const Answer other = in_fresh_process(subject.command, {"plugin", "check", subject.file, "--digest", number, "--seed", seed}, {0.5 * subject.limit});
+  const Answer other =
+      in_fresh_process(subject.command, {"plugin", "check", subject.file, "--digest", number, "--seed", seed},
+                       {0.5 * subject.limit});
   const std::string mine = text("%016llx", static_cast<unsigned long long>(here));
-  if (!other.spoke) broken("asked in a second process, it %s; a law must not depend on the process it runs in", other.ending.c_str());
+  if (!other.spoke)
+    broken("asked in a second process, it %s; a law must not depend on the process it runs in",
+           other.ending.c_str());
   if (other.verdict.detail != mine)
-    broken("the same batches give %s here and %s in another process: it uses an address, the time or something left uninitialised, so results differ from run to run; compute from "
-           "the inputs alone", mine.c_str(), other.verdict.detail.c_str());
+    broken(
+        "the same batches give %s here and %s in another process: it uses an address, the time or something "
+        "left uninitialised, so results differ from run to run; compute from the inputs alone",
+        mine.c_str(), other.verdict.detail.c_str());
   return "digest " + mine;
 }
 
@@ -105,14 +135,22 @@ std::string bad_lane_stays(const Subject &subject) {
   Lanes good(law, 19), spoilt(law, 19);
   settle(good, scales, random, 1e-3);
   for (uint32_t i = 0; i < good.n; ++i)
-    if (law.needs(DFM_NEED_FN)) good.fn[i] = scales.fn * random.logarithmic(0.1, 10);     // a contact that is open may answer zero to anything
+    // a contact that is open may answer zero to anything
+    if (law.needs(DFM_NEED_FN)) good.fn[i] = scales.fn * random.logarithmic(0.1, 10);
   good.must(1e-3);
-  struct Input { const char *name; bool given; double *column; };
+  struct Input {
+    const char *name;
+    bool given;
+    double *column;
+  };
   const size_t S = spoilt.stride;
   std::vector<Input> inputs = {{"fn", law.needs(DFM_NEED_FN), spoilt.fn},
-                               {"vt", law.needs(DFM_NEED_VT), spoilt.vt}, {"vt", law.needs(DFM_NEED_VT), spoilt.vt + S},
-                               {"ft_stop", law.needs(DFM_NEED_FT_STOP), spoilt.stop}, {"ft_stop", law.needs(DFM_NEED_FT_STOP), spoilt.stop + S},
-                               {"area", law.needs(DFM_NEED_AREA), spoilt.area}, {"dwell", law.needs(DFM_NEED_DWELL), spoilt.dwell}};
+                               {"vt", law.needs(DFM_NEED_VT), spoilt.vt},
+                               {"vt", law.needs(DFM_NEED_VT), spoilt.vt + S},
+                               {"ft_stop", law.needs(DFM_NEED_FT_STOP), spoilt.stop},
+                               {"ft_stop", law.needs(DFM_NEED_FT_STOP), spoilt.stop + S},
+                               {"area", law.needs(DFM_NEED_AREA), spoilt.area},
+                               {"dwell", law.needs(DFM_NEED_DWELL), spoilt.dwell}};
   for (uint32_t c = 0; c < law.nstate; ++c) inputs.push_back({"state", true, spoilt.state + c * S});
   constexpr uint32_t kBad = 6;
   for (const Input &input : inputs)
@@ -121,16 +159,23 @@ std::string bad_lane_stays(const Subject &subject) {
       for (uint32_t i = 0; i < good.n; ++i) spoilt.take(i, good, i);
       input.column[kBad] = bad;
       stage("%s = %g in lane %u", input.name, bad, kBad);
-      if (spoilt.ask(1e-3) != DFM_OK) continue;                // nothing was changed: the host may try smaller
+      // nothing was changed: the host may try smaller
+      if (spoilt.ask(1e-3) != DFM_OK) continue;
       for (uint32_t i = 0; i < good.n; ++i)
         if (i != kBad && !spoilt.same(i, good, i))
-          broken("%s = %g in lane %u changed lane %u from (%.17g, %.17g) to (%.17g, %.17g) N: one broken contact would spoil others; compute each lane from its own inputs", input.name,
-                 bad, kBad, i, good.out_ft[i], good.out_ft[S + i], spoilt.out_ft[i], spoilt.out_ft[S + i]);
+          broken(
+              "%s = %g in lane %u changed lane %u from (%.17g, %.17g) to (%.17g, %.17g) N: one broken "
+              "contact would spoil others; compute each lane from its own inputs",
+              input.name, bad, kBad, i, good.out_ft[i], good.out_ft[S + i], spoilt.out_ft[i],
+              spoilt.out_ft[S + i]);
       bool finite = std::isfinite(spoilt.ft(kBad));
-      for (uint32_t c = 0; c < law.nstate && std::strcmp(input.name, "state") == 0; ++c) finite = finite && std::isfinite(spoilt.out_state[c * S + kBad]);
+      for (uint32_t c = 0; c < law.nstate && std::strcmp(input.name, "state") == 0; ++c)
+        finite = finite && std::isfinite(spoilt.out_state[c * S + kBad]);
       if (std::isnan(bad) && std::strcmp(input.name, "dwell") != 0 && finite)
-        broken("%s = NaN gave a finite force (%.17g, %.17g) N, so the host would not notice that its contact is broken; let the NaN through, or return DFM_DISCARD", input.name,
-               spoilt.out_ft[kBad], spoilt.out_ft[S + kBad]);
+        broken(
+            "%s = NaN gave a finite force (%.17g, %.17g) N, so the host would not notice that its contact is "
+            "broken; let the NaN through, or return DFM_DISCARD",
+            input.name, spoilt.out_ft[kBad], spoilt.out_ft[S + kBad]);
     }
   return "";
 }
@@ -147,21 +192,26 @@ std::string split_equals_whole(const Subject &subject) {
       for (uint32_t begin = 0; begin < whole.n; begin += piece) {
         const uint32_t n = std::min(piece, whole.n - begin);
         Lanes part(law, n, piece == 9 ? 16 : 0);
-        part.spoil_padding();                                                       // may be read, and must not matter
-        for (uint32_t k = 0; k < n; ++k) part.take(n - 1 - k, whole, begin + k);    // in reverse: neighbors change too
+        // may be read, and must not matter
+        part.spoil_padding();
+        // in reverse: neighbors change too
+        for (uint32_t k = 0; k < n; ++k) part.take(n - 1 - k, whole, begin + k);
         part.must(h);
         for (uint32_t k = 0; k < n; ++k)
           if (!part.same(n - 1 - k, whole, begin + k))
-            broken("contact %u answers (%.17g, %.17g) N in a batch of %u and (%.17g, %.17g) N in one of %u: a world would change with the number of its contacts; compute each lane by "
-                   "the same operations wherever it stands",
-                   begin + k, whole.out_ft[begin + k], whole.out_ft[whole.stride + begin + k], whole.n, part.out_ft[n - 1 - k],
-                   part.out_ft[part.stride + n - 1 - k], n);
+            broken(
+                "contact %u answers (%.17g, %.17g) N in a batch of %u and (%.17g, %.17g) N in one of %u: a "
+                "world would change with the number of its contacts; compute each lane by the same "
+                "operations wherever it stands",
+                begin + k, whole.out_ft[begin + k], whole.out_ft[whole.stride + begin + k], whole.n,
+                part.out_ft[n - 1 - k], part.out_ft[part.stride + n - 1 - k], n);
       }
   }
   return "";
 }
 
-// What counts calls or contacts goes bad only after many; what numbers the contacts of a batch in 16 bits only in large ones.
+// What counts calls or contacts goes bad only after many; what numbers the contacts of a batch in 16 bits
+// only in large ones.
 std::string endures(const Subject &subject) {
   const Law law(subject, lively_params(subject));
   const Scales scales = scales_of(law);
@@ -180,16 +230,25 @@ std::string endures(const Subject &subject) {
   again.must(1e-3);
   for (uint32_t i = 0; i < first.n; ++i)
     if (!again.same(i, first, i))
-      broken("lane %u answered (%.17g, %.17g) N and, after %u other contacts, (%.17g, %.17g) N: it counts or wears out, so a long run goes elsewhere than a short one; keep nothing between calls but state slots",
-             i, first.out_ft[i], first.out_ft[first.stride + i], asked, again.out_ft[i], again.out_ft[again.stride + i]);
+      broken(
+          "lane %u answered (%.17g, %.17g) N and, after %u other contacts, (%.17g, %.17g) N: it counts or "
+          "wears out, so a long run goes elsewhere than a short one; keep nothing between calls but state "
+          "slots",
+          i, first.out_ft[i], first.out_ft[first.stride + i], asked, again.out_ft[i],
+          again.out_ft[again.stride + i]);
   Lanes large(law, kLarge);
   for (uint32_t i = 0; i < kLarge; ++i) large.take(i, many, i % kBatch);
   stage("a batch of %u contacts", kLarge);
-  large.must(1e-3), many.must(1e-3);
+  large.must(1e-3);
+  many.must(1e-3);
   for (uint32_t i = 0; i < kLarge; ++i)
     if (!large.same(i, many, i % kBatch))
-      broken("contact %u of a batch of %u answers (%.17g, %.17g) N and the same contact in a batch of %u (%.17g, %.17g) N: large worlds would go wrong; index contacts by uint32_t, and keep no table of fixed size",
-             i, kLarge, large.out_ft[i], large.out_ft[large.stride + i], kBatch, many.out_ft[i % kBatch], many.out_ft[many.stride + i % kBatch]);
+      broken(
+          "contact %u of a batch of %u answers (%.17g, %.17g) N and the same contact in a batch of %u "
+          "(%.17g, %.17g) N: large worlds would go wrong; index contacts by uint32_t, and keep no table of "
+          "fixed size",
+          i, kLarge, large.out_ft[i], large.out_ft[large.stride + i], kBatch, many.out_ft[i % kBatch],
+          many.out_ft[many.stride + i % kBatch]);
   return text("%u contacts", asked);
 }
 

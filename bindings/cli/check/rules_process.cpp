@@ -27,16 +27,19 @@
 #endif
 
 #if DEFORM_SANITIZED
-extern "C" size_t __sanitizer_get_current_allocated_bytes();   // not every compiler brings the header that declares it
+// not every compiler brings the header that declares it
+extern "C" size_t __sanitizer_get_current_allocated_bytes();
 #endif
 
 namespace cli::check {
 namespace {
 
-// Lanes of every kind: at rest and sliding, open and pressed, with states that grow as the batch is asked again.
+// Lanes of every kind: at rest and sliding, open and pressed, with states that grow as the batch
+// is asked again.
 void vary(Lanes &b, Random &random, double scale) {
   for (uint32_t i = 0; i < b.n; ++i) {
-    const double w = i % 5 == 0 ? 0 : scale * random.logarithmic(1e-6, 10), heading = random.uniform(0, 6.283185307179586);
+    const double w = i % 5 == 0 ? 0 : scale * random.logarithmic(1e-6, 10);
+    const double heading = random.uniform(0, 6.283185307179586);
     if (b.law.needs(DFM_NEED_FN)) b.fn[i] = i % 9 == 0 ? 0 : random.logarithmic(1e-3, 1e5);
     b.slip(i, w * std::cos(heading), w * std::sin(heading));
   }
@@ -44,7 +47,7 @@ void vary(Lanes &b, Random &random, double scale) {
 
 }  // namespace
 
-// ---- V05 ---------------------------------------------------------------------------------------------------------------------------
+// ---- V05 --------------------------------------------------------------------------------------------------
 
 namespace {
 
@@ -68,21 +71,25 @@ std::string eval_keeps_to_itself(const Subject &subject) {
       for (int round = 0; round < 4; ++round) {
         Lanes b(law, n);
         vary(b, random, 1);
-        if (round == 3) b.vt[0] = b.fn[0] = std::numeric_limits<double>::quiet_NaN();  // the way out of trouble counts too
+        // the way out of trouble counts too
+        if (round == 3) b.vt[0] = b.fn[0] = std::numeric_limits<double>::quiet_NaN();
         stage("batch of %u contacts, step %g s", n, h);
         b.in.dt = h;
         const Kept kept("eval");
         const char *name = watch.run([&] { law.ops.eval(&b.in, &b.out); });
         subject.plugin->host().give_back_scratch();
         if (name)
-          broken("eval calls %s: it runs in every pass of every step from many threads, where this costs time or stops the world; take memory from dfm_host.scratch, make tables in prepare, and "
-                 "leave files, environment, clock and chance to the host", spelt(name).c_str());
+          broken(
+              "eval calls %s: it runs in every pass of every step from many threads, where this costs time "
+              "or stops the world; take memory from dfm_host.scratch, make tables in prepare, and leave "
+              "files, environment, clock and chance to the host",
+              spelt(name).c_str());
         ++calls;
       }
   return text("%u calls, %zu entries watched", calls, watch.entries());
 }
 
-// ---- V06 ---------------------------------------------------------------------------------------------------------------------------
+// ---- V06 --------------------------------------------------------------------------------------------------
 
 namespace {
 
@@ -90,28 +97,44 @@ namespace {
 class FencedBatch {
  public:
   FencedBatch(const Law &law, Lanes &lanes, Fenced::Place place)
-      : lanes_(lanes), in_("dfm_friction_in", sizeof(dfm_friction_in), place), out_("dfm_friction_out", sizeof(dfm_friction_out), place) {
-    in() = lanes.in, out() = lanes.out;
+      : lanes_(lanes),
+        in_("dfm_friction_in", sizeof(dfm_friction_in), place),
+        out_("dfm_friction_out", sizeof(dfm_friction_out), place) {
+    in() = lanes.in;
+    out() = lanes.out;
     in().dt = 1e-3;
     params_ = std::make_unique<Fenced>("params", law.params.size() * sizeof(double), place);
     std::copy(law.params.begin(), law.params.end(), params_->numbers());
     in().params = params_->numbers();
-    const struct { const char *name; const double **column; uint32_t width; } inputs[] = {
-        {"fn", &in().fn, 1},     {"vt", &in().vt, 2},       {"ft_stop", &in().ft_stop, 2},
-        {"area", &in().area, 1}, {"dwell", &in().dwell, 1}, {"state (input)", &in().state, law.nstate}};
+    const struct {
+      const char *name;
+      const double **column;
+      uint32_t width;
+    } inputs[] = {{"fn", &in().fn, 1},           {"vt", &in().vt, 2},
+                  {"ft_stop", &in().ft_stop, 2}, {"area", &in().area, 1},
+                  {"dwell", &in().dwell, 1},     {"state (input)", &in().state, law.nstate}};
     for (const auto &i : inputs) {
       if (!*i.column) continue;
       inputs_.push_back(std::make_unique<Fenced>(i.name, bytes(i.width), place));
       std::copy_n(*i.column, size_t(i.width) * lanes.stride, inputs_.back()->numbers());
       *i.column = inputs_.back()->numbers();
     }
-    output(out().ft, "ft", 2, place), output(out().state, "state (output)", law.nstate, place), output(out().dft_dvt, "dft_dvt", 4, place);
-    output(out().dft_dfn, "dft_dfn", 2, place), output(out().limit, "limit", 1, place), output(out().stored, "stored", 1, place);
-    outputs_.push_back({"mode", std::make_unique<Fenced>("mode", lanes.stride, lanes.stride % 64 == 0 ? place : Fenced::at_start), 1, 1});
+    output(out().ft, "ft", 2, place);
+    output(out().state, "state (output)", law.nstate, place);
+    output(out().dft_dvt, "dft_dvt", 4, place);
+    output(out().dft_dfn, "dft_dfn", 2, place);
+    output(out().limit, "limit", 1, place);
+    output(out().stored, "stored", 1, place);
+    outputs_.push_back(
+        {"mode",
+         std::make_unique<Fenced>("mode", lanes.stride, lanes.stride % 64 == 0 ? place : Fenced::at_start), 1,
+         1});
     out().mode = static_cast<uint8_t *>(outputs_.back().array->data());
     for (auto &o : outputs_) std::memset(o.array->data(), kPaint, o.bytes * o.width * lanes.stride);
     for (auto &i : inputs_) i->lock();
-    params_->lock(), in_.lock(), out_.lock();
+    params_->lock();
+    in_.lock();
+    out_.lock();
   }
   dfm_friction_in &in() { return *static_cast<dfm_friction_in *>(in_.data()); }
   dfm_friction_out &out() { return *static_cast<dfm_friction_out *>(out_.data()); }
@@ -120,17 +143,28 @@ class FencedBatch {
     long offset = 0;
     const size_t lanes = (lanes_.n + 7) & ~7u;
     for (const auto &o : outputs_) {
-      if (o.array->spoilt(&offset)) broken("eval writes %s array %s (offset %ld bytes), over what lies there; loop to in->n and step columns by in->stride", offset < 0 ? "before the" : "past the end of the", o.name, offset);
+      if (o.array->spoilt(&offset))
+        broken(
+            "eval writes %s array %s (offset %ld bytes), over what lies there; loop to in->n and step "
+            "columns by in->stride",
+            offset < 0 ? "before the" : "past the end of the", o.name, offset);
       const unsigned char *p = static_cast<const unsigned char *>(o.array->data());
       for (size_t c = 0; c < o.width; ++c)
         for (size_t i = lanes * o.bytes; i < lanes_.stride * o.bytes; ++i)
           if (p[c * lanes_.stride * o.bytes + i] != kPaint)
-            broken("eval writes lane %zu of %s, column %zu, in a batch of %u: only lanes up to n rounded to 8 may be touched; loop to in->n", i / o.bytes, o.name, c, lanes_.n);
+            broken(
+                "eval writes lane %zu of %s, column %zu, in a batch of %u: only lanes up to n rounded to 8 "
+                "may be touched; loop to in->n",
+                i / o.bytes, o.name, c, lanes_.n);
     }
   }
 
  private:
-  struct Output { const char *name; std::unique_ptr<Fenced> array; size_t width, bytes; };
+  struct Output {
+    const char *name;
+    std::unique_ptr<Fenced> array;
+    size_t width, bytes;
+  };
   static constexpr unsigned char kPaint = 0x5c;
   size_t bytes(uint32_t width) const { return size_t(width) * lanes_.stride * sizeof(double); }
   void output(double *&column, const char *name, uint32_t width, Fenced::Place place) {
@@ -152,8 +186,14 @@ void asks_fenced(const Law &law, Lanes &lanes, Fenced::Place place) {
   const Kept kept("eval");
   const std::string trouble = Fenced::guard([&] { status = law.ops.eval(&batch.in(), &batch.out()); });
   law.subject.plugin->host().give_back_scratch();
-  if (!trouble.empty()) broken("in a batch of %u contacts (stride %u) eval %s: over what lies there in a world; loop to in->n and step columns by in->stride", lanes.n, lanes.stride, trouble.c_str());
-  if (status != DFM_OK) broken("eval returns %s for finite input, which would stop a world; answer every finite input", dfm_status_name(status));
+  if (!trouble.empty())
+    broken(
+        "in a batch of %u contacts (stride %u) eval %s: over what lies there in a world; loop to in->n and "
+        "step columns by in->stride",
+        lanes.n, lanes.stride, trouble.c_str());
+  if (status != DFM_OK)
+    broken("eval returns %s for finite input, which would stop a world; answer every finite input",
+           dfm_status_name(status));
   batch.look();
 }
 
@@ -181,11 +221,15 @@ void asks_with_nulls(const Law &law, Lanes &whole) {
     const std::string trouble = Fenced::guard([&] { status = law.ops.eval(&b.in, &out); });
     law.subject.plugin->host().give_back_scratch();
     if (!trouble.empty() || status != DFM_OK)
-      broken("with %s%s eval %s: an output that is NULL is not wanted; ask each pointer before writing", alone ? "every output NULL but " : "the output NULL: ", names[one],
+      broken("with %s%s eval %s: an output that is NULL is not wanted; ask each pointer before writing",
+             alone ? "every output NULL but " : "the output NULL: ", names[one],
              trouble.empty() ? dfm_status_name(status) : trouble.c_str());
     for (uint32_t i = 0; out.ft && i < b.n; ++i)
       if (std::memcmp(&b.out_ft[i], &whole.out_ft[i], sizeof(double)) != 0)
-        broken("with %s%s the force of lane %u is %.17g instead of %.17g N: what is computed must not depend on what is asked for beside", alone ? "nothing wanted but " : "no ", names[one], i, b.out_ft[i], whole.out_ft[i]);
+        broken(
+            "with %s%s the force of lane %u is %.17g instead of %.17g N: what is computed must not depend on "
+            "what is asked for beside",
+            alone ? "nothing wanted but " : "no ", names[one], i, b.out_ft[i], whole.out_ft[i]);
   }
 }
 
@@ -208,7 +252,7 @@ std::string stays_in_its_arrays(const Subject &subject) {
   return "";
 }
 
-// ---- V09 ---------------------------------------------------------------------------------------------------------------------------
+// ---- V09 --------------------------------------------------------------------------------------------------
 
 namespace {
 
@@ -242,26 +286,35 @@ void load_and_unload(const Subject &subject) {
   for (const dfm_type *type : plugin.types()) {
     if (type->kind != DFM_KIND_FRICTION) continue;
     Subject one = subject;
-    one.plugin = &plugin, one.type = type;
+    one.plugin = &plugin;
+    one.type = type;
     const Law law(one, default_params(*type));
     Lanes b(law, 8);
     for (uint32_t i = 0; i < b.n && law.needs(DFM_NEED_FN); ++i) b.fn[i] = 1;
     for (uint32_t i = 0; i < b.n; ++i) b.slip(i, 1e-3 * i, 0);
-    b.must(1e-3), b.commit(), b.must(1e-3);
+    b.must(1e-3);
+    b.commit();
+    b.must(1e-3);
   }
   plugin.close();
   if (const size_t n = plugin.host().pieces())
-    broken("after it was unloaded %zu piece%s of the host's memory %s still held: every load would cost that again; release in release() or shutdown() what was taken", n, n == 1 ? "" : "s", n == 1 ? "is" : "are");
+    broken(
+        "after it was unloaded %zu piece%s of the host's memory %s still held: every load would cost that "
+        "again; release in release() or shutdown() what was taken",
+        n, n == 1 ? "" : "s", n == 1 ? "is" : "are");
 }
 
 }  // namespace
 
 std::string unloads_without_leak(const Subject &subject) {
   if (!subject.plugin) skip("it does not load (V02)");
-  subject.plugin->close();                                  // the one opened to look at it would keep it in memory
+  // the one opened to look at it would keep it in memory
+  subject.plugin->close();
   constexpr int kCycles = 100;
-  constexpr long kSmallestPiece = 24;                        // bytes: less than one piece in each cycle is the C library's own housekeeping
-  // What is left once (caches of the C library and the linker) is no leak: both halves after the warm-up must grow.
+  // bytes: less than one piece in each cycle is the C library's own housekeeping
+  constexpr long kSmallestPiece = 24;
+  // What is left once (caches of the C library and the linker) is no leak: both halves after the
+  // warm-up must grow.
   struct Use { long heap, pages, files; } at[3] = {};
   for (int i = 0, mark = 0; i <= kCycles; ++i) {
     if (i == 20 || i == 60 || i == 100) at[mark++] = {heap_in_use(), pages_mapped(), files_open()};
@@ -269,22 +322,41 @@ std::string unloads_without_leak(const Subject &subject) {
     stage("load-unload cycle %d", i + 1);
     load_and_unload(subject);
   }
-  const auto each = [&](long Use::*what) { return std::min(at[1].*what - at[0].*what, at[2].*what - at[1].*what) / 40; };
-  if (const long left = each(&Use::heap); left >= kSmallestPiece) broken("each load-unload cycle leaves %ld bytes on the heap: a host that reloads an edited law fills up; free in shutdown() what the entry or prepare() made", left);
-  if (const long left = each(&Use::pages); left > 0) broken("each load-unload cycle leaves %ld pages mapped: a host that reloads an edited law fills up; unmap in shutdown()", left);
-  if (each(&Use::files) > 0) broken("each load-unload cycle leaves a file open: a host that reloads an edited law runs out of them; close in shutdown()");
+  const auto each = [&](long Use::*what) {
+    return std::min(at[1].*what - at[0].*what, at[2].*what - at[1].*what) / 40;
+  };
+  if (const long left = each(&Use::heap); left >= kSmallestPiece)
+    broken(
+        "each load-unload cycle leaves %ld bytes on the heap: a host that reloads an edited law fills up; "
+        "free in shutdown() what the entry or prepare() made",
+        left);
+  if (const long left = each(&Use::pages); left > 0)
+    broken(
+        "each load-unload cycle leaves %ld pages mapped: a host that reloads an edited law fills up; unmap "
+        "in shutdown()",
+        left);
+  if (each(&Use::files) > 0)
+    broken(
+        "each load-unload cycle leaves a file open: a host that reloads an edited law runs out of them; "
+        "close in shutdown()");
   const std::string path = std::string(subject.file);
-  if (void *still = dlopen(path.find('/') == std::string::npos ? ("./" + path).c_str() : path.c_str(), RTLD_NOW | RTLD_NOLOAD)) {
+  if (void *still = dlopen(path.find('/') == std::string::npos ? ("./" + path).c_str() : path.c_str(),
+                           RTLD_NOW | RTLD_NOLOAD)) {
     dlclose(still);
-    broken("it stays in memory after it was unloaded, so an edited law cannot be loaded in its place; build it with deform_add_plugin (unique C++ symbols and -z nodelete keep a library)");
+    broken(
+        "it stays in memory after it was unloaded, so an edited law cannot be loaded in its place; build it "
+        "with deform_add_plugin (unique C++ symbols and -z nodelete keep a library)");
   }
   return text("%d cycles", kCycles);
 }
 
-// ---- V10 ---------------------------------------------------------------------------------------------------------------------------
+// ---- V10 --------------------------------------------------------------------------------------------------
 
 std::string sanitizer_finds_nothing(const Subject &subject) {
-  if (!DEFORM_SANITIZED) skip("this deform is not built with a sanitizer; build it by `cmake --preset asan` or `tsan`, and the plugin with the same -fsanitize");
+  if (!DEFORM_SANITIZED)
+    skip(
+        "this deform is not built with a sanitizer; build it by `cmake --preset asan` or `tsan`, and the "
+        "plugin with the same -fsanitize");
   const Law law(subject, lively_params(subject));
   constexpr int kThreads = 4;
   constexpr int kRounds = 20;
@@ -310,15 +382,19 @@ std::string sanitizer_finds_nothing(const Subject &subject) {
   for (int t = 0; t < kThreads; ++t) {
     work(t, alone[t]);
     if (std::memcmp(told[t].data(), alone[t].data(), told[t].size() * sizeof(double)) != 0)
-      broken("evaluated from %d threads at once it gives other forces than alone: it writes something that batches share; keep it in state slots, or in what prepare() makes and eval only reads", kThreads);
+      broken(
+          "evaluated from %d threads at once it gives other forces than alone: it writes something that "
+          "batches share; keep it in state slots, or in what prepare() makes and eval only reads",
+          kThreads);
   }
   return text("%d threads", kThreads);
 }
 
-// ---- V14 ---------------------------------------------------------------------------------------------------------------------------
+// ---- V14 --------------------------------------------------------------------------------------------------
 
-// While eval runs the plugin's own writable memory is read only. Tables made at the first call are there by then; what is written after that is memory between
-// calls, or between threads. Thread-local variables are not seen.
+// While eval runs the plugin's own writable memory is read only. Tables made at the first call are there
+// by then; what is written after that is memory between calls, or between threads. Thread-local
+// variables are not seen.
 std::string writes_no_static(const Subject &subject) {
   const Law law(subject, lively_params(subject));
   Random random(subject.seed);
@@ -343,8 +419,11 @@ std::string writes_no_static(const Subject &subject) {
     if (trouble.empty()) return;
     if (!ours) broken("eval %s; touch only the arrays that are given", trouble.c_str());
     const std::string name = variable_at(subject.file, reinterpret_cast<uintptr_t>(at) - base);
-    broken("eval writes the static variable %s: threads and worlds share it, so results depend on what else runs; keep it in a state slot, or on the stack",
-           name.empty() ? text("at %#zx of the file", reinterpret_cast<uintptr_t>(at) - base).c_str() : ("\"" + name + "\"").c_str());
+    broken(
+        "eval writes the static variable %s: threads and worlds share it, so results depend on what else "
+        "runs; keep it in a state slot, or on the stack",
+        name.empty() ? text("at %#zx of the file", reinterpret_cast<uintptr_t>(at) - base).c_str()
+                     : ("\"" + name + "\"").c_str());
   };
   for (const bool locked : {false, true})
     for (const uint32_t n : {8u, 1u, 1000u}) once(n, locked);

@@ -1,5 +1,6 @@
-// F06 to F11 and F13: each effect that a law promises is measured. A promise that only some parameters keep (a static level above the kinetic
-// one, a viscous part) is kept if parameters inside the table's ranges show it.
+// F06 to F11 and F13: each effect that a law promises is measured. A promise that only some parameters
+// keep (a static level above the kinetic one, a viscous part) is kept if parameters inside the table's
+// ranges show it.
 #include <algorithm>
 #include <cmath>
 #include <cstring>
@@ -33,7 +34,8 @@ std::vector<std::vector<double>> candidates(const Subject &subject) {
     for (const double v : values) {
       std::vector<double> moved = base;
       for (uint32_t k = 0; k < row.width; ++k) moved[at + k] = v;
-      if (v >= row.min && v <= row.max && moved != base && refusal(law_of(subject), moved).empty()) out.push_back(std::move(moved));
+      if (v >= row.min && v <= row.max && moved != base && refusal(law_of(subject), moved).empty())
+        out.push_back(std::move(moved));
     }
   }
   return out;
@@ -58,14 +60,17 @@ void load_up(Masses &masses, const std::vector<double> &load) {
   constexpr int kSteps = 1000;
   std::vector<double> force(load.size());
   for (int k = 1; k <= 2 * kSteps; ++k) {
-    for (size_t i = 0; i < load.size(); ++i) force[i] = load[i] * std::min(1.0, static_cast<double>(k) / kSteps);
+    for (size_t i = 0; i < load.size(); ++i)
+      force[i] = load[i] * std::min(1.0, static_cast<double>(k) / kSteps);
     masses.step(force, 1e-3);
   }
 }
 
 double presliding_or_break(const Scales &s) {
   if (s.z > 0) return s.z;
-  broken("the contact does not give elastically before it slides (a displacement leaves no force behind), so there is no presliding; keep a bristle in a state slot, or drop the promise");
+  broken(
+      "the contact does not give elastically before it slides (a displacement leaves no force behind), so "
+      "there is no presliding; keep a bristle in a state slot, or drop the promise");
 }
 
 }  // namespace
@@ -87,7 +92,10 @@ std::string holds_below_threshold(const Subject &subject) {
     const double moved = std::fabs(masses.x[i] - begin[i]);
     worst = std::max(worst, moved);
     if (!(moved < 1e-9))
-      broken("held with %g of its limit of %.3g N it moves by %.3g m in 1000 s (1e-9 m allowed): a grip would let go in time; the force at rest must not relax, and must not need a speed", shares[i], s.level, moved);
+      broken(
+          "held with %g of its limit of %.3g N it moves by %.3g m in 1000 s (1e-9 m allowed): a grip would "
+          "let go in time; the force at rest must not relax, and must not need a speed",
+          shares[i], s.level, moved);
   }
   return text("moved %.1e m in 1000 s", worst);
 }
@@ -95,11 +103,16 @@ std::string holds_below_threshold(const Subject &subject) {
 std::string falls_with_speed(const Subject &subject) {
   needs_promise(subject, "stribeck");
   const std::vector<double> speeds = decades(1e-5, 10, 8);
-  return some_candidate(subject, "it promises stribeck, but %s for none of the parameters tried: no stick-slip would come of it; let the level fall from mu_S to mu_C with speed, or drop the promise",
+  return some_candidate(subject,
+                        "it promises stribeck, but %s for none of the parameters tried: no stick-slip would "
+                        "come of it; let the level fall from mu_S to mu_C with speed, or drop the promise",
                         [&](const Law &law, const Scales &s, std::string *why) -> std::string {
                           const std::vector<double> f = steady_force(law, s, speeds);
                           double top = 0, fall = 0;
-                          for (const double x : f) top = std::max(top, x), fall = std::max(fall, (top - x) / top);
+                          for (const double x : f) {
+                            top = std::max(top, x);
+                            fall = std::max(fall, (top - x) / top);
+                          }
                           *why = "the steady force falls nowhere between 1e-5 and 10 m/s";
                           return fall > 0.01 ? text("falls by %.0f %%", 100 * fall) : "";
                         });
@@ -107,26 +120,31 @@ std::string falls_with_speed(const Subject &subject) {
 
 std::string rises_at_high_speed(const Subject &subject) {
   needs_promise(subject, "viscous");
-  return some_candidate(subject, "it promises viscous, but %s for any of the parameters tried: nothing would slow a fast slide more than a slow one; add a term that grows with speed, or drop the promise",
-                        [&](const Law &law, const Scales &s, std::string *why) -> std::string {
-                          const std::vector<double> f = steady_force(law, s, {10, 100});
-                          *why = "the steady force does not rise between 10 and 100 m/s";
-                          return f[1] > f[0] * (1 + 1e-9) ? text("%.3g N s/m", (f[1] - f[0]) / 90) : "";
-                        });
+  return some_candidate(
+      subject,
+      "it promises viscous, but %s for any of the parameters tried: nothing would slow a fast slide more "
+      "than a slow one; add a term that grows with speed, or drop the promise",
+      [&](const Law &law, const Scales &s, std::string *why) -> std::string {
+        const std::vector<double> f = steady_force(law, s, {10, 100});
+        *why = "the steady force does not rise between 10 and 100 m/s";
+        return f[1] > f[0] * (1 + 1e-9) ? text("%.3g N s/m", (f[1] - f[0]) / 90) : "";
+      });
 }
 
-// ---- presliding --------------------------------------------------------------------------------------------------------------------
+// ---- presliding -------------------------------------------------------------------------------------------
 
 namespace {
 
-// Force along a path of displacements, at a rate: the same displacements, each step taking as long as the rate says.
+// Force along a path of displacements, at a rate: the same displacements, each step taking as long as
+// the rate says.
 std::vector<double> along(const Law &law, const Scales &s, const std::vector<double> &path, double h) {
   Lanes b(law, 1);
   if (law.needs(DFM_NEED_FN)) b.fn[0] = s.fn;
   std::vector<double> out;
   for (size_t k = 1; k < path.size(); ++k) {
     b.slip(0, (path[k] - path[k - 1]) / h, 0);
-    b.must(h), b.commit();
+    b.must(h);
+    b.commit();
     out.push_back(-b.out_ft[0]);
   }
   return out;
@@ -135,7 +153,8 @@ std::vector<double> along(const Law &law, const Scales &s, const std::vector<dou
 std::vector<double> to_and_fro(double amplitude, int steps_per_leg, int legs) {
   std::vector<double> out{0};
   for (int leg = 0; leg < legs; ++leg) {
-    const double from = leg == 0 ? 0 : (leg % 2 ? amplitude : -amplitude), to = leg % 2 ? -amplitude : amplitude;
+    const double from = leg == 0 ? 0 : (leg % 2 ? amplitude : -amplitude);
+    const double to = leg % 2 ? -amplitude : amplitude;
     for (int k = 1; k <= steps_per_leg; ++k) out.push_back(from + (to - from) * k / steps_per_leg);
   }
   return out;
@@ -155,13 +174,22 @@ std::string presliding_is_displacement(const Subject &subject) {
   const Scales s = scales_of(law);
   const double z = presliding_or_break(s);
   const std::vector<double> path = to_and_fro(0.8 * z, 400, 3);
-  const std::vector<double> fast = along(law, s, path, 1.0 / 3000), slow = along(law, s, path, 1.0 / 300), slowest = along(law, s, path, 1.0 / 30);
+  const std::vector<double> fast = along(law, s, path, 1.0 / 3000);
+  const std::vector<double> slow = along(law, s, path, 1.0 / 300);
+  const std::vector<double> slowest = along(law, s, path, 1.0 / 30);
   const double early = largest_difference(fast, slow), late = largest_difference(slow, slowest);
   if (!(late <= 0.01 * s.level) || !(late <= 0.3 * early + 2e-5 * s.level))
-    broken("along one presliding path the force still changes by %.3g N when the rate falls from a tenth to a hundredth (%.3g N before, of a level of %.3g N): it is a function of the rate, so a slow load "
-           "creeps; let slip path, not time, change the state", late, early, s.level);
+    broken(
+        "along one presliding path the force still changes by %.3g N when the rate falls from a tenth to a "
+        "hundredth (%.3g N before, of a level of %.3g N): it is a function of the rate, so a slow load "
+        "creeps; let slip path, not time, change the state",
+        late, early, s.level);
   const double small = std::fabs(along(law, s, {0, 0.01 * z}, 1.0 / 30)[0]);
-  if (!(small < 0.1 * s.level)) broken("a hundredth of the presliding displacement meets %.3g N of %.3g N: the contact is rigid, not presliding", small, s.level);
+  if (!(small < 0.1 * s.level))
+    broken(
+        "a hundredth of the presliding displacement meets %.3g N of %.3g N: the contact is rigid, not "
+        "presliding",
+        small, s.level);
   return text("%.3g m, %.3g N/m, rate changes it by %.1e of the level", z, s.stiffness, late / s.level);
 }
 
@@ -173,26 +201,32 @@ std::string loop_has_area(const Subject &subject) {
   constexpr int kLeg = 400;
   const std::vector<double> path = to_and_fro(amplitude, kLeg, 5), force = along(law, s, path, 1.0 / 30);
   double area = 0;
-  for (size_t k = 3 * kLeg + 1; k < path.size(); ++k) area += 0.5 * (force[k - 2] + force[k - 1]) * (path[k] - path[k - 1]);   // the last two legs close a loop
+  // the last two legs close a loop
+  for (size_t k = 3 * kLeg + 1; k < path.size(); ++k)
+    area += 0.5 * (force[k - 2] + force[k - 1]) * (path[k] - path[k - 1]);
   const double share = area / (4 * amplitude * s.level);
   if (!(share > 1e-3))
-    broken("a loop of +-%.3g m, one and a half times the presliding displacement, takes %.3g J (%.2g of the largest it could): it promises hysteresis, and vibration there would never die out; "
-           "let the bristle yield before the level, or drop the promise", amplitude, area, share);
+    broken(
+        "a loop of +-%.3g m, one and a half times the presliding displacement, takes %.3g J (%.2g of the "
+        "largest it could): it promises hysteresis, and vibration there would never die out; let the bristle "
+        "yield before the level, or drop the promise",
+        amplitude, area, share);
   return text("%.0f %% of a full loop", 100 * share);
 }
 
-// ---- break-away --------------------------------------------------------------------------------------------------------------------
+// ---- break-away -------------------------------------------------------------------------------------------
 
 std::string breaks_away(const Subject &subject) {
   needs_promise(subject, "breakaway");
-  const std::vector<double> speeds = decades(1e-5, 10, 8), rates{0.3, 1, 3, 10, 30};     // levels per second
+  const std::vector<double> speeds = decades(1e-5, 10, 8), rates{0.3, 1, 3, 10, 30};  // levels per second
   const auto show = [&](const Law &law, const Scales &s, std::string *why) -> std::string {
     const std::vector<double> steady = steady_force(law, s, speeds);
     const auto top = std::max_element(steady.begin(), steady.end() - 1);
     const auto low = std::min_element(top, steady.end());
     // sliding has begun where the steady force has come down to within a hundredth of its least
     double begun = speeds.back();
-    for (auto f = low; f != top && *(f - 1) <= 1.01 * *low; --f) begun = speeds[static_cast<size_t>(f - 1 - steady.begin())];
+    for (auto f = low; f != top && *(f - 1) <= 1.01 * *low; --f)
+      begun = speeds[static_cast<size_t>(f - 1 - steady.begin())];
     Masses masses(law, s, static_cast<uint32_t>(rates.size()));
     std::vector<double> peak(rates.size(), 0.0), force(rates.size());
     std::vector<bool> slides(rates.size(), false);
@@ -206,15 +240,20 @@ std::string breaks_away(const Subject &subject) {
       }
       if (std::all_of(slides.begin(), slides.end(), [](bool b) { return b; })) break;
     }
-    *why = text("the peak is %.4g N at the slowest ramp and %.4g N at the fastest, above a kinetic level of %.4g N", peak.front(), peak.back(), *low);
+    *why = text(
+        "the peak is %.4g N at the slowest ramp and %.4g N at the fastest, above a kinetic level of %.4g N",
+        peak.front(), peak.back(), *low);
     bool falls = peak.front() > 1.01 * *low && peak.back() < (1 - 1e-3) * peak.front();
     for (size_t i = 1; i < peak.size(); ++i) falls = falls && peak[i] <= (1 + 1e-3) * peak[i - 1];
     return falls ? text("%.3g to %.3g of the kinetic level", peak.front() / *low, peak.back() / *low) : "";
   };
-  return some_candidate(subject, "it promises breakaway, but %s, whatever the parameters tried: a jerk would need as much force as a slow pull; let the state lag behind the slip, or drop the promise", show);
+  return some_candidate(subject,
+                        "it promises breakaway, but %s, whatever the parameters tried: a jerk would need as "
+                        "much force as a slow pull; let the state lag behind the slip, or drop the promise",
+                        show);
 }
 
-// ---- drift -------------------------------------------------------------------------------------------------------------------------
+// ---- drift ------------------------------------------------------------------------------------------------
 
 std::string does_not_drift(const Subject &subject) {
   needs_promise(subject, "stiction");
@@ -228,7 +267,8 @@ std::string does_not_drift(const Subject &subject) {
   for (size_t i = 0; i < load.size(); ++i) load[i] = loads[i].bias * s.level;
   load_up(masses, load);
   for (int k = 1; k <= kCycle * kCycles; ++k) {
-    for (size_t i = 0; i < load.size(); ++i) load[i] = s.level * (loads[i].bias + loads[i].amplitude * std::sin(6.283185307179586 * k / kCycle));
+    for (size_t i = 0; i < load.size(); ++i)
+      load[i] = s.level * (loads[i].bias + loads[i].amplitude * std::sin(6.283185307179586 * k / kCycle));
     masses.step(load, 1.0 / kCycle);
     if (k == kCycle * kWarm) begin = masses.x;
   }
@@ -237,8 +277,11 @@ std::string does_not_drift(const Subject &subject) {
     const double drift = std::fabs(masses.x[i] - begin[i]) / (kCycles - kWarm);
     worst = std::max(worst, drift);
     if (!(drift <= 1e-6 * s.length()))
-      broken("a load of %g +- %g of its limit, which it should hold, moves it by %.3g m per cycle (elastic displacement %.3g m): what vibrates would walk away; give the bristle a zone in which it is purely "
-             "elastic, or do not promise stiction", loads[i].bias, loads[i].amplitude, drift, s.length());
+      broken(
+          "a load of %g +- %g of its limit, which it should hold, moves it by %.3g m per cycle (elastic "
+          "displacement %.3g m): what vibrates would walk away; give the bristle a zone in which it is "
+          "purely elastic, or do not promise stiction",
+          loads[i].bias, loads[i].amplitude, drift, s.length());
   }
   return text("%.1e m per cycle", worst);
 }

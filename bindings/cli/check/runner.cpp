@@ -38,7 +38,8 @@ bool waits(pid_t child) {
   if (fd >= 0) close(fd);
   if (n <= 0) return false;
   line[n] = 0;
-  const char *after = std::strrchr(line, ')');                // the name of the program, which stands before it, may hold anything
+  // the name of the program, which stands before it, may hold anything
+  const char *after = std::strrchr(line, ')');
   return after && after[1] == ' ' && after[2] == 'S';
 }
 
@@ -73,21 +74,25 @@ const char *signal_name(int number) {
 std::string ending_of(int status) {
   if (WIFEXITED(status)) return text("left its process by itself with exit code %d", WEXITSTATUS(status));
   const char *name = signal_name(WTERMSIG(status));
-  return name ? text("ended its process by %s", name) : text("ended its process by signal %d", WTERMSIG(status));
+  return name ? text("ended its process by %s", name)
+              : text("ended its process by signal %d", WTERMSIG(status));
 }
 
 [[noreturn]] void become_child(const std::function<void()> &work, int to_report, int to_output) {
   setpgid(0, 0);
-  leave(0);                                                    // how it ends is for the parent to judge
+  leave(0);  // how it ends is for the parent to judge
   prctl(PR_SET_PDEATHSIG, SIGKILL);
   const rlimit no_core{0, 0};
   setrlimit(RLIMIT_CORE, &no_core);
   const int input = open("/dev/null", O_RDONLY);
-  dup2(input, 0), dup2(to_output, 1), dup2(to_output, 2);
+  dup2(input, 0);
+  dup2(to_output, 1);
+  dup2(to_output, 2);
   report_to(to_report);
   try {
     work();
-  } catch (...) {                                              // never back into what the parent would do next
+  } catch (...) {
+    // never back into what the parent would do next
     _exit(1);
   }
   std::fflush(nullptr);
@@ -98,8 +103,12 @@ void read_reports(Answer &out, std::string &pending) {
   for (size_t end; (end = pending.find('\0')) != std::string::npos; pending.erase(0, end + 1)) {
     const char letter = pending[0];
     const std::string what(pending, 1, end - 1);
-    if (letter == 's') out.at = what;
-    else out.spoke = true, out.verdict = {letter == 'P' ? Result::pass : letter == 'F' ? Result::fail : Result::skip, what};
+    if (letter == 's') {
+      out.at = what;
+    } else {
+      out.spoke = true;
+      out.verdict = {letter == 'P' ? Result::pass : letter == 'F' ? Result::fail : Result::skip, what};
+    }
   }
 }
 
@@ -143,13 +152,15 @@ void stage(const char *format, ...) {
 }
 
 void answer(const Verdict &verdict) {
-  if (report >= 0) send(verdict.result == Result::pass ? 'P' : verdict.result == Result::fail ? 'F' : 'S', verdict.detail);
+  if (report >= 0)
+    send(verdict.result == Result::pass ? 'P' : verdict.result == Result::fail ? 'F' : 'S', verdict.detail);
 }
 
 void fail_now(const char *sentence) {
   const char letter = 'F';
   const int to = report >= 0 ? report : STDERR_FILENO;
-  if ((report >= 0 && write(to, &letter, 1) != 1) || write(to, sentence, std::strlen(sentence) + 1) < 0) _exit(1);
+  if ((report >= 0 && write(to, &letter, 1) != 1) || write(to, sentence, std::strlen(sentence) + 1) < 0)
+    _exit(1);
   _exit(1);
 }
 
@@ -157,27 +168,37 @@ Verdict run_here(const Rule &rule, const Subject &subject) {
   try {
     const uint32_t kind = subject.type ? subject.type->kind : uint32_t(DFM_KIND_FRICTION);
     const auto run = kind == DFM_KIND_FRICTION ? rule.law : rule.model;
-    if (!run) return {Result::skip, kind == DFM_KIND_MODEL ? "comes with the rules for models (M01 to M15), which are not available yet" : "no such rule for solvers is available yet"};
+    if (!run)
+      return {Result::skip, kind == DFM_KIND_MODEL
+                                ? "comes with the rules for models (M01 to M15), which are not available yet"
+                                : "no such rule for solvers is available yet"};
     return {Result::pass, run(subject)};
   } catch (const Broken &b) {
     return {Result::fail, b.what()};
   } catch (const Skipped &s) {
     return {Result::skip, s.what()};
   } catch (const std::exception &e) {
-    return {Result::fail, text("an exception left the plugin (%s), which ends a program written in C; wrap its entries in dfm::plugin::guarded", e.what())};
+    return {Result::fail, text("an exception left the plugin (%s), which ends a program written in C; wrap "
+                               "its entries in dfm::plugin::guarded",
+                               e.what())};
   } catch (...) {
-    return {Result::fail, "an exception left the plugin, which ends a program written in C; wrap its entries in dfm::plugin::guarded"};
+    return {Result::fail,
+            "an exception left the plugin, which ends a program written in C; wrap its entries in "
+            "dfm::plugin::guarded"};
   }
 }
 
-Answer in_fresh_process(const std::string &command, std::vector<std::string> arguments, const Limits &limits) {
+Answer in_fresh_process(const std::string &command, std::vector<std::string> arguments,
+                        const Limits &limits) {
   const auto become = [&] {
     fcntl(report, F_SETFD, 0);
-    arguments.push_back("--report-to"), arguments.push_back(std::to_string(report));
+    arguments.push_back("--report-to");
+    arguments.push_back(std::to_string(report));
     std::vector<char *> argv{const_cast<char *>("deform")};
     for (std::string &a : arguments) argv.push_back(a.data());
     argv.push_back(nullptr);
-    setenv("GLIBC_TUNABLES", "glibc.malloc.tcache_count=0", 1);   // a cache of free pieces would look like a leak to V09
+    // a cache of free pieces would look like a leak to V09
+    setenv("GLIBC_TUNABLES", "glibc.malloc.tcache_count=0", 1);
     execv(command.c_str(), argv.data());
     _exit(127);
   };
@@ -186,13 +207,23 @@ Answer in_fresh_process(const std::string &command, std::vector<std::string> arg
 
 Answer in_own_process(const std::function<void()> &work, const Limits &limits) {
   int reports[2], output[2];
-  if (pipe2(reports, O_CLOEXEC) != 0) throw Failure(kBadInput, "no pipe is left for the process of a rule; close programs or raise the limit of open files");
-  if (pipe2(output, O_CLOEXEC) != 0) throw Failure(kBadInput, "no pipe is left for the process of a rule; close programs or raise the limit of open files");
-  std::fflush(nullptr);                                        // or the child would print what waits here once more
+  if (pipe2(reports, O_CLOEXEC) != 0)
+    throw Failure(
+        kBadInput,
+        "no pipe is left for the process of a rule; close programs or raise the limit of open files");
+  if (pipe2(output, O_CLOEXEC) != 0)
+    throw Failure(
+        kBadInput,
+        "no pipe is left for the process of a rule; close programs or raise the limit of open files");
+  // or the child would print what waits here once more
+  std::fflush(nullptr);
   const pid_t child = fork();
   if (child == 0) become_child(work, reports[1], output[1]);
-  close(reports[1]), close(output[1]);
-  if (child < 0) throw Failure(kBadInput, "the system starts no further process for a rule; close programs, or say --in-process");
+  close(reports[1]);
+  close(output[1]);
+  if (child < 0)
+    throw Failure(kBadInput,
+                  "the system starts no further process for a rule; close programs, or say --in-process");
   Answer out;
   std::string pending;
   pollfd ends[2] = {{reports[0], POLLIN, 0}, {output[0], POLLIN, 0}};
@@ -201,26 +232,38 @@ Answer in_own_process(const std::function<void()> &work, const Limits &limits) {
   const double begun = clock_of(CLOCK_MONOTONIC);
   char buffer[4096];
   int status = 0;
-  double moved = begun, counted = 0;                           // when it last computed
+  double moved = begun, counted = 0;  // when it last computed
   bool waited = false;
   for (bool ended = false; !ended;) {
-    poll(ends, 2, ends[0].fd < 0 && ends[1].fd < 0 ? 1 : 5);     // both closed: it ends any moment
+    poll(ends, 2, ends[0].fd < 0 && ends[1].fd < 0 ? 1 : 5);  // both closed: it ends any moment
     for (int k = 0; k < 2; ++k) {
       if (!(ends[k].revents & (POLLIN | POLLHUP | POLLERR))) continue;
       const ssize_t n = read(ends[k].fd, buffer, sizeof buffer);
-      if (n <= 0) ends[k].fd = -1 - ends[k].fd;              // at its end: poll passes over negative descriptors
-      else if (k == 0) pending.append(buffer, static_cast<size_t>(n)), read_reports(out, pending);
-      else if (out.said.size() < 65536) out.said.append(buffer, static_cast<size_t>(n));
+      // at its end: poll passes over negative descriptors
+      if (n <= 0) {
+        ends[k].fd = -1 - ends[k].fd;
+      } else if (k == 0) {
+        pending.append(buffer, static_cast<size_t>(n));
+        read_reports(out, pending);
+      } else if (out.said.size() < 65536) out.said.append(buffer, static_cast<size_t>(n));
     }
     if (const double used = timed ? clock_of(clock) : -1; used >= 0) out.seconds = used;
     const double clock_now = clock_of(CLOCK_MONOTONIC);
-    if (out.seconds > counted + 1e-3) counted = out.seconds, moved = clock_now;
+    if (out.seconds > counted + 1e-3) {
+      counted = out.seconds;
+      moved = clock_now;
+    }
     if (!out.late && clock_now - moved > limits.still && waits(child)) waited = true;
     const bool over = waited || out.seconds > limits.seconds || clock_now - begun > 10 * limits.seconds;
-    if (over && !out.late) out.late = true, kill(-child, SIGKILL), kill(child, SIGKILL);
+    if (over && !out.late) {
+      out.late = true;
+      kill(-child, SIGKILL);
+      kill(child, SIGKILL);
+    }
     ended = waitpid(child, &status, WNOHANG) == child;
   }
-  for (int k = 0; k < 2; ++k) {                               // what it wrote before it ended; a process it left behind is not waited for
+  // what it wrote before it ended; a process it left behind is not waited for
+  for (int k = 0; k < 2; ++k) {
     const int fd = ends[k].fd < 0 ? -1 - ends[k].fd : ends[k].fd;
     fcntl(fd, F_SETFL, O_NONBLOCK);
     for (ssize_t n; (n = read(fd, buffer, sizeof buffer)) > 0;) {
@@ -232,7 +275,8 @@ Answer in_own_process(const std::function<void()> &work, const Limits &limits) {
   read_reports(out, pending);
   kill(-child, SIGKILL);
   if (!out.spoke)
-    out.ending = waited     ? text("did not come back: it has waited for %g s for something that never comes", limits.still)
+    out.ending = waited     ? text("did not come back: it has waited for %g s for something that never comes",
+                                   limits.still)
                  : out.late ? text("did not come back within %g s", limits.seconds)
                             : ending_of(status);
   return out;

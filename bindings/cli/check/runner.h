@@ -1,4 +1,5 @@
-// How a rule is run: here, or in a process of its own with a limit, so that what crashes or hangs costs its rule and nothing else.
+// How a rule is run: here, or in a process of its own with a limit, so that what crashes or hangs costs its
+// rule and nothing else.
 #pragma once
 #include <functional>
 #include <string>
@@ -8,7 +9,8 @@
 
 namespace cli::check {
 
-// Of processor time for one rule; ten times that of the clock. What neither computes nor may run for `still` seconds waits for something that never comes.
+// Of processor time for one rule; ten times that of the clock. What neither computes nor may run for `still`
+// seconds waits for something that never comes.
 struct Limits { double seconds = 10, still = 5; };
 
 // What a rule is about to do: named where its process ends without an answer.
@@ -20,17 +22,18 @@ void report_to(int descriptor);
 [[noreturn]] void fail_now(const char *sentence);
 
 struct Answer {
-  bool spoke = false;          // the process gave a verdict
+  bool spoke = false;  // the process gave a verdict
   Verdict verdict;
-  std::string said;            // what it wrote to its standard streams
-  std::string ending;          // where it gave none: "ended by SIGSEGV", "ran past 1 s of processor time"
-  std::string at;              // its last stage
-  double seconds = 0;          // processor time
-  bool late = false;           // it was ended because it did not come back
+  std::string said;    // what it wrote to its standard streams
+  std::string ending;  // where it gave none: "ended by SIGSEGV", "ran past 1 s of processor time"
+  std::string at;      // its last stage
+  double seconds = 0;  // processor time
+  bool late = false;   // it was ended because it did not come back
 };
 // Runs work in a process of its own, which has loaded no plugin before, and waits within the limits.
 Answer in_own_process(const std::function<void()> &work, const Limits &limits);
-// The same in a fresh image of this program, with other addresses; the arguments say what to do, --report-to is added.
+// The same in a fresh image of this program, with other addresses; the arguments say what to do,
+// --report-to is added.
 Answer in_fresh_process(const std::string &command, std::vector<std::string> arguments, const Limits &limits);
 // The child's last word.
 void answer(const Verdict &verdict);

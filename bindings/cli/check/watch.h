@@ -1,8 +1,9 @@
-// Catches what eval must not do: calls of the C library that allocate, open, print or read the environment, and touches of memory outside the
-// arrays. Calls are caught by exchanging addresses: every function that a loaded object calls in another one stands in that object's table of
-// addresses (global offset table), so while eval runs, the entries of those names, in the plugin and in every library under it, point to ours.
-// Nothing is forwarded: the first such call ends eval by a jump back to the rule. Not seen: bare system calls in machine code, the
-// variable `environ`, and a C library linked into the plugin.
+// Catches what eval must not do: calls of the C library that allocate, open, print or read the environment,
+// and touches of memory outside the arrays. Calls are caught by exchanging addresses: every function that a
+// loaded object calls in another one stands in that object's table of addresses (global offset table), so
+// while eval runs, the entries of those names, in the plugin and in every library under it, point to ours.
+// Nothing is forwarded: the first such call ends eval by a jump back to the rule. Not seen: bare system calls
+// in machine code, the variable `environ`, and a C library linked into the plugin.
 #pragma once
 #include <csetjmp>
 #include <cstdint>
@@ -13,7 +14,7 @@ namespace cli::check {
 
 class Watch {
  public:
-  Watch();                                    // finds the entries; the plugin must be loaded
+  Watch();  // finds the entries; the plugin must be loaded
   // Runs f; the name of the function that it called and may not, or null.
   template <class F>
   const char *run(F &&f) {
@@ -27,11 +28,14 @@ class Watch {
     return name;
   }
   size_t entries() const { return slots_.size(); }
-  [[noreturn]] static void stop(const char *name);   // for services that have no entry to exchange
+  [[noreturn]] static void stop(const char *name);  // for services that have no entry to exchange
   static bool watching() { return active; }
 
  private:
-  struct Slot { void **at; void *ours, *theirs; };
+  struct Slot {
+    void **at;
+    void *ours, *theirs;
+  };
   void exchange(bool ours);
   static sigjmp_buf back;
   static const char *caught;
@@ -42,20 +46,21 @@ class Watch {
 // The writable memory of the plugin's own file (its static variables), read only while this lives.
 class StaticsLocked {
  public:
-  explicit StaticsLocked(const void *inside);   // any address in the plugin
+  explicit StaticsLocked(const void *inside);  // any address in the plugin
   ~StaticsLocked() { protect(true); }
   StaticsLocked(const StaticsLocked &) = delete;
   StaticsLocked &operator=(const StaticsLocked &) = delete;
   bool hold(const void *at) const;
   struct Range { unsigned char *begin, *end; };
-  uintptr_t base = 0;                           // of the loaded file
+  uintptr_t base = 0;  // of the loaded file
 
  private:
   void protect(bool writable) const;
   std::vector<Range> ranges_;
 };
 
-// An array between two pages that may not be touched, at the end or at the start of what lies between them; the rest holds a pattern.
+// An array between two pages that may not be touched, at the end or at the start of what lies between them;
+// the rest holds a pattern.
 class Fenced {
  public:
   enum Place { at_start, at_end };
@@ -65,8 +70,9 @@ class Fenced {
   Fenced &operator=(const Fenced &) = delete;
   void *data() const { return data_; }
   double *numbers() const { return static_cast<double *>(data_); }
-  void lock();                                // read only from here on
-  // The first byte beside the array that is no longer the pattern, as an offset from its beginning; false where there is none.
+  void lock();  // read only from here on
+  // The first byte beside the array that is no longer the pattern, as an offset from its beginning; false
+  // where there is none.
   bool spoilt(long *offset) const;
 
   // Runs f and turns a touch of a fence into a sentence; empty where there was none.
@@ -85,7 +91,7 @@ class Fenced {
   static void on_fault(int, void *info, void *context);
   static sigjmp_buf back;
   static char sentence[256];
-  static const void *touched;                  // where; null where there was no touch
+  static const void *touched;  // where; null where there was no touch
   static std::vector<Fenced *> all;
   const char *name_;
   unsigned char *pages_, *middle_;

@@ -7,149 +7,186 @@
 #ifdef __cplusplus
 extern "C" {
 #endif
-/** How a surface of its own hangs on the body's points: x_s = N x_p, rows of N sum to one; forces go back by the transpose.
- * BARYCENTRIC: in the cell that holds the surfel, or the nearest one. MLS: moving least squares over the points within the support; both
- * reproduce linear fields. THESIS: as Zerbato (2010) prints (3.9), to compare: torque and power are wrong (doc/concepts/couplings.md). */
+/** How a surface of its own hangs on the body's points: x_s = N x_p, rows of N sum to one; forces go back by
+ * the transpose. BARYCENTRIC: in the cell that holds the surfel, or the nearest one. MLS: moving least
+ * squares over the points within the support; both reproduce linear fields. THESIS: as Zerbato (2010) prints
+ * (3.9), to compare: torque and power are wrong (doc/concepts/couplings.md). */
 enum { DFM_COUPLING_BARYCENTRIC = 0, DFM_COUPLING_MLS = 1, DFM_COUPLING_THESIS = 2 };
 typedef struct dfm_surface_def {
-  uint32_t size; int32_t coupling;
+  uint32_t size;
+  int32_t coupling;
   uint32_t npoint, ntriangle;
-  const double *points;             /* [npoint,3] at rest, in the frame of the body's points; copied */
-  const uint32_t *triangles;        /* [ntriangle,3] counter-clockwise from outside; copied */
-  double support;                   /* MLS, THESIS: support radius in mean distances to the ten nearest points; 0: 3 */
+  const double *points;      /* [npoint,3] at rest, in the frame of the body's points; copied */
+  const uint32_t *triangles; /* [ntriangle,3] counter-clockwise from outside; copied */
+  /* MLS, THESIS: support radius in mean distances to the ten nearest points; 0: 3 */
+  double support;
 } dfm_surface_def;
 
-/** Groups of a body's surface triangles, for friction by "body:GROUP". With `triangles`: any of the surface's triangles by their points (the
- * body's, or those of a surface of its own), in any order and turn; those inside the body are passed over, one that is named twice keeps its first
- * group. Without: one entry for every triangle in the order of dfm_surface_triangles. Since 0.1. */
+/** Groups of a body's surface triangles, for friction by "body:GROUP". With `triangles`: any of the surface's
+ * triangles by their points (the body's, or those of a surface of its own), in any order and turn; those
+ * inside the body are passed over, one that is named twice keeps its first group. Without: one entry for
+ * every triangle in the order of dfm_surface_triangles. Since 0.1. */
 typedef struct dfm_surface_groups {
   uint32_t size, ngroup;
-  const char *const *names;         /* [ngroup] */
+  const char *const *names; /* [ngroup] */
   uint32_t ntriangle, reserved;
-  const uint32_t *triangles;        /* [ntriangle,3], or NULL */
-  const uint32_t *group;            /* [ntriangle] index into names; UINT32_MAX: none */
+  const uint32_t *triangles; /* [ntriangle,3], or NULL */
+  const uint32_t *group;     /* [ntriangle] index into names; UINT32_MAX: none */
 } dfm_surface_groups;
 
-typedef struct dfm_cell_field { const char *key; const double *values; uint32_t width; } dfm_cell_field;   /* [ntet,width] */
+/* [ntet,width] */
+typedef struct dfm_cell_field {
+  const char *key;
+  const double *values;
+  uint32_t width;
+} dfm_cell_field;
 
 typedef struct dfm_body_def {
   uint32_t size, flags;
-  const char *name;                 /* unique in the world; NULL: "body<N>" */
+  const char *name; /* unique in the world; NULL: "body<N>" */
   uint32_t npoint, ntet;
-  const double *points;             /* [npoint,3] rest positions before pose, m; copied */
-  const uint32_t *tets;             /* [ntet,4] positive volume; copied */
-  dfm_material material;            /* 0: dfm_material_def_default() */
-  const char *model;                /* short name or full id; NULL: "msm" */
+  const double *points;  /* [npoint,3] rest positions before pose, m; copied */
+  const uint32_t *tets;  /* [ntet,4] positive volume; copied */
+  dfm_material material; /* 0: dfm_material_def_default() */
+  const char *model;     /* short name or full id; NULL: "msm" */
   dfm_params model_params;
   dfm_pose pose;
-  double velocity[3], spin[3];      /* m/s of the center of mass; rad/s about it */
-  const uint8_t *fixed;             /* [npoint] held components, bits 1 x, 2 y, 4 z; NULL: none */
-  uint32_t category, collides_with; /* collision filter: a pair touches if (a.category & b.collides_with) and (b.category & a.collides_with) */
+  double velocity[3], spin[3]; /* m/s of the center of mass; rad/s about it */
+  const uint8_t *fixed;        /* [npoint] held components, bits 1 x, 2 y, 4 z; NULL: none */
+  /* collision filter: a pair touches if (a.category & b.collides_with) and (b.category & a.collides_with) */
+  uint32_t category, collides_with;
   void *user;
-  const dfm_surface_def *surface;   /* NULL: the boundary of the cells, each surfel a point of the body */
+  const dfm_surface_def *surface; /* NULL: the boundary of the cells, each surfel a point of the body */
   uint32_t nfield;
-  const dfm_cell_field *fields;     /* model parameters that differ by cell ("young", "anisotropy_axis"); win over materials; copied */
-  const dfm_material *cell_materials;  /* [ntet] material of each cell, 0: `material`; NULL: one for all */
-  const double *cell_share;         /* [ntet] how much of the cell is material, (0,1]: scales its mass and Young's modulus; NULL: all */
+  /* model parameters that differ by cell ("young", "anisotropy_axis"); win over materials; copied */
+  const dfm_cell_field *fields;
+  const dfm_material *cell_materials; /* [ntet] material of each cell, 0: `material`; NULL: one for all */
+  /* [ntet] how much of the cell is material, (0,1]: scales its mass and Young's modulus; NULL: all */
+  const double *cell_share;
   const dfm_surface_groups *groups; /* named parts of its surface; NULL: none. Copied */
 } dfm_body_def;
 
 /** No mesh, model msm, category 1, collides with all. Threads: Any thread. Since 0.1. */
 DFM_API dfm_body_def dfm_body_def_default(void);
-/** @return DFM_OK; DFM_E_ARG (which entry, why); DFM_E_UNSUPPORTED no plugin offers the model (lists those that do); DFM_E_NOMEM;
+/** @return DFM_OK; DFM_E_ARG (which entry, why); DFM_E_UNSUPPORTED no plugin offers the model (lists those
+ * that do); DFM_E_NOMEM;
  *          DFM_E_HANDLE. Threads: Not during step. Since 0.1. */
 DFM_API dfm_status dfm_body_create(dfm_world world, const dfm_body_def *def, dfm_body *out);
-/** Removes the body, between two steps of a running world too; its contacts end (events are reported). Threads: Not during step. Since 0.1. */
+/** Removes the body, between two steps of a running world too; its contacts end (events are reported).
+ * Threads: Not during step. Since 0.1. */
 DFM_API dfm_status dfm_body_destroy(dfm_body body);
 
 typedef struct dfm_body_info {
   uint32_t size, npoint, ntet, nsurfel, ntriangle, nedge;
   dfm_world world;
-  const char *name, *model;         /* valid while the body lives */
-  double mass, rest_volume;         /* kg, m3 */
+  const char *name, *model; /* valid while the body lives */
+  double mass, rest_volume; /* kg, m3 */
   void *user;
 } dfm_body_info;
 /** What it is made of. Threads: Any thread. Not during step. Since 0.1. */
 DFM_API dfm_status dfm_body_get_info(dfm_body body, dfm_body_info *out);
-/** Changes the user pointer that its def gave. @return DFM_OK; DFM_E_HANDLE. Threads: Not during step. Since 0.1. */
+/** Changes the user pointer that its def gave. @return DFM_OK; DFM_E_HANDLE. Threads: Not during
+ * step. Since 0.1. */
 DFM_API dfm_status dfm_body_set_user(dfm_body body, void *user);
-/** Changes the collision filter that its def gave (dfm_body_def). @return DFM_OK; DFM_E_HANDLE. Threads: Not during step. Since 0.1. */
+/** Changes the collision filter that its def gave (dfm_body_def). @return DFM_OK; DFM_E_HANDLE. Threads: Not
+ * during step. Since 0.1. */
 DFM_API dfm_status dfm_body_set_filter(dfm_body body, uint32_t category, uint32_t collides_with);
 
 /** Positions and velocities of all phyxels, [npoint,3] each, m and m/s; either may be NULL.
- * @param capacity of x and v in phyxels; 0 with both NULL only counts. @return DFM_OK; DFM_E_ARG capacity too small (untouched, *n set); DFM_E_HANDLE.
+ * @param capacity of x and v in phyxels; 0 with both NULL only counts. @return DFM_OK; DFM_E_ARG capacity too
+ * small (untouched, *n set); DFM_E_HANDLE.
  * Threads: Not during step. Since 0.1. */
 DFM_API dfm_status dfm_body_get_state(dfm_body body, uint32_t capacity, double *x, double *v, uint32_t *n);
-/** Sets them, [n,3] each, m and m/s; either may be NULL. Held components stay where they are told to be. @param n number of phyxels
- * @return DFM_OK; DFM_E_ARG n is another number, or a value is not finite (nothing changed); DFM_E_HANDLE. Threads: Not during step. Since 0.1. */
+/** Sets them, [n,3] each, m and m/s; either may be NULL. Held components stay where they are told to be.
+ * @param n number of phyxels
+ * @return DFM_OK; DFM_E_ARG n is another number, or a value is not finite (nothing changed); DFM_E_HANDLE.
+ * Threads: Not during step. Since 0.1. */
 DFM_API dfm_status dfm_body_set_state(dfm_body body, uint32_t n, const double *x, const double *v);
 /** Rest positions, [npoint,3], m, pose not applied; cells [ntet,4], phyxel numbers. Either may be NULL.
- * @return DFM_OK; DFM_E_ARG a capacity too small (untouched); DFM_E_HANDLE. Threads: Any thread. Not during step. Since 0.1. */
-DFM_API dfm_status dfm_body_get_rest(dfm_body body, uint32_t capacity_points, double *x, uint32_t capacity_tets, uint32_t *tets);
+ * @return DFM_OK; DFM_E_ARG a capacity too small (untouched); DFM_E_HANDLE. Threads: Any thread. Not during
+ * step. Since 0.1. */
+DFM_API dfm_status dfm_body_get_rest(dfm_body body, uint32_t capacity_points, double *x,
+                                     uint32_t capacity_tets, uint32_t *tets);
 
-/** Holds (bits 1 x, 2 y, 4 z) or releases (0) components of points. A point that is released loses its motion (dfm_body_move_held); one that stays held
- * keeps it. Threads: Not during step. Since 0.1. */
+/** Holds (bits 1 x, 2 y, 4 z) or releases (0) components of points. A point that is released loses its motion
+ * (dfm_body_move_held); one that stays held keeps it. Threads: Not during step. Since 0.1. */
 DFM_API dfm_status dfm_body_hold(dfm_body body, uint32_t n, const uint32_t *points, uint8_t axes);
-/** Moves held points together: their start positions carried by the keys' pose (relative to key 0) and, on top, the sine offset.
- * A point has one motion: a new one replaces what carried the point before, so calling this each frame takes no more memory than calling it once.
+/** Moves held points together: their start positions carried by the keys' pose (relative to key 0) and, on
+ * top, the sine offset.
+ * A point has one motion: a new one replaces what carried the point before, so calling this each frame takes
+ * no more memory than calling it once.
  * @param keys  [nkey], times strictly rising; nkey may be 0 when sine is given; copied
  * Threads: Not during step. Since 0.1. */
-DFM_API dfm_status dfm_body_move_held(dfm_body body, uint32_t n, const uint32_t *points, uint32_t nkey, const dfm_pose_key *keys,
-                                      const dfm_sine *sine);
-/** Adds a lasting load: force[i] N on points[i], times the keyed scale (nkey 0: 1), times (1 + sine) where sine is given
- * (its amplitude[0] counts). @param load out, number to remove it by; may be NULL. Threads: Not during step. Since 0.1. */
+DFM_API dfm_status dfm_body_move_held(dfm_body body, uint32_t n, const uint32_t *points, uint32_t nkey,
+                                      const dfm_pose_key *keys, const dfm_sine *sine);
+/** Adds a lasting load: force[i] N on points[i], times the keyed scale (nkey 0: 1), times (1 + sine) where
+ * sine is given (its amplitude[0] counts). @param load out, number to remove it by; may be NULL. Threads: Not
+ * during step. Since 0.1. */
 DFM_API dfm_status dfm_body_add_load(dfm_body body, uint32_t n, const uint32_t *points, const double *force,
-                                     uint32_t nkey, const dfm_scale_key *keys, const dfm_sine *sine, uint32_t *load);
-/** Removes a load by its number. @return DFM_OK; DFM_E_ARG no such load; DFM_E_HANDLE. Threads: Not during step. Since 0.1. */
+                                     uint32_t nkey, const dfm_scale_key *keys, const dfm_sine *sine,
+                                     uint32_t *load);
+/** Removes a load by its number. @return DFM_OK; DFM_E_ARG no such load; DFM_E_HANDLE. Threads: Not during
+ * step. Since 0.1. */
 DFM_API dfm_status dfm_body_remove_load(dfm_body body, uint32_t load);
 
-/** A spring of rest length zero from a point of the body to a place in the world, F = stiffness (to - x) + damping (v_to - v), where x = sum
- * weights[i] x[points[i]]; each point takes its weight's share of F. Explicit: it counts in the body's stable step. */
+/** A spring of rest length zero from a point of the body to a place in the world, F = stiffness (to - x) +
+ * damping (v_to - v), where x = sum weights[i] x[points[i]]; each point takes its weight's share of F.
+ * Explicit: it counts in the body's stable step. */
 typedef struct dfm_spring_def {
   uint32_t size, npoint;
-  const uint32_t *points;      /* [npoint] */
-  const double *weights;       /* [npoint] >= 0, scaled to sum 1; NULL: by mass, so that it pulls at the center of mass of these points */
-  double to[3];                /* m; counts where nkey is 0 */
-  const dfm_vector_key *keys;  /* [nkey] m, times strictly rising: where it ends, over time; copied */
+  const uint32_t *points; /* [npoint] */
+  /* [npoint] >= 0, scaled to sum 1; NULL: by mass, so that it pulls at the center of mass of these points */
+  const double *weights;
+  double to[3];               /* m; counts where nkey is 0 */
+  const dfm_vector_key *keys; /* [nkey] m, times strictly rising: where it ends, over time; copied */
   uint32_t nkey, reserved;
-  double stiffness, damping;   /* N/m, N s/m; >= 0 */
+  double stiffness, damping; /* N/m, N s/m; >= 0 */
 } dfm_spring_def;
-/** Adds a spring. @param spring out, number to name it by; may be NULL. @return DFM_E_ARG for points that do not exist, weights without a sum, values
- * that are negative or not finite; DFM_E_UNSUPPORTED where the model steps itself and has no step bound. Threads: Not during step. Since 0.1. */
+/** Adds a spring. @param spring out, number to name it by; may be NULL. @return DFM_E_ARG for points that do
+ * not exist, weights without a sum, values that are negative or not finite; DFM_E_UNSUPPORTED where the model
+ * steps itself and has no step bound. Threads: Not during step. Since 0.1. */
 DFM_API dfm_status dfm_body_add_spring(dfm_body body, const dfm_spring_def *def, uint32_t *spring);
-/** Moves the spring's end to a place; its keys, if it had any, are gone. Threads: Not during step. Since 0.1. */
+/** Moves the spring's end to a place; its keys, if it had any, are gone. Threads: Not during
+ * step. Since 0.1. */
 DFM_API dfm_status dfm_body_set_spring_target(dfm_body body, uint32_t spring, const double to[3]);
-/** The force with which it pulls at the body now, N. @param force out [3]. Threads: Any thread. Not during step. Since 0.1. */
+/** The force with which it pulls at the body now, N. @param force out [3]. Threads: Any thread. Not during
+ * step. Since 0.1. */
 DFM_API dfm_status dfm_body_get_spring_force(dfm_body body, uint32_t spring, double force[3]);
-/** Removes a spring by its number. @return DFM_OK; DFM_E_ARG no such spring; DFM_E_HANDLE. Threads: Not during step. Since 0.1. */
+/** Removes a spring by its number. @return DFM_OK; DFM_E_ARG no such spring; DFM_E_HANDLE. Threads: Not
+ * during step. Since 0.1. */
 DFM_API dfm_status dfm_body_remove_spring(dfm_body body, uint32_t spring);
-/** Impulse (N s) at a point of space, spread over the nearest surface triangle by barycentric weights. Threads: Not during step. Since 0.1. */
+/** Impulse (N s) at a point of space, spread over the nearest surface triangle by barycentric weights.
+ * Threads: Not during step. Since 0.1. */
 DFM_API dfm_status dfm_body_apply_impulse(dfm_body body, const double point[3], const double impulse[3]);
-/** Changes runtime parameters of the body's model by key. @return DFM_E_ARG unknown key (nearest valid name), out of range, not a runtime row,
- * or a parameter that differs by cell in this body (from fields, materials or share): one value cannot replace it.
+/** Changes runtime parameters of the body's model by key. @return DFM_E_ARG unknown key (nearest valid name),
+ * out of range, not a runtime row, or a parameter that differs by cell in this body (from fields, materials
+ * or share): one value cannot replace it.
  * Threads: Not during step. Since 0.1. */
 DFM_API dfm_status dfm_body_set_params(dfm_body body, const dfm_params *params);
 
-/** Wakes the body and those it touches, directly or through others; awake, it starts to count its calm anew. Whatever changes a body, or
- * reaches it, wakes it by itself. Threads: Not during step. Since 0.1. */
+/** Wakes the body and those it touches, directly or through others; awake, it starts to count its calm anew.
+ * Whatever changes a body, or reaches it, wakes it by itself. Threads: Not during step. Since 0.1. */
 DFM_API dfm_status dfm_body_wake(dfm_body body);
-/** Does the body sleep (dfm_world_def.sleep)? @param asleep out. Threads: Any thread. Not during step. Since 0.1. */
+/** Does the body sleep (dfm_world_def.sleep)? @param asleep out. Threads: Any thread. Not during
+ * step. Since 0.1. */
 DFM_API dfm_status dfm_body_is_asleep(dfm_body body, bool *asleep);
 
-/** Sums over the body, in SI units. angular: about the center of mass. contact_impulse: total contact impulse on the body since it was
- * created (N s): divide differences by the interval for a mean force. elastic is NAN if the model has no energy. */
+/** Sums over the body, in SI units. angular: about the center of mass. contact_impulse: total contact impulse
+ * on the body since it was created (N s): divide differences by the interval for a mean force. elastic is NAN
+ * if the model has no energy. */
 typedef struct dfm_body_measure {
   uint32_t size, inverted;
-  double mass, com[3], velocity[3];            /* kg; m, m/s of the center of mass */
-  double momentum[3], angular[3];              /* kg m/s; kg m2/s about the center of mass */
-  double kinetic, elastic;                     /* J; elastic NAN where the model gives no energy */
-  double volume, rest_volume, speed_max;       /* m3 of the cells, signed; m/s of the fastest phyxel */
-  double contact_impulse[3];                   /* N s that contact has given it since creation */
+  double mass, com[3], velocity[3];      /* kg; m, m/s of the center of mass */
+  double momentum[3], angular[3];        /* kg m/s; kg m2/s about the center of mass */
+  double kinetic, elastic;               /* J; elastic NAN where the model gives no energy */
+  double volume, rest_volume, speed_max; /* m3 of the cells, signed; m/s of the fastest phyxel */
+  double contact_impulse[3];             /* N s that contact has given it since creation */
 } dfm_body_measure;
 /** @return DFM_OK; DFM_E_HANDLE; DFM_E_ARG. Threads: Any thread. Not during step. Since 0.1. */
 DFM_API dfm_status dfm_body_get_measure(dfm_body body, dfm_body_measure *out);
 /** Strain energy density of each cell, J/m3, [ntet]. @param capacity of out in cells
- * @return DFM_OK; DFM_E_UNSUPPORTED the model offers none; DFM_E_ARG capacity too small; DFM_E_HANDLE. Threads: Any thread. Not during step. Since 0.1. */
+ * @return DFM_OK; DFM_E_UNSUPPORTED the model offers none; DFM_E_ARG capacity too small; DFM_E_HANDLE.
+ * Threads: Any thread. Not during step. Since 0.1. */
 DFM_API dfm_status dfm_body_energy_density(dfm_body body, uint32_t capacity, double *out);
 #ifdef __cplusplus
 }

@@ -6,13 +6,15 @@
 #ifdef __cplusplus
 extern "C" {
 #endif
-/** Phyxels as VTU (point data u, v; cell data energy_density where the model offers it). Never leaves half a file.
+/** Phyxels as VTU (point data u, v; cell data energy_density where the model offers it). Never
+ * leaves half a file.
  * Threads: Not during step. Since 0.1. */
 DFM_API dfm_status dfm_debug_write_body(dfm_body body, const char *path);
 /** Surfels as VTU (point data u, v, force). Threads: Not during step. Since 0.1. */
 DFM_API dfm_status dfm_debug_write_surface(dfm_body body, const char *path);
 
-/** Lines for a debug view: contact normals and friction forces of the last sub-step, swept boxes of the surfaces. */
+/** Lines for a debug view: contact normals and friction forces of the last sub-step, swept boxes of
+ * the surfaces. */
 enum { DFM_DRAW_CONTACTS = 1, DFM_DRAW_FORCES = 2, DFM_DRAW_BOXES = 4 };
 typedef void (*dfm_draw_line_fn)(void *user, const double a[3], const double b[3], uint32_t rgb);
 /** Calls line for each; what is a sum of DFM_DRAW_*. Threads: Not during step. Since 0.1. */

@@ -1,6 +1,7 @@
-// deform/deform.hpp -- the C API for C++20: handles that end what they own, spans for arrays, errors as exceptions or as values. Header only.
-// Every function costs what the C function costs that it is named after, and allocates only where it returns a std::vector or std::string.
-// Comments of the C headers hold: units, errors, threads. doc/howto/cpp.md
+// deform/deform.hpp -- the C API for C++20: handles that end what they own, spans for arrays, errors as
+// exceptions or as values. Header only. Every function costs what the C function costs that it is named
+// after, and allocates only where it returns a std::vector or std::string. Comments of the C headers hold:
+// units, errors, threads. doc/howto/cpp.md
 //
 //   #include <deform/deform.hpp>
 //   auto context = deform::Context::make();                                  // throws deform::Error with the library's sentence
@@ -12,13 +13,14 @@
 //   const deform::Body ball = world.add_body(def);
 //   for (int i = 0; i < 500; ++i) world.step(1e-3);
 //
-// The same names in deform::values return Result<T> instead of throwing. Without exceptions (-fno-exceptions), or with
-// DEFORM_ERRORS_AS_VALUES defined, the names in deform are those.
+// The same names in deform::values return Result<T> instead of throwing. Without exceptions
+// (-fno-exceptions), or with DEFORM_ERRORS_AS_VALUES defined, the names in deform are those.
 //
-// Two kinds of handles, both as large as the C handle. A plain one (Body, World, ..) refers: copies are free, nothing ends with it, a stale one
-// answers DFM_E_HANDLE. Unique<Body>, Unique<World>, .. ends what it refers to. What lives in a context (worlds, scenes, meshes, laws) is handed
-// out as Unique; what lives in a world (bodies, obstacles, materials) as a plain handle that ends with the world, or earlier by destroy() or in
-// a Unique.
+// Two kinds of handles, both as large as the C handle. A plain one (Body, World, ..) refers: copies are
+// free, nothing ends with it, a stale one answers DFM_E_HANDLE. Unique<Body>, Unique<World>, .. ends what it
+// refers to. What lives in a context (worlds, scenes, meshes, laws) is handed out as Unique; what lives in a
+// world (bodies, obstacles, materials) as a plain handle that ends with the world, or earlier by destroy()
+// or in a Unique.
 #ifndef DEFORM_DEFORM_HPP
 #define DEFORM_DEFORM_HPP
 #include <cstddef>
@@ -32,46 +34,87 @@
 
 namespace deform {
 
-// ---- defs with the library's defaults ---------------------------------------------------------------------------------------------
-struct ContextDef : dfm_context_def { ContextDef() noexcept : dfm_context_def(dfm_context_def_default()) {} };
-struct WorldDef : dfm_world_def { WorldDef() noexcept : dfm_world_def(dfm_world_def_default()) {} };
-struct MaterialDef : dfm_material_def { MaterialDef() noexcept : dfm_material_def(dfm_material_def_default()) {} };
-struct ObstacleDef : dfm_obstacle_def { ObstacleDef() noexcept : dfm_obstacle_def(dfm_obstacle_def_default()) {} };
-struct RigidDef : dfm_rigid_def { RigidDef() noexcept : dfm_rigid_def(dfm_rigid_def_default()) {} };
+// ---- defs with the library's defaults ---------------------------------------------------------------------
+struct ContextDef : dfm_context_def {
+  ContextDef() noexcept : dfm_context_def(dfm_context_def_default()) {}
+};
+struct WorldDef : dfm_world_def {
+  WorldDef() noexcept : dfm_world_def(dfm_world_def_default()) {}
+};
+struct MaterialDef : dfm_material_def {
+  MaterialDef() noexcept : dfm_material_def(dfm_material_def_default()) {}
+};
+struct ObstacleDef : dfm_obstacle_def {
+  ObstacleDef() noexcept : dfm_obstacle_def(dfm_obstacle_def_default()) {}
+};
+struct RigidDef : dfm_rigid_def {
+  RigidDef() noexcept : dfm_rigid_def(dfm_rigid_def_default()) {}
+};
 struct BodyDef : dfm_body_def {
   BodyDef() noexcept : dfm_body_def(dfm_body_def_default()) {}
   // Borrowed until the body is made: points [n,3], tets [n,4].
   void set_mesh(std::span<const double> p, std::span<const uint32_t> t) noexcept {
-    npoint = static_cast<uint32_t>(p.size() / 3), points = p.data();
-    ntet = static_cast<uint32_t>(t.size() / 4), tets = t.data();
+    npoint = static_cast<uint32_t>(p.size() / 3);
+    points = p.data();
+    ntet = static_cast<uint32_t>(t.size() / 4);
+    tets = t.data();
   }
   template <class Mesh>
-  auto set_mesh(const Mesh &mesh) { return mesh.give_to(*this); }
+  auto set_mesh(const Mesh &mesh) {
+    return mesh.give_to(*this);
+  }
 };
 
 // What world.step() returns. Converts to true where the world advanced.
 struct [[nodiscard]] StepReport {
-  uint32_t trouble = 0;      // DFM_TROUBLE_*
-  bool discarded = false;    // too many sub-steps, its budget used up, or interrupted (trouble says which): nothing changed
+  uint32_t trouble = 0;  // DFM_TROUBLE_*
+  // too many sub-steps, its budget used up, or interrupted (trouble says which): nothing changed
+  bool discarded = false;
   constexpr explicit operator bool() const noexcept { return !discarded; }
 };
-struct StableStep { double dt = 0; dfm_body body = 0; uint32_t point = 0; };
+struct StableStep {
+  double dt = 0;
+  dfm_body body = 0;
+  uint32_t point = 0;
+};
 struct Wrench { Vec3 force{}, moment{}; };
-struct HoldReport { double creep = 0; uint32_t count = 0; };
-struct JointState { double position = 0, rate = 0, effort = 0; };   // as dfm_rigid_joint
-struct ProbeState { const char *name = nullptr; Vec3 position{}, velocity{}; };
-struct Touch { double t = 0; Vec3 weights{}; };        // weights of the triangle's vertices
-struct EdgeTouch { double t = 0, a = 0, b = 0; };      // where on each edge
-struct TetData { std::span<const double> points; std::span<const uint32_t> tets, file_point; };
-struct TriData { std::span<const double> points; std::span<const uint32_t> triangles, file_point; };
-struct Groups { std::span<const char *const> names; std::span<const uint32_t> of; };   // of: group of each cell or triangle
+struct HoldReport {
+  double creep = 0;
+  uint32_t count = 0;
+};
+struct JointState { double position = 0, rate = 0, effort = 0; };  // as dfm_rigid_joint
+struct ProbeState {
+  const char *name = nullptr;
+  Vec3 position{}, velocity{};
+};
+struct Touch {
+  double t = 0;
+  Vec3 weights{};
+};  // weights of the triangle's vertices
+struct EdgeTouch { double t = 0, a = 0, b = 0; };  // where on each edge
+struct TetData {
+  std::span<const double> points;
+  std::span<const uint32_t> tets, file_point;
+};
+struct TriData {
+  std::span<const double> points;
+  std::span<const uint32_t> triangles, file_point;
+};
+// of: group of each cell or triangle
+struct Groups {
+  std::span<const char *const> names;
+  std::span<const uint32_t> of;
+};
 struct GroupTriangles { std::span<const uint32_t> triangles, group; };
-struct GroupPoints { uint32_t dimension = 0; std::span<const uint32_t> points; };
+struct GroupPoints {
+  uint32_t dimension = 0;
+  std::span<const uint32_t> points;
+};
 
 // The classes, with how they tell errors as a parameter: Throw or Values.
 namespace basic {
 
-// ---- materials, laws --------------------------------------------------------------------------------------------------------------
+// ---- materials, laws --------------------------------------------------------------------------------------
 template <class E>
 class Material : public Handle<dfm_material> {
  public:
@@ -86,7 +129,9 @@ class Law : public Handle<dfm_law> {
   using Handle::Handle;
   static void end(dfm_law law) noexcept { dfm_law_close(law); }
   auto close() const { return E::done(dfm_law_close(raw_)); }
-  auto type() const { return produce<E, const dfm_type *>([&](const dfm_type *&t) { return dfm_law_type(raw_, &t); }); }
+  auto type() const {
+    return produce<E, const dfm_type *>([&](const dfm_type *&t) { return dfm_law_type(raw_, &t); });
+  }
   // False: the law discarded the batch, nothing in out counts.
   auto eval(const dfm_friction_in &in, dfm_friction_out &out) const {
     return produce<E, bool>([&](bool &counts) {
@@ -96,7 +141,8 @@ class Law : public Handle<dfm_law> {
     });
   }
   auto pack(const dfm_params &params, std::span<double> values) const {
-    return produce<E, uint32_t>([&](uint32_t &n) { return dfm_law_pack(raw_, &params, rows(values.size(), 1), values.data(), &n); });
+    return produce<E, uint32_t>(
+        [&](uint32_t &n) { return dfm_law_pack(raw_, &params, rows(values.size(), 1), values.data(), &n); });
   }
   auto pack(const dfm_params &params) const {
     return produce<E, std::vector<double>>([&](std::vector<double> &out) {
@@ -109,7 +155,7 @@ class Law : public Handle<dfm_law> {
   }
 };
 
-// ---- meshes -----------------------------------------------------------------------------------------------------------------------
+// ---- meshes -----------------------------------------------------------------------------------------------
 template <class E>
 class TetMesh : public Handle<dfm_tetmesh> {
  public:
@@ -117,7 +163,10 @@ class TetMesh : public Handle<dfm_tetmesh> {
   static void end(dfm_tetmesh mesh) noexcept { dfm_tetmesh_destroy(mesh); }
   auto destroy() const { return E::done(dfm_tetmesh_destroy(raw_)); }
   auto info() const {
-    return produce<E, dfm_tetmesh_info>([&](dfm_tetmesh_info &i) { return i.size = sizeof i, dfm_tetmesh_get_info(raw_, &i); });
+    return produce<E, dfm_tetmesh_info>([&](dfm_tetmesh_info &i) {
+      i.size = sizeof i;
+      return dfm_tetmesh_get_info(raw_, &i);
+    });
   }
   // Spans below are borrowed: valid while the mesh lives.
   auto data() const {
@@ -160,15 +209,16 @@ class TetMesh : public Handle<dfm_tetmesh> {
       return s;
     });
   }
-  auto file_cells() const { return per_cell<uint32_t>(dfm_tetmesh_file_cells); }   // empty: as in the file
-  auto share() const { return per_cell<double>(dfm_tetmesh_share); }               // empty: not filled
+  auto file_cells() const { return per_cell<uint32_t>(dfm_tetmesh_file_cells); }  // empty: as in the file
+  auto share() const { return per_cell<double>(dfm_tetmesh_share); }              // empty: not filled
   auto write(Text path) const { return E::done(dfm_tetmesh_write(raw_, path.c_str)); }
   // Points, cells and share into a def that borrows them.
   auto give_to(dfm_body_def &def) const {
     return E::done(counted([&](const dfm_tetmesh_info &i) {
       const dfm_status s = dfm_tetmesh_data(raw_, &def.points, &def.tets, nullptr);
       if (s < 0) return s;
-      def.npoint = i.npoint, def.ntet = i.ntet;
+      def.npoint = i.npoint;
+      def.ntet = i.ntet;
       return dfm_tetmesh_share(raw_, &def.cell_share);
     }));
   }
@@ -200,7 +250,10 @@ class TriMesh : public Handle<dfm_trimesh> {
   static void end(dfm_trimesh mesh) noexcept { dfm_trimesh_destroy(mesh); }
   auto destroy() const { return E::done(dfm_trimesh_destroy(raw_)); }
   auto info() const {
-    return produce<E, dfm_trimesh_info>([&](dfm_trimesh_info &i) { return i.size = sizeof i, dfm_trimesh_get_info(raw_, &i); });
+    return produce<E, dfm_trimesh_info>([&](dfm_trimesh_info &i) {
+      i.size = sizeof i;
+      return dfm_trimesh_get_info(raw_, &i);
+    });
   }
   // Spans below are borrowed: valid while the mesh lives.
   auto data() const {
@@ -210,7 +263,8 @@ class TriMesh : public Handle<dfm_trimesh> {
       dfm_trimesh_info i = sized<dfm_trimesh_info>();
       dfm_status s = dfm_trimesh_get_info(raw_, &i);
       if (s >= 0) s = dfm_trimesh_data(raw_, &points, &triangles, &from);
-      if (s >= 0) d = {{points, size_t{3} * i.npoint}, {triangles, size_t{3} * i.ntriangle}, {from, i.npoint}};
+      if (s >= 0)
+        d = {{points, size_t{3} * i.npoint}, {triangles, size_t{3} * i.ntriangle}, {from, i.npoint}};
       return s;
     });
   }
@@ -228,7 +282,8 @@ class TriMesh : public Handle<dfm_trimesh> {
   auto write(Text path) const { return E::done(dfm_trimesh_write(raw_, path.c_str)); }
   // Tetrahedra inside.
   auto fill(uint32_t cells) const {
-    return produce<E, Unique<TetMesh<E>>>([&](auto &mesh) { return dfm_tetmesh_fill(raw_, cells, mesh.put()); });
+    return produce<E, Unique<TetMesh<E>>>(
+        [&](auto &mesh) { return dfm_tetmesh_fill(raw_, cells, mesh.put()); });
   }
 };
 
@@ -238,7 +293,7 @@ struct AnyMesh {
   Unique<TriMesh<E>> surface;
 };
 
-// ---- bodies -----------------------------------------------------------------------------------------------------------------------
+// ---- bodies -----------------------------------------------------------------------------------------------
 template <class E>
 class Body : public Handle<dfm_body> {
  public:
@@ -246,45 +301,72 @@ class Body : public Handle<dfm_body> {
   static void end(dfm_body body) noexcept { dfm_body_destroy(body); }
   auto destroy() const { return E::done(dfm_body_destroy(raw_)); }
   auto info() const {
-    return produce<E, dfm_body_info>([&](dfm_body_info &i) { return i.size = sizeof i, dfm_body_get_info(raw_, &i); });
+    return produce<E, dfm_body_info>([&](dfm_body_info &i) {
+      i.size = sizeof i;
+      return dfm_body_get_info(raw_, &i);
+    });
   }
   auto measure() const {
-    return produce<E, dfm_body_measure>([&](dfm_body_measure &m) { return m.size = sizeof m, dfm_body_get_measure(raw_, &m); });
+    return produce<E, dfm_body_measure>([&](dfm_body_measure &m) {
+      m.size = sizeof m;
+      return dfm_body_get_measure(raw_, &m);
+    });
   }
   auto set_user(void *user) const { return E::done(dfm_body_set_user(raw_, user)); }
-  auto set_filter(uint32_t category, uint32_t collides_with) const { return E::done(dfm_body_set_filter(raw_, category, collides_with)); }
+  auto set_filter(uint32_t category, uint32_t collides_with) const {
+    return E::done(dfm_body_set_filter(raw_, category, collides_with));
+  }
   auto set_params(const dfm_params &params) const { return E::done(dfm_body_set_params(raw_, &params)); }
 
   // Points: x, v [npoint,3]; an empty span leaves that one out. Returns npoint.
   auto state(std::span<double> x, std::span<double> v) const {
-    const size_t room = x.empty() ? v.size() : v.empty() ? x.size() : x.size() < v.size() ? x.size() : v.size();
-    return produce<E, uint32_t>([&](uint32_t &n) { return dfm_body_get_state(raw_, rows(room, 3), x.data(), v.data(), &n); });
+    const size_t room = x.empty()             ? v.size()
+                        : v.empty()           ? x.size()
+                        : x.size() < v.size() ? x.size()
+                                              : v.size();
+    return produce<E, uint32_t>(
+        [&](uint32_t &n) { return dfm_body_get_state(raw_, rows(room, 3), x.data(), v.data(), &n); });
   }
   auto set_state(std::span<const double> x, std::span<const double> v) const {
     if (!x.empty() && !v.empty() && x.size() != v.size()) return E::done(spans_disagree);
     return E::done(dfm_body_set_state(raw_, rows(x.empty() ? v.size() : x.size(), 3), x.data(), v.data()));
   }
   auto positions() const {
-    return collect<E, 3>(+[](dfm_body b, uint32_t room, double *x, uint32_t *n) { return dfm_body_get_state(b, room, x, nullptr, n); }, raw_);
+    return collect<E, 3>(
+        +[](dfm_body b, uint32_t room, double *x, uint32_t *n) {
+          return dfm_body_get_state(b, room, x, nullptr, n);
+        },
+        raw_);
   }
   auto velocities() const {
-    return collect<E, 3>(+[](dfm_body b, uint32_t room, double *v, uint32_t *n) { return dfm_body_get_state(b, room, nullptr, v, n); }, raw_);
+    return collect<E, 3>(
+        +[](dfm_body b, uint32_t room, double *v, uint32_t *n) {
+          return dfm_body_get_state(b, room, nullptr, v, n);
+        },
+        raw_);
   }
   auto rest(std::span<double> x, std::span<uint32_t> tets) const {
     return E::done(dfm_body_get_rest(raw_, rows(x.size(), 3), x.data(), rows(tets.size(), 4), tets.data()));
   }
-  auto energy_density(std::span<double> out) const { return E::done(dfm_body_energy_density(raw_, rows(out.size(), 1), out.data())); }
+  auto energy_density(std::span<double> out) const {
+    return E::done(dfm_body_energy_density(raw_, rows(out.size(), 1), out.data()));
+  }
 
-  auto hold(std::span<const uint32_t> points, uint8_t axes = 7) const { return E::done(dfm_body_hold(raw_, rows(points.size(), 1), points.data(), axes)); }
-  auto move_held(std::span<const uint32_t> points, std::span<const dfm_pose_key> keys, const dfm_sine *sine = nullptr) const {
-    return E::done(dfm_body_move_held(raw_, rows(points.size(), 1), points.data(), rows(keys.size(), 1), keys.data(), sine));
+  auto hold(std::span<const uint32_t> points, uint8_t axes = 7) const {
+    return E::done(dfm_body_hold(raw_, rows(points.size(), 1), points.data(), axes));
+  }
+  auto move_held(std::span<const uint32_t> points, std::span<const dfm_pose_key> keys,
+                 const dfm_sine *sine = nullptr) const {
+    return E::done(dfm_body_move_held(raw_, rows(points.size(), 1), points.data(), rows(keys.size(), 1),
+                                      keys.data(), sine));
   }
   // force [points.size(), 3] N. Returns the load's number.
-  auto add_load(std::span<const uint32_t> points, std::span<const double> force, std::span<const dfm_scale_key> keys = {},
-                const dfm_sine *sine = nullptr) const {
+  auto add_load(std::span<const uint32_t> points, std::span<const double> force,
+                std::span<const dfm_scale_key> keys = {}, const dfm_sine *sine = nullptr) const {
     return produce<E, uint32_t>([&](uint32_t &load) {
       if (force.size() != 3 * points.size()) return spans_disagree;
-      return dfm_body_add_load(raw_, rows(points.size(), 1), points.data(), force.data(), rows(keys.size(), 1), keys.data(), sine, &load);
+      return dfm_body_add_load(raw_, rows(points.size(), 1), points.data(), force.data(),
+                               rows(keys.size(), 1), keys.data(), sine, &load);
     });
   }
   auto remove_load(uint32_t load) const { return E::done(dfm_body_remove_load(raw_, load)); }
@@ -292,21 +374,32 @@ class Body : public Handle<dfm_body> {
   auto add_spring(const dfm_spring_def &def) const {
     return produce<E, uint32_t>([&](uint32_t &spring) { return dfm_body_add_spring(raw_, &def, &spring); });
   }
-  auto set_spring_target(uint32_t spring, In3 to) const { return E::done(dfm_body_set_spring_target(raw_, spring, to.data())); }
+  auto set_spring_target(uint32_t spring, In3 to) const {
+    return E::done(dfm_body_set_spring_target(raw_, spring, to.data()));
+  }
   auto spring_force(uint32_t spring) const {
-    return produce<E, std::array<double, 3>>([&](std::array<double, 3> &force) { return dfm_body_get_spring_force(raw_, spring, force.data()); });
+    return produce<E, std::array<double, 3>>(
+        [&](std::array<double, 3> &force) { return dfm_body_get_spring_force(raw_, spring, force.data()); });
   }
   auto remove_spring(uint32_t spring) const { return E::done(dfm_body_remove_spring(raw_, spring)); }
-  auto apply_impulse(In3 point, In3 impulse) const { return E::done(dfm_body_apply_impulse(raw_, point.data(), impulse.data())); }
-  auto asleep() const { return produce<E, bool>([&](bool &asleep) { return dfm_body_is_asleep(raw_, &asleep); }); }
+  auto apply_impulse(In3 point, In3 impulse) const {
+    return E::done(dfm_body_apply_impulse(raw_, point.data(), impulse.data()));
+  }
+  auto asleep() const {
+    return produce<E, bool>([&](bool &asleep) { return dfm_body_is_asleep(raw_, &asleep); });
+  }
   auto wake() const { return E::done(dfm_body_wake(raw_)); }
 
   // Surface: into the caller's memory, returning how many surfels or triangles, or as a vector.
   auto surface_positions(std::span<double> out) const { return fill<E, 3>(dfm_surface_positions, raw_, out); }
-  auto surface_velocities(std::span<double> out) const { return fill<E, 3>(dfm_surface_velocities, raw_, out); }
+  auto surface_velocities(std::span<double> out) const {
+    return fill<E, 3>(dfm_surface_velocities, raw_, out);
+  }
   auto surface_normals(std::span<double> out) const { return fill<E, 3>(dfm_surface_normals, raw_, out); }
   auto surface_forces(std::span<double> out) const { return fill<E, 3>(dfm_surface_forces, raw_, out); }
-  auto surface_triangles(std::span<uint32_t> out) const { return fill<E, 3>(dfm_surface_triangles, raw_, out); }
+  auto surface_triangles(std::span<uint32_t> out) const {
+    return fill<E, 3>(dfm_surface_triangles, raw_, out);
+  }
   auto surface_points(std::span<uint32_t> out) const { return fill<E, 1>(dfm_surface_points, raw_, out); }
   auto surface_positions() const { return collect<E, 3>(dfm_surface_positions, raw_); }
   auto surface_velocities() const { return collect<E, 3>(dfm_surface_velocities, raw_); }
@@ -319,16 +412,21 @@ class Body : public Handle<dfm_body> {
   auto write_surface(Text path) const { return E::done(dfm_debug_write_surface(raw_, path.c_str)); }
 };
 
-// ---- obstacles and rigid bodies ---------------------------------------------------------------------------------------------------
+// ---- obstacles and rigid bodies ---------------------------------------------------------------------------
 template <class E>
 class Obstacle : public Handle<dfm_obstacle> {
  public:
   using Handle::Handle;
   static void end(dfm_obstacle obstacle) noexcept { dfm_obstacle_destroy(obstacle); }
   auto destroy() const { return E::done(dfm_obstacle_destroy(raw_)); }
-  auto pose() const { return produce<E, dfm_pose>([&](dfm_pose &p) { return dfm_obstacle_get_pose(raw_, &p); }); }
+  auto pose() const {
+    return produce<E, dfm_pose>([&](dfm_pose &p) { return dfm_obstacle_get_pose(raw_, &p); });
+  }
   auto def() const {
-    return produce<E, dfm_obstacle_def>([&](dfm_obstacle_def &d) { return d.size = sizeof d, dfm_obstacle_get_def(raw_, &d); });
+    return produce<E, dfm_obstacle_def>([&](dfm_obstacle_def &d) {
+      d.size = sizeof d;
+      return dfm_obstacle_get_def(raw_, &d);
+    });
   }
   auto move_to(const dfm_pose &pose) const { return E::done(dfm_obstacle_move_to(raw_, &pose)); }
   auto teleport(const dfm_pose &pose) const { return E::done(dfm_obstacle_teleport(raw_, &pose)); }
@@ -342,27 +440,43 @@ class Rigid : public Handle<dfm_rigid> {
   // Of the whole set that the body came with.
   static void end(dfm_rigid rigid) noexcept { dfm_rigid_destroy(rigid); }
   auto destroy() const { return E::done(dfm_rigid_destroy(raw_)); }
-  static auto register_host(Text name, const dfm_rigid_host &table) { return E::done(dfm_rigid_host_register(name.c_str, &table)); }
+  static auto register_host(Text name, const dfm_rigid_host &table) {
+    return E::done(dfm_rigid_host_register(name.c_str, &table));
+  }
   operator Obstacle<E>() const noexcept { return Obstacle<E>(raw_); }
-  auto def() const { return produce<E, dfm_rigid_def>([&](dfm_rigid_def &d) { return d.size = sizeof d, dfm_rigid_get_def(raw_, &d); }); }
-  auto state() const { return produce<E, dfm_rigid_state>([&](dfm_rigid_state &s) { return dfm_rigid_get_state(raw_, &s); }); }
+  auto def() const {
+    return produce<E, dfm_rigid_def>([&](dfm_rigid_def &d) {
+      d.size = sizeof d;
+      return dfm_rigid_get_def(raw_, &d);
+    });
+  }
+  auto state() const {
+    return produce<E, dfm_rigid_state>([&](dfm_rigid_state &s) { return dfm_rigid_get_state(raw_, &s); });
+  }
   auto set_state(const dfm_rigid_state &state) const { return E::done(dfm_rigid_set_state(raw_, &state)); }
   auto add_shape(const dfm_obstacle_def &def) const {
     return produce<E, Obstacle<E>>([&](Obstacle<E> &o) { return dfm_rigid_add_shape(raw_, &def, o.put()); });
   }
   auto measure() const {
-    return produce<E, dfm_body_measure>([&](dfm_body_measure &m) { return m.size = sizeof m, dfm_rigid_get_measure(raw_, &m); });
+    return produce<E, dfm_body_measure>([&](dfm_body_measure &m) {
+      m.size = sizeof m;
+      return dfm_rigid_get_measure(raw_, &m);
+    });
   }
   auto contact_wrench() const {
-    return produce<E, Wrench>([&](Wrench &w) { return dfm_rigid_contact_wrench(raw_, w.force.data(), w.moment.data()); });
+    return produce<E, Wrench>(
+        [&](Wrench &w) { return dfm_rigid_contact_wrench(raw_, w.force.data(), w.moment.data()); });
   }
-  auto set_motor(uint32_t joint, double velocity, double max) const { return E::done(dfm_rigid_set_motor(raw_, joint, velocity, max)); }
+  auto set_motor(uint32_t joint, double velocity, double max) const {
+    return E::done(dfm_rigid_set_motor(raw_, joint, velocity, max));
+  }
   auto joint(uint32_t joint) const {
-    return produce<E, JointState>([&](JointState &j) { return dfm_rigid_joint(raw_, joint, &j.position, &j.rate, &j.effort); });
+    return produce<E, JointState>(
+        [&](JointState &j) { return dfm_rigid_joint(raw_, joint, &j.position, &j.rate, &j.effort); });
   }
 };
 
-// ---- the world --------------------------------------------------------------------------------------------------------------------
+// ---- the world --------------------------------------------------------------------------------------------
 template <class E>
 class World : public Handle<dfm_world> {
  public:
@@ -379,13 +493,18 @@ class World : public Handle<dfm_world> {
     });
   }
   auto stable_step() const {
-    return produce<E, StableStep>([&](StableStep &s) { return dfm_world_stable_step(raw_, &s.dt, &s.body, &s.point); });
+    return produce<E, StableStep>(
+        [&](StableStep &s) { return dfm_world_stable_step(raw_, &s.dt, &s.body, &s.point); });
   }
   double time() const noexcept { return dfm_world_time(raw_); }
   uint64_t hash() const noexcept { return dfm_world_hash(raw_); }
   auto set_gravity(In3 g) const { return E::done(dfm_world_set_gravity(raw_, g.data())); }
-  auto set_gravity(std::span<const dfm_vector_key> keys) const { return E::done(dfm_world_set_gravity_keys(raw_, rows(keys.size(), 1), keys.data())); }
-  auto set_budget(double max_time, uint64_t max_work) const { return E::done(dfm_world_set_budget(raw_, max_time, max_work)); }
+  auto set_gravity(std::span<const dfm_vector_key> keys) const {
+    return E::done(dfm_world_set_gravity_keys(raw_, rows(keys.size(), 1), keys.data()));
+  }
+  auto set_budget(double max_time, uint64_t max_work) const {
+    return E::done(dfm_world_set_budget(raw_, max_time, max_work));
+  }
   auto interrupt() const { return E::done(dfm_world_interrupt(raw_)); }
   auto set_sleep(bool sleep) const { return E::done(dfm_world_set_sleep(raw_, sleep)); }
 
@@ -402,29 +521,44 @@ class World : public Handle<dfm_world> {
   auto add_rigid(const dfm_rigid_def &def, Text host = nullptr) const {
     return produce<E, Rigid<E>>([&](Rigid<E> &r) {
       dfm_rigid_set_def set = sized<dfm_rigid_set_def>();
-      set.nbody = 1, set.bodies = &def;
+      set.nbody = 1;
+      set.bodies = &def;
       return dfm_rigid_create(raw_, host.c_str, &set, r.put());
     });
   }
   // A set: out [set.nbody].
   auto add_rigids(const dfm_rigid_set_def &set, std::span<dfm_rigid> out, Text host = nullptr) const {
-    return E::done(out.size() < set.nbody ? spans_disagree : dfm_rigid_create(raw_, host.c_str, &set, out.data()));
+    return E::done(out.size() < set.nbody ? spans_disagree
+                                          : dfm_rigid_create(raw_, host.c_str, &set, out.data()));
   }
   auto add_friction(const dfm_friction_def &def) const { return E::done(dfm_world_add_friction(raw_, &def)); }
   auto add_friction(Text a, Text b, Text law, const dfm_params &params = {}) const {
     dfm_friction_def def = sized<dfm_friction_def>();
-    def.between[0] = a.c_str, def.between[1] = b.c_str, def.law = law.c_str, def.params = params;
+    def.between[0] = a.c_str;
+    def.between[1] = b.c_str;
+    def.law = law.c_str;
+    def.params = params;
     return E::done(dfm_world_add_friction(raw_, &def));
   }
   auto set_friction(Text a, Text b, const dfm_params &params) const {
     return E::done(dfm_world_set_friction(raw_, a.c_str, b.c_str, &params));
   }
-  auto remove_friction(Text a, Text b) const { return E::done(dfm_world_remove_friction(raw_, a.c_str, b.c_str)); }
-  auto remove_filter(Text a, Text b) const { return E::done(dfm_world_remove_filter(raw_, a.c_str, b.c_str)); }
-  auto filter_pair(Text a, Text b, bool collide) const { return E::done(dfm_world_filter_pair(raw_, a.c_str, b.c_str, collide)); }
+  auto remove_friction(Text a, Text b) const {
+    return E::done(dfm_world_remove_friction(raw_, a.c_str, b.c_str));
+  }
+  auto remove_filter(Text a, Text b) const {
+    return E::done(dfm_world_remove_filter(raw_, a.c_str, b.c_str));
+  }
+  auto filter_pair(Text a, Text b, bool collide) const {
+    return E::done(dfm_world_filter_pair(raw_, a.c_str, b.c_str, collide));
+  }
 
-  auto find_body(Text name) const { return produce<E, Body<E>>([&](Body<E> &b) { return dfm_world_find_body(raw_, name.c_str, b.put()); }); }
-  auto find_rigid(Text name) const { return produce<E, Rigid<E>>([&](Rigid<E> &r) { return dfm_world_find_rigid(raw_, name.c_str, r.put()); }); }
+  auto find_body(Text name) const {
+    return produce<E, Body<E>>([&](Body<E> &b) { return dfm_world_find_body(raw_, name.c_str, b.put()); });
+  }
+  auto find_rigid(Text name) const {
+    return produce<E, Rigid<E>>([&](Rigid<E> &r) { return dfm_world_find_rigid(raw_, name.c_str, r.put()); });
+  }
   auto bodies() const { return collect_handles<E, Body<E>>(dfm_world_bodies, raw_); }
   auto obstacles() const { return collect_handles<E, Obstacle<E>>(dfm_world_obstacles, raw_); }
   auto rigids() const { return collect_handles<E, Rigid<E>>(dfm_world_rigids, raw_); }
@@ -433,20 +567,35 @@ class World : public Handle<dfm_world> {
   auto rigids(std::span<dfm_rigid> out) const { return fill<E, 1>(dfm_world_rigids, raw_, out); }
 
   // What a step did: into the caller's memory, returning how many, or as a vector.
-  auto contacts(std::span<dfm_contact> out) const { return fill_rows<E>(dfm_world_contacts_sized, raw_, out); }
+  auto contacts(std::span<dfm_contact> out) const {
+    return fill_rows<E>(dfm_world_contacts_sized, raw_, out);
+  }
   auto pairs(std::span<dfm_pair_report> out) const { return fill_rows<E>(dfm_world_pairs_sized, raw_, out); }
-  auto events(std::span<dfm_contact_event> out) const { return fill_rows<E>(dfm_world_events_sized, raw_, out); }
-  auto profile(std::span<dfm_stage_time> out) const { return fill_rows<E>(dfm_world_profile_sized, raw_, out); }
-  auto overlaps(std::span<dfm_overlap> out) const { return fill_rows<E>(dfm_world_overlaps_sized, raw_, out); }
+  auto events(std::span<dfm_contact_event> out) const {
+    return fill_rows<E>(dfm_world_events_sized, raw_, out);
+  }
+  auto profile(std::span<dfm_stage_time> out) const {
+    return fill_rows<E>(dfm_world_profile_sized, raw_, out);
+  }
+  auto overlaps(std::span<dfm_overlap> out) const {
+    return fill_rows<E>(dfm_world_overlaps_sized, raw_, out);
+  }
   auto contacts() const { return collect_rows<E>(dfm_world_contacts_sized, raw_); }
   auto pairs() const { return collect_rows<E>(dfm_world_pairs_sized, raw_); }
-  auto pair_impulses(std::span<dfm_pair_impulse> out) const { return fill_rows<E>(dfm_world_pair_impulses_sized, raw_, out); }
+  auto pair_impulses(std::span<dfm_pair_impulse> out) const {
+    return fill_rows<E>(dfm_world_pair_impulses_sized, raw_, out);
+  }
   auto pair_impulses() const { return collect_rows<E>(dfm_world_pair_impulses_sized, raw_); }
   auto events() const { return collect_rows<E>(dfm_world_events_sized, raw_); }
   auto profile() const { return collect_rows<E>(dfm_world_profile_sized, raw_); }
   auto overlaps() const { return collect_rows<E>(dfm_world_overlaps_sized, raw_); }
-  auto untangle() const { return produce<E, uint32_t>([&](uint32_t &left) { return dfm_world_untangle(raw_, &left); }); }   // pairs that overlap still
-  auto find_overlaps() const { return produce<E, uint32_t>([&](uint32_t &n) { return dfm_world_find_overlaps(raw_, &n); }); }
+  // pairs that overlap still
+  auto untangle() const {
+    return produce<E, uint32_t>([&](uint32_t &left) { return dfm_world_untangle(raw_, &left); });
+  }
+  auto find_overlaps() const {
+    return produce<E, uint32_t>([&](uint32_t &n) { return dfm_world_find_overlaps(raw_, &n); });
+  }
   // The law behind dfm_contact.law; its pointers are borrowed until a rule of friction changes.
   auto law_info(uint32_t law) const {
     return produce<E, dfm_law_info>([&](dfm_law_info &info) {
@@ -455,7 +604,10 @@ class World : public Handle<dfm_world> {
     });
   }
   auto stats() const {
-    return produce<E, dfm_world_stats>([&](dfm_world_stats &s) { return s.size = sizeof s, dfm_world_get_stats(raw_, &s); });
+    return produce<E, dfm_world_stats>([&](dfm_world_stats &s) {
+      s.size = sizeof s;
+      return dfm_world_get_stats(raw_, &s);
+    });
   }
   // a, b: handles of bodies, obstacles or rigid bodies. On a, about point.
   template <class A, class B>
@@ -465,20 +617,31 @@ class World : public Handle<dfm_world> {
     });
   }
   auto hold_begin() const { return E::done(dfm_world_hold_begin(raw_)); }
-  auto hold() const { return produce<E, HoldReport>([&](HoldReport &h) { return dfm_world_hold(raw_, &h.creep, &h.count); }); }
+  auto hold() const {
+    return produce<E, HoldReport>([&](HoldReport &h) { return dfm_world_hold(raw_, &h.creep, &h.count); });
+  }
   auto ray(In3 origin, In3 direction, double max_distance) const {
     return produce<E, dfm_ray_hit>([&](dfm_ray_hit &h) {
-      return h.size = sizeof h, dfm_world_ray(raw_, origin.data(), direction.data(), max_distance, &h);
+      h.size = sizeof h;
+      return dfm_world_ray(raw_, origin.data(), direction.data(), max_distance, &h);
     });
   }
   auto closest(In3 point, double max_distance) const {
-    return produce<E, dfm_ray_hit>([&](dfm_ray_hit &h) { return h.size = sizeof h, dfm_world_closest(raw_, point.data(), max_distance, &h); });
+    return produce<E, dfm_ray_hit>([&](dfm_ray_hit &h) {
+      h.size = sizeof h;
+      return dfm_world_closest(raw_, point.data(), max_distance, &h);
+    });
   }
-  auto explain() const { return collect_text<E>([&](char *text, size_t *bytes) { return dfm_world_explain(raw_, text, bytes); }); }
+  auto explain() const {
+    return collect_text<E>([&](char *text, size_t *bytes) { return dfm_world_explain(raw_, text, bytes); });
+  }
 
   // Returns the bytes used; an empty span only asks how many are needed.
   auto snapshot(std::span<std::byte> out) const {
-    return produce<E, size_t>([&](size_t &bytes) { return bytes = out.size(), dfm_world_snapshot(raw_, out.data(), &bytes); });
+    return produce<E, size_t>([&](size_t &bytes) {
+      bytes = out.size();
+      return dfm_world_snapshot(raw_, out.data(), &bytes);
+    });
   }
   auto snapshot() const {
     return produce<E, std::vector<std::byte>>([&](std::vector<std::byte> &out) {
@@ -489,40 +652,54 @@ class World : public Handle<dfm_world> {
       return dfm_world_snapshot(raw_, out.data(), &bytes);
     });
   }
-  auto restore(std::span<const std::byte> from) const { return E::done(dfm_world_restore(raw_, from.data(), from.size())); }
+  auto restore(std::span<const std::byte> from) const {
+    return E::done(dfm_world_restore(raw_, from.data(), from.size()));
+  }
 
-  // line(std::span<const double, 3> a, std::span<const double, 3> b, uint32_t rgb) for each; what: DFM_DRAW_*.
+  // line(std::span<const double, 3> a, std::span<const double, 3> b, uint32_t rgb) for each;
+  // what: DFM_DRAW_*.
   template <class F>
   auto draw(uint32_t what, F &&line) const {
     typename E::template Call<std::remove_reference_t<F>> call{line};
-    const dfm_status s = dfm_debug_draw(raw_, what, [](void *user, const double a[3], const double b[3], uint32_t rgb) {
-      (*static_cast<decltype(call) *>(user))(In3(a, 3), In3(b, 3), rgb);
-    }, &call);
+    const dfm_status s = dfm_debug_draw(
+        raw_, what,
+        [](void *user, const double a[3], const double b[3], uint32_t rgb) {
+          (*static_cast<decltype(call) *>(user))(In3(a, 3), In3(b, 3), rgb);
+        },
+        &call);
     call.rethrow();
     return E::done(s);
   }
 };
 
-// ---- scenes -----------------------------------------------------------------------------------------------------------------------
+// ---- scenes -----------------------------------------------------------------------------------------------
 template <class E>
 class Scene : public Handle<dfm_scene> {
  public:
   using Handle::Handle;
   static void end(dfm_scene scene) noexcept { dfm_scene_close(scene); }
   auto close() const { return E::done(dfm_scene_close(raw_)); }
-  auto world() const { return produce<E, World<E>>([&](World<E> &w) { return dfm_scene_world(raw_, w.put()); }); }
+  auto world() const {
+    return produce<E, World<E>>([&](World<E> &w) { return dfm_scene_world(raw_, w.put()); });
+  }
   auto settings() const {
-    return produce<E, dfm_scene_settings>([&](dfm_scene_settings &s) { return s.size = sizeof s, dfm_scene_get_settings(raw_, &s); });
+    return produce<E, dfm_scene_settings>([&](dfm_scene_settings &s) {
+      s.size = sizeof s;
+      return dfm_scene_get_settings(raw_, &s);
+    });
   }
   auto value(Text pointer) const {
-    return collect_text<E>([&](char *text, size_t *bytes) { return dfm_scene_value(raw_, pointer.c_str, text, bytes); });
+    return collect_text<E>(
+        [&](char *text, size_t *bytes) { return dfm_scene_value(raw_, pointer.c_str, text, bytes); });
   }
   auto probe(uint32_t index) const {
-    return produce<E, ProbeState>([&](ProbeState &p) { return dfm_scene_probe(raw_, index, &p.name, p.position.data(), p.velocity.data()); });
+    return produce<E, ProbeState>([&](ProbeState &p) {
+      return dfm_scene_probe(raw_, index, &p.name, p.position.data(), p.velocity.data());
+    });
   }
 };
 
-// ---- the context ------------------------------------------------------------------------------------------------------------------
+// ---- the context ------------------------------------------------------------------------------------------
 template <class E>
 class Context : public Handle<dfm_context *> {
  public:
@@ -539,32 +716,40 @@ class Context : public Handle<dfm_context *> {
     return produce<E, Unique<World<E>>>([&](auto &w) { return dfm_scene_load(raw_, path.c_str, w.put()); });
   }
   auto open_scene(Text path, const dfm_scene_options *options = nullptr) const {
-    return produce<E, Unique<Scene<E>>>([&](auto &s) { return dfm_scene_open(raw_, path.c_str, options, s.put()); });
+    return produce<E, Unique<Scene<E>>>(
+        [&](auto &s) { return dfm_scene_open(raw_, path.c_str, options, s.put()); });
   }
   auto open_law(Text id_or_path) const {
-    return produce<E, Unique<Law<E>>>([&](auto &law) { return dfm_law_open(raw_, id_or_path.c_str, law.put()); });
+    return produce<E, Unique<Law<E>>>(
+        [&](auto &law) { return dfm_law_open(raw_, id_or_path.c_str, law.put()); });
   }
 
   // Cells, or where the file has none the surface: the other one refers to nothing.
   auto read_mesh(Text path) const {
-    return produce<E, AnyMesh<E>>([&](AnyMesh<E> &m) { return dfm_mesh_read(raw_, path.c_str, m.cells.put(), m.surface.put()); });
+    return produce<E, AnyMesh<E>>(
+        [&](AnyMesh<E> &m) { return dfm_mesh_read(raw_, path.c_str, m.cells.put(), m.surface.put()); });
   }
   auto read_tets(Text path) const {
-    return produce<E, Unique<TetMesh<E>>>([&](auto &m) { return dfm_tetmesh_read(raw_, path.c_str, m.put()); });
+    return produce<E, Unique<TetMesh<E>>>(
+        [&](auto &m) { return dfm_tetmesh_read(raw_, path.c_str, m.put()); });
   }
   auto make_tets(Text kind, const Size &size, uint32_t cells) const {
-    return produce<E, Unique<TetMesh<E>>>([&](auto &m) { return dfm_tetmesh_make(raw_, kind.c_str, size.m, cells, m.put()); });
+    return produce<E, Unique<TetMesh<E>>>(
+        [&](auto &m) { return dfm_tetmesh_make(raw_, kind.c_str, size.m, cells, m.put()); });
   }
   auto read_surface(Text path) const {
-    return produce<E, Unique<TriMesh<E>>>([&](auto &m) { return dfm_trimesh_read(raw_, path.c_str, m.put()); });
+    return produce<E, Unique<TriMesh<E>>>(
+        [&](auto &m) { return dfm_trimesh_read(raw_, path.c_str, m.put()); });
   }
   auto make_surface(Text kind, const Size &size, uint32_t triangles) const {
-    return produce<E, Unique<TriMesh<E>>>([&](auto &m) { return dfm_trimesh_make(raw_, kind.c_str, size.m, triangles, m.put()); });
+    return produce<E, Unique<TriMesh<E>>>(
+        [&](auto &m) { return dfm_trimesh_make(raw_, kind.c_str, size.m, triangles, m.put()); });
   }
   // Of triangles of the host's: points [n,3], triangles [n,3].
   auto make_surface(std::span<const double> points, std::span<const uint32_t> triangles) const {
     return produce<E, Unique<TriMesh<E>>>([&](auto &m) {
-      return dfm_trimesh_create(raw_, rows(points.size(), 3), points.data(), rows(triangles.size(), 3), triangles.data(), m.put());
+      return dfm_trimesh_create(raw_, rows(points.size(), 3), points.data(), rows(triangles.size(), 3),
+                                triangles.data(), m.put());
     });
   }
   auto mesh_file_kind(Text path) const {
@@ -573,16 +758,22 @@ class Context : public Handle<dfm_context *> {
 
   auto load_plugin(Text path) const { return E::done(dfm_plugin_load(raw_, path.c_str)); }
   auto scan_plugins(Text directory) const {
-    return produce<E, uint32_t>([&](uint32_t &loaded) { return dfm_plugin_scan(raw_, directory.c_str, &loaded); });
+    return produce<E, uint32_t>(
+        [&](uint32_t &loaded) { return dfm_plugin_scan(raw_, directory.c_str, &loaded); });
   }
-  auto register_plugin(dfm_plugin_fn entry, Text name) const { return E::done(dfm_plugin_register_static(raw_, entry, name.c_str)); }
+  auto register_plugin(dfm_plugin_fn entry, Text name) const {
+    return E::done(dfm_plugin_register_static(raw_, entry, name.c_str));
+  }
   // visit(const dfm_type &, const char *file) for every type known.
   template <class F>
   auto visit_plugins(F &&visit) const {
     typename E::template Call<std::remove_reference_t<F>> call{visit};
-    const dfm_status s = dfm_plugin_visit(raw_, [](void *user, const dfm_type *type, const char *file) {
-      (*static_cast<decltype(call) *>(user))(*type, file);
-    }, &call);
+    const dfm_status s = dfm_plugin_visit(
+        raw_,
+        [](void *user, const dfm_type *type, const char *file) {
+          (*static_cast<decltype(call) *>(user))(*type, file);
+        },
+        &call);
     call.rethrow();
     return E::done(s);
   }
@@ -590,9 +781,12 @@ class Context : public Handle<dfm_context *> {
   template <class F>
   auto visit_passed(F &&visit) const {
     typename E::template Call<std::remove_reference_t<F>> call{visit};
-    const dfm_status s = dfm_plugin_visit_passed(raw_, [](void *user, const char *file, const char *reason) {
-      (*static_cast<decltype(call) *>(user))(file, reason);
-    }, &call);
+    const dfm_status s = dfm_plugin_visit_passed(
+        raw_,
+        [](void *user, const char *file, const char *reason) {
+          (*static_cast<decltype(call) *>(user))(file, reason);
+        },
+        &call);
     call.rethrow();
     return E::done(s);
   }
@@ -601,17 +795,22 @@ class Context : public Handle<dfm_context *> {
 // The plugin that the calling thread is in, or null (dfm_plugin_running).
 inline const char *running_plugin(const char **what = nullptr) noexcept { return dfm_plugin_running(what); }
 
-// ---- time of impact ---------------------------------------------------------------------------------------------------------------
+// ---- time of impact ---------------------------------------------------------------------------------------
 template <class E>
 struct Toi {
-  static auto point_triangle(const dfm_motion &p, std::span<const dfm_motion, 3> triangle, const dfm_toi_options *options = nullptr) {
-    return produce<E, Touch>([&](Touch &t) { return dfm_toi_point_triangle(&p, triangle.data(), options, &t.t, t.weights.data()); });
+  static auto point_triangle(const dfm_motion &p, std::span<const dfm_motion, 3> triangle,
+                             const dfm_toi_options *options = nullptr) {
+    return produce<E, Touch>([&](Touch &t) {
+      return dfm_toi_point_triangle(&p, triangle.data(), options, &t.t, t.weights.data());
+    });
   }
-  static auto edge_edge(std::span<const dfm_motion, 2> a, std::span<const dfm_motion, 2> b, const dfm_toi_options *options = nullptr) {
+  static auto edge_edge(std::span<const dfm_motion, 2> a, std::span<const dfm_motion, 2> b,
+                        const dfm_toi_options *options = nullptr) {
     return produce<E, EdgeTouch>([&](EdgeTouch &t) {
       double ab[2] = {};
       const dfm_status s = dfm_toi_edge_edge(a.data(), b.data(), options, &t.t, ab);
-      t.a = ab[0], t.b = ab[1];
+      t.a = ab[0];
+      t.b = ab[1];
       return s;
     });
   }

@@ -6,19 +6,21 @@
 #ifdef __cplusplus
 extern "C" {
 #endif
-/** density kg/m3 (> 0), young Pa (> 0), poisson (-1..0.5), damping_mass 1/s, damping_stiffness s. A model parameter that a body does
- * not give itself is taken from the material's entry of the same key, else from the model's default. `extra` holds such further entries, and
- * "friction": the coefficient with which it meets others where no rule names the pair (dfm_friction_def). */
+/** density kg/m3 (> 0), young Pa (> 0), poisson (-1..0.5), damping_mass 1/s, damping_stiffness s. A model
+ * parameter that a body does not give itself is taken from the material's entry of the same key, else from
+ * the model's default. `extra` holds such further entries, and "friction": the coefficient with which it
+ * meets others where no rule names the pair (dfm_friction_def). */
 typedef struct dfm_material_def {
   uint32_t size, flags;
-  const char *name;                    /* unique in its world; NULL: none */
+  const char *name; /* unique in its world; NULL: none */
   double density, young, poisson, damping_mass, damping_stiffness;
   dfm_params extra;
 } dfm_material_def;
 
 /** 1000 kg/m3, 1e5 Pa, 0.3, undamped. Threads: Any thread. Since 0.1. */
 DFM_API dfm_material_def dfm_material_def_default(void);
-/** @return DFM_OK; DFM_E_ARG a value out of range or the name is taken; DFM_E_HANDLE. Threads: Not during step. Since 0.1. */
+/** @return DFM_OK; DFM_E_ARG a value out of range or the name is taken; DFM_E_HANDLE. Threads: Not during
+ * step. Since 0.1. */
 DFM_API dfm_status dfm_material_create(dfm_world world, const dfm_material_def *def, dfm_material *out);
 /** Bodies keep what they took from it. Threads: Not during step. Since 0.1. */
 DFM_API dfm_status dfm_material_destroy(dfm_material material);

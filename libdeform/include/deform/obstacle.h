@@ -1,4 +1,5 @@
-/* deform/obstacle.h -- rigid things that the host moves and that feel nothing: plane, sphere, box, capsule, triangle mesh, voxel grid. */
+/* deform/obstacle.h -- rigid things that the host moves and that feel nothing: plane, sphere, box, capsule,
+ * triangle mesh, voxel grid. */
 #ifndef DEFORM_OBSTACLE_H
 #define DEFORM_OBSTACLE_H
 #include "deform/base.h"
@@ -7,46 +8,60 @@
 #ifdef __cplusplus
 extern "C" {
 #endif
-enum { DFM_SHAPE_PLANE = 0, DFM_SHAPE_SPHERE = 1, DFM_SHAPE_BOX = 2, DFM_SHAPE_CAPSULE = 3,
-       DFM_SHAPE_MESH = 4, DFM_SHAPE_VOXELS = 5,
-       DFM_SHAPE_NONE = 6                         /* a rigid body that has only the shapes added to it, or none */ };
+enum {
+  DFM_SHAPE_PLANE = 0,
+  DFM_SHAPE_SPHERE = 1,
+  DFM_SHAPE_BOX = 2,
+  DFM_SHAPE_CAPSULE = 3,
+  DFM_SHAPE_MESH = 4,
+  DFM_SHAPE_VOXELS = 5,
+  DFM_SHAPE_NONE = 6 /* a rigid body that has only the shapes added to it, or none */
+};
 typedef struct dfm_obstacle_def {
-  uint32_t size, shape;             /* DFM_SHAPE_* */
-  const char *name;                 /* unique in the world */
-  dfm_pose pose;                    /* plane: through position, normal = rotation * (0,0,1) */
-  double half_size[3];              /* box, m */
-  double radius;                    /* sphere, capsule, m */
-  double half_length;               /* capsule: half of the axis between the centers of its caps, along local z, m */
+  uint32_t size, shape; /* DFM_SHAPE_* */
+  const char *name;     /* unique in the world */
+  dfm_pose pose;        /* plane: through position, normal = rotation * (0,0,1) */
+  double half_size[3];  /* box, m */
+  double radius;        /* sphere, capsule, m */
+  /* capsule: half of the axis between the centers of its caps, along local z, m */
+  double half_length;
   uint32_t nkey, reserved;
-  const dfm_pose_key *keys;         /* absolute poses over time, replace pose; copied */
-  dfm_sine sine;                    /* offset on top */
-  double velocity_surface[3];       /* belt: velocity of the surface beside that of the pose, m/s, world frame */
-  dfm_material material;            /* for pair rules by material; 0: none */
+  const dfm_pose_key *keys; /* absolute poses over time, replace pose; copied */
+  dfm_sine sine;            /* offset on top */
+  /* belt: velocity of the surface beside that of the pose, m/s, world frame */
+  double velocity_surface[3];
+  dfm_material material; /* for pair rules by material; 0: none */
   uint32_t category, collides_with;
   void *user;
-  /* Since 0.1. mesh, voxels: a triangle surface in the obstacle's frame; copied. Points of one place must be one point (dfm_trimesh_read and
-   * dfm_trimesh_create see to that). A mesh may be open: it acts on the side that its triangles face. Voxels need a closed one. */
+  /* Since 0.1. mesh, voxels: a triangle surface in the obstacle's frame; copied. Points of one place must be
+   * one point (dfm_trimesh_read and dfm_trimesh_create see to that). A mesh may be open: it acts on the side
+   * that its triangles face. Voxels need a closed one. */
   uint32_t npoint, ntriangle;
-  const double *points;             /* [npoint,3] m */
-  const uint32_t *triangles;        /* [ntriangle,3] counter-clockwise seen from outside */
-  uint32_t cells;                   /* voxels: cubic cells that fill the surface's box, about; 0: 262144 (64 x 64 x 64 of a cube) */
+  const double *points;      /* [npoint,3] m */
+  const uint32_t *triangles; /* [ntriangle,3] counter-clockwise seen from outside */
+  /* voxels: cubic cells that fill the surface's box, about; 0: 262144 (64 x 64 x 64 of a cube) */
+  uint32_t cells;
   uint32_t reserved2;
 } dfm_obstacle_def;
 /** A plane z = 0 that looks up, at rest, category 1, collides with all. Threads: Any thread. Since 0.1. */
 DFM_API dfm_obstacle_def dfm_obstacle_def_default(void);
-/** @return DFM_OK; DFM_E_ARG (which entry, why); DFM_E_NOMEM; DFM_E_HANDLE. Threads: Not during step. Since 0.1. */
+/** @return DFM_OK; DFM_E_ARG (which entry, why); DFM_E_NOMEM; DFM_E_HANDLE. Threads: Not during
+ * step. Since 0.1. */
 DFM_API dfm_status dfm_obstacle_create(dfm_world world, const dfm_obstacle_def *def, dfm_obstacle *out);
 /** Its contacts end (events are reported). Threads: Not during step. Since 0.1. */
 DFM_API dfm_status dfm_obstacle_destroy(dfm_obstacle obstacle);
 /** Where it is now. Threads: Any thread. Not during step. Since 0.1. */
 DFM_API dfm_status dfm_obstacle_get_pose(dfm_obstacle obstacle, dfm_pose *out);
-/** Its def as created (name, points and triangles valid while it lives; keys are not returned). Threads: Any thread. Not during step. Since 0.1. */
+/** Its def as created (name, points and triangles valid while it lives; keys are not returned). Threads: Any
+ * thread. Not during step. Since 0.1. */
 DFM_API dfm_status dfm_obstacle_get_def(dfm_obstacle obstacle, dfm_obstacle_def *out);
-/** Pose at the end of the next step; its surface moves there at constant rate. Replaces keys. A step in which it would move faster than
- * dfm_world_def.obstacle_speed is refused with DFM_E_ARG, and nothing changes: take more steps, or teleport. Threads: Not during step. Since 0.1. */
+/** Pose at the end of the next step; its surface moves there at constant rate. Replaces keys. A step in which
+ * it would move faster than dfm_world_def.obstacle_speed is refused with DFM_E_ARG, and nothing changes: take
+ * more steps, or teleport. Threads: Not during step. Since 0.1. */
 DFM_API dfm_status dfm_obstacle_move_to(dfm_obstacle obstacle, const dfm_pose *pose);
-/** Puts it there now, without a motion: nothing is pushed or dragged on the way. Replaces keys, sine and target. What it lies in then overlaps, and is
- * found as after creation (dfm_world_overlaps). Threads: Not during step. Since 0.1. */
+/** Puts it there now, without a motion: nothing is pushed or dragged on the way. Replaces keys, sine and
+ * target. What it lies in then overlaps, and is found as after creation (dfm_world_overlaps). Threads: Not
+ * during step. Since 0.1. */
 DFM_API dfm_status dfm_obstacle_teleport(dfm_obstacle obstacle, const dfm_pose *pose);
 #ifdef __cplusplus
 }

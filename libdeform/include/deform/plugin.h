@@ -1,7 +1,8 @@
 /* deform/plugin.h -- ABI draft. Stand-alone: needs only the two headers below. SI units, binary64, C calling
  * convention. Structs start with their size (rows: see param_size), grow at the end only, missing tail == 0.
- * Threads: [setup] no step running; [step] one call at a time per instance, instances run concurrently;
- * [batch] re-entrant, many workers at once; [any] from anywhere. No C++ exception, exit or longjmp crosses. */
+ * Threads: [setup] no step running; [step] one call at a time per instance, instances run
+ * concurrently; [batch] re-entrant, many workers at once; [any] from anywhere. No C++ exception, exit
+ * or longjmp crosses. */
 #ifndef DEFORM_PLUGIN_H
 #define DEFORM_PLUGIN_H
 #include <stddef.h>
@@ -9,90 +10,132 @@
 #ifdef __cplusplus
 extern "C" {
 #endif
-#define DFM_ABI 0u          /* 0 = draft: host and plugin must agree on DFM_ABI_DRAFT; from 1 on only breaks bump it */
+/* 0 = draft: host and plugin must agree on DFM_ABI_DRAFT; from 1 on only breaks bump it */
+#define DFM_ABI 0u
 #define DFM_ABI_DRAFT 1u
-typedef int32_t dfm_status; /* 0 ok, > 0 try again, < 0 failed; never renumbered; base.h includes this header */
-enum { DFM_OK = 0, DFM_DISCARD = 1 /* outputs void, nothing changed: host may retry with smaller dt */,
-       DFM_E_ARG = -1, DFM_E_NOMEM = -2, DFM_E_UNSUPPORTED = -3, DFM_E_STATE = -4, DFM_E_FATAL = -5,
-       DFM_E_HANDLE = -6, DFM_E_IO = -7, DFM_E_FORMAT = -8, DFM_E_DIVERGED = -9, DFM_E_BUSY = -10 };
+/* 0 ok, > 0 try again, < 0 failed; never renumbered; base.h includes this header */
+typedef int32_t dfm_status;
+enum {
+  DFM_OK = 0,
+  DFM_DISCARD = 1 /* outputs void, nothing changed: host may retry with smaller dt */,
+  DFM_E_ARG = -1,
+  DFM_E_NOMEM = -2,
+  DFM_E_UNSUPPORTED = -3,
+  DFM_E_STATE = -4,
+  DFM_E_FATAL = -5,
+  DFM_E_HANDLE = -6,
+  DFM_E_IO = -7,
+  DFM_E_FORMAT = -8,
+  DFM_E_DIVERGED = -9,
+  DFM_E_BUSY = -10
+};
 /* ---- services the host lends to a plugin; valid from entry until the last destroy ---------------- */
 typedef struct dfm_host {
-  uint32_t size, abi, abi_draft, reserved;  /* sizeof this struct in the host; ABI the host speaks */
-  void *ctx;                          /* pass back as the first argument of every call below */
-  void *(*alloc)(void *ctx, size_t bytes, size_t align);                       /* [any] NULL on failure */
-  void  (*release)(void *ctx, void *p, size_t bytes, size_t align);            /* [any] */
-  void *(*scratch)(void *ctx, size_t bytes);       /* [batch] thread-local, valid until the call returns */
-  void  (*log)(void *ctx, int32_t level, uint32_t code, const char *utf8);     /* [any] */
+  uint32_t size, abi, abi_draft, reserved; /* sizeof this struct in the host; ABI the host speaks */
+  void *ctx;                               /* pass back as the first argument of every call below */
+  void *(*alloc)(void *ctx, size_t bytes, size_t align);           /* [any] NULL on failure */
+  void (*release)(void *ctx, void *p, size_t bytes, size_t align); /* [any] */
+  void *(*scratch)(void *ctx, size_t bytes); /* [batch] thread-local, valid until the call returns */
+  void (*log)(void *ctx, int32_t level, uint32_t code, const char *utf8); /* [any] */
   /* [setup][step] blocking. fn may be called with any cut at multiples of grain; put partial sums into slot
    * begin/grain and add them in slot order; a call from inside a worker runs serially in the caller. */
-  void  (*parallel_for)(void *ctx, uint32_t n, uint32_t grain,
-                        void (*fn)(void *user, uint32_t begin, uint32_t end), void *user);
-  const void *(*extension)(void *ctx, const char *id);                         /* [any] e.g. "dfm.trace/1" */
+  void (*parallel_for)(void *ctx, uint32_t n, uint32_t grain,
+                       void (*fn)(void *user, uint32_t begin, uint32_t end), void *user);
+  const void *(*extension)(void *ctx, const char *id); /* [any] e.g. "dfm.trace/1" */
 } dfm_host;
 /* ---- self-description ---------------------------------------------------------------------------- */
-typedef struct dfm_param {            /* a row; values of all rows lie end to end, width doubles each */
-  const char *key, *label, *unit;     /* "sigma0", "bristle stiffness per area", "N/m^3"; "1" if dimensionless */
-  double min, max, def;               /* closed finite range; def inside it */
-  uint32_t flags, width;              /* DFM_PARAM_*; doubles per value, 1..16 (3: an axis) */
-  const char *const *names;           /* DFM_PARAM_ENUM: value k reads names[k], NULL-terminated; else NULL */
+typedef struct dfm_param { /* a row; values of all rows lie end to end, width doubles each */
+  /* "sigma0", "bristle stiffness per area", "N/m^3"; "1" if dimensionless */
+  const char *key, *label, *unit;
+  double min, max, def;     /* closed finite range; def inside it */
+  uint32_t flags, width;    /* DFM_PARAM_*; doubles per value, 1..16 (3: an axis) */
+  const char *const *names; /* DFM_PARAM_ENUM: value k reads names[k], NULL-terminated; else NULL */
 } dfm_param;
-enum { DFM_PARAM_INTEGER = 1, DFM_PARAM_LOG_SCALE = 2, DFM_PARAM_RUNTIME = 4 /* may change mid-run */,
-       DFM_PARAM_ENUM = 8, DFM_PARAM_PER_CELL = 16 /* may come as a field of the mesh with this key */,
-       DFM_PARAM_AUTO = 32 /* def is no value but a sign, read and shown as "auto": the plugin takes one from the others */,
-       DFM_PARAM_LIST = 64 /* 1 to width values may be given, the rest read 0 */ };
-typedef struct dfm_slot { uint32_t unit, width, kind, reserved; } dfm_slot;   /* one block of state */
+enum {
+  DFM_PARAM_INTEGER = 1,
+  DFM_PARAM_LOG_SCALE = 2,
+  DFM_PARAM_RUNTIME = 4 /* may change mid-run */,
+  DFM_PARAM_ENUM = 8,
+  DFM_PARAM_PER_CELL = 16 /* may come as a field of the mesh with this key */,
+  DFM_PARAM_AUTO =
+      32 /* def is no value but a sign, read and shown as "auto": the plugin takes one from the others */,
+  DFM_PARAM_LIST = 64 /* 1 to width values may be given, the rest read 0 */
+};
+typedef struct dfm_slot { uint32_t unit, width, kind, reserved; } dfm_slot; /* one block of state */
 enum { DFM_PER_CONTACT = 1, DFM_PER_POINT = 2, DFM_PER_CELL = 3, DFM_PER_EDGE = 4, DFM_PER_INSTANCE = 5 };
-enum { DFM_SLOT_SCALAR = 1, DFM_SLOT_TANGENT = 2 /* pair, turns with the contact frame */, DFM_SLOT_VECTOR = 3,
-       DFM_SLOT_ROTATION = 4 /* unit quaternion */ };
-typedef struct dfm_slots { uint32_t size, nslot; const dfm_slot *slots; } dfm_slots;   /* all of an instance */
+enum {
+  DFM_SLOT_SCALAR = 1,
+  DFM_SLOT_TANGENT = 2 /* pair, turns with the contact frame */,
+  DFM_SLOT_VECTOR = 3,
+  DFM_SLOT_ROTATION = 4 /* unit quaternion */
+};
+/* all of an instance */
+typedef struct dfm_slots {
+  uint32_t size, nslot;
+  const dfm_slot *slots;
+} dfm_slots;
 typedef struct dfm_type {
-  uint32_t size, kind;                /* DFM_KIND_* tells what ops points to */
-  const char *id, *name, *version, *licence, *source;  /* "org.deform.lugre" ...; source = paper, eq. no. */
-  const dfm_param *params;            /* [nparam] rows of param_size bytes (rows may grow too) */
+  uint32_t size, kind;                                /* DFM_KIND_* tells what ops points to */
+  const char *id, *name, *version, *licence, *source; /* "org.deform.lugre" ...; source = paper, eq. no. */
+  const dfm_param *params; /* [nparam] rows of param_size bytes (rows may grow too) */
   uint32_t nparam, param_size;
-  const char *const *effects;         /* promises, NULL-terminated: "stiction" "stribeck" ... or "vendor.word" */
-  const void *ops;                    /* dfm_friction, dfm_model or dfm_solver: grows independently of this head */
+  /* promises, NULL-terminated: "stiction" "stribeck" ... or "vendor.word" */
+  const char *const *effects;
+  /* dfm_friction, dfm_model or dfm_solver: grows independently of this head */
+  const void *ops;
 } dfm_type;
 enum { DFM_KIND_FRICTION = 1, DFM_KIND_MODEL = 2, DFM_KIND_SOLVER = 3 };
 /* ---- friction law: a pure function of a batch; all memory belongs to the host --------------------- */
 enum { DFM_NEED_FN = 1, DFM_NEED_VT = 2, DFM_NEED_FT_STOP = 4, DFM_NEED_AREA = 8, DFM_NEED_DWELL = 16 };
 enum { DFM_FRIC_ISOTROPIC = 1, DFM_FRIC_PASSIVE = 2, DFM_FRIC_JACOBIAN = 4, DFM_FRIC_SET_VALUED = 8 };
-typedef struct dfm_friction_in {      /* SoA; column c of contact i is at [c*stride + i]; 64-byte aligned */
-  uint32_t size, n, stride, flags;    /* stride % 8 == 0; lanes up to n rounded to 8 may be touched, ignored */
-  double dt;                          /* s */
-  const double *params;               /* shared by the batch (host groups contacts by law and params) */
-  const void *data;                   /* what prepare() made from params; NULL without prepare */
-  const double *fn;                   /* [n]   normal force, >= 0 (N) */
-  const double *vt;                   /* [2,n] trial slip, mean over the step = slip path / dt, of the surfel's owner
-                                       * against the other side, in the contact frame (m/s) */
-  const double *ft_stop;              /* [2,n] tangential force that makes this mean slip zero (N) */
-  const double *area, *dwell;         /* [n]   m^2, s; NULL unless needed */
-  const double *state;                /* [nstate,n] at t */
+typedef struct dfm_friction_in { /* SoA; column c of contact i is at [c*stride + i]; 64-byte aligned */
+  /* stride % 8 == 0; lanes up to n rounded to 8 may be touched, ignored */
+  uint32_t size, n, stride, flags;
+  double dt;            /* s */
+  const double *params; /* shared by the batch (host groups contacts by law and params) */
+  const void *data;     /* what prepare() made from params; NULL without prepare */
+  const double *fn;     /* [n]   normal force, >= 0 (N) */
+  /* [2,n] trial slip, mean over the step = slip path / dt, of the surfel's owner against the other side, in
+   * the contact frame (m/s) */
+  const double *vt;
+  const double *ft_stop;      /* [2,n] tangential force that makes this mean slip zero (N) */
+  const double *area, *dwell; /* [n]   m^2, s; NULL unless needed */
+  const double *state;        /* [nstate,n] at t */
 } dfm_friction_in;
-typedef struct dfm_friction_out {     /* each pointer may be NULL: not wanted */
+typedef struct dfm_friction_out { /* each pointer may be NULL: not wanted */
   uint32_t size, flags;
-  double *ft;                         /* [2,n] force ON the moving side (N); opposes slip; ft_stop while stuck */
-  double *state;                      /* [nstate,n] trial at t+dt, inside the cone of fn; host commits or drops it */
-  double *dft_dvt;                    /* [4,n] row-major 2x2, negative semidefinite part used (N s/m) */
-  double *dft_dfn;                    /* [2,n] (1) */
-  double *limit;                      /* [n]   largest force the contact carries before gross slip (N); +inf none */
-  uint8_t *mode;                      /* [n]   0 open, 1 stick (presliding included), 2 slip */
-  double *stored;                     /* [n]   energy held in the state (J) */
+  /* [2,n] force ON the moving side (N); opposes slip; ft_stop while stuck */
+  double *ft;
+  /* [nstate,n] trial at t+dt, inside the cone of fn; host commits or drops it */
+  double *state;
+  double *dft_dvt; /* [4,n] row-major 2x2, negative semidefinite part used (N s/m) */
+  double *dft_dfn; /* [2,n] (1) */
+  /* [n]   largest force the contact carries before gross slip (N); +inf none */
+  double *limit;
+  uint8_t *mode;  /* [n]   0 open, 1 stick (presliding included), 2 slip */
+  double *stored; /* [n]   energy held in the state (J) */
 } dfm_friction_out;
 typedef struct dfm_friction {
   uint32_t size, needs, flags, nslot;
-  const dfm_slot *slots;              /* [nslot], unit DFM_PER_CONTACT; nstate = sum of widths; zero = rest */
-  dfm_status (*eval)(const dfm_friction_in *in, dfm_friction_out *out);        /* [batch] no alloc, no I/O */
-  dfm_status (*check)(const double *params, char *why, size_t cap);  /* [any] optional cross-field rules */
+  const dfm_slot *slots; /* [nslot], unit DFM_PER_CONTACT; nstate = sum of widths; zero = rest */
+  dfm_status (*eval)(const dfm_friction_in *in, dfm_friction_out *out); /* [batch] no alloc, no I/O */
+  dfm_status (*check)(const double *params, char *why, size_t cap);     /* [any] optional cross-field rules */
   dfm_status (*prepare)(const dfm_host *h, const double *params, void **data); /* [setup] optional tables */
   void (*release)(const dfm_host *h, void *data);                              /* [setup] iff prepare */
-  /* [any] optional (NULL: slots): the state that these parameters call for, where they decide how much there is; it stands in
-   * the place of slots, which then is the most that any parameters call for. Constant data, the same for the same parameters. */
+  /* [any] optional (NULL: slots): the state that these parameters call for, where they decide how much there
+   * is; it stands in the place of slots, which then is the most that any parameters call for. Constant data,
+   * the same for the same parameters. */
   const dfm_slots *(*state)(const double *params);
 } dfm_friction;
 /* ---- deformable model: host owns x, v, f and all state; plugin owns only rebuildable caches -------- */
-enum { DFM_CAP_ENERGY = 1, DFM_CAP_STIFFNESS = 2, DFM_CAP_DAMPING = 4, DFM_CAP_TOPOLOGY = 8,
-       DFM_CAP_ROTATION_INVARIANT = 16, DFM_CAP_PLAUSIBLE = 32 /* not derived from a continuum */ };
+enum {
+  DFM_CAP_ENERGY = 1,
+  DFM_CAP_STIFFNESS = 2,
+  DFM_CAP_DAMPING = 4,
+  DFM_CAP_TOPOLOGY = 8,
+  DFM_CAP_ROTATION_INVARIANT = 16,
+  DFM_CAP_PLAUSIBLE = 32 /* not derived from a continuum */
+};
 enum { DFM_CELL_POINT = 1, DFM_CELL_EDGE = 2, DFM_CELL_TRI = 4, DFM_CELL_TET = 8, DFM_CELL_HEX = 16 };
 typedef struct dfm_mesh {             /* rest configuration; borrowed during create() only */
   uint32_t size, npoint, ncell, cell; /* cell: one DFM_CELL_* */
@@ -100,103 +143,132 @@ typedef struct dfm_mesh {             /* rest configuration; borrowed during cre
   const uint32_t *cells;              /* [ncell,k] */
   const double *mass;                 /* [npoint] kg */
   const double *params;               /* as in dfm_param */
-  const char *const *field_keys;      /* DFM_PARAM_PER_CELL rows that differ by cell, NULL-terminated ("young") */
-  const double *const *fields;        /* [nfield] each [ncell, width of the row of that key], in the row's range */
+  /* DFM_PARAM_PER_CELL rows that differ by cell, NULL-terminated ("young") */
+  const char *const *field_keys;
+  /* [nfield] each [ncell, width of the row of that key], in the row's range */
+  const double *const *fields;
   uint32_t nedge, nsurfel;
-  const uint32_t *edges;              /* [nedge,2] i < j, lexicographic: the order of DFM_PER_EDGE state */
-  const uint32_t *row, *col;          /* coupling N in CSR: surfel s has points col[row[s] .. row[s+1]) */
-  const double *weight;               /* [row[nsurfel]]; x_s = sum weight * x_point */
-  const uint8_t *fixed;               /* [npoint] held components, bits 1 x, 2 y, 4 z; the host moves them */
+  const uint32_t *edges;     /* [nedge,2] i < j, lexicographic: the order of DFM_PER_EDGE state */
+  const uint32_t *row, *col; /* coupling N in CSR: surfel s has points col[row[s] .. row[s+1]) */
+  const double *weight;      /* [row[nsurfel]]; x_s = sum weight * x_point */
+  const uint8_t *fixed;      /* [npoint] held components, bits 1 x, 2 y, 4 z; the host moves them */
 } dfm_mesh;
-typedef struct dfm_kin {              /* one evaluation point */
-  uint32_t size, stride; double t, dt;  /* stride: doubles per point in x, v and f, >= 3; 4 by default */
-  const double *x, *v;                /* [npoint,stride] m, m/s; 64-byte aligned */
-  const double *state;                /* at t; slots end to end, each [count, width] row-major, count by unit */
-  double *state_out;                  /* trial at t+dt, written by add_forces (steppers: commit); NULL: pure query */
+typedef struct dfm_kin { /* one evaluation point */
+  uint32_t size, stride;
+  double t, dt;        /* stride: doubles per point in x, v and f, >= 3; 4 by default */
+  const double *x, *v; /* [npoint,stride] m, m/s; 64-byte aligned */
+  /* at t; slots end to end, each [count, width] row-major, count by unit */
+  const double *state;
+  /* trial at t+dt, written by add_forces (steppers: commit); NULL: pure query */
+  double *state_out;
 } dfm_kin;
-typedef struct dfm_model {            /* self is void*: one shared struct tag would break the C++ ODR */
-  uint32_t size, caps, cells, nslot;  /* DFM_CAP_*, accepted DFM_CELL_* */
-  const dfm_slot *slots;              /* what can change one bit of a later result is state, warm starts included */
-  dfm_status (*create)(const dfm_host *h, const dfm_mesh *m, void **self);            /* [setup] */
-  void       (*destroy)(void *self);                                                    /* [setup] */
-  dfm_status (*set_params)(void *self, const double *params);          /* [setup] optional: RUNTIME rows only */
-  dfm_status (*state_init)(const void *self, double *state);                            /* [setup] */
-  dfm_status (*add_forces)(void *self, const dfm_kin *k, double *f);   /* [step] f[npoint,stride] += N */
+typedef struct dfm_model {           /* self is void*: one shared struct tag would break the C++ ODR */
+  uint32_t size, caps, cells, nslot; /* DFM_CAP_*, accepted DFM_CELL_* */
+  /* what can change one bit of a later result is state, warm starts included */
+  const dfm_slot *slots;
+  dfm_status (*create)(const dfm_host *h, const dfm_mesh *m, void **self); /* [setup] */
+  void (*destroy)(void *self);                                             /* [setup] */
+  /* [setup] optional: RUNTIME rows only */
+  dfm_status (*set_params)(void *self, const double *params);
+  dfm_status (*state_init)(const void *self, double *state);         /* [setup] */
+  dfm_status (*add_forces)(void *self, const dfm_kin *k, double *f); /* [step] f[npoint,stride] += N */
   dfm_status (*bound)(void *self, const dfm_kin *k, double *ksum, double *csum, double *dt);
-                                      /* [step] row sums += N/m, N s/m per point; *dt = min(*dt, cell bound) */
-  dfm_status (*energy)(void *self, const dfm_kin *k, double *joule);   /* CAP_ENERGY; f = -dE/dx */
-  dfm_status (*pattern)(const void *self, uint32_t *nb, uint32_t *ij_or_null);  /* CAP_STIFFNESS; [nb,2], i<=j */
+  /* [step] row sums += N/m, N s/m per point; *dt = min(*dt,
+                                       * cell bound) */
+  dfm_status (*energy)(void *self, const dfm_kin *k, double *joule); /* CAP_ENERGY; f = -dE/dx */
+  /* CAP_STIFFNESS; [nb,2], i<=j */
+  dfm_status (*pattern)(const void *self, uint32_t *nb, uint32_t *ij_or_null);
   dfm_status (*stiffness)(void *self, const dfm_kin *k, double a, double b, double *blk);
-                                      /* CAP_STIFFNESS; blk[nb,9] += a*df/dx + b*df/dv, fixed block order */
-  const void *(*extension)(const void *self, const char *id);  /* "dfm.stepper/1" "dfm.topology/1" ... */
+  /* CAP_STIFFNESS; blk[nb,9] += a*df/dx + b*df/dv, fixed block order */
+  const void *(*extension)(const void *self, const char *id); /* "dfm.stepper/1" "dfm.topology/1" ... */
 } dfm_model;
 /* Self-stepping model, extension "dfm.stepper/1". Contact, friction, report and pictures see surfels only.
  * Velocities here are means over the step: (x_s(t+dt) - x_s(t)) / dt. */
 typedef struct dfm_stepper {
   uint32_t size, reserved;
-  /* [step] without contact. f_ext [npoint,stride] N: gravity, loads, springs. u_s [nsurfel,3]. Held components of k->v carry their given mean velocity. */
+  /* [step] without contact. f_ext [npoint,stride] N: gravity, loads, springs. u_s [nsurfel,3]. Held
+   * components of k->v carry their given mean velocity. */
   dfm_status (*predict)(void *self, const dfm_kin *k, const double *f_ext, double *u_s);
-  /* [step] p, du_s [n,3] at the same n distinct surfels; linear in p (N s), symmetric, >= 0, same operator for the whole step */
-  dfm_status (*respond)(void *self, const dfm_kin *k, uint32_t n, const uint32_t *surfel, const double *p, double *du_s);
-  dfm_status (*diagonal)(void *self, const dfm_kin *k, uint32_t n, const uint32_t *surfel, double *w); /* [n,9] 1/kg, or a bound */
-  /* [step] equals predict + respond. p_s [nsurfel,3] total impulses; x, v [npoint,stride] out at t+dt, not aliasing k */
+  /* [step] p, du_s [n,3] at the same n distinct surfels; linear in p (N s), symmetric, >= 0, same operator
+   * for the whole step */
+  dfm_status (*respond)(void *self, const dfm_kin *k, uint32_t n, const uint32_t *surfel, const double *p,
+                        double *du_s);
+  /* [n,9] 1/kg, or a bound */
+  dfm_status (*diagonal)(void *self, const dfm_kin *k, uint32_t n, const uint32_t *surfel, double *w);
+  /* [step] equals predict + respond. p_s [nsurfel,3] total impulses; x, v [npoint,stride] out at t+dt,
+   * not aliasing k */
   dfm_status (*commit)(void *self, const dfm_kin *k, const double *p_s, double *x, double *v);
-  dfm_status (*fetch)(void *self, uint32_t what, double *dst);     /* [step] copies what lives off the host */
+  dfm_status (*fetch)(void *self, uint32_t what, double *dst); /* [step] copies what lives off the host */
 } dfm_stepper;
-/* Extension "dfm.cell_energy/1" of a model (draft): elastic energy per rest volume, for pictures and probes. */
+/* Extension "dfm.cell_energy/1" of a model (draft): elastic energy per rest volume, for pictures
+ * and probes. */
 #define DFM_EXT_CELL_ENERGY "dfm.cell_energy/1"
 typedef struct dfm_cell_energy {
   uint32_t size, reserved;
-  dfm_status (*cell_energy)(void *self, const dfm_kin *k, double *density);  /* [step] density[ncell] = J/m^3 */
+  /* [step] density[ncell] = J/m^3 */
+  dfm_status (*cell_energy)(void *self, const dfm_kin *k, double *density);
 } dfm_cell_energy;
-/* Extension "dfm.slots/1" of a model (draft): state of this instance, where its parameters decide how much there is. It stands in the
- * place of dfm_model.slots, is asked for once after create() and stays as it is while the instance lives. */
+/* Extension "dfm.slots/1" of a model (draft): state of this instance, where its parameters decide how much
+ * there is. It stands in the place of dfm_model.slots, is asked for once after create() and stays as it is
+ * while the instance lives. */
 #define DFM_EXT_SLOTS "dfm.slots/1"
-/* Extension "dfm.effects/1" of a model (draft): those of dfm_type.effects that the instance's present parameters call for,
- * NULL-terminated. Without it all of them are taken to be at work. */
+/* Extension "dfm.effects/1" of a model (draft): those of dfm_type.effects that the instance's present
+ * parameters call for, NULL-terminated. Without it all of them are taken to be at work. */
 #define DFM_EXT_EFFECTS "dfm.effects/1"
 typedef struct dfm_effects {
   uint32_t size, reserved;
-  const char *const *(*active)(const void *self);                  /* [setup] valid until the next call of set_params */
+  /* [setup] valid until the next call of set_params */
+  const char *const *(*active)(const void *self);
 } dfm_effects;
-/* Extension "dfm.idle/1" of a model (draft): parameters that do nothing beside the present others, or not what their row says, and why:
- * part of a sentence without a full stop. Hosts tell it to the user. NULL where the parameter does what it says. */
+/* Extension "dfm.idle/1" of a model (draft): parameters that do nothing beside the present others, or not
+ * what their row says, and why: part of a sentence without a full stop. Hosts tell it to the user. NULL where
+ * the parameter does what it says. */
 #define DFM_EXT_IDLE "dfm.idle/1"
 typedef struct dfm_idle {
   uint32_t size, reserved;
-  const char *(*why)(const void *self, uint32_t row);              /* [setup] row of dfm_type.params; valid until the next call of set_params */
+  /* [setup] row of dfm_type.params; valid until the next call of set_params */
+  const char *(*why)(const void *self, uint32_t row);
 } dfm_idle;
-/* Extension "dfm.limited/1" of a model (draft): cells so far from their shape that the model limits their stiffness there. */
+/* Extension "dfm.limited/1" of a model (draft): cells so far from their shape that the model limits their
+ * stiffness there. */
 #define DFM_EXT_LIMITED "dfm.limited/1"
 typedef struct dfm_limited {
   uint32_t size, reserved;
-  uint32_t (*count)(const void *self);                             /* [step] as counted by the last call of bound */
+  /* [step] as counted by the last call of bound */
+  uint32_t (*count)(const void *self);
 } dfm_limited;
-/* Extension "dfm.spring_mask/1" of a model (draft): springs by edge of the mesh, switched off and on. Like a parameter, the mask is the
- * host's to keep: it is no state. Off gives a spring's energy away; on again may bring some. */
+/* Extension "dfm.spring_mask/1" of a model (draft): springs by edge of the mesh, switched off and on. Like a
+ * parameter, the mask is the host's to keep: it is no state. Off gives a spring's energy away; on again may
+ * bring some. */
 #define DFM_EXT_SPRING_MASK "dfm.spring_mask/1"
 typedef struct dfm_spring_mask {
   uint32_t size, reserved;
-  dfm_status (*set)(void *self, uint32_t n, const uint32_t *edges, uint8_t on);  /* [setup] all or, on DFM_E_ARG, none */
-  dfm_status (*get)(const void *self, uint8_t *on);                              /* [any] on[nedge] 1, 0 */
+  /* [setup] all or, on DFM_E_ARG, none */
+  dfm_status (*set)(void *self, uint32_t n, const uint32_t *edges, uint8_t on);
+  dfm_status (*get)(const void *self, uint8_t *on); /* [any] on[nedge] 1, 0 */
 } dfm_spring_mask;
 /* ---- linear solver for the implicit system (SPD, 3x3 blocks) ---------------------------------------- */
 typedef struct dfm_solver {
   uint32_t size, flags;
-  dfm_status (*analyse)(const dfm_host *h, uint32_t n, uint32_t nb, const uint32_t *ij, void **self);  /* [setup] */
-  dfm_status (*factor)(void *self, const double *blk);                                                  /* [step] */
-  dfm_status (*solve)(void *self, const double *rhs, double *x, double tolerance);                      /* [step] */
-  void       (*release)(void *self);                                                                    /* [setup] */
+  /* [setup] */
+  dfm_status (*analyse)(const dfm_host *h, uint32_t n, uint32_t nb, const uint32_t *ij, void **self);
+  /* [step] */
+  dfm_status (*factor)(void *self, const double *blk);
+  /* [step] */
+  dfm_status (*solve)(void *self, const double *rhs, double *x, double tolerance);
+  /* [setup] */
+  void (*release)(void *self);
 } dfm_solver;
 /* ---- entry: the one symbol a plugin exports ------------------------------------------------------- */
-#define DFM_ABI_OK(h) ((h)->abi == DFM_ABI && (DFM_ABI != 0u || (h)->abi_draft == DFM_ABI_DRAFT))  /* until ABI 1 */
+/* until ABI 1 */
+#define DFM_ABI_OK(h) ((h)->abi == DFM_ABI && (DFM_ABI != 0u || (h)->abi_draft == DFM_ABI_DRAFT))
 typedef struct dfm_plugin {
   uint32_t size, abi, abi_draft, ntype;
-  const dfm_type *const *types;       /* [ntype] array of pointers, so dfm_type may grow */
-  void (*shutdown)(void);             /* optional */
+  const dfm_type *const *types; /* [ntype] array of pointers, so dfm_type may grow */
+  void (*shutdown)(void);       /* optional */
 } dfm_plugin;
 typedef const dfm_plugin *(*dfm_plugin_fn)(const dfm_host *host, uint32_t host_abi, uint32_t host_abi_min);
-#ifdef DFM_STATIC_PLUGIN              /* -DDFM_STATIC_PLUGIN=lugre -> dfm_plugin_entry_lugre, no dlopen */
+#ifdef DFM_STATIC_PLUGIN /* -DDFM_STATIC_PLUGIN=lugre -> dfm_plugin_entry_lugre, no dlopen */
 #define DFM_CAT_(a, b) a##b
 #define DFM_CAT(a, b) DFM_CAT_(a, b)
 #define dfm_plugin_entry DFM_CAT(dfm_plugin_entry_, DFM_STATIC_PLUGIN)

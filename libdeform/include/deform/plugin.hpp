@@ -1,5 +1,5 @@
-// deform/plugin.hpp -- header-only help for plugins written in C++17 or later; nothing in it crosses the boundary that plugin.h does not
-// name. A law in full:
+// deform/plugin.hpp -- header-only help for plugins written in C++17 or later; nothing in it crosses the
+// boundary that plugin.h does not name. A law in full:
 //
 //   #include "deform/plugin.hpp"
 //   namespace dp = dfm::plugin;
@@ -7,8 +7,8 @@
 //   dfm_status eval(const dfm_friction_in *in, dfm_friction_out *out) { ... return DFM_OK; }     // may throw: guarded below
 //   const dfm_friction law = dp::friction(DFM_NEED_FN | DFM_NEED_VT, DFM_FRIC_ISOTROPIC, dp::guarded<eval>);
 //   const char *const effects[] = {"viscous", nullptr};
-//   const dfm_type type = dp::type(DFM_KIND_FRICTION, "org.example.mylaw", "My law", "1.0.0", "MIT", "Paper, eq. 1", rows, effects, &law);
-//   DFM_PLUGIN(&type)
+//   const dfm_type type = dp::type(DFM_KIND_FRICTION, "org.example.mylaw", "My law", "1.0.0", "MIT", "Paper,
+//   eq. 1", rows, effects, &law); DFM_PLUGIN(&type)
 #ifndef DEFORM_PLUGIN_HPP
 #define DEFORM_PLUGIN_HPP
 #include <cstddef>
@@ -21,7 +21,7 @@
 
 namespace dfm::plugin {
 
-// ---- no exception crosses: guarded<f> has f's parameters and is what goes into the tables ----------------------------------------
+// ---- no exception crosses: guarded<f> has f's parameters and is what goes into the tables -----------------
 template <auto Function>
 struct Guard;
 template <class... A, dfm_status (*Function)(A...)>
@@ -39,27 +39,40 @@ struct Guard<Function> {
 template <auto Function>
 inline constexpr auto guarded = &Guard<Function>::call;
 
-// ---- tables ----------------------------------------------------------------------------------------------------------------------
-constexpr dfm_param param(const char *key, const char *label, const char *unit, double min, double max, double def, uint32_t flags = 0,
-                          uint32_t width = 1) {
+// ---- tables -----------------------------------------------------------------------------------------------
+constexpr dfm_param param(const char *key, const char *label, const char *unit, double min, double max,
+                          double def, uint32_t flags = 0, uint32_t width = 1) {
   return {key, label, unit, min, max, def, flags, width, nullptr};
 }
 
 // `names` ends with a null pointer; value k reads names[k].
 template <size_t N>
-constexpr dfm_param enumeration(const char *key, const char *label, const char *const (&names)[N], uint32_t def) {
-  return {key, label, "1", 0, static_cast<double>(N - 2), static_cast<double>(def), DFM_PARAM_ENUM | DFM_PARAM_INTEGER, 1, names};
+constexpr dfm_param enumeration(const char *key, const char *label, const char *const (&names)[N],
+                                uint32_t def) {
+  return {key,
+          label,
+          "1",
+          0,
+          static_cast<double>(N - 2),
+          static_cast<double>(def),
+          DFM_PARAM_ENUM | DFM_PARAM_INTEGER,
+          1,
+          names};
 }
 
 template <size_t N>
-constexpr dfm_type type(uint32_t kind, const char *id, const char *name, const char *version, const char *licence, const char *source,
-                        const dfm_param (&rows)[N], const char *const *effects, const void *ops) {
-  return {sizeof(dfm_type), kind, id, name, version, licence, source, rows, static_cast<uint32_t>(N), sizeof(dfm_param), effects, ops};
+constexpr dfm_type type(uint32_t kind, const char *id, const char *name, const char *version,
+                        const char *licence, const char *source, const dfm_param (&rows)[N],
+                        const char *const *effects, const void *ops) {
+  return {sizeof(dfm_type),  kind,    id, name, version, licence, source, rows, static_cast<uint32_t>(N),
+          sizeof(dfm_param), effects, ops};
 }
 // Without parameters.
-constexpr dfm_type type(uint32_t kind, const char *id, const char *name, const char *version, const char *licence, const char *source,
-                        const char *const *effects, const void *ops) {
-  return {sizeof(dfm_type), kind, id, name, version, licence, source, nullptr, 0, sizeof(dfm_param), effects, ops};
+constexpr dfm_type type(uint32_t kind, const char *id, const char *name, const char *version,
+                        const char *licence, const char *source, const char *const *effects,
+                        const void *ops) {
+  return {sizeof(dfm_type),  kind,    id, name, version, licence, source, nullptr, 0,
+          sizeof(dfm_param), effects, ops};
 }
 
 using Eval = dfm_status (*)(const dfm_friction_in *, dfm_friction_out *);
@@ -68,22 +81,26 @@ constexpr dfm_friction friction(uint32_t needs, uint32_t flags, Eval eval, Check
   return {sizeof(dfm_friction), needs, flags, 0, nullptr, eval, check, nullptr, nullptr, nullptr};
 }
 
-// ---- batches: columns of a structure of arrays ------------------------------------------------------------------------------------
+// ---- batches: columns of a structure of arrays ------------------------------------------------------------
 // Column c of p, or null where the caller does not want it.
 template <class T>
 constexpr T *column(T *p, uint32_t stride, uint32_t c) {
   return p ? p + static_cast<size_t>(c) * stride : nullptr;
 }
 
-// ---- entry -------------------------------------------------------------------------------------------------------------------------
-// Null after saying why where the host speaks another ABI; else the plugin. Only the head of the host is read before that is known.
-inline const dfm_plugin *publish(const dfm_host *host, uint32_t host_abi, uint32_t host_abi_min, const dfm_plugin *plugin) noexcept {
+// ---- entry ------------------------------------------------------------------------------------------------
+// Null after saying why where the host speaks another ABI; else the plugin. Only the head of the host is read
+// before that is known.
+inline const dfm_plugin *publish(const dfm_host *host, uint32_t host_abi, uint32_t host_abi_min,
+                                 const dfm_plugin *plugin) noexcept {
   if (host && host_abi_min <= DFM_ABI && DFM_ABI_OK(host)) return plugin;
-  // A host of another ABI still has log in this place or none of it: within the draft the head of dfm_host has not moved.
+  // A host of another ABI still has log in this place or none of it: within the draft the head of dfm_host
+  // has not moved.
   if (host && host->size >= offsetof(dfm_host, log) + sizeof(host->log) && host->log) {
     char text[160];
-    std::snprintf(text, sizeof text, "plugin built for ABI %u draft %u, the host speaks ABI %u (from %u) draft %u", DFM_ABI, DFM_ABI_DRAFT,
-                  host_abi, host_abi_min, host->abi_draft);
+    std::snprintf(text, sizeof text,
+                  "plugin built for ABI %u draft %u, the host speaks ABI %u (from %u) draft %u", DFM_ABI,
+                  DFM_ABI_DRAFT, host_abi, host_abi_min, host->abi_draft);
     host->log(host->ctx, 2, 0, text);
   }
   return nullptr;
@@ -92,10 +109,12 @@ inline const dfm_plugin *publish(const dfm_host *host, uint32_t host_abi, uint32
 }  // namespace dfm::plugin
 
 // Defines the one exported symbol; the arguments are pointers to the dfm_types.
-#define DFM_PLUGIN(...)                                                                                                        \
-  extern "C" DFM_EXPORT const dfm_plugin *dfm_plugin_entry(const dfm_host *host, uint32_t host_abi, uint32_t host_abi_min) {   \
-    static const dfm_type *const types[] = {__VA_ARGS__};                                                                      \
-    static const dfm_plugin plugin = {sizeof(dfm_plugin), DFM_ABI, DFM_ABI_DRAFT, sizeof types / sizeof types[0], types, nullptr}; \
-    return dfm::plugin::publish(host, host_abi, host_abi_min, &plugin);                                                        \
+#define DFM_PLUGIN(...)                                                                              \
+  extern "C" DFM_EXPORT const dfm_plugin *dfm_plugin_entry(const dfm_host *host, uint32_t host_abi,  \
+                                                           uint32_t host_abi_min) {                  \
+    static const dfm_type *const types[] = {__VA_ARGS__};                                            \
+    static const dfm_plugin plugin = {                                                               \
+        sizeof(dfm_plugin), DFM_ABI, DFM_ABI_DRAFT, sizeof types / sizeof types[0], types, nullptr}; \
+    return dfm::plugin::publish(host, host_abi, host_abi_min, &plugin);                              \
   }
 #endif

@@ -1,5 +1,5 @@
-// deform/result.hpp -- what the classes of deform.hpp are made of: how errors are told, arguments that cost nothing, handles that end what they
-// own. Included by deform.hpp.
+// deform/result.hpp -- what the classes of deform.hpp are made of: how errors are told, arguments that cost
+// nothing, handles that end what they own. Included by deform.hpp.
 #ifndef DEFORM_RESULT_HPP
 #define DEFORM_RESULT_HPP
 #if !defined(__cplusplus) || __cplusplus < 202002L
@@ -20,9 +20,9 @@
 
 namespace deform {
 
-// ---- small types ------------------------------------------------------------------------------------------------------------------
+// ---- small types ------------------------------------------------------------------------------------------
 using Vec3 = std::array<double, 3>;
-using In3 = std::span<const double, 3>;   // takes Vec3 and double[3]
+using In3 = std::span<const double, 3>;  // takes Vec3 and double[3]
 
 // A string that the C API reads: a literal or a std::string. Its end is a NUL.
 struct Text {
@@ -45,7 +45,8 @@ constexpr T sized() noexcept {
   return t;
 }
 
-// Parameters by key, without allocation: `const deform::Params p({{"mu_C", 0.4}, {"mu_S", 0.5}});` then p or p.c where dfm_params is wanted.
+// Parameters by key, without allocation: `const deform::Params p({{"mu_C", 0.4}, {"mu_S", 0.5}});` then p or
+// p.c where dfm_params is wanted.
 struct Param {
   const char *key;
   double value;
@@ -54,9 +55,12 @@ template <size_t N>
 class Params {
  public:
   constexpr explicit Params(const Param (&given)[N]) noexcept {
-    for (size_t i = 0; i < N; ++i) value_[i] = given[i].value, row_[i] = {given[i].key, &value_[i], 1};
+    for (size_t i = 0; i < N; ++i) {
+      value_[i] = given[i].value;
+      row_[i] = {given[i].key, &value_[i], 1};
+    }
   }
-  Params(const Params &) = delete;   // rows point at the values beside them
+  Params(const Params &) = delete;  // rows point at the values beside them
   Params &operator=(const Params &) = delete;
   operator dfm_params() const noexcept { return {sizeof(dfm_params), N, row_}; }
 
@@ -65,26 +69,35 @@ class Params {
   dfm_param_value row_[N];
 };
 
-// ---- errors -----------------------------------------------------------------------------------------------------------------------
+// ---- errors -----------------------------------------------------------------------------------------------
 // Two spans of one call disagree in length; no C function was called.
 inline constexpr dfm_status spans_disagree = -1000;
 
 inline const char *version() noexcept { return dfm_version(nullptr, nullptr, nullptr); }
-inline const char *status_name(dfm_status s) noexcept { return s == spans_disagree ? "spans_disagree" : dfm_status_name(s); }
+inline const char *status_name(dfm_status s) noexcept {
+  return s == spans_disagree ? "spans_disagree" : dfm_status_name(s);
+}
 // The sentence that belongs to s, the status of this thread's last call that failed.
 inline const char *sentence(dfm_status s) noexcept {
-  return s == spans_disagree ? "two arrays of one call disagree in length: each point or item needs its row in both" : dfm_last_error();
+  return s == spans_disagree
+             ? "two arrays of one call disagree in length: each point or item needs its row in both"
+             : dfm_last_error();
 }
 
 // Of bindings: sets that sentence.
 inline dfm_status fail(dfm_status s, const char *why) noexcept { return dfm_fail(s, why); }
-// Of bindings: files as the library reads and writes its own. take(bytes, n) is called once and does not throw.
+// Of bindings: files as the library reads and writes its own. take(bytes, n) is called once and
+// does not throw.
 template <class Take>
 dfm_status read_file(const char *path, uint64_t limit, const char *expected, Take &&take) noexcept {
-  const auto call = [](void *user, const char *bytes, size_t n) { (*static_cast<std::remove_reference_t<Take> *>(user))(bytes, n); };
+  const auto call = [](void *user, const char *bytes, size_t n) {
+    (*static_cast<std::remove_reference_t<Take> *>(user))(bytes, n);
+  };
   return dfm_file_read(path, limit, expected, call, const_cast<void *>(static_cast<const void *>(&take)));
 }
-inline dfm_status write_file(const char *path, const void *bytes, size_t n) noexcept { return dfm_file_write(path, bytes, n); }
+inline dfm_status write_file(const char *path, const void *bytes, size_t n) noexcept {
+  return dfm_file_write(path, bytes, n);
+}
 
 // A status with what the call gives. `if (result) use(*result); else log(result.what());`
 template <class T>
@@ -104,7 +117,7 @@ class [[nodiscard]] Result {
 
  private:
   friend struct Values;
-  constexpr Result() noexcept : value_() {}   // status_ is written by Values::end
+  constexpr Result() noexcept : value_() {}  // status_ is written by Values::end
   T value_;
   dfm_status status_;
 };
@@ -127,18 +140,26 @@ struct Values {
   using Out = Result<T>;
   static constexpr Result<void> done(dfm_status s) noexcept { return Result<void>(s); }
   template <class T>
-  static constexpr Result<T> begin() noexcept { return Result<T>(); }
+  static constexpr Result<T> begin() noexcept {
+    return Result<T>();
+  }
   template <class T>
-  static constexpr T &slot(Result<T> &r) noexcept { return r.value_; }
+  static constexpr T &slot(Result<T> &r) noexcept {
+    return r.value_;
+  }
   template <class T>
-  static constexpr void end(Result<T> &r, dfm_status s) noexcept { r.status_ = s; }
+  static constexpr void end(Result<T> &r, dfm_status s) noexcept {
+    r.status_ = s;
+  }
 
   // A callable handed through the C API; it must not throw.
   template <class F>
   struct Call {
     F &f;
     template <class... A>
-    void operator()(A &&...a) noexcept { f(std::forward<A>(a)...); }
+    void operator()(A &&...a) noexcept {
+      f(std::forward<A>(a)...);
+    }
     void rethrow() noexcept {}
   };
 };
@@ -160,16 +181,24 @@ struct Throw {
   // Out of line: its callers cost a test and a jump, as in C.
   [[noreturn, gnu::cold, gnu::noinline]] static void raise(dfm_status s) { throw Error(s); }
   static void done(dfm_status s) {
-    if (s < 0) [[unlikely]] raise(s);
+    if (s < 0) [[unlikely]]
+      raise(s);
   }
   template <class T>
-  static constexpr T begin() { return T(); }
+  static constexpr T begin() {
+    return T();
+  }
   template <class T>
-  static constexpr T &slot(T &r) noexcept { return r; }
+  static constexpr T &slot(T &r) noexcept {
+    return r;
+  }
   template <class T>
-  static void end(T &, dfm_status s) { done(s); }
+  static void end(T &, dfm_status s) {
+    done(s);
+  }
 
-  // A callable handed through the C API: what it throws waits on this side of it, and the remaining calls pass it by.
+  // A callable handed through the C API: what it throws waits on this side of it, and the remaining
+  // calls pass it by.
   template <class F>
   struct Call {
     F &f;
@@ -215,16 +244,21 @@ class Unique : public Ref {
 namespace basic {
 
 template <class E, class T, class F>
-inline typename E::template Out<T> produce(F &&f) {   // the type by name: clang 14 copies a result whose type is deduced
+// the type by name: clang 14 copies a result whose type is deduced
+inline typename E::template Out<T> produce(F &&f) {
   typename E::template Out<T> r = E::template begin<T>();
   E::end(r, f(E::slot(r)));
   return r;
 }
-constexpr uint32_t rows(size_t numbers, uint32_t width) noexcept { return static_cast<uint32_t>(numbers / width); }
+constexpr uint32_t rows(size_t numbers, uint32_t width) noexcept {
+  return static_cast<uint32_t>(numbers / width);
+}
 
-// [n, W] numbers through one of the counted functions: into the caller's memory, returning n, or into a vector.
+// [n, W] numbers through one of the counted functions: into the caller's memory, returning n, or
+// into a vector.
 template <class E, uint32_t W, class T>
-inline auto fill(dfm_status (*f)(uint64_t, uint32_t, T *, uint32_t *), uint64_t handle, std::span<std::type_identity_t<T>> out) {
+inline auto fill(dfm_status (*f)(uint64_t, uint32_t, T *, uint32_t *), uint64_t handle,
+                 std::span<std::type_identity_t<T>> out) {
   return produce<E, uint32_t>([&](uint32_t &n) { return f(handle, rows(out.size(), W), out.data(), &n); });
 }
 template <class E, uint32_t W, class T>
@@ -278,7 +312,7 @@ inline auto collect_text(F &&f) {
     if (s < 0 || bytes == 0) return s;
     out.resize(bytes);
     s = f(out.data(), &bytes);
-    out.resize(s >= 0 && bytes ? bytes - 1 : 0);   // without the NUL
+    out.resize(s >= 0 && bytes ? bytes - 1 : 0);  // without the NUL
     return s;
   });
 }
@@ -290,7 +324,7 @@ class Handle {
   constexpr Handle() = default;
   constexpr explicit Handle(Raw raw) noexcept : raw_(raw) {}
   constexpr Raw get() const noexcept { return raw_; }
-  constexpr Raw *put() noexcept { return &raw_; }   // for C functions with an out parameter
+  constexpr Raw *put() noexcept { return &raw_; }  // for C functions with an out parameter
   constexpr explicit operator bool() const noexcept { return raw_ != Raw{}; }
   friend constexpr bool operator==(Handle, Handle) = default;
 

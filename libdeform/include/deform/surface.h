@@ -16,25 +16,38 @@ DFM_API dfm_status dfm_surface_positions(dfm_body body, uint32_t capacity, doubl
 /** Velocities of all surfels, m/s, [n,3]; capacity and errors as for dfm_surface_positions.
  * Threads: Any thread. Not during step. Since 0.1. */
 DFM_API dfm_status dfm_surface_velocities(dfm_body body, uint32_t capacity, double *xyz, uint32_t *n);
-/** Area-weighted unit normals of all surfels, outward, [n,3]; capacity and errors as for dfm_surface_positions.
+/** Area-weighted unit normals of all surfels, outward, [n,3]; capacity and errors as for
+ * dfm_surface_positions.
  * Threads: Any thread. Not during step. Since 0.1. */
 DFM_API dfm_status dfm_surface_normals(dfm_body body, uint32_t capacity, double *xyz, uint32_t *n);
-/** Contact force on each surfel in the last sub-step, N, [n,3]; capacity and errors as for dfm_surface_positions.
+/** Contact force on each surfel in the last sub-step, N, [n,3]; capacity and errors as for
+ * dfm_surface_positions.
  * Threads: Any thread. Not during step. Since 0.1. */
 DFM_API dfm_status dfm_surface_forces(dfm_body body, uint32_t capacity, double *xyz, uint32_t *n);
-/** Triangles, [n,3] surfel numbers, counter-clockwise seen from outside. @param capacity of tri in triangles; else as dfm_surface_positions.
+/** Triangles, [n,3] surfel numbers, counter-clockwise seen from outside. @param capacity of tri in triangles;
+ * else as dfm_surface_positions.
  * Threads: Any thread. Not during step. Since 0.1. */
 DFM_API dfm_status dfm_surface_triangles(dfm_body body, uint32_t capacity, uint32_t *tri, uint32_t *n);
-/** Phyxel under each surfel, [n]; capacity as for dfm_surface_positions. @return DFM_OK; DFM_E_UNSUPPORTED unless the coupling is identity;
- * DFM_E_ARG; DFM_E_HANDLE. Threads: Any thread. Not during step. Since 0.1. */
+/** Phyxel under each surfel, [n]; capacity as for dfm_surface_positions. @return DFM_OK;
+ * DFM_E_UNSUPPORTED unless the coupling is identity; DFM_E_ARG; DFM_E_HANDLE. Threads: Any thread. Not
+ * during step. Since 0.1. */
 DFM_API dfm_status dfm_surface_points(dfm_body body, uint32_t capacity, uint32_t *point, uint32_t *n);
 
-typedef struct dfm_ray_hit { uint32_t size, triangle; dfm_body body; dfm_obstacle obstacle; double distance, point[3], normal[3]; } dfm_ray_hit;
-/** First surface a ray meets. @param direction need not be unit; distance is in meters. hit->body and hit->obstacle are both 0: nothing met.
+typedef struct dfm_ray_hit {
+  uint32_t size, triangle;
+  dfm_body body;
+  dfm_obstacle obstacle;
+  double distance, point[3], normal[3];
+} dfm_ray_hit;
+/** First surface a ray meets. @param direction need not be unit; distance is in meters. hit->body and
+ * hit->obstacle are both 0: nothing met.
  * Threads: Any thread. Not during step. Since 0.1. */
-DFM_API dfm_status dfm_world_ray(dfm_world world, const double origin[3], const double direction[3], double max_distance, dfm_ray_hit *hit);
-/** Closest point of any body's surface within max_distance. Same result struct. Threads: Any thread. Not during step. Since 0.1. */
-DFM_API dfm_status dfm_world_closest(dfm_world world, const double point[3], double max_distance, dfm_ray_hit *hit);
+DFM_API dfm_status dfm_world_ray(dfm_world world, const double origin[3], const double direction[3],
+                                 double max_distance, dfm_ray_hit *hit);
+/** Closest point of any body's surface within max_distance. Same result struct. Threads: Any thread. Not
+ * during step. Since 0.1. */
+DFM_API dfm_status dfm_world_closest(dfm_world world, const double point[3], double max_distance,
+                                     dfm_ray_hit *hit);
 #ifdef __cplusplus
 }
 #endif

@@ -22,9 +22,12 @@ dfm_context_def checked(const dfm_context_def *given) {
   std::memset(&def, 0, sizeof def);
   std::memcpy(&def, given, std::min<size_t>(given->size, sizeof def));
   def.size = sizeof def;
-  if (!def.alloc != !def.release) fail(DFM_E_ARG, "the hooks alloc and release go together; %s is missing", def.alloc ? "release" : "alloc");
+  if (!def.alloc != !def.release)
+    fail(DFM_E_ARG, "the hooks alloc and release go together; %s is missing",
+         def.alloc ? "release" : "alloc");
   if (!def.trace_begin != !def.trace_end) fail(DFM_E_ARG, "the hooks trace_begin and trace_end go together");
-  if (def.threads > 1024) fail(DFM_E_ARG, "threads is %u, at most 1024 expected (0: one per processor)", def.threads);
+  if (def.threads > 1024)
+    fail(DFM_E_ARG, "threads is %u, at most 1024 expected (0: one per processor)", def.threads);
   return def;
 }
 
@@ -69,9 +72,11 @@ dfm_status dfm_fail(dfm_status status, const char *sentence) {
   return status;
 }
 
-dfm_status dfm_file_read(const char *path, uint64_t limit, const char *expected, dfm_file_take_fn take, void *user) {
+dfm_status dfm_file_read(const char *path, uint64_t limit, const char *expected, dfm_file_take_fn take,
+                         void *user) {
   return dfm::guard([&] {
-    if (!path || !*path || !expected || !take) dfm::fail(DFM_E_ARG, "dfm_file_read: path is empty, or path, expected or take is NULL");
+    if (!path || !*path || !expected || !take)
+      dfm::fail(DFM_E_ARG, "dfm_file_read: path is empty, or path, expected or take is NULL");
     const dfm::Array<char> bytes = dfm::read_whole_file(dfm::Memory::standard(), path, limit, expected);
     take(user, bytes.data(), bytes.size());
   });
@@ -79,7 +84,8 @@ dfm_status dfm_file_read(const char *path, uint64_t limit, const char *expected,
 
 dfm_status dfm_file_write(const char *path, const void *bytes, size_t n) {
   return dfm::guard([&] {
-    if (!path || !*path || (n && !bytes)) dfm::fail(DFM_E_ARG, "dfm_file_write: path is empty, or path or bytes is NULL");
+    if (!path || !*path || (n && !bytes))
+      dfm::fail(DFM_E_ARG, "dfm_file_write: path is empty, or path or bytes is NULL");
     dfm::AtomicFile file(path);
     file.write(bytes, n);
     file.commit();
@@ -115,7 +121,9 @@ dfm_status dfm_context_create(const dfm_context_def *def, dfm_context **out) {
 void dfm_context_destroy(dfm_context *context) {
   if (!context) return;
   if (context->calls != 0 || context->ending.exchange(true)) {
-    dfm::set_last_error("the context is inside a call whose hook, plugin or host asks to destroy it; nothing was destroyed: do it when that call has returned");
+    dfm::set_last_error(
+        "the context is inside a call whose hook, plugin or host asks to destroy it; nothing was destroyed: "
+        "do it when that call has returned");
     context->log(DFM_LOG_ERROR, dfm::last_error());
     return;
   }
@@ -155,6 +163,7 @@ dfm_status dfm_plugin_visit(dfm_context *context, dfm_plugin_visit_fn visit, voi
 dfm_status dfm_plugin_visit_passed(dfm_context *context, dfm_plugin_passed_fn visit, void *user) {
   return guard([&] {
     if (!visit) fail(DFM_E_ARG, "dfm_plugin_visit_passed: visit is NULL");
-    for (const auto &passed : used(require(context)).registry.passed()) visit(user, passed.file.c_str(), passed.reason.c_str());
+    for (const auto &passed : used(require(context)).registry.passed())
+      visit(user, passed.file.c_str(), passed.reason.c_str());
   });
 }

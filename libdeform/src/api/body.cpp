@@ -20,19 +20,25 @@ namespace {
 
 // A count of keys without keys, and a sine that is not finite.
 void check_motion(const Body &b, uint32_t nkey, const void *keys, const dfm_sine *sine) {
-  if (nkey && !keys) fail(DFM_E_ARG, "body '%s': %u keys are announced, but keys is NULL", b.name.c_str(), nkey);
+  if (nkey && !keys)
+    fail(DFM_E_ARG, "body '%s': %u keys are announced, but keys is NULL", b.name.c_str(), nkey);
   if (!sine) return;
   for (double v : {sine->amplitude[0], sine->amplitude[1], sine->amplitude[2], sine->frequency, sine->phase})
-    if (!std::isfinite(v)) fail(DFM_E_ARG, "body '%s': the sine is not finite; give amplitude, frequency (Hz) and phase (rad)", b.name.c_str());
+    if (!std::isfinite(v))
+      fail(DFM_E_ARG, "body '%s': the sine is not finite; give amplitude, frequency (Hz) and phase (rad)",
+           b.name.c_str());
 }
 
 void check_points(const Body &b, uint32_t n, const uint32_t *points) {
   if (n) need(points, "points");
   for (uint32_t i = 0; i < n; ++i)
-    if (points[i] >= b.p.n) fail(DFM_E_ARG, "body '%s': point %u does not exist; it has %u points", b.name.c_str(), points[i], b.p.n);
+    if (points[i] >= b.p.n)
+      fail(DFM_E_ARG, "body '%s': point %u does not exist; it has %u points", b.name.c_str(), points[i],
+           b.p.n);
 }
 
-// The held components keep what holds them: their velocity is that of the hold, zero unless a motion moves them.
+// The held components keep what holds them: their velocity is that of the hold, zero unless a
+// motion moves them.
 void stop_held(Body &b) {
   for (uint32_t i = 0; i < b.p.n; ++i)
     for (int k = 0; k < 3; ++k)
@@ -41,7 +47,10 @@ void stop_held(Body &b) {
 
 // Lasting loads that do not vary are summed once; varying ones are summed anew by the motion stage.
 // What the host changes is no work of the step's.
-void disturb(Body &b) { wake(*b.world, b), forget_energy(b); }
+void disturb(Body &b) {
+  wake(*b.world, b);
+  forget_energy(b);
+}
 
 void sum_loads(Body &b) {
   std::fill(b.p.load.begin(), b.p.load.end(), 0.0);
@@ -68,23 +77,31 @@ void springs_changed(Body &b) {
 
 Spring make_spring(const Body &b, const dfm_spring_def &d) {
   const char *const name = b.name.c_str();
-  if (b.model.stepper) fail(DFM_E_UNSUPPORTED, "body '%s': a spring is explicit, and model '%s' has no step bound to hold it to", name, b.model.type->id);
+  if (b.model.stepper)
+    fail(DFM_E_UNSUPPORTED, "body '%s': a spring is explicit, and model '%s' has no step bound to hold it to",
+         name, b.model.type->id);
   check_points(b, d.npoint, d.points);
   if (d.npoint == 0) fail(DFM_E_ARG, "body '%s': a spring needs at least one point", name);
   if (d.nkey && !d.keys) fail(DFM_E_ARG, "body '%s': %u keys are announced, but keys is NULL", name, d.nkey);
   if (!(d.stiffness >= 0) || !(d.damping >= 0) || std::isinf(d.stiffness) || std::isinf(d.damping))
-    fail(DFM_E_ARG, "body '%s': a spring's stiffness and damping are finite and not negative; found %g N/m and %g N s/m", name, d.stiffness, d.damping);
+    fail(DFM_E_ARG,
+         "body '%s': a spring's stiffness and damping are finite and not negative; found %g N/m and %g N s/m",
+         name, d.stiffness, d.damping);
   Spring s{b.next_load, {d.points, d.points + d.npoint}, {}, {}, load3(d.to), d.stiffness, d.damping};
   if (d.nkey) s.keys.assign(d.keys, d.keys + d.nkey);
   check_keys(s.keys, name);
   double sum = 0, poison = 0;
   for (uint32_t i = 0; i < d.npoint; ++i) {
     const double w = d.weights ? d.weights[i] : b.p.mass[d.points[i]];
-    if (!(w >= 0)) fail(DFM_E_ARG, "body '%s': weight %u of a spring is %g; weights are not negative", name, i, w);
-    s.weights.push_back(w), sum += w;
+    if (!(w >= 0))
+      fail(DFM_E_ARG, "body '%s': weight %u of a spring is %g; weights are not negative", name, i, w);
+    s.weights.push_back(w);
+    sum += w;
   }
   for (double x : d.to) poison += 0.0 * x;
-  if (!(sum > 0) || std::isinf(sum) || poison != 0) fail(DFM_E_ARG, "body '%s': a spring's end and the sum of its weights must be finite, the sum above 0", name);
+  if (!(sum > 0) || std::isinf(sum) || poison != 0)
+    fail(DFM_E_ARG, "body '%s': a spring's end and the sum of its weights must be finite, the sum above 0",
+         name);
   for (double &w : s.weights) w /= sum;
   return s;
 }
@@ -94,7 +111,8 @@ Spring make_spring(const Body &b, const dfm_spring_def &d) {
 dfm_body_def dfm_body_def_default(void) {
   dfm_body_def d{};
   d.size = sizeof d;
-  d.category = 1, d.collides_with = ~0u;
+  d.category = 1;
+  d.collides_with = ~0u;
   return d;
 }
 
@@ -118,10 +136,17 @@ dfm_status dfm_body_get_info(dfm_body body, dfm_body_info *out) {
   return guard([&] {
     const Body &b = body_of(body);
     dfm_body_info i{};
-    i.npoint = b.p.n, i.ntet = static_cast<uint32_t>(b.tets.size() / 4);
-    i.nsurfel = b.surface.nsurfel, i.ntriangle = b.surface.ntri, i.nedge = static_cast<uint32_t>(b.edges.size() / 2);
-    i.world = b.world->handle, i.name = b.name.c_str(), i.model = b.model.type->id;
-    i.mass = b.mass, i.rest_volume = b.rest_volume, i.user = b.user;
+    i.npoint = b.p.n;
+    i.ntet = static_cast<uint32_t>(b.tets.size() / 4);
+    i.nsurfel = b.surface.nsurfel;
+    i.ntriangle = b.surface.ntri;
+    i.nedge = static_cast<uint32_t>(b.edges.size() / 2);
+    i.world = b.world->handle;
+    i.name = b.name.c_str();
+    i.model = b.model.type->id;
+    i.mass = b.mass;
+    i.rest_volume = b.rest_volume;
+    i.user = b.user;
     give(out, i);
   });
 }
@@ -134,7 +159,8 @@ dfm_status dfm_body_set_filter(dfm_body body, uint32_t category, uint32_t collid
   return guard([&] {
     Body &b = body_of(body);
     idle(*b.world);
-    b.category = category, b.collides_with = collides_with;
+    b.category = category;
+    b.collides_with = collides_with;
     disturb(b);
     b.world->overlaps.place(b.id);
     b.world->changed = true;
@@ -159,11 +185,13 @@ dfm_status dfm_body_set_state(dfm_body body, uint32_t n, const double *x, const 
     if (n != b.p.n) fail(DFM_E_ARG, "body '%s' has %u points, %u were given", b.name.c_str(), b.p.n, n);
     for (size_t i = 0; i < size_t(3) * n; ++i)
       if ((x && !std::isfinite(x[i])) || (v && !std::isfinite(v[i])))
-        fail(DFM_E_ARG, "body '%s': the state of point %zu is not finite; nothing was changed", b.name.c_str(), i / 3);
+        fail(DFM_E_ARG, "body '%s': the state of point %zu is not finite; nothing was changed",
+             b.name.c_str(), i / 3);
     for (uint32_t i = 0; v && i < n; ++i) check_velocity("body", b.name.c_str(), load3(v + size_t(3) * i));
     if (x) {
       const double far = largest_coordinate(x, n, 3);
-      check_resolved(b.name.c_str(), far, b.surface.median_edge), check_place(*b.world, "body", b.name.c_str(), far);
+      check_resolved(b.name.c_str(), far, b.surface.median_edge);
+      check_place(*b.world, "body", b.name.c_str(), far);
     }
     for (uint32_t i = 0; i < n; ++i)
       for (int k = 0; k < 3; ++k) {
@@ -178,11 +206,13 @@ dfm_status dfm_body_set_state(dfm_body body, uint32_t n, const double *x, const 
   });
 }
 
-dfm_status dfm_body_get_rest(dfm_body body, uint32_t capacity_points, double *x, uint32_t capacity_tets, uint32_t *tets) {
+dfm_status dfm_body_get_rest(dfm_body body, uint32_t capacity_points, double *x, uint32_t capacity_tets,
+                             uint32_t *tets) {
   return guard([&] {
     const Body &b = body_of(body);
     if (x && room(b.p.n, capacity_points, x, nullptr)) std::copy(b.p.rest.begin(), b.p.rest.end(), x);
-    if (tets && room(static_cast<uint32_t>(b.tets.size() / 4), capacity_tets, tets, nullptr)) std::copy(b.tets.begin(), b.tets.end(), tets);
+    if (tets && room(static_cast<uint32_t>(b.tets.size() / 4), capacity_tets, tets, nullptr))
+      std::copy(b.tets.begin(), b.tets.end(), tets);
   });
 }
 
@@ -201,11 +231,13 @@ dfm_status dfm_body_hold(dfm_body body, uint32_t n, const uint32_t *points, uint
   });
 }
 
-dfm_status dfm_body_move_held(dfm_body body, uint32_t n, const uint32_t *points, uint32_t nkey, const dfm_pose_key *keys, const dfm_sine *sine) {
+dfm_status dfm_body_move_held(dfm_body body, uint32_t n, const uint32_t *points, uint32_t nkey,
+                              const dfm_pose_key *keys, const dfm_sine *sine) {
   return guard([&] {
     Body &b = body_of(body);
     idle(*b.world);
-    check_points(b, n, points), check_motion(b, nkey, keys, sine);
+    check_points(b, n, points);
+    check_motion(b, nkey, keys, sine);
     if (nkey == 0 && !sine) fail(DFM_E_ARG, "body '%s': a motion needs keys or a sine", b.name.c_str());
     if (n == 0) fail(DFM_E_ARG, "body '%s': a motion needs points", b.name.c_str());
     need_ability(*b.world, Ability::held_motion, "body", b.name);
@@ -215,7 +247,9 @@ dfm_status dfm_body_move_held(dfm_body body, uint32_t n, const uint32_t *points,
     check_keys(m.keys, b.name.c_str());
     if (sine) m.sine = *sine;
     for (uint32_t i = 0; i < n; ++i) {
-      if (!b.p.held[points[i]]) fail(DFM_E_ARG, "body '%s': point %u is not held; call dfm_body_hold first", b.name.c_str(), points[i]);
+      if (!b.p.held[points[i]])
+        fail(DFM_E_ARG, "body '%s': point %u is not held; call dfm_body_hold first", b.name.c_str(),
+             points[i]);
       for (int k = 0; k < 3; ++k) m.start.push_back(b.p.x[size_t(points[i]) * kStride + size_t(k)]);
     }
     b.motions.reserve(b.motions.size() + 1);
@@ -226,16 +260,18 @@ dfm_status dfm_body_move_held(dfm_body body, uint32_t n, const uint32_t *points,
   });
 }
 
-dfm_status dfm_body_add_load(dfm_body body, uint32_t n, const uint32_t *points, const double *force, uint32_t nkey, const dfm_scale_key *keys,
-                             const dfm_sine *sine, uint32_t *load) {
+dfm_status dfm_body_add_load(dfm_body body, uint32_t n, const uint32_t *points, const double *force,
+                             uint32_t nkey, const dfm_scale_key *keys, const dfm_sine *sine, uint32_t *load) {
   return guard([&] {
     Body &b = body_of(body);
     idle(*b.world);
-    check_points(b, n, points), check_motion(b, nkey, keys, sine);
+    check_points(b, n, points);
+    check_motion(b, nkey, keys, sine);
     if (n) need(force, "force");
     Load l{};
     l.number = b.next_load;
-    l.points.assign(points, points + n), l.force.assign(force, force + size_t(3) * n);
+    l.points.assign(points, points + n);
+    l.force.assign(force, force + size_t(3) * n);
     for (double f : l.force)
       if (!std::isfinite(f)) fail(DFM_E_ARG, "body '%s': a load is not finite", b.name.c_str());
     if (nkey) l.keys.assign(keys, keys + nkey);
@@ -262,7 +298,9 @@ dfm_status dfm_body_add_spring(dfm_body body, const dfm_spring_def *def, uint32_
   return guard([&] {
     Body &b = body_of(body);
     idle(*b.world);
-    b.springs.push_back(make_spring(b, take_def(def, dfm_spring_def{sizeof(dfm_spring_def), 0, nullptr, nullptr, {}, nullptr, 0, 0, 0, 0})));
+    b.springs.push_back(make_spring(
+        b,
+        take_def(def, dfm_spring_def{sizeof(dfm_spring_def), 0, nullptr, nullptr, {}, nullptr, 0, 0, 0, 0})));
     ++b.next_load;
     if (spring) *spring = b.springs.back().number;
     springs_changed(b);
@@ -275,8 +313,10 @@ dfm_status dfm_body_set_spring_target(dfm_body body, uint32_t spring, const doub
     idle(*b.world);
     need(to, "to");
     Spring &s = spring_of(b, spring);
-    if (!std::isfinite(to[0]) || !std::isfinite(to[1]) || !std::isfinite(to[2])) fail(DFM_E_ARG, "body '%s': a spring's end must be finite", b.name.c_str());
-    s.to = load3(to), s.keys.clear();
+    if (!std::isfinite(to[0]) || !std::isfinite(to[1]) || !std::isfinite(to[2]))
+      fail(DFM_E_ARG, "body '%s': a spring's end must be finite", b.name.c_str());
+    s.to = load3(to);
+    s.keys.clear();
     disturb(b);
   });
 }
@@ -302,22 +342,31 @@ dfm_status dfm_body_apply_impulse(dfm_body body, const double point[3], const do
   return guard([&] {
     Body &b = body_of(body);
     idle(*b.world);
-    need(point, "point"), need(impulse, "impulse");
+    need(point, "point");
+    need(impulse, "impulse");
     for (int k = 0; k < 3; ++k)
-      if (!std::isfinite(point[k]) || !std::isfinite(impulse[k])) fail(DFM_E_ARG, "body '%s': point and impulse must be finite", b.name.c_str());
+      if (!std::isfinite(point[k]) || !std::isfinite(impulse[k]))
+        fail(DFM_E_ARG, "body '%s': point and impulse must be finite", b.name.c_str());
     double best = INFINITY, weight[3] = {1, 0, 0};
     uint32_t triangle = 0;
     for (uint32_t t = 0; t < b.surface.ntri; ++t) {
       const uint32_t *const c = &b.surface.tri[size_t(3) * t];
       const TrianglePoint q =
-          closest_on_triangle(load3(point), surfel_vector(b, b.p.x, c[0]), surfel_vector(b, b.p.x, c[1]), surfel_vector(b, b.p.x, c[2]));
-      if (q.distance2 < best) best = q.distance2, triangle = t, std::copy(q.weight, q.weight + 3, weight);
+          closest_on_triangle(load3(point), surfel_vector(b, b.p.x, c[0]), surfel_vector(b, b.p.x, c[1]),
+                              surfel_vector(b, b.p.x, c[2]));
+      if (q.distance2 < best) {
+        best = q.distance2;
+        triangle = t;
+        std::copy(q.weight, q.weight + 3, weight);
+      }
     }
     disturb(b);
     // dv = M^-1 N^T p: of all changes that give the point its new velocity the one of least kinetic energy
     for (int k = 0; k < 3; ++k)
       b.surface.each_phyxel(b.surface.tri[size_t(3) * triangle + size_t(k)], [&](uint32_t phyxel, double w) {
-        for (size_t c = 0; c < 3; ++c) b.p.v[size_t(phyxel) * kStride + c] += weight[k] * w * b.p.inv_mass[size_t(phyxel) * kStride + c] * impulse[c];
+        for (size_t c = 0; c < 3; ++c)
+          b.p.v[size_t(phyxel) * kStride + c] +=
+              weight[k] * w * b.p.inv_mass[size_t(phyxel) * kStride + c] * impulse[c];
       });
   });
 }

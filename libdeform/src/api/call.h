@@ -1,5 +1,6 @@
-// The calls of the API that are in progress on this thread, the innermost first. A hook, a plugin or a host's table may call back into the library in
-// the middle of one; what a call works on must not be destroyed or changed beneath it, so each names what it holds.
+// The calls of the API that are in progress on this thread, the innermost first. A hook, a plugin or a host's
+// table may call back into the library in the middle of one; what a call works on must not be destroyed or
+// changed beneath it, so each names what it holds.
 #pragma once
 #include <atomic>
 #include <cstddef>
@@ -57,11 +58,14 @@ class Call {
   void let_go() noexcept { writing_ = nullptr; }
 
   [[noreturn]] static void refuse(const char *what) {
-    fail(DFM_E_BUSY, "the %s is inside a call: a step, or one whose hook, plugin or host has called back; call again when that has returned", what);
+    fail(DFM_E_BUSY,
+         "the %s is inside a call: a step, or one whose hook, plugin or host has called back; call again "
+         "when that has returned",
+         what);
   }
 
  private:
-  static constexpr size_t kMostHeld = 6;   // no function works on more things than that
+  static constexpr size_t kMostHeld = 6;  // no function works on more things than that
   static inline thread_local Call *innermost_ = nullptr;
   Call *const outer_;
   std::atomic<bool> *writing_ = nullptr;

@@ -18,7 +18,8 @@ namespace {
 std::vector<std::string> groups_of(const Body &b) {
   std::vector<std::string> out;
   for (const auto &zone : b.zones.list)
-    if (!zone.group.empty() && std::find(out.begin(), out.end(), zone.group) == out.end()) out.push_back(zone.group);
+    if (!zone.group.empty() && std::find(out.begin(), out.end(), zone.group) == out.end())
+      out.push_back(zone.group);
   return out;
 }
 
@@ -26,14 +27,17 @@ std::vector<std::string> groups_of(const Body &b) {
 std::string group_side(World &w, const std::string &text) {
   for (size_t colon = text.find(':'); colon != std::string::npos; colon = text.find(':', colon + 1)) {
     const std::string name = text.substr(0, colon), group = text.substr(colon + 1);
-    if (w.find_obstacle(name)) fail(DFM_E_ARG, "'%s': obstacle '%s' has no surface groups; name the whole obstacle", text.c_str(), name.c_str());
+    if (w.find_obstacle(name))
+      fail(DFM_E_ARG, "'%s': obstacle '%s' has no surface groups; name the whole obstacle", text.c_str(),
+           name.c_str());
     const Body *const b = w.find_body(name);
     if (!b) continue;
     const std::vector<std::string> known = groups_of(*b);
     if (std::find(known.begin(), known.end(), group) != known.end()) return text;
     const std::string near = nearest(group, known);
-    fail(DFM_E_ARG, "'%s': no triangle of the surface of '%s' is in a group '%s'%s; %s", text.c_str(), name.c_str(), group.c_str(),
-         near.empty() ? "" : (", did you mean '" + near + "'?").c_str(), known.empty() ? "it has no groups" : ("groups: " + join(known)).c_str());
+    fail(DFM_E_ARG, "'%s': no triangle of the surface of '%s' is in a group '%s'%s; %s", text.c_str(),
+         name.c_str(), group.c_str(), near.empty() ? "" : (", did you mean '" + near + "'?").c_str(),
+         known.empty() ? "it has no groups" : ("groups: " + join(known)).c_str());
   }
   return {};
 }
@@ -52,7 +56,9 @@ std::string side(World &w, const char *text, bool grouped) {
     if (names.back() == s) return s;
   }
   if (const std::string found = group_side(w, s); !found.empty()) {
-    if (!grouped) fail(DFM_E_UNSUPPORTED, "'%s': groups of a surface choose friction, not whether it touches; name the whole body", text);
+    if (!grouped)
+      fail(DFM_E_UNSUPPORTED,
+           "'%s': groups of a surface choose friction, not whether it touches; name the whole body", text);
     return found;
   }
   const std::string near = nearest(s, names);
@@ -65,25 +71,40 @@ bool touching(const World &w, uint32_t i) { return w.store.touching[i]; }
 
 struct Sides { uint64_t a, b; };
 Sides sides(const World &w, const ContactPoint &c) {
-  return {w.bodies[c.slot_a]->handle, c.obstacle ? w.obstacles[c.slot_b]->handle : w.bodies[c.slot_b]->handle};
+  return {w.bodies[c.slot_a]->handle,
+          c.obstacle ? w.obstacles[c.slot_b]->handle : w.bodies[c.slot_b]->handle};
 }
 
 dfm_contact report(const World &w, uint32_t i) {
   const ContactPoint &c = w.report.contacts[i];
-  const double h = w.report.h, *const f = &w.report.frame[size_t(9) * i], *const l = &w.report.impulse[size_t(3) * i];
+  const double h = w.report.h;
+  const double *const f = &w.report.frame[size_t(9) * i];
+  const double *const l = &w.report.impulse[size_t(3) * i];
   dfm_contact out{};
   if (l[0] > 0 && w.report.mode[i] == 1) out.flags |= DFM_CONTACT_STICKING;
   if (w.store.began[i]) out.flags |= DFM_CONTACT_BEGAN;
   if (c.type_a == 1) out.flags |= DFM_CONTACT_EDGE_A;
   if (c.type_a == 2) out.flags |= DFM_CONTACT_TRIANGLE_A;
   const Sides s = sides(w, c);
-  out.body_a = s.a, out.body_b = c.obstacle && !w.obstacles[c.slot_b]->rigid ? 0 : s.b, out.key = c.key;
-  out.feature_a = c.feature_a, out.feature_b = c.obstacle ? c.slot_b : c.feature_b;
-  out.kind = c.obstacle ? uint32_t{DFM_CONTACT_PRIMITIVE} : c.kind, out.law = w.store.law[i];
-  std::copy(c.point, c.point + 3, out.point), std::copy(f, f + 3, out.normal), std::copy(f + 3, f + 6, out.tangent);
-  out.gap = c.distance - w.offset, out.area = c.area, out.fn = l[0] / h;
-  for (int k = 0; k < 2; ++k) out.ft[k] = l[1 + k] / h, out.slip[k] = w.report.slip[size_t(2) * i + size_t(k)];
-  for (uint32_t k = 0; k < 2 && k < w.store.nstate; ++k) out.bristle[k] = w.store.bristle[size_t(w.store.nstate) * i + k];
+  out.body_a = s.a;
+  out.body_b = c.obstacle && !w.obstacles[c.slot_b]->rigid ? 0 : s.b;
+  out.key = c.key;
+  out.feature_a = c.feature_a;
+  out.feature_b = c.obstacle ? c.slot_b : c.feature_b;
+  out.kind = c.obstacle ? uint32_t{DFM_CONTACT_PRIMITIVE} : c.kind;
+  out.law = w.store.law[i];
+  std::copy(c.point, c.point + 3, out.point);
+  std::copy(f, f + 3, out.normal);
+  std::copy(f + 3, f + 6, out.tangent);
+  out.gap = c.distance - w.offset;
+  out.area = c.area;
+  out.fn = l[0] / h;
+  for (int k = 0; k < 2; ++k) {
+    out.ft[k] = l[1 + k] / h;
+    out.slip[k] = w.report.slip[size_t(2) * i + size_t(k)];
+  }
+  for (uint32_t k = 0; k < 2 && k < w.store.nstate; ++k)
+    out.bristle[k] = w.store.bristle[size_t(w.store.nstate) * i + k];
   return out;
 }
 
@@ -98,7 +119,8 @@ uint64_t id_of(const World &w, uint64_t handle, const char *what) {
 
 // The values of a def; `what` names them where they are missing.
 std::span<const dfm_param_value> values_of(const dfm_params &params, const char *what) {
-  if (params.n && !params.values) fail(DFM_E_ARG, "%u parameters are announced for %s, but params.values is NULL", params.n, what);
+  if (params.n && !params.values)
+    fail(DFM_E_ARG, "%u parameters are announced for %s, but params.values is NULL", params.n, what);
   return {params.values, params.n};
 }
 
@@ -150,8 +172,10 @@ dfm_status dfm_world_remove_filter(dfm_world world, const char *a, const char *b
     need(a, "a");
     need(b, "b");
     const std::string between[2] = {a, b};
-    const auto rule = std::find_if(w.filters.begin(), w.filters.end(), [&](const FilterRule &r) { return same_pair(r.between, between); });
-    if (rule == w.filters.end()) fail(DFM_E_ARG, "no filter is for ['%s', '%s']; dfm_world_filter_pair makes one", a, b);
+    const auto rule = std::find_if(w.filters.begin(), w.filters.end(),
+                                   [&](const FilterRule &r) { return same_pair(r.between, between); });
+    if (rule == w.filters.end())
+      fail(DFM_E_ARG, "no filter is for ['%s', '%s']; dfm_world_filter_pair makes one", a, b);
     if (!rule->collide) w.overlaps.all = true;
     w.filters.erase(rule);
     wake_all(w);
@@ -177,8 +201,10 @@ dfm_status dfm_world_law_info(dfm_world world, uint32_t law, dfm_law_info *info)
   return guard([&] {
     const World &w = settled(world_of(world));
     if (law >= w.laws.size())
-      fail(DFM_E_ARG, "law %u is none of this world, which has %zu; take the number from a dfm_contact or a dfm_pair_report", law,
-           w.laws.size());
+      fail(DFM_E_ARG,
+           "law %u is none of this world, which has %zu; take the number from a dfm_contact or a "
+           "dfm_pair_report",
+           law, w.laws.size());
     const LawInstance &l = *w.laws[law];
     dfm_law_info out{};
     out.id = l.type->id;
@@ -194,7 +220,10 @@ dfm_status dfm_world_pairs_sized(dfm_world world, uint32_t row_size, uint32_t ca
   return guard([&] {
     Rows<dfm_pair_report> rows(out, row_size, "dfm_pair_report");
     World &w = settled(world_of(world));
-    struct Pair { uint64_t a, b; dfm_pair_report report; };   // ids: the order of creation
+    struct Pair {
+      uint64_t a, b;
+      dfm_pair_report report;
+    };  // ids: the order of creation
     std::vector<Pair> pairs;
     std::vector<Vec3> com(w.bodies.size());
     std::vector<uint8_t> known(w.bodies.size());
@@ -205,28 +234,39 @@ dfm_status dfm_world_pairs_sized(dfm_world world, uint32_t row_size, uint32_t ca
       // vertex-face contacts of a pair come from both sides; the report's a is the body with the lower id
       const bool turned = !c.obstacle && ib < ia;
       Sides s = sides(w, c);
-      if (turned) std::swap(s.a, s.b), std::swap(ia, ib);
-      auto at = std::lower_bound(pairs.begin(), pairs.end(), std::pair(ia, ib), [](const Pair &p, auto &k) { return std::pair(p.a, p.b) < k; });
+      if (turned) {
+        std::swap(s.a, s.b);
+        std::swap(ia, ib);
+      }
+      auto at = std::lower_bound(pairs.begin(), pairs.end(), std::pair(ia, ib),
+                                 [](const Pair &p, auto &k) { return std::pair(p.a, p.b) < k; });
       if (at == pairs.end() || at->a != ia || at->b != ib) {
         dfm_pair_report p{};
-        p.a = s.a, p.b = s.b, p.law = w.store.law[i];
+        p.a = s.a;
+        p.b = s.b;
+        p.law = w.store.law[i];
         for (const PairWork &work : w.work)
           if ((work.a == ia && work.b == ib) || (work.a == ib && work.b == ia)) p.friction_work += work.work;
         at = pairs.insert(at, {ia, ib, p});
       }
       dfm_pair_report *const it = &at->report;
       const uint32_t body = turned ? c.slot_b : c.slot_a;
-      if (!known[body]) {  // where the center was when the contact points were there: at the start of the sub-step
+      // where the center was when the contact points were there: at the start of the sub-step
+      if (!known[body]) {
         const dfm_body_measure m = measure(*w.bodies[body]);
-        com[body] = load3(m.com) - w.report.h * load3(m.velocity), known[body] = 1;
+        com[body] = load3(m.com) - w.report.h * load3(m.velocity);
+        known[body] = 1;
       }
       const double *const f = &w.report.frame[size_t(9) * i], *const l = &w.report.impulse[size_t(3) * i];
       const double scale = (turned ? -1 : 1) / w.report.h;
-      const Vec3 friction = scale * (l[1] * load3(f + 3) + l[2] * load3(f + 6)), force = scale * l[0] * load3(f) + friction;
-      ++it->count, it->sticking += l[0] > 0 && w.report.mode[i] == 1;
+      const Vec3 friction = scale * (l[1] * load3(f + 3) + l[2] * load3(f + 6));
+      const Vec3 force = scale * l[0] * load3(f) + friction;
+      ++it->count;
+      it->sticking += l[0] > 0 && w.report.mode[i] == 1;
       it->normal += l[0] / w.report.h;
-      if (ia != ib) {   // what a body does to itself sums to nothing
-        store3(it->force, load3(it->force) + force), store3(it->friction, load3(it->friction) + friction);
+      if (ia != ib) {  // what a body does to itself sums to nothing
+        store3(it->force, load3(it->force) + force);
+        store3(it->friction, load3(it->friction) + friction);
         store3(it->moment, load3(it->moment) + cross(load3(c.point) - com[body], force));
       }
       const double *const slip = &w.report.slip[size_t(2) * i];
@@ -237,29 +277,35 @@ dfm_status dfm_world_pairs_sized(dfm_world world, uint32_t row_size, uint32_t ca
   });
 }
 
-dfm_status dfm_world_pair_wrench(dfm_world world, uint64_t a, uint64_t b, const double point[3], double force[3], double moment[3]) {
+dfm_status dfm_world_pair_wrench(dfm_world world, uint64_t a, uint64_t b, const double point[3],
+                                 double force[3], double moment[3]) {
   return guard([&] {
     const World &w = settled(world_of(world));
     need(point, "point");
     for (int k = 0; k < 3; ++k)
-      if (!std::isfinite(point[k])) fail(DFM_E_ARG, "the point about which the moment is taken is not finite");
+      if (!std::isfinite(point[k]))
+        fail(DFM_E_ARG, "the point about which the moment is taken is not finite");
     const uint64_t ia = id_of(w, a, "a"), ib = id_of(w, b, "b");
     const Vec3 about = load3(point);
     Vec3 sum, turn;
     for (uint32_t i = 0; i < w.report.n; ++i) {
-      const bool straight = w.store.id_a[i] == ia && w.store.id_b[i] == ib, turned = w.store.id_a[i] == ib && w.store.id_b[i] == ia;
+      const bool straight = w.store.id_a[i] == ia && w.store.id_b[i] == ib;
+      const bool turned = w.store.id_a[i] == ib && w.store.id_b[i] == ia;
       if (!touching(w, i) || !(straight || turned) || (straight && turned)) continue;
-      const double *const f = &w.report.frame[size_t(9) * i], *const l = &w.report.impulse[size_t(3) * i], scale = (turned ? -1 : 1) / w.report.h;
+      const double *const f = &w.report.frame[size_t(9) * i];
+      const double *const l = &w.report.impulse[size_t(3) * i];
+      const double scale = (turned ? -1 : 1) / w.report.h;
       const Vec3 one = scale * (l[0] * load3(f) + l[1] * load3(f + 3) + l[2] * load3(f + 6));
-      sum += one, turn += cross(load3(w.report.contacts[i].point) - about, one);
+      sum += one;
+      turn += cross(load3(w.report.contacts[i].point) - about, one);
     }
     if (force) store3(force, sum);
     if (moment) store3(moment, turn);
   });
 }
 
-dfm_status dfm_world_pair_impulses_sized(dfm_world world, uint32_t row_size, uint32_t capacity, dfm_pair_impulse *out,
-                                         uint32_t *n) {
+dfm_status dfm_world_pair_impulses_sized(dfm_world world, uint32_t row_size, uint32_t capacity,
+                                         dfm_pair_impulse *out, uint32_t *n) {
   return guard([&] {
     Rows<dfm_pair_impulse> rows(out, row_size, "dfm_pair_impulse");
     const World &w = world_of(world);
@@ -268,16 +314,21 @@ dfm_status dfm_world_pair_impulses_sized(dfm_world world, uint32_t row_size, uin
     if (!room(static_cast<uint32_t>(pairs.size()), capacity, out, n)) return;
     for (const StepImpulses::Pair &p : pairs) {
       dfm_pair_impulse r{};
-      r.a = w.handle_of(p.a), r.b = w.handle_of(p.b);
-      store3(r.impulse, p.impulse), store3(r.point, (1 / p.normal) * p.place);
-      r.normal_impulse = p.normal, r.peak_normal = p.peak_normal, r.peak_force = p.peak_force, r.touching = p.touching;
+      r.a = w.handle_of(p.a);
+      r.b = w.handle_of(p.b);
+      store3(r.impulse, p.impulse);
+      store3(r.point, (1 / p.normal) * p.place);
+      r.normal_impulse = p.normal;
+      r.peak_normal = p.peak_normal;
+      r.peak_force = p.peak_force;
+      r.touching = p.touching;
       rows.add(r);
     }
   });
 }
 
-dfm_status dfm_world_events_sized(dfm_world world, uint32_t row_size, uint32_t capacity, dfm_contact_event *out,
-                                  uint32_t *n) {
+dfm_status dfm_world_events_sized(dfm_world world, uint32_t row_size, uint32_t capacity,
+                                  dfm_contact_event *out, uint32_t *n) {
   return guard([&] {
     Rows<dfm_contact_event> rows(out, row_size, "dfm_contact_event");
     World &w = idle(world_of(world));
@@ -290,7 +341,8 @@ dfm_status dfm_world_events_sized(dfm_world world, uint32_t row_size, uint32_t c
 dfm_status dfm_world_hold_begin(dfm_world world) {
   return guard([&] {
     World &w = idle(world_of(world));
-    w.holding = true, w.hold_start = w.time;
+    w.holding = true;
+    w.hold_start = w.time;
     std::fill(w.store.held.begin(), w.store.held.end(), uint8_t(0));
     std::fill(w.store.path.begin(), w.store.path.end(), 0.0);
     hold_sleepers(w);

@@ -26,8 +26,11 @@ dfm_status dfm_debug_write_body(dfm_body body, const char *path) {
     std::vector<double> u = x, energy;
     for (size_t i = 0; i < u.size(); ++i) u[i] -= b.p.rest[i];
     VtuGrid grid;
-    grid.npoint = b.p.n, grid.ncell = static_cast<uint32_t>(b.tets.size() / 4), grid.corners = 4;
-    grid.points = x.data(), grid.cells = b.tets.data();
+    grid.npoint = b.p.n;
+    grid.ncell = static_cast<uint32_t>(b.tets.size() / 4);
+    grid.corners = 4;
+    grid.points = x.data();
+    grid.cells = b.tets.data();
     grid.point_data = {{"u", 3, u.data(), nullptr}, {"v", 3, v.data(), nullptr}};
     if (b.model.ops->extension && b.model.ops->extension(b.model.self, DFM_EXT_CELL_ENERGY)) {
       energy.resize(grid.ncell);
@@ -46,15 +49,21 @@ dfm_status dfm_debug_write_surface(dfm_body body, const char *path) {
     std::vector<double> x(size_t(3) * n), v(size_t(3) * n), u(size_t(3) * n), force(size_t(3) * n);
     const double h = b.impulse_time();
     for (uint32_t s = 0; s < n; ++s) {
-      store3(&x[size_t(3) * s], surfel_vector(b, b.p.x, s)), store3(&v[size_t(3) * s], surfel_vector(b, b.p.v, s));
-      const Vec3 rest = load3(b.surface.identity() ? &b.p.rest[size_t(3) * b.surface.point[s]] : &b.surface.rest[size_t(3) * s]);
+      store3(&x[size_t(3) * s], surfel_vector(b, b.p.x, s));
+      store3(&v[size_t(3) * s], surfel_vector(b, b.p.v, s));
+      const Vec3 rest = load3(b.surface.identity() ? &b.p.rest[size_t(3) * b.surface.point[s]]
+                                                   : &b.surface.rest[size_t(3) * s]);
       store3(&u[size_t(3) * s], load3(&x[size_t(3) * s]) - rest);
       if (h > 0) store3(&force[size_t(3) * s], (1 / h) * load3(&b.surfel_impulse[size_t(3) * s]));
     }
     VtuGrid grid;
-    grid.npoint = n, grid.ncell = b.surface.ntri, grid.corners = 3;
-    grid.points = x.data(), grid.cells = b.surface.tri.data();
-    grid.point_data = {{"u", 3, u.data(), nullptr}, {"v", 3, v.data(), nullptr}, {"force", 3, force.data(), nullptr}};
+    grid.npoint = n;
+    grid.ncell = b.surface.ntri;
+    grid.corners = 3;
+    grid.points = x.data();
+    grid.cells = b.surface.tri.data();
+    grid.point_data = {
+        {"u", 3, u.data(), nullptr}, {"v", 3, v.data(), nullptr}, {"force", 3, force.data(), nullptr}};
     write_vtu(path, grid);
   });
 }
@@ -65,10 +74,12 @@ dfm_status dfm_debug_draw(dfm_world world, uint32_t what, dfm_draw_line_fn line,
     if (!line) fail(DFM_E_ARG, "argument 'line' is NULL");
     double longest = 0;
     for (uint32_t i = 0; i < w.report.n; ++i) longest = std::max(longest, w.report.impulse[size_t(3) * i]);
-    const double scale = longest > 0 ? 1000 * w.offset / longest * 5 : 0;   // the strongest contact is drawn about five edges long
+    // the strongest contact is drawn about five edges long
+    const double scale = longest > 0 ? 1000 * w.offset / longest * 5 : 0;
     auto draw = [&](Vec3 a, Vec3 b, uint32_t rgb) {
       double p[3], q[3];
-      store3(p, a), store3(q, b);
+      store3(p, a);
+      store3(q, b);
       line(user, p, q, rgb);
     };
     for (uint32_t i = 0; i < w.report.n; ++i) {
@@ -76,21 +87,26 @@ dfm_status dfm_debug_draw(dfm_world world, uint32_t what, dfm_draw_line_fn line,
       const Vec3 at = load3(w.report.contacts[i].point);
       const double *const f = &w.report.frame[size_t(9) * i], *const l = &w.report.impulse[size_t(3) * i];
       if (what & DFM_DRAW_CONTACTS) draw(at, at + 1000 * w.offset * load3(f), 0x30a0ff);
-      if (what & DFM_DRAW_FORCES) draw(at, at + scale * (l[0] * load3(f) + l[1] * load3(f + 3) + l[2] * load3(f + 6)), 0xff5030);
+      if (what & DFM_DRAW_FORCES)
+        draw(at, at + scale * (l[0] * load3(f) + l[1] * load3(f + 3) + l[2] * load3(f + 6)), 0xff5030);
     }
     if (!(what & DFM_DRAW_BOXES)) return;
     for (auto &b : w.bodies) {
       Vec3 lo = surfel_vector(*b, b->p.x, 0), hi = lo;
       for (uint32_t s = 1; s < b->surface.nsurfel; ++s) {
         const Vec3 x = surfel_vector(*b, b->p.x, s);
-        for (int k = 0; k < 3; ++k) lo[k] = std::min(lo[k], x[k]), hi[k] = std::max(hi[k], x[k]);
+        for (int k = 0; k < 3; ++k) {
+          lo[k] = std::min(lo[k], x[k]);
+          hi[k] = std::max(hi[k], x[k]);
+        }
       }
       for (int corner = 0; corner < 8; ++corner)
         for (int axis = 0; axis < 3; ++axis) {
           if (corner & (1 << axis)) continue;
           Vec3 p, q;
           for (int k = 0; k < 3; ++k) p[k] = corner & (1 << k) ? hi[k] : lo[k];
-          q = p, q[axis] = hi[axis];
+          q = p;
+          q[axis] = hi[axis];
           draw(p, q, 0x808080);
         }
     }

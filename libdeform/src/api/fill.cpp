@@ -9,7 +9,8 @@ dfm_status dfm_tetmesh_fill(dfm_trimesh surface, uint32_t cells, dfm_tetmesh *ou
     need(out, "out");
     const dfm::TriMeshObject &object = dfm::TriMeshObject::of(surface);
     dfm::TetMesh mesh = dfm::fill_surface(object.mesh, cells);
-    for (const std::string &w : mesh.warnings) object.context.logf(DFM_LOG_WARNING, "filling a surface: %s", w.c_str());
+    for (const std::string &w : mesh.warnings)
+      object.context.logf(DFM_LOG_WARNING, "filling a surface: %s", w.c_str());
     *out = dfm::TetMeshObject::keep(object.context, std::move(mesh));
   });
 }

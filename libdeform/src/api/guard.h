@@ -14,8 +14,12 @@ template <class F>
 dfm_status guard(F &&f) noexcept {
   Call call;
   try {
-    if constexpr (std::is_same_v<std::invoke_result_t<F>, dfm_status>) return f();
-    else return f(), DFM_OK;
+    if constexpr (std::is_same_v<std::invoke_result_t<F>, dfm_status>) {
+      return f();
+    } else {
+      f();
+      return DFM_OK;
+    }
   } catch (const Error &e) {
     set_last_error(e.what());
     return e.status;

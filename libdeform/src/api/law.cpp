@@ -22,12 +22,19 @@ struct Prepared {
   const dfm_type &type;
   std::vector<double> params;
   void *data = nullptr;
-  Prepared(const dfm_host &h, const dfm_type &t, const double *values) : host(h), type(t), params(values, values + packed_width(t)) {
-    const dfm_status status = call_plugin(host, type, "prepare", [&] { return law_of(type).prepare(&host, params.data(), &data); });
-    if (status != DFM_OK) fail(status < 0 ? status : DFM_E_FATAL, "law %s could not prepare its tables (%s)", type.id, dfm_status_name(status));
+  Prepared(const dfm_host &h, const dfm_type &t, const double *values)
+      : host(h), type(t), params(values, values + packed_width(t)) {
+    const dfm_status status =
+        call_plugin(host, type, "prepare", [&] { return law_of(type).prepare(&host, params.data(), &data); });
+    if (status != DFM_OK)
+      fail(status < 0 ? status : DFM_E_FATAL, "law %s could not prepare its tables (%s)", type.id,
+           dfm_status_name(status));
   }
   ~Prepared() {
-    call_plugin(host, type, "release", [&] { return law_of(type).release(&host, data), DFM_OK; });
+    call_plugin(host, type, "release", [&] {
+      law_of(type).release(&host, data);
+      return DFM_OK;
+    });
   }
   Prepared(const Prepared &) = delete;
   Prepared &operator=(const Prepared &) = delete;
@@ -38,7 +45,8 @@ struct Law {
   const dfm_type &type;
   uint64_t handle = 0;
   std::mutex mutex;
-  std::shared_ptr<const Prepared> prepared;  // of the last parameters: a rig or plot calls with the same ones again and again
+  // of the last parameters: a rig or plot calls with the same ones again and again
+  std::shared_ptr<const Prepared> prepared;
 
   std::shared_ptr<const Prepared> prepare(const double *params) {
     const std::lock_guard lock(mutex);
@@ -56,7 +64,9 @@ void destroy(uint64_t handle) {
 
 Law &law_at(dfm_law handle) {
   Law &law = resolve<Law>(Kind::law, handle);
-  Call::now().hold(&law), Call::now().hold(&law.context), Call::now().count(law.context.calls);
+  Call::now().hold(&law);
+  Call::now().hold(&law.context);
+  Call::now().count(law.context.calls);
   return law;
 }
 
@@ -71,54 +81,89 @@ const dfm_type &type_from_file(dfm_context &context, const char *path) {
   std::vector<const dfm_type *> laws;
   std::vector<std::string> ids;
   for (const dfm_type *type : context.loader.types_of(path))
-    if (type->kind == DFM_KIND_FRICTION) laws.push_back(type), ids.push_back(type->id);
+    if (type->kind == DFM_KIND_FRICTION) {
+      laws.push_back(type);
+      ids.push_back(type->id);
+    }
   if (laws.empty()) fail(DFM_E_UNSUPPORTED, "%s holds no friction law", path);
-  if (laws.size() > 1) fail(DFM_E_ARG, "%s holds several laws, open one by its id: %s", path, join(ids).c_str());
+  if (laws.size() > 1)
+    fail(DFM_E_ARG, "%s holds several laws, open one by its id: %s", path, join(ids).c_str());
   return *laws[0];
 }
 
-// ---- evaluation ------------------------------------------------------------------------------------------------------------------
+// ---- evaluation -------------------------------------------------------------------------------------------
 
 void check_input(const Law &law, const dfm_friction_in &in) {
   const dfm_friction &ops = law_of(law.type);
   const char *id = law.type.id;
   if (in.stride < in.n) fail(DFM_E_ARG, "dfm_law_eval (%s): stride %u is below n %u", id, in.stride, in.n);
-  if (!(in.dt >= 0) || !std::isfinite(in.dt)) fail(DFM_E_ARG, "dfm_law_eval (%s): dt is %g, a time in s expected", id, in.dt);
-  if (law.type.nparam && !in.params) fail(DFM_E_ARG, "dfm_law_eval (%s): params is NULL; fill them with dfm_law_pack", id);
-  const struct { const double *given; bool needed; const char *name; } columns[] = {
-      {in.fn, bool(ops.needs & DFM_NEED_FN), "fn"},       {in.vt, bool(ops.needs & DFM_NEED_VT), "vt"},
-      {in.ft_stop, bool(ops.needs & DFM_NEED_FT_STOP), "ft_stop"}, {in.area, bool(ops.needs & DFM_NEED_AREA), "area"},
-      {in.dwell, bool(ops.needs & DFM_NEED_DWELL), "dwell"},       {in.state, ops.nslot != 0, "state"}};
+  if (!(in.dt >= 0) || !std::isfinite(in.dt))
+    fail(DFM_E_ARG, "dfm_law_eval (%s): dt is %g, a time in s expected", id, in.dt);
+  if (law.type.nparam && !in.params)
+    fail(DFM_E_ARG, "dfm_law_eval (%s): params is NULL; fill them with dfm_law_pack", id);
+  const struct {
+    const double *given;
+    bool needed;
+    const char *name;
+  } columns[] = {{in.fn, bool(ops.needs & DFM_NEED_FN), "fn"},
+                 {in.vt, bool(ops.needs & DFM_NEED_VT), "vt"},
+                 {in.ft_stop, bool(ops.needs & DFM_NEED_FT_STOP), "ft_stop"},
+                 {in.area, bool(ops.needs & DFM_NEED_AREA), "area"},
+                 {in.dwell, bool(ops.needs & DFM_NEED_DWELL), "dwell"},
+                 {in.state, ops.nslot != 0, "state"}};
   for (const auto &column : columns)
-    if (column.needed && !column.given) fail(DFM_E_ARG, "dfm_law_eval (%s): the law needs %s, which is NULL", id, column.name);
+    if (column.needed && !column.given)
+      fail(DFM_E_ARG, "dfm_law_eval (%s): the law needs %s, which is NULL", id, column.name);
 }
 
-// A plugin may rely on 64-byte columns and a stride of whole vectors; a caller with plain arrays need not provide them.
+// A plugin may rely on 64-byte columns and a stride of whole vectors; a caller with plain arrays need
+// not provide them.
 class Aligned {
  public:
   Aligned(dfm_context &context, const dfm_friction_in &in, const dfm_friction_out &out, uint32_t nstate)
-      : arena_(context.scratch.arena()), in_(in), out_(out), given_(out), nstate_(nstate), stride_((in.n + 7) & ~7u) {
+      : arena_(context.scratch.arena()),
+        in_(in),
+        out_(out),
+        given_(out),
+        nstate_(nstate),
+        stride_((in.n + 7) & ~7u) {
     bool aligned = in.stride % 8 == 0;
-    for (const void *p : {static_cast<const void *>(in.fn), static_cast<const void *>(in.vt), static_cast<const void *>(in.ft_stop),
-                          static_cast<const void *>(in.area), static_cast<const void *>(in.dwell), static_cast<const void *>(in.state),
-                          static_cast<const void *>(out.ft), static_cast<const void *>(out.state), static_cast<const void *>(out.dft_dvt),
-                          static_cast<const void *>(out.dft_dfn), static_cast<const void *>(out.limit), static_cast<const void *>(out.mode),
+    for (const void *p : {static_cast<const void *>(in.fn), static_cast<const void *>(in.vt),
+                          static_cast<const void *>(in.ft_stop), static_cast<const void *>(in.area),
+                          static_cast<const void *>(in.dwell), static_cast<const void *>(in.state),
+                          static_cast<const void *>(out.ft), static_cast<const void *>(out.state),
+                          static_cast<const void *>(out.dft_dvt), static_cast<const void *>(out.dft_dfn),
+                          static_cast<const void *>(out.limit), static_cast<const void *>(out.mode),
                           static_cast<const void *>(out.stored)})
       aligned &= reinterpret_cast<uintptr_t>(p) % 64 == 0;
     if (aligned) return;
     copied_ = true;
     from_ = in.stride;
     in_.stride = stride_;
-    copy_in(in_.fn, 1), copy_in(in_.vt, 2), copy_in(in_.ft_stop, 2), copy_in(in_.area, 1), copy_in(in_.dwell, 1), copy_in(in_.state, nstate);
-    make(out_.ft, 2), make(out_.state, nstate), make(out_.dft_dvt, 4), make(out_.dft_dfn, 2), make(out_.limit, 1), make(out_.mode, 1);
+    copy_in(in_.fn, 1);
+    copy_in(in_.vt, 2);
+    copy_in(in_.ft_stop, 2);
+    copy_in(in_.area, 1);
+    copy_in(in_.dwell, 1);
+    copy_in(in_.state, nstate);
+    make(out_.ft, 2);
+    make(out_.state, nstate);
+    make(out_.dft_dvt, 4);
+    make(out_.dft_dfn, 2);
+    make(out_.limit, 1);
+    make(out_.mode, 1);
     make(out_.stored, 1);
   }
   const dfm_friction_in *in() const { return &in_; }
   dfm_friction_out *out() { return &out_; }
   void finish() const {
     if (!copied_) return;
-    copy_out(given_.ft, out_.ft, 2), copy_out(given_.state, out_.state, nstate_), copy_out(given_.dft_dvt, out_.dft_dvt, 4);
-    copy_out(given_.dft_dfn, out_.dft_dfn, 2), copy_out(given_.limit, out_.limit, 1), copy_out(given_.mode, out_.mode, 1);
+    copy_out(given_.ft, out_.ft, 2);
+    copy_out(given_.state, out_.state, nstate_);
+    copy_out(given_.dft_dvt, out_.dft_dvt, 4);
+    copy_out(given_.dft_dfn, out_.dft_dfn, 2);
+    copy_out(given_.limit, out_.limit, 1);
+    copy_out(given_.mode, out_.mode, 1);
     copy_out(given_.stored, out_.stored, 1);
   }
 
@@ -132,7 +177,8 @@ class Aligned {
   void copy_in(const double *&column, uint32_t width) const {
     if (!column) return;
     double *to = static_cast<double *>(take(sizeof(double) * stride_ * width));
-    for (uint32_t c = 0; c < width; ++c) std::copy_n(column + size_t(c) * from_, in_.n, to + size_t(c) * stride_);
+    for (uint32_t c = 0; c < width; ++c)
+      std::copy_n(column + size_t(c) * from_, in_.n, to + size_t(c) * stride_);
     column = to;
   }
   template <class T>
@@ -141,7 +187,8 @@ class Aligned {
   }
   template <class T>
   void copy_out(T *to, const T *column, uint32_t width) const {
-    for (uint32_t c = 0; to && c < width; ++c) std::copy_n(column + size_t(c) * stride_, in_.n, to + size_t(c) * from_);
+    for (uint32_t c = 0; to && c < width; ++c)
+      std::copy_n(column + size_t(c) * stride_, in_.n, to + size_t(c) * from_);
   }
 
   ScratchArena *arena_;
@@ -162,13 +209,16 @@ bool finite(const dfm_friction_in &in, const dfm_friction_out &out, uint32_t nst
   bool limits = true;
   for (uint32_t i = 0; out.limit && i < in.n; ++i) limits &= out.limit[i] >= 0;  // +inf: no limit
   return limits && finite(out.ft, 2, in.stride, in.n) && finite(out.state, nstate, in.stride, in.n) &&
-         finite(out.dft_dvt, 4, in.stride, in.n) && finite(out.dft_dfn, 2, in.stride, in.n) && finite(out.stored, 1, in.stride, in.n);
+         finite(out.dft_dvt, 4, in.stride, in.n) && finite(out.dft_dfn, 2, in.stride, in.n) &&
+         finite(out.stored, 1, in.stride, in.n);
 }
 
 template <class T>
 T full(const T *given, uint32_t head, const char *name) {
   if (!given) fail(DFM_E_ARG, "dfm_law_eval: %s is NULL", name);
-  if (given->size < head) fail(DFM_E_ARG, "dfm_law_eval: %s.size is %u, at least %u expected; set it to sizeof", name, given->size, head);
+  if (given->size < head)
+    fail(DFM_E_ARG, "dfm_law_eval: %s.size is %u, at least %u expected; set it to sizeof", name, given->size,
+         head);
   T copy{};
   std::memcpy(&copy, given, std::min<size_t>(given->size, sizeof copy));
   copy.size = sizeof copy;
@@ -186,11 +236,13 @@ dfm_status evaluate(Law &law, const dfm_friction_in *given_in, dfm_friction_out 
   const PluginCall scratch(law.context.scratch);
   const uint32_t nstate = state_width(law, in.params);
   Aligned batch(law.context, in, out, nstate);
-  const dfm_status status = call_plugin(law.context.host, law.type, "eval", [&] { return ops.eval(batch.in(), batch.out()); });
+  const dfm_status status =
+      call_plugin(law.context.host, law.type, "eval", [&] { return ops.eval(batch.in(), batch.out()); });
   if (status < 0) fail(status, "law %s failed with %s", law.type.id, dfm_status_name(status));
   batch.finish();
   if (status == DFM_OK && !finite(*batch.in(), *batch.out(), nstate)) {
-    law.context.logf(DFM_LOG_WARNING, "%s: eval wrote a value that is not finite; the batch is discarded", law.type.id);
+    law.context.logf(DFM_LOG_WARNING, "%s: eval wrote a value that is not finite; the batch is discarded",
+                     law.type.id);
     return DFM_DISCARD;
   }
   return status;
@@ -203,11 +255,14 @@ using namespace dfm;
 
 dfm_status dfm_law_open(dfm_context *context, const char *id_or_path, dfm_law *out) {
   return guard([&] {
-    if (!context || !id_or_path || !*id_or_path || !out) fail(DFM_E_ARG, "dfm_law_open: context, name and out are needed");
+    if (!context || !id_or_path || !*id_or_path || !out)
+      fail(DFM_E_ARG, "dfm_law_open: context, name and out are needed");
     const std::string name = id_or_path;
-    const bool path = name.find('/') != std::string::npos || (name.size() > 3 && name.compare(name.size() - 3, 3, ".so") == 0);
+    const bool path = name.find('/') != std::string::npos ||
+                      (name.size() > 3 && name.compare(name.size() - 3, 3, ".so") == 0);
     used(*context);
-    const dfm_type &type = path ? type_from_file(*context, id_or_path) : context->registry.find(DFM_KIND_FRICTION, name);
+    const dfm_type &type =
+        path ? type_from_file(*context, id_or_path) : context->registry.find(DFM_KIND_FRICTION, name);
     std::unique_ptr<Law> law(new Law{*context, type, 0, {}, nullptr});
     law->handle = handle_create(Kind::law, law.get());
     try {
@@ -240,16 +295,18 @@ dfm_status dfm_law_eval(dfm_law law, const dfm_friction_in *in, dfm_friction_out
   return guard([&] { return evaluate(law_at(law), in, out); });
 }
 
-dfm_status dfm_law_pack(dfm_law law, const dfm_params *params, uint32_t capacity, double *values, uint32_t *n) {
+dfm_status dfm_law_pack(dfm_law law, const dfm_params *params, uint32_t capacity, double *values,
+                        uint32_t *n) {
   return guard([&] {
     if (params && params->n && !params->values) fail(DFM_E_ARG, "dfm_law_pack: params.values is NULL");
     const Law &l = law_at(law);
-    const std::vector<double> packed =
-        pack_params(l.type, params ? std::span(params->values, params->n) : std::span<const dfm_param_value>());
+    const std::vector<double> packed = pack_params(
+        l.type, params ? std::span(params->values, params->n) : std::span<const dfm_param_value>());
     if (n) *n = static_cast<uint32_t>(packed.size());
     if (!values && capacity == 0) return;
     if (!values || capacity < packed.size())
-      fail(DFM_E_ARG, "dfm_law_pack: %s has %zu values, room for %u is given", l.type.id, packed.size(), values ? capacity : 0);
+      fail(DFM_E_ARG, "dfm_law_pack: %s has %zu values, room for %u is given", l.type.id, packed.size(),
+           values ? capacity : 0);
     std::copy(packed.begin(), packed.end(), values);
   });
 }

@@ -1,5 +1,5 @@
-// The lists that are inline in the headers, as symbols of the library: for callers that look functions up by name without a C compiler and so
-// have no sizeof. Rows are those of 0.1 and stay so.
+// The lists that are inline in the headers, as symbols of the library: for callers that look functions up by
+// name without a C compiler and so have no sizeof. Rows are those of 0.1 and stay so.
 //
 // In this file the headers' inline functions have other names.
 #define dfm_world_contacts contacts_inline
@@ -18,9 +18,9 @@
 #undef dfm_world_profile
 
 // bytes: of a row in 0.1.
-#define DFM_LIST_SYMBOL(name, row, bytes)                                                              \
-  extern "C" DFM_API dfm_status name(dfm_world world, uint32_t capacity, row *out, uint32_t *n) {     \
-    return name##_sized(world, bytes, capacity, out, n);                                               \
+#define DFM_LIST_SYMBOL(name, row, bytes)                                                         \
+  extern "C" DFM_API dfm_status name(dfm_world world, uint32_t capacity, row *out, uint32_t *n) { \
+    return name##_sized(world, bytes, capacity, out, n);                                          \
   }
 DFM_LIST_SYMBOL(dfm_world_contacts, dfm_contact, 192)
 DFM_LIST_SYMBOL(dfm_world_pairs, dfm_pair_report, 128)

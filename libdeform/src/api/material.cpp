@@ -12,7 +12,9 @@ using namespace dfm;
 dfm_material_def dfm_material_def_default(void) {
   dfm_material_def d{};
   d.size = sizeof d;
-  d.density = 1000, d.young = 1e5, d.poisson = 0.3;
+  d.density = 1000;
+  d.young = 1e5;
+  d.poisson = 0.3;
   return d;
 }
 
@@ -26,24 +28,38 @@ dfm_status dfm_material_create(dfm_world world, const dfm_material_def *def, dfm
     m->name = m->def.name ? m->def.name : "";
     const char *const name = m->name.c_str();
     auto positive = [&](double v, const char *key, const char *unit) {
-      if (!(v > 0 && std::isfinite(v))) fail(DFM_E_ARG, "material '%s': %s is %g %s; it must be positive and finite", name, key, v, unit);
+      if (!(v > 0 && std::isfinite(v)))
+        fail(DFM_E_ARG, "material '%s': %s is %g %s; it must be positive and finite", name, key, v, unit);
     };
-    positive(m->def.density, "density", "kg/m3"), positive(m->def.young, "young", "Pa");
-    if (!(m->def.poisson > -1 && m->def.poisson < 0.5)) fail(DFM_E_ARG, "material '%s': poisson is %g; it must lie in (-1, 0.5)", name, m->def.poisson);
-    if (!(m->def.damping_mass >= 0 && std::isfinite(m->def.damping_mass) && m->def.damping_stiffness >= 0 && std::isfinite(m->def.damping_stiffness)))
-      fail(DFM_E_ARG, "material '%s': damping_mass is %g 1/s and damping_stiffness %g s; both must be zero or positive, and finite", name,
-           m->def.damping_mass, m->def.damping_stiffness);
+    positive(m->def.density, "density", "kg/m3");
+    positive(m->def.young, "young", "Pa");
+    if (!(m->def.poisson > -1 && m->def.poisson < 0.5))
+      fail(DFM_E_ARG, "material '%s': poisson is %g; it must lie in (-1, 0.5)", name, m->def.poisson);
+    if (!(m->def.damping_mass >= 0 && std::isfinite(m->def.damping_mass) && m->def.damping_stiffness >= 0 &&
+          std::isfinite(m->def.damping_stiffness)))
+      fail(DFM_E_ARG,
+           "material '%s': damping_mass is %g 1/s and damping_stiffness %g s; both must be zero or positive, "
+           "and finite",
+           name, m->def.damping_mass, m->def.damping_stiffness);
     if (!m->name.empty())
       for (auto &other : w.materials)
-        if (other->name == m->name) fail(DFM_E_ARG, "material '%s': the name is taken in this world; names are unique", name);
+        if (other->name == m->name)
+          fail(DFM_E_ARG, "material '%s': the name is taken in this world; names are unique", name);
     for (uint32_t i = 0; m->def.extra.values && i < m->def.extra.n; ++i) {
       const dfm_param_value &v = m->def.extra.values[i];
-      if (!v.key || !v.value) fail(DFM_E_ARG, "material '%s': extra entry %u has no %s", name, i, v.key ? "value" : "key");
-      if (!std::strcmp(v.key, kFrictionKey) && !(v.width == 1 && v.value[0] >= 0 && std::isfinite(v.value[0])))
-        fail(DFM_E_ARG, "material '%s': friction is %g of %u values; it must be one coefficient, zero or positive, and finite", name, v.width ? v.value[0] : 0.0, v.width);
-      m->extra_keys.push_back(v.key), m->extra_values.emplace_back(v.value, v.value + v.width);
+      if (!v.key || !v.value)
+        fail(DFM_E_ARG, "material '%s': extra entry %u has no %s", name, i, v.key ? "value" : "key");
+      if (!std::strcmp(v.key, kFrictionKey) &&
+          !(v.width == 1 && v.value[0] >= 0 && std::isfinite(v.value[0])))
+        fail(DFM_E_ARG,
+             "material '%s': friction is %g of %u values; it must be one coefficient, zero or positive, and "
+             "finite",
+             name, v.width ? v.value[0] : 0.0, v.width);
+      m->extra_keys.push_back(v.key);
+      m->extra_values.emplace_back(v.value, v.value + v.width);
     }
-    m->def.extra = {}, m->def.name = nullptr;
+    m->def.extra = {};
+    m->def.name = nullptr;
     w.materials.reserve(w.materials.size() + 1);
     m->handle = handle_create(Kind::material, m.get());
     *out = m->handle;

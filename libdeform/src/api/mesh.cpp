@@ -13,7 +13,10 @@ using Object = dfm::TetMeshObject;
 
 dfm_status dfm_tetmesh_read(dfm_context *context, const char *path, dfm_tetmesh *out) {
   return guard([&] {
-    need(context, "context"), dfm::used(*context), need(path, "path"), need(out, "out");
+    need(context, "context");
+    dfm::used(*context);
+    need(path, "path");
+    need(out, "out");
     dfm::TetMesh mesh = dfm::read_tet_mesh(context->memory, path);
     for (const std::string &w : mesh.warnings) context->logf(DFM_LOG_WARNING, "%s: %s", path, w.c_str());
     *out = Object::keep(*context, std::move(mesh));
@@ -22,31 +25,47 @@ dfm_status dfm_tetmesh_read(dfm_context *context, const char *path, dfm_tetmesh 
 
 dfm_status dfm_mesh_file_kind(dfm_context *context, const char *path, uint32_t *kind) {
   return guard([&] {
-    need(context, "context"), dfm::used(*context), need(path, "path"), need(kind, "kind");
+    need(context, "context");
+    dfm::used(*context);
+    need(path, "path");
+    need(kind, "kind");
     *kind = dfm::has_cells(path, dfm::read_raw(context->memory, path)) ? DFM_MESH_TETS : DFM_MESH_SURFACE;
   });
 }
 
 dfm_status dfm_mesh_read(dfm_context *context, const char *path, dfm_tetmesh *cells, dfm_trimesh *surface) {
   return guard([&] {
-    need(context, "context"), dfm::used(*context), need(path, "path"), need(cells, "cells"), need(surface, "surface");
+    need(context, "context");
+    dfm::used(*context);
+    need(path, "path");
+    need(cells, "cells");
+    need(surface, "surface");
     dfm::AnyMesh mesh = dfm::read_any_mesh(context->memory, path);
-    for (const std::string &w : mesh.cells ? mesh.cells->warnings : mesh.surface->warnings) context->logf(DFM_LOG_WARNING, "%s: %s", path, w.c_str());
+    for (const std::string &w : mesh.cells ? mesh.cells->warnings : mesh.surface->warnings)
+      context->logf(DFM_LOG_WARNING, "%s: %s", path, w.c_str());
     const dfm_tetmesh c = mesh.cells ? Object::keep(*context, std::move(*mesh.cells)) : 0;
     *surface = mesh.surface ? dfm::TriMeshObject::keep(*context, std::move(*mesh.surface)) : 0;
     *cells = c;
   });
 }
 
-dfm_status dfm_tetmesh_make(dfm_context *context, const char *kind, const double size[3], uint32_t cells, dfm_tetmesh *out) {
+dfm_status dfm_tetmesh_make(dfm_context *context, const char *kind, const double size[3], uint32_t cells,
+                            dfm_tetmesh *out) {
   return guard([&] {
-    need(context, "context"), dfm::used(*context), need(kind, "kind"), need(size, "size"), need(out, "out");
+    need(context, "context");
+    dfm::used(*context);
+    need(kind, "kind");
+    need(size, "size");
+    need(out, "out");
     const std::string name = kind;
     const dfm::Memory &memory = context->memory;
-    if (name == "cylinder") *out = Object::keep(*context, dfm::make_cylinder(memory, size[0], size[1], cells));
-    else if (name == "beam") *out = Object::keep(*context, dfm::make_beam(memory, size[0], size[1], size[2], cells));
+    if (name == "cylinder")
+      *out = Object::keep(*context, dfm::make_cylinder(memory, size[0], size[1], cells));
+    else if (name == "beam")
+      *out = Object::keep(*context, dfm::make_beam(memory, size[0], size[1], size[2], cells));
     else if (name == "ball") *out = Object::keep(*context, dfm::make_ball(memory, size[0], cells));
-    else if (name == "tube") *out = Object::keep(*context, dfm::make_tube(memory, size[0], size[1], size[2], cells));
+    else if (name == "tube")
+      *out = Object::keep(*context, dfm::make_tube(memory, size[0], size[1], size[2], cells));
     else fail(DFM_E_ARG, "no generator is called '%s'; expected cylinder, beam, ball or tube", kind);
   });
 }
@@ -61,20 +80,35 @@ dfm_status dfm_tetmesh_get_info(dfm_tetmesh mesh, dfm_tetmesh_info *out) {
     const dfm::TetMesh &m = object.mesh;
     const dfm::MeshStatistics &s = object.statistics;
     dfm_tetmesh_info info{};
-    info.npoint = s.npoint, info.ntet = s.ntet, info.ntriangle = s.ntriangle, info.nedge = s.nedge, info.npiece = s.npiece;
-    info.turned = m.turned, info.dropped_points = m.dropped_points, info.dropped_cells = m.dropped_cells;
-    info.flat_cells = s.flat_cells, info.duplicate_points = s.duplicate_points, info.nonmanifold_edges = s.nonmanifold_edges;
-    info.overlapping_faces = m.overlapping, info.ngroup = static_cast<uint32_t>(m.groups.size());
-    info.volume = s.volume, info.edge_min = s.edge_min, info.edge_median = s.edge_median, info.edge_max = s.edge_max;
-    info.quality_min = s.quality_min, info.quality_mean = s.quality_mean;
+    info.npoint = s.npoint;
+    info.ntet = s.ntet;
+    info.ntriangle = s.ntriangle;
+    info.nedge = s.nedge;
+    info.npiece = s.npiece;
+    info.turned = m.turned;
+    info.dropped_points = m.dropped_points;
+    info.dropped_cells = m.dropped_cells;
+    info.flat_cells = s.flat_cells;
+    info.duplicate_points = s.duplicate_points;
+    info.nonmanifold_edges = s.nonmanifold_edges;
+    info.overlapping_faces = m.overlapping;
+    info.ngroup = static_cast<uint32_t>(m.groups.size());
+    info.volume = s.volume;
+    info.edge_min = s.edge_min;
+    info.edge_median = s.edge_median;
+    info.edge_max = s.edge_max;
+    info.quality_min = s.quality_min;
+    info.quality_mean = s.quality_mean;
     std::copy_n(s.histogram, 10, info.quality_histogram);
-    std::copy_n(s.lo, 3, info.lo), std::copy_n(s.hi, 3, info.hi);
+    std::copy_n(s.lo, 3, info.lo);
+    std::copy_n(s.hi, 3, info.hi);
     info.warnings = object.warnings.c_str();
     dfm::give(out, info);
   });
 }
 
-dfm_status dfm_tetmesh_data(dfm_tetmesh mesh, const double **points, const uint32_t **tets, const uint32_t **file_point) {
+dfm_status dfm_tetmesh_data(dfm_tetmesh mesh, const double **points, const uint32_t **tets,
+                            const uint32_t **file_point) {
   return guard([&] {
     const dfm::TetMesh &m = Object::of(mesh).mesh;
     if (points) *points = m.points.data();
@@ -99,7 +133,8 @@ dfm_status dfm_tetmesh_groups(dfm_tetmesh mesh, const char *const **names, const
   });
 }
 
-dfm_status dfm_tetmesh_triangles(dfm_tetmesh mesh, const uint32_t **triangles, const uint32_t **group, uint32_t *n) {
+dfm_status dfm_tetmesh_triangles(dfm_tetmesh mesh, const uint32_t **triangles, const uint32_t **group,
+                                 uint32_t *n) {
   return guard([&] {
     const dfm::TetMesh &m = Object::of(mesh).mesh;
     if (triangles) *triangles = m.tris.data();
@@ -108,10 +143,12 @@ dfm_status dfm_tetmesh_triangles(dfm_tetmesh mesh, const uint32_t **triangles, c
   });
 }
 
-dfm_status dfm_tetmesh_group_points(dfm_tetmesh mesh, uint32_t group, uint32_t *dimension, const uint32_t **points, uint32_t *n) {
+dfm_status dfm_tetmesh_group_points(dfm_tetmesh mesh, uint32_t group, uint32_t *dimension,
+                                    const uint32_t **points, uint32_t *n) {
   return guard([&] {
     const dfm::TetMesh &m = Object::of(mesh).mesh;
-    if (group >= m.groups.size()) fail(DFM_E_ARG, "there is no group %u; the mesh has %zu", group, m.groups.size());
+    if (group >= m.groups.size())
+      fail(DFM_E_ARG, "there is no group %u; the mesh has %zu", group, m.groups.size());
     const dfm::MeshGroup &g = m.groups[group];
     if (dimension) *dimension = static_cast<uint32_t>(g.dimension);
     if (points) *points = g.points.data();

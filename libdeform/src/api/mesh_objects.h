@@ -28,7 +28,9 @@ struct MeshObject {
 
   static MeshObject &of(uint64_t handle) {
     MeshObject &object = resolve<MeshObject>(kKind, handle);
-    Call::now().hold(&object), Call::now().hold(&object.context), Call::now().count(object.context.calls);
+    Call::now().hold(&object);
+    Call::now().hold(&object.context);
+    Call::now().count(object.context.calls);
     return object;
   }
 

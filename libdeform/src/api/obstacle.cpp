@@ -14,8 +14,11 @@ using namespace dfm;
 dfm_obstacle_def dfm_obstacle_def_default(void) {
   dfm_obstacle_def d{};
   d.size = sizeof d;
-  d.half_size[0] = d.half_size[1] = d.half_size[2] = 0.5, d.radius = 0.5, d.half_length = 0.5;
-  d.category = 1, d.collides_with = ~0u;
+  d.half_size[0] = d.half_size[1] = d.half_size[2] = 0.5;
+  d.radius = 0.5;
+  d.half_length = 0.5;
+  d.category = 1;
+  d.collides_with = ~0u;
   return d;
 }
 
@@ -31,7 +34,9 @@ dfm_status dfm_obstacle_destroy(dfm_obstacle obstacle) {
   return guard([&] {
     Obstacle &o = obstacle_of(obstacle);
     idle(*o.world);
-    if (o.rigid && !o.added) fail(DFM_E_STATE, "'%s' is a rigid body; dfm_rigid_destroy removes it, with the set it came with", o.name.c_str());
+    if (o.rigid && !o.added)
+      fail(DFM_E_STATE, "'%s' is a rigid body; dfm_rigid_destroy removes it, with the set it came with",
+           o.name.c_str());
     destroy_obstacle(o);
   });
 }
@@ -42,7 +47,10 @@ dfm_status dfm_obstacle_get_pose(dfm_obstacle obstacle, dfm_pose *out) {
     need(out, "out");
     store3(out->position, o.pose.position);
     const Quat q = o.pose.rotation;
-    out->rotation[0] = q.x, out->rotation[1] = q.y, out->rotation[2] = q.z, out->rotation[3] = q.w;
+    out->rotation[0] = q.x;
+    out->rotation[1] = q.y;
+    out->rotation[2] = q.z;
+    out->rotation[3] = q.w;
   });
 }
 
@@ -57,7 +65,9 @@ Obstacle &movable(dfm_obstacle obstacle, const dfm_pose *pose) {
   Obstacle &o = obstacle_of(obstacle);
   idle(*o.world);
   need(pose, "pose");
-  if (o.rigid) fail(DFM_E_STATE, "'%s' is a rigid body and moves by itself; dfm_rigid_set_state puts it somewhere", o.name.c_str());
+  if (o.rigid)
+    fail(DFM_E_STATE, "'%s' is a rigid body and moves by itself; dfm_rigid_set_state puts it somewhere",
+         o.name.c_str());
   for (int i = 0; i < 4; ++i)
     if (!std::isfinite(pose->rotation[i]) || (i < 3 && !std::isfinite(pose->position[i])))
       fail(DFM_E_ARG, "obstacle '%s': the target pose is not finite", o.name.c_str());
@@ -73,7 +83,8 @@ dfm_status dfm_obstacle_move_to(dfm_obstacle obstacle, const dfm_pose *pose) {
     need_ability(*o.world, Ability::obstacle_motion, "obstacle", o.name);
     o.keys.clear();
     o.def.sine = {};
-    o.target = to_pose(*pose), o.has_target = true;
+    o.target = to_pose(*pose);
+    o.has_target = true;
   });
 }
 
@@ -82,10 +93,11 @@ dfm_status dfm_obstacle_teleport(dfm_obstacle obstacle, const dfm_pose *pose) {
     Obstacle &o = movable(obstacle, pose);
     World &w = *o.world;
     w.overlaps.place(o.id);
-    wake_all(w);   // it may have been put where someone sleeps, or taken from under someone
+    wake_all(w);  // it may have been put where someone sleeps, or taken from under someone
     o.keys.clear();
     o.def.sine = {};
-    o.pose = to_pose(*pose), o.has_target = false;
+    o.pose = to_pose(*pose);
+    o.has_target = false;
     ++w.placements;
   });
 }

@@ -18,25 +18,33 @@ Obstacle &rigid_of(dfm_rigid h) {
 
 dfm_status dfm_rigid_host_register(const char *name, const dfm_rigid_host *table) {
   return guard([&] {
-    need(name, "name"), need(table, "table");
+    need(name, "name");
+    need(table, "table");
     register_host(name, take_def(table, dfm_rigid_host{}));
   });
 }
 
 dfm_rigid_def dfm_rigid_def_default(void) {
   dfm_rigid_def d{};
-  d.size = sizeof d, d.shape = 1;   // DFM_SHAPE_SPHERE
-  d.half_size[0] = d.half_size[1] = d.half_size[2] = 0.5, d.radius = 0.5, d.half_length = 0.5, d.mass = 1;
-  d.category = 1, d.collides_with = ~0u;
+  d.size = sizeof d;
+  d.shape = 1;  // DFM_SHAPE_SPHERE
+  d.half_size[0] = d.half_size[1] = d.half_size[2] = 0.5;
+  d.radius = 0.5;
+  d.half_length = 0.5;
+  d.mass = 1;
+  d.category = 1;
+  d.collides_with = ~0u;
   return d;
 }
 
 dfm_status dfm_rigid_create(dfm_world world, const char *host, const dfm_rigid_set_def *set, dfm_rigid *out) {
   return guard([&] {
     World &w = idle(world_of(world));
-    need(set, "set"), need(out, "out");
+    need(set, "set");
+    need(out, "out");
     dfm_rigid_set_def def = take_def(set, dfm_rigid_set_def{});
-    const auto bodies = take_defs(def.bodies, def.nbody, dfm_rigid_def_default(), "rigid body", "start from dfm_rigid_def_default()");
+    const auto bodies = take_defs(def.bodies, def.nbody, dfm_rigid_def_default(), "rigid body",
+                                  "start from dfm_rigid_def_default()");
     const auto joints = take_defs(def.joints, def.njoint, dfm_joint_def{}, "joint", "set it to sizeof");
     if (def.bodies) def.bodies = bodies.data();
     if (def.joints) def.joints = joints.data();
@@ -56,7 +64,8 @@ dfm_status dfm_rigid_add_shape(dfm_rigid rigid, const dfm_obstacle_def *def, dfm
   return guard([&] {
     Obstacle &o = rigid_of(rigid);
     idle(*o.world);
-    need(def, "def"), need(out, "out");
+    need(def, "def");
+    need(out, "out");
     *out = add_rigid_shape(o, take_def(def, dfm_obstacle_def_default())).handle;
   });
 }
@@ -75,7 +84,8 @@ dfm_status dfm_world_rigids(dfm_world world, uint32_t capacity, dfm_rigid *out, 
 dfm_status dfm_world_find_rigid(dfm_world world, const char *name, dfm_rigid *out) {
   return guard([&] {
     World &w = world_of(world);
-    need(name, "name"), need(out, "out");
+    need(name, "name");
+    need(out, "out");
     std::vector<std::string> names;
     for (auto &o : w.obstacles) {
       if (!o->rigid || o->added) continue;
@@ -86,7 +96,8 @@ dfm_status dfm_world_find_rigid(dfm_world world, const char *name, dfm_rigid *ou
       names.push_back(o->name);
     }
     const std::string near = nearest(name, names);
-    fail(DFM_E_ARG, "there is no rigid body '%s'%s", name, near.empty() ? "" : ("; did you mean '" + near + "'?").c_str());
+    fail(DFM_E_ARG, "there is no rigid body '%s'%s", name,
+         near.empty() ? "" : ("; did you mean '" + near + "'?").c_str());
   });
 }
 
@@ -113,7 +124,7 @@ dfm_status dfm_rigid_set_state(dfm_rigid rigid, const dfm_rigid_state *state) {
     set_rigid_state(o, *state);
     for (auto &shape : w.obstacles)
       if (shape->rigid == o.rigid && shape->rigid_body == o.rigid_body) w.overlaps.place(shape->id);
-    wake_all(w);   // it may have been put where someone sleeps
+    wake_all(w);  // it may have been put where someone sleeps
   });
 }
 
@@ -127,9 +138,13 @@ dfm_status dfm_rigid_get_measure(dfm_rigid rigid, dfm_body_measure *out) {
 dfm_status dfm_rigid_contact_wrench(dfm_rigid rigid, double force[3], double moment[3]) {
   return guard([&] {
     const Obstacle &o = rigid_of(rigid);
-    need(force, "force"), need(moment, "moment");
+    need(force, "force");
+    need(moment, "moment");
     const double h = o.rigid->last_h, *const p = &o.rigid->impulse[6 * size_t{o.rigid_body}];
-    for (int k = 0; k < 3; ++k) force[k] = h > 0 ? p[k] / h : 0, moment[k] = h > 0 ? p[3 + k] / h : 0;
+    for (int k = 0; k < 3; ++k) {
+      force[k] = h > 0 ? p[k] / h : 0;
+      moment[k] = h > 0 ? p[3 + k] / h : 0;
+    }
   });
 }
 

@@ -13,14 +13,17 @@ using dfm::scene::Scene;
 
 Scene &scene_of(dfm_scene handle) {
   Scene &scene = dfm::resolve<Scene>(dfm::Kind::scene, handle);
-  dfm::Call::now().hold(&scene), dfm::Call::now().hold(scene.context()), dfm::Call::now().count(scene.context()->calls);
+  dfm::Call::now().hold(&scene);
+  dfm::Call::now().hold(scene.context());
+  dfm::Call::now().count(scene.context()->calls);
   return scene;
 }
 
 void close_scene(dfm_scene handle) {
   Scene *scene = &scene_of(handle);
   dfm::Call::now().need_alone(scene, "scene");
-  if (const auto *world = static_cast<dfm::World *>(dfm::handle_find(dfm::Kind::world, scene->world()))) {   // it goes with the scene
+  // it goes with the scene
+  if (const auto *world = static_cast<dfm::World *>(dfm::handle_find(dfm::Kind::world, scene->world()))) {
     dfm::Call::now().need_alone(world, "scene's world");
     if (world->busy) dfm::Call::refuse("scene's world");
   }
@@ -31,7 +34,8 @@ void close_scene(dfm_scene handle) {
 
 void check_call(const dfm_context *context, const char *path, const void *out) {
   if (!context) dfm::fail(DFM_E_ARG, "dfm_scene: context is NULL; create one with dfm_context_create");
-  if (!path || !*path) dfm::fail(DFM_E_ARG, "dfm_scene: path is %s; expected a scene file", path ? "empty" : "NULL");
+  if (!path || !*path)
+    dfm::fail(DFM_E_ARG, "dfm_scene: path is %s; expected a scene file", path ? "empty" : "NULL");
   if (!out) dfm::fail(DFM_E_ARG, "dfm_scene: out is NULL");
 }
 
@@ -45,12 +49,14 @@ dfm_status dfm_scene_load(dfm_context *context, const char *path, dfm_world *out
   });
 }
 
-dfm_status dfm_scene_open(dfm_context *context, const char *path, const dfm_scene_options *options, dfm_scene *out) {
+dfm_status dfm_scene_open(dfm_context *context, const char *path, const dfm_scene_options *options,
+                          dfm_scene *out) {
   return dfm::guard([&] {
     check_call(context, path, out);
     dfm::used(*context);
     if (options && options->size < sizeof(dfm_scene_options))
-      dfm::fail(DFM_E_ARG, "dfm_scene_open: options->size is %u, expected %zu", options->size, sizeof(dfm_scene_options));
+      dfm::fail(DFM_E_ARG, "dfm_scene_open: options->size is %u, expected %zu", options->size,
+                sizeof(dfm_scene_options));
     auto scene = std::make_unique<Scene>(context, path, options);
     const uint64_t handle = dfm::handle_create(dfm::Kind::scene, scene.get());
     try {
@@ -77,12 +83,15 @@ dfm_status dfm_scene_world(dfm_scene scene, dfm_world *out) {
 
 dfm_status dfm_scene_value(dfm_scene scene, const char *pointer, char *text, size_t *bytes) {
   return dfm::guard([&] {
-    if (!pointer || !bytes) dfm::fail(DFM_E_ARG, "dfm_scene_value: %s is NULL", pointer ? "bytes" : "pointer");
+    if (!pointer || !bytes)
+      dfm::fail(DFM_E_ARG, "dfm_scene_value: %s is NULL", pointer ? "bytes" : "pointer");
     const std::string value = scene_of(scene).value(pointer);
     const size_t capacity = *bytes;
     *bytes = value.size() + 1;
     if (!text) return;
-    if (capacity < value.size() + 1) dfm::fail(DFM_E_ARG, "dfm_scene_value: the text needs %zu bytes, %zu given", value.size() + 1, capacity);
+    if (capacity < value.size() + 1)
+      dfm::fail(DFM_E_ARG, "dfm_scene_value: the text needs %zu bytes, %zu given", value.size() + 1,
+                capacity);
     std::memcpy(text, value.c_str(), value.size() + 1);
   });
 }
@@ -90,14 +99,21 @@ dfm_status dfm_scene_value(dfm_scene scene, const char *pointer, char *text, siz
 dfm_status dfm_scene_get_settings(dfm_scene scene, dfm_scene_settings *out) {
   return dfm::guard([&] {
     if (!out || out->size < sizeof(dfm_scene_settings))
-      dfm::fail(DFM_E_ARG, "dfm_scene_get_settings: out is NULL or its size is not set to sizeof(dfm_scene_settings)");
+      dfm::fail(DFM_E_ARG,
+                "dfm_scene_get_settings: out is NULL or its size is not set to sizeof(dfm_scene_settings)");
     const Scene &s = scene_of(scene);
     const dfm::scene::Definition &d = s.definition();
     dfm_scene_settings r = {};
     r.size = sizeof r;
     r.nprobe = uint32_t(s.probe_count());
-    r.duration = d.duration, r.step = d.step, r.every = d.every;
-    r.frames = d.frames, r.states = d.states, r.nodes = d.nodes, r.contacts = d.contacts, r.check = d.check;
+    r.duration = d.duration;
+    r.step = d.step;
+    r.every = d.every;
+    r.frames = d.frames;
+    r.states = d.states;
+    r.nodes = d.nodes;
+    r.contacts = d.contacts;
+    r.check = d.check;
     r.color = d.color.c_str();
     std::memcpy(r.eye, d.eye, sizeof r.eye);
     std::memcpy(r.look_at, d.look_at, sizeof r.look_at);
@@ -106,10 +122,13 @@ dfm_status dfm_scene_get_settings(dfm_scene scene, dfm_scene_settings *out) {
   });
 }
 
-dfm_status dfm_scene_probe(dfm_scene scene, uint32_t probe, const char **name, double position[3], double velocity[3]) {
+dfm_status dfm_scene_probe(dfm_scene scene, uint32_t probe, const char **name, double position[3],
+                           double velocity[3]) {
   return dfm::guard([&] {
     Scene &s = scene_of(scene);
-    if (probe >= s.probe_count()) dfm::fail(DFM_E_ARG, "dfm_scene_probe: there is no probe %u, the scene has %zu", probe, s.probe_count());
+    if (probe >= s.probe_count())
+      dfm::fail(DFM_E_ARG, "dfm_scene_probe: there is no probe %u, the scene has %zu", probe,
+                s.probe_count());
     double x[3], v[3];
     s.probe_state(probe, x, v);
     if (name) *name = s.probe(probe).name.c_str();

@@ -54,18 +54,25 @@ dfm_status dfm_surface_triangles(dfm_body body, uint32_t capacity, uint32_t *tri
 dfm_status dfm_surface_points(dfm_body body, uint32_t capacity, uint32_t *point, uint32_t *n) {
   return guard([&] {
     const Body &b = body_of(body);
-    if (!b.surface.identity()) fail(DFM_E_UNSUPPORTED, "body '%s': its surfels hang on several points each; there is no one point per surfel", b.name.c_str());
-    if (room(b.surface.nsurfel, capacity, point, n)) std::copy(b.surface.point.begin(), b.surface.point.begin() + b.surface.nsurfel, point);
+    if (!b.surface.identity())
+      fail(DFM_E_UNSUPPORTED,
+           "body '%s': its surfels hang on several points each; there is no one point per surfel",
+           b.name.c_str());
+    if (room(b.surface.nsurfel, capacity, point, n))
+      std::copy(b.surface.point.begin(), b.surface.point.begin() + b.surface.nsurfel, point);
   });
 }
 
-dfm_status dfm_world_ray(dfm_world world, const double origin[3], const double direction[3], double max_distance, dfm_ray_hit *hit) {
+dfm_status dfm_world_ray(dfm_world world, const double origin[3], const double direction[3],
+                         double max_distance, dfm_ray_hit *hit) {
   return guard([&] {
     World &w = world_of(world);
-    need(origin, "origin"), need(direction, "direction");
+    need(origin, "origin");
+    need(direction, "direction");
     const Vec3 d = normalized(load3(direction));
     if (!(norm2(d) > 0.5) || !(norm2(load3(origin)) < INFINITY) || !(max_distance > 0))
-      fail(DFM_E_ARG, "a ray needs a finite origin, a direction that is not zero and a positive max_distance");
+      fail(DFM_E_ARG,
+           "a ray needs a finite origin, a direction that is not zero and a positive max_distance");
     give(hit, cast_ray(w, load3(origin), d, max_distance));
   });
 }

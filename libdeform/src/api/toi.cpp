@@ -16,15 +16,22 @@ dfm_toi_options checked(const char *function, const dfm_toi_options *given) {
   o.method = DFM_TOI_CONSERVATIVE;
   if (!given) return o;
   const uint32_t least = offsetof(dfm_toi_options, tolerance);
-  if (given->size < least) fail(DFM_E_ARG, "%s: options.size is %u, at least %u expected; set it to sizeof", function, given->size, least);
+  if (given->size < least)
+    fail(DFM_E_ARG, "%s: options.size is %u, at least %u expected; set it to sizeof", function, given->size,
+         least);
   std::memcpy(&o, given, std::min<size_t>(given->size, sizeof o));
   if (o.method < DFM_TOI_BISECTION || o.method > DFM_TOI_CONSERVATIVE)
-    fail(DFM_E_ARG, "%s: options.method is %d, expected DFM_TOI_BISECTION (0) to DFM_TOI_CONSERVATIVE (3)", function, o.method);
+    fail(DFM_E_ARG, "%s: options.method is %d, expected DFM_TOI_BISECTION (0) to DFM_TOI_CONSERVATIVE (3)",
+         function, o.method);
   if (!(o.tolerance >= 0 && o.tolerance < 1))
-    fail(DFM_E_ARG, "%s: options.tolerance is %g, expected at least 0 (0: 1e-12) and below 1", function, o.tolerance);
+    fail(DFM_E_ARG, "%s: options.tolerance is %g, expected at least 0 (0: 1e-12) and below 1", function,
+         o.tolerance);
   if (!(o.min_separation >= 0 && std::isfinite(o.min_separation)))
-    fail(DFM_E_ARG, "%s: options.min_separation is %g m, expected a finite distance of at least 0", function, o.min_separation);
-  if (o.max_iterations < 0) fail(DFM_E_ARG, "%s: options.max_iterations is %d, expected at least 0 (0: the default)", function, o.max_iterations);
+    fail(DFM_E_ARG, "%s: options.min_separation is %g m, expected a finite distance of at least 0", function,
+         o.min_separation);
+  if (o.max_iterations < 0)
+    fail(DFM_E_ARG, "%s: options.max_iterations is %d, expected at least 0 (0: the default)", function,
+         o.max_iterations);
   return o;
 }
 
@@ -34,7 +41,8 @@ void check(const char *function, const char *name, const dfm_motion *motion, int
     for (int i = 0; i < 3; ++i)
       for (const double *end : {motion[k].p0, motion[k].p1})
         if (!std::isfinite(end[i]))
-          fail(DFM_E_ARG, "%s: %s[%d].%s[%d] is %g, expected a finite coordinate", function, name, k, end == motion[k].p0 ? "p0" : "p1", i, end[i]);
+          fail(DFM_E_ARG, "%s: %s[%d].%s[%d] is %g, expected a finite coordinate", function, name, k,
+               end == motion[k].p0 ? "p0" : "p1", i, end[i]);
 }
 
 void give(const ToiHit &hit, double *t, double *at, int n) {
@@ -48,7 +56,8 @@ void give(const ToiHit &hit, double *t, double *at, int n) {
 
 using namespace dfm;
 
-dfm_status dfm_toi_point_triangle(const dfm_motion *p, const dfm_motion tri[3], const dfm_toi_options *options, double *t, double bary[3]) {
+dfm_status dfm_toi_point_triangle(const dfm_motion *p, const dfm_motion tri[3],
+                                  const dfm_toi_options *options, double *t, double bary[3]) {
   return guard([&] {
     const char *const name = "dfm_toi_point_triangle";
     const dfm_toi_options o = checked(name, options);
@@ -59,7 +68,8 @@ dfm_status dfm_toi_point_triangle(const dfm_motion *p, const dfm_motion tri[3], 
   });
 }
 
-dfm_status dfm_toi_edge_edge(const dfm_motion a[2], const dfm_motion b[2], const dfm_toi_options *options, double *t, double ab[2]) {
+dfm_status dfm_toi_edge_edge(const dfm_motion a[2], const dfm_motion b[2], const dfm_toi_options *options,
+                             double *t, double ab[2]) {
   return guard([&] {
     const char *const name = "dfm_toi_edge_edge";
     const dfm_toi_options o = checked(name, options);

@@ -20,39 +20,60 @@ void log_warnings(const dfm_context &context, const char *what, const dfm::TriMe
 
 dfm_status dfm_trimesh_read(dfm_context *context, const char *path, dfm_trimesh *out) {
   return guard([&] {
-    need(context, "context"), dfm::used(*context), need(path, "path"), need(out, "out");
+    need(context, "context");
+    dfm::used(*context);
+    need(path, "path");
+    need(out, "out");
     dfm::TriMesh mesh = dfm::read_tri_mesh(context->memory, path);
     log_warnings(*context, path, mesh);
     *out = Object::keep(*context, std::move(mesh));
   });
 }
 
-dfm_status dfm_trimesh_create(dfm_context *context, uint32_t npoint, const double *points, uint32_t ntriangle, const uint32_t *triangles,
-                              dfm_trimesh *out) {
+dfm_status dfm_trimesh_create(dfm_context *context, uint32_t npoint, const double *points, uint32_t ntriangle,
+                              const uint32_t *triangles, dfm_trimesh *out) {
   return guard([&] {
-    need(context, "context"), dfm::used(*context), need(points, "points"), need(triangles, "triangles"), need(out, "out");
+    need(context, "context");
+    dfm::used(*context);
+    need(points, "points");
+    need(triangles, "triangles");
+    need(out, "out");
     for (size_t i = 0; i < 3 * size_t(ntriangle); ++i)
       if (triangles[i] >= npoint)
-        fail(DFM_E_ARG, "triangle %zu (counted from 0) uses point %u, there are %u; numbers count from 0", i / 3, triangles[i], npoint);
+        fail(DFM_E_ARG, "triangle %zu (counted from 0) uses point %u, there are %u; numbers count from 0",
+             i / 3, triangles[i], npoint);
     dfm::RawMesh raw(context->memory);
-    raw.points.assign(points, points + 3 * size_t(npoint)), raw.tris.assign(triangles, triangles + 3 * size_t(ntriangle));
+    raw.points.assign(points, points + 3 * size_t(npoint));
+    raw.tris.assign(triangles, triangles + 3 * size_t(ntriangle));
     dfm::TriMesh mesh = dfm::finish_surface("dfm_trimesh_create", std::move(raw));
     log_warnings(*context, "dfm_trimesh_create", mesh);
     *out = Object::keep(*context, std::move(mesh));
   });
 }
 
-dfm_status dfm_trimesh_make(dfm_context *context, const char *kind, const double size[3], uint32_t triangles, dfm_trimesh *out) {
+dfm_status dfm_trimesh_make(dfm_context *context, const char *kind, const double size[3], uint32_t triangles,
+                            dfm_trimesh *out) {
   return guard([&] {
-    need(context, "context"), dfm::used(*context), need(kind, "kind"), need(size, "size"), need(out, "out");
+    need(context, "context");
+    dfm::used(*context);
+    need(kind, "kind");
+    need(size, "size");
+    need(out, "out");
     const std::string name = kind;
     const dfm::Memory &memory = context->memory;
-    if (name == "cylinder") *out = Object::keep(*context, dfm::make_cylinder_surface(memory, size[0], size[1], triangles));
-    else if (name == "beam") *out = Object::keep(*context, dfm::make_beam_surface(memory, size[0], size[1], size[2], triangles));
-    else if (name == "ball") *out = Object::keep(*context, dfm::make_ball_surface(memory, size[0], triangles));
-    else if (name == "tube") *out = Object::keep(*context, dfm::make_tube_surface(memory, size[0], size[1], size[2], triangles));
-    else if (name == "torus") *out = Object::keep(*context, dfm::make_torus_surface(memory, size[0], size[1], triangles));
-    else fail(DFM_E_ARG, "no surface generator is called '%s'; expected cylinder, beam, ball, tube or torus", kind);
+    if (name == "cylinder")
+      *out = Object::keep(*context, dfm::make_cylinder_surface(memory, size[0], size[1], triangles));
+    else if (name == "beam")
+      *out = Object::keep(*context, dfm::make_beam_surface(memory, size[0], size[1], size[2], triangles));
+    else if (name == "ball")
+      *out = Object::keep(*context, dfm::make_ball_surface(memory, size[0], triangles));
+    else if (name == "tube")
+      *out = Object::keep(*context, dfm::make_tube_surface(memory, size[0], size[1], size[2], triangles));
+    else if (name == "torus")
+      *out = Object::keep(*context, dfm::make_torus_surface(memory, size[0], size[1], triangles));
+    else
+      fail(DFM_E_ARG, "no surface generator is called '%s'; expected cylinder, beam, ball, tube or torus",
+           kind);
   });
 }
 
@@ -66,21 +87,36 @@ dfm_status dfm_trimesh_get_info(dfm_trimesh mesh, dfm_trimesh_info *out) {
     const dfm::TriMesh &m = object.mesh;
     const dfm::TriMeshStatistics &s = object.statistics;
     dfm_trimesh_info info{};
-    info.npoint = s.npoint, info.ntriangle = s.ntri, info.nedge = s.nedge, info.npiece = s.npiece;
+    info.npoint = s.npoint;
+    info.ntriangle = s.ntri;
+    info.nedge = s.nedge;
+    info.npiece = s.npiece;
     info.ngroup = static_cast<uint32_t>(m.groups.size());
-    info.merged_points = m.merged_points, info.dropped_points = m.dropped_points, info.dropped_triangles = m.dropped_tris;
-    info.turned = m.turned, info.open_edges = s.open_edges, info.holes = s.holes, info.nonmanifold_edges = s.nonmanifold_edges;
-    info.closed = s.closed, info.area = s.area, info.volume = s.volume;
-    info.edge_min = s.edge_min, info.edge_median = s.edge_median, info.edge_max = s.edge_max;
-    info.quality_min = s.quality_min, info.quality_mean = s.quality_mean;
+    info.merged_points = m.merged_points;
+    info.dropped_points = m.dropped_points;
+    info.dropped_triangles = m.dropped_tris;
+    info.turned = m.turned;
+    info.open_edges = s.open_edges;
+    info.holes = s.holes;
+    info.nonmanifold_edges = s.nonmanifold_edges;
+    info.closed = s.closed;
+    info.area = s.area;
+    info.volume = s.volume;
+    info.edge_min = s.edge_min;
+    info.edge_median = s.edge_median;
+    info.edge_max = s.edge_max;
+    info.quality_min = s.quality_min;
+    info.quality_mean = s.quality_mean;
     std::copy_n(s.histogram, 10, info.quality_histogram);
-    std::copy_n(s.lo, 3, info.lo), std::copy_n(s.hi, 3, info.hi);
+    std::copy_n(s.lo, 3, info.lo);
+    std::copy_n(s.hi, 3, info.hi);
     info.warnings = object.warnings.c_str();
     dfm::give(out, info);
   });
 }
 
-dfm_status dfm_trimesh_data(dfm_trimesh mesh, const double **points, const uint32_t **triangles, const uint32_t **file_point) {
+dfm_status dfm_trimesh_data(dfm_trimesh mesh, const double **points, const uint32_t **triangles,
+                            const uint32_t **file_point) {
   return guard([&] {
     const dfm::TriMesh &m = Object::of(mesh).mesh;
     if (points) *points = m.points.data();

@@ -27,7 +27,8 @@ void destroy_world(uint64_t handle) {
 }
 
 void check_max_time(double seconds) {
-  if (!(seconds >= 0)) fail(DFM_E_ARG, "max_time is %g s; give the machine's time that a step may take, or 0 for any", seconds);
+  if (!(seconds >= 0))
+    fail(DFM_E_ARG, "max_time is %g s; give the machine's time that a step may take, or 0 for any", seconds);
 }
 
 // A text or buffer that the caller sizes first.
@@ -36,7 +37,8 @@ void give_bytes(const void *data, size_t size, void *to, size_t *bytes) {
   const size_t room = *bytes;
   *bytes = size;
   if (!to) return;
-  if (room < size) fail(DFM_E_ARG, "the buffer has %zu bytes, %zu are needed; call with NULL to learn the size", room, size);
+  if (room < size)
+    fail(DFM_E_ARG, "the buffer has %zu bytes, %zu are needed; call with NULL to learn the size", room, size);
   std::memcpy(to, data, size);
 }
 
@@ -56,7 +58,9 @@ const ContactMethod &method_of(int32_t number) {
     case DFM_METHOD_ROLLBACK: return rollback::method();
   }
   fail(DFM_E_UNSUPPORTED,
-       "contact method %d is not available; use DFM_METHOD_AUTO, DFM_METHOD_VELOCITY or (to compare) DFM_METHOD_ROLLBACK", number);
+       "contact method %d is not available; use DFM_METHOD_AUTO, DFM_METHOD_VELOCITY or (to compare) "
+       "DFM_METHOD_ROLLBACK",
+       number);
 }
 
 }  // namespace
@@ -65,41 +69,61 @@ dfm_world_def dfm_world_def_default(void) {
   dfm_world_def d{};
   d.size = sizeof d;
   d.gravity[2] = -9.81;
-  d.max_sweeps = 50, d.max_passes = 20, d.max_substeps = 10000;
-  d.sleep_speed = 0.01, d.sleep_time = 0.5;
+  d.max_sweeps = 50;
+  d.max_passes = 20;
+  d.max_substeps = 10000;
+  d.sleep_speed = 0.01;
+  d.sleep_time = 0.5;
   d.energy_watch = 0.01;
   return d;
 }
 
 dfm_status dfm_world_create(dfm_context *context, const dfm_world_def *def, dfm_world *out) {
   return guard([&] {
-    need(context, "context"), need(out, "out");
+    need(context, "context");
+    need(out, "out");
     auto w = std::make_unique<World>(&used(*context));
     w->def = take_def(def, dfm_world_def_default());
     for (double g : w->def.gravity)
       if (!std::isfinite(g)) fail(DFM_E_ARG, "gravity is not finite; give m/s2");
-    if (!(w->def.contact_offset >= 0 && std::isfinite(w->def.contact_offset)) || !(w->def.contact_tolerance >= 0 && std::isfinite(w->def.contact_tolerance)))
-      fail(DFM_E_ARG, "contact_offset (m) and contact_tolerance (m/s) must be zero (automatic) or positive, and finite; found %g and %g",
+    if (!(w->def.contact_offset >= 0 && std::isfinite(w->def.contact_offset)) ||
+        !(w->def.contact_tolerance >= 0 && std::isfinite(w->def.contact_tolerance)))
+      fail(DFM_E_ARG,
+           "contact_offset (m) and contact_tolerance (m/s) must be zero (automatic) or positive, and finite; "
+           "found %g and %g",
            w->def.contact_offset, w->def.contact_tolerance);
     for (const double speed : {w->def.recovery_speed, w->def.obstacle_speed})
-      if (!(speed >= 0 && std::isfinite(speed))) fail(DFM_E_ARG, "recovery_speed and obstacle_speed must be zero (the default) or positive, and finite; found %g m/s", speed);
+      if (!(speed >= 0 && std::isfinite(speed)))
+        fail(DFM_E_ARG,
+             "recovery_speed and obstacle_speed must be zero (the default) or positive, and finite; found %g "
+             "m/s",
+             speed);
     if (w->def.flags & ~uint32_t{DFM_WORLD_UNGUARDED | DFM_WORLD_UNTANGLE})
-      fail(DFM_E_ARG, "flags 0x%x: known are DFM_WORLD_UNGUARDED (1) and DFM_WORLD_UNTANGLE (2)", w->def.flags);
+      fail(DFM_E_ARG, "flags 0x%x: known are DFM_WORLD_UNGUARDED (1) and DFM_WORLD_UNTANGLE (2)",
+           w->def.flags);
     if (w->def.max_sweeps == 0 || w->def.max_passes == 0 || w->def.max_substeps == 0)
       fail(DFM_E_ARG, "max_sweeps, max_passes and max_substeps must be at least 1");
     check_max_time(w->def.max_time);
     if (!(w->def.energy_watch >= 0 && std::isfinite(w->def.energy_watch)))
-      fail(DFM_E_ARG, "energy_watch is %g; it must be a finite share of the largest energy such as 0.01, or 0 (off)", w->def.energy_watch);
+      fail(DFM_E_ARG,
+           "energy_watch is %g; it must be a finite share of the largest energy such as 0.01, or 0 (off)",
+           w->def.energy_watch);
     if (w->def.sleep > 1) fail(DFM_E_ARG, "sleep is %u; it must be 0 (off) or 1 (on)", w->def.sleep);
     if (w->def.self_contact > DFM_SELF_AUTO)
-      fail(DFM_E_ARG, "self_contact is %u; it must be DFM_SELF_OFF (0), DFM_SELF_ON (1) or DFM_SELF_AUTO (2)", w->def.self_contact);
+      fail(DFM_E_ARG, "self_contact is %u; it must be DFM_SELF_OFF (0), DFM_SELF_ON (1) or DFM_SELF_AUTO (2)",
+           w->def.self_contact);
     for (const double value : {w->def.sleep_speed, w->def.sleep_time})
       if (!(value > 0 && std::isfinite(value)))
-        fail(DFM_E_ARG, "sleep_speed (m/s) and sleep_time (s) must be positive and finite; the defaults are 0.01 and 0.5, found %g", value);
+        fail(DFM_E_ARG,
+             "sleep_speed (m/s) and sleep_time (s) must be positive and finite; the defaults are 0.01 and "
+             "0.5, found %g",
+             value);
     use_method(*w, method_of(w->def.method));
     if (w->def.sleep) need_ability(*w, Ability::sleep);
     if (w->def.integrator != DFM_INTEGRATOR_AUTO && w->def.integrator != DFM_INTEGRATOR_SYMPLECTIC_EULER)
-      fail(DFM_E_UNSUPPORTED, "integrator %d is not available; use DFM_INTEGRATOR_AUTO or DFM_INTEGRATOR_SYMPLECTIC_EULER", w->def.integrator);
+      fail(DFM_E_UNSUPPORTED,
+           "integrator %d is not available; use DFM_INTEGRATOR_AUTO or DFM_INTEGRATOR_SYMPLECTIC_EULER",
+           w->def.integrator);
     for (const char *const *e = w->def.effects; e && *e; ++e) w->asked_effects.push_back(*e);
     prepare(*w);
     w->changed = true;
@@ -164,7 +188,8 @@ dfm_status dfm_world_step(dfm_world world, double dt, uint32_t *trouble) {
   return guard([&]() -> dfm_status {
     World &w = idle(world_of(world));
     if (!(dt > 0 && std::isfinite(dt))) fail(DFM_E_ARG, "a step of %g s; it must be positive and finite", dt);
-    if (const double floor = shortest_step(w, dt); dt < floor) fail(DFM_E_ARG, "%s", short_step(dt, floor).c_str());
+    if (const double floor = shortest_step(w, dt); dt < floor)
+      fail(DFM_E_ARG, "%s", short_step(dt, floor).c_str());
     uint32_t bits = 0;
     const dfm_status s = step_within_budget(w, dt, &bits);
     if (trouble) *trouble = bits;
@@ -176,13 +201,17 @@ dfm_status dfm_world_set_budget(dfm_world world, double max_time, uint64_t max_w
   return guard([&] {
     World &w = idle(world_of(world));
     check_max_time(max_time);
-    w.def.max_time = max_time, w.def.max_work = max_work;
+    w.def.max_time = max_time;
+    w.def.max_work = max_work;
   });
 }
 
 dfm_status dfm_world_interrupt(dfm_world world) {
-  if (uint8_t(world >> 32) != uint8_t(Kind::world)) return guard([] { fail(DFM_E_HANDLE, "a handle that is no world's cannot be interrupted"); });
-  return request_stop(world) ? DFM_OK : guard([] { fail(DFM_E_NOMEM, "64 other worlds have been asked to stop and have not stepped since"); });
+  if (uint8_t(world >> 32) != uint8_t(Kind::world))
+    return guard([] { fail(DFM_E_HANDLE, "a handle that is no world's cannot be interrupted"); });
+  return request_stop(world) ? DFM_OK : guard([] {
+    fail(DFM_E_NOMEM, "64 other worlds have been asked to stop and have not stepped since");
+  });
 }
 
 dfm_status dfm_world_stable_step(dfm_world world, double *dt, dfm_body *body, uint32_t *point) {
@@ -190,7 +219,8 @@ dfm_status dfm_world_stable_step(dfm_world world, double *dt, dfm_body *body, ui
     World &w = idle(world_of(world));
     need(dt, "dt");
     prepare(w);
-    // The bound that the next step uses: asked anew only when it would ask, so that reading it changes no result.
+    // The bound that the next step uses: asked anew only when it would ask, so that reading it
+    // changes no result.
     if (bound_due(w)) update_bound(w);
     *dt = offered_step(w.sizes, w.stable);
     if (body) *body = w.worst_body ? w.worst_body->handle : 0;
@@ -206,7 +236,8 @@ dfm_status dfm_world_overlaps_sized(dfm_world world, uint32_t row_size, uint32_t
     prepare(w);
     if (!room(static_cast<uint32_t>(w.overlaps.found.size()), capacity, out, n)) return;
     for (const Overlap &o : w.overlaps.found) {
-      const uint32_t aside = o.aside && !o.separated ? DFM_OVERLAP_ASIDE : 0, parted = o.separated ? DFM_OVERLAP_SEPARATED : 0;
+      const uint32_t aside = o.aside && !o.separated ? DFM_OVERLAP_ASIDE : 0;
+      const uint32_t parted = o.separated ? DFM_OVERLAP_SEPARATED : 0;
       const uint32_t flags = (o.obstacle ? uint32_t{DFM_OVERLAP_OBSTACLE} : 0) | aside | parted;
       rows.add({0, flags, w.handle_of(o.a), w.handle_of(o.b), o.crossings, o.enclosed, o.depth});
     }
@@ -231,7 +262,9 @@ dfm_status dfm_world_untangle(dfm_world world, uint32_t *left) {
     w.overlaps.all = w.overlaps.untangle = true;
     prepare(w);
     const auto &found = w.overlaps.found;
-    if (left) *left = static_cast<uint32_t>(std::count_if(found.begin(), found.end(), [](const Overlap &o) { return !o.separated; }));
+    if (left)
+      *left = static_cast<uint32_t>(
+          std::count_if(found.begin(), found.end(), [](const Overlap &o) { return !o.separated; }));
   });
 }
 
@@ -266,13 +299,15 @@ dfm_status dfm_world_restore(dfm_world world, const void *buffer, size_t bytes) 
 dfm_status dfm_world_find_body(dfm_world world, const char *name, dfm_body *out) {
   return guard([&] {
     World &w = world_of(world);
-    need(name, "name"), need(out, "out");
+    need(name, "name");
+    need(out, "out");
     const Body *const b = w.find_body(name);
     if (!b) {
       std::vector<std::string> names;
       for (auto &x : w.bodies) names.push_back(x->name);
       const std::string near = nearest(name, names);
-      fail(DFM_E_ARG, "no body is named '%s'%s; bodies: %s", name, near.empty() ? "" : (", did you mean '" + near + "'?").c_str(), join(names).c_str());
+      fail(DFM_E_ARG, "no body is named '%s'%s; bodies: %s", name,
+           near.empty() ? "" : (", did you mean '" + near + "'?").c_str(), join(names).c_str());
     }
     *out = b->handle;
   });
@@ -298,9 +333,11 @@ dfm_status dfm_world_get_stats(dfm_world world, dfm_world_stats *out) {
   return guard([&] {
     const World &w = world_of(world);
     dfm_world_stats s = w.stats;
-    s.rebuilds = w.steps->broad.stats().rebuilds, s.refits = w.steps->broad.stats().refits;
+    s.rebuilds = w.steps->broad.stats().rebuilds;
+    s.refits = w.steps->broad.stats().refits;
     s.threads = w.context->tasks.threads();
-    s.time = w.time, s.asleep = w.sleepers;
+    s.time = w.time;
+    s.asleep = w.sleepers;
     give(out, s);
   });
 }

@@ -31,14 +31,21 @@ Box triangle_box(const uint32_t *corner, const double *x) {
 }  // namespace
 
 BoxTree::BoxTree(const Memory &memory)
-    : node_(HookAllocator<Node>(memory)), box_(HookAllocator<Box>(memory)), tri_box_(HookAllocator<Box>(memory)),
-      tri_(HookAllocator<uint32_t>(memory)), centroid_(HookAllocator<Centroid>(memory)) {}
+    : node_(HookAllocator<Node>(memory)),
+      box_(HookAllocator<Box>(memory)),
+      tri_box_(HookAllocator<Box>(memory)),
+      tri_(HookAllocator<uint32_t>(memory)),
+      centroid_(HookAllocator<Centroid>(memory)) {}
 
-// All memory first: where one allocation is refused the tree stays what it was, nodes and boxes in step with each other.
+// All memory first: where one allocation is refused the tree stays what it was, nodes and boxes in step
+// with each other.
 void BoxTree::build(const Surface &surface, const double *x) {
   const size_t leaves = (size_t{surface.ntri} + kLeaf - 1) / kLeaf, nodes = leaves ? 2 * leaves - 1 : 0;
-  node_.reserve(nodes), box_.reserve(nodes);
-  tri_.reserve(surface.ntri), tri_box_.reserve(surface.ntri), centroid_.reserve(surface.ntri);
+  node_.reserve(nodes);
+  box_.reserve(nodes);
+  tri_.reserve(surface.ntri);
+  tri_box_.reserve(surface.ntri);
+  centroid_.reserve(surface.ntri);
   node_.clear();
   centroid_.resize(surface.ntri);
   for (uint32_t t = 0; t < surface.ntri; ++t) {
@@ -55,7 +62,8 @@ void BoxTree::build(const Surface &surface, const double *x) {
   area_built_ = area_;
 }
 
-// Splits at the median of the longest axis; ties by triangle number, so that the tree depends on the input alone.
+// Splits at the median of the longest axis; ties by triangle number, so that the tree depends on
+// the input alone.
 uint32_t BoxTree::split(uint32_t begin, uint32_t end) {
   const uint32_t self = uint32_t(node_.size());
   if (end - begin <= kLeaf) {
@@ -75,7 +83,9 @@ uint32_t BoxTree::split(uint32_t begin, uint32_t end) {
   // Full leaves: the left half takes a multiple of the leaf's size.
   const uint32_t leaves = (end - begin + kLeaf - 1) / kLeaf, middle = begin + (leaves + 1) / 2 * kLeaf;
   std::nth_element(centroid_.begin() + begin, centroid_.begin() + middle, centroid_.begin() + end,
-                   [axis](const Centroid &l, const Centroid &r) { return l.x[axis] != r.x[axis] ? l.x[axis] < r.x[axis] : l.tri < r.tri; });
+                   [axis](const Centroid &l, const Centroid &r) {
+                     return l.x[axis] != r.x[axis] ? l.x[axis] < r.x[axis] : l.tri < r.tri;
+                   });
   node_.push_back({0, 0});
   split(begin, middle);
   const uint32_t right = split(middle, end);

@@ -1,5 +1,5 @@
-// Binary tree of boxes over a surface's triangles. Its topology is found once by median splits; later only its boxes are renewed from
-// below, and it is built anew when they have grown too much.
+// Binary tree of boxes over a surface's triangles. Its topology is found once by median splits; later only
+// its boxes are renewed from below, and it is built anew when they have grown too much.
 #pragma once
 #include <cstdint>
 
@@ -13,7 +13,8 @@ struct alignas(64) Box {
   double lo[4], hi[4];  // fourth component 0
 };
 
-// Squared distance of two boxes; 0 where they overlap. Two lanes at a time: this is the inner loop of every descent.
+// Squared distance of two boxes; 0 where they overlap. Two lanes at a time: this is the inner loop of
+// every descent.
 inline double box_distance2(const Box &a, const Box &b) {
   using Two = double __attribute__((vector_size(16)));
   const Two *al = reinterpret_cast<const Two *>(a.lo), *ah = reinterpret_cast<const Two *>(a.hi);
@@ -37,8 +38,9 @@ class BoxTree {
  public:
   static constexpr uint32_t kLeaf = 8;  // triangles in a leaf, at most
   struct Node {
-    uint32_t right;         // inner: the left child is the next node, this is the right one; leaf: first place in triangle()
-    uint32_t count;         // 0: inner
+    // inner: the left child is the next node, this is the right one; leaf: first place in triangle()
+    uint32_t right;
+    uint32_t count;  // 0: inner
   };
   explicit BoxTree(const Memory &memory);
 
@@ -52,11 +54,14 @@ class BoxTree {
   const Box &root() const { return box_[0]; }
   const Array<Node> &nodes() const { return node_; }
   const Array<Box> &boxes() const { return box_; }
-  const Array<uint32_t> &triangles() const { return tri_; }   // in the order of the leaves
+  const Array<uint32_t> &triangles() const { return tri_; }  // in the order of the leaves
   const Array<Box> &triangle_boxes() const { return tri_box_; }
 
  private:
-  struct Centroid { double x[3]; uint32_t tri; };
+  struct Centroid {
+    double x[3];
+    uint32_t tri;
+  };
   uint32_t split(uint32_t begin, uint32_t end);
   Array<Node> node_;
   Array<Box> box_, tri_box_;
@@ -65,8 +70,8 @@ class BoxTree {
   double area_ = 0, area_built_ = 0;
 };
 
-// f(place in a, place in b, squared distance of the boxes) for all triangles whose boxes are no further apart than margin; places count
-// in the order of the leaves. stack is scratch.
+// f(place in a, place in b, squared distance of the boxes) for all triangles whose boxes are no further apart
+// than margin; places count in the order of the leaves. stack is scratch.
 template <class F>
 void near_pairs(const BoxTree &a, const BoxTree &b, double margin, Array<PairOfTriangles> &stack, F &&f) {
   if (a.empty() || b.empty()) return;
@@ -85,10 +90,13 @@ void near_pairs(const BoxTree &a, const BoxTree &b, double margin, Array<PairOfT
       for (uint32_t p = m.right; count && p < m.right + m.count; ++p) {
         if (!(box_distance2(a.triangle_boxes()[p], b.boxes()[j]) <= limit)) continue;
         for (uint32_t k = 0; k < count; ++k)
-          if (const double d2 = box_distance2(a.triangle_boxes()[p], b.triangle_boxes()[near_a[k]]); d2 <= limit) f(p, near_a[k], d2);
+          if (const double d2 = box_distance2(a.triangle_boxes()[p], b.triangle_boxes()[near_a[k]]);
+              d2 <= limit)
+            f(p, near_a[k], d2);
       }
     } else if (n.count || (!m.count && m.right - i >= n.right - j)) {
-      stack.push_back({i + 1, j});       // the left child of a larger node first: its extent in the array stands for its size
+      // the left child of a larger node first: its extent in the array stands for its size
+      stack.push_back({i + 1, j});
       stack.push_back({m.right, j});
     } else {
       stack.push_back({i, j + 1});
@@ -103,7 +111,8 @@ void near_self_pairs(const BoxTree &tree, double margin, Array<PairOfTriangles> 
   if (tree.empty()) return;
   const double limit = margin * margin;
   const auto meet = [&](uint32_t p, uint32_t q) {
-    if (const double d2 = box_distance2(tree.triangle_boxes()[p], tree.triangle_boxes()[q]); d2 <= limit) f(p, q, d2);
+    if (const double d2 = box_distance2(tree.triangle_boxes()[p], tree.triangle_boxes()[q]); d2 <= limit)
+      f(p, q, d2);
   };
   stack.clear();
   stack.push_back({0, 0});
@@ -114,7 +123,11 @@ void near_self_pairs(const BoxTree &tree, double margin, Array<PairOfTriangles> 
     if (i == j) {
       for (uint32_t p = m.right; p < m.right + m.count; ++p)
         for (uint32_t q = p + 1; q < m.right + m.count; ++q) meet(p, q);
-      if (!m.count) stack.push_back({i + 1, i + 1}), stack.push_back({m.right, m.right}), stack.push_back({i + 1, m.right});
+      if (!m.count) {
+        stack.push_back({i + 1, i + 1});
+        stack.push_back({m.right, m.right});
+        stack.push_back({i + 1, m.right});
+      }
       continue;
     }
     if (!(box_distance2(tree.boxes()[i], tree.boxes()[j]) <= limit)) continue;
@@ -123,9 +136,11 @@ void near_self_pairs(const BoxTree &tree, double margin, Array<PairOfTriangles> 
         if (box_distance2(tree.triangle_boxes()[p], tree.boxes()[j]) <= limit)
           for (uint32_t q = n.right; q < n.right + n.count; ++q) meet(p, q);
     } else if (n.count || (!m.count && m.right - i >= n.right - j)) {
-      stack.push_back({i + 1, j}), stack.push_back({m.right, j});
+      stack.push_back({i + 1, j});
+      stack.push_back({m.right, j});
     } else {
-      stack.push_back({i, j + 1}), stack.push_back({i, n.right});
+      stack.push_back({i, j + 1});
+      stack.push_back({i, n.right});
     }
   }
 }

@@ -9,16 +9,19 @@
 namespace dfm {
 namespace {
 
-constexpr double kRounding = 1 + 1e-9;      // margins hold in spite of rounded distances
-constexpr double kSkinLeast = 0.02;         // of the median edge: a resting body keeps its lists
-constexpr double kSkinMost = 0.5;           // beyond half an edge, lists grow faster than they last
-constexpr double kSpeedGrowth = 1.25;       // speeds may rise by so much before the margin of the reach is used up
-constexpr double kQualityLimit = 2;         // boxes that have grown this much in sum are worth a new tree
+constexpr double kRounding = 1 + 1e-9;  // margins hold in spite of rounded distances
+constexpr double kSkinLeast = 0.02;     // of the median edge: a resting body keeps its lists
+constexpr double kSkinMost = 0.5;       // beyond half an edge, lists grow faster than they last
+// speeds may rise by so much before the margin of the reach is used up
+constexpr double kSpeedGrowth = 1.25;
+constexpr double kQualityLimit = 2;  // boxes that have grown this much in sum are worth a new tree
 
-double obstacle_speed(const ObstacleView &o, double extent) { return norm(o.velocity) + norm(o.spin) * extent; }
+double obstacle_speed(const ObstacleView &o, double extent) {
+  return norm(o.velocity) + norm(o.spin) * extent;
+}
 
-// Bound of the motion of a shape between two poses: |q - q0| of unit quaternions is at most half the chord that a point at distance 1
-// moves.
+// Bound of the motion of a shape between two poses: |q - q0| of unit quaternions is at most half the chord
+// that a point at distance 1 moves.
 double obstacle_displacement(const ObstacleView &now, const ObstacleView &then, double extent) {
   const Quat p = now.rotation, q = then.rotation;
   const double s = p.x * q.x + p.y * q.y + p.z * q.z + p.w * q.w < 0 ? -1 : 1;
@@ -28,14 +31,15 @@ double obstacle_displacement(const ObstacleView &now, const ObstacleView &then, 
 
 // Shape, size and belt are an obstacle's own; a new one under an old id has other lists.
 bool same_shape(const ObstacleView &a, const ObstacleView &b) {
-  return a.shape == b.shape && a.surface == b.surface && a.grid == b.grid && a.slot == b.slot && a.category == b.category &&
-         a.collides_with == b.collides_with && a.radius == b.radius && a.half_length == b.half_length && a.half_size.x == b.half_size.x &&
-         a.half_size.y == b.half_size.y && a.half_size.z == b.half_size.z;
+  return a.shape == b.shape && a.surface == b.surface && a.grid == b.grid && a.slot == b.slot &&
+         a.category == b.category && a.collides_with == b.collides_with && a.radius == b.radius &&
+         a.half_length == b.half_length && a.half_size.x == b.half_size.x && a.half_size.y == b.half_size.y &&
+         a.half_size.z == b.half_size.z;
 }
 
 uint64_t features(uint32_t a, uint32_t b) { return uint64_t{a} << 32 | b; }
 
-struct Features {      // corners of a surface as listed
+struct Features {  // corners of a surface as listed
   const Surface &surface;
   const double *x;
   Vec3 point(uint32_t s) const { return load3(x + 4 * size_t{s}); }
@@ -52,11 +56,19 @@ bool finite_positions(const Surface &s) {
 }  // namespace
 
 BroadPhase::BroadPhase(const Memory &memory)
-    : memory_(memory), bodies_(HookAllocator<Body>(memory_)), things_(HookAllocator<Thing>(memory_)),
-      segments_(HookAllocator<Segment>(memory_)), next_segments_(HookAllocator<Segment>(memory_)),
-      candidates_(HookAllocator<Candidate>(memory_)), next_(HookAllocator<Candidate>(memory_)), fresh_(HookAllocator<uint64_t>(memory_)),
-      vf_(HookAllocator<uint64_t>(memory_)), fv_(HookAllocator<uint64_t>(memory_)), ee_(HookAllocator<uint64_t>(memory_)),
-      order_(HookAllocator<uint32_t>(memory_)), stack_(HookAllocator<PairOfTriangles>(memory_)) {}
+    : memory_(memory),
+      bodies_(HookAllocator<Body>(memory_)),
+      things_(HookAllocator<Thing>(memory_)),
+      segments_(HookAllocator<Segment>(memory_)),
+      next_segments_(HookAllocator<Segment>(memory_)),
+      candidates_(HookAllocator<Candidate>(memory_)),
+      next_(HookAllocator<Candidate>(memory_)),
+      fresh_(HookAllocator<uint64_t>(memory_)),
+      vf_(HookAllocator<uint64_t>(memory_)),
+      fv_(HookAllocator<uint64_t>(memory_)),
+      ee_(HookAllocator<uint64_t>(memory_)),
+      order_(HookAllocator<uint32_t>(memory_)),
+      stack_(HookAllocator<PairOfTriangles>(memory_)) {}
 
 void BroadPhase::clear() {
   bodies_.clear();
@@ -65,8 +77,8 @@ void BroadPhase::clear() {
   candidates_.clear();
 }
 
-bool BroadPhase::update(std::span<const BodyView> bodies, std::span<const ObstacleView> obstacles, const PairFilter &filter, double h,
-                        double offset) {
+bool BroadPhase::update(std::span<const BodyView> bodies, std::span<const ObstacleView> obstacles,
+                        const PairFilter &filter, double h, double offset) {
   ++stats_.updates;
   match(bodies, obstacles, filter);
   if (!find_dirty(bodies, obstacles, h, offset)) return false;
@@ -74,8 +86,8 @@ bool BroadPhase::update(std::span<const BodyView> bodies, std::span<const Obstac
   return true;
 }
 
-bool BroadPhase::cover(std::span<const BodyView> bodies, std::span<const ObstacleView> obstacles, const PairFilter &filter, double h, double offset,
-                       std::span<const double> speed) {
+bool BroadPhase::cover(std::span<const BodyView> bodies, std::span<const ObstacleView> obstacles,
+                       const PairFilter &filter, double h, double offset, std::span<const double> speed) {
   bool any = false;
   for (size_t i = 0; i < bodies_.size(); ++i) {
     Body &b = bodies_[i];
@@ -89,8 +101,8 @@ bool BroadPhase::cover(std::span<const BodyView> bodies, std::span<const Obstacl
   return any;
 }
 
-void BroadPhase::renew(std::span<const BodyView> bodies, std::span<const ObstacleView> obstacles, const PairFilter &filter, double h,
-                       double offset) {
+void BroadPhase::renew(std::span<const BodyView> bodies, std::span<const ObstacleView> obstacles,
+                       const PairFilter &filter, double h, double offset) {
   ++stats_.renewals;
   for (Body &b : bodies_)
     if (b.dirty) renew_body(b, h, offset);
@@ -108,12 +120,15 @@ void BroadPhase::renew(std::span<const BodyView> bodies, std::span<const Obstacl
 }
 
 // Brings bodies_ and things_ in line with the views; what is new, gone or changed in kind loses its lists.
-void BroadPhase::match(std::span<const BodyView> bodies, std::span<const ObstacleView> obstacles, const PairFilter &filter) {
-  bool same = bodies.size() == bodies_.size() && obstacles.size() == things_.size() && filter.version == filter_version_;
+void BroadPhase::match(std::span<const BodyView> bodies, std::span<const ObstacleView> obstacles,
+                       const PairFilter &filter) {
+  bool same = bodies.size() == bodies_.size() && obstacles.size() == things_.size() &&
+              filter.version == filter_version_;
   for (size_t i = 0; same && i < bodies.size(); ++i) {
     const Body &b = bodies_[i];
-    same = b.id == bodies[i].id && b.surface == bodies[i].surface && b.slot == bodies[i].slot && b.category == bodies[i].category &&
-           b.collides_with == bodies[i].collides_with && b.x.size() == bodies[i].surface->x.size();
+    same = b.id == bodies[i].id && b.surface == bodies[i].surface && b.slot == bodies[i].slot &&
+           b.category == bodies[i].category && b.collides_with == bodies[i].collides_with &&
+           b.x.size() == bodies[i].surface->x.size();
   }
   for (size_t o = 0; same && o < obstacles.size(); ++o)
     same = things_[o].view.id == obstacles[o].id && same_shape(things_[o].view, obstacles[o]);
@@ -123,7 +138,11 @@ void BroadPhase::match(std::span<const BodyView> bodies, std::span<const Obstacl
   bodies_.reserve(bodies.size());
   for (const BodyView &v : bodies) {
     Body &b = bodies_.emplace_back(memory_);
-    b.id = v.id, b.surface = v.surface, b.slot = v.slot, b.category = v.category, b.collides_with = v.collides_with;
+    b.id = v.id;
+    b.surface = v.surface;
+    b.slot = v.slot;
+    b.category = v.category;
+    b.collides_with = v.collides_with;
     b.x.resize(v.surface->x.size());
   }
   things_.reserve(obstacles.size());
@@ -136,14 +155,17 @@ void BroadPhase::match(std::span<const BodyView> bodies, std::span<const Obstacl
   }
 }
 
-bool BroadPhase::find_dirty(std::span<const BodyView> bodies, std::span<const ObstacleView> obstacles, double h, double offset) {
+bool BroadPhase::find_dirty(std::span<const BodyView> bodies, std::span<const ObstacleView> obstacles,
+                            double h, double offset) {
   bool any = false;
   for (size_t i = 0; i < bodies_.size(); ++i) {
     Body &b = bodies_[i];
     const bool stays = b.asleep && bodies[i].asleep;
-    b.asleep = bodies[i].asleep, b.expected = 0;
+    b.asleep = bodies[i].asleep;
+    b.expected = 0;
     if (!b.dirty && !stays) {
-      b.moved = largest_norm(b.surface->nsurfel, b.surface->x.data(), b.x.data()), b.speed = largest_speed(*b.surface);
+      b.moved = largest_norm(b.surface->nsurfel, b.surface->x.data(), b.x.data());
+      b.speed = largest_speed(*b.surface);
       b.dirty = !(kRounding * (b.moved + reach_share(h, offset, b.speed)) <= b.margin);
     }
     any |= b.dirty;
@@ -156,13 +178,15 @@ bool BroadPhase::find_dirty(std::span<const BodyView> bodies, std::span<const Ob
 }
 
 // times: how often the obstacle's way of the sub-step is to be covered.
-bool BroadPhase::holds(const Thing &thing, const ObstacleView &now, double h, double offset, double times) const {
+bool BroadPhase::holds(const Thing &thing, const ObstacleView &now, double h, double offset,
+                       double times) const {
   const ObstacleView &then = thing.view;
   double moved, extent;
   if (now.shape == Shape::plane) {
     // Only the motion along the normal counts, over the sphere that holds all bodies.
     const Vec3 n = ObstacleShape(now).axis(2), n0 = ObstacleShape(then).axis(2);
-    moved = norm(n - n0) * radius_ + std::fabs(dot(n, center_ - now.position) - dot(n0, center_ - then.position));
+    moved =
+        norm(n - n0) * radius_ + std::fabs(dot(n, center_ - now.position) - dot(n0, center_ - then.position));
     extent = norm(center_ - now.position) + radius_;
   } else {
     extent = ObstacleShape(now).extent();
@@ -191,8 +215,11 @@ bool BroadPhase::renew_tree(Side &side) {
 void BroadPhase::renew_thing(Thing &t, const ObstacleView &now, double h, double offset) {
   t.view = now;
   if (t.surface) renew_tree(t);
-  const double extent = now.shape == Shape::plane ? norm(center_ - now.position) + radius_ : ObstacleShape(now).extent();
-  t.margin = kRounding * reach_share(h, offset, (kSpeedGrowth + 0.5 * skin_steps_) * obstacle_speed(now, extent)) + offset;
+  const double extent =
+      now.shape == Shape::plane ? norm(center_ - now.position) + radius_ : ObstacleShape(now).extent();
+  t.margin =
+      kRounding * reach_share(h, offset, (kSpeedGrowth + 0.5 * skin_steps_) * obstacle_speed(now, extent)) +
+      offset;
 }
 
 // The skin lasts for skin_steps_ of the present motion, a function of the state alone.
@@ -200,8 +227,11 @@ void BroadPhase::renew_body(Body &body, double h, double offset) {
   if (!renew_tree(body)) return;
   const Surface &s = *body.surface;
   const double speed = body.speed = largest_speed(s);
-  const double skin = std::clamp(skin_steps_ * h * speed, kSkinLeast * s.median_edge, kSkinMost * s.median_edge);
-  body.margin = kRounding * std::max(reach_share(h, offset, kSpeedGrowth * speed), 2 * offset + kSpeedGrowth * h * body.expected) + skin;
+  const double skin =
+      std::clamp(skin_steps_ * h * speed, kSkinLeast * s.median_edge, kSkinMost * s.median_edge);
+  body.margin = kRounding * std::max(reach_share(h, offset, kSpeedGrowth * speed),
+                                     2 * offset + kSpeedGrowth * h * body.expected) +
+                skin;
   body.moved = 0;
 }
 
@@ -221,17 +251,23 @@ void BroadPhase::bound_bodies() {
   radius_ = 0.5 * norm(hi - lo);
 }
 
-// Pairs of which neither side has changed keep their runs; the others are listed again. Bodies are swept along x.
-void BroadPhase::find_pairs(std::span<const BodyView> bodies, std::span<const ObstacleView> obstacles, const PairFilter &filter) {
+// Pairs of which neither side has changed keep their runs; the others are listed again. Bodies are
+// swept along x.
+void BroadPhase::find_pairs(std::span<const BodyView> bodies, std::span<const ObstacleView> obstacles,
+                            const PairFilter &filter) {
   fresh_.clear();
   next_segments_.clear();
   for (const Segment &s : segments_)
-    if (!bodies_[s.a].dirty && !(s.obstacle ? things_[s.b].dirty : bodies_[s.b].dirty)) next_segments_.push_back(s);
+    if (!bodies_[s.a].dirty && !(s.obstacle ? things_[s.b].dirty : bodies_[s.b].dirty))
+      next_segments_.push_back(s);
   order_.clear();
   for (uint32_t i = 0; i < bodies_.size(); ++i)
     if (bodies_[i].usable) order_.push_back(i);
-  const auto low = [&](uint32_t i) { return bodies_[i].tree.root().lo[0] - bodies_[i].margin - recovery_depth(*bodies_[i].surface); };
-  std::sort(order_.begin(), order_.end(), [&](uint32_t i, uint32_t j) { return low(i) != low(j) ? low(i) < low(j) : i < j; });
+  const auto low = [&](uint32_t i) {
+    return bodies_[i].tree.root().lo[0] - bodies_[i].margin - recovery_depth(*bodies_[i].surface);
+  };
+  std::sort(order_.begin(), order_.end(),
+            [&](uint32_t i, uint32_t j) { return low(i) != low(j) ? low(i) < low(j) : i < j; });
   for (size_t p = 0; p < order_.size(); ++p) {
     const Body &a = bodies_[order_[p]];
     const double high = a.tree.root().hi[0] + a.margin + recovery_depth(*a.surface);
@@ -241,24 +277,32 @@ void BroadPhase::find_pairs(std::span<const BodyView> bodies, std::span<const Ob
         list_bodies(order_[ordered ? p : q], order_[ordered ? q : p]);
       }
     for (uint32_t o = 0; o < things_.size(); ++o)
-      if ((a.dirty || things_[o].dirty) && filter.may_touch(bodies[order_[p]], obstacles[o])) list_thing(order_[p], o);
+      if ((a.dirty || things_[o].dirty) && filter.may_touch(bodies[order_[p]], obstacles[o]))
+        list_thing(order_[p], o);
   }
 }
 
 // Into vf_, ee_ and fv_; false where the two are too far apart for any.
 bool BroadPhase::list_surfaces(const Side &a, const Side &b) {
   const Features fa{*a.surface, a.x.data()}, fb{*b.surface, b.x.data()};
-  const double near = kRounding * (a.margin + b.margin), edges = near + edge_recovery_depth(*a.surface, *b.surface), edges2 = edges * edges;
-  const double deep_a = near + recovery_depth(*a.surface), deep_b = near + recovery_depth(*b.surface), wide = std::max(deep_a, deep_b);
+  const double near = kRounding * (a.margin + b.margin);
+  const double edges = near + edge_recovery_depth(*a.surface, *b.surface);
+  const double edges2 = edges * edges;
+  const double deep_a = near + recovery_depth(*a.surface);
+  const double deep_b = near + recovery_depth(*b.surface);
+  const double wide = std::max(deep_a, deep_b);
   if (!(box_distance2(a.tree.root(), b.tree.root()) <= wide * wide)) return false;
   vf_.clear();
   fv_.clear();
   ee_.clear();
-  // Surfels of one side against a triangle of the other: those that the triangle owns, so that no pair comes twice.
-  const auto vertices = [](const Features &from, uint32_t t, const Features &to, uint32_t face, double limit, Array<uint64_t> &found) {
+  // Surfels of one side against a triangle of the other: those that the triangle owns, so that no
+  // pair comes twice.
+  const auto vertices = [](const Features &from, uint32_t t, const Features &to, uint32_t face, double limit,
+                           Array<uint64_t> &found) {
     const uint32_t owns = from.surface.tri_owns[t] & 7;
     for (int k = 0; owns >> k; ++k)
-      if (owns >> k & 1 && triangle_within(from.corner(t, k), to.corner(face, 0), to.corner(face, 1), to.corner(face, 2), limit))
+      if (owns >> k & 1 && triangle_within(from.corner(t, k), to.corner(face, 0), to.corner(face, 1),
+                                           to.corner(face, 2), limit))
         found.push_back(features(from.surface.tri[3 * size_t{t} + k], face));
   };
   near_pairs(a.tree, b.tree, wide, stack_, [&](uint32_t place_a, uint32_t place_b, double distance2) {
@@ -269,9 +313,10 @@ bool BroadPhase::list_surfaces(const Side &a, const Side &b) {
     if (!own_s || !own_t || !(distance2 <= edges2)) return;
     for (int k = 0; own_s >> k; ++k)
       for (int l = 0; own_t >> l; ++l)
-        if (own_s >> k & own_t >> l & 1 &&
-            segments_within(fa.corner(s, k), fa.corner(s, (k + 1) % 3), fb.corner(t, l), fb.corner(t, (l + 1) % 3), edges))
-          ee_.push_back(features(fa.surface.tri_edge[3 * size_t{s} + k], fb.surface.tri_edge[3 * size_t{t} + l]));
+        if (own_s >> k & own_t >> l & 1 && segments_within(fa.corner(s, k), fa.corner(s, (k + 1) % 3),
+                                                           fb.corner(t, l), fb.corner(t, (l + 1) % 3), edges))
+          ee_.push_back(
+              features(fa.surface.tri_edge[3 * size_t{s} + k], fb.surface.tri_edge[3 * size_t{t} + l]));
   });
   return true;
 }
@@ -299,15 +344,19 @@ void BroadPhase::list_voxels(uint32_t i, uint32_t o) {
   shape.bounds(bounds.lo, bounds.hi);
   vf_.clear();
   fv_.clear();
-  near_triangles(a.tree, stack_, [&](const Box &b) { return box_distance2(b, bounds) <= near * near; }, [&](uint32_t t) {
-    const Vec3 x[3] = {fa.corner(t, 0), fa.corner(t, 1), fa.corner(t, 2)}, center = (1.0 / 3) * (x[0] + x[1] + x[2]);
-    double size2 = 0;
-    for (int k = 0; k < 3; ++k) {
-      if (fa.surface.tri_owns[t] >> k & 1 && shape.voxels_near(x[k], near)) vf_.push_back(uint64_t{fa.surface.tri[3 * size_t{t} + k]} << 32);
-      size2 = std::max(size2, norm2(x[k] - center));
-    }
-    if (shape.voxels_near(center, near + std::sqrt(size2))) fv_.push_back(uint64_t{t} << 32);
-  });
+  near_triangles(
+      a.tree, stack_, [&](const Box &b) { return box_distance2(b, bounds) <= near * near; },
+      [&](uint32_t t) {
+        const Vec3 x[3] = {fa.corner(t, 0), fa.corner(t, 1), fa.corner(t, 2)};
+        const Vec3 center = (1.0 / 3) * (x[0] + x[1] + x[2]);
+        double size2 = 0;
+        for (int k = 0; k < 3; ++k) {
+          if (fa.surface.tri_owns[t] >> k & 1 && shape.voxels_near(x[k], near))
+            vf_.push_back(uint64_t{fa.surface.tri[3 * size_t{t} + k]} << 32);
+          size2 = std::max(size2, norm2(x[k] - center));
+        }
+        if (shape.voxels_near(center, near + std::sqrt(size2))) fv_.push_back(uint64_t{t} << 32);
+      });
   add_segment(i, o, true, 0, vf_);
   add_segment(i, o, true, 2, fv_);
 }
@@ -320,8 +369,8 @@ void BroadPhase::list_thing(uint32_t i, uint32_t o) {
   }
 }
 
-// Edges and triangles count only where a surfel alone would let the obstacle through: edges at a round shape or at a box's edges,
-// triangles at a round shape or at a box's corners.
+// Edges and triangles count only where a surfel alone would let the obstacle through: edges at a round shape
+// or at a box's edges, triangles at a round shape or at a box's corners.
 void BroadPhase::list_obstacle(uint32_t i, uint32_t o) {
   const Body &a = bodies_[i];
   const ObstacleShape shape(things_[o].view);
@@ -353,7 +402,8 @@ void BroadPhase::list_obstacle(uint32_t i, uint32_t o) {
     const uint32_t points = kind == Shape::box ? 8 : 2;
     for (uint32_t c = 0; c < points; ++c) {
       const Vec3 p = kind == Shape::box ? shape.corner(c) : shape.end(int(c));
-      if (closest_on_triangle(p, fa.corner(t, 0), fa.corner(t, 1), fa.corner(t, 2)).distance2 <= limit2) return true;
+      if (closest_on_triangle(p, fa.corner(t, 0), fa.corner(t, 1), fa.corner(t, 2)).distance2 <= limit2)
+        return true;
     }
     return false;
   };
@@ -363,8 +413,10 @@ void BroadPhase::list_obstacle(uint32_t i, uint32_t o) {
   near_triangles(a.tree, stack_, box_near, [&](uint32_t t) {
     const uint32_t owns = fa.surface.tri_owns[t];
     for (int k = 0; k < 3; ++k) {
-      if (owns >> k & 1 && shape.closest(fa.corner(t, k)).distance <= near) vf_.push_back(fa.surface.tri[3 * size_t{t} + k]);
-      if (kind != Shape::plane && owns >> (3 + k) & 1 && edge_near(fa.corner(t, k), fa.corner(t, (k + 1) % 3)))
+      if (owns >> k & 1 && shape.closest(fa.corner(t, k)).distance <= near)
+        vf_.push_back(fa.surface.tri[3 * size_t{t} + k]);
+      if (kind != Shape::plane && owns >> (3 + k) & 1 &&
+          edge_near(fa.corner(t, k), fa.corner(t, (k + 1) % 3)))
         ee_.push_back(fa.surface.tri_edge[3 * size_t{t} + k]);
     }
     if (kind != Shape::plane && triangle_near(t)) fv_.push_back(t);
@@ -380,7 +432,8 @@ void BroadPhase::list_obstacle(uint32_t i, uint32_t o) {
 void BroadPhase::add_segment(uint32_t a, uint32_t b, bool obstacle, uint8_t kind, Array<uint64_t> &found) {
   std::sort(found.begin(), found.end());
   const uint64_t id_b = obstacle ? things_[b].view.id : bodies_[b].id;
-  next_segments_.push_back({bodies_[a].id, id_b, a, b, uint32_t(fresh_.size()), uint32_t(found.size()), obstacle, kind, true});
+  next_segments_.push_back(
+      {bodies_[a].id, id_b, a, b, uint32_t(fresh_.size()), uint32_t(found.size()), obstacle, kind, true});
   fresh_.insert(fresh_.end(), found.begin(), found.end());
 }
 
@@ -395,7 +448,8 @@ void BroadPhase::assemble() {
   stats_.pairs = 0;
   for (Segment &s : next_segments_) {
     const uint32_t begin = uint32_t(next_.size());
-    const uint32_t slot_a = bodies_[s.a].slot, slot_b = s.obstacle ? things_[s.b].view.slot : bodies_[s.b].slot;
+    const uint32_t slot_a = bodies_[s.a].slot;
+    const uint32_t slot_b = s.obstacle ? things_[s.b].view.slot : bodies_[s.b].slot;
     if (s.fresh) {
       for (uint32_t i = s.begin; i < s.begin + s.count; ++i)
         next_.push_back({slot_a, slot_b, uint32_t(fresh_[i] >> 32), uint32_t(fresh_[i]), s.kind, s.obstacle});

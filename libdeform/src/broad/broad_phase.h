@@ -1,10 +1,12 @@
-// Which features may touch: lists of pairs with a skin around them, so that most sub-steps only check that the lists still hold.
+// Which features may touch: lists of pairs with a skin around them, so that most sub-steps only check that
+// the lists still hold.
 //
-// Every body and obstacle keeps the shape it had when its lists were made, and a margin m. Its share is respected while
+// Every body and obstacle keeps the shape it had when its lists were made, and a margin m. Its share is
+// respected while
 //     displacement since then + d_c + 2 h speed <= m,
-// and two features whose boxes were further apart than m_a + m_b (+ recovery depth) cannot be within the reach of a contact then. Lists
-// hold a superset of the contacts and narrow/ decides by the geometry of the sub-step alone, so results never depend on when lists were
-// made.
+// and two features whose boxes were further apart than m_a + m_b (+ recovery depth) cannot be within the
+// reach of a contact then. Lists hold a superset of the contacts and narrow/ decides by the geometry of the
+// sub-step alone, so results never depend on when lists were made.
 #pragma once
 #include <cstdint>
 #include <span>
@@ -21,14 +23,16 @@ class BroadPhase {
  public:
   explicit BroadPhase(const Memory &memory);
 
-  // Renews what is out of date; true if candidates() changed. h in s; offset d_c in m. Views may come in any order.
-  bool update(std::span<const BodyView> bodies, std::span<const ObstacleView> obstacles, const PairFilter &filter, double h, double offset);
+  // Renews what is out of date; true if candidates() changed. h in s; offset d_c in m. Views may
+  // come in any order.
+  bool update(std::span<const BodyView> bodies, std::span<const ObstacleView> obstacles,
+              const PairFilter &filter, double h, double offset);
 
-  // The same lists, made anew where they do not cover the way that the sub-step takes after its solve: speed[i] bounds that of the surfels of body i;
-  // the obstacles' views hold theirs.
+  // The same lists, made anew where they do not cover the way that the sub-step takes after its solve:
+  // speed[i] bounds that of the surfels of body i; the obstacles' views hold theirs.
   // After update(), on the same views.
-  bool cover(std::span<const BodyView> bodies, std::span<const ObstacleView> obstacles, const PairFilter &filter, double h, double offset,
-             std::span<const double> speed);
+  bool cover(std::span<const BodyView> bodies, std::span<const ObstacleView> obstacles,
+             const PairFilter &filter, double h, double offset, std::span<const double> speed);
   // f(triangle of a, triangle of b) for pairs that may meet now; slots of bodies, or of a mesh obstacle.
   template <class F>
   void near_triangles_of(uint32_t slot_a, uint32_t slot_b, bool obstacle, F &&f) {
@@ -40,9 +44,8 @@ class BroadPhase {
     for (const Thing &thing : things_)
       if (obstacle && thing.view.slot == slot_b) b = &thing;
     if (!a || !b || !a->usable || !b->usable) return;
-    near_pairs(a->tree, b->tree, a->margin + b->margin, stack_, [&](uint32_t p, uint32_t q, double) {
-      f(a->tree.triangles()[p], b->tree.triangles()[q]);
-    });
+    near_pairs(a->tree, b->tree, a->margin + b->margin, stack_,
+               [&](uint32_t p, uint32_t q, double) { f(a->tree.triangles()[p], b->tree.triangles()[q]); });
   }
 
   // In the order that find_contacts expects: (id a, body before obstacle, id b, kind, feature a, feature b).
@@ -51,7 +54,8 @@ class BroadPhase {
   // m/s, largest of view i's surfels, at the last update().
   double speed(size_t i) const { return bodies_[i].speed; }
 
-  // The skin is made to last for about this many sub-steps of the present motion. Results do not depend on it.
+  // The skin is made to last for about this many sub-steps of the present motion. Results do
+  // not depend on it.
   void set_skin_steps(double steps) { skin_steps_ = steps; }
   // Forgets all lists (after a change that update() cannot see). Results do not depend on it.
   void clear();
@@ -66,15 +70,16 @@ class BroadPhase {
   const Stats &stats() const { return stats_; }
 
  private:
-  struct Side {             // a surface in lists
+  struct Side {  // a surface in lists
     const Surface *surface = nullptr;
-    double margin = -1;     // negative: no lists yet
-    double moved = 0, speed = 0;        // since the lists were made, at the last update(); largest at that time
-    double expected = 0;    // speed that cover() asks the lists to hold for
+    double margin = -1;  // negative: no lists yet
+    // since the lists were made, at the last update(); largest at that time
+    double moved = 0, speed = 0;
+    double expected = 0;                // speed that cover() asks the lists to hold for
     bool dirty = true, usable = false;  // usable: all positions finite
-    bool asleep = false;    // at the last update: nothing has moved if it still is
+    bool asleep = false;                // at the last update: nothing has moved if it still is
     BoxTree tree;
-    Array<double> x;        // [nsurfel,4] when the lists were made
+    Array<double> x;  // [nsurfel,4] when the lists were made
     explicit Side(const Memory &m) : tree(m), x(HookAllocator<double>(m)) {}
   };
   struct Body : Side {
@@ -82,27 +87,31 @@ class BroadPhase {
     uint32_t slot = 0, category = 0, collides_with = 0;
     using Side::Side;
   };
-  struct Thing : Side {     // an obstacle; surface and tree of a mesh only
-    ObstacleView view{};    // when the lists were made
+  struct Thing : Side {   // an obstacle; surface and tree of a mesh only
+    ObstacleView view{};  // when the lists were made
     using Side::Side;
   };
-  struct Segment {          // a run of candidates of one pair and one kind
+  struct Segment {  // a run of candidates of one pair and one kind
     uint64_t id_a, id_b;
-    uint32_t a, b;          // indices of the views
+    uint32_t a, b;  // indices of the views
     uint32_t begin, count;
     uint8_t obstacle, kind;
-    bool fresh;             // lies in fresh_, not in candidates_
+    bool fresh;  // lies in fresh_, not in candidates_
   };
 
-  void match(std::span<const BodyView> bodies, std::span<const ObstacleView> obstacles, const PairFilter &filter);
-  bool find_dirty(std::span<const BodyView> bodies, std::span<const ObstacleView> obstacles, double h, double offset);
+  void match(std::span<const BodyView> bodies, std::span<const ObstacleView> obstacles,
+             const PairFilter &filter);
+  bool find_dirty(std::span<const BodyView> bodies, std::span<const ObstacleView> obstacles, double h,
+                  double offset);
   bool holds(const Thing &thing, const ObstacleView &now, double h, double offset, double times = 2) const;
   bool renew_tree(Side &side);
-  void renew(std::span<const BodyView> bodies, std::span<const ObstacleView> obstacles, const PairFilter &filter, double h, double offset);
+  void renew(std::span<const BodyView> bodies, std::span<const ObstacleView> obstacles,
+             const PairFilter &filter, double h, double offset);
   void renew_body(Body &body, double h, double offset);
   void renew_thing(Thing &thing, const ObstacleView &now, double h, double offset);
   void bound_bodies();
-  void find_pairs(std::span<const BodyView> bodies, std::span<const ObstacleView> obstacles, const PairFilter &filter);
+  void find_pairs(std::span<const BodyView> bodies, std::span<const ObstacleView> obstacles,
+                  const PairFilter &filter);
   bool list_surfaces(const Side &a, const Side &b);
   void list_bodies(uint32_t i, uint32_t j);
   void list_mesh(uint32_t i, uint32_t o);
@@ -117,11 +126,12 @@ class BroadPhase {
   Array<Body> bodies_;
   Array<Thing> things_;
   uint64_t filter_version_ = 0;
-  Vec3 center_;              // of a sphere around all bodies as they were when listed, for the motion of planes
+  // of a sphere around all bodies as they were when listed, for the motion of planes
+  Vec3 center_;
   double radius_ = 0;
   Array<Segment> segments_, next_segments_;
   Array<Candidate> candidates_, next_;
-  Array<uint64_t> fresh_, vf_, fv_, ee_;   // {feature a, feature b}
+  Array<uint64_t> fresh_, vf_, fv_, ee_;  // {feature a, feature b}
   Array<uint32_t> order_;
   Array<PairOfTriangles> stack_;
   Stats stats_;

@@ -9,14 +9,14 @@
 namespace dfm {
 
 struct PairRule {
-  uint64_t a, b;       // ids; of two bodies a < b; of a body and an obstacle a is the body
+  uint64_t a, b;  // ids; of two bodies a < b; of a body and an obstacle a is the body
   bool obstacle;
   bool touch;
 };
 
 struct PairFilter {
-  Array<PairRule> rules;   // sorted by (a, obstacle, b); changed through set()
-  uint64_t version = 0;    // rises with every change, so that lists built under older rules are renewed
+  Array<PairRule> rules;  // sorted by (a, obstacle, b); changed through set()
+  uint64_t version = 0;   // rises with every change, so that lists built under older rules are renewed
 
   PairFilter() = default;
   explicit PairFilter(const Memory &memory) : rules(HookAllocator<PairRule>(memory)) {}
@@ -31,7 +31,8 @@ struct PairFilter {
   }
   bool may_touch(const BodyView &a, const BodyView &b) const {
     if (a.id == b.id) return false;  // self contact is an effect of its own
-    return decide(std::min(a.id, b.id), std::max(a.id, b.id), false, masks(a.category, a.collides_with, b.category, b.collides_with));
+    return decide(std::min(a.id, b.id), std::max(a.id, b.id), false,
+                  masks(a.category, a.collides_with, b.category, b.collides_with));
   }
   bool may_touch(const BodyView &a, const ObstacleView &b) const {
     return decide(a.id, b.id, true, masks(a.category, a.collides_with, b.category, b.collides_with));

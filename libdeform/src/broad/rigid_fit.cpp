@@ -7,21 +7,27 @@ namespace dfm {
 namespace {
 
 // Sums over points r about their mean and vectors d: what the best rigid field theta x r + mean takes of d.
-struct Fit {
-  Vec3 mean, theta;
-};
+struct Fit { Vec3 mean, theta; };
 template <class Point, class Vector>
 Fit fit(uint32_t n, Point r, Vector d) {
   Vec3 sum, moment;
   double xx = 0, yy = 0, zz = 0, xy = 0, yz = 0, zx = 0;
   for (uint32_t s = 0; s < n; ++s) {
     const Vec3 a = r(s), b = d(s);
-    sum += b, moment += cross(a, b);
-    xx += a.x * a.x, yy += a.y * a.y, zz += a.z * a.z, xy += a.x * a.y, yz += a.y * a.z, zx += a.z * a.x;
+    sum += b;
+    moment += cross(a, b);
+    xx += a.x * a.x;
+    yy += a.y * a.y;
+    zz += a.z * a.z;
+    xy += a.x * a.y;
+    yz += a.y * a.z;
+    zx += a.z * a.x;
   }
   const Vec3 i{yy + zz, -xy, -zx}, j{-xy, xx + zz, -yz}, k{-zx, -yz, xx + yy}, jk = cross(j, k);
   const double det = dot(i, jk);
-  const Vec3 theta = det > 0 ? (1 / det) * Vec3{dot(moment, jk), dot(moment, cross(k, i)), dot(moment, cross(i, j))} : Vec3{};
+  const Vec3 theta =
+      det > 0 ? (1 / det) * Vec3{dot(moment, jk), dot(moment, cross(k, i)), dot(moment, cross(i, j))}
+              : Vec3{};
   return {(1.0 / n) * sum, theta};
 }
 
@@ -35,7 +41,8 @@ Vec3 mean_place(const Surface &s) {
 
 void RigidReference::set(const Surface &s) {
   x_.assign(s.x.begin(), s.x.end());
-  center_ = mean_place(s), turn_ = {};
+  center_ = mean_place(s);
+  turn_ = {};
 }
 
 double RigidReference::displaced(const Surface &s) {
@@ -59,11 +66,12 @@ DeformingMotion deforming_motion(const Surface &s, double h) {
   const auto v = [&](uint32_t i) { return load3(&s.v[4 * size_t{i}]); };
   Fit f = fit(s.nsurfel, place, v);
   if (!(4 * h * norm(f.theta) < 1)) f.theta = {};
-  Vec3 sum;   // the mean of what the turn leaves
+  Vec3 sum;  // the mean of what the turn leaves
   for (uint32_t i = 0; i < s.nsurfel; ++i) sum += v(i) - cross(f.theta, place(i));
   const Vec3 mean = (1.0 / s.nsurfel) * sum;
   double most = 0;
-  for (uint32_t i = 0; i < s.nsurfel; ++i) most = std::max(most, norm2(v(i) - cross(f.theta, place(i)) - mean));
+  for (uint32_t i = 0; i < s.nsurfel; ++i)
+    most = std::max(most, norm2(v(i) - cross(f.theta, place(i)) - mean));
   return {norm(f.theta), std::sqrt(most)};
 }
 

@@ -11,17 +11,19 @@ class RigidReference {
  public:
   explicit RigidReference(const Memory &memory) : x_(HookAllocator<double>(memory)) {}
   void set(const Surface &surface);
-  double displaced(const Surface &surface);   // m, largest since set(), beyond the rigid motion that fits best
+  // m, largest since set(), beyond the rigid motion that fits best
+  double displaced(const Surface &surface);
   const Array<double> &x() const { return x_; }
 
  private:
-  Array<double> x_;                           // [nsurfel,4]
-  Vec3 center_;                               // of x_
-  Quat turn_;                                 // that fitted best at the last look
+  Array<double> x_;  // [nsurfel,4]
+  Vec3 center_;      // of x_
+  Quat turn_;        // that fitted best at the last look
 };
 
-struct DeformingMotion { double turn = 0, speed = 0; };   // rad/s; m/s, largest beyond the rigid motion that fits best
+// rad/s; m/s, largest beyond the rigid motion that fits best
+struct DeformingMotion { double turn = 0, speed = 0; };
 DeformingMotion deforming_motion(const Surface &surface, double h);
-double longest_edge(const Surface &surface);              // m, now
+double longest_edge(const Surface &surface);  // m, now
 
 }  // namespace dfm

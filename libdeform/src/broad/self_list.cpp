@@ -9,25 +9,31 @@
 namespace dfm {
 namespace {
 
-constexpr double kSkinLeast = 0.02;         // of the median edge
-constexpr double kSkinMost = 0.2;           // wider than this, every surfel would list the triangles of the second ring around it
+constexpr double kSkinLeast = 0.02;  // of the median edge
+// wider than this, every surfel would list the triangles of the second ring around it
+constexpr double kSkinMost = 0.2;
 constexpr double kSpeedGrowth = 1.25;
-constexpr double kQualityLimit = 2;         // boxes that have grown this much in sum are worth a new tree
+constexpr double kQualityLimit = 2;  // boxes that have grown this much in sum are worth a new tree
 
 }  // namespace
 
-SelfList::SelfList(const Memory &m, const Surface &surface) : surface_(surface), tree_(m), at_(m) { use_memory(m, vf_, ee_, stack_); }
-
-// What one of two features adds to the reach of their contact. Two vertices of a pair are no further apart than the reach and two edges, so
-// |relative speed| <= 2 |rest| + |omega| (reach + 2 edges).
-double SelfList::share(double h, double offset, double growth) const {
-  const double turn = growth * h * motion_.turn;
-  return (reach_share(h, offset, growth * motion_.speed) + 2 * turn * (longest_ + 2 * moved_)) / (1 - 2 * std::min(turn, 0.3));
+SelfList::SelfList(const Memory &m, const Surface &surface) : surface_(surface), tree_(m), at_(m) {
+  use_memory(m, vf_, ee_, stack_);
 }
 
-// What one of two features adds to the distance from which they come to each other in the sub-step. On straight ways the rigid part of a motion is
-// |r + h omega x r| >= |r|: it brings nothing together.
-double SelfList::covers(double h, double offset, double change) const { return offset + h * (motion_.speed + change); }
+// What one of two features adds to the reach of their contact. Two vertices of a pair are no further apart
+// than the reach and two edges, so |relative speed| <= 2 |rest| + |omega| (reach + 2 edges).
+double SelfList::share(double h, double offset, double growth) const {
+  const double turn = growth * h * motion_.turn;
+  return (reach_share(h, offset, growth * motion_.speed) + 2 * turn * (longest_ + 2 * moved_)) /
+         (1 - 2 * std::min(turn, 0.3));
+}
+
+// What one of two features adds to the distance from which they come to each other in the sub-step. On
+// straight ways the rigid part of a motion is |r + h omega x r| >= |r|: it brings nothing together.
+double SelfList::covers(double h, double offset, double change) const {
+  return offset + h * (motion_.speed + change);
+}
 
 bool SelfList::update(double h, double offset) {
   const Surface &s = surface_;
@@ -49,17 +55,22 @@ bool SelfList::cover(double h, double offset, double change) {
 
 void SelfList::renew(double h, double offset, double change) {
   const Surface &s = surface_;
-  margin_ = -1;   // until the lists are whole: a refused allocation leaves none that anyone believes
+  margin_ = -1;  // until the lists are whole: a refused allocation leaves none that anyone believes
   at_.set(s);
-  longest_ = longest_edge(s), moved_ = 0;
+  longest_ = longest_edge(s);
+  moved_ = 0;
   if (!tree_.empty()) tree_.refit(s, s.x.data());
   if (tree_.empty() || tree_.quality() > kQualityLimit) tree_.build(s, s.x.data());
   const double now = std::max(share(h, offset, kSpeedGrowth), covers(h, offset, kSpeedGrowth * change));
-  const double edge = s.median_edge, skin = wide_ ? kSkinMost * edge : std::clamp(skin_steps_ * 0.5 * (now - offset), kSkinLeast * edge, kSkinMost * edge);
+  const double edge = s.median_edge;
+  const double skin =
+      wide_ ? kSkinMost * edge
+            : std::clamp(skin_steps_ * 0.5 * (now - offset), kSkinLeast * edge, kSkinMost * edge);
   const double margin = kDistanceRounding * now + skin;
   limit_ = kDistanceRounding * 2 * margin + self_recovery_depth(s);
   list(limit_);
-  margin_ = margin, ++renewals_;
+  margin_ = margin;
+  ++renewals_;
 }
 
 void SelfList::list(double limit) {
@@ -70,26 +81,32 @@ void SelfList::list(double limit) {
     const uint32_t c0 = corner(face, 0), c1 = corner(face, 1), c2 = corner(face, 2);
     for (uint32_t k = 0; k < 3; ++k) {
       const uint32_t p = corner(from, k);
-      if (s.tri_owns[from] >> k & 1 && p != c0 && p != c1 && p != c2 && triangle_within(at(p), at(c0), at(c1), at(c2), limit)) vf_.push_back({p, face});
+      if (s.tri_owns[from] >> k & 1 && p != c0 && p != c1 && p != c2 &&
+          triangle_within(at(p), at(c0), at(c1), at(c2), limit))
+        vf_.push_back({p, face});
     }
   };
-  vf_.clear(), ee_.clear();
+  vf_.clear();
+  ee_.clear();
   near_self_pairs(tree_, limit, stack_, [&](uint32_t place_a, uint32_t place_b, double) {
     const uint32_t a = tree_.triangles()[place_a], b = tree_.triangles()[place_b];
-    vertices(a, b), vertices(b, a);
+    vertices(a, b);
+    vertices(b, a);
     const uint32_t own_a = s.tri_owns[a] >> 3, own_b = s.tri_owns[b] >> 3;
     if (!own_a || !own_b) return;
     for (uint32_t k = 0; k < 3; ++k)
       for (uint32_t l = 0; l < 3; ++l) {
         if (!(own_a >> k & own_b >> l & 1)) continue;
         const uint32_t i = corner(a, k), j = corner(a, k + 1), m = corner(b, l), n = corner(b, l + 1);
-        if (i == m || i == n || j == m || j == n || !segments_within(at(i), at(j), at(m), at(n), limit)) continue;
+        if (i == m || i == n || j == m || j == n || !segments_within(at(i), at(j), at(m), at(n), limit))
+          continue;
         const uint32_t e = s.tri_edge[3 * size_t{a} + k], f = s.tri_edge[3 * size_t{b} + l];
         ee_.push_back({std::min(e, f), std::max(e, f)});
       }
   });
   const auto before = [](const SelfPair &l, const SelfPair &r) { return l.a != r.a ? l.a < r.a : l.b < r.b; };
-  std::sort(vf_.begin(), vf_.end(), before), std::sort(ee_.begin(), ee_.end(), before);
+  std::sort(vf_.begin(), vf_.end(), before);
+  std::sort(ee_.begin(), ee_.end(), before);
 }
 
 }  // namespace dfm

@@ -1,7 +1,9 @@
-// Which features of one surface may touch each other: lists with a skin, as those of two bodies (broad_phase.h), of a tree against itself.
+// Which features of one surface may touch each other: lists with a skin, as those of two bodies
+// (broad_phase.h), of a tree against itself.
 //
-// Two differences. A rigid motion of all surfels brings no two of them together, so displacements and speeds are taken against the one that fits
-// best: a body that falls or rolls keeps its lists. And features that share a surfel are no pair: they always touch.
+// Two differences. A rigid motion of all surfels brings no two of them together, so displacements and speeds
+// are taken against the one that fits best: a body that falls or rolls keeps its lists. And features that
+// share a surfel are no pair: they always touch.
 #pragma once
 #include "broad/box_tree.h"
 #include "broad/rigid_fit.h"
@@ -16,10 +18,12 @@ class SelfList {
  public:
   SelfList(const Memory &memory, const Surface &surface);
 
-  // Renews what is out of date; true if the lists changed. h in s; offset d_c in m. Results never depend on when lists were made.
+  // Renews what is out of date; true if the lists changed. h in s; offset d_c in m. Results never depend on
+  // when lists were made.
   bool update(double h, double offset);
-  // After update(), at the same positions: the same lists, made anew where they do not cover the way that the sub-step takes after its solve. change: m/s, by
-  // how much the solve has changed the velocity of any surfel.
+  // After update(), at the same positions: the same lists, made anew where they do not cover the way
+  // that the sub-step takes after its solve. change: m/s, by how much the solve has changed the velocity
+  // of any surfel.
   bool cover(double h, double offset, double change);
   // m/s: no surfel was faster than that at the last update(), beyond the rigid motion that fits best.
   double deforming() const { return motion_.speed; }
@@ -28,30 +32,32 @@ class SelfList {
   // f(triangle, triangle) for pairs whose boxes may meet now; each pair once.
   template <class F>
   void near_triangles(F &&f) {
-    near_self_pairs(tree_, kDistanceRounding * 2 * moved_, stack_, [&](uint32_t p, uint32_t q, double) { f(tree_.triangles()[p], tree_.triangles()[q]); });
+    near_self_pairs(tree_, kDistanceRounding * 2 * moved_, stack_,
+                    [&](uint32_t p, uint32_t q, double) { f(tree_.triangles()[p], tree_.triangles()[q]); });
   }
   // Ascending by (a, b).
   const Array<SelfPair> &vertex_face() const { return vf_; }
   const Array<SelfPair> &edge_edge() const { return ee_; }
   // m: every pair that is nearer than this now is listed. After update(), at the same positions.
   double covered() const { return limit_ - kDistanceRounding * 2 * moved_; }
-  // Wide: at the next renewal the skin is as wide as it ever is, whatever the motion; for a body that waits to touch itself, whose list is not gone through.
+  // Wide: at the next renewal the skin is as wide as it ever is, whatever the motion; for a body that waits
+  // to touch itself, whose list is not gone through.
   void set_wide(bool wide) { wide_ = wide; }
   // The skin is made to last for about this many sub-steps of the present motion.
   void set_skin_steps(double steps) { skin_steps_ = steps; }
 
  private:
-  static constexpr double kDistanceRounding = 1 + 1e-9;   // margins hold in spite of rounded distances
+  static constexpr double kDistanceRounding = 1 + 1e-9;  // margins hold in spite of rounded distances
   double share(double h, double offset, double growth) const;
   double covers(double h, double offset, double change) const;
   void renew(double h, double offset, double change);
   void list(double limit);
   const Surface &surface_;
-  double skin_steps_ = 24, margin_ = -1;   // negative: no lists yet
+  double skin_steps_ = 24, margin_ = -1;  // negative: no lists yet
   BoxTree tree_;
-  RigidReference at_;                      // when the lists were made
-  double longest_ = 0, moved_ = 0;         // m, edge of that time; what displaced() said at the last update()
-  double limit_ = 0;                       // m, that the lists were made with
+  RigidReference at_;               // when the lists were made
+  double longest_ = 0, moved_ = 0;  // m, edge of that time; what displaced() said at the last update()
+  double limit_ = 0;                // m, that the lists were made with
   bool wide_ = false;
   DeformingMotion motion_;
   uint64_t renewals_ = 0;

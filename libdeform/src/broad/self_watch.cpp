@@ -9,7 +9,7 @@
 namespace dfm {
 namespace {
 
-constexpr double kNear = 0.6;            // of the distance at rest; contacts rest at half of it at most
+constexpr double kNear = 0.6;  // of the distance at rest; contacts rest at half of it at most
 constexpr double kRounding = 1 + 1e-9;
 
 double face_distance(const Surface &s, SelfPair pair, const double *x) {
@@ -24,7 +24,8 @@ double edge_distance(const Surface &s, SelfPair pair, const double *x) {
   return std::sqrt(closest_segments(at(a[0]), at(a[1]), at(b[0]), at(b[1])).distance2);
 }
 
-// Largest difference of two arrays [n,4], less that of their first rows; y null: of x itself. What all rows have in common brings no two of them together.
+// Largest difference of two arrays [n,4], less that of their first rows; y null: of x itself. What all rows
+// have in common brings no two of them together.
 double largest_beside_first(uint32_t n, const double *x, const double *y) {
   alignas(16) double common[4];
   for (int k = 0; k < 4; ++k) common[k] = x[k] - (y ? y[k] : 0);
@@ -34,16 +35,22 @@ double largest_beside_first(uint32_t n, const double *x, const double *y) {
 }  // namespace
 
 SelfWatch::SelfWatch(const Memory &m, const Surface &surface, const SelfRest &rest, SelfList &list)
-    : surface_(surface), rest_(rest), list_(list), now_([&surface](uint32_t i) { return load3(&surface.v[4 * size_t{i}]); }) {
+    : surface_(surface),
+      rest_(rest),
+      list_(list),
+      now_([&surface](uint32_t i) { return load3(&surface.v[4 * size_t{i}]); }) {
   use_memory(m, x_, apart_, safe_);
 }
 
-// Two features have moved, and move, against each other by no more than twice what a surfel does against the first.
+// Two features have moved, and move, against each other by no more than twice what a surfel does
+// against the first.
 bool SelfWatch::near(double h, double offset, double speed) {
   const Surface &s = surface_;
-  speed_ = -1, left_ = -1;
+  speed_ = -1;
+  left_ = -1;
   if (s.ntri == 0) return false;
-  if (slack_ > 0 && offset == offset_) left_ = slack_ - kRounding * 2 * largest_beside_first(s.nsurfel, s.x.data(), x_.data());
+  if (slack_ > 0 && offset == offset_)
+    left_ = slack_ - kRounding * 2 * largest_beside_first(s.nsurfel, s.x.data(), x_.data());
   speed_ = speed;
   if (kRounding * 4 * h * speed_ < left_) return false;
   speed_ = largest_beside_first(s.nsurfel, s.v.data(), nullptr);
@@ -54,11 +61,13 @@ bool SelfWatch::near(double h, double offset, double speed) {
 
 bool SelfWatch::meets(double h, double offset, double change, const std::function<Vec3(uint32_t)> &velocity) {
   if (surface_.ntri == 0 || kRounding * 2 * h * (speed_ + change) < left_) return false;
-  list_.update(h, offset), list_.cover(h, offset, change);
+  list_.update(h, offset);
+  list_.cover(h, offset, change);
   return any_near(offset, {h, 2 * h * (list_.deforming() + change), 2 * h * (speed_ + change), velocity});
 }
 
-// What is not listed is not near: update() and cover() list all that is within the reach of a contact, or deeper than what is led back.
+// What is not listed is not near: update() and cover() list all that is within the reach of a contact, or
+// deeper than what is led back.
 bool SelfWatch::any_near(double offset, const Ask &ask) {
   const Surface &s = surface_;
   const Array<SelfPair> &faces = list_.vertex_face(), &edges = list_.edge_edge();
@@ -66,12 +75,14 @@ bool SelfWatch::any_near(double offset, const Ask &ask) {
   if (!x_.empty()) way_ += kRounding * 2 * largest_beside_first(s.nsurfel, s.x.data(), x_.data());
   x_.assign(s.x.begin(), s.x.end());
   if (renewals_ != list_.renewals() || offset != offset_) {
-    renewals_ = 0;   // until it is whole
+    renewals_ = 0;  // until it is whole
     apart_.clear();
     for (const SelfPair &pair : faces) apart_.push_back(face_distance(s, pair, rest_.x.data()));
     for (const SelfPair &pair : edges) apart_.push_back(edge_distance(s, pair, rest_.x.data()));
-    safe_.assign(apart_.size(), -HUGE_VAL), way_ = 0;
-    renewals_ = list_.renewals(), offset_ = offset;
+    safe_.assign(apart_.size(), -HUGE_VAL);
+    way_ = 0;
+    renewals_ = list_.renewals();
+    offset_ = offset;
   }
   const double least = std::max(2 * offset, self_recovery_depth(s));
   double left = list_.covered() - least;
@@ -81,8 +92,10 @@ bool SelfWatch::any_near(double offset, const Ask &ask) {
     if (safe) left = std::min(left, safe_[k] - way_);
     return safe || !(apart_[k] > kClosedAtRest * offset);
   };
-  const auto is_near = [&](size_t k, double distance, std::span<const uint32_t> a, std::span<const uint32_t> b) {
-    const double reach = std::min(2 * offset, kNear * apart_[k]), closest = std::min(least, kNear * apart_[k]);
+  const auto is_near = [&](size_t k, double distance, std::span<const uint32_t> a,
+                           std::span<const uint32_t> b) {
+    const double reach = std::min(2 * offset, kNear * apart_[k]);
+    const double closest = std::min(least, kNear * apart_[k]);
     safe_[k] = way_ + distance - closest;
     left = std::min(left, distance - closest);
     if (distance >= std::max(closest, reach + ask.most)) return false;
@@ -92,7 +105,9 @@ bool SelfWatch::any_near(double offset, const Ask &ask) {
     return distance < std::max(closest, reach + std::min(ask.time * std::sqrt(speed2), ask.most));
   };
   for (size_t k = 0; k < faces.size(); ++k)
-    if (!is_safe(k) && is_near(k, face_distance(s, faces[k], s.x.data()), {&faces[k].a, 1}, {&s.tri[3 * size_t{faces[k].b}], 3})) return true;
+    if (!is_safe(k) && is_near(k, face_distance(s, faces[k], s.x.data()), {&faces[k].a, 1},
+                               {&s.tri[3 * size_t{faces[k].b}], 3}))
+      return true;
   for (size_t k = 0; k < edges.size(); ++k) {
     if (is_safe(faces.size() + k)) continue;
     const uint32_t *const a = &s.edge[2 * size_t{edges[k].a}], *const b = &s.edge[2 * size_t{edges[k].b}];

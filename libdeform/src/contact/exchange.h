@@ -1,17 +1,22 @@
-// Even pressure where the load is even: the areas of neighboring contacts follow the shares in which the mesh carries the normal force.
+// Even pressure where the load is even: the areas of neighboring contacts follow the shares in which the mesh
+// carries the normal force.
 //
-// Detection gives a corner a third of the triangles around it. What a uniform pressure puts on a corner is another share: it depends on how the body's
-// model hands force to its points (springs, lumped masses), and on a pad of regular cells the pressures fn/A of neighbors differ by a factor of two,
-// however fine the mesh is. Rigid-plastic friction does not see it. A bristle does, since its force K A z is bounded by mu fn: a level that is
-// concave in the pressure, so corners with little force slip early, those with much lag behind, and the patch breaks loose below its limit.
+// Detection gives a corner a third of the triangles around it. What a uniform pressure puts on a corner is
+// another share: it depends on how the body's model hands force to its points (springs, lumped masses), and
+// on a pad of regular cells the pressures fn/A of neighbors differ by a factor of two, however fine the mesh
+// is. Rigid-plastic friction does not see it. A bristle does, since its force K A z is bounded by mu fn: a
+// level that is concave in the pressure, so corners with little force slip early, those with much lag behind,
+// and the patch breaks loose below its limit.
 //
-// So each triangle of the patch, of area w, hands area between its corners in proportion to what they carry. With p_i = fn_i / A_i,
+// So each triangle of the patch, of area w, hands area between its corners in proportion to what they carry.
+// With p_i = fn_i / A_i,
 //
 //     A_i* = A_i + sum over triangles T, their other corners j of  w (p_i - p_j) / (3 sum_T p) min(1, 2 min(p_i, p_j) / max(p_i, p_j))         (1)
 //
-// Without the last factor that is A_i* = sum_T w p_i / sum_T p, or 1/p_i* = mean over the fan of 1/mean_T p: the pressure averaged over a ring of
-// triangles. What passes is antisymmetric, so that the patch keeps its area; evens out within a ring what alternates from corner to corner; and cancels
-// where the pressure changes linearly, so that a pressure that falls toward a rim stays one. The last factor makes it continuous where a
+// Without the last factor that is A_i* = sum_T w p_i / sum_T p, or 1/p_i* = mean over the fan of 1/mean_T p:
+// the pressure averaged over a ring of triangles. What passes is antisymmetric, so that the patch keeps its
+// area; evens out within a ring what alternates from corner to corner; and cancels where the pressure changes
+// linearly, so that a pressure that falls toward a rim stays one. The last factor makes it continuous where a
 // corner begins to carry.
 //
 // Areas go there as fast as sliding renews the bristles: contact/renewal.h.
@@ -27,21 +32,33 @@ namespace dfm {
 class AreaExchange {
  public:
   explicit AreaExchange(const Memory &memory);
-  // Which contacts' areas depend on each other. sources: by body slot. law: [n], contacts of one law hand area to each other, none where kNone.
-  // area: [n] m2, as detection and AreaShares (contact/areas.h) have it.
-  void list(std::span<const ContactPoint> contacts, std::span<const DofSource> sources, const uint32_t *law, const double *area);
-  void clear() { triangles_.clear(), last_.clear(), corners_.clear(); }
-  // area: [n] m2, as listed; becomes A* for the contacts that take part. impulse: [n,3], normal part first. Allocates nothing.
+  // Which contacts' areas depend on each other. sources: by body slot. law: [n], contacts of one law
+  // hand area to each other, none where kNone. area: [n] m2, as detection and AreaShares
+  // (contact/areas.h) have it.
+  void list(std::span<const ContactPoint> contacts, std::span<const DofSource> sources, const uint32_t *law,
+            const double *area);
+  void clear() {
+    triangles_.clear();
+    last_.clear();
+    corners_.clear();
+  }
+  // area: [n] m2, as listed; becomes A* for the contacts that take part. impulse: [n,3], normal part first.
+  // Allocates nothing.
   void pass(const double *impulse, double *area);
 
  private:
   struct Corner { uint32_t node, other, contact, law; };
-  // A triangle of the surface in slot_a of its contacts, and what each corner sees of it. kNone: takes no part.
-  struct Triangle { uint32_t slot, number, contact[3]; double area[3]; };
-  Array<Corner> corners_, last_;        // those that take part, by node; all, as they were when the triangles were listed
+  // A triangle of the surface in slot_a of its contacts, and what each corner sees of it. kNone:
+  // takes no part.
+  struct Triangle {
+    uint32_t slot, number, contact[3];
+    double area[3];
+  };
+  // those that take part, by node; all, as they were when the triangles were listed
+  Array<Corner> corners_, last_;
   Array<Corner> fresh_;
   Array<Triangle> triangles_;
-  Array<double> area_, pressure_;       // [n] as listed; fn/A
+  Array<double> area_, pressure_;  // [n] as listed; fn/A
   const Corner *find(uint32_t node, uint32_t other) const;
   void list_triangles(std::span<const ContactPoint> contacts, std::span<const DofSource> sources);
   double taken(const Triangle &t, int corner) const;

@@ -17,13 +17,19 @@ uint64_t sides_of(const ContactPoint &c) {
 Renewal::Renewal(const Memory &m) { use_memory(m, patches_, patch_of_); }
 
 void Renewal::list(std::span<const ContactPoint> contacts, const double *impulse) {
-  patches_.clear(), patch_of_.clear();
+  patches_.clear();
+  patch_of_.clear();
   for (const ContactPoint &c : contacts)
-    if (patches_.empty() || patches_.back().sides != sides_of(c)) patches_.push_back({sides_of(c), 0, 0, 0, 0, 0, 0, 0});
-  std::sort(patches_.begin(), patches_.end(), [](const Patch &l, const Patch &r) { return l.sides < r.sides; });
-  patches_.erase(std::unique(patches_.begin(), patches_.end(), [](const Patch &l, const Patch &r) { return l.sides == r.sides; }), patches_.end());
+    if (patches_.empty() || patches_.back().sides != sides_of(c))
+      patches_.push_back({sides_of(c), 0, 0, 0, 0, 0, 0, 0});
+  std::sort(patches_.begin(), patches_.end(),
+            [](const Patch &l, const Patch &r) { return l.sides < r.sides; });
+  patches_.erase(std::unique(patches_.begin(), patches_.end(),
+                             [](const Patch &l, const Patch &r) { return l.sides == r.sides; }),
+                 patches_.end());
   for (size_t i = 0; i < contacts.size(); ++i) {
-    const auto at = std::lower_bound(patches_.begin(), patches_.end(), sides_of(contacts[i]), [](const Patch &p, uint64_t sides) { return p.sides < sides; });
+    const auto at = std::lower_bound(patches_.begin(), patches_.end(), sides_of(contacts[i]),
+                                     [](const Patch &p, uint64_t sides) { return p.sides < sides; });
     patch_of_.push_back(static_cast<uint32_t>(at - patches_.begin()));
     at->before += impulse[3 * i];
   }
@@ -33,7 +39,8 @@ void Renewal::fill(const uint8_t *stands, const double *aim, double *area) {
   for (size_t i = 0; i < patch_of_.size(); ++i) {
     if (!stands[i]) continue;
     Patch &p = patches_[patch_of_[i]];
-    p.lacks += aim[i] - area[i], p.below += std::max(0.0, aim[i] - area[i]);
+    p.lacks += aim[i] - area[i];
+    p.below += std::max(0.0, aim[i] - area[i]);
   }
   for (size_t i = 0; i < patch_of_.size(); ++i) {
     const Patch &p = patches_[patch_of_[i]];
@@ -41,17 +48,23 @@ void Renewal::fill(const uint8_t *stands, const double *aim, double *area) {
   }
 }
 
-void Renewal::measure(double h, const double *impulse, const Way *ways, const double *dwell, double *renewed) {
+void Renewal::measure(double h, const double *impulse, const Way *ways, const double *dwell,
+                      double *renewed) {
   for (Patch &p : patches_) p.load = p.young = p.slid = p.out = 0;
   for (size_t i = 0; i < patch_of_.size(); ++i) {
     Patch &p = patches_[patch_of_[i]];
     const double ln = impulse[3 * i];
-    p.load += ln, p.young += ln * (h / (h + dwell[i])), p.slid += ln * ways[i].slid, p.out += ln * ways[i].out;
+    p.load += ln;
+    p.young += ln * (h / (h + dwell[i]));
+    p.slid += ln * ways[i].slid;
+    p.out += ln * ways[i].out;
   }
   for (size_t i = 0; i < patch_of_.size(); ++i) {
     const Patch &p = patches_[patch_of_[i]];
     const double slides = p.slid < p.out ? p.slid / p.out : p.slid > 0 ? 1 : 0;
-    const double begins = p.load > 0 ? std::min(std::fabs(p.load - p.before) / std::max(p.load, p.before), p.young / p.load) : 0;
+    const double begins =
+        p.load > 0 ? std::min(std::fabs(p.load - p.before) / std::max(p.load, p.before), p.young / p.load)
+                   : 0;
     renewed[i] = std::min(1.0, slides + begins);
   }
 }

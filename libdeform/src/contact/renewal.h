@@ -1,20 +1,25 @@
 // How far the area of a contact goes to where it should be (its aim: contact/areas.h, contact/exchange.h).
 //
-// Bristles stand on the surface. Area that moved with every change of load would mix deflections that differ, and a patch that is rocked would forget
-// where it stood. Worse, which of several redundant contacts carries a load is chance, down to the last digits of the solve: where an area follows at once,
-// each turn takes bristles off one contact and gives bare area to another, the patch loses force, what it holds gives way, the loads change, and they take
-// turns again. A stack of cubes walked by micrometers per second on that. So what does not move changes nothing:
+// Bristles stand on the surface. Area that moved with every change of load would mix deflections that differ,
+// and a patch that is rocked would forget where it stood. Worse, which of several redundant contacts carries
+// a load is chance, down to the last digits of the solve: where an area follows at once, each turn takes
+// bristles off one contact and gives bare area to another, the patch loses force, what it holds gives way,
+// the loads change, and they take turns again. A stack of cubes walked by micrometers per second on that. So
+// what does not move changes nothing:
 //
 //   a contact that carries nothing   has no bristle out, and gets its aim when it begins to carry
 //   one that carries                 keeps its area, except that
-//     contacts of the patch let go   what the patch lacks then goes to those below their aim; their force is kept, their energy falls
+//     contacts of the patch let go   what the patch lacks then goes to those below their aim; their force is
+//                                    kept, their energy falls
 //     sliding renews the bristles    its area goes to its aim by the share r of the way in a sub-step
 //
 //     r = min(1, sum fn |h v - dz| / sum fn |z|  +  min(|F - F_0| / max(F, F_0), sum fn h / (h + t) / F))       sums over the patch, F = sum fn
 //
-// first how far points slid on over how far their bristles are out, dz being what these took up. Sliding steadily that is the way over the deflection,
-// without bristles it is 1. Then, for a patch that is being made, how much its load has changed since the last sub-step (F_0), as long as its contacts are
-// young, t being their time in contact. One number for a patch, which is all contacts of two sides with each other, so that what some give is what others take.
+// first how far points slid on over how far their bristles are out, dz being what these took up. Sliding
+// steadily that is the way over the deflection, without bristles it is 1. Then, for a patch that is being
+// made, how much its load has changed since the last sub-step (F_0), as long as its contacts are young, t
+// being their time in contact. One number for a patch, which is all contacts of two sides with each other, so
+// that what some give is what others take.
 #pragma once
 #include <span>
 
@@ -28,22 +33,25 @@ class Renewal {
   explicit Renewal(const Memory &memory);
   // impulse: [n,3] of the last sub-step, normal part first.
   void list(std::span<const ContactPoint> contacts, const double *impulse);
-  // Of the contacts listed. stands: [n] 1: has an area that it keeps; aim: [n] m2; area: [n] in and out, of those that stand. Allocates nothing.
+  // Of the contacts listed. stands: [n] 1: has an area that it keeps; aim: [n] m2; area: [n] in and out, of
+  // those that stand. Allocates nothing.
   void fill(const uint8_t *stands, const double *aim, double *area);
   // How far a contact has slid on and how far its bristles are out, m.
   struct Way { double slid, out; };
-  // impulse: [n,3] of this sub-step of h; ways, dwell: [n]; renewed: [n] out, r of the contact's patch. Allocates nothing.
+  // impulse: [n,3] of this sub-step of h; ways, dwell: [n]; renewed: [n] out, r of the contact's patch.
+  // Allocates nothing.
   void measure(double h, const double *impulse, const Way *ways, const double *dwell, double *renewed);
 
  private:
   struct Patch {
     uint64_t sides;
-    double before;                    // N s, load in the last sub-step
-    double load, young, slid, out;    // this one's, and sums that it weights
-    double lacks, below;              // m2: of the patch's area, and what its contacts have less than they should
+    double before;                  // N s, load in the last sub-step
+    double load, young, slid, out;  // this one's, and sums that it weights
+    // m2: of the patch's area, and what its contacts have less than they should
+    double lacks, below;
   };
   Array<Patch> patches_;
-  Array<uint32_t> patch_of_;          // [n]
+  Array<uint32_t> patch_of_;  // [n]
 };
 
 }  // namespace dfm

@@ -5,29 +5,37 @@
 namespace dfm {
 
 ContactRows::ContactRows(const Memory &m) {
-  use_memory(m, begin, dof, weight, y, y_free, inv_mass, source, point, block, blocks, response, frame, drive, rate, wn, wt, cross, impulse,
-             dof_of_point_, dof_of_node_, place_, rigid, arm, dof_of_group_);
+  use_memory(m, begin, dof, weight, y, y_free, inv_mass, source, point, block, blocks, response, frame, drive,
+             rate, wn, wt, cross, impulse, dof_of_point_, dof_of_node_, place_, rigid, arm, dof_of_group_);
 }
 
 // Blocks of the rigid groups that are touched, in their order.
 void ContactRows::build_rigid(std::span<const ContactPoint> contacts, const RigidPlaces &rigids) {
-  rigid.assign(n, kNone), arm.resize(size_t(3) * n);
+  rigid.assign(n, kNone);
+  arm.resize(size_t(3) * n);
   dof_of_group_.assign(rigids.group_size.size(), kNone);
   for (const ContactPoint &c : contacts)
-    if (c.obstacle && rigids.of_obstacle[c.slot_b].group != kNone) dof_of_group_[rigids.of_obstacle[c.slot_b].group] = 0;
+    if (c.obstacle && rigids.of_obstacle[c.slot_b].group != kNone)
+      dof_of_group_[rigids.of_obstacle[c.slot_b].group] = 0;
   for (uint32_t g = 0; g < rigids.group_size.size(); ++g) {
     if (dof_of_group_[g] == kNone) continue;
     const uint32_t count = 2 * rigids.group_size[g];
     dof_of_group_[g] = ndof;
-    for (uint32_t k = 0; k < count; ++k) source.push_back(kNone), point.push_back(k), block.push_back(static_cast<uint32_t>(blocks.size()));
+    for (uint32_t k = 0; k < count; ++k) {
+      source.push_back(kNone);
+      point.push_back(k);
+      block.push_back(static_cast<uint32_t>(blocks.size()));
+    }
     blocks.push_back({kNone, ndof, count, response.size(), g});
     response.resize(response.size() + size_t(9) * count * count);
     ndof += count;
   }
 }
 
-// From the rigid body's center to where the impulse acts on the soft body: the same point on both sides, so that angular momentum is kept to rounding.
-void ContactRows::set_arms(std::span<const ContactPoint> contacts, std::span<const DofSource> sources, const RigidPlaces &rigids) {
+// From the rigid body's center to where the impulse acts on the soft body: the same point on both sides, so
+// that angular momentum is kept to rounding.
+void ContactRows::set_arms(std::span<const ContactPoint> contacts, std::span<const DofSource> sources,
+                           const RigidPlaces &rigids) {
   uint32_t s = 0;
   for (uint32_t i = 0; i < n; ++i) {
     const ContactPoint &c = contacts[i];
@@ -36,19 +44,32 @@ void ContactRows::set_arms(std::span<const ContactPoint> contacts, std::span<con
     rigid[i] = dof_of_group_[r.group] + 2 * r.place;
     Vec3 at;
     for (uint32_t k = 0; k < c.nnode; ++k) {
-      while (c.node[k] < sources[s].first_node || c.node[k] >= sources[s].first_node + sources[s].nnode) s = (s + 1) % uint32_t(sources.size());
+      while (c.node[k] < sources[s].first_node || c.node[k] >= sources[s].first_node + sources[s].nnode)
+        s = (s + 1) % uint32_t(sources.size());
       at += c.weight[k] * load3(&sources[s].surface->x[size_t(c.node[k] - sources[s].first_node) * 4]);
     }
     store3(&arm[size_t(3) * i], at - r.center);
   }
 }
 
-void ContactRows::build(std::span<const ContactPoint> contacts, std::span<const DofSource> sources, const RigidPlaces &rigids) {
-  // Dofs are numbered in order of first use, except that those of a self-stepping body follow each other (its response is one block).
+void ContactRows::build(std::span<const ContactPoint> contacts, std::span<const DofSource> sources,
+                        const RigidPlaces &rigids) {
+  // Dofs are numbered in order of first use, except that those of a self-stepping body follow each other (its
+  // response is one block).
   n = static_cast<uint32_t>(contacts.size());
   uint32_t nnode = 0, npoint = 0;
-  for (const DofSource &s : sources) nnode = std::max(nnode, s.first_node + s.nnode), npoint = std::max(npoint, s.first_point + s.npoint);
-  begin.clear(), dof.clear(), weight.clear(), source.clear(), point.clear(), block.clear(), blocks.clear(), response.clear();
+  for (const DofSource &s : sources) {
+    nnode = std::max(nnode, s.first_node + s.nnode);
+    npoint = std::max(npoint, s.first_point + s.npoint);
+  }
+  begin.clear();
+  dof.clear();
+  weight.clear();
+  source.clear();
+  point.clear();
+  block.clear();
+  blocks.clear();
+  response.clear();
   ndof = 0;
 
   auto source_of = [&](uint32_t node) {
@@ -71,7 +92,9 @@ void ContactRows::build(std::span<const ContactPoint> contacts, std::span<const 
     for (uint32_t node = sources[s].first_node; node < sources[s].first_node + sources[s].nnode; ++node) {
       if (dof_of_node_[node] == kNone) continue;
       dof_of_node_[node] = ndof++;
-      source.push_back(s), point.push_back(node - sources[s].first_node), block.push_back(static_cast<uint32_t>(blocks.size()));
+      source.push_back(s);
+      point.push_back(node - sources[s].first_node);
+      block.push_back(static_cast<uint32_t>(blocks.size()));
     }
     const uint32_t count = ndof - first;
     if (count == 0) continue;
@@ -79,12 +102,21 @@ void ContactRows::build(std::span<const ContactPoint> contacts, std::span<const 
     response.resize(response.size() + size_t(9) * count * count);
   }
   rigid.clear();
-  if (!rigids.of_obstacle.empty()) build_rigid(contacts, rigids), set_arms(contacts, sources, rigids);
-  // Pass 2: contacts to dofs. A coupled surfel expands to its phyxels; a phyxel that comes twice in one contact is merged.
+  if (!rigids.of_obstacle.empty()) {
+    build_rigid(contacts, rigids);
+    set_arms(contacts, sources, rigids);
+  }
+  // Pass 2: contacts to dofs. A coupled surfel expands to its phyxels; a phyxel that comes twice in one
+  // contact is merged.
   dof_of_point_.assign(npoint, kNone);
   auto dof_of = [&](uint32_t s, uint32_t phyxel) {
     uint32_t &d = dof_of_point_[sources[s].first_point + phyxel];
-    if (d == kNone) d = ndof++, source.push_back(s), point.push_back(phyxel), block.push_back(kNone);
+    if (d == kNone) {
+      d = ndof++;
+      source.push_back(s);
+      point.push_back(phyxel);
+      block.push_back(kNone);
+    }
     return d;
   };
   for (const ContactPoint &c : contacts) {
@@ -96,9 +128,11 @@ void ContactRows::build(std::span<const ContactPoint> contacts, std::span<const 
           weight[j] += w;
           return;
         }
-      dof.push_back(d), weight.push_back(w);
+      dof.push_back(d);
+      weight.push_back(w);
     };
-    // The same by a table, for rows that are long. What it holds of other contacts is told by the row's own columns.
+    // The same by a table, for rows that are long. What it holds of other contacts is told by the
+    // row's own columns.
     auto add_far = [&](uint32_t d, double w) {
       if (d >= place_.size()) place_.resize(d + 1);
       const uint32_t at = place_[d];
@@ -107,7 +141,8 @@ void ContactRows::build(std::span<const ContactPoint> contacts, std::span<const 
         return;
       }
       place_[d] = static_cast<uint32_t>(dof.size());
-      dof.push_back(d), weight.push_back(w);
+      dof.push_back(d);
+      weight.push_back(w);
     };
     for (uint32_t k = 0; k < c.nnode; ++k) {
       const uint32_t s = source_of(c.node[k]), surfel = c.node[k] - sources[s].first_node;
@@ -117,15 +152,19 @@ void ContactRows::build(std::span<const ContactPoint> contacts, std::span<const 
       } else if (surface.identity()) {
         add(dof_of(s, surface.point[surfel]), c.weight[k]);
       } else {
-        surface.each_phyxel(surfel, [&](uint32_t phyxel, double w) { add_far(dof_of(s, phyxel), c.weight[k] * w); });
+        surface.each_phyxel(surfel,
+                            [&](uint32_t phyxel, double w) { add_far(dof_of(s, phyxel), c.weight[k] * w); });
       }
     }
   }
   begin.push_back(static_cast<uint32_t>(dof.size()));
-  y.resize(size_t(ndof) * 4), inv_mass.resize(size_t(ndof) * 4);
+  y.resize(size_t(ndof) * 4);
+  inv_mass.resize(size_t(ndof) * 4);
   for (uint32_t d = 0; d < ndof; ++d) {
-    if (source[d] == kNone) {          // a rigid body's change of velocity: what it has without contact is the contact's own `velocity`
-      std::fill_n(&y[size_t(d) * 4], 4, 0.0), std::fill_n(&inv_mass[size_t(d) * 4], 4, 0.0);
+    // a rigid body's change of velocity: what it has without contact is the contact's own `velocity`
+    if (source[d] == kNone) {
+      std::fill_n(&y[size_t(d) * 4], 4, 0.0);
+      std::fill_n(&inv_mass[size_t(d) * 4], 4, 0.0);
       continue;
     }
     const DofSource &s = sources[source[d]];
@@ -136,7 +175,8 @@ void ContactRows::build(std::span<const ContactPoint> contacts, std::span<const 
   }
 }
 
-// What the impulse a on the soft body, -a on the rigid one, changes of the velocity between them on the rigid side.
+// What the impulse a on the soft body, -a on the rigid one, changes of the velocity between them on
+// the rigid side.
 Vec3 ContactRows::rigid_diagonal(uint32_t i, Vec3 a) const {
   const Block &b = blocks[block[rigid[i]]];
   const Vec3 r = load3(&arm[size_t(3) * i]), m = dfm::cross(r, a);
@@ -164,7 +204,8 @@ Vec3 ContactRows::diagonal(uint32_t i, Vec3 a) const {
     const Block &b = blocks[block[d]];
     for (uint32_t l = begin[i]; l < begin[i + 1]; ++l) {
       if (block[dof[l]] != block[d]) continue;
-      const double *const r = &response[b.response + size_t(3 * (d - b.first)) * 3 * b.count + 3 * (dof[l] - b.first)];
+      const double *const r =
+          &response[b.response + size_t(3 * (d - b.first)) * 3 * b.count + 3 * (dof[l] - b.first)];
       const double ww = weight[j] * weight[l];
       for (uint32_t row = 0; row < 3; ++row) {
         const double *const rr = r + size_t(row) * 3 * b.count;
@@ -176,26 +217,41 @@ Vec3 ContactRows::diagonal(uint32_t i, Vec3 a) const {
   return sum;
 }
 
-void ContactRows::finish(std::span<const ContactPoint> contacts, const double *tangents, double h, double planned, double offset) {
-  frame.resize(size_t(n) * 9), drive.resize(size_t(n) * 3), rate.resize(n), wn.resize(n), wt.resize(n);
-  cross.resize(size_t(n) * 2), impulse.resize(size_t(n) * 3);
+void ContactRows::finish(std::span<const ContactPoint> contacts, const double *tangents, double h,
+                         double planned, double offset) {
+  frame.resize(size_t(n) * 9);
+  drive.resize(size_t(n) * 3);
+  rate.resize(n);
+  wn.resize(n);
+  wt.resize(n);
+  cross.resize(size_t(n) * 2);
+  impulse.resize(size_t(n) * 3);
   const double most = recovery > 0 ? recovery * planned : 0.1 * offset;
   for (uint32_t i = 0; i < n; ++i) {
-    const Vec3 normal = load3(contacts[i].normal), t1 = load3(tangents + size_t(i) * 3), t2 = dfm::cross(normal, t1);
+    const Vec3 normal = load3(contacts[i].normal);
+    const Vec3 t1 = load3(tangents + size_t(i) * 3);
+    const Vec3 t2 = dfm::cross(normal, t1);
     double *const f = &frame[size_t(i) * 9];
-    store3(f, normal), store3(f + 3, t1), store3(f + 6, t2);
+    store3(f, normal);
+    store3(f + 3, t1);
+    store3(f + 6, t2);
     const Vec3 v = load3(contacts[i].velocity);
     store3(&drive[size_t(i) * 3], {dot(normal, v), dot(t1, v), dot(t2, v)});
     const double gap = contacts[i].distance - offset;
-    // A depth closes by a fifth per sub-step: closed at once it would leave the bodies apart at gap / h, and a contact that comes with a little depth
-    // (an edge of a face that bends) would be struck away, come back deeper, and never rest.
-    // But the last of the distance is no tolerance to spend: a point that slides over a face that turns comes nearer by slip times turn in every
-    // sub-step, which the contact's straight motion does not see. Nearer than 0.6 d_c the whole of a further depth is closed in the sub-step.
-    // Surfaces that are through each other already (a start state) take their time.
-    const double slow = std::max(0.2 * gap, -most), near = contacts[i].distance > 0 ? gap + 0.32 * offset : slow;
+    // A depth closes by a fifth per sub-step: closed at once it would leave the bodies apart at gap / h, and
+    // a contact that comes with a little depth (an edge of a face that bends) would be struck away, come back
+    // deeper, and never rest.
+    // But the last of the distance is no tolerance to spend: a point that slides over a face that turns comes
+    // nearer by slip times turn in every sub-step, which the contact's straight motion does not see. Nearer
+    // than 0.6 d_c the whole of a further depth is closed in the sub-step. Surfaces that are through each
+    // other already (a start state) take their time.
+    const double slow = std::max(0.2 * gap, -most);
+    const double near = contacts[i].distance > 0 ? gap + 0.32 * offset : slow;
     rate[i] = gap > 0 ? gap / h : std::min(slow, near) / planned;
     const Vec3 w0 = diagonal(i, normal);
-    wn[i] = dot(normal, w0), cross[2 * size_t(i)] = dot(t1, w0), cross[2 * size_t(i) + 1] = dot(t2, w0);
+    wn[i] = dot(normal, w0);
+    cross[2 * size_t(i)] = dot(t1, w0);
+    cross[2 * size_t(i) + 1] = dot(t2, w0);
     const Vec3 w1 = diagonal(i, t1), w2 = diagonal(i, t2);
     const double a = dot(t1, w1), c = dot(t2, w2), b = dot(t1, w2);
     wt[i] = 0.5 * (a + c) + std::sqrt(0.25 * (a - c) * (a - c) + b * b);
@@ -229,7 +285,8 @@ void ContactRows::apply(uint32_t i, Vec3 q) {
   const Vec3 p = q.x * load3(f) + q.y * load3(f + 3) + q.z * load3(f + 6);
   if (!rigid.empty() && rigid[i] != kNone) {
     const Block &b = blocks[block[rigid[i]]];
-    response_apply(b, rigid[i], -p), response_apply(b, rigid[i] + 1, -dfm::cross(load3(&arm[size_t(3) * i]), p));
+    response_apply(b, rigid[i], -p);
+    response_apply(b, rigid[i] + 1, -dfm::cross(load3(&arm[size_t(3) * i]), p));
   }
   for (uint32_t j = begin[i]; j < begin[i + 1]; ++j) {
     const uint32_t d = dof[j];
@@ -239,7 +296,9 @@ void ContactRows::apply(uint32_t i, Vec3 q) {
     }
     double *const to = &y[size_t(d) * 4];
     const double *const w = &inv_mass[size_t(d) * 4];
-    to[0] += weight[j] * (w[0] * p.x), to[1] += weight[j] * (w[1] * p.y), to[2] += weight[j] * (w[2] * p.z);
+    to[0] += weight[j] * (w[0] * p.x);
+    to[1] += weight[j] * (w[1] * p.y);
+    to[2] += weight[j] * (w[2] * p.z);
   }
 }
 
@@ -256,7 +315,8 @@ void ContactRows::push_rigid(const Block &b) {
     if (rigid[i] == kNone || rigid[i] < b.first || rigid[i] >= b.first + b.count) continue;
     const double *const f = &frame[size_t(i) * 9], *const q = &impulse[size_t(i) * 3];
     const Vec3 p = q[0] * load3(f) + q[1] * load3(f + 3) + q[2] * load3(f + 6);
-    response_apply(b, rigid[i], -p), response_apply(b, rigid[i] + 1, -dfm::cross(load3(&arm[size_t(3) * i]), p));
+    response_apply(b, rigid[i], -p);
+    response_apply(b, rigid[i] + 1, -dfm::cross(load3(&arm[size_t(3) * i]), p));
   }
 }
 

@@ -1,10 +1,13 @@
 // The contact operator of one sub-step.
 //
-// Contact i sees the mean velocity over the sub-step u_i = sum_k w_ik y_k - v_obstacle of a few unknowns ("dofs") y_k: phyxels of bodies
-// that the host integrates, surfels of bodies that step themselves. An impulse p at the contact changes them by
+// Contact i sees the mean velocity over the sub-step u_i = sum_k w_ik y_k - v_obstacle of a few unknowns
+// ("dofs") y_k: phyxels of bodies that the host integrates, surfels of bodies that step themselves. An
+// impulse p at the contact changes them by
 //     y_k += w_ik M_k^-1 p                     (phyxel; M per component, infinite where held)
-//     y_j += R_jk w_ik p for all j of the body (self-stepping body; R is its own symmetric response, dense over its touched surfels)
-// A contact with a rigid body also sees the change (dv, dw) of that body's mean velocity, at the arm r from its center to the contact:
+//     y_j += R_jk w_ik p for all j of the body (self-stepping body; R is its own symmetric response, dense
+//     over its touched surfels)
+// A contact with a rigid body also sees the change (dv, dw) of that body's mean velocity, at the arm r from
+// its center to the contact:
 //     u_i -= dv + dw x r,   (dv, dw)_j -= R_jk (p, r x p)  for all bodies j of its group (joints tie them)
 // which is W = J B J^T of doc/concepts/contact.md without ever forming it.
 #pragma once
@@ -18,67 +21,84 @@ namespace dfm {
 
 // Where a body's dofs come from.
 struct DofSource {
-  uint32_t first_node = 0, nnode = 0;     // world-wide surfel numbers of the body
-  uint32_t first_point = 0, npoint = 0;   // world-wide phyxel numbers
+  uint32_t first_node = 0, nnode = 0;    // world-wide surfel numbers of the body
+  uint32_t first_point = 0, npoint = 0;  // world-wide phyxel numbers
   const Surface *surface = nullptr;
-  const double *inv_mass = nullptr;       // [npoint,4]; null: self-stepping
-  const double *v_free = nullptr;         // [npoint,4] or, self-stepping, surface->v
+  const double *inv_mass = nullptr;  // [npoint,4]; null: self-stepping
+  const double *v_free = nullptr;    // [npoint,4] or, self-stepping, surface->v
 };
 
 // The rigid body that an obstacle is: its number in a group of bodies that answer each other's impulses.
 struct RigidPlace {
-  uint32_t group = kNone, place = 0;      // world-wide; kNone: an obstacle that feels nothing
-  Vec3 center;                            // of mass, at the start of the sub-step
+  uint32_t group = kNone, place = 0;  // world-wide; kNone: an obstacle that feels nothing
+  Vec3 center;                        // of mass, at the start of the sub-step
 };
 struct RigidPlaces {
-  std::span<const RigidPlace> of_obstacle;      // by obstacle slot; empty: no rigid bodies
-  std::span<const uint32_t> group_size;         // bodies per group
+  std::span<const RigidPlace> of_obstacle;  // by obstacle slot; empty: no rigid bodies
+  std::span<const uint32_t> group_size;     // bodies per group
 };
 
 struct ContactRows {
-  // Dofs [first, first+count) of a self-stepping body, or of a rigid group: per body its linear velocity, then its spin.
-  struct Block { uint32_t source, first, count; size_t response; uint32_t group; };
+  // Dofs [first, first+count) of a self-stepping body, or of a rigid group: per body its linear velocity,
+  // then its spin.
+  struct Block {
+    uint32_t source, first, count;
+    size_t response;
+    uint32_t group;
+  };
 
   uint32_t n = 0, ndof = 0;
-  Array<uint32_t> begin;                  // [n+1] into dof, weight
+  Array<uint32_t> begin;  // [n+1] into dof, weight
   Array<uint32_t> dof;
   Array<double> weight;
-  Array<double> y, inv_mass;              // [ndof,4]; inv_mass zero for dofs of blocks
-  Array<double> y_free;                   // [ndof,4] without impulses
-  Array<uint32_t> source, point;          // [ndof] index of the DofSource (rigid: kNone), phyxel (or surfel of a block)
-  Array<uint32_t> block;                  // [ndof] kNone or index into blocks
-  Array<uint32_t> rigid;                  // [n] dof of the rigid body's velocity, its spin is the next one; kNone. Empty: no contact has any
-  Array<double> arm;                      // [n,3] m, where there are any
+  Array<double> y, inv_mass;  // [ndof,4]; inv_mass zero for dofs of blocks
+  Array<double> y_free;       // [ndof,4] without impulses
+  // [ndof] index of the DofSource (rigid: kNone), phyxel (or surfel of a block)
+  Array<uint32_t> source, point;
+  Array<uint32_t> block;  // [ndof] kNone or index into blocks
+  // [n] dof of the rigid body's velocity, its spin is the next one; kNone. Empty: no contact has any
+  Array<uint32_t> rigid;
+  Array<double> arm;  // [n,3] m, where there are any
   Array<Block> blocks;
-  Array<double> response;                 // per block [3 count, 3 count] row-major, 1/kg
+  Array<double> response;  // per block [3 count, 3 count] row-major, 1/kg
 
-  Array<double> frame;                    // [n,9] normal, tangent, normal x tangent
-  Array<double> drive;                    // [n,3] obstacle velocity in the frame
-  Array<double> rate;                     // [n] m/s: gap / h; a depth 0.2 gap / h, at least -0.1 d_c / h
-  Array<double> wn, wt;                   // [n] 1/kg: W_nn; largest eigenvalue of W_tt
-  Array<double> cross;                    // [n,2] 1/kg: W_tn, the slip that a unit normal impulse makes at its own contact
-  Array<double> impulse;                  // [n,3] N s: normal, two tangents
+  Array<double> frame;   // [n,9] normal, tangent, normal x tangent
+  Array<double> drive;   // [n,3] obstacle velocity in the frame
+  Array<double> rate;    // [n] m/s: gap / h; a depth 0.2 gap / h, at least -0.1 d_c / h
+  Array<double> wn, wt;  // [n] 1/kg: W_nn; largest eigenvalue of W_tt
+  // [n,2] 1/kg: W_tn, the slip that a unit normal impulse makes at its own contact
+  Array<double> cross;
+  Array<double> impulse;  // [n,3] N s: normal, two tangents
 
-  double recovery = 0;                    // m/s, at most, at which a depth is opened; 0: a tenth of the rest distance per sub-step
+  // m/s, at most, at which a depth is opened; 0: a tenth of the rest distance per sub-step
+  double recovery = 0;
 
   explicit ContactRows(const Memory &memory);
-  // Expands contacts to dofs. Blocks get their dofs and counts; the caller fills `response`, then calls finish().
-  void build(std::span<const ContactPoint> contacts, std::span<const DofSource> sources, const RigidPlaces &rigids = {});
-  // Frames from normals and tangents [n,3], W diagonals, rates. planned: s, time in which a depth closes; longer than h where the guard has cut it, or
-  // depths would turn into speed.
-  void finish(std::span<const ContactPoint> contacts, const double *tangents, double h, double planned, double offset);
+  // Expands contacts to dofs. Blocks get their dofs and counts; the caller fills `response`, then
+  // calls finish().
+  void build(std::span<const ContactPoint> contacts, std::span<const DofSource> sources,
+             const RigidPlaces &rigids = {});
+  // Frames from normals and tangents [n,3], W diagonals, rates. planned: s, time in which a depth closes;
+  // longer than h where the guard has cut it, or depths would turn into speed.
+  void finish(std::span<const ContactPoint> contacts, const double *tangents, double h, double planned,
+              double offset);
 
-  Vec3 velocity(uint32_t i) const;        // relative velocity of contact i in its frame (normal, t1, t2)
-  void apply(uint32_t i, Vec3 impulse_frame);   // changes y by an impulse given in the frame
-  void restore();                         // y from the impulses alone: sweeps have left it not finite, or with their rounding
-  void push_rigid(const Block &group);    // changes y of a rigid group by all impulses that act on it: its response has been renewed
+  Vec3 velocity(uint32_t i) const;             // relative velocity of contact i in its frame (normal, t1, t2)
+  void apply(uint32_t i, Vec3 impulse_frame);  // changes y by an impulse given in the frame
+  // y from the impulses alone: sweeps have left it not finite, or with their rounding
+  void restore();
+  // changes y of a rigid group by all impulses that act on it: its response has been renewed
+  void push_rigid(const Block &group);
 
  private:
-  Array<uint32_t> dof_of_point_, dof_of_node_;   // this sub-step's dof of a phyxel, of a surfel of a self-stepping body; kNone
-  Array<uint32_t> place_;                        // where a dof of a coupled surface stands in the row being made
-  Array<uint32_t> dof_of_group_;                 // first dof of a rigid group
+  // this sub-step's dof of a phyxel, of a surfel of a self-stepping body; kNone
+  Array<uint32_t> dof_of_point_, dof_of_node_;
+  // where a dof of a coupled surface stands in the row being made
+  Array<uint32_t> place_;
+  Array<uint32_t> dof_of_group_;  // first dof of a rigid group
   void build_rigid(std::span<const ContactPoint> contacts, const RigidPlaces &rigids);
-  void set_arms(std::span<const ContactPoint> contacts, std::span<const DofSource> sources, const RigidPlaces &rigids);
+  void set_arms(std::span<const ContactPoint> contacts, std::span<const DofSource> sources,
+                const RigidPlaces &rigids);
   void response_apply(const Block &b, uint32_t k, Vec3 p);
   Vec3 rigid_diagonal(uint32_t i, Vec3 a) const;
   Vec3 diagonal(uint32_t i, Vec3 direction) const;

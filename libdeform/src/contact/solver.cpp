@@ -8,20 +8,27 @@ namespace {
 
 struct Pair { double a, b; };
 
-// Friction impulse that the linearized law wants, given the contact's present impulse (l1, l2), slip (u1, u2) and new normal impulse.
+// Friction impulse that the linearized law wants, given the contact's present impulse (l1, l2), slip (u1, u2)
+// and new normal impulse.
 //
-// Set-valued laws: lambda* = lambda - u / w_t would stop the slip. Inside the disc it is taken (stick); outside the contact slides along
-// lambda* on a disc whose radius grows with the slip speed s by the law's slope c = -v^ . (dft/dv) v^ >= 0 (viscous part):
+// Set-valued laws: lambda* = lambda - u / w_t would stop the slip. Inside the disc it is taken (stick);
+// outside the contact slides along lambda* on a disc whose radius grows with the slip speed s by the law's
+// slope c = -v^ . (dft/dv) v^ >= 0 (viscous part):
 //     radius(s) = R + h c (s - s0),  s = w_t (|lambda*| - radius(s))   =>   s = w_t (|lambda*| - R + h c s0) / (1 + w_t h c).
-// The radius follows the normal impulse: in proportion while it sticks, by the law's dft/dfn while it slips (its viscous part does not).
+// The radius follows the normal impulse: in proportion while it sticks, by the law's dft/dfn while it slips
+// (its viscous part does not).
 //
-// Smooth laws: lambda = h [ft + D (u' - v) + d (fn' - fn)] with u' = u + w_t (lambda - lambda_old): a 2x2 system, positive definite
-// because only the negative semidefinite part of D is used. The law's limit is kept: an elastic bristle that breaks away then slides on the cone at
-// once instead of overshooting it. A contact that stuck when its law was asked is kept inside the limit in proportion to the normal impulse. One that slid
-// is kept inside what the limit can be at all: limit(fn) is concave (a cone and a bounded part), so never above limit max(1, ln / (h fn)). Without that the
-// sweeps can run away. Where fn is small dft_dfn is steep, by mu^2 sigma1/(4 sigma0 h) with micro-damping, and holds for a hair's breadth alone; each sweep
-// then answers a normal impulse with several times as much friction, that with a normal impulse beside it, and so on until nothing is finite.
-Pair friction_impulse(const ContactRows &rows, const ContactState &s, uint32_t i, double h, double ln, double u1, double u2) {
+// Smooth laws: lambda = h [ft + D (u' - v) + d (fn' - fn)] with u' = u + w_t (lambda - lambda_old): a 2x2
+// system, positive definite
+// because only the negative semidefinite part of D is used. The law's limit is kept: an elastic bristle that
+// breaks away then slides on the cone at once instead of overshooting it. A contact that stuck when its law
+// was asked is kept inside the limit in proportion to the normal impulse. One that slid is kept inside what
+// the limit can be at all: limit(fn) is concave (a cone and a bounded part), so never above limit max(1, ln /
+// (h fn)). Without that the sweeps can run away. Where fn is small dft_dfn is steep, by mu^2 sigma1/(4 sigma0
+// h) with micro-damping, and holds for a hair's breadth alone; each sweep then answers a normal impulse with
+// several times as much friction, that with a normal impulse beside it, and so on until nothing is finite.
+Pair friction_impulse(const ContactRows &rows, const ContactState &s, uint32_t i, double h, double ln,
+                      double u1, double u2) {
   const double wt = rows.wt[i], l1 = rows.impulse[size_t(i) * 3 + 1], l2 = rows.impulse[size_t(i) * 3 + 2];
   const uint32_t n = s.stride;
   const double fn = s.fn[i];
@@ -36,7 +43,8 @@ Pair friction_impulse(const ContactRows &rows, const ContactState &s, uint32_t i
       double slope = 0;
       if (speed > 0) {
         const double e1 = v1 / speed, e2 = v2 / speed;
-        slope = std::max(0.0, -(e1 * (s.dft_dvt[i] * e1 + s.dft_dvt[n + i] * e2) + e2 * (s.dft_dvt[2 * n + i] * e1 + s.dft_dvt[3 * n + i] * e2)));
+        slope = std::max(0.0, -(e1 * (s.dft_dvt[i] * e1 + s.dft_dvt[n + i] * e2) +
+                                e2 * (s.dft_dvt[2 * n + i] * e1 + s.dft_dvt[3 * n + i] * e2)));
       }
       const double slip = std::max(0.0, wt * (size - radius + h * slope * speed) / (1 + wt * h * slope));
       radius = std::max(0.0, radius + h * slope * (slip - speed));
@@ -47,8 +55,12 @@ Pair friction_impulse(const ContactRows &rows, const ContactState &s, uint32_t i
   const auto [d11, d12, d22] = dissipative_slope(s, i);
   const double dfn = ln / h - fn;
   const double v1 = u1 - wt * l1 - s.vt[i], v2 = u2 - wt * l2 - s.vt[n + i];
-  const double r1 = h * (s.ft[i] + d11 * v1 + d12 * v2 + s.dft_dfn[i] * dfn), r2 = h * (s.ft[n + i] + d12 * v1 + d22 * v2 + s.dft_dfn[n + i] * dfn);
-  const double m11 = 1 - h * wt * d11, m22 = 1 - h * wt * d22, m12 = -h * wt * d12, det = m11 * m22 - m12 * m12;
+  const double r1 = h * (s.ft[i] + d11 * v1 + d12 * v2 + s.dft_dfn[i] * dfn);
+  const double r2 = h * (s.ft[n + i] + d12 * v1 + d22 * v2 + s.dft_dfn[n + i] * dfn);
+  const double m11 = 1 - h * wt * d11;
+  const double m22 = 1 - h * wt * d22;
+  const double m12 = -h * wt * d12;
+  const double det = m11 * m22 - m12 * m12;
   Pair l{(m22 * r1 - m12 * r2) / det, (m11 * r2 - m12 * r1) / det};
   const double size = std::sqrt(l.a * l.a + l.b * l.b), radius = fn > 0 ? s.limit[i] / fn * ln : 0;
   const double most = s.mode[i] == 1 ? radius : std::max(radius, h * s.limit[i]);
@@ -66,10 +78,13 @@ void set_trial(const ContactRows &rows, double h, ContactState &s) {
   for (uint32_t i = 0; i < rows.n; ++i) {
     const Vec3 u = rows.velocity(i);
     const double *const l = &rows.impulse[size_t(i) * 3];
-    // A contact without impulse is asked at the normal force that would close it alone, and never below what changes its velocity by 1e-6 m/s:
-    // its law's limit per normal force must be known, or a contact that opens and closes would lose its friction in every other pass.
-    s.fn[i] = rows.wn[i] > 0 ? std::max(l[0] > 0 ? l[0] : normal_impulse(rows, i, u.x), 1e-6 / rows.wn[i]) / h : 0;
-    s.vt[i] = u.y, s.vt[s.stride + i] = u.z;
+    // A contact without impulse is asked at the normal force that would close it alone, and never below what
+    // changes its velocity by 1e-6 m/s: its law's limit per normal force must be known, or a contact that
+    // opens and closes would lose its friction in every other pass.
+    s.fn[i] =
+        rows.wn[i] > 0 ? std::max(l[0] > 0 ? l[0] : normal_impulse(rows, i, u.x), 1e-6 / rows.wn[i]) / h : 0;
+    s.vt[i] = u.y;
+    s.vt[s.stride + i] = u.z;
     const double wt = rows.wt[i];
     s.ft_stop[i] = wt > 0 ? (l[1] - u.y / wt) / h : 0;
     s.ft_stop[s.stride + i] = wt > 0 ? (l[2] - u.z / wt) / h : 0;
@@ -79,7 +94,8 @@ void set_trial(const ContactRows &rows, double h, ContactState &s) {
 void set_slips(const ContactRows &rows, ContactState &s) {
   for (uint32_t i = 0; i < rows.n; ++i) {
     const Vec3 u = rows.velocity(i);
-    s.vt[i] = u.y, s.vt[s.stride + i] = u.z;
+    s.vt[i] = u.y;
+    s.vt[s.stride + i] = u.z;
   }
 }
 
@@ -92,10 +108,13 @@ void sweep(ContactRows &rows, const ContactState &law, double h) {
     if (ln == 0 && l[0] == 0 && l[1] == 0 && l[2] == 0) continue;
     Pair t{0, 0};
     if (ln > 0 && rows.wt[i] > 0)
-      t = friction_impulse(rows, law, i, h, ln, u.y + rows.cross[2 * size_t(i)] * d, u.z + rows.cross[2 * size_t(i) + 1] * d);
+      t = friction_impulse(rows, law, i, h, ln, u.y + rows.cross[2 * size_t(i)] * d,
+                           u.z + rows.cross[2 * size_t(i) + 1] * d);
     if (d == 0 && t.a == l[1] && t.b == l[2]) continue;
     rows.apply(i, {d, t.a - l[1], t.b - l[2]});
-    l[0] = ln, l[1] = t.a, l[2] = t.b;
+    l[0] = ln;
+    l[1] = t.a;
+    l[2] = t.b;
   }
 }
 
@@ -117,8 +136,16 @@ double dot(const double *a, const double *b, uint32_t n) {
 
 void Acceleration::start(const ContactRows &rows) {
   const uint32_t values = 3 * rows.n;
-  n_ = (values + 3) & ~3u, count_ = next_ = 0, first_ = true, last_ = 0;
-  metric_.resize(n_), f_.resize(n_), g_.resize(n_), now_.resize(n_), df_.resize(size_t(kWindow) * n_), dg_.resize(size_t(kWindow) * n_);
+  n_ = (values + 3) & ~3u;
+  count_ = next_ = 0;
+  first_ = true;
+  last_ = 0;
+  metric_.resize(n_);
+  f_.resize(n_);
+  g_.resize(n_);
+  now_.resize(n_);
+  df_.resize(size_t(kWindow) * n_);
+  dg_.resize(size_t(kWindow) * n_);
   for (uint32_t i = 0; i < rows.n; ++i) {
     metric_[3 * i] = std::sqrt(rows.wn[i]);
     metric_[3 * i + 1] = metric_[3 * i + 2] = std::sqrt(rows.wt[i]);
@@ -128,7 +155,8 @@ void Acceleration::start(const ContactRows &rows) {
   std::copy(rows.impulse.begin(), rows.impulse.end(), from_.begin());
 }
 
-// gamma that makes |f - sum gamma_j df_j| least: normal equations by Cholesky, slightly regularized. False: not usable.
+// gamma that makes |f - sum gamma_j df_j| least: normal equations by Cholesky, slightly regularized.
+// False: not usable.
 bool Acceleration::combine(const double *f, double *gamma) const {
   double l[kWindow][kWindow], y[kWindow], trace = 0;
   for (uint32_t j = 0; j < count_; ++j) trace += gram_[j][j];
@@ -157,30 +185,39 @@ void Acceleration::follow(ContactRows &rows) {
   double *const df = &df_[size_t(next_) * n_], *const dg = &dg_[size_t(next_) * n_];
   for (uint32_t k = 0; k < n_; ++k) {
     const double f = metric_[k] * (now_[k] - from_[k]);
-    if (!first_) df[k] = f - f_[k], dg[k] = now_[k] - g_[k];
-    f_[k] = f, g_[k] = now_[k];
+    if (!first_) {
+      df[k] = f - f_[k];
+      dg[k] = now_[k] - g_[k];
+    }
+    f_[k] = f;
+    g_[k] = now_[k];
   }
   const double size = dot(f_.data(), f_.data(), n_);
-  if (!first_ && size > 4 * last_) {        // the map has changed under us (contacts opened or began to slip): what was learned is void
+  // the map has changed under us (contacts opened or began to slip): what was learned is void
+  if (!first_ && size > 4 * last_) {
     count_ = next_ = 0;
   } else if (!first_) {
     count_ = std::max(count_, next_ + 1);
-    for (uint32_t j = 0; j < count_; ++j) gram_[j][next_] = gram_[next_][j] = dot(&df_[size_t(j) * n_], df, n_);
+    for (uint32_t j = 0; j < count_; ++j)
+      gram_[j][next_] = gram_[next_][j] = dot(&df_[size_t(j) * n_], df, n_);
     next_ = (next_ + 1) % kWindow;
   }
-  first_ = false, last_ = size;
+  first_ = false;
+  last_ = size;
 
   double gamma[kWindow] = {};
   if (count_ > 0 && combine(f_.data(), gamma)) {
     Four *const jumps = reinterpret_cast<Four *>(now_.data());
     for (uint32_t k = 0; k < n_ / 4; ++k) {
       Four sum{0, 0, 0, 0};
-      for (uint32_t j = 0; j < count_; ++j) sum -= gamma[j] * reinterpret_cast<const Four *>(&dg_[size_t(j) * n_])[k];
+      for (uint32_t j = 0; j < count_; ++j)
+        sum -= gamma[j] * reinterpret_cast<const Four *>(&dg_[size_t(j) * n_])[k];
       jumps[k] = sum;
     }
     for (uint32_t i = 0; i < rows.n; ++i) {
       Vec3 jump = load3(&now_[size_t(3) * i]);
-      jump.x = std::max(jump.x, -rows.impulse[3 * i]);   // a normal impulse never pulls, not in between either
+      // a normal impulse never pulls, not in between either
+      jump.x = std::max(jump.x, -rows.impulse[3 * i]);
       if (jump.x == 0 && jump.y == 0 && jump.z == 0) continue;
       rows.apply(i, jump);
       for (uint32_t c = 0; c < 3; ++c) rows.impulse[3 * i + c] += jump[int(c)];
@@ -200,9 +237,10 @@ double tangent_residual(const ContactRows &rows, uint32_t i, Pair law) {
   return rows.wt[i] * std::sqrt(a * a + b * b);
 }
 
-// What the laws, asked at the present state, want contact i to carry. They are compared by the answer they give together with the contact's own
-// response, not by the bare force: the difference is then the velocity that is left to correct. Where a set-valued law just slips, force and
-// slip may differ in direction by much while that is tiny; a smooth law with a steep slope c would count it 1 + h w_t c times.
+// What the laws, asked at the present state, want contact i to carry. They are compared by the answer they
+// give together with the contact's own response, not by the bare force: the difference is then the velocity
+// that is left to correct. Where a set-valued law just slips, force and slip may differ in direction by much
+// while that is tiny; a smooth law with a steep slope c would count it 1 + h w_t c times.
 Pair answered(const ContactRows &rows, const ContactState &s, uint32_t i, double h, Vec3 u) {
   return friction_impulse(rows, s, i, h, rows.impulse[size_t(i) * 3], u.y, u.z);
 }
@@ -218,29 +256,40 @@ Residual residual(const ContactRows &rows, const Tolerance &tolerance, Law law) 
     const Vec3 u = rows.velocity(i);
     const double normal = normal_residual(rows, i, u);
     poison += 0.0 * ((u.x + u.y) + (u.z + l[0]));
-    r.share = std::max(r.share, normal / tolerance.normal[i]), r.due = std::max(r.due, normal / tolerance.most_normal);
-    r.speed = std::max(r.speed, normal), r.normal = std::max(r.normal, normal);
+    r.share = std::max(r.share, normal / tolerance.normal[i]);
+    r.due = std::max(r.due, normal / tolerance.most_normal);
+    r.speed = std::max(r.speed, normal);
+    r.normal = std::max(r.normal, normal);
     if (!(rows.wt[i] > 0) || !(l[0] > 0)) continue;
     const Pair t = law(i, u);
-    const double tangent = tangent_residual(rows, i, t), allowed = std::max(tolerance.tangent[i], 1e-3 * std::sqrt(u.y * u.y + u.z * u.z));
-    r.share = std::max(r.share, tangent / allowed), r.due = std::max(r.due, tangent / allowed), r.speed = std::max(r.speed, tangent);
+    const double tangent = tangent_residual(rows, i, t);
+    const double allowed = std::max(tolerance.tangent[i], 1e-3 * std::sqrt(u.y * u.y + u.z * u.z));
+    r.share = std::max(r.share, tangent / allowed);
+    r.due = std::max(r.due, tangent / allowed);
+    r.speed = std::max(r.speed, tangent);
   }
-  if (poison != 0) r.share = r.due = std::numeric_limits<double>::infinity();   // max() passes over what is no number
+  // max() passes over what is no number
+  if (poison != 0) r.share = r.due = std::numeric_limits<double>::infinity();
   return r;
 }
 
 }  // namespace
 
-Residual inner_residual(const ContactRows &rows, const ContactState &law, double h, const Tolerance &tolerance) {
-  return residual(rows, tolerance, [&](uint32_t i, Vec3 u) { return friction_impulse(rows, law, i, h, rows.impulse[size_t(i) * 3], u.y, u.z); });
+Residual inner_residual(const ContactRows &rows, const ContactState &law, double h,
+                        const Tolerance &tolerance) {
+  return residual(rows, tolerance, [&](uint32_t i, Vec3 u) {
+    return friction_impulse(rows, law, i, h, rows.impulse[size_t(i) * 3], u.y, u.z);
+  });
 }
 
-Residual true_residual(const ContactRows &rows, const ContactState &answer, double h, const Tolerance &tolerance) {
+Residual true_residual(const ContactRows &rows, const ContactState &answer, double h,
+                       const Tolerance &tolerance) {
   return residual(rows, tolerance, [&](uint32_t i, Vec3 u) { return answered(rows, answer, i, h, u); });
 }
 
-void set_tolerance(const ContactRows &rows, const ContactState &answer, std::span<const ContactPoint> contacts, double h,
-                   const ToleranceBounds &bounds, uint32_t bodies, Array<double> &disturbance, Tolerance &tolerance) {
+void set_tolerance(const ContactRows &rows, const ContactState &answer,
+                   std::span<const ContactPoint> contacts, double h, const ToleranceBounds &bounds,
+                   uint32_t bodies, Array<double> &disturbance, Tolerance &tolerance) {
   disturbance.assign(2 * size_t{bodies}, 0.0);
   auto visit = [&](uint32_t i, auto f) {
     f(&disturbance[2 * size_t{contacts[i].slot_a}]);
@@ -250,16 +299,26 @@ void set_tolerance(const ContactRows &rows, const ContactState &answer, std::spa
     if (!(rows.wn[i] > 0)) continue;
     const Vec3 u = rows.velocity(i);
     const bool rubs = rows.wt[i] > 0 && (rows.impulse[size_t(i) * 3] > 0 || answer.fn[i] > 0);
-    const double normal = normal_residual(rows, i, u), tangent = rubs ? tangent_residual(rows, i, answered(rows, answer, i, h, u)) : 0;
-    visit(i, [&](double *d) { d[0] = std::max(d[0], tangent), d[1] = std::max({d[1], tangent, normal}); });
+    const double normal = normal_residual(rows, i, u);
+    const double tangent = rubs ? tangent_residual(rows, i, answered(rows, answer, i, h, u)) : 0;
+    visit(i, [&](double *d) {
+      d[0] = std::max(d[0], tangent);
+      d[1] = std::max({d[1], tangent, normal});
+    });
   }
   tolerance.most_normal = bounds.most_normal;
-  tolerance.normal.resize(rows.n), tolerance.tangent.resize(rows.n);
+  tolerance.normal.resize(rows.n);
+  tolerance.tangent.resize(rows.n);
   for (uint32_t i = 0; i < rows.n; ++i) {
     // what a gap is off by where coordinates are large: a few roundings of them
-    double normal = std::max(bounds.normal, 0x1p-49 * norm(load3(contacts[i].point)) / h), tangent = bounds.tangent;
-    visit(i, [&](const double *d) { tangent = std::max(tangent, 1e-2 * d[0]), normal = std::max(normal, 2e-2 * d[1]); });
-    tolerance.normal[i] = std::min(normal, bounds.most_normal), tolerance.tangent[i] = tangent;
+    double normal = std::max(bounds.normal, 0x1p-49 * norm(load3(contacts[i].point)) / h);
+    double tangent = bounds.tangent;
+    visit(i, [&](const double *d) {
+      tangent = std::max(tangent, 1e-2 * d[0]);
+      normal = std::max(normal, 2e-2 * d[1]);
+    });
+    tolerance.normal[i] = std::min(normal, bounds.most_normal);
+    tolerance.tangent[i] = tangent;
   }
 }
 

@@ -1,5 +1,6 @@
-// Normal contact and friction of one sub-step: inner sweeps of block Gauss-Seidel on the laws as they were linearized by the last outer
-// pass. The outer loop (which asks the laws) is world/solve.cpp; the mathematics is doc/concepts/contact.md.
+// Normal contact and friction of one sub-step: inner sweeps of block Gauss-Seidel on the laws as they were
+// linearized by the last outer pass. The outer loop (which asks the laws) is world/solve.cpp; the mathematics
+// is doc/concepts/contact.md.
 #pragma once
 #include "contact/rows.h"
 #include "surfel/contact_state.h"
@@ -11,50 +12,65 @@ void set_trial(const ContactRows &rows, double h, ContactState &state);
 // The slips that were solved for, where the laws were asked beside them.
 void set_slips(const ContactRows &rows, ContactState &state);
 
-// One sweep in contact order. Every contact first gets its normal impulse, then its friction impulse with that new normal impulse.
+// One sweep in contact order. Every contact first gets its normal impulse, then its friction impulse with
+// that new normal impulse.
 void sweep(ContactRows &rows, const ContactState &law, double h);
 
-// Anderson acceleration of the sweeps (Walker and Ni 2011, type II). A sweep is a fixed-point map G; where contacts are nearly redundant
-// (vertex-face beside edge-edge, two bodies' grids on each other) it converges linearly and slowly. With f = G(lambda) - lambda of the last
-// few sweeps, the next iterate is the combination of their results whose f would be least, in the metric of the operator's diagonal; once the
-// active set stands this is GMRES on the linear system. The state that is used is always one that a plain sweep has left.
+// Anderson acceleration of the sweeps (Walker and Ni 2011, type II). A sweep is a fixed-point map G; where
+// contacts are nearly redundant (vertex-face beside edge-edge, two bodies' grids on each other) it converges
+// linearly and slowly. With f = G(lambda) - lambda of the last few sweeps, the next iterate is the
+// combination of their results whose f would be least, in the metric of the operator's diagonal; once the
+// active set stands this is GMRES on the linear system. The state that is used is always one that a plain
+// sweep has left.
 class Acceleration {
  public:
   explicit Acceleration(const Memory &memory);
-  void start(const ContactRows &rows);         // before the first sweep of a pass
-  void follow(ContactRows &rows);              // after a sweep that another one follows
+  void start(const ContactRows &rows);  // before the first sweep of a pass
+  void follow(ContactRows &rows);       // after a sweep that another one follows
 
  private:
   static constexpr uint32_t kWindow = 5;
-  uint32_t n_ = 0, count_ = 0, next_ = 0;      // values padded to fours, columns held, column to write
+  uint32_t n_ = 0, count_ = 0, next_ = 0;  // values padded to fours, columns held, column to write
   bool first_ = true;
   double last_ = 0;
-  Array<double> metric_;                       // [n] square roots of the diagonal
-  Array<double> from_;                         // [n] iterate that the last sweep started from
-  Array<double> f_, g_, now_;                  // [n] of the last sweep, f in the metric; scratch
-  Array<double> df_, dg_;                      // [window,n] differences of successive f and g
+  Array<double> metric_;       // [n] square roots of the diagonal
+  Array<double> from_;         // [n] iterate that the last sweep started from
+  Array<double> f_, g_, now_;  // [n] of the last sweep, f in the metric; scratch
+  Array<double> df_, dg_;      // [window,n] differences of successive f and g
   double gram_[kWindow][kWindow] = {};
   bool combine(const double *f, double *gamma) const;
 };
 
-// How far a state is from a solution. Per contact, m/s: r_n = |min(w_n lambda_n, u_n + gap/h)|, r_t = w_t |lambda_t - law|.
+// How far a state is from a solution. Per contact, m/s: r_n = |min(w_n lambda_n, u_n + gap/h)|, r_t = w_t
+// |lambda_t - law|.
 // A contact is good where both stay within what they may be off by:
-//   r_n <= normal[i]                      0.01 (d_c - d_g) / h: the gap is then off by less than a hundredth of its margin; less where laws remember
+//   r_n <= normal[i]                      0.01 (d_c - d_g) / h: the gap is then off by less than a hundredth
+//                                         of its margin; less where laws remember
 //   r_t <= max(tangent[i], 1e-3 |slip|)   1e-6 m/s at rest, which bounds the creep of what sticks
-// `share` is the worst contact's residual over its tolerance: at most 1 is converged (doc/decisions/0004-contact-tolerance.md).
-struct Tolerance { double most_normal = 0; Array<double> normal, tangent; };
-struct ToleranceBounds { double tangent, normal, most_normal; };   // m/s: at rest, at rest, ever
-// `due` is the same with most_normal for normal[i]: what must be reached, where the rest may be left to the next sub-step's warm start.
-// `normal` is the worst r_n alone, m/s.
+// `share` is the worst contact's residual over its tolerance: at most 1 is converged
+// (doc/decisions/0004-contact-tolerance.md).
+struct Tolerance {
+  double most_normal = 0;
+  Array<double> normal, tangent;
+};
+struct ToleranceBounds { double tangent, normal, most_normal; };  // m/s: at rest, at rest, ever
+// `due` is the same with most_normal for normal[i]: what must be reached, where the rest may be left to the
+// next sub-step's warm start. `normal` is the worst r_n alone, m/s.
 struct Residual { double share = 0, due = 0, speed = 0, normal = 0; };
-Residual inner_residual(const ContactRows &rows, const ContactState &law, double h, const Tolerance &tolerance);   // of the linearized laws
-Residual true_residual(const ContactRows &rows, const ContactState &answer, double h, const Tolerance &tolerance); // laws asked at this state
+// of the linearized laws
+Residual inner_residual(const ContactRows &rows, const ContactState &law, double h,
+                        const Tolerance &tolerance);
+// laws asked at this state
+Residual true_residual(const ContactRows &rows, const ContactState &answer, double h,
+                       const Tolerance &tolerance);
 
-// tangent[i] = max(bounds.tangent, 1e-2 d), d: the largest r_t that the warm start leaves at any contact of the two bodies. A contact at rest is
-// warm started at its solution, so d vanishes and the bound at rest rules; while bodies shake, a hundredth of what the sub-step changes is enough,
-// and what is left is part of the next sub-step's d. normal[i] = max(bounds.normal, 2e-2 d), d the largest of all r_n and r_t, up to most_normal.
-// disturbance: scratch, two entries per body slot.
-void set_tolerance(const ContactRows &rows, const ContactState &answer, std::span<const ContactPoint> contacts, double h,
-                   const ToleranceBounds &bounds, uint32_t bodies, Array<double> &disturbance, Tolerance &tolerance);
+// tangent[i] = max(bounds.tangent, 1e-2 d), d: the largest r_t that the warm start leaves at any contact of
+// the two bodies. A contact at rest is warm started at its solution, so d vanishes and the bound at rest
+// rules; while bodies shake, a hundredth of what the sub-step changes is enough, and what is left is part of
+// the next sub-step's d. normal[i] = max(bounds.normal, 2e-2 d), d the largest of all r_n and r_t, up to
+// most_normal. disturbance: scratch, two entries per body slot.
+void set_tolerance(const ContactRows &rows, const ContactState &answer,
+                   std::span<const ContactPoint> contacts, double h, const ToleranceBounds &bounds,
+                   uint32_t bodies, Array<double> &disturbance, Tolerance &tolerance);
 
 }  // namespace dfm

@@ -9,7 +9,8 @@ ContactStore::ContactStore(const Memory &m) {
 }
 
 uint32_t ContactStore::find(uint64_t k) const {
-  const auto it = std::lower_bound(by_key.begin(), by_key.end(), k, [&](uint32_t i, uint64_t value) { return key[i] < value; });
+  const auto it = std::lower_bound(by_key.begin(), by_key.end(), k,
+                                   [&](uint32_t i, uint64_t value) { return key[i] < value; });
   return it != by_key.end() && key[*it] == k ? *it : kNone;
 }
 
@@ -17,12 +18,13 @@ Vec3 transport(Vec3 t, Vec3 m, Vec3 n, bool *reset) {
   const double c = dot(m, n);
   *reset = c < -0.5;
   if (*reset) return any_tangent(n);
-  const Vec3 turned = t - (dot(n, t) / (1 + c)) * (m + n);   // rotation m -> n applied to a vector orthogonal to m
-  return normalized(turned - dot(turned, n) * n);            // rounding only
+  // rotation m -> n applied to a vector orthogonal to m
+  const Vec3 turned = t - (dot(n, t) / (1 + c)) * (m + n);
+  return normalized(turned - dot(turned, n) * n);  // rounding only
 }
 
-void warm_start(const ContactStore &old, std::span<const ContactPoint> contacts, double h, ContactRows &rows, ContactState &state,
-                double *tangents, uint32_t *match) {
+void warm_start(const ContactStore &old, std::span<const ContactPoint> contacts, double h, ContactRows &rows,
+                ContactState &state, double *tangents, uint32_t *match) {
   const double scale = old.h > 0 ? h / old.h : 0;
   rows.impulse.resize(size_t(contacts.size()) * 3);
   for (uint32_t i = 0; i < contacts.size(); ++i) {
@@ -34,7 +36,8 @@ void warm_start(const ContactStore &old, std::span<const ContactPoint> contacts,
     state.dwell[i] = 0;
     bool reset = true;
     Vec3 t;
-    if (m != kNone) t = transport(load3(&old.tangent[size_t(m) * 3]), load3(&old.normal[size_t(m) * 3]), n, &reset);
+    if (m != kNone)
+      t = transport(load3(&old.tangent[size_t(m) * 3]), load3(&old.normal[size_t(m) * 3]), n, &reset);
     else t = any_tangent(n);
     store3(tangents + size_t(i) * 3, t);
     if (reset) {
@@ -45,7 +48,8 @@ void warm_start(const ContactStore &old, std::span<const ContactPoint> contacts,
     state.dwell[i] = old.dwell[m];
     // The columns are as wide as the law with most state needs; a law's own values stand first.
     if (old.law[m] == state.law[i])
-      for (uint32_t s = 0; s < std::min(old.nstate, state.nstate); ++s) state.bristle[size_t(s) * state.stride + i] = old.bristle[size_t(m) * old.nstate + s];
+      for (uint32_t s = 0; s < std::min(old.nstate, state.nstate); ++s)
+        state.bristle[size_t(s) * state.stride + i] = old.bristle[size_t(m) * old.nstate + s];
   }
 }
 

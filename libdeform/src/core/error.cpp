@@ -16,8 +16,13 @@ class Line {
   Line(char *out, size_t capacity) : out_(out), left_(capacity - 1) {}
   ~Line() { *out_ = 0; }
   void add(const char *bytes, size_t n) {
-    if (n > left_) left_ = 0;
-    else std::memcpy(out_, bytes, n), out_ += n, left_ -= n;
+    if (n > left_) {
+      left_ = 0;
+    } else {
+      std::memcpy(out_, bytes, n);
+      out_ += n;
+      left_ -= n;
+    }
   }
 
  private:
@@ -27,9 +32,13 @@ class Line {
 
 // Bytes of the UTF-8 character at `s`; 0: it is none.
 size_t character(const unsigned char *s) {
-  const size_t n = s[0] < 0x80 ? 1 : s[0] >= 0xc2 && s[0] < 0xe0 ? 2 : (s[0] & 0xf0) == 0xe0 ? 3 : s[0] >= 0xf0 && s[0] < 0xf5 ? 4 : 0;
+  const size_t n = s[0] < 0x80                   ? 1
+                   : s[0] >= 0xc2 && s[0] < 0xe0 ? 2
+                   : (s[0] & 0xf0) == 0xe0       ? 3
+                   : s[0] >= 0xf0 && s[0] < 0xf5 ? 4
+                                                 : 0;
   for (size_t i = 1; i < n; ++i)
-    if ((s[i] & 0xc0) != 0x80) return 0;   // the closing zero too
+    if ((s[i] & 0xc0) != 0x80) return 0;  // the closing zero too
   return n;
 }
 
@@ -79,7 +88,8 @@ void printable(const char *text, char *out, size_t capacity) noexcept {
     const unsigned code = n == 2 ? (s[0] & 0x1fu) << 6 | (s[1] & 0x3fu) : s[0];
     char escape[8];
     if (n == 0) line.add("?", 1);
-    else if (n <= 2 && (code < 0x20 || (code >= 0x7f && code < 0xa0))) line.add(escape, size_t(std::snprintf(escape, sizeof escape, "\\u%04x", code)));
+    else if (n <= 2 && (code < 0x20 || (code >= 0x7f && code < 0xa0)))
+      line.add(escape, size_t(std::snprintf(escape, sizeof escape, "\\u%04x", code)));
     else line.add(text + (reinterpret_cast<const char *>(s) - text), n);
     s += std::max<size_t>(n, 1);
   }
@@ -87,7 +97,7 @@ void printable(const char *text, char *out, size_t capacity) noexcept {
 
 void set_last_error(const char *sentence) noexcept {
   char text[sizeof last_sentence];
-  printable(sentence, text, sizeof text);   // by way of a copy: the sentence may be a part of the last one
+  printable(sentence, text, sizeof text);  // by way of a copy: the sentence may be a part of the last one
   std::memcpy(last_sentence, text, sizeof text);
   ++said;
 }
@@ -100,7 +110,10 @@ std::string nearest(const std::string &wrong, const std::vector<std::string> &va
   size_t best_distance = std::max<size_t>(2, wrong.size() / 2) + 1;
   for (const auto &name : valid) {
     const size_t d = edit_distance(wrong, name);
-    if (d < best_distance) best_distance = d, best = name;
+    if (d < best_distance) {
+      best_distance = d;
+      best = name;
+    }
   }
   return best;
 }

@@ -1,4 +1,5 @@
-// One way for a sentence to reach the caller: code inside throws Error, the guard in api/ turns it into a status and dfm_last_error().
+// One way for a sentence to reach the caller: code inside throws Error, the guard in api/ turns it into a
+// status and dfm_last_error().
 #pragma once
 #include <cstdarg>
 #include <exception>
@@ -20,12 +21,14 @@ struct Error : std::exception {
 [[noreturn]] void fail(dfm_status status, const char *format, ...) __attribute__((format(printf, 2, 3)));
 std::string format(const char *format, ...) __attribute__((format(printf, 1, 2)));
 
-// One line that any terminal may be shown: control characters (names of a file may hold them) become \uXXXX, bytes that are no UTF-8 become "?".
+// One line that any terminal may be shown: control characters (names of a file may hold them) become \uXXXX,
+// bytes that are no UTF-8 become "?".
 void printable(const char *text, char *out, size_t capacity) noexcept;
 
 void set_last_error(const char *sentence) noexcept;  // thread-local
 const char *last_error() noexcept;
-uint64_t sentences() noexcept;                       // of this thread so far: has what was called said why it failed?
+// of this thread so far: has what was called said why it failed?
+uint64_t sentences() noexcept;
 
 // The valid name nearest to a wrong one (edit distance), for "did you mean"; empty when nothing is near.
 std::string nearest(const std::string &wrong, const std::vector<std::string> &valid);

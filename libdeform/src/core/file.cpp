@@ -16,23 +16,30 @@ namespace {
 
 const char *kind_of(mode_t mode) {
   if (S_ISBLK(mode) || S_ISCHR(mode)) return "a device";
-  return S_ISDIR(mode) ? "a directory" : S_ISFIFO(mode) ? "a pipe" : S_ISSOCK(mode) ? "a socket" : "not a regular file";
+  return S_ISDIR(mode)    ? "a directory"
+         : S_ISFIFO(mode) ? "a pipe"
+         : S_ISSOCK(mode) ? "a socket"
+                          : "not a regular file";
 }
 
 }  // namespace
 
 InputFile::InputFile(const std::string &path, const char *expected) : path_(path) {
-  // Without O_NONBLOCK opening a pipe that nobody writes would wait for ever. Whoever names standard input wants to wait for it.
+  // Without O_NONBLOCK opening a pipe that nobody writes would wait for ever. Whoever names standard input
+  // wants to wait for it.
   const bool standard = path == "/dev/stdin";
-  descriptor_ = standard ? fcntl(STDIN_FILENO, F_DUPFD_CLOEXEC, 0) : open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK | O_NOCTTY);
-  if (descriptor_ < 0) fail(DFM_E_IO, "%s: cannot be opened: %s; expected %s", path.c_str(), std::strerror(errno), expected);
+  descriptor_ = standard ? fcntl(STDIN_FILENO, F_DUPFD_CLOEXEC, 0)
+                         : open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK | O_NOCTTY);
+  if (descriptor_ < 0)
+    fail(DFM_E_IO, "%s: cannot be opened: %s; expected %s", path.c_str(), std::strerror(errno), expected);
   struct stat status;
   const bool known = fstat(descriptor_, &status) == 0, regular = known && S_ISREG(status.st_mode);
   if (regular || (known && standard && (S_ISFIFO(status.st_mode) || S_ISSOCK(status.st_mode)))) {
     bytes_ = regular ? uint64_t(status.st_size) : 0;
     return;
   }
-  const std::string reason = known ? format("is %s", kind_of(status.st_mode)) : format("cannot be read: %s", std::strerror(errno));
+  const std::string reason =
+      known ? format("is %s", kind_of(status.st_mode)) : format("cannot be read: %s", std::strerror(errno));
   close(descriptor_);
   fail(DFM_E_IO, "%s: %s; give the name of %s", path.c_str(), reason.c_str(), expected);
 }
@@ -51,7 +58,8 @@ size_t InputFile::read(char *to, size_t n) {
   return done;
 }
 
-Array<char> read_whole_file(const Memory &memory, const std::string &path, uint64_t limit, const char *expected) {
+Array<char> read_whole_file(const Memory &memory, const std::string &path, uint64_t limit,
+                            const char *expected) {
   InputFile file(path, expected);
   const auto too_large = [&] {
     const bool small = limit < 2 * kMiB;
@@ -74,14 +82,18 @@ Array<char> read_whole_file(const Memory &memory, const std::string &path, uint6
   }
 }
 
-// A file without a name in the folder of `path`, which a process that is killed does not leave behind; -1 where the file system has none.
+// A file without a name in the folder of `path`, which a process that is killed does not leave behind; -1
+// where the file system has none.
 int AtomicFile::open_beside() {
   const size_t slash = path_.rfind('/');
   const std::string folder = slash == std::string::npos ? "." : path_.substr(0, slash + 1);
 #ifdef O_TMPFILE
   if (access("/proc/self/fd", X_OK) == 0) {
     const int fd = open(folder.c_str(), O_TMPFILE | O_WRONLY | O_CLOEXEC, 0666);
-    if (fd >= 0) return kind_ = Kind::unnamed, fd;
+    if (fd >= 0) {
+      kind_ = Kind::unnamed;
+      return fd;
+    }
   }
 #endif
   return open(temporary_.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_NOFOLLOW | O_CLOEXEC, 0666);
@@ -94,8 +106,10 @@ AtomicFile::AtomicFile(const std::string &path) : path_(path) {
   int fd = -1;
   if (stat(path.c_str(), &status) == 0 && !S_ISREG(status.st_mode)) {
     kind_ = Kind::device;
-    if (S_ISDIR(status.st_mode) || S_ISBLK(status.st_mode)) fail(DFM_E_IO, "%s: is %s; give the name of a file to write", path.c_str(), kind_of(status.st_mode));
-    fd = open(path.c_str(), O_WRONLY | O_CLOEXEC | O_NONBLOCK | O_NOCTTY);   // a pipe that nobody reads is refused, and not waited for
+    if (S_ISDIR(status.st_mode) || S_ISBLK(status.st_mode))
+      fail(DFM_E_IO, "%s: is %s; give the name of a file to write", path.c_str(), kind_of(status.st_mode));
+    // a pipe that nobody reads is refused, and not waited for
+    fd = open(path.c_str(), O_WRONLY | O_CLOEXEC | O_NONBLOCK | O_NOCTTY);
     if (fd >= 0) fcntl(fd, F_SETFL, fcntl(fd, F_GETFL) & ~O_NONBLOCK);
   } else {
     fd = open_beside();
@@ -116,7 +130,9 @@ AtomicFile::~AtomicFile() {
   if (kind_ == Kind::named) unlink(temporary_.c_str());
 }
 
-void AtomicFile::fail_io(const char *what) { fail(DFM_E_IO, "%s: %s: %s", path_.c_str(), what, std::strerror(errno)); }
+void AtomicFile::fail_io(const char *what) {
+  fail(DFM_E_IO, "%s: %s: %s", path_.c_str(), what, std::strerror(errno));
+}
 
 void AtomicFile::write(const void *data, size_t bytes) {
   if (bytes && std::fwrite(data, 1, bytes, file_) != bytes) fail_io("cannot be written");

@@ -1,4 +1,5 @@
-// Whole files in and out: bounded reading, and writing that leaves either the old file or the complete new one.
+// Whole files in and out: bounded reading, and writing that leaves either the old file or the
+// complete new one.
 #pragma once
 #include <cstdint>
 #include <cstdio>
@@ -8,7 +9,8 @@
 
 namespace dfm {
 
-// Opens for reading what is a regular file, without waiting for the writer of a pipe. Throws Error(DFM_E_IO). `expected` ends the sentence.
+// Opens for reading what is a regular file, without waiting for the writer of a pipe. Throws Error(DFM_E_IO).
+// `expected` ends the sentence.
 class InputFile {
  public:
   InputFile(const std::string &path, const char *expected);
@@ -16,8 +18,8 @@ class InputFile {
   InputFile(const InputFile &) = delete;
   InputFile &operator=(const InputFile &) = delete;
   int descriptor() const { return descriptor_; }
-  uint64_t bytes() const { return bytes_; }          // that the system claims; 0 for standard input
-  size_t read(char *to, size_t n);                   // fewer than n at the end only
+  uint64_t bytes() const { return bytes_; }  // that the system claims; 0 for standard input
+  size_t read(char *to, size_t n);           // fewer than n at the end only
 
  private:
   std::string path_;
@@ -25,16 +27,19 @@ class InputFile {
   uint64_t bytes_ = 0;
 };
 
-// The bytes of a regular file, or of standard input where `path` is /dev/stdin: at most `limit`, which is checked before anything is allocated.
-// `expected` says what kind of file is wanted, with its article. Throws Error: DFM_E_IO, DFM_E_FORMAT where there are more bytes than that.
-Array<char> read_whole_file(const Memory &memory, const std::string &path, uint64_t limit, const char *expected);
+// The bytes of a regular file, or of standard input where `path` is /dev/stdin: at most `limit`, which is
+// checked before anything is allocated. `expected` says what kind of file is wanted, with its article. Throws
+// Error: DFM_E_IO, DFM_E_FORMAT where there are more bytes than that.
+Array<char> read_whole_file(const Memory &memory, const std::string &path, uint64_t limit,
+                            const char *expected);
 
 inline constexpr uint64_t kMiB = uint64_t(1) << 20;
-inline constexpr uint64_t kMaxMeshBytes = 4096 * kMiB;   // 1e8 tetrahedra in binary, the most that a mesh may have
+// 1e8 tetrahedra in binary, the most that a mesh may have
+inline constexpr uint64_t kMaxMeshBytes = 4096 * kMiB;
 
-// Writes beside `path`; commit() renames. Without commit, and where the process is killed, nothing stays behind on file systems that know
-// files without a name; elsewhere a killed process leaves a file PATH.partPID-N. A link at `path` is replaced and not followed; a device or
-// pipe is written to as it stands.
+// Writes beside `path`; commit() renames. Without commit, and where the process is killed, nothing stays
+// behind on file systems that know files without a name; elsewhere a killed process leaves a file
+// PATH.partPID-N. A link at `path` is replaced and not followed; a device or pipe is written to as it stands.
 class AtomicFile {
  public:
   explicit AtomicFile(const std::string &path);
@@ -44,7 +49,9 @@ class AtomicFile {
   void write(const void *data, size_t bytes);
   void write(const std::string &text) { write(text.data(), text.size()); }
   template <class T>
-  void put(const T &value) { write(&value, sizeof value); }
+  void put(const T &value) {
+    write(&value, sizeof value);
+  }
   void commit();
 
  private:

@@ -9,7 +9,11 @@
 namespace dfm {
 namespace {
 
-struct Slot { void *object = nullptr; uint32_t generation = 1; Kind kind = Kind::none; };
+struct Slot {
+  void *object = nullptr;
+  uint32_t generation = 1;
+  Kind kind = Kind::none;
+};
 
 struct Table {
   std::shared_mutex mutex;
@@ -52,7 +56,8 @@ uint64_t handle_create(Kind kind, void *object) {
     t.free.pop_back();
   }
   Slot &slot = t.slots[index];
-  slot.object = object, slot.kind = kind;
+  slot.object = object;
+  slot.kind = kind;
   return (uint64_t(slot.generation & 0xffffff) << 40) | (uint64_t(kind) << 32) | (index + 1);
 }
 
@@ -73,7 +78,8 @@ void handle_destroy(uint64_t handle) noexcept {
   if (index == 0 || index > t.slots.size()) return;
   Slot &slot = t.slots[index - 1];
   if ((slot.generation & 0xffffff) != uint32_t(handle >> 40) || slot.kind == Kind::none) return;
-  slot.object = nullptr, slot.kind = Kind::none;
+  slot.object = nullptr;
+  slot.kind = Kind::none;
   slot.generation = (slot.generation + 1) & 0xffffff;
   if (slot.generation == 0) slot.generation = 1;
   t.free.push_back(index - 1);
@@ -82,8 +88,9 @@ void handle_destroy(uint64_t handle) noexcept {
 void *handle_require(Kind kind, uint64_t handle) {
   void *object = handle_find(kind, handle);
   if (!object)
-    fail(DFM_E_HANDLE, "%s handle 0x%llx is stale, null or of another kind; keep handles only while their object lives", kind_name(kind),
-         static_cast<unsigned long long>(handle));
+    fail(DFM_E_HANDLE,
+         "%s handle 0x%llx is stale, null or of another kind; keep handles only while their object lives",
+         kind_name(kind), static_cast<unsigned long long>(handle));
   return object;
 }
 

@@ -1,12 +1,22 @@
-// The process-wide table behind all handles: {generation:24, kind:8, index+1:32}. A slot's generation rises when its object goes, so an
-// old handle no longer matches; kinds are checked too.
+// The process-wide table behind all handles: {generation:24, kind:8, index+1:32}. A slot's generation rises
+// when its object goes, so an old handle no longer matches; kinds are checked too.
 #pragma once
 #include <cstdint>
 #include <memory>
 
 namespace dfm {
 
-enum class Kind : uint8_t { none = 0, world = 1, body = 2, obstacle = 3, material = 4, law = 5, scene = 6, tetmesh = 7, trimesh = 8 };
+enum class Kind : uint8_t {
+  none = 0,
+  world = 1,
+  body = 2,
+  obstacle = 3,
+  material = 4,
+  law = 5,
+  scene = 6,
+  tetmesh = 7,
+  trimesh = 8
+};
 
 // Registers an object (not owned) and returns its handle. Thread-safe; throws std::bad_alloc.
 uint64_t handle_create(Kind kind, void *object);
@@ -17,6 +27,8 @@ void handle_destroy(uint64_t handle) noexcept;
 // Throws Error(DFM_E_HANDLE) with a sentence that names the kind.
 void *handle_require(Kind kind, uint64_t handle);
 template <class T>
-T &resolve(Kind kind, uint64_t handle) { return *static_cast<T *>(handle_require(kind, handle)); }
+T &resolve(Kind kind, uint64_t handle) {
+  return *static_cast<T *>(handle_require(kind, handle));
+}
 
 }  // namespace dfm

@@ -12,7 +12,9 @@ struct Hash {
     for (size_t i = 0; i < bytes; ++i) value = (value ^ p[i]) * 1099511628211ull;
   }
   template <class T>
-  void add(const T &x) { add(&x, sizeof x); }
+  void add(const T &x) {
+    add(&x, sizeof x);
+  }
 };
 
 }  // namespace dfm

@@ -1,4 +1,5 @@
-// Memory of a context: every array of ours is allocated through the host's hooks, so that a host can count, pool or refuse it.
+// Memory of a context: every array of ours is allocated through the host's hooks, so that a host can count,
+// pool or refuse it.
 #pragma once
 #include <cstddef>
 #include <cstdint>
@@ -14,7 +15,8 @@ struct Memory {
   static const Memory &standard();  // aligned malloc and free
 };
 
-// Throws Error(DFM_E_NOMEM) where work that is about to begin would need more memory than the machine, or the group of processes, may ever have.
+// Throws Error(DFM_E_NOMEM) where work that is about to begin would need more memory than the machine, or the
+// group of processes, may ever have.
 void need_memory(uint64_t bytes, const char *what);
 
 // Allocator of std::vector over Memory; 64-byte alignment so that kernels may load whole vectors.
@@ -34,7 +36,9 @@ struct HookAllocator {
   }
   void deallocate(T *p, size_t n) { memory->release(memory->user, p, n * sizeof(T), 64); }
   template <class U>
-  bool operator==(const HookAllocator<U> &other) const { return memory == other.memory; }
+  bool operator==(const HookAllocator<U> &other) const {
+    return memory == other.memory;
+  }
   // Containers move between worlds of one context only, so allocators travel with their content.
   using propagate_on_container_move_assignment = std::true_type;
   using propagate_on_container_swap = std::true_type;
@@ -45,6 +49,8 @@ using Array = std::vector<T, HookAllocator<T>>;
 
 // Empties arrays and has them allocate from m from now on.
 template <class... T>
-void use_memory(const Memory &m, Array<T> &...arrays) { ((arrays = Array<T>(HookAllocator<T>(m))), ...); }
+void use_memory(const Memory &m, Array<T> &...arrays) {
+  ((arrays = Array<T>(HookAllocator<T>(m))), ...);
+}
 
 }  // namespace dfm

@@ -19,7 +19,10 @@ struct Inside {
 };
 
 // A host's workers do not know that they are ours: each block marks its thread while it runs.
-struct HostTask { void (*fn)(void *, uint32_t, uint32_t); void *task; };
+struct HostTask {
+  void (*fn)(void *, uint32_t, uint32_t);
+  void *task;
+};
 void run_host_block(void *task, uint32_t begin, uint32_t end) {
   const Inside inside;
   const HostTask &t = *static_cast<HostTask *>(task);
@@ -28,8 +31,9 @@ void run_host_block(void *task, uint32_t begin, uint32_t end) {
 
 }  // namespace
 
-// Waits for `ready` without sleeping, for about as long as a step spends between two of its jobs (some 100 microseconds): waking a thread
-// costs tens of microseconds, more than the work of a small body. False: not ready yet, sleep.
+// Waits for `ready` without sleeping, for about as long as a step spends between two of its jobs (some 100
+// microseconds): waking a thread costs tens of microseconds, more than the work of a small body. False: not
+// ready yet, sleep.
 template <class Ready>
 bool spin(Ready ready) {
   for (int i = 0; i < 4000; ++i) {
@@ -47,11 +51,11 @@ struct Tasks::Pool {
   std::mutex mutex;
   std::condition_variable start, done;
   std::vector<std::thread> workers;
-  std::atomic<uint64_t> job{0};      // rises with each job; what the job is was written before
-  std::atomic<uint32_t> busy{0};     // workers that have not finished it
+  std::atomic<uint64_t> job{0};   // rises with each job; what the job is was written before
+  std::atomic<uint32_t> busy{0};  // workers that have not finished it
   std::atomic<bool> stop{false};
-  uint32_t asleep = 0;               // workers in start, under mutex
-  bool waiting = false;              // the owner is in done, under mutex
+  uint32_t asleep = 0;   // workers in start, under mutex
+  bool waiting = false;  // the owner is in done, under mutex
 
   uint32_t n = 0, grain = 1;
   std::atomic<uint32_t> next{0};
@@ -80,7 +84,9 @@ struct Tasks::Pool {
 
   void work() {
     uint64_t seen = 0;
-    const auto ready = [&] { return stop.load(std::memory_order_acquire) || job.load(std::memory_order_acquire) != seen; };
+    const auto ready = [&] {
+      return stop.load(std::memory_order_acquire) || job.load(std::memory_order_acquire) != seen;
+    };
     for (;;) {
       if (!spin(ready)) {
         std::unique_lock lock(mutex);
@@ -108,7 +114,9 @@ struct Tasks::Pool {
 };
 
 Tasks::Tasks(uint32_t threads, HostFor host_for, void *host_user)
-    : threads_(threads ? threads : std::max(1u, std::thread::hardware_concurrency())), host_for_(host_for), host_user_(host_user) {
+    : threads_(threads ? threads : std::max(1u, std::thread::hardware_concurrency())),
+      host_for_(host_for),
+      host_user_(host_user) {
   if (host_for_ || threads_ == 1) return;
   pool_ = std::make_unique<Pool>();
   pool_->workers.reserve(threads_ - 1);
@@ -135,7 +143,10 @@ void Tasks::run(uint32_t n, uint32_t grain, void (*fn)(void *, uint32_t, uint32_
     fn(task, 0, n);
     return;
   }
-  pool.n = n, pool.grain = grain, pool.fn = fn, pool.task = task;
+  pool.n = n;
+  pool.grain = grain;
+  pool.fn = fn;
+  pool.task = task;
   pool.next.store(0, std::memory_order_relaxed);
   pool.busy.store(static_cast<uint32_t>(pool.workers.size()), std::memory_order_relaxed);
   bool wake;

@@ -1,5 +1,5 @@
-// parallel_for over the host's hook or our own pool. Results must not depend on the cut: work writes to its own lanes, or to partial
-// sums in slot begin/grain that the caller adds in slot order.
+// parallel_for over the host's hook or our own pool. Results must not depend on the cut: work writes to its
+// own lanes, or to partial sums in slot begin/grain that the caller adds in slot order.
 #pragma once
 #include <cstdint>
 #include <memory>
@@ -8,17 +8,21 @@ namespace dfm {
 
 class Tasks {
  public:
-  using HostFor = void (*)(void *user, uint32_t n, uint32_t grain, void (*fn)(void *, uint32_t, uint32_t), void *task);
+  using HostFor = void (*)(void *user, uint32_t n, uint32_t grain, void (*fn)(void *, uint32_t, uint32_t),
+                           void *task);
   // threads: 1 none, 0 one per processor; host_for wins where given
   Tasks(uint32_t threads, HostFor host_for, void *host_user);
   ~Tasks();
   uint32_t threads() const { return threads_; }
 
-  // fn(begin, end) over [0,n), cut at multiples of grain; blocks. A call from inside a worker runs serially in the caller.
+  // fn(begin, end) over [0,n), cut at multiples of grain; blocks. A call from inside a worker runs serially
+  // in the caller.
   void run(uint32_t n, uint32_t grain, void (*fn)(void *, uint32_t, uint32_t), void *task);
   template <class F>
   void parallel_for(uint32_t n, uint32_t grain, F &&f) {
-    run(n, grain, [](void *task, uint32_t begin, uint32_t end) { (*static_cast<F *>(task))(begin, end); }, &f);
+    run(
+        n, grain, [](void *task, uint32_t begin, uint32_t end) { (*static_cast<F *>(task))(begin, end); },
+        &f);
   }
 
  private:

@@ -4,7 +4,8 @@
 
 namespace dfm {
 
-void distribute(std::span<const ContactPoint> contacts, const double *frame, const double *impulse, std::span<const ImpulseSink> sinks) {
+void distribute(std::span<const ContactPoint> contacts, const double *frame, const double *impulse,
+                std::span<const ImpulseSink> sinks) {
   for (const ImpulseSink &s : sinks) std::fill(s.surfel, s.surfel + size_t(3) * s.nnode, 0.0);
   for (size_t i = 0; i < contacts.size(); ++i) {
     const double *const f = frame + 9 * i, *const l = impulse + 3 * i;
@@ -12,7 +13,8 @@ void distribute(std::span<const ContactPoint> contacts, const double *frame, con
     const Vec3 p = l[0] * load3(f) + l[1] * load3(f + 3) + l[2] * load3(f + 6);
     for (uint32_t k = 0; k < contacts[i].nnode; ++k) {
       const uint32_t node = contacts[i].node[k];
-      auto sink = std::upper_bound(sinks.begin(), sinks.end(), node, [](uint32_t value, const ImpulseSink &s) { return value < s.first_node; });
+      auto sink = std::upper_bound(sinks.begin(), sinks.end(), node,
+                                   [](uint32_t value, const ImpulseSink &s) { return value < s.first_node; });
       --sink;
       double *const to = sink->surfel + size_t(3) * (node - sink->first_node);
       store3(to, load3(to) + contacts[i].weight[k] * p);
@@ -25,7 +27,8 @@ void distribute(std::span<const ContactPoint> contacts, const double *frame, con
       scatter_surface(surface, s.surfel, s.npoint, s.phyxel);
       continue;
     }
-    for (uint32_t j = 0; j < s.nnode; ++j) store3(s.phyxel + size_t(4) * surface.point[j], load3(s.surfel + size_t(3) * j));
+    for (uint32_t j = 0; j < s.nnode; ++j)
+      store3(s.phyxel + size_t(4) * surface.point[j], load3(s.surfel + size_t(3) * j));
   }
 }
 
@@ -37,7 +40,8 @@ void scatter_surface(const Surface &surface, const double *surfel, uint32_t npoi
     const double *const f = surfel + size_t(3) * s;
     if (f[0] == 0 && f[1] == 0 && f[2] == 0) continue;
     const Point p{f[0], f[1], f[2], 0};
-    for (uint32_t j = surface.row[s]; j < surface.row[s + 1]; ++j) to[surface.col[j]] += surface.weight[j] * p;
+    for (uint32_t j = surface.row[s]; j < surface.row[s + 1]; ++j)
+      to[surface.col[j]] += surface.weight[j] * p;
   }
 }
 

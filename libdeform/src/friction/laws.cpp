@@ -11,25 +11,40 @@
 namespace dfm {
 
 LawInstance::LawInstance(const dfm_type &t, const dfm_host &h, std::vector<double> values)
-    : type(&t), ops(static_cast<const dfm_friction *>(t.ops)), params(std::move(values)), by_key(param_rows(t, params)), host(&h) {
+    : type(&t),
+      ops(static_cast<const dfm_friction *>(t.ops)),
+      params(std::move(values)),
+      by_key(param_rows(t, params)),
+      host(&h) {
   for (const dfm_slot &slot : law_slots(t, h, params.data())) {
     nstate += slot.width;
     tangent.resize(nstate, slot.kind == DFM_SLOT_TANGENT);
     turns |= slot.kind == DFM_SLOT_TANGENT;
   }
   // check() was asked by pack_params
-  if (ops->prepare && call_plugin(h, t, "prepare", [&] { return ops->prepare(host, params.data(), &data); }) != DFM_OK)
+  if (ops->prepare &&
+      call_plugin(h, t, "prepare", [&] { return ops->prepare(host, params.data(), &data); }) != DFM_OK)
     fail(DFM_E_FATAL, "law '%s' could not prepare its tables; the log says why", t.id);
 }
 
 LawInstance::~LawInstance() {
-  if (ops->prepare && ops->release) call_plugin(*host, *type, "release", [&] { return ops->release(host, data), DFM_OK; });
+  if (ops->prepare && ops->release)
+    call_plugin(*host, *type, "release", [&] {
+      ops->release(host, data);
+      return DFM_OK;
+    });
 }
 
 LawBatches::LawBatches(const Memory &m)
-    : order_(HookAllocator<uint32_t>(m)), in_(HookAllocator<double>(m)), out_(HookAllocator<double>(m)), moved_(HookAllocator<double>(m)),
-      answer_(HookAllocator<double>(m)), origin_(HookAllocator<Origin>(m)), mode_(HookAllocator<uint8_t>(m)),
-      local_(HookAllocator<Local>(m)), asked_(HookAllocator<uint32_t>(m)) {}
+    : order_(HookAllocator<uint32_t>(m)),
+      in_(HookAllocator<double>(m)),
+      out_(HookAllocator<double>(m)),
+      moved_(HookAllocator<double>(m)),
+      answer_(HookAllocator<double>(m)),
+      origin_(HookAllocator<Origin>(m)),
+      mode_(HookAllocator<uint8_t>(m)),
+      local_(HookAllocator<Local>(m)),
+      asked_(HookAllocator<uint32_t>(m)) {}
 
 void LawBatches::gather(const std::vector<LawInstance *> &laws, ContactState &state) {
   batches_.clear();
@@ -44,7 +59,8 @@ void LawBatches::gather(const std::vector<LawInstance *> &laws, ContactState &st
         state.set_valued[i] = (laws[l]->ops->flags & DFM_FRIC_SET_VALUED) != 0;
       }
     if (order_.size() == begin) continue;
-    smooth_ |= !(laws[l]->ops->flags & DFM_FRIC_SET_VALUED), remembers_ |= laws[l]->nstate > 0;
+    smooth_ |= !(laws[l]->ops->flags & DFM_FRIC_SET_VALUED);
+    remembers_ |= laws[l]->nstate > 0;
     batches_.push_back({laws[l], begin, static_cast<uint32_t>(order_.size()) - begin});
   }
 }
@@ -63,9 +79,15 @@ const LawInstance *LawBatches::slopes(double h, ContactState &state) {
       for (uint32_t k = 0; k < batch.n; ++k) {
         const uint32_t i = order_[batch.begin + k];
         if (origin_[i].hold & which) continue;
-        // What sticks hangs on its bristle, not on its normal force; where that is not quite so the passes notice.
-        if (which == kByFn && state.mode[i] == 1) state.dft_dfn[i] = state.dft_dfn[state.stride + i] = 0, origin_[i].made |= which, origin_[i].hold |= which;
-        else asked_.push_back(i);
+        // What sticks hangs on its bristle, not on its normal force; where that is not quite so the
+        // passes notice.
+        if (which == kByFn && state.mode[i] == 1) {
+          state.dft_dfn[i] = state.dft_dfn[state.stride + i] = 0;
+          origin_[i].made |= which;
+          origin_[i].hold |= which;
+        } else {
+          asked_.push_back(i);
+        }
       }
       if (asked_.empty()) continue;
       if (const LawInstance *bad = difference(*batch.law, asked_, h, which, state)) return bad;
@@ -74,8 +96,8 @@ const LawInstance *LawBatches::slopes(double h, ContactState &state) {
   return nullptr;
 }
 
-// Slopes whose prediction of the change of force since they were made is right to a tenth let the passes converge by that tenth; new ones are not worth
-// three answers.
+// Slopes whose prediction of the change of force since they were made is right to a tenth let the passes
+// converge by that tenth; new ones are not worth three answers.
 void LawBatches::look_back(uint32_t i, const ContactState &s) {
   constexpr double kGood = 0.1;
   Origin &o = origin_[i];
@@ -83,62 +105,93 @@ void LawBatches::look_back(uint32_t i, const ContactState &s) {
   const uint32_t n = s.stride;
   const double v1 = s.vt[i] - o.v[0], v2 = s.vt[n + i] - o.v[1], fn = s.fn[i] - o.fn;
   const double p1 = s.dft_dvt[i] * v1 + s.dft_dvt[n + i] * v2 + s.dft_dfn[i] * fn;
-  const double p2 = s.dft_dvt[2 * size_t(n) + i] * v1 + s.dft_dvt[3 * size_t(n) + i] * v2 + s.dft_dfn[n + i] * fn;
+  const double p2 =
+      s.dft_dvt[2 * size_t(n) + i] * v1 + s.dft_dvt[3 * size_t(n) + i] * v2 + s.dft_dfn[n + i] * fn;
   const double e1 = s.ft[i] - o.f[0] - p1, e2 = s.ft[n + i] - o.f[1] - p2;
   o.hold = e1 * e1 + e2 * e2 <= kGood * kGood * (p1 * p1 + p2 * p2) ? o.made : uint8_t(kNoSlope);
 }
 
-dfm_friction_in LawBatches::inputs(const LawInstance &law, std::span<const uint32_t> index, double h, const ContactState &state) {
+dfm_friction_in LawBatches::inputs(const LawInstance &law, std::span<const uint32_t> index, double h,
+                                   const ContactState &state) {
   const uint32_t n = static_cast<uint32_t>(index.size()), stride = (n + 7) & ~7u, S = law.nstate;
   const size_t column = stride;
   in_.assign(column * (7 + S), 0.0);
-  double *const fn = in_.data(), *const vt = fn + column, *const stop = vt + 2 * column, *const area = stop + 2 * column,
-                *const dwell = area + column, *const bristle = dwell + column;
+  double *const fn = in_.data();
+  double *const vt = fn + column;
+  double *const stop = vt + 2 * column;
+  double *const area = stop + 2 * column;
+  double *const dwell = area + column;
+  double *const bristle = dwell + column;
   for (uint32_t k = 0; k < n; ++k) {
     const uint32_t i = index[k];
-    fn[k] = state.fn[i], area[k] = state.area[i], dwell[k] = state.dwell[i];
-    vt[k] = state.vt[i], vt[column + k] = state.vt[state.stride + i];
-    stop[k] = state.ft_stop[i], stop[column + k] = state.ft_stop[state.stride + i];
+    fn[k] = state.fn[i];
+    area[k] = state.area[i];
+    dwell[k] = state.dwell[i];
+    vt[k] = state.vt[i];
+    vt[column + k] = state.vt[state.stride + i];
+    stop[k] = state.ft_stop[i];
+    stop[column + k] = state.ft_stop[state.stride + i];
     for (uint32_t s = 0; s < S; ++s) bristle[s * column + k] = state.bristle[size_t(s) * state.stride + i];
   }
   const uint32_t needs = law.ops->needs;
   dfm_friction_in in{};
-  in.size = sizeof in, in.n = n, in.stride = stride, in.dt = h;
-  in.params = law.params.data(), in.data = law.data;
-  in.fn = fn, in.vt = vt, in.ft_stop = stop;
+  in.size = sizeof in;
+  in.n = n;
+  in.stride = stride;
+  in.dt = h;
+  in.params = law.params.data();
+  in.data = law.data;
+  in.fn = fn;
+  in.vt = vt;
+  in.ft_stop = stop;
   in.area = needs & DFM_NEED_AREA ? area : nullptr;
   in.dwell = needs & DFM_NEED_DWELL ? dwell : nullptr;
   in.state = bristle;
   return in;
 }
 
-const LawInstance *LawBatches::evaluate(const LawInstance &law, std::span<const uint32_t> index, double h, ContactState &state) {
+const LawInstance *LawBatches::evaluate(const LawInstance &law, std::span<const uint32_t> index, double h,
+                                        ContactState &state) {
   const dfm_friction_in in = inputs(law, index, h, state);
   const uint32_t n = in.n, S = law.nstate;
   const size_t column = in.stride;
   out_.resize(column * (11 + S));
   mode_.resize(column);
-  double *const ft = out_.data(), *const dv = ft + 2 * column, *const dn = dv + 4 * column, *const limit = dn + 2 * column,
-                *const next = limit + 3 * column;
+  double *const ft = out_.data();
+  double *const dv = ft + 2 * column;
+  double *const dn = dv + 4 * column;
+  double *const limit = dn + 2 * column;
+  double *const next = limit + 3 * column;
   dfm_friction_out out{};
   out.size = sizeof out;
-  out.ft = ft, out.state = next, out.dft_dvt = dv, out.dft_dfn = dn, out.limit = limit, out.mode = mode_.data();
+  out.ft = ft;
+  out.state = next;
+  out.dft_dvt = dv;
+  out.dft_dfn = dn;
+  out.limit = limit;
+  out.mode = mode_.data();
   const bool given = law.ops->flags & DFM_FRIC_JACOBIAN;
   if (!given) out.dft_dvt = out.dft_dfn = nullptr;
   failed_ = kNone;
-  if (call_plugin(*law.host, *law.type, "eval", [&] { return law.ops->eval(&in, &out); }) != DFM_OK) return &law;
+  if (call_plugin(*law.host, *law.type, "eval", [&] { return law.ops->eval(&in, &out); }) != DFM_OK)
+    return &law;
 
   for (uint32_t k = 0; k < n; ++k) {
     const uint32_t i = index[k];
     double poison = 0;
-    state.ft[i] = ft[k], state.ft[state.stride + i] = ft[column + k];
-    state.limit[i] = limit[k], state.mode[i] = mode_[k];
-    for (uint32_t s = 0; s < S; ++s) poison += 0.0 * (state.bristle_out[size_t(s) * state.stride + i] = next[s * column + k]);
+    state.ft[i] = ft[k];
+    state.ft[state.stride + i] = ft[column + k];
+    state.limit[i] = limit[k];
+    state.mode[i] = mode_[k];
+    for (uint32_t s = 0; s < S; ++s)
+      poison += 0.0 * (state.bristle_out[size_t(s) * state.stride + i] = next[s * column + k]);
     poison += 0.0 * (ft[k] + ft[column + k]);
     if (given) {
       for (uint32_t j = 0; j < 4; ++j) state.dft_dvt[size_t(j) * state.stride + i] = dv[j * column + k];
-      state.dft_dfn[i] = dn[k], state.dft_dfn[state.stride + i] = dn[column + k];
-      poison += 0.0 * (dv[k] + dv[column + k] + dv[2 * column + k] + dv[3 * column + k]) + 0.0 * (dn[k] + dn[column + k]);
+      state.dft_dfn[i] = dn[k];
+      state.dft_dfn[state.stride + i] = dn[column + k];
+      poison += 0.0 * (dv[k] + dv[column + k] + dv[2 * column + k] + dv[3 * column + k]) +
+                0.0 * (dn[k] + dn[column + k]);
     } else {
       look_back(i, state);
     }
@@ -148,37 +201,46 @@ const LawInstance *LawBatches::evaluate(const LawInstance &law, std::span<const 
   return failed_ == kNone ? nullptr : &law;
 }
 
-// Derivatives of a law that gives none, by forward differences: without them a steep law (h w_t c > 1) would make the passes diverge. The step
-// is a millionth of the value, and at least a tenth of the slip and of the force that the solve resolves.
-const LawInstance *LawBatches::difference(const LawInstance &law, std::span<const uint32_t> index, double h, Slopes which, ContactState &state) {
+// Derivatives of a law that gives none, by forward differences: without them a steep law (h w_t c > 1) would
+// make the passes diverge. The step is a millionth of the value, and at least a tenth of the slip and of the
+// force that the solve resolves.
+const LawInstance *LawBatches::difference(const LawInstance &law, std::span<const uint32_t> index, double h,
+                                          Slopes which, ContactState &state) {
   dfm_friction_in in = inputs(law, index, h, state);
   const size_t column = in.stride, n = state.stride;
   const double *const fn = in.fn, *const vt = in.vt;
   answer_.resize(2 * column);
   dfm_friction_out out{};
-  out.size = sizeof out, out.ft = answer_.data();
+  out.size = sizeof out;
+  out.ft = answer_.data();
   failed_ = kNone;
   // to: the column of the 2x2 or 2x1 slope, of `width` columns
-  const auto ask = [&](const double *at, size_t columns, size_t c, const double *&input, double least, Array<double> &to, size_t width) {
+  const auto ask = [&](const double *at, size_t columns, size_t c, const double *&input, double least,
+                       Array<double> &to, size_t width) {
     moved_.assign(at, at + columns * column);
-    for (size_t k = 0; k < in.n; ++k) moved_[c * column + k] += std::max(least, 1e-6 * std::fabs(at[c * column + k]));
+    for (size_t k = 0; k < in.n; ++k)
+      moved_[c * column + k] += std::max(least, 1e-6 * std::fabs(at[c * column + k]));
     input = moved_.data();
-    const bool answered = call_plugin(*law.host, *law.type, "eval", [&] { return law.ops->eval(&in, &out); }) == DFM_OK;
+    const bool answered =
+        call_plugin(*law.host, *law.type, "eval", [&] { return law.ops->eval(&in, &out); }) == DFM_OK;
     input = at;
     for (size_t r = 0; r < 2; ++r)
       for (size_t k = 0; k < in.n; ++k) {
-        const double slope = (answer_[r * column + k] - state.ft[r * n + index[k]]) / (moved_[c * column + k] - at[c * column + k]);
+        const double slope = (answer_[r * column + k] - state.ft[r * n + index[k]]) /
+                             (moved_[c * column + k] - at[c * column + k]);
         to[(r * width + c) * n + index[k]] = slope;
         if (failed_ == kNone && !std::isfinite(slope)) failed_ = index[k];
       }
     return answered;
   };
   bool answered = true;
-  if (which & kByVt) answered = ask(vt, 2, 0, in.vt, 1e-7, state.dft_dvt, 2) && ask(vt, 2, 1, in.vt, 1e-7, state.dft_dvt, 2);
+  if (which & kByVt)
+    answered = ask(vt, 2, 0, in.vt, 1e-7, state.dft_dvt, 2) && ask(vt, 2, 1, in.vt, 1e-7, state.dft_dvt, 2);
   if (answered && (which & kByFn)) answered = ask(fn, 1, 0, in.fn, 1e-9, state.dft_dfn, 1);
   for (const uint32_t i : index) {
     Origin &o = origin_[i];
-    if (!(o.hold & ~which)) o.made = kNoSlope;                   // what was made elsewhere belongs to another force
+    // what was made elsewhere belongs to another force
+    if (!(o.hold & ~which)) o.made = kNoSlope;
     const uint8_t made = o.made | which, hold = o.hold | which;
     o = {{state.vt[i], state.vt[n + i]}, state.fn[i], {state.ft[i], state.ft[n + i]}, made, hold};
   }

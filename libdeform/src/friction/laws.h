@@ -1,5 +1,5 @@
-// Friction laws of a world, and the one place where they are asked: contacts are gathered into one batch per law, evaluated by the plugin,
-// screened, and scattered back to the contacts' columns.
+// Friction laws of a world, and the one place where they are asked: contacts are gathered into one batch per
+// law, evaluated by the plugin, screened, and scattered back to the contacts' columns.
 #pragma once
 #include <span>
 #include <string>
@@ -17,15 +17,16 @@ struct LawInstance {
   const dfm_type *type = nullptr;
   const dfm_friction *ops = nullptr;
   std::vector<double> params;
-  std::vector<dfm_param_value> by_key;   // params, for dfm_world_law_info
-  void *data = nullptr;           // what prepare() made
+  std::vector<dfm_param_value> by_key;  // params, for dfm_world_law_info
+  void *data = nullptr;                 // what prepare() made
   const dfm_host *host = nullptr;
   uint32_t nstate = 0;
-  std::vector<uint8_t> tangent;   // [nstate] 1: a component of a vector in the tangent plane
-  bool turns = false;             // any
-  bool by_default = false;        // pairs without a rule have it
+  std::vector<uint8_t> tangent;  // [nstate] 1: a component of a vector in the tangent plane
+  bool turns = false;            // any
+  bool by_default = false;       // pairs without a rule have it
 
-  LawInstance(const dfm_type &t, const dfm_host &h, std::vector<double> values);   // throws where check() or prepare() refuses
+  // throws where check() or prepare() refuses
+  LawInstance(const dfm_type &t, const dfm_host &h, std::vector<double> values);
   LawInstance(const LawInstance &) = delete;
   LawInstance &operator=(const LawInstance &) = delete;
   ~LawInstance();
@@ -36,28 +37,43 @@ class LawBatches {
   explicit LawBatches(const Memory &memory);
   // Sorts the contacts into batches by state.law and sets state.set_valued. Call once per sub-step.
   void gather(const std::vector<LawInstance *> &laws, ContactState &state);
-  // Asks every batch at the trial in state: force, limit, mode, trial state, and the slopes dft_dvt and dft_dfn of laws that give them. nullptr, or the
-  // law that failed or answered with something not finite.
+  // Asks every batch at the trial in state: force, limit, mode, trial state, and the slopes dft_dvt and
+  // dft_dfn of laws that give them. nullptr, or the law that failed or answered with something not finite.
   const LawInstance *evaluate(double h, ContactState &state);
-  // The slopes at the last answer, of laws that give none, by differences of the force; asked for where the solve goes on, since they cost three
-  // more answers. Where the force has followed the slopes of an earlier pass they are kept.
+  // The slopes at the last answer, of laws that give none, by differences of the force; asked for where the
+  // solve goes on, since they cost three more answers. Where the force has followed the slopes of an earlier
+  // pass they are kept.
   const LawInstance *slopes(double h, ContactState &state);
-  // The same, but a smooth law is asked where the contact would come to rest alone (friction/local_solve.cpp): state.vt moves there.
-  //   wt     [n] 1/kg, how much slip an impulse makes at its own contact; with it ft_stop tells the slip that others leave
+  // The same, but a smooth law is asked where the contact would come to rest alone
+  // (friction/local_solve.cpp): state.vt moves there.
+  //   wt     [n] 1/kg, how much slip an impulse makes at its own contact; with it ft_stop tells the slip
+  //          that others leave
   //   least, share   m/s, 1: a contact's slip need not be known closer than least + share of it
   const LawInstance *answer(double h, const double *wt, double least, double share, ContactState &state);
-  bool smooth() const { return smooth_; }          // is any law of this sub-step not set-valued?
-  bool remembers() const { return remembers_; }    // has any a state?
+  bool smooth() const { return smooth_; }        // is any law of this sub-step not set-valued?
+  bool remembers() const { return remembers_; }  // has any a state?
   // After a law has failed: the contact whose answer is not to be used; kNone: it refused the whole batch.
   uint32_t failed() const { return failed_; }
 
  private:
-  struct Batch { const LawInstance *law; uint32_t begin, n; };
-  // A contact whose own answer is still looked for: the best slip so far, what it leaves of its equation, and the step tried from there.
-  struct Local { uint32_t contact; bool from_zero, last, fresh; double v[2], left, step[2], share; };
+  struct Batch {
+    const LawInstance *law;
+    uint32_t begin, n;
+  };
+  // A contact whose own answer is still looked for: the best slip so far, what it leaves of its equation, and
+  // the step tried from there.
+  struct Local {
+    uint32_t contact;
+    bool from_zero, last, fresh;
+    double v[2], left, step[2], share;
+  };
   enum Slopes : uint8_t { kNoSlope = 0, kByVt = 1, kByFn = 2 };
-  // Where slopes were made by differences: the force that they start from, and which of them hold at the present answer.
-  struct Origin { double v[2], fn, f[2]; uint8_t made, hold; };
+  // Where slopes were made by differences: the force that they start from, and which of them hold at the
+  // present answer.
+  struct Origin {
+    double v[2], fn, f[2];
+    uint8_t made, hold;
+  };
   std::vector<Batch> batches_;
   Array<uint32_t> order_;         // contacts by law, in contact order within each
   Array<double> in_, out_;        // columns of one batch
@@ -65,15 +81,21 @@ class LawBatches {
   Array<Origin> origin_;          // [n] of their contacts
   Array<uint8_t> mode_;
   Array<Local> local_;
-  Array<uint32_t> asked_;         // contacts of local_ that are asked together
+  Array<uint32_t> asked_;  // contacts of local_ that are asked together
   bool smooth_ = false, remembers_ = false;
   uint32_t failed_ = kNone;
-  dfm_friction_in inputs(const LawInstance &law, std::span<const uint32_t> contacts, double h, const ContactState &state);   // in in_
-  const LawInstance *evaluate(const LawInstance &law, std::span<const uint32_t> contacts, double h, ContactState &state);
-  const LawInstance *settle(const Batch &batch, double h, const double *wt, double least, double share, ContactState &state);
+  // in in_
+  dfm_friction_in inputs(const LawInstance &law, std::span<const uint32_t> contacts, double h,
+                         const ContactState &state);
+  const LawInstance *evaluate(const LawInstance &law, std::span<const uint32_t> contacts, double h,
+                              ContactState &state);
+  const LawInstance *settle(const Batch &batch, double h, const double *wt, double least, double share,
+                            ContactState &state);
   // Slopes by differences at the present answer. The law where it fails.
-  const LawInstance *difference(const LawInstance &law, std::span<const uint32_t> contacts, double h, Slopes which, ContactState &state);
-  void look_back(uint32_t contact, const ContactState &state);   // do earlier slopes hold at the answer just given?
+  const LawInstance *difference(const LawInstance &law, std::span<const uint32_t> contacts, double h,
+                                Slopes which, ContactState &state);
+  // do earlier slopes hold at the answer just given?
+  void look_back(uint32_t contact, const ContactState &state);
 };
 
 }  // namespace dfm

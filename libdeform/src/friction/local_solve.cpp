@@ -1,8 +1,9 @@
 // Where a smooth law is asked.
 //
-// Seen from one contact, with what all others do held still, slip and friction force lie on the line v = m (f - f_stop), m = h w_t; the law is a
-// monotone curve f = ft(v), and the contact's answer is where they cross. Newton on all contacts together asks the law at the present slip v instead
-// and takes its tangent there. That works while the line is steeper than the curve; a stiff bristle is the other way round:
+// Seen from one contact, with what all others do held still, slip and friction force lie on the line v = m (f
+// - f_stop), m = h w_t; the law is a monotone curve f = ft(v), and the contact's answer is where they cross.
+// Newton on all contacts together asks the law at the present slip v instead and takes its tangent there.
+// That works while the line is steeper than the curve; a stiff bristle is the other way round:
 //
 //      f |   line                  a law saturates within a slip of R / (h sigma0 A). Asked at a slip beyond that it answers "R, whatever the slip",
 //        | \    ________ law       and the solve reverses the slip by m R; asked there it says "-R", and so on: stick and slip take turns for ever
@@ -12,8 +13,9 @@
 //        | /   \                   further than f_stop does (Rockafellar 1976, prop. 1), as the projection of a set-valued law; and it has a slope
 //          zero  v now             there which the passes use. Passes are then the semi-smooth Newton method on the natural map (Alart 1997).
 //
-// The crossing itself by Newton: g(v) = v - m (ft(v) - f_stop) has slope >= 1. A law that saturates is concave in |v|, so that Newton steps that start at
-// no slip stay on this side of the crossing and grow toward it. The present slip is tried first: it mostly is the answer.
+// The crossing itself by Newton: g(v) = v - m (ft(v) - f_stop) has slope >= 1. A law that saturates is
+// concave in |v|, so that Newton steps that start at no slip stay on this side of the crossing and grow
+// toward it. The present slip is tried first: it mostly is the answer.
 #include <algorithm>
 #include <cmath>
 
@@ -23,13 +25,15 @@ namespace dfm {
 namespace {
 
 constexpr uint32_t kMostAsked = 24;
-// Where the law is asked on the very edge of its cone, its tangent is that of slip and the step too long by 1 + h m sigma0 A, which may be 1e12.
-constexpr double kCut = 1.0 / 16, kLeastShare = 1e-15;   // of a Newton step that leads away
+// Where the law is asked on the very edge of its cone, its tangent is that of slip and the step too long by 1
+// + h m sigma0 A, which may be 1e12.
+constexpr double kCut = 1.0 / 16, kLeastShare = 1e-15;  // of a Newton step that leads away
 
 struct Residue { double a, b, size; };
 Residue residue(const ContactState &s, uint32_t i, double m) {
   const uint32_t n = s.stride;
-  const double a = s.vt[i] - m * (s.ft[i] - s.ft_stop[i]), b = s.vt[n + i] - m * (s.ft[n + i] - s.ft_stop[n + i]);
+  const double a = s.vt[i] - m * (s.ft[i] - s.ft_stop[i]);
+  const double b = s.vt[n + i] - m * (s.ft[n + i] - s.ft_stop[n + i]);
   return {a, b, std::sqrt(a * a + b * b)};
 }
 
@@ -38,13 +42,16 @@ void newton_step(const ContactState &s, uint32_t i, double m, double v[2], doubl
   const Residue g = residue(s, i, m);
   const auto [d11, d12, d22] = dissipative_slope(s, i);
   const double m11 = 1 - m * d11, m22 = 1 - m * d22, m12 = -m * d12, det = m11 * m22 - m12 * m12;
-  v[0] = s.vt[i], v[1] = s.vt[s.stride + i];
-  step[0] = -(m22 * g.a - m12 * g.b) / det, step[1] = -(m11 * g.b - m12 * g.a) / det;
+  v[0] = s.vt[i];
+  v[1] = s.vt[s.stride + i];
+  step[0] = -(m22 * g.a - m12 * g.b) / det;
+  step[1] = -(m11 * g.b - m12 * g.a) / det;
 }
 
 }  // namespace
 
-const LawInstance *LawBatches::answer(double h, const double *wt, double least, double share, ContactState &state) {
+const LawInstance *LawBatches::answer(double h, const double *wt, double least, double share,
+                                      ContactState &state) {
   for (const Batch &batch : batches_) {
     if (const LawInstance *bad = evaluate(*batch.law, {&order_[batch.begin], batch.n}, h, state)) return bad;
     if (batch.law->ops->flags & DFM_FRIC_SET_VALUED) continue;
@@ -54,11 +61,13 @@ const LawInstance *LawBatches::answer(double h, const double *wt, double least, 
 }
 
 // All contacts of a batch side by side; those that are done leave it.
-const LawInstance *LawBatches::settle(const Batch &batch, double h, const double *wt, double least, double share, ContactState &s) {
+const LawInstance *LawBatches::settle(const Batch &batch, double h, const double *wt, double least,
+                                      double share, ContactState &s) {
   const uint32_t n = s.stride;
   local_.clear();
   for (uint32_t k = 0; k < batch.n; ++k)
-    if (const uint32_t i = order_[batch.begin + k]; wt[i] > 0) local_.push_back({i, false, false, false, {0, 0}, INFINITY, {0, 0}, 0});
+    if (const uint32_t i = order_[batch.begin + k]; wt[i] > 0)
+      local_.push_back({i, false, false, false, {0, 0}, INFINITY, {0, 0}, 0});
   const bool gives_slopes = batch.law->ops->flags & DFM_FRIC_JACOBIAN;
   for (uint32_t asked = 1; !local_.empty(); ++asked) {
     size_t kept = 0;
@@ -69,14 +78,18 @@ const LawInstance *LawBatches::settle(const Batch &batch, double h, const double
       const Residue g = residue(s, i, m);
       const double size = std::sqrt(s.vt[i] * s.vt[i] + s.vt[n + i] * s.vt[n + i]);
       if (g.size <= least + share * size) continue;
-      // Beyond the crossing, g points along the step: deep in stick it is nearly as large there as it was, so less does not tell.
-      const bool nearer = g.size < 0.5 * c.left || (c.from_zero && g.size < c.left && g.a * c.step[0] + g.b * c.step[1] < 0);
+      // Beyond the crossing, g points along the step: deep in stick it is nearly as large there as it was, so
+      // less does not tell.
+      const bool nearer =
+          g.size < 0.5 * c.left || (c.from_zero && g.size < c.left && g.a * c.step[0] + g.b * c.step[1] < 0);
       c.fresh = false;
       if (std::isinf(c.left) || nearer) {
         if (asked == kMostAsked) continue;
-        c.fresh = true, c.left = g.size, c.share = 1;
+        c.fresh = true;
+        c.left = g.size;
+        c.share = 1;
         if (!gives_slopes && !(origin_[i].hold & kByVt)) asked_.push_back(i);
-      } else if (!c.from_zero && asked < kMostAsked) {   // tangents from where it slips lead nowhere
+      } else if (!c.from_zero && asked < kMostAsked) {  // tangents from where it slips lead nowhere
         c = {i, true, false, false, {0, 0}, INFINITY, {0, 0}, 0};
       } else {
         c.share *= kCut;
@@ -93,12 +106,14 @@ const LawInstance *LawBatches::settle(const Batch &batch, double h, const double
       // Out of turns, or at the end of what steps can do: the best slip is asked once more and is the answer.
       c.last = asked >= kMostAsked || (c.share > 0 && c.share < kLeastShare);
       if (c.last) c.share = 0;
-      s.vt[i] = c.v[0] + c.share * c.step[0], s.vt[n + i] = c.v[1] + c.share * c.step[1];
+      s.vt[i] = c.v[0] + c.share * c.step[0];
+      s.vt[n + i] = c.v[1] + c.share * c.step[1];
     }
     asked_.clear();
     for (const Local &c : local_) asked_.push_back(c.contact);
     if (const LawInstance *bad = evaluate(*batch.law, asked_, h, s)) return bad;
-    local_.erase(std::remove_if(local_.begin(), local_.end(), [](const Local &c) { return c.last; }), local_.end());
+    local_.erase(std::remove_if(local_.begin(), local_.end(), [](const Local &c) { return c.last; }),
+                 local_.end());
   }
   return nullptr;
 }

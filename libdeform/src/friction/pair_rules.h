@@ -1,4 +1,5 @@
-// Which rule holds between two sides. A side of a rule is a pattern, a side of a pair is a thing with a name, a group and a material.
+// Which rule holds between two sides. A side of a rule is a pattern, a side of a pair is a thing with a name,
+// a group and a material.
 //
 //   pattern        matches                                   weight
 //   body:GROUP     that group of that body's surface         4
@@ -6,7 +7,8 @@
 //   material=NAME  where it is of that material              2
 //   *              everything                                1
 //
-// A rule matches a pair in either order; of those that match, the one with the largest sum of weights wins, then the last given.
+// A rule matches a pair in either order; of those that match, the one with the largest sum of weights wins,
+// then the last given.
 #pragma once
 #include <algorithm>
 #include <string>
@@ -22,10 +24,12 @@ inline constexpr std::string_view kMaterialPrefix = "material=";
 // 0: no match.
 inline int pattern_weight(std::string_view pattern, const PairSide &side) {
   if (pattern == "*") return 1;
-  if (pattern.substr(0, kMaterialPrefix.size()) == kMaterialPrefix) return pattern.substr(kMaterialPrefix.size()) == side.material ? 2 : 0;
+  if (pattern.substr(0, kMaterialPrefix.size()) == kMaterialPrefix)
+    return pattern.substr(kMaterialPrefix.size()) == side.material ? 2 : 0;
   if (pattern == side.name) return 3;
-  const bool grouped = !side.group.empty() && pattern.size() == side.name.size() + 1 + side.group.size() && pattern[side.name.size()] == ':' &&
-                       pattern.substr(0, side.name.size()) == side.name && pattern.substr(side.name.size() + 1) == side.group;
+  const bool grouped = !side.group.empty() && pattern.size() == side.name.size() + 1 + side.group.size() &&
+                       pattern[side.name.size()] == ':' && pattern.substr(0, side.name.size()) == side.name &&
+                       pattern.substr(side.name.size() + 1) == side.group;
   return grouped ? 4 : 0;
 }
 
@@ -37,12 +41,14 @@ inline int rule_weight(const std::string between[2], const PairSide &a, const Pa
   return std::max(both(a, b), both(b, a));
 }
 
-// The same two patterns, in either order: the newer rule holds wherever the older one did, so the older one can go.
+// The same two patterns, in either order: the newer rule holds wherever the older one did, so the
+// older one can go.
 inline bool same_pair(const std::string a[2], const std::string b[2]) {
   return (a[0] == b[0] && a[1] == b[1]) || (a[0] == b[1] && a[1] == b[0]);
 }
 
-// Puts a rule behind the others and drops the one it supersedes. The vector must have room for one more, or this may throw before it changes anything.
+// Puts a rule behind the others and drops the one it supersedes. The vector must have room for one more, or
+// this may throw before it changes anything.
 template <class Rule>
 void add_rule(std::vector<Rule> &rules, Rule &&fresh) {
   rules.reserve(rules.size() + 1);
@@ -52,7 +58,8 @@ void add_rule(std::vector<Rule> &rules, Rule &&fresh) {
 
 // Is `name` a body or obstacle that the pattern names, as a whole or by a group?
 inline bool names(std::string_view pattern, std::string_view name) {
-  return pattern == name || (pattern.size() > name.size() && pattern.substr(0, name.size()) == name && pattern[name.size()] == ':');
+  return pattern == name || (pattern.size() > name.size() && pattern.substr(0, name.size()) == name &&
+                             pattern[name.size()] == ':');
 }
 
 // nullptr: no rule names the pair.
@@ -62,7 +69,10 @@ const Rule *best_rule(const std::vector<Rule> &rules, const PairSide &a, const P
   int most = 0;
   for (const Rule &r : rules) {
     const int weight = rule_weight(r.between, a, b);
-    if (weight && weight >= most) most = weight, best = &r;
+    if (weight && weight >= most) {
+      most = weight;
+      best = &r;
+    }
   }
   return best;
 }

@@ -6,7 +6,8 @@ namespace dfm {
 
 namespace {
 
-// One point: four doubles, two or one machine vectors. The same operations on each component as written, at every width.
+// One point: four doubles, two or one machine vectors. The same operations on each component as written,
+// at every width.
 using Point = double __attribute__((vector_size(32)));
 static_assert(kStride == 4 && sizeof(Point) == kStride * sizeof(double));
 Point *points(Array<double> &a) { return reinterpret_cast<Point *>(a.data()); }
@@ -17,13 +18,16 @@ double predict(Phyxels &p, Vec3 gravity, double h) {
   const Point g{gravity.x, gravity.y, gravity.z, 0};
   const Point *const v = points(p.v), *const w = points(p.inv_mass), *const f = points(p.f);
   Point *const free = points(p.v_free);
-  Point square[2] = {};   // two sums, so that one addition does not wait for the one before
+  Point square[2] = {};  // two sums, so that one addition does not wait for the one before
   const auto one = [&](uint32_t i, Point &sum) {
     free[i] = v[i] + h * (w[i] * (f[i] + p.mass[i] * g));
     sum += p.mass[i] * (free[i] * free[i]);
   };
   uint32_t i = 0;
-  for (; i + 2 <= p.n; i += 2) one(i, square[0]), one(i + 1, square[1]);
+  for (; i + 2 <= p.n; i += 2) {
+    one(i, square[0]);
+    one(i + 1, square[1]);
+  }
   if (i < p.n) one(i, square[0]);
   const Point sum = square[0] + square[1];
   return 0.5 * ((sum[0] + sum[1]) + sum[2]);
@@ -31,7 +35,9 @@ double predict(Phyxels &p, Vec3 gravity, double h) {
 
 void commit(Phyxels &p, bool touched, double h) {
   Point *const x = points(p.x), *const v = points(p.v);
-  const Point *const free = points(p.v_free), *const w = points(p.inv_mass), *const impulse = points(p.impulse);
+  const Point *const free = points(p.v_free);
+  const Point *const w = points(p.inv_mass);
+  const Point *const impulse = points(p.impulse);
   for (uint32_t i = 0; i < p.n; ++i) {
     v[i] = touched ? free[i] + w[i] * impulse[i] : free[i];
     x[i] += h * v[i];
@@ -47,7 +53,10 @@ double stable_step(const Phyxels &p, const double *ksum, const double *csum, uin
     // h = 4m / (c + sqrt(c^2 + 4 m k)): the same root without cancellation, and defined for k = 0
     const double bottom = c + std::sqrt(c * c + 4 * m * k);
     const double h = bottom > 0 ? 4 * m / bottom : std::numeric_limits<double>::infinity();
-    if (h < best) best = h, *worst = i;
+    if (h < best) {
+      best = h;
+      *worst = i;
+    }
   }
   return best;
 }

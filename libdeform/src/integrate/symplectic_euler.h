@@ -1,18 +1,22 @@
-// Symplectic Euler in velocity form: v' = v + h M^-1 (f + m g + contact), x' = x + h v'. The mean velocity over the sub-step is v', which
-// is what contact needs. (The position form loses h^2 a to rounding: doc/concepts/step.md.)
+// Symplectic Euler in velocity form: v' = v + h M^-1 (f + m g + contact), x' = x + h v'. The mean velocity
+// over the sub-step is v', which is what contact needs. (The position form loses h^2 a to rounding:
+// doc/concepts/step.md.)
 #pragma once
 #include "phyxel/phyxels.h"
 
 namespace dfm {
 
-// v_free for free components; held components keep the velocity they carry. Returns its kinetic energy, J, which is not finite where a component is not.
+// v_free for free components; held components keep the velocity they carry. Returns its kinetic energy, J,
+// which is not finite where a component is not.
 double predict(Phyxels &p, Vec3 gravity, double h);
 // v = v_free + M^-1 impulse (impulse may be absent: `touched` false), x += h v.
 void commit(Phyxels &p, bool touched, double h);
 
-// Largest stable sub-step. For every mode of K - w^2 M with dampers C taken from the start of the step the scheme is stable iff
-// h^2 k + 2 h c <= 4 m; with Gershgorin row sums this holds for the whole matrix if it holds for each point:
-// h = [-c + sqrt(c^2 + 4 m k)] / k. ksum, csum: [n] row sums of K and C (N/m, N s/m). worst: the point that bounds, or n.
+// Largest stable sub-step. For every mode of K - w^2 M with dampers C taken from the start of the step the
+// scheme is stable iff h^2 k + 2 h c <= 4 m; with Gershgorin row sums this holds for the whole matrix if it
+// holds for each point:
+// h = [-c + sqrt(c^2 + 4 m k)] / k. ksum, csum: [n] row sums of K and C (N/m, N s/m). worst: the point
+// that bounds, or n.
 double stable_step(const Phyxels &p, const double *ksum, const double *csum, uint32_t *worst);
 
 }  // namespace dfm

@@ -4,12 +4,13 @@
 
 namespace dfm {
 
-// sin(2 pi turns). The argument is reduced exactly to |r| <= 1/8 turn; Taylor polynomials to below one unit in the last place there.
+// sin(2 pi turns). The argument is reduced exactly to |r| <= 1/8 turn; Taylor polynomials to below one unit
+// in the last place there.
 inline double sin_turns(double turns) {
-  double r = turns - std::floor(turns + 0.5);   // [-0.5, 0.5)
+  double r = turns - std::floor(turns + 0.5);  // [-0.5, 0.5)
   const double sign = r < 0 ? -1 : 1;
   r = r < 0 ? -r : r;
-  if (r > 0.25) r = 0.5 - r;                    // sin(pi - x) = sin x
+  if (r > 0.25) r = 0.5 - r;  // sin(pi - x) = sin x
   const double tau = 6.283185307179586476925;
   if (r <= 0.125) {
     const double x = tau * r, q = x * x;

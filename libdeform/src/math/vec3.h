@@ -1,4 +1,5 @@
-// Three doubles and the few operations that geometry needs. No FMA, no reordering: the bits are the same on every build.
+// Three doubles and the few operations that geometry needs. No FMA, no reordering: the bits are the same
+// on every build.
 #pragma once
 #include <cmath>
 
@@ -11,7 +12,11 @@ struct Vec3 {
 };
 
 inline Vec3 load3(const double *p) { return {p[0], p[1], p[2]}; }
-inline void store3(double *p, Vec3 a) { p[0] = a.x, p[1] = a.y, p[2] = a.z; }
+inline void store3(double *p, Vec3 a) {
+  p[0] = a.x;
+  p[1] = a.y;
+  p[2] = a.z;
+}
 inline Vec3 operator+(Vec3 a, Vec3 b) { return {a.x + b.x, a.y + b.y, a.z + b.z}; }
 inline Vec3 operator-(Vec3 a, Vec3 b) { return {a.x - b.x, a.y - b.y, a.z - b.z}; }
 inline Vec3 operator-(Vec3 a) { return {-a.x, -a.y, -a.z}; }
@@ -19,7 +24,9 @@ inline Vec3 operator*(double s, Vec3 a) { return {s * a.x, s * a.y, s * a.z}; }
 inline Vec3 &operator+=(Vec3 &a, Vec3 b) { return a = a + b; }
 inline Vec3 &operator-=(Vec3 &a, Vec3 b) { return a = a - b; }
 inline double dot(Vec3 a, Vec3 b) { return a.x * b.x + a.y * b.y + a.z * b.z; }
-inline Vec3 cross(Vec3 a, Vec3 b) { return {a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x}; }
+inline Vec3 cross(Vec3 a, Vec3 b) {
+  return {a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
+}
 inline double norm2(Vec3 a) { return dot(a, a); }
 inline double norm(Vec3 a) { return std::sqrt(dot(a, a)); }
 inline Vec3 normalized(Vec3 a) {
@@ -46,7 +53,8 @@ inline Quat operator*(Quat a, Quat b) {
   return {a.w * b.x + a.x * b.w + a.y * b.z - a.z * b.y, a.w * b.y - a.x * b.z + a.y * b.w + a.z * b.x,
           a.w * b.z + a.x * b.y - a.y * b.x + a.z * b.w, a.w * b.w - a.x * b.x - a.y * b.y - a.z * b.z};
 }
-// All zero reads as identity (dfm_pose). Lengths whose square a double does not hold are brought near one first.
+// All zero reads as identity (dfm_pose). Lengths whose square a double does not hold are brought
+// near one first.
 inline Quat unit_quat(const double q[4]) {
   const double n = std::sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3]);
   if (n > 1e-150 && n < 1e150) return {q[0] / n, q[1] / n, q[2] / n, q[3] / n};

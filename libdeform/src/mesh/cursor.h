@@ -1,5 +1,6 @@
-// A place in the bytes of a mesh file: words and numbers as text, or values as binary, with the place named in every refusal. Nothing is
-// copied and no line is limited; numbers go through from_chars, so the locale has no say.
+// A place in the bytes of a mesh file: words and numbers as text, or values as binary, with the place
+// named in every refusal. Nothing is copied and no line is limited; numbers go through from_chars, so the
+// locale has no say.
 #pragma once
 #include <charconv>
 #include <cmath>
@@ -20,7 +21,8 @@ inline unsigned long long ull(uint64_t n) { return n; }
 
 class Cursor {
  public:
-  Cursor(const std::string &path, const char *begin, size_t bytes) : path_(path), begin_(begin), p_(begin), end_(begin + bytes) {}
+  Cursor(const std::string &path, const char *begin, size_t bytes)
+      : path_(path), begin_(begin), p_(begin), end_(begin + bytes) {}
 
   bool binary = false;  // names places by byte instead of line
   bool swap = false;    // binary values have the other byte order
@@ -70,7 +72,8 @@ class Cursor {
     const std::string_view found = word();
     if (found == wanted) return;
     seek(at);
-    refuse("expected %.*s after %s, found %s", int(wanted.size()), wanted.data(), after, quote(found).c_str());
+    refuse("expected %.*s after %s, found %s", int(wanted.size()), wanted.data(), after,
+           quote(found).c_str());
   }
   int64_t integer(const char *what) { return to_integer(word(), what); }
   double real(const char *what) { return to_real(word(), what); }
@@ -80,7 +83,8 @@ class Cursor {
     const char *from = text.data(), *to = from + text.size();
     if (text.size() > 1 && *from == '+' && from[1] != '-') ++from;
     const auto result = std::from_chars(from, to, value);
-    if (text.empty() || result.ec != std::errc() || result.ptr != to) refuse_word(text, what, "a whole number");
+    if (text.empty() || result.ec != std::errc() || result.ptr != to)
+      refuse_word(text, what, "a whole number");
     return value;
   }
   double to_real(std::string_view text, const char *what) {
@@ -94,7 +98,8 @@ class Cursor {
       refuse_word(text, what, "a finite number");
     return value;
   }
-  // The next word of this line; empty at its end, which stays unread. A backslash before a line end continues the line.
+  // The next word of this line; empty at its end, which stays unread. A backslash before a line end
+  // continues the line.
   std::string_view line_word() {
     for (; p_ < end_ && *p_ != '\n'; ++p_) {
       if (is_space(*p_)) continue;
@@ -119,8 +124,10 @@ class Cursor {
   uint64_t count(int64_t claimed, size_t least_bytes_each, const char *what) const {
     if (claimed < 0) refuse("promises %lld %s; a count cannot be negative", ll(claimed), what);
     if (static_cast<uint64_t>(claimed) > left() / least_bytes_each)
-      refuse("promises %lld %s, but the %zu bytes left in the file cannot hold them: the file is truncated or its count is wrong",
-             ll(claimed), what, left());
+      refuse(
+          "promises %lld %s, but the %zu bytes left in the file cannot hold them: the file is truncated or "
+          "its count is wrong",
+          ll(claimed), what, left());
     return static_cast<uint64_t>(claimed);
   }
   // The same in text, where the last number needs no space behind it.
@@ -135,7 +142,8 @@ class Cursor {
     if (left() < sizeof(T)) refuse("the file ends inside %s", what);
     char raw[sizeof(T)];
     std::memcpy(raw, p_, sizeof(T));
-    if (swap) for (size_t i = 0; i < sizeof(T) / 2; ++i) std::swap(raw[i], raw[sizeof(T) - 1 - i]);
+    if (swap)
+      for (size_t i = 0; i < sizeof(T) / 2; ++i) std::swap(raw[i], raw[sizeof(T) - 1 - i]);
     p_ += sizeof(T);
     T out;
     std::memcpy(&out, raw, sizeof(T));
@@ -168,7 +176,9 @@ class Cursor {
   static std::string quote(std::string_view text);
 
  private:
-  static bool is_space(char c) { return c == ' ' || c == '\n' || c == '\t' || c == '\r' || c == '\v' || c == '\f'; }
+  static bool is_space(char c) {
+    return c == ' ' || c == '\n' || c == '\t' || c == '\r' || c == '\v' || c == '\f';
+  }
   // Whether an out-of-range decimal is too small rather than too large.
   static bool below_one(std::string_view text) {
     const size_t e = text.find_first_of("eE");
@@ -181,7 +191,8 @@ class Cursor {
     return offset();
   }
   bool continues() const {  // at a backslash that stands before the line's end
-    return *p_ == '\\' && end_ - p_ > 1 && (p_[1] == '\n' || (p_[1] == '\r' && end_ - p_ > 2 && p_[2] == '\n'));
+    return *p_ == '\\' && end_ - p_ > 1 &&
+           (p_[1] == '\n' || (p_[1] == '\r' && end_ - p_ > 2 && p_[2] == '\n'));
   }
   [[noreturn]] void refuse_word(std::string_view text, const char *what, const char *kind) {
     if (!text.empty()) p_ = text.data();

@@ -1,13 +1,17 @@
-// A surface becomes cells: the pitch of the lattice is sought that offers the wanted number, each cell's share of material is measured, the
-// sum of the shares is made to agree with the enclosed volume where that is known better, and light cells are given a floor.
+// A surface becomes cells: the pitch of the lattice is sought that offers the wanted number, each cell's
+// share of material is measured, the sum of the shares is made to agree with the enclosed volume where that
+// is known better, and light cells are given a floor.
 //
-// The floor. Mass and stiffness of a cell are scaled by the same share, so a model that is linear in the cells keeps its step bound however
-// small a share is: K = sum s_c K_c and M = sum s_c M_c give x.Kx <= max_c(lambda_c) x.Mx. What suffers is contact, and springs whose weights
-// come from all cells around: a corner that only cells of tiny share know has next to no mass, an impulse on a surfel near it throws it
-// through its cell, and mass ratios have no bound. So no cell has less than kShareFloor of what the fullest cell around it has; the mass for it
-// comes from the full cells around it, so that the body's mass stays and its center moves by less than a cell times the little that is moved.
-// Measured on examples/scenes/fill_drop.json (doc/concepts/filling.md): 41 sub-steps a step without a floor, 3 from 0.01 on; 0.1 leaves mass
-// ratios of 60 between points and the fewest steps at the solver's cap, and makes a ball of 5,000 cells 0.8 % wider in its inertia.
+// The floor. Mass and stiffness of a cell are scaled by the same share, so a model that is linear in the
+// cells keeps its step bound however small a share is: K = sum s_c K_c and M = sum s_c M_c give x.Kx <=
+// max_c(lambda_c) x.Mx. What suffers is contact, and springs whose weights come from all cells around: a
+// corner that only cells of tiny share know has next to no mass, an impulse on a surfel near it throws it
+// through its cell, and mass ratios have no bound. So no cell has less than kShareFloor of what the fullest
+// cell around it has; the mass for it comes from the full cells around it, so that the body's mass stays and
+// its center moves by less than a cell times the little that is moved. Measured on
+// examples/scenes/fill_drop.json (doc/concepts/filling.md): 41 sub-steps a step without a floor, 3 from 0.01
+// on; 0.1 leaves mass ratios of 60 between points and the fewest steps at the solver's cap, and makes a ball
+// of 5,000 cells 0.8 % wider in its inertia.
 #include <algorithm>
 #include <cfloat>
 #include <cmath>
@@ -20,18 +24,18 @@ namespace dfm {
 namespace {
 
 constexpr uint32_t kMostCells = 100'000'000;
-constexpr double kShareFloor = 0.1;      // of the fullest cell around
-constexpr double kOpening = 0.1;         // openings up to this part of the closed area are filled across
-constexpr double kDeviations = 4;        // sampled and summed volume agree within so many standard deviations
-constexpr double kCloseEnough = 1.02;    // number of cells over the wanted one, or the reverse
+constexpr double kShareFloor = 0.1;    // of the fullest cell around
+constexpr double kOpening = 0.1;       // openings up to this part of the closed area are filled across
+constexpr double kDeviations = 4;      // sampled and summed volume agree within so many standard deviations
+constexpr double kCloseEnough = 1.02;  // number of cells over the wanted one, or the reverse
 constexpr double kFarOff = 1.05;
 constexpr int kTries = 12;
 constexpr uint64_t kBytesPerCell = 200;  // at the peak, measured at 1e6 cells
 
-// ---- the pitch -----------------------------------------------------------------------------------------------------
+// ---- the pitch --------------------------------------------------------------------------------------------
 
-// Cells of a lattice in any position that a body touches: density times (V + A w/2) with the cells' mean width w (Steiner's formula);
-// w = 0.85 h for this lattice, by counting.
+// Cells of a lattice in any position that a body touches: density times (V + A w/2) with the cells' mean
+// width w (Steiner's formula); w = 0.85 h for this lattice, by counting.
 double expected_cells(const FillSurface &s, double half_pitch) {
   const double h = 2 * half_pitch;
   return 12 / (h * h * h) * (std::fabs(s.volume) + 0.425 * h * s.area);
@@ -47,24 +51,34 @@ double expected_half_pitch(const FillSurface &s, double cells) {
 }
 
 // As far as a search may go beyond the wanted number.
-uint32_t most_cells(uint32_t cells) { return uint32_t(std::min<uint64_t>(4 * uint64_t(cells) + 1000, kMostCells)); }
+uint32_t most_cells(uint32_t cells) {
+  return uint32_t(std::min<uint64_t>(4 * uint64_t(cells) + 1000, kMostCells));
+}
 
-// Below it keys do not fit, or the rounding of the coordinates (four times that is what touching allows) reaches 1/20 of the lattice's unit.
+// Below it keys do not fit, or the rounding of the coordinates (four times that is what touching allows)
+// reaches 1/20 of the lattice's unit.
 double least_half_pitch(const FillSurface &s) { return std::max(2.0 / kLatticeReach, 80 * s.resolution); }
 
-// Half the pitch that offers the number of cells. The count falls with the pitch to the power of 2 (all surface) to 3 (all inside), and 8/3
-// makes each try some ten times better than the last; where the count jumps the tries are kept between those that were too many and too few.
-// Square roots alone, so that the lattice is the same on every machine. Returns how far the count is off, as a ratio above 1; infinity: no
+// Half the pitch that offers the number of cells. The count falls with the pitch to the power of 2 (all
+// surface) to 3 (all inside), and 8/3 makes each try some ten times better than the last; where the count
+// jumps the tries are kept between those that were too many and too few. Square roots alone, so that the
+// lattice is the same on every machine. Returns how far the count is off, as a ratio above 1; infinity: no
 // lattice that was tried has so few cells.
 double seek_pitch(const FillSurface &surface, uint32_t cells, Lattice &lattice) {
   const uint32_t limit = most_cells(cells);
-  double fine = least_half_pitch(surface), coarse = 1, best_apart = HUGE_VAL, next = std::clamp(expected_half_pitch(surface, cells), fine, coarse);
+  double fine = least_half_pitch(surface);
+  double coarse = 1;
+  double best_apart = HUGE_VAL;
+  double next = std::clamp(expected_half_pitch(surface, cells), fine, coarse);
   Lattice trial = lattice;
   for (int tries = 0; tries < kTries && best_apart > kCloseEnough; ++tries) {
     trial.half_pitch = next;
     const FillCover covered = cover(surface, trial, limit);
     const double ratio = double(covered.kept) / cells, apart = std::max(ratio, 1 / ratio);
-    if (covered.complete && apart < best_apart) best_apart = apart, lattice = trial;
+    if (covered.complete && apart < best_apart) {
+      best_apart = apart;
+      lattice = trial;
+    }
     (ratio > 1 || !covered.complete ? fine : coarse) = next;
     next *= std::sqrt(std::sqrt(std::sqrt(ratio * ratio * ratio)));
     if (covered.hopeless || !(next > fine && next < coarse)) next = std::sqrt(fine * coarse);
@@ -72,30 +86,36 @@ double seek_pitch(const FillSurface &surface, uint32_t cells, Lattice &lattice) 
   return best_apart;
 }
 
-// A grid point in the middle of the box keeps the symmetries of a body. Where that makes the number of cells jump too far, as across a rod
-// of a few cells' width, any other place will do.
+// A grid point in the middle of the box keeps the symmetries of a body. Where that makes the number of cells
+// jump too far, as across a rod of a few cells' width, any other place will do.
 Lattice choose_lattice(const FillSurface &surface, uint32_t cells) {
   Lattice symmetric, other;
   other.shift = {0.39, 0.27, 0.61};
   const double apart = seek_pitch(surface, cells, symmetric);
   const bool better = apart > kFarOff && seek_pitch(surface, cells, other) < apart;
   if (!better && apart == HUGE_VAL)
-    fail(DFM_E_FORMAT, "about %u cells cannot fill this surface of %zu triangles, %.3g m across with an area of %.3g m2: at every pitch that was tried its triangles enter more than %u; "
-         "stray corners or thin spikes that reach far out do that, so remove them, or ask for more cells",
-         cells, surface.tris.size() / 3, surface.size, surface.area * surface.size * surface.size, most_cells(cells));
+    fail(DFM_E_FORMAT,
+         "about %u cells cannot fill this surface of %zu triangles, %.3g m across with an area of %.3g m2: "
+         "at every pitch that was tried its triangles enter more than %u; stray corners or thin spikes that "
+         "reach far out do that, so remove them, or ask for more cells",
+         cells, surface.tris.size() / 3, surface.size, surface.area * surface.size * surface.size,
+         most_cells(cells));
   return better ? other : symmetric;
 }
 
-// ---- the shares ----------------------------------------------------------------------------------------------------
+// ---- the shares -------------------------------------------------------------------------------------------
 
 struct Filling {
   explicit Filling(const Memory &memory)
-      : keys(HookAllocator<Site>(memory)), share(HookAllocator<double>(memory)), loose(HookAllocator<double>(memory)),
-        tets(HookAllocator<uint32_t>(memory)), sites(HookAllocator<Site>(memory)) {}
-  Array<Site> keys;                // cells in the order of their keys
+      : keys(HookAllocator<Site>(memory)),
+        share(HookAllocator<double>(memory)),
+        loose(HookAllocator<double>(memory)),
+        tets(HookAllocator<uint32_t>(memory)),
+        sites(HookAllocator<Site>(memory)) {}
+  Array<Site> keys;  // cells in the order of their keys
   Array<double> share, loose;
   Array<uint32_t> tets;
-  Array<Site> sites;               // of the points
+  Array<Site> sites;  // of the points
   size_t size() const { return keys.size(); }
 };
 
@@ -105,13 +125,17 @@ double sum(const Array<double> &x) {
   return s;
 }
 
-// Shifts every unsettled share by the same part of what is unsettled in it until the sum is `wanted` cells, if chance explains the gap.
+// Shifts every unsettled share by the same part of what is unsettled in it until the sum is `wanted` cells,
+// if chance explains the gap.
 bool settle(Filling &f, double wanted, double piece) {
   Array<double> &share = f.share;
-  if (std::fabs(sum(share) - wanted) > kDeviations * 0.5 * std::sqrt(piece * sum(f.loose)) + 1e-9 * wanted) return false;
+  if (std::fabs(sum(share) - wanted) > kDeviations * 0.5 * std::sqrt(piece * sum(f.loose)) + 1e-9 * wanted)
+    return false;
   for (int i = 0; i < 100; ++i) {
     double missing = wanted - sum(share), room = 0;
-    const auto may_move = [&](size_t c) { return f.loose[c] > 0 && (missing > 0 ? share[c] < 1 : share[c] > 0); };
+    const auto may_move = [&](size_t c) {
+      return f.loose[c] > 0 && (missing > 0 ? share[c] < 1 : share[c] > 0);
+    };
     for (size_t c = 0; c < f.size(); ++c) room += may_move(c) ? f.loose[c] : 0;
     if (std::fabs(missing) <= 1e-13 * wanted || !(room > 0)) break;
     for (size_t c = 0; c < f.size(); ++c)
@@ -127,11 +151,13 @@ Filling arrange(const FillSurface &surface, const FillCover &cover, const FillSh
   for (uint32_t i = 0; i < cover.cells.size(); ++i)
     if (cover.kind[i] != CellKind::outside && !(shares.share[i] == 0 && cover.kind[i] == CellKind::mixed))
       order.push_back(i);
-  std::sort(order.begin(), order.end(), [&](uint32_t i, uint32_t j) { return cover.cells[i] < cover.cells[j]; });
+  std::sort(order.begin(), order.end(),
+            [&](uint32_t i, uint32_t j) { return cover.cells[i] < cover.cells[j]; });
   Filling out(memory);
   for (const uint32_t i : order) {
     out.keys.push_back(unpack(cover.cells[i]));
-    out.share.push_back(shares.share[i]), out.loose.push_back(shares.loose[i]);
+    out.share.push_back(shares.share[i]);
+    out.loose.push_back(shares.loose[i]);
   }
   return out;
 }
@@ -147,12 +173,15 @@ void number_points(const Memory &memory, Filling &f) {
   const Array<uint64_t> all = sites;
   std::sort(sites.begin(), sites.end());
   sites.erase(std::unique(sites.begin(), sites.end()), sites.end());
-  f.tets.clear(), f.sites.clear();
-  for (const uint64_t s : all) f.tets.push_back(uint32_t(std::lower_bound(sites.begin(), sites.end(), s) - sites.begin()));
+  f.tets.clear();
+  f.sites.clear();
+  for (const uint64_t s : all)
+    f.tets.push_back(uint32_t(std::lower_bound(sites.begin(), sites.end(), s) - sites.begin()));
   for (const uint64_t s : sites) f.sites.push_back(unpack(s));
 }
 
-// Drops pieces that hold no material: sheets without thickness, and triangles that hang in the air. Returns their number of cells.
+// Drops pieces that hold no material: sheets without thickness, and triangles that hang in the air. Returns
+// their number of cells.
 uint32_t drop_empty_pieces(const Memory &memory, Filling &f) {
   Array<uint32_t> parent(f.sites.size(), HookAllocator<uint32_t>(memory));
   for (uint32_t i = 0; i < parent.size(); ++i) parent[i] = i;
@@ -169,11 +198,15 @@ uint32_t drop_empty_pieces(const Memory &memory, Filling &f) {
   size_t kept = 0;
   for (size_t c = 0; c < f.size(); ++c)
     if (material[root(f.tets[4 * c])] > 0) {
-      f.keys[kept] = f.keys[c], f.share[kept] = f.share[c], f.loose[kept] = f.loose[c];
+      f.keys[kept] = f.keys[c];
+      f.share[kept] = f.share[c];
+      f.loose[kept] = f.loose[c];
       ++kept;
     }
   const auto dropped = uint32_t(f.size() - kept);
-  f.keys.resize(kept), f.share.resize(kept), f.loose.resize(kept);
+  f.keys.resize(kept);
+  f.share.resize(kept);
+  f.loose.resize(kept);
   if (dropped) number_points(memory, f);
   return dropped;
 }
@@ -182,7 +215,8 @@ uint32_t drop_empty_pieces(const Memory &memory, Filling &f) {
 struct Around {
   Array<uint32_t> row, cell;
   Around(const Memory &memory, const Filling &f)
-      : row(f.sites.size() + 1, 0u, HookAllocator<uint32_t>(memory)), cell(f.tets.size(), HookAllocator<uint32_t>(memory)) {
+      : row(f.sites.size() + 1, 0u, HookAllocator<uint32_t>(memory)),
+        cell(f.tets.size(), HookAllocator<uint32_t>(memory)) {
     for (const uint32_t p : f.tets) ++row[p + 1];
     for (size_t p = 1; p < row.size(); ++p) row[p] += row[p - 1];
     Array<uint32_t> at = row;
@@ -196,20 +230,29 @@ struct Around {
   }
 };
 
-// Raises light cells to the floor at the expense of the full ones around them (those with at least half of what the fullest has); none gives
-// more than half of what it has. Where nothing around has material, as along a hair thinner than the samples, the whole body gives.
+// Raises light cells to the floor at the expense of the full ones around them (those with at least half of
+// what the fullest has); none gives more than half of what it has. Where nothing around has material, as
+// along a hair thinner than the samples, the whole body gives.
 void raise_to_floor(const Memory &memory, Filling &f) {
   const Around around(memory, f);
   double first = 0, second = 0;
-  for (const double s : f.share) first += s, second += s * s;
+  for (const double s : f.share) {
+    first += s;
+    second += s * s;
+  }
   const double typical = second / first;
   const size_t n = f.size();
-  Array<double> fullest(n, 0.0, HookAllocator<double>(memory)), need = fullest, from = fullest, gift = fullest, part = fullest;
+  Array<double> fullest(n, 0.0, HookAllocator<double>(memory)), need = fullest, from = fullest,
+                                                                gift = fullest, part = fullest;
   double common = 0;
   for (size_t c = 0; c < n; ++c) {
     around.each(f, c, [&](size_t d) { fullest[c] = std::max(fullest[c], f.share[d]); });
     need[c] = std::max(0.0, kShareFloor * std::max(fullest[c], kShareFloor * typical) - f.share[c]);
-    if (need[c] > 0 && fullest[c] < kShareFloor * typical) common += need[c], f.share[c] += need[c], need[c] = 0;
+    if (need[c] > 0 && fullest[c] < kShareFloor * typical) {
+      common += need[c];
+      f.share[c] += need[c];
+      need[c] = 0;
+    }
   }
   const auto gives = [&](size_t c, size_t d) { return d != c && f.share[d] >= 0.5 * fullest[c]; };
   for (size_t c = 0; c < n; ++c)
@@ -220,11 +263,16 @@ void raise_to_floor(const Memory &memory, Filling &f) {
   for (size_t c = 0; c < n; ++c)
     if (need[c] > 0) {
       part[c] = 1;
-      around.each(f, c, [&](size_t d) { if (gives(c, d) && gift[d] > 0.5 * f.share[d]) part[c] = std::min(part[c], 0.5 * f.share[d] / gift[d]); });
+      around.each(f, c, [&](size_t d) {
+        if (gives(c, d) && gift[d] > 0.5 * f.share[d])
+          part[c] = std::min(part[c], 0.5 * f.share[d] / gift[d]);
+      });
     }
   std::fill(gift.begin(), gift.end(), 0.0);
   for (size_t c = 0; c < n; ++c)
-    if (need[c] > 0) around.each(f, c, [&](size_t d) { gift[d] += gives(c, d) ? part[c] * need[c] * f.share[d] / from[c] : 0; });
+    if (need[c] > 0)
+      around.each(f, c,
+                  [&](size_t d) { gift[d] += gives(c, d) ? part[c] * need[c] * f.share[d] / from[c] : 0; });
   for (size_t c = 0; c < n; ++c) f.share[c] += part[c] * need[c] - gift[c];
   if (common > 0) {
     const double factor = first / (first + common);
@@ -232,7 +280,7 @@ void raise_to_floor(const Memory &memory, Filling &f) {
   }
 }
 
-// ---- sentences -----------------------------------------------------------------------------------------------------
+// ---- sentences --------------------------------------------------------------------------------------------
 
 void refuse_unfit(const TriMesh &surface, const FillSurface &s, uint32_t cells) {
   if (cells < 1 || cells > kMostCells) fail(DFM_E_ARG, "cells is %u; expected 1 to %u", cells, kMostCells);
@@ -241,33 +289,46 @@ void refuse_unfit(const TriMesh &surface, const FillSurface &s, uint32_t cells) 
   const double whole = s.area + s.opening_area;
   if (s.opening_area > kOpening * whole)
     fail(DFM_E_FORMAT,
-         "the surface is open: %u opening%s of %.3g m2 in all, %.0f %% of the closed surface, the widest %.3g m across where the whole is %.3g m; openings up to %.0f %% are filled across, so close it or give a mesh with tetrahedra",
-         s.openings, s.openings == 1 ? "" : "s", s.opening_area * s.size * s.size, 100 * s.opening_area / whole, s.opening_width * s.size, s.size,
-         100 * kOpening);
+         "the surface is open: %u opening%s of %.3g m2 in all, %.0f %% of the closed surface, the widest "
+         "%.3g m across where the whole is %.3g m; openings up to %.0f %% are filled across, so close it or "
+         "give a mesh with tetrahedra",
+         s.openings, s.openings == 1 ? "" : "s", s.opening_area * s.size * s.size,
+         100 * s.opening_area / whole, s.opening_width * s.size, s.size, 100 * kOpening);
   const double needed = expected_half_pitch(s, cells), least = least_half_pitch(s);
   if (needed >= least) return;
   const double reach = s.resolution / DBL_EPSILON * s.size;
   if (80 * s.resolution > 2.0 / kLatticeReach)
-    fail(DFM_E_FORMAT, "%u cells need a pitch of %.3g m, and coordinates of up to %.3g m are known to %.3g m only, where the surface is %.3g m across; move it nearer to the origin",
+    fail(DFM_E_FORMAT,
+         "%u cells need a pitch of %.3g m, and coordinates of up to %.3g m are known to %.3g m only, where "
+         "the surface is %.3g m across; move it nearer to the origin",
          cells, 2 * needed * s.size, reach, DBL_EPSILON * reach, s.size);
-  fail(DFM_E_FORMAT, "%u cells need a pitch of %.3g m, which is too fine for a surface that is %.3g m across; its parts lie too far apart, or spikes reach far out: remove them, or ask for fewer cells",
+  fail(DFM_E_FORMAT,
+       "%u cells need a pitch of %.3g m, which is too fine for a surface that is %.3g m across; its parts "
+       "lie too far apart, or spikes reach far out: remove them, or ask for fewer cells",
        cells, 2 * needed * s.size, s.size);
 }
 
-void tell(const FillSurface &s, const Filling &f, double half_pitch, uint32_t cells, bool settled, double sampled, uint32_t empty, TetMesh &out) {
+void tell(const FillSurface &s, const Filling &f, double half_pitch, uint32_t cells, bool settled,
+          double sampled, uint32_t empty, TetMesh &out) {
   const double cube = s.size * s.size * s.size, unit = kLatticeCell * half_pitch * half_pitch * half_pitch;
   if (!s.closed)
-    out.warnings.push_back(format("the surface has %u opening%s (or triangles that face the wrong way) of %.3g m2 in all, %.2g %% of its area, the widest %.3g m across; it is filled across them",
-                                  s.openings, s.openings == 1 ? "" : "s", s.opening_area * s.size * s.size,
-                                  100 * s.opening_area / (s.area + s.opening_area), s.opening_width * s.size));
+    out.warnings.push_back(
+        format("the surface has %u opening%s (or triangles that face the wrong way) of %.3g m2 in all, %.2g "
+               "%% of its area, the widest %.3g m across; it is filled across them",
+               s.openings, s.openings == 1 ? "" : "s", s.opening_area * s.size * s.size,
+               100 * s.opening_area / (s.area + s.opening_area), s.opening_width * s.size));
   if (s.closed && !settled)
-    out.warnings.push_back(format("the triangles sum up to a volume of %.6g m3, but %.6g m3 lie inside: the surface passes through itself, and what it encloses twice counts once",
-                                  s.volume * cube, sampled * unit * cube));
+    out.warnings.push_back(
+        format("the triangles sum up to a volume of %.6g m3, but %.6g m3 lie inside: the surface passes "
+               "through itself, and what it encloses twice counts once",
+               s.volume * cube, sampled * unit * cube));
   if (empty)
-    out.warnings.push_back(format("%u cells were left out: they hold a sheet or triangles that enclose nothing", empty));
+    out.warnings.push_back(
+        format("%u cells were left out: they hold a sheet or triangles that enclose nothing", empty));
   const double count = double(f.size());
   if (std::fabs(count - cells) > 0.1 * cells)
-    out.warnings.push_back(format("%zu cells instead of %u: the lattice offers none nearer for this surface", f.size(), cells));
+    out.warnings.push_back(
+        format("%zu cells instead of %u: the lattice offers none nearer for this surface", f.size(), cells));
 }
 
 }  // namespace
@@ -286,7 +347,9 @@ TetMesh fill_surface(const TriMesh &surface, uint32_t cells) {
   number_points(s.memory, f);
   const uint32_t empty = drop_empty_pieces(s.memory, f);
   if (f.size() == 0)
-    fail(DFM_E_FORMAT, "nothing lies inside the surface (%u triangles, %.3g m across); it should enclose a volume, its triangles counter-clockwise from outside",
+    fail(DFM_E_FORMAT,
+         "nothing lies inside the surface (%u triangles, %.3g m across); it should enclose a volume, its "
+         "triangles counter-clockwise from outside",
          surface.ntri(), s.size);
   raise_to_floor(s.memory, f);
 
@@ -297,7 +360,8 @@ TetMesh fill_surface(const TriMesh &surface, uint32_t cells) {
     const Vec3 p = s.middle + length * (place_of(site) - lattice.shift);
     out.points.insert(out.points.end(), {p.x, p.y, p.z});
   }
-  out.tets = std::move(f.tets), out.share = std::move(f.share);
+  out.tets = std::move(f.tets);
+  out.share = std::move(f.share);
   out.tet_group.assign(out.ntet(), kNoGroup);
   for (uint32_t i = 0; i < out.npoint(); ++i) out.file_point.push_back(i);
   tell(s, f, half_pitch, cells, settled, sampled, empty, out);

@@ -1,5 +1,6 @@
-// Which cells of the lattice a surface needs. Triangles are put into cells by separating axes, and what they enclose is reached from there
-// across faces without a triangle, so that work and memory follow the cells kept and not the box around a slanting rod.
+// Which cells of the lattice a surface needs. Triangles are put into cells by separating axes, and what they
+// enclose is reached from there across faces without a triangle, so that work and memory follow the cells
+// kept and not the box around a slanting rod.
 #include <algorithm>
 #include <array>
 #include <cfloat>
@@ -18,12 +19,16 @@ Vec3 middle_of(const TriMesh &surface, double *size, double *reach) {
   for (const uint32_t p : surface.tris)
     for (int k = 0; k < 3; ++k) {
       const double x = surface.points[3 * size_t(p) + k];
-      lo[k] = std::min(lo[k], x), hi[k] = std::max(hi[k], x);
+      lo[k] = std::min(lo[k], x);
+      hi[k] = std::max(hi[k], x);
     }
   *reach = 0;
   for (int k = 0; k < 3; ++k) *reach = std::max({*reach, std::fabs(lo[k]), std::fabs(hi[k])});
   const double longest = std::max({hi[0] - lo[0], hi[1] - lo[1], hi[2] - lo[2]});
-  if (!(longest > 0)) return *size = 0, Vec3{};
+  if (!(longest > 0)) {
+    *size = 0;
+    return Vec3{};
+  }
   const Vec3 extent = (1 / longest) * Vec3{hi[0] - lo[0], hi[1] - lo[1], hi[2] - lo[2]};
   *size = longest * norm(extent);
   return {lo[0] + 0.5 * (hi[0] - lo[0]), lo[1] + 0.5 * (hi[1] - lo[1]), lo[2] + 0.5 * (hi[2] - lo[2])};
@@ -32,7 +37,8 @@ Vec3 middle_of(const TriMesh &surface, double *size, double *reach) {
 Array<double> local_points(const TriMesh &surface, Vec3 middle, double size) {
   Array<double> out{HookAllocator<double>(*surface.memory)};
   out.reserve(surface.points.size());
-  for (size_t i = 0; i < surface.points.size(); ++i) out.push_back(size > 0 ? (surface.points[i] - middle[int(i % 3)]) / size : 0);
+  for (size_t i = 0; i < surface.points.size(); ++i)
+    out.push_back(size > 0 ? (surface.points[i] - middle[int(i % 3)]) / size : 0);
   return out;
 }
 
@@ -44,7 +50,9 @@ struct Kinds {
     int a = kind / 6, b = kind / 2 % 3;
     if (a == b) b = (a + 1) % 3;  // six numbers are never asked for
     int32_t key[3];
-    key[a] = 0, key[b] = 2, key[3 - a - b] = kind % 2 ? 3 : 1;
+    key[a] = 0;
+    key[b] = 2;
+    key[3 - a - b] = kind % 2 ? 3 : 1;
     Site corner[4];
     const Site at{key[0], key[1], key[2]};
     corners_of(at, corner);
@@ -74,7 +82,10 @@ class PieceTest {
   bool run(const Vec3 corner[3], uint32_t triangle) {
     Vec3 lo = corner[0], hi = lo;
     for (int i = 1; i < 3; ++i)
-      for (int k = 0; k < 3; ++k) lo[k] = std::min(lo[k], corner[i][k]), hi[k] = std::max(hi[k], corner[i][k]);
+      for (int k = 0; k < 3; ++k) {
+        lo[k] = std::min(lo[k], corner[i][k]);
+        hi[k] = std::max(hi[k], corner[i][k]);
+      }
     const Vec3 size = hi - lo;
     if (std::max({size.x, size.y, size.z}) > kLongestPiece) {  // in two at the longest edge
       int k = 0;
@@ -100,12 +111,14 @@ class PieceTest {
     int32_t key[3];
     for (key[a] = first_at_least(2 * (lo[a] - 1 - t), 4, 0); key[a] <= 2 * (hi[a] + 1 + t); key[a] += 4)
       for (key[b] = first_at_least(2 * (lo[b] - 1 - t), 4, 2); key[b] <= 2 * (hi[b] + 1 + t); key[b] += 4)
-        for (key[c] = first_at_least(2 * (lo[c] - 0.5 - t), 2, 1); key[c] <= 2 * (hi[c] + 0.5 + t); key[c] += 2) {
+        for (key[c] = first_at_least(2 * (lo[c] - 0.5 - t), 2, 1); key[c] <= 2 * (hi[c] + 0.5 + t);
+             key[c] += 2) {
           const Site at{key[0], key[1], key[2]};
           if (work_ == 0) return false;
           --work_;
           if (skip_ && skip_->find(pack(at)) != UINT32_MAX) continue;
-          const Vec3 middle = 0.5 * place_of(at), moved[3] = {corner[0] - middle, corner[1] - middle, corner[2] - middle};
+          const Vec3 middle = 0.5 * place_of(at);
+          const Vec3 moved[3] = {corner[0] - middle, corner[1] - middle, corner[2] - middle};
           const TetShape &shape = Kinds::all().shape[size_t(Kinds::number(a, b, (key[c] & 2) != 0))];
           if (shape.meets(moved, t) && !visit_(pack(at), triangle, shape.meets(moved, -t))) return false;
         }
@@ -121,32 +134,43 @@ class PieceTest {
 }  // namespace
 
 FillSurface::FillSurface(const TriMesh &surface)
-    : memory(*surface.memory), middle(middle_of(surface, &size, &resolution)), points(local_points(surface, middle, size)),
-      tris(surface.tris), winding(memory, points.data(), surface.ntri(), tris.data()) {
+    : memory(*surface.memory),
+      middle(middle_of(surface, &size, &resolution)),
+      points(local_points(surface, middle, size)),
+      tris(surface.tris),
+      winding(memory, points.data(), surface.ntri(), tris.data()) {
   resolution = size > 0 ? DBL_EPSILON * resolution / size : 0;
   for (size_t t = 0; t < tris.size(); t += 3) {
-    const Vec3 a = load3(&points[3 * size_t(tris[t])]), b = load3(&points[3 * size_t(tris[t + 1])]), c = load3(&points[3 * size_t(tris[t + 2])]);
+    const Vec3 a = load3(&points[3 * size_t(tris[t])]);
+    const Vec3 b = load3(&points[3 * size_t(tris[t + 1])]);
+    const Vec3 c = load3(&points[3 * size_t(tris[t + 2])]);
     area += 0.5 * norm(cross(b - a, c - a));
     volume += dot(a, cross(b, c)) / 6;
   }
   measure_openings();
 }
 
-// The edges that are passed more often one way than the other form closed loops; a loop's vector area is that of any patch that closes it
-// without turning back, at most its area. A triangle that faces the wrong way among its neighbors counts twice: so does its harm.
+// The edges that are passed more often one way than the other form closed loops; a loop's vector area is that
+// of any patch that closes it without turning back, at most its area. A triangle that faces the wrong way
+// among its neighbors counts twice: so does its harm.
 void FillSurface::measure_openings() {
-  struct Edge { uint32_t a, b; int32_t way; };
+  struct Edge {
+    uint32_t a, b;
+    int32_t way;
+  };
   Array<Edge> edges{HookAllocator<Edge>(memory)};
   edges.reserve(tris.size());
   for (size_t i = 0; i < tris.size(); ++i) {
     const uint32_t a = tris[i], b = tris[i % 3 == 2 ? i - 2 : i + 1];
     edges.push_back(a < b ? Edge{a, b, 1} : Edge{b, a, -1});
   }
-  std::sort(edges.begin(), edges.end(), [](const Edge &e, const Edge &f) { return e.a != f.a ? e.a < f.a : e.b < f.b; });
+  std::sort(edges.begin(), edges.end(),
+            [](const Edge &e, const Edge &f) { return e.a != f.a ? e.a < f.a : e.b < f.b; });
   size_t kept = 0;
   for (size_t i = 0, j; i < edges.size(); i = j) {
     int32_t way = 0;
-    for (j = i; j < edges.size() && edges[j].a == edges[i].a && edges[j].b == edges[i].b; ++j) way += edges[j].way;
+    for (j = i; j < edges.size() && edges[j].a == edges[i].a && edges[j].b == edges[i].b; ++j)
+      way += edges[j].way;
     if (way != 0) edges[kept++] = {edges[i].a, edges[i].b, way};
   }
   edges.resize(kept);
@@ -173,19 +197,28 @@ void FillSurface::measure_openings() {
     for (j = i; j < edges.size() && root(edges[j].a) == loop; ++j) {
       const Vec3 a = load3(&points[3 * size_t(edges[j].a)]), b = load3(&points[3 * size_t(edges[j].b)]);
       patch += (0.5 * edges[j].way) * cross(a - origin, b - origin);
-      for (int k = 0; k < 3; ++k) lo[k] = std::min({lo[k], a[k], b[k]}), hi[k] = std::max({hi[k], a[k], b[k]});
+      for (int k = 0; k < 3; ++k) {
+        lo[k] = std::min({lo[k], a[k], b[k]});
+        hi[k] = std::max({hi[k], a[k], b[k]});
+      }
     }
-    ++openings, opening_area += norm(patch), opening_width = std::max(opening_width, norm(hi - lo));
+    ++openings;
+    opening_area += norm(patch);
+    opening_width = std::max(opening_width, norm(hi - lo));
   }
 }
 
-double touch_tolerance(const FillSurface &surface, const Lattice &lattice) { return 1e-9 + 4 * surface.resolution / lattice.half_pitch; }
+double touch_tolerance(const FillSurface &surface, const Lattice &lattice) {
+  return 1e-9 + 4 * surface.resolution / lattice.half_pitch;
+}
 
-uint64_t each_crossing(const FillSurface &surface, const Lattice &lattice, const KeySet *skip, uint64_t work, const VisitCrossing &visit) {
+uint64_t each_crossing(const FillSurface &surface, const Lattice &lattice, const KeySet *skip, uint64_t work,
+                       const VisitCrossing &visit) {
   PieceTest test(touch_tolerance(surface, lattice), skip, work, visit);
   for (uint32_t t = 0; t < surface.tris.size() / 3; ++t) {
     Vec3 corner[3];
-    for (int k = 0; k < 3; ++k) corner[k] = lattice.from_box(load3(&surface.points[3 * size_t(surface.tris[3 * size_t(t) + k])]));
+    for (int k = 0; k < 3; ++k)
+      corner[k] = lattice.from_box(load3(&surface.points[3 * size_t(surface.tris[3 * size_t(t) + k])]));
     if (!test.run(corner, t)) break;
   }
   return test.work();
@@ -195,10 +228,11 @@ FillCover cover(const FillSurface &surface, const Lattice &lattice, uint32_t lim
   FillCover out(surface.memory);
   KeySet touched(surface.memory);
   const uint64_t most_touched = 8 * uint64_t(limit);
-  out.hopeless = each_crossing(surface, lattice, &out.cells, crossing_work(surface, limit), [&](uint64_t key, uint32_t, bool deep) {
-    (deep ? out.cells : touched).add(key);
-    return out.cells.size() <= limit && touched.size() <= most_touched;
-  }) == 0;
+  out.hopeless = each_crossing(surface, lattice, &out.cells, crossing_work(surface, limit),
+                               [&](uint64_t key, uint32_t, bool deep) {
+                                 (deep ? out.cells : touched).add(key);
+                                 return out.cells.size() <= limit && touched.size() <= most_touched;
+                               }) == 0;
   const uint32_t crossed = out.kept = out.cells.size();
   out.complete = !out.hopeless && crossed <= limit && touched.size() <= most_touched;
   if (!out.complete) return out;
@@ -219,8 +253,10 @@ FillCover cover(const FillSurface &surface, const Lattice &lattice, uint32_t lim
   for (uint32_t i = 0; i < touched.size(); ++i) look(touched[i], false);
   const uint32_t near = out.cells.size();
   for (uint32_t i = 0; i < out.cells.size() && out.kept <= limit; ++i)
-    for (uint32_t face = 0; face < 4 && out.kind[i] != CellKind::outside; ++face)  // nothing lies between neighbors that no triangle touches
-      look(pack(neighbor(unpack(out.cells[i]), face)), i >= near && surface.closed && out.kind[i] == CellKind::inside);
+    // nothing lies between neighbors that no triangle touches
+    for (uint32_t face = 0; face < 4 && out.kind[i] != CellKind::outside; ++face)
+      look(pack(neighbor(unpack(out.cells[i]), face)),
+           i >= near && surface.closed && out.kind[i] == CellKind::inside);
   out.complete = out.kept <= limit;
   return out;
 }

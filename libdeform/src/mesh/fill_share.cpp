@@ -1,6 +1,7 @@
-// How much of a cell is material: the cell is cut into eight again and again where a triangle crosses it, and each part that no triangle
-// crosses is settled by the winding number at its middle. Parts still crossed at the last cut count whole or not at all by one place in them,
-// which differs from part to part: places at fixed spots would all lie on one side of a face along the lattice's planes.
+// How much of a cell is material: the cell is cut into eight again and again where a triangle crosses it, and
+// each part that no triangle crosses is settled by the winding number at its middle. Parts still crossed at
+// the last cut count whole or not at all by one place in them, which differs from part to part: places at
+// fixed spots would all lie on one side of a face along the lattice's planes.
 #include <algorithm>
 #include <cmath>
 
@@ -10,12 +11,15 @@
 namespace dfm {
 namespace {
 
-constexpr uint32_t kFineCells = 20000;  // above so many crossed cells one cut less is enough: their errors average out
+// above so many crossed cells one cut less is enough: their errors average out
+constexpr uint32_t kFineCells = 20000;
 
 class Sampler {
  public:
   Sampler(const FillSurface &surface, const Lattice &lattice, int cuts)
-      : surface_(surface), lattice_(lattice), cuts_(cuts),
+      : surface_(surface),
+        lattice_(lattice),
+        cuts_(cuts),
         level_(size_t(cuts) + 1, Array<uint32_t>(HookAllocator<uint32_t>(surface.memory))) {}
 
   // Of the whole cell, in parts of one.
@@ -27,12 +31,14 @@ class Sampler {
     share_ = loose_ = 0;
     level_[0].assign(tris, tris + ntri);
     part(corner, 0, 1, {}, 0);
-    *share = share_, *loose = loose_;
+    *share = share_;
+    *loose = loose_;
   }
 
  private:
   void triangle(uint32_t t, Vec3 c[3]) const {
-    for (int k = 0; k < 3; ++k) c[k] = lattice_.from_box(load3(&surface_.points[3 * size_t(surface_.tris[3 * size_t(t) + k])]));
+    for (int k = 0; k < 3; ++k)
+      c[k] = lattice_.from_box(load3(&surface_.points[3 * size_t(surface_.tris[3 * size_t(t) + k])]));
   }
   bool meets(const TetShape &shape, uint32_t t) const {
     Vec3 c[3];
@@ -40,27 +46,33 @@ class Sampler {
     return shape.meets(c, 0);
   }
 
-  // Evenly distributed over tetrahedra: steps of the generalized golden ratio in the cube, sorted, so that the gaps are weights that sum to one.
+  // Evenly distributed over tetrahedra: steps of the generalized golden ratio in the cube, sorted, so that
+  // the gaps are weights that sum to one.
   Vec3 any_place(const Vec3 corner[4]) {
     double u[3];
     for (int k = 0; k < 3; ++k) {
       constexpr double kStep[3] = {0.8191725133961645, 0.6710436067037893, 0.5497004779019703};
-      step_[k] += kStep[k], step_[k] -= std::floor(step_[k]);
+      step_[k] += kStep[k];
+      step_[k] -= std::floor(step_[k]);
       u[k] = step_[k];
     }
     std::sort(u, u + 3);
-    return u[0] * corner[0] + (u[1] - u[0]) * corner[1] + ((u[2] - u[1]) * corner[2] + (1 - u[2]) * corner[3]);
+    return u[0] * corner[0] + (u[1] - u[0]) * corner[1] +
+           ((u[2] - u[1]) * corner[2] + (1 - u[2]) * corner[3]);
   }
 
-  // The winding number at `place` from the one at `known`, both in the part at `level`: it rises by one where the way goes in through a
-  // triangle. Only for closed surfaces, where nothing else changes it. False: the way meets an edge, or begins or ends on a triangle.
+  // The winding number at `place` from the one at `known`, both in the part at `level`: it rises by one where
+  // the way goes in through a triangle. Only for closed surfaces, where nothing else changes it. False: the
+  // way meets an edge, or begins or ends on a triangle.
   bool go(int level, Vec3 known, Vec3 place, double *winding) const {
     const Vec3 way = place - known;
     for (const uint32_t t : level_[size_t(level)]) {
       Vec3 c[3];
       triangle(t, c);
       const Vec3 normal = cross(c[1] - c[0], c[2] - c[0]);
-      const double from = dot(normal, known - c[0]), to = dot(normal, place - c[0]), thin = 1e-10 * norm(normal);
+      const double from = dot(normal, known - c[0]);
+      const double to = dot(normal, place - c[0]);
+      const double thin = 1e-10 * norm(normal);
       if ((from > thin && to > thin) || (from < -thin && to < -thin)) continue;
       int left = 0, right = 0, on = 0;
       for (int k = 0; k < 3; ++k) {
@@ -80,7 +92,8 @@ class Sampler {
   // known: a place in the part above and its winding number, for closed surfaces.
   void part(const Vec3 corner[4], int level, double fraction, Vec3 known, double known_winding) {
     const bool crossed = !level_[size_t(level)].empty();
-    const Vec3 place = crossed ? any_place(corner) : 0.25 * ((corner[0] + corner[1]) + (corner[2] + corner[3]));
+    const Vec3 place =
+        crossed ? any_place(corner) : 0.25 * ((corner[0] + corner[1]) + (corner[2] + corner[3]));
     double w = known_winding;
     if (level == 0 || !surface_.closed || !go(level - 1, known, place, &w)) {
       w = winding_at(place);
@@ -100,11 +113,14 @@ class Sampler {
         if (meets(shape, t)) mine.push_back(t);
       part(p, level + 1, fraction / 8, place, w);
     };
-    // Corners keep the shape; the octahedron between is cut around its shortest diagonal, between the middles of the two lattice edges.
+    // Corners keep the shape; the octahedron between is cut around its shortest diagonal, between the middles
+    // of the two lattice edges.
     const auto mid = [&](int i, int j) { return 0.5 * (corner[i] + corner[j]); };
     const Vec3 m = mid(0, 1), n = mid(2, 3), ring[4] = {mid(0, 2), mid(1, 2), mid(1, 3), mid(0, 3)};
-    child(corner[0], m, ring[0], ring[3]), child(m, corner[1], ring[1], ring[2]);
-    child(ring[0], ring[1], corner[2], n), child(ring[3], ring[2], n, corner[3]);
+    child(corner[0], m, ring[0], ring[3]);
+    child(m, corner[1], ring[1], ring[2]);
+    child(ring[0], ring[1], corner[2], n);
+    child(ring[3], ring[2], n, corner[3]);
     for (int k = 0; k < 4; ++k) child(m, n, ring[k], ring[(k + 1) % 4]);
   }
 
@@ -127,21 +143,27 @@ FillShares sample_shares(const FillSurface &surface, const FillCover &cover, con
   const Memory &memory = surface.memory;
   Array<Pair> pairs{HookAllocator<Pair>(memory)};
   // Cutting a cell costs some 170 tests for each triangle in it.
-  const uint64_t most = 128 * (surface.tris.size() / 3 + cover.cells.size()), work = 8 * crossing_work(surface, cover.cells.size());
+  const uint64_t most = 128 * (surface.tris.size() / 3 + cover.cells.size());
+  const uint64_t work = 8 * crossing_work(surface, cover.cells.size());
   const uint64_t left = each_crossing(surface, lattice, nullptr, work, [&](uint64_t key, uint32_t tri, bool) {
     const Pair pair{cover.cells.find(key), tri};
-    if (cover.kind[pair.cell] == CellKind::crossed && (pairs.empty() || !(pairs.back() == pair))) pairs.push_back(pair);
+    if (cover.kind[pair.cell] == CellKind::crossed && (pairs.empty() || !(pairs.back() == pair)))
+      pairs.push_back(pair);
     return pairs.size() <= most;
   });
   if (left == 0 || pairs.size() > most)
-    fail(DFM_E_FORMAT, "the %zu triangles enter %u cells more than %llu times: a tangle of long triangles bounds no body; remove those that reach across it, or ask for more cells",
+    fail(DFM_E_FORMAT,
+         "the %zu triangles enter %u cells more than %llu times: a tangle of long triangles bounds no body; "
+         "remove those that reach across it, or ask for more cells",
          surface.tris.size() / 3, cover.cells.size(), static_cast<unsigned long long>(most));
   std::sort(pairs.begin(), pairs.end());
   pairs.erase(std::unique(pairs.begin(), pairs.end()), pairs.end());
-  const auto sampled = uint32_t(std::count_if(cover.kind.begin(), cover.kind.end(),
-                                              [](CellKind k) { return k == CellKind::crossed || k == CellKind::mixed; }));
+  const auto sampled = uint32_t(std::count_if(cover.kind.begin(), cover.kind.end(), [](CellKind k) {
+    return k == CellKind::crossed || k == CellKind::mixed;
+  }));
   const uint32_t n = cover.cells.size();
-  FillShares out{Array<double>(n, 0.0, HookAllocator<double>(memory)), Array<double>(n, 0.0, HookAllocator<double>(memory)), 1};
+  FillShares out{Array<double>(n, 0.0, HookAllocator<double>(memory)),
+                 Array<double>(n, 0.0, HookAllocator<double>(memory)), 1};
   const int cuts = sampled > kFineCells ? 2 : 3;
   out.piece = cuts == 2 ? 1.0 / 64 : 1.0 / 512;
   Sampler sampler(surface, lattice, cuts);

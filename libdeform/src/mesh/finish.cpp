@@ -1,6 +1,7 @@
-// From what a file says to a mesh a body can be made of. Order matters: unsound input is refused first (flat cells), then cells are turned,
-// doubles dropped and points renumbered; what was done is counted and told. All thresholds are relative: a cell counts as flat when its
-// volume is not above the rounding of its own coordinates, so bodies of nanometers and of 100 km load alike.
+// From what a file says to a mesh a body can be made of. Order matters: unsound input is refused first (flat
+// cells), then cells are turned, doubles dropped and points renumbered; what was done is counted and told.
+// All thresholds are relative: a cell counts as flat when its volume is not above the rounding of its own
+// coordinates, so bodies of nanometers and of 100 km load alike.
 #include <algorithm>
 #include <array>
 #include <cfloat>
@@ -14,7 +15,8 @@
 namespace dfm {
 namespace {
 
-constexpr double kCoarseCoordinates = 1e-8;   // rounding of coordinates over the shortest edge, from which a warning is due
+// rounding of coordinates over the shortest edge, from which a warning is due
+constexpr double kCoarseCoordinates = 1e-8;
 
 struct CellShape { double volume6, edge_max, reach; };  // reach: largest coordinate
 
@@ -22,7 +24,8 @@ CellShape cell_shape(const double *points, const uint32_t *tet) {
   CellShape s{6 * tet_volume(points, tet), 0, 0};
   double longest2 = 0;
   for (const auto &e : kTetEdge)
-    longest2 = std::max(longest2, norm2(load3(points + 3 * size_t(tet[e[0]])) - load3(points + 3 * size_t(tet[e[1]]))));
+    longest2 = std::max(longest2,
+                        norm2(load3(points + 3 * size_t(tet[e[0]])) - load3(points + 3 * size_t(tet[e[1]]))));
   s.edge_max = std::sqrt(longest2);
   for (int k = 0; k < 4; ++k)
     for (int c = 0; c < 3; ++c) s.reach = std::max(s.reach, std::fabs(points[3 * size_t(tet[k]) + c]));
@@ -30,7 +33,9 @@ CellShape cell_shape(const double *points, const uint32_t *tet) {
 }
 
 // A coordinate x is known to eps*x; an altitude below a few of those says nothing.
-bool is_flat(const CellShape &s) { return !(std::fabs(s.volume6) > 8 * DBL_EPSILON * s.edge_max * s.edge_max * (s.edge_max + s.reach)); }
+bool is_flat(const CellShape &s) {
+  return !(std::fabs(s.volume6) > 8 * DBL_EPSILON * s.edge_max * s.edge_max * (s.edge_max + s.reach));
+}
 
 void refuse_flat(const std::string &path, const RawMesh &raw) {
   const uint32_t ntet = uint32_t(raw.tets.size() / 4);
@@ -40,26 +45,36 @@ void refuse_flat(const std::string &path, const RawMesh &raw) {
   if (flat == 0) return;
   const uint32_t *c = &raw.tets[4 * size_t(first)];
   if (flat == ntet && ntet > 1)
-    fail(DFM_E_FORMAT, "%s: all %u tetrahedra are flat (no volume): the points of each lie in one plane; a body needs a volume mesh",
+    fail(DFM_E_FORMAT,
+         "%s: all %u tetrahedra are flat (no volume): the points of each lie in one plane; a body needs a "
+         "volume mesh",
          path.c_str(), ntet);
-  fail(DFM_E_FORMAT, "%s: %u of %u tetrahedra %s flat (no volume), the first is tetrahedron %u (counted from 0) on points %u %u %u %u; remove slivers in the mesher",
+  fail(DFM_E_FORMAT,
+       "%s: %u of %u tetrahedra %s flat (no volume), the first is tetrahedron %u (counted from 0) on points "
+       "%u %u %u %u; remove slivers in the mesher",
        path.c_str(), flat, ntet, flat == 1 ? "is" : "are", first, c[0], c[1], c[2], c[3]);
 }
 
 void turn_negative(RawMesh &raw, TetMesh &mesh) {
   for (size_t t = 0; t < raw.tets.size(); t += 4)
-    if (tet_volume(raw.points.data(), &raw.tets[t]) < 0) std::swap(raw.tets[t + 2], raw.tets[t + 3]), ++mesh.turned;
+    if (tet_volume(raw.points.data(), &raw.tets[t]) < 0) {
+      std::swap(raw.tets[t + 2], raw.tets[t + 3]);
+      ++mesh.turned;
+    }
 }
 
 // Triangles without a group say nothing that the cells' boundary does not.
 void keep_grouped_triangles(const RawMesh &raw, TetMesh &mesh, const Array<uint32_t> &number) {
   for (size_t t = 0; t < raw.tri_group.size(); ++t) {
     const uint32_t *c = &raw.tris[3 * t];
-    if (raw.tri_group[t] == kNoGroup || number[c[0]] == kNoGroup || number[c[1]] == kNoGroup || number[c[2]] == kNoGroup) continue;
+    if (raw.tri_group[t] == kNoGroup || number[c[0]] == kNoGroup || number[c[1]] == kNoGroup ||
+        number[c[2]] == kNoGroup)
+      continue;
     mesh.tris.insert(mesh.tris.end(), {number[c[0]], number[c[1]], number[c[2]]});
     mesh.tri_group.push_back(raw.tri_group[t]);
   }
-  mesh.tris.shrink_to_fit(), mesh.tri_group.shrink_to_fit();
+  mesh.tris.shrink_to_fit();
+  mesh.tri_group.shrink_to_fit();
 }
 
 // Keeps the points that cells use, in the file's order, and fills the groups' points.
@@ -75,7 +90,8 @@ void renumber(RawMesh &raw, TetMesh &mesh) {
       number[p] = uint32_t(mesh.file_point.size());
       mesh.file_point.push_back(p);
     }
-  for (size_t i = 0; i < kept; ++i) std::copy_n(&raw.points[3 * size_t(mesh.file_point[i])], 3, &raw.points[3 * i]);
+  for (size_t i = 0; i < kept; ++i)
+    std::copy_n(&raw.points[3 * size_t(mesh.file_point[i])], 3, &raw.points[3 * i]);
   raw.points.resize(3 * size_t(kept));
   raw.points.shrink_to_fit();
   for (uint32_t &p : raw.tets) p = number[p];
@@ -101,20 +117,27 @@ void sort_groups(RawMesh &raw, TetMesh &mesh) {
   std::vector<uint32_t> order(n), place(n);
   for (uint32_t g = 0; g < n; ++g) order[g] = g;
   std::sort(order.begin(), order.end(), [&](uint32_t a, uint32_t b) {
-    return std::pair(raw.groups[a].dimension, raw.groups[a].tag) < std::pair(raw.groups[b].dimension, raw.groups[b].tag);
+    return std::pair(raw.groups[a].dimension, raw.groups[a].tag) <
+           std::pair(raw.groups[b].dimension, raw.groups[b].tag);
   });
   std::vector<MeshGroup> sorted;
   sorted.reserve(n);
-  for (uint32_t g = 0; g < n; ++g) place[order[g]] = g, sorted.push_back(std::move(raw.groups[order[g]]));
+  for (uint32_t g = 0; g < n; ++g) {
+    place[order[g]] = g;
+    sorted.push_back(std::move(raw.groups[order[g]]));
+  }
   raw.groups = std::move(sorted);
   for (uint32_t &g : raw.tet_group)
     if (g != kNoGroup) g = place[g];
   for (uint32_t &g : mesh.tri_group) g = place[g];
 }
 
-// Shares count where there is one for each cell, all in (0,1]: another array of that name means something else.
+// Shares count where there is one for each cell, all in (0,1]: another array of that name means
+// something else.
 void take_shares(RawMesh &raw, TetMesh &mesh) {
-  const bool sound = raw.tet_share.size() == raw.ntet() && std::all_of(raw.tet_share.begin(), raw.tet_share.end(), [](double s) { return s > 0 && s <= 1; });
+  const bool sound =
+      raw.tet_share.size() == raw.ntet() &&
+      std::all_of(raw.tet_share.begin(), raw.tet_share.end(), [](double s) { return s > 0 && s <= 1; });
   if (sound) mesh.share = std::move(raw.tet_share);
 }
 
@@ -133,26 +156,34 @@ uint32_t count_overlaps(const TetMesh &mesh, uint32_t *crowded) {
 void add_warnings(TetMesh &mesh, uint32_t crowded) {
   const auto warn = [&](const std::string &text) { mesh.warnings.push_back(text); };
   const MeshStatistics s = mesh_statistics(mesh);
-  if (mesh.turned) warn(format("%u of %u cells had negative volume and %s turned", mesh.turned, s.ntet, was_were(mesh.turned)));
+  if (mesh.turned)
+    warn(format("%u of %u cells had negative volume and %s turned", mesh.turned, s.ntet,
+                was_were(mesh.turned)));
   if (mesh.overlapping)
-    warn(format("the mesh is tangled: across %u face%s both cells lie on the same side, so they overlap; mesh the shape anew",
-                mesh.overlapping, plural(mesh.overlapping)));
-  if (crowded) warn(format("%u face%s shared by more than two cells; the cells there overlap", crowded, crowded == 1 ? " is" : "s are"));
+    warn(
+        format("the mesh is tangled: across %u face%s both cells lie on the same side, so they overlap; mesh "
+               "the shape anew",
+               mesh.overlapping, plural(mesh.overlapping)));
+  if (crowded)
+    warn(format("%u face%s shared by more than two cells; the cells there overlap", crowded,
+                crowded == 1 ? " is" : "s are"));
   if (mesh.dropped_cells)
-    warn(format("%u duplicate cell%s %s dropped", mesh.dropped_cells, plural(mesh.dropped_cells), was_were(mesh.dropped_cells)));
+    warn(format("%u duplicate cell%s %s dropped", mesh.dropped_cells, plural(mesh.dropped_cells),
+                was_were(mesh.dropped_cells)));
   if (mesh.dropped_points)
-    warn(format("%u point%s that no tetrahedron uses %s dropped", mesh.dropped_points, plural(mesh.dropped_points),
-                was_were(mesh.dropped_points)));
+    warn(format("%u point%s that no tetrahedron uses %s dropped", mesh.dropped_points,
+                plural(mesh.dropped_points), was_were(mesh.dropped_points)));
   if (s.duplicate_points)
-    warn(format("%u point%s %s exactly at another point's place; cells that meet there are not joined", s.duplicate_points,
-                plural(s.duplicate_points), s.duplicate_points == 1 ? "lies" : "lie"));
+    warn(format("%u point%s %s exactly at another point's place; cells that meet there are not joined",
+                s.duplicate_points, plural(s.duplicate_points), s.duplicate_points == 1 ? "lies" : "lie"));
   if (s.npiece > 1) warn(format("the mesh has %u pieces that share no point and move apart", s.npiece));
   if (s.nonmanifold_edges)
-    warn(format("%u edge%s of the surface %s used by more than two triangles", s.nonmanifold_edges, plural(s.nonmanifold_edges),
-                is_are(s.nonmanifold_edges)));
+    warn(format("%u edge%s of the surface %s used by more than two triangles", s.nonmanifold_edges,
+                plural(s.nonmanifold_edges), is_are(s.nonmanifold_edges)));
   if (s.flat_cells)
-    warn(format("%u cell%s %s nearly flat (mean ratio below 0.01, least %.3g); they force small explicit steps", s.flat_cells,
-                plural(s.flat_cells), is_are(s.flat_cells), s.quality_min));
+    warn(format(
+        "%u cell%s %s nearly flat (mean ratio below 0.01, least %.3g); they force small explicit steps",
+        s.flat_cells, plural(s.flat_cells), is_are(s.flat_cells), s.quality_min));
   if (const std::string coarse = coarse_coordinates(s.lo, s.hi, s.edge_min); !coarse.empty()) warn(coarse);
 }
 
@@ -161,8 +192,9 @@ void add_warnings(TetMesh &mesh, uint32_t crowded) {
 void check_points(const std::string &path, const Array<double> &points) {
   for (size_t i = 0; i < points.size(); ++i)
     if (!(std::fabs(points[i]) <= kLargestCoordinate))
-      fail(DFM_E_FORMAT, "%s: point %zu (counted from 0) has the coordinate %g m; coordinates up to %g m are read", path.c_str(), i / 3,
-           points[i], kLargestCoordinate);
+      fail(DFM_E_FORMAT,
+           "%s: point %zu (counted from 0) has the coordinate %g m; coordinates up to %g m are read",
+           path.c_str(), i / 3, points[i], kLargestCoordinate);
 }
 
 void sort_once(Array<uint32_t> &points) {
@@ -190,7 +222,10 @@ uint32_t drop_duplicate_cells(RawMesh &raw, Array<uint32_t> *file_cell) {
   uint32_t dropped = 0;
   Array<uint8_t> drop(ntet, 0, HookAllocator<uint8_t>(*raw.memory));
   for (size_t i = 1; i < keys.size(); ++i)
-    if (keys[i].corner == keys[i - 1].corner) drop[keys[i].cell] = 1, ++dropped;
+    if (keys[i].corner == keys[i - 1].corner) {
+      drop[keys[i].cell] = 1;
+      ++dropped;
+    }
   if (dropped == 0) return 0;
   size_t kept = 0;
   for (uint32_t t = 0; t < ntet; ++t)
@@ -201,7 +236,8 @@ uint32_t drop_duplicate_cells(RawMesh &raw, Array<uint32_t> *file_cell) {
       if (file_cell) file_cell->push_back(t);
     }
   if (raw.tet_share.size() == ntet) raw.tet_share.resize(kept);
-  raw.tets.resize(4 * kept), raw.tet_group.resize(kept);
+  raw.tets.resize(4 * kept);
+  raw.tet_group.resize(kept);
   return dropped;
 }
 
@@ -209,15 +245,20 @@ std::string coarse_coordinates(const double lo[3], const double hi[3], double ed
   double reach = 0;
   for (int k = 0; k < 3; ++k) reach = std::max({reach, std::fabs(lo[k]), std::fabs(hi[k])});
   if (!(DBL_EPSILON * reach > kCoarseCoordinates * edge_min)) return {};
-  return format("the body lies %.3g m from the origin, where coordinates resolve only %.2g m; move it nearer", reach, DBL_EPSILON * reach);
+  return format("the body lies %.3g m from the origin, where coordinates resolve only %.2g m; move it nearer",
+                reach, DBL_EPSILON * reach);
 }
 
 TetMesh finish_mesh(const std::string &path, RawMesh &&raw) {
   TetMesh mesh(*raw.memory);
   if (raw.tets.empty() && !raw.tris.empty())
-    fail(DFM_E_FORMAT, "%s: no tetrahedra in this file, only a surface of %u triangles; fill it first: deform mesh fill %s --out OUT.msh",
+    fail(DFM_E_FORMAT,
+         "%s: no tetrahedra in this file, only a surface of %u triangles; fill it first: deform mesh fill %s "
+         "--out OUT.msh",
          path.c_str(), raw.ntri(), path.c_str());
-  if (raw.tets.empty()) fail(DFM_E_FORMAT, "%s: no tetrahedra in this file; a body needs a volume mesh or a closed surface", path.c_str());
+  if (raw.tets.empty())
+    fail(DFM_E_FORMAT, "%s: no tetrahedra in this file; a body needs a volume mesh or a closed surface",
+         path.c_str());
   check_points(path, raw.points);
   refuse_flat(path, raw);
   turn_negative(raw, mesh);
@@ -225,7 +266,9 @@ TetMesh finish_mesh(const std::string &path, RawMesh &&raw) {
   take_shares(raw, mesh);
   renumber(raw, mesh);
   sort_groups(raw, mesh);
-  mesh.points = std::move(raw.points), mesh.tets = std::move(raw.tets), mesh.tet_group = std::move(raw.tet_group);
+  mesh.points = std::move(raw.points);
+  mesh.tets = std::move(raw.tets);
+  mesh.tet_group = std::move(raw.tet_group);
   mesh.groups = std::move(raw.groups);
   uint32_t crowded = 0;
   mesh.overlapping = count_overlaps(mesh, &crowded);

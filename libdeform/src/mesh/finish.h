@@ -10,7 +10,8 @@ inline constexpr double kLargestCoordinate = 1e100;  // m; beyond it squares of 
 
 void check_points(const std::string &path, const Array<double> &points);
 void sort_once(Array<uint32_t> &points);  // points of a group: ascending, each once
-// Drops cells with the same four corners as an earlier cell; returns how many. file_cell (may be null): numbers of those kept, if any goes.
+// Drops cells with the same four corners as an earlier cell; returns how many. file_cell (may be null):
+// numbers of those kept, if any goes.
 uint32_t drop_duplicate_cells(RawMesh &raw, Array<uint32_t> *file_cell = nullptr);
 // The body's box against the rounding of its coordinates: a sentence where they are coarse, else empty.
 std::string coarse_coordinates(const double lo[3], const double hi[3], double edge_min);
@@ -20,8 +21,10 @@ inline const char *plural(uint32_t n) { return n == 1 ? "" : "s"; }
 inline const char *is_are(uint32_t n) { return n == 1 ? "is" : "are"; }
 inline const char *was_were(uint32_t n) { return n == 1 ? "was" : "were"; }
 
-// Turns triangles so that neighbors agree across every edge of two triangles, solid pieces face outward and the inner surface of a hollow
-// one into its hole. Returns how many were turned; `twisted` counts the pieces that have no two sides (left as they were).
-uint32_t orient_triangles(const Memory &memory, const Array<double> &points, Array<uint32_t> &tris, uint32_t *twisted);
+// Turns triangles so that neighbors agree across every edge of two triangles, solid pieces face outward and
+// the inner surface of a hollow one into its hole. Returns how many were turned; `twisted` counts the pieces
+// that have no two sides (left as they were).
+uint32_t orient_triangles(const Memory &memory, const Array<double> &points, Array<uint32_t> &tris,
+                          uint32_t *twisted);
 
 }  // namespace dfm

@@ -1,6 +1,7 @@
-// Which side of a surface is outside. Triangles are joined to patches across edges of exactly two triangles, breadth first, and turned to
-// agree. A patch with holes is closed in thought by fans over its boundary loops; where those are small beside the patch, it bounds a solid
-// and the sign of its volume tells outside from inside. A patch inside an odd number of others is the wall of a hole and faces into it:
+// Which side of a surface is outside. Triangles are joined to patches across edges of exactly two triangles,
+// breadth first, and turned to agree. A patch with holes is closed in thought by fans over its boundary
+// loops; where those are small beside the patch, it bounds a solid and the sign of its volume tells outside
+// from inside. A patch inside an odd number of others is the wall of a hole and faces into it:
 //
 //      +--------------+      depth 0 faces outward, depth 1 into the hole, depth 2 (a kernel in the hole) outward again.
 //      | ^  +----+    |      Inside is where the winding number (solid angle over 4 pi) of the other patch is one: van Oosterom and
@@ -17,15 +18,19 @@
 namespace dfm {
 namespace {
 
-constexpr double kSmallOpening = 0.25;  // area of the fans over the area of the patch, up to which it still bounds a solid
-constexpr double kOnTriangle = 1e-10;   // triple product of the unit vectors to the corners
+// area of the fans over the area of the patch, up to which it still bounds a solid
+constexpr double kSmallOpening = 0.25;
+constexpr double kOnTriangle = 1e-10;  // triple product of the unit vectors to the corners
 constexpr double kFourPi = 12.566370614359172954;
 
 struct Corners { Vec3 a, b, c; };
 struct Box {
   Vec3 lo{HUGE_VAL, HUGE_VAL, HUGE_VAL}, hi{-HUGE_VAL, -HUGE_VAL, -HUGE_VAL};
   void add(Vec3 p) {
-    for (int k = 0; k < 3; ++k) lo[k] = std::min(lo[k], p[k]), hi[k] = std::max(hi[k], p[k]);
+    for (int k = 0; k < 3; ++k) {
+      lo[k] = std::min(lo[k], p[k]);
+      hi[k] = std::max(hi[k], p[k]);
+    }
   }
   bool holds(const Box &o) const {
     for (int k = 0; k < 3; ++k)
@@ -35,12 +40,12 @@ struct Box {
 };
 
 struct Patch {
-  uint32_t begin = 0, end = 0;        // in order_
-  uint32_t turned = 0;                // against the file, before its side is chosen
+  uint32_t begin = 0, end = 0;  // in order_
+  uint32_t turned = 0;          // against the file, before its side is chosen
   bool two_sided = true, solid = false;
   double volume6 = 0, area2 = 0, fan_area2 = 0;
   Box box;
-  std::vector<Corners> fans;          // over its openings, facing like the patch
+  std::vector<Corners> fans;  // over its openings, facing like the patch
   uint32_t depth = 0;
 };
 
@@ -60,8 +65,13 @@ double solid_angle(const Corners &t, Vec3 at) {
 class Orienter {
  public:
   Orienter(const Memory &memory, const Array<double> &points, Array<uint32_t> &tris)
-      : memory_(memory), points_(points), tris_(tris), ntri_(uint32_t(tris.size() / 3)), flip_(ntri_, 0, HookAllocator<uint8_t>(memory)),
-        patch_of_(ntri_, UINT32_MAX, HookAllocator<uint32_t>(memory)), order_(HookAllocator<uint32_t>(memory)) {
+      : memory_(memory),
+        points_(points),
+        tris_(tris),
+        ntri_(uint32_t(tris.size() / 3)),
+        flip_(ntri_, 0, HookAllocator<uint8_t>(memory)),
+        patch_of_(ntri_, UINT32_MAX, HookAllocator<uint32_t>(memory)),
+        order_(HookAllocator<uint32_t>(memory)) {
     Box box;
     for (size_t p = 0; p < points.size(); p += 3) box.add(load3(&points[p]));
     origin_ = box.lo;
@@ -79,13 +89,15 @@ class Orienter {
   }
 
  private:
-  // Scaled to a box of edge one at the origin, so that neither nanometers nor light years leave the range of a double.
+  // Scaled to a box of edge one at the origin, so that neither nanometers nor light years leave the
+  // range of a double.
   Vec3 at(uint32_t p) const { return scale_ * (load3(&points_[3 * size_t(p)]) - origin_); }
   Corners corners(uint32_t t) const {
     const uint32_t *c = &tris_[3 * size_t(t)];
     return flip_[t] ? Corners{at(c[0]), at(c[2]), at(c[1])} : Corners{at(c[0]), at(c[1]), at(c[2])};
   }
-  bool runs_up(uint32_t half) const { return tris_[half] < tris_[next_half_edge(half)]; }  // from the lower to the higher point
+  // from the lower to the higher point
+  bool runs_up(uint32_t half) const { return tris_[half] < tris_[next_half_edge(half)]; }
 
   void find_patches(const Array<uint32_t> &twin) {
     order_.reserve(ntri_);
@@ -94,15 +106,19 @@ class Orienter {
       const uint32_t self = uint32_t(patches_.size());
       Patch patch;
       patch.begin = uint32_t(order_.size());
-      patch_of_[seed] = self, order_.push_back(seed);
+      patch_of_[seed] = self;
+      order_.push_back(seed);
       for (uint32_t i = patch.begin; i < order_.size(); ++i) {
         const uint32_t t = order_[i];
         for (uint32_t h = 3 * t; h < 3 * t + 3; ++h) {
           if (twin[h] >= kCrowdedEdge) continue;
           const uint32_t u = twin[h] / 3;
           const uint8_t flip = flip_[t] ^ uint8_t(runs_up(h) == runs_up(twin[h]));
-          if (patch_of_[u] == UINT32_MAX) patch_of_[u] = self, flip_[u] = flip, order_.push_back(u);
-          else if (flip_[u] != flip) patch.two_sided = false;
+          if (patch_of_[u] == UINT32_MAX) {
+            patch_of_[u] = self;
+            flip_[u] = flip;
+            order_.push_back(u);
+          } else if (flip_[u] != flip) patch.two_sided = false;
         }
       }
       patch.end = uint32_t(order_.size());
@@ -114,13 +130,15 @@ class Orienter {
     }
   }
 
-  // An edge bounds a patch where the patch's triangles at it do not cancel: one triangle, or three where two cancel.
+  // An edge bounds a patch where the patch's triangles at it do not cancel: one triangle, or three
+  // where two cancel.
   void close_patches(const Array<TriEdge> &edges) {
     std::vector<Rim> rims;
     std::vector<std::pair<uint32_t, uint32_t>> here;  // patch and half-edge
     for (size_t i = 0, j = 0; i < edges.size(); i = j) {
       here.clear();
-      for (; j < edges.size() && edges[j].key == edges[i].key; ++j) here.emplace_back(patch_of_[edges[j].half / 3], edges[j].half);
+      for (; j < edges.size() && edges[j].key == edges[i].key; ++j)
+        here.emplace_back(patch_of_[edges[j].half / 3], edges[j].half);
       if (here.size() == 2 && here[0].first == here[1].first) continue;
       std::sort(here.begin(), here.end());
       for (size_t k = 0, m = 0; k < here.size(); k = m) {
@@ -146,7 +164,10 @@ class Orienter {
       while (parent[p] != p) p = parent[p] = parent[parent[p]];
       return p;
     };
-    for (const Rim *r = begin; r < end; ++r) parent[r->from] = r->from, parent[r->to] = r->to;
+    for (const Rim *r = begin; r < end; ++r) {
+      parent[r->from] = r->from;
+      parent[r->to] = r->to;
+    }
     for (const Rim *r = begin; r < end; ++r) {
       const uint32_t a = root(r->from), b = root(r->to);
       parent[std::max(a, b)] = std::min(a, b);
@@ -157,9 +178,11 @@ class Orienter {
     std::vector<Corners> &fans = patches_[begin->patch].fans;
     for (size_t i = 0, j = 0; i < by_loop.size(); i = j) {
       Vec3 mean;
-      for (; j < by_loop.size() && by_loop[j].first == by_loop[i].first; ++j) mean += at(by_loop[j].second->from);
+      for (; j < by_loop.size() && by_loop[j].first == by_loop[i].first; ++j)
+        mean += at(by_loop[j].second->from);
       mean = (1 / double(j - i)) * mean;
-      for (size_t k = i; k < j; ++k) fans.push_back({at(by_loop[k].second->to), at(by_loop[k].second->from), mean});
+      for (size_t k = i; k < j; ++k)
+        fans.push_back({at(by_loop[k].second->to), at(by_loop[k].second->from), mean});
     }
   }
 
@@ -167,10 +190,16 @@ class Orienter {
     const Vec3 o = at(tris_[3 * size_t(order_[p.begin])]);
     for (uint32_t i = p.begin; i < p.end; ++i) {
       const Corners t = corners(order_[i]);
-      p.volume6 += volume6(t, o), p.area2 += area2(t);
-      p.box.add(t.a), p.box.add(t.b), p.box.add(t.c);
+      p.volume6 += volume6(t, o);
+      p.area2 += area2(t);
+      p.box.add(t.a);
+      p.box.add(t.b);
+      p.box.add(t.c);
     }
-    for (const Corners &t : p.fans) p.volume6 += volume6(t, o), p.fan_area2 += area2(t);
+    for (const Corners &t : p.fans) {
+      p.volume6 += volume6(t, o);
+      p.fan_area2 += area2(t);
+    }
     p.solid = p.two_sided && p.fan_area2 <= kSmallOpening * p.area2;
     if (!p.solid) p.fans = {};
   }
@@ -182,10 +211,12 @@ class Orienter {
     return sum / kFourPi;
   }
 
-  // Triangles at the ends of the box and some between: a patch that only pokes into another shows one of them outside.
+  // Triangles at the ends of the box and some between: a patch that only pokes into another shows one
+  // of them outside.
   std::vector<Vec3> samples(const Patch &p) const {
     constexpr uint32_t kBetween = 6;
-    uint32_t end[6] = {order_[p.begin], order_[p.begin], order_[p.begin], order_[p.begin], order_[p.begin], order_[p.begin]};
+    uint32_t end[6] = {order_[p.begin], order_[p.begin], order_[p.begin],
+                       order_[p.begin], order_[p.begin], order_[p.begin]};
     double best[6] = {HUGE_VAL, HUGE_VAL, HUGE_VAL, HUGE_VAL, HUGE_VAL, HUGE_VAL};
     const auto middle = [&](uint32_t t) {
       const Corners c = corners(t);
@@ -195,12 +226,16 @@ class Orienter {
       const Vec3 m = middle(order_[i]);
       for (int k = 0; k < 6; ++k) {
         const double reach = k < 3 ? m[k] : -m[k - 3];
-        if (reach < best[k]) best[k] = reach, end[k] = order_[i];
+        if (reach < best[k]) {
+          best[k] = reach;
+          end[k] = order_[i];
+        }
       }
     }
     std::vector<Vec3> out;
     for (const uint32_t t : end) out.push_back(middle(t));
-    for (uint32_t k = 0; k < kBetween; ++k) out.push_back(middle(order_[p.begin + uint32_t(uint64_t(p.end - p.begin) * k / kBetween)]));
+    for (uint32_t k = 0; k < kBetween; ++k)
+      out.push_back(middle(order_[p.begin + uint32_t(uint64_t(p.end - p.begin) * k / kBetween)]));
     return out;
   }
 
@@ -242,11 +277,13 @@ class Orienter {
     *twisted = 0;
     for (const Patch &p : patches_) {
       *twisted += !p.two_sided;
-      const bool wrong = p.solid && p.volume6 != 0 ? (p.volume6 < 0) != (p.depth % 2 == 1) : p.turned > (p.end - p.begin) / 2;
+      const bool wrong = p.solid && p.volume6 != 0 ? (p.volume6 < 0) != (p.depth % 2 == 1)
+                                                   : p.turned > (p.end - p.begin) / 2;
       for (uint32_t i = p.begin; i < p.end; ++i) {
         const uint32_t t = order_[i];
         if (bool(flip_[t]) == wrong) continue;
-        std::swap(tris_[3 * size_t(t) + 1], tris_[3 * size_t(t) + 2]), ++turned;
+        std::swap(tris_[3 * size_t(t) + 1], tris_[3 * size_t(t) + 2]);
+        ++turned;
       }
     }
     return turned;
@@ -265,7 +302,8 @@ class Orienter {
 
 }  // namespace
 
-uint32_t orient_triangles(const Memory &memory, const Array<double> &points, Array<uint32_t> &tris, uint32_t *twisted) {
+uint32_t orient_triangles(const Memory &memory, const Array<double> &points, Array<uint32_t> &tris,
+                          uint32_t *twisted) {
   return Orienter(memory, points, tris).run(twisted);
 }
 

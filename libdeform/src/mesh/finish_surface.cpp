@@ -1,6 +1,7 @@
-// From loose triangles to a surface with two sides. Order matters: points at one place become one (an STL file has each corner anew), which
-// makes neighbors; triangles without area go, and where one lies flat along a neighbor's side that neighbor is split, so that no slit
-// opens; doubles go; what is left is turned to agree and to face outward. Nothing is closed or smoothed. All thresholds are relative.
+// From loose triangles to a surface with two sides. Order matters: points at one place become one (an STL
+// file has each corner anew), which makes neighbors; triangles without area go, and where one lies flat along
+// a neighbor's side that neighbor is split, so that no slit opens; doubles go; what is left is turned to
+// agree and to face outward. Nothing is closed or smoothed. All thresholds are relative.
 #include <algorithm>
 #include <array>
 #include <bit>
@@ -39,11 +40,12 @@ uint32_t keep_triangles(RawMesh &raw, const Keep &keep) {
       std::copy_n(corners(raw, t), 3, &raw.tris[3 * size_t(kept)]);
       raw.tri_group[kept++] = raw.tri_group[t];
     }
-  raw.tris.resize(3 * size_t(kept)), raw.tri_group.resize(kept);
+  raw.tris.resize(3 * size_t(kept));
+  raw.tri_group.resize(kept);
   return n - kept;
 }
 
-// ---- points at one place -------------------------------------------------------------------------------------------
+// ---- points at one place ----------------------------------------------------------------------------------
 
 uint64_t place_hash(const double *p) {
   uint64_t h = 0;
@@ -55,7 +57,8 @@ uint64_t place_hash(const double *p) {
   return h;
 }
 
-// Every used point becomes the first used one at exactly its place. Open addressing in file order, so the outcome has one answer.
+// Every used point becomes the first used one at exactly its place. Open addressing in file order, so the
+// outcome has one answer.
 uint32_t merge_points(RawMesh &raw) {
   const uint32_t n = raw.npoint();
   Array<uint32_t> into(n, kNoGroup, HookAllocator<uint32_t>(*raw.memory));
@@ -68,16 +71,21 @@ uint32_t merge_points(RawMesh &raw) {
     if (into[p] == kNoGroup) continue;
     const double *x = &raw.points[3 * size_t(p)];
     size_t slot = place_hash(x) & mask;
-    while (table[slot] != kNoGroup && !std::equal(x, x + 3, &raw.points[3 * size_t(table[slot])])) slot = (slot + 1) & mask;
-    if (table[slot] == kNoGroup) table[slot] = p;
-    else into[p] = table[slot], ++merged;
+    while (table[slot] != kNoGroup && !std::equal(x, x + 3, &raw.points[3 * size_t(table[slot])]))
+      slot = (slot + 1) & mask;
+    if (table[slot] == kNoGroup) {
+      table[slot] = p;
+    } else {
+      into[p] = table[slot];
+      ++merged;
+    }
   }
   for (uint32_t &p : raw.tets) p = into[p];
   for (uint32_t &p : raw.tris) p = into[p];
   return merged;
 }
 
-// ---- boundary of cells ---------------------------------------------------------------------------------------------
+// ---- boundary of cells ------------------------------------------------------------------------------------
 
 // The file's own triangles stay only as the groups of the boundary's. Returns how many points lie inside.
 uint32_t take_boundary(RawMesh &raw) {
@@ -99,17 +107,21 @@ uint32_t take_boundary(RawMesh &raw) {
   Array<uint8_t> inner(raw.npoint(), 0, HookAllocator<uint8_t>(*raw.memory));
   for (const uint32_t p : raw.tets) inner[p] = 1;
   for (const uint32_t p : raw.tris) inner[p] = 0;
-  raw.tets.clear(), raw.tet_group.clear();
+  raw.tets.clear();
+  raw.tet_group.clear();
   return uint32_t(std::count(inner.begin(), inner.end(), 1));
 }
 
-// ---- triangles without area ----------------------------------------------------------------------------------------
+// ---- triangles without area -------------------------------------------------------------------------------
 
 bool has_double_corner(const uint32_t *c) { return c[0] == c[1] || c[1] == c[2] || c[2] == c[0]; }
 
-// An altitude below a few roundings of the coordinates says nothing. Relative to the longest edge, so that no product leaves the range.
+// An altitude below a few roundings of the coordinates says nothing. Relative to the longest edge, so that no
+// product leaves the range.
 bool is_flat(const RawMesh &raw, const uint32_t *c) {
-  const Vec3 a = load3(&raw.points[3 * size_t(c[0])]), b = load3(&raw.points[3 * size_t(c[1])]), d = load3(&raw.points[3 * size_t(c[2])]);
+  const Vec3 a = load3(&raw.points[3 * size_t(c[0])]);
+  const Vec3 b = load3(&raw.points[3 * size_t(c[1])]);
+  const Vec3 d = load3(&raw.points[3 * size_t(c[2])]);
   double longest = 0, reach = 0;
   for (int k = 0; k < 3; ++k) {
     longest = std::max({longest, std::fabs(b[k] - a[k]), std::fabs(d[k] - a[k]), std::fabs(d[k] - b[k])});
@@ -124,8 +136,12 @@ uint32_t longest_edge(const RawMesh &raw, uint32_t t) {
   uint32_t best = 3 * t;
   double length = -1;
   for (uint32_t h = 3 * t; h < 3 * t + 3; ++h) {
-    const double l = norm2(load3(&raw.points[3 * size_t(raw.tris[next_half_edge(h)])]) - load3(&raw.points[3 * size_t(raw.tris[h])]));
-    if (l > length) length = l, best = h;
+    const double l = norm2(load3(&raw.points[3 * size_t(raw.tris[next_half_edge(h)])]) -
+                           load3(&raw.points[3 * size_t(raw.tris[h])]));
+    if (l > length) {
+      length = l;
+      best = h;
+    }
   }
   return best;
 }
@@ -142,36 +158,48 @@ uint32_t split_beside_flat(RawMesh &raw) {
     Array<uint8_t> skip(n, 0, HookAllocator<uint8_t>(*raw.memory));  // flat, or changed in this round
     Array<uint32_t> flat{HookAllocator<uint32_t>(*raw.memory)};
     for (uint32_t t = 0; t < n; ++t)
-      if (is_flat(raw, corners(raw, t))) skip[t] = 1, flat.push_back(t);
+      if (is_flat(raw, corners(raw, t))) {
+        skip[t] = 1;
+        flat.push_back(t);
+      }
     if (flat.empty()) break;
     const Array<uint32_t> twin = edge_twins(*raw.memory, sorted_edges(*raw.memory, n, raw.tris.data()));
     for (const uint32_t t : flat) {
-      const uint32_t h = longest_edge(raw, t), a = raw.tris[h], c = raw.tris[next_half_edge(h)], b = raw.tris[previous_half_edge(h)];
+      const uint32_t h = longest_edge(raw, t);
+      const uint32_t a = raw.tris[h];
+      const uint32_t c = raw.tris[next_half_edge(h)];
+      const uint32_t b = raw.tris[previous_half_edge(h)];
       if (twin[h] >= kCrowdedEdge || skip[twin[h] / 3]) continue;
       const uint32_t u = twin[h] / 3;
       Corners3 first, second;
       for (int k = 0; k < 3; ++k) {
         const uint32_t p = corners(raw, u)[k];
-        first[k] = p == c ? b : p, second[k] = p == a ? b : p;
+        first[k] = p == c ? b : p;
+        second[k] = p == a ? b : p;
       }
-      if (has_double_corner(first.data()) || is_flat(raw, first.data()) || is_flat(raw, second.data())) continue;
-      std::copy_n(first.data(), 3, &raw.tris[3 * size_t(u)]), std::copy_n(second.data(), 3, &raw.tris[3 * size_t(t)]);
+      if (has_double_corner(first.data()) || is_flat(raw, first.data()) || is_flat(raw, second.data()))
+        continue;
+      std::copy_n(first.data(), 3, &raw.tris[3 * size_t(u)]);
+      std::copy_n(second.data(), 3, &raw.tris[3 * size_t(t)]);
       raw.tri_group[t] = raw.tri_group[u];
-      skip[u] = 1, ++split;
+      skip[u] = 1;
+      ++split;
     }
   }
   return split;
 }
 
-// ---- doubles -------------------------------------------------------------------------------------------------------
+// ---- doubles ----------------------------------------------------------------------------------------------
 
-// Triangles that lie twice in the surface are either listed twice, or a wall where two pieces touch, which is inside and must go. They
-// differ at their rim: across it a triangle listed twice has one neighbor, a wall two. A sheet that is doubled everywhere keeps one side.
+// Triangles that lie twice in the surface are either listed twice, or a wall where two pieces touch, which is
+// inside and must go. They differ at their rim: across it a triangle listed twice has one neighbor, a wall
+// two. A sheet that is doubled everywhere keeps one side.
 class Walls {
  public:
   Walls(const RawMesh &raw, const Array<uint8_t> &drop, const Array<uint8_t> &twice) : parent_(count(raw)) {
     for (uint32_t t = 0; t < parent_.size(); ++t) parent_[t] = t;
-    wall_.assign(parent_.size(), 0), not_wall_ = wall_;
+    wall_.assign(parent_.size(), 0);
+    not_wall_ = wall_;
     const Array<TriEdge> edges = sorted_edges(*raw.memory, count(raw), raw.tris.data());
     for (int pass = 0; pass < 2; ++pass)  // patches first, then what their rims say
       for (size_t i = 0, j = 0; i < edges.size(); i = j) {
@@ -206,18 +234,24 @@ void drop_doubles(RawMesh &raw, Repairs &done) {
   Array<uint8_t> drop(n, 0, HookAllocator<uint8_t>(*raw.memory)), twice = drop;
   for (size_t i = 0, j = 0; i < keys.size(); i = j) {
     while (j < keys.size() && keys[j].first == keys[i].first) ++j;
-    for (size_t k = i + 1; k < j; ++k) drop[keys[k].second] = 1, ++done.doubles;
+    for (size_t k = i + 1; k < j; ++k) {
+      drop[keys[k].second] = 1;
+      ++done.doubles;
+    }
     twice[keys[i].second] = (j - i) % 2 == 0;
   }
   if (done.doubles == 0) return;
   Walls walls(raw, drop, twice);
   for (uint32_t t = 0; t < n; ++t)
-    if (twice[t] && walls.is_wall(t)) drop[t] = 1, ++done.walls;
+    if (twice[t] && walls.is_wall(t)) {
+      drop[t] = 1;
+      ++done.walls;
+    }
   done.doubles -= done.walls;  // of a wall both go
   keep_triangles(raw, [&](uint32_t t) { return !drop[t]; });
 }
 
-// ---- numbers and groups --------------------------------------------------------------------------------------------
+// ---- numbers and groups -----------------------------------------------------------------------------------
 
 void renumber(RawMesh &raw, TriMesh &mesh, uint32_t inner) {
   const uint32_t npoint = raw.npoint();
@@ -235,17 +269,22 @@ void renumber(RawMesh &raw, TriMesh &mesh, uint32_t inner) {
   mesh.tris = std::move(raw.tris);
 }
 
-// Groups that triangles carry, by number; their points are those of the triangles, not of the file's elements.
+// Groups that triangles carry, by number; their points are those of the triangles, not of the
+// file's elements.
 void take_groups(RawMesh &raw, TriMesh &mesh) {
   std::vector<uint32_t> order, place(raw.groups.size(), kNoGroup);
   for (const uint32_t g : raw.tri_group)
-    if (g != kNoGroup && place[g] == kNoGroup) place[g] = 0, order.push_back(g);
+    if (g != kNoGroup && place[g] == kNoGroup) {
+      place[g] = 0;
+      order.push_back(g);
+    }
   std::sort(order.begin(), order.end(), [&](uint32_t a, uint32_t b) {
     return std::pair(raw.groups[a].tag, a) < std::pair(raw.groups[b].tag, b);
   });
   for (const uint32_t g : order) {
     place[g] = uint32_t(mesh.groups.size());
-    mesh.groups.push_back({raw.groups[g].name, 2, raw.groups[g].tag, Array<uint32_t>(HookAllocator<uint32_t>(*raw.memory))});
+    mesh.groups.push_back(
+        {raw.groups[g].name, 2, raw.groups[g].tag, Array<uint32_t>(HookAllocator<uint32_t>(*raw.memory))});
   }
   for (size_t t = 0; t < raw.tri_group.size(); ++t) {
     if (raw.tri_group[t] == kNoGroup) continue;
@@ -257,35 +296,40 @@ void take_groups(RawMesh &raw, TriMesh &mesh) {
   mesh.tri_group = std::move(raw.tri_group);
 }
 
-// ---- what was done -------------------------------------------------------------------------------------------------
+// ---- what was done ----------------------------------------------------------------------------------------
 
 void add_warnings(TriMesh &mesh, const Repairs &done) {
   const auto warn = [&](const std::string &text) { mesh.warnings.push_back(text); };
   const TriMeshStatistics s = tri_mesh_statistics(mesh);
   if (mesh.merged_points)
-    warn(format("%u point%s %s merged with another at exactly the same place", mesh.merged_points, plural(mesh.merged_points),
-                was_were(mesh.merged_points)));
+    warn(format("%u point%s %s merged with another at exactly the same place", mesh.merged_points,
+                plural(mesh.merged_points), was_were(mesh.merged_points)));
   if (done.split)
-    warn(format("%u triangle%s without area %s taken up by splitting the neighbor", done.split, plural(done.split), was_were(done.split)));
-  if (done.flat) warn(format("%u triangle%s without area %s dropped", done.flat, plural(done.flat), was_were(done.flat)));
-  if (done.doubles) warn(format("%u duplicate triangle%s %s dropped", done.doubles, plural(done.doubles), was_were(done.doubles)));
+    warn(format("%u triangle%s without area %s taken up by splitting the neighbor", done.split,
+                plural(done.split), was_were(done.split)));
+  if (done.flat)
+    warn(format("%u triangle%s without area %s dropped", done.flat, plural(done.flat), was_were(done.flat)));
+  if (done.doubles)
+    warn(format("%u duplicate triangle%s %s dropped", done.doubles, plural(done.doubles),
+                was_were(done.doubles)));
   if (done.walls)
-    warn(format("%u pair%s of triangles where two pieces touch %s dropped, so the pieces are one", done.walls, plural(done.walls),
-                was_were(done.walls)));
+    warn(format("%u pair%s of triangles where two pieces touch %s dropped, so the pieces are one", done.walls,
+                plural(done.walls), was_were(done.walls)));
   if (mesh.dropped_points)
-    warn(format("%u point%s that no triangle uses %s dropped", mesh.dropped_points, plural(mesh.dropped_points),
-                was_were(mesh.dropped_points)));
+    warn(format("%u point%s that no triangle uses %s dropped", mesh.dropped_points,
+                plural(mesh.dropped_points), was_were(mesh.dropped_points)));
   if (mesh.turned)
-    warn(format("%u of %u triangles faced the wrong way and %s turned", mesh.turned, s.ntri, was_were(mesh.turned)));
+    warn(format("%u of %u triangles faced the wrong way and %s turned", mesh.turned, s.ntri,
+                was_were(mesh.turned)));
   if (done.twisted)
     warn(format("%u piece%s no two sides (like a Moebius strip) and %s left as in the file", done.twisted,
                 done.twisted == 1 ? " has" : "s have", was_were(done.twisted)));
   if (s.open_edges)
-    warn(format("the surface is open: %u edge%s with one triangle around %u hole%s", s.open_edges, plural(s.open_edges), s.holes,
-                plural(s.holes)));
+    warn(format("the surface is open: %u edge%s with one triangle around %u hole%s", s.open_edges,
+                plural(s.open_edges), s.holes, plural(s.holes)));
   if (s.nonmanifold_edges)
-    warn(format("%u edge%s %s used by more than two triangles", s.nonmanifold_edges, plural(s.nonmanifold_edges),
-                is_are(s.nonmanifold_edges)));
+    warn(format("%u edge%s %s used by more than two triangles", s.nonmanifold_edges,
+                plural(s.nonmanifold_edges), is_are(s.nonmanifold_edges)));
   if (const std::string coarse = coarse_coordinates(s.lo, s.hi, s.edge_min); !coarse.empty()) warn(coarse);
 }
 
@@ -294,9 +338,12 @@ void add_warnings(TriMesh &mesh, const Repairs &done) {
 TriMesh finish_surface(const std::string &path, RawMesh &&raw) {
   TriMesh mesh(*raw.memory);
   if (raw.tris.empty() && raw.tets.empty())
-    fail(DFM_E_FORMAT, "%s: no triangles in this file; a surface needs triangles, or polygons to cut into them", path.c_str());
+    fail(DFM_E_FORMAT,
+         "%s: no triangles in this file; a surface needs triangles, or polygons to cut into them",
+         path.c_str());
   if (raw.tris.size() >= kCrowdedEdge)
-    fail(DFM_E_UNSUPPORTED, "%s: %zu triangles; up to %u are read", path.c_str(), raw.tris.size() / 3, kCrowdedEdge / 3);
+    fail(DFM_E_UNSUPPORTED, "%s: %zu triangles; up to %u are read", path.c_str(), raw.tris.size() / 3,
+         kCrowdedEdge / 3);
   check_points(path, raw.points);
   raw.tri_group.resize(count(raw), kNoGroup);
   mesh.merged_points = merge_points(raw);
@@ -309,7 +356,9 @@ TriMesh finish_surface(const std::string &path, RawMesh &&raw) {
   done.flat += keep_triangles(raw, [&](uint32_t t) { return !is_flat(raw, corners(raw, t)); });
   drop_doubles(raw, done);
   if (raw.tris.empty())
-    fail(DFM_E_FORMAT, "%s: all %u triangles are without area or cancel each other; a surface needs triangles with three corners apart",
+    fail(DFM_E_FORMAT,
+         "%s: all %u triangles are without area or cancel each other; a surface needs triangles with three "
+         "corners apart",
          path.c_str(), given);
   mesh.dropped_tris = given - count(raw);
   renumber(raw, mesh, inner);

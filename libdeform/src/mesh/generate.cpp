@@ -1,12 +1,14 @@
-// Structured bodies with near-isotropic cells and no preferred direction. Coordinates come from + - * / sqrt alone, so their bits are the
-// same on every machine.
+// Structured bodies with near-isotropic cells and no preferred direction. Coordinates come from + - * / sqrt
+// alone, so their bits are the same on every machine.
 //
-//   beam      body-centered cubic lattice: grid points and cell centers; four cells around each inner grid face (mean ratio 0.95), two on
-//             each boundary face with alternating diagonals. All inner points have 14 neighbors.
-//   cylinder  rings of 6, 12, 18 .. points (a triangular lattice bent into a disc), extruded; each prism is cut in three by the lattice's
+//   beam      body-centered cubic lattice: grid points and cell centers; four cells around each inner grid
+//             face (mean ratio 0.95), two on each boundary face with alternating diagonals. All inner points
+//             have 14 neighbors.
+//   cylinder  rings of 6, 12, 18 .. points (a triangular lattice bent into a disc), extruded; each prism is
+//   cut in three by the lattice's
 //             three colors, layers mirrored in turn, so that the surface diagonals zigzag and nothing twists.
-//   ball      icosahedron around the center, each of its 20 cells cut into n^3 by the tetrahedral-octahedral lattice, layers pushed out to
-//             spheres: the surface triangles are nearly equilateral.
+//   ball      icosahedron around the center, each of its 20 cells cut into n^3 by the tetrahedral-octahedral
+//             lattice, layers pushed out to spheres: the surface triangles are nearly equilateral.
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -31,10 +33,12 @@ Vec3 unit_on_circle(double angle) {
 Vec3 unit_on_circle(uint64_t i, uint64_t n) {
   static constexpr double half = 0.5, third = 1.0471975511965977462;  // pi/3
   static const double root = std::sqrt(3.0) / 2;
-  static const double turn[6][2] = {{1, 0}, {half, root}, {-half, root}, {-1, 0}, {-half, -root}, {half, -root}};
+  static const double turn[6][2] = {{1, 0},  {half, root},   {-half, root},
+                                    {-1, 0}, {-half, -root}, {half, -root}};
   const uint64_t sextant = 6 * (i % n) / n;
   const Vec3 u = unit_on_circle(third * (double(6 * (i % n) - sextant * n) / double(n)));
-  return {turn[sextant][0] * u.x - turn[sextant][1] * u.y, turn[sextant][1] * u.x + turn[sextant][0] * u.y, 0};
+  return {turn[sextant][0] * u.x - turn[sextant][1] * u.y, turn[sextant][1] * u.x + turn[sextant][0] * u.y,
+          0};
 }
 
 Vec3 on_annulus(double inner, double outer, uint32_t k, uint32_t rings, uint32_t j, uint32_t n) {
@@ -43,8 +47,12 @@ Vec3 on_annulus(double inner, double outer, uint32_t k, uint32_t rings, uint32_t
 }
 
 void check_tube(double inner, double outer, double length) {
-  check_size("tube's inner radius", inner), check_size("tube's outer radius", outer), check_size("tube's length", length);
-  if (!(inner < outer)) fail(DFM_E_ARG, "the tube's inner radius is %g m; expected less than the outer radius, %g m", inner, outer);
+  check_size("tube's inner radius", inner);
+  check_size("tube's outer radius", outer);
+  check_size("tube's length", length);
+  if (!(inner < outer))
+    fail(DFM_E_ARG, "the tube's inner radius is %g m; expected less than the outer radius, %g m", inner,
+         outer);
 }
 
 void add_point(TetMesh &mesh, Vec3 p) { mesh.points.insert(mesh.points.end(), {p.x, p.y, p.z}); }
@@ -68,7 +76,9 @@ Icosahedron::Icosahedron() {
     for (const double s : {1.0, -1.0})
       for (const double t : {1.0, -1.0}) {
         Vec3 p;
-        p[axis] = 0, p[(axis + 1) % 3] = s / length, p[(axis + 2) % 3] = t * g / length;
+        p[axis] = 0;
+        p[(axis + 1) % 3] = s / length;
+        p[(axis + 2) % 3] = t * g / length;
         corner[v++] = p;
       }
   for (uint32_t a = 0; a < 12; ++a)
@@ -79,16 +89,19 @@ Icosahedron::Icosahedron() {
 
 namespace {
 
-// ---- beam ----------------------------------------------------------------------------------------------------------
+// ---- beam -------------------------------------------------------------------------------------------------
 
 struct Grid {
   uint32_t n[3];
   uint32_t slab() const { return (n[1] + 1) * (n[2] + 1) + n[1] * n[2]; }
   uint32_t corner(uint32_t i, uint32_t j, uint32_t k) const { return i * slab() + j * (n[2] + 1) + k; }
-  uint32_t center(uint32_t i, uint32_t j, uint32_t k) const { return i * slab() + (n[1] + 1) * (n[2] + 1) + j * n[2] + k; }
+  uint32_t center(uint32_t i, uint32_t j, uint32_t k) const {
+    return i * slab() + (n[1] + 1) * (n[2] + 1) + j * n[2] + k;
+  }
 };
 
-// Tries cubes of the size that gives the number of cells, and smaller ones, each edge's number rounded down and up.
+// Tries cubes of the size that gives the number of cells, and smaller ones, each edge's number
+// rounded down and up.
 Grid choose_grid(const double size[3], uint32_t cells) {
   const double cubes = std::max(1.0, cells / 12.0);
   const double shortest = std::min({size[0], size[1], size[2]});
@@ -98,17 +111,23 @@ Grid choose_grid(const double size[3], uint32_t cells) {
   for (int finer = 0; finer == 0 || (finer < 64 && edge > 0.5 * shortest); ++finer, edge *= 0.9)
     for (int up = 0; up < 8; ++up) {
       Grid g{};
-      for (int k = 0; k < 3; ++k) g.n[k] = uint32_t(std::clamp(std::floor(size[k] / edge) + (up >> k & 1), 1.0, double(kMostCells)));
-      const double count = double(g.n[0]) * g.n[1] * g.n[2], h[3] = {size[0] / g.n[0], size[1] / g.n[1], size[2] / g.n[2]};
+      for (int k = 0; k < 3; ++k)
+        g.n[k] = uint32_t(std::clamp(std::floor(size[k] / edge) + (up >> k & 1), 1.0, double(kMostCells)));
+      const double count = double(g.n[0]) * g.n[1] * g.n[2];
+      const double h[3] = {size[0] / g.n[0], size[1] / g.n[1], size[2] / g.n[2]};
       if (count > kMostCells / 12) continue;
-      const double s = choice_score(std::max({h[0], h[1], h[2]}) / std::min({h[0], h[1], h[2]}), count, cubes);
-      if (s < best_score) best_score = s, best = g;
+      const double s =
+          choice_score(std::max({h[0], h[1], h[2]}) / std::min({h[0], h[1], h[2]}), count, cubes);
+      if (s < best_score) {
+        best_score = s;
+        best = g;
+      }
     }
   check_choice("beam", best_score < HUGE_VAL ? 12.0 * best.n[0] * best.n[1] * best.n[2] : HUGE_VAL, cells);
   return best;
 }
 
-// ---- ball ----------------------------------------------------------------------------------------------------------
+// ---- ball -------------------------------------------------------------------------------------------------
 
 class BallBuilder {
  public:
@@ -120,30 +139,38 @@ class BallBuilder {
   }
 
  private:
-  using Lattice = std::array<uint32_t, 4>;  // weights of the center and of the face's three corners; they sum to n
+  // weights of the center and of the face's three corners; they sum to n
+  using Lattice = std::array<uint32_t, 4>;
 
   void number_edges() {
     uint32_t e = 0;
     for (uint32_t a = 0; a < 12; ++a)
       for (uint32_t b = a + 1; b < 12; ++b)
-        if (ico_.near(a, b)) edge_[a][b] = e, ends_[e++] = {a, b};
+        if (ico_.near(a, b)) {
+          edge_[a][b] = e;
+          ends_[e++] = {a, b};
+        }
   }
 
   uint32_t first_of_layer(uint32_t k) const {  // 1 center and 10 q^2 + 2 points in each layer q < k
     return 1 + 2 * (k - 1) + 10 * ((k - 1) * k * (2 * k - 1) / 6);
   }
 
-  void add_on_sphere(uint32_t k, Vec3 direction) { add_point(mesh_, (radius_ * (double(k) / n_)) * normalized(direction)); }
+  void add_on_sphere(uint32_t k, Vec3 direction) {
+    add_point(mesh_, (radius_ * (double(k) / n_)) * normalized(direction));
+  }
 
   // Corners, then points inside edges, then points inside faces.
   void add_layer(uint32_t k) {
     for (const Vec3 &p : ico_.corner) add_on_sphere(k, p);
     for (const auto &[a, b] : ends_)
-      for (uint32_t t = 1; t < k; ++t) add_on_sphere(k, double(k - t) * ico_.corner[a] + double(t) * ico_.corner[b]);
+      for (uint32_t t = 1; t < k; ++t)
+        add_on_sphere(k, double(k - t) * ico_.corner[a] + double(t) * ico_.corner[b]);
     for (const auto &[a, b, c] : ico_.face)
       for (uint32_t i = 1; i + 1 < k; ++i)
         for (uint32_t j = 1; i + j < k; ++j)
-          add_on_sphere(k, double(k - i - j) * ico_.corner[a] + (double(i) * ico_.corner[b] + double(j) * ico_.corner[c]));
+          add_on_sphere(k, double(k - i - j) * ico_.corner[a] +
+                               (double(i) * ico_.corner[b] + double(j) * ico_.corner[c]));
   }
 
   uint32_t point(uint32_t f, const Lattice &w) const {
@@ -183,25 +210,31 @@ class BallBuilder {
     add_tet(mesh_, p[0], p[1], p[2], p[3]);
   }
 
-  // Four cells around the shortest diagonal; where lengths are equal the choice goes round with the place, so that none is preferred.
+  // Four cells around the shortest diagonal; where lengths are equal the choice goes round with the place, so
+  // that none is preferred.
   void cut_octahedron(uint32_t f, const Lattice &base) {
-    static constexpr uint32_t kPair[3][4] = {{0, 1, 2, 3}, {0, 2, 1, 3}, {0, 3, 1, 2}};  // base + two is opposite base + the others
+    // base + two is opposite base + the others
+    static constexpr uint32_t kPair[3][4] = {{0, 1, 2, 3}, {0, 2, 1, 3}, {0, 3, 1, 2}};
     uint32_t p[3][2];
     double length[3];
     for (int d = 0; d < 3; ++d) {
       for (int end = 0; end < 2; ++end) {
         Lattice w = base;
-        ++w[kPair[d][2 * end]], ++w[kPair[d][2 * end + 1]];
+        ++w[kPair[d][2 * end]];
+        ++w[kPair[d][2 * end + 1]];
         p[d][end] = point(f, w);
       }
-      length[d] = norm2(load3(&mesh_.points[3 * size_t(p[d][0])]) - load3(&mesh_.points[3 * size_t(p[d][1])]));
+      length[d] =
+          norm2(load3(&mesh_.points[3 * size_t(p[d][0])]) - load3(&mesh_.points[3 * size_t(p[d][1])]));
     }
     uint32_t best = (base[1] + 2 * base[2] + base[0]) % 3;
     for (uint32_t d = 0; d < 3; ++d)
       if (length[d] < length[best] * (1 - 1e-9)) best = d;
     const uint32_t *axis = p[best], *u = p[(best + 1) % 3], *v = p[(best + 2) % 3];
-    add_tet(mesh_, axis[0], axis[1], u[0], v[0]), add_tet(mesh_, axis[0], axis[1], v[0], u[1]);
-    add_tet(mesh_, axis[0], axis[1], u[1], v[1]), add_tet(mesh_, axis[0], axis[1], v[1], u[0]);
+    add_tet(mesh_, axis[0], axis[1], u[0], v[0]);
+    add_tet(mesh_, axis[0], axis[1], v[0], u[1]);
+    add_tet(mesh_, axis[0], axis[1], u[1], v[1]);
+    add_tet(mesh_, axis[0], axis[1], v[1], u[0]);
   }
 
   TetMesh &mesh_;
@@ -212,15 +245,18 @@ class BallBuilder {
   std::array<std::array<uint32_t, 2>, 30> ends_{};
 };
 
-// ---- cylinder ------------------------------------------------------------------------------------------------------
+// ---- cylinder ---------------------------------------------------------------------------------------------
 
 struct Disc {  // triangular lattice in rings
   uint32_t n;
   uint32_t npoint() const { return 1 + 3 * n * (n + 1); }
-  static uint32_t point(uint32_t ring, uint32_t j) { return ring == 0 ? 0 : 1 + 3 * ring * (ring - 1) + j % (6 * ring); }
+  static uint32_t point(uint32_t ring, uint32_t j) {
+    return ring == 0 ? 0 : 1 + 3 * ring * (ring - 1) + j % (6 * ring);
+  }
 };
 
-// Tries every number of rings, with the layers that give the number of cells and with those that give near-equal edges.
+// Tries every number of rings, with the layers that give the number of cells and with those that give
+// near-equal edges.
 void choose_rings(double radius, double length, uint32_t cells, uint32_t *rings, uint32_t *layers) {
   double best = HUGE_VAL;
   for (uint32_t n = 1; n == 1 || 18.0 * n * n <= std::max(4.0 * cells, 2e5); ++n)
@@ -228,7 +264,11 @@ void choose_rings(double radius, double length, uint32_t cells, uint32_t *rings,
       if (wanted > kMostCells / (18.0 * n * n)) continue;
       const uint32_t m = rounded(wanted);
       const double s = choice_score(apart(length / m, radius / n), 18.0 * n * n * m, cells);
-      if (s < best) best = s, *rings = n, *layers = m;
+      if (s < best) {
+        best = s;
+        *rings = n;
+        *layers = m;
+      }
     }
   check_choice("cylinder", best < HUGE_VAL ? 18.0 * *rings * *rings * *layers : HUGE_VAL, cells);
 }
@@ -236,11 +276,16 @@ void choose_rings(double radius, double length, uint32_t cells, uint32_t *rings,
 }  // namespace
 
 TetMesh make_beam(const Memory &memory, double x, double y, double z, uint32_t cells) {
-  check_size("beam's x size", x), check_size("beam's y size", y), check_size("beam's z size", z), check_cells(cells);
+  check_size("beam's x size", x);
+  check_size("beam's y size", y);
+  check_size("beam's z size", z);
+  check_cells(cells);
   const double size[3] = {x, y, z};
   const Grid g = choose_grid(size, cells);
   TetMesh mesh(memory);
-  const auto at = [&](double i, double j, double k) { add_point(mesh, {x * (i / g.n[0]), y * (j / g.n[1]), z * (k / g.n[2])}); };
+  const auto at = [&](double i, double j, double k) {
+    add_point(mesh, {x * (i / g.n[0]), y * (j / g.n[1]), z * (k / g.n[2])});
+  };
   for (uint32_t i = 0; i <= g.n[0]; ++i) {
     for (uint32_t j = 0; j <= g.n[1]; ++j)
       for (uint32_t k = 0; k <= g.n[2]; ++k) at(i, j, k);
@@ -252,7 +297,9 @@ TetMesh make_beam(const Memory &memory, double x, double y, double z, uint32_t c
     uint32_t corner[4], even = 0;
     for (uint32_t q = 0; q < 4; ++q) {
       uint32_t p[3] = {c[0], c[1], c[2]};
-      p[axis] += high, p[(axis + 1) % 3] += q == 1 || q == 2, p[(axis + 2) % 3] += q >= 2;
+      p[axis] += high;
+      p[(axis + 1) % 3] += q == 1 || q == 2;
+      p[(axis + 2) % 3] += q >= 2;
       corner[q] = g.corner(p[0], p[1], p[2]);
       if (q == 0) even = (p[0] + p[1] + p[2]) % 2;  // the diagonal starts at an even corner
     }
@@ -264,7 +311,8 @@ TetMesh make_beam(const Memory &memory, double x, double y, double z, uint32_t c
     }
     uint32_t next[3] = {c[0], c[1], c[2]};
     ++next[axis];
-    for (uint32_t q = 0; q < 4; ++q) add_tet(mesh, corner[q], corner[(q + 1) % 4], center, g.center(next[0], next[1], next[2]));
+    for (uint32_t q = 0; q < 4; ++q)
+      add_tet(mesh, corner[q], corner[(q + 1) % 4], center, g.center(next[0], next[1], next[2]));
   };
   uint32_t c[3];
   for (c[0] = 0; c[0] < g.n[0]; ++c[0])
@@ -278,12 +326,15 @@ TetMesh make_beam(const Memory &memory, double x, double y, double z, uint32_t c
 }
 
 TetMesh make_cylinder(const Memory &memory, double radius, double length, uint32_t cells) {
-  check_size("cylinder's radius", radius), check_size("cylinder's length", length), check_cells(cells);
+  check_size("cylinder's radius", radius);
+  check_size("cylinder's length", length);
+  check_cells(cells);
   uint32_t n = 1, m = 1;
   choose_rings(radius, length, cells, &n, &m);
   const Disc disc{n};
   TetMesh mesh(memory);
-  // The disc: points, and their colors in the triangular lattice (axial coordinates of hexagon directions, difference modulo 3).
+  // The disc: points, and their colors in the triangular lattice (axial coordinates of hexagon directions,
+  // difference modulo 3).
   static constexpr int kAxial[7][2] = {{1, 0}, {0, 1}, {-1, 1}, {-1, 0}, {0, -1}, {1, -1}, {1, 0}};
   const double half = 0.5, root = std::sqrt(3.0) / 2, third = 1.0471975511965977462;  // pi/3
   const double turn[6][2] = {{1, 0}, {half, root}, {-half, root}, {-1, 0}, {-half, -root}, {half, -root}};
@@ -294,13 +345,15 @@ TetMesh make_cylinder(const Memory &memory, double radius, double length, uint32
       for (int t = 0; t < k; ++t) {
         const Vec3 u = (radius * (double(k) / n)) * unit_on_circle(third * (double(t) / k));
         flat.push_back({turn[s][0] * u.x - turn[s][1] * u.y, turn[s][1] * u.x + turn[s][0] * u.y, 0});
-        const int q = (k - t) * kAxial[s][0] + t * kAxial[s + 1][0], r = (k - t) * kAxial[s][1] + t * kAxial[s + 1][1];
+        const int q = (k - t) * kAxial[s][0] + t * kAxial[s + 1][0];
+        const int r = (k - t) * kAxial[s][1] + t * kAxial[s + 1][1];
         color.push_back(((q - r) % 3 + 3) % 3);
       }
   for (uint32_t layer = 0; layer <= m; ++layer)
     for (const Vec3 &p : flat) add_point(mesh, {p.x, p.y, length * (double(layer) / m)});
   const auto add_prism = [&](uint32_t layer, std::array<uint32_t, 3> v) {
-    std::sort(v.begin(), v.end(), [&](uint32_t a, uint32_t b) { return layer % 2 ? color[a] > color[b] : color[a] < color[b]; });
+    std::sort(v.begin(), v.end(),
+              [&](uint32_t a, uint32_t b) { return layer % 2 ? color[a] > color[b] : color[a] < color[b]; });
     const uint32_t low = layer * disc.npoint(), up = low + disc.npoint();
     add_tet(mesh, low + v[0], low + v[1], low + v[2], up + v[2]);
     add_tet(mesh, low + v[0], low + v[1], up + v[1], up + v[2]);
@@ -312,13 +365,16 @@ TetMesh make_cylinder(const Memory &memory, double radius, double length, uint32
         for (uint32_t t = 0; t < k; ++t) {
           const uint32_t outer = s * k + t, inner = s * (k - 1) + t;
           add_prism(layer, {Disc::point(k - 1, inner), Disc::point(k, outer), Disc::point(k, outer + 1)});
-          if (t + 1 < k) add_prism(layer, {Disc::point(k - 1, inner), Disc::point(k, outer + 1), Disc::point(k - 1, inner + 1)});
+          if (t + 1 < k)
+            add_prism(layer,
+                      {Disc::point(k - 1, inner), Disc::point(k, outer + 1), Disc::point(k - 1, inner + 1)});
         }
   return finished(std::move(mesh));
 }
 
 TetMesh make_ball(const Memory &memory, double radius, uint32_t cells) {
-  check_size("ball's radius", radius), check_cells(cells);
+  check_size("ball's radius", radius);
+  check_cells(cells);
   uint32_t n = 1;
   while (apart(20.0 * (n + 1) * (n + 1) * (n + 1), cells) < apart(20.0 * n * n * n, cells)) ++n;
   TetMesh mesh(memory);

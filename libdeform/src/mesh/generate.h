@@ -12,10 +12,12 @@ namespace dfm {
 
 inline constexpr uint32_t kMostCells = 100'000'000;
 inline constexpr double kTwoPi = 6.2831853071795864769;
-inline constexpr double kRow = 0.86602540378443864676;  // rows of the triangular lattice lie sqrt(3)/2 edges apart
+// rows of the triangular lattice lie sqrt(3)/2 edges apart
+inline constexpr double kRow = 0.86602540378443864676;
 
 inline void check_size(const char *what, double size) {
-  if (!(size > 0) || !std::isfinite(size)) fail(DFM_E_ARG, "the %s is %g m; expected a finite length above 0", what, size);
+  if (!(size > 0) || !std::isfinite(size))
+    fail(DFM_E_ARG, "the %s is %g m; expected a finite length above 0", what, size);
 }
 inline void check_cells(uint32_t cells) {
   if (cells < 1 || cells > kMostCells) fail(DFM_E_ARG, "cells is %u; expected 1 to %u", cells, kMostCells);
@@ -25,8 +27,9 @@ void check_tube(double inner, double outer, double length);
 inline uint32_t rounded(double x) { return uint32_t(std::max(1.0, std::floor(x + 0.5))); }
 // How far two positive numbers are apart, as a ratio of at least 1.
 inline double apart(double a, double b) { return std::max(a, b) / std::min(a, b); }
-// What a choice of counts costs, 1 at best: cells longer than wide (a little is cheap; beyond 2:1 they spoil the mesh, and more
-// cells than asked for are made instead) against a number of cells far from the one asked for.
+// What a choice of counts costs, 1 at best: cells longer than wide (a little is cheap; beyond 2:1 they
+// spoil the mesh, and more cells than asked for are made instead) against a number of cells far from the
+// one asked for.
 inline double choice_score(double elongation, double count, double asked) {
   const double excess = std::max(1.0, elongation / 2);
   return std::sqrt(elongation) * excess * excess * excess * apart(count, asked);
@@ -34,7 +37,9 @@ inline double choice_score(double elongation, double count, double asked) {
 // More cells than asked for are made within reason only.
 inline void check_choice(const char *shape, double count, uint32_t asked) {
   if (count > 100.0 * std::max(asked, 100u))
-    fail(DFM_E_ARG, "a %s of these proportions needs about %.2g cells to keep them in shape, %u were asked for; ask for more, or give sizes nearer to each other",
+    fail(DFM_E_ARG,
+         "a %s of these proportions needs about %.2g cells to keep them in shape, %u were asked for; ask for "
+         "more, or give sizes nearer to each other",
          shape, count, asked);
 }
 
@@ -42,12 +47,14 @@ inline void check_choice(const char *shape, double count, uint32_t asked) {
 Vec3 unit_on_circle(double angle);
 // The point at i/n of a full turn.
 Vec3 unit_on_circle(uint64_t i, uint64_t n);
-// Place j of n on ring k of `rings` from the inner circle to the outer: a triangular lattice, odd rings shifted by half a step.
+// Place j of n on ring k of `rings` from the inner circle to the outer: a triangular lattice, odd rings
+// shifted by half a step.
 Vec3 on_annulus(double inner, double outer, uint32_t k, uint32_t rings, uint32_t j, uint32_t n);
 
 void add_point(TetMesh &mesh, Vec3 p);
 void add_tet(TetMesh &mesh, uint32_t a, uint32_t b, uint32_t c, uint32_t d);  // turned to positive volume
-TetMesh finished(TetMesh mesh);                                               // without groups, points numbered as they stand
+// without groups, points numbered as they stand
+TetMesh finished(TetMesh mesh);
 
 // The icosahedron on the unit sphere.
 struct Icosahedron {

@@ -1,5 +1,6 @@
-// Surfaces: triangles are listed by their corners' places, and the repair of read surfaces joins and turns them. Corners that meet are
-// computed by the same operations on the same numbers, so they come out the same to the bit.
+// Surfaces: triangles are listed by their corners' places, and the repair of read surfaces joins and turns
+// them. Corners that meet are computed by the same operations on the same numbers, so they come out the
+// same to the bit.
 #include "mesh/generate.h"
 #include "mesh/raw_mesh.h"
 
@@ -17,13 +18,19 @@ class Soup {
   }
   // Corners around; the diagonal from the first where `first`, else from the second.
   void square(Vec3 a, Vec3 b, Vec3 c, Vec3 d, bool first) {
-    if (first) triangle(a, b, c), triangle(a, c, d);
-    else triangle(b, c, d), triangle(b, d, a);
+    if (first) {
+      triangle(a, b, c);
+      triangle(a, c, d);
+    } else {
+      triangle(b, c, d);
+      triangle(b, d, a);
+    }
   }
   TriMesh finish() {
     TriMesh mesh = finish_surface("generator", std::move(raw_));
     for (uint32_t p = 0; p < mesh.npoint(); ++p) mesh.file_point[p] = p;
-    mesh.merged_points = mesh.turned = 0, mesh.warnings.clear();
+    mesh.merged_points = mesh.turned = 0;
+    mesh.warnings.clear();
     return mesh;
   }
 
@@ -32,7 +39,8 @@ class Soup {
 };
 
 void check_triangles(uint32_t triangles) {
-  if (triangles < 1 || triangles > kMostCells) fail(DFM_E_ARG, "the number of triangles is %u; expected 1 to %u", triangles, kMostCells);
+  if (triangles < 1 || triangles > kMostCells)
+    fail(DFM_E_ARG, "the number of triangles is %u; expected 1 to %u", triangles, kMostCells);
 }
 
 // Two annuli of triangular lattice at heights 0 and `length`.
@@ -62,13 +70,15 @@ void add_side(Soup &soup, uint32_t around, uint32_t along, double length, const 
 }  // namespace
 
 TriMesh make_ball_surface(const Memory &memory, double radius, uint32_t triangles) {
-  check_size("ball's radius", radius), check_triangles(triangles);
+  check_size("ball's radius", radius);
+  check_triangles(triangles);
   const uint32_t n = rounded(std::sqrt(triangles / 20.0));
   const Icosahedron ico;
   Soup soup(memory);
   for (const auto &face : ico.face) {
     const auto at = [&](uint32_t i, uint32_t j) {
-      return radius * normalized(double(n - i - j) * ico.corner[face[0]] + double(i) * ico.corner[face[1]] + double(j) * ico.corner[face[2]]);
+      return radius * normalized(double(n - i - j) * ico.corner[face[0]] + double(i) * ico.corner[face[1]] +
+                                 double(j) * ico.corner[face[2]]);
     };
     for (uint32_t i = 0; i < n; ++i)
       for (uint32_t j = 0; i + j < n; ++j) {
@@ -80,7 +90,10 @@ TriMesh make_ball_surface(const Memory &memory, double radius, uint32_t triangle
 }
 
 TriMesh make_beam_surface(const Memory &memory, double x, double y, double z, uint32_t triangles) {
-  check_size("beam's x size", x), check_size("beam's y size", y), check_size("beam's z size", z), check_triangles(triangles);
+  check_size("beam's x size", x);
+  check_size("beam's y size", y);
+  check_size("beam's z size", z);
+  check_triangles(triangles);
   const double size[3] = {x, y, z}, squares = std::max(6.0, triangles / 2.0);
   const auto cut = [&](double edge, uint32_t n[3]) {
     for (int k = 0; k < 3; ++k) n[k] = rounded(std::min(1e4, size[k] / edge));
@@ -91,35 +104,51 @@ TriMesh make_beam_surface(const Memory &memory, double x, double y, double z, ui
   for (int finer = 0; finer < 48; ++finer, edge *= 0.95) {
     uint32_t n[3];
     const double count = cut(edge, n), h[3] = {x / n[0], y / n[1], z / n[2]};
-    const double s = choice_score(std::max({h[0], h[1], h[2]}) / std::min({h[0], h[1], h[2]}), count, squares);
-    if (s < best_score) best_score = s, std::copy_n(n, 3, best);
+    const double s =
+        choice_score(std::max({h[0], h[1], h[2]}) / std::min({h[0], h[1], h[2]}), count, squares);
+    if (s < best_score) {
+      best_score = s;
+      std::copy_n(n, 3, best);
+    }
   }
-  check_choice("beam's surface", 4.0 * (double(best[0]) * best[1] + double(best[1]) * best[2] + double(best[2]) * best[0]), triangles);
+  check_choice("beam's surface",
+               4.0 * (double(best[0]) * best[1] + double(best[1]) * best[2] + double(best[2]) * best[0]),
+               triangles);
   Soup soup(memory);
   for (int axis = 0; axis < 3; ++axis)
     for (const uint32_t side : {0u, best[axis]}) {
       const int u = (axis + 1) % 3, v = (axis + 2) % 3;
       const auto at = [&](uint32_t i, uint32_t j) {
         Vec3 p;
-        p[axis] = size[axis] * (double(side) / best[axis]), p[u] = size[u] * (double(i) / best[u]), p[v] = size[v] * (double(j) / best[v]);
+        p[axis] = size[axis] * (double(side) / best[axis]);
+        p[u] = size[u] * (double(i) / best[u]);
+        p[v] = size[v] * (double(j) / best[v]);
         return p;
       };
       for (uint32_t i = 0; i < best[u]; ++i)
-        for (uint32_t j = 0; j < best[v]; ++j) soup.square(at(i, j), at(i + 1, j), at(i + 1, j + 1), at(i, j + 1), (i + j) % 2);
+        for (uint32_t j = 0; j < best[v]; ++j)
+          soup.square(at(i, j), at(i + 1, j), at(i + 1, j + 1), at(i, j + 1), (i + j) % 2);
     }
   return soup.finish();
 }
 
 TriMesh make_cylinder_surface(const Memory &memory, double radius, double length, uint32_t triangles) {
-  check_size("cylinder's radius", radius), check_size("cylinder's length", length), check_triangles(triangles);
+  check_size("cylinder's radius", radius);
+  check_size("cylinder's length", length);
+  check_triangles(triangles);
   uint32_t n = 1, m = 1;
   double best = HUGE_VAL;
   for (uint32_t rings = 1; rings == 1 || 12.0 * rings * rings <= std::max(4.0 * triangles, 2e5); ++rings) {
     const double h = radius / rings;
     for (const double wanted : {length / h, triangles / (12.0 * rings) - rings}) {
       const uint32_t layers = rounded(std::min(wanted, 1e7));
-      const double s = choice_score(apart(length / layers, h), 12.0 * rings * (double(rings) + layers), triangles);
-      if (s < best) best = s, n = rings, m = layers;
+      const double s =
+          choice_score(apart(length / layers, h), 12.0 * rings * (double(rings) + layers), triangles);
+      if (s < best) {
+        best = s;
+        n = rings;
+        m = layers;
+      }
     }
   }
   check_choice("cylinder's surface", 12.0 * n * (double(n) + m), triangles);
@@ -128,7 +157,10 @@ TriMesh make_cylinder_surface(const Memory &memory, double radius, double length
     return ring == 0 ? Vec3{} : (radius * (double(ring) / n)) * unit_on_circle(j % (6 * ring), 6 * ring);
   };
   for (const double z : {0.0, length}) {
-    const auto cap = [&](Vec3 a, Vec3 b, Vec3 c) { a.z = b.z = c.z = z, soup.triangle(a, b, c); };
+    const auto cap = [&](Vec3 a, Vec3 b, Vec3 c) {
+      a.z = b.z = c.z = z;
+      soup.triangle(a, b, c);
+    };
     for (uint32_t k = 1; k <= n; ++k)
       for (uint32_t s = 0; s < 6; ++s)
         for (uint32_t t = 0; t < k; ++t) {
@@ -141,8 +173,10 @@ TriMesh make_cylinder_surface(const Memory &memory, double radius, double length
   return soup.finish();
 }
 
-TriMesh make_tube_surface(const Memory &memory, double inner, double outer, double length, uint32_t triangles) {
-  check_tube(inner, outer, length), check_triangles(triangles);
+TriMesh make_tube_surface(const Memory &memory, double inner, double outer, double length,
+                          uint32_t triangles) {
+  check_tube(inner, outer, length);
+  check_triangles(triangles);
   const double wall = outer - inner, round = kTwoPi * (0.5 * (inner + outer)), area = 2 * (length + wall);
   uint32_t around = 3, across = 1, along = 1;
   double best = HUGE_VAL, edge = std::sqrt(2 * round * area / triangles);
@@ -150,27 +184,41 @@ TriMesh make_tube_surface(const Memory &memory, double inner, double outer, doub
     const uint32_t n = std::max(3u, rounded(std::min(1e7, round / edge)));
     const uint32_t k = rounded(std::min(1e4, wall / edge / kRow)), m = rounded(std::min(1e7, length / edge));
     const double h[3] = {round / n, wall / k / kRow, length / m};
-    const double s = choice_score(std::max({h[0], h[1], h[2]}) / std::min({h[0], h[1], h[2]}), 4.0 * n * (double(k) + m), triangles);
-    if (s < best) best = s, around = n, across = k, along = m;
+    const double s = choice_score(std::max({h[0], h[1], h[2]}) / std::min({h[0], h[1], h[2]}),
+                                  4.0 * n * (double(k) + m), triangles);
+    if (s < best) {
+      best = s;
+      around = n;
+      across = k;
+      along = m;
+    }
   }
   check_choice("tube's surface", 4.0 * around * (double(across) + along), triangles);
   Soup soup(memory);
   add_annuli(soup, inner, outer, length, across, around);
   for (const uint32_t ring : {0u, across})
-    add_side(soup, around, along, length, [&](uint32_t j) { return on_annulus(inner, outer, ring, across, j, around); });
+    add_side(soup, around, along, length,
+             [&](uint32_t j) { return on_annulus(inner, outer, ring, across, j, around); });
   return soup.finish();
 }
 
 TriMesh make_torus_surface(const Memory &memory, double ring, double radius, uint32_t triangles) {
-  check_size("torus's ring radius", ring), check_size("torus's tube radius", radius), check_triangles(triangles);
-  if (!(radius < ring)) fail(DFM_E_ARG, "the torus's tube radius is %g m; expected less than the ring radius, %g m", radius, ring);
-  const double small = std::sqrt(radius / ring * (triangles * 0.5 * kRow));  // around the tube, in edges, where both ways have the same
+  check_size("torus's ring radius", ring);
+  check_size("torus's tube radius", radius);
+  check_triangles(triangles);
+  if (!(radius < ring))
+    fail(DFM_E_ARG, "the torus's tube radius is %g m; expected less than the ring radius, %g m", radius,
+         ring);
+  // around the tube, in edges, where both ways have the same
+  const double small = std::sqrt(radius / ring * (triangles * 0.5 * kRow));
   const auto whole = [](double n) { return rounded(std::min(n, 1e7)); };
-  const uint32_t around = std::max(3u, whole(small)), along = 2 * std::max(2u, whole(small * (ring / radius) / (2 * kRow)));
+  const uint32_t around = std::max(3u, whole(small));
+  const uint32_t along = 2 * std::max(2u, whole(small * (ring / radius) / (2 * kRow)));
   check_choice("torus", 2.0 * around * along, triangles);
   Soup soup(memory);
   const auto at = [&](uint32_t i, uint32_t j) {  // odd rows are shifted by half a step
-    const Vec3 u = unit_on_circle(2 * uint64_t(j % around) + i % 2, 2 * uint64_t(around)), v = unit_on_circle(i % along, along);
+    const Vec3 u = unit_on_circle(2 * uint64_t(j % around) + i % 2, 2 * uint64_t(around));
+    const Vec3 v = unit_on_circle(i % along, along);
     const double r = ring + radius * u.x;
     return Vec3{r * v.x, r * v.y, radius * u.y};
   };

@@ -1,5 +1,6 @@
-// Tube: the triangular lattice bent into an annulus, rings of equal number, each shifted by half a step against the last; extruded, and each
-// prism cut in three by the lattice's three colors with layers mirrored in turn, as in the cylinder: nothing twists, nothing is preferred.
+// Tube: the triangular lattice bent into an annulus, rings of equal number, each shifted by half a step
+// against the last; extruded, and each prism cut in three by the lattice's three colors with layers mirrored
+// in turn, as in the cylinder: nothing twists, nothing is preferred.
 #include "mesh/generate.h"
 
 namespace dfm {
@@ -9,7 +10,8 @@ constexpr double kMostElongated = 20;  // beyond it cells are all but flat
 
 struct Tube { uint32_t around, across, along; };
 
-// Tries every number of rings in the wall; what goes around in threes (the colors close), what goes along by both rules.
+// Tries every number of rings in the wall; what goes around in threes (the colors close), what goes along
+// by both rules.
 Tube choose(double inner, double outer, double length, uint32_t cells) {
   const double wall = outer - inner, round = kTwoPi * (0.5 * (inner + outer));
   Tube best{3, 1, 1};
@@ -25,11 +27,16 @@ Tube choose(double inner, double outer, double length, uint32_t cells) {
         const double layer = length / along;
         const double longer = std::max({h, row, layer}) / std::min({h, row, layer});
         const double s = choice_score(longer, 6.0 * across * around * along, cells);
-        if (s < best_score) best_score = s, best = {around, across, along}, elongation = longer;
+        if (s < best_score) {
+          best_score = s;
+          best = {around, across, along};
+          elongation = longer;
+        }
       }
     }
   }
-  check_choice("tube", best_score < HUGE_VAL ? 6.0 * best.around * best.across * best.along : HUGE_VAL, cells);
+  check_choice("tube", best_score < HUGE_VAL ? 6.0 * best.around * best.across * best.along : HUGE_VAL,
+               cells);
   if (elongation > kMostElongated) check_choice("tube", 6 * (round / wall) * (length / wall), 0);
   return best;
 }
@@ -37,7 +44,8 @@ Tube choose(double inner, double outer, double length, uint32_t cells) {
 }  // namespace
 
 TetMesh make_tube(const Memory &memory, double inner, double outer, double length, uint32_t cells) {
-  check_tube(inner, outer, length), check_cells(cells);
+  check_tube(inner, outer, length);
+  check_cells(cells);
   const Tube tube = choose(inner, outer, length, cells);
   const uint32_t n = tube.around, slab = n * (tube.across + 1);
   TetMesh mesh(memory);
@@ -50,7 +58,8 @@ TetMesh make_tube(const Memory &memory, double inner, double outer, double lengt
   // Colors go 0 1 2 along a ring; a shifted ring begins with 2, so that each triangle has all three.
   const auto color = [&](uint32_t p) { return (p % n + 2 * (p / n % 2)) % 3; };
   const auto add_prism = [&](uint32_t layer, std::array<uint32_t, 3> v) {
-    std::sort(v.begin(), v.end(), [&](uint32_t a, uint32_t b) { return layer % 2 ? color(a) > color(b) : color(a) < color(b); });
+    std::sort(v.begin(), v.end(),
+              [&](uint32_t a, uint32_t b) { return layer % 2 ? color(a) > color(b) : color(a) < color(b); });
     const uint32_t low = layer * slab, up = low + slab;
     add_tet(mesh, low + v[0], low + v[1], low + v[2], up + v[2]);
     add_tet(mesh, low + v[0], low + v[1], up + v[1], up + v[2]);

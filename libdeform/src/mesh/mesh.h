@@ -1,4 +1,5 @@
-// Tetrahedral meshes before they become bodies: reading, repair, topology, generators, writing. Set-up code: nothing here runs in a step.
+// Tetrahedral meshes before they become bodies: reading, repair, topology, generators, writing. Set-up code:
+// nothing here runs in a step.
 #pragma once
 #include <cstdint>
 #include <string>
@@ -8,33 +9,43 @@
 
 namespace dfm {
 
-// A physical group of the file. Cells refer to groups of dimension 3; groups of any dimension keep the points of their elements, so that
-// a scene can hold or load a named surface.
+// A physical group of the file. Cells refer to groups of dimension 3; groups of any dimension keep the points
+// of their elements, so that a scene can hold or load a named surface.
 struct MeshGroup {
-  std::string name;              // the file's; its number as text where the file gives no name
+  std::string name;  // the file's; its number as text where the file gives no name
   int32_t dimension = 3;
-  int32_t tag = 0;               // the file's number
-  Array<uint32_t> points;        // ascending, each once
+  int32_t tag = 0;         // the file's number
+  Array<uint32_t> points;  // ascending, each once
 };
 
 struct TetMesh {
   explicit TetMesh(const Memory &m = Memory::standard())
-      : memory(&m), points(HookAllocator<double>(m)), tets(HookAllocator<uint32_t>(m)), tet_group(HookAllocator<uint32_t>(m)),
-        tris(HookAllocator<uint32_t>(m)), tri_group(HookAllocator<uint32_t>(m)), file_point(HookAllocator<uint32_t>(m)),
-        file_cell(HookAllocator<uint32_t>(m)), share(HookAllocator<double>(m)) {}
+      : memory(&m),
+        points(HookAllocator<double>(m)),
+        tets(HookAllocator<uint32_t>(m)),
+        tet_group(HookAllocator<uint32_t>(m)),
+        tris(HookAllocator<uint32_t>(m)),
+        tri_group(HookAllocator<uint32_t>(m)),
+        file_point(HookAllocator<uint32_t>(m)),
+        file_cell(HookAllocator<uint32_t>(m)),
+        share(HookAllocator<double>(m)) {}
   const Memory *memory;
-  Array<double> points;          // [npoint,3], m
-  Array<uint32_t> tets;          // [ntet,4], every volume positive
-  Array<uint32_t> tet_group;     // [ntet] index into groups, kNoGroup without
-  Array<uint32_t> tris;          // [n,3] the file's triangles that belong to a group, so that it survives writing; in the file's sense of turn
-  Array<uint32_t> tri_group;     // [n] index into groups
-  Array<uint32_t> file_point;    // [npoint] 0-based position of the point in its file
-  Array<uint32_t> file_cell;     // [ntet] 0-based position among the file's tetrahedra; empty where none was dropped
-  Array<double> share;           // [ntet] of a filled surface: how much of the cell is material, (0,1]; else empty
-  std::vector<MeshGroup> groups; // by dimension, then tag
+  Array<double> points;       // [npoint,3], m
+  Array<uint32_t> tets;       // [ntet,4], every volume positive
+  Array<uint32_t> tet_group;  // [ntet] index into groups, kNoGroup without
+  // [n,3] the file's triangles that belong to a group, so that it survives writing; in the
+  // file's sense of turn
+  Array<uint32_t> tris;
+  Array<uint32_t> tri_group;   // [n] index into groups
+  Array<uint32_t> file_point;  // [npoint] 0-based position of the point in its file
+  // [ntet] 0-based position among the file's tetrahedra; empty where none was dropped
+  Array<uint32_t> file_cell;
+  // [ntet] of a filled surface: how much of the cell is material, (0,1]; else empty
+  Array<double> share;
+  std::vector<MeshGroup> groups;  // by dimension, then tag
   // What reading had to repair or noticed.
   uint32_t turned = 0, dropped_points = 0, dropped_cells = 0;
-  uint32_t overlapping = 0;      // faces whose two cells lie on the same side: the mesh is tangled there
+  uint32_t overlapping = 0;           // faces whose two cells lie on the same side: the mesh is tangled there
   std::vector<std::string> warnings;  // one sentence each
   uint32_t npoint() const { return static_cast<uint32_t>(points.size() / 3); }
   uint32_t ntet() const { return static_cast<uint32_t>(tets.size() / 4); }
@@ -42,27 +53,33 @@ struct TetMesh {
 inline constexpr uint32_t kNoGroup = UINT32_MAX;
 inline constexpr uint32_t kMaxTets = 1u << 30;  // face numbers are 4*cell+face in 32 bits
 
-// ---- reading -----------------------------------------------------------------------------------------------------
-// By file name ending; throws Error (IO, FORMAT, UNSUPPORTED) with one sentence. Memory stays within a small multiple of the file's size.
+// ---- reading ----------------------------------------------------------------------------------------------
+// By file name ending; throws Error (IO, FORMAT, UNSUPPORTED) with one sentence. Memory stays within a small
+// multiple of the file's size.
 TetMesh read_tet_mesh(const Memory &memory, const std::string &path);
 // The same from bytes that already lie in memory; `path` tells the format and stands in sentences.
 TetMesh parse_tet_mesh(const Memory &memory, const std::string &path, const char *bytes, size_t size);
 
-// ---- generators (SI units, near-isotropic cells, about `cells` of them) -------------------------------------------
-TetMesh make_cylinder(const Memory &memory, double radius, double length, uint32_t cells);  // axis z, base at the origin
-TetMesh make_beam(const Memory &memory, double x, double y, double z, uint32_t cells);      // from the origin
-TetMesh make_ball(const Memory &memory, double radius, uint32_t cells);                     // about the origin
-TetMesh make_tube(const Memory &memory, double inner, double outer, double length, uint32_t cells);  // as the cylinder, with a hole
+// ---- generators (SI units, near-isotropic cells, about `cells` of them) -----------------------------------
+// axis z, base at the origin
+TetMesh make_cylinder(const Memory &memory, double radius, double length, uint32_t cells);
+TetMesh make_beam(const Memory &memory, double x, double y, double z, uint32_t cells);  // from the origin
+// about the origin
+TetMesh make_ball(const Memory &memory, double radius, uint32_t cells);
+// as the cylinder, with a hole
+TetMesh make_tube(const Memory &memory, double inner, double outer, double length, uint32_t cells);
 
-// ---- topology ----------------------------------------------------------------------------------------------------
+// ---- topology ---------------------------------------------------------------------------------------------
 // Corners of the four faces of a cell, outward for a positive cell; face f lies opposite corner f.
 inline constexpr uint32_t kTetFace[4][3] = {{1, 2, 3}, {0, 3, 2}, {0, 1, 3}, {0, 2, 1}};
 inline constexpr uint32_t kTetEdge[6][2] = {{0, 1}, {0, 2}, {0, 3}, {1, 2}, {1, 3}, {2, 3}};
 
-// Faces that belong to one cell only, [n,3], outward, ordered by owning cell and face. Point numbers are those of the cells.
+// Faces that belong to one cell only, [n,3], outward, ordered by owning cell and face. Point numbers are
+// those of the cells.
 Array<uint32_t> boundary_triangles(const Memory &memory, uint32_t ntet, const uint32_t *tets);
 inline Array<uint32_t> boundary_triangles(const Array<uint32_t> &tets) {
-  return boundary_triangles(*tets.get_allocator().memory, static_cast<uint32_t>(tets.size() / 4), tets.data());
+  return boundary_triangles(*tets.get_allocator().memory, static_cast<uint32_t>(tets.size() / 4),
+                            tets.data());
 }
 // Edges of the cells, [n,2], i < j, lexicographic.
 Array<uint32_t> unique_edges(const Memory &memory, uint32_t ntet, const uint32_t *tets);
@@ -71,7 +88,8 @@ inline Array<uint32_t> unique_edges(const Array<uint32_t> &tets) {
 }
 
 double tet_volume(const double *points, const uint32_t *tet);
-// Mean ratio 12 (3V)^(2/3) / sum l^2: 1 for a regular tetrahedron, 0 for a flat one, negative for an inverted one.
+// Mean ratio 12 (3V)^(2/3) / sum l^2: 1 for a regular tetrahedron, 0 for a flat one, negative for
+// an inverted one.
 double tet_quality(const double *points, const uint32_t *tet);
 
 struct MeshStatistics {
@@ -80,26 +98,27 @@ struct MeshStatistics {
   uint32_t nonmanifold_edges = 0;  // boundary edges with more than two triangles
   uint32_t flat_cells = 0;         // mean ratio below 0.01
   double volume = 0, edge_min = 0, edge_median = 0, edge_max = 0, quality_min = 0, quality_mean = 0;
-  uint32_t histogram[10] = {};     // of the mean ratio, bins of 0.1
+  uint32_t histogram[10] = {};  // of the mean ratio, bins of 0.1
   double lo[3] = {}, hi[3] = {};
 };
 MeshStatistics mesh_statistics(const TetMesh &mesh);
 
-// ---- writing -----------------------------------------------------------------------------------------------------
+// ---- writing ----------------------------------------------------------------------------------------------
 // All write to a temporary name beside the target and rename it: never half a file. Throw Error(DFM_E_IO).
 void write_msh41(const TetMesh &mesh, const std::string &path);  // binary
 void write_msh22(const TetMesh &mesh, const std::string &path);  // binary
 void write_vtk(const TetMesh &mesh, const std::string &path);    // legacy 3.0, binary
 void write_medit(const TetMesh &mesh, const std::string &path);  // text; groups by number alone
 void write_vtu(const TetMesh &mesh, const std::string &path);    // with groups and share as cell data
-void write_tet_mesh(const TetMesh &mesh, const std::string &path);  // by ending: .msh (4.1), .msh2 (2.2), .vtk, .vtu, .mesh
+// by ending: .msh (4.1), .msh2 (2.2), .vtk, .vtu, .mesh
+void write_tet_mesh(const TetMesh &mesh, const std::string &path);
 
 // VTU (XML, appended raw data), as ParaView reads it.
 struct VtuArray {
   const char *name;
-  uint32_t width;             // components
-  const double *real;         // [n,width], or
-  const uint32_t *integer;    // [n,width] where real is null
+  uint32_t width;           // components
+  const double *real;       // [n,width], or
+  const uint32_t *integer;  // [n,width] where real is null
 };
 struct VtuGrid {
   uint32_t npoint = 0, ncell = 0, corners = 4;  // 4 tetrahedra, 3 triangles

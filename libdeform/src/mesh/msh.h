@@ -6,30 +6,36 @@
 
 namespace dfm {
 
-constexpr const char *kConvertMsh = "convert it first: gmsh -3 -save_all -format msh41 -order 1 FILE -o OUT.msh";
+constexpr const char *kConvertMsh =
+    "convert it first: gmsh -3 -save_all -format msh41 -order 1 FILE -o OUT.msh";
 
 // Points and dimension of a gmsh element type; points 0: not known.
-struct MshElement { uint32_t points; int32_t dimension; };
+struct MshElement {
+  uint32_t points;
+  int32_t dimension;
+};
 MshElement msh_element(int64_t type);
 constexpr int64_t kMshTet = 4;
 
 // Node numbers of the file to positions. Numbers may have gaps and come in any order.
 class NodeNumbers {
  public:
-  explicit NodeNumbers(const Memory &m) : tags_(HookAllocator<int64_t>(m)), order_(HookAllocator<uint32_t>(m)) {}
+  explicit NodeNumbers(const Memory &m)
+      : tags_(HookAllocator<int64_t>(m)), order_(HookAllocator<uint32_t>(m)) {}
   void reserve(size_t n) { tags_.reserve(n); }
   void add(int64_t tag) { tags_.push_back(tag); }
   size_t size() const { return tags_.size(); }
-  void finish(const Cursor &in);                      // refuses a number given twice
-  uint32_t find(const Cursor &in, int64_t tag) const; // refuses an unknown number
+  void finish(const Cursor &in);                       // refuses a number given twice
+  uint32_t find(const Cursor &in, int64_t tag) const;  // refuses an unknown number
 
  private:
-  Array<int64_t> tags_;      // by position, then ascending after finish()
-  Array<uint32_t> order_;    // position of each ascending number; empty where they ascend in the file already
+  Array<int64_t> tags_;    // by position, then ascending after finish()
+  Array<uint32_t> order_;  // position of each ascending number; empty where they ascend in the file already
 };
 
-// Takes elements one by one: keeps tetrahedra, triangles and quadrangles (cut), passes over points and lines (their points join their
-// group), refuses other volume cells, and curved faces where the file has nothing straight.
+// Takes elements one by one: keeps tetrahedra, triangles and quadrangles (cut), passes over points and
+// lines (their points join their group), refuses other volume cells, and curved faces where the file has
+// nothing straight.
 class ElementSink {
  public:
   ElementSink(RawMesh &out, const NodeNumbers &nodes) : out_(out), nodes_(nodes) {}

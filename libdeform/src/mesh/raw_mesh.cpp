@@ -14,7 +14,8 @@ uint32_t RawMesh::group(const Cursor &at, int32_t dimension, int32_t tag) {
   const auto [entry, fresh] = group_index_.try_emplace({dimension, tag}, uint32_t(groups.size()));
   if (fresh) {
     if (groups.size() == kMaxGroups) at.refuse("more than %u groups", kMaxGroups);
-    groups.push_back({std::to_string(tag), dimension, tag, Array<uint32_t>(HookAllocator<uint32_t>(*memory))});
+    groups.push_back(
+        {std::to_string(tag), dimension, tag, Array<uint32_t>(HookAllocator<uint32_t>(*memory))});
   }
   return entry->second;
 }
@@ -33,8 +34,10 @@ void RawMesh::expect_tets(size_t n) {
   if (n >= kMaxTets) return;  // add_tet says so
   const size_t cells = ntet() + n;
   if (tets.capacity() >= 4 * cells) return;
-  const size_t room = tets.empty() ? cells : std::max(cells, 2 * size_t(ntet()));  // many small blocks still cost linear time
-  tets.reserve(4 * room), tet_group.reserve(room);
+  // many small blocks still cost linear time
+  const size_t room = tets.empty() ? cells : std::max(cells, 2 * size_t(ntet()));
+  tets.reserve(4 * room);
+  tet_group.reserve(room);
 }
 
 void RawMesh::add_tet(const Cursor &at, const uint32_t corners[4], uint32_t in_group) {
@@ -51,7 +54,8 @@ void RawMesh::add_triangle(const Cursor &at, uint32_t a, uint32_t b, uint32_t c,
 
 void RawMesh::add_polygon(const Cursor &at, const uint32_t *corners, size_t n, uint32_t in_group) {
   for (size_t k = 2; k < n; ++k) add_triangle(at, corners[0], corners[k - 1], corners[k], in_group);
-  if (in_group != kNoGroup) groups[in_group].points.insert(groups[in_group].points.end(), corners, corners + n);
+  if (in_group != kNoGroup)
+    groups[in_group].points.insert(groups[in_group].points.end(), corners, corners + n);
 }
 
 void RawMesh::add_strip(const Cursor &at, const uint32_t *corners, size_t n, uint32_t in_group) {
@@ -59,7 +63,8 @@ void RawMesh::add_strip(const Cursor &at, const uint32_t *corners, size_t n, uin
     const bool turned = k % 2 != 0;
     add_triangle(at, corners[k - 2], corners[k - !turned], corners[k - turned], in_group);
   }
-  if (in_group != kNoGroup) groups[in_group].points.insert(groups[in_group].points.end(), corners, corners + n);
+  if (in_group != kNoGroup)
+    groups[in_group].points.insert(groups[in_group].points.end(), corners, corners + n);
 }
 
 uint32_t point_count(const Cursor &at, uint64_t n, const char *what) {

@@ -1,4 +1,5 @@
-// What a reader hands over: points, tetrahedra and triangles in the file's order, not yet looked at as geometry.
+// What a reader hands over: points, tetrahedra and triangles in the file's order, not yet looked
+// at as geometry.
 #pragma once
 #include <map>
 #include <optional>
@@ -14,15 +15,21 @@ namespace dfm {
 
 struct RawMesh {
   explicit RawMesh(const Memory &m)
-      : memory(&m), points(HookAllocator<double>(m)), tets(HookAllocator<uint32_t>(m)), tet_group(HookAllocator<uint32_t>(m)),
-        tet_share(HookAllocator<double>(m)), tris(HookAllocator<uint32_t>(m)), tri_group(HookAllocator<uint32_t>(m)) {}
+      : memory(&m),
+        points(HookAllocator<double>(m)),
+        tets(HookAllocator<uint32_t>(m)),
+        tet_group(HookAllocator<uint32_t>(m)),
+        tet_share(HookAllocator<double>(m)),
+        tris(HookAllocator<uint32_t>(m)),
+        tri_group(HookAllocator<uint32_t>(m)) {}
   const Memory *memory;
   Array<double> points;
-  Array<uint32_t> tets;        // 0-based positions of points in the file
-  Array<uint32_t> tet_group;   // index into groups
-  Array<double> tet_share;     // how much of each is material, where the file says so of all; else of no use (finish_mesh decides)
-  Array<uint32_t> tris;        // polygons are cut into triangles by the readers
-  Array<uint32_t> tri_group;   // index into groups, kNoGroup without
+  Array<uint32_t> tets;       // 0-based positions of points in the file
+  Array<uint32_t> tet_group;  // index into groups
+  // how much of each is material, where the file says so of all; else of no use (finish_mesh decides)
+  Array<double> tet_share;
+  Array<uint32_t> tris;           // polygons are cut into triangles by the readers
+  Array<uint32_t> tri_group;      // index into groups, kNoGroup without
   std::vector<MeshGroup> groups;  // points: of elements below dimension 3 only, in file order, with repeats
   std::vector<std::string> warnings;  // one sentence each, to stand before those of repair
   uint32_t npoint() const { return static_cast<uint32_t>(points.size() / 3); }
@@ -35,7 +42,8 @@ struct RawMesh {
   uint32_t named_group(const Cursor &at, int32_t dimension, std::string_view name);
 
   void add_tet(const Cursor &at, const uint32_t corners[4], uint32_t in_group);
-  // n >= 3 corners around a face, cut into the n-2 triangles of a fan about the first: right for convex polygons.
+  // n >= 3 corners around a face, cut into the n-2 triangles of a fan about the first: right for
+  // convex polygons.
   void add_polygon(const Cursor &at, const uint32_t *corners, size_t n, uint32_t in_group);
   // Triangles (i, i+1, i+2), every second one turned.
   void add_strip(const Cursor &at, const uint32_t *corners, size_t n, uint32_t in_group);
@@ -61,7 +69,8 @@ void read_ply(Cursor &in, RawMesh &out);
 void read_stl(Cursor &in, RawMesh &out);
 void read_off(Cursor &in, RawMesh &out);
 
-// Reads any format by file name ending and content; fills tets, tris or both. parse_raw: from bytes in memory.
+// Reads any format by file name ending and content; fills tets, tris or both. parse_raw: from
+// bytes in memory.
 RawMesh read_raw(const Memory &memory, const std::string &path);
 RawMesh parse_raw(const Memory &memory, const std::string &path, const char *bytes, size_t size);
 

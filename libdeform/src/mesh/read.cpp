@@ -1,5 +1,5 @@
-// Which reader a file needs: by what it begins with where that is beyond doubt, else by its name's ending. What is not read is refused with
-// the way to convert it.
+// Which reader a file needs: by what it begins with where that is beyond doubt, else by its name's ending.
+// What is not read is refused with the way to convert it.
 #include <algorithm>
 #include <cctype>
 
@@ -11,15 +11,18 @@ namespace dfm {
 namespace {
 
 struct Format {
-  const char *name;                       // in sentences
-  std::vector<const char *> endings;      // the first is the usual one
-  void (*read)(Cursor &, RawMesh &);      // null: not read, and then
-  const char *advice;                     // how to convert it
+  const char *name;                   // in sentences
+  std::vector<const char *> endings;  // the first is the usual one
+  void (*read)(Cursor &, RawMesh &);  // null: not read, and then
+  const char *advice;                 // how to convert it
 };
 
 constexpr const char *kMeshio = "convert it first: meshio convert FILE OUT.vtu";
-constexpr const char *kAssimp = "convert it first: deform mesh convert FILE OUT.obj (where the command is built with assimp), or export OBJ, PLY or STL";
-constexpr const char *kCad = "it is a shape without cells; mesh it first: gmsh -3 -format msh41 FILE -o OUT.msh";
+constexpr const char *kAssimp =
+    "convert it first: deform mesh convert FILE OUT.obj (where the command is built with assimp), or export "
+    "OBJ, PLY or STL";
+constexpr const char *kCad =
+    "it is a shape without cells; mesh it first: gmsh -3 -format msh41 FILE -o OUT.msh";
 
 const std::vector<Format> &formats() {
   static const std::vector<Format> all{
@@ -32,8 +35,11 @@ const std::vector<Format> &formats() {
       {"STL", {"stl"}, read_stl, nullptr},
       {"OFF", {"off", "coff", "noff"}, read_off, nullptr},
       {"Abaqus", {"inp"}, nullptr, kMeshio},
-      {"TetGen", {"node", "ele", "face", "edge", "poly", "smesh"}, nullptr,
-       "let tetgen write Medit (tetgen -g) and read the .mesh, or convert it first: meshio convert FILE.node OUT.vtu"},
+      {"TetGen",
+       {"node", "ele", "face", "edge", "poly", "smesh"},
+       nullptr,
+       "let tetgen write Medit (tetgen -g) and read the .mesh, or convert it first: meshio convert FILE.node "
+       "OUT.vtu"},
       {"binary Medit", {"meshb"}, nullptr, "convert it first: gmsh -3 -format mesh FILE -o OUT.mesh"},
       {"glTF", {"gltf", "glb"}, nullptr, kAssimp},
       {"FBX", {"fbx"}, nullptr, kAssimp},
@@ -80,7 +86,8 @@ std::string readable() {
 
 bool starts(std::string_view text, std::string_view with) { return text.substr(0, with.size()) == with; }
 
-// What the first bytes say beyond doubt; null where they say nothing. OBJ, ASCII STL and TetGen have no mark of their own.
+// What the first bytes say beyond doubt; null where they say nothing. OBJ, ASCII STL and TetGen have no
+// mark of their own.
 const Format *format_by_content(std::string_view bytes) {
   if (starts(bytes, "\x1f\x8b")) return format_called("gzip");
   if (starts(bytes, "glTF")) return format_called("glTF");
@@ -93,7 +100,9 @@ const Format *format_by_content(std::string_view bytes) {
   if (starts(head, "# vtk DataFile")) return format_called("legacy VTK");
   if (starts(head, "<?xml") || starts(head, "<VTKFile") || starts(head, "<!--")) {
     if (head.find("<VTKFile") != head.npos) return format_called("VTU");
-    return format_called(head.find("<COLLADA") != head.npos ? "COLLADA" : head.find("<X3D") != head.npos ? "X3D or Blender" : "");
+    return format_called(head.find("<COLLADA") != head.npos ? "COLLADA"
+                         : head.find("<X3D") != head.npos   ? "X3D or Blender"
+                                                            : "");
   }
   while (starts(head, "#")) {  // OFF and Medit may begin with comments
     head.remove_prefix(std::min(head.find('\n'), head.size()));
@@ -103,8 +112,10 @@ const Format *format_by_content(std::string_view bytes) {
   if (word == "$MeshFormat" || word == "$NOD" || word == "$Comments") return format_called("MSH");
   if (word == "MeshVersionFormatted") return format_called("Medit");
   if (word == "ply") return format_called("PLY");
-  if (word == "OFF" || word == "COFF" || word == "NOFF" || word == "CNOFF" || word == "STOFF") return format_called("OFF");
-  if (starts(word, "**") || Cursor::is_word(word, "*heading") || Cursor::is_word(word, "*node") || Cursor::is_word(word, "*node,"))
+  if (word == "OFF" || word == "COFF" || word == "NOFF" || word == "CNOFF" || word == "STOFF")
+    return format_called("OFF");
+  if (starts(word, "**") || Cursor::is_word(word, "*heading") || Cursor::is_word(word, "*node") ||
+      Cursor::is_word(word, "*node,"))
     return format_called("Abaqus");
   if (word == "ISO-10303-21;") return format_called("CAD");
   return nullptr;
@@ -113,11 +124,14 @@ const Format *format_by_content(std::string_view bytes) {
 const Format &choose(const std::string &path, std::string_view bytes, RawMesh &raw) {
   const std::string end = ending(path);
   const Format *const named = format_by_ending(end), *const seen = format_by_content(bytes);
-  if (bytes.empty()) fail(DFM_E_FORMAT, "%s: the file is empty; expected a mesh (%s)", path.c_str(), readable().c_str());
+  if (bytes.empty())
+    fail(DFM_E_FORMAT, "%s: the file is empty; expected a mesh (%s)", path.c_str(), readable().c_str());
   const Format *const found = seen ? seen : named;
   const bool lies = seen && seen != named;
-  const std::string although = !lies ? "" : end.empty() ? ", as its first bytes show, although its name has no ending"
-                                                        : format(", as its first bytes show, although its name ends in .%s", end.c_str());
+  const std::string although =
+      !lies         ? ""
+      : end.empty() ? ", as its first bytes show, although its name has no ending"
+                    : format(", as its first bytes show, although its name ends in .%s", end.c_str());
   if (!found) {
     std::vector<std::string> known;
     for (const Format &f : formats())
@@ -127,14 +141,16 @@ const Format &choose(const std::string &path, std::string_view bytes, RawMesh &r
          near.empty() ? "" : (", did you mean ." + near + "?").c_str(), readable().c_str());
   }
   if (!found->read)
-    fail(DFM_E_UNSUPPORTED, "%s: this is a %s file%s, which the library itself does not read; %s", path.c_str(), found->name, although.c_str(), found->advice);
+    fail(DFM_E_UNSUPPORTED, "%s: this is a %s file%s, which the library itself does not read; %s",
+         path.c_str(), found->name, although.c_str(), found->advice);
   if (lies) raw.warnings.push_back(format("read as %s%s", found->name, although.c_str()));
   return *found;
 }
 
 // Warnings of the reader stand before those of the repair.
 template <class Mesh>
-Mesh finish_with_warnings(Mesh (*finish)(const std::string &, RawMesh &&), const std::string &path, RawMesh &&raw) {
+Mesh finish_with_warnings(Mesh (*finish)(const std::string &, RawMesh &&), const std::string &path,
+                          RawMesh &&raw) {
   const std::vector<std::string> warnings = raw.warnings;
   Mesh mesh = finish(path, std::move(raw));
   mesh.warnings.insert(mesh.warnings.begin(), warnings.begin(), warnings.end());
@@ -154,7 +170,8 @@ RawMesh parse_raw(const Memory &memory, const std::string &path, const char *byt
 RawMesh read_raw(const Memory &memory, const std::string &path) {
   const Format *const named = format_by_ending(ending(path));
   if (named && !named->read)  // before a large file is read for nothing
-    fail(DFM_E_UNSUPPORTED, "%s: the library itself reads no %s files; %s", path.c_str(), named->name, named->advice);
+    fail(DFM_E_UNSUPPORTED, "%s: the library itself reads no %s files; %s", path.c_str(), named->name,
+         named->advice);
   const Array<char> bytes = read_whole_file(memory, path, kMaxMeshBytes, "a mesh file");
   return parse_raw(memory, path, bytes.data(), bytes.size());
 }
@@ -164,7 +181,8 @@ TetMesh parse_tet_mesh(const Memory &memory, const std::string &path, const char
 }
 
 TetMesh read_tet_mesh(const Memory &memory, const std::string &path) {
-  return finish_with_warnings(finish_mesh, path, read_raw(memory, path));  // the file's bytes are free before the repair begins
+  // the file's bytes are free before the repair begins
+  return finish_with_warnings(finish_mesh, path, read_raw(memory, path));
 }
 
 TriMesh parse_tri_mesh(const Memory &memory, const std::string &path, const char *bytes, size_t size) {
@@ -173,7 +191,8 @@ TriMesh parse_tri_mesh(const Memory &memory, const std::string &path, const char
 
 bool has_cells(const std::string &path, const RawMesh &raw) {
   if (raw.tets.empty() && raw.tris.empty())
-    fail(DFM_E_FORMAT, "%s: no tetrahedra and no triangles in this file; a body needs one of them", path.c_str());
+    fail(DFM_E_FORMAT, "%s: no tetrahedra and no triangles in this file; a body needs one of them",
+         path.c_str());
   return !raw.tets.empty();
 }
 
@@ -185,6 +204,8 @@ AnyMesh read_any_mesh(const Memory &memory, const std::string &path) {
   return out;
 }
 
-TriMesh read_tri_mesh(const Memory &memory, const std::string &path) { return finish_with_warnings(finish_surface, path, read_raw(memory, path)); }
+TriMesh read_tri_mesh(const Memory &memory, const std::string &path) {
+  return finish_with_warnings(finish_surface, path, read_raw(memory, path));
+}
 
 }  // namespace dfm

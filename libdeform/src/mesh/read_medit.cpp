@@ -1,5 +1,6 @@
-// Medit files (.mesh, ASCII): keywords, each with a count and rows of numbers from 1, the last of a row its reference. References other than 0
-// are groups of the tetrahedra, triangles (and quadrilaterals, cut) and edges. Keywords that a body has no use for are passed over.
+// Medit files (.mesh, ASCII): keywords, each with a count and rows of numbers from 1, the last of a row its
+// reference. References other than 0 are groups of the tetrahedra, triangles (and quadrilaterals, cut) and
+// edges. Keywords that a body has no use for are passed over.
 #include "mesh/raw_mesh.h"
 
 namespace dfm {
@@ -15,21 +16,29 @@ class MeditReader {
     if (version < 1 || version > 4) in_.unsupported("Medit version %lld; 1 to 4 are read", ll(version));
     bool points = false, ended = false;
     for (std::string_view word = in_.word(); !word.empty() && !ended; word = ended ? word : in_.word()) {
-      if (word == "Dimension") dimension();
-      else if (word == "Vertices") {
+      if (word == "Dimension") {
+        dimension();
+      } else if (word == "Vertices") {
         if (points) in_.refuse("a second Vertices section; one mesh per file is read");
-        read_points(), points = true;
+        read_points();
+        points = true;
       } else if (word == "Tetrahedra") read_cells(points, "tetrahedra", 4, 3);
       else if (word == "Triangles") read_cells(points, "triangles", 3, 2);
       else if (word == "Quadrilaterals") read_cells(points, "quadrilaterals", 4, 2);
       else if (word == "Edges") read_cells(points, "edges", 2, 1);
-      else if (word == "Hexahedra" || word == "Hexaedra" || word == "Prisms" || word == "Pyramids") refuse_if_any(word);
+      else if (word == "Hexahedra" || word == "Hexaedra" || word == "Prisms" || word == "Pyramids")
+        refuse_if_any(word);
       else if (word == "End") ended = true;
       else if (is_letter(word.front())) pass_over(word);
-      else in_.refuse("expected a keyword such as Vertices, Tetrahedra or End, found %s", Cursor::quote(word).c_str());
+      else
+        in_.refuse("expected a keyword such as Vertices, Tetrahedra or End, found %s",
+                   Cursor::quote(word).c_str());
     }
     if (!points) in_.refuse("no Vertices section; the file is truncated or holds no mesh");
-    if (!ended) out_.warnings.push_back("End is missing; every section has as many lines as it promises, so the mesh was taken as complete");
+    if (!ended)
+      out_.warnings.push_back(
+          "End is missing; every section has as many lines as it promises, so the mesh was taken as "
+          "complete");
   }
 
  private:
@@ -57,30 +66,36 @@ class MeditReader {
     for (uint64_t i = 0; i < n; ++i) {
       for (uint32_t k = 0; k < corners; ++k) corner[k] = point();
       const int64_t reference = in_.integer("an element's reference");
-      if (reference < INT32_MIN || reference > INT32_MAX) in_.refuse("reference %lld does not fit 32 bits", ll(reference));
+      if (reference < INT32_MIN || reference > INT32_MAX)
+        in_.refuse("reference %lld does not fit 32 bits", ll(reference));
       const uint32_t group = out_.group(in_, dimension, static_cast<int32_t>(reference));
       if (dimension == 3) out_.add_tet(in_, corner, group);
       else if (dimension == 2) out_.add_polygon(in_, corner, corners, group);
-      else if (group != kNoGroup) out_.groups[group].points.insert(out_.groups[group].points.end(), corner, corner + corners);
+      else if (group != kNoGroup)
+        out_.groups[group].points.insert(out_.groups[group].points.end(), corner, corner + corners);
     }
   }
 
   uint32_t point() {
     const int64_t p = in_.integer("an element's vertex");
-    if (p < 1 || p > int64_t(out_.npoint())) in_.refuse("an element refers to vertex %lld; the file has vertices 1 to %u", ll(p), out_.npoint());
+    if (p < 1 || p > int64_t(out_.npoint()))
+      in_.refuse("an element refers to vertex %lld; the file has vertices 1 to %u", ll(p), out_.npoint());
     return static_cast<uint32_t>(p - 1);
   }
 
   void refuse_if_any(std::string_view what) {
     if (in_.integer("a number of elements") == 0) return;
-    in_.unsupported("%.*s; only tetrahedra and triangles are read: mesh the volume with tetrahedra, or split the cells", int(what.size()), what.data());
+    in_.unsupported(
+        "%.*s; only tetrahedra and triangles are read: mesh the volume with tetrahedra, or split the cells",
+        int(what.size()), what.data());
   }
 
   // To the next keyword; cells of higher order must not be lost in silence.
   void pass_over(std::string_view word) {
     const bool curved = word == "TetrahedraP2" || word == "TrianglesP2";
     if (curved && in_.integer("a number of elements") != 0)
-      in_.unsupported("second-order %s; write first-order cells (for instance gmsh -order 1)", word == "TrianglesP2" ? "triangles" : "tetrahedra");
+      in_.unsupported("second-order %s; write first-order cells (for instance gmsh -order 1)",
+                      word == "TrianglesP2" ? "triangles" : "tetrahedra");
     for (;;) {
       in_.skip_space();
       if (in_.left() == 0 || is_letter(in_.rest().front())) return;

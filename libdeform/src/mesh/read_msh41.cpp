@@ -1,5 +1,6 @@
-// MSH 4.1, ASCII and binary: nodes and elements in blocks, one per entity of the geometry; $Entities tells the physical groups of each.
-// Counts and numbers are size_t of the writing machine (data size 8 or 4), entity and type numbers are int.
+// MSH 4.1, ASCII and binary: nodes and elements in blocks, one per entity of the geometry; $Entities tells
+// the physical groups of each. Counts and numbers are size_t of the writing machine (data size 8 or 4),
+// entity and type numbers are int.
 #include <algorithm>
 
 #include "mesh/msh.h"
@@ -10,28 +11,38 @@ namespace {
 class Msh41Reader {
  public:
   Msh41Reader(Cursor &in, RawMesh &out, size_t size_bytes)
-      : in_(in), out_(out), wide_(size_bytes == 8), nodes_(*out.memory), sink_(out, nodes_),
+      : in_(in),
+        out_(out),
+        wide_(size_bytes == 8),
+        nodes_(*out.memory),
+        sink_(out, nodes_),
         entities_(HookAllocator<Entity>(*out.memory)) {}
 
   void run() {
     bool have_nodes = false, have_elements = false;
     for (std::string_view section = in_.word(); !section.empty(); section = in_.word()) {
-      if (section == "$PhysicalNames") read_physical_names(in_, out_);
-      else if (section == "$Entities") {
+      if (section == "$PhysicalNames") {
+        read_physical_names(in_, out_);
+      } else if (section == "$Entities") {
         if (have_elements) in_.refuse("$Entities after $Elements; expected them first");
         read_entities();
       } else if (section == "$Nodes") {
         if (have_nodes) in_.refuse("a second $Nodes section; one mesh per file is read");
-        read_nodes(), have_nodes = true;
+        read_nodes();
+        have_nodes = true;
       } else if (section == "$Elements") {
         if (!have_nodes) in_.refuse("$Elements before $Nodes; expected the nodes first");
         if (have_elements) in_.refuse("a second $Elements section; one mesh per file is read");
-        read_elements(), have_elements = true;
+        read_elements();
+        have_elements = true;
       } else if (section[0] == '$') skip_section(in_, section);
-      else in_.refuse("expected a section such as $Nodes or $Elements, found %s", Cursor::quote(section).c_str());
+      else
+        in_.refuse("expected a section such as $Nodes or $Elements, found %s",
+                   Cursor::quote(section).c_str());
     }
     if (!have_nodes || !have_elements)
-      in_.refuse("no %s section; the file is truncated or holds no mesh", have_nodes ? "$Elements" : "$Nodes");
+      in_.refuse("no %s section; the file is truncated or holds no mesh",
+                 have_nodes ? "$Elements" : "$Nodes");
     sink_.finish(in_);
   }
 
@@ -39,17 +50,24 @@ class Msh41Reader {
   struct Entity {
     int32_t dimension, tag;
     uint32_t group;
-    bool operator<(const Entity &o) const { return std::pair(dimension, tag) < std::pair(o.dimension, o.tag); }
+    bool operator<(const Entity &o) const {
+      return std::pair(dimension, tag) < std::pair(o.dimension, o.tag);
+    }
   };
 
   int64_t size(const char *what) {
     if (!in_.binary) return in_.integer(what);
     if (!wide_) return in_.value<uint32_t>(what);
     const uint64_t v = in_.value<uint64_t>(what);
-    if (v > uint64_t(INT64_MAX)) in_.seek(in_.offset() - 8), in_.refuse("%s %llu is out of range", what, ull(v));
+    if (v > uint64_t(INT64_MAX)) {
+      in_.seek(in_.offset() - 8);
+      in_.refuse("%s %llu is out of range", what, ull(v));
+    }
     return static_cast<int64_t>(v);
   }
-  int32_t number(const char *what) { return in_.binary ? in_.value<int32_t>(what) : msh_int(in_, in_.integer(what), what); }
+  int32_t number(const char *what) {
+    return in_.binary ? in_.value<int32_t>(what) : msh_int(in_, in_.integer(what), what);
+  }
   double real(const char *what) { return in_.binary ? in_.binary_real(what) : in_.real(what); }
   size_t size_bytes() const { return !in_.binary ? 2 : wide_ ? 8 : 4; }
   size_t real_bytes() const { return in_.binary ? 8 : 2; }
@@ -66,13 +84,15 @@ class Msh41Reader {
       for (uint64_t i = 0; i < m; ++i) {
         const int32_t tag = number("an entity's number");
         for (int k = 0; k < (d == 0 ? 3 : 6); ++k) real("an entity's box");
-        const uint64_t physical = in_.count(size("an entity's number of physical groups"), in_.binary ? 4 : 2, "physical groups");
+        const uint64_t physical =
+            in_.count(size("an entity's number of physical groups"), in_.binary ? 4 : 2, "physical groups");
         for (uint64_t k = 0; k < physical; ++k) {
           const int32_t group = number("a physical group's number");
           if (k == 0) entities_.push_back({d, tag, out_.group(in_, d, group)});
         }
         if (d > 0) {
-          const uint64_t bounding = in_.count(size("an entity's number of boundaries"), in_.binary ? 4 : 2, "boundary entities");
+          const uint64_t bounding =
+              in_.count(size("an entity's number of boundaries"), in_.binary ? 4 : 2, "boundary entities");
           for (uint64_t k = 0; k < bounding; ++k) number("a boundary entity");
         }
       }
@@ -91,17 +111,21 @@ class Msh41Reader {
     begin("$Nodes");
     const int64_t nblock = size("the number of node blocks");
     const uint64_t nnode = in_.count(size("the number of nodes"), size_bytes() + 3 * real_bytes(), "nodes");
-    size("the least node number"), size("the greatest node number");
-    nodes_.reserve(nnode), out_.points.reserve(3 * nnode);
+    size("the least node number");
+    size("the greatest node number");
+    nodes_.reserve(nnode);
+    out_.points.reserve(3 * nnode);
     for (int64_t b = 0; b < nblock; ++b) {
       const int32_t dimension = number("a node block's dimension");
       number("a node block's entity");
       const int32_t parametric = number("a node block's parametric flag");
       const int64_t n = size("a node block's number of nodes");
-      if (dimension < 0 || dimension > 3) in_.refuse("a node block of dimension %d; expected 0 to 3", dimension);
+      if (dimension < 0 || dimension > 3)
+        in_.refuse("a node block of dimension %d; expected 0 to 3", dimension);
       if (parametric != 0 && parametric != 1) in_.refuse("parametric flag %d; expected 0 or 1", parametric);
       if (n < 0 || uint64_t(n) > nnode - nodes_.size())
-        in_.refuse("a block of %lld nodes where %llu of the %llu promised are left", ll(n), ull(nnode - nodes_.size()), ull(nnode));
+        in_.refuse("a block of %lld nodes where %llu of the %llu promised are left", ll(n),
+                   ull(nnode - nodes_.size()), ull(nnode));
       for (int64_t i = 0; i < n; ++i) nodes_.add(size("a node's number"));
       for (int64_t i = 0; i < n; ++i) {
         for (int k = 0; k < 3; ++k) out_.points.push_back(real("a node's coordinate"));
@@ -109,7 +133,8 @@ class Msh41Reader {
       }
     }
     in_.expect("$EndNodes", "the node blocks promised");
-    if (nodes_.size() != nnode) in_.refuse("$Nodes promises %llu nodes, its blocks hold %zu", ull(nnode), nodes_.size());
+    if (nodes_.size() != nnode)
+      in_.refuse("$Nodes promises %llu nodes, its blocks hold %zu", ull(nnode), nodes_.size());
     nodes_.finish(in_);
   }
 
@@ -117,15 +142,18 @@ class Msh41Reader {
     begin("$Elements");
     const int64_t nblock = size("the number of element blocks");
     const uint64_t nelement = in_.count(size("the number of elements"), 2 * size_bytes(), "elements");
-    size("the least element number"), size("the greatest element number");
+    size("the least element number");
+    size("the greatest element number");
     uint64_t done = 0;
     int64_t tags[kMaxElementPoints];
     for (int64_t b = 0; b < nblock; ++b) {
-      const int32_t dimension = number("an element block's dimension"), entity = number("an element block's entity");
+      const int32_t dimension = number("an element block's dimension");
+      const int32_t entity = number("an element block's entity");
       const int32_t type = number("an element block's type");
       const int64_t n = size("an element block's number of elements");
       if (n < 0 || uint64_t(n) > nelement - done)
-        in_.refuse("a block of %lld elements where %llu of the %llu promised are left", ll(n), ull(nelement - done), ull(nelement));
+        in_.refuse("a block of %lld elements where %llu of the %llu promised are left", ll(n),
+                   ull(nelement - done), ull(nelement));
       const uint32_t points = sink_.begin(in_, type);
       in_.count(n, size_bytes() * (1 + points), "elements in a block");
       if (type == kMshTet) out_.expect_tets(size_t(n));
@@ -140,7 +168,8 @@ class Msh41Reader {
       done += uint64_t(n);
     }
     in_.expect("$EndElements", "the element blocks promised");
-    if (done != nelement) in_.refuse("$Elements promises %llu elements, its blocks hold %llu", ull(nelement), ull(done));
+    if (done != nelement)
+      in_.refuse("$Elements promises %llu elements, its blocks hold %llu", ull(nelement), ull(done));
   }
 
   Cursor &in_;

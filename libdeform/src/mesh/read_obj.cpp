@@ -1,5 +1,6 @@
-// OBJ: records of one line each (a backslash continues it): "v x y z", "f 1 2 3" with corners from 1, or from -1 backwards, of which a texture
-// and a normal may follow behind slashes. A triangle's group is what "g" says, else "usemtl", else "o". All other records are passed over.
+// OBJ: records of one line each (a backslash continues it): "v x y z", "f 1 2 3" with corners from 1, or from
+// -1 backwards, of which a texture and a normal may follow behind slashes. A triangle's group is what "g"
+// says, else "usemtl", else "o". All other records are passed over.
 #include "mesh/raw_mesh.h"
 
 namespace dfm {
@@ -19,7 +20,8 @@ class ObjReader {
       else if (word == "usemtl") set(material_, name());
       else if (word == "o") set(object_, name());
       else if (word.empty() || word.front() == '#') continue;
-      else if (!is_known(word)) in_.refuse("expected a record such as v, vn, vt, f or g, found %s", Cursor::quote(word).c_str());
+      else if (!is_known(word))
+        in_.refuse("expected a record such as v, vn, vt, f or g, found %s", Cursor::quote(word).c_str());
       any = true;
     }
     if (!any) in_.refuse("no records; the file holds no mesh");
@@ -28,9 +30,11 @@ class ObjReader {
  private:
   // Every keyword of the format; anything else is not an OBJ file.
   static bool is_known(std::string_view word) {
-    for (const char *k : {"vt", "vn", "vp", "p", "l", "s", "mg", "mtllib", "maplib", "usemap", "cstype", "deg", "bmat", "step", "curv", "curv2", "surf",
-                          "parm", "trim", "hole", "scrv", "sp", "end", "con", "bevel", "c_interp", "d_interp", "lod", "shadow_obj", "trace_obj", "ctech",
-                          "stech", "call", "csh"})
+    for (const char *k :
+         {"vt",     "vn",         "vp",        "p",     "l",     "s",    "mg",    "mtllib",   "maplib",
+          "usemap", "cstype",     "deg",       "bmat",  "step",  "curv", "curv2", "surf",     "parm",
+          "trim",   "hole",       "scrv",      "sp",    "end",   "con",  "bevel", "c_interp", "d_interp",
+          "lod",    "shadow_obj", "trace_obj", "ctech", "stech", "call", "csh"})
       if (word == k) return true;
     return false;
   }
@@ -48,7 +52,8 @@ class ObjReader {
     which = name == "default" || name == "off" || name == "(null)" ? std::string_view() : name;
     const std::string_view current = !group_.empty() ? group_ : !material_.empty() ? material_ : object_;
     if (current == current_) return;
-    current_ = current, stale_ = true;  // a group without faces is none
+    current_ = current;
+    stale_ = true;  // a group without faces is none
   }
 
   void read_point() {
@@ -58,17 +63,25 @@ class ObjReader {
 
   void read_face() {
     corners_.clear();
-    for (std::string_view word = in_.line_word(); !word.empty() && word.front() != '#'; word = in_.line_word()) corners_.push_back(corner(word));
+    for (std::string_view word = in_.line_word(); !word.empty() && word.front() != '#';
+         word = in_.line_word())
+      corners_.push_back(corner(word));
     if (corners_.size() < 3) in_.refuse("a face with %zu corners; expected 3 or more", corners_.size());
-    if (stale_) in_group_ = out_.named_group(in_, 2, current_), stale_ = false;
+    if (stale_) {
+      in_group_ = out_.named_group(in_, 2, current_);
+      stale_ = false;
+    }
     out_.add_polygon(in_, corners_.data(), corners_.size(), in_group_);
   }
 
   uint32_t corner(std::string_view word) {
-    const int64_t n = out_.npoint(), given = in_.to_integer(word.substr(0, word.find('/')), "a face's vertex");
+    const int64_t n = out_.npoint();
+    const int64_t given = in_.to_integer(word.substr(0, word.find('/')), "a face's vertex");
     const int64_t at = given < 0 ? n + given : given - 1;
-    if (given == 0) in_.refuse("a face refers to vertex 0; vertices are counted from 1, or from -1 backwards");
-    if (at < 0 || at >= n) in_.refuse("a face refers to vertex %lld, but only %lld stand before it", ll(given), ll(n));
+    if (given == 0)
+      in_.refuse("a face refers to vertex 0; vertices are counted from 1, or from -1 backwards");
+    if (at < 0 || at >= n)
+      in_.refuse("a face refers to vertex %lld, but only %lld stand before it", ll(given), ll(n));
     return static_cast<uint32_t>(at);
   }
 

@@ -1,5 +1,6 @@
-// OFF: "OFF" (perhaps with ST, C and N before it, which add texture, color and normal to each vertex), the numbers of vertices, faces and
-// edges, vertices, and faces as "n i1 .. in" from 0 with perhaps a color behind. Binary OFF holds the same as big-endian 32-bit numbers.
+// OFF: "OFF" (perhaps with ST, C and N before it, which add texture, color and normal to each vertex), the
+// numbers of vertices, faces and edges, vertices, and faces as "n i1 .. in" from 0 with perhaps a color
+// behind. Binary OFF holds the same as big-endian 32-bit numbers.
 #include <bit>
 
 #include "mesh/raw_mesh.h"
@@ -9,14 +10,18 @@ namespace {
 
 class OffReader {
  public:
-  OffReader(Cursor &in, RawMesh &out) : in_(in), out_(out), corners_(HookAllocator<uint32_t>(*out.memory)) { in.comment = '#'; }
+  OffReader(Cursor &in, RawMesh &out) : in_(in), out_(out), corners_(HookAllocator<uint32_t>(*out.memory)) {
+    in.comment = '#';
+  }
 
   void run() {
     read_keyword();
     const int64_t npoint = number("the number of vertices"), nface = number("the number of faces");
     if (in_.binary) number("the number of edges");
     else in_.line();  // the number of edges, which nobody needs and some leave out
-    const uint32_t n = point_count(in_, in_.binary ? in_.count(npoint, 12, "vertices") : in_.text_count(npoint, 3, "vertices"), "vertices");
+    const uint32_t n = point_count(
+        in_, in_.binary ? in_.count(npoint, 12, "vertices") : in_.text_count(npoint, 3, "vertices"),
+        "vertices");
     out_.points.reserve(3 * size_t(n));
     for (uint32_t i = 0; i < n; ++i) read_point();
     const uint64_t m = in_.binary ? in_.count(nface, 8, "faces") : in_.text_count(nface, 2, "faces");
@@ -28,24 +33,42 @@ class OffReader {
     in_.skip_space();
     const size_t at = in_.offset();
     std::string_view word = in_.word();
-    if (!word.empty() && word.front() >= '0' && word.front() <= '9' && word.find("OFF") == word.npos) return in_.seek(at);  // the keyword may be absent
+    // the keyword may be absent
+    if (!word.empty() && word.front() >= '0' && word.front() <= '9' && word.find("OFF") == word.npos)
+      return in_.seek(at);
     const std::string whole(word.substr(0, 16));
-    if (word.substr(0, 2) == "ST") extra_ += 2, word.remove_prefix(2);
-    if (word.substr(0, 1) == "C") extra_ += 4, word.remove_prefix(1);
-    if (word.substr(0, 1) == "N") extra_ += 3, word.remove_prefix(1);
+    if (word.substr(0, 2) == "ST") {
+      extra_ += 2;
+      word.remove_prefix(2);
+    }
+    if (word.substr(0, 1) == "C") {
+      extra_ += 4;
+      word.remove_prefix(1);
+    }
+    if (word.substr(0, 1) == "N") {
+      extra_ += 3;
+      word.remove_prefix(1);
+    }
     if (word == "4OFF" || word == "nOFF" || word == "4nOFF")
-      in_.unsupported("%s has points of other than three coordinates; expected OFF", Cursor::quote(whole).c_str());
-    if (word != "OFF") in_.seek(at), in_.refuse("expected OFF (or COFF, NOFF, STOFF) at the start, found %s", Cursor::quote(whole).c_str());
+      in_.unsupported("%s has points of other than three coordinates; expected OFF",
+                      Cursor::quote(whole).c_str());
+    if (word != "OFF") {
+      in_.seek(at);
+      in_.refuse("expected OFF (or COFF, NOFF, STOFF) at the start, found %s", Cursor::quote(whole).c_str());
+    }
     const size_t behind = in_.offset();
     if (in_.line_word() != "BINARY") return in_.seek(behind);
     in_.end_line("BINARY");
-    in_.binary = true, in_.swap = std::endian::native == std::endian::little;
+    in_.binary = true;
+    in_.swap = std::endian::native == std::endian::little;
   }
 
   int64_t number(const char *what) { return in_.binary ? in_.value<int32_t>(what) : in_.integer(what); }
 
   void read_point() {
-    for (int k = 0; k < 3; ++k) out_.points.push_back(in_.binary ? in_.binary_real<float>("a vertex's coordinate") : in_.real("a vertex's coordinate"));
+    for (int k = 0; k < 3; ++k)
+      out_.points.push_back(in_.binary ? in_.binary_real<float>("a vertex's coordinate")
+                                       : in_.real("a vertex's coordinate"));
     if (in_.binary) in_.skip(4 * extra_, "a vertex's color or normal");
     else in_.line();
   }
@@ -57,11 +80,14 @@ class OffReader {
     corners_.clear();
     for (int64_t k = 0; k < n; ++k) {
       const int64_t p = number("a face's vertex");
-      if (p < 0 || p >= int64_t(out_.npoint())) in_.refuse("face %llu refers to vertex %lld; the file has vertices 0 to %lld", ull(face), ll(p), ll(out_.npoint()) - 1);
+      if (p < 0 || p >= int64_t(out_.npoint()))
+        in_.refuse("face %llu refers to vertex %lld; the file has vertices 0 to %lld", ull(face), ll(p),
+                   ll(out_.npoint()) - 1);
       corners_.push_back(static_cast<uint32_t>(p));
     }
     out_.add_polygon(in_, corners_.data(), corners_.size(), kNoGroup);
-    if (in_.binary) in_.skip(4 * in_.count(number("a face's number of colors"), 4, "colors of a face"), "a face's color");
+    if (in_.binary)
+      in_.skip(4 * in_.count(number("a face's number of colors"), 4, "colors of a face"), "a face's color");
     else in_.line();
   }
 

@@ -1,5 +1,6 @@
-// PLY: a text head that declares elements and their properties, then the elements one after another as text or as binary of either byte order.
-// Of the vertices x y z are kept, of the faces the list of corners and a whole-number property that numbers groups; all else is passed over.
+// PLY: a text head that declares elements and their properties, then the elements one after another as text
+// or as binary of either byte order. Of the vertices x y z are kept, of the faces the list of corners and a
+// whole-number property that numbers groups; all else is passed over.
 #include <bit>
 
 #include "mesh/raw_mesh.h"
@@ -21,9 +22,13 @@ struct Element {
 
 size_t bytes_of(PlyNumber type) {
   switch (type) {
-    case PlyNumber::i8: case PlyNumber::u8: return 1;
-    case PlyNumber::i16: case PlyNumber::u16: return 2;
-    case PlyNumber::i32: case PlyNumber::u32: case PlyNumber::f32: return 4;
+    case PlyNumber::i8:
+    case PlyNumber::u8: return 1;
+    case PlyNumber::i16:
+    case PlyNumber::u16: return 2;
+    case PlyNumber::i32:
+    case PlyNumber::u32:
+    case PlyNumber::f32: return 4;
     case PlyNumber::f64: return 8;
     case PlyNumber::none: break;
   }
@@ -43,13 +48,16 @@ class PlyReader {
  private:
   PlyNumber number_type(std::string_view name) const {
     static const std::pair<std::string_view, PlyNumber> known[] = {
-        {"char", PlyNumber::i8}, {"uchar", PlyNumber::u8}, {"short", PlyNumber::i16}, {"ushort", PlyNumber::u16}, {"int", PlyNumber::i32},
-        {"uint", PlyNumber::u32}, {"float", PlyNumber::f32}, {"double", PlyNumber::f64}, {"int8", PlyNumber::i8}, {"uint8", PlyNumber::u8},
-        {"int16", PlyNumber::i16}, {"uint16", PlyNumber::u16}, {"int32", PlyNumber::i32}, {"uint32", PlyNumber::u32}, {"float32", PlyNumber::f32},
+        {"char", PlyNumber::i8},    {"uchar", PlyNumber::u8},   {"short", PlyNumber::i16},
+        {"ushort", PlyNumber::u16}, {"int", PlyNumber::i32},    {"uint", PlyNumber::u32},
+        {"float", PlyNumber::f32},  {"double", PlyNumber::f64}, {"int8", PlyNumber::i8},
+        {"uint8", PlyNumber::u8},   {"int16", PlyNumber::i16},  {"uint16", PlyNumber::u16},
+        {"int32", PlyNumber::i32},  {"uint32", PlyNumber::u32}, {"float32", PlyNumber::f32},
         {"float64", PlyNumber::f64}};
     for (const auto &[text, type] : known)
       if (text == name) return type;
-    in_.refuse("expected a number type (float, double, int, uchar ...), found %s", Cursor::quote(name.empty() ? " " : name).c_str());
+    in_.refuse("expected a number type (float, double, int, uchar ...), found %s",
+               Cursor::quote(name.empty() ? " " : name).c_str());
   }
 
   void read_head() {
@@ -60,11 +68,14 @@ class PlyReader {
       if (in_.left() == 0) in_.refuse("end_header is missing: the file is truncated");
       const std::string_view word = in_.line_word();
       if (word == "end_header") break;
-      if (word == "format") format = true, binary = read_format();
-      else if (word == "element") read_element_head();
+      if (word == "format") {
+        format = true;
+        binary = read_format();
+      } else if (word == "element") read_element_head();
       else if (word == "property") read_property();
       else if (!word.empty() && word != "comment" && word != "obj_info")
-        in_.refuse("expected format, comment, element, property or end_header, found %s", Cursor::quote(word).c_str());
+        in_.refuse("expected format, comment, element, property or end_header, found %s",
+                   Cursor::quote(word).c_str());
       in_.line();
     }
     if (!format) in_.refuse("the head has no format line");
@@ -76,8 +87,10 @@ class PlyReader {
     const std::string_view form = in_.line_word();
     const bool little = form == "binary_little_endian", big = form == "binary_big_endian";
     if (!little && !big && form != "ascii")
-      in_.refuse("format %s; expected ascii, binary_little_endian or binary_big_endian", Cursor::quote(form.empty() ? " " : form).c_str());
-    in_.swap = little ? std::endian::native != std::endian::little : std::endian::native == std::endian::little;
+      in_.refuse("format %s; expected ascii, binary_little_endian or binary_big_endian",
+                 Cursor::quote(form.empty() ? " " : form).c_str());
+    in_.swap =
+        little ? std::endian::native != std::endian::little : std::endian::native == std::endian::little;
     return little || big;
   }
 
@@ -97,9 +110,12 @@ class PlyReader {
     Property p{{}, PlyNumber::none};
     if (first == "list") {
       p.count = number_type(in_.line_word());
-      if (p.count == PlyNumber::f32 || p.count == PlyNumber::f64) in_.refuse("a list counted by floating-point numbers");
+      if (p.count == PlyNumber::f32 || p.count == PlyNumber::f64)
+        in_.refuse("a list counted by floating-point numbers");
       p.type = number_type(in_.line_word());
-    } else p.type = number_type(first);
+    } else {
+      p.type = number_type(first);
+    }
     p.name = in_.line_word();
     elements_.back().properties.push_back(p);
   }
@@ -127,23 +143,29 @@ class PlyReader {
 
   uint64_t list_length(const Property &p) {
     const int64_t n = whole(p.count, "the length of a list");
-    return in_.binary ? in_.count(n, bytes_of(p.type), "values in a list") : in_.text_count(n, 1, "values in a list");
+    return in_.binary ? in_.count(n, bytes_of(p.type), "values in a list")
+                      : in_.text_count(n, 1, "values in a list");
   }
 
   void pass_over(const Property &p) {
     const uint64_t n = p.count == PlyNumber::none ? 1 : list_length(p);
     if (in_.binary) return in_.skip(n * bytes_of(p.type), "a property");
     for (uint64_t i = 0; i < n; ++i)
-      if (in_.word().empty()) in_.refuse("the file ends inside property %s", Cursor::quote(p.name.empty() ? " " : p.name).c_str());
+      if (in_.word().empty())
+        in_.refuse("the file ends inside property %s", Cursor::quote(p.name.empty() ? " " : p.name).c_str());
   }
 
   void read_element(const Element &e) {
     if (e.properties.empty()) return;  // takes no bytes
-    if (e.name == "tristrips" && e.number > 0) in_.unsupported("triangle strips; save the surface with faces (for instance meshlab, or meshio convert FILE OUT.obj)");
+    if (e.name == "tristrips" && e.number > 0)
+      in_.unsupported(
+          "triangle strips; save the surface with faces (for instance meshlab, or meshio convert FILE "
+          "OUT.obj)");
     size_t least = 0;
     for (const Property &p : e.properties) least += bytes_of(p.count != PlyNumber::none ? p.count : p.type);
     const std::string name = "elements " + Cursor::quote(e.name);
-    const uint64_t n = in_.binary ? in_.count(e.number, least, name.c_str()) : in_.text_count(e.number, e.properties.size(), name.c_str());
+    const uint64_t n = in_.binary ? in_.count(e.number, least, name.c_str())
+                                  : in_.text_count(e.number, e.properties.size(), name.c_str());
     if (e.name == "vertex") read_points(e, n);
     else if (e.name == "face") read_faces(e, n);
     else
@@ -155,7 +177,9 @@ class PlyReader {
     int axis_of[3] = {-1, -1, -1};
     for (size_t k = 0; k < e.properties.size(); ++k)
       for (int c = 0; c < 3; ++c)
-        if (e.properties[k].name == std::string_view("xyz").substr(size_t(c), 1) && e.properties[k].count == PlyNumber::none) axis_of[c] = int(k);
+        if (e.properties[k].name == std::string_view("xyz").substr(size_t(c), 1) &&
+            e.properties[k].count == PlyNumber::none)
+          axis_of[c] = int(k);
     for (int c = 0; c < 3; ++c)
       if (axis_of[c] < 0) in_.refuse("vertices have no property %c", "xyz"[c]);
     out_.points.reserve(3 * n);
@@ -175,7 +199,9 @@ class PlyReader {
     for (const Property &p : e.properties) {
       const bool is_list = p.count != PlyNumber::none;
       if (is_list && (p.name == "vertex_indices" || p.name == "vertex_index")) list = &p;
-      if (!is_list && is_whole(p.type) && !label && (p.name == "group" || p.name == "material_index" || p.name == "material")) label = &p;
+      if (!is_list && is_whole(p.type) && !label &&
+          (p.name == "group" || p.name == "material_index" || p.name == "material"))
+        label = &p;
     }
     if (!list) in_.refuse("faces have no list vertex_indices");
     if (!is_whole(list->type)) in_.refuse("vertex_indices are not whole numbers");
@@ -186,7 +212,9 @@ class PlyReader {
         else if (&p == label) number = whole(p.type, "a face's group");
         else pass_over(p);
       }
-      const uint32_t group = number < INT32_MIN || number > INT32_MAX ? kNoGroup : out_.group(in_, 2, static_cast<int32_t>(number));
+      const uint32_t group = number < INT32_MIN || number > INT32_MAX
+                                 ? kNoGroup
+                                 : out_.group(in_, 2, static_cast<int32_t>(number));
       out_.add_polygon(in_, corners_.data(), corners_.size(), group);
     }
   }
@@ -197,7 +225,9 @@ class PlyReader {
     corners_.clear();
     for (uint64_t i = 0; i < k; ++i) {
       const int64_t v = whole(p.type, "a face's vertex");
-      if (v < 0 || v >= int64_t(npoint_)) in_.refuse("face %llu refers to vertex %lld; the file has vertices 0 to %lld", ull(face), ll(v), ll(npoint_) - 1);
+      if (v < 0 || v >= int64_t(npoint_))
+        in_.refuse("face %llu refers to vertex %lld; the file has vertices 0 to %lld", ull(face), ll(v),
+                   ll(npoint_) - 1);
       corners_.push_back(static_cast<uint32_t>(v));
     }
   }

@@ -1,5 +1,7 @@
-// STL, ASCII ("solid", facets of three vertices, "endsolid"; several solids, any case) and binary (80 bytes of anything, the number of triangles,
-// 50 bytes each). Corners are points of their own; finish_surface joins them. A binary file may begin with "solid" too, so its size decides.
+// STL, ASCII ("solid", facets of three vertices, "endsolid"; several solids, any case) and binary (80 bytes
+// of anything, the number of triangles,
+// 50 bytes each). Corners are points of their own; finish_surface joins them. A binary file may begin with
+//    "solid" too, so its size decides.
 #include <bit>
 
 #include "mesh/raw_mesh.h"
@@ -18,15 +20,24 @@ class StlReader {
     const bool solid = Cursor::is_word(Cursor(in_).word(), "solid");
     const bool room = size >= kHead;
     if (room) in_.skip(kHead - 4, "the head");
-    in_.binary = room, in_.swap = std::endian::native == std::endian::big;
+    in_.binary = room;
+    in_.swap = std::endian::native == std::endian::big;
     const uint64_t n = room ? in_.value<uint32_t>("the number of triangles") : 0;
     const uint64_t wanted = kHead + kEach * n;
     if (room && (wanted == size || (!solid && wanted < size && size - wanted < kEach))) return read_binary(n);
-    in_.seek(0), in_.binary = false;
+    in_.seek(0);
+    in_.binary = false;
     if (solid) return read_text();
-    if (!room) in_.refuse("%zu bytes that do not begin with 'solid'; expected an ASCII STL, or a binary one of at least %zu bytes", size, kHead);
+    if (!room)
+      in_.refuse(
+          "%zu bytes that do not begin with 'solid'; expected an ASCII STL, or a binary one of at least %zu "
+          "bytes",
+          size, kHead);
     in_.binary = true;
-    in_.refuse("a binary STL of %zu bytes promises %llu triangles, which take %llu: the file is truncated or its count is wrong", size, ull(n), ull(wanted));
+    in_.refuse(
+        "a binary STL of %zu bytes promises %llu triangles, which take %llu: the file is truncated or its "
+        "count is wrong",
+        size, ull(n), ull(wanted));
   }
 
  private:
@@ -39,7 +50,9 @@ class StlReader {
   }
 
   void read_binary(uint64_t n) {
-    out_.points.reserve(9 * n), out_.tris.reserve(3 * n), out_.tri_group.reserve(n);
+    out_.points.reserve(9 * n);
+    out_.tris.reserve(3 * n);
+    out_.tri_group.reserve(n);
     for (uint64_t t = 0; t < n; ++t) {
       in_.skip(12, "a triangle's normal");  // the corners tell it
       double x[3];
@@ -54,12 +67,14 @@ class StlReader {
 
   void keyword(const char *wanted, const char *after) {
     const std::string_view word = in_.word();
-    if (!Cursor::is_word(word, wanted)) in_.refuse("expected '%s' after %s, found %s", wanted, after, Cursor::quote(word).c_str());
+    if (!Cursor::is_word(word, wanted))
+      in_.refuse("expected '%s' after %s, found %s", wanted, after, Cursor::quote(word).c_str());
   }
 
   void read_text() {
     for (std::string_view word = in_.word(); !word.empty(); word = in_.word()) {
-      if (!Cursor::is_word(word, "solid")) in_.refuse("expected 'solid' or the end of the file, found %s", Cursor::quote(word).c_str());
+      if (!Cursor::is_word(word, "solid"))
+        in_.refuse("expected 'solid' or the end of the file, found %s", Cursor::quote(word).c_str());
       read_solid();
     }
   }
@@ -72,16 +87,22 @@ class StlReader {
     for (;;) {
       const std::string_view word = in_.word();
       if (Cursor::is_word(word, "endsolid")) break;
-      if (!Cursor::is_word(word, "facet")) in_.refuse("expected 'facet' or 'endsolid', found %s", Cursor::quote(word).c_str());
-      if (fresh) group_ = out_.named_group(in_, 2, name), fresh = false;
+      if (!Cursor::is_word(word, "facet"))
+        in_.refuse("expected 'facet' or 'endsolid', found %s", Cursor::quote(word).c_str());
+      if (fresh) {
+        group_ = out_.named_group(in_, 2, name);
+        fresh = false;
+      }
       in_.line();  // the normal: the corners tell it, and some files have none to tell
-      keyword("outer", "a facet's normal"), keyword("loop", "'outer'");
+      keyword("outer", "a facet's normal");
+      keyword("loop", "'outer'");
       for (int k = 0; k < 3; ++k) {
         keyword("vertex", "'outer loop' or another vertex");
         const double x = in_.real("a corner's coordinate"), y = in_.real("a corner's coordinate");
         corner(x, y, in_.real("a corner's coordinate"));
       }
-      keyword("endloop", "three vertices"), keyword("endfacet", "'endloop'");
+      keyword("endloop", "three vertices");
+      keyword("endfacet", "'endloop'");
       triangle();
     }
     in_.line();  // the name again

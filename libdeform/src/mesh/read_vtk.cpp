@@ -1,6 +1,7 @@
-// Legacy VTK files 2.0 to 5.1, UNSTRUCTURED_GRID and POLYDATA, ASCII and binary (always big-endian). A line of header, a title, ASCII or
-// BINARY, then sections by keyword. Cells come as "k i1 .. ik" rows (to 4.x) or, from 5.0 on, as OFFSETS and CONNECTIVITY arrays. Of the
-// attributes behind them only an array that numbers groups and one of shares are kept.
+// Legacy VTK files 2.0 to 5.1, UNSTRUCTURED_GRID and POLYDATA, ASCII and binary (always big-endian). A line
+// of header, a title, ASCII or BINARY, then sections by keyword. Cells come as "k i1 .. ik" rows (to 4.x) or,
+// from 5.0 on, as OFFSETS and CONNECTIVITY arrays. Of the attributes behind them only an array that numbers
+// groups and one of shares are kept.
 #include <algorithm>
 #include <bit>
 #include <cctype>
@@ -12,48 +13,74 @@ namespace {
 
 using Number = VtkNumber;
 
-// VTK writes vtkIdType as int; long is that of the machine that wrote the file, 8 bytes on all that count today.
+// VTK writes vtkIdType as int; long is that of the machine that wrote the file, 8 bytes on all
+// that count today.
 Number number_type(const Cursor &in, std::string_view name) {
   static const std::pair<const char *, Number> known[] = {
-      {"float", Number::f32}, {"double", Number::f64}, {"int", Number::i32}, {"unsigned_int", Number::u32}, {"long", Number::i64},
-      {"unsigned_long", Number::u64}, {"vtktypeint64", Number::i64}, {"vtktypeuint64", Number::u64}, {"vtktypeint32", Number::i32},
-      {"vtkidtype", Number::i32}, {"short", Number::i16}, {"unsigned_short", Number::u16}, {"char", Number::i8},
-      {"signed_char", Number::i8}, {"unsigned_char", Number::u8}, {"string", Number::text}, {"bit", Number::bit}};
+      {"float", Number::f32},        {"double", Number::f64},
+      {"int", Number::i32},          {"unsigned_int", Number::u32},
+      {"long", Number::i64},         {"unsigned_long", Number::u64},
+      {"vtktypeint64", Number::i64}, {"vtktypeuint64", Number::u64},
+      {"vtktypeint32", Number::i32}, {"vtkidtype", Number::i32},
+      {"short", Number::i16},        {"unsigned_short", Number::u16},
+      {"char", Number::i8},          {"signed_char", Number::i8},
+      {"unsigned_char", Number::u8}, {"string", Number::text},
+      {"bit", Number::bit}};
   const std::string wanted = vtk_lower(name);
   for (const auto &[text, type] : known)
     if (wanted == text) return type;
-  in.refuse("expected a number type (float, double, int, long, vtktypeint64 ...), found %s", Cursor::quote(name).c_str());
+  in.refuse("expected a number type (float, double, int, long, vtktypeint64 ...), found %s",
+            Cursor::quote(name).c_str());
 }
 
 class VtkReader {
  public:
   VtkReader(Cursor &in, RawMesh &out)
-      : in_(in), out_(out), sink_(out), cells_(HookAllocator<uint32_t>(*out.memory)), start_(HookAllocator<uint32_t>(*out.memory)),
-        types_(HookAllocator<uint8_t>(*out.memory)), labels_(HookAllocator<int32_t>(*out.memory)), shares_(HookAllocator<double>(*out.memory)) {}
+      : in_(in),
+        out_(out),
+        sink_(out),
+        cells_(HookAllocator<uint32_t>(*out.memory)),
+        start_(HookAllocator<uint32_t>(*out.memory)),
+        types_(HookAllocator<uint8_t>(*out.memory)),
+        labels_(HookAllocator<int32_t>(*out.memory)),
+        shares_(HookAllocator<double>(*out.memory)) {}
 
   void run() {
     header();
     bool points = false, types = false, any = false;
     for (;;) {
       const std::string keyword = vtk_lower(in_.word());
-      if (keyword == "points") once(points, "POINTS"), read_points();
-      else if (const uint8_t face = face_type(keyword); face && polydata_) cells_after(points, any, keyword), read_cells(face);
-      else if (keyword == "cells" && !polydata_) {
+      if (keyword == "points") {
+        once(points, "POINTS");
+        read_points();
+      } else if (const uint8_t face = face_type(keyword); face && polydata_) {
+        cells_after(points, any, keyword);
+        read_cells(face);
+      } else if (keyword == "cells" && !polydata_) {
         if (any) in_.refuse("a second CELLS section; one mesh per file is read");
-        cells_after(points, any, keyword), read_cells(0);
+        cells_after(points, any, keyword);
+        read_cells(0);
       } else if (keyword == "cell_types" && !polydata_) {
         if (!any) in_.refuse("CELL_TYPES before CELLS; expected CELLS first");
-        once(types, "CELL_TYPES"), read_types();
-      } else if (keyword == "field") read_field(nullptr);
-      else if (keyword == "metadata") skip_metadata();
-      else if (keyword == "point_data" || keyword == "cell_data") {
+        once(types, "CELL_TYPES");
+        read_types();
+      } else if (keyword == "field") {
+        read_field(nullptr);
+      } else if (keyword == "metadata") {
+        skip_metadata();
+      } else if (keyword == "point_data" || keyword == "cell_data") {
         read_attributes(keyword == "cell_data");
         break;
       } else if (keyword.empty()) break;
-      else in_.refuse("unknown keyword %s; expected POINTS, %s, FIELD, METADATA, POINT_DATA or CELL_DATA", Cursor::quote(keyword).c_str(),
-          polydata_ ? "VERTICES, LINES, POLYGONS, TRIANGLE_STRIPS" : "CELLS, CELL_TYPES");
+      else
+        in_.refuse("unknown keyword %s; expected POINTS, %s, FIELD, METADATA, POINT_DATA or CELL_DATA",
+                   Cursor::quote(keyword).c_str(),
+                   polydata_ ? "VERTICES, LINES, POLYGONS, TRIANGLE_STRIPS" : "CELLS, CELL_TYPES");
     }
-    const char *const missing = !points ? "POINTS" : !any ? (polydata_ ? "POLYGONS" : "CELLS") : !types && !polydata_ ? "CELL_TYPES" : nullptr;
+    const char *const missing = !points                ? "POINTS"
+                                : !any                 ? (polydata_ ? "POLYGONS" : "CELLS")
+                                : !types && !polydata_ ? "CELL_TYPES"
+                                                       : nullptr;
     if (missing) in_.refuse("no %s section; the file is truncated or holds no mesh", missing);
     collect();
   }
@@ -61,7 +88,11 @@ class VtkReader {
  private:
   // The cell type that a section of POLYDATA holds; 0: no such section.
   static uint8_t face_type(const std::string &keyword) {
-    return keyword == "vertices" ? 2 : keyword == "lines" ? 4 : keyword == "polygons" ? 7 : keyword == "triangle_strips" ? 6 : 0;
+    return keyword == "vertices"          ? 2
+           : keyword == "lines"           ? 4
+           : keyword == "polygons"        ? 7
+           : keyword == "triangle_strips" ? 6
+                                          : 0;
   }
   void cells_after(bool points, bool &any, const std::string &keyword) {
     std::string name = keyword;
@@ -77,23 +108,30 @@ class VtkReader {
   void header() {
     const std::string_view first = in_.line();
     constexpr std::string_view kMark = "# vtk DataFile Version ";
-    if (first.substr(0, kMark.size()) != kMark)
-      in_.seek(0), in_.refuse("expected '# vtk DataFile Version x.y' in the first line, found %s",
-          Cursor::quote(first.empty() ? " " : first).c_str());
+    if (first.substr(0, kMark.size()) != kMark) {
+      in_.seek(0);
+      in_.refuse("expected '# vtk DataFile Version x.y' in the first line, found %s",
+                 Cursor::quote(first.empty() ? " " : first).c_str());
+    }
     double version = 0;
     const std::string_view number = first.substr(kMark.size());
     std::from_chars(number.data(), number.data() + number.size(), version);
-    if (!(version >= 2.0 && version < 5.15))
-      in_.seek(0), in_.unsupported("legacy VTK version %s; 2.0 to 5.1 are read", Cursor::quote(number.empty() ? " " : number).c_str());
+    if (!(version >= 2.0 && version < 5.15)) {
+      in_.seek(0);
+      in_.unsupported("legacy VTK version %s; 2.0 to 5.1 are read",
+                      Cursor::quote(number.empty() ? " " : number).c_str());
+    }
     in_.line();  // title
     const std::string_view form = in_.word();
     const std::string kind = vtk_lower(form);
-    if (kind != "ascii" && kind != "binary") in_.refuse("expected ASCII or BINARY, found %s", Cursor::quote(form).c_str());
+    if (kind != "ascii" && kind != "binary")
+      in_.refuse("expected ASCII or BINARY, found %s", Cursor::quote(form).c_str());
     in_.expect("DATASET", "ASCII or BINARY");
     const std::string_view dataset = in_.word();
     polydata_ = vtk_lower(dataset) == "polydata";
     if (!polydata_ && vtk_lower(dataset) != "unstructured_grid")
-      in_.unsupported("DATASET %s has no tetrahedra and no triangles; expected UNSTRUCTURED_GRID or POLYDATA", Cursor::quote(dataset).c_str());
+      in_.unsupported("DATASET %s has no tetrahedra and no triangles; expected UNSTRUCTURED_GRID or POLYDATA",
+                      Cursor::quote(dataset).c_str());
     in_.binary = kind == "binary";
     in_.swap = std::endian::native == std::endian::little;
   }
@@ -104,7 +142,8 @@ class VtkReader {
   // Bytes that one number takes at least in this file.
   size_t least(Number type) const { return in_.binary ? vtk_bytes(type) : 2; }
   uint64_t count(int64_t claimed, size_t numbers_each, Number type, const char *what) const {
-    return in_.binary ? in_.count(claimed, numbers_each * least(type), what) : in_.text_count(claimed, numbers_each, what);
+    return in_.binary ? in_.count(claimed, numbers_each * least(type), what)
+                      : in_.text_count(claimed, numbers_each, what);
   }
   uint32_t small_count(uint64_t n, const char *what) const {
     if (n >= UINT32_MAX) in_.unsupported("%llu %s; up to %u are read", ull(n), what, UINT32_MAX - 1);
@@ -115,13 +154,15 @@ class VtkReader {
   }
   Number real_type(std::string_view name) {
     const Number type = number_type(in_, name);
-    if (vtk_bytes(type) == 0) in_.refuse("POINTS of type %s; expected float or double", Cursor::quote(name).c_str());
+    if (vtk_bytes(type) == 0)
+      in_.refuse("POINTS of type %s; expected float or double", Cursor::quote(name).c_str());
     return type;
   }
   Number integer_type(std::string_view name) {
     const Number type = number_type(in_, name);
     if (!vtk_whole(type))
-      in_.refuse("cells of type %s; expected a whole-number type such as vtktypeint64", Cursor::quote(name).c_str());
+      in_.refuse("cells of type %s; expected a whole-number type such as vtktypeint64",
+                 Cursor::quote(name).c_str());
     return type;
   }
 
@@ -152,29 +193,36 @@ class VtkReader {
   }
 
   void read_rows() {
-    const int64_t first = in_.integer("the number of cells"), second = in_.integer("the size of the cell list");
+    const int64_t first = in_.integer("the number of cells");
+    const int64_t second = in_.integer("the size of the cell list");
     const size_t at = in_.offset();
-    if (in_.binary) in_.end_line("CELLS");  // OFFSETS is text on a line of its own; old cell rows would be bytes here
+    // OFFSETS is text on a line of its own; old cell rows would be bytes here
+    if (in_.binary) in_.end_line("CELLS");
     const bool arrays = vtk_lower(in_.word()) == "offsets";
     if (arrays) return read_cell_arrays(first, second);
     in_.seek(at);
     begin_data("CELLS");
     const uint64_t size = count(second, 1, Number::i32, "numbers in the cell list");
-    if (first < 0 || uint64_t(first) > size) in_.refuse("CELLS promises %lld cells in a list of %lld numbers", ll(first), ll(second));
+    if (first < 0 || uint64_t(first) > size)
+      in_.refuse("CELLS promises %lld cells in a list of %lld numbers", ll(first), ll(second));
     const uint32_t ncell = small_count(uint64_t(first), "cells");
     small_count(size, "numbers in the cell list");
     small_count(cells_.size() + size, "numbers in the cell lists");
-    start_.reserve(start_.size() + ncell + 1), cells_.reserve(cells_.size() + (size - ncell));
+    start_.reserve(start_.size() + ncell + 1);
+    cells_.reserve(cells_.size() + (size - ncell));
     uint64_t used = 0;
     for (uint32_t c = 0; c < ncell; ++c) {
       const int64_t k = integer(Number::i32, "a cell's number of points");
       if (k < 0 || used + 1 + uint64_t(k) > size)
-        in_.refuse("cell %u has %lld points; the list of %lld numbers that CELLS promises has no room for it", c, ll(k), ll(second));
+        in_.refuse("cell %u has %lld points; the list of %lld numbers that CELLS promises has no room for it",
+                   c, ll(k), ll(second));
       used += 1 + uint64_t(k);
       start_.push_back(uint32_t(cells_.size()));
       for (int64_t i = 0; i < k; ++i) cells_.push_back(corner(Number::i32));
     }
-    if (used != size) in_.refuse("CELLS promises a list of %lld numbers, but its %u cells use %llu", ll(second), ncell, ull(used));
+    if (used != size)
+      in_.refuse("CELLS promises a list of %lld numbers, but its %u cells use %llu", ll(second), ncell,
+                 ull(used));
     start_.push_back(uint32_t(cells_.size()));
   }
 
@@ -188,17 +236,21 @@ class VtkReader {
     for (uint32_t i = 0; i < n; ++i) {
       const int64_t v = integer(offset_type, "a cell offset");
       if (v < last || v > nconnectivity || (i == 0 && v != 0))
-        in_.refuse("cell offset %lld; offsets start at 0 and rise to the %lld numbers of CONNECTIVITY", ll(v), ll(nconnectivity));
+        in_.refuse("cell offset %lld; offsets start at 0 and rise to the %lld numbers of CONNECTIVITY", ll(v),
+                   ll(nconnectivity));
       start_.push_back(small_count(base + uint64_t(v), "numbers in the cell lists"));
       last = v;
     }
-    if (last != nconnectivity) in_.refuse("the last cell offset must equal the %lld numbers of CONNECTIVITY", ll(nconnectivity));
+    if (last != nconnectivity)
+      in_.refuse("the last cell offset must equal the %lld numbers of CONNECTIVITY", ll(nconnectivity));
     if (n == 0) start_.push_back(small_count(base, "numbers in the cell lists"));
     const std::string_view word = in_.word();
-    if (vtk_lower(word) != "connectivity") in_.refuse("expected CONNECTIVITY after OFFSETS, found %s", Cursor::quote(word).c_str());
+    if (vtk_lower(word) != "connectivity")
+      in_.refuse("expected CONNECTIVITY after OFFSETS, found %s", Cursor::quote(word).c_str());
     const Number type = integer_type(in_.word());
     begin_data("CONNECTIVITY");
-    const uint32_t m = small_count(count(nconnectivity, 1, type, "numbers in CONNECTIVITY"), "numbers in CONNECTIVITY");
+    const uint32_t m =
+        small_count(count(nconnectivity, 1, type, "numbers in CONNECTIVITY"), "numbers in CONNECTIVITY");
     cells_.reserve(base + m);
     for (uint32_t i = 0; i < m; ++i) cells_.push_back(corner(type));
   }
@@ -212,7 +264,8 @@ class VtkReader {
     types_.reserve(count(claimed, 1, Number::i32, "cell types"));
     for (size_t c = 0; c < ncell; ++c) {
       const int64_t type = integer(Number::i32, "a cell type");
-      if (type < 0 || type > 255) in_.refuse("cell type %lld; expected 0 to 82 (10 is a tetrahedron)", ll(type));
+      if (type < 0 || type > 255)
+        in_.refuse("cell type %lld; expected 0 to 82 (10 is a tetrahedron)", ll(type));
       types_.push_back(static_cast<uint8_t>(type));
     }
   }
@@ -222,32 +275,42 @@ class VtkReader {
     out_.expect_tets(size_t(ntet));
     if (labels_.size() != types_.size()) labels_.clear();
     for (size_t c = 0; c < types_.size(); ++c)
-      sink_.add(in_, types_[c], cells_.data() + start_[c], start_[c + 1] - start_[c], labels_.empty() ? 0 : labels_[c]);
+      sink_.add(in_, types_[c], cells_.data() + start_[c], start_[c + 1] - start_[c],
+                labels_.empty() ? 0 : labels_[c]);
     for (size_t c = 0; shares_.size() == types_.size() && c < types_.size(); ++c)
       if (types_[c] == 10) out_.tet_share.push_back(shares_[c]);
     sink_.finish(in_);
     sink_.name_groups(group_numbers_, group_names_);
   }
 
-  // "name type [components]", "LOOKUP_TABLE name", or "name components tuples type" in a FIELD; then the values. Attributes are passed over but
-  // for those over the cells that number groups and hold shares. What comes behind an unknown keyword is left unread.
+  // "name type [components]", "LOOKUP_TABLE name", or "name components tuples type" in a FIELD; then the
+  // values. Attributes are passed over but for those over the cells that number groups and hold shares. What
+  // comes behind an unknown keyword is left unread.
   void read_attributes(bool of_cells) {
     int64_t n = in_.integer("the number of tuples");
     for (;;) {
       const std::string keyword = vtk_lower(in_.word());
-      if (keyword == "point_data" || keyword == "cell_data") of_cells = keyword == "cell_data", n = in_.integer("the number of tuples");
-      else if (keyword == "field") read_field(of_cells ? &n : nullptr);
-      else if (keyword == "metadata") skip_metadata();
-      else if (keyword == "scalars") read_scalars(of_cells, n);
-      else if (keyword == "color_scalars" || keyword == "lookup_table") {
+      if (keyword == "point_data" || keyword == "cell_data") {
+        of_cells = keyword == "cell_data";
+        n = in_.integer("the number of tuples");
+      } else if (keyword == "field") {
+        read_field(of_cells ? &n : nullptr);
+      } else if (keyword == "metadata") {
+        skip_metadata();
+      } else if (keyword == "scalars") {
+        read_scalars(of_cells, n);
+      } else if (keyword == "color_scalars" || keyword == "lookup_table") {
         in_.word();
         const int64_t k = in_.integer("a number of colors");
-        skip_values(in_.binary ? Number::u8 : Number::f32, keyword == "lookup_table" ? product(4, k) : product(k, n));
+        skip_values(in_.binary ? Number::u8 : Number::f32,
+                    keyword == "lookup_table" ? product(4, k) : product(k, n));
       } else if (const int64_t width = attribute_width(keyword)) {
         in_.word();
         const int64_t components = width < 0 ? in_.integer("a number of components") : width;
         skip_values(number_type(in_, in_.word()), product(components, n));
-      } else return;
+      } else {
+        return;
+      }
     }
   }
 
@@ -260,7 +323,8 @@ class VtkReader {
   }
 
   int64_t product(int64_t a, int64_t b) const {
-    if (a < 0 || b < 0 || (a && b > INT64_MAX / a)) in_.refuse("an array of %lld x %lld values", ll(a), ll(b));
+    if (a < 0 || b < 0 || (a && b > INT64_MAX / a))
+      in_.refuse("an array of %lld x %lld values", ll(a), ll(b));
     return a * b;
   }
 
@@ -283,7 +347,8 @@ class VtkReader {
       for (uint64_t i = 0; i < m; ++i) shares_.push_back(real(type, "a cell's share"));
       return;
     }
-    if (!candidate || !vtk_whole(type) || !labels_.empty() || !vtk_names_groups(name)) return skip_values(type, n);
+    if (!candidate || !vtk_whole(type) || !labels_.empty() || !vtk_names_groups(name))
+      return skip_values(type, n);
     begin_data("an array's type");
     const uint64_t m = count(n, 1, type, "numbers of groups");
     labels_.reserve(m);
@@ -293,19 +358,30 @@ class VtkReader {
     }
   }
 
-  // "FIELD name n", then n arrays "name components tuples type" and their values. n_cells: where the field is over the cells.
+  // "FIELD name n", then n arrays "name components tuples type" and their values. n_cells: where the field is
+  // over the cells.
   void read_field(const int64_t *n_cells) {
     in_.word();
     const int64_t arrays = in_.integer("the number of arrays in FIELD");
     for (int64_t a = 0; a < arrays; ++a) {
       const size_t at = in_.offset();
       const std::string_view name = in_.word();
-      if (vtk_lower(name) == "metadata") { skip_metadata(); --a; continue; }
-      if (name.empty()) in_.seek(at), in_.refuse("the file ends inside a FIELD that promises %lld arrays", ll(arrays));
-      const int64_t width = in_.integer("an array's number of components"), tuples = in_.integer("an array's number of tuples");
+      if (vtk_lower(name) == "metadata") {
+        skip_metadata();
+        --a;
+        continue;
+      }
+      if (name.empty()) {
+        in_.seek(at);
+        in_.refuse("the file ends inside a FIELD that promises %lld arrays", ll(arrays));
+      }
+      const int64_t width = in_.integer("an array's number of components");
+      const int64_t tuples = in_.integer("an array's number of tuples");
       const Number type = number_type(in_, in_.word());
-      if (name == kVtkGroupNumber && width == 2 && type == Number::i32) read_group_numbers(product(2, tuples));
-      else if (name == kVtkGroupName && width == 1 && type == Number::text) skip_strings(tuples, &group_names_);
+      if (name == kVtkGroupNumber && width == 2 && type == Number::i32)
+        read_group_numbers(product(2, tuples));
+      else if (name == kVtkGroupName && width == 1 && type == Number::text)
+        skip_strings(tuples, &group_names_);
       else keep_or_skip(n_cells && width == 1 && tuples == *n_cells, name, type, product(width, tuples));
     }
   }
@@ -338,7 +414,9 @@ class VtkReader {
         const size_t bytes = string_bytes();
         text = in_.rest().substr(0, bytes);
         in_.skip(bytes, "a FIELD string");
-      } else text = in_.line();
+      } else {
+        text = in_.line();
+      }
       if (keep) keep->emplace_back(text);
     }
   }
@@ -364,8 +442,8 @@ class VtkReader {
   bool polydata_ = false;
   Array<uint32_t> cells_, start_;  // corners end to end; first corner of each cell, and the end
   Array<uint8_t> types_;
-  Array<int32_t> labels_;          // the file's number of each cell's group, where it has an array of them
-  Array<double> shares_;           // of each cell, where it has these
+  Array<int32_t> labels_;  // the file's number of each cell's group, where it has an array of them
+  Array<double> shares_;   // of each cell, where it has these
   std::vector<int64_t> group_numbers_;  // dimension and number of each named group
   std::vector<std::string> group_names_;
 };

@@ -1,5 +1,6 @@
-// VTU and VTP: the XML files of VTK. Pieces follow one another in one mesh; each holds points, cells (offsets, connectivity and, of
-// UnstructuredGrid, types) and data, of which only an array over the cells that numbers groups and one of shares are kept.
+// VTU and VTP: the XML files of VTK. Pieces follow one another in one mesh; each holds points, cells
+// (offsets, connectivity and, of UnstructuredGrid, types) and data, of which only an array over the cells
+// that numbers groups and one of shares are kept.
 #include <algorithm>
 #include <bit>
 
@@ -12,22 +13,31 @@ struct CellList { VtuPlace connectivity, offsets, types; };
 
 struct Piece {
   uint64_t npoint = 0;
-  uint64_t ncell[4] = {};       // UnstructuredGrid: the first alone; PolyData: vertices, lines, polygons, strips
+  // UnstructuredGrid: the first alone; PolyData: vertices, lines, polygons, strips
+  uint64_t ncell[4] = {};
   CellList cells[4];
   VtuPlace points, group, share;
 };
 
 class VtuReader {
  public:
-  VtuReader(Cursor &in, RawMesh &out) : in_(in), out_(out), sink_(out), corners_(HookAllocator<uint32_t>(*out.memory)) {}
+  VtuReader(Cursor &in, RawMesh &out)
+      : in_(in), out_(out), sink_(out), corners_(HookAllocator<uint32_t>(*out.memory)) {}
 
   void run() {
-    find_head(), find_appended();
+    find_head();
+    find_appended();
     bool piece = false, closed = false;
     while (const auto tag = next_tag(in_)) {
-      if (tag->name == "Piece" && !tag->closes) read_piece(*tag), piece = true;
-      else if (tag->name == "FieldData" && !tag->closes && !tag->empty) read_field_data();
-      else if (tag->name == "AppendedData" || (tag->name == "VTKFile" && tag->closes)) { closed = true; break; }
+      if (tag->name == "Piece" && !tag->closes) {
+        read_piece(*tag);
+        piece = true;
+      } else if (tag->name == "FieldData" && !tag->closes && !tag->empty) {
+        read_field_data();
+      } else if (tag->name == "AppendedData" || (tag->name == "VTKFile" && tag->closes)) {
+        closed = true;
+        break;
+      }
     }
     if (!closed) in_.refuse("</VTKFile> is missing: the file is truncated");
     if (!piece) in_.refuse("no Piece in this file; expected one with Points and Cells");
@@ -39,22 +49,30 @@ class VtuReader {
   void find_head() {
     packing_.file_bytes = in_.left();
     auto tag = next_tag(in_);
-    if (!tag || tag->name != "VTKFile") in_.refuse("expected <VTKFile> first, found %s", Cursor::quote(tag ? tag->name : "").c_str());
+    if (!tag || tag->name != "VTKFile")
+      in_.refuse("expected <VTKFile> first, found %s", Cursor::quote(tag ? tag->name : "").c_str());
     const std::string_view type = tag->get("type");
     polydata_ = type == "PolyData";
     if (!polydata_ && type != "UnstructuredGrid")
-      in_.unsupported("a VTKFile of type %s; expected UnstructuredGrid or PolyData: save one of these (in ParaView: Append Datasets, then Save Data)",
-                      Cursor::quote(type.empty() ? " " : type).c_str());
-    const std::string_view order = tag->get("byte_order"), header = tag->get("header_type"), compressor = tag->get("compressor");
+      in_.unsupported(
+          "a VTKFile of type %s; expected UnstructuredGrid or PolyData: save one of these (in ParaView: "
+          "Append Datasets, then Save Data)",
+          Cursor::quote(type.empty() ? " " : type).c_str());
+    const std::string_view order = tag->get("byte_order");
+    const std::string_view header = tag->get("header_type");
+    const std::string_view compressor = tag->get("compressor");
     const bool little = order.empty() || order == "LittleEndian";
-    if (!little && order != "BigEndian") in_.refuse("byte_order %s; expected LittleEndian or BigEndian", Cursor::quote(order).c_str());
+    if (!little && order != "BigEndian")
+      in_.refuse("byte_order %s; expected LittleEndian or BigEndian", Cursor::quote(order).c_str());
     packing_.swap = little != (std::endian::native == std::endian::little);
     if (!header.empty() && header != "UInt32" && header != "UInt64")
       in_.refuse("header_type %s; expected UInt32 or UInt64", Cursor::quote(header).c_str());
     packing_.header_bytes = header == "UInt64" ? 8 : 4;
     packing_.compressed = !compressor.empty();
     if (packing_.compressed && compressor != "vtkZLibDataCompressor")
-      in_.unsupported("packed by %s; vtkZLibDataCompressor or no compressor is read: save it with one of these", Cursor::quote(compressor).c_str());
+      in_.unsupported(
+          "packed by %s; vtkZLibDataCompressor or no compressor is read: save it with one of these",
+          Cursor::quote(compressor).c_str());
   }
 
   // Appended data come last but are needed first.
@@ -63,12 +81,15 @@ class VtuReader {
     if (!look.find("<AppendedData")) return;
     const auto tag = next_tag(look);
     const std::string_view encoding = tag->get("encoding");
-    if (encoding != "raw" && encoding != "base64") look.refuse("AppendedData encoded as %s; expected raw or base64", Cursor::quote(encoding.empty() ? " " : encoding).c_str());
+    if (encoding != "raw" && encoding != "base64")
+      look.refuse("AppendedData encoded as %s; expected raw or base64",
+                  Cursor::quote(encoding.empty() ? " " : encoding).c_str());
     packing_.appended_base64 = encoding == "base64";
     if (!look.find("_")) look.refuse("AppendedData has no underscore before its data: the file is truncated");
     look.skip(1, "AppendedData");
     packing_.appended = look.rest();
-    const size_t end = packing_.appended_base64 ? packing_.appended.find('<') : packing_.appended.rfind("</AppendedData");
+    const size_t end =
+        packing_.appended_base64 ? packing_.appended.find('<') : packing_.appended.rfind("</AppendedData");
     if (end != packing_.appended.npos) packing_.appended = packing_.appended.substr(0, end);
   }
 
@@ -84,7 +105,8 @@ class VtuReader {
     static const char *const counts[] = {"NumberOfVerts", "NumberOfLines", "NumberOfPolys", "NumberOfStrips"};
     Piece piece;
     piece.npoint = number(head, "NumberOfPoints");
-    if (polydata_) for (int k = 0; k < 4; ++k) piece.ncell[k] = number(head, counts[k]);
+    if (polydata_)
+      for (int k = 0; k < 4; ++k) piece.ncell[k] = number(head, counts[k]);
     else piece.ncell[0] = number(head, "NumberOfCells");
     if (!head.empty) find_arrays(piece);
     const uint32_t base = out_.npoint();
@@ -108,10 +130,14 @@ class VtuReader {
   }
 
   void keep_array(Piece &piece, std::string_view section, const char *const *lists, VtuPlace &&place) {
-    if (section == "Points") piece.points = std::move(place);
-    else if (section == "CellData") {
-      if (!piece.group.given && place.components == 1 && vtk_whole(place.type) && vtk_names_groups(place.name)) piece.group = std::move(place);
-      else if (!piece.share.given && place.components == 1 && vtk_names_share(place.name, place.type)) piece.share = std::move(place);
+    if (section == "Points") {
+      piece.points = std::move(place);
+    } else if (section == "CellData") {
+      if (!piece.group.given && place.components == 1 && vtk_whole(place.type) &&
+          vtk_names_groups(place.name))
+        piece.group = std::move(place);
+      else if (!piece.share.given && place.components == 1 && vtk_names_share(place.name, place.type))
+        piece.share = std::move(place);
     } else {
       int list = polydata_ ? -1 : section == "Cells" ? 0 : -1;
       for (int k = 0; polydata_ && k < 4; ++k)
@@ -135,12 +161,14 @@ class VtuReader {
 
   void read_points(const Piece &piece) {
     if (piece.npoint == 0) return;
-    if (piece.points.given && piece.points.components != 3) in_.refuse("points of %u components; expected 3", piece.points.components);
+    if (piece.points.given && piece.points.components != 3)
+      in_.refuse("points of %u components; expected 3", piece.points.components);
     const uint32_t n = point_count(in_, piece.npoint);
     VtuNumbers a = numbers(piece.points, 3 * uint64_t(n), "points", false);
     point_count(in_, uint64_t(out_.npoint()) + n);
     out_.points.reserve(out_.points.size() + 3 * size_t(n));
-    for (uint64_t i = 0; i < 3 * uint64_t(n); ++i) out_.points.push_back(vtk_real(a.in, a.type, "a point's coordinate"));
+    for (uint64_t i = 0; i < 3 * uint64_t(n); ++i)
+      out_.points.push_back(vtk_real(a.in, a.type, "a point's coordinate"));
   }
 
   void read_cells(const Piece &piece, uint32_t base) {
@@ -155,32 +183,40 @@ class VtuReader {
     if (piece.group.given) group.emplace(numbers(piece.group, total, "groups of cells", true));
     if (piece.share.given && !polydata_) share.emplace(numbers(piece.share, total, "shares of cells", false));
     for (int k = 0; k < 4; ++k)
-      if (piece.ncell[k]) read_list(piece.cells[k], piece.ncell[k], base, polydata_ ? kinds[k] : 0, group, share);
+      if (piece.ncell[k])
+        read_list(piece.cells[k], piece.ncell[k], base, polydata_ ? kinds[k] : 0, group, share);
   }
 
-  void read_list(const CellList &list, uint64_t n, uint32_t base, uint8_t kind, std::optional<VtuNumbers> &group, std::optional<VtuNumbers> &share) {
-    VtuNumbers offsets = numbers(list.offsets, n, "offsets of cells", true), connectivity = numbers(list.connectivity, 0, "connectivity", true);
+  void read_list(const CellList &list, uint64_t n, uint32_t base, uint8_t kind,
+                 std::optional<VtuNumbers> &group, std::optional<VtuNumbers> &share) {
+    VtuNumbers offsets = numbers(list.offsets, n, "offsets of cells", true);
+    VtuNumbers connectivity = numbers(list.connectivity, 0, "connectivity", true);
     std::optional<VtuNumbers> types;
     if (kind == 0) {
       types.emplace(numbers(list.types, n, "types of cells", true));
-      out_.expect_tets(std::min<size_t>(n, connectivity.in.left() / (connectivity.in.binary ? 4 * vtk_bytes(connectivity.type) : 8)));
+      out_.expect_tets(std::min<size_t>(
+          n, connectivity.in.left() / (connectivity.in.binary ? 4 * vtk_bytes(connectivity.type) : 8)));
     }
     const uint32_t npoint = out_.npoint() - base;
     int64_t end = 0;
     for (uint64_t c = 0; c < n; ++c) {
       const int64_t next = vtk_integer(offsets.in, offsets.type, "a cell's offset");
-      if (next < end) offsets.in.refuse("the offset of cell %llu is %lld, after %lld; offsets are ends and rise", ull(c), ll(next), ll(end));
+      if (next < end)
+        offsets.in.refuse("the offset of cell %llu is %lld, after %lld; offsets are ends and rise", ull(c),
+                          ll(next), ll(end));
       connectivity.expect(static_cast<uint64_t>(next) - static_cast<uint64_t>(end), "corners of a cell");
       corners_.clear();
       for (; end < next; ++end) {
         const int64_t p = vtk_integer(connectivity.in, connectivity.type, "a cell's point");
         if (p < 0 || p >= int64_t(npoint))
-          connectivity.in.refuse("cell %llu refers to point %lld; the piece has points 0 to %lld", ull(c), ll(p), ll(npoint) - 1);
+          connectivity.in.refuse("cell %llu refers to point %lld; the piece has points 0 to %lld", ull(c),
+                                 ll(p), ll(npoint) - 1);
         corners_.push_back(base + static_cast<uint32_t>(p));
       }
       int64_t type = kind;
       if (types) type = vtk_integer(types->in, types->type, "a cell's type");
-      if (type < 0 || type > 255) types->in.refuse("cell type %lld; expected 0 to 82 (10 is a tetrahedron)", ll(type));
+      if (type < 0 || type > 255)
+        types->in.refuse("cell type %lld; expected 0 to 82 (10 is a tetrahedron)", ll(type));
       const int64_t label = group ? vtk_integer(group->in, group->type, "a cell's group") : 0;
       sink_.add(in_, static_cast<uint8_t>(type), corners_.data(), corners_.size(), label);
       const double part = share ? vtk_real(share->in, share->type, "a cell's share") : 1;
@@ -188,7 +224,8 @@ class VtuReader {
     }
   }
 
-  // Names of groups, as our writer leaves them: pairs of dimension and number, and texts that end with a zero.
+  // Names of groups, as our writer leaves them: pairs of dimension and number, and texts that
+  // end with a zero.
   void read_field_data() {
     while (const auto tag = next_tag(in_)) {
       if (tag->closes && tag->name == "FieldData") return;
@@ -203,9 +240,14 @@ class VtuReader {
         if (!a.in.binary) a.in.skip_space();
         if (a.in.left() == 0) break;
         const int64_t v = vtk_integer(a.in, a.type, "a value of the field data");
-        if (name == kVtkGroupNumber) group_numbers_.push_back(v);
-        else if (v) text += static_cast<char>(v);
-        else group_names_.push_back(std::move(text)), text.clear();
+        if (name == kVtkGroupNumber) {
+          group_numbers_.push_back(v);
+        } else if (v) {
+          text += static_cast<char>(v);
+        } else {
+          group_names_.push_back(std::move(text));
+          text.clear();
+        }
       }
     }
     in_.refuse("FieldData has no end: the file is truncated");

@@ -15,9 +15,18 @@ Array<TetFace> sorted_faces(const Memory &memory, uint32_t ntet, const uint32_t 
       uint32_t c[3];
       for (int k = 0; k < 3; ++k) c[k] = tets[size_t(t) * 4 + kTetFace[f][k]];
       uint32_t odd = 0;  // whether sorting the corners turned the face over
-      if (c[0] > c[1]) std::swap(c[0], c[1]), odd ^= 1;
-      if (c[1] > c[2]) std::swap(c[1], c[2]), odd ^= 1;
-      if (c[0] > c[1]) std::swap(c[0], c[1]), odd ^= 1;
+      if (c[0] > c[1]) {
+        std::swap(c[0], c[1]);
+        odd ^= 1;
+      }
+      if (c[1] > c[2]) {
+        std::swap(c[1], c[2]);
+        odd ^= 1;
+      }
+      if (c[0] > c[1]) {
+        std::swap(c[0], c[1]);
+        odd ^= 1;
+      }
       faces.push_back({c[0], c[1], c[2], t * 4 + f, odd});
     }
   std::sort(faces.begin(), faces.end());
@@ -37,7 +46,8 @@ Array<uint32_t> boundary_triangles(const Memory &memory, uint32_t ntet, const ui
   Array<uint32_t> triangles{HookAllocator<uint32_t>(memory)};
   triangles.reserve(owner.size() * 3);
   for (const uint32_t face : owner)
-    for (const uint32_t corner : kTetFace[face & 3]) triangles.push_back(tets[size_t(face >> 2) * 4 + corner]);
+    for (const uint32_t corner : kTetFace[face & 3])
+      triangles.push_back(tets[size_t(face >> 2) * 4 + corner]);
   return triangles;
 }
 
@@ -53,7 +63,10 @@ Array<uint32_t> unique_edges(const Memory &memory, uint32_t ntet, const uint32_t
   keys.erase(std::unique(keys.begin(), keys.end()), keys.end());
   Array<uint32_t> edges{HookAllocator<uint32_t>(memory)};
   edges.reserve(keys.size() * 2);
-  for (const uint64_t key : keys) edges.push_back(uint32_t(key >> 32)), edges.push_back(uint32_t(key));
+  for (const uint64_t key : keys) {
+    edges.push_back(uint32_t(key >> 32));
+    edges.push_back(uint32_t(key));
+  }
   return edges;
 }
 
@@ -64,13 +77,16 @@ double tet_volume(const double *points, const uint32_t *tet) {
 
 double tet_quality(const double *points, const uint32_t *tet) {
   double sum = 0;
-  for (const auto &e : kTetEdge) sum += norm2(load3(points + 3 * size_t(tet[e[0]])) - load3(points + 3 * size_t(tet[e[1]])));
-  // Lengths relative to the edges' mean, so that neither nanometers nor kilometers leave the range of a double.
+  for (const auto &e : kTetEdge)
+    sum += norm2(load3(points + 3 * size_t(tet[e[0]])) - load3(points + 3 * size_t(tet[e[1]])));
+  // Lengths relative to the edges' mean, so that neither nanometers nor kilometers leave the
+  // range of a double.
   const double length = std::sqrt(sum / 6);
   if (!(length > 0)) return 0;
   const Vec3 a = load3(points + 3 * size_t(tet[0]));
   const auto scaled = [&](int k) { return (1 / length) * (load3(points + 3 * size_t(tet[k])) - a); };
-  const double volume = tet_volume(Vec3{}, scaled(1), scaled(2), scaled(3)), root = std::cbrt(3 * std::fabs(volume));
+  const double volume = tet_volume(Vec3{}, scaled(1), scaled(2), scaled(3));
+  const double root = std::cbrt(3 * std::fabs(volume));
   return std::copysign(2 * root * root, volume);
 }
 
@@ -80,8 +96,9 @@ uint32_t count_duplicate_points(const TetMesh &mesh) {
   Array<uint32_t> order(mesh.npoint(), HookAllocator<uint32_t>(*mesh.memory));
   for (uint32_t i = 0; i < order.size(); ++i) order[i] = i;
   const auto at = [&](uint32_t i) { return mesh.points.data() + 3 * size_t(i); };
-  std::sort(order.begin(), order.end(),
-            [&](uint32_t a, uint32_t b) { return std::lexicographical_compare(at(a), at(a) + 3, at(b), at(b) + 3); });
+  std::sort(order.begin(), order.end(), [&](uint32_t a, uint32_t b) {
+    return std::lexicographical_compare(at(a), at(a) + 3, at(b), at(b) + 3);
+  });
   uint32_t n = 0;
   for (size_t i = 1; i < order.size(); ++i) n += std::equal(at(order[i]), at(order[i]) + 3, at(order[i - 1]));
   return n;
@@ -99,7 +116,10 @@ uint32_t count_pieces(const TetMesh &mesh) {
   for (uint32_t t = 0; t < mesh.ntet(); ++t)
     for (int k = 1; k < 4; ++k) {
       const uint32_t a = root(mesh.tets[4 * size_t(t)]), b = root(mesh.tets[4 * size_t(t) + k]);
-      if (a != b) parent[std::max(a, b)] = std::min(a, b), --pieces;
+      if (a != b) {
+        parent[std::max(a, b)] = std::min(a, b);
+        --pieces;
+      }
     }
   return pieces;
 }
@@ -126,7 +146,8 @@ uint32_t count_nonmanifold_edges(const Memory &memory, const Array<uint32_t> &tr
 MeshStatistics mesh_statistics(const TetMesh &mesh) {
   MeshStatistics s;
   const Memory &memory = *mesh.memory;
-  s.npoint = mesh.npoint(), s.ntet = mesh.ntet();
+  s.npoint = mesh.npoint();
+  s.ntet = mesh.ntet();
   if (s.ntet == 0) return s;
   {
     const Array<uint32_t> triangles = boundary_triangles(mesh.tets);
@@ -139,24 +160,31 @@ MeshStatistics mesh_statistics(const TetMesh &mesh) {
     Array<double> length{HookAllocator<double>(memory)};
     length.reserve(s.nedge);
     for (size_t i = 0; i < edges.size(); i += 2)
-      length.push_back(norm(load3(&mesh.points[3 * size_t(edges[i])]) - load3(&mesh.points[3 * size_t(edges[i + 1])])));
+      length.push_back(
+          norm(load3(&mesh.points[3 * size_t(edges[i])]) - load3(&mesh.points[3 * size_t(edges[i + 1])])));
     std::sort(length.begin(), length.end());
-    s.edge_min = length.front(), s.edge_median = length[length.size() / 2], s.edge_max = length.back();
+    s.edge_min = length.front();
+    s.edge_median = length[length.size() / 2];
+    s.edge_max = length.back();
   }
-  s.npiece = count_pieces(mesh), s.duplicate_points = count_duplicate_points(mesh);
+  s.npiece = count_pieces(mesh);
+  s.duplicate_points = count_duplicate_points(mesh);
   s.quality_min = 1;
   for (uint32_t t = 0; t < s.ntet; ++t) {
     const uint32_t *tet = &mesh.tets[4 * size_t(t)];
     const double q = tet_quality(mesh.points.data(), tet);
     s.volume += tet_volume(mesh.points.data(), tet);
-    s.quality_min = std::min(s.quality_min, q), s.quality_mean += q;
+    s.quality_min = std::min(s.quality_min, q);
+    s.quality_mean += q;
     s.flat_cells += q < 0.01;
     ++s.histogram[std::clamp(static_cast<int>(q * 10), 0, 9)];
   }
   s.quality_mean /= s.ntet;
   for (int k = 0; k < 3; ++k) s.lo[k] = s.hi[k] = mesh.points[k];
-  for (size_t i = 0; i < mesh.points.size(); ++i)
-    s.lo[i % 3] = std::min(s.lo[i % 3], mesh.points[i]), s.hi[i % 3] = std::max(s.hi[i % 3], mesh.points[i]);
+  for (size_t i = 0; i < mesh.points.size(); ++i) {
+    s.lo[i % 3] = std::min(s.lo[i % 3], mesh.points[i]);
+    s.hi[i % 3] = std::max(s.hi[i % 3], mesh.points[i]);
+  }
   return s;
 }
 

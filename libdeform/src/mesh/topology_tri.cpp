@@ -23,20 +23,27 @@ Array<uint32_t> edge_twins(const Memory &memory, const Array<TriEdge> &edges) {
   Array<uint32_t> twin(edges.size(), kOpenEdge, HookAllocator<uint32_t>(memory));
   for (size_t i = 0, j = 0; i < edges.size(); i = j) {
     while (j < edges.size() && edges[j].key == edges[i].key) ++j;
-    if (j - i == 2) twin[edges[i].half] = edges[i + 1].half, twin[edges[i + 1].half] = edges[i].half;
+    if (j - i == 2) {
+      twin[edges[i].half] = edges[i + 1].half;
+      twin[edges[i + 1].half] = edges[i].half;
+    }
     for (size_t k = i; j - i > 2 && k < j; ++k) twin[edges[k].half] = kCrowdedEdge;
   }
   return twin;
 }
 
 double triangle_area(const double *points, const uint32_t *tri) {
-  const Vec3 a = load3(points + 3 * size_t(tri[0])), b = load3(points + 3 * size_t(tri[1])), c = load3(points + 3 * size_t(tri[2]));
+  const Vec3 a = load3(points + 3 * size_t(tri[0]));
+  const Vec3 b = load3(points + 3 * size_t(tri[1]));
+  const Vec3 c = load3(points + 3 * size_t(tri[2]));
   const double l = std::sqrt(std::max({norm2(b - a), norm2(c - a), norm2(c - b)}));
   return l > 0 ? 0.5 * l * (l * norm(cross((1 / l) * (b - a), (1 / l) * (c - a)))) : 0;
 }
 
 double triangle_quality(const double *points, const uint32_t *tri) {
-  const Vec3 a = load3(points + 3 * size_t(tri[0])), b = load3(points + 3 * size_t(tri[1])), c = load3(points + 3 * size_t(tri[2]));
+  const Vec3 a = load3(points + 3 * size_t(tri[0]));
+  const Vec3 b = load3(points + 3 * size_t(tri[1]));
+  const Vec3 c = load3(points + 3 * size_t(tri[2]));
   const double sum = norm2(b - a) + norm2(c - b) + norm2(a - c), l = std::sqrt(sum);
   return l > 0 ? 2 * std::sqrt(3.0) * norm(cross((1 / l) * (b - a), (1 / l) * (c - a))) : 0;
 }
@@ -55,28 +62,41 @@ struct Sets {
     return i;
   }
   void join(uint32_t a, uint32_t b) {
-    a = root(a), b = root(b);
-    if (a != b) parent[std::max(a, b)] = std::min(a, b), --count;
+    a = root(a);
+    b = root(b);
+    if (a != b) {
+      parent[std::max(a, b)] = std::min(a, b);
+      --count;
+    }
   }
 };
 
 uint32_t count_pieces(const TriMesh &mesh) {
   Sets sets(*mesh.memory, mesh.npoint());
-  for (size_t t = 0; t < mesh.tris.size(); t += 3) sets.join(mesh.tris[t], mesh.tris[t + 1]), sets.join(mesh.tris[t], mesh.tris[t + 2]);
+  for (size_t t = 0; t < mesh.tris.size(); t += 3) {
+    sets.join(mesh.tris[t], mesh.tris[t + 1]);
+    sets.join(mesh.tris[t], mesh.tris[t + 2]);
+  }
   return sets.count;
 }
 
-// Boundary loops: from each end of an open edge around that point, through the triangles between, to the loop's next open edge.
+// Boundary loops: from each end of an open edge around that point, through the triangles between, to the
+// loop's next open edge.
 uint32_t count_holes(const TriMesh &mesh, const Array<uint32_t> &twin) {
-  Array<uint32_t> open{HookAllocator<uint32_t>(*mesh.memory)}, number(twin.size(), HookAllocator<uint32_t>(*mesh.memory));
+  Array<uint32_t> open{HookAllocator<uint32_t>(*mesh.memory)};
+  Array<uint32_t> number(twin.size(), HookAllocator<uint32_t>(*mesh.memory));
   for (uint32_t h = 0; h < twin.size(); ++h)
-    if (twin[h] == kOpenEdge) number[h] = uint32_t(open.size()), open.push_back(h);
+    if (twin[h] == kOpenEdge) {
+      number[h] = uint32_t(open.size());
+      open.push_back(h);
+    }
   Sets sets(*mesh.memory, uint32_t(open.size()));
   for (const uint32_t start : open)
     for (const uint32_t point : {mesh.tris[start], mesh.tris[next_half_edge(start)]}) {
       uint32_t h = start;
       do {
-        const uint32_t next = next_half_edge(h), previous = previous_half_edge(h);  // the triangle's other edge at the point
+        // the triangle's other edge at the point
+        const uint32_t next = next_half_edge(h), previous = previous_half_edge(h);
         h = mesh.tris[next] == point || mesh.tris[next_half_edge(next)] == point ? next : previous;
         if (mesh.tris[h] != point && mesh.tris[next_half_edge(h)] != point) break;
         if (twin[h] < kCrowdedEdge) h = twin[h];
@@ -91,7 +111,8 @@ uint32_t count_holes(const TriMesh &mesh, const Array<uint32_t> &twin) {
 
 TriMeshStatistics tri_mesh_statistics(const TriMesh &mesh) {
   TriMeshStatistics s;
-  s.npoint = mesh.npoint(), s.ntri = mesh.ntri();
+  s.npoint = mesh.npoint();
+  s.ntri = mesh.ntri();
   if (s.ntri == 0) return s;
   const double *points = mesh.points.data();
   Array<double> length{HookAllocator<double>(*mesh.memory)};
@@ -102,27 +123,39 @@ TriMeshStatistics tri_mesh_statistics(const TriMesh &mesh) {
     for (size_t i = 0; i < edges.size(); ++i) {
       const uint32_t h = edges[i].half;
       if (i > 0 && edges[i - 1].key == edges[i].key) continue;
-      ++s.nedge, s.open_edges += twin[h] == kOpenEdge, s.nonmanifold_edges += twin[h] == kCrowdedEdge;
+      ++s.nedge;
+      s.open_edges += twin[h] == kOpenEdge;
+      s.nonmanifold_edges += twin[h] == kCrowdedEdge;
       disagreeing += twin[h] < kCrowdedEdge && mesh.tris[h] == mesh.tris[twin[h]];
-      length.push_back(norm(load3(points + 3 * size_t(edges[i].key >> 32)) - load3(points + 3 * size_t(uint32_t(edges[i].key)))));
+      length.push_back(norm(load3(points + 3 * size_t(edges[i].key >> 32)) -
+                            load3(points + 3 * size_t(uint32_t(edges[i].key)))));
     }
     s.closed = s.open_edges + s.nonmanifold_edges + disagreeing == 0;
     s.holes = count_holes(mesh, twin);
   }
   std::sort(length.begin(), length.end());
-  s.edge_min = length.front(), s.edge_median = length[length.size() / 2], s.edge_max = length.back();
+  s.edge_min = length.front();
+  s.edge_median = length[length.size() / 2];
+  s.edge_max = length.back();
   s.npiece = count_pieces(mesh);
   for (int k = 0; k < 3; ++k) s.lo[k] = s.hi[k] = points[k];
-  for (size_t i = 0; i < mesh.points.size(); ++i) s.lo[i % 3] = std::min(s.lo[i % 3], points[i]), s.hi[i % 3] = std::max(s.hi[i % 3], points[i]);
+  for (size_t i = 0; i < mesh.points.size(); ++i) {
+    s.lo[i % 3] = std::min(s.lo[i % 3], points[i]);
+    s.hi[i % 3] = std::max(s.hi[i % 3], points[i]);
+  }
   // Volume from cones to the middle of the box: far from the origin nothing cancels.
   const Vec3 middle = 0.5 * (load3(s.lo) + load3(s.hi));
   s.quality_min = 1;
   for (uint32_t t = 0; t < s.ntri; ++t) {
     const uint32_t *tri = &mesh.tris[3 * size_t(t)];
-    const Vec3 a = load3(points + 3 * size_t(tri[0])), b = load3(points + 3 * size_t(tri[1])), c = load3(points + 3 * size_t(tri[2]));
+    const Vec3 a = load3(points + 3 * size_t(tri[0]));
+    const Vec3 b = load3(points + 3 * size_t(tri[1]));
+    const Vec3 c = load3(points + 3 * size_t(tri[2]));
     const double q = triangle_quality(points, tri);
-    s.area += triangle_area(points, tri), s.volume += dot(cross(a - middle, b - middle), c - middle) / 6;
-    s.quality_min = std::min(s.quality_min, q), s.quality_mean += q;
+    s.area += triangle_area(points, tri);
+    s.volume += dot(cross(a - middle, b - middle), c - middle) / 6;
+    s.quality_min = std::min(s.quality_min, q);
+    s.quality_mean += q;
     ++s.histogram[std::clamp(static_cast<int>(q * 10), 0, 9)];
   }
   s.quality_mean /= s.ntri;

@@ -4,13 +4,14 @@
 
 namespace dfm {
 
-inline constexpr uint32_t kCrowdedEdge = UINT32_MAX - 1, kOpenEdge = UINT32_MAX;  // instead of a twin: more than two triangles, one only
+// instead of a twin: more than two triangles, one only
+inline constexpr uint32_t kCrowdedEdge = UINT32_MAX - 1, kOpenEdge = UINT32_MAX;
 
 inline uint32_t next_half_edge(uint32_t h) { return h % 3 == 2 ? h - 2 : h + 1; }
 inline uint32_t previous_half_edge(uint32_t h) { return h % 3 == 0 ? h + 2 : h - 1; }
 
 struct TriEdge {
-  uint64_t key;    // lower point << 32 | higher point
+  uint64_t key;  // lower point << 32 | higher point
   uint32_t half;
   bool operator<(const TriEdge &o) const { return key != o.key ? key < o.key : half < o.half; }
 };

@@ -1,4 +1,5 @@
-// Triangle surfaces before they become a body's skin or are filled with cells: reading, repair, measures, writing.
+// Triangle surfaces before they become a body's skin or are filled with cells: reading, repair,
+// measures, writing.
 #pragma once
 #include "mesh/mesh.h"
 
@@ -6,13 +7,17 @@ namespace dfm {
 
 struct TriMesh {
   explicit TriMesh(const Memory &m = Memory::standard())
-      : memory(&m), points(HookAllocator<double>(m)), tris(HookAllocator<uint32_t>(m)), tri_group(HookAllocator<uint32_t>(m)),
+      : memory(&m),
+        points(HookAllocator<double>(m)),
+        tris(HookAllocator<uint32_t>(m)),
+        tri_group(HookAllocator<uint32_t>(m)),
         file_point(HookAllocator<uint32_t>(m)) {}
   const Memory *memory;
-  Array<double> points;          // [npoint,3], m
-  Array<uint32_t> tris;          // [ntri,3], neighbors agree; closed pieces face outward
-  Array<uint32_t> tri_group;     // [ntri] index into groups, kNoGroup without
-  Array<uint32_t> file_point;    // [npoint] 0-based position of the point in its file (the first of those merged)
+  Array<double> points;       // [npoint,3], m
+  Array<uint32_t> tris;       // [ntri,3], neighbors agree; closed pieces face outward
+  Array<uint32_t> tri_group;  // [ntri] index into groups, kNoGroup without
+  // [npoint] 0-based position of the point in its file (the first of those merged)
+  Array<uint32_t> file_point;
   std::vector<MeshGroup> groups;
   // What reading had to repair or noticed.
   uint32_t merged_points = 0, dropped_points = 0, dropped_tris = 0, turned = 0;
@@ -24,17 +29,21 @@ struct TriMesh {
 TriMesh read_tri_mesh(const Memory &memory, const std::string &path);
 TriMesh parse_tri_mesh(const Memory &memory, const std::string &path, const char *bytes, size_t size);
 
-// ---- generators: closed surfaces of about `triangles` near-equilateral triangles, in the places of the bodies of the same names ----
+// ---- generators: closed surfaces of about `triangles` near-equilateral triangles, in the places of the
+// bodies of the same names ----
 TriMesh make_cylinder_surface(const Memory &memory, double radius, double length, uint32_t triangles);
 TriMesh make_beam_surface(const Memory &memory, double x, double y, double z, uint32_t triangles);
 TriMesh make_ball_surface(const Memory &memory, double radius, uint32_t triangles);
-TriMesh make_tube_surface(const Memory &memory, double inner, double outer, double length, uint32_t triangles);
-TriMesh make_torus_surface(const Memory &memory, double ring, double radius, uint32_t triangles);  // about the origin, axis z
+TriMesh make_tube_surface(const Memory &memory, double inner, double outer, double length,
+                          uint32_t triangles);
+// about the origin, axis z
+TriMesh make_torus_surface(const Memory &memory, double ring, double radius, uint32_t triangles);
 
-// ---- writing: to a temporary name beside the target, then renamed. By ending: .obj, .ply, .stl, .off, .vtk, .vtu. Throws Error.
+// ---- writing: to a temporary name beside the target, then renamed. By ending: .obj, .ply, .stl, .off, .vtk,
+// .vtu. Throws Error.
 void write_tri_mesh(const TriMesh &mesh, const std::string &path);
 
-// ---- measures ----------------------------------------------------------------------------------------------------
+// ---- measures ---------------------------------------------------------------------------------------------
 double triangle_area(const double *points, const uint32_t *tri);
 // 4 sqrt(3) area / sum l^2: 1 for an equilateral triangle, 0 for a flat one.
 double triangle_quality(const double *points, const uint32_t *tri);
@@ -45,13 +54,14 @@ struct TriMeshStatistics {
   uint32_t nonmanifold_edges = 0;                        // edges of more than two triangles
   bool closed = false;                                   // every edge has two triangles that agree
   double area = 0, volume = 0, edge_min = 0, edge_median = 0, edge_max = 0, quality_min = 0, quality_mean = 0;
-  uint32_t histogram[10] = {};                           // of the quality, bins of 0.1
+  uint32_t histogram[10] = {};  // of the quality, bins of 0.1
   double lo[3] = {}, hi[3] = {};
 };
 TriMeshStatistics tri_mesh_statistics(const TriMesh &mesh);
 
-// Cells of a body-centered cubic lattice that cover the inside of the surface, about `cells` of them, with `share` filled in. The surface
-// need not be clean: inside is where the generalized winding number exceeds one half. Throws Error(FORMAT) where nothing is inside.
+// Cells of a body-centered cubic lattice that cover the inside of the surface, about `cells` of them, with
+// `share` filled in. The surface need not be clean: inside is where the generalized winding number exceeds
+// one half. Throws Error(FORMAT) where nothing is inside.
 TetMesh fill_surface(const TriMesh &surface, uint32_t cells);
 
 }  // namespace dfm

@@ -1,5 +1,5 @@
-// What legacy VTK and VTU share: number types, cell types, and groups of cells, which both keep as an integer array over the cells and, from
-// our own writer, names in the field data.
+// What legacy VTK and VTU share: number types, cell types, and groups of cells, which both keep as an integer
+// array over the cells and, from our own writer, names in the field data.
 #pragma once
 #include <string>
 #include <vector>
@@ -11,21 +11,27 @@ namespace dfm {
 enum class VtkNumber : uint8_t { f32, f64, i8, u8, i16, u16, i32, u32, i64, u64, text, bit };
 
 size_t vtk_bytes(VtkNumber type);  // 0 for text and bit
-inline bool vtk_whole(VtkNumber type) { return vtk_bytes(type) && type != VtkNumber::f32 && type != VtkNumber::f64; }
+inline bool vtk_whole(VtkNumber type) {
+  return vtk_bytes(type) && type != VtkNumber::f32 && type != VtkNumber::f64;
+}
 // The next number of a text or binary array; real() is finite.
 double vtk_real(Cursor &in, VtkNumber type, const char *what);
 int64_t vtk_integer(Cursor &in, VtkNumber type, const char *what);
 std::string vtk_lower(std::string_view text);  // its first 64 characters
 
-// Arrays over the cells that are taken for numbers of groups: ours and those of gmsh, meshio, medit and common meshers.
+// Arrays over the cells that are taken for numbers of groups: ours and those of gmsh, meshio, medit and
+// common meshers.
 bool vtk_names_groups(std::string_view array);
-inline constexpr const char *kVtkGroup = "group", *kVtkGroupNumber = "group_number", *kVtkGroupName = "group_name";
+inline constexpr const char *kVtkGroup = "group", *kVtkGroupNumber = "group_number",
+                            *kVtkGroupName = "group_name";
 // Real numbers over the cells by this name are the shares of a filled surface, as our writer leaves them.
 inline constexpr const char *kVtkShare = "share";
-inline bool vtk_names_share(std::string_view array, VtkNumber type) { return array == kVtkShare && (type == VtkNumber::f32 || type == VtkNumber::f64); }
+inline bool vtk_names_share(std::string_view array, VtkNumber type) {
+  return array == kVtkShare && (type == VtkNumber::f32 || type == VtkNumber::f64);
+}
 
-// Takes cells one by one: keeps tetrahedra and straight faces (cut into triangles), passes over points and lines, refuses other volume cells:
-// a body must not lose parts in silence.
+// Takes cells one by one: keeps tetrahedra and straight faces (cut into triangles), passes over points and
+// lines, refuses other volume cells: a body must not lose parts in silence.
 class VtkCells {
  public:
   explicit VtkCells(RawMesh &out) : out_(out) {}

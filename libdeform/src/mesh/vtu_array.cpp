@@ -7,16 +7,20 @@
 namespace dfm {
 namespace {
 
-// Unpacked bytes that one array may have, over the bytes of its whole file: an array of types packs a thousandfold, but coordinates and
-// cells of a sound file are not all alike. And what deflate can make of one byte at most.
+// Unpacked bytes that one array may have, over the bytes of its whole file: an array of types packs a
+// thousandfold, but coordinates and cells of a sound file are not all alike. And what deflate can make of
+// one byte at most.
 constexpr uint64_t kMaxUnpacking = 64, kFreeUnpacking = 4096, kMaxDeflation = 1032;
 
-// Bytes out of raw data or base64. White space is passed over; a padded group may stand anywhere, as writers encode lengths and data apart.
+// Bytes out of raw data or base64. White space is passed over; a padded group may stand anywhere, as writers
+// encode lengths and data apart.
 class ByteSource {
  public:
   ByteSource(std::string_view data, bool base64) : data_(data), base64_(base64) {}
 
-  uint64_t at_most() const { return base64_ ? uint64_t(data_.size() - at_) * 3 / 4 + held_ : data_.size() - at_; }
+  uint64_t at_most() const {
+    return base64_ ? uint64_t(data_.size() - at_) * 3 / 4 + held_ : data_.size() - at_;
+  }
   std::string_view raw_rest() const { return data_.substr(at_); }
 
   // False where the data end before n bytes.
@@ -29,7 +33,8 @@ class ByteSource {
     }
     for (size_t i = 0; i < n; ++i) {
       if (held_ == 0 && !decode()) return false;
-      out[i] = group_[used_++], --held_;
+      out[i] = group_[used_++];
+      --held_;
     }
     return true;
   }
@@ -48,15 +53,22 @@ class ByteSource {
     while (n < 4) {
       if (at_ == data_.size()) return false;
       const char c = data_[at_];
-      if (c == ' ' || c == '\n' || c == '\r' || c == '\t') { ++at_; continue; }
+      if (c == ' ' || c == '\n' || c == '\r' || c == '\t') {
+        ++at_;
+        continue;
+      }
       const int d = digit(c);
       if (d < 0 || (padding && d != 64) || (d == 64 && n < 2)) return false;
       padding += d == 64;
       bits = bits << 6 | uint32_t(d & 63);
-      ++at_, ++n;
+      ++at_;
+      ++n;
     }
-    group_[0] = static_cast<char>(bits >> 16), group_[1] = static_cast<char>(bits >> 8), group_[2] = static_cast<char>(bits);
-    used_ = 0, held_ = 3 - padding;
+    group_[0] = static_cast<char>(bits >> 16);
+    group_[1] = static_cast<char>(bits >> 8);
+    group_[2] = static_cast<char>(bits);
+    used_ = 0;
+    held_ = 3 - padding;
     return held_ > 0;
   }
 
@@ -69,42 +81,53 @@ class ByteSource {
 
 class Unpacker {
  public:
-  Unpacker(const Cursor &in, const VtuPacking &packing, ByteSource source) : in_(in), packing_(packing), source_(source) {}
+  Unpacker(const Cursor &in, const VtuPacking &packing, ByteSource source)
+      : in_(in), packing_(packing), source_(source) {}
 
   // Raw data are left where they lie; all else is unpacked into `out`.
   std::string_view run(Array<char> &out, bool in_place) {
     const uint64_t first = length();
     if (packing_.compressed) return inflate_blocks(first, out);
     if (first > source_.at_most())
-      in_.refuse("promises %llu bytes, but the %llu left in the file cannot hold them: the file is truncated or its length is wrong", ull(first),
-                 ull(source_.at_most()));
+      in_.refuse(
+          "promises %llu bytes, but the %llu left in the file cannot hold them: the file is truncated or its "
+          "length is wrong",
+          ull(first), ull(source_.at_most()));
     if (in_place) return source_.raw_rest().substr(0, size_t(first));
     out.resize(size_t(first));
-    if (!source_.read(out.data(), out.size())) in_.refuse("the file ends, or is not base64, inside its %llu bytes", ull(first));
+    if (!source_.read(out.data(), out.size()))
+      in_.refuse("the file ends, or is not base64, inside its %llu bytes", ull(first));
     return {out.data(), out.size()};
   }
 
  private:
   uint64_t length() {
     char raw[8];
-    if (!source_.read(raw, packing_.header_bytes)) in_.refuse("the file ends, or is not base64, inside the array's length");
+    if (!source_.read(raw, packing_.header_bytes))
+      in_.refuse("the file ends, or is not base64, inside the array's length");
     Cursor number(in_.path(), raw, packing_.header_bytes);
     number.swap = packing_.swap;
-    return packing_.header_bytes == 8 ? number.value<uint64_t>("a length") : number.value<uint32_t>("a length");
+    return packing_.header_bytes == 8 ? number.value<uint64_t>("a length")
+                                      : number.value<uint32_t>("a length");
   }
 
-  // How many blocks, bytes of each but perhaps the last, bytes of the last where it is shorter, packed bytes of each.
+  // How many blocks, bytes of each but perhaps the last, bytes of the last where it is shorter, packed
+  // bytes of each.
   std::string_view inflate_blocks(uint64_t nblock, Array<char> &out) {
-    if (nblock > source_.at_most() / packing_.header_bytes) in_.refuse("promises %llu blocks, for which the file is too short", ull(nblock));
+    if (nblock > source_.at_most() / packing_.header_bytes)
+      in_.refuse("promises %llu blocks, for which the file is too short", ull(nblock));
     const uint64_t size = length(), last = length(), packed_left = source_.at_most();
     const uint64_t most = kFreeUnpacking + kMaxUnpacking * packing_.file_bytes;
     if (size > most || last > size || (nblock && size > most / nblock))
-      in_.refuse("promises %llu blocks of %llu bytes, but the %llu packed bytes left in the file cannot hold them", ull(nblock), ull(size), ull(packed_left));
+      in_.refuse(
+          "promises %llu blocks of %llu bytes, but the %llu packed bytes left in the file cannot hold them",
+          ull(nblock), ull(size), ull(packed_left));
     Array<uint64_t> packed(size_t(nblock), HookAllocator<uint64_t>(*out.get_allocator().memory));
     for (uint64_t &p : packed) {
       p = length();
       if (p > packed_left || (&p != &packed.back() && size > kMaxDeflation * (p + 1)))
-        in_.refuse("compressed block %zu has %llu bytes where %llu are left, for %llu", size_t(&p - packed.data()), ull(p), ull(packed_left), ull(size));
+        in_.refuse("compressed block %zu has %llu bytes where %llu are left, for %llu",
+                   size_t(&p - packed.data()), ull(p), ull(packed_left), ull(size));
     }
     const uint64_t total = nblock == 0 ? 0 : size * (nblock - 1) + (last ? last : size);
     out.resize(size_t(total));
@@ -112,13 +135,16 @@ class Unpacker {
     for (uint64_t b = 0; b < nblock; ++b) {
       if (packed[b] > source_.at_most()) in_.refuse("the file ends inside compressed block %llu", ull(b));
       block.resize(size_t(packed[b]));
-      if (!source_.read(block.data(), block.size())) in_.refuse("the file ends, or is not base64, inside compressed block %llu", ull(b));
+      if (!source_.read(block.data(), block.size()))
+        in_.refuse("the file ends, or is not base64, inside compressed block %llu", ull(b));
       uLongf bytes = static_cast<uLongf>(b + 1 < nblock || last == 0 ? size : last);
       const uLongf wanted = bytes;
-      const int code = uncompress(reinterpret_cast<Bytef *>(out.data() + size * b), &bytes, reinterpret_cast<const Bytef *>(block.data()),
-                                  static_cast<uLong>(block.size()));
+      const int code =
+          uncompress(reinterpret_cast<Bytef *>(out.data() + size * b), &bytes,
+                     reinterpret_cast<const Bytef *>(block.data()), static_cast<uLong>(block.size()));
       if (code == Z_MEM_ERROR) throw std::bad_alloc();
-      if (code != Z_OK || bytes != wanted) in_.refuse("compressed block %llu is damaged (zlib says %d)", ull(b), code);
+      if (code != Z_OK || bytes != wanted)
+        in_.refuse("compressed block %llu is damaged (zlib says %d)", ull(b), code);
     }
     return {out.data(), out.size()};
   }
@@ -130,12 +156,15 @@ class Unpacker {
 
 VtkNumber type_called(const Cursor &in, std::string_view name) {
   static const std::pair<std::string_view, VtkNumber> known[] = {
-      {"Float32", VtkNumber::f32}, {"Float64", VtkNumber::f64}, {"Int8", VtkNumber::i8}, {"UInt8", VtkNumber::u8}, {"Int16", VtkNumber::i16},
-      {"UInt16", VtkNumber::u16}, {"Int32", VtkNumber::i32}, {"UInt32", VtkNumber::u32}, {"Int64", VtkNumber::i64}, {"UInt64", VtkNumber::u64},
-      {"String", VtkNumber::text}, {"Bit", VtkNumber::bit}, {"VTKIdType", VtkNumber::i64}, {"vtkIdType", VtkNumber::i64}};
+      {"Float32", VtkNumber::f32},   {"Float64", VtkNumber::f64},  {"Int8", VtkNumber::i8},
+      {"UInt8", VtkNumber::u8},      {"Int16", VtkNumber::i16},    {"UInt16", VtkNumber::u16},
+      {"Int32", VtkNumber::i32},     {"UInt32", VtkNumber::u32},   {"Int64", VtkNumber::i64},
+      {"UInt64", VtkNumber::u64},    {"String", VtkNumber::text},  {"Bit", VtkNumber::bit},
+      {"VTKIdType", VtkNumber::i64}, {"vtkIdType", VtkNumber::i64}};
   for (const auto &[text, type] : known)
     if (text == name) return type;
-  in.refuse("a DataArray of type %s; expected Float64, Float32, Int32, Int64, UInt8 ...", Cursor::quote(name.empty() ? " " : name).c_str());
+  in.refuse("a DataArray of type %s; expected Float64, Float32, Int32, Int64, UInt8 ...",
+            Cursor::quote(name.empty() ? " " : name).c_str());
 }
 
 }  // namespace
@@ -161,7 +190,8 @@ std::optional<XmlTag> next_tag(Cursor &in) {
     std::string_view rest = in.rest();
     const bool comment = rest.substr(0, 4) == "<!--";
     if (comment || rest.substr(0, 2) == "<?" || rest.substr(0, 2) == "<!") {
-      if (!in.find(comment ? "-->" : ">")) in.refuse("an XML %s has no end", comment ? "comment" : "declaration");
+      if (!in.find(comment ? "-->" : ">"))
+        in.refuse("an XML %s has no end", comment ? "comment" : "declaration");
       in.skip(1, "a tag");
       continue;
     }
@@ -192,23 +222,29 @@ VtuPlace vtu_place(Cursor &in, const XmlTag &tag) {
     return text.empty() ? int64_t(0) : Cursor(in).to_integer(text, key);
   };
   const int64_t components = number("NumberOfComponents"), offset = number("offset");
-  if (components < 0 || components > 64 || offset < 0) in.refuse("a DataArray with %lld components at offset %lld", ll(components), ll(offset));
-  place.components = std::max(1u, static_cast<uint32_t>(components)), place.offset = static_cast<uint64_t>(offset);
+  if (components < 0 || components > 64 || offset < 0)
+    in.refuse("a DataArray with %lld components at offset %lld", ll(components), ll(offset));
+  place.components = std::max(1u, static_cast<uint32_t>(components));
+  place.offset = static_cast<uint64_t>(offset);
   if (tag.empty) return place;
   // Numbers stand before the first tag inside; information keys may follow.
   while (place.text.empty()) {
     place.text = in.rest().substr(0, in.rest().find('<'));
     if (place.text.find_first_not_of(" \t\r\n") == place.text.npos) place.text = {};
     const auto inner = next_tag(in);
-    if (!inner) in.refuse("DataArray %s has no end: the file is truncated", Cursor::quote(place.name.empty() ? " " : place.name).c_str());
+    if (!inner)
+      in.refuse("DataArray %s has no end: the file is truncated",
+                Cursor::quote(place.name.empty() ? " " : place.name).c_str());
     if (inner->closes && inner->name == "DataArray") return place;
   }
   for (auto inner = next_tag(in); inner; inner = next_tag(in))
     if (inner->closes && inner->name == "DataArray") return place;
-  in.refuse("DataArray %s has no end: the file is truncated", Cursor::quote(place.name.empty() ? " " : place.name).c_str());
+  in.refuse("DataArray %s has no end: the file is truncated",
+            Cursor::quote(place.name.empty() ? " " : place.name).c_str());
 }
 
-VtuNumbers::VtuNumbers(const Memory &memory, const Cursor &file, const VtuPacking &packing, const VtuPlace &place)
+VtuNumbers::VtuNumbers(const Memory &memory, const Cursor &file, const VtuPacking &packing,
+                       const VtuPlace &place)
     : in(file), type(place.type), unpacked_(HookAllocator<char>(memory)) {
   if (type == VtkNumber::text) type = VtkNumber::i8;
   if (vtk_bytes(type) == 0) file.unsupported("DataArray '%s' of bits is not read", place.name.c_str());
@@ -219,18 +255,26 @@ VtuNumbers::VtuNumbers(const Memory &memory, const Cursor &file, const VtuPackin
     return;
   }
   const bool appended = place.format == "appended";
-  if (!appended && place.format != "binary") file.refuse("a DataArray of format %s; expected ascii, binary or appended", Cursor::quote(place.format).c_str());
-  if (appended && packing.appended.empty()) file.refuse("DataArray '%s' is appended, but the file has no AppendedData: it is truncated", place.name.c_str());
+  if (!appended && place.format != "binary")
+    file.refuse("a DataArray of format %s; expected ascii, binary or appended",
+                Cursor::quote(place.format).c_str());
+  if (appended && packing.appended.empty())
+    file.refuse("DataArray '%s' is appended, but the file has no AppendedData: it is truncated",
+                place.name.c_str());
   if (appended && place.offset > packing.appended.size())
-    file.refuse("DataArray '%s' at offset %llu, but AppendedData has %zu bytes", place.name.c_str(), ull(place.offset), packing.appended.size());
+    file.refuse("DataArray '%s' at offset %llu, but AppendedData has %zu bytes", place.name.c_str(),
+                ull(place.offset), packing.appended.size());
   const bool base64 = !appended || packing.appended_base64;
   const std::string name = file.path() + ", DataArray '" + place.name + "'";
   Cursor self(name, nullptr, 0);
   self.binary = true;
-  Unpacker unpacker(self, packing, ByteSource(appended ? packing.appended.substr(size_t(place.offset)) : place.text, base64));
+  Unpacker unpacker(
+      self, packing,
+      ByteSource(appended ? packing.appended.substr(size_t(place.offset)) : place.text, base64));
   const std::string_view bytes = unpacker.run(unpacked_, !base64);
   in = Cursor(name, bytes.data(), bytes.size());
-  in.binary = true, in.swap = packing.swap;
+  in.binary = true;
+  in.swap = packing.swap;
 }
 
 void VtuNumbers::expect(uint64_t n, const char *what) {

@@ -1,5 +1,6 @@
-// A DataArray of a VTU file as a cursor over numbers, wherever and however they are kept: text between the tags, base64 between the tags, or
-// at an offset into the appended data (raw or base64); the last three perhaps cut into blocks that zlib has compressed.
+// A DataArray of a VTU file as a cursor over numbers, wherever and however they are kept: text between the
+// tags, base64 between the tags, or at an offset into the appended data (raw or base64); the last three
+// perhaps cut into blocks that zlib has compressed.
 #pragma once
 #include <optional>
 #include <string>
@@ -11,9 +12,9 @@ namespace dfm {
 // Attributes of one XML tag, as they stand in the file.
 class XmlTag {
  public:
-  std::string_view name;   // without the slash
-  bool closes = false;     // </name>
-  bool empty = false;      // <name/>
+  std::string_view name;  // without the slash
+  bool closes = false;    // </name>
+  bool empty = false;     // <name/>
   std::string_view attributes;
   std::string_view get(std::string_view key) const;  // empty where it is absent
 };
@@ -22,12 +23,12 @@ std::optional<XmlTag> next_tag(Cursor &in);
 
 // How the file packs its numbers.
 struct VtuPacking {
-  bool swap = false;            // byte order
-  size_t header_bytes = 4;      // of each length
+  bool swap = false;        // byte order
+  size_t header_bytes = 4;  // of each length
   bool compressed = false;
   bool appended_base64 = false;
-  size_t file_bytes = 0;        // bounds what unpacking may take
-  std::string_view appended;    // what stands behind the underscore
+  size_t file_bytes = 0;      // bounds what unpacking may take
+  std::string_view appended;  // what stands behind the underscore
 };
 
 // Where one array lies.
@@ -36,8 +37,8 @@ struct VtuPlace {
   VtkNumber type = VtkNumber::f64;
   uint32_t components = 1;
   std::string name, format;
-  std::string_view text;        // between the tags
-  uint64_t offset = 0;          // into the appended data
+  std::string_view text;  // between the tags
+  uint64_t offset = 0;    // into the appended data
 };
 VtuPlace vtu_place(Cursor &in, const XmlTag &tag);  // reads on to </DataArray>
 

@@ -1,6 +1,7 @@
-// How often a triangle surface winds around a place: 1 inside, 0 outside, and in between where the surface has holes or triangles face the
-// wrong way (Jacobson, Kavan and Sorkine-Hornung 2013). What a box of triangles contributes from afar is summed as one dipole with its
-// first correction (Barill, Dickson, Schmidt, Levin and Jacobson 2018). Set-up code.
+// How often a triangle surface winds around a place: 1 inside, 0 outside, and in between where the surface
+// has holes or triangles face the wrong way (Jacobson, Kavan and Sorkine-Hornung 2013). What a box of
+// triangles contributes from afar is summed as one dipole with its first correction (Barill, Dickson,
+// Schmidt, Levin and Jacobson 2018). Set-up code.
 #pragma once
 #include <cstdint>
 
@@ -9,30 +10,32 @@
 
 namespace dfm {
 
-// A tree is used from a distance of kFarWinding radii of a box; nearer, its triangles' solid angles are summed exactly. The error of the sum
-// is below 0.05 on every surface measured (tests/unit/mesh/winding_test.cpp), where the decision at 1/2 needs less than 1/4.
+// A tree is used from a distance of kFarWinding radii of a box; nearer, its triangles' solid angles are
+// summed exactly. The error of the sum is below 0.05 on every surface measured
+// (tests/unit/mesh/winding_test.cpp), where the decision at 1/2 needs less than 1/4.
 inline constexpr double kFarWinding = 2.5;
 
 class WindingTree {
  public:
   // points [.,3], tris [ntri,3]. Lengths should be of order one: cubes of distances are formed.
   WindingTree(const Memory &memory, const double *points, uint32_t ntri, const uint32_t *tris);
-  double at(Vec3 place) const;         // by the tree
-  double exactly_at(Vec3 place) const; // the sum over all triangles
+  double at(Vec3 place) const;          // by the tree
+  double exactly_at(Vec3 place) const;  // the sum over all triangles
 
  private:
   struct Box {
-    Vec3 center, area;         // area-weighted center; sum of the triangles' area vectors
-    double moment[3][3];       // sum of (triangle's center - center) x area vector
-    double reach;              // farthest corner from the center
-    uint32_t begin, end;       // triangles
-    uint32_t right;            // second child; the first is the next box. 0: a leaf
+    Vec3 center, area;    // area-weighted center; sum of the triangles' area vectors
+    double moment[3][3];  // sum of (triangle's center - center) x area vector
+    double reach;         // farthest corner from the center
+    uint32_t begin, end;  // triangles
+    uint32_t right;       // second child; the first is the next box. 0: a leaf
   };
-  uint32_t build(const double *points, const uint32_t *tris, Array<Vec3> &centers, Array<uint32_t> &order, uint32_t begin, uint32_t end);
+  uint32_t build(const double *points, const uint32_t *tris, Array<Vec3> &centers, Array<uint32_t> &order,
+                 uint32_t begin, uint32_t end);
   void sum_up(Box &box) const;
 
   Array<Box> boxes_;
-  Array<Vec3> corners_;        // [ntri,3] in the order of the boxes
+  Array<Vec3> corners_;  // [ntri,3] in the order of the boxes
 };
 
 }  // namespace dfm

@@ -22,13 +22,15 @@ T big_endian(T value) {
 
 std::string text(uint64_t n) { return std::to_string(n); }
 
-// The file's number of each cell's and then each triangle's group, 0 without. Empty where there are no groups at all.
+// The file's number of each cell's and then each triangle's group, 0 without. Empty where there are no
+// groups at all.
 Array<uint32_t> group_numbers(const TetMesh &mesh) {
   Array<uint32_t> out(HookAllocator<uint32_t>(*mesh.memory));
   if (mesh.groups.empty()) return out;
   out.reserve(mesh.tet_group.size() + mesh.tri_group.size());
   for (const Array<uint32_t> *groups : {&mesh.tet_group, &mesh.tri_group})
-    for (const uint32_t g : *groups) out.push_back(g == kNoGroup ? 0 : static_cast<uint32_t>(mesh.groups[g].tag));
+    for (const uint32_t g : *groups)
+      out.push_back(g == kNoGroup ? 0 : static_cast<uint32_t>(mesh.groups[g].tag));
   return out;
 }
 
@@ -41,7 +43,8 @@ Array<double> shares(const TetMesh &mesh) {
   return out;
 }
 
-// Lengths of strings in binary legacy files: the top bits of the first byte tell how many bytes the length takes.
+// Lengths of strings in binary legacy files: the top bits of the first byte tell how many bytes
+// the length takes.
 void put_string(AtomicFile &out, const std::string &s) {
   if (s.size() < 64) out.put(static_cast<uint8_t>(0xc0 | s.size()));
   else out.put(big_endian(static_cast<uint16_t>(0x8000 | std::min<size_t>(s.size(), 0x3fff))));
@@ -52,7 +55,10 @@ void put_group_names(AtomicFile &out, const TetMesh &mesh) {
   if (mesh.groups.empty()) return;
   const std::string n = text(mesh.groups.size());
   out.write(std::string("FIELD FieldData 2\n") + kVtkGroupNumber + " 2 " + n + " int\n");
-  for (const MeshGroup &g : mesh.groups) out.put(big_endian(g.dimension)), out.put(big_endian(g.tag));
+  for (const MeshGroup &g : mesh.groups) {
+    out.put(big_endian(g.dimension));
+    out.put(big_endian(g.tag));
+  }
   out.write(std::string("\n") + kVtkGroupName + " 1 " + n + " string\n");
   for (const MeshGroup &g : mesh.groups) put_string(out, g.name);
   out.write("\n");
@@ -74,9 +80,13 @@ class TextRows {
     const auto end = std::to_chars(row_ + used_, row_ + sizeof row_, value);
     used_ = size_t(end.ptr - row_);
     row_[used_++] = behind;
-    if (behind == '\n') out_.write(row_, used_), used_ = 0;
+    if (behind == '\n') {
+      out_.write(row_, used_);
+      used_ = 0;
+    }
   }
-  void elements(const char *keyword, uint32_t corners, const Array<uint32_t> &points, const Array<uint32_t> &group, const TetMesh &mesh) {
+  void elements(const char *keyword, uint32_t corners, const Array<uint32_t> &points,
+                const Array<uint32_t> &group, const TetMesh &mesh) {
     if (group.empty()) return;
     out_.write(std::string(keyword) + "\n" + text(group.size()) + "\n");
     for (size_t t = 0; t < group.size(); ++t) {
@@ -101,7 +111,8 @@ void write_vtk(const TetMesh &mesh, const std::string &path) {
   out.write("POINTS " + text(mesh.npoint()) + " double\n");
   for (const double x : mesh.points) out.put(big_endian(x));
   out.write("\nCELLS " + text(ncell) + " " + text(5 * uint64_t(mesh.ntet()) + 4 * ntri) + "\n");
-  put_cells(out, mesh.tets, 4), put_cells(out, mesh.tris, 3);
+  put_cells(out, mesh.tets, 4);
+  put_cells(out, mesh.tris, 3);
   out.write("\nCELL_TYPES " + text(ncell) + "\n");
   for (uint64_t t = 0; t < ncell; ++t) out.put(big_endian(int32_t(t < mesh.ntet() ? 10 : 5)));
   const Array<uint32_t> groups = group_numbers(mesh);
@@ -124,9 +135,12 @@ void write_vtu(const TetMesh &mesh, const std::string &path) {
   const Array<uint32_t> groups = group_numbers(mesh);
   const Array<double> share = shares(mesh);
   VtuGrid grid;
-  grid.npoint = mesh.npoint(), grid.points = mesh.points.data();
-  grid.ncell = mesh.ntet(), grid.cells = mesh.tets.data();
-  grid.nface = static_cast<uint32_t>(mesh.tri_group.size()), grid.faces = mesh.tris.data();
+  grid.npoint = mesh.npoint();
+  grid.points = mesh.points.data();
+  grid.ncell = mesh.ntet();
+  grid.cells = mesh.tets.data();
+  grid.nface = static_cast<uint32_t>(mesh.tri_group.size());
+  grid.faces = mesh.tris.data();
   grid.groups = &mesh.groups;
   if (!groups.empty()) grid.cell_data.push_back({kVtkGroup, 1, nullptr, groups.data()});
   if (!share.empty()) grid.cell_data.push_back({"share", 1, share.data(), nullptr});
@@ -158,7 +172,11 @@ void write_tet_mesh(const TetMesh &mesh, const std::string &path) {
   else if (ends(".vtk")) write_vtk(mesh, path);
   else if (ends(".vtu")) write_vtu(mesh, path);
   else if (ends(".mesh")) write_medit(mesh, path);
-  else fail(DFM_E_UNSUPPORTED, "%s: tetrahedra are not written to this file name ending; expected .msh (MSH 4.1), .msh2 (MSH 2.2), .vtk (legacy VTK), .vtu (VTU) or .mesh (Medit)", path.c_str());
+  else
+    fail(DFM_E_UNSUPPORTED,
+         "%s: tetrahedra are not written to this file name ending; expected .msh (MSH 4.1), .msh2 (MSH 2.2), "
+         ".vtk (legacy VTK), .vtu (VTU) or .mesh (Medit)",
+         path.c_str());
 }
 
 }  // namespace dfm

@@ -1,4 +1,5 @@
-// MSH 2.2 and 4.1, binary. Cells keep their order; groups of points and of triangles are written before them, as elements of their own.
+// MSH 2.2 and 4.1, binary. Cells keep their order; groups of points and of triangles are written before them,
+// as elements of their own.
 #include <algorithm>
 #include <cmath>
 
@@ -25,7 +26,8 @@ struct Run {
   uint64_t n;
 };
 
-void add_runs(std::vector<Run> &runs, int32_t dimension, int32_t type, uint32_t corners, const Array<uint32_t> &points, const Array<uint32_t> &group) {
+void add_runs(std::vector<Run> &runs, int32_t dimension, int32_t type, uint32_t corners,
+              const Array<uint32_t> &points, const Array<uint32_t> &group) {
   for (size_t t = 0; t < group.size();) {
     size_t end = t + 1;
     while (end < group.size() && group[end] == group[t]) ++end;
@@ -34,12 +36,14 @@ void add_runs(std::vector<Run> &runs, int32_t dimension, int32_t type, uint32_t 
   }
 }
 
-// Everything that is written, lowest dimension first. Of lines only the points are known, so their groups are left out.
+// Everything that is written, lowest dimension first. Of lines only the points are known, so their
+// groups are left out.
 std::vector<Run> runs_of(const TetMesh &mesh) {
   std::vector<Run> runs;
   for (uint32_t g = 0; g < mesh.groups.size(); ++g) {
     const Array<uint32_t> &points = mesh.groups[g].points;
-    if (mesh.groups[g].dimension == 0 && !points.empty()) runs.push_back({0, 15, g, 1, points.data(), points.size()});
+    if (mesh.groups[g].dimension == 0 && !points.empty())
+      runs.push_back({0, 15, g, 1, points.data(), points.size()});
   }
   add_runs(runs, 2, 2, 3, mesh.tris, mesh.tri_group);
   add_runs(runs, 3, 4, 4, mesh.tets, mesh.tet_group);
@@ -68,7 +72,8 @@ void put_names(AtomicFile &out, const TetMesh &mesh, const std::vector<uint32_t>
   if (groups.empty()) return;
   out.write("$PhysicalNames\n" + text(groups.size()) + "\n");
   for (const uint32_t g : groups)
-    out.write(std::to_string(mesh.groups[g].dimension) + " " + std::to_string(mesh.groups[g].tag) + " \"" + mesh.groups[g].name + "\"\n");
+    out.write(std::to_string(mesh.groups[g].dimension) + " " + std::to_string(mesh.groups[g].tag) + " \"" +
+              mesh.groups[g].name + "\"\n");
   out.write("$EndPhysicalNames\n");
 }
 
@@ -107,18 +112,26 @@ void write_msh41(const TetMesh &mesh, const std::string &path) {
   AtomicFile out(path);
   const std::vector<Run> runs = runs_of(mesh);
   const std::vector<uint32_t> groups = written_groups(mesh, runs);
-  put_head(out, "4.1"), put_names(out, mesh, groups), put_entities(out, mesh, groups);
+  put_head(out, "4.1");
+  put_names(out, mesh, groups);
+  put_entities(out, mesh, groups);
   const uint64_t npoint = mesh.npoint(), nelement = elements(runs);
   out.write("$Nodes\n");
   for (const uint64_t n : {uint64_t(1), npoint, uint64_t(1), npoint}) out.put(n);
-  out.put<int32_t>(3), out.put(entity_of(mesh, mesh.ntet() ? mesh.tet_group[0] : kNoGroup)), out.put<int32_t>(0), out.put(npoint);
+  out.put<int32_t>(3);
+  out.put(entity_of(mesh, mesh.ntet() ? mesh.tet_group[0] : kNoGroup));
+  out.put<int32_t>(0);
+  out.put(npoint);
   for (uint64_t i = 1; i <= npoint; ++i) out.put(i);
   out.write(mesh.points.data(), mesh.points.size() * sizeof(double));
   out.write("\n$EndNodes\n$Elements\n");
   for (const uint64_t n : {uint64_t(runs.size()), nelement, uint64_t(1), nelement}) out.put(n);
   uint64_t number = 0;
   for (const Run &r : runs) {
-    out.put(r.dimension), out.put(entity_of(mesh, r.group)), out.put(r.type), out.put(r.n);
+    out.put(r.dimension);
+    out.put(entity_of(mesh, r.group));
+    out.put(r.type);
+    out.put(r.n);
     for (uint64_t t = 0; t < r.n; ++t) {
       out.put(++number);
       for (uint32_t k = 0; k < r.corners; ++k) out.put<uint64_t>(uint64_t(r.points[r.corners * t + k]) + 1);
@@ -130,18 +143,27 @@ void write_msh41(const TetMesh &mesh, const std::string &path) {
 
 void write_msh22(const TetMesh &mesh, const std::string &path) {
   if (mesh.npoint() > INT32_MAX)
-    fail(DFM_E_UNSUPPORTED, "%s: MSH 2.2 holds up to %d nodes, the mesh has %u; write MSH 4.1", path.c_str(), INT32_MAX, mesh.npoint());
+    fail(DFM_E_UNSUPPORTED, "%s: MSH 2.2 holds up to %d nodes, the mesh has %u; write MSH 4.1", path.c_str(),
+         INT32_MAX, mesh.npoint());
   AtomicFile out(path);
   const std::vector<Run> runs = runs_of(mesh);
-  put_head(out, "2.2"), put_names(out, mesh, written_groups(mesh, runs));
+  put_head(out, "2.2");
+  put_names(out, mesh, written_groups(mesh, runs));
   out.write("$Nodes\n" + text(mesh.npoint()) + "\n");
-  for (uint32_t i = 0; i < mesh.npoint(); ++i) out.put(int32_t(i + 1)), out.write(&mesh.points[3 * size_t(i)], 3 * sizeof(double));
+  for (uint32_t i = 0; i < mesh.npoint(); ++i) {
+    out.put(int32_t(i + 1));
+    out.write(&mesh.points[3 * size_t(i)], 3 * sizeof(double));
+  }
   out.write("\n$EndNodes\n$Elements\n" + text(elements(runs)) + "\n");
   int32_t number = 0;
   for (const Run &r : runs) {
-    out.put(r.type), out.put(static_cast<int32_t>(r.n)), out.put<int32_t>(2);
+    out.put(r.type);
+    out.put(static_cast<int32_t>(r.n));
+    out.put<int32_t>(2);
     for (uint64_t t = 0; t < r.n; ++t) {
-      out.put(++number), out.put(r.group == kNoGroup ? 0 : mesh.groups[r.group].tag), out.put(entity_of(mesh, r.group));
+      out.put(++number);
+      out.put(r.group == kNoGroup ? 0 : mesh.groups[r.group].tag);
+      out.put(entity_of(mesh, r.group));
       for (uint32_t k = 0; k < r.corners; ++k) out.put(static_cast<int32_t>(r.points[r.corners * t + k] + 1));
     }
   }

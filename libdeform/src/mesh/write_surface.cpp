@@ -1,4 +1,5 @@
-// Triangles in the formats that other programs read. Text carries 17 digits, so that a double comes back as it was.
+// Triangles in the formats that other programs read. Text carries 17 digits, so that a double comes
+// back as it was.
 #include <algorithm>
 #include <bit>
 #include <cctype>
@@ -26,7 +27,8 @@ std::string text(uint64_t n) { return std::to_string(n); }
 
 void put_points(AtomicFile &out, const TriMesh &mesh, const char *before) {
   for (size_t p = 0; p < mesh.points.size(); p += 3)
-    out.write(format("%s%.17g %.17g %.17g\n", before, mesh.points[p], mesh.points[p + 1], mesh.points[p + 2]));
+    out.write(
+        format("%s%.17g %.17g %.17g\n", before, mesh.points[p], mesh.points[p + 1], mesh.points[p + 2]));
 }
 
 // A name ends with its line.
@@ -59,19 +61,23 @@ void put_off(AtomicFile &out, const TriMesh &mesh) {
 void put_ply(AtomicFile &out, const TriMesh &mesh) {
   out.write("ply\nformat binary_little_endian 1.0\nelement vertex " + text(mesh.npoint()) +
             "\nproperty double x\nproperty double y\nproperty double z\nelement face " + text(mesh.ntri()) +
-            "\nproperty list uchar uint vertex_indices\n" + (mesh.groups.empty() ? "" : "property int group\n") + "end_header\n");
+            "\nproperty list uchar uint vertex_indices\n" +
+            (mesh.groups.empty() ? "" : "property int group\n") + "end_header\n");
   for (const double x : mesh.points) put_as(out, std::endian::little, x);
   for (uint32_t t = 0; t < mesh.ntri(); ++t) {
     out.put(uint8_t(3));
     for (int k = 0; k < 3; ++k) put_as(out, std::endian::little, mesh.tris[3 * size_t(t) + k]);
-    if (!mesh.groups.empty()) put_as(out, std::endian::little, mesh.tri_group[t] == kNoGroup ? 0 : mesh.groups[mesh.tri_group[t]].tag);
+    if (!mesh.groups.empty())
+      put_as(out, std::endian::little,
+             mesh.tri_group[t] == kNoGroup ? 0 : mesh.groups[mesh.tri_group[t]].tag);
   }
 }
 
 void put_stl(AtomicFile &out, const TriMesh &mesh, const std::string &path) {
   for (const double x : mesh.points)
     if (std::fabs(x) > FLT_MAX)
-      fail(DFM_E_UNSUPPORTED, "%s: STL holds coordinates up to %g m, the surface has %g m; write .ply", path.c_str(), double(FLT_MAX), x);
+      fail(DFM_E_UNSUPPORTED, "%s: STL holds coordinates up to %g m, the surface has %g m; write .ply",
+           path.c_str(), double(FLT_MAX), x);
   std::string head = "binary STL, m";
   head.resize(80, ' ');
   out.write(head);
@@ -92,7 +98,10 @@ void put_stl(AtomicFile &out, const TriMesh &mesh, const std::string &path) {
 // The formats of cells hold triangles too: a body without cells, whose triangles all stand in the file.
 TetMesh as_cells(const TriMesh &mesh) {
   TetMesh out(*mesh.memory);
-  out.points = mesh.points, out.tris = mesh.tris, out.tri_group = mesh.tri_group, out.groups = mesh.groups;
+  out.points = mesh.points;
+  out.tris = mesh.tris;
+  out.tri_group = mesh.tri_group;
+  out.groups = mesh.groups;
   return out;
 }
 
@@ -100,14 +109,16 @@ TetMesh as_cells(const TriMesh &mesh) {
 
 void write_tri_mesh(const TriMesh &mesh, const std::string &path) {
   const size_t slash = path.find_last_of('/'), dot = path.find_last_of('.');
-  std::string ending = dot == std::string::npos || (slash != std::string::npos && dot < slash) ? "" : path.substr(dot);
+  std::string ending =
+      dot == std::string::npos || (slash != std::string::npos && dot < slash) ? "" : path.substr(dot);
   for (char &c : ending) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
   if (ending == ".vtk") return write_vtk(as_cells(mesh), path);
   if (ending == ".vtu") return write_vtu(as_cells(mesh), path);
   static const std::vector<std::string> known{".obj", ".ply", ".stl", ".off", ".vtk", ".vtu"};
   if (std::find(known.begin(), known.end(), ending) == known.end())
-    fail(DFM_E_UNSUPPORTED, "%s: a surface is written as %s, told by the file name's ending; this one ends with '%s'", path.c_str(),
-         join(known).c_str(), ending.c_str());
+    fail(DFM_E_UNSUPPORTED,
+         "%s: a surface is written as %s, told by the file name's ending; this one ends with '%s'",
+         path.c_str(), join(known).c_str(), ending.c_str());
   AtomicFile out(path);
   if (ending == ".obj") put_obj(out, mesh);
   else if (ending == ".ply") put_ply(out, mesh);

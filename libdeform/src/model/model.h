@@ -1,4 +1,5 @@
-// One body's model: the plugin instance, its parameters and its state. Everything else in the library calls models through here.
+// One body's model: the plugin instance, its parameters and its state. Everything else in the library calls
+// models through here.
 #pragma once
 #include <string>
 #include <vector>
@@ -13,35 +14,45 @@ struct ModelInstance {
   const dfm_type *type = nullptr;
   const dfm_model *ops = nullptr;
   const dfm_host *host = nullptr;
-  const dfm_stepper *stepper = nullptr;      // null: a force model, the host integrates
-  const dfm_effects *effects = nullptr;      // null: whatever the type promises is at work
-  const dfm_idle *idle = nullptr;            // null: every parameter does what its row says
-  const dfm_limited *limited = nullptr;      // null: the model limits nothing, or does not say
+  const dfm_stepper *stepper = nullptr;  // null: a force model, the host integrates
+  const dfm_effects *effects = nullptr;  // null: whatever the type promises is at work
+  const dfm_idle *idle = nullptr;        // null: every parameter does what its row says
+  const dfm_limited *limited = nullptr;  // null: the model limits nothing, or does not say
   void *self = nullptr;
   std::vector<double> params;
-  Array<double> state, state_out;            // slots end to end
+  Array<double> state, state_out;  // slots end to end
 
   ModelInstance() = default;
   ModelInstance(const ModelInstance &) = delete;
   ModelInstance &operator=(const ModelInstance &) = delete;
   ~ModelInstance() {
-    if (self && ops->destroy) call("destroy", [&] { return ops->destroy(self), DFM_OK; });
+    if (self && ops->destroy)
+      call("destroy", [&] {
+        ops->destroy(self);
+        return DFM_OK;
+      });
   }
 
   // Creates the instance and its state; throws Error naming the plugin where it refuses.
-  void create(const dfm_type &t, const dfm_host &host, const dfm_mesh &mesh, const Memory &memory, std::vector<double> values);
+  void create(const dfm_type &t, const dfm_host &host, const dfm_mesh &mesh, const Memory &memory,
+              std::vector<double> values);
   // Runs f, which calls into the plugin: an exception becomes a status, a failure is logged as `what`.
   template <class F>
-  dfm_status call(const char *what, F &&f) const noexcept { return call_plugin(*host, *type, what, f); }
+  dfm_status call(const char *what, F &&f) const noexcept {
+    return call_plugin(*host, *type, what, f);
+  }
   // Is this effect of the type called for by the present parameters?
   bool works(const std::string &effect) const;
   // Why the parameter of this row does nothing now; empty where it does what it says.
   std::string idle_reason(uint32_t row) const;
-  uint32_t limited_cells() const;            // at the last bound
-  void commit_state() { if (!state.empty()) state.swap(state_out); }
+  uint32_t limited_cells() const;  // at the last bound
+  void commit_state() {
+    if (!state.empty()) state.swap(state_out);
+  }
 };
 
 // Number of state values that slots need on a mesh of these counts.
-size_t model_state_size(const dfm_slot *slots, uint32_t nslot, uint32_t npoint, uint32_t ncell, uint32_t nedge);
+size_t model_state_size(const dfm_slot *slots, uint32_t nslot, uint32_t npoint, uint32_t ncell,
+                        uint32_t nedge);
 
 }  // namespace dfm

@@ -17,20 +17,26 @@ namespace dfm::narrow {
 using Run = std::span<const Candidate>;
 
 // Cosines and sines of directions, dimensionless.
-constexpr double kFlat = 1e-3;        // slack of the cones of normals against the edges of a box
-constexpr double kCone = 0.035;       // 2 degrees: slack of an edge's cone of normals, so that contacts do not flicker at its border
-constexpr double kParallel = 1e-3;    // sine between two edges below which vertex-face contacts stand for them
-constexpr double kPast = 0.25;        // share of an edge by which it may count as longer for what slides in over its ends
-constexpr double kLeastDip = 0.1;     // of the rest offset: what a face's inside is nearer to voxels than its corners by less is left to the corners
-constexpr double kEnd = 1e-3;         // share of an edge next to its ends that is left to vertex-face contacts: no longer than the default d_c
+constexpr double kFlat = 1e-3;  // slack of the cones of normals against the edges of a box
+// 2 degrees: slack of an edge's cone of normals, so that contacts do not flicker at its border
+constexpr double kCone = 0.035;
+// sine between two edges below which vertex-face contacts stand for them
+constexpr double kParallel = 1e-3;
+// share of an edge by which it may count as longer for what slides in over its ends
+constexpr double kPast = 0.25;
+// of the rest offset: what a face's inside is nearer to voxels than its corners by less is left
+// to the corners
+constexpr double kLeastDip = 0.1;
+// share of an edge next to its ends that is left to vertex-face contacts: no longer than the default d_c
+constexpr double kEnd = 1e-3;
 
 struct Pair {
   const BodyView &a;
-  const BodyView *b;            // or
+  const BodyView *b;  // or
   const ObstacleShape *shape;
   double h, offset;
-  double speed_b;               // m/s, bound over body b's surfels
-  std::span<const Crossing> crossings{};   // of this pair, in their order
+  double speed_b;                         // m/s, bound over body b's surfels
+  std::span<const Crossing> crossings{};  // of this pair, in their order
 
   Vec3 xa(uint32_t s) const { return load3(&a.surface->x[4 * size_t{s}]); }
   Vec3 va(uint32_t s) const { return load3(&a.surface->v[4 * size_t{s}]); }
@@ -38,7 +44,8 @@ struct Pair {
   Vec3 vb(uint32_t s) const { return load3(&b->surface->v[4 * size_t{s}]); }
   // Did edge a touch any edge of b, or this one, at the end of the last sub-step?
   bool bears(uint32_t edge_a) const {
-    const auto at = std::lower_bound(crossings.begin(), crossings.end(), edge_a, [](const Crossing &c, uint32_t edge) { return c.edge_a < edge; });
+    const auto at = std::lower_bound(crossings.begin(), crossings.end(), edge_a,
+                                     [](const Crossing &c, uint32_t edge) { return c.edge_a < edge; });
     return at != crossings.end() && at->edge_a == edge_a;
   }
   bool bears(uint32_t edge_a, uint32_t edge_b) const {
@@ -54,8 +61,10 @@ inline uint64_t mix(uint64_t hash, uint64_t value) {
   return hash ^ hash >> 29;
 }
 // ordinal: tells apart contacts of one feature with one patch, in the order of b's features.
-inline uint64_t contact_key(const ContactPoint &c, uint64_t id_a, uint64_t id_b, uint32_t patch, uint32_t ordinal) {
-  const uint64_t head = uint64_t{c.kind} | uint64_t{c.obstacle} << 8 | uint64_t{c.type_a} << 16 | uint64_t{ordinal} << 32;
+inline uint64_t contact_key(const ContactPoint &c, uint64_t id_a, uint64_t id_b, uint32_t patch,
+                            uint32_t ordinal) {
+  const uint64_t head =
+      uint64_t{c.kind} | uint64_t{c.obstacle} << 8 | uint64_t{c.type_a} << 16 | uint64_t{ordinal} << 32;
   uint64_t hash = mix(0x9e3779b97f4a7c15ull, head);
   hash = mix(hash, id_a);
   hash = mix(hash, id_b);
@@ -63,7 +72,8 @@ inline uint64_t contact_key(const ContactPoint &c, uint64_t id_a, uint64_t id_b,
 }
 
 // Blank contact of a pair; the caller fills geometry, nodes and weights.
-inline ContactPoint blank(const Pair &pair, uint8_t kind, uint8_t type_a, uint32_t feature_a, uint32_t feature_b) {
+inline ContactPoint blank(const Pair &pair, uint8_t kind, uint8_t type_a, uint32_t feature_a,
+                          uint32_t feature_b) {
   ContactPoint c{};
   c.kind = kind;
   c.type_a = type_a;
@@ -91,26 +101,33 @@ void edge_edge(const Pair &pair, Run run, Array<ContactPoint> &out);
 void surfel_obstacle(const Pair &pair, Run run, Array<ContactPoint> &out);
 void edge_obstacle(const Pair &pair, Run run, Array<ContactPoint> &out);
 void triangle_obstacle(const Pair &pair, Run run, Array<ContactPoint> &out);
-// Is a place inside the face x (in the grid's frame) lower than its corners by more than `dip`? Where and how low. Faces above `most` are not looked at.
-bool dips(const VoxelGrid &grid, const Vec3 x[3], double most, double dip, double weight[3], double &distance);
+// Is a place inside the face x (in the grid's frame) lower than its corners by more than `dip`? Where and how
+// low. Faces above `most` are not looked at.
+bool dips(const VoxelGrid &grid, const Vec3 x[3], double most, double dip, double weight[3],
+          double &distance);
 void voxel_triangle(const Pair &pair, Run run, Array<ContactPoint> &out);
 // A contact on `q` of the body (nodes and weights already set), on `o` of the obstacle.
-void finish(const Pair &pair, ContactPoint &c, Vec3 q, Vec3 o, Vec3 normal, double distance, uint32_t patch, Array<ContactPoint> &out);
+void finish(const Pair &pair, ContactPoint &c, Vec3 q, Vec3 o, Vec3 normal, double distance, uint32_t patch,
+            Array<ContactPoint> &out);
 // Of these surfels against the obstacle's surface at o.
 double reach_of(const Pair &pair, std::span<const uint32_t> nodes, Vec3 o);
 // A body against a mesh that has no dofs: pair.b is the mesh, and its nodes lie beyond those of all bodies.
-void mesh_obstacle(const Pair &pair, const ObstacleView &view, uint8_t kind, Run run, Array<ContactPoint> &out);
-// The faces beside an edge and their cone of normals: a unit direction that is orthogonal to the edge lies in it if it leans to neither
-// face by more than `slack` (sine).
+void mesh_obstacle(const Pair &pair, const ObstacleView &view, uint8_t kind, Run run,
+                   Array<ContactPoint> &out);
+// The faces beside an edge and their cone of normals: a unit direction that is orthogonal to the edge lies in
+// it if it leans to neither face by more than `slack` (sine).
 struct EdgeFaces {
-  Vec3 along;                  // unit, i to j
-  Vec3 normal[2], inward[2];   // unit; inward lies in the face, orthogonal to the edge; both zero where there is no face
+  Vec3 along;  // unit, i to j
+  // unit; inward lies in the face, orthogonal to the edge; both zero where there is no face
+  Vec3 normal[2], inward[2];
   Vec3 outward() const { return normal[0] + normal[1]; }
-  bool leans_out(Vec3 n, double slack) const { return dot(n, inward[0]) <= slack && dot(n, inward[1]) <= slack; }
+  bool leans_out(Vec3 n, double slack) const {
+    return dot(n, inward[0]) <= slack && dot(n, inward[1]) <= slack;
+  }
 };
 EdgeFaces edge_faces(const Surface &surface, uint32_t edge);
 bool edge_becomes_convex(const Surface &surface, uint32_t edge, double h);
-constexpr int kNowhere = -2, kBetween = -1;   // else the end: 0 or 1
+constexpr int kNowhere = -2, kBetween = -1;  // else the end: 0 or 1
 int place_on_edge(double at, double slide);
 
 }  // namespace dfm::narrow

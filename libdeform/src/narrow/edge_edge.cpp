@@ -1,10 +1,13 @@
-// Two edges cross over each other: closest points of their lines n . r / |n| with n = u x w, both inside the edges, both edges convex,
-// and the direction inside both cones of normals. The faces beside the edges give the sign, so that edges which have slipped through each
+// Two edges cross over each other: closest points of their lines n . r / |n| with n = u x w, both inside the
+// edges, both edges convex,
+// and the direction inside both cones of normals. The faces beside the edges give the sign, so that edges
+// which have slipped through each
 // other by a little are pushed back the way they came.
 //
-// Edges that bore each other in the last sub-step count on, convex or not, within their cones of normals: the load itself presses them flat and a little
-// hollow, and left out there they would lose it, spring back and be hit again, for ever (doc/decisions/0035-edges-that-bear.md). Between hollow edges the lines
-// are further apart than the surfaces, so such a contact keeps nothing away that the others would let come.
+// Edges that bore each other in the last sub-step count on, convex or not, within their cones of normals: the
+// load itself presses them flat and a little hollow, and left out there they would lose it, spring back and
+// be hit again, for ever (doc/decisions/0035-edges-that-bear.md). Between hollow edges the lines are further
+// apart than the surfaces, so such a contact keeps nothing away that the others would let come.
 #include <algorithm>
 
 #include "narrow/detail.h"
@@ -27,9 +30,10 @@ EdgeFaces edge_faces(const Surface &surface, uint32_t edge) {
   return f;
 }
 
-// Where the crossing at `at` (0 and 1: the ends) lies on an edge: kNowhere on it, between its ends, or so close to one of them that the end itself may
-// make the contact (vertex-face); a second one in the same place with nearly the same normal would only make the solve ill-conditioned. Where
-// the crossing may slide in over an end within the sub-step (by `slide`, in lengths of the edge), the edges would be through each other
+// Where the crossing at `at` (0 and 1: the ends) lies on an edge: kNowhere on it, between its ends, or so
+// close to one of them that the end itself may make the contact (vertex-face); a second one in the same place
+// with nearly the same normal would only make the solve ill-conditioned. Where the crossing may slide in over
+// an end within the sub-step (by `slide`, in lengths of the edge), the edges would be through each other
 // before they were seen: then the edge counts as that much longer.
 int place_on_edge(double at, double slide) {
   if (slide > kEnd) {
@@ -42,7 +46,8 @@ int place_on_edge(double at, double slide) {
 
 namespace {
 
-// Does a vertex this near an edge make a contact of its own there: over one of the edge's faces, or off the edge in the vertex's cone of normals?
+// Does a vertex this near an edge make a contact of its own there: over one of the edge's faces, or off the
+// edge in the vertex's cone of normals?
 bool end_touches(const Surface &surface, uint32_t vertex, Vec3 from, Vec3 to, const EdgeFaces &faces) {
   const Vec3 p = load3(&surface.x[4 * size_t{vertex}]);
   const double s = closest_on_segment(p, from, to);
@@ -54,7 +59,8 @@ bool end_touches(const Surface &surface, uint32_t vertex, Vec3 from, Vec3 to, co
 
 }  // namespace
 
-// Convex now, or on the way to be within the sub-step: a fold that pops out under an edge that lies on both its faces meets it at once.
+// Convex now, or on the way to be within the sub-step: a fold that pops out under an edge that lies on both
+// its faces meets it at once.
 bool edge_becomes_convex(const Surface &surface, uint32_t edge, double h) {
   return edge_convex(surface, edge, 0) || edge_convex(surface, edge, 2 * h);
 }
@@ -67,15 +73,19 @@ void edge_edge(const Pair &pair, Run run, Array<ContactPoint> &out) {
   double uu = 0, widest2 = 0;
   const double depth = edge_recovery_depth(sa, sb);
   EdgeFaces fa;
-  bool known = false, convex = false, bears = false;   // fa belongs to last_a; so do convex and bears
+  bool known = false, convex = false, bears = false;  // fa belongs to last_a; so do convex and bears
   for (const Candidate &candidate : run) {
-    const uint32_t *ea = &sa.edge[2 * size_t{candidate.feature_a}], *eb = &sb.edge[2 * size_t{candidate.feature_b}];
+    const uint32_t *ea = &sa.edge[2 * size_t{candidate.feature_a}];
+    const uint32_t *eb = &sb.edge[2 * size_t{candidate.feature_b}];
     if (candidate.feature_a != last_a) {
       last_a = candidate.feature_a;
       known = false;
-      convex = edge_becomes_convex(sa, last_a, pair.h), bears = pair.bears(last_a);
-      p0 = pair.xa(ea[0]), u = pair.xa(ea[1]) - p0;
-      vp0 = pair.va(ea[0]), vp1 = pair.va(ea[1]);
+      convex = edge_becomes_convex(sa, last_a, pair.h);
+      bears = pair.bears(last_a);
+      p0 = pair.xa(ea[0]);
+      u = pair.xa(ea[1]) - p0;
+      vp0 = pair.va(ea[0]);
+      vp1 = pair.va(ea[1]);
       uu = norm2(u);
       const double speed = std::sqrt(std::max(norm2(vp0), norm2(vp1))) + pair.speed_b;
       const double widest = std::max(contact_reach(pair.h, pair.offset, speed), depth);
@@ -87,17 +97,21 @@ void edge_edge(const Pair &pair, Run run, Array<ContactPoint> &out) {
     const double nn = norm2(n), nr = dot(n, r), ww = norm2(w);
     if (!(nr * nr <= widest2 * nn) || !(nn > kParallel * kParallel * uu * ww)) continue;
     const double uw = dot(u, w), ur = dot(u, r), wr = dot(w, r);
-    const double s = uw * wr - ww * ur, t = uu * wr - uw * ur;   // times nn
+    const double s = uw * wr - ww * ur, t = uu * wr - uw * ur;  // times nn
     if (!(s > -kPast * nn && s < (1 + kPast) * nn && t > -kPast * nn && t < (1 + kPast) * nn)) continue;
     double speed2 = 0;
-    for (const uint32_t e : {eb[0], eb[1]}) speed2 = std::max({speed2, norm2(vp0 - pair.vb(e)), norm2(vp1 - pair.vb(e))});
+    for (const uint32_t e : {eb[0], eb[1]})
+      speed2 = std::max({speed2, norm2(vp0 - pair.vb(e)), norm2(vp1 - pair.vb(e))});
     const double reach = contact_reach(pair.h, pair.offset, std::sqrt(speed2));
     const double allowed = std::max(reach, depth);
     if (!(nr * nr < allowed * allowed * nn)) continue;
-    const int place_a = place_on_edge(s / nn, 2 * pair.h * std::sqrt(speed2 / uu)), place_b = place_on_edge(t / nn, 2 * pair.h * std::sqrt(speed2 / ww));
+    const int place_a = place_on_edge(s / nn, 2 * pair.h * std::sqrt(speed2 / uu));
+    const int place_b = place_on_edge(t / nn, 2 * pair.h * std::sqrt(speed2 / ww));
     if (place_a == kNowhere || place_b == kNowhere) continue;
 
-    if (!(convex && edge_becomes_convex(sb, candidate.feature_b, pair.h)) && !(bears && pair.bears(last_a, candidate.feature_b))) continue;
+    if (!(convex && edge_becomes_convex(sb, candidate.feature_b, pair.h)) &&
+        !(bears && pair.bears(last_a, candidate.feature_b)))
+      continue;
     if (!known) fa = edge_faces(sa, candidate.feature_a);
     known = true;
     const EdgeFaces fb = edge_faces(sb, candidate.feature_b);
@@ -125,7 +139,8 @@ void edge_edge(const Pair &pair, Run run, Array<ContactPoint> &out) {
   };
   for (size_t i = begin; i < out.size(); ++i) {
     uint32_t ordinal = 0;
-    for (size_t j = i; j-- > begin && out[j].feature_a == out[i].feature_a;) ordinal += patch(out[j]) == patch(out[i]);
+    for (size_t j = i; j-- > begin && out[j].feature_a == out[i].feature_a;)
+      ordinal += patch(out[j]) == patch(out[i]);
     out[i].key = contact_key(out[i], pair.a.id, pair.b->id, patch(out[i]), ordinal);
   }
 }

@@ -25,16 +25,19 @@ std::span<const Crossing> of_pair(std::span<const Crossing> all, uint64_t id_a, 
 struct Owners {
   const ContactPoint *begin, *end;
   bool has(uint32_t surfel) const {
-    const ContactPoint *at = std::lower_bound(begin, end, surfel, [](const ContactPoint &c, uint32_t s) { return c.feature_a < s; });
+    const ContactPoint *at = std::lower_bound(
+        begin, end, surfel, [](const ContactPoint &c, uint32_t s) { return c.feature_a < s; });
     return at != end && at->feature_a == surfel;
   }
 };
 
-// An edge or triangle contact takes over the area of the nearest of its corners that carries no contact of its own with the other side;
-// none is given twice; 0 where none is free (doc/concepts/detection.md). lender holds the node that gave.
+// An edge or triangle contact takes over the area of the nearest of its corners that carries no contact of
+// its own with the other side; none is given twice; 0 where none is free (doc/concepts/detection.md). lender
+// holds the node that gave.
 class Areas {
  public:
-  Areas(std::span<const BodyView> bodies, std::span<const ObstacleView> obstacles, Array<ContactPoint> &contacts, Array<uint8_t> &lent)
+  Areas(std::span<const BodyView> bodies, std::span<const ObstacleView> obstacles,
+        Array<ContactPoint> &contacts, Array<uint8_t> &lent)
       : bodies_(bodies), obstacles_(obstacles), contacts_(contacts), lent_(lent) {
     uint32_t nnode = 0;
     for (const BodyView &b : bodies) nnode = std::max(nnode, b.first_node + b.surface->nsurfel);
@@ -73,12 +76,11 @@ class Areas {
     };
     const ContactPoint *list = contacts_.data(), *last = list + contacts_.size();
     // Surfels come before edges and triangles of the same pair.
-    const ContactPoint *begin = std::lower_bound(list, last, wanted, [&](const ContactPoint &c, const Place &w) {
-      return before(place_of(c), w);
-    });
-    const ContactPoint *end = std::lower_bound(begin, last, wanted, [&](const ContactPoint &c, const Place &w) {
-      return !before(w, place_of(c)) && c.type_a == 0;
-    });
+    const ContactPoint *begin = std::lower_bound(
+        list, last, wanted, [&](const ContactPoint &c, const Place &w) { return before(place_of(c), w); });
+    const ContactPoint *end = std::lower_bound(
+        begin, last, wanted,
+        [&](const ContactPoint &c, const Place &w) { return !before(w, place_of(c)) && c.type_a == 0; });
     return {begin, end};
   }
 
@@ -99,7 +101,8 @@ class Areas {
         if (lent_[c.node[k]]) continue;
         nearest = d2;
         c.lender = c.node[k] + 1;
-        c.area = facing_area(*own.surface, surfel, side_a ? -load3(c.normal) : load3(c.normal)) * (b ? 0.5 : 1.0);
+        c.area =
+            facing_area(*own.surface, surfel, side_a ? -load3(c.normal) : load3(c.normal)) * (b ? 0.5 : 1.0);
       }
       if (c.lender) lent_[c.lender - 1] = 1;
     }
@@ -110,13 +113,14 @@ class Areas {
   std::span<const BodyView> bodies_;
   std::span<const ObstacleView> obstacles_;
   Array<ContactPoint> &contacts_;
-  Array<uint8_t> &lent_;   // per node: has lent its area in the pair at hand
+  Array<uint8_t> &lent_;  // per node: has lent its area in the pair at hand
 };
 
 }  // namespace
 
-void find_contacts(std::span<const BodyView> bodies, std::span<const ObstacleView> obstacles, const Array<Candidate> &candidates, double h,
-                   double offset, std::span<const Crossing> crossings, Array<uint8_t> &lent, Array<ContactPoint> &out) {
+void find_contacts(std::span<const BodyView> bodies, std::span<const ObstacleView> obstacles,
+                   const Array<Candidate> &candidates, double h, double offset,
+                   std::span<const Crossing> crossings, Array<uint8_t> &lent, Array<ContactPoint> &out) {
   out.clear();
   uint32_t nnode = 0;
   for (const BodyView &b : bodies) nnode = std::max(nnode, b.first_node + b.surface->nsurfel);
@@ -125,25 +129,31 @@ void find_contacts(std::span<const BodyView> bodies, std::span<const ObstacleVie
   for (size_t i = 0; i < candidates.size();) {
     const Candidate &c = candidates[i];
     size_t end = i + 1;
-    while (end < candidates.size() && candidates[end].slot_a == c.slot_a && candidates[end].slot_b == c.slot_b &&
-           candidates[end].obstacle == c.obstacle && candidates[end].kind == c.kind)
+    while (end < candidates.size() && candidates[end].slot_a == c.slot_a &&
+           candidates[end].slot_b == c.slot_b && candidates[end].obstacle == c.obstacle &&
+           candidates[end].kind == c.kind)
       ++end;
     const narrow::Run run(&c, end - i);
     i = end;
     const BodyView &a = *find_slot(bodies, c.slot_a);
-    if (a.asleep && !(c.obstacle ? find_slot(obstacles, c.slot_b)->moves() : !find_slot(bodies, c.slot_b)->asleep)) continue;
+    if (a.asleep &&
+        !(c.obstacle ? find_slot(obstacles, c.slot_b)->moves() : !find_slot(bodies, c.slot_b)->asleep))
+      continue;
     if (c.obstacle) {
       const ObstacleView &view = *find_slot(obstacles, c.slot_b);
       if (view.shape == Shape::mesh) {
         const BodyView mesh{view.slot, nnode, view.category, view.collides_with, view.id, view.surface};
         const double fastest = norm(view.velocity) + norm(view.spin) * view.extent;
-        narrow::mesh_obstacle({a, &mesh, nullptr, h, offset, fastest, of_pair(crossings, a.id, view.id)}, view, c.kind, run, out);
+        narrow::mesh_obstacle({a, &mesh, nullptr, h, offset, fastest, of_pair(crossings, a.id, view.id)},
+                              view, c.kind, run, out);
         continue;
       }
       const ObstacleShape shape(view);
       const narrow::Pair pair{a, nullptr, &shape, h, offset, 0};
       const auto triangle = view.shape == Shape::voxels ? narrow::voxel_triangle : narrow::triangle_obstacle;
-      (c.kind == 0 ? narrow::surfel_obstacle : c.kind == 1 ? narrow::edge_obstacle : triangle)(pair, run, out);
+      (c.kind == 0   ? narrow::surfel_obstacle
+       : c.kind == 1 ? narrow::edge_obstacle
+                     : triangle)(pair, run, out);
       continue;
     }
     const BodyView *b = find_slot(bodies, c.slot_b);

@@ -1,6 +1,6 @@
-// Bodies against planes, spheres, boxes and capsules, in closed form. A surfel sees the nearest point of the obstacle. Where the obstacle
-// is smaller than a triangle, edges and faces of the body count too, with the same rule as between bodies: only local minima of the
-// distance, seen from outside.
+// Bodies against planes, spheres, boxes and capsules, in closed form. A surfel sees the nearest point of the
+// obstacle. Where the obstacle is smaller than a triangle, edges and faces of the body count too, with the
+// same rule as between bodies: only local minima of the distance, seen from outside.
 #include <algorithm>
 
 #include "narrow/detail.h"
@@ -9,10 +9,12 @@
 
 namespace dfm::narrow {
 
-void finish(const Pair &pair, ContactPoint &c, Vec3 q, Vec3 o, Vec3 normal, double distance, uint32_t patch, Array<ContactPoint> &out) {
+void finish(const Pair &pair, ContactPoint &c, Vec3 q, Vec3 o, Vec3 normal, double distance, uint32_t patch,
+            Array<ContactPoint> &out) {
   place(c, q, o, normal, distance);
-  // A belt slips along its surface; it never pushes what lies beside it. Of what turns, it is the place where the body's own point is: what sticks goes
-  // along with the turn at its own radius, and that is also where impulses act (ContactRows::arm), so that a spin which they take back leaves nothing.
+  // A belt slips along its surface; it never pushes what lies beside it. Of what turns, it is the place where
+  // the body's own point is: what sticks goes along with the turn at its own radius, and that is also where
+  // impulses act (ContactRows::arm), so that a spin which they take back leaves nothing.
   const ObstacleView &view = pair.shape->view();
   store3(c.velocity, view.velocity_at(q, pair.h) - dot(view.belt, normal) * normal);
   c.key = contact_key(c, pair.a.id, view.id, patch, 0);
@@ -28,12 +30,13 @@ double reach_of(const Pair &pair, std::span<const uint32_t> nodes, Vec3 o) {
 
 namespace {
 
-// One edge of the body with what it needs against a shape; the faces beside it are found when first asked for.
+// One edge of the body with what it needs against a shape; the faces beside it are found when
+// first asked for.
 struct Edge {
   const Pair &pair;
   uint32_t number;
   std::span<const uint32_t> ends;
-  Vec3 p, u;                   // p + s u
+  Vec3 p, u;  // p + s u
   EdgeFaces faces;
   bool known = false;
 
@@ -46,7 +49,8 @@ struct Edge {
     known = true;
     return faces;
   }
-  void emit(double s, Vec3 o, Vec3 normal, double distance, uint32_t feature_b, Array<ContactPoint> &out) const {
+  void emit(double s, Vec3 o, Vec3 normal, double distance, uint32_t feature_b,
+            Array<ContactPoint> &out) const {
     ContactPoint c = blank(pair, kPrimitive, 1, number, feature_b);
     add_node(c, pair.a.first_node + ends[0], 1 - s);
     add_node(c, pair.a.first_node + ends[1], s);
@@ -54,10 +58,11 @@ struct Edge {
   }
 };
 
-// The inner point s of an edge against a ball around c; normal from c to the edge. `cone` accepts directions that leave the obstacle. slack: of the edge's own
-// cone of normals, more than kFlat.
+// The inner point s of an edge against a ball around c; normal from c to the edge. `cone` accepts directions
+// that leave the obstacle. slack: of the edge's own cone of normals, more than kFlat.
 template <class Cone>
-void edge_point(Edge &e, double s, Vec3 c, double radius, uint32_t feature_b, double slack, Cone &&cone, Array<ContactPoint> &out) {
+void edge_point(Edge &e, double s, Vec3 c, double radius, uint32_t feature_b, double slack, Cone &&cone,
+                Array<ContactPoint> &out) {
   if (!(s > 0 && s < 1)) return;
   const Vec3 r = e.p + s * e.u - c;
   const double d = norm(r);
@@ -68,9 +73,10 @@ void edge_point(Edge &e, double s, Vec3 c, double radius, uint32_t feature_b, do
   e.emit(s, c + radius * normal, normal, d - radius, feature_b, out);
 }
 
-// Across a capsule's axis the two lines fix the normal, as between two edges, and what bears is a row of edges that the straight axis presses into
-// one line: flat ones. Left out, each would lose its load where it is pushed flat, spring back and be hit again (a tube between two rods shook for ever).
-// A ball's center has the faces beside a flat edge.
+// Across a capsule's axis the two lines fix the normal, as between two edges, and what bears is a row of
+// edges that the straight axis presses into one line: flat ones. Left out, each would lose its load where it
+// is pushed flat, spring back and be hit again (a tube between two rods shook for ever). A ball's center has
+// the faces beside a flat edge.
 void edge_round(Edge &e, Array<ContactPoint> &out) {
   const Pair &pair = e.pair;
   const ObstacleShape &shape = *pair.shape;
@@ -83,7 +89,8 @@ void edge_round(Edge &e, Array<ContactPoint> &out) {
   if (shape.view().shape == Shape::sphere || parallel) {
     const int ends = shape.view().shape == Shape::sphere ? 1 : 2;
     for (int k = 0; k < ends && convex(); ++k)
-      edge_point(e, closest_on_segment(shape.end(k), e.p, e.p + e.u), shape.end(k), radius, uint32_t(k), 0, any, out);
+      edge_point(e, closest_on_segment(shape.end(k), e.p, e.p + e.u), shape.end(k), radius, uint32_t(k), 0,
+                 any, out);
     return;
   }
   const SegmentPoints q = closest_segments(e.p, e.p + e.u, shape.end(0), shape.end(1));
@@ -105,7 +112,7 @@ void edge_box(Edge &e, Array<ContactPoint> &out) {
     shape.edge(k, q, to, face);
     const Vec3 w = to - q, r = e.p - q, n = cross(e.u, w);
     const double nn = norm2(n), ww = norm2(w), uw = dot(e.u, w), ur = dot(e.u, r), wr = dot(w, r);
-    const double s = uw * wr - ww * ur, t = uu * wr - uw * ur;   // times nn
+    const double s = uw * wr - ww * ur, t = uu * wr - uw * ur;  // times nn
     if (!(nn > kParallel * kParallel * uu * ww) || !(s > 0 && s < nn && t > 0 && t < nn)) continue;
     const Vec3 o = q + (t / nn) * w;
     const double reach = reach_of(pair, e.ends, o), nr = dot(n, r), allowed = std::max(reach, depth);
@@ -114,8 +121,11 @@ void edge_box(Edge &e, Array<ContactPoint> &out) {
     const Vec3 m0 = shape.face_normal(face[0]), m1 = shape.face_normal(face[1]);
     Vec3 normal = (1 / std::sqrt(nn)) * n;
     if (dot(normal, m0 + m1) < dot(normal, f.outward())) normal = -normal;
-    const double distance = dot(normal, r), slack = kCone + std::min(0.3, reach / std::sqrt(std::min(uu, ww)));
-    if (!(distance < reach) || !f.leans_out(-normal, slack) || dot(normal, m0) < -slack || dot(normal, m1) < -slack) continue;
+    const double distance = dot(normal, r);
+    const double slack = kCone + std::min(0.3, reach / std::sqrt(std::min(uu, ww)));
+    if (!(distance < reach) || !f.leans_out(-normal, slack) || dot(normal, m0) < -slack ||
+        dot(normal, m1) < -slack)
+      continue;
     e.emit(s / nn, o, normal, distance, k, out);
   }
   for (uint32_t k = 0; k < 8; ++k) {
@@ -129,7 +139,8 @@ void edge_box(Edge &e, Array<ContactPoint> &out) {
   }
 }
 
-// Off a box's edge or corner the direction is free, and the surfel must stick out along it; where it does not, the edges and faces beside it are nearer.
+// Off a box's edge or corner the direction is free, and the surfel must stick out along it; where it does
+// not, the edges and faces beside it are nearer.
 bool off_an_edge(const ObstacleShape &shape, const ObstaclePoint &o) {
   if (shape.view().shape != Shape::box || !(o.distance > 0)) return false;
   for (int k = 0; k < 3; ++k)
@@ -158,7 +169,9 @@ void edge_obstacle(const Pair &pair, Run run, Array<ContactPoint> &out) {
   const bool box = pair.shape->view().shape == Shape::box;
   for (const Candidate &candidate : run) {
     const uint32_t number = candidate.feature_a;
-    if (box ? !edge_becomes_convex(surface, number, pair.h) : edge_hollow(surface, number) && edge_hollow(surface, number, 2 * pair.h)) continue;
+    if (box ? !edge_becomes_convex(surface, number, pair.h)
+            : edge_hollow(surface, number) && edge_hollow(surface, number, 2 * pair.h))
+      continue;
     Edge e(pair, number);
     if (box) edge_box(e, out);
     else edge_round(e, out);
@@ -181,8 +194,11 @@ void triangle_obstacle(const Pair &pair, Run run, Array<ContactPoint> &out) {
       const double plane = dot(m, c - q.point), distance = plane - radius;
       // Over the face, its border included: there rounding may put a point beside both of two triangles.
       if (q.feature != TriangleFeature::face && !(q.distance2 <= plane * plane * (1 + 1e-9))) continue;
-      if (!(norm2(m) > 0) || !(distance < reach_of(pair, corner, c)) || !(plane > (box ? -depth : -std::min(radius, depth)))) continue;
-      if (box && plane < 0) {              // only a corner that leads the box into the body, not one of its far side
+      if (!(norm2(m) > 0) || !(distance < reach_of(pair, corner, c)) ||
+          !(plane > (box ? -depth : -std::min(radius, depth))))
+        continue;
+      // only a corner that leads the box into the body, not one of its far side
+      if (box && plane < 0) {
         bool leads = true;
         for (int i = 0; i < 3; ++i) leads &= dot(m, shape.axis(i)) * (k >> i & 1 ? 1 : -1) <= 0.3;
         if (!leads) continue;

@@ -5,12 +5,13 @@
 //              \__/ F           In a fold the nearest point lies inside a face, over an edge or over a corner, as between two bodies.
 //
 // Every pair that is near is looked at in the rest shape as well:
-//   - It rests at o = min(d_c, half of its distance at rest) instead of d_c: what is near at rest, as in a sharp fold, carries nothing there.
-//   - Near features that look at each other through the material at rest are the two sides of something thin. They are kept apart from within, by the
-//     same rule for the surface turned inside out: what would pass there turns cells inside out. Seen from outside they make no contact; it would
-//     keep them so.
-//   - The side is that of the rest shape, so what is a little on the wrong one is led back. Near features side by side in one plane may fold either
-//     way: theirs is the side they are on.
+//   - It rests at o = min(d_c, half of its distance at rest) instead of d_c: what is near at rest, as in a
+//     sharp fold, carries nothing there.
+//   - Near features that look at each other through the material at rest are the two sides of something thin.
+//     They are kept apart from within, by the same rule for the surface turned inside out: what would pass
+//     there turns cells inside out. Seen from outside they make no contact; it would keep them so.
+//   - The side is that of the rest shape, so what is a little on the wrong one is led back. Near features
+//     side by side in one plane may fold either way: theirs is the side they are on.
 #include "narrow/self_contact.h"
 
 #include <algorithm>
@@ -25,7 +26,8 @@ namespace {
 
 using namespace narrow;
 
-// Sine of the fold at the positions x + ahead v: negative where the edge is convex; an open edge is as convex as can be (surfel/convex.h).
+// Sine of the fold at the positions x + ahead v: negative where the edge is convex; an open edge is as convex
+// as can be (surfel/convex.h).
 double fold(const Surface &s, uint32_t edge, double ahead) {
   const uint32_t *const ends = &s.edge[2 * size_t{edge}], *const tris = &s.edge_tri[2 * size_t{edge}];
   if (tris[0] == kNone || tris[1] == kNone) return -1;
@@ -40,18 +42,21 @@ double fold(const Surface &s, uint32_t edge, double ahead) {
   return size2 > 0 ? dot(c0, r1) * norm(e) / std::sqrt(size2) : 0;
 }
 
-constexpr double kNearer = 1e-9;      // relative: a triangle beside the feature counts as nearer only beyond this
-constexpr double kThrough = 0.25;     // cosine to the outward normal beyond which a pair at rest looks through the material, or away from it
+// relative: a triangle beside the feature counts as nearer only beyond this
+constexpr double kNearer = 1e-9;
+// cosine to the outward normal beyond which a pair at rest looks through the material, or away from it
+constexpr double kThrough = 0.25;
 
 // What a pair is at rest.
 struct Kin {
-  double apart;                        // m it rests at; 0: it makes no contact
-  double side;                         // 1: kept apart outside, -1: within, 0: where it is
+  double apart;  // m it rests at; 0: it makes no contact
+  double side;   // 1: kept apart outside, -1: within, 0: where it is
 };
 
 class RestShape {
  public:
-  RestShape(const Surface &surface, const SelfRest &rest, double offset) : s_(surface), rest_(rest), offset_(offset) {}
+  RestShape(const Surface &surface, const SelfRest &rest, double offset)
+      : s_(surface), rest_(rest), offset_(offset) {}
 
   Kin of_face(uint32_t surfel, uint32_t t) const {
     const uint32_t *const c = &s_.tri[3 * size_t{t}];
@@ -79,7 +84,9 @@ class RestShape {
   // By the distance at rest and the cosine between the way across and the outward normal there.
   Kin kin(double at_rest, double facing) const {
     if (!(at_rest > kClosedAtRest * offset_)) return {0, 0};
-    return {std::min(offset_, 0.5 * at_rest), at_rest >= rest_.thin || facing > kThrough ? 1.0 : facing < -kThrough ? -1.0 : 0.0};
+    return {std::min(offset_, 0.5 * at_rest), at_rest >= rest_.thin || facing > kThrough ? 1.0
+                                              : facing < -kThrough                       ? -1.0
+                                                                                         : 0.0};
   }
   const Surface &s_;
   const SelfRest &rest_;
@@ -95,9 +102,18 @@ struct Self {
   Pair pair;
   Array<ContactPoint> &out;
 
-  Self(const BodyView &b, const SelfRest &r, double step, double d_c, const Tangled &t, Array<ContactPoint> &to)
-      : body(b), s(*b.surface), rest(s, r, d_c), h(step), offset(d_c), depth(self_recovery_depth(s)), edge_depth(edge_recovery_depth(s, s)),
-        tangled(t), pair{b, &b, nullptr, step, d_c, 0}, out(to) {}
+  Self(const BodyView &b, const SelfRest &r, double step, double d_c, const Tangled &t,
+       Array<ContactPoint> &to)
+      : body(b),
+        s(*b.surface),
+        rest(s, r, d_c),
+        h(step),
+        offset(d_c),
+        depth(self_recovery_depth(s)),
+        edge_depth(edge_recovery_depth(s, s)),
+        tangled(t),
+        pair{b, &b, nullptr, step, d_c, 0},
+        out(to) {}
 
   // Is what stands on the wrong side really through?
   bool through(std::initializer_list<uint32_t> a, std::initializer_list<uint32_t> b) const {
@@ -110,7 +126,9 @@ struct Self {
     const uint32_t *const c = corners(t);
     return c[0] == surfel || c[1] == surfel || c[2] == surfel;
   }
-  TrianglePoint closest(uint32_t t, Vec3 p) const { return closest_on_triangle(p, x(corners(t)[0]), x(corners(t)[1]), x(corners(t)[2])); }
+  TrianglePoint closest(uint32_t t, Vec3 p) const {
+    return closest_on_triangle(p, x(corners(t)[0]), x(corners(t)[1]), x(corners(t)[2]));
+  }
   Vec3 normal(uint32_t t) const {
     const uint32_t *const c = corners(t);
     return normalized(cross(x(c[1]) - x(c[0]), x(c[2]) - x(c[0])));
@@ -125,7 +143,8 @@ struct Self {
   void share_areas(size_t begin, size_t edges, Array<uint8_t> &lent);
 };
 
-// Does t leave the feature that it shares with `other` to it: because p is of it, or nearer to it, or over its face, or because it comes first?
+// Does t leave the feature that it shares with `other` to it: because p is of it, or nearer to it, or over
+// its face, or because it comes first?
 bool Self::yields(uint32_t t, double distance2, uint32_t other, uint32_t surfel) const {
   if (has(other, surfel)) return true;
   const TrianglePoint o = closest(other, x(surfel));
@@ -137,7 +156,8 @@ bool Self::minimum(uint32_t surfel, uint32_t t, const TrianglePoint &at) const {
   const int f = int(at.feature);
   if (f == 0) return true;
   if (f < 4) {
-    const uint32_t *const sides = &s.edge_tri[2 * size_t{s.tri_edge[3 * size_t{t} + size_t(f - 1)]}], beyond = sides[0] == t ? sides[1] : sides[0];
+    const uint32_t *const sides = &s.edge_tri[2 * size_t{s.tri_edge[3 * size_t{t} + size_t(f - 1)]}];
+    const uint32_t beyond = sides[0] == t ? sides[1] : sides[0];
     return beyond == kNone || !yields(t, at.distance2, beyond, surfel);
   }
   const uint32_t corner = corners(t)[f - 4];
@@ -146,7 +166,8 @@ bool Self::minimum(uint32_t surfel, uint32_t t, const TrianglePoint &at) const {
   return true;
 }
 
-// Not normalized; its side at the closest point tells outside from inside. At a corner that of the edge there that points to p most.
+// Not normalized; its side at the closest point tells outside from inside. At a corner that of the edge there
+// that points to p most.
 Vec3 Self::outward(uint32_t surfel, uint32_t t, const TrianglePoint &at) const {
   const int f = int(at.feature);
   if (f == 0) return normal(t);
@@ -162,7 +183,10 @@ Vec3 Self::outward(uint32_t surfel, uint32_t t, const TrianglePoint &at) const {
         const uint32_t e = s.tri_edge[3 * size_t{s.fan[k]} + i], *const ends = &s.edge[2 * size_t{e}];
         if (ends[0] != corner && ends[1] != corner) continue;
         const double c = dot(normalized(x(ends[0] == corner ? ends[1] : ends[0]) - x(corner)), to);
-        if (edge == kNone || c > most) edge = e, most = c;
+        if (edge == kNone || c > most) {
+          edge = e;
+          most = c;
+        }
       }
   }
   Vec3 sum;
@@ -176,7 +200,10 @@ void Self::vertex_face(uint32_t surfel, uint32_t t) {
   const Vec3 p = x(surfel), a = x(c[0]), u = x(c[1]) - a, w = x(c[2]) - a, n = cross(u, w);
   double speed2 = 0;
   for (int k = 0; k < 3; ++k) speed2 = std::max(speed2, norm2(v(surfel) - v(c[k])));
-  const double reach = contact_reach(h, offset, std::sqrt(speed2)), widest = std::max(reach, depth), along = dot(n, p - a), nn = norm2(n);
+  const double reach = contact_reach(h, offset, std::sqrt(speed2));
+  const double widest = std::max(reach, depth);
+  const double along = dot(n, p - a);
+  const double nn = norm2(n);
   if (along * along > widest * widest * (1 + kNearer) * nn && nn > 1e-12 * norm2(u) * norm2(w)) return;
   const TrianglePoint at = closest(t, p);
   if (!(at.distance2 < widest * widest) || !minimum(surfel, t, at)) return;
@@ -204,20 +231,31 @@ void Self::edge_edge(uint32_t a, uint32_t b) {
   const Vec3 p0 = x(ea[0]), u = x(ea[1]) - p0, q0 = x(eb[0]), w = x(eb[1]) - q0, r = p0 - q0, n = cross(u, w);
   const double uu = norm2(u), ww = norm2(w), nn = norm2(n), nr = dot(n, r);
   if (!(nn > kParallel * kParallel * uu * ww)) return;
-  const double uw = dot(u, w), ur = dot(u, r), wr = dot(w, r), past_a = uw * wr - ww * ur, past_b = uu * wr - uw * ur;
-  if (!(past_a > -kPast * nn && past_a < (1 + kPast) * nn && past_b > -kPast * nn && past_b < (1 + kPast) * nn)) return;
+  const double uw = dot(u, w);
+  const double ur = dot(u, r);
+  const double wr = dot(w, r);
+  const double past_a = uw * wr - ww * ur;
+  const double past_b = uu * wr - uw * ur;
+  if (!(past_a > -kPast * nn && past_a < (1 + kPast) * nn && past_b > -kPast * nn &&
+        past_b < (1 + kPast) * nn))
+    return;
   const double on_a = past_a / nn, on_b = past_b / nn;
   double speed2 = 0;
   for (int i = 0; i < 2; ++i)
     for (int j = 0; j < 2; ++j) speed2 = std::max(speed2, norm2(v(ea[i]) - v(eb[j])));
   const double reach = contact_reach(h, offset, std::sqrt(speed2)), widest = std::max(reach, edge_depth);
   if (!(nr * nr < widest * widest * nn)) return;
-  if (place_on_edge(on_a, 2 * h * std::sqrt(speed2 / uu)) != kBetween || place_on_edge(on_b, 2 * h * std::sqrt(speed2 / ww)) != kBetween) return;
+  if (place_on_edge(on_a, 2 * h * std::sqrt(speed2 / uu)) != kBetween ||
+      place_on_edge(on_b, 2 * h * std::sqrt(speed2 / ww)) != kBetween)
+    return;
   const Kin k = rest.of_edges(a, b);
   if (!(k.apart > 0)) return;
-  // An edge that is flat folds out where the blow bends its faces, by what they may move against each other within the sub-step.
+  // An edge that is flat folds out where the blow bends its faces, by what they may move against each other
+  // within the sub-step.
   const double bent = std::min(0.3, 2 * h * std::sqrt(speed2 / std::min(uu, ww))) - kConvex;
-  const auto sticks_out = [&](uint32_t e, double side) { return side * fold(s, e, 0) < bent || side * fold(s, e, 2 * h) < bent; };
+  const auto sticks_out = [&](uint32_t e, double side) {
+    return side * fold(s, e, 0) < bent || side * fold(s, e, 2 * h) < bent;
+  };
   const bool outside = k.side >= 0 && sticks_out(a, 1) && sticks_out(b, 1);
   const bool within = !outside && k.side <= 0 && sticks_out(a, -1) && sticks_out(b, -1);
   if (!(outside || within)) return;
@@ -226,12 +264,16 @@ void Self::edge_edge(uint32_t a, uint32_t b) {
   Vec3 normal = (1 / std::sqrt(nn)) * n;
   if (dot(normal, up_b) < dot(normal, up_a)) normal = -normal;
   const double distance = dot(normal, r);
-  if (!(distance < reach && distance >= -edge_depth) || (distance < 0 && !through({ea[0], ea[1]}, {eb[0], eb[1]}))) return;
+  if (!(distance < reach && distance >= -edge_depth) ||
+      (distance < 0 && !through({ea[0], ea[1]}, {eb[0], eb[1]})))
+    return;
   const double slack = kCone + std::min(0.3, reach / std::sqrt(std::min(uu, ww)));
   if (!fb.leans_out(normal, slack) || !fa.leans_out(-normal, slack)) return;
   ContactPoint c = blank(pair, kEdgeEdge, 1, a, b);
-  add_node(c, body.first_node + ea[0], 1 - on_a), add_node(c, body.first_node + ea[1], on_a);
-  add_node(c, body.first_node + eb[0], on_b - 1), add_node(c, body.first_node + eb[1], -on_b);
+  add_node(c, body.first_node + ea[0], 1 - on_a);
+  add_node(c, body.first_node + ea[1], on_a);
+  add_node(c, body.first_node + eb[0], on_b - 1);
+  add_node(c, body.first_node + eb[1], -on_b);
   place(c, p0 + on_a * u, q0 + on_b * w, normal, distance + (offset - k.apart));
   out.push_back(c);
 }
@@ -245,7 +287,8 @@ void Self::name(size_t begin) {
   for (size_t i = begin; i < out.size();) {
     size_t end = i;
     uint32_t touching = 0;
-    for (; end < out.size() && out[end].type_a == out[i].type_a && out[end].feature_a == out[i].feature_a; ++end)
+    for (; end < out.size() && out[end].type_a == out[i].type_a && out[end].feature_a == out[i].feature_a;
+         ++end)
       touching += out[end].distance < 2 * offset;
     for (size_t k = i; k < end; ++k) {
       uint32_t ordinal = 0;
@@ -257,7 +300,8 @@ void Self::name(size_t begin) {
   }
 }
 
-// An edge contact takes over the area of the nearest of its ends that has no contact of its own; none is given twice.
+// An edge contact takes over the area of the nearest of its ends that has no contact of its own; none
+// is given twice.
 void Self::share_areas(size_t begin, size_t edges, Array<uint8_t> &lent) {
   if (edges == out.size()) return;
   lent.assign(s.nsurfel, 0);
@@ -269,7 +313,8 @@ void Self::share_areas(size_t begin, size_t edges, Array<uint8_t> &lent) {
       const uint32_t surfel = c.node[k] - body.first_node;
       const double d2 = norm2(x(surfel) - load3(c.point));
       if (lent[surfel] || (c.lender && !(d2 < nearest))) continue;
-      nearest = d2, c.lender = c.node[k] + 1;
+      nearest = d2;
+      c.lender = c.node[k] + 1;
       c.area = 0.5 * facing_area(s, surfel, c.weight[k] > 0 ? -load3(c.normal) : load3(c.normal));
     }
     if (c.lender) lent[c.lender - 1 - body.first_node] = 1;
@@ -278,8 +323,9 @@ void Self::share_areas(size_t begin, size_t edges, Array<uint8_t> &lent) {
 
 }  // namespace
 
-void find_self_contacts(const BodyView &body, const SelfRest &rest, std::span<const SelfPair> vertex_face, std::span<const SelfPair> edge_edge,
-                        double h, double offset, const Tangled &tangled, Array<uint8_t> &lent, Array<ContactPoint> &out) {
+void find_self_contacts(const BodyView &body, const SelfRest &rest, std::span<const SelfPair> vertex_face,
+                        std::span<const SelfPair> edge_edge, double h, double offset, const Tangled &tangled,
+                        Array<uint8_t> &lent, Array<ContactPoint> &out) {
   Self self(body, rest, h, offset, tangled, out);
   const size_t begin = out.size();
   for (const SelfPair &pair : vertex_face) self.vertex_face(pair.a, pair.b);
@@ -289,7 +335,8 @@ void find_self_contacts(const BodyView &body, const SelfRest &rest, std::span<co
   self.share_areas(begin, edges, lent);
 }
 
-double self_apart(const Surface &surface, const SelfRest &rest, ContactKind kind, uint32_t a, uint32_t b, double offset) {
+double self_apart(const Surface &surface, const SelfRest &rest, ContactKind kind, uint32_t a, uint32_t b,
+                  double offset) {
   const RestShape shape(surface, rest, offset);
   return (kind == kEdgeEdge ? shape.of_edges(a, b) : shape.of_face(a, b)).apart;
 }

@@ -1,5 +1,5 @@
-// Contacts of a surface with itself. Same reach, same rule as between two bodies (narrow_phase.h): a contact is a local minimum of the
-// distance, seen from outside. What differs is said in self_contact.cpp.
+// Contacts of a surface with itself. Same reach, same rule as between two bodies (narrow_phase.h): a contact
+// is a local minimum of the distance, seen from outside. What differs is said in self_contact.cpp.
 #pragma once
 #include <functional>
 #include <span>
@@ -11,18 +11,24 @@
 
 namespace dfm {
 
-// Does a surfel belong to a triangle that passes through another one at the start of the sub-step? Asked only where a pair seems to be through.
+// Does a surfel belong to a triangle that passes through another one at the start of the sub-step? Asked only
+// where a pair seems to be through.
 using Tangled = std::function<bool(uint32_t surfel)>;
 
-// Appends the contacts of one body, sorted by (kind, feature a, feature b); keys are unique within the sub-step. slot_a == slot_b, and the nodes of both
-// sides are the body's. `distance` is the true one plus what the pair may be nearer than d_c at rest.
-//   tangled  where the guard sees to it that nothing passes, what is on the wrong side without being tangled has come there another way, and stays; empty: it
+// Appends the contacts of one body, sorted by (kind, feature a, feature b); keys are unique within the
+// sub-step. slot_a == slot_b, and the nodes of both sides are the body's. `distance` is the true one plus
+// what the pair may be nearer than d_c at rest.
+//   tangled  where the guard sees to it that nothing passes, what is on the wrong side without being tangled
+//   has come there another way, and stays; empty: it
 //            is led back
 //   lent     scratch that the caller keeps
-void find_self_contacts(const BodyView &body, const SelfRest &rest, std::span<const SelfPair> vertex_face, std::span<const SelfPair> edge_edge,
-                        double h, double offset, const Tangled &tangled, Array<uint8_t> &lent, Array<ContactPoint> &out);
+void find_self_contacts(const BodyView &body, const SelfRest &rest, std::span<const SelfPair> vertex_face,
+                        std::span<const SelfPair> edge_edge, double h, double offset, const Tangled &tangled,
+                        Array<uint8_t> &lent, Array<ContactPoint> &out);
 
-// m that two features of one surface rest apart: min(offset, half of their distance in the rest shape). 0 where they lie on each other there: no contact.
-double self_apart(const Surface &surface, const SelfRest &rest, ContactKind kind, uint32_t a, uint32_t b, double offset);
+// m that two features of one surface rest apart: min(offset, half of their distance in the rest shape). 0
+// where they lie on each other there: no contact.
+double self_apart(const Surface &surface, const SelfRest &rest, ContactKind kind, uint32_t a, uint32_t b,
+                  double offset);
 
 }  // namespace dfm

@@ -1,5 +1,6 @@
-// Brings a query to the form that the finders work on. Only differences between the two features enter, in an order that their coordinates decide,
-// times a power of two: so the answer's bits do not depend on how the caller numbers vertices, on where the origin is, or on the unit of length.
+// Brings a query to the form that the finders work on. Only differences between the two features enter, in an
+// order that their coordinates decide, times a power of two: so the answer's bits do not depend on how the
+// caller numbers vertices, on where the origin is, or on the unit of length.
 #include "narrow/toi.h"
 
 #include <cstring>
@@ -31,7 +32,10 @@ struct Size {
   void look_at(const double *p) {
     for (int i = 0; i < 3; ++i) axis[i] = std::max(axis[i], std::fabs(p[i]));
   }
-  void look_at(const dfm_motion &m) { look_at(m.p0), look_at(m.p1); }
+  void look_at(const dfm_motion &m) {
+    look_at(m.p0);
+    look_at(m.p1);
+  }
   double largest() const { return std::max({axis[0], axis[1], axis[2]}); }
 };
 
@@ -50,24 +54,29 @@ bool before(const dfm_motion &a, const dfm_motion &b) {
   return false;
 }
 
-// Differences of numbers above 2^1000 or below 2^-900 could overflow or lose bits: such queries are moved to the middle first.
+// Differences of numbers above 2^1000 or below 2^-900 could overflow or lose bits: such queries are moved to
+// the middle first.
 constexpr double kTolerance = 1e-12;
 constexpr double kHuge = 0x1p1000, kTiny = 0x1p-900;
 
-// Two factors whose product is 2^exponent; the second is 1 unless the first alone would not be a normal number.
+// Two factors whose product is 2^exponent; the second is 1 unless the first alone would not be a
+// normal number.
 void split_power(int exponent, double out[2]) {
   const bool normal = exponent > -1000 && exponent < 1000;
   const int first = normal ? exponent : exponent / 2;
-  out[0] = power_of_two(first), out[1] = power_of_two(exponent - first);
+  out[0] = power_of_two(first);
+  out[1] = power_of_two(exponent - first);
 }
-Vec3 times(const double factor[2], Vec3 v) { return factor[1] == 1 ? factor[0] * v : factor[1] * (factor[0] * v); }
+Vec3 times(const double factor[2], Vec3 v) {
+  return factor[1] == 1 ? factor[0] * v : factor[1] * (factor[0] * v);
+}
 double times(const double factor[2], double x) { return factor[1] * (factor[0] * x); }
 
 struct Builder {
   Query query;
   int shift = 0, exponent = 0;
 
-  explicit Builder(double size) {   // of the coordinates
+  explicit Builder(double size) {  // of the coordinates
     if (size <= kHuge && (size >= kTiny || size == 0)) return;
     shift = exponent_of(size);
     split_power(-shift, query.before);
@@ -76,25 +85,38 @@ struct Builder {
     return shift == 0 ? load3(a) - load3(b) : times(query.before, load3(a)) - times(query.before, load3(b));
   }
   void corner(int k, const dfm_motion &a, const dfm_motion &b) {
-    query.w0[k] = difference(a.p0, b.p0), query.w1[k] = difference(a.p1, b.p1);
-    if (k == 0) query.to[0] = &a, query.from[0] = &b;
+    query.w0[k] = difference(a.p0, b.p0);
+    query.w1[k] = difference(a.p1, b.p1);
+    if (k == 0) {
+      query.to[0] = &a;
+      query.from[0] = &b;
+    }
   }
   void edge(int k, Vec3 out[2], const dfm_motion &to, const dfm_motion &from) {
-    out[0] = difference(to.p0, from.p0), out[1] = difference(to.p1, from.p1);
-    query.to[k] = &to, query.from[k] = &from;
+    out[0] = difference(to.p0, from.p0);
+    out[1] = difference(to.p1, from.p1);
+    query.to[k] = &to;
+    query.from[k] = &from;
   }
 
   void finish(const dfm_toi_options &options, double margin) {
     Query &q = query;
     Size extent;
-    for (int k = 0; k < q.ncorner; ++k) extent.look_at(&q.w0[k].x), extent.look_at(&q.w1[k].x);
+    for (int k = 0; k < q.ncorner; ++k) {
+      extent.look_at(&q.w0[k].x);
+      extent.look_at(&q.w1[k].x);
+    }
     const double size = extent.largest();
     exponent = size > 0 ? exponent_of(size) : 0;
     split_power(-exponent, q.after);
-    for (int k = 0; k < q.ncorner; ++k) q.w0[k] = times(q.after, q.w0[k]), q.w1[k] = times(q.after, q.w1[k]);
+    for (int k = 0; k < q.ncorner; ++k) {
+      q.w0[k] = times(q.after, q.w0[k]);
+      q.w1[k] = times(q.after, q.w1[k]);
+    }
     for (Vec3 *v : {q.e1, q.e2})
       for (int end = 0; end < 2; ++end) v[end] = times(q.after, v[end]);
-    const auto scaled = [&](double x) { return std::min(times(q.after, x), 0x1p100); };   // of lengths after the shift
+    // of lengths after the shift
+    const auto scaled = [&](double x) { return std::min(times(q.after, x), 0x1p100); };
     q.separation = scaled(times(q.before, options.min_separation));
     const bool safe = options.method == DFM_TOI_CONSERVATIVE;
     const double share = options.tolerance > 0 ? options.tolerance : kTolerance;
@@ -119,8 +141,12 @@ Builder build(const dfm_motion &p, const dfm_motion tri[3], int order[3]) {
   const auto sort2 = [&](int i, int j) {
     if (before(tri[order[j]], tri[order[i]])) std::swap(order[i], order[j]);
   };
-  order[0] = 0, order[1] = 1, order[2] = 2;
-  sort2(0, 1), sort2(1, 2), sort2(0, 1);
+  order[0] = 0;
+  order[1] = 1;
+  order[2] = 2;
+  sort2(0, 1);
+  sort2(1, 2);
+  sort2(0, 1);
   Builder s(size_of(&p, 1, tri, 3));
   s.query.ncorner = 3;
   for (int k = 0; k < 3; ++k) s.corner(k, p, tri[order[k]]);
@@ -129,12 +155,12 @@ Builder build(const dfm_motion &p, const dfm_motion tri[3], int order[3]) {
   return s;
 }
 
-struct EdgeOrder {
-  bool turn_a, turn_b, swap;
-};
+struct EdgeOrder { bool turn_a, turn_b, swap; };
 Builder build(const dfm_motion a[2], const dfm_motion b[2], EdgeOrder &order) {
-  order.turn_a = before(a[1], a[0]), order.turn_b = before(b[1], b[0]);
-  const dfm_motion *const ends[2][2] = {{&a[order.turn_a], &a[!order.turn_a]}, {&b[order.turn_b], &b[!order.turn_b]}};
+  order.turn_a = before(a[1], a[0]);
+  order.turn_b = before(b[1], b[0]);
+  const dfm_motion *const ends[2][2] = {{&a[order.turn_a], &a[!order.turn_a]},
+                                        {&b[order.turn_b], &b[!order.turn_b]}};
   const bool same_first = !before(*ends[0][0], *ends[1][0]) && !before(*ends[1][0], *ends[0][0]);
   order.swap = same_first ? before(*ends[1][1], *ends[0][1]) : before(*ends[1][0], *ends[0][0]);
   const dfm_motion *const *x = ends[order.swap], *const *y = ends[!order.swap];
@@ -156,7 +182,8 @@ double distance(Builder &s, double t) {
 
 }  // namespace
 
-ToiHit toi_point_triangle(const dfm_motion &p, const dfm_motion tri[3], const dfm_toi_options &options, double margin) {
+ToiHit toi_point_triangle(const dfm_motion &p, const dfm_motion tri[3], const dfm_toi_options &options,
+                          double margin) {
   int order[3];
   Builder s = build(p, tri, order);
   s.finish(options, margin);
@@ -167,7 +194,8 @@ ToiHit toi_point_triangle(const dfm_motion &p, const dfm_motion tri[3], const df
   return hit;
 }
 
-ToiHit toi_edge_edge(const dfm_motion a[2], const dfm_motion b[2], const dfm_toi_options &options, double margin) {
+ToiHit toi_edge_edge(const dfm_motion a[2], const dfm_motion b[2], const dfm_toi_options &options,
+                     double margin) {
   EdgeOrder order;
   Builder s = build(a, b, order);
   s.finish(options, margin);

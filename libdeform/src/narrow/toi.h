@@ -7,8 +7,9 @@
 namespace dfm {
 
 struct ToiHit {
-  double t;                // +infinity: never
-  double at[3];            // weights of the triangle's vertices, or where on a and on b; meaningless for a miss
+  double t;  // +infinity: never
+  // weights of the triangle's vertices, or where on a and on b; meaningless for a miss
+  double at[3];
   uint32_t evaluations;
 };
 
@@ -16,8 +17,11 @@ struct ToiHit {
 double distance_point_triangle(const dfm_motion &p, const dfm_motion tri[3], double t);
 double distance_edge_edge(const dfm_motion a[2], const dfm_motion b[2], double t);
 
-// margin: m, how far apart beyond options.min_separation counts as touching already, in place of options.tolerance (conservative only); 0: tolerance.
-ToiHit toi_point_triangle(const dfm_motion &p, const dfm_motion tri[3], const dfm_toi_options &options, double margin = 0);
-ToiHit toi_edge_edge(const dfm_motion a[2], const dfm_motion b[2], const dfm_toi_options &options, double margin = 0);
+// margin: m, how far apart beyond options.min_separation counts as touching already, in place of
+// options.tolerance (conservative only); 0: tolerance.
+ToiHit toi_point_triangle(const dfm_motion &p, const dfm_motion tri[3], const dfm_toi_options &options,
+                          double margin = 0);
+ToiHit toi_edge_edge(const dfm_motion a[2], const dfm_motion b[2], const dfm_toi_options &options,
+                     double margin = 0);
 
 }  // namespace dfm

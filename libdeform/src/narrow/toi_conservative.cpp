@@ -1,11 +1,14 @@
-// Conservative time of impact. The time moves on only over intervals in which a touch is disproved, rounding included, so the answer is never late;
-// it stops where the features are nearer than the tolerance, so it is hardly early. Three disproofs, each cheap where the others crawl:
+// Conservative time of impact. The time moves on only over intervals in which a touch is disproved, rounding
+// included, so the answer is never late; it stops where the features are nearer than the tolerance, so it is
+// hardly early. Three disproofs, each cheap where the others crawl:
 //   1. the coplanarity cubic keeps its sign: straight to the next root, however the features turn;
-//   2. a fixed plane keeps the features apart: its corners move on straight lines, so it holds until the first of them reaches it. The advancement
-//      of Mirtich (1996) and of Li et al. (2021, ACCD), with speeds along one direction instead of a bound on all speeds;
-//   3. a plane that turns between the separating normals n0 and n1 of two times: n(t) . w[k](t) is a quadratic whose control values
-//      n0.w0, (n0.w1 + n1.w0)/2, n1.w1 bound it (the inclusion of Wang et al. 2021, with a normal that follows the motion). Converges
-//      quadratically where the first two are linear: motion in one plane, double and triple roots, slivers.
+//   2. a fixed plane keeps the features apart: its corners move on straight lines, so it holds until the
+//      first of them reaches it. The advancement of Mirtich (1996) and of Li et al. (2021, ACCD), with speeds
+//      along one direction instead of a bound on all speeds;
+//   3. a plane that turns between the separating normals n0 and n1 of two times: n(t) . w[k](t) is a
+//      quadratic whose control values n0.w0, (n0.w1 + n1.w0)/2, n1.w1 bound it (the inclusion of Wang et al.
+//      2021, with a normal that follows the motion). Converges quadratically where the first two are linear:
+//      motion in one plane, double and triple roots, slivers.
 #include <algorithm>
 
 #include "narrow/toi_query.h"
@@ -16,8 +19,11 @@ namespace {
 class Advance {
  public:
   explicit Advance(const Query &query)
-      : q_(query), c_(coplanarity(query)), clear_(c_.error + query.separation * c_.normal_max),
-        safe_(query.separation + kRound), stop_(query.separation + std::max(query.tolerance, 4 * kRound)) {}
+      : q_(query),
+        c_(coplanarity(query)),
+        clear_(c_.error + query.separation * c_.normal_max),
+        safe_(query.separation + kRound),
+        stop_(query.separation + std::max(query.tolerance, 4 * kRound)) {}
 
   Answer run() {
     if (apart_along_axis(q_)) return answer_;
@@ -35,7 +41,9 @@ class Advance {
       }
       if (!turning_plane(s, t, fixed, stride)) s = look(t = fixed);
     }
-    answer_.t = t, answer_.u = s.u, answer_.v = s.v;
+    answer_.t = t;
+    answer_.u = s.u;
+    answer_.v = s.v;
     return answer_;
   }
 
@@ -45,7 +53,8 @@ class Advance {
     return separate(q_, t);
   }
 
-  // From t on, the first time at which the cubic is not clear of zero, itself where that is t; 2 where there is none.
+  // From t on, the first time at which the cubic is not clear of zero, itself where that is t; 2 where
+  // there is none.
   double next_suspect(double t) {
     const double at_t = c_.f(t);
     ++answer_.evaluations;
@@ -67,7 +76,8 @@ class Advance {
     return 2;
   }
 
-  // f falls monotonically (times sign) from clear at lo to not clear at hi: a time before the crossing, as near to it as values can tell.
+  // f falls monotonically (times sign) from clear at lo to not clear at hi: a time before the crossing, as
+  // near to it as values can tell.
   double last_clear(double sign, double lo, double hi) {
     const Poly slope = c_.f.derivative();
     const double aim = clear_ + 0.5 * c_.error, enough = clear_ + c_.error;
@@ -97,11 +107,13 @@ class Advance {
   bool keeps_apart(const Separation &s0, double t0, const Separation &s1, double t1) const {
     if (!(s1.lower > safe_)) return false;
     for (int k = 0; k < q_.ncorner; ++k)
-      if (!(0.5 * (dot(s0.normal, q_.corner(k, t1)) + dot(s1.normal, q_.corner(k, t0))) > safe_)) return false;
+      if (!(0.5 * (dot(s0.normal, q_.corner(k, t1)) + dot(s1.normal, q_.corner(k, t0))) > safe_))
+        return false;
     return true;
   }
 
-  // Moves on further than the fixed plane would allow, aiming at the touch as the distance's slope foretells it.
+  // Moves on further than the fixed plane would allow, aiming at the touch as the distance's
+  // slope foretells it.
   bool turning_plane(Separation &s, double &t, double fixed, double &stride) {
     const double slope = dot(s.normal, q_.at(1, s.u, s.v) - q_.at(t, s.u, s.v)) / (1 - t);
     const double aim = 0.5 * (safe_ + stop_);
@@ -111,7 +123,8 @@ class Advance {
       const Separation ahead = look(to);
       if (keeps_apart(s, t, ahead, to)) {
         stride = 4 * (to - t);
-        s = ahead, t = to;
+        s = ahead;
+        t = to;
         return true;
       }
       to = t + 0.25 * (to - t);
@@ -122,9 +135,9 @@ class Advance {
 
   const Query &q_;
   const Coplanarity c_;
-  const double clear_;     // |f| above it: no touch
-  const double safe_;      // a proven distance above it: no touch
-  const double stop_;      // a distance up to it is called a touch
+  const double clear_;  // |f| above it: no touch
+  const double safe_;   // a proven distance above it: no touch
+  const double stop_;   // a distance up to it is called a touch
   Answer answer_;
 };
 

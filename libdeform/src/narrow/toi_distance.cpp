@@ -1,8 +1,9 @@
-// Distance of a flat patch to the origin. The nearest point comes from the interior or from an edge that the origin's foot lies beyond. What the
-// caller may rely on are the bounds, not the way there: any point of the patch bounds the distance from above, any unit vector n with
-// min n . w[k] > 0 from below.
+// Distance of a flat patch to the origin. The nearest point comes from the interior or from an edge that the
+// origin's foot lies beyond. What the caller may rely on are the bounds, not the way there: any point of the
+// patch bounds the distance from above, any unit vector n with min n . w[k] > 0 from below.
 //
-// Close to a touch the vector to the nearest point is all rounding, so normals are taken from the features: across the patch, across an edge.
+// Close to a touch the vector to the nearest point is all rounding, so normals are taken from the features:
+// across the patch, across an edge.
 #include <algorithm>
 
 #include "narrow/toi_query.h"
@@ -29,7 +30,11 @@ double least(const Patch &patch, Vec3 normal) {
 
 void offer_point(Separation &s, Vec3 point, double u, double v) {
   const double d = norm(point);
-  if (d < s.upper) s.upper = d, s.u = u, s.v = v;
+  if (d < s.upper) {
+    s.upper = d;
+    s.u = u;
+    s.v = v;
+  }
 }
 
 void offer_normal(Separation &s, const Patch &patch, Vec3 direction) {
@@ -37,15 +42,20 @@ void offer_normal(Separation &s, const Patch &patch, Vec3 direction) {
   if (!(length > 0)) return;
   const Vec3 normal = (1 / length) * direction;
   const double lower = least(patch, normal);
-  if (lower > s.lower) s.lower = lower, s.normal = normal;
+  if (lower > s.lower) {
+    s.lower = lower;
+    s.normal = normal;
+  }
 }
 
 // u and v of the point that lies at share s of side k.
 void on_side(int n, int k, double s, double &u, double &v) {
-  static const double corner_u[2][4] = {{0, 1, 0, 0}, {0, 1, 1, 0}}, corner_v[2][4] = {{0, 0, 1, 0}, {0, 0, 1, 1}};
+  static const double corner_u[2][4] = {{0, 1, 0, 0}, {0, 1, 1, 0}};
+  static const double corner_v[2][4] = {{0, 0, 1, 0}, {0, 0, 1, 1}};
   const int next = k + 1 < n ? k + 1 : 0;
   const double *cu = corner_u[n - 3], *cv = corner_v[n - 3];
-  u = (1 - s) * cu[k] + s * cu[next], v = (1 - s) * cv[k] + s * cv[next];
+  u = (1 - s) * cu[k] + s * cu[next];
+  v = (1 - s) * cv[k] + s * cv[next];
 }
 
 void offer_side(Separation &s, const Patch &patch, int k) {
@@ -66,7 +76,8 @@ void offer_side(Separation &s, const Patch &patch, int k) {
   offer_normal(s, patch, point - (dot(point, e) / ee) * e);
 }
 
-// The foot of the origin from the best point so far instead of from a corner: what a sliver's small area spoils is then the small rest alone.
+// The foot of the origin from the best point so far instead of from a corner: what a sliver's small area
+// spoils is then the small rest alone.
 void offer_foot(Separation &s, const Patch &patch, Vec3 across) {
   const double area2 = norm2(across);
   if (!(area2 > 0)) return;
@@ -80,7 +91,8 @@ void offer_foot(Separation &s, const Patch &patch, Vec3 across) {
   }
 }
 
-// The cross product of two long, nearly parallel sides leans by its rounding over its length, which matters along the patch alone.
+// The cross product of two long, nearly parallel sides leans by its rounding over its length, which matters
+// along the patch alone.
 Vec3 level(const Patch &patch, Vec3 across) {
   Vec3 longest;
   for (int k = 0; k < patch.n; ++k)
@@ -128,7 +140,10 @@ Separation separate(const Query &query, double t) {
   } else {
     bool any = false;
     for (int k = 0; k < patch.n; ++k)
-      if (beyond[k] || !(area2 > 0)) offer_side(s, patch, k), any = true;
+      if (beyond[k] || !(area2 > 0)) {
+        offer_side(s, patch, k);
+        any = true;
+      }
     if (!any) offer_all(s, patch, across);
   }
   if (s.lower < kProven * s.upper - kRound) offer_all(s, patch, across);
@@ -136,15 +151,18 @@ Separation separate(const Query &query, double t) {
 }
 
 Coplanarity coplanarity(const Query &q) {
-  const Vec3 n0 = cross(q.e1[0], q.e2[0]), n1 = cross(q.e1[0], q.e2[1]) + cross(q.e1[1], q.e2[0]), n2 = cross(q.e1[1], q.e2[1]);
+  const Vec3 n0 = cross(q.e1[0], q.e2[0]);
+  const Vec3 n1 = cross(q.e1[0], q.e2[1]) + cross(q.e1[1], q.e2[0]);
+  const Vec3 n2 = cross(q.e1[1], q.e2[1]);
   const Vec3 r0 = q.w0[0], r1 = q.w1[0];
   Coplanarity c;
   c.f = {3, {dot(r0, n0), dot(r1, n0) + dot(r0, n1), dot(r1, n1) + dot(r0, n2), dot(r1, n2)}};
   const auto size = [](Vec3 a, Vec3 b) {
-    return std::max({std::fabs(a.x), std::fabs(a.y), std::fabs(a.z), std::fabs(b.x), std::fabs(b.y), std::fabs(b.z)});
+    return std::max(
+        {std::fabs(a.x), std::fabs(a.y), std::fabs(a.z), std::fabs(b.x), std::fabs(b.y), std::fabs(b.z)});
   };
-  // Six products of three factors, each rounded at most eight times on the way and three times before: 66 units of 2^-53, and as much again for
-  // evaluating the polynomial.
+  // Six products of three factors, each rounded at most eight times on the way and three times before: 66
+  // units of 2^-53, and as much again for evaluating the polynomial.
   const double size3 = size(r0, r1) * size(q.e1[0], q.e1[1]) * size(q.e2[0], q.e2[1]);
   c.error = 0x1p-45 * size3;
   const double largest = c.f.size();

@@ -15,10 +15,13 @@ namespace {
 using narrow::Features;
 using narrow::PairMotion;
 
-constexpr double kRounding = 1 + 1e-6;   // bounds hold in spite of rounding; nothing next to the margin
+constexpr double kRounding = 1 + 1e-6;  // bounds hold in spite of rounding; nothing next to the margin
 
-// What stays above this never trips: whether a pair is asked about does not change the answer, whatever is known of it from before.
-double clear_of(const GuardScene &scene) { return kRounding * (scene.floor + 2 * narrow::kSharp * scene.margin); }
+// What stays above this never trips: whether a pair is asked about does not change the answer, whatever is
+// known of it from before.
+double clear_of(const GuardScene &scene) {
+  return kRounding * (scene.floor + 2 * narrow::kSharp * scene.margin);
+}
 
 // Least height of the features over each other along n.
 double height(const double *const at[4], int split, Vec3 n) {
@@ -48,7 +51,8 @@ class NearPairs {
 
   void look(const GuardMemory::Run &run) {
     const double now = kRounding * (run.way + run.travel), *const rest = memory_.rest.data();
-    a_ = &scene_.side(list_[run.begin], false), b_ = &scene_.side(list_[run.begin], true);
+    a_ = &scene_.side(list_[run.begin], false);
+    b_ = &scene_.side(list_[run.begin], true);
     for (uint32_t i = run.begin; i < run.end; ++i)
       if (!(now < rest[i])) look(i, run.way, now);
   }
@@ -85,7 +89,7 @@ class NearPairs {
   GuardMemory &memory_;
   Array<uint32_t> &near_;
   double floor_;
-  GuardSide *a_ = nullptr, *b_ = nullptr;   // of the run
+  GuardSide *a_ = nullptr, *b_ = nullptr;  // of the run
 };
 
 // A surface and a closed-form shape or voxels, in the frame of the obstacle.
@@ -111,12 +115,16 @@ class NearObstacle {
   }
 
  private:
-  // A convex shape lies behind the plane at its point nearest to the feature's middle; a box also behind each of its faces.
+  // A convex shape lies behind the plane at its point nearest to the feature's middle; a box also behind
+  // each of its faces.
   bool clear(const narrow::ObstacleFrame &frame, GuardSide &body, uint32_t i, double way) {
     const Candidate &c = list_[i];
     const uint32_t *const corner = narrow::corners_of(*body.surface, c.kind, c.feature_a);
     Vec3 from[3], middle, normal, on;
-    for (int k = 0; k <= c.kind; ++k) from[k] = frame.at_start(load3(&body.surface->x[4 * size_t{corner[k]}])), middle += from[k];
+    for (int k = 0; k <= c.kind; ++k) {
+      from[k] = frame.at_start(load3(&body.surface->x[4 * size_t{corner[k]}]));
+      middle += from[k];
+    }
     const auto lowest = [&](Vec3 n, Vec3 p) {
       double low = HUGE_VAL;
       for (int k = 0; k <= c.kind; ++k) low = std::min(low, dot(n, from[k] - p));
@@ -126,16 +134,25 @@ class NearObstacle {
     if (c.kind > 0 && frame.shape.view().shape == Shape::box)
       for (uint32_t f = 0; f < 6; ++f) {
         const Vec3 n = frame.shape.face_normal(f), p = frame.shape.view().half_size[int(f >> 1)] * n;
-        if (const double low = lowest(n, p); low > start) start = low, normal = n, on = p;
+        if (const double low = lowest(n, p); low > start) {
+          start = low;
+          normal = n;
+          on = p;
+        }
       }
     if (!(start > floor_)) {
       const ObstaclePoint p = frame.shape.closest((1.0 / (c.kind + 1)) * middle);
-      if (const double low = lowest(p.normal, p.point); low > start) start = low, normal = p.normal, on = p.point;
+      if (const double low = lowest(p.normal, p.point); low > start) {
+        start = low;
+        normal = p.normal;
+        on = p.point;
+      }
     }
     memory_.rest[i] = way + start - floor_;
     if (!(start > floor_)) return false;
     double end = HUGE_VAL;
-    for (int k = 0; k <= c.kind; ++k) end = std::min(end, dot(normal, frame.at_end(load3(scene_.end(body, corner[k]))) - on));
+    for (int k = 0; k <= c.kind; ++k)
+      end = std::min(end, dot(normal, frame.at_end(load3(scene_.end(body, corner[k]))) - on));
     return end > floor_;
   }
   bool far(const narrow::ObstacleFrame &frame, GuardSide &body, uint32_t i, double way, double now) {
@@ -158,39 +175,57 @@ void GuardScene::find_end(GuardSide &s, uint32_t surfel) {
   double *const out = &s.end[4 * size_t{surfel}];
   const Vec3 x = load3(&s.surface->x[4 * size_t{surfel}]);
   if (s.still) return store3(out, x);
-  if (s.local) return store3(out, s.pose.position + rotate(s.pose.rotation, load3(&s.local[3 * size_t{surfel}])));   // its pose is at the share already
+  // its pose is at the share already
+  if (s.local)
+    return store3(out, s.pose.position + rotate(s.pose.rotation, load3(&s.local[3 * size_t{surfel}])));
   Vec3 way;
   s.surface->each_phyxel(surfel, [&](uint32_t p, double weight) {
     const size_t at = 4 * size_t{p};
     if (s.to) way += weight * load3(&s.to[at]);
     else if (!s.impulse) way += (weight * h) * load3(&s.v[at]);
     else
-      for (int k = 0; k < 3; ++k) way[k] += (weight * h) * (s.v[at + size_t(k)] + s.inv_mass[at + size_t(k)] * s.impulse[at + size_t(k)]);
+      for (int k = 0; k < 3; ++k)
+        way[k] +=
+            (weight * h) * (s.v[at + size_t(k)] + s.inv_mass[at + size_t(k)] * s.impulse[at + size_t(k)]);
   });
   if (s.to) way -= x;
   store3(out, x + share * way);
 }
 
 void GuardMemory::follow(const Array<Candidate> &list) {
-  old_runs.swap(runs), old_features.swap(features), old_rest.swap(rest), old_normal.swap(normal);
+  old_runs.swap(runs);
+  old_features.swap(features);
+  old_rest.swap(rest);
+  old_normal.swap(normal);
   runs.clear();
   const size_t n = list.size();
-  features.resize(n), rest.resize(n), normal.resize(3 * n);
+  features.resize(n);
+  rest.resize(n);
+  normal.resize(3 * n);
   for (uint32_t i = 0; i < n; ++i) {
     const Candidate &c = list[i];
     features[i] = uint64_t{c.feature_a} << 32 | c.feature_b;
     const Run *const last = runs.empty() ? nullptr : &runs.back();
-    if (!last || last->slot_a != c.slot_a || last->slot_b != c.slot_b || last->obstacle != c.obstacle || last->kind != c.kind)
+    if (!last || last->slot_a != c.slot_a || last->slot_b != c.slot_b || last->obstacle != c.obstacle ||
+        last->kind != c.kind)
       runs.push_back({i, i, c.slot_a, c.slot_b, c.obstacle, c.kind, 0, 0});
     runs.back().end = i + 1;
   }
   // Runs come in one order in all lists, pairs in a run by their features.
   size_t next = 0;
   for (Run &run : runs) {
-    const auto same = [&](const Run &o) { return o.slot_a == run.slot_a && o.slot_b == run.slot_b && o.obstacle == run.obstacle && o.kind == run.kind; };
+    const auto same = [&](const Run &o) {
+      return o.slot_a == run.slot_a && o.slot_b == run.slot_b && o.obstacle == run.obstacle &&
+             o.kind == run.kind;
+    };
     const auto found = std::find_if(old_runs.begin() + std::ptrdiff_t(next), old_runs.end(), same);
     uint32_t j = 0, last = 0;
-    if (found != old_runs.end()) run.way = found->way, j = found->begin, last = found->end, next = size_t(found - old_runs.begin()) + 1;
+    if (found != old_runs.end()) {
+      run.way = found->way;
+      j = found->begin;
+      last = found->end;
+      next = size_t(found - old_runs.begin()) + 1;
+    }
     for (uint32_t i = run.begin; i < run.end; ++i) {
       while (j < last && old_features[j] < features[i]) ++j;
       const bool known = j < last && old_features[j] == features[i];
@@ -207,14 +242,16 @@ void guard_near(GuardScene &scene, const Array<Candidate> &list, GuardMemory &me
   for (GuardMemory::Run &run : memory.runs) {
     const Candidate &c = list[run.begin];
     const GuardSide &a = scene.side(c, false), &b = scene.side(c, true);
-    run.travel = &a == &b ? 2 * a.deform : std::min(a.travel + b.travel, norm(a.drift - b.drift) + a.spread + b.spread);
+    run.travel = &a == &b ? 2 * a.deform
+                          : std::min(a.travel + b.travel, norm(a.drift - b.drift) + a.spread + b.spread);
     if (a.still && b.still) continue;
     if (c.obstacle && scene.obstacles[c.slot_b].shape != Shape::mesh) obstacles.look(run);
     else pairs.look(run);
   }
 }
 
-double guard_pairs(GuardScene &scene, const Array<Candidate> &list, std::span<const uint32_t> which, Array<GuardHit> &out) {
+double guard_pairs(GuardScene &scene, const Array<Candidate> &list, std::span<const uint32_t> which,
+                   Array<GuardHit> &out) {
   out.clear();
   double least = 1;
   for (const uint32_t i : which) {

@@ -1,5 +1,6 @@
-// Polynomials in t on [0,1] as sum B[i] t^i (1-t)^(n-i): Bernstein's basis with the binomials left in the coefficients. A straight path is its
-// two ends, products are convolutions, the hull of B[i]/binomial bounds the values, and no end of the interval is better than the other.
+// Polynomials in t on [0,1] as sum B[i] t^i (1-t)^(n-i): Bernstein's basis with the binomials left in the
+// coefficients. A straight path is its two ends, products are convolutions, the hull of B[i]/binomial bounds
+// the values, and no end of the interval is better than the other.
 #pragma once
 #include <algorithm>
 #include <cmath>
@@ -16,7 +17,8 @@ struct Poly {
 
   double operator()(double t) const {
     const double s = 1 - t;
-    if (degree == 3) return (b[0] * s + b[1] * t) * (s * s) + (b[2] * s + b[3] * t) * (t * t);   // nearly all there is to do, in a short chain
+    // nearly all there is to do, in a short chain
+    if (degree == 3) return (b[0] * s + b[1] * t) * (s * s) + (b[2] * s + b[3] * t) * (t * t);
     double value = b[0], power = 1;
     for (int i = 1; i <= degree; ++i) {
       power *= t;
@@ -41,7 +43,8 @@ struct Poly {
     least = largest = b[0];
     for (int i = 1; i <= degree; ++i) {
       binomial = binomial * (degree - i + 1) / i;
-      least = std::min(least, b[i] / binomial), largest = std::max(largest, b[i] / binomial);
+      least = std::min(least, b[i] / binomial);
+      largest = std::max(largest, b[i] / binomial);
     }
   }
 };
@@ -67,12 +70,16 @@ inline Poly operator-(const Poly &p, const Poly &q) { return p + -1.0 * q; }
 inline Poly raised(const Poly &p) {
   Poly r;
   r.degree = p.degree + 1;
-  for (int i = 0; i <= p.degree; ++i) r.b[i] += p.b[i], r.b[i + 1] += p.b[i];
+  for (int i = 0; i <= p.degree; ++i) {
+    r.b[i] += p.b[i];
+    r.b[i + 1] += p.b[i];
+  }
   return r;
 }
 inline Poly linear(double at0, double at1) { return {1, {at0, at1}}; }
 
-// Roots inside (0,1) of a quadratic, ascending, without cancellation; a root outside by rounding alone belongs to the caller's ends.
+// Roots inside (0,1) of a quadratic, ascending, without cancellation; a root outside by rounding alone
+// belongs to the caller's ends.
 inline int quadratic_roots(const Poly &p, double out[2]) {
   // In x = t / (1-t): b0 + b1 x + b2 x^2, t = x / (1 + x). t of a ratio num / den is num / (num + den).
   const double a = p.b[2], h = 0.5 * p.b[1], c = p.b[0];

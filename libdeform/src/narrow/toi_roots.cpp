@@ -1,10 +1,13 @@
-// Time of impact by roots: where features first touch, one of a few polynomials is zero. All their roots are isolated between the roots of their
-// derivatives, sorted, and the earliest at which the true distance confirms a touch is the answer (Zerbato 2010, (4.2) to (4.7), corrected: up to three roots,
-// each with its inside test; even roots and motions in one plane have no change of sign).
+// Time of impact by roots: where features first touch, one of a few polynomials is zero. All their roots are
+// isolated between the roots of their derivatives, sorted, and the earliest at which the true distance
+// confirms a touch is the answer (Zerbato 2010, (4.2) to (4.7), corrected: up to three roots, each with its
+// inside test; even roots and motions in one plane have no change of sign).
 //
-//   without separation   the coplanarity cubic; where it vanishes altogether (motion in one plane, parallel edges, flat triangles) a first touch
-//                        is one at the patch's border: w_k x w_k+1 = 0 on a side, w_k = 0 at a corner
-//   with separation m    the same per region of the patch: f^2 = m^2 |n|^2, |w_k x w_k+1|^2 = m^2 |w_k+1 - w_k|^2, |w_k|^2 = m^2
+//   without separation   the coplanarity cubic; where it vanishes altogether (motion in one plane, parallel
+//                        edges, flat triangles) a first touch is one at the patch's border: w_k x w_k+1 = 0
+//                        on a side, w_k = 0 at a corner
+//   with separation m    the same per region of the patch: f^2 = m^2 |n|^2, |w_k x w_k+1|^2 = m^2 |w_k+1 -
+//                        w_k|^2, |w_k|^2 = m^2
 #include <algorithm>
 
 #include "narrow/toi_finders.h"
@@ -13,15 +16,15 @@
 namespace dfm::toi {
 namespace {
 
-constexpr double kPolyRound = 0x1p-44;   // rounding of a polynomial's values, in sizes of its coefficients
+constexpr double kPolyRound = 0x1p-44;  // rounding of a polynomial's values, in sizes of its coefficients
 
-constexpr double kSharp = 1e-10;         // in t: roots less certain than that are sharpened
-constexpr double kSharpenBy = 1e-8;      // in t: no step further than that
+constexpr double kSharp = 1e-10;     // in t: roots less certain than that are sharpened
+constexpr double kSharpenBy = 1e-8;  // in t: no step further than that
 
-struct VectorPoly {
-  Poly x, y, z;
-};
-VectorPoly path(Vec3 at0, Vec3 at1) { return {linear(at0.x, at1.x), linear(at0.y, at1.y), linear(at0.z, at1.z)}; }
+struct VectorPoly { Poly x, y, z; };
+VectorPoly path(Vec3 at0, Vec3 at1) {
+  return {linear(at0.x, at1.x), linear(at0.y, at1.y), linear(at0.z, at1.z)};
+}
 VectorPoly cross(const VectorPoly &a, const VectorPoly &b) {
   return {a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
 }
@@ -39,7 +42,8 @@ class Roots {
       touch_ = q_.separation + 4 * kRound;
       if (touches(0)) return answer_;
     }
-    touch_ = q_.separation + 8 * q_.tolerance + 4 * kRound;   // as far as the features may move while t is uncertain
+    // as far as the features may move while t is uncertain
+    touch_ = q_.separation + 8 * q_.tolerance + 4 * kRound;
     if (contacts && !plane_.vanishes && in_order()) return answer_;
     if (contacts) contact();
     else separation();
@@ -54,7 +58,9 @@ class Roots {
     ++answer_.evaluations;
     const Separation s = separate(q_, t);
     if (!(s.upper <= touch_)) return false;
-    answer_.t = t, answer_.u = s.u, answer_.v = s.v;
+    answer_.t = t;
+    answer_.u = s.u;
+    answer_.v = s.v;
     return true;
   }
 
@@ -83,15 +89,18 @@ class Roots {
     int n = 0;
     Bracket b{0, 0, p(0), 0};
     for (int k = 0; k <= nturn; ++k, b.lo = b.hi, b.f_lo = b.f_hi) {
-      b.hi = k < nturn ? turn[k] : 1, b.f_hi = p(b.hi);
+      b.hi = k < nturn ? turn[k] : 1;
+      b.f_hi = p(b.hi);
       ++answer_.evaluations;
       if ((b.f_lo < 0 && b.f_hi > 0) || (b.f_lo > 0 && b.f_hi < 0))
-        out[n++] = find_root(method, p, b, method == method_ ? q_.tolerance : 0x1p-50, q_.max_iterations, answer_.evaluations);
+        out[n++] = find_root(method, p, b, method == method_ ? q_.tolerance : 0x1p-50, q_.max_iterations,
+                             answer_.evaluations);
     }
     return n;
   }
 
-  // Roots of p in (0,1], and the places where it comes as near to zero as rounding can tell without changing its sign.
+  // Roots of p in (0,1], and the places where it comes as near to zero as rounding can tell without
+  // changing its sign.
   void add_roots(const Poly &p, double error) {
     double least, largest;
     p.bounds(least, largest);
@@ -105,8 +114,8 @@ class Roots {
     if (std::fabs(p(1)) <= error) add(1);
   }
 
-  // Two roots close together lie where the cubic is flat, and its rounding moves them: Newton steps on the sharp one, unless a touch of an even
-  // root leaves nothing to find.
+  // Two roots close together lie where the cubic is flat, and its rounding moves them: Newton steps on the
+  // sharp one, unless a touch of an even root leaves nothing to find.
   void sharpen() {
     const Poly slope = plane_.f.derivative();
     for (int k = 0; k < ntime_; ++k) {
@@ -124,17 +133,24 @@ class Roots {
   // Nothing can touch between two times: all corners lie on one side along an axis, at both.
   bool apart_between(double lo, double hi) const {
     Vec3 at[8];
-    for (int k = 0; k < q_.ncorner; ++k) at[k] = q_.corner(k, lo), at[q_.ncorner + k] = q_.corner(k, hi);
+    for (int k = 0; k < q_.ncorner; ++k) {
+      at[k] = q_.corner(k, lo);
+      at[q_.ncorner + k] = q_.corner(k, hi);
+    }
     for (int axis = 0; axis < 3; ++axis) {
       double low = at[0][axis], high = low;
-      for (int k = 1; k < 2 * q_.ncorner; ++k) low = std::min(low, at[k][axis]), high = std::max(high, at[k][axis]);
+      for (int k = 1; k < 2 * q_.ncorner; ++k) {
+        low = std::min(low, at[k][axis]);
+        high = std::max(high, at[k][axis]);
+      }
       if (low > touch_ || high < -touch_) return true;
     }
     return false;
   }
 
-  // Nearly every query. The cubic is monotonic between its turns, so its roots come in order: each is asked at once, and one after a touch is never looked
-  // for, nor one in a piece in which the corners stay on one side. False where a root is not certain: those are sharpened and sorted first.
+  // Nearly every query. The cubic is monotonic between its turns, so its roots come in order: each is asked
+  // at once, and one after a touch is never looked for, nor one in a piece in which the corners stay on one
+  // side. False where a root is not certain: those are sharpened and sorted first.
   bool in_order() {
     const Poly &p = plane_.f;
     double least, largest;
@@ -147,9 +163,11 @@ class Roots {
     end[n++] = 1;
     Bracket b{0, 0, p(0), 0};
     for (int k = 0; k < n; ++k, b.lo = b.hi, b.f_lo = b.f_hi) {
-      b.hi = end[k], b.f_hi = p(b.hi);
+      b.hi = end[k];
+      b.f_hi = p(b.hi);
       ++answer_.evaluations;
-      if (((b.f_lo < 0 && b.f_hi > 0) || (b.f_lo > 0 && b.f_hi < 0)) && !(n > 1 && apart_between(b.lo, b.hi))) {
+      if (((b.f_lo < 0 && b.f_hi > 0) || (b.f_lo > 0 && b.f_hi < 0)) &&
+          !(n > 1 && apart_between(b.lo, b.hi))) {
         const double t = find_root(method_, p, b, q_.tolerance, q_.max_iterations, answer_.evaluations);
         if (!certain(t)) return false;
         if (touches(t)) return true;
@@ -174,7 +192,8 @@ class Roots {
 
   void separation() {
     const double m2 = q_.separation * q_.separation;
-    const VectorPoly r = path(q_.w0[0], q_.w1[0]), n = cross(path(q_.e1[0], q_.e1[1]), path(q_.e2[0], q_.e2[1]));
+    const VectorPoly r = path(q_.w0[0], q_.w1[0]);
+    const VectorPoly n = cross(path(q_.e1[0], q_.e1[1]), path(q_.e2[0], q_.e2[1]));
     const Poly f = r.x * n.x + r.y * n.y + r.z * n.z, ff = f * f, plane = ff - m2 * raised(raised(square(n)));
     add_roots(plane, kPolyRound * ff.size());
     for (int k = 0; k < q_.ncorner; ++k) {
@@ -187,7 +206,8 @@ class Roots {
     }
   }
 
-  static constexpr int kMaxTimes = 128;   // at most 6 + 4 sides x (3 quadratics x 4 + 3 lines x 2) = 78 are there
+  // at most 6 + 4 sides x (3 quadratics x 4 + 3 lines x 2) = 78 are there
+  static constexpr int kMaxTimes = 128;
   const Query &q_;
   const int method_;
   Coplanarity plane_;

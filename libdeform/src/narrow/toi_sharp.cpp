@@ -1,14 +1,13 @@
-// The coplanarity cubic once more in pairs of doubles, from the vertices themselves. A needle a million times longer than wide leaves six digits fewer
-// in the plain one, so its roots would be known to 1e-5 only; here they are known to the last digits of a double. Sums and products of pairs after
-// Dekker (1971), from + - * alone.
+// The coplanarity cubic once more in pairs of doubles, from the vertices themselves. A needle a million
+// times longer than wide leaves six digits fewer in the plain one, so its roots would be known to 1e-5
+// only; here they are known to the last digits of a double. Sums and products of pairs after Dekker (1971),
+// from + - * alone.
 #include "narrow/toi_query.h"
 
 namespace dfm::toi {
 namespace {
 
-struct Pair {
-  double high, low;
-};
+struct Pair { double high, low; };
 
 Pair sum(double a, double b) {
   const double s = a + b, t = s - a;
@@ -36,9 +35,7 @@ Pair operator*(Pair a, Pair b) {
   return quick_sum(p, rest + (a.high * b.low + a.low * b.high));
 }
 
-struct Pairs {
-  Pair x, y, z;
-};
+struct Pairs { Pair x, y, z; };
 Pairs operator+(const Pairs &a, const Pairs &b) { return {a.x + b.x, a.y + b.y, a.z + b.z}; }
 Pair dot(const Pairs &a, const Pairs &b) { return a.x * b.x + a.y * b.y + a.z * b.z; }
 Pairs cross(const Pairs &a, const Pairs &b) {
@@ -63,11 +60,17 @@ SharpCubic sharp_coplanarity(const Query &q) {
     e1[end] = difference(q, at(q.to[1]), at(q.from[1]));
     e2[end] = difference(q, at(q.to[2]), at(q.from[2]));
   }
-  const Pairs n0 = cross(e1[0], e2[0]), n1 = cross(e1[0], e2[1]) + cross(e1[1], e2[0]), n2 = cross(e1[1], e2[1]);
-  const Pair b[4] = {dot(r[0], n0), dot(r[1], n0) + dot(r[0], n1), dot(r[1], n1) + dot(r[0], n2), dot(r[1], n2)};
+  const Pairs n0 = cross(e1[0], e2[0]);
+  const Pairs n1 = cross(e1[0], e2[1]) + cross(e1[1], e2[0]);
+  const Pairs n2 = cross(e1[1], e2[1]);
+  const Pair b[4] = {dot(r[0], n0), dot(r[1], n0) + dot(r[0], n1), dot(r[1], n1) + dot(r[0], n2),
+                     dot(r[1], n2)};
   SharpCubic c;
   c.high.degree = c.low.degree = 3;
-  for (int i = 0; i < 4; ++i) c.high.b[i] = b[i].high, c.low.b[i] = b[i].low;
+  for (int i = 0; i < 4; ++i) {
+    c.high.b[i] = b[i].high;
+    c.low.b[i] = b[i].low;
+  }
   return c;
 }
 

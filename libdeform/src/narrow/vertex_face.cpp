@@ -6,10 +6,10 @@
 //      X   beside a concave edge: the other face's plane,           \       |        \____
 //          its weights extrapolated                                  \      |
 //
-// Whether p is outside is told by the nearest point: over a face by its side, over an edge by the sum of its faces' normals, over a
-// corner by the edge there that points to p most (the point of the corner's spherical outline nearest to the direction of p lies on it).
-// From inside, only the nearest face pushes back (with the planes across concave edges): the far side of a thin body does not pull p
-// through.
+// Whether p is outside is told by the nearest point: over a face by its side, over an edge by the sum of its
+// faces' normals, over a corner by the edge there that points to p most (the point of the corner's spherical
+// outline nearest to the direction of p lies on it). From inside, only the nearest face pushes back (with the
+// planes across concave edges): the far side of a thin body does not pull p through.
 #include <algorithm>
 
 #include "narrow/detail.h"
@@ -19,24 +19,25 @@
 namespace dfm::narrow {
 namespace {
 
-constexpr uint32_t kMost = 96;        // triangles kept per surfel; beyond that the nearest ones
+constexpr uint32_t kMost = 96;  // triangles kept per surfel; beyond that the nearest ones
 constexpr double kLoose = 1 + 1e-9;
-constexpr double kNearer = 1e-9;      // relative: a triangle beside the feature counts as nearer only beyond this
+// relative: a triangle beside the feature counts as nearer only beyond this
+constexpr double kNearer = 1e-9;
 
 struct Near {
   uint32_t tri;
   TriangleFeature feature;
   bool emitted;
   double weight[3];
-  Vec3 q, normal;              // closest point; unit face normal (zero for a triangle without area)
+  Vec3 q, normal;  // closest point; unit face normal (zero for a triangle without area)
   Vec3 emitted_normal;
-  double distance, plane;      // to the triangle (>= 0); signed, to its plane
+  double distance, plane;  // to the triangle (>= 0); signed, to its plane
   double reach;
 };
 
 struct Group {
   const Pair &pair;
-  double depth;                // m, recovery
+  double depth;  // m, recovery
   uint32_t surfel = 0, count = 0;
   Vec3 p;
   Near near[kMost];
@@ -60,7 +61,8 @@ struct Group {
   void resolve(Array<ContactPoint> &out);
 };
 
-// Place for a new entry; where all are taken (a surface folded onto itself), that of the farthest, or null. The order of triangles stays.
+// Place for a new entry; where all are taken (a surface folded onto itself), that of the farthest, or null.
+// The order of triangles stays.
 Near *place_for(Near *near, uint32_t &count, double distance) {
   if (count < kMost) return &near[count++];
   uint32_t far = 0;
@@ -77,8 +79,9 @@ double Group::reach_to(Vec3 v, const uint32_t *c) const {
   return contact_reach(pair.h, pair.offset, std::sqrt(speed2));
 }
 
-// Is p within reach of a plane, or behind one, so that it is worth looking closer? In front of all faces beyond the reach, p is outside
-// and free. Looser by a few roundings than the decisions that follow, which alone may depend on distances.
+// Is p within reach of a plane, or behind one, so that it is worth looking closer? In front of all faces
+// beyond the reach, p is outside and free. Looser by a few roundings than the decisions that follow, which
+// alone may depend on distances.
 bool Group::reaches(Run run, Vec3 v, double widest2) const {
   const double depth2 = depth * depth;
   for (const Candidate &candidate : run) {
@@ -108,9 +111,12 @@ void Group::collect(Run run) {
     const double distance = std::sqrt(t.distance2);
     Near *n = place_for(near, count, distance);
     if (!n) continue;
-    n->tri = candidate.feature_b, n->feature = t.feature, n->emitted = false;
+    n->tri = candidate.feature_b;
+    n->feature = t.feature;
+    n->emitted = false;
     for (int k = 0; k < 3; ++k) n->weight[k] = t.weight[k];
-    n->q = t.point, n->distance = distance;
+    n->q = t.point;
+    n->distance = distance;
     n->normal = normalized(cross(b - a, d - a));
     n->plane = dot(n->normal, p - t.point);
     n->reach = reach_to(v, c);
@@ -160,7 +166,8 @@ Vec3 Group::outward(const Near &n) const {
   }
   for (uint32_t i = 0; i < count; ++i) {
     const uint32_t *c = corners(near[i]);
-    if ((c[0] == i0 || c[1] == i0 || c[2] == i0) && (c[0] == i1 || c[1] == i1 || c[2] == i1)) sum += near[i].normal;
+    if ((c[0] == i0 || c[1] == i0 || c[2] == i0) && (c[0] == i1 || c[1] == i1 || c[2] == i1))
+      sum += near[i].normal;
   }
   return sum;
 }
@@ -168,7 +175,9 @@ Vec3 Group::outward(const Near &n) const {
 // Is p beside an open surface, where there is no inside?
 bool Group::beyond_rim(const Near &n) const {
   const Surface &s = *pair.b->surface;
-  const auto open = [&](uint32_t edge) { return s.edge_tri[2 * size_t{edge}] == kNone || s.edge_tri[2 * size_t{edge} + 1] == kNone; };
+  const auto open = [&](uint32_t edge) {
+    return s.edge_tri[2 * size_t{edge}] == kNone || s.edge_tri[2 * size_t{edge} + 1] == kNone;
+  };
   const int f = int(n.feature);
   if (f == 0) return false;
   if (f < 4) return open(s.tri_edge[3 * size_t{n.tri} + f - 1]);
@@ -176,16 +185,19 @@ bool Group::beyond_rim(const Near &n) const {
   for (uint32_t k = s.fan_begin[corner]; k < s.fan_begin[corner + 1]; ++k)
     for (int i = 0; i < 3; ++i) {
       const uint32_t *c = &s.tri[3 * size_t{s.fan[k]}];
-      if ((c[i] == corner || c[(i + 1) % 3] == corner) && open(s.tri_edge[3 * size_t{s.fan[k]} + i])) return true;
+      if ((c[i] == corner || c[(i + 1) % 3] == corner) && open(s.tri_edge[3 * size_t{s.fan[k]} + i]))
+        return true;
     }
   return false;
 }
 
 // Was the same closest point made a contact from another triangle, with the same normal?
 bool Group::repeated(const Near &n, Vec3 normal) const {
-  const double tiny = 1e-9 * pair.b->surface->median_edge, same = 1e-8 * n.distance * n.distance + tiny * tiny;
+  const double tiny = 1e-9 * pair.b->surface->median_edge;
+  const double same = 1e-8 * n.distance * n.distance + tiny * tiny;
   for (uint32_t j = 0; j < count; ++j)
-    if (near[j].emitted && norm2(near[j].q - n.q) <= same && norm2(near[j].emitted_normal - normal) <= 1e-6) return true;
+    if (near[j].emitted && norm2(near[j].q - n.q) <= same && norm2(near[j].emitted_normal - normal) <= 1e-6)
+      return true;
   return false;
 }
 
@@ -196,7 +208,10 @@ uint32_t Group::steepest(const Near &n) const {
   for (uint32_t i = 0; i < count; ++i) {
     if (near[i].tri != n.tri && (n.feature == TriangleFeature::face || !has_feature(near[i], n))) continue;
     const double s = std::fabs(dot(near[i].normal, p - n.q));
-    if (s > most) most = s, best = i;
+    if (s > most) {
+      most = s;
+      best = i;
+    }
   }
   return best;
 }
@@ -213,34 +228,38 @@ bool Group::plane_weights(const Near &n, double weight[3]) const {
   return true;
 }
 
-// p projects beside the face, across concave edges only and no further than it can travel. Flat edges do not count: sliding over them
-// within the reach costs less than a tenth of the rest distance.
+// p projects beside the face, across concave edges only and no further than it can travel. Flat edges do not
+// count: sliding over them within the reach costs less than a tenth of the rest distance.
 bool Group::reachable_across(const Near &n, double weight[3]) const {
   if (!plane_weights(n, weight)) return false;
   const Surface &s = *pair.b->surface;
   const uint32_t *c = corners(n);
   const double area2 = norm(cross(pair.xb(c[1]) - pair.xb(c[0]), pair.xb(c[2]) - pair.xb(c[0])));
   bool across = false;
-  for (int k = 0; k < 3; ++k) {            // edge k faces corner k + 2
+  for (int k = 0; k < 3; ++k) {  // edge k faces corner k + 2
     const double w = weight[(k + 2) % 3];
     if (w >= 0) continue;
     const uint32_t from = c[k], to = c[(k + 1) % 3];
     const Vec3 along = pair.xb(to) - pair.xb(from);
     const double length = norm(along);
     if (!(-w * area2 <= n.reach * length)) return false;
-    const uint32_t *sides = &s.edge_tri[2 * size_t{s.tri_edge[3 * size_t{n.tri} + k]}], beyond = sides[0] == n.tri ? sides[1] : sides[0];
+    const uint32_t *sides = &s.edge_tri[2 * size_t{s.tri_edge[3 * size_t{n.tri} + k]}];
+    const uint32_t beyond = sides[0] == n.tri ? sides[1] : sides[0];
     if (beyond == kNone) return false;
     Vec3 o;
     for (int i = 0; i < 3; ++i)
-      if (const uint32_t v = s.tri[3 * size_t{beyond} + i]; v != from && v != to) o = pair.xb(v) - pair.xb(from);
-    const double rise = dot(n.normal, o) * length, height = norm(cross(along, o));   // rise / height: sine of the fold
+      if (const uint32_t v = s.tri[3 * size_t{beyond} + i]; v != from && v != to)
+        o = pair.xb(v) - pair.xb(from);
+    // rise / height: sine of the fold
+    const double rise = dot(n.normal, o) * length, height = norm(cross(along, o));
     if (!(rise * n.reach > 0.1 * pair.offset * height)) return false;
     across = true;
   }
   return across;
 }
 
-void Group::emit(Near &n, Vec3 normal, double distance, const double weight[3], Array<ContactPoint> &out) const {
+void Group::emit(Near &n, Vec3 normal, double distance, const double weight[3],
+                 Array<ContactPoint> &out) const {
   ContactPoint c = blank(pair, kVertexFace, 0, surfel, n.tri);
   add_node(c, pair.a.first_node + surfel, 1);
   for (int k = 0; k < 3; ++k) add_node(c, pair.b->first_node + corners(n)[k], -weight[k]);
@@ -254,7 +273,7 @@ void Group::resolve(Array<ContactPoint> &out) {
   const Near &best = near[nearest()];
   const double tiny = 1e-9 * pair.b->surface->median_edge;
   const bool inside = dot(outward(best), p - best.q) < 0 && !beyond_rim(best);
-  uint32_t deepest = kNone;                // of the faces that p is behind, the one it is least deep below
+  uint32_t deepest = kNone;  // of the faces that p is behind, the one it is least deep below
   double weight[3];
   for (uint32_t i = 0; i < count; ++i) {
     Near &n = near[i];
@@ -303,7 +322,8 @@ void vertex_face(const Pair &pair, Run run, Array<ContactPoint> &out) {
     if (!group.count) continue;
     const size_t begin = out.size();
     group.resolve(out);
-    std::sort(out.begin() + begin, out.end(), [](const ContactPoint &l, const ContactPoint &r) { return l.feature_b < r.feature_b; });
+    std::sort(out.begin() + begin, out.end(),
+              [](const ContactPoint &l, const ContactPoint &r) { return l.feature_b < r.feature_b; });
     uint32_t touching = 0;
     for (size_t k = begin; k < out.size(); ++k) touching += out[k].distance < 2 * pair.offset;
     for (size_t k = begin; k < out.size(); ++k) {

@@ -1,5 +1,5 @@
-// Physics points of one body as a structure of arrays. Points lie 4 doubles apart (the fourth is zero), so that one point is one
-// 256-bit load; the measurement behind it is doc/decisions/0003-point-layout.md.
+// Physics points of one body as a structure of arrays. Points lie 4 doubles apart (the fourth is zero), so
+// that one point is one 256-bit load; the measurement behind it is doc/decisions/0003-point-layout.md.
 #pragma once
 #include <cstdint>
 
@@ -12,24 +12,24 @@ inline constexpr uint32_t kStride = 4;
 
 struct Phyxels {
   uint32_t n = 0;
-  Array<double> rest;       // [n,3] m, before pose
-  Array<double> x, v;       // [n,4] m, m/s: start of the sub-step
-  Array<double> v_free;     // [n,4] m/s: end of the sub-step without contact
-  Array<double> f;          // [n,4] N: loads and the model's forces
-  Array<double> load;       // [n,4] N: sum of lasting loads at the current time
-  Array<double> impulse;    // [n,4] N s: contact impulses of the sub-step, J^T lambda
-  Array<double> mass;       // [n] kg, lumped
-  double least_mass = 0;    // kg
-  Array<double> inv_mass;   // [n,4] 1/kg, zero where a component is held
-  Array<uint8_t> held;      // [n] bits 1 x, 2 y, 4 z
+  Array<double> rest;      // [n,3] m, before pose
+  Array<double> x, v;      // [n,4] m, m/s: start of the sub-step
+  Array<double> v_free;    // [n,4] m/s: end of the sub-step without contact
+  Array<double> f;         // [n,4] N: loads and the model's forces
+  Array<double> load;      // [n,4] N: sum of lasting loads at the current time
+  Array<double> impulse;   // [n,4] N s: contact impulses of the sub-step, J^T lambda
+  Array<double> mass;      // [n] kg, lumped
+  double least_mass = 0;   // kg
+  Array<double> inv_mass;  // [n,4] 1/kg, zero where a component is held
+  Array<uint8_t> held;     // [n] bits 1 x, 2 y, 4 z
 };
 
-// Lumped mass of tetrahedra: a quarter of each cell's mass to each corner. cell_density [ntet] wins over density; share [ntet]: how much of
-// a cell is material. Both may be null.
+// Lumped mass of tetrahedra: a quarter of each cell's mass to each corner. cell_density [ntet] wins over
+// density; share [ntet]: how much of a cell is material. Both may be null.
 struct LumpedMass { double volume, mass; };
-LumpedMass lump_mass(uint32_t npoint, const double *rest, uint32_t ntet, const uint32_t *tets, double density, const double *cell_density,
-                     const double *share, double *mass);
-void update_inverse_mass(Phyxels &p);   // and least_mass
+LumpedMass lump_mass(uint32_t npoint, const double *rest, uint32_t ntet, const uint32_t *tets, double density,
+                     const double *cell_density, const double *share, double *mass);
+void update_inverse_mass(Phyxels &p);  // and least_mass
 
 double tet_volume(const double *x, uint32_t stride, const uint32_t tet[4]);
 

@@ -7,7 +7,8 @@
 namespace dfm {
 namespace {
 
-// Effects that cannot keep their promise without it: what is cut lies on itself, what folds comes to lie on itself.
+// Effects that cannot keep their promise without it: what is cut lies on itself, what folds comes to
+// lie on itself.
 constexpr const char *kNeedSelf[] = {"cutting", "folding"};
 
 }  // namespace
@@ -16,7 +17,8 @@ void plan_effects(const SceneFacts &f, Plan &plan) {
   auto provider = [](const std::vector<SceneFacts::Provider> &list, const std::string &effect) {
     std::vector<std::string> names;
     for (const auto &p : list)
-      if (p.effect == effect && std::find(names.begin(), names.end(), p.plugin) == names.end()) names.push_back(p.plugin);
+      if (p.effect == effect && std::find(names.begin(), names.end(), p.plugin) == names.end())
+        names.push_back(p.plugin);
     return join(names);
   };
   std::vector<std::string> names;
@@ -30,11 +32,13 @@ void plan_effects(const SceneFacts &f, Plan &plan) {
   for (const auto &name : names) {
     const std::string by = provider(f.offered, name);
     if (const std::string idle = provider(f.idle, name); by.empty() && !idle.empty())
-      fail(DFM_E_ARG, "effect '%s' is asked for, and %s provides it, but the parameters of every body leave it off; set them "
-           "('deform plugin info %s' lists them) or take the effect from the list", name.c_str(), idle.c_str(), idle.c_str());
+      fail(DFM_E_ARG,
+           "effect '%s' is asked for, and %s provides it, but the parameters of every body leave it off; set "
+           "them ('deform plugin info %s' lists them) or take the effect from the list",
+           name.c_str(), idle.c_str(), idle.c_str());
     if (by.empty()) {
       const std::string could = provider(f.available, name);
-      if (f.bodies == 0 && !could.empty()) {   // an empty world: whoever comes first may provide it
+      if (f.bodies == 0 && !could.empty()) {  // an empty world: whoever comes first may provide it
         plan.effects.push_back({name, "effects", ""});
         continue;
       }
@@ -50,12 +54,15 @@ void plan_effects(const SceneFacts &f, Plan &plan) {
 }
 
 std::string self_asked_by(const SceneFacts &f) {
-  const auto listed = [&](const std::string &name) { return std::find(f.asked.begin(), f.asked.end(), name) != f.asked.end(); };
+  const auto listed = [&](const std::string &name) {
+    return std::find(f.asked.begin(), f.asked.end(), name) != f.asked.end();
+  };
   if (f.effects_listed && listed(kSelfContact)) return "effects";
   if (f.self) return "contact.self";
   for (const char *need : kNeedSelf) {
     const auto offers = [&](const SceneFacts::Provider &p) { return p.effect == need; };
-    if (f.effects_listed ? listed(need) : std::any_of(f.offered.begin(), f.offered.end(), offers)) return need;
+    if (f.effects_listed ? listed(need) : std::any_of(f.offered.begin(), f.offered.end(), offers))
+      return need;
   }
   if (f.self_auto) return kSelfAuto;
   return {};

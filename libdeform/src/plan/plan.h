@@ -1,6 +1,7 @@
 // The plan: which stages a sub-step runs, and which effects they are there for, derived from what the scene
-// contains. A stage that nothing calls for is not in the list, so it costs no instruction; `deform explain` prints
-// both lists with the reasons. The order of the stages is that of the contact method's table (world/method.h).
+// contains. A stage that nothing calls for is not in the list, so it costs no instruction; `deform explain`
+// prints both lists with the reasons. The order of the stages is that of the contact method's table
+// (world/method.h).
 #pragma once
 #include <cstddef>
 #include <string>
@@ -11,34 +12,39 @@ namespace dfm {
 // What a stage does that other stages ask the plan about; most stages are asked for by nobody.
 enum class StageRole {
   none,
-  lists_pairs,         // candidates of pairs, and how fast surfaces are
-  finds_contacts,      // contacts of pairs
-  solves,              // contacts act on bodies
-  gives_impulses,      // and they do so by impulses on points
-  guards,              // nothing crosses at the end of the sub-step
+  lists_pairs,     // candidates of pairs, and how fast surfaces are
+  finds_contacts,  // contacts of pairs
+  solves,          // contacts act on bodies
+  gives_impulses,  // and they do so by impulses on points
+  guards,          // nothing crosses at the end of the sub-step
 };
 
 // What the plan is derived from.
 struct SceneFacts {
   unsigned bodies = 0, self_stepping = 0, obstacles = 0;
-  unsigned coupled = 0, coupled_surfels = 0;           // bodies with a surface of their own, and its surfels
-  unsigned body_pairs = 0, obstacle_pairs = 0;         // pairs that may touch, filters applied
+  unsigned coupled = 0, coupled_surfels = 0;    // bodies with a surface of their own, and its surfels
+  unsigned body_pairs = 0, obstacle_pairs = 0;  // pairs that may touch, filters applied
   unsigned rigid_bodies = 0, rigid_joints = 0;
-  std::string rigid_hosts;                             // names
+  std::string rigid_hosts;  // names
   bool gravity_keys = false, loads_vary = false, held_move = false, obstacles_move = false, unguarded = false;
   struct Provider { std::string effect, plugin; };
-  std::vector<Provider> offered;                       // by models and laws that the scene uses, as their parameters stand
-  std::vector<Provider> idle;                          // by models that the scene uses, if their parameters called for it
-  std::vector<Provider> available;                     // by every loaded plugin
+  // by models and laws that the scene uses, as their parameters stand
+  std::vector<Provider> offered;
+  // by models that the scene uses, if their parameters called for it
+  std::vector<Provider> idle;
+  std::vector<Provider> available;  // by every loaded plugin
   bool effects_listed = false;
-  bool sleep = false;                                  // islands at rest may sleep
-  bool self = false, self_auto = false;                // contact.self
-  unsigned self_bodies = 0;                            // bodies that may touch themselves, filters applied
-  std::vector<std::string> asked;                      // where listed
+  bool sleep = false;                    // islands at rest may sleep
+  bool self = false, self_auto = false;  // contact.self
+  unsigned self_bodies = 0;              // bodies that may touch themselves, filters applied
+  std::vector<std::string> asked;        // where listed
 };
 
 // Does a stage run, and why; where it does not: why not, or nothing where that is not worth a line.
-struct StageChoice { bool runs = false; std::string why; };
+struct StageChoice {
+  bool runs = false;
+  std::string why;
+};
 namespace when {
 StageChoice motion(const SceneFacts &facts);
 StageChoice model(const SceneFacts &facts);
@@ -57,7 +63,7 @@ StageChoice sleep(const SceneFacts &facts);
 }  // namespace when
 
 struct PlannedStage {
-  size_t row;                                          // of the table
+  size_t row;  // of the table
   StageRole role;
   std::string why;
 };
@@ -65,11 +71,11 @@ struct AbsentStage { std::string name, why; };
 struct PlannedEffect { std::string name, asked_by, provided_by; };
 
 struct Plan {
-  std::vector<PlannedStage> stages;                    // in the order of a sub-step
+  std::vector<PlannedStage> stages;  // in the order of a sub-step
   std::vector<AbsentStage> absent;
   std::vector<PlannedEffect> effects;
   bool has(StageRole role) const;
-  bool touches() const;                                // has stages of contact
+  bool touches() const;  // has stages of contact
 };
 
 inline constexpr char kSelfContact[] = "self_contact";
@@ -77,7 +83,8 @@ inline constexpr char kSelfAuto[] = "contact.self auto";
 // Who calls for self contact: "contact.self", "effects", the effect that needs it; "" where nobody does.
 std::string self_asked_by(const SceneFacts &facts);
 
-// The effects. Throws Error(DFM_E_ARG) where a listed one is provided by nothing in the scene; names who could.
+// The effects. Throws Error(DFM_E_ARG) where a listed one is provided by nothing in the scene;
+// names who could.
 void plan_effects(const SceneFacts &facts, Plan &plan);
 
 }  // namespace dfm

@@ -6,7 +6,9 @@
 namespace dfm::when {
 namespace {
 
-std::string count(unsigned n, const char *noun, const char *plural) { return std::to_string(n) + " " + (n == 1 ? noun : plural); }
+std::string count(unsigned n, const char *noun, const char *plural) {
+  return std::to_string(n) + " " + (n == 1 ? noun : plural);
+}
 StageChoice runs(std::string why) { return {true, std::move(why)}; }
 StageChoice left_out(std::string why = {}) { return {false, std::move(why)}; }
 
@@ -16,9 +18,12 @@ std::string who(const SceneFacts &f) {
   return count(f.body_pairs, "pair of bodies", "pairs of bodies") + " and " +
          count(f.obstacle_pairs, "pair of body and obstacle", "pairs of body and obstacle") + " may touch";
 }
-std::string nobody(const SceneFacts &f) { return f.bodies < 2 && !f.obstacles ? "one body and nothing to touch" : "filters let no pair touch"; }
+std::string nobody(const SceneFacts &f) {
+  return f.bodies < 2 && !f.obstacles ? "one body and nothing to touch" : "filters let no pair touch";
+}
 std::string rigids(const SceneFacts &f) {
-  return count(f.rigid_bodies, "rigid body", "rigid bodies") + " and " + count(f.rigid_joints, "joint", "joints") + " of host " + f.rigid_hosts;
+  return count(f.rigid_bodies, "rigid body", "rigid bodies") + " and " +
+         count(f.rigid_joints, "joint", "joints") + " of host " + f.rigid_hosts;
 }
 
 StageChoice of_contact(const SceneFacts &f) { return touches(f) ? runs(who(f)) : left_out(nobody(f)); }
@@ -38,17 +43,24 @@ StageChoice motion(const SceneFacts &f) {
 }
 
 StageChoice model(const SceneFacts &f) {
-  return f.bodies > f.self_stepping ? runs("internal forces of " + count(f.bodies - f.self_stepping, "body", "bodies")) : left_out();
+  return f.bodies > f.self_stepping
+             ? runs("internal forces of " + count(f.bodies - f.self_stepping, "body", "bodies"))
+             : left_out();
 }
 
-StageChoice predict(const SceneFacts &f) { return f.bodies ? runs("velocities without contact of " + count(f.bodies, "body", "bodies")) : left_out(); }
+StageChoice predict(const SceneFacts &f) {
+  return f.bodies ? runs("velocities without contact of " + count(f.bodies, "body", "bodies")) : left_out();
+}
 
-StageChoice rigid_predict(const SceneFacts &f) { return f.rigid_bodies ? runs(rigids(f)) : left_out("no rigid bodies"); }
+StageChoice rigid_predict(const SceneFacts &f) {
+  return f.rigid_bodies ? runs(rigids(f)) : left_out("no rigid bodies");
+}
 
 StageChoice gather(const SceneFacts &f) {
   if (!touches(f)) return left_out(nobody(f));
   if (!f.coupled) return left_out("every surfel is a point of its body");
-  return runs(count(f.coupled_surfels, "surfel", "surfels") + " of " + count(f.coupled, "body", "bodies") + " hang on several points each");
+  return runs(count(f.coupled_surfels, "surfel", "surfels") + " of " + count(f.coupled, "body", "bodies") +
+              " hang on several points each");
 }
 
 StageChoice broad(const SceneFacts &f) { return of_pairs(f); }
@@ -58,28 +70,39 @@ StageChoice narrow(const SceneFacts &f) { return of_pairs(f); }
 StageChoice self(const SceneFacts &f) {
   const std::string by = self_asked_by(f);
   if (f.self_bodies)
-    return runs(count(f.self_bodies, "body", "bodies") + " may touch themselves (" + (by.empty() ? "contact.filter" : by) + ")" +
+    return runs(count(f.self_bodies, "body", "bodies") + " may touch themselves (" +
+                (by.empty() ? "contact.filter" : by) + ")" +
                 (by == kSelfAuto ? ", each only while it folds so far that it may" : ""));
-  return left_out(by.empty() ? "not asked for (contact.self), and no effect needs it" : f.bodies ? "filters take every body out" : "no body");
+  return left_out(by.empty() ? "not asked for (contact.self), and no effect needs it"
+                  : f.bodies ? "filters take every body out"
+                             : "no body");
 }
 
 StageChoice solve(const SceneFacts &f) { return of_contact(f); }
 
-StageChoice rigid_commit(const SceneFacts &f) { return f.rigid_bodies ? runs("ends of " + rigids(f)) : left_out(); }
+StageChoice rigid_commit(const SceneFacts &f) {
+  return f.rigid_bodies ? runs("ends of " + rigids(f)) : left_out();
+}
 
 StageChoice distribute(const SceneFacts &f) { return of_contact(f); }
 
 StageChoice guard(const SceneFacts &f) {
   if (!touches(f)) return left_out(nobody(f));
-  if (f.unguarded) return left_out("switched off (contact.guard): what moves further than contacts reach in one sub-step may cross");
-  return runs("nothing crosses at the end of a sub-step: " + count(pairs(f), "pair", "pairs") +
-              (f.self_bodies ? ", " + count(f.self_bodies, "body with itself", "bodies with themselves") : ""));
+  if (f.unguarded)
+    return left_out(
+        "switched off (contact.guard): what moves further than contacts reach in one sub-step may cross");
+  return runs(
+      "nothing crosses at the end of a sub-step: " + count(pairs(f), "pair", "pairs") +
+      (f.self_bodies ? ", " + count(f.self_bodies, "body with itself", "bodies with themselves") : ""));
 }
 
-StageChoice commit(const SceneFacts &f) { return f.bodies ? runs("positions and velocities at the end of the sub-step") : left_out(); }
+StageChoice commit(const SceneFacts &f) {
+  return f.bodies ? runs("positions and velocities at the end of the sub-step") : left_out();
+}
 
 StageChoice sleep(const SceneFacts &f) {
-  if (f.bodies && f.sleep) return runs("islands at rest leave the stages above until something reaches them (contact.sleep)");
+  if (f.bodies && f.sleep)
+    return runs("islands at rest leave the stages above until something reaches them (contact.sleep)");
   return left_out(f.bodies ? "not asked for (contact.sleep)" : "no body");
 }
 

@@ -1,5 +1,5 @@
-// Every call into a plugin goes through here: what it took as scratch is given back, the floating-point environment is put back, an exception
-// becomes a status, and a failure is logged under the plugin's name.
+// Every call into a plugin goes through here: what it took as scratch is given back, the floating-point
+// environment is put back, an exception becomes a status, and a failure is logged under the plugin's name.
 #pragma once
 #include "plugin/boundary.h"
 #include "plugin/context.h"
@@ -19,10 +19,16 @@ dfm_status call_plugin(const dfm_host &host, const dfm_type &type, const char *w
     threw = true;
   }
   if (const char *changed = boundary.restore(); changed && context.left_changed.first(&type))
-    context.logf(DFM_LOG_WARNING, "%s: %s changed %s and left it so; it was put back, and is from now on without a word; a plugin must leave the floating-point "
-                 "environment as it finds it", type.id, what, changed);
-  if (threw) context.logf(DFM_LOG_ERROR, "%s: %s threw an exception; a plugin must not (wrap its entries in dfm::plugin::guarded)", type.id, what);
-  else if (status < 0) context.logf(DFM_LOG_ERROR, "%s: %s returned %s", type.id, what, dfm_status_name(status));
+    context.logf(DFM_LOG_WARNING,
+                 "%s: %s changed %s and left it so; it was put back, and is from now on without a word; a "
+                 "plugin must leave the floating-point environment as it finds it",
+                 type.id, what, changed);
+  if (threw)
+    context.logf(DFM_LOG_ERROR,
+                 "%s: %s threw an exception; a plugin must not (wrap its entries in dfm::plugin::guarded)",
+                 type.id, what);
+  else if (status < 0)
+    context.logf(DFM_LOG_ERROR, "%s: %s returned %s", type.id, what, dfm_status_name(status));
   return status;
 }
 

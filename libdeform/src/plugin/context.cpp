@@ -19,7 +19,8 @@ void host_release(void *ctx, void *p, size_t bytes, size_t align) {
   if (p) memory.release(memory.user, p, bytes, align);
 }
 
-// Outside a PluginCall (a thread of the plugin's own) each piece replaces the one before it, so that memory stays bounded.
+// Outside a PluginCall (a thread of the plugin's own) each piece replaces the one before it, so that memory
+// stays bounded.
 void *host_scratch(void *ctx, size_t bytes) {
   dfm::ScratchArena *arena = self(ctx).scratch.arena();
   if (!arena) return nullptr;
@@ -33,11 +34,13 @@ void host_log(void *ctx, int32_t level, uint32_t code, const char *utf8) {
   else self(ctx).log(level, utf8 ? utf8 : "");
 }
 
-void host_parallel_for(void *ctx, uint32_t n, uint32_t grain, void (*fn)(void *, uint32_t, uint32_t), void *user) {
+void host_parallel_for(void *ctx, uint32_t n, uint32_t grain, void (*fn)(void *, uint32_t, uint32_t),
+                       void *user) {
   dfm_context &context = self(ctx);
   const dfm::Running caller = dfm::running;
   context.tasks.parallel_for(n, grain, [&](uint32_t begin, uint32_t end) {
-    const dfm::PluginCall call(context.scratch);  // what a worker took as scratch is given back when its block is done
+    // what a worker took as scratch is given back when its block is done
+    const dfm::PluginCall call(context.scratch);
     const dfm::Boundary boundary(caller.who, caller.what);
     fn(user, begin, end);
   });
@@ -52,13 +55,22 @@ dfm::Memory memory_of(const dfm_context_def &def) {
 }  // namespace
 
 dfm_context::dfm_context(const dfm_context_def &def)
-    : hooks(def), memory(memory_of(def)), tasks(def.threads, def.parallel_for, def.user), scratch(memory), host{},
+    : hooks(def),
+      memory(memory_of(def)),
+      tasks(def.threads, def.parallel_for, def.user),
+      scratch(memory),
+      host{},
       loader(registry, host) {
   host.size = sizeof host;
-  host.abi = DFM_ABI, host.abi_draft = DFM_ABI_DRAFT;
+  host.abi = DFM_ABI;
+  host.abi_draft = DFM_ABI_DRAFT;
   host.ctx = this;
-  host.alloc = host_alloc, host.release = host_release, host.scratch = host_scratch, host.log = host_log;
-  host.parallel_for = host_parallel_for, host.extension = host_extension;
+  host.alloc = host_alloc;
+  host.release = host_release;
+  host.scratch = host_scratch;
+  host.log = host_log;
+  host.parallel_for = host_parallel_for;
+  host.extension = host_extension;
 }
 
 dfm_context::~dfm_context() {
@@ -78,7 +90,8 @@ void dfm_context::log(int32_t level, const char *utf8) const noexcept {
   if (hooks.log) {
     try {
       hooks.log(hooks.user, level, utf8);
-    } catch (...) {   // a hook in C++ that ran out of memory: what it had to say is lost, the caller's work is not
+    } catch (...) {
+      // a hook in C++ that ran out of memory: what it had to say is lost, the caller's work is not
     }
   } else if (level >= DFM_LOG_WARNING) {
     std::fprintf(stderr, "deform: %s: %s\n", level >= DFM_LOG_ERROR ? "error" : "warning", utf8);

@@ -1,4 +1,5 @@
-// The context: hooks of the host, what is lent to plugins, what plugins are loaded, and the objects that live in it.
+// The context: hooks of the host, what is lent to plugins, what plugins are loaded, and the objects
+// that live in it.
 #pragma once
 #include <atomic>
 #include <cstdint>
@@ -23,10 +24,15 @@ struct dfm_context {
   // To the host's hook; without one, warnings and errors go to stderr.
   void log(int32_t level, const char *utf8) const noexcept;
   void logf(int32_t level, const char *format, ...) const noexcept __attribute__((format(printf, 3, 4)));
-  void trace_begin(const char *zone) const { if (hooks.trace_begin) hooks.trace_begin(hooks.user, zone); }
-  void trace_end(const char *zone) const { if (hooks.trace_end) hooks.trace_end(hooks.user, zone); }
+  void trace_begin(const char *zone) const {
+    if (hooks.trace_begin) hooks.trace_begin(hooks.user, zone);
+  }
+  void trace_end(const char *zone) const {
+    if (hooks.trace_end) hooks.trace_end(hooks.user, zone);
+  }
 
-  // Worlds, laws and scenes stand here so that dfm_context_destroy can end them: destroy(handle) is called for those still listed.
+  // Worlds, laws and scenes stand here so that dfm_context_destroy can end them: destroy(handle) is called
+  // for those still listed.
   void add_live(uint64_t handle, void (*destroy)(uint64_t));
   void remove_live(uint64_t handle) noexcept;
 
@@ -34,11 +40,11 @@ struct dfm_context {
   dfm::Memory memory;
   dfm::Tasks tasks;
   dfm::Scratch scratch;
-  dfm_host host;          // what we lend to plugins
+  dfm_host host;  // what we lend to plugins
   dfm::Registry registry;
   dfm::Loader loader;
-  dfm::SaidOnce left_changed;   // types that left the floating-point environment changed
-  std::atomic<uint32_t> calls{0};     // of the API that are in progress in it or in its worlds (api/call.h)
+  dfm::SaidOnce left_changed;      // types that left the floating-point environment changed
+  std::atomic<uint32_t> calls{0};  // of the API that are in progress in it or in its worlds (api/call.h)
   std::atomic<bool> ending{false};
 
  private:
@@ -51,7 +57,9 @@ namespace dfm {
 // A zone of the host's tracer for the life of the object.
 class TraceZone {
  public:
-  TraceZone(const dfm_context &context, const char *zone) : context_(context), zone_(zone) { context_.trace_begin(zone_); }
+  TraceZone(const dfm_context &context, const char *zone) : context_(context), zone_(zone) {
+    context_.trace_begin(zone_);
+  }
   ~TraceZone() { context_.trace_end(zone_); }
   TraceZone(const TraceZone &) = delete;
   TraceZone &operator=(const TraceZone &) = delete;

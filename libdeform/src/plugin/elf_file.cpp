@@ -40,9 +40,10 @@ constexpr int kMachine = EM_AARCH64;
 constexpr int kMachine = -1;  // left to the dynamic linker
 #endif
 
-bool defines_entry(const File &file, const ElfW(Ehdr) &header, bool *known) {
+bool defines_entry(const File &file, const ElfW(Ehdr) & header, bool *known) {
   std::vector<ElfW(Shdr)> sections;
-  *known = header.e_shnum != 0 && header.e_shentsize == sizeof(ElfW(Shdr)) && file.read_all(header.e_shoff, header.e_shnum, sections);
+  *known = header.e_shnum != 0 && header.e_shentsize == sizeof(ElfW(Shdr)) &&
+           file.read_all(header.e_shoff, header.e_shnum, sections);
   if (!*known) return false;
   for (const auto &section : sections) {
     if (section.sh_type != SHT_DYNSYM || section.sh_link >= sections.size()) continue;
@@ -53,7 +54,8 @@ bool defines_entry(const File &file, const ElfW(Ehdr) &header, bool *known) {
     if (!file.read_all(strings.sh_offset, strings.sh_size, names)) continue;
     names.push_back(0);
     for (const auto &symbol : symbols)
-      if (symbol.st_shndx != SHN_UNDEF && symbol.st_name < names.size() && std::strcmp(&names[symbol.st_name], "dfm_plugin_entry") == 0)
+      if (symbol.st_shndx != SHN_UNDEF && symbol.st_name < names.size() &&
+          std::strcmp(&names[symbol.st_name], "dfm_plugin_entry") == 0)
         return true;
   }
   return false;
@@ -68,14 +70,19 @@ void check_elf_plugin(const std::string &path) {
   if (!file.read(0, &header, sizeof header) || std::memcmp(header.e_ident, ELFMAG, SELFMAG) != 0)
     fail(DFM_E_UNSUPPORTED, "%s is not a plugin: it is not a shared library (ELF)", name);
   if (header.e_ident[EI_CLASS] != kClass || (kMachine >= 0 && header.e_machine != kMachine))
-    fail(DFM_E_UNSUPPORTED, "%s is built for another machine (ELF class %d, machine %d)", name, header.e_ident[EI_CLASS], header.e_machine);
-  if (header.e_type != ET_DYN) fail(DFM_E_UNSUPPORTED, "%s is not a shared library; build it with deform_add_plugin", name);
+    fail(DFM_E_UNSUPPORTED, "%s is built for another machine (ELF class %d, machine %d)", name,
+         header.e_ident[EI_CLASS], header.e_machine);
+  if (header.e_type != ET_DYN)
+    fail(DFM_E_UNSUPPORTED, "%s is not a shared library; build it with deform_add_plugin", name);
   std::vector<ElfW(Phdr)> segments;
-  bool whole = header.e_phentsize == sizeof(ElfW(Phdr)) && file.read_all(header.e_phoff, header.e_phnum, segments);
+  bool whole =
+      header.e_phentsize == sizeof(ElfW(Phdr)) && file.read_all(header.e_phoff, header.e_phnum, segments);
   for (const auto &segment : segments)
-    if (segment.p_type == PT_LOAD) whole &= segment.p_filesz <= file.bytes() && segment.p_offset <= file.bytes() - segment.p_filesz;
-  if (!whole) fail(DFM_E_UNSUPPORTED, "%s is cut short: parts that its header names lie beyond its %llu bytes", name,
-                   static_cast<unsigned long long>(file.bytes()));
+    if (segment.p_type == PT_LOAD)
+      whole &= segment.p_filesz <= file.bytes() && segment.p_offset <= file.bytes() - segment.p_filesz;
+  if (!whole)
+    fail(DFM_E_UNSUPPORTED, "%s is cut short: parts that its header names lie beyond its %llu bytes", name,
+         static_cast<unsigned long long>(file.bytes()));
   bool known;
   if (!defines_entry(file, header, &known) && known)
     fail(DFM_E_UNSUPPORTED, "%s is not a plugin: it has no symbol dfm_plugin_entry", name);

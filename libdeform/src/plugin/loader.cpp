@@ -25,7 +25,8 @@ namespace {
 thread_local std::string *entry_log = nullptr;
 
 std::string real_path(const std::string &path) {
-  char *resolved = realpath(path.c_str(), nullptr);  // dlopen searches the system's libraries for a name without a slash
+  // dlopen searches the system's libraries for a name without a slash
+  char *resolved = realpath(path.c_str(), nullptr);
   if (!resolved) fail(DFM_E_IO, "cannot open plugin \"%s\": %s", path.c_str(), std::strerror(errno));
   const std::unique_ptr<char, decltype(&std::free)> freed(resolved, &std::free);
   return resolved;
@@ -41,27 +42,36 @@ bool is_link(const std::string &path) {
   return lstat(path.c_str(), &st) == 0 && S_ISLNK(st.st_mode);
 }
 
-// By readdir: the iterators of the standard library allocate inside functions that must not throw, so memory that runs out there ends the process.
+// By readdir: the iterators of the standard library allocate inside functions that must not throw, so memory
+// that runs out there ends the process.
 std::vector<std::string> entries(const std::string &directory) {
   const std::unique_ptr<DIR, int (*)(DIR *)> open(opendir(directory.c_str()), &closedir);
-  if (!open) fail(errno == ENOMEM ? DFM_E_NOMEM : DFM_E_IO, "cannot read plugin directory \"%s\": %s", directory.c_str(), std::strerror(errno));
+  if (!open)
+    fail(errno == ENOMEM ? DFM_E_NOMEM : DFM_E_IO, "cannot read plugin directory \"%s\": %s",
+         directory.c_str(), std::strerror(errno));
   std::vector<std::string> names;
   errno = 0;
   for (const dirent *entry; (entry = readdir(open.get()));)
     if (const std::string name = entry->d_name; name != "." && name != "..") names.push_back(name);
-  if (errno) fail(DFM_E_IO, "cannot read plugin directory \"%s\": %s", directory.c_str(), std::strerror(errno));
+  if (errno)
+    fail(DFM_E_IO, "cannot read plugin directory \"%s\": %s", directory.c_str(), std::strerror(errno));
   std::sort(names.begin(), names.end());  // the same order on every file system
   return names;
 }
 
-bool ends_in_so(const std::string &name) { return name.size() > 3 && name.compare(name.size() - 3, 3, ".so") == 0; }
+bool ends_in_so(const std::string &name) {
+  return name.size() > 3 && name.compare(name.size() - 3, 3, ".so") == 0;
+}
 
-// While code of a plugin runs that no world asked for: its initializers and its entry. What makes the host misread or miscompute afterwards, the
-// floating-point environment and the decimal point, is put back.
+// While code of a plugin runs that no world asked for: its initializers and its entry. What makes the host
+// misread or miscompute afterwards, the floating-point environment and the decimal point, is put back.
 class Visit {
  public:
   Visit(const dfm_host &host, const std::string &file)
-      : host_(host), file_(file), locale_(std::setlocale(LC_NUMERIC, nullptr)), boundary_(file.c_str(), "load") {}
+      : host_(host),
+        file_(file),
+        locale_(std::setlocale(LC_NUMERIC, nullptr)),
+        boundary_(file.c_str(), "load") {}
   ~Visit() { put_back(); }
   Visit(const Visit &) = delete;
   Visit &operator=(const Visit &) = delete;
@@ -70,7 +80,9 @@ class Visit {
     char sentence[1024];
     const char *changed = put_back();
     if (!changed) return;
-    std::snprintf(sentence, sizeof sentence, "%s: loading it changed %s; it was put back, since the host would compute or read numbers otherwise; a plugin must leave that as it finds it",
+    std::snprintf(sentence, sizeof sentence,
+                  "%s: loading it changed %s; it was put back, since the host would compute or read numbers "
+                  "otherwise; a plugin must leave that as it finds it",
                   file_.c_str(), changed);
     host_.log(host_.ctx, DFM_LOG_WARNING, 0, sentence);
   }
@@ -78,7 +90,10 @@ class Visit {
  private:
   const char *put_back() noexcept {
     const char *changed = boundary_.restore();
-    if (locale_ != std::setlocale(LC_NUMERIC, nullptr)) std::setlocale(LC_NUMERIC, locale_.c_str()), changed = "the locale of numbers";
+    if (locale_ != std::setlocale(LC_NUMERIC, nullptr)) {
+      std::setlocale(LC_NUMERIC, locale_.c_str());
+      changed = "the locale of numbers";
+    }
     return changed;
   }
   const dfm_host &host_;
@@ -94,8 +109,7 @@ void Loader::note_log(const char *text) noexcept {
   try {
     if (!entry_log->empty()) *entry_log += "; ";
     entry_log->append(text, strnlen(text, 512));
-  } catch (...) {
-  }
+  } catch (...) {}
 }
 
 // Takes no memory: it may be memory that has run out.
@@ -115,7 +129,8 @@ Loader::~Loader() {
   }
 }
 
-// Calls the entry and copies what it returns; nothing beyond the two ABI numbers is read before they are found to match.
+// Calls the entry and copies what it returns; nothing beyond the two ABI numbers is read before they are
+// found to match.
 void Loader::enter(dfm_plugin_fn entry, const std::string &file, dfm_plugin &plugin) {
   std::string said;
   const dfm_plugin *given = nullptr;
@@ -127,16 +142,21 @@ void Loader::enter(dfm_plugin_fn entry, const std::string &file, dfm_plugin &plu
     threw = true;
   }
   entry_log = nullptr;
-  if (threw) fail(DFM_E_UNSUPPORTED, "%s: its entry threw an exception%s%s", file.c_str(), said.empty() ? "" : " after it said: ", said.c_str());
+  if (threw)
+    fail(DFM_E_UNSUPPORTED, "%s: its entry threw an exception%s%s", file.c_str(),
+         said.empty() ? "" : " after it said: ", said.c_str());
   if (!given)
-    fail(DFM_E_UNSUPPORTED, "%s: the plugin refuses this library (ABI %u draft %u)%s%s", file.c_str(), DFM_ABI, DFM_ABI_DRAFT,
-         said.empty() ? " and gave no reason" : ": ", said.c_str());
+    fail(DFM_E_UNSUPPORTED, "%s: the plugin refuses this library (ABI %u draft %u)%s%s", file.c_str(),
+         DFM_ABI, DFM_ABI_DRAFT, said.empty() ? " and gave no reason" : ": ", said.c_str());
   if (given->abi != DFM_ABI || given->abi_draft != DFM_ABI_DRAFT)
-    fail(DFM_E_UNSUPPORTED, "%s: built for plugin ABI %u draft %u, this library speaks ABI %u draft %u; rebuild it against this library's "
-         "deform/plugin.h", file.c_str(), given->abi, given->abi_draft, DFM_ABI, DFM_ABI_DRAFT);
+    fail(DFM_E_UNSUPPORTED,
+         "%s: built for plugin ABI %u draft %u, this library speaks ABI %u draft %u; rebuild it against this "
+         "library's deform/plugin.h",
+         file.c_str(), given->abi, given->abi_draft, DFM_ABI, DFM_ABI_DRAFT);
   constexpr uint32_t head = offsetof(dfm_plugin, types) + sizeof(void *);
   if (given->size < head || given->size > 65536)
-    fail(DFM_E_UNSUPPORTED, "%s: dfm_plugin.size is %u, at least %u expected", file.c_str(), given->size, head);
+    fail(DFM_E_UNSUPPORTED, "%s: dfm_plugin.size is %u, at least %u expected", file.c_str(), given->size,
+         head);
   plugin = dfm_plugin{};
   std::memcpy(&plugin, given, std::min<size_t>(given->size, sizeof plugin));
 }
@@ -144,7 +164,8 @@ void Loader::enter(dfm_plugin_fn entry, const std::string &file, dfm_plugin &plu
 bool Loader::load(const std::string &path) {
   const std::string file = real_path(path);
   struct stat st{};
-  if (stat(file.c_str(), &st) != 0) fail(DFM_E_IO, "cannot read plugin \"%s\": %s", path.c_str(), std::strerror(errno));
+  if (stat(file.c_str(), &st) != 0)
+    fail(DFM_E_IO, "cannot read plugin \"%s\": %s", path.c_str(), std::strerror(errno));
   if (!S_ISREG(st.st_mode)) fail(DFM_E_UNSUPPORTED, "%s is not a file", path.c_str());
   for (const Module &module : modules_)
     if (module.image && module.device == st.st_dev && module.inode == st.st_ino) return false;
@@ -218,7 +239,8 @@ std::vector<const dfm_type *> Loader::types_of(const std::string &path) const {
 void Loader::scan_if_there(const std::string &directory, bool asked_for) {
   if (directory.empty()) return;
   if (!is_directory(directory)) {
-    if (asked_for) registry_.pass_over(directory, "named in DEFORM_PLUGIN_PATH, but there is no such directory");
+    if (asked_for)
+      registry_.pass_over(directory, "named in DEFORM_PLUGIN_PATH, but there is no such directory");
     return;
   }
   try {
@@ -240,7 +262,8 @@ void Loader::add_bundled() {
 
 void Loader::discover() {
   const char *path = secure_getenv("DEFORM_PLUGIN_PATH");
-  if (!path && std::getenv("DEFORM_PLUGIN_PATH")) registry_.pass_over("DEFORM_PLUGIN_PATH", "ignored: the process runs with elevated privilege");
+  if (!path && std::getenv("DEFORM_PLUGIN_PATH"))
+    registry_.pass_over("DEFORM_PLUGIN_PATH", "ignored: the process runs with elevated privilege");
   for (const char *begin = path; begin && *begin;) {
     const char *end = std::strchr(begin, ':');
     scan_if_there(end ? std::string(begin, end) : std::string(begin), true);

@@ -17,14 +17,16 @@ class Loader {
   Loader(const Loader &) = delete;
   Loader &operator=(const Loader &) = delete;
 
-  // Returns true where the file was loaded now, false where it was there already (the same file under another name counts as there).
-  // Throws DFM_E_IO, DFM_E_UNSUPPORTED or DFM_E_STATE with the reason.
+  // Returns true where the file was loaded now, false where it was there already (the same file under another
+  // name counts as there). Throws DFM_E_IO, DFM_E_UNSUPPORTED or DFM_E_STATE with the reason.
   bool load(const std::string &path);
-  // Every plugin of a directory, by name; what is passed over goes to the registry with its reason. Throws DFM_E_IO: no directory.
+  // Every plugin of a directory, by name; what is passed over goes to the registry with its reason. Throws
+  // DFM_E_IO: no directory.
   uint32_t scan(const std::string &directory);
   void add_static(dfm_plugin_fn entry, const std::string &name);
   void add_bundled();  // plugins linked into this library (option DEFORM_PLUGINS_STATIC)
-  // DEFORM_PLUGIN_PATH (not under elevated privilege), then the directory beside this library, else the installed one.
+  // DEFORM_PLUGIN_PATH (not under elevated privilege), then the directory beside this library, else the
+  // installed one.
   void discover();
   // Plugins of one file, by type id order; empty where the file is not loaded.
   std::vector<const dfm_type *> types_of(const std::string &path) const;
@@ -33,7 +35,13 @@ class Loader {
   static void note_log(const char *text) noexcept;
 
  private:
-  struct Module { void *image; uint64_t device, inode; std::string file; dfm_plugin_fn entry; void (*shutdown)(void); };
+  struct Module {
+    void *image;
+    uint64_t device, inode;
+    std::string file;
+    dfm_plugin_fn entry;
+    void (*shutdown)(void);
+  };
   void keep(Module &&module, const dfm_plugin &plugin);
   void enter(dfm_plugin_fn entry, const std::string &file, dfm_plugin &plugin);
   void scan_if_there(const std::string &directory, bool asked_for);

@@ -15,8 +15,8 @@ std::string range_of(const dfm_param &row) {
     for (const char *const *n = row.names; n && *n; ++n) names.push_back(*n);
     return "one of " + join(names);
   }
-  return format("%s in [%g, %g] %s", row.flags & DFM_PARAM_INTEGER ? "a whole number" : "a number", row.min, row.max,
-                std::strcmp(row.unit, "1") == 0 ? "" : row.unit);
+  return format("%s in [%g, %g] %s", row.flags & DFM_PARAM_INTEGER ? "a whole number" : "a number", row.min,
+                row.max, std::strcmp(row.unit, "1") == 0 ? "" : row.unit);
 }
 
 std::vector<std::string> keys_of(const dfm_type &type) {
@@ -32,40 +32,45 @@ bool has_row(const dfm_type &type, const char *key) {
 }
 
 bool stands_for(const dfm_type &type, const char *given, const char *row) {
-  return std::strcmp(given, "mu") == 0 && !has_row(type, "mu") && (std::strcmp(row, "mu_C") == 0 || std::strcmp(row, "mu_S") == 0);
+  return std::strcmp(given, "mu") == 0 && !has_row(type, "mu") &&
+         (std::strcmp(row, "mu_C") == 0 || std::strcmp(row, "mu_S") == 0);
 }
 
 void check_keys(const dfm_type &type, std::span<const dfm_param_value> given) {
   for (size_t i = 0; i < given.size(); ++i) {
-    if (!given[i].key || !given[i].value) fail(DFM_E_ARG, "%s: parameter %zu has no %s", type.id, i, given[i].key ? "value" : "key");
+    if (!given[i].key || !given[i].value)
+      fail(DFM_E_ARG, "%s: parameter %zu has no %s", type.id, i, given[i].key ? "value" : "key");
     bool known = has_row(type, given[i].key);
     for (uint32_t k = 0; k < type.nparam; ++k) known |= stands_for(type, given[i].key, type.params[k].key);
     if (!known) {
       const auto keys = keys_of(type);
       const std::string near = nearest(given[i].key, keys);
-      fail(DFM_E_ARG, "%s has no parameter \"%s\"%s%s%s; it has %s", type.id, given[i].key, near.empty() ? "" : ", did you mean \"",
-           near.c_str(), near.empty() ? "" : "\"", keys.empty() ? "none" : join(keys).c_str());
+      fail(DFM_E_ARG, "%s has no parameter \"%s\"%s%s%s; it has %s", type.id, given[i].key,
+           near.empty() ? "" : ", did you mean \"", near.c_str(), near.empty() ? "" : "\"",
+           keys.empty() ? "none" : join(keys).c_str());
     }
     for (size_t k = 0; k < i; ++k)
-      if (std::strcmp(given[i].key, given[k].key) == 0) fail(DFM_E_ARG, "%s: parameter \"%s\" is given twice", type.id, given[i].key);
+      if (std::strcmp(given[i].key, given[k].key) == 0)
+        fail(DFM_E_ARG, "%s: parameter \"%s\" is given twice", type.id, given[i].key);
   }
 }
 
 void check_value(const dfm_type &type, const dfm_param &row, const dfm_param_value &value) {
   const bool list = row.flags & DFM_PARAM_LIST;
   if (list ? value.width < 1 || value.width > row.width : value.width != row.width)
-    fail(DFM_E_ARG, "%s: parameter \"%s\" has %u value%s, %s%u expected", type.id, value.key, value.width, value.width == 1 ? "" : "s", list ? "1 to " : "",
-         row.width);
+    fail(DFM_E_ARG, "%s: parameter \"%s\" has %u value%s, %s%u expected", type.id, value.key, value.width,
+         value.width == 1 ? "" : "s", list ? "1 to " : "", row.width);
   for (uint32_t k = 0; k < value.width; ++k) {
     const double x = value.value[k];
     const bool whole = !(row.flags & (DFM_PARAM_INTEGER | DFM_PARAM_ENUM)) || x == std::floor(x);
     if (!(x >= row.min && x <= row.max) || !whole)
-      fail(DFM_E_ARG, "%s: parameter \"%s\" is %g, %s expected", type.id, value.key, x, range_of(row).c_str());
+      fail(DFM_E_ARG, "%s: parameter \"%s\" is %g, %s expected", type.id, value.key, x,
+           range_of(row).c_str());
   }
 }
 
-const dfm_param_value *choose(const dfm_type &type, const dfm_param &row, std::span<const dfm_param_value> given,
-                              const ParamLookup &fallback) {
+const dfm_param_value *choose(const dfm_type &type, const dfm_param &row,
+                              std::span<const dfm_param_value> given, const ParamLookup &fallback) {
   for (const auto &value : given)
     if (std::strcmp(value.key, row.key) == 0) return &value;
   for (const auto &value : given)
@@ -96,7 +101,8 @@ std::vector<dfm_param_value> param_rows(const dfm_type &type, const std::vector<
   return rows;
 }
 
-std::vector<double> pack_params(const dfm_type &type, std::span<const dfm_param_value> given, const ParamLookup &fallback) {
+std::vector<double> pack_params(const dfm_type &type, std::span<const dfm_param_value> given,
+                                const ParamLookup &fallback) {
   check_keys(type, given);
   std::vector<double> packed;
   packed.reserve(packed_width(type));
@@ -119,12 +125,14 @@ std::vector<double> pack_params(const dfm_type &type, std::span<const dfm_param_
       std::strcpy(why, "its check threw an exception");
     }
     why[sizeof why - 1] = 0;
-    if (status != DFM_OK) fail(DFM_E_ARG, "%s: %s", type.id, *why ? why : "its check refuses these parameters together");
+    if (status != DFM_OK)
+      fail(DFM_E_ARG, "%s: %s", type.id, *why ? why : "its check refuses these parameters together");
   }
   return packed;
 }
 
-std::vector<double> changed_params(const dfm_type &type, std::span<const dfm_param_value> given, const std::vector<double> &present) {
+std::vector<double> changed_params(const dfm_type &type, std::span<const dfm_param_value> given,
+                                   const std::vector<double> &present) {
   const std::vector<dfm_param_value> rows = param_rows(type, present);
   return pack_params(type, given, [&](const char *key) -> const dfm_param_value * {
     for (const dfm_param_value &row : rows)

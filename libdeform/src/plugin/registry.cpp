@@ -17,13 +17,15 @@ constexpr uint32_t kParamHead = offsetof(dfm_param, names);
 constexpr uint32_t kLawHead = offsetof(dfm_friction, eval) + sizeof(void *);
 constexpr uint32_t kModelHead = offsetof(dfm_model, destroy) + sizeof(void *);
 constexpr uint32_t kSolverHead = offsetof(dfm_solver, release) + sizeof(void *);
-constexpr uint32_t kLargest = 1u << 16;  // no struct of this ABI will ever be larger: what claims more is not one
+// no struct of this ABI will ever be larger: what claims more is not one
+constexpr uint32_t kLargest = 1u << 16;
 
 [[noreturn]] void bad(const std::string &id, const std::string &what) {
   fail(DFM_E_UNSUPPORTED, "type \"%s\" is not usable: %s", id.c_str(), what.c_str());
 }
 
-// Copies what both sides know; the rest of the full struct stays zero. The first field of every struct is its size.
+// Copies what both sides know; the rest of the full struct stays zero. The first field of every
+// struct is its size.
 template <class T>
 void copy_struct(T &full, const void *from, uint32_t head, const std::string &id, const char *name) {
   uint32_t size;
@@ -38,7 +40,8 @@ bool reverse_dns(const char *id) {
   bool dot = false;
   char last = '.';
   for (const char *c = id; *c; last = *c++) {
-    if (*c == '.' ? last == '.' : !(std::isalnum(static_cast<unsigned char>(*c)) || *c == '_' || *c == '-')) return false;
+    if (*c == '.' ? last == '.' : !(std::isalnum(static_cast<unsigned char>(*c)) || *c == '_' || *c == '-'))
+      return false;
     dot |= *c == '.';
   }
   return dot && last != '.';
@@ -48,11 +51,14 @@ void check_head(const dfm_type &type) {
   const std::string id = type.id ? type.id : "";
   if (id.empty()) bad("", "it has no id; give one in reverse-DNS form such as \"org.example.mylaw\"");
   if (!reverse_dns(type.id)) bad(id, "its id is not in reverse-DNS form such as \"org.example.mylaw\"");
-  const struct { const char *key, *text; } fields[] = {
+  const struct {
+    const char *key, *text;
+  } fields[] = {
       {"name", type.name}, {"version", type.version}, {"licence", type.licence}, {"source", type.source}};
   for (const auto &field : fields)
     if (!field.text || !*field.text) bad(id, format("its metadata lacks \"%s\"", field.key));
-  if (type.kind < DFM_KIND_FRICTION || type.kind > DFM_KIND_SOLVER) bad(id, format("its kind %u is unknown to this library", type.kind));
+  if (type.kind < DFM_KIND_FRICTION || type.kind > DFM_KIND_SOLVER)
+    bad(id, format("its kind %u is unknown to this library", type.kind));
   if (!type.ops) bad(id, "it has no operations (ops is NULL)");
 }
 
@@ -61,17 +67,23 @@ void check_row(const std::string &id, const dfm_param &row, const std::vector<df
   if (key.empty()) bad(id, "a parameter row has no key");
   for (const auto &other : before)
     if (key == other.key) bad(id, format("parameter \"%s\" stands twice in the table", key.c_str()));
-  if (!row.label || !row.unit) bad(id, format("parameter \"%s\" lacks a label or a unit (\"1\" if dimensionless)", key.c_str()));
+  if (!row.label || !row.unit)
+    bad(id, format("parameter \"%s\" lacks a label or a unit (\"1\" if dimensionless)", key.c_str()));
   if (!std::isfinite(row.min) || !std::isfinite(row.max) || !(row.min <= row.def && row.def <= row.max))
-    bad(id, format("parameter \"%s\": the range [%g, %g] must be finite and hold the default %g", key.c_str(), row.min, row.max, row.def));
-  if (row.width < 1 || row.width > 16) bad(id, format("parameter \"%s\": width %u is not in 1..16", key.c_str(), row.width));
+    bad(id, format("parameter \"%s\": the range [%g, %g] must be finite and hold the default %g", key.c_str(),
+                   row.min, row.max, row.def));
+  if (row.width < 1 || row.width > 16)
+    bad(id, format("parameter \"%s\": width %u is not in 1..16", key.c_str(), row.width));
   if ((row.flags & DFM_PARAM_LIST) && !(row.min <= 0 && 0 <= row.max))
-    bad(id, format("parameter \"%s\" is a list, whose values that are not given read 0, which its range [%g, %g] excludes", key.c_str(), row.min, row.max));
+    bad(id, format("parameter \"%s\" is a list, whose values that are not given read 0, which its range [%g, "
+                   "%g] excludes",
+                   key.c_str(), row.min, row.max));
   if (row.flags & DFM_PARAM_ENUM) {
     uint32_t n = 0;
     while (row.names && n < kLargest && row.names[n]) ++n;
     if (n == 0 || row.min != 0 || row.max != n - 1)
-      bad(id, format("parameter \"%s\": an enumeration of %u names needs the range [0, %g]", key.c_str(), n, n - 1.0));
+      bad(id, format("parameter \"%s\": an enumeration of %u names needs the range [0, %g]", key.c_str(), n,
+                     n - 1.0));
   }
 }
 
@@ -81,7 +93,8 @@ void copy_rows(RegisteredType &out) {
   if (type.nparam == 0) return;
   if (!type.params) bad(id, "nparam is not 0 but params is NULL");
   if (type.nparam > 4096 || type.param_size < kParamHead || type.param_size > kLargest)
-    bad(id, format("its parameter table has %u rows of %u bytes; at least %u bytes a row expected", type.nparam, type.param_size, kParamHead));
+    bad(id, format("its parameter table has %u rows of %u bytes; at least %u bytes a row expected",
+                   type.nparam, type.param_size, kParamHead));
   for (uint32_t i = 0; i < type.nparam; ++i) {
     dfm_param row{};
     std::memcpy(&row, reinterpret_cast<const char *>(type.params) + size_t(i) * type.param_size,
@@ -105,7 +118,8 @@ void copy_ops(RegisteredType &out) {
   } else if (out.type.kind == DFM_KIND_MODEL) {
     copy_struct(out.model, ops, kModelHead, id, "dfm_model");
     if (!out.model.create || !out.model.destroy) bad(id, "a model needs create and destroy");
-    if (!out.model.add_forces && !out.model.extension) bad(id, "a model needs add_forces, or the extension \"dfm.stepper/1\"");
+    if (!out.model.add_forces && !out.model.extension)
+      bad(id, "a model needs add_forces, or the extension \"dfm.stepper/1\"");
     if (out.model.cells == 0) bad(id, "a model must accept a kind of cell");
     check_slots(id, out.model.slots, out.model.nslot, false);
     out.type.ops = &out.model;
@@ -123,8 +137,12 @@ void check_slots(const std::string &id, const dfm_slot *slots, uint32_t n, bool 
   if (n > 4096 || (n && !slots)) bad(id, "its state slots are missing");
   for (uint32_t i = 0; i < n; ++i) {
     const dfm_slot &s = slots[i];
-    const uint32_t width = s.kind == DFM_SLOT_TANGENT ? 2 : s.kind == DFM_SLOT_VECTOR ? 3 : s.kind == DFM_SLOT_ROTATION ? 4 : s.width;
-    if (s.kind < DFM_SLOT_SCALAR || s.kind > DFM_SLOT_ROTATION || s.width == 0 || s.width > 4096 || s.width != width)
+    const uint32_t width = s.kind == DFM_SLOT_TANGENT    ? 2
+                           : s.kind == DFM_SLOT_VECTOR   ? 3
+                           : s.kind == DFM_SLOT_ROTATION ? 4
+                                                         : s.width;
+    if (s.kind < DFM_SLOT_SCALAR || s.kind > DFM_SLOT_ROTATION || s.width == 0 || s.width > 4096 ||
+        s.width != width)
       bad(id, format("state slot %u has kind %u and width %u, which do not agree", i, s.kind, s.width));
     if (law ? s.unit != DFM_PER_CONTACT : s.unit < DFM_PER_POINT || s.unit > DFM_PER_INSTANCE)
       bad(id, format("state slot %u has unit %u, which a %s cannot have", i, s.unit, law ? "law" : "model"));
@@ -135,14 +153,21 @@ std::span<const dfm_slot> law_slots(const dfm_type &type, const dfm_host &host, 
   const dfm_friction &law = law_of(type);
   if (!law.state) return {law.slots, law.nslot};
   const dfm_slots *own = nullptr;
-  call_plugin(host, type, "state", [&] { return own = law.state(params), DFM_OK; });
-  if (!own || own->size < sizeof(dfm_slots)) bad(type.id, "it does not say what state its parameters call for");
+  call_plugin(host, type, "state", [&] {
+    own = law.state(params);
+    return DFM_OK;
+  });
+  if (!own || own->size < sizeof(dfm_slots))
+    bad(type.id, "it does not say what state its parameters call for");
   check_slots(type.id, own->slots, own->nslot, true);
   return {own->slots, own->nslot};
 }
 
 const char *kind_name(uint32_t kind) {
-  return kind == DFM_KIND_FRICTION ? "law" : kind == DFM_KIND_MODEL ? "model" : kind == DFM_KIND_SOLVER ? "solver" : "type";
+  return kind == DFM_KIND_FRICTION ? "law"
+         : kind == DFM_KIND_MODEL  ? "model"
+         : kind == DFM_KIND_SOLVER ? "solver"
+                                   : "type";
 }
 
 std::string short_name(const dfm_type &type) {
@@ -171,14 +196,15 @@ void Registry::add(const dfm_plugin &plugin, const std::string &file) {
     for (const auto *list : {&types_, &fresh})
       for (const auto &other : *list)
         if (std::strcmp(other->type.id, entry->type.id) == 0)
-          fail(DFM_E_STATE, "id \"%s\" is taken by %s; unload that one, or give this plugin an id of its own", entry->type.id,
-               other->file.c_str());
+          fail(DFM_E_STATE, "id \"%s\" is taken by %s; unload that one, or give this plugin an id of its own",
+               entry->type.id, other->file.c_str());
     fresh.push_back(std::move(entry));
   }
   types_.reserve(types_.size() + fresh.size());
   for (auto &entry : fresh) types_.push_back(std::move(entry));
   std::sort(types_.begin(), types_.end(), [](const auto &a, const auto &b) {
-    return a->type.kind != b->type.kind ? a->type.kind < b->type.kind : std::strcmp(a->type.id, b->type.id) < 0;
+    return a->type.kind != b->type.kind ? a->type.kind < b->type.kind
+                                        : std::strcmp(a->type.id, b->type.id) < 0;
   });
 }
 
@@ -199,16 +225,18 @@ const dfm_type &Registry::find(uint32_t kind, std::string_view name) const {
   const std::string wrong(name);
   std::vector<std::string> names, listed;
   for (const dfm_type *type : list(kind)) {
-    names.push_back(short_name(*type)), names.push_back(type->id);
+    names.push_back(short_name(*type));
+    names.push_back(type->id);
     listed.push_back(short_name(*type));
   }
   const std::string near = nearest(wrong, names);
   const char *what = kind_name(kind);
   if (listed.empty())
-    fail(DFM_E_UNSUPPORTED, "no %s \"%s\": no plugin with a %s is loaded; set DEFORM_PLUGIN_PATH or see \"deform plugin list\"", what,
-         wrong.c_str(), what);
-  fail(DFM_E_UNSUPPORTED, "no %s \"%s\" is loaded%s%s%s; loaded: %s", what, wrong.c_str(), near.empty() ? "" : ", did you mean \"",
-       near.c_str(), near.empty() ? "" : "\"", join(listed).c_str());
+    fail(DFM_E_UNSUPPORTED,
+         "no %s \"%s\": no plugin with a %s is loaded; set DEFORM_PLUGIN_PATH or see \"deform plugin list\"",
+         what, wrong.c_str(), what);
+  fail(DFM_E_UNSUPPORTED, "no %s \"%s\" is loaded%s%s%s; loaded: %s", what, wrong.c_str(),
+       near.empty() ? "" : ", did you mean \"", near.c_str(), near.empty() ? "" : "\"", join(listed).c_str());
 }
 
 std::vector<const dfm_type *> Registry::list(uint32_t kind) const {

@@ -1,5 +1,6 @@
-// What the loaded plugins offer. Types are copied into full structs of this library's size with stable addresses: a plugin built against
-// an older header has shorter structs, whose absent tail then reads zero, and nobody behind this file has to know.
+// What the loaded plugins offer. Types are copied into full structs of this library's size with stable
+// addresses: a plugin built against an older header has shorter structs, whose absent tail then reads zero,
+// and nobody behind this file has to know.
 #pragma once
 #include <cstdint>
 #include <memory>
@@ -29,16 +30,20 @@ class Registry {
   Registry(const Registry &) = delete;
   Registry &operator=(const Registry &) = delete;
 
-  // Takes all types of a plugin, or none: throws Error with the reason (metadata, parameter table, operations, id taken).
+  // Takes all types of a plugin, or none: throws Error with the reason (metadata, parameter table,
+  // operations, id taken).
   void add(const dfm_plugin &plugin, const std::string &file);
 
-  // By full id, else by short name (what follows the last dot of the id). Throws DFM_E_UNSUPPORTED with those loaded and the nearest.
+  // By full id, else by short name (what follows the last dot of the id). Throws DFM_E_UNSUPPORTED with those
+  // loaded and the nearest.
   const dfm_type &find(uint32_t kind, std::string_view name) const;
   const dfm_type *try_find(uint32_t kind, std::string_view name) const noexcept;
   std::vector<const dfm_type *> list(uint32_t kind = 0) const;  // by kind and id; 0: all
   const std::string &file_of(const dfm_type &type) const;
 
-  void pass_over(std::string file, std::string reason) { passed_.push_back({std::move(file), std::move(reason)}); }
+  void pass_over(std::string file, std::string reason) {
+    passed_.push_back({std::move(file), std::move(reason)});
+  }
   const std::vector<PassedFile> &passed() const { return passed_; }
 
  private:
@@ -53,7 +58,9 @@ std::vector<std::string> effects(const dfm_type &type);
 void check_slots(const std::string &id, const dfm_slot *slots, uint32_t n, bool law);
 // The state slots of a law with these parameters; throws Error where what it answers is none.
 std::span<const dfm_slot> law_slots(const dfm_type &type, const dfm_host &host, const double *params);
-inline const dfm_friction &law_of(const dfm_type &type) { return *static_cast<const dfm_friction *>(type.ops); }
+inline const dfm_friction &law_of(const dfm_type &type) {
+  return *static_cast<const dfm_friction *>(type.ops);
+}
 inline const dfm_model &model_of(const dfm_type &type) { return *static_cast<const dfm_model *>(type.ops); }
 
 }  // namespace dfm

@@ -13,7 +13,10 @@ uint64_t next_serial() {
   return ++serial;
 }
 
-struct Cache { uint64_t serial = 0; ScratchArena *arena = nullptr; };
+struct Cache {
+  uint64_t serial = 0;
+  ScratchArena *arena = nullptr;
+};
 thread_local Cache cache;
 
 }  // namespace
@@ -77,7 +80,8 @@ ScratchArena *Scratch::arena() noexcept {
   try {
     const std::lock_guard lock(mutex_);
     const auto self = std::this_thread::get_id();
-    auto found = std::find_if(arenas_.begin(), arenas_.end(), [&](const Owned &o) { return o.thread == self; });
+    auto found =
+        std::find_if(arenas_.begin(), arenas_.end(), [&](const Owned &o) { return o.thread == self; });
     if (found == arenas_.end()) {
       arenas_.reserve(arenas_.size() + 1);
       arenas_.push_back({self, new ScratchArena(memory_)});

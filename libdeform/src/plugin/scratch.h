@@ -1,6 +1,6 @@
-// Scratch memory lent to plugins: one bump arena per thread and context, in memory of the context's hooks. A PluginCall around each call
-// into a plugin gives back what that call took, so several pieces of one call are valid together, and nothing is allocated once the
-// largest call has been seen.
+// Scratch memory lent to plugins: one bump arena per thread and context, in memory of the context's hooks. A
+// PluginCall around each call into a plugin gives back what that call took, so several pieces of one call are
+// valid together, and nothing is allocated once the largest call has been seen.
 #pragma once
 #include <cstddef>
 #include <cstdint>
@@ -25,7 +25,10 @@ class ScratchArena {
   uint32_t depth = 0;  // open PluginCalls of this thread
 
  private:
-  struct Chunk { char *data; size_t begin, bytes; };  // covers offsets [begin, begin + bytes) of the arena
+  struct Chunk {
+    char *data;
+    size_t begin, bytes;
+  };  // covers offsets [begin, begin + bytes) of the arena
   bool grow(size_t bytes) noexcept;
   void drop_all() noexcept;
   const Memory &memory_;
@@ -41,7 +44,10 @@ class Scratch {
   ScratchArena *arena() noexcept;  // of this thread; nullptr where memory is refused
 
  private:
-  struct Owned { std::thread::id thread; ScratchArena *arena; };
+  struct Owned {
+    std::thread::id thread;
+    ScratchArena *arena;
+  };
   const Memory &memory_;
   const uint64_t serial_;  // an address may be used again by a later context, a serial number never
   std::mutex mutex_;
@@ -52,10 +58,16 @@ class Scratch {
 class PluginCall {
  public:
   explicit PluginCall(Scratch &scratch) noexcept : arena_(scratch.arena()) {
-    if (arena_) mark_ = arena_->mark(), ++arena_->depth;
+    if (arena_) {
+      mark_ = arena_->mark();
+      ++arena_->depth;
+    }
   }
   ~PluginCall() {
-    if (arena_) --arena_->depth, arena_->reset(mark_);
+    if (arena_) {
+      --arena_->depth;
+      arena_->reset(mark_);
+    }
   }
   PluginCall(const PluginCall &) = delete;
   PluginCall &operator=(const PluginCall &) = delete;

@@ -7,8 +7,10 @@
 namespace dfm {
 
 SharedObject::SharedObject(const std::string &, const std::string &name) {
-  fail(DFM_E_UNSUPPORTED, "%s is not opened: this library was built to load no files (DEFORM_PLUGINS_STATIC); link the plugin into the program "
-       "and call dfm_plugin_register_static", name.c_str());
+  fail(DFM_E_UNSUPPORTED,
+       "%s is not opened: this library was built to load no files (DEFORM_PLUGINS_STATIC); link the plugin "
+       "into the program and call dfm_plugin_register_static",
+       name.c_str());
 }
 void SharedObject::close(void *) noexcept {}
 std::string default_plugin_directory() { return {}; }
@@ -45,7 +47,8 @@ void SharedObject::close(void *image) noexcept {
 std::string default_plugin_directory() {
   Dl_info info{};
   std::string self;
-  if (dladdr(reinterpret_cast<void *>(&default_plugin_directory), &info) && info.dli_fname && std::strchr(info.dli_fname, '/'))
+  if (dladdr(reinterpret_cast<void *>(&default_plugin_directory), &info) && info.dli_fname &&
+      std::strchr(info.dli_fname, '/'))
     self = info.dli_fname;
   std::error_code error;
   fs::path binary = self.empty() ? fs::path() : fs::canonical(self, error);

@@ -6,7 +6,10 @@
 
 namespace dfm {
 
-struct StaticPlugin { const char *name; dfm_plugin_fn entry; };
+struct StaticPlugin {
+  const char *name;
+  dfm_plugin_fn entry;
+};
 std::span<const StaticPlugin> static_plugins();
 
 }  // namespace dfm

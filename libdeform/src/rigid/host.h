@@ -7,9 +7,9 @@
 
 namespace dfm {
 
-const dfm_rigid_host &builtin_host();                       // builtin.cpp
+const dfm_rigid_host &builtin_host();  // builtin.cpp
 
-void register_host(const std::string &name, const dfm_rigid_host &table);   // throws Error
+void register_host(const std::string &name, const dfm_rigid_host &table);  // throws Error
 // By name; throws Error(DFM_E_ARG) that names the nearest one.
 dfm_rigid_host find_host(const std::string &name);
 

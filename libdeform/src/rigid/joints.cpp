@@ -5,16 +5,21 @@
 namespace dfm {
 namespace {
 
-Quat rotation_of(const dfm_rigid_state &s) { return {s.rotation[0], s.rotation[1], s.rotation[2], s.rotation[3]}; }
+Quat rotation_of(const dfm_rigid_state &s) {
+  return {s.rotation[0], s.rotation[1], s.rotation[2], s.rotation[3]};
+}
 
 // Where one side of a joint stands.
-struct Side { Vec3 center; Quat turn; };
+struct Side {
+  Vec3 center;
+  Quat turn;
+};
 Side side(uint32_t part, std::span<const dfm_rigid_state> state) {
   if (part == DFM_RIGID_WORLD) return {};
   return {load3(state[part].position), rotation_of(state[part])};
 }
 
-constexpr double kRedundant = 1e-12;   // of a row's own diagonal: what is left of it after the earlier rows
+constexpr double kRedundant = 1e-12;  // of a row's own diagonal: what is left of it after the earlier rows
 
 Vec3 unit_vector(int k) {
   Vec3 e;
@@ -39,7 +44,9 @@ void response(Vec3 l, Vec3 a, const RigidPart &part, const dfm_rigid_state &stat
 
 RigidJoint make_joint(const dfm_joint_def &def, std::span<const dfm_rigid_def> bodies) {
   RigidJoint j{};
-  j.type = def.type, j.a = def.body, j.b = def.with;
+  j.type = def.type;
+  j.a = def.body;
+  j.b = def.with;
   auto stand = [&](uint32_t part) -> Side {
     if (part == DFM_RIGID_WORLD) return {};
     return {load3(bodies[part].pose.position), unit_quat(bodies[part].pose.rotation)};
@@ -47,9 +54,12 @@ RigidJoint make_joint(const dfm_joint_def &def, std::span<const dfm_rigid_def> b
   const Side a = stand(j.a), b = stand(j.b);
   const Vec3 anchor = load3(def.anchor), axis = j.can_drive() ? normalized(load3(def.axis)) : Vec3{0, 0, 1};
   const Vec3 side = any_tangent(axis);
-  j.anchor_a = rotate_back(a.turn, anchor - a.center), j.anchor_b = rotate_back(b.turn, anchor - b.center);
-  j.axis_a = rotate_back(a.turn, axis), j.axis_b = rotate_back(b.turn, axis);
-  j.side_b[0] = rotate_back(b.turn, side), j.side_b[1] = rotate_back(b.turn, cross(axis, side));
+  j.anchor_a = rotate_back(a.turn, anchor - a.center);
+  j.anchor_b = rotate_back(b.turn, anchor - b.center);
+  j.axis_a = rotate_back(a.turn, axis);
+  j.axis_b = rotate_back(b.turn, axis);
+  j.side_b[0] = rotate_back(b.turn, side);
+  j.side_b[1] = rotate_back(b.turn, cross(axis, side));
   j.turn = conjugate(b.turn) * a.turn;
   return j;
 }
@@ -71,7 +81,7 @@ void hold_rows(const RigidJoint &j, std::span<const dfm_rigid_state> state, std:
     const Vec3 n = rotate(a.turn, j.axis_a);
     for (const Vec3 &s : j.side_b) {
       const Vec3 t = rotate(b.turn, s);
-      out.push_back(spin_row(j, cross(n, t), dot(n, t)));   // d/dt (n . t) = (w_a - w_b) . (n x t)
+      out.push_back(spin_row(j, cross(n, t), dot(n, t)));  // d/dt (n . t) = (w_a - w_b) . (n x t)
     }
   } else if (j.type != DFM_JOINT_BALL) {
     const Vec3 off = rotation_vector(a.turn * conjugate(b.turn * j.turn));
@@ -82,8 +92,11 @@ void hold_rows(const RigidJoint &j, std::span<const dfm_rigid_state> state, std:
 JointRow drive_row(const RigidJoint &j, std::span<const dfm_rigid_state> state) {
   const Side a = side(j.a, state), b = side(j.b, state);
   const Vec3 axis = rotate(b.turn, j.axis_b);
-  if (j.type == DFM_JOINT_HINGE) return spin_row(j, axis, dot(rotation_vector(a.turn * conjugate(b.turn * j.turn)), axis));
-  const Vec3 arm_a = rotate(a.turn, j.anchor_a), arm_b = rotate(b.turn, j.anchor_b), apart = a.center + arm_a - (b.center + arm_b);
+  if (j.type == DFM_JOINT_HINGE)
+    return spin_row(j, axis, dot(rotation_vector(a.turn * conjugate(b.turn * j.turn)), axis));
+  const Vec3 arm_a = rotate(a.turn, j.anchor_a);
+  const Vec3 arm_b = rotate(b.turn, j.anchor_b);
+  const Vec3 apart = a.center + arm_a - (b.center + arm_b);
   return point_row(j, arm_a, arm_b + apart, axis, dot(apart, axis));
 }
 
@@ -95,18 +108,22 @@ double row_rate(const JointRow &r, std::span<const double> v) {
   return rate + dot(r.lb, load3(b)) + dot(r.ab, load3(b + 3));
 }
 
-void JointSystem::build(std::span<const JointRow> rows, std::span<const RigidPart> parts, std::span<const dfm_rigid_state> state) {
+void JointSystem::build(std::span<const JointRow> rows, std::span<const RigidPart> parts,
+                        std::span<const dfm_rigid_state> state) {
   n_ = rows.size();
-  factor_.assign(n_ * n_, 0.0), responses_.assign(12 * n_, 0.0);
+  factor_.assign(n_ * n_, 0.0);
+  responses_.assign(12 * n_, 0.0);
   for (size_t i = 0; i < n_; ++i) {
     const JointRow &r = rows[i];
     double *const m = &responses_[12 * i];
     Vec3 dv, dw;
     response(r.la, r.aa, parts[r.a], state[r.a], dv, dw);
-    store3(m, dv), store3(m + 3, dw);
+    store3(m, dv);
+    store3(m + 3, dw);
     if (r.b == DFM_RIGID_WORLD) continue;
     response(r.lb, r.ab, parts[r.b], state[r.b], dv, dw);
-    store3(m + 6, dv), store3(m + 9, dw);
+    store3(m + 6, dv);
+    store3(m + 9, dw);
   }
   // Lower triangle of A: row i on the response of row k, side by side where they share a part.
   for (size_t i = 0; i < n_; ++i)
@@ -119,7 +136,8 @@ void JointSystem::build(std::span<const JointRow> rows, std::span<const RigidPar
         if (part == q.a) sum += dot(l, load3(m)) + dot(a, load3(m + 3));
         if (part == q.b) sum += dot(l, load3(m + 6)) + dot(a, load3(m + 9));
       };
-      add(r.a, r.la, r.aa), add(r.b, r.lb, r.ab);
+      add(r.a, r.la, r.aa);
+      add(r.b, r.lb, r.ab);
       factor_[i * n_ + k] = sum;
     }
   // L D L^T in place: D on the diagonal, 0 where the row is left out.
@@ -154,7 +172,8 @@ void JointSystem::solve(std::span<double> x) const {
   }
 }
 
-void JointSystem::push(std::span<const JointRow> rows, std::span<const double> x, std::span<const RigidPart> parts, std::span<const dfm_rigid_state> state,
+void JointSystem::push(std::span<const JointRow> rows, std::span<const double> x,
+                       std::span<const RigidPart> parts, std::span<const dfm_rigid_state> state,
                        std::span<double> velocity) {
   for (size_t i = 0; i < rows.size(); ++i) {
     const JointRow &r = rows[i];
@@ -163,9 +182,11 @@ void JointSystem::push(std::span<const JointRow> rows, std::span<const double> x
       Vec3 dv, dw;
       response(x[i] * l, x[i] * a, parts[part], state[part], dv, dw);
       double *const v = &velocity[6 * size_t{part}];
-      store3(v, load3(v) + dv), store3(v + 3, load3(v + 3) + dw);
+      store3(v, load3(v) + dv);
+      store3(v + 3, load3(v + 3) + dw);
     };
-    add(r.a, r.la, r.aa), add(r.b, r.lb, r.ab);
+    add(r.a, r.la, r.aa);
+    add(r.b, r.lb, r.ab);
   }
 }
 

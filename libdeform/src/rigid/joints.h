@@ -2,7 +2,8 @@
 //
 //   row: J v = la . va + aa . wa + lb . vb + ab . wb        A = J M^-1 J^T, factorised as L D L^T
 //
-// A row whose pivot vanishes says what earlier rows say already (a closed loop, a joint between still bodies) and is left out.
+// A row whose pivot vanishes says what earlier rows say already (a closed loop, a joint between still bodies)
+// and is left out.
 #pragma once
 #include <span>
 #include <vector>
@@ -14,7 +15,7 @@ namespace dfm {
 
 struct RigidPart {
   double inverse_mass = 0;
-  Vec3 moments, inverse_moments;   // about its own axes; inverse 0 where still
+  Vec3 moments, inverse_moments;  // about its own axes; inverse 0 where still
 };
 
 struct RigidJoint {
@@ -27,9 +28,9 @@ struct RigidJoint {
 RigidJoint make_joint(const dfm_joint_def &def, std::span<const dfm_rigid_def> bodies);
 
 struct JointRow {
-  uint32_t a, b;                   // parts; b kNone: the world
+  uint32_t a, b;  // parts; b kNone: the world
   Vec3 la, aa, lb, ab;
-  double error = 0;                // m or rad: what the position is off by
+  double error = 0;  // m or rad: what the position is off by
 };
 
 // Appends the rows that hold joint j, as the bodies stand.
@@ -37,15 +38,18 @@ void hold_rows(const RigidJoint &j, std::span<const dfm_rigid_state> state, std:
 // The row that its motor drives; error: its angle (within half a turn) or path.
 JointRow drive_row(const RigidJoint &j, std::span<const dfm_rigid_state> state);
 
-double row_rate(const JointRow &row, std::span<const double> velocity);   // J v, velocity [n,6]
+double row_rate(const JointRow &row, std::span<const double> velocity);  // J v, velocity [n,6]
 
 // A of a few rows; velocities are [n,6] over the parts.
 class JointSystem {
  public:
-  void build(std::span<const JointRow> rows, std::span<const RigidPart> parts, std::span<const dfm_rigid_state> state);
-  void solve(std::span<double> x) const;                                  // A x = x in place; rows left out get 0
+  void build(std::span<const JointRow> rows, std::span<const RigidPart> parts,
+             std::span<const dfm_rigid_state> state);
+  // A x = x in place; rows left out get 0
+  void solve(std::span<double> x) const;
   // velocity += M^-1 J^T x
-  static void push(std::span<const JointRow> rows, std::span<const double> x, std::span<const RigidPart> parts, std::span<const dfm_rigid_state> state,
+  static void push(std::span<const JointRow> rows, std::span<const double> x,
+                   std::span<const RigidPart> parts, std::span<const dfm_rigid_state> state,
                    std::span<double> velocity);
 
  private:

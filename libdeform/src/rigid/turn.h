@@ -1,4 +1,5 @@
-// Rotations of a rigid body over a step: exponential map, its inverse, and the mean spin that conserves angular momentum. + - * / sqrt only.
+// Rotations of a rigid body over a step: exponential map, its inverse, and the mean spin that conserves
+// angular momentum. + - * / sqrt only.
 #pragma once
 #include "math/trig.h"
 #include "math/vec3.h"
@@ -15,13 +16,14 @@ inline Quat conjugate(Quat q) { return {-q.x, -q.y, -q.z, q.w}; }
 inline Quat turned(Quat q, Vec3 r) {
   const double angle = norm(r);
   if (!(angle > 0)) return q;
-  const double half = angle / (4 * 3.14159265358979323846);   // half the angle in turns
+  const double half = angle / (4 * 3.14159265358979323846);  // half the angle in turns
   const Vec3 v = (sin_turns(half) / angle) * r;
   return unit(Quat{v.x, v.y, v.z, sin_turns(half + 0.25)} * q);
 }
 
-// The rotation vector of q along the shorter arc. Halving the arc needs square roots only; asin by its series is exact to rounding where it is small
-// enough, that is at once for the turn of a sub-step, after five halvings for the longest arc.
+// The rotation vector of q along the shorter arc. Halving the arc needs square roots only; asin by its series
+// is exact to rounding where it is small enough, that is at once for the turn of a sub-step, after five
+// halvings for the longest arc.
 inline Vec3 rotation_vector(Quat q) {
   if (q.w < 0) q = {-q.x, -q.y, -q.z, -q.w};
   double scale = 2;
@@ -40,9 +42,9 @@ inline Vec3 in_axes(Quat q, Vec3 diagonal, Vec3 v) {
   return rotate(q, {diagonal.x * b.x, diagonal.y * b.y, diagonal.z * b.z});
 }
 
-// Mean spin w over a step with constant angular momentum L: w = I^-1(q_m) L with q_m half way, q_m = exp(h w / 2) q (the midpoint Lie scheme;
-// Krysl 2005, IJNME 63:2171). L is conserved whatever w is, so the spin is bounded; fixed-point steps converge while h |w| is below about 1, and a
-// round body needs none.
+// Mean spin w over a step with constant angular momentum L: w = I^-1(q_m) L with q_m half way, q_m = exp(h w
+// / 2) q (the midpoint Lie scheme; Krysl 2005, IJNME 63:2171). L is conserved whatever w is, so the spin is
+// bounded; fixed-point steps converge while h |w| is below about 1, and a round body needs none.
 inline Vec3 mean_spin(Quat q, Vec3 inverse_moments, Vec3 L, double h) {
   Vec3 w = in_axes(q, inverse_moments, L);
   if (inverse_moments.x == inverse_moments.y && inverse_moments.y == inverse_moments.z) return w;

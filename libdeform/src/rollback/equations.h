@@ -1,5 +1,6 @@
-// The equations of Zerbato (2010, sections 4.2 and 5.4) for a colliding point, one by one, in the form that can be computed; what is printed and
-// why it cannot be is told at each. doc/concepts/rollback.md shows what they do to sliding, momentum and force.
+// The equations of Zerbato (2010, sections 4.2 and 5.4) for a colliding point, one by one, in the form that
+// can be computed; what is printed and why it cannot be is told at each. doc/concepts/rollback.md shows what
+// they do to sliding, momentum and force.
 #pragma once
 #include <algorithm>
 
@@ -7,16 +8,21 @@
 
 namespace dfm::rollback {
 
-// (4.5): a vertex is where it is at its impact, x + t h v, t that of its island (printed: of its own). Position Verlet, Zerbato's integrator, then
-// reads the velocity from positions, (x(t) - x(0)) / h: t times that of the full way. The text does not say.
+// (4.5): a vertex is where it is at its impact, x + t h v, t that of its island (printed: of its own).
+// Position Verlet, Zerbato's integrator, then reads the velocity from positions, (x(t) - x(0)) / h: t times
+// that of the full way. The text does not say.
 inline Vec3 velocity_after(Vec3 velocity, double t) { return t * velocity; }
 
-// A safety factor on impact times; with it the next sub-step does not begin in the touch that this one ended in.
+// A safety factor on impact times; with it the next sub-step does not begin in the touch that
+// this one ended in.
 inline constexpr double kSafety = 0.9;
 
-// (5.23), (5.24): normal force, N, >= 0. Printed as a choice between dot products of the forces of point and triangle in which the normal does not
-// occur, and which is zero but where both are equally large. inverse_mass: n^T J M^-1 J^T n of the pair, 1/kg; speed: relative velocity along n at the
-// end of a step of h under the forces of the last step, m/s.
-inline double normal_force(double inverse_mass, double speed, double h) { return inverse_mass > 0 ? std::max(0.0, -speed / (inverse_mass * h)) : 0; }
+// (5.23), (5.24): normal force, N, >= 0. Printed as a choice between dot products of the forces of point and
+// triangle in which the normal does not occur, and which is zero but where both are equally large.
+// inverse_mass: n^T J M^-1 J^T n of the pair, 1/kg; speed: relative velocity along n at the end of a step of
+// h under the forces of the last step, m/s.
+inline double normal_force(double inverse_mass, double speed, double h) {
+  return inverse_mass > 0 ? std::max(0.0, -speed / (inverse_mass * h)) : 0;
+}
 
 }  // namespace dfm::rollback

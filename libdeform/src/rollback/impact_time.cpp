@@ -12,30 +12,48 @@
 namespace dfm::rollback {
 namespace {
 
-constexpr double kSharp = 1e-3;   // share of d_c to which times are found; what is nearer than d_c by twice as much rests
-constexpr double kBack = 0.5;     // of its distance, down to which what parts from a rest may come back
-constexpr int kNewton = 60;       // far more than it takes; every step is safe, so stopping early stops early
+// share of d_c to which times are found; what is nearer than d_c by twice as much rests
+constexpr double kSharp = 1e-3;
+constexpr double kBack = 0.5;  // of its distance, down to which what parts from a rest may come back
+constexpr int kNewton = 60;    // far more than it takes; every step is safe, so stopping early stops early
 
 // The two nearest places of the features at one moment.
-struct Nearest { Vec3 a, b; double distance, at[3]; };
+struct Nearest {
+  Vec3 a, b;
+  double distance, at[3];
+};
 
 Nearest nearest_of(const Vec3 x[4], bool edges) {
   Nearest n{};
   if (edges) {
     const SegmentPoints s = closest_segments(x[0], x[1], x[2], x[3]);
-    n.a = x[0] + s.s * (x[1] - x[0]), n.b = x[2] + s.t * (x[3] - x[2]), n.distance = std::sqrt(s.distance2);
-    n.at[0] = s.s, n.at[1] = s.t;
+    n.a = x[0] + s.s * (x[1] - x[0]);
+    n.b = x[2] + s.t * (x[3] - x[2]);
+    n.distance = std::sqrt(s.distance2);
+    n.at[0] = s.s;
+    n.at[1] = s.t;
   } else {
     const TrianglePoint t = closest_on_triangle(x[0], x[1], x[2], x[3]);
-    n.a = x[0], n.b = t.point, n.distance = std::sqrt(t.distance2);
+    n.a = x[0];
+    n.b = t.point;
+    n.distance = std::sqrt(t.distance2);
     std::copy(t.weight, t.weight + 3, n.at);
   }
   return n;
 }
 
 void weights_of(const Nearest &n, bool edges, double w[4]) {
-  if (edges) w[0] = 1 - n.at[0], w[1] = n.at[0], w[2] = n.at[1] - 1, w[3] = -n.at[1];
-  else w[0] = 1, w[1] = -n.at[0], w[2] = -n.at[1], w[3] = -n.at[2];
+  if (edges) {
+    w[0] = 1 - n.at[0];
+    w[1] = n.at[0];
+    w[2] = n.at[1] - 1;
+    w[3] = -n.at[1];
+  } else {
+    w[0] = 1;
+    w[1] = -n.at[0];
+    w[2] = -n.at[1];
+    w[3] = -n.at[2];
+  }
 }
 
 // The boxes of the two swept features, grown by `by`, do not meet: nearly all pairs of a list end here.
@@ -46,7 +64,8 @@ bool far_apart(const Vec3 x[4], const Vec3 way[4], bool edges, double by) {
     for (int k = 0; k < 4; ++k) {
       const int side = k >= split;
       const double p = x[k][i], q = x[k][i] + way[k][i];
-      low[side] = std::min({low[side], p, q}), high[side] = std::max({high[side], p, q});
+      low[side] = std::min({low[side], p, q});
+      high[side] = std::max({high[side], p, q});
     }
     const double grown = by * (1 + 1e-9);
     if (low[0] - high[1] > grown || low[1] - high[0] > grown) return true;
@@ -56,17 +75,24 @@ bool far_apart(const Vec3 x[4], const Vec3 way[4], bool edges, double by) {
 
 double touch_time(const Vec3 x[4], const Vec3 way[4], bool edges, double distance, double within) {
   dfm_motion m[4];
-  for (int k = 0; k < 4; ++k) store3(m[k].p0, x[k]), store3(m[k].p1, x[k] + way[k]);
+  for (int k = 0; k < 4; ++k) {
+    store3(m[k].p0, x[k]);
+    store3(m[k].p1, x[k] + way[k]);
+  }
   const dfm_toi_options options = {sizeof options, DFM_TOI_CONSERVATIVE, 0, distance, 0};
-  return (edges ? toi_edge_edge(m, m + 2, options, within) : toi_point_triangle(m[0], m + 1, options, within)).t;
+  return (edges ? toi_edge_edge(m, m + 2, options, within) : toi_point_triangle(m[0], m + 1, options, within))
+      .t;
 }
 
 }  // namespace
 
-ImpactQuery::ImpactQuery(std::span<const BodyView> bodies, std::span<const ObstacleView> obstacles, double h, double touch)
+ImpactQuery::ImpactQuery(std::span<const BodyView> bodies, std::span<const ObstacleView> obstacles, double h,
+                         double touch)
     : bodies_(bodies), obstacles_(obstacles), h_(h), touch_(touch) {}
 
-Vec3 ImpactQuery::start(const Corner &c) const { return c.slot == kNone ? c.still : load3(&bodies_[c.slot].surface->x[4 * size_t{c.surfel}]); }
+Vec3 ImpactQuery::start(const Corner &c) const {
+  return c.slot == kNone ? c.still : load3(&bodies_[c.slot].surface->x[4 * size_t{c.surfel}]);
+}
 
 Vec3 ImpactQuery::way(const Corner &c, std::span<const double *const> share) const {
   if (c.slot == kNone) return {};
@@ -84,7 +110,7 @@ void ImpactQuery::mesh_features(const Candidate &c, const Surface &mesh, Feature
     }
     return;
   }
-  f.turned = c.kind == 2;   // a vertex of the mesh against a triangle of the body
+  f.turned = c.kind == 2;  // a vertex of the mesh against a triangle of the body
   f.corner[0] = f.turned ? fixed(c.feature_a) : surfel(c.slot_a, c.feature_a);
   const uint32_t *const t = &(f.turned ? a : mesh).tri[3 * size_t{c.feature_b}];
   for (uint32_t k = 0; k < 3; ++k) f.corner[1 + k] = f.turned ? surfel(c.slot_a, t[k]) : fixed(t[k]);
@@ -99,31 +125,40 @@ void ImpactQuery::each(const Candidate &c, F &&call) const {
     f.corner[0] = surfel(c.slot_a, f.edges ? a.edge[2 * size_t{c.feature_a}] : c.feature_a);
     if (f.edges) f.corner[1] = surfel(c.slot_a, a.edge[2 * size_t{c.feature_a} + 1]);
     for (uint32_t k = f.edges ? 2 : 1; k < 4; ++k)
-      f.corner[k] = surfel(c.slot_b, f.edges ? b.edge[2 * size_t{c.feature_b} + k - 2] : b.tri[3 * size_t{c.feature_b} + k - 1]);
+      f.corner[k] = surfel(c.slot_b, f.edges ? b.edge[2 * size_t{c.feature_b} + k - 2]
+                                             : b.tri[3 * size_t{c.feature_b} + k - 1]);
     return call(f);
   }
   const ObstacleView &v = obstacles_[c.slot_b];
-  if (v.shape == Shape::mesh) return mesh_features(c, *v.surface, f), call(f);
+  if (v.shape == Shape::mesh) {
+    mesh_features(c, *v.surface, f);
+    return call(f);
+  }
   if (c.kind == 0) return;
   const ObstacleShape shape(v);
   if (c.kind == 1) {
     for (uint32_t k = 0; k < 2; ++k) f.corner[k] = surfel(c.slot_a, a.edge[2 * size_t{c.feature_a} + k]);
     if (v.shape == Shape::capsule) {
-      f.round = v.radius, f.part = 2, f.corner[2] = still(shape.end(0)), f.corner[3] = still(shape.end(1));
+      f.round = v.radius;
+      f.part = 2;
+      f.corner[2] = still(shape.end(0));
+      f.corner[3] = still(shape.end(1));
       call(f);
     } else if (v.shape == Shape::box) {
       for (f.part = 0; f.part < 12; ++f.part) {
         Vec3 from, to;
         uint32_t faces[2];
         shape.edge(f.part, from, to, faces);
-        f.corner[2] = still(from), f.corner[3] = still(to);
+        f.corner[2] = still(from);
+        f.corner[3] = still(to);
         call(f);
       }
     }
     return;
   }
   const uint32_t points = v.shape == Shape::box ? 8 : v.shape == Shape::capsule ? 2 : 1;
-  f.turned = true, f.round = v.shape == Shape::box ? 0 : v.radius;
+  f.turned = true;
+  f.round = v.shape == Shape::box ? 0 : v.radius;
   for (uint32_t k = 0; k < 3; ++k) f.corner[1 + k] = surfel(c.slot_a, a.tri[3 * size_t{c.feature_a} + k]);
   for (uint32_t k = 0; k < points; ++k) {
     f.corner[0] = still(v.shape == Shape::box ? shape.corner(k) : shape.end(int(k)));
@@ -134,7 +169,10 @@ void ImpactQuery::each(const Candidate &c, F &&call) const {
 
 void ImpactQuery::against(const Features &f, std::span<const double *const> share, ImpactHit &best) const {
   Vec3 x[4], d[4];
-  for (int k = 0; k < 4; ++k) x[k] = start(f.corner[k]), d[k] = way(f.corner[k], share);
+  for (int k = 0; k < 4; ++k) {
+    x[k] = start(f.corner[k]);
+    d[k] = way(f.corner[k], share);
+  }
   if (far_apart(x, d, f.edges, touch_ + f.round)) return;
   Nearest n = nearest_of(x, f.edges);
   const double distance = n.distance - f.round;
@@ -147,7 +185,9 @@ void ImpactQuery::against(const Features &f, std::span<const double *const> shar
     weights_of(n, f.edges, w);
     Vec3 closing;
     for (int k = 0; k < 4; ++k) closing += w[k] * d[k];
-    t = dot(closing, n.a - n.b) < 0 ? 0 : touch_time(x, d, f.edges, kBack * distance + f.round, kSharp * distance);
+    t = dot(closing, n.a - n.b) < 0
+            ? 0
+            : touch_time(x, d, f.edges, kBack * distance + f.round, kSharp * distance);
   }
   if (!(t <= 1) || !(t < best.t)) return;
   if (t > 0) {
@@ -155,13 +195,18 @@ void ImpactQuery::against(const Features &f, std::span<const double *const> shar
     n = nearest_of(x, f.edges);
   }
   const Vec3 normal = (f.turned ? -1 : 1) * normalized(n.a - n.b);
-  best.t = t, best.part = f.part, best.start = distance;
+  best.t = t;
+  best.part = f.part;
+  best.start = distance;
   std::copy(n.at, n.at + 3, best.at);
-  store3(best.normal, normal), store3(best.point, 0.5 * (n.a + n.b));
+  store3(best.normal, normal);
+  store3(best.point, 0.5 * (n.a + n.b));
 }
 
-// A surfel against a convex shape that stands still: the distance is a convex function of time, and Newton's steps from the left never pass its root.
-void ImpactQuery::against_shape(const Candidate &c, std::span<const double *const> share, ImpactHit &best) const {
+// A surfel against a convex shape that stands still: the distance is a convex function of time, and Newton's
+// steps from the left never pass its root.
+void ImpactQuery::against_shape(const Candidate &c, std::span<const double *const> share,
+                                ImpactHit &best) const {
   const ObstacleShape shape(obstacles_[c.slot_b]);
   const Corner corner = surfel(c.slot_a, c.feature_a);
   const Vec3 x = start(corner), d = way(corner, share);
@@ -170,7 +215,7 @@ void ImpactQuery::against_shape(const Candidate &c, std::span<const double *cons
   if (!(distance > 0)) return;
   double touch = touch_, t = 0;
   if (distance <= touch_ * (1 + 2 * kSharp)) {
-    if (!(dot(p.normal, d) < 0)) return;   // parts, and what parts from a convex shape does not come back
+    if (!(dot(p.normal, d) < 0)) return;  // parts, and what parts from a convex shape does not come back
     touch = distance;
   }
   for (int i = 0; i < kNewton && p.distance > touch * (1 + kSharp); ++i) {
@@ -179,9 +224,13 @@ void ImpactQuery::against_shape(const Candidate &c, std::span<const double *cons
     t = std::min(1.0, t + left / rate);
     p = shape.closest(x + t * d);
   }
-  best.t = t, best.part = p.face, best.start = distance;
-  best.at[0] = 1, best.at[1] = best.at[2] = 0;
-  store3(best.normal, p.normal), store3(best.point, 0.5 * (x + t * d + p.point));
+  best.t = t;
+  best.part = p.face;
+  best.start = distance;
+  best.at[0] = 1;
+  best.at[1] = best.at[2] = 0;
+  store3(best.normal, p.normal);
+  store3(best.point, 0.5 * (x + t * d + p.point));
 }
 
 ImpactHit ImpactQuery::first(const Candidate &c, std::span<const double *const> share) const {
@@ -206,8 +255,13 @@ uint32_t ImpactQuery::nodes(const Candidate &c, uint32_t out[4]) const {
     return n;
   }
   const BodyView &b = bodies_[c.slot_b];
-  if (c.kind == kEdgeEdge) add(a, a.surface->edge, c.feature_a, 2), add(b, b.surface->edge, c.feature_b, 2);
-  else out[n++] = a.first_node + c.feature_a, add(b, b.surface->tri, c.feature_b, 3);
+  if (c.kind == kEdgeEdge) {
+    add(a, a.surface->edge, c.feature_a, 2);
+    add(b, b.surface->edge, c.feature_b, 2);
+  } else {
+    out[n++] = a.first_node + c.feature_a;
+    add(b, b.surface->tri, c.feature_b, 3);
+  }
   return n;
 }
 
@@ -215,16 +269,24 @@ ContactPoint ImpactQuery::contact(const Candidate &c, const ImpactHit &hit) cons
   const BodyView &a = bodies_[c.slot_a];
   const Vec3 normal = load3(hit.normal);
   ContactPoint p{};
-  p.slot_a = c.slot_a, p.slot_b = c.slot_b, p.obstacle = c.obstacle, p.feature_a = c.feature_a, p.feature_b = c.feature_b;
+  p.slot_a = c.slot_a;
+  p.slot_b = c.slot_b;
+  p.obstacle = c.obstacle;
+  p.feature_a = c.feature_a;
+  p.feature_b = c.feature_b;
   p.kind = c.obstacle ? uint8_t{kPrimitive} : c.kind;
   p.type_a = c.obstacle ? c.kind : c.kind == kEdgeEdge;
   p.distance = hit.start;
-  std::copy(hit.point, hit.point + 3, p.point), std::copy(hit.normal, hit.normal + 3, p.normal);
+  std::copy(hit.point, hit.point + 3, p.point);
+  std::copy(hit.normal, hit.normal + 3, p.normal);
   uint32_t node[4];
   const uint32_t n = nodes(c, node);
   const bool edge = p.type_a == 1, triangle = p.type_a == 2;
   for (uint32_t k = 0; k < n; ++k) {
-    const double w = edge ? k == 0 ? 1 - hit.at[0] : k == 1 ? hit.at[0] : k == 2 ? hit.at[1] - 1 : -hit.at[1]
+    const double w = edge       ? k == 0   ? 1 - hit.at[0]
+                                  : k == 1 ? hit.at[0]
+                                  : k == 2 ? hit.at[1] - 1
+                                           : -hit.at[1]
                      : triangle ? hit.at[k]
                      : k == 0   ? 1
                                 : -hit.at[k - 1];
@@ -238,7 +300,10 @@ ContactPoint ImpactQuery::contact(const Candidate &c, const ImpactHit &hit) cons
     id_b = o.id;
     patch = !mesh ? hit.part : c.kind == 2 ? c.feature_a : c.feature_b;
     if (!mesh) p.feature_b = hit.part;
-    if (mesh && c.kind == 2) p.feature_a = c.feature_b, p.feature_b = c.feature_a;
+    if (mesh && c.kind == 2) {
+      p.feature_a = c.feature_b;
+      p.feature_b = c.feature_a;
+    }
     store3(p.velocity, o.belt - dot(o.belt, normal) * normal);
     if (p.type_a == 0) p.area = facing_area(*a.surface, c.feature_a, -normal);
   } else {

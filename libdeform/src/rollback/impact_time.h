@@ -1,8 +1,10 @@
-// What the roll-back (doc/concepts/rollback.md) asks of detection: when do two listed features, on straight ways over the sub-step, first come as near
-// as they rest? And what are the places and the normal of that moment?
+// What the roll-back (doc/concepts/rollback.md) asks of detection: when do two listed features, on
+// straight ways over the sub-step, first come as near as they rest? And what are the places and the normal
+// of that moment?
 //
-// Features that are apart touch when their true distance falls to d_c, found conservatively: never late. Features that rest at d_c (or nearer) touch at
-// t = 0 if they approach; if they part, only once they come back to half of their distance. What is through already (a start state) is let out.
+// Features that are apart touch when their true distance falls to d_c, found conservatively: never late.
+// Features that rest at d_c (or nearer) touch at t = 0 if they approach; if they part, only once they come
+// back to half of their distance. What is through already (a start state) is let out.
 #pragma once
 #include <cstdint>
 #include <span>
@@ -13,38 +15,53 @@
 namespace dfm::rollback {
 
 struct ImpactHit {
-  double t;                // share of the sub-step; above 1: never
-  uint32_t part;           // of an obstacle: its face, edge or corner, as contacts number them; else 0
-  double at[3];            // weights of the triangle's corners, or places on edge a and edge b; 1 for a surfel that meets a closed form
-  double start;            // m, distance at the start
-  double normal[3];        // unit, from b to a, at t
-  double point[3];         // m, midway, at t
+  double t;       // share of the sub-step; above 1: never
+  uint32_t part;  // of an obstacle: its face, edge or corner, as contacts number them; else 0
+  // weights of the triangle's corners, or places on edge a and edge b; 1 for a surfel that
+  // meets a closed form
+  double at[3];
+  double start;      // m, distance at the start
+  double normal[3];  // unit, from b to a, at t
+  double point[3];   // m, midway, at t
 };
 
 class ImpactQuery {
  public:
-  // Views by slot; surface->x and surface->v are start and velocity, obstacles stand still. h in s; touch: d_c, m.
-  ImpactQuery(std::span<const BodyView> bodies, std::span<const ObstacleView> obstacles, double h, double touch);
+  // Views by slot; surface->x and surface->v are start and velocity, obstacles stand still. h in s;
+  // touch: d_c, m.
+  ImpactQuery(std::span<const BodyView> bodies, std::span<const ObstacleView> obstacles, double h,
+              double touch);
 
   // share: by slot, [nsurfel] how much of its way h v each surfel goes; empty: all of it. Re-entrant.
   ImpactHit first(const Candidate &c, std::span<const double *const> share) const;
   // World-wide surfel numbers of both features; returns how many.
   uint32_t nodes(const Candidate &c, uint32_t out[4]) const;
-  // The hit as a contact, with area and key (patch as last part of it); key unique among contacts of different features of the first side.
+  // The hit as a contact, with area and key (patch as last part of it); key unique among contacts of
+  // different features of the first side.
   ContactPoint contact(const Candidate &c, const ImpactHit &hit) const;
 
  private:
   // One moving corner: a surfel of a body, or a point that stands still.
-  struct Corner { uint32_t slot, surfel; Vec3 still; };
-  // A point and a triangle, or two edges; the first feature is body a's unless `turned`. round: around the second one.
-  struct Features { Corner corner[4]; bool edges, turned; uint32_t part; double round; };
+  struct Corner {
+    uint32_t slot, surfel;
+    Vec3 still;
+  };
+  // A point and a triangle, or two edges; the first feature is body a's unless `turned`. round: around
+  // the second one.
+  struct Features {
+    Corner corner[4];
+    bool edges, turned;
+    uint32_t part;
+    double round;
+  };
 
   Corner surfel(uint32_t slot, uint32_t s) const { return {slot, s, {}}; }
   Corner still(Vec3 p) const { return {kNone, 0, p}; }
   Vec3 start(const Corner &c) const;
   Vec3 way(const Corner &c, std::span<const double *const> share) const;
   template <class F>
-  void each(const Candidate &c, F &&f) const;   // f(Features), all that the candidate stands for but a surfel against a closed form
+  // f(Features), all that the candidate stands for but a surfel against a closed form
+  void each(const Candidate &c, F &&f) const;
   void mesh_features(const Candidate &c, const Surface &mesh, Features &f) const;
   void against_shape(const Candidate &c, std::span<const double *const> share, ImpactHit &best) const;
   void against(const Features &f, std::span<const double *const> share, ImpactHit &best) const;

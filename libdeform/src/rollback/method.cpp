@@ -19,8 +19,9 @@ StageChoice when_lagged(const SceneFacts &f) {
   return with_contact(f, "friction that the last sub-step found");
 }
 StageChoice when_rollback(const SceneFacts &f) {
-  return with_contact(f, "contact.method rollback: vertices that collide go back to their time of impact; "
-                         "there to compare, not to use");
+  return with_contact(f,
+                      "contact.method rollback: vertices that collide go back to their time of impact; "
+                      "there to compare, not to use");
 }
 StageChoice replaced(const SceneFacts &f) {
   return touches(f) ? StageChoice{false, kWhyNot} : when::solve(f);

@@ -12,7 +12,8 @@ namespace {
 
 class Builder {
  public:
-  Builder(dfm_context *context, Definition &def, uint64_t seed) : context_(context), def_(def), jittered_(seed != 0), jitter_(seed), files_(context, def) {}
+  Builder(dfm_context *context, Definition &def, uint64_t seed)
+      : context_(context), def_(def), jittered_(seed != 0), jitter_(seed), files_(context, def) {}
   ~Builder() {
     if (world_) dfm_world_destroy(world_);
   }
@@ -28,7 +29,8 @@ class Builder {
     for (Friction &f : def_.friction) add_friction(f);
     for (const Filter &f : def_.filters)
       check(dfm_world_filter_pair(world_, f.between[0].c_str(), f.between[1].c_str(), f.collide), f.pointer);
-    // Makes the plan now, so that an effect that nothing provides is an error of the scene and not of its first step.
+    // Makes the plan now, so that an effect that nothing provides is an error of the scene and not of
+    // its first step.
     double step = 0;
     check(dfm_world_stable_step(world_, &step, nullptr, nullptr), def_.effects_auto ? "/bodies" : "/effects");
     return {std::exchange(world_, 0), std::move(probes_)};
@@ -42,28 +44,37 @@ class Builder {
   void create_world() {
     dfm_world_def w = dfm_world_def_default();
     std::copy_n(def_.gravity, 3, w.gravity);
-    w.method = def_.method, w.integrator = def_.integrator;
-    w.contact_offset = def_.offset, w.contact_tolerance = def_.tolerance, w.sleep = def_.sleep, w.self_contact = def_.self;
+    w.method = def_.method;
+    w.integrator = def_.integrator;
+    w.contact_offset = def_.offset;
+    w.contact_tolerance = def_.tolerance;
+    w.sleep = def_.sleep;
+    w.self_contact = def_.self;
     w.max_time = def_.max_time;
     w.max_work = def_.max_work < 1.8e19 ? static_cast<uint64_t>(def_.max_work) : UINT64_MAX;
     w.energy_watch = def_.energy_watch;
     if (!def_.guard) w.flags |= DFM_WORLD_UNGUARDED;
     if (def_.untangle) w.flags |= DFM_WORLD_UNTANGLE;
-    w.recovery_speed = def_.recovery_speed, w.obstacle_speed = def_.obstacle_speed;
+    w.recovery_speed = def_.recovery_speed;
+    w.obstacle_speed = def_.obstacle_speed;
     std::vector<const char *> effects;
     for (const std::string &e : def_.effects) effects.push_back(e.c_str());
     effects.push_back(nullptr);
     if (!def_.effects_auto) w.effects = effects.data();
     check(dfm_world_create(context_, &w, &world_), def_.effects_auto ? "/contact" : "/effects");
     if (def_.gravity_keys.empty()) return;
-    check(dfm_world_set_gravity_keys(world_, uint32_t(def_.gravity_keys.size()), def_.gravity_keys.data()), "/gravity/keyframes");
+    check(dfm_world_set_gravity_keys(world_, uint32_t(def_.gravity_keys.size()), def_.gravity_keys.data()),
+          "/gravity/keyframes");
   }
 
   void create_material(Material &m) {
     dfm_material_def d = dfm_material_def_default();
     d.name = m.name.c_str();
-    d.density = m.density, d.young = m.young, d.poisson = m.poisson;
-    d.damping_mass = m.damping_mass, d.damping_stiffness = m.damping_stiffness;
+    d.density = m.density;
+    d.young = m.young;
+    d.poisson = m.poisson;
+    d.damping_mass = m.damping_mass;
+    d.damping_stiffness = m.damping_stiffness;
     d.extra = m.extra.view();
     check(dfm_material_create(world_, &d, &materials_[m.name]), m.pointer);
   }
@@ -93,21 +104,25 @@ class Builder {
     for (const GroupMaterial &m : b.by_group) {
       if (std::find(names.begin(), names.end(), m.group) == names.end()) {
         const std::string near = nearest(m.group, names);
-        fail(DFM_E_ARG, "%s: %s: the mesh has no physical group of cells \"%s\"%s%s", def_.file.c_str(), m.pointer.c_str(), m.group.c_str(),
+        fail(DFM_E_ARG, "%s: %s: the mesh has no physical group of cells \"%s\"%s%s", def_.file.c_str(),
+             m.pointer.c_str(), m.group.c_str(),
              names.empty() ? "; it has none at all" : ("; it has: " + join(names)).c_str(),
              near.empty() ? "" : ("; did you mean \"" + near + "\"?").c_str());
       }
       for (uint32_t g = 0; g < mesh.ngroup; ++g)
         if (cells[g] && m.group == mesh.group_names[g]) of_group[g] = material(m.material);
     }
-    for (uint32_t t = 0; t < mesh.ntet; ++t) out.push_back(mesh.cell_group[t] == UINT32_MAX ? material(b.material) : of_group[mesh.cell_group[t]]);
+    for (uint32_t t = 0; t < mesh.ntet; ++t)
+      out.push_back(mesh.cell_group[t] == UINT32_MAX ? material(b.material) : of_group[mesh.cell_group[t]]);
     return out;
   }
 
   // Named parts of the surface: the skin's, or the file's groups of triangles.
   static dfm_surface_groups groups_of(const BodyMesh &mesh) {
     const uint32_t size = sizeof(dfm_surface_groups);
-    if (mesh.wears_skin) return {size, mesh.skin.ngroup, mesh.skin.group_names, mesh.skin.ntriangle, 0, nullptr, mesh.skin.triangle_group};
+    if (mesh.wears_skin)
+      return {size, mesh.skin.ngroup, mesh.skin.group_names,   mesh.skin.ntriangle,
+              0,    nullptr,          mesh.skin.triangle_group};
     return {size, mesh.nface ? mesh.ngroup : 0, mesh.group_names, mesh.nface, 0, mesh.faces, mesh.face_group};
   }
 
@@ -127,7 +142,9 @@ class Builder {
     const std::vector<dfm_material> materials = materials_by_group(b, mesh);
     mesh.cell_weight = cell_weights(mesh, materials);
     std::vector<NodalRow> nodal;
-    if (!b.nodal_bc.empty()) nodal = with_pointer(b.pointer + "/nodal_bc", [&] { return read_nodal(files_.path_of(b.nodal_bc), mesh); });
+    if (!b.nodal_bc.empty())
+      nodal =
+          with_pointer(b.pointer + "/nodal_bc", [&] { return read_nodal(files_.path_of(b.nodal_bc), mesh); });
     std::vector<std::vector<double>> values;
     std::vector<dfm_cell_field> fields;
     for (const FieldFile &f : b.fields) {
@@ -144,23 +161,28 @@ class Builder {
 
     dfm_body_def d = dfm_body_def_default();
     d.name = b.name.c_str();
-    d.npoint = mesh.npoint, d.ntet = mesh.ntet;
-    d.points = mesh.points.data(), d.tets = mesh.tets;
+    d.npoint = mesh.npoint;
+    d.ntet = mesh.ntet;
+    d.points = mesh.points.data();
+    d.tets = mesh.tets;
     d.material = material(b.material);
     d.model = b.model.c_str();
     d.model_params = b.params.view();
     d.fixed = fixed.data();
-    d.nfield = uint32_t(fields.size()), d.fields = fields.data();
+    d.nfield = uint32_t(fields.size());
+    d.fields = fields.data();
     if (!materials.empty()) d.cell_materials = materials.data();
     d.cell_share = mesh.share;
     const Skin &skin = mesh.skin;
-    const dfm_surface_def surface = {sizeof(dfm_surface_def), b.surface.coupling, skin.npoint,      skin.ntriangle,
-                                     skin.points.data(),      skin.triangles,     b.surface.support};
+    const dfm_surface_def surface = {sizeof(dfm_surface_def), b.surface.coupling, skin.npoint,
+                                     skin.ntriangle,          skin.points.data(), skin.triangles,
+                                     b.surface.support};
     if (mesh.wears_skin) d.surface = &surface;
     const dfm_surface_groups groups = groups_of(mesh);
     if (groups.ngroup) d.groups = &groups;
     if (jittered_) {
-      const double center[3] = {(mesh.lo[0] + mesh.hi[0]) / 2, (mesh.lo[1] + mesh.hi[1]) / 2, (mesh.lo[2] + mesh.hi[2]) / 2};
+      const double center[3] = {(mesh.lo[0] + mesh.hi[0]) / 2, (mesh.lo[1] + mesh.hi[1]) / 2,
+                                (mesh.lo[2] + mesh.hi[2]) / 2};
       jitter_.apply(mesh.size, center, b.pose, b.velocity, b.spin);
     }
     d.pose = b.pose;
@@ -177,19 +199,21 @@ class Builder {
 
   void move_held(dfm_body body, const Fix &f, const std::vector<uint32_t> &points) const {
     if (!f.motion.any()) return;
-    check(dfm_body_move_held(body, uint32_t(points.size()), points.data(), uint32_t(f.motion.keys.size()), f.motion.keys.data(), &f.motion.sine),
+    check(dfm_body_move_held(body, uint32_t(points.size()), points.data(), uint32_t(f.motion.keys.size()),
+                             f.motion.keys.data(), &f.motion.sine),
           f.where.pointer + "/motion");
   }
 
-  void add_loads(dfm_body body, const Body &b, const BodyMesh &mesh, const std::vector<NodalRow> &nodal) const {
+  void add_loads(dfm_body body, const Body &b, const BodyMesh &mesh,
+                 const std::vector<NodalRow> &nodal) const {
     for (const Force &f : b.forces) {
       const Shared shared = share(f, mesh, def_.file);
       std::vector<double> forces;
       for (double w : shared.weights)
         for (double t : f.total) forces.push_back(w * t);
       const bool sine = f.sine.amplitude[0] != 0;
-      check(dfm_body_add_load(body, uint32_t(shared.points.size()), shared.points.data(), forces.data(), uint32_t(f.keys.size()), f.keys.data(),
-                              sine ? &f.sine : nullptr, nullptr),
+      check(dfm_body_add_load(body, uint32_t(shared.points.size()), shared.points.data(), forces.data(),
+                              uint32_t(f.keys.size()), f.keys.data(), sine ? &f.sine : nullptr, nullptr),
             f.where.pointer);
     }
     std::vector<uint32_t> points;
@@ -200,16 +224,21 @@ class Builder {
       forces.insert(forces.end(), row.force, row.force + 3);
     }
     if (points.empty()) return;
-    check(dfm_body_add_load(body, uint32_t(points.size()), points.data(), forces.data(), 0, nullptr, nullptr, nullptr), b.pointer + "/nodal_bc");
+    check(dfm_body_add_load(body, uint32_t(points.size()), points.data(), forces.data(), 0, nullptr, nullptr,
+                            nullptr),
+          b.pointer + "/nodal_bc");
   }
 
   // The cell that holds a point of the body at rest, or the nearest one where the point lies close by.
-  void locate_near(const double point[3], const std::string &pointer, const std::string &name, const BodyMesh &mesh, uint32_t corners[4],
-                   double weights[4]) const {
+  void locate_near(const double point[3], const std::string &pointer, const std::string &name,
+                   const BodyMesh &mesh, uint32_t corners[4], double weights[4]) const {
     const double away = locate(mesh, point, corners, weights);
     if (!(away <= 0.25 * mesh.size))
-      fail(DFM_E_ARG, "%s: %s/point: lies %g m away from \"%s\", which at rest, scaled but before its pose, spans [%g, %g, %g] to [%g, %g, %g]",
-           def_.file.c_str(), pointer.c_str(), away, name.c_str(), mesh.lo[0], mesh.lo[1], mesh.lo[2], mesh.hi[0], mesh.hi[1], mesh.hi[2]);
+      fail(DFM_E_ARG,
+           "%s: %s/point: lies %g m away from \"%s\", which at rest, scaled but before its pose, spans [%g, "
+           "%g, %g] to [%g, %g, %g]",
+           def_.file.c_str(), pointer.c_str(), away, name.c_str(), mesh.lo[0], mesh.lo[1], mesh.lo[2],
+           mesh.hi[0], mesh.hi[1], mesh.hi[2]);
   }
 
   void add_spring(dfm_body body, const Spring &s, const std::string &name, const BodyMesh &mesh) const {
@@ -217,20 +246,28 @@ class Builder {
     std::vector<double> weights(4);
     if (s.at_point) {
       locate_near(s.point, s.pointer, name, mesh, points.data(), weights.data());
-      for (double &w : weights) w = std::max(w, 0.0);   // a point beside the body pulls at the nearest place of the cell
+      // a point beside the body pulls at the nearest place of the cell
+      for (double &w : weights) w = std::max(w, 0.0);
     } else {
       points = select(s.where, mesh, def_.file);
     }
     dfm_spring_def d{};
-    d.size = sizeof d, d.npoint = uint32_t(points.size()), d.points = points.data(), d.weights = s.at_point ? weights.data() : nullptr;
+    d.size = sizeof d;
+    d.npoint = uint32_t(points.size());
+    d.points = points.data();
+    d.weights = s.at_point ? weights.data() : nullptr;
     std::copy_n(s.to, 3, d.to);
-    d.keys = s.keys.data(), d.nkey = uint32_t(s.keys.size()), d.stiffness = s.stiffness, d.damping = s.damping;
+    d.keys = s.keys.data();
+    d.nkey = uint32_t(s.keys.size());
+    d.stiffness = s.stiffness;
+    d.damping = s.damping;
     check(dfm_body_add_spring(body, &d, nullptr), s.pointer);
   }
 
   void add_probe(dfm_body body, const Probe &p, const BodyMesh &mesh) {
     ProbePoint probe;
-    probe.name = p.name, probe.body = body;
+    probe.name = p.name;
+    probe.body = body;
     locate_near(p.point, p.pointer, p.body, mesh, probe.points, probe.weights);
     // Probes are reported in the scene's order, whatever the order of their bodies.
     if (probes_.size() < def_.probes.size()) probes_.resize(def_.probes.size());
@@ -250,31 +287,39 @@ class Builder {
 
   void create_rigid(Rigid &rigid) {
     if (rigid.bodies.empty()) {
-      with_pointer(rigid.pointer + "/host", [&] { return find_host(rigid.host), 0; });   // a host that is not there is an error all the same
+      with_pointer(rigid.pointer + "/host", [&] {
+        find_host(rigid.host);
+        return 0;
+      });  // a host that is not there is an error all the same
       return;
     }
     std::vector<dfm_rigid_def> bodies;
     std::vector<dfm_joint_def> joints;
     for (RigidBody &b : rigid.bodies) {
-      b.def.name = b.name.c_str(), b.def.material = material(b.material);
+      b.def.name = b.name.c_str();
+      b.def.material = material(b.material);
       const uint32_t number = uint32_t(bodies.size());
       bool tied = b.def.fixed != 0;
       for (const RigidBody &other : rigid.bodies)
         for (const Joint &j : other.joints) tied = tied || &other == &b || j.with == b.name;
-      if (jittered_ && !tied) {   // what hangs on joints stands where they say
+      if (jittered_ && !tied) {  // what hangs on joints stands where they say
         const double center[3] = {0, 0, 0}, *const a = b.def.half_size;
-        const double size = b.def.shape == DFM_SHAPE_BOX ? 2 * std::max({a[0], a[1], a[2]}) : 2 * (b.def.radius + b.def.half_length);
+        const double size = b.def.shape == DFM_SHAPE_BOX ? 2 * std::max({a[0], a[1], a[2]})
+                                                         : 2 * (b.def.radius + b.def.half_length);
         jitter_.apply(size, center, b.def.pose, b.def.velocity, b.def.spin);
       }
       bodies.push_back(b.def);
       for (Joint &j : b.joints) {
-        j.def.body = number, j.def.with = DFM_RIGID_WORLD;
+        j.def.body = number;
+        j.def.with = DFM_RIGID_WORLD;
         for (uint32_t k = 0; k < rigid.bodies.size(); ++k)
           if (rigid.bodies[k].name == j.with) j.def.with = k;
         joints.push_back(j.def);
       }
     }
-    const dfm_rigid_set_def set = {sizeof set, uint32_t(bodies.size()), uint32_t(joints.size()), 0, bodies.data(), joints.data(), nullptr};
+    const dfm_rigid_set_def set = {sizeof set, uint32_t(bodies.size()), uint32_t(joints.size()),
+                                   0,          bodies.data(),           joints.data(),
+                                   nullptr};
     std::vector<dfm_rigid> made(bodies.size());
     check(dfm_rigid_create(world_, rigid.host.c_str(), &set, made.data()), rigid.pointer);
   }
@@ -282,7 +327,8 @@ class Builder {
   void add_friction(Friction &f) {
     dfm_friction_def d = {};
     d.size = sizeof d;
-    d.between[0] = f.between[0].c_str(), d.between[1] = f.between[1].c_str();
+    d.between[0] = f.between[0].c_str();
+    d.between[1] = f.between[1].c_str();
     d.law = f.law.c_str();
     d.params = f.params.view();
     check(dfm_world_add_friction(world_, &d), f.pointer);
@@ -300,6 +346,8 @@ class Builder {
 
 }  // namespace
 
-Built build(dfm_context *context, Definition &def, uint64_t jitter_seed) { return Builder(context, def, jitter_seed).run(); }
+Built build(dfm_context *context, Definition &def, uint64_t jitter_seed) {
+  return Builder(context, def, jitter_seed).run();
+}
 
 }  // namespace dfm::scene

@@ -1,4 +1,5 @@
-// What a scene file says, checked and in plain structs; build.cpp turns it into a world through the public API.
+// What a scene file says, checked and in plain structs; build.cpp turns it into a world through
+// the public API.
 #pragma once
 #include <cstdint>
 #include <map>
@@ -25,7 +26,9 @@ struct Selection {
 struct Motion {
   std::vector<dfm_pose_key> keys;
   dfm_sine sine = {};
-  bool any() const { return !keys.empty() || sine.amplitude[0] != 0 || sine.amplitude[1] != 0 || sine.amplitude[2] != 0; }
+  bool any() const {
+    return !keys.empty() || sine.amplitude[0] != 0 || sine.amplitude[1] != 0 || sine.amplitude[2] != 0;
+  }
 };
 
 struct Fix {
@@ -44,7 +47,7 @@ struct Force {
 
 struct Spring {
   std::string pointer;
-  Selection where;       // unless by point
+  Selection where;  // unless by point
   bool at_point = false;
   double point[3] = {}, to[3] = {}, stiffness = 0, damping = 0;
   std::vector<dfm_vector_key> keys;
@@ -68,7 +71,7 @@ struct OwnSurface {
 
 // A mesh that is made and not read, as dfm_tetmesh_make does.
 struct MadeMesh {
-  std::string kind;          // empty: the mesh is a file
+  std::string kind;  // empty: the mesh is a file
   double size[3] = {};
   uint32_t cells = 0;
 };
@@ -137,7 +140,8 @@ struct Definition {
   double gravity[3] = {0, 0, -9.81};
   std::vector<dfm_vector_key> gravity_keys;
   int32_t method = DFM_METHOD_AUTO, integrator = DFM_INTEGRATOR_AUTO;
-  double offset = 0, tolerance = 0, max_time = 0, max_work = 0, recovery_speed = 0, obstacle_speed = 0, energy_watch = dfm_world_def_default().energy_watch;
+  double offset = 0, tolerance = 0, max_time = 0, max_work = 0, recovery_speed = 0, obstacle_speed = 0,
+         energy_watch = dfm_world_def_default().energy_watch;
   uint32_t self = DFM_SELF_OFF;
   bool sleep = false, guard = true, untangle = false;
   bool effects_auto = true;
@@ -164,6 +168,7 @@ class Types {
   std::vector<std::string> names(uint32_t kind) const;                 // short names
   std::vector<std::string> model_keys() const;                         // parameters of any model
   std::vector<const dfm_type *> models() const;
+
  private:
   std::vector<const dfm_type *> types_;
 };

@@ -1,5 +1,5 @@
-// A parameter of the model for each cell, from a table: one row per tetrahedron of the mesh file, in the file's order, or with a column `cell`
-// of its number from 0 in any order.
+// A parameter of the model for each cell, from a table: one row per tetrahedron of the mesh file, in the
+// file's order, or with a column `cell` of its number from 0 in any order.
 #include <algorithm>
 #include <cmath>
 
@@ -44,7 +44,8 @@ std::vector<double> read_field(const std::string &path, const FieldFile &field, 
   if (table.next(text)) header = tidy(text);
   if (field.width == 1 && header == field.key) header = plain;
   if (field.width == 1 && header == "cell," + field.key) header = numbered;
-  if (header != plain && header != numbered) fail(DFM_E_FORMAT, "%s:1: expected the header %s", path.c_str(), expected.c_str());
+  if (header != plain && header != numbered)
+    fail(DFM_E_FORMAT, "%s:1: expected the header %s", path.c_str(), expected.c_str());
   const bool has_cell = header == numbered;
   const int columns = int(field.width) + has_cell;
 
@@ -58,12 +59,16 @@ std::vector<double> read_field(const std::string &path, const FieldFile &field, 
     if (trimmed.empty()) continue;
     split_row(path, line, trimmed, header.c_str(), columns, row.data());
     const double number = has_cell ? row[0] : double(next);
-    if (!has_cell && next == nfile) fail(DFM_E_FORMAT, "%s:%zu: more rows than the %u tetrahedra of the mesh file", path.c_str(), line, nfile);
+    if (!has_cell && next == nfile)
+      fail(DFM_E_FORMAT, "%s:%zu: more rows than the %u tetrahedra of the mesh file", path.c_str(), line,
+           nfile);
     if (number < 0 || number != std::floor(number) || number >= nfile)
-      fail(DFM_E_ARG, "%s:%zu: there is no cell %g; the mesh file has the tetrahedra 0 to %u", path.c_str(), line, number, nfile - 1);
+      fail(DFM_E_ARG, "%s:%zu: there is no cell %g; the mesh file has the tetrahedra 0 to %u", path.c_str(),
+           line, number, nfile - 1);
     const uint32_t cell = uint32_t(number);
     if (seen[cell]) fail(DFM_E_ARG, "%s:%zu: cell %u has a row already", path.c_str(), line, cell);
-    seen[cell] = 1, ++next;
+    seen[cell] = 1;
+    ++next;
     if (cell_of[cell] == UINT32_MAX) continue;  // a double that reading dropped
     double *const to = &out[size_t(cell_of[cell]) * w];
     std::copy_n(&row[has_cell], w, to);
@@ -71,7 +76,9 @@ std::vector<double> read_field(const std::string &path, const FieldFile &field, 
   }
   for (uint32_t c = 0; c < nfile; ++c)
     if (!seen[c] && cell_of[c] != UINT32_MAX)
-      fail(DFM_E_FORMAT, "%s: cell %u has no row; expected one for each of the %u tetrahedra of the mesh file, found %u", path.c_str(), c, nfile, next);
+      fail(DFM_E_FORMAT,
+           "%s: cell %u has no row; expected one for each of the %u tetrahedra of the mesh file, found %u",
+           path.c_str(), c, nfile, next);
   return out;
 }
 

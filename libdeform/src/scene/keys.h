@@ -1,4 +1,5 @@
-// The one table of names that a scene file may hold: reader, error messages and the shipped schema are checked against it.
+// The one table of names that a scene file may hold: reader, error messages and the shipped schema are
+// checked against it.
 #pragma once
 #include <string>
 #include <vector>

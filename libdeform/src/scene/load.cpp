@@ -24,7 +24,9 @@ void MeshFiles::refuse(const std::string &pointer, const std::string &sentence) 
 
 std::string MeshFiles::path_of(const std::string &path) const {
   const std::filesystem::path p(path);
-  return p.is_absolute() || def_.folder.empty() ? path : (std::filesystem::path(def_.folder) / p).lexically_normal().string();
+  return p.is_absolute() || def_.folder.empty()
+             ? path
+             : (std::filesystem::path(def_.folder) / p).lexically_normal().string();
 }
 
 bool MeshFiles::has_cells(const std::string &path, const std::string &pointer) {
@@ -33,16 +35,21 @@ bool MeshFiles::has_cells(const std::string &path, const std::string &pointer) {
   dfm_tetmesh cells = 0;
   dfm_trimesh surface = 0;
   check(dfm_mesh_read(context_, path.c_str(), &cells, &surface), pointer);
-  if (cells) return cells_[path] = cells, true;
+  if (cells) {
+    cells_[path] = cells;
+    return true;
+  }
   surface_only_.insert(path);
-  if (!surfaces_.try_emplace(path, surface).second) check(dfm_trimesh_destroy(surface), pointer);   // known as somebody's skin already
+  // known as somebody's skin already
+  if (!surfaces_.try_emplace(path, surface).second) check(dfm_trimesh_destroy(surface), pointer);
   return false;
 }
 
 // Under a name that no file can have.
 std::string MeshFiles::make(const Body &b) {
   const MadeMesh &m = b.made;
-  const std::string name = format("/dev/null/%s %a %a %a %u", m.kind.c_str(), m.size[0], m.size[1], m.size[2], m.cells);
+  const std::string name =
+      format("/dev/null/%s %a %a %a %u", m.kind.c_str(), m.size[0], m.size[1], m.size[2], m.cells);
   dfm_tetmesh &mesh = cells_[name];
   if (!mesh) check(dfm_tetmesh_make(context_, m.kind.c_str(), m.size, m.cells, &mesh), b.pointer + "/mesh");
   return name;
@@ -63,13 +70,17 @@ dfm_trimesh MeshFiles::surface(const std::string &path, const std::string &point
 dfm_tetmesh MeshFiles::filling(const std::string &path, const Body &b) {
   const uint32_t wanted = b.fill ? b.fill : kFillCells;
   dfm_tetmesh &mesh = fillings_[{path, wanted}];
-  if (!mesh) check(dfm_tetmesh_fill(surface(path, b.pointer + "/mesh"), wanted, &mesh), b.pointer + (b.fill ? "/fill" : "/mesh"));
+  if (!mesh)
+    check(dfm_tetmesh_fill(surface(path, b.pointer + "/mesh"), wanted, &mesh),
+          b.pointer + (b.fill ? "/fill" : "/mesh"));
   if (!b.fill) {
     dfm_tetmesh_info info = {};
     info.size = sizeof info;
     check(dfm_tetmesh_get_info(mesh, &info), b.pointer + "/mesh");
-    context_->logf(DFM_LOG_WARNING, "body '%s': %s holds a surface and no cells; it is filled with %u tetrahedra; \"fill\": {\"cells\": N} chooses", b.name.c_str(),
-                   path.c_str(), info.ntet);
+    context_->logf(DFM_LOG_WARNING,
+                   "body '%s': %s holds a surface and no cells; it is filled with %u tetrahedra; \"fill\": "
+                   "{\"cells\": N} chooses",
+                   b.name.c_str(), path.c_str(), info.ntet);
   }
   return mesh;
 }
@@ -77,14 +88,24 @@ dfm_tetmesh MeshFiles::filling(const std::string &path, const Body &b) {
 // Keys that go with one kind of mesh file only.
 void MeshFiles::check_keys(const Body &b, bool filled) const {
   if (filled) {
-    if (!b.nodal_bc.empty()) refuse(b.pointer + "/nodal_bc", "the mesh is a surface, whose nodes are none of the filled body's points; use \"fix\" and \"forces\"");
-    if (!b.fields.empty()) refuse(b.fields[0].pointer, "the mesh is a surface, so its file has no cells to give values for; fill it first with deform mesh fill and use the result as mesh");
-    if (!b.by_group.empty()) refuse(b.by_group[0].pointer, "the mesh is a surface, and the cells that fill it belong to no group");
+    if (!b.nodal_bc.empty())
+      refuse(b.pointer + "/nodal_bc",
+             "the mesh is a surface, whose nodes are none of the filled body's points; use \"fix\" and "
+             "\"forces\"");
+    if (!b.fields.empty())
+      refuse(b.fields[0].pointer,
+             "the mesh is a surface, so its file has no cells to give values for; fill it first with deform "
+             "mesh fill and use the result as mesh");
+    if (!b.by_group.empty())
+      refuse(b.by_group[0].pointer, "the mesh is a surface, and the cells that fill it belong to no group");
     return;
   }
-  if (b.fill) refuse(b.pointer + "/fill", "the mesh holds tetrahedra already; \"fill\" is for a closed surface");
+  if (b.fill)
+    refuse(b.pointer + "/fill", "the mesh holds tetrahedra already; \"fill\" is for a closed surface");
   if (b.surface.coupled && b.surface.mesh.empty())
-    refuse(b.surface.pointer + "/coupling", "the surface is the boundary of the cells, whose points are the body's own; a coupling needs \"mesh\"");
+    refuse(b.surface.pointer + "/coupling",
+           "the surface is the boundary of the cells, whose points are the body's own; a coupling needs "
+           "\"mesh\"");
 }
 
 void MeshFiles::take_cells(dfm_tetmesh mesh, const Body &b, BodyMesh &out) const {
@@ -98,11 +119,19 @@ void MeshFiles::take_cells(dfm_tetmesh mesh, const Body &b, BodyMesh &out) const
   check(dfm_tetmesh_triangles(mesh, &out.faces, &out.face_group, &out.nface), pointer);
   check(dfm_tetmesh_file_cells(mesh, &out.file_cell), pointer);
   check(dfm_tetmesh_share(mesh, &out.share), pointer);
-  out.handle = mesh, out.npoint = info.npoint, out.ntet = info.ntet, out.ngroup = info.ngroup, out.dropped_cells = info.dropped_cells;
+  out.handle = mesh;
+  out.npoint = info.npoint;
+  out.ntet = info.ntet;
+  out.ngroup = info.ngroup;
+  out.dropped_cells = info.dropped_cells;
   out.points.resize(3 * size_t(info.npoint));
   for (size_t i = 0; i < out.points.size(); ++i) out.points[i] = points[i] * b.scale;
-  for (int k = 0; k < 3; ++k) out.lo[k] = info.lo[k] * b.scale, out.hi[k] = info.hi[k] * b.scale;
-  out.size = std::sqrt(std::pow(out.hi[0] - out.lo[0], 2) + std::pow(out.hi[1] - out.lo[1], 2) + std::pow(out.hi[2] - out.lo[2], 2));
+  for (int k = 0; k < 3; ++k) {
+    out.lo[k] = info.lo[k] * b.scale;
+    out.hi[k] = info.hi[k] * b.scale;
+  }
+  out.size = std::sqrt(std::pow(out.hi[0] - out.lo[0], 2) + std::pow(out.hi[1] - out.lo[1], 2) +
+                       std::pow(out.hi[2] - out.lo[2], 2));
 }
 
 void MeshFiles::take_skin(dfm_trimesh mesh, const Body &b, const std::string &pointer, BodyMesh &out) const {
@@ -113,7 +142,9 @@ void MeshFiles::take_skin(dfm_trimesh mesh, const Body &b, const std::string &po
   check(dfm_trimesh_get_info(mesh, &info), pointer);
   check(dfm_trimesh_data(mesh, &points, &skin.triangles, nullptr), pointer);
   check(dfm_trimesh_groups(mesh, &skin.group_names, &skin.triangle_group), pointer);
-  skin.npoint = info.npoint, skin.ntriangle = info.ntriangle, skin.ngroup = info.ngroup;
+  skin.npoint = info.npoint;
+  skin.ntriangle = info.ntriangle;
+  skin.ngroup = info.ngroup;
   skin.points.resize(3 * size_t(info.npoint));
   for (size_t i = 0; i < skin.points.size(); ++i) skin.points[i] = points[i] * b.scale;
 }
@@ -141,7 +172,8 @@ void MeshFiles::load(Obstacle &o, std::vector<double> &points) {
   info.size = sizeof info;
   check(dfm_trimesh_get_info(mesh, &info), pointer);
   check(dfm_trimesh_data(mesh, &o.def.points, &o.def.triangles, nullptr), pointer);
-  o.def.npoint = info.npoint, o.def.ntriangle = info.ntriangle;
+  o.def.npoint = info.npoint;
+  o.def.ntriangle = info.ntriangle;
   if (o.scale == 1) return;
   points.assign(o.def.points, o.def.points + 3 * size_t(info.npoint));
   for (double &x : points) x *= o.scale;

@@ -21,14 +21,17 @@ class MeshFiles {
   std::string path_of(const std::string &path) const;  // relative to the scene file
   // Cells, skin and groups of a body, scaled. Borrows from this object.
   BodyMesh load(const Body &body);
-  // Triangles of an obstacle of shape mesh or voxels into its def. `points` takes those that are scaled; the rest is borrowed from this object.
+  // Triangles of an obstacle of shape mesh or voxels into its def. `points` takes those that are scaled; the
+  // rest is borrowed from this object.
   void load(Obstacle &obstacle, std::vector<double> &points);
 
  private:
   void check(dfm_status status, const std::string &pointer) const;
   [[noreturn]] void refuse(const std::string &pointer, const std::string &sentence) const;
-  bool has_cells(const std::string &path, const std::string &pointer);   // reads the file; else it has a surface alone
-  std::string make(const Body &body);                                    // gives the name under which `cells` knows it
+  // reads the file; else it has a surface alone
+  bool has_cells(const std::string &path, const std::string &pointer);
+  // gives the name under which `cells` knows it
+  std::string make(const Body &body);
   dfm_tetmesh cells(const std::string &path, const std::string &pointer);
   dfm_trimesh surface(const std::string &path, const std::string &pointer);
   dfm_tetmesh filling(const std::string &path, const Body &body);

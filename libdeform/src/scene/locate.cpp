@@ -14,7 +14,8 @@ double volume6(const double *const p[4]) {
   return dot(load3(p[1]) - a, cross(load3(p[2]) - a, load3(p[3]) - a));
 }
 
-// Distance of a point from a segment, and from a triangle: inside its prism the height, else the nearest of its edges.
+// Distance of a point from a segment, and from a triangle: inside its prism the height, else the
+// nearest of its edges.
 double segment_distance(Vec3 p, Vec3 a, Vec3 b) {
   const Vec3 u = b - a, v = p - a;
   const double t = std::clamp(dot(u, v) / dot(u, u), 0.0, 1.0);
@@ -26,7 +27,8 @@ double triangle_distance(const double *point, const double *const corner[3]) {
   const Vec3 u = c[1] - c[0], v = c[2] - c[0], w = p - c[0], n = cross(u, v);
   const double s = dot(w, cross(v, n)), t = dot(u, cross(w, n)), whole = dot(n, n);
   if (s >= 0 && t >= 0 && s + t <= whole) return std::fabs(dot(w, n)) / std::sqrt(whole);
-  return std::min({segment_distance(p, c[0], c[1]), segment_distance(p, c[1], c[2]), segment_distance(p, c[2], c[0])});
+  return std::min(
+      {segment_distance(p, c[0], c[1]), segment_distance(p, c[1], c[2]), segment_distance(p, c[2], c[0])});
 }
 
 // Barycentric coordinates of the point in the cell, and its distance from it.
@@ -53,8 +55,12 @@ double from_cell(const double *const corner[4], const double *point, double weig
 Locator::Locator(const BodyMesh &mesh) : mesh_(mesh) {
   double hi[3];
   for (int k = 0; k < 3; ++k) {
-    lo_[k] = INFINITY, hi[k] = -INFINITY;
-    for (uint32_t i = 0; i < mesh.npoint; ++i) lo_[k] = std::min(lo_[k], mesh.points[3 * i + k]), hi[k] = std::max(hi[k], mesh.points[3 * i + k]);
+    lo_[k] = INFINITY;
+    hi[k] = -INFINITY;
+    for (uint32_t i = 0; i < mesh.npoint; ++i) {
+      lo_[k] = std::min(lo_[k], mesh.points[3 * i + k]);
+      hi[k] = std::max(hi[k], mesh.points[3 * i + k]);
+    }
   }
   // About one bin a cell, as cubes; a bin is never thinner than a body's thinnest extent asks for.
   const double extent = std::max({hi[0] - lo_[0], hi[1] - lo_[1], hi[2] - lo_[2]});
@@ -77,9 +83,11 @@ Locator::Locator(const BodyMesh &mesh) : mesh_(mesh) {
         double least = INFINITY, most = -INFINITY;
         for (int j = 0; j < 4; ++j) {
           const double x = mesh.points[3 * size_t(mesh.tets[4 * size_t(c) + size_t(j)]) + size_t(k)];
-          least = std::min(least, x), most = std::max(most, x);
+          least = std::min(least, x);
+          most = std::max(most, x);
         }
-        first[k] = bin(least, k), last[k] = bin(most, k);
+        first[k] = bin(least, k);
+        last[k] = bin(most, k);
       }
       for (int i = first[0]; i <= last[0]; ++i)
         for (int j = first[1]; j <= last[1]; ++j)
@@ -104,8 +112,8 @@ void Locator::look(int i, int j, int k, const double *point, Best &best) const {
   for (uint32_t n = begin_[b]; n < begin_[b + 1]; ++n) {
     const uint32_t c = cell_[n], *const t = mesh_.tets + 4 * size_t(c);
     if (best.away == 0 && c >= best.cell) return;
-    const double *const corner[4] = {&mesh_.points[3 * size_t(t[0])], &mesh_.points[3 * size_t(t[1])], &mesh_.points[3 * size_t(t[2])],
-                                     &mesh_.points[3 * size_t(t[3])]};
+    const double *const corner[4] = {&mesh_.points[3 * size_t(t[0])], &mesh_.points[3 * size_t(t[1])],
+                                     &mesh_.points[3 * size_t(t[2])], &mesh_.points[3 * size_t(t[3])]};
     Best here = {0, c, {}};
     here.away = from_cell(corner, point, here.weights);
     if (here.away < best.away || (here.away == best.away && c < best.cell)) best = here;
@@ -116,14 +124,19 @@ double Locator::find(const double point[3], uint32_t corners[4], double weights[
   Best best = {INFINITY, UINT32_MAX, {}};
   const int at[3] = {bin(point[0], 0), bin(point[1], 1), bin(point[2], 2)};
   const int rings = std::max({n_[0], n_[1], n_[2]});
-  // Bins of ring r lie at least r - 1 bins away; a point outside the grid is nearer to none of them than its projection.
+  // Bins of ring r lie at least r - 1 bins away; a point outside the grid is nearer to none of them than
+  // its projection.
   for (int r = 0; r < rings && !(best.away < (r - 1) * least_width_) && !(r > 0 && best.away == 0); ++r) {
     int first[3], last[3];
-    for (int k = 0; k < 3; ++k) first[k] = std::max(at[k] - r, 0), last[k] = std::min(at[k] + r, n_[k] - 1);
+    for (int k = 0; k < 3; ++k) {
+      first[k] = std::max(at[k] - r, 0);
+      last[k] = std::min(at[k] + r, n_[k] - 1);
+    }
     for (int i = first[0]; i <= last[0]; ++i)
       for (int j = first[1]; j <= last[1]; ++j)
         for (int k = first[2]; k <= last[2]; ++k)
-          if (std::max({std::abs(i - at[0]), std::abs(j - at[1]), std::abs(k - at[2])}) == r) look(i, j, k, point, best);
+          if (std::max({std::abs(i - at[0]), std::abs(j - at[1]), std::abs(k - at[2])}) == r)
+            look(i, j, k, point, best);
   }
   if (best.cell == UINT32_MAX) return best.away;
   std::copy_n(mesh_.tets + 4 * size_t(best.cell), 4, corners);

@@ -31,20 +31,26 @@ std::vector<NodalRow> read_nodal(const std::string &path, const BodyMesh &mesh) 
     double cell[7];
     split_row(path, line, trimmed, kHeader, 7, cell);
     if (cell[0] < 0 || cell[0] != std::floor(cell[0]) || cell[0] > highest)
-      fail(DFM_E_ARG, "%s:%zu: there is no node %g; the mesh file has the nodes 0 to %u", path.c_str(), line, cell[0], highest);
+      fail(DFM_E_ARG, "%s:%zu: there is no node %g; the mesh file has the nodes 0 to %u", path.c_str(), line,
+           cell[0], highest);
     NodalRow row = {point_of[size_t(cell[0])], 0, {cell[4], cell[5], cell[6]}};
     for (int k = 0; k < 3; ++k) {
-      if (cell[1 + k] != 0 && cell[1 + k] != 1) fail(DFM_E_ARG, "%s:%zu: fix%c is 0 or 1, found %g", path.c_str(), line, "xyz"[k], cell[1 + k]);
+      if (cell[1 + k] != 0 && cell[1 + k] != 1)
+        fail(DFM_E_ARG, "%s:%zu: fix%c is 0 or 1, found %g", path.c_str(), line, "xyz"[k], cell[1 + k]);
       if (cell[1 + k] == 1) row.axes = uint8_t(row.axes | (1u << k));
     }
     if (row.point == UINT32_MAX) {
       // A node that no cell uses has no phyxel: holding it means nothing, a force on it would be lost.
-      if (cell[4] != 0 || cell[5] != 0 || cell[6] != 0) fail(DFM_E_ARG, "%s:%zu: node %g belongs to no tetrahedron, so no force can act on it", path.c_str(), line, cell[0]);
+      if (cell[4] != 0 || cell[5] != 0 || cell[6] != 0)
+        fail(DFM_E_ARG, "%s:%zu: node %g belongs to no tetrahedron, so no force can act on it", path.c_str(),
+             line, cell[0]);
       continue;
     }
     rows.push_back(row);
   }
-  if (line == 1) fail(DFM_E_FORMAT, "%s: nothing to read; expected the header %s and a row for each node", path.c_str(), kHeader);
+  if (line == 1)
+    fail(DFM_E_FORMAT, "%s: nothing to read; expected the header %s and a row for each node", path.c_str(),
+         kHeader);
   return rows;
 }
 

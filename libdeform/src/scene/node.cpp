@@ -19,7 +19,8 @@ std::string excerpt(const json &value) {
 std::string span(const Range &r) {
   if (r.lo <= -1e300 && r.hi >= 1e300) return "a finite number";
   if (r.hi >= 1e300) return format("a number %s %g", r.open_lo ? "above" : "of at least", r.lo);
-  return format("a number from %.9g%s to %.9g%s", r.lo, r.open_lo ? " (excluded)" : "", r.hi, r.open_hi ? " (excluded)" : "");
+  return format("a number from %.9g%s to %.9g%s", r.lo, r.open_lo ? " (excluded)" : "", r.hi,
+                r.open_hi ? " (excluded)" : "");
 }
 
 std::vector<std::string> delivered(const std::vector<Key> &keys) {
@@ -50,9 +51,13 @@ void Node::fail(const char *text, ...) const {
   dfm::fail(DFM_E_ARG, "%s: %s: %s", file_->c_str(), pointer_.empty() ? "/" : pointer_.c_str(), buffer);
 }
 
-void Node::not_yet() const { dfm::fail(DFM_E_UNSUPPORTED, "%s: not available yet: %s", file_->c_str(), pointer_.c_str()); }
+void Node::not_yet() const {
+  dfm::fail(DFM_E_UNSUPPORTED, "%s: not available yet: %s", file_->c_str(), pointer_.c_str());
+}
 
-std::string Node::kind_found() const { return value_->is_null() ? "null" : std::string(value_->type_name()) + " " + excerpt(*value_); }
+std::string Node::kind_found() const {
+  return value_->is_null() ? "null" : std::string(value_->type_name()) + " " + excerpt(*value_);
+}
 
 void Node::object(const std::string &kind, const std::vector<std::string> &further) const {
   if (!value_->is_object()) fail("expected an object, found %s", kind_found().c_str());
@@ -75,7 +80,9 @@ void Node::object(const std::string &kind, const std::vector<std::string> &furth
   }
 }
 
-Node Node::member(const std::string &key) const { return Node(&(*value_)[key], pointer_ + "/" + escape_pointer(key), file_); }
+Node Node::member(const std::string &key) const {
+  return Node(&(*value_)[key], pointer_ + "/" + escape_pointer(key), file_);
+}
 
 Node Node::at(const std::string &key) const {
   if (!has(key.c_str())) fail("the key \"%s\" is missing here", key.c_str());
@@ -85,7 +92,8 @@ Node Node::at(const std::string &key) const {
 std::vector<Node> Node::items() const {
   if (!value_->is_array()) fail("expected an array, found %s", kind_found().c_str());
   std::vector<Node> out;
-  for (size_t i = 0; i < value_->size(); ++i) out.emplace_back(&(*value_)[i], pointer_ + "/" + std::to_string(i), file_);
+  for (size_t i = 0; i < value_->size(); ++i)
+    out.emplace_back(&(*value_)[i], pointer_ + "/" + std::to_string(i), file_);
   return out;
 }
 
@@ -97,8 +105,10 @@ std::vector<Node> Node::items(const char *key) const {
 double Node::number(const Range &range) const {
   if (!value_->is_number()) fail("expected %s, found %s", span(range).c_str(), kind_found().c_str());
   const double x = value_->get<double>();
-  const bool low = range.open_lo ? x <= range.lo : x < range.lo, high = range.open_hi ? x >= range.hi : x > range.hi;
-  if (!std::isfinite(x) || low || high) fail("expected %s, found %s", span(range).c_str(), excerpt(*value_).c_str());
+  const bool low = range.open_lo ? x <= range.lo : x < range.lo;
+  const bool high = range.open_hi ? x >= range.hi : x > range.hi;
+  if (!std::isfinite(x) || low || high)
+    fail("expected %s, found %s", span(range).c_str(), excerpt(*value_).c_str());
   return x;
 }
 
@@ -146,7 +156,8 @@ std::string Node::word(const char *key, const char *otherwise, const std::string
 }
 
 void Node::vector(double out[3]) const {
-  if (!value_->is_array() || value_->size() != 3) fail("expected three numbers [x, y, z], found %s", kind_found().c_str());
+  if (!value_->is_array() || value_->size() != 3)
+    fail("expected three numbers [x, y, z], found %s", kind_found().c_str());
   const std::vector<Node> parts = items();
   for (int i = 0; i < 3; ++i) out[i] = parts[i].number();
 }
@@ -161,12 +172,15 @@ std::string Node::name() const {
   if (s.size() > 100) fail("a name has at most 100 bytes, found %zu", s.size());
   if (s[0] == '.') fail("a name does not begin with a dot, found \"%s\"", s.c_str());
   for (size_t i = 0; i + 1 < s.size(); ++i)
-    if (s[i] == '\xc2' && static_cast<unsigned char>(s[i + 1]) >= 0x80 && static_cast<unsigned char>(s[i + 1]) < 0xa0)
+    if (s[i] == '\xc2' && static_cast<unsigned char>(s[i + 1]) >= 0x80 &&
+        static_cast<unsigned char>(s[i + 1]) < 0xa0)
       fail("a name holds no control characters, found %s", excerpt(*value_).c_str());
   for (unsigned char c : s)
     if (c < 0x20 || c == 0x7f || std::string("/\\,:*=\"").find(char(c)) != std::string::npos)
-      fail("a name holds no control characters and none of / \\ , : * = \", since it stands in file names, tables and \"between\"; found %s",
-           excerpt(*value_).c_str());
+      fail(
+          "a name holds no control characters and none of / \\ , : * = \", since it stands in file names, "
+          "tables and \"between\"; found %s",
+          excerpt(*value_).c_str());
   return s;
 }
 

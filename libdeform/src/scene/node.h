@@ -1,5 +1,6 @@
-// A place in the scene's JSON tree that knows its pointer (RFC 6901), so that every complaint names file, place and what was expected.
-// Optional values are written back with their defaults: the tree then reads as the scene that really runs.
+// A place in the scene's JSON tree that knows its pointer (RFC 6901), so that every complaint names file,
+// place and what was expected. Optional values are written back with their defaults: the tree then reads as
+// the scene that really runs.
 #pragma once
 #include <cstdint>
 #include <nlohmann/json.hpp>
@@ -22,7 +23,8 @@ inline constexpr Range kNotNegative{0, 1e300, false, false};
 
 class Node {
  public:
-  Node(json *value, std::string pointer, const std::string *file) : value_(value), pointer_(std::move(pointer)), file_(file) {}
+  Node(json *value, std::string pointer, const std::string *file)
+      : value_(value), pointer_(std::move(pointer)), file_(file) {}
 
   const std::string &pointer() const { return pointer_; }
   const std::string &file() const { return *file_; }
@@ -31,12 +33,13 @@ class Node {
   [[noreturn]] void fail(const char *format, ...) const __attribute__((format(printf, 2, 3)));
   [[noreturn]] void not_yet() const;  // "not available yet: POINTER"
 
-  // Checks that this is an object whose keys are those of `kind`; unknown ones and those not delivered are refused.
+  // Checks that this is an object whose keys are those of `kind`; unknown ones and those not
+  // delivered are refused.
   void object(const std::string &kind, const std::vector<std::string> &further = {}) const;
   bool has(const char *key) const { return value_->is_object() && value_->contains(key); }
-  Node at(const std::string &key) const;        // an error if absent: the key is required
-  Node member(const std::string &key) const;    // must exist
-  std::vector<Node> items() const;              // an error if this is no array
+  Node at(const std::string &key) const;           // an error if absent: the key is required
+  Node member(const std::string &key) const;       // must exist
+  std::vector<Node> items() const;                 // an error if this is no array
   std::vector<Node> items(const char *key) const;  // empty where the key is absent
 
   double number(const Range &range = kAny) const;
@@ -63,7 +66,8 @@ std::string escape_pointer(const std::string &key);
 // Reads a file into a tree: size, nesting and repeated keys are checked first, with line and column.
 json parse_file(const std::string &path);
 json parse_text(const std::string &text, const std::string &file);
-// "/json/pointer=value"; the value is JSON, or else a bare string. Creates the last step of the pointer where it is absent.
+// "/json/pointer=value"; the value is JSON, or else a bare string. Creates the last step of the pointer
+// where it is absent.
 void apply_set(json &tree, const std::string &assignment, const std::string &file);
 
 }  // namespace dfm::scene

@@ -1,5 +1,6 @@
-// Text to tree. A scan of our own runs before the JSON parser: it bounds nesting (so that neither the parser nor the tree's later
-// use can exhaust the stack) and finds keys given twice, which the parser would silently drop.
+// Text to tree. A scan of our own runs before the JSON parser: it bounds nesting (so that neither the parser
+// nor the tree's later use can exhaust the stack) and finds keys given twice, which the parser would
+// silently drop.
 #include <cctype>
 #include <cstring>
 #include <set>
@@ -18,8 +19,12 @@ struct Place { size_t line = 1, column = 1; };
 Place place_of(const std::string &text, size_t byte) {
   Place p;
   for (size_t i = 0; i < byte && i < text.size(); ++i) {
-    if (text[i] == '\n') ++p.line, p.column = 1;
-    else ++p.column;
+    if (text[i] == '\n') {
+      ++p.line;
+      p.column = 1;
+    } else {
+      ++p.column;
+    }
   }
   return p;
 }
@@ -34,7 +39,8 @@ size_t string_end(const std::string &text, size_t i) {
 void scan(const std::string &text, const std::string &file) {
   if (const size_t nul = text.find('\0'); nul != std::string::npos) {
     const Place p = place_of(text, nul);
-    fail(DFM_E_FORMAT, "%s:%zu:%zu: not JSON: a NUL character; whatever follows would be passed over", file.c_str(), p.line, p.column);
+    fail(DFM_E_FORMAT, "%s:%zu:%zu: not JSON: a NUL character; whatever follows would be passed over",
+         file.c_str(), p.line, p.column);
   }
   std::vector<std::set<std::string>> keys;  // of each open object; arrays hold none
   for (size_t i = 0; i < text.size(); ++i) {
@@ -42,7 +48,8 @@ void scan(const std::string &text, const std::string &file) {
     if (c == '{' || c == '[') {
       if (keys.size() == kMaxDepth) {
         const Place p = place_of(text, i);
-        fail(DFM_E_FORMAT, "%s:%zu:%zu: brackets nested deeper than %zu levels", file.c_str(), p.line, p.column, kMaxDepth);
+        fail(DFM_E_FORMAT, "%s:%zu:%zu: brackets nested deeper than %zu levels", file.c_str(), p.line,
+             p.column, kMaxDepth);
       }
       keys.emplace_back();
     } else if (c == '}' || c == ']') {
@@ -53,12 +60,13 @@ void scan(const std::string &text, const std::string &file) {
       while (next < text.size() && std::strchr(" \t\r\n", text[next])) ++next;
       if (next < text.size() && text[next] == ':' && !keys.empty()) {
         std::string key = text.substr(i + 1, end - i - 1);
-        if (key.find('\\') != std::string::npos)   // "\u0061" is "a" as well
-          if (const json plain = json::parse(text.substr(i, end - i + 1), nullptr, false); plain.is_string()) key = plain.get<std::string>();
+        if (key.find('\\') != std::string::npos)  // "\u0061" is "a" as well
+          if (const json plain = json::parse(text.substr(i, end - i + 1), nullptr, false); plain.is_string())
+            key = plain.get<std::string>();
         if (!keys.back().insert(key).second) {
           const Place p = place_of(text, i);
-          fail(DFM_E_FORMAT, "%s:%zu:%zu: the key \"%.60s\" is given twice in one object; keep one", file.c_str(), p.line, p.column,
-               key.c_str());
+          fail(DFM_E_FORMAT, "%s:%zu:%zu: the key \"%.60s\" is given twice in one object; keep one",
+               file.c_str(), p.line, p.column, key.c_str());
         }
       }
       i = end;
@@ -80,7 +88,8 @@ std::string reason(const char *what) {
 // Whether the word at which the parser stopped is one of the ways to write what is not finite.
 bool is_not_finite(const std::string &text, size_t byte) {
   size_t begin = std::min(byte, text.size());
-  while (begin > 0 && (std::isalpha(static_cast<unsigned char>(text[begin - 1])) || text[begin - 1] == '-')) --begin;
+  while (begin > 0 && (std::isalpha(static_cast<unsigned char>(text[begin - 1])) || text[begin - 1] == '-'))
+    --begin;
   std::string word;
   for (size_t i = begin; i < text.size() && word.size() < 4; ++i)
     if (text[i] != '-') word += char(std::tolower(static_cast<unsigned char>(text[i])));
@@ -90,7 +99,8 @@ bool is_not_finite(const std::string &text, size_t byte) {
 }  // namespace
 
 json parse_text(const std::string &text, const std::string &file) {
-  if (text.find_first_not_of(" \t\r\n") == std::string::npos) fail(DFM_E_FORMAT, "%s:1:1: the file is empty; expected a JSON object", file.c_str());
+  if (text.find_first_not_of(" \t\r\n") == std::string::npos)
+    fail(DFM_E_FORMAT, "%s:1:1: the file is empty; expected a JSON object", file.c_str());
   scan(text, file);
   try {
     return json::parse(text);
@@ -116,7 +126,8 @@ std::vector<std::string> steps_of(const std::string &pointer) {
     const size_t end = std::min(pointer.find('/', i + 1), pointer.size());
     std::string step;
     for (size_t k = i + 1; k < end; ++k) {
-      if (pointer[k] == '~' && k + 1 < end && (pointer[k + 1] == '0' || pointer[k + 1] == '1')) step += pointer[++k] == '0' ? '~' : '/';
+      if (pointer[k] == '~' && k + 1 < end && (pointer[k + 1] == '0' || pointer[k + 1] == '1'))
+        step += pointer[++k] == '0' ? '~' : '/';
       else step += pointer[k];
     }
     steps.push_back(step);
@@ -134,12 +145,14 @@ bool is_index(const std::string &step) {
 void apply_set(json &tree, const std::string &assignment, const std::string &file) {
   const size_t equals = assignment.find('=');
   if (assignment.empty() || assignment[0] != '/' || equals == std::string::npos)
-    fail(DFM_E_ARG, "--set %s: expected /json/pointer=value, e.g. --set /time/duration=2", assignment.c_str());
+    fail(DFM_E_ARG, "--set %s: expected /json/pointer=value, e.g. --set /time/duration=2",
+         assignment.c_str());
   const std::string pointer = assignment.substr(0, equals), text = assignment.substr(equals + 1);
   scan(text, "--set " + pointer);
   json value = json::parse(text, nullptr, false);
   if (value.is_discarded()) value = text;  // a bare string
-  // Objects on the way are created, so that "/output/every=0.1" works on a scene without "output"; what it then holds is checked as ever.
+  // Objects on the way are created, so that "/output/every=0.1" works on a scene without "output"; what it
+  // then holds is checked as ever.
   json *here = &tree;
   std::string so_far;
   for (const std::string &step : steps_of(pointer)) {
@@ -149,14 +162,15 @@ void apply_set(json &tree, const std::string &assignment, const std::string &fil
       here = &here->back();
     } else if (here->is_array()) {
       if (!is_index(step) || std::stoul(step) >= here->size())
-        fail(DFM_E_ARG, "--set %s: %s in %s has %zu entries, numbered from 0 (\"-\" appends); there is no \"%s\"", pointer.c_str(),
-             so_far.c_str(), file.c_str(), here->size(), step.c_str());
+        fail(DFM_E_ARG,
+             "--set %s: %s in %s has %zu entries, numbered from 0 (\"-\" appends); there is no \"%s\"",
+             pointer.c_str(), so_far.c_str(), file.c_str(), here->size(), step.c_str());
       here = &(*here)[std::stoul(step)];
     } else if (here->is_object()) {
       here = &(*here)[step];
     } else {
-      fail(DFM_E_ARG, "--set %s: %s in %s is neither an object nor an array", pointer.c_str(), so_far.empty() ? "/" : so_far.c_str(),
-           file.c_str());
+      fail(DFM_E_ARG, "--set %s: %s in %s is neither an object nor an array", pointer.c_str(),
+           so_far.empty() ? "/" : so_far.c_str(), file.c_str());
     }
     so_far += "/" + step;
   }

@@ -10,7 +10,7 @@
 
 namespace dfm::scene {
 
-// ---- loaded types and their parameters ----------------------------------------------------------------------
+// ---- loaded types and their parameters --------------------------------------------------------------------
 
 namespace {
 
@@ -20,14 +20,18 @@ std::string short_name(const dfm_type *type) {
 }
 
 const dfm_param &row(const dfm_type *type, uint32_t i) {
-  return *reinterpret_cast<const dfm_param *>(reinterpret_cast<const char *>(type->params) + size_t(i) * type->param_size);
+  return *reinterpret_cast<const dfm_param *>(reinterpret_cast<const char *>(type->params) +
+                                              size_t(i) * type->param_size);
 }
 
 }  // namespace
 
 Types::Types(dfm_context *context) {
   dfm_plugin_visit(
-      context, [](void *user, const dfm_type *type, const char *) { static_cast<std::vector<const dfm_type *> *>(user)->push_back(type); },
+      context,
+      [](void *user, const dfm_type *type, const char *) {
+        static_cast<std::vector<const dfm_type *> *>(user)->push_back(type);
+      },
       &types_);
 }
 
@@ -74,7 +78,8 @@ const dfm_param *find_row(const dfm_type *type, const std::string &key) {
 
 dfm_params Params::view() {
   rows.clear();
-  for (size_t i = 0; i < keys.size(); ++i) rows.push_back({keys[i].c_str(), values[i].data(), uint32_t(values[i].size())});
+  for (size_t i = 0; i < keys.size(); ++i)
+    rows.push_back({keys[i].c_str(), values[i].data(), uint32_t(values[i].size())});
   return {sizeof(dfm_params), uint32_t(rows.size()), rows.data()};
 }
 
@@ -87,29 +92,35 @@ static double enum_value(const Node &value, const char *const *names) {
   for (const char *const *n = names; *n; ++n) words.push_back(*n);
   const std::string word = value.text();
   const auto found = std::find(words.begin(), words.end(), word);
-  if (found == words.end()) value.fail("expected one of: %s; found \"%s\"", join(words).c_str(), word.c_str());
+  if (found == words.end())
+    value.fail("expected one of: %s; found \"%s\"", join(words).c_str(), word.c_str());
   return double(found - words.begin());
 }
 
 std::vector<double> read_param(const Node &value, const dfm_param &p) {
   if (value.value().is_string()) {
-    if ((p.flags & DFM_PARAM_AUTO) && value.text() == kAuto) return std::vector<double>(p.width ? p.width : 1, p.def);
+    if ((p.flags & DFM_PARAM_AUTO) && value.text() == kAuto)
+      return std::vector<double>(p.width ? p.width : 1, p.def);
     const std::string unit = p.unit && std::string(p.unit) != "1" ? p.unit : "";
     if (!(p.flags & DFM_PARAM_ENUM) || !p.names)
-      value.fail("expected a number%s%s, found \"%s\"", unit.empty() ? "" : " in ", unit.c_str(), value.text().c_str());
+      value.fail("expected a number%s%s, found \"%s\"", unit.empty() ? "" : " in ", unit.c_str(),
+                 value.text().c_str());
     return {enum_value(value, p.names)};
   }
   std::vector<double> out;
   const Range range{p.min, p.max, false, false};
-  if (value.value().is_boolean() && (p.flags & DFM_PARAM_INTEGER)) out.push_back(value.value().get<bool>() ? 1 : 0);
+  if (value.value().is_boolean() && (p.flags & DFM_PARAM_INTEGER))
+    out.push_back(value.value().get<bool>() ? 1 : 0);
   else if (value.value().is_array())
     for (const Node &item : value.items()) out.push_back(item.number(range));
   else out.push_back(value.number(range));
   const uint32_t width = p.width ? p.width : 1;
   if (p.flags & DFM_PARAM_LIST ? out.empty() || out.size() > width : out.size() != width)
-    value.fail("expected %s%u number%s, found %zu", p.flags & DFM_PARAM_LIST ? "1 to " : "", width, width == 1 ? "" : "s", out.size());
+    value.fail("expected %s%u number%s, found %zu", p.flags & DFM_PARAM_LIST ? "1 to " : "", width,
+               width == 1 ? "" : "s", out.size());
   for (double x : out)
-    if ((p.flags & (DFM_PARAM_INTEGER | DFM_PARAM_ENUM)) && x != std::floor(x)) value.fail("expected a whole number, found %g", x);
+    if ((p.flags & (DFM_PARAM_INTEGER | DFM_PARAM_ENUM)) && x != std::floor(x))
+      value.fail("expected a whole number, found %g", x);
   return out;
 }
 
@@ -127,8 +138,11 @@ Params read_params(const Node &params, const dfm_type *type) {
     if (!p) {
       const std::string near = nearest(entry.key(), valid);
       if (valid.empty()) value.fail("%s has no parameters", type->id);
-      if (!near.empty()) value.fail("%s has no parameter \"%s\"; did you mean \"%s\"?", type->id, entry.key().c_str(), near.c_str());
-      value.fail("%s has no parameter \"%s\"; it has: %s", type->id, entry.key().c_str(), join(valid).c_str());
+      if (!near.empty())
+        value.fail("%s has no parameter \"%s\"; did you mean \"%s\"?", type->id, entry.key().c_str(),
+                   near.c_str());
+      value.fail("%s has no parameter \"%s\"; it has: %s", type->id, entry.key().c_str(),
+                 join(valid).c_str());
     }
     out.keys.push_back(entry.key());
     out.values.push_back(read_param(value, *p));
@@ -142,27 +156,32 @@ const dfm_type *read_type(const Node &name, uint32_t kind, const Types &types) {
   const std::vector<std::string> loaded = types.names(kind);
   const char *what = kind == DFM_KIND_MODEL ? "model" : "law";
   const std::string near = nearest(wanted, loaded);
-  fail(DFM_E_UNSUPPORTED, "%s: %s: no loaded plugin offers the %s \"%s\"; loaded: %s%s", name.file().c_str(), name.pointer().c_str(), what,
-       wanted.c_str(), loaded.empty() ? "none (see: deform plugin list)" : join(loaded).c_str(),
+  fail(DFM_E_UNSUPPORTED, "%s: %s: no loaded plugin offers the %s \"%s\"; loaded: %s%s", name.file().c_str(),
+       name.pointer().c_str(), what, wanted.c_str(),
+       loaded.empty() ? "none (see: deform plugin list)" : join(loaded).c_str(),
        near.empty() ? "" : ("; did you mean \"" + near + "\"?").c_str());
 }
 
-// ---- small shared parts ------------------------------------------------------------------------------------
+// ---- small shared parts -----------------------------------------------------------------------------------
 
 std::string known(const Node &name, const std::vector<std::string> &valid, const char *what) {
   const std::string s = name.text();
   if (std::find(valid.begin(), valid.end(), s) != valid.end()) return s;
   const std::string near = nearest(s, valid);
   if (!near.empty()) name.fail("there is no %s \"%s\"; did you mean \"%s\"?", what, s.c_str(), near.c_str());
-  name.fail("there is no %s \"%s\"; there %s: %s", what, s.c_str(), valid.size() == 1 ? "is" : "are", valid.empty() ? "none" : join(valid).c_str());
+  name.fail("there is no %s \"%s\"; there %s: %s", what, s.c_str(), valid.size() == 1 ? "is" : "are",
+            valid.empty() ? "none" : join(valid).c_str());
 }
 
-void check_fresh(const Node &name, const std::string &value, const std::vector<std::string> &taken, const char *what) {
-  if (std::find(taken.begin(), taken.end(), value) != taken.end()) name.fail("the name \"%s\" is taken by another %s; names are unique", value.c_str(), what);
+void check_fresh(const Node &name, const std::string &value, const std::vector<std::string> &taken,
+                 const char *what) {
+  if (std::find(taken.begin(), taken.end(), value) != taken.end())
+    name.fail("the name \"%s\" is taken by another %s; names are unique", value.c_str(), what);
 }
 
 void check_rising(const Node &key, size_t i, double previous, double t) {
-  if (i > 0 && !(t > previous)) key.at("t").fail("times of keyframes rise strictly; found %g after %g", t, previous);
+  if (i > 0 && !(t > previous))
+    key.at("t").fail("times of keyframes rise strictly; found %g after %g", t, previous);
 }
 
 dfm_sine read_sine(const Node &sine, bool scalar) {
@@ -175,7 +194,7 @@ dfm_sine read_sine(const Node &sine, bool scalar) {
   return out;
 }
 
-// ---- parts of the scene ------------------------------------------------------------------------------------
+// ---- parts of the scene -----------------------------------------------------------------------------------
 
 namespace {
 
@@ -206,21 +225,25 @@ void read_time(const Node &scene, Definition &def) {
   if (time.has("max_work")) def.max_work = time.member("max_work").number(Range{1, HUGE_VAL, false, true});
   const Node step = time.member("step");
   if (step.value().is_string()) {
-    if (step.text() != "auto") step.fail("expected a number of seconds or \"auto\", found \"%s\"", step.text().c_str());
+    if (step.text() != "auto")
+      step.fail("expected a number of seconds or \"auto\", found \"%s\"", step.text().c_str());
   } else {
     def.step = step.number(kPositive);
     if (def.step < kShortestStep) step.fail("%s", short_step(def.step, kShortestStep).c_str());
-    if (def.duration / def.step > 1e12) step.fail("%g s at %g s a step are more than 1e12 steps", def.duration, def.step);
+    if (def.duration / def.step > 1e12)
+      step.fail("%g s at %g s a step are more than 1e12 steps", def.duration, def.step);
   }
   time.word("mode", "dynamic", "mode");
-  if (time.word("integrator", "auto", "integrator") == "symplectic_euler") def.integrator = DFM_INTEGRATOR_SYMPLECTIC_EULER;
+  if (time.word("integrator", "auto", "integrator") == "symplectic_euler")
+    def.integrator = DFM_INTEGRATOR_SYMPLECTIC_EULER;
 }
 
 void read_effects(const Node &scene, Definition &def) {
   if (!scene.has("effects")) scene.value()["effects"] = "auto";
   const Node effects = scene.member("effects");
   if (effects.value().is_string()) {
-    if (effects.text() != "auto") effects.fail("expected \"auto\" or a list of effects, found \"%s\"", effects.text().c_str());
+    if (effects.text() != "auto")
+      effects.fail("expected \"auto\" or a list of effects, found \"%s\"", effects.text().c_str());
     return;
   }
   def.effects_auto = false;
@@ -240,10 +263,12 @@ std::vector<double> read_extra(const Node &value, const std::string &key, const 
       const bool automatic = row && (row->flags & DFM_PARAM_AUTO) && value.text() == kAuto;
       if (!automatic && (!row || !(row->flags & DFM_PARAM_ENUM) || !row->names)) continue;
       const double number = automatic ? row->def : enum_value(value, row->names);
-      if (!out.empty() && out[0] != number) value.fail("the models number this word differently; give it in the body's model params");
+      if (!out.empty() && out[0] != number)
+        value.fail("the models number this word differently; give it in the body's model params");
       out = {number};
     }
-    if (out.empty()) value.fail("expected a number, found a string; no loaded model has words for this parameter");
+    if (out.empty())
+      value.fail("expected a number, found a string; no loaded model has words for this parameter");
   } else if (value.value().is_array()) {
     for (const Node &item : value.items()) out.push_back(item.number());
   } else {
@@ -261,7 +286,8 @@ void read_materials(const Node &scene, Definition &def, ReadContext &context) {
     const Node node = materials.member(entry.key());
     node.object("material", model_keys);
     Material m;
-    m.pointer = node.pointer(), m.name = entry.key();
+    m.pointer = node.pointer();
+    m.name = entry.key();
     json copy = entry.key();
     Node(&copy, node.pointer(), &node.file()).name();
     m.density = node.number("density", m.density, kPositive);
@@ -275,17 +301,21 @@ void read_materials(const Node &scene, Definition &def, ReadContext &context) {
     for (const auto &further : node.value().items()) {
       const std::string &key = further.key();
       const std::vector<Key> &own = keys_of("material");
-      if (key != "friction" && std::any_of(own.begin(), own.end(), [&](const Key &k) { return key == k.name; })) continue;
+      if (key != "friction" &&
+          std::any_of(own.begin(), own.end(), [&](const Key &k) { return key == k.name; }))
+        continue;
       const Node value = node.member(key);
       m.extra.keys.push_back(key);
-      m.extra.values.push_back(key == "friction" ? std::vector<double>{value.number(kNotNegative)} : read_extra(value, key, context.types));
+      m.extra.values.push_back(key == "friction" ? std::vector<double>{value.number(kNotNegative)}
+                                                 : read_extra(value, key, context.types));
     }
     context.materials.push_back(m.name);
     def.materials.push_back(std::move(m));
   }
 }
 
-// A side of a pair: "*", a body or an obstacle, "material=NAME", "body:GROUP" (whose groups the world knows once the body is there).
+// A side of a pair: "*", a body or an obstacle, "material=NAME", "body:GROUP" (whose groups the world knows
+// once the body is there).
 std::string read_side(const Node &side, const ReadContext &context, bool grouped) {
   const std::string text = side.text();
   if (text == "*") return text;
@@ -313,14 +343,19 @@ void read_contact(const Node &scene, Definition &def, const ReadContext &context
   const Node contact = scene.member("contact");
   contact.object("contact");
   const std::string method = contact.word("method", "auto", "method");
-  def.method = method == "velocity" ? DFM_METHOD_VELOCITY : method == "rollback" ? DFM_METHOD_ROLLBACK : DFM_METHOD_AUTO;
+  def.method = method == "velocity"   ? DFM_METHOD_VELOCITY
+               : method == "rollback" ? DFM_METHOD_ROLLBACK
+                                      : DFM_METHOD_AUTO;
   def.sleep = contact.boolean("sleep", false);
-  const bool self_given = contact.has("self"), listed = std::find(def.effects.begin(), def.effects.end(), "self_contact") != def.effects.end();
+  const bool self_given = contact.has("self");
+  const bool listed = std::find(def.effects.begin(), def.effects.end(), "self_contact") != def.effects.end();
   if (self_given && contact.value()["self"] == "auto") def.self = DFM_SELF_AUTO;
-  else if (self_given && !contact.value()["self"].is_boolean()) contact.member("self").fail("expected true, false or \"auto\"");
+  else if (self_given && !contact.value()["self"].is_boolean())
+    contact.member("self").fail("expected true, false or \"auto\"");
   else def.self = contact.boolean("self", listed) ? DFM_SELF_ON : DFM_SELF_OFF;
   if (self_given && def.self != DFM_SELF_ON && listed)
-    contact.member("self").fail("\"self\" is not true, but /effects asks for \"self_contact\"; take one of the two away");
+    contact.member("self").fail(
+        "\"self\" is not true, but /effects asks for \"self_contact\"; take one of the two away");
   def.untangle = contact.boolean("untangle", false);
   def.guard = contact.boolean("guard", true);
   if (contact.has("energy_watch")) {
@@ -375,8 +410,12 @@ void read_output(const Node &scene, Definition &def) {
   def.every = output.number("every", 0.02, kPositive);
   if (!output.has("frames")) output.value()["frames"] = false;
   const Node frames = output.member("frames");
-  if (frames.value().is_number()) def.frame_rate = frames.number(Range{0, 1e6, true, false}), def.frames = true;
-  else def.frames = frames.boolean();
+  if (frames.value().is_number()) {
+    def.frame_rate = frames.number(Range{0, 1e6, true, false});
+    def.frames = true;
+  } else {
+    def.frames = frames.boolean();
+  }
   def.states = output.boolean("states", false);
   def.nodes = output.boolean("nodes", false);
   def.contacts = output.boolean("contacts", true);
@@ -387,7 +426,8 @@ void read_output(const Node &scene, Definition &def) {
     camera.object("camera");
     camera.at("eye").vector(def.eye);
     camera.vector("look_at", def.look_at, 0, 0, 0);
-    if (std::equal(def.eye, def.eye + 3, def.look_at)) camera.fail("\"eye\" and \"look_at\" are the same point");
+    if (std::equal(def.eye, def.eye + 3, def.look_at))
+      camera.fail("\"eye\" and \"look_at\" are the same point");
     def.has_camera = true;
   }
 }
@@ -398,7 +438,8 @@ Definition read_scene(json &tree, const std::string &file, const Types &types) {
   const Node scene(&tree, "", &file);
   scene.object("scene");
   const Node format = scene.at("format"), version = scene.at("version");
-  if (format.text() != "deform-scene") format.fail("expected \"deform-scene\", found \"%s\"", format.text().c_str());
+  if (format.text() != "deform-scene")
+    format.fail("expected \"deform-scene\", found \"%s\"", format.text().c_str());
   if (version.number() != 1) version.fail("this reader knows version 1, found %g", version.number());
   Definition def;
   def.file = file;

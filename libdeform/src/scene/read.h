@@ -18,16 +18,19 @@ std::vector<double> read_param(const Node &value, const dfm_param &row);
 const dfm_type *read_type(const Node &name, uint32_t kind, const Types &types);
 dfm_sine read_sine(const Node &sine, bool scalar);
 void check_rising(const Node &keys, size_t i, double previous, double t);
-void check_fresh(const Node &name, const std::string &value, const std::vector<std::string> &taken, const char *what);
+void check_fresh(const Node &name, const std::string &value, const std::vector<std::string> &taken,
+                 const char *what);
 std::string known(const Node &name, const std::vector<std::string> &valid, const char *what);
-// What a body is made of beside its material: fields, materials by group, anisotropy; its surface and filling. read_carriers.cpp
+// What a body is made of beside its material: fields, materials by group, anisotropy; its surface and
+// filling. read_carriers.cpp
 void read_carriers(const Node &body, const dfm_type *model, ReadContext &context, Body &out);
 std::vector<Body> read_bodies(const Node &scene, ReadContext &context);
 std::vector<Obstacle> read_obstacles(const Node &scene, ReadContext &context);
 // Size and place of a shape, as obstacles and rigid bodies say it; kind: of the pose's object.
 void check_shape_keys(const Node &node, const std::string &shape);
 dfm_pose read_pose(const Node &holder, const char *kind, double *scale);
-void read_solid(const Node &node, const std::string &shape, uint32_t &number, double half_size[3], double &radius, double &half_length);
+void read_solid(const Node &node, const std::string &shape, uint32_t &number, double half_size[3],
+                double &radius, double &half_length);
 Rigid read_rigid(const Node &scene, ReadContext &context);
 
 }  // namespace dfm::scene

@@ -14,10 +14,14 @@ void read_rotation(const Node &holder, double out[4]) {
     node.object("rotation");
     double axis[3];
     node.at("axis").vector(axis);
-    if (axis[0] == 0 && axis[1] == 0 && axis[2] == 0) node.at("axis").fail("the axis of a rotation cannot be zero");
+    if (axis[0] == 0 && axis[1] == 0 && axis[2] == 0)
+      node.at("axis").fail("the axis of a rotation cannot be zero");
     q = rotation(axis, node.at("angle_deg").number());
   }
-  out[0] = q.x, out[1] = q.y, out[2] = q.z, out[3] = q.w;
+  out[0] = q.x;
+  out[1] = q.y;
+  out[2] = q.z;
+  out[3] = q.w;
 }
 
 }  // namespace
@@ -38,7 +42,8 @@ namespace {
 Selection read_selection(const Node &entry) {
   Selection s;
   s.pointer = entry.pointer();
-  if (entry.has("box") == entry.has("group")) entry.fail("expected either \"box\" or \"group\" to say which points");
+  if (entry.has("box") == entry.has("group"))
+    entry.fail("expected either \"box\" or \"group\" to say which points");
   if (entry.has("group")) {
     s.group = entry.member("group").text();
     return s;
@@ -46,13 +51,17 @@ Selection read_selection(const Node &entry) {
   const Node box = entry.member("box");
   const std::vector<Node> corners = box.items();
   if (corners.size() != 2) box.fail("expected two corners [[x, y, z], [x, y, z]], found %zu", corners.size());
-  corners[0].vector(s.lo), corners[1].vector(s.hi);
+  corners[0].vector(s.lo);
+  corners[1].vector(s.hi);
   for (int i = 0; i < 3; ++i)
-    if (s.lo[i] > s.hi[i]) box.fail("the first corner is the lower one; in %c it has %g and the second %g", "xyz"[i], s.lo[i], s.hi[i]);
+    if (s.lo[i] > s.hi[i])
+      box.fail("the first corner is the lower one; in %c it has %g and the second %g", "xyz"[i], s.lo[i],
+               s.hi[i]);
   return s;
 }
 
-// A key that leaves out position or rotation keeps that of `base`. `turn`: what every rotation is applied to (a plane's normal).
+// A key that leaves out position or rotation keeps that of `base`. `turn`: what every rotation is applied to
+// (a plane's normal).
 std::vector<dfm_pose_key> read_keys(const Node &motion, const dfm_pose &base, const Quaternion &turn) {
   std::vector<dfm_pose_key> keys;
   const std::vector<Node> nodes = motion.items("keyframes");
@@ -65,7 +74,10 @@ std::vector<dfm_pose_key> read_keys(const Node &motion, const dfm_pose &base, co
       double q[4];
       read_rotation(nodes[i], q);
       const Quaternion turned = multiply({q[0], q[1], q[2], q[3]}, turn);
-      key.pose.rotation[0] = turned.x, key.pose.rotation[1] = turned.y, key.pose.rotation[2] = turned.z, key.pose.rotation[3] = turned.w;
+      key.pose.rotation[0] = turned.x;
+      key.pose.rotation[1] = turned.y;
+      key.pose.rotation[2] = turned.z;
+      key.pose.rotation[3] = turned.w;
     }
     keys.push_back(key);
   }
@@ -75,9 +87,11 @@ std::vector<dfm_pose_key> read_keys(const Node &motion, const dfm_pose &base, co
 Motion read_motion(const Node &motion, const dfm_pose &base, const Quaternion &turn) {
   Motion out;
   motion.object("motion");
-  if (!motion.has("keyframes") && !motion.has("sine")) motion.fail("expected \"keyframes\", \"sine\" or both");
+  if (!motion.has("keyframes") && !motion.has("sine"))
+    motion.fail("expected \"keyframes\", \"sine\" or both");
   out.keys = read_keys(motion, base, turn);
-  if (motion.has("keyframes") && out.keys.empty()) motion.at("keyframes").fail("expected at least one keyframe");
+  if (motion.has("keyframes") && out.keys.empty())
+    motion.at("keyframes").fail("expected at least one keyframe");
   if (motion.has("sine")) out.sine = read_sine(motion.member("sine"), false);
   return out;
 }
@@ -129,7 +143,8 @@ Spring read_spring(const Node &entry) {
     entry.fail("expected one of \"point\", \"box\" and \"group\" to say where the spring pulls");
   if (spring.at_point) entry.member("point").vector(spring.point);
   else spring.where = read_selection(entry);
-  if (entry.has("to") == entry.has("keyframes")) entry.fail("expected either \"to\" or \"keyframes\" to say where the spring ends");
+  if (entry.has("to") == entry.has("keyframes"))
+    entry.fail("expected either \"to\" or \"keyframes\" to say where the spring ends");
   if (entry.has("to")) entry.member("to").vector(spring.to);
   const std::vector<Node> keys = entry.items("keyframes");
   if (entry.has("keyframes") && keys.empty()) entry.at("keyframes").fail("expected at least one keyframe");
@@ -147,7 +162,8 @@ Spring read_spring(const Node &entry) {
 
 uint32_t read_count(const Node &node, double least, double most) {
   const double n = node.number();
-  if (!(n >= least && n <= most) || n != std::floor(n)) node.fail("expected a whole number from %.0f to %.0f, found %g", least, most, n);
+  if (!(n >= least && n <= most) || n != std::floor(n))
+    node.fail("expected a whole number from %.0f to %.0f, found %g", least, most, n);
   return uint32_t(n);
 }
 
@@ -157,7 +173,8 @@ MadeMesh read_made(const Node &node) {
   node.object("made_mesh");
   made.kind = node.at("make").word("make");
   const bool round = made.kind != "beam", tube = made.kind == "tube", along = tube || made.kind == "cylinder";
-  const std::pair<const char *, bool> wanted[] = {{"radius", round}, {"inner", tube}, {"length", along}, {"size", !round}};
+  const std::pair<const char *, bool> wanted[] = {
+      {"radius", round}, {"inner", tube}, {"length", along}, {"size", !round}};
   for (const auto &[key, mine] : wanted)
     if (!mine && node.has(key)) node.member(key).fail("a %s has no \"%s\"", made.kind.c_str(), key);
   if (round) {
@@ -210,19 +227,22 @@ Body read_body(const Node &node, ReadContext &context) {
 // Which of the keys that place or size a shape belong to it.
 void check_shape_keys(const Node &node, const std::string &shape) {
   const std::vector<std::pair<std::string, std::vector<std::string>>> wanted = {
-      {"plane", {"point", "normal"}}, {"sphere", {"radius"}}, {"box", {"half_size"}}, {"capsule", {"radius", "half_length"}},
-      {"mesh", {"mesh"}}, {"voxels", {"mesh", "cells"}}};
+      {"plane", {"point", "normal"}},         {"sphere", {"radius"}}, {"box", {"half_size"}},
+      {"capsule", {"radius", "half_length"}}, {"mesh", {"mesh"}},     {"voxels", {"mesh", "cells"}}};
   for (const auto &[name, keys] : wanted) {
     for (const std::string &key : keys) {
       bool mine = false;
       for (const auto &[other, others] : wanted)
         if (other == shape) mine = std::find(others.begin(), others.end(), key) != others.end();
-      if (!mine && node.has(key.c_str())) node.member(key).fail("the shape %s has no \"%s\"; that is for %s", shape.c_str(), key.c_str(), name.c_str());
+      if (!mine && node.has(key.c_str()))
+        node.member(key).fail("the shape %s has no \"%s\"; that is for %s", shape.c_str(), key.c_str(),
+                              name.c_str());
     }
   }
 }
 
-void read_solid(const Node &node, const std::string &shape, uint32_t &number, double half_size[3], double &radius, double &half_length) {
+void read_solid(const Node &node, const std::string &shape, uint32_t &number, double half_size[3],
+                double &radius, double &half_length) {
   if (shape == "sphere") {
     number = DFM_SHAPE_SPHERE;
     radius = node.at("radius").number(kPositive);
@@ -243,14 +263,19 @@ namespace {
 
 Quaternion read_plane(const Node &node, dfm_obstacle_def &def) {
   double normal[3];
-  if (node.has("pose") && node.has("point")) node.member("point").fail("a plane is placed by \"point\" or by \"pose\", not by both");
+  if (node.has("pose") && node.has("point"))
+    node.member("point").fail("a plane is placed by \"point\" or by \"pose\", not by both");
   if (!node.has("pose")) node.vector("point", def.pose.position, 0, 0, 0);
   node.vector("normal", normal, 0, 0, 1);
-  if (normal[0] == 0 && normal[1] == 0 && normal[2] == 0) node.at("normal").fail("the normal of a plane cannot be zero");
+  if (normal[0] == 0 && normal[1] == 0 && normal[2] == 0)
+    node.at("normal").fail("the normal of a plane cannot be zero");
   const Quaternion turn = rotation_to(normal);
   const double *q = def.pose.rotation;
   const Quaternion turned = multiply({q[0], q[1], q[2], q[3]}, turn);
-  def.pose.rotation[0] = turned.x, def.pose.rotation[1] = turned.y, def.pose.rotation[2] = turned.z, def.pose.rotation[3] = turned.w;
+  def.pose.rotation[0] = turned.x;
+  def.pose.rotation[1] = turned.y;
+  def.pose.rotation[2] = turned.z;
+  def.pose.rotation[3] = turned.w;
   return turn;
 }
 
@@ -268,7 +293,8 @@ Obstacle read_obstacle(const Node &node, ReadContext &context) {
   check_shape_keys(node, shape);
   const bool of_triangles = shape == "mesh" || shape == "voxels";
   if (node.has("pose") && !of_triangles && node.member("pose").has("scale"))
-    node.member("pose").at("scale").fail("a %s has its own size; \"scale\" is for the shapes mesh and voxels", shape.c_str());
+    node.member("pose").at("scale").fail("a %s has its own size; \"scale\" is for the shapes mesh and voxels",
+                                         shape.c_str());
   o.def.pose = read_pose(node, "obstacle_pose", of_triangles ? &o.scale : nullptr);
   Quaternion turn;
   if (shape == "plane") {

@@ -1,4 +1,5 @@
-// What a body is made of, cell by cell, and what carries its surface: the keys fields, materials_by_group, anisotropy, surface and fill.
+// What a body is made of, cell by cell, and what carries its surface: the keys fields, materials_by_group,
+// anisotropy, surface and fill.
 #include <algorithm>
 #include <cmath>
 
@@ -56,9 +57,11 @@ void read_anisotropy_params(const Node &params, const dfm_type *model, Body &b) 
     if (!row) {
       const std::string near = nearest(entry.key(), valid);
       value.fail("%s has no anisotropy parameter \"%s\"%s; it has: %s", model->id, entry.key().c_str(),
-                 near.empty() ? "" : ("; did you mean \"" + near + "\"?").c_str(), valid.empty() ? "none" : join(valid).c_str());
+                 near.empty() ? "" : ("; did you mean \"" + near + "\"?").c_str(),
+                 valid.empty() ? "none" : join(valid).c_str());
     }
-    if (std::string(row->key) == kAxis) value.fail("the direction is given by \"axis\" or \"field\" beside \"params\"");
+    if (std::string(row->key) == kAxis)
+      value.fail("the direction is given by \"axis\" or \"field\" beside \"params\"");
     if (std::find(b.params.keys.begin(), b.params.keys.end(), row->key) != b.params.keys.end())
       value.fail("\"%s\" is given in the model's params too; keep one", row->key);
     b.params.keys.push_back(row->key);
@@ -73,12 +76,15 @@ void read_anisotropy(const Node &node, const dfm_type *model, const Types &types
     std::vector<std::string> able;
     for (const dfm_type *t : types.models())
       if (find_row(t, kAxis)) able.push_back(t->id);
-    node.fail("%s is the same in all directions; %s%s", model->id, able.empty() ? "no loaded model has a direction" : "models with a direction: ",
-              join(able).c_str());
+    node.fail(
+        "%s is the same in all directions; %s%s", model->id,
+        able.empty() ? "no loaded model has a direction" : "models with a direction: ", join(able).c_str());
   }
-  if (node.has("axis") == node.has("field")) node.fail("expected either \"axis\" or \"field\" to say the direction");
-  const bool taken = std::find(b.params.keys.begin(), b.params.keys.end(), kAxis) != b.params.keys.end() ||
-                     std::any_of(b.fields.begin(), b.fields.end(), [](const FieldFile &f) { return f.key == kAxis; });
+  if (node.has("axis") == node.has("field"))
+    node.fail("expected either \"axis\" or \"field\" to say the direction");
+  const bool taken =
+      std::find(b.params.keys.begin(), b.params.keys.end(), kAxis) != b.params.keys.end() ||
+      std::any_of(b.fields.begin(), b.fields.end(), [](const FieldFile &f) { return f.key == kAxis; });
   if (taken) node.fail("the direction is given as \"%s\" too; keep one", kAxis);
   if (node.has("axis")) {
     double axis[3];
@@ -86,12 +92,16 @@ void read_anisotropy(const Node &node, const dfm_type *model, const Types &types
     const double largest = std::max({std::fabs(axis[0]), std::fabs(axis[1]), std::fabs(axis[2])});
     if (!(largest > 0)) node.member("axis").fail("the direction cannot be zero");
     double square = 0;
-    for (double &a : axis) a /= largest, square += a * a;
+    for (double &a : axis) {
+      a /= largest;
+      square += a * a;
+    }
     for (double &a : axis) a /= std::sqrt(square);
     b.params.keys.push_back(kAxis);
     b.params.values.push_back({axis, axis + 3});
   } else {
-    if (!(row->flags & DFM_PARAM_PER_CELL)) node.member("field").fail("%s takes one direction for the whole body; give \"axis\"", model->id);
+    if (!(row->flags & DFM_PARAM_PER_CELL))
+      node.member("field").fail("%s takes one direction for the whole body; give \"axis\"", model->id);
     b.fields.push_back({node.member("field").pointer(), kAxis, node.member("field").text(), 3, true});
   }
   if (node.has("params")) read_anisotropy_params(node.member("params"), model, b);
@@ -102,14 +112,21 @@ void read_surface(const Node &node, OwnSurface &out) {
   out.pointer = node.pointer();
   out.boundary = node.has("from");
   if (out.boundary) node.member("from").word("from");
-  if (out.boundary && node.has("mesh")) node.member("mesh").fail("a surface is either \"from\": \"boundary\" or a mesh of its own; keep one");
+  if (out.boundary && node.has("mesh"))
+    node.member("mesh").fail("a surface is either \"from\": \"boundary\" or a mesh of its own; keep one");
   if (node.has("mesh")) out.mesh = node.member("mesh").text();
   out.coupled = node.has("coupling");
-  if (out.boundary && out.coupled) node.member("coupling").fail("the boundary's points are the body's own; a coupling is for a surface of its own");
+  if (out.boundary && out.coupled)
+    node.member("coupling")
+        .fail("the boundary's points are the body's own; a coupling is for a surface of its own");
   const std::string coupling = out.coupled ? node.member("coupling").word("coupling") : "barycentric";
-  out.coupling = coupling == "mls" ? DFM_COUPLING_MLS : coupling == "thesis" ? DFM_COUPLING_THESIS : DFM_COUPLING_BARYCENTRIC;
+  out.coupling = coupling == "mls"      ? DFM_COUPLING_MLS
+                 : coupling == "thesis" ? DFM_COUPLING_THESIS
+                                        : DFM_COUPLING_BARYCENTRIC;
   if (!node.has("support")) return;
-  if (coupling == "barycentric") node.member("support").fail("a support is for the couplings mls and thesis; \"coupling\" is barycentric here");
+  if (coupling == "barycentric")
+    node.member("support").fail(
+        "a support is for the couplings mls and thesis; \"coupling\" is barycentric here");
   out.support = node.member("support").number(Range{0, kWidestSupport, true, false});
 }
 

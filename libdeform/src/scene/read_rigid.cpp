@@ -40,7 +40,10 @@ Joint read_joint(const Node &node, const RigidBody &body, const std::vector<std:
   j.pointer = node.pointer();
   const Node type_node = node.at("type");
   const std::string type = type_node.word("joint_type");
-  j.def.type = type == "hinge" ? DFM_JOINT_HINGE : type == "slider" ? DFM_JOINT_SLIDER : type == "ball" ? DFM_JOINT_BALL : DFM_JOINT_FIXED;
+  j.def.type = type == "hinge"    ? DFM_JOINT_HINGE
+               : type == "slider" ? DFM_JOINT_SLIDER
+               : type == "ball"   ? DFM_JOINT_BALL
+                                  : DFM_JOINT_FIXED;
   const bool has_axis = j.def.type == DFM_JOINT_HINGE || j.def.type == DFM_JOINT_SLIDER;
   if (node.has("with") && !node.member("with").value().is_null()) {
     j.with = known(node.member("with"), names, "rigid body");
@@ -50,10 +53,12 @@ Joint read_joint(const Node &node, const RigidBody &body, const std::vector<std:
   node.vector("anchor", j.def.anchor, p[0], p[1], p[2]);
   if (has_axis) {
     node.at("axis").vector(j.def.axis);
-    if (j.def.axis[0] == 0 && j.def.axis[1] == 0 && j.def.axis[2] == 0) node.at("axis").fail("the axis of a joint cannot be zero");
+    if (j.def.axis[0] == 0 && j.def.axis[1] == 0 && j.def.axis[2] == 0)
+      node.at("axis").fail("the axis of a joint cannot be zero");
   } else {
     for (const char *key : {"axis", "motor"})
-      if (node.has(key)) node.member(key).fail("a %s joint has no \"%s\"; that is for a hinge or a slider", type.c_str(), key);
+      if (node.has(key))
+        node.member(key).fail("a %s joint has no \"%s\"; that is for a hinge or a slider", type.c_str(), key);
   }
   if (node.has("motor")) {
     const Node motor = node.member("motor");
@@ -83,7 +88,8 @@ Rigid read_rigid(const Node &scene, ReadContext &context) {
   }
   // Joints may name bodies that stand further down.
   for (size_t i = 0; i < nodes.size(); ++i)
-    for (const Node &joint : nodes[i].items("joints")) out.bodies[i].joints.push_back(read_joint(joint, out.bodies[i], names));
+    for (const Node &joint : nodes[i].items("joints"))
+      out.bodies[i].joints.push_back(read_joint(joint, out.bodies[i], names));
   return out;
 }
 

@@ -29,10 +29,22 @@ void sine_cosine_deg(double degrees, double *s, double *c) {
   if (turn - 90.0 * quarter == 45.0) a = b = std::sqrt(0.5);
   if (turn - 90.0 * quarter == -45.0) a = -(b = std::sqrt(0.5));
   switch (((static_cast<int>(quarter) % 4) + 4) % 4) {
-    case 0: *s = a, *c = b; break;
-    case 1: *s = b, *c = -a; break;
-    case 2: *s = -a, *c = -b; break;
-    default: *s = -b, *c = a; break;
+    case 0:
+      *s = a;
+      *c = b;
+      break;
+    case 1:
+      *s = b;
+      *c = -a;
+      break;
+    case 2:
+      *s = -a;
+      *c = -b;
+      break;
+    default:
+      *s = -b;
+      *c = a;
+      break;
   }
 }
 
@@ -48,12 +60,16 @@ Quaternion rotation(const double axis[3], double angle_deg) {
   sine_cosine_deg(angle_deg / 2, &s, &c);
   // Scaled first: the square of a tiny or huge axis would leave the range of double.
   const double scale = std::fmax(std::fabs(axis[0]), std::fmax(std::fabs(axis[1]), std::fabs(axis[2])));
-  const double x = axis[0] / scale, y = axis[1] / scale, z = axis[2] / scale, n = std::sqrt(x * x + y * y + z * z);
+  const double x = axis[0] / scale;
+  const double y = axis[1] / scale;
+  const double z = axis[2] / scale;
+  const double n = std::sqrt(x * x + y * y + z * z);
   return {s * x / n, s * y / n, s * z / n, c};
 }
 
 Quaternion rotation_to(const double direction[3]) {
-  const double scale = std::fmax(std::fabs(direction[0]), std::fmax(std::fabs(direction[1]), std::fabs(direction[2])));
+  const double scale =
+      std::fmax(std::fabs(direction[0]), std::fmax(std::fabs(direction[1]), std::fabs(direction[2])));
   double d[3] = {direction[0] / scale, direction[1] / scale, direction[2] / scale};
   const double n = std::sqrt(d[0] * d[0] + d[1] * d[1] + d[2] * d[2]);
   for (double &x : d) x /= n;
@@ -69,8 +85,10 @@ Quaternion multiply(const Quaternion &a, const Quaternion &b) {
 }
 
 void rotate(const Quaternion &q, const double v[3], double out[3]) {
-  const double u[3] = {q.y * v[2] - q.z * v[1] + q.w * v[0], q.z * v[0] - q.x * v[2] + q.w * v[1], q.x * v[1] - q.y * v[0] + q.w * v[2]};
-  const double r[3] = {v[0] + 2 * (q.y * u[2] - q.z * u[1]), v[1] + 2 * (q.z * u[0] - q.x * u[2]), v[2] + 2 * (q.x * u[1] - q.y * u[0])};
+  const double u[3] = {q.y * v[2] - q.z * v[1] + q.w * v[0], q.z * v[0] - q.x * v[2] + q.w * v[1],
+                       q.x * v[1] - q.y * v[0] + q.w * v[2]};
+  const double r[3] = {v[0] + 2 * (q.y * u[2] - q.z * u[1]), v[1] + 2 * (q.z * u[0] - q.x * u[2]),
+                       v[2] + 2 * (q.x * u[1] - q.y * u[0])};
   for (int i = 0; i < 3; ++i) out[i] = r[i];
 }
 

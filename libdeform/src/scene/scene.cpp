@@ -9,8 +9,8 @@ namespace dfm::scene {
 
 namespace {
 
-// The destructor of a JSON container allocates (it lists its children, not to recurse), which without memory ends the process. Emptied from below it
-// has nothing to list. The parser bounds the depth.
+// The destructor of a JSON container allocates (it lists its children, not to recurse), which without memory
+// ends the process. Emptied from below it has nothing to list. The parser bounds the depth.
 void dismantle(json &value) noexcept {
   if (!value.is_structured()) return;
   for (json &child : value) dismantle(child);
@@ -28,7 +28,8 @@ Scene::Scene(dfm_context *context, const std::string &path, const dfm_scene_opti
     : context_(context), tree_(std::make_unique<Tree>()) {
   tree_->root = parse_file(path);
   for (uint32_t i = 0; options && i < options->nset; ++i) {
-    if (!options->set || !options->set[i]) fail(DFM_E_ARG, "scene options: set[%u] is NULL, expected \"/json/pointer=value\"", i);
+    if (!options->set || !options->set[i])
+      fail(DFM_E_ARG, "scene options: set[%u] is NULL, expected \"/json/pointer=value\"", i);
     apply_set(tree_->root, options->set[i], path);
   }
   definition_ = read_scene(tree_->root, path, Types(context));
@@ -48,7 +49,8 @@ void Scene::probe_state(size_t i, double position[3], double velocity[3]) {
   uint32_t n = 0;
   dfm_status status = dfm_body_get_state(p.body, 0, nullptr, nullptr, &n);
   if (status >= 0) {
-    x_.resize(3 * size_t(n)), v_.resize(3 * size_t(n));
+    x_.resize(3 * size_t(n));
+    v_.resize(3 * size_t(n));
     status = dfm_body_get_state(p.body, n, x_.data(), v_.data(), &n);
   }
   if (status < 0) fail(status, "probe \"%s\": %s", p.name.c_str(), dfm_last_error());

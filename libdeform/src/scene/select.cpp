@@ -16,7 +16,8 @@ double triangle_area(const double *a, const double *b, const double *c) {
 
 double tet_volume6(const BodyMesh &mesh, const uint32_t *t) {
   const Vec3 a = load3(&mesh.points[3 * t[0]]);
-  return dot(load3(&mesh.points[3 * t[1]]) - a, cross(load3(&mesh.points[3 * t[2]]) - a, load3(&mesh.points[3 * t[3]]) - a));
+  return dot(load3(&mesh.points[3 * t[1]]) - a,
+             cross(load3(&mesh.points[3 * t[2]]) - a, load3(&mesh.points[3 * t[3]]) - a));
 }
 
 // Position of each point within the selection; UINT32_MAX: not selected.
@@ -41,7 +42,9 @@ double locate(const BodyMesh &mesh, const double point[3], uint32_t corners[4], 
 
 namespace {
 
-constexpr double kSlack = 1e-9;  // of the body's diagonal: points that lie on a face of the box by the author's reckoning may miss it by rounding
+// of the body's diagonal: points that lie on a face of the box by the author's reckoning may miss
+// it by rounding
+constexpr double kSlack = 1e-9;
 
 bool in_box(const Selection &where, const BodyMesh &mesh, const double *p) {
   const double slack = kSlack * mesh.size;
@@ -60,7 +63,8 @@ uint32_t find_group(const std::string &group, const char *const *names, uint32_t
   std::vector<std::string> names(mesh.group_names, mesh.group_names + mesh.ngroup);
   names.insert(names.end(), mesh.skin.group_names, mesh.skin.group_names + mesh.skin.ngroup);
   const std::string near = nearest(where.group, names);
-  fail(DFM_E_ARG, "%s: %s/group: the mesh has no physical group \"%s\"%s%s", file.c_str(), where.pointer.c_str(), where.group.c_str(),
+  fail(DFM_E_ARG, "%s: %s/group: the mesh has no physical group \"%s\"%s%s", file.c_str(),
+       where.pointer.c_str(), where.group.c_str(),
        names.empty() ? "; it has none at all" : ("; it has: " + join(names)).c_str(),
        near.empty() ? "" : ("; did you mean \"" + near + "\"?").c_str());
 }
@@ -105,22 +109,25 @@ std::vector<uint32_t> marked(const std::vector<uint8_t> &marks) {
 std::vector<uint32_t> select_group(const Selection &where, const BodyMesh &mesh, const std::string &file) {
   const uint32_t group = find_group(where.group, mesh.group_names, mesh.ngroup);
   if (group == mesh.ngroup) {
-    if (find_group(where.group, mesh.skin.group_names, mesh.skin.ngroup) == mesh.skin.ngroup) no_group(where, mesh, file);
+    if (find_group(where.group, mesh.skin.group_names, mesh.skin.ngroup) == mesh.skin.ngroup)
+      no_group(where, mesh, file);
     std::vector<uint8_t> surfel(mesh.skin.npoint, 0), point(mesh.npoint, 0);
     for (uint32_t t : skin_triangles(where, mesh))
       for (int k = 0; k < 3; ++k) surfel[mesh.skin.triangles[3 * size_t(t) + size_t(k)]] = 1;
     mark_cells(surfel, mesh, point);
     std::vector<uint32_t> out = marked(point);
     if (out.empty())
-      fail(DFM_E_ARG, "%s: %s/group: the group \"%s\" has no triangle", file.c_str(), where.pointer.c_str(), where.group.c_str());
+      fail(DFM_E_ARG, "%s: %s/group: the group \"%s\" has no triangle", file.c_str(), where.pointer.c_str(),
+           where.group.c_str());
     return out;
   }
   const uint32_t *points = nullptr;
   uint32_t n = 0;
-  if (dfm_tetmesh_group_points(mesh.handle, group, nullptr, &points, &n) < 0) fail(DFM_E_HANDLE, "%s", dfm_last_error());
+  if (dfm_tetmesh_group_points(mesh.handle, group, nullptr, &points, &n) < 0)
+    fail(DFM_E_HANDLE, "%s", dfm_last_error());
   if (n == 0)
-    fail(DFM_E_ARG, "%s: %s/group: the physical group \"%s\" has no point of a tetrahedron", file.c_str(), where.pointer.c_str(),
-         where.group.c_str());
+    fail(DFM_E_ARG, "%s: %s/group: the physical group \"%s\" has no point of a tetrahedron", file.c_str(),
+         where.pointer.c_str(), where.group.c_str());
   return {points, points + n};
 }
 
@@ -132,13 +139,17 @@ std::vector<uint32_t> select(const Selection &where, const BodyMesh &mesh, const
   for (uint32_t i = 0; i < mesh.npoint; ++i) point[i] = in_box(where, mesh, &mesh.points[3 * size_t(i)]);
   if (mesh.filled) {
     std::vector<uint8_t> surfel(mesh.skin.npoint, 0);
-    for (uint32_t s = 0; s < mesh.skin.npoint; ++s) surfel[s] = in_box(where, mesh, &mesh.skin.points[3 * size_t(s)]);
+    for (uint32_t s = 0; s < mesh.skin.npoint; ++s)
+      surfel[s] = in_box(where, mesh, &mesh.skin.points[3 * size_t(s)]);
     mark_cells(surfel, mesh, point);
   }
   std::vector<uint32_t> out = marked(point);
   if (out.empty())
-    fail(DFM_E_ARG, "%s: %s/box: no point of the body lies in this box; the body at rest, scaled but before its pose, spans [%g, %g, %g] to [%g, %g, %g]",
-         file.c_str(), where.pointer.c_str(), mesh.lo[0], mesh.lo[1], mesh.lo[2], mesh.hi[0], mesh.hi[1], mesh.hi[2]);
+    fail(DFM_E_ARG,
+         "%s: %s/box: no point of the body lies in this box; the body at rest, scaled but before its pose, "
+         "spans [%g, %g, %g] to [%g, %g, %g]",
+         file.c_str(), where.pointer.c_str(), mesh.lo[0], mesh.lo[1], mesh.lo[2], mesh.hi[0], mesh.hi[1],
+         mesh.hi[2]);
   return out;
 }
 
@@ -147,7 +158,8 @@ std::vector<double> share_by_mass(const std::vector<uint32_t> &points, const Bod
   std::vector<double> weights(points.size(), 0.0);
   for (uint32_t c = 0; c < mesh.ntet; ++c) {
     const uint32_t *t = mesh.tets + 4 * size_t(c);
-    const double quarter = std::fabs(tet_volume6(mesh, t)) / 24 * (mesh.cell_weight.empty() ? 1 : mesh.cell_weight[c]);
+    const double quarter =
+        std::fabs(tet_volume6(mesh, t)) / 24 * (mesh.cell_weight.empty() ? 1 : mesh.cell_weight[c]);
     for (int k = 0; k < 4; ++k)
       if (rank[t[k]] != UINT32_MAX) weights[rank[t[k]]] += quarter;
   }
@@ -155,7 +167,8 @@ std::vector<double> share_by_mass(const std::vector<uint32_t> &points, const Bod
   return weights;
 }
 
-std::vector<double> share_by_area(const std::vector<uint32_t> &points, const BodyMesh &mesh, const std::vector<uint32_t> &triangles) {
+std::vector<double> share_by_area(const std::vector<uint32_t> &points, const BodyMesh &mesh,
+                                  const std::vector<uint32_t> &triangles) {
   const std::vector<uint32_t> rank = ranks(points, mesh.npoint);
   std::vector<double> weights(points.size(), 0.0);
   bool any = false;
@@ -164,7 +177,8 @@ std::vector<double> share_by_area(const std::vector<uint32_t> &points, const Bod
     if (r[0] == UINT32_MAX || r[1] == UINT32_MAX || r[2] == UINT32_MAX) continue;
     any = true;
     const double *p = mesh.points.data();
-    const double third = triangle_area(p + 3 * triangles[i], p + 3 * triangles[i + 1], p + 3 * triangles[i + 2]) / 3;
+    const double third =
+        triangle_area(p + 3 * triangles[i], p + 3 * triangles[i + 1], p + 3 * triangles[i + 2]) / 3;
     for (uint32_t k : r) weights[k] += third;
   }
   if (!any) return {};
@@ -187,33 +201,46 @@ Shared share_on_skin(const std::vector<uint32_t> &triangles, const BodyMesh &mes
     uint32_t corners[4];
     double weights[4];
     locate(mesh, &skin.points[3 * size_t(s)], corners, weights);
-    for (int k = 0; k < 4; ++k) point[corners[k]] += weights[k] * surfel[s], touched[corners[k]] = 1;
+    for (int k = 0; k < 4; ++k) {
+      point[corners[k]] += weights[k] * surfel[s];
+      touched[corners[k]] = 1;
+    }
   }
   Shared out;
-  for (uint32_t i : marked(touched)) out.points.push_back(i), out.weights.push_back(point[i]);
+  for (uint32_t i : marked(touched)) {
+    out.points.push_back(i);
+    out.weights.push_back(point[i]);
+  }
   normalize(out.weights);
   return out;
 }
 
 namespace {
 
-// Shares on the cells' own points: a selection that lies on the boundary is a pressed face; one that reaches inside is a piece of the body.
+// Shares on the cells' own points: a selection that lies on the boundary is a pressed face; one that reaches
+// inside is a piece of the body.
 Shared share_on_cells(const Force &force, const BodyMesh &mesh, const std::string &file) {
   Shared out;
   out.points = select(force.where, mesh, file);
-  if (force.by == "mass") return out.weights = share_by_mass(out.points, mesh), out;
+  if (force.by == "mass") {
+    out.weights = share_by_mass(out.points, mesh);
+    return out;
+  }
   const Array<uint32_t> faces = boundary_triangles(Memory::standard(), mesh.ntet, mesh.tets);
   const std::vector<uint32_t> triangles(faces.begin(), faces.end());
   out.weights = share_by_area(out.points, mesh, triangles);
   if (force.by == "area") {
     if (out.weights.empty())
-      fail(DFM_E_ARG, "%s: %s/by: no boundary triangle has its three corners in this selection; enlarge it or share by \"mass\"", file.c_str(),
-           force.where.pointer.c_str());
+      fail(DFM_E_ARG,
+           "%s: %s/by: no boundary triangle has its three corners in this selection; enlarge it or share by "
+           "\"mass\"",
+           file.c_str(), force.where.pointer.c_str());
     return out;
   }
   std::vector<uint8_t> boundary(mesh.npoint, 0);
   for (uint32_t p : triangles) boundary[p] = 1;
-  const bool face = std::all_of(out.points.begin(), out.points.end(), [&](uint32_t p) { return boundary[p] != 0; });
+  const bool face =
+      std::all_of(out.points.begin(), out.points.end(), [&](uint32_t p) { return boundary[p] != 0; });
   if (!face || out.weights.empty()) out.weights = share_by_mass(out.points, mesh);
   return out;
 }
@@ -227,8 +254,10 @@ Shared share(const Force &force, const BodyMesh &mesh, const std::string &file) 
   const std::vector<uint32_t> triangles = skin_triangles(force.where, mesh);
   if (!triangles.empty()) return share_on_skin(triangles, mesh);
   if (force.by == "area" && force.where.group.empty())
-    fail(DFM_E_ARG, "%s: %s/by: no triangle of the surface has its three corners in this box; enlarge it or share by \"mass\"", file.c_str(),
-         force.where.pointer.c_str());
+    fail(DFM_E_ARG,
+         "%s: %s/by: no triangle of the surface has its three corners in this box; enlarge it or share by "
+         "\"mass\"",
+         file.c_str(), force.where.pointer.c_str());
   Shared out;
   out.points = select(force.where, mesh, file);
   out.weights = share_by_mass(out.points, mesh);

@@ -22,41 +22,54 @@ struct BodyMesh {
   std::vector<double> points;  // [n,3] rest, scaled
   const uint32_t *tets = nullptr, *file_point = nullptr, *cell_group = nullptr, *file_cell = nullptr;
   const double *share = nullptr;
-  dfm_tetmesh handle = 0;      // lends the arrays and the points of its groups
+  dfm_tetmesh handle = 0;  // lends the arrays and the points of its groups
   const char *const *group_names = nullptr;
-  const uint32_t *faces = nullptr, *face_group = nullptr;   // [nface,3], [nface] the file's triangles that belong to a group
+  // [nface,3], [nface] the file's triangles that belong to a group
+  const uint32_t *faces = nullptr, *face_group = nullptr;
   uint32_t npoint = 0, ntet = 0, ngroup = 0, dropped_cells = 0, nface = 0;
-  bool filled = false;         // the cells are ours, the file's shape is the skin
-  bool wears_skin = false;     // the skin is the body's surface; else that is the boundary of the cells
-  Skin skin;                   // npoint 0: none
-  std::vector<double> cell_weight;          // [ntet] mass per volume of each cell relative to the others; empty: the same
-  double lo[3] = {}, hi[3] = {}, size = 0;  // of the scaled points; size: diagonal
+  bool filled = false;      // the cells are ours, the file's shape is the skin
+  bool wears_skin = false;  // the skin is the body's surface; else that is the boundary of the cells
+  Skin skin;                // npoint 0: none
+  // [ntet] mass per volume of each cell relative to the others; empty: the same
+  std::vector<double> cell_weight;
+  double lo[3] = {}, hi[3] = {}, size = 0;         // of the scaled points; size: diagonal
   mutable std::shared_ptr<const Locator> locator;  // made when first asked for
 };
 
-// Points to hold: by physical group of the cells or of the skin (then the corners of the cells that hold its points), or those in a box. On
-// a filled body the box takes the skin's points in it too, by the corners of their cells: what is held then includes the given surface.
+// Points to hold: by physical group of the cells or of the skin (then the corners of the cells that hold its
+// points), or those in a box. On a filled body the box takes the skin's points in it too, by the corners of
+// their cells: what is held then includes the given surface.
 std::vector<uint32_t> select(const Selection &where, const BodyMesh &mesh, const std::string &file);
 
 // Weights that sum to 1, one per selected point. triangles: boundary, point numbers.
 std::vector<double> share_by_mass(const std::vector<uint32_t> &points, const BodyMesh &mesh);
-// By boundary area: a third of each triangle whose three corners are selected. Empty if there is no such triangle.
-std::vector<double> share_by_area(const std::vector<uint32_t> &points, const BodyMesh &mesh, const std::vector<uint32_t> &triangles);
+// By boundary area: a third of each triangle whose three corners are selected. Empty if there is no
+// such triangle.
+std::vector<double> share_by_area(const std::vector<uint32_t> &points, const BodyMesh &mesh,
+                                  const std::vector<uint32_t> &triangles);
 
 // Which points carry a force, and how much of it each.
-struct Shared { std::vector<uint32_t> points; std::vector<double> weights; };
-// By area of the skin: a third of each triangle to each of its points, from there to the corners of its cell by its barycentric weights, so
-// that force and torque are those of the traction.
+struct Shared {
+  std::vector<uint32_t> points;
+  std::vector<double> weights;
+};
+// By area of the skin: a third of each triangle to each of its points, from there to the corners of its cell
+// by its barycentric weights, so that force and torque are those of the traction.
 Shared share_on_skin(const std::vector<uint32_t> &triangles, const BodyMesh &mesh);
 Shared share(const Force &force, const BodyMesh &mesh, const std::string &file);
 
-double locate(const BodyMesh &mesh, const double point[3], uint32_t corners[4], double weights[4]);  // see Locator::find
+// see Locator::find
+double locate(const BodyMesh &mesh, const double point[3], uint32_t corners[4], double weights[4]);
 
 // Values of a field for each cell of the mesh, [ntet,width].
 std::vector<double> read_field(const std::string &path, const FieldFile &field, const BodyMesh &mesh);
 
 // Held components and forces by the file's node numbers.
-struct NodalRow { uint32_t point; uint8_t axes; double force[3]; };
+struct NodalRow {
+  uint32_t point;
+  uint8_t axes;
+  double force[3];
+};
 std::vector<NodalRow> read_nodal(const std::string &path, const BodyMesh &mesh);
 
 }  // namespace dfm::scene

@@ -1,5 +1,6 @@
-// The area that a surfel brings to a contact: a third of the triangles around it, as seen along the contact's normal, so that a patch that
-// touches all over adds up to its area and a rim does not count the sides beside it.
+// The area that a surfel brings to a contact: a third of the triangles around it, as seen along the
+// contact's normal, so that a patch that touches all over adds up to its area and a rim does not count the
+// sides beside it.
 #pragma once
 #include "math/vec3.h"
 #include "surfel/surface.h"

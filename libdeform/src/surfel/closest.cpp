@@ -1,4 +1,5 @@
-// Voronoi regions of a triangle are told apart by signs of dot products; no division happens before the region is known.
+// Voronoi regions of a triangle are told apart by signs of dot products; no division happens before the
+// region is known.
 #include "surfel/closest.h"
 
 #include <algorithm>
@@ -6,7 +7,8 @@
 namespace dfm {
 namespace {
 
-constexpr double kSolid = 1e-12;  // squared sine below which a cross product is too much rounding to judge distances by
+// squared sine below which a cross product is too much rounding to judge distances by
+constexpr double kSolid = 1e-12;
 
 TrianglePoint on_corner(Vec3 p, Vec3 a, int corner) {
   TrianglePoint r{a, {0, 0, 0}, norm2(p - a), TriangleFeature(4 + corner)};
@@ -29,7 +31,9 @@ TrianglePoint nearest_edge(Vec3 p, Vec3 a, Vec3 b, Vec3 c) {
   for (int k = 0; k < 3; ++k) {
     const Vec3 from = x[k], to = x[(k + 1) % 3];
     const double t = closest_on_segment(p, from, to);
-    const TrianglePoint q = t <= 0 ? on_corner(p, from, k) : t >= 1 ? on_corner(p, to, (k + 1) % 3) : on_edge(p, from, to, t, k);
+    const TrianglePoint q = t <= 0   ? on_corner(p, from, k)
+                            : t >= 1 ? on_corner(p, to, (k + 1) % 3)
+                                     : on_edge(p, from, to, t, k);
     if (q.distance2 < best.distance2) best = q;
   }
   return best;
@@ -45,8 +49,8 @@ TrianglePoint closest_on_triangle(Vec3 p, Vec3 a, Vec3 b, Vec3 c) {
   if (d3 >= 0 && d4 <= 0) return on_corner(p, b, 1);
   const double d5 = dot(bc, cp), d6 = dot(ac, cp);
   if (d5 >= 0 && d6 >= 0) return on_corner(p, c, 2);
-  // Signed areas of the projection, from cross products with the normal: the differences of products that the textbook form takes lose
-  // all digits on slivers.
+  // Signed areas of the projection, from cross products with the normal: the differences of products that the
+  // textbook form takes lose all digits on slivers.
   const Vec3 n = cross(ab, ac);
   const double nn = norm2(n);
   if (!(nn > 1e-28 * norm2(ab) * norm2(ac))) return nearest_edge(p, a, b, c);
@@ -54,7 +58,8 @@ TrianglePoint closest_on_triangle(Vec3 p, Vec3 a, Vec3 b, Vec3 c) {
   if (wa >= 0 && wb >= 0 && wc >= 0) {
     const double sum = wa + wb + wc, v = wb / sum, w = wc / sum;
     const Vec3 q = a + v * ab + w * ac;
-    return {q, {wa / sum, v, w}, norm2(p - q), TriangleFeature::face};   // never negative, as 1 - v - w might be
+    // never negative, as 1 - v - w might be
+    return {q, {wa / sum, v, w}, norm2(p - q), TriangleFeature::face};
   }
   if (wc <= 0 && d1 >= 0 && d3 <= 0) return on_edge(p, a, b, d1 / (d1 - d3), 0);
   if (wa <= 0 && d4 >= 0 && d5 <= 0) return on_edge(p, b, c, d4 / (d4 - d5), 1);
@@ -85,7 +90,9 @@ SegmentPoints closest_segments(Vec3 p0, Vec3 p1, Vec3 q0, Vec3 q1) {
 
 bool segments_within(Vec3 p0, Vec3 p1, Vec3 q0, Vec3 q1, double limit) {
   for (int k = 0; k < 3; ++k)
-    if (std::max(p0[k], p1[k]) + limit < std::min(q0[k], q1[k]) || std::max(q0[k], q1[k]) + limit < std::min(p0[k], p1[k])) return false;
+    if (std::max(p0[k], p1[k]) + limit < std::min(q0[k], q1[k]) ||
+        std::max(q0[k], q1[k]) + limit < std::min(p0[k], p1[k]))
+      return false;
   // Lines are never further apart than the segments on them. NaN goes on and fails the last comparison.
   const Vec3 u = p1 - p0, w = q1 - q0, n = cross(u, w);
   const double along = dot(n, p0 - q0), nn = norm2(n);
@@ -95,7 +102,8 @@ bool segments_within(Vec3 p0, Vec3 p1, Vec3 q0, Vec3 q1, double limit) {
 
 bool triangle_within(Vec3 p, Vec3 a, Vec3 b, Vec3 c, double limit) {
   for (int k = 0; k < 3; ++k)
-    if (p[k] + limit < std::min({a[k], b[k], c[k]}) || p[k] - limit > std::max({a[k], b[k], c[k]})) return false;
+    if (p[k] + limit < std::min({a[k], b[k], c[k]}) || p[k] - limit > std::max({a[k], b[k], c[k]}))
+      return false;
   const Vec3 u = b - a, w = c - a, n = cross(u, w);
   const double along = dot(n, p - a), nn = norm2(n);
   if (nn > kSolid * norm2(u) * norm2(w) && along * along > limit * limit * (1 + 1e-9) * nn) return false;

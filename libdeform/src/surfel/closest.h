@@ -1,5 +1,5 @@
-// Closest points of a triangle to a point and of two segments. Degenerate input gives finite answers: a triangle without area counts as its
-// edges, an edge without length as a point.
+// Closest points of a triangle to a point and of two segments. Degenerate input gives finite answers: a
+// triangle without area counts as its edges, an edge without length as a point.
 #pragma once
 #include <cstdint>
 
@@ -8,7 +8,15 @@
 namespace dfm {
 
 // Where on a triangle the closest point lies.
-enum class TriangleFeature : uint8_t { face = 0, edge0 = 1, edge1 = 2, edge2 = 3, corner0 = 4, corner1 = 5, corner2 = 6 };
+enum class TriangleFeature : uint8_t {
+  face = 0,
+  edge0 = 1,
+  edge1 = 2,
+  edge2 = 3,
+  corner0 = 4,
+  corner1 = 5,
+  corner2 = 6
+};
 
 struct TrianglePoint {
   Vec3 point;
@@ -26,7 +34,7 @@ inline double closest_on_segment(Vec3 p, Vec3 a, Vec3 b) {
 }
 
 struct SegmentPoints {
-  double s, t;              // on p0-p1 and on q0-q1
+  double s, t;  // on p0-p1 and on q0-q1
   double distance2;
 };
 SegmentPoints closest_segments(Vec3 p0, Vec3 p1, Vec3 q0, Vec3 q1);

@@ -1,5 +1,6 @@
-// What contact/ and friction/ exchange while they solve one sub-step: columns over the contacts, in the contacts' order.
-// Pairs in the tangent plane are [2,stride], 2x2 matrices [4,stride] row-major; stride is a multiple of 8.
+// What contact/ and friction/ exchange while they solve one sub-step: columns over the contacts, in the
+// contacts' order. Pairs in the tangent plane are [2,stride], 2x2 matrices [4,stride] row-major; stride is a
+// multiple of 8.
 #pragma once
 #include <cmath>
 #include <cstdint>
@@ -10,42 +11,52 @@ namespace dfm {
 
 struct ContactState {
   uint32_t n = 0, stride = 0, nstate = 0;
-  Array<uint32_t> law;          // [n] index into the world's law table
+  Array<uint32_t> law;  // [n] index into the world's law table
   // Trial: where the laws are asked.
-  Array<double> fn;             // N
-  Array<double> vt;             // [2,stride] m/s, mean slip of side a against side b
-  Array<double> ft_stop;        // [2,stride] N, force that makes the mean slip zero
-  Array<double> area, dwell;    // m2, s
-  Array<double> bristle;        // [nstate,stride] law state at the start of the sub-step, nstate = most that any law has
+  Array<double> fn;           // N
+  Array<double> vt;           // [2,stride] m/s, mean slip of side a against side b
+  Array<double> ft_stop;      // [2,stride] N, force that makes the mean slip zero
+  Array<double> area, dwell;  // m2, s
+  // [nstate,stride] law state at the start of the sub-step, nstate = most that any law has
+  Array<double> bristle;
   // Answer: the laws there.
-  Array<double> ft;             // [2,stride] N, force on side a
-  Array<double> dft_dvt;        // [4,stride] N s/m
-  Array<double> dft_dfn;        // [2,stride]
-  Array<double> limit;          // N
-  Array<double> bristle_out;    // [nstate,stride]
-  Array<uint8_t> mode;          // 0 open, 1 stick, 2 slip
-  Array<uint8_t> set_valued;    // 1: the law is solved by projection on the disc of radius limit
+  Array<double> ft;           // [2,stride] N, force on side a
+  Array<double> dft_dvt;      // [4,stride] N s/m
+  Array<double> dft_dfn;      // [2,stride]
+  Array<double> limit;        // N
+  Array<double> bristle_out;  // [nstate,stride]
+  Array<uint8_t> mode;        // 0 open, 1 stick, 2 slip
+  Array<uint8_t> set_valued;  // 1: the law is solved by projection on the disc of radius limit
 
   void resize(uint32_t count, uint32_t states) {
-    n = count, nstate = states, stride = (count + 7) & ~7u;
+    n = count;
+    nstate = states;
+    stride = (count + 7) & ~7u;
     for (Array<double> *a : {&fn, &area, &dwell, &limit}) a->resize(stride);
     for (Array<double> *a : {&vt, &ft_stop, &ft, &dft_dfn}) a->resize(size_t(2) * stride);
     dft_dvt.resize(size_t(4) * stride);
-    bristle.resize(size_t(nstate) * stride), bristle_out.resize(size_t(nstate) * stride);
-    law.resize(stride), mode.resize(stride), set_valued.resize(stride);
+    bristle.resize(size_t(nstate) * stride);
+    bristle_out.resize(size_t(nstate) * stride);
+    law.resize(stride);
+    mode.resize(stride);
+    set_valued.resize(stride);
   }
 };
 
-// The part of a law's dft/dvt that dissipates: its symmetric part without the positive eigenvalue. [a b; b c], N s/m, negative semidefinite.
+// The part of a law's dft/dvt that dissipates: its symmetric part without the positive eigenvalue. [a b; b
+// c], N s/m, negative semidefinite.
 struct Slope { double a, b, c; };
 inline Slope dissipative_slope(const ContactState &s, uint32_t i) {
   const uint32_t n = s.stride;
-  const double a = s.dft_dvt[i], c = s.dft_dvt[3 * size_t(n) + i], b = 0.5 * (s.dft_dvt[size_t(n) + i] + s.dft_dvt[2 * size_t(n) + i]);
+  const double a = s.dft_dvt[i];
+  const double c = s.dft_dvt[3 * size_t(n) + i];
+  const double b = 0.5 * (s.dft_dvt[size_t(n) + i] + s.dft_dvt[2 * size_t(n) + i]);
   const double mean = 0.5 * (a + c), dev = 0.5 * (a - c), spread = std::sqrt(dev * dev + b * b);
   const double top = mean + spread, bottom = mean - spread;
   if (bottom >= 0) return {0, 0, 0};
   if (!(top > 0)) return {a, b, c};
-  const double scale = bottom / (top - bottom);   // keep only bottom * p p^T, p p^T = (top I - D) / (top - bottom)
+  // keep only bottom * p p^T, p p^T = (top I - D) / (top - bottom)
+  const double scale = bottom / (top - bottom);
   return {scale * (top - a), scale * -b, scale * (top - c)};
 }
 

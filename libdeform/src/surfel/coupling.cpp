@@ -1,5 +1,5 @@
-// A surfel moves with the tetrahedron that it lies in: its barycentric coordinates at rest are its weights. They reproduce linear fields, also
-// outside the cell, where they extrapolate.
+// A surfel moves with the tetrahedron that it lies in: its barycentric coordinates at rest are its weights.
+// They reproduce linear fields, also outside the cell, where they extrapolate.
 #include <limits>
 
 #include "core/error.h"
@@ -9,13 +9,16 @@
 namespace dfm {
 namespace {
 
-constexpr double kInside = 1e-10;       // a weight above -kInside is inside: a point on a face belongs to the cells on both sides
-constexpr double kNothing = 1.4e-14;    // 64 rounding units: a weight below is zero, so that a surfel on a phyxel is that phyxel
+// a weight above -kInside is inside: a point on a face belongs to the cells on both sides
+constexpr double kInside = 1e-10;
+// 64 rounding units: a weight below is zero, so that a surfel on a phyxel is that phyxel
+constexpr double kNothing = 1.4e-14;
 
 double cell_distance2(Vec3 x, const Vec3 c[4]) {
   constexpr int kFace[4][3] = {{1, 2, 3}, {0, 3, 2}, {0, 1, 3}, {0, 2, 1}};
   double best = std::numeric_limits<double>::infinity();
-  for (const auto &f : kFace) best = std::min(best, closest_on_triangle(x, c[f[0]], c[f[1]], c[f[2]]).distance2);
+  for (const auto &f : kFace)
+    best = std::min(best, closest_on_triangle(x, c[f[0]], c[f[1]], c[f[2]]).distance2);
   return best;
 }
 
@@ -26,12 +29,16 @@ Array<RestBox> cell_boxes(const Memory &memory, const CouplingInput &in, const L
     b.lo = b.hi = rest.point[in.tet[size_t{4} * t]];
     for (int k = 1; k < 4; ++k) {
       const Vec3 x = rest.point[in.tet[size_t{4} * t + size_t(k)]];
-      for (int a = 0; a < 3; ++a) b.lo[a] = std::min(b.lo[a], x[a]), b.hi[a] = std::max(b.hi[a], x[a]);
+      for (int a = 0; a < 3; ++a) {
+        b.lo[a] = std::min(b.lo[a], x[a]);
+        b.hi[a] = std::max(b.hi[a], x[a]);
+      }
     }
     // what kInside calls inside may stand out by that share of the cell
     const Vec3 size = b.hi - b.lo;
     const double more = 4 * kInside * std::max({size.x, size.y, size.z});
-    b.lo -= {more, more, more}, b.hi += {more, more, more};
+    b.lo -= {more, more, more};
+    b.hi += {more, more, more};
   }
   return boxes;
 }
@@ -39,7 +46,8 @@ Array<RestBox> cell_boxes(const Memory &memory, const CouplingInput &in, const L
 }  // namespace
 
 LocalRest::LocalRest(const Memory &memory, const CouplingInput &in)
-    : point(in.npoint, Vec3{}, HookAllocator<Vec3>(memory)), surfel(in.nsurfel, Vec3{}, HookAllocator<Vec3>(memory)) {
+    : point(in.npoint, Vec3{}, HookAllocator<Vec3>(memory)),
+      surfel(in.nsurfel, Vec3{}, HookAllocator<Vec3>(memory)) {
   const Vec3 origin = in.npoint ? load3(in.point) : Vec3{};
   for (uint32_t i = 0; i < in.npoint; ++i) point[i] = load3(in.point + size_t{3} * i) - origin;
   for (uint32_t s = 0; s < in.nsurfel; ++s) surfel[s] = load3(in.surfel + size_t{3} * s) - origin;
@@ -53,9 +61,14 @@ void tet_weights(Vec3 x, const Vec3 c[4], double w[4]) {
   double a = dot(d, n1) * inverse, b = dot(d, n2) * inverse, g = dot(d, n3) * inverse;
   for (int pass = 0; pass < 2; ++pass) {
     const Vec3 r = d - (a * e1 + b * e2 + g * e3);
-    a += dot(r, n1) * inverse, b += dot(r, n2) * inverse, g += dot(r, n3) * inverse;
+    a += dot(r, n1) * inverse;
+    b += dot(r, n2) * inverse;
+    g += dot(r, n3) * inverse;
   }
-  w[0] = 1 - (a + b + g), w[1] = a, w[2] = b, w[3] = g;
+  w[0] = 1 - (a + b + g);
+  w[1] = a;
+  w[2] = b;
+  w[3] = g;
 }
 
 RestCells::RestCells(const Memory &memory, const CouplingInput &in, const LocalRest &rest)
@@ -70,7 +83,8 @@ uint32_t RestCells::find(Vec3 x, double *away) const {
   uint32_t cell = UINT32_MAX;
   tree_.holding(x, [&](uint32_t t) {
     if (t >= cell) return;
-    corners(t), tet_weights(x, c, w);
+    corners(t);
+    tet_weights(x, c, w);
     if (std::min({w[0], w[1], w[2], w[3]}) >= -kInside) cell = t;
   });
   double far2 = 0;
@@ -79,7 +93,10 @@ uint32_t RestCells::find(Vec3 x, double *away) const {
     tree_.near(x, far2, [&](uint32_t t) {
       corners(t);
       const double d2 = cell_distance2(x, c);
-      if (d2 < far2 || (d2 == far2 && t < cell)) far2 = d2, cell = t;
+      if (d2 < far2 || (d2 == far2 && t < cell)) {
+        far2 = d2;
+        cell = t;
+      }
     });
   }
   if (away) *away = std::sqrt(far2);
@@ -100,26 +117,35 @@ double RestCells::row(Vec3 x, RowEntry out[4]) const {
 void append_row(Coupling &out, RowEntry *entries, size_t n) {
   double largest = 0;
   for (size_t i = 0; i < n; ++i) largest = std::max(largest, std::fabs(entries[i].weight));
-  n = size_t(std::remove_if(entries, entries + n, [&](const RowEntry &e) { return std::fabs(e.weight) <= kNothing * largest; }) - entries);
+  n = size_t(std::remove_if(entries, entries + n,
+                            [&](const RowEntry &e) { return std::fabs(e.weight) <= kNothing * largest; }) -
+             entries);
   std::sort(entries, entries + n, [](const RowEntry &a, const RowEntry &b) { return a.col < b.col; });
   // Added up in the order in which gather_surface() adds, the last one completes the sum.
   double before = 0;
   for (size_t i = 0; i + 1 < n; ++i) before += entries[i].weight;
   entries[n - 1].weight = 1 - before;
-  for (size_t i = 0; i < n; ++i) out.col.push_back(entries[i].col), out.weight.push_back(entries[i].weight);
-  if (out.col.size() > UINT32_MAX) fail(DFM_E_NOMEM, "a coupling of more than 4294967295 weights: use barycentric, a smaller support or fewer surfels");
+  for (size_t i = 0; i < n; ++i) {
+    out.col.push_back(entries[i].col);
+    out.weight.push_back(entries[i].weight);
+  }
+  if (out.col.size() > UINT32_MAX)
+    fail(DFM_E_NOMEM,
+         "a coupling of more than 4294967295 weights: use barycentric, a smaller support or fewer surfels");
   out.row.push_back(static_cast<uint32_t>(out.col.size()));
 }
 
 Coupling empty_coupling(const Memory &memory, uint32_t nsurfel) {
-  Coupling out{Array<uint32_t>(HookAllocator<uint32_t>(memory)), Array<uint32_t>(HookAllocator<uint32_t>(memory)),
+  Coupling out{Array<uint32_t>(HookAllocator<uint32_t>(memory)),
+               Array<uint32_t>(HookAllocator<uint32_t>(memory)),
                Array<double>(HookAllocator<double>(memory))};
   out.row.reserve(size_t{nsurfel} + 1);
   out.row.push_back(0);
   return out;
 }
 
-void append_cell_row(const Memory &memory, const CouplingInput &in, const LocalRest &rest, uint32_t surfel, std::optional<RestCells> &cells, Coupling &out) {
+void append_cell_row(const Memory &memory, const CouplingInput &in, const LocalRest &rest, uint32_t surfel,
+                     std::optional<RestCells> &cells, Coupling &out) {
   if (!cells) cells.emplace(memory, in, rest);
   RowEntry row[4];
   out.farthest = std::max(out.farthest, cells->row(rest.surfel[surfel], row));
@@ -131,7 +157,8 @@ Coupling couple_barycentric(const Memory &memory, const CouplingInput &in) {
   const LocalRest rest(memory, in);
   const RestCells cells(memory, in, rest);
   Coupling out = empty_coupling(memory, in.nsurfel);
-  out.col.reserve(size_t{4} * in.nsurfel), out.weight.reserve(size_t{4} * in.nsurfel);
+  out.col.reserve(size_t{4} * in.nsurfel);
+  out.weight.reserve(size_t{4} * in.nsurfel);
   for (uint32_t s = 0; s < in.nsurfel; ++s) {
     RowEntry row[4];
     const double far = cells.row(rest.surfel[s], row);

@@ -1,4 +1,5 @@
-// How the surfels of a surface of its own hang on the phyxels: one sparse matrix N in rest positions, precomputed.
+// How the surfels of a surface of its own hang on the phyxels: one sparse matrix N in rest
+// positions, precomputed.
 #pragma once
 #include <cstdint>
 
@@ -6,21 +7,23 @@
 
 namespace dfm {
 
-// x_s = N x_p. Row s holds the phyxels col[row[s]] .. col[row[s + 1] - 1], ascending, with their weights; each row sums to one.
+// x_s = N x_p. Row s holds the phyxels col[row[s]] .. col[row[s + 1] - 1], ascending, with their weights;
+// each row sums to one.
 struct Coupling {
   Array<uint32_t> row, col;
   Array<double> weight;
-  uint32_t outside = 0;      // surfels outside all cells (barycentric) or with too few phyxels in reach (mls, thesis): nearest ones used
-  double farthest = 0;       // m, distance of the farthest such surfel from its cell
+  // surfels outside all cells (barycentric) or with too few phyxels in reach (mls, thesis): nearest ones used
+  uint32_t outside = 0;
+  double farthest = 0;  // m, distance of the farthest such surfel from its cell
 };
 
 // What couplings are made from, all at rest, m.
 struct CouplingInput {
   uint32_t npoint = 0, ntet = 0, nsurfel = 0;
-  const double *point = nullptr;     // [npoint,3]
-  const uint32_t *tet = nullptr;     // [ntet,4]
-  const double *surfel = nullptr;    // [nsurfel,3]
-  double support = 3;                // mean distances to the ten nearest phyxels
+  const double *point = nullptr;   // [npoint,3]
+  const uint32_t *tet = nullptr;   // [ntet,4]
+  const double *surfel = nullptr;  // [nsurfel,3]
+  double support = 3;              // mean distances to the ten nearest phyxels
 };
 
 Coupling couple_barycentric(const Memory &memory, const CouplingInput &in);

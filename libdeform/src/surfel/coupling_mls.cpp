@@ -1,11 +1,12 @@
-// A surfel takes the motion of the phyxels that reach it, each carried on to the surfel by its own gradient (Zerbato 2010, (3.9), with the corrections
-// of doc/concepts/couplings.md):
+// A surfel takes the motion of the phyxels that reach it, each carried on to the surfel by its own gradient
+// (Zerbato 2010, (3.9), with the corrections of doc/concepts/couplings.md):
 //
 //   u_s = sum_i W_i (u_i + H_i (X_s - X_i)),   W_i = w(|X_s - X_i|, h_i) / sum,   H_i = sum_j w_ij (u_j - u_i) X_ij^T A_i^-1,
 //   A_i = sum_j w_ij X_ij X_ij^T,   X_ij = X_j - X_i,   w_ij = w(|X_ij|, h_i),   w(r, h) = 315/(64 pi h^9) (h^2 - r^2)^3  (3.11)
 //
-// All positions are rest positions, so that this is one row of N. h_i, the support, belongs to the phyxel i. Every term in the sum over i
-// extrapolates linear fields exactly, hence so does the row; without the gradient (Shepard, couple_thesis) only constants are.
+// All positions are rest positions, so that this is one row of N. h_i, the support, belongs to the phyxel i.
+// Every term in the sum over i extrapolates linear fields exactly, hence so does the row; without the
+// gradient (Shepard, couple_thesis) only constants are.
 #include <limits>
 
 #include "surfel/coupling_rows.h"
@@ -13,10 +14,12 @@
 namespace dfm {
 namespace {
 
-constexpr uint32_t kNeighbours = 10;   // whose mean distance is the unit of the support
-constexpr double kFlat = 1e-10;        // det(A / trace A) below this: the neighbors lie in a plane (1/27 for a sphere of them)
+constexpr uint32_t kNeighbours = 10;  // whose mean distance is the unit of the support
+// det(A / trace A) below this: the neighbors lie in a plane (1/27 for a sphere of them)
+constexpr double kFlat = 1e-10;
 
-// (3.11) without its constant factor, which cancels in every quotient; (1 - r2/h2)^3 / h^3 neither over- nor underflows at any scale of length.
+// (3.11) without its constant factor, which cancels in every quotient; (1 - r2/h2)^3 / h^3 neither over- nor
+// underflows at any scale of length.
 double kernel(double r2, double h) {
   const double q = 1 - r2 / (h * h);
   return q > 0 ? q * q * q / (h * h * h) : 0;
@@ -24,33 +27,52 @@ double kernel(double r2, double h) {
 
 struct Symmetric {
   double xx = 0, yy = 0, zz = 0, xy = 0, xz = 0, yz = 0;
-  void add(double w, Vec3 a) { xx += w * a.x * a.x, yy += w * a.y * a.y, zz += w * a.z * a.z, xy += w * a.x * a.y, xz += w * a.x * a.z, yz += w * a.y * a.z; }
+  void add(double w, Vec3 a) {
+    xx += w * a.x * a.x;
+    yy += w * a.y * a.y;
+    zz += w * a.z * a.z;
+    xy += w * a.x * a.y;
+    xz += w * a.x * a.z;
+    yz += w * a.y * a.z;
+  }
 };
 
 // The inverse, unless the vectors lie in a plane.
 bool invert(const Symmetric &s, Symmetric &out) {
   const double trace = s.xx + s.yy + s.zz;
   if (!(trace > 0)) return false;
-  const double f = 1 / trace, a = f * s.xx, b = f * s.yy, c = f * s.zz, d = f * s.xy, e = f * s.xz, g = f * s.yz;
+  const double f = 1 / trace;
+  const double a = f * s.xx;
+  const double b = f * s.yy;
+  const double c = f * s.zz;
+  const double d = f * s.xy;
+  const double e = f * s.xz;
+  const double g = f * s.yz;
   const double cxx = b * c - g * g, cxy = e * g - d * c, cxz = d * g - b * e;
   const double det = a * cxx + d * cxy + e * cxz;
   if (!(det > kFlat)) return false;
   const double scale = f / det;
-  out = {scale * cxx, scale * (a * c - e * e), scale * (a * b - d * d), scale * cxy, scale * cxz, scale * (d * e - a * g)};
+  out = {scale * cxx, scale * (a * c - e * e), scale * (a * b - d * d), scale * cxy,
+         scale * cxz, scale * (d * e - a * g)};
   return true;
 }
 Vec3 operator*(const Symmetric &s, Vec3 v) {
-  return {s.xx * v.x + s.xy * v.y + s.xz * v.z, s.xy * v.x + s.yy * v.y + s.yz * v.z, s.xz * v.x + s.yz * v.y + s.zz * v.z};
+  return {s.xx * v.x + s.xy * v.y + s.xz * v.z, s.xy * v.x + s.yy * v.y + s.yz * v.z,
+          s.xz * v.x + s.yz * v.y + s.zz * v.z};
 }
 
 class Cloud {
  public:
   Cloud(const Memory &memory, const CouplingInput &in)
-      : rest(memory, in), support(in.npoint, 0.0, HookAllocator<double>(memory)), dots_(dots(memory, rest.point)), dot_tree_(memory, dots_),
-        cubes_(find_supports(memory, in.support)), cube_tree_(memory, cubes_) {}
+      : rest(memory, in),
+        support(in.npoint, 0.0, HookAllocator<double>(memory)),
+        dots_(dots(memory, rest.point)),
+        dot_tree_(memory, dots_),
+        cubes_(find_supports(memory, in.support)),
+        cube_tree_(memory, cubes_) {}
 
   LocalRest rest;
-  Array<double> support;          // [npoint] h_i, m
+  Array<double> support;  // [npoint] h_i, m
 
   // Phyxels that reach x, ascending.
   void reaching(Vec3 x, Array<uint32_t> &out) const {
@@ -109,9 +131,16 @@ class Cloud {
 class Neighbourhoods {
  public:
   Neighbourhoods(const Memory &memory, const Cloud &cloud)
-      : cloud_(cloud), known_(cloud.support.size(), Known{}, HookAllocator<Known>(memory)), neighbor_(HookAllocator<uint32_t>(memory)),
+      : cloud_(cloud),
+        known_(cloud.support.size(), Known{}, HookAllocator<Known>(memory)),
+        neighbor_(HookAllocator<uint32_t>(memory)),
         list_(HookAllocator<uint32_t>(memory)) {}
-  struct Known { size_t begin = 0, end = 0; Symmetric inverse; uint8_t state = 0; };   // state 0 not looked at, 1 spans space, 2 flat
+  // state 0 not looked at, 1 spans space, 2 flat
+  struct Known {
+    size_t begin = 0, end = 0;
+    Symmetric inverse;
+    uint8_t state = 0;
+  };
   const Known &of(uint32_t i) {
     Known &k = known_[i];
     if (k.state) return k;
@@ -140,10 +169,15 @@ class Neighbourhoods {
 class RowBuilder {
  public:
   RowBuilder(const Memory &memory, uint32_t npoint)
-      : value_(npoint, 0.0, HookAllocator<double>(memory)), met_(npoint, uint8_t{0}, HookAllocator<uint8_t>(memory)),
-        touched_(HookAllocator<uint32_t>(memory)), row_(HookAllocator<RowEntry>(memory)) {}
+      : value_(npoint, 0.0, HookAllocator<double>(memory)),
+        met_(npoint, uint8_t{0}, HookAllocator<uint8_t>(memory)),
+        touched_(HookAllocator<uint32_t>(memory)),
+        row_(HookAllocator<RowEntry>(memory)) {}
   void add(uint32_t i, double w) {
-    if (!met_[i]) met_[i] = 1, touched_.push_back(i);
+    if (!met_[i]) {
+      met_[i] = 1;
+      touched_.push_back(i);
+    }
     value_[i] += w;
   }
   Array<RowEntry> &take() {
@@ -151,7 +185,8 @@ class RowBuilder {
     std::sort(touched_.begin(), touched_.end());
     for (uint32_t i : touched_) {
       if (value_[i] != 0) row_.push_back({i, value_[i]});
-      value_[i] = 0, met_[i] = 0;
+      value_[i] = 0;
+      met_[i] = 0;
     }
     touched_.clear();
     return row_;
@@ -164,13 +199,17 @@ class RowBuilder {
   Array<RowEntry> row_;
 };
 
-// Rounding in A^-1 of a flat neighborhood grows with its condition: the row is given back the linear fields that it lost, by the least change
-// relative to |w_j|:  w_j += |w_j| p_j . M^-1 (p_s - sum w p),  p = (1, X - X_s),  M = sum |w| p p^T.
+// Rounding in A^-1 of a flat neighborhood grows with its condition: the row is given back the linear fields
+// that it lost, by the least change relative to |w_j|:  w_j += |w_j| p_j . M^-1 (p_s - sum w p),  p = (1, X -
+// X_s),  M = sum |w| p p^T.
 void restore_linear(const Array<Vec3> &point, Vec3 x, Array<RowEntry> &row) {
   double extent2 = 0;
   for (const RowEntry &e : row) extent2 = std::max(extent2, norm2(point[e.col] - x));
   const double unit = extent2 > 0 ? 1 / std::sqrt(extent2) : 0;
-  const auto basis = [&](uint32_t i, double p[4]) { p[0] = 1, store3(p + 1, unit * (point[i] - x)); };
+  const auto basis = [&](uint32_t i, double p[4]) {
+    p[0] = 1;
+    store3(p + 1, unit * (point[i] - x));
+  };
   double m[4][4] = {}, r[4] = {1, 0, 0, 0}, p[4];
   for (const RowEntry &e : row) {
     basis(e.col, p);
@@ -179,11 +218,11 @@ void restore_linear(const Array<Vec3> &point, Vec3 x, Array<RowEntry> &row) {
       for (int b = 0; b <= a; ++b) m[a][b] += std::fabs(e.weight) * p[a] * p[b];
     }
   }
-  for (int a = 0; a < 4; ++a) {     // Cholesky: m = L L^T
+  for (int a = 0; a < 4; ++a) {  // Cholesky: m = L L^T
     for (int b = 0; b <= a; ++b) {
       double s = m[a][b];
       for (int k = 0; k < b; ++k) s -= m[a][k] * m[b][k];
-      if (a == b && !(s > 1e-14 * m[0][0])) return;   // all but flat: what the row has is as good as it gets
+      if (a == b && !(s > 1e-14 * m[0][0])) return;  // all but flat: what the row has is as good as it gets
       m[a][b] = a == b ? std::sqrt(s) : s / m[b][b];
     }
     for (int k = 0; k < a; ++k) r[a] -= m[a][k] * r[k];
@@ -199,9 +238,11 @@ void restore_linear(const Array<Vec3> &point, Vec3 x, Array<RowEntry> &row) {
   }
 }
 
-// One row for each surfel from the phyxels that reach it, but for those that stand back, by `row`; where none does, the row of its cell.
+// One row for each surfel from the phyxels that reach it, but for those that stand back, by `row`; where none
+// does, the row of its cell.
 template <class StandsBack, class Row>
-Coupling couple_by_reach(const Memory &memory, const CouplingInput &in, const Cloud &cloud, const StandsBack &stands_back, const Row &row) {
+Coupling couple_by_reach(const Memory &memory, const CouplingInput &in, const Cloud &cloud,
+                         const StandsBack &stands_back, const Row &row) {
   RowBuilder build(memory, in.npoint);
   std::optional<RestCells> cells;
   Array<uint32_t> reach(HookAllocator<uint32_t>{memory});
@@ -228,35 +269,40 @@ Coupling couple_mls(const Memory &memory, const CouplingInput &in) {
   const Cloud cloud(memory, in);
   const Array<Vec3> &point = cloud.rest.point;
   Neighbourhoods near(memory, cloud);
-  // A phyxel whose neighbors lie in a plane has no gradient to give: it stands back where others reach the surfel.
+  // A phyxel whose neighbors lie in a plane has no gradient to give: it stands back where others
+  // reach the surfel.
   const auto stands_back = [&](uint32_t i) { return near.of(i).state == 2; };
-  return couple_by_reach(memory, in, cloud, stands_back, [&](Vec3 x, const Array<uint32_t> &reach, double sum, RowBuilder &build) -> Array<RowEntry> & {
-    for (uint32_t i : reach) {
-      const Neighbourhoods::Known &k = near.of(i);
-      const double share = kernel(norm2(x - point[i]), cloud.support[i]) / sum;
-      const Vec3 a = share * (k.inverse * (x - point[i]));
-      double back = 0;
-      for (size_t e = k.begin; e < k.end; ++e) {
-        const Vec3 d = point[near[e]] - point[i];
-        const double w = kernel(norm2(d), cloud.support[i]) * dot(d, a);
-        build.add(near[e], w);
-        back += w;
-      }
-      build.add(i, share - back);
-    }
-    Array<RowEntry> &row = build.take();
-    for (int pass = 0; pass < 2; ++pass) restore_linear(point, x, row);
-    return row;
-  });
+  return couple_by_reach(
+      memory, in, cloud, stands_back,
+      [&](Vec3 x, const Array<uint32_t> &reach, double sum, RowBuilder &build) -> Array<RowEntry> & {
+        for (uint32_t i : reach) {
+          const Neighbourhoods::Known &k = near.of(i);
+          const double share = kernel(norm2(x - point[i]), cloud.support[i]) / sum;
+          const Vec3 a = share * (k.inverse * (x - point[i]));
+          double back = 0;
+          for (size_t e = k.begin; e < k.end; ++e) {
+            const Vec3 d = point[near[e]] - point[i];
+            const double w = kernel(norm2(d), cloud.support[i]) * dot(d, a);
+            build.add(near[e], w);
+            back += w;
+          }
+          build.add(i, share - back);
+        }
+        Array<RowEntry> &row = build.take();
+        for (int pass = 0; pass < 2; ++pass) restore_linear(point, x, row);
+        return row;
+      });
 }
 
 Coupling couple_thesis(const Memory &memory, const CouplingInput &in) {
   const Cloud cloud(memory, in);
   const auto never = [](uint32_t) { return false; };
-  return couple_by_reach(memory, in, cloud, never, [&](Vec3 x, const Array<uint32_t> &reach, double sum, RowBuilder &build) -> Array<RowEntry> & {
-    for (uint32_t i : reach) build.add(i, kernel(norm2(x - cloud.rest.point[i]), cloud.support[i]) / sum);
-    return build.take();
-  });
+  return couple_by_reach(
+      memory, in, cloud, never,
+      [&](Vec3 x, const Array<uint32_t> &reach, double sum, RowBuilder &build) -> Array<RowEntry> & {
+        for (uint32_t i : reach) build.add(i, kernel(norm2(x - cloud.rest.point[i]), cloud.support[i]) / sum);
+        return build.take();
+      });
 }
 
 }  // namespace dfm

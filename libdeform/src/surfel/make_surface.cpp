@@ -11,10 +11,10 @@ namespace {
 constexpr double kPatchCosine = 0.5;  // faces within 60 degrees are one patch (doc/concepts/detection.md)
 
 struct Side {
-  uint64_t key;      // {lower surfel, higher surfel}
+  uint64_t key;  // {lower surfel, higher surfel}
   uint32_t tri;
-  uint8_t corner;    // the edge runs from this corner to the next one
-  bool forward;      // from the lower to the higher surfel
+  uint8_t corner;  // the edge runs from this corner to the next one
+  bool forward;    // from the lower to the higher surfel
 };
 
 void number_surfels(uint32_t npoint, const uint32_t *tris, uint32_t ntri, Surface &out) {
@@ -40,7 +40,8 @@ void find_edges(Surface &out) {
       const uint32_t i = out.tri[3 * t + k], j = out.tri[3 * t + (k + 1) % 3];
       sides.push_back({uint64_t{std::min(i, j)} << 32 | std::max(i, j), t, k, i < j});
     }
-  std::sort(sides.begin(), sides.end(), [](const Side &a, const Side &b) { return a.key != b.key ? a.key < b.key : a.tri < b.tri; });
+  std::sort(sides.begin(), sides.end(),
+            [](const Side &a, const Side &b) { return a.key != b.key ? a.key < b.key : a.tri < b.tri; });
   out.edge.clear();
   out.edge_tri.clear();
   out.tri_edge.assign(size_t{3} * out.ntri, kNone);
@@ -102,12 +103,24 @@ void find_fans(Surface &out) {
 
 }  // namespace
 
-void make_surface(const Memory &memory, uint32_t npoint, const double *rest, const uint32_t *boundary_tris, uint32_t ntri, Surface &out) {
+void make_surface(const Memory &memory, uint32_t npoint, const double *rest, const uint32_t *boundary_tris,
+                  uint32_t ntri, Surface &out) {
   const HookAllocator<uint32_t> a(memory);
-  out.tri = Array<uint32_t>(a), out.edge = Array<uint32_t>(a), out.edge_tri = Array<uint32_t>(a), out.tri_edge = Array<uint32_t>(a);
-  out.tri_owns = Array<uint32_t>(a), out.patch = Array<uint32_t>(a), out.point = Array<uint32_t>(a), out.row = Array<uint32_t>(a);
-  out.col = Array<uint32_t>(a), out.weight = Array<double>(a), out.fan_begin = Array<uint32_t>(a), out.fan = Array<uint32_t>(a);
-  out.rest = Array<double>(a), out.x = Array<double>(a), out.v = Array<double>(a);
+  out.tri = Array<uint32_t>(a);
+  out.edge = Array<uint32_t>(a);
+  out.edge_tri = Array<uint32_t>(a);
+  out.tri_edge = Array<uint32_t>(a);
+  out.tri_owns = Array<uint32_t>(a);
+  out.patch = Array<uint32_t>(a);
+  out.point = Array<uint32_t>(a);
+  out.row = Array<uint32_t>(a);
+  out.col = Array<uint32_t>(a);
+  out.weight = Array<double>(a);
+  out.fan_begin = Array<uint32_t>(a);
+  out.fan = Array<uint32_t>(a);
+  out.rest = Array<double>(a);
+  out.x = Array<double>(a);
+  out.v = Array<double>(a);
   number_surfels(npoint, boundary_tris, ntri, out);
   find_edges(out);
 
@@ -121,7 +134,8 @@ void make_surface(const Memory &memory, uint32_t npoint, const double *rest, con
   find_fans(out);
 
   Array<double> length(a);
-  for (uint32_t e = 0; e < out.nedge; ++e) length.push_back(norm(at(out.edge[2 * e + 1]) - at(out.edge[2 * e])));
+  for (uint32_t e = 0; e < out.nedge; ++e)
+    length.push_back(norm(at(out.edge[2 * e + 1]) - at(out.edge[2 * e])));
   if (!length.empty()) {
     std::nth_element(length.begin(), length.begin() + length.size() / 2, length.end());
     out.median_edge = length[length.size() / 2];
@@ -132,9 +146,12 @@ void make_surface(const Memory &memory, uint32_t npoint, const double *rest, con
 }
 
 void wear_coupling(Coupling &&coupling, Surface &surface) {
-  surface.row = std::move(coupling.row), surface.col = std::move(coupling.col), surface.weight = std::move(coupling.weight);
+  surface.row = std::move(coupling.row);
+  surface.col = std::move(coupling.col);
+  surface.weight = std::move(coupling.weight);
   surface.rest = Array<double>(size_t{3} * surface.nsurfel, 0.0, surface.weight.get_allocator());
-  for (uint32_t s = 0; s < surface.nsurfel; ++s) store3(&surface.rest[size_t{3} * s], load3(&surface.x[size_t{4} * s]));
+  for (uint32_t s = 0; s < surface.nsurfel; ++s)
+    store3(&surface.rest[size_t{3} * s], load3(&surface.x[size_t{4} * s]));
   surface.point.clear();
   surface.point.shrink_to_fit();
   for (uint32_t s = 0; s < surface.nsurfel; ++s) {
@@ -145,10 +162,11 @@ void wear_coupling(Coupling &&coupling, Surface &surface) {
 }
 
 void gather_rows(Surface &surface, const double *x, const double *v, uint32_t begin, uint32_t end) {
-  // Half a point: sums of whole ones (32 bytes) are kept in memory by gcc 12 where the machine's vectors are 16, at ten times the cost. The same
-  // operations on each component at every width; the fourth stays zero.
+  // Half a point: sums of whole ones (32 bytes) are kept in memory by gcc 12 where the machine's vectors are
+  // 16, at ten times the cost. The same operations on each component at every width; the fourth stays zero.
   using Half = double __attribute__((vector_size(16)));
-  Half *const xs = reinterpret_cast<Half *>(surface.x.data()), *const vs = reinterpret_cast<Half *>(surface.v.data());
+  Half *const xs = reinterpret_cast<Half *>(surface.x.data());
+  Half *const vs = reinterpret_cast<Half *>(surface.v.data());
   const uint32_t *const row = surface.row.data(), *const col = surface.col.data();
   const double *const weight = surface.weight.data();
   const Half *const xp = reinterpret_cast<const Half *>(x), *const vp = reinterpret_cast<const Half *>(v);
@@ -157,11 +175,19 @@ void gather_rows(Surface &surface, const double *x, const double *v, uint32_t be
     Half x0{0, 0}, x1{0, 0}, v0{0, 0}, v1{0, 0};
     for (uint32_t i = row[s]; i < row[s + 1]; ++i) {
       const size_t from = size_t{2} * col[i];
-      x0 += weight[i] * xp[from], x1 += weight[i] * xp[from + 1];
-      if (v) v0 += weight[i] * vp[from], v1 += weight[i] * vp[from + 1];
+      x0 += weight[i] * xp[from];
+      x1 += weight[i] * xp[from + 1];
+      if (v) {
+        v0 += weight[i] * vp[from];
+        v1 += weight[i] * vp[from + 1];
+      }
     }
-    xs[to] = x0, xs[to + 1] = x1;
-    if (v) vs[to] = v0, vs[to + 1] = v1;
+    xs[to] = x0;
+    xs[to + 1] = x1;
+    if (v) {
+      vs[to] = v0;
+      vs[to + 1] = v1;
+    }
   }
 }
 

@@ -46,7 +46,8 @@ ObstaclePoint ObstacleShape::closest(Vec3 p) const {
   }
   const Vec3 c = end_[0] + closest_on_segment(p, end_[0], end_[1]) * (end_[1] - end_[0]);
   const double d = norm(p - c);
-  const Vec3 n = d > 1e-12 * view_.radius ? (1 / d) * (p - c) : axis_[0];  // on the axis every direction is as good
+  // on the axis every direction is as good
+  const Vec3 n = d > 1e-12 * view_.radius ? (1 / d) * (p - c) : axis_[0];
   return {c + view_.radius * n, n, d - view_.radius, 0};
 }
 
@@ -112,11 +113,16 @@ double ObstacleShape::extent() const {
 
 void ObstacleShape::bounds(double lo[3], double hi[3]) const {
   if (view_.shape == Shape::voxels) {
-    const Vec3 half = 0.5 * (view_.grid->high() - view_.grid->low()), center = 0.5 * (view_.grid->high() + view_.grid->low());
+    const Vec3 half = 0.5 * (view_.grid->high() - view_.grid->low());
+    const Vec3 center = 0.5 * (view_.grid->high() + view_.grid->low());
     for (int k = 0; k < 3; ++k) {
       double c = view_.position[k], r = 0;
-      for (int i = 0; i < 3; ++i) c += axis_[i][k] * center[i], r += std::fabs(axis_[i][k]) * half[i];
-      lo[k] = c - r, hi[k] = c + r;
+      for (int i = 0; i < 3; ++i) {
+        c += axis_[i][k] * center[i];
+        r += std::fabs(axis_[i][k]) * half[i];
+      }
+      lo[k] = c - r;
+      hi[k] = c + r;
     }
     return;
   }

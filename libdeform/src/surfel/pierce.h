@@ -1,5 +1,5 @@
-// Do triangles pass through each other? By signs of volumes as they round: good enough to tell what is through from what is not, where nothing hangs on
-// the last bit.
+// Do triangles pass through each other? By signs of volumes as they round: good enough to tell what is
+// through from what is not, where nothing hangs on the last bit.
 #pragma once
 #include "math/vec3.h"
 #include "surfel/surface.h"
@@ -17,7 +17,9 @@ inline bool pierces(Vec3 p, Vec3 q, const Surface &s, uint32_t triangle) {
   Vec3 x[3];
   for (int k = 0; k < 3; ++k) x[k] = load3(&s.x[4 * size_t{c[k]}]);
   if (!(tet_volume(x[0], x[1], x[2], p) * tet_volume(x[0], x[1], x[2], q) < 0)) return false;
-  const double v0 = tet_volume(p, q, x[0], x[1]), v1 = tet_volume(p, q, x[1], x[2]), v2 = tet_volume(p, q, x[2], x[0]);
+  const double v0 = tet_volume(p, q, x[0], x[1]);
+  const double v1 = tet_volume(p, q, x[1], x[2]);
+  const double v2 = tet_volume(p, q, x[2], x[0]);
   return (v0 >= 0 && v1 >= 0 && v2 >= 0) || (v0 <= 0 && v1 <= 0 && v2 <= 0);
 }
 

@@ -1,4 +1,5 @@
-// A tree of boxes over things at rest (points, cells, supports), for the searches that couplings are made from. Built once, then only asked.
+// A tree of boxes over things at rest (points, cells, supports), for the searches that couplings are made
+// from. Built once, then only asked.
 #pragma once
 #include <algorithm>
 #include <cstdint>
@@ -10,7 +11,8 @@ namespace dfm {
 
 struct RestBox { Vec3 lo, hi; };
 
-// Cut in the middle of the longest side of the boxes' centers, items in order of (center, number): the tree depends on its input alone.
+// Cut in the middle of the longest side of the boxes' centers, items in order of (center, number): the tree
+// depends on its input alone.
 class RestTree {
  public:
   RestTree(const Memory &memory, const Array<RestBox> &boxes);
@@ -20,14 +22,19 @@ class RestTree {
   void holding(Vec3 p, F &&visit) const {
     walk(0, [&](const RestBox &b) { return distance2(b, p) <= 0; }, visit);
   }
-  // Calls visit(item) for every item whose box is no further from p than sqrt(limit2); visit may lower limit2.
+  // Calls visit(item) for every item whose box is no further from p than sqrt(limit2); visit
+  // may lower limit2.
   template <class F>
   void near(Vec3 p, const double &limit2, F &&visit) const {
     if (!node_.empty()) near_node(0, p, limit2, visit);
   }
 
  private:
-  struct Node { RestBox box; uint32_t begin, end, right; };   // items [begin,end); children: the next node and `right`; a leaf has right 0
+  // items [begin,end); children: the next node and `right`; a leaf has right 0
+  struct Node {
+    RestBox box;
+    uint32_t begin, end, right;
+  };
   static constexpr uint32_t kLeaf = 4;
   Array<Node> node_;
   Array<uint32_t> item_;
@@ -41,7 +48,10 @@ class RestTree {
   template <class Enter, class F>
   void walk(uint32_t n, const Enter &enter, F &visit) const {
     if (n >= node_.size() || !enter(node_[n].box)) return;
-    if (node_[n].right) return walk(n + 1, enter, visit), walk(node_[n].right, enter, visit);
+    if (node_[n].right) {
+      walk(n + 1, enter, visit);
+      return walk(node_[n].right, enter, visit);
+    }
     for (uint32_t i = node_[n].begin; i < node_[n].end; ++i)
       if (enter(box_[item_[i]])) visit(item_[i]);
   }

@@ -1,6 +1,7 @@
-// The surface of one body: surfels, triangles, edges, patches, and where each surfel hangs on the body's phyxels.
-// Filled once per topology by make_surface, and by wear_coupling where the body wears a surface of its own; x and v are renewed every sub-step
-// from the phyxels (N x_p).
+// The surface of one body: surfels, triangles, edges, patches, and where each surfel hangs on the
+// body's phyxels.
+// Filled once per topology by make_surface, and by wear_coupling where the body wears a surface of its own; x
+// and v are renewed every sub-step from the phyxels (N x_p).
 #pragma once
 #include <cstdint>
 
@@ -12,21 +13,26 @@ inline constexpr uint32_t kNone = UINT32_MAX;
 
 struct Surface {
   uint32_t nsurfel = 0, ntri = 0, nedge = 0;
-  Array<uint32_t> tri;         // [ntri,3] surfels, counter-clockwise seen from outside
-  Array<uint32_t> edge;        // [nedge,2] surfels i < j, lexicographic
-  Array<uint32_t> edge_tri;    // [nedge,2] the triangles on both sides, kNone where open; first has the edge as i -> j
-  Array<uint32_t> tri_edge;    // [ntri,3] edge k joins corners k and k+1
-  Array<uint32_t> tri_owns;    // [ntri] bits 0-2: owns corner k; bits 3-5: owns edge k. Each surfel and edge has one owner
-  Array<uint32_t> patch;       // [ntri] features that share an edge within 60 degrees of normal (rest shape) are one patch
-  Array<uint32_t> fan_begin, fan;   // [nsurfel+1], triangles around each surfel, ascending
-  double median_edge = 0;      // m, rest
+  Array<uint32_t> tri;   // [ntri,3] surfels, counter-clockwise seen from outside
+  Array<uint32_t> edge;  // [nedge,2] surfels i < j, lexicographic
+  // [nedge,2] the triangles on both sides, kNone where open; first has the edge as i -> j
+  Array<uint32_t> edge_tri;
+  Array<uint32_t> tri_edge;  // [ntri,3] edge k joins corners k and k+1
+  // [ntri] bits 0-2: owns corner k; bits 3-5: owns edge k. Each surfel and edge has one owner
+  Array<uint32_t> tri_owns;
+  // [ntri] features that share an edge within 60 degrees of normal (rest shape) are one patch
+  Array<uint32_t> patch;
+  Array<uint32_t> fan_begin, fan;  // [nsurfel+1], triangles around each surfel, ascending
+  double median_edge = 0;          // m, rest
 
-  // Coupling x_s = N x_p. Identity: row, col, weight and rest are empty and point[s] is surfel s's phyxel. Else N in CSR, columns ascending, and
-  // point is empty.
+  // Coupling x_s = N x_p. Identity: row, col, weight and rest are empty and point[s] is surfel s's phyxel.
+  // Else N in CSR, columns ascending, and point is empty.
   Array<uint32_t> point, row, col;
   Array<double> weight;
-  double weight_sum = 1;       // largest sum of |weight| of a row: how much faster than its phyxels a surfel may be
-  Array<double> rest;          // [nsurfel,3] m, as given; where N does not reproduce linear fields this is not N times the phyxels at rest
+  // largest sum of |weight| of a row: how much faster than its phyxels a surfel may be
+  double weight_sum = 1;
+  // [nsurfel,3] m, as given; where N does not reproduce linear fields this is not N times the phyxels at rest
+  Array<double> rest;
   bool identity() const { return row.empty(); }
   // f(phyxel, weight) for all that surfel s hangs on.
   template <class F>

@@ -9,31 +9,45 @@
 namespace dfm {
 namespace {
 
-constexpr double kMostSupport = 10;     // mean distances; beyond, rows hold hundreds of phyxels and the surface no longer follows the body
-constexpr double kTellOutside = 0.02;   // of the cells' diagonal: further out than a coarse lattice's boundary is from a curved surface
+// mean distances; beyond, rows hold hundreds of phyxels and the surface no longer follows the body
+constexpr double kMostSupport = 10;
+// of the cells' diagonal: further out than a coarse lattice's boundary is from a curved surface
+constexpr double kTellOutside = 0.02;
 
 void check_surface(const dfm_surface_def &def, const char *name) {
-  if (def.size < sizeof(dfm_surface_def)) fail(DFM_E_ARG, "body '%s': surface->size is %u, expected %zu; set it to sizeof", name, def.size, sizeof(dfm_surface_def));
+  if (def.size < sizeof(dfm_surface_def))
+    fail(DFM_E_ARG, "body '%s': surface->size is %u, expected %zu; set it to sizeof", name, def.size,
+         sizeof(dfm_surface_def));
   if (def.coupling < DFM_COUPLING_BARYCENTRIC || def.coupling > DFM_COUPLING_THESIS)
-    fail(DFM_E_ARG, "body '%s': surface->coupling %d is unknown; use DFM_COUPLING_BARYCENTRIC, MLS or THESIS", name, def.coupling);
+    fail(DFM_E_ARG, "body '%s': surface->coupling %d is unknown; use DFM_COUPLING_BARYCENTRIC, MLS or THESIS",
+         name, def.coupling);
   if (!(def.support >= 0 && def.support <= kMostSupport))
-    fail(DFM_E_ARG, "body '%s': surface->support is %g mean distances; it must lie between 0 (which means 3) and %g", name, def.support, kMostSupport);
+    fail(DFM_E_ARG,
+         "body '%s': surface->support is %g mean distances; it must lie between 0 (which means 3) and %g",
+         name, def.support, kMostSupport);
   if (def.npoint < 3 || def.ntriangle < 1 || !def.points || !def.triangles)
-    fail(DFM_E_ARG, "body '%s': its surface has %u points and %u triangles; it needs at least 3 points and 1 triangle", name, def.npoint, def.ntriangle);
+    fail(DFM_E_ARG,
+         "body '%s': its surface has %u points and %u triangles; it needs at least 3 points and 1 triangle",
+         name, def.npoint, def.ntriangle);
   for (size_t i = 0; i < size_t{3} * def.npoint; ++i)
-    if (!std::isfinite(def.points[i])) fail(DFM_E_ARG, "body '%s': surface point %zu is not finite", name, i / 3);
+    if (!std::isfinite(def.points[i]))
+      fail(DFM_E_ARG, "body '%s': surface point %zu is not finite", name, i / 3);
   std::vector<uint8_t> used(def.npoint);
   for (uint32_t t = 0; t < def.ntriangle; ++t) {
     const uint32_t *const c = def.triangles + size_t{3} * t;
     for (int k = 0; k < 3; ++k) {
-      if (c[k] >= def.npoint) fail(DFM_E_ARG, "body '%s': surface triangle %u names point %u of %u", name, t, c[k], def.npoint);
+      if (c[k] >= def.npoint)
+        fail(DFM_E_ARG, "body '%s': surface triangle %u names point %u of %u", name, t, c[k], def.npoint);
       used[c[k]] = 1;
     }
     if (c[0] == c[1] || c[1] == c[2] || c[2] == c[0])
-      fail(DFM_E_ARG, "body '%s': surface triangle %u names a point twice; drop it (dfm_trimesh_create does)", name, t);
+      fail(DFM_E_ARG, "body '%s': surface triangle %u names a point twice; drop it (dfm_trimesh_create does)",
+           name, t);
   }
   for (uint32_t i = 0; i < def.npoint; ++i)
-    if (!used[i]) fail(DFM_E_ARG, "body '%s': surface point %u belongs to no triangle; drop it (dfm_trimesh_create does)", name, i);
+    if (!used[i])
+      fail(DFM_E_ARG, "body '%s': surface point %u belongs to no triangle; drop it (dfm_trimesh_create does)",
+           name, i);
 }
 
 // A closed surface that faces inward would take every outside for its inside.
@@ -46,21 +60,31 @@ void check_outward(const Surface &s, const char *name) {
     const auto x = [&](int k) { return load3(&s.x[size_t{4} * s.tri[size_t{3} * t + size_t(k)]]) - origin; };
     volume += dot(x(0), cross(x(1), x(2))) / 6;
   }
-  if (volume < 0) fail(DFM_E_ARG, "body '%s': its surface is closed and faces inward; turn its triangles (dfm_trimesh_create does)", name);
+  if (volume < 0)
+    fail(DFM_E_ARG,
+         "body '%s': its surface is closed and faces inward; turn its triangles (dfm_trimesh_create does)",
+         name);
 }
 
 double diagonal(const Phyxels &p) {
   Vec3 lo = load3(&p.rest[0]), hi = lo;
   for (uint32_t i = 1; i < p.n; ++i)
-    for (int k = 0; k < 3; ++k) lo[k] = std::min(lo[k], p.rest[size_t{3} * i + size_t(k)]), hi[k] = std::max(hi[k], p.rest[size_t{3} * i + size_t(k)]);
+    for (int k = 0; k < 3; ++k) {
+      lo[k] = std::min(lo[k], p.rest[size_t{3} * i + size_t(k)]);
+      hi[k] = std::max(hi[k], p.rest[size_t{3} * i + size_t(k)]);
+    }
   return norm(hi - lo);
 }
 
 void couple(Body &b, const dfm_surface_def &def) {
   const Memory &m = b.world->memory();
   CouplingInput in;
-  in.npoint = b.p.n, in.ntet = static_cast<uint32_t>(b.tets.size() / 4), in.nsurfel = def.npoint;
-  in.point = b.p.rest.data(), in.tet = b.tets.data(), in.surfel = def.points;
+  in.npoint = b.p.n;
+  in.ntet = static_cast<uint32_t>(b.tets.size() / 4);
+  in.nsurfel = def.npoint;
+  in.point = b.p.rest.data();
+  in.tet = b.tets.data();
+  in.surfel = def.points;
   if (def.support > 0) in.support = def.support;
   Coupling c = def.coupling == DFM_COUPLING_MLS      ? couple_mls(m, in)
                : def.coupling == DFM_COUPLING_THESIS ? couple_thesis(m, in)
@@ -68,11 +92,15 @@ void couple(Body &b, const dfm_surface_def &def) {
   const char *const name = b.name.c_str();
   const double size = diagonal(b.p);
   if (c.farthest > size)
-    fail(DFM_E_ARG, "body '%s': its surface lies up to %g m from its cells, which are %g m across; both must be in the same frame and unit (m)", name,
-         c.farthest, size);
+    fail(DFM_E_ARG,
+         "body '%s': its surface lies up to %g m from its cells, which are %g m across; both must be in the "
+         "same frame and unit (m)",
+         name, c.farthest, size);
   if (c.farthest > kTellOutside * size)
-    b.world->context->logf(DFM_LOG_WARNING, "body '%s': %u of %u surfels hang on the nearest cell from outside, the farthest %g m away; cells that cover the "
-                           "surface follow it better", name, c.outside, def.npoint, c.farthest);
+    b.world->context->logf(DFM_LOG_WARNING,
+                           "body '%s': %u of %u surfels hang on the nearest cell from outside, the farthest "
+                           "%g m away; cells that cover the surface follow it better",
+                           name, c.outside, def.npoint, c.farthest);
   wear_coupling(std::move(c), b.surface);
 }
 
@@ -86,14 +114,19 @@ void make_body_surface(Body &b, const dfm_surface_def *def) {
     check_outward(b.surface, b.name.c_str());
     couple(b, *def);
   } else {
-    const Array<uint32_t> boundary = boundary_triangles(m, static_cast<uint32_t>(b.tets.size() / 4), b.tets.data());
-    make_surface(m, b.p.n, b.p.rest.data(), boundary.data(), static_cast<uint32_t>(boundary.size() / 3), b.surface);
+    const Array<uint32_t> boundary =
+        boundary_triangles(m, static_cast<uint32_t>(b.tets.size() / 4), b.tets.data());
+    make_surface(m, b.p.n, b.p.rest.data(), boundary.data(), static_cast<uint32_t>(boundary.size() / 3),
+                 b.surface);
   }
   gather_surface(b.surface, b.p.x.data(), b.p.v.data());
 }
 
 MeshCoupling::MeshCoupling(const Memory &memory, const Surface &surface)
-    : surface_(surface), row_(HookAllocator<uint32_t>(memory)), col_(HookAllocator<uint32_t>(memory)), weight_(HookAllocator<double>(memory)) {
+    : surface_(surface),
+      row_(HookAllocator<uint32_t>(memory)),
+      col_(HookAllocator<uint32_t>(memory)),
+      weight_(HookAllocator<double>(memory)) {
   if (!surface.identity()) return;
   col_ = surface.point;
   weight_.assign(surface.nsurfel, 1.0);
@@ -103,7 +136,8 @@ MeshCoupling::MeshCoupling(const Memory &memory, const Surface &surface)
 void MeshCoupling::tell(dfm_mesh &mesh) const {
   const bool own = surface_.identity();
   mesh.nsurfel = surface_.nsurfel;
-  mesh.row = own ? row_.data() : surface_.row.data(), mesh.col = own ? col_.data() : surface_.col.data();
+  mesh.row = own ? row_.data() : surface_.row.data();
+  mesh.col = own ? col_.data() : surface_.col.data();
   mesh.weight = own ? weight_.data() : surface_.weight.data();
 }
 

@@ -4,7 +4,8 @@
 
 namespace dfm {
 
-// b.p (rest, x, v) and b.tets stand. Throws Error; tells the log where a surface of its own lies outside the cells.
+// b.p (rest, x, v) and b.tets stand. Throws Error; tells the log where a surface of its own lies
+// outside the cells.
 void make_body_surface(Body &b, const dfm_surface_def *def);
 
 // The coupling as models are told about it; lives as long as the body's surface and this object.
@@ -15,7 +16,7 @@ class MeshCoupling {
 
  private:
   const Surface &surface_;
-  Array<uint32_t> row_, col_;   // of an identity, which needs none otherwise
+  Array<uint32_t> row_, col_;  // of an identity, which needs none otherwise
   Array<double> weight_;
 };
 

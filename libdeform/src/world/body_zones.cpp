@@ -34,7 +34,7 @@ class TriangleIndex {
     }
     std::sort(entries_.begin(), entries_.end());
   }
-  uint32_t find(const uint32_t *corners) const {   // kNone: not on the surface
+  uint32_t find(const uint32_t *corners) const {  // kNone: not on the surface
     const Corners key = sorted(corners);
     const auto at = std::lower_bound(entries_.begin(), entries_.end(), std::pair(key, 0u));
     return at != entries_.end() && at->first == key ? at->second : kNone;
@@ -46,23 +46,30 @@ class TriangleIndex {
 
 void check_groups(const dfm_surface_groups &g, const Body &b, uint32_t npoint) {
   const char *const name = b.name.c_str();
-  if (g.size < sizeof g) fail(DFM_E_ARG, "body '%s': groups->size is %u, expected %zu; set it to sizeof", name, g.size, sizeof g);
+  if (g.size < sizeof g)
+    fail(DFM_E_ARG, "body '%s': groups->size is %u, expected %zu; set it to sizeof", name, g.size, sizeof g);
   if ((g.ngroup && !g.names) || (g.ntriangle && !g.group))
-    fail(DFM_E_ARG, "body '%s': %u groups and %u triangles are announced, but groups->%s is NULL", name, g.ngroup, g.ntriangle, g.ngroup && !g.names ? "names" : "group");
+    fail(DFM_E_ARG, "body '%s': %u groups and %u triangles are announced, but groups->%s is NULL", name,
+         g.ngroup, g.ntriangle, g.ngroup && !g.names ? "names" : "group");
   for (uint32_t k = 0; k < g.ngroup; ++k)
     if (!g.names[k] || !*g.names[k]) fail(DFM_E_ARG, "body '%s': surface group %u has no name", name, k);
   if (!g.triangles && g.ntriangle != b.surface.ntri)
-    fail(DFM_E_ARG, "body '%s': groups are given for %u triangles in the surface's order, which has %u; give groups->triangles to name some of them", name,
-         g.ntriangle, b.surface.ntri);
+    fail(DFM_E_ARG,
+         "body '%s': groups are given for %u triangles in the surface's order, which has %u; give "
+         "groups->triangles to name some of them",
+         name, g.ntriangle, b.surface.ntri);
   for (uint32_t t = 0; t < g.ntriangle; ++t) {
-    if (g.group[t] != UINT32_MAX && g.group[t] >= g.ngroup) fail(DFM_E_ARG, "body '%s': triangle %u of groups is in group %u of %u", name, t, g.group[t], g.ngroup);
+    if (g.group[t] != UINT32_MAX && g.group[t] >= g.ngroup)
+      fail(DFM_E_ARG, "body '%s': triangle %u of groups is in group %u of %u", name, t, g.group[t], g.ngroup);
     for (uint32_t k = 0; g.triangles && k < 3; ++k)
       if (g.triangles[size_t{3} * t + k] >= npoint)
-        fail(DFM_E_ARG, "body '%s': triangle %u of groups names point %u of %u", name, t, g.triangles[size_t{3} * t + k], npoint);
+        fail(DFM_E_ARG, "body '%s': triangle %u of groups names point %u of %u", name, t,
+             g.triangles[size_t{3} * t + k], npoint);
   }
 }
 
-// [ntri] group of each triangle, kNone without. A triangle that is named twice keeps its first group; one inside the body is passed over.
+// [ntri] group of each triangle, kNone without. A triangle that is named twice keeps its first group; one
+// inside the body is passed over.
 std::vector<uint32_t> triangle_groups(const Body &b, const dfm_body_def &def) {
   std::vector<uint32_t> out(b.surface.ntri, kNone);
   if (!def.groups) return out;
@@ -80,8 +87,10 @@ std::vector<uint32_t> triangle_groups(const Body &b, const dfm_body_def &def) {
   return out;
 }
 
-// [ntri] entry of materials.list of the cell that carries each triangle: the cell that it is a face of, or that its middle lies in.
-std::vector<uint32_t> triangle_materials(const Body &b, const dfm_body_def &def, const CellMaterials &materials) {
+// [ntri] entry of materials.list of the cell that carries each triangle: the cell that it is a face of, or
+// that its middle lies in.
+std::vector<uint32_t> triangle_materials(const Body &b, const dfm_body_def &def,
+                                         const CellMaterials &materials) {
   std::vector<uint32_t> out(b.surface.ntri, 0);
   if (materials.of.empty()) return out;
   if (!def.surface) {
@@ -96,12 +105,17 @@ std::vector<uint32_t> triangle_materials(const Body &b, const dfm_body_def &def,
   std::vector<double> middle;
   for (uint32_t t = 0; t < def.surface->ntriangle; ++t) {
     Vec3 sum;
-    for (uint32_t k = 0; k < 3; ++k) sum += load3(def.surface->points + size_t{3} * def.surface->triangles[size_t{3} * t + k]);
+    for (uint32_t k = 0; k < 3; ++k)
+      sum += load3(def.surface->points + size_t{3} * def.surface->triangles[size_t{3} * t + k]);
     for (int k = 0; k < 3; ++k) middle.push_back(sum[k] / 3);
   }
   CouplingInput in;
-  in.npoint = def.npoint, in.ntet = def.ntet, in.nsurfel = b.surface.ntri;
-  in.point = def.points, in.tet = def.tets, in.surfel = middle.data();
+  in.npoint = def.npoint;
+  in.ntet = def.ntet;
+  in.nsurfel = b.surface.ntri;
+  in.point = def.points;
+  in.tet = def.tets;
+  in.surfel = middle.data();
   const Memory &m = b.world->memory();
   const LocalRest rest(m, in);
   const RestCells cells(m, in, rest);
@@ -118,7 +132,9 @@ double friction_of(const Material &m) {
 }
 
 void make_zones(Body &b, const dfm_body_def &def, const CellMaterials &materials, const Material &plain) {
-  const auto name = [&](uint32_t k) { return materials.list[k] == &plain ? std::string() : materials.list[k]->name; };
+  const auto name = [&](uint32_t k) {
+    return materials.list[k] == &plain ? std::string() : materials.list[k]->name;
+  };
   SurfaceZones &zones = b.zones;
   zones.list.clear();
   zones.of = Array<uint32_t>(HookAllocator<uint32_t>(b.world->memory()));
@@ -126,14 +142,16 @@ void make_zones(Body &b, const dfm_body_def &def, const CellMaterials &materials
     zones.list.push_back({"", name(0), friction_of(*materials.list[0])});
     return;
   }
-  const std::vector<uint32_t> group = triangle_groups(b, def), material = triangle_materials(b, def, materials);
+  const std::vector<uint32_t> group = triangle_groups(b, def);
+  const std::vector<uint32_t> material = triangle_materials(b, def, materials);
   std::vector<std::pair<uint32_t, uint32_t>> kinds;
   for (uint32_t t = 0; t < b.surface.ntri; ++t) {
     const std::pair kind(group[t], material[t]);
     const size_t at = size_t(std::find(kinds.begin(), kinds.end(), kind) - kinds.begin());
     if (at == kinds.size()) {
       kinds.push_back(kind);
-      zones.list.push_back({group[t] == kNone ? "" : def.groups->names[group[t]], name(material[t]), friction_of(*materials.list[material[t]])});
+      zones.list.push_back({group[t] == kNone ? "" : def.groups->names[group[t]], name(material[t]),
+                            friction_of(*materials.list[material[t]])});
     }
     zones.of.push_back(uint32_t(at));
   }

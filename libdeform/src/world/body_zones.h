@@ -4,7 +4,7 @@
 
 namespace dfm {
 
-inline constexpr char kFrictionKey[] = "friction";   // a material's entry
+inline constexpr char kFrictionKey[] = "friction";  // a material's entry
 
 // The material's coefficient of friction, or kDefaultFriction where it has none.
 double friction_of(const Material &material);

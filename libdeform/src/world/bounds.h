@@ -1,4 +1,5 @@
-// What numbers a world takes: places that doubles still resolve, speeds that a step can mean, a rest distance that fits its bodies.
+// What numbers a world takes: places that doubles still resolve, speeds that a step can mean, a rest distance
+// that fits its bodies.
 #pragma once
 #include <cstddef>
 
@@ -6,22 +7,27 @@
 
 namespace dfm {
 
-inline constexpr double kLight = 299792458;     // m/s: no component of a velocity is above it
-inline constexpr double kObstacleSpeed = 200;   // m/s, unless the world's def says otherwise
+inline constexpr double kLight = 299792458;    // m/s: no component of a velocity is above it
+inline constexpr double kObstacleSpeed = 200;  // m/s, unless the world's def says otherwise
 
 struct Body;
 struct Obstacle;
 struct World;
 
 // Throw DFM_E_ARG, in one sentence that names `what` (a body, an obstacle, a rigid body with its name).
-void check_velocity(const char *what, const char *name, Vec3 velocity, Vec3 spin = {}, double radius = 0);   // radius: m, what turns
-void check_place(const World &w, const char *what, const char *name, double farthest);              // m, largest coordinate; where d_c is known
-void check_resolved(const char *name, double farthest, double edge);                                 // of a body: by its own median edge
-void check_offset(const World &w);                                                                   // all of them, once d_c is chosen
-// Mean thickness of a body: 2 V / A, the thickness of a sheet, the radius of a rod, two thirds of that of a ball.
+// radius: m, what turns
+void check_velocity(const char *what, const char *name, Vec3 velocity, Vec3 spin = {}, double radius = 0);
+// m, largest coordinate; where d_c is known
+void check_place(const World &w, const char *what, const char *name, double farthest);
+// of a body: by its own median edge
+void check_resolved(const char *name, double farthest, double edge);
+// all of them, once d_c is chosen
+void check_offset(const World &w);
+// Mean thickness of a body: 2 V / A, the thickness of a sheet, the radius of a rod, two thirds of
+// that of a ball.
 double thickness(const Body &b);
 
-double largest_coordinate(const double *x, size_t n, size_t stride);   // m, of n points
+double largest_coordinate(const double *x, size_t n, size_t stride);  // m, of n points
 
 // Motions of obstacles: by their keys and sine when they are made, by their target when dt is known.
 void check_motion_speed(const World &w, const Obstacle &o);

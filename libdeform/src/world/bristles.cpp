@@ -3,10 +3,12 @@
 //   normal turns    contact/store.cpp, transport(): by the smallest rotation that takes it along
 //   surfaces spin   here: about the normal, by half of what each of the two turns
 //   area changes    here: sigma0 A z is kept where A grows, z where A shrinks
-//   bristles slide  here: areas go where the load asks for them (contact/areas.h, contact/exchange.h), as far as sliding renews the bristles
+//   bristles slide  here: areas go where the load asks for them (contact/areas.h, contact/exchange.h), as far
+//   as sliding renews the bristles
 //                   (contact/renewal.h)
 //
-// A surface's turn about n within the sub-step is what its points near the contact did, x -> x': with r from their middle, in the plane of n,
+// A surface's turn about n within the sub-step is what its points near the contact did, x -> x': with r from
+// their middle, in the plane of n,
 //     tan(angle) = sum n . (r x r') / sum r . r'
 // is the rotation of least squares (Kabsch 1976, in the plane); exact for a rigid motion, whatever its size.
 #include "world/bristles.h"
@@ -47,13 +49,15 @@ class Neighborhood {
     double c = 0, s = 0;
     for (uint32_t k = 0; k < count_; ++k) {
       const Vec3 r = at_[k] - from, q = moved_[k] - to;
-      c += dot(r, q) - dot(n, r) * dot(n, q), s += dot(n, cross(r, q));
+      c += dot(r, q) - dot(n, r) * dot(n, q);
+      s += dot(n, cross(r, q));
     }
     return unit_turn(c, s);
   }
 
  private:
-  static constexpr uint32_t kMost = 36;   // corners, counted once per triangle; the first twelve triangles of a fan tell its turn
+  // corners, counted once per triangle; the first twelve triangles of a fan tell its turn
+  static constexpr uint32_t kMost = 36;
   const Body &body_;
   uint32_t count_ = 0;
   Vec3 at_[kMost], moved_[kMost], before_, after_;
@@ -63,9 +67,14 @@ class Neighborhood {
     for (int k = 0; k < 3; ++k) {
       const uint32_t surfel = body_.surface.tri[3 * size_t{t} + size_t(k)];
       Vec3 now;
-      body_.surface.each_phyxel(surfel, [&](uint32_t phyxel, double weight) { now += weight * load3(&body_.p.x[size_t(phyxel) * kStride]); });
-      at_[count_] = load3(&body_.surface.x[4 * size_t{surfel}]), moved_[count_] = now;
-      before_ += at_[count_], after_ += now, ++count_;
+      body_.surface.each_phyxel(surfel, [&](uint32_t phyxel, double weight) {
+        now += weight * load3(&body_.p.x[size_t(phyxel) * kStride]);
+      });
+      at_[count_] = load3(&body_.surface.x[4 * size_t{surfel}]);
+      moved_[count_] = now;
+      before_ += at_[count_];
+      after_ += now;
+      ++count_;
     }
   }
 };
@@ -78,33 +87,46 @@ Turn turn_of(const Body &b, uint8_t type, uint32_t feature, Vec3 n) {
 
 Turn turn_of(const World &w, const StepContext &step, const Obstacle &o, Vec3 n) {
   if (!o.rigid && !o.has_target && !o.moves()) return {1, 0};
-  const double a = step.guard.motion * dot(n, spin_between(o.pose.rotation, o.end_pose(w.time, step.h, step.left).rotation, 1));
-  const double half = 0.5 * a * (1 + a * a / 12);   // tan(a / 2) up to a^5
-  return unit_turn(1 - half * half, 2 * half);   // of length one: what is halved after it counts on that
+  const double a = step.guard.motion *
+                   dot(n, spin_between(o.pose.rotation, o.end_pose(w.time, step.h, step.left).rotation, 1));
+  const double half = 0.5 * a * (1 + a * a / 12);  // tan(a / 2) up to a^5
+  return unit_turn(1 - half * half, 2 * half);     // of length one: what is halved after it counts on that
 }
 
 }  // namespace
 
 void share_areas(World &w, StepContext &step) {
-  const auto counts = [](const LawInstance *law) { return (law->ops->needs & DFM_NEED_AREA) && !(law->ops->flags & DFM_FRIC_SET_VALUED); };
+  const auto counts = [](const LawInstance *law) {
+    return (law->ops->needs & DFM_NEED_AREA) && !(law->ops->flags & DFM_FRIC_SET_VALUED);
+  };
   step.shares = std::any_of(w.law_list.begin(), w.law_list.end(), counts);
-  if (!step.shares) return step.exchange.clear(), step.aim.clear();
+  if (!step.shares) {
+    step.exchange.clear();
+    return step.aim.clear();
+  }
   const uint32_t n = step.rows.n;
-  step.sharing.resize(n), step.aim.resize(n), step.stands.resize(n), step.ways.resize(n), step.renewed.resize(n);
+  step.sharing.resize(n);
+  step.aim.resize(n);
+  step.stands.resize(n);
+  step.ways.resize(n);
+  step.renewed.resize(n);
   step.areas.share(step.contacts, step.rows.impulse.data(), 1.1 * w.offset, step.aim.data());
-  for (uint32_t i = 0; i < n; ++i) step.sharing[i] = counts(w.law_list[step.state.law[i]]) ? step.state.law[i] : kNone;
+  for (uint32_t i = 0; i < n; ++i)
+    step.sharing[i] = counts(w.law_list[step.state.law[i]]) ? step.state.law[i] : kNone;
   step.exchange.list(step.contacts, step.sources, step.sharing.data(), step.aim.data());
   step.renewal.list(step.contacts, step.rows.impulse.data());
   for (uint32_t i = 0; i < n; ++i) {
     const uint32_t m = step.match[i];
     const bool carries = step.sharing[i] != kNone && step.rows.impulse[3 * size_t{i}] > 0;
-    step.stands[i] = carries && m < w.store.due.size() && w.store.law[m] == step.state.law[i] && w.store.due[m] > 0;
+    step.stands[i] =
+        carries && m < w.store.due.size() && w.store.law[m] == step.state.law[i] && w.store.due[m] > 0;
     step.state.area[i] = step.stands[i] ? w.store.due[m] : step.aim[i];
   }
   step.renewal.fill(step.stands.data(), step.aim.data(), step.state.area.data());
 }
 
-// Slid on: beyond what the bristles have taken up. The slip that a law was asked at is known to a hundredth (friction/local_solve.cpp); five count as none.
+// Slid on: beyond what the bristles have taken up. The slip that a law was asked at is known to a hundredth
+// (friction/local_solve.cpp); five count as none.
 void follow_load(World &w, StepContext &step) {
   ContactStore &to = step.next_store;
   const ContactState &s = step.state;
@@ -119,15 +141,18 @@ void follow_load(World &w, StepContext &step) {
     double pairs = 0;
     for (uint32_t k = 0; k + 1 < law.nstate; ++k) {
       if (!law.tangent[k]) continue;
-      const double *const z = &s.bristle[size_t{k} * s.stride + i], *const after = &s.bristle_out[size_t{k} * s.stride + i];
+      const double *const z = &s.bristle[size_t{k} * s.stride + i];
+      const double *const after = &s.bristle_out[size_t{k} * s.stride + i];
       const double a = x - (after[0] - z[0]), b = y - (after[s.stride] - z[s.stride]);
       step.ways[i].slid += std::max(0.0, std::sqrt(a * a + b * b) - 0.05 * far);
       step.ways[i].out += std::sqrt(after[0] * after[0] + after[s.stride] * after[s.stride]);
-      ++pairs, ++k;
+      ++pairs;
+      ++k;
     }
     if (pairs == 0) step.ways[i].slid = far;
   }
-  step.renewal.measure(step.h, step.rows.impulse.data(), step.ways.data(), s.dwell.data(), step.renewed.data());
+  step.renewal.measure(step.h, step.rows.impulse.data(), step.ways.data(), s.dwell.data(),
+                       step.renewed.data());
   step.exchange.pass(step.rows.impulse.data(), step.aim.data());
   for (uint32_t i = 0; i < n; ++i) to.due[i] = s.area[i] + step.renewed[i] * (step.aim[i] - s.area[i]);
 }
@@ -152,8 +177,10 @@ void turn_frames(World &w, StepContext &step) {
     const ContactPoint &c = step.contacts[i];
     const Vec3 n = load3(c.normal), t = load3(&to.tangent[3 * size_t{i}]);
     const Turn a = turn_of(*w.bodies[c.slot_a], c.type_a, c.feature_a, n);
-    const Turn b = c.obstacle ? turn_of(w, step, *w.obstacles[c.slot_b], n) : turn_of(*w.bodies[c.slot_b], c.kind == kEdgeEdge ? 1 : 2, c.feature_b, n);
-    const Turn both{a.c * b.c - a.s * b.s, a.c * b.s + a.s * b.c}, mean = unit_turn(1 + both.c, both.s);   // half of the sum
+    const Turn b = c.obstacle ? turn_of(w, step, *w.obstacles[c.slot_b], n)
+                              : turn_of(*w.bodies[c.slot_b], c.kind == kEdgeEdge ? 1 : 2, c.feature_b, n);
+    // half of the sum
+    const Turn both{a.c * b.c - a.s * b.s, a.c * b.s + a.s * b.c}, mean = unit_turn(1 + both.c, both.s);
     store3(&to.tangent[3 * size_t{i}], mean.c * t + mean.s * cross(n, t));
   }
 }

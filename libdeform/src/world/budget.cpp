@@ -17,7 +17,8 @@ namespace {
 
 // Shares of the budget at which the step begins to go without polish, sweeps and guard pieces.
 constexpr double kNoPolishAt = 0.25, kFewSweepsAt = 0.5, kNoPiecesAt = 0.75;
-// Where none is given, a step may cost this many times what its planned sub-steps cost with nothing in contact.
+// Where none is given, a step may cost this many times what its planned sub-steps cost with
+// nothing in contact.
 constexpr uint64_t kAutomaticFactor = 1000;
 
 struct StepStopped {
@@ -34,12 +35,17 @@ bool take_request(uint64_t world) noexcept {
   bool found = false;
   for (auto &r : requests) {
     uint64_t is = world;
-    if (r.compare_exchange_strong(is, 0)) waiting.fetch_sub(1), found = true;
+    if (r.compare_exchange_strong(is, 0)) {
+      waiting.fetch_sub(1);
+      found = true;
+    }
   }
   return found;
 }
 
-double now() { return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count(); }
+double now() {
+  return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
+}
 
 double used_share(const StepContext &step) {
   const Budget &b = step.budget;
@@ -48,7 +54,8 @@ double used_share(const StepContext &step) {
   return share;
 }
 
-// One list of what a step changes serves writing down and putting back. Room: what putting back may need is reserved before.
+// One list of what a step changes serves writing down and putting back. Room: what putting back may need is
+// reserved before.
 struct Keep {
   std::vector<unsigned char> &out;
   template <class T>
@@ -64,12 +71,17 @@ struct Keep {
     out.insert(out.end(), p, p + a.size() * sizeof(a[0]));
   }
   template <class A>
-  void length(const A &a) { value(uint64_t(a.size())); }
+  void length(const A &a) {
+    value(uint64_t(a.size()));
+  }
 };
 struct PutBack {
   const unsigned char *at;
   template <class T>
-  void value(T &x) { std::memcpy(&x, at, sizeof x), at += sizeof x; }
+  void value(T &x) {
+    std::memcpy(&x, at, sizeof x);
+    at += sizeof x;
+  }
   template <class A>
   void array(A &a) {
     uint64_t n;
@@ -87,38 +99,80 @@ struct PutBack {
 };
 
 template <class R, class F>
-void each_column_of_report(R &r, F f) { f(r.contacts), f(r.frame), f(r.impulse), f(r.slip), f(r.mode); }
+void each_column_of_report(R &r, F f) {
+  f(r.contacts);
+  f(r.frame);
+  f(r.impulse);
+  f(r.slip);
+  f(r.mode);
+}
 
 template <class Stream>
 void changing(Stream &s, World &w) {
   const auto array = [&](auto &a) { s.array(a); };
-  s.value(w.time), s.value(w.stable), s.value(w.inverted), s.value(w.bound_age), s.value(w.worst_body), s.value(w.worst_point);
-  s.value(w.gravity), s.value(w.step_count), s.value(w.sleepers), s.value(w.watch);
+  s.value(w.time);
+  s.value(w.stable);
+  s.value(w.inverted);
+  s.value(w.bound_age);
+  s.value(w.worst_body);
+  s.value(w.worst_point);
+  s.value(w.gravity);
+  s.value(w.step_count);
+  s.value(w.sleepers);
+  s.value(w.watch);
   for (auto &b : w.bodies) {
-    s.array(b->p.x), s.array(b->p.v), s.array(b->model.state), s.array(b->surfel_impulse), s.array(b->method_values), s.array(b->anchor);
-    s.value(b->contact_impulse), s.value(b->energy), s.value(b->slumber), s.value(b->bound);
+    s.array(b->p.x);
+    s.array(b->p.v);
+    s.array(b->model.state);
+    s.array(b->surfel_impulse);
+    s.array(b->method_values);
+    s.array(b->anchor);
+    s.value(b->contact_impulse);
+    s.value(b->energy);
+    s.value(b->slumber);
+    s.value(b->bound);
   }
-  for (auto &o : w.obstacles) s.value(o->pose), s.value(o->has_target);
-  for (auto &set : w.rigid_sets) s.array(set->state), s.array(set->extra), s.array(set->total), s.array(set->impulse), s.value(set->last_h);
-  s.value(w.store.n), s.value(w.store.nstate), s.value(w.store.h);
+  for (auto &o : w.obstacles) {
+    s.value(o->pose);
+    s.value(o->has_target);
+  }
+  for (auto &set : w.rigid_sets) {
+    s.array(set->state);
+    s.array(set->extra);
+    s.array(set->total);
+    s.array(set->impulse);
+    s.value(set->last_h);
+  }
+  s.value(w.store.n);
+  s.value(w.store.nstate);
+  s.value(w.store.h);
   each_column([&](const ContactColumn &, auto &column) { s.array(column); }, w.store);
-  s.value(w.report.n), s.value(w.report.h), each_column_of_report(w.report, array);
+  s.value(w.report.n);
+  s.value(w.report.h);
+  each_column_of_report(w.report, array);
   s.array(w.work);
-  s.length(w.events);   // a step only adds to it, and it may wait for the host for many steps
+  s.length(w.events);  // a step only adds to it, and it may wait for the host for many steps
 }
 
-// The two stores and the two reports change places as sub-steps end, so what is put back may have to fit into the other one.
+// The two stores and the two reports change places as sub-steps end, so what is put back may have to fit into
+// the other one.
 void reserve_others(World &w, StepContext &step) {
-  each_column([](const ContactColumn &, const auto &from, auto &to) { to.reserve(from.size()); }, w.store, step.next_store);
+  each_column([](const ContactColumn &, const auto &from, auto &to) { to.reserve(from.size()); }, w.store,
+              step.next_store);
   std::array<size_t, 5> size{};
   size_t k = 0;
   each_column_of_report(w.report, [&](auto &a) { size[k++] = a.size(); });
-  k = 0, each_column_of_report(step.last_report, [&](auto &a) { a.reserve(size[k++]); });
+  k = 0;
+  each_column_of_report(step.last_report, [&](auto &a) { a.reserve(size[k++]); });
 }
 
 // What the step changes at its start, before it is known whether more has to be kept.
 template <class Stream>
-void changed_at_once(Stream &s, World &w) { s.array(w.step_impulses.pairs), s.value(w.step_impulses.idle), s.value(w.sizes); }
+void changed_at_once(Stream &s, World &w) {
+  s.array(w.step_impulses.pairs);
+  s.value(w.step_impulses.idle);
+  s.value(w.sizes);
+}
 
 void return_to_start(World &w, StepContext &step) {
   PutBack from{step.budget.start.data()};
@@ -130,20 +184,26 @@ void return_to_start(World &w, StepContext &step) {
     gather_active(w);
   }
   const uint64_t cheapened = w.stats.cheapened;
-  w.stats = step.budget.stats, w.stats.cheapened = cheapened;
+  w.stats = step.budget.stats;
+  w.stats.cheapened = cheapened;
   step.guard.forget();
 }
 
 void tell(const World &w, const StepContext &step, StepStopped::Why why, double dt) {
   const unsigned long long number = w.step_count;
-  if (why == StepStopped::asked) return set_last_error(format("step %llu was asked to stop; the state is as before it", number).c_str());
+  if (why == StepStopped::asked)
+    return set_last_error(format("step %llu was asked to stop; the state is as before it", number).c_str());
   const char *const body = w.worst_body ? w.worst_body->name.c_str() : "?";
   if (why == StepStopped::time)
-    return set_last_error(format("step %llu: %g s of simulated time took longer than max_time (%g s); the state is as before it; take a shorter step, or "
-                                 "give it more time", number, dt, w.def.max_time).c_str());
-  set_last_error(format("step %llu: %g s of simulated time need more than %llu units of work (max_work), in contact or in body '%s', whose step bound is the "
-                        "least; the state is as before it; take a shorter step, soften the blow, or raise max_work", number, dt,
-                        static_cast<unsigned long long>(step.budget.limit), body).c_str());
+    return set_last_error(format("step %llu: %g s of simulated time took longer than max_time (%g s); the "
+                                 "state is as before it; take a shorter step, or give it more time",
+                                 number, dt, w.def.max_time)
+                              .c_str());
+  set_last_error(format("step %llu: %g s of simulated time need more than %llu units of work (max_work), in "
+                        "contact or in body '%s', whose step bound is the least; the state is as before it; "
+                        "take a shorter step, soften the blow, or raise max_work",
+                        number, dt, static_cast<unsigned long long>(step.budget.limit), body)
+                     .c_str());
 }
 
 }  // namespace
@@ -161,7 +221,9 @@ uint64_t surface_work(const World &w, const StepContext &step) {
 }
 
 void plan_work(World &w, StepContext &step, uint32_t substeps) {
-  step.budget.limit = w.def.max_work ? w.def.max_work : kAutomaticFactor * substeps * (body_work(w, step) + surface_work(w, step));
+  step.budget.limit = w.def.max_work
+                          ? w.def.max_work
+                          : kAutomaticFactor * substeps * (body_work(w, step) + surface_work(w, step));
 }
 
 void charge(World &w, StepContext &step, uint64_t units) {
@@ -169,11 +231,14 @@ void charge(World &w, StepContext &step, uint64_t units) {
   b.work += units;
   if (b.limit && b.work > b.limit) throw StepStopped{StepStopped::work};
   if (b.end > 0 && now() > b.end) throw StepStopped{StepStopped::time};
-  if (waiting.load(std::memory_order_relaxed) != 0 && take_request(w.handle)) throw StepStopped{StepStopped::asked};
+  if (waiting.load(std::memory_order_relaxed) != 0 && take_request(w.handle))
+    throw StepStopped{StepStopped::asked};
 }
 
 bool spares(StepContext &step, Thrift what) {
-  const double from = what == Thrift::polish ? kNoPolishAt : what == Thrift::sweeps ? kFewSweepsAt : kNoPiecesAt;
+  const double from = what == Thrift::polish   ? kNoPolishAt
+                      : what == Thrift::sweeps ? kFewSweepsAt
+                                               : kNoPiecesAt;
   if (!(used_share(step) > from)) return false;
   step.budget.used = std::max(step.budget.used, what);
   return true;
@@ -191,8 +256,12 @@ void keep_start(World &w, StepContext &step) {
 dfm_status step_within_budget(World &w, double dt, uint32_t *trouble) {
   StepContext &step = *w.steps;
   Budget &b = step.budget;
-  b.work = b.limit = 0, b.kept = false, b.used = Thrift::none, b.stats = w.stats;
-  b.span = w.def.max_time, b.end = b.span > 0 ? now() + b.span : 0;
+  b.work = b.limit = 0;
+  b.kept = false;
+  b.used = Thrift::none;
+  b.stats = w.stats;
+  b.span = w.def.max_time;
+  b.end = b.span > 0 ? now() + b.span : 0;
   b.start.clear();
   Keep to{b.start};
   changed_at_once(to, w);
@@ -205,9 +274,14 @@ dfm_status step_within_budget(World &w, double dt, uint32_t *trouble) {
     *trouble = stopped.why == StepStopped::asked ? DFM_TROUBLE_INTERRUPTED : DFM_TROUBLE_BUDGET;
     ++w.stats.discarded;
   }
-  if (b.used != Thrift::none) *trouble |= DFM_TROUBLE_BUDGET, ++w.stats.cheapened;
-  if (w.events.size() > kMostEvents) w.events.erase(w.events.begin(), w.events.end() - kMostEvents + kEventsAtOnce);
-  w.stats.work = b.work, w.stats.work_max = std::max(w.stats.work_max, b.work);
+  if (b.used != Thrift::none) {
+    *trouble |= DFM_TROUBLE_BUDGET;
+    ++w.stats.cheapened;
+  }
+  if (w.events.size() > kMostEvents)
+    w.events.erase(w.events.begin(), w.events.end() - kMostEvents + kEventsAtOnce);
+  w.stats.work = b.work;
+  w.stats.work_max = std::max(w.stats.work_max, b.work);
   return status;
 }
 
@@ -216,7 +290,10 @@ bool request_stop(uint64_t world) noexcept {
     if (r.load() == world) return true;
   for (auto &r : requests) {
     uint64_t none = 0;
-    if (r.compare_exchange_strong(none, world)) return waiting.fetch_add(1), true;
+    if (r.compare_exchange_strong(none, world)) {
+      waiting.fetch_add(1);
+      return true;
+    }
   }
   return false;
 }

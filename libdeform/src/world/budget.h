@@ -1,5 +1,6 @@
-// What one step may cost, and what stops it on its way; doc/concepts/budget.md. Work is counted in units that depend on the state alone (points, cells,
-// contacts swept), so that a step that is cheapened or discarded by its count is so on every machine, with any number of threads.
+// What one step may cost, and what stops it on its way; doc/concepts/budget.md. Work is counted in units that
+// depend on the state alone (points, cells, contacts swept), so that a step that is cheapened or discarded by
+// its count is so on every machine, with any number of threads.
 #pragma once
 #include <cstdint>
 #include <vector>
@@ -16,22 +17,24 @@ struct World;
 enum class Thrift { none, polish, sweeps, pieces };
 
 struct Budget {
-  uint64_t work = 0, limit = 0;          // units of the present step; limit 0: not planned yet
-  double end = 0;                        // s of the steady clock at which the step has used its time; 0: it may take any
-  double span = 0;                       // s, from the start of the step to `end`
-  Thrift used = Thrift::none;            // the furthest that this step has gone
-  bool kept = false;                     // `start` holds the state before this step
+  uint64_t work = 0, limit = 0;  // units of the present step; limit 0: not planned yet
+  // s of the steady clock at which the step has used its time; 0: it may take any
+  double end = 0;
+  double span = 0;             // s, from the start of the step to `end`
+  Thrift used = Thrift::none;  // the furthest that this step has gone
+  bool kept = false;           // `start` holds the state before this step
   std::vector<unsigned char> start;
-  dfm_world_stats stats{};               // before the step
+  dfm_world_stats stats{};  // before the step
 };
 
-// One step within its budget. Besides what World::step() returns: DFM_DISCARD where the budget is used up or somebody asked the step to stop; the state is
-// then as before the step.
+// One step within its budget. Besides what World::step() returns: DFM_DISCARD where the budget is used up or
+// somebody asked the step to stop; the state is then as before the step.
 dfm_status step_within_budget(World &w, double dt, uint32_t *trouble);
 
 // Of World::step(): the step is going to be cut into so many sub-steps.
 void plan_work(World &w, StepContext &step, uint32_t substeps);
-// Adds units and throws where the step has to end here. Called by the stepping thread only, never while another stage's threads run.
+// Adds units and throws where the step has to end here. Called by the stepping thread only, never while
+// another stage's threads run.
 void charge(World &w, StepContext &step, uint64_t units);
 // Units of one pass over the bodies that are awake: points and cells; surfels.
 uint64_t body_work(const World &w, const StepContext &step);
@@ -41,8 +44,9 @@ bool spares(StepContext &step, Thrift what);
 // The state before the step is written down, once, before anything of it changes.
 void keep_start(World &w, StepContext &step);
 
-// Asks the present step of a world, or if none runs the next one, to stop. Async-signal-safe. False: too many requests wait.
+// Asks the present step of a world, or if none runs the next one, to stop. Async-signal-safe. False: too many
+// requests wait.
 bool request_stop(uint64_t world) noexcept;
-void forget_stop(uint64_t world) noexcept;   // of a world that goes
+void forget_stop(uint64_t world) noexcept;  // of a world that goes
 
 }  // namespace dfm

@@ -28,29 +28,32 @@ struct StageTime {
 };
 
 struct StepContext {
-  double h = 0, left = 0;                              // s: of the sub-step; from its start to the end of the step
+  // s: of the sub-step; from its start to the end of the step
+  double h = 0, left = 0;
   Budget budget;
-  std::vector<StageTime> stage_times;                  // by row of the method's table
+  std::vector<StageTime> stage_times;  // by row of the method's table
 
   // prepare(): the world's entities as the stages see them
-  SceneFacts facts;                                    // what the plan was made from
-  struct { uint64_t tables = 0, plans = 0; } made;     // how often prepare() has made all of this anew, and the plan
+  SceneFacts facts;  // what the plan was made from
+  // how often prepare() has made all of this anew, and the plan
+  struct { uint64_t tables = 0, plans = 0; } made;
   std::vector<BodyView> body_views;
   std::vector<ObstacleView> obstacle_views;
-  std::vector<RigidPlace> rigid_places;                // by obstacle slot; empty without rigid bodies
-  std::vector<uint32_t> rigid_groups;                  // bodies per group, all sets
+  std::vector<RigidPlace> rigid_places;  // by obstacle slot; empty without rigid bodies
+  std::vector<uint32_t> rigid_groups;    // bodies per group, all sets
   std::vector<DofSource> sources;
   std::vector<std::unique_ptr<SelfBody>> self_bodies;  // in id order; those that may touch themselves
 
   // motion
   struct Driven { double *velocity, before; };
-  Array<Driven> driven;                                // held components that this sub-step's motion stage has set
+  // held components that this sub-step's motion stage has set
+  Array<Driven> driven;
   // predict
-  Array<double> free_kinetic;                          // [bodies] J, without contact; of this sub-step
+  Array<double> free_kinetic;  // [bodies] J, without contact; of this sub-step
   // broad, narrow, self
   BroadPhase broad;
   Array<ContactPoint> contacts;
-  Array<uint8_t> lent;                                 // scratch of the narrow phase
+  Array<uint8_t> lent;  // scratch of the narrow phase
 
   // contact <-> friction
   ContactRows rows;
@@ -62,20 +65,23 @@ struct StepContext {
   Array<double> disturbance, best_impulse;
   LawBatches batches;
   Array<double> tangents;
-  Array<uint32_t> match;                               // [contacts] place in the store that the contact goes on from, or kNone
-  Array<uint32_t> block_surfels;                       // responses of self-stepping bodies
+  // [contacts] place in the store that the contact goes on from, or kNone
+  Array<uint32_t> match;
+  Array<uint32_t> block_surfels;  // responses of self-stepping bodies
   Array<double> block_impulse, block_velocity;
-  bool rigid_again = false;                            // a host has answered, and the solve goes on from its last impulses
+  // a host has answered, and the solve goes on from its last impulses
+  bool rigid_again = false;
   AreaShares areas;
   AreaExchange exchange;
-  Array<uint32_t> sharing;                             // law of contacts whose areas follow the load, else kNone
-  bool shares = false;                                 // does any law count by area?
-  Array<double> aim;                                   // [contacts] m2, what they should stand for, if so
+  // law of contacts whose areas follow the load, else kNone
+  Array<uint32_t> sharing;
+  bool shares = false;  // does any law count by area?
+  Array<double> aim;    // [contacts] m2, what they should stand for, if so
   Renewal renewal;
-  Array<uint8_t> stands;                               // [contacts] carries, and has an area that it keeps
+  Array<uint8_t> stands;  // [contacts] carries, and has an area that it keeps
   Array<Renewal::Way> ways;
   Array<double> renewed;
-  std::unique_ptr<MethodBuffers> method;               // of stages that the contact method has for itself
+  std::unique_ptr<MethodBuffers> method;  // of stages that the contact method has for itself
 
   // distribute, guard
   std::vector<ImpulseSink> sinks;
@@ -85,8 +91,9 @@ struct StepContext {
   Report last_report;
   // sleep. With nobody asleep `active` holds all bodies.
   Islands islands;
-  Array<uint32_t> active, woken;                       // slots that the stages work on, ascending; slots woken in this sub-step
-  Array<uint8_t> stirred;                              // [island]
+  // slots that the stages work on, ascending; slots woken in this sub-step
+  Array<uint32_t> active, woken;
+  Array<uint8_t> stirred;  // [island]
 
   explicit StepContext(const Memory &memory);
 };

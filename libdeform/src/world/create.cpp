@@ -1,4 +1,5 @@
-// Bodies and obstacles come into a world: defs are checked, meshes become phyxels and surfels, the model plugin gets its instance.
+// Bodies and obstacles come into a world: defs are checked, meshes become phyxels and surfels, the model
+// plugin gets its instance.
 #include "world/create.h"
 
 #include <algorithm>
@@ -29,27 +30,35 @@ bool finite(const double *p, size_t n) {
 void check_name(World &w, const std::string &name, const char *kind) {
   if (name.empty() || name == "*" || name.rfind("material=", 0) == 0)
     fail(DFM_E_ARG, "%s name '%s' is reserved; choose another", kind, name.c_str());
-  if (w.find_body(name) || w.find_obstacle(name)) fail(DFM_E_ARG, "%s '%s': the name is taken in this world; names are unique", kind, name.c_str());
+  if (w.find_body(name) || w.find_obstacle(name))
+    fail(DFM_E_ARG, "%s '%s': the name is taken in this world; names are unique", kind, name.c_str());
 }
 
 void check_mesh(const dfm_body_def &def, const std::string &name) {
   if (def.npoint < 4 || def.ntet < 1 || !def.points || !def.tets)
-    fail(DFM_E_ARG, "body '%s' has %u points and %u tetrahedra; it needs at least 4 points and 1 tetrahedron", name.c_str(), def.npoint, def.ntet);
+    fail(DFM_E_ARG, "body '%s' has %u points and %u tetrahedra; it needs at least 4 points and 1 tetrahedron",
+         name.c_str(), def.npoint, def.ntet);
   for (uint32_t i = 0; i < def.npoint; ++i)
-    if (!finite(def.points + size_t(3) * i, 3)) fail(DFM_E_ARG, "body '%s': point %u is not finite", name.c_str(), i);
+    if (!finite(def.points + size_t(3) * i, 3))
+      fail(DFM_E_ARG, "body '%s': point %u is not finite", name.c_str(), i);
   std::vector<uint8_t> used(def.npoint);
   for (uint32_t t = 0; t < def.ntet; ++t) {
     const uint32_t *const c = def.tets + size_t(4) * t;
     for (int k = 0; k < 4; ++k) {
-      if (c[k] >= def.npoint) fail(DFM_E_ARG, "body '%s': tetrahedron %u names point %u of %u", name.c_str(), t, c[k], def.npoint);
+      if (c[k] >= def.npoint)
+        fail(DFM_E_ARG, "body '%s': tetrahedron %u names point %u of %u", name.c_str(), t, c[k], def.npoint);
       used[c[k]] = 1;
     }
     if (!(tet_volume(def.points, 3, c) > 0))
-      fail(DFM_E_ARG, "body '%s': tetrahedron %u has no positive volume; turn or remove it (deform mesh info shows such cells)", name.c_str(), t);
+      fail(DFM_E_ARG,
+           "body '%s': tetrahedron %u has no positive volume; turn or remove it (deform mesh info shows such "
+           "cells)",
+           name.c_str(), t);
   }
   const auto unused = std::find(used.begin(), used.end(), uint8_t(0));
   if (unused != used.end())
-    fail(DFM_E_ARG, "body '%s': point %td belongs to no tetrahedron and would have no mass; drop it", name.c_str(), unused - used.begin());
+    fail(DFM_E_ARG, "body '%s': point %td belongs to no tetrahedron and would have no mass; drop it",
+         name.c_str(), unused - used.begin());
 }
 
 void place_phyxels(Body &b, const dfm_body_def &def) {
@@ -78,27 +87,34 @@ Body &create_body(World &w, const dfm_body_def &def) {
   b.name = def.name ? def.name : "body" + std::to_string(w.next_id);
   check_name(w, b.name, "body");
   check_mesh(def, b.name);
-  if (!finite(def.pose.position, 3) || !finite(def.pose.rotation, 4) || !finite(def.velocity, 3) || !finite(def.spin, 3))
+  if (!finite(def.pose.position, 3) || !finite(def.pose.rotation, 4) || !finite(def.velocity, 3) ||
+      !finite(def.spin, 3))
     fail(DFM_E_ARG, "body '%s': pose, velocity and spin must be finite", b.name.c_str());
   Material plain;
   plain.def = dfm_material_def_default();
   const CellMaterials materials = cell_materials(w, def, b.name, plain);
   check_share(def, b.name);
   if (def.material) b.material = resolve<Material>(Kind::material, def.material).name;
-  b.category = def.category, b.collides_with = def.collides_with, b.user = def.user;
+  b.category = def.category;
+  b.collides_with = def.collides_with;
+  b.user = def.user;
 
   const Memory &m = w.memory();
   auto make = [&](Array<double> &a, size_t n) { a = Array<double>(n, 0.0, HookAllocator<double>(m)); };
   Phyxels &p = b.p;
   p.n = def.npoint;
   p.rest = Array<double>(def.points, def.points + size_t(3) * p.n, HookAllocator<double>(m));
-  for (Array<double> *a : {&p.x, &p.v, &p.v_free, &p.f, &p.load, &p.impulse, &p.inv_mass}) make(*a, size_t(kStride) * p.n);
-  make(p.mass, p.n), make(b.ksum, p.n), make(b.csum, p.n);
+  for (Array<double> *a : {&p.x, &p.v, &p.v_free, &p.f, &p.load, &p.impulse, &p.inv_mass})
+    make(*a, size_t(kStride) * p.n);
+  make(p.mass, p.n);
+  make(b.ksum, p.n);
+  make(b.csum, p.n);
   p.held = Array<uint8_t>(p.n, 0, HookAllocator<uint8_t>(m));
   if (def.fixed)
     for (uint32_t i = 0; i < p.n; ++i) p.held[i] = def.fixed[i] & 7;
   b.tets = Array<uint32_t>(def.tets, def.tets + size_t(4) * def.ntet, HookAllocator<uint32_t>(m));
-  if (def.cell_share) b.share = Array<double>(def.cell_share, def.cell_share + def.ntet, HookAllocator<double>(m));
+  if (def.cell_share)
+    b.share = Array<double>(def.cell_share, def.cell_share + def.ntet, HookAllocator<double>(m));
   lump_body(b, def, materials);
   update_inverse_mass(p);
   place_phyxels(b, def);
@@ -118,13 +134,25 @@ Body &create_body(World &w, const dfm_body_def &def) {
   find_unused(b, type, materials);
   std::vector<const char *> field_keys;
   std::vector<const double *> fields;
-  for (const CellField &f : b.fields) field_keys.push_back(f.key.c_str()), fields.push_back(f.values.data());
+  for (const CellField &f : b.fields) {
+    field_keys.push_back(f.key.c_str());
+    fields.push_back(f.values.data());
+  }
   field_keys.push_back(nullptr);
   dfm_mesh mesh{};
-  mesh.size = sizeof mesh, mesh.npoint = p.n, mesh.ncell = def.ntet, mesh.cell = DFM_CELL_TET;
-  mesh.rest = p.rest.data(), mesh.cells = b.tets.data(), mesh.mass = p.mass.data(), mesh.params = values.data();
-  mesh.field_keys = field_keys.data(), mesh.fields = fields.data();
-  mesh.nedge = static_cast<uint32_t>(b.edges.size() / 2), mesh.edges = b.edges.data(), mesh.fixed = p.held.data();
+  mesh.size = sizeof mesh;
+  mesh.npoint = p.n;
+  mesh.ncell = def.ntet;
+  mesh.cell = DFM_CELL_TET;
+  mesh.rest = p.rest.data();
+  mesh.cells = b.tets.data();
+  mesh.mass = p.mass.data();
+  mesh.params = values.data();
+  mesh.field_keys = field_keys.data();
+  mesh.fields = fields.data();
+  mesh.nedge = static_cast<uint32_t>(b.edges.size() / 2);
+  mesh.edges = b.edges.data();
+  mesh.fixed = p.held.data();
   coupling.tell(mesh);
   b.model.create(type, w.context->host, mesh, m, std::move(values));
   if (b.model.stepper) need_ability(w, Ability::self_stepping, "body", b.name);
@@ -151,21 +179,28 @@ constexpr uint32_t kVoxelCells = 262144, kMostVoxelCells = 1u << 28, kFewestVoxe
 void take_triangles(Obstacle &o, const dfm_obstacle_def &def) {
   const char *const name = o.name.c_str();
   if (def.npoint < 3 || def.ntriangle < 1 || !def.points || !def.triangles)
-    fail(DFM_E_ARG, "obstacle '%s': its surface has %u points and %u triangles; it needs at least 3 points and 1 triangle", name, def.npoint,
-         def.ntriangle);
+    fail(DFM_E_ARG,
+         "obstacle '%s': its surface has %u points and %u triangles; it needs at least 3 points and 1 "
+         "triangle",
+         name, def.npoint, def.ntriangle);
   for (uint32_t i = 0; i < def.npoint; ++i)
-    if (!finite(def.points + size_t(3) * i, 3)) fail(DFM_E_ARG, "obstacle '%s': point %u is not finite", name, i);
+    if (!finite(def.points + size_t(3) * i, 3))
+      fail(DFM_E_ARG, "obstacle '%s': point %u is not finite", name, i);
   for (uint32_t t = 0; t < def.ntriangle; ++t) {
     const uint32_t *const c = def.triangles + size_t(3) * t;
     for (int k = 0; k < 3; ++k)
-      if (c[k] >= def.npoint) fail(DFM_E_ARG, "obstacle '%s': triangle %u names point %u of %u", name, t, c[k], def.npoint);
+      if (c[k] >= def.npoint)
+        fail(DFM_E_ARG, "obstacle '%s': triangle %u names point %u of %u", name, t, c[k], def.npoint);
     if (c[0] == c[1] || c[1] == c[2] || c[2] == c[0])
-      fail(DFM_E_ARG, "obstacle '%s': triangle %u names a point twice; drop it (dfm_trimesh_create does)", name, t);
+      fail(DFM_E_ARG, "obstacle '%s': triangle %u names a point twice; drop it (dfm_trimesh_create does)",
+           name, t);
   }
   const Memory &m = o.world->memory();
   o.points = Array<double>(def.points, def.points + size_t(3) * def.npoint, HookAllocator<double>(m));
-  o.triangles = Array<uint32_t>(def.triangles, def.triangles + size_t(3) * def.ntriangle, HookAllocator<uint32_t>(m));
-  o.def.points = o.points.data(), o.def.triangles = o.triangles.data();
+  o.triangles =
+      Array<uint32_t>(def.triangles, def.triangles + size_t(3) * def.ntriangle, HookAllocator<uint32_t>(m));
+  o.def.points = o.points.data();
+  o.def.triangles = o.triangles.data();
 }
 
 double signed_volume(const Obstacle &o) {
@@ -182,19 +217,31 @@ void make_voxels(Obstacle &o, const Memory &memory) {
   const char *const name = o.name.c_str();
   const uint32_t cells = o.def.cells ? o.def.cells : kVoxelCells;
   if (cells < kFewestVoxelCells || cells > kMostVoxelCells)
-    fail(DFM_E_ARG, "obstacle '%s': %u cells; a grid has between %u and %u", name, cells, kFewestVoxelCells, kMostVoxelCells);
+    fail(DFM_E_ARG, "obstacle '%s': %u cells; a grid has between %u and %u", name, cells, kFewestVoxelCells,
+         kMostVoxelCells);
   if (!ObstacleMesh(memory, o.def.npoint, o.points.data(), o.def.ntriangle, o.triangles.data()).closed)
-    fail(DFM_E_ARG, "obstacle '%s': voxels need a closed surface, and this one has open edges or edges of more than two triangles, so no place "
-         "is inside or outside; close it, or use the shape mesh, which takes open ones", name);
+    fail(
+        DFM_E_ARG,
+        "obstacle '%s': voxels need a closed surface, and this one has open edges or edges of more than two "
+        "triangles, so no place is inside or outside; close it, or use the shape mesh, which takes open ones",
+        name);
   if (!(signed_volume(o) > 0))
-    fail(DFM_E_ARG, "obstacle '%s': its surface encloses no volume or faces inward; turn its triangles (dfm_trimesh_create does)", name);
+    fail(DFM_E_ARG,
+         "obstacle '%s': its surface encloses no volume or faces inward; turn its triangles "
+         "(dfm_trimesh_create does)",
+         name);
   o.grid = std::make_unique<VoxelGrid>(memory, o.points.data(), o.def.ntriangle, o.triangles.data(), cells);
   const VoxelGrid &g = *o.grid;
-  o.world->context->logf(DFM_LOG_INFO, "obstacle '%s': voxels of %g m in %.1f MB; distances are wrong by at most %g m at the centers of its triangles",
+  o.world->context->logf(DFM_LOG_INFO,
+                         "obstacle '%s': voxels of %g m in %.1f MB; distances are wrong by at most %g m at "
+                         "the centers of its triangles",
                          name, g.cell(), 1e-6 * double(g.bytes()), g.error());
   if (g.error() > 0.25 * g.cell())
-    o.world->context->logf(DFM_LOG_WARNING, "obstacle '%s': its voxels of %g m are too coarse: distances are wrong by %g m somewhere, as where walls are "
-                           "thinner than two cells; ask for more cells or use the shape mesh", name, g.cell(), g.error());
+    o.world->context->logf(
+        DFM_LOG_WARNING,
+        "obstacle '%s': its voxels of %g m are too coarse: distances are wrong by %g m somewhere, as where "
+        "walls are thinner than two cells; ask for more cells or use the shape mesh",
+        name, g.cell(), g.error());
 }
 
 }  // namespace
@@ -207,17 +254,22 @@ Obstacle &create_obstacle(World &w, const dfm_obstacle_def &def) {
   check_name(w, o.name, "obstacle");
   const char *const name = o.name.c_str();
   if (def.shape > DFM_SHAPE_NONE)
-    fail(DFM_E_ARG, "obstacle '%s': shape %u is unknown; use DFM_SHAPE_PLANE, SPHERE, BOX, CAPSULE, MESH or VOXELS", name, def.shape);
-  if (!finite(def.pose.position, 3) || !finite(def.pose.rotation, 4) || !finite(def.velocity_surface, 3) || !finite(def.sine.amplitude, 3) ||
-      !finite(&def.sine.frequency, 1) || !finite(&def.sine.phase, 1))
+    fail(DFM_E_ARG,
+         "obstacle '%s': shape %u is unknown; use DFM_SHAPE_PLANE, SPHERE, BOX, CAPSULE, MESH or VOXELS",
+         name, def.shape);
+  if (!finite(def.pose.position, 3) || !finite(def.pose.rotation, 4) || !finite(def.velocity_surface, 3) ||
+      !finite(def.sine.amplitude, 3) || !finite(&def.sine.frequency, 1) || !finite(&def.sine.phase, 1))
     fail(DFM_E_ARG, "obstacle '%s': pose, sine and velocity_surface must be finite", name);
-  if ((def.shape == DFM_SHAPE_SPHERE || def.shape == DFM_SHAPE_CAPSULE) && !(def.radius > 0 && std::isfinite(def.radius)))
+  if ((def.shape == DFM_SHAPE_SPHERE || def.shape == DFM_SHAPE_CAPSULE) &&
+      !(def.radius > 0 && std::isfinite(def.radius)))
     fail(DFM_E_ARG, "obstacle '%s': radius %g m; it must be positive and finite", name, def.radius);
   if (def.shape == DFM_SHAPE_CAPSULE && !(def.half_length >= 0 && std::isfinite(def.half_length)))
-    fail(DFM_E_ARG, "obstacle '%s': half_length %g m; it must be finite and not negative", name, def.half_length);
+    fail(DFM_E_ARG, "obstacle '%s': half_length %g m; it must be finite and not negative", name,
+         def.half_length);
   if (def.shape == DFM_SHAPE_BOX)
     for (double s : def.half_size)
-      if (!(s > 0 && std::isfinite(s))) fail(DFM_E_ARG, "obstacle '%s': half_size %g m; all three must be positive and finite", name, s);
+      if (!(s > 0 && std::isfinite(s)))
+        fail(DFM_E_ARG, "obstacle '%s': half_size %g m; all three must be positive and finite", name, s);
   if (def.material) {
     const Material &m = resolve<Material>(Kind::material, def.material);
     if (m.world != &w) fail(DFM_E_HANDLE, "obstacle '%s': its material belongs to another world", name);
@@ -225,15 +277,19 @@ Obstacle &create_obstacle(World &w, const dfm_obstacle_def &def) {
     o.zone = {"", m.name, friction_of(m)};
   }
   o.def = def;
-  if (def.nkey && !def.keys) fail(DFM_E_ARG, "obstacle '%s': %u keys are announced, but keys is NULL", name, def.nkey);
+  if (def.nkey && !def.keys)
+    fail(DFM_E_ARG, "obstacle '%s': %u keys are announced, but keys is NULL", name, def.nkey);
   if (def.nkey) o.keys.assign(def.keys, def.keys + def.nkey);
   check_keys(o.keys, name);
-  o.def.keys = nullptr, o.def.nkey = 0;
-  o.def.points = nullptr, o.def.triangles = nullptr;
+  o.def.keys = nullptr;
+  o.def.nkey = 0;
+  o.def.points = nullptr;
+  o.def.triangles = nullptr;
   if (def.shape == DFM_SHAPE_MESH || def.shape == DFM_SHAPE_VOXELS) take_triangles(o, def);
   else o.def.npoint = o.def.ntriangle = 0;
   if (def.shape == DFM_SHAPE_MESH)
-    o.mesh = std::make_unique<ObstacleMesh>(w.memory(), def.npoint, o.points.data(), def.ntriangle, o.triangles.data());
+    o.mesh = std::make_unique<ObstacleMesh>(w.memory(), def.npoint, o.points.data(), def.ntriangle,
+                                            o.triangles.data());
   if (def.shape == DFM_SHAPE_VOXELS) make_voxels(o, w.memory());
   o.pose = o.pose_at_time(w.time);
   check_motion_speed(w, o);
@@ -247,14 +303,15 @@ Obstacle &create_obstacle(World &w, const dfm_obstacle_def &def) {
   ++w.next_id;
   o.def.name = o.name.c_str();
   w.obstacles.push_back(std::move(owned));
-  wake_all(w);   // it may stand where someone sleeps
+  wake_all(w);  // it may stand where someone sleeps
   w.changed = true;
   return o;
 }
 
 namespace {
 
-// What remembers the removed thing: its contacts end with an event, its friction work leaves the books, and rules that name it go with it.
+// What remembers the removed thing: its contacts end with an event, its friction work leaves the books, and
+// rules that name it go with it.
 void forget(World &w, uint64_t id, bool obstacle, uint64_t handle, const std::string &name) {
   close_slot(w, id, obstacle);
   ContactStore &s = w.store;
@@ -264,11 +321,12 @@ void forget(World &w, uint64_t id, bool obstacle, uint64_t handle, const std::st
       if (s.touching[i]) add_event(w, DFM_EVENT_END, s.id_a[i], s.id_b[i], s.key[i], w.time);
       s.touching[i] = 0;
     }
-  const auto goes = [&](const std::string &side) {   // "body:GROUP" may also be all of another one's name
+  const auto goes = [&](const std::string &side) {  // "body:GROUP" may also be all of another one's name
     return names(side, name) && (side == name || (!w.find_body(side) && !w.find_obstacle(side)));
   };
   const auto named = [&](const auto &rule) { return goes(rule.between[0]) || goes(rule.between[1]); };
-  std::erase_if(w.friction, named), std::erase_if(w.filters, named);
+  std::erase_if(w.friction, named);
+  std::erase_if(w.filters, named);
   std::erase_if(w.work, [&](const PairWork &p) { return p.a == id || p.b == id; });
   handle_destroy(handle);
   w.changed = true;

@@ -1,5 +1,6 @@
-// A law that only one rule refers to takes new parameters in its place: numbers of laws, tables and plan stand, and contacts keep their
-// memory. A law that others share is left to them, and the rule gets one of its own, once.
+// A law that only one rule refers to takes new parameters in its place: numbers of laws, tables and plan
+// stand, and contacts keep their memory. A law that others share is left to them, and the rule gets one of
+// its own, once.
 #include "world/friction_rules.h"
 
 #include <algorithm>
@@ -29,7 +30,8 @@ std::vector<uint8_t> free_laws(const World &w, const FrictionRule *but) {
 }
 
 FrictionRule *find_rule(World &w, const std::string between[2]) {
-  const auto at = std::find_if(w.friction.begin(), w.friction.end(), [&](const FrictionRule &r) { return same_pair(r.between, between); });
+  const auto at = std::find_if(w.friction.begin(), w.friction.end(),
+                               [&](const FrictionRule &r) { return same_pair(r.between, between); });
   return at == w.friction.end() ? nullptr : &*at;
 }
 
@@ -37,9 +39,10 @@ FrictionRule &need_rule(World &w, const char *a, const char *b) {
   const std::string between[2] = {a, b};
   if (FrictionRule *const rule = find_rule(w, between)) return *rule;
   std::vector<std::string> known;
-  for (const FrictionRule &r : w.friction) known.push_back("['" + r.between[0] + "', '" + r.between[1] + "']");
-  fail(DFM_E_ARG, "no rule of friction is for ['%s', '%s'] (rules: %s); dfm_world_add_friction makes one", a, b,
-       known.empty() ? "none" : join(known).c_str());
+  for (const FrictionRule &r : w.friction)
+    known.push_back("['" + r.between[0] + "', '" + r.between[1] + "']");
+  fail(DFM_E_ARG, "no rule of friction is for ['%s', '%s'] (rules: %s); dfm_world_add_friction makes one", a,
+       b, known.empty() ? "none" : join(known).c_str());
 }
 
 bool shared(const World &w, const FrictionRule &rule) {
@@ -47,7 +50,9 @@ bool shared(const World &w, const FrictionRule &rule) {
   return w.laws[rule.law]->by_default || std::any_of(w.friction.begin(), w.friction.end(), refers);
 }
 
-bool same_memory(const LawInstance &a, const LawInstance &b) { return a.type == b.type && a.tangent == b.tangent; }
+bool same_memory(const LawInstance &a, const LawInstance &b) {
+  return a.type == b.type && a.tangent == b.tangent;
+}
 
 // The rule's law, with other values of its parameters.
 void put_params(World &w, FrictionRule &rule, std::vector<double> values) {
@@ -66,21 +71,25 @@ void put_params(World &w, FrictionRule &rule, std::vector<double> values) {
   w.changed = true;
 }
 
-// Does it hold for one pair of things, as a whole? Then its place among the others of this sort does not matter.
+// Does it hold for one pair of things, as a whole? Then its place among the others of this sort
+// does not matter.
 bool names_things(World &w, const FrictionRule &rule) {
-  return std::all_of(rule.between, rule.between + 2, [&](const std::string &side) { return w.find_body(side) || w.find_obstacle(side); });
+  return std::all_of(rule.between, rule.between + 2,
+                     [&](const std::string &side) { return w.find_body(side) || w.find_obstacle(side); });
 }
 
 // The last given wins of rules that weigh the same.
 void move_to_end(World &w, FrictionRule *rule) {
   FrictionRule *const end = w.friction.data() + w.friction.size();
-  if (std::any_of(rule, end, [&](const FrictionRule &r) { return !names_things(w, r); }) && rule + 1 != end) w.changed = true;
+  if (std::any_of(rule, end, [&](const FrictionRule &r) { return !names_things(w, r); }) && rule + 1 != end)
+    w.changed = true;
   std::rotate(rule, rule + 1, end);
 }
 
 }  // namespace
 
-void add_friction_rule(World &w, std::string a, std::string b, const char *law, std::span<const dfm_param_value> given) {
+void add_friction_rule(World &w, std::string a, std::string b, const char *law,
+                       std::span<const dfm_param_value> given) {
   FrictionRule rule{{std::move(a), std::move(b)}, 0};
   w.friction.reserve(w.friction.size() + 1);
   FrictionRule *const before = find_rule(w, rule.between);

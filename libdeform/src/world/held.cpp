@@ -14,7 +14,8 @@ void drop_motions(Body &b, std::span<const uint32_t> points) {
       for (size_t k = 0; k < 3; ++k) m.start[3 * kept + k] = m.start[3 * i + k];
       ++kept;
     }
-    m.points.resize(kept), m.start.resize(3 * kept);
+    m.points.resize(kept);
+    m.start.resize(3 * kept);
   }
   std::erase_if(b.motions, [](const HeldMotion &m) { return m.points.empty(); });
 }

@@ -33,7 +33,8 @@ void find_unused(Body &b, const dfm_type &type, const CellMaterials &cells) {
   const dfm_material_def plain = dfm_material_def_default();
   const auto note = [&](const std::string &key, const std::string &material) {
     const auto same = [&](const Unused &u) { return u.key == key; };
-    if (!has_row(type, key) && std::none_of(b.unused.begin(), b.unused.end(), same)) b.unused.push_back({key, material});
+    if (!has_row(type, key) && std::none_of(b.unused.begin(), b.unused.end(), same))
+      b.unused.push_back({key, material});
   };
   for (const Material *m : cells.list) {
     const dfm_material_def &d = m->def;
@@ -49,14 +50,18 @@ void find_unused(Body &b, const dfm_type &type, const CellMaterials &cells) {
 std::vector<IdleParam> idle_params(const Body &b) {
   std::vector<IdleParam> out;
   const dfm_type &type = *b.model.type;
-  for (const Unused &u : b.unused) out.push_back({u.key, format("%s has no such parameter (material '%s' gives it)", type.id, u.material.c_str()), true});
+  for (const Unused &u : b.unused)
+    out.push_back({u.key,
+                   format("%s has no such parameter (material '%s' gives it)", type.id, u.material.c_str()),
+                   true});
   size_t at = 0;
   for (uint32_t i = 0; i < type.nparam; at += type.params[i++].width) {
     const dfm_param &row = type.params[i];
     const std::string why = b.model.idle_reason(i);
     if (why.empty()) continue;
     const double *const now = &b.model.params[at];
-    const bool chosen = field_of(b, row.key) || std::any_of(now, now + row.width, [&](double x) { return x != row.def; });
+    const bool chosen =
+        field_of(b, row.key) || std::any_of(now, now + row.width, [&](double x) { return x != row.def; });
     if (chosen || from_material(row.key)) out.push_back({row.key, why, chosen});
   }
   return out;
@@ -64,7 +69,9 @@ std::vector<IdleParam> idle_params(const Body &b) {
 
 void warn_of_idle(const Body &b) {
   for (const IdleParam &p : idle_params(b))
-    if (p.chosen) b.world->context->logf(DFM_LOG_WARNING, "body '%s': %s has no effect, or not the one it names: %s", b.name.c_str(), p.key.c_str(), p.why.c_str());
+    if (p.chosen)
+      b.world->context->logf(DFM_LOG_WARNING, "body '%s': %s has no effect, or not the one it names: %s",
+                             b.name.c_str(), p.key.c_str(), p.why.c_str());
 }
 
 }  // namespace dfm

@@ -1,4 +1,5 @@
-// Parameters of a body that do nothing: those of its materials that its model lacks, and those that the model says have no effect now.
+// Parameters of a body that do nothing: those of its materials that its model lacks, and those that the model
+// says have no effect now.
 #pragma once
 #include <string>
 #include <vector>
@@ -10,14 +11,15 @@ namespace dfm {
 
 struct IdleParam {
   std::string key, why;
-  bool chosen;   // not the default: somebody set it and expects something of it
+  bool chosen;  // not the default: somebody set it and expects something of it
 };
 
-// Entries of the materials that the model has no parameter for and that are not at their default, into b.unused. Friction is the pairs' to use.
+// Entries of the materials that the model has no parameter for and that are not at their default, into
+// b.unused. Friction is the pairs' to use.
 void find_unused(Body &b, const dfm_type &type, const CellMaterials &cells);
 
-// b.unused, then what the model's extension "dfm.idle/1" says about the present parameters, in the order of its table; those at their default only
-// where a material has them.
+// b.unused, then what the model's extension "dfm.idle/1" says about the present parameters, in the order of
+// its table; those at their default only where a material has them.
 std::vector<IdleParam> idle_params(const Body &b);
 
 // One warning for each that was chosen.

@@ -1,4 +1,5 @@
-// Union-find with the lowest number as each set's root: the root of an island is its first member, so numbering needs no sort.
+// Union-find with the lowest number as each set's root: the root of an island is its first member, so
+// numbering needs no sort.
 #include "world/islands.h"
 
 #include <algorithm>
@@ -7,11 +8,15 @@ namespace dfm {
 
 Islands::Islands(const Memory &m) { use_memory(m, of, begin, member); }
 
-void Islands::reserve(uint32_t n) { of.reserve(n), begin.reserve(size_t{n} + 1), member.reserve(n); }
+void Islands::reserve(uint32_t n) {
+  of.reserve(n);
+  begin.reserve(size_t{n} + 1);
+  member.reserve(n);
+}
 
 void Islands::start(uint32_t n) {
   of.resize(n);
-  for (uint32_t i = 0; i < n; ++i) of[i] = i;   // until finish(): a thing nearer to the root
+  for (uint32_t i = 0; i < n; ++i) of[i] = i;  // until finish(): a thing nearer to the root
   count = 0;
 }
 
@@ -21,7 +26,8 @@ uint32_t Islands::root(uint32_t a) {
 }
 
 void Islands::join(uint32_t a, uint32_t b) {
-  a = root(a), b = root(b);
+  a = root(a);
+  b = root(b);
   if (a < b) of[b] = a;
   else of[a] = b;
 }

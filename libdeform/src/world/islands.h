@@ -1,5 +1,6 @@
-// Islands: sets of things that touch each other, directly or through others. What holds for one of them may depend on all of its own and on
-// nothing outside; so sleep, and whatever else goes by groups that touch, is decided by island. Made only by those who ask.
+// Islands: sets of things that touch each other, directly or through others. What holds for one of them may
+// depend on all of its own and on nothing outside; so sleep, and whatever else goes by groups that touch, is
+// decided by island. Made only by those who ask.
 #pragma once
 #include <cstdint>
 
@@ -7,15 +8,16 @@
 
 namespace dfm {
 
-// Things are numbers 0..n-1 (body slots; whoever wants more kinds puts them behind). start(), join() any pairs, finish(); then the columns
-// hold. Order is that of the lowest number in each island, whatever the order of the pairs.
+// Things are numbers 0..n-1 (body slots; whoever wants more kinds puts them behind). start(), join() any
+// pairs, finish(); then the columns hold. Order is that of the lowest number in each island, whatever the
+// order of the pairs.
 struct Islands {
   uint32_t count = 0;
-  Array<uint32_t> of;               // [n] island of each thing
-  Array<uint32_t> begin, member;    // [count+1], [n] things by island, ascending
+  Array<uint32_t> of;             // [n] island of each thing
+  Array<uint32_t> begin, member;  // [count+1], [n] things by island, ascending
 
   explicit Islands(const Memory &memory);
-  void reserve(uint32_t n);         // start() with as many allocates nothing
+  void reserve(uint32_t n);  // start() with as many allocates nothing
   void start(uint32_t n);
   void join(uint32_t a, uint32_t b);
   void finish();

@@ -1,4 +1,5 @@
-// What a body is made of, cell by cell: density, share of each cell that is material, and the model's parameters that differ between cells.
+// What a body is made of, cell by cell: density, share of each cell that is material, and the model's
+// parameters that differ between cells.
 #pragma once
 #include <string>
 #include <vector>
@@ -9,12 +10,13 @@ namespace dfm {
 
 // The materials of a body's cells. One entry in `list`: the same everywhere, and `of` is empty.
 struct CellMaterials {
-  std::vector<const Material *> list;   // by first cell
-  std::vector<uint32_t> of;             // [ntet] index into list
+  std::vector<const Material *> list;  // by first cell
+  std::vector<uint32_t> of;            // [ntet] index into list
 };
 
 // Throws Error(HANDLE) for a material that is none or belongs to another world. `plain` stands for handle 0.
-CellMaterials cell_materials(const World &w, const dfm_body_def &def, const std::string &body, const Material &plain);
+CellMaterials cell_materials(const World &w, const dfm_body_def &def, const std::string &body,
+                             const Material &plain);
 
 // Throws Error(ARG) for a share outside (0,1].
 void check_share(const dfm_body_def &def, const std::string &body);
@@ -22,8 +24,10 @@ void check_share(const dfm_body_def &def, const std::string &body);
 // Lumped mass of all points into b.p.mass; b.mass and b.rest_volume.
 void lump_body(Body &b, const dfm_body_def &def, const CellMaterials &cells);
 
-// Values of the model's parameters for the whole body, as its table orders them; those that differ by cell go to b.fields. A parameter comes
-// from the def's fields, else from its model_params, else from the cells' materials, else it is the default; a share then scales "young".
-std::vector<double> model_values(const World &w, Body &b, const dfm_type &type, const dfm_body_def &def, const CellMaterials &cells);
+// Values of the model's parameters for the whole body, as its table orders them; those that differ by cell go
+// to b.fields. A parameter comes from the def's fields, else from its model_params, else from the cells'
+// materials, else it is the default; a share then scales "young".
+std::vector<double> model_values(const World &w, Body &b, const dfm_type &type, const dfm_body_def &def,
+                                 const CellMaterials &cells);
 
 }  // namespace dfm

@@ -11,32 +11,43 @@ namespace dfm {
 
 dfm_body_measure measure(Body &b) {
   dfm_body_measure m{};
-  m.mass = b.mass, m.rest_volume = b.rest_volume;
+  m.mass = b.mass;
+  m.rest_volume = b.rest_volume;
   const Phyxels &p = b.p;
   Vec3 com, momentum;
   double kinetic = 0, fastest = 0;
   for (uint32_t i = 0; i < p.n; ++i) {
     const Vec3 x = load3(&p.x[size_t(i) * kStride]), v = load3(&p.v[size_t(i) * kStride]);
-    com += p.mass[i] * x, momentum += p.mass[i] * v;
-    kinetic += 0.5 * p.mass[i] * norm2(v), fastest = std::max(fastest, norm2(v));
+    com += p.mass[i] * x;
+    momentum += p.mass[i] * v;
+    kinetic += 0.5 * p.mass[i] * norm2(v);
+    fastest = std::max(fastest, norm2(v));
   }
   com = (1 / b.mass) * com;
   const Vec3 velocity = (1 / b.mass) * momentum;
   Vec3 angular;
   for (uint32_t i = 0; i < p.n; ++i)
-    angular += p.mass[i] * cross(load3(&p.x[size_t(i) * kStride]) - com, load3(&p.v[size_t(i) * kStride]) - velocity);
+    angular += p.mass[i] *
+               cross(load3(&p.x[size_t(i) * kStride]) - com, load3(&p.v[size_t(i) * kStride]) - velocity);
   for (size_t t = 0; t < b.tets.size(); t += 4) {
     const double v = tet_volume(p.x.data(), kStride, &b.tets[t]);
-    m.volume += b.share.empty() ? v : b.share[t / 4] * v, m.inverted += v < 0;
+    m.volume += b.share.empty() ? v : b.share[t / 4] * v;
+    m.inverted += v < 0;
   }
-  store3(m.com, com), store3(m.velocity, velocity), store3(m.momentum, momentum), store3(m.angular, angular);
-  store3(m.contact_impulse, b.contact_impulse + (b.slumber.asleep ? b.world->time - b.slumber.since : 0) * b.slumber.force);
-  m.kinetic = kinetic, m.speed_max = std::sqrt(fastest);
+  store3(m.com, com);
+  store3(m.velocity, velocity);
+  store3(m.momentum, momentum);
+  store3(m.angular, angular);
+  store3(m.contact_impulse,
+         b.contact_impulse + (b.slumber.asleep ? b.world->time - b.slumber.since : 0) * b.slumber.force);
+  m.kinetic = kinetic;
+  m.speed_max = std::sqrt(fastest);
   m.elastic = NAN;
   if ((b.model.ops->caps & DFM_CAP_ENERGY) && b.model.ops->energy) {
     double joule = 0;
     const dfm_kin k = b.kin(b.world->time, 0, nullptr);
-    if (b.model.call("energy", [&] { return b.model.ops->energy(b.model.self, &k, &joule); }) == DFM_OK) m.elastic = joule;
+    if (b.model.call("energy", [&] { return b.model.ops->energy(b.model.self, &k, &joule); }) == DFM_OK)
+      m.elastic = joule;
   }
   return m;
 }
@@ -45,9 +56,12 @@ void energy_density(Body &b, double *out) {
   const dfm_cell_energy *e = nullptr;
   if (b.model.ops->extension)
     b.model.call("extension", [&] {
-      return e = static_cast<const dfm_cell_energy *>(b.model.ops->extension(b.model.self, DFM_EXT_CELL_ENERGY)), DFM_OK;
+      e = static_cast<const dfm_cell_energy *>(b.model.ops->extension(b.model.self, DFM_EXT_CELL_ENERGY));
+      return DFM_OK;
     });
-  if (!e) fail(DFM_E_UNSUPPORTED, "model '%s' of body '%s' offers no energy per cell", b.model.type->id, b.name.c_str());
+  if (!e)
+    fail(DFM_E_UNSUPPORTED, "model '%s' of body '%s' offers no energy per cell", b.model.type->id,
+         b.name.c_str());
   const dfm_kin k = b.kin(b.world->time, 0, nullptr);
   if (b.model.call("cell_energy", [&] { return e->cell_energy(b.model.self, &k, out); }) != DFM_OK)
     fail(DFM_E_FATAL, "model '%s' could not give its energy per cell", b.model.type->id);
@@ -77,27 +91,38 @@ class EffectsAtWork {
 
 void set_model_params(Body &b, const dfm_params &params) {
   const dfm_type &type = *b.model.type;
-  if (params.n && !params.values) fail(DFM_E_ARG, "body '%s': %u parameters are announced, but params.values is NULL", b.name.c_str(), params.n);
+  if (params.n && !params.values)
+    fail(DFM_E_ARG, "body '%s': %u parameters are announced, but params.values is NULL", b.name.c_str(),
+         params.n);
   const std::span<const dfm_param_value> given(params.values, params.n);
   for (const dfm_param_value &value : given)
     for (const CellField &f : b.fields)
       if (value.key && f.key == value.key)
-        fail(DFM_E_ARG, "body '%s': parameter '%s' differs by cell (from %s), so one value cannot replace it while it runs; make the body anew",
+        fail(DFM_E_ARG,
+             "body '%s': parameter '%s' differs by cell (from %s), so one value cannot replace it while it "
+             "runs; make the body anew",
              b.name.c_str(), f.key.c_str(), f.from.c_str());
   std::vector<double> values = changed_params(type, given, b.model.params);
   size_t at = 0;
   for (uint32_t i = 0; i < type.nparam; at += type.params[i++].width)
-    if (!(type.params[i].flags & DFM_PARAM_RUNTIME) && !std::equal(&values[at], &values[at] + type.params[i].width, &b.model.params[at]))
-      fail(DFM_E_ARG, "body '%s': parameter '%s' of model '%s' cannot change while it runs", b.name.c_str(), type.params[i].key, type.id);
-  if (!b.model.ops->set_params) fail(DFM_E_UNSUPPORTED, "model '%s' takes no parameters while it runs", type.id);
+    if (!(type.params[i].flags & DFM_PARAM_RUNTIME) &&
+        !std::equal(&values[at], &values[at] + type.params[i].width, &b.model.params[at]))
+      fail(DFM_E_ARG, "body '%s': parameter '%s' of model '%s' cannot change while it runs", b.name.c_str(),
+           type.params[i].key, type.id);
+  if (!b.model.ops->set_params)
+    fail(DFM_E_UNSUPPORTED, "model '%s' takes no parameters while it runs", type.id);
   const EffectsAtWork before(b.model);
-  const dfm_status status = b.model.call("set_params", [&] { return b.model.ops->set_params(b.model.self, values.data()); });
-  if (status == DFM_E_NOMEM) fail(DFM_E_NOMEM, "body '%s': model '%s' found no memory for these parameters; nothing was changed", b.name.c_str(), type.id);
+  const dfm_status status =
+      b.model.call("set_params", [&] { return b.model.ops->set_params(b.model.self, values.data()); });
+  if (status == DFM_E_NOMEM)
+    fail(DFM_E_NOMEM, "body '%s': model '%s' found no memory for these parameters; nothing was changed",
+         b.name.c_str(), type.id);
   if (status != DFM_OK)
-    fail(DFM_E_ARG, "body '%s': model '%s' refuses these parameters; the log says why", b.name.c_str(), type.id);
+    fail(DFM_E_ARG, "body '%s': model '%s' refuses these parameters; the log says why", b.name.c_str(),
+         type.id);
   b.model.params = std::move(values);
   values_changed(*b.world);
-  if (before.changed()) b.world->changed = true;   // the plan names the effects that parameters call for
+  if (before.changed()) b.world->changed = true;  // the plan names the effects that parameters call for
 }
 
 }  // namespace dfm

@@ -5,7 +5,8 @@
 namespace dfm {
 
 dfm_body_measure measure(Body &b);
-void energy_density(Body &b, double *out);                       // [ntet] J/m3; throws where the model offers none
-void set_model_params(Body &b, const dfm_params &params);        // runtime rows only; throws
+// [ntet] J/m3; throws where the model offers none
+void energy_density(Body &b, double *out);
+void set_model_params(Body &b, const dfm_params &params);  // runtime rows only; throws
 
 }  // namespace dfm

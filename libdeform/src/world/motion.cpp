@@ -28,8 +28,11 @@ Quat normalized(Quat q) {
 template <class Key, class Finite>
 void check(const std::vector<Key> &keys, const char *what, Finite finite) {
   for (size_t i = 0; i < keys.size(); ++i) {
-    if (!std::isfinite(keys[i].t) || !finite(keys[i])) fail(DFM_E_ARG, "%s: key %zu is not finite; give finite numbers", what, i);
-    if (i && !(keys[i].t > keys[i - 1].t)) fail(DFM_E_ARG, "%s: times must rise, but key %zu has t = %g after %g", what, i, keys[i].t, keys[i - 1].t);
+    if (!std::isfinite(keys[i].t) || !finite(keys[i]))
+      fail(DFM_E_ARG, "%s: key %zu is not finite; give finite numbers", what, i);
+    if (i && !(keys[i].t > keys[i - 1].t))
+      fail(DFM_E_ARG, "%s: times must rise, but key %zu has t = %g after %g", what, i, keys[i].t,
+           keys[i - 1].t);
   }
 }
 
@@ -43,14 +46,19 @@ bool all_finite(const double *p, int n) {
 
 Pose to_pose(const dfm_pose &p) { return {load3(p.position), unit_quat(p.rotation)}; }
 
-// Halving the arc needs square roots only: the midpoint of two unit quaternions is their normalized sum. 52 halvings follow the bits of s.
+// Halving the arc needs square roots only: the midpoint of two unit quaternions is their normalized sum. 52
+// halvings follow the bits of s.
 Quat slerp(Quat a, Quat b, double s) {
   if (a.x * b.x + a.y * b.y + a.z * b.z + a.w * b.w < 0) b = {-b.x, -b.y, -b.z, -b.w};
   for (int bit = 0; bit < 52 && s > 0; ++bit) {
     const Quat mid = normalized({a.x + b.x, a.y + b.y, a.z + b.z, a.w + b.w});
     s *= 2;
-    if (s >= 1) a = mid, s -= 1;
-    else b = mid;
+    if (s >= 1) {
+      a = mid;
+      s -= 1;
+    } else {
+      b = mid;
+    }
   }
   return a;
 }
@@ -67,7 +75,8 @@ Vec3 spin_between(Quat a, Quat b, double h) {
   }
   const Vec3 v{d.x, d.y, d.z};
   const double q = norm2(v);
-  const double asin_ratio = 1 + q * (1.0 / 6 + q * (3.0 / 40 + q * (15.0 / 336 + q * (105.0 / 3456))));  // asin(x)/x
+  // asin(x)/x
+  const double asin_ratio = 1 + q * (1.0 / 6 + q * (3.0 / 40 + q * (15.0 / 336 + q * (105.0 / 3456))));
   return (scale * asin_ratio / h) * v;
 }
 
@@ -93,10 +102,14 @@ double scale_at(const std::vector<dfm_scale_key> &keys, double t) {
   return s == 0 ? keys[i].value : keys[i].value + s * (keys[i + 1].value - keys[i].value);
 }
 
-double sine_at(const dfm_sine &s, double t) { return sin_turns(s.frequency * t + s.phase / 6.283185307179586476925); }
+double sine_at(const dfm_sine &s, double t) {
+  return sin_turns(s.frequency * t + s.phase / 6.283185307179586476925);
+}
 
 void check_keys(const std::vector<dfm_pose_key> &keys, const char *what) {
-  check(keys, what, [](const dfm_pose_key &k) { return all_finite(k.pose.position, 3) && all_finite(k.pose.rotation, 4); });
+  check(keys, what, [](const dfm_pose_key &k) {
+    return all_finite(k.pose.position, 3) && all_finite(k.pose.rotation, 4);
+  });
 }
 void check_keys(const std::vector<dfm_vector_key> &keys, const char *what) {
   check(keys, what, [](const dfm_vector_key &k) { return all_finite(k.value, 3); });

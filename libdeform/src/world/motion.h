@@ -7,11 +7,15 @@
 
 namespace dfm {
 
-struct Pose { Vec3 position; Quat rotation; };
+struct Pose {
+  Vec3 position;
+  Quat rotation;
+};
 Pose to_pose(const dfm_pose &p);
 inline Vec3 place(const Pose &pose, Vec3 x) { return rotate(pose.rotation, x) + pose.position; }
 
-// Keys at rising times, joined linearly (rotations by slerp along the shorter arc); constant before the first and after the last.
+// Keys at rising times, joined linearly (rotations by slerp along the shorter arc); constant before the first
+// and after the last.
 Pose pose_at(const std::vector<dfm_pose_key> &keys, double t);
 Vec3 vector_at(const std::vector<dfm_vector_key> &keys, double t);
 double scale_at(const std::vector<dfm_scale_key> &keys, double t);
@@ -19,7 +23,8 @@ double scale_at(const std::vector<dfm_scale_key> &keys, double t);
 double sine_at(const dfm_sine &s, double t);
 
 Quat slerp(Quat a, Quat b, double s);
-// Angular velocity (world frame) that turns a into b in h seconds along the shorter arc, for arcs well below a turn.
+// Angular velocity (world frame) that turns a into b in h seconds along the shorter arc, for arcs
+// well below a turn.
 Vec3 spin_between(Quat a, Quat b, double h);
 
 // Throws Error(DFM_E_ARG) where times do not rise or a value is not finite; `what` names the keys.

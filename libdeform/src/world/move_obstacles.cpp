@@ -8,7 +8,8 @@ Pose Obstacle::end_pose(double t, double h, double left) const {
   if (rigid) return shape_pose(*this, rigid->next[rigid_body]);
   if (!has_target) return moves() ? pose_at_time(t + h) : pose;
   const double s = h / left;
-  return {pose.position + s * (target.position - pose.position), slerp(pose.rotation, target.rotation, s < 1 ? s : 1)};
+  return {pose.position + s * (target.position - pose.position),
+          slerp(pose.rotation, target.rotation, s < 1 ? s : 1)};
 }
 
 void view_obstacles(World &w, StepContext &step) {
@@ -16,7 +17,8 @@ void view_obstacles(World &w, StepContext &step) {
   for (size_t i = 0; i < w.obstacles.size(); ++i) {
     const Obstacle &o = *w.obstacles[i];
     ObstacleView &v = step.obstacle_views[i];
-    v.position = o.pose.position, v.rotation = o.pose.rotation;
+    v.position = o.pose.position;
+    v.rotation = o.pose.rotation;
     v.velocity = v.spin = v.linear = {};
     if (o.has_target) {
       v.velocity = (1 / left) * (o.target.position - o.pose.position);
@@ -32,7 +34,8 @@ void view_obstacles(World &w, StepContext &step) {
 
 void move_obstacles(World &w, const StepContext &step, bool last) {
   for (auto &o : w.obstacles) {
-    if (o->has_target || o->moves()) o->pose = last && o->has_target ? o->target : o->end_pose(w.time, step.h, step.left);
+    if (o->has_target || o->moves())
+      o->pose = last && o->has_target ? o->target : o->end_pose(w.time, step.h, step.left);
     if (last) o->has_target = false;
   }
 }
@@ -41,7 +44,8 @@ void move_obstacles_by(World &w, const StepContext &step, double share) {
   for (auto &o : w.obstacles) {
     if (!o->has_target && !o->moves()) continue;
     const Pose end = o->end_pose(w.time, step.h, step.left);
-    o->pose = {o->pose.position + share * (end.position - o->pose.position), slerp(o->pose.rotation, end.rotation, share)};
+    o->pose = {o->pose.position + share * (end.position - o->pose.position),
+               slerp(o->pose.rotation, end.rotation, share)};
   }
 }
 

@@ -14,22 +14,29 @@
 namespace dfm {
 namespace {
 
-constexpr uint64_t kReleaseEvery = 16;   // steps: pairs that are aside are looked at no more often
-constexpr size_t kSentences = 8;         // pairs that are named in the log one by one
+constexpr uint64_t kReleaseEvery = 16;  // steps: pairs that are aside are looked at no more often
+constexpr size_t kSentences = 8;        // pairs that are named in the log one by one
 
-// Deeper than contact leads out. Closed shapes and voxels lead out from any depth; of triangles only the nearest do.
+// Deeper than contact leads out. Closed shapes and voxels lead out from any depth; of triangles only
+// the nearest do.
 bool deep(const World &w, const OverlapPair &p, const Crossed &c) {
   if (p.obstacle && !w.obstacles[p.b]->mesh) return false;
-  const Surface &a = w.bodies[p.a]->surface, &b = p.obstacle ? w.obstacles[p.b]->mesh->surface : w.bodies[p.b]->surface;
-  return c.coincide || c.depth > std::min(recovery_depth(a), recovery_depth(b)) || 2 * c.enclosed > (p.obstacle ? a.nsurfel : std::min(a.nsurfel, b.nsurfel));
+  const Surface &a = w.bodies[p.a]->surface;
+  const Surface &b = p.obstacle ? w.obstacles[p.b]->mesh->surface : w.bodies[p.b]->surface;
+  return c.coincide || c.depth > std::min(recovery_depth(a), recovery_depth(b)) ||
+         2 * c.enclosed > (p.obstacle ? a.nsurfel : std::min(a.nsurfel, b.nsurfel));
 }
 
-uint64_t other_id(const World &w, const OverlapPair &p) { return p.obstacle ? w.obstacles[p.b]->id : w.bodies[p.b]->id; }
+uint64_t other_id(const World &w, const OverlapPair &p) {
+  return p.obstacle ? w.obstacles[p.b]->id : w.bodies[p.b]->id;
+}
 
 std::vector<Overlap> find_overlaps(World &w) {
   std::vector<uint64_t> &placed = w.overlaps.placed;
   std::sort(placed.begin(), placed.end());
-  const auto asked = [&](uint64_t id) { return w.overlaps.all || std::binary_search(placed.begin(), placed.end(), id); };
+  const auto asked = [&](uint64_t id) {
+    return w.overlaps.all || std::binary_search(placed.begin(), placed.end(), id);
+  };
   std::vector<Overlap> out;
   OverlapSides sides(w);
   const auto look = [&](const OverlapPair &p) {
@@ -59,14 +66,23 @@ const Obstacle *obstacle_of_id(const World &w, uint64_t id) {
 void warn(const World &w, const Overlap &o) {
   const Obstacle *const thing = o.obstacle ? obstacle_of_id(w, o.b) : nullptr;
   const std::string &name = thing ? thing->name : body_of_id(w, o.b)->name;
-  w.context->logf(DFM_LOG_WARNING, "body '%s' and %s '%s' overlap by %.3g m (%u pairs of triangles cross, %u surface points inside): %s",
-                  body_of_id(w, o.a)->name.c_str(), !thing ? "body" : thing->rigid ? "rigid body" : "obstacle", name.c_str(), o.depth, o.crossings, o.enclosed,
-                  o.aside ? "they do not touch until they are apart; move one of them, or ask for \"untangle\"" : "contact pushes them apart slowly; move one of them, or ask for \"untangle\"");
+  w.context->logf(
+      DFM_LOG_WARNING,
+      "body '%s' and %s '%s' overlap by %.3g m (%u pairs of triangles cross, %u surface points inside): %s",
+      body_of_id(w, o.a)->name.c_str(),
+      !thing         ? "body"
+      : thing->rigid ? "rigid body"
+                     : "obstacle",
+      name.c_str(), o.depth, o.crossings, o.enclosed,
+      o.aside ? "they do not touch until they are apart; move one of them, or ask for \"untangle\""
+              : "contact pushes them apart slowly; move one of them, or ask for \"untangle\"");
 }
 
 // It is apart: contact again.
 void take_back(World &w, const Overlap &f) {
-  if (std::erase_if(w.overlaps.aside, [&](const PairAside &p) { return p.a == f.a && p.b == f.b && (p.obstacle != 0) == f.obstacle; }))
+  if (std::erase_if(w.overlaps.aside, [&](const PairAside &p) {
+        return p.a == f.a && p.b == f.b && (p.obstacle != 0) == f.obstacle;
+      }))
     w.filter.set(f.a, f.b, f.obstacle, true);
 }
 
@@ -83,19 +99,26 @@ void settle_overlaps(World &w) {
     else take_back(w, f);
   }
   for (size_t i = 0; i < left.size() && i < kSentences; ++i) warn(w, left[i]);
-  if (left.size() > kSentences) w.context->logf(DFM_LOG_WARNING, "%zu more pairs overlap; dfm_world_overlaps lists them", left.size() - kSentences);
+  if (left.size() > kSentences)
+    w.context->logf(DFM_LOG_WARNING, "%zu more pairs overlap; dfm_world_overlaps lists them",
+                    left.size() - kSentences);
   for (const Overlap &f : left) {
     if (!f.aside || o.look_only || o.is_aside(f.a, f.b, f.obstacle)) continue;
     o.aside.push_back({f.a, f.b, f.obstacle});
     w.filter.set(f.a, f.b, f.obstacle, false);
   }
-  o.found = std::move(found), o.told = left.empty();
-  o.placed.clear(), o.all = o.look_only = o.untangle = false;
+  o.found = std::move(found);
+  o.told = left.empty();
+  o.placed.clear();
+  o.all = o.look_only = o.untangle = false;
 }
 
 void keep_overlaps_aside(World &w) {
-  const auto gone = [&](const auto &p) { return !body_of_id(w, p.a) || (p.obstacle ? !obstacle_of_id(w, p.b) : !body_of_id(w, p.b)); };
-  std::erase_if(w.overlaps.aside, gone), std::erase_if(w.overlaps.found, gone);
+  const auto gone = [&](const auto &p) {
+    return !body_of_id(w, p.a) || (p.obstacle ? !obstacle_of_id(w, p.b) : !body_of_id(w, p.b));
+  };
+  std::erase_if(w.overlaps.aside, gone);
+  std::erase_if(w.overlaps.found, gone);
   for (const PairAside &p : w.overlaps.aside) w.filter.set(p.a, p.b, p.obstacle, false);
 }
 

@@ -22,13 +22,15 @@ class OverlapSkin {
   Vec3 corner(uint32_t t, int k) const { return x(surface_->tri[3 * size_t{t} + size_t(k)]); }
   Vec3 lo() const { return lo_; }
   Vec3 hi() const { return hi_; }
-  const std::vector<Vec3> &inner() const { return inner_; }   // places inside that lie on no surface; of a body
-  double slack() const { return slack_; }                     // m, by which its triangles may be off what contact sees (voxels)
-  bool room() const { return closed_ && !outward_; }          // material is outside its triangles
+  // places inside that lie on no surface; of a body
+  const std::vector<Vec3> &inner() const { return inner_; }
+  // m, by which its triangles may be off what contact sees (voxels)
+  double slack() const { return slack_; }
+  bool room() const { return closed_ && !outward_; }  // material is outside its triangles
 
   const BoxTree &tree();
-  bool inside(Vec3 p);                 // in its material; never in an open surface's
-  double distance(Vec3 p);             // m, to its surface
+  bool inside(Vec3 p);      // in its material; never in an open surface's
+  double distance(Vec3 p);  // m, to its surface
   void shift(Vec3 by);
 
  private:
@@ -54,13 +56,14 @@ struct Crossed {
   bool coincide = false;  // no surface tells the sides apart
 };
 // `yes_or_no`: only `through` is asked for.
-Crossed cross_skins(OverlapSkin &a, OverlapSkin &b, double offset, bool yes_or_no, Array<PairOfTriangles> &stack);
+Crossed cross_skins(OverlapSkin &a, OverlapSkin &b, double offset, bool yes_or_no,
+                    Array<PairOfTriangles> &stack);
 // Plane, sphere, capsule: in closed form.
 Crossed cross_shape(OverlapSkin &a, const ObstacleShape &b, double offset);
 
 struct OverlapPair {
-  uint32_t a, b;          // slots
-  bool obstacle;          // b is one
+  uint32_t a, b;  // slots
+  bool obstacle;  // b is one
 };
 
 // Sides as they are needed, each made once.
@@ -68,7 +71,7 @@ class OverlapSides {
  public:
   explicit OverlapSides(World &w);
   OverlapSkin &body(uint32_t i);
-  bool may_touch(const OverlapPair &p) const;           // but for being aside
+  bool may_touch(const OverlapPair &p) const;  // but for being aside
   // through: by more than `least`.
   Crossed look(const OverlapPair &p, double least, bool yes_or_no);
 
@@ -76,8 +79,8 @@ class OverlapSides {
   ObstacleShape shape(const OverlapPair &p) const;
   bool plane(const OverlapPair &p) const;
   Vec3 center(const OverlapPair &p);
-  double reach(const OverlapPair &p, Vec3 direction);   // m, its farthest point along a direction
-  double slack(const OverlapPair &p);                   // m, OverlapSkin::slack()
+  double reach(const OverlapPair &p, Vec3 direction);  // m, its farthest point along a direction
+  double slack(const OverlapPair &p);                  // m, OverlapSkin::slack()
 
  private:
   bool round(const OverlapPair &p) const;

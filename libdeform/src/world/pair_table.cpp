@@ -1,7 +1,8 @@
 // Friction laws of a world's pairs, from the rules by name, group and material.
 //
-// pair_law holds one law per pair of things. Only where rules tell parts of a surface apart does the pair have a table over the zones of both
-// sides as well, and only then is a contact asked which triangle it stands on: a world without such rules runs no instruction of it.
+// pair_law holds one law per pair of things. Only where rules tell parts of a surface apart does the pair
+// have a table over the zones of both sides as well, and only then is a contact asked which triangle it
+// stands on: a world without such rules runs no instruction of it.
 #include <algorithm>
 #include <cmath>
 
@@ -37,8 +38,10 @@ uint32_t default_law(World &w, double a, double b) {
   return law;
 }
 
-const FrictionRule *rule_of(const World &w, uint32_t a, const SurfaceZones::Zone &za, uint32_t b, const SurfaceZones::Zone &zb) {
-  return best_rule(w.friction, {name_of(w, a), za.group, za.material}, {name_of(w, b), zb.group, zb.material});
+const FrictionRule *rule_of(const World &w, uint32_t a, const SurfaceZones::Zone &za, uint32_t b,
+                            const SurfaceZones::Zone &zb) {
+  return best_rule(w.friction, {name_of(w, a), za.group, za.material},
+                   {name_of(w, b), zb.group, zb.material});
 }
 
 // On which zones of its two sides a contact stands.
@@ -55,9 +58,11 @@ Zones zones_of(const World &w, const ContactPoint &c) {
 // Place among bodies and obstacles, or kNone.
 uint32_t thing_of(const World &w, uint64_t id) {
   const auto is = [id](const auto &thing) { return thing->id == id; };
-  if (const auto b = std::find_if(w.bodies.begin(), w.bodies.end(), is); b != w.bodies.end()) return static_cast<uint32_t>(b - w.bodies.begin());
+  if (const auto b = std::find_if(w.bodies.begin(), w.bodies.end(), is); b != w.bodies.end())
+    return static_cast<uint32_t>(b - w.bodies.begin());
   const auto o = std::find_if(w.obstacles.begin(), w.obstacles.end(), is);
-  return o == w.obstacles.end() ? kNone : static_cast<uint32_t>(w.bodies.size() + size_t(o - w.obstacles.begin()));
+  return o == w.obstacles.end() ? kNone
+                                : static_cast<uint32_t>(w.bodies.size() + size_t(o - w.obstacles.begin()));
 }
 
 }  // namespace
@@ -98,7 +103,8 @@ void set_zone_laws(World &w, StepContext &step) {
     const uint32_t table = w.zone_table[c.slot_a * width + (c.obstacle ? nb : 0) + c.slot_b];
     if (table == kNone) continue;
     const Zones zones = zones_of(w, c);
-    step.state.law[i] = w.zone_law[table + zones.a * (c.obstacle ? 1 : w.bodies[c.slot_b]->zones.list.size()) + zones.b];
+    step.state.law[i] =
+        w.zone_law[table + zones.a * (c.obstacle ? 1 : w.bodies[c.slot_b]->zones.list.size()) + zones.b];
   }
 }
 

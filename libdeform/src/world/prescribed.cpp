@@ -6,7 +6,8 @@
 namespace dfm {
 
 void stage_motion(World &w, StepContext &step) {
-  // Held velocities are the one part of the state that changes before a sub-step is known to succeed; what was there is kept.
+  // Held velocities are the one part of the state that changes before a sub-step is known to succeed; what
+  // was there is kept.
   if (!w.gravity_keys.empty()) change_gravity(w, vector_at(w.gravity_keys, w.time + step.h));
   for (auto &b : w.bodies) {
     if (b->slumber.asleep) continue;
@@ -14,7 +15,8 @@ void stage_motion(World &w, StepContext &step) {
       std::fill(b->p.load.begin(), b->p.load.end(), 0.0);
       for (const Load &load : b->loads) {
         double scale = load.keys.empty() ? 1 : scale_at(load.keys, w.time + step.h);
-        if (load.sine.amplitude[0] != 0) scale *= 1 + load.sine.amplitude[0] * sine_at(load.sine, w.time + step.h);
+        if (load.sine.amplitude[0] != 0)
+          scale *= 1 + load.sine.amplitude[0] * sine_at(load.sine, w.time + step.h);
         for (size_t i = 0; i < load.points.size(); ++i) {
           double *const f = &b->p.load[size_t(load.points[i]) * kStride];
           store3(f, load3(f) + scale * load3(&load.force[3 * i]));
@@ -23,8 +25,11 @@ void stage_motion(World &w, StepContext &step) {
       for (const Spring &spring : b->springs) add_spring_force(*b, spring, w.time, step.h);
     }
     for (const HeldMotion &m : b->motions) {
-      const Pose first = m.keys.empty() ? Pose{} : to_pose(m.keys.front().pose), now = m.keys.empty() ? Pose{} : pose_at(m.keys, w.time + step.h);
-      const Vec3 shift = m.sine.frequency != 0 || m.sine.phase != 0 ? sine_at(m.sine, w.time + step.h) * load3(m.sine.amplitude) : Vec3{};
+      const Pose first = m.keys.empty() ? Pose{} : to_pose(m.keys.front().pose);
+      const Pose now = m.keys.empty() ? Pose{} : pose_at(m.keys, w.time + step.h);
+      const Vec3 shift = m.sine.frequency != 0 || m.sine.phase != 0
+                             ? sine_at(m.sine, w.time + step.h) * load3(m.sine.amplitude)
+                             : Vec3{};
       for (size_t i = 0; i < m.points.size(); ++i) {
         const size_t at = size_t(m.points[i]) * kStride;
         const Vec3 local = rotate_back(first.rotation, load3(&m.start[3 * i]) - first.position);

@@ -40,8 +40,14 @@ double ray_box(Vec3 o, Vec3 d, Vec3 half, Vec3 *normal) {
     }
     double t0 = (-half[k] - o[k]) / d[k], t1 = (half[k] - o[k]) / d[k];
     if (t0 > t1) std::swap(t0, t1);
-    if (t0 > near) near = t0, axis = k;
-    if (t1 < far) far = t1, exit = k;
+    if (t0 > near) {
+      near = t0;
+      axis = k;
+    }
+    if (t1 < far) {
+      far = t1;
+      exit = k;
+    }
   }
   if (near > far || far < 0) return kFar;
   *normal = {};
@@ -55,9 +61,15 @@ double ray_capsule(Vec3 o, Vec3 d, double r, double half, Vec3 *normal) {
   const bool inside = norm2(o - Vec3{0, 0, std::clamp(o.z, -half, half)}) < r * r;
   double first = kFar, last = -kFar;
   auto crossing = [&](double t) {
-    if (t >= 0) first = std::min(first, t), last = std::max(last, t);
+    if (t >= 0) {
+      first = std::min(first, t);
+      last = std::max(last, t);
+    }
   };
-  const double a = d.x * d.x + d.y * d.y, b = o.x * d.x + o.y * d.y, c = o.x * o.x + o.y * o.y - r * r, disc = b * b - a * c;
+  const double a = d.x * d.x + d.y * d.y;
+  const double b = o.x * d.x + o.y * d.y;
+  const double c = o.x * o.x + o.y * o.y - r * r;
+  const double disc = b * b - a * c;
   if (a > 0 && disc >= 0) {
     for (double root : {-std::sqrt(disc), std::sqrt(disc)})
       if (const double t = (-b + root) / a; std::fabs(o.z + t * d.z) <= half) crossing(t);
@@ -66,7 +78,8 @@ double ray_capsule(Vec3 o, Vec3 d, double r, double half, Vec3 *normal) {
     const Vec3 m = o - Vec3{0, 0, s};
     const double along = dot(m, d), square = along * along - (norm2(m) - r * r);
     if (square < 0) continue;
-    crossing(-along - std::sqrt(square)), crossing(-along + std::sqrt(square));
+    crossing(-along - std::sqrt(square));
+    crossing(-along + std::sqrt(square));
   }
   const double best = !inside ? first : last >= 0 ? last : kFar;
   if (best < kFar) {
@@ -82,7 +95,10 @@ double ray_triangles(const Obstacle &ob, Vec3 o, Vec3 d, Vec3 *normal) {
   for (size_t i = 0; i < ob.triangles.size(); i += 3) {
     const auto x = [&](size_t k) { return load3(&ob.points[size_t(3) * ob.triangles[i + k]]); };
     const double t = ray_triangle(o, d, x(0), x(1), x(2));
-    if (t < best) best = t, *normal = normalized(cross(x(1) - x(0), x(2) - x(0)));
+    if (t < best) {
+      best = t;
+      *normal = normalized(cross(x(1) - x(0), x(2) - x(0)));
+    }
   }
   return best;
 }
@@ -118,7 +134,8 @@ Vec3 triangle_normal(const Body &b, uint32_t t) {
 
 dfm_ray_hit nothing() {
   dfm_ray_hit hit{};
-  hit.distance = kFar, hit.triangle = kNone;
+  hit.distance = kFar;
+  hit.triangle = kNone;
   return hit;
 }
 
@@ -140,7 +157,8 @@ void surface_normals(const Body &b, double *out) {
       store3(to, load3(to) + n);
     }
   }
-  for (uint32_t s = 0; s < b.surface.nsurfel; ++s) store3(out + size_t(3) * s, normalized(load3(out + size_t(3) * s)));
+  for (uint32_t s = 0; s < b.surface.nsurfel; ++s)
+    store3(out + size_t(3) * s, normalized(load3(out + size_t(3) * s)));
 }
 
 dfm_ray_hit cast_ray(World &w, Vec3 o, Vec3 d, double max_distance) {
@@ -148,9 +166,12 @@ dfm_ray_hit cast_ray(World &w, Vec3 o, Vec3 d, double max_distance) {
   for (auto &b : w.bodies)
     for (uint32_t t = 0; t < b->surface.ntri; ++t) {
       const uint32_t *const c = &b->surface.tri[size_t(3) * t];
-      const double at = ray_triangle(o, d, surfel_vector(*b, b->p.x, c[0]), surfel_vector(*b, b->p.x, c[1]), surfel_vector(*b, b->p.x, c[2]));
+      const double at = ray_triangle(o, d, surfel_vector(*b, b->p.x, c[0]), surfel_vector(*b, b->p.x, c[1]),
+                                     surfel_vector(*b, b->p.x, c[2]));
       if (at <= max_distance && at < hit.distance) {
-        hit.distance = at, hit.body = b->handle, hit.triangle = t;
+        hit.distance = at;
+        hit.body = b->handle;
+        hit.triangle = t;
         store3(hit.normal, normalized(triangle_normal(*b, t)));
       }
     }
@@ -158,7 +179,10 @@ dfm_ray_hit cast_ray(World &w, Vec3 o, Vec3 d, double max_distance) {
     Vec3 n;
     const double at = ray_obstacle(*ob, o, d, &n);
     if (at <= max_distance && at < hit.distance) {
-      hit.distance = at, hit.body = 0, hit.obstacle = ob->handle, hit.triangle = kNone;
+      hit.distance = at;
+      hit.body = 0;
+      hit.obstacle = ob->handle;
+      hit.triangle = kNone;
       store3(hit.normal, n);
     }
   }
@@ -171,11 +195,16 @@ dfm_ray_hit closest_surface(World &w, Vec3 p, double max_distance) {
   for (auto &b : w.bodies)
     for (uint32_t t = 0; t < b->surface.ntri; ++t) {
       const uint32_t *const c = &b->surface.tri[size_t(3) * t];
-      const TrianglePoint q = closest_on_triangle(p, surfel_vector(*b, b->p.x, c[0]), surfel_vector(*b, b->p.x, c[1]), surfel_vector(*b, b->p.x, c[2]));
+      const TrianglePoint q =
+          closest_on_triangle(p, surfel_vector(*b, b->p.x, c[0]), surfel_vector(*b, b->p.x, c[1]),
+                              surfel_vector(*b, b->p.x, c[2]));
       const double d = std::sqrt(q.distance2);
       if (d <= max_distance && d < hit.distance) {
-        hit.distance = d, hit.body = b->handle, hit.triangle = t;
-        store3(hit.point, q.point), store3(hit.normal, normalized(triangle_normal(*b, t)));
+        hit.distance = d;
+        hit.body = b->handle;
+        hit.triangle = t;
+        store3(hit.point, q.point);
+        store3(hit.normal, normalized(triangle_normal(*b, t)));
       }
     }
   return hit;

@@ -4,8 +4,10 @@
 
 namespace dfm {
 
-Vec3 surfel_vector(const Body &b, const Array<double> &phyxel_column, uint32_t surfel);   // N times a column of the phyxels
-void surface_normals(const Body &b, double *out);                                         // [nsurfel,3], area-weighted
+// N times a column of the phyxels
+Vec3 surfel_vector(const Body &b, const Array<double> &phyxel_column, uint32_t surfel);
+// [nsurfel,3], area-weighted
+void surface_normals(const Body &b, double *out);
 dfm_ray_hit cast_ray(World &w, Vec3 origin, Vec3 unit_direction, double max_distance);
 dfm_ray_hit closest_surface(World &w, Vec3 p, double max_distance);
 

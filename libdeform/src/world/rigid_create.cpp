@@ -1,4 +1,5 @@
-// A set of rigid bodies comes into a world: defs are checked, the host gets them, each becomes an obstacle too.
+// A set of rigid bodies comes into a world: defs are checked, the host gets them, each becomes
+// an obstacle too.
 #include <algorithm>
 #include <cmath>
 
@@ -12,37 +13,57 @@
 namespace dfm {
 namespace {
 
-bool finite(const double *p, size_t n) { return std::all_of(p, p + n, [](double x) { return std::isfinite(x); }); }
+bool finite(const double *p, size_t n) {
+  return std::all_of(p, p + n, [](double x) { return std::isfinite(x); });
+}
 bool zero(const double *p) { return p[0] == 0 && p[1] == 0 && p[2] == 0; }
 
 // Shape, pose and material are checked where the obstacle is made.
 void check_body(dfm_rigid_def &d, const char *name) {
-  if (d.shape != DFM_SHAPE_SPHERE && d.shape != DFM_SHAPE_BOX && d.shape != DFM_SHAPE_CAPSULE && d.shape != DFM_SHAPE_NONE)
-    fail(DFM_E_ARG, "rigid body '%s': shape %u; it can be a sphere, a box or a capsule, or DFM_SHAPE_NONE with any shapes added by dfm_rigid_add_shape",
+  if (d.shape != DFM_SHAPE_SPHERE && d.shape != DFM_SHAPE_BOX && d.shape != DFM_SHAPE_CAPSULE &&
+      d.shape != DFM_SHAPE_NONE)
+    fail(DFM_E_ARG,
+         "rigid body '%s': shape %u; it can be a sphere, a box or a capsule, or DFM_SHAPE_NONE with any "
+         "shapes added by dfm_rigid_add_shape",
          name, d.shape);
-  if (d.shape == DFM_SHAPE_NONE && !d.fixed && zero(d.inertia)) fail(DFM_E_ARG, "rigid body '%s' has no shape to take its inertia from; give all three moments", name);
-  if (!finite(d.pose.position, 3) || !finite(d.pose.rotation, 4) || !finite(d.velocity, 3) || !finite(d.spin, 3))
+  if (d.shape == DFM_SHAPE_NONE && !d.fixed && zero(d.inertia))
+    fail(DFM_E_ARG, "rigid body '%s' has no shape to take its inertia from; give all three moments", name);
+  if (!finite(d.pose.position, 3) || !finite(d.pose.rotation, 4) || !finite(d.velocity, 3) ||
+      !finite(d.spin, 3))
     fail(DFM_E_ARG, "rigid body '%s': pose, velocity and spin must be finite", name);
   if (!finite(d.half_size, 3) || !finite(&d.radius, 1) || !finite(&d.half_length, 1))
     fail(DFM_E_ARG, "rigid body '%s': half_size, radius and half_length must be finite", name);
   check_velocity("rigid body", name, load3(d.velocity), load3(d.spin), 1);
   if (d.fixed) {
-    if (!zero(d.velocity) || !zero(d.spin)) fail(DFM_E_ARG, "rigid body '%s' is fixed and has a velocity; drop one (an obstacle's motion is prescribed)", name);
-    d.mass = 0, d.inertia[0] = d.inertia[1] = d.inertia[2] = 0;
+    if (!zero(d.velocity) || !zero(d.spin))
+      fail(DFM_E_ARG,
+           "rigid body '%s' is fixed and has a velocity; drop one (an obstacle's motion is prescribed)",
+           name);
+    d.mass = 0;
+    d.inertia[0] = d.inertia[1] = d.inertia[2] = 0;
     return;
   }
-  if (!(d.mass > 0 && std::isfinite(d.mass))) fail(DFM_E_ARG, "rigid body '%s': mass %g kg; it must be positive and finite, or the body fixed", name, d.mass);
+  if (!(d.mass > 0 && std::isfinite(d.mass)))
+    fail(DFM_E_ARG, "rigid body '%s': mass %g kg; it must be positive and finite, or the body fixed", name,
+         d.mass);
   if (zero(d.inertia)) solid_inertia(d, d.inertia);
   const double *const i = d.inertia, slack = 1e-9 * (i[0] + i[1] + i[2]);
   for (int k = 0; k < 3; ++k)
-    if (!(i[k] > 0 && std::isfinite(i[k]))) fail(DFM_E_ARG, "rigid body '%s': moment of inertia %g kg m2; all three must be positive and finite", name, i[k]);
+    if (!(i[k] > 0 && std::isfinite(i[k])))
+      fail(DFM_E_ARG, "rigid body '%s': moment of inertia %g kg m2; all three must be positive and finite",
+           name, i[k]);
   for (int k = 0; k < 3; ++k)
     if (i[k] > i[(k + 1) % 3] + i[(k + 2) % 3] + slack)
-      fail(DFM_E_ARG, "rigid body '%s': moments of inertia %g, %g, %g kg m2; no body has one above the sum of the other two", name, i[0], i[1], i[2]);
+      fail(DFM_E_ARG,
+           "rigid body '%s': moments of inertia %g, %g, %g kg m2; no body has one above the sum of the other "
+           "two",
+           name, i[0], i[1], i[2]);
 }
 
 void check_joint(const dfm_joint_def &j, uint32_t number, const std::vector<dfm_rigid_def> &bodies) {
-  if (j.type > DFM_JOINT_FIXED) fail(DFM_E_ARG, "joint %u: type %u is unknown; use DFM_JOINT_HINGE, SLIDER, BALL or FIXED", number, j.type);
+  if (j.type > DFM_JOINT_FIXED)
+    fail(DFM_E_ARG, "joint %u: type %u is unknown; use DFM_JOINT_HINGE, SLIDER, BALL or FIXED", number,
+         j.type);
   const uint32_t n = static_cast<uint32_t>(bodies.size());
   if (j.body >= n || (j.with >= n && j.with != DFM_RIGID_WORLD))
     fail(DFM_E_ARG, "joint %u names body %u; the set has %u", number, j.body >= n ? j.body : j.with, n);
@@ -50,21 +71,32 @@ void check_joint(const dfm_joint_def &j, uint32_t number, const std::vector<dfm_
   if (j.body == j.with) fail(DFM_E_ARG, "joint %u ties rigid body '%s' to itself", number, name);
   if (bodies[j.body].fixed && (j.with == DFM_RIGID_WORLD || bodies[j.with].fixed))
     fail(DFM_E_ARG, "joint %u of rigid body '%s' ties two things that never move", number, name);
-  if (!finite(j.anchor, 3) || !finite(j.axis, 3)) fail(DFM_E_ARG, "joint %u of rigid body '%s': anchor and axis must be finite", number, name);
+  if (!finite(j.anchor, 3) || !finite(j.axis, 3))
+    fail(DFM_E_ARG, "joint %u of rigid body '%s': anchor and axis must be finite", number, name);
   const bool drives = j.type == DFM_JOINT_HINGE || j.type == DFM_JOINT_SLIDER;
   if (drives && zero(j.axis)) fail(DFM_E_ARG, "joint %u of rigid body '%s': its axis is zero", number, name);
   if (!std::isfinite(j.velocity) || !(j.max >= 0 && std::isfinite(j.max)))
-    fail(DFM_E_ARG, "joint %u of rigid body '%s': motor velocity %g and max %g must be finite, max not negative", number, name, j.velocity, j.max);
+    fail(DFM_E_ARG,
+         "joint %u of rigid body '%s': motor velocity %g and max %g must be finite, max not negative", number,
+         name, j.velocity, j.max);
   if (!j.motor) return;
-  if (!drives) fail(DFM_E_ARG, "joint %u of rigid body '%s': only hinges and sliders have motors", number, name);
+  if (!drives)
+    fail(DFM_E_ARG, "joint %u of rigid body '%s': only hinges and sliders have motors", number, name);
 }
 
 Obstacle &make_obstacle(World &w, const dfm_rigid_def &d) {
   dfm_obstacle_def o{};
-  o.size = sizeof o, o.shape = d.shape, o.name = d.name, o.pose = d.pose;
+  o.size = sizeof o;
+  o.shape = d.shape;
+  o.name = d.name;
+  o.pose = d.pose;
   std::copy(d.half_size, d.half_size + 3, o.half_size);
-  o.radius = d.radius, o.half_length = d.half_length, o.material = d.material;
-  o.category = d.category, o.collides_with = d.collides_with, o.user = d.user;
+  o.radius = d.radius;
+  o.half_length = d.half_length;
+  o.material = d.material;
+  o.category = d.category;
+  o.collides_with = d.collides_with;
+  o.user = d.user;
   return create_obstacle(w, o);
 }
 
@@ -78,8 +110,11 @@ void ask_host(RigidSet &set, const std::vector<dfm_joint_def> &joints, void *dat
   const dfm_status status = set.host.create(set.host.user, &def, &set.self, set.group.data(), &nextra);
   need_memory(status);
   if (status != DFM_OK) {
-    const std::string why = sentences() != said ? last_error() : "it gives no reason; look for huge positions and speeds, and for masses, inertias and joints that it cannot take";
-    fail(DFM_E_FATAL, "rigid host '%s' refuses the set of rigid body '%s' (bodies: %u, joints: %u): %s", host, set.defs[0].name, n, set.njoint, why.c_str());
+    const std::string why = sentences() != said ? last_error()
+                                                : "it gives no reason; look for huge positions and speeds, "
+                                                  "and for masses, inertias and joints that it cannot take";
+    fail(DFM_E_FATAL, "rigid host '%s' refuses the set of rigid body '%s' (bodies: %u, joints: %u): %s", host,
+         set.defs[0].name, n, set.njoint, why.c_str());
   }
   std::vector<uint32_t> members;
   for (const uint32_t g : set.group) {
@@ -87,13 +122,17 @@ void ask_host(RigidSet &set, const std::vector<dfm_joint_def> &joints, void *dat
       set.place.push_back(0);
       continue;
     }
-    if (g >= n) fail(DFM_E_FATAL, "rigid host '%s' names group %u; groups are numbered from 0 to at most %u", host, g, n - 1);
+    if (g >= n)
+      fail(DFM_E_FATAL, "rigid host '%s' names group %u; groups are numbered from 0 to at most %u", host, g,
+           n - 1);
     if (g >= members.size()) members.resize(g + 1);
     set.place.push_back(members[g]++);
   }
   set.ngroup = static_cast<uint32_t>(members.size());
-  if (std::find(members.begin(), members.end(), 0u) != members.end()) fail(DFM_E_FATAL, "rigid host '%s' leaves out a group number", host);
-  set.extra.assign(nextra, 0.0), set.next_extra.assign(nextra, 0.0);
+  if (std::find(members.begin(), members.end(), 0u) != members.end())
+    fail(DFM_E_FATAL, "rigid host '%s' leaves out a group number", host);
+  set.extra.assign(nextra, 0.0);
+  set.next_extra.assign(nextra, 0.0);
   for (uint32_t k = 0; k < set.njoint; ++k)
     if (joints[k].motor) set_rigid_motor(set, k, joints[k].velocity, joints[k].max);
 }
@@ -102,7 +141,8 @@ void ask_host(RigidSet &set, const std::vector<dfm_joint_def> &joints, void *dat
 
 RigidSet::RigidSet(World &w, const std::string &name) : world(&w), host_name(name), host(find_host(name)) {
   const Memory &m = w.memory();
-  use_memory(m, state, next), use_memory(m, extra, next_extra, velocity, impulse, first, revised, total);
+  use_memory(m, state, next);
+  use_memory(m, extra, next_extra, velocity, impulse, first, revised, total);
 }
 
 RigidSet::~RigidSet() {
@@ -112,11 +152,15 @@ RigidSet::~RigidSet() {
 void destroy_rigids(RigidSet &set) {
   World &w = *set.world;
   const uint64_t said = sentences();
-  if (const dfm_status status = set.host.may_destroy ? set.host.may_destroy(set.self) : dfm_status{DFM_OK}; status != DFM_OK) {
-    const std::string why = sentences() != said ? last_error() : format("rigid host '%s' keeps '%s'; remove it where it was made", set.host_name.c_str(), set.defs[0].name);
+  if (const dfm_status status = set.host.may_destroy ? set.host.may_destroy(set.self) : dfm_status{DFM_OK};
+      status != DFM_OK) {
+    const std::string why = sentences() != said
+                                ? last_error()
+                                : format("rigid host '%s' keeps '%s'; remove it where it was made",
+                                         set.host_name.c_str(), set.defs[0].name);
     fail(status < 0 ? status : DFM_E_STATE, "%s", why.c_str());
   }
-  std::vector<uint64_t> ids;   // with the shapes that were added
+  std::vector<uint64_t> ids;  // with the shapes that were added
   for (auto &o : w.obstacles)
     if (o->rigid == &set) ids.push_back(o->id);
   for (const uint64_t id : ids) destroy_obstacle(rigid_obstacle(w, id));
@@ -127,15 +171,19 @@ void destroy_rigids(RigidSet &set) {
 Obstacle &add_rigid_shape(Obstacle &body, const dfm_obstacle_def &def) {
   const char *const name = def.name ? def.name : "(unnamed)";
   if (def.shape == DFM_SHAPE_PLANE || def.shape == DFM_SHAPE_NONE)
-    fail(DFM_E_ARG, "shape '%s' of rigid body '%s' is %s; add a sphere, a box, a capsule, a mesh or voxels", name, body.name.c_str(),
-         def.shape == DFM_SHAPE_PLANE ? "a plane, which has no inside" : "none");
+    fail(DFM_E_ARG, "shape '%s' of rigid body '%s' is %s; add a sphere, a box, a capsule, a mesh or voxels",
+         name, body.name.c_str(), def.shape == DFM_SHAPE_PLANE ? "a plane, which has no inside" : "none");
   if (def.nkey || def.sine.frequency != 0 || def.sine.phase != 0)
-    fail(DFM_E_ARG, "shape '%s' of rigid body '%s' has a motion of its own; it moves with its body", name, body.name.c_str());
+    fail(DFM_E_ARG, "shape '%s' of rigid body '%s' has a motion of its own; it moves with its body", name,
+         body.name.c_str());
   World &w = *body.world;
   RigidSet &set = *body.rigid;
   const uint32_t number = body.rigid_body;
   Obstacle &o = create_obstacle(w, def);
-  o.rigid = &set, o.rigid_body = number, o.added = true, o.local = o.pose;
+  o.rigid = &set;
+  o.rigid_body = number;
+  o.added = true;
+  o.local = o.pose;
   const dfm_rigid_state &s = set.state[number];
   const Quat q{s.rotation[0], s.rotation[1], s.rotation[2], s.rotation[3]};
   o.pose = {rotate(q, o.local.position) + load3(s.position), q * o.local.rotation};
@@ -154,7 +202,10 @@ void create_rigids(World &w, const char *host, const dfm_rigid_set_def &def, uin
     names.push_back(d.name ? d.name : "rigid" + std::to_string(w.next_id + i));
     check_body(d, names.back().c_str());
     const Quat q = unit_quat(d.pose.rotation);
-    d.pose.rotation[0] = q.x, d.pose.rotation[1] = q.y, d.pose.rotation[2] = q.z, d.pose.rotation[3] = q.w;
+    d.pose.rotation[0] = q.x;
+    d.pose.rotation[1] = q.y;
+    d.pose.rotation[2] = q.z;
+    d.pose.rotation[3] = q.w;
     set.defs.push_back(d);
   }
   for (uint32_t i = 0; i < def.nbody; ++i) set.defs[i].name = names[i].c_str();
@@ -164,7 +215,11 @@ void create_rigids(World &w, const char *host, const dfm_rigid_set_def &def, uin
   ask_host(set, joints, def.data);
 
   const size_t n = set.defs.size();
-  set.state.resize(n), set.next.resize(n), set.velocity.assign(6 * n, 0.0), set.impulse.assign(6 * n, 0.0), set.revised.assign(6 * n, 0.0);
+  set.state.resize(n);
+  set.next.resize(n);
+  set.velocity.assign(6 * n, 0.0);
+  set.impulse.assign(6 * n, 0.0);
+  set.revised.assign(6 * n, 0.0);
   set.total.assign(3 * n, 0.0);
   w.rigid_sets.reserve(w.rigid_sets.size() + 1);
   std::vector<uint64_t> handles;
@@ -172,11 +227,16 @@ void create_rigids(World &w, const char *host, const dfm_rigid_set_def &def, uin
     for (uint32_t i = 0; i < n; ++i) {
       dfm_rigid_def &d = set.defs[i];
       Obstacle &o = make_obstacle(w, d);
-      set.obstacle.push_back(o.id), handles.push_back(o.handle);
-      o.rigid = &set, o.rigid_body = i, d.name = o.name.c_str();
+      set.obstacle.push_back(o.id);
+      handles.push_back(o.handle);
+      o.rigid = &set;
+      o.rigid_body = i;
+      d.name = o.name.c_str();
       dfm_rigid_state &s = set.state[i];
-      std::copy(d.pose.position, d.pose.position + 3, s.position), std::copy(d.pose.rotation, d.pose.rotation + 4, s.rotation);
-      std::copy(d.velocity, d.velocity + 3, s.velocity), std::copy(d.spin, d.spin + 3, s.spin);
+      std::copy(d.pose.position, d.pose.position + 3, s.position);
+      std::copy(d.pose.rotation, d.pose.rotation + 4, s.rotation);
+      std::copy(d.velocity, d.velocity + 3, s.velocity);
+      std::copy(d.spin, d.spin + 3, s.spin);
     }
   } catch (...) {
     for (const uint64_t id : set.obstacle) destroy_obstacle(rigid_obstacle(w, id));

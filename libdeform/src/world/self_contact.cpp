@@ -1,11 +1,13 @@
 // Self contact. A body's surface touches itself where the effect is on for it:
 //
-//   the scene asks    contact.self, or "self_contact" among its effects; "auto": while the body folds so far that it may (broad/self_watch.h)
+//   the scene asks    contact.self, or "self_contact" among its effects; "auto": while the body folds so far
+//                     that it may (broad/self_watch.h)
 //   an effect needs   plan/plan.cpp: cutting, folding
 //   a filter rule     that names the body on both sides decides for this body, whatever the above say
 //
-// and where its model does not promise the effect itself. Contacts come behind those of pairs, body by body, into the same solve; there
-// both sides' weights fall on dofs of one body and are merged where they share one, so the operator is exact (contact/rows.cpp).
+// and where its model does not promise the effect itself. Contacts come behind those of pairs, body by body,
+// into the same solve; there both sides' weights fall on dofs of one body and are merged where they share
+// one, so the operator is exact (contact/rows.cpp).
 #include "world/self_contact.h"
 
 #include <algorithm>
@@ -29,7 +31,8 @@ double median(std::vector<double> &v) {
 // The last rule that names the body on both sides.
 uint8_t rule_of(const World &w, const Body &b, uint8_t otherwise) {
   for (const FilterRule &rule : w.filters)
-    if (rule.between[0] == b.name && rule.between[1] == b.name) otherwise = rule.collide ? DFM_SELF_ON : DFM_SELF_OFF;
+    if (rule.between[0] == b.name && rule.between[1] == b.name)
+      otherwise = rule.collide ? DFM_SELF_ON : DFM_SELF_OFF;
   return otherwise;
 }
 
@@ -39,13 +42,15 @@ bool promises(const Body &b) {
 }
 
 SelfBody *self_body(StepContext &step, uint32_t slot) {
-  const auto at = std::lower_bound(step.self_bodies.begin(), step.self_bodies.end(), slot, [](auto &s, uint32_t v) { return s->body->slot < v; });
+  const auto at = std::lower_bound(step.self_bodies.begin(), step.self_bodies.end(), slot,
+                                   [](auto &s, uint32_t v) { return s->body->slot < v; });
   return at != step.self_bodies.end() && (*at)->body->slot == slot ? at->get() : nullptr;
 }
 
 void find_tangled(SelfBody &b) {
   const Surface &s = b.body->surface;
-  b.tangled.assign(s.nsurfel, 0), b.looked = true;
+  b.tangled.assign(s.nsurfel, 0);
+  b.looked = true;
   b.list.near_triangles([&](uint32_t t, uint32_t u) {
     const uint32_t *const c = &s.tri[3 * size_t{t}], *const d = &s.tri[3 * size_t{u}];
     if (share_a_corner(c, d) || !(edges_pierce(s, t, s, u) || edges_pierce(s, u, s, t))) return;
@@ -75,7 +80,8 @@ SelfBody::SelfBody(const Memory &m, const Body &b) : id(b.id), body(&b), list(m,
 }
 
 uint8_t asks_self_contact(const World &w) {
-  const bool listed = std::find(w.asked_effects.begin(), w.asked_effects.end(), kSelfContact) != w.asked_effects.end();
+  const bool listed =
+      std::find(w.asked_effects.begin(), w.asked_effects.end(), kSelfContact) != w.asked_effects.end();
   return listed ? uint8_t{DFM_SELF_ON} : static_cast<uint8_t>(w.def.self_contact);
 }
 
@@ -89,14 +95,18 @@ void choose_self_bodies(World &w, StepContext &step, SceneFacts &facts, std::vec
   for (auto &b : w.bodies) {
     const uint8_t when = rule_of(w, *b, asked);
     if (promises(*b) || when == DFM_SELF_OFF) continue;
-    const auto same = std::find_if(before.begin(), before.end(), [&](auto &s) { return s && s->id == b->id; });
-    step.self_bodies.push_back(same != before.end() ? std::move(*same) : std::make_unique<SelfBody>(w.memory(), *b));
+    const auto same =
+        std::find_if(before.begin(), before.end(), [&](auto &s) { return s && s->id == b->id; });
+    step.self_bodies.push_back(same != before.end() ? std::move(*same)
+                                                    : std::make_unique<SelfBody>(w.memory(), *b));
     SelfBody &self = *step.self_bodies.back();
     if (when == DFM_SELF_ON) self.watch.reset();
-    else if (!self.watch) self.watch = std::make_unique<SelfWatch>(w.memory(), b->surface, self.rest, self.list);
+    else if (!self.watch)
+      self.watch = std::make_unique<SelfWatch>(w.memory(), b->surface, self.rest, self.list);
     w.find_law(b->slot, b->slot, used);
     for (const uint32_t law : used)
-      for (const std::string &e : effects(*w.laws[law]->type)) facts.offered.push_back({e, w.laws[law]->type->id});
+      for (const std::string &e : effects(*w.laws[law]->type))
+        facts.offered.push_back({e, w.laws[law]->type->id});
   }
   facts.self_bodies = static_cast<unsigned>(step.self_bodies.size());
 }
@@ -109,15 +119,17 @@ void switch_to(SelfBody &s, bool on) {
 }
 
 void count_self(World &w, StepContext &step) {
-  w.stats.self_bodies = static_cast<uint32_t>(std::count_if(step.self_bodies.begin(), step.self_bodies.end(), [](auto &s) { return s->on; }));
+  w.stats.self_bodies = static_cast<uint32_t>(
+      std::count_if(step.self_bodies.begin(), step.self_bodies.end(), [](auto &s) { return s->on; }));
   w.stats.self_max = std::max(w.stats.self_max, w.stats.self_bodies);
 }
 
 // How fast a surfel goes to its end of the sub-step, as the solve left it.
 Vec3 velocity_after(const StepContext &step, const Body &b, uint32_t surfel) {
   Vec3 sum;
-  if (b.model.stepper) {   // has written its end beside its start
-    b.surface.each_phyxel(surfel, [&](uint32_t p, double weight) { sum += weight * load3(&b.p.f[size_t(p) * kStride]); });
+  if (b.model.stepper) {  // has written its end beside its start
+    b.surface.each_phyxel(
+        surfel, [&](uint32_t p, double weight) { sum += weight * load3(&b.p.f[size_t(p) * kStride]); });
     return (1 / step.h) * (sum - load3(&b.surface.x[size_t(surfel) * 4]));
   }
   const bool touched = step.rows.n > 0;
@@ -132,12 +144,13 @@ Vec3 velocity_after(const StepContext &step, const Body &b, uint32_t surfel) {
 
 void stage_self(World &w, StepContext &step) {
   if (!w.plan.has(StageRole::finds_contacts)) step.contacts.clear();
-  const bool listed = w.plan.has(StageRole::lists_pairs);   // which has looked at the speeds
+  const bool listed = w.plan.has(StageRole::lists_pairs);  // which has looked at the speeds
   for (auto &s : step.self_bodies) {
     const BodyView &view = step.body_views[s->body->slot];
     s->looked = false;
     if (view.asleep) continue;
-    switch_to(*s, !s->watch || s->watch->near(step.h, w.offset, listed ? step.broad.speed(s->body->slot) : HUGE_VAL));
+    switch_to(*s, !s->watch ||
+                      s->watch->near(step.h, w.offset, listed ? step.broad.speed(s->body->slot) : HUGE_VAL));
     if (!s->on) continue;
     s->list.update(step.h, w.offset);
     SelfBody *const self = s.get();
@@ -155,7 +168,9 @@ bool cover_self(World &w, StepContext &step) {
     if (step.body_views[b.slot].asleep) continue;
     const double change = b.model.stepper ? step.guard.speed[b.slot] : step.guard.change[b.slot];
     // A blow may fold within the sub-step what was far from itself before the solve.
-    if (!s->on && s->watch->meets(step.h, w.offset, change, [&](uint32_t surfel) { return velocity_after(step, b, surfel); })) switch_to(*s, true);
+    if (!s->on && s->watch->meets(step.h, w.offset, change,
+                                  [&](uint32_t surfel) { return velocity_after(step, b, surfel); }))
+      switch_to(*s, true);
     if (s->on) s->list.cover(step.h, w.offset, change);
     fresh |= s->joined != (s->on ? s->list.renewals() : 0);
   }
@@ -185,7 +200,9 @@ double guarded_apart(World &w, StepContext &step, const Candidate &c) {
   SelfBody &b = *self_body(step, c.slot_a);
   const Surface &s = b.body->surface;
   const bool edges = c.kind == kEdgeEdge;
-  const auto any = [&](const uint32_t *corner, int n) { return std::any_of(corner, corner + n, [&](uint32_t surfel) { return is_tangled(b, surfel); }); };
+  const auto any = [&](const uint32_t *corner, int n) {
+    return std::any_of(corner, corner + n, [&](uint32_t surfel) { return is_tangled(b, surfel); });
+  };
   const bool a_is = any(narrow::corners_of(s, edges ? 1 : 0, c.feature_a), edges ? 2 : 1);
   const bool b_is = any(narrow::corners_of(s, edges ? 1 : 2, c.feature_b), edges ? 2 : 3);
   return a_is && b_is ? 0 : self_apart(s, b.rest, ContactKind(c.kind), c.feature_a, c.feature_b, w.offset);

@@ -1,14 +1,18 @@
 // Sleep and waking.
 //
-//   end of a sub-step    a body whose points are all slower than sleep_speed, and within half of d_c of where they were when its calm began,
-//                        stays calm. Speed alone would let slow drift pass, and never let a stiff body sleep that shivers by a nanometer
-//                        an island sleeps when all its bodies have been calm for sleep_time, none of its contacts slides or meets
-//                        an obstacle that moves or a rigid host's body, and nothing that is prescribed for its bodies lies ahead
-//   asleep               x, contacts and their forces stay, v = 0; no stage works on the body. Detection keeps its shape as a partner:
-//                        pairs of which at least one side is awake, or an obstacle that moves, are looked at as ever
-//   waking               a contact between such a pair, even one that is still open, wakes the whole island before the sub-step goes on:
-//                        the woken take the stages that the others have passed, and detection looks again. So a woken body meets what
-//                        comes with all of its own dynamics, warm started by the contacts that it had when it fell asleep
+//   end of a sub-step    a body whose points are all slower than sleep_speed, and within half of d_c of where
+//                        they were when its calm began, stays calm. Speed alone would let slow drift pass,
+//                        and never let a stiff body sleep that shivers by a nanometer an island sleeps when
+//                        all its bodies have been calm for sleep_time, none of its contacts slides or meets
+//                        an obstacle that moves or a rigid host's body, and nothing that is prescribed for
+//                        its bodies lies ahead
+//   asleep               x, contacts and their forces stay, v = 0; no stage works on the body. Detection
+//                        keeps its shape as a partner: pairs of which at least one side is awake, or an
+//                        obstacle that moves, are looked at as ever
+//   waking               a contact between such a pair, even one that is still open, wakes the whole island
+//                        before the sub-step goes on: the woken take the stages that the others have passed,
+//                        and detection looks again. So a woken body meets what comes with all of its own
+//                        dynamics, warm started by the contacts that it had when it fell asleep
 //
 // Everything is decided by the state alone, in the order of ids.
 #include "world/sleep.h"
@@ -27,16 +31,19 @@
 namespace dfm {
 namespace {
 
-constexpr double kStay = 0.5;   // of d_c
+constexpr double kStay = 0.5;  // of d_c
 constexpr double kForever = std::numeric_limits<double>::infinity();
 
 template <class Key>
-double last_time(const std::vector<Key> &keys) { return keys.empty() ? -kForever : keys.back().t; }
+double last_time(const std::vector<Key> &keys) {
+  return keys.empty() ? -kForever : keys.back().t;
+}
 
 // From when on nothing that is prescribed for a body changes any more.
 double settled_from(const Body &b) {
   double t = -kForever;
-  for (const Load &l : b.loads) t = std::max(t, l.sine.amplitude[0] != 0 && l.sine.frequency != 0 ? kForever : last_time(l.keys));
+  for (const Load &l : b.loads)
+    t = std::max(t, l.sine.amplitude[0] != 0 && l.sine.frequency != 0 ? kForever : last_time(l.keys));
   for (const Spring &s : b.springs) t = std::max(t, last_time(s.keys));
   for (const HeldMotion &m : b.motions) {
     const bool swings = m.sine.frequency != 0 && norm2(load3(m.sine.amplitude)) != 0;
@@ -47,7 +54,8 @@ double settled_from(const Body &b) {
 
 // Ids rise with the slots; slots themselves are renewed by prepare() only.
 uint32_t slot_of(const World &w, uint64_t id) {
-  const auto at = std::lower_bound(w.bodies.begin(), w.bodies.end(), id, [](const auto &b, uint64_t value) { return b->id < value; });
+  const auto at = std::lower_bound(w.bodies.begin(), w.bodies.end(), id,
+                                   [](const auto &b, uint64_t value) { return b->id < value; });
   return at != w.bodies.end() && (*at)->id == id ? static_cast<uint32_t>(at - w.bodies.begin()) : kNone;
 }
 
@@ -61,20 +69,26 @@ bool asleep(const World &w, uint64_t id) {
 // Which bodies the stages of a sub-step work on, and whom contact impulses go to.
 void gather_active(World &w) {
   StepContext &step = *w.steps;
-  step.active.clear(), step.sinks.clear();
+  step.active.clear();
+  step.sinks.clear();
   for (uint32_t i = 0; i < w.bodies.size(); ++i) {
     Body &b = *w.bodies[i];
     step.body_views[i].asleep = b.slumber.asleep;
     if (b.slumber.asleep) continue;
     step.active.push_back(i);
-    step.sinks.push_back({step.body_views[i].first_node, b.surface.nsurfel, b.p.n, &b.surface, b.surfel_impulse.data(),
-                     b.model.stepper ? nullptr : b.p.impulse.data()});
+    step.sinks.push_back({step.body_views[i].first_node, b.surface.nsurfel, b.p.n, &b.surface,
+                          b.surfel_impulse.data(), b.model.stepper ? nullptr : b.p.impulse.data()});
   }
   w.sleepers = static_cast<uint32_t>(w.bodies.size() - step.active.size());
 }
 
 void reserve_sleep(World &w, StepContext &step, uint32_t n) {
-  if (w.def.sleep) step.islands.reserve(n), step.active.reserve(n), step.woken.reserve(n), step.stirred.reserve(n);
+  if (w.def.sleep) {
+    step.islands.reserve(n);
+    step.active.reserve(n);
+    step.woken.reserve(n);
+    step.stirred.reserve(n);
+  }
 }
 
 void rouse(World &w, std::span<const uint32_t> slots) {
@@ -82,7 +96,8 @@ void rouse(World &w, std::span<const uint32_t> slots) {
   // What time would have added to contacts that stay: their age, and the impulse that they pass on.
   for (uint32_t m = 0; m < w.store.n; ++m) {
     const uint32_t a = slot_of(w, w.store.id_a[m]);
-    if (w.store.touching[m] && a != kNone && w.bodies[a]->slumber.asleep && std::binary_search(slots.begin(), slots.end(), a))
+    if (w.store.touching[m] && a != kNone && w.bodies[a]->slumber.asleep &&
+        std::binary_search(slots.begin(), slots.end(), a))
       w.store.dwell[m] += w.time - w.bodies[a]->slumber.since;
   }
   for (const uint32_t i : slots) {
@@ -93,7 +108,7 @@ void rouse(World &w, std::span<const uint32_t> slots) {
     }
     b.slumber = {};
   }
-  if (!w.changed) gather_active(w);   // else prepare(w) does, whose views are out of date now
+  if (!w.changed) gather_active(w);  // else prepare(w) does, whose views are out of date now
 }
 
 // The whole island, as its contacts stood when it fell asleep.
@@ -104,7 +119,8 @@ void wake(World &w, Body &b) {
   step.islands.start(static_cast<uint32_t>(w.bodies.size()));
   for (uint32_t m = 0; m < w.store.n; ++m) {
     const uint32_t i = slot_of(w, w.store.id_a[m]), j = slot_of(w, w.store.id_b[m]);
-    if (i != kNone && j != kNone && w.bodies[i]->slumber.asleep && w.bodies[j]->slumber.asleep) step.islands.join(i, j);
+    if (i != kNone && j != kNone && w.bodies[i]->slumber.asleep && w.bodies[j]->slumber.asleep)
+      step.islands.join(i, j);
   }
   step.islands.finish();
   const uint32_t k = step.islands.of[slot_of(w, b.id)];
@@ -117,18 +133,21 @@ void wake_all(World &w) {
   if (w.sleepers == 0) return;
   step.islands.start(static_cast<uint32_t>(w.bodies.size()));
   step.islands.finish();
-  rouse(w, step.islands.member);   // of islands that no pair joins: all bodies, ascending
+  rouse(w, step.islands.member);  // of islands that no pair joins: all bodies, ascending
 }
 
 void wake_touching(World &w, uint64_t obstacle) {
   for (uint32_t m = 0; m < w.store.n; ++m)
-    if (const uint32_t i = w.store.id_b[m] == obstacle ? slot_of(w, w.store.id_a[m]) : kNone; i != kNone) wake(w, *w.bodies[i]);
+    if (const uint32_t i = w.store.id_b[m] == obstacle ? slot_of(w, w.store.id_a[m]) : kNone; i != kNone)
+      wake(w, *w.bodies[i]);
 }
 
-// Nothing moves and nothing will: the sub-step would leave everything as it is. What a rigid host's bodies do only the host knows.
+// Nothing moves and nothing will: the sub-step would leave everything as it is. What a rigid host's bodies do
+// only the host knows.
 bool all_idle(const World &w, const StepContext &step) {
   return w.sleepers > 0 && step.active.empty() && w.rigid_sets.empty() &&
-         std::none_of(step.obstacle_views.begin(), step.obstacle_views.end(), [](const ObstacleView &o) { return o.moves(); });
+         std::none_of(step.obstacle_views.begin(), step.obstacle_views.end(),
+                      [](const ObstacleView &o) { return o.moves(); });
 }
 
 bool stage_narrow(World &w, StepContext &step, uint32_t *trouble) {
@@ -137,7 +156,8 @@ bool stage_narrow(World &w, StepContext &step, uint32_t *trouble) {
     ~Restored() { gather_active(w); }
   };
   for (;;) {
-    find_contacts(step.body_views, step.obstacle_views, step.broad.candidates(), step.h, w.offset, w.store.crossings, step.lent, step.contacts);
+    find_contacts(step.body_views, step.obstacle_views, step.broad.candidates(), step.h, w.offset,
+                  w.store.crossings, step.lent, step.contacts);
     step.woken.clear();
     if (w.sleepers == 0) return true;
     for (const ContactPoint &c : step.contacts) {
@@ -191,15 +211,20 @@ void stage_sleep(World &w, StepContext &step) {
   for (size_t i = 0; i < n; ++i) {
     const ContactPoint &c = step.contacts[i];
     const double *const l = &step.rows.impulse[3 * i];
-    // At the edge of its cone a contact may rest as well: sliding is what is faster than a contact that sticks may be left with.
+    // At the edge of its cone a contact may rest as well: sliding is what is faster than a contact that
+    // sticks may be left with.
     const double s1 = step.state.vt[i], s2 = step.state.vt[step.state.stride + i];
-    const bool slides = step.state.mode[i] != 1 && (l[1] != 0 || l[2] != 0) && s1 * s1 + s2 * s2 > creep * creep;
+    const bool slides =
+        step.state.mode[i] != 1 && (l[1] != 0 || l[2] != 0) && s1 * s1 + s2 * s2 > creep * creep;
     const bool pushed = c.obstacle && (w.obstacles[c.slot_b]->rigid || step.obstacle_views[c.slot_b].moves());
     if (slides || pushed) step.stirred[step.islands.of[c.slot_a]] = 1;
   }
   bool any = false;
   for (const uint32_t i : step.active)
-    if (!step.stirred[step.islands.of[i]]) fall_asleep(w, step, *w.bodies[i], end), any = true;
+    if (!step.stirred[step.islands.of[i]]) {
+      fall_asleep(w, step, *w.bodies[i], end);
+      any = true;
+    }
   if (any) gather_active(w);
 }
 
@@ -209,42 +234,54 @@ void fall_asleep(World &w, StepContext &step, Body &b, double end) {
   double kinetic = 0;
   for (uint32_t i = 0; i < p.n; ++i) {
     const Vec3 v = load3(&p.v[size_t(i) * kStride]);
-    momentum += p.mass[i] * v, kinetic += 0.5 * p.mass[i] * norm2(v);
+    momentum += p.mass[i] * v;
+    kinetic += 0.5 * p.mass[i] * norm2(v);
   }
   w.stats.sleep_energy += kinetic;
   store3(w.stats.sleep_momentum, load3(w.stats.sleep_momentum) + momentum);
-  std::fill(p.v.begin(), p.v.end(), 0.0), std::fill(p.v_free.begin(), p.v_free.end(), 0.0);
-  gather_surface(b.surface, p.x.data(), p.v.data());   // detection goes on seeing it, where it stays
+  std::fill(p.v.begin(), p.v.end(), 0.0);
+  std::fill(p.v_free.begin(), p.v_free.end(), 0.0);
+  gather_surface(b.surface, p.x.data(), p.v.data());  // detection goes on seeing it, where it stays
   if (w.plan.touches())
     for (uint32_t s = 0; s < b.surface.nsurfel; ++s) impulse += load3(&b.surfel_impulse[3 * size_t(s)]);
   b.slumber = {true, 0, end, step.h, (1 / step.h) * impulse};
   b.bound.known = false;
 }
 
-// Contacts of those who sleep go on behind the ones of this sub-step, in the order of their keys. last_report belongs to `store`.
+// Contacts of those who sleep go on behind the ones of this sub-step, in the order of their keys. last_report
+// belongs to `store`.
 void carry_sleepers(World &w, StepContext &step, uint32_t *touching, uint32_t *sticking) {
   ContactStore &to = step.next_store;
   const uint32_t own = to.n;
-  const double scale = w.store.h > 0 ? step.h / w.store.h : 0;   // impulses belong to a sub-step's length
+  const double scale = w.store.h > 0 ? step.h / w.store.h : 0;  // impulses belong to a sub-step's length
   const auto carry = [&](uint32_t from, uint32_t end) {
     const auto copy = [=](const auto &source, auto &into, size_t width) {
-      into.insert(into.end(), source.begin() + std::ptrdiff_t(from * width), source.begin() + std::ptrdiff_t(end * width));
+      into.insert(into.end(), source.begin() + std::ptrdiff_t(from * width),
+                  source.begin() + std::ptrdiff_t(end * width));
     };
-    each_column([&](const ContactColumn &column, const auto &source, auto &into) {
-      if (column.carried && column.width != kOwnLength && column.width != kPerState) copy(source, into, column.width);
-    }, w.store, to);
+    each_column(
+        [&](const ContactColumn &column, const auto &source, auto &into) {
+          if (column.carried && column.width != kOwnLength && column.width != kPerState)
+            copy(source, into, column.width);
+        },
+        w.store, to);
     if (step.shares) copy(w.store.due.empty() ? w.store.area : w.store.due, to.due, 1);
-    copy(step.last_report.contacts, w.report.contacts, 1), copy(step.last_report.frame, w.report.frame, 9), copy(step.last_report.slip, w.report.slip, 2);
+    copy(step.last_report.contacts, w.report.contacts, 1);
+    copy(step.last_report.frame, w.report.frame, 9);
+    copy(step.last_report.slip, w.report.slip, 2);
     copy(step.last_report.mode, w.report.mode, 1);
     if (to.nstate == w.store.nstate) copy(w.store.bristle, to.bristle, w.store.nstate);
     else
       for (uint32_t m = from; m < end; ++m)
-        for (uint32_t s = 0; s < to.nstate; ++s) to.bristle.push_back(s < w.store.nstate ? w.store.bristle[size_t(w.store.nstate) * m + s] : 0);
+        for (uint32_t s = 0; s < to.nstate; ++s)
+          to.bristle.push_back(s < w.store.nstate ? w.store.bristle[size_t(w.store.nstate) * m + s] : 0);
     to.n += end - from;
   };
   // While the same ones sleep they are the old store's tail, and go over as a whole.
   uint32_t tail = w.store.n;
-  while (tail > 0 && sleeps(w, step, tail - 1) && (tail == w.store.n || w.store.key[tail - 1] < w.store.key[tail])) --tail;
+  while (tail > 0 && sleeps(w, step, tail - 1) &&
+         (tail == w.store.n || w.store.key[tail - 1] < w.store.key[tail]))
+    --tail;
   uint32_t before = 0;
   while (before < tail && !sleeps(w, step, before)) ++before;
   if (before == tail) {
@@ -253,12 +290,19 @@ void carry_sleepers(World &w, StepContext &step, uint32_t *touching, uint32_t *s
     for (const uint32_t m : w.store.by_key)
       if (sleeps(w, step, m)) carry(m, m + 1);
   }
-  to.began.resize(to.n, 0), to.by_key.resize(to.n), w.report.n = to.n;
+  to.began.resize(to.n, 0);
+  to.by_key.resize(to.n);
+  w.report.n = to.n;
   for (size_t i = size_t(3) * own; i < size_t(3) * to.n; ++i) to.impulse[i] *= scale;
-  w.report.impulse.insert(w.report.impulse.end(), to.impulse.begin() + std::ptrdiff_t(size_t(3) * own), to.impulse.end());
-  for (uint32_t m = own; m < to.n; ++m) *touching += to.touching[m], *sticking += to.impulse[size_t(3) * m] > 0 && w.report.mode[m] == 1;
+  w.report.impulse.insert(w.report.impulse.end(), to.impulse.begin() + std::ptrdiff_t(size_t(3) * own),
+                          to.impulse.end());
+  for (uint32_t m = own; m < to.n; ++m) {
+    *touching += to.touching[m];
+    *sticking += to.impulse[size_t(3) * m] > 0 && w.report.mode[m] == 1;
+  }
 
-  // Two sorted runs: this sub-step's, which `match` takes meanwhile, and the carried, whose places are their order.
+  // Two sorted runs: this sub-step's, which `match` takes meanwhile, and the carried, whose places
+  // are their order.
   std::copy(to.by_key.begin(), to.by_key.begin() + own, step.match.begin());
   for (uint32_t i = 0, m = own, k = 0; k < to.n; ++k)
     to.by_key[k] = m == to.n || (i < own && to.key[step.match[i]] < to.key[m]) ? step.match[i++] : m++;
@@ -277,15 +321,18 @@ void hold_sleepers(World &w) {
     w.store.held[m] = w.store.impulse[size_t(3) * m] > 0 && asleep(w, w.store.id_a[m]);
 }
 
-// Before the world forgets a body or an obstacle: whom it touched wakes, and the contacts of those who sleep on name slots that move up.
+// Before the world forgets a body or an obstacle: whom it touched wakes, and the contacts of those who sleep
+// on name slots that move up.
 void close_slot(World &w, uint64_t id, bool obstacle) {
-  const auto thing = std::find_if(w.obstacles.begin(), w.obstacles.end(), [&](auto &o) { return o->id == id; });
+  const auto thing =
+      std::find_if(w.obstacles.begin(), w.obstacles.end(), [&](auto &o) { return o->id == id; });
   const uint32_t slot = obstacle ? static_cast<uint32_t>(thing - w.obstacles.begin()) : slot_of(w, id);
   if (obstacle) wake_touching(w, id);
   else wake(w, *w.bodies[slot]);
   if (w.sleepers == 0) w.report.n = 0;
   for (ContactPoint &c : w.report.contacts) {
-    if (!obstacle && c.slot_a == slot) c.slot_a = kNone;   // touches no more, and is nobody's until the next sub-step drops it
+    // touches no more, and is nobody's until the next sub-step drops it
+    if (!obstacle && c.slot_a == slot) c.slot_a = kNone;
     else if (!obstacle && c.slot_a > slot && c.slot_a != kNone) --c.slot_a;
     if (bool(c.obstacle) == obstacle && c.slot_b > slot) --c.slot_b;
   }

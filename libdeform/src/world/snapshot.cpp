@@ -1,10 +1,12 @@
-// Snapshot, restore and hash: everything that a later result depends on, and nothing else. Candidate lists are left out on purpose:
-// contacts come from exact geometry, so lists that are built anew give the same contacts (broad/). What the host may change between two
-// steps (loads, holds, motions, gravity, filters, friction rules, runtime parameters) is state too.
+// Snapshot, restore and hash: everything that a later result depends on, and nothing else. Candidate lists
+// are left out on purpose: contacts come from exact geometry, so lists that are built anew give the same
+// contacts (broad/). What the host may change between two steps (loads, holds, motions, gravity, filters,
+// friction rules, runtime parameters) is state too.
 //
-// A field is one line in one of the ..._fields() functions below: its name, where it lies and what it must be. Writing, reading and the check all
-// follow from it; what must hold between fields stands in check(). A restore reads and checks everything into a Staged before it changes anything,
-// then exchanges it with the world, which cannot fail; where the tables that follow cannot be made it exchanges back.
+// A field is one line in one of the ..._fields() functions below: its name, where it lies and what it must
+// be. Writing, reading and the check all follow from it; what must hold between fields stands in check(). A
+// restore reads and checks everything into a Staged before it changes anything, then exchanges it with the
+// world, which cannot fail; where the tables that follow cannot be made it exchanges back.
 #include "world/snapshot.h"
 
 #include <algorithm>
@@ -25,22 +27,34 @@ namespace dfm {
 namespace {
 
 void zone(Hash &h, const SurfaceZones::Zone &z) {
-  h.add(z.group.data(), z.group.size()), h.add(z.material.data(), z.material.size()), h.add(z.friction);
+  h.add(z.group.data(), z.group.size());
+  h.add(z.material.data(), z.material.size());
+  h.add(z.friction);
 }
 
 // What must be the same in the world that a snapshot is restored into.
 uint64_t structure(const World &w) {
   Hash h;
   for (auto &b : w.bodies) {
-    h.add(b->id), h.add(b->p.n), h.add(b->surface.nsurfel), h.add(uint64_t(b->model.state.size()));
+    h.add(b->id);
+    h.add(b->p.n);
+    h.add(b->surface.nsurfel);
+    h.add(uint64_t(b->model.state.size()));
     h.add(b->model.type->id, std::strlen(b->model.type->id));
-    h.add(b->name.data(), b->name.size()), h.add(b->material.data(), b->material.size());
-    h.add(b->tets.data(), b->tets.size() * sizeof(uint32_t)), h.add(b->p.rest.data(), b->p.rest.size() * sizeof(double));
+    h.add(b->name.data(), b->name.size());
+    h.add(b->material.data(), b->material.size());
+    h.add(b->tets.data(), b->tets.size() * sizeof(uint32_t));
+    h.add(b->p.rest.data(), b->p.rest.size() * sizeof(double));
     h.add(b->p.mass.data(), b->p.mass.size() * sizeof(double));
-    for (const CellField &f : b->fields) h.add(f.key.data(), f.key.size()), h.add(f.values.data(), f.values.size() * sizeof(double));
+    for (const CellField &f : b->fields) {
+      h.add(f.key.data(), f.key.size());
+      h.add(f.values.data(), f.values.size() * sizeof(double));
+    }
     const Surface &s = b->surface;
-    h.add(s.row.data(), s.row.size() * sizeof(uint32_t)), h.add(s.col.data(), s.col.size() * sizeof(uint32_t));
-    h.add(s.weight.data(), s.weight.size() * sizeof(double)), h.add(s.rest.data(), s.rest.size() * sizeof(double));
+    h.add(s.row.data(), s.row.size() * sizeof(uint32_t));
+    h.add(s.col.data(), s.col.size() * sizeof(uint32_t));
+    h.add(s.weight.data(), s.weight.size() * sizeof(double));
+    h.add(s.rest.data(), s.rest.size() * sizeof(double));
     if (!s.identity()) h.add(s.tri.data(), s.tri.size() * sizeof(uint32_t));
     zone(h, b->zones.list[0]);
     if (b->zones.of.empty()) continue;
@@ -49,30 +63,55 @@ uint64_t structure(const World &w) {
   }
   for (auto &o : w.obstacles) {
     const dfm_obstacle_def &d = o->def;
-    h.add(o->id), h.add(d.shape), h.add(d.pose), h.add(d.half_size), h.add(d.radius), h.add(d.half_length), h.add(d.velocity_surface);
+    h.add(o->id);
+    h.add(d.shape);
+    h.add(d.pose);
+    h.add(d.half_size);
+    h.add(d.radius);
+    h.add(d.half_length);
+    h.add(d.velocity_surface);
     if (!o->points.empty()) {
-      h.add(o->points.data(), o->points.size() * sizeof(double)), h.add(o->triangles.data(), o->triangles.size() * sizeof(uint32_t));
+      h.add(o->points.data(), o->points.size() * sizeof(double));
+      h.add(o->triangles.data(), o->triangles.size() * sizeof(uint32_t));
       h.add(d.cells);
     }
-    h.add(d.category), h.add(d.collides_with), h.add(o->name.data(), o->name.size()), h.add(o->material.data(), o->material.size());
+    h.add(d.category);
+    h.add(d.collides_with);
+    h.add(o->name.data(), o->name.size());
+    h.add(o->material.data(), o->material.size());
     h.add(o->zone.friction);
-    if (o->added) h.add(o->rigid_body), h.add(o->local.position), h.add(o->local.rotation);
+    if (o->added) {
+      h.add(o->rigid_body);
+      h.add(o->local.position);
+      h.add(o->local.rotation);
+    }
   }
   for (auto &set : w.rigid_sets) {
-    h.add(set->host_name.data(), set->host_name.size()), h.add(set->njoint), h.add(uint64_t(set->extra.size()));
+    h.add(set->host_name.data(), set->host_name.size());
+    h.add(set->njoint);
+    h.add(uint64_t(set->extra.size()));
     h.add(set->group.data(), set->group.size() * sizeof(uint32_t));
-    for (const dfm_rigid_def &d : set->defs) h.add(d.mass), h.add(d.inertia);
+    for (const dfm_rigid_def &d : set->defs) {
+      h.add(d.mass);
+      h.add(d.inertia);
+    }
   }
   if (w.method->point_values) h.add(w.def.method);
   if (const uint8_t asked = asks_self_contact(w)) h.add(asked);
   return h.value;
 }
 
-// A world's changing part, read in full before anything of it is put in place. Members are named as in World, Body and Obstacle, so that the lists
-// of fields serve both.
+// A world's changing part, read in full before anything of it is put in place. Members are named as in World,
+// Body and Obstacle, so that the lists of fields serve both.
 struct StagedBody {
-  struct { Array<double> x, v, load; Array<uint8_t> held; } p;
-  struct { Array<double> state; std::vector<double> params; } model;
+  struct {
+    Array<double> x, v, load;
+    Array<uint8_t> held;
+  } p;
+  struct {
+    Array<double> state;
+    std::vector<double> params;
+  } model;
   Vec3 contact_impulse;
   EnergyBook energy;
   std::vector<Load> loads;
@@ -82,9 +121,21 @@ struct StagedBody {
   Slumber slumber;
   Array<double> surfel_impulse, anchor, method_values;
 };
-struct StagedObstacle { Pose pose, target; bool has_target = false; std::vector<dfm_pose_key> keys; dfm_obstacle_def def{}; };
-struct StagedRigids { Array<dfm_rigid_state> state; Array<double> extra, total; double last_h = 0; };
-struct StagedLaw { std::string id; std::vector<double> params; };
+struct StagedObstacle {
+  Pose pose, target;
+  bool has_target = false;
+  std::vector<dfm_pose_key> keys;
+  dfm_obstacle_def def{};
+};
+struct StagedRigids {
+  Array<dfm_rigid_state> state;
+  Array<double> extra, total;
+  double last_h = 0;
+};
+struct StagedLaw {
+  std::string id;
+  std::vector<double> params;
+};
 struct Staged {
   double time = 0, stable = 0, offset = 0, hold_start = 0;
   uint64_t step_count = 0, next_id = 0;
@@ -106,26 +157,34 @@ struct Staged {
   struct { std::vector<PairAside> aside; } overlaps;
   std::vector<PairWork> work;
   Report report;
-  std::vector<dfm_contact_event> events;   // none
+  std::vector<dfm_contact_event> events;  // none
   explicit Staged(const World &w) : store(w.memory()) {
     const Memory &m = w.memory();
     use_memory(m, report.contacts, report.frame, report.impulse, report.slip, report.mode);
     def.method = w.def.method;
-    bodies.resize(w.bodies.size()), obstacles.resize(w.obstacles.size()), rigid_sets.resize(w.rigid_sets.size());
-    for (StagedBody &b : bodies) use_memory(m, b.p.x, b.p.v, b.p.load, b.p.held, b.model.state, b.surfel_impulse, b.anchor, b.method_values);
+    bodies.resize(w.bodies.size());
+    obstacles.resize(w.obstacles.size());
+    rigid_sets.resize(w.rigid_sets.size());
+    for (StagedBody &b : bodies)
+      use_memory(m, b.p.x, b.p.v, b.p.load, b.p.held, b.model.state, b.surfel_impulse, b.anchor,
+                 b.method_values);
     for (StagedRigids &r : rigid_sets) use_memory(m, r.state, r.extra, r.total);
   }
 };
 
 template <class T>
-auto &object(T &x) { return x; }
+auto &object(T &x) {
+  return x;
+}
 template <class T>
-T &object(const std::unique_ptr<T> &x) { return *x; }
+T &object(const std::unique_ptr<T> &x) {
+  return *x;
+}
 
 std::string id_of(const LawInstance &law) { return law.type->id; }
 std::string &id_of(StagedLaw &law) { return law.id; }
 
-// ---- what values must be --------------------------------------------------------------------------------------------------
+// ---- what values must be ----------------------------------------------------------------------------------
 
 template <class Key>
 bool rise(const std::vector<Key> &keys) {
@@ -153,7 +212,8 @@ bool below(const List &list, uint32_t n) {
 bool in_range(const dfm_type &type, const std::vector<double> &values) {
   std::vector<dfm_param_value> given;
   size_t at = 0;
-  for (uint32_t i = 0; i < type.nparam; at += type.params[i++].width) given.push_back({type.params[i].key, values.data() + at, type.params[i].width});
+  for (uint32_t i = 0; i < type.nparam; at += type.params[i++].width)
+    given.push_back({type.params[i].key, values.data() + at, type.params[i].width});
   try {
     pack_params(type, given);
     return true;
@@ -163,23 +223,28 @@ bool in_range(const dfm_type &type, const std::vector<double> &values) {
 }
 
 bool good_state(const dfm_rigid_state &s) {
-  return must::all_finite(s.position) && must::all_finite(s.velocity) && must::all_finite(s.spin) && must::rotation.is(s.rotation);
+  return must::all_finite(s.position) && must::all_finite(s.velocity) && must::all_finite(s.spin) &&
+         must::rotation.is(s.rotation);
 }
 
 bool good_stats(const dfm_world_stats &s) {
-  return s.size == sizeof s && must::all_finite(s.time) && must::all_finite(s.residual) && must::all_finite(s.contacts_mean) &&
-         must::all_finite(s.residual_max) && s.stable_step >= 0 && must::all_finite(s.sleep_energy) && must::all_finite(s.sleep_momentum) &&
+  return s.size == sizeof s && must::all_finite(s.time) && must::all_finite(s.residual) &&
+         must::all_finite(s.contacts_mean) && must::all_finite(s.residual_max) && s.stable_step >= 0 &&
+         must::all_finite(s.sleep_energy) && must::all_finite(s.sleep_momentum) &&
          must::all_finite(s.guard_lost);
 }
 
-constexpr uint64_t kMostIds = uint64_t{1} << 48;   // far more than any run makes, and far from where counting on would wrap
+// far more than any run makes, and far from where counting on would wrap
+constexpr uint64_t kMostIds = uint64_t{1} << 48;
 uint64_t last_id(const World &w) {
-  return std::max(w.bodies.empty() ? 0 : w.bodies.back()->id, w.obstacles.empty() ? 0 : w.obstacles.back()->id);
+  return std::max(w.bodies.empty() ? 0 : w.bodies.back()->id,
+                  w.obstacles.empty() ? 0 : w.obstacles.back()->id);
 }
 
-constexpr double kLeastStep = 1e-15;   // s; no bound of a body in SI units lies below, and a smaller one would never let the world step again
+// s; no bound of a body in SI units lies below, and a smaller one would never let the world step again
+constexpr double kLeastStep = 1e-15;
 
-// ---- the fields -----------------------------------------------------------------------------------------------------------
+// ---- the fields -------------------------------------------------------------------------------------------
 
 // `like`: the world that is written, or read into.
 template <class Stream, class B>
@@ -190,7 +255,8 @@ void prescribed_fields(Stream &s, B &b, const Body &like) {
     s.value("load number", l.number, must::any);
     s.array("load points", l.points, kAnyCount, must::below(like.p.n));
     s.array("load force", l.force, 3 * l.points.size(), must::finite);
-    s.array("load keys", l.keys, kAnyCount, must::any), sine(l.sine);
+    s.array("load keys", l.keys, kAnyCount, must::any);
+    sine(l.sine);
     s.must_hold("load keys", "finite keys at rising times", [&] { return rise(l.keys); });
     s.must_hold("load number", "a number below the next one", [&] { return l.number < b.next_load; });
   });
@@ -200,7 +266,8 @@ void prescribed_fields(Stream &s, B &b, const Body &like) {
     s.array("spring weights", p.weights, p.points.size(), must::not_negative);
     s.array("spring keys", p.keys, kAnyCount, must::any);
     s.value("spring end", p.to, must::finite);
-    s.value("spring stiffness", p.stiffness, must::not_negative), s.value("spring damping", p.damping, must::not_negative);
+    s.value("spring stiffness", p.stiffness, must::not_negative);
+    s.value("spring damping", p.damping, must::not_negative);
     s.must_hold("spring keys", "finite keys at rising times", [&] { return rise(p.keys); });
     s.must_hold("spring number", "a number below the next one, on a body that is no self-stepping one",
                 [&] { return p.number < b.next_load && !like.model.stepper; });
@@ -211,7 +278,8 @@ void prescribed_fields(Stream &s, B &b, const Body &like) {
   s.list("motions", b.motions, [&](auto &m) {
     s.array("motion points", m.points, kAnyCount, must::below(like.p.n));
     s.array("motion start", m.start, 3 * m.points.size(), must::finite);
-    s.array("motion keys", m.keys, kAnyCount, must::any), sine(m.sine);
+    s.array("motion keys", m.keys, kAnyCount, must::any);
+    sine(m.sine);
     s.must_hold("motion keys", "finite keys at rising times", [&] { return rise(m.keys); });
   });
 }
@@ -219,19 +287,28 @@ void prescribed_fields(Stream &s, B &b, const Body &like) {
 template <class Stream, class W, class B>
 void body_fields(Stream &s, W &w, B &b, const Body &like) {
   s.where("body", like.name);
-  s.array("position", b.p.x, like.p.x.size(), must::finite), s.array("velocity", b.p.v, like.p.v.size(), must::finite);
-  s.array("held", b.p.held, like.p.held.size(), must::at_most(7)), s.array("load sum", b.p.load, like.p.load.size(), must::finite);
-  s.must_hold("position", "a fourth component of zero", [&] { return padded(b.p.x) && padded(b.p.v) && padded(b.p.load); });
+  s.array("position", b.p.x, like.p.x.size(), must::finite);
+  s.array("velocity", b.p.v, like.p.v.size(), must::finite);
+  s.array("held", b.p.held, like.p.held.size(), must::at_most(7));
+  s.array("load sum", b.p.load, like.p.load.size(), must::finite);
+  s.must_hold("position", "a fourth component of zero",
+              [&] { return padded(b.p.x) && padded(b.p.v) && padded(b.p.load); });
   s.array("model state", b.model.state, like.model.state.size(), must::finite);
   s.array("model parameters", b.model.params, like.model.params.size(), must::finite);
-  s.must_hold("model parameters", "values in the range of the model's table", [&] { return in_range(*like.model.type, b.model.params); });
+  s.must_hold("model parameters", "values in the range of the model's table",
+              [&] { return in_range(*like.model.type, b.model.params); });
   s.value("contact_impulse", b.contact_impulse, must::finite);
-  s.value("energy known", b.energy.known, must::at_most(8)), s.value("least energy", b.energy.base, must::finite);
-  s.value("booked work", b.energy.work, must::finite), s.value("kinetic energy", b.energy.kinetic, must::finite);
+  s.value("energy known", b.energy.known, must::at_most(8));
+  s.value("least energy", b.energy.base, must::finite);
+  s.value("booked work", b.energy.work, must::finite);
+  s.value("kinetic energy", b.energy.kinetic, must::finite);
   s.must_hold("energy known", "what the energy watch writes", [&] { return sound(b.energy); });
-  s.value("category", b.category, must::any), s.value("collides_with", b.collides_with, must::any);
-  s.value("asleep", b.slumber.asleep, must::flag), s.value("calm", b.slumber.calm, must::not_negative);
-  s.value("asleep since", b.slumber.since, must::not_negative), s.value("sub-step asleep", b.slumber.h, must::not_negative);
+  s.value("category", b.category, must::any);
+  s.value("collides_with", b.collides_with, must::any);
+  s.value("asleep", b.slumber.asleep, must::flag);
+  s.value("calm", b.slumber.calm, must::not_negative);
+  s.value("asleep since", b.slumber.since, must::not_negative);
+  s.value("sub-step asleep", b.slumber.h, must::not_negative);
   s.value("force asleep", b.slumber.force, must::finite);
   s.must_hold("asleep", "a sleep that began in a sub-step before now, where bodies may sleep", [&] {
     return !b.slumber.asleep || (w.def.sleep && b.slumber.since <= w.time && b.slumber.h > 0);
@@ -246,31 +323,42 @@ void body_fields(Stream &s, W &w, B &b, const Body &like) {
 
 template <class Stream, class C>
 void contact_fields(Stream &s, C &c, uint64_t laws) {
-  s.value("contacts", c.n, must::any), s.value("contact states", c.nstate, must::any), s.value("contact sub-step", c.h, must::not_negative);
+  s.value("contacts", c.n, must::any);
+  s.value("contact states", c.nstate, must::any);
+  s.value("contact sub-step", c.h, must::not_negative);
   const uint64_t n = c.n;
-  each_column([&](auto column, auto &values) {
-    using V = ColumnValues;
-    constexpr V kind = decltype(column)::values;
-    const uint64_t count = column.width == kOwnLength ? kAnyCount : column.entries(n, c.nstate);
-    if (!column.name) return;
-    if constexpr (kind == V::finite) s.array(column.name, values, count, must::finite);
-    else if constexpr (kind == V::not_negative) s.array(column.name, values, count, must::not_negative);
-    else if constexpr (kind == V::flag) s.array(column.name, values, count, must::flag);
-    else if constexpr (kind == V::law) s.array(column.name, values, count, must::below(laws));
-    else s.array(column.name, values, count, must::any);
-  }, c);
+  each_column(
+      [&](auto column, auto &values) {
+        using V = ColumnValues;
+        constexpr V kind = decltype(column)::values;
+        const uint64_t count = column.width == kOwnLength ? kAnyCount : column.entries(n, c.nstate);
+        if (!column.name) return;
+        if constexpr (kind == V::finite) s.array(column.name, values, count, must::finite);
+        else if constexpr (kind == V::not_negative) s.array(column.name, values, count, must::not_negative);
+        else if constexpr (kind == V::flag) s.array(column.name, values, count, must::flag);
+        else if constexpr (kind == V::law) s.array(column.name, values, count, must::below(laws));
+        else s.array(column.name, values, count, must::any);
+      },
+      c);
 }
 
 template <class Stream, class W>
 void rule_fields(Stream &s, W &w, uint64_t laws) {
   const auto between = [&](auto &r) {
-    s.array("rule", r.between[0], kAnyCount, must::any), s.array("rule", r.between[1], kAnyCount, must::any);
+    s.array("rule", r.between[0], kAnyCount, must::any);
+    s.array("rule", r.between[1], kAnyCount, must::any);
     s.must_hold("rule", "two names", [&] { return !r.between[0].empty() && !r.between[1].empty(); });
   };
-  s.list("friction rules", w.friction, [&](auto &r) { between(r), s.value("rule's law", r.law, must::below(laws)); });
-  s.array("pairs that are set aside", w.overlaps.aside, kAnyCount, must::Be{[](const PairAside &x) { return x.obstacle <= 1 && x.a != x.b; },
-          "two things"});
-  s.list("filter rules", w.filters, [&](auto &r) { between(r), s.value("collide", r.collide, must::flag); });
+  s.list("friction rules", w.friction, [&](auto &r) {
+    between(r);
+    s.value("rule's law", r.law, must::below(laws));
+  });
+  s.array("pairs that are set aside", w.overlaps.aside, kAnyCount,
+          must::Be{[](const PairAside &x) { return x.obstacle <= 1 && x.a != x.b; }, "two things"});
+  s.list("filter rules", w.filters, [&](auto &r) {
+    between(r);
+    s.value("collide", r.collide, must::flag);
+  });
 }
 
 template <class Stream, class W>
@@ -281,33 +369,51 @@ void fields(Stream &s, W &w, const World &like) {
     s.must_hold("law", "the name of a law", [&] { return !id_of(l).empty(); });
     s.array("law parameters", l.params, kAnyCount, must::finite);
   });
-  s.value("time", w.time, must::not_negative), s.value("steps", w.step_count, must::any);
+  s.value("time", w.time, must::not_negative);
+  s.value("steps", w.step_count, must::any);
   s.value("step bound", w.stable, must::Be{[](double x) { return x >= 0; }, "a time above zero"});
-  s.value("inverted cells", w.inverted, must::any), s.value("age of the bound", w.bound_age, must::any);
-  s.must_hold("step bound", "a time that a sub-step can have", [&] { return w.bound_age == kNone || w.stable >= kLeastStep; });
-  for (auto *r : {&w.sizes.cut, &w.sizes.offer})
-    s.value("step size", r->size, must::not_negative), s.value("calm of the size", r->calm, must::any), s.value("patience", r->patience, must::any);
+  s.value("inverted cells", w.inverted, must::any);
+  s.value("age of the bound", w.bound_age, must::any);
+  s.must_hold("step bound", "a time that a sub-step can have",
+              [&] { return w.bound_age == kNone || w.stable >= kLeastStep; });
+  for (auto *r : {&w.sizes.cut, &w.sizes.offer}) {
+    s.value("step size", r->size, must::not_negative);
+    s.value("calm of the size", r->calm, must::any);
+    s.value("patience", r->patience, must::any);
+  }
   s.must_hold("step size", "sizes that the library chooses", [&] { return sound(w.sizes); });
-  s.value("age of the energies", w.watch.age, must::any), s.value("credit of the energies", w.watch.credit, must::any);
+  s.value("age of the energies", w.watch.age, must::any);
+  s.value("credit of the energies", w.watch.credit, must::any);
   s.value("last sub-step", w.watch.last_h, must::not_negative);
   s.must_hold("last sub-step", "what the energy watch writes", [&] { return sound(w.watch); });
   s.value("contact offset", w.offset, must::positive);
-  s.value("hold start", w.hold_start, must::finite), s.value("holding", w.holding, must::flag);
-  s.value("statistics", w.stats, must::Be{[](const dfm_world_stats &x) { return good_stats(x); }, "finite statistics"});
-  s.value("gravity", w.gravity, must::finite), s.value("gravity", w.def.gravity, must::finite);
-  s.value("next id", w.next_id, must::Be{[&](uint64_t x) { return x > last_id(like) && x < kMostIds; }, "a number above all that are taken"});
+  s.value("hold start", w.hold_start, must::finite);
+  s.value("holding", w.holding, must::flag);
+  s.value("statistics", w.stats,
+          must::Be{[](const dfm_world_stats &x) { return good_stats(x); }, "finite statistics"});
+  s.value("gravity", w.gravity, must::finite);
+  s.value("gravity", w.def.gravity, must::finite);
+  s.value("next id", w.next_id,
+          must::Be{[&](uint64_t x) { return x > last_id(like) && x < kMostIds; },
+                   "a number above all that are taken"});
   s.array("gravity keys", w.gravity_keys, kAnyCount, must::any);
   s.must_hold("gravity keys", "finite keys at rising times", [&] { return rise(w.gravity_keys); });
-  s.value("sleep", w.def.sleep, must::flag), s.value("sleepers", w.sleepers, must::any);
-  s.must_hold("sleep", "no sleep with this contact method", [&] { return !w.def.sleep || !lacks(*like.method, Ability::sleep); });
+  s.value("sleep", w.def.sleep, must::flag);
+  s.value("sleepers", w.sleepers, must::any);
+  s.must_hold("sleep", "no sleep with this contact method",
+              [&] { return !w.def.sleep || !lacks(*like.method, Ability::sleep); });
   size_t at = 0;
-  s.members("bodies", w.bodies, like.bodies.size(), [&](auto &entry) { body_fields(s, w, object(entry), *like.bodies[at++]); });
+  s.members("bodies", w.bodies, like.bodies.size(),
+            [&](auto &entry) { body_fields(s, w, object(entry), *like.bodies[at++]); });
   at = 0;
   s.members("obstacles", w.obstacles, like.obstacles.size(), [&](auto &entry) {
     auto &o = object(entry);
     s.where("obstacle", like.obstacles[at++]->name);
-    s.value("pose", o.pose, must::pose), s.value("target", o.target, must::pose), s.value("has a target", o.has_target, must::flag);
-    s.array("keys", o.keys, kAnyCount, must::any), s.value("sine", o.def.sine, must::finite);
+    s.value("pose", o.pose, must::pose);
+    s.value("target", o.target, must::pose);
+    s.value("has a target", o.has_target, must::flag);
+    s.array("keys", o.keys, kAnyCount, must::any);
+    s.value("sine", o.def.sine, must::finite);
     s.must_hold("keys", "finite keys at rising times", [&] { return rise(o.keys); });
   });
   at = 0;
@@ -315,22 +421,30 @@ void fields(Stream &s, W &w, const World &like) {
     auto &r = object(entry);
     const RigidSet &l = *like.rigid_sets[at++];
     s.where("rigid body", l.defs[0].name);
-    s.array("rigid state", r.state, l.state.size(), must::Be{[](const dfm_rigid_state &x) { return good_state(x); }, "finite states and unit quaternions"});
-    s.array("host's values", r.extra, l.extra.size(), must::finite), s.array("impulse", r.total, l.total.size(), must::finite);
+    s.array("rigid state", r.state, l.state.size(),
+            must::Be{[](const dfm_rigid_state &x) { return good_state(x); },
+                     "finite states and unit quaternions"});
+    s.array("host's values", r.extra, l.extra.size(), must::finite);
+    s.array("impulse", r.total, l.total.size(), must::finite);
   });
   s.where("", "");
   rule_fields(s, w, w.laws.size());
   contact_fields(s, w.store, w.laws.size());
-  s.array("friction work", w.work, kAnyCount, must::Be{[](const PairWork &x) { return must::all_finite(x.work); }, "finite work"});
-  if (w.sleepers == 0) return;   // contacts that sleep are reported from what the last sub-step left
+  s.array("friction work", w.work, kAnyCount,
+          must::Be{[](const PairWork &x) { return must::all_finite(x.work); }, "finite work"});
+  if (w.sleepers == 0) return;  // contacts that sleep are reported from what the last sub-step left
   auto &r = w.report;
   const uint64_t n = w.store.n;
-  s.value("reported contacts", r.n, must::at_most(n)), s.value("reported sub-step", r.h, must::positive), s.array("report", r.contacts, n, must::any);
-  s.array("reported frame", r.frame, 9 * n, must::finite), s.array("reported impulse", r.impulse, 3 * n, must::finite);
-  s.array("reported slip", r.slip, 2 * n, must::finite), s.array("reported mode", r.mode, n, must::at_most(2));
+  s.value("reported contacts", r.n, must::at_most(n));
+  s.value("reported sub-step", r.h, must::positive);
+  s.array("report", r.contacts, n, must::any);
+  s.array("reported frame", r.frame, 9 * n, must::finite);
+  s.array("reported impulse", r.impulse, 3 * n, must::finite);
+  s.array("reported slip", r.slip, 2 * n, must::finite);
+  s.array("reported mode", r.mode, n, must::at_most(2));
 }
 
-// ---- what must hold between fields ----------------------------------------------------------------------------------------
+// ---- what must hold between fields ------------------------------------------------------------------------
 
 // Of the world that is restored into; both lists are in id order.
 struct Things {
@@ -340,7 +454,8 @@ struct Things {
   bool known(uint64_t id) const { return body(id) || obstacle(id); }
   template <class List>
   static auto find(const List &list, uint64_t id) -> decltype(list[0].get()) {
-    const auto at = std::lower_bound(list.begin(), list.end(), id, [](const auto &x, uint64_t value) { return x->id < value; });
+    const auto at = std::lower_bound(list.begin(), list.end(), id,
+                                     [](const auto &x, uint64_t value) { return x->id < value; });
     return at != list.end() && (*at)->id == id ? at->get() : nullptr;
   }
   // Edges of a body or of a mesh.
@@ -359,11 +474,15 @@ bool good_contacts(const Staged &t, const Things &things) {
     const Vec3 n = load3(&c.normal[3 * size_t{i}]), u = load3(&c.tangent[3 * size_t{i}]);
     if (!(norm2(n) < 1.01 && norm2(u) < 1.01)) return false;
     // Of what was removed since, contacts stay until the next sub-step, and touch no more.
-    if (c.id_a[i] >= t.next_id || c.id_b[i] >= t.next_id || (c.touching[i] && !(things.body(c.id_a[i]) && things.known(c.id_b[i])))) return false;
+    if (c.id_a[i] >= t.next_id || c.id_b[i] >= t.next_id ||
+        (c.touching[i] && !(things.body(c.id_a[i]) && things.known(c.id_b[i]))))
+      return false;
   }
   if (c.crossings.size() > c.n || !std::is_sorted(c.crossings.begin(), c.crossings.end())) return false;
   for (const Crossing &x : c.crossings)
-    if (things.known(x.id_a) && things.known(x.id_b) && (x.edge_a >= things.edges(x.id_a) || x.edge_b >= things.edges(x.id_b))) return false;
+    if (things.known(x.id_a) && things.known(x.id_b) &&
+        (x.edge_a >= things.edges(x.id_a) || x.edge_b >= things.edges(x.id_b)))
+      return false;
   return true;
 }
 
@@ -390,12 +509,15 @@ bool good_report(const Staged &t, const World &w) {
     const size_t counts[] = {4, 3, 3, 1, 1, 3};
     for (int k = 0; k < 6; ++k)
       if (!must::all_finite(values[k], counts[k])) return false;
-    if (c.key != t.store.key[i] || c.kind > kPrimitive || c.obstacle > 1 || c.nnode > 4 || c.type_a > 2) return false;
-    if (!t.store.touching[i] && c.slot_a == kNone) continue;   // of a body that was removed since
+    if (c.key != t.store.key[i] || c.kind > kPrimitive || c.obstacle > 1 || c.nnode > 4 || c.type_a > 2)
+      return false;
+    if (!t.store.touching[i] && c.slot_a == kNone) continue;  // of a body that was removed since
     if (c.slot_a >= w.bodies.size()) return false;
     if (!t.store.touching[i]) continue;
     if (c.slot_b >= (c.obstacle ? w.obstacles.size() : w.bodies.size())) return false;
-    if (w.bodies[c.slot_a]->id != t.store.id_a[i] || (c.obstacle ? w.obstacles[c.slot_b]->id : w.bodies[c.slot_b]->id) != t.store.id_b[i]) return false;
+    if (w.bodies[c.slot_a]->id != t.store.id_a[i] ||
+        (c.obstacle ? w.obstacles[c.slot_b]->id : w.bodies[c.slot_b]->id) != t.store.id_b[i])
+      return false;
     const Surface &s = w.bodies[c.slot_a]->surface;
     if (c.feature_a >= (c.type_a == 0 ? s.nsurfel : c.type_a == 1 ? s.nedge : s.ntri)) return false;
   }
@@ -406,7 +528,8 @@ void check(const SnapshotReader &s, const Staged &t, const World &w) {
   if (!s.at_end()) s.refuse("the end", "no bytes after the last field");
   if (!good_contacts(t, {w})) s.refuse("contacts", "contacts of bodies and obstacles that are there");
   if (!good_work(t.work, {w})) s.refuse("friction work", "pairs that are there, in order");
-  if (!good_aside(t.overlaps.aside, {w})) s.refuse("pairs that are set aside", "bodies and obstacles that are there");
+  if (!good_aside(t.overlaps.aside, {w}))
+    s.refuse("pairs that are set aside", "bodies and obstacles that are there");
   size_t sleepers = 0;
   for (const StagedBody &b : t.bodies) sleepers += b.slumber.asleep;
   if (sleepers != t.sleepers) s.refuse("sleepers", "as many as sleep");
@@ -414,18 +537,22 @@ void check(const SnapshotReader &s, const Staged &t, const World &w) {
   for (size_t i = 0; i < t.rigid_sets.size(); ++i) {
     const RigidSet &set = *w.rigid_sets[i];
     for (size_t k = 0; k < set.group.size(); ++k)
-      if (set.group[k] == DFM_RIGID_STILL && std::memcmp(&t.rigid_sets[i].state[k], &set.state[k], sizeof(dfm_rigid_state)) != 0)
+      if (set.group[k] == DFM_RIGID_STILL &&
+          std::memcmp(&t.rigid_sets[i].state[k], &set.state[k], sizeof(dfm_rigid_state)) != 0)
         s.refuse("rigid state", "a fixed body where it stands");
   }
 }
 
 // Laws stand in the order in which the run first needed them, and contacts remember their law by that place.
-std::vector<std::unique_ptr<LawInstance>> make_laws(const SnapshotReader &s, const World &w, const Staged &t) {
+std::vector<std::unique_ptr<LawInstance>> make_laws(const SnapshotReader &s, const World &w,
+                                                    const Staged &t) {
   std::vector<std::unique_ptr<LawInstance>> laws;
   uint32_t most = 0;
   for (const StagedLaw &l : t.laws) {
     const dfm_type &type = w.context->registry.find(DFM_KIND_FRICTION, l.id);
-    if (l.params.size() != packed_width(type)) fail(DFM_E_FORMAT, "the snapshot was made with another version of law '%s'; nothing was restored", type.id);
+    if (l.params.size() != packed_width(type))
+      fail(DFM_E_FORMAT, "the snapshot was made with another version of law '%s'; nothing was restored",
+           type.id);
     if (!in_range(type, l.params)) s.refuse("law parameters", "values in the range of the law's table");
     laws.push_back(std::make_unique<LawInstance>(type, w.context->host, l.params));
     most = std::max(most, laws.back()->nstate);
@@ -438,15 +565,20 @@ std::vector<std::unique_ptr<LawInstance>> make_laws(const SnapshotReader &s, con
 void order_contacts(ContactStore &c) {
   c.by_key.resize(c.n);
   std::iota(c.by_key.begin(), c.by_key.end(), 0u);
-  std::sort(c.by_key.begin(), c.by_key.end(), [&](uint32_t i, uint32_t j) { return c.key[i] != c.key[j] ? c.key[i] < c.key[j] : i < j; });
+  std::sort(c.by_key.begin(), c.by_key.end(),
+            [&](uint32_t i, uint32_t j) { return c.key[i] != c.key[j] ? c.key[i] < c.key[j] : i < j; });
 }
 
-// ---- into the world -------------------------------------------------------------------------------------------------------
+// ---- into the world ---------------------------------------------------------------------------------------
 
 void put_parameters(Body &b, const std::vector<double> &values) {
   if (values == b.model.params) return;
-  if (!b.model.ops->set_params || b.model.call("set_params", [&] { return b.model.ops->set_params(b.model.self, values.data()); }) != DFM_OK)
-    fail(DFM_E_FORMAT, "the snapshot has other parameters for model '%s' of body '%s', which cannot take them while it runs; nothing was restored",
+  if (!b.model.ops->set_params || b.model.call("set_params", [&] {
+        return b.model.ops->set_params(b.model.self, values.data());
+      }) != DFM_OK)
+    fail(DFM_E_FORMAT,
+         "the snapshot has other parameters for model '%s' of body '%s', which cannot take them while it "
+         "runs; nothing was restored",
          b.model.type->id, b.name.c_str());
 }
 
@@ -455,7 +587,8 @@ void take_parameters_back(World &w, const Staged &t, size_t n) noexcept {
   while (n-- > 0) {
     Body &b = *w.bodies[n];
     if (t.bodies[n].model.params != b.model.params)
-      b.model.call("set_params", [&] { return b.model.ops->set_params(b.model.self, b.model.params.data()); });
+      b.model.call("set_params",
+                   [&] { return b.model.ops->set_params(b.model.self, b.model.params.data()); });
   }
 }
 
@@ -475,13 +608,24 @@ void exchange(World &w, Staged &t) noexcept {
   for (size_t i = 0; i < w.bodies.size(); ++i) {
     Body &b = *w.bodies[i];
     StagedBody &other = t.bodies[i];
-    b.p.x.swap(other.p.x), b.p.v.swap(other.p.v), b.p.load.swap(other.p.load), b.p.held.swap(other.p.held);
-    b.model.state.swap(other.model.state), b.model.params.swap(other.model.params);
-    b.loads.swap(other.loads), b.springs.swap(other.springs), b.motions.swap(other.motions);
-    std::swap(b.contact_impulse, other.contact_impulse), std::swap(b.energy, other.energy), std::swap(b.next_load, other.next_load);
-    std::swap(b.category, other.category), std::swap(b.collides_with, other.collides_with);
-    std::swap(b.slumber, other.slumber), b.bound.known = false;
-    b.anchor.swap(other.anchor), b.method_values.swap(other.method_values);
+    b.p.x.swap(other.p.x);
+    b.p.v.swap(other.p.v);
+    b.p.load.swap(other.p.load);
+    b.p.held.swap(other.p.held);
+    b.model.state.swap(other.model.state);
+    b.model.params.swap(other.model.params);
+    b.loads.swap(other.loads);
+    b.springs.swap(other.springs);
+    b.motions.swap(other.motions);
+    std::swap(b.contact_impulse, other.contact_impulse);
+    std::swap(b.energy, other.energy);
+    std::swap(b.next_load, other.next_load);
+    std::swap(b.category, other.category);
+    std::swap(b.collides_with, other.collides_with);
+    std::swap(b.slumber, other.slumber);
+    b.bound.known = false;
+    b.anchor.swap(other.anchor);
+    b.method_values.swap(other.method_values);
     if (!other.surfel_impulse.empty()) b.surfel_impulse.swap(other.surfel_impulse);
     if (b.slumber.asleep) gather_surface(b.surface, b.p.x.data(), b.p.v.data());
     update_inverse_mass(b.p);
@@ -489,21 +633,40 @@ void exchange(World &w, Staged &t) noexcept {
   for (size_t i = 0; i < w.obstacles.size(); ++i) {
     Obstacle &o = *w.obstacles[i];
     StagedObstacle &other = t.obstacles[i];
-    std::swap(o.pose, other.pose), std::swap(o.target, other.target), std::swap(o.has_target, other.has_target);
-    std::swap(o.def.sine, other.def.sine), o.keys.swap(other.keys);
+    std::swap(o.pose, other.pose);
+    std::swap(o.target, other.target);
+    std::swap(o.has_target, other.has_target);
+    std::swap(o.def.sine, other.def.sine);
+    o.keys.swap(other.keys);
   }
   for (size_t i = 0; i < w.rigid_sets.size(); ++i) {
     RigidSet &set = *w.rigid_sets[i];
     StagedRigids &other = t.rigid_sets[i];
-    set.state.swap(other.state), set.extra.swap(other.extra), set.total.swap(other.total), std::swap(set.last_h, other.last_h);
+    set.state.swap(other.state);
+    set.extra.swap(other.extra);
+    set.total.swap(other.total);
+    std::swap(set.last_h, other.last_h);
   }
-  w.friction.swap(t.friction), w.filters.swap(t.filters), w.overlaps.aside.swap(t.overlaps.aside);
-  w.gravity_keys.swap(t.gravity_keys), w.work.swap(t.work), w.events.swap(t.events);
-  std::swap(w.def.gravity, t.def.gravity), std::swap(w.def.sleep, t.def.sleep);
-  std::swap(w.store, t.store), std::swap(w.report, t.report), std::swap(w.stats, t.stats);
-  std::swap(w.time, t.time), std::swap(w.step_count, t.step_count), std::swap(w.next_id, t.next_id);
-  std::swap(w.hold_start, t.hold_start), std::swap(w.holding, t.holding), std::swap(w.sizes, t.sizes), std::swap(w.watch, t.watch);
-  w.worst_body = nullptr, w.worst_point = 0;
+  w.friction.swap(t.friction);
+  w.filters.swap(t.filters);
+  w.overlaps.aside.swap(t.overlaps.aside);
+  w.gravity_keys.swap(t.gravity_keys);
+  w.work.swap(t.work);
+  w.events.swap(t.events);
+  std::swap(w.def.gravity, t.def.gravity);
+  std::swap(w.def.sleep, t.def.sleep);
+  std::swap(w.store, t.store);
+  std::swap(w.report, t.report);
+  std::swap(w.stats, t.stats);
+  std::swap(w.time, t.time);
+  std::swap(w.step_count, t.step_count);
+  std::swap(w.next_id, t.next_id);
+  std::swap(w.hold_start, t.hold_start);
+  std::swap(w.holding, t.holding);
+  std::swap(w.sizes, t.sizes);
+  std::swap(w.watch, t.watch);
+  w.worst_body = nullptr;
+  w.worst_point = 0;
   ++w.placements;
 }
 
@@ -512,17 +675,25 @@ void exchange(World &w, Staged &t) noexcept {
 uint64_t world_hash(const World &w) {
   Hash h;
   for (auto &b : w.bodies) {
-    for (const Array<double> *a : {&b->p.x, &b->p.v, &b->model.state}) h.add(a->data(), a->size() * sizeof(double));
+    for (const Array<double> *a : {&b->p.x, &b->p.v, &b->model.state})
+      h.add(a->data(), a->size() * sizeof(double));
   }
   for (auto &set : w.rigid_sets) {
-    h.add(set->state.data(), set->state.size() * sizeof(dfm_rigid_state)), h.add(set->extra.data(), set->extra.size() * sizeof(double));
+    h.add(set->state.data(), set->state.size() * sizeof(dfm_rigid_state));
+    h.add(set->extra.data(), set->extra.size() * sizeof(double));
   }
-  each_column([&](const ContactColumn &column, const auto &values) {
-    if (column.hashed) h.add(values.data(), values.size() * sizeof(values[0]));
-  }, w.store);
+  each_column(
+      [&](const ContactColumn &column, const auto &values) {
+        if (column.hashed) h.add(values.data(), values.size() * sizeof(values[0]));
+      },
+      w.store);
   for (auto &b : w.bodies) h.add(b->method_values.data(), b->method_values.size() * sizeof(double));
   if (w.def.sleep)
-    for (auto &b : w.bodies) h.add(b->slumber.asleep), h.add(b->slumber.calm), h.add(b->slumber.since);
+    for (auto &b : w.bodies) {
+      h.add(b->slumber.asleep);
+      h.add(b->slumber.calm);
+      h.add(b->slumber.since);
+    }
   return h.value;
 }
 
@@ -545,17 +716,24 @@ void check_head(const World &w, const unsigned char *data, size_t bytes) {
   std::memcpy(&head, data, std::min(bytes, sizeof head));
   if (bytes < sizeof head.magic || std::memcmp(head.magic, kSnapshotMagic, sizeof head.magic - 1) != 0)
     fail(DFM_E_FORMAT, "these %zu bytes are no snapshot; take one with dfm_world_snapshot", bytes);
-  if (bytes < sizeof head) fail(DFM_E_FORMAT, "the snapshot is cut short: %zu bytes, its head alone has %zu; nothing was restored", bytes, sizeof head);
+  if (bytes < sizeof head)
+    fail(DFM_E_FORMAT, "the snapshot is cut short: %zu bytes, its head alone has %zu; nothing was restored",
+         bytes, sizeof head);
   if (head.magic[7] != 0 || head.version != kSnapshotVersion || head.zero != 0)
-    fail(DFM_E_FORMAT, "the snapshot was written by another version of the library, or is damaged: this one reads format %u; nothing was restored",
+    fail(DFM_E_FORMAT,
+         "the snapshot was written by another version of the library, or is damaged: this one reads format "
+         "%u; nothing was restored",
          kSnapshotVersion);
   if (head.length != bytes)
-    fail(DFM_E_FORMAT, "the snapshot is cut short or damaged: it says %llu bytes, and %zu were given; nothing was restored",
+    fail(DFM_E_FORMAT,
+         "the snapshot is cut short or damaged: it says %llu bytes, and %zu were given; nothing was restored",
          static_cast<unsigned long long>(head.length), bytes);
-  if (head.checksum != snapshot_checksum(data, bytes)) fail(DFM_E_FORMAT, "the snapshot is damaged (checksum); nothing was restored");
+  if (head.checksum != snapshot_checksum(data, bytes))
+    fail(DFM_E_FORMAT, "the snapshot is damaged (checksum); nothing was restored");
   if (head.structure != structure(w))
     fail(DFM_E_FORMAT,
-         "the snapshot belongs to another world: names, meshes, masses, models, fields and obstacles must be the same; nothing was restored");
+         "the snapshot belongs to another world: names, meshes, masses, models, fields and obstacles must be "
+         "the same; nothing was restored");
 }
 
 }  // namespace
@@ -576,16 +754,19 @@ void world_restore(World &w, const void *data, size_t bytes) {
   w.laws.swap(laws);
   try {
     // Tables and plan follow from what is there now; what prepare() would choose anew is put back as it was.
-    const RestoredChoice choice{staged.gravity, staged.stable, staged.offset, staged.inverted, staged.bound_age};
+    const RestoredChoice choice{staged.gravity, staged.stable, staged.offset, staged.inverted,
+                                staged.bound_age};
     w.changed = true;
     w.overlaps.all = w.overlaps.look_only = true;
-    w.sleepers = 0;   // prepare() counts them
+    w.sleepers = 0;  // prepare() counts them
     prepare(w, &choice);
-  } catch (...) {     // no memory for the tables: the state is as it was, and the tables are made when next needed
+  } catch (...) {
+    // no memory for the tables: the state is as it was, and the tables are made when next needed
     exchange(w, staged);
     take_parameters_back(w, staged, w.bodies.size());
     w.laws.swap(laws);
-    w.offset = offset, w.sleepers = sleepers;
+    w.offset = offset;
+    w.sleepers = sleepers;
     throw;
   }
 }

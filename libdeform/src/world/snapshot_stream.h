@@ -1,7 +1,9 @@
-// How a snapshot's bytes are written, read and checked. One list of fields (snapshot.cpp) serves both ways: each line says the field's name, where it
-// lies and what it must be, so that nothing is read that was not asked for.
+// How a snapshot's bytes are written, read and checked. One list of fields (snapshot.cpp) serves both
+// ways: each line says the field's name, where it lies and what it must be, so that nothing is read that
+// was not asked for.
 //
-//   bytes 0  "dfmsnap" 0 | u32 version | u32 0 | u64 length of all | u64 hash of what must be the same in both worlds | u64 checksum | fields
+//   bytes 0  "dfmsnap" 0 | u32 version | u32 0 | u64 length of all | u64 hash of what must be the same in
+//   both worlds | u64 checksum | fields
 #pragma once
 #include <cmath>
 #include <cstdint>
@@ -21,7 +23,7 @@ namespace dfm {
 struct SnapshotHead {
   char magic[8];
   uint32_t version, zero;
-  uint64_t length, structure, checksum;   // checksum: of all bytes but itself
+  uint64_t length, structure, checksum;  // checksum: of all bytes but itself
 };
 inline constexpr char kSnapshotMagic[8] = {'d', 'f', 'm', 's', 'n', 'a', 'p', 0};
 inline constexpr uint32_t kSnapshotVersion = 9;
@@ -36,8 +38,8 @@ inline uint64_t snapshot_checksum(const unsigned char *data, size_t bytes) {
 // Where a field of a snapshot lies, for tests that damage each.
 struct SnapshotField {
   const char *name;
-  size_t at, bytes;          // of its values; of a list's, its count
-  char kind;                 // d: doubles, u: unsigned, f: flags, n: a count
+  size_t at, bytes;  // of its values; of a list's, its count
+  char kind;         // d: doubles, u: unsigned, f: flags, n: a count
   bool checked;
 };
 
@@ -63,22 +65,30 @@ inline bool all_finite(const double *x, size_t n) {
 }
 inline bool all_finite(const Vec3 &v) { return all_finite(&v.x, 3); }
 template <size_t n>
-bool all_finite(const double (&x)[n]) { return all_finite(x, n); }
-inline bool all_finite(const dfm_sine &s) { return all_finite(s.amplitude) && all_finite(s.frequency) && all_finite(s.phase); }
+bool all_finite(const double (&x)[n]) {
+  return all_finite(x, n);
+}
+inline bool all_finite(const dfm_sine &s) {
+  return all_finite(s.amplitude) && all_finite(s.frequency) && all_finite(s.phase);
+}
 
 inline constexpr Be any{[](const auto &) { return true; }, "anything", false};
 inline constexpr Be finite{[](const auto &x) { return all_finite(x); }, "a finite number"};
-inline constexpr Be not_negative{[](double x) { return x >= 0 && std::isfinite(x); }, "a finite number that is not negative"};
-inline constexpr Be positive{[](double x) { return x > 0 && std::isfinite(x); }, "a finite number above zero"};
+inline constexpr Be not_negative{[](double x) { return x >= 0 && std::isfinite(x); },
+                                 "a finite number that is not negative"};
+inline constexpr Be positive{[](double x) { return x > 0 && std::isfinite(x); },
+                             "a finite number above zero"};
 // Hosts answer for the length of their quaternions, so it is not asked to a rounding.
 inline constexpr Be rotation{[](const double (&q)[4]) {
-  const double n = q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3];
-  return n > 0.25 && n < 4;
-}, "a unit quaternion"};
+                               const double n = q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3];
+                               return n > 0.25 && n < 4;
+                             },
+                             "a unit quaternion"};
 inline constexpr Be pose{[](const Pose &p) {
-  const double q[4] = {p.rotation.x, p.rotation.y, p.rotation.z, p.rotation.w};
-  return all_finite(p.position) && rotation.is(q);
-}, "a finite position and a unit quaternion"};
+                           const double q[4] = {p.rotation.x, p.rotation.y, p.rotation.z, p.rotation.w};
+                           return all_finite(p.position) && rotation.is(q);
+                         },
+                         "a finite position and a unit quaternion"};
 inline constexpr Be flag{[](auto x) { return x == 0 || x == 1; }, "0 or 1"};
 inline auto below(uint64_t n) {
   return Be{[n](uint64_t x) { return x < n; }, "a number of something that is there"};
@@ -101,7 +111,8 @@ inline constexpr uint64_t kAnyCount = ~uint64_t{0};
 
 class SnapshotWriter {
  public:
-  explicit SnapshotWriter(std::vector<unsigned char> &out, std::vector<SnapshotField> *map = nullptr) : out_(out), map_(map) {}
+  explicit SnapshotWriter(std::vector<unsigned char> &out, std::vector<SnapshotField> *map = nullptr)
+      : out_(out), map_(map) {}
   void bytes(const void *p, size_t n) {
     const unsigned char *const from = static_cast<const unsigned char *>(p);
     if (n) out_.insert(out_.end(), from, from + n);
@@ -125,7 +136,9 @@ class SnapshotWriter {
     for (const auto &x : a) f(x);
   }
   template <class A, class F>
-  void members(const char *name, const A &a, uint64_t, F f) { list(name, a, f); }
+  void members(const char *name, const A &a, uint64_t, F f) {
+    list(name, a, f);
+  }
   template <class F>
   void must_hold(const char *, const char *, F) {}
 
@@ -146,7 +159,9 @@ class SnapshotReader {
  public:
   SnapshotReader(const unsigned char *begin, const unsigned char *end) : p_(begin), end_(end) {}
   // In whose fields the reader is now, for the sentence.
-  void where(const char *kind, const std::string &name) { where_ = name.empty() ? std::string() : std::string(kind) + " '" + name + "': "; }
+  void where(const char *kind, const std::string &name) {
+    where_ = name.empty() ? std::string() : std::string(kind) + " '" + name + "': ";
+  }
   bool at_end() const { return p_ == end_; }
 
   template <class T, class B>
@@ -190,7 +205,8 @@ class SnapshotReader {
     if (!holds()) refuse(name, what);
   }
   [[noreturn]] void refuse(const char *name, const char *what) const {
-    fail(DFM_E_FORMAT, "the snapshot is damaged: %s%s: expected %s; nothing was restored", where_.c_str(), name, what);
+    fail(DFM_E_FORMAT, "the snapshot is damaged: %s%s: expected %s; nothing was restored", where_.c_str(),
+         name, what);
   }
 
  private:

@@ -10,7 +10,8 @@ Vec3 spring_force(const Body &b, const Spring &s, double t, double h) {
   Vec3 x, v;
   for (size_t i = 0; i < s.points.size(); ++i) {
     const size_t at = size_t(s.points[i]) * kStride;
-    x += s.weights[i] * load3(&b.p.x[at]), v += s.weights[i] * load3(&b.p.v[at]);
+    x += s.weights[i] * load3(&b.p.x[at]);
+    v += s.weights[i] * load3(&b.p.v[at]);
   }
   // Both ends at t, or a body that follows would run ahead by a step.
   const Vec3 end = spring_end(s, t), speed = h > 0 ? (1 / h) * (spring_end(s, t + h) - end) : Vec3{};
@@ -26,7 +27,10 @@ void add_spring_force(Body &b, const Spring &s, double t, double h) {
 }
 
 void add_spring_bound(Body &b, const Spring &s) {
-  for (size_t i = 0; i < s.points.size(); ++i) b.ksum[s.points[i]] += s.stiffness * s.weights[i], b.csum[s.points[i]] += s.damping * s.weights[i];
+  for (size_t i = 0; i < s.points.size(); ++i) {
+    b.ksum[s.points[i]] += s.stiffness * s.weights[i];
+    b.csum[s.points[i]] += s.damping * s.weights[i];
+  }
 }
 
 }  // namespace dfm

@@ -1,4 +1,5 @@
-// Springs from points of a body to places in the world (world.h, Spring). They pull in the motion stage, with the loads that vary.
+// Springs from points of a body to places in the world (world.h, Spring). They pull in the motion stage, with
+// the loads that vary.
 #pragma once
 #include "world/world.h"
 

@@ -1,5 +1,6 @@
-// The stages of a sub-step, and what they share. The table of the contact method has their order (world/method.h).
-// False: the sub-step cannot be taken; `trouble` and dfm_last_error() say why, and nothing of it has been committed.
+// The stages of a sub-step, and what they share. The table of the contact method has their order
+// (world/method.h). False: the sub-step cannot be taken; `trouble` and dfm_last_error() say why, and nothing
+// of it has been committed.
 #pragma once
 #include <cstdint>
 #include <memory>
@@ -19,57 +20,64 @@ struct World;
 
 // Plan, pair tables, offset, views of the entities; where nothing has changed it does nothing. Throws Error.
 void prepare(World &w, const RestoredChoice *restored = nullptr);
-// After a change of values that no table depends on: loads, motions, gravity, parameters of a model or of a law.
-// The step bound is asked for anew and the energy books begin anew; the plan is looked at in the next prepare().
+// After a change of values that no table depends on: loads, motions, gravity, parameters of a model or of
+// a law. The step bound is asked for anew and the energy books begin anew; the plan is looked at in the
+// next prepare().
 void values_changed(World &w);
-void set_gravity_now(World &w);              // from what is prescribed, at the present time
+void set_gravity_now(World &w);  // from what is prescribed, at the present time
 dfm_status run_step(World &w, StepContext &step, double dt, uint32_t *trouble);
-void undo_motion(StepContext &step);         // held velocities as before stage_motion()
+void undo_motion(StepContext &step);  // held velocities as before stage_motion()
 
 void stage_motion(World &w, StepContext &step);
 bool stage_model(World &w, StepContext &step, uint32_t *trouble);
 bool stage_predict(World &w, StepContext &step, uint32_t *trouble);
-bool predict_and_watch(World &w, StepContext &step, uint32_t *trouble);     // as a row of a table: step.cpp
-bool stage_rigid_predict(World &w, StepContext &step, uint32_t *trouble);   // rigid.cpp
+bool predict_and_watch(World &w, StepContext &step, uint32_t *trouble);    // as a row of a table: step.cpp
+bool stage_rigid_predict(World &w, StepContext &step, uint32_t *trouble);  // rigid.cpp
 void stage_gather(World &w, StepContext &step);
 void stage_broad(World &w, StepContext &step);
-bool stage_narrow(World &w, StepContext &step, uint32_t *trouble);          // sleep.cpp
-void stage_self(World &w, StepContext &step);                               // self_contact.cpp
-bool stage_solve(World &w, StepContext &step, uint32_t *trouble);           // solve.cpp
-bool stage_rigid_commit(World &w, StepContext &step, uint32_t *trouble);    // rigid.cpp: ends beside the present states, kept by keep_rigids()
+bool stage_narrow(World &w, StepContext &step, uint32_t *trouble);  // sleep.cpp
+void stage_self(World &w, StepContext &step);                       // self_contact.cpp
+bool stage_solve(World &w, StepContext &step, uint32_t *trouble);   // solve.cpp
+// rigid.cpp: ends beside the present states, kept by keep_rigids()
+bool stage_rigid_commit(World &w, StepContext &step, uint32_t *trouble);
 void stage_distribute(StepContext &step);
-bool stage_guard(World &w, StepContext &step, uint32_t *trouble);           // guard.cpp
+bool stage_guard(World &w, StepContext &step, uint32_t *trouble);  // guard.cpp
 bool stage_commit(World &w, StepContext &step, uint32_t *trouble);
-void stage_sleep(World &w, StepContext &step);                              // sleep.cpp
+void stage_sleep(World &w, StepContext &step);  // sleep.cpp
 
 // model and commit of self-stepping bodies: they write their ends beside their present states.
 bool commit_steppers(World &w, StepContext &step, uint32_t *trouble);
-void keep_rigids(World &w, StepContext &step);         // once the sub-step is known to succeed
+void keep_rigids(World &w, StepContext &step);  // once the sub-step is known to succeed
 
 // solve.cpp
-void make_rows(World &w, StepContext &step);           // contacts as rows, with what they kept
-uint32_t tell_failed_solve(World &w, StepContext &step, const LawInstance *law);   // to dfm_last_error(), null: not finite; which trouble that is
-void set_zone_laws(World &w, StepContext &step);       // pair_table.cpp: state.law of this sub-step's contacts where a pair has a table
-void rename_law(World &w, const FrictionRule &rule, uint32_t to);   // pair_table.cpp: in the store, of contacts that the rule holds for
+void make_rows(World &w, StepContext &step);  // contacts as rows, with what they kept
+// to dfm_last_error(), null: not finite; which trouble that is
+uint32_t tell_failed_solve(World &w, StepContext &step, const LawInstance *law);
+// pair_table.cpp: state.law of this sub-step's contacts where a pair has a table
+void set_zone_laws(World &w, StepContext &step);
+// pair_table.cpp: in the store, of contacts that the rule holds for
+void rename_law(World &w, const FrictionRule &rule, uint32_t to);
 // In a place that `free` marks, or behind the others.
 uint32_t place_law(World &w, std::unique_ptr<LawInstance> law, std::span<const uint8_t> free);
-void reserve_contacts(World &w, StepContext &step);    // memory for keep_contacts()
-void keep_contacts(World &w, StepContext &step);       // store, events, hold, work, report; allocates nothing
-void end_contacts(World &w);                           // all, with their events, where no stage of a plan looks after them
+void reserve_contacts(World &w, StepContext &step);  // memory for keep_contacts()
+void keep_contacts(World &w, StepContext &step);     // store, events, hold, work, report; allocates nothing
+// all, with their events, where no stage of a plan looks after them
+void end_contacts(World &w);
 void reserve_events(World &w, size_t more);
-void add_event(World &w, uint32_t kind, uint64_t a, uint64_t b, uint64_t key, double t);   // a, b: ids
+void add_event(World &w, uint32_t kind, uint64_t a, uint64_t b, uint64_t key, double t);  // a, b: ids
 
 // sleep.cpp
 void gather_active(World &w);
-void reserve_sleep(World &w, StepContext &step, uint32_t n);   // waking and falling asleep allocate nothing, and cannot fail
-void wake(World &w, Body &b);                          // and its island
+// waking and falling asleep allocate nothing, and cannot fail
+void reserve_sleep(World &w, StepContext &step, uint32_t n);
+void wake(World &w, Body &b);  // and its island
 void wake_all(World &w);
 void wake_touching(World &w, uint64_t obstacle);
 bool all_idle(const World &w, const StepContext &step);
-bool sleeps(const World &w, const StepContext &step, uint32_t m);   // a contact of the store
+bool sleeps(const World &w, const StepContext &step, uint32_t m);  // a contact of the store
 void carry_sleepers(World &w, StepContext &step, uint32_t *touching, uint32_t *sticking);
 void close_slot(World &w, uint64_t id, bool obstacle);
 void fall_asleep(World &w, StepContext &step, Body &b, double end);
-void hold_sleepers(World &w);                          // hold_begin() while contacts sleep
+void hold_sleepers(World &w);  // hold_begin() while contacts sleep
 
 }  // namespace dfm

@@ -3,9 +3,11 @@
 //   bound                            when it is due: sizes of the sub-steps (step_bound.cpp, step_sizes.cpp)
 //   sub-steps                        run_step(): equal ones, cut finer where the bound has fallen
 //     pieces                         advance(), piece(): shorter where the guard asks for it
-//       stages                       sub_step(): all rows of the method's table that the plan has chosen, or none
+//       stages                       sub_step(): all rows of the method's table that the plan has
+//                                    chosen, or none
 //         waking                     narrow runs model to broad again for who has been woken (sleep.cpp)
-//         a rigid host's revision    solve, again, where a motor lets go; rigid commit, where a host asks for another solve (rigid.cpp)
+//         a rigid host's revision    solve, again, where a motor lets go; rigid commit, where a host asks for
+//                                    another solve (rigid.cpp)
 //         hits                       guard runs solve and distribute again with what would cross (guard.cpp)
 #include <algorithm>
 #include <chrono>
@@ -25,7 +27,10 @@
 namespace dfm {
 namespace {
 
-bool distribute_all(World &, StepContext &step, uint32_t *) { return stage_distribute(step), true; }
+bool distribute_all(World &, StepContext &step, uint32_t *) {
+  stage_distribute(step);
+  return true;
+}
 
 constexpr Stage kTable[] = {
     {"motion", always<stage_motion>, cost::prescribed, when::motion},
@@ -82,14 +87,20 @@ dfm_status run_step(World &w, StepContext &step, double dt, uint32_t *trouble) {
   release_overlaps(w);
   if (!std::exchange(w.overlaps.told, true)) *trouble |= DFM_TROUBLE_OVERLAP;
   if (bound_due(w)) update_bound(w);
-  const double needed = std::ceil(dt / w.stable - 1e-9);   // stable is infinite where nothing bounds the step
+  const double needed = std::ceil(dt / w.stable - 1e-9);  // stable is infinite where nothing bounds the step
   if (!(needed <= w.def.max_substeps)) {
-    set_last_error(format("a step of %g s needs %g sub-steps of %g s (max_substeps %u): soften or coarsen body '%s', whose point %u bounds the step, lower "
-                          "its damping, or take a shorter step", dt, needed, w.stable, w.def.max_substeps, w.worst_body ? w.worst_body->name.c_str() : "?", w.worst_point).c_str());
-    return *trouble |= DFM_TROUBLE_SUBSTEPS, DFM_DISCARD;
+    set_last_error(
+        format("a step of %g s needs %g sub-steps of %g s (max_substeps %u): soften or coarsen body '%s', "
+               "whose point %u bounds the step, lower its damping, or take a shorter step",
+               dt, needed, w.stable, w.def.max_substeps, w.worst_body ? w.worst_body->name.c_str() : "?",
+               w.worst_point)
+            .c_str());
+    *trouble |= DFM_TROUBLE_SUBSTEPS;
+    return DFM_DISCARD;
   }
   const StepSizes before = w.sizes;
-  const uint32_t n = static_cast<uint32_t>(std::min<double>(w.def.max_substeps, choose_pieces(w.sizes, dt, w.stable)));
+  const uint32_t n =
+      static_cast<uint32_t>(std::min<double>(w.def.max_substeps, choose_pieces(w.sizes, dt, w.stable)));
   w.watch.new_size = earned(before, w.sizes, w.stable);
   plan_work(w, step, n);
   if (n > 1) *trouble |= DFM_TROUBLE_SUBSTEPS;
@@ -97,7 +108,8 @@ dfm_status run_step(World &w, StepContext &step, double dt, uint32_t *trouble) {
 
   begin_impulses(w.step_impulses);
   const double goal = w.time + dt;
-  double from = w.time, span = dt;   // `cut` equal sub-steps since `from`; the rest of the step is cut finer where the bound has fallen
+  // `cut` equal sub-steps since `from`; the rest of the step is cut finer where the bound has fallen
+  double from = w.time, span = dt;
   uint32_t cut = n, done = 0;
   for (uint32_t k = 0; k < cut; ++k, ++done) {
     if (bound_due(w)) {
@@ -105,14 +117,21 @@ dfm_status run_step(World &w, StepContext &step, double dt, uint32_t *trouble) {
       if (w.inverted) *trouble |= DFM_TROUBLE_INVERTED;
       const double more = (cut - k) * cut_finer(w.sizes, span / cut, w.stable);
       if (!(done + more <= w.def.max_substeps)) {
-        set_last_error(format("step %llu: the shape of body '%s' has changed so much that the rest of the step needs %g sub-steps of %g s "
-                              "(max_substeps %u); take a shorter step", static_cast<unsigned long long>(w.step_count),
-                              w.worst_body ? w.worst_body->name.c_str() : "?", std::ceil((goal - w.time) / w.stable), w.stable, w.def.max_substeps).c_str());
+        set_last_error(format("step %llu: the shape of body '%s' has changed so much that the rest of the "
+                              "step needs %g sub-steps of %g s (max_substeps %u); take a shorter step",
+                              static_cast<unsigned long long>(w.step_count),
+                              w.worst_body ? w.worst_body->name.c_str() : "?",
+                              std::ceil((goal - w.time) / w.stable), w.stable, w.def.max_substeps)
+                           .c_str());
         return DFM_E_DIVERGED;
       }
       if (more > cut - k) {
-        from = w.time, span = goal - w.time, cut = static_cast<uint32_t>(more), k = 0;
-        w.watch.new_size = true, *trouble |= DFM_TROUBLE_SUBSTEPS;
+        from = w.time;
+        span = goal - w.time;
+        cut = static_cast<uint32_t>(more);
+        k = 0;
+        w.watch.new_size = true;
+        *trouble |= DFM_TROUBLE_SUBSTEPS;
       }
     }
     const bool last = k + 1 == cut;
@@ -120,30 +139,39 @@ dfm_status run_step(World &w, StepContext &step, double dt, uint32_t *trouble) {
     if (!advance(w, step, end, goal, last, trouble)) return DFM_E_DIVERGED;
     pass(w.sizes);
   }
-  w.stats.last_substeps = done, w.stats.substeps_max = std::max(w.stats.substeps_max, done);
+  w.stats.last_substeps = done;
+  w.stats.substeps_max = std::max(w.stats.substeps_max, done);
   ++w.step_count;
-  w.stats.steps = w.step_count, w.stats.time = w.time;
+  w.stats.steps = w.step_count;
+  w.stats.time = w.time;
   return DFM_OK;
 }
 
 namespace {
 
-// One planned sub-step, up to `end`: as a whole, or in the pieces that the guard cuts it into. last: of the step, which ends at `goal`.
+// One planned sub-step, up to `end`: as a whole, or in the pieces that the guard cuts it into. last: of the
+// step, which ends at `goal`.
 bool advance(World &w, StepContext &step, double end, double goal, bool last, uint32_t *trouble) {
-  step.guard.pieces = 0, step.guard.motion = 1, step.guard.planned = end - w.time;
+  step.guard.pieces = 0;
+  step.guard.motion = 1;
+  step.guard.planned = end - w.time;
   for (bool whole = false; !whole;) {
     const double rest = step.h = end - w.time;
     step.left = goal - w.time;
-    if (step.h < step.left || (w.def.sleep && !all_idle(w, step))) keep_start(w, step);   // waking changes what a later failure must put back
+    // waking changes what a later failure must put back
+    if (step.h < step.left || (w.def.sleep && !all_idle(w, step))) keep_start(w, step);
     charge(w, step, 1);
     view_obstacles(w, step);
-    if (all_idle(w, step)) w.stats.contacts_mean += (w.stats.contacts - w.stats.contacts_mean) / double(w.stats.substeps + 1), w.step_impulses.idle += step.h;
-    else if (!piece(w, step, trouble)) return false;
+    if (all_idle(w, step)) {
+      w.stats.contacts_mean += (w.stats.contacts - w.stats.contacts_mean) / double(w.stats.substeps + 1);
+      w.step_impulses.idle += step.h;
+    } else if (!piece(w, step, trouble)) return false;
     whole = step.h == rest;
     if (step.guard.motion < 1) move_obstacles_by(w, step, step.guard.motion);
     else move_obstacles(w, step, whole && last);
     w.time = whole ? end : w.time + step.h;
-    ++w.stats.substeps, ++w.bound_age;
+    ++w.stats.substeps;
+    ++w.bound_age;
   }
   return true;
 }
@@ -157,7 +185,8 @@ bool piece(World &w, StepContext &step, uint32_t *trouble) {
     if (!step.guard.again) return false;
     step.h *= step.guard.cut;
     keep_start(w, step);
-    *trouble = before, w.stats.unconverged = unconverged;
+    *trouble = before;
+    w.stats.unconverged = unconverged;
     view_obstacles(w, step);
   }
   w.stats.guard_steps += step.guard.acted;
@@ -171,7 +200,9 @@ bool sub_step(World &w, StepContext &step, uint32_t *trouble) {
     World &w;
     StepContext &step;
     bool kept = false;
-    ~Undo() { if (!kept) undo_motion(step); }
+    ~Undo() {
+      if (!kept) undo_motion(step);
+    }
   } undo{w, step};
   step.driven.clear();
   step.guard.start();

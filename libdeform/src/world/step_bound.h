@@ -5,7 +5,7 @@ namespace dfm {
 
 struct World;
 
-bool bound_due(const World &w);   // does the next sub-step ask for it?
-void update_bound(World &w);      // stable, worst_body, worst_point, inverted
+bool bound_due(const World &w);  // does the next sub-step ask for it?
+void update_bound(World &w);     // stable, worst_body, worst_point, inverted
 
 }  // namespace dfm

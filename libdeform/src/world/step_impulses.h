@@ -1,5 +1,6 @@
-// What contact did between two things over the whole last step: sums and peaks over its sub-steps. The report holds the last sub-step alone, so a
-// blow that begins and ends within a step, or peaks before its end, is not in it.
+// What contact did between two things over the whole last step: sums and peaks over its sub-steps. The
+// report holds the last sub-step alone, so a blow that begins and ends within a step, or peaks before its
+// end, is not in it.
 #pragma once
 #include "core/memory.h"
 #include "math/vec3.h"
@@ -10,22 +11,22 @@ struct World;
 
 struct StepImpulses {
   struct Pair {
-    uint64_t a, b;           // ids; between two bodies a is the lower one
-    Vec3 impulse;            // N s, on a
-    Vec3 place;              // m N s: points of contact, weighted with their normal impulses
-    double normal;           // N s, sum of normal impulses
-    double touching;         // s, in which it carried something
-    double peak_normal, peak_force;   // N, means over the sub-step where they were largest
-    Vec3 now;                // N s, of the present sub-step
+    uint64_t a, b;                   // ids; between two bodies a is the lower one
+    Vec3 impulse;                    // N s, on a
+    Vec3 place;                      // m N s: points of contact, weighted with their normal impulses
+    double normal;                   // N s, sum of normal impulses
+    double touching;                 // s, in which it carried something
+    double peak_normal, peak_force;  // N, means over the sub-step where they were largest
+    Vec3 now;                        // N s, of the present sub-step
     double now_normal;
   };
-  Array<Pair> pairs;         // sorted by (a, b)
-  double idle = 0;           // s of this step in which everybody slept: forces are those of the report
+  Array<Pair> pairs;  // sorted by (a, b)
+  double idle = 0;    // s of this step in which everybody slept: forces are those of the report
 };
 
 void begin_impulses(StepImpulses &s);
-void reserve_impulses(World &w, uint32_t contacts);   // so that add_impulses() cannot fail
-void add_impulses(World &w);                          // of the sub-step that the report holds
+void reserve_impulses(World &w, uint32_t contacts);  // so that add_impulses() cannot fail
+void add_impulses(World &w);                         // of the sub-step that the report holds
 void list_impulses(const World &w, Array<StepImpulses::Pair> &out);
 
 }  // namespace dfm

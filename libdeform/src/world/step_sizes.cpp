@@ -8,16 +8,18 @@
 namespace dfm {
 namespace {
 
-constexpr double kRounding = 1e-9;   // of a quotient of two sizes
-constexpr double kSame = 1.06;       // sizes within this factor are one rung: half way to the next, the nearest of which is 8/7 away
-constexpr double kRise = 0.9;        // longer sub-steps are taken up to this share of the stable one, so that they need not be given up again soon
+constexpr double kRounding = 1e-9;  // of a quotient of two sizes
+// sizes within this factor are one rung: half way to the next, the nearest of which is 8/7 away
+constexpr double kSame = 1.06;
+// longer sub-steps are taken up to this share of the stable one, so that they need not be given up again soon
+constexpr double kRise = 0.9;
 constexpr uint32_t kLeastCalm = 64;  // sub-steps: four evaluations of the bound
 
 // The smallest of 1, 2, 3 and (4, 5, 6, 7) 2^k that is not below x.
 double count_above(double x) {
   if (!(x > 1)) return 1;
   int e;
-  std::frexp(x, &e);   // x < 2^e
+  std::frexp(x, &e);  // x < 2^e
   const double unit = std::ldexp(1.0, std::max(0, e - 3));
   return unit * std::ceil(x / unit);
 }
@@ -27,16 +29,18 @@ double pieces(double dt, double longest) { return count_above(dt / longest - kRo
 // The largest of (4, 5, 6, 7) 2^k s that is not above x.
 double rung_below(double x) {
   int e;
-  const double m = std::frexp(x, &e);   // in [0.5, 1)
+  const double m = std::frexp(x, &e);  // in [0.5, 1)
   return std::ldexp(std::floor(8 * m), e - 3);
 }
 
 void take(Rung &r, double size) {
   if (r.size > 0 && size > r.size) r.patience = std::min(kMostPatience, 2 * r.patience);
-  r.size = size, r.calm = 0;
+  r.size = size;
+  r.calm = 0;
 }
 
-// Down at once to `most`, the longest size that is stable. Up to `longer`, which has a margin to it: the more there is to win, the sooner.
+// Down at once to `most`, the longest size that is stable. Up to `longer`, which has a margin to it: the more
+// there is to win, the sooner.
 void settle(Rung &r, double stable, double most, double longer) {
   if (!(r.size > 0 && r.size <= stable * (1 + kRounding))) return take(r, most);
   if (!(longer > r.size * kSame)) r.calm = 0;
@@ -51,7 +55,8 @@ void settle_offer(Rung &r, double stable) {
 void pass(Rung &r) { r.calm += r.calm < kMostPatience; }
 
 bool sound(const Rung &r) {
-  return r.size >= 0 && std::isfinite(r.size) && r.calm <= kMostPatience && r.patience >= kFirstPatience && r.patience <= kMostPatience;
+  return r.size >= 0 && std::isfinite(r.size) && r.calm <= kMostPatience && r.patience >= kFirstPatience &&
+         r.patience <= kMostPatience;
 }
 
 }  // namespace
@@ -68,8 +73,12 @@ double choose_pieces(StepSizes &s, double dt, double stable) {
   Rung &r = s.cut;
   // A step that differs little from the last one, or is a multiple of its sub-steps, goes on with them.
   const double ratio = dt / r.size, same = r.size > 0 ? count_above(ratio / kSame) : 0;
-  if (same > 0 && same <= ratio * kSame) r.size = dt / same, settle(r, stable, dt / pieces(dt, stable), dt / pieces(dt, kRise * stable));
-  else take(r, dt / pieces(dt, stable));
+  if (same > 0 && same <= ratio * kSame) {
+    r.size = dt / same;
+    settle(r, stable, dt / pieces(dt, stable), dt / pieces(dt, kRise * stable));
+  } else {
+    take(r, dt / pieces(dt, stable));
+  }
   return std::nearbyint(dt / r.size);
 }
 
@@ -85,16 +94,23 @@ bool earned(const StepSizes &before, const StepSizes &now, double stable) {
   if (now.cut.size == r.size || !(r.size > 0)) return false;
   if (now.offer.size != before.offer.size) return true;
   const double gain = now.cut.size / r.size;
-  return gain < 1 ? r.size > stable * (1 + kRounding) : r.calm >= kLeastCalm && r.calm * (gain * gain) >= r.patience;
+  return gain < 1 ? r.size > stable * (1 + kRounding)
+                  : r.calm >= kLeastCalm && r.calm * (gain * gain) >= r.patience;
 }
 
-void pass(StepSizes &s) { pass(s.cut), pass(s.offer); }
+void pass(StepSizes &s) {
+  pass(s.cut);
+  pass(s.offer);
+}
 
 bool sound(const StepSizes &s) { return sound(s.cut) && sound(s.offer); }
 
 std::string short_step(double dt, double floor) {
-  return format("a step of %g s is below the floor of %g s (1 ns for each meter from the origin, at least one meter): positions are numbers of 16 digits, and "
-                "over such a step their rounding is more than contact may err; take a longer step", dt, floor);
+  return format(
+      "a step of %g s is below the floor of %g s (1 ns for each meter from the origin, at least one meter): "
+      "positions are numbers of 16 digits, and over such a step their rounding is more than contact may err; "
+      "take a longer step",
+      dt, floor);
 }
 
 }  // namespace dfm

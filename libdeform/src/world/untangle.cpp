@@ -15,14 +15,18 @@
 namespace dfm {
 namespace {
 
-constexpr int kRounds = 64;            // over all pairs; a heap that is not apart by then has no room
-constexpr int kPolish = 6;             // halvings of the step with which the best direction is sought
-constexpr int kParts = 16;             // a body that is not convex may be free after a part of the way past the other's hull
-constexpr size_t kMostLooks = 96;      // at a pair, for such a part
-constexpr double kConvex = 1.5;        // a way past the hull of up to this many depths is taken as it is
-constexpr double kClear = 1.01;        // of d_c: contact starts without a load
+constexpr int kRounds = 64;  // over all pairs; a heap that is not apart by then has no room
+constexpr int kPolish = 6;   // halvings of the step with which the best direction is sought
+// a body that is not convex may be free after a part of the way past the other's hull
+constexpr int kParts = 16;
+constexpr size_t kMostLooks = 96;  // at a pair, for such a part
+constexpr double kConvex = 1.5;    // a way past the hull of up to this many depths is taken as it is
+constexpr double kClear = 1.01;    // of d_c: contact starts without a load
 
-struct Way { Vec3 direction; double length; };
+struct Way {
+  Vec3 direction;
+  double length;
+};
 
 class Untangler {
  public:
@@ -55,12 +59,15 @@ class Untangler {
  private:
   OverlapPair pair_of(const Overlap &f) const {
     const auto at = [](const auto &list, uint64_t id) {
-      return static_cast<uint32_t>(std::find_if(list.begin(), list.end(), [&](auto &x) { return x->id == id; }) - list.begin());
+      return static_cast<uint32_t>(
+          std::find_if(list.begin(), list.end(), [&](auto &x) { return x->id == id; }) - list.begin());
     };
     return {at(w_.bodies, f.a), f.obstacle ? at(w_.obstacles, f.b) : at(w_.bodies, f.b), f.obstacle};
   }
   bool moves(const OverlapPair &p) const { return movable_[p.a] || (!p.obstacle && movable_[p.b]); }
-  bool moved(const OverlapPair &p) const { return norm2(shift_[p.a]) > 0 || (!p.obstacle && norm2(shift_[p.b]) > 0); }
+  bool moved(const OverlapPair &p) const {
+    return norm2(shift_[p.a]) > 0 || (!p.obstacle && norm2(shift_[p.b]) > 0);
+  }
   bool overlap(const OverlapPair &p) { return sides_.look(p, w_.offset, true).through; }
 
   // What overlaps now of those that have moved.
@@ -69,7 +76,8 @@ class Untangler {
     for (uint32_t i = 0; i < w_.bodies.size(); ++i) {
       const bool whole = norm2(shift_[i]) > 0;
       for (uint32_t j = i + 1; j < w_.bodies.size(); ++j)
-        if ((whole || norm2(shift_[j]) > 0) && sides_.may_touch({i, j, false}) && overlap({i, j, false})) out.push_back({i, j, false});
+        if ((whole || norm2(shift_[j]) > 0) && sides_.may_touch({i, j, false}) && overlap({i, j, false}))
+          out.push_back({i, j, false});
       for (uint32_t j = 0; j < w_.obstacles.size() && whole; ++j)
         if (sides_.may_touch({i, j, true}) && overlap({i, j, true})) out.push_back({i, j, true});
     }
@@ -83,7 +91,8 @@ class Untangler {
 
   void shift(uint32_t i, Vec3 by) {
     if (norm2(by) == 0) return;
-    shift_[i] += by, sides_.body(i).shift(by);
+    shift_[i] += by;
+    sides_.body(i).shift(by);
   }
 
   // Both go their share, by their masses, so that their common center stays; false: there is no way.
@@ -92,7 +101,7 @@ class Untangler {
     if (!moves(p)) return false;
     const Way way = find_way(p);
     if (!std::isfinite(way.length)) return false;
-    double share = 1;   // of a
+    double share = 1;  // of a
     if (!p.obstacle) {
       const double ma = w_.bodies[p.a]->mass, mb = w_.bodies[p.b]->mass;
       share = !movable_[p.a] ? 0 : !movable_[p.b] ? 1 : mb / (ma + mb);
@@ -123,11 +132,14 @@ class Untangler {
       std::stable_sort(ways.begin(), ways.end(), shorter);
       ways.insert(ways.begin(), polished(p, ways.front()));
     }
-    if (ways.front().length <= kConvex * sides_.look(p, w_.offset, false).depth + 2 * clearance_ && clear(p, ways.front())) return ways.front();
+    if (ways.front().length <= kConvex * sides_.look(p, w_.offset, false).depth + 2 * clearance_ &&
+        clear(p, ways.front()))
+      return ways.front();
     std::vector<Way> tries;
     for (const Way &way : ways)
       for (int k = 1; k <= kParts; ++k) tries.push_back({way.direction, way.length * k / kParts});
-    std::stable_sort(tries.begin(), tries.end(), [](const Way &l, const Way &r) { return l.length < r.length; });
+    std::stable_sort(tries.begin(), tries.end(),
+                     [](const Way &l, const Way &r) { return l.length < r.length; });
     // Evenly over all lengths, where there are more than may be looked at; the whole ways are among them.
     std::vector<Way> kept;
     for (size_t i = 0; i < tries.size(); i += tries.size() / kMostLooks + 1) kept.push_back(tries[i]);
@@ -149,11 +161,17 @@ class Untangler {
     std::vector<Vec3> out;
     const OverlapSkin &a = sides_.body(p.a);
     const Vec3 between = 0.5 * (a.lo() + a.hi()) - sides_.center(p);
-    if (norm2(between) > 0) out.push_back(normalized(between)), out.push_back(-normalized(between));
+    if (norm2(between) > 0) {
+      out.push_back(normalized(between));
+      out.push_back(-normalized(between));
+    }
     for (int k = 0; k < 27; ++k)
       if (k != 13) out.push_back(normalized({double(k / 9 - 1), double(k / 3 % 3 - 1), double(k % 3 - 1)}));
     if (p.obstacle)
-      for (int k = 0; k < 3; ++k) out.push_back(sides_.shape(p).axis(k)), out.push_back(-sides_.shape(p).axis(k));
+      for (int k = 0; k < 3; ++k) {
+        out.push_back(sides_.shape(p).axis(k));
+        out.push_back(-sides_.shape(p).axis(k));
+      }
     return out;
   }
 
@@ -178,14 +196,18 @@ class Untangler {
       if (!p.obstacle) stuck[root(p.b)] = 1;
     }
     for (uint32_t i = 0; i < w_.bodies.size(); ++i)
-      if (stuck[root(i)]) sides_.body(i).shift(-shift_[i]), shift_[i] = {};
+      if (stuck[root(i)]) {
+        sides_.body(i).shift(-shift_[i]);
+        shift_[i] = {};
+      }
   }
 
   void tell_failure(const OverlapPair &p) const {
     const std::string &b = p.obstacle ? w_.obstacles[p.b]->name : w_.bodies[p.b]->name;
-    w_.context->logf(DFM_LOG_WARNING, "untangle cannot part '%s' and '%s': %s", w_.bodies[p.a]->name.c_str(), b.c_str(),
-                     moves(p) ? "it finds no place for them that is free, and leaves them where they are"
-                              : "neither may be moved as a whole, since points of them are held or they step themselves");
+    w_.context->logf(
+        DFM_LOG_WARNING, "untangle cannot part '%s' and '%s': %s", w_.bodies[p.a]->name.c_str(), b.c_str(),
+        moves(p) ? "it finds no place for them that is free, and leaves them where they are"
+                 : "neither may be moved as a whole, since points of them are held or they step themselves");
   }
 
   double potential(const Body &b, Vec3 by) const {
@@ -202,10 +224,14 @@ class Untangler {
       const Vec3 by = shift_[i];
       if (norm2(by) == 0) continue;
       Body &b = *w_.bodies[i];
-      w_.context->logf(DFM_LOG_INFO, "untangle moved body '%s' by (%.4g, %.4g, %.4g) m; its energy in gravity and springs changed by %.3g J", b.name.c_str(),
-                       by.x, by.y, by.z, potential(b, by));
-      for (uint32_t k = 0; k < b.p.n; ++k) store3(&b.p.x[size_t(k) * kStride], load3(&b.p.x[size_t(k) * kStride]) + by);
-      wake(w_, b), forget_energy(b);   // the change of potential is nobody's work
+      w_.context->logf(DFM_LOG_INFO,
+                       "untangle moved body '%s' by (%.4g, %.4g, %.4g) m; its energy in gravity and springs "
+                       "changed by %.3g J",
+                       b.name.c_str(), by.x, by.y, by.z, potential(b, by));
+      for (uint32_t k = 0; k < b.p.n; ++k)
+        store3(&b.p.x[size_t(k) * kStride], load3(&b.p.x[size_t(k) * kStride]) + by);
+      wake(w_, b);
+      forget_energy(b);  // the change of potential is nobody's work
       ++w_.placements;
     }
   }
@@ -214,7 +240,7 @@ class Untangler {
   OverlapSides sides_;
   std::vector<uint8_t> movable_;
   std::vector<Vec3> shift_;
-  std::vector<uint32_t> group_;   // bodies that have had to do with each other, as a forest
+  std::vector<uint32_t> group_;  // bodies that have had to do with each other, as a forest
   double clearance_ = 0;
 };
 

@@ -13,22 +13,30 @@
 namespace dfm {
 
 bool Body::loads_vary() const {
-  return !springs.empty() || std::any_of(loads.begin(), loads.end(), [](const Load &l) { return !l.keys.empty() || l.sine.amplitude[0] != 0; });
+  return !springs.empty() || std::any_of(loads.begin(), loads.end(), [](const Load &l) {
+    return !l.keys.empty() || l.sine.amplitude[0] != 0;
+  });
 }
 
 double Body::impulse_time() const { return slumber.asleep ? slumber.h : world->report.h; }
 
 dfm_kin Body::kin(double t, double h, double *state_out) const {
   dfm_kin k{};
-  k.size = sizeof k, k.stride = kStride, k.t = t, k.dt = h;
-  k.x = p.x.data(), k.v = p.v.data();
-  k.state = model.state.data(), k.state_out = state_out;
+  k.size = sizeof k;
+  k.stride = kStride;
+  k.t = t;
+  k.dt = h;
+  k.x = p.x.data();
+  k.v = p.v.data();
+  k.state = model.state.data();
+  k.state_out = state_out;
   return k;
 }
 
 Pose Obstacle::pose_at_time(double t) const {
   Pose p = keys.empty() ? to_pose(def.pose) : pose_at(keys, t);
-  if (def.sine.frequency != 0 || def.sine.phase != 0) p.position += sine_at(def.sine, t) * load3(def.sine.amplitude);
+  if (def.sine.frequency != 0 || def.sine.phase != 0)
+    p.position += sine_at(def.sine, t) * load3(def.sine.amplitude);
   return p;
 }
 
@@ -61,7 +69,8 @@ uint64_t World::handle_of(uint64_t id) const {
   return 0;
 }
 
-uint32_t World::add_law(const char *name, std::span<const dfm_param_value> values, std::span<const uint8_t> free) {
+uint32_t World::add_law(const char *name, std::span<const dfm_param_value> values,
+                        std::span<const uint8_t> free) {
   const dfm_type &type = context->registry.find(DFM_KIND_FRICTION, name);
   std::vector<double> packed = pack_params(type, values);
   for (uint32_t i = 0; i < laws.size(); ++i)
@@ -85,8 +94,8 @@ uint32_t place_law(World &w, std::unique_ptr<LawInstance> law, std::span<const u
 
 namespace {
 
-// Rest distance d_c: 1e-3 of the median surface edge, at least 64 rounding units of the largest coordinate, at most 0.1 of the thinnest part:
-// of the least mean thickness and of the shortest median edge.
+// Rest distance d_c: 1e-3 of the median surface edge, at least 64 rounding units of the largest coordinate,
+// at most 0.1 of the thinnest part: of the least mean thickness and of the shortest median edge.
 double contact_offset(const World &w) {
   double edge = 0, shortest = 0, extent = 0;
   std::vector<double> edges;
@@ -165,14 +174,20 @@ void prepare(World &w, const RestoredChoice *restored) {
     if (w.revalued) look_at_plan(w, step);
     return settle_overlaps(w);
   }
-  const uint32_t nb = static_cast<uint32_t>(w.bodies.size()), no = static_cast<uint32_t>(w.obstacles.size()), width = nb + no;
+  const uint32_t nb = static_cast<uint32_t>(w.bodies.size());
+  const uint32_t no = static_cast<uint32_t>(w.obstacles.size());
+  const uint32_t width = nb + no;
   SceneFacts &facts = step.facts;
   facts = {};
-  facts.bodies = nb, facts.obstacles = no;
+  facts.bodies = nb;
+  facts.obstacles = no;
   facts.sleep = w.def.sleep != 0;
   put(prescribed(w), facts);
 
-  step.body_views.clear(), step.obstacle_views.clear(), step.sources.clear(), step.exchange.clear();
+  step.body_views.clear();
+  step.obstacle_views.clear();
+  step.sources.clear();
+  step.exchange.clear();
   uint32_t node = 0, point = 0;
   for (uint32_t i = 0; i < nb; ++i) {
     Body &b = *w.bodies[i];
@@ -180,41 +195,63 @@ void prepare(World &w, const RestoredChoice *restored) {
     facts.self_stepping += b.model.stepper != nullptr;
     const Surface &s = b.surface;
     step.body_views.push_back({i, node, b.category, b.collides_with, b.id, &s});
-    step.sources.push_back({node, s.nsurfel, point, b.p.n, &s, b.model.stepper ? nullptr : b.p.inv_mass.data(),
-                       b.model.stepper ? s.v.data() : b.p.v_free.data()});
-    if (!s.identity()) ++facts.coupled, facts.coupled_surfels += s.nsurfel;
-    node += s.nsurfel, point += b.p.n;
-    for (const std::string &e : effects(*b.model.type)) (b.model.works(e) ? facts.offered : facts.idle).push_back({e, b.model.type->id});
+    step.sources.push_back({node, s.nsurfel, point, b.p.n, &s,
+                            b.model.stepper ? nullptr : b.p.inv_mass.data(),
+                            b.model.stepper ? s.v.data() : b.p.v_free.data()});
+    if (!s.identity()) {
+      ++facts.coupled;
+      facts.coupled_surfels += s.nsurfel;
+    }
+    node += s.nsurfel;
+    point += b.p.n;
+    for (const std::string &e : effects(*b.model.type))
+      (b.model.works(e) ? facts.offered : facts.idle).push_back({e, b.model.type->id});
   }
   for (uint32_t i = 0; i < no; ++i) {
     Obstacle &o = *w.obstacles[i];
     o.slot = i;
     ObstacleView v{};
-    v.slot = i, v.category = o.def.category, v.collides_with = o.def.collides_with, v.id = o.id, v.shape = Shape(o.def.shape);
+    v.slot = i;
+    v.category = o.def.category;
+    v.collides_with = o.def.collides_with;
+    v.id = o.id;
+    v.shape = Shape(o.def.shape);
     if (v.shape == Shape::none) v.category = v.collides_with = 0;
-    v.position = o.pose.position, v.rotation = o.pose.rotation, v.half_size = load3(o.def.half_size);
-    v.radius = o.def.radius, v.half_length = o.def.half_length, v.belt = load3(o.def.velocity_surface);
+    v.position = o.pose.position;
+    v.rotation = o.pose.rotation;
+    v.half_size = load3(o.def.half_size);
+    v.radius = o.def.radius;
+    v.half_length = o.def.half_length;
+    v.belt = load3(o.def.velocity_surface);
     if (o.mesh) {
       o.mesh->place(v.position, v.rotation, {}, {});
-      v.surface = &o.mesh->surface, v.extent = o.mesh->extent;
+      v.surface = &o.mesh->surface;
+      v.extent = o.mesh->extent;
     }
-    if (o.grid) v.grid = o.grid.get(), v.extent = o.grid->extent();
+    if (o.grid) {
+      v.grid = o.grid.get();
+      v.extent = o.grid->extent();
+    }
     step.obstacle_views.push_back(v);
   }
 
   place_rigids(w);
   for (auto &set : w.rigid_sets) {
-    facts.rigid_bodies += static_cast<unsigned>(set->defs.size()), facts.rigid_joints += set->njoint;
-    if (facts.rigid_hosts.find(set->host_name) == std::string::npos) facts.rigid_hosts += (facts.rigid_hosts.empty() ? "" : ", ") + set->host_name;
+    facts.rigid_bodies += static_cast<unsigned>(set->defs.size());
+    facts.rigid_joints += set->njoint;
+    if (facts.rigid_hosts.find(set->host_name) == std::string::npos)
+      facts.rigid_hosts += (facts.rigid_hosts.empty() ? "" : ", ") + set->host_name;
     facts.offered.push_back({"two_way_rigid", "rigid host " + set->host_name});
   }
 
   // Pairs: filters, then laws. The default law is made only when a pair needs it.
-  const uint64_t filter_version = w.filter.version;   // rises, so that lists made under older rules are renewed
+  // rises, so that lists made under older rules are renewed
+  const uint64_t filter_version = w.filter.version;
   w.filter = PairFilter(w.memory());
   w.filter.version = filter_version + 1;
   w.pair_law.assign(size_t(nb) * width, 0);
-  w.zone_table.clear(), w.zone_law.clear();
+  w.zone_table.clear();
+  w.zone_law.clear();
   for (auto &law : w.laws) law->by_default = false;
   std::vector<uint32_t> used;
   for (uint32_t i = 0; i < nb; ++i) {
@@ -225,7 +262,8 @@ void prepare(World &w, const RestoredChoice *restored) {
       const uint64_t id = is_body ? w.bodies[j]->id : w.obstacles[j - nb]->id;
       const PairSide b = is_body ? PairSide{w.bodies[j]->name, {}, w.bodies[j]->material}
                                  : PairSide{w.obstacles[j - nb]->name, {}, w.obstacles[j - nb]->material};
-      bool touch = is_body ? (w.bodies[i]->category & w.bodies[j]->collides_with) && (w.bodies[j]->category & w.bodies[i]->collides_with)
+      bool touch = is_body ? (w.bodies[i]->category & w.bodies[j]->collides_with) &&
+                                 (w.bodies[j]->category & w.bodies[i]->collides_with)
                            : (w.bodies[i]->category & w.obstacles[j - nb]->def.collides_with) &&
                                  (w.obstacles[j - nb]->def.category & w.bodies[i]->collides_with);
       if (const FilterRule *rule = best_rule(w.filters, a, b)) {
@@ -256,22 +294,33 @@ void prepare(World &w, const RestoredChoice *restored) {
   ++step.made.plans;
   if (!restored && !w.plan.touches()) end_contacts(w);
 
-  // While contacts live it only falls: a larger one would turn their rest into a depth, and push them apart at 0.1 d_c / h.
+  // While contacts live it only falls: a larger one would turn their rest into a depth, and push them apart
+  // at 0.1 d_c / h.
   const double wanted = contact_offset(w);
   const double before = w.offset;
-  w.offset = restored ? restored->offset : w.def.contact_offset > 0 ? w.def.contact_offset : w.store.n > 0 ? std::min(w.offset, wanted) : wanted;
+  w.offset = restored                   ? restored->offset
+             : w.def.contact_offset > 0 ? w.def.contact_offset
+             : w.store.n > 0            ? std::min(w.offset, wanted)
+                                        : wanted;
   if (!restored) check_offset(w);
   for (auto &b : w.bodies)
     if (w.def.sleep && b->anchor.empty()) b->anchor = b->p.x;
-  step.active.reserve(nb), step.sinks.reserve(nb);
+  step.active.reserve(nb);
+  step.sinks.reserve(nb);
   reserve_sleep(w, step, nb);
-  if (w.sleepers > 0 && w.offset != before) wake_all(w);   // contacts rest at another distance now
+  if (w.sleepers > 0 && w.offset != before) wake_all(w);  // contacts rest at another distance now
   gather_active(w);
   set_gravity_now(w);
   w.bound_age = kNone;
   step.free_kinetic.resize(nb);
-  if (!restored) forget_energy(w);
-  else w.gravity = restored->gravity, w.stable = restored->stable, w.inverted = restored->inverted, w.bound_age = restored->bound_age;
+  if (!restored) {
+    forget_energy(w);
+  } else {
+    w.gravity = restored->gravity;
+    w.stable = restored->stable;
+    w.inverted = restored->inverted;
+    w.bound_age = restored->bound_age;
+  }
   step.guard.forget();
   w.changed = w.revalued = false;
   ++step.made.tables;

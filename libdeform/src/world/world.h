@@ -1,4 +1,5 @@
-// The world: what lasts. world/step.cpp is the table of contents of what happens to it in a step, world/context.h has the buffers of that.
+// The world: what lasts. world/step.cpp is the table of contents of what happens to it in a step,
+// world/context.h has the buffers of that.
 #pragma once
 #include <atomic>
 #include <memory>
@@ -44,10 +45,20 @@ struct Material {
 // A model parameter that differs from cell to cell, and who said so ("field", "materials", "share").
 // An entry of a material that the body's model has no parameter for.
 struct Unused { std::string key, material; };
-struct CellField { std::string key, from; uint32_t width; Array<double> values; };
+struct CellField {
+  std::string key, from;
+  uint32_t width;
+  Array<double> values;
+};
 
 // A lasting load: force[i] on points[i], times the keyed scale, times 1 + sine.
-struct Load { uint32_t number; std::vector<uint32_t> points; std::vector<double> force; std::vector<dfm_scale_key> keys; dfm_sine sine{}; };
+struct Load {
+  uint32_t number;
+  std::vector<uint32_t> points;
+  std::vector<double> force;
+  std::vector<dfm_scale_key> keys;
+  dfm_sine sine{};
+};
 // A spring of rest length zero from the weighted mean of points to a place, or a path of places.
 struct Spring {
   uint32_t number;
@@ -58,10 +69,15 @@ struct Spring {
   double stiffness, damping;
 };
 // Held points carried by keyed poses (relative to the first key) and a sine.
-struct HeldMotion { std::vector<uint32_t> points; std::vector<double> start; std::vector<dfm_pose_key> keys; dfm_sine sine{}; };
+struct HeldMotion {
+  std::vector<uint32_t> points;
+  std::vector<double> start;
+  std::vector<dfm_pose_key> keys;
+  dfm_sine sine{};
+};
 
 inline constexpr int32_t kNoCoupling = -1;
-inline constexpr double kDefaultFriction = 0.5;        // of a material that has no entry "friction"
+inline constexpr double kDefaultFriction = 0.5;  // of a material that has no entry "friction"
 
 struct Body {
   World *world = nullptr;
@@ -75,27 +91,34 @@ struct Body {
   Array<uint32_t> tets, edges;
   Surface surface;
   SurfaceZones zones;
-  int32_t coupling = kNoCoupling;    // DFM_COUPLING_* of a surface of its own
+  int32_t coupling = kNoCoupling;  // DFM_COUPLING_* of a surface of its own
   ModelInstance model;
   double mass = 0, rest_volume = 0;
-  Array<double> share;               // [ntet] how much of each cell is material; empty: all
+  Array<double> share;  // [ntet] how much of each cell is material; empty: all
   std::vector<CellField> fields;
   std::vector<Unused> unused;
   std::vector<Load> loads;
   std::vector<Spring> springs;
   std::vector<HeldMotion> motions;
-  uint32_t next_load = 1;            // number of the next load or spring
-  Vec3 contact_impulse;              // N s since creation
+  uint32_t next_load = 1;  // number of the next load or spring
+  Vec3 contact_impulse;    // N s since creation
   EnergyBook energy;
-  Array<double> surfel_impulse;      // [nsurfel,3] N s of the last sub-step
-  Array<double> method_values;       // [n,4] what the contact method keeps of each point; empty where it keeps nothing
-  Array<double> ksum, csum;          // [n] row sums of the step bound
-  struct { bool known = false; double step = 0; uint32_t point = 0, inverted = 0; } bound;   // as last asked for; holds while asleep
+  Array<double> surfel_impulse;  // [nsurfel,3] N s of the last sub-step
+  // [n,4] what the contact method keeps of each point; empty where it keeps nothing
+  Array<double> method_values;
+  Array<double> ksum, csum;  // [n] row sums of the step bound
+  // as last asked for; holds while asleep
+  struct {
+    bool known = false;
+    double step = 0;
+    uint32_t point = 0, inverted = 0;
+  } bound;
   Slumber slumber;
-  Array<double> anchor;              // [n,4] m, positions since which it is calm; empty where nothing may sleep
+  // [n,4] m, positions since which it is calm; empty where nothing may sleep
+  Array<double> anchor;
 
   bool loads_vary() const;
-  double impulse_time() const;       // s that surfel_impulse belongs to
+  double impulse_time() const;  // s that surfel_impulse belongs to
   dfm_kin kin(double t, double h, double *state_out) const;
 };
 
@@ -107,37 +130,51 @@ struct Obstacle {
   SurfaceZones::Zone zone{"", "", kDefaultFriction};
   dfm_obstacle_def def{};
   std::vector<dfm_pose_key> keys;
-  Pose pose;                         // now
-  Pose target;                       // at the end of the next step, where move_to set it
+  Pose pose;    // now
+  Pose target;  // at the end of the next step, where move_to set it
   bool has_target = false;
-  RigidSet *rigid = nullptr;         // a body of a rigid host: where it stands in `rigid`
+  RigidSet *rigid = nullptr;  // a body of a rigid host: where it stands in `rigid`
   uint32_t rigid_body = 0;
-  bool added = false;                // a further shape of that body, at `local` in its frame
+  bool added = false;  // a further shape of that body, at `local` in its frame
   Pose local;
-  bool moves() const { return !keys.empty() || def.sine.amplitude[0] != 0 || def.sine.amplitude[1] != 0 || def.sine.amplitude[2] != 0; }
-  Array<double> points;              // mesh, voxels: as given, in its frame
+  bool moves() const {
+    return !keys.empty() || def.sine.amplitude[0] != 0 || def.sine.amplitude[1] != 0 ||
+           def.sine.amplitude[2] != 0;
+  }
+  Array<double> points;  // mesh, voxels: as given, in its frame
   Array<uint32_t> triangles;
   std::unique_ptr<ObstacleMesh> mesh;
   std::unique_ptr<VoxelGrid> grid;
   Pose pose_at_time(double t) const;
-  Pose end_pose(double t, double h, double left) const;   // of a sub-step, in a step that lasts for `left` from t
+  // of a sub-step, in a step that lasts for `left` from t
+  Pose end_pose(double t, double h, double left) const;
 };
 
-struct FrictionRule { std::string between[2]; uint32_t law; };
-struct FilterRule { std::string between[2]; bool collide; };
-struct PairWork { uint64_t a, b; double work; };
+struct FrictionRule {
+  std::string between[2];
+  uint32_t law;
+};
+struct FilterRule {
+  std::string between[2];
+  bool collide;
+};
+struct PairWork {
+  uint64_t a, b;
+  double work;
+};
 
 // What the last sub-step left for the report: contacts in key order with their solution.
 struct Report {
   uint32_t n = 0;
   double h = 0;
   Array<ContactPoint> contacts;
-  Array<double> frame, impulse, slip;   // [n,9], [n,3], [n,2]
+  Array<double> frame, impulse, slip;  // [n,9], [n,3], [n,2]
   Array<uint8_t> mode;
 };
 
-inline constexpr size_t kMostEvents = 65536;           // between steps; with more, so many of the oldest go that
-inline constexpr size_t kEventsAtOnce = 1024;          // the next steps find room
+// between steps; with more, so many of the oldest go that
+inline constexpr size_t kMostEvents = 65536;
+inline constexpr size_t kEventsAtOnce = 1024;  // the next steps find room
 
 struct World {
   dfm_context *context;
@@ -146,46 +183,50 @@ struct World {
   std::vector<std::string> asked_effects;
   std::vector<dfm_vector_key> gravity_keys;
 
-  std::vector<std::unique_ptr<Body>> bodies;           // in id order
-  std::vector<std::unique_ptr<Obstacle>> obstacles;    // in id order
+  std::vector<std::unique_ptr<Body>> bodies;         // in id order
+  std::vector<std::unique_ptr<Obstacle>> obstacles;  // in id order
   std::vector<std::unique_ptr<Material>> materials;
-  std::vector<std::unique_ptr<RigidSet>> rigid_sets;   // each a host's bodies, which are obstacles too
-  std::vector<std::unique_ptr<LawInstance>> laws;      // the first is the default law, made when first needed
+  std::vector<std::unique_ptr<RigidSet>> rigid_sets;  // each a host's bodies, which are obstacles too
+  std::vector<std::unique_ptr<LawInstance>> laws;     // the first is the default law, made when first needed
   std::vector<FrictionRule> friction;
   std::vector<FilterRule> filters;
   Overlaps overlaps;
-  uint64_t placements = 0;                             // rises when positions or d_c change otherwise than by a step
+  // rises when positions or d_c change otherwise than by a step
+  uint64_t placements = 0;
   uint64_t next_id = 1;
 
   // Derived from the above by prepare() whenever something changed.
   bool changed = true;
-  bool revalued = false;                               // values_changed(): tables hold, the plan is looked at
+  bool revalued = false;  // values_changed(): tables hold, the plan is looked at
   Plan plan;
-  std::vector<uint32_t> pair_law;                      // [body][body or obstacle] -> index into laws
-  std::vector<uint32_t> zone_table, zone_law;          // as pair_law -> first in zone_law [zone a][zone b], kNone: the pair has one law; empty: all have
+  std::vector<uint32_t> pair_law;  // [body][body or obstacle] -> index into laws
+  // as pair_law -> first in zone_law [zone a][zone b], kNone: the pair has one law; empty: all have
+  std::vector<uint32_t> zone_table, zone_law;
   PairFilter filter;
   std::vector<LawInstance *> law_list;
-  double offset = 0;                                   // d_c, m
-  uint32_t bound_age = kNone;                          // sub-steps since the bound was asked for; kNone: ask before the next step
+  double offset = 0;  // d_c, m
+  // sub-steps since the bound was asked for; kNone: ask before the next step
+  uint32_t bound_age = kNone;
 
-  const ContactMethod *method = nullptr;               // its table of stages, and what it cannot do (world/method.h)
+  // its table of stages, and what it cannot do (world/method.h)
+  const ContactMethod *method = nullptr;
 
   // Time.
-  double time = 0, stable = 0;                         // s; stable: 0.9 of the bound at its last evaluation
+  double time = 0, stable = 0;  // s; stable: 0.9 of the bound at its last evaluation
   StepSizes sizes;
   EnergyWatch watch;
   uint64_t step_count = 0;
   Body *worst_body = nullptr;
-  uint32_t inverted = 0;                               // cells inside out at the last evaluation of the bound
+  uint32_t inverted = 0;  // cells inside out at the last evaluation of the bound
   uint32_t worst_point = 0;
-  std::atomic<bool> busy{false};                       // a call of the API changes it (api/call.h)
+  std::atomic<bool> busy{false};  // a call of the API changes it (api/call.h)
 
-  std::unique_ptr<StepContext> steps;                  // buffers: world/context.h
+  std::unique_ptr<StepContext> steps;  // buffers: world/context.h
 
   Vec3 gravity;
   ContactStore store;
   Report report;
-  std::vector<PairWork> work;                          // sorted by (a, b)
+  std::vector<PairWork> work;  // sorted by (a, b)
   std::vector<dfm_contact_event> events;
   StepImpulses step_impulses;
   double hold_start = 0;
@@ -202,14 +243,17 @@ struct World {
   // world.cpp
   Body *find_body(const std::string &name);
   Obstacle *find_obstacle(const std::string &name);
-  uint64_t handle_of(uint64_t id) const;               // body or obstacle; 0 if gone
-  // Index of the law with these values: one that is there, else a new one, in a place that `free` marks or behind the others.
-  uint32_t add_law(const char *name, std::span<const dfm_param_value> values, std::span<const uint8_t> free = {});
+  uint64_t handle_of(uint64_t id) const;  // body or obstacle; 0 if gone
+  // Index of the law with these values: one that is there, else a new one, in a place that `free` marks or
+  // behind the others.
+  uint32_t add_law(const char *name, std::span<const dfm_param_value> values,
+                   std::span<const uint8_t> free = {});
 
   // pair_table.cpp; a, b: bodies by slot, then obstacles
   uint32_t law_of(uint32_t slot_a, bool obstacle, uint32_t slot_b) const;
   uint32_t resolve_law(uint32_t a, uint32_t zone_a, uint32_t b, uint32_t zone_b);
-  void find_law(uint32_t a, uint32_t b, std::vector<uint32_t> &used);   // fills pair_law and, where zones differ, the tables; used: laws out
+  // fills pair_law and, where zones differ, the tables; used: laws out
+  void find_law(uint32_t a, uint32_t b, std::vector<uint32_t> &used);
 };
 
 }  // namespace dfm

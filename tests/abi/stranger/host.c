@@ -1,14 +1,17 @@
-/* A host by somebody else, in C, against the installed tree: a ball on a floor under a law from the plugin file argv[1]. */
+/* A host by somebody else, in C, against the installed tree: a ball on a floor under a law from the plugin
+ * file argv[1]. */
 #include <deform/deform.h>
 #include <math.h>
 #include <stdio.h>
 
-#define TRY(call) if ((call) < 0) return fprintf(stderr, "%s: %s\n", #call, dfm_last_error()), 1
+#define TRY(call) \
+  if ((call) < 0) return fprintf(stderr, "%s: %s\n", #call, dfm_last_error()), 1
 
 int main(int argc, char **argv) {
   int major = -1, minor = -1, patch = -1;
   printf("deform %s\n", dfm_version(&major, &minor, &patch));
-  if (major != DFM_VERSION_MAJOR || minor != DFM_VERSION_MINOR || patch != DFM_VERSION_PATCH || argc != 2) return 1;
+  if (major != DFM_VERSION_MAJOR || minor != DFM_VERSION_MINOR || patch != DFM_VERSION_PATCH || argc != 2)
+    return 1;
 
   dfm_context *context = NULL;
   TRY(dfm_context_create(NULL, &context));
@@ -32,13 +35,16 @@ int main(int argc, char **argv) {
   dfm_tetmesh_info info = {sizeof info};
   TRY(dfm_tetmesh_get_info(mesh, &info));
   dfm_body_def body_def = dfm_body_def_default();
-  body_def.name = "ball", body_def.npoint = info.npoint, body_def.ntet = info.ntet;
+  body_def.name = "ball";
+  body_def.npoint = info.npoint;
+  body_def.ntet = info.ntet;
   TRY(dfm_tetmesh_data(mesh, &body_def.points, &body_def.tets, NULL));
   body_def.pose.position[2] = 0.101;
   dfm_body body = 0;
   TRY(dfm_body_create(world, &body_def, &body));
   dfm_friction_def pair = {sizeof pair};
-  pair.between[0] = pair.between[1] = "*", pair.law = type->id;
+  pair.between[0] = pair.between[1] = "*";
+  pair.law = type->id;
   TRY(dfm_world_add_friction(world, &pair));
 
   for (int i = 0; i < 100; ++i) TRY(dfm_world_step(world, 1e-3, NULL));

@@ -1,4 +1,5 @@
-// Steps that fail half way: ODE's bodies stand where the dfm_world does, those that it does not know included, and go on as if nothing had been.
+// Steps that fail half way: ODE's bodies stand where the dfm_world does, those that it does not know
+// included, and go on as if nothing had been.
 #include <gtest/gtest.h>
 
 #include <cstdlib>
@@ -9,16 +10,22 @@ namespace {
 
 using namespace test;
 
-// A rigid host whose body stays where it is. Armed, it lets so many sub-steps go well and fails in the next one, in the first call of `where`.
+// A rigid host whose body stays where it is. Armed, it lets so many sub-steps go well and fails in the next
+// one, in the first call of `where`.
 struct Saboteur {
   enum Where { predict, commit };
   static inline Where where = predict;
   static inline int left = -1;
-  static inline double at = 0;             // s
-  static void arm(Where here, int good) { where = here, left = good, at = -1; }
+  static inline double at = 0;  // s
+  static void arm(Where here, int good) {
+    where = here;
+    left = good;
+    at = -1;
+  }
   static dfm_status strike(Where here, const dfm_rigid_step *step) {
     if (here != where || step->t == at) return DFM_OK;
-    return at = step->t, left-- == 0 ? DFM_E_FATAL : DFM_OK;
+    at = step->t;
+    return left-- == 0 ? DFM_E_FATAL : DFM_OK;
   }
 
   // Asked after the sets that are there already.
@@ -27,14 +34,23 @@ struct Saboteur {
       dfm_rigid_host t{};
       t.size = sizeof t;
       t.create = [](void *, const dfm_rigid_set_def *, void **self, uint32_t *group, uint32_t *nextra) {
-        *self = &left, group[0] = 0, *nextra = 0;
+        *self = &left;
+        group[0] = 0;
+        *nextra = 0;
         return dfm_status(DFM_OK);
       };
       t.destroy = [](void *) {};
-      t.predict = [](void *, const dfm_rigid_step *step, double *v) { return std::fill(v, v + 6, 0.0), strike(predict, step); };
-      t.respond = [](void *, const dfm_rigid_step *, uint32_t, double *m) { return std::fill(m, m + 36, 0.0), dfm_status(DFM_OK); };
+      t.predict = [](void *, const dfm_rigid_step *step, double *v) {
+        std::fill(v, v + 6, 0.0);
+        return strike(predict, step);
+      };
+      t.respond = [](void *, const dfm_rigid_step *, uint32_t, double *m) {
+        std::fill(m, m + 36, 0.0);
+        return dfm_status(DFM_OK);
+      };
       t.commit = [](void *, const dfm_rigid_step *step, const double *, dfm_rigid_state *state, double *) {
-        return state[0] = step->state[0], strike(commit, step);
+        state[0] = step->state[0];
+        return strike(commit, step);
       };
       return dfm_rigid_host_register("saboteur", &t);
     }();
@@ -51,11 +67,18 @@ struct Stand {
 };
 Stand stand(dBodyID b) {
   const dReal *const q = dBodyGetQuaternion(b);
-  return {position(b), velocity(b), vec(dBodyGetAngularVel(b)), vec(dBodyGetForce(b)), vec(dBodyGetTorque(b)), {q[0], q[1], q[2], q[3]},
-          dBodyIsEnabled(b), dBodyGetGyroscopicMode(b)};
+  return {position(b),
+          velocity(b),
+          vec(dBodyGetAngularVel(b)),
+          vec(dBodyGetForce(b)),
+          vec(dBodyGetTorque(b)),
+          {q[0], q[1], q[2], q[3]},
+          dBodyIsEnabled(b),
+          dBodyGetGyroscopicMode(b)};
 }
 
-// A box with a soft ball on it; on a hinge of the box hangs a weight without a geom, which the dfm_world does not know, and on that a sleeping one.
+// A box with a soft ball on it; on a hinge of the box hangs a weight without a geom, which the dfm_world does
+// not know, and on that a sleeping one.
 struct Swing {
   Ode ode;
   dBodyID box, weight, sleeper;
@@ -63,21 +86,25 @@ struct Swing {
   dJointFeedback feedback{};
   Swing() : ode({0, 0, -9.81}) {
     soft_bed(ode);
-    box = ode.box({0.08, 0.08, 0.05}, 2, {0.15, 0.15, 0.152}), weight = ode.body(0.5, {1e-3, 2e-3, 3e-3}, {0.15, 0.3, 0.3});
+    box = ode.box({0.08, 0.08, 0.05}, 2, {0.15, 0.15, 0.152});
+    weight = ode.body(0.5, {1e-3, 2e-3, 3e-3}, {0.15, 0.3, 0.3});
     dBodySetAngularVel(weight, 1, 0, 0);
     hinge = dJointCreateHinge(ode.world, nullptr);
-    dJointAttach(hinge, box, weight), dJointSetHingeAnchor(hinge, 0.15, 0.15, 0.25), dJointSetHingeAxis(hinge, 1, 0, 0);
+    dJointAttach(hinge, box, weight);
+    dJointSetHingeAnchor(hinge, 0.15, 0.15, 0.25);
+    dJointSetHingeAxis(hinge, 1, 0, 0);
     dJointSetFeedback(hinge, &feedback);
-    ode.step();                            // the box is known now, before the saboteur
+    ode.step();  // the box is known now, before the saboteur
     Saboteur::join(ode.soft);
     sleeper = ode.body(0.2, {1e-3, 1e-3, 1e-3}, {0.15, 0.4, 0.3});
     const dJointID tie = dJointCreateBall(ode.world, nullptr);
-    dJointAttach(tie, weight, sleeper), dJointSetBallAnchor(tie, 0.15, 0.35, 0.3);
+    dJointAttach(tie, weight, sleeper);
+    dJointSetBallAnchor(tie, 0.15, 0.35, 0.3);
   }
   std::array<Stand, 3> stands() const { return {stand(box), stand(weight), stand(sleeper)}; }
 };
 
-constexpr double kStep = 0.04;             // of several sub-steps
+constexpr double kStep = 0.04;  // of several sub-steps
 
 // To the last bit, but for rotations: ODE makes them unit anew whenever they are set.
 void expect_alike(const std::array<Stand, 3> &a, const std::array<Stand, 3> &b) {
@@ -96,7 +123,8 @@ void expect_alike(const std::array<Stand, 3> &a, const std::array<Stand, 3> &b) 
 
 }  // namespace
 
-// Nothing has moved: every body, its forces and its sleep are as before the call, and the next steps are those of a world in which nothing had failed.
+// Nothing has moved: every body, its forces and its sleep are as before the call, and the next steps are
+// those of a world in which nothing had failed.
 TEST(OdeFailure, InTheFirstSubStep_LeavesNoTrace) {
   for (const Saboteur::Where where : {Saboteur::predict, Saboteur::commit}) {
     SCOPED_TRACE(where);
@@ -104,7 +132,8 @@ TEST(OdeFailure, InTheFirstSubStep_LeavesNoTrace) {
     for (Swing *s : {&struck, &calm}) {
       for (int i = 0; i < 5; ++i) s->ode.step(kStep);
       dBodyDisable(s->sleeper);
-      dBodyAddForce(s->weight, 0.3, 0, 0), dBodyAddTorque(s->box, 0, 0, 0.1);
+      dBodyAddForce(s->weight, 0.3, 0, 0);
+      dBodyAddTorque(s->box, 0, 0, 0.1);
     }
     const auto before = struck.stands();
     Saboteur::arm(where, 0);
@@ -118,7 +147,8 @@ TEST(OdeFailure, InTheFirstSubStep_LeavesNoTrace) {
   }
 }
 
-// Some sub-steps have counted: all bodies are where the last of these ended, whichever of them the dfm_world knows.
+// Some sub-steps have counted: all bodies are where the last of these ended, whichever of them the
+// dfm_world knows.
 TEST(OdeFailure, InALaterSubStep_LeavesAllBodiesAtTheSameTime) {
   for (const Saboteur::Where where : {Saboteur::predict, Saboteur::commit})
     for (const int good : {1, 2, 3}) {
@@ -127,7 +157,8 @@ TEST(OdeFailure, InALaterSubStep_LeavesAllBodiesAtTheSameTime) {
       ASSERT_GT(stats(calm.ode.soft).last_substeps, 4u);
       const double start = dfm_world_time(struck.ode.soft);
       Saboteur::arm(where, good);
-      dBodyAddForce(struck.weight, 0.3, 0, 0), dBodyAddForce(calm.weight, 0.3, 0, 0);
+      dBodyAddForce(struck.weight, 0.3, 0, 0);
+      dBodyAddForce(calm.weight, 0.3, 0, 0);
       EXPECT_EQ(dfm_ode_step(struck.ode.adapter, kStep), DFM_E_DIVERGED);
       const double passed = dfm_world_time(struck.ode.soft) - start;
       EXPECT_GT(passed, 0);
@@ -138,7 +169,7 @@ TEST(OdeFailure, InALaterSubStep_LeavesAllBodiesAtTheSameTime) {
         EXPECT_LT(apart(a[i].position, b[i].position), 1e-12) << where << " " << good << " " << i;
         EXPECT_LT(apart(a[i].velocity, b[i].velocity), 1e-9) << where << " " << good << " " << i;
         EXPECT_LT(apart(a[i].spin, b[i].spin), 1e-9) << where << " " << good << " " << i;
-        EXPECT_EQ(a[i].force, Vec{}) << i;   // they acted
+        EXPECT_EQ(a[i].force, Vec{}) << i;  // they acted
       }
     }
 }
@@ -153,11 +184,12 @@ TEST(OdeFailure, DiscardedStep_KeepsTheForces) {
   expect_alike(s.stands(), before);
 }
 
-// ---- the end of the program ---------------------------------------------------------------------------------------
+// ---- the end of the program -------------------------------------------------------------------------------
 
 namespace {
 
-// Detaches when statics go, after those that came later; the exit code says whether the adapter was still there.
+// Detaches when statics go, after those that came later; the exit code says whether the adapter
+// was still there.
 struct Late {
   dfm_ode adapter = 0;
   ~Late() {
@@ -165,7 +197,8 @@ struct Late {
   }
 };
 [[noreturn]] void detach_late() {
-  static Late late;                        // before the first adapter, so destroyed after all that comes with it
+  // before the first adapter, so destroyed after all that comes with it
+  static Late late;
   static Ode *const ode = new Ode;
   ode->ball(0.1, 1, {0, 0, 1});
   ode->step();
@@ -177,7 +210,9 @@ struct Late {
   ode->box({0.2, 0.2, 0.05}, 1, {0, 0, 0.049});
   dCreatePlane(ode->space, 0, 0, 1, 0);
   ode->step();
-  dSpaceDestroy(ode->space), dWorldDestroy(ode->world), dCloseODE();
+  dSpaceDestroy(ode->space);
+  dWorldDestroy(ode->world);
+  dCloseODE();
   ok(dfm_world_destroy(ode->soft));
   std::exit(::testing::Test::HasFailure());
 }
@@ -185,7 +220,8 @@ struct Late {
 }  // namespace
 
 TEST(OdeExitDeathTest, AdapterOfAHostThatTearsDownLate_IsStillThere) {
-  GTEST_FLAG_SET(death_test_style, "threadsafe");   // a process of its own, in which no adapter has been before
+  // a process of its own, in which no adapter has been before
+  GTEST_FLAG_SET(death_test_style, "threadsafe");
   EXPECT_EXIT(detach_late(), ::testing::ExitedWithCode(0), "");
 }
 TEST(OdeExitDeathTest, AdapterThatNobodyDetaches_TouchesNothingAtTheEnd) {

@@ -39,7 +39,8 @@ TEST(OdeFriction, NoLaw_IsTheCoefficientOfTheDef) {
   EXPECT_NEAR(sliding_path(ode), 1 / (2 * 0.5 * 9.81), 0.01 / (2 * 0.5 * 9.81));
 }
 
-// Stribeck's curve: the path is the integral of v dv / (g mu(v)), mu = mu_C + (mu_S - mu_C) exp(-(v / v_s)^2).
+// Stribeck's curve: the path is the integral of v dv / (g mu(v)), mu = mu_C + (mu_S - mu_C)
+// exp(-(v / v_s)^2).
 TEST(OdeFriction, StribeckCurve_IsFollowedDownToRest) {
   Ode ode;
   ok(use(ode, "coulomb", {{"mu_C", 0.1}, {"mu_S", 0.4}, {"v_s", 0.3}}));
@@ -51,7 +52,8 @@ TEST(OdeFriction, StribeckCurve_IsFollowedDownToRest) {
   EXPECT_NEAR(sliding_path(ode), path, 0.01 * path);
 }
 
-// A law with a state: pushed with half of what it carries, the box moves by its bristles' bending and comes back when let go.
+// A law with a state: pushed with half of what it carries, the box moves by its bristles' bending and comes
+// back when let go.
 TEST(OdeFriction, LawWithAState_BendsAndComesBack) {
   Ode ode;
   ok(dfm_plugin_register_static(ode.context, dfm_plugin_entry_bristle, "bristle"));
@@ -60,15 +62,19 @@ TEST(OdeFriction, LawWithAState_BendsAndComesBack) {
   const dBodyID box = ode.box({0.1, 0.1, 0.02}, 2, {0, 0, 0.02});
   ode.run(0.2);
   const double start = position(box)[0];
-  for (int i = 0; i < 500; ++i) dBodyAddForce(box, 0.5 * 0.5 * 2 * 9.81, 0, 0), ode.step();
+  for (int i = 0; i < 500; ++i) {
+    dBodyAddForce(box, 0.5 * 0.5 * 2 * 9.81, 0, 0);
+    ode.step();
+  }
   const double bent = position(box)[0] - start;
-  const double stiffness = 4 * 1e7 * 1e-3;   // four corners, N/m
+  const double stiffness = 4 * 1e7 * 1e-3;  // four corners, N/m
   EXPECT_NEAR(bent, 0.25 * 2 * 9.81 / stiffness, 0.1 * 0.25 * 2 * 9.81 / stiffness);
   ode.run(0.5);
   EXPECT_LT(std::fabs(position(box)[0] - start), 0.1 * bent);
 }
 
-// Bent bristles between rigid bodies: the adapter's snapshot has them; the dfm_world's own takes the bodies back, and they begin straight.
+// Bent bristles between rigid bodies: the adapter's snapshot has them; the dfm_world's own takes the bodies
+// back, and they begin straight.
 TEST(OdeFriction, SnapshotOfTheAdapter_HasTheBristles) {
   Ode ode;
   ok(dfm_plugin_register_static(ode.context, dfm_plugin_entry_bristle, "bristle"));
@@ -77,7 +83,10 @@ TEST(OdeFriction, SnapshotOfTheAdapter_HasTheBristles) {
   dCreatePlane(ode.space, 0, 0, 1, 0);
   const dBodyID box = ode.box({0.2, 0.2, 0.02}, 2, {0, 0, 0.02});
   const auto push = [&](int steps) {
-    for (int i = 0; i < steps; ++i) dBodyAddForce(box, 4, 1, 0), ode.step();
+    for (int i = 0; i < steps; ++i) {
+      dBodyAddForce(box, 4, 1, 0);
+      ode.step();
+    }
   };
   push(100);
   const std::vector<unsigned char> shot = ode.snapshot();
@@ -101,12 +110,16 @@ TEST(OdeFriction, SnapshotOfTheAdapter_HasTheBristles) {
   EXPECT_EQ(straight[0], straight[1]);
   ok(use(ode, "coulomb", {{"mu", 0.2}}));
   EXPECT_EQ(dfm_ode_restore(ode.adapter, shot.data(), shot.size()), DFM_E_FORMAT);
-  EXPECT_NE(std::string(dfm_last_error()).find("dfm_ode_set_friction"), std::string::npos) << dfm_last_error();
+  EXPECT_NE(std::string(dfm_last_error()).find("dfm_ode_set_friction"), std::string::npos)
+      << dfm_last_error();
 }
 
 // A near callback of the caller's that leaves the contact to dfm_ode_contact.
 TEST(OdeFriction, OwnNearCallback_MayUseTheLaw) {
-  struct Data { dfm_ode adapter; int made; } data{};
+  struct Data {
+    dfm_ode adapter;
+    int made;
+  } data{};
   const auto callback = [](void *user, dGeomID a, dGeomID b) {
     Data &d = *static_cast<Data *>(user);
     int n = 0;

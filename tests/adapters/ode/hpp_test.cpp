@@ -23,19 +23,26 @@ struct Scene {
 
   Scene() {
     deform::ContextDef quiet;
-    quiet.plugin_dir = DEFORM_PLUGIN_DIR, quiet.log = [](void *, int32_t, const char *) {};
-    context = deform::Context::make(quiet), soft = context.make_world();
+    quiet.plugin_dir = DEFORM_PLUGIN_DIR;
+    quiet.log = [](void *, int32_t, const char *) {};
+    context = deform::Context::make(quiet);
+    soft = context.make_world();
     dWorldSetGravity(world, 0, 0, -9.81);
     dCreatePlane(space, 0, 0, 1, 0);
-    dGeomSetBody(geom, body), dBodySetPosition(body, 0, 0, 0.27);
+    dGeomSetBody(geom, body);
+    dBodySetPosition(body, 0, 0, 0.27);
     const auto mesh = context.make_tets("ball", {0.1}, 200);
     deform::BodyDef soft_ball;
     soft_ball.set_mesh(mesh);
     soft_ball.pose.position[2] = 0.101;
     ball = soft.add_body(soft_ball);
-    def.world = world, def.space = space;
+    def.world = world;
+    def.space = space;
   }
-  ~Scene() { dSpaceDestroy(space), dWorldDestroy(world); }
+  ~Scene() {
+    dSpaceDestroy(space);
+    dWorldDestroy(world);
+  }
   Scene(const Scene &) = delete;
   Scene &operator=(const Scene &) = delete;
 };

@@ -1,4 +1,5 @@
-// Bodies that ODE's joints, motors and rigid contacts hold, in the solve with what these did last and one correction.
+// Bodies that ODE's joints, motors and rigid contacts hold, in the solve with what these did last and
+// one correction.
 #include <gtest/gtest.h>
 
 #include "ode.h"
@@ -9,7 +10,8 @@ using namespace test;
 
 dJointID ball_joint(Ode &ode, dBodyID a, dBodyID b, Vec at) {
   const dJointID j = dJointCreateBall(ode.world, nullptr);
-  dJointAttach(j, a, b), dJointSetBallAnchor(j, at[0], at[1], at[2]);
+  dJointAttach(j, a, b);
+  dJointSetBallAnchor(j, at[0], at[1], at[2]);
   return j;
 }
 
@@ -67,7 +69,8 @@ TEST(OdeJoints, Chain_ConvergesWithTheStep) {
   EXPECT_NEAR(std::log2(b / c), 1, 0.2);
 }
 
-// A ball that soft bodies ignore falls beside a struck chain: ODE moves it once per sub-step, however often contact is solved again.
+// A ball that soft bodies ignore falls beside a struck chain: ODE moves it once per sub-step, however often
+// contact is solved again.
 TEST(OdeJoints, IgnoredBodyBesideCorrections_FallsAsOdeLetsIt) {
   Ode ode;
   const std::vector<dBodyID> links = chain(ode, 4, 0.1, 0.5, 0, true);
@@ -76,7 +79,8 @@ TEST(OdeJoints, IgnoredBodyBesideCorrections_FallsAsOdeLetsIt) {
   const dGeomID geom = dCreateSphere(ode.space, 0.1);
   dGeomSetBody(geom, stone);
   dfm_ode_geom props{};
-  props.size = sizeof props, props.ignore = 1;
+  props.size = sizeof props;
+  props.ignore = 1;
   ok(dfm_ode_set_geom(ode.adapter, geom, &props));
   constexpr double h = 1e-3;
   const int n = 200;
@@ -85,7 +89,8 @@ TEST(OdeJoints, IgnoredBodyBesideCorrections_FallsAsOdeLetsIt) {
   EXPECT_NEAR(velocity(stone)[2], -9.81 * n * h, 1e-9);
 }
 
-// Two fingers on sliders close on a soft ball with motors, a third motor lifts the palm. Twice the force that friction needs.
+// Two fingers on sliders close on a soft ball with motors, a third motor lifts the palm. Twice the force that
+// friction needs.
 struct Gripper {
   Ode ode;
   dBodyID palm, finger[2];
@@ -95,16 +100,24 @@ struct Gripper {
     constexpr double kMu = 0.5;
     set_friction(ode.soft, kMu);
     BodyOptions o;
-    o.name = "ball", o.young = 6e3, o.poisson = 0.3, o.density = 200, o.damping_stiffness = 0.01, o.damping_mass = 5;
+    o.name = "ball";
+    o.young = 6e3;
+    o.poisson = 0.3;
+    o.density = 200;
+    o.damping_stiffness = 0.01;
+    o.damping_mass = 5;
     ball = make_body(ode.context, ode.soft, "ball", {0.05}, 500, o);
     palm = ode.box({0.2, 0.03, 0.02}, 1, {0, 0, 0.15});
     lift = dJointCreateSlider(ode.world, nullptr);
-    dJointAttach(lift, palm, nullptr), dJointSetSliderAxis(lift, 0, 0, 1), dJointSetSliderParam(lift, dParamFMax, 400);
+    dJointAttach(lift, palm, nullptr);
+    dJointSetSliderAxis(lift, 0, 0, 1);
+    dJointSetSliderParam(lift, dParamFMax, 400);
     for (int k = 0; k < 2; ++k) {
       const double side = k ? 1 : -1;
       finger[k] = ode.box({0.01, 0.04, 0.05}, 0.3, {0.062 * side, 0, 0});
       close[k] = dJointCreateSlider(ode.world, nullptr);
-      dJointAttach(close[k], finger[k], palm), dJointSetSliderAxis(close[k], 1, 0, 0);
+      dJointAttach(close[k], finger[k], palm);
+      dJointSetSliderAxis(close[k], 1, 0, 0);
       dJointSetSliderParam(close[k], dParamVel, -0.5 * side);
       dJointSetSliderParam(close[k], dParamFMax, 2 * measure(ball).mass * 9.81 / (2 * kMu));
     }
@@ -119,7 +132,7 @@ class OdeGripper : public ::testing::TestWithParam<double> {};
 TEST_P(OdeGripper, LiftsABallAndHoldsIt) {
   Gripper g;
   const double h = GetParam();
-  g.ode.run(0.05, h);                      // grip; the ball has fallen by a centimeter at most
+  g.ode.run(0.05, h);  // grip; the ball has fallen by a centimeter at most
   dJointSetSliderParam(g.lift, dParamVel, 0.2);
   g.ode.run(0.5, h);
   dJointSetSliderParam(g.lift, dParamVel, 0);
@@ -139,13 +152,18 @@ TEST(OdeJoints, Feedback_HasTheLoadOfTheSoftBody) {
   set_friction(ode.soft, 0.8);
   const dBodyID plate = ode.box({0.2, 0.2, 0.02}, 1.5, {0, 0, 0});
   const dJointID hold = dJointCreateFixed(ode.world, nullptr);
-  dJointAttach(hold, plate, nullptr), dJointSetFixed(hold);
+  dJointAttach(hold, plate, nullptr);
+  dJointSetFixed(hold);
   dJointFeedback feedback{};
   dJointSetFeedback(hold, &feedback);
   const dfm_body ball = soft_ball(ode, {0.05, 0, 0.122}, {}, 3e4, 30);
   ode.run(0.8);
   double mean = 0, moment = 0;
-  for (int i = 0; i < 100; ++i) ode.step(), mean += feedback.f1[2] / 100, moment += feedback.t1[1] / 100;
+  for (int i = 0; i < 100; ++i) {
+    ode.step();
+    mean += feedback.f1[2] / 100;
+    moment += feedback.t1[1] / 100;
+  }
   const double weight = measure(ball).mass * 9.81;
   EXPECT_NEAR(mean, 1.5 * 9.81 + weight, 0.01 * weight);
   EXPECT_NEAR(moment, -weight * measure(ball).com[0], 0.02 * weight * 0.05);

@@ -1,4 +1,5 @@
-// What the caller does to ODE's world between two steps: things come, go, move, fall asleep, and soft bodies take notice.
+// What the caller does to ODE's world between two steps: things come, go, move, fall asleep, and soft
+// bodies take notice.
 #include <gtest/gtest.h>
 
 #include <cstring>
@@ -11,7 +12,8 @@ using namespace test;
 
 double height(dfm_body b) { return measure(b).com[2]; }
 
-// A soft ball at rest on a rigid plate of 4 kg that a hinge-free column would not hold: it stands on ODE's plane.
+// A soft ball at rest on a rigid plate of 4 kg that a hinge-free column would not hold: it stands
+// on ODE's plane.
 struct OnAPlate {
   Ode ode;
   dGeomID floor;
@@ -28,9 +30,12 @@ struct OnAPlate {
 
 // On the bed; on a hinge a weight that has no geom, which is returned.
 dBodyID box_with_a_weight(Ode &ode) {
-  const dBodyID box = ode.box({0.08, 0.08, 0.05}, 2, {0.15, 0.15, 0.16}), weight = ode.body(0.5, {1e-3, 1e-3, 1e-3}, {0.15, 0.2, 0.3});
+  const dBodyID box = ode.box({0.08, 0.08, 0.05}, 2, {0.15, 0.15, 0.16});
+  const dBodyID weight = ode.body(0.5, {1e-3, 1e-3, 1e-3}, {0.15, 0.2, 0.3});
   const dJointID hinge = dJointCreateHinge(ode.world, nullptr);
-  dJointAttach(hinge, box, weight), dJointSetHingeAnchor(hinge, 0.15, 0.15, 0.25), dJointSetHingeAxis(hinge, 1, 0, 0);
+  dJointAttach(hinge, box, weight);
+  dJointSetHingeAnchor(hinge, 0.15, 0.15, 0.25);
+  dJointSetHingeAxis(hinge, 1, 0, 0);
   return weight;
 }
 
@@ -44,7 +49,7 @@ TEST(OdeLifecycle, GeomDestroyedWhileTouched_EndsItsContacts) {
   s.ode.step();
   EXPECT_EQ(s.ode.stats().bodies, 0u);
   EXPECT_EQ(s.ode.stats().shapes, 1u);
-  s.ode.run(0.3);                          // down to the plane
+  s.ode.run(0.3);  // down to the plane
   EXPECT_LT(height(s.ball), 0.12);
   EXPECT_GT(height(s.ball), 0.05);
 }
@@ -56,13 +61,14 @@ TEST(OdeLifecycle, BodyDestroyedWhileTouched_LeavesItsGeomInTheWorld) {
   s.ode.run(0.1);
   EXPECT_EQ(s.ode.stats().bodies, 0u);
   EXPECT_EQ(s.ode.stats().shapes, 2u);
-  EXPECT_NEAR(height(s.ball), 0.19, 0.02);   // ODE's rule: a geom without a body stands where it is
+  EXPECT_NEAR(height(s.ball), 0.19, 0.02);  // ODE's rule: a geom without a body stands where it is
   dGeomDestroy(g);
   s.ode.run(0.25);
   EXPECT_LT(height(s.ball), 0.12);
 }
 
-// What stands for ODE's bodies is the adapter's: the caller cannot take it away, and nothing has happened where he tried.
+// What stands for ODE's bodies is the adapter's: the caller cannot take it away, and nothing has happened
+// where he tried.
 TEST(OdeLifecycle, RigidOfTheAdapter_IsNotTheCallersToDestroy) {
   OnAPlate s;
   dfm_rigid r = 0;
@@ -112,10 +118,10 @@ TEST(OdeLifecycle, GeomsThatComeAndChange_AreSeenInTheNextStep) {
   const dGeomID box = dCreateBox(ode.space, 1, 1, 0.02);
   ode.run(0.1);
   EXPECT_GT(height(ball), 0.08);
-  dGeomBoxSetLengths(box, 1, 1, 0.06);     // thicker by 2 cm on each side, at once: pushed out
+  dGeomBoxSetLengths(box, 1, 1, 0.06);  // thicker by 2 cm on each side, at once: pushed out
   ode.run(0.5);
   EXPECT_GT(height(ball), 0.11);
-  dGeomSetPosition(box, 5, 0, -1);         // gone
+  dGeomSetPosition(box, 5, 0, -1);  // gone
   dGeomDestroy(box);
   ode.run(0.1);
   EXPECT_LT(height(ball), 0.1);
@@ -124,7 +130,8 @@ TEST(OdeLifecycle, GeomsThatComeAndChange_AreSeenInTheNextStep) {
 TEST(OdeLifecycle, KinematicBody_LiftsAndFeelsNothing) {
   Ode ode;
   const dBodyID lift = ode.box({0.2, 0.2, 0.05}, 1, {0, 0, -0.05});
-  dBodySetKinematic(lift), dBodySetLinearVel(lift, 0, 0, 0.1);
+  dBodySetKinematic(lift);
+  dBodySetLinearVel(lift, 0, 0, 0.1);
   const dfm_body ball = soft_ball(ode, {0, 0, 0.101}, {0, 0, 0.1}, 3e4, 30);
   ode.run(0.8);
   EXPECT_NEAR(position(lift)[2], -0.05 + 0.08, 1e-12);
@@ -132,10 +139,11 @@ TEST(OdeLifecycle, KinematicBody_LiftsAndFeelsNothing) {
   EXPECT_GT(height(ball), 0.15);
   dBodySetDynamic(lift);
   ode.run(0.1);
-  EXPECT_LT(velocity(lift)[2], -0.5);      // falls, with the ball
+  EXPECT_LT(velocity(lift)[2], -0.5);  // falls, with the ball
 }
 
-// A kinematic body that the caller moves without a velocity, as a geom without a body: the surface comes along within the step.
+// A kinematic body that the caller moves without a velocity, as a geom without a body: the surface comes
+// along within the step.
 TEST(OdeLifecycle, GeomMovedByHand_CarriesByFriction) {
   Ode ode;
   set_friction(ode.soft, 0.9);
@@ -143,7 +151,10 @@ TEST(OdeLifecycle, GeomMovedByHand_CarriesByFriction) {
   dGeomSetPosition(belt, 0, 0, -0.05);
   const dfm_body ball = soft_ball(ode, {0, 0, 0.1}, {}, 3e4, 0);
   ode.run(0.2);
-  for (int i = 1; i <= 400; ++i) dGeomSetPosition(belt, 0.5 * 0.5e-3 * 1e-3 * i * i, 0, -0.05), ode.step();   // 0.5 m/s2
+  for (int i = 1; i <= 400; ++i) {
+    dGeomSetPosition(belt, 0.5 * 0.5e-3 * 1e-3 * i * i, 0, -0.05);
+    ode.step();  // 0.5 m/s2
+  }
   EXPECT_GT(measure(ball).velocity[0], 0.02);
   const dfm_obstacle none = 0;
   dfm_obstacle o = none;
@@ -170,7 +181,7 @@ TEST(OdeLifecycle, DisabledBody_StandsUntilSomethingMeetsIt) {
   dBodyDisable(box);
   const dfm_body ball = soft_ball(ode, {0, 0, 0.25}, {}, 3e4);
   ode.run(0.05);
-  EXPECT_EQ(position(box)[2], 0);          // hangs in the air, as ODE has it
+  EXPECT_EQ(position(box)[2], 0);  // hangs in the air, as ODE has it
   EXPECT_FALSE(dBodyIsEnabled(box));
   ode.run(0.15);
   EXPECT_TRUE(dBodyIsEnabled(box));
@@ -200,10 +211,13 @@ TEST(OdeLifecycle, DisabledBoxOnASoftBed_WakesWhenItsLoadChanges) {
   EXPECT_LT(position(box)[2], rest - 1e-4);
 }
 
-// ODE lets only bodies with joints fall asleep: here those of the contact with its plane. What they carried goes on being carried.
+// ODE lets only bodies with joints fall asleep: here those of the contact with its plane. What they carried
+// goes on being carried.
 TEST(OdeLifecycle, AutoDisabledPlate_SleepsUnderABallAndWakesWithoutIt) {
   Ode ode;
-  dWorldSetAutoDisableFlag(ode.world, 1), dWorldSetAutoDisableSteps(ode.world, 20), dWorldSetAutoDisableTime(ode.world, 0);
+  dWorldSetAutoDisableFlag(ode.world, 1);
+  dWorldSetAutoDisableSteps(ode.world, 20);
+  dWorldSetAutoDisableTime(ode.world, 0);
   set_friction(ode.soft, 0.8);
   dCreatePlane(ode.space, 0, 0, 1, 0);
   const dBodyID plate = ode.box({0.2, 0.2, 0.05}, 4, {0, 0, 0.05});
@@ -219,30 +233,41 @@ TEST(OdeLifecycle, AutoDisabledPlate_SleepsUnderABallAndWakesWithoutIt) {
   EXPECT_FALSE(dBodyIsEnabled(plate));
   ok(dfm_body_destroy(ball));
   bool woke = false;
-  for (int i = 0; i < 50; ++i) ode.step(), woke |= bool(dBodyIsEnabled(plate));
+  for (int i = 0; i < 50; ++i) {
+    ode.step();
+    woke |= bool(dBodyIsEnabled(plate));
+  }
   EXPECT_TRUE(woke);
 }
 
-// What hangs on something awake does not sleep, idle as it is: asleep it would stand still in the solve while ODE moves it without its load.
+// What hangs on something awake does not sleep, idle as it is: asleep it would stand still in the solve while
+// ODE moves it without its load.
 TEST(OdeLifecycle, PlateWithASwingingPendulum_StaysAwakeUntilThatHangsStill) {
   Ode ode;
-  dWorldSetAutoDisableFlag(ode.world, 1), dWorldSetAutoDisableSteps(ode.world, 20), dWorldSetAutoDisableTime(ode.world, 0);
+  dWorldSetAutoDisableFlag(ode.world, 1);
+  dWorldSetAutoDisableSteps(ode.world, 20);
+  dWorldSetAutoDisableTime(ode.world, 0);
   dCreatePlane(ode.space, 0, 0, 1, 0);
-  const dBodyID plate = ode.box({0.2, 0.2, 0.05}, 4, {0, 0, 0.05}), bob = ode.body(0.01, {1e-5, 1e-5, 1e-5}, {0.3, 0.03, -0.1});
+  const dBodyID plate = ode.box({0.2, 0.2, 0.05}, 4, {0, 0, 0.05});
+  const dBodyID bob = ode.body(0.01, {1e-5, 1e-5, 1e-5}, {0.3, 0.03, -0.1});
   soft_ball(ode, {0, 0, 0.203}, {}, 3e4, 30);
   const dJointID hinge = dJointCreateHinge(ode.world, nullptr);
-  dJointAttach(hinge, plate, bob), dJointSetHingeAnchor(hinge, 0.3, 0, 0.05), dJointSetHingeAxis(hinge, 1, 0, 0);
+  dJointAttach(hinge, plate, bob);
+  dJointSetHingeAnchor(hinge, 0.3, 0, 0.05);
+  dJointSetHingeAxis(hinge, 1, 0, 0);
   for (int i = 0; i < 800; ++i) {
     ode.step();
     ASSERT_TRUE(dBodyIsEnabled(plate) && dBodyIsEnabled(bob)) << i;
   }
-  dBodySetAngularDamping(bob, 0.2), dBodySetAngularDampingThreshold(bob, 0);
+  dBodySetAngularDamping(bob, 0.2);
+  dBodySetAngularDampingThreshold(bob, 0);
   ode.run(1);
   EXPECT_FALSE(dBodyIsEnabled(plate));
   EXPECT_FALSE(dBodyIsEnabled(bob));
 }
 
-// A sleeping plate that a soft ball leans on is struck by a rigid one: in that very sub-step it takes the impulses of both.
+// A sleeping plate that a soft ball leans on is struck by a rigid one: in that very sub-step it takes the
+// impulses of both.
 TEST(OdeLifecycle, SleepingPlateStruckByARigidBall_IsAwakeInTheSolveAtOnce) {
   Ode ode({0, 0, 0});
   const dfm_body ball = soft_ball(ode, {0, 0, 0}, {0, 0, -0.005});
@@ -252,10 +277,14 @@ TEST(OdeLifecycle, SleepingPlateStruckByARigidBall_IsAwakeInTheSolveAtOnce) {
   dBodyDisable(plate);
   for (int i = 0; i < 200 && !dBodyIsEnabled(plate); ++i) {
     Momenta start, end;
-    add(start, ball), add(start, plate), add(start, striker);
+    add(start, ball);
+    add(start, plate);
+    add(start, striker);
     ode.step();
     if (!dBodyIsEnabled(plate)) continue;
-    add(end, ball), add(end, plate), add(end, striker);
+    add(end, ball);
+    add(end, plate);
+    add(end, striker);
     dfm_rigid rigid = 0;
     ok(dfm_ode_rigid(ode.adapter, plate, &rigid));
     double force[3], moment[3];
@@ -273,8 +302,10 @@ TEST(OdeLifecycle, ForcesOfTheCaller_ActOverTheWholeStep) {
   soft_ball(ode, {5, 0, 0}, {}, 1e6);
   const dBodyID free = ode.ball(0.1, 2, {0, 0, 0}), other = ode.body(2, {1, 1, 1}, {1, 0, 0});
   const dJointID tie = dJointCreateFixed(ode.world, nullptr);
-  dJointAttach(tie, free, other), dJointSetFixed(tie);
-  dBodyAddForce(free, 3, 0, 0), dBodyAddForce(other, 1, 0, 0);   // `other` has no geom: it is known through the joint
+  dJointAttach(tie, free, other);
+  dJointSetFixed(tie);
+  dBodyAddForce(free, 3, 0, 0);
+  dBodyAddForce(other, 1, 0, 0);  // `other` has no geom: it is known through the joint
   ode.step(0.02);
   ASSERT_GT(stats(ode.soft).last_substeps, 5u);
   EXPECT_NEAR(velocity(free)[0], 0.02, 1e-9);
@@ -292,9 +323,11 @@ TEST(OdeLifecycle, MassOfALiveBody_CountsFromTheNextStep) {
   dMassSetSphereTotal(&m, 50, 0.1);
   dBodySetMass(b, &m);
   Momenta start, end;
-  add(start, ball), add(start, b);
+  add(start, ball);
+  add(start, b);
   ode.run(0.1);
-  add(end, ball), add(end, b);
+  add(end, ball);
+  add(end, b);
   EXPECT_LT(velocity(b)[2], -0.05);
   EXPECT_LT(apart(start.linear, end.linear), 1e-12 * start.size);
 }
@@ -316,24 +349,31 @@ TEST(OdeLifecycle, Restore_TakesTheBodiesBack) {
   EXPECT_EQ(position(box), there);
 }
 
-// Auto-disable counts in the state that is restored: the plate falls asleep at the same step again, and one that slept sleeps.
+// Auto-disable counts in the state that is restored: the plate falls asleep at the same step again, and one
+// that slept sleeps.
 TEST(OdeLifecycle, Restore_TakesSleepAndItsCountersBack) {
   Ode ode;
-  dWorldSetAutoDisableFlag(ode.world, 1), dWorldSetAutoDisableSteps(ode.world, 40), dWorldSetAutoDisableTime(ode.world, 0);
+  dWorldSetAutoDisableFlag(ode.world, 1);
+  dWorldSetAutoDisableSteps(ode.world, 40);
+  dWorldSetAutoDisableTime(ode.world, 0);
   set_friction(ode.soft, 0.8);
   dCreatePlane(ode.space, 0, 0, 1, 0);
   const dBodyID plate = ode.box({0.2, 0.2, 0.05}, 4, {0, 0, 0.05});
   soft_ball(ode, {0, 0, 0.203}, {}, 3e4, 30);
   std::string before = snapshot(ode.soft), awake;
   int fell = 0;
-  for (; dBodyIsEnabled(plate) && fell < 2000; ++fell) awake = std::move(before), ode.run(0.01), before = snapshot(ode.soft);
+  for (; dBodyIsEnabled(plate) && fell < 2000; ++fell) {
+    awake = std::move(before);
+    ode.run(0.01);
+    before = snapshot(ode.soft);
+  }
   ASSERT_LT(fell, 2000);
   const std::string asleep = std::move(before);
   ode.run(0.02);
   const uint64_t hash = dfm_world_hash(ode.soft);
   for (const bool slept : {false, true}) {
     const std::string &shot = slept ? asleep : awake;
-    dBodyEnable(plate);                    // whatever ODE's bodies are at
+    dBodyEnable(plate);  // whatever ODE's bodies are at
     ok(dfm_world_restore(ode.soft, shot.data(), shot.size()));
     ode.run(slept ? 0.02 : 0.03);
     EXPECT_FALSE(dBodyIsEnabled(plate));
@@ -341,7 +381,8 @@ TEST(OdeLifecycle, Restore_TakesSleepAndItsCountersBack) {
   }
 }
 
-// A body without a geom is not the dfm_world's; the adapter's snapshot has it, with dWorldQuickStep's random order.
+// A body without a geom is not the dfm_world's; the adapter's snapshot has it, with
+// dWorldQuickStep's random order.
 TEST(OdeLifecycle, SnapshotOfTheAdapter_HasBodiesWithoutGeomsToo) {
   Ode ode({0, 0, -9.81}, DFM_ODE_QUICK);
   soft_bed(ode);
@@ -362,7 +403,8 @@ TEST(OdeLifecycle, SnapshotOfTheAdapter_HasBodiesWithoutGeomsToo) {
   ode.run(0.1);
   EXPECT_EQ(dfm_world_hash(ode.soft), hash);
   EXPECT_EQ(position(weight), there);
-  for (const size_t wrong : {size_t{0}, size_t{40}, bytes - 8, bytes - 1}) EXPECT_EQ(dfm_ode_restore(ode.adapter, shot.data(), wrong), DFM_E_FORMAT) << wrong;
+  for (const size_t wrong : {size_t{0}, size_t{40}, bytes - 8, bytes - 1})
+    EXPECT_EQ(dfm_ode_restore(ode.adapter, shot.data(), wrong), DFM_E_FORMAT) << wrong;
   EXPECT_EQ(position(weight), there);
   shot[60] ^= 1;
   EXPECT_EQ(dfm_ode_restore(ode.adapter, shot.data(), bytes), DFM_E_FORMAT);
@@ -401,16 +443,21 @@ TEST(OdeLifecycle, SnapshotThatIsDamaged_IsRefusedAndChangesNothing) {
     std::memcpy(&bad[kChecksum], &sum, sizeof sum);
     return bad;
   };
-  const size_t friction = bytes - 2 * sizeof(double), body = friction - kBody;   // the weight's numbers; it has no geom
+  // the weight's numbers; it has no geom
+  const size_t friction = bytes - 2 * sizeof(double), body = friction - kBody;
   double x = 0;
   std::memcpy(&x, &good[body], sizeof x);
-  ok(dfm_ode_restore(ode.adapter, forged(body, x).data(), bytes));   // the seal itself is right
+  ok(dfm_ode_restore(ode.adapter, forged(body, x).data(), bytes));  // the seal itself is right
   ok(dfm_ode_restore(ode.adapter, good.data(), bytes));
   ode.run(0.05);
   ASSERT_EQ(dfm_world_hash(ode.soft), hash);
   for (size_t k = 0; k < 16; ++k) refused(forged(body + 8 * k, NAN), "out of range");
-  refused(forged(body + 8 * 13, 2), "out of range"), refused(forged(body + 8 * 14, -1), "out of range"), refused(forged(body + 8 * 3, 40), "out of range");
-  refused(forged(body - 8, 0.5), "out of range"), refused(forged(friction + 8, INFINITY), "out of range"), refused(forged(friction, 3), "another law");
+  refused(forged(body + 8 * 13, 2), "out of range");
+  refused(forged(body + 8 * 14, -1), "out of range");
+  refused(forged(body + 8 * 3, 40), "out of range");
+  refused(forged(body - 8, 0.5), "out of range");
+  refused(forged(friction + 8, INFINITY), "out of range");
+  refused(forged(friction, 3), "another law");
 }
 
 TEST(OdeLifecycle, PlainWorldStep_IsRefused) {
@@ -439,9 +486,11 @@ TEST(OdeLifecycle, WrongUse_IsOneSentence) {
   refused(DFM_E_STATE, "adapter already");
   d.real_bytes = 4;
   refused(DFM_E_UNSUPPORTED, "4 bytes");
-  d.real_bytes = 8, d.version = "0.13.1";
+  d.real_bytes = 8;
+  d.version = "0.13.1";
   refused(DFM_E_UNSUPPORTED, "0.13.1");
-  d.version = dODE_VERSION, d.most_contacts = 0;
+  d.version = dODE_VERSION;
+  d.most_contacts = 0;
   refused(DFM_E_ARG, "most_contacts");
   EXPECT_EQ(dfm_ode_step(ode.adapter, 0), DFM_E_ARG);
   EXPECT_EQ(dfm_ode_step(12345, 1e-3), DFM_E_HANDLE);

@@ -33,8 +33,8 @@ TEST(OdeMomentum, CollisionWithATumblingBox_KeepsBothMomenta) {
   EXPECT_EQ(ode.stats().corrections, 0u);
 }
 
-// What ODE and the contact solve book is one impulse, not a force that comes a step later: the momentum that the soft ball loses within one step has
-// arrived in the rigid one at the end of that step.
+// What ODE and the contact solve book is one impulse, not a force that comes a step later: the momentum that
+// the soft ball loses within one step has arrived in the rigid one at the end of that step.
 TEST(OdeMomentum, EachStepOfAnImpact_BooksTheSameImpulseOnBothSides) {
   Ode ode({0, 0, 0});
   const dfm_body ball = soft_ball(ode, {0, 0, 0.3}, {0, 0, -3});
@@ -58,14 +58,15 @@ TEST(OdeMomentum, BodyOfThreeGeoms_AnswersAsOne) {
   const dBodyID bar = ode.body(1.5, {0.01, 0.03, 0.03}, {0, 0, 0.15});
   for (const double x : {-0.15, 0.0, 0.15}) {
     const dGeomID g = dCreateSphere(ode.space, 0.05);
-    dGeomSetBody(g, bar), dGeomSetOffsetPosition(g, x, 0, 0);
+    dGeomSetBody(g, bar);
+    dGeomSetOffsetPosition(g, x, 0, 0);
   }
   const Momenta start = total(ball, {bar});
   ode.run(0.15);
   const Momenta end = total(ball, {bar});
   EXPECT_EQ(ode.stats().bodies, 1u);
   EXPECT_EQ(ode.stats().shapes, 3u);
-  EXPECT_GT(norm(vec(dBodyGetAngularVel(bar))), 1);   // struck off its center
+  EXPECT_GT(norm(vec(dBodyGetAngularVel(bar))), 1);  // struck off its center
   EXPECT_LT(apart(start.linear, end.linear), 1e-12 * start.size);
   EXPECT_LT(apart(start.angular, end.angular), 1e-12 * start.size);
 }
@@ -77,7 +78,9 @@ TEST(OdeMomentum, SkewInertia_IsTheMatrixThatOdeHas) {
   const dBodyID b = dBodyCreate(ode.world);
   dMass m;
   dMassSetParameters(&m, 1, 0, 0, 0, 0.010, 0.012, 0.014, 0.002, -0.001, 0.003);
-  dBodySetMass(b, &m), dBodySetPosition(b, 0, 0, 0.09), dBodySetAngularVel(b, 0.3, -0.5, 0.2);
+  dBodySetMass(b, &m);
+  dBodySetPosition(b, 0, 0, 0.09);
+  dBodySetAngularVel(b, 0.3, -0.5, 0.2);
   dGeomSetBody(dCreateBox(ode.space, 0.2, 0.2, 0.1), b);
   const Momenta start = total(ball, {b});
   ode.run(0.15);

@@ -1,4 +1,5 @@
-// Sets on the host "ode" that bring nothing but their defs: their joints mean and say what those of the builtin host do.
+// Sets on the host "ode" that bring nothing but their defs: their joints mean and say what those of the
+// builtin host do.
 #include <gtest/gtest.h>
 
 #include "ode.h"
@@ -10,8 +11,13 @@ using namespace test;
 // Without a shape: rigid bodies of ODE touch each other, the builtin host's do not.
 dfm_rigid_def part(const char *name, double mass, Vec inertia, Vec position) {
   dfm_rigid_def d = dfm_rigid_def_default();
-  d.name = name, d.shape = DFM_SHAPE_NONE, d.mass = mass;
-  for (int k = 0; k < 3; ++k) d.inertia[k] = inertia[size_t(k)], d.pose.position[k] = position[size_t(k)];
+  d.name = name;
+  d.shape = DFM_SHAPE_NONE;
+  d.mass = mass;
+  for (int k = 0; k < 3; ++k) {
+    d.inertia[k] = inertia[size_t(k)];
+    d.pose.position[k] = position[size_t(k)];
+  }
   return d;
 }
 // A fixed body that stands askew: 0.8 rad about (1, 2, 2) / 3.
@@ -23,7 +29,9 @@ dfm_rigid_def stand(const char *name, Vec position) {
   return d;
 }
 dfm_joint_def driven(dfm_joint_def j, double velocity, double max) {
-  j.motor = 1, j.velocity = velocity, j.max = max;
+  j.motor = 1;
+  j.velocity = velocity;
+  j.max = max;
   return j;
 }
 
@@ -32,28 +40,37 @@ enum class With { world, still, still_first, moving };
 constexpr With kAll[] = {With::world, With::still, With::still_first, With::moving};
 constexpr const char *kNames[] = {"world", "still", "still_first", "moving"};
 
-// An arm of 2 kg whose center is 0.3 m along x from its joint in the origin. A body that moves in the arm's stead hangs on the world by a fixed joint.
+// An arm of 2 kg whose center is 0.3 m along x from its joint in the origin. A body that moves in the arm's
+// stead hangs on the world by a fixed joint.
 struct Rig {
   dfm_world world;
   std::vector<dfm_rigid> bodies;
-  Rig(dfm_context *c, const char *host, With with, uint32_t type, Vec axis, double velocity, double max, Vec gravity = {0, 0, -9.81}) {
+  Rig(dfm_context *c, const char *host, With with, uint32_t type, Vec axis, double velocity, double max,
+      Vec gravity = {0, 0, -9.81}) {
     world = make_world(c, gravity);
     const dfm_rigid_def arm = part("arm", 2, {0.02, 0.03, 0.04}, {0.3, 0, 0});
     const Vec anchor = {};
     switch (with) {
-      case With::world: bodies = create(world, {arm}, {driven(joint(type, 0, DFM_RIGID_WORLD, anchor, axis), velocity, max)}, host); return;
+      case With::world:
+        bodies = create(world, {arm}, {driven(joint(type, 0, DFM_RIGID_WORLD, anchor, axis), velocity, max)},
+                        host);
+        return;
       case With::still:
-        bodies = create(world, {arm, stand("stand", {-0.1, 0.2, 0})}, {driven(joint(type, 0, 1, anchor, axis), velocity, max)}, host);
+        bodies = create(world, {arm, stand("stand", {-0.1, 0.2, 0})},
+                        {driven(joint(type, 0, 1, anchor, axis), velocity, max)}, host);
         return;
       case With::still_first:
-        bodies = create(world, {stand("stand", {-0.1, 0.2, 0}), arm}, {driven(joint(type, 0, 1, anchor, axis), velocity, max)}, host);
+        bodies = create(world, {stand("stand", {-0.1, 0.2, 0}), arm},
+                        {driven(joint(type, 0, 1, anchor, axis), velocity, max)}, host);
         return;
       case With::moving: break;
     }
     dfm_rigid_def base = stand("base", {-0.1, 0.2, 0});
     base.fixed = 0;
     bodies = create(world, {base, arm},
-                    {driven(joint(type, 1, 0, anchor, axis), velocity, max), joint(DFM_JOINT_FIXED, 0, DFM_RIGID_WORLD, anchor)}, host);
+                    {driven(joint(type, 1, 0, anchor, axis), velocity, max),
+                     joint(DFM_JOINT_FIXED, 0, DFM_RIGID_WORLD, anchor)},
+                    host);
   }
   JointReading read() const { return reading(bodies[0], 0); }
 };
@@ -67,10 +84,12 @@ class OdeOwnWorld : public ::testing::TestWithParam<With> {
 };
 
 // Runs both hosts side by side and compares what the joint says; the bounds hold over `seconds`.
-void compare(dfm_context *c, With with, uint32_t type, Vec axis, double velocity, double max, double seconds, JointReading within) {
+void compare(dfm_context *c, With with, uint32_t type, Vec axis, double velocity, double max, double seconds,
+             JointReading within) {
   const Rig ode(c, "ode", with, type, axis, velocity, max), own(c, nullptr, with, type, axis, velocity, max);
   for (double t = 0; t < seconds; t += 0.02) {
-    run(ode.world, 0.02, 1e-3), run(own.world, 0.02, 1e-3);
+    run(ode.world, 0.02, 1e-3);
+    run(own.world, 0.02, 1e-3);
     const JointReading a = ode.read(), b = own.read();
     ASSERT_NEAR(a.position, b.position, within.position) << t;
     ASSERT_NEAR(a.rate, b.rate, within.rate) << t;
@@ -80,8 +99,9 @@ void compare(dfm_context *c, With with, uint32_t type, Vec axis, double velocity
 
 }  // namespace
 
-// A motor that holds an arm still carries its weight at its lever, 0.3 m: about the axis, not about the arm's center, where the hinge's own force turns too.
-// `body` against `with`: where the arm is the second body, the motor turns the other way round to carry it.
+// A motor that holds an arm still carries its weight at its lever, 0.3 m: about the axis, not about the arm's
+// center, where the hinge's own force turns too. `body` against `with`: where the arm is the second body, the
+// motor turns the other way round to carry it.
 TEST_P(OdeOwnWorld, HingeThatHoldsAnArm_SaysItsMomentAboutTheHinge) {
   for (const char *host : {"ode", "builtin"}) {
     const Rig rig(c, host, GetParam(), DFM_JOINT_HINGE, kAcross, 0, 50);
@@ -101,10 +121,12 @@ TEST_P(OdeOwnWorld, SliderThatHoldsAnArm_SaysItsForceAlongTheAxis) {
   }
 }
 
-// The motor's direction: body against with, about the axis as the def has it in the world, however the bodies stand or which of them is fixed.
+// The motor's direction: body against with, about the axis as the def has it in the world, however the bodies
+// stand or which of them is fixed.
 TEST_P(OdeOwnWorld, HingeMotor_TurnsAsOnTheBuiltinHost) {
   for (const double sign : {1.0, -1.0}) {
-    compare(c, GetParam(), DFM_JOINT_HINGE, kSkew, 2 * sign, 50, 0.4, {0.005, 0.01, 0.05});   // moments to 8 N m
+    // moments to 8 N m
+    compare(c, GetParam(), DFM_JOINT_HINGE, kSkew, 2 * sign, 50, 0.4, {0.005, 0.01, 0.05});
     const Rig rig(c, "ode", GetParam(), DFM_JOINT_HINGE, kSkew, 2 * sign, 50);
     run(rig.world, 0.4, 1e-3);
     EXPECT_NEAR(rig.read().position, 0.8 * sign, 0.01);
@@ -132,10 +154,12 @@ TEST_P(OdeOwnWorld, MotorAtItsLimit_SaysItsLimit) {
 
 // Past half a turn the angle goes on from the other side.
 TEST_P(OdeOwnWorld, HingeAngle_IsWithinHalfATurn) {
-  const Rig ode(c, "ode", GetParam(), DFM_JOINT_HINGE, kSkew, 5, 200), own(c, nullptr, GetParam(), DFM_JOINT_HINGE, kSkew, 5, 200);
+  const Rig ode(c, "ode", GetParam(), DFM_JOINT_HINGE, kSkew, 5, 200),
+      own(c, nullptr, GetParam(), DFM_JOINT_HINGE, kSkew, 5, 200);
   bool below = false;
   for (int i = 0; i < 40; ++i) {
-    run(ode.world, 0.04, 1e-3), run(own.world, 0.04, 1e-3);
+    run(ode.world, 0.04, 1e-3);
+    run(own.world, 0.04, 1e-3);
     const double a = ode.read().position, b = own.read().position;
     ASSERT_NEAR(std::remainder(a - b, 2 * 3.141592653589793), 0, 0.02) << i;
     ASSERT_LE(std::fabs(a), 3.1416);
@@ -143,9 +167,11 @@ TEST_P(OdeOwnWorld, HingeAngle_IsWithinHalfATurn) {
   }
   EXPECT_TRUE(below);
 }
-INSTANTIATE_TEST_SUITE_P(All, OdeOwnWorld, ::testing::ValuesIn(kAll), [](const auto &p) { return kNames[int(p.param)]; });
+INSTANTIATE_TEST_SUITE_P(All, OdeOwnWorld, ::testing::ValuesIn(kAll),
+                         [](const auto &p) { return kNames[int(p.param)]; });
 
-// Two arms on driven hinges, on a fixed body that stands askew; a soft ball under one of them, on it a pile that also leans on the fixed body.
+// Two arms on driven hinges, on a fixed body that stands askew; a soft ball under one of them, on it a pile
+// that also leans on the fixed body.
 namespace {
 
 struct Machine {
@@ -158,14 +184,22 @@ struct Machine {
     set_friction(world, 0.5);
     add_plane(world, "floor", {0, 0, -0.25});
     BodyOptions o;
-    o.name = "soft", o.young = 2e4, o.damping_stiffness = 2e-3, o.position = {0.3, 0, -0.152};
+    o.name = "soft";
+    o.young = 2e4;
+    o.damping_stiffness = 2e-3;
+    o.position = {0.3, 0, -0.152};
     make_body(c, world, "ball", {0.1}, 200, o);
-    dfm_rigid_def post = stand("post", {0, 0.1, 0.1}), lying = box("lying", {0.05, 0.05, 0.05}, 0.4, {0.11, 0.02, 0.0705});
-    post.shape = DFM_SHAPE_BOX, post.half_size[0] = post.half_size[1] = post.half_size[2] = 0.05;
-    lying.velocity[0] = -0.3, lying.spin[2] = 2;
+    dfm_rigid_def post = stand("post", {0, 0.1, 0.1});
+    dfm_rigid_def lying = box("lying", {0.05, 0.05, 0.05}, 0.4, {0.11, 0.02, 0.0705});
+    post.shape = DFM_SHAPE_BOX;
+    post.half_size[0] = post.half_size[1] = post.half_size[2] = 0.05;
+    lying.velocity[0] = -0.3;
+    lying.spin[2] = 2;
     bodies = create(world,
-                    {box("upper", {0.15, 0.04, 0.02}, 1, {0.2, 0, 0}), post, box("lower", {0.15, 0.04, 0.02}, 1, {0.55, 0, 0}), lying,
-                     box("top", {0.06, 0.03, 0.02}, 0.2, {0.13, 0.02, 0.141}), box("end", {0.03, 0.03, 0.03}, 0.2, {0.6, 0, 0.0505})},
+                    {box("upper", {0.15, 0.04, 0.02}, 1, {0.2, 0, 0}), post,
+                     box("lower", {0.15, 0.04, 0.02}, 1, {0.55, 0, 0}), lying,
+                     box("top", {0.06, 0.03, 0.02}, 0.2, {0.13, 0.02, 0.141}),
+                     box("end", {0.03, 0.03, 0.03}, 0.2, {0.6, 0, 0.0505})},
                     {driven(joint(DFM_JOINT_HINGE, 1, 0, {0, 0, 0}, {0, 1, 0}), 0, 12),
                      driven(joint(DFM_JOINT_HINGE, 2, 0, {0.375, 0, 0}, {0, 1, 0}), -0.5, 4)},
                     "ode");
@@ -175,12 +209,13 @@ struct Machine {
 
 }  // namespace
 
-// After a restore joints say what they said then, before any step, in this world and in another one; and both go on with the same bits.
+// After a restore joints say what they said then, before any step, in this world and in another one; and both
+// go on with the same bits.
 TEST(OdeOwnWorldSnapshot, Restored_SaysWhatTheJointsSaidAndGoesOnBitByBit) {
   Machine m;
   run(m.world, 0.15, 1e-3);
   ASSERT_GT(stats(m.world).contacts, 0u);
-  EXPECT_GT(state(m.bodies[4]).velocity[2], -0.1);   // carried by what lies below
+  EXPECT_GT(state(m.bodies[4]).velocity[2], -0.1);  // carried by what lies below
   const std::string shot = snapshot(m.world);
   const std::vector<JointReading> then = m.read();
   run(m.world, 0.15, 1e-3);
@@ -205,7 +240,8 @@ TEST(OdeOwnWorldSnapshot, SetState_IsWhatTheJointSays) {
   const Rig rig(c, "ode", With::still, DFM_JOINT_SLIDER, {1, 0, 0}, 0, 50, {0, 0, 0});
   run(rig.world, 0.01, 1e-3);
   dfm_rigid_state s = state(rig.bodies[0]);
-  s.position[0] += 0.25, s.velocity[0] = 0.5;
+  s.position[0] += 0.25;
+  s.velocity[0] = 0.5;
   ok(dfm_rigid_set_state(rig.bodies[0], &s));
   EXPECT_NEAR(rig.read().position, 0.25, 1e-9);
   EXPECT_NEAR(rig.read().rate, 0.5, 1e-9);

@@ -9,12 +9,12 @@ namespace {
 
 using namespace test;
 
-constexpr double kTop = 0.2;   // every stand ends at this height, flat or round
+constexpr double kTop = 0.2;  // every stand ends at this height, flat or round
 
 struct Stand {
   const char *name;
   std::function<dGeomID(Ode &)> make;
-  std::function<double(Vec)> outside;   // distance of a point from the shape, below the top
+  std::function<double(Vec)> outside;  // distance of a point from the shape, below the top
 };
 
 double above_plane(Vec p) { return p[2] - kTop; }
@@ -25,18 +25,20 @@ dGeomID at(dGeomID g, double z) {
   dGeomSetPosition(g, 0, 0, z);
   return g;
 }
-dGeomID lying(dGeomID g, double z) {      // axis along x
+dGeomID lying(dGeomID g, double z) {  // axis along x
   dQuaternion q = {std::sqrt(0.5), 0, std::sqrt(0.5), 0};
   dGeomSetQuaternion(g, q);
   return at(g, z);
 }
 
 // A table of eight points whose triangles ODE keeps by reference.
-const double kTable[8][4] = {{-0.3, -0.3, -0.1, 0}, {0.3, -0.3, -0.1, 0}, {0.3, 0.3, -0.1, 0}, {-0.3, 0.3, -0.1, 0},
-                             {-0.3, -0.3, 0.1, 0}, {0.3, -0.3, 0.1, 0}, {0.3, 0.3, 0.1, 0}, {-0.3, 0.3, 0.1, 0}};
-const dTriIndex kFaces[36] = {0, 2, 1, 0, 3, 2, 4, 5, 6, 4, 6, 7, 0, 1, 5, 0, 5, 4, 1, 2, 6, 1, 6, 5, 2, 3, 7, 2, 7, 6, 3, 0, 4, 3, 4, 7};
+const double kTable[8][4] = {{-0.3, -0.3, -0.1, 0}, {0.3, -0.3, -0.1, 0}, {0.3, 0.3, -0.1, 0},
+                             {-0.3, 0.3, -0.1, 0},  {-0.3, -0.3, 0.1, 0}, {0.3, -0.3, 0.1, 0},
+                             {0.3, 0.3, 0.1, 0},    {-0.3, 0.3, 0.1, 0}};
+const dTriIndex kFaces[36] = {0, 2, 1, 0, 3, 2, 4, 5, 6, 4, 6, 7, 0, 1, 5, 0, 5, 4,
+                              1, 2, 6, 1, 6, 5, 2, 3, 7, 2, 7, 6, 3, 0, 4, 3, 4, 7};
 dTriMeshDataID table_data() {
-  static const dTriMeshDataID data = [] {   // of all stands
+  static const dTriMeshDataID data = [] {  // of all stands
     const dTriMeshDataID made = dGeomTriMeshDataCreate();
     dGeomTriMeshDataBuildDouble(made, kTable, sizeof kTable[0], 8, kFaces, 36, 3 * sizeof(dTriIndex));
     return made;
@@ -48,7 +50,8 @@ dTriMeshDataID table_data() {
 #pragma GCC diagnostic ignored "-Wdeprecated-declarations"
 dGeomID transformed(Ode &o) {
   const dGeomID outer = dCreateGeomTransform(o.space), inner = dCreateBox(nullptr, 0.6, 0.6, 0.2);
-  dGeomTransformSetCleanup(outer, 1), dGeomTransformSetGeom(outer, inner);
+  dGeomTransformSetCleanup(outer, 1);
+  dGeomTransformSetGeom(outer, inner);
   dGeomSetPosition(inner, 0, 0, -0.4);
   return at(outer, kTop + 0.3);
 }
@@ -58,15 +61,22 @@ const Stand kStands[] = {
     {"box", [](Ode &o) { return at(dCreateBox(o.space, 0.6, 0.6, 0.2), kTop - 0.1); }, above_plane},
     {"sphere", [](Ode &o) { return at(dCreateSphere(o.space, 0.5), kTop - 0.5); }, from_center},
     {"capsule", [](Ode &o) { return lying(dCreateCapsule(o.space, 0.5, 1), kTop - 0.5); }, from_axis},
-    {"cylinder_standing", [](Ode &o) { return at(dCreateCylinder(o.space, 0.4, 0.3), kTop - 0.15); }, above_plane},
-    {"cylinder_lying", [](Ode &o) { return lying(dCreateCylinder(o.space, 0.5, 1), kTop - 0.5); }, [](Vec p) { return from_axis(p) + 0.001; }},
-    {"trimesh", [](Ode &o) { return at(dCreateTriMesh(o.space, table_data(), nullptr, nullptr, nullptr), kTop - 0.1); }, above_plane},
+    {"cylinder_standing", [](Ode &o) { return at(dCreateCylinder(o.space, 0.4, 0.3), kTop - 0.15); },
+     above_plane},
+    {"cylinder_lying", [](Ode &o) { return lying(dCreateCylinder(o.space, 0.5, 1), kTop - 0.5); },
+     [](Vec p) { return from_axis(p) + 0.001; }},
+    {"trimesh",
+     [](Ode &o) { return at(dCreateTriMesh(o.space, table_data(), nullptr, nullptr, nullptr), kTop - 0.1); },
+     above_plane},
     {"transform", transformed, above_plane},
-    {"nested", [](Ode &o) {
+    {"nested",
+     [](Ode &o) {
        const dSpaceID inner = dSimpleSpaceCreate(o.space);
        return at(dCreateBox(dHashSpaceCreate(inner), 0.6, 0.6, 0.2), kTop - 0.1);
-     }, above_plane},
-    {"plane", [](Ode &o) { return dCreatePlane(o.space, 0, 0, 1, kTop); }, above_plane},   // the last one: it has no body
+     },
+     above_plane},
+    // the last one: it has no body
+    {"plane", [](Ode &o) { return dCreatePlane(o.space, 0, 0, 1, kTop); }, above_plane},
 };
 
 class OdeStand : public ::testing::TestWithParam<Stand> {};
@@ -92,10 +102,11 @@ TEST_P(OdeStand, OfTheWorld_CarriesABall) {
   ode.run(0.25);
   EXPECT_GT(stats(ode.soft).contacts, 0u);
   EXPECT_GT(lowest(ball, GetParam().outside), 0);
-  EXPECT_LT(lowest(ball, GetParam().outside), 2e-3);   // not above something larger than the geom
+  EXPECT_LT(lowest(ball, GetParam().outside), 2e-3);  // not above something larger than the geom
 }
 
-// The same geom on a heavy body that ODE lets fall: the ball in free fall beside it is pushed by nothing but the body.
+// The same geom on a heavy body that ODE lets fall: the ball in free fall beside it is pushed by
+// nothing but the body.
 TEST_P(OdeSolid, OfABody_PushesWithItsMass) {
   Ode ode({0, 0, 0});
   const dGeomID g = GetParam().make(ode);
@@ -103,12 +114,16 @@ TEST_P(OdeSolid, OfABody_PushesWithItsMass) {
   const Vec was = vec(dGeomGetPosition(g));
   dQuaternion q;
   dGeomGetQuaternion(g, q);
-  dGeomSetBody(g, b), dGeomSetOffsetWorldPosition(g, was[0], was[1], was[2]), dGeomSetOffsetWorldQuaternion(g, q);
+  dGeomSetBody(g, b);
+  dGeomSetOffsetWorldPosition(g, was[0], was[1], was[2]);
+  dGeomSetOffsetWorldQuaternion(g, q);
   const dfm_body ball = soft_ball(ode, {0.05, 0, kTop + 0.105}, {0, 0, -1});
   Momenta start, end;
-  add(start, ball), add(start, b);
+  add(start, ball);
+  add(start, b);
   ode.run(0.1);
-  add(end, ball), add(end, b);
+  add(end, ball);
+  add(end, b);
   EXPECT_LT(velocity(b)[2], -0.1);
   EXPECT_LT(apart(start.linear, end.linear), 1e-12 * start.size);
   EXPECT_LT(apart(start.angular, end.angular), 1e-12 * start.size);
@@ -116,7 +131,8 @@ TEST_P(OdeSolid, OfABody_PushesWithItsMass) {
 
 std::string name_of(const ::testing::TestParamInfo<Stand> &p) { return p.param.name; }
 INSTANTIATE_TEST_SUITE_P(All, OdeStand, ::testing::ValuesIn(kStands), name_of);
-INSTANTIATE_TEST_SUITE_P(All, OdeSolid, ::testing::ValuesIn(kStands, kStands + std::size(kStands) - 1), name_of);
+INSTANTIATE_TEST_SUITE_P(All, OdeSolid, ::testing::ValuesIn(kStands, kStands + std::size(kStands) - 1),
+                         name_of);
 
 TEST(OdeShapes, TrimeshesAreReadOnceAndAgainWhenTold) {
   Ode ode;
@@ -131,17 +147,17 @@ TEST(OdeShapes, TrimeshesAreReadOnceAndAgainWhenTold) {
     dfm_obstacle_def d{};
     d.size = sizeof d;
     ok(dfm_obstacle_get_def(o, &d));
-    EXPECT_EQ(d.npoint, 8u);   // corners of one place are one point
+    EXPECT_EQ(d.npoint, 8u);  // corners of one place are one point
     EXPECT_EQ(d.ntriangle, 12u);
     double most = 0;
     for (uint32_t i = 0; i < d.npoint; ++i) most = std::max(most, d.points[3 * i]);
     return most;
   };
-  EXPECT_NEAR(width(), 0.3, 1e-7);   // ODE keeps single precision
+  EXPECT_NEAR(width(), 0.3, 1e-7);  // ODE keeps single precision
   for (auto &p : points) p[0] *= 2;
   dGeomTriMeshDataUpdate(data);
   ode.step();
-  EXPECT_NEAR(width(), 0.3, 1e-7);   // ODE keeps single precision
+  EXPECT_NEAR(width(), 0.3, 1e-7);  // ODE keeps single precision
   ok(dfm_ode_refresh(ode.adapter, g));
   EXPECT_NEAR(width(), 0.6, 1e-7);
   dGeomTriMeshDataDestroy(data);
@@ -153,12 +169,15 @@ TEST(OdeShapes, ConvexWithoutArrays_IsRefusedAndNothingMoves) {
   for (int k = 0; k < 3; ++k)
     for (int side = 0; side < 2; ++side) {
       dReal *const p = planes + 4 * (2 * k + side);
-      p[0] = p[1] = p[2] = 0, p[k] = side ? 1 : -1, p[3] = k == 2 ? 0.1 : 0.3;
+      p[0] = p[1] = p[2] = 0;
+      p[k] = side ? 1 : -1;
+      p[3] = k == 2 ? 0.1 : 0.3;
     }
   dReal points[24];
   for (int i = 0; i < 8; ++i)
     for (int k = 0; k < 3; ++k) points[3 * i + k] = kTable[i][k];
-  unsigned polygons[] = {4, 0, 3, 2, 1, 4, 4, 5, 6, 7, 4, 0, 1, 5, 4, 4, 1, 2, 6, 5, 4, 2, 3, 7, 6, 4, 3, 0, 4, 7};
+  unsigned polygons[] = {4, 0, 3, 2, 1, 4, 4, 5, 6, 7, 4, 0, 1, 5, 4,
+                         4, 1, 2, 6, 5, 4, 2, 3, 7, 6, 4, 3, 0, 4, 7};
   const dGeomID g = dCreateConvex(ode.space, planes, 6, points, 8, polygons);
   dGeomSetPosition(g, 0, 0, kTop - 0.1);
   const dfm_body ball = soft_ball(ode, {0, 0, kTop + 0.105}, {}, 3e4, 30);
@@ -181,12 +200,13 @@ TEST(OdeShapes, Heightfield_CarriesWhereOdeSaysItIs) {
   const dHeightfieldDataID data = dGeomHeightfieldDataCreate();
   dGeomHeightfieldDataBuildDouble(data, heights, 1, 1, 1, 3, 3, 1, 0, 1, 0);
   const dGeomID g = dCreateHeightfield(ode.space, data, 1);
-  dQuaternion up = {std::sqrt(0.5), std::sqrt(0.5), 0, 0};   // its y to the world's z
+  dQuaternion up = {std::sqrt(0.5), std::sqrt(0.5), 0, 0};  // its y to the world's z
   dGeomSetQuaternion(g, up);
   EXPECT_EQ(dfm_ode_step(ode.adapter, 1e-3), DFM_E_UNSUPPORTED);
   ok(dfm_ode_set_heights(ode.adapter, g, 1, 1, 3, 3, heights));
   ode.step();
-  // Rays of ODE and of libdeform meet it at the same heights, over its corners and edges, where both cut its cells alike.
+  // Rays of ODE and of libdeform meet it at the same heights, over its corners and edges, where both cut
+  // its cells alike.
   const dGeomID ray = dCreateRay(nullptr, 2);
   for (const Vec p : {Vec{0.01, 0.01, 1}, Vec{0.499, -0.499, 1}, Vec{0.4999, 0.0, 1}, Vec{-0.25, 0.001, 1}}) {
     dGeomRaySet(ray, p[0], p[1], p[2], 0, 0, -1);
@@ -196,11 +216,12 @@ TEST(OdeShapes, Heightfield_CarriesWhereOdeSaysItIs) {
     dfm_ray_hit hit{};
     hit.size = sizeof hit;
     ok(dfm_world_ray(ode.soft, p.data(), down, 2, &hit));
-    if (n == 0) continue;                  // ODE finds no ray on a heightfield's border
+    if (n == 0) continue;  // ODE finds no ray on a heightfield's border
     EXPECT_NEAR(hit.point[2], c[0].pos[2], 2e-3) << p[0] << " " << p[1];
   }
   dGeomDestroy(ray);
-  dGeomDestroy(g), dGeomHeightfieldDataDestroy(data);
+  dGeomDestroy(g);
+  dGeomHeightfieldDataDestroy(data);
 }
 
 TEST(OdeShapes, WhatIsNoSolid_IsLeftOut) {
@@ -209,7 +230,8 @@ TEST(OdeShapes, WhatIsNoSolid_IsLeftOut) {
   const dGeomID off = dCreateSphere(ode.space, 1), ignored = dCreateSphere(ode.space, 1);
   dGeomDisable(off);
   dfm_ode_geom props{};
-  props.size = sizeof props, props.ignore = 1;
+  props.size = sizeof props;
+  props.ignore = 1;
   ok(dfm_ode_set_geom(ode.adapter, ignored, &props));
   ode.step();
   EXPECT_EQ(ode.stats().shapes, 0u);
@@ -217,7 +239,8 @@ TEST(OdeShapes, WhatIsNoSolid_IsLeftOut) {
   dfm_obstacle o = 0;
   EXPECT_EQ(dfm_ode_obstacle(ode.adapter, off, &o), DFM_E_ARG);
   dGeomEnable(off);
-  props.ignore = 0, props.name = "stone";
+  props.ignore = 0;
+  props.name = "stone";
   ok(dfm_ode_set_geom(ode.adapter, ignored, &props));
   ok(dfm_ode_obstacle(ode.adapter, off, &o));
   dfm_obstacle_def d{};
@@ -238,7 +261,8 @@ TEST(OdeShapes, CategoryBitsOfOde_FilterSoftBodiesToo) {
   const dfm_body ball = soft_ball(ode, {0, 0, kTop + 0.11});
   ode.run(0.2);
   EXPECT_LT(measure(ball).com[2], kTop);
-  dGeomSetCollideBits(floor, ~0ul), dGeomPlaneSetParams(floor, 0, 0, 1, -1);
+  dGeomSetCollideBits(floor, ~0ul);
+  dGeomPlaneSetParams(floor, 0, 0, 1, -1);
   ode.run(0.45);
   EXPECT_GT(lowest(ball, [](Vec p) { return p[2] + 1; }), 0);
 }

@@ -2,7 +2,9 @@
 
 namespace msm {
 namespace {
-MSM_INLINE v4 gather4(const double *p, const unsigned *n) { return {_mm_set_pd(p[n[1]], p[n[0]]), _mm_set_pd(p[n[3]], p[n[2]])}; }
+MSM_INLINE v4 gather4(const double *p, const unsigned *n) {
+  return {_mm_set_pd(p[n[1]], p[n[0]]), _mm_set_pd(p[n[3]], p[n[2]])};
+}
 }  // namespace
 }  // namespace msm
 

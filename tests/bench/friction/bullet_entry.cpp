@@ -1,5 +1,6 @@
-// One case of the friction benchmark in Bullet's deformable world: bullet_entry CASE MESH key=value..., prints key=value lines.
-// Neo-Hookean tetrahedra, contacts of nodes with rigid bodies, its own friction (kDF times the rigid body's).
+// One case of the friction benchmark in Bullet's deformable world: bullet_entry CASE MESH key=value...,
+// prints key=value lines. Neo-Hookean tetrahedra, contacts of nodes with rigid bodies, its own friction (kDF
+// times the rigid body's).
 #include <BulletDynamics/Featherstone/btMultiBodyConstraintSolver.h>
 #include <BulletSoftBody/btDeformableBodySolver.h>
 #include <BulletSoftBody/btDeformableMultiBodyConstraintSolver.h>
@@ -21,7 +22,8 @@
 
 namespace {
 
-// Centimeters and grams: its solvers stop at absolute tolerances that a small body in SI units does not exceed. Values arrive in SI units.
+// Centimeters and grams: its solvers stop at absolute tolerances that a small body in SI units does not
+// exceed. Values arrive in SI units.
 constexpr double kLength = 100, kMass = 1000, kStress = kMass / kLength, kG = 9.81 * kLength;
 constexpr btScalar kMargin = btScalar(1e-3 * kLength);
 using Values = std::map<std::string, double>;
@@ -38,13 +40,21 @@ struct Scene {
   double time = 0, step, friction;
   explicit Scene(const Values &v) : step(v.at("step")), friction(v.at("mu")) {
     solver.setDeformableSolver(&body_solver);
-    // The implicit integrator needs contacts as projections: as Lagrange multipliers they are not part of its system.
+    // The implicit integrator needs contacts as projections: as Lagrange multipliers they are not part
+    // of its system.
     const bool implicit = v.at("implicit") != 0;
-    world.setImplicit(implicit), world.setLineSearch(false), world.setUseProjection(implicit);
+    world.setImplicit(implicit);
+    world.setLineSearch(false);
+    world.setUseProjection(implicit);
     btSoftBodyWorldInfo &info = world.getWorldInfo();
-    info.m_dispatcher = &dispatcher, info.m_broadphase = &broadphase;
-    info.m_gravity = btVector3(0, 0, 0), info.m_sparsesdf.setDefaultVoxelsz(2.5f), info.m_sparsesdf.Initialize();
-    world.getSolverInfo().m_deformable_erp = 0.06f, world.getSolverInfo().m_friction = 1, world.getSolverInfo().m_numIterations = 100;
+    info.m_dispatcher = &dispatcher;
+    info.m_broadphase = &broadphase;
+    info.m_gravity = btVector3(0, 0, 0);
+    info.m_sparsesdf.setDefaultVoxelsz(2.5f);
+    info.m_sparsesdf.Initialize();
+    world.getSolverInfo().m_deformable_erp = 0.06f;
+    world.getSolverInfo().m_friction = 1;
+    world.getSolverInfo().m_numIterations = 100;
   }
 
   void load(const std::string &path, const Values &v, double lift) {
@@ -69,16 +79,25 @@ struct Scene {
     for (auto [a, b] : edges) soft->appendLink(a, b);
     btSoftBodyHelpers::generateBoundaryFaces(soft);
     soft->initializeDmInverse();
-    soft->m_tetraScratches.resize(soft->m_tetras.size()), soft->m_tetraScratchesTn.resize(soft->m_tetras.size());
+    soft->m_tetraScratches.resize(soft->m_tetras.size());
+    soft->m_tetraScratchesTn.resize(soft->m_tetras.size());
     soft->getCollisionShape()->setMargin(kMargin);
     soft->setTotalMass(btScalar(kMass * v.at("mass")));
-    soft->m_cfg.kKHR = 1, soft->m_cfg.kCHR = 1, soft->m_cfg.kDF = btScalar(friction);
-    // Nodes against rigid bodies. With faces too (SDF_RDF) the implicit world stands still, without friction neither.
+    soft->m_cfg.kKHR = 1;
+    soft->m_cfg.kCHR = 1;
+    soft->m_cfg.kDF = btScalar(friction);
+    // Nodes against rigid bodies. With faces too (SDF_RDF) the implicit world stands still, without
+    // friction neither.
     soft->m_cfg.collisions = btSoftBody::fCollision::SDF_RD | btSoftBody::fCollision::SDF_RDN;
-    soft->m_sleepingThreshold = 0, soft->setActivationState(DISABLE_DEACTIVATION);
+    soft->m_sleepingThreshold = 0;
+    soft->setActivationState(DISABLE_DEACTIVATION);
     world.addSoftBody(soft);
-    const double e = kStress * v.at("young"), nu = v.at("poisson"), shear = e / (2 * (1 + nu)), lame = e * nu / ((1 + nu) * (1 - 2 * nu));
-    world.addForce(soft, new btDeformableNeoHookeanForce(btScalar(shear), btScalar(lame), btScalar(v.at("damping"))));
+    const double e = kStress * v.at("young");
+    const double nu = v.at("poisson");
+    const double shear = e / (2 * (1 + nu));
+    const double lame = e * nu / ((1 + nu) * (1 - 2 * nu));
+    world.addForce(
+        soft, new btDeformableNeoHookeanForce(btScalar(shear), btScalar(lame), btScalar(v.at("damping"))));
     world.addForce(soft, gravity = new btDeformableGravityForce(btVector3(0, 0, 0)));
     soft->m_gravityFactor = 1;
   }
@@ -89,13 +108,15 @@ struct Scene {
     const btTransform pose(btQuaternion::getIdentity(), at);
     auto *const body = new btRigidBody(0, new btDefaultMotionState(pose), shape);
     body->setCollisionFlags(body->getCollisionFlags() | btCollisionObject::CF_KINEMATIC_OBJECT);
-    body->setActivationState(DISABLE_DEACTIVATION), body->setFriction(1);
+    body->setActivationState(DISABLE_DEACTIVATION);
+    body->setFriction(1);
     world.addRigidBody(body);
     return body;
   }
 
   static void move(btRigidBody *body, double x, double z) {
-    body->getMotionState()->setWorldTransform(btTransform(btQuaternion::getIdentity(), btVector3(btScalar(x), 0, btScalar(z))));
+    body->getMotionState()->setWorldTransform(
+        btTransform(btQuaternion::getIdentity(), btVector3(btScalar(x), 0, btScalar(z))));
   }
 
   double center(int axis) const {
@@ -108,29 +129,48 @@ struct Scene {
     before(time + step);
     world.stepSimulation(btScalar(step), 0, btScalar(step));
     time += step;
-    if (std::floor(time / 0.1) > std::floor((time - step) / 0.1)) std::fprintf(stderr, "at %g\n", time);   // how far it came, should it be stopped
-    if (!std::isfinite(center(0))) std::fprintf(stderr, "not finite at %g s\n", time), std::exit(1);
+    // how far it came, should it be stopped
+    if (std::floor(time / 0.1) > std::floor((time - step) / 0.1)) std::fprintf(stderr, "at %g\n", time);
+    if (!std::isfinite(center(0))) {
+      std::fprintf(stderr, "not finite at %g s\n", time);
+      std::exit(1);
+    }
   }
 
-  void tilt(double angle) { gravity->m_gravity = btVector3(btScalar(kG * std::sin(angle)), 0, btScalar(-kG * std::cos(angle))); }
+  void tilt(double angle) {
+    gravity->m_gravity = btVector3(btScalar(kG * std::sin(angle)), 0, btScalar(-kG * std::cos(angle)));
+  }
 };
 
 // Straight-line fit of what was recorded between two times: its slope.
 struct Line {
   double n = 0, t = 0, x = 0, tt = 0, tx = 0;
-  void add(double at, double value) { ++n, t += at, x += value, tt += at * at, tx += at * value; }
+  void add(double at, double value) {
+    ++n;
+    t += at;
+    x += value;
+    tt += at * at;
+    tx += at * value;
+  }
   double slope() const { return (n * tx - t * x) / (n * tt - t * t); }
 };
 
-double ramp(double t, double from, double to) { return std::min(1.0, std::max(0.0, (t - from) / (to - from))); }
+double ramp(double t, double from, double to) {
+  return std::min(1.0, std::max(0.0, (t - from) / (to - from)));
+}
 
-void print(const char *key, double value, double simulated) { std::printf("%s=%.9g\nsimulated=%.9g\n", key, value, simulated); }
+void print(const char *key, double value, double simulated) {
+  std::printf("%s=%.9g\nsimulated=%.9g\n", key, value, simulated);
+}
 
 int run(const std::string &name, const std::string &mesh, const Values &v) {
   Scene s(v);
   const double lift = 2 * kMargin;
   if (name == "pinch_hold") {
-    const double r = kLength * v.at("radius"), half = 0.01 * kLength, shut = 0.8 * v.at("close"), apart = r + half + lift;
+    const double r = kLength * v.at("radius");
+    const double half = 0.01 * kLength;
+    const double shut = 0.8 * v.at("close");
+    const double apart = r + half + lift;
     s.load(mesh, v, 0);
     const btVector3 jaw(btScalar(half), btScalar(0.06 * kLength), btScalar(0.06 * kLength));
     btRigidBody *const left = s.wall(jaw, btVector3(btScalar(-apart), 0, 0));
@@ -139,12 +179,14 @@ int run(const std::string &name, const std::string &mesh, const Values &v) {
     while (s.time < v.at("end")) {
       s.advance([&](double t) {
         const double x = apart - (kLength * v.at("depth") + lift) * ramp(t, 0, shut);
-        Scene::move(left, -x, 0), Scene::move(right, x, 0);
+        Scene::move(left, -x, 0);
+        Scene::move(right, x, 0);
         s.gravity->m_gravity = btVector3(0, 0, btScalar(-kG * ramp(t, v.at("close"), v.at("load"))));
       });
       if (s.time >= v.at("begin")) line.add(s.time, s.center(2));
     }
-    return print("creep_um_per_s", 1e6 / kLength * std::fabs(line.slope()), s.time), 0;
+    print("creep_um_per_s", 1e6 / kLength * std::fabs(line.slope()), s.time);
+    return 0;
   }
   s.load(mesh, v, lift);
   const btScalar wide = btScalar(0.5 * kLength), thick = btScalar(0.05 * kLength);
@@ -154,30 +196,45 @@ int run(const std::string &name, const std::string &mesh, const Values &v) {
     while (angle < std::atan(1.2 * v.at("mu"))) {
       s.advance([&](double t) { s.tilt(angle = std::max(0.0, v.at("rate") * (t - v.at("settle")))); });
       if (std::isnan(start) && s.time >= v.at("settle")) start = s.center(0);
-      if (s.center(0) - start >= kLength * v.at("distance")) return print("slip_tan", std::tan(angle), s.time), 0;
+      if (s.center(0) - start >= kLength * v.at("distance")) {
+        print("slip_tan", std::tan(angle), s.time);
+        return 0;
+      }
     }
-    return print("slip_tan", INFINITY, s.time), 0;
+    print("slip_tan", INFINITY, s.time);
+    return 0;
   }
   const bool slide = name == "slope_slide", shakes = name == "vibration_drift";
-  const double w = shakes ? 2 * M_PI * v.at("frequency") : 0, begin = v.at("begin"), middle = 0.5 * (begin + v.at("end"));
+  const double w = shakes ? 2 * M_PI * v.at("frequency") : 0;
+  const double begin = v.at("begin");
+  const double middle = 0.5 * (begin + v.at("end"));
   Line all, first, last;
   while (s.time < v.at("end")) {
     s.advance([&](double t) {
       s.tilt(v.at("angle") * (slide ? 1 : ramp(t, 0.2, v.at("tilt"))));
-      if (shakes) Scene::move(floor, kLength * v.at("acceleration") / (w * w) * std::sin(w * t), -0.05 * kLength);
+      if (shakes)
+        Scene::move(floor, kLength * v.at("acceleration") / (w * w) * std::sin(w * t), -0.05 * kLength);
     });
     if (s.time < begin) continue;
-    all.add(s.time, s.center(0)), (s.time < middle ? first : last).add(s.time, s.center(0));
+    all.add(s.time, s.center(0));
+    (s.time < middle ? first : last).add(s.time, s.center(0));
   }
   // an even acceleration: the slopes of both halves are the speeds in their middles
-  if (slide) return print("acceleration", (last.slope() - first.slope()) / (0.5 * (v.at("end") - begin)) / kLength, s.time), 0;
-  return print("creep_um_per_s", 1e6 / kLength * std::fabs(all.slope()), s.time), 0;
+  if (slide) {
+    print("acceleration", (last.slope() - first.slope()) / (0.5 * (v.at("end") - begin)) / kLength, s.time);
+    return 0;
+  }
+  print("creep_um_per_s", 1e6 / kLength * std::fabs(all.slope()), s.time);
+  return 0;
 }
 
 }  // namespace
 
 int main(int argc, char **argv) {
-  if (argc < 3) return std::fprintf(stderr, "usage: bullet_entry CASE MESH key=value...\n"), 2;
+  if (argc < 3) {
+    std::fprintf(stderr, "usage: bullet_entry CASE MESH key=value...\n");
+    return 2;
+  }
   Values v;
   for (int i = 3; i < argc; ++i) {
     const std::string pair = argv[i];

@@ -3,7 +3,9 @@
 
 static void fitted(struct lane *l) {
   const double factor = 1 + 1e-4 / l->h;
-  l->mu *= factor, l->cone *= factor, l->stiff *= factor;
+  l->mu *= factor;
+  l->cone *= factor;
+  l->stiff *= factor;
   sound(l);
 }
 

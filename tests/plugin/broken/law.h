@@ -1,6 +1,7 @@
-/* The rest of a broken law: eval, tables and entry. Hooks, each a macro with a sound default: EFFECTS and FLAGS what it promises, LANE the update
- * of one contact, BEFORE_EVAL a statement at the head of eval,
- * AFTER_LANE one after each contact, STEP the step it uses, CHECK, SLOTS, SOURCE; with OWN_ENTRY it brings its entry. */
+/* The rest of a broken law: eval, tables and entry. Hooks, each a macro with a sound default: EFFECTS and
+ * FLAGS what it promises, LANE the update of one contact, BEFORE_EVAL a statement at the head of eval,
+ * AFTER_LANE one after each contact, STEP the step it uses, CHECK, SLOTS, SOURCE; with OWN_ENTRY it
+ * brings its entry. */
 #include "base.h"
 
 #ifndef SOURCE
@@ -36,8 +37,20 @@ static dfm_status eval(const dfm_friction_in *in, dfm_friction_out *out) {
   BEFORE_EVAL
   for (uint32_t i = 0; i < in->n; ++i) {
     const double pressed = in->fn[i] > 0 ? in->fn[i] : 0.0;
-    struct lane l = {in->fn[i], STEP, in->params[0], in->params[1] * in->area[i], in->params[0] * pressed,
-                     {in->vt[i], in->vt[s + i]}, {in->state[i], in->state[s + i]}, {0}, {0}, {0}, {0}, 0, 0, 0};
+    struct lane l = {in->fn[i],
+                     STEP,
+                     in->params[0],
+                     in->params[1] * in->area[i],
+                     in->params[0] * pressed,
+                     {in->vt[i], in->vt[s + i]},
+                     {in->state[i], in->state[s + i]},
+                     {0},
+                     {0},
+                     {0},
+                     {0},
+                     0,
+                     0,
+                     0};
     LANE(&l);
     for (uint32_t a = 0; a < 2; ++a) {
       if (out->ft) out->ft[a * s + i] = l.f[a];
@@ -53,20 +66,40 @@ static dfm_status eval(const dfm_friction_in *in, dfm_friction_out *out) {
   return DFM_OK;
 }
 
-static const dfm_param rows[] = {{"mu", "friction coefficient", "1", 0.0, 10.0, 0.5, DFM_PARAM_RUNTIME, 1, NULL},
-                                 {"sigma0", "bristle stiffness per area", "N/m^3", 1.0, 1e12, 1e8, DFM_PARAM_LOG_SCALE, 1, NULL}};
+static const dfm_param rows[] = {
+    {"mu", "friction coefficient", "1", 0.0, 10.0, 0.5, DFM_PARAM_RUNTIME, 1, NULL},
+    {"sigma0", "bristle stiffness per area", "N/m^3", 1.0, 1e12, 1e8, DFM_PARAM_LOG_SCALE, 1, NULL}};
 static const dfm_slot slots[] = {SLOTS};
-static const dfm_friction ops = {sizeof(dfm_friction), DFM_NEED_FN | DFM_NEED_VT | DFM_NEED_AREA, FLAGS, sizeof slots / sizeof slots[0], slots, eval,
-                                 CHECK, NULL, NULL, NULL};
+static const dfm_friction ops = {sizeof(dfm_friction),
+                                 DFM_NEED_FN | DFM_NEED_VT | DFM_NEED_AREA,
+                                 FLAGS,
+                                 sizeof slots / sizeof slots[0],
+                                 slots,
+                                 eval,
+                                 CHECK,
+                                 NULL,
+                                 NULL,
+                                 NULL};
 static const char *const effects[] = {EFFECTS, NULL};
-static const dfm_type type = {sizeof(dfm_type), DFM_KIND_FRICTION, "org.broken.law", "a law of the tests", "1.0", "MIT", SOURCE,
-                              rows, 2, sizeof(dfm_param), effects, &ops};
+static const dfm_type type = {sizeof(dfm_type),
+                              DFM_KIND_FRICTION,
+                              "org.broken.law",
+                              "a law of the tests",
+                              "1.0",
+                              "MIT",
+                              SOURCE,
+                              rows,
+                              2,
+                              sizeof(dfm_param),
+                              effects,
+                              &ops};
 static const dfm_type *const types[] = {&type};
 static const dfm_plugin plugin = {sizeof(dfm_plugin), DFM_ABI, DFM_ABI_DRAFT, 1, types, NULL};
 
 #ifndef OWN_ENTRY
 const dfm_plugin *dfm_plugin_entry(const dfm_host *host, uint32_t host_abi, uint32_t host_abi_min) {
-  (void)host_abi, (void)host_abi_min;
+  (void)host_abi;
+  (void)host_abi_min;
   return DFM_ABI_OK(host) ? &plugin : NULL;
 }
 #endif

@@ -1,4 +1,5 @@
-/* V12: a thread of its own, which nobody ends. It is one function of the C library, and only one is started, so that nothing crashes. */
+/* V12: a thread of its own, which nobody ends. It is one function of the C library, and only one is started,
+ * so that nothing crashes. */
 #define _DEFAULT_SOURCE
 #include <dirent.h>
 #include <pthread.h>
@@ -11,7 +12,10 @@ static int threads(void) {
   return n - 2;
 }
 __attribute__((constructor)) static void start(void) {
-  union { int (*wait)(void); void *(*run)(void *); } start = {pause};
+  union {
+    int (*wait)(void);
+    void *(*run)(void *);
+  } start = {pause};
   pthread_t thread;
   if (threads() == 1) pthread_create(&thread, NULL, start.run, NULL);
 }

@@ -3,7 +3,8 @@
 
 static void divides(struct lane *l) {
   sound(l);
-  l->f[0] *= l->mu / l->mu, l->f[1] *= l->mu / l->mu;
+  l->f[0] *= l->mu / l->mu;
+  l->f[1] *= l->mu / l->mu;
 }
 
 #define LANE divides

@@ -4,7 +4,9 @@
 #include <stdint.h>
 #include "deform/plugin.h"
 static dfm_status check(const double *params, char *why, size_t cap) {
-  (void)params, (void)why, (void)cap;
+  (void)params;
+  (void)why;
+  (void)cap;
   setlocale(LC_ALL, "C.UTF-8");
   return DFM_OK;
 }

@@ -3,7 +3,8 @@
 
 static void forward(struct lane *l) {
   sound(l);
-  l->f[0] = -l->f[0], l->f[1] = -l->f[1];
+  l->f[0] = -l->f[0];
+  l->f[1] = -l->f[1];
 }
 
 #define EFFECTS NULL

@@ -31,19 +31,33 @@
 #else
 #define EVAL eval
 static dfm_status eval(const dfm_friction_in *in, dfm_friction_out *out) {
-  (void)in, (void)out;
+  (void)in;
+  (void)out;
   return DFM_OK;
 }
 #endif
 
-static const dfm_param rows[] = {{"first", "first", "N", 0.0, 10.0, DEFAULT, 0, 1, NULL}, {SECOND, "second", "N", 0.0, 10.0, 2.0, 0, 1, NULL}};
+static const dfm_param rows[] = {{"first", "first", "N", 0.0, 10.0, DEFAULT, 0, 1, NULL},
+                                 {SECOND, "second", "N", 0.0, 10.0, 2.0, 0, 1, NULL}};
 static const dfm_slot slots[] = {{UNIT, 2, DFM_SLOT_TANGENT, 0}};
 static const dfm_friction law = {sizeof(dfm_friction), 0, 0, 1, slots, EVAL, NULL, NULL, NULL, NULL};
-static const dfm_type type = {sizeof(dfm_type), DFM_KIND_FRICTION, ID, "bad", "1.0", "MIT", SOURCE, rows, 2, sizeof(dfm_param), NULL, &law};
+static const dfm_type type = {sizeof(dfm_type),
+                              DFM_KIND_FRICTION,
+                              ID,
+                              "bad",
+                              "1.0",
+                              "MIT",
+                              SOURCE,
+                              rows,
+                              2,
+                              sizeof(dfm_param),
+                              NULL,
+                              &law};
 static const dfm_type *const types[] = {&type};
 static const dfm_plugin plugin = {sizeof(dfm_plugin), DFM_ABI, DFM_ABI_DRAFT, 1, types, NULL};
 
 const dfm_plugin *dfm_plugin_entry(const dfm_host *host, uint32_t host_abi, uint32_t host_abi_min) {
-  (void)host_abi, (void)host_abi_min;
+  (void)host_abi;
+  (void)host_abi_min;
   return DFM_ABI_OK(host) ? &plugin : NULL;
 }

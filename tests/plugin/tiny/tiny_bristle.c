@@ -1,12 +1,14 @@
-/* A law of a third party: an elastic bristle that slides at mu fn (Prandtl's element), without derivatives. Two slots, so that a host
- * that mixes up their columns is seen; the first counts the steps. */
+/* A law of a third party: an elastic bristle that slides at mu fn (Prandtl's element), without derivatives.
+ * Two slots, so that a host that mixes up their columns is seen; the first counts the steps. */
 #include <math.h>
 
 #include "deform/plugin.h"
 
-static const dfm_param rows[] = {{"mu", "friction coefficient", "1", 0.0, 10.0, 0.5, 0, 1, NULL},
-                                 {"sigma0", "bristle stiffness per area", "N/m^3", 0.0, 1e15, 1e8, 0, 1, NULL}};
-static const dfm_slot slots[] = {{DFM_PER_CONTACT, 1, DFM_SLOT_SCALAR, 0}, {DFM_PER_CONTACT, 2, DFM_SLOT_TANGENT, 0}};
+static const dfm_param rows[] = {
+    {"mu", "friction coefficient", "1", 0.0, 10.0, 0.5, 0, 1, NULL},
+    {"sigma0", "bristle stiffness per area", "N/m^3", 0.0, 1e15, 1e8, 0, 1, NULL}};
+static const dfm_slot slots[] = {{DFM_PER_CONTACT, 1, DFM_SLOT_SCALAR, 0},
+                                 {DFM_PER_CONTACT, 2, DFM_SLOT_TANGENT, 0}};
 
 static dfm_status eval(const dfm_friction_in *in, dfm_friction_out *out) {
   const double mu = in->params[0], sigma = in->params[1];
@@ -16,9 +18,17 @@ static dfm_status eval(const dfm_friction_in *in, dfm_friction_out *out) {
     const double k = sigma * in->area[i], most = mu * in->fn[i];
     double x = in->state[s + i] + in->dt * in->vt[i], y = in->state[2 * s + i] + in->dt * in->vt[s + i];
     const double trial = k * sqrt(x * x + y * y), share = trial > most ? most / trial : 1.0;
-    x *= share, y *= share;
-    if (out->ft) out->ft[i] = -k * x, out->ft[s + i] = -k * y;
-    if (out->state) out->state[i] = in->state[i] + 1, out->state[s + i] = x, out->state[2 * s + i] = y;
+    x *= share;
+    y *= share;
+    if (out->ft) {
+      out->ft[i] = -k * x;
+      out->ft[s + i] = -k * y;
+    }
+    if (out->state) {
+      out->state[i] = in->state[i] + 1;
+      out->state[s + i] = x;
+      out->state[2 * s + i] = y;
+    }
     if (out->limit) out->limit[i] = most;
     if (out->mode) out->mode[i] = trial > most ? 2 : 1;
     if (out->stored) out->stored[i] = 0.5 * k * (x * x + y * y);
@@ -26,15 +36,34 @@ static dfm_status eval(const dfm_friction_in *in, dfm_friction_out *out) {
   return DFM_OK;
 }
 
-static const dfm_friction law = {sizeof(dfm_friction), DFM_NEED_FN | DFM_NEED_VT | DFM_NEED_AREA, DFM_FRIC_ISOTROPIC | DFM_FRIC_PASSIVE, 2, slots, eval,
-                                 NULL, NULL, NULL, NULL};
+static const dfm_friction law = {sizeof(dfm_friction),
+                                 DFM_NEED_FN | DFM_NEED_VT | DFM_NEED_AREA,
+                                 DFM_FRIC_ISOTROPIC | DFM_FRIC_PASSIVE,
+                                 2,
+                                 slots,
+                                 eval,
+                                 NULL,
+                                 NULL,
+                                 NULL,
+                                 NULL};
 static const char *const effects[] = {"presliding", NULL};
-static const dfm_type type = {sizeof(dfm_type), DFM_KIND_FRICTION, "org.tiny.bristle", "bristle", "1.0", "MIT", "Prandtl 1928", rows, 2,
-                              sizeof(dfm_param), effects, &law};
+static const dfm_type type = {sizeof(dfm_type),
+                              DFM_KIND_FRICTION,
+                              "org.tiny.bristle",
+                              "bristle",
+                              "1.0",
+                              "MIT",
+                              "Prandtl 1928",
+                              rows,
+                              2,
+                              sizeof(dfm_param),
+                              effects,
+                              &law};
 static const dfm_type *const types[] = {&type};
 static const dfm_plugin plugin = {sizeof(dfm_plugin), DFM_ABI, DFM_ABI_DRAFT, 1, types, NULL};
 
 const dfm_plugin *dfm_plugin_entry(const dfm_host *host, uint32_t host_abi, uint32_t host_abi_min) {
-  (void)host_abi, (void)host_abi_min;
+  (void)host_abi;
+  (void)host_abi_min;
   return DFM_ABI_OK(host) ? &plugin : NULL;
 }

@@ -1,9 +1,13 @@
-/* Of another ABI, and it does not ask: the library must see it. Everything behind the two numbers is unreadable on purpose. */
+/* Of another ABI, and it does not ask: the library must see it. Everything behind the two numbers is
+ * unreadable on purpose. */
 #include "deform/plugin.h"
 
-static const dfm_plugin plugin = {sizeof(dfm_plugin), 7, 3, 1, (const dfm_type *const *)(uintptr_t)8, (void (*)(void))(uintptr_t)8};
+static const dfm_plugin plugin = {sizeof(dfm_plugin),          7, 3, 1, (const dfm_type *const *)(uintptr_t)8,
+                                  (void (*)(void))(uintptr_t)8};
 
 const dfm_plugin *dfm_plugin_entry(const dfm_host *host, uint32_t host_abi, uint32_t host_abi_min) {
-  (void)host, (void)host_abi, (void)host_abi_min;
+  (void)host;
+  (void)host_abi;
+  (void)host_abi_min;
   return &plugin;
 }

@@ -6,7 +6,10 @@
 
 namespace {
 namespace dp = dfm::plugin;
-struct Tables { const dfm_host *host; double factor; };
+struct Tables {
+  const dfm_host *host;
+  double factor;
+};
 const dfm_param rows[] = {dp::param("factor", "what prepare() doubles", "1", 0, 100, 3)};
 
 dfm_status prepare(const dfm_host *host, const double *params, void **data) {
@@ -23,7 +26,12 @@ void release(const dfm_host *host, void *data) {
   host->release(host->ctx, data, sizeof(Tables), alignof(Tables));
 }
 
-struct Job { const dfm_friction_in *in; double *twice; const dfm_host *host; std::atomic<bool> refused; };
+struct Job {
+  const dfm_friction_in *in;
+  double *twice;
+  const dfm_host *host;
+  std::atomic<bool> refused;
+};
 
 void work(void *user, uint32_t begin, uint32_t end) {
   Job &job = *static_cast<Job *>(user);
@@ -36,22 +44,29 @@ void work(void *user, uint32_t begin, uint32_t end) {
   for (uint32_t i = begin; i < end; ++i) job.twice[i] = 2 * own[i - begin];
 }
 
-// ft_x = twice the normal force through two pieces of scratch that live together, ft_y = the factor of prepare().
+// ft_x = twice the normal force through two pieces of scratch that live together, ft_y = the
+// factor of prepare().
 dfm_status eval(const dfm_friction_in *in, dfm_friction_out *out) {
   const auto &tables = *static_cast<const Tables *>(in->data);
   const dfm_host *host = tables.host;
   double *twice = static_cast<double *>(host->scratch(host->ctx, in->n * sizeof(double)));
   double *large = static_cast<double *>(host->scratch(host->ctx, 3000000));
-  if (!twice || !large || reinterpret_cast<uintptr_t>(twice) % 64 || reinterpret_cast<uintptr_t>(large) % 64) return DFM_E_FATAL;
+  if (!twice || !large || reinterpret_cast<uintptr_t>(twice) % 64 || reinterpret_cast<uintptr_t>(large) % 64)
+    return DFM_E_FATAL;
   std::memset(large, 0xff, 3000000);
   Job job{in, twice, host, false};
   host->parallel_for(host->ctx, in->n, 16, work, &job);
   if (job.refused) return DFM_E_NOMEM;
-  for (uint32_t i = 0; i < in->n; ++i) out->ft[i] = twice[i], out->ft[in->stride + i] = tables.factor;
+  for (uint32_t i = 0; i < in->n; ++i) {
+    out->ft[i] = twice[i];
+    out->ft[in->stride + i] = tables.factor;
+  }
   return host->extension(host->ctx, "dfm.unheard-of/1") ? DFM_E_FATAL : DFM_OK;
 }
 
-const dfm_friction law = {sizeof(dfm_friction), DFM_NEED_FN, 0, 0, nullptr, dp::guarded<eval>, nullptr, prepare, release, nullptr};
-const dfm_type type = dp::type(DFM_KIND_FRICTION, "org.tiny.host", "host services", "1.0", "MIT", "test", rows, nullptr, &law);
+const dfm_friction law = {sizeof(dfm_friction), DFM_NEED_FN, 0,       0,       nullptr,
+                          dp::guarded<eval>,    nullptr,     prepare, release, nullptr};
+const dfm_type type =
+    dp::type(DFM_KIND_FRICTION, "org.tiny.host", "host services", "1.0", "MIT", "test", rows, nullptr, &law);
 }  // namespace
 DFM_PLUGIN(&type)

@@ -1,6 +1,7 @@
-/* A law that ends its process, or never comes back, in the way that its parameter says, at the third hundredth call. */
+/* A law that ends its process, or never comes back, in the way that its parameter says, at the third
+ * hundredth call. */
 #define _DEFAULT_SOURCE
-#define _ISOC11_SOURCE   /* quick_exit */
+#define _ISOC11_SOURCE /* quick_exit */
 #include <math.h>
 #include <pthread.h>
 #include <signal.h>
@@ -9,7 +10,17 @@
 
 #include "deform/plugin.h"
 
-enum { RETURNS, EXITS, UNDERSCORE_EXITS, QUICK_EXITS, ABORTS, ENDS_ITS_THREAD, TOUCHES_NOTHING, HANGS, WAITS };
+enum {
+  RETURNS,
+  EXITS,
+  UNDERSCORE_EXITS,
+  QUICK_EXITS,
+  ABORTS,
+  ENDS_ITS_THREAD,
+  TOUCHES_NOTHING,
+  HANGS,
+  WAITS
+};
 
 static void leave(int way) {
   volatile int round = 1;
@@ -41,13 +52,33 @@ static dfm_status eval(const dfm_friction_in *in, dfm_friction_out *out) {
 }
 
 static const dfm_param rows[] = {{"way", "how it leaves", "1", 0, 8, 0, DFM_PARAM_INTEGER, 1, NULL}};
-static const dfm_friction law = {sizeof(dfm_friction), DFM_NEED_VT, DFM_FRIC_ISOTROPIC | DFM_FRIC_PASSIVE | DFM_FRIC_JACOBIAN,
-                                 0, NULL, eval, NULL, NULL, NULL, NULL};
-static const dfm_type type = {sizeof(dfm_type), DFM_KIND_FRICTION, "org.tiny.leaves", "leaves", "1.0", "MIT", "test", rows, 1, sizeof(dfm_param), NULL, &law};
+static const dfm_friction law = {sizeof(dfm_friction),
+                                 DFM_NEED_VT,
+                                 DFM_FRIC_ISOTROPIC | DFM_FRIC_PASSIVE | DFM_FRIC_JACOBIAN,
+                                 0,
+                                 NULL,
+                                 eval,
+                                 NULL,
+                                 NULL,
+                                 NULL,
+                                 NULL};
+static const dfm_type type = {sizeof(dfm_type),
+                              DFM_KIND_FRICTION,
+                              "org.tiny.leaves",
+                              "leaves",
+                              "1.0",
+                              "MIT",
+                              "test",
+                              rows,
+                              1,
+                              sizeof(dfm_param),
+                              NULL,
+                              &law};
 static const dfm_type *const types[] = {&type};
 static const dfm_plugin plugin = {sizeof(dfm_plugin), DFM_ABI, DFM_ABI_DRAFT, 1, types, NULL};
 
 const dfm_plugin *dfm_plugin_entry(const dfm_host *host, uint32_t host_abi, uint32_t host_abi_min) {
-  (void)host_abi, (void)host_abi_min;
+  (void)host_abi;
+  (void)host_abi_min;
   return DFM_ABI_OK(host) ? &plugin : NULL;
 }

@@ -1,4 +1,5 @@
-// Writes what it is told to: "value" 0 a number, 1 a NaN, 2 an infinity, into the output "where" (an enumeration).
+// Writes what it is told to: "value" 0 a number, 1 a NaN, 2 an infinity, into the output "where"
+// (an enumeration).
 #include <cmath>
 
 #include "deform/plugin.hpp"
@@ -7,7 +8,8 @@ namespace {
 namespace dp = dfm::plugin;
 const char *const outputs[] = {"ft", "dft_dvt", "dft_dfn", "limit", "stored", "state", nullptr};
 const char *const values[] = {"number", "nan", "infinity", nullptr};
-const dfm_param rows[] = {dp::enumeration("where", "output that is spoilt", outputs, 0), dp::enumeration("value", "what is written", values, 0)};
+const dfm_param rows[] = {dp::enumeration("where", "output that is spoilt", outputs, 0),
+                          dp::enumeration("value", "what is written", values, 0)};
 const dfm_slot slots[] = {{DFM_PER_CONTACT, 1, DFM_SLOT_SCALAR, 0}};
 
 dfm_status eval(const dfm_friction_in *in, dfm_friction_out *out) {
@@ -21,7 +23,9 @@ dfm_status eval(const dfm_friction_in *in, dfm_friction_out *out) {
   return DFM_OK;
 }
 
-const dfm_friction law = {sizeof(dfm_friction), 0, 0, 1, slots, dp::guarded<eval>, nullptr, nullptr, nullptr, nullptr};
-const dfm_type type = dp::type(DFM_KIND_FRICTION, "org.tiny.nan", "nan", "1.0", "MIT", "test", rows, nullptr, &law);
+const dfm_friction law = {sizeof(dfm_friction), 0,       0,       1,       slots,
+                          dp::guarded<eval>,    nullptr, nullptr, nullptr, nullptr};
+const dfm_type type =
+    dp::type(DFM_KIND_FRICTION, "org.tiny.nan", "nan", "1.0", "MIT", "test", rows, nullptr, &law);
 }  // namespace
 DFM_PLUGIN(&type)

@@ -1,4 +1,5 @@
-/* A model of a third party with a wrong sign: springs along the edges, whose dampers push where they should brake. */
+/* A model of a third party with a wrong sign: springs along the edges, whose dampers push where they
+ * should brake. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -11,14 +12,17 @@ static const dfm_param rows[] = {{"stiffness", "of each edge", "N/m", 1.0, 1e6, 
 typedef struct Net {
   double stiffness, damper;
   uint32_t n;
-  uint32_t *edges;   /* [n,2] */
-  double *rest;      /* [n] m */
+  uint32_t *edges; /* [n,2] */
+  double *rest;    /* [n] m */
 } Net;
 
 static double apart(const double *a, const double *b, double e[3]) {
   double square = 0, length;
   int k;
-  for (k = 0; k < 3; ++k) e[k] = b[k] - a[k], square += e[k] * e[k];
+  for (k = 0; k < 3; ++k) {
+    e[k] = b[k] - a[k];
+    square += e[k] * e[k];
+  }
   length = sqrt(square);
   for (k = 0; k < 3; ++k) e[k] /= length;
   return length;
@@ -26,7 +30,9 @@ static double apart(const double *a, const double *b, double e[3]) {
 
 static void destroy(void *self) {
   Net *net = self;
-  free(net->edges), free(net->rest), free(net);
+  free(net->edges);
+  free(net->rest);
+  free(net);
 }
 
 static dfm_status create(const dfm_host *host, const dfm_mesh *m, void **self) {
@@ -35,14 +41,18 @@ static dfm_status create(const dfm_host *host, const dfm_mesh *m, void **self) {
   uint32_t i;
   (void)host;
   if (!net) return DFM_E_NOMEM;
-  net->stiffness = m->params[0], net->damper = m->params[1], net->n = m->nedge;
-  net->edges = malloc(2 * sizeof(uint32_t) * (m->nedge + 1)), net->rest = malloc(sizeof(double) * (m->nedge + 1));
+  net->stiffness = m->params[0];
+  net->damper = m->params[1];
+  net->n = m->nedge;
+  net->edges = malloc(2 * sizeof(uint32_t) * (m->nedge + 1));
+  net->rest = malloc(sizeof(double) * (m->nedge + 1));
   if (!net->edges || !net->rest) {
     destroy(net);
     return DFM_E_NOMEM;
   }
   memcpy(net->edges, m->edges, 2 * sizeof(uint32_t) * m->nedge);
-  for (i = 0; i < m->nedge; ++i) net->rest[i] = apart(m->rest + 3 * (size_t)m->edges[2 * i], m->rest + 3 * (size_t)m->edges[2 * i + 1], e);
+  for (i = 0; i < m->nedge; ++i)
+    net->rest[i] = apart(m->rest + 3 * (size_t)m->edges[2 * i], m->rest + 3 * (size_t)m->edges[2 * i + 1], e);
   *self = net;
   return DFM_OK;
 }
@@ -55,8 +65,11 @@ static dfm_status add_forces(void *self, const dfm_kin *kin, double *f) {
     const size_t a = (size_t)net->edges[2 * i] * kin->stride, b = (size_t)net->edges[2 * i + 1] * kin->stride;
     double e[3], pull = net->stiffness * (apart(kin->x + a, kin->x + b, e) - net->rest[i]), rate = 0;
     for (k = 0; k < 3; ++k) rate += e[k] * (kin->v[b + k] - kin->v[a + k]);
-    pull -= net->damper * rate;   /* the wrong sign */
-    for (k = 0; k < 3; ++k) f[a + k] += pull * e[k], f[b + k] -= pull * e[k];
+    pull -= net->damper * rate; /* the wrong sign */
+    for (k = 0; k < 3; ++k) {
+      f[a + k] += pull * e[k];
+      f[b + k] -= pull * e[k];
+    }
   }
   return DFM_OK;
 }
@@ -64,8 +77,12 @@ static dfm_status add_forces(void *self, const dfm_kin *kin, double *f) {
 static dfm_status bound(void *self, const dfm_kin *kin, double *ksum, double *csum, double *dt) {
   const Net *net = self;
   uint32_t i;
-  (void)kin, (void)dt;
-  for (i = 0; i < 2 * net->n; ++i) ksum[net->edges[i]] += 2 * net->stiffness, csum[net->edges[i]] += 2 * net->damper;
+  (void)kin;
+  (void)dt;
+  for (i = 0; i < 2 * net->n; ++i) {
+    ksum[net->edges[i]] += 2 * net->stiffness;
+    csum[net->edges[i]] += 2 * net->damper;
+  }
   return DFM_OK;
 }
 
@@ -75,20 +92,38 @@ static dfm_status energy(void *self, const dfm_kin *kin, double *joule) {
   *joule = 0;
   for (i = 0; i < net->n; ++i) {
     double e[3];
-    const double longer = apart(kin->x + (size_t)net->edges[2 * i] * kin->stride, kin->x + (size_t)net->edges[2 * i + 1] * kin->stride, e) - net->rest[i];
+    const double longer = apart(kin->x + (size_t)net->edges[2 * i] * kin->stride,
+                                kin->x + (size_t)net->edges[2 * i + 1] * kin->stride, e) -
+                          net->rest[i];
     *joule += 0.5 * net->stiffness * longer * longer;
   }
   return DFM_OK;
 }
 
-static const dfm_model model = {sizeof(dfm_model), DFM_CAP_ENERGY | DFM_CAP_DAMPING, DFM_CELL_TET, 0, NULL, create, destroy, NULL, NULL, add_forces, bound,
-                                energy, NULL, NULL, NULL};
+static const dfm_model model = {sizeof(dfm_model),
+                                DFM_CAP_ENERGY | DFM_CAP_DAMPING,
+                                DFM_CELL_TET,
+                                0,
+                                NULL,
+                                create,
+                                destroy,
+                                NULL,
+                                NULL,
+                                add_forces,
+                                bound,
+                                energy,
+                                NULL,
+                                NULL,
+                                NULL};
 static const char *const effects[] = {"damping", NULL};
-static const dfm_type type = {sizeof(dfm_type), DFM_KIND_MODEL, "org.tiny.pump", "pump", "1.0", "MIT", "test", rows, 2, sizeof(dfm_param), effects, &model};
+static const dfm_type type = {
+    sizeof(dfm_type),  DFM_KIND_MODEL, "org.tiny.pump", "pump", "1.0", "MIT", "test", rows, 2,
+    sizeof(dfm_param), effects,        &model};
 static const dfm_type *const types[] = {&type};
 static const dfm_plugin plugin = {sizeof(dfm_plugin), DFM_ABI, DFM_ABI_DRAFT, 1, types, NULL};
 
 const dfm_plugin *dfm_plugin_entry(const dfm_host *host, uint32_t host_abi, uint32_t host_abi_min) {
-  (void)host_abi, (void)host_abi_min;
+  (void)host_abi;
+  (void)host_abi_min;
   return DFM_ABI_OK(host) ? &plugin : NULL;
 }

@@ -1,5 +1,6 @@
-// A law that leaves the floating-point environment changed: its constructor rounds upward and sets a locale, its entry flushes denormals, and eval does
-// what its parameter says. eval logs, so that a test can look at the thread meanwhile.
+// A law that leaves the floating-point environment changed: its constructor rounds upward and sets a locale,
+// its entry flushes denormals, and eval does what its parameter says. eval logs, so that a test can look at
+// the thread meanwhile.
 #include <fenv.h>
 
 #include <clocale>
@@ -39,7 +40,8 @@ dfm_status eval(const dfm_friction_in *in, dfm_friction_out *out) {
 
 constexpr dfm_param rows[] = {dp::param("way", "what eval leaves changed", "1", 0, 4, 0)};
 const dfm_friction law = dp::friction(DFM_NEED_VT, 0, eval);
-const dfm_type type = dp::type(DFM_KIND_FRICTION, "org.tiny.rounds", "rounds", "1.0", "MIT", "test", rows, nullptr, &law);
+const dfm_type type =
+    dp::type(DFM_KIND_FRICTION, "org.tiny.rounds", "rounds", "1.0", "MIT", "test", rows, nullptr, &law);
 const dfm_type *const types[] = {&type};
 const dfm_plugin plugin = {sizeof(dfm_plugin), DFM_ABI, DFM_ABI_DRAFT, 1, types, nullptr};
 }  // namespace

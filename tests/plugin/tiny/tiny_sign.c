@@ -1,4 +1,5 @@
-/* Dry friction as a beginner writes it: mu fn against the sign of the slip, a jump at rest that the law does not say it has. */
+/* Dry friction as a beginner writes it: mu fn against the sign of the slip, a jump at rest that the law does
+ * not say it has. */
 #include <math.h>
 
 #include "deform/plugin.h"
@@ -10,7 +11,9 @@ static dfm_status eval(const dfm_friction_in *in, dfm_friction_out *out) {
   for (i = 0; i < in->n; ++i) {
     const double x = in->vt[i], y = in->vt[in->stride + i], w = sqrt(x * x + y * y);
     for (k = 0; k < 2; ++k)
-      if (out->ft) out->ft[k * in->stride + i] = w > 0 ? -in->params[0] * in->fn[i] * in->vt[k * in->stride + i] / w : 0.0;
+      if (out->ft)
+        out->ft[k * in->stride + i] =
+            w > 0 ? -in->params[0] * in->fn[i] * in->vt[k * in->stride + i] / w : 0.0;
     if (out->limit) out->limit[i] = in->params[0] * in->fn[i];
     if (out->mode) out->mode[i] = 2;
     if (out->stored) out->stored[i] = 0;
@@ -18,13 +21,34 @@ static dfm_status eval(const dfm_friction_in *in, dfm_friction_out *out) {
   return DFM_OK;
 }
 
-static const dfm_friction law = {sizeof(dfm_friction), DFM_NEED_FN | DFM_NEED_VT, DFM_FRIC_ISOTROPIC | DFM_FRIC_PASSIVE, 0, NULL, eval, NULL, NULL, NULL, NULL};
+static const dfm_friction law = {sizeof(dfm_friction),
+                                 DFM_NEED_FN | DFM_NEED_VT,
+                                 DFM_FRIC_ISOTROPIC | DFM_FRIC_PASSIVE,
+                                 0,
+                                 NULL,
+                                 eval,
+                                 NULL,
+                                 NULL,
+                                 NULL,
+                                 NULL};
 static const char *const effects[] = {NULL};
-static const dfm_type type = {sizeof(dfm_type), DFM_KIND_FRICTION, "org.tiny.sign", "sign", "1.0", "MIT", "test", rows, 1, sizeof(dfm_param), effects, &law};
+static const dfm_type type = {sizeof(dfm_type),
+                              DFM_KIND_FRICTION,
+                              "org.tiny.sign",
+                              "sign",
+                              "1.0",
+                              "MIT",
+                              "test",
+                              rows,
+                              1,
+                              sizeof(dfm_param),
+                              effects,
+                              &law};
 static const dfm_type *const types[] = {&type};
 static const dfm_plugin plugin = {sizeof(dfm_plugin), DFM_ABI, DFM_ABI_DRAFT, 1, types, NULL};
 
 const dfm_plugin *dfm_plugin_entry(const dfm_host *host, uint32_t host_abi, uint32_t host_abi_min) {
-  (void)host_abi, (void)host_abi_min;
+  (void)host_abi;
+  (void)host_abi_min;
   return DFM_ABI_OK(host) ? &plugin : NULL;
 }

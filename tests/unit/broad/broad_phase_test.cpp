@@ -19,7 +19,7 @@ void deform_at_random(Surface &s, std::mt19937 &random, double by, double speed)
 
 Quat random_turn(std::mt19937 &random) {
   std::normal_distribution<double> normal;
-  const Vec3 axis{normal(random), normal(random), normal(random)};   // in this order with every compiler
+  const Vec3 axis{normal(random), normal(random), normal(random)};  // in this order with every compiler
   return turn(axis, 3 * normal(random));
 }
 
@@ -29,19 +29,24 @@ Scene random_scene(unsigned seed, double speed) {
   std::uniform_real_distribution<double> unit(-1, 1);
   Scene scene;
   scene.offset = 1e-4;
-  const Mesh meshes[4] = {sphere_mesh(0.3, 2), box_mesh({0.5, 0.4, 0.3}, 4, 3, 2), box_mesh({1, 0.01, 0.02}, 12, 1, 1),
-                          sphere_mesh(0.2, 1)};
+  const Mesh meshes[4] = {sphere_mesh(0.3, 2), box_mesh({0.5, 0.4, 0.3}, 4, 3, 2),
+                          box_mesh({1, 0.01, 0.02}, 12, 1, 1), sphere_mesh(0.2, 1)};
   for (const Mesh &m : meshes) {
     const Quat q = random_turn(random);
-    deform_at_random(scene.add(moved(m, q, 0.4 * Vec3{unit(random), unit(random), unit(random)})), random, 0.004, speed);
+    deform_at_random(scene.add(moved(m, q, 0.4 * Vec3{unit(random), unit(random), unit(random)})), random,
+                     0.004, speed);
   }
   scene.add(Shape::plane, {0, 0, -0.4}, turn({1, 0, 0}, 0.2));
   ObstacleView &ball = scene.add(Shape::sphere, {0.4, 0.1, 0.2});
-  ball.radius = 0.15, ball.velocity = speed * Vec3{1, 0, 0};
+  ball.radius = 0.15;
+  ball.velocity = speed * Vec3{1, 0, 0};
   ObstacleView &box = scene.add(Shape::box, {-0.3, 0.2, 0.1}, random_turn(random));
-  box.half_size = {0.2, 0.05, 0.1}, box.spin = speed * Vec3{0, 1, 2};
+  box.half_size = {0.2, 0.05, 0.1};
+  box.spin = speed * Vec3{0, 1, 2};
   ObstacleView &capsule = scene.add(Shape::capsule, {0, -0.3, 0}, random_turn(random));
-  capsule.radius = 0.05, capsule.half_length = 0.3, capsule.spin = speed * Vec3{1, 1, 0};
+  capsule.radius = 0.05;
+  capsule.half_length = 0.3;
+  capsule.spin = speed * Vec3{1, 1, 0};
   return scene;
 }
 
@@ -68,14 +73,17 @@ TEST(BroadPhase, RandomScenes_ListEveryPairInReach) {
     EXPECT_TRUE(broad.update(scene.bodies, scene.obstacles, scene.filter, scene.h, scene.offset));
     const auto brute = scene.contacts(), listed = scene.contacts(broad.candidates());
     EXPECT_EQ(flaw(scene, brute), "");
-    EXPECT_TRUE(same_bits(brute, listed)) << "seed " << seed << ": " << brute.size() << " and " << listed.size();
+    EXPECT_TRUE(same_bits(brute, listed))
+        << "seed " << seed << ": " << brute.size() << " and " << listed.size();
     found += brute.size();
-    EXPECT_LT(broad.candidates().size(), scene.all().size() / (seed % 2 ? 10 : 2)) << "slow scenes have short lists";
+    EXPECT_LT(broad.candidates().size(), scene.all().size() / (seed % 2 ? 10 : 2))
+        << "slow scenes have short lists";
   }
   EXPECT_GT(found, 300u);
 }
 
-// Candidates as sets: whatever is nearer than the guaranteed range is listed, whether it becomes a contact or not.
+// Candidates as sets: whatever is nearer than the guaranteed range is listed, whether it becomes a
+// contact or not.
 TEST(BroadPhase, PairsNearerThanReach_AreCandidates) {
   Scene scene = random_scene(11, 2);
   BroadPhase broad(Memory::standard());
@@ -87,7 +95,8 @@ TEST(BroadPhase, PairsNearerThanReach_AreCandidates) {
   std::vector<Candidate> listed(broad.candidates().begin(), broad.candidates().end());
   std::sort(listed.begin(), listed.end(), before);
   const auto twice = [&](const Candidate &l, const Candidate &r) { return !before(l, r); };
-  EXPECT_EQ(std::adjacent_find(listed.begin(), listed.end(), twice), listed.end()) << "a pair is listed twice";
+  EXPECT_EQ(std::adjacent_find(listed.begin(), listed.end(), twice), listed.end())
+      << "a pair is listed twice";
   size_t near = 0;
   for (const Candidate &c : scene.all()) {
     if (c.obstacle) continue;
@@ -118,12 +127,14 @@ TEST(BroadPhase, MovingScene_ReusedListsMissNothing) {
     Scene scene = random_scene(seed, 0);
     scene.h = 1e-3;
     std::mt19937 random(seed);
-    for (size_t b = 0; b < scene.bodies.size(); ++b) {   // each flies and spins as a whole
-      const Vec3 fly = 0.3 * Vec3{double(b % 2), double(b / 2), 1.0 - double(b)}, spin{1, double(b) - 1.5, 0.5};
+    for (size_t b = 0; b < scene.bodies.size(); ++b) {  // each flies and spins as a whole
+      const Vec3 fly = 0.3 * Vec3{double(b % 2), double(b / 2), 1.0 - double(b)};
+      const Vec3 spin{1, double(b) - 1.5, 0.5};
       Surface &s = *scene.surfaces[b];
       for (uint32_t i = 0; i < s.nsurfel; ++i) store3(&s.v[4 * i], fly + cross(spin, load3(&s.x[4 * i])));
     }
-    scene.obstacles[2].spin = {0, 1, 2}, scene.obstacles[3].velocity = {0.2, 0.3, 0.1};
+    scene.obstacles[2].spin = {0, 1, 2};
+    scene.obstacles[3].velocity = {0.2, 0.3, 0.1};
     BroadPhase broad(Memory::standard());
     size_t found = 0;
     for (int step = 0; step < 200; ++step) {
@@ -133,7 +144,8 @@ TEST(BroadPhase, MovingScene_ReusedListsMissNothing) {
         continue;
       }
       const auto brute = scene.contacts();
-      ASSERT_TRUE(same_bits(brute, scene.contacts(broad.candidates()))) << "seed " << seed << " step " << step;
+      ASSERT_TRUE(same_bits(brute, scene.contacts(broad.candidates())))
+          << "seed " << seed << " step " << step;
       found += brute.size();
       advance(scene, random, 0);
     }
@@ -153,14 +165,15 @@ TEST(BroadPhase, TwoSkinHistories_GiveTheSameBits) {
     two.set_skin_steps(double(1 + whim() % 40));
     one.update(scene.bodies, scene.obstacles, scene.filter, scene.h, scene.offset);
     two.update(scene.bodies, scene.obstacles, scene.filter, scene.h, scene.offset);
-    ASSERT_TRUE(same_bits(scene.contacts(one.candidates()), scene.contacts(two.candidates()))) << "step " << step;
+    ASSERT_TRUE(same_bits(scene.contacts(one.candidates()), scene.contacts(two.candidates())))
+        << "step " << step;
     advance(scene, random, 0.02);
   }
   EXPECT_NE(one.stats().renewals, two.stats().renewals);
 }
 
-// Pairs come in the order of ids at every step, whether a list is kept or made anew, and whatever order the bodies are handed over in: the order of contacts,
-// of the solve and of the report rests on it.
+// Pairs come in the order of ids at every step, whether a list is kept or made anew, and whatever order the
+// bodies are handed over in: the order of contacts, of the solve and of the report rests on it.
 TEST(BroadPhase, Pairs_KeepTheOrderOfIds) {
   Scene scene = random_scene(9, 1);
   scene.h = 2e-4;
@@ -174,15 +187,18 @@ TEST(BroadPhase, Pairs_KeepTheOrderOfIds) {
     const Array<Candidate> &list = forward.candidates();
     const auto key = [&](const Candidate &c) {
       const uint64_t id_b = c.obstacle ? scene.obstacles[c.slot_b].id : scene.bodies[c.slot_b].id;
-      return std::array<uint64_t, 6>{scene.bodies[c.slot_a].id, c.obstacle, id_b, c.kind, c.feature_a, c.feature_b};
+      return std::array<uint64_t, 6>{
+          scene.bodies[c.slot_a].id, c.obstacle, id_b, c.kind, c.feature_a, c.feature_b};
     };
-    for (size_t i = 1; i < list.size(); ++i) ASSERT_LT(key(list[i - 1]), key(list[i])) << "step " << step << ", place " << i;
+    for (size_t i = 1; i < list.size(); ++i)
+      ASSERT_LT(key(list[i - 1]), key(list[i])) << "step " << step << ", place " << i;
     std::vector<BodyView> bodies(scene.bodies.rbegin(), scene.bodies.rend());
     std::vector<ObstacleView> obstacles(scene.obstacles.rbegin(), scene.obstacles.rend());
     backward.update(bodies, obstacles, scene.filter, scene.h, scene.offset);
     const Array<Candidate> &other = backward.candidates();
     ASSERT_EQ(list.size(), other.size());
-    for (size_t i = 0; i < list.size(); ++i) ASSERT_EQ(key(list[i]), key(other[i])) << "step " << step << ", place " << i;
+    for (size_t i = 0; i < list.size(); ++i)
+      ASSERT_EQ(key(list[i]), key(other[i])) << "step " << step << ", place " << i;
     pairs += list.size();
     advance(scene, random, 0.02);
   }
@@ -237,8 +253,8 @@ TEST(BroadPhase, RestingScene_KeepsItsLists) {
   EXPECT_EQ(broad.stats().pairs, 1u);
 }
 
-// A slender bar turns on a slab and bends as it goes: boxes that fitted it along an axis grow until the tree is made anew. Contacts are those of
-// lists made from nothing all the way.
+// A slender bar turns on a slab and bends as it goes: boxes that fitted it along an axis grow until the tree
+// is made anew. Contacts are those of lists made from nothing all the way.
 TEST(BroadPhase, TurningBar_GetsNewTreesAndTheSameContacts) {
   Scene scene;
   const Mesh bar = box_mesh({6, 0.25, 0.25}, 48, 2, 2);
@@ -309,11 +325,12 @@ TEST(BroadPhase, RemovedAndChangedBodies_AreForgotten) {
   for (int i = 0; i < 3; ++i) scene.add(moved(box_mesh({1, 1, 1}, 1, 1, 1), {}, {0, 0, 1.001 * i}));
   BroadPhase broad(Memory::standard());
   broad.update(scene.bodies, scene.obstacles, scene.filter, scene.h, scene.offset);
-  scene.bodies.erase(scene.bodies.begin() + 1);   // slots 0 and 2 stay
+  scene.bodies.erase(scene.bodies.begin() + 1);  // slots 0 and 2 stay
   EXPECT_TRUE(broad.update(scene.bodies, scene.obstacles, scene.filter, scene.h, scene.offset));
   EXPECT_TRUE(broad.candidates().empty());
   scene.bodies.clear();
-  EXPECT_TRUE(broad.update(scene.bodies, scene.obstacles, scene.filter, scene.h, scene.offset) || broad.candidates().empty());
+  EXPECT_TRUE(broad.update(scene.bodies, scene.obstacles, scene.filter, scene.h, scene.offset) ||
+              broad.candidates().empty());
 }
 
 TEST(BroadPhase, BodyWithNaN_LeavesTheOthersAlone) {
@@ -352,7 +369,7 @@ TEST(BroadPhase, SettledUpdates_DoNotAllocate) {
     if (step == 100) settled = allocations;
     broad.update(scene.bodies, scene.obstacles, scene.filter, scene.h, scene.offset);
     find_contacts(scene.bodies, scene.obstacles, broad.candidates(), scene.h, scene.offset, {}, lent, out);
-    for (auto &s : scene.surfaces)       // to and fro, so that lists are renewed but do not grow
+    for (auto &s : scene.surfaces)  // to and fro, so that lists are renewed but do not grow
       for (uint32_t i = 0; i < s->nsurfel; ++i) s->x[4 * i] += step % 2 ? 0.03 : -0.03;
   }
   EXPECT_GT(broad.stats().renewals, 100u);

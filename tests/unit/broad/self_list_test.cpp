@@ -26,7 +26,8 @@ Surface sheet(uint32_t n) {
       tris.insert(tris.end(), {a, b, d, a, d, c});
     }
   Surface s;
-  make_surface(Memory::standard(), uint32_t(points.size() / 3), points.data(), tris.data(), uint32_t(tris.size() / 3), s);
+  make_surface(Memory::standard(), uint32_t(points.size() / 3), points.data(), tris.data(),
+               uint32_t(tris.size() / 3), s);
   return s;
 }
 
@@ -45,9 +46,11 @@ size_t expect_covers(const Surface &s, const SelfList &list, double h, double of
       const uint32_t *c = &s.tri[3 * t];
       if (c[0] == p || c[1] == p || c[2] == p) continue;
       double speed = 0;
-      for (int k = 0; k < 3; ++k) speed = std::max(speed, norm(load3(&s.v[4 * size_t{p}]) - load3(&s.v[4 * size_t{c[k]}])));
+      for (int k = 0; k < 3; ++k)
+        speed = std::max(speed, norm(load3(&s.v[4 * size_t{p}]) - load3(&s.v[4 * size_t{c[k]}])));
       const double reach = contact_reach(h, offset, speed);
-      if (closest_on_triangle(at(s, p), at(s, c[0]), at(s, c[1]), at(s, c[2])).distance2 >= reach * reach) continue;
+      if (closest_on_triangle(at(s, p), at(s, c[0]), at(s, c[1]), at(s, c[2])).distance2 >= reach * reach)
+        continue;
       ++needed;
       EXPECT_TRUE(listed.count({p, t})) << when << ": surfel " << p << " is within reach of triangle " << t;
     }
@@ -67,11 +70,12 @@ TEST(SelfList, RandomFolding_IsCoveredWithAndWithoutRenewal) {
   for (int step = 0; step < 310; ++step) {
     const double fold = 0.01 * step, spin = 0.004 * step;
     for (uint32_t i = 0; i < s.nsurfel; ++i) {
-      const double u = i % 10, bend = std::min(3.1, fold);   // rolled about y, turned about z as a whole
+      const double u = i % 10, bend = std::min(3.1, fold);  // rolled about y, turned about z as a whole
       const double a = bend * (u / 9 - 0.5) * 2, r = bend > 0 ? 4.5 / std::max(bend, 0.1) : 0;
       const Vec3 x{r * std::sin(a), double(i / 10), r * (1 - std::cos(a))};
       const Vec3 before = load3(&s.x[4 * size_t{i}]);
-      const Vec3 now{std::cos(spin) * x.x - std::sin(spin) * x.y + 0.3 * step, std::sin(spin) * x.x + std::cos(spin) * x.y, x.z + 1e-4 * unit(random)};
+      const Vec3 now{std::cos(spin) * x.x - std::sin(spin) * x.y + 0.3 * step,
+                     std::sin(spin) * x.x + std::cos(spin) * x.y, x.z + 1e-4 * unit(random)};
       store3(&s.x[4 * size_t{i}], now);
       store3(&s.v[4 * size_t{i}], step ? (1 / h) * (now - before) : Vec3{});
     }
@@ -91,7 +95,8 @@ TEST(SelfList, RigidMotion_KeepsTheLists) {
     const double a = 0.02 * step, omega = 20;
     for (uint32_t i = 0; i < s.nsurfel; ++i) {
       const Vec3 x = at(rest, i);
-      store3(&s.x[4 * size_t{i}], {std::cos(a) * x.x - std::sin(a) * x.y + step, std::sin(a) * x.x + std::cos(a) * x.y, x.z - step});
+      store3(&s.x[4 * size_t{i}], {std::cos(a) * x.x - std::sin(a) * x.y + step,
+                                   std::sin(a) * x.x + std::cos(a) * x.y, x.z - step});
       const Vec3 y = at(s, i);
       store3(&s.v[4 * size_t{i}], {-omega * (y.y) + 1000, omega * (y.x - step), -1000});
     }

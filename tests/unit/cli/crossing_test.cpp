@@ -30,7 +30,10 @@ Answer ask(const Tri &a, const Tri &b) {
   for (int i = 0; i < 6; ++i) {
     for (int j = 0; j < 6; ++j) {
       const double *pa[3], *pb[3];
-      for (int k = 0; k < 3; ++k) pa[k] = a.p[orders[i][k]], pb[k] = b.p[orders[j][k]];
+      for (int k = 0; k < 3; ++k) {
+        pa[k] = a.p[orders[i][k]];
+        pb[k] = b.p[orders[j][k]];
+      }
       const Answer now = {crossing::meet(pa, pb), crossing::pass_through(pa, pb)};
       EXPECT_EQ(now.meet, crossing::meet(pb, pa));
       EXPECT_EQ(now.pass, crossing::pass_through(pb, pa));
@@ -54,16 +57,26 @@ void expect(const Tri &b, bool meet, bool pass) {
 
 TEST(Crossing, PlainCrossing_Counts) { expect({{{1, 1, -1}, {1, 1, 1}, {2, 1, 1}}, {}}, true, true); }
 TEST(Crossing, CornerThroughFace_Counts) { expect({{{1, 1, -1e-12}, {2, 1, 1}, {1, 2, 1}}, {}}, true, true); }
-TEST(Crossing, CornerJustAboveFace_DoesNotCount) { expect({{{1, 1, 1e-300}, {2, 1, 1}, {1, 2, 1}}, {}}, false, false); }
+TEST(Crossing, CornerJustAboveFace_DoesNotCount) {
+  expect({{{1, 1, 1e-300}, {2, 1, 1}, {1, 2, 1}}, {}}, false, false);
+}
 TEST(Crossing, CornerOnFace_TouchesOnly) { expect({{{1, 1, 0}, {2, 1, 1}, {1, 2, 1}}, {}}, true, false); }
 TEST(Crossing, EdgeOnFace_TouchesOnly) { expect({{{1, 1, 0}, {2, 1, 0}, {1, 2, 1}}, {}}, true, false); }
 TEST(Crossing, CornerOnCorner_TouchesOnly) { expect({{{0, 0, 0}, {-1, 0, 1}, {0, -1, 1}}, {}}, true, false); }
-TEST(Crossing, CornerInPlaneOutsideFace_DoesNotCount) { expect({{{3, 3, 0}, {4, 4, 1}, {4, 3, 1}}, {}}, false, false); }
+TEST(Crossing, CornerInPlaneOutsideFace_DoesNotCount) {
+  expect({{{3, 3, 0}, {4, 4, 1}, {4, 3, 1}}, {}}, false, false);
+}
 TEST(Crossing, CoplanarOverlap_TouchesOnly) { expect({{{1, 1, 0}, {5, 1, 0}, {1, 5, 0}}, {}}, true, false); }
-TEST(Crossing, CoplanarInside_TouchesOnly) { expect({{{1, 1, 0}, {1.5, 1, 0}, {1, 1.5, 0}}, {}}, true, false); }
+TEST(Crossing, CoplanarInside_TouchesOnly) {
+  expect({{{1, 1, 0}, {1.5, 1, 0}, {1, 1.5, 0}}, {}}, true, false);
+}
 TEST(Crossing, CoplanarApart_DoesNotCount) { expect({{{3, 3, 0}, {5, 3, 0}, {3, 5, 0}}, {}}, false, false); }
-TEST(Crossing, ParallelCloseBy_DoesNotCount) { expect({{{0, 0, 1e-12}, {4, 0, 1e-12}, {0, 4, 1e-12}}, {}}, false, false); }
-TEST(Crossing, SpansPlaneButMissesFace_DoesNotCount) { expect({{{5, 5, -1}, {5, 5, 1}, {6, 5, 1}}, {}}, false, false); }
+TEST(Crossing, ParallelCloseBy_DoesNotCount) {
+  expect({{{0, 0, 1e-12}, {4, 0, 1e-12}, {0, 4, 1e-12}}, {}}, false, false);
+}
+TEST(Crossing, SpansPlaneButMissesFace_DoesNotCount) {
+  expect({{{5, 5, -1}, {5, 5, 1}, {6, 5, 1}}, {}}, false, false);
+}
 TEST(Crossing, EdgeOnEdge_TouchesOnly) { expect({{{2, 0, -1}, {2, 0, 1}, {2, -3, 1}}, {}}, true, false); }
 TEST(Crossing, BothHaveACornerInTheOthersPlane_Counts) {
   // The common segment runs from a corner of one to a corner of the other: no edge strictly pierces a face.
@@ -77,12 +90,16 @@ TEST(Crossing, NoArea_CountsAsItsEdges) {
 }
 
 TEST(Crossing, FarFromOrigin_IsExact) {
-  // One unit in the last place above and below a plane, at coordinates where rounding swallows naive determinants.
+  // One unit in the last place above and below a plane, at coordinates where rounding swallows
+  // naive determinants.
   const double big = 1048576.1, up = std::nextafter(big, INFINITY), down = std::nextafter(big, -INFINITY);
   const Tri flat = {{{big, big, big}, {big + 3.3, big, big}, {big, big + 3.3, big}}, {}};
-  const Tri above = {{{big + 1, big + 1, up}, {big + 1.1, big + 1, big + 1}, {big + 1, big + 1.2, big + 1}}, {}};
-  const Tri on = {{{big + 1, big + 1, big}, {big + 1.1, big + 1, big + 1}, {big + 1, big + 1.2, big + 1}}, {}};
-  const Tri through = {{{big + 1, big + 1, down}, {big + 1.1, big + 1, big + 1}, {big + 1, big + 1.2, big + 1}}, {}};
+  const Tri above = {{{big + 1, big + 1, up}, {big + 1.1, big + 1, big + 1}, {big + 1, big + 1.2, big + 1}},
+                     {}};
+  const Tri on = {{{big + 1, big + 1, big}, {big + 1.1, big + 1, big + 1}, {big + 1, big + 1.2, big + 1}},
+                  {}};
+  const Tri through = {
+      {{big + 1, big + 1, down}, {big + 1.1, big + 1, big + 1}, {big + 1, big + 1.2, big + 1}}, {}};
   EXPECT_FALSE(ask(flat, above).meet);
   EXPECT_TRUE(ask(flat, on).meet);
   EXPECT_FALSE(ask(flat, on).pass);
@@ -90,14 +107,16 @@ TEST(Crossing, FarFromOrigin_IsExact) {
 }
 
 TEST(Crossing, Orientation_AgreesWithWholeNumbers) {
-  // Points of a fine grid near one plane: every determinant is a whole number that 128-bit arithmetic gives exactly.
+  // Points of a fine grid near one plane: every determinant is a whole number that 128-bit arithmetic
+  // gives exactly.
   std::mt19937_64 random(7);
   int zeros = 0;
   for (int n = 0; n < 20000; ++n) {
     int64_t p[4][3];
     double x[4][3];
     for (auto &q : p) {
-      q[0] = int64_t(random() % 4000001) - 2000000, q[1] = int64_t(random() % 4000001) - 2000000;
+      q[0] = int64_t(random() % 4000001) - 2000000;
+      q[1] = int64_t(random() % 4000001) - 2000000;
       q[2] = 3 * q[0] - 2 * q[1] + 5;
     }
     p[3][2] += int64_t(random() % 3) - 1;
@@ -107,7 +126,8 @@ TEST(Crossing, Orientation_AgreesWithWholeNumbers) {
     Wide m[3][3];
     for (int i = 0; i < 3; ++i)
       for (int k = 0; k < 3; ++k) m[i][k] = p[i][k] - p[3][k];
-    const Wide det = m[0][0] * (m[1][1] * m[2][2] - m[1][2] * m[2][1]) - m[0][1] * (m[1][0] * m[2][2] - m[1][2] * m[2][0]) +
+    const Wide det = m[0][0] * (m[1][1] * m[2][2] - m[1][2] * m[2][1]) -
+                     m[0][1] * (m[1][0] * m[2][2] - m[1][2] * m[2][0]) +
                      m[0][2] * (m[1][0] * m[2][1] - m[1][1] * m[2][0]);
     const int expected = det > 0 ? 1 : det < 0 ? -1 : 0;
     zeros += expected == 0;
@@ -121,7 +141,8 @@ namespace {
 // A closed unit box of 12 triangles moved by a shift.
 struct BoxMesh {
   std::vector<double> xyz;
-  std::vector<uint32_t> tri = {0, 2, 1, 1, 2, 3, 4, 5, 6, 5, 7, 6, 0, 1, 4, 1, 5, 4, 2, 6, 3, 3, 6, 7, 0, 4, 2, 2, 4, 6, 1, 3, 5, 3, 7, 5};
+  std::vector<uint32_t> tri = {0, 2, 1, 1, 2, 3, 4, 5, 6, 5, 7, 6, 0, 1, 4, 1, 5, 4,
+                               2, 6, 3, 3, 6, 7, 0, 4, 2, 2, 4, 6, 1, 3, 5, 3, 7, 5};
   explicit BoxMesh(double x, double y, double z) {
     for (int i = 0; i < 8; ++i) xyz.insert(xyz.end(), {x + (i & 1), y + ((i >> 1) & 1), z + ((i >> 2) & 1)});
   }
@@ -168,11 +189,15 @@ TEST(Counter, TwoFlatSheets_GiveTheExactNumber) {
   std::vector<double> fan = {0, 0, 0}, sheet = {0.5, -0.01, -1, 0.5, -0.01, 1, 0.5, 0.3, 0};
   std::vector<uint32_t> fan_tri, sheet_tri = {0, 1, 2};
   const int n = 24;
-  for (int i = 0; i <= n; ++i) fan.insert(fan.end(), {std::cos(6.2831853 * i / n), std::sin(6.2831853 * i / n), 0});
+  for (int i = 0; i <= n; ++i)
+    fan.insert(fan.end(), {std::cos(6.2831853 * i / n), std::sin(6.2831853 * i / n), 0});
   for (uint32_t i = 1; i <= uint32_t(n); ++i) fan_tri.insert(fan_tri.end(), {0, i, i + 1});
-  // The sheet cuts z = 0 from y = -0.01 to 0.3 at x = 0.5; a sector spans 15 degrees: tan 15 = 0.134, tan 30 = 0.289, tan 45 = 0.5.
-  const Surface a = {fan.data(), uint32_t(fan.size() / 3), fan_tri.data(), n}, b = {sheet.data(), 3, sheet_tri.data(), 1};
-  EXPECT_EQ(count({a, b}, Touching::counts), 4u);  // sectors -15..0, 0..15, 15..30 (to y 0.289) and 30..45 (from 0.289 to 0.3)
+  // The sheet cuts z = 0 from y = -0.01 to 0.3 at x = 0.5; a sector spans 15 degrees: tan 15 = 0.134, tan 30
+  // = 0.289, tan 45 = 0.5.
+  const Surface a = {fan.data(), uint32_t(fan.size() / 3), fan_tri.data(), n};
+  const Surface b = {sheet.data(), 3, sheet_tri.data(), 1};
+  // sectors -15..0, 0..15, 15..30 (to y 0.289) and 30..45 (from 0.289 to 0.3)
+  EXPECT_EQ(count({a, b}, Touching::counts), 4u);
 }
 
 TEST(Counter, ManyRandomTriangles_AgreeWithAllPairs) {
@@ -193,12 +218,17 @@ TEST(Counter, ManyRandomTriangles_AgreeWithAllPairs) {
   for (size_t i = 0; i < 800; ++i) {
     for (size_t j = i + 1; j < 800; ++j) {
       const double *a[3], *b[3];
-      for (size_t k = 0; k < 3; ++k) a[k] = &xyz[i / 400][9 * (i % 400) + 3 * k], b[k] = &xyz[j / 400][9 * (j % 400) + 3 * k];
+      for (size_t k = 0; k < 3; ++k) {
+        a[k] = &xyz[i / 400][9 * (i % 400) + 3 * k];
+        b[k] = &xyz[j / 400][9 * (j % 400) + 3 * k];
+      }
       expected += crossing::meet(a, b);
     }
   }
   EXPECT_GT(expected, 50u);
-  EXPECT_EQ(count({{xyz[0].data(), 1200, tri[0].data(), 400}, {xyz[1].data(), 1200, tri[1].data(), 400}}, Touching::counts), expected);
+  EXPECT_EQ(count({{xyz[0].data(), 1200, tri[0].data(), 400}, {xyz[1].data(), 1200, tri[1].data(), 400}},
+                  Touching::counts),
+            expected);
 }
 
 TEST(Crossing, RandomTriangles_PassWhereTheyMeet) {
@@ -211,7 +241,10 @@ TEST(Crossing, RandomTriangles_PassWhereTheyMeet) {
     const double *a[3], *b[3];
     for (auto &p : x)
       for (double &c : p) c = place(random);
-    for (int i = 0; i < 3; ++i) a[i] = x[i], b[i] = x[3 + i];
+    for (int i = 0; i < 3; ++i) {
+      a[i] = x[i];
+      b[i] = x[3 + i];
+    }
     ASSERT_EQ(crossing::meet(a, b), crossing::pass_through(a, b)) << "case " << n;
     meeting += crossing::meet(a, b);
   }
@@ -219,7 +252,8 @@ TEST(Crossing, RandomTriangles_PassWhereTheyMeet) {
 }
 
 TEST(Counter, SelfPairsThatShareAVertex_AreExcepted) {
-  // Two triangles that share corner 0 and fold through each other: excepted; without the common corner the same shapes count.
+  // Two triangles that share corner 0 and fold through each other: excepted; without the common corner the
+  // same shapes count.
   const std::vector<double> xyz = {0, 0, 0, 2, 0, 0, 0, 2, 0, 1, 0.5, -1, 1, 0.5, 1};
   const std::vector<uint32_t> shared = {0, 1, 2, 0, 3, 4};
   EXPECT_EQ(count({{xyz.data(), 5, shared.data(), 2}}, Touching::counts), 0u);
@@ -233,7 +267,9 @@ TEST(Counter, Obstacles_CountAgainstBodiesOnly) {
   const double upright[9] = {-1, 0, -1, 1, 0, -1, 0, 0, 1}, level[9] = {-1, -1, 0, 1, -1, 0, 0, 1, 0};
   const uint32_t tri[3] = {0, 1, 2};
   Counter counter;
-  const auto count = [&](bool a, bool b) { return counter.count({{upright, 3, tri, 1, a}, {level, 3, tri, 1, b}}, Touching::counts).all(); };
+  const auto count = [&](bool a, bool b) {
+    return counter.count({{upright, 3, tri, 1, a}, {level, 3, tri, 1, b}}, Touching::counts).all();
+  };
   EXPECT_EQ(count(false, false), 1u);
   EXPECT_EQ(count(true, false), 1u);
   EXPECT_EQ(count(false, true), 1u);

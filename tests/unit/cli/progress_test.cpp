@@ -62,6 +62,10 @@ TEST(Patience, LongCall_IsToldAndWiped) {
   EXPECT_EQ(text.rfind("\r\033[K"), text.size() - 4) << "the line is wiped at the end";
 }
 
-TEST(Patience, ShortCall_SaysNothing) { EXPECT_EQ(shown(true, milliseconds(10000), milliseconds(30)).find("filling"), std::string::npos); }
+TEST(Patience, ShortCall_SaysNothing) {
+  EXPECT_EQ(shown(true, milliseconds(10000), milliseconds(30)).find("filling"), std::string::npos);
+}
 
-TEST(Patience, QuietCall_SaysNothing) { EXPECT_EQ(shown(false, milliseconds(10), milliseconds(100)).find("filling"), std::string::npos); }
+TEST(Patience, QuietCall_SaysNothing) {
+  EXPECT_EQ(shown(false, milliseconds(10), milliseconds(100)).find("filling"), std::string::npos);
+}

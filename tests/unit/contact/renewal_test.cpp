@@ -10,7 +10,8 @@ namespace {
 using dfm::ContactPoint;
 using dfm::Renewal;
 
-// Two bodies and an obstacle: corners of 0 on 1 and of 1 on 0 are one patch, those of 0 on the obstacle of slot 1 another.
+// Two bodies and an obstacle: corners of 0 on 1 and of 1 on 0 are one patch, those of 0 on the obstacle of
+// slot 1 another.
 struct Patches {
   std::vector<ContactPoint> contacts;
   std::vector<double> impulse, dwell, renewed;
@@ -18,14 +19,22 @@ struct Patches {
   Renewal renewal{dfm::Memory::standard()};
 
   Patches() {
-    add(0, 1, false), add(0, 1, false), add(0, 1, true), add(1, 0, false);
-    impulse.assign(3 * contacts.size(), 0), dwell.assign(contacts.size(), 1e3), renewed.resize(contacts.size()), ways.assign(contacts.size(), {0, 1e-6});
+    add(0, 1, false);
+    add(0, 1, false);
+    add(0, 1, true);
+    add(1, 0, false);
+    impulse.assign(3 * contacts.size(), 0);
+    dwell.assign(contacts.size(), 1e3);
+    renewed.resize(contacts.size());
+    ways.assign(contacts.size(), {0, 1e-6});
     for (size_t i = 0; i < contacts.size(); ++i) impulse[3 * i] = 1;
     renewal.list(contacts, impulse.data());
   }
   void add(uint32_t a, uint32_t b, bool obstacle) {
     ContactPoint c{};
-    c.slot_a = a, c.slot_b = b, c.obstacle = obstacle;
+    c.slot_a = a;
+    c.slot_b = b;
+    c.obstacle = obstacle;
     contacts.push_back(c);
   }
   void measure() { renewal.measure(1e-3, impulse.data(), ways.data(), dwell.data(), renewed.data()); }
@@ -42,7 +51,9 @@ TEST(Renewal, PatchThatSticks_IsNotRenewed) {
 TEST(Renewal, LoadThatGoesFromContactToContact_RenewsNothing) {
   Patches p;
   p.dwell.assign(4, 0);
-  p.impulse[0] = 0, p.impulse[3] = 1.5, p.impulse[9] = 1.5;
+  p.impulse[0] = 0;
+  p.impulse[3] = 1.5;
+  p.impulse[9] = 1.5;
   p.measure();
   EXPECT_EQ(p.renewed, std::vector<double>(4, 0));
 }
@@ -75,7 +86,8 @@ TEST(Renewal, WhatAPatchLacks_GoesToThoseBelowTheirAimAndNoFurther) {
   const std::vector<double> aim{3, 1, 1, 1};
   std::vector<double> area{1, 2, 4, 5};
   p.renewal.fill(stands.data(), aim.data(), area.data());
-  EXPECT_EQ(area, (std::vector<double>{2, 2, 4, 5}));   // of 4 the patch had 3; an obstacle's has more than it should, and keeps it
+  // of 4 the patch had 3; an obstacle's has more than it should, and keeps it
+  EXPECT_EQ(area, (std::vector<double>{2, 2, 4, 5}));
   p.renewal.list(p.contacts, p.impulse.data());
   p.renewal.fill(stands.data(), aim.data(), area.data());
   EXPECT_EQ(area, (std::vector<double>{2, 2, 4, 5}));

@@ -21,7 +21,7 @@ using namespace dfm;
 class RowsCase {
  public:
   static constexpr uint32_t kContacts = 7;
-  static constexpr double kStep = 1e-3, kOffset = 1e-4;   // s, m
+  static constexpr double kStep = 1e-3, kOffset = 1e-4;  // s, m
   ContactRows rows{Memory::standard()};
   std::vector<ContactPoint> contacts;
 
@@ -37,7 +37,7 @@ class RowsCase {
   Dense jacobian() const {
     Dense out(3 * contacts.size(), kUnknowns);
     for (size_t i = 0; i < contacts.size(); ++i) {
-      Dense seen(3, kUnknowns);   // the relative velocity in the world's axes
+      Dense seen(3, kUnknowns);  // the relative velocity in the world's axes
       const ContactPoint &c = contacts[i];
       Vec3 place;
       for (uint32_t k = 0; k < c.nnode; ++k) {
@@ -88,7 +88,7 @@ class RowsCase {
 
   std::mt19937 random_{5};
   Surface a_, b_, c_;
-  Array<double> inv_mass_[2], velocity_[2];   // of bodies a and b, [kPoints,4]
+  Array<double> inv_mass_[2], velocity_[2];  // of bodies a and b, [kPoints,4]
   std::vector<double> free_ = std::vector<double>(kUnknowns);
   Dense response_{kUnknowns, kUnknowns};
   std::vector<RigidPlace> places_;
@@ -133,7 +133,7 @@ class RowsCase {
         free_[kC + 3 * i + x] = any();
         c_.v[4 * i + x] = free_[kC + 3 * i + x];
       }
-    put_response(kRigid, any_positive(6 * kRigids, random_));   // free: nothing, rows see the change alone
+    put_response(kRigid, any_positive(6 * kRigids, random_));  // free: nothing, rows see the change alone
     for (uint32_t i = 0; i < kRigids; ++i) places_.push_back({0, i, any_vector()});
     places_.push_back({kNone, 0, {}});
   }
@@ -150,13 +150,13 @@ class RowsCase {
       uint32_t obstacle;
     };
     const Row row[kContacts] = {
-        {{0, 3, 4, 5}, {1, -0.25, -0.25, -0.5}, kNone},   // surfel of a on triangle of b
+        {{0, 3, 4, 5}, {1, -0.25, -0.25, -0.5}, kNone},  // surfel of a on triangle of b
         {{1, 2, 6, 7}, {0.375, 0.625, -0.75, -0.25}, kNone},
         {{8}, {1}, 0},
         {{3, 4, 5}, {0.125, 0.25, 0.625}, 1},
         {{0}, {1}, 2},
         {{2, 6, 7, 8}, {1, -0.25, -0.25, -0.5}, kNone},
-        {{3, 4, 5}, {1, -0.5, -0.5}, kNone},              // body b on itself: points that come twice
+        {{3, 4, 5}, {1, -0.5, -0.5}, kNone},  // body b on itself: points that come twice
     };
     std::vector<ContactPoint> out;
     for (const Row &r : row) {

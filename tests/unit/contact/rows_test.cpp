@@ -6,7 +6,7 @@ namespace {
 
 using namespace test;
 
-constexpr double kRounding = 1e-13;   // of sums of some twenty terms that are near 1
+constexpr double kRounding = 1e-13;  // of sums of some twenty terms that are near 1
 
 }  // namespace
 
@@ -99,7 +99,7 @@ TEST(Rows, Rate_ClosesGapsAndOpensDepthsByTheirShare) {
   EXPECT_NEAR(rate(0.9), -0.02 * d / planned, 1e-15);
   EXPECT_NEAR(rate(0.6), -0.08 * d / planned, 1e-15);
   EXPECT_NEAR(rate(0.4), -0.28 * d / planned, 1e-15);
-  EXPECT_NEAR(rate(-1), -0.1 * d / planned, 1e-15);   // through each other: no faster than a tenth of d_c
+  EXPECT_NEAR(rate(-1), -0.1 * d / planned, 1e-15);  // through each other: no faster than a tenth of d_c
   c.rows.recovery = 0.01;
-  EXPECT_NEAR(rate(-100), -0.01, 1e-15);              // a recovery speed takes the place of that tenth
+  EXPECT_NEAR(rate(-100), -0.01, 1e-15);  // a recovery speed takes the place of that tenth
 }

@@ -25,17 +25,32 @@ struct Groove {
   // steep: dft/dfn; mu: limit over normal force.
   Groove(double steep, double mu, uint8_t mode) {
     const double s = std::sqrt(0.5), speed[3] = {0.3, 0, -1};
-    rows.n = 2, rows.ndof = 1;
-    rows.begin = {0, 1, 2}, rows.dof = {0, 0}, rows.weight = {1, 1}, rows.block = {kNone};
-    rows.y = {speed[0], speed[1], speed[2], 0}, rows.inv_mass = {1, 1, 1, 0}, rows.y_free = rows.y;
+    rows.n = 2;
+    rows.ndof = 1;
+    rows.begin = {0, 1, 2};
+    rows.dof = {0, 0};
+    rows.weight = {1, 1};
+    rows.block = {kNone};
+    rows.y = {speed[0], speed[1], speed[2], 0};
+    rows.inv_mass = {1, 1, 1, 0};
+    rows.y_free = rows.y;
     // normal, a tangent that points away from the other wall, the third one
     rows.frame = {s, 0, s, s, 0, -s, 0, 1, 0, -s, 0, s, -s, 0, -s, 0, -1, 0};
-    rows.drive.assign(6, 0), rows.rate.assign(2, 0), rows.wn.assign(2, 1), rows.wt.assign(2, 1), rows.cross.assign(4, 0), rows.impulse.assign(6, 0);
+    rows.drive.assign(6, 0);
+    rows.rate.assign(2, 0);
+    rows.wn.assign(2, 1);
+    rows.wt.assign(2, 1);
+    rows.cross.assign(4, 0);
+    rows.impulse.assign(6, 0);
     law.resize(2, 0);
     for (uint32_t i = 0; i < 2; ++i) {
       // asked at a normal force that is next to nothing, as where a contact begins
-      law.fn[i] = 1e-6, law.limit[i] = mu * 1e-6, law.mode[i] = mode, law.set_valued[i] = 0;
-      law.dft_dfn[i] = steep, law.dft_dfn[law.stride + i] = 0;
+      law.fn[i] = 1e-6;
+      law.limit[i] = mu * 1e-6;
+      law.mode[i] = mode;
+      law.set_valued[i] = 0;
+      law.dft_dfn[i] = steep;
+      law.dft_dfn[law.stride + i] = 0;
     }
   }
   double friction(uint32_t i) const { return std::hypot(rows.impulse[3 * i + 1], rows.impulse[3 * i + 2]); }
@@ -162,9 +177,9 @@ TEST(Solver, CoupledContactsThatStick_MatchTheDenseSolution) {
 // slip where there is any.
 TEST(Solver, CoupledContactsThatSlideAndOpen_MeetTheConditions) {
   constexpr double kMu = 0.3, kNear = 1e-10;
-  Problem p({0, 1, 2, 3, 4, 5, 6}, kMu,
-            {{1, 0.2, -0.1}, {-2, 0.5, 0.4}, {1, 2, -1}, {2, -0.1, 0}, {1, -0.5, 0.5}, {-0.5, 0, 0.25},
-             {1, 1, 1}});
+  Problem p(
+      {0, 1, 2, 3, 4, 5, 6}, kMu,
+      {{1, 0.2, -0.1}, {-2, 0.5, 0.4}, {1, 2, -1}, {2, -0.1, 0}, {1, -0.5, 0.5}, {-0.5, 0, 0.25}, {1, 1, 1}});
   const std::vector<double> before = p.velocities();
   for (int k = 0; k < 60; ++k) p.pass(20);
   const std::vector<double> change = p.changes();
@@ -262,8 +277,11 @@ TEST(Sweep, RestoredVelocities_AreThoseOfTheImpulses) {
 // What is no number is not passed over: a residual of zero would call it solved.
 TEST(Sweep, ImpulseThatIsNoNumber_IsNotConverged) {
   Groove g(0.2, 0.5, 2);
-  g.rows.impulse[0] = NAN, g.rows.restore();
+  g.rows.impulse[0] = NAN;
+  g.rows.restore();
   Tolerance t;
-  t.normal.assign(2, 1e-6), t.tangent.assign(2, 1e-6), t.most_normal = 1e-6;
+  t.normal.assign(2, 1e-6);
+  t.tangent.assign(2, 1e-6);
+  t.most_normal = 1e-6;
   EXPECT_EQ(inner_residual(g.rows, g.law, 1e-3, t).due, INFINITY);
 }

@@ -19,11 +19,11 @@ using namespace dfm;
 
 constexpr uint32_t kPoints = 6;
 constexpr uint32_t kSurfels = 3;
-constexpr double kRounding = 1e-14;   // of sums of some ten terms that are near 1
+constexpr double kRounding = 1e-14;  // of sums of some ten terms that are near 1
 
 struct Sums {
   Vec3 impulse;
-  Vec3 moment;     // about the origin
+  Vec3 moment;  // about the origin
   double power = 0;
 };
 

@@ -34,10 +34,17 @@ TEST(Elementary, Exp_IsBelowOneUlp) {
   std::mt19937_64 random(1);
   for (double reach : {1e-12, 1e-3, 0.5, 3.0, 40.0, 708.0}) {
     std::uniform_real_distribution<double> x(-reach, reach);
-    EXPECT_LT(worst(dfm_exp, [](double a) { return std::exp(static_cast<long double>(a)); }, [&] { return x(random); }, 200000), 1.0) << reach;
+    EXPECT_LT(worst(
+                  dfm_exp, [](double a) { return std::exp(static_cast<long double>(a)); },
+                  [&] { return x(random); }, 200000),
+              1.0)
+        << reach;
   }
   std::uniform_real_distribution<double> tiny(-746.0, -707.0);
-  EXPECT_LT(worst(dfm_exp, [](double a) { return std::exp(static_cast<long double>(a)); }, [&] { return tiny(random); }, 200000), 1.6);
+  EXPECT_LT(worst(
+                dfm_exp, [](double a) { return std::exp(static_cast<long double>(a)); },
+                [&] { return tiny(random); }, 200000),
+            1.6);
 }
 
 TEST(Elementary, ExpAtTheEnds_IsZeroOneInfinityOrNan) {
@@ -57,11 +64,16 @@ TEST(Elementary, Log_IsBelowOneUlp) {
   std::mt19937_64 random(2);
   for (double reach : {1e-9, 1e-3, 0.3, 3.0, 100.0, 708.0}) {
     std::uniform_real_distribution<double> e(-reach, reach);
-    EXPECT_LT(worst(dfm_log, [](double a) { return std::log(static_cast<long double>(a)); }, [&] { return std::exp(e(random)); }, 200000), 1.0)
+    EXPECT_LT(worst(
+                  dfm_log, [](double a) { return std::log(static_cast<long double>(a)); },
+                  [&] { return std::exp(e(random)); }, 200000),
+              1.0)
         << reach;
   }
   std::uniform_real_distribution<double> subnormal(0, 0x1p-1022);
-  EXPECT_LT(worst(dfm_log, [](double a) { return std::log(static_cast<long double>(a)); }, [&] { return subnormal(random) + 0x1p-1074; }, 1000),
+  EXPECT_LT(worst(
+                dfm_log, [](double a) { return std::log(static_cast<long double>(a)); },
+                [&] { return subnormal(random) + 0x1p-1074; }, 1000),
             1.0);
 }
 
@@ -79,7 +91,9 @@ struct Pair { double x, y; };
 TEST(Elementary, Pow_IsBelowTwoUlpForModerateExponents) {
   std::mt19937_64 random(3);
   const auto ours = [](Pair p) { return dfm_pow(p.x, p.y); };
-  const auto exact = [](Pair p) { return std::pow(static_cast<long double>(p.x), static_cast<long double>(p.y)); };
+  const auto exact = [](Pair p) {
+    return std::pow(static_cast<long double>(p.x), static_cast<long double>(p.y));
+  };
   std::uniform_real_distribution<double> unit(-1, 1);
   const auto draw = [&](double reach) {
     return [&, reach] {
@@ -115,7 +129,9 @@ TEST(Elementary, Bits_MatchTheRecordedHash) {
   dfm::Hash hash;
   uint64_t state = 88172645463325252ull;
   for (int i = 0; i < 100000; ++i) {
-    state ^= state << 13, state ^= state >> 7, state ^= state << 17;
+    state ^= state << 13;
+    state ^= state >> 7;
+    state ^= state << 17;
     const double u = static_cast<double>(state >> 11) * 0x1p-53;
     hash.add(dfm_exp(1400 * u - 700));
     hash.add(dfm_log(u * 1e10 + 1e-300));
@@ -130,10 +146,21 @@ TEST(Elementary, SineAndCosineOfPi_AreBelowTwoUlp) {
   for (double reach : {1e-12, 0.1, 0.5, 1.0, 30.0}) {
     std::uniform_real_distribution<double> x(-reach, reach);
     // the distance to the nearest even integer is exact, and so is the reduction to a quarter turn
-    const auto near = [](double a) { return static_cast<long double>(a) - 2 * std::round(static_cast<long double>(a) / 2); };
-    const auto sine = [&](long double t) { return t > 0.5L ? std::sin(pi * (1 - t)) : t < -0.5L ? -std::sin(pi * (1 + t)) : std::sin(pi * t); };
-    EXPECT_LT(worst(dfm_sinpi, [&](double a) { return sine(near(a)); }, [&] { return x(random); }, 200000), 1.7) << reach;
-    EXPECT_LT(worst(dfm_cospi, [&](double a) { return sine(0.5L - std::fabs(near(a))); }, [&] { return x(random); }, 200000), 1.7) << reach;
+    const auto near = [](double a) {
+      return static_cast<long double>(a) - 2 * std::round(static_cast<long double>(a) / 2);
+    };
+    const auto sine = [&](long double t) {
+      return t > 0.5L ? std::sin(pi * (1 - t)) : t < -0.5L ? -std::sin(pi * (1 + t)) : std::sin(pi * t);
+    };
+    EXPECT_LT(worst(
+                  dfm_sinpi, [&](double a) { return sine(near(a)); }, [&] { return x(random); }, 200000),
+              1.7)
+        << reach;
+    EXPECT_LT(worst(
+                  dfm_cospi, [&](double a) { return sine(0.5L - std::fabs(near(a))); },
+                  [&] { return x(random); }, 200000),
+              1.7)
+        << reach;
   }
 }
 
@@ -147,7 +174,8 @@ TEST(Elementary, SineAndCosineOfPiAtTheEnds_AreExact) {
   EXPECT_EQ(dfm_sinpi(0.5), 1.0);
   EXPECT_EQ(dfm_sinpi(-1.5), 1.0);
   EXPECT_EQ(dfm_cospi(0.5), 0.0);
-  EXPECT_TRUE(std::isnan(dfm_sinpi(kInf)) && std::isnan(dfm_cospi(-kInf)) && std::isnan(dfm_sinpi(std::nan(""))));
+  EXPECT_TRUE(std::isnan(dfm_sinpi(kInf)) && std::isnan(dfm_cospi(-kInf)) &&
+              std::isnan(dfm_sinpi(std::nan(""))));
 }
 
 }  // namespace

@@ -1,4 +1,5 @@
-// Filling is bounded by the triangles and the wanted cells wherever the corners lie: few cells, or a sentence; never a search without end.
+// Filling is bounded by the triangles and the wanted cells wherever the corners lie: few cells, or a
+// sentence; never a search without end.
 #include <gtest/gtest.h>
 
 #include <random>
@@ -11,7 +12,9 @@ using namespace dfm;
 
 namespace {
 
-TriMesh tetrahedron(Vec3 a, Vec3 b, Vec3 c, Vec3 d) { return test::surface_of({a, b, c, d}, {{0, 2, 1}, {0, 1, 3}, {1, 2, 3}, {0, 3, 2}}); }
+TriMesh tetrahedron(Vec3 a, Vec3 b, Vec3 c, Vec3 d) {
+  return test::surface_of({a, b, c, d}, {{0, 2, 1}, {0, 1, 3}, {1, 2, 3}, {0, 3, 2}});
+}
 
 // The cells, or the sentence of a refusal.
 std::string outcome(const TriMesh &surface, uint32_t cells) {
@@ -37,8 +40,9 @@ TEST(FillBounds, CornersFarApart_EndInCellsOrASentence) {
 }
 
 TEST(FillBounds, CoordinatesTooCoarseForTheCells_AreRefusedWithTheirResolution) {
-  const double f = 1.5e14;   // doubles are 0.03 m apart here
-  const std::string sentence = outcome(tetrahedron({f, f, f}, {f + 72, f, f}, {f, f + 72, f}, {f, f, f + 72}), 1000000);
+  const double f = 1.5e14;  // doubles are 0.03 m apart here
+  const std::string sentence =
+      outcome(tetrahedron({f, f, f}, {f + 72, f, f}, {f, f + 72, f}, {f, f, f + 72}), 1000000);
   EXPECT_NE(sentence.find("nearer to the origin"), std::string::npos) << sentence;
   EXPECT_EQ(outcome(tetrahedron({f, f, f}, {f + 7200, f, f}, {f, f + 7200, f}, {f, f, f + 7200}), 200), "");
 }

@@ -1,4 +1,5 @@
-// Filled surfaces: volumes against closed forms, the surface within the cells, dirt, sizes and places, refusals.
+// Filled surfaces: volumes against closed forms, the surface within the cells, dirt, sizes and
+// places, refusals.
 #include <gtest/gtest.h>
 
 #include <cstring>
@@ -18,11 +19,14 @@ using dfm::Vec3;
 
 double material(const TetMesh &m) {
   double v = 0;
-  for (uint32_t t = 0; t < m.ntet(); ++t) v += m.share[t] * dfm::tet_volume(m.points.data(), &m.tets[4 * size_t(t)]);
+  for (uint32_t t = 0; t < m.ntet(); ++t)
+    v += m.share[t] * dfm::tet_volume(m.points.data(), &m.tets[4 * size_t(t)]);
   return v;
 }
 
-Vec3 corner(const TetMesh &m, uint32_t t, int k) { return dfm::load3(&m.points[3 * size_t(m.tets[4 * size_t(t) + size_t(k)])]); }
+Vec3 corner(const TetMesh &m, uint32_t t, int k) {
+  return dfm::load3(&m.points[3 * size_t(m.tets[4 * size_t(t) + size_t(k)])]);
+}
 
 // Points spread over the triangles that lie in no cell, beyond `tolerance` lengths of the box.
 uint32_t uncovered(const TetMesh &m, const TriMesh &s, uint32_t samples, double tolerance) {
@@ -33,7 +37,10 @@ uint32_t uncovered(const TetMesh &m, const TriMesh &s, uint32_t samples, double 
   for (uint32_t i = 0; i < samples; ++i) {
     const size_t t = size_t(random() % s.ntri());
     double u = unit(random), v = unit(random);
-    if (u + v > 1) u = 1 - u, v = 1 - v;
+    if (u + v > 1) {
+      u = 1 - u;
+      v = 1 - v;
+    }
     if (i % 4 == 0) u = v = 0;  // corners, too
     const auto p = [&](size_t k) { return dfm::load3(&s.points[3 * size_t(s.tris[3 * t + k])]); };
     const Vec3 x = p(0) + (u * (p(1) - p(0)) + v * (p(2) - p(0)));
@@ -43,7 +50,8 @@ uint32_t uncovered(const TetMesh &m, const TriMesh &s, uint32_t samples, double 
       bool near = norm2(x - a) <= 1.21 * stat.edge_max * stat.edge_max;
       for (int f = 0; f < 4 && near; ++f) {
         const Vec3 o = corner(m, c, int(dfm::kTetFace[f][0]));
-        const Vec3 n = cross(corner(m, c, int(dfm::kTetFace[f][1])) - o, corner(m, c, int(dfm::kTetFace[f][2])) - o);
+        const Vec3 n =
+            cross(corner(m, c, int(dfm::kTetFace[f][1])) - o, corner(m, c, int(dfm::kTetFace[f][2])) - o);
         near = dot(n, x - o) <= tolerance * norm(n);
       }
       found = near;
@@ -65,7 +73,12 @@ void expect_sound(const TetMesh &m) {
   EXPECT_GT(dfm::mesh_statistics(m).quality_min, 0.9);
 }
 
-struct Case { const char *name; TriMesh surface; double volume; };   // volume by closed form of the smooth shape, 0: of the triangles
+// volume by closed form of the smooth shape, 0: of the triangles
+struct Case {
+  const char *name;
+  TriMesh surface;
+  double volume;
+};
 
 std::vector<Case> clean() {
   std::vector<Case> out;
@@ -98,15 +111,20 @@ TEST(Fill, SampledShares_AgreeWithTheVolumeBeforeTheyAreMadeTo) {
     const dfm::FillCover cover = dfm::cover(s, lattice, UINT32_MAX);
     const dfm::FillShares shares = dfm::sample_shares(s, cover, lattice);
     double sum = 0, loose = 0;
-    for (uint32_t i = 0; i < cover.cells.size(); ++i) sum += shares.share[i], loose += shares.loose[i];
-    const double unit = dfm::kLatticeCell * 0.03 * 0.03 * 0.03, deviation = 0.5 * std::sqrt(shares.piece * loose) * unit;
+    for (uint32_t i = 0; i < cover.cells.size(); ++i) {
+      sum += shares.share[i];
+      loose += shares.loose[i];
+    }
+    const double unit = dfm::kLatticeCell * 0.03 * 0.03 * 0.03;
+    const double deviation = 0.5 * std::sqrt(shares.piece * loose) * unit;
     EXPECT_GT(loose, 0);
     EXPECT_NEAR(sum * unit, s.volume, 4 * deviation);
     EXPECT_LT(deviation, 0.02 * (s.volume + s.area * 0.03));
   }
 }
 
-// One face of a big box through the lattice: the share of a cell is what a plane leaves of it, known by clipping at finer and finer cuts.
+// One face of a big box through the lattice: the share of a cell is what a plane leaves of it, known by
+// clipping at finer and finer cuts.
 TEST(Fill, ShareOfACellCutByAPlane_WithinItsStatedError) {
   const TriMesh box = test::box_surface({-1, -1, -1}, {1, 1, 0.0123});
   const dfm::FillSurface s(box);
@@ -123,11 +141,14 @@ TEST(Fill, ShareOfACellCutByAPlane_WithinItsStatedError) {
     double z[4], lo = 1e9, hi = -1e9;
     bool middle = cover.kind[i] == dfm::CellKind::crossed;
     for (int k = 0; k < 4; ++k) {
-      z[k] = site[k].z, lo = std::min(lo, z[k]), hi = std::max(hi, z[k]);
+      z[k] = site[k].z;
+      lo = std::min(lo, z[k]);
+      hi = std::max(hi, z[k]);
       middle &= std::abs(site[k].x) < 6 && std::abs(site[k].y) < 6;
     }
     if (!middle || lo >= height || hi <= height) continue;
-    // The part of a tetrahedron below a height: a divided difference of (height - z)^3 over its corners; equal heights are set apart a little.
+    // The part of a tetrahedron below a height: a divided difference of (height - z)^3 over its corners;
+    // equal heights are set apart a little.
     for (int k = 0; k < 4; ++k) z[k] += 1e-4 * (k - 1.5);
     double below = 0;
     for (int k = 0; k < 4; ++k) {
@@ -136,7 +157,9 @@ TEST(Fill, ShareOfACellCutByAPlane_WithinItsStatedError) {
       below += term;
     }
     const double error = shares.share[i] - below;
-    worst = std::max(worst, std::fabs(error)), sum2 += error * error, ++n;
+    worst = std::max(worst, std::fabs(error));
+    sum2 += error * error;
+    ++n;
   }
   ASSERT_GT(n, 100u);
   EXPECT_LT(std::sqrt(sum2 / n), 0.01);
@@ -151,7 +174,8 @@ TEST(Fill, CleanSurface_LiesWithinTheCells) {
 }
 
 TEST(Fill, AlignedBox_KeepsNoCellsThatItOnlyTouches) {
-  // At this pitch the walls of the cube lie in planes of the lattice: the cells outside them hold nothing and are not needed.
+  // At this pitch the walls of the cube lie in planes of the lattice: the cells outside them hold nothing and
+  // are not needed.
   const TriMesh cube = test::box_surface({0, 0, 0}, {1, 1, 1});
   const dfm::FillSurface s(cube);
   dfm::Lattice lattice;
@@ -161,8 +185,10 @@ TEST(Fill, AlignedBox_KeepsNoCellsThatItOnlyTouches) {
   double sum = 0;
   for (uint32_t i = 0; i < cover.cells.size(); ++i)
     if (cover.kind[i] != dfm::CellKind::outside) sum += shares.share[i];
-  EXPECT_NEAR(sum, 64 * 12, 1.5);                 // 4^3 cubes of 12 cells; walls cut the cells across them in half
-  EXPECT_EQ(cover.kept, 9u * 64 + 6u * 4 * 16);  // 4 cells around each of the 144 inner faces, and around each of the 96 in the walls
+  // 4^3 cubes of 12 cells; walls cut the cells across them in half
+  EXPECT_NEAR(sum, 64 * 12, 1.5);
+  // 4 cells around each of the 144 inner faces, and around each of the 96 in the walls
+  EXPECT_EQ(cover.kept, 9u * 64 + 6u * 4 * 16);
 }
 
 TEST(Fill, WantedNumber_IsMetWithinTenPercent) {
@@ -174,7 +200,8 @@ TEST(Fill, WantedNumber_IsMetWithinTenPercent) {
   EXPECT_GE(fill_surface(test::sphere_surface(1, 3), 1).ntet(), 1u);
 }
 
-// A cut cell carries its material as if it filled it evenly, so a body is a little too wide: by 0.6 % of its inertia at 20,000 cells.
+// A cut cell carries its material as if it filled it evenly, so a body is a little too wide: by 0.6 % of its
+// inertia at 20,000 cells.
 TEST(Fill, Ball_MassCentreAndInertiaWithinOnePercent) {
   const double r = 0.5;
   const TriMesh s = test::sphere_surface(r, 6, {0.3, -0.2, 0.1});
@@ -187,10 +214,13 @@ TEST(Fill, Ball_MassCentreAndInertiaWithinOnePercent) {
     double squares = 0;
     for (int k = 0; k < 4; ++k) {
       const Vec3 x = corner(m, t, k) - Vec3{0.3, -0.2, 0.1};
-      sum += x, squares += x.x * x.x + x.y * x.y;
+      sum += x;
+      squares += x.x * x.x + x.y * x.y;
     }
-    mass += v, center += (v / 4) * sum;
-    inertia += v / 20 * (squares + sum.x * sum.x + sum.y * sum.y);  // of a tetrahedron of even density, about z
+    mass += v;
+    center += (v / 4) * sum;
+    // of a tetrahedron of even density, about z
+    inertia += v / 20 * (squares + sum.x * sum.x + sum.y * sum.y);
   }
   const double truth = 4 * M_PI / 3 * r * r * r;
   EXPECT_NEAR(mass, truth, 0.01 * truth);
@@ -201,7 +231,8 @@ TEST(Fill, Ball_MassCentreAndInertiaWithinOnePercent) {
 TEST(Fill, Shares_NeverBelowTheFloorOfTheirNeighbourhood) {
   const TetMesh m = fill_surface(test::sphere_surface(0.5, 5), 5000);
   std::vector<double> fullest(m.npoint(), 0.0);
-  for (size_t i = 0; i < m.tets.size(); ++i) fullest[m.tets[i]] = std::max(fullest[m.tets[i]], m.share[i / 4]);
+  for (size_t i = 0; i < m.tets.size(); ++i)
+    fullest[m.tets[i]] = std::max(fullest[m.tets[i]], m.share[i / 4]);
   for (uint32_t t = 0; t < m.ntet(); ++t) {
     double most = 0;
     for (int k = 0; k < 4; ++k) most = std::max(most, fullest[m.tets[4 * size_t(t) + size_t(k)]]);
@@ -229,7 +260,8 @@ TEST(Fill, ShellsThroughEachOther_CountWhatIsInsideOnce) {
   TriMesh two = test::sphere_surface(0.5, 5);
   test::append(two, test::sphere_surface(0.5, 5, {0.5, 0, 0}));
   const TetMesh m = fill_surface(two, 5000);
-  const double ball = 4 * M_PI / 3 * 0.125, lens = 5 * M_PI / 12 * 0.125;  // of two balls of radius r at distance r: 5 pi r^3 / 12
+  // of two balls of radius r at distance r: 5 pi r^3 / 12
+  const double ball = 4 * M_PI / 3 * 0.125, lens = 5 * M_PI / 12 * 0.125;
   EXPECT_NEAR(material(m), 2 * ball - lens, 0.005 * ball);
   ASSERT_EQ(m.warnings.size(), 1u);
   EXPECT_NE(m.warnings[0].find("passes through itself"), std::string::npos);
@@ -302,27 +334,32 @@ TEST(Fill, HugeOpening_IsRefusedWithItsSize) {
   EXPECT_NE(text.find("1 opening of 3.14 m2"), std::string::npos) << text;
   EXPECT_NE(text.find("2.83 m across"), std::string::npos) << text;  // of its box
   TriMesh cube = test::box_surface({0, 0, 0}, {1, 1, 1});
-  test::remove(cube, 0), test::remove(cube, 0);
+  test::remove(cube, 0);
+  test::remove(cube, 0);
   EXPECT_NE(refusal(cube, 1000).find("1 opening of 1 m2"), std::string::npos);
 }
 
 TEST(Fill, NothingToFill_IsRefused) {
   EXPECT_NE(refusal(test::surface_of({}, {}), 100).find("no triangles"), std::string::npos);
-  EXPECT_NE(refusal(test::surface_of({{1, 1, 1}, {1, 1, 1}, {1, 1, 1}}, {{0, 1, 2}}), 100).find("no area"), std::string::npos);
+  EXPECT_NE(refusal(test::surface_of({{1, 1, 1}, {1, 1, 1}, {1, 1, 1}}, {{0, 1, 2}}), 100).find("no area"),
+            std::string::npos);
   EXPECT_NE(refusal(test::sphere_surface(1, 2), 0).find("cells is 0"), std::string::npos);
   TriMesh inside_out = test::sphere_surface(1, 2);
   for (uint32_t t = 0; t < inside_out.ntri(); ++t) test::flip(inside_out, t);
-  EXPECT_NE(refusal(inside_out, 100).find("nothing lies inside"), std::string::npos) << refusal(inside_out, 100);
+  EXPECT_NE(refusal(inside_out, 100).find("nothing lies inside"), std::string::npos)
+      << refusal(inside_out, 100);
 }
 
 // Every surface at hand that closes, as read.
-void fills(const std::string &folder, const std::vector<std::string> &endings, uint32_t cells, uint32_t at_least,
-           const std::vector<std::string> &but = {}) {
+void fills(const std::string &folder, const std::vector<std::string> &endings, uint32_t cells,
+           uint32_t at_least, const std::vector<std::string> &but = {}) {
   const std::string shared = test::shared_dir();
   if (shared.empty()) GTEST_SKIP() << "../shared is not there";
   uint32_t n = 0;
   for (const std::string &path : test::files_of(shared + "/meshes/" + folder, endings)) {
-    if (std::any_of(but.begin(), but.end(), [&](const std::string &b) { return path.find(b) != std::string::npos; })) continue;
+    if (std::any_of(but.begin(), but.end(),
+                    [&](const std::string &b) { return path.find(b) != std::string::npos; }))
+      continue;
     SCOPED_TRACE(path);
     const TriMesh s = dfm::read_tri_mesh(dfm::Memory::standard(), path);
     const TetMesh m = fill_surface(s, cells);

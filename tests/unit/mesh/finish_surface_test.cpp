@@ -20,9 +20,14 @@ struct Soup {
 // The six faces of a box as two triangles each, outward.
 Soup box(Vec3 lo, Vec3 hi) {
   Soup s;
-  for (uint32_t i = 0; i < 8; ++i) s.points.push_back({i & 1 ? hi.x : lo.x, i & 2 ? hi.y : lo.y, i & 4 ? hi.z : lo.z});
-  const uint32_t quad[6][4] = {{0, 2, 3, 1}, {4, 5, 7, 6}, {0, 1, 5, 4}, {2, 6, 7, 3}, {0, 4, 6, 2}, {1, 3, 7, 5}};
-  for (const auto &q : quad) s.tris.push_back({q[0], q[1], q[2]}), s.tris.push_back({q[0], q[2], q[3]});
+  for (uint32_t i = 0; i < 8; ++i)
+    s.points.push_back({i & 1 ? hi.x : lo.x, i & 2 ? hi.y : lo.y, i & 4 ? hi.z : lo.z});
+  const uint32_t quad[6][4] = {{0, 2, 3, 1}, {4, 5, 7, 6}, {0, 1, 5, 4},
+                               {2, 6, 7, 3}, {0, 4, 6, 2}, {1, 3, 7, 5}};
+  for (const auto &q : quad) {
+    s.tris.push_back({q[0], q[1], q[2]});
+    s.tris.push_back({q[0], q[2], q[3]});
+  }
   return s;
 }
 
@@ -58,7 +63,9 @@ RawMesh raw_of(const Soup &s, double scale = 1, Vec3 offset = {}) {
   return raw;
 }
 
-TriMesh finished(const Soup &s, double scale = 1, Vec3 offset = {}) { return finish_surface("soup", raw_of(s, scale, offset)); }
+TriMesh finished(const Soup &s, double scale = 1, Vec3 offset = {}) {
+  return finish_surface("soup", raw_of(s, scale, offset));
+}
 
 std::string all_warnings(const TriMesh &m) {
   std::string out;
@@ -75,7 +82,8 @@ std::string refused(RawMesh &&raw) {
   return "";
 }
 
-const Soup kTetrahedron{{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, 0, 1}}, {{0, 2, 1}, {0, 1, 3}, {0, 3, 2}, {1, 2, 3}}};
+const Soup kTetrahedron{{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, 0, 1}},
+                        {{0, 2, 1}, {0, 1, 3}, {0, 3, 2}, {1, 2, 3}}};
 
 }  // namespace
 
@@ -168,7 +176,8 @@ TEST(FinishSurface, Crossing_IsNotNested) {
   EXPECT_NEAR(tri_mesh_statistics(m).volume, 64 + 16, 1e-12);
 }
 
-// Both boxes within the other's bounding box would be wrong by one point or by boxes alone: the small one lies in the opening of an L.
+// Both boxes within the other's bounding box would be wrong by one point or by boxes alone: the small one
+// lies in the opening of an L.
 TEST(FinishSurface, BesideInTheBoundingBox_IsNotNested) {
   Soup l = kTetrahedron;
   const TriMesh m = finished(turned(joined(l, box({0.7, 0.7, 0.7}, {0.9, 0.9, 0.9})), 3));
@@ -176,21 +185,25 @@ TEST(FinishSurface, BesideInTheBoundingBox_IsNotNested) {
 }
 
 TEST(FinishSurface, NestedPieceThatTouchesTheOuter_StillFacesIntoTheHole) {
-  const TriMesh m = finished(joined(box({0, 0, 0}, {3, 3, 3}), box({0, 1, 1}, {2, 2, 2})));  // shares the plane x = 0
+  // shares the plane x = 0
+  const TriMesh m = finished(joined(box({0, 0, 0}, {3, 3, 3}), box({0, 1, 1}, {2, 2, 2})));
   EXPECT_NEAR(tri_mesh_statistics(m).volume, 27 - 2, 1e-12);
 }
 
 TEST(FinishSurface, MissingTriangles_AreCountedAndTheRestFacesOutward) {
   Soup s = joined(box({}, {1, 1, 1}), box({2, 0, 0}, {3, 1, 1}));
   s.tris.erase(s.tris.begin() + 12, s.tris.begin() + 14);  // z = 0 of the second: a square hole
-  s.tris.erase(s.tris.begin() + 3), s.tris.erase(s.tris.begin());
+  s.tris.erase(s.tris.begin() + 3);
+  s.tris.erase(s.tris.begin());
   const TriMesh m = finished(turned(s));
   const TriMeshStatistics st = tri_mesh_statistics(m);
   EXPECT_FALSE(st.closed);
   EXPECT_EQ(st.open_edges, 10u);
   EXPECT_EQ(st.holes, 3u);
   EXPECT_EQ(m.turned, m.ntri());
-  EXPECT_NE(all_warnings(m).find("the surface is open: 10 edges with one triangle around 3 holes"), std::string::npos) << all_warnings(m);
+  EXPECT_NE(all_warnings(m).find("the surface is open: 10 edges with one triangle around 3 holes"),
+            std::string::npos)
+      << all_warnings(m);
 }
 
 TEST(FinishSurface, RimsThatTouchInAPoint_AreTwo) {
@@ -206,13 +219,16 @@ TEST(FinishSurface, OpenSheet_KeepsTheSideOfItsMajority) {
   for (uint32_t i = 0; i < 16; ++i) s.points.push_back({double(i % 4), double(i / 4), 0});
   for (uint32_t q = 0; q < 9; ++q) {
     const uint32_t a = q % 3 + 4 * (q / 3);
-    s.tris.push_back({a, a + 5, a + 1}), s.tris.push_back({a, a + 4, a + 5});
+    s.tris.push_back({a, a + 5, a + 1});
+    s.tris.push_back({a, a + 4, a + 5});
   }
   const TriMesh m = finished(turned(s, 4));
   EXPECT_EQ(m.turned, 5u);
   for (uint32_t t = 0; t < m.ntri(); ++t) {
     const uint32_t *c = &m.tris[3 * size_t(t)];
-    const Vec3 a = load3(&m.points[3 * size_t(c[0])]), b = load3(&m.points[3 * size_t(c[1])]), d = load3(&m.points[3 * size_t(c[2])]);
+    const Vec3 a = load3(&m.points[3 * size_t(c[0])]);
+    const Vec3 b = load3(&m.points[3 * size_t(c[1])]);
+    const Vec3 d = load3(&m.points[3 * size_t(c[2])]);
     EXPECT_LT(cross(b - a, d - a).z, 0);
   }
 }
@@ -227,7 +243,8 @@ TEST(FinishSurface, MoebiusStrip_IsReportedAndLeft) {
     }
   for (uint32_t i = 0; i < n; ++i) {
     const uint32_t a = 2 * i, b = a + 1, c = i + 1 < n ? a + 2 : 1, d = i + 1 < n ? a + 3 : 0;
-    s.tris.push_back({a, c, b}), s.tris.push_back({b, c, d});
+    s.tris.push_back({a, c, b});
+    s.tris.push_back({b, c, d});
   }
   const TriMesh m = finished(s);
   EXPECT_EQ(m.turned, 0u);
@@ -237,13 +254,17 @@ TEST(FinishSurface, MoebiusStrip_IsReportedAndLeft) {
 
 TEST(FinishSurface, WithoutArea_IsDropped) {
   Soup s = box({}, {1, 1, 1});
-  s.points.push_back({0.5, 0.5, 7}), s.points.push_back({5, 5, 5});
-  s.tris.push_back({0, 0, 1}), s.tris.push_back({2, 2, 2}), s.tris.push_back({8, 3, 8});
+  s.points.push_back({0.5, 0.5, 7});
+  s.points.push_back({5, 5, 5});
+  s.tris.push_back({0, 0, 1});
+  s.tris.push_back({2, 2, 2});
+  s.tris.push_back({8, 3, 8});
   const TriMesh m = finished(s);
   EXPECT_EQ(m.dropped_tris, 3u);
   EXPECT_EQ(m.dropped_points, 2u);
   EXPECT_TRUE(tri_mesh_statistics(m).closed);
-  EXPECT_EQ(all_warnings(m), "3 triangles without area were dropped\n2 points that no triangle uses were dropped\n");
+  EXPECT_EQ(all_warnings(m),
+            "3 triangles without area were dropped\n2 points that no triangle uses were dropped\n");
 }
 
 // A flat triangle that closes a T-junction: dropping it would open a slit, so its neighbor is split.
@@ -262,8 +283,11 @@ TEST(FinishSurface, FlatAlongANeighboursSide_LeavesNoSlit) {
 
 TEST(FinishSurface, FlatBesideFlat_IsTakenUpInTurn) {
   Soup s = kTetrahedron;
-  s.points.push_back({0.25, 0, 0}), s.points.push_back({0.5, 0, 0}), s.points.push_back({0.75, 0, 0});
-  s.tris = {{0, 2, 1}, {0, 4, 3}, {4, 5, 3}, {5, 6, 3}, {6, 1, 3}, {0, 3, 2}, {1, 2, 3}, {0, 1, 5}, {0, 5, 4}, {5, 1, 6}};
+  s.points.push_back({0.25, 0, 0});
+  s.points.push_back({0.5, 0, 0});
+  s.points.push_back({0.75, 0, 0});
+  s.tris = {{0, 2, 1}, {0, 4, 3}, {4, 5, 3}, {5, 6, 3}, {6, 1, 3},
+            {0, 3, 2}, {1, 2, 3}, {0, 1, 5}, {0, 5, 4}, {5, 1, 6}};
   const TriMesh m = finished(s);
   EXPECT_TRUE(tri_mesh_statistics(m).closed);
   EXPECT_EQ(m.ntri(), 10u);
@@ -272,7 +296,9 @@ TEST(FinishSurface, FlatBesideFlat_IsTakenUpInTurn) {
 
 TEST(FinishSurface, ListedTwice_IsDropped) {
   Soup s = box({}, {1, 1, 1});
-  s.tris.push_back(s.tris[3]), s.tris.push_back({s.tris[4][0], s.tris[4][2], s.tris[4][1]}), s.tris.push_back(s.tris[5]);
+  s.tris.push_back(s.tris[3]);
+  s.tris.push_back({s.tris[4][0], s.tris[4][2], s.tris[4][1]});
+  s.tris.push_back(s.tris[5]);
   const TriMesh m = finished(s);
   EXPECT_EQ(m.ntri(), 12u);
   EXPECT_EQ(m.dropped_tris, 3u);
@@ -288,7 +314,9 @@ TEST(FinishSurface, TwoBoxesFaceToFace_BecomeOne) {
   EXPECT_EQ(m.ntri(), 20u);
   EXPECT_EQ(st.npiece, 1u);
   EXPECT_NEAR(st.volume, 2, 1e-15);
-  EXPECT_NE(all_warnings(m).find("2 pairs of triangles where two pieces touch were dropped"), std::string::npos) << all_warnings(m);
+  EXPECT_NE(all_warnings(m).find("2 pairs of triangles where two pieces touch were dropped"),
+            std::string::npos)
+      << all_warnings(m);
 }
 
 TEST(FinishSurface, SheetWithBothSides_KeepsOne) {
@@ -319,7 +347,9 @@ TEST(FinishSurface, FinOnABox_IsCountedAndTheBoxFacesOutward) {
   double volume = 0;
   for (uint32_t t = 0; t < 12; ++t) {
     const uint32_t *c = &m.tris[3 * size_t(t)];
-    volume += dot(cross(load3(&m.points[3 * size_t(c[0])]), load3(&m.points[3 * size_t(c[1])])), load3(&m.points[3 * size_t(c[2])])) / 6;
+    volume += dot(cross(load3(&m.points[3 * size_t(c[0])]), load3(&m.points[3 * size_t(c[1])])),
+                  load3(&m.points[3 * size_t(c[2])])) /
+              6;
   }
   EXPECT_NEAR(volume, 1, 1e-15);
 }
@@ -327,11 +357,13 @@ TEST(FinishSurface, FinOnABox_IsCountedAndTheBoxFacesOutward) {
 TEST(FinishSurface, Tetrahedra_GiveTheirBoundaryWithTheGroupsOfTheSkin) {
   const TetMesh ball = make_ball(Memory::standard(), 1, 160);
   RawMesh raw(Memory::standard());
-  raw.points = ball.points, raw.tets = ball.tets;
-  std::swap(raw.tets[2], raw.tets[3]);  // an inverted cell
+  raw.points = ball.points;
+  raw.tets = ball.tets;
+  std::swap(raw.tets[2], raw.tets[3]);                                        // an inverted cell
   raw.tets.insert(raw.tets.end(), ball.tets.begin(), ball.tets.begin() + 8);  // and two listed twice
   raw.points.insert(raw.points.end(), {9, 9, 9});
-  raw.groups.push_back({"unused", 2, 4, {}}), raw.groups.push_back({"skin", 2, 7, {}});
+  raw.groups.push_back({"unused", 2, 4, {}});
+  raw.groups.push_back({"skin", 2, 7, {}});
   const Array<uint32_t> skin = boundary_triangles(ball.tets);
   raw.tris.assign({skin[5], skin[4], skin[3]});
   raw.tri_group.assign({1});
@@ -364,8 +396,10 @@ TEST(FinishSurface, CellsApartAtOnePlace_AreJoined) {
 
 TEST(FinishSurface, Groups_FollowTheirTriangles) {
   RawMesh raw = raw_of(loose(box({}, {1, 1, 1})));
-  raw.groups.push_back({"b", 2, 9, {}}), raw.groups.push_back({"a", 2, 3, {}});
-  raw.tri_group[0] = raw.tri_group[1] = 0, raw.tri_group[2] = 1;
+  raw.groups.push_back({"b", 2, 9, {}});
+  raw.groups.push_back({"a", 2, 3, {}});
+  raw.tri_group[0] = raw.tri_group[1] = 0;
+  raw.tri_group[2] = 1;
   const TriMesh m = finish_surface("soup", std::move(raw));
   ASSERT_EQ(m.groups.size(), 2u);
   EXPECT_EQ(m.groups[0].name, "a");
@@ -392,13 +426,13 @@ TEST(FinishSurface, OutOfMemoryAnywhere_LeaksNothing) {
     {
       RawMesh raw(memory.hooks);
       const RawMesh given = raw_of(s);
-      raw.points.assign(given.points.begin(), given.points.end()), raw.tris.assign(given.tris.begin(), given.tris.end());
+      raw.points.assign(given.points.begin(), given.points.end());
+      raw.tris.assign(given.tris.begin(), given.tris.end());
       memory.refuse_from = memory.calls + n;
       try {
         finish_surface("soup", std::move(raw));
         done = true;
-      } catch (const std::bad_alloc &) {
-      }
+      } catch (const std::bad_alloc &) {}
     }
     EXPECT_EQ(memory.held, 0u) << n;
     if (done) return;

@@ -1,4 +1,5 @@
-// Generated tubes and surfaces: closed, sound, of the size that their polygons have, near the number asked for.
+// Generated tubes and surfaces: closed, sound, of the size that their polygons have, near the
+// number asked for.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -27,7 +28,8 @@ void expect_sound(const TriMesh &m, uint32_t asked, int euler, double least_qual
   EXPECT_EQ(m.tri_group.size(), m.ntri());
   for (uint32_t p = 0; p < m.npoint(); ++p) ASSERT_EQ(m.file_point[p], p);
   if (asked < 500) return;
-  EXPECT_LT(std::max(s.ntri / double(asked), asked / double(s.ntri)), 1.35) << asked << " asked, " << s.ntri << " made";
+  EXPECT_LT(std::max(s.ntri / double(asked), asked / double(s.ntri)), 1.35)
+      << asked << " asked, " << s.ntri << " made";
 }
 
 std::string refused(const std::function<void()> &f) {
@@ -74,7 +76,8 @@ TEST(GenerateSurface, Cylinders_HaveTheVolumeOfTheirPolygon) {
       uint32_t around = 0;
       for (size_t p = 0; p < m.points.size(); p += 3)
         around += m.points[p + 2] == 0 && std::hypot(m.points[p], m.points[p + 1]) > 0.2 - 1e-12;
-      EXPECT_NEAR(tri_mesh_statistics(m).volume, length * 0.02 * around * std::sin(2 * kPi / around), 1e-14 * around);
+      EXPECT_NEAR(tri_mesh_statistics(m).volume, length * 0.02 * around * std::sin(2 * kPi / around),
+                  1e-14 * around);
     }
 }
 
@@ -86,7 +89,8 @@ TEST(GenerateSurface, Tubes_HaveTheVolumeOfTheirRing) {
       uint32_t around = 0;
       for (size_t p = 0; p < m.points.size(); p += 3)
         around += m.points[p + 2] == 0 && std::hypot(m.points[p], m.points[p + 1]) > 0.2 - 1e-12;
-      EXPECT_NEAR(tri_mesh_statistics(m).volume, 0.3 * (0.04 - inner * inner) * around * std::sin(2 * kPi / around), 1e-14 * around);
+      EXPECT_NEAR(tri_mesh_statistics(m).volume,
+                  0.3 * (0.04 - inner * inner) * around * std::sin(2 * kPi / around), 1e-14 * around);
     }
 }
 
@@ -97,7 +101,9 @@ TEST(GenerateSurface, Tori_ApproachTheirVolume) {
     for (size_t p = 0; p < m.points.size(); p += 3)
       EXPECT_NEAR(std::hypot(std::hypot(m.points[p], m.points[p + 1]) - 0.06, m.points[p + 2]), 0.02, 1e-15);
   }
-  EXPECT_NEAR(tri_mesh_statistics(make_torus_surface(standard(), 0.06, 0.02, 50000)).volume / (2 * kPi * kPi * 0.06 * 0.0004), 1, 2e-3);
+  EXPECT_NEAR(tri_mesh_statistics(make_torus_surface(standard(), 0.06, 0.02, 50000)).volume /
+                  (2 * kPi * kPi * 0.06 * 0.0004),
+              1, 2e-3);
 }
 
 TEST(GenerateTube, Cells_AreSoundAndFillTheRing) {
@@ -109,13 +115,16 @@ TEST(GenerateTube, Cells_AreSoundAndFillTheRing) {
       EXPECT_EQ(s.npiece, 1u);
       EXPECT_EQ(s.nonmanifold_edges + s.duplicate_points, 0u);
       EXPECT_EQ(int64_t(s.npoint) - s.nedge + (4 * s.ntet + s.ntriangle) / 2 - s.ntet, 0) << "a solid ring";
-      for (uint32_t t = 0; t < m.ntet(); ++t) ASSERT_GT(tet_volume(m.points.data(), &m.tets[4 * size_t(t)]), 0);
+      for (uint32_t t = 0; t < m.ntet(); ++t)
+        ASSERT_GT(tet_volume(m.points.data(), &m.tets[4 * size_t(t)]), 0);
       uint32_t around = 0;
       for (size_t p = 0; p < m.points.size(); p += 3)
         around += m.points[p + 2] == 0 && std::hypot(m.points[p], m.points[p + 1]) > 0.2 - 1e-12;
-      EXPECT_NEAR(s.volume, 0.35 * (0.04 - inner * inner) * around * std::sin(2 * kPi / around), 1e-14 * around);
+      EXPECT_NEAR(s.volume, 0.35 * (0.04 - inner * inner) * around * std::sin(2 * kPi / around),
+                  1e-14 * around);
       if (inner == 0.18 || n < 500) continue;
-      EXPECT_LT(std::max(s.ntet / double(n), n / double(s.ntet)), 1.5) << n << " asked, " << s.ntet << " made";
+      EXPECT_LT(std::max(s.ntet / double(n), n / double(s.ntet)), 1.5)
+          << n << " asked, " << s.ntet << " made";
     }
 }
 
@@ -127,7 +136,8 @@ TEST(GenerateTube, Surface_HasNoSense) {
   for (size_t i = 0; i < edges.size(); i += 2) {
     const double *p = &m.points[3 * size_t(edges[i])], *q = &m.points[3 * size_t(edges[i + 1])];
     const double turn = (p[0] * q[1] - p[1] * q[0]) * (q[2] - p[2]);
-    twist += turn, all += std::fabs(turn);
+    twist += turn;
+    all += std::fabs(turn);
   }
   EXPECT_LT(std::fabs(twist), 0.05 * all);
 }
@@ -135,19 +145,28 @@ TEST(GenerateTube, Surface_HasNoSense) {
 TEST(GenerateSurface, SameBitsEveryTime) {
   Hash h;
   for (const TriMesh &m : {make_ball_surface(standard(), 1, 500), make_torus_surface(standard(), 2, 1, 500),
-                           make_tube_surface(standard(), 1, 2, 3, 500)})
-    h.add(m.points.data(), m.points.size() * sizeof(double)), h.add(m.tris.data(), m.tris.size() * sizeof(uint32_t));
+                           make_tube_surface(standard(), 1, 2, 3, 500)}) {
+    h.add(m.points.data(), m.points.size() * sizeof(double));
+    h.add(m.tris.data(), m.tris.size() * sizeof(uint32_t));
+  }
   const TetMesh t = make_tube(standard(), 1, 2, 3, 500);
-  h.add(t.points.data(), t.points.size() * sizeof(double)), h.add(t.tets.data(), t.tets.size() * sizeof(uint32_t));
+  h.add(t.points.data(), t.points.size() * sizeof(double));
+  h.add(t.tets.data(), t.tets.size() * sizeof(uint32_t));
   EXPECT_EQ(h.value, 10497315447834092805u);
 }
 
 TEST(GenerateSurface, ImpossibleSizes_AreRefused) {
-  EXPECT_NE(refused([] { make_tube(standard(), 0.2, 0.1, 1, 10); }).find("inner radius is 0.2 m; expected less than"), std::string::npos);
-  EXPECT_NE(refused([] { make_tube_surface(standard(), 0, 0.1, 1, 10); }).find("inner radius is 0 m"), std::string::npos);
+  EXPECT_NE(refused([] {
+              make_tube(standard(), 0.2, 0.1, 1, 10);
+            }).find("inner radius is 0.2 m; expected less than"),
+            std::string::npos);
+  EXPECT_NE(refused([] { make_tube_surface(standard(), 0, 0.1, 1, 10); }).find("inner radius is 0 m"),
+            std::string::npos);
   EXPECT_NE(refused([] { make_torus_surface(standard(), 1, 1, 10); }).find("torus"), std::string::npos);
-  EXPECT_NE(refused([] { make_torus_surface(standard(), 1, 1e-20, 10); }).find("ask for more"), std::string::npos);
+  EXPECT_NE(refused([] { make_torus_surface(standard(), 1, 1e-20, 10); }).find("ask for more"),
+            std::string::npos);
   EXPECT_NE(refused([] { make_ball_surface(standard(), NAN, 10); }).find("ball's radius"), std::string::npos);
   EXPECT_NE(refused([] { make_ball_surface(standard(), 1, 0); }).find("triangles is 0"), std::string::npos);
-  EXPECT_NE(refused([] { make_tube(standard(), 1, 1.0001, 100, 10); }).find("ask for more"), std::string::npos);
+  EXPECT_NE(refused([] { make_tube(standard(), 1, 1.0001, 100, 10); }).find("ask for more"),
+            std::string::npos);
 }

@@ -1,4 +1,5 @@
-// Readers under attack: cut, mutated and lying files neither crash nor take memory beyond a small multiple of the file.
+// Readers under attack: cut, mutated and lying files neither crash nor take memory beyond a small
+// multiple of the file.
 #include <gtest/gtest.h>
 
 #include "mesh/raw_mesh.h"
@@ -8,13 +9,16 @@ using namespace dfm;
 
 namespace {
 
-// Text of 2 bytes may stand for 8 or more in memory, and sorted faces take 80 bytes a cell. A corner of a polygon, perhaps one byte, stands
-// for a triangle of 16 bytes in an array that grows by doubling, and repair sorts them; compressed arrays may unpack to 64 times their file.
-constexpr size_t kMultiple = 24, kBase = 4096, kSurfaceMultiple = 64, kSurfaceBase = 16384, kZlibMultiple = 160;
+// Text of 2 bytes may stand for 8 or more in memory, and sorted faces take 80 bytes a cell. A corner of a
+// polygon, perhaps one byte, stands for a triangle of 16 bytes in an array that grows by doubling, and repair
+// sorts them; compressed arrays may unpack to 64 times their file.
+constexpr size_t kMultiple = 24, kBase = 4096, kSurfaceMultiple = 64, kSurfaceBase = 16384,
+                 kZlibMultiple = 160;
 
 size_t cap_of(const std::string &name, size_t bytes) {
   if (name.find("zlib") != std::string::npos) return kBase + kZlibMultiple * bytes;
-  const bool cells = name.find(".msh") != std::string::npos || name.find(".vtk") != std::string::npos || name.find(".vtu") != std::string::npos;
+  const bool cells = name.find(".msh") != std::string::npos || name.find(".vtk") != std::string::npos ||
+                     name.find(".vtu") != std::string::npos;
   return cells ? kBase + kMultiple * bytes : kSurfaceBase + kSurfaceMultiple * bytes;
 }
 
@@ -33,7 +37,8 @@ bool read_capped(const std::string &name, const std::string &bytes) {
     } else {
       const TetMesh mesh = finish_mesh(name, std::move(raw));
       mesh_statistics(mesh);
-      for (uint32_t t = 0; t < mesh.ntet(); ++t) EXPECT_GT(tet_volume(mesh.points.data(), &mesh.tets[4 * size_t(t)]), 0) << name;
+      for (uint32_t t = 0; t < mesh.ntet(); ++t)
+        EXPECT_GT(tet_volume(mesh.points.data(), &mesh.tets[4 * size_t(t)]), 0) << name;
     }
     accepted = true;
   } catch (const Error &e) {
@@ -60,20 +65,28 @@ TEST(MeshBounds, CutAtAnyByte_IsRefusedOrWhole) {
   for (const std::string &file : all_files()) {
     const std::string bytes = test::read_file(file);
     ASSERT_TRUE(read_capped(name_of(file), bytes)) << file;
-    // What follows the cells is not needed: node data and periodic sections in MSH must still be complete, VTK attributes not.
-    // OBJ has no count and no end, a file of several solids is whole after each, POLYDATA after each section: the surface is open there.
+    // What follows the cells is not needed: node data and periodic sections in MSH must still be complete,
+    // VTK attributes not. OBJ has no count and no end, a file of several solids is whole after each, POLYDATA
+    // after each section: the surface is open there.
     bool has_end = true;
-    for (const char *without : {".obj", "stl_ascii", "polydata"}) has_end = has_end && file.find(without) == std::string::npos;
+    for (const char *without : {".obj", "stl_ascii", "polydata"})
+      has_end = has_end && file.find(without) == std::string::npos;
     for (size_t n = 0; n < bytes.size(); ++n) {
       const bool accepted = read_capped(name_of(file), bytes.substr(0, n));
-      if (has_end && n < bytes.size() / 2) { EXPECT_FALSE(accepted) << file << " cut at " << n; }
+      if (has_end && n < bytes.size() / 2) {
+        EXPECT_FALSE(accepted) << file << " cut at " << n;
+      }
     }
   }
 }
 
 TEST(MeshBounds, MutatedBytes_NeitherCrashNorEatMemory) {
   uint64_t random = 88172645463325252ull;  // xorshift64
-  const auto next = [&] { return random ^= random << 13, random ^= random >> 7, random ^= random << 17; };
+  const auto next = [&] {
+    random ^= random << 13;
+    random ^= random >> 7;
+    return random ^= random << 17;
+  };
   uint32_t accepted = 0, tried = 0;
   for (const std::string &file : all_files()) {
     const std::string bytes = test::read_file(file);
@@ -92,27 +105,34 @@ TEST(MeshBounds, MutatedBytes_NeitherCrashNorEatMemory) {
       accepted += read_capped(name_of(file), mutated);
     }
   }
-  EXPECT_GT(accepted, tried / 100);  // some mutations only move a point: else nothing beyond the head was tried
+  // some mutations only move a point: else nothing beyond the head was tried
+  EXPECT_GT(accepted, tried / 100);
   EXPECT_LT(accepted, tried);
 }
 
 TEST(MeshBounds, PromiseOfTenGigabytes_IsRefusedWithLittleMemory) {
   const std::string v = "# vtk DataFile Version 3.0\nt\n", grid = "DATASET UNSTRUCTURED_GRID\n";
   const std::string four = "POINTS 4 double\n0 0 0\n1 0 0\n0 1 0\n0 0 1\n";
-  const std::string m22 = "$MeshFormat\n2.2 0 8\n$EndMeshFormat\n", m41 = "$MeshFormat\n4.1 0 8\n$EndMeshFormat\n";
-  const std::string nodes22 = "$Nodes\n1\n1 0 0 0\n$EndNodes\n", nodes41 = "$Nodes\n1 1 1 1\n3 1 0 1\n1\n0 0 0\n$EndNodes\n";
+  const std::string m22 = "$MeshFormat\n2.2 0 8\n$EndMeshFormat\n";
+  const std::string m41 = "$MeshFormat\n4.1 0 8\n$EndMeshFormat\n";
+  const std::string nodes22 = "$Nodes\n1\n1 0 0 0\n$EndNodes\n";
+  const std::string nodes41 = "$Nodes\n1 1 1 1\n3 1 0 1\n1\n0 0 0\n$EndNodes\n";
   const std::string one("\1\0\0\0", 4), huge("\0\xe4\x0b\x54\x02\0\0\0", 8), eight(8, '\0');
   const std::string endless("\0\xff\xff\xff\xff\xff\xff\xff", 8), run("\4\0\0\0\xff\xff\xff\x7f\0\0\0\0", 12);
-  const std::string b22 = "$MeshFormat\n2.2 1 8\n" + one + "\n$EndMeshFormat\n",
-      b41 = "$MeshFormat\n4.1 1 8\n" + one + "\n$EndMeshFormat\n";
+  const std::string b22 = "$MeshFormat\n2.2 1 8\n" + one + "\n$EndMeshFormat\n";
+  const std::string b41 = "$MeshFormat\n4.1 1 8\n" + one + "\n$EndMeshFormat\n";
   const std::string medit = "MeshVersionFormatted 2\nDimension 3\n";
-  const auto vtu = [](uint64_t points, uint64_t cells, const std::string &form, const std::string &data, bool packed = false) {
-    const std::string array = "<DataArray type=\"Int64\" " + (form.empty() ? "format=\"ascii\"" : form) + " Name=\"";
-    const std::string compressor = packed ? " compressor=\"vtkZLibDataCompressor\"" : "", end = "</DataArray>";
-    return "<VTKFile type=\"UnstructuredGrid\"" + compressor + "><UnstructuredGrid><Piece NumberOfPoints=\"" + std::to_string(points) +
-           "\" NumberOfCells=\"" + std::to_string(cells) + "\"><Points><DataArray type=\"Float32\" NumberOfComponents=\"3\" format=\"ascii\">0 0 0" +
-           end + "</Points><Cells>" + array + "connectivity\">" + data + end + array + "offsets\">" + data + end + array + "types\">" + data + end +
-           "</Cells></Piece></UnstructuredGrid></VTKFile>";
+  const auto vtu = [](uint64_t points, uint64_t cells, const std::string &form, const std::string &data,
+                      bool packed = false) {
+    const std::string array =
+        "<DataArray type=\"Int64\" " + (form.empty() ? "format=\"ascii\"" : form) + " Name=\"";
+    const std::string compressor = packed ? " compressor=\"vtkZLibDataCompressor\"" : "";
+    const std::string end = "</DataArray>";
+    return "<VTKFile type=\"UnstructuredGrid\"" + compressor + "><UnstructuredGrid><Piece NumberOfPoints=\"" +
+           std::to_string(points) + "\" NumberOfCells=\"" + std::to_string(cells) +
+           "\"><Points><DataArray type=\"Float32\" NumberOfComponents=\"3\" format=\"ascii\">0 0 0" + end +
+           "</Points><Cells>" + array + "connectivity\">" + data + end + array + "offsets\">" + data + end +
+           array + "types\">" + data + end + "</Cells></Piece></UnstructuredGrid></VTKFile>";
   };
   const std::pair<const char *, std::string> lies[] = {
       {"points.vtk", v + "ASCII\n" + grid + "POINTS 10000000000 double\n0 0 0\n"},
@@ -120,8 +140,11 @@ TEST(MeshBounds, PromiseOfTenGigabytes_IsRefusedWithLittleMemory) {
       {"points_bin.vtk", v + "BINARY\n" + grid + "POINTS 10000000000 double\n" + eight},
       {"cells.vtk", v + "ASCII\n" + grid + four + "CELLS 2000000000 10000000000\n4 0 1 2 3\n"},
       {"cells_only.vtk", v + "ASCII\n" + grid + four + "CELLS 10000000000 5\n4 0 1 2 3\n"},
-      {"offsets.vtk", v + "ASCII\n" + grid + four + "CELLS 10000000000 4\nOFFSETS int\n0 4\nCONNECTIVITY int\n0 1 2 3\n"},
-      {"connectivity.vtk", v + "ASCII\n" + grid + four + "CELLS 2 10000000000\nOFFSETS vtktypeint64\n0 10000000000\nCONNECTIVITY int\n0 1 2 3\n"},
+      {"offsets.vtk",
+       v + "ASCII\n" + grid + four + "CELLS 10000000000 4\nOFFSETS int\n0 4\nCONNECTIVITY int\n0 1 2 3\n"},
+      {"connectivity.vtk",
+       v + "ASCII\n" + grid + four +
+           "CELLS 2 10000000000\nOFFSETS vtktypeint64\n0 10000000000\nCONNECTIVITY int\n0 1 2 3\n"},
       {"field.vtk", v + "ASCII\n" + grid + "FIELD f 10000000000\n"},
       {"field_bin.vtk", v + "BINARY\n" + grid + "FIELD f 1\na 100000 1000000 double\n" + eight},
       {"field_string.vtk", v + "BINARY\n" + grid + "FIELD f 1\na 1 10000000000 string\n" + endless},
@@ -141,14 +164,24 @@ TEST(MeshBounds, PromiseOfTenGigabytes_IsRefusedWithLittleMemory) {
       {"entities41_bin.msh", b41 + "$Entities\n" + huge + huge + huge + huge},
       {"polygons.vtk", v + "ASCII\nDATASET POLYDATA\n" + four + "POLYGONS 2000000000 10000000000\n3 0 1 2\n"},
       {"scalars.vtk", v + "BINARY\n" + grid +
-                          "POINTS 0 float\n\nCELLS 0 0\n\nCELL_TYPES 0\n\nCELL_DATA 10000000000\nSCALARS group int\nLOOKUP_TABLE default\n" + eight},
+                          "POINTS 0 float\n\nCELLS 0 0\n\nCELL_TYPES 0\n\nCELL_DATA 10000000000\nSCALARS "
+                          "group int\nLOOKUP_TABLE default\n" +
+                          eight},
       {"vertices.mesh", medit + "Vertices\n10000000000\n0 0 0 0\n"},
       {"tets.mesh", medit + "Vertices\n1\n0 0 0 0\nTetrahedra\n10000000000\n1 1 1 1 0\n"},
-      {"points.ply", "ply\nformat ascii 1.0\nelement vertex 4000000000\nproperty float x\nproperty float y\nproperty float z\nend_header\n0 0 0\n"},
+      {"points.ply",
+       "ply\nformat ascii 1.0\nelement vertex 4000000000\nproperty float x\nproperty float y\nproperty float "
+       "z\nend_header\n0 0 0\n"},
       {"points_bin.ply",
-       "ply\nformat binary_little_endian 1.0\nelement vertex 4000000000\nproperty float x\nproperty float y\nproperty float z\nend_header\n" + eight + eight},
-      {"empty_properties.ply", "ply\nformat ascii 1.0\nelement vertex 4000000000\nelement nothing 9000000000000000000\nend_header\n"},
-      {"list.ply", "ply\nformat binary_little_endian 1.0\nelement face 1\nproperty list uint double vertex_indices\nend_header\n" + run.substr(4, 4) + eight},
+       "ply\nformat binary_little_endian 1.0\nelement vertex 4000000000\nproperty float x\nproperty float "
+       "y\nproperty float z\nend_header\n" +
+           eight + eight},
+      {"empty_properties.ply",
+       "ply\nformat ascii 1.0\nelement vertex 4000000000\nelement nothing 9000000000000000000\nend_header\n"},
+      {"list.ply",
+       "ply\nformat binary_little_endian 1.0\nelement face 1\nproperty list uint double "
+       "vertex_indices\nend_header\n" +
+           run.substr(4, 4) + eight},
       {"faces.off", "OFF\n1 10000000000 0\n0 0 0\n3 0 0 0\n"},
       {"points.off", "OFF\n4000000000 1 0\n0 0 0\n3 0 0 0\n"},
       {"corners.off", "OFF\n1 1 0\n0 0 0\n4000000000 0 0 0\n"},
@@ -182,7 +215,8 @@ TEST(MeshBounds, RealMesh_TakesASmallMultipleOfItsFile) {
   EXPECT_EQ(memory.held, 0u);
 }
 
-// What a large mesh may take: 600 bytes per tetrahedron while it is read, 400 once settled, whatever its format (1e6: tests/bench/mesh_read_bench.cpp).
+// What a large mesh may take: 600 bytes per tetrahedron while it is read, 400 once settled, whatever its
+// format (1e6: tests/bench/mesh_read_bench.cpp).
 TEST(MeshBounds, LargeMesh_TakesSixHundredBytesPerTetrahedronWhileRead) {
   const TetMesh beam = make_beam(Memory::standard(), 2, 1, 1, 100000);
   for (const char *name : {"/large.msh", "/large.msh2", "/large.vtk", "/large.vtu", "/large.mesh"}) {
@@ -212,8 +246,7 @@ TEST(MeshBounds, EveryFailingAllocation_IsOutOfMemory) {
         const TetMesh mesh = read_tet_mesh(memory.hooks, file);
         whole = memory.calls <= n;
         EXPECT_TRUE(whole) << "allocation " << n << " failed unnoticed";
-      } catch (const std::bad_alloc &) {
-      }
+      } catch (const std::bad_alloc &) {}
       EXPECT_EQ(memory.held, 0u);
     }
   }

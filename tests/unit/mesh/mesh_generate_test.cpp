@@ -1,4 +1,5 @@
-// Generators: closed sound bodies of the right size, near the number of cells asked for, the same bits every time.
+// Generators: closed sound bodies of the right size, near the number of cells asked for, the same
+// bits every time.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -36,21 +37,26 @@ void expect_sound(const TetMesh &m) {
     EXPECT_EQ(n, 1);
     EXPECT_TRUE(directed.count({edge.second, edge.first}));  // closed and consistently turned
     double d = 0;
-    for (int k = 0; k < 3; ++k) d += std::pow(m.points[3 * edge.first + k] - m.points[3 * edge.second + k], 2);
-    longest = std::max(longest, d), shortest = std::min(shortest, d);
+    for (int k = 0; k < 3; ++k)
+      d += std::pow(m.points[3 * edge.first + k] - m.points[3 * edge.second + k], 2);
+    longest = std::max(longest, d);
+    shortest = std::min(shortest, d);
   }
   EXPECT_LT(std::sqrt(longest / shortest), 3.0);  // contact wants surfaces of one grain
   double volume = 0;
   for (size_t i = 0; i < tri.size(); i += 3) {
     const double *a = &m.points[3 * tri[i]], *b = &m.points[3 * tri[i + 1]], *c = &m.points[3 * tri[i + 2]];
-    volume += (a[0] * (b[1] * c[2] - b[2] * c[1]) + a[1] * (b[2] * c[0] - b[0] * c[2]) + a[2] * (b[0] * c[1] - b[1] * c[0])) / 6;
+    volume += (a[0] * (b[1] * c[2] - b[2] * c[1]) + a[1] * (b[2] * c[0] - b[0] * c[2]) +
+               a[2] * (b[0] * c[1] - b[1] * c[0])) /
+              6;
   }
   EXPECT_NEAR(volume / s.volume, 1, 1e-12);
 }
 
 uint64_t hash_of(const TetMesh &m) {
   Hash h;
-  h.add(m.points.data(), m.points.size() * sizeof(double)), h.add(m.tets.data(), m.tets.size() * sizeof(uint32_t));
+  h.add(m.points.data(), m.points.size() * sizeof(double));
+  h.add(m.tets.data(), m.tets.size() * sizeof(uint32_t));
   return h.value;
 }
 
@@ -58,8 +64,8 @@ uint64_t hash_of(const TetMesh &m) {
 
 TEST(MeshGenerate, Beams_AreSoundAndFillTheirBox) {
   for (const uint32_t cells : {1u, 50u, 500u, 3000u, 20000u})
-    for (const auto &[x, y, z] :
-         {std::tuple{1.0, 0.1, 0.1}, std::tuple{0.1, 0.1, 0.1}, std::tuple{1.0, 1.0, 0.1}, std::tuple{2e-9, 1e-9, 3e-9}}) {
+    for (const auto &[x, y, z] : {std::tuple{1.0, 0.1, 0.1}, std::tuple{0.1, 0.1, 0.1},
+                                  std::tuple{1.0, 1.0, 0.1}, std::tuple{2e-9, 1e-9, 3e-9}}) {
       SCOPED_TRACE(testing::Message() << cells << " cells, " << x << " " << y << " " << z);
       const TetMesh m = make_beam(standard(), x, y, z, cells);
       expect_sound(m);
@@ -69,13 +75,16 @@ TEST(MeshGenerate, Beams_AreSoundAndFillTheirBox) {
       EXPECT_EQ(s.hi[0], x);
       EXPECT_EQ(s.hi[1], y);
       EXPECT_EQ(s.hi[2], z);
-      if (cells >= 3000) { EXPECT_NEAR(s.ntet / double(cells), 1, 0.35); }
+      if (cells >= 3000) {
+        EXPECT_NEAR(s.ntet / double(cells), 1, 0.35);
+      }
     }
 }
 
 TEST(MeshGenerate, Cylinders_AreSoundAndInscribed) {
   for (const uint32_t cells : {1u, 50u, 500u, 2700u, 15000u})
-    for (const auto &[radius, length] : {std::pair{0.2, 1.0}, std::pair{1.0, 1.0}, std::pair{1.0, 0.2}, std::pair{0.02, 0.16}}) {
+    for (const auto &[radius, length] :
+         {std::pair{0.2, 1.0}, std::pair{1.0, 1.0}, std::pair{1.0, 0.2}, std::pair{0.02, 0.16}}) {
       SCOPED_TRACE(testing::Message() << cells << " cells, " << radius << " " << length);
       const TetMesh m = make_cylinder(standard(), radius, length, cells);
       expect_sound(m);
@@ -90,7 +99,9 @@ TEST(MeshGenerate, Cylinders_AreSoundAndInscribed) {
       const double polygon = 0.5 * rim * std::sin(2 * M_PI / rim) * radius * radius;
       EXPECT_NEAR(s.volume / (polygon * length), 1, 1e-12);
       EXPECT_EQ(s.hi[2], length);
-      if (cells >= 2700) { EXPECT_NEAR(s.ntet / double(cells), 1, 0.35); }
+      if (cells >= 2700) {
+        EXPECT_NEAR(s.ntet / double(cells), 1, 0.35);
+      }
     }
 }
 
@@ -115,13 +126,17 @@ TEST(MeshGenerate, Balls_AreSoundAndTheirSurfaceLiesOnTheSphere) {
 }
 
 TEST(MeshGenerate, Lattices_HaveNoPreferredDirection) {
-  // The tensor of edge directions (sum of d d^T over |d|^2) is a multiple of the identity by symmetry of the lattices.
+  // The tensor of edge directions (sum of d d^T over |d|^2) is a multiple of the identity by symmetry
+  // of the lattices.
   const auto anisotropy = [](const TetMesh &m, int axes) {
     const Array<uint32_t> edges = unique_edges(m.tets);
     double t[3][3] = {};
     for (size_t i = 0; i < edges.size(); i += 2) {
       double d[3], l = 0;
-      for (int k = 0; k < 3; ++k) d[k] = m.points[3 * size_t(edges[i]) + k] - m.points[3 * size_t(edges[i + 1]) + k], l += d[k] * d[k];
+      for (int k = 0; k < 3; ++k) {
+        d[k] = m.points[3 * size_t(edges[i]) + k] - m.points[3 * size_t(edges[i + 1]) + k];
+        l += d[k] * d[k];
+      }
       for (int a = 0; a < 3; ++a)
         for (int b = 0; b < 3; ++b) t[a][b] += d[a] * d[b] / l;
     }
@@ -131,7 +146,8 @@ TEST(MeshGenerate, Lattices_HaveNoPreferredDirection) {
       for (int b = 0; b < axes; ++b) worst = std::max(worst, std::fabs(t[a][b] - (a == b ? mean : 0)) / mean);
     return worst;
   };
-  EXPECT_LT(anisotropy(make_ball(standard(), 1, 5000), 3), 0.02);  // only the diagonals of its octahedra differ
+  // only the diagonals of its octahedra differ
+  EXPECT_LT(anisotropy(make_ball(standard(), 1, 5000), 3), 0.02);
   EXPECT_LT(anisotropy(make_cylinder(standard(), 1, 2, 5000), 2), 0.01);
   EXPECT_LT(anisotropy(make_beam(standard(), 1, 1, 1, 12 * 8 * 8 * 8), 3), 0.01);
 }
@@ -154,7 +170,8 @@ TEST(MeshGenerate, UnusableSizes_AreRefusedWithTheReason) {
     return "";
   };
   for (const double bad : {0.0, -1.0, double(NAN), double(INFINITY)}) {
-    EXPECT_NE(sentence([&] { make_beam(standard(), 1, bad, 1, 10); }).find("beam's y size"), std::string::npos);
+    EXPECT_NE(sentence([&] { make_beam(standard(), 1, bad, 1, 10); }).find("beam's y size"),
+              std::string::npos);
     EXPECT_NE(sentence([&] { make_cylinder(standard(), bad, 1, 10); }).find("radius"), std::string::npos);
     EXPECT_NE(sentence([&] { make_cylinder(standard(), 1, bad, 10); }).find("length"), std::string::npos);
     EXPECT_NE(sentence([&] { make_ball(standard(), bad, 10); }).find("radius"), std::string::npos);
@@ -169,7 +186,8 @@ TEST(MeshGenerate, ExtremeProportions_NeitherHangNorFill) {
       try {
         const TetMesh m = shape ? make_cylinder(standard(), 1, x, 100) : make_beam(standard(), 1, 1, x, 100);
         EXPECT_LE(m.ntet(), 10'000u);
-        for (uint32_t t = 0; t < m.ntet(); ++t) ASSERT_GT(tet_volume(m.points.data(), &m.tets[4 * size_t(t)]), 0);
+        for (uint32_t t = 0; t < m.ntet(); ++t)
+          ASSERT_GT(tet_volume(m.points.data(), &m.tets[4 * size_t(t)]), 0);
       } catch (const Error &e) {
         EXPECT_NE(e.sentence.find("nearer to each other"), std::string::npos) << e.sentence;
       }

@@ -22,7 +22,8 @@ struct CountedMemory {
     hooks.alloc = [](void *user, size_t bytes, size_t align) -> void * {
       CountedMemory &m = *static_cast<CountedMemory *>(user);
       if (++m.calls > m.refuse_from || bytes > m.cap - std::min(m.cap, m.held)) return nullptr;
-      m.held += bytes, m.peak = std::max(m.peak, m.held);
+      m.held += bytes;
+      m.peak = std::max(m.peak, m.held);
       return std::aligned_alloc(align, (std::max<size_t>(bytes, 1) + align - 1) / align * align);
     };
     hooks.release = [](void *user, void *p, size_t bytes, size_t) {
@@ -42,13 +43,17 @@ inline std::vector<std::string> files_of(const std::string &folder, const std::v
   std::sort(out.begin(), out.end());
   return out;
 }
-inline std::vector<std::string> own_meshes() { return files_of(std::string(DEFORM_SOURCE_DIR) + "/tests/data/meshes", {".msh", ".vtk", ".vtu", ".mesh"}); }
+inline std::vector<std::string> own_meshes() {
+  return files_of(std::string(DEFORM_SOURCE_DIR) + "/tests/data/meshes", {".msh", ".vtk", ".vtu", ".mesh"});
+}
 inline std::vector<std::string> own_surfaces() {
-  return files_of(std::string(DEFORM_SOURCE_DIR) + "/tests/data/surfaces", {".obj", ".ply", ".stl", ".off", ".vtk", ".vtp", ".mesh", ".msh"});
+  return files_of(std::string(DEFORM_SOURCE_DIR) + "/tests/data/surfaces",
+                  {".obj", ".ply", ".stl", ".off", ".vtk", ".vtp", ".mesh", ".msh"});
 }
 
 // The error of reading a file; none where it is read.
-inline std::optional<dfm::Error> refusal(const std::string &path, const dfm::Memory &memory = dfm::Memory::standard()) {
+inline std::optional<dfm::Error> refusal(const std::string &path,
+                                         const dfm::Memory &memory = dfm::Memory::standard()) {
   try {
     dfm::read_tet_mesh(memory, path);
   } catch (const dfm::Error &e) {

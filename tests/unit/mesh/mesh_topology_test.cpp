@@ -22,14 +22,18 @@ TetMesh two_tets() {  // share the face 1 2 3
 TEST(MeshTopology, Faces_OfAPositiveCellPointOutward) {
   const TetMesh m = two_tets();
   ASSERT_GT(tet_volume(m.points.data(), &m.tets[4]), 0);
-  // Divergence theorem: the sum of signed cones from the origin is the volume only if every triangle points outward.
+  // Divergence theorem: the sum of signed cones from the origin is the volume only if every triangle
+  // points outward.
   const Array<uint32_t> tri = boundary_triangles(m.tets);
   double volume = 0;
   for (size_t i = 0; i < tri.size(); i += 3) {
     const double *a = &m.points[3 * tri[i]], *b = &m.points[3 * tri[i + 1]], *c = &m.points[3 * tri[i + 2]];
-    volume += (a[0] * (b[1] * c[2] - b[2] * c[1]) + a[1] * (b[2] * c[0] - b[0] * c[2]) + a[2] * (b[0] * c[1] - b[1] * c[0])) / 6;
+    volume += (a[0] * (b[1] * c[2] - b[2] * c[1]) + a[1] * (b[2] * c[0] - b[0] * c[2]) +
+               a[2] * (b[0] * c[1] - b[1] * c[0])) /
+              6;
   }
-  EXPECT_NEAR(volume, tet_volume(m.points.data(), &m.tets[0]) + tet_volume(m.points.data(), &m.tets[4]), 1e-15);
+  EXPECT_NEAR(volume, tet_volume(m.points.data(), &m.tets[0]) + tet_volume(m.points.data(), &m.tets[4]),
+              1e-15);
 }
 
 TEST(MeshTopology, Boundary_LeavesOutSharedFacesInOrderOfCells) {
@@ -39,7 +43,8 @@ TEST(MeshTopology, Boundary_LeavesOutSharedFacesInOrderOfCells) {
 }
 
 TEST(MeshTopology, Edges_AreUniqueAscendingAndLexicographic) {
-  EXPECT_EQ(unique_edges(two_tets().tets), (Array<uint32_t>{0, 1, 0, 2, 0, 3, 1, 2, 1, 3, 1, 4, 2, 3, 2, 4, 3, 4}));
+  EXPECT_EQ(unique_edges(two_tets().tets),
+            (Array<uint32_t>{0, 1, 0, 2, 0, 3, 1, 2, 1, 3, 1, 4, 2, 3, 2, 4, 3, 4}));
 }
 
 TEST(MeshTopology, Quality_IsOneForRegularZeroForFlatAndBlindToSize) {
@@ -48,7 +53,8 @@ TEST(MeshTopology, Quality_IsOneForRegularZeroForFlatAndBlindToSize) {
     const double regular[12] = {s, s, s, s, -s, -s, -s, s, -s, -s, -s, s};
     EXPECT_NEAR(std::fabs(tet_quality(regular, tet)), 1, 1e-14);
     const double corner[12] = {0, 0, 0, s, 0, 0, 0, s, 0, 0, 0, s};
-    EXPECT_NEAR(tet_quality(corner, tet), 12 * std::cbrt(0.25) / 9, 1e-14);  // V = 1/6, squared edges 1 1 1 2 2 2
+    // V = 1/6, squared edges 1 1 1 2 2 2
+    EXPECT_NEAR(tet_quality(corner, tet), 12 * std::cbrt(0.25) / 9, 1e-14);
     const double flat[12] = {0, 0, 0, s, 0, 0, 0, s, 0, s, s, 0};
     EXPECT_EQ(tet_quality(flat, tet), 0);
   }

@@ -32,7 +32,9 @@ void expect_same_bits(const TetMesh &a, const TetMesh &b) {
   EXPECT_EQ(a.tets, b.tets);
 }
 
-size_t files_in(const std::string &path) { return size_t(std::distance(std::filesystem::directory_iterator(path), {})); }
+size_t files_in(const std::string &path) {
+  return size_t(std::distance(std::filesystem::directory_iterator(path), {}));
+}
 
 }  // namespace
 
@@ -47,7 +49,8 @@ TEST(MeshWrite, MshBinary_ReadsBackToTheBitWithGroups) {
     EXPECT_EQ(back.groups[0].name, "inner part");
     EXPECT_EQ(back.groups[0].tag, 4);
     EXPECT_EQ(back.groups[1].name, "outer");
-    for (uint32_t t = 0; t < m.ntet(); ++t) ASSERT_EQ(back.tet_group[t], m.tet_group[t] == kNoGroup ? kNoGroup : m.tet_group[t] - 1);
+    for (uint32_t t = 0; t < m.ntet(); ++t)
+      ASSERT_EQ(back.tet_group[t], m.tet_group[t] == kNoGroup ? kNoGroup : m.tet_group[t] - 1);
     EXPECT_TRUE(back.warnings.empty());
   }
 }
@@ -60,7 +63,8 @@ TEST(MeshWrite, VtkBinary_ReadsBackToTheBit) {
 
 namespace {
 
-// A beam whose ends are named: groups of cells, of triangles, of points, and of lines, of which only the points are known.
+// A beam whose ends are named: groups of cells, of triangles, of points, and of lines, of which only the
+// points are known.
 TetMesh grouped() {
   TetMesh m = make_beam(Memory::standard(), 2, 1, 1, 100);
   m.groups.push_back({"corner", 0, 4, {0, 1}});
@@ -87,11 +91,15 @@ using Named = std::map<std::pair<int32_t, std::string>, std::set<uint32_t>>;
 // By dimension and name (number where the format keeps no names): the elements.
 Named named(const TetMesh &m, bool by_number) {
   Named out;
-  const auto key = [&](uint32_t g) { return std::pair(m.groups[g].dimension, by_number ? std::to_string(m.groups[g].tag) : m.groups[g].name); };
+  const auto key = [&](uint32_t g) {
+    return std::pair(m.groups[g].dimension, by_number ? std::to_string(m.groups[g].tag) : m.groups[g].name);
+  };
   for (uint32_t t = 0; t < m.ntet(); ++t)
     if (m.tet_group[t] != kNoGroup) out[key(m.tet_group[t])].insert(t);
   for (size_t t = 0; t < m.tri_group.size(); ++t) {
-    out[key(m.tri_group[t])].insert(m.tris[3 * t]), out[key(m.tri_group[t])].insert(m.tris[3 * t + 1]), out[key(m.tri_group[t])].insert(m.tris[3 * t + 2]);
+    out[key(m.tri_group[t])].insert(m.tris[3 * t]);
+    out[key(m.tri_group[t])].insert(m.tris[3 * t + 1]);
+    out[key(m.tri_group[t])].insert(m.tris[3 * t + 2]);
   }
   return out;
 }
@@ -108,9 +116,12 @@ TEST(MeshWrite, Groups_SurviveEveryFormat) {
     expect_same_bits(m, back);
     const bool by_number = std::strcmp(name, "/g.mesh") == 0;
     EXPECT_EQ(named(back, by_number), named(m, by_number));
-    const auto corner = std::find_if(back.groups.begin(), back.groups.end(), [](const MeshGroup &g) { return g.dimension == 0; });
+    const auto corner = std::find_if(back.groups.begin(), back.groups.end(),
+                                     [](const MeshGroup &g) { return g.dimension == 0; });
     ASSERT_EQ(corner != back.groups.end(), std::strstr(name, ".msh") != nullptr);
-    if (corner != back.groups.end()) { EXPECT_EQ(corner->points, (Array<uint32_t>{0, 1})); }
+    if (corner != back.groups.end()) {
+      EXPECT_EQ(corner->points, (Array<uint32_t>{0, 1}));
+    }
     EXPECT_TRUE(back.warnings.empty());
   }
 }
@@ -122,7 +133,8 @@ TEST(MeshWrite, Vtu_HasTheShareOfFilledCells) {
   const std::string text = test::read_file(folder() + "/share.vtu");
   const size_t at = text.find("Name=\"share\"");
   ASSERT_NE(at, std::string::npos);
-  const size_t data = text.find("<AppendedData encoding=\"raw\">\n_") + std::strlen("<AppendedData encoding=\"raw\">\n_");
+  const size_t data =
+      text.find("<AppendedData encoding=\"raw\">\n_") + std::strlen("<AppendedData encoding=\"raw\">\n_");
   const size_t start = data + std::stoul(text.substr(text.find("offset=\"", at) + 8));
   uint64_t bytes = 0;
   std::memcpy(&bytes, &text[start], 8);
@@ -137,7 +149,8 @@ TEST(MeshWrite, FailedWrite_LeavesOldFileAndNothingElse) {
   const std::string home = test::scratch("mesh_write_failed");
   std::filesystem::remove_all(home);
   std::filesystem::create_directories(home + "/taken.msh/inside");
-  EXPECT_THROW(write_tet_mesh(sample(), home + "/taken.msh"), Error);  // a folder stands there: renaming fails
+  // a folder stands there: renaming fails
+  EXPECT_THROW(write_tet_mesh(sample(), home + "/taken.msh"), Error);
   EXPECT_EQ(files_in(home), 1u);
   EXPECT_THROW(write_tet_mesh(sample(), home + "/none/a.msh"), Error);
   test::write_file(home + "/old.obj", "old");
@@ -159,7 +172,8 @@ TEST(MeshWrite, DiskThatFills_LeavesNothing) {
   std::signal(SIGXFSZ, SIG_IGN);  // so that the limit shows as a failing write, as a full disk does
   rlimit before{}, small{};
   getrlimit(RLIMIT_FSIZE, &before);
-  small.rlim_cur = 4096, small.rlim_max = before.rlim_max;
+  small.rlim_cur = 4096;
+  small.rlim_max = before.rlim_max;
   setrlimit(RLIMIT_FSIZE, &small);
   for (const char *name : {"/a.msh", "/a.msh2", "/a.vtk", "/a.vtu", "/a.mesh"}) {
     try {
@@ -179,14 +193,19 @@ TEST(MeshWrite, Vtu_OffsetsLeadToItsArrays) {
   std::vector<double> u(m.points.size(), 0.25), energy(m.ntet(), 7);
   std::vector<uint32_t> part(m.ntet(), 3);
   VtuGrid grid;
-  grid.npoint = m.npoint(), grid.ncell = m.ntet(), grid.points = m.points.data(), grid.cells = m.tets.data();
+  grid.npoint = m.npoint();
+  grid.ncell = m.ntet();
+  grid.points = m.points.data();
+  grid.cells = m.tets.data();
   grid.point_data = {{"u", 3, u.data(), nullptr}};
   grid.cell_data = {{"energy \"density\" <J>", 1, energy.data(), nullptr}, {"part", 1, nullptr, part.data()}};
   write_vtu(folder() + "/a.vtu", grid);
   const std::string text = test::read_file(folder() + "/a.vtu");
-  EXPECT_NE(text.find("NumberOfPoints=\"" + std::to_string(m.npoint()) + "\" NumberOfCells=\"" + std::to_string(m.ntet()) + "\""),
-      std::string::npos);
-  const size_t data = text.find("<AppendedData encoding=\"raw\">\n_") + std::strlen("<AppendedData encoding=\"raw\">\n_");
+  EXPECT_NE(text.find("NumberOfPoints=\"" + std::to_string(m.npoint()) + "\" NumberOfCells=\"" +
+                      std::to_string(m.ntet()) + "\""),
+            std::string::npos);
+  const size_t data =
+      text.find("<AppendedData encoding=\"raw\">\n_") + std::strlen("<AppendedData encoding=\"raw\">\n_");
   size_t end = data;
   const auto block = [&](const std::string &name) {
     const size_t at = text.find("Name=\"" + name + "\""), offset = text.find("offset=\"", at);
@@ -217,7 +236,11 @@ TEST(MeshWrite, VtuOfTriangles_HasTriangleCells) {
   const TetMesh m = make_beam(Memory::standard(), 1, 1, 1, 12);
   const Array<uint32_t> tri = boundary_triangles(m.tets);
   VtuGrid grid;
-  grid.npoint = m.npoint(), grid.ncell = uint32_t(tri.size() / 3), grid.corners = 3, grid.points = m.points.data(), grid.cells = tri.data();
+  grid.npoint = m.npoint();
+  grid.ncell = uint32_t(tri.size() / 3);
+  grid.corners = 3;
+  grid.points = m.points.data();
+  grid.cells = tri.data();
   write_vtu(folder() + "/t.vtu", grid);
   const std::string text = test::read_file(folder() + "/t.vtu"), end = "\n  </AppendedData>\n</VTKFile>\n";
   EXPECT_EQ(text.substr(text.size() - end.size() - grid.ncell, grid.ncell), std::string(grid.ncell, '\5'));

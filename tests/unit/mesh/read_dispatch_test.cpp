@@ -1,4 +1,5 @@
-// Which reader a file gets: by content where that is beyond doubt, else by ending; foreign formats are refused with the way to convert them.
+// Which reader a file gets: by content where that is beyond doubt, else by ending; foreign formats are
+// refused with the way to convert them.
 #include <gtest/gtest.h>
 
 #include "mesh/raw_mesh.h"
@@ -10,16 +11,20 @@ namespace {
 
 const std::string kOff = "OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n";
 
-RawMesh parse(const std::string &name, const std::string &text) { return parse_raw(Memory::standard(), name, text.data(), text.size()); }
+RawMesh parse(const std::string &name, const std::string &text) {
+  return parse_raw(Memory::standard(), name, text.data(), text.size());
+}
 
-void expect_unsupported(const std::string &name, const std::string &text, const std::vector<std::string> &words) {
+void expect_unsupported(const std::string &name, const std::string &text,
+                        const std::vector<std::string> &words) {
   try {
     parse(name, text);
     ADD_FAILURE() << name << " was read";
   } catch (const Error &e) {
     EXPECT_EQ(e.status, DFM_E_UNSUPPORTED) << e.sentence;
     EXPECT_EQ(e.sentence.rfind(name + ": ", 0), 0u) << e.sentence;
-    for (const std::string &word : words) EXPECT_NE(e.sentence.find(word), std::string::npos) << "no '" << word << "' in: " << e.sentence;
+    for (const std::string &word : words)
+      EXPECT_NE(e.sentence.find(word), std::string::npos) << "no '" << word << "' in: " << e.sentence;
   }
 }
 
@@ -30,7 +35,8 @@ TEST(ReadDispatch, EndingThatLies_IsToldInAWarningAndTheFileRead) {
   EXPECT_EQ(raw.ntri(), 1u);
   ASSERT_EQ(raw.warnings.size(), 1u);
   EXPECT_EQ(raw.warnings[0], "read as OFF, as its first bytes show, although its name ends in .ply");
-  EXPECT_EQ(parse("a", kOff).warnings.at(0), "read as OFF, as its first bytes show, although its name has no ending");
+  EXPECT_EQ(parse("a", kOff).warnings.at(0),
+            "read as OFF, as its first bytes show, although its name has no ending");
   EXPECT_TRUE(parse("A.OFF", kOff).warnings.empty());
   const TriMesh mesh = parse_tri_mesh(Memory::standard(), "a.ply", kOff.data(), kOff.size());
   ASSERT_FALSE(mesh.warnings.empty());
@@ -54,14 +60,16 @@ TEST(ReadDispatch, ForeignContent_IsNamedWhateverTheEnding) {
 
 TEST(ReadDispatch, ForeignEndings_AreRefusedWithTheWayToConvert) {
   const std::pair<const char *, const char *> rows[] = {
-      {"inp", "meshio convert"}, {"node", "tetgen -g"}, {"ele", "tetgen -g"}, {"face", "meshio convert"}, {"gltf", "assimp"}, {"glb", "assimp"},
-      {"fbx", "assimp"}, {"3ds", "assimp"}, {"dae", "assimp"}, {"gz", "gunzip"}, {"meshb", "gmsh -3"}, {"step", "gmsh -3"}, {"med", "meshio"}};
-  for (const auto &[end, word] : rows)
-    expect_unsupported(std::string("a.") + end, "x", {word});
+      {"inp", "meshio convert"}, {"node", "tetgen -g"}, {"ele", "tetgen -g"}, {"face", "meshio convert"},
+      {"gltf", "assimp"},        {"glb", "assimp"},     {"fbx", "assimp"},    {"3ds", "assimp"},
+      {"dae", "assimp"},         {"gz", "gunzip"},      {"meshb", "gmsh -3"}, {"step", "gmsh -3"},
+      {"med", "meshio"}};
+  for (const auto &[end, word] : rows) expect_unsupported(std::string("a.") + end, "x", {word});
 }
 
 TEST(ReadDispatch, UnknownEnding_NamesTheNearestAndAllThatAreRead) {
-  expect_unsupported("a.stll", "x", {"'stll'", "did you mean .stl?", ".msh, .vtk, .vtu, .mesh, .obj, .ply, .stl, .off"});
+  expect_unsupported("a.stll", "x",
+                     {"'stll'", "did you mean .stl?", ".msh, .vtk, .vtu, .mesh, .obj, .ply, .stl, .off"});
   expect_unsupported("a.d/mesh", "x", {"unknown mesh file ending ''"});
 }
 

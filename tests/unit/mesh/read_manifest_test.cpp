@@ -1,5 +1,6 @@
-// The shared mesh collection, every file of it: its manifest says how many points, tetrahedra and triangles other programs see, the folders'
-// EXPECTED.csv what must become of a file (read, report, reject, error). Formats that are not ours are refused with the way to convert them.
+// The shared mesh collection, every file of it: its manifest says how many points, tetrahedra and triangles
+// other programs see, the folders' EXPECTED.csv what must become of a file (read, report, reject, error).
+// Formats that are not ours are refused with the way to convert them.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -24,7 +25,9 @@ std::string trimmed(const std::string &text) {
   const size_t from = text.find_first_not_of(' ');
   return from == std::string::npos ? "" : text.substr(from, text.find_last_not_of(' ') - from + 1);
 }
-uint32_t count_in(const std::string &text) { return text.empty() ? 0 : static_cast<uint32_t>(std::stoul(text)); }
+uint32_t count_in(const std::string &text) {
+  return text.empty() ? 0 : static_cast<uint32_t>(std::stoul(text));
+}
 
 // Rows of a table without its head; the last column is a note that may hold commas.
 std::vector<std::vector<std::string>> rows_of(const std::string &path, size_t columns) {
@@ -37,17 +40,22 @@ std::vector<std::vector<std::string>> rows_of(const std::string &path, size_t co
   return rows;
 }
 
-// | file | points | tets | tris | min q | bytes | source | licence | sha256 | note |, with what EXPECTED.csv of the folder adds.
+// | file | points | tets | tris | min q | bytes | source | licence | sha256 | note |, with what EXPECTED.csv
+// of the folder adds.
 std::vector<Row> manifest(const std::string &folder) {
   std::map<std::string, Row> expected;
   for (const auto &r : rows_of(folder + "formats/EXPECTED.csv", 8)) {
     Row row{"formats/" + r[0], r[7], r[6]};
-    row.points = count_in(r[2]), row.tets = count_in(r[3]), row.tris = count_in(r[4]), row.volume = r[5].empty() ? 0 : std::stod(r[5]);
+    row.points = count_in(r[2]);
+    row.tets = count_in(r[3]);
+    row.tris = count_in(r[4]);
+    row.volume = r[5].empty() ? 0 : std::stod(r[5]);
     expected[row.file] = row;
   }
   for (const auto &r : rows_of(folder + "nasty/EXPECTED.csv", 5)) {
     Row row{"nasty/" + r[0], r[4], r[3]};
-    row.points = count_in(r[1]), row.tets = count_in(r[2]);
+    row.points = count_in(r[1]);
+    row.tets = count_in(r[2]);
     expected[row.file] = row;
   }
   std::vector<Row> out;
@@ -58,7 +66,9 @@ std::vector<Row> manifest(const std::string &folder) {
     for (std::string c; std::getline(cells, c, '|');) cell.push_back(trimmed(c));
     if (cell.size() < 11 || cell[1].find('/') == std::string::npos) continue;
     Row row{cell[1], cell[10]};
-    row.points = count_in(cell[2]), row.tets = count_in(cell[3]), row.tris = count_in(cell[4]);
+    row.points = count_in(cell[2]);
+    row.tets = count_in(cell[3]);
+    row.tris = count_in(cell[4]);
     const auto more = expected.find(row.file);
     if (more != expected.end()) row = more->second;
     row.quality = cell[5].empty() ? 0 : std::stod(cell[5]);
@@ -71,9 +81,11 @@ std::vector<Row> manifest(const std::string &folder) {
 bool is_foreign(const Row &row, const std::string &folder) {
   const std::string end = std::filesystem::path(row.file).extension().string();
   if (end == ".inp" || end == ".node" || end == ".ele" || end == ".face") return true;
-  for (const char *name : {"vol_msh10_ascii.msh", "vol_msh40_ascii.msh", "box_hex_msh41.msh", "box_tet10_msh41.msh"})
+  for (const char *name :
+       {"vol_msh10_ascii.msh", "vol_msh40_ascii.msh", "box_hex_msh41.msh", "box_tet10_msh41.msh"})
     if (row.name() == name) return true;
-  return test::read_file(folder + row.file).compare(0, 4, "$NOD") == 0;  // MSH 1, of which only some notes speak
+  // MSH 1, of which only some notes speak
+  return test::read_file(folder + row.file).compare(0, 4, "$NOD") == 0;
 }
 
 class SharedMeshes : public testing::Test {
@@ -91,9 +103,15 @@ class SharedMeshes : public testing::Test {
     const MeshStatistics s = mesh_statistics(mesh);
     EXPECT_EQ(s.npoint + mesh.dropped_points, row.points);
     EXPECT_EQ(s.ntet + mesh.dropped_cells, row.tets);
-    if (row.tris) { EXPECT_EQ(s.ntriangle, row.tris); }
-    if (row.volume > 0) { EXPECT_NEAR(s.volume / row.volume, 1, row.file.find("_f32") != std::string::npos ? 1e-6 : 1e-9); }
-    if (row.quality > 0 && mesh.turned == 0) { EXPECT_NEAR(s.quality_min, row.quality, 0.006 * row.quality); }
+    if (row.tris) {
+      EXPECT_EQ(s.ntriangle, row.tris);
+    }
+    if (row.volume > 0) {
+      EXPECT_NEAR(s.volume / row.volume, 1, row.file.find("_f32") != std::string::npos ? 1e-6 : 1e-9);
+    }
+    if (row.quality > 0 && mesh.turned == 0) {
+      EXPECT_NEAR(s.quality_min, row.quality, 0.006 * row.quality);
+    }
     EXPECT_GT(s.quality_min, 0);
   }
 
@@ -107,11 +125,14 @@ class SharedMeshes : public testing::Test {
       EXPECT_NEAR(s.volume / row.volume, 1, 1e-5);  // some are written with 7 digits
       EXPECT_TRUE(s.closed);
     } else if (row.tris) {  // as they stand in the file, STL corners apart
-      const uint32_t points = raw_points == row.points ? raw_points : raw_points - mesh.dropped_points;  // others drop unused points of OBJ
+      // others drop unused points of OBJ
+      const uint32_t points = raw_points == row.points ? raw_points : raw_points - mesh.dropped_points;
       EXPECT_EQ(points, row.points);
       EXPECT_EQ(raw_tris, row.tris);
     }
-    if (row.must.find("report") != std::string::npos) { EXPECT_FALSE(mesh.warnings.empty()); }
+    if (row.must.find("report") != std::string::npos) {
+      EXPECT_FALSE(mesh.warnings.empty());
+    }
   }
 };
 
@@ -130,12 +151,14 @@ TEST_F(SharedMeshes, EveryFileOfTheManifest_IsReadRepairedOrRefusedAsItSays) {
       EXPECT_FALSE(is_foreign(row, folder)) << "a format that is not ours was read";
       if (!raw.tets.empty()) {
         const TetMesh mesh = finish_mesh(path, std::move(raw));
-        if (row.tets && row.name() != "6_tetra_bad.msh") expect_tets(row, mesh);  // all its elements carry one number; others keep the last
+        // all its elements carry one number; others keep the last
+        if (row.tets && row.name() != "6_tetra_bad.msh") expect_tets(row, mesh);
         ++done["tets"];
       } else {
         EXPECT_EQ(row.tets, 0u);
         const TriMesh mesh = finish_surface(path, std::move(raw));
-        if (row.name() != "test_quad.vtk") expect_surface(row, points, tris, mesh);  // 0 triangles to others, its quadrangles cut to us
+        // 0 triangles to others, its quadrangles cut to us
+        if (row.name() != "test_quad.vtk") expect_surface(row, points, tris, mesh);
         ++done["surface"];
       }
       EXPECT_TRUE(row.must != "error" && row.must != "reject") << "was read";
@@ -143,7 +166,8 @@ TEST_F(SharedMeshes, EveryFileOfTheManifest_IsReadRepairedOrRefusedAsItSays) {
       EXPECT_NE(e.sentence.find(row.name()), std::string::npos) << e.sentence;
       if (is_foreign(row, folder)) {
         EXPECT_EQ(e.status, DFM_E_UNSUPPORTED) << e.sentence;
-        const bool converts = e.sentence.find("gmsh -3") != std::string::npos || e.sentence.find("meshio convert") != std::string::npos;
+        const bool converts = e.sentence.find("gmsh -3") != std::string::npos ||
+                              e.sentence.find("meshio convert") != std::string::npos;
         EXPECT_TRUE(converts) << e.sentence;
         ++done["foreign"];
       } else {
@@ -159,9 +183,12 @@ TEST_F(SharedMeshes, EveryFileOfTheManifest_IsReadRepairedOrRefusedAsItSays) {
 }
 
 TEST_F(SharedMeshes, Nasty_RepairsAndReportsAreTold) {
-  const auto read = [&](const char *file) { return read_tet_mesh(Memory::standard(), folder + "nasty/" + file); };
+  const auto read = [&](const char *file) {
+    return read_tet_mesh(Memory::standard(), folder + "nasty/" + file);
+  };
   const auto told = [](const TetMesh &m, const char *word) {
-    return std::any_of(m.warnings.begin(), m.warnings.end(), [&](const std::string &w) { return w.find(word) != std::string::npos; });
+    return std::any_of(m.warnings.begin(), m.warnings.end(),
+                       [&](const std::string &w) { return w.find(word) != std::string::npos; });
   };
   EXPECT_EQ(mesh_statistics(read("two_pieces.msh")).npiece, 2u);
   EXPECT_TRUE(told(read("two_pieces.msh"), "2 pieces that share no point"));
@@ -181,12 +208,17 @@ TEST_F(SharedMeshes, Nasty_RepairsAndReportsAreTold) {
 }
 
 TEST_F(SharedMeshes, ThesisCylinders_HaveTheirPublishedCounts) {
-  const struct { const char *file; uint32_t points, tets, triangles, edges; } rows[] = {
-      {"cyl_222.msh", 222, 561, 412, 988}, {"cyl_222.vtk", 222, 561, 412, 988},
-      {"cyl_coarse.msh", 554, 2729, 906, 3735}, {"cyl_fine.msh", 2579, 15092, 2386, 18863}};
+  const struct {
+    const char *file;
+    uint32_t points, tets, triangles, edges;
+  } rows[] = {{"cyl_222.msh", 222, 561, 412, 988},
+              {"cyl_222.vtk", 222, 561, 412, 988},
+              {"cyl_coarse.msh", 554, 2729, 906, 3735},
+              {"cyl_fine.msh", 2579, 15092, 2386, 18863}};
   for (const auto &row : rows) {
     SCOPED_TRACE(row.file);
-    const MeshStatistics s = mesh_statistics(read_tet_mesh(Memory::standard(), folder + "thesis/" + row.file));
+    const MeshStatistics s =
+        mesh_statistics(read_tet_mesh(Memory::standard(), folder + "thesis/" + row.file));
     EXPECT_EQ(s.npoint, row.points);
     EXPECT_EQ(s.ntet, row.tets);
     EXPECT_EQ(s.ntriangle, row.triangles);
@@ -195,7 +227,9 @@ TEST_F(SharedMeshes, ThesisCylinders_HaveTheirPublishedCounts) {
 }
 
 TEST_F(SharedMeshes, NastySurfaces_RepairsAndReportsAreTold) {
-  const auto read = [&](const char *file) { return read_tri_mesh(Memory::standard(), folder + "nasty/" + file); };
+  const auto read = [&](const char *file) {
+    return read_tri_mesh(Memory::standard(), folder + "nasty/" + file);
+  };
   EXPECT_GT(tri_mesh_statistics(read("open_surface.obj")).open_edges, 0u);
   EXPECT_GT(read("mixed_winding.obj").turned, 0u);
   EXPECT_TRUE(tri_mesh_statistics(read("mixed_winding.obj")).closed);

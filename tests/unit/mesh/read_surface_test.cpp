@@ -1,4 +1,5 @@
-// The surface readers on files of our own (tests/data/surfaces): every dialect gives the same cube; every refusal names its place.
+// The surface readers on files of our own (tests/data/surfaces): every dialect gives the same cube; every
+// refusal names its place.
 #include <gtest/gtest.h>
 
 #include <map>
@@ -12,16 +13,20 @@ namespace {
 
 const std::string kFolder = std::string(DEFORM_SOURCE_DIR) + "/tests/data/surfaces/";
 
-RawMesh parse(const std::string &name, const std::string &text) { return parse_raw(Memory::standard(), name, text.data(), text.size()); }
+RawMesh parse(const std::string &name, const std::string &text) {
+  return parse_raw(Memory::standard(), name, text.data(), text.size());
+}
 
-void expect_refusal(const std::string &name, const std::string &text, dfm_status status, const std::vector<std::string> &words) {
+void expect_refusal(const std::string &name, const std::string &text, dfm_status status,
+                    const std::vector<std::string> &words) {
   try {
     parse(name, text);
     ADD_FAILURE() << name << " was read:\n" << text.substr(0, 200);
   } catch (const Error &e) {
     EXPECT_EQ(e.status, status) << e.sentence;
     EXPECT_NE(e.sentence.find(name), std::string::npos) << e.sentence;
-    for (const std::string &word : words) EXPECT_NE(e.sentence.find(word), std::string::npos) << "no '" << word << "' in: " << e.sentence;
+    for (const std::string &word : words)
+      EXPECT_NE(e.sentence.find(word), std::string::npos) << "no '" << word << "' in: " << e.sentence;
   }
 }
 
@@ -37,13 +42,17 @@ using Groups = std::map<std::string, uint32_t>;
 double volume6(const RawMesh &raw) {
   double v = 0;
   for (size_t t = 0; t < raw.tris.size(); t += 3) {
-    const double *a = &raw.points[3 * raw.tris[t]], *b = &raw.points[3 * raw.tris[t + 1]], *c = &raw.points[3 * raw.tris[t + 2]];
-    v += a[0] * (b[1] * c[2] - b[2] * c[1]) + a[1] * (b[2] * c[0] - b[0] * c[2]) + a[2] * (b[0] * c[1] - b[1] * c[0]);
+    const double *a = &raw.points[3 * raw.tris[t]];
+    const double *b = &raw.points[3 * raw.tris[t + 1]];
+    const double *c = &raw.points[3 * raw.tris[t + 2]];
+    v += a[0] * (b[1] * c[2] - b[2] * c[1]) + a[1] * (b[2] * c[0] - b[0] * c[2]) +
+         a[2] * (b[0] * c[1] - b[1] * c[0]);
   }
   return v;
 }
 
-const std::string kPlyHead = "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\n";
+const std::string kPlyHead =
+    "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\n";
 const std::string kPlyThree = "0 0 0\n1 0 0\n0 1 0\n";
 
 }  // namespace
@@ -64,17 +73,22 @@ TEST(ReadSurface, EveryDialect_GivesTheSameCube) {
     EXPECT_EQ(mesh.npoint(), 8u);
     EXPECT_EQ(mesh.ntri(), 12u);
     EXPECT_EQ(mesh.turned, 0u);
-    if (!stl) { EXPECT_EQ(mesh.file_point, (Array<uint32_t>{0, 1, 3, 4, 5, 6, 7, 8})); }
+    if (!stl) {
+      EXPECT_EQ(mesh.file_point, (Array<uint32_t>{0, 1, 3, 4, 5, 6, 7, 8}));
+    }
   }
 }
 
 TEST(ReadSurface, Groups_AreThoseOfTheFile) {
-  const auto groups = [](const char *file) { return groups_of(read_raw(Memory::standard(), kFolder + "cube_" + file)); };
+  const auto groups = [](const char *file) {
+    return groups_of(read_raw(Memory::standard(), kFolder + "cube_" + file));
+  };
   EXPECT_EQ(groups("obj.obj"), (Groups{{"low", 6}, {"high end", 6}}));
   EXPECT_EQ(groups("obj_quads.obj"), (Groups{{"", 12}}));
   EXPECT_EQ(groups("stl_ascii.stl"), (Groups{{"low", 6}, {"high end", 6}}));
   EXPECT_EQ(groups("stl_upper.stl"), (Groups{{"", 12}}));
-  for (const char *file : {"ply_ascii.ply", "ply_little.ply", "ply_big.ply"}) EXPECT_EQ(groups(file), (Groups{{"", 6}, {"1", 6}})) << file;
+  for (const char *file : {"ply_ascii.ply", "ply_little.ply", "ply_big.ply"})
+    EXPECT_EQ(groups(file), (Groups{{"", 6}, {"1", 6}})) << file;
   EXPECT_EQ(groups("vtk_polydata.vtk"), (Groups{{"1", 8}, {"2", 4}}));  // vertices, lines, polygons, strips
   EXPECT_EQ(groups("medit.mesh"), (Groups{{"1", 6}, {"2", 6}}));
   EXPECT_EQ(groups("msh22.msh"), (Groups{{"1", 6}, {"2", 6}}));
@@ -82,7 +96,8 @@ TEST(ReadSurface, Groups_AreThoseOfTheFile) {
 
 TEST(ReadSurface, ObjGroup_IsWhatGSaysElseTheMaterialElseTheObject) {
   const std::string v = "v 0 0 0\nv 1 0 0\nv 0 1 0\n", f = "f 1 2 3\n";
-  EXPECT_EQ(groups_of(parse("a.obj", v + "o whole\n" + f + "usemtl red\n" + f + "g part\n" + f + "usemtl blue\n" + f + "g default\n" + f)),
+  EXPECT_EQ(groups_of(parse("a.obj", v + "o whole\n" + f + "usemtl red\n" + f + "g part\n" + f +
+                                         "usemtl blue\n" + f + "g default\n" + f)),
             (Groups{{"whole", 1}, {"red", 1}, {"part", 2}, {"blue", 1}}));
   EXPECT_TRUE(parse("a.obj", v + "g empty\ng\n" + f).groups.empty());  // a group without faces is none
 }
@@ -115,30 +130,45 @@ TEST(ReadSurface, ObjRefusals_NameLineAndReason) {
 TEST(ReadSurface, PlyRefusals_NamePlaceAndReason) {
   const std::string faces = "element face 1\nproperty list uchar int vertex_index\nend_header\n";
   EXPECT_EQ(parse("a.ply", kPlyHead + faces + kPlyThree + "3 0 1 2").ntri(), 1u);
-  expect_refusal("a.ply", kPlyHead + faces + kPlyThree + "3 0 1 3\n", DFM_E_FORMAT, {"a.ply:13:", "vertex 3", "0 to 2"});
+  expect_refusal("a.ply", kPlyHead + faces + kPlyThree + "3 0 1 3\n", DFM_E_FORMAT,
+                 {"a.ply:13:", "vertex 3", "0 to 2"});
   expect_refusal("a.ply", kPlyHead + faces + kPlyThree + "200 0 1 2\n", DFM_E_FORMAT, {"a.ply:13:", "200"});
   expect_refusal("a.ply", kPlyHead + faces + kPlyThree + "2 0 1\n", DFM_E_FORMAT, {"2 corners"});
   expect_refusal("a.ply", kPlyHead + faces + "0 0 inf\n", DFM_E_FORMAT, {"cannot hold"});
   expect_refusal("a.ply", kPlyHead + faces + "0 0 inf\n" + kPlyThree, DFM_E_FORMAT, {"a.ply:10:", "'inf'"});
-  expect_refusal("a.ply", kPlyHead + "element face 1\nproperty int a\nend_header\n" + kPlyThree + "1\n", DFM_E_FORMAT, {"vertex_indices"});
-  expect_refusal("a.ply", kPlyHead + "element face 1\nproperty list uchar float vertex_indices\nend_header\n" + kPlyThree + "3 0 1 2\n", DFM_E_FORMAT, {"whole"});
-  expect_refusal("a.ply", kPlyHead + "element tristrips 1\nproperty list uchar int vertex_indices\nend_header\n" + kPlyThree + "3 0 1 2\n",
+  expect_refusal("a.ply", kPlyHead + "element face 1\nproperty int a\nend_header\n" + kPlyThree + "1\n",
+                 DFM_E_FORMAT, {"vertex_indices"});
+  expect_refusal("a.ply",
+                 kPlyHead + "element face 1\nproperty list uchar float vertex_indices\nend_header\n" +
+                     kPlyThree + "3 0 1 2\n",
+                 DFM_E_FORMAT, {"whole"});
+  expect_refusal("a.ply",
+                 kPlyHead + "element tristrips 1\nproperty list uchar int vertex_indices\nend_header\n" +
+                     kPlyThree + "3 0 1 2\n",
                  DFM_E_UNSUPPORTED, {"triangle strips", "meshio convert"});
-  expect_refusal("a.ply", "ply\nformat ascii 1.0\nelement vertex 3\nend_header\n", DFM_E_FORMAT, {"without properties"});
-  expect_refusal("a.ply", "ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nproperty float y\nend_header\n1 2\n", DFM_E_FORMAT, {"no property z"});
+  expect_refusal("a.ply", "ply\nformat ascii 1.0\nelement vertex 3\nend_header\n", DFM_E_FORMAT,
+                 {"without properties"});
+  expect_refusal(
+      "a.ply",
+      "ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nproperty float y\nend_header\n1 2\n",
+      DFM_E_FORMAT, {"no property z"});
   expect_refusal("a.ply", "ply\nformat zip 1.0\nend_header\n", DFM_E_FORMAT, {"a.ply:2:", "'zip'"});
-  expect_refusal("a.ply", "ply\nformat ascii 1.0\nproperty float x\nend_header\n", DFM_E_FORMAT, {"before any element"});
+  expect_refusal("a.ply", "ply\nformat ascii 1.0\nproperty float x\nend_header\n", DFM_E_FORMAT,
+                 {"before any element"});
   expect_refusal("a.ply", "ply\nend_header\n", DFM_E_FORMAT, {"no format"});
   expect_refusal("a.ply", "ply\nformat ascii 1.0\n", DFM_E_FORMAT, {"end_header is missing"});
 }
 
 TEST(ReadSurface, StlRefusals_NamePlaceAndReason) {
-  const std::string facet = "facet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nvertex 0 1 0\nendloop\nendfacet\n";
+  const std::string facet =
+      "facet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nvertex 0 1 0\nendloop\nendfacet\n";
   EXPECT_EQ(parse("a.stl", "solid\n" + facet + "endsolid").ntri(), 1u);
   expect_refusal("a.stl", "solid\n" + facet, DFM_E_FORMAT, {"'facet' or 'endsolid'", "end of the file"});
   expect_refusal("a.stl", "solid\n" + facet + "endsolid\nfacet", DFM_E_FORMAT, {"a.stl:10:", "'solid'"});
-  expect_refusal("a.stl", "solid\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nendloop\n", DFM_E_FORMAT, {"a.stl:6:", "'vertex'"});
-  expect_refusal("a.stl", "solid\nfacet normal 0 0 1\nouter loop\nvertex 0 0 zero\n", DFM_E_FORMAT, {"a.stl:4:", "'zero'"});
+  expect_refusal("a.stl", "solid\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nendloop\n",
+                 DFM_E_FORMAT, {"a.stl:6:", "'vertex'"});
+  expect_refusal("a.stl", "solid\nfacet normal 0 0 1\nouter loop\nvertex 0 0 zero\n", DFM_E_FORMAT,
+                 {"a.stl:4:", "'zero'"});
   expect_refusal("a.stl", "hello", DFM_E_FORMAT, {"5 bytes", "84"});
   std::string binary(84 + 50, '\0');
   binary[80] = 1;
@@ -147,7 +177,8 @@ TEST(ReadSurface, StlRefusals_NamePlaceAndReason) {
   binary[80] = 2;
   expect_refusal("a.stl", binary, DFM_E_FORMAT, {"2 triangles", "184"});
   binary[80] = 0;
-  expect_refusal("a.stl", binary, DFM_E_FORMAT, {"0 triangles", "count is wrong"});  // 50 bytes more than promised: a part would be lost
+  // 50 bytes more than promised: a part would be lost
+  expect_refusal("a.stl", binary, DFM_E_FORMAT, {"0 triangles", "count is wrong"});
 }
 
 TEST(ReadSurface, OffRefusals_NamePlaceAndReason) {
@@ -164,8 +195,14 @@ TEST(ReadSurface, OffRefusals_NamePlaceAndReason) {
 }
 
 TEST(ReadSurface, CurvedFacesAlone_AreRefusedWithTheWayToConvert) {
-  const std::string nodes = "$MeshFormat\n2.2 0 8\n$EndMeshFormat\n$Nodes\n6\n1 0 0 0\n2 2 0 0\n3 0 2 0\n4 1 0 0\n5 1 1 0\n6 0 1 0\n$EndNodes\n";
-  expect_refusal("a.msh", nodes + "$Elements\n1\n1 9 0 1 2 3 4 5 6\n$EndElements\n", DFM_E_UNSUPPORTED, {"second- or higher-order", "gmsh -3"});
-  expect_refusal("a.vtk", "# vtk DataFile Version 3.0\nt\nASCII\nDATASET UNSTRUCTURED_GRID\nPOINTS 6 float\n0 0 0 2 0 0 0 2 0 1 0 0 1 1 0 0 1 0\n"
-                          "CELLS 1 7\n6 0 1 2 3 4 5\nCELL_TYPES 1\n22\n", DFM_E_UNSUPPORTED, {"second- or higher-order", "-order 1"});
+  const std::string nodes =
+      "$MeshFormat\n2.2 0 8\n$EndMeshFormat\n$Nodes\n6\n1 0 0 0\n2 2 0 0\n3 0 2 0\n4 1 0 0\n5 1 1 0\n6 0 1 "
+      "0\n$EndNodes\n";
+  expect_refusal("a.msh", nodes + "$Elements\n1\n1 9 0 1 2 3 4 5 6\n$EndElements\n", DFM_E_UNSUPPORTED,
+                 {"second- or higher-order", "gmsh -3"});
+  expect_refusal("a.vtk",
+                 "# vtk DataFile Version 3.0\nt\nASCII\nDATASET UNSTRUCTURED_GRID\nPOINTS 6 float\n0 0 0 2 0 "
+                 "0 0 2 0 1 0 0 1 1 0 0 1 0\n"
+                 "CELLS 1 7\n6 0 1 2 3 4 5\nCELL_TYPES 1\n22\n",
+                 DFM_E_UNSUPPORTED, {"second- or higher-order", "-order 1"});
 }

@@ -11,22 +11,29 @@ using namespace dfm;
 
 namespace {
 
-RawMesh parse(const std::string &text) { return parse_raw(Memory::standard(), "a.vtu", text.data(), text.size()); }
+RawMesh parse(const std::string &text) {
+  return parse_raw(Memory::standard(), "a.vtu", text.data(), text.size());
+}
 
-std::string array(const std::string &type, const std::string &name, const std::string &text, const std::string &more = "format=\"ascii\"") {
+std::string array(const std::string &type, const std::string &name, const std::string &text,
+                  const std::string &more = "format=\"ascii\"") {
   return "<DataArray type=\"" + type + "\" Name=\"" + name + "\" " + more + ">" + text + "</DataArray>";
 }
-std::string piece(int npoint, const std::string &points, int ncell, const std::string &corners, const std::string &ends, const std::string &types,
-                  const std::string &data = "") {
-  return "<Piece NumberOfPoints=\"" + std::to_string(npoint) + "\" NumberOfCells=\"" + std::to_string(ncell) + "\"><CellData>" + data + "</CellData><Points>" +
-         array("Float64", "Points", points, "NumberOfComponents=\"3\" format=\"ascii\"") + "</Points><Cells>" + array("Int64", "connectivity", corners) +
-         array("Int32", "offsets", ends) + array("UInt8", "types", types) + "</Cells></Piece>";
+std::string piece(int npoint, const std::string &points, int ncell, const std::string &corners,
+                  const std::string &ends, const std::string &types, const std::string &data = "") {
+  return "<Piece NumberOfPoints=\"" + std::to_string(npoint) + "\" NumberOfCells=\"" + std::to_string(ncell) +
+         "\"><CellData>" + data + "</CellData><Points>" +
+         array("Float64", "Points", points, "NumberOfComponents=\"3\" format=\"ascii\"") +
+         "</Points><Cells>" + array("Int64", "connectivity", corners) + array("Int32", "offsets", ends) +
+         array("UInt8", "types", types) + "</Cells></Piece>";
 }
 std::string file(const std::string &content, const std::string &head = "byte_order=\"LittleEndian\"") {
-  return "<VTKFile type=\"UnstructuredGrid\" version=\"0.1\" " + head + ">\n<UnstructuredGrid>\n" + content + "\n</UnstructuredGrid></VTKFile>\n";
+  return "<VTKFile type=\"UnstructuredGrid\" version=\"0.1\" " + head + ">\n<UnstructuredGrid>\n" + content +
+         "\n</UnstructuredGrid></VTKFile>\n";
 }
 std::string points_alone(const std::string &how, const std::string &text) {
-  return "<Piece NumberOfPoints=\"1\" NumberOfCells=\"0\"><Points>" + array("Float32", "Points", text, how) + "</Points></Piece>";
+  return "<Piece NumberOfPoints=\"1\" NumberOfCells=\"0\"><Points>" + array("Float32", "Points", text, how) +
+         "</Points></Piece>";
 }
 const std::string kFour = "0 0 0 1 0 0 0 1 0 0 0 1";
 std::string one_tet() { return piece(4, kFour, 1, "0 1 2 3", "4", "10"); }
@@ -38,7 +45,8 @@ void expect_refusal(const std::string &text, dfm_status status, const std::vecto
   } catch (const Error &e) {
     EXPECT_EQ(e.status, status) << e.sentence;
     EXPECT_EQ(e.sentence.rfind("a.vtu", 0), 0u) << e.sentence;
-    for (const std::string &word : words) EXPECT_NE(e.sentence.find(word), std::string::npos) << "no '" << word << "' in: " << e.sentence;
+    for (const std::string &word : words)
+      EXPECT_NE(e.sentence.find(word), std::string::npos) << "no '" << word << "' in: " << e.sentence;
   }
 }
 
@@ -47,18 +55,22 @@ std::string base64(const std::string &bytes) {
   std::string out;
   for (size_t i = 0; i < bytes.size(); i += 3) {
     uint32_t bits = 0;
-    for (size_t k = 0; k < 3; ++k) bits = bits << 8 | (i + k < bytes.size() ? static_cast<unsigned char>(bytes[i + k]) : 0u);
+    for (size_t k = 0; k < 3; ++k)
+      bits = bits << 8 | (i + k < bytes.size() ? static_cast<unsigned char>(bytes[i + k]) : 0u);
     for (size_t k = 0; k < 4; ++k) out += i + k <= bytes.size() ? digits[bits >> (18 - 6 * k) & 63] : '=';
   }
   return out;
 }
 template <class T>
-std::string bytes_of(const std::vector<T> &values) { return {reinterpret_cast<const char *>(values.data()), values.size() * sizeof(T)}; }
+std::string bytes_of(const std::vector<T> &values) {
+  return {reinterpret_cast<const char *>(values.data()), values.size() * sizeof(T)};
+}
 
 }  // namespace
 
 TEST(ReadVtu, Pieces_FollowOneAnother) {
-  const RawMesh raw = parse(file(one_tet() + piece(3, "5 5 5 6 5 5 5 6 5", 1, "0 1 2", "3", "5") + "<Piece NumberOfPoints=\"0\" NumberOfCells=\"0\"/>"));
+  const RawMesh raw = parse(file(one_tet() + piece(3, "5 5 5 6 5 5 5 6 5", 1, "0 1 2", "3", "5") +
+                                 "<Piece NumberOfPoints=\"0\" NumberOfCells=\"0\"/>"));
   EXPECT_EQ(raw.npoint(), 7u);
   EXPECT_EQ(raw.tets, (Array<uint32_t>{0, 1, 2, 3}));
   EXPECT_EQ(raw.tris, (Array<uint32_t>{4, 5, 6}));
@@ -66,10 +78,14 @@ TEST(ReadVtu, Pieces_FollowOneAnother) {
 
 TEST(ReadVtu, StraightFaces_AreCutIntoTriangles) {
   const std::string five = "0 0 0 1 0 0 1 1 0 0 1 0 0.5 2 0";
-  const RawMesh raw = parse(file(piece(5, five, 7, "0 1 2  0 1 2 3  0 1 3 2  0 1 2 4 3  0 1 3 2  0 1  4", "3 7 11 16 20 22 23", "5 9 8 7 6 3 1")));
+  const RawMesh raw = parse(file(piece(5, five, 7, "0 1 2  0 1 2 3  0 1 3 2  0 1 2 4 3  0 1 3 2  0 1  4",
+                                       "3 7 11 16 20 22 23", "5 9 8 7 6 3 1")));
   EXPECT_EQ(raw.ntri(), 1u + 2 + 2 + 3 + 2);
-  EXPECT_EQ(Array<uint32_t>(raw.tris.begin() + 9, raw.tris.begin() + 15), (Array<uint32_t>{0, 1, 2, 0, 2, 3}));   // a pixel's corners go row by row
-  EXPECT_EQ(Array<uint32_t>(raw.tris.end() - 6, raw.tris.end()), (Array<uint32_t>{0, 1, 3, 1, 2, 3}));            // a strip's every second one is turned
+  // a pixel's corners go row by row
+  EXPECT_EQ(Array<uint32_t>(raw.tris.begin() + 9, raw.tris.begin() + 15),
+            (Array<uint32_t>{0, 1, 2, 0, 2, 3}));
+  // a strip's every second one is turned
+  EXPECT_EQ(Array<uint32_t>(raw.tris.end() - 6, raw.tris.end()), (Array<uint32_t>{0, 1, 3, 1, 2, 3}));
 }
 
 TEST(ReadVtu, GroupsOfCells_AreKnownByTheirArray) {
@@ -90,11 +106,14 @@ TEST(ReadVtu, CompressedArray_MayUnpackToSixtyFourTimesItsFile) {
     const std::string zeros(npoint * 12, '\0');
     uLongf size = compressBound(zeros.size());
     std::string out(size, '\0');
-    compress(reinterpret_cast<Bytef *>(out.data()), &size, reinterpret_cast<const Bytef *>(zeros.data()), zeros.size());
+    compress(reinterpret_cast<Bytef *>(out.data()), &size, reinterpret_cast<const Bytef *>(zeros.data()),
+             zeros.size());
     out.resize(size);
     const std::string head = bytes_of<uint32_t>({1, uint32_t(zeros.size()), 0, uint32_t(size)});
     return file("<Piece NumberOfPoints=\"" + std::to_string(npoint) + "\" NumberOfCells=\"0\"><Points>" +
-                    array("Float32", "Points", base64(head) + base64(out), "NumberOfComponents=\"3\" format=\"binary\"") + "</Points></Piece>",
+                    array("Float32", "Points", base64(head) + base64(out),
+                          "NumberOfComponents=\"3\" format=\"binary\"") +
+                    "</Points></Piece>",
                 "byte_order=\"LittleEndian\" compressor=\"vtkZLibDataCompressor\"");
   };
   EXPECT_EQ(parse(packed(1000)).npoint(), 1000u);
@@ -106,11 +125,14 @@ TEST(ReadVtu, DamagedData_AreRefused) {
   for (size_t i = 0; i < data.size(); ++i) data[i] = static_cast<char>(i * 37 % 251);
   uLongf size = compressBound(data.size());
   std::string body(size, '\0');
-  compress(reinterpret_cast<Bytef *>(body.data()), &size, reinterpret_cast<const Bytef *>(data.data()), data.size());
+  compress(reinterpret_cast<Bytef *>(body.data()), &size, reinterpret_cast<const Bytef *>(data.data()),
+           data.size());
   body.resize(size);
   const auto with = [&](const std::vector<uint32_t> &head, const std::string &packed) {
     return file("<Piece NumberOfPoints=\"4\" NumberOfCells=\"0\"><Points>" +
-                    array("UInt8", "Points", base64(bytes_of(head)) + base64(packed), "NumberOfComponents=\"3\" format=\"binary\"") + "</Points></Piece>",
+                    array("UInt8", "Points", base64(bytes_of(head)) + base64(packed),
+                          "NumberOfComponents=\"3\" format=\"binary\"") +
+                    "</Points></Piece>",
                 "byte_order=\"LittleEndian\" compressor=\"vtkZLibDataCompressor\"");
   };
   const uint32_t n = uint32_t(data.size()), p = uint32_t(size);
@@ -123,12 +145,17 @@ TEST(ReadVtu, DamagedData_AreRefused) {
   expect_refusal(with({1, n, n + 1, p}, body), DFM_E_FORMAT, {"cannot hold"});
   expect_refusal(with({1, 5, 0, p}, body), DFM_E_FORMAT, {"damaged"});
   expect_refusal(with({0, n, 0}, ""), DFM_E_FORMAT, {"promises 12 points"});
-  const auto inline_points = [](const std::string &text) { return file(points_alone("NumberOfComponents=\"3\" format=\"binary\"", text)); };
+  const auto inline_points = [](const std::string &text) {
+    return file(points_alone("NumberOfComponents=\"3\" format=\"binary\"", text));
+  };
   EXPECT_EQ(parse(inline_points(base64(bytes_of<uint32_t>({12, 0, 0, 0})))).npoint(), 1u);
-  const std::string apart = " \n" + base64(bytes_of<uint32_t>({12})) + "\n" + base64(bytes_of<uint32_t>({0, 0, 0}));  // length encoded apart
+  // length encoded apart
+  const std::string apart =
+      " \n" + base64(bytes_of<uint32_t>({12})) + "\n" + base64(bytes_of<uint32_t>({0, 0, 0}));
   EXPECT_EQ(parse(inline_points(apart)).npoint(), 1u);
   expect_refusal(inline_points("DAAAAA*AAAAAAAAAAAAAAA=="), DFM_E_FORMAT, {"not base64"});
-  expect_refusal(inline_points(base64(bytes_of<uint32_t>({12, 0, 0, 0x7f800000}))), DFM_E_FORMAT, {"DataArray 'Points', byte 8", "finite"});
+  expect_refusal(inline_points(base64(bytes_of<uint32_t>({12, 0, 0, 0x7f800000}))), DFM_E_FORMAT,
+                 {"DataArray 'Points', byte 8", "finite"});
   expect_refusal(inline_points(base64(bytes_of<uint32_t>({13, 0, 0, 0}))), DFM_E_FORMAT, {"13 bytes"});
 }
 
@@ -137,20 +164,29 @@ TEST(ReadVtu, Structure_IsChecked) {
   const std::string whole = file(one_tet());
   expect_refusal(whole.substr(0, whole.find("</UnstructuredGrid>")), DFM_E_FORMAT, {"</VTKFile> is missing"});
   expect_refusal(file(""), DFM_E_FORMAT, {"no Piece"});
-  expect_refusal(file(piece(4, kFour, 1, "0 1 2 4", "4", "10")), DFM_E_FORMAT, {"cell 0", "point 4", "0 to 3"});
+  expect_refusal(file(piece(4, kFour, 1, "0 1 2 4", "4", "10")), DFM_E_FORMAT,
+                 {"cell 0", "point 4", "0 to 3"});
   expect_refusal(file(piece(4, kFour, 1, "0 1 2 -1", "4", "10")), DFM_E_FORMAT, {"point -1"});
   expect_refusal(file(piece(4, kFour, 1, "0 1 2 3", "5", "10")), DFM_E_FORMAT, {"5 corners of a cell"});
-  expect_refusal(file(piece(4, kFour, 2, "0 1 2 3 0 1 2 3", "4 3", "10 10")), DFM_E_FORMAT, {"offset of cell 1 is 3"});
+  expect_refusal(file(piece(4, kFour, 2, "0 1 2 3 0 1 2 3", "4 3", "10 10")), DFM_E_FORMAT,
+                 {"offset of cell 1 is 3"});
   expect_refusal(file(piece(4, kFour, 2, "0 1 2 3", "4", "10")), DFM_E_FORMAT, {"2 offsets"});
   expect_refusal(file(piece(4, kFour, 1, "0 1 2", "3", "10")), DFM_E_FORMAT, {"tetrahedron", "3 points"});
   expect_refusal(file(piece(4, "0 0 0", 1, "0 1 2 3", "4", "10")), DFM_E_FORMAT, {"12 points"});
-  expect_refusal(file(piece(4, "0 0 0 1 0 0 0 nan 0 0 0 1", 1, "0 1 2 3", "4", "10")), DFM_E_FORMAT, {"a.vtu:3:", "'nan'"});
-  expect_refusal(file(piece(8, kFour + " " + kFour, 1, "0 1 2 3 4 5 6 7", "8", "12")), DFM_E_UNSUPPORTED, {"hexahedron", "mesh the shape"});
-  expect_refusal(file(piece(4, kFour, 1, "0 1 2 3 0 1 2 3 0 1", "10", "24")), DFM_E_UNSUPPORTED, {"higher-order", "-order 1"});
-  expect_refusal(file(points_alone("NumberOfComponents=\"2\" format=\"ascii\"", "0 0")), DFM_E_FORMAT, {"2 components"});
-  expect_refusal(file(points_alone("NumberOfComponents=\"3\" format=\"appended\" offset=\"0\"", "")), DFM_E_FORMAT, {"no AppendedData"});
-  expect_refusal("<VTKFile type=\"ImageData\"></VTKFile>", DFM_E_UNSUPPORTED, {"'ImageData'", "UnstructuredGrid or PolyData"});
-  expect_refusal(file(one_tet(), "compressor=\"vtkLZ4DataCompressor\""), DFM_E_UNSUPPORTED, {"LZ4", "vtkZLibDataCompressor"});
+  expect_refusal(file(piece(4, "0 0 0 1 0 0 0 nan 0 0 0 1", 1, "0 1 2 3", "4", "10")), DFM_E_FORMAT,
+                 {"a.vtu:3:", "'nan'"});
+  expect_refusal(file(piece(8, kFour + " " + kFour, 1, "0 1 2 3 4 5 6 7", "8", "12")), DFM_E_UNSUPPORTED,
+                 {"hexahedron", "mesh the shape"});
+  expect_refusal(file(piece(4, kFour, 1, "0 1 2 3 0 1 2 3 0 1", "10", "24")), DFM_E_UNSUPPORTED,
+                 {"higher-order", "-order 1"});
+  expect_refusal(file(points_alone("NumberOfComponents=\"2\" format=\"ascii\"", "0 0")), DFM_E_FORMAT,
+                 {"2 components"});
+  expect_refusal(file(points_alone("NumberOfComponents=\"3\" format=\"appended\" offset=\"0\"", "")),
+                 DFM_E_FORMAT, {"no AppendedData"});
+  expect_refusal("<VTKFile type=\"ImageData\"></VTKFile>", DFM_E_UNSUPPORTED,
+                 {"'ImageData'", "UnstructuredGrid or PolyData"});
+  expect_refusal(file(one_tet(), "compressor=\"vtkLZ4DataCompressor\""), DFM_E_UNSUPPORTED,
+                 {"LZ4", "vtkZLibDataCompressor"});
   expect_refusal(file(one_tet(), "byte_order=\"Middle\""), DFM_E_FORMAT, {"'Middle'"});
   expect_refusal(file(one_tet(), "header_type=\"UInt16\""), DFM_E_FORMAT, {"'UInt16'"});
 }

@@ -1,4 +1,5 @@
-// Surfaces of ../shared/meshes: each meets the fate that its note foretells, and the boundary of a body encloses the body's volume.
+// Surfaces of ../shared/meshes: each meets the fate that its note foretells, and the boundary of a body
+// encloses the body's volume.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -12,21 +13,28 @@ namespace {
 
 std::string meshes() { return test::shared_dir().empty() ? "" : test::shared_dir() + "/meshes/"; }
 
-struct Fate { const char *file; uint32_t npoint, ntri, npiece, open_edges, holes, nonmanifold; double volume; const char *warning; };
+struct Fate {
+  const char *file;
+  uint32_t npoint, ntri, npiece, open_edges, holes, nonmanifold;
+  double volume;
+  const char *warning;
+};
 
 }  // namespace
 
 TEST(SurfaceShared, NastyFiles_MeetTheirNotes) {
   if (meshes().empty()) GTEST_SKIP() << "../shared is not here";
-  for (const Fate &f : {Fate{"nasty/degenerate_triangles.off", 92, 180, 1, 0, 0, 0, 0.002, "2 triangles without area were dropped"},
-                        {"nasty/mixed_winding.obj", 92, 180, 1, 0, 0, 0, 0.002, "45 of 180 triangles faced the wrong way"},
-                        {"nasty/nonmanifold_edge.ply", 92, 181, 1, 2, 1, 1, 0, "1 edge is used by more than two triangles"},
-                        {"nasty/open_surface.obj", 91, 173, 1, 7, 1, 0, 0, "the surface is open: 7 edges"},
-                        {"nasty/self_intersecting.stl", 184, 360, 2, 0, 0, 0, 0.004, "896 points were merged"},
-                        {"formats/surf_ngon.obj", 12, 20, 1, 0, 0, 0, 1.5 * std::sqrt(3.0), ""},
-                        {"formats/surf_ascii_two_solids.stl", 121, 238, 1, 0, 0, 0, -1, "merged"},
-                        {"formats/surf_bin.stl", 121, 238, 1, 0, 0, 0, -1, "merged"},
-                        {"thesis/liverlike1.stl", 2401, 4798, 1, 0, 0, 0, -1, "merged"}}) {
+  for (const Fate &f :
+       {Fate{"nasty/degenerate_triangles.off", 92, 180, 1, 0, 0, 0, 0.002,
+             "2 triangles without area were dropped"},
+        {"nasty/mixed_winding.obj", 92, 180, 1, 0, 0, 0, 0.002, "45 of 180 triangles faced the wrong way"},
+        {"nasty/nonmanifold_edge.ply", 92, 181, 1, 2, 1, 1, 0, "1 edge is used by more than two triangles"},
+        {"nasty/open_surface.obj", 91, 173, 1, 7, 1, 0, 0, "the surface is open: 7 edges"},
+        {"nasty/self_intersecting.stl", 184, 360, 2, 0, 0, 0, 0.004, "896 points were merged"},
+        {"formats/surf_ngon.obj", 12, 20, 1, 0, 0, 0, 1.5 * std::sqrt(3.0), ""},
+        {"formats/surf_ascii_two_solids.stl", 121, 238, 1, 0, 0, 0, -1, "merged"},
+        {"formats/surf_bin.stl", 121, 238, 1, 0, 0, 0, -1, "merged"},
+        {"thesis/liverlike1.stl", 2401, 4798, 1, 0, 0, 0, -1, "merged"}}) {
     const TriMesh m = read_tri_mesh(Memory::standard(), meshes() + f.file);
     const TriMeshStatistics s = tri_mesh_statistics(m);
     EXPECT_EQ(s.npoint, f.npoint) << f.file;
@@ -48,7 +56,8 @@ TEST(SurfaceShared, NastyFiles_MeetTheirNotes) {
 // The same surface in every format: those of one precision give the same box and volume.
 TEST(SurfaceShared, OneSurfaceInManyFormats_IsOneSurface) {
   if (meshes().empty()) GTEST_SKIP() << "../shared is not here";
-  const double volume = tri_mesh_statistics(read_tri_mesh(Memory::standard(), meshes() + "formats/surf_plain.obj")).volume;
+  const double volume =
+      tri_mesh_statistics(read_tri_mesh(Memory::standard(), meshes() + "formats/surf_plain.obj")).volume;
   EXPECT_GT(volume, 0);
   uint32_t n = 0;
   for (const std::string &file : test::files_of(meshes() + "formats", {".obj", ".ply", ".stl", ".off"})) {
@@ -70,7 +79,8 @@ TEST(SurfaceShared, BoundaryOfABody_EnclosesItsVolume) {
       if (test::refusal(file)) continue;
       const TetMesh body = read_tet_mesh(Memory::standard(), file);
       const MeshStatistics b = mesh_statistics(body);
-      if (body.overlapping || b.ntet > 6000) continue;  // tangled: no surface encloses it; the large ones say nothing new
+      // tangled: no surface encloses it; the large ones say nothing new
+      if (body.overlapping || b.ntet > 6000) continue;
       const TriMeshStatistics s = tri_mesh_statistics(read_tri_mesh(Memory::standard(), file));
       EXPECT_NEAR(s.volume / b.volume, 1, 1e-12) << file;
       EXPECT_EQ(s.closed, b.nonmanifold_edges == 0) << file;
@@ -82,7 +92,8 @@ TEST(SurfaceShared, BoundaryOfABody_EnclosesItsVolume) {
   EXPECT_GE(n, 50u);
 }
 
-// The wall of the hole is a piece of its own and faces into the hole: 4/3 pi (0.05^3 - 0.035^3) less what polyhedra cut off.
+// The wall of the hole is a piece of its own and faces into the hole: 4/3 pi (0.05^3 - 0.035^3) less what
+// polyhedra cut off.
 TEST(SurfaceShared, HollowBall_HasTwoPiecesAndItsShellsVolume) {
   if (meshes().empty()) GTEST_SKIP() << "../shared is not here";
   const TriMesh m = read_tri_mesh(Memory::standard(), meshes() + "misc/shell_sphere.msh");

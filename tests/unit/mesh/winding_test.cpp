@@ -11,14 +11,18 @@ using dfm::TriMesh;
 using dfm::Vec3;
 using dfm::WindingTree;
 
-WindingTree tree_of(const TriMesh &m) { return WindingTree(dfm::Memory::standard(), m.points.data(), m.ntri(), m.tris.data()); }
+WindingTree tree_of(const TriMesh &m) {
+  return WindingTree(dfm::Memory::standard(), m.points.data(), m.ntri(), m.tris.data());
+}
 
 // Places spread over a cube of half size `reach`, none special.
 std::vector<Vec3> places(uint32_t n, double reach) {
   std::vector<Vec3> out;
   double u = 0.5, v = 0.5, w = 0.5;
   for (uint32_t i = 0; i < n; ++i) {
-    u = std::fmod(u + 0.8191725134, 1), v = std::fmod(v + 0.6710436067, 1), w = std::fmod(w + 0.5497004779, 1);
+    u = std::fmod(u + 0.8191725134, 1);
+    v = std::fmod(v + 0.6710436067, 1);
+    w = std::fmod(w + 0.5497004779, 1);
     out.push_back({reach * (2 * u - 1), reach * (2 * v - 1), reach * (2 * w - 1)});
   }
   return out;
@@ -35,7 +39,8 @@ TEST(Winding, ClosedSurface_OneInsideZeroOutside) {
 
 TEST(Winding, CubeWithoutAFace_FromItsCentreFiveSixths) {
   TriMesh cube = test::box_surface({-0.5, -0.5, -0.5}, {0.5, 0.5, 0.5});
-  test::remove(cube, 0), test::remove(cube, 0);
+  test::remove(cube, 0);
+  test::remove(cube, 0);
   EXPECT_NEAR(tree_of(cube).exactly_at({}), 5.0 / 6, 1e-15);
 }
 
@@ -46,8 +51,9 @@ TEST(Winding, OneTriangle_AnOctantIsAnEighthAndItsBackIsMinusThat) {
   EXPECT_NEAR(tree_of(m).exactly_at({}), -0.125, 1e-16);
 }
 
-// The cap of a sphere within angle a around its pole has the solid angle 2 pi (1 - cos a); here its rim is a polygon, so the exact sum over
-// the rest of the sphere must equal one minus what the removed triangles are seen under.
+// The cap of a sphere within angle a around its pole has the solid angle 2 pi (1 - cos a); here its rim is
+// a polygon, so the exact sum over the rest of the sphere must equal one minus what the removed triangles
+// are seen under.
 TEST(Winding, SphereWithAHole_MissesTheSolidAngleOfTheHole) {
   TriMesh whole = test::sphere_surface(0.5, 4), hole = whole;
   TriMesh cap = test::surface_of({}, {});
@@ -78,7 +84,8 @@ TEST(Winding, Tree_WithinItsStatedErrorOfTheSum) {
   for (const TriMesh *m : {&ball, &torus}) {
     const WindingTree tree = tree_of(*m);
     double worst = 0;
-    for (const Vec3 &p : places(3000, 0.5)) worst = std::max(worst, std::fabs(tree.at(p) - tree.exactly_at(p)));
+    for (const Vec3 &p : places(3000, 0.5))
+      worst = std::max(worst, std::fabs(tree.at(p) - tree.exactly_at(p)));
     EXPECT_LT(worst, 0.05);
     EXPECT_GT(worst, 0) << "the tree was never used from afar: nothing was tested";
   }

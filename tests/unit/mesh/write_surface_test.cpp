@@ -15,7 +15,8 @@ std::string folder() { return test::scratch("write_surface"); }
 
 TriMesh ball_in_groups() {
   TriMesh m = make_ball_surface(Memory::standard(), 0.1, 320);
-  m.groups.push_back({"north pole", 2, 3, {}}), m.groups.push_back({"south", 2, 8, {}});
+  m.groups.push_back({"north pole", 2, 3, {}});
+  m.groups.push_back({"south", 2, 8, {}});
   for (uint32_t t = 0; t < m.ntri(); ++t) m.tri_group[t] = t % 5 == 0 ? 0 : t % 5 < 3 ? 1 : kNoGroup;
   return m;
 }
@@ -75,7 +76,8 @@ TEST(WriteSurface, Stl_KeepsSinglePrecision) {
   EXPECT_EQ(back.turned, 0u);
   for (size_t i = 0; i < m.tris.size(); ++i)
     for (int k = 0; k < 3; ++k)
-      EXPECT_EQ(back.points[3 * size_t(back.tris[i]) + k], double(float(m.points[3 * size_t(m.tris[i]) + k])));
+      EXPECT_EQ(back.points[3 * size_t(back.tris[i]) + k],
+                double(float(m.points[3 * size_t(m.tris[i]) + k])));
 }
 
 TEST(WriteSurface, StlNormals_PointOutward) {
@@ -96,15 +98,18 @@ TEST(WriteSurface, ExtremeCoordinates_SurviveText) {
   for (const double scale : {1e-9 / 3, 1e5 / 3, 1e99 / 3}) {
     TriMesh m = make_ball_surface(Memory::standard(), 1, 20);
     for (double &x : m.points) x *= scale;
-    for (const char *ending : {".obj", ".off"}) EXPECT_EQ(there_and_back(m, ending).points, m.points) << ending << scale;
+    for (const char *ending : {".obj", ".off"})
+      EXPECT_EQ(there_and_back(m, ending).points, m.points) << ending << scale;
   }
 }
 
 TEST(WriteSurface, WhatAFormatCannotHold_IsRefusedAndLeavesNoFile) {
   TriMesh m = make_ball_surface(Memory::standard(), 1e50, 20);
   EXPECT_NE(refused(m, "big.stl", DFM_E_UNSUPPORTED).find("STL holds coordinates up to"), std::string::npos);
-  EXPECT_NE(refused(m, "ball.xyz", DFM_E_UNSUPPORTED).find(".obj, .ply, .stl, .off, .vtk, .vtu"), std::string::npos);
+  EXPECT_NE(refused(m, "ball.xyz", DFM_E_UNSUPPORTED).find(".obj, .ply, .stl, .off, .vtk, .vtu"),
+            std::string::npos);
   EXPECT_NE(refused(m, "ball", DFM_E_UNSUPPORTED).find("this one ends with ''"), std::string::npos);
   EXPECT_NE(refused(m, "none/ball.obj", DFM_E_IO).find("No such file"), std::string::npos);
-  for (const auto &entry : std::filesystem::directory_iterator(folder())) EXPECT_EQ(entry.path().string().find("big"), std::string::npos);
+  for (const auto &entry : std::filesystem::directory_iterator(folder()))
+    EXPECT_EQ(entry.path().string().find("big"), std::string::npos);
 }

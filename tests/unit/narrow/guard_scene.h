@@ -8,10 +8,13 @@
 namespace test {
 
 // end: of each body, [nsurfel,4].
-inline dfm::GuardScene guard_scene(std::span<const dfm::BodyView> bodies, const std::vector<std::vector<double>> &end, double floor, double margin) {
+inline dfm::GuardScene guard_scene(std::span<const dfm::BodyView> bodies,
+                                   const std::vector<std::vector<double>> &end, double floor, double margin) {
   dfm::GuardScene scene;
-  scene.bodies = bodies, scene.round = 1;
-  scene.floor = floor, scene.margin = margin;
+  scene.bodies = bodies;
+  scene.round = 1;
+  scene.floor = floor;
+  scene.margin = margin;
   for (size_t i = 0; i < bodies.size(); ++i) {
     dfm::GuardSide side;
     side.surface = bodies[i].surface;

@@ -25,23 +25,27 @@ TEST(Plane, Surfels_HaveSignedDistanceAreaAndBelt) {
     EXPECT_NEAR(k.distance, 5e-4, 1e-15);
     EXPECT_EQ(k.normal[2], 1.0);
     const double turn = 5 * scene.h, x = k.point[0], y = k.point[1];
-    EXPECT_NEAR(k.velocity[0], 0.3 + ((std::cos(turn) - 1) * x - std::sin(turn) * y) / scene.h, 1e-7) << "the chord, not the tangent";
+    EXPECT_NEAR(k.velocity[0], 0.3 + ((std::cos(turn) - 1) * x - std::sin(turn) * y) / scene.h, 1e-7)
+        << "the chord, not the tangent";
     EXPECT_NEAR(k.velocity[1], ((std::cos(turn) - 1) * y + std::sin(turn) * x) / scene.h, 1e-7);
     EXPECT_NEAR(k.velocity[2], 0, 1e-12) << "a belt does not push";
     area += k.area;
   }
   EXPECT_NEAR(area, 1, 1e-12) << "the bottom, and nothing of the sides";
   for (uint32_t i = 0; i < scene.surfaces[0]->nsurfel; ++i) scene.surfaces[0]->x[4 * i + 2] -= 0.1;
-  for (const ContactPoint &k : scene.contacts()) EXPECT_NEAR(k.distance, 5e-4 - 0.1, 1e-15) << "from any depth";
+  for (const ContactPoint &k : scene.contacts())
+    EXPECT_NEAR(k.distance, 5e-4 - 0.1, 1e-15) << "from any depth";
 }
 
-// What sticks to a drum goes round with it at its own radius, not at the drum's; of a rigid body, what its host adds to its spin counts to first order only.
+// What sticks to a drum goes round with it at its own radius, not at the drum's; of a rigid body, what its
+// host adds to its spin counts to first order only.
 TEST(Obstacles, Turn_IsToldAtTheBodysPoint) {
   Scene scene;
   scene.add(moved(box_mesh({1, 1, 1}, 2, 2, 2), {}, {0, 0, 1.0005}));
   scene.add(Shape::sphere, {0, 0, 0}).radius = 0.5;
   const auto velocity = [&](Vec3 spin, Vec3 linear) {
-    scene.obstacles[0].spin = spin, scene.obstacles[0].linear = linear;
+    scene.obstacles[0].spin = spin;
+    scene.obstacles[0].linear = linear;
     Vec3 top{};
     for (const ContactPoint &c : scene.contacts())
       if (c.normal[2] == 1 && c.type_a == 0) top = load3(c.velocity);
@@ -61,7 +65,10 @@ TEST(Obstacles, Reach_CountsWhatMoves) {
     Scene scene;
     scene.add(moved(box_mesh({1, 1, 1}, 2, 2, 2), {}, {0, 0, 1.005}));
     ObstacleView &o = scene.add(Shape::sphere, {0.001, 0.001, 0});
-    o.radius = 0.5, o.belt = belt, o.velocity = velocity, o.spin = spin;
+    o.radius = 0.5;
+    o.belt = belt;
+    o.velocity = velocity;
+    o.spin = spin;
     return scene.contacts().size();
   };
   EXPECT_EQ(count({}, {}, {}), 0u);
@@ -71,7 +78,10 @@ TEST(Obstacles, Reach_CountsWhatMoves) {
 }
 
 TEST(Sphere, SmallerThanTriangle_MeetsFaceEdgeOrCorner) {
-  struct Case { Vec3 center; int type; } cases[] = {{{0.1, 0.3, 0.5605}, 2}, {{0.5425, 0.1, 0.5425}, 1}, {{0.535, 0.535, 0.535}, 0}};
+  struct Case {
+    Vec3 center;
+    int type;
+  } cases[] = {{{0.1, 0.3, 0.5605}, 2}, {{0.5425, 0.1, 0.5425}, 1}, {{0.535, 0.535, 0.535}, 0}};
   for (const Case &at : cases) {
     Scene scene;
     scene.add(box_mesh({1, 1, 1}, 1, 1, 1));
@@ -90,7 +100,8 @@ TEST(Sphere, SmallerThanTriangle_MeetsFaceEdgeOrCorner) {
   }
 }
 
-// A ball rolls over a flat triangulated face: always one face contact with the same normal; edges inside the face are silent.
+// A ball rolls over a flat triangulated face: always one face contact with the same normal; edges inside the
+// face are silent.
 TEST(Sphere, SlidingOverFlatFace_SeesNoBump) {
   Scene scene;
   const Surface &s = scene.add(box_mesh({2, 2, 1}, 5, 5, 1));
@@ -115,12 +126,14 @@ TEST(Sphere, SlidingOverFlatFace_SeesNoBump) {
   }
 }
 
-// At the ends by the face, between them by the face's diagonal, flat as it is: of a face that bends it would be what bears.
+// At the ends by the face, between them by the face's diagonal, flat as it is: of a face that bends it would
+// be what bears.
 TEST(Capsule, LyingOnFace_HoldsAtBothEndsAndAcrossTheDiagonal) {
   Scene scene;
   scene.add(box_mesh({2, 2, 1}, 1, 1, 1));
   ObstacleView &o = scene.add(Shape::capsule, {0.1, 0.2, 0.5 + 0.1 + 5e-4}, turn({0, 1, 0}, M_PI / 2));
-  o.radius = 0.1, o.half_length = 0.3;
+  o.radius = 0.1;
+  o.half_length = 0.3;
   const auto c = scene.contacts();
   EXPECT_EQ(flaw(scene, c), "");
   ASSERT_EQ(c.size(), 3u);
@@ -128,7 +141,8 @@ TEST(Capsule, LyingOnFace_HoldsAtBothEndsAndAcrossTheDiagonal) {
     EXPECT_EQ(k.type_a, &k == &c[0] ? 1 : 2);
     EXPECT_NEAR(k.distance, 5e-4, 1e-12);
     EXPECT_NEAR(k.normal[2], -1, 1e-12);
-    EXPECT_NEAR(k.type_a == 1 ? std::fabs(std::fabs(k.point[0]) - 0.2) : std::fabs(k.point[0] - 0.1) - 0.3, 0, 1e-9);
+    EXPECT_NEAR(k.type_a == 1 ? std::fabs(std::fabs(k.point[0]) - 0.2) : std::fabs(k.point[0] - 0.1) - 0.3, 0,
+                1e-9);
   }
 }
 
@@ -136,8 +150,10 @@ TEST(Capsule, AcrossAnEdge_MeetsTheEdge) {
   Scene scene;
   scene.add(box_mesh({1, 1, 1}, 1, 1, 1));
   const Vec3 out = normalized({1, 0, 1});
-  ObstacleView &o = scene.add(Shape::capsule, Vec3{0.5, 0.1, 0.5} + 0.1005 * out, turn({0, 1, 0}, 3 * M_PI / 4));
-  o.radius = 0.1, o.half_length = 0.3;
+  ObstacleView &o =
+      scene.add(Shape::capsule, Vec3{0.5, 0.1, 0.5} + 0.1005 * out, turn({0, 1, 0}, 3 * M_PI / 4));
+  o.radius = 0.1;
+  o.half_length = 0.3;
   const auto c = scene.contacts();
   EXPECT_EQ(flaw(scene, c), "");
   ASSERT_EQ(c.size(), 1u);
@@ -148,7 +164,7 @@ TEST(Capsule, AcrossAnEdge_MeetsTheEdge) {
 
 TEST(Box, CornerInFaceAndEdgeOnEdge_AreFound) {
   {
-    Scene scene;                           // a box stands on its corner upon a large triangle
+    Scene scene;  // a box stands on its corner upon a large triangle
     scene.add(box_mesh({2, 2, 1}, 1, 1, 1));
     const Vec3 down = normalized({1, 1, 1});
     const Quat q = turn(cross(down, {0, 0, -1}), std::acos(-down.z));
@@ -162,7 +178,7 @@ TEST(Box, CornerInFaceAndEdgeOnEdge_AreFound) {
     EXPECT_NEAR(c[0].normal[2], -1, 1e-12);
   }
   for (const double gap : {5e-4, -5e-4}) {
-    Scene scene;                           // two roofs cross
+    Scene scene;  // two roofs cross
     scene.add(moved(box_mesh({1, 1, 1}, 1, 1, 1), turn({1, 0, 0}, M_PI / 4), {0, 0, 0}));
     ObstacleView &o = scene.add(Shape::box, {0, 0, std::sqrt(2.0) + gap}, turn({0, 1, 0}, M_PI / 4));
     o.half_size = {0.5, 0.5, 0.5};
@@ -189,7 +205,8 @@ TEST(Box, BodyOnItsTop_UsesSurfelsAlone) {
   }
 }
 
-// The least distance over all contacts is the distance of body and obstacle, from every side; the surfels' own distances are exact.
+// The least distance over all contacts is the distance of body and obstacle, from every side; the surfels'
+// own distances are exact.
 TEST(Obstacles, NearestContact_IsTheDistance) {
   std::mt19937 random(9);
   std::normal_distribution<double> normal;
@@ -200,18 +217,25 @@ TEST(Obstacles, NearestContact_IsTheDistance) {
     Scene scene;
     scene.h = 0;
     scene.offset = 0.05;
-    Surface &s = scene.add(moved(i % 2 ? box_mesh({1, 0.7, 0.5}, 1, 1, 1) : sphere_mesh(0.5, 1), turn(any(), 1 + i), {}));
+    Surface &s = scene.add(
+        moved(i % 2 ? box_mesh({1, 0.7, 0.5}, 1, 1, 1) : sphere_mesh(0.5, 1), turn(any(), 1 + i), {}));
     ObstacleView &o = scene.add(kind, {}, turn(any(), 2 * i));
-    o.half_size = {0.3, 0.2, 0.4}, o.radius = 0.15, o.half_length = 0.4;
+    o.half_size = {0.3, 0.2, 0.4};
+    o.radius = 0.15;
+    o.half_length = 0.4;
     const ObstacleShape shape(o);
     // Distance by points sampled densely on the body's surface, from the signed distance of the obstacle.
     const auto distance = [&](int n) {
       double least = 1e9;
       for (uint32_t t = 0; t < s.ntri; ++t) {
-        const Vec3 a = load3(&s.x[4 * s.tri[3 * t]]), b = load3(&s.x[4 * s.tri[3 * t + 1]]), c = load3(&s.x[4 * s.tri[3 * t + 2]]);
+        const Vec3 a = load3(&s.x[4 * s.tri[3 * t]]);
+        const Vec3 b = load3(&s.x[4 * s.tri[3 * t + 1]]);
+        const Vec3 c = load3(&s.x[4 * s.tri[3 * t + 2]]);
         for (int u = 0; u <= n; ++u)
           for (int v = 0; u + v <= n; ++v)
-            least = std::min(least, shape.closest((double(u) / n) * a + (double(v) / n) * b + (double(n - u - v) / n) * c).distance);
+            least = std::min(
+                least, shape.closest((double(u) / n) * a + (double(v) / n) * b + (double(n - u - v) / n) * c)
+                           .distance);
       }
       return least;
     };
@@ -246,7 +270,8 @@ TEST(Obstacles, InsideRecovery_LeadsOut) {
     Scene scene;
     scene.add(moved(box_mesh({0.1, 0.1, 0.1}, 1, 1, 1), {}, {0.05, 0.02, 0.32}));
     ObstacleView &o = scene.add(kind, kind == Shape::plane ? Vec3{0, 0, 0.4} : Vec3{});
-    o.half_size = {0.4, 0.4, 0.4}, o.radius = 0.4;
+    o.half_size = {0.4, 0.4, 0.4};
+    o.radius = 0.4;
     const auto c = scene.contacts();
     EXPECT_EQ(flaw(scene, c), "");
     size_t surfels = 0;
@@ -259,10 +284,12 @@ TEST(Obstacles, InsideRecovery_LeadsOut) {
   }
 }
 
-// A surfel slides round a box's corner: one contact throughout, the key changes with the face, never within it.
+// A surfel slides round a box's corner: one contact throughout, the key changes with the face,
+// never within it.
 TEST(Box, SurfelRoundTheEdge_KeepsItsKeyOnAFace) {
   Scene scene;
-  Surface &s = scene.add(tetrahedron_mesh({0, 0, 0}, {0.02, 0, 0.04}, {-0.02, 0.02, 0.04}, {-0.02, -0.02, 0.04}));
+  Surface &s =
+      scene.add(tetrahedron_mesh({0, 0, 0}, {0.02, 0, 0.04}, {-0.02, 0.02, 0.04}, {-0.02, -0.02, 0.04}));
   const std::vector<double> rest(s.x.begin(), s.x.end());
   scene.add(Shape::box, {0, 0, 0});
   scene.obstacles[0].half_size = {0.5, 0.5, 0.5};

@@ -15,7 +15,9 @@ using namespace test;
 // A probe: a tiny tetrahedron whose lowest corner is at `tip`, so that one surfel meets the other surface.
 constexpr double kProbe = 0.02;
 Mesh probe(Vec3 tip, Quat q = {}) {
-  return moved(tetrahedron_mesh({0, 0, 0}, {kProbe, 0, 2 * kProbe}, {-kProbe, kProbe, 2 * kProbe}, {-kProbe, -kProbe, 2 * kProbe}), q, tip);
+  return moved(tetrahedron_mesh({0, 0, 0}, {kProbe, 0, 2 * kProbe}, {-kProbe, kProbe, 2 * kProbe},
+                                {-kProbe, -kProbe, 2 * kProbe}),
+               q, tip);
 }
 std::vector<ContactPoint> of_tip(const Scene &scene, uint32_t body, uint32_t surfel) {
   std::vector<ContactPoint> found;
@@ -24,7 +26,8 @@ std::vector<ContactPoint> of_tip(const Scene &scene, uint32_t body, uint32_t sur
   return found;
 }
 
-// A floor with a valley or a ridge along y at x = 0: two slabs that rise to both sides by `rise`, closed below.
+// A floor with a valley or a ridge along y at x = 0: two slabs that rise to both sides by
+// `rise`, closed below.
 Mesh folded_floor(double rise, int n) {
   Welder w;
   for (int side = 0; side < 2; ++side) {
@@ -62,7 +65,8 @@ TEST(VertexFace, Reach_GrowsWithRelativeSpeedOnly) {
     }
 }
 
-// Slides a tip over a flat face cut into triangles: exactly one contact everywhere, always with the plane's own normal and distance.
+// Slides a tip over a flat face cut into triangles: exactly one contact everywhere, always with the plane's
+// own normal and distance.
 TEST(VertexFace, SlideOverFlatTriangulation_SeesNoBump) {
   Scene scene;
   scene.add(probe({0, 0, 0}));
@@ -72,13 +76,14 @@ TEST(VertexFace, SlideOverFlatTriangulation_SeesNoBump) {
   const Surface &floor = *scene.surfaces[1];
   std::vector<Vec3> tips;
   for (int i = 0; i < 400; ++i) tips.push_back({unit(random), unit(random), 1e-3});
-  for (uint32_t e = 0; e < floor.nedge; ++e) {      // right above edges and corners
+  for (uint32_t e = 0; e < floor.nedge; ++e) {  // right above edges and corners
     const Vec3 a = load3(&floor.x[4 * floor.edge[2 * e]]), b = load3(&floor.x[4 * floor.edge[2 * e + 1]]);
     for (const double t : {0.0, 0.25, 0.5})
       if (a.z > -0.1 && b.z > -0.1) {
         const Vec3 p = a + t * (b - a);
         if (std::fabs(p.x) < 0.6 && std::fabs(p.y) < 0.6)
-          for (const double off : {0.0, 1e-16, 1e-12, 1e-9, -1e-7}) tips.push_back({p.x + off, p.y - off, 1e-3});
+          for (const double off : {0.0, 1e-16, 1e-12, 1e-9, -1e-7})
+            tips.push_back({p.x + off, p.y - off, 1e-3});
       }
   }
   Surface &s = *scene.surfaces[0];
@@ -94,7 +99,8 @@ TEST(VertexFace, SlideOverFlatTriangulation_SeesNoBump) {
   EXPECT_GT(tips.size(), 600u);
 }
 
-// Round a tessellated cylinder at a constant distance from its surface: one contact each, the normal within the faces' own spread.
+// Round a tessellated cylinder at a constant distance from its surface: one contact each, the normal within
+// the faces' own spread.
 TEST(VertexFace, SlideRoundCylinder_OneContactWithTurningNormal) {
   const int n = 32;
   Scene scene;
@@ -106,7 +112,8 @@ TEST(VertexFace, SlideRoundCylinder_OneContactWithTurningNormal) {
   Vec3 last;
   for (int i = 0; i < 1000; ++i) {
     const double angle = 0.001 * M_PI * i, radius = 0.5005;
-    const Vec3 out{std::cos(angle), 0, std::sin(angle)}, tip{radius * out.x, 0.013 + 1e-4 * i, radius * out.z};
+    const Vec3 out{std::cos(angle), 0, std::sin(angle)};
+    const Vec3 tip{radius * out.x, 0.013 + 1e-4 * i, radius * out.z};
     const Mesh p = probe(tip, turn({0, 1, 0}, M_PI / 2 - angle));
     for (uint32_t k = 0; k < s.nsurfel; ++k) store3(&s.x[4 * k], p.at(k));
     scene.offset = 4e-3;
@@ -134,7 +141,7 @@ TEST(VertexFace, OverConvexEdgeAndCorner_OneContactAlongTheDirection) {
     const bool corner = i % 2;
     const Vec3 d = 1.5e-3 * normalized(Vec3{unit(random), corner ? unit(random) : 0, unit(random)});
     const Vec3 tip = Vec3{0.5, corner ? 0.5 : unit(random) - 0.5, 0.5} + d, across = cross({0, 0, 1}, d);
-    const double lean = std::acos(d.z / norm(d));   // the tip points at the box
+    const double lean = std::acos(d.z / norm(d));  // the tip points at the box
     const Mesh pointed = probe(tip, lean > 0 ? turn(across, lean) : Quat{});
     for (uint32_t k = 0; k < s.nsurfel; ++k) store3(&s.x[4 * k], pointed.at(k));
     const auto c = of_tip(scene, 1, 0);
@@ -167,13 +174,13 @@ TEST(VertexFace, InValley_BothPlanesHold) {
   }
 }
 
-// Above one side of a gentle valley, about to reach the other side within the step: the other plane is there in advance, with weights that
-// sum to one and no torque.
+// Above one side of a gentle valley, about to reach the other side within the step: the other plane is there
+// in advance, with weights that sum to one and no torque.
 TEST(VertexFace, NearValley_PlaneAcrossIsExtrapolated) {
   Scene scene;
   scene.add(folded_floor(0.2, 4));
   const Vec3 n0 = normalized({0.2, 0, 1});
-  const double s = 1e-3;                       // beside the fold, above the left side
+  const double s = 1e-3;  // beside the fold, above the left side
   scene.add(probe(Vec3{-s, 0.1, 0.2 * s} + 1e-4 * n0), {2, 0, 0});
   const auto c = of_tip(scene, 1, 0);
   ASSERT_EQ(c.size(), 2u);
@@ -193,7 +200,7 @@ TEST(VertexFace, NearValley_PlaneAcrossIsExtrapolated) {
 TEST(VertexFace, SlightlyInside_IsPushedOutThroughTheNearestFace) {
   Scene scene;
   scene.add(box_mesh({1, 1, 1}, 4, 4, 4));
-  scene.add(probe({0.49, 0.03, 0.498}));         // 2 mm below the top, 10 mm beside the side
+  scene.add(probe({0.49, 0.03, 0.498}));  // 2 mm below the top, 10 mm beside the side
   auto c = of_tip(scene, 1, 0);
   ASSERT_EQ(c.size(), 1u);
   EXPECT_NEAR(c[0].distance, -2e-3, 1e-12);
@@ -230,7 +237,8 @@ TEST(VertexFace, BelowBothPlanesOfValley_BothPush) {
   EXPECT_EQ(flaw(scene, scene.contacts()), "");
 }
 
-// The nearest distance over all contacts equals the brute-force distance of two bodies apart, from every direction: no gap in the rules.
+// The nearest distance over all contacts equals the brute-force distance of two bodies apart, from every
+// direction: no gap in the rules.
 TEST(FindContacts, NearestContact_IsTheDistanceOfTheBodies) {
   std::mt19937 random(8);
   std::normal_distribution<double> normal;
@@ -252,12 +260,16 @@ TEST(FindContacts, NearestContact_IsTheDistanceOfTheBodies) {
         for (uint32_t v = 0; v < p.nsurfel; ++v)
           for (uint32_t t = 0; t < q.ntri; ++t)
             least = std::min(least, closest_on_triangle(load3(&p.x[4 * v]), load3(&q.x[4 * q.tri[3 * t]]),
-                                                        load3(&q.x[4 * q.tri[3 * t + 1]]), load3(&q.x[4 * q.tri[3 * t + 2]])).distance2);
+                                                        load3(&q.x[4 * q.tri[3 * t + 1]]),
+                                                        load3(&q.x[4 * q.tri[3 * t + 2]]))
+                                        .distance2);
       }
       for (uint32_t e = 0; e < a.nedge; ++e)
         for (uint32_t f = 0; f < b.nedge; ++f)
-          least = std::min(least, closest_segments(load3(&a.x[4 * a.edge[2 * e]]), load3(&a.x[4 * a.edge[2 * e + 1]]),
-                                                   load3(&b.x[4 * b.edge[2 * f]]), load3(&b.x[4 * b.edge[2 * f + 1]])).distance2);
+          least = std::min(
+              least, closest_segments(load3(&a.x[4 * a.edge[2 * e]]), load3(&a.x[4 * a.edge[2 * e + 1]]),
+                                      load3(&b.x[4 * b.edge[2 * f]]), load3(&b.x[4 * b.edge[2 * f + 1]]))
+                         .distance2);
       return std::sqrt(least);
     };
     // From far away toward each other until they are 0.03 to 0.09 apart.
@@ -275,16 +287,22 @@ TEST(FindContacts, NearestContact_IsTheDistanceOfTheBodies) {
     double least = 1e9;
     const ContactPoint *nearest = nullptr;
     for (const ContactPoint &c : contacts)
-      if (c.distance < least) least = c.distance, nearest = &c;
+      if (c.distance < least) {
+        least = c.distance;
+        nearest = &c;
+      }
     ASSERT_NE(nearest, nullptr) << "pair " << i << " at distance " << d;
-    // Exact, but for edges that meet within a thousandth of their ends: there the end stands for them, x further along the other edge.
-    const double x = 1e-3 * 1.4;   // no edge of these meshes is longer than 1.4
+    // Exact, but for edges that meet within a thousandth of their ends: there the end stands for them, x
+    // further along the other edge.
+    const double x = 1e-3 * 1.4;  // no edge of these meshes is longer than 1.4
     EXPECT_GE(least, d - 1e-9) << "pair " << i;
     EXPECT_LE(least, std::sqrt(d * d + x * x) + 1e-9) << "pair " << i;
-    exact += least < d + 1e-9, ++pairs;
+    exact += least < d + 1e-9;
+    ++pairs;
     const Vec3 n = load3(nearest->normal);
     EXPECT_GT(dot(n, way) * (nearest->slot_a == 1 ? 1 : -1), 0);
-    edges += nearest->kind == kEdgeEdge, faces += nearest->kind == kVertexFace && nearest->nnode == 4;
+    edges += nearest->kind == kEdgeEdge;
+    faces += nearest->kind == kVertexFace && nearest->nnode == 4;
     rims += nearest->kind == kVertexFace && nearest->nnode < 4;
   }
   EXPECT_GT(edges, 50);
@@ -308,7 +326,7 @@ TEST(EdgeEdge, CrossedTetrahedra_MeetEdgeOnEdge) {
   EXPECT_EQ(c[0].kind, kEdgeEdge);
   EXPECT_EQ(c[0].slot_a, 0u);
   EXPECT_NEAR(c[0].distance, 1e-3, 1e-15);
-  EXPECT_NEAR(c[0].normal[2], -1, 1e-15);      // from b (above) to a
+  EXPECT_NEAR(c[0].normal[2], -1, 1e-15);  // from b (above) to a
   EXPECT_NEAR(c[0].point[2], 0.5e-3, 1e-15);
   for (int k = 0; k < 4; ++k) EXPECT_NEAR(std::fabs(c[0].weight[k]), 0.5, 1e-12);
   EXPECT_EQ(flaw(scene, c), "");
@@ -316,13 +334,18 @@ TEST(EdgeEdge, CrossedTetrahedra_MeetEdgeOnEdge) {
   EXPECT_DOUBLE_EQ(c[0].area, facing_area(*scene.surfaces[0], 0, -load3(c[0].normal)) / 2);
 }
 
-// The upper edge starts a little beyond the end of the lower one and slides in over it: at the end of the sub-step they would be through each
-// other without ever having been seen side by side. At rest the same place makes no edge contact.
+// The upper edge starts a little beyond the end of the lower one and slides in over it: at the end of the
+// sub-step they would be through each other without ever having been seen side by side. At rest the same
+// place makes no edge contact.
 TEST(EdgeEdge, EdgeThatSlidesInOverAnEnd_IsSeenBefore) {
   for (const double speed : {0.0, 50.0}) {
     Scene scene = crossed_tetrahedra(1e-3);
     Surface &upper = *scene.surfaces[1];
-    for (uint32_t s = 0; s < upper.nsurfel; ++s) upper.x[4 * s] += 1.02, upper.v[4 * s] = -speed, upper.v[4 * s + 2] = -0.1 * speed;
+    for (uint32_t s = 0; s < upper.nsurfel; ++s) {
+      upper.x[4 * s] += 1.02;
+      upper.v[4 * s] = -speed;
+      upper.v[4 * s + 2] = -0.1 * speed;
+    }
     int edges = 0;
     for (const ContactPoint &c : scene.contacts())
       if (c.kind == kEdgeEdge && c.feature_a == 0 && c.feature_b == 0) {
@@ -347,7 +370,8 @@ TEST(EdgeEdge, SlightPenetration_KeepsItsSign) {
 TEST(EdgeEdge, ParallelEdges_AreLeftToVertexFace) {
   Scene scene;
   scene.add(box_mesh({1, 1, 1}, 1, 1, 1));
-  scene.add(moved(box_mesh({1, 1, 1}, 1, 1, 1), {}, {0.3, 1.0005, 1.0005}));   // edge along edge, diagonally above
+  // edge along edge, diagonally above
+  scene.add(moved(box_mesh({1, 1, 1}, 1, 1, 1), {}, {0.3, 1.0005, 1.0005}));
   const auto c = scene.contacts();
   EXPECT_EQ(flaw(scene, c), "");
   ASSERT_FALSE(c.empty());
@@ -373,21 +397,24 @@ TEST(EdgeEdge, FlatFaces_HaveNoEdgeContacts) {
   EXPECT_GE(faces, 32u + 4u);
 }
 
-// Edges that bore each other count on though load has pressed them flat or a little hollow: exactly those two, and only while the normal is in the
-// cone of a face that leans up by less than its slack, 2 degrees and what the edges can turn within the sub-step.
+// Edges that bore each other count on though load has pressed them flat or a little hollow: exactly those
+// two, and only while the normal is in the cone of a face that leans up by less than its slack, 2 degrees and
+// what the edges can turn within the sub-step.
 TEST(EdgeEdge, FlatButBoreInTheLastSubStep_CountsOnWithinItsCone) {
   for (const double rise : {0.0, 0.02, 0.06}) {
     Scene scene;
     Mesh lower = box_mesh({1, 1, 1}, 1, 1, 1);
     for (uint32_t i = 0; i < lower.npoint(); ++i)
-      if (const Vec3 p = lower.at(i); p.z > 0 && p.x * p.y < 0) lower.x[3 * i + 2] += rise;   // beside the diagonal of the upper face: it is a valley
+      // beside the diagonal of the upper face: it is a valley
+      if (const Vec3 p = lower.at(i); p.z > 0 && p.x * p.y < 0) lower.x[3 * i + 2] += rise;
     scene.add(lower);
     scene.add(moved(box_mesh({0.2, 0.2, 1}, 1, 1, 1), turn({0, 0, 1}, 0.5 * M_PI), {0, 0, 1.001}));
     const Surface &a = *scene.bodies[0].surface, &b = *scene.bodies[1].surface;
     const auto edges = [&](std::span<const Crossing> bore) {
       std::vector<Crossing> found;
       for (const ContactPoint &c : scene.contacts(scene.all(), bore))
-        if (c.kind == kEdgeEdge) found.push_back({scene.bodies[0].id, scene.bodies[1].id, c.feature_a, c.feature_b});
+        if (c.kind == kEdgeEdge)
+          found.push_back({scene.bodies[0].id, scene.bodies[1].id, c.feature_a, c.feature_b});
       return found;
     };
     EXPECT_TRUE(edges({}).empty());
@@ -407,7 +434,8 @@ TEST(EdgeEdge, FlatButBoreInTheLastSubStep_CountsOnWithinItsCone) {
   }
 }
 
-// A tilted edge over a rim: the closest points of the lines lie inside both, but the distance falls on along the edge, so it is no minimum.
+// A tilted edge over a rim: the closest points of the lines lie inside both, but the distance falls on along
+// the edge, so it is no minimum.
 TEST(EdgeEdge, DirectionOutsideTheCone_IsNoContact) {
   for (const double tilt : {-0.5, 0.5}) {
     Scene scene;
@@ -442,7 +470,8 @@ TEST(EdgeEdge, Area_ComesFromFreeCorners) {
     for (int k = 0; k < c.nnode; ++k) {
       const uint32_t body = c.node[k] < scene.surfaces[0]->nsurfel ? 0 : 1;
       if (!touching.count(c.node[k]) && corners.insert(c.node[k]).second)
-        free += 0.5 * facing_area(*scene.surfaces[body], c.node[k] - scene.bodies[body].first_node, {0, 0, body ? -1.0 : 1.0});
+        free += 0.5 * facing_area(*scene.surfaces[body], c.node[k] - scene.bodies[body].first_node,
+                                  {0, 0, body ? -1.0 : 1.0});
     }
   }
   EXPECT_GE(edges, 8u);
@@ -462,10 +491,13 @@ TEST(FindContacts, SummedArea_IsTheTouchingPatch) {
 
 TEST(FindContacts, SwappedBodies_GiveMirroredContacts) {
   Scene one, two;
-  const Mesh m = sphere_mesh(0.5, 2), n = moved(box_mesh({1, 1, 1}, 3, 3, 3), turn({1, 2, 3}, 0.7), {0.9, 0.3, 0.2});
+  const Mesh m = sphere_mesh(0.5, 2);
+  const Mesh n = moved(box_mesh({1, 1, 1}, 3, 3, 3), turn({1, 2, 3}, 0.7), {0.9, 0.3, 0.2});
   one.offset = two.offset = 0.02;
-  one.add(m), one.add(n);
-  two.add(n), two.add(m);
+  one.add(m);
+  one.add(n);
+  two.add(n);
+  two.add(m);
   const auto a = one.contacts(), b = two.contacts();
   ASSERT_EQ(a.size(), b.size());
   ASSERT_GT(a.size(), 3u);
@@ -516,7 +548,8 @@ TEST(FindContacts, FixedScene_HasItsGoldenHash) {
   scene.add(moved(sphere_mesh(0.3, 2), {}, {-0.2, 0.77, 0.1}));
   scene.add(Shape::plane, {0, 0, -0.49});
   ObstacleView &o = scene.add(Shape::capsule, {-0.3, 0, 0.5}, unit_quat(q));
-  o.radius = 0.05, o.half_length = 0.4;
+  o.radius = 0.05;
+  o.half_length = 0.4;
   ObstacleView &box = scene.add(Shape::box, {0.2, -0.6, 0.1}, unit_quat(q));
   box.half_size = {0.2, 0.2, 0.2};
   const auto contacts = scene.contacts();
@@ -547,22 +580,25 @@ TEST(FindContacts, DegenerateShapes_StayFinite) {
     scene.add(moved(box, {}, {0.2, 0.1, 0.4}));
     for (uint32_t i = 0; i < s.nsurfel; ++i) {
       double *x = &s.x[4 * i];
-      if (kind == 0) x[0] = x[1] = x[2] = 0.5;          // one point
-      if (kind == 1) x[1] = x[2] = 0;                    // a line
-      if (kind == 2) x[2] = 0.6;                         // a sheet
-      if (kind == 3) x[0] = -x[0];                       // inside out
+      if (kind == 0) x[0] = x[1] = x[2] = 0.5;  // one point
+      if (kind == 1) x[1] = x[2] = 0;           // a line
+      if (kind == 2) x[2] = 0.6;                // a sheet
+      if (kind == 3) x[0] = -x[0];              // inside out
       if (kind == 4 && i % 3 == 0) x[0] = NAN;
     }
     for (const Shape shape : {Shape::plane, Shape::sphere, Shape::box, Shape::capsule}) {
       ObstacleView &o = scene.add(shape, {0.5, 0.1, 0.1});
-      o.half_size = {0.3, 0.3, 0.3}, o.radius = 0.3, o.half_length = 0;
+      o.half_size = {0.3, 0.3, 0.3};
+      o.radius = 0.3;
+      o.half_length = 0;
     }
     const auto c = scene.contacts();
     if (kind != 4) {
       EXPECT_EQ(flaw(scene, c), "") << kind;
       continue;
     }
-    for (const ContactPoint &k : c) EXPECT_TRUE(std::isfinite(k.distance) && std::isfinite(k.normal[0]) && std::isfinite(k.point[0]));
+    for (const ContactPoint &k : c)
+      EXPECT_TRUE(std::isfinite(k.distance) && std::isfinite(k.normal[0]) && std::isfinite(k.point[0]));
   }
 }
 

@@ -1,5 +1,6 @@
-// Cones of normals (surfel/convex.h): a feature makes a contact only along a direction in which it is the first of its surface. Flat patches have no
-// ghosts at the rim of what slides over them, what sticks out keeps its contact, and next to an edge's end either the end has it or the edge.
+// Cones of normals (surfel/convex.h): a feature makes a contact only along a direction in which it is the
+// first of its surface. Flat patches have no ghosts at the rim of what slides over them, what sticks out
+// keeps its contact, and next to an edge's end either the end has it or the edge.
 #include <gtest/gtest.h>
 
 #include <set>
@@ -24,13 +25,15 @@ Surface fan(const std::array<double, 6> &h) {
 }
 Vec3 lean(double x, double y) { return normalized(Vec3{x, y, 1}); }
 
-// A floor of triangles with edges of 1/6 and a block on it, its left rim `off` beside a row of the floor's vertices (in rest distances; > 0: they are off
-// the block).
+// A floor of triangles with edges of 1/6 and a block on it, its left rim `off` beside a row of the floor's
+// vertices (in rest distances; > 0: they are off the block).
 Scene block_on_floor(double off, double speed, int cells) {
   Scene scene;
   scene.h = 1e-4;
   scene.add(box_mesh({4, 4, 1}, 24, 24, 4));
-  scene.add(moved(box_mesh({1, 1, 1}, cells, cells + 1, 2), {}, {0.5 + off * scene.offset, 0.31, 1 + scene.offset}), {-speed, 0.3 * speed, 0});
+  scene.add(
+      moved(box_mesh({1, 1, 1}, cells, cells + 1, 2), {}, {0.5 + off * scene.offset, 0.31, 1 + scene.offset}),
+      {-speed, 0.3 * speed, 0});
   return scene;
 }
 
@@ -40,11 +43,12 @@ TEST(NormalCone, FlatVertex_HoldsItsNormalAlone) {
   const Surface s = fan({0, 0, 0, 0, 0, 0});
   EXPECT_TRUE(vertex_cone_has(s, 0, {0, 0, 1}));
   EXPECT_TRUE(vertex_cone_has(s, 0, lean(1e-6, -1e-6)));
-  for (int k = 0; k < 12; ++k) EXPECT_FALSE(vertex_cone_has(s, 0, lean(1e-4 * std::cos(0.1 + k), 1e-4 * std::sin(0.1 + k)))) << k;
+  for (int k = 0; k < 12; ++k)
+    EXPECT_FALSE(vertex_cone_has(s, 0, lean(1e-4 * std::cos(0.1 + k), 1e-4 * std::sin(0.1 + k)))) << k;
 }
 
 TEST(NormalCone, Spike_HoldsWhatItsSidesAllow) {
-  const Surface s = fan({-1, -1, -1, -1, -1, -1});   // sides fall by 45 degrees along the edges
+  const Surface s = fan({-1, -1, -1, -1, -1, -1});  // sides fall by 45 degrees along the edges
   for (const double x : {-0.99, -0.5, 0.0, 0.5, 0.99}) EXPECT_TRUE(vertex_cone_has(s, 0, lean(x, 0))) << x;
   for (const double x : {-1.01, 1.01, 3.0}) EXPECT_FALSE(vertex_cone_has(s, 0, lean(x, 0))) << x;
   EXPECT_FALSE(vertex_cone_has(s, 0, {0, 0, -1}));
@@ -52,13 +56,14 @@ TEST(NormalCone, Spike_HoldsWhatItsSidesAllow) {
 
 TEST(NormalCone, Ridge_HoldsDirectionsAcrossIt) {
   const double fall = -0.2 * std::sqrt(3.0) / 2;
-  const Surface s = fan({0, fall, fall, 0, fall, fall});   // a ridge along x
+  const Surface s = fan({0, fall, fall, 0, fall, fall});  // a ridge along x
   EXPECT_TRUE(vertex_cone_has(s, 0, lean(0, 0.19)));
   EXPECT_FALSE(vertex_cone_has(s, 0, lean(0, 0.21)));
   EXPECT_FALSE(vertex_cone_has(s, 0, lean(0.01, 0)));
 }
 
-// At the bottom of a groove no direction is free, but the groove's own normal must be: what lies in the groove rests on such vertices.
+// At the bottom of a groove no direction is free, but the groove's own normal must be: what lies in the
+// groove rests on such vertices.
 TEST(NormalCone, Hollow_HoldsItsMeanNormal) {
   const double rise = 0.2 * std::sqrt(3.0) / 2;
   for (const Surface &s : {fan({0, rise, rise, 0, rise, rise}), fan({0.3, 0.3, 0.3, 0.3, 0.3, 0.3})}) {
@@ -67,8 +72,9 @@ TEST(NormalCone, Hollow_HoldsItsMeanNormal) {
   }
 }
 
-// Floor vertices that are off the block by less than the reach must be there, or nothing is tested: without the rule they make contacts that lean by 45 degrees
-// and more. Edges of flat faces, of which hundreds cross, make none.
+// Floor vertices that are off the block by less than the reach must be there, or nothing is tested: without
+// the rule they make contacts that lean by 45 degrees and more. Edges of flat faces, of which hundreds
+// cross, make none.
 TEST(NormalCone, BlockOnFlatBody_HasUprightContactsOnly) {
   for (const double speed : {0.0, 1.0, 20.0})
     for (const double off : {-3.0, -0.5, -0.01, 0.0, 0.01, 0.1, 0.5, 1.0, 1.7, 3.0}) {
@@ -77,7 +83,8 @@ TEST(NormalCone, BlockOnFlatBody_HasUprightContactsOnly) {
       EXPECT_EQ(flaw(scene, contacts), "");
       std::set<std::array<uint32_t, 3>> owners;
       for (const ContactPoint &c : contacts) {
-        EXPECT_LT(std::hypot(c.normal[0], c.normal[1]), 2 * kConvex) << "off " << off << ", surfel " << c.feature_a << " of " << c.slot_a;
+        EXPECT_LT(std::hypot(c.normal[0], c.normal[1]), 2 * kConvex)
+            << "off " << off << ", surfel " << c.feature_a << " of " << c.slot_a;
         EXPECT_EQ(c.kind, kVertexFace);
         EXPECT_TRUE(owners.insert({c.slot_a, c.type_a, c.feature_a}).second) << "owned twice";
       }
@@ -91,16 +98,19 @@ TEST(NormalCone, BlockOnFlatBody_CarriesThePatchOnce) {
   for (const double off : {0.0, 0.1, 20.0, 50.0, 83.0, 120.0}) {
     Scene scene;
     scene.add(box_mesh({2, 2, 0.5}, 100, 100, 4));
-    scene.add(moved(box_mesh({1, 1, 0.5}, 30, 31, 4), turn({0, 0, 1}, 0.2), {0.01 + off * 1e-4, 0, 0.5 + scene.offset}));
+    scene.add(moved(box_mesh({1, 1, 0.5}, 30, 31, 4), turn({0, 0, 1}, 0.2),
+                    {0.01 + off * 1e-4, 0, 0.5 + scene.offset}));
     double area = 0;
     for (const ContactPoint &c : scene.listed()) area += c.area;
     EXPECT_NEAR(area, 1, 0.02) << off;
   }
 }
 
-// Two convex edges that cross near the end of one: over the end's cone the end has the contact, beside it the edges, nowhere none, nowhere both.
+// Two convex edges that cross near the end of one: over the end's cone the end has the contact, beside it the
+// edges, nowhere none, nowhere both.
 TEST(NormalCone, CrossingNearAnEnd_HasOneContact) {
-  for (const double beyond : {-1.1e-3, -0.9e-3, -1e-4, -1e-9, 0.0, 1e-9, 1e-4, 1e-3}) {   // lengths of the lower edge (2) past its end
+  // lengths of the lower edge (2) past its end
+  for (const double beyond : {-1.1e-3, -0.9e-3, -1e-4, -1e-9, 0.0, 1e-9, 1e-4, 1e-3}) {
     Scene scene;
     scene.add(tetrahedron_mesh({-1, 0, 0}, {1, 0, 0}, {0, -0.5, -1}, {0, 0.5, -1}));
     const double x = 1 + 2 * beyond, gap = 1.5e-3;
@@ -142,7 +152,8 @@ TEST(NormalCone, FlatVertexOffABox_MakesNoContact) {
     if (sharp) scene.add(tetrahedron_mesh({0, 0, 0}, {0.1, 0, -1}, {-0.1, 0.1, -1}, {-0.1, -0.1, -1}));
     else scene.add(moved(box_mesh({2, 2, 1}, 4, 4, 2), {}, {0, 0, -0.5}));
     ObstacleView &box = scene.add(Shape::box, {0.4 + 5e-4, 0, 0.3 + 1e-3});
-    box.half_size = {0.4, 0.4, 0.3};   // the surfel at the origin is off its left face by half the rest distance
+    // the surfel at the origin is off its left face by half the rest distance
+    box.half_size = {0.4, 0.4, 0.3};
     int leaning = 0;
     for (const ContactPoint &c : scene.contacts()) leaning += c.type_a == 0 && std::fabs(c.normal[0]) > 0.1;
     EXPECT_EQ(leaning, sharp ? 1 : 0);

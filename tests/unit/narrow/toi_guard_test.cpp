@@ -1,4 +1,5 @@
-// The guard's question to detection: how far may a sub-step go. Bodies are boxes and spheres; ends are free motion, as if no contact held.
+// The guard's question to detection: how far may a sub-step go. Bodies are boxes and spheres; ends are free
+// motion, as if no contact held.
 #include <gtest/gtest.h>
 
 #include <numeric>
@@ -11,7 +12,8 @@ namespace {
 
 using test::Scene;
 
-constexpr double kOffset = 1e-3, kFloor = 0.5e-3, kMargin = 0.05e-3;   // d_c, d_g and 0.1 (d_c - d_g) of surfaces with edges of 1 m
+// d_c, d_g and 0.1 (d_c - d_g) of surfaces with edges of 1 m
+constexpr double kOffset = 1e-3, kFloor = 0.5e-3, kMargin = 0.05e-3;
 
 struct Guard {
   Scene scene;
@@ -48,8 +50,10 @@ struct Guard {
         }
       };
       if (q.edges) {
-        for (int k = 0; k < 2; ++k)
-          vertex(k, c.slot_a, a.edge[2 * size_t{c.feature_a} + size_t(k)]), vertex(2 + k, c.slot_b, b.edge[2 * size_t{c.feature_b} + size_t(k)]);
+        for (int k = 0; k < 2; ++k) {
+          vertex(k, c.slot_a, a.edge[2 * size_t{c.feature_a} + size_t(k)]);
+          vertex(2 + k, c.slot_b, b.edge[2 * size_t{c.feature_b} + size_t(k)]);
+        }
       } else {
         vertex(0, c.slot_a, c.feature_a);
         for (int k = 0; k < 3; ++k) vertex(1 + k, c.slot_b, b.tri[3 * size_t{c.feature_b} + size_t(k)]);
@@ -91,7 +95,8 @@ TEST(ToiGuard, NothingComesNear_WholeStepIsSafe) {
   EXPECT_EQ(boxes(0.01, {50, 0, 0}).safe(), 1);
 }
 
-// Contacts at rest sit at d_c and may slide as far as they like; a first touch that the solve lets come to d_c does not trip either.
+// Contacts at rest sit at d_c and may slide as far as they like; a first touch that the solve lets come to
+// d_c does not trip either.
 TEST(ToiGuard, RestAndSliding_DoNotTrip) {
   EXPECT_EQ(boxes(kOffset, {0, 0, 0}).safe(), 1);
   EXPECT_EQ(boxes(kOffset, {0.3, -0.2, 0}).safe(), 1);
@@ -112,7 +117,7 @@ TEST(ToiGuard, BelowTheFloor_MayRiseButNotPass) {
   EXPECT_EQ(boxes(0.2 * kFloor, {0, 0, 0.01}).safe(), 1);
   EXPECT_EQ(boxes(kFloor, {0, 0, 0.01}).safe(), 1);
   for (const double gap : {0.2 * kFloor, kFloor}) {
-    Guard through = boxes(gap, {0, 0, -5});   // out on the other side, further away than before
+    Guard through = boxes(gap, {0, 0, -5});  // out on the other side, further away than before
     const double safe = through.safe();
     EXPECT_GT(safe, 0);
     EXPECT_LT(safe, 1e-3);
@@ -133,14 +138,16 @@ TEST(ToiGuard, ThinSheetAtAnySpeed_IsNotPassed) {
   }
 }
 
-// Tumbling and squeezed bodies: up to the safe time all distances keep the floor, and the answer does not waste the way there.
+// Tumbling and squeezed bodies: up to the safe time all distances keep the floor, and the answer does not
+// waste the way there.
 TEST(ToiGuard, TumblingBodies_KeepTheFloorOnTheWholeWay) {
   test::Random random(5);
   int stopped = 0;
   for (int n = 0; n < 60; ++n) {
     Guard g;
     g.add(test::box_mesh({1, 0.6, 0.4}, 1, 1, 1));
-    g.add(test::moved(test::sphere_mesh(0.4, 0), test::turn({random.real(-1, 1), random.real(-1, 1), 1}, random.real(0, 6)),
+    g.add(test::moved(test::sphere_mesh(0.4, 0),
+                      test::turn({random.real(-1, 1), random.real(-1, 1), 1}, random.real(0, 6)),
                       dfm::Vec3{random.real(-1, 1), random.real(-1, 1), 0.9}));
     const dfm::Quat q = test::turn({random.real(-1, 1), 1, random.real(-1, 1)}, random.real(-1, 1));
     g.move(0, [&](dfm::Vec3 x) { return dfm::rotate(q, dfm::Vec3{1.2 * x.x, 0.8 * x.y, x.z}); });

@@ -49,15 +49,15 @@ TEST(ToiPoly, QuadraticRoots_KeepTheirDigits) {
   EXPECT_NEAR(root[0], 5e-19, 1e-33);
   ASSERT_EQ(quadratic_roots({2, {1e-18, -2, -1}}, root), 1);
   EXPECT_NEAR(root[0], 5e-19, 1e-33);
-  ASSERT_EQ(quadratic_roots({2, {3, -7, 3}}, root), 2);   // symmetric about 1/2
+  ASSERT_EQ(quadratic_roots({2, {3, -7, 3}}, root), 2);  // symmetric about 1/2
   EXPECT_LT(root[0], root[1]);
   EXPECT_NEAR(root[0] + root[1], 1, 1e-15);
   EXPECT_NEAR(Poly({2, {3, -7, 3}})(root[0]), 0, 1e-15);
-  EXPECT_EQ(quadratic_roots({2, {3, -6, 3}}, root), 1);   // double
+  EXPECT_EQ(quadratic_roots({2, {3, -6, 3}}, root), 1);  // double
   EXPECT_EQ(root[0], 0.5);
   EXPECT_EQ(quadratic_roots({2, {3, -5, 3}}, root), 0);
   EXPECT_EQ(quadratic_roots({2, {0, 0, 0}}, root), 0);
-  ASSERT_EQ(quadratic_roots({2, {-1, 0, 1}}, root), 1);   // linear: 2 t - 1
+  ASSERT_EQ(quadratic_roots({2, {-1, 0, 1}}, root), 1);  // linear: 2 t - 1
   EXPECT_EQ(root[0], 0.5);
 }
 
@@ -82,7 +82,7 @@ TEST_P(ToiFinder, EndsWithinTheWidth) {
   check(odd, "flat");
   check(steep, "steep");
   check(jump, "jump");
-  if (GetParam() != DFM_TOI_REGULA_FALSI) check(bend, "bend");   // no polynomial has one
+  if (GetParam() != DFM_TOI_REGULA_FALSI) check(bend, "bend");  // no polynomial has one
 }
 
 TEST_P(ToiFinder, Cap_EndsInsideTheBracket) {
@@ -96,4 +96,5 @@ TEST_P(ToiFinder, Cap_EndsInsideTheBracket) {
   }
 }
 
-INSTANTIATE_TEST_SUITE_P(Finders, ToiFinder, testing::Values(0, 1, 2), [](const auto &i) { return std::string(test::kFinderNames[i.param]); });
+INSTANTIATE_TEST_SUITE_P(Finders, ToiFinder, testing::Values(0, 1, 2),
+                         [](const auto &i) { return std::string(test::kFinderNames[i.param]); });

@@ -1,5 +1,5 @@
-// Random queries against three oracles that share no code with the library: integer arithmetic on small whole coordinates, touches built to be exact,
-// and dense sampling of the distance in long double.
+// Random queries against three oracles that share no code with the library: integer arithmetic on small whole
+// coordinates, touches built to be exact, and dense sampling of the distance in long double.
 #include <gtest/gtest.h>
 
 #include <cstring>
@@ -10,19 +10,22 @@ namespace {
 
 using namespace test;
 
-// ---- integer oracle ------------------------------------------------------------------------------------------------------------------
+// ---- integer oracle ---------------------------------------------------------------------------------------
 
 using Whole = __int128;
 struct Whole3 { Whole x, y, z; };
 Whole3 operator-(Whole3 a, Whole3 b) { return {a.x - b.x, a.y - b.y, a.z - b.z}; }
 Whole dot(Whole3 a, Whole3 b) { return a.x * b.x + a.y * b.y + a.z * b.z; }
-Whole3 cross(Whole3 a, Whole3 b) { return {a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x}; }
+Whole3 cross(Whole3 a, Whole3 b) {
+  return {a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
+}
 
-constexpr int64_t kGrid = 1 << 24;   // times are k / kGrid; coordinates within 6 keep every product below 2^127
+// times are k / kGrid; coordinates within 6 keep every product below 2^127
+constexpr int64_t kGrid = 1 << 24;
 
 struct Verdict {
   bool sure = false, hit = false;
-  double from = 0, to = 0;           // the exact time lies in there
+  double from = 0, to = 0;  // the exact time lies in there
 };
 
 class Oracle {
@@ -59,7 +62,8 @@ class Oracle {
           }
         }
         if (lo != hi) {
-          const int inside = std::min(inside_at(lo), inside_at(hi)), outside = std::max(inside_at(lo), inside_at(hi));
+          const int inside = std::min(inside_at(lo), inside_at(hi));
+          const int outside = std::max(inside_at(lo), inside_at(hi));
           if (inside > 0) return {true, true, double(lo) / kGrid, double(hi) / kGrid};
           if (outside >= 0) return none;
         }
@@ -73,13 +77,22 @@ class Oracle {
  private:
   double scale() const { return 1e3 * std::pow(double(kGrid), 3); }
   Whole3 point(int vertex, int64_t k) const {
-    const auto one = [&](int i) { return Whole(kGrid - k) * Whole(q_.m[vertex].p0[i]) + Whole(k) * Whole(q_.m[vertex].p1[i]); };
+    const auto one = [&](int i) {
+      return Whole(kGrid - k) * Whole(q_.m[vertex].p0[i]) + Whole(k) * Whole(q_.m[vertex].p1[i]);
+    };
     return {one(0), one(1), one(2)};
   }
-  void frame(int64_t k, Whole3 &r, Whole3 &e1, Whole3 &e2) const {   // the patch is r + u e1 + v e2
+  void frame(int64_t k, Whole3 &r, Whole3 &e1, Whole3 &e2) const {  // the patch is r + u e1 + v e2
     const Whole3 a = point(0, k), b = point(1, k), c = point(2, k), d = point(3, k);
-    if (q_.edges) r = a - c, e1 = b - a, e2 = c - d;
-    else r = a - b, e1 = b - c, e2 = b - d;
+    if (q_.edges) {
+      r = a - c;
+      e1 = b - a;
+      e2 = c - d;
+    } else {
+      r = a - b;
+      e1 = b - c;
+      e2 = b - d;
+    }
   }
   Whole plane(int64_t k) const {
     Whole3 r, e1, e2;
@@ -91,7 +104,9 @@ class Oracle {
     Whole3 r, e1, e2;
     frame(k, r, e1, e2);
     const Whole3 n = cross(e1, e2);
-    const double area2 = double(dot(n, n)), u = double(dot(cross(e2, r), n)) / area2, v = double(dot(cross(r, e1), n)) / area2;
+    const double area2 = double(dot(n, n));
+    const double u = double(dot(cross(e2, r), n)) / area2;
+    const double v = double(dot(cross(r, e1), n)) / area2;
     if (area2 < 1e-3 * std::pow(double(kGrid), 4)) return 0;
     const double least = q_.edges ? std::min({u, v, 1 - u, 1 - v}) : std::min({u, v, 1 - u - v});
     return least > 1e-4 ? 1 : least < -1e-4 ? -1 : 0;
@@ -105,13 +120,16 @@ class Oracle {
   // Zeros of the cubic's derivative and 1.
   int turning_points(double out[3]) const {
     const double s = std::pow(double(kGrid), 3);
-    const double f[4] = {double(plane(0)) / s, double(plane(kGrid / 4)) / s, double(plane(kGrid / 2)) / s, double(plane(kGrid)) / s};
+    const double f[4] = {double(plane(0)) / s, double(plane(kGrid / 4)) / s, double(plane(kGrid / 2)) / s,
+                         double(plane(kGrid)) / s};
     // The cubic through t = 0, 1/4, 1/2, 1 in Newton's form, then its derivative.
     const double x[4] = {0, 0.25, 0.5, 1};
     double d[4] = {f[0], f[1], f[2], f[3]};
     for (int level = 1; level < 4; ++level)
       for (int i = 3; i >= level; --i) d[i] = (d[i] - d[i - 1]) / (x[i] - x[i - level]);
-    const double c3 = d[3], c2 = d[2] - d[3] * (x[0] + x[1] + x[2]), c1 = d[1] - d[2] * (x[0] + x[1]) + d[3] * (x[0] * x[1] + x[0] * x[2] + x[1] * x[2]);
+    const double c3 = d[3];
+    const double c2 = d[2] - d[3] * (x[0] + x[1] + x[2]);
+    const double c1 = d[1] - d[2] * (x[0] + x[1]) + d[3] * (x[0] * x[1] + x[0] * x[2] + x[1] * x[2]);
     int n = 0;
     const double square = c2 * c2 - 3 * c3 * c1;
     if (square >= 0) {
@@ -130,14 +148,18 @@ ToiQuery whole_query(Random &random, bool edges) {
   ToiQuery q;
   q.edges = edges;
   for (dfm_motion &m : q.m)
-    for (int i = 0; i < 3; ++i) m.p0[i] = random.whole(-6, 6), m.p1[i] = random.whole(-6, 6);
+    for (int i = 0; i < 3; ++i) {
+      m.p0[i] = random.whole(-6, 6);
+      m.p1[i] = random.whole(-6, 6);
+    }
   return q;
 }
 
-// ---- touches that are exact by construction ------------------------------------------------------------------------------------------
+// ---- touches that are exact by construction ---------------------------------------------------------------
 
-// At t* = k/16 the point is at weights of sixteenths on the triangle (edges: at sixteenths on both); all numbers are small multiples of 1/256, so
-// the ends of all paths, and with them the touch, are exact in doubles. `grazing`: the velocity along the normal is nearly or exactly the same there.
+// At t* = k/16 the point is at weights of sixteenths on the triangle (edges: at sixteenths on both); all
+// numbers are small multiples of 1/256, so the ends of all paths, and with them the touch, are exact in
+// doubles. `grazing`: the velocity along the normal is nearly or exactly the same there.
 ToiQuery exact_touch(Random &random, double &time) {
   ToiQuery q;
   q.edges = random.next() & 1;
@@ -147,25 +169,32 @@ ToiQuery exact_touch(Random &random, double &time) {
   const int style = random.whole(0, 5);
   for (int k = 0; k < 4; ++k)
     for (int i = 0; i < 3; ++i) {
-      x[k][i] = random.whole(-16, 16), v[k][i] = random.whole(-16, 16);
-      if (style == 1 && i == 2) v[k][i] = 0;                 // motion in parallel planes
-      if (style == 2 && i == 2) x[k][i] = v[k][i] = 0;       // motion in one plane
-      if (style == 3 && k > 0) v[k][i] = v[0][i];            // a common translation
-      if (style == 4) v[k][i] = k == 0 ? v[k][i] / 16 : 0;   // nearly at rest
+      x[k][i] = random.whole(-16, 16);
+      v[k][i] = random.whole(-16, 16);
+      if (style == 1 && i == 2) v[k][i] = 0;                // motion in parallel planes
+      if (style == 2 && i == 2) x[k][i] = v[k][i] = 0;      // motion in one plane
+      if (style == 3 && k > 0) v[k][i] = v[0][i];           // a common translation
+      if (style == 4) v[k][i] = k == 0 ? v[k][i] / 16 : 0;  // nearly at rest
     }
-  if (style == 5)                                            // a sliver
+  if (style == 5)  // a sliver
     for (int i = 0; i < 3; ++i) x[3][i] = x[2][i] + (x[3][i] - x[2][i]) * 0x1p-20;
   const int wu = random.whole(0, 16), wv = random.whole(0, q.edges ? 16 : 16 - wu);
   for (int i = 0; i < 3; ++i) {
-    if (q.edges) {   // b's end is put where the point on a needs it: b0 such that b0 + wv/16 (b1 - b0) is on a
-      const double on_a = (x[0][i] * (16 - wu) + x[1][i] * wu) / 16, on_b = (x[2][i] * (16 - wv) + x[3][i] * wv) / 16;
-      x[2][i] += on_a - on_b, x[3][i] += on_a - on_b;
+    // b's end is put where the point on a needs it: b0 such that b0 + wv/16 (b1 - b0) is on a
+    if (q.edges) {
+      const double on_a = (x[0][i] * (16 - wu) + x[1][i] * wu) / 16;
+      const double on_b = (x[2][i] * (16 - wv) + x[3][i] * wv) / 16;
+      x[2][i] += on_a - on_b;
+      x[3][i] += on_a - on_b;
     } else {
       x[0][i] = (x[1][i] * (16 - wu - wv) + x[2][i] * wu + x[3][i] * wv) / 16;
     }
   }
   for (int k = 0; k < 4; ++k)
-    for (int i = 0; i < 3; ++i) q.m[k].p0[i] = x[k][i] - time * v[k][i], q.m[k].p1[i] = x[k][i] + (1 - time) * v[k][i];
+    for (int i = 0; i < 3; ++i) {
+      q.m[k].p0[i] = x[k][i] - time * v[k][i];
+      q.m[k].p1[i] = x[k][i] + (1 - time) * v[k][i];
+    }
   return q;
 }
 
@@ -173,7 +202,10 @@ ToiQuery real_query(Random &random, double motion) {
   ToiQuery q;
   q.edges = random.next() & 1;
   for (dfm_motion &m : q.m)
-    for (int i = 0; i < 3; ++i) m.p0[i] = random.real(-1, 1), m.p1[i] = m.p0[i] + motion * random.real(-1, 1);
+    for (int i = 0; i < 3; ++i) {
+      m.p0[i] = random.real(-1, 1);
+      m.p1[i] = m.p0[i] + motion * random.real(-1, 1);
+    }
   return q;
 }
 
@@ -188,7 +220,8 @@ TEST_P(ToiRandom, WholeCoordinates_AgreeWithIntegerArithmetic) {
     const ToiQuery q = whole_query(random, n & 1);
     const Verdict truth = Oracle(q).decide();
     if (!truth.sure) continue;
-    ++sure, hits += truth.hit;
+    ++sure;
+    hits += truth.hit;
     const double t = ask(q, GetParam()).t;
     ASSERT_EQ(t <= 1, truth.hit) << n << " t " << t << " exact from " << truth.from;
     if (!truth.hit) continue;
@@ -211,9 +244,11 @@ TEST_P(ToiRandom, FindersAgreeOnEveryTime) {
   }
 }
 
-INSTANTIATE_TEST_SUITE_P(Finders, ToiRandom, testing::Values(0, 1, 2, 3), [](const auto &i) { return std::string(kFinderNames[i.param]); });
+INSTANTIATE_TEST_SUITE_P(Finders, ToiRandom, testing::Values(0, 1, 2, 3),
+                         [](const auto &i) { return std::string(kFinderNames[i.param]); });
 
-// 1e5 touches known to the last bit, many of them grazing, in one plane, at the border or at the ends of the step.
+// 1e5 touches known to the last bit, many of them grazing, in one plane, at the border or at the
+// ends of the step.
 TEST(ToiConservative, ExactTouches_AreNeverMissedAndNeverLate) {
   Random random(13);
   for (int n = 0; n < 100000; ++n) {
@@ -223,7 +258,8 @@ TEST(ToiConservative, ExactTouches_AreNeverMissedAndNeverLate) {
     const ToiAnswer a = ask(q, DFM_TOI_CONSERVATIVE);
     ASSERT_LE(a.t, time) << n << (q.edges ? " edges" : " point");
     ASSERT_LE(distance_at(q, Real(a.t)), 2e-12L * Real(extent_of(q)))
-        << n << ": called touching while apart, t " << a.t << " exact " << time << " evaluations " << a.evaluations;
+        << n << ": called touching while apart, t " << a.t << " exact " << time << " evaluations "
+        << a.evaluations;
     ASSERT_LT(a.evaluations, 512u) << n;
   }
 }
@@ -264,7 +300,8 @@ TEST(ToiConservative, Separation_AllFindersAgree) {
       ASSERT_EQ(t <= 1, other <= 1) << n << " " << kFinderNames[method];
       if (t <= 1) {
         ASSERT_LE(t, other + 1e-12) << n << " " << kFinderNames[method];
-        ASSERT_NEAR(t, other, 1e-7) << n << " " << kFinderNames[method];   // a grazing pass: the tolerance in distance is wide in time
+        // a grazing pass: the tolerance in distance is wide in time
+        ASSERT_NEAR(t, other, 1e-7) << n << " " << kFinderNames[method];
       }
     }
     hits += t <= 1;
@@ -272,10 +309,11 @@ TEST(ToiConservative, Separation_AllFindersAgree) {
   EXPECT_GT(hits, 1000);
 }
 
-// The same bits from every compiler, optimization and vector width; a change of the method changes the number, a change of the build may not.
+// The same bits from every compiler, optimization and vector width; a change of the method changes the
+// number, a change of the build may not.
 TEST(Toi, Bits_AreThoseOfEveryBuild) {
   Random random(9);
-  uint64_t hash = 14695981039346656037ull;   // FNV-1a
+  uint64_t hash = 14695981039346656037ull;  // FNV-1a
   const auto add = [&](double x) {
     uint64_t bits;
     std::memcpy(&bits, &x, sizeof bits);
@@ -286,7 +324,10 @@ TEST(Toi, Bits_AreThoseOfEveryBuild) {
     for (int method = 0; method < 4; ++method) {
       const ToiAnswer a = ask(q, method, n % 5 == 0 ? 0.05 : 0);
       add(a.t);
-      if (a.t <= 1) add(a.at[0]), add(a.at[1]);
+      if (a.t <= 1) {
+        add(a.at[0]);
+        add(a.at[1]);
+      }
     }
   }
   EXPECT_EQ(hash, 17016981760266008452ull);

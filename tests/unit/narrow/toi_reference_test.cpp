@@ -1,4 +1,5 @@
-// All four finders on the exact queries of ../shared/reference/ccd and on the published ones beside them: nothing missed, conservative never late.
+// All four finders on the exact queries of ../shared/reference/ccd and on the published ones beside them:
+// nothing missed, conservative never late.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -9,7 +10,7 @@ namespace {
 
 using namespace test;
 
-constexpr double kTolerance = 1e-12;   // the default, a share of the extent over the step
+constexpr double kTolerance = 1e-12;  // the default, a share of the extent over the step
 
 // What is wrong with an answer; "" where nothing is.
 std::string judge(const ToiQuery &q, int method, const ToiAnswer &a) {
@@ -32,7 +33,8 @@ void expect_right(const std::vector<ToiQuery> &queries, int method) {
   for (const ToiQuery &q : queries) {
     const ToiAnswer a = ask(q, method);
     const std::string wrong = judge(q, method, a);
-    EXPECT_EQ(wrong, "") << kFinderNames[method] << " " << q.id << " " << q.category << " t " << a.t << " exact " << q.toi;
+    EXPECT_EQ(wrong, "") << kFinderNames[method] << " " << q.id << " " << q.category << " t " << a.t
+                         << " exact " << q.toi;
   }
 }
 
@@ -57,33 +59,43 @@ TEST_P(ToiReference, PublishedQueries_NoneMissedNoneLate) {
   expect_right(queries, GetParam());
 }
 
-// Same verdict, same bits: swapped edges, turned triangles, reversed edges; exact translations; a power of two.
+// Same verdict, same bits: swapped edges, turned triangles, reversed edges; exact translations;
+// a power of two.
 TEST_P(ToiReference, Relabelled_SameBits) {
   for (const ToiQuery &q : reference_queries()) {
     const double t = ask(q, GetParam()).t;
     for (int k = 0; k < 3; ++k) {
       ToiQuery other = q;
-      if (q.edges && k == 0) std::swap(other.m[0], other.m[2]), std::swap(other.m[1], other.m[3]);
-      else if (q.edges) std::swap(other.m[2 * k - 2], other.m[2 * k - 1]);
+      if (q.edges && k == 0) {
+        std::swap(other.m[0], other.m[2]);
+        std::swap(other.m[1], other.m[3]);
+      } else if (q.edges) std::swap(other.m[2 * k - 2], other.m[2 * k - 1]);
       else if (k < 2) std::rotate(other.m + 1, other.m + 2 + k, other.m + 4);
       else std::swap(other.m[1], other.m[3]);
       EXPECT_EQ(ask(other, GetParam()).t, t) << q.id << " " << q.category << " " << k;
     }
-    if (q.category == "extreme_scale") continue;   // times 2^40 is not exact there
+    if (q.category == "extreme_scale") continue;  // times 2^40 is not exact there
     ToiQuery scaled = q;
     for (dfm_motion &m : scaled.m)
-      for (int i = 0; i < 3; ++i) m.p0[i] *= 0x1p40, m.p1[i] *= 0x1p40;
+      for (int i = 0; i < 3; ++i) {
+        m.p0[i] *= 0x1p40;
+        m.p1[i] *= 0x1p40;
+      }
     EXPECT_EQ(ask(scaled, GetParam()).t, t) << q.id << " " << q.category;
     if (q.category != "intgrid") continue;
     const double shift[3] = {1000, -77, 65536};
     ToiQuery moved = q;
     for (dfm_motion &m : moved.m)
-      for (int i = 0; i < 3; ++i) m.p0[i] += shift[i], m.p1[i] += shift[i];
+      for (int i = 0; i < 3; ++i) {
+        m.p0[i] += shift[i];
+        m.p1[i] += shift[i];
+      }
     EXPECT_EQ(ask(moved, GetParam()).t, t) << q.id << " moved";
   }
 }
 
-// Sums of three products are rounded in another order then, so the verdict may differ only where it rests on rounding.
+// Sums of three products are rounded in another order then, so the verdict may differ only where it
+// rests on rounding.
 TEST_P(ToiReference, PermutedAxes_SameVerdict) {
   for (const ToiQuery &q : reference_queries()) {
     const double t = ask(q, GetParam()).t;
@@ -98,16 +110,19 @@ TEST_P(ToiReference, PermutedAxes_SameVerdict) {
   }
 }
 
-INSTANTIATE_TEST_SUITE_P(Finders, ToiReference, testing::Values(0, 1, 2, 3), [](const auto &i) { return std::string(kFinderNames[i.param]); });
+INSTANTIATE_TEST_SUITE_P(Finders, ToiReference, testing::Values(0, 1, 2, 3),
+                         [](const auto &i) { return std::string(kFinderNames[i.param]); });
 
-// Query 272, "just outside" by construction: near t = 0.5 the point passes a side of the triangle at 1.1e-14 of the extent (in rational numbers) and
-// touches only at 0.694. The reference is right; the answer is early by 0.19 of the step because the features are nearer there than the
-// tolerance, and nearer than the 1.4e-14 that rounding leaves to tell, so no finer tolerance would help. In lengths, which is what "early by
+// Query 272, "just outside" by construction: near t = 0.5 the point passes a side of the triangle at 1.1e-14
+// of the extent (in rational numbers) and touches only at 0.694. The reference is right; the answer is early
+// by 0.19 of the step because the features are nearer there than the tolerance, and nearer than the 1.4e-14
+// that rounding leaves to tell, so no finer tolerance would help. In lengths, which is what "early by
 // 1 % of the extent" limits, it is nothing.
 TEST(Toi, PassingNearerThanRounding_IsATouch) {
   if (ccd_folder().empty()) GTEST_SKIP() << "../shared is absent";
   const std::vector<ToiQuery> queries = reference_queries();
-  const auto found = std::find_if(queries.begin(), queries.end(), [](const ToiQuery &q) { return q.id == "272"; });
+  const auto found =
+      std::find_if(queries.begin(), queries.end(), [](const ToiQuery &q) { return q.id == "272"; });
   ASSERT_NE(found, queries.end());
   for (int method = 0; method < 4; ++method) {
     const double t = ask(*found, method).t;
@@ -116,7 +131,8 @@ TEST(Toi, PassingNearerThanRounding_IsATouch) {
   }
 }
 
-// Early by more than a millionth of the step only at roots of a higher order, but for 272; in lengths, nowhere by more than 1 % of the extent.
+// Early by more than a millionth of the step only at roots of a higher order, but for 272; in lengths,
+// nowhere by more than 1 % of the extent.
 TEST(Toi, ConservativeTimes_AreEarlyAtDegenerateQueriesAlone) {
   if (ccd_folder().empty()) GTEST_SKIP() << "../shared is absent";
   size_t early = 0, hits = 0;
@@ -126,7 +142,8 @@ TEST(Toi, ConservativeTimes_AreEarlyAtDegenerateQueriesAlone) {
     const double t = ask(q, DFM_TOI_CONSERVATIVE).t;
     if (q.toi - t <= 1e-6) continue;
     ++early;
-    EXPECT_TRUE(q.multiplicity != 1 || q.id == "272") << q.id << " " << q.category << " " << t << " " << q.toi << " x" << q.multiplicity;
+    EXPECT_TRUE(q.multiplicity != 1 || q.id == "272")
+        << q.id << " " << q.category << " " << t << " " << q.toi << " x" << q.multiplicity;
     EXPECT_LE(distance_at(q, Real(t)), 0.01 * q.extent) << q.id;
   }
   EXPECT_EQ(hits, 811u);
@@ -136,14 +153,16 @@ TEST(Toi, ConservativeTimes_AreEarlyAtDegenerateQueriesAlone) {
 
 TEST(Toi, ReferenceQueries_NeedLittleWork) {
   if (ccd_folder().empty()) GTEST_SKIP() << "../shared is absent";
-  const double most[4] = {28, 10, 10, 10};   // measured 25.1, 8.4, 8.1, 8.5; (4.7) as printed needs 42 for one root
+  // measured 25.1, 8.4, 8.1, 8.5; (4.7) as printed needs 42 for one root
+  const double most[4] = {28, 10, 10, 10};
   const std::vector<ToiQuery> queries = reference_queries();
   for (int method = 0; method < 4; ++method) {
     double sum = 0;
     uint32_t largest = 0;
     for (const ToiQuery &q : queries) {
       const uint32_t n = ask(q, method).evaluations;
-      sum += n, largest = std::max(largest, n);
+      sum += n;
+      largest = std::max(largest, n);
     }
     EXPECT_LT(sum / double(queries.size()), most[method]) << kFinderNames[method];
     EXPECT_LE(largest, 512u) << kFinderNames[method];

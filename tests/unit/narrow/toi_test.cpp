@@ -1,4 +1,5 @@
-// Time of impact of hand-made queries: every kind of first touch, the motions without a change of sign, separations, scales.
+// Time of impact of hand-made queries: every kind of first touch, the motions without a change of sign,
+// separations, scales.
 #include <gtest/gtest.h>
 
 #include "toi_support.h"
@@ -12,7 +13,10 @@ ToiQuery query(bool edges, std::array<P, 4> from, std::array<P, 4> to) {
   ToiQuery q;
   q.edges = edges;
   for (int k = 0; k < 4; ++k)
-    for (int i = 0; i < 3; ++i) q.m[k].p0[i] = from[size_t(k)][size_t(i)], q.m[k].p1[i] = to[size_t(k)][size_t(i)];
+    for (int i = 0; i < 3; ++i) {
+      q.m[k].p0[i] = from[size_t(k)][size_t(i)];
+      q.m[k].p1[i] = to[size_t(k)][size_t(i)];
+    }
   return q;
 }
 // A point that moves over or onto the triangle (0,0,0) (4,0,0) (0,4,0) at rest.
@@ -71,21 +75,26 @@ TEST(Toi, EdgeOverEdge_TimeAndPlaces) {
 // The counter-example to (4.5) in doc/reference/zerbato.md: the triangle's three vertices move differently.
 TEST(Toi, DeformingTriangle_MeetsPointAtRest) {
   const P o = {0, 0, 0};
-  const ToiQuery q = query(false, {o, P{-1, -1, 0.2}, P{3, -1, 0.2}, P{-1, 1, 0.6}}, {o, P{-1, -1, 0.6}, P{3, -1, 0.6}, P{-1, 1, -1.4}});
+  const ToiQuery q = query(false, {o, P{-1, -1, 0.2}, P{3, -1, 0.2}, P{-1, 1, 0.6}},
+                           {o, P{-1, -1, 0.6}, P{3, -1, 0.6}, P{-1, 1, -1.4}});
   expect_time(q, 0.5, "counter-example");
   const ToiAnswer a = ask(q, DFM_TOI_CONSERVATIVE);
   EXPECT_NEAR(a.at[0], 0.25, 1e-9);
   EXPECT_NEAR(a.at[1], 0.25, 1e-9);
 }
 
-// Queries whose cubic changes its sign more than once, the first time while the point is beside the triangle: the roots come from dense sampling.
+// Queries whose cubic changes its sign more than once, the first time while the point is beside the triangle:
+// the roots come from dense sampling.
 TEST(Toi, SeveralRoots_EarliestAdmissibleOneCounts) {
   Random random(21);
   int later = 0, beside = 0;
   for (int n = 0; n < 3000; ++n) {
     ToiQuery q;
     for (dfm_motion &m : q.m)
-      for (int i = 0; i < 3; ++i) m.p0[i] = random.real(-1, 1), m.p1[i] = random.real(-1, 1);
+      for (int i = 0; i < 3; ++i) {
+        m.p0[i] = random.real(-1, 1);
+        m.p1[i] = random.real(-1, 1);
+      }
     const auto plane = [&](Real t) {
       const Real3 a = at(q.m[1], t);
       return dot(at(q.m[0], t) - a, cross(at(q.m[2], t) - a, at(q.m[3], t) - a));
@@ -96,7 +105,8 @@ TEST(Toi, SeveralRoots_EarliestAdmissibleOneCounts) {
       Real lo = Real(k) / 400, hi = Real(k + 1) / 400;
       if ((plane(lo) > 0) == (plane(hi) > 0)) continue;
       ++roots;
-      for (int halving = 0; halving < 60; ++halving) ((plane(0.5L * (lo + hi)) > 0) == (plane(lo) > 0) ? lo : hi) = 0.5L * (lo + hi);
+      for (int halving = 0; halving < 60; ++halving)
+        ((plane(0.5L * (lo + hi)) > 0) == (plane(lo) > 0) ? lo : hi) = 0.5L * (lo + hi);
       if (distance_at(q, lo) < 1e-12) expected = double(lo);
     }
     if (roots < 2) continue;
@@ -131,7 +141,8 @@ TEST(Toi, BorderOfFeatures_Counts) {
   expect_time(point_on_still({2, 2.0000001, 1}, {2, 2.0000001, -1}), kNever, "past a side");
   expect_time(edge_on_still({2, -1, 1}, {2, 1, 1}, {2, -1, -1}, {2, 1, -1}), 0.5, "at an end");
   expect_time(edge_on_still({2, 0, 1}, {2, 1, 1}, {2, 0, -1}, {2, 1, -1}), 0.5, "end on end");
-  expect_time(edge_on_still({2.0000001, -1, 1}, {2.0000001, 1, 1}, {2.0000001, -1, -1}, {2.0000001, 1, -1}), kNever, "past an end");
+  expect_time(edge_on_still({2.0000001, -1, 1}, {2.0000001, 1, 1}, {2.0000001, -1, -1}, {2.0000001, 1, -1}),
+              kNever, "past an end");
 }
 
 TEST(Toi, BeginAndEndOfStep_Count) {
@@ -143,7 +154,8 @@ TEST(Toi, BeginAndEndOfStep_Count) {
   expect_time(edge_on_still({0, 0, 0}, {0, 0, 2}, {0, 0, 0}, {0, 0, 2}), 0, "rests on an edge");
 }
 
-// A tilting triangle z = (1 - s) y under a point at y = 1 + s, z = height, with s = t - 1/2: the gap is height - 1 + s^2.
+// A tilting triangle z = (1 - s) y under a point at y = 1 + s, z = height, with s = t - 1/2: the gap is
+// height - 1 + s^2.
 TEST(Toi, GrazingTouch_IsFound) {
   const auto tilting = [](double height) {
     const P a = {0, 0, 0}, b = {4, 0, 0};
@@ -162,18 +174,27 @@ TEST(Toi, FeaturesWithoutExtent_AreTheirPoints) {
   const P o = {0, 0, 0}, up = {0, 0, 1}, down = {0, 0, -1};
   expect_time(query(false, {up, o, o, o}, {down, o, o, o}), 0.5, "a triangle that is a point");
   expect_time(query(false, {P{1, 0, 1}, o, o, o}, {P{1, 0, -1}, o, o, o}), kNever, "beside that");
-  expect_time(query(false, {up, P{-1, 0, 0}, o, P{1, 0, 0}}, {down, P{-1, 0, 0}, o, P{1, 0, 0}}), 0.5, "a triangle that is a line");
-  expect_time(query(false, {P{0, 1, 0}, P{-1, 0, 0}, P{3, 0, 0}, P{1, 0, 0}}, {P{4, -1, 0}, P{-1, 0, 0}, P{3, 0, 0}, P{1, 0, 0}}), 0.5, "aslant onto that");
-  expect_time(query(true, {up, up, P{-1, 0, 0}, P{1, 0, 0}}, {down, down, P{-1, 0, 0}, P{1, 0, 0}}), 0.5, "an edge that is a point");
+  expect_time(query(false, {up, P{-1, 0, 0}, o, P{1, 0, 0}}, {down, P{-1, 0, 0}, o, P{1, 0, 0}}), 0.5,
+              "a triangle that is a line");
+  expect_time(query(false, {P{0, 1, 0}, P{-1, 0, 0}, P{3, 0, 0}, P{1, 0, 0}},
+                    {P{4, -1, 0}, P{-1, 0, 0}, P{3, 0, 0}, P{1, 0, 0}}),
+              0.5, "aslant onto that");
+  expect_time(query(true, {up, up, P{-1, 0, 0}, P{1, 0, 0}}, {down, down, P{-1, 0, 0}, P{1, 0, 0}}), 0.5,
+              "an edge that is a point");
   expect_time(query(true, {up, up, o, o}, {down, down, o, o}), 0.5, "two edges that are points");
   // Flat only in the middle of the step, when the point is there.
-  expect_time(query(false, {P{0, 0, 1}, P{-1, 0, 0}, P{1, 0, 0}, P{0, 2, 0}}, {P{0, 0, -1}, P{-1, 0, 0}, P{1, 0, 0}, P{0, -2, 0}}), 0.5, "flips");
+  expect_time(query(false, {P{0, 0, 1}, P{-1, 0, 0}, P{1, 0, 0}, P{0, 2, 0}},
+                    {P{0, 0, -1}, P{-1, 0, 0}, P{1, 0, 0}, P{0, -2, 0}}),
+              0.5, "flips");
 }
 
 TEST(Toi, CommonMotion_ChangesNothing) {
   for (const double speed : {1.0, 64.0, 4096.0}) {
     ToiQuery q = point_on_still({1, 1, 1}, {1, 1, 1});
-    for (dfm_motion &m : q.m) m.p1[0] += speed, m.p1[2] -= 3 * speed;
+    for (dfm_motion &m : q.m) {
+      m.p1[0] += speed;
+      m.p1[2] -= 3 * speed;
+    }
     expect_time(q, kNever, "rigid");
     q.m[0].p1[2] -= 2;
     expect_time(q, 0.5, "rigid, and 2 down");
@@ -200,12 +221,19 @@ TEST(Toi, Bits_DoNotDependOnUnitOriginOrOrder) {
     for (const double scale : {0x1p-1000, 0x1p-900, 0x1p-60, 0x1p50, 0x1p950, 0x1p1020}) {
       ToiQuery scaled = q;
       for (dfm_motion &m : scaled.m)
-        for (int i = 0; i < 3; ++i) m.p0[i] *= scale, m.p1[i] *= scale;
+        for (int i = 0; i < 3; ++i) {
+          m.p0[i] *= scale;
+          m.p1[i] *= scale;
+        }
       EXPECT_EQ(ask(scaled, method).t, plain.t) << scale;
     }
-    ToiQuery moved = q;   // exact: all coordinates are eighths
+    ToiQuery moved = q;  // exact: all coordinates are eighths
     for (dfm_motion &m : moved.m)
-      for (double *end : {m.p0, m.p1}) end[0] += 10, end[1] += 20, end[2] += 30;
+      for (double *end : {m.p0, m.p1}) {
+        end[0] += 10;
+        end[1] += 20;
+        end[2] += 30;
+      }
     EXPECT_EQ(ask(moved, method).t, plain.t);
     const int orders[5][3] = {{1, 3, 2}, {2, 1, 3}, {2, 3, 1}, {3, 1, 2}, {3, 2, 1}};
     for (const auto &order : orders) {
@@ -219,9 +247,15 @@ TEST(Toi, Bits_DoNotDependOnUnitOriginOrOrder) {
 }
 
 TEST(Toi, LargestNumbers_DoNotOverflow) {
-  const double far = 0x1.8p1023;   // twice that is no number any more
-  const P a = {0, 0, -far}, b = {4e300, 0, -far}, c = {0, 4e300, -far}, d = {0, 0, far}, e = {4e300, 0, far}, f = {0, 4e300, far};
-  expect_time(query(false, {P{1e300, 1e300, far}, a, b, c}, {P{1e300, 1e300, -far}, d, e, f}), 0.5, "triangle and point fall past each other");
+  const double far = 0x1.8p1023;  // twice that is no number any more
+  const P a = {0, 0, -far};
+  const P b = {4e300, 0, -far};
+  const P c = {0, 4e300, -far};
+  const P d = {0, 0, far};
+  const P e = {4e300, 0, far};
+  const P f = {0, 4e300, far};
+  expect_time(query(false, {P{1e300, 1e300, far}, a, b, c}, {P{1e300, 1e300, -far}, d, e, f}), 0.5,
+              "triangle and point fall past each other");
 }
 
 // With too few iterations the conservative answer is early, never late and never a miss.
@@ -232,7 +266,10 @@ TEST(Toi, IterationCap_StaysOnTheSafeSide) {
     ToiQuery q;
     q.edges = n & 1;
     for (dfm_motion &m : q.m)
-      for (int i = 0; i < 3; ++i) m.p0[i] = random.real(-1, 1), m.p1[i] = random.real(-1, 1);
+      for (int i = 0; i < 3; ++i) {
+        m.p0[i] = random.real(-1, 1);
+        m.p1[i] = random.real(-1, 1);
+      }
     const double t = ask(q, DFM_TOI_CONSERVATIVE).t;
     for (const int cap : {1, 3, 6}) {
       const double early = ask(q, DFM_TOI_CONSERVATIVE, 0, 0, cap).t;
@@ -243,7 +280,8 @@ TEST(Toi, IterationCap_StaysOnTheSafeSide) {
   EXPECT_GT(capped, 100);
 }
 
-// Zerbato 2010, (4.7), corrected: with the distance to the plane 42, 7.5 and 7 values for one root at 1e-12; Brent below 15.
+// Zerbato 2010, (4.7), corrected: with the distance to the plane 42, 7.5 and 7 values for one root at 1e-12;
+// Brent below 15.
 TEST(Toi, Evaluations_AreThoseOfTheMethods) {
   Random random(4);
   double sum[3] = {};
@@ -251,8 +289,12 @@ TEST(Toi, Evaluations_AreThoseOfTheMethods) {
   for (int n = 0; n < 2000; ++n) {
     ToiQuery q;
     for (dfm_motion &m : q.m)
-      for (int i = 0; i < 3; ++i) m.p0[i] = random.real(-1, 1), m.p1[i] = m.p0[i] + random.real(-0.2, 0.2);
-    q.m[0].p0[2] = 1, q.m[0].p1[2] = -1;
+      for (int i = 0; i < 3; ++i) {
+        m.p0[i] = random.real(-1, 1);
+        m.p1[i] = m.p0[i] + random.real(-0.2, 0.2);
+      }
+    q.m[0].p0[2] = 1;
+    q.m[0].p1[2] = -1;
     if (ask(q, DFM_TOI_BRENT).t > 1) continue;
     ++hits;
     for (int method = 0; method < 3; ++method) sum[method] += ask(q, method).evaluations;

@@ -15,7 +15,8 @@ const ContactMethod &velocity() { return dfm::velocity_method(); }
 
 dfm::SceneFacts two_bodies() {
   dfm::SceneFacts f;
-  f.bodies = 2, f.body_pairs = 1;
+  f.bodies = 2;
+  f.body_pairs = 1;
   return f;
 }
 
@@ -38,8 +39,8 @@ TEST(Plan, OfAnEmptyWorld_HasNoStage) {
 }
 
 TEST(Plan, OfBodiesThatTouch_HasTheStagesOfContactInOrder) {
-  const Names want = {"model",            "predict",    "broad", "narrow",
-                      "contact+friction", "distribute", "guard", "commit"};
+  const Names want = {"model",      "predict", "broad", "narrow", "contact+friction",
+                      "distribute", "guard",   "commit"};
   EXPECT_EQ(stages(two_bodies()), want);
   EXPECT_TRUE(dfm::make_plan(velocity().table, two_bodies()).touches());
 }
@@ -53,8 +54,11 @@ TEST(Plan, OfOneBody_HasNothingOfContact) {
 
 TEST(Plan, OfABodyThatTouchesItselfAlone_LooksForNoPairs) {
   dfm::SceneFacts f;
-  f.bodies = 1, f.self_bodies = 1, f.self = true;
-  const Names want = {"model", "predict", "self contact", "contact+friction", "distribute", "guard", "commit"};
+  f.bodies = 1;
+  f.self_bodies = 1;
+  f.self = true;
+  const Names want = {"model",      "predict", "self contact", "contact+friction",
+                      "distribute", "guard",   "commit"};
   EXPECT_EQ(stages(f), want);
   EXPECT_EQ(why_not(f, "broad"), "no pair may touch");
 }
@@ -72,7 +76,9 @@ TEST(Plan, OfRollback_HasItsStagesInPlaceOfTheSolve) {
 
 TEST(Plan, OfRigidBodies_EndsThemBeforeImpulsesAreDistributed) {
   dfm::SceneFacts f = two_bodies();
-  f.rigid_bodies = 3, f.rigid_hosts = "builtin", f.obstacle_pairs = 1;
+  f.rigid_bodies = 3;
+  f.rigid_hosts = "builtin";
+  f.obstacle_pairs = 1;
   const Names all = stages(f);
   EXPECT_EQ(all[2], "rigid predict");
   EXPECT_EQ(all[6], "rigid commit");
@@ -200,7 +206,7 @@ TEST(PlanEffects, ThatNobodyProvides_AreRefusedWithThoseWhoCould) {
   EXPECT_NE(refusal(f).find("the parameters of every body leave it off"), std::string::npos) << refusal(f);
   f.offered = {{"volume", "model.a"}};
   EXPECT_EQ(refusal(f), "");
-  dfm::SceneFacts empty;   // whoever comes first may provide it
+  dfm::SceneFacts empty;  // whoever comes first may provide it
   empty.effects_listed = true;
   empty.asked = {"volume"};
   empty.available = {{"volume", "model.a"}};

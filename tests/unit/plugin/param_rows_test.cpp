@@ -11,8 +11,9 @@ constexpr dfm_param kRows[] = {
     {"levels", "", "1", 0, 9, 0, DFM_PARAM_LIST, 4, nullptr},
     {"rates", "", "1", 1, 9, 1, DFM_PARAM_LIST, 4, nullptr},
 };
-constexpr dfm_type kType = {sizeof(dfm_type), DFM_KIND_MODEL, "org.example.rows", "", "1", "MIT", "none", kRows, 4,
-                            sizeof(dfm_param), nullptr, nullptr};
+constexpr dfm_type kType = {
+    sizeof(dfm_type), DFM_KIND_MODEL, "org.example.rows", "", "1", "MIT", "none", kRows, 4, sizeof(dfm_param),
+    nullptr,          nullptr};
 
 }  // namespace
 

@@ -12,7 +12,8 @@ struct Counting {
   dfm::Memory memory{this,
                      [](void *user, size_t bytes, size_t align) -> void * {
                        auto &c = *static_cast<Counting *>(user);
-                       c.live += bytes, ++c.calls;
+                       c.live += bytes;
+                       ++c.calls;
                        return std::aligned_alloc(align, bytes);
                      },
                      [](void *user, void *p, size_t bytes, size_t) {

@@ -19,7 +19,7 @@ using test::expect_near;
 
 constexpr double kStep = 1e-3;
 constexpr Vec3 kGravity{0.5, -1, -9.81};
-constexpr double kRounding = 1e-13;   // of values near 1
+constexpr double kRounding = 1e-13;  // of values near 1
 
 struct End {
   std::vector<dfm_rigid_state> state;
@@ -341,5 +341,5 @@ TEST(RigidHost, CommitOfTwoOnABallJoint_KeepsMomentaAndTheJoint) {
     anchor[i] = load3(end.state[i].position) + rotate(rotation(end.state[i]), arm);
   }
   expect_near(after, before, 1e-12);
-  expect_near(anchor[0], anchor[1], 1e-10);   // what a joint may be off by at the end of a sub-step
+  expect_near(anchor[0], anchor[1], 1e-10);  // what a joint may be off by at the end of a sub-step
 }

@@ -1,5 +1,5 @@
-// Single tetrahedra thrown at each shape of obstacle, turned at random, in one large step: no point of their surface ends nearer than d_c, and those
-// that would have gone through end near it.
+// Single tetrahedra thrown at each shape of obstacle, turned at random, in one large step: no point of their
+// surface ends nearer than d_c, and those that would have gone through end near it.
 #include <functional>
 
 #include "obstacle.h"
@@ -12,7 +12,7 @@ using test::rollback::Vector;
 constexpr double kOffset = 1e-3, kSize = 0.5;
 
 double length(Vector a) { return std::sqrt(a[0] * a[0] + a[1] * a[1] + a[2] * a[2]); }
-double box_distance(Vector p, Vector half) {   // of a point outside
+double box_distance(Vector p, Vector half) {  // of a point outside
   Vector d{};
   for (size_t k = 0; k < 3; ++k) d[k] = std::max(0.0, std::fabs(p[k]) - half[k]);
   return length(d);
@@ -21,12 +21,14 @@ double box_distance(Vector p, Vector half) {   // of a point outside
 struct Case {
   const char *name;
   std::function<void(dfm_world)> add;
-  std::function<double(Vector)> distance;   // 0 inside
+  std::function<double(Vector)> distance;  // 0 inside
 };
 
 void add(dfm_world w, uint32_t shape, double radius, Vector half) {
   dfm_obstacle_def d = dfm_obstacle_def_default();
-  d.shape = shape, d.radius = radius, d.half_length = half[2];
+  d.shape = shape;
+  d.radius = radius;
+  d.half_length = half[2];
   std::copy(half.begin(), half.end(), d.half_size);
   dfm_obstacle o = 0;
   test::ok(dfm_obstacle_create(w, &d, &o));
@@ -35,20 +37,30 @@ void add(dfm_world w, uint32_t shape, double radius, Vector half) {
 const Vector kHalf = {0.3, 0.15, 0.1};
 
 std::vector<Case> cases() {
-  return {{"sphere", [](dfm_world w) { add(w, DFM_SHAPE_SPHERE, 0.2, {}); }, [](Vector p) { return std::max(0.0, length(p) - 0.2); }},
-          {"capsule", [](dfm_world w) { add(w, DFM_SHAPE_CAPSULE, 0.05, {0, 0, 0.3}); },
-           [](Vector p) { return std::max(0.0, length({p[0], p[1], p[2] - std::clamp(p[2], -0.3, 0.3)}) - 0.05); }},
-          {"box", [](dfm_world w) { add(w, DFM_SHAPE_BOX, 1, kHalf); }, [](Vector p) { return box_distance(p, kHalf); }},
-          {"mesh", [](dfm_world w) { test::add_mesh(w, "mesh", test::box_surface({kHalf[0], kHalf[1], kHalf[2]}, 2)); },
-           [](Vector p) { return box_distance(p, kHalf); }}};
+  return {
+      {"sphere", [](dfm_world w) { add(w, DFM_SHAPE_SPHERE, 0.2, {}); },
+       [](Vector p) { return std::max(0.0, length(p) - 0.2); }},
+      {"capsule", [](dfm_world w) { add(w, DFM_SHAPE_CAPSULE, 0.05, {0, 0, 0.3}); },
+       [](Vector p) {
+         return std::max(0.0, length({p[0], p[1], p[2] - std::clamp(p[2], -0.3, 0.3)}) - 0.05);
+       }},
+      {"box", [](dfm_world w) { add(w, DFM_SHAPE_BOX, 1, kHalf); },
+       [](Vector p) { return box_distance(p, kHalf); }},
+      {"mesh",
+       [](dfm_world w) { test::add_mesh(w, "mesh", test::box_surface({kHalf[0], kHalf[1], kHalf[2]}, 2)); },
+       [](Vector p) { return box_distance(p, kHalf); }}};
 }
 
 struct Random {
   uint64_t seed;
-  double operator()() { return seed = seed * 6364136223846793005ull + 1442695040888963407ull, 2 * double(seed >> 11) / 9007199254740992.0 - 1; }
+  double operator()() {
+    seed = seed * 6364136223846793005ull + 1442695040888963407ull;
+    return 2 * double(seed >> 11) / 9007199254740992.0 - 1;
+  }
   Vector direction() {
     for (;;)
-      if (const Vector v{(*this)(), (*this)(), (*this)()}; length(v) <= 1 && length(v) > 0.1) return {v[0] / length(v), v[1] / length(v), v[2] / length(v)};
+      if (const Vector v{(*this)(), (*this)(), (*this)()}; length(v) <= 1 && length(v) > 0.1)
+        return {v[0] / length(v), v[1] / length(v), v[2] / length(v)};
   }
 };
 
@@ -57,7 +69,9 @@ double nearest(const double x[12], const std::function<double(Vector)> &distance
   constexpr int kSteps = 12;
   double least = 1e300;
   for (int face = 0; face < 4; ++face) {
-    const double *const a = x + 3 * ((face + 1) % 4), *const b = x + 3 * ((face + 2) % 4), *const c = x + 3 * ((face + 3) % 4);
+    const double *const a = x + 3 * ((face + 1) % 4);
+    const double *const b = x + 3 * ((face + 2) % 4);
+    const double *const c = x + 3 * ((face + 3) % 4);
     for (int i = 0; i <= kSteps; ++i)
       for (int j = 0; i + j <= kSteps; ++j) {
         const double u = double(i) / kSteps, v = double(j) / kSteps;
@@ -75,19 +89,28 @@ TEST(Rollback, BodiesThrownAtEveryShape_StayOutside) {
   for (const Case &shape : cases()) {
     test::Context context;
     dfm_world_def wd = dfm_world_def_default();
-    wd.method = DFM_METHOD_ROLLBACK, wd.contact_offset = kOffset, wd.gravity[2] = 0;
+    wd.method = DFM_METHOD_ROLLBACK;
+    wd.contact_offset = kOffset;
+    wd.gravity[2] = 0;
     dfm_world w = 0;
     test::ok(dfm_world_create(context, &wd, &w));
-    test::set_friction(w, 0, "none");   // of the last throw would act on the next
+    test::set_friction(w, 0, "none");  // of the last throw would act on the next
     shape.add(w);
-    const double rest[] = {kSize, kSize, kSize, kSize, -kSize, -kSize, -kSize, kSize, -kSize, -kSize, -kSize, kSize};
+    const double rest[] = {kSize,  kSize, kSize,  kSize,  -kSize, -kSize,
+                           -kSize, kSize, -kSize, -kSize, -kSize, kSize};
     const uint32_t cell[] = {0, 1, 3, 2};
     dfm_material_def md = dfm_material_def_default();
-    md.density = 1e6, md.young = 1e-3;
+    md.density = 1e6;
+    md.young = 1e-3;
     dfm_material material = 0;
     test::ok(dfm_material_create(w, &md, &material));
     dfm_body_def d = dfm_body_def_default();
-    d.npoint = 4, d.ntet = 1, d.points = rest, d.tets = cell, d.material = material, d.pose.position[0] = 10;
+    d.npoint = 4;
+    d.ntet = 1;
+    d.points = rest;
+    d.tets = cell;
+    d.material = material;
+    d.pose.position[0] = 10;
     dfm_body body = 0;
     test::ok(dfm_body_create(w, &d, &body));
 
@@ -116,7 +139,8 @@ TEST(Rollback, BodiesThrownAtEveryShape_StayOutside) {
       uint32_t n = 0;
       test::ok(dfm_body_get_state(body, 4, x, nullptr, &n));
       ASSERT_GE(nearest(x, shape.distance), kOffset * (1 - 1e-9)) << shape.name << ", throw " << i;
-      through += would, met += !test::contacts(w).empty();
+      through += would;
+      met += !test::contacts(w).empty();
     }
     EXPECT_GT(through, 30) << shape.name;
     EXPECT_GE(met, through) << shape.name;

@@ -27,7 +27,9 @@ std::string sentence_of(const std::string &text) {
 
 TEST(Parse, RepeatedKey_IsRefusedWithItsLine) {
   EXPECT_EQ(sentence_of("{\"a\": 1,\n \"b\": {\"a\": 2}}"), "");
-  EXPECT_NE(sentence_of("{\"a\": 1,\n \"b\": 2,\n  \"a\": 3}").find("s.json:3:3: the key \"a\" is given twice"), std::string::npos);
+  EXPECT_NE(
+      sentence_of("{\"a\": 1,\n \"b\": 2,\n  \"a\": 3}").find("s.json:3:3: the key \"a\" is given twice"),
+      std::string::npos);
 }
 
 TEST(Parse, BracketsInStrings_AreNoNesting) {
@@ -35,7 +37,8 @@ TEST(Parse, BracketsInStrings_AreNoNesting) {
 }
 
 TEST(Parse, Nesting_IsBounded) {
-  EXPECT_NE(sentence_of(std::string(10 << 20, '[')).find("s.json:1:65: brackets nested deeper than 64"), std::string::npos);
+  EXPECT_NE(sentence_of(std::string(10 << 20, '[')).find("s.json:1:65: brackets nested deeper than 64"),
+            std::string::npos);
   EXPECT_EQ(sentence_of(std::string(64, '[') + std::string(64, ']')), "");
 }
 
@@ -99,7 +102,12 @@ TEST(Rotation, AnyAngle_AgreesWithTheMathLibrary) {
 
 TEST(Rotation, OntoDirection_TurnsZ) {
   const double z[3] = {0, 0, 1};
-  for (const auto &d : {std::array<double, 3>{0, 0, 2}, {0, 0, -3}, {1e-9, 0, -1}, {1, 2, -3}, {1e-200, 0, 1e-200}, {1, 0, 0}}) {
+  for (const auto &d : {std::array<double, 3>{0, 0, 2},
+                        {0, 0, -3},
+                        {1e-9, 0, -1},
+                        {1, 2, -3},
+                        {1e-200, 0, 1e-200},
+                        {1, 0, 0}}) {
     double out[3];
     rotate(rotation_to(d.data()), z, out);
     const double scale = std::max({std::fabs(d[0]), std::fabs(d[1]), std::fabs(d[2])});
@@ -119,7 +127,8 @@ TEST(Jitter, StaysWithinItsBounds_AndFollowsTheSeed) {
     const Quaternion q{pose.rotation[0], pose.rotation[1], pose.rotation[2], pose.rotation[3]};
     double moved[3];
     rotate(q, center, moved);
-    for (int k = 0; k < 3; ++k) EXPECT_LE(std::fabs(moved[k] + pose.position[k] - (center[k] + 1 + k)), 2e-3 + 1e-12);
+    for (int k = 0; k < 3; ++k)
+      EXPECT_LE(std::fabs(moved[k] + pose.position[k] - (center[k] + 1 + k)), 2e-3 + 1e-12);
     EXPECT_LE(2 * std::acos(std::min(1.0, q.w)) * 180 / M_PI, 0.5 + 1e-6);
     EXPECT_LE(std::fabs(v[0] - 1), 0.01 + 1e-12);
     EXPECT_EQ(v[1], -2 * v[0]);
@@ -130,11 +139,16 @@ TEST(Jitter, StaysWithinItsBounds_AndFollowsTheSeed) {
 }
 
 TEST(Share, FaceOfACube_GetsTheConsistentLoad) {
-  // Unit cube of five tetrahedra; the face x = 1 has two triangles, so two of its corners carry 1/3 and two 1/6.
+  // Unit cube of five tetrahedra; the face x = 1 has two triangles, so two of its corners carry
+  // 1/3 and two 1/6.
   BodyMesh mesh;
-  for (int i = 0; i < 8; ++i) mesh.points.insert(mesh.points.end(), {double(i & 1), double((i >> 1) & 1), double((i >> 2) & 1)});
+  for (int i = 0; i < 8; ++i)
+    mesh.points.insert(mesh.points.end(), {double(i & 1), double((i >> 1) & 1), double((i >> 2) & 1)});
   const std::vector<uint32_t> tets = {0, 1, 2, 4, 1, 3, 2, 7, 1, 7, 4, 5, 2, 7, 6, 4, 1, 2, 4, 7};
-  mesh.tets = tets.data(), mesh.npoint = 8, mesh.ntet = 5, mesh.size = std::sqrt(3.0);
+  mesh.tets = tets.data();
+  mesh.npoint = 8;
+  mesh.ntet = 5;
+  mesh.size = std::sqrt(3.0);
   const std::vector<uint32_t> triangles = {1, 3, 7, 1, 7, 5, 0, 4, 2, 2, 4, 6};
   const std::vector<uint32_t> face = {1, 3, 5, 7};
   const std::vector<double> w = share_by_area(face, mesh, triangles);
@@ -145,7 +159,8 @@ TEST(Share, FaceOfACube_GetsTheConsistentLoad) {
   EXPECT_TRUE(share_by_area({1, 3}, mesh, triangles).empty());
   const std::vector<double> m = share_by_mass(face, mesh);
   EXPECT_NEAR(m[0] + m[1] + m[2] + m[3], 1, 1e-15);
-  EXPECT_NEAR(m[0] / m[1], (3 * 1.0 / 6 + 1.0 / 3) / (1.0 / 6), 1e-12);  // 1 and 7 belong to four cells, 3 and 5 to one
+  // 1 and 7 belong to four cells, 3 and 5 to one
+  EXPECT_NEAR(m[0] / m[1], (3 * 1.0 / 6 + 1.0 / 3) / (1.0 / 6), 1e-12);
 
   uint32_t corners[4];
   double weights[4];
@@ -162,9 +177,11 @@ TEST(Share, FaceOfACube_GetsTheConsistentLoad) {
 TEST(Nodal, Table_IsReadByFileNumbers) {
   BodyMesh mesh;
   const std::vector<uint32_t> file_point = {4, 0, 2};
-  mesh.npoint = 3, mesh.file_point = file_point.data();
+  mesh.npoint = 3;
+  mesh.file_point = file_point.data();
   const std::string path = test::scratch("nodal") + "/bc.csv";
-  test::write_file(path, "node,fixx,fixy,fixz,fx,fy,fz\n0,1,0,1,0,0,0\n4,0,0,0,1.5,-2e-1,0\n\n1,1,1,1,0,0,0\n");
+  test::write_file(path,
+                   "node,fixx,fixy,fixz,fx,fy,fz\n0,1,0,1,0,0,0\n4,0,0,0,1.5,-2e-1,0\n\n1,1,1,1,0,0,0\n");
   const std::vector<NodalRow> rows = read_nodal(path, mesh);
   ASSERT_EQ(rows.size(), 2u);  // node 1 belongs to no cell: holding it means nothing
   EXPECT_EQ(rows[0].point, 1u);
@@ -172,9 +189,11 @@ TEST(Nodal, Table_IsReadByFileNumbers) {
   EXPECT_EQ(rows[1].point, 0u);
   EXPECT_EQ(rows[1].force[1], -0.2);
   EXPECT_THROW(read_nodal(test::scratch("nodal"), mesh), dfm::Error) << "a folder";
-  for (const char *bad : {"", "node,x\n", "node,fixx,fixy,fixz,fx,fy,fz\n9,1,1,1,0,0,0\n", "node,fixx,fixy,fixz,fx,fy,fz\n0,2,1,1,0,0,0\n",
-                          "node,fixx,fixy,fixz,fx,fy,fz\n0,1,1,1,0,0,nan\n", "node,fixx,fixy,fixz,fx,fy,fz\n0,1,1,1,0,0\n",
-                          "node,fixx,fixy,fixz,fx,fy,fz\n1,0,0,0,1,0,0\n", "node,fixx,fixy,fixz,fx,fy,fz\n0.5,0,0,0,1,0,0\n"}) {
+  for (const char *bad :
+       {"", "node,x\n", "node,fixx,fixy,fixz,fx,fy,fz\n9,1,1,1,0,0,0\n",
+        "node,fixx,fixy,fixz,fx,fy,fz\n0,2,1,1,0,0,0\n", "node,fixx,fixy,fixz,fx,fy,fz\n0,1,1,1,0,0,nan\n",
+        "node,fixx,fixy,fixz,fx,fy,fz\n0,1,1,1,0,0\n", "node,fixx,fixy,fixz,fx,fy,fz\n1,0,0,0,1,0,0\n",
+        "node,fixx,fixy,fixz,fx,fy,fz\n0.5,0,0,0,1,0,0\n"}) {
     test::write_file(path, bad);
     EXPECT_THROW(read_nodal(path, mesh), dfm::Error) << bad;
   }

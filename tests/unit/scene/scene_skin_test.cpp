@@ -19,11 +19,17 @@ struct Cells {
   BodyMesh body;
   explicit Cells(dfm::TetMesh &&m) : mesh(std::move(m)) {
     body.points.assign(mesh.points.begin(), mesh.points.end());
-    body.tets = mesh.tets.data(), body.npoint = mesh.npoint(), body.ntet = mesh.ntet();
-    for (int k = 0; k < 3; ++k) body.lo[k] = INFINITY, body.hi[k] = -INFINITY;
+    body.tets = mesh.tets.data();
+    body.npoint = mesh.npoint();
+    body.ntet = mesh.ntet();
+    for (int k = 0; k < 3; ++k) {
+      body.lo[k] = INFINITY;
+      body.hi[k] = -INFINITY;
+    }
     for (size_t i = 0; i < body.points.size(); ++i) {
       const double x = body.points[i];
-      body.lo[i % 3] = std::min(body.lo[i % 3], x), body.hi[i % 3] = std::max(body.hi[i % 3], x);
+      body.lo[i % 3] = std::min(body.lo[i % 3], x);
+      body.hi[i % 3] = std::max(body.hi[i % 3], x);
     }
     body.size = std::hypot(body.hi[0] - body.lo[0], body.hi[1] - body.lo[1], body.hi[2] - body.lo[2]);
   }
@@ -33,8 +39,11 @@ struct Cells {
 double one_cell(const BodyMesh &all, uint32_t cell, const double *point) {
   const uint32_t own[4] = {0, 1, 2, 3}, *const t = all.tets + 4 * size_t(cell);
   BodyMesh one;
-  for (int k = 0; k < 4; ++k) one.points.insert(one.points.end(), &all.points[3 * size_t(t[k])], &all.points[3 * size_t(t[k])] + 3);
-  one.npoint = 4, one.tets = own, one.ntet = 1;
+  for (int k = 0; k < 4; ++k)
+    one.points.insert(one.points.end(), &all.points[3 * size_t(t[k])], &all.points[3 * size_t(t[k])] + 3);
+  one.npoint = 4;
+  one.tets = own;
+  one.ntet = 1;
   uint32_t corners[4];
   double weights[4];
   return Locator(one).find(point, corners, weights);
@@ -68,37 +77,52 @@ TEST(Locator, FindsTheCellThatASearchThroughAllFinds) {
   }
 }
 
-// A slanted triangle inside a block: what reaches the cells' points has the triangle's force, torque and nothing else.
+// A slanted triangle inside a block: what reaches the cells' points has the triangle's force, torque
+// and nothing else.
 TEST(ShareOnSkin, ForceAndTorque_AreThoseOfTheTraction) {
   Cells c(dfm::make_beam(dfm::Memory::standard(), 1, 0.5, 0.5, 300));
   Skin &skin = c.body.skin;
   const uint32_t triangles[] = {0, 1, 2, 1, 3, 2};
   skin.points = {0.1, 0.1, 0.2, 0.8, 0.15, 0.3, 0.3, 0.4, 0.45, 0.9, 0.45, 0.1};
-  skin.triangles = triangles, skin.npoint = 4, skin.ntriangle = 2;
+  skin.triangles = triangles;
+  skin.npoint = 4;
+  skin.ntriangle = 2;
   double area[2], center[2][3] = {};
   for (int t = 0; t < 2; ++t) {
     const double *p[3];
     for (int k = 0; k < 3; ++k) p[k] = &skin.points[3 * size_t(triangles[3 * t + k])];
     double u[3], v[3];
-    for (int k = 0; k < 3; ++k) u[k] = p[1][k] - p[0][k], v[k] = p[2][k] - p[0][k], center[t][k] = (p[0][k] + p[1][k] + p[2][k]) / 3;
-    area[t] = 0.5 * std::hypot(u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]);
+    for (int k = 0; k < 3; ++k) {
+      u[k] = p[1][k] - p[0][k];
+      v[k] = p[2][k] - p[0][k];
+      center[t][k] = (p[0][k] + p[1][k] + p[2][k]) / 3;
+    }
+    area[t] =
+        0.5 * std::hypot(u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]);
   }
   const Shared shared = share_on_skin({0, 1}, c.body);
   double sum = 0, middle[3] = {};
   for (size_t i = 0; i < shared.points.size(); ++i) {
     sum += shared.weights[i];
-    for (int k = 0; k < 3; ++k) middle[k] += shared.weights[i] * c.body.points[3 * size_t(shared.points[i]) + size_t(k)];
+    for (int k = 0; k < 3; ++k)
+      middle[k] += shared.weights[i] * c.body.points[3 * size_t(shared.points[i]) + size_t(k)];
   }
   EXPECT_NEAR(sum, 1, 1e-14);
-  for (int k = 0; k < 3; ++k) EXPECT_NEAR(middle[k], (area[0] * center[0][k] + area[1] * center[1][k]) / (area[0] + area[1]), 1e-14) << "where the force acts";
+  for (int k = 0; k < 3; ++k)
+    EXPECT_NEAR(middle[k], (area[0] * center[0][k] + area[1] * center[1][k]) / (area[0] + area[1]), 1e-14)
+        << "where the force acts";
 }
 
 TEST(SelectOnFilled, Box_TakesTheSurfaceInIt) {
   Cells c(dfm::make_beam(dfm::Memory::standard(), 1, 1, 1, 100));
   Skin &skin = c.body.skin;
-  skin.points = {0.3, 0.3, 0.31}, skin.npoint = 1;
+  skin.points = {0.3, 0.3, 0.31};
+  skin.npoint = 1;
   Selection where;
-  for (int k = 0; k < 3; ++k) where.lo[k] = 0.29, where.hi[k] = 0.32;
+  for (int k = 0; k < 3; ++k) {
+    where.lo[k] = 0.29;
+    where.hi[k] = 0.32;
+  }
   EXPECT_THROW(select(where, c.body, "s.json"), dfm::Error) << "no point of the cells lies there";
   c.body.filled = true;
   const std::vector<uint32_t> points = select(where, c.body, "s.json");

@@ -11,7 +11,8 @@ namespace {
 using dfm::scene::json;
 
 const json &schema() {
-  static const json tree = dfm::scene::parse_file(std::string(DEFORM_SOURCE_DIR) + "/libdeform/schema/deform-scene.schema.json");
+  static const json tree =
+      dfm::scene::parse_file(std::string(DEFORM_SOURCE_DIR) + "/libdeform/schema/deform-scene.schema.json");
   return tree;
 }
 
@@ -47,7 +48,9 @@ TEST(Schema, EveryObject_RefusesOtherKeys) {
 TEST(Schema, EveryWord_IsTheReaders) {
   for (const std::string &set : dfm::scene::word_sets()) {
     ASSERT_TRUE(schema()["$defs"].contains(set + "_word")) << set;
-    EXPECT_EQ(sorted(schema()["$defs"][set + "_word"]["enum"].get<std::vector<std::string>>()), names(dfm::scene::words_of(set))) << set;
+    EXPECT_EQ(sorted(schema()["$defs"][set + "_word"]["enum"].get<std::vector<std::string>>()),
+              names(dfm::scene::words_of(set)))
+        << set;
   }
 }
 
@@ -55,7 +58,8 @@ TEST(Schema, KeysNotDelivered_AreMarked) {
   for (const std::string &kind : dfm::scene::object_kinds()) {
     for (const auto &key : dfm::scene::keys_of(kind)) {
       const json &property = schema()["$defs"][kind]["properties"][key.name];
-      const std::string text = property.contains("description") ? property["description"].get<std::string>() : "";
+      const std::string text =
+          property.contains("description") ? property["description"].get<std::string>() : "";
       EXPECT_EQ(text.rfind("not available yet", 0) == 0, !key.delivered) << kind << "/" << key.name;
     }
   }

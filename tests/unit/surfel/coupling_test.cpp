@@ -1,5 +1,5 @@
-// N: rows that sum to one, linear fields, and what its transpose does to forces. The reference values of (3.9) and (3.12) come from
-// ../shared/reference/elasticity (phyxels: nodes of a small cylinder).
+// N: rows that sum to one, linear fields, and what its transpose does to forces. The reference values of
+// (3.9) and (3.12) come from ../shared/reference/elasticity (phyxels: nodes of a small cylinder).
 #include "surfel/coupling.h"
 
 #include <gtest/gtest.h>
@@ -18,7 +18,9 @@ using namespace dfm;
 enum Kind { kBarycentric, kMls, kThesis };
 Coupling couple(Kind kind, const CouplingInput &in) {
   const Memory &m = Memory::standard();
-  return kind == kBarycentric ? couple_barycentric(m, in) : kind == kMls ? couple_mls(m, in) : couple_thesis(m, in);
+  return kind == kBarycentric ? couple_barycentric(m, in)
+         : kind == kMls       ? couple_mls(m, in)
+                              : couple_thesis(m, in);
 }
 
 struct Case {
@@ -26,15 +28,21 @@ struct Case {
   std::vector<uint32_t> tet, tri;
   CouplingInput in(double support = 3) const {
     CouplingInput c;
-    c.npoint = uint32_t(point.size() / 3), c.ntet = uint32_t(tet.size() / 4), c.nsurfel = uint32_t(surfel.size() / 3);
-    c.point = point.data(), c.tet = tet.data(), c.surfel = surfel.data(), c.support = support;
+    c.npoint = uint32_t(point.size() / 3);
+    c.ntet = uint32_t(tet.size() / 4);
+    c.nsurfel = uint32_t(surfel.size() / 3);
+    c.point = point.data();
+    c.tet = tet.data();
+    c.surfel = surfel.data();
+    c.support = support;
     return c;
   }
   Vec3 p(uint32_t i) const { return load3(&point[3 * i]); }
   Vec3 s(uint32_t i) const { return load3(&surfel[3 * i]); }
 };
 
-// A fine sphere in a coarse ball, moved and scaled. With cells of 1 m the sphere sticks out of the faceted ball a little.
+// A fine sphere in a coarse ball, moved and scaled. With cells of 1 m the sphere sticks out of the faceted
+// ball a little.
 Case ball(double scale = 1, Vec3 shift = {}, int level = 3) {
   const double size[1] = {1};
   const TetMesh m = make_ball(Memory::standard(), size[0], 400);
@@ -70,7 +78,10 @@ double linear_error(const Case &k, const Coupling &c) {
 class Linear : public testing::TestWithParam<Kind> {};
 
 TEST_P(Linear, Rows_SumToOneAndReproduceLinearFieldsAtAnyScaleAndPlace) {
-  struct At { double scale; Vec3 shift; };
+  struct At {
+    double scale;
+    Vec3 shift;
+  };
   for (const At a : {At{1, {}}, At{1e-9, {}}, At{1e5, {}}, At{1, {1e7, -1e7, 1e7}}, At{1e-9, {0.01, 0, 0}}}) {
     const Case k = ball(a.scale, a.shift);
     const Coupling c = couple(GetParam(), k.in());
@@ -90,7 +101,8 @@ TEST_P(Linear, ScaleByAPowerOfTwo_ChangesNoBit) {
   EXPECT_EQ(home.weight, scaled.weight);
 }
 
-// Random forces at the surfels of a body that is bent and turned: force, torque about the origin and power, at the surfels and at the phyxels.
+// Random forces at the surfels of a body that is bent and turned: force, torque about the origin and power,
+// at the surfels and at the phyxels.
 TEST_P(Linear, Transpose_ConservesForceTorqueAndPowerInADeformedState) {
   const Case k = ball();
   const uint32_t np = k.in().npoint, ns = k.in().nsurfel;
@@ -103,7 +115,9 @@ TEST_P(Linear, Transpose_ConservesForceTorqueAndPowerInADeformedState) {
   Array<double> x(size_t{4} * np), v(size_t{4} * np), f(size_t{4} * np, 1.0);
   for (uint32_t i = 0; i < np; ++i) {
     const Vec3 r = k.p(i);
-    store3(&x[4 * i], rotate(test::turn({1, 2, 3}, 2), r + Vec3{0.3 * r.y * r.y, 0.2 * r.x * r.z, 0.1 * r.x}) + 0.05 * any());
+    store3(&x[4 * i],
+           rotate(test::turn({1, 2, 3}, 2), r + Vec3{0.3 * r.y * r.y, 0.2 * r.x * r.z, 0.1 * r.x}) +
+               0.05 * any());
     store3(&v[4 * i], any());
   }
   std::vector<double> load(size_t{3} * ns);
@@ -114,11 +128,17 @@ TEST_P(Linear, Transpose_ConservesForceTorqueAndPowerInADeformedState) {
   double power = 0, sum = 0, work = 0;
   for (uint32_t s = 0; s < ns; ++s) {
     const Vec3 l = load3(&load[3 * s]), at = load3(&surface.x[4 * s]), move = load3(&surface.v[4 * s]);
-    force += l, torque += cross(at, l), power += dot(move, l), sum += norm(l), work += std::fabs(dot(move, l));
+    force += l;
+    torque += cross(at, l);
+    power += dot(move, l);
+    sum += norm(l);
+    work += std::fabs(dot(move, l));
   }
   for (uint32_t i = 0; i < np; ++i) {
     const Vec3 l = load3(&f[4 * i]);
-    force -= l, torque -= cross(load3(&x[4 * i]), l), power -= dot(load3(&v[4 * i]), l);
+    force -= l;
+    torque -= cross(load3(&x[4 * i]), l);
+    power -= dot(load3(&v[4 * i]), l);
     EXPECT_EQ(f[4 * i + 3], 0.0);
   }
   EXPECT_LT(norm(force), 1e-13 * sum);
@@ -133,7 +153,8 @@ TEST_P(Linear, SameInput_SameBits) {
   EXPECT_EQ(a.weight, b.weight);
 }
 
-INSTANTIATE_TEST_SUITE_P(Coupling, Linear, testing::Values(kBarycentric, kMls), [](const auto &i) { return i.param == kMls ? "Mls" : "Barycentric"; });
+INSTANTIATE_TEST_SUITE_P(Coupling, Linear, testing::Values(kBarycentric, kMls),
+                         [](const auto &i) { return i.param == kMls ? "Mls" : "Barycentric"; });
 
 // Two cells on a common face 1 2 3.
 Case two_cells() {
@@ -195,7 +216,8 @@ TEST(Mls, ThinSheet_StaysLinear) {
     const auto at = [](int i, int j, int z) { return uint32_t(36 * z + 6 * i + j); };
     for (int i = 0; i < 5; ++i)
       for (int j = 0; j < 5; ++j)
-        for (const auto &path : {std::array{at(i + 1, j, 0), at(i + 1, j + 1, 0)}, std::array{at(i, j + 1, 0), at(i + 1, j + 1, 0)}})
+        for (const auto &path : {std::array{at(i + 1, j, 0), at(i + 1, j + 1, 0)},
+                                 std::array{at(i, j + 1, 0), at(i + 1, j + 1, 0)}})
           c.tet.insert(c.tet.end(), {at(i, j, 0), path[0], path[1], at(i + 1, j + 1, 1)});
     c.surfel = {0.23, 0.31, thick, 0.01, 0.02, 0, 0.25, 0.25, 0.5 * thick};
     const Coupling n = couple(kMls, c.in());
@@ -203,7 +225,8 @@ TEST(Mls, ThinSheet_StaysLinear) {
   }
 }
 
-// Zerbato 2010, chapter 3: Shepard weights draw the surface inwards, and lose torque and power where the linear-exact ones do not.
+// Zerbato 2010, chapter 3: Shepard weights draw the surface inwards, and lose torque and power where the
+// linear-exact ones do not.
 TEST(Thesis, Surface_ShrinksAndTorqueAndPowerAreLost) {
   const Case k = ball();
   const Coupling c = couple(kThesis, k.in());
@@ -216,11 +239,16 @@ TEST(Thesis, Surface_ShrinksAndTorqueAndPowerAreLost) {
     Vec3 y;
     for (uint32_t j = c.row[s]; j < c.row[s + 1]; ++j) y += c.weight[j] * k.p(c.col[j]);
     shrink = std::max(shrink, norm(y - x));
-    torque_in += cross(x, f).z, torque_out += cross(y, f).z;
-    power_in += dot(velocity(x), f), power_out += dot(velocity(y), f);
+    torque_in += cross(x, f).z;
+    torque_out += cross(y, f).z;
+    power_in += dot(velocity(x), f);
+    power_out += dot(velocity(y), f);
   }
   const double torque = 1 - torque_out / torque_in, power = 1 - power_out / power_in;
-  std::printf("thesis coupling, support 3: surfels off by up to %.3f of the radius, torque lost %.1f %%, power lost %.1f %%\n", shrink, 100 * torque, 100 * power);
+  std::printf(
+      "thesis coupling, support 3: surfels off by up to %.3f of the radius, torque lost %.1f %%, power lost "
+      "%.1f %%\n",
+      shrink, 100 * torque, 100 * power);
   EXPECT_GT(shrink, 0.05);
   EXPECT_GT(torque, 0.01);
   EXPECT_GT(power, 0.01);
@@ -234,7 +262,7 @@ class Reference : public testing::Test {
   std::vector<std::vector<double>> read(const std::string &name) const {
     std::vector<std::vector<double>> rows;
     for (const auto &line : test::read_csv(folder + "/" + name)) {
-      if (!line.empty() && std::isalpha(line[0][0])) continue;   // the headings
+      if (!line.empty() && std::isalpha(line[0][0])) continue;  // the headings
       rows.emplace_back();
       for (const std::string &cell : line) rows.back().push_back(std::stod(cell));
     }
@@ -243,9 +271,11 @@ class Reference : public testing::Test {
   void SetUp() override {
     if (test::shared_dir().empty()) GTEST_SKIP() << "no shared data beside the repository";
     folder = test::shared_dir() + "/reference/elasticity";
-    for (const auto &row : read("tables/mls_phyxels.csv")) k.point.insert(k.point.end(), row.begin() + 1, row.begin() + 4);
-    for (const auto &row : read("tables/mls_surfels.csv")) k.surfel.insert(k.surfel.end(), row.begin() + 1, row.begin() + 4);
-    k.tet = {0, 1, 2, 3};   // never asked: every surfel is within reach
+    for (const auto &row : read("tables/mls_phyxels.csv"))
+      k.point.insert(k.point.end(), row.begin() + 1, row.begin() + 4);
+    for (const auto &row : read("tables/mls_surfels.csv"))
+      k.surfel.insert(k.surfel.end(), row.begin() + 1, row.begin() + 4);
+    k.tet = {0, 1, 2, 3};  // never asked: every surfel is within reach
   }
   Vec3 apply(const Coupling &c, uint32_t s, const std::vector<Vec3> &u) const {
     Vec3 sum;
@@ -261,13 +291,17 @@ TEST_F(Reference, QuadraticField_BothCouplings) {
   for (const auto &row : read("fields/mls_elastic_u.csv")) u.push_back({row[1], row[2], row[3]});
   ASSERT_EQ(u.size(), k.in().npoint);
   // mls_elastic_u is quadratic + linear; so is the sum of the two surfel tables
-  const auto linear = read("fields/mls_linear_surfel_u.csv"), quadratic = read("fields/mls_quadratic_surfel_u.csv");
+  const auto linear = read("fields/mls_linear_surfel_u.csv");
+  const auto quadratic = read("fields/mls_quadratic_surfel_u.csv");
   double worst = 0, worst_thesis = 0, top = 0;
   for (uint32_t s = 0; s < k.in().nsurfel; ++s) {
-    const auto at3 = [](const std::vector<double> &row, size_t at) { return Vec3{row[at], row[at + 1], row[at + 2]}; };
+    const auto at3 = [](const std::vector<double> &row, size_t at) {
+      return Vec3{row[at], row[at + 1], row[at + 2]};
+    };
     const auto sum = [&](size_t at) { return at3(linear[s], at) + at3(quadratic[s], at); };
     top = std::max(top, norm(sum(4)));
-    worst = std::max(worst, norm(apply(mls, s, u) - sum(4))), worst_thesis = std::max(worst_thesis, norm(apply(thesis, s, u) - sum(1)));
+    worst = std::max(worst, norm(apply(mls, s, u) - sum(4)));
+    worst_thesis = std::max(worst_thesis, norm(apply(thesis, s, u) - sum(1)));
   }
   EXPECT_LT(worst, 1e-11 * top);
   EXPECT_LT(worst_thesis, 1e-11 * top);
@@ -276,14 +310,17 @@ TEST_F(Reference, QuadraticField_BothCouplings) {
 TEST_F(Reference, TransposedForces_MatchAndLiteralSpreadingIsAnotherThing) {
   const Coupling mls = couple(kMls, k.in());
   for (const char *name : {"random", "torsion", "single_surfel", "uniform_down"}) {
-    const auto in = read(std::string("fields/mls_force_") + name + "_in.csv"), out = read(std::string("fields/mls_force_transpose_") + name + ".csv");
+    const auto in = read(std::string("fields/mls_force_") + name + "_in.csv");
+    const auto out = read(std::string("fields/mls_force_transpose_") + name + ".csv");
     std::vector<Vec3> f(k.in().npoint);
     for (uint32_t s = 0; s < k.in().nsurfel; ++s)
-      for (uint32_t j = mls.row[s]; j < mls.row[s + 1]; ++j) f[mls.col[j]] += mls.weight[j] * Vec3{in[s][1], in[s][2], in[s][3]};
+      for (uint32_t j = mls.row[s]; j < mls.row[s + 1]; ++j)
+        f[mls.col[j]] += mls.weight[j] * Vec3{in[s][1], in[s][2], in[s][3]};
     double worst = 0, top = 0;
     for (uint32_t i = 0; i < f.size(); ++i) {
       const Vec3 want{out[i][1], out[i][2], out[i][3]};
-      worst = std::max(worst, norm(f[i] - want)), top = std::max(top, norm(want));
+      worst = std::max(worst, norm(f[i] - want));
+      top = std::max(top, norm(want));
     }
     EXPECT_LT(worst, 1e-11 * top) << name;
   }
@@ -294,10 +331,13 @@ TEST(Gather, WeightsOfAPlainRow_ComeBackToTheBit) {
   const TetMesh m = make_ball(Memory::standard(), 1, 400);
   const auto boundary = boundary_triangles(Memory::standard(), m.ntet(), m.tets.data());
   Surface identity, coupled;
-  make_surface(Memory::standard(), m.npoint(), m.points.data(), boundary.data(), uint32_t(boundary.size() / 3), identity);
+  make_surface(Memory::standard(), m.npoint(), m.points.data(), boundary.data(),
+               uint32_t(boundary.size() / 3), identity);
   Case k;
-  k.point.assign(m.points.begin(), m.points.end()), k.tet.assign(m.tets.begin(), m.tets.end());
-  for (const uint32_t p : identity.point) k.surfel.insert(k.surfel.end(), &m.points[3 * p], &m.points[3 * p] + 3);
+  k.point.assign(m.points.begin(), m.points.end());
+  k.tet.assign(m.tets.begin(), m.tets.end());
+  for (const uint32_t p : identity.point)
+    k.surfel.insert(k.surfel.end(), &m.points[3 * p], &m.points[3 * p] + 3);
   const Coupling c = couple(kBarycentric, k.in());
   EXPECT_EQ(c.col, identity.point);
   EXPECT_EQ(c.weight, Array<double>(identity.nsurfel, 1.0));

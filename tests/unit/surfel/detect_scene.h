@@ -89,7 +89,8 @@ inline Mesh sphere_mesh(double radius, int level) {
   return w.mesh;
 }
 
-// Closed cylinder along y around the origin; n sides (points by the chord, no transcendental accuracy needed).
+// Closed cylinder along y around the origin; n sides (points by the chord, no transcendental
+// accuracy needed).
 inline Mesh cylinder_mesh(double radius, double length, int n, int m) {
   Welder w;
   const auto at = [&](int i, double y) {
@@ -148,8 +149,11 @@ struct Scene {
     ObstacleView o{};
     o.slot = uint32_t(obstacles.size());
     o.id = 100 + obstacles.size();
-    o.category = 1, o.collides_with = ~0u;
-    o.shape = shape, o.position = position, o.rotation = rotation;
+    o.category = 1;
+    o.collides_with = ~0u;
+    o.shape = shape;
+    o.position = position;
+    o.rotation = rotation;
     obstacles.push_back(o);
     return obstacles.back();
   }
@@ -171,7 +175,8 @@ struct Scene {
       }
       for (const ObstacleView &o : obstacles) {
         if (!filter.may_touch(a, o)) continue;
-        const uint32_t count[3] = {s.nsurfel, o.shape == Shape::plane ? 0 : s.nedge, o.shape == Shape::plane ? 0 : s.ntri};
+        const uint32_t count[3] = {s.nsurfel, o.shape == Shape::plane ? 0 : s.nedge,
+                                   o.shape == Shape::plane ? 0 : s.ntri};
         for (uint8_t k = 0; k < 3; ++k)
           for (uint32_t i = 0; i < count[k]; ++i) c.push_back({a.slot, o.slot, i, 0, k, 1});
       }
@@ -194,7 +199,8 @@ struct Scene {
 };
 
 inline bool same_bits(const Array<ContactPoint> &a, const Array<ContactPoint> &b) {
-  return a.size() == b.size() && (a.empty() || std::memcmp(a.data(), b.data(), a.size() * sizeof(ContactPoint)) == 0);
+  return a.size() == b.size() &&
+         (a.empty() || std::memcmp(a.data(), b.data(), a.size() * sizeof(ContactPoint)) == 0);
 }
 
 // What every set of contacts must satisfy; empty if it does.
@@ -206,7 +212,8 @@ inline std::string flaw(const Scene &scene, const Array<ContactPoint> &contacts)
     for (uint32_t s = 0; s < b.surface->nsurfel; ++s) at.push_back(load3(&b.surface->x[4 * s]));
   const auto order = [&](const ContactPoint &c) {
     const uint64_t id_b = c.obstacle ? scene.obstacles[c.slot_b].id : scene.bodies[c.slot_b].id;
-    return std::array<uint64_t, 7>{scene.bodies[c.slot_a].id, c.obstacle, id_b, c.kind, c.type_a, c.feature_a, c.feature_b};
+    return std::array<uint64_t, 7>{
+        scene.bodies[c.slot_a].id, c.obstacle, id_b, c.kind, c.type_a, c.feature_a, c.feature_b};
   };
   for (size_t i = 0; i < contacts.size(); ++i) {
     const ContactPoint &c = contacts[i];
@@ -214,7 +221,8 @@ inline std::string flaw(const Scene &scene, const Array<ContactPoint> &contacts)
     if (i && !(order(contacts[i - 1]) < order(c))) return which + "out of order";
     keys.push_back(c.key);
     if (std::fabs(norm(load3(c.normal)) - 1) > 1e-12) return which + "normal is not a unit vector";
-    if (!std::isfinite(c.distance) || !(c.area >= 0) || c.nnode < 1 || c.nnode > 4) return which + "not finite, or bad counts";
+    if (!std::isfinite(c.distance) || !(c.area >= 0) || c.nnode < 1 || c.nnode > 4)
+      return which + "not finite, or bad counts";
     double sum[2] = {0, 0};
     Vec3 side[2];
     for (int k = 0; k < c.nnode; ++k) {
@@ -223,9 +231,11 @@ inline std::string flaw(const Scene &scene, const Array<ContactPoint> &contacts)
       sum[s] += c.weight[k];
       side[s] += c.weight[k] * at[c.node[k]];
       // An edge may count as up to a quarter longer for what slides in over its ends.
-      if (s == 0 && !(c.weight[k] > (c.kind == kEdgeEdge || (c.obstacle && c.type_a == 1) ? -0.25 : 0.0))) return which + "weight of side a is out of range";
+      if (s == 0 && !(c.weight[k] > (c.kind == kEdgeEdge || (c.obstacle && c.type_a == 1) ? -0.25 : 0.0)))
+        return which + "weight of side a is out of range";
     }
-    if (std::fabs(sum[0] - 1) > 1e-12 || std::fabs(sum[1] + (c.obstacle ? 0 : 1)) > 1e-12) return which + "weights do not sum to one";
+    if (std::fabs(sum[0] - 1) > 1e-12 || std::fabs(sum[1] + (c.obstacle ? 0 : 1)) > 1e-12)
+      return which + "weights do not sum to one";
     // No torque: the two points where the force acts lie on the line of the normal.
     if (!c.obstacle) {
       const Vec3 r = side[0] + side[1] - c.distance * load3(c.normal);

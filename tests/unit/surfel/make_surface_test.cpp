@@ -26,12 +26,13 @@ TEST(MakeSurface, ClosedMeshes_ObeyEulerAndShareEdgesInPairs) {
       const uint32_t i = s.edge[2 * e], j = s.edge[2 * e + 1];
       EXPECT_LT(i, j);
       EXPECT_TRUE(e == 0 || std::make_pair(s.edge[2 * e - 2], s.edge[2 * e - 1]) < std::make_pair(i, j));
-      for (int k = 0; k < 2; ++k) {                    // first face has it as i to j, second as j to i
+      for (int k = 0; k < 2; ++k) {  // first face has it as i to j, second as j to i
         const uint32_t t = s.edge_tri[2 * e + k];
         ASSERT_NE(t, kNone);
         bool found = false;
         for (int c = 0; c < 3; ++c)
-          found |= s.tri_edge[3 * t + c] == e && s.tri[3 * t + c] == (k ? j : i) && s.tri[3 * t + (c + 1) % 3] == (k ? i : j);
+          found |= s.tri_edge[3 * t + c] == e && s.tri[3 * t + c] == (k ? j : i) &&
+                   s.tri[3 * t + (c + 1) % 3] == (k ? i : j);
         EXPECT_TRUE(found);
       }
     }
@@ -91,12 +92,13 @@ TEST(MakeSurface, UnusedPoints_AreNoSurfels) {
 }
 
 TEST(MakeSurface, OpenAndNonManifoldInput_IsKept) {
-  Mesh m;                                              // three triangles on one edge, and a border everywhere else
+  // three triangles on one edge, and a border everywhere else
+  Mesh m;
   for (const Vec3 p : {Vec3{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, -1, 0}, {0, 0, 1}}) m.add(p);
   m.tri = {0, 1, 2, 1, 0, 3, 0, 1, 4};
   const Surface s = surface_of(m);
   EXPECT_EQ(s.nedge, 7u);
-  EXPECT_EQ(s.edge_tri[0], 0u);                        // edge 0-1: the lowest of each direction
+  EXPECT_EQ(s.edge_tri[0], 0u);  // edge 0-1: the lowest of each direction
   EXPECT_EQ(s.edge_tri[1], 1u);
   EXPECT_EQ(s.tri_edge[6], 0u);
   EXPECT_EQ(surface_of(Mesh{}).ntri, 0u);
@@ -124,7 +126,10 @@ TEST(Closest, Triangle_BeatsSampledPoints) {
   std::normal_distribution<double> normal;
   const auto any = [&] { return Vec3{normal(random), normal(random), normal(random)}; };
   for (int i = 0; i < 300; ++i) {
-    const Vec3 a = any(), b = i % 5 ? any() : a + 1e-6 * any(), c = i % 7 ? any() : a + 0.5 * (b - a) + 1e-9 * any(), p = 2.0 * any();
+    const Vec3 a = any();
+    const Vec3 b = i % 5 ? any() : a + 1e-6 * any();
+    const Vec3 c = i % 7 ? any() : a + 0.5 * (b - a) + 1e-9 * any();
+    const Vec3 p = 2.0 * any();
     const TrianglePoint q = closest_on_triangle(p, a, b, c);
     EXPECT_NEAR(q.weight[0] + q.weight[1] + q.weight[2], 1, 1e-14);
     for (const double w : q.weight) EXPECT_GE(w, 0);
@@ -132,11 +137,13 @@ TEST(Closest, Triangle_BeatsSampledPoints) {
     EXPECT_NEAR(norm2(p - q.point), q.distance2, 1e-14 * (1 + q.distance2));
     double least = 1e9;
     for (int u = 0; u <= 40; ++u)
-      for (int v = 0; u + v <= 40; ++v) least = std::min(least, norm(p - (u / 40.0) * b - (v / 40.0) * c - ((40 - u - v) / 40.0) * a));
+      for (int v = 0; u + v <= 40; ++v)
+        least = std::min(least, norm(p - (u / 40.0) * b - (v / 40.0) * c - ((40 - u - v) / 40.0) * a));
     EXPECT_LE(std::sqrt(q.distance2), least + 1e-12);
     EXPECT_GE(std::sqrt(q.distance2), least - 0.1 * std::max({norm(b - a), norm(c - a), norm(c - b)}));
     // Optimal: no corner lies beyond the plane through q orthogonal to p - q.
-    for (const Vec3 x : {a, b, c}) EXPECT_LE(dot(p - q.point, x - q.point), 1e-12 * (1 + norm(p)) * (1 + norm(x)));
+    for (const Vec3 x : {a, b, c})
+      EXPECT_LE(dot(p - q.point, x - q.point), 1e-12 * (1 + norm(p)) * (1 + norm(x)));
     EXPECT_TRUE(triangle_within(p, a, b, c, std::sqrt(q.distance2) * (1 + 1e-12)));
     EXPECT_FALSE(triangle_within(p, a, b, c, std::sqrt(q.distance2) * (1 - 1e-12)));
   }
@@ -160,7 +167,7 @@ TEST(Closest, Segments_AreOptimal) {
   const auto any = [&] { return Vec3{normal(random), normal(random), normal(random)}; };
   for (int i = 0; i < 500; ++i) {
     const Vec3 p0 = any(), p1 = i % 11 ? any() : p0, q0 = any();
-    const Vec3 q1 = i % 5 == 0 ? q0 + (p1 - p0) : i % 7 == 0 ? q0 : any();   // parallel; points
+    const Vec3 q1 = i % 5 == 0 ? q0 + (p1 - p0) : i % 7 == 0 ? q0 : any();  // parallel; points
     const SegmentPoints q = closest_segments(p0, p1, q0, q1);
     EXPECT_TRUE(q.s >= 0 && q.s <= 1 && q.t >= 0 && q.t <= 1);
     double least = 1e9;
@@ -196,7 +203,8 @@ TEST(ObstacleShape, Closest_MatchesSampledSurface) {
     o.position = any();
     o.rotation = turn(any(), 2);
     o.half_size = {0.5, 0.3, 0.8};
-    o.radius = 0.4, o.half_length = 0.6;
+    o.radius = 0.4;
+    o.half_length = 0.6;
     const ObstacleShape shape(o);
     std::vector<Vec3> surface;
     for (int i = 0; i < 60000; ++i) {
@@ -206,8 +214,9 @@ TEST(ObstacleShape, Closest_MatchesSampledSurface) {
         p[i % 3] = (i & 1 ? 1 : -1) * o.half_size[i % 3];
       } else {
         p = o.radius * normalized(any());
-        if (kind == Shape::capsule) p = i % 2 ? p + Vec3{0, 0, (p.z > 0 ? 1 : -1) * o.half_length}
-                                             : o.radius * normalized({p.x, p.y, 0}) + Vec3{0, 0, o.half_length * unit(random)};
+        if (kind == Shape::capsule)
+          p = i % 2 ? p + Vec3{0, 0, (p.z > 0 ? 1 : -1) * o.half_length}
+                    : o.radius * normalized({p.x, p.y, 0}) + Vec3{0, 0, o.half_length * unit(random)};
       }
       surface.push_back(o.position + rotate(o.rotation, p));
     }
@@ -222,8 +231,10 @@ TEST(ObstacleShape, Closest_MatchesSampledSurface) {
       EXPECT_LT(norm(q.point + q.distance * q.normal - p), 1e-12);
       const Vec3 local = rotate_back(o.rotation, p - o.position);
       bool inside = norm(local) < o.radius;
-      if (kind == Shape::box) inside = std::fabs(local.x) < 0.5 && std::fabs(local.y) < 0.3 && std::fabs(local.z) < 0.8;
-      if (kind == Shape::capsule) inside = norm(local - Vec3{0, 0, std::clamp(local.z, -0.6, 0.6)}) < o.radius;
+      if (kind == Shape::box)
+        inside = std::fabs(local.x) < 0.5 && std::fabs(local.y) < 0.3 && std::fabs(local.z) < 0.8;
+      if (kind == Shape::capsule)
+        inside = norm(local - Vec3{0, 0, std::clamp(local.z, -0.6, 0.6)}) < o.radius;
       EXPECT_EQ(q.distance < 0, inside);
     }
   }
@@ -233,7 +244,9 @@ TEST(ObstacleShape, CentresOfSymmetry_GiveUnitNormals) {
   for (const Shape kind : {Shape::sphere, Shape::box, Shape::capsule}) {
     ObstacleView o{};
     o.shape = kind;
-    o.half_size = {0.5, 0.5, 0.5}, o.radius = 0.5, o.half_length = 0.2;
+    o.half_size = {0.5, 0.5, 0.5};
+    o.radius = 0.5;
+    o.half_length = 0.2;
     const ObstaclePoint q = ObstacleShape(o).closest({0, 0, 0});
     EXPECT_NEAR(norm(q.normal), 1, 1e-15);
     EXPECT_DOUBLE_EQ(q.distance, -0.5);
@@ -252,7 +265,8 @@ TEST(ObstacleShape, BoxEdges_JoinNeighbouringCorners) {
     shape.edge(e, a, b, f);
     EXPECT_DOUBLE_EQ(norm(b - a), 2 * o.half_size[int(e / 4)]);
     for (const uint32_t face : f)
-      for (const Vec3 p : {a, b}) EXPECT_DOUBLE_EQ(dot(shape.face_normal(face), p), o.half_size[int(face / 2)]);
+      for (const Vec3 p : {a, b})
+        EXPECT_DOUBLE_EQ(dot(shape.face_normal(face), p), o.half_size[int(face / 2)]);
     EXPECT_TRUE(seen.insert({a.x, a.y, a.z, b.x, b.y, b.z}).second);
   }
 }

@@ -10,17 +10,24 @@ namespace {
 using namespace dfm;
 using namespace test;
 
-VoxelGrid grid_of(const Mesh &m, uint32_t cells) { return VoxelGrid(Memory::standard(), m.x.data(), m.ntri(), m.tri.data(), cells); }
+VoxelGrid grid_of(const Mesh &m, uint32_t cells) {
+  return VoxelGrid(Memory::standard(), m.x.data(), m.ntri(), m.tri.data(), cells);
+}
 
 // Distance to the triangles, with the sign of the shape that they are made from.
 double true_distance(const Mesh &m, Vec3 p, bool inside) {
   double d2 = INFINITY;
   for (uint32_t t = 0; t < m.ntri(); ++t)
-    d2 = std::min(d2, closest_on_triangle(p, m.at(m.tri[3 * t]), m.at(m.tri[3 * t + 1]), m.at(m.tri[3 * t + 2])).distance2);
+    d2 = std::min(
+        d2,
+        closest_on_triangle(p, m.at(m.tri[3 * t]), m.at(m.tri[3 * t + 1]), m.at(m.tri[3 * t + 2])).distance2);
   return inside ? -std::sqrt(d2) : std::sqrt(d2);
 }
 
-struct Errors { double near = 0, far = 0, tilt = 0; uint32_t wrong_side = 0; };
+struct Errors {
+  double near = 0, far = 0, tilt = 0;
+  uint32_t wrong_side = 0;
+};
 
 // Against the true distance at places in and around the box; near: within two cells of the surface.
 template <class Inside>
@@ -48,16 +55,18 @@ bool in_cube(Vec3 p) {
 
 }  // namespace
 
-// Smooth walls: the error falls with the square of the cell. Rims and corners are rounded off by a share of a cell.
+// Smooth walls: the error falls with the square of the cell. Rims and corners are rounded off by a
+// share of a cell.
 TEST(VoxelGrid, Distance_IsTrueToAShareOfACell) {
   const Mesh ball = sphere_mesh(0.5, 4), box = cube();
   double last = INFINITY;
   for (const uint32_t cells : {1000u, 8000u}) {
     const VoxelGrid g = grid_of(ball, cells);
-    const Errors e = errors_of(ball, g, [&](Vec3 p) { return g.at(p).distance < 0 ? norm(p) < 0.52 : norm(p) < 0.48; });
+    const Errors e =
+        errors_of(ball, g, [&](Vec3 p) { return g.at(p).distance < 0 ? norm(p) < 0.52 : norm(p) < 0.48; });
     EXPECT_EQ(e.wrong_side, 0u);
-    // An eighth of the cell's square times the distance's second derivatives, 2 / r, on the smallest of the spheres that count; and an eighth of the
-    // cell times the fold between facets.
+    // An eighth of the cell's square times the distance's second derivatives, 2 / r, on the smallest of the
+    // spheres that count; and an eighth of the cell times the fold between facets.
     const double bound = g.cell() * g.cell() / 4 / (0.5 - 2 * g.cell()) + 0.1 * g.cell() / 8;
     EXPECT_LT(e.near, bound) << cells;
     EXPECT_LT(e.near, last / 2.5) << "half the cell, a quarter of the error, but for facets";
@@ -80,7 +89,7 @@ TEST(VoxelGrid, FlatWall_IsExact) {
   for (double x = -0.2; x <= 0.2; x += 0.04)
     for (double z = 0.26; z < 0.36; z += 0.01) {
       const VoxelGrid::Value v = g.at(rotate(q, {x, 0.3 * x, z}) + Vec3{0.1, 0.2, 0.3});
-      EXPECT_NEAR(v.distance, z - 0.3, 1e-7);                      // floats
+      EXPECT_NEAR(v.distance, z - 0.3, 1e-7);  // floats
       EXPECT_LT(norm(v.gradient - rotate(q, {0, 0, 1})), 1e-5);
     }
 }
@@ -111,7 +120,8 @@ TEST(VoxelGrid, Near_NeverMissesWhatMayCome) {
   EXPECT_GT(refused, 20000);
 }
 
-// Beside the grid the distance is what is certain: never more than the truth, never a contact that is not there.
+// Beside the grid the distance is what is certain: never more than the truth, never a contact
+// that is not there.
 TEST(VoxelGrid, Outside_UnderestimatesAndGrows) {
   const Mesh box = cube();
   const VoxelGrid g = grid_of(box, 4000);

@@ -1,4 +1,5 @@
-// What changes while a world runs, and what prepare() makes anew for it: values need neither tables nor, as long as the same stages are called for, a plan.
+// What changes while a world runs, and what prepare() makes anew for it: values need neither tables nor, as
+// long as the same stages are called for, a plan.
 #include <functional>
 
 #include "inside.h"
@@ -14,7 +15,9 @@ struct Made {
   uint64_t tables, plans;
   bool operator==(const Made &) const = default;
 };
-std::ostream &operator<<(std::ostream &out, const Made &m) { return out << m.tables << " tables, " << m.plans << " plans"; }
+std::ostream &operator<<(std::ostream &out, const Made &m) {
+  return out << m.tables << " tables, " << m.plans << " plans";
+}
 
 struct Running {
   test::Context c;
@@ -76,7 +79,9 @@ TEST(Changes, OfALoadThatVaries_MakeThePlanOnceWhereTheMotionStageComesOrGoes) {
   EXPECT_EQ(r.after([&] {
     test::ok(dfm_body_remove_load(r.stack.upper, load));
     load = r.push(0.2, 2, keys);
-  }), kNothing) << "replaced within a frame: loads vary as before";
+  }),
+            kNothing)
+      << "replaced within a frame: loads vary as before";
   EXPECT_EQ(r.after([&] { test::ok(dfm_body_remove_load(r.stack.upper, load)); }), kPlan);
 }
 
@@ -92,8 +97,10 @@ TEST(Changes, OfSpringsAndHeldPoints_MakeThePlanForTheFirstOnly) {
 
   const dfm_sine sway{{1e-4, 0, 0}, 20, 0};
   test::ok(dfm_body_hold(r.stack.lower, 1, &first, 7));
-  EXPECT_EQ(r.after([&] { test::ok(dfm_body_move_held(r.stack.lower, 1, &first, 0, nullptr, &sway)); }), kPlan);
-  EXPECT_EQ(r.after([&] { test::ok(dfm_body_move_held(r.stack.lower, 1, &first, 0, nullptr, &sway)); }), kNothing);
+  EXPECT_EQ(r.after([&] { test::ok(dfm_body_move_held(r.stack.lower, 1, &first, 0, nullptr, &sway)); }),
+            kPlan);
+  EXPECT_EQ(r.after([&] { test::ok(dfm_body_move_held(r.stack.lower, 1, &first, 0, nullptr, &sway)); }),
+            kNothing);
 }
 
 TEST(Changes, OfGravityPosesAndParameters_MakeNoTableAndNoPlan) {
@@ -103,9 +110,12 @@ TEST(Changes, OfGravityPosesAndParameters_MakeNoTableAndNoPlan) {
   EXPECT_EQ(inside(r.stack.world).gravity.z, -5);
 
   dfm_obstacle_def d = dfm_obstacle_def_default();
-  d.name = "jaw", d.shape = DFM_SHAPE_BOX, d.pose.position[0] = 3;
+  d.name = "jaw";
+  d.shape = DFM_SHAPE_BOX;
+  d.pose.position[0] = 3;
   dfm_obstacle jaw = 0;
-  EXPECT_EQ(r.after([&] { test::ok(dfm_obstacle_create(r.stack.world, &d, &jaw)); }), kAll) << "somebody new is no value";
+  EXPECT_EQ(r.after([&] { test::ok(dfm_obstacle_create(r.stack.world, &d, &jaw)); }), kAll)
+      << "somebody new is no value";
   d.pose.position[0] = 3.00001;
   EXPECT_EQ(r.after([&] { test::ok(dfm_obstacle_move_to(jaw, &d.pose)); }), kNothing);
 
@@ -147,9 +157,11 @@ TEST(Changes, OfValues_LeadToTheSameStateAsMakingAllAnew) {
       test::ok(dfm_body_remove_load(r.stack.upper, load));
       load = r.push(1e-3 * i);
     };
-    change(a, load_a), change(b, load_b);
+    change(a, load_a);
+    change(b, load_b);
     inside(b.stack.world).changed = true;
-    a.step(), b.step();
+    a.step();
+    b.step();
     ASSERT_EQ(dfm_world_hash(a.stack.world), dfm_world_hash(b.stack.world)) << i;
   }
   EXPECT_LT(a.made().tables, 3u);
@@ -168,12 +180,14 @@ TEST(Changes, OfACoefficient_MakeNothingAndKeepTheLaw) {
 TEST(Changes, OfARuleThatSharesItsLaw_MakeTheTablesOnce) {
   Running r;
   EXPECT_EQ(r.after([&] { r.add_friction(0.5, "lower", "floor"); }), kAll);
-  EXPECT_EQ(r.after([&] { r.friction(0.6, "floor", "lower"); }), kAll) << "shared with the rule for all: a law of its own, once";
+  EXPECT_EQ(r.after([&] { r.friction(0.6, "floor", "lower"); }), kAll)
+      << "shared with the rule for all: a law of its own, once";
   for (int i = 0; i < 5; ++i) {
     EXPECT_EQ(r.after([&] { r.friction(0.6 + 0.01 * i, "lower", "floor"); }), kNothing);
     EXPECT_EQ(r.after([&] { r.friction(0.5 + 0.01 * i); }), kNothing);
   }
-  EXPECT_EQ(r.after([&] { r.add_friction(0.7, "lower", "floor"); }), kNothing) << "moved behind the others, which weigh less";
+  EXPECT_EQ(r.after([&] { r.add_friction(0.7, "lower", "floor"); }), kNothing)
+      << "moved behind the others, which weigh less";
 }
 
 // Of rules that weigh the same the last given wins: given again, the first one may hold elsewhere.

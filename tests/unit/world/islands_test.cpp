@@ -11,7 +11,8 @@ using dfm::Islands;
 
 std::vector<std::vector<uint32_t>> sets(const Islands &x) {
   std::vector<std::vector<uint32_t>> out;
-  for (uint32_t k = 0; k < x.count; ++k) out.emplace_back(x.member.begin() + x.begin[k], x.member.begin() + x.begin[k + 1]);
+  for (uint32_t k = 0; k < x.count; ++k)
+    out.emplace_back(x.member.begin() + x.begin[k], x.member.begin() + x.begin[k + 1]);
   return out;
 }
 
@@ -19,9 +20,11 @@ std::vector<std::vector<uint32_t>> sets(const Islands &x) {
 
 TEST(Islands, WithoutPairs_EveryThingIsOne) {
   Islands x(dfm::Memory::standard());
-  x.start(3), x.finish();
+  x.start(3);
+  x.finish();
   EXPECT_EQ(sets(x), (std::vector<std::vector<uint32_t>>{{0}, {1}, {2}}));
-  x.start(0), x.finish();
+  x.start(0);
+  x.finish();
   EXPECT_EQ(x.count, 0u);
 }
 
@@ -35,7 +38,8 @@ TEST(Islands, ThatJoinThroughOthers_AreOrderedByTheirLowestMember) {
   EXPECT_EQ(std::vector<uint32_t>(x.of.begin(), x.of.end()), (std::vector<uint32_t>{0, 1, 2, 0, 0, 0, 1, 1}));
 }
 
-// Against plain spreading of the lowest number along the pairs; any order of the pairs gives the same columns.
+// Against plain spreading of the lowest number along the pairs; any order of the pairs gives
+// the same columns.
 TEST(Islands, OfRandomPairs_AreTheConnectedComponentsInAnyOrder) {
   std::mt19937 random(5);
   for (int round = 0; round < 200; ++round) {
@@ -47,14 +51,19 @@ TEST(Islands, OfRandomPairs_AreTheConnectedComponentsInAnyOrder) {
     for (bool again = true; again;) {
       again = false;
       for (auto [a, b] : pairs)
-        if (lowest[a] != lowest[b]) lowest[a] = lowest[b] = std::min(lowest[a], lowest[b]), again = true;
+        if (lowest[a] != lowest[b]) {
+          lowest[a] = lowest[b] = std::min(lowest[a], lowest[b]);
+          again = true;
+        }
     }
     Islands x(dfm::Memory::standard()), y(dfm::Memory::standard());
-    x.start(n), y.start(n);
+    x.start(n);
+    y.start(n);
     for (auto [a, b] : pairs) x.join(a, b);
     std::shuffle(pairs.begin(), pairs.end(), random);
     for (auto [a, b] : pairs) y.join(b, a);
-    x.finish(), y.finish();
+    x.finish();
+    y.finish();
     for (uint32_t i = 0; i < n; ++i) ASSERT_EQ(x.member[x.begin[x.of[i]]], lowest[i]);
     ASSERT_EQ(sets(x), sets(y));
   }

@@ -1,5 +1,6 @@
-// Snapshots that are damaged or forged: whatever the bytes, a restore refuses them whole with a sentence and leaves the world as it was, or takes them and
-// the world can go on. Forged ones carry a checksum that holds, so that every check behind it is met.
+// Snapshots that are damaged or forged: whatever the bytes, a restore refuses them whole with a sentence and
+// leaves the world as it was, or takes them and the world can go on. Forged ones carry a checksum that holds,
+// so that every check behind it is met.
 #include <cstring>
 #include <limits>
 #include <random>
@@ -14,22 +15,32 @@ namespace {
 
 using Bytes = std::vector<unsigned char>;
 
-// Something of everything that a snapshot holds, and at a time at which one island sleeps and another does not.
+// Something of everything that a snapshot holds, and at a time at which one island sleeps and
+// another does not.
 dfm_world build(dfm_context *c) {
   dfm_world_def d = dfm_world_def_default();
-  d.sleep = 1, d.sleep_speed = 0.5, d.sleep_time = 4e-3;
+  d.sleep = 1;
+  d.sleep_speed = 0.5;
+  d.sleep_time = 4e-3;
   dfm_world w = 0;
   test::ok(dfm_world_create(c, &d, &w));
   test::ok(dfm_plugin_register_static(c, dfm_plugin_entry_bristle, "bristle"));
   test::add_plane(w, "floor");
   test::set_friction(w, 0.5, "test.bristle");
   test::BodyOptions o;
-  o.young = 2e5, o.damping_stiffness = 2e-3, o.damping_mass = 20;
-  o.name = "sleeper", o.position = {2, 0, 4e-5};
+  o.young = 2e5;
+  o.damping_stiffness = 2e-3;
+  o.damping_mass = 20;
+  o.name = "sleeper";
+  o.position = {2, 0, 4e-5};
   test::make_body(c, w, "beam", {0.1, 0.1, 0.1}, 10, o);
-  o.name = "lower", o.position = {0, 0, 4e-5};
+  o.name = "lower";
+  o.position = {0, 0, 4e-5};
   const dfm_body lower = test::make_body(c, w, "beam", {0.1, 0.1, 0.1}, 10, o);
-  o.name = "upper", o.position = {0.013, 0.007, 0.1001}, o.velocity = {0.3, 0, 0}, o.spin = {0, 0, 10};
+  o.name = "upper";
+  o.position = {0.013, 0.007, 0.1001};
+  o.velocity = {0.3, 0, 0};
+  o.spin = {0, 0, 10};
   const dfm_body upper = test::make_body(c, w, "beam", {0.1, 0.1, 0.1}, 10, o);
   const uint32_t pushed[] = {3, 5}, held[] = {0, 1};
   const double force[] = {0.1, 0, 0, 0, 0.1, 0};
@@ -42,13 +53,19 @@ dfm_world build(dfm_context *c) {
   const dfm_spring_def spring{sizeof spring, 2, pushed, nullptr, {0, 0, 0.3}, ends, 2, 0, 3, 0.1};
   test::ok(dfm_body_add_spring(upper, &spring, nullptr));
   dfm_obstacle_def jaw = dfm_obstacle_def_default();
-  const dfm_pose_key keys[] = {{0, {{-1, 0.05, 0.15}, {0, 0, 0, 1}}}, {1, {{-0.9, 0.05, 0.15}, {0, 0, 0.1, 1}}}};
-  jaw.name = "jaw", jaw.shape = DFM_SHAPE_BOX, jaw.nkey = 2, jaw.keys = keys;
+  const dfm_pose_key keys[] = {{0, {{-1, 0.05, 0.15}, {0, 0, 0, 1}}},
+                               {1, {{-0.9, 0.05, 0.15}, {0, 0, 0.1, 1}}}};
+  jaw.name = "jaw";
+  jaw.shape = DFM_SHAPE_BOX;
+  jaw.nkey = 2;
+  jaw.keys = keys;
   for (double &size : jaw.half_size) size = 0.1;
   dfm_obstacle obstacle = 0;
   test::ok(dfm_obstacle_create(w, &jaw, &obstacle));
   dfm_joint_def hinge = test::joint(DFM_JOINT_HINGE, 0, DFM_RIGID_WORLD, {5, 0, 1}, {0, 1, 0});
-  hinge.motor = 1, hinge.velocity = -2, hinge.max = 5;
+  hinge.motor = 1;
+  hinge.velocity = -2;
+  hinge.max = 5;
   test::create(w, {test::box("arm", {0.2, 0.02, 0.02}, 0.5, {5.1, 0, 1})}, {hinge});
   test::ok(dfm_world_filter_pair(w, "upper", "jaw", false));
   for (int i = 0; i < 60; ++i) test::ok(dfm_world_step(w, 5e-4, nullptr));
@@ -81,12 +98,15 @@ void use(dfm_world w) {
   test::contacts(w);
   dfm_world_hash(w);
   const dfm_status s = dfm_world_step(w, 1e-4, &trouble);
-  EXPECT_TRUE(s == DFM_OK || s == DFM_E_DIVERGED || s == DFM_DISCARD) << dfm_status_name(s) << ": " << dfm_last_error();
+  EXPECT_TRUE(s == DFM_OK || s == DFM_E_DIVERGED || s == DFM_DISCARD)
+      << dfm_status_name(s) << ": " << dfm_last_error();
   test::contacts(w);
 }
 
 template <class T>
-void put(Bytes &b, size_t at, T x) { std::memcpy(b.data() + at, &x, sizeof x); }
+void put(Bytes &b, size_t at, T x) {
+  std::memcpy(b.data() + at, &x, sizeof x);
+}
 
 struct DamagedSnapshot : testing::Test {
   test::Context c;
@@ -97,11 +117,13 @@ struct DamagedSnapshot : testing::Test {
 
   void SetUp() override {
     for (int i = 0; i < 3; ++i) test::ok(dfm_world_step(w, 5e-4, nullptr));
-    hash = dfm_world_hash(w), state = take(w).bytes;
+    hash = dfm_world_hash(w);
+    state = take(w).bytes;
   }
   void refused(const Bytes &bad, const std::string &what, const char *part = "") {
     EXPECT_EQ(restore(w, bad), DFM_E_FORMAT) << what << ": " << dfm_last_error();
-    EXPECT_NE(std::string(dfm_last_error()).find(part), std::string::npos) << what << ": " << dfm_last_error();
+    EXPECT_NE(std::string(dfm_last_error()).find(part), std::string::npos)
+        << what << ": " << dfm_last_error();
     EXPECT_EQ(dfm_world_hash(w), hash) << what;
   }
 };
@@ -112,7 +134,8 @@ TEST_F(DamagedSnapshot, WithFlippedBytes_IsRefusedAndChangesNothing) {
   std::mt19937 random(7);
   for (int i = 0; i < 10000; ++i) {
     Bytes bad = good.bytes;
-    for (uint32_t flips = 1 + random() % 3; flips-- > 0;) bad[random() % bad.size()] ^= static_cast<unsigned char>(1 + random() % 255);
+    for (uint32_t flips = 1 + random() % 3; flips-- > 0;)
+      bad[random() % bad.size()] ^= static_cast<unsigned char>(1 + random() % 255);
     if (bad == good.bytes) continue;
     ASSERT_EQ(restore(w, bad), DFM_E_FORMAT) << i;
   }
@@ -121,23 +144,32 @@ TEST_F(DamagedSnapshot, WithFlippedBytes_IsRefusedAndChangesNothing) {
 }
 
 TEST_F(DamagedSnapshot, CutAnywhere_IsRefused) {
-  for (size_t n = 1; n < good.bytes.size(); n += 1 + n / 16) refused(Bytes(good.bytes.begin(), good.bytes.begin() + std::ptrdiff_t(n)), "cut");
-  for (size_t n = sizeof(dfm::SnapshotHead); n < good.bytes.size(); n += 1 + n / 16) {   // with a head that agrees
+  for (size_t n = 1; n < good.bytes.size(); n += 1 + n / 16)
+    refused(Bytes(good.bytes.begin(), good.bytes.begin() + std::ptrdiff_t(n)), "cut");
+  // with a head that agrees
+  for (size_t n = sizeof(dfm::SnapshotHead); n < good.bytes.size(); n += 1 + n / 16) {
     Bytes bad(good.bytes.begin(), good.bytes.begin() + std::ptrdiff_t(n));
-    seal(bad), refused(bad, "cut and sealed");
+    seal(bad);
+    refused(bad, "cut and sealed");
   }
   Bytes longer = good.bytes;
-  longer.push_back(0), seal(longer);
+  longer.push_back(0);
+  seal(longer);
   refused(longer, "longer", "the end");
 }
 
 TEST_F(DamagedSnapshot, OfAnotherVersion_IsNamed) {
   Bytes bad = good.bytes;
-  put(bad, 8, uint32_t{6}), seal(bad);
+  put(bad, 8, uint32_t{6});
+  seal(bad);
   refused(bad, "version", "another version");
-  bad = good.bytes, bad[7] = '5', seal(bad);
+  bad = good.bytes;
+  bad[7] = '5';
+  seal(bad);
   refused(bad, "the format before", "another version");
-  bad = good.bytes, bad[0] = 'x', seal(bad);
+  bad = good.bytes;
+  bad[0] = 'x';
+  seal(bad);
   refused(bad, "no snapshot", "no snapshot");
 }
 
@@ -149,25 +181,32 @@ TEST_F(DamagedSnapshot, ForgedFieldByField_IsRefusedUnderItsName) {
     if (!f.checked) continue;
     const auto forge = [&](auto value, size_t at, const char *what) {
       Bytes bad = good.bytes;
-      put(bad, at, value), seal(bad);
+      put(bad, at, value);
+      seal(bad);
       refused(bad, std::string(f.name) + " " + what, f.name);
       ++forged;
     };
     const size_t last = f.at + f.bytes;
     if (f.kind == 'd') {
       forge(nan, f.at, "nan first");
-      if (std::string(f.name) == "friction work") forge(nan, last - 8, "nan last");
-      else if (std::string(f.name) != "statistics") forge(nan, last - 8, "nan last"), forge(-inf, f.at, "-inf");
+      if (std::string(f.name) == "friction work") {
+        forge(nan, last - 8, "nan last");
+      } else if (std::string(f.name) != "statistics") {
+        forge(nan, last - 8, "nan last");
+        forge(-inf, f.at, "-inf");
+      }
     } else if (f.kind == 'u') {
       forge(static_cast<unsigned char>(0xff), last - 1, "large");
     } else if (f.kind == 'f') {
-      forge(uint8_t{2}, f.at, "2"), forge(uint8_t{255}, f.at, "255");
+      forge(uint8_t{2}, f.at, "2");
+      forge(uint8_t{255}, f.at, "255");
     } else {
       uint64_t n;
       std::memcpy(&n, good.bytes.data() + f.at, sizeof n);
       Bytes bad = good.bytes;
       for (const uint64_t wrong : {uint64_t{1} << 60, ~uint64_t{0}, n + 1}) {
-        put(bad, f.at, wrong), seal(bad);
+        put(bad, f.at, wrong);
+        seal(bad);
         refused(bad, std::string(f.name) + " count");
         ++forged;
       }
@@ -182,7 +221,8 @@ TEST_F(DamagedSnapshot, WithAStepBoundThatNoSubStepCanHave_IsRefused) {
     if (std::string(f.name) != "step bound") continue;
     for (const double bound : {0.0, 5e-312, 1e-300, -1.0}) {
       Bytes bad = good.bytes;
-      put(bad, f.at, bound), seal(bad);
+      put(bad, f.at, bound);
+      seal(bad);
       refused(bad, "bound", "step bound");
     }
   }
@@ -200,13 +240,19 @@ TEST_F(DamagedSnapshot, ForgedAtRandom_IsRefusedOrTheWorldGoesOn) {
     }
     seal(bad);
     const dfm_status s = restore(w, bad);
-    ASSERT_TRUE(s == DFM_OK || s == DFM_E_FORMAT || s == DFM_E_UNSUPPORTED) << i << ": " << dfm_status_name(s) << ": " << dfm_last_error();
-    if (s == DFM_OK) ++taken, use(w), test::ok(restore(w, good.bytes));
+    ASSERT_TRUE(s == DFM_OK || s == DFM_E_FORMAT || s == DFM_E_UNSUPPORTED)
+        << i << ": " << dfm_status_name(s) << ": " << dfm_last_error();
+    if (s == DFM_OK) {
+      ++taken;
+      use(w);
+      test::ok(restore(w, good.bytes));
+    }
   }
   EXPECT_GT(taken, 100) << "low bits of positions are anyone's";
 }
 
-// A list may not ask for more memory than its bytes account for: not by its count, and not by entries that are small in the file and large in memory.
+// A list may not ask for more memory than its bytes account for: not by its count, and not by entries that
+// are small in the file and large in memory.
 TEST_F(DamagedSnapshot, ThatClaimsMuchMemory_TakesNoMoreThanAFewTimesItsBytes) {
   constexpr size_t kPadding = 1 << 20;
   for (const dfm::SnapshotField &f : good.map) {
@@ -214,7 +260,8 @@ TEST_F(DamagedSnapshot, ThatClaimsMuchMemory_TakesNoMoreThanAFewTimesItsBytes) {
     Bytes bad = good.bytes;
     bad.insert(bad.begin() + std::ptrdiff_t(f.at) + 8, kPadding, 0);
     for (const size_t entry : {size_t{1}, size_t{8}, size_t{68}}) {
-      put(bad, f.at, uint64_t{kPadding / entry}), seal(bad);
+      put(bad, f.at, uint64_t{kPadding / entry});
+      seal(bad);
       const uint64_t before = test::heap_bytes;
       EXPECT_NE(restore(w, bad), DFM_OK) << f.name;
       EXPECT_LT(test::heap_bytes - before, 12 * bad.size()) << f.name << ", entries of " << entry << " bytes";

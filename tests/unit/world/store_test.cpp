@@ -22,16 +22,18 @@ using test::expect_near;
 using test::inside;
 using test::Refusal;
 
-constexpr double kStep = 1e-4;   // s, below every bound: a step is one sub-step
+constexpr double kStep = 1e-4;  // s, below every bound: a step is one sub-step
 
 // A store of one contact per key, in this order.
 ContactStore store_of(std::vector<uint64_t> keys, uint32_t nstate = 0) {
   ContactStore s(Memory::standard());
   s.n = uint32_t(keys.size());
   s.nstate = nstate;
-  each_column([&](const ContactColumn &column, auto &values) {
-    if (column.width != kOwnLength) values.resize(column.entries(s.n, nstate));
-  }, s);
+  each_column(
+      [&](const ContactColumn &column, auto &values) {
+        if (column.width != kOwnLength) values.resize(column.entries(s.n, nstate));
+      },
+      s);
   s.key.assign(keys.begin(), keys.end());
   std::iota(s.by_key.begin(), s.by_key.end(), 0u);
   std::sort(s.by_key.begin(), s.by_key.end(), [&](uint32_t i, uint32_t j) { return keys[i] < keys[j]; });
@@ -73,9 +75,9 @@ std::vector<std::string> all_of(const World &w) {
   const auto put = [&](const void *data, size_t bytes) {
     out.emplace_back(static_cast<const char *>(data), bytes);
   };
-  each_column([&](const ContactColumn &, const auto &values) {
-    put(values.data(), values.size() * sizeof(values[0]));
-  }, w.store);
+  each_column([&](const ContactColumn &,
+                  const auto &values) { put(values.data(), values.size() * sizeof(values[0])); },
+              w.store);
   put(&w.store.n, sizeof w.store.n);
   put(&w.store.nstate, sizeof w.store.nstate);
   put(&w.store.h, sizeof w.store.h);
@@ -87,10 +89,12 @@ std::vector<std::string> all_of(const World &w) {
 
 // Every column has a value for every contact, and the place in the order of keys is the inverse of find().
 void expect_whole(const ContactStore &s) {
-  each_column([&](const ContactColumn &column, const auto &values) {
-    if (column.width == kOwnLength) return;
-    EXPECT_EQ(values.size(), column.entries(s.n, s.nstate));
-  }, s);
+  each_column(
+      [&](const ContactColumn &column, const auto &values) {
+        if (column.width == kOwnLength) return;
+        EXPECT_EQ(values.size(), column.entries(s.n, s.nstate));
+      },
+      s);
   for (uint32_t k = 1; k < s.n; ++k) EXPECT_LT(s.key[s.by_key[k - 1]], s.key[s.by_key[k]]) << k;
   for (uint32_t i = 0; i < s.n; ++i) EXPECT_EQ(s.find(s.key[i]), i);
   EXPECT_EQ(std::set<uint32_t>(s.by_key.begin(), s.by_key.end()).size(), s.n);
@@ -139,10 +143,12 @@ TEST(Store, Columns_AreAllInTheList) {
   ContactStore s(Memory::standard());
   size_t bytes = 0;
   std::set<const void *> seen;
-  each_column([&](const ContactColumn &, const auto &values) {
-    bytes += sizeof values;
-    seen.insert(&values);
-  }, s);
+  each_column(
+      [&](const ContactColumn &, const auto &values) {
+        bytes += sizeof values;
+        seen.insert(&values);
+      },
+      s);
   EXPECT_EQ(bytes + 2 * sizeof(uint32_t) + sizeof(double), sizeof s);
   EXPECT_EQ(seen.size() * sizeof(Array<double>), bytes) << "a column is named twice";
 }
@@ -180,7 +186,7 @@ TEST(WarmStart, TakesOverWhatTheContactOfTheKeyHas) {
   expect_near(now.impulse(0), {2, 2.5, 3}, 0);
   expect_near(now.impulse(1), {}, 0);
   expect_near(now.impulse(2), {0.5, 1, 1.5}, 0);
-  const double bristles[3][3] = {{0.3, 0.4, 0}, {0, 0, 0}, {0, 0, 0}};   // the last: of another law
+  const double bristles[3][3] = {{0.3, 0.4, 0}, {0, 0, 0}, {0, 0, 0}};  // the last: of another law
   for (uint32_t i = 0; i < 3; ++i)
     for (uint32_t s = 0; s < 3; ++s) EXPECT_EQ(now.bristle(i, s), bristles[i][s]) << i << " " << s;
   EXPECT_EQ(now.state.dwell[0], 8);
@@ -219,13 +225,15 @@ TEST(Store, OfSleepers_StaysAsItIsBesideContactsThatMove) {
     const ContactStore &s = world.store;
     for (uint32_t i = 0; i < s.n; ++i) {
       if (s.id_a[i] != sleeper) continue;
-      each_column([&](const ContactColumn &column, const auto &values) {
-        if constexpr (std::is_arithmetic_v<std::remove_cvref_t<decltype(values[0])>>) {
-          if (!column.carried || column.width == kOwnLength) return;
-          const size_t width = column.width == kPerState ? s.nstate : column.width;
-          for (size_t k = 0; k < width; ++k) out[s.key[i]].push_back(double(values[i * width + k]));
-        }
-      }, s);
+      each_column(
+          [&](const ContactColumn &column, const auto &values) {
+            if constexpr (std::is_arithmetic_v<std::remove_cvref_t<decltype(values[0])>>) {
+              if (!column.carried || column.width == kOwnLength) return;
+              const size_t width = column.width == kPerState ? s.nstate : column.width;
+              for (size_t k = 0; k < width; ++k) out[s.key[i]].push_back(double(values[i * width + k]));
+            }
+          },
+          s);
     }
     return out;
   };
