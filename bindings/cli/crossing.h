@@ -48,10 +48,11 @@ class Counter {
 
  private:
   struct Box { double lo[3], hi[3]; };
+  // left 0: leaf
   struct Node {
     Box box;
     uint32_t begin, end, left, right;
-  };  // left 0: leaf
+  };
   struct Item {
     Box box;
     uint32_t surface, triangle;

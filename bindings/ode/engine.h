@@ -125,11 +125,12 @@ class Engine {
     Idle idle{}, next_idle{};  // of bodies without geoms
   };
   class Lent;
+  // a, b: in saved_
   struct Tie {
     dJointID joint;
     size_t a, b;
     dJointFeedback own, *callers;
-  };  // a, b: in saved_
+  };
   std::unordered_map<dBodyID, size_t> number_;  // in saved_
   std::vector<Tie> ties_;                       // joints between two bodies that move, but for contacts
   // every body known: members in their order, then bodies without geoms

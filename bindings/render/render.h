@@ -68,11 +68,12 @@ struct Sphere {
   double radius;
   Look look;
 };
+// a and b are the centers of its caps
 struct Capsule {
   double a[3], b[3];
   double radius;
   Look look;
-};  // a and b are the centers of its caps
+};
 // Segments as ribbons that face the camera, e.g. contact normals.
 struct Lines {
   const double *xyz = nullptr;  // [2 n,3]: start, end, start, end

@@ -61,7 +61,7 @@ BAD = {
              ("libdeform/src/core/error.h", "// TODO later\n")],
     "paths": [("README.md", "see /home/me/deform\n"), ("CMakeLists.txt", "set(X /root/x)\n"), ("README.md", "../.lib" + "rary/a\n"),
               ("examples/01_hello.c", '// "/wo' + 'rk/main"\n')],
-    "readme": [("examples/01_hello.c", "// more\n"), ("README.md", "=# Title\n"), ("examples/01_hello.c", "\n" * 40)],
+    "readme": [("examples/01_hello.c", "// more\n"), ("README.md", "=# Title\n"), ("examples/01_hello.c", "\n" * 60)],
     "guides": [("libdeform/doc/howto/engine.md", "```c\nint z;\n```\n"), ("libdeform/doc/howto/engine.md", "```cmake\nproject(x)\n```\n")],
     "links": [("README.md", "[x](libdeform/doc/gone.md)\n"), ("README.md", "[x](libdeform/doc/howto/engine.md#gone)\n"),
               ("libdeform/doc/README.md", "[x](#gone)\n")],

@@ -57,8 +57,8 @@ def threads(tree):
 
 
 def cpp_complete(tree):
-    """deform.hpp (with result.hpp) calls every function that the public headers declare, ode.hpp those of the binding."""
-    for folder, name, more in (PUBLIC, "deform.hpp", ["result.hpp"]), (ODE, "ode.hpp", []):
+    """deform.hpp (with defs.hpp and result.hpp) calls every function that the public headers declare, ode.hpp those of the binding."""
+    for folder, name, more in (PUBLIC, "deform.hpp", ["defs.hpp", "result.hpp"]), (ODE, "ode.hpp", []):
         wrapper, functions = folder + name, list(declared(tree, folder))
         if wrapper not in tree.paths and (functions or folder == PUBLIC):
             yield wrapper, 1, "is not there"
