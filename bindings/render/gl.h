@@ -13,18 +13,18 @@
   X(AttachShader, ATTACHSHADER)                                                                              \
   X(BindAttribLocation, BINDATTRIBLOCATION)                                                                  \
   X(BindBuffer, BINDBUFFER)                                                                                  \
-  X(BindFramebuffer, BINDFRAMEBUFFER) X(BindRenderbuffer, BINDRENDERBUFFER) X(BindTexture, BINDTEXTURE)      \
-      X(BindVertexArray, BINDVERTEXARRAY) X(BlendFunc, BLENDFUNC) X(BlitFramebuffer, BLITFRAMEBUFFER) X(     \
-          BufferData, BUFFERDATA) X(CheckFramebufferStatus, CHECKFRAMEBUFFERSTATUS) X(Clear, CLEAR)          \
-          X(ClearColor, CLEARCOLOR) X(CompileShader, COMPILESHADER) X(CreateProgram, CREATEPROGRAM) X(       \
-              CreateShader, CREATESHADER) X(DeleteBuffers, DELETEBUFFERS)                                    \
-              X(DeleteFramebuffers, DELETEFRAMEBUFFERS) X(DeleteProgram, DELETEPROGRAM) X(                   \
-                  DeleteRenderbuffers, DELETERENDERBUFFERS) X(DeleteShader, DELETESHADER)                    \
-                  X(DeleteTextures, DELETETEXTURES) X(DeleteVertexArrays, DELETEVERTEXARRAYS) X(             \
-                      DepthFunc, DEPTHFUNC) X(DepthMask, DEPTHMASK) X(Disable, DISABLE)                      \
-                      X(DrawArrays, DRAWARRAYS) X(DrawBuffer, DRAWBUFFER) X(Enable, ENABLE) X(               \
-                          EnableVertexAttribArray, ENABLEVERTEXATTRIBARRAY) X(FramebufferRenderbuffer,       \
-                                                                              FRAMEBUFFERRENDERBUFFER)       \
+  X(BindFramebuffer, BINDFRAMEBUFFER)                                                                        \
+  X(BindRenderbuffer, BINDRENDERBUFFER) X(BindTexture, BINDTEXTURE) X(BindVertexArray, BINDVERTEXARRAY) X(   \
+      BlendFunc, BLENDFUNC) X(BlitFramebuffer, BLITFRAMEBUFFER) X(BufferData, BUFFERDATA)                    \
+      X(CheckFramebufferStatus, CHECKFRAMEBUFFERSTATUS) X(Clear, CLEAR) X(ClearColor, CLEARCOLOR) X(         \
+          CompileShader, COMPILESHADER) X(CreateProgram, CREATEPROGRAM) X(CreateShader, CREATESHADER)        \
+          X(DeleteBuffers, DELETEBUFFERS) X(DeleteFramebuffers, DELETEFRAMEBUFFERS) X(                       \
+              DeleteProgram, DELETEPROGRAM) X(DeleteRenderbuffers, DELETERENDERBUFFERS)                      \
+              X(DeleteShader, DELETESHADER) X(DeleteTextures, DELETETEXTURES) X(                             \
+                  DeleteVertexArrays, DELETEVERTEXARRAYS) X(DepthFunc, DEPTHFUNC) X(DepthMask, DEPTHMASK)    \
+                  X(Disable, DISABLE) X(DrawArrays, DRAWARRAYS) X(DrawBuffer, DRAWBUFFER) X(Enable, ENABLE)  \
+                      X(EnableVertexAttribArray, ENABLEVERTEXATTRIBARRAY) X(FramebufferRenderbuffer,         \
+                                                                            FRAMEBUFFERRENDERBUFFER)         \
                           X(FramebufferTexture2D, FRAMEBUFFERTEXTURE2D) X(                                   \
                               FramebufferTextureLayer, FRAMEBUFFERTEXTURELAYER) X(GenBuffers, GENBUFFERS)    \
                               X(GenFramebuffers, GENFRAMEBUFFERS) X(GenRenderbuffers, GENRENDERBUFFERS)      \

@@ -79,7 +79,8 @@ float key_light(vec3 nn) {
 float sky_light(vec3 nn) {
   vec4 from = vec4(p + nn * (1.6 * sky_texel), 1.0);
   float away = smoothstep(2.5, 3.5, length(p - casters) / casters_radius);
-  int count = kind == 1 && away >= 1.0 ? 0 : SKY;  // most of the floor is open: a loop that ends at once costs nothing
+  // most of the floor is open: a loop that ends at once costs nothing
+  int count = kind == 1 && away >= 1.0 ? 0 : SKY;
   float sum = 0.0;
   for (int i = 0; i < count; ++i) {
     vec3 q = (sky_map[i] * from).xyz;
@@ -98,14 +99,16 @@ void main() {
   vec3 v = normalize(eye - p), nn = normalize(n);
   if (kind == 2) { result = vec4(rgb, alpha); return; }
   if (!gl_FrontFacing) nn = -nn;  // by winding: at a silhouette the interpolated normal may already look away
-  // Corners without a value weigh nothing in it; the flat ends of the step hide what interpolation over slivers rounds.
+  // Corners without a value weigh nothing in it; the flat ends of the step hide what interpolation over
+  // slivers rounds.
   float value = scalar.x / max(scalar.y, 0.01), valued = smoothstep(0.1, 0.9, scalar.y);
   if (fade > 0.0) valued *= smoothstep(0.0, fade, value);
   vec3 base = linear(mix(rgb, texture(map, vec2(value * 256.0 / 257.0 + 0.5 / 257.0, 0.5)).rgb, valued));
   float a = alpha, gloss = 0.16;
   if (kind == 1) {
     vec2 x = vec2(dot(p - floor_center, floor_x), dot(p - floor_center, floor_y)) / floor_size.x;
-    float far = length(p - floor_center) / floor_size.y, plain = clamp(1.6 - 4.0 * max(fwidth(x.x), fwidth(x.y)), 0.0, 1.0);
+    float far = length(p - floor_center) / floor_size.y;
+    float plain = clamp(1.6 - 4.0 * max(fwidth(x.x), fwidth(x.y)), 0.0, 1.0);
     float odd = mod(floor(x.x) + floor(x.y), 2.0);
     base *= 1.0 - 0.035 * odd * plain - 0.09 * lines_of(x, 1.2);
     a *= 1.0 - smoothstep(0.12, 1.0, far);
@@ -150,7 +153,10 @@ void main() {
 const char *const kBackgroundFragmentShader = R"(#version 330 core
 in float height;
 layout(location = 0) out vec4 result;
-void main() { result = vec4(mix(vec3(0.955, 0.960, 0.968), vec3(0.800, 0.845, 0.900), smoothstep(0.25, 1.0, height)), 1.0); }
+void main() {
+  vec3 c = mix(vec3(0.955, 0.960, 0.968), vec3(0.800, 0.845, 0.900), smoothstep(0.25, 1.0, height));
+  result = vec4(c, 1.0);
+}
 )";
 
 }  // namespace render

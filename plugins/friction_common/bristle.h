@@ -2,7 +2,8 @@
 // tangential displacement is an elastic part z, kept as a vector in the tangent plane, and a plastic rest
 // that flows against it at the rate m (m/s) that the law chooses,
 //
-//   dz/dt = v - (K0 m / g) z,        F = K0 z + K1 dz/dt + K2 v,        ft = -F                         K0 = sigma0 A, K1 = sigma1 A, K2 = sigma2 A
+//   dz/dt = v - (K0 m / g) z,   F = K0 z + K1 dz/dt + K2 v,   ft = -F,
+//   K0 = sigma0 A, K1 = sigma1 A, K2 = sigma2 A
 //
 // g(w) the Stribeck level (N), w = |v|. LuGre and Dahl: m = w (Canudas de Wit et al. 1995, (1)-(3); Dahl
 // 1976); elastoplastic: m = alpha M. One step of length h is an implicit radial return at the new slip and
@@ -15,14 +16,16 @@
 // derivatives dm/dv and dm/dfn,
 //
 //   dz'/dv  = h [ (g/D) 1 - (K0/D^2) zt (g dm/dv - m dg/dv)^T ]
-//   dz'/dfn = (g/D) dz0/dfn + (h K0/D^2) zt (m dg/dfn - g dm/dfn),      dz0/dfn = z0/fn where the old bristle was cut, else 0
+//   dz'/dfn = (g/D) dz0/dfn + (h K0/D^2) zt (m dg/dfn - g dm/dfn),
+//   dz0/dfn = z0/fn where the old bristle was cut, else 0
 //
 // and those of dz/dt are the same over h less dz0. Any m >= 0 is dissipative: V = K0 |z|^2/2 gives (K0 z).v -
 // V' = K0 m K0 |z|^2/g. The micro-damping is passive for every y = K0 z iff K1^2 m <= 4 g (K1 + K2). So it is
 // damped at the speed W = max(w, m), which is w where m <= w: the default K1e = K1 / (1 + K1 W/(4 g)) has K1e
 // m <= 4 g whatever the parameters. The step inherits that, with d = z' - z0 and y = K0 z':
 //
-//   F.v h - dV = (K0/2 + K1e/h) d^2 + h (m/g) y^2 + K1e (m/g) d.y + K2 w^2 h  >=  0   where (K1e m/g)^2 <= 4 (K1e/h) (h m/g),  the same bound
+//   F.v h - dV = (K0/2 + K1e/h) d^2 + h (m/g) y^2 + K1e (m/g) d.y + K2 w^2 h  >=  0
+//   where (K1e m/g)^2 <= 4 (K1e/h) (h m/g),  the same bound
 #pragma once
 #include "curve.h"
 

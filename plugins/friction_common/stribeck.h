@@ -1,6 +1,6 @@
 // Set-valued friction with a Stribeck curve: what the laws coulomb and karnopp share.
 //
-//   g(w) = F_C + (F_S - F_C) exp(-(w/v_s)^delta),   F_C = mu_C fn, F_S = mu_S fn, w = |v|        (Stribeck curve, N)
+//   g(w) = F_C + (F_S - F_C) exp(-(w/v_s)^delta), F_C = mu_C fn, F_S = mu_S fn, w = |v|  (Stribeck curve, N)
 //   stick  |ft_stop| <= R:  ft = ft_stop, the force that makes the slip of this step zero
 //   slip   otherwise:       at rest (w <= band)  F_S along ft_stop, which is where the contact
 //                           is about to go;

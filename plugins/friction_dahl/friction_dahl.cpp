@@ -9,7 +9,8 @@
 // alpha = 1 gives c = 1. Otherwise the implicit return of bristle.h is one equation in the share rho = |K0
 // z'|/F_C along the trial direction t, with kappa = t.v^ and f(rho) = rho c(1 - kappa rho):
 //
-//   rho + p f(rho) = rho_t,   p = h K0 w/F_C;      times kappa, with q = 1 - kappa rho:      q + p |q|^alpha sgn q = R,   R = 1 + p - kappa rho_t
+//   rho + p f(rho) = rho_t,   p = h K0 w/F_C;
+//   times kappa, with q = 1 - kappa rho:   q + p |q|^alpha sgn q = R,   R = 1 + p - kappa rho_t
 //
 // whose left side is odd and grows: q has the sign of R, and y = |q| is the one root of y + p y^alpha = |R|.
 // Both terms bound it, y <= |R| and y <= (|R|/p)^(1/alpha); the smaller is at most twice the root, and from
@@ -114,7 +115,8 @@ DEFORM_PASS inline void solve(double a, Trial &t) {
 
 // m = w c(1 - kappa rho), so dm = c dw - w c' (kappa drho + rho dkappa), and from the return, with f' = alpha
 // |q|^(alpha - 1),
-//   (1 + p f') drho = drho_t - f dp + p rho^2 c' dkappa,   drho_t - f dp = (h K0/F_C) (t - f v^) . dv + (K0 t.dz0 - rho dF_C)/F_C
+//   (1 + p f') drho = drho_t - f dp + p rho^2 c' dkappa,
+//   drho_t - f dp = (h K0/F_C) (t - f v^) . dv + (K0 t.dz0 - rho dF_C)/F_C
 // Near q = 1 both quotients of c and c' lose their digits to a difference; their series do not.
 DEFORM_PASS inline void rates(double a, const bristle::Batch &batch, const Trial &t, Block &b) {
   const double c1 = a * (a - 1) / 2, c2 = c1 * (a - 2) / 3;

@@ -13,7 +13,8 @@
 //
 //   rho + P f(rho) = rho_t      one root, since f' >= 0; Newton in a bracket, eight lanes at a time; a lane
 //                               that has converged stays as it is
-//   (1 + P f') drho = (h K0/g) (t.dv - f dM) - rho dg/g - P f_lambda dlambda (+ K0 t.dz0/g),      dlambda = -lambda dg/g at constant fn
+//   (1 + P f') drho = (h K0/g) (t.dv - f dM) - rho dg/g - P f_lambda dlambda (+ K0 t.dz0/g),
+//   dlambda = -lambda dg/g at constant fn
 //
 // Where g has fallen with speed below what the bristle holds (rho > 1), q = 1 - rho < 0 and the plastic rate
 // is m = M (1 + (rho - 1)^i)/rho: more than w for i > 1 and rho > 2. It, and not w, is what the micro-damping

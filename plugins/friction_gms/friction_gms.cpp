@@ -8,7 +8,8 @@
 // As vectors, by one radial return per element, which is these equations in one dimension. With K = k A, f0 =
 // K z0 brought into the new cone nu F_S, and lambda = h C A:
 //
-//   ft = f0 + K h v,   f' = ft min(1, L/|ft|),   L = nu g  where the element was stuck,   L = g (|f0| + lambda nu)/(g + lambda)  where it slipped
+//   ft = f0 + K h v,   f' = ft min(1, L/|ft|),
+//   L = nu g  where the element was stuck,   L = g (|f0| + lambda nu)/(g + lambda)  where it slipped
 //
 // so the direction follows the displacement and the magnitude relaxes in time; what turns is stuck again by
 // itself. F = sum f_i + sigma2 A v.

@@ -1,7 +1,8 @@
 // Row sums for the step bound (doc/models/msm.md). With K and C the stiffness and damping of the body, any D
 // >= K and E >= C that are diagonal (Loewner order) make h^2 D + 2 h E <= 4 M sufficient for symplectic
 // Euler; doc/models/msm.md proves it. The rows are
-//   D_i = |A_i| + sum_j k_ij w_j / w_i + cells,   A_i = sum_j k_ij ((1 - s) n n^T + s I),   s = max(0, 1 - L0/L)
+//   D_i = |A_i| + sum_j k_ij w_j / w_i + cells,
+//   A_i = sum_j k_ij ((1 - s) n n^T + s I),   s = max(0, 1 - L0/L)
 // (the page has A_i and k_ij where extra coordinates count) with positive weights w, chosen once so that the
 // rows are even: they come from a few steps toward the Perron vector of the row-sum operator. Every w gives a
 // bound, a good one gives nearly the true step (0.95 of it on a free mesh, 0.6 for w = 1).

@@ -1,6 +1,7 @@
 // Energies. A spring holds k/2 (L - L0)^2 in the length that counts (form B), a branch k1/2 p^2 with p the
 // stretch of its spring, and form A the integral of its force, which is elementary:
-//   E/k = int_l0^l (sqrt(s^2 + w^2) - L0) ds.   With t = l + L, t0 = l0 + L0, t = t0 (1 + q), b = w^2/t0^2 all terms of first order cancel:
+//   E/k = int_l0^l (sqrt(s^2 + w^2) - L0) ds.
+// With t = l + L, t0 = l0 + L0, t = t0 (1 + q), b = w^2/t0^2 all terms of first order cancel:
 //   E/(k t0^2) = [ q^2/2 + b q^2/(1+q) - (b q)^2/(2 (1+q)^2) - 2 b (q - ln(1+q)) ]/4.
 #include <deform/elementary.h>
 

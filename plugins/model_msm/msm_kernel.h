@@ -1,16 +1,18 @@
 // Mass-spring kernels, chosen at run time by instruction set. All of them do the same IEEE operations in
 // the same order:
-//   spring  L = sqrt((dx^2 + dy^2) + dz^2),  F = k [(L - L0)/L + damp (dv.d)/L^2] d                       (2.25), (2.26 corrected)
-//   tilted  L = sqrt(((dx^2 + dy^2) + dz^2) + w^2) in its place, w the frozen extra coordinates' part of d
-//   (chapter 6, form B)
-//   turned  l = sqrt(d.d),  F = k [(L - L0)/l + damp (dv.d)/(l L)] d                                        (chapter 6, form A)
-//   branch  F = k [(a e + part r)/L + damp (dv.d)/L^2] d,  e = L - L0, and r for the next step              (Fig. 2.5 a, c)
+//   spring  L = sqrt((dx^2 + dy^2) + dz^2),  F = k [(L - L0)/L + damp (dv.d)/L^2] d  (2.25), (2.26 corrected)
+//   tilted  L = sqrt(((dx^2 + dy^2) + dz^2) + w^2) in its place, w the frozen extra coordinates' part
+//           of d                                                             (chapter 6, form B)
+//   turned  l = sqrt(d.d),  F = k [(L - L0)/l + damp (dv.d)/(l L)] d                     (chapter 6, form A)
+//   branch  F = k [(a e + part r)/L + damp (dv.d)/L^2] d,  e = L - L0, and r for the next step
+//                                                                            (Fig. 2.5 a, c)
 //   row     f_i += (F0 + F1) + (F2 + F3) per quad of springs, then f_j -= F one spring after the other
-//   cell    6V = a.(b x c),  p = kV/(36 V0) (6V0 - 6V) + kC/(36 V0) max(0, 0.6 6V0 - 6V)                    (2.27 corrected, collapse)
-//           with 6V kept between -6V0 and 18V0, and taken from a cell whose edges have grown beyond a limit
-//           as doc/models/msm.md says F_n = p g_n,  F_0 = -((F_1 + F_2) + F_3), four cells at a time, corner
-//           after corner in the order 1 2 3 0; four cells without pressure are left out, which changes no
-//           bit: sums that begin at +0 never become -0
+//   cell    6V = a.(b x c),  p = kV/(36 V0) (6V0 - 6V) + kC/(36 V0) max(0, 0.6 6V0 - 6V)  (2.27 corrected,
+//           collapse) with 6V kept between -6V0 and 18V0, and taken from a cell whose edges have grown beyond
+//           a limit as doc/models/msm.md says
+//           F_n = p g_n,  F_0 = -((F_1 + F_2) + F_3), four cells at a time, corner after corner in the order
+//           1 2 3 0; four cells without pressure are left out, which changes no bit: sums that begin at +0
+//           never become -0
 // so that the instruction set never shows in a result. Plain data only: kernel files see no STL and nothing
 // with external inline code.
 #pragma once

@@ -1,6 +1,7 @@
 /* A friction law to copy and edit: an elastic bristle z that yields on the friction cone (radial return; Simo
  * and Hughes 1998, box 1.4).
- *   z <- z on the cone of the new normal force;   t = z + h v;   z' = t, or where k |t| > mu fn the point of the cone beside it;   ft = -k z'
+ *   z <- z on the cone of the new normal force;   t = z + h v;
+ *   z' = t, or where k |t| > mu fn the point of the cone beside it;   ft = -k z'
  */
 #include <math.h>
 #include <deform/plugin.h>

@@ -126,7 +126,8 @@ TEST(FrictionRig, LoopsOfAThirdPartyLaw_AreExact) {
 // A law without derivatives: viscous drag, v = (f/c)(1 - e^(-c t/m)).
 TEST(FrictionRig, LawWithoutDerivatives_IsSolvedAllTheSame) {
   const std::string text =
-      R"({"law": "drag", "mass": 2.0, "params": {"c": 3.0}, "input": {"kind": "bias_sine_force", "bias": 6, "amp": 0, "freq": 1},
+      R"({"law": "drag", "mass": 2.0, "params": {"c": 3.0},
+ "input": {"kind": "bias_sine_force", "bias": 6, "amp": 0, "freq": 1},
  "columns": ["t", "v", "F"], "output_times": [0, 0.2, 1, 3]})";
   const Outcome out = run(file("drag.json", text), {"--law", tiny("tiny_law"), "--step", "1e-4"});
   const std::vector<double> t = out.rows.column("t"), v = out.rows.column("v"), f = out.rows.column("F");
@@ -184,7 +185,8 @@ TEST(FrictionRig, SlowShake_DriftsAsDahlMustAndNotAsElastoplastic) {
 // the force balance, and the speed never jumps by more than the force allows.
 TEST(FrictionRig, SeveralSolutions_TheMotionIsContinued) {
   const auto text = [](double bias, double v) {
-    return R"({"law": "coulomb", "mass": 1.0, "params": {"F_C": 1.0, "F_S": 2.0, "v_s": 0.004, "delta": 2}, "initial": {"v": )" +
+    return R"({"law": "coulomb", "mass": 1.0, "params": {"F_C": 1.0, "F_S": 2.0, "v_s": 0.004, "delta": 2},
+ "initial": {"v": )" +
            std::to_string(v) + R"(}, "input": {"kind": "bias_sine_force", "bias": )" + std::to_string(bias) +
            R"(, "amp": 0, "freq": 1}, "columns": ["t", "v", "F"], "T": 1,
  "output_times": [0, 0.02, 0.04, 0.06, 0.08, 0.1]})";
@@ -209,7 +211,8 @@ TEST(FrictionRig, SeveralSolutions_TheMotionIsContinued) {
 
 TEST(FrictionRig, SpringOfAnyStiffness_StaysBounded) {
   const std::string text =
-      R"({"law": "coulomb", "mass": 1.0, "params": {"mu": 0.5}, "input": {"kind": "spring_pull", "k": 1e10, "V": 0.1},
+      R"({"law": "coulomb", "mass": 1.0, "params": {"mu": 0.5},
+ "input": {"kind": "spring_pull", "k": 1e10, "V": 0.1},
  "columns": ["t", "x", "v"], "output_times": [0, 0.5, 1]})";
   const Outcome out = run(file("stiff.json", text), {"--step", "0.01"});
   EXPECT_NEAR(out.rows.column("x").back(), 0.1, 2e-3);

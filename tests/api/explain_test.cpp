@@ -23,7 +23,8 @@ std::string scene(const std::string &name, const std::string &rest) {
 
 const char *kOneBody = R"("bodies": [{"name": "lone", "mesh": "block.msh"}])";
 const char *kOnFloor =
-    R"("bodies": [{"name": "lone", "mesh": "block.msh"}], "obstacles": [{"name": "floor", "shape": "plane"}])";
+    R"("bodies": [{"name": "lone", "mesh": "block.msh"}],
+       "obstacles": [{"name": "floor", "shape": "plane"}])";
 
 // The part of the text that lists what runs.
 std::string running(const std::string &text) {

@@ -32,7 +32,8 @@ const std::string &folder() {
 }
 
 std::string scene_with(const std::string &body, const std::string &rest = "") {
-  return R"({"format": "deform-scene", "version": 1, "time": {"duration": 0.002, "step": 0.001}, "bodies": [{"name": "block", "mesh": ")" +
+  return R"({"format": "deform-scene", "version": 1, "time": {"duration": 0.002, "step": 0.001},
+    "bodies": [{"name": "block", "mesh": ")" +
          folder() + R"(/block.msh")" + body + "}]" + rest + "}";
 }
 

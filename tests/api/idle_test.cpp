@@ -84,12 +84,13 @@ TEST(Idle, AutoInAScene_IsTheDefaultAndTheCommandShowsWhatDoesNothing) {
                 .exit_code,
             0);
   const auto hash = [&](const std::string &params) {
-    test::write_file(
-        path,
-        R"({"format": "deform-scene", "version": 1, "time": {"duration": 0.05, "step": 0.001}, "gravity": [0, 0, -9.81],
-      "materials": {"gel": {"density": 1000, "young": 1e4, "poisson": 0.4}}, "bodies": [{"name": "lone", "mesh": "block.msh", "material": "gel",
+    test::write_file(path,
+                     R"({"format": "deform-scene", "version": 1, "time": {"duration": 0.05, "step": 0.001},
+      "gravity": [0, 0, -9.81],
+      "materials": {"gel": {"density": 1000, "young": 1e4, "poisson": 0.4}},
+      "bodies": [{"name": "lone", "mesh": "block.msh", "material": "gel",
       "fix": [{"box": [[-1, -1, -1], [0.001, 1, 1]]}], "model": {"type": "msm", "params": )" +
-            params + "}}]}");
+                         params + "}}]}");
     const test::CommandResult run = test::deform({"run", path, "--quiet", "--out", folder + "/out"});
     EXPECT_EQ(run.exit_code, 0) << run.err;
     const std::string text = test::read_file(folder + "/out/summary.json");

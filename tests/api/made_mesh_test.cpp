@@ -6,7 +6,8 @@
 namespace {
 
 std::string scene_of(const std::string &mesh) {
-  return R"({"format": "deform-scene", "version": 1, "time": {"duration": 0.002, "step": 0.001}, "gravity": [0, 0, -9.81],
+  return R"({"format": "deform-scene", "version": 1, "time": {"duration": 0.002, "step": 0.001},
+    "gravity": [0, 0, -9.81],
     "bodies": [{"name": "b", "mesh": )" +
          mesh + R"(, "spin": [1, 2, 3]}], "output": {"every": 1}})";
 }

@@ -193,10 +193,15 @@ TEST(MeshCommand, ConvertForeignFormat_ReadsItOrSaysHow) {
   test::write_file(file,
                    R"({"asset":{"version":"2.0"},"scene":0,"scenes":[{"nodes":[0]}],"nodes":[{"mesh":0}],
     "meshes":[{"primitives":[{"attributes":{"POSITION":1},"indices":0}]}],
-    "buffers":[{"uri":"data:application/octet-stream;base64,AAABAAIAAAAAAAAAAAAAAAAAAAAAAIA/AAAAAAAAAAAAAAAAAACAPwAAAAA=","byteLength":44}],
-    "bufferViews":[{"buffer":0,"byteOffset":0,"byteLength":6,"target":34963},{"buffer":0,"byteOffset":8,"byteLength":36,"target":34962}],
-    "accessors":[{"bufferView":0,"byteOffset":0,"componentType":5123,"count":3,"type":"SCALAR","max":[2],"min":[0]},
-      {"bufferView":1,"byteOffset":0,"componentType":5126,"count":3,"type":"VEC3","max":[1,1,0],"min":[0,0,0]}]})");
+    "buffers":[{"byteLength":44,
+      "uri":"data:application/octet-stream;base64,AAABAAIAAAAAAAAAAAAAAAAAAAAAAIA/AAAAA)"
+                   R"(AAAAAAAAAAAAACAPwAAAAA="}],
+    "bufferViews":[{"buffer":0,"byteOffset":0,"byteLength":6,"target":34963},
+      {"buffer":0,"byteOffset":8,"byteLength":36,"target":34962}],
+    "accessors":[{"bufferView":0,"byteOffset":0,"componentType":5123,"count":3,"type":"SCALAR",
+      "max":[2],"min":[0]},
+      {"bufferView":1,"byteOffset":0,"componentType":5126,"count":3,"type":"VEC3",
+      "max":[1,1,0],"min":[0,0,0]}]})");
   const auto r = test::deform({"mesh", "convert", file, out});
   if (has(r.err, "built without")) {
     expect_refused({"mesh", "convert", file, out},

@@ -195,7 +195,8 @@ TEST(MeshObstacleScene, Keys_AreReadAndChecked) {
   test::write_file(dir + "/scene.json",
                    R"({"format": "deform-scene", "version": 1, "time": {"duration": 0.1, "step": 0.001},
     "bodies": [{"name": "block", "mesh": "block.msh", "pose": {"position": [0.2, 0.2, 0.101]}}],
-    "obstacles": [{"name": "slab", "shape": "mesh", "mesh": "slab.ply", "pose": {"scale": 0.5}}], "output": {"every": 0.05}})");
+    "obstacles": [{"name": "slab", "shape": "mesh", "mesh": "slab.ply", "pose": {"scale": 0.5}}],
+    "output": {"every": 0.05}})");
   const auto run = [&](const std::string &set) {
     std::vector<std::string> arguments = {"run", dir + "/scene.json", "--quiet", "--out", dir + "/out"};
     if (!set.empty()) arguments.insert(arguments.end(), {"--set", set});

@@ -214,7 +214,8 @@ TEST(PairTable, SceneWithGroups_SlidesByThem) {
     const std::string path = folder + "/scene.json";
     test::write_file(path, R"({"format": "deform-scene", "version": 1, "time": {"duration": 1, "step": 0.001},
       "materials": {"gel": {"young": 1e6, "damping": {"stiffness": 0.001}, "friction": 0.01}},
-      "bodies": [{"name": "cube", "mesh": "cube.obj", "fill": {"cells": 100}, "material": "gel", "pose": {"position": [0, 0, 0.0001]}, "velocity": [1, 0, 0]}],
+      "bodies": [{"name": "cube", "mesh": "cube.obj", "fill": {"cells": 100}, "material": "gel",
+        "pose": {"position": [0, 0, 0.0001]}, "velocity": [1, 0, 0]}],
       "obstacles": [{"name": "floor", "shape": "plane"}],
       "contact": {"friction": [{"between": ["cube:)" +
                                group + R"(", "floor"], "law": "coulomb", "params": {"mu": 0.4}}]}})");

@@ -69,7 +69,8 @@ f 4 1 5 8
 const char *kScene = R"({
   "format": "deform-scene", "version": 1, "gravity": [0, 0, 0],
   "time": {"duration": 0.01, "step": 0.001},
-  "materials": {"soft": {"density": 500, "young": 2e4}, "hard": {"density": 1000, "young": 8e4}, "slow": {"relaxation_time": 2, "damper": "maxwell"}},
+  "materials": {"soft": {"density": 500, "young": 2e4}, "hard": {"density": 1000, "young": 8e4},
+    "slow": {"relaxation_time": 2, "damper": "maxwell"}},
   "bodies": [{"name": "column", "mesh": "column.msh", "material": "soft"}]
 })";
 
@@ -257,9 +258,8 @@ TEST(SceneMaterials, Words_StandForEnumerations) {
 TEST(SceneAnisotropy, KeysAndDirections_BecomeTheModels) {
   const uint64_t plain = Loaded({kPush}).hash_after(20);
   const uint64_t along =
-      Loaded(
-          {kPush,
-           R"(/bodies/0/model/params={"anisotropy_slope": 0.5, "anisotropy_kind": "stiffer", "anisotropy_axis": [0, 0, 1]})"})
+      Loaded({kPush, R"(/bodies/0/model/params={"anisotropy_slope": 0.5, "anisotropy_kind": "stiffer", )"
+                     R"("anisotropy_axis": [0, 0, 1]})"})
           .hash_after(20);
   EXPECT_NE(plain, along);
   EXPECT_EQ(
@@ -267,12 +267,9 @@ TEST(SceneAnisotropy, KeysAndDirections_BecomeTheModels) {
       Loaded(
           {kPush, R"(/bodies/0/anisotropy={"axis": [0, 0, 7], "params": {"slope": 0.5, "kind": "stiffer"}})"})
           .hash_after(20));
-  EXPECT_EQ(
-      along,
-      Loaded(
-          {kPush,
-           R"(/bodies/0/anisotropy={"field": "axes.csv", "params": {"anisotropy_slope": 0.5, "kind": "stiffer"}})"})
-          .hash_after(20))
+  EXPECT_EQ(along, Loaded({kPush, R"(/bodies/0/anisotropy={"field": "axes.csv", "params": )"
+                                  R"({"anisotropy_slope": 0.5, "kind": "stiffer"}})"})
+                       .hash_after(20))
       << "directions of any length";
   EXPECT_NE(
       along,

@@ -15,7 +15,8 @@ namespace {
 const char *kScene = R"({
   "format": "deform-scene", "version": 1,
   "time": {"duration": 0.002, "step": 0.001},
-  "materials": {"gel": {"density": 1000, "young": 20000, "poisson": 0.3, "damping": {"mass": 0.1, "stiffness": 0.001}}},
+  "materials": {"gel": {"density": 1000, "young": 20000, "poisson": 0.3,
+    "damping": {"mass": 0.1, "stiffness": 0.001}}},
   "bodies": [{"name": "block", "mesh": "block.msh", "material": "gel", "model": {"type": "msm", "params": {}},
               "pose": {"position": [0, 0, 0.1], "rotation": {"axis": [0, 0, 1], "angle_deg": 10}, "scale": 1},
               "fix": [{"box": [[-1, -1, -1], [1, 1, 0.001]]}],

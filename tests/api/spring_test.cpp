@@ -167,13 +167,14 @@ TEST(Spring, OfASceneFile_PullsWhereItSays) {
                 .exit_code,
             0);
   const std::string head =
-      R"({"format": "deform-scene", "version": 1, "gravity": [0, 0, -10], "time": {"duration": 3, "step": 0.001},
+      R"({"format": "deform-scene", "version": 1, "gravity": [0, 0, -10],
+    "time": {"duration": 3, "step": 0.001},
     "materials": {"gel": {"young": 1e6, "damping": {"mass": 4, "stiffness": 0.001}}},
     "bodies": [{"name": "cube", "mesh": "cube.msh", "material": "gel", "springs": [)";
-  for (
-      const char *spring :
-      {R"({"box": [[0, 0, 0], [0.1, 0.1, 0.1]], "to": [0.05, 0.05, 0.05], "stiffness": 500, "damping": 40})",
-       R"({"point": [0.05, 0.05, 0.05], "keyframes": [{"t": 0, "position": [0.05, 0.05, 0.05]}], "stiffness": 500, "damping": 40})"}) {
+  for (const char *spring :
+       {R"({"box": [[0, 0, 0], [0.1, 0.1, 0.1]], "to": [0.05, 0.05, 0.05], "stiffness": 500, "damping": 40})",
+        R"({"point": [0.05, 0.05, 0.05], "keyframes": [{"t": 0, "position": [0.05, 0.05, 0.05]}],
+         "stiffness": 500, "damping": 40})"}) {
     test::write_file(folder + "/scene.json", head + spring + "]}]}");
     const test::CommandResult r =
         test::deform({"run", folder + "/scene.json", "--out", folder + "/out", "--quiet"});

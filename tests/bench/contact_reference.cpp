@@ -26,10 +26,11 @@ std::vector<std::vector<std::string>> table(const char *name) {
 // The worst of each quantity over the rows of one table, and who missed its tolerance.
 class Limits {
  public:
+  // both in one unit
   struct Got {
     std::string quantity;
     double error, tolerance;
-  };  // both in one unit
+  };
   bench::Table table{{"table", "rows", "quantity", "worst error", "where", "tolerance"}, {}};
   bool met = true;
 

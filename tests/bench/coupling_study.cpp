@@ -2,7 +2,7 @@
 // distances. A sphere of 4,098 surfels hangs on a ball of 400 cells by each coupling; two motions whose shape
 // is known everywhere are given to its phyxels:
 //
-//   twist   x turns about z by z / R radians            poke   a bump of 0.2 R, exp(-d2 / (0.35 R)2) around one pole
+//   twist   x turns about z by z / R radians     poke   a bump of 0.2 R, exp(-d2 / (0.35 R)2) around one pole
 //
 // and the surface is compared with the same motion of its own points: distance, and roughness: how much the
 // angle between neighboring triangles differs. Forces: torque and power that arrive at the phyxels, by the

@@ -3,7 +3,8 @@
 // where something that should hold crept by more than a micrometer per second, or what drifts by its law does
 // so at more than 1.25 times the rate of its formula.
 //
-//   hold_soak TABLE.csv [--only TEXT] [--seconds N]     rows whose name contains TEXT; begins no row after N seconds
+//   hold_soak TABLE.csv [--only TEXT] [--seconds N]
+//       rows whose name contains TEXT; begins no row after N seconds
 #include <chrono>
 #include <cstdio>
 #include <cstring>

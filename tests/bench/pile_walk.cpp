@@ -1,7 +1,8 @@
 // Walks random piles (support/pile.h) until it has made the steps asked for with every law, and prints what
 // failed: seed, step, and what the law was asked.
 //
-//   pile_walk [--law NAME] [--seed N] [--steps N] [--step S]     from seed N (1) on, 1,000 steps a pile; in all N steps (100,000) per law
+//   pile_walk [--law NAME] [--seed N] [--steps N] [--step S]
+//       from seed N (1) on, 1,000 steps a pile; in all N steps (100,000) per law
 #include <cstdio>
 #include <cstdlib>
 #include <cstring>

@@ -2,7 +2,8 @@
 // and on meshes of the thesis, a row each (doc/concepts/step.md). Rows that the table has are left alone, so
 // that the run may be stopped and taken up again.
 //
-//   step_study TABLE.csv [--commit ID] [--only TEXT] [--steps N] [--seconds N]     rows whose name contains TEXT; begins no row after N seconds
+//   step_study TABLE.csv [--commit ID] [--only TEXT] [--steps N] [--seconds N]
+//       rows whose name contains TEXT; begins no row after N seconds
 #include <chrono>
 #include <cstdio>
 #include <cstring>
@@ -35,10 +36,11 @@ std::vector<Case> cases() {
   }
   std::sort(meshes.begin(), meshes.end());
   std::vector<Case> out;
+  // negative: as it follows from Poisson's ratio
   struct Run {
     const char *motion;
     double volume;
-  };  // negative: as it follows from Poisson's ratio
+  };
   for (const Run &run : {Run{"spin", 1},
                          {"spin", 0},
                          {"hung", 1},

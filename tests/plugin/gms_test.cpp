@@ -325,11 +325,13 @@ TEST_F(Gms, NumberOfElements_IsThatOfTheValuesGiven) {
 
 TEST_F(Gms, CaseWithFiveElements_RunsOnTheRig) {
   const std::string dir = tiny::folder("gms_case");
-  test::write_file(
-      dir + "/five.json",
-      R"({"scenario": "sinvel", "law": "gms", "columns": [{"name": "t"}, {"name": "F"}, {"name": "f1"}, {"name": "f5"}],
-    "params": {"F_C": 1.47, "F_S": 1.96, "v_s": 0.01, "delta": 2, "sigma2": 0.4, "C": 60, "k": [4000, 3000, 2000, 1000, 500], "nu": [0.2, 0.3, 0.2, 0.2, 0.1]},
-    "initial": {}, "input": {"kind": "sine_velocity", "V": 0.01, "freq": 1, "T": 0.5}, "output_times": [0, 0.1, 0.2]})");
+  test::write_file(dir + "/five.json",
+                   R"({"scenario": "sinvel", "law": "gms", "columns": [{"name": "t"}, {"name": "F"},
+      {"name": "f1"}, {"name": "f5"}],
+    "params": {"F_C": 1.47, "F_S": 1.96, "v_s": 0.01, "delta": 2, "sigma2": 0.4, "C": 60,
+      "k": [4000, 3000, 2000, 1000, 500], "nu": [0.2, 0.3, 0.2, 0.2, 0.1]},
+    "initial": {}, "input": {"kind": "sine_velocity", "V": 0.01, "freq": 1, "T": 0.5},
+    "output_times": [0, 0.1, 0.2]})");
   const test::CommandResult r = test::deform({"friction", dir + "/five.json", "--csv", dir + "/five.csv"});
   EXPECT_EQ(r.exit_code, 0) << r.err;
   EXPECT_EQ(test::read_file(dir + "/five.csv").substr(0, 10), "t,F,f1,f5\n");

@@ -22,8 +22,10 @@ constexpr int kEndedByPlugin = 4, kInterrupted = 130;
 // A block on a floor; the law is asked some hundred times in each recorded interval.
 std::string scene_with(int way) {
   return R"({"format": "deform-scene", "version": 1, "time": {"duration": 0.2, "step": 0.0005},
-  "materials": {"gel": {"density": 1000, "young": 50000, "poisson": 0.3, "damping": {"mass": 2, "stiffness": 0.002}}},
-  "bodies": [{"name": "block", "mesh": "block.msh", "material": "gel", "pose": {"position": [0, 0, 0.0005]}, "velocity": [0.1, 0, 0]}],
+  "materials": {"gel": {"density": 1000, "young": 50000, "poisson": 0.3,
+    "damping": {"mass": 2, "stiffness": 0.002}}},
+  "bodies": [{"name": "block", "mesh": "block.msh", "material": "gel", "pose": {"position": [0, 0, 0.0005]},
+    "velocity": [0.1, 0, 0]}],
   "obstacles": [{"name": "floor", "shape": "plane"}],
   "contact": {"friction": [{"between": ["*", "*"], "law": "leaves", "params": {"way": )" +
          std::to_string(way) + R"(}}]},

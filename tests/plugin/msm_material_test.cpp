@@ -161,9 +161,10 @@ TEST(MsmMaterial, VoigtElement_FollowsTheClosedForm) {
     if (n == 500) {
       EXPECT_NEAR((*x - rest) / force, 0.000247825376157322, 1e-8);
     }
+    // at 0.05 s
     if (n == 2500) {
       EXPECT_NEAR((*x - rest) / force, 0.00574037939570326, 1e-8);
-    }  // at 0.05 s
+    }
   }
   EXPECT_LT(worst, 1e-6);
 }

@@ -224,7 +224,8 @@ TEST(EnergyWatch, WorkThatIsDone_IsNoGain) {
 TEST(EnergyWatch, OfAScene_IsReadAndReported) {
   const std::string out = test::scratch("energy_watch"), scene = out + "/scene.json";
   const std::string text =
-      R"({"format": "deform-scene", "version": 1, "time": {"duration": 0.02, "step": "auto"}, "gravity": [0, 0, 0],
+      R"({"format": "deform-scene", "version": 1, "time": {"duration": 0.02, "step": "auto"},
+    "gravity": [0, 0, 0],
     "bodies": [{"name": "bar", "mesh": ")" +
       kBar + R"(", "spin": [0, 0, 9]}], "output": {"every": 0.01}})";
   test::write_file(scene, text);

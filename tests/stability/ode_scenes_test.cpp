@@ -139,10 +139,8 @@ TEST(OdeCart, FiveMoreJitteredRuns_AllDriveUpTheBump) {
 TEST(OdeCart, WithoutGripOrBump_DoesNotDriveUpIt) {
   if (!test::kHasOde) GTEST_SKIP() << kNotBuilt;
   EXPECT_FALSE(drives(SceneRun(
-      "ode_cart",
-      lasting(
-          0.5,
-          {R"(/contact/friction=[{"between": ["*", "floor"], "law": "coulomb", "params": {"mu": 0.05}}])"}))));
+      "ode_cart", lasting(0.5, {R"(/contact/friction=[{"between": ["*", "floor"], "law": "coulomb", )"
+                                R"("params": {"mu": 0.05}}])"}))));
   EXPECT_FALSE(drives(SceneRun(
       "ode_cart", lasting(0.5, {R"(/contact/filter=[{"between": ["*", "bump"], "collide": false}])"}))));
 }

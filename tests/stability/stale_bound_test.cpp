@@ -6,11 +6,12 @@
 
 namespace {
 
+// steps that 80 stable ones are taken in
 struct Case {
   const char *name;
   double slope, speed;
   int steps;
-};  // steps that 80 stable ones are taken in
+};
 
 // Largest kinetic plus elastic energy over that at the start, of a free body whose points all start with
 // velocities of their own.

@@ -4,11 +4,12 @@
 //   #include "deform/plugin.hpp"
 //   namespace dp = dfm::plugin;
 //   constexpr dfm_param rows[] = {dp::param("mu_C", "friction coefficient", "1", 0, 10, 0.5)};
-//   dfm_status eval(const dfm_friction_in *in, dfm_friction_out *out) { ... return DFM_OK; }     // may throw: guarded below
+//   dfm_status eval(const dfm_friction_in *in, dfm_friction_out *out) { ... return DFM_OK; }  // may throw
 //   const dfm_friction law = dp::friction(DFM_NEED_FN | DFM_NEED_VT, DFM_FRIC_ISOTROPIC, dp::guarded<eval>);
 //   const char *const effects[] = {"viscous", nullptr};
-//   const dfm_type type = dp::type(DFM_KIND_FRICTION, "org.example.mylaw", "My law", "1.0.0", "MIT", "Paper,
-//   eq. 1", rows, effects, &law); DFM_PLUGIN(&type)
+//   const dfm_type type = dp::type(DFM_KIND_FRICTION, "org.example.mylaw", "My law", "1.0.0", "MIT",
+//                                  "Paper, eq. 1", rows, effects, &law);
+//   DFM_PLUGIN(&type)
 #ifndef DEFORM_PLUGIN_HPP
 #define DEFORM_PLUGIN_HPP
 #include <cstddef>

@@ -220,10 +220,11 @@ dfm_status dfm_world_pairs_sized(dfm_world world, uint32_t row_size, uint32_t ca
   return guard([&] {
     Rows<dfm_pair_report> rows(out, row_size, "dfm_pair_report");
     World &w = settled(world_of(world));
+    // ids: the order of creation
     struct Pair {
       uint64_t a, b;
       dfm_pair_report report;
-    };  // ids: the order of creation
+    };
     std::vector<Pair> pairs;
     std::vector<Vec3> com(w.bodies.size());
     std::vector<uint8_t> known(w.bodies.size());

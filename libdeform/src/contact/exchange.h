@@ -11,7 +11,8 @@
 // So each triangle of the patch, of area w, hands area between its corners in proportion to what they carry.
 // With p_i = fn_i / A_i,
 //
-//     A_i* = A_i + sum over triangles T, their other corners j of  w (p_i - p_j) / (3 sum_T p) min(1, 2 min(p_i, p_j) / max(p_i, p_j))         (1)
+//     A_i* = A_i + sum over triangles T, their other corners j of
+//            w (p_i - p_j) / (3 sum_T p) min(1, 2 min(p_i, p_j) / max(p_i, p_j))                  (1)
 //
 // Without the last factor that is A_i* = sum_T w p_i / sum_T p, or 1/p_i* = mean over the fan of 1/mean_T p:
 // the pressure averaged over a ring of triangles. What passes is antisymmetric, so that the patch keeps its

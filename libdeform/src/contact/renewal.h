@@ -13,7 +13,8 @@
 //                                    kept, their energy falls
 //     sliding renews the bristles    its area goes to its aim by the share r of the way in a sub-step
 //
-//     r = min(1, sum fn |h v - dz| / sum fn |z|  +  min(|F - F_0| / max(F, F_0), sum fn h / (h + t) / F))       sums over the patch, F = sum fn
+//     r = min(1, sum fn |h v - dz| / sum fn |z|  +  min(|F - F_0| / max(F, F_0), sum fn h / (h + t) / F)),
+//     sums over the patch, F = sum fn:
 //
 // first how far points slid on over how far their bristles are out, dz being what these took up. Sliding
 // steadily that is the way over the deflection, without bristles it is 1. Then, for a patch that is being

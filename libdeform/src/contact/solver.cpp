@@ -14,7 +14,8 @@ struct Pair { double a, b; };
 // Set-valued laws: lambda* = lambda - u / w_t would stop the slip. Inside the disc it is taken (stick);
 // outside the contact slides along lambda* on a disc whose radius grows with the slip speed s by the law's
 // slope c = -v^ . (dft/dv) v^ >= 0 (viscous part):
-//     radius(s) = R + h c (s - s0),  s = w_t (|lambda*| - radius(s))   =>   s = w_t (|lambda*| - R + h c s0) / (1 + w_t h c).
+//     radius(s) = R + h c (s - s0),  s = w_t (|lambda*| - radius(s))
+//     =>   s = w_t (|lambda*| - R + h c s0) / (1 + w_t h c).
 // The radius follows the normal impulse: in proportion while it sticks, by the law's dft/dfn while it slips
 // (its viscous part does not).
 //

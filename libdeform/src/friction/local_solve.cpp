@@ -5,13 +5,15 @@
 // Newton on all contacts together asks the law at the present slip v instead and takes its tangent there.
 // That works while the line is steeper than the curve; a stiff bristle is the other way round:
 //
-//      f |   line                  a law saturates within a slip of R / (h sigma0 A). Asked at a slip beyond that it answers "R, whatever the slip",
-//        | \    ________ law       and the solve reverses the slip by m R; asked there it says "-R", and so on: stick and slip take turns for ever
-//        |  \ /                    once h m sigma0 A > 2, at any accuracy of the sweeps.
-//        |   x
-//        |__/_\_________ v         Asked at the crossing x, the answer as a function of f_stop is the resolvent of a monotone map: it never moves
-//        | /   \                   further than f_stop does (Rockafellar 1976, prop. 1), as the projection of a set-valued law; and it has a slope
-//          zero  v now             there which the passes use. Passes are then the semi-smooth Newton method on the natural map (Alart 1997).
+//      f |   line               a law saturates within a slip of R / (h sigma0 A). Asked at a slip beyond it
+//        | \    ________ law    says "R, whatever the slip", and the solve reverses the slip by m R; asked
+//        |  \ /                 there it says "-R", and so on: stick and slip take turns for ever once
+//        |   x                  h m sigma0 A > 2, at any accuracy of the sweeps.
+//        |__/_\_________ v      Asked at the crossing x, the answer as a function of f_stop is the resolvent
+//        | /   \                of a monotone map: it never moves further than f_stop does (Rockafellar
+//          zero  v now          1976, prop. 1), as the projection of a set-valued law; and it has a slope
+//                               there which the passes use. Passes are then the semi-smooth Newton method
+//                               on the natural map (Alart 1997).
 //
 // The crossing itself by Newton: g(v) = v - m (ft(v) - f_stop) has slope >= 1. A law that saturates is
 // concave in |v|, so that Newton steps that start at no slip stay on this side of the crossing and grow

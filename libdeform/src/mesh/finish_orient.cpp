@@ -3,10 +3,10 @@
 // loops; where those are small beside the patch, it bounds a solid and the sign of its volume tells outside
 // from inside. A patch inside an odd number of others is the wall of a hole and faces into it:
 //
-//      +--------------+      depth 0 faces outward, depth 1 into the hole, depth 2 (a kernel in the hole) outward again.
-//      | ^  +----+    |      Inside is where the winding number (solid angle over 4 pi) of the other patch is one: van Oosterom and
-//      | |  | <- |    |      Strackee 1983, eq. 8. Patches that only cross each other are not nested.
-//      |    +----+    |
+//      +--------------+      depth 0 faces outward, depth 1 into the hole, depth 2 (a kernel in the hole)
+//      | ^  +----+    |      outward again. Inside is where the winding number (solid angle over 4 pi) of the
+//      | |  | <- |    |      other patch is one: van Oosterom and Strackee 1983, eq. 8. Patches that only
+//      |    +----+    |      cross each other are not nested.
 //      +--------------+
 #include <algorithm>
 #include <cmath>

@@ -1,8 +1,10 @@
 // A surfel p against the other triangles of its own surface, and edges against edges.
 //
-//        p                      The surface around p is at distance 0 of it, so a triangle's nearest point is a minimum of the distance only if no
-//    ____|\____    /            triangle beside it, those of p among them, is nearer: flat and convex parts have none, however fine they are.
-//              \__/ F           In a fold the nearest point lies inside a face, over an edge or over a corner, as between two bodies.
+//        p                The surface around p is at distance 0 of it, so a triangle's nearest point is a
+//    ____|\____    /      minimum of the distance only if no triangle beside it, those of p among them, is
+//              \__/ F     nearer: flat and convex parts have none, however fine they are.
+//
+// In a fold the nearest point lies inside a face, over an edge or over a corner, as between two bodies.
 //
 // Every pair that is near is looked at in the rest shape as well:
 //   - It rests at o = min(d_c, half of its distance at rest) instead of d_c: what is near at rest, as in a

@@ -91,9 +91,10 @@ struct GuardMemory {
 
   void follow(const Array<Candidate> &list);
   void forget() { runs.clear(); }
+  // the sub-step has been taken
   void keep() {
     for (Run &r : runs) r.way += r.travel;
-  }  // the sub-step has been taken
+  }
 };
 
 // The candidates that may come to the floor, ascending: all that the other functions need to be asked about.

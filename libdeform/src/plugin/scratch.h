@@ -25,10 +25,11 @@ class ScratchArena {
   uint32_t depth = 0;  // open PluginCalls of this thread
 
  private:
+  // covers offsets [begin, begin + bytes) of the arena
   struct Chunk {
     char *data;
     size_t begin, bytes;
-  };  // covers offsets [begin, begin + bytes) of the arena
+  };
   bool grow(size_t bytes) noexcept;
   void drop_all() noexcept;
   const Memory &memory_;

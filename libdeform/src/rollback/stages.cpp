@@ -1,8 +1,10 @@
 // Two stages in place of narrow, contact <-> friction and distribute:
 //
 //   lagged     v_free += h M^-1 (friction forces that the last sub-step found)
-//   rollback   for every listed pair, on straight ways x -> x + h v_free: when does it touch?           (4.2)-(4.4), (4.7) corrected
-//              vertices that a hit ties together are an island; it goes its way up to t = 0.9 of its earliest hit      (4.5)
+//   rollback   for every listed pair, on straight ways x -> x + h v_free: when does it touch?
+//              (4.2)-(4.4), (4.7) corrected
+//              vertices that a hit ties together are an island; it goes its way up to t = 0.9 of its earliest
+//              hit (4.5)
 //              a pair whose vertices now go different shares may touch on that way: it joins them, and so on
 //              until none does
 //              normal force and friction of every colliding point, from the forces of this sub-step; they act

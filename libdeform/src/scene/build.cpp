@@ -287,10 +287,11 @@ class Builder {
 
   void create_rigid(Rigid &rigid) {
     if (rigid.bodies.empty()) {
+      // a host that is not there is an error all the same
       with_pointer(rigid.pointer + "/host", [&] {
         find_host(rigid.host);
         return 0;
-      });  // a host that is not there is an error all the same
+      });
       return;
     }
     std::vector<dfm_rigid_def> bodies;

@@ -1,9 +1,12 @@
 // Contacts of one sub-step as a structure of arrays: what narrow/ finds, contact/ and friction/ solve,
 // distribute/ applies, world/ reports.
 //
-//        a (surfel, edge or triangle of body a)        relative velocity  u = sum_k weight[k] v[node[k]] - v_obstacle
-//        |  ^ normal (from b to a)                      weights of side a sum to +1, of side b to -1 (or there are none)
+//        a (surfel, edge or triangle of body a)
+//        |  ^ normal (from b to a)
 //   -----+-----  b (triangle or edge of body b, or an obstacle)
+//
+// Relative velocity u = sum_k weight[k] v[node[k]] - v_obstacle; the weights of side a sum to +1, those of
+// side b to -1 (or there are none).
 //
 // Nodes are world-wide surfel numbers: surfel s of the body in slot k is node first_node[k] + s.
 #pragma once

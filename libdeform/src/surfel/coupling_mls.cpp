@@ -1,8 +1,9 @@
 // A surfel takes the motion of the phyxels that reach it, each carried on to the surfel by its own gradient
 // (Zerbato 2010, (3.9), with the corrections of doc/concepts/couplings.md):
 //
-//   u_s = sum_i W_i (u_i + H_i (X_s - X_i)),   W_i = w(|X_s - X_i|, h_i) / sum,   H_i = sum_j w_ij (u_j - u_i) X_ij^T A_i^-1,
-//   A_i = sum_j w_ij X_ij X_ij^T,   X_ij = X_j - X_i,   w_ij = w(|X_ij|, h_i),   w(r, h) = 315/(64 pi h^9) (h^2 - r^2)^3  (3.11)
+//   u_s = sum_i W_i (u_i + H_i (X_s - X_i)),   W_i = w(|X_s - X_i|, h_i) / sum,
+//   H_i = sum_j w_ij (u_j - u_i) X_ij^T A_i^-1,   A_i = sum_j w_ij X_ij X_ij^T,   X_ij = X_j - X_i,
+//   w_ij = w(|X_ij|, h_i),   w(r, h) = 315/(64 pi h^9) (h^2 - r^2)^3  (3.11)
 //
 // All positions are rest positions, so that this is one row of N. h_i, the support, belongs to the phyxel i.
 // Every term in the sum over i extrapolates linear fields exactly, hence so does the row; without the

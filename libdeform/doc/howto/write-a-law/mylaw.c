@@ -1,6 +1,6 @@
 /* Dahl's law, exponent 1, from the template: every slip moves the bristle, and the force comes near the cone
  * as exp(-path sigma0/(mu p)).
- *   z <- z on the cone;   z' = (z + h v) mu fn/(mu fn + k h |v|);   ft = -k z'                       (Dahl 1968; implicit in h)
+ *   z <- z on the cone;   z' = (z + h v) mu fn/(mu fn + k h |v|);   ft = -k z'   (Dahl 1968; implicit in h)
  */
 #include <math.h>
 #include <deform/plugin.h>
