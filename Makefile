@@ -7,7 +7,7 @@ BUILD = @cmake --build --preset
 # The set-up's own, as in cmake/DeformPython.cmake.
 PYTHON ?= $(firstword $(wildcard /usr/bin/python3) python3)
 
-.PHONY: help demo test bench soak lint asan tsan fuzz install clean setup setup-bench setup-fuzz
+.PHONY: help demo test bench soak lint format tidy asan tsan fuzz install clean setup setup-bench setup-fuzz
 
 help:
 	@echo "make demo             two soft cylinders with and without friction: table, picture, out/demo/"
@@ -15,6 +15,8 @@ help:
 	@echo "make bench            the figures: kernels and full steps"
 	@echo "make soak             what holds, and how much it creeps: hours; goes on where it was stopped"
 	@echo "make lint             layout, includes, headers, text"
+	@echo "make format           clang-format on all C and C++ files, one version everywhere"
+	@echo "make tidy             clang-tidy on the library, where it is installed"
 	@echo "make asan, make tsan  the suite under the sanitizers; tsan: what runs on several threads"
 	@echo "make fuzz             the readers under libFuzzer"
 	@echo "make install PREFIX=  library, headers, plugins, command (default $(PREFIX))"
@@ -43,6 +45,13 @@ test: setup build/release/build.ninja
 
 lint: setup build/release/build.ninja
 	@ctest --preset release -j $(JOBS) -L lint
+
+format:
+	@cmake/format.sh write
+
+# Reads how each file is compiled from the release build.
+tidy: setup build/release/build.ninja
+	@cmake/tidy.sh $(JOBS) $(FILES)
 
 asan tsan: %: setup build/%/build.ninja
 	$(BUILD) $@ --target checked_by_$@
