@@ -1,9 +1,13 @@
 // Handles: null, stale, of another kind or made up, every call that takes one says so; ends of
 // life in any order.
+#include <filesystem>
 #include <functional>
 #include <limits>
+#include <regex>
+#include <set>
 
 #include "stack.h"
+#include "support.h"
 
 namespace {
 
@@ -42,6 +46,14 @@ std::vector<Call> world_calls() {
          return dfm_world_get_stats(h, &s);
        }},
       {"world_profile", [](uint64_t h) { return dfm_world_profile(h, 0, nullptr, &count); }},
+      {"world_profile_sized", [](uint64_t h) { return dfm_world_profile_sized(h, 24, 0, nullptr, &count); }},
+      {"world_overlaps", [](uint64_t h) { return dfm_world_overlaps(h, 0, nullptr, &count); }},
+      {"world_overlaps_sized",
+       [](uint64_t h) { return dfm_world_overlaps_sized(h, 40, 0, nullptr, &count); }},
+      {"world_find_overlaps", [](uint64_t h) { return dfm_world_find_overlaps(h, &count); }},
+      {"world_untangle", [](uint64_t h) { return dfm_world_untangle(h, &count); }},
+      {"world_find_rigid", [](uint64_t h) { return dfm_world_find_rigid(h, "box", &made); }},
+      {"world_rigids", [](uint64_t h) { return dfm_world_rigids(h, 0, nullptr, &count); }},
       {"world_explain", [](uint64_t h) { return dfm_world_explain(h, nullptr, &bytes); }},
       {"world_add_friction",
        [](uint64_t h) {
@@ -57,8 +69,22 @@ std::vector<Call> world_calls() {
       {"world_filter_pair", [](uint64_t h) { return dfm_world_filter_pair(h, "*", "*", true); }},
       {"world_remove_filter", [](uint64_t h) { return dfm_world_remove_filter(h, "*", "*"); }},
       {"world_contacts", [](uint64_t h) { return dfm_world_contacts(h, 0, nullptr, &count); }},
+      {"world_contacts_sized",
+       [](uint64_t h) { return dfm_world_contacts_sized(h, 192, 0, nullptr, &count); }},
+      {"world_law_info",
+       [](uint64_t h) {
+         dfm_law_info i{};
+         return dfm_world_law_info(h, 0, &i);
+       }},
       {"world_pairs", [](uint64_t h) { return dfm_world_pairs(h, 0, nullptr, &count); }},
+      {"world_pairs_sized", [](uint64_t h) { return dfm_world_pairs_sized(h, 128, 0, nullptr, &count); }},
+      {"world_pair_impulses", [](uint64_t h) { return dfm_world_pair_impulses(h, 0, nullptr, &count); }},
+      {"world_pair_impulses_sized",
+       [](uint64_t h) { return dfm_world_pair_impulses_sized(h, 104, 0, nullptr, &count); }},
+      {"world_pair_wrench",
+       [](uint64_t h) { return dfm_world_pair_wrench(h, 1, 2, zero3, nullptr, nullptr); }},
       {"world_events", [](uint64_t h) { return dfm_world_events(h, 0, nullptr, &count); }},
+      {"world_events_sized", [](uint64_t h) { return dfm_world_events_sized(h, 40, 0, nullptr, &count); }},
       {"world_set_budget", [](uint64_t h) { return dfm_world_set_budget(h, 0, 0); }},
       {"world_set_sleep", [](uint64_t h) { return dfm_world_set_sleep(h, true); }},
       {"world_hold_begin", [](uint64_t h) { return dfm_world_hold_begin(h); }},
@@ -87,6 +113,11 @@ std::vector<Call> world_calls() {
        [](uint64_t h) {
          const dfm_obstacle_def d = dfm_obstacle_def_default();
          return dfm_obstacle_create(h, &d, &made);
+       }},
+      {"rigid_create",
+       [](uint64_t h) {
+         const dfm_rigid_set_def d{sizeof d, 0, 0, 0, nullptr, nullptr, nullptr};
+         return dfm_rigid_create(h, nullptr, &d, &made);
        }},
       {"material_create",
        [](uint64_t h) {
@@ -165,12 +196,50 @@ std::vector<Call> obstacle_calls() {
          return dfm_obstacle_get_def(h, &d);
        }},
       {"obstacle_move_to", [](uint64_t h) { return dfm_obstacle_move_to(h, &pose); }},
+      {"obstacle_teleport", [](uint64_t h) { return dfm_obstacle_teleport(h, &pose); }},
   };
 }
 
-std::vector<Call> other_calls() {
+std::vector<Call> rigid_calls() {
   return {
-      {"material_destroy", [](uint64_t h) { return dfm_material_destroy(h); }},
+      {"rigid_destroy", [](uint64_t h) { return dfm_rigid_destroy(h); }},
+      {"rigid_add_shape",
+       [](uint64_t h) {
+         const dfm_obstacle_def d = dfm_obstacle_def_default();
+         return dfm_rigid_add_shape(h, &d, &made);
+       }},
+      {"rigid_get_def",
+       [](uint64_t h) {
+         dfm_rigid_def d{};
+         return dfm_rigid_get_def(h, &d);
+       }},
+      {"rigid_get_state",
+       [](uint64_t h) {
+         dfm_rigid_state s{};
+         return dfm_rigid_get_state(h, &s);
+       }},
+      {"rigid_set_state",
+       [](uint64_t h) {
+         const dfm_rigid_state s{};
+         return dfm_rigid_set_state(h, &s);
+       }},
+      {"rigid_get_measure",
+       [](uint64_t h) {
+         dfm_body_measure m{};
+         return dfm_rigid_get_measure(h, &m);
+       }},
+      {"rigid_contact_wrench", [](uint64_t h) { return dfm_rigid_contact_wrench(h, numbers, numbers); }},
+      {"rigid_set_motor", [](uint64_t h) { return dfm_rigid_set_motor(h, 0, 0, 0); }},
+      {"rigid_joint", [](uint64_t h) { return dfm_rigid_joint(h, 0, nullptr, nullptr, nullptr); }},
+  };
+}
+
+std::vector<Call> material_calls() {
+  return {{"material_destroy", [](uint64_t h) { return dfm_material_destroy(h); }}};
+}
+
+std::vector<Call> law_calls() {
+  return {
       {"law_close", [](uint64_t h) { return dfm_law_close(h); }},
       {"law_type",
        [](uint64_t h) {
@@ -184,6 +253,11 @@ std::vector<Call> other_calls() {
          dfm_friction_out out{};
          return dfm_law_eval(h, &in, &out);
        }},
+  };
+}
+
+std::vector<Call> tetmesh_calls() {
+  return {
       {"tetmesh_destroy", [](uint64_t h) { return dfm_tetmesh_destroy(h); }},
       {"tetmesh_get_info",
        [](uint64_t h) {
@@ -194,11 +268,113 @@ std::vector<Call> other_calls() {
       {"tetmesh_groups", [](uint64_t h) { return dfm_tetmesh_groups(h, nullptr, nullptr); }},
       {"tetmesh_group_points",
        [](uint64_t h) { return dfm_tetmesh_group_points(h, 0, nullptr, nullptr, nullptr); }},
+      {"tetmesh_triangles", [](uint64_t h) { return dfm_tetmesh_triangles(h, nullptr, nullptr, nullptr); }},
+      {"tetmesh_file_cells",
+       [](uint64_t h) {
+         const uint32_t *p;
+         return dfm_tetmesh_file_cells(h, &p);
+       }},
+      {"tetmesh_share",
+       [](uint64_t h) {
+         const double *p;
+         return dfm_tetmesh_share(h, &p);
+       }},
       {"tetmesh_write", [](uint64_t h) { return dfm_tetmesh_write(h, "/nonexistent/x.msh"); }},
+  };
+}
+
+std::vector<Call> trimesh_calls() {
+  return {
+      {"trimesh_destroy", [](uint64_t h) { return dfm_trimesh_destroy(h); }},
+      {"trimesh_get_info",
+       [](uint64_t h) {
+         dfm_trimesh_info i{};
+         return dfm_trimesh_get_info(h, &i);
+       }},
+      {"trimesh_data", [](uint64_t h) { return dfm_trimesh_data(h, nullptr, nullptr, nullptr); }},
+      {"trimesh_groups", [](uint64_t h) { return dfm_trimesh_groups(h, nullptr, nullptr); }},
+      {"trimesh_write", [](uint64_t h) { return dfm_trimesh_write(h, "/nonexistent/x.obj"); }},
+      {"tetmesh_fill", [](uint64_t h) { return dfm_tetmesh_fill(h, 100, &made); }},
+  };
+}
+
+std::vector<Call> scene_calls() {
+  return {
       {"scene_close", [](uint64_t h) { return dfm_scene_close(h); }},
       {"scene_world", [](uint64_t h) { return dfm_scene_world(h, &made); }},
       {"scene_value", [](uint64_t h) { return dfm_scene_value(h, "/time", nullptr, &bytes); }},
+      {"scene_get_settings",
+       [](uint64_t h) {
+         dfm_scene_settings s{};
+         return dfm_scene_get_settings(h, &s);
+       }},
+      {"scene_probe", [](uint64_t h) { return dfm_scene_probe(h, 0, nullptr, nullptr, nullptr); }},
   };
+}
+
+// Calls by the kind of handle that they take.
+struct Taker {
+  uint32_t kind;
+  const char *wanted;
+  std::vector<Call> calls;
+};
+std::vector<Taker> takers() {
+  return {{DFM_HANDLE_WORLD, "a world", world_calls()},
+          {DFM_HANDLE_BODY, "a body", body_calls()},
+          {DFM_HANDLE_OBSTACLE, "an obstacle", obstacle_calls()},
+          {DFM_HANDLE_RIGID, "", rigid_calls()},
+          {DFM_HANDLE_MATERIAL, "a material", material_calls()},
+          {DFM_HANDLE_LAW, "a law", law_calls()},
+          {DFM_HANDLE_TETMESH, "a mesh", tetmesh_calls()},
+          {DFM_HANDLE_TRIMESH, "a surface mesh", trimesh_calls()},
+          {DFM_HANDLE_SCENE, "a scene", scene_calls()}};
+}
+
+// One live handle of each kind, as reports and find functions give them.
+struct Live {
+  uint32_t kind;
+  const char *name;
+  uint64_t handle;
+};
+std::vector<Live> live(dfm_context *c) {
+  const test::Stack s = test::make_stack(c);
+  std::vector<Live> out = {{DFM_HANDLE_WORLD, "a world", s.world},
+                           {DFM_HANDLE_BODY, "a body", s.lower},
+                           {DFM_HANDLE_OBSTACLE, "an obstacle", s.floor}};
+  const auto add = [&](uint32_t kind, const char *name, dfm_status status, const uint64_t &handle) {
+    test::ok(status);
+    out.push_back({kind, name, handle});
+  };
+  const dfm_rigid_def rigid_def = dfm_rigid_def_default();
+  const dfm_rigid_set_def set = {sizeof set, 1, 0, 0, &rigid_def, nullptr, nullptr};
+  const dfm_material_def material_def = dfm_material_def_default();
+  const double size[3] = {0.1, 0, 0};
+  const std::string file = std::string(DEFORM_SOURCE_DIR) + "/examples/scenes/two_cylinders.json";
+  uint64_t h = 0;
+  add(DFM_HANDLE_RIGID, "an obstacle", dfm_rigid_create(s.world, nullptr, &set, &h), h);
+  add(DFM_HANDLE_MATERIAL, "a material", dfm_material_create(s.world, &material_def, &h), h);
+  add(DFM_HANDLE_LAW, "a law", dfm_law_open(c, "coulomb", &h), h);
+  add(DFM_HANDLE_TETMESH, "a mesh", dfm_tetmesh_make(c, "ball", size, 100, &h), h);
+  add(DFM_HANDLE_TRIMESH, "a surface mesh", dfm_trimesh_make(c, "ball", size, 100, &h), h);
+  add(DFM_HANDLE_SCENE, "a scene", dfm_scene_open(c, file.c_str(), nullptr, &h), h);
+  return out;
+}
+
+// Names of the public functions whose first argument is a handle of the kind, without "dfm_"; of handles
+// alone those that give a status.
+std::multiset<std::string> declared() {
+  const std::regex comment(R"(/\*[\s\S]*?\*/)");
+  const std::regex function(
+      R"(\bdfm_status\s+dfm_(\w+)\s*\(\s*dfm_(world|body|obstacle|rigid|material|law|scene|tetmesh|trimesh)\s+\w)");
+  std::multiset<std::string> out;
+  for (const auto &entry :
+       std::filesystem::directory_iterator(std::string(DEFORM_SOURCE_DIR) + "/libdeform/include/deform")) {
+    if (entry.path().extension() != ".h") continue;
+    const std::string text = std::regex_replace(test::read_file(entry.path()), comment, "");
+    for (std::sregex_iterator at(text.begin(), text.end(), function), end; at != end; ++at)
+      out.insert((*at)[1]);
+  }
+  return out;
 }
 
 void all_refuse(const std::vector<Call> &calls, uint64_t handle, const char *what) {
@@ -214,27 +390,73 @@ void all_refuse(const std::vector<Call> &calls, uint64_t handle, const char *wha
 TEST(Handles, NullOrMadeUp_AreRefusedByEveryCall) {
   test::Context c;
   const test::Stack s = test::make_stack(c);
-  for (const auto &calls : {world_calls(), body_calls(), obstacle_calls(), other_calls()}) {
-    all_refuse(calls, 0, "null");
-    all_refuse(calls, 0xdeadbeefdeadbeefull, "made up");
-    all_refuse(calls, std::numeric_limits<uint64_t>::max(), "made up");
+  for (const Taker &taker : takers()) {
+    all_refuse(taker.calls, 0, "null");
+    all_refuse(taker.calls, 0xdeadbeefdeadbeefull, "made up");
+    all_refuse(taker.calls, std::numeric_limits<uint64_t>::max(), "made up");
   }
   EXPECT_TRUE(std::isnan(dfm_world_time(0)));
   EXPECT_EQ(dfm_world_hash(0), 0u);
   EXPECT_NE(dfm_world_hash(s.world), 0u);
 }
 
-TEST(Handles, OfAnotherKind_AreRefusedByEveryCall) {
+// The lists above are complete: a function that joins the headers joins them.
+TEST(Handles, EveryFunctionThatTakesOne_IsTriedHere) {
+  std::multiset<std::string> tried{"world_interrupt"};  // looks at the kind alone: below
+  for (const Taker &taker : takers())
+    for (const auto &[name, call] : taker.calls) tried.insert(name);
+  EXPECT_EQ(tried, declared());
+}
+
+TEST(Handles, OfAnotherKind_AreRefusedByEveryCall_WithBothKindsNamed) {
   test::Context c;
+  const std::vector<Live> all = live(c);
+  for (const Taker &taker : takers())
+    for (const Live &one : all) {
+      // a rigid body is an obstacle too
+      const bool moves = taker.kind == DFM_HANDLE_OBSTACLE && one.kind == DFM_HANDLE_RIGID;
+      if (taker.kind == one.kind || moves) continue;
+      SCOPED_TRACE(one.name);
+      for (const auto &[name, call] : taker.calls) {
+        EXPECT_EQ(call(one.handle), DFM_E_HANDLE) << name;
+        const std::string said = dfm_last_error();
+        if (taker.kind == DFM_HANDLE_RIGID && one.kind == DFM_HANDLE_OBSTACLE) {
+          EXPECT_NE(said.find("obstacle 'floor', which feels nothing, and a rigid body is wanted"),
+                    std::string::npos)
+              << name << ": " << said;
+          continue;
+        }
+        const char *const wanted = taker.kind == DFM_HANDLE_RIGID ? "an obstacle" : taker.wanted;
+        const std::string both = std::string("is that of ") + one.name + " and " + wanted + " is wanted";
+        EXPECT_NE(said.find(both), std::string::npos) << name << ": " << said;
+      }
+    }
+  for (const Live &one : all) {
+    if (one.kind == DFM_HANDLE_WORLD) continue;
+    EXPECT_TRUE(std::isnan(dfm_world_time(one.handle)));
+    EXPECT_EQ(dfm_world_hash(one.handle), 0u);
+    EXPECT_EQ(dfm_world_interrupt(one.handle), DFM_E_HANDLE);
+    test::says({"is not that of a world"});
+  }
+  test::run(all[0].handle, 2e-3, 1e-3);  // and nothing was harmed
+}
+
+TEST(Handles, HandleKind_TellsWhatAReportNames) {
+  test::Context c;
+  uint64_t floor = 0;
+  for (const Live &one : live(c)) {
+    EXPECT_EQ(dfm_handle_kind(one.handle), one.kind);
+    if (one.kind == DFM_HANDLE_OBSTACLE) floor = one.handle;
+  }
+  test::ok(dfm_obstacle_destroy(floor));
+  for (const uint64_t none : {uint64_t{0}, floor, uint64_t{0xdeadbeefdeadbeef}})
+    EXPECT_EQ(dfm_handle_kind(none), uint32_t{DFM_HANDLE_NONE});
   const test::Stack s = test::make_stack(c);
-  all_refuse(world_calls(), s.lower, "body");
-  all_refuse(body_calls(), s.world, "world");
-  all_refuse(body_calls(), s.floor, "obstacle");
-  all_refuse(obstacle_calls(), s.upper, "body");
-  all_refuse(other_calls(), s.world, "world");
-  EXPECT_TRUE(std::isnan(dfm_world_time(s.lower)));
-  EXPECT_EQ(dfm_world_hash(s.lower), 0u);
-  test::run(s.world, 2e-3, 1e-3);  // and nothing was harmed
+  test::run(s.world, 10e-3, 1e-3);
+  for (const dfm_pair_report &p : test::pairs(s.world)) {
+    EXPECT_EQ(dfm_handle_kind(p.a), uint32_t{DFM_HANDLE_BODY});
+    EXPECT_EQ(dfm_handle_kind(p.b), uint32_t(p.b == s.floor ? DFM_HANDLE_OBSTACLE : DFM_HANDLE_BODY));
+  }
 }
 
 TEST(Handles, AfterTheirObjectWent_AreRefusedThoughTheSlotIsUsedAgain) {
@@ -286,8 +508,8 @@ TEST(Handles, WhenTheContextGoesFirst_EveryHandleIsStale) {
   all_refuse(world_calls(), s.world, "stale");
   all_refuse(body_calls(), s.upper, "stale");
   all_refuse(obstacle_calls(), s.floor, "stale");
-  all_refuse(other_calls(), law, "stale");
-  all_refuse(other_calls(), mesh, "stale");
+  all_refuse(law_calls(), law, "stale");
+  all_refuse(tetmesh_calls(), mesh, "stale");
   dfm_context_destroy(nullptr);
 }
 

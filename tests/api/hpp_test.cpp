@@ -39,6 +39,20 @@ struct Scene {
   }
 };
 
+// Handles of different things are of different types: neither converts, assigns or compares, but a rigid body
+// is an obstacle.
+template <class A, class B>
+constexpr bool kMixed = std::is_convertible_v<A, B> || std::is_constructible_v<A, B> ||
+                        std::is_assignable_v<A &, B> || requires(A a, B b) { a == b; };
+static_assert(!kMixed<deform::Body, deform::World> && !kMixed<deform::Body, deform::Obstacle> &&
+              !kMixed<deform::Obstacle, deform::Body>);
+static_assert(!kMixed<deform::Law, deform::Material> && !kMixed<deform::TetMesh, deform::TriMesh> &&
+              !kMixed<deform::Scene, deform::World>);
+static_assert(!kMixed<deform::Rigid, deform::Body> &&
+              !std::is_convertible_v<deform::Obstacle, deform::Rigid>);
+static_assert(std::is_convertible_v<deform::Rigid, deform::Obstacle> &&
+              !std::is_convertible_v<uint64_t, deform::Body>);
+
 }  // namespace
 
 TEST(Hpp, Handles_EndWhatTheyOwnAndOnlyThat) {

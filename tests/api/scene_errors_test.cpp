@@ -285,6 +285,29 @@ TEST(SceneApi, SelfContactAuto_IsReadAndIsOffWhereNothingFolds) {
   test::ok(dfm_scene_close(s));
 }
 
+// Structs of an older header end earlier: what they lack is left out, or has its default.
+TEST(SceneApi, OptionsAndSettingsOfAnOlderHeader_AreTaken) {
+  test::Context context;
+  const char *set[] = {"/time/duration=0.5"};
+  dfm_scene_options options = {offsetof(dfm_scene_options, jitter_seed), 1, set, 4711};
+  dfm_scene older = 0, today = 0;
+  DFM_OK_OR_DIE(dfm_scene_open(context, scene().c_str(), &options, &older));
+  options = {sizeof options, 1, set, 0};
+  DFM_OK_OR_DIE(dfm_scene_open(context, scene().c_str(), &options, &today));
+  dfm_world worlds[2] = {};
+  DFM_OK_OR_DIE(dfm_scene_world(older, &worlds[0]));
+  DFM_OK_OR_DIE(dfm_scene_world(today, &worlds[1]));
+  EXPECT_EQ(dfm_world_hash(worlds[0]), dfm_world_hash(worlds[1]))
+      << "the seed behind the struct's end counts";
+  dfm_scene_settings settings = {};
+  settings.size = offsetof(dfm_scene_settings, every);
+  settings.every = -1;
+  DFM_OK_OR_DIE(dfm_scene_get_settings(older, &settings));
+  EXPECT_EQ(settings.duration, 0.5);
+  EXPECT_EQ(settings.every, -1) << "behind the end that the caller named";
+  EXPECT_EQ(settings.size, offsetof(dfm_scene_settings, every));
+}
+
 TEST(SceneApi, OpenScene_AnswersUntilItIsClosed) {
   test::Context context;
   const char *set[] = {"/time/duration=0.5", "/output/color=speed"};

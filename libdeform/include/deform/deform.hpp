@@ -40,7 +40,7 @@ namespace basic {
 
 // ---- materials, laws --------------------------------------------------------------------------------------
 template <class E>
-class Material : public Handle<dfm_material> {
+class Material : public Handle<dfm_material, struct MaterialKind> {
  public:
   using Handle::Handle;
   static void end(dfm_material m) noexcept { dfm_material_destroy(m); }
@@ -48,7 +48,7 @@ class Material : public Handle<dfm_material> {
 };
 
 template <class E>
-class Law : public Handle<dfm_law> {
+class Law : public Handle<dfm_law, struct LawKind> {
  public:
   using Handle::Handle;
   static void end(dfm_law law) noexcept { dfm_law_close(law); }
@@ -81,7 +81,7 @@ class Law : public Handle<dfm_law> {
 
 // ---- meshes -----------------------------------------------------------------------------------------------
 template <class E>
-class TetMesh : public Handle<dfm_tetmesh> {
+class TetMesh : public Handle<dfm_tetmesh, struct TetMeshKind> {
  public:
   using Handle::Handle;
   static void end(dfm_tetmesh mesh) noexcept { dfm_tetmesh_destroy(mesh); }
@@ -168,7 +168,7 @@ class TetMesh : public Handle<dfm_tetmesh> {
 };
 
 template <class E>
-class TriMesh : public Handle<dfm_trimesh> {
+class TriMesh : public Handle<dfm_trimesh, struct TriMeshKind> {
  public:
   using Handle::Handle;
   static void end(dfm_trimesh mesh) noexcept { dfm_trimesh_destroy(mesh); }
@@ -219,7 +219,7 @@ struct AnyMesh {
 
 // ---- bodies -----------------------------------------------------------------------------------------------
 template <class E>
-class Body : public Handle<dfm_body> {
+class Body : public Handle<dfm_body, struct BodyKind> {
  public:
   using Handle::Handle;
   static void end(dfm_body body) noexcept { dfm_body_destroy(body); }
@@ -338,7 +338,7 @@ class Body : public Handle<dfm_body> {
 
 // ---- obstacles and rigid bodies ---------------------------------------------------------------------------
 template <class E>
-class Obstacle : public Handle<dfm_obstacle> {
+class Obstacle : public Handle<dfm_obstacle, struct ObstacleKind> {
  public:
   using Handle::Handle;
   static void end(dfm_obstacle obstacle) noexcept { dfm_obstacle_destroy(obstacle); }
@@ -358,7 +358,7 @@ class Obstacle : public Handle<dfm_obstacle> {
 
 // Converts to Obstacle: poses, pair rules and reports take it.
 template <class E>
-class Rigid : public Handle<dfm_rigid> {
+class Rigid : public Handle<dfm_rigid, struct RigidKind> {
  public:
   using Handle::Handle;
   // Of the whole set that the body came with.
@@ -402,7 +402,7 @@ class Rigid : public Handle<dfm_rigid> {
 
 // ---- the world --------------------------------------------------------------------------------------------
 template <class E>
-class World : public Handle<dfm_world> {
+class World : public Handle<dfm_world, struct WorldKind> {
  public:
   using Handle::Handle;
   static void end(dfm_world world) noexcept { dfm_world_destroy(world); }
@@ -598,7 +598,7 @@ class World : public Handle<dfm_world> {
 
 // ---- scenes -----------------------------------------------------------------------------------------------
 template <class E>
-class Scene : public Handle<dfm_scene> {
+class Scene : public Handle<dfm_scene, struct SceneKind> {
  public:
   using Handle::Handle;
   static void end(dfm_scene scene) noexcept { dfm_scene_close(scene); }
@@ -625,7 +625,7 @@ class Scene : public Handle<dfm_scene> {
 
 // ---- the context ------------------------------------------------------------------------------------------
 template <class E>
-class Context : public Handle<dfm_context *> {
+class Context : public Handle<dfm_context *, struct ContextKind> {
  public:
   using Handle::Handle;
   static void end(dfm_context *context) noexcept { dfm_context_destroy(context); }

@@ -17,6 +17,7 @@
 #include <vector>
 
 #include "deform/base.h"
+#include "deform/id.h"
 
 namespace deform {
 
@@ -77,6 +78,8 @@ inline const char *version() noexcept { return dfm_version(nullptr, nullptr, nul
 inline const char *status_name(dfm_status s) noexcept {
   return s == spans_disagree ? "spans_disagree" : dfm_status_name(s);
 }
+// DFM_HANDLE_*: what a handle refers to that a report gives as a number.
+inline uint32_t handle_kind(uint64_t handle) noexcept { return dfm_handle_kind(handle); }
 // The sentence that belongs to s, the status of this thread's last call that failed.
 inline const char *sentence(dfm_status s) noexcept {
   return s == spans_disagree
@@ -317,8 +320,9 @@ inline auto collect_text(F &&f) {
   });
 }
 
-// A handle's value. Raw is what the C functions take.
-template <class Raw>
+// A handle's value. Raw is what the C functions take; Kind keeps handles of different things apart, which in
+// C have one type.
+template <class Raw, class Kind>
 class Handle {
  public:
   constexpr Handle() = default;

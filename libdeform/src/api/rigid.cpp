@@ -10,7 +10,11 @@ namespace {
 
 Obstacle &rigid_of(dfm_rigid h) {
   Obstacle &o = obstacle_of(h);
-  if (!o.rigid) fail(DFM_E_HANDLE, "obstacle '%s' is no rigid body: it feels nothing", o.name.c_str());
+  if (!o.rigid)
+    fail(DFM_E_HANDLE,
+         "handle 0x%llx is that of obstacle '%s', which feels nothing, and a rigid body is wanted; pass the "
+         "other handle",
+         static_cast<unsigned long long>(h), o.name.c_str());
   return o;
 }
 

@@ -54,10 +54,8 @@ dfm_status dfm_scene_open(dfm_context *context, const char *path, const dfm_scen
   return dfm::guard([&] {
     check_call(context, path, out);
     dfm::used(*context);
-    if (options && options->size < sizeof(dfm_scene_options))
-      dfm::fail(DFM_E_ARG, "dfm_scene_open: options->size is %u, expected %zu", options->size,
-                sizeof(dfm_scene_options));
-    auto scene = std::make_unique<Scene>(context, path, options);
+    const dfm_scene_options given = dfm::take_def(options, dfm_scene_options{});
+    auto scene = std::make_unique<Scene>(context, path, &given);
     const uint64_t handle = dfm::handle_create(dfm::Kind::scene, scene.get());
     try {
       context->add_live(handle, [](uint64_t h) { dfm_scene_close(h); });
@@ -98,13 +96,9 @@ dfm_status dfm_scene_value(dfm_scene scene, const char *pointer, char *text, siz
 
 dfm_status dfm_scene_get_settings(dfm_scene scene, dfm_scene_settings *out) {
   return dfm::guard([&] {
-    if (!out || out->size < sizeof(dfm_scene_settings))
-      dfm::fail(DFM_E_ARG,
-                "dfm_scene_get_settings: out is NULL or its size is not set to sizeof(dfm_scene_settings)");
     const Scene &s = scene_of(scene);
     const dfm::scene::Definition &d = s.definition();
     dfm_scene_settings r = {};
-    r.size = sizeof r;
     r.nprobe = uint32_t(s.probe_count());
     r.duration = d.duration;
     r.step = d.step;
@@ -118,7 +112,7 @@ dfm_status dfm_scene_get_settings(dfm_scene scene, dfm_scene_settings *out) {
     std::memcpy(r.eye, d.eye, sizeof r.eye);
     std::memcpy(r.look_at, d.look_at, sizeof r.look_at);
     r.has_camera = d.has_camera;
-    *out = r;
+    dfm::give(out, r);
   });
 }
 

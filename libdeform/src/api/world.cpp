@@ -207,8 +207,14 @@ dfm_status dfm_world_set_budget(dfm_world world, double max_time, uint64_t max_w
 }
 
 dfm_status dfm_world_interrupt(dfm_world world) {
+  // no look into the table: a signal may have come inside it
   if (uint8_t(world >> 32) != uint8_t(Kind::world))
-    return guard([] { fail(DFM_E_HANDLE, "a handle that is no world's cannot be interrupted"); });
+    return guard([&] {
+      fail(DFM_E_HANDLE,
+           "handle 0x%llx is not that of a world and a world is wanted; pass the handle of the world to "
+           "interrupt",
+           static_cast<unsigned long long>(world));
+    });
   return request_stop(world) ? DFM_OK : guard([] {
     fail(DFM_E_NOMEM, "64 other worlds have been asked to stop and have not stepped since");
   });

@@ -28,17 +28,30 @@ Table &table() {
 
 const char *kind_name(Kind kind) {
   switch (kind) {
-    case Kind::world: return "world";
-    case Kind::body: return "body";
-    case Kind::obstacle: return "obstacle";
-    case Kind::material: return "material";
-    case Kind::law: return "law";
-    case Kind::scene: return "scene";
-    case Kind::tetmesh: return "mesh";
-    case Kind::trimesh: return "surface mesh";
+    case Kind::world: return "a world";
+    case Kind::body: return "a body";
+    case Kind::obstacle: return "an obstacle";
+    case Kind::material: return "a material";
+    case Kind::law: return "a law";
+    case Kind::scene: return "a scene";
+    case Kind::tetmesh: return "a mesh";
+    case Kind::trimesh: return "a surface mesh";
     case Kind::none: break;
   }
-  return "object";
+  return "an object";
+}
+
+// The slot that the handle names, or an empty one for a null, stale or made-up handle.
+Slot slot_of(uint64_t handle) noexcept {
+  const uint32_t index = static_cast<uint32_t>(handle);
+  if (index == 0) return {};
+  Table &t = table();
+  std::shared_lock lock(t.mutex);
+  if (index > t.slots.size()) return {};
+  const Slot &slot = t.slots[index - 1];
+  const bool fits =
+      uint8_t(handle >> 32) == uint8_t(slot.kind) && (slot.generation & 0xffffff) == uint32_t(handle >> 40);
+  return fits ? slot : Slot{};
 }
 
 }  // namespace
@@ -62,14 +75,11 @@ uint64_t handle_create(Kind kind, void *object) {
 }
 
 void *handle_find(Kind kind, uint64_t handle) noexcept {
-  const uint32_t index = static_cast<uint32_t>(handle);
-  if (index == 0 || uint8_t(handle >> 32) != uint8_t(kind)) return nullptr;
-  Table &t = table();
-  std::shared_lock lock(t.mutex);
-  if (index > t.slots.size()) return nullptr;
-  const Slot &slot = t.slots[index - 1];
-  return slot.kind == kind && (slot.generation & 0xffffff) == uint32_t(handle >> 40) ? slot.object : nullptr;
+  const Slot slot = slot_of(handle);
+  return slot.kind == kind ? slot.object : nullptr;
 }
+
+Kind handle_kind(uint64_t handle) noexcept { return slot_of(handle).kind; }
 
 void handle_destroy(uint64_t handle) noexcept {
   const uint32_t index = static_cast<uint32_t>(handle);
@@ -86,12 +96,22 @@ void handle_destroy(uint64_t handle) noexcept {
 }
 
 void *handle_require(Kind kind, uint64_t handle) {
-  void *object = handle_find(kind, handle);
-  if (!object)
-    fail(DFM_E_HANDLE,
-         "%s handle 0x%llx is stale, null or of another kind; keep handles only while their object lives",
-         kind_name(kind), static_cast<unsigned long long>(handle));
-  return object;
+  const Slot slot = slot_of(handle);
+  if (slot.kind == kind && slot.object) return slot.object;
+  const unsigned long long value = handle;
+  const char *const wanted = kind_name(kind);
+  if (handle == 0)
+    fail(DFM_E_HANDLE, "handle 0x0 is null and %s is wanted; pass what a create or find function gave",
+         wanted);
+  if (slot.object)
+    fail(DFM_E_HANDLE, "handle 0x%llx is that of %s and %s is wanted; pass the other handle", value,
+         kind_name(slot.kind), wanted);
+  if (uint8_t(handle >> 32) == uint8_t(kind))
+    fail(DFM_E_HANDLE, "handle 0x%llx is stale and %s is wanted; keep handles only while their object lives",
+         value, wanted);
+  fail(DFM_E_HANDLE,
+       "handle 0x%llx refers to nothing and %s is wanted; pass what a create or find function gave", value,
+       wanted);
 }
 
 }  // namespace dfm

@@ -22,9 +22,11 @@ enum class Kind : uint8_t {
 uint64_t handle_create(Kind kind, void *object);
 // The object, or nullptr for a null, stale or wrong-kind handle. Thread-safe.
 void *handle_find(Kind kind, uint64_t handle) noexcept;
+// Kind of the object, or none for a null, stale or made-up handle. Thread-safe.
+Kind handle_kind(uint64_t handle) noexcept;
 void handle_destroy(uint64_t handle) noexcept;
 
-// Throws Error(DFM_E_HANDLE) with a sentence that names the kind.
+// Throws Error(DFM_E_HANDLE) with a sentence that says which kind is wanted and what the handle is instead.
 void *handle_require(Kind kind, uint64_t handle);
 template <class T>
 T &resolve(Kind kind, uint64_t handle) {

@@ -23,7 +23,7 @@ struct OdeGeom : dfm_ode_geom {
 namespace basic {
 
 template <class E>
-class Ode : public Handle<dfm_ode> {
+class Ode : public Handle<dfm_ode, struct OdeKind> {
  public:
   using Handle::Handle;
   // "ode" for scenes and World::add_rigids
