@@ -72,7 +72,8 @@ dfm_status commit(void *self, const dfm_kin *k, const double *p, double *x, doub
 }
 
 const void *extension(const void *, const char *id) {
-  static const dfm_stepper stepper{sizeof(dfm_stepper), 0, predict, respond, diagonal, commit, nullptr};
+  static const dfm_stepper stepper{
+      sizeof(dfm_stepper), 0, predict, respond, diagonal, commit, nullptr, nullptr};
   return std::string(id) == "dfm.stepper/1" ? &stepper : nullptr;
 }
 

@@ -199,6 +199,10 @@ typedef struct dfm_stepper {
    * not aliasing k */
   dfm_status (*commit)(void *self, const dfm_kin *k, const double *p_s, double *x, double *v);
   dfm_status (*fetch)(void *self, uint32_t what, double *dst); /* [step] copies what lives off the host */
+  /* [step] optional (NULL, or a smaller size): respond for nrhs right-hand sides at once, p, du_s [nrhs,n,3].
+   * Without it respond is called nrhs times. */
+  dfm_status (*respond_many)(void *self, const dfm_kin *k, uint32_t n, const uint32_t *surfel, uint32_t nrhs,
+                             const double *p, double *du_s);
 } dfm_stepper;
 /* Extension "dfm.cell_energy/1" of a model (draft): elastic energy per rest volume, for pictures
  * and probes. */

@@ -77,7 +77,7 @@ void springs_changed(Body &b) {
 
 Spring make_spring(const Body &b, const dfm_spring_def &d) {
   const char *const name = b.name.c_str();
-  if (b.model.stepper)
+  if (!b.dynamics->abilities().springs)
     fail(DFM_E_UNSUPPORTED, "body '%s': a spring is explicit, and model '%s' has no step bound to hold it to",
          name, b.model.type->id);
   check_points(b, d.npoint, d.points);
@@ -364,9 +364,7 @@ dfm_status dfm_body_apply_impulse(dfm_body body, const double point[3], const do
     // dv = M^-1 N^T p: of all changes that give the point its new velocity the one of least kinetic energy
     for (int k = 0; k < 3; ++k)
       b.surface.each_phyxel(b.surface.tri[size_t(3) * triangle + size_t(k)], [&](uint32_t phyxel, double w) {
-        for (size_t c = 0; c < 3; ++c)
-          b.p.v[size_t(phyxel) * kStride + c] +=
-              weight[k] * w * b.p.inv_mass[size_t(phyxel) * kStride + c] * impulse[c];
+        b.dynamics->push(phyxel, weight[k] * w, impulse);
       });
   });
 }

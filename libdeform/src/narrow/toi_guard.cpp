@@ -179,16 +179,8 @@ void GuardScene::find_end(GuardSide &s, uint32_t surfel) {
   if (s.local)
     return store3(out, s.pose.position + rotate(s.pose.rotation, load3(&s.local[3 * size_t{surfel}])));
   Vec3 way;
-  s.surface->each_phyxel(surfel, [&](uint32_t p, double weight) {
-    const size_t at = 4 * size_t{p};
-    if (s.to) way += weight * load3(&s.to[at]);
-    else if (!s.impulse) way += (weight * h) * load3(&s.v[at]);
-    else
-      for (int k = 0; k < 3; ++k)
-        way[k] +=
-            (weight * h) * (s.v[at + size_t(k)] + s.inv_mass[at + size_t(k)] * s.impulse[at + size_t(k)]);
-  });
-  if (s.to) way -= x;
+  s.surface->each_phyxel(
+      surfel, [&](uint32_t p, double weight) { way += (weight * h) * load3(&s.mean[4 * size_t{p}]); });
   store3(out, x + share * way);
 }
 

@@ -38,9 +38,7 @@ struct GuardPose {
 struct GuardSide {
   const Surface *surface = nullptr;
   bool still = false;
-  // [n,4] of the phyxels: end = start + h (v + inv_mass impulse); impulse may be null
-  const double *v = nullptr, *inv_mass = nullptr, *impulse = nullptr;
-  const double *to = nullptr;  // or: [n,4] phyxels at the end
+  const double *mean = nullptr;  // [n,4] m/s of the phyxels: end = start + h mean
   // or: [nsurfel,3] a mesh in its frame, which ends at `pose`
   const double *local = nullptr;
   GuardPose pose;

@@ -12,16 +12,19 @@ inline constexpr uint32_t kStride = 4;
 
 struct Phyxels {
   uint32_t n = 0;
-  Array<double> rest;      // [n,3] m, before pose
-  Array<double> x, v;      // [n,4] m, m/s: start of the sub-step
-  Array<double> v_free;    // [n,4] m/s: end of the sub-step without contact
-  Array<double> f;         // [n,4] N: loads and the model's forces
-  Array<double> load;      // [n,4] N: sum of lasting loads at the current time
-  Array<double> impulse;   // [n,4] N s: contact impulses of the sub-step, J^T lambda
-  Array<double> mass;      // [n] kg, lumped
-  double least_mass = 0;   // kg
-  Array<double> inv_mass;  // [n,4] 1/kg, zero where a component is held
-  Array<uint8_t> held;     // [n] bits 1 x, 2 y, 4 z
+  Array<double> rest;          // [n,3] m, before pose
+  Array<double> x, v;          // [n,4] m, m/s: start of the sub-step
+  Array<double> v_free;        // [n,4] m/s: end of the sub-step without contact
+  Array<double> x_end, v_end;  // [n,4] m, m/s: end of the sub-step with contact
+  Array<double> f;             // [n,4] N: loads and the model's forces
+  Array<double> load;          // [n,4] N: sum of lasting loads at the current time
+  Array<double> impulse;       // [n,4] N s: contact impulses of the sub-step, J^T lambda
+  Array<double> mass;          // [n] kg, lumped
+  double least_mass = 0;       // kg
+  Array<double> inv_mass;      // [n,4] 1/kg, zero where a component is held
+  Array<uint8_t> held;         // [n] bits 1 x, 2 y, 4 z
+
+  bool moves(size_t component) const { return inv_mass[component] > 0; }  // of [n,4]: not held
 };
 
 // Lumped mass of tetrahedra: a quarter of each cell's mass to each corner. cell_density [ntet] wins over

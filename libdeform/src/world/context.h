@@ -85,6 +85,7 @@ struct StepContext {
 
   // distribute, guard
   std::vector<ImpulseSink> sinks;
+  bool ended = false;  // find_ends() has been asked since the last solve
   Guard guard;
   // commit: trades places with the world's
   ContactStore next_store;

@@ -104,11 +104,9 @@ Body &create_body(World &w, const dfm_body_def &def) {
   Phyxels &p = b.p;
   p.n = def.npoint;
   p.rest = Array<double>(def.points, def.points + size_t(3) * p.n, HookAllocator<double>(m));
-  for (Array<double> *a : {&p.x, &p.v, &p.v_free, &p.f, &p.load, &p.impulse, &p.inv_mass})
+  for (Array<double> *a : {&p.x, &p.v, &p.v_free, &p.x_end, &p.v_end, &p.f, &p.load, &p.impulse, &p.inv_mass})
     make(*a, size_t(kStride) * p.n);
   make(p.mass, p.n);
-  make(b.ksum, p.n);
-  make(b.csum, p.n);
   p.held = Array<uint8_t>(p.n, 0, HookAllocator<uint8_t>(m));
   if (def.fixed)
     for (uint32_t i = 0; i < p.n; ++i) p.held[i] = def.fixed[i] & 7;
@@ -155,7 +153,8 @@ Body &create_body(World &w, const dfm_body_def &def) {
   mesh.fixed = p.held.data();
   coupling.tell(mesh);
   b.model.create(type, w.context->host, mesh, m, std::move(values));
-  if (b.model.stepper) need_ability(w, Ability::self_stepping, "body", b.name);
+  b.dynamics = make_dynamics(m, p, b.surface, b.model, b.edges);
+  if (!b.dynamics->abilities().placed) need_ability(w, Ability::self_stepping, "body", b.name);
   if (!b.surface.identity()) need_ability(w, Ability::own_surface, "body", b.name);
   if (w.method->point_values) make(b.method_values, size_t(kStride) * p.n);
 

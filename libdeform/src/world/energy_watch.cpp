@@ -29,8 +29,9 @@ constexpr double kPositionDigits = 8 * 2.3e-16;
 bool watching(const World &w) {
   return w.def.energy_watch > 0 && w.plan.has(StageRole::gives_impulses) == w.plan.touches();
 }
+bool books(const Body &b) { return b.dynamics->abilities().energy; }
 bool watched(const Body &b) {
-  return !b.model.stepper && (b.model.ops->caps & DFM_CAP_ENERGY) && b.model.ops->energy;
+  return books(b) && (b.model.ops->caps & DFM_CAP_ENERGY) && b.model.ops->energy;
 }
 // Loads that change from sub-step to sub-step have no potential: their work is booked as it is done.
 bool books_loads(const Body &b) { return b.loads_vary(); }
@@ -62,7 +63,7 @@ double work_of_new_size(const World &w, const StepContext &step, const Body &b) 
   double sum = 0;
   for (uint32_t i = 0; i < p.n; ++i)
     for (size_t k = 0, at = size_t(i) * kStride; k < 3; ++k, ++at)
-      if (p.inv_mass[at] > 0)
+      if (p.moves(at))
         sum += p.v[at] * (p.mass[i] * (p.v_free[at] - p.v[at]) - (load_booked ? step.h * p.load[at] : 0));
   return 0.5 * (1 - w.watch.last_h / step.h) * sum;
 }
@@ -80,7 +81,7 @@ bool look(World &w, StepContext &step, Body &b, Look &out) {
       const double x = p.x[at + k], v = p.v[at + k], load = p.load[at + k];
       reach = std::max(reach, std::fabs(x));
       potential -= (m * w.gravity[int(k)] + (load_booked ? 0 : load)) * x;
-      if (!(p.inv_mass[at + k] > 0)) continue;
+      if (!p.moves(at + k)) continue;
       const double change = p.v_free[at + k] - v;
       kinetic += 0.5 * (m * v * v);
       kick += 0.5 * (m * change * change);
@@ -88,7 +89,7 @@ bool look(World &w, StepContext &step, Body &b, Look &out) {
     }
   }
   double elastic = 0;
-  const dfm_kin kin = b.kin(w.time, 0, nullptr);
+  const dfm_kin kin = b.dynamics->kin(w.time, 0);
   if (b.model.call("energy", [&] { return b.model.ops->energy(b.model.self, &kin, &elastic); }) != DFM_OK)
     return false;
   const double drift = kPositionDigits * reach / step.h;
@@ -105,12 +106,12 @@ void book_contact(World &w, StepContext &step) {
   for (uint32_t d = 0; d < step.rows.ndof; ++d) {
     if (step.rows.source[d] == kNone) continue;
     Body &b = *w.bodies[step.rows.source[d]];
-    if (b.model.stepper) continue;
+    if (!books(b)) continue;
     const size_t at = size_t(step.rows.point[d]) * kStride;
+    const double *const end = b.dynamics->end().v;
     double sum = 0;
     for (size_t k = 0; k < 3; ++k) {
-      const double p = b.p.impulse[at + k], inverse = b.p.inv_mass[at + k];
-      if (inverse > 0) sum += 0.5 * p * (b.p.v[at + k] + (b.p.v_free[at + k] + inverse * p));
+      if (b.p.moves(at + k)) sum += 0.5 * b.p.impulse[at + k] * (b.p.v[at + k] + end[at + k]);
     }
     b.energy.work += sum;
   }
@@ -118,15 +119,15 @@ void book_contact(World &w, StepContext &step) {
 
 // Loads without a potential; and, where the guard left out a part of the way, what the inner forces would
 // have done on it.
-void book_body(World &w, StepContext &step, Body &b, bool touched, double motion) {
+void book_body(World &w, StepContext &step, Body &b, double motion) {
   const bool load_booked = books_loads(b);
   const Phyxels &p = b.p;
   double sum = 0;
   for (uint32_t i = 0; i < p.n; ++i)
     for (size_t k = 0, at = size_t(i) * kStride; k < 3; ++k, ++at) {
       const double booked = load_booked ? p.load[at] : 0;
-      if (!(p.inv_mass[at] > 0) || (booked == 0 && motion == 1)) continue;
-      const double end = p.v_free[at] + (touched ? p.inv_mass[at] * p.impulse[at] : 0);
+      if (!p.moves(at) || (booked == 0 && motion == 1)) continue;
+      const double end = b.dynamics->end().v[at];
       sum += step.h * booked * 0.5 * (p.v[at] + end);
       if (motion < 1) sum += (1 - motion) * step.h * end * (p.f[at] + p.mass[i] * w.gravity[int(k)] - booked);
     }
@@ -148,7 +149,7 @@ void change_gravity(World &w, Vec3 gravity) {
     for (uint32_t i = 0; i < p.n; ++i)
       for (size_t k = 0, at = size_t(i) * kStride; k < 3; ++k, ++at)
         b->energy.work -=
-            p.mass[i] * by[int(k)] * (p.x[at] - (p.inv_mass[at] > 0 ? 0.5 * w.watch.last_h * p.v[at] : 0));
+            p.mass[i] * by[int(k)] * (p.x[at] - (p.moves(at) ? 0.5 * w.watch.last_h * p.v[at] : 0));
   }
 }
 
@@ -218,8 +219,8 @@ void book_energy(World &w, StepContext &step, double motion) {
   for (const uint32_t i : step.active) {
     Body &b = *w.bodies[i];
     if (!step.driven.empty()) b.energy.work += work_of_holders(w, step, b, true);
-    if (!b.model.stepper && step.guard.planned == step.h) b.energy.work += work_of_new_size(w, step, b);
-    if (!b.model.stepper && (motion < 1 || books_loads(b))) book_body(w, step, b, touched, motion);
+    if (books(b) && step.guard.planned == step.h) b.energy.work += work_of_new_size(w, step, b);
+    if (books(b) && (motion < 1 || books_loads(b))) book_body(w, step, b, motion);
   }
   w.watch.last_h = motion * step.h;
   w.watch.new_size = w.watch.new_size && step.guard.planned != step.h;

@@ -50,23 +50,23 @@ std::string body(const Body &b) {
 
 std::string seconds(double s) { return std::isfinite(s) ? format("%.3g s", s) : "any step"; }
 
-// Which term rules at the worst point, from the sums that the bound was made of: h = 4 m / (c + sqrt(c^2 + 4
-// m k)) is 2 sqrt(m / k) without damping and 2 m / c without stiffness.
+// Which term rules at the worst point: the one that alone would allow the shorter step.
 std::string reason(const World &w) {
   if (!w.worst_body) return "nothing bounds the step";
   const Body &b = *w.worst_body;
   const std::string cut = "; longer steps are cut into equal sub-steps";
-  const double m = w.worst_point < b.p.n ? b.p.mass[w.worst_point] : 0;
-  const double k = m > 0 ? b.ksum[w.worst_point] : 0;
-  const double c = m > 0 ? b.csum[w.worst_point] : 0;
-  if (!(k > 0 || c > 0)) return "0.9 of the bound that its model gives" + cut;
-  const double share = w.stable / b.bound.step;
-  const std::string stiffness = seconds(share * 2 * std::sqrt(m / k)), damping = seconds(share * 2 * m / c);
+  const StepBound &bound = b.bound.found;
+  if (std::isinf(bound.by_stiffness) && std::isinf(bound.by_damping))
+    return "0.9 of the bound that its model gives" + cut;
+  const double share = w.stable / bound.step;
+  const std::string stiffness = seconds(share * bound.by_stiffness);
+  const std::string damping = seconds(share * bound.by_damping);
   return "0.9 of the proven bound: " +
-         (c * c > m * k ? "damping bounds it (alone it allows " + damping + ", stiffness alone " + stiffness +
-                              "); lower the damping of this body or of its springs"
-                        : "the stiffest point for its mass (alone its stiffness allows " + stiffness +
-                              ", its damping " + damping + "); soften or coarsen this body") +
+         (bound.by_damping < bound.by_stiffness
+              ? "damping bounds it (alone it allows " + damping + ", stiffness alone " + stiffness +
+                    "); lower the damping of this body or of its springs"
+              : "the stiffest point for its mass (alone its stiffness allows " + stiffness +
+                    ", its damping " + damping + "); soften or coarsen this body") +
          cut;
 }
 

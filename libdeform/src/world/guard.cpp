@@ -49,10 +49,8 @@ void bound_speeds(World &w, StepContext &step) {
   for (uint32_t d = 0; d < step.rows.ndof; ++d) {
     const uint32_t i = step.rows.source[d];
     if (i == kNone) continue;
-    const Body &b = *w.bodies[i];
-    if (b.model.stepper) continue;
     const Vec3 y = load3(&step.rows.y[size_t(d) * kStride]);
-    const Vec3 change = y - load3(&b.p.v_free[size_t(step.rows.point[d]) * kStride]);
+    const Vec3 change = y - load3(&step.rows.y_free[size_t(d) * kStride]);
     g.speed[i] = std::max(g.speed[i], norm2(y));
     g.change[i] = std::max(g.change[i], norm2(change));
   }
@@ -64,16 +62,8 @@ void bound_speeds(World &w, StepContext &step) {
     double &speed = g.speed[i];
     speed = std::sqrt(speed);
     g.change[i] = b.surface.weight_sum * std::sqrt(g.change[i]);
-    if (b.model.stepper) {  // has written its end beside its start
-      for (uint32_t s = 0; s < b.surface.nsurfel; ++s) {
-        Vec3 x;
-        b.surface.each_phyxel(
-            s, [&](uint32_t p, double weight) { x += weight * load3(&b.p.f[size_t(p) * kStride]); });
-        speed = std::max(speed, norm(x - load3(&b.surface.x[size_t(s) * 4])) / step.h);
-      }
-    } else {
-      speed = b.surface.identity() ? std::max(speed, before) : before + g.change[i];
-    }
+    speed = b.surface.identity() ? std::max(speed, before) : before + g.change[i];
+    b.dynamics->bound_ends(speed, g.change[i]);
   }
 }
 
@@ -111,7 +101,6 @@ void set_sides(World &w, StepContext &step) {
   scene.h = step.h;
   scene.floor = 0.5 * w.offset;
   scene.margin = 0.1 * (w.offset - scene.floor);
-  const bool touched = step.rows.n > 0;
   for (size_t i = 0; i < nb; ++i) {
     const Body &b = *w.bodies[i];
     GuardSide &s = scene.sides[i];
@@ -119,22 +108,17 @@ void set_sides(World &w, StepContext &step) {
     s.still = b.slumber.asleep;
     s.travel = s.spread = step.h * step.guard.speed[i];
     s.drift = {};
-    if (s.travel > kSlow * scene.floor && !b.model.stepper) {
+    if (s.travel > kSlow * scene.floor) {
       split_motion(b.surface, s.drift, s.spread);
       s.drift = step.h * s.drift;
       s.spread = step.h * (s.spread + step.guard.change[i]);
     }
-    s.v = b.p.v_free.data();
-    s.inv_mass = b.p.inv_mass.data();
-    s.impulse = touched ? b.p.impulse.data() : nullptr;
-    s.to = b.model.stepper ? b.p.f.data() : nullptr;
+    s.mean = b.dynamics->end().mean;
     s.local = nullptr;
   }
   for (const auto &b : step.self_bodies) {
     GuardSide &s = scene.sides[b->body->slot];
-    if (b->on)
-      s.deform = b->body->model.stepper ? s.travel
-                                        : step.h * (b->list.deforming() + step.guard.change[b->body->slot]);
+    if (b->on) s.deform = step.h * (b->list.deforming() + step.guard.change[b->body->slot]);
   }
   for (size_t o = 0; o < w.obstacles.size(); ++o) {
     const ObstacleView &v = step.obstacle_views[o];
@@ -223,18 +207,15 @@ bool wake_hit(World &w, StepContext &step) {
 bool stage_guard(World &w, StepContext &step, uint32_t *trouble) {
   step.guard.kept.clear();
   step.guard.through.clear();
-  const bool steppers =
-      std::any_of(w.bodies.begin(), w.bodies.end(), [](auto &b) { return b->model.stepper != nullptr; });
   double safe = 1;
   for (uint32_t solve = 0;; ++solve) {
-    if (steppers && !commit_steppers(w, step, trouble)) return false;
+    if (!find_ends(w, step, trouble)) return false;
     bound_speeds(w, step);
     follow_lists(w, step);
     set_sides(w, step);
     set_share(w, step, 1);
     guard_near(step.guard.scene, *step.guard.list, step.guard.memory, step.guard.near);
     safe = find_hits(w, step);
-    step.guard.stepped = steppers;
     if (step.guard.hits.empty()) return true;
     step.guard.acted = true;
     if (w.sleepers > 0 && wake_hit(w, step)) {

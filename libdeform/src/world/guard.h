@@ -37,8 +37,6 @@ struct Guard {
   // sorted by key: what the solve before left, and the rates of contacts made from hits
   Array<Kept> kept;
   bool resolving = false;  // a solve that starts from `kept`
-  // self-stepping bodies have written their ends for the impulses as they are
-  bool stepped = false;
 
   double planned = 0;                 // s, the sub-step before it was cut
   uint32_t pieces = 0;                // cuts of this planned sub-step
@@ -49,7 +47,7 @@ struct Guard {
   void start() {
     kept.clear();
     cut = motion = 1;
-    acted = again = stepped = false;
+    acted = again = false;
   }
   void forget() { memory.forget(); }  // positions or d_c have changed otherwise than by a step
 };

@@ -45,7 +45,7 @@ dfm_body_measure measure(Body &b) {
   m.elastic = NAN;
   if ((b.model.ops->caps & DFM_CAP_ENERGY) && b.model.ops->energy) {
     double joule = 0;
-    const dfm_kin k = b.kin(b.world->time, 0, nullptr);
+    const dfm_kin k = b.dynamics->kin(b.world->time, 0);
     if (b.model.call("energy", [&] { return b.model.ops->energy(b.model.self, &k, &joule); }) == DFM_OK)
       m.elastic = joule;
   }
@@ -62,7 +62,7 @@ void energy_density(Body &b, double *out) {
   if (!e)
     fail(DFM_E_UNSUPPORTED, "model '%s' of body '%s' offers no energy per cell", b.model.type->id,
          b.name.c_str());
-  const dfm_kin k = b.kin(b.world->time, 0, nullptr);
+  const dfm_kin k = b.dynamics->kin(b.world->time, 0);
   if (b.model.call("cell_energy", [&] { return e->cell_energy(b.model.self, &k, out); }) != DFM_OK)
     fail(DFM_E_FATAL, "model '%s' could not give its energy per cell", b.model.type->id);
 }

@@ -125,18 +125,11 @@ void count_self(World &w, StepContext &step) {
 }
 
 // How fast a surfel goes to its end of the sub-step, as the solve left it.
-Vec3 velocity_after(const StepContext &step, const Body &b, uint32_t surfel) {
+Vec3 velocity_after(const Body &b, uint32_t surfel) {
+  const double *const mean = b.dynamics->end().mean;
   Vec3 sum;
-  if (b.model.stepper) {  // has written its end beside its start
-    b.surface.each_phyxel(
-        surfel, [&](uint32_t p, double weight) { sum += weight * load3(&b.p.f[size_t(p) * kStride]); });
-    return (1 / step.h) * (sum - load3(&b.surface.x[size_t(surfel) * 4]));
-  }
-  const bool touched = step.rows.n > 0;
-  b.surface.each_phyxel(surfel, [&](uint32_t p, double weight) {
-    sum += weight * load3(&b.p.v_free[size_t(p) * kStride]);
-    if (touched) sum += weight * b.p.inv_mass[p] * load3(&b.p.impulse[size_t(p) * kStride]);
-  });
+  b.surface.each_phyxel(
+      surfel, [&](uint32_t p, double weight) { sum += weight * load3(&mean[size_t(p) * kStride]); });
   return sum;
 }
 
@@ -166,10 +159,10 @@ bool cover_self(World &w, StepContext &step) {
   for (auto &s : step.self_bodies) {
     const Body &b = *s->body;
     if (step.body_views[b.slot].asleep) continue;
-    const double change = b.model.stepper ? step.guard.speed[b.slot] : step.guard.change[b.slot];
+    const double change = step.guard.change[b.slot];
     // A blow may fold within the sub-step what was far from itself before the solve.
-    if (!s->on && s->watch->meets(step.h, w.offset, change,
-                                  [&](uint32_t surfel) { return velocity_after(step, b, surfel); }))
+    if (!s->on &&
+        s->watch->meets(step.h, w.offset, change, [&](uint32_t surfel) { return velocity_after(b, surfel); }))
       switch_to(*s, true);
     if (s->on) s->list.cover(step.h, w.offset, change);
     fresh |= s->joined != (s->on ? s->list.renewals() : 0);

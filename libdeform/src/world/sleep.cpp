@@ -77,7 +77,7 @@ void gather_active(World &w) {
     if (b.slumber.asleep) continue;
     step.active.push_back(i);
     step.sinks.push_back({step.body_views[i].first_node, b.surface.nsurfel, b.p.n, &b.surface,
-                          b.surfel_impulse.data(), b.model.stepper ? nullptr : b.p.impulse.data()});
+                          b.surfel_impulse.data(), b.dynamics->diagonal() ? b.p.impulse.data() : nullptr});
   }
   w.sleepers = static_cast<uint32_t>(w.bodies.size() - step.active.size());
 }

@@ -270,7 +270,7 @@ void prescribed_fields(Stream &s, B &b, const Body &like) {
     s.value("spring damping", p.damping, must::not_negative);
     s.must_hold("spring keys", "finite keys at rising times", [&] { return rise(p.keys); });
     s.must_hold("spring number", "a number below the next one, on a body that is no self-stepping one",
-                [&] { return p.number < b.next_load && !like.model.stepper; });
+                [&] { return p.number < b.next_load && like.dynamics->abilities().springs; });
     s.must_hold("spring weights", "weights that sum to one", [&] {
       return std::fabs(std::accumulate(p.weights.begin(), p.weights.end(), 0.0) - 1) < 1e-9;
     });

@@ -18,33 +18,29 @@
 namespace dfm {
 namespace {
 
-// Responses of self-stepping bodies to unit impulses at their touched surfels: column by column.
+// Responses between the touched surfels of bodies whose points answer each other: the columns are those to
+// unit impulses.
 void fill_responses(World &w, StepContext &step) {
   for (const ContactRows::Block &block : step.rows.blocks) {
     if (block.group != kNone) {
       rigid_response(w, step, block.group, &step.rows.response[block.response]);
       continue;
     }
-    Body &b = *w.bodies[block.source];
-    const uint32_t n = block.count;
+    const Body &b = *w.bodies[block.source];
+    const uint32_t n = block.count, width = 3 * n;
     step.block_surfels.resize(n);
-    step.block_impulse.resize(size_t(3) * n);
-    step.block_velocity.resize(size_t(3) * n);
+    step.block_velocity.resize(size_t(width) * width);
+    step.block_impulse.assign(size_t(width) * width, 0.0);
     for (uint32_t k = 0; k < n; ++k) step.block_surfels[k] = step.rows.point[block.first + k];
-    const dfm_kin kin = b.kin(w.time, step.h, nullptr);
-    for (uint32_t c = 0; c < 3 * n; ++c) {
-      std::fill(step.block_impulse.begin(), step.block_impulse.end(), 0.0);
-      std::fill(step.block_velocity.begin(), step.block_velocity.end(), 0.0);
-      step.block_impulse[c] = 1;
-      if (b.model.call("respond", [&] {
-            return b.model.stepper->respond(b.model.self, &kin, n, step.block_surfels.data(),
-                                            step.block_impulse.data(), step.block_velocity.data());
-          }) != DFM_OK)
-        fail(DFM_E_FATAL, "model '%s' of body '%s' does not answer impulses; change the model",
-             b.model.type->id, b.name.c_str());
-      for (uint32_t r = 0; r < 3 * n; ++r)
-        step.rows.response[block.response + size_t(r) * 3 * n + c] = step.block_velocity[r];
-    }
+    for (uint32_t c = 0; c < width; ++c) step.block_impulse[size_t(c) * width + c] = 1;
+    if (!b.dynamics->respond(sub_step_of(w, step), n, step.block_surfels.data(), width,
+                             step.block_impulse.data(), step.block_velocity.data()))
+      fail(DFM_E_FATAL, "model '%s' of body '%s' does not answer impulses; change the model",
+           b.model.type->id, b.name.c_str());
+    for (uint32_t r = 0; r < width; ++r)
+      for (uint32_t c = 0; c < width; ++c)
+        step.rows.response[block.response + size_t(r) * width + c] =
+            step.block_velocity[size_t(c) * width + r];
   }
 }
 

@@ -26,10 +26,10 @@ void add_spring_force(Body &b, const Spring &s, double t, double h) {
   }
 }
 
-void add_spring_bound(Body &b, const Spring &s) {
+void add_spring_bound(const Spring &s, double *stiffness, double *damping) {
   for (size_t i = 0; i < s.points.size(); ++i) {
-    b.ksum[s.points[i]] += s.stiffness * s.weights[i];
-    b.csum[s.points[i]] += s.damping * s.weights[i];
+    stiffness[s.points[i]] += s.stiffness * s.weights[i];
+    damping[s.points[i]] += s.damping * s.weights[i];
   }
 }
 

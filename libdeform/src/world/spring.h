@@ -11,6 +11,6 @@ Vec3 spring_force(const Body &b, const Spring &s, double t, double h);
 // Its shares join what already pulls at the points.
 void add_spring_force(Body &b, const Spring &s, double t, double h);
 // Row sums of k w w^T: weights are >= 0 and sum to one, so row i sums to k w_i.
-void add_spring_bound(Body &b, const Spring &s);
+void add_spring_bound(const Spring &s, double *stiffness, double *damping);  // row sums, N/m, N s/m
 
 }  // namespace dfm

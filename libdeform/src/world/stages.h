@@ -7,6 +7,7 @@
 #include <span>
 
 #include "deform/world.h"
+#include "dynamics/dynamics.h"
 #include "plan/plan.h"
 
 namespace dfm {
@@ -45,8 +46,9 @@ bool stage_guard(World &w, StepContext &step, uint32_t *trouble);  // guard.cpp
 bool stage_commit(World &w, StepContext &step, uint32_t *trouble);
 void stage_sleep(World &w, StepContext &step);  // sleep.cpp
 
-// model and commit of self-stepping bodies: they write their ends beside their present states.
-bool commit_steppers(World &w, StepContext &step, uint32_t *trouble);
+SubStep sub_step_of(const World &w, const StepContext &step);
+// Where all active bodies end with the impulses that have been distributed, beside their present states.
+bool find_ends(World &w, StepContext &step, uint32_t *trouble);
 void keep_rigids(World &w, StepContext &step);  // once the sub-step is known to succeed
 
 // solve.cpp

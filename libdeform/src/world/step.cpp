@@ -206,6 +206,7 @@ bool sub_step(World &w, StepContext &step, uint32_t *trouble) {
   } undo{w, step};
   step.driven.clear();
   step.guard.start();
+  step.ended = false;
   charge(w, step, body_work(w, step) + surface_work(w, step));
   for (const PlannedStage &planned : w.plan.stages)
     if (!run(planned.row, w, step, trouble)) return false;

@@ -5,7 +5,6 @@
 #include <limits>
 
 #include "core/error.h"
-#include "integrate/symplectic_euler.h"
 #include "world/spring.h"
 #include "world/world.h"
 
@@ -24,32 +23,15 @@ uint32_t inverted_cells(const Body &b) {
   return n;
 }
 
-// The fastest stretch of an edge, 1/s; turning gives none.
-double strain_rate(const Body &b) {
-  const double *const x = b.p.x.data(), *const v = b.p.v.data();
-  double most = 0;
-  for (size_t e = 0; e < b.edges.size(); e += 2) {
-    const size_t i = size_t(b.edges[e]) * kStride, j = size_t(b.edges[e + 1]) * kStride;
-    const Vec3 d = load3(x + j) - load3(x + i);
-    const double dd = norm2(d), stretch = std::fabs(dot(d, load3(v + j) - load3(v + i)));
-    if (stretch > most * dd) most = dd > 0 ? stretch / dd : most;
-  }
-  return most;
-}
-
-void ask_bound(World &w, Body &b) {
-  b.bound = {true, std::numeric_limits<double>::infinity(), 0, inverted_cells(b)};
-  if (b.model.stepper || !b.model.ops->bound) return;
-  std::fill(b.ksum.begin(), b.ksum.end(), 0.0);
-  std::fill(b.csum.begin(), b.csum.end(), 0.0);
-  double cell = std::numeric_limits<double>::infinity();
-  const dfm_kin k = b.kin(w.time, 0, nullptr);
-  if (b.model.call("bound", [&] {
-        return b.model.ops->bound(b.model.self, &k, b.ksum.data(), b.csum.data(), &cell);
-      }) != DFM_OK)
+// 1/s, of the edge that stretches fastest.
+double ask_bound(World &w, Body &b) {
+  b.bound = {true, {}, inverted_cells(b)};
+  const auto springs = [&b](double *stiffness, double *damping) {
+    for (const Spring &spring : b.springs) add_spring_bound(spring, stiffness, damping);
+  };
+  if (!b.dynamics->bound(w.time, springs, b.bound.found))
     fail(DFM_E_FATAL, "model '%s' of body '%s' gives no step bound", b.model.type->id, b.name.c_str());
-  for (const Spring &spring : b.springs) add_spring_bound(b, spring);
-  b.bound.step = std::min(cell, stable_step(b.p, b.ksum.data(), b.csum.data(), &b.bound.point));
+  return b.bound.found.strain_rate;
 }
 
 }  // namespace
@@ -65,14 +47,15 @@ void update_bound(World &w) {
   double fastest = 0;
   for (auto &b : w.bodies) {
     const bool stays = b->slumber.asleep && b->bound.known;
-    if (!stays) ask_bound(w, *b);  // who sleeps counts too: the step must not change when it wakes
+    // who sleeps counts too: the step must not change when it wakes
+    if (!stays) fastest = std::max(fastest, ask_bound(w, *b));
     w.inverted += b->bound.inverted;
     limited += b->model.limited_cells();
-    if (!stays && !b->model.stepper && b->model.ops->bound) fastest = std::max(fastest, strain_rate(*b));
-    if (b->bound.step < w.stable) {
-      w.stable = b->bound.step;
+    const StepBound &found = b->bound.found;
+    if (found.step < w.stable) {
+      w.stable = found.step;
       w.worst_body = b.get();
-      w.worst_point = b->bound.point;
+      w.worst_point = found.point;
     }
   }
   w.stable *= kBoundShare;

@@ -34,7 +34,7 @@ class Untangler {
     std::iota(group_.begin(), group_.end(), 0u);
     for (auto &b : w.bodies) {
       const bool held = std::any_of(b->p.held.begin(), b->p.held.end(), [](uint8_t h) { return h != 0; });
-      movable_.push_back(!held && !b->model.stepper);
+      movable_.push_back(!held && b->dynamics->abilities().placed);
     }
   }
 

@@ -20,19 +20,6 @@ bool Body::loads_vary() const {
 
 double Body::impulse_time() const { return slumber.asleep ? slumber.h : world->report.h; }
 
-dfm_kin Body::kin(double t, double h, double *state_out) const {
-  dfm_kin k{};
-  k.size = sizeof k;
-  k.stride = kStride;
-  k.t = t;
-  k.dt = h;
-  k.x = p.x.data();
-  k.v = p.v.data();
-  k.state = model.state.data();
-  k.state_out = state_out;
-  return k;
-}
-
 Pose Obstacle::pose_at_time(double t) const {
   Pose p = keys.empty() ? to_pose(def.pose) : pose_at(keys, t);
   if (def.sine.frequency != 0 || def.sine.phase != 0)
@@ -192,12 +179,11 @@ void prepare(World &w, const RestoredChoice *restored) {
   for (uint32_t i = 0; i < nb; ++i) {
     Body &b = *w.bodies[i];
     b.slot = i;
-    facts.self_stepping += b.model.stepper != nullptr;
+    facts.self_stepping += !b.dynamics->abilities().forces;
     const Surface &s = b.surface;
     step.body_views.push_back({i, node, b.category, b.collides_with, b.id, &s});
-    step.sources.push_back({node, s.nsurfel, point, b.p.n, &s,
-                            b.model.stepper ? nullptr : b.p.inv_mass.data(),
-                            b.model.stepper ? s.v.data() : b.p.v_free.data()});
+    step.sources.push_back(
+        {node, s.nsurfel, point, b.p.n, &s, b.dynamics->diagonal(), b.dynamics->contact_velocity()});
     if (!s.identity()) {
       ++facts.coupled;
       facts.coupled_surfels += s.nsurfel;

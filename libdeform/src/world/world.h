@@ -9,9 +9,8 @@
 #include "broad/pair_filter.h"
 #include "contact/store.h"
 #include "deform/deform.h"
+#include "dynamics/dynamics.h"
 #include "friction/laws.h"
-#include "model/model.h"
-#include "phyxel/phyxels.h"
 #include "plan/plan.h"
 #include "plugin/context.h"
 #include "plugin/params.h"
@@ -93,6 +92,7 @@ struct Body {
   SurfaceZones zones;
   int32_t coupling = kNoCoupling;  // DFM_COUPLING_* of a surface of its own
   ModelInstance model;
+  std::unique_ptr<Dynamics> dynamics;  // how it moves
   double mass = 0, rest_volume = 0;
   Array<double> share;  // [ntet] how much of each cell is material; empty: all
   std::vector<CellField> fields;
@@ -106,12 +106,11 @@ struct Body {
   Array<double> surfel_impulse;  // [nsurfel,3] N s of the last sub-step
   // [n,4] what the contact method keeps of each point; empty where it keeps nothing
   Array<double> method_values;
-  Array<double> ksum, csum;  // [n] row sums of the step bound
   // as last asked for; holds while asleep
   struct {
     bool known = false;
-    double step = 0;
-    uint32_t point = 0, inverted = 0;
+    StepBound found;
+    uint32_t inverted = 0;
   } bound;
   Slumber slumber;
   // [n,4] m, positions since which it is calm; empty where nothing may sleep
@@ -119,7 +118,6 @@ struct Body {
 
   bool loads_vary() const;
   double impulse_time() const;  // s that surfel_impulse belongs to
-  dfm_kin kin(double t, double h, double *state_out) const;
 };
 
 struct Obstacle {

@@ -9,8 +9,10 @@ namespace dfm {
 // v_free for free components; held components keep the velocity they carry. Returns its kinetic energy, J,
 // which is not finite where a component is not.
 double predict(Phyxels &p, Vec3 gravity, double h);
-// v = v_free + M^-1 impulse (impulse may be absent: `touched` false), x += h v.
-void commit(Phyxels &p, bool touched, double h);
+// v_end = v_free + M^-1 impulse (impulse may be absent: `touched` false), x_end = x + h v_end.
+void find_end(Phyxels &p, bool touched, double h);
+// x_end for a shorter way: h times v_end.
+void shorten(Phyxels &p, double h);
 
 // Largest stable sub-step. For every mode of K - w^2 M with dampers C taken from the start of the step the
 // scheme is stable iff h^2 k + 2 h c <= 4 m; with Gershgorin row sums this holds for the whole matrix if it

@@ -1,4 +1,4 @@
-#include "integrate/symplectic_euler.h"
+#include "dynamics/symplectic_euler.h"
 
 #include <limits>
 
@@ -33,15 +33,21 @@ double predict(Phyxels &p, Vec3 gravity, double h) {
   return 0.5 * ((sum[0] + sum[1]) + sum[2]);
 }
 
-void commit(Phyxels &p, bool touched, double h) {
-  Point *const x = points(p.x), *const v = points(p.v);
-  const Point *const free = points(p.v_free);
-  const Point *const w = points(p.inv_mass);
+void find_end(Phyxels &p, bool touched, double h) {
+  Point *const x_end = points(p.x_end), *const v_end = points(p.v_end);
+  const Point *const x = points(p.x), *const free = points(p.v_free), *const w = points(p.inv_mass);
   const Point *const impulse = points(p.impulse);
   for (uint32_t i = 0; i < p.n; ++i) {
-    v[i] = touched ? free[i] + w[i] * impulse[i] : free[i];
-    x[i] += h * v[i];
+    const Point v = touched ? free[i] + w[i] * impulse[i] : free[i];
+    v_end[i] = v;
+    x_end[i] = x[i] + h * v;
   }
+}
+
+void shorten(Phyxels &p, double h) {
+  Point *const x_end = points(p.x_end);
+  const Point *const x = points(p.x), *const v_end = points(p.v_end);
+  for (uint32_t i = 0; i < p.n; ++i) x_end[i] = x[i] + h * v_end[i];
 }
 
 double stable_step(const Phyxels &p, const double *ksum, const double *csum, uint32_t *worst) {

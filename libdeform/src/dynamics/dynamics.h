@@ -1,0 +1,104 @@
+// How one body moves in a sub-step. Stages, contact, guard and watch know a body's motion by this interface
+// alone; what moves it is known in this folder only.
+//
+//   bound         between sub-steps: the largest stable one at the present state
+//   add_forces    forces that follow from the state
+//   free_motion   the mean velocity over the sub-step without contact
+//   diagonal      what an impulse changes of that velocity, where points do not answer each other's impulses;
+//   respond       else, for many impulses at once
+//   end_state     where it ends with the impulses that the solve has found; asked again after a further solve
+//   commit        the end becomes the present
+//
+// A body whose response is the inverse of a system matrix (implicit points) answers by respond() too, one
+// factorization for all right-hand sides; the matrix of the responses between its touched surfels is all that
+// contact sees (doc/decisions/0085-body-dynamics.md).
+#pragma once
+#include <functional>
+#include <limits>
+#include <memory>
+
+#include "model/model.h"
+#include "phyxel/phyxels.h"
+#include "surfel/surface.h"
+
+namespace dfm {
+
+struct SubStep {
+  double time = 0, h = 0;     // s: its start, its length
+  Vec3 gravity;               // m/s2
+  double fastest = HUGE_VAL;  // m/s: no component of a velocity may be above it
+};
+
+struct StepBound {
+  double step = std::numeric_limits<double>::infinity();  // s; infinite: nothing bounds it
+  uint32_t point = 0;                                     // that bounds it
+  double by_stiffness = step, by_damping = step;          // s, that each would allow alone at that point
+  double strain_rate = 0;                                 // 1/s, of the edge that stretches fastest
+};
+// Adds row sums of stiffness N/m and damping N s/m that act on the points from outside of the model.
+using AddRowSums = std::function<void(double *stiffness, double *damping)>;
+
+// [n,4] m, m/s: of the points at the end of the sub-step; x_end = x + h mean.
+struct EndState { const double *x, *v, *mean; };
+
+// What may be done to a body beside moving it.
+struct Abilities {
+  bool forces = false;   // add_forces() does something
+  bool springs = false;  // loads may depend on the state: bound() takes their row sums
+  bool placed = false;   // its points may be put elsewhere, one by one
+  bool energy = false;   // the energy that its scheme keeps is known (world/energy_watch.h)
+};
+
+class Dynamics {
+ public:
+  Dynamics(Phyxels &points, Surface &surface, ModelInstance &model);
+  Dynamics(const Dynamics &) = delete;
+  Dynamics &operator=(const Dynamics &) = delete;
+  virtual ~Dynamics() = default;
+
+  virtual Abilities abilities() const = 0;
+
+  // False: the model gives none.
+  virtual bool bound(double time, const AddRowSums &outside, StepBound &out) = 0;
+  // False: the model cannot, or (free_motion) a velocity is not finite or above `fastest`. kinetic: J, of the
+  // free motion; left as it is where it is not known.
+  virtual bool add_forces(const SubStep &) { return true; }
+  virtual bool free_motion(const SubStep &now, double &kinetic) = 0;
+
+  // [npoint,4] 1/kg, what an impulse changes of its own point; null: the unknowns of contact are the touched
+  // surfels, which answer each other.
+  virtual const double *diagonal() const { return nullptr; }
+  // Where diagonal() is null: du[k] [n,3] m/s by the impulses p[k] [n,3] N s, k < nrhs, at n distinct
+  // surfels. False: the model cannot.
+  virtual bool respond(const SubStep &, uint32_t, const uint32_t *, uint32_t, const double *, double *) {
+    return false;
+  }
+  // [npoint,4] m/s without contact; null: free_motion() has written the surfels' own, surface.v.
+  virtual const double *point_velocity() const { return nullptr; }
+  const double *contact_velocity() const;  // of the unknowns: [npoint,4], or [nsurfel,4]
+
+  // By the impulses in points().impulse, or at the surfels [nsurfel,3] where points answer each other.
+  // touched: there are any. False: the model cannot, or its end is not finite.
+  virtual bool end_state(const SubStep &now, const double *surfel_impulse, bool touched) = 0;
+  virtual EndState end() const = 0;
+  // Bounds of the surfels' mean velocities and of what contact has changed of them, m/s, as the linear
+  // response gives them: replaced by the true ones where the end need not agree with it. After end_state().
+  virtual void bound_ends(double &, double &) const {}
+  // share: of the way to the end that is taken; velocities are the end's.
+  virtual void commit(const SubStep &now, double share) = 0;
+
+  // trial: with room for the model's next state
+  dfm_kin kin(double time, double h, bool trial = false) const;
+  void push(uint32_t point, double weight, const double *impulse);  // N s, between sub-steps
+
+ protected:
+  Phyxels &p_;
+  Surface &surface_;
+  ModelInstance &model_;
+};
+
+// What moves a body of this model. edges: [nedge,2] of its mesh.
+std::unique_ptr<Dynamics> make_dynamics(const Memory &memory, Phyxels &points, Surface &surface,
+                                        ModelInstance &model, const Array<uint32_t> &edges);
+
+}  // namespace dfm

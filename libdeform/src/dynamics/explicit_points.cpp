@@ -1,0 +1,79 @@
+#include "dynamics/explicit_points.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "dynamics/symplectic_euler.h"
+
+namespace dfm {
+
+ExplicitPoints::ExplicitPoints(const Memory &memory, Phyxels &points, Surface &surface, ModelInstance &model,
+                               const Array<uint32_t> &edges)
+    : Dynamics(points, surface, model),
+      edges_(edges),
+      stiffness_(points.n, 0.0, HookAllocator<double>(memory)),
+      damping_(points.n, 0.0, HookAllocator<double>(memory)) {}
+
+// Turning gives none.
+double ExplicitPoints::strain_rate() const {
+  const double *const x = p_.x.data(), *const v = p_.v.data();
+  double most = 0;
+  for (size_t e = 0; e < edges_.size(); e += 2) {
+    const size_t i = size_t(edges_[e]) * kStride, j = size_t(edges_[e + 1]) * kStride;
+    const Vec3 d = load3(x + j) - load3(x + i);
+    const double dd = norm2(d), stretch = std::fabs(dot(d, load3(v + j) - load3(v + i)));
+    if (stretch > most * dd) most = dd > 0 ? stretch / dd : most;
+  }
+  return most;
+}
+
+bool ExplicitPoints::bound(double time, const AddRowSums &outside, StepBound &out) {
+  const dfm_model &ops = *model_.ops;
+  if (!ops.bound) return true;
+  std::fill(stiffness_.begin(), stiffness_.end(), 0.0);
+  std::fill(damping_.begin(), damping_.end(), 0.0);
+  double cell = std::numeric_limits<double>::infinity();
+  const dfm_kin k = kin(time, 0);
+  const auto ask = [&] { return ops.bound(model_.self, &k, stiffness_.data(), damping_.data(), &cell); };
+  if (model_.call("bound", ask) != DFM_OK) return false;
+  outside(stiffness_.data(), damping_.data());
+  out.step = std::min(cell, stable_step(p_, stiffness_.data(), damping_.data(), &out.point));
+  // Of 4 m / (c + sqrt(c^2 + 4 m k)): without damping, without stiffness.
+  if (out.point < p_.n) {
+    const double m = p_.mass[out.point];
+    out.by_stiffness = 2 * std::sqrt(m / stiffness_[out.point]);
+    out.by_damping = 2 * m / damping_[out.point];
+  }
+  out.strain_rate = strain_rate();
+  return true;
+}
+
+bool ExplicitPoints::add_forces(const SubStep &now) {
+  std::copy(p_.load.begin(), p_.load.end(), p_.f.begin());
+  const dfm_kin k = kin(now.time, now.h, true);
+  return model_.call("add_forces", [&] { return model_.ops->add_forces(model_.self, &k, p_.f.data()); }) ==
+         DFM_OK;
+}
+
+bool ExplicitPoints::free_motion(const SubStep &now, double &kinetic) {
+  kinetic = predict(p_, now.gravity, now.h);
+  // A lightest point at the limit has so much alone; who has less need not be looked at point by point.
+  if (kinetic < 0.5 * p_.least_mass * (now.fastest * now.fastest)) return true;
+  if (!std::isfinite(kinetic)) return false;
+  return std::all_of(p_.v_free.begin(), p_.v_free.end(),
+                     [&](double v) { return std::fabs(v) <= now.fastest; });
+}
+
+bool ExplicitPoints::end_state(const SubStep &now, const double *, bool touched) {
+  find_end(p_, touched, now.h);
+  return true;
+}
+
+void ExplicitPoints::commit(const SubStep &now, double share) {
+  if (share < 1) shorten(p_, now.h * share);
+  p_.x.swap(p_.x_end);
+  p_.v.swap(p_.v_end);
+  model_.commit_state();
+}
+
+}  // namespace dfm

@@ -1,0 +1,31 @@
+// Points that the library moves by symplectic Euler, each by its own mass, under the forces of a model.
+#pragma once
+#include "dynamics/dynamics.h"
+
+namespace dfm {
+
+class ExplicitPoints : public Dynamics {
+ public:
+  ExplicitPoints(const Memory &memory, Phyxels &points, Surface &surface, ModelInstance &model,
+                 const Array<uint32_t> &edges);
+
+  Abilities abilities() const override {
+    return {.forces = true, .springs = true, .placed = true, .energy = true};
+  }
+  bool bound(double time, const AddRowSums &outside, StepBound &out) override;
+  bool add_forces(const SubStep &now) override;
+  bool free_motion(const SubStep &now, double &kinetic) override;
+  const double *diagonal() const override { return p_.inv_mass.data(); }
+  const double *point_velocity() const override { return p_.v_free.data(); }
+  bool end_state(const SubStep &now, const double *surfel_impulse, bool touched) override;
+  EndState end() const override { return {p_.x_end.data(), p_.v_end.data(), p_.v_end.data()}; }
+  void commit(const SubStep &now, double share) override;
+
+ private:
+  const Array<uint32_t> &edges_;
+  Array<double> stiffness_, damping_;  // [npoint] row sums: N/m, N s/m
+
+  double strain_rate() const;
+};
+
+}  // namespace dfm

@@ -1,0 +1,93 @@
+#include "dynamics/self_stepping.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+
+namespace dfm {
+namespace {
+
+bool offers_many(const dfm_stepper &ops) {
+  return ops.size >= offsetof(dfm_stepper, respond_many) + sizeof ops.respond_many && ops.respond_many;
+}
+
+}  // namespace
+
+SelfStepping::SelfStepping(const Memory &memory, Phyxels &points, Surface &surface, ModelInstance &model)
+    : Dynamics(points, surface, model),
+      mean_(size_t(kStride) * points.n, 0.0, HookAllocator<double>(memory)),
+      surfels_(size_t(3) * surface.nsurfel, 0.0, HookAllocator<double>(memory)) {}
+
+// Loads and gravity are external forces of the model, which answers the surfels' mean velocities.
+bool SelfStepping::free_motion(const SubStep &now, double &) {
+  for (uint32_t i = 0; i < p_.n; ++i) {
+    const size_t at = size_t(i) * kStride;
+    store3(&p_.f[at], load3(&p_.load[at]) + p_.mass[i] * now.gravity);
+  }
+  const dfm_kin k = kin(now.time, now.h);
+  const auto predict = [&] { return model_.stepper->predict(model_.self, &k, p_.f.data(), surfels_.data()); };
+  bool good = model_.call("predict", predict) == DFM_OK;
+  for (uint32_t s = 0; s < surface_.nsurfel; ++s) {
+    const double *const u = &surfels_[3 * size_t(s)];
+    store3(&surface_.v[size_t(s) * kStride], load3(u));
+    for (int c = 0; c < 3; ++c) good = good && std::fabs(u[c]) <= now.fastest;
+  }
+  return good;
+}
+
+bool SelfStepping::respond(const SubStep &now, uint32_t n, const uint32_t *surfel, uint32_t nrhs,
+                           const double *p, double *du) {
+  const dfm_kin k = kin(now.time, now.h);
+  const dfm_stepper &ops = *model_.stepper;
+  std::fill(du, du + size_t(3) * n * nrhs, 0.0);
+  if (offers_many(ops)) {
+    const auto many = [&] { return ops.respond_many(model_.self, &k, n, surfel, nrhs, p, du); };
+    return model_.call("respond_many", many) == DFM_OK;
+  }
+  for (uint32_t r = 0; r < nrhs; ++r) {
+    const size_t at = size_t(3) * n * r;
+    const auto one = [&] { return ops.respond(model_.self, &k, n, surfel, p + at, du + at); };
+    if (model_.call("respond", one) != DFM_OK) return false;
+  }
+  return true;
+}
+
+bool SelfStepping::end_state(const SubStep &now, const double *surfel_impulse, bool touched) {
+  if (!touched) {
+    std::fill(surfels_.begin(), surfels_.end(), 0.0);
+    surfel_impulse = surfels_.data();
+  }
+  const dfm_kin k = kin(now.time, now.h, true);
+  double *const x = p_.x_end.data(), *const v = p_.v_end.data();
+  const auto end = [&] { return model_.stepper->commit(model_.self, &k, surfel_impulse, x, v); };
+  if (model_.call("commit", end) != DFM_OK) return false;
+  double poison = 0;
+  for (size_t j = 0; j < size_t(p_.n) * kStride; ++j) {
+    poison += 0.0 * x[j] + 0.0 * v[j];
+    mean_[j] = (x[j] - p_.x[j]) / now.h;
+  }
+  return poison == 0;
+}
+
+void SelfStepping::bound_ends(double &speed, double &change) const {
+  double fastest = 0, most = 0;
+  for (uint32_t s = 0; s < surface_.nsurfel; ++s) {
+    Vec3 u;
+    surface_.each_phyxel(
+        s, [&](uint32_t p, double weight) { u += weight * load3(&mean_[size_t(p) * kStride]); });
+    fastest = std::max(fastest, norm2(u));
+    most = std::max(most, norm2(u - load3(&surface_.v[size_t(s) * kStride])));
+  }
+  speed = std::sqrt(fastest);
+  change = std::sqrt(most);
+}
+
+void SelfStepping::commit(const SubStep &, double share) {
+  if (share < 1)
+    for (size_t j = 0; j < p_.x.size(); ++j) p_.x_end[j] = p_.x[j] + share * (p_.x_end[j] - p_.x[j]);
+  p_.x.swap(p_.x_end);
+  p_.v.swap(p_.v_end);
+  model_.commit_state();
+}
+
+}  // namespace dfm

@@ -1,0 +1,27 @@
+// A model that moves its body itself (dfm.stepper/1): it predicts, answers impulses at its surfels, and
+// ends the sub-step.
+#pragma once
+#include "dynamics/dynamics.h"
+
+namespace dfm {
+
+class SelfStepping : public Dynamics {
+ public:
+  SelfStepping(const Memory &memory, Phyxels &points, Surface &surface, ModelInstance &model);
+
+  Abilities abilities() const override { return {}; }
+  bool bound(double, const AddRowSums &, StepBound &) override { return true; }
+  bool free_motion(const SubStep &now, double &kinetic) override;
+  bool respond(const SubStep &now, uint32_t n, const uint32_t *surfel, uint32_t nrhs, const double *p,
+               double *du) override;
+  bool end_state(const SubStep &now, const double *surfel_impulse, bool touched) override;
+  EndState end() const override { return {p_.x_end.data(), p_.v_end.data(), mean_.data()}; }
+  void bound_ends(double &speed, double &change) const override;
+  void commit(const SubStep &now, double share) override;
+
+ private:
+  Array<double> mean_;     // [npoint,4] m/s
+  Array<double> surfels_;  // [nsurfel,3] m/s as the model writes them; N s, zero, where nothing touches
+};
+
+}  // namespace dfm
