@@ -144,6 +144,7 @@ static const Row rows[] = {
     M(dfm_stepper, diagonal),
     M(dfm_stepper, commit),
     M(dfm_stepper, fetch),
+    M(dfm_stepper, respond_many),
     S(dfm_solver),
     M(dfm_solver, size),
     M(dfm_solver, flags),

@@ -6,8 +6,8 @@ from tree import CODE, includes, line_of, without_comments
 
 SRC = "libdeform/src/"
 # A folder may include itself and what stands on a lower level; folders of one level never include each other.
-LEVELS = [["core"], ["math"], ["mesh", "plugin"], ["phyxel", "surfel"],
-          ["model", "integrate", "broad", "narrow", "contact", "friction", "distribute", "rigid"],
+LEVELS = [["core"], ["math"], ["mesh", "plugin"], ["phyxel", "surfel"], ["model"],
+          ["dynamics", "broad", "narrow", "contact", "friction", "distribute", "rigid"],
           ["plan"], ["world"], ["rollback"], ["scene", "api"]]
 RANK = {folder: rank for rank, folders in enumerate(LEVELS) for folder in folders}
 # api/ holds one thin file per public header, and scene.h is one of them.
@@ -28,7 +28,7 @@ THIRD_PARTIES = [
     ("Bullet", r"(bullet/|bt[A-Z]\w+\.h|BulletDynamics|LinearMath/)", r"\bbt[A-Z]\w+", "bindings/bullet/"),
 ]
 
-STEP_FOLDERS = tuple(SRC + f + "/" for f in ("math", "phyxel", "surfel", "model", "integrate", "broad", "narrow", "contact",
+STEP_FOLDERS = tuple(SRC + f + "/" for f in ("math", "phyxel", "surfel", "model", "dynamics", "broad", "narrow", "contact",
                                              "friction", "distribute", "rigid", "world", "rollback"))
 LIBM = ("exp exp2 expm1 log2 log10 log1p log sin cos tan asin acos atan atan2 sinh cosh tanh asinh acosh atanh sincos pow cbrt "
         "hypot erf erfc tgamma lgamma").split()

@@ -42,13 +42,26 @@ dfm_status predict(void *self, const dfm_kin *k, const double *f, double *u) {
     for (int c = 0; c < 3; ++c) u[3 * s + c] = pending.v[c];
   return DFM_OK;
 }
+uint32_t asked = 0, asked_many = 0, most_at_once = 0;
+bool offers_many = false;
+
 dfm_status respond(void *self, const dfm_kin *, uint32_t n, const uint32_t *, const double *p, double *du) {
   const Toy &t = *static_cast<Toy *>(self);
+  ++asked;
   for (int c = 0; c < 3; ++c) {
     double sum = 0;
     for (uint32_t i = 0; i < n; ++i) sum += p[3 * i + c];
     for (uint32_t i = 0; i < n; ++i) du[3 * i + c] = sum / t.total;
   }
+  return DFM_OK;
+}
+dfm_status respond_many(void *self, const dfm_kin *k, uint32_t n, const uint32_t *surfel, uint32_t nrhs,
+                        const double *p, double *du) {
+  const uint32_t before = asked;
+  for (uint32_t r = 0; r < nrhs; ++r) respond(self, k, n, surfel, p + 3 * n * r, du + 3 * n * r);
+  asked = before;
+  ++asked_many;
+  most_at_once = std::max(most_at_once, nrhs);
   return DFM_OK;
 }
 dfm_status diagonal(void *self, const dfm_kin *, uint32_t n, const uint32_t *, double *w) {
@@ -72,9 +85,10 @@ dfm_status commit(void *self, const dfm_kin *k, const double *p, double *x, doub
 }
 
 const void *extension(const void *, const char *id) {
-  static const dfm_stepper stepper{
-      sizeof(dfm_stepper), 0, predict, respond, diagonal, commit, nullptr, nullptr};
-  return std::string(id) == "dfm.stepper/1" ? &stepper : nullptr;
+  static const dfm_stepper one{sizeof(dfm_stepper), 0, predict, respond, diagonal, commit, nullptr, nullptr};
+  static const dfm_stepper many{sizeof(dfm_stepper), 0, predict, respond, diagonal, commit, nullptr,
+                                respond_many};
+  return std::string(id) != "dfm.stepper/1" ? nullptr : offers_many ? &many : &one;
 }
 
 }  // namespace
@@ -135,6 +149,30 @@ TEST(Stepper, DroppedOnAFloor_RestsAtTheOffsetAndCarriesItsWeight) {
   uint32_t n = 0;
   ASSERT_EQ(dfm_world_pairs(w.world, 1, &pair, &n), DFM_OK) << dfm_last_error();
   EXPECT_NEAR(pair.normal, m.mass * 9.81, 1e-3 * m.mass * 9.81);
+}
+
+// All right-hand sides of a sub-step are asked in one call, with the same bits as one by one.
+TEST(Stepper, ThatRespondsToMany_IsAskedOncePerSolve) {
+  uint64_t hash[2];
+  for (const bool many : {false, true}) {
+    offers_many = many;
+    asked = asked_many = most_at_once = 0;
+    World w(0.5, {0.3, 0, -9.81}, 1e-4);
+    test::run(w.world, 0.2, 1e-3);
+    const dfm_world_stats s = test::stats(w.world);
+    if (many) {
+      EXPECT_EQ(asked, 0u);
+      EXPECT_GT(asked_many, 0u);
+      EXPECT_LE(asked_many, s.substeps);
+      EXPECT_GE(most_at_once, 3u * 9) << "surfels of the lower face";
+    } else {
+      EXPECT_GT(asked, s.substeps);
+      EXPECT_EQ(asked_many, 0u);
+    }
+    hash[many] = dfm_world_hash(w.world);
+  }
+  offers_many = false;
+  EXPECT_EQ(hash[0], hash[1]);
 }
 
 // Its surface hangs on its points through N: positions come from the host, velocities from the model.

@@ -5,7 +5,7 @@
 namespace dfm {
 
 ContactRows::ContactRows(const Memory &m) {
-  use_memory(m, begin, dof, weight, y, y_free, inv_mass, source, point, block, blocks, response, frame, drive,
+  use_memory(m, begin, dof, weight, y, y_free, alone, source, point, block, blocks, response, frame, drive,
              rate, wn, wt, cross, impulse, dof_of_point_, dof_of_node_, place_, rigid, arm, dof_of_group_);
 }
 
@@ -84,7 +84,7 @@ void ContactRows::build(std::span<const ContactPoint> contacts, std::span<const 
   // Pass 1: touched surfels of self-stepping bodies, ascending, one block each.
   dof_of_node_.assign(nnode, kNone);
   for (uint32_t s = 0; s < sources.size(); ++s) {
-    if (sources[s].inv_mass) continue;
+    if (sources[s].diagonal) continue;
     const uint32_t first = ndof;
     for (const ContactPoint &c : contacts)
       for (uint32_t k = 0; k < c.nnode; ++k)
@@ -147,7 +147,7 @@ void ContactRows::build(std::span<const ContactPoint> contacts, std::span<const 
     for (uint32_t k = 0; k < c.nnode; ++k) {
       const uint32_t s = source_of(c.node[k]), surfel = c.node[k] - sources[s].first_node;
       const Surface &surface = *sources[s].surface;
-      if (!sources[s].inv_mass) {
+      if (!sources[s].diagonal) {
         add(dof_of_node_[c.node[k]], c.weight[k]);
       } else if (surface.identity()) {
         add(dof_of(s, surface.point[surfel]), c.weight[k]);
@@ -159,18 +159,18 @@ void ContactRows::build(std::span<const ContactPoint> contacts, std::span<const 
   }
   begin.push_back(static_cast<uint32_t>(dof.size()));
   y.resize(size_t(ndof) * 4);
-  inv_mass.resize(size_t(ndof) * 4);
+  alone.resize(size_t(ndof) * 4);
   for (uint32_t d = 0; d < ndof; ++d) {
     // a rigid body's change of velocity: what it has without contact is the contact's own `velocity`
     if (source[d] == kNone) {
       std::fill_n(&y[size_t(d) * 4], 4, 0.0);
-      std::fill_n(&inv_mass[size_t(d) * 4], 4, 0.0);
+      std::fill_n(&alone[size_t(d) * 4], 4, 0.0);
       continue;
     }
     const DofSource &s = sources[source[d]];
     for (uint32_t k = 0; k < 4; ++k) {
-      y[size_t(d) * 4 + k] = s.v_free[size_t(point[d]) * 4 + k];
-      inv_mass[size_t(d) * 4 + k] = s.inv_mass ? s.inv_mass[size_t(point[d]) * 4 + k] : 0;
+      y[size_t(d) * 4 + k] = s.velocity[size_t(point[d]) * 4 + k];
+      alone[size_t(d) * 4 + k] = s.diagonal ? s.diagonal[size_t(point[d]) * 4 + k] : 0;
     }
   }
 }
@@ -196,9 +196,7 @@ Vec3 ContactRows::diagonal(uint32_t i, Vec3 a) const {
   for (uint32_t j = begin[i]; j < begin[i + 1]; ++j) {
     const uint32_t d = dof[j];
     if (block[d] == kNone) {
-      const double *const w = &inv_mass[size_t(d) * 4];
-      const double ww = weight[j] * weight[j];
-      sum += Vec3{ww * (w[0] * a.x), ww * (w[1] * a.y), ww * (w[2] * a.z)};
+      sum += (weight[j] * weight[j]) * answer(d, a);
       continue;
     }
     const Block &b = blocks[block[d]];
@@ -295,10 +293,7 @@ void ContactRows::apply(uint32_t i, Vec3 q) {
       continue;
     }
     double *const to = &y[size_t(d) * 4];
-    const double *const w = &inv_mass[size_t(d) * 4];
-    to[0] += weight[j] * (w[0] * p.x);
-    to[1] += weight[j] * (w[1] * p.y);
-    to[2] += weight[j] * (w[2] * p.z);
+    store3(to, load3(to) + weight[j] * answer(d, p));
   }
 }
 

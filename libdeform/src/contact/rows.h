@@ -1,11 +1,12 @@
 // The contact operator of one sub-step.
 //
 // Contact i sees the mean velocity over the sub-step u_i = sum_k w_ik y_k - v_obstacle of a few unknowns
-// ("dofs") y_k: phyxels of bodies that the host integrates, surfels of bodies that step themselves. An
-// impulse p at the contact changes them by
-//     y_k += w_ik M_k^-1 p                     (phyxel; M per component, infinite where held)
-//     y_j += R_jk w_ik p for all j of the body (self-stepping body; R is its own symmetric response, dense
-//     over its touched surfels)
+// ("dofs") y_k: phyxels of bodies whose points do not answer each other, surfels of the others. An impulse p
+// at the contact changes them by
+//     y_k += w_ik D_k p                        (phyxel that answers its own impulses only; D its diagonal,
+//                                              zero where held)
+//     y_j += R_jk w_ik p for all j of the body (other bodies; R is the symmetric response, dense over the
+//     touched surfels)
 // A contact with a rigid body also sees the change (dv, dw) of that body's mean velocity, at the arm r from
 // its center to the contact:
 //     u_i -= dv + dw x r,   (dv, dw)_j -= R_jk (p, r x p)  for all bodies j of its group (joints tie them)
@@ -24,8 +25,9 @@ struct DofSource {
   uint32_t first_node = 0, nnode = 0;    // world-wide surfel numbers of the body
   uint32_t first_point = 0, npoint = 0;  // world-wide phyxel numbers
   const Surface *surface = nullptr;
-  const double *inv_mass = nullptr;  // [npoint,4]; null: self-stepping
-  const double *v_free = nullptr;    // [npoint,4] or, self-stepping, surface->v
+  // [npoint,4] 1/kg, Dynamics::diagonal(); null: surfels are the unknowns
+  const double *diagonal = nullptr;
+  const double *velocity = nullptr;  // without contact: [npoint,4] or, of surfels, surface->v
 };
 
 // The rigid body that an obstacle is: its number in a group of bodies that answer each other's impulses.
@@ -51,8 +53,9 @@ struct ContactRows {
   Array<uint32_t> begin;  // [n+1] into dof, weight
   Array<uint32_t> dof;
   Array<double> weight;
-  Array<double> y, inv_mass;  // [ndof,4]; inv_mass zero for dofs of blocks
-  Array<double> y_free;       // [ndof,4] without impulses
+  // [ndof,4]; 1/kg, the diagonal response of a dof, zero for those of blocks
+  Array<double> y, alone;
+  Array<double> y_free;  // [ndof,4] without impulses
   // [ndof] index of the DofSource (rigid: kNone), phyxel (or surfel of a block)
   Array<uint32_t> source, point;
   Array<uint32_t> block;  // [ndof] kNone or index into blocks
@@ -99,6 +102,10 @@ struct ContactRows {
   void build_rigid(std::span<const ContactPoint> contacts, const RigidPlaces &rigids);
   void set_arms(std::span<const ContactPoint> contacts, std::span<const DofSource> sources,
                 const RigidPlaces &rigids);
+  Vec3 answer(uint32_t d, Vec3 p) const {  // of a dof that is in no block
+    const double *const w = &alone[size_t(d) * 4];
+    return {w[0] * p.x, w[1] * p.y, w[2] * p.z};
+  }
   void response_apply(const Block &b, uint32_t k, Vec3 p);
   Vec3 rigid_diagonal(uint32_t i, Vec3 a) const;
   Vec3 diagonal(uint32_t i, Vec3 direction) const;
