@@ -55,7 +55,7 @@ dfm_world legs(dfm_context *c, uint32_t self) {
 
 TEST(SelfAuto, BallAt20MetresPerSecond_IsAsAlwaysOn) { is_as_always_on("ball", {0.05, 0, 0}, 20); }
 TEST(SelfAuto, BallAt50MetresPerSecond_IsAsAlwaysOn) { is_as_always_on("ball", {0.05, 0, 0}, 50); }
-TEST(SelfAuto, CubeAt20MetresPerSecond_IsAsAlwaysOn) { is_as_always_on("beam", {0.1, 0.1, 0.1}, 20); }
+TEST(SelfAuto, CubeAt30MetresPerSecond_IsAsAlwaysOn) { is_as_always_on("beam", {0.1, 0.1, 0.1}, 30); }
 TEST(SelfAuto, CubeAt50MetresPerSecond_IsAsAlwaysOn) { is_as_always_on("beam", {0.1, 0.1, 0.1}, 50); }
 
 TEST(SelfAuto, LegsThatMeetAndPart_AreOnWhileTheyAreNear) {

@@ -57,10 +57,11 @@ void stage_lagged(World &w, StepContext &step) {
     Phyxels &p = b->p;
     const Array<double> &force = lagged(*b);
     bool any = false;
+    const double *const diagonal = b->dynamics->diagonal();
     for (size_t i = 0; i < p.v_free.size(); ++i)
       if (force[i] != 0) {
         any = true;
-        p.v_free[i] += step.h * (p.inv_mass[i] * force[i]);
+        p.v_free[i] += step.h * (diagonal[i] * force[i]);
       }
     if (any) gather_surface(b->surface, p.x.data(), p.v_free.data());
   }
@@ -192,7 +193,7 @@ void set_forces(World &w, StepContext &step) {
       const size_t at = size_t{b.surface.point[s]} * kStride;
       const double *const force = &lagged(b)[at];
       for (int j = 0; j < 3; ++j)
-        pull[j] += c.weight[k] * (step.h * (b.p.inv_mass[at + size_t(j)] * force[j]));
+        pull[j] += c.weight[k] * (step.h * (b.dynamics->diagonal()[at + size_t(j)] * force[j]));
     }
     const double *const f = &step.rows.frame[size_t(i) * 9];
     const Vec3 u = step.rows.velocity(i);
