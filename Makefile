@@ -1,5 +1,5 @@
-# Two doors: `make demo` and `make test`. Each installs what is missing (cmake/deps.txt), configures, builds and runs;
-# a second call installs and rebuilds nothing. The rest is for those who work on the library.
+# Two doors: `make demo` and `make test`. Each installs what is missing (cmake/deps.txt), configures, builds
+# and runs; a second call installs and rebuilds nothing. The rest is for those who work on the library.
 PREFIX ?= /usr/local
 JOBS ?= $(shell nproc)
 SETUP = @cmake/setup.sh

@@ -1,5 +1,6 @@
 #!/usr/bin/env python3
-"""Runs every shipped scene with the commands of several builds, on one and two threads, and asks for one state hash per scene.
+"""Runs every shipped scene with the commands of several builds, on one and two threads, and asks for one
+state hash per scene.
 
 same_bits.py BUILD_DIR...    each holds bin/deform
 """
@@ -9,7 +10,8 @@ import subprocess
 import sys
 import tempfile
 
-STEPS = 200  # few, since -O0 runs them too; scenes start near enough for contacts to come, stick and slide by then
+# few, since -O0 runs them too; scenes start near enough for contacts to come, stick and slide by then
+STEPS = 200
 
 
 def state_hash(build, scene, folder, threads):
@@ -27,7 +29,8 @@ def state_hash(build, scene, folder, threads):
 def meshes_present(scene):
     """Some scenes stand on meshes that lie beside the repository and not in it."""
     meshes = [body["mesh"] for body in json.loads(scene.read_text())["bodies"]]
-    return all((scene.parent / mesh).exists() for mesh in meshes if isinstance(mesh, str))  # an object is made, not read
+    # an object is made, not read
+    return all((scene.parent / mesh).exists() for mesh in meshes if isinstance(mesh, str))
 
 
 def main():
@@ -37,7 +40,8 @@ def main():
             if not meshes_present(scene):
                 print(f"{scene.stem:24} left out: its meshes are not here")
                 continue
-            runs = {(build, threads): state_hash(build, scene, folder, threads) for build in sys.argv[1:] for threads in (1, 2)}
+            runs = {(build, threads): state_hash(build, scene, folder, threads) for build in sys.argv[1:]
+                    for threads in (1, 2)}
             for (build, threads), (value, contacts) in runs.items():
                 print(f"{scene.stem:24} {build:16} threads {threads}  {value}  contacts {contacts}")
                 touched |= contacts > 0

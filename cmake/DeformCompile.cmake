@@ -1,5 +1,6 @@
-# Flags that every target of ours is built with. The number rules of the house (same bits for every vector width and compiler)
-# need -ffp-contract=off and no fast-math; kernels get their wide flags per file, see deform_kernel_flags.
+# Flags that every target of ours is built with. The number rules of the house (same bits for every vector
+# width and compiler) need -ffp-contract=off and no fast-math; kernels get their wide flags per file, see
+# deform_kernel_flags.
 set(CMAKE_CXX_STANDARD 20)
 set(CMAKE_CXX_STANDARD_REQUIRED ON)
 set(CMAKE_CXX_EXTENSIONS OFF)
@@ -31,8 +32,9 @@ if(DEFORM_SANITIZE)
   add_link_options(-fsanitize=${DEFORM_SANITIZE})
 endif()
 
-# Files named *_kernel_avx2.cpp and *_kernel_avx512.cpp are compiled for those instruction sets and chosen at run time. AVX-512 cannot
-# be had without FMA (clang turns it off with -mno-fma); -ffp-contract=off keeps it unused, and a test looks into the objects.
+# Files named *_kernel_avx2.cpp and *_kernel_avx512.cpp are compiled for those instruction sets and chosen at
+# run time. AVX-512 cannot be had without FMA (clang turns it off with -mno-fma); -ffp-contract=off keeps it
+# unused, and a test looks into the objects.
 function(deform_kernel_flags)
   foreach(file IN LISTS ARGN)
     if(file MATCHES "_kernel_avx2\\.cpp$")

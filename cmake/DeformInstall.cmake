@@ -1,5 +1,6 @@
-# Everything that `make install PREFIX=` writes. The tree may be moved afterwards: the command finds the library by a relative
-# rpath, the library finds the plugins beside itself, deform.pc and the CMake package count from their own place.
+# Everything that `make install PREFIX=` writes. The tree may be moved afterwards: the command finds the
+# library by a relative rpath, the library finds the plugins beside itself, deform.pc and the CMake package
+# count from their own place.
 include(CMakePackageConfigHelpers)
 
 set(deform_plugin_dir ${CMAKE_INSTALL_LIBDIR}/deform/${DFM_ABI_DIR})
@@ -8,8 +9,9 @@ file(RELATIVE_PATH deform_bin_to_lib /${CMAKE_INSTALL_BINDIR} /${CMAKE_INSTALL_L
 file(RELATIVE_PATH deform_pc_to_prefix /${CMAKE_INSTALL_LIBDIR}/pkgconfig /)
 string(REGEX REPLACE "/$" "" deform_pc_to_prefix ${deform_pc_to_prefix})
 
-# The build tree has the same run paths as the installed one. With a run path of its own CMake would pad it with empty entries to the length of the
-# installed one, and the dynamic linker reads an empty entry as the current folder: a library lying there would be loaded.
+# The build tree has the same run paths as the installed one. With a run path of its own CMake would pad it
+# with empty entries to the length of the installed one, and the dynamic linker reads an empty entry as the
+# current folder: a library lying there would be loaded.
 set(deform_cli_rpath "$ORIGIN/${deform_bin_to_lib}")
 if(NOT deform_bin_to_lib STREQUAL "../lib")
   list(APPEND deform_cli_rpath "$ORIGIN/../lib")   # where the build tree has it
@@ -24,16 +26,19 @@ if(deform_plugins)
 endif()
 install(DIRECTORY ${CMAKE_SOURCE_DIR}/libdeform/include/deform DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}
   FILES_MATCHING PATTERN "*.h" PATTERN "*.hpp")
-install(FILES ${CMAKE_SOURCE_DIR}/libdeform/schema/deform-scene.schema.json DESTINATION ${CMAKE_INSTALL_DATADIR}/deform)
+install(FILES ${CMAKE_SOURCE_DIR}/libdeform/schema/deform-scene.schema.json
+  DESTINATION ${CMAKE_INSTALL_DATADIR}/deform)
 # Plugins to copy and edit, as source.
 file(GLOB deform_templates ${CMAKE_SOURCE_DIR}/plugins/template_*)
 install(DIRECTORY ${deform_templates} DESTINATION ${CMAKE_INSTALL_DATADIR}/deform)
 install(FILES ${CMAKE_SOURCE_DIR}/LICENSE ${CMAKE_SOURCE_DIR}/README.md ${CMAKE_SOURCE_DIR}/CHANGELOG.md
   DESTINATION ${CMAKE_INSTALL_DOCDIR})
 
-# libdeform_ode has an export of its own, so that who does not ask for it (find_package(deform COMPONENTS ode)) needs no ODE.
+# libdeform_ode has an export of its own, so that who does not ask for it (find_package(deform COMPONENTS
+# ode)) needs no ODE.
 if(TARGET deform_ode)
-  install(TARGETS deform_ode EXPORT deformOdeTargets LIBRARY DESTINATION ${CMAKE_INSTALL_LIBDIR} ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR})
+  install(TARGETS deform_ode EXPORT deformOdeTargets LIBRARY DESTINATION ${CMAKE_INSTALL_LIBDIR}
+    ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR})
   set_target_properties(deform_ode PROPERTIES INSTALL_RPATH "$ORIGIN" BUILD_WITH_INSTALL_RPATH ON)
   install(DIRECTORY ${CMAKE_SOURCE_DIR}/bindings/ode/include/deform DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}
     FILES_MATCHING PATTERN "*.h" PATTERN "*.hpp")
@@ -41,11 +46,14 @@ if(TARGET deform_ode)
 endif()
 
 install(EXPORT deformTargets NAMESPACE deform:: DESTINATION ${deform_cmake_dir})
-configure_package_config_file(${CMAKE_SOURCE_DIR}/cmake/deformConfig.cmake.in ${CMAKE_BINARY_DIR}/cmake/deformConfig.cmake
+configure_package_config_file(${CMAKE_SOURCE_DIR}/cmake/deformConfig.cmake.in
+  ${CMAKE_BINARY_DIR}/cmake/deformConfig.cmake
   INSTALL_DESTINATION ${deform_cmake_dir} PATH_VARS deform_plugin_dir)
-write_basic_package_version_file(${CMAKE_BINARY_DIR}/cmake/deformConfigVersion.cmake COMPATIBILITY SameMinorVersion)
+write_basic_package_version_file(${CMAKE_BINARY_DIR}/cmake/deformConfigVersion.cmake
+  COMPATIBILITY SameMinorVersion)
 install(FILES ${CMAKE_BINARY_DIR}/cmake/deformConfig.cmake ${CMAKE_BINARY_DIR}/cmake/deformConfigVersion.cmake
-  ${CMAKE_SOURCE_DIR}/cmake/DeformPlugin.cmake ${CMAKE_SOURCE_DIR}/cmake/deform_plugin.map DESTINATION ${deform_cmake_dir})
+  ${CMAKE_SOURCE_DIR}/cmake/DeformPlugin.cmake ${CMAKE_SOURCE_DIR}/cmake/deform_plugin.map
+  DESTINATION ${deform_cmake_dir})
 
 # An archive is all there is to link then, so `pkg-config --libs` names what it needs even without --static.
 set(deform_pc_needs "")

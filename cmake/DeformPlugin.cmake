@@ -1,6 +1,7 @@
-# deform_add_plugin(NAME SOURCE...) builds a plugin that exports dfm_plugin_entry alone, with the number rules of the library.
-# deform_add_static_plugin(NAME SOURCE...) builds the same sources as an archive to link into a program; the entry is then called
-# dfm_plugin_entry_NAME, and the program hands it to dfm_plugin_register_static.
+# deform_add_plugin(NAME SOURCE...) builds a plugin that exports dfm_plugin_entry alone, with the number rules
+# of the library. deform_add_static_plugin(NAME SOURCE...) builds the same sources as an archive to link into
+# a program; the entry is then called dfm_plugin_entry_NAME, and the program hands it to
+# dfm_plugin_register_static.
 set(DEFORM_PLUGIN_MAP ${CMAKE_CURRENT_LIST_DIR}/deform_plugin.map)
 function(deform_plugin_rules name)
   if(COMMAND deform_kernel_flags)
@@ -13,7 +14,8 @@ function(deform_plugin_rules name)
   endif()
   target_compile_options(${name} PRIVATE -ffp-contract=off)
   target_link_libraries(${name} PRIVATE m)   # sqrt of a law in C; a host need not have it
-  set_target_properties(${name} PROPERTIES C_VISIBILITY_PRESET hidden CXX_VISIBILITY_PRESET hidden VISIBILITY_INLINES_HIDDEN ON)
+  set_target_properties(${name} PROPERTIES C_VISIBILITY_PRESET hidden CXX_VISIBILITY_PRESET hidden
+    VISIBILITY_INLINES_HIDDEN ON)
 endfunction()
 
 function(deform_add_static_plugin name)

@@ -1,5 +1,6 @@
 #!/usr/bin/env python3
-"""make demo: the two cylinders with friction and without, as a table, one picture with two rows, and out/demo/summary.json.
+"""make demo: the two cylinders with friction and without, as a table, one picture with two rows, and
+out/demo/summary.json.
 
 demo.py DEFORM_COMMAND OUT_DIR
 """
@@ -16,13 +17,15 @@ RUNS = {
     "without friction": ["--set", '/contact/friction=[{"between": ["*", "*"], "law": "none"}]'],
 }
 FRAMES_PER_SECOND = 2
-TIMES = (0, 0.5, 1, 1.5, 5)  # s; the pictures of a row: frictionless, the upper cylinder leaves between the third and the fourth
+# s; the pictures of a row: frictionless, the upper cylinder leaves between the third and the fourth
+TIMES = (0, 0.5, 1, 1.5, 5)
 
 
 def run(*argv):
     done = subprocess.run([str(a) for a in argv])
     if done.returncode:
-        sys.exit(f"demo: {' '.join(map(str, argv))} ended with exit code {done.returncode}; its sentence stands above")
+        sys.exit(f"demo: {' '.join(map(str, argv))} ended with exit code {done.returncode}; its sentence "
+                 f"stands above")
 
 
 def simulate(command, out, label, options):
@@ -36,11 +39,13 @@ def simulate(command, out, label, options):
     start, end = ([float(row[f"com_{axis}"]) for axis in "xyz"] for row in (rows[0], rows[-1]))
     frames = sorted((folder / "frames").glob("*.png"))
     if len(frames) <= round(TIMES[-1] * FRAMES_PER_SECOND):
-        sys.exit(f"demo: {folder}/frames holds {len(frames)} pictures; the scene is shorter than {TIMES[-1]} s")
+        sys.exit(f"demo: {folder}/frames holds {len(frames)} pictures; the scene is shorter than {TIMES[-1]} "
+                 f"s")
     return {
         "upper": {"start": start, "end": end, "moved_m": math.dist(start, end)},
         "contacts": summary["contacts"], "creep_um_per_s": summary["hold"]["creep_max_um_per_s"],
-        "intersections_max": summary["intersections_max"], "steps": summary["steps"], "simulated_s": summary["simulated_s"],
+        "intersections_max": summary["intersections_max"], "steps": summary["steps"],
+        "simulated_s": summary["simulated_s"],
         "steps_per_second": 1000 / summary["ms_per_step"]["median"], "state_hash": summary["state_hash"],
         "pictures": [str(frames[round(t * FRAMES_PER_SECOND)]) for t in TIMES],
     }
@@ -54,7 +59,8 @@ def table(runs):
             ("upper cylinder ends at (m)", lambda r: place(r["upper"]["end"])),
             ("moved (m)", lambda r: f"{r['upper']['moved_m']:.3f}"),
             ("contacts, mean and most", lambda r: f"{r['contacts']['mean']:.0f}, {r['contacts']['max']}"),
-            ("creep of holding contacts (um/s)", lambda r: "none hold" if r["creep_um_per_s"] is None else f"{r['creep_um_per_s']:.3g}"),
+            ("creep of holding contacts (um/s)", lambda r: "none hold" if r["creep_um_per_s"] is None
+             else f"{r['creep_um_per_s']:.3g}"),
             ("crossing triangle pairs", lambda r: str(r["intersections_max"])),
             ("steps per second", lambda r: f"{r['steps_per_second']:.0f}")]
     print()
@@ -68,8 +74,10 @@ def main():
     out.mkdir(parents=True, exist_ok=True)
     runs = {label: simulate(command, out, label, options) for label, options in RUNS.items()}
     picture = out / "two_cylinders.png"
-    run(command, "montage", *(part for label, r in runs.items() for part in ("--row", label, *r["pictures"])), "--out", picture)
-    (out / "summary.json").write_text(json.dumps({"scene": SCENE, "picture": str(picture), "runs": runs}, indent=2) + "\n")
+    run(command, "montage", *(part for label, r in runs.items() for part in ("--row", label, *r["pictures"])),
+        "--out", picture)
+    (out / "summary.json").write_text(json.dumps({"scene": SCENE, "picture": str(picture), "runs": runs},
+                                                 indent=2) + "\n")
     table(runs)
     print(f"\npicture {picture}, figures {out}/summary.json")
 

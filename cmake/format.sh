@@ -8,8 +8,11 @@ tool=build/tools/clang-format-$version
 python=/usr/bin/python3   # the set-up's own, as in cmake/DeformPython.cmake
 [ -x "$python" ] || python=python3
 if [ ! -x $tool/clang_format/data/bin/clang-format ]; then
-  "$python" -m pip install --quiet --disable-pip-version-check --no-deps --target $tool "clang-format==$version" ||
-    { echo "clang-format $version is not to be had: pip could not install it; the form is not checked"; exit 77; }
+  if ! "$python" -m pip install --quiet --disable-pip-version-check --no-deps --target $tool \
+    "clang-format==$version"; then
+    echo "clang-format $version is not to be had: pip could not install it; the form is not checked"
+    exit 77
+  fi
 fi
 files() { git -c safe.directory='*' ls-files -z '*.c' '*.h' '*.cpp' '*.hpp'; }
 case ${1:-write} in

@@ -1,6 +1,7 @@
 #!/bin/sh
-# setup.sh SET... -- installs the packages of those sets of deps.txt that are missing, and nothing where all are there.
-# As another user than root it prints the line to run and stops: a build has no business with somebody's password.
+# setup.sh SET... -- installs the packages of those sets of deps.txt that are missing, and nothing where all
+# are there. As another user than root it prints the line to run and stops: a build has no business with
+# somebody's password.
 set -eu
 list=$(dirname "$0")/deps.txt
 rows=$(for set in "$@"; do sed -n "s/^$set  *//p" "$list"; done)
@@ -9,7 +10,8 @@ if ! command -v dpkg-query >/dev/null; then
   echo "deform: this is not a Debian system; make sure that it has what these packages hold:" $names >&2
   exit 0
 fi
-present=$(dpkg-query -W -f '${db:Status-Status} ${Package}\n' $names 2>/dev/null | sed -n 's/^installed //p' || true)
+present=$(dpkg-query -W -f '${db:Status-Status} ${Package}\n' $names 2>/dev/null |
+  sed -n 's/^installed //p' || true)
 missing=
 for name in $names; do
   echo "$present" | grep -qx "$name" || missing="$missing $name"
@@ -27,5 +29,8 @@ if [ "$(id -u)" != 0 ]; then
   exit 1
 fi
 export DEBIAN_FRONTEND=noninteractive
-apt-get update -q || { echo "deform: apt-get update failed; check network and /etc/apt/sources.list" >&2; exit 1; }
+if ! apt-get update -q; then
+  echo "deform: apt-get update failed; check network and /etc/apt/sources.list" >&2
+  exit 1
+fi
 $line || { echo "deform: apt could not install:$missing; see its message above" >&2; exit 1; }

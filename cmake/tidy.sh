@@ -1,6 +1,6 @@
 #!/bin/sh
-# tidy.sh JOBS [FILE...]: clang-tidy with the checks of .clang-tidy on these files, or on all of the library and
-# its plugins.
+# tidy.sh JOBS [FILE...]: clang-tidy with the checks of .clang-tidy on these files, or on all of the library
+# and its plugins.
 set -eu
 cd "$(dirname "$0")/.."
 command -v clang-tidy >/dev/null || { echo "clang-tidy is not installed"; exit 77; }

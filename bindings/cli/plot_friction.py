@@ -1,4 +1,5 @@
-"""Plots the rows of `deform friction`: python3 - ROWS.csv OUT.png KIND TITLE. Exit 3: matplotlib is missing."""
+"""Plots the rows of `deform friction`: python3 - ROWS.csv OUT.png KIND TITLE. Exit 3: matplotlib is
+missing."""
 import csv
 import os
 import sys
@@ -11,8 +12,10 @@ try:
 except Exception:
     sys.exit(3)
 
-UNITS = {"t": "time (s)", "x": "displacement (m)", "v": "velocity (m/s)", "F": "friction force (N)", "z": "bristle (m)", "Fn": "normal force (N)",
-         "F_elastic": "elastic force (N)", "rate": "force rate (N/s)", "F_ba": "break-away force (N)", "Fx": "Fx (N)", "Fy": "Fy (N)",
+UNITS = {"t": "time (s)", "x": "displacement (m)", "v": "velocity (m/s)", "F": "friction force (N)",
+         "z": "bristle (m)", "Fn": "normal force (N)",
+         "F_elastic": "elastic force (N)", "rate": "force rate (N/s)", "F_ba": "break-away force (N)",
+         "Fx": "Fx (N)", "Fy": "Fy (N)",
          "zx": "bristle x (m)", "zy": "bristle y (m)"}
 # Pairs of columns, one panel each.
 PANELS = {

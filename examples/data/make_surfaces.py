@@ -1,8 +1,9 @@
 #!/usr/bin/env python3
 """Makes organ.obj and rabbit.obj: closed surfaces of our own for scenes that fill them with cells.
 
-A sphere of even triangles is pulled out to a radius that depends on the direction; then each point moves to the middle of its neighbours and
-back onto the shape, again and again, until the triangles are even there. Run in this folder: python3 make_surfaces.py
+A sphere of even triangles is pulled out to a radius that depends on the direction; then each point moves to
+the middle of its neighbours and back onto the shape, again and again, until the triangles are even there. Run
+in this folder: python3 make_surfaces.py
 """
 import math
 
@@ -18,7 +19,8 @@ def dot(p, q):
 
 def icosphere(cuts):
     g = (1 + math.sqrt(5)) / 2
-    points = [unit(p) for s in (1, -1) for t in (1, -1) for p in ((0, s, t * g), (s, t * g, 0), (t * g, 0, s))]
+    points = [unit(p) for s in (1, -1) for t in (1, -1) for p in ((0, s, t * g), (s, t * g, 0),
+                                                                  (t * g, 0, s))]
     near = [[j for j in range(12) if j != i and dot(points[i], points[j]) > 0.4] for i in range(12)]
     triangles = []
     for i in range(12):
@@ -26,7 +28,8 @@ def icosphere(cuts):
             for k in near[i]:
                 if i < j and i < k and j < k and k in near[j]:
                     a, b, c = points[i], points[j], points[k]
-                    volume = dot(a, (b[1] * c[2] - b[2] * c[1], b[2] * c[0] - b[0] * c[2], b[0] * c[1] - b[1] * c[0]))
+                    volume = dot(a, (b[1] * c[2] - b[2] * c[1], b[2] * c[0] - b[0] * c[2],
+                                     b[0] * c[1] - b[1] * c[0]))
                     triangles.append((i, j, k) if volume > 0 else (i, k, j))
     for _ in range(cuts):
         middle, finer = {}, []
@@ -53,7 +56,8 @@ def bump(direction, axis, width):
 
 def organ(d):
     """A lobe, a smaller one beside it, a hollow below and an edge in front, as a liver has them."""
-    r = 0.060 * (1 + 0.55 * bump(d, (1, 0, 0.1), 0.8) + 0.25 * bump(d, (-1, 0.4, 0.2), 0.7) - 0.35 * bump(d, (0.2, 0.1, -1), 0.7))
+    r = 0.060 * (1 + 0.55 * bump(d, (1, 0, 0.1), 0.8) + 0.25 * bump(d, (-1, 0.4, 0.2), 0.7) - 0.35 *
+                 bump(d, (0.2, 0.1, -1), 0.7))
     return r * (1 + 0.05 * math.sin(5 * d[0] + 2 * d[1]) * math.sin(4 * d[1] - 3 * d[2]))
 
 
@@ -76,7 +80,8 @@ def relaxed(shape, cuts, rounds):
     place = lambda d: tuple(shape(d) * x for x in d)
     x = [place(p) for p in points]
     for _ in range(rounds):
-        x = [place(unit(tuple(0.5 * x[i][k] + 0.5 * sum(x[j][k] for j in n) / len(n) for k in range(3)))) for i, n in enumerate(near)]
+        x = [place(unit(tuple(0.5 * x[i][k] + 0.5 * sum(x[j][k] for j in n) / len(n) for k in range(3))))
+             for i, n in enumerate(near)]
     return x, triangles
 
 

@@ -1,6 +1,7 @@
 #!/usr/bin/env python3
-"""Writes terrain.obj (an open height field of irregular triangles: a dale with ridges and boulders) and basin.obj (a closed, lobed, folded bowl),
-for the scenes terrain.json and basin.json. Plain arithmetic: python3 static_surfaces.py"""
+"""Writes terrain.obj (an open height field of irregular triangles: a dale with ridges and boulders) and
+basin.obj (a closed, lobed, folded bowl), for the scenes terrain.json and basin.json. Plain arithmetic:
+python3 static_surfaces.py"""
 import math
 import os
 import random
@@ -18,10 +19,12 @@ def write(name, points, triangles):
 
 def terrain(n=30, size=0.9):
     draw = random.Random(7)
-    boulders = [(draw.uniform(-0.5, 0.5), draw.uniform(-0.5, 0.5), draw.uniform(0.06, 0.12)) for _ in range(9)]
+    boulders = [(draw.uniform(-0.5, 0.5), draw.uniform(-0.5, 0.5), draw.uniform(0.06, 0.12))
+                for _ in range(9)]
 
     def height(x, y):
-        z = 0.35 * (x * x + y * y) + 0.045 * math.sin(9 * x + 2 * y) * math.cos(7 * y - 3 * x) + 0.05 * abs(math.sin(4 * x - 5 * y))
+        z = (0.35 * (x * x + y * y) + 0.045 * math.sin(9 * x + 2 * y) * math.cos(7 * y - 3 * x) +
+             0.05 * abs(math.sin(4 * x - 5 * y)))
         return z + sum(0.7 * max(0.0, r - math.hypot(x - a, y - b)) for a, b, r in boulders)
 
     points, triangles = [], []
@@ -39,7 +42,8 @@ def terrain(n=30, size=0.9):
 
 
 def basin(around=48, along=14):
-    """Inner wall from the middle to the rim, outer wall back; both lobed, the inner one with folds that run up it."""
+    """Inner wall from the middle to the rim, outer wall back; both lobed, the inner one with folds that run
+    up it."""
     points, triangles = [(0, 0, 0)], []
     rings = 2 * along
     for ring in range(1, rings):

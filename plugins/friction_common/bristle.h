@@ -68,8 +68,10 @@ struct Columns {
   size_t follows[kColumns];  // all ones: a column of the batch; 0: a spare place
   DEFORM_PASS Columns(dfm_friction_out *out, size_t stride) {
     const auto place = [&](uint32_t at, double *base, uint32_t n) DEFORM_PASS {
-      for (uint32_t c = 0; c < n; ++c)
-        first[at + c] = base ? base + c * stride : spare[at + c], follows[at + c] = base ? ~size_t(0) : 0;
+      for (uint32_t c = 0; c < n; ++c) {
+        first[at + c] = base ? base + c * stride : spare[at + c];
+        follows[at + c] = base ? ~size_t(0) : 0;
+      }
     };
     place(kFx, out->ft, 2);
     place(kZx, out->state, 2);

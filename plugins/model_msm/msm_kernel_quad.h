@@ -176,7 +176,8 @@ MSM_INLINE void stretched_forces(const Block &b, uint32_t t, v4 q, v4 now, const
   const Edges4 middle = {quarter * ((e1.x + e2.x) + e3.x), quarter * ((e1.y + e2.y) + e3.y),
                          quarter * ((e1.z + e2.z) + e3.z)};
   const auto turn = [&](const Edges4 &e, Edges4 &g) __attribute__((always_inline)) {
-    g.x = along * g.x + inward * (e.x - middle.x), g.y = along * g.y + inward * (e.y - middle.y),
+    g.x = along * g.x + inward * (e.x - middle.x);
+    g.y = along * g.y + inward * (e.y - middle.y);
     g.z = along * g.z + inward * (e.z - middle.z);
   };
   turn(e1, g1);
@@ -284,7 +285,8 @@ static inline void spring_rows(const Block &b) {
   }
   const auto add = [&b](uint32_t n, v4 square, v4 mixed) __attribute__((always_inline)) {
     double *row = b.row + 8 * size_t(n);
-    store4(row, load4(row) + square), store4(row + 4, load4(row + 4) + mixed);
+    store4(row, load4(row) + square);
+    store4(row + 4, load4(row + 4) + mixed);
   };
   const v4 diagonal = set4(1, 1, 1, kForm == kPlain ? 1 : 0);
   for (uint32_t n = 0; n < b.quads; ++n) {

@@ -1,5 +1,6 @@
 #!/usr/bin/env python3
-"""What the shared objects export: the library exactly the functions of the public headers, also the inline lists, a plugin its entry alone.
+"""What the shared objects export: the library exactly the functions of the public headers, also the inline
+lists, a plugin its entry alone.
 
 exports.py NM INCLUDE_DIR LIBRARY PLUGIN...
 """
@@ -10,7 +11,8 @@ import sys
 
 
 def exported(nm, path):
-    out = subprocess.run([nm, "-D", "--defined-only", path], capture_output=True, text=True, check=True).stdout
+    out = subprocess.run([nm, "-D", "--defined-only", path], capture_output=True, text=True,
+                         check=True).stdout
     # Version names stand among the symbols as absolute ones.
     return {line.split()[2].split("@")[0] for line in out.splitlines() if line.split()[1] != "A"}
 
@@ -31,7 +33,8 @@ def main():
     for path, names in wanted.items():
         found = exported(nm, path)
         for name in sorted(found - names):
-            print(f"{path} exports {name}, which " + ("no public header declares" if path == library else "is not its entry"))
+            print(f"{path} exports {name}, which " + ("no public header declares" if path == library
+                                                      else "is not its entry"))
         for name in sorted(names - found):
             print(f"{path} does not export {name}")
         failed |= found != names

@@ -1,7 +1,8 @@
 #!/usr/bin/env python3
-"""Every guide of doc/howto that has a folder of files is followed as a stranger would: the folder is copied away from the source tree, and each
-sh block of the guide runs in it against an installed and moved tree. A guide that begins with <!-- needs FILE --> is passed over where the
-installed tree has no such file. So are examples/05_cpp.cpp and, where there is libdeform_ode, examples/ode.
+"""Every guide of doc/howto that has a folder of files is followed as a stranger would: the folder is copied
+away from the source tree, and each sh block of the guide runs in it against an installed and moved tree. A
+guide that begins with <!-- needs FILE --> is passed over where the installed tree has no such file. So are
+examples/05_cpp.cpp and, where there is libdeform_ode, examples/ode.
 
 guides.py BUILD_DIR SOURCE_DIR SCRATCH_DIR CXX_COMPILER
 """
@@ -19,7 +20,8 @@ from installed_tree import clean_environment, install, run, without_spaces
 def follow(guide, prefix, libdir, scratch):
     folder = scratch / guide.stem
     shutil.copytree(guide.with_suffix(""), folder)
-    env = {**clean_environment(), "CMAKE_PREFIX_PATH": str(prefix), "PKG_CONFIG_PATH": str(prefix / libdir / "pkgconfig"),
+    env = {**clean_environment(), "CMAKE_PREFIX_PATH": str(prefix),
+           "PKG_CONFIG_PATH": str(prefix / libdir / "pkgconfig"),
            "PATH": f"{prefix / 'bin'}:{os.environ['PATH']}"}
     if not any("CXX" in path.read_text() for path in folder.rglob("CMakeLists.txt")):
         env["CXX"] = "/bin/false"  # a guide whose project is in C asks for no other compiler
@@ -54,7 +56,8 @@ def main():
     build, source, scratch, compiler = sys.argv[1:]
     scratch = without_spaces(scratch)
     prefix, libdir = install(build, source, scratch)
-    guides = [path for path in sorted(pathlib.Path(source).glob("libdeform/doc/howto/*.md")) if path.with_suffix("").is_dir()]
+    guides = [path for path in sorted(pathlib.Path(source).glob("libdeform/doc/howto/*.md"))
+              if path.with_suffix("").is_dir()]
     followed = []
     for guide in guides:
         needs = re.match(r"<!-- needs (\S+) -->", guide.read_text())
@@ -70,16 +73,19 @@ def main():
 
     # The C++ header, as installed.
     env = clean_environment()
-    flags = run("pkg-config", "--cflags", "--libs", "deform", env={**env, "PKG_CONFIG_PATH": str(prefix / libdir / "pkgconfig")}).split()
+    flags = run("pkg-config", "--cflags", "--libs", "deform",
+                env={**env, "PKG_CONFIG_PATH": str(prefix / libdir / "pkgconfig")}).split()
     program = scratch / "cpp"
-    run(compiler, "-std=c++20", pathlib.Path(source) / "examples" / "05_cpp.cpp", "-o", program, *flags, env=env)
+    run(compiler, "-std=c++20", pathlib.Path(source) / "examples" / "05_cpp.cpp", "-o", program, *flags,
+        env=env)
     run(program, env={**env, "LD_LIBRARY_PATH": str(prefix / libdir)})
 
     # The examples beside an ODE world, by CMake and without it.
     if (prefix / libdir / "libdeform_ode.so").exists():
         folder = scratch / "examples_ode"
         shutil.copytree(pathlib.Path(source) / "examples" / "ode", folder)
-        env = {**env, "CMAKE_PREFIX_PATH": str(prefix), "PKG_CONFIG_PATH": str(prefix / libdir / "pkgconfig"), "LD_LIBRARY_PATH": str(prefix / libdir)}
+        env = {**env, "CMAKE_PREFIX_PATH": str(prefix), "PKG_CONFIG_PATH": str(prefix / libdir / "pkgconfig"),
+               "LD_LIBRARY_PATH": str(prefix / libdir)}
         run("cmake", "-S", folder, "-B", folder / "build", "-DCMAKE_BUILD_TYPE=Release", env=env)
         run("cmake", "--build", folder / "build", env=env)
         flags = run("pkg-config", "--cflags", "--libs", "deform_ode", env=env).split()

@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
-"""deform.hpp costs nothing: in hpp_cost.cpp, compiled with -O2, what goes through the wrapper makes the same calls as what goes through the C
-API, in as many instructions give or take MOVES register moves; and every member compiles, without exceptions too, and may stand in two units of
-one program.
+"""deform.hpp costs nothing: in hpp_cost.cpp, compiled with -O2, what goes through the wrapper makes the same
+calls as what goes through the C API, in as many instructions give or take MOVES register moves; and every
+member compiles, without exceptions too, and may stand in two units of one program.
 
 hpp_cost.py OBJDUMP INCLUDE_DIR SOURCE COMPILER...    compilers that are not there are passed by
 """
@@ -18,8 +18,10 @@ PAIRS = {"-fexceptions": 10, "-fno-exceptions": 6}
 
 
 def functions(objdump, obj):
-    """name: its instructions, padding left out, with what they refer to. What a compiler moves out of the way (NAME.cold) belongs to NAME."""
-    text = subprocess.run([objdump, "-dr", "--no-show-raw-insn", "-Mintel", obj], capture_output=True, text=True, check=True).stdout
+    """name: its instructions, padding left out, with what they refer to. What a compiler moves out of the way
+    (NAME.cold) belongs to NAME."""
+    text = subprocess.run([objdump, "-dr", "--no-show-raw-insn", "-Mintel", obj], capture_output=True,
+                          text=True, check=True).stdout
     found, name = {}, None
     for line in text.splitlines():
         if head := re.match(r"[0-9a-f]+ <(\w+)(?:\.\w+)*>:$", line):
@@ -40,7 +42,8 @@ def calls(code):
 
 def check(objdump, include, source, compiler, mode, folder):
     obj = pathlib.Path(folder) / "hpp_cost.o"
-    flags = ["-std=c++20", "-O2", "-Wall", "-Wextra", "-Wpedantic", "-Wshadow", "-Werror", mode, f"-I{include}"]
+    flags = ["-std=c++20", "-O2", "-Wall", "-Wextra", "-Wpedantic", "-Wshadow", "-Werror", mode,
+             f"-I{include}"]
     subprocess.run([compiler, *flags, "-c", source, "-o", obj], check=True)
     code = functions(objdump, obj)
     pairs = [name[2:] for name in code if name.startswith("c_")]
@@ -54,7 +57,8 @@ def check(objdump, include, source, compiler, mode, folder):
     if len(pairs) != PAIRS[mode]:
         sys.exit(f"{compiler} {mode}: {len(pairs)} pairs found, {PAIRS[mode]} expected")
     total = [sum(len(code[side + name]) for name in pairs) for side in ("c_", "hpp_")]
-    print(f"{compiler} {mode}: {len(pairs)} pairs, {total[0]} instructions in C, {total[1]} through the wrapper; {dearer} cost more")
+    print(f"{compiler} {mode}: {len(pairs)} pairs, {total[0]} instructions in C, {total[1]} through the "
+          f"wrapper; {dearer} cost more")
     return dearer
 
 
@@ -62,11 +66,13 @@ def header_only(include, compiler, folder):
     """Two translation units with every member in each link into one library without a name defined twice."""
     source = '#include <deform/deform.hpp>\n' + "".join(
         f"template class deform::basic::{name}<deform::{mode}>;\n" for mode in ("Values", "Throw")
-        for name in ("Context", "World", "Body", "Obstacle", "Rigid", "Material", "Law", "Scene", "TetMesh", "TriMesh"))
+        for name in ("Context", "World", "Body", "Obstacle", "Rigid", "Material", "Law", "Scene", "TetMesh",
+                     "TriMesh"))
     paths = [pathlib.Path(folder) / f"unit{i}.cpp" for i in (1, 2)]
     for path in paths:
         path.write_text(source)
-    subprocess.run([compiler, "-std=c++20", "-shared", "-fPIC", f"-I{include}", *paths, "-o", pathlib.Path(folder) / "units.so"], check=True)
+    subprocess.run([compiler, "-std=c++20", "-shared", "-fPIC", f"-I{include}", *paths, "-o",
+                    pathlib.Path(folder) / "units.so"], check=True)
 
 
 def main():

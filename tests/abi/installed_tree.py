@@ -1,6 +1,7 @@
 #!/usr/bin/env python3
-"""Installs into a scratch prefix, moves it, and does there what a stranger does: build a host with CMake and one with pkg-config, build a
-law with deform_add_plugin, run them, ask the command which plugins it finds. Nothing may point back into the build or source tree.
+"""Installs into a scratch prefix, moves it, and does there what a stranger does: build a host with CMake and
+one with pkg-config, build a law with deform_add_plugin, run them, ask the command which plugins it finds.
+Nothing may point back into the build or source tree.
 
 installed_tree.py BUILD_DIR SOURCE_DIR SCRATCH_DIR C_COMPILER
 """
@@ -30,7 +31,8 @@ def clean_environment():
 
 
 def without_spaces(folder):
-    """The folder, or one elsewhere: a shell splits what pkg-config prints at spaces, so the lines of the guides need a prefix without any."""
+    """The folder, or one elsewhere: a shell splits what pkg-config prints at spaces, so the lines of the
+    guides need a prefix without any."""
     folder = pathlib.Path(folder).resolve()
     if " " in str(folder):
         folder = pathlib.Path(tempfile.mkdtemp()) / folder.name
@@ -39,13 +41,16 @@ def without_spaces(folder):
 
 
 def install(build, source, scratch):
-    """(prefix, name of its library folder) of a tree installed into scratch, then moved, that names neither build nor source tree."""
+    """(prefix, name of its library folder) of a tree installed into scratch, then moved, that names neither
+    build nor source tree."""
     shutil.rmtree(scratch, ignore_errors=True)
     scratch.mkdir(parents=True)
     run("cmake", "--install", build, "--strip", "--prefix", scratch / "first", env=clean_environment())
     prefix = (scratch / "first").rename(scratch / "moved")
     for path in prefix.rglob("*"):
-        if path.is_file() and path.suffix in (".cmake", ".pc", ".h", ".hpp") and any(str(place) in path.read_text() for place in (build, source)):
+        if path.is_file() and path.suffix in (".cmake", ".pc", ".h",
+                                              ".hpp") and any(str(place) in path.read_text()
+                                                              for place in (build, source)):
             sys.exit(f"{path} names the build or source tree")
     return prefix, next(prefix.rglob("deform.pc")).parent.parent.relative_to(prefix)
 
@@ -57,21 +62,25 @@ def main():
     clean = clean_environment()
     prefix, libdir = install(build, source, scratch)
 
-    run("cmake", "-S", here, "-B", scratch / "cmake", f"-DCMAKE_PREFIX_PATH={prefix}", f"-DCMAKE_C_COMPILER={compiler}",
+    run("cmake", "-S", here, "-B", scratch / "cmake", f"-DCMAKE_PREFIX_PATH={prefix}",
+        f"-DCMAKE_C_COMPILER={compiler}",
         "-DCMAKE_BUILD_TYPE=Release", env=clean)
     run("cmake", "--build", scratch / "cmake", env=clean)
     slab = next((scratch / "cmake").glob("slab.*"))
     run(scratch / "cmake" / "host", slab, env=clean)
 
-    flags = run("pkg-config", "--cflags", "--libs", "deform", env={**clean, "PKG_CONFIG_PATH": str(prefix / libdir / "pkgconfig")}).split()
+    flags = run("pkg-config", "--cflags", "--libs", "deform",
+                env={**clean, "PKG_CONFIG_PATH": str(prefix / libdir / "pkgconfig")}).split()
     host = scratch / "host_by_pkg_config"
-    run(compiler, "-std=c99", "-Wall", "-Wextra", "-Werror", "-Wno-missing-field-initializers", here / "host.c", "-o", host, *flags, "-lm", env=clean)
+    run(compiler, "-std=c99", "-Wall", "-Wextra", "-Werror", "-Wno-missing-field-initializers",
+        here / "host.c", "-o", host, *flags, "-lm", env=clean)
     run(host, slab, env={**clean, "LD_LIBRARY_PATH": str(prefix / libdir)})
 
     # The front page's line for its program, to the letter; it needs no LD_LIBRARY_PATH to run.
     line = re.search(r"^cc hello\.c .*$", (pathlib.Path(source) / "README.md").read_text(), re.M).group(0)
     shutil.copy(pathlib.Path(source) / "examples" / "01_hello.c", scratch / "hello.c")
-    run("sh", "-ec", f"cd '{scratch}' && {line} && ./hello", env={**clean, "PKG_CONFIG_PATH": str(prefix / libdir / "pkgconfig")})
+    run("sh", "-ec", f"cd '{scratch}' && {line} && ./hello",
+        env={**clean, "PKG_CONFIG_PATH": str(prefix / libdir / "pkgconfig")})
 
     library = (prefix / libdir / "libdeform.so").resolve()
     if b".debug_info" in library.read_bytes():

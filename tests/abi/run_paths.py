@@ -1,7 +1,8 @@
 #!/usr/bin/env python3
-"""Every program and shared object of the build tree looks for its libraries in folders that the build names, and never in the current folder: the
-dynamic linker reads an empty or relative run path entry as the folder in which the user happens to stand, and loads what lies there. The command
-proves it: it runs in a folder of broken libraries.
+"""Every program and shared object of the build tree looks for its libraries in folders that the build names,
+and never in the current folder: the dynamic linker reads an empty or relative run path entry as the folder in
+which the user happens to stand, and loads what lies there. The command proves it: it runs in a folder of
+broken libraries.
 
 run_paths.py READELF BUILD_DIR SCRATCH_DIR
 """
@@ -22,7 +23,8 @@ def run_path(readelf, path):
 
 
 def bad_entries(readelf, folder):
-    """(file, entry) for each entry below folder that is neither absolute nor relative to the file, and the number of files seen."""
+    """(file, entry) for each entry below folder that is neither absolute nor relative to the file, and the
+    number of files seen."""
     bad, seen = [], 0
     for path in sorted(p for p in pathlib.Path(folder).rglob("*") if p.is_file() and not p.is_symlink()):
         entries = run_path(readelf, path)
@@ -45,12 +47,14 @@ def main():
             failed = True
     command = build / "bin" / "deform"
     scratch.mkdir(parents=True, exist_ok=True)
-    needed = re.findall(r"\(NEEDED\)\s+Shared library: \[(.*)\]", subprocess.run([readelf, "-d", command], capture_output=True, text=True).stdout)
+    needed = re.findall(r"\(NEEDED\)\s+Shared library: \[(.*)\]",
+                        subprocess.run([readelf, "-d", command], capture_output=True, text=True).stdout)
     for name in needed:
         if not name.startswith(("libc.", "ld-")):   # without these no program of the test would start either
             (scratch / name).write_bytes(b"not a library\n")
     done = subprocess.run([command, "--version"], cwd=scratch, capture_output=True, text=True)
-    print(f"in a folder with broken {', '.join(needed)}: exit {done.returncode} {done.stdout.strip()} {done.stderr.strip()}")
+    print(f"in a folder with broken {', '.join(needed)}: exit {done.returncode} {done.stdout.strip()} "
+          f"{done.stderr.strip()}")
     return 1 if failed or done.returncode or not needed else 0
 
 

@@ -1,6 +1,7 @@
 #!/usr/bin/env python3
-"""A build with DEFORM_PLUGINS_STATIC, installed, moved, and linked whole (-static) into an application that has no dynamic linker: by CMake and by
-pkg-config. The scene it runs ends in the same bits as in the build that loads plugins from files, and nothing refers to dlopen.
+"""A build with DEFORM_PLUGINS_STATIC, installed, moved, and linked whole (-static) into an application that
+has no dynamic linker: by CMake and by pkg-config. The scene it runs ends in the same bits as in the build
+that loads plugins from files, and nothing refers to dlopen.
 
 static_tree.py STATIC_BUILD SOURCE_DIR SCRATCH_DIR DYNAMIC_BUILD [C_COMPILER]
 """
@@ -24,10 +25,12 @@ def asked_for(*paths):
 
 def hash_of_the_dynamic_build(build, source, scratch, step):
     out = scratch / "dynamic"
-    run(pathlib.Path(build) / "bin" / "deform", "run", pathlib.Path(source) / SCENE, "--out", out, "--time", STEPS * step, "--quiet")
+    run(pathlib.Path(build) / "bin" / "deform", "run", pathlib.Path(source) / SCENE, "--out", out, "--time",
+        STEPS * step, "--quiet")
     summary = json.loads((out / "summary.json").read_text())
     if summary["steps"] != STEPS or summary["contacts"]["max"] == 0:
-        sys.exit(f"{SCENE} took {summary['steps']} steps with {summary['contacts']['max']} contacts; {STEPS} steps that touch are compared")
+        sys.exit(f"{SCENE} took {summary['steps']} steps with {summary['contacts']['max']} contacts; {STEPS} "
+                 f"steps that touch are compared")
     return summary["state_hash"]
 
 
@@ -44,15 +47,18 @@ def main():
     if list(prefix.rglob("*.so*")):
         sys.exit(f"{prefix} holds shared objects")
 
-    run("cmake", "-S", here, "-B", scratch / "cmake", f"-DCMAKE_PREFIX_PATH={prefix}", "-DCMAKE_BUILD_TYPE=Release", env=env)
+    run("cmake", "-S", here, "-B", scratch / "cmake", f"-DCMAKE_PREFIX_PATH={prefix}",
+        "-DCMAKE_BUILD_TYPE=Release", env=env)
     # The linker warns where a program without a dynamic linker holds a call of one.
     built = run("cmake", "--build", scratch / "cmake", "--clean-first", env=env)
     if "warning: Using 'dl" in built:
         sys.exit("the application calls the dynamic linker")
 
-    flags = run("pkg-config", "--cflags", "--libs", "deform", env={**env, "PKG_CONFIG_PATH": str(prefix / libdir / "pkgconfig")}).split()
+    flags = run("pkg-config", "--cflags", "--libs", "deform",
+                env={**env, "PKG_CONFIG_PATH": str(prefix / libdir / "pkgconfig")}).split()
     by_pkg_config = scratch / "embedded_by_pkg_config"
-    run(compiler, "-std=c99", "-Wall", "-Wextra", "-Werror", here / "embedded.c", scratch / "cmake" / "libslab.a", "-o", by_pkg_config, *flags, env=env)
+    run(compiler, "-std=c99", "-Wall", "-Wextra", "-Werror", here / "embedded.c",
+        scratch / "cmake" / "libslab.a", "-o", by_pkg_config, *flags, env=env)
 
     step = json.loads((pathlib.Path(source) / SCENE).read_text())["time"]["step"]
     wanted = hash_of_the_dynamic_build(dynamic_build, source, scratch, step)

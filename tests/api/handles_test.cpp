@@ -364,8 +364,8 @@ std::vector<Live> live(dfm_context *c) {
 // alone those that give a status.
 std::multiset<std::string> declared() {
   const std::regex comment(R"(/\*[\s\S]*?\*/)");
-  const std::regex function(
-      R"(\bdfm_status\s+dfm_(\w+)\s*\(\s*dfm_(world|body|obstacle|rigid|material|law|scene|tetmesh|trimesh)\s+\w)");
+  const std::regex function(R"(\bdfm_status\s+dfm_(\w+)\s*\(\s*dfm_(world|body|obstacle|rigid|material|law|)"
+                            R"(scene|tetmesh|trimesh)\s+\w)");
   std::multiset<std::string> out;
   for (const auto &entry :
        std::filesystem::directory_iterator(std::string(DEFORM_SOURCE_DIR) + "/libdeform/include/deform")) {

@@ -36,7 +36,8 @@ dfm_status eval(const dfm_friction_in *in, dfm_friction_out *out) {
 }
 const dfm_friction law_table = [] {
   dfm_friction t{};
-  t.size = sizeof t, t.eval = eval;
+  t.size = sizeof t;
+  t.eval = eval;
   return t;
 }();
 

@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
-"""Scenes with host "ode" with numbers replaced by extremes, each run in a process of its own: exit codes, and every run that ended otherwise than by
-0, 2 or 3. The short version is tests/adapters/ode/mutated_test.cpp.
+"""Scenes with host "ode" with numbers replaced by extremes, each run in a process of its own: exit codes, and
+every run that ended otherwise than by 0, 2 or 3. The short version is tests/adapters/ode/mutated_test.cpp.
 
 ode_mutations.py DEFORM [RUNS [FIRST_SEED]]    from the top of the repository
 """
@@ -51,7 +51,8 @@ def run(deform, scene, seed):
         path = pathlib.Path(folder, "scene.json")
         path.write_text(json.dumps(tree))
         try:
-            done = subprocess.run([deform, "run", path, "--quiet", "--time", "0.03", "--out", f"{folder}/out"], capture_output=True, text=True,
+            done = subprocess.run([deform, "run", path, "--quiet", "--time", "0.03", "--out",
+                                   f"{folder}/out"], capture_output=True, text=True,
                                   timeout=LIMIT_S)
             return scene.stem, seed, changed, done.returncode, done.stderr.strip()
         except subprocess.TimeoutExpired:
@@ -59,10 +60,12 @@ def run(deform, scene, seed):
 
 
 def main():
-    deform, runs, first = sys.argv[1], int(sys.argv[2]) if len(sys.argv) > 2 else 100, int(sys.argv[3]) if len(sys.argv) > 3 else 1
+    deform, runs, first = (sys.argv[1], int(sys.argv[2]) if len(sys.argv) > 2 else 100,
+                           int(sys.argv[3]) if len(sys.argv) > 3 else 1)
     codes = collections.Counter()
     with concurrent.futures.ThreadPoolExecutor() as pool:
-        jobs = [pool.submit(run, deform, scene, seed) for scene in SCENES for seed in range(first, first + runs)]
+        jobs = [pool.submit(run, deform, scene, seed) for scene in SCENES
+                for seed in range(first, first + runs)]
         for job in jobs:
             scene, seed, changed, code, sentence = job.result()
             codes[code] += 1

@@ -1,7 +1,8 @@
 #!/usr/bin/env python3
 """Each public header compiles alone in every language that a host may speak.
 
-headers_alone.py INCLUDE_DIR COMPILER...    C compilers; each is tried as C and as C++ (gcc -x c++, clang -x c++)
+headers_alone.py INCLUDE_DIR COMPILER...    C compilers; each is tried as C and as C++ (gcc -x c++, clang -x
+                                            c++)
 """
 import pathlib
 import shutil
@@ -23,11 +24,13 @@ def main():
     for compiler in filter(shutil.which, compilers):
         for standard, language in LANGUAGES.items():
             for header in headers:
-                if header.suffix == ".hpp" and language == "c" or header.name in CPP20 and standard != "c++20":
+                if (header.suffix == ".hpp" and language == "c" or header.name in CPP20
+                    and standard != "c++20"):
                     continue
                 # Twice: a header without a working guard fails.
                 source = f'#include "deform/{header.name}"\n' * 2 + "extern int nothing_else;\n"
-                run = subprocess.run([compiler, "-x", language, f"-std={standard}", *FLAGS, f"-I{include}", "-"], input=source,
+                run = subprocess.run([compiler, "-x", language, f"-std={standard}", *FLAGS, f"-I{include}",
+                                      "-"], input=source,
                                      capture_output=True, text=True)
                 tried += 1
                 if run.returncode:

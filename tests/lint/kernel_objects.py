@@ -1,9 +1,10 @@
 #!/usr/bin/env python3
-"""What the compiler made of the wide kernels: no weak symbol, only entries that carry the instruction set in their name, and no
-instruction that rounds otherwise than + - * / and sqrt (fused multiply-add, estimates).
+"""What the compiler made of the wide kernels: no weak symbol, only entries that carry the instruction set in
+their name, and no instruction that rounds otherwise than + - * / and sqrt (fused multiply-add, estimates).
 
 kernel_objects.py NM OBJDUMP BUILD_DIR
-A weak symbol (an inline function, a template) of an object compiled for AVX may be the one that the linker keeps for everybody.
+A weak symbol (an inline function, a template) of an object compiled for AVX may be the one that the linker
+keeps for everybody.
 """
 import pathlib
 import re

@@ -1,5 +1,6 @@
 #!/usr/bin/env python3
-"""The rules of the house as checks: each prints `file:line: [rule] what, and what to do` and the run fails if any did.
+"""The rules of the house as checks: each prints `file:line: [rule] what, and what to do` and the run fails if
+any did.
 
 lint.py [--root DIR] [RULE...]    checks all rules, or those named; --list names them
 Only Python's standard library is used, so the tests need nothing else.
@@ -9,12 +10,14 @@ import pathlib
 import sys
 
 import rules_code
+import rules_form
 import rules_header
 import rules_pages
 import rules_tree
 from tree import Tree
 
-RULES = {**rules_tree.RULES, **rules_code.RULES, **rules_header.RULES, **rules_pages.RULES}
+RULES = {**rules_tree.RULES, **rules_form.RULES, **rules_code.RULES, **rules_header.RULES,
+         **rules_pages.RULES}
 
 
 def check(root, names=None):

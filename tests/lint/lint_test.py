@@ -1,5 +1,6 @@
 #!/usr/bin/env python3
-"""The lint's own test: a small good tree is clean, and each bad change to it is found by the rule that is meant for it."""
+"""The lint's own test: a small good tree is clean, and each bad change to it is found by the rule that is
+meant for it."""
 import os
 import pathlib
 import subprocess
@@ -27,26 +28,42 @@ DFM_API int dfm_hello_loud(void);
 """
 GOOD = {
     "README.md": f"# Title\n\n```c\n{HELLO}```\n",
-    "LICENSE": "MIT\n", "CHANGELOG.md": "# Changes\n", "CMakePresets.json": "{}\n", "Makefile": "all:\n\techo\n",
-    "CMakeLists.txt": "# no -ffast-math here\nadd_compile_options(-ffp-contract=off -mno-fma)\n", ".ci/run": "#!/bin/sh\n",
+    "LICENSE": "MIT\n", "CHANGELOG.md": "# Changes\n", "CMakePresets.json": "{}\n",
+    "Makefile": "all:\n\techo\n",
+    "CMakeLists.txt": "# no -ffast-math here\nadd_compile_options(-ffp-contract=off -mno-fma)\n",
+    ".ci/run": "#!/bin/sh\n",
     "examples/01_hello.c": HELLO,
     "libdeform/include/deform/base.h": HEADER,
-    "libdeform/include/deform/deform.h": '#ifndef DEFORM_DEFORM_H\n#define DEFORM_DEFORM_H\n#include "deform/base.h"\n#endif\n',
+    "libdeform/include/deform/deform.h": '#ifndef DEFORM_DEFORM_H\n#define DEFORM_DEFORM_H\n'
+                                         '#include "deform/base.h"\n#endif\n',
     "libdeform/include/deform/deform.hpp": "inline int hello() { return dfm_hello() + dfm_hello_loud(); }\n",
     "libdeform/src/core/error.h": "#pragma once\n#include <string>\n",
-    "libdeform/src/math/elementary.h": "#pragma once\ninline double exp_check(double x) { return std::exp(x); }\n",
-    "libdeform/src/broad/tree.cpp": '#include "core/error.h"\n// std::pow( and Eigen:: in a comment say nothing\nint log(int);\n',
+    "libdeform/src/math/elementary.h": "#pragma once\ninline double exp_check(double x) { return "
+                                       "std::exp(x); }\n",
+    "libdeform/src/broad/tree.cpp": '#include "core/error.h"\n'
+                                    '// std::pow( and Eigen:: in a comment say nothing\nint log(int);\n',
+    "libdeform/src/broad/list.cpp": (
+        "A::A() : a_(1), b_{2} {}\nenum { B, C = 2 };\nvoid f(int a, int b) {\n"
+        "  for (int i = 0, j = 1; i < j; ++i, --j) g(i, j);\n  std::map<int, std::vector<A *>> m, n;\n"
+        "  const A *const p = h(a, b), *const q = p;\n"
+        "  auto l = [&](int c, int d) { return k<A, B>(c, d); };\n"
+        "  A x = {1, 2}, y{3, 4};\n  if (a) return A{1, 2};\n}\n"),
     "libdeform/src/api/scene.cpp": '#include "scene/reader.h"\n',
-    "libdeform/src/scene/reader.h": "#pragma once\n#include <nlohmann/json.hpp>\nusing json = nlohmann::json;\n",
+    "libdeform/src/scene/reader.h": "#pragma once\n#include <nlohmann/json.hpp>\n"
+                                    "using json = nlohmann::json;\n",
     "plugins/model_msm/model_msm.cpp": '#include "deform/plugin.h"\n#include "spring.h"\n#include <vector>\n',
     "plugins/model_msm/spring.h": "#pragma once\n",
     "plugins/friction_b/b.cpp": '#include "../friction_common/curve.h"\n',
     "plugins/friction_common/curve.h": "#pragma once\n",
-    "plugins/model_msm/spring_kernel_avx2.cpp": "#include <immintrin.h>\n#include \"spring.h\"\nnamespace {\ninline double half(double x) { return x / 2; }\n}\n",
+    "plugins/model_msm/spring_kernel_avx2.cpp": "#include <immintrin.h>\n#include \"spring.h\"\nnamespace {\n"
+                                                "inline double half(double x) { return x / 2; }\n}\n",
     "bindings/cli/main.cpp": '#include <CLI/CLI.hpp>\n#include "deform/deform.h"\n',
-    "libdeform/doc/howto/engine.md": "# Engine\n\n```c\nint x;\n```\n", "libdeform/doc/howto/engine/engine.c": "int w;\nint x;\nint y;\n",
+    "libdeform/doc/howto/engine.md": "# Engine\n\n```c\nint x;\n```\n",
+    "libdeform/doc/howto/engine/engine.c": "int w;\nint x;\nint y;\n",
     "libdeform/doc/howto/cpp.md": "```c\nint nowhere;\n```\n",
-    "libdeform/doc/README.md": "# Pages\n\n`dfm_hello`, `tree.cpp`, `core/error.h` [engine](howto/engine.md#engine), [c++](howto/cpp.md), [top](#pages), [out](https://example.org/a.md)\n",
+    "libdeform/doc/README.md": "# Pages\n\n`dfm_hello`, `tree.cpp`, `core/error.h` "
+                               "[engine](howto/engine.md#engine), [c++](howto/cpp.md), [top](#pages), "
+                               "[out](https://example.org/a.md)\n",
     "libdeform/doc/decisions/0001-handles.md": "# Handles\n",
     "libdeform/src/core/page.h": "#pragma once\n// doc/howto/cpp.md, howto/engine.md, decision 0001\n",
     "tests/unit/tree_test.cpp": '#include "broad/tree.h"\n',
@@ -54,59 +71,103 @@ GOOD = {
 }
 # rule: [(file, text that is appended, or replaces it where it starts with "=")]
 BAD = {
-    "layout": [("notes.txt", "=x\n"), ("src/main.cpp", "=int x;\n"), ("libdeform/src/utils/a.h", "=#pragma once\n"), ("plugins/msm/a.c", "=\n"),
-               ("tests/misc/a_test.cpp", "=\n"), ("libdeform/src/core/Error.h", "=#pragma once\n"), ("docs/index.md", "=x\n")],
-    "text": [("libdeform/src/core/error.h", "int x;\n" * 801), ("README.md", "word \n"), ("libdeform/src/core/error.h", "\tint x;\n"),
-             ("README.md", "no end"), ("libdeform/src/core/error.h", "// " + "x" * 200 + "\n"), ("CHANGELOG.md", "a\r\n"),
+    "layout": [("notes.txt", "=x\n"), ("src/main.cpp", "=int x;\n"),
+               ("libdeform/src/utils/a.h", "=#pragma once\n"), ("plugins/msm/a.c", "=\n"),
+               ("tests/misc/a_test.cpp", "=\n"), ("libdeform/src/core/Error.h", "=#pragma once\n"),
+               ("docs/index.md", "=x\n")],
+    "text": [("libdeform/src/core/error.h", "int x;\n" * 801), ("README.md", "word \n"),
+             ("libdeform/src/core/error.h", "\tint x;\n"),
+             ("README.md", "no end"),
+             ("CHANGELOG.md", "a\r\n"),
              ("libdeform/src/core/error.h", "// TODO later\n")],
-    "paths": [("README.md", "see /home/me/deform\n"), ("CMakeLists.txt", "set(X /root/x)\n"), ("README.md", "../.lib" + "rary/a\n"),
+    "columns": [("libdeform/src/core/error.h", "// " + "x" * 108 + "\n"), ("Makefile", "#" * 111 + "\n"),
+                (".ci/run", "#" * 111 + "\n"), ("CMakeLists.txt", "#" * 111 + "\n"),
+                ("libdeform/src/core/error.h", 'const char *a = R"(' + "x" * 100 + ')";\n')],
+    "statements": [("libdeform/src/broad/tree.cpp", f"void f() {{ {chain} }}\n") for chain in (
+        "a = 1, b = 2;", "return a = 1, true;", "if (a < b) a = 1, ++b;",
+        "for (int i = 0; i < 3; ++i) f(i), g(i);",
+        "s.x[2 * i].clear(), s.y.clear();", "const auto g = [&](int k) { a = k, b = k; };",
+        "else *a += 1, *b = 2;", "a::b(1), c<int>(2);", "switch (a) { case 1: a = 1, b = 2; }",
+        "return std::pair<int, int>(1, 2), true;", "p->a = {1, 2}, p->b = 3;")],
+    "paths": [("README.md", "see /home/me/deform\n"), ("CMakeLists.txt", "set(X /root/x)\n"),
+              ("README.md", "../.lib" + "rary/a\n"),
               ("examples/01_hello.c", '// "/wo' + 'rk/main"\n')],
-    "readme": [("examples/01_hello.c", "// more\n"), ("README.md", "=# Title\n"), ("examples/01_hello.c", "\n" * 60)],
-    "guides": [("libdeform/doc/howto/engine.md", "```c\nint z;\n```\n"), ("libdeform/doc/howto/engine.md", "```cmake\nproject(x)\n```\n")],
-    "links": [("README.md", "[x](libdeform/doc/gone.md)\n"), ("README.md", "[x](libdeform/doc/howto/engine.md#gone)\n"),
+    "readme": [("examples/01_hello.c", "// more\n"), ("README.md", "=# Title\n"),
+               ("examples/01_hello.c", "\n" * 60)],
+    "guides": [("libdeform/doc/howto/engine.md", "```c\nint z;\n```\n"),
+               ("libdeform/doc/howto/engine.md", "```cmake\nproject(x)\n```\n")],
+    "links": [("README.md", "[x](libdeform/doc/gone.md)\n"),
+              ("README.md", "[x](libdeform/doc/howto/engine.md#gone)\n"),
               ("libdeform/doc/README.md", "[x](#gone)\n")],
-    "citations": [("libdeform/src/core/error.h", "// design.md section 2\n"), ("libdeform/src/core/error.h", "// doc/concepts/cpp.md\n"),
-                  ("README.md", "decision 0002\n"), ("libdeform/src/core/error.h", "// doc/decisions/0002\n")],
-    "names": [("README.md", "`dfm_gone()`\n"), ("README.md", "in `broad/gone.cpp`\n"), ("libdeform/doc/howto/cpp.md", "`DFM_GONE`\n")],
+    "citations": [("libdeform/src/core/error.h", "// design.md section 2\n"),
+                  ("libdeform/src/core/error.h", "// doc/concepts/cpp.md\n"),
+                  ("README.md", "decision 0002\n"),
+                  ("libdeform/src/core/error.h", "// doc/decisions/0002\n")],
+    "names": [("README.md", "`dfm_gone()`\n"), ("README.md", "in `broad/gone.cpp`\n"),
+              ("libdeform/doc/howto/cpp.md", "`DFM_GONE`\n")],
     "reading_order": [("libdeform/doc/concepts/new.md", "=# New\n")],
-    "layers": [("libdeform/src/core/error.h", '#include "math/vec3.h"\n'), ("libdeform/src/broad/tree.cpp", '#include "narrow/pair.h"\n'),
-               ("libdeform/src/broad/tree.cpp", '#include "../core/error.h"\n'), ("libdeform/src/scene/reader.h", '#include "api/guard.h"\n'),
-               ("libdeform/src/mesh/a.h", '=#include "plugin/loader.h"\n'), ("libdeform/src/plan/a.h", '=#include <world/world.h>\n'),
+    "layers": [("libdeform/src/core/error.h", '#include "math/vec3.h"\n'),
+               ("libdeform/src/broad/tree.cpp", '#include "narrow/pair.h"\n'),
+               ("libdeform/src/broad/tree.cpp", '#include "../core/error.h"\n'),
+               ("libdeform/src/scene/reader.h", '#include "api/guard.h"\n'),
+               ("libdeform/src/mesh/a.h", '=#include "plugin/loader.h"\n'),
+               ("libdeform/src/plan/a.h", '=#include <world/world.h>\n'),
                ("libdeform/src/surfel/a.h", '=#include "phyxel/phyxels.h"\n')],
-    "public_only": [("bindings/cli/main.cpp", '#include "core/error.h"\n'), ("tests/api/hello_test.cpp", '#include "core/error.h"\n'),
-                    ("examples/01_hello.c", '#include "../libdeform/src/core/error.h"\n'), ("tests/analytic/a_test.cpp", '=#include "broad/tree.cpp"\n')],
-    "plugin_includes": [("plugins/model_msm/spring.h", '#include "deform/world.h"\n'), ("plugins/model_msm/spring.h", '#include "core/error.h"\n'),
+    "public_only": [("bindings/cli/main.cpp", '#include "core/error.h"\n'),
+                    ("tests/api/hello_test.cpp", '#include "core/error.h"\n'),
+                    ("examples/01_hello.c", '#include "../libdeform/src/core/error.h"\n'),
+                    ("tests/analytic/a_test.cpp", '=#include "broad/tree.cpp"\n')],
+    "plugin_includes": [("plugins/model_msm/spring.h", '#include "deform/world.h"\n'),
+                        ("plugins/model_msm/spring.h", '#include "core/error.h"\n'),
                         ("plugins/model_msm/spring.h", "#include <deform/base.h>\n"),
                         ("plugins/friction_a/a.c", '=#include "../model_msm/spring.h"\n'),
                         ("plugins/model_msm/spring.h", '#include "../friction_common/curve.h"\n')],
-    "third_parties": [("libdeform/src/broad/tree.cpp", "#include <Eigen/Core>\n"), ("bindings/cli/main.cpp", "#include <nlohmann/json.hpp>\n"),
-                      ("libdeform/src/core/error.h", "using V = Eigen::Vector3d;\n"), ("libdeform/include/deform/base.h", "#include <GL/gl.h>\n"),
-                      ("libdeform/src/core/error.h", "#include <spdlog/spdlog.h>\n"), ("bindings/cli/main.cpp", "#include <png.h>\n")],
-    "numbers": [("CMakeLists.txt", "add_compile_options(-ffast-math)\n"), ("CMakePresets.json", '{"f": "-Ofast"}\n'), ("Makefile", "X = -mfma\n"),
+    "third_parties": [("libdeform/src/broad/tree.cpp", "#include <Eigen/Core>\n"),
+                      ("bindings/cli/main.cpp", "#include <nlohmann/json.hpp>\n"),
+                      ("libdeform/src/core/error.h", "using V = Eigen::Vector3d;\n"),
+                      ("libdeform/include/deform/base.h", "#include <GL/gl.h>\n"),
+                      ("libdeform/src/core/error.h", "#include <spdlog/spdlog.h>\n"),
+                      ("bindings/cli/main.cpp", "#include <png.h>\n")],
+    "numbers": [("CMakeLists.txt", "add_compile_options(-ffast-math)\n"),
+                ("CMakePresets.json", '{"f": "-Ofast"}\n'), ("Makefile", "X = -mfma\n"),
                 ("libdeform/src/broad/tree.cpp", "double f(double a) { return std::fma(a, a, a); }\n"),
-                ("plugins/model_msm/spring_kernel_avx2.cpp", "__m256d f(__m256d a) { return _mm256_fmadd_pd(a, a, a); }\n"),
-                ("plugins/model_msm/spring_kernel_avx2.cpp", "__m256 f(__m256 a) { return _mm256_rsqrt_ps(a); }\n"),
+                ("plugins/model_msm/spring_kernel_avx2.cpp", "__m256d f(__m256d a) { return "
+                                                             "_mm256_fmadd_pd(a, a, a); }\n"),
+                ("plugins/model_msm/spring_kernel_avx2.cpp", "__m256 f(__m256 a) { return "
+                                                             "_mm256_rsqrt_ps(a); }\n"),
                 ("CMakeLists.txt", "add_compile_options(-march=native)\n"),
                 ("libdeform/src/broad/tree.cpp", '#pragma GCC optimize("fast-math")\n')],
-    "libm": [("libdeform/src/broad/tree.cpp", "double f(double a) { return std::pow(a, 3); }\n"), ("plugins/model_msm/spring.h", "double y = sin(1.0);\n"),
-             ("libdeform/src/math/vec3.h", "=double y = cbrt(1.0);\n"), ("libdeform/src/world/step.cpp", "=float y = expf(1.0f);\n"),
+    "libm": [("libdeform/src/broad/tree.cpp", "double f(double a) { return std::pow(a, 3); }\n"),
+             ("plugins/model_msm/spring.h", "double y = sin(1.0);\n"),
+             ("libdeform/src/math/vec3.h", "=double y = cbrt(1.0);\n"),
+             ("libdeform/src/world/step.cpp", "=float y = expf(1.0f);\n"),
              ("libdeform/src/world/step.cpp", "=double f(double x) { return exp(x); }\n")],
-    "kernels": [("plugins/model_msm/spring.h", "#include <vector>\n"), ("plugins/model_msm/spring_kernel_avx2.cpp", "#include <vector>\n"),
+    "kernels": [("plugins/model_msm/spring.h", "#include <vector>\n"),
+                ("plugins/model_msm/spring_kernel_avx2.cpp", "#include <vector>\n"),
                 ("plugins/model_msm/spring_kernel.h", "=#include <Eigen/Core>\n"),
                 ("plugins/model_msm/spring_kernel_avx2.cpp", "double f(double a) { return std::sqrt(a); }\n"),
                 ("plugins/model_msm/spring_kernel_avx512.cpp", "=inline double f(double a) { return a; }\n"),
                 ("libdeform/src/broad/box_kernel_avx2.cpp", "=double f(double a) { return a; }\n")],
-    "public_headers": [("libdeform/include/deform/base.h", "#include <stdlib.h>\n"), ("libdeform/include/deform/plugin.h", '=#include "deform/base.h"\n'),
+    "public_headers": [("libdeform/include/deform/base.h", "#include <stdlib.h>\n"),
+                       ("libdeform/include/deform/plugin.h", '=#include "deform/base.h"\n'),
                        ("libdeform/include/deform/body.h", "=#pragma once\n"),
-                       ("libdeform/include/deform/deform.h", "=#ifndef DEFORM_DEFORM_H\n#define DEFORM_DEFORM_H\n#endif\n"),
-                       ("libdeform/include/deform/base.h", "=#ifndef DEFORM_BASE_H\n#define DEFORM_BASE_H\nDFM_API int dfm_a(void);\n#endif\n")],
-    "cpp_complete": [("libdeform/include/deform/deform.hpp", "=// dfm_hello() and dfm_hello_loud() in a comment reach nothing\n"),
+                       ("libdeform/include/deform/deform.h", "=#ifndef DEFORM_DEFORM_H\n"
+                                                             "#define DEFORM_DEFORM_H\n#endif\n"),
+                       ("libdeform/include/deform/base.h", "=#ifndef DEFORM_BASE_H\n#define DEFORM_BASE_H\n"
+                                                           "DFM_API int dfm_a(void);\n#endif\n")],
+    "cpp_complete": [("libdeform/include/deform/deform.hpp", "=// dfm_hello() and dfm_hello_loud() in a "
+                                                             "comment reach nothing\n"),
                      ("libdeform/include/deform/deform.hpp", "=inline int hello() { return dfm_hello(); }\n"),
                      ("bindings/ode/include/deform/ode.h", "=DFM_API int dfm_ode_hello(void);\n")],
     "threads": [("libdeform/include/deform/base.h", "\nDFM_API int dfm_silent(void);\n"),
-                ("libdeform/include/deform/base.h", "\n/** Says nothing of threads. */\nDFM_API int dfm_silent(int a,\n  int b);\n"),
-                ("libdeform/include/deform/base.h", "\n/** Both. Threads: Any thread. */\nDFM_API int dfm_said(void);\nDFM_API int dfm_silent(void);\n")],
-    "versions": [("libdeform/include/deform/base.h", "\n#define DFM_VERSION_MAJOR 0\n#define DFM_VERSION_MINOR 1\n/* Since 0.1; this one since 0.2. */\n")],
+                ("libdeform/include/deform/base.h", "\n/** Says nothing of threads. */\n"
+                                                    "DFM_API int dfm_silent(int a,\n  int b);\n"),
+                ("libdeform/include/deform/base.h", "\n/** Both. Threads: Any thread. */\n"
+                                                    "DFM_API int dfm_said(void);\n"
+                                                    "DFM_API int dfm_silent(void);\n")],
+    "versions": [("libdeform/include/deform/base.h", "\n#define DFM_VERSION_MAJOR 0\n"
+                                                     "#define DFM_VERSION_MINOR 1\n"
+                                                     "/* Since 0.1; this one since 0.2. */\n")],
 }
 
 
@@ -128,7 +189,8 @@ class Lint(unittest.TestCase):
         for rule, changes in BAD.items():
             for change in changes:
                 with self.subTest(rule=rule, file=change[0], text=change[1][:60]):
-                    found = [f for f in lint.check(self.tree([change]), [rule]) if change[0] in f or rule in ("readme", "layout")]
+                    found = [f for f in lint.check(self.tree([change]), [rule]) if change[0] in f
+                             or rule in ("readme", "layout")]
                     self.assertTrue(found, "not found")
 
     def test_every_rule_has_a_bad_case(self):
@@ -137,7 +199,8 @@ class Lint(unittest.TestCase):
     def test_bad_kernel_objects_are_found(self):
         root = pathlib.Path(self.enterContext(tempfile.TemporaryDirectory()))
         source = ("inline int weak() { return 1; }\nint entry() { return weak(); }\n"
-                  "__attribute__((target(\"fma\"))) double fused_avx2(double a) { return __builtin_fma(a, a, a); }\n")
+                  "__attribute__((target(\"fma\"))) double fused_avx2(double a) { return __builtin_fma(a, a, "
+                  "a); }\n")
         (root / "a_kernel_avx2.cpp").write_text(source)
         target = root / "a_kernel_avx2.cpp.o"
         compiler = os.environ.get("CXX", "c++")

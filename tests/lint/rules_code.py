@@ -28,13 +28,16 @@ THIRD_PARTIES = [
     ("Bullet", r"(bullet/|bt[A-Z]\w+\.h|BulletDynamics|LinearMath/)", r"\bbt[A-Z]\w+", "bindings/bullet/"),
 ]
 
-STEP_FOLDERS = tuple(SRC + f + "/" for f in ("math", "phyxel", "surfel", "model", "dynamics", "broad", "narrow", "contact",
+STEP_FOLDERS = tuple(SRC + f + "/" for f in ("math", "phyxel", "surfel", "model", "dynamics", "broad",
+                                             "narrow", "contact",
                                              "friction", "distribute", "rigid", "world", "rollback"))
-LIBM = ("exp exp2 expm1 log2 log10 log1p log sin cos tan asin acos atan atan2 sinh cosh tanh asinh acosh atanh sincos pow cbrt "
+LIBM = ("exp exp2 expm1 log2 log10 log1p log sin cos tan asin acos atan atan2 sinh cosh tanh asinh acosh "
+        "atanh sincos pow cbrt "
         "hypot erf erfc tgamma lgamma").split()
 # elementary.h is header-only and needs nothing of the library: exp and pow with the same bits for everybody.
 PLUGIN_HEADERS = ("deform/plugin.h", "deform/plugin.hpp", "deform/elementary.h")
-KERNEL_HEADERS = {"emmintrin.h", "immintrin.h", "stdint.h", "stddef.h", "cstdint", "cstddef", "deform/plugin.h"}
+KERNEL_HEADERS = {"emmintrin.h", "immintrin.h", "stdint.h", "stddef.h", "cstdint", "cstddef",
+                  "deform/plugin.h"}
 
 
 def _resolves(tree, path, name):
@@ -42,17 +45,20 @@ def _resolves(tree, path, name):
 
 
 def layers(tree):
-    """core <- math <- {mesh, plugin} <- {phyxel, surfel} <- stages <- plan <- world <- rollback <- {scene, api}."""
+    """core <- math <- {mesh, plugin} <- {phyxel, surfel} <- stages <- plan <- world <- rollback <- {scene,
+    api}."""
     for path in tree.select(SRC):
         own = path[len(SRC):].split("/")[0]
         for line, _, name in includes(tree.text(path)):
             if name.startswith("../") or "/../" in name:
                 yield path, line, f"includes {name}: name a header from libdeform/src, as in \"core/error.h\""
             other = name.split("/")[0]
-            if other not in RANK or own not in RANK or other == own or "/" not in name or (own, other) in ALLOWED_BESIDE:
+            if (other not in RANK or own not in RANK or other == own or "/" not in name
+                or (own, other) in ALLOWED_BESIDE):
                 continue
             if RANK[other] == RANK[own]:
-                yield path, line, f"{own}/ includes {name}: {own}/ and {other}/ stand beside each other and meet in a higher folder"
+                yield (path, line, f"{own}/ includes {name}: {own}/ and {other}/ stand beside each other and "
+                                   f"meet in a higher folder")
             elif RANK[other] > RANK[own]:
                 yield path, line, f"{own}/ includes {name}, but {other}/ is built on {own}/"
 
@@ -69,16 +75,18 @@ def public_only(tree):
 
 
 def plugin_includes(tree):
-    """A plugin is built from plugin.h alone: what it needs more, a stranger's plugin would not have. Plugins of one kind may share headers in
-    plugins/KIND_common, which hold no .cpp."""
+    """A plugin is built from plugin.h alone: what it needs more, a stranger's plugin would not have. Plugins
+    of one kind may share headers in plugins/KIND_common, which hold no .cpp."""
     for path in tree.select("plugins/"):
         for line, quote, name in includes(tree.text(path)):
             common = re.match(r"\.\./([a-z]+)_common/[a-z0-9_]+\.h$", name)
-            shared = common and path.startswith(f"plugins/{common.group(1)}_") and f"plugins/{name[3:]}" in tree.paths
+            shared = (common and path.startswith(f"plugins/{common.group(1)}_")
+                      and f"plugins/{name[3:]}" in tree.paths)
             own = quote == '"' and (".." not in name and _resolves(tree, path, name) or shared)
             if quote == "<" and not name.startswith("deform/") or name in PLUGIN_HEADERS or own:
                 continue
-            yield path, line, f"includes {name}; a plugin includes {', '.join(PLUGIN_HEADERS)}, its own files and header-only third parties"
+            yield (path, line, f"includes {name}; a plugin includes {', '.join(PLUGIN_HEADERS)}, its own "
+                               f"files and header-only third parties")
 
 
 def third_parties(tree):
@@ -93,14 +101,17 @@ def third_parties(tree):
                 if re.match(include, name):
                     yield path, line, f"includes {name}: {who} stays in {folder}"
             for match in re.finditer(use, code):
-                yield path, line_of(code, match.start()), f"uses {match.group(0).strip('( ')}: {who} stays in {folder}"
+                yield (path, line_of(code, match.start()),
+                       f"uses {match.group(0).strip('( ')}: {who} stays in {folder}")
 
 
 def numbers(tree):
     """Same bits everywhere: no fast-math, no fused multiply-add, no estimates, no flags of one machine."""
-    flags = re.compile(r"-ffast-math|-Ofast|-funsafe-math\S*|-fassociative-math|-freciprocal-math|-mfma\b|-march=native|-mtune=native|"
+    flags = re.compile(r"-ffast-math|-Ofast|-funsafe-math\S*|-fassociative-math|-freciprocal-math|-mfma\b|"
+                       r"-march=native|-mtune=native|"
                        r"-ffp-contract=(?!off)\w+")
-    calls = re.compile(r"\b(_mm\d*_(mask\w*_)?f(n?m(add|sub)(sub|add)?)_\w+|_mm\d*_(mask\w*_)?(rcp|rsqrt)\w*|__builtin_fmaf?|"
+    calls = re.compile(r"\b(_mm\d*_(mask\w*_)?f(n?m(add|sub)(sub|add)?)_\w+|_mm\d*_(mask\w*_)?(rcp|rsqrt)\w*|"
+                       r"__builtin_fmaf?|"
                        r"(std::)?fmaf?\s*\()")
     for path in tree.paths:
         content = tree.text(path)
@@ -110,17 +121,20 @@ def numbers(tree):
             for number, line in enumerate(content.split("\n"), 1):
                 match = flags.search(line.split("#")[0])
                 if match:
-                    yield path, number, f"{match.group(0)} changes results; the library is built with -ffp-contract=off and plain IEEE operations"
+                    yield (path, number, f"{match.group(0)} changes results; the library is built with "
+                                         f"-ffp-contract=off and plain IEEE operations")
         elif path.endswith(CODE):
             code = without_comments(content, strings=True)
             for match in calls.finditer(code):
-                yield path, line_of(code, match.start()), f"{match.group(0).strip('( ')} gives other bits than a*b+c, a/b, sqrt; write those"
+                yield (path, line_of(code, match.start()),
+                       f"{match.group(0).strip('( ')} gives other bits than a*b+c, a/b, sqrt; write those")
             for match in re.finditer(r"#\s*pragma\s+(STDC\s+FP_CONTRACT\s+ON|GCC\s+optimize)", code):
                 yield path, line_of(code, match.start()), "a pragma may not change how numbers are computed"
 
 
 def libm(tree):
-    """libm picks its variant by processor, so inside a step only + - * / sqrt and math/elementary.h are used."""
+    """libm picks its variant by processor, so inside a step only + - * / sqrt and math/elementary.h are
+    used."""
     call = re.compile(r"(?<![\w.>:])(std::|::)?(" + "|".join(LIBM) + r")f?\s*\(")
     for path in tree.select(*STEP_FOLDERS, "plugins/", "libdeform/include/"):
         if path.startswith(SRC + "math/elementary"):
@@ -128,14 +142,17 @@ def libm(tree):
         code = without_comments(tree.text(path), strings=True)
         for match in call.finditer(code):
             before = code[:match.start()].rstrip(" *&")
-            if re.search(r"\b(void|int|double|float|inline|Vec3)$", before):  # a declaration of that name, not a call
+            # a declaration of that name, not a call
+            if re.search(r"\b(void|int|double|float|inline|Vec3)$", before):
                 continue
-            yield path, line_of(code, match.start()), f"calls libm's {match.group(2)}; take it from math/elementary.h (same bits on every processor)"
+            yield (path, line_of(code, match.start()),
+                   f"calls libm's {match.group(2)}; take it from math/elementary.h "
+                   f"(same bits on every processor)")
 
 
 def kernels(tree):
-    """Wide kernels see no STL and no Eigen and link internally: the linker may choose an inline function compiled with wide flags
-    for the whole program, which then dies on an older processor."""
+    """Wide kernels see no STL and no Eigen and link internally: the linker may choose an inline function
+    compiled with wide flags for the whole program, which then dies on an older processor."""
     pending = [p for p in tree.select(SRC, "plugins/") if "_kernel" in p.rsplit("/", 1)[1]]
     seen = set()
     while pending:
@@ -148,18 +165,24 @@ def kernels(tree):
             if name in KERNEL_HEADERS:
                 continue
             if quote == '"' and "/" not in name and _resolves(tree, path, name):
-                pending.append(posixpath.join(posixpath.dirname(path), name))  # its own header keeps the same rules
+                # its own header keeps the same rules
+                pending.append(posixpath.join(posixpath.dirname(path), name))
             else:
-                yield path, line, f"a kernel file includes {name}; allowed are {', '.join(sorted(KERNEL_HEADERS))} and headers beside it"
+                yield (path, line, f"a kernel file includes {name}; allowed are "
+                                   f"{', '.join(sorted(KERNEL_HEADERS))} and headers beside it")
         code = without_comments(content, strings=True)
         for match in re.finditer(r"\b(std|Eigen)::", code):
             yield path, line_of(code, match.start()), f"a kernel file uses {match.group(0)}"
-        if path.endswith(".cpp") and not re.search(r"\bnamespace\s*\{|\bstatic\b", code) and "#include" not in code:
+        if (path.endswith(".cpp") and not re.search(r"\bnamespace\s*\{|\bstatic\b", code)
+                and "#include" not in code):
             yield path, 1, "a kernel file keeps its functions in an anonymous namespace or static"
         for match in re.finditer(r"^(?:template\b[^;{]*?>\s*)?inline\b", code, re.M):
             if "namespace {" not in code[:match.start()]:
-                yield path, line_of(code, match.start()), "an inline function in a kernel file needs internal linkage: static, or an anonymous namespace"
+                yield (path, line_of(code, match.start()),
+                       "an inline function in a kernel file needs internal linkage: static, or an anonymous "
+                       "namespace")
 
 
-RULES = {"layers": layers, "public_only": public_only, "plugin_includes": plugin_includes, "third_parties": third_parties,
+RULES = {"layers": layers, "public_only": public_only, "plugin_includes": plugin_includes,
+         "third_parties": third_parties,
          "numbers": numbers, "libm": libm, "kernels": kernels}

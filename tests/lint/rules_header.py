@@ -23,14 +23,17 @@ def declared(tree, folder=PUBLIC):
 
 
 def public_headers(tree):
-    """Public C headers include three C headers and each other, plugin.h only two; all have guards and C linkage."""
+    """Public C headers include three C headers and each other, plugin.h only two; all have guards and C
+    linkage."""
     for path in tree.select(PUBLIC, ext=(".h",)):
         name = path[len(PUBLIC):]
         content = tree.text(path)
         for line, _, other in includes(content):
             allowed = {"stddef.h", "stdint.h"} if name == "plugin.h" else C_HEADERS | MORE.get(name, set())
-            if other not in allowed and (name == "plugin.h" or PUBLIC + other[len("deform/"):] not in tree.paths):
-                yield path, line, f"includes {other}; allowed are {', '.join(sorted(allowed))}" + ("" if name == "plugin.h" else " and deform/*.h")
+            beside = PUBLIC + other[len("deform/"):] in tree.paths
+            if other not in allowed and (name == "plugin.h" or not beside):
+                yield (path, line, f"includes {other}; allowed are {', '.join(sorted(allowed))}" +
+                       ("" if name == "plugin.h" else " and deform/*.h"))
         guard = f"DEFORM_{name[:-2].upper()}_H"
         if f"#ifndef {guard}\n#define {guard}\n" not in content:
             yield path, 1, f"has no guard {guard}"
@@ -53,11 +56,14 @@ def threads(tree):
         for match in DECLARATION.finditer(code):
             above = content[:match.start()].rstrip()
             if not above.endswith("*/") or "Threads:" not in above[above.rfind("/*"):]:
-                yield path, line_of(content, match.start()), f"{match.group(1)} has no comment that says \"Threads: ...\" (see base.h for the four phrases)"
+                yield (path, line_of(content, match.start()),
+                       f"{match.group(1)} has no comment that says \"Threads: ...\" (see base.h for the four "
+                       f"phrases)")
 
 
 def cpp_complete(tree):
-    """deform.hpp (with defs.hpp and result.hpp) calls every function that the public headers declare, ode.hpp those of the binding."""
+    """deform.hpp (with defs.hpp and result.hpp) calls every function that the public headers declare, ode.hpp
+    those of the binding."""
     for folder, name, more in (PUBLIC, "deform.hpp", ["defs.hpp", "result.hpp"]), (ODE, "ode.hpp", []):
         wrapper, functions = folder + name, list(declared(tree, folder))
         if wrapper not in tree.paths and (functions or folder == PUBLIC):
@@ -80,7 +86,9 @@ def versions(tree):
         content = tree.text(path)
         for match in re.finditer(r"\bsince (\d+)\.(\d+)", content, re.I):
             if (int(match[1]), int(match[2])) > (int(own[1]), int(own[2])):
-                yield path, line_of(content, match.start()), f"says \"{match[0]}\", and the version is {own[1]}.{own[2]}"
+                yield (path, line_of(content, match.start()),
+                       f"says \"{match[0]}\", and the version is {own[1]}.{own[2]}")
 
 
-RULES = {"public_headers": public_headers, "threads": threads, "cpp_complete": cpp_complete, "versions": versions}
+RULES = {"public_headers": public_headers, "threads": threads, "cpp_complete": cpp_complete,
+         "versions": versions}

@@ -11,7 +11,8 @@ HISTORY = ("CHANGELOG.md", PAGES + "decisions/")   # may name pages that are gon
 def slugs(text):
     """Anchors that a page's headings have."""
     text = re.sub(r"^```.*?^```", "", text, flags=re.M | re.S)
-    return {re.sub(r"[^\w\- ]", "", heading.lower()).replace(" ", "-") for heading in re.findall(r"^#+ (.*)$", text, re.M)}
+    return {re.sub(r"[^\w\- ]", "", heading.lower()).replace(" ", "-")
+            for heading in re.findall(r"^#+ (.*)$", text, re.M)}
 
 
 def links(tree):
@@ -31,15 +32,20 @@ def links(tree):
 
 def citations(tree):
     """Comments, messages and pages name only documents of the repository."""
-    ends = {path[i + 1:] for path in tree.paths if path.endswith(".md") for i in [-1, *(k for k, c in enumerate(path) if c == "/")]}
+    ends = {path[i + 1:] for path in tree.paths if path.endswith(".md")
+            for i in [-1, *(k for k, c in enumerate(path) if c == "/")]}
     numbers = {m.group(1) for p in tree.paths if (m := re.match(PAGES + r"decisions/(\d{4})", p))}
     for path in tree.select("", ext=(*CODE, ".py", ".txt", ".cmake", ".json", ".md")):
         if path.startswith(("tests/lint/", "tests/data/", "examples/data/", *HISTORY)):
             continue
         content = tree.text(path)
-        for match in re.finditer(r"(?<![\w./*:}-])[\w./-]*\w\.md\b(?!\")", content):   # a name in quotes is a file that is read
-            if not {match.group(0), posixpath.normpath(posixpath.join(posixpath.dirname(path), match.group(0)))} & (ends | set(tree.paths)):
-                yield path, line_of(content, match.start()), f"{match.group(0)} is not in the repository; say it in a page here and cite that"
+        # a name in quotes is a file that is read
+        for match in re.finditer(r"(?<![\w./*:}-])[\w./-]*\w\.md\b(?!\")", content):
+            if not {match.group(0),
+                    posixpath.normpath(posixpath.join(posixpath.dirname(path),
+                                                      match.group(0)))} & (ends | set(tree.paths)):
+                yield (path, line_of(content, match.start()),
+                       f"{match.group(0)} is not in the repository; say it in a page here and cite that")
         for match in re.finditer(r"decisions?[ /](\d{4})\b", content):
             if match.group(1) not in numbers:
                 yield path, line_of(content, match.start()), f"there is no decision {match.group(1)}"
@@ -50,22 +56,26 @@ def reading_order(tree):
     order = PAGES + "README.md"
     if order not in tree.paths:
         return
-    listed = {posixpath.normpath(PAGES + target.partition("#")[0]) for target in re.findall(r"\]\(([^)\s]+)\)", tree.text(order))}
+    listed = {posixpath.normpath(PAGES + target.partition("#")[0])
+              for target in re.findall(r"\]\(([^)\s]+)\)", tree.text(order))}
     for path in tree.select(PAGES, ext=(".md",)):
         if path != order and not path.startswith(PAGES + "decisions/") and path not in listed:
             yield path, 1, f"is not in {order}; say there in a line what it answers"
 
 
 def names(tree):
-    """A source file or public name that a page writes as code is there, so that pages follow when files move."""
+    """A source file or public name that a page writes as code is there, so that pages follow when files
+    move."""
     files = {path.rpartition("/")[2] for path in tree.paths}
     headers = "".join(tree.text(path) for path in tree.paths if "/include/" in path and path.endswith(CODE))
     for path in tree.select("", ext=(".md",)):
         if path.startswith(HISTORY):
             continue
-        content = re.sub(r"^```.*?^```", lambda m: re.sub(r"[^\n]", " ", m.group(0)), tree.text(path), flags=re.M | re.S)
+        content = re.sub(r"^```.*?^```", lambda m: re.sub(r"[^\n]", " ", m.group(0)), tree.text(path),
+                         flags=re.M | re.S)
         for code in re.finditer(r"`[^`]+`", content):
-            for match in re.finditer(r"(?<![\w*{}./-])(?:[\w-]+/)*([a-z0-9_]+\.(?:cpp|hpp|h|c|py))\b|\b(dfm_[a-z0-9_]+|DFM_[A-Z0-9_]+)", code.group(0)):
+            for match in re.finditer(r"(?<![\w*{}./-])(?:[\w-]+/)*([a-z0-9_]+\.(?:cpp|hpp|h|c|py))\b|"
+                                     r"\b(dfm_[a-z0-9_]+|DFM_[A-Z0-9_]+)", code.group(0)):
                 file, name = match.groups()
                 line = line_of(content, code.start() + match.start())
                 if file and file not in files:

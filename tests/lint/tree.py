@@ -8,8 +8,8 @@ CODE = (".c", ".cpp", ".h", ".hpp", ".inl")
 
 
 class Tree:
-    """Text files below root: what git tracks, so that a stray file in the checkout is not judged; without git, everything but build/, out/ and
-    dot folders."""
+    """Text files below root: what git tracks, so that a stray file in the checkout is not judged; without
+    git, everything but build/, out/ and dot folders."""
 
     def __init__(self, root):
         self.root = pathlib.Path(root)
@@ -38,7 +38,8 @@ class Tree:
 
     def select(self, *prefixes, ext=CODE):
         """Text files below any of the prefixes with one of the endings."""
-        return [p for p in self.paths if p.startswith(prefixes) and p.endswith(tuple(ext)) and self.text(p) is not None]
+        return [p for p in self.paths if p.startswith(prefixes) and p.endswith(tuple(ext))
+                and self.text(p) is not None]
 
 
 def without_comments(text, strings=False):
@@ -60,5 +61,6 @@ def line_of(text, offset):
 
 def includes(text):
     """(line, quote, name) of each #include."""
-    for match in re.finditer(r'^[ \t]*#[ \t]*include[ \t]*([<"])([^>"\n]+)[>"]', without_comments(text), re.M):
+    for match in re.finditer(r'^[ \t]*#[ \t]*include[ \t]*([<"])([^>"\n]+)[>"]', without_comments(text),
+                             re.M):
         yield line_of(text, match.start()), match.group(1), match.group(2)

@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
-"""The figures of the laws' pages, made by `deform friction` from examples/friction: laws_rig.png, laws_breakaway.png, laws_loops.png, laws_sliding.png,
-laws_pulled.png.
+"""The figures of the laws' pages, made by `deform friction` from examples/friction: laws_rig.png,
+laws_breakaway.png, laws_loops.png, laws_sliding.png, laws_pulled.png.
 
 friction_laws.py DEFORM_COMMAND [FOLDER]
 """
@@ -19,7 +19,8 @@ import matplotlib.pyplot as plt
 
 ROOT = pathlib.Path(__file__).resolve().parents[3]
 CASES = ROOT / "examples/friction"
-LAWS = {"coulomb": "#4c4c4c", "karnopp": "#8d6e3a", "dahl": "#2f6db3", "lugre": "#c8553d", "elastoplastic": "#3b8f5c", "gms": "#8657a8"}
+LAWS = {"coulomb": "#4c4c4c", "karnopp": "#8d6e3a", "dahl": "#2f6db3", "lugre": "#c8553d",
+        "elastoplastic": "#3b8f5c", "gms": "#8657a8"}
 command = sys.argv[1]
 
 
@@ -33,7 +34,8 @@ def run(case, law, step="1e-4", change=None):
             file = pathlib.Path(folder) / "case.json"
             file.write_text(json.dumps(text))
         rows = pathlib.Path(folder) / "rows.csv"
-        subprocess.run([command, "friction", str(file), "--law", law, "--step", step, "--csv", str(rows), "--quiet"], check=True)
+        subprocess.run([command, "friction", str(file), "--law", law, "--step", step, "--csv", str(rows),
+                        "--quiet"], check=True)
         with open(rows, newline="") as table:
             read = list(csv.DictReader(table))
     return {name: np.array([float(row[name]) for row in read]) for name in read[0]}
@@ -48,11 +50,13 @@ def rig(out):
         axes[2, column].plot(gross["t"], gross["F"], color=color, linewidth=1)
         axes[0, column].set_title(law, fontsize=10)
         axes[2, column].set_xlabel("time (s)")
-    for row, label in enumerate(("below break-away:\ndisplacement (\u00b5m)", "sliding:\nvelocity (m/s)", "sliding:\nfriction force (N)")):
+    for row, label in enumerate(("below break-away:\ndisplacement (\u00b5m)", "sliding:\nvelocity (m/s)",
+                                 "sliding:\nfriction force (N)")):
         axes[row, 0].set_ylabel(label)
         for axis in axes[row]:
             axis.grid(True, alpha=0.25)
-    figure.suptitle("1 kg on a plane, bias 0.2 N plus 0.7 N (top) or 3 N (below) at 1 Hz; F_C 1.47 N, F_S 1.96 N", fontsize=10)
+    figure.suptitle("1 kg on a plane, bias 0.2 N plus 0.7 N (top) or 3 N (below) at 1 Hz; F_C 1.47 N, F_S "
+                    "1.96 N", fontsize=10)
     figure.tight_layout()
     figure.savefig(out / "laws_rig.png")
 
@@ -91,12 +95,14 @@ def loops(out):
         rows = run("loops", law, change=dense)
         axis.plot(1e6 * rows["x"], rows["F"], color=LAWS[law], linewidth=1.1)
         inner = [int(np.argmax(rows["segment"] > k)) - 1 for k in (0, 2)]
-        axis.plot(1e6 * rows["x"][inner], rows["F"][inner], "o", color=LAWS[law], markersize=4, fillstyle="none")
+        axis.plot(1e6 * rows["x"][inner], rows["F"][inner], "o", color=LAWS[law], markersize=4,
+                  fillstyle="none")
         axis.set_title(law, fontsize=10)
         axis.set_xlabel("displacement (\u00b5m)")
         axis.grid(True, alpha=0.25)
     axes[0].set_ylabel("friction force (N)")
-    figure.suptitle("A slow path with an inner loop; circles: the same place before and after the loop", fontsize=10)
+    figure.suptitle("A slow path with an inner loop; circles: the same place before and after the loop",
+                    fontsize=10)
     figure.tight_layout()
     figure.savefig(out / "laws_loops.png")
 
@@ -111,7 +117,8 @@ def sliding(out):
         axis.set_xlabel("velocity (mm/s)")
         axis.grid(True, alpha=0.25)
     axes[0].set_ylabel("friction force (N)")
-    figure.suptitle("Prescribed slip, 20 mm/s at 1 Hz, second cycle: lag behind the steady curve and hysteresis at the reversals", fontsize=10)
+    figure.suptitle("Prescribed slip, 20 mm/s at 1 Hz, second cycle: lag behind the steady curve and "
+                    "hysteresis at the reversals", fontsize=10)
     figure.tight_layout()
     figure.savefig(out / "laws_sliding.png")
 

@@ -1,5 +1,6 @@
 #!/usr/bin/env python3
-"""The same throw, bounce and collision under both contact methods: rollback.png and the figures in it, from the scene rollback_compare.
+"""The same throw, bounce and collision under both contact methods: rollback.png and the figures in it, from
+the scene rollback_compare.
 
 rollback.py DEFORM_COMMAND [OUT.png]
 """
@@ -22,12 +23,14 @@ TIMES = (0.1, 0.2, 0.4)  # s, of the frames
 
 
 def run(command, method, out):
-    call = [command, "run", str(SCENE), "--quiet", "--out", str(out), "--frames", "10", "--set", f'/contact/method="{method}"']
+    call = [command, "run", str(SCENE), "--quiet", "--out", str(out), "--frames", "10", "--set",
+            f'/contact/method="{method}"']
     subprocess.run(call, check=True)
     with open(out / "bodies.csv", newline="") as file:
         rows = list(csv.DictReader(file))
     names = list(dict.fromkeys(r["body"] for r in rows))
-    series = {n: {k: np.array([float(r[k]) for r in rows if r["body"] == n]) for k in ("t", "com_x", "vel_x", "vel_z")} for n in names}
+    series = {n: {k: np.array([float(r[k]) for r in rows if r["body"] == n])
+                  for k in ("t", "com_x", "vel_x", "vel_z")} for n in names}
     frames = [plt.imread(out / f"frames/frame_{round(10 * t):06d}.png")[40:700, 60:900] for t in TIMES]
     return series, frames
 
@@ -35,7 +38,8 @@ def run(command, method, out):
 def main():
     picture = pathlib.Path(sys.argv[2]) if len(sys.argv) > 2 else pathlib.Path(__file__).with_suffix(".png")
     plt.rcParams.update({"font.size": 9, "axes.spines.top": False, "axes.spines.right": False})
-    figure, axes = plt.subplots(3, 3, figsize=(10.2, 8.6), dpi=100, gridspec_kw={"height_ratios": (1, 1, 0.85)})
+    figure, axes = plt.subplots(3, 3, figsize=(10.2, 8.6), dpi=100,
+                                gridspec_kw={"height_ratios": (1, 1, 0.85)})
     with tempfile.TemporaryDirectory() as folder:
         for row, method in enumerate(COLORS):
             series, frames = run(sys.argv[1], method, pathlib.Path(folder) / method)
@@ -48,7 +52,8 @@ def main():
             axes[2][0].plot(thrown["t"], thrown["vel_x"], **style)
             axes[2][1].plot(ball["t"], ball["vel_x"], **style)
             axes[2][2].plot(flying["t"], flying["vel_x"] + struck["vel_x"], **style)
-            print(f"{method}: block went {thrown['com_x'][-1] - thrown['com_x'][0]:.4f} m; ball leaves at {ball['vel_x'][-1]:.4f} m/s along the floor; "
+            print(f"{method}: block went {thrown['com_x'][-1] - thrown['com_x'][0]:.4f} m; ball leaves at "
+                  f"{ball['vel_x'][-1]:.4f} m/s along the floor; "
                   f"flying {flying['vel_x'][-1]:.4f}, struck {struck['vel_x'][-1]:.4f} m/s")
     t = np.linspace(0, 0.5, 201)
     axes[2][0].plot(t, np.maximum(0, 1.2 - 0.3 * 9.81 * t), "k:", lw=1, label="v0 - mu g t")

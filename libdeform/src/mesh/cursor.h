@@ -152,7 +152,10 @@ class Cursor {
   template <class T = double>
   double binary_real(const char *what) {
     const T v = value<T>(what);
-    if (!std::isfinite(v)) p_ -= sizeof(T), refuse("%s is not a finite number", what);
+    if (!std::isfinite(v)) {
+      p_ -= sizeof(T);
+      refuse("%s is not a finite number", what);
+    }
     return static_cast<double>(v);
   }
   void skip(size_t bytes, const char *what) {

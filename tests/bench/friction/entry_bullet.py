@@ -1,8 +1,10 @@
-"""Bullet's deformable world (Debian libbullet-dev) as an entry: bullet_entry.cpp, compiled when asked for, on the same tetrahedra.
+"""Bullet's deformable world (Debian libbullet-dev) as an entry: bullet_entry.cpp, compiled when asked for, on
+the same tetrahedra.
 
-Its explicit integrator with its implicit damping, and its implicit one. Contacts of nodes only (its default, and that of its demonstrations): with
-contacts of faces (SDF_RDF) the implicit world does not move at all, without friction neither. It tells no contact forces, so the cases that ask for
-them are not run, and it has one coefficient of friction.
+Its explicit integrator with its implicit damping, and its implicit one. Contacts of nodes only (its default,
+and that of its demonstrations): with contacts of faces (SDF_RDF) the implicit world does not move at all,
+without friction neither. It tells no contact forces, so the cases that ask for them are not run, and it has
+one coefficient of friction.
 """
 import os
 import resource
@@ -20,15 +22,19 @@ class Entry:
     def __init__(self, command, work):
         self.command, self.work, self.meshes = command, work, {}
         try:
-            flags = subprocess.run(["pkg-config", "--cflags", "--libs", "bullet"], capture_output=True, text=True)
+            flags = subprocess.run(["pkg-config", "--cflags", "--libs", "bullet"], capture_output=True,
+                                   text=True)
         except FileNotFoundError:
-            raise SystemExit("bullet: there is no pkg-config, which tells where Bullet is; install pkg-config and libbullet-dev")
+            raise SystemExit("bullet: there is no pkg-config, which tells where Bullet is; install "
+                             "pkg-config and libbullet-dev")
         if flags.returncode:
             raise SystemExit("bullet: pkg-config does not find it; install libbullet-dev")
-        self.version = subprocess.run(["pkg-config", "--modversion", "bullet"], capture_output=True, text=True).stdout.strip()
+        self.version = subprocess.run(["pkg-config", "--modversion", "bullet"], capture_output=True,
+                                      text=True).stdout.strip()
         self.program = os.path.join(work, "bullet_entry")
         source = os.path.join(os.path.dirname(os.path.abspath(__file__)), "bullet_entry.cpp")
-        subprocess.run(["c++", "-O2", "-std=c++17", source, "-o", self.program, *flags.stdout.split()], check=True)
+        subprocess.run(["c++", "-O2", "-std=c++17", source, "-o", self.program, *flags.stdout.split()],
+                       check=True)
 
     def configurations(self, case):
         return ["explicit", "implicit"] if case["name"] in CASES else []
@@ -50,7 +56,8 @@ class Entry:
         path, volume = self.meshes[key]
         m = case["body"]["material"]
         given = {k: v for k, v in case.items() if isinstance(v, float)}
-        given.update(mass=m["density"] * volume, young=m["young"], poisson=m["poisson"], damping=m["damping_stiffness"], begin=case.get("span", [0, 0])[0],
+        given.update(mass=m["density"] * volume, young=m["young"], poisson=m["poisson"],
+                     damping=m["damping_stiffness"], begin=case.get("span", [0, 0])[0],
                      end=case.get("span", [0, 0])[1], radius=case["body"].get("radius", 0.0))
         given["implicit"] = float(configuration == "implicit")
         most = cases.MOST_SECONDS
@@ -63,7 +70,8 @@ class Entry:
             last = [line for line in done.stderr.splitlines() if line.startswith("at ")]
             raise cases.TooSlow(float(last[-1][3:]) if last else 0, given["end"] or case["settle"])
         if done.returncode:
-            raise RuntimeError(done.stderr.strip().splitlines()[-1] if done.stderr.strip() else "ended with %d" % done.returncode)
+            raise RuntimeError(done.stderr.strip().splitlines()[-1] if done.stderr.strip()
+                               else "ended with %d" % done.returncode)
         values = dict(line.split("=") for line in done.stdout.split())
         values = {k: float(v) for k, v in values.items()}
         return values, used / values.pop("simulated")

@@ -1,6 +1,7 @@
 """The benchmark's cases as scenes of `deform run`. One function per case: scene in, measured quantities out.
 
-Laws: every case that asks for one coefficient runs with each law given to `laws`; the others with the law that the case names.
+Laws: every case that asks for one coefficient runs with each law given to `laws`; the others with the law
+that the case names.
 """
 import csv
 import json
@@ -27,7 +28,8 @@ class Entry:
         self.version = version[-1] if version else "unknown"
 
     def configurations(self, case):
-        return COULOMB_LIKE if case["law"] == "coulomb" else ["coulomb"] if case["law"] == "static_kinetic" else ["dahl"]
+        return (COULOMB_LIKE if case["law"] == "coulomb" else ["coulomb"] if case["law"] == "static_kinetic"
+                else ["dahl"])
 
     def mesh(self, body):
         key = json.dumps(body, sort_keys=True)
@@ -45,7 +47,8 @@ class Entry:
             json.dump(scene, f)
         most = cases.MOST_SECONDS
         before = resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime
-        done = subprocess.run([self.command, "run", path, "--out", folder, "--quiet"], capture_output=True, text=True,
+        done = subprocess.run([self.command, "run", path, "--out", folder, "--quiet"], capture_output=True,
+                              text=True,
                               preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_CPU, (most, most + 5)))
         used = resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime - before
         if done.returncode and used > most - 2:
@@ -59,19 +62,25 @@ class Entry:
     # What all scenes share. `low`: lowest point of the mesh in its own frame.
     def base(self, case, law, duration, every, gravity):
         m = case["body"]["material"]
-        params = {"mu": case["mu"]} if "mu" in case else {"mu_S": case["mu_S"], "mu_C": case["mu_C"], "v_s": case["v_s"]}
+        params = {"mu": case["mu"]} if "mu" in case else {"mu_S": case["mu_S"], "mu_C": case["mu_C"],
+                                                          "v_s": case["v_s"]}
         if law == "dahl":
             params = {"mu_C": case["mu"], "sigma0": case["sigma0"]}
-        elif law in ("lugre", "elastoplastic"):  # bristles that give a thousandth of a millimeter at the limit of 1 kPa
+        # bristles that give a thousandth of a millimeter at the limit of 1 kPa
+        elif law in ("lugre", "elastoplastic"):
             params.update({"sigma0": 1e9, "sigma1": 1e5})
-        return {"format": "deform-scene", "version": 1, "gravity": gravity, "time": {"duration": duration, "step": case["step"]},
+        return {"format": "deform-scene", "version": 1, "gravity": gravity,
+                "time": {"duration": duration, "step": case["step"]},
                 "materials": {"gel": {"density": m["density"], "young": m["young"], "poisson": m["poisson"],
                                       "damping": {"mass": 0, "stiffness": m["damping_stiffness"]}}},
-                "bodies": [{"name": "soft", "mesh": self.mesh(case["body"]), "material": "gel", "model": {"type": "msm"}}],
-                "contact": {"friction": [{"between": ["*", "*"], "law": law, "params": params}]}, "output": {"every": every}}
+                "bodies": [{"name": "soft", "mesh": self.mesh(case["body"]), "material": "gel",
+                            "model": {"type": "msm"}}],
+                "contact": {"friction": [{"between": ["*", "*"], "law": law, "params": params}]},
+                "output": {"every": every}}
 
     def floor(self, scene, **more):
-        scene["obstacles"] = [{"name": "floor", "shape": "plane", "point": [0, 0, 0], "normal": [0, 0, 1], **more}]
+        scene["obstacles"] = [{"name": "floor", "shape": "plane", "point": [0, 0, 0], "normal": [0, 0, 1],
+                               **more}]
         scene["bodies"][0]["pose"] = {"position": [0, 0, GAP]}
         return scene
 
@@ -81,7 +90,8 @@ class Entry:
         keys = [{"t": 0, "value": [0, 0, -G]}] if start > 0 else []
         for i in range(pieces + 1):
             a = angle * i / pieces
-            keys.append({"t": start + (end - start) * i / pieces, "value": [G * math.sin(a), 0, -G * math.cos(a)]})
+            keys.append({"t": start + (end - start) * i / pieces,
+                         "value": [G * math.sin(a), 0, -G * math.cos(a)]})
         return {"keyframes": keys}
 
     def scene_slope_ramp(self, case, law):
@@ -103,7 +113,8 @@ class Entry:
 
     def scene_slope_slide(self, case, law):
         a = case["angle"]
-        scene = self.floor(self.base(case, law, case["span"][1], 0.01, [G * math.sin(a), 0, -G * math.cos(a)]))
+        scene = self.floor(self.base(case, law, case["span"][1], 0.01,
+                                     [G * math.sin(a), 0, -G * math.cos(a)]))
 
         def measure(t):
             time, v = t.body("vel_x")
@@ -115,39 +126,49 @@ class Entry:
     def creep(self, case, axis):
         def measure(t):
             time, x = t.body("com_" + axis)
-            inside = [(s, u) for s, u in zip(time, x) if case["span"][0] - 1e-9 <= s <= case["span"][1] + 1e-9]
-            return {"creep_um_per_s": 1e6 * abs(inside[-1][1] - inside[0][1]) / (inside[-1][0] - inside[0][0])}
+            inside = [(s, u) for s, u in zip(time, x)
+                      if case["span"][0] - 1e-9 <= s <= case["span"][1] + 1e-9]
+            return {"creep_um_per_s": 1e6 *
+                    abs(inside[-1][1] - inside[0][1]) / (inside[-1][0] - inside[0][0])}
 
         return measure
 
     def scene_slope_hold(self, case, law):
-        scene = self.floor(self.base(case, law, case["span"][1], 0.02, self.tilting(0.2, case["tilt"], case["angle"])))
+        scene = self.floor(self.base(case, law, case["span"][1], 0.02,
+                                     self.tilting(0.2, case["tilt"], case["angle"])))
         return scene, self.creep(case, "x")
 
     def scene_vibration_drift(self, case, law):
-        scene = self.floor(self.base(case, law, case["span"][1], 0.02, self.tilting(0.2, case["tilt"], case["angle"])))
+        scene = self.floor(self.base(case, law, case["span"][1], 0.02,
+                                     self.tilting(0.2, case["tilt"], case["angle"])))
         w = 2 * math.pi * case["frequency"]
-        scene["obstacles"][0] = {"name": "floor", "shape": "box", "half_size": [0.5, 0.5, 0.05], "pose": {"position": [0, 0, -0.05]},
+        scene["obstacles"][0] = {"name": "floor", "shape": "box", "half_size": [0.5, 0.5, 0.05],
+                                 "pose": {"position": [0, 0, -0.05]},
                                  "motion": {"keyframes": [{"t": 0, "position": [0, 0, -0.05]}],
-                                            "sine": {"amplitude": [case["acceleration"] / w ** 2, 0, 0], "frequency": case["frequency"]}}}
+                                            "sine": {"amplitude": [case["acceleration"] / w ** 2, 0, 0],
+                                                     "frequency": case["frequency"]}}}
         return scene, self.creep(case, "x")
 
     def scene_pinch_hold(self, case, law):
         r, half = case["body"]["radius"], 0.01
-        gravity = {"keyframes": [{"t": 0, "value": [0, 0, 0]}, {"t": case["close"], "value": [0, 0, 0]}, {"t": case["load"], "value": [0, 0, -G]}]}
+        gravity = {"keyframes": [{"t": 0, "value": [0, 0, 0]}, {"t": case["close"], "value": [0, 0, 0]},
+                                 {"t": case["load"], "value": [0, 0, -G]}]}
         scene = self.base(case, law, case["span"][1], 0.02, gravity)
         scene["obstacles"] = []
         for name, side in (("left", -1), ("right", 1)):
             at = [side * (r + half + GAP), 0, 0]
             shut = [side * (r + half - case["depth"]), 0, 0]
             scene["obstacles"].append({"name": name, "shape": "box", "half_size": [half, 0.06, 0.06],
-                                       "motion": {"keyframes": [{"t": 0, "position": at}, {"t": 0.8 * case["close"], "position": shut}]}})
+                                       "motion": {"keyframes": [{"t": 0, "position": at},
+                                                                {"t": 0.8 * case["close"],
+                                                                 "position": shut}]}})
 
         def measure(t):
             out = self.creep(case, "z")(t)
             time, f = t.body("force_z")
             carried = [u for s, u in zip(time, f) if s >= case["span"][0]]
-            out["lift_share"] = sum(carried) / len(carried) / (case["body"]["material"]["density"] * t.first("volume") * G)
+            weight = case["body"]["material"]["density"] * t.first("volume") * G
+            out["lift_share"] = sum(carried) / len(carried) / weight
             return out
 
         return scene, measure
@@ -157,32 +178,41 @@ class Entry:
         scene["bodies"][0]["fix"] = [{"box": big, "motion": motion}]
 
     def scene_rotating_pad(self, case, law):
-        """The pad's top goes down and stays; the plate below turns about z, and slides along x in the combined cases."""
+        """The pad's top goes down and stays; the plate below turns about z, and slides along x in the
+        combined cases."""
         height, s, end = case["body"]["height"], case["ratio"], case["span"][1]
         spin = case["spin"] if s == 0 else case["speed"] / (s * case["body"]["radius"])
         speed = case["speed"] if s > 0 else 0.0
         scene = self.floor(self.base(case, law, end, 0.01, [0, 0, 0]))
-        self.pressed_top(scene, height, keyframes=[{"t": 0, "position": [0, 0, 0]}, {"t": case["press"], "position": [0, 0, -case["depth"] - GAP]}])
-        # The plate moves from the first moment on; its axis passes the pad's in the middle of the measured span.
+        self.pressed_top(scene, height, keyframes=[{"t": 0, "position": [0, 0, 0]},
+                                                   {"t": case["press"],
+                                                    "position": [0, 0, -case["depth"] - GAP]}])
+        # The plate moves from the first moment on; its axis passes the pad's in the middle of the measured
+        # span.
         middle, keys, pieces = 0.5 * (case["span"][0] + end), [], 60
         for i in range(pieces + 1):
             t = end * i / pieces
-            keys.append({"t": t, "position": [speed * (t - middle), 0, -0.05], "rotation": {"axis": [0, 0, 1], "angle_deg": math.degrees(spin * t) % 360}})
-        scene["obstacles"][0] = {"name": "floor", "shape": "box", "half_size": [0.5, 0.5, 0.05], "motion": {"keyframes": keys}}
+            keys.append({"t": t, "position": [speed * (t - middle), 0, -0.05],
+                         "rotation": {"axis": [0, 0, 1], "angle_deg": math.degrees(spin * t) % 360}})
+        scene["obstacles"][0] = {"name": "floor", "shape": "box", "half_size": [0.5, 0.5, 0.05],
+                                 "motion": {"keyframes": keys}}
 
         def measure(t):
             rows = [r for r in t.contacts() if case["span"][0] - 1e-9 <= float(r["t"]) <= end + 1e-9]
             mean = lambda key: sum(float(r[key]) for r in rows) / len(rows)
             if s == 0:
-                return {"torque_share": mean("moment_Nm") / (case["mu"] * mean("normal_N") * case["body"]["radius"])}
+                largest = case["mu"] * mean("normal_N") * case["body"]["radius"]
+                return {"torque_share": mean("moment_Nm") / largest}
             return {"force_share": mean("friction_N") / (case["mu"] * mean("normal_N"))}
 
         return scene, measure
 
     def scene_belt_stick_slip(self, case, law):
-        scene = self.floor(self.base(case, law, case["span"][1], 0.002, [0, 0, -G]), velocity_surface=[case["speed"], 0, 0])
+        scene = self.floor(self.base(case, law, case["span"][1], 0.002, [0, 0, -G]),
+                           velocity_surface=[case["speed"], 0, 0])
         middle = [s / 2 for s in case["body"]["size"]]
-        scene["bodies"][0]["springs"] = [{"box": [[-1, -1, -1], [1, 1, 1]], "to": middle, "stiffness": case["stiffness"]}]
+        scene["bodies"][0]["springs"] = [{"box": [[-1, -1, -1], [1, 1, 1]], "to": middle,
+                                          "stiffness": case["stiffness"]}]
 
         def measure(t):
             time, x = t.body("com_x")
@@ -201,8 +231,12 @@ class Entry:
         scene = self.floor(self.base(case, law, case["span"][1], 0.005, [0, 0, 0]))
         top = [[-1, -1, height - 1e-6], [1, 1, height + 1e-6]]
         above = [[-1, -1, 1e-6], [1, 1, 1]]
-        scene["bodies"][0]["fix"] = [{"box": above, "axes": "xy", "motion": {"sine": {"amplitude": [case["amplitude"], 0, 0], "frequency": case["frequency"]}}}]
-        scene["bodies"][0]["forces"] = [{"box": top, "total": [0, 0, -case["normal"]], "keyframes": [{"t": 0, "scale": 0}, {"t": case["press"], "scale": 1}]}]
+        scene["bodies"][0]["fix"] = [{"box": above, "axes": "xy",
+                                      "motion": {"sine": {"amplitude": [case["amplitude"], 0, 0],
+                                                          "frequency": case["frequency"]}}}]
+        scene["bodies"][0]["forces"] = [{"box": top, "total": [0, 0, -case["normal"]],
+                                         "keyframes": [{"t": 0, "scale": 0},
+                                                       {"t": case["press"], "scale": 1}]}]
 
         def measure(t):
             time, f = t.body("force_x")
@@ -210,7 +244,8 @@ class Entry:
             rows = [(s, u) for s, u in zip(time, f) if case["span"][0] - 1e-9 <= s <= case["span"][1] + 1e-9]
             # the force of a row is the mean over the interval that ends there
             work = sum(-u1 * (position(s1) - position(s0)) for (s0, _), (s1, u1) in zip(rows, rows[1:]))
-            return {"work_per_cycle": work * (1 / case["frequency"]) / (rows[-1][0] - rows[0][0]), "peak_force": max(abs(u) for _, u in rows)}
+            return {"work_per_cycle": work * (1 / case["frequency"]) / (rows[-1][0] - rows[0][0]),
+                    "peak_force": max(abs(u) for _, u in rows)}
 
         return scene, measure
 

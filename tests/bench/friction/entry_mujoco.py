@@ -1,13 +1,15 @@
 """MuJoCo (pip install mujoco numpy) as an entry: the same tetrahedra as a three-dimensional flex.
 
-It has one coefficient of friction and no bristles: the other cases are told as not run. Moving walls are bodies on joints whose position and
-velocity are prescribed in every step (a mocap body would have no velocity in contact). Its manual ("Tuning models: Deformables", "Preventing slip")
-asks for the integrator `discrete` where a flex is elastic, with steps of 1 to 4 ms; its no-slip iterations are not available with a flex. So:
+It has one coefficient of friction and no bristles: the other cases are told as not run. Moving walls are
+bodies on joints whose position and velocity are prescribed in every step (a mocap body would have no velocity
+in contact). Its manual ("Tuning models: Deformables", "Preventing slip") asks for the integrator `discrete`
+where a flex is elastic, with steps of 1 to 4 ms; its no-slip iterations are not available with a flex. So:
 
   default       that integrator, all else as it comes: pyramidal cones, impratio 1
   recommended   elliptic cones and impratio 10, the manual's figure for manipulation
-  hard          what made the pinch creep least here: impratio 1000, contacts as stiff as the step allows (solref of two steps, its own clamp) and the
-                exact diagonal (diagexact), without which vertices of a few milligrams get contacts that the ball pushes in by 4 of its 6 mm
+  hard          what made the pinch creep least here: impratio 1000, contacts as stiff as the step allows
+                (solref of two steps, its own clamp) and the exact diagonal (diagexact), without which
+                vertices of a few milligrams get contacts that the ball pushes in by 4 of its 6 mm
 """
 import math
 import os
@@ -17,8 +19,10 @@ import cases
 import mesh_file
 
 G = 9.81
-OPTIONS = {"default": ("", False), "recommended": ('cone="elliptic" impratio="10"', False), "hard": ('cone="elliptic" impratio="1000"', True)}
-LEAST_STEP = {"pinch_hold": 2e-3, "rotating_pad": 2e-3}  # nothing in them is faster, and at the cases' own step they take four times as long
+OPTIONS = {"default": ("", False), "recommended": ('cone="elliptic" impratio="10"', False),
+           "hard": ('cone="elliptic" impratio="1000"', True)}
+# nothing in them is faster, and at the cases' own step they take four times as long
+LEAST_STEP = {"pinch_hold": 2e-3, "rotating_pad": 2e-3}
 
 
 class Entry:
@@ -49,19 +53,26 @@ class Entry:
         return values, (time.process_time() - started) / simulated
 
     def model(self, case, configuration, walls="", holder="", pin="", lift=0.0):
-        """The soft body over z = lift, in `holder` (a body that carries pinned points) if given; friction of a contact is the larger of both sides."""
+        """The soft body over z = lift, in `holder` (a body that carries pinned points) if given; friction of
+        a contact is the larger of both sides."""
         points, tets = self.mesh(case["body"])
         m = case["body"]["material"]
         mass = m["density"] * mesh_file.volume(points, tets)
-        flex = '<flexcomp name="soft" type="direct" dim="3" mass="%.9g" radius="1e-4" pos="0 0 %g" point="%s" element="%s">' % (
-            mass, lift, " ".join("%.9g" % x for p in points for x in p), " ".join(str(i) for t in tets for i in t))
-        flex += '<elasticity young="%g" poisson="%g" damping="%g"/><edge equality="false"/>' % (m["young"], m["poisson"], m["damping_stiffness"])
+        flex = ('<flexcomp name="soft" type="direct" dim="3" mass="%.9g" radius="1e-4" pos="0 0 %g" '
+                'point="%s" element="%s">' % (
+            mass, lift, " ".join("%.9g" % x for p in points for x in p),
+            " ".join(str(i) for t in tets for i in t)))
+        flex += ('<elasticity young="%g" poisson="%g" damping="%g"/><edge equality="false"/>' %
+                 (m["young"], m["poisson"], m["damping_stiffness"]))
         option, hard = OPTIONS[configuration]
-        touch = 'friction="%g 0.005 0.0001"' % case["mu"] + (' solref="%g 1"' % (2 * case["step"]) if hard else "")
+        touch = 'friction="%g 0.005 0.0001"' % case["mu"] + (' solref="%g 1"' % (2 * case["step"]) if hard
+                                                             else "")
         flex += '<contact selfcollide="none" condim="3" %s/>%s</flexcomp>' % (touch, pin)
-        xml = ('<mujoco><size memory="1G"/><option timestep="%g" integrator="discrete" %s><flag diagexact="%s"/></option>'
+        xml = ('<mujoco><size memory="1G"/><option timestep="%g" integrator="discrete" %s><flag '
+               'diagexact="%s"/></option>'
                '<default><geom %s/></default><worldbody>%s%s</worldbody></mujoco>') % (
-            case["step"], option, "enable" if hard else "disable", touch, walls, holder % flex if holder else flex)
+            case["step"], option, "enable" if hard else "disable", touch, walls, holder % flex if holder
+            else flex)
         try:
             model = self.mj.MjModel.from_xml_string(xml)
         except ValueError as error:
@@ -114,7 +125,8 @@ class Entry:
         speed = lambda r: (r[-1][1] - r[0][1]) / (r[-1][0] - r[0][0])
         middle = lambda r: 0.5 * (r[-1][0] + r[0][0])
         first, last = inside[:n], inside[-n:]
-        return {"acceleration": (speed(last) - speed(first)) / (middle(last) - middle(first))}, case["span"][1]
+        return ({"acceleration": (speed(last) - speed(first)) / (middle(last) - middle(first))},
+                case["span"][1])
 
     def creep(self, model, data, case, axis, before):
         at = []
@@ -126,14 +138,17 @@ class Entry:
     def run_slope_hold(self, case, configuration):
         model, data = self.model(case, configuration, self.FLOOR, lift=self.LIFT)
         share = lambda t: min(1.0, max(0.0, (t - 0.2) / (case["tilt"] - 0.2)))
-        return {"creep_um_per_s": self.creep(model, data, case, 0, lambda t: self.tilt(model, case["angle"] * share(t)))}, case["span"][1]
+        return {"creep_um_per_s": self.creep(model, data, case, 0,
+                                             lambda t: self.tilt(model,
+                                                                 case["angle"] * share(t)))}, case["span"][1]
 
     @staticmethod
     def prescribe(data, joint, position, velocity):
         data.qpos[joint], data.qvel[joint] = position, velocity
 
     def run_vibration_drift(self, case, configuration):
-        plate = '<body pos="0 0 -0.05" gravcomp="1"><joint name="shake" type="slide" axis="1 0 0"/><geom type="box" size="0.5 0.5 0.05" mass="1e6"/></body>'
+        plate = ('<body pos="0 0 -0.05" gravcomp="1"><joint name="shake" type="slide" axis="1 0 0"/><geom '
+                 'type="box" size="0.5 0.5 0.05" mass="1e6"/></body>')
         model, data = self.model(case, configuration, plate, lift=self.LIFT)
         joint = model.jnt_qposadr[self.mj.mj_name2id(model, self.mj.mjtObj.mjOBJ_JOINT, "shake")]
         w = 2 * math.pi * case["frequency"]
@@ -147,7 +162,8 @@ class Entry:
         return {"creep_um_per_s": self.creep(model, data, case, 0, before)}, case["span"][1]
 
     def wall_force(self, model, data, geoms):
-        """Total contact force of the flex on geoms, N, and its moment about the z axis through the origin, N m."""
+        """Total contact force of the flex on geoms, N, and its moment about the z axis through the origin, N
+        m."""
         import numpy
         force, moment, f6 = numpy.zeros(3), 0.0, numpy.zeros(6)
         for i in range(data.ncon):
@@ -167,11 +183,13 @@ class Entry:
         r, half = case["body"]["radius"], 0.01
         walls = ""
         for name, side in (("left", -1), ("right", 1)):
-            walls += '<body pos="%g 0 0" gravcomp="1"><joint name="%s" type="slide" axis="1 0 0"/><geom type="box" size="%g 0.06 0.06" mass="1e6"/></body>' % (
-                side * (r + half + 1.2e-4), name, half)
+            walls += ('<body pos="%g 0 0" gravcomp="1"><joint name="%s" type="slide" axis="1 0 0"/><geom '
+                      'type="box" size="%g 0.06 0.06" mass="1e6"/></body>' % (
+                side * (r + half + 1.2e-4), name, half))
         model, data = self.model(case, configuration, walls)
         model.opt.gravity[:] = 0
-        joints = [model.jnt_qposadr[self.mj.mj_name2id(model, self.mj.mjtObj.mjOBJ_JOINT, n)] for n in ("left", "right")]
+        joints = [model.jnt_qposadr[self.mj.mj_name2id(model, self.mj.mjtObj.mjOBJ_JOINT, n)]
+                  for n in ("left", "right")]
         close = 0.8 * case["close"]
 
         def before(t):
@@ -179,7 +197,8 @@ class Entry:
             speed = (case["depth"] + 1.2e-4) / close if data.time < close else 0.0
             self.prescribe(data, joints[0], travel, speed)
             self.prescribe(data, joints[1], -travel, -speed)
-            model.opt.gravity[2] = -G * min(1.0, max(0.0, (t - case["close"]) / (case["load"] - case["close"])))
+            model.opt.gravity[2] = -G * min(1.0,
+                                            max(0.0, (t - case["close"]) / (case["load"] - case["close"])))
 
         at, lift, count = [], 0.0, 0
         for t in self.steps(model, data, case["span"][1], before):
@@ -193,20 +212,25 @@ class Entry:
         height, s, end = case["body"]["height"], case["ratio"], case["span"][1]
         points, _ = self.mesh(case["body"])
         top = " ".join(str(i) for i, p in enumerate(points) if p[2] > height - 1e-6)
-        plate = ('<body name="plate" pos="0 0 -0.05"><joint name="slide" type="slide" axis="1 0 0"/><joint name="turn" type="hinge" axis="0 0 1"/>'
+        plate = ('<body name="plate" pos="0 0 -0.05"><joint name="slide" type="slide" axis="1 0 0"/><joint '
+                 'name="turn" type="hinge" axis="0 0 1"/>'
                  '<geom name="plate" type="box" size="0.5 0.5 0.05" mass="1e6"/></body>')
-        press = '<body name="press" pos="0 0 0"><joint name="press" type="slide" axis="0 0 1"/><inertial pos="0 0 0" mass="1e6" diaginertia="1 1 1"/>%s</body>'
+        press = ('<body name="press" pos="0 0 0"><joint name="press" type="slide" axis="0 0 1"/><inertial '
+                 'pos="0 0 0" mass="1e6" diaginertia="1 1 1"/>%s</body>')
         model, data = self.model(case, configuration, plate, press, '<pin id="%s"/>' % top, lift=self.LIFT)
         model.opt.gravity[:] = 0
-        joint = {n: model.jnt_qposadr[self.mj.mj_name2id(model, self.mj.mjtObj.mjOBJ_JOINT, n)] for n in ("slide", "turn", "press")}
+        joint = {n: model.jnt_qposadr[self.mj.mj_name2id(model, self.mj.mjtObj.mjOBJ_JOINT, n)]
+                 for n in ("slide", "turn", "press")}
         spin = case["spin"] if s == 0 else case["speed"] / (s * case["body"]["radius"])
-        speed, middle, down = (case["speed"] if s > 0 else 0.0), 0.5 * (case["span"][0] + end), case["depth"] + self.LIFT - 1e-4
+        speed, middle, down = (case["speed"] if s > 0
+                               else 0.0), 0.5 * (case["span"][0] + end), case["depth"] + self.LIFT - 1e-4
 
         def before(_):
             t = data.time
             self.prescribe(data, joint["slide"], speed * (t - middle), speed)
             self.prescribe(data, joint["turn"], spin * t, spin)
-            self.prescribe(data, joint["press"], -down * min(1.0, t / case["press"]), -down / case["press"] if t < case["press"] else 0.0)
+            self.prescribe(data, joint["press"], -down * min(1.0, t / case["press"]), -down / case["press"]
+                           if t < case["press"] else 0.0)
 
         normal = force = torque = 0.0
         for t in self.steps(model, data, end, before):

@@ -1,4 +1,5 @@
-"""Tetrahedra for the other entries: made by `deform mesh make` (MSH 2.2, binary), so that every engine works on the same mesh."""
+"""Tetrahedra for the other entries: made by `deform mesh make` (MSH 2.2, binary), so that every engine works
+on the same mesh."""
 import struct
 import subprocess
 
@@ -10,7 +11,8 @@ def make(command, body, path):
         shape = ["ball", "--radius", body["radius"]]
     else:
         shape = ["cylinder", "--radius", body["radius"], "--length", body["height"]]
-    subprocess.run([command, "mesh", "make", *map(str, shape), "--cells", str(body["cells"]), "--out", path, "--quiet"], check=True)
+    subprocess.run([command, "mesh", "make", *map(str, shape), "--cells", str(body["cells"]), "--out", path,
+                    "--quiet"], check=True)
 
 
 def read(path):
@@ -40,5 +42,6 @@ def volume(points, tets):
     total = 0.0
     for a, b, c, d in tets:
         u, v, w = ([points[k][i] - points[a][i] for i in range(3)] for k in (b, c, d))
-        total += (u[0] * (v[1] * w[2] - v[2] * w[1]) - u[1] * (v[0] * w[2] - v[2] * w[0]) + u[2] * (v[0] * w[1] - v[1] * w[0])) / 6
+        total += (u[0] * (v[1] * w[2] - v[2] * w[1]) - u[1] * (v[0] * w[2] - v[2] * w[0]) +
+                  u[2] * (v[0] * w[1] - v[1] * w[0])) / 6
     return abs(total)

@@ -2,12 +2,13 @@
 """Runs the friction benchmark with one engine and writes a row per case and configuration.
 
   run.py deform [--command build/release/bin/deform] [--only CASE] [--law LAW] [--out FILE.csv]
-  run.py mujoco | run.py bullet          other engines, by the scripts beside this one; any NAME with an entry_NAME.py here or in --entries
+  run.py mujoco | run.py bullet          other engines, by the scripts beside this one; any NAME with an
+                                         entry_NAME.py here or in --entries
 
-A row: engine, version, configuration, case, its parameters, quantity, measured, expected, low, high, verdict (pass, fail, too_slow, error, or
-not_run where an engine has no such law), cost (seconds of processor time per simulated second), note.
-A row is written as soon as its case is done; rows that FILE already
-holds are not run again, so a run that was stopped goes on where it was.
+A row: engine, version, configuration, case, its parameters, quantity, measured, expected, low, high, verdict
+(pass, fail, too_slow, error, or not_run where an engine has no such law), cost (seconds of processor time per
+simulated second), note. A row is written as soon as its case is done; rows that FILE already holds are not
+run again, so a run that was stopped goes on where it was.
 """
 import argparse
 import csv
@@ -20,7 +21,8 @@ import tempfile
 import cases
 
 ROOT = os.path.join(os.path.dirname(os.path.abspath(__file__)), *[os.pardir] * 3)
-COLUMNS = ["engine", "version", "configuration", "case", "parameters", "quantity", "measured", "expected", "low", "high", "verdict", "cost", "note"]
+COLUMNS = ["engine", "version", "configuration", "case", "parameters", "quantity", "measured", "expected",
+           "low", "high", "verdict", "cost", "note"]
 MISSING = "%s: this python3 does not find the module '%s'; install it, or take the python3 that has it"
 PARAMETERS = ["mu", "mu_S", "mu_C", "share", "ratio"]
 
@@ -34,11 +36,13 @@ def verdict(value, low, high):
 
 
 def main():
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = argparse.ArgumentParser(description=__doc__,
+                                     formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("engine", metavar="ENGINE", help="NAME of an entry_NAME.py")
     parser.add_argument("--entries", help="another folder that has entries")
     parser.add_argument("--command", default=os.path.join(ROOT, "build", "release", "bin", "deform"),
-                        help="the deform command: runs our cases, makes the meshes of all entries (that of this checkout, as `make demo` builds it)")
+                        help="the deform command: runs our cases, makes the meshes of all entries (that of "
+                             "this checkout, as `make demo` builds it)")
     parser.add_argument("--only", help="one case by name")
     parser.add_argument("--configuration", help="one configuration of the engine (for deform: a law)")
     parser.add_argument("--out", help="CSV to write or to go on with; without it the rows are printed")
@@ -46,7 +50,8 @@ def main():
     make = entry_of(given.engine, given.entries)
     given.command = os.path.abspath(given.command)
     if not os.access(given.command, os.X_OK):
-        sys.exit("%s: no such command; build it with `make demo`, or name another with --command" % given.command)
+        sys.exit("%s: no such command; build it with `make demo`, or name another with --command" %
+                 given.command)
     done, file = set(), None
     if given.out:
         fresh = not os.path.exists(given.out)
@@ -66,8 +71,10 @@ def main():
             if given.only and case["name"] != given.only:
                 continue
             for configuration in entry.configurations(case) or ["none"]:
-                head = dict(zip(COLUMNS, [entry.name, entry.version, configuration, case["name"], parameters(case)]))
-                if tuple(head.values()) in done or (given.configuration and configuration != given.configuration):
+                head = dict(zip(COLUMNS, [entry.name, entry.version, configuration, case["name"],
+                                          parameters(case)]))
+                if tuple(head.values()) in done or (given.configuration
+                                                    and configuration != given.configuration):
                     continue
                 rows = measured_rows(entry, case, configuration)
                 for row in rows:
@@ -75,8 +82,10 @@ def main():
                     if file:
                         writer.writerow(row)
                         file.flush()
-                    shown = ("engine", "configuration", "case", "parameters", "quantity", "measured", "low", "high", "verdict", "note")
-                    print("%-8s %-14s %-16s %-14s %-16s %12s  [%s, %s]  %s %s" % tuple(row.get(k, "") for k in shown), flush=True)
+                    shown = ("engine", "configuration", "case", "parameters", "quantity", "measured", "low",
+                             "high", "verdict", "note")
+                    print("%-8s %-14s %-16s %-14s %-16s %12s  [%s, %s]  %s %s" %
+                          tuple(row.get(k, "") for k in shown), flush=True)
 
 
 def entry_of(engine, folder):
@@ -88,8 +97,10 @@ def entry_of(engine, folder):
     except ModuleNotFoundError as error:
         if error.name != "entry_" + engine:
             sys.exit(MISSING % (engine, error.name))
-        known = sorted(n[6:-3] for d in folders if os.path.isdir(d) for n in os.listdir(d) if n.startswith("entry_") and n.endswith(".py"))
-        sys.exit("there is no entry_%s.py in %s; there are: %s" % (engine, " or ".join(folders), ", ".join(known)))
+        known = sorted(n[6:-3] for d in folders if os.path.isdir(d) for n in os.listdir(d)
+                       if n.startswith("entry_") and n.endswith(".py"))
+        sys.exit("there is no entry_%s.py in %s; there are: %s" % (engine, " or ".join(folders),
+                                                                   ", ".join(known)))
 
 
 def measured_rows(entry, case, configuration):
@@ -108,7 +119,8 @@ def measured_rows(entry, case, configuration):
             rows.append({"quantity": quantity, "verdict": "not_run", "note": "the engine does not tell it"})
             continue
         value = values[quantity]
-        rows.append({"quantity": quantity, "measured": "%.6g" % value, "expected": "%.6g" % expected, "low": "%.6g" % low, "high": "%.6g" % high,
+        rows.append({"quantity": quantity, "measured": "%.6g" % value, "expected": "%.6g" % expected,
+                     "low": "%.6g" % low, "high": "%.6g" % high,
                      "verdict": verdict(value, low, high), "cost": "%.3g" % cost})
     return rows
 

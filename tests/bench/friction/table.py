@@ -1,5 +1,6 @@
 #!/usr/bin/env python3
-"""The benchmark's rows side by side, as a table of Markdown: table.py FILE.csv... (each as run.py writes it). A value outside its band is in bold."""
+"""The benchmark's rows side by side, as a table of Markdown: table.py FILE.csv... (each as run.py writes it).
+A value outside its band is in bold."""
 import csv
 import sys
 
