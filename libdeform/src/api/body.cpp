@@ -200,7 +200,7 @@ dfm_status dfm_body_set_state(dfm_body body, uint32_t n, const double *x, const 
         if (v) b.p.v[size_t(i) * kStride + size_t(k)] = v[size_t(3) * i + size_t(k)];
       }
     disturb(b);
-    b.world->bound_age = kNone;
+    b.world->bound.age = kNone;
     ++b.world->placements;
     if (x) b.world->overlaps.place(b.id);
   });
@@ -227,7 +227,7 @@ dfm_status dfm_body_hold(dfm_body body, uint32_t n, const uint32_t *points, uint
     update_inverse_mass(b.p);
     stop_held(b);
     disturb(b);
-    b.world->bound_age = kNone;
+    b.world->bound.age = kNone;
   });
 }
 

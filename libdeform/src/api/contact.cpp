@@ -342,8 +342,8 @@ dfm_status dfm_world_events_sized(dfm_world world, uint32_t row_size, uint32_t c
 dfm_status dfm_world_hold_begin(dfm_world world) {
   return guard([&] {
     World &w = idle(world_of(world));
-    w.holding = true;
-    w.hold_start = w.time;
+    w.hold.on = true;
+    w.hold.start = w.time;
     std::fill(w.store.held.begin(), w.store.held.end(), uint8_t(0));
     std::fill(w.store.path.begin(), w.store.path.end(), 0.0);
     hold_sleepers(w);
@@ -362,7 +362,7 @@ dfm_status dfm_world_hold(dfm_world world, double *creep, uint32_t *count) {
       const double *const p = &w.store.path[size_t(2) * i];
       longest = std::max(longest, std::sqrt(p[0] * p[0] + p[1] * p[1]));
     }
-    *creep = w.holding && n && w.time > w.hold_start ? longest / (w.time - w.hold_start) : NAN;
+    *creep = w.hold.on && n && w.time > w.hold.start ? longest / (w.time - w.hold.start) : NAN;
     if (count) *count = n;
   });
 }

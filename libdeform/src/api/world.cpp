@@ -154,7 +154,7 @@ dfm_status dfm_world_set_gravity(dfm_world world, const double gravity[3]) {
     for (int k = 0; k < 3; ++k)
       if (!std::isfinite(gravity[k])) fail(DFM_E_ARG, "gravity is not finite; give m/s2");
     store3(w.def.gravity, load3(gravity));
-    w.gravity_keys.clear();
+    w.gravity.keys.clear();
     wake_all(w);
     set_gravity_now(w);
     values_changed(w);
@@ -167,7 +167,7 @@ dfm_status dfm_world_set_gravity_keys(dfm_world world, uint32_t n, const dfm_vec
     if (n) need(keys, "keys");
     std::vector<dfm_vector_key> copy(keys, keys + n);
     check_keys(copy, "gravity");
-    w.gravity_keys = std::move(copy);
+    w.gravity.keys = std::move(copy);
     wake_all(w);
     set_gravity_now(w);
     values_changed(w);
@@ -228,9 +228,9 @@ dfm_status dfm_world_stable_step(dfm_world world, double *dt, dfm_body *body, ui
     // The bound that the next step uses: asked anew only when it would ask, so that reading it
     // changes no result.
     if (bound_due(w)) update_bound(w);
-    *dt = offered_step(w.sizes, w.stable);
-    if (body) *body = w.worst_body ? w.worst_body->handle : 0;
-    if (point) *point = w.worst_point;
+    *dt = offered_step(w.sizes, w.bound.step);
+    if (body) *body = w.bound.body ? w.bound.body->handle : 0;
+    if (point) *point = w.bound.point;
   });
 }
 

@@ -99,7 +99,7 @@ void share_areas(World &w, StepContext &step) {
   const auto counts = [](const LawInstance *law) {
     return (law->ops->needs & DFM_NEED_AREA) && !(law->ops->flags & DFM_FRIC_SET_VALUED);
   };
-  step.shares = std::any_of(w.law_list.begin(), w.law_list.end(), counts);
+  step.shares = std::any_of(w.pairs.laws.begin(), w.pairs.laws.end(), counts);
   if (!step.shares) {
     step.exchange.clear();
     return step.aim.clear();
@@ -112,7 +112,7 @@ void share_areas(World &w, StepContext &step) {
   step.renewed.resize(n);
   step.areas.share(step.contacts, step.rows.impulse.data(), 1.1 * w.offset, step.aim.data());
   for (uint32_t i = 0; i < n; ++i)
-    step.sharing[i] = counts(w.law_list[step.state.law[i]]) ? step.state.law[i] : kNone;
+    step.sharing[i] = counts(w.pairs.laws[step.state.law[i]]) ? step.state.law[i] : kNone;
   step.exchange.list(step.contacts, step.sources, step.sharing.data(), step.aim.data());
   step.renewal.list(step.contacts, step.rows.impulse.data());
   for (uint32_t i = 0; i < n; ++i) {
@@ -136,7 +136,7 @@ void follow_load(World &w, StepContext &step) {
   for (uint32_t i = 0; i < n; ++i) {
     step.ways[i] = {0, 0};
     if (step.sharing[i] == kNone || !(step.rows.impulse[3 * size_t{i}] > 0)) continue;
-    const LawInstance &law = *w.law_list[s.law[i]];
+    const LawInstance &law = *w.pairs.laws[s.law[i]];
     const double x = step.h * s.vt[i], y = step.h * s.vt[s.stride + i], far = std::sqrt(x * x + y * y);
     double pairs = 0;
     for (uint32_t k = 0; k + 1 < law.nstate; ++k) {
@@ -163,7 +163,7 @@ void fit_bristles(World &w, StepContext &step) {
   for (uint32_t i = 0; i < step.rows.n; ++i) {
     const uint32_t m = step.match[i];
     if (m == kNone || !(w.store.area[m] < s.area[i])) continue;
-    const LawInstance &law = *w.law_list[s.law[i]];
+    const LawInstance &law = *w.pairs.laws[s.law[i]];
     for (uint32_t k = 0; k < law.nstate; ++k)
       if (law.tangent[k]) s.bristle[size_t(k) * s.stride + i] *= w.store.area[m] / s.area[i];
   }
@@ -172,7 +172,7 @@ void fit_bristles(World &w, StepContext &step) {
 void turn_frames(World &w, StepContext &step) {
   ContactStore &to = step.next_store;
   for (uint32_t i = 0; i < step.rows.n; ++i) {
-    const LawInstance &law = *w.law_list[step.state.law[i]];
+    const LawInstance &law = *w.pairs.laws[step.state.law[i]];
     if (!law.turns || !to.touching[i]) continue;
     const ContactPoint &c = step.contacts[i];
     const Vec3 n = load3(c.normal), t = load3(&to.tangent[3 * size_t{i}]);

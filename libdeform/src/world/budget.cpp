@@ -111,12 +111,12 @@ template <class Stream>
 void changing(Stream &s, World &w) {
   const auto array = [&](auto &a) { s.array(a); };
   s.value(w.time);
-  s.value(w.stable);
-  s.value(w.inverted);
-  s.value(w.bound_age);
-  s.value(w.worst_body);
-  s.value(w.worst_point);
-  s.value(w.gravity);
+  s.value(w.bound.step);
+  s.value(w.bound.inverted);
+  s.value(w.bound.age);
+  s.value(w.bound.body);
+  s.value(w.bound.point);
+  s.value(w.gravity.now);
   s.value(w.step_count);
   s.value(w.sleepers);
   s.value(w.watch);
@@ -193,7 +193,7 @@ void tell(const World &w, const StepContext &step, StepStopped::Why why, double 
   const unsigned long long number = w.step_count;
   if (why == StepStopped::asked)
     return set_last_error(format("step %llu was asked to stop; the state is as before it", number).c_str());
-  const char *const body = w.worst_body ? w.worst_body->name.c_str() : "?";
+  const char *const body = w.bound.body ? w.bound.body->name.c_str() : "?";
   if (why == StepStopped::time)
     return set_last_error(format("step %llu: %g s of simulated time took longer than max_time (%g s); the "
                                  "state is as before it; take a shorter step, or give it more time",

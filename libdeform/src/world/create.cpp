@@ -337,7 +337,7 @@ void destroy_body(Body &b) {
   World &w = *b.world;
   forget(w, b.id, false, b.handle, b.name);
   std::erase_if(w.bodies, [&](auto &p) { return p.get() == &b; });
-  w.worst_body = nullptr;
+  w.bound.body = nullptr;
 }
 
 void destroy_obstacle(Obstacle &o) {

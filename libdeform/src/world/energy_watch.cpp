@@ -47,7 +47,7 @@ double work_of_holders(const World &w, const StepContext &step, const Body &b, b
   for (const StepContext::Driven &d : step.driven) {
     if (d.velocity < b.p.v.data() || d.velocity >= b.p.v.data() + b.p.v.size()) continue;
     const size_t at = size_t(d.velocity - b.p.v.data());
-    const double force = b.p.f[at] + b.p.mass[at / kStride] * w.gravity[int(at % kStride)];
+    const double force = b.p.f[at] + b.p.mass[at / kStride] * w.gravity.now[int(at % kStride)];
     sum -= 0.5 * force * (w.watch.last_h * d.before + (now ? step.h * *d.velocity : 0));
   }
   return sum;
@@ -80,7 +80,7 @@ bool look(World &w, StepContext &step, Body &b, Look &out) {
     for (size_t k = 0; k < 3; ++k) {
       const double x = p.x[at + k], v = p.v[at + k], load = p.load[at + k];
       reach = std::max(reach, std::fabs(x));
-      potential -= (m * w.gravity[int(k)] + (load_booked ? 0 : load)) * x;
+      potential -= (m * w.gravity.now[int(k)] + (load_booked ? 0 : load)) * x;
       if (!p.moves(at + k)) continue;
       const double change = p.v_free[at + k] - v;
       kinetic += 0.5 * (m * v * v);
@@ -129,7 +129,8 @@ void book_body(World &w, StepContext &step, Body &b, double motion) {
       if (!p.moves(at) || (booked == 0 && motion == 1)) continue;
       const double end = b.dynamics->end().v[at];
       sum += step.h * booked * 0.5 * (p.v[at] + end);
-      if (motion < 1) sum += (1 - motion) * step.h * end * (p.f[at] + p.mass[i] * w.gravity[int(k)] - booked);
+      if (motion < 1)
+        sum += (1 - motion) * step.h * end * (p.f[at] + p.mass[i] * w.gravity.now[int(k)] - booked);
     }
   b.energy.work += sum;
 }
@@ -140,8 +141,8 @@ void book_body(World &w, StepContext &step, Body &b, double motion) {
 // h v / 2, whatever the motion. The sub-step may fail after this and be tried again with another gravity,
 // from the same state: then the rest is booked.
 void change_gravity(World &w, Vec3 gravity) {
-  const Vec3 by = gravity - w.gravity;
-  w.gravity = gravity;
+  const Vec3 by = gravity - w.gravity.now;
+  w.gravity.now = gravity;
   if (!watching(w) || norm2(by) == 0) return;
   for (auto &b : w.bodies) {
     if (!watched(*b)) continue;

@@ -52,13 +52,13 @@ std::string seconds(double s) { return std::isfinite(s) ? format("%.3g s", s) : 
 
 // Which term rules at the worst point: the one that alone would allow the shorter step.
 std::string reason(const World &w) {
-  if (!w.worst_body) return "nothing bounds the step";
-  const Body &b = *w.worst_body;
+  if (!w.bound.body) return "nothing bounds the step";
+  const Body &b = *w.bound.body;
   const std::string cut = "; longer steps are cut into equal sub-steps";
   const StepBound &bound = b.bound.found;
   if (std::isinf(bound.by_stiffness) && std::isinf(bound.by_damping))
     return "0.9 of the bound that its model gives" + cut;
-  const double share = w.stable / bound.step;
+  const double share = w.bound.step / bound.step;
   const std::string stiffness = seconds(share * bound.by_stiffness);
   const std::string damping = seconds(share * bound.by_damping);
   return "0.9 of the proven bound: " +
@@ -94,9 +94,9 @@ std::string explain(const World &w) {
   out += "],\"bodies\":[";
   for (size_t i = 0; i < w.bodies.size(); ++i) out += (i ? "," : "") + body(*w.bodies[i]);
   out += "],\"step\":{\"stable_s\":" +
-         (std::isfinite(w.stable) ? format("%.9g", w.stable) : std::string("null")) +
-         ",\"worst_body\":" + (w.worst_body ? quote(w.worst_body->name) : "null") +
-         ",\"worst_point\":" + std::to_string(w.worst_point) +
+         (std::isfinite(w.bound.step) ? format("%.9g", w.bound.step) : std::string("null")) +
+         ",\"worst_body\":" + (w.bound.body ? quote(w.bound.body->name) : "null") +
+         ",\"worst_point\":" + std::to_string(w.bound.point) +
          ",\"contact_offset_m\":" + format("%.9g", w.offset) + ",\"reason\":" + quote(reason(w)) + "}}";
   return out;
 }

@@ -12,7 +12,9 @@
 
 namespace dfm {
 
-SubStep sub_step_of(const World &w, const StepContext &step) { return {w.time, step.h, w.gravity, kLight}; }
+SubStep sub_step_of(const World &w, const StepContext &step) {
+  return {w.time, step.h, w.gravity.now, kLight};
+}
 
 bool stage_model(World &w, StepContext &step, uint32_t *trouble) {
   const SubStep now = sub_step_of(w, step);
@@ -76,7 +78,7 @@ void stage_gather(World &w, StepContext &step) {
 
 void stage_broad(World &w, StepContext &step) {
   try {
-    step.broad.update(step.body_views, step.obstacle_views, w.filter, step.h, w.offset);
+    step.broad.update(step.body_views, step.obstacle_views, w.pairs.filter, step.h, w.offset);
   } catch (...) {
     step.broad.clear();  // out of memory half way through its lists: they are made anew next time
     throw;

@@ -24,7 +24,8 @@ std::vector<uint8_t> free_laws(const World &w, const FrictionRule *but) {
   };
   for (const FrictionRule &r : w.friction)
     if (&r != but) use(r.law);
-  for (const auto *const list : {&w.pair_law, &w.zone_law}) std::for_each(list->begin(), list->end(), use);
+  for (const auto *const list : {&w.pairs.law, &w.pairs.zone_law})
+    std::for_each(list->begin(), list->end(), use);
   std::for_each(w.store.law.begin(), w.store.law.end(), use);
   return free;
 }
@@ -62,7 +63,7 @@ void put_params(World &w, FrictionRule &rule, std::vector<double> values) {
   const bool remembers = same_memory(*law, *fresh);
   if (remembers && !shared(w, rule)) {
     law.swap(fresh);
-    if (rule.law < w.law_list.size()) w.law_list[rule.law] = law.get();
+    if (rule.law < w.pairs.laws.size()) w.pairs.laws[rule.law] = law.get();
     return;
   }
   const uint32_t own = place_law(w, std::move(fresh), free_laws(w, nullptr));
@@ -98,7 +99,7 @@ void add_friction_rule(World &w, std::string a, std::string b, const char *law,
     put_params(w, *before, pack_params(type, given));
     move_to_end(w, before);
   } else {
-    rule.law = w.add_law(law, given, free_laws(w, before));
+    rule.law = add_law(w, law, given, free_laws(w, before));
     add_rule(w.friction, std::move(rule));
     w.changed = true;
   }

@@ -83,7 +83,7 @@ void take_back(World &w, const Overlap &f) {
   if (std::erase_if(w.overlaps.aside, [&](const PairAside &p) {
         return p.a == f.a && p.b == f.b && (p.obstacle != 0) == f.obstacle;
       }))
-    w.filter.set(f.a, f.b, f.obstacle, true);
+    w.pairs.filter.set(f.a, f.b, f.obstacle, true);
 }
 
 }  // namespace
@@ -105,7 +105,7 @@ void settle_overlaps(World &w) {
   for (const Overlap &f : left) {
     if (!f.aside || o.look_only || o.is_aside(f.a, f.b, f.obstacle)) continue;
     o.aside.push_back({f.a, f.b, f.obstacle});
-    w.filter.set(f.a, f.b, f.obstacle, false);
+    w.pairs.filter.set(f.a, f.b, f.obstacle, false);
   }
   o.found = std::move(found);
   o.told = left.empty();
@@ -119,7 +119,7 @@ void keep_overlaps_aside(World &w) {
   };
   std::erase_if(w.overlaps.aside, gone);
   std::erase_if(w.overlaps.found, gone);
-  for (const PairAside &p : w.overlaps.aside) w.filter.set(p.a, p.b, p.obstacle, false);
+  for (const PairAside &p : w.overlaps.aside) w.pairs.filter.set(p.a, p.b, p.obstacle, false);
 }
 
 void release_overlaps(World &w) {
@@ -128,7 +128,7 @@ void release_overlaps(World &w) {
   std::erase_if(w.overlaps.aside, [&](const PairAside &p) {
     const uint32_t j = p.obstacle ? obstacle_of_id(w, p.b)->slot : body_of_id(w, p.b)->slot;
     if (sides.look({body_of_id(w, p.a)->slot, j, p.obstacle != 0}, w.offset, true).through) return false;
-    w.filter.set(p.a, p.b, p.obstacle, true);
+    w.pairs.filter.set(p.a, p.b, p.obstacle, true);
     return true;
   });
 }

@@ -1,6 +1,6 @@
 // Friction laws of a world's pairs, from the rules by name, group and material.
 //
-// pair_law holds one law per pair of things. Only where rules tell parts of a surface apart does the pair
+// PairTables::law holds one law per pair of things. Only where rules tell parts of a surface apart does the pair
 // have a table over the zones of both sides as well, and only then is a contact asked which triangle it
 // stands on: a world without such rules runs no instruction of it.
 #include <algorithm>
@@ -33,7 +33,7 @@ uint32_t default_law(World &w, double a, double b) {
   const double mu = std::sqrt(a * b);
   const dfm_param_value values[] = {{"mu_C", &mu, 1}, {"mu_S", &mu, 1}};
   const bool plain = a == kDefaultFriction && b == kDefaultFriction;
-  const uint32_t law = w.add_law("coulomb", std::span(values, plain ? 0 : 2));
+  const uint32_t law = add_law(w, "coulomb", std::span(values, plain ? 0 : 2));
   w.laws[law]->by_default = true;
   return law;
 }
@@ -65,46 +65,70 @@ uint32_t thing_of(const World &w, uint64_t id) {
                                 : static_cast<uint32_t>(w.bodies.size() + size_t(o - w.obstacles.begin()));
 }
 
+uint32_t law_of_zones(World &w, uint32_t a, uint32_t zone_a, uint32_t b, uint32_t zone_b) {
+  const SurfaceZones::Zone &za = zone_at(w, a, zone_a), &zb = zone_at(w, b, zone_b);
+  const FrictionRule *const rule = rule_of(w, a, za, b, zb);
+  return rule ? rule->law : default_law(w, za.friction, zb.friction);
+}
+
 }  // namespace
 
-uint32_t World::law_of(uint32_t slot_a, bool obstacle, uint32_t slot_b) const {
-  const size_t width = bodies.size() + obstacles.size();
-  return pair_law[slot_a * width + (obstacle ? bodies.size() : 0) + slot_b];
+uint32_t add_law(World &w, const char *name, std::span<const dfm_param_value> values,
+                 std::span<const uint8_t> free) {
+  const dfm_type &type = w.context->registry.find(DFM_KIND_FRICTION, name);
+  std::vector<double> packed = pack_params(type, values);
+  for (uint32_t i = 0; i < w.laws.size(); ++i)
+    if (w.laws[i]->type == &type && w.laws[i]->params == packed) return i;
+  auto law = std::make_unique<LawInstance>(type, w.context->host, std::move(packed));
+  if (law->nstate) need_ability(w, Ability::law_memory, "friction law", name);
+  return place_law(w, std::move(law), free);
 }
 
-uint32_t World::resolve_law(uint32_t a, uint32_t zone_a, uint32_t b, uint32_t zone_b) {
-  const SurfaceZones::Zone &za = zone_at(*this, a, zone_a), &zb = zone_at(*this, b, zone_b);
-  const FrictionRule *const rule = rule_of(*this, a, za, b, zb);
-  return rule ? rule->law : default_law(*this, za.friction, zb.friction);
+uint32_t place_law(World &w, std::unique_ptr<LawInstance> law, std::span<const uint8_t> free) {
+  const auto found = std::find(free.begin(), free.end(), uint8_t(1));
+  if (found == free.end()) {
+    w.laws.push_back(std::move(law));
+    return static_cast<uint32_t>(w.laws.size() - 1);
+  }
+  const uint32_t place = static_cast<uint32_t>(found - free.begin());
+  w.laws[place] = std::move(law);
+  w.changed = true;
+  return place;
 }
 
-void World::find_law(uint32_t a, uint32_t b, std::vector<uint32_t> &used) {
-  const size_t width = bodies.size() + obstacles.size();
-  const uint32_t na = zone_count(*this, a), nb = zone_count(*this, b);
+uint32_t pair_law(const World &w, uint32_t slot_a, bool obstacle, uint32_t slot_b) {
+  const size_t nb = w.bodies.size(), width = nb + w.obstacles.size();
+  return w.pairs.law[slot_a * width + (obstacle ? nb : 0) + slot_b];
+}
+
+void find_law(World &w, uint32_t a, uint32_t b, std::vector<uint32_t> &used) {
+  const size_t width = w.bodies.size() + w.obstacles.size();
+  const uint32_t na = zone_count(w, a), nb = zone_count(w, b);
   std::vector<uint32_t> laws_of;
   bool same = true;
   for (uint32_t i = 0; i < na; ++i)
     for (uint32_t j = 0; j < nb; ++j) {
-      laws_of.push_back(resolve_law(a, i, b, j));
+      laws_of.push_back(law_of_zones(w, a, i, b, j));
       same = same && laws_of.back() == laws_of[0];
     }
-  pair_law[a * width + b] = laws_of[0];
+  PairTables &to = w.pairs;
+  to.law[a * width + b] = laws_of[0];
   used.assign(laws_of.begin(), same ? laws_of.begin() + 1 : laws_of.end());
   if (same) return;
-  if (zone_table.empty()) zone_table.assign(bodies.size() * width, kNone);
-  zone_table[a * width + b] = static_cast<uint32_t>(zone_law.size());
-  zone_law.insert(zone_law.end(), laws_of.begin(), laws_of.end());
+  if (to.zone_table.empty()) to.zone_table.assign(w.bodies.size() * width, kNone);
+  to.zone_table[a * width + b] = static_cast<uint32_t>(to.zone_law.size());
+  to.zone_law.insert(to.zone_law.end(), laws_of.begin(), laws_of.end());
 }
 
-void set_zone_laws(World &w, StepContext &step) {
+void set_zone_laws(const World &w, std::span<const ContactPoint> contacts, Array<uint32_t> &law) {
   const size_t nb = w.bodies.size(), width = nb + w.obstacles.size();
-  for (uint32_t i = 0; i < step.contacts.size(); ++i) {
-    const ContactPoint &c = step.contacts[i];
-    const uint32_t table = w.zone_table[c.slot_a * width + (c.obstacle ? nb : 0) + c.slot_b];
+  for (uint32_t i = 0; i < contacts.size(); ++i) {
+    const ContactPoint &c = contacts[i];
+    const uint32_t table = w.pairs.zone_table[c.slot_a * width + (c.obstacle ? nb : 0) + c.slot_b];
     if (table == kNone) continue;
     const Zones zones = zones_of(w, c);
-    step.state.law[i] =
-        w.zone_law[table + zones.a * (c.obstacle ? 1 : w.bodies[c.slot_b]->zones.list.size()) + zones.b];
+    const size_t others = c.obstacle ? 1 : w.bodies[c.slot_b]->zones.list.size();
+    law[i] = w.pairs.zone_law[table + zones.a * others + zones.b];
   }
 }
 

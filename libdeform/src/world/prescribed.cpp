@@ -8,7 +8,7 @@ namespace dfm {
 void stage_motion(World &w, StepContext &step) {
   // Held velocities are the one part of the state that changes before a sub-step is known to succeed; what
   // was there is kept.
-  if (!w.gravity_keys.empty()) change_gravity(w, vector_at(w.gravity_keys, w.time + step.h));
+  if (!w.gravity.keys.empty()) change_gravity(w, vector_at(w.gravity.keys, w.time + step.h));
   for (auto &b : w.bodies) {
     if (b->slumber.asleep) continue;
     if (b->loads_vary()) {

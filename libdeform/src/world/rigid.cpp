@@ -103,9 +103,13 @@ bool stage_rigid_predict(World &w, StepContext &step, uint32_t *trouble) {
   step.rigid_again = false;
   for (auto &set : w.rigid_sets) {
     const uint32_t n = static_cast<uint32_t>(set->defs.size());
-    set->step = {
-        sizeof set->step, n, w.time, step.h, {w.gravity.x, w.gravity.y, w.gravity.z}, set->state.data(),
-        set->extra.data()};
+    set->step = {sizeof set->step,
+                 n,
+                 w.time,
+                 step.h,
+                 {w.gravity.now.x, w.gravity.now.y, w.gravity.now.z},
+                 set->state.data(),
+                 set->extra.data()};
   }
   if (!ask_rigids(w, trouble)) return false;
   for (auto &set : w.rigid_sets) set->first.assign(set->velocity.begin(), set->velocity.end());

@@ -103,7 +103,7 @@ void choose_self_bodies(World &w, StepContext &step, SceneFacts &facts, std::vec
     if (when == DFM_SELF_ON) self.watch.reset();
     else if (!self.watch)
       self.watch = std::make_unique<SelfWatch>(w.memory(), b->surface, self.rest, self.list);
-    w.find_law(b->slot, b->slot, used);
+    find_law(w, b->slot, b->slot, used);
     for (const uint32_t law : used)
       for (const std::string &e : effects(*w.laws[law]->type))
         facts.offered.push_back({e, w.laws[law]->type->id});

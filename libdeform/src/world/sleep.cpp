@@ -195,7 +195,7 @@ void stage_sleep(World &w, StepContext &step) {
     }
     tired |= b.slumber.calm >= w.def.sleep_time;
   }
-  if (!tired || end < last_time(w.gravity_keys)) return;
+  if (!tired || end < last_time(w.gravity.keys)) return;
 
   const size_t n = w.plan.touches() ? step.contacts.size() : 0;
   step.islands.start(static_cast<uint32_t>(w.bodies.size()));

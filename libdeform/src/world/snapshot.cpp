@@ -137,16 +137,16 @@ struct StagedLaw {
   std::vector<double> params;
 };
 struct Staged {
-  double time = 0, stable = 0, offset = 0, hold_start = 0;
+  double time = 0, offset = 0;
   uint64_t step_count = 0, next_id = 0;
-  uint32_t inverted = 0, sleepers = 0, bound_age = 0;
-  bool holding = false;
+  uint32_t sleepers = 0;
+  WorldBound bound;
+  Hold hold;
   StepSizes sizes;
   EnergyWatch watch;
   dfm_world_stats stats{};
-  Vec3 gravity;
+  Gravity gravity;
   dfm_world_def def{};
-  std::vector<dfm_vector_key> gravity_keys;
   std::vector<StagedBody> bodies;
   std::vector<StagedObstacle> obstacles;
   std::vector<StagedRigids> rigid_sets;
@@ -371,11 +371,11 @@ void fields(Stream &s, W &w, const World &like) {
   });
   s.value("time", w.time, must::not_negative);
   s.value("steps", w.step_count, must::any);
-  s.value("step bound", w.stable, must::Be{[](double x) { return x >= 0; }, "a time above zero"});
-  s.value("inverted cells", w.inverted, must::any);
-  s.value("age of the bound", w.bound_age, must::any);
+  s.value("step bound", w.bound.step, must::Be{[](double x) { return x >= 0; }, "a time above zero"});
+  s.value("inverted cells", w.bound.inverted, must::any);
+  s.value("age of the bound", w.bound.age, must::any);
   s.must_hold("step bound", "a time that a sub-step can have",
-              [&] { return w.bound_age == kNone || w.stable >= kLeastStep; });
+              [&] { return w.bound.age == kNone || w.bound.step >= kLeastStep; });
   for (auto *r : {&w.sizes.cut, &w.sizes.offer}) {
     s.value("step size", r->size, must::not_negative);
     s.value("calm of the size", r->calm, must::any);
@@ -387,17 +387,17 @@ void fields(Stream &s, W &w, const World &like) {
   s.value("last sub-step", w.watch.last_h, must::not_negative);
   s.must_hold("last sub-step", "what the energy watch writes", [&] { return sound(w.watch); });
   s.value("contact offset", w.offset, must::positive);
-  s.value("hold start", w.hold_start, must::finite);
-  s.value("holding", w.holding, must::flag);
+  s.value("hold start", w.hold.start, must::finite);
+  s.value("holding", w.hold.on, must::flag);
   s.value("statistics", w.stats,
           must::Be{[](const dfm_world_stats &x) { return good_stats(x); }, "finite statistics"});
-  s.value("gravity", w.gravity, must::finite);
+  s.value("gravity", w.gravity.now, must::finite);
   s.value("gravity", w.def.gravity, must::finite);
   s.value("next id", w.next_id,
           must::Be{[&](uint64_t x) { return x > last_id(like) && x < kMostIds; },
                    "a number above all that are taken"});
-  s.array("gravity keys", w.gravity_keys, kAnyCount, must::any);
-  s.must_hold("gravity keys", "finite keys at rising times", [&] { return rise(w.gravity_keys); });
+  s.array("gravity keys", w.gravity.keys, kAnyCount, must::any);
+  s.must_hold("gravity keys", "finite keys at rising times", [&] { return rise(w.gravity.keys); });
   s.value("sleep", w.def.sleep, must::flag);
   s.value("sleepers", w.sleepers, must::any);
   s.must_hold("sleep", "no sleep with this contact method",
@@ -650,7 +650,7 @@ void exchange(World &w, Staged &t) noexcept {
   w.friction.swap(t.friction);
   w.filters.swap(t.filters);
   w.overlaps.aside.swap(t.overlaps.aside);
-  w.gravity_keys.swap(t.gravity_keys);
+  w.gravity.keys.swap(t.gravity.keys);
   w.work.swap(t.work);
   w.events.swap(t.events);
   std::swap(w.def.gravity, t.def.gravity);
@@ -661,12 +661,11 @@ void exchange(World &w, Staged &t) noexcept {
   std::swap(w.time, t.time);
   std::swap(w.step_count, t.step_count);
   std::swap(w.next_id, t.next_id);
-  std::swap(w.hold_start, t.hold_start);
-  std::swap(w.holding, t.holding);
+  std::swap(w.hold, t.hold);
   std::swap(w.sizes, t.sizes);
   std::swap(w.watch, t.watch);
-  w.worst_body = nullptr;
-  w.worst_point = 0;
+  w.bound.body = nullptr;
+  w.bound.point = 0;
   ++w.placements;
 }
 
@@ -754,8 +753,7 @@ void world_restore(World &w, const void *data, size_t bytes) {
   w.laws.swap(laws);
   try {
     // Tables and plan follow from what is there now; what prepare() would choose anew is put back as it was.
-    const RestoredChoice choice{staged.gravity, staged.stable, staged.offset, staged.inverted,
-                                staged.bound_age};
+    const RestoredChoice choice{staged.gravity.now, staged.bound, staged.offset};
     w.changed = true;
     w.overlaps.all = w.overlaps.look_only = true;
     w.sleepers = 0;  // prepare() counts them

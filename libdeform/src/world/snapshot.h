@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "math/vec3.h"
+#include "world/step_bound.h"
 
 namespace dfm {
 
@@ -14,8 +15,8 @@ struct SnapshotField;
 // What prepare() would choose anew and a restored world keeps: it was chosen at a state that is past.
 struct RestoredChoice {
   Vec3 gravity;
-  double stable, offset;
-  uint32_t inverted, bound_age;
+  WorldBound bound;
+  double offset;
 };
 
 uint64_t world_hash(const World &w);

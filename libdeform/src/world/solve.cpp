@@ -122,14 +122,14 @@ void sweep_until_good(World &w, StepContext &step, Acceleration &acceleration, c
 void make_rows(World &w, StepContext &step) {
   const uint32_t n = static_cast<uint32_t>(step.contacts.size());
   uint32_t nstate = 0;
-  for (const LawInstance *law : w.law_list) nstate = std::max(nstate, law->nstate);
+  for (const LawInstance *law : w.pairs.laws) nstate = std::max(nstate, law->nstate);
   step.state.resize(n, nstate);
   for (uint32_t i = 0; i < n; ++i) {
     const ContactPoint &c = step.contacts[i];
-    step.state.law[i] = w.law_of(c.slot_a, c.obstacle, c.slot_b);
+    step.state.law[i] = pair_law(w, c.slot_a, c.obstacle, c.slot_b);
     step.state.area[i] = c.area;
   }
-  if (!w.zone_table.empty()) set_zone_laws(w, step);
+  if (!w.pairs.zone_table.empty()) set_zone_laws(w, step.contacts, step.state.law);
   if (step.rigid_again) step.best_impulse.assign(step.rows.impulse.begin(), step.rows.impulse.end());
   step.rows.build(step.contacts, step.sources, {step.rigid_places, step.rigid_groups});
   correct_rigids(w, step);
@@ -144,7 +144,7 @@ void make_rows(World &w, StepContext &step) {
   if (step.guard.resolving) guard_impulses(step);
   if (!step.guard.kept.empty()) guard_rates(step);
   if (step.rigid_again) step.rows.impulse.assign(step.best_impulse.begin(), step.best_impulse.end());
-  step.batches.gather(w.law_list, step.state);
+  step.batches.gather(w.pairs.laws, step.state);
 }
 
 // Passes until the true residual is good enough; a law that failed, or null.
@@ -313,15 +313,15 @@ void keep_contacts(World &w, StepContext &step) {
     store3(&to.tangent[size_t(3) * i], load3(&step.rows.frame[size_t(9) * i + 3]));
     store3(&to.impulse[size_t(3) * i], load3(l));
     // its law wrote no further: the rest of the columns is another contact's
-    const uint32_t own = now ? w.law_list[step.state.law[i]]->nstate : 0;
+    const uint32_t own = now ? w.pairs.laws[step.state.law[i]]->nstate : 0;
     for (uint32_t s = 0; s < S; ++s)
       to.bristle[size_t(S) * i + s] = s < own ? step.state.bristle_out[size_t(s) * step.state.stride + i] : 0;
     to.dwell[i] = now ? step.state.dwell[i] + step.h : 0;
     to.area[i] = step.state.area[i];
     const double v1 = step.state.vt[i], v2 = step.state.vt[step.state.stride + i];
     // A hold counts from hold_begin on: what sticks in the first sub-step after it, and in every one since.
-    const bool first = w.time <= w.hold_start, carried = !first && m != kNone && w.store.held[m];
-    const bool holds = w.holding && stick && (first || carried);
+    const bool first = w.time <= w.hold.start, carried = !first && m != kNone && w.store.held[m];
+    const bool holds = w.hold.on && stick && (first || carried);
     to.path[2 * i] = holds ? (carried ? w.store.path[2 * m] : 0) + step.h * v1 : 0;
     to.path[2 * i + 1] = holds ? (carried ? w.store.path[2 * m + 1] : 0) + step.h * v2 : 0;
     to.touching[i] = now;

@@ -13,7 +13,6 @@
 namespace dfm {
 
 struct Body;
-struct FrictionRule;
 struct LawInstance;
 struct RestoredChoice;
 struct StepContext;
@@ -55,12 +54,6 @@ void keep_rigids(World &w, StepContext &step);  // once the sub-step is known to
 void make_rows(World &w, StepContext &step);  // contacts as rows, with what they kept
 // to dfm_last_error(), null: not finite; which trouble that is
 uint32_t tell_failed_solve(World &w, StepContext &step, const LawInstance *law);
-// pair_table.cpp: state.law of this sub-step's contacts where a pair has a table
-void set_zone_laws(World &w, StepContext &step);
-// pair_table.cpp: in the store, of contacts that the rule holds for
-void rename_law(World &w, const FrictionRule &rule, uint32_t to);
-// In a place that `free` marks, or behind the others.
-uint32_t place_law(World &w, std::unique_ptr<LawInstance> law, std::span<const uint8_t> free);
 void reserve_contacts(World &w, StepContext &step);  // memory for keep_contacts()
 void keep_contacts(World &w, StepContext &step);     // store, events, hold, work, report; allocates nothing
 // all, with their events, where no stage of a plan looks after them

@@ -87,24 +87,25 @@ dfm_status run_step(World &w, StepContext &step, double dt, uint32_t *trouble) {
   release_overlaps(w);
   if (!std::exchange(w.overlaps.told, true)) *trouble |= DFM_TROUBLE_OVERLAP;
   if (bound_due(w)) update_bound(w);
-  const double needed = std::ceil(dt / w.stable - 1e-9);  // stable is infinite where nothing bounds the step
+  const double needed =
+      std::ceil(dt / w.bound.step - 1e-9);  // stable is infinite where nothing bounds the step
   if (!(needed <= w.def.max_substeps)) {
     set_last_error(
         format("a step of %g s needs %g sub-steps of %g s (max_substeps %u): soften or coarsen body '%s', "
                "whose point %u bounds the step, lower its damping, or take a shorter step",
-               dt, needed, w.stable, w.def.max_substeps, w.worst_body ? w.worst_body->name.c_str() : "?",
-               w.worst_point)
+               dt, needed, w.bound.step, w.def.max_substeps, w.bound.body ? w.bound.body->name.c_str() : "?",
+               w.bound.point)
             .c_str());
     *trouble |= DFM_TROUBLE_SUBSTEPS;
     return DFM_DISCARD;
   }
   const StepSizes before = w.sizes;
   const uint32_t n =
-      static_cast<uint32_t>(std::min<double>(w.def.max_substeps, choose_pieces(w.sizes, dt, w.stable)));
-  w.watch.new_size = earned(before, w.sizes, w.stable);
+      static_cast<uint32_t>(std::min<double>(w.def.max_substeps, choose_pieces(w.sizes, dt, w.bound.step)));
+  w.watch.new_size = earned(before, w.sizes, w.bound.step);
   plan_work(w, step, n);
   if (n > 1) *trouble |= DFM_TROUBLE_SUBSTEPS;
-  if (w.inverted) *trouble |= DFM_TROUBLE_INVERTED;
+  if (w.bound.inverted) *trouble |= DFM_TROUBLE_INVERTED;
 
   begin_impulses(w.step_impulses);
   const double goal = w.time + dt;
@@ -114,14 +115,14 @@ dfm_status run_step(World &w, StepContext &step, double dt, uint32_t *trouble) {
   for (uint32_t k = 0; k < cut; ++k, ++done) {
     if (bound_due(w)) {
       update_bound(w);
-      if (w.inverted) *trouble |= DFM_TROUBLE_INVERTED;
-      const double more = (cut - k) * cut_finer(w.sizes, span / cut, w.stable);
+      if (w.bound.inverted) *trouble |= DFM_TROUBLE_INVERTED;
+      const double more = (cut - k) * cut_finer(w.sizes, span / cut, w.bound.step);
       if (!(done + more <= w.def.max_substeps)) {
         set_last_error(format("step %llu: the shape of body '%s' has changed so much that the rest of the "
                               "step needs %g sub-steps of %g s (max_substeps %u); take a shorter step",
                               static_cast<unsigned long long>(w.step_count),
-                              w.worst_body ? w.worst_body->name.c_str() : "?",
-                              std::ceil((goal - w.time) / w.stable), w.stable, w.def.max_substeps)
+                              w.bound.body ? w.bound.body->name.c_str() : "?",
+                              std::ceil((goal - w.time) / w.bound.step), w.bound.step, w.def.max_substeps)
                            .c_str());
         return DFM_E_DIVERGED;
       }
@@ -171,7 +172,7 @@ bool advance(World &w, StepContext &step, double end, double goal, bool last, ui
     else move_obstacles(w, step, whole && last);
     w.time = whole ? end : w.time + step.h;
     ++w.stats.substeps;
-    ++w.bound_age;
+    ++w.bound.age;
   }
   return true;
 }

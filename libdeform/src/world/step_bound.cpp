@@ -36,34 +36,34 @@ double ask_bound(World &w, Body &b) {
 
 }  // namespace
 
-bool bound_due(const World &w) { return w.bound_age >= kBoundEvery; }
+bool bound_due(const World &w) { return w.bound.age >= kBoundEvery; }
 
 void update_bound(World &w) {
-  w.stable = std::numeric_limits<double>::infinity();
-  w.worst_body = nullptr;
-  w.worst_point = 0;
-  w.inverted = 0;
+  w.bound.step = std::numeric_limits<double>::infinity();
+  w.bound.body = nullptr;
+  w.bound.point = 0;
+  w.bound.inverted = 0;
   uint32_t limited = 0;
   double fastest = 0;
   for (auto &b : w.bodies) {
     const bool stays = b->slumber.asleep && b->bound.known;
     // who sleeps counts too: the step must not change when it wakes
     if (!stays) fastest = std::max(fastest, ask_bound(w, *b));
-    w.inverted += b->bound.inverted;
+    w.bound.inverted += b->bound.inverted;
     limited += b->model.limited_cells();
     const StepBound &found = b->bound.found;
-    if (found.step < w.stable) {
-      w.stable = found.step;
-      w.worst_body = b.get();
-      w.worst_point = found.point;
+    if (found.step < w.bound.step) {
+      w.bound.step = found.step;
+      w.bound.body = b.get();
+      w.bound.point = found.point;
     }
   }
-  w.stable *= kBoundShare;
-  w.stats.stable_step = w.stable;
-  w.stats.inverted_max = std::max(w.stats.inverted_max, w.inverted);
+  w.bound.step *= kBoundShare;
+  w.stats.stable_step = w.bound.step;
+  w.stats.inverted_max = std::max(w.stats.inverted_max, w.bound.inverted);
   w.stats.limited_max = std::max(w.stats.limited_max, limited);
-  const double keeps = kBoundStrain / (fastest * w.stable);  // sub-steps
-  w.bound_age =
+  const double keeps = kBoundStrain / (fastest * w.bound.step);  // sub-steps
+  w.bound.age =
       keeps >= kBoundEvery || !(fastest > 0) ? 0 : kBoundEvery - static_cast<uint32_t>(std::max(1.0, keeps));
 }
 

@@ -211,7 +211,7 @@ class Untangler {
   }
 
   double potential(const Body &b, Vec3 by) const {
-    double joule = -b.mass * dot(w_.gravity, by);
+    double joule = -b.mass * dot(w_.gravity.now, by);
     for (const Spring &s : b.springs) {
       const Vec3 pull = spring_force(b, s, w_.time, 0);
       joule += -dot(pull, by) + 0.5 * s.stiffness * norm2(by);

@@ -56,29 +56,6 @@ uint64_t World::handle_of(uint64_t id) const {
   return 0;
 }
 
-uint32_t World::add_law(const char *name, std::span<const dfm_param_value> values,
-                        std::span<const uint8_t> free) {
-  const dfm_type &type = context->registry.find(DFM_KIND_FRICTION, name);
-  std::vector<double> packed = pack_params(type, values);
-  for (uint32_t i = 0; i < laws.size(); ++i)
-    if (laws[i]->type == &type && laws[i]->params == packed) return i;
-  auto law = std::make_unique<LawInstance>(type, context->host, std::move(packed));
-  if (law->nstate) need_ability(*this, Ability::law_memory, "friction law", name);
-  return place_law(*this, std::move(law), free);
-}
-
-uint32_t place_law(World &w, std::unique_ptr<LawInstance> law, std::span<const uint8_t> free) {
-  const auto found = std::find(free.begin(), free.end(), uint8_t(1));
-  if (found == free.end()) {
-    w.laws.push_back(std::move(law));
-    return static_cast<uint32_t>(w.laws.size() - 1);
-  }
-  const uint32_t place = static_cast<uint32_t>(found - free.begin());
-  w.laws[place] = std::move(law);
-  w.changed = true;
-  return place;
-}
-
 namespace {
 
 // Rest distance d_c: 1e-3 of the median surface edge, at least 64 rounding units of the largest coordinate,
@@ -113,7 +90,7 @@ struct Prescribed {
 
 Prescribed prescribed(const World &w) {
   Prescribed p;
-  p.gravity_keys = !w.gravity_keys.empty();
+  p.gravity_keys = !w.gravity.keys.empty();
   for (auto &b : w.bodies) {
     p.loads_vary |= b->loads_vary();
     p.held_move |= !b->motions.empty();
@@ -147,12 +124,12 @@ void look_at_plan(World &w, StepContext &step) {
 
 void values_changed(World &w) {
   w.revalued = true;
-  w.bound_age = kNone;
+  w.bound.age = kNone;
   forget_energy(w);
 }
 
 void set_gravity_now(World &w) {
-  w.gravity = w.gravity_keys.empty() ? load3(w.def.gravity) : vector_at(w.gravity_keys, w.time);
+  w.gravity.now = w.gravity.keys.empty() ? load3(w.def.gravity) : vector_at(w.gravity.keys, w.time);
 }
 
 void prepare(World &w, const RestoredChoice *restored) {
@@ -232,12 +209,12 @@ void prepare(World &w, const RestoredChoice *restored) {
 
   // Pairs: filters, then laws. The default law is made only when a pair needs it.
   // rises, so that lists made under older rules are renewed
-  const uint64_t filter_version = w.filter.version;
-  w.filter = PairFilter(w.memory());
-  w.filter.version = filter_version + 1;
-  w.pair_law.assign(size_t(nb) * width, 0);
-  w.zone_table.clear();
-  w.zone_law.clear();
+  const uint64_t filter_version = w.pairs.filter.version;
+  w.pairs.filter = PairFilter(w.memory());
+  w.pairs.filter.version = filter_version + 1;
+  w.pairs.law.assign(size_t(nb) * width, 0);
+  w.pairs.zone_table.clear();
+  w.pairs.zone_law.clear();
   for (auto &law : w.laws) law->by_default = false;
   std::vector<uint32_t> used;
   for (uint32_t i = 0; i < nb; ++i) {
@@ -253,14 +230,14 @@ void prepare(World &w, const RestoredChoice *restored) {
                            : (w.bodies[i]->category & w.obstacles[j - nb]->def.collides_with) &&
                                  (w.obstacles[j - nb]->def.category & w.bodies[i]->collides_with);
       if (const FilterRule *rule = best_rule(w.filters, a, b)) {
-        if (!is_body || i < j) w.filter.set(w.bodies[i]->id, id, !is_body, rule->collide);
+        if (!is_body || i < j) w.pairs.filter.set(w.bodies[i]->id, id, !is_body, rule->collide);
         touch = rule->collide;
       }
       if (!is_body && step.obstacle_views[j - nb].shape == Shape::none) touch = false;
       if (!touch) continue;
       if (is_body) facts.body_pairs += i < j;
       else ++facts.obstacle_pairs;
-      w.find_law(i, j, used);
+      find_law(w, i, j, used);
       for (uint32_t law : used) offer(*w.laws[law]->type, facts.offered);
     }
   }
@@ -268,8 +245,8 @@ void prepare(World &w, const RestoredChoice *restored) {
   facts.effects_listed = w.def.effects != nullptr;
   facts.asked = w.asked_effects;
   choose_self_bodies(w, step, facts, used);
-  w.law_list.clear();
-  for (auto &l : w.laws) w.law_list.push_back(l.get());
+  w.pairs.laws.clear();
+  for (auto &l : w.laws) w.pairs.laws.push_back(l.get());
 
   for (const dfm_type *t : w.context->registry.list()) offer(*t, facts.available);
   facts.unguarded = w.def.flags & DFM_WORLD_UNGUARDED;
@@ -297,15 +274,13 @@ void prepare(World &w, const RestoredChoice *restored) {
   if (w.sleepers > 0 && w.offset != before) wake_all(w);  // contacts rest at another distance now
   gather_active(w);
   set_gravity_now(w);
-  w.bound_age = kNone;
+  w.bound.age = kNone;
   step.free_kinetic.resize(nb);
   if (!restored) {
     forget_energy(w);
   } else {
-    w.gravity = restored->gravity;
-    w.stable = restored->stable;
-    w.inverted = restored->inverted;
-    w.bound_age = restored->bound_age;
+    w.gravity.now = restored->gravity;
+    w.bound = restored->bound;
   }
   step.guard.forget();
   w.changed = w.revalued = false;

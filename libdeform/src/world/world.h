@@ -6,7 +6,6 @@
 #include <string>
 #include <vector>
 
-#include "broad/pair_filter.h"
 #include "contact/store.h"
 #include "deform/deform.h"
 #include "dynamics/dynamics.h"
@@ -20,9 +19,11 @@
 #include "world/energy_watch.h"
 #include "world/motion.h"
 #include "world/overlap.h"
+#include "world/pair_table.h"
 #include "world/rigid.h"
 #include "world/sleep.h"
 #include "world/snapshot.h"
+#include "world/step_bound.h"
 #include "world/step_impulses.h"
 #include "world/step_sizes.h"
 
@@ -170,6 +171,17 @@ struct Report {
   Array<uint8_t> mode;
 };
 
+struct Gravity {
+  std::vector<dfm_vector_key> keys;
+  Vec3 now;  // m/s2
+};
+
+// A measurement of what creeps (dfm_world_hold_begin).
+struct Hold {
+  bool on = false;
+  double start = 0;  // s
+};
+
 // between steps; with more, so many of the oldest go that
 inline constexpr size_t kMostEvents = 65536;
 inline constexpr size_t kEventsAtOnce = 1024;  // the next steps find room
@@ -179,7 +191,7 @@ struct World {
   uint64_t handle = 0;
   dfm_world_def def{};
   std::vector<std::string> asked_effects;
-  std::vector<dfm_vector_key> gravity_keys;
+  Gravity gravity;
 
   std::vector<std::unique_ptr<Body>> bodies;         // in id order
   std::vector<std::unique_ptr<Obstacle>> obstacles;  // in id order
@@ -197,39 +209,26 @@ struct World {
   bool changed = true;
   bool revalued = false;  // values_changed(): tables hold, the plan is looked at
   Plan plan;
-  std::vector<uint32_t> pair_law;  // [body][body or obstacle] -> index into laws
-  // as pair_law -> first in zone_law [zone a][zone b], kNone: the pair has one law; empty: all have
-  std::vector<uint32_t> zone_table, zone_law;
-  PairFilter filter;
-  std::vector<LawInstance *> law_list;
-  double offset = 0;  // d_c, m
-  // sub-steps since the bound was asked for; kNone: ask before the next step
-  uint32_t bound_age = kNone;
-
-  // its table of stages, and what it cannot do (world/method.h)
-  const ContactMethod *method = nullptr;
+  PairTables pairs;
+  double offset = 0;                      // d_c, m
+  const ContactMethod *method = nullptr;  // its table of stages, and what it cannot do (world/method.h)
 
   // Time.
-  double time = 0, stable = 0;  // s; stable: 0.9 of the bound at its last evaluation
+  double time = 0;  // s
+  uint64_t step_count = 0;
+  WorldBound bound;
   StepSizes sizes;
   EnergyWatch watch;
-  uint64_t step_count = 0;
-  Body *worst_body = nullptr;
-  uint32_t inverted = 0;  // cells inside out at the last evaluation of the bound
-  uint32_t worst_point = 0;
   std::atomic<bool> busy{false};  // a call of the API changes it (api/call.h)
 
   std::unique_ptr<StepContext> steps;  // buffers: world/context.h
 
-  Vec3 gravity;
   ContactStore store;
   Report report;
   std::vector<PairWork> work;  // sorted by (a, b)
   std::vector<dfm_contact_event> events;
   StepImpulses step_impulses;
-  double hold_start = 0;
-  bool holding = false;
-
+  Hold hold;
   uint32_t sleepers = 0;
 
   dfm_world_stats stats{};
@@ -242,16 +241,6 @@ struct World {
   Body *find_body(const std::string &name);
   Obstacle *find_obstacle(const std::string &name);
   uint64_t handle_of(uint64_t id) const;  // body or obstacle; 0 if gone
-  // Index of the law with these values: one that is there, else a new one, in a place that `free` marks or
-  // behind the others.
-  uint32_t add_law(const char *name, std::span<const dfm_param_value> values,
-                   std::span<const uint8_t> free = {});
-
-  // pair_table.cpp; a, b: bodies by slot, then obstacles
-  uint32_t law_of(uint32_t slot_a, bool obstacle, uint32_t slot_b) const;
-  uint32_t resolve_law(uint32_t a, uint32_t zone_a, uint32_t b, uint32_t zone_b);
-  // fills pair_law and, where zones differ, the tables; used: laws out
-  void find_law(uint32_t a, uint32_t b, std::vector<uint32_t> &used);
 };
 
 }  // namespace dfm
