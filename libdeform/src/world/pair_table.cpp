@@ -1,7 +1,7 @@
 // Friction laws of a world's pairs, from the rules by name, group and material.
 //
-// PairTables::law holds one law per pair of things. Only where rules tell parts of a surface apart does the pair
-// have a table over the zones of both sides as well, and only then is a contact asked which triangle it
+// PairTables::law holds one law per pair of things. Only where rules tell parts of a surface apart does the
+// pair have a table over the zones of both sides as well, and only then is a contact asked which triangle it
 // stands on: a world without such rules runs no instruction of it.
 #include <algorithm>
 #include <cmath>

@@ -1,4 +1,4 @@
-// What the rules of friction and of contact come to: laws of the world, and which one each pair of things has.
+// What the rules of friction and of contact come to: the laws of a world, and which one each pair has.
 #pragma once
 #include <cstdint>
 #include <memory>
@@ -28,8 +28,8 @@ uint32_t add_law(World &w, const char *name, std::span<const dfm_param_value> va
                  std::span<const uint8_t> free = {});
 uint32_t place_law(World &w, std::unique_ptr<LawInstance> law, std::span<const uint8_t> free);
 
-// Things a, b: bodies by slot, then obstacles.
-void find_law(World &w, uint32_t a, uint32_t b, std::vector<uint32_t> &used);  // into the tables; used: laws out
+// Fills the tables for things a and b (bodies by slot, then obstacles). used: their laws, out.
+void find_law(World &w, uint32_t a, uint32_t b, std::vector<uint32_t> &used);
 uint32_t pair_law(const World &w, uint32_t slot_a, bool obstacle, uint32_t slot_b);
 // law: of contacts between pairs that have a table of zones.
 void set_zone_laws(const World &w, std::span<const ContactPoint> contacts, Array<uint32_t> &law);

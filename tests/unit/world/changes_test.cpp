@@ -107,7 +107,7 @@ TEST(Changes, OfGravityPosesAndParameters_MakeNoTableAndNoPlan) {
   Running r;
   const double down[3] = {0, 0, -5};
   EXPECT_EQ(r.after([&] { test::ok(dfm_world_set_gravity(r.stack.world, down)); }), kNothing);
-  EXPECT_EQ(inside(r.stack.world).gravity.z, -5);
+  EXPECT_EQ(inside(r.stack.world).gravity.now.z, -5);
 
   dfm_obstacle_def d = dfm_obstacle_def_default();
   d.name = "jaw";
@@ -197,7 +197,7 @@ TEST(Changes, OfARuleThatMovesBehindItsEquals_MakeAll) {
   r.add_friction(0.9, "upper", "*");
   r.step();
   dfm::World &w = inside(r.stack.world);
-  const auto between_cubes = [&] { return w.laws[w.law_of(0, false, 1)]->params[0]; };
+  const auto between_cubes = [&] { return w.laws[pair_law(w, 0, false, 1)]->params[0]; };
   EXPECT_EQ(between_cubes(), 0.9);
   EXPECT_EQ(r.after([&] { r.add_friction(0.2, "*", "lower"); }), kAll);
   EXPECT_EQ(between_cubes(), 0.2);
