@@ -43,9 +43,7 @@ Found look(dfm_context *context) {
   return found;
 }
 
-const char *kind_name(uint32_t kind) {
-  return kind == DFM_KIND_FRICTION ? "law" : kind == DFM_KIND_MODEL ? "model" : "solver";
-}
+const char *kind_name(uint32_t kind) { return kind == DFM_KIND_FRICTION ? "law" : "model"; }
 
 std::vector<std::string> effects(const dfm_type &type) {
   std::vector<std::string> out;
@@ -119,12 +117,30 @@ std::vector<std::string> names_of(const dfm_param &row) {
   return out;
 }
 
+// What a model says of itself, in words; none of a law.
+std::vector<std::string> capabilities(const dfm_type &type) {
+  std::vector<std::string> out;
+  if (type.kind != DFM_KIND_MODEL) return out;
+  const uint32_t caps = static_cast<const dfm_model *>(type.ops)->caps;
+  const struct {
+    uint32_t bit;
+    const char *name;
+  } names[] = {{DFM_CAP_ENERGY, "energy"},
+               {DFM_CAP_DAMPING, "damping"},
+               {DFM_CAP_ROTATION_INVARIANT, "rotation_invariant"},
+               {DFM_CAP_PLAUSIBLE, "plausible"}};
+  for (const auto &cap : names)
+    if (caps & cap.bit) out.push_back(cap.name);
+  return out;
+}
+
 void print_info(const Type &t) {
   const dfm_type &type = *t.type;
   std::printf(
       "%s %s, version %s\n  name     %s\n  licence  %s\n  source   %s\n  file     %s\n  effects  %s\n",
       kind_name(type.kind), type.id, type.version, type.name, type.licence, type.source,
       shown(t.file).c_str(), joined(effects(type)).c_str());
+  if (type.kind == DFM_KIND_MODEL) std::printf("  can      %s\n", joined(capabilities(type)).c_str());
   if (type.nparam)
     std::printf("\n  %-18s %-10s %-16s %-10s %s\n", "parameter", "default", "range", "unit", "meaning");
   for (uint32_t i = 0; i < type.nparam; ++i) {
@@ -163,8 +179,9 @@ std::string json_info(const Type &t) {
     if (row.names) o.add("names", json_array(quoted_all(names_of(row))));
     rows.push_back(o.text());
   }
-  return json_head(t)
-      .add("licence", quoted(t.type->licence))
+  JsonObject head = json_head(t);
+  if (t.type->kind == DFM_KIND_MODEL) head.add("capabilities", json_array(quoted_all(capabilities(*t.type))));
+  return head.add("licence", quoted(t.type->licence))
       .add("source", quoted(t.type->source))
       .add("params", json_array(rows))
       .text();

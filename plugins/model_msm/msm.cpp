@@ -3,6 +3,7 @@
 // as corrected in doc/models/msm.md, which derives the constants.
 #include <stdio.h>
 
+#include "deform/plugin_draft.h"
 #include "msm_body.h"
 
 namespace msm {

@@ -53,6 +53,16 @@ TEST(PluginCommand, Info_ShowsTheParameterTable) {
       << json.out;
 }
 
+TEST(PluginCommand, InfoOfAModel_SaysWhatItCan) {
+  const auto r = test::deform({"plugin", "info", "msm"});
+  EXPECT_EQ(r.exit_code, 0) << r.err;
+  EXPECT_TRUE(has(r.out, "can      energy damping rotation_invariant plausible")) << r.out;
+  const auto json = test::deform({"plugin", "info", "msm", "--json"});
+  EXPECT_TRUE(has(json.out, "\"capabilities\": [")) << json.out;
+  EXPECT_TRUE(has(json.out, "\"rotation_invariant\"")) << json.out;
+  EXPECT_FALSE(has(test::deform({"plugin", "info", "coulomb", "--json"}).out, "capabilities"));
+}
+
 TEST(PluginCommand, InfoOfAFile_LoadsIt) {
   const auto r = test::deform({"plugin", "info", std::string(DEFORM_PLUGIN_DIR) + "/friction_none.so"});
   EXPECT_EQ(r.exit_code, 0) << r.err;

@@ -155,6 +155,12 @@ BAD = {
                                                              "#define DEFORM_DEFORM_H\n#endif\n"),
                        ("libdeform/include/deform/base.h", "=#ifndef DEFORM_BASE_H\n#define DEFORM_BASE_H\n"
                                                            "DFM_API int dfm_a(void);\n#endif\n")],
+    "plugin_callers": [("libdeform/include/deform/plugin.h", "=enum { DFM_NOBODY = 1 };\n"),
+                       ("libdeform/include/deform/plugin.h",
+                        "=typedef struct dfm_nobody {\n  int a;\n} dfm_nobody;\n"),
+                       ("libdeform/include/deform/plugin.h",
+                        "=struct s {\n  void (*nobody)(void *self);\n};\n"),
+                       ("libdeform/include/deform/plugin.h", '=#define DFM_EXT_NOBODY "dfm.nobody/1"\n')],
     "cpp_complete": [("libdeform/include/deform/deform.hpp", "=// dfm_hello() and dfm_hello_loud() in a "
                                                              "comment reach nothing\n"),
                      ("libdeform/include/deform/deform.hpp", "=inline int hello() { return dfm_hello(); }\n"),

@@ -7,7 +7,8 @@ PUBLIC = "libdeform/include/deform/"
 C_HEADERS = {"stddef.h", "stdint.h", "stdbool.h"}
 # memcpy is the one way to read the bits of a double that both C and C++ define.
 MORE = {"elementary.h": {"string.h"}}
-NOT_IN_UMBRELLA = {"deform.h", "elementary.h"}  # elementary.h is for plugins, no part of the library
+# These two are for plugins, no part of the library.
+NOT_IN_UMBRELLA = {"deform.h", "elementary.h", "plugin_draft.h"}
 DECLARATION = re.compile(r"^DFM_API\b[^;{]*?\b(dfm_\w+)\s*\(", re.M)
 
 
@@ -46,6 +47,36 @@ def public_headers(tree):
             name = path[len(PUBLIC):]
             if name not in NOT_IN_UMBRELLA and "deform/" + name not in listed:
                 yield umbrella, 1, f"does not include deform/{name}"
+
+
+# Where what a plugin offers is called: the library, and the command with its validator.
+HOSTS = ("libdeform/src/", "bindings/cli/")
+# For plugins alone: the head of the entry.
+NO_HOST = re.compile(r"DFM_(ABI_OK|CAT_?|EXPORT)$")
+# Members that keep a place in a table, without a type: plugin_draft.h has it (decision 0078).
+SEATS = {"pattern", "stiffness", "fetch"}
+
+
+def plugin_callers(tree):
+    """What plugin.h names has a caller: functions of its structs, constants, structs. The rest waits in
+    plugin_draft.h."""
+    path = PUBLIC + "plugin.h"
+    if path not in tree.paths:
+        return
+    code = without_comments(tree.text(path))
+    hosts = "\n".join(without_comments(tree.text(p)) for p in tree.select(*HOSTS, ext=(".cpp", ".h")))
+    words = set(re.findall(r"\w+", hosts))
+    members = set(re.findall(r"(?:\.|->)\s*(\w+)", hosts))
+    constants = [name for names in re.findall(r"\b(DFM_\w+)\s*=|#define\s+(DFM_\w+)", code) for name in names]
+    structs = re.findall(r"^typedef struct (dfm_\w+)", code, re.M)
+    functions = [name for name in re.findall(r"\(\*(\w+)\)\s*\(", code)
+                 if name not in SEATS and name != "fn" and not name.startswith("dfm_")]
+    wanted = {name: words for name in constants + structs} | {name: members for name in functions}
+    for name, used in wanted.items():
+        if name and name not in used and not NO_HOST.match(name):
+            line = line_of(code, re.search(rf"\b{name}\b", code).start())
+            yield path, line, (f"{name} has no caller in {' or '.join(HOSTS)}; it belongs into "
+                               "plugin_draft.h until it has one")
 
 
 def threads(tree):
@@ -90,5 +121,5 @@ def versions(tree):
                        f"says \"{match[0]}\", and the version is {own[1]}.{own[2]}")
 
 
-RULES = {"public_headers": public_headers, "threads": threads, "cpp_complete": cpp_complete,
-         "versions": versions}
+RULES = {"public_headers": public_headers, "plugin_callers": plugin_callers, "threads": threads,
+         "cpp_complete": cpp_complete, "versions": versions}

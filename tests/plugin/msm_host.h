@@ -1,7 +1,8 @@
 // A host of a page for the mass-spring plugin: services, meshes, an instance with its arrays. Sees
-// deform/plugin.h alone, as a third party's host would.
+// deform/plugin.h and its draft alone, as a third party's host would.
 #pragma once
 #include <deform/plugin.h>
+#include <deform/plugin_draft.h>
 #include <dlfcn.h>
 #include <gtest/gtest.h>
 

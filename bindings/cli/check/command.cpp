@@ -32,9 +32,7 @@ struct Report {
 };
 
 const char *const kNotLoaded = "it does not load (V02 says why)";
-const char *kind_name(uint32_t kind) {
-  return kind == DFM_KIND_FRICTION ? "law" : kind == DFM_KIND_MODEL ? "model" : "solver";
-}
+const char *kind_name(uint32_t kind) { return kind == DFM_KIND_FRICTION ? "law" : "model"; }
 
 // ---- a rule of this file, in this process -----------------------------------------------------------------
 

@@ -150,20 +150,16 @@ void Plugin::copy_type(const void *from, uint32_t number) {
   type.params = copy->rows.data();
   type.param_size = sizeof(dfm_param);
   const void *ops = type.ops;
-  const bool known = type.kind == DFM_KIND_FRICTION
-                         ? copy_struct(copy->friction, ops, offsetof(dfm_friction, eval) + sizeof(void *))
-                     : type.kind == DFM_KIND_MODEL
-                         ? copy_struct(copy->model, ops, offsetof(dfm_model, destroy) + sizeof(void *))
-                         : type.kind == DFM_KIND_SOLVER &&
-                               copy_struct(copy->solver, ops, offsetof(dfm_solver, release) + sizeof(void *));
+  const bool law = type.kind == DFM_KIND_FRICTION;
+  const bool known = law ? copy_struct(copy->friction, ops, offsetof(dfm_friction, eval) + sizeof(void *))
+                         : type.kind == DFM_KIND_MODEL &&
+                               copy_struct(copy->model, ops, offsetof(dfm_model, destroy) + sizeof(void *));
   if (!known)
     broken(
         "type #%u has kind %u and operations that do not fit it, so nothing can be called; set kind, and "
         "ops.size to the sizeof of its struct",
         number, type.kind);
-  type.ops = type.kind == DFM_KIND_FRICTION ? static_cast<const void *>(&copy->friction)
-             : type.kind == DFM_KIND_MODEL  ? static_cast<const void *>(&copy->model)
-                                            : static_cast<const void *>(&copy->solver);
+  type.ops = law ? static_cast<const void *>(&copy->friction) : &copy->model;
   types_.push_back(std::move(copy));
   view_.push_back(&types_.back()->type);
 }

@@ -1,5 +1,6 @@
 /* deform/plugin.h -- ABI draft. Stand-alone: needs only the two headers below. SI units, binary64, C calling
  * convention. Structs start with their size (rows: see param_size), grow at the end only, missing tail == 0.
+ * What the library does not call yet stands in plugin_draft.h.
  * Threads: [setup] no step running; [step] one call at a time per instance, instances run
  * concurrently; [batch] re-entrant, many workers at once; [any] from anywhere. No C++ exception, exit
  * or longjmp crosses. */
@@ -81,10 +82,10 @@ typedef struct dfm_type {
   uint32_t nparam, param_size;
   /* promises, NULL-terminated: "stiction" "stribeck" ... or "vendor.word" */
   const char *const *effects;
-  /* dfm_friction, dfm_model or dfm_solver: grows independently of this head */
+  /* dfm_friction or dfm_model: grows independently of this head */
   const void *ops;
 } dfm_type;
-enum { DFM_KIND_FRICTION = 1, DFM_KIND_MODEL = 2, DFM_KIND_SOLVER = 3 };
+enum { DFM_KIND_FRICTION = 1, DFM_KIND_MODEL = 2 };
 /* ---- friction law: a pure function of a batch; all memory belongs to the host --------------------- */
 enum { DFM_NEED_FN = 1, DFM_NEED_VT = 2, DFM_NEED_FT_STOP = 4, DFM_NEED_AREA = 8, DFM_NEED_DWELL = 16 };
 enum { DFM_FRIC_ISOTROPIC = 1, DFM_FRIC_PASSIVE = 2, DFM_FRIC_JACOBIAN = 4, DFM_FRIC_SET_VALUED = 8 };
@@ -130,13 +131,11 @@ typedef struct dfm_friction {
 /* ---- deformable model: host owns x, v, f and all state; plugin owns only rebuildable caches -------- */
 enum {
   DFM_CAP_ENERGY = 1,
-  DFM_CAP_STIFFNESS = 2,
   DFM_CAP_DAMPING = 4,
-  DFM_CAP_TOPOLOGY = 8,
   DFM_CAP_ROTATION_INVARIANT = 16,
   DFM_CAP_PLAUSIBLE = 32 /* not derived from a continuum */
 };
-enum { DFM_CELL_POINT = 1, DFM_CELL_EDGE = 2, DFM_CELL_TRI = 4, DFM_CELL_TET = 8, DFM_CELL_HEX = 16 };
+enum { DFM_CELL_TET = 8 };
 typedef struct dfm_mesh {             /* rest configuration; borrowed during create() only */
   uint32_t size, npoint, ncell, cell; /* cell: one DFM_CELL_* */
   const double *rest;                 /* [npoint,3] m */
@@ -176,11 +175,9 @@ typedef struct dfm_model {           /* self is void*: one shared struct tag wou
   /* [step] row sums += N/m, N s/m per point; *dt = min(*dt,
                                        * cell bound) */
   dfm_status (*energy)(void *self, const dfm_kin *k, double *joule); /* CAP_ENERGY; f = -dE/dx */
-  /* CAP_STIFFNESS; [nb,2], i<=j */
-  dfm_status (*pattern)(const void *self, uint32_t *nb, uint32_t *ij_or_null);
-  dfm_status (*stiffness)(void *self, const dfm_kin *k, double a, double b, double *blk);
-  /* CAP_STIFFNESS; blk[nb,9] += a*df/dx + b*df/dv, fixed block order */
-  const void *(*extension)(const void *self, const char *id); /* "dfm.stepper/1" "dfm.topology/1" ... */
+  void (*pattern)(void);   /* draft: dfm_pattern_fn of plugin_draft.h; not called */
+  void (*stiffness)(void); /* draft: dfm_stiffness_fn of plugin_draft.h; not called */
+  const void *(*extension)(const void *self, const char *id); /* "dfm.stepper/1" ... */
 } dfm_model;
 /* Self-stepping model, extension "dfm.stepper/1". Contact, friction, report and pictures see surfels only.
  * Velocities here are means over the step: (x_s(t+dt) - x_s(t)) / dt. */
@@ -198,7 +195,7 @@ typedef struct dfm_stepper {
   /* [step] equals predict + respond. p_s [nsurfel,3] total impulses; x, v [npoint,stride] out at t+dt,
    * not aliasing k */
   dfm_status (*commit)(void *self, const dfm_kin *k, const double *p_s, double *x, double *v);
-  dfm_status (*fetch)(void *self, uint32_t what, double *dst); /* [step] copies what lives off the host */
+  void (*fetch)(void); /* draft: dfm_fetch_fn of plugin_draft.h; not called */
   /* [step] optional (NULL, or a smaller size): respond for nrhs right-hand sides at once, p, du_s [nrhs,n,3].
    * Without it respond is called nrhs times. */
   dfm_status (*respond_many)(void *self, const dfm_kin *k, uint32_t n, const uint32_t *surfel, uint32_t nrhs,
@@ -241,28 +238,6 @@ typedef struct dfm_limited {
   /* [step] as counted by the last call of bound */
   uint32_t (*count)(const void *self);
 } dfm_limited;
-/* Extension "dfm.spring_mask/1" of a model (draft): springs by edge of the mesh, switched off and on. Like a
- * parameter, the mask is the host's to keep: it is no state. Off gives a spring's energy away; on again may
- * bring some. */
-#define DFM_EXT_SPRING_MASK "dfm.spring_mask/1"
-typedef struct dfm_spring_mask {
-  uint32_t size, reserved;
-  /* [setup] all or, on DFM_E_ARG, none */
-  dfm_status (*set)(void *self, uint32_t n, const uint32_t *edges, uint8_t on);
-  dfm_status (*get)(const void *self, uint8_t *on); /* [any] on[nedge] 1, 0 */
-} dfm_spring_mask;
-/* ---- linear solver for the implicit system (SPD, 3x3 blocks) ---------------------------------------- */
-typedef struct dfm_solver {
-  uint32_t size, flags;
-  /* [setup] */
-  dfm_status (*analyse)(const dfm_host *h, uint32_t n, uint32_t nb, const uint32_t *ij, void **self);
-  /* [step] */
-  dfm_status (*factor)(void *self, const double *blk);
-  /* [step] */
-  dfm_status (*solve)(void *self, const double *rhs, double *x, double tolerance);
-  /* [setup] */
-  void (*release)(void *self);
-} dfm_solver;
 /* ---- entry: the one symbol a plugin exports ------------------------------------------------------- */
 /* until ABI 1 */
 #define DFM_ABI_OK(h) ((h)->abi == DFM_ABI && (DFM_ABI != 0u || (h)->abi_draft == DFM_ABI_DRAFT))

@@ -17,7 +17,6 @@ struct RegisteredType {
   dfm_type type{};
   dfm_friction friction{};
   dfm_model model{};
-  dfm_solver solver{};
   std::vector<dfm_param> rows;
   std::string file;  // "static:NAME" for a registered one
 };
@@ -51,7 +50,7 @@ class Registry {
   std::vector<PassedFile> passed_;
 };
 
-const char *kind_name(uint32_t kind);  // "law", "model", "solver"
+const char *kind_name(uint32_t kind);  // "law", "model"
 std::string short_name(const dfm_type &type);
 std::vector<std::string> effects(const dfm_type &type);
 // Throws Error naming the type where a slot's unit, kind and width do not agree.

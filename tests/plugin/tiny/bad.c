@@ -1,5 +1,5 @@
 /* One plugin per mistake in the self-description; the library refuses each with a sentence. */
-#include "deform/plugin.h"
+#include "deform/plugin_draft.h"
 
 #ifdef BAD_NO_SOURCE
 #define SOURCE ""
@@ -26,6 +26,11 @@
 #else
 #define UNIT DFM_PER_CONTACT
 #endif
+#ifdef BAD_DRAFT_KIND
+#define KIND DFM_KIND_SOLVER
+#else
+#define KIND DFM_KIND_FRICTION
+#endif
 #ifdef BAD_NO_EVAL
 #define EVAL NULL
 #else
@@ -41,18 +46,8 @@ static const dfm_param rows[] = {{"first", "first", "N", 0.0, 10.0, DEFAULT, 0, 
                                  {SECOND, "second", "N", 0.0, 10.0, 2.0, 0, 1, NULL}};
 static const dfm_slot slots[] = {{UNIT, 2, DFM_SLOT_TANGENT, 0}};
 static const dfm_friction law = {sizeof(dfm_friction), 0, 0, 1, slots, EVAL, NULL, NULL, NULL, NULL};
-static const dfm_type type = {sizeof(dfm_type),
-                              DFM_KIND_FRICTION,
-                              ID,
-                              "bad",
-                              "1.0",
-                              "MIT",
-                              SOURCE,
-                              rows,
-                              2,
-                              sizeof(dfm_param),
-                              NULL,
-                              &law};
+static const dfm_type type = {sizeof(dfm_type),  KIND, ID,  "bad", "1.0", "MIT", SOURCE, rows, 2,
+                              sizeof(dfm_param), NULL, &law};
 static const dfm_type *const types[] = {&type};
 static const dfm_plugin plugin = {sizeof(dfm_plugin), DFM_ABI, DFM_ABI_DRAFT, 1, types, NULL};
 
