@@ -135,7 +135,7 @@ void tree_rebuild(benchmark::State &state) {
   Pair pair(false);
   BoxTree tree(Memory::standard());
   const Surface &s = *pair.scene.surfaces[0];
-  for (auto _ : state) tree.build(s, s.x.data());
+  for (auto _ : state) tree.build(s.tri, s.x.data());
 }
 BENCHMARK(tree_rebuild);
 
@@ -143,8 +143,8 @@ void tree_refit(benchmark::State &state) {
   Pair pair(false);
   BoxTree tree(Memory::standard());
   const Surface &s = *pair.scene.surfaces[0];
-  tree.build(s, s.x.data());
-  for (auto _ : state) tree.refit(s, s.x.data());
+  tree.build(s.tri, s.x.data());
+  for (auto _ : state) tree.refit(s.tri, s.x.data());
 }
 BENCHMARK(tree_refit);
 
@@ -160,9 +160,9 @@ void tree_refit_share(benchmark::State &state) {
   std::vector<double> build, refit;
   for (auto _ : state) {
     const double t0 = clock();
-    tree.build(s, s.x.data());
+    tree.build(s.tri, s.x.data());
     const double t1 = clock();
-    for (int k = 0; k < 10; ++k) tree.refit(s, s.x.data());
+    for (int k = 0; k < 10; ++k) tree.refit(s.tri, s.x.data());
     const double t2 = clock();
     build.push_back(t1 - t0);
     refit.push_back((t2 - t1) / 10);

@@ -3,7 +3,6 @@
 #include <cmath>
 
 #include "api/objects.h"
-#include "surfel/closest.h"
 #include "world/bounds.h"
 #include "world/spring.h"
 #include "world/create.h"
@@ -202,6 +201,7 @@ dfm_status dfm_body_set_state(dfm_body body, uint32_t n, const double *x, const 
     disturb(b);
     b.world->bound.age = kNone;
     ++b.world->placements;
+    ++b.x_version;
     if (x) b.world->overlaps.place(b.id);
   });
 }
@@ -347,25 +347,13 @@ dfm_status dfm_body_apply_impulse(dfm_body body, const double point[3], const do
     for (int k = 0; k < 3; ++k)
       if (!std::isfinite(point[k]) || !std::isfinite(impulse[k]))
         fail(DFM_E_ARG, "body '%s': point and impulse must be finite", b.name.c_str());
-    double best = INFINITY, weight[3] = {1, 0, 0};
-    uint32_t triangle = 0;
-    for (uint32_t t = 0; t < b.surface.ntri; ++t) {
-      const uint32_t *const c = &b.surface.tri[size_t(3) * t];
-      const TrianglePoint q =
-          closest_on_triangle(load3(point), surfel_vector(b, b.p.x, c[0]), surfel_vector(b, b.p.x, c[1]),
-                              surfel_vector(b, b.p.x, c[2]));
-      if (q.distance2 < best) {
-        best = q.distance2;
-        triangle = t;
-        std::copy(q.weight, q.weight + 3, weight);
-      }
-    }
+    const TriangleNearPoint near = closest_on_body(b, load3(point));
     disturb(b);
     // dv = M^-1 N^T p: of all changes that give the point its new velocity the one of least kinetic energy
     for (int k = 0; k < 3; ++k)
-      b.surface.each_phyxel(b.surface.tri[size_t(3) * triangle + size_t(k)], [&](uint32_t phyxel, double w) {
-        b.dynamics->push(phyxel, weight[k] * w, impulse);
-      });
+      b.surface.each_phyxel(
+          b.surface.tri[size_t(3) * near.triangle + size_t(k)],
+          [&](uint32_t phyxel, double w) { b.dynamics->push(phyxel, near.at.weight[k] * w, impulse); });
   });
 }
 

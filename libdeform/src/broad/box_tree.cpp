@@ -5,6 +5,8 @@
 namespace dfm {
 namespace {
 
+constexpr double kQualityLimit = 2;  // boxes that have grown this much in sum are worth a new tree
+
 void join(Box &a, const Box &b) {
   for (int k = 0; k < 4; ++k) {
     a.lo[k] = b.lo[k] < a.lo[k] ? b.lo[k] : a.lo[k];
@@ -39,27 +41,35 @@ BoxTree::BoxTree(const Memory &memory)
 
 // All memory first: where one allocation is refused the tree stays what it was, nodes and boxes in step
 // with each other.
-void BoxTree::build(const Surface &surface, const double *x) {
-  const size_t leaves = (size_t{surface.ntri} + kLeaf - 1) / kLeaf, nodes = leaves ? 2 * leaves - 1 : 0;
+void BoxTree::build(std::span<const uint32_t> corners, const double *x) {
+  const uint32_t ntri = uint32_t(corners.size() / 3);
+  const size_t leaves = (size_t{ntri} + kLeaf - 1) / kLeaf, nodes = leaves ? 2 * leaves - 1 : 0;
   node_.reserve(nodes);
   box_.reserve(nodes);
-  tri_.reserve(surface.ntri);
-  tri_box_.reserve(surface.ntri);
-  centroid_.reserve(surface.ntri);
+  tri_.reserve(ntri);
+  tri_box_.reserve(ntri);
+  centroid_.reserve(ntri);
   node_.clear();
-  centroid_.resize(surface.ntri);
-  for (uint32_t t = 0; t < surface.ntri; ++t) {
-    const Box b = triangle_box(&surface.tri[3 * size_t{t}], x);
+  centroid_.resize(ntri);
+  for (uint32_t t = 0; t < ntri; ++t) {
+    const Box b = triangle_box(&corners[3 * size_t{t}], x);
     for (int k = 0; k < 3; ++k) centroid_[t].x[k] = b.lo[k] + b.hi[k];
     centroid_[t].tri = t;
   }
-  if (surface.ntri) split(0, surface.ntri);
-  tri_.resize(surface.ntri);
-  for (uint32_t i = 0; i < surface.ntri; ++i) tri_[i] = centroid_[i].tri;
+  if (ntri) split(0, ntri);
+  tri_.resize(ntri);
+  for (uint32_t i = 0; i < ntri; ++i) tri_[i] = centroid_[i].tri;
   box_.resize(node_.size());
-  tri_box_.resize(surface.ntri);
-  refit(surface, x);
+  tri_box_.resize(ntri);
+  refit(corners, x);
   area_built_ = area_;
+}
+
+bool BoxTree::renew(std::span<const uint32_t> corners, const double *x) {
+  if (!empty()) refit(corners, x);
+  if (!empty() && quality() <= kQualityLimit) return false;
+  build(corners, x);
+  return true;
 }
 
 // Splits at the median of the longest axis; ties by triangle number, so that the tree depends on
@@ -93,9 +103,9 @@ uint32_t BoxTree::split(uint32_t begin, uint32_t end) {
   return self;
 }
 
-void BoxTree::refit(const Surface &surface, const double *x) {
+void BoxTree::refit(std::span<const uint32_t> corners, const double *x) {
   area_ = 0;
-  for (uint32_t i = 0; i < tri_.size(); ++i) tri_box_[i] = triangle_box(&surface.tri[3 * size_t{tri_[i]}], x);
+  for (uint32_t i = 0; i < tri_.size(); ++i) tri_box_[i] = triangle_box(&corners[3 * size_t{tri_[i]}], x);
   for (uint32_t i = uint32_t(node_.size()); i-- > 0;) {
     const Node n = node_[i];
     Box box;

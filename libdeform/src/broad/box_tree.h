@@ -1,11 +1,11 @@
-// Binary tree of boxes over a surface's triangles. Its topology is found once by median splits; later only
-// its boxes are renewed from below, and it is built anew when they have grown too much.
+// Binary tree of boxes over triangles. Its topology is found once by median splits; later only its boxes are
+// renewed from below, and it is built anew when they have grown too much.
 #pragma once
 #include <cstdint>
+#include <span>
 
 #include "core/memory.h"
 #include "math/vec3.h"
-#include "surfel/surface.h"
 
 namespace dfm {
 
@@ -44,9 +44,11 @@ class BoxTree {
   };
   explicit BoxTree(const Memory &memory);
 
-  // x: [nsurfel,4]
-  void build(const Surface &surface, const double *x);
-  void refit(const Surface &surface, const double *x);
+  // corners: [ntri,3]; x: [points,4]
+  void build(std::span<const uint32_t> corners, const double *x);
+  void refit(std::span<const uint32_t> corners, const double *x);
+  // Refits, and builds where there is no tree yet or its boxes have grown too much. Was it built?
+  bool renew(std::span<const uint32_t> corners, const double *x);
   // Sum of the boxes' areas over its value after build().
   double quality() const { return area_built_ > 0 ? area_ / area_built_ : 1; }
 

@@ -14,7 +14,6 @@ constexpr double kSkinLeast = 0.02;     // of the median edge: a resting body ke
 constexpr double kSkinMost = 0.5;       // beyond half an edge, lists grow faster than they last
 // speeds may rise by so much before the margin of the reach is used up
 constexpr double kSpeedGrowth = 1.25;
-constexpr double kQualityLimit = 2;  // boxes that have grown this much in sum are worth a new tree
 
 double obstacle_speed(const ObstacleView &o, double extent) {
   return norm(o.velocity) + norm(o.spin) * extent;
@@ -201,14 +200,8 @@ bool BroadPhase::renew_tree(Side &side) {
   side.usable = s.ntri > 0 && finite_positions(s);
   if (!side.usable) return false;
   std::copy(s.x.begin(), s.x.end(), side.x.begin());
-  if (!side.tree.empty()) {
-    side.tree.refit(s, side.x.data());
-    ++stats_.refits;
-  }
-  if (side.tree.empty() || side.tree.quality() > kQualityLimit) {
-    side.tree.build(s, side.x.data());
-    ++stats_.rebuilds;
-  }
+  stats_.refits += !side.tree.empty();
+  stats_.rebuilds += side.tree.renew(s.tri, side.x.data());
   return true;
 }
 

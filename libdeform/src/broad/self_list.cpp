@@ -13,7 +13,6 @@ constexpr double kSkinLeast = 0.02;  // of the median edge
 // wider than this, every surfel would list the triangles of the second ring around it
 constexpr double kSkinMost = 0.2;
 constexpr double kSpeedGrowth = 1.25;
-constexpr double kQualityLimit = 2;  // boxes that have grown this much in sum are worth a new tree
 
 }  // namespace
 
@@ -59,8 +58,7 @@ void SelfList::renew(double h, double offset, double change) {
   at_.set(s);
   longest_ = longest_edge(s);
   moved_ = 0;
-  if (!tree_.empty()) tree_.refit(s, s.x.data());
-  if (tree_.empty() || tree_.quality() > kQualityLimit) tree_.build(s, s.x.data());
+  tree_.renew(s.tri, s.x.data());
   const double now = std::max(share(h, offset, kSpeedGrowth), covers(h, offset, kSpeedGrowth * change));
   const double edge = s.median_edge;
   const double skin =

@@ -179,8 +179,10 @@ void return_to_start(World &w, StepContext &step) {
   changed_at_once(from, w);
   if (step.budget.kept) {
     changing(from, w);
-    for (auto &b : w.bodies)
+    for (auto &b : w.bodies) {
+      ++b->x_version;
       if (b->slumber.asleep) gather_surface(b->surface, b->p.x.data(), b->p.v.data());
+    }
     gather_active(w);
   }
   const uint64_t cheapened = w.stats.cheapened;

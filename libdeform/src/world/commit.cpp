@@ -44,6 +44,7 @@ bool stage_commit(World &w, StepContext &step, uint32_t *trouble) {
         for (const uint32_t i : std::span(step.active).subspan(begin, end - begin)) {
           Body &b = *w.bodies[i];
           b.dynamics->commit(now, step.guard.motion);  // the guard may leave out some of the way
+          ++b.x_version;
           if (!w.plan.touches()) continue;
           Vec3 sum;
           for (uint32_t s = 0; s < b.surface.nsurfel; ++s) sum += load3(&b.surfel_impulse[3 * size_t(s)]);

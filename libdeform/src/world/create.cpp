@@ -84,6 +84,7 @@ Body &create_body(World &w, const dfm_body_def &def) {
   auto owned = std::make_unique<Body>();
   Body &b = *owned;
   b.world = &w;
+  b.search = std::make_unique<SearchTree>(w.memory());
   b.name = def.name ? def.name : "body" + std::to_string(w.next_id);
   check_name(w, b.name, "body");
   check_mesh(def, b.name);
@@ -249,6 +250,7 @@ Obstacle &create_obstacle(World &w, const dfm_obstacle_def &def) {
   auto owned = std::make_unique<Obstacle>();
   Obstacle &o = *owned;
   o.world = &w;
+  o.search = std::make_unique<SearchTree>(w.memory());
   o.name = def.name ? def.name : "obstacle" + std::to_string(w.next_id);
   check_name(w, o.name, "obstacle");
   const char *const name = o.name.c_str();

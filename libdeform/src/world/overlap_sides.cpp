@@ -155,13 +155,13 @@ void OverlapSkin::shift(Vec3 by) {
   lo_ += by;
   hi_ += by;
   origin_ += by;
-  if (tree_) tree_->refit(*surface_, x_.data());
+  if (tree_) tree_->refit(surface_->tri, x_.data());
 }
 
 const BoxTree &OverlapSkin::tree() {
   if (!tree_) {
     tree_ = std::make_unique<BoxTree>(*memory_);
-    tree_->build(*surface_, x_.data());
+    tree_->build(surface_->tri, x_.data());
   }
   return *tree_;
 }

@@ -1,25 +1,12 @@
 #include "world/queries.h"
 
 #include <algorithm>
-#include <limits>
 
 #include "surfel/closest.h"
 #include "surfel/views.h"
 
 namespace dfm {
 namespace {
-
-constexpr double kFar = std::numeric_limits<double>::infinity();
-
-// Moeller and Trumbore 1997: distance along the ray, or infinity. Both sides count.
-double ray_triangle(Vec3 o, Vec3 d, Vec3 a, Vec3 b, Vec3 c) {
-  const Vec3 e1 = b - a, e2 = c - a, p = cross(d, e2);
-  const double det = dot(e1, p);
-  if (det == 0) return kFar;
-  const Vec3 s = o - a, q = cross(s, e1);
-  const double u = dot(s, p) / det, v = dot(d, q) / det, t = dot(e2, q) / det;
-  return u >= 0 && v >= 0 && u + v <= 1 && t >= 0 ? t : kFar;
-}
 
 double ray_sphere(Vec3 o, Vec3 d, Vec3 center, double r) {
   const Vec3 m = o - center;
@@ -89,21 +76,42 @@ double ray_capsule(Vec3 o, Vec3 d, double r, double half, Vec3 *normal) {
   return best;
 }
 
-// Voxels answer as the surface that they are made from.
-double ray_triangles(const Obstacle &ob, Vec3 o, Vec3 d, Vec3 *normal) {
-  double best = kFar;
-  for (size_t i = 0; i < ob.triangles.size(); i += 3) {
-    const auto x = [&](size_t k) { return load3(&ob.points[size_t(3) * ob.triangles[i + k]]); };
-    const double t = ray_triangle(o, d, x(0), x(1), x(2));
-    if (t < best) {
-      best = t;
-      *normal = normalized(cross(x(1) - x(0), x(2) - x(0)));
+// Positions of a body's surfels.
+Triangles search(Body &b) {
+  return b.search->at(b.x_version, b.surface.tri, b.surface.nsurfel, [&](double *x) {
+    for (uint32_t s = 0; s < b.surface.nsurfel; ++s) {
+      store3(x + 4 * size_t{s}, surfel_vector(b, b.p.x, s));
+      x[4 * size_t{s} + 3] = 0;
     }
-  }
-  return best;
+  });
 }
 
-double ray_obstacle(const Obstacle &ob, Vec3 origin, Vec3 direction, Vec3 *normal) {
+// In the obstacle's frame, where its points never change. Voxels answer as the surface that they
+// are made from.
+Triangles search(Obstacle &ob) {
+  const size_t n = ob.points.size() / 3;
+  return ob.search->at(1, ob.triangles, n, [&](double *x) {
+    for (size_t i = 0; i < n; ++i) {
+      store3(x + 4 * i, load3(&ob.points[3 * i]));
+      x[4 * i + 3] = 0;
+    }
+  });
+}
+
+Vec3 normal_of(const Triangles &m, uint32_t t) {
+  const Vec3 a = m.corner(t, 0);
+  return normalized(cross(m.corner(t, 1) - a, m.corner(t, 2) - a));
+}
+
+double ray_triangles(Obstacle &ob, Vec3 o, Vec3 d, double limit, Vec3 *normal, SearchCount *count) {
+  const Triangles m = search(ob);
+  const TriangleOnRay hit = first_on_ray(m, o, d, limit, count);
+  if (hit.triangle != kNone) *normal = normal_of(m, hit.triangle);
+  return hit.distance;
+}
+
+double ray_obstacle(Obstacle &ob, Vec3 origin, Vec3 direction, double limit, Vec3 *normal,
+                    SearchCount *count) {
   const Quat q = ob.pose.rotation;
   const Vec3 o = rotate_back(q, origin - ob.pose.position), d = rotate_back(q, direction);
   double t = kFar;
@@ -119,7 +127,7 @@ double ray_obstacle(const Obstacle &ob, Vec3 origin, Vec3 direction, Vec3 *norma
     case Shape::box: t = ray_box(o, d, load3(ob.def.half_size), &n); break;
     case Shape::capsule: t = ray_capsule(o, d, ob.def.radius, ob.def.half_length, &n); break;
     case Shape::mesh:
-    case Shape::voxels: t = ray_triangles(ob, o, d, &n); break;
+    case Shape::voxels: t = ray_triangles(ob, o, d, limit, &n, count); break;
     case Shape::none: break;
   }
   *normal = rotate(q, n);
@@ -161,53 +169,53 @@ void surface_normals(const Body &b, double *out) {
     store3(out + size_t(3) * s, normalized(load3(out + size_t(3) * s)));
 }
 
-dfm_ray_hit cast_ray(World &w, Vec3 o, Vec3 d, double max_distance) {
+dfm_ray_hit cast_ray(World &w, Vec3 o, Vec3 d, double max_distance, SearchCount *count) {
   dfm_ray_hit hit = nothing();
-  for (auto &b : w.bodies)
-    for (uint32_t t = 0; t < b->surface.ntri; ++t) {
-      const uint32_t *const c = &b->surface.tri[size_t(3) * t];
-      const double at = ray_triangle(o, d, surfel_vector(*b, b->p.x, c[0]), surfel_vector(*b, b->p.x, c[1]),
-                                     surfel_vector(*b, b->p.x, c[2]));
-      if (at <= max_distance && at < hit.distance) {
-        hit.distance = at;
-        hit.body = b->handle;
-        hit.triangle = t;
-        store3(hit.normal, normalized(triangle_normal(*b, t)));
-      }
-    }
+  for (auto &b : w.bodies) {
+    const Triangles m = search(*b);
+    const TriangleOnRay on = first_on_ray(m, o, d, std::min(max_distance, hit.distance), count);
+    if (on.triangle == kNone || !(on.distance < hit.distance)) continue;
+    hit.distance = on.distance;
+    hit.body = b->handle;
+    hit.triangle = on.triangle;
+    store3(hit.normal, normal_of(m, on.triangle));
+  }
   for (auto &ob : w.obstacles) {
     Vec3 n;
-    const double at = ray_obstacle(*ob, o, d, &n);
-    if (at <= max_distance && at < hit.distance) {
-      hit.distance = at;
-      hit.body = 0;
-      hit.obstacle = ob->handle;
-      hit.triangle = kNone;
-      store3(hit.normal, n);
-    }
+    const double at = ray_obstacle(*ob, o, d, std::min(max_distance, hit.distance), &n, count);
+    if (!(at <= max_distance && at < hit.distance)) continue;
+    hit.distance = at;
+    hit.body = 0;
+    hit.obstacle = ob->handle;
+    hit.triangle = kNone;
+    store3(hit.normal, n);
   }
   if (hit.distance < kFar) store3(hit.point, o + hit.distance * d);
   return hit;
 }
 
-dfm_ray_hit closest_surface(World &w, Vec3 p, double max_distance) {
+dfm_ray_hit closest_surface(World &w, Vec3 p, double max_distance, SearchCount *count) {
   dfm_ray_hit hit = nothing();
-  for (auto &b : w.bodies)
-    for (uint32_t t = 0; t < b->surface.ntri; ++t) {
-      const uint32_t *const c = &b->surface.tri[size_t(3) * t];
-      const TrianglePoint q =
-          closest_on_triangle(p, surfel_vector(*b, b->p.x, c[0]), surfel_vector(*b, b->p.x, c[1]),
-                              surfel_vector(*b, b->p.x, c[2]));
-      const double d = std::sqrt(q.distance2);
-      if (d <= max_distance && d < hit.distance) {
-        hit.distance = d;
-        hit.body = b->handle;
-        hit.triangle = t;
-        store3(hit.point, q.point);
-        store3(hit.normal, normalized(triangle_normal(*b, t)));
-      }
-    }
+  for (auto &b : w.bodies) {
+    const Triangles m = search(*b);
+    const TriangleNearPoint near =
+        closest_to(m, p, DistanceKey::root, std::min(max_distance, hit.distance), count);
+    if (near.triangle == kNone || !(near.key < hit.distance)) continue;
+    hit.distance = near.key;
+    hit.body = b->handle;
+    hit.triangle = near.triangle;
+    store3(hit.point, near.at.point);
+    store3(hit.normal, normal_of(m, near.triangle));
+  }
   return hit;
+}
+
+TriangleNearPoint closest_on_body(Body &b, Vec3 p) {
+  TriangleNearPoint near = closest_to(search(b), p, DistanceKey::squared, kFar);
+  if (near.triangle != kNone) return near;
+  near.triangle = 0;  // so far away that squared distances overflow: all are equal
+  near.at.weight[0] = 1;
+  return near;
 }
 
 }  // namespace dfm

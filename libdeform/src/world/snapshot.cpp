@@ -608,6 +608,7 @@ void exchange(World &w, Staged &t) noexcept {
   for (size_t i = 0; i < w.bodies.size(); ++i) {
     Body &b = *w.bodies[i];
     StagedBody &other = t.bodies[i];
+    ++b.x_version;
     b.p.x.swap(other.p.x);
     b.p.v.swap(other.p.v);
     b.p.load.swap(other.p.load);

@@ -233,6 +233,7 @@ class Untangler {
       wake(w_, b);
       forget_energy(b);  // the change of potential is nobody's work
       ++w_.placements;
+      ++b.x_version;
     }
   }
 

@@ -21,6 +21,7 @@
 #include "world/overlap.h"
 #include "world/pair_table.h"
 #include "world/rigid.h"
+#include "world/search_tree.h"
 #include "world/sleep.h"
 #include "world/snapshot.h"
 #include "world/step_bound.h"
@@ -88,6 +89,7 @@ struct Body {
   void *user = nullptr;
 
   Phyxels p;
+  uint64_t x_version = 1;  // rises whenever p.x may have changed
   Array<uint32_t> tets, edges;
   Surface surface;
   SurfaceZones zones;
@@ -116,6 +118,7 @@ struct Body {
   Slumber slumber;
   // [n,4] m, positions since which it is calm; empty where nothing may sleep
   Array<double> anchor;
+  std::unique_ptr<SearchTree> search;  // rays and closest points
 
   bool loads_vary() const;
   double impulse_time() const;  // s that surfel_impulse belongs to
@@ -144,6 +147,7 @@ struct Obstacle {
   Array<uint32_t> triangles;
   std::unique_ptr<ObstacleMesh> mesh;
   std::unique_ptr<VoxelGrid> grid;
+  std::unique_ptr<SearchTree> search;  // rays
   Pose pose_at_time(double t) const;
   // of a sub-step, in a step that lasts for `left` from t
   Pose end_pose(double t, double h, double left) const;

@@ -380,11 +380,11 @@ TEST(BoxTree, Refit_BoundsDeformedTriangles) {
   Scene scene;
   Surface &s = scene.add(sphere_mesh(1, 3));
   BoxTree tree(Memory::standard());
-  tree.build(s, s.x.data());
+  tree.build(s.tri, s.x.data());
   EXPECT_DOUBLE_EQ(tree.quality(), 1);
   std::mt19937 random(2);
   deform_at_random(s, random, 0.2, 0);
-  tree.refit(s, s.x.data());
+  tree.refit(s.tri, s.x.data());
   EXPECT_GT(tree.quality(), 1.2);
   std::vector<int> seen(s.ntri, 0);
   for (uint32_t i = 0; i < s.ntri; ++i) ++seen[tree.triangles()[i]];
