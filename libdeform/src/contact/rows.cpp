@@ -215,6 +215,30 @@ Vec3 ContactRows::diagonal(uint32_t i, Vec3 a) const {
   return sum;
 }
 
+namespace {
+
+// A depth closes by a fifth per sub-step. Closed at once it would leave the bodies apart at gap / h, and a
+// contact that comes with a little depth (an edge of a face that bends) would be struck away, come back deeper,
+// and never rest.
+constexpr double kCloses = 0.2;
+// The last of the distance is no tolerance to spend: a point that slides over a face that turns comes nearer by
+// slip times turn in every sub-step, which the contact's straight motion does not see. Deeper than 0.4 d_c the
+// whole of a further depth is closed in the sub-step: (1 - kCloses) 0.4 of d_c is what may stay.
+constexpr double kStays = 0.32;
+// Surfaces that are through each other already (a start state) take their time: so much of d_c per sub-step.
+constexpr double kOpens = 0.1;
+
+// m/s at which contact may approach, or has to open. most: m, the largest depth that one sub-step closes.
+double bias_velocity(double distance, double offset, double h, double planned, double most) {
+  const double gap = distance - offset;
+  if (gap > 0) return gap / h;
+  const double slow = std::max(kCloses * gap, -most);
+  const double near = distance > 0 ? gap + kStays * offset : slow;
+  return std::min(slow, near) / planned;
+}
+
+}  // namespace
+
 void ContactRows::finish(std::span<const ContactPoint> contacts, const double *tangents, double h,
                          double planned, double offset) {
   frame.resize(size_t(n) * 9);
@@ -224,7 +248,7 @@ void ContactRows::finish(std::span<const ContactPoint> contacts, const double *t
   wt.resize(n);
   cross.resize(size_t(n) * 2);
   impulse.resize(size_t(n) * 3);
-  const double most = recovery > 0 ? recovery * planned : 0.1 * offset;
+  const double most = recovery > 0 ? recovery * planned : kOpens * offset;
   for (uint32_t i = 0; i < n; ++i) {
     const Vec3 normal = load3(contacts[i].normal);
     const Vec3 t1 = load3(tangents + size_t(i) * 3);
@@ -235,17 +259,7 @@ void ContactRows::finish(std::span<const ContactPoint> contacts, const double *t
     store3(f + 6, t2);
     const Vec3 v = load3(contacts[i].velocity);
     store3(&drive[size_t(i) * 3], {dot(normal, v), dot(t1, v), dot(t2, v)});
-    const double gap = contacts[i].distance - offset;
-    // A depth closes by a fifth per sub-step: closed at once it would leave the bodies apart at gap / h, and
-    // a contact that comes with a little depth (an edge of a face that bends) would be struck away, come back
-    // deeper, and never rest.
-    // But the last of the distance is no tolerance to spend: a point that slides over a face that turns comes
-    // nearer by slip times turn in every sub-step, which the contact's straight motion does not see. Nearer
-    // than 0.6 d_c the whole of a further depth is closed in the sub-step. Surfaces that are through each
-    // other already (a start state) take their time.
-    const double slow = std::max(0.2 * gap, -most);
-    const double near = contacts[i].distance > 0 ? gap + 0.32 * offset : slow;
-    rate[i] = gap > 0 ? gap / h : std::min(slow, near) / planned;
+    rate[i] = bias_velocity(contacts[i].distance, offset, h, planned, most);
     const Vec3 w0 = diagonal(i, normal);
     wn[i] = dot(normal, w0);
     cross[2 * size_t(i)] = dot(t1, w0);

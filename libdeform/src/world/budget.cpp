@@ -98,18 +98,8 @@ struct PutBack {
   }
 };
 
-template <class R, class F>
-void each_column_of_report(R &r, F f) {
-  f(r.contacts);
-  f(r.frame);
-  f(r.impulse);
-  f(r.slip);
-  f(r.mode);
-}
-
 template <class Stream>
 void changing(Stream &s, World &w) {
-  const auto array = [&](auto &a) { s.array(a); };
   s.value(w.time);
   s.value(w.bound.step);
   s.value(w.bound.inverted);
@@ -149,7 +139,7 @@ void changing(Stream &s, World &w) {
   each_column([&](const ContactColumn &, auto &column) { s.array(column); }, w.store);
   s.value(w.report.n);
   s.value(w.report.h);
-  each_column_of_report(w.report, array);
+  each_report_column([&](size_t, auto &column) { s.array(column); }, w.report);
   s.array(w.work);
   s.length(w.events);  // a step only adds to it, and it may wait for the host for many steps
 }
@@ -159,11 +149,8 @@ void changing(Stream &s, World &w) {
 void reserve_others(World &w, StepContext &step) {
   each_column([](const ContactColumn &, const auto &from, auto &to) { to.reserve(from.size()); }, w.store,
               step.next_store);
-  std::array<size_t, 5> size{};
-  size_t k = 0;
-  each_column_of_report(w.report, [&](auto &a) { size[k++] = a.size(); });
-  k = 0;
-  each_column_of_report(step.last_report, [&](auto &a) { a.reserve(size[k++]); });
+  each_report_column([](size_t, const auto &from, auto &to) { to.reserve(from.size()); }, w.report,
+                     step.last_report);
 }
 
 // What the step changes at its start, before it is known whether more has to be kept.

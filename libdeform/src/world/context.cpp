@@ -11,6 +11,7 @@ StepContext::StepContext(const Memory &m)
       exchange(m),
       renewal(m),
       next_store(m),
+      last_report(m),
       islands(m) {
   use_memory(m, driven, free_kinetic, lent, contacts, tolerance.normal, tolerance.tangent, disturbance,
              best_impulse, tangents, match, sharing, aim, stands, ways, renewed, block_surfels, block_impulse,
@@ -22,8 +23,6 @@ StepContext::StepContext(const Memory &m)
   GuardMemory &known = guard.memory;
   use_memory(m, known.runs, known.old_runs, known.features, known.old_features, known.rest, known.old_rest,
              known.normal, known.old_normal);
-  use_memory(m, last_report.contacts, last_report.frame, last_report.impulse, last_report.slip,
-             last_report.mode);
 }
 
 }  // namespace dfm

@@ -150,32 +150,6 @@ bool all_idle(const World &w, const StepContext &step) {
                       [](const ObstacleView &o) { return o.moves(); });
 }
 
-bool stage_narrow(World &w, StepContext &step, uint32_t *trouble) {
-  struct Restored {
-    World &w;
-    ~Restored() { gather_active(w); }
-  };
-  for (;;) {
-    find_contacts(step.body_views, step.obstacle_views, step.broad.candidates(), step.h, w.offset,
-                  w.store.crossings, step.lent, step.contacts);
-    step.woken.clear();
-    if (w.sleepers == 0) return true;
-    for (const ContactPoint &c : step.contacts) {
-      if (w.bodies[c.slot_a]->slumber.asleep) wake(w, *w.bodies[c.slot_a]);
-      if (!c.obstacle && w.bodies[c.slot_b]->slumber.asleep) wake(w, *w.bodies[c.slot_b]);
-    }
-    if (step.woken.empty()) return true;
-    std::sort(step.woken.begin(), step.woken.end());
-    {
-      const Restored all{w};
-      step.active.swap(step.woken);
-      if (!stage_model(w, step, trouble) || !stage_predict(w, step, trouble)) return false;
-      stage_gather(w, step);
-    }
-    stage_broad(w, step);
-  }
-}
-
 // At the end of a sub-step that has been committed; allocates nothing.
 void stage_sleep(World &w, StepContext &step) {
   const double end = w.time + step.h;
@@ -266,10 +240,8 @@ void carry_sleepers(World &w, StepContext &step, uint32_t *touching, uint32_t *s
         },
         w.store, to);
     if (step.shares) copy(w.store.due.empty() ? w.store.area : w.store.due, to.due, 1);
-    copy(step.last_report.contacts, w.report.contacts, 1);
-    copy(step.last_report.frame, w.report.frame, 9);
-    copy(step.last_report.slip, w.report.slip, 2);
-    copy(step.last_report.mode, w.report.mode, 1);
+    each_report_column([&](size_t width, const auto &source, auto &into) { copy(source, into, width); },
+                       step.last_report, w.report);
     if (to.nstate == w.store.nstate) copy(w.store.bristle, to.bristle, w.store.nstate);
     else
       for (uint32_t m = from; m < end; ++m)
@@ -294,8 +266,8 @@ void carry_sleepers(World &w, StepContext &step, uint32_t *touching, uint32_t *s
   to.by_key.resize(to.n);
   w.report.n = to.n;
   for (size_t i = size_t(3) * own; i < size_t(3) * to.n; ++i) to.impulse[i] *= scale;
-  w.report.impulse.insert(w.report.impulse.end(), to.impulse.begin() + std::ptrdiff_t(size_t(3) * own),
-                          to.impulse.end());
+  std::copy(to.impulse.begin() + std::ptrdiff_t(size_t(3) * own), to.impulse.end(),
+            w.report.impulse.begin() + std::ptrdiff_t(size_t(3) * own));
   for (uint32_t m = own; m < to.n; ++m) {
     *touching += to.touching[m];
     *sticking += to.impulse[size_t(3) * m] > 0 && w.report.mode[m] == 1;

@@ -158,9 +158,8 @@ struct Staged {
   std::vector<PairWork> work;
   Report report;
   std::vector<dfm_contact_event> events;  // none
-  explicit Staged(const World &w) : store(w.memory()) {
+  explicit Staged(const World &w) : store(w.memory()), report(w.memory()) {
     const Memory &m = w.memory();
-    use_memory(m, report.contacts, report.frame, report.impulse, report.slip, report.mode);
     def.method = w.def.method;
     bodies.resize(w.bodies.size());
     obstacles.resize(w.obstacles.size());

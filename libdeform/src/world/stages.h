@@ -35,7 +35,7 @@ bool predict_and_watch(World &w, StepContext &step, uint32_t *trouble);    // as
 bool stage_rigid_predict(World &w, StepContext &step, uint32_t *trouble);  // rigid.cpp
 void stage_gather(World &w, StepContext &step);
 void stage_broad(World &w, StepContext &step);
-bool stage_narrow(World &w, StepContext &step, uint32_t *trouble);  // sleep.cpp
+bool stage_narrow(World &w, StepContext &step, uint32_t *trouble);  // narrow.cpp
 void stage_self(World &w, StepContext &step);                       // self_contact.cpp
 bool stage_solve(World &w, StepContext &step, uint32_t *trouble);   // solve.cpp
 // rigid.cpp: ends beside the present states, kept by keep_rigids()

@@ -5,7 +5,7 @@
 //     pieces                         advance(), piece(): shorter where the guard asks for it
 //       stages                       sub_step(): all rows of the method's table that the plan has
 //                                    chosen, or none
-//         waking                     narrow runs model to broad again for who has been woken (sleep.cpp)
+//         waking                     narrow runs model to broad again for who has been woken (narrow.cpp)
 //         a rigid host's revision    solve, again, where a motor lets go; rigid commit, where a host asks for
 //                                    another solve (rigid.cpp)
 //         hits                       guard runs solve and distribute again with what would cross (guard.cpp)

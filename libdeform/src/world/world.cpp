@@ -27,9 +27,9 @@ Pose Obstacle::pose_at_time(double t) const {
   return p;
 }
 
-World::World(dfm_context *c) : context(c), steps(std::make_unique<StepContext>(c->memory)), store(c->memory) {
-  const Memory &m = c->memory;
-  use_memory(m, report.contacts, report.frame, report.impulse, report.slip, report.mode, step_impulses.pairs);
+World::World(dfm_context *c)
+    : context(c), steps(std::make_unique<StepContext>(c->memory)), store(c->memory), report(c->memory) {
+  use_memory(c->memory, step_impulses.pairs);
   stats.size = sizeof stats;
   use_method(*this, velocity_method());
 }

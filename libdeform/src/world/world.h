@@ -20,6 +20,7 @@
 #include "world/motion.h"
 #include "world/overlap.h"
 #include "world/pair_table.h"
+#include "world/report.h"
 #include "world/rigid.h"
 #include "world/search_tree.h"
 #include "world/sleep.h"
@@ -164,15 +165,6 @@ struct FilterRule {
 struct PairWork {
   uint64_t a, b;
   double work;
-};
-
-// What the last sub-step left for the report: contacts in key order with their solution.
-struct Report {
-  uint32_t n = 0;
-  double h = 0;
-  Array<ContactPoint> contacts;
-  Array<double> frame, impulse, slip;  // [n,9], [n,3], [n,2]
-  Array<uint8_t> mode;
 };
 
 struct Gravity {
