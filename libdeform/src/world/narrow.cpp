@@ -1,5 +1,5 @@
-// Contacts of the sub-step. A contact of a sleeper wakes its island, whose bodies then take the stages that the
-// others have passed, model to broad, before contacts are found once more.
+// Contacts of the sub-step. A contact of a sleeper wakes its island, whose bodies then take the stages that
+// the others have passed, model to broad, before contacts are found once more.
 #include <algorithm>
 
 #include "narrow/narrow_phase.h"

@@ -15,8 +15,8 @@ struct Report {
   explicit Report(const Memory &memory);
 };
 
-// f(width, column of each report). Memory, room, carrying over sleepers and the copy that a step's budget puts
-// back follow from this list.
+// f(width, column of each report). Memory, room, carrying over sleepers and the copy that a step's budget
+// puts back follow from this list.
 template <class F, class... R>
 void each_report_column(F &&f, R &...r) {
   f(size_t{1}, r.contacts...);
