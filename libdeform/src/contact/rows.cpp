@@ -218,12 +218,12 @@ Vec3 ContactRows::diagonal(uint32_t i, Vec3 a) const {
 namespace {
 
 // A depth closes by a fifth per sub-step. Closed at once it would leave the bodies apart at gap / h, and a
-// contact that comes with a little depth (an edge of a face that bends) would be struck away, come back deeper,
-// and never rest.
+// contact that comes with a little depth (an edge of a face that bends) would be struck away, come back
+// deeper, and never rest.
 constexpr double kCloses = 0.2;
-// The last of the distance is no tolerance to spend: a point that slides over a face that turns comes nearer by
-// slip times turn in every sub-step, which the contact's straight motion does not see. Deeper than 0.4 d_c the
-// whole of a further depth is closed in the sub-step: (1 - kCloses) 0.4 of d_c is what may stay.
+// The last of the distance is no tolerance to spend: a point that slides over a face that turns comes nearer
+// by slip times turn in every sub-step, which the contact's straight motion does not see. Deeper than 0.4 d_c
+// the whole of a further depth is closed in the sub-step: (1 - kCloses) 0.4 of d_c is what may stay.
 constexpr double kStays = 0.32;
 // Surfaces that are through each other already (a start state) take their time: so much of d_c per sub-step.
 constexpr double kOpens = 0.1;

@@ -1,5 +1,5 @@
-// What contacts leave behind when a sub-step has been taken: the store for the next one, events, the hold, the
-// work of friction, and the report.
+// What contacts leave behind when a sub-step has been taken: the store for the next one, events, the hold,
+// the work of friction, and the report.
 #include <algorithm>
 
 #include "world/bristles.h"
