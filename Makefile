@@ -49,8 +49,7 @@ lint: setup build/release/build.ninja
 format:
 	@cmake/format.sh write
 
-# Reads how each file is compiled from the release build.
-tidy: setup build/release/build.ninja
+tidy: setup
 	@cmake/tidy.sh $(JOBS) $(FILES)
 
 asan tsan: %: setup build/%/build.ninja

@@ -13,6 +13,9 @@ import lint
 HELLO = "int main(void) { return 0; }\n"
 HEADER = """#ifndef DEFORM_BASE_H
 #define DEFORM_BASE_H
+#define DFM_VERSION_MAJOR 0
+#define DFM_VERSION_MINOR 1
+#define DFM_VERSION_PATCH 0
 #include <stdint.h>
 #ifdef __cplusplus
 extern "C" {
@@ -171,9 +174,10 @@ BAD = {
                 ("libdeform/include/deform/base.h", "\n/** Both. Threads: Any thread. */\n"
                                                     "DFM_API int dfm_said(void);\n"
                                                     "DFM_API int dfm_silent(void);\n")],
-    "versions": [("libdeform/include/deform/base.h", "\n#define DFM_VERSION_MAJOR 0\n"
-                                                     "#define DFM_VERSION_MINOR 1\n"
-                                                     "/* Since 0.1; this one since 0.2. */\n")],
+    "walks": [("README.md", "`explain` in `tree.cpp`\n"), ("README.md", "`log` in\n`gone.cpp`\n")],
+    "versions": [
+        ("CMakeLists.txt", "project(deform VERSION 0.2.0)\n"), ("CHANGELOG.md", "## 0.2.0 (unreleased)\n"),
+        ("libdeform/include/deform/base.h", "/* Since 0.1; this one since 0.2. */\n")],
 }
 
 

@@ -108,11 +108,19 @@ def cpp_complete(tree):
 
 
 def versions(tree):
-    """What a public header says has come "since" a version has not come since one that is still to be."""
-    base = tree.text(PUBLIC + "base.h")
-    own = re.search(r"#define DFM_VERSION_MAJOR (\d+)\s+#define DFM_VERSION_MINOR (\d+)", base)
+    """One version: DFM_VERSION, CMake's and the newest of CHANGELOG.md; nothing came "since" a later one."""
+    base = PUBLIC + "base.h"
+    own = re.search(r"#define DFM_VERSION_MAJOR (\d+)\s+#define DFM_VERSION_MINOR (\d+)"
+                    r"(?:\s+#define DFM_VERSION_PATCH (\d+))?", tree.text(base))
     if not own:
         return
+    whole = ".".join(part for part in own.groups() if part)
+    for path, pattern in (("CMakeLists.txt", r"project\(\w+ VERSION ([\d.]+)"),
+                          ("CHANGELOG.md", r"^## (\d[\d.]*)")):
+        said = re.search(pattern, tree.text(path) or "", re.M)
+        if said and said.group(1) != whole:
+            yield (path, line_of(tree.text(path), said.start()),
+                   f"is of version {said.group(1)}, and DFM_VERSION in {base} says {whole}")
     for path in tree.select(PUBLIC, ODE, ext=(".h", ".hpp")):
         content = tree.text(path)
         for match in re.finditer(r"\bsince (\d+)\.(\d+)", content, re.I):

@@ -84,4 +84,19 @@ def names(tree):
                     yield path, line, f"{name} is in no public header"
 
 
-RULES = {"names": names, "links": links, "citations": citations, "reading_order": reading_order}
+def walks(tree):
+    """Where a page says `function` in `file`, that file is there and has the function."""
+    for path in tree.select("", ext=(".md",)):
+        if path.startswith(HISTORY):
+            continue
+        content = tree.text(path)
+        said = re.compile(r"`([\w:]+)(?:\(\))?`\s+in\s+`([\w./-]+\.(?:cpp|hpp|h|c|py))`")
+        for match in said.finditer(content):
+            name, file = match.group(1).rpartition(":")[2], match.group(2)
+            named = [p for p in tree.paths if ("/" + p).endswith("/" + file)]
+            if not any(re.search(rf"\b{name}\b", tree.text(p) or "") for p in named):
+                yield path, line_of(content, match.start()), f"{match.group(1)} is not in {file}"
+
+
+RULES = {"walks": walks, "names": names, "links": links, "citations": citations,
+         "reading_order": reading_order}

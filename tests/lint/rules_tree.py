@@ -4,7 +4,8 @@ import re
 from tree import CODE, line_of
 
 TOP = {"CMakeLists.txt", "libdeform", "plugins", "bindings", "examples", "tests", "cmake",
-       "README.md", "LICENSE", "CHANGELOG.md", "CMakePresets.json", "Makefile"}
+       "README.md", "CONTRIBUTING.md", "SECURITY.md", "LICENSE", "CHANGELOG.md", "CMakePresets.json",
+       "Makefile"}
 BELOW = {
     "libdeform": {"CMakeLists.txt", "include", "src", "schema", "doc"},
     "libdeform/include": {"deform"},
@@ -13,9 +14,8 @@ BELOW = {
                       "contact", "friction", "distribute", "rigid", "world", "rollback", "scene", "api"},
     "libdeform/doc": {"README.md", "concepts", "reference", "models", "laws", "howto", "decisions", "images"},
     "bindings": {"CMakeLists.txt", "cli", "render", "ode", "bullet", "python"},
-    "tests": {"CMakeLists.txt", "support", "data", "unit", "analytic", "stability", "api", "plugin",
-              "determinism", "adapters",
-              "fuzz", "lint", "bench", "abi", "render"},
+    "tests": {"CMakeLists.txt", "README.md", "support", "data", "unit", "analytic", "stability", "api",
+              "plugin", "determinism", "adapters", "fuzz", "lint", "bench", "abi", "render"},
 }
 PLUGIN_FOLDER = re.compile(r"plugins/(CMakeLists\.txt|(model|friction|solver|template)_[a-z0-9_]+)$")
 MAX_LINES = 800

@@ -53,7 +53,7 @@ template <class Rule>
 void add_rule(std::vector<Rule> &rules, Rule &&fresh) {
   rules.reserve(rules.size() + 1);
   std::erase_if(rules, [&](const Rule &r) { return same_pair(r.between, fresh.between); });
-  rules.push_back(std::move(fresh));
+  rules.push_back(std::forward<Rule>(fresh));
 }
 
 // Is `name` a body or obstacle that the pattern names, as a whole or by a group?
