@@ -130,28 +130,37 @@ TriangleNearPoint closest_to(const Triangles &m, Vec3 p, DistanceKey key, double
   TriangleNearPoint best;
   if (m.tree.empty()) return best;
   const double slack = kPointSlack * length_scale(m.tree, p);
-  const auto widened = [&](double value) {
-    const double distance = (key == DistanceKey::root ? value : std::sqrt(value)) + slack;
-    return distance * distance;
-  };
+  const auto distance_of = [&](double value) { return key == DistanceKey::root ? value : std::sqrt(value); };
   SearchCount own;
-  double most = limit, most2 = widened(limit);
+  double most = limit;
+  double reach = distance_of(limit) + slack;
+  double reach2 = reach * reach;
+  Vec3 away;  // from the best point to p, of length one; zero: none
   const Box point{{p.x, p.y, p.z, 0}, {p.x, p.y, p.z, 0}};
   const auto bound = [&](const Box &b) { return box_distance2(point, b); };
+  // A triangle is at least as far from p as the plane across `away` through that of its corners which lies
+  // farthest along it. Where triangles curve away from p this leaves out most of those whose boxes are near.
+  const auto behind = [&](Vec3 a, Vec3 b, Vec3 c) {
+    return dot(away, p) - std::max({dot(away, a), dot(away, b), dot(away, c)}) > reach;
+  };
   const auto leaf = [&](uint32_t begin, uint32_t end) {
     for (uint32_t i = begin; i < end; ++i) {
-      if (!(bound(m.tree.triangle_boxes()[i]) <= most2)) continue;
-      ++own.triangles;
+      if (!(bound(m.tree.triangle_boxes()[i]) <= reach2)) continue;
       const uint32_t t = m.tree.triangles()[i];
-      const TrianglePoint q = closest_on_triangle(p, m.corner(t, 0), m.corner(t, 1), m.corner(t, 2));
+      const Vec3 a = m.corner(t, 0), b = m.corner(t, 1), c = m.corner(t, 2);
+      if (behind(a, b, c)) continue;
+      ++own.triangles;
+      const TrianglePoint q = closest_on_triangle(p, a, b, c);
       const double value = key == DistanceKey::root ? std::sqrt(q.distance2) : q.distance2;
       if (!(value < most || (value == most && t < best.triangle))) continue;
       most = value;
-      most2 = widened(value);
+      reach = distance_of(value) + slack;
+      reach2 = reach * reach;
+      away = normalized(p - q.point);
       best = {value, t, q};
     }
   };
-  nearest_first(m.tree, most2, own.nodes, bound, leaf);
+  nearest_first(m.tree, reach2, own.nodes, bound, leaf);
   if (count) {
     count->nodes += own.nodes;
     count->triangles += own.triangles;

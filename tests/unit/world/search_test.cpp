@@ -271,7 +271,7 @@ TEST(Search, AmongManyTriangles_LooksAtFew) {
   EXPECT_LT(double(rays.nodes) / kQueries, 100);
   EXPECT_LT(double(rays.triangles) / kQueries, 20);
   EXPECT_LT(double(points.nodes) / kQueries, 200);
-  EXPECT_LT(double(points.triangles) / kQueries, 120);
+  EXPECT_LT(double(points.triangles) / kQueries, 40);
 }
 
 // Every way in which positions change is seen by the next question.
