@@ -183,6 +183,14 @@ TEST(Hpp, Spans_ReadAndWriteWhatTheCFunctionsDo) {
   s.ball.remove_load(load);
   EXPECT_THROW(s.ball.remove_load(load), deform::Error);
   EXPECT_TRUE(s.world.ray(Vec3{0, 0, 1}, Vec3{0, 0, -1}, 10).body);
+
+  s.world.add_friction("ball", "floor", "coulomb", deform::Params({{"mu", 0.2}}));
+  s.world.set_friction("floor", "ball", deform::Params({{"mu", 0.3}}));
+  s.world.remove_friction("ball", "floor");
+  EXPECT_THROW(s.world.remove_friction("ball", "floor"), deform::Error);
+  s.world.filter_pair("ball", "floor", false);
+  s.world.remove_filter("floor", "ball");
+  EXPECT_THROW(s.world.remove_filter("floor", "ball"), deform::Error);
 }
 
 TEST(Hpp, Snapshot_RestoresTheSameBits) {

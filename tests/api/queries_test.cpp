@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <map>
 
+#include "obstacle.h"
 #include "stack.h"
 
 namespace {
@@ -118,6 +119,60 @@ TEST(Ray, MeetsBodiesByTriangleAndTheNearestThingWins) {
   expect(ray(s.world, {-1, 0.05, 0.05}, {1, 0, 0}), 1, {0, 0.05, 0.05}, {-1, 0, 0}, "side of the lower cube");
   EXPECT_EQ(ray(s.world, {-1, 0.05, 0.05}, {1, 0, -0.2}).raw.obstacle, s.floor);
   expect_nothing(ray(s.world, {-1, 0.05, 5}, {1, 0, 0}), "over all");
+}
+
+TEST(Ray, FromInsideOfTriangles_MeetsWhereItLeavesThem) {
+  test::Context c;
+  const dfm_world w = test::make_world(c);
+  test::BodyOptions o;
+  o.name = "cube";
+  o.position = {1, 1, 1};
+  const dfm_body body = test::make_body(c, w, "beam", {0.1, 0.1, 0.1}, 60, o);
+  const Hit out = ray(w, {1.04, 1.03, 1.02}, {0, 0, 1});
+  expect(out, 0.08, {1.04, 1.03, 1.1}, {0, 0, 1}, "a body's face, from behind");
+  EXPECT_EQ(out.raw.body, body);
+  const test::Triangles box = test::box_surface({0.1, 0.2, 0.3}, 4);
+  for (const uint32_t shape : {uint32_t(DFM_SHAPE_MESH), uint32_t(DFM_SHAPE_VOXELS)}) {
+    dfm_obstacle_def d = test::mesh_def(shape == DFM_SHAPE_MESH ? "mesh" : "voxels", box, shape, 8000);
+    d.pose.position[0] = shape == DFM_SHAPE_MESH ? 5 : 8;
+    for (size_t k = 0; k < 4; ++k) d.pose.rotation[k] = kQuarterX[k];  // half sizes: x 0.1, y 0.3, z 0.2
+    dfm_obstacle ob = 0;
+    test::ok(dfm_obstacle_create(w, &d, &ob));
+    const double x = d.pose.position[0];
+    const Hit inside = ray(w, {x + 0.03, 0.04, 0.05}, {0, 1, 0});
+    expect(inside, 0.26, {x + 0.03, 0.3, 0.05}, {0, 1, 0}, d.name);
+    EXPECT_EQ(inside.raw.obstacle, ob);
+    EXPECT_EQ(inside.raw.body, 0u);
+    expect(ray(w, {x + 0.03, 0.04, 2}, {0, 0, -1}), 1.8, {x + 0.03, 0.04, 0.2}, {0, 0, 1}, "from outside");
+    expect_nothing(ray(w, {x + 0.11, 0.04, 2}, {0, 0, -1}, 5), "past it");
+  }
+}
+
+TEST(Ray, InThePlaneOfAFace_MeetsTheFaceAcrossItsWay) {
+  test::Context c;
+  const dfm_world w = test::make_world(c);
+  test::BodyOptions o;
+  o.name = "cube";
+  test::make_body(c, w, "beam", {0.5, 0.5, 0.5}, 60, o);
+  expect(ray(w, {-1, 0.25, 0.5}, {1, 0, 0}), 1, {0, 0.25, 0.5}, {-1, 0, 0}, "along the upper face");
+  expect(ray(w, {-1, 0, 0}, {1, 0, 0}), 1, {0, 0, 0}, {-1, 0, 0}, "along an edge");
+  expect_nothing(ray(w, {-1, 0.25, 0.5000001}, {1, 0, 0}), "just above it");
+}
+
+TEST(Ray, OfAnyScale_MeetsTheSamePoint) {
+  test::Context c;
+  const test::Stack s = test::make_stack(c);
+  const Hit near = ray(s.world, {0.06, 0.05, 5}, {0, 0, -1});
+  EXPECT_EQ(ray(s.world, {0.06, 0.05, 5}, {0, 0, -1e-100}).distance, near.distance) << "a short direction";
+  EXPECT_EQ(ray(s.world, {0.06, 0.05, 5}, {0, 0, -1}, INFINITY).distance, near.distance);
+  EXPECT_EQ(ray(s.world, {0.06, 0.05, 5}, {0, 0, -1}, near.distance).raw.body, s.upper)
+      << "up to and with it";
+  EXPECT_EQ(ray(s.world, {0.06, 0.05, 1e6}, {0, 0, -1}, INFINITY).raw.body, s.upper) << "from far away";
+  expect_nothing(ray(s.world, {1e6, 0.05, 5}, {1, 0, 1e-320}, INFINITY), "away, almost along an axis");
+  dfm_ray_hit h{};
+  const double far[3] = {0.06, 0.05, 1e6};
+  test::ok(dfm_world_closest(s.world, far, INFINITY, &h));
+  EXPECT_EQ(h.body, s.upper);
 }
 
 TEST(Closest, PointOfABody_OnFaceEdgeAndCorner) {

@@ -319,7 +319,8 @@ void set_rigid_state(Obstacle &o, const dfm_rigid_state &given) {
   s.rotation[3] = q.w;
   for (auto &shape : o.world->obstacles)
     if (shape->rigid == &set && shape->rigid_body == o.rigid_body) shape->pose = shape_pose(*shape, s);
-  o.world->changed = true;
+  ++o.world->placements;
+  values_changed(*o.world);
 }
 
 namespace {

@@ -4,6 +4,7 @@
 
 #include "inside.h"
 #include "obstacle.h"
+#include "rigid.h"
 #include "stack.h"
 #include "world/context.h"
 
@@ -123,6 +124,17 @@ TEST(Changes, OfGravityPosesAndParameters_MakeNoTableAndNoPlan) {
   const dfm_param_value value{"young", &young, 1};
   const dfm_params params{sizeof params, 1, &value};
   EXPECT_EQ(r.after([&] { test::ok(dfm_body_set_params(r.stack.upper, &params)); }), kNothing);
+}
+
+TEST(Changes, OfTheStateOfARigidBody_MakeNoTableAndNoPlan) {
+  Running r;
+  const dfm_rigid arm = test::create(r.stack.world, {test::box("arm", {0.2, 0.02, 0.02}, 0.5, {3, 0, 1})})[0];
+  r.step();
+  dfm_rigid_state state{};
+  test::ok(dfm_rigid_get_state(arm, &state));
+  state.position[0] = 0.05;
+  state.position[2] = 0.4;
+  EXPECT_EQ(r.after([&] { test::ok(dfm_rigid_set_state(arm, &state)); }), kNothing);
 }
 
 TEST(Changes, OfGravityKeys_MakeThePlanWhereTheyComeOrGo) {
