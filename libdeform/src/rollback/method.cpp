@@ -31,15 +31,20 @@ StageChoice no_self(const SceneFacts &f) { return touches(f) ? StageChoice{} : w
 
 std::string candidates_again(const World &) { return "candidate pairs, again while any is tied"; }
 
+bool lagged_friction(World &w, StepContext &step, uint32_t *) {
+  stage_lagged(w, step);
+  return true;
+}
+
 // Rows without a function tell why a stage of the method velocity is not there.
 constexpr Stage kTable[] = {
-    {"motion", always<stage_motion>, cost::prescribed, when::motion},
-    {"model", stage_model, cost::cells, when::model},
-    {"predict", predict_and_watch, cost::points, when::predict},
+    {"motion", row::motion, cost::prescribed, when::motion},
+    {"model", row::model, cost::cells, when::model},
+    {"predict", row::predict, cost::points, when::predict},
     {"rigid predict", nullptr, nullptr, when::rigid_predict},
     {"gather", nullptr, nullptr, when::gather},
-    {"lagged friction", always<stage_lagged>, cost::points, when_lagged},
-    {"broad", always<stage_broad>, cost::surfels_and_triangles, when::broad, StageRole::lists_pairs},
+    {"lagged friction", lagged_friction, cost::points, when_lagged},
+    {"broad", row::broad, cost::surfels_and_triangles, when::broad, StageRole::lists_pairs},
     {"rollback", stage_rollback, candidates_again, when_rollback, StageRole::solves},
     {"narrow", nullptr, nullptr, replaced},
     {"self contact", nullptr, nullptr, no_self},

@@ -8,11 +8,6 @@
 
 namespace dfm {
 
-void stage_distribute(StepContext &step) {
-  step.ended = false;
-  distribute(step.contacts, step.rows.frame.data(), step.rows.impulse.data(), step.sinks);
-}
-
 bool find_ends(World &w, StepContext &step, uint32_t *trouble) {
   const SubStep now = sub_step_of(w, step);
   const bool touched = w.plan.has(StageRole::gives_impulses) && step.rows.n > 0;

@@ -18,6 +18,7 @@
 #include "world/islands.h"
 #include "world/method.h"
 #include "world/self_contact.h"
+#include "world/stages.h"
 #include "world/world.h"
 
 namespace dfm {
@@ -45,8 +46,6 @@ struct StepContext {
   std::vector<std::unique_ptr<SelfBody>> self_bodies;  // in id order; those that may touch themselves
 
   // motion
-  struct Driven { double *velocity, before; };
-  // held components that this sub-step's motion stage has set
   Array<Driven> driven;
   // predict
   Array<double> free_kinetic;  // [bodies] J, without contact; of this sub-step

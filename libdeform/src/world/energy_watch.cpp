@@ -44,7 +44,7 @@ struct Look {
 // counts for half of the way of the one before, and, where `now`, for half of this one's.
 double work_of_holders(const World &w, const StepContext &step, const Body &b, bool now) {
   double sum = 0;
-  for (const StepContext::Driven &d : step.driven) {
+  for (const Driven &d : step.driven) {
     if (d.velocity < b.p.v.data() || d.velocity >= b.p.v.data() + b.p.v.size()) continue;
     const size_t at = size_t(d.velocity - b.p.v.data());
     const double force = b.p.f[at] + b.p.mass[at / kStride] * w.gravity.now[int(at % kStride)];

@@ -16,14 +16,12 @@ SubStep sub_step_of(const World &w, const StepContext &step) {
   return {w.time, step.h, w.gravity.now, kLight};
 }
 
-bool stage_model(World &w, StepContext &step, uint32_t *trouble) {
-  const SubStep now = sub_step_of(w, step);
+bool stage_model(World &w, Active active, const SubStep &now, uint32_t *trouble) {
   FirstFailure failed;
-  w.context->tasks.parallel_for(static_cast<uint32_t>(step.active.size()), 1,
-                                [&](uint32_t begin, uint32_t end) {
-                                  for (const uint32_t i : std::span(step.active).subspan(begin, end - begin))
-                                    if (!w.bodies[i]->dynamics->add_forces(now)) failed.note(i);
-                                });
+  w.context->tasks.parallel_for(static_cast<uint32_t>(active.size()), 1, [&](uint32_t begin, uint32_t end) {
+    for (const uint32_t i : active.subspan(begin, end - begin))
+      if (!w.bodies[i]->dynamics->add_forces(now)) failed.note(i);
+  });
   if (failed.body == kNone) return true;
   *trouble |= DFM_TROUBLE_PLUGIN;
   const Body &b = *w.bodies[failed.body];
@@ -34,19 +32,17 @@ bool stage_model(World &w, StepContext &step, uint32_t *trouble) {
   return false;
 }
 
-bool stage_predict(World &w, StepContext &step, uint32_t *trouble) {
+bool stage_predict(World &w, Active active, const SubStep &now, Array<double> &kinetic, uint32_t *trouble) {
   const bool touches = w.plan.touches();
-  const SubStep now = sub_step_of(w, step);
   FirstFailure failed;
-  w.context->tasks.parallel_for(
-      static_cast<uint32_t>(step.active.size()), 1, [&](uint32_t begin, uint32_t end) {
-        for (const uint32_t i : std::span(step.active).subspan(begin, end - begin)) {
-          Body &b = *w.bodies[i];
-          if (!b.dynamics->free_motion(now, step.free_kinetic[i])) failed.note(i);
-          if (touches && b.surface.identity())
-            gather_surface(b.surface, b.p.x.data(), b.dynamics->point_velocity());
-        }
-      });
+  w.context->tasks.parallel_for(static_cast<uint32_t>(active.size()), 1, [&](uint32_t begin, uint32_t end) {
+    for (const uint32_t i : active.subspan(begin, end - begin)) {
+      Body &b = *w.bodies[i];
+      if (!b.dynamics->free_motion(now, kinetic[i])) failed.note(i);
+      if (touches && b.surface.identity())
+        gather_surface(b.surface, b.p.x.data(), b.dynamics->point_velocity());
+    }
+  });
   if (failed.body == kNone) return true;
   const Body &b = *w.bodies[failed.body];
   *trouble |= DFM_TROUBLE_NONFINITE;
@@ -65,8 +61,8 @@ bool stage_predict(World &w, StepContext &step, uint32_t *trouble) {
 
 // Surfels that hang on several phyxels: rows of N are independent of each other, so they are cut
 // among the threads.
-void stage_gather(World &w, StepContext &step) {
-  for (const uint32_t i : step.active) {
+void stage_gather(World &w, Active active) {
+  for (const uint32_t i : active) {
     const auto &b = w.bodies[i];
     if (b->surface.identity()) continue;
     const double *const v = b->dynamics->point_velocity();
@@ -76,11 +72,12 @@ void stage_gather(World &w, StepContext &step) {
   }
 }
 
-void stage_broad(World &w, StepContext &step) {
+void stage_broad(std::span<const BodyView> bodies, std::span<const ObstacleView> obstacles,
+                 const PairFilter &filter, double h, double offset, BroadPhase &out) {
   try {
-    step.broad.update(step.body_views, step.obstacle_views, w.pairs.filter, step.h, w.offset);
+    out.update(bodies, obstacles, filter, h, offset);
   } catch (...) {
-    step.broad.clear();  // out of memory half way through its lists: they are made anew next time
+    out.clear();  // out of memory half way through its lists: they are made anew next time
     throw;
   }
 }

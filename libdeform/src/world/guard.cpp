@@ -232,7 +232,7 @@ bool stage_guard(World &w, StepContext &step, uint32_t *trouble) {
     // a host may have it solved once more
     if (!solved || (!w.rigid_sets.empty() && !stage_rigid_commit(w, step, trouble))) return false;
     ++w.stats.guard_solves;
-    stage_distribute(step);
+    row::distribute(w, step, trouble);
   }
   if (step.guard.pieces < kCuts && !spares(step, Thrift::pieces)) {
     ++step.guard.pieces;

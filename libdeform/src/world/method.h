@@ -25,13 +25,6 @@ struct Stage {
   StageRole role = StageRole::none;
 };
 
-// A stage that cannot fail, as a row has it.
-template <auto function>
-bool always(World &w, StepContext &step, uint32_t *) {
-  function(w, step);
-  return true;
-}
-
 // What a method may be unable to do.
 enum class Ability {
   self_stepping,  // models that step themselves

@@ -28,10 +28,12 @@ bool stage_narrow(World &w, StepContext &step, uint32_t *trouble) {
     {
       const Restored all{w};
       step.active.swap(step.woken);
-      if (!stage_model(w, step, trouble) || !stage_predict(w, step, trouble)) return false;
-      stage_gather(w, step);
+      const SubStep now = sub_step_of(w, step);
+      if (!stage_model(w, step.active, now, trouble)) return false;
+      if (!stage_predict(w, step.active, now, step.free_kinetic, trouble)) return false;
+      stage_gather(w, step.active);
     }
-    stage_broad(w, step);
+    row::broad(w, step, trouble);
   }
 }
 

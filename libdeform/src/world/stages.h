@@ -7,6 +7,7 @@
 #include <span>
 
 #include "deform/world.h"
+#include "broad/broad_phase.h"
 #include "dynamics/dynamics.h"
 #include "plan/plan.h"
 
@@ -26,21 +27,37 @@ void prepare(World &w, const RestoredChoice *restored = nullptr);
 void values_changed(World &w);
 void set_gravity_now(World &w);  // from what is prescribed, at the present time
 dfm_status run_step(World &w, StepContext &step, double dt, uint32_t *trouble);
-void undo_motion(StepContext &step);  // held velocities as before stage_motion()
 
-void stage_motion(World &w, StepContext &step);
-bool stage_model(World &w, StepContext &step, uint32_t *trouble);
-bool stage_predict(World &w, StepContext &step, uint32_t *trouble);
-bool predict_and_watch(World &w, StepContext &step, uint32_t *trouble);    // as a row of a table: step.cpp
+// The rows of the table: what a stage reads and writes of world and context stands in step.cpp.
+namespace row {
+bool motion(World &w, StepContext &step, uint32_t *trouble);
+bool model(World &w, StepContext &step, uint32_t *trouble);
+bool predict(World &w, StepContext &step, uint32_t *trouble);
+bool gather(World &w, StepContext &step, uint32_t *trouble);
+bool broad(World &w, StepContext &step, uint32_t *trouble);
+bool self(World &w, StepContext &step, uint32_t *trouble);
+bool distribute(World &w, StepContext &step, uint32_t *trouble);
+bool sleep(World &w, StepContext &step, uint32_t *trouble);
+}  // namespace row
+
+using Active = std::span<const uint32_t>;  // slots of the bodies that stages work on, ascending
+// A held component of a velocity that this sub-step has set.
+struct Driven { double *velocity, before; };
+
+void stage_motion(World &w, double h, Array<Driven> &driven);
+void undo_motion(Array<Driven> &driven);  // held velocities as before stage_motion()
+bool stage_model(World &w, Active active, const SubStep &now, uint32_t *trouble);
+// kinetic: [bodies] J, of the active ones, out.
+bool stage_predict(World &w, Active active, const SubStep &now, Array<double> &kinetic, uint32_t *trouble);
 bool stage_rigid_predict(World &w, StepContext &step, uint32_t *trouble);  // rigid.cpp
-void stage_gather(World &w, StepContext &step);
-void stage_broad(World &w, StepContext &step);
+void stage_gather(World &w, Active active);
+void stage_broad(std::span<const BodyView> bodies, std::span<const ObstacleView> obstacles,
+                 const PairFilter &filter, double h, double offset, BroadPhase &out);
 bool stage_narrow(World &w, StepContext &step, uint32_t *trouble);  // narrow.cpp
 void stage_self(World &w, StepContext &step);                       // self_contact.cpp
 bool stage_solve(World &w, StepContext &step, uint32_t *trouble);   // solve.cpp
 // rigid.cpp: ends beside the present states, kept by keep_rigids()
 bool stage_rigid_commit(World &w, StepContext &step, uint32_t *trouble);
-void stage_distribute(StepContext &step);
 bool stage_guard(World &w, StepContext &step, uint32_t *trouble);  // guard.cpp
 bool stage_commit(World &w, StepContext &step, uint32_t *trouble);
 void stage_sleep(World &w, StepContext &step);  // sleep.cpp

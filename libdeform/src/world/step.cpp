@@ -27,26 +27,21 @@
 namespace dfm {
 namespace {
 
-bool distribute_all(World &, StepContext &step, uint32_t *) {
-  stage_distribute(step);
-  return true;
-}
-
 constexpr Stage kTable[] = {
-    {"motion", always<stage_motion>, cost::prescribed, when::motion},
-    {"model", stage_model, cost::cells, when::model},
-    {"predict", predict_and_watch, cost::points, when::predict},
+    {"motion", row::motion, cost::prescribed, when::motion},
+    {"model", row::model, cost::cells, when::model},
+    {"predict", row::predict, cost::points, when::predict},
     {"rigid predict", stage_rigid_predict, cost::rigid_states, when::rigid_predict},
-    {"gather", always<stage_gather>, cost::weights, when::gather},
-    {"broad", always<stage_broad>, cost::surfels_and_triangles, when::broad, StageRole::lists_pairs},
+    {"gather", row::gather, cost::weights, when::gather},
+    {"broad", row::broad, cost::surfels_and_triangles, when::broad, StageRole::lists_pairs},
     {"narrow", stage_narrow, cost::candidates, when::narrow, StageRole::finds_contacts},
-    {"self contact", always<stage_self>, cost::self_surfels, when::self},
+    {"self contact", row::self, cost::self_surfels, when::self},
     {"contact+friction", stage_solve, cost::contacts_and_sweeps, when::solve, StageRole::solves},
     {"rigid commit", stage_rigid_commit, cost::rigid_states, when::rigid_commit},
-    {"distribute", distribute_all, cost::contacts_and_surfels, when::distribute, StageRole::gives_impulses},
+    {"distribute", row::distribute, cost::contacts_and_surfels, when::distribute, StageRole::gives_impulses},
     {"guard", stage_guard, cost::candidates_near, when::guard, StageRole::guards},
     {"commit", stage_commit, cost::points, when::commit},
-    {"sleep", always<stage_sleep>, cost::awake, when::sleep},
+    {"sleep", row::sleep, cost::awake, when::sleep},
 };
 constexpr ContactMethod kVelocity{"velocity", kTable};
 
@@ -77,9 +72,42 @@ bool sub_step(World &w, StepContext &step, uint32_t *trouble);
 
 const ContactMethod &velocity_method() { return kVelocity; }
 
-bool predict_and_watch(World &w, StepContext &step, uint32_t *trouble) {
-  return stage_predict(w, step, trouble) && watch_energy(w, step, trouble);
+namespace row {
+
+bool motion(World &w, StepContext &step, uint32_t *) {
+  stage_motion(w, step.h, step.driven);
+  return true;
 }
+bool model(World &w, StepContext &step, uint32_t *trouble) {
+  return stage_model(w, step.active, sub_step_of(w, step), trouble);
+}
+bool predict(World &w, StepContext &step, uint32_t *trouble) {
+  return stage_predict(w, step.active, sub_step_of(w, step), step.free_kinetic, trouble) &&
+         watch_energy(w, step, trouble);
+}
+bool gather(World &w, StepContext &step, uint32_t *) {
+  stage_gather(w, step.active);
+  return true;
+}
+bool broad(World &w, StepContext &step, uint32_t *) {
+  stage_broad(step.body_views, step.obstacle_views, w.pairs.filter, step.h, w.offset, step.broad);
+  return true;
+}
+bool self(World &w, StepContext &step, uint32_t *) {
+  stage_self(w, step);
+  return true;
+}
+bool distribute(World &, StepContext &step, uint32_t *) {
+  step.ended = false;
+  dfm::distribute(step.contacts, step.rows.frame.data(), step.rows.impulse.data(), step.sinks);
+  return true;
+}
+bool sleep(World &w, StepContext &step, uint32_t *) {
+  stage_sleep(w, step);
+  return true;
+}
+
+}  // namespace row
 
 dfm_status run_step(World &w, StepContext &step, double dt, uint32_t *trouble) {
   prepare(w);
@@ -202,7 +230,7 @@ bool sub_step(World &w, StepContext &step, uint32_t *trouble) {
     StepContext &step;
     bool kept = false;
     ~Undo() {
-      if (!kept) undo_motion(step);
+      if (!kept) undo_motion(step.driven);
     }
   } undo{w, step};
   step.driven.clear();
