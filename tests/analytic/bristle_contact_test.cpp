@@ -125,7 +125,7 @@ TEST(BristleContact, PulledOverASoftMesh_NoAreaIsOwnedTwice) {
       if (c.body_b == 0 || !(c.fn > 0)) continue;
       sum += c.area;
       EXPECT_LT(std::fabs(bristle(c)[0]), 1.05 * x + 1e-5);
-      if (c.kind == 0 && c.body_a == r.block) {
+      if (c.kind == DFM_CONTACT_VERTEX_FACE && c.body_a == r.block) {
         EXPECT_EQ(seen[c.feature_a]++, 0);
       }
     }
@@ -209,7 +209,7 @@ TEST(BristleContact, TwoPadsOfTwoRefinements_RestOnTheSameArea) {
     run(world, 0.9, 1e-3);
     double force = 0, area = 0;
     for (const dfm_contact &c : contacts(world)) {
-      if (c.kind == 2 || !(c.fn > 0)) continue;
+      if (c.kind == DFM_CONTACT_PRIMITIVE || !(c.fn > 0)) continue;
       const double side = c.body_a == block ? 1 : -1, x = side * bristle(c)[0];
       force += kSigma0 * c.area * x;
       area += c.area;

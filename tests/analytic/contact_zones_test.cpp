@@ -169,7 +169,7 @@ struct Crossing {
   std::map<uint32_t, dfm_contact> corners() const {
     std::map<uint32_t, dfm_contact> out;
     for (const dfm_contact &c : test::contacts(world))
-      if (c.body_a == block && c.kind == 0) out[c.feature_a] = c;
+      if (c.body_a == block && c.kind == DFM_CONTACT_VERTEX_FACE) out[c.feature_a] = c;
     return out;
   }
 };

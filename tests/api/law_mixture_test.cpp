@@ -48,7 +48,8 @@ TEST(LawMixture, ContactsWithoutMemory_KeepNone) {
   for (int k = 0; k < 40; ++k) {
     m.run(10);
     for (const dfm_contact &c : test::contacts(m.world)) {
-      const bool floor = c.body_a == m.lower && c.body_b != m.upper && c.body_b != m.lower && c.kind == 2;
+      const bool floor = c.body_a == m.lower && c.body_b != m.upper && c.body_b != m.lower &&
+                         c.kind == DFM_CONTACT_PRIMITIVE;
       if (floor) {
         EXPECT_EQ(std::fabs(c.bristle[0]) + std::fabs(c.bristle[1]), 0) << k;
       }

@@ -207,7 +207,7 @@ TEST(Rollback, EdgeAgainstEdge_GoesBackToo) {
   EXPECT_NEAR(state(b).x[2][2], 0.9, 1e-12);
   EXPECT_EQ(state(a).x[0][2], 0);
   ASSERT_EQ(test::contacts(s.world).size(), 1u);
-  EXPECT_EQ(test::contacts(s.world)[0].kind, 1u);
+  EXPECT_EQ(test::contacts(s.world)[0].kind, uint32_t{DFM_CONTACT_EDGE_EDGE});
 }
 
 // A vertex that goes back stands in the way of one that does not: they are tied, and the second
