@@ -12,8 +12,9 @@ Obstacle &rigid_of(dfm_rigid h) {
   Obstacle &o = obstacle_of(h);
   if (!o.rigid)
     fail(DFM_E_HANDLE,
-         "handle 0x%llx is that of obstacle '%s', which feels nothing, and a rigid body is wanted; pass the "
-         "other handle",
+         "rigid body handle 0x%llx is that of obstacle '%s', which is no rigid body and feels nothing; pass "
+         "the "
+         "handle of a rigid body",
          static_cast<unsigned long long>(h), o.name.c_str());
   return o;
 }

@@ -211,8 +211,7 @@ dfm_status dfm_world_interrupt(dfm_world world) {
   if (uint8_t(world >> 32) != uint8_t(Kind::world))
     return guard([&] {
       fail(DFM_E_HANDLE,
-           "handle 0x%llx is not that of a world and a world is wanted; pass the handle of the world to "
-           "interrupt",
+           "world handle 0x%llx is not that of a world; pass the handle of the world to interrupt",
            static_cast<unsigned long long>(world));
     });
   return request_stop(world) ? DFM_OK : guard([] {

@@ -2,6 +2,7 @@
 
 #include <mutex>
 #include <shared_mutex>
+#include <string>
 #include <vector>
 
 #include "core/error.h"
@@ -28,17 +29,22 @@ Table &table() {
 
 const char *kind_name(Kind kind) {
   switch (kind) {
-    case Kind::world: return "a world";
-    case Kind::body: return "a body";
-    case Kind::obstacle: return "an obstacle";
-    case Kind::material: return "a material";
-    case Kind::law: return "a law";
-    case Kind::scene: return "a scene";
-    case Kind::tetmesh: return "a mesh";
-    case Kind::trimesh: return "a surface mesh";
+    case Kind::world: return "world";
+    case Kind::body: return "body";
+    case Kind::obstacle: return "obstacle";
+    case Kind::material: return "material";
+    case Kind::law: return "law";
+    case Kind::scene: return "scene";
+    case Kind::tetmesh: return "mesh";
+    case Kind::trimesh: return "surface mesh";
     case Kind::none: break;
   }
-  return "an object";
+  return "object";
+}
+
+// With its article.
+std::string a_kind(Kind kind) {
+  return std::string(kind == Kind::obstacle || kind == Kind::none ? "an " : "a ") + kind_name(kind);
 }
 
 // The slot that the handle names, or an empty one for a null, stale or made-up handle.
@@ -101,17 +107,15 @@ void *handle_require(Kind kind, uint64_t handle) {
   const unsigned long long value = handle;
   const char *const wanted = kind_name(kind);
   if (handle == 0)
-    fail(DFM_E_HANDLE, "handle 0x0 is null and %s is wanted; pass what a create or find function gave",
-         wanted);
+    fail(DFM_E_HANDLE, "%s handle 0x0 is null; pass what a create or find function gave", wanted);
   if (slot.object)
-    fail(DFM_E_HANDLE, "handle 0x%llx is that of %s and %s is wanted; pass the other handle", value,
-         kind_name(slot.kind), wanted);
+    fail(DFM_E_HANDLE, "%s handle 0x%llx is that of %s; pass the handle of %s", wanted, value,
+         a_kind(slot.kind).c_str(), a_kind(kind).c_str());
   if (uint8_t(handle >> 32) == uint8_t(kind))
-    fail(DFM_E_HANDLE, "handle 0x%llx is stale and %s is wanted; keep handles only while their object lives",
-         value, wanted);
-  fail(DFM_E_HANDLE,
-       "handle 0x%llx refers to nothing and %s is wanted; pass what a create or find function gave", value,
-       wanted);
+    fail(DFM_E_HANDLE, "%s handle 0x%llx is stale; keep handles only while their object lives", wanted,
+         value);
+  fail(DFM_E_HANDLE, "%s handle 0x%llx refers to nothing; pass what a create or find function gave", wanted,
+       value);
 }
 
 }  // namespace dfm
