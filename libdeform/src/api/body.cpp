@@ -12,6 +12,7 @@
 #include "world/context.h"
 #include "world/method.h"
 #include "world/stages.h"
+#include "world/energy_watch.h"
 
 using namespace dfm;
 

@@ -9,6 +9,7 @@
 #include "world/measure.h"
 #include "world/context.h"
 #include "world/stages.h"
+#include "world/step_impulses.h"
 
 using namespace dfm;
 

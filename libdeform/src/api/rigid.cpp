@@ -3,6 +3,7 @@
 #include "api/objects.h"
 #include "world/context.h"
 #include "world/stages.h"
+#include "world/rigid.h"
 
 using namespace dfm;
 

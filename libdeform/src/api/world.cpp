@@ -10,6 +10,7 @@
 #include "world/step_bound.h"
 #include "world/context.h"
 #include "world/stages.h"
+#include "world/snapshot.h"
 
 using namespace dfm;
 

@@ -5,6 +5,8 @@
 #include "world/context.h"
 #include "world/first_failure.h"
 #include "world/stages.h"
+#include "world/energy_watch.h"
+#include "world/step_impulses.h"
 
 namespace dfm {
 

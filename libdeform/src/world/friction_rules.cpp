@@ -12,6 +12,7 @@
 #include "world/method.h"
 #include "world/stages.h"
 #include "world/world.h"
+#include "world/pair_table.h"
 
 namespace dfm {
 namespace {

@@ -6,6 +6,7 @@
 #include "world/context.h"
 #include "world/stages.h"
 #include "world/world.h"
+#include "world/step_impulses.h"
 
 namespace dfm {
 

@@ -1,6 +1,7 @@
 #include "world/move_obstacles.h"
 
 #include "world/context.h"
+#include "world/rigid.h"
 
 namespace dfm {
 

@@ -10,6 +10,7 @@
 #include "world/context.h"
 #include "world/stages.h"
 #include "world/world.h"
+#include "world/pair_table.h"
 
 namespace dfm {
 namespace {

@@ -5,22 +5,14 @@
 #include <span>
 #include <vector>
 
-#include "broad/pair_filter.h"
 #include "friction/laws.h"
 #include "surfel/contact_set.h"
+#include "world/pair_tables.h"
 
 namespace dfm {
 
 struct FrictionRule;
 struct World;
-
-struct PairTables {
-  std::vector<uint32_t> law;  // [body][body or obstacle] -> index into World::laws
-  // as law -> first in zone_law [zone a][zone b], kNone: the pair has one law; empty: all have
-  std::vector<uint32_t> zone_table, zone_law;
-  PairFilter filter;
-  std::vector<LawInstance *> laws;
-};
 
 // Index of the law with these values: one that is there, else a new one, in a place that `free` marks or
 // behind the others.

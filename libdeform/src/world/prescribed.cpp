@@ -1,6 +1,7 @@
 // What is prescribed over time: gravity, loads, springs, the ways of held points.
 #include "world/spring.h"
 #include "world/stages.h"
+#include "world/energy_watch.h"
 
 namespace dfm {
 

@@ -4,20 +4,10 @@
 #include <cstdint>
 #include <vector>
 
-#include "math/vec3.h"
-#include "world/step_bound.h"
-
 namespace dfm {
 
 struct World;
 struct SnapshotField;
-
-// What prepare() would choose anew and a restored world keeps: it was chosen at a state that is past.
-struct RestoredChoice {
-  Vec3 gravity;
-  WorldBound bound;
-  double offset;
-};
 
 uint64_t world_hash(const World &w);
 // map: where each field lies, for tests; may be null.

@@ -14,6 +14,8 @@
 #include "world/context.h"
 #include "world/stages.h"
 #include "world/world.h"
+#include "world/pair_table.h"
+#include "world/rigid.h"
 
 namespace dfm {
 namespace {

@@ -9,16 +9,23 @@
 #include "deform/world.h"
 #include "broad/broad_phase.h"
 #include "dynamics/dynamics.h"
+#include "math/vec3.h"
 #include "plan/plan.h"
+#include "world/world_bound.h"
 
 namespace dfm {
 
 struct Body;
 struct LawInstance;
-struct RestoredChoice;
 struct StepContext;
 struct World;
 
+// What prepare() would choose anew and a restored world keeps: it was chosen at a state that is past.
+struct RestoredChoice {
+  Vec3 gravity;
+  WorldBound bound;
+  double offset;
+};
 // Plan, pair tables, offset, views of the entities; where nothing has changed it does nothing. Throws Error.
 void prepare(World &w, const RestoredChoice *restored = nullptr);
 // After a change of values that no table depends on: loads, motions, gravity, parameters of a model or of

@@ -23,6 +23,9 @@
 #include "world/stages.h"
 #include "world/bounds.h"
 #include "world/world.h"
+#include "world/energy_watch.h"
+#include "world/overlap.h"
+#include "world/step_impulses.h"
 
 namespace dfm {
 namespace {

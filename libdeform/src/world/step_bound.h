@@ -1,22 +1,10 @@
 // The bound of the step: the longest sub-step at which no mode of any body grows (doc/concepts/step.md).
 #pragma once
-#include <cstdint>
-
-#include "surfel/surface.h"
+#include "world/world_bound.h"
 
 namespace dfm {
 
-struct Body;
 struct World;
-
-// The step bound as it was last asked for.
-struct WorldBound {
-  double step = 0;        // s, 0.9 of the bound
-  uint32_t age = kNone;   // sub-steps since then; kNone: ask before the next step
-  uint32_t inverted = 0;  // cells inside out
-  Body *body = nullptr;   // that bounds the step, by its
-  uint32_t point = 0;
-};
 
 bool bound_due(const World &w);  // does the next sub-step ask for it?
 void update_bound(World &w);     // w.bound

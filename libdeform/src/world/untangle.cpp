@@ -11,6 +11,7 @@
 #include "world/context.h"
 #include "world/stages.h"
 #include "world/world.h"
+#include "world/energy_watch.h"
 
 namespace dfm {
 namespace {

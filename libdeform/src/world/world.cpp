@@ -9,6 +9,10 @@
 #include "core/error.h"
 #include "friction/pair_rules.h"
 #include "world/bounds.h"
+#include "world/energy_watch.h"
+#include "world/overlap.h"
+#include "world/pair_table.h"
+#include "world/rigid.h"
 
 namespace dfm {
 

@@ -7,6 +7,7 @@
 #include "rigid.h"
 #include "stack.h"
 #include "world/context.h"
+#include "world/pair_table.h"
 
 namespace {
 

@@ -10,6 +10,7 @@
 #include "inside.h"
 #include "rigid.h"
 #include "sealed_snapshot.h"
+#include "world/snapshot.h"
 
 namespace {
 
