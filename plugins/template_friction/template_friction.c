@@ -1,8 +1,6 @@
 /* A friction law to copy and edit: an elastic bristle z that yields on the friction cone (radial return; Simo
- * and Hughes 1998, box 1.4).
- *   z <- z on the cone of the new normal force;   t = z + h v;
- *   z' = t, or where k |t| > mu fn the point of the cone beside it;   ft = -k z'
- */
+ * and Hughes 1998, box 1.4). z <- z on the cone of the new normal force; t = z + h v;
+ * z' = t, or where k |t| > mu fn the point of the cone beside it; ft = -k z'. */
 #include <math.h>
 #include <deform/plugin.h>
 
@@ -16,21 +14,15 @@ static dfm_status eval(const dfm_friction_in *in, dfm_friction_out *out) {
   /* column c of contact i is at [c * s + i]; outputs that are NULL are not wanted */
   const size_t s = in->stride;
   for (size_t i = 0; i < in->n; ++i) {
-    const double h = in->dt;
-    const double mu = in->params[0];
-    const double k = in->params[1] * in->area[i];
-    const double cone = in->fn[i] < 0 ? 0 : mu * in->fn[i];
-    double z[2] = {in->state[i], in->state[s + i]}, t[2];
-    /* written so that a NaN stays one */
-    const double held = k * length(z), onto = held <= cone ? 1 : cone / held;
-    for (int a = 0; a < 2; ++a) {
-      z[a] *= onto;
-      t[a] = z[a] + h * in->vt[a * s + i];
-    }
+    const double h = in->dt, mu = in->params[0];
+    const double k = in->params[1] * in->area[i], cone = in->fn[i] < 0 ? 0 : mu * in->fn[i];
+    double z[2] = {in->state[i], in->state[s + i]};
+    const double held = k * length(z), onto = held <= cone ? 1 : cone / held; /* a NaN stays one */
+    for (int a = 0; a < 2; ++a) z[a] *= onto;
+    const double t[2] = {z[0] + h * in->vt[i], z[1] + h * in->vt[s + i]};
     const double trial = k * length(t), share = trial <= cone ? 1 : cone / trial;
     for (int a = 0; a < 2; ++a) {
-      /* of the force k z', by fn and by v */
-      double by_fn = share < 1 ? mu * k * t[a] / trial : 0;
+      double by_fn = share < 1 ? mu * k * t[a] / trial : 0; /* of k z', by fn; below, by v */
       for (int b = 0; b < 2; ++b) {
         const double turn = share * ((a == b) - (share < 1 ? t[a] * t[b] * k * k / (trial * trial) : 0));
         if (onto < 1 && cone > 0) by_fn += turn * mu * k * z[b] / cone;
@@ -47,37 +39,21 @@ static dfm_status eval(const dfm_friction_in *in, dfm_friction_out *out) {
   return DFM_OK;
 }
 
-/* the host keeps it, turns it, drops it on lift-off */
-static const dfm_slot state[] = {{DFM_PER_CONTACT, 2, DFM_SLOT_TANGENT, 0}};
-static const dfm_friction law = {sizeof law,
-                                 DFM_NEED_FN | DFM_NEED_VT | DFM_NEED_AREA,
-                                 DFM_FRIC_ISOTROPIC | DFM_FRIC_PASSIVE | DFM_FRIC_JACOBIAN,
-                                 1,
-                                 state,
-                                 eval,
-                                 NULL,
-                                 NULL,
-                                 NULL,
-                                 NULL};
+static const dfm_slot state[] = {{DFM_PER_CONTACT, 2, DFM_SLOT_TANGENT, 0}}; /* the host keeps and turns it */
 static const char *const effects[] = {"stiction", "presliding", "hysteresis", NULL};
-static const dfm_type type = {sizeof type,
-                              DFM_KIND_FRICTION,
-                              "org.deform.template_friction",
-                              "bristle on a cone",
-                              "1.0",
-                              "MIT",
-                              "Simo and Hughes 1998, box 1.4",
-                              params,
-                              2,
-                              sizeof params[0],
-                              effects,
-                              &law};
+enum { NEEDS = DFM_NEED_FN | DFM_NEED_VT | DFM_NEED_AREA };
+enum { FLAGS = DFM_FRIC_ISOTROPIC | DFM_FRIC_PASSIVE | DFM_FRIC_JACOBIAN };
+static const dfm_friction law = {sizeof law, NEEDS, FLAGS, 1, state, eval, NULL, NULL, NULL, NULL};
+#define ID "org.deform.template_friction"
+#define SOURCE "Simo and Hughes 1998, box 1.4"
+static const dfm_type type = {
+    sizeof type,      DFM_KIND_FRICTION, ID,  "bristle on a cone", "1.0", "MIT", SOURCE, params, 2,
+    sizeof params[0], effects,           &law};
 static const dfm_type *const types[] = {&type};
 static const dfm_plugin plugin = {sizeof plugin, DFM_ABI, DFM_ABI_DRAFT, 1, types, NULL};
 
 const dfm_plugin *dfm_plugin_entry(const dfm_host *host, uint32_t host_abi, uint32_t host_abi_min) {
   (void)host_abi;
   (void)host_abi_min;
-  /* never hand structs to a host of another shape */
-  return DFM_ABI_OK(host) ? &plugin : NULL;
+  return DFM_ABI_OK(host) ? &plugin : NULL; /* never to a host of another shape */
 }
