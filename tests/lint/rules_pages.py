@@ -5,7 +5,7 @@ import re
 from tree import CODE, line_of
 
 PAGES = "libdeform/doc/"
-HISTORY = ("CHANGELOG.md", PAGES + "decisions/")   # may name pages that are gone
+HISTORY = (PAGES + "decisions/",)  # may name pages that are gone
 
 
 def slugs(text):
