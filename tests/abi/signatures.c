@@ -5,9 +5,10 @@
 
 #include "deform/deform.h"
 
-#define SAME_TYPE(struct_, member, type)                                                            \
-  _Static_assert(_Generic(((struct_ *)0)->member, type: 1, default: 0), #struct_ "." #member " is " \
-                                                                                             "no " #type)
+#define SAME_TYPE(struct_, member, type)                                                     \
+  _Static_assert(_Generic(((struct_ *)0)->member, type: 1, default: 0), #struct_ "." #member \
+                                                                                 " is "      \
+                                                                                 "no " #type)
 
 SAME_TYPE(dfm_contact, size, uint32_t);
 SAME_TYPE(dfm_contact, flags, uint32_t);

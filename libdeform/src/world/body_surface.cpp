@@ -5,6 +5,7 @@
 #include "core/error.h"
 #include "mesh/mesh.h"
 #include "surfel/make_surface.h"
+#include "world/world.h"
 
 namespace dfm {
 namespace {

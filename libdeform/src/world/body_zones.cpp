@@ -8,6 +8,7 @@
 #include "core/error.h"
 #include "mesh/mesh.h"
 #include "surfel/coupling_rows.h"
+#include "world/world.h"
 
 namespace dfm {
 namespace {

@@ -1,8 +1,12 @@
 // Bodies and obstacles enter and leave a world. All throw Error and leave the world as it was.
 #pragma once
-#include "world/world.h"
+#include "deform/deform.h"
 
 namespace dfm {
+
+struct Body;
+struct Obstacle;
+struct World;
 
 Body &create_body(World &w, const dfm_body_def &def);
 Obstacle &create_obstacle(World &w, const dfm_obstacle_def &def);

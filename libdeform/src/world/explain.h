@@ -2,9 +2,9 @@
 #pragma once
 #include <string>
 
-#include "world/world.h"
-
 namespace dfm {
+
+struct World;
 
 std::string explain(const World &w);
 

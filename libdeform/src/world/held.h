@@ -3,7 +3,7 @@
 #include <cstdint>
 #include <span>
 
-#include "world/world.h"
+#include "world/body.h"
 
 namespace dfm {
 

@@ -4,6 +4,7 @@
 #include <cstring>
 
 #include "core/error.h"
+#include "world/world.h"
 
 namespace dfm {
 namespace {

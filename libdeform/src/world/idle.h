@@ -4,8 +4,8 @@
 #include <string>
 #include <vector>
 
+#include "world/body.h"
 #include "world/material.h"
-#include "world/world.h"
 
 namespace dfm {
 

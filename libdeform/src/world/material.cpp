@@ -7,6 +7,8 @@
 
 #include "core/error.h"
 #include "core/handle.h"
+#include "plugin/params.h"
+#include "world/world.h"
 
 namespace dfm {
 

@@ -4,9 +4,21 @@
 #include <string>
 #include <vector>
 
-#include "world/world.h"
+#include "deform/deform.h"
 
 namespace dfm {
+
+struct Body;
+struct World;
+
+struct Material {
+  uint64_t handle = 0;
+  World *world = nullptr;
+  std::string name;
+  dfm_material_def def{};
+  std::vector<std::string> extra_keys;
+  std::vector<std::vector<double>> extra_values;
+};
 
 // The materials of a body's cells. One entry in `list`: the same everywhere, and `of` is empty.
 struct CellMaterials {

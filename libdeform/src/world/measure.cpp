@@ -5,7 +5,9 @@
 
 #include "core/error.h"
 #include "plugin/registry.h"
+#include "plugin/params.h"
 #include "world/stages.h"
+#include "world/world.h"
 
 namespace dfm {
 

@@ -6,9 +6,13 @@
 #include "broad/box_tree.h"
 #include "mesh/winding.h"
 #include "surfel/obstacle_shape.h"
-#include "world/world.h"
+#include "world/body.h"
+#include "world/obstacle.h"
 
 namespace dfm {
+
+struct StepContext;
+struct World;
 
 // A surface of triangles: a body's, or that of a mesh, voxels or a box.
 class OverlapSkin {

@@ -7,6 +7,7 @@
 #include <cmath>
 
 #include "friction/pair_rules.h"
+#include "plugin/params.h"
 #include "world/context.h"
 #include "world/stages.h"
 #include "world/world.h"

@@ -2,6 +2,7 @@
 #include "world/spring.h"
 #include "world/stages.h"
 #include "world/energy_watch.h"
+#include "world/world.h"
 
 namespace dfm {
 

@@ -4,6 +4,7 @@
 
 #include "surfel/closest.h"
 #include "surfel/views.h"
+#include "world/world.h"
 
 namespace dfm {
 namespace {

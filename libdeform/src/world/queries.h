@@ -1,9 +1,11 @@
 // Questions about the present state that no step needs: surface vectors and normals, rays, closest points.
 #pragma once
 #include "broad/triangle_search.h"
-#include "world/world.h"
+#include "world/body.h"
 
 namespace dfm {
+
+struct World;
 
 // N times a column of the phyxels
 Vec3 surfel_vector(const Body &b, const Array<double> &phyxel_column, uint32_t surfel);

@@ -16,6 +16,7 @@
 #include "core/error.h"
 #include "core/hash.h"
 #include "surfel/make_surface.h"
+#include "plugin/params.h"
 #include "world/measure.h"
 #include "world/snapshot_stream.h"
 #include "world/context.h"

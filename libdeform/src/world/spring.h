@@ -1,7 +1,7 @@
-// Springs from points of a body to places in the world (world.h, Spring). They pull in the motion stage, with
+// Springs from points of a body to places in the world (body.h, Spring). They pull in the motion stage, with
 // the loads that vary.
 #pragma once
-#include "world/world.h"
+#include "world/body.h"
 
 namespace dfm {
 

@@ -7,24 +7,18 @@
 #include <vector>
 
 #include "contact/store.h"
-#include "deform/deform.h"
-#include "dynamics/dynamics.h"
 #include "friction/laws.h"
 #include "plan/plan.h"
 #include "plugin/context.h"
-#include "plugin/params.h"
-#include "surfel/obstacle_mesh.h"
-#include "surfel/voxel_grid.h"
-#include "surfel/zones.h"
+#include "world/body.h"
 #include "world/energy_book.h"
 #include "world/impulses.h"
-#include "world/motion.h"
+#include "world/material.h"
+#include "world/obstacle.h"
 #include "world/overlaps.h"
 #include "world/pair_tables.h"
 #include "world/report.h"
 #include "world/rigid_set.h"
-#include "world/search_tree.h"
-#include "world/sleep.h"
 #include "world/step_sizes.h"
 #include "world/world_bound.h"
 
@@ -32,126 +26,6 @@ namespace dfm {
 
 struct ContactMethod;
 struct StepContext;
-struct World;
-
-struct Material {
-  uint64_t handle = 0;
-  World *world = nullptr;
-  std::string name;
-  dfm_material_def def{};
-  std::vector<std::string> extra_keys;
-  std::vector<std::vector<double>> extra_values;
-};
-
-// A model parameter that differs from cell to cell, and who said so ("field", "materials", "share").
-// An entry of a material that the body's model has no parameter for.
-struct Unused { std::string key, material; };
-struct CellField {
-  std::string key, from;
-  uint32_t width;
-  Array<double> values;
-};
-
-// A lasting load: force[i] on points[i], times the keyed scale, times 1 + sine.
-struct Load {
-  uint32_t number;
-  std::vector<uint32_t> points;
-  std::vector<double> force;
-  std::vector<dfm_scale_key> keys;
-  dfm_sine sine{};
-};
-// A spring of rest length zero from the weighted mean of points to a place, or a path of places.
-struct Spring {
-  uint32_t number;
-  std::vector<uint32_t> points;
-  std::vector<double> weights;
-  std::vector<dfm_vector_key> keys;
-  Vec3 to;
-  double stiffness, damping;
-};
-// Held points carried by keyed poses (relative to the first key) and a sine.
-struct HeldMotion {
-  std::vector<uint32_t> points;
-  std::vector<double> start;
-  std::vector<dfm_pose_key> keys;
-  dfm_sine sine{};
-};
-
-inline constexpr int32_t kNoCoupling = -1;
-inline constexpr double kDefaultFriction = 0.5;  // of a material that has no entry "friction"
-
-struct Body {
-  World *world = nullptr;
-  uint64_t id = 0, handle = 0;
-  uint32_t slot = 0;
-  std::string name, material;
-  uint32_t category = 1, collides_with = ~0u;
-  void *user = nullptr;
-
-  Phyxels p;
-  uint64_t x_version = 1;  // rises whenever p.x may have changed
-  Array<uint32_t> tets, edges;
-  Surface surface;
-  SurfaceZones zones;
-  int32_t coupling = kNoCoupling;  // DFM_COUPLING_* of a surface of its own
-  ModelInstance model;
-  std::unique_ptr<Dynamics> dynamics;  // how it moves
-  double mass = 0, rest_volume = 0;
-  Array<double> share;  // [ntet] how much of each cell is material; empty: all
-  std::vector<CellField> fields;
-  std::vector<Unused> unused;
-  std::vector<Load> loads;
-  std::vector<Spring> springs;
-  std::vector<HeldMotion> motions;
-  uint32_t next_load = 1;  // number of the next load or spring
-  Vec3 contact_impulse;    // N s since creation
-  EnergyBook energy;
-  Array<double> surfel_impulse;  // [nsurfel,3] N s of the last sub-step
-  // [n,4] what the contact method keeps of each point; empty where it keeps nothing
-  Array<double> method_values;
-  // as last asked for; holds while asleep
-  struct {
-    bool known = false;
-    StepBound found;
-    uint32_t inverted = 0;
-  } bound;
-  Slumber slumber;
-  // [n,4] m, positions since which it is calm; empty where nothing may sleep
-  Array<double> anchor;
-  std::unique_ptr<SearchTree> search;  // rays and closest points
-
-  bool loads_vary() const;
-  double impulse_time() const;  // s that surfel_impulse belongs to
-};
-
-struct Obstacle {
-  World *world = nullptr;
-  uint64_t id = 0, handle = 0;
-  uint32_t slot = 0;
-  std::string name, material;
-  SurfaceZones::Zone zone{"", "", kDefaultFriction};
-  dfm_obstacle_def def{};
-  std::vector<dfm_pose_key> keys;
-  Pose pose;    // now
-  Pose target;  // at the end of the next step, where move_to set it
-  bool has_target = false;
-  RigidSet *rigid = nullptr;  // a body of a rigid host: where it stands in `rigid`
-  uint32_t rigid_body = 0;
-  bool added = false;  // a further shape of that body, at `local` in its frame
-  Pose local;
-  bool moves() const {
-    return !keys.empty() || def.sine.amplitude[0] != 0 || def.sine.amplitude[1] != 0 ||
-           def.sine.amplitude[2] != 0;
-  }
-  Array<double> points;  // mesh, voxels: as given, in its frame
-  Array<uint32_t> triangles;
-  std::unique_ptr<ObstacleMesh> mesh;
-  std::unique_ptr<VoxelGrid> grid;
-  std::unique_ptr<SearchTree> search;  // rays
-  Pose pose_at_time(double t) const;
-  // of a sub-step, in a step that lasts for `left` from t
-  Pose end_pose(double t, double h, double left) const;
-};
 
 struct FrictionRule {
   std::string between[2];

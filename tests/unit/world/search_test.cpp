@@ -10,6 +10,7 @@
 #include "obstacle.h"
 #include "stack.h"
 #include "world/queries.h"
+#include "world/world.h"
 
 namespace {
 
