@@ -169,6 +169,13 @@ TEST(Hpp, Spans_ReadAndWriteWhatTheCFunctionsDo) {
   EXPECT_THROW((void)s.ball.surface_positions(std::span(surface).first(3)), deform::Error) << "too short";
   EXPECT_EQ(s.world.contacts().size(), s.world.stats().contacts);
   EXPECT_GT(s.world.contacts().size(), 0u);
+  for (const dfm_contact &contact : s.world.contacts()) {
+    EXPECT_EQ(deform::Body(contact.body_a), s.ball);
+    EXPECT_EQ(deform::handle_kind(contact.body_a), uint32_t{DFM_HANDLE_BODY});
+    EXPECT_EQ(s.world.obstacles()[contact.feature_b], s.floor);
+    EXPECT_STREQ(s.world.law_info(contact.law).id, "org.deform.coulomb");
+  }
+  EXPECT_THROW((void)s.world.law_info(4711), deform::Error);
 
   // Lengths that disagree never reach the C function.
   const uint32_t points[2] = {0, 1};

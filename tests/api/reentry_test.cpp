@@ -276,6 +276,11 @@ Calls world_calls(Scene &s, bool step_only) {
   if (step_only)
     all.insert(all.end(), {{"world_contacts", [&] { return dfm_world_contacts(s.w, 0, nullptr, &n); }},
                            {"world_pairs", [&] { return dfm_world_pairs(s.w, 0, nullptr, &n); }},
+                           {"world_law_info",
+                            [&] {
+                              dfm_law_info info{};
+                              return dfm_world_law_info(s.w, 0, &info);
+                            }},
                            {"world_hold",
                             [&] {
                               double creep;
