@@ -257,7 +257,7 @@ Residual residual(const ContactRows &rows, const Tolerance &tolerance, Law law) 
     const Vec3 u = rows.velocity(i);
     const double normal = normal_residual(rows, i, u);
     poison += 0.0 * ((u.x + u.y) + (u.z + l[0]));
-    r.share = std::max(r.share, normal / tolerance.normal[i]);
+    r.relative = std::max(r.relative, normal / tolerance.normal[i]);
     r.due = std::max(r.due, normal / tolerance.most_normal);
     r.speed = std::max(r.speed, normal);
     r.normal = std::max(r.normal, normal);
@@ -265,12 +265,12 @@ Residual residual(const ContactRows &rows, const Tolerance &tolerance, Law law) 
     const Pair t = law(i, u);
     const double tangent = tangent_residual(rows, i, t);
     const double allowed = std::max(tolerance.tangent[i], 1e-3 * std::sqrt(u.y * u.y + u.z * u.z));
-    r.share = std::max(r.share, tangent / allowed);
+    r.relative = std::max(r.relative, tangent / allowed);
     r.due = std::max(r.due, tangent / allowed);
     r.speed = std::max(r.speed, tangent);
   }
   // max() passes over what is no number
-  if (poison != 0) r.share = r.due = std::numeric_limits<double>::infinity();
+  if (poison != 0) r.relative = r.due = std::numeric_limits<double>::infinity();
   return r;
 }
 

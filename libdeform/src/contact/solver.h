@@ -47,7 +47,7 @@ class Acceleration {
 //   r_n <= normal[i]                      0.01 (d_c - d_g) / h: the gap is then off by less than a hundredth
 //                                         of its margin; less where laws remember
 //   r_t <= max(tangent[i], 1e-3 |slip|)   1e-6 m/s at rest, which bounds the creep of what sticks
-// `share` is the worst contact's residual over its tolerance: at most 1 is converged
+// `relative` is the worst contact's residual over its tolerance: at most 1 is converged
 // (doc/decisions/0004-contact-tolerance.md).
 struct Tolerance {
   double most_normal = 0;
@@ -56,7 +56,7 @@ struct Tolerance {
 struct ToleranceBounds { double tangent, normal, most_normal; };  // m/s: at rest, at rest, ever
 // `due` is the same with most_normal for normal[i]: what must be reached, where the rest may be left to the
 // next sub-step's warm start. `normal` is the worst r_n alone, m/s.
-struct Residual { double share = 0, due = 0, speed = 0, normal = 0; };
+struct Residual { double relative = 0, due = 0, speed = 0, normal = 0; };
 // of the linearized laws
 Residual inner_residual(const ContactRows &rows, const ContactState &law, double h,
                         const Tolerance &tolerance);

@@ -84,8 +84,8 @@ class Dynamics {
   // Bounds of the surfels' mean velocities and of what contact has changed of them, m/s, as the linear
   // response gives them: replaced by the true ones where the end need not agree with it. After end_state().
   virtual void bound_ends(double &, double &) const {}
-  // share: of the way to the end that is taken; velocities are the end's.
-  virtual void commit(const SubStep &now, double share) = 0;
+  // fraction: of the way to the end that is taken; velocities are the end's.
+  virtual void commit(const SubStep &now, double fraction) = 0;
 
   // trial: with room for the model's next state
   dfm_kin kin(double time, double h, bool trial = false) const;

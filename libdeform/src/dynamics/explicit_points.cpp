@@ -69,8 +69,8 @@ bool ExplicitPoints::end_state(const SubStep &now, const double *, bool touched)
   return true;
 }
 
-void ExplicitPoints::commit(const SubStep &now, double share) {
-  if (share < 1) shorten(p_, now.h * share);
+void ExplicitPoints::commit(const SubStep &now, double fraction) {
+  if (fraction < 1) shorten(p_, now.h * fraction);
   p_.x.swap(p_.x_end);
   p_.v.swap(p_.v_end);
   model_.commit_state();

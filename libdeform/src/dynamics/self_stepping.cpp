@@ -82,9 +82,9 @@ void SelfStepping::bound_ends(double &speed, double &change) const {
   change = std::sqrt(most);
 }
 
-void SelfStepping::commit(const SubStep &, double share) {
-  if (share < 1)
-    for (size_t j = 0; j < p_.x.size(); ++j) p_.x_end[j] = p_.x[j] + share * (p_.x_end[j] - p_.x[j]);
+void SelfStepping::commit(const SubStep &, double fraction) {
+  if (fraction < 1)
+    for (size_t j = 0; j < p_.x.size(); ++j) p_.x_end[j] = p_.x[j] + fraction * (p_.x_end[j] - p_.x[j]);
   p_.x.swap(p_.x_end);
   p_.v.swap(p_.v_end);
   model_.commit_state();

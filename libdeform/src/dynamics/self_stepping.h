@@ -17,7 +17,7 @@ class SelfStepping : public Dynamics {
   bool end_state(const SubStep &now, const double *surfel_impulse, bool touched) override;
   EndState end() const override { return {p_.x_end.data(), p_.v_end.data(), mean_.data()}; }
   void bound_ends(double &speed, double &change) const override;
-  void commit(const SubStep &now, double share) override;
+  void commit(const SubStep &now, double fraction) override;
 
  private:
   Array<double> mean_;     // [npoint,4] m/s

@@ -48,8 +48,8 @@ class LawBatches {
   // (friction/local_solve.cpp): state.vt moves there.
   //   wt     [n] 1/kg, how much slip an impulse makes at its own contact; with it ft_stop tells the slip
   //          that others leave
-  //   least, share   m/s, 1: a contact's slip need not be known closer than least + share of it
-  const LawInstance *answer(double h, const double *wt, double least, double share, ContactState &state);
+  //   least, relative   m/s, 1: a contact's slip need not be known closer than least + relative of it
+  const LawInstance *answer(double h, const double *wt, double least, double relative, ContactState &state);
   bool smooth() const { return smooth_; }        // is any law of this sub-step not set-valued?
   bool remembers() const { return remembers_; }  // has any a state?
   // After a law has failed: the contact whose answer is not to be used; kNone: it refused the whole batch.
@@ -65,7 +65,7 @@ class LawBatches {
   struct Local {
     uint32_t contact;
     bool from_zero, last, fresh;
-    double v[2], left, step[2], share;
+    double v[2], left, step[2], fraction;
   };
   enum Slopes : uint8_t { kNoSlope = 0, kByVt = 1, kByFn = 2 };
   // Where slopes were made by differences: the force that they start from, and which of them hold at the
@@ -89,7 +89,7 @@ class LawBatches {
                          const ContactState &state);
   const LawInstance *evaluate(const LawInstance &law, std::span<const uint32_t> contacts, double h,
                               ContactState &state);
-  const LawInstance *settle(const Batch &batch, double h, const double *wt, double least, double share,
+  const LawInstance *settle(const Batch &batch, double h, const double *wt, double least, double relative,
                             ContactState &state);
   // Slopes by differences at the present answer. The law where it fails.
   const LawInstance *difference(const LawInstance &law, std::span<const uint32_t> contacts, double h,

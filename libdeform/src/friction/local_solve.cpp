@@ -29,7 +29,7 @@ namespace {
 constexpr uint32_t kMostAsked = 24;
 // Where the law is asked on the very edge of its cone, its tangent is that of slip and the step too long by 1
 // + h m sigma0 A, which may be 1e12.
-constexpr double kCut = 1.0 / 16, kLeastShare = 1e-15;  // of a Newton step that leads away
+constexpr double kCut = 1.0 / 16, kLeastFraction = 1e-15;  // of a Newton step that leads away
 
 struct Residue { double a, b, size; };
 Residue residue(const ContactState &s, uint32_t i, double m) {
@@ -52,19 +52,19 @@ void newton_step(const ContactState &s, uint32_t i, double m, double v[2], doubl
 
 }  // namespace
 
-const LawInstance *LawBatches::answer(double h, const double *wt, double least, double share,
+const LawInstance *LawBatches::answer(double h, const double *wt, double least, double relative,
                                       ContactState &state) {
   for (const Batch &batch : batches_) {
     if (const LawInstance *bad = evaluate(*batch.law, {&order_[batch.begin], batch.n}, h, state)) return bad;
     if (batch.law->ops->flags & DFM_FRIC_SET_VALUED) continue;
-    if (const LawInstance *bad = settle(batch, h, wt, least, share, state)) return bad;
+    if (const LawInstance *bad = settle(batch, h, wt, least, relative, state)) return bad;
   }
   return nullptr;
 }
 
 // All contacts of a batch side by side; those that are done leave it.
 const LawInstance *LawBatches::settle(const Batch &batch, double h, const double *wt, double least,
-                                      double share, ContactState &s) {
+                                      double relative, ContactState &s) {
   const uint32_t n = s.stride;
   local_.clear();
   for (uint32_t k = 0; k < batch.n; ++k)
@@ -79,7 +79,7 @@ const LawInstance *LawBatches::settle(const Batch &batch, double h, const double
       const double m = h * wt[i];
       const Residue g = residue(s, i, m);
       const double size = std::sqrt(s.vt[i] * s.vt[i] + s.vt[n + i] * s.vt[n + i]);
-      if (g.size <= least + share * size) continue;
+      if (g.size <= least + relative * size) continue;
       // Beyond the crossing, g points along the step: deep in stick it is nearly as large there as it was, so
       // less does not tell.
       const bool nearer =
@@ -89,12 +89,12 @@ const LawInstance *LawBatches::settle(const Batch &batch, double h, const double
         if (asked == kMostAsked) continue;
         c.fresh = true;
         c.left = g.size;
-        c.share = 1;
+        c.fraction = 1;
         if (!gives_slopes && !(origin_[i].hold & kByVt)) asked_.push_back(i);
       } else if (!c.from_zero && asked < kMostAsked) {  // tangents from where it slips lead nowhere
         c = {i, true, false, false, {0, 0}, INFINITY, {0, 0}, 0};
       } else {
-        c.share *= kCut;
+        c.fraction *= kCut;
       }
       local_[kept++] = c;
     }
@@ -106,10 +106,10 @@ const LawInstance *LawBatches::settle(const Batch &batch, double h, const double
       const uint32_t i = c.contact;
       if (c.fresh) newton_step(s, i, h * wt[i], c.v, c.step);
       // Out of turns, or at the end of what steps can do: the best slip is asked once more and is the answer.
-      c.last = asked >= kMostAsked || (c.share > 0 && c.share < kLeastShare);
-      if (c.last) c.share = 0;
-      s.vt[i] = c.v[0] + c.share * c.step[0];
-      s.vt[n + i] = c.v[1] + c.share * c.step[1];
+      c.last = asked >= kMostAsked || (c.fraction > 0 && c.fraction < kLeastFraction);
+      if (c.last) c.fraction = 0;
+      s.vt[i] = c.v[0] + c.fraction * c.step[0];
+      s.vt[n + i] = c.v[1] + c.fraction * c.step[1];
     }
     asked_.clear();
     for (const Local &c : local_) asked_.push_back(c.contact);

@@ -96,12 +96,12 @@ class Advance {
   }
 
   double plane_holds_until(const Separation &s, double t) const {
-    double share = HUGE_VAL;
+    double fraction = HUGE_VAL;
     for (int k = 0; k < q_.ncorner; ++k) {
       const double now = dot(s.normal, q_.corner(k, t)), end = dot(s.normal, q_.w1[k]);
-      if (end < safe_) share = std::min(share, (now - safe_) / (now - end));
+      if (end < safe_) fraction = std::min(fraction, (now - safe_) / (now - end));
     }
-    return share == HUGE_VAL ? 1 : t + share * (1 - t);
+    return fraction == HUGE_VAL ? 1 : t + fraction * (1 - t);
   }
 
   bool keeps_apart(const Separation &s0, double t0, const Separation &s1, double t1) const {

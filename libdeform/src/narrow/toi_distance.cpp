@@ -11,7 +11,7 @@
 namespace dfm::toi {
 namespace {
 
-// Less of the distance proven than this share: other normals are tried as well.
+// Less of the distance proven than this fraction: other normals are tried as well.
 constexpr double kProven = 0.9;
 // A cubic that is nowhere larger than that many times its error is computed again, sharper.
 constexpr double kBlurred = 0x1p32;
@@ -48,7 +48,7 @@ void offer_normal(Separation &s, const Patch &patch, Vec3 direction) {
   }
 }
 
-// u and v of the point that lies at share s of side k.
+// u and v of the point that lies at fraction s of side k.
 void on_side(int n, int k, double s, double &u, double &v) {
   static const double corner_u[2][4] = {{0, 1, 0, 0}, {0, 1, 1, 0}};
   static const double corner_v[2][4] = {{0, 0, 1, 0}, {0, 0, 1, 1}};
@@ -62,16 +62,16 @@ void offer_side(Separation &s, const Patch &patch, int k) {
   const Vec3 from = patch.w[k], e = patch.side(k);
   const double ee = norm2(e), along = -dot(from, e);
   const int next = k + 1 < patch.n ? k + 1 : 0;
-  const double share = !(along > 0) ? 0 : !(along < ee) ? 1 : along / ee;
+  const double fraction = !(along > 0) ? 0 : !(along < ee) ? 1 : along / ee;
   double u, v;
-  on_side(patch.n, k, share, u, v);
-  if (share == 0 || share == 1) {
-    const Vec3 corner = share == 0 ? from : patch.w[next];
+  on_side(patch.n, k, fraction, u, v);
+  if (fraction == 0 || fraction == 1) {
+    const Vec3 corner = fraction == 0 ? from : patch.w[next];
     offer_point(s, corner, u, v);
     offer_normal(s, patch, corner);
     return;
   }
-  const Vec3 point = from + share * e;
+  const Vec3 point = from + fraction * e;
   offer_point(s, point, u, v);
   offer_normal(s, patch, point - (dot(point, e) / ee) * e);
 }

@@ -175,13 +175,13 @@ void GuardScene::find_end(GuardSide &s, uint32_t surfel) {
   double *const out = &s.end[4 * size_t{surfel}];
   const Vec3 x = load3(&s.surface->x[4 * size_t{surfel}]);
   if (s.still) return store3(out, x);
-  // its pose is at the share already
+  // its pose is at the fraction already
   if (s.local)
     return store3(out, s.pose.position + rotate(s.pose.rotation, load3(&s.local[3 * size_t{surfel}])));
   Vec3 way;
   s.surface->each_phyxel(
       surfel, [&](uint32_t p, double weight) { way += (weight * h) * load3(&s.mean[4 * size_t{p}]); });
-  store3(out, x + share * way);
+  store3(out, x + fraction * way);
 }
 
 void GuardMemory::follow(const Array<Candidate> &list) {

@@ -21,7 +21,7 @@ struct GuardHit {
   uint32_t candidate;  // number in the list
   // of an obstacle in closed form: which of its points or edges (as contacts number them); else 0
   uint32_t part;
-  double t;      // share of the sub-step after which the distance reaches the floor; never late
+  double t;      // fraction of the sub-step after which the distance reaches the floor; never late
   double safe;   // up to there the distance stays above the floor by the margin; <= t
   double start;  // m, distance at the start
   double at[3];  // at t: weights of the triangle's corners, or places on edge a and edge b
@@ -57,7 +57,7 @@ struct GuardScene {
   std::span<const ObstacleView> obstacles;
   std::vector<GuardSide> sides;
   std::vector<GuardPose> poses;  // of obstacles, at the end
-  double h = 0, share = 1;       // s; of the way, that is taken
+  double h = 0, fraction = 1;    // s; of the way, that is taken
   double floor = 0, margin = 0;  // m: d_g, 0.1 (d_c - d_g)
   uint32_t round = 0;            // ends of earlier rounds are out of date
 

@@ -12,7 +12,7 @@
 namespace dfm::rollback {
 namespace {
 
-// share of d_c to which times are found; what is nearer than d_c by twice as much rests
+// fraction of d_c to which times are found; what is nearer than d_c by twice as much rests
 constexpr double kSharp = 1e-3;
 constexpr double kBack = 0.5;  // of its distance, down to which what parts from a rest may come back
 constexpr int kNewton = 60;    // far more than it takes; every step is safe, so stopping early stops early
@@ -94,9 +94,9 @@ Vec3 ImpactQuery::start(const Corner &c) const {
   return c.slot == kNone ? c.still : load3(&bodies_[c.slot].surface->x[4 * size_t{c.surfel}]);
 }
 
-Vec3 ImpactQuery::way(const Corner &c, std::span<const double *const> share) const {
+Vec3 ImpactQuery::way(const Corner &c, std::span<const double *const> fraction) const {
   if (c.slot == kNone) return {};
-  const double s = share.empty() ? 1 : share[c.slot][c.surfel];
+  const double s = fraction.empty() ? 1 : fraction[c.slot][c.surfel];
   return (h_ * s) * load3(&bodies_[c.slot].surface->v[4 * size_t{c.surfel}]);
 }
 
@@ -167,11 +167,11 @@ void ImpactQuery::each(const Candidate &c, F &&call) const {
   }
 }
 
-void ImpactQuery::against(const Features &f, std::span<const double *const> share, ImpactHit &best) const {
+void ImpactQuery::against(const Features &f, std::span<const double *const> fraction, ImpactHit &best) const {
   Vec3 x[4], d[4];
   for (int k = 0; k < 4; ++k) {
     x[k] = start(f.corner[k]);
-    d[k] = way(f.corner[k], share);
+    d[k] = way(f.corner[k], fraction);
   }
   if (far_apart(x, d, f.edges, touch_ + f.round)) return;
   Nearest n = nearest_of(x, f.edges);
@@ -205,11 +205,11 @@ void ImpactQuery::against(const Features &f, std::span<const double *const> shar
 
 // A surfel against a convex shape that stands still: the distance is a convex function of time, and Newton's
 // steps from the left never pass its root.
-void ImpactQuery::against_shape(const Candidate &c, std::span<const double *const> share,
+void ImpactQuery::against_shape(const Candidate &c, std::span<const double *const> fraction,
                                 ImpactHit &best) const {
   const ObstacleShape shape(obstacles_[c.slot_b]);
   const Corner corner = surfel(c.slot_a, c.feature_a);
-  const Vec3 x = start(corner), d = way(corner, share);
+  const Vec3 x = start(corner), d = way(corner, fraction);
   ObstaclePoint p = shape.closest(x);
   const double distance = p.distance;
   if (!(distance > 0)) return;
@@ -233,11 +233,12 @@ void ImpactQuery::against_shape(const Candidate &c, std::span<const double *cons
   store3(best.point, 0.5 * (x + t * d + p.point));
 }
 
-ImpactHit ImpactQuery::first(const Candidate &c, std::span<const double *const> share) const {
+ImpactHit ImpactQuery::first(const Candidate &c, std::span<const double *const> fraction) const {
   ImpactHit best{};
   best.t = HUGE_VAL;
-  if (c.obstacle && c.kind == 0 && obstacles_[c.slot_b].shape != Shape::mesh) against_shape(c, share, best);
-  else each(c, [&](const Features &f) { against(f, share, best); });
+  if (c.obstacle && c.kind == 0 && obstacles_[c.slot_b].shape != Shape::mesh)
+    against_shape(c, fraction, best);
+  else each(c, [&](const Features &f) { against(f, fraction, best); });
   return best;
 }
 

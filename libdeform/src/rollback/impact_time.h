@@ -15,7 +15,7 @@
 namespace dfm::rollback {
 
 struct ImpactHit {
-  double t;       // share of the sub-step; above 1: never
+  double t;       // fraction of the sub-step; above 1: never
   uint32_t part;  // of an obstacle: its face, edge or corner, as contacts number them; else 0
   // weights of the triangle's corners, or places on edge a and edge b; 1 for a surfel that
   // meets a closed form
@@ -32,8 +32,8 @@ class ImpactQuery {
   ImpactQuery(std::span<const BodyView> bodies, std::span<const ObstacleView> obstacles, double h,
               double touch);
 
-  // share: by slot, [nsurfel] how much of its way h v each surfel goes; empty: all of it. Re-entrant.
-  ImpactHit first(const Candidate &c, std::span<const double *const> share) const;
+  // fraction: by slot, [nsurfel] how much of its way h v each surfel goes; empty: all of it. Re-entrant.
+  ImpactHit first(const Candidate &c, std::span<const double *const> fraction) const;
   // World-wide surfel numbers of both features; returns how many.
   uint32_t nodes(const Candidate &c, uint32_t out[4]) const;
   // The hit as a contact, with area and key (patch as last part of it); key unique among contacts of
@@ -58,13 +58,13 @@ class ImpactQuery {
   Corner surfel(uint32_t slot, uint32_t s) const { return {slot, s, {}}; }
   Corner still(Vec3 p) const { return {kNone, 0, p}; }
   Vec3 start(const Corner &c) const;
-  Vec3 way(const Corner &c, std::span<const double *const> share) const;
+  Vec3 way(const Corner &c, std::span<const double *const> fraction) const;
   template <class F>
   // f(Features), all that the candidate stands for but a surfel against a closed form
   void each(const Candidate &c, F &&f) const;
   void mesh_features(const Candidate &c, const Surface &mesh, Features &f) const;
-  void against_shape(const Candidate &c, std::span<const double *const> share, ImpactHit &best) const;
-  void against(const Features &f, std::span<const double *const> share, ImpactHit &best) const;
+  void against_shape(const Candidate &c, std::span<const double *const> fraction, ImpactHit &best) const;
+  void against(const Features &f, std::span<const double *const> fraction, ImpactHit &best) const;
 
   std::span<const BodyView> bodies_;
   std::span<const ObstacleView> obstacles_;

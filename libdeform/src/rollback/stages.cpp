@@ -5,13 +5,13 @@
 //              (4.2)-(4.4), (4.7) corrected
 //              vertices that a hit ties together are an island; it goes its way up to t = 0.9 of its earliest
 //              hit (4.5)
-//              a pair whose vertices now go different shares may touch on that way: it joins them, and so on
+//              a pair whose vertices now go different fractions may touch on that way: it joins them, and so on
 //              until none does
 //              normal force and friction of every colliding point, from the forces of this sub-step; they act
 //              in the next  (5.18)-(5.30)
 //
 // Why this ends, and in a state without contact: vertices of one island follow the true motion up to one
-// time, before any of their hits; pairs that go unequal shares have been asked about just that motion; and
+// time, before any of their hits; pairs that go unequal fractions have been asked about just that motion; and
 // each round that finds a hit leaves fewer islands.
 #include "rollback/stages.h"
 
@@ -30,15 +30,15 @@ namespace dfm::rollback {
 namespace {
 
 struct Buffers : MethodBuffers {
-  Islands islands;                     // of surfels, world-wide numbers
-  Array<ImpactHit> hits;               // by candidate
-  Array<uint8_t> joins;                // by candidate: ties its vertices together
-  Array<uint32_t> joined;              // those candidates, in the order in which they were found
-  Array<double> share;                 // by surfel, of its way
-  Array<double> time;                  // by island
-  Array<uint8_t> met;                  // by surfel: a contact of a point has it
-  std::vector<const double *> shares;  // by body slot, into share
-  explicit Buffers(const Memory &m) : islands(m) { use_memory(m, hits, joins, joined, share, time, met); }
+  Islands islands;                        // of surfels, world-wide numbers
+  Array<ImpactHit> hits;                  // by candidate
+  Array<uint8_t> joins;                   // by candidate: ties its vertices together
+  Array<uint32_t> joined;                 // those candidates, in the order in which they were found
+  Array<double> fraction;                 // by surfel, of its way
+  Array<double> time;                     // by island
+  Array<uint8_t> met;                     // by surfel: a contact of a point has it
+  std::vector<const double *> fractions;  // by body slot, into fraction
+  explicit Buffers(const Memory &m) : islands(m) { use_memory(m, hits, joins, joined, fraction, time, met); }
 };
 Buffers &buffers(StepContext &step) { return static_cast<Buffers &>(*step.method); }
 
@@ -73,7 +73,7 @@ constexpr uint32_t kGrain = 64;
 
 // The first time of every candidate that `wanted`, each into its own place.
 template <class Wanted>
-void ask(World &w, StepContext &step, std::span<const double *const> share, Wanted &&wanted) {
+void ask(World &w, StepContext &step, std::span<const double *const> fraction, Wanted &&wanted) {
   Buffers &r = buffers(step);
   const Array<Candidate> &list = step.broad.candidates();
   const ImpactQuery query(step.body_views, step.obstacle_views, step.h, w.offset);
@@ -81,7 +81,7 @@ void ask(World &w, StepContext &step, std::span<const double *const> share, Want
                                 [&](uint32_t begin, uint32_t end) {
                                   for (uint32_t i = begin; i < end; ++i) {
                                     if (!wanted(query, i)) continue;
-                                    r.hits[i] = query.first(list[i], share);
+                                    r.hits[i] = query.first(list[i], fraction);
                                     r.joins[i] = r.hits[i].t <= 1 ? 2 : 0;  // 2: new
                                   }
                                 });
@@ -98,9 +98,9 @@ bool take_new(Buffers &r) {
 }
 
 // One time per island. `own`: as many of `joined` as have hit on the true motion; the others only tie.
-void set_shares(StepContext &step, const ImpactQuery &query, size_t own) {
+void set_fractions(StepContext &step, const ImpactQuery &query, size_t own) {
   Buffers &r = buffers(step);
-  const uint32_t n = static_cast<uint32_t>(r.share.size());
+  const uint32_t n = static_cast<uint32_t>(r.fraction.size());
   r.islands.start(n);
   uint32_t node[4];
   for (const uint32_t i : r.joined) {
@@ -114,10 +114,10 @@ void set_shares(StepContext &step, const ImpactQuery &query, size_t own) {
     double &t = r.time[r.islands.of[node[0]]];
     t = std::min(t, kSafety * r.hits[r.joined[k]].t);
   }
-  for (uint32_t i = 0; i < n; ++i) r.share[i] = r.time[r.islands.of[i]];
+  for (uint32_t i = 0; i < n; ++i) r.fraction[i] = r.time[r.islands.of[i]];
 }
 
-// Shares of all surfels: every pair that would touch on the ways that they leave is tied.
+// Fractions of all surfels: every pair that would touch on the ways that they leave is tied.
 void find_islands(World &w, StepContext &step) {
   Buffers &r = buffers(step);
   const Array<Candidate> &list = step.broad.candidates();
@@ -129,12 +129,13 @@ void find_islands(World &w, StepContext &step) {
   if (!take_new(r)) return;
   const size_t own = r.joined.size();
   do {
-    set_shares(step, query, own);
-    ask(w, step, r.shares, [&](const ImpactQuery &q, uint32_t i) {
+    set_fractions(step, query, own);
+    ask(w, step, r.fractions, [&](const ImpactQuery &q, uint32_t i) {
       if (r.joins[i]) return false;
       uint32_t node[4];
       const uint32_t n = q.nodes(list[i], node);
-      return std::any_of(node + 1, node + n, [&](uint32_t s) { return r.share[s] != r.share[node[0]]; });
+      return std::any_of(node + 1, node + n,
+                         [&](uint32_t s) { return r.fraction[s] != r.fraction[node[0]]; });
     });
   } while (take_new(r));
 }
@@ -155,7 +156,7 @@ void find_points(World &w, StepContext &step) {
     const uint32_t n = query.nodes(c, node);
     return std::any_of(node, node + n, [&](uint32_t s) { return r.met[s] != 0; });
   };
-  r.met.assign(r.share.size(), 0);
+  r.met.assign(r.fraction.size(), 0);
   for (const uint32_t i : r.joined) {
     uint32_t node[4];
     if (edges(list[i])) continue;
@@ -212,11 +213,11 @@ void set_forces(World &w, StepContext &step) {
 void roll_back(World &w, StepContext &step) {
   for (size_t i = 0; i < step.body_views.size(); ++i) {
     Body &b = *w.bodies[step.body_views[i].slot];
-    const double *const share = buffers(step).shares[i];
+    const double *const fraction = buffers(step).fractions[i];
     for (uint32_t s = 0; s < b.surface.nsurfel; ++s) {
       const size_t at = size_t{b.surface.point[s]} * kStride;
       const Vec3 before = load3(&b.p.v_free[at]);
-      const Vec3 after = share[s] < 1 ? velocity_after(before, share[s]) : before;
+      const Vec3 after = fraction[s] < 1 ? velocity_after(before, fraction[s]) : before;
       const Vec3 lost = b.p.mass[b.surface.point[s]] * (after - before);
       store3(&b.surfel_impulse[3 * size_t{s}], step.h * load3(&lagged(b)[at]) + lost);
       store3(&b.p.v_free[at], after);
@@ -269,9 +270,9 @@ bool stage_rollback(World &w, StepContext &step, uint32_t *trouble) {
   uint32_t nnode = 0;
   for (const BodyView &v : step.body_views) nnode = std::max(nnode, v.first_node + v.surface->nsurfel);
   Buffers &r = buffers(step);
-  r.share.assign(nnode, 1.0);
-  r.shares.clear();
-  for (const BodyView &v : step.body_views) r.shares.push_back(&r.share[v.first_node]);
+  r.fraction.assign(nnode, 1.0);
+  r.fractions.clear();
+  for (const BodyView &v : step.body_views) r.fractions.push_back(&r.fraction[v.first_node]);
   find_islands(w, step);
   find_points(w, step);
   make_rows(w, step);

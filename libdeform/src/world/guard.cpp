@@ -6,7 +6,7 @@
 //      at most 4 times
 //   2  the sub-step is taken anew, shorter: up to the safe part of the way, but no less than a quarter
 //      at most 8 times
-//   3  all that moves takes the safe share of its way; velocities stay, so no momentum is lost, only way
+//   3  all that moves takes the safe fraction of its way; velocities stay, so no momentum is lost, only way
 //
 // What is not listed is not asked: broad/ covers the motion after the solve too (BroadPhase::cover). Why the
 // order is this one and the cut is the whole world's: doc/decisions/0020-guard-cuts-time.md.
@@ -27,7 +27,7 @@
 namespace dfm {
 namespace {
 
-constexpr uint32_t kSolves = 4, kCuts = 8, kShares = 40;
+constexpr uint32_t kSolves = 4, kCuts = 8, kFractions = 40;
 constexpr double kLeastCut = 0.25;
 constexpr double kSlow = 0.01;  // of d_g: what moves by less needs no closer look at how it does
 
@@ -136,10 +136,10 @@ void set_sides(World &w, StepContext &step) {
   }
 }
 
-// Everything goes this share of its way.
-void set_share(World &w, StepContext &step, double share) {
+// Everything goes this fraction of its way.
+void set_fraction(World &w, StepContext &step, double fraction) {
   GuardScene &scene = step.guard.scene;
-  step.guard.motion = scene.share = share;
+  step.guard.motion = scene.fraction = fraction;
   ++scene.round;
   for (size_t o = 0; o < w.obstacles.size(); ++o) {
     const ObstacleView &v = step.obstacle_views[o];
@@ -148,8 +148,8 @@ void set_share(World &w, StepContext &step, double share) {
     if (!v.moves()) continue;
     const Pose end = w.obstacles[o]->end_pose(w.time, step.h, step.left);
     to = {end.position, end.rotation};
-    if (share < 1)
-      to = {v.position + share * (end.position - v.position), slerp(v.rotation, end.rotation, share)};
+    if (fraction < 1)
+      to = {v.position + fraction * (end.position - v.position), slerp(v.rotation, end.rotation, fraction)};
     scene.sides[w.bodies.size() + o].pose = to;
   }
 }
@@ -172,7 +172,7 @@ bool cross_at_start(StepContext &step, const Candidate &c) {
   return yes;
 }
 
-// The safe share of the way; 1: nothing comes too near.
+// The safe fraction of the way; 1: nothing comes too near.
 double find_hits(World &w, StepContext &step) {
   Guard &g = step.guard;
   g.hits.clear();
@@ -214,7 +214,7 @@ bool stage_guard(World &w, StepContext &step, uint32_t *trouble) {
     bound_speeds(w, step);
     follow_lists(w, step);
     set_sides(w, step);
-    set_share(w, step, 1);
+    set_fraction(w, step, 1);
     guard_near(step.guard.scene, *step.guard.list, step.guard.memory, step.guard.near);
     safe = find_hits(w, step);
     if (step.guard.hits.empty()) return true;
@@ -242,7 +242,7 @@ bool stage_guard(World &w, StepContext &step, uint32_t *trouble) {
     return false;
   }
   for (uint32_t k = 0; !step.guard.hits.empty(); ++k) {
-    set_share(w, step, k < kShares ? step.guard.motion * std::min(safe, 0.999) : 0);
+    set_fraction(w, step, k < kFractions ? step.guard.motion * std::min(safe, 0.999) : 0);
     if (step.guard.motion == 0) break;
     safe = find_hits(w, step);
   }

@@ -42,7 +42,7 @@ struct Guard {
   uint32_t pieces = 0;                // cuts of this planned sub-step
   bool acted = false, again = false;  // in this sub-step; it is to be taken anew
   double cut = 1;                     // then: this much as long
-  double motion = 1;                  // < 1: share of its way that is taken
+  double motion = 1;                  // < 1: fraction of its way that is taken
 
   void start() {
     kept.clear();

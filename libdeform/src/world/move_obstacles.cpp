@@ -41,12 +41,12 @@ void move_obstacles(World &w, const StepContext &step, bool last) {
   }
 }
 
-void move_obstacles_by(World &w, const StepContext &step, double share) {
+void move_obstacles_by(World &w, const StepContext &step, double fraction) {
   for (auto &o : w.obstacles) {
     if (!o->has_target && !o->moves()) continue;
     const Pose end = o->end_pose(w.time, step.h, step.left);
-    o->pose = {o->pose.position + share * (end.position - o->pose.position),
-               slerp(o->pose.rotation, end.rotation, share)};
+    o->pose = {o->pose.position + fraction * (end.position - o->pose.position),
+               slerp(o->pose.rotation, end.rotation, fraction)};
   }
 }
 

@@ -11,8 +11,8 @@ struct World;
 void view_obstacles(World &w, StepContext &step);
 // Where the obstacles are at the end of the sub-step; `last`: of the step, so that a target is met exactly.
 void move_obstacles(World &w, const StepContext &step, bool last);
-// Where the guard let the bodies go a share of their way only. Obstacles come to their poses in the
+// Where the guard let the bodies go a fraction of their way only. Obstacles come to their poses in the
 // sub-steps after.
-void move_obstacles_by(World &w, const StepContext &step, double share);
+void move_obstacles_by(World &w, const StepContext &step, double fraction);
 
 }  // namespace dfm

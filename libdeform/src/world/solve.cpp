@@ -77,9 +77,9 @@ bool may_sweep(World &w, StepContext &step, const Residual &residual) {
 // What goes beyond what must be reached is polish, and this many sweeps of a sub-step are enough for it: the
 // next one goes on from there.
 constexpr uint32_t kPolish = 20;
-bool good(StepContext &step, const Residual &left, double share) {
-  return left.share <= share ||
-         (left.due <= share && (step.sweeps >= kPolish || spares(step, Thrift::polish)));
+bool good(StepContext &step, const Residual &left, double most) {
+  return left.relative <= most ||
+         (left.due <= most && (step.sweeps >= kPolish || spares(step, Thrift::polish)));
 }
 
 // Beyond this times the best residual sweeps are running away: with a jam of strong friction block

@@ -238,12 +238,12 @@ TEST(Solver, Residual_IsThatOfItsDefinition) {
   }
   EXPECT_NEAR(found.normal, normal, 1e-13);
   EXPECT_NEAR(found.speed, std::max(normal, tangent), 1e-13);
-  EXPECT_NEAR(found.share, std::max(normal / 0.5, share), 1e-12);
+  EXPECT_NEAR(found.relative, std::max(normal / 0.5, share), 1e-12);
   EXPECT_NEAR(found.due, std::max(normal / (4 * 0.5), share), 1e-12);
   // Where friction may be off by much, the normal residual alone decides: over what it may be off by, and at
   // most.
   const Residual loose = true_residual(p.rows, p.state, RowsCase::kStep, same_tolerance(3, 0.5, 1e6));
-  EXPECT_NEAR(loose.share, normal / 0.5, 1e-12);
+  EXPECT_NEAR(loose.relative, normal / 0.5, 1e-12);
   EXPECT_NEAR(loose.due, normal / (4 * 0.5), 1e-12);
 }
 
