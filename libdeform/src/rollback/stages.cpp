@@ -5,8 +5,8 @@
 //              (4.2)-(4.4), (4.7) corrected
 //              vertices that a hit ties together are an island; it goes its way up to t = 0.9 of its earliest
 //              hit (4.5)
-//              a pair whose vertices now go different fractions may touch on that way: it joins them, and so on
-//              until none does
+//              a pair whose vertices now go different fractions may touch on that way: it joins them, and so
+//              on until none does
 //              normal force and friction of every colliding point, from the forces of this sub-step; they act
 //              in the next  (5.18)-(5.30)
 //
