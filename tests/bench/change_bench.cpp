@@ -13,10 +13,7 @@
 
 namespace {
 
-struct Sink {
-  std::FILE *csv = nullptr;
-  std::string head;
-};
+using Sink = bench::Csv;
 
 struct Scene {
   test::Context c;
@@ -76,15 +73,7 @@ void measure(const Sink &sink, const Scene &s, const char *what, const std::func
 }  // namespace
 
 int main(int argc, char **argv) {
-  Sink sink;
-  std::string commit = "unknown";
-  for (int n = 1; n + 1 < argc; n += 2) {
-    if (!std::strcmp(argv[n], "--csv")) sink.csv = std::fopen(argv[n + 1], "a");
-    if (!std::strcmp(argv[n], "--commit")) commit = argv[n + 1];
-  }
-  sink.head = bench::machine() + "," + bench::compiler() + "," + commit;
-  if (sink.csv && std::ftell(sink.csv) == 0)
-    std::fprintf(sink.csv, "machine,compiler,commit,bodies,change,us\n");
+  Sink sink(argc, argv, "bodies,change,us");
   for (const uint32_t n : {10u, 30u, 100u}) {
     const Scene s(n);
     uint32_t load = 0;
@@ -106,6 +95,5 @@ int main(int argc, char **argv) {
       s.add(0, 0.3 + 1e-4 * i);
     });
   }
-  if (sink.csv) std::fclose(sink.csv);
   return 0;
 }

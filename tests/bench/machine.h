@@ -1,6 +1,8 @@
 // Where figures were taken: the first two columns of results/*.csv. Which rows such a table has already.
 #pragma once
 #include <algorithm>
+#include <cstdio>
+#include <cstring>
 #include <fstream>
 #include <set>
 #include <string>
@@ -21,6 +23,27 @@ inline std::string machine() {
     if (line.rfind("model name", 0) == 0) return line.substr(line.find(':') + 2);
   return "unknown";
 }
+
+// Rows for results/*.csv, where the program was called with --csv FILE --commit HASH.
+struct Csv {
+  std::FILE *csv = nullptr;
+  std::string head;  // machine, compiler, commit
+  // columns: those behind the head's.
+  Csv(int argc, char **argv, const char *columns) {
+    std::string commit = "unknown";
+    for (int n = 1; n + 1 < argc; n += 2) {
+      if (!std::strcmp(argv[n], "--csv")) csv = std::fopen(argv[n + 1], "a");
+      if (!std::strcmp(argv[n], "--commit")) commit = argv[n + 1];
+    }
+    head = machine() + "," + compiler() + "," + commit;
+    if (csv && std::ftell(csv) == 0) std::fprintf(csv, "machine,compiler,commit,%s\n", columns);
+  }
+  ~Csv() {
+    if (csv) std::fclose(csv);
+  }
+  Csv(const Csv &) = delete;
+  Csv &operator=(const Csv &) = delete;
+};
 
 // Of each row the text of `count` columns after the first `skip`.
 inline std::set<std::string> names_in(const std::string &path, int skip, int count) {

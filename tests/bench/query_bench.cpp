@@ -16,6 +16,7 @@
 #include "machine.h"
 #include "world.h"
 #include "world/queries.h"
+#include "world/world.h"
 
 namespace {
 
@@ -27,9 +28,8 @@ double seconds_since(std::chrono::steady_clock::time_point begin) {
   return std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
 }
 
-struct Sink {
-  std::FILE *csv = nullptr;
-  std::string head;
+struct Sink : bench::Csv {
+  using Csv::Csv;
   void row(const char *query, const char *what, uint32_t triangles, double nodes, double tried, double ns,
            double update_us) const {
     std::printf("%-8s %-10s %9u %8.1f %10.1f %9.0f %10.1f\n", query, what, triangles, nodes, tried, ns,
@@ -119,17 +119,7 @@ void obstacle(const Sink &sink, int level) {
 }  // namespace
 
 int main(int argc, char **argv) {
-  Sink sink;
-  std::string commit = "unknown";
-  for (int n = 1; n + 1 < argc; n += 2) {
-    if (!std::strcmp(argv[n], "--csv")) sink.csv = std::fopen(argv[n + 1], "a");
-    if (!std::strcmp(argv[n], "--commit")) commit = argv[n + 1];
-  }
-  sink.head = bench::machine() + "," + bench::compiler() + "," + commit;
-  if (sink.csv && std::ftell(sink.csv) == 0)
-    std::fprintf(
-        sink.csv,
-        "machine,compiler,commit,query,what,triangles,nodes,triangles_tried,ns_per_query,update_us\n");
+  Sink sink(argc, argv, "query,what,triangles,nodes,triangles_tried,ns_per_query,update_us");
   std::printf("%-8s %-10s %9s %8s %10s %9s %10s\n", "query", "of", "triangles", "nodes", "triangles", "ns",
               "update us");
   for (const uint32_t cells : {1500u, 60000u}) body(sink, "body", cells, nullptr);
@@ -137,6 +127,5 @@ int main(int argc, char **argv) {
   const dfm_surface_def worn = skin.def();
   body(sink, "fine skin", 1500, &worn);
   for (const int level : {3, 5, 7}) obstacle(sink, level);
-  if (sink.csv) std::fclose(sink.csv);
   return 0;
 }

@@ -26,10 +26,7 @@ using namespace test;
 
 constexpr int kRepetitions = 15;
 
-struct Sink {
-  std::FILE *csv = nullptr;
-  std::string head;  // machine, compiler, commit
-};
+using Sink = bench::Csv;
 
 // ---- the functions of Zerbato 2010 ------------------------------------------------------------------------
 
@@ -265,17 +262,8 @@ void guard(const Sink &sink) {
 }  // namespace
 
 int main(int argc, char **argv) {
-  Sink sink;
-  std::string commit = "unknown";
-  for (int n = 1; n + 1 < argc; n += 2) {
-    if (!std::strcmp(argv[n], "--csv")) sink.csv = std::fopen(argv[n + 1], "a");
-    if (!std::strcmp(argv[n], "--commit")) commit = argv[n + 1];
-  }
-  sink.head = bench::machine() + "," + bench::compiler() + "," + commit;
-  if (sink.csv && std::ftell(sink.csv) == 0)
-    std::fprintf(sink.csv,
-                 "machine,compiler,commit,set,finder,queries,hits,evaluations,evaluations_max,ns_per_query,"
-                 "missed,false,late,late_by_max\n");
+  Sink sink(argc, argv,
+            "set,finder,queries,hits,evaluations,evaluations_max,ns_per_query,missed,false,late,late_by_max");
   std::printf("%-10s %-14s %6s %6s %9s %6s %6s %7s %6s %5s %9s\n", "set", "finder", "number", "hits",
               "values", "most", "ns", "missed", "false", "late", "by");
   const bool shared = !ccd_folder().empty();
@@ -286,6 +274,5 @@ int main(int argc, char **argv) {
   queries(sink, "random", random_queries(), false);
   roots(sink);
   guard(sink);
-  if (sink.csv) std::fclose(sink.csv);
   return 0;
 }
