@@ -8,9 +8,12 @@ static double x[3 * POINTS], force[3 * POINTS];
 static uint32_t points[POINTS];
 static dfm_contact_event events[EVENTS];
 
-#define TRY(call)                                               \
-  do {                                                          \
-    if ((call) < 0) return printf("%s\n", dfm_last_error()), 1; \
+#define TRY(call)                       \
+  do {                                  \
+    if ((call) < 0) {                   \
+      printf("%s\n", dfm_last_error()); \
+      return 1;                         \
+    }                                   \
   } while (0)
 
 static int make(dfm_context *context, dfm_world world, const char *name, const double size[3], double z,

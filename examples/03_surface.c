@@ -3,9 +3,12 @@
 #include <deform/deform.h>
 #include <stdio.h>
 
-#define TRY(call)                                               \
-  do {                                                          \
-    if ((call) < 0) return printf("%s\n", dfm_last_error()), 1; \
+#define TRY(call)                       \
+  do {                                  \
+    if ((call) < 0) {                   \
+      printf("%s\n", dfm_last_error()); \
+      return 1;                         \
+    }                                   \
   } while (0)
 
 static void quiet(void *user, int32_t level, const char *text) {

@@ -5,9 +5,12 @@
 #include <stdio.h>
 #include <string.h>
 
-#define TRY(call)                                               \
-  do {                                                          \
-    if ((call) < 0) return printf("%s\n", dfm_last_error()), 1; \
+#define TRY(call)                       \
+  do {                                  \
+    if ((call) < 0) {                   \
+      printf("%s\n", dfm_last_error()); \
+      return 1;                         \
+    }                                   \
   } while (0)
 
 /* What the host knows of its box. Position and velocity are not here: the world keeps them and hands them to

@@ -8,9 +8,12 @@
 #include <time.h>
 
 enum { CRATES = 4, VERTICES = 4096, PAIRS = 64 };
-#define TRY(call)                                               \
-  do {                                                          \
-    if ((call) < 0) return printf("%s\n", dfm_last_error()), 1; \
+#define TRY(call)                       \
+  do {                                  \
+    if ((call) < 0) {                   \
+      printf("%s\n", dfm_last_error()); \
+      return 1;                         \
+    }                                   \
   } while (0)
 
 /* s, of the world: fixed, so that a replay gives the same bits */

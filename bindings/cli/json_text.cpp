@@ -155,9 +155,9 @@ class Reader {
     uint32_t code = 0, low = 0;
     if (!unit(code)) return false;
     if (code >= 0xd800 && code < 0xe000) {  // half of a pair
-      if (code >= 0xdc00 || s_.compare(i_ + 1, 2, "\\u") != 0 || (i_ += 2, !unit(low)) || low < 0xdc00 ||
-          low >= 0xe000)
-        return false;
+      if (code >= 0xdc00 || s_.compare(i_ + 1, 2, "\\u") != 0) return false;
+      i_ += 2;
+      if (!unit(low) || low < 0xdc00 || low >= 0xe000) return false;
       code = 0x10000 + ((code - 0xd800) << 10) + (low - 0xdc00);
     }
     const auto add = [&](uint32_t byte) { out += static_cast<char>(byte); };
@@ -179,7 +179,8 @@ class Reader {
   }
   bool array(JsonValue &out, int depth) {
     out.kind = JsonValue::array;
-    if (take('['), take(']')) return true;
+    take('[');
+    if (take(']')) return true;
     do {
       out.items.emplace_back();
       if (!value(out.items.back(), depth + 1)) return false;
@@ -188,7 +189,8 @@ class Reader {
   }
   bool object(JsonValue &out, int depth) {
     out.kind = JsonValue::object;
-    if (take('{'), take('}')) return true;
+    take('{');
+    if (take('}')) return true;
     std::set<std::string> names;
     do {
       out.members.emplace_back();

@@ -5,9 +5,12 @@
 #include <math.h>
 #include <stdio.h>
 
-#define TRY(call)                                                        \
-  do {                                                                   \
-    if ((call) < 0) return fprintf(stderr, "%s\n", dfm_last_error()), 1; \
+#define TRY(call)                                \
+  do {                                           \
+    if ((call) < 0) {                            \
+      fprintf(stderr, "%s\n", dfm_last_error()); \
+      return 1;                                  \
+    }                                            \
   } while (0)
 
 /* steps per second; dfm_ode_step cuts them into what the ball needs */

@@ -60,7 +60,12 @@ def chains(source):
     outer, text, start = [], "", None
     for match in TOKEN.finditer(source):
         token = match.group(0)
-        if token.startswith(("//", "/*")) or token.lstrip().startswith("#"):
+        if token.startswith(("//", "/*")):
+            continue
+        if token.lstrip().startswith("#"):
+            body = re.sub(r"^\s*#\s*define\s+\w+(?:\([^)]*\))?", "", token.replace("\\\n", "  "))
+            if body != token and re.search(r"\b(?:do|if|return)\b", body):
+                yield from ((match.start() + at, chain) for at, chain in chains(body + ";"))
             continue
         if token.isspace():
             text += " " if text else ""

@@ -22,9 +22,12 @@ const std::pair<const char *, Params> kAll[] = {{"B", tilted(1.5, {1, 2, -0.5})}
 
 // A cell of unit edges of which the spring from point 0 to point 1, along x, is alone switched on: 1 N/m.
 struct OneSpring : Instance {
-  OneSpring(Host &lent, Params p)
-      : Instance(lent, regular_tet(), (p.young = 1 / regular_tet().volume(0), p)) {
+  OneSpring(Host &lent, Params p) : Instance(lent, regular_tet(), unit_stiff(p)) {
     mask({1, 2, 3, 4, 5}, false);
+  }
+  static Params unit_stiff(Params p) {
+    p.young = 1 / regular_tet().volume(0);
+    return p;
   }
   double pull_at(double stretch) {
     set(x, 1, {1 + stretch, 0, 0});

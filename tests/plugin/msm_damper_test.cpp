@@ -18,9 +18,10 @@ Params viscous(int damper, double time, double ratio = 1) {
 // the pull of a step asks for.
 struct OneSpring : Instance {
   static constexpr double k = 50;
-  OneSpring(Host &lent, Params p)
-      : Instance(lent, regular_tet(), (p.young = k / regular_tet().volume(0), p)) {
-    mask({1, 2, 3, 4, 5}, false);
+  OneSpring(Host &lent, Params p) : Instance(lent, regular_tet(), stiff(p)) { mask({1, 2, 3, 4, 5}, false); }
+  static Params stiff(Params p) {
+    p.young = k / regular_tet().volume(0);
+    return p;
   }
   double pull_at(double stretch) {
     set(x, 1, {1 + stretch, 0, 0});

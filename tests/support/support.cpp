@@ -22,8 +22,10 @@ class SkipsFail : public testing::EmptyTestEventListener {
       ADD_FAILURE() << "skipped, although the shared data are present";
   }
 };
-[[maybe_unused]] const bool listening =
-    (testing::UnitTest::GetInstance()->listeners().Append(new SkipsFail), true);
+[[maybe_unused]] const bool listening = [] {
+  testing::UnitTest::GetInstance()->listeners().Append(new SkipsFail);
+  return true;
+}();
 
 }  // namespace
 

@@ -7,8 +7,13 @@
 #include <stdlib.h>
 #include <string.h>
 
-#define TRY(call) \
-  if ((call) < 0) return fprintf(stderr, "%s: %s\n", #call, dfm_last_error()), 1
+#define TRY(call)                                           \
+  do {                                                      \
+    if ((call) < 0) {                                       \
+      fprintf(stderr, "%s: %s\n", #call, dfm_last_error()); \
+      return 1;                                             \
+    }                                                       \
+  } while (0)
 
 extern const dfm_plugin *dfm_plugin_entry_slab(const dfm_host *host, uint32_t host_abi,
                                                uint32_t host_abi_min);

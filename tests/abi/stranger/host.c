@@ -4,8 +4,13 @@
 #include <math.h>
 #include <stdio.h>
 
-#define TRY(call) \
-  if ((call) < 0) return fprintf(stderr, "%s: %s\n", #call, dfm_last_error()), 1
+#define TRY(call)                                           \
+  do {                                                      \
+    if ((call) < 0) {                                       \
+      fprintf(stderr, "%s: %s\n", #call, dfm_last_error()); \
+      return 1;                                             \
+    }                                                       \
+  } while (0)
 
 int main(int argc, char **argv) {
   int major = -1, minor = -1, patch = -1;

@@ -4,9 +4,12 @@
 #include <math.h>
 #include <stdio.h>
 
-#define TRY(call)                                                        \
-  do {                                                                   \
-    if ((call) < 0) return fprintf(stderr, "%s\n", dfm_last_error()), 1; \
+#define TRY(call)                                \
+  do {                                           \
+    if ((call) < 0) {                            \
+      fprintf(stderr, "%s\n", dfm_last_error()); \
+      return 1;                                  \
+    }                                            \
   } while (0)
 
 /* ---- ODE: begin ---------------------------------------------------------------------------------------- */

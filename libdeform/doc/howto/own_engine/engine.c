@@ -6,9 +6,12 @@
 #include <stdlib.h>
 #include <string.h>
 
-#define TRY(call)                                                        \
-  do {                                                                   \
-    if ((call) < 0) return fprintf(stderr, "%s\n", dfm_last_error()), 1; \
+#define TRY(call)                                \
+  do {                                           \
+    if ((call) < 0) {                            \
+      fprintf(stderr, "%s\n", dfm_last_error()); \
+      return 1;                                  \
+    }                                            \
   } while (0)
 
 /* ---- the table: begin ---------------------------------------------------------------------------------- */
