@@ -3,7 +3,7 @@
 #include <benchmark/benchmark.h>
 
 #include "../unit/surfel/detect_scene.h"
-#include "distribute/distribute.h"
+#include "contact/distribute.h"
 #include "mesh/mesh.h"
 
 namespace {

@@ -8,11 +8,11 @@
 #include <filesystem>
 
 #include "../unit/surfel/detect_scene.h"
+#include "body/obstacle_mesh.h"
+#include "geometry/voxel_grid.h"
 #include "mesh/mesh.h"
 #include "mesh/tri_mesh.h"
 #include "support.h"
-#include "surfel/obstacle_mesh.h"
-#include "surfel/voxel_grid.h"
 
 namespace {
 

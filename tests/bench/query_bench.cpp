@@ -14,9 +14,9 @@
 #include "core/handle.h"
 #include "coupled.h"
 #include "machine.h"
+#include "state/world.h"
 #include "world.h"
 #include "world/queries.h"
-#include "world/world.h"
 
 namespace {
 

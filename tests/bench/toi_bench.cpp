@@ -17,8 +17,8 @@
 #include "../unit/narrow/guard_scene.h"
 #include "../unit/narrow/toi_support.h"
 #include "../unit/surfel/detect_scene.h"
+#include "ccd/toi_finders.h"
 #include "machine.h"
-#include "narrow/toi_finders.h"
 
 namespace {
 

@@ -7,7 +7,7 @@
 
 #include "core/handle.h"
 #include "scenes.h"
-#include "world/context.h"
+#include "step/context.h"
 
 namespace {
 

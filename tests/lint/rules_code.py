@@ -6,9 +6,9 @@ from tree import CODE, includes, line_of, without_comments
 
 SRC = "libdeform/src/"
 # A folder may include itself and what stands on a lower level; folders of one level never include each other.
-LEVELS = [["core"], ["math"], ["mesh", "plugin"], ["phyxel", "surfel"], ["model"],
-          ["dynamics", "broad", "narrow", "contact", "friction", "distribute", "rigid"],
-          ["plan"], ["world"], ["rollback"], ["scene", "api"]]
+LEVELS = [["core"], ["math"], ["geometry"], ["mesh", "plugin"], ["body"], ["dynamics", "contact"],
+          ["friction", "broad", "narrow"], ["ccd"], ["plan"], ["state"], ["step"], ["world"], ["rollback"],
+          ["scene", "api"]]
 RANK = {folder: rank for rank, folders in enumerate(LEVELS) for folder in folders}
 # api/ holds one thin file per public header, and scene.h is one of them.
 ALLOWED_BESIDE = {("api", "scene")}
@@ -28,9 +28,9 @@ THIRD_PARTIES = [
     ("Bullet", r"(bullet/|bt[A-Z]\w+\.h|BulletDynamics|LinearMath/)", r"\bbt[A-Z]\w+", "bindings/bullet/"),
 ]
 
-STEP_FOLDERS = tuple(SRC + f + "/" for f in ("math", "phyxel", "surfel", "model", "dynamics", "broad",
-                                             "narrow", "contact",
-                                             "friction", "distribute", "rigid", "world", "rollback"))
+STEP_FOLDERS = tuple(SRC + f + "/" for f in (
+    "math", "geometry", "body", "dynamics", "contact", "friction", "broad", "narrow", "ccd", "state", "step",
+    "world", "rollback"))
 LIBM = ("exp exp2 expm1 log2 log10 log1p log sin cos tan asin acos atan atan2 sinh cosh tanh asinh acosh "
         "atanh sincos pow cbrt "
         "hypot erf erfc tgamma lgamma").split()
@@ -45,8 +45,8 @@ def _resolves(tree, path, name):
 
 
 def layers(tree):
-    """core <- math <- {mesh, plugin} <- {phyxel, surfel} <- stages <- plan <- world <- rollback <- {scene,
-    api}."""
+    """core <- math <- geometry <- {mesh, plugin} <- body <- {dynamics, contact} <- {friction, broad,
+    narrow} <- ccd <- plan <- state <- step <- world <- rollback <- {scene, api}."""
     for path in tree.select(SRC):
         own = path[len(SRC):].split("/")[0]
         for line, _, name in includes(tree.text(path)):

@@ -9,9 +9,8 @@ TOP = {"CMakeLists.txt", "libdeform", "plugins", "bindings", "examples", "tests"
 BELOW = {
     "libdeform": {"CMakeLists.txt", "include", "src", "schema", "doc"},
     "libdeform/include": {"deform"},
-    "libdeform/src": {"core", "math", "mesh", "phyxel", "surfel", "plugin", "plan", "model", "dynamics",
-                      "broad", "narrow",
-                      "contact", "friction", "distribute", "rigid", "world", "rollback", "scene", "api"},
+    "libdeform/src": {"core", "math", "geometry", "mesh", "plugin", "body", "dynamics", "contact", "friction",
+                      "broad", "narrow", "ccd", "plan", "state", "step", "world", "rollback", "scene", "api"},
     "libdeform/doc": {"README.md", "concepts", "reference", "models", "laws", "howto", "decisions", "images"},
     "bindings": {"CMakeLists.txt", "cli", "render", "ode", "bullet", "python"},
     "tests": {"CMakeLists.txt", "README.md", "support", "data", "unit", "analytic", "stability", "api",

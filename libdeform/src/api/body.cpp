@@ -3,16 +3,16 @@
 #include <cmath>
 
 #include "api/objects.h"
-#include "world/bounds.h"
-#include "world/spring.h"
+#include "state/bounds.h"
+#include "state/held.h"
+#include "state/spring.h"
+#include "step/context.h"
+#include "step/energy_watch.h"
+#include "step/method.h"
+#include "step/stages.h"
 #include "world/create.h"
-#include "world/held.h"
 #include "world/measure.h"
 #include "world/queries.h"
-#include "world/context.h"
-#include "world/method.h"
-#include "world/stages.h"
-#include "world/energy_watch.h"
 
 using namespace dfm;
 

@@ -5,11 +5,11 @@
 
 #include "api/objects.h"
 #include "friction/pair_rules.h"
+#include "step/context.h"
+#include "step/stages.h"
+#include "step/step_impulses.h"
 #include "world/friction_rules.h"
 #include "world/measure.h"
-#include "world/context.h"
-#include "world/stages.h"
-#include "world/step_impulses.h"
 
 using namespace dfm;
 

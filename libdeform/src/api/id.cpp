@@ -1,7 +1,7 @@
 #include "deform/id.h"
 
 #include "core/handle.h"
-#include "world/world.h"
+#include "state/world.h"
 
 using namespace dfm;
 

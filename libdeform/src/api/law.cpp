@@ -10,8 +10,8 @@
 #include "api/objects.h"
 #include "plugin/call.h"
 #include "plugin/params.h"
-#include "world/context.h"
-#include "world/stages.h"
+#include "step/context.h"
+#include "step/stages.h"
 
 namespace dfm {
 namespace {

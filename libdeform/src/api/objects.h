@@ -5,7 +5,7 @@
 
 #include "api/guard.h"
 #include "core/handle.h"
-#include "world/world.h"
+#include "state/world.h"
 
 namespace dfm {
 

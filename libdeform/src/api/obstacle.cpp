@@ -3,11 +3,11 @@
 #include <cmath>
 
 #include "api/objects.h"
-#include "world/bounds.h"
+#include "state/bounds.h"
+#include "step/context.h"
+#include "step/method.h"
+#include "step/stages.h"
 #include "world/create.h"
-#include "world/context.h"
-#include "world/method.h"
-#include "world/stages.h"
 
 using namespace dfm;
 

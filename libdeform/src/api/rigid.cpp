@@ -1,9 +1,9 @@
 #include "deform/rigid.h"
 
 #include "api/objects.h"
-#include "world/context.h"
-#include "world/stages.h"
-#include "world/rigid.h"
+#include "step/context.h"
+#include "step/rigid.h"
+#include "step/stages.h"
 
 using namespace dfm;
 

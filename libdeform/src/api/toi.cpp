@@ -4,7 +4,7 @@
 #include <cstring>
 
 #include "api/guard.h"
-#include "narrow/toi.h"
+#include "ccd/toi.h"
 
 namespace dfm {
 namespace {

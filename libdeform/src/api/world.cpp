@@ -5,11 +5,11 @@
 
 #include "api/objects.h"
 #include "rollback/rollback.h"
+#include "step/context.h"
+#include "step/method.h"
+#include "step/stages.h"
+#include "step/step_bound.h"
 #include "world/explain.h"
-#include "world/method.h"
-#include "world/step_bound.h"
-#include "world/context.h"
-#include "world/stages.h"
 #include "world/snapshot.h"
 
 using namespace dfm;

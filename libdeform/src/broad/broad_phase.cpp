@@ -3,8 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
-#include "surfel/closest.h"
-#include "surfel/obstacle_shape.h"
+#include "geometry/closest.h"
+#include "geometry/obstacle_shape.h"
 
 namespace dfm {
 namespace {

@@ -11,11 +11,11 @@
 #include <cstdint>
 #include <span>
 
-#include "broad/box_tree.h"
 #include "broad/pair_filter.h"
+#include "contact/reach.h"
 #include "core/memory.h"
-#include "surfel/reach.h"
-#include "surfel/views.h"
+#include "geometry/box_tree.h"
+#include "geometry/views.h"
 
 namespace dfm {
 

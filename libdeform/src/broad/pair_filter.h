@@ -4,7 +4,7 @@
 #include <cstdint>
 
 #include "core/memory.h"
-#include "surfel/views.h"
+#include "geometry/views.h"
 
 namespace dfm {
 

@@ -1,8 +1,8 @@
 // How a surface has moved, and moves, beyond a rigid motion: only that brings parts of it together.
 #pragma once
 #include "core/memory.h"
+#include "geometry/surface.h"
 #include "math/vec3.h"
-#include "surfel/surface.h"
 
 namespace dfm {
 

@@ -5,12 +5,12 @@
 // are taken against the one that fits best: a body that falls or rolls keeps its lists. And features that
 // share a surfel are no pair: they always touch.
 #pragma once
-#include "broad/box_tree.h"
+#include "body/self_rest.h"
 #include "broad/rigid_fit.h"
 #include "core/memory.h"
+#include "geometry/box_tree.h"
+#include "geometry/surface.h"
 #include "math/vec3.h"
-#include "surfel/self_rest.h"
-#include "surfel/surface.h"
 
 namespace dfm {
 

@@ -3,8 +3,8 @@
 #include <algorithm>
 #include <span>
 
-#include "surfel/closest.h"
-#include "surfel/reach.h"
+#include "contact/reach.h"
+#include "geometry/closest.h"
 
 namespace dfm {
 namespace {

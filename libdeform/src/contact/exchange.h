@@ -24,9 +24,9 @@
 #pragma once
 #include <span>
 
+#include "contact/contact_set.h"
 #include "contact/rows.h"
 #include "core/memory.h"
-#include "surfel/contact_set.h"
 
 namespace dfm {
 

@@ -24,8 +24,8 @@
 #pragma once
 #include <span>
 
+#include "contact/contact_set.h"
 #include "core/memory.h"
-#include "surfel/contact_set.h"
 
 namespace dfm {
 

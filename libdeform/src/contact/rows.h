@@ -14,9 +14,9 @@
 #pragma once
 #include <span>
 
+#include "contact/contact_set.h"
+#include "geometry/surface.h"
 #include "math/vec3.h"
-#include "surfel/contact_set.h"
-#include "surfel/surface.h"
 
 namespace dfm {
 

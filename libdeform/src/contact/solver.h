@@ -1,9 +1,9 @@
 // Normal contact and friction of one sub-step: inner sweeps of block Gauss-Seidel on the laws as they were
-// linearized by the last outer pass. The outer loop (which asks the laws) is world/solve.cpp; the mathematics
+// linearized by the last outer pass. The outer loop (which asks the laws) is step/solve.cpp; the mathematics
 // is doc/concepts/contact.md.
 #pragma once
+#include "contact/contact_state.h"
 #include "contact/rows.h"
-#include "surfel/contact_state.h"
 
 namespace dfm {
 

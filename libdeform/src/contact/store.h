@@ -3,8 +3,8 @@
 #pragma once
 #include <span>
 
+#include "contact/contact_state.h"
 #include "contact/rows.h"
-#include "surfel/contact_state.h"
 
 namespace dfm {
 

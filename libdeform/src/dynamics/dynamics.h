@@ -17,9 +17,9 @@
 #include <limits>
 #include <memory>
 
-#include "model/model.h"
-#include "phyxel/phyxels.h"
-#include "surfel/surface.h"
+#include "body/phyxels.h"
+#include "dynamics/model.h"
+#include "geometry/surface.h"
 
 namespace dfm {
 
@@ -46,7 +46,7 @@ struct Abilities {
   bool forces = false;   // add_forces() does something
   bool springs = false;  // loads may depend on the state: bound() takes their row sums
   bool placed = false;   // its points may be put elsewhere, one by one
-  bool energy = false;   // the energy that its scheme keeps is known (world/energy_watch.h)
+  bool energy = false;   // the energy that its scheme keeps is known (step/energy_watch.h)
 };
 
 class Dynamics {

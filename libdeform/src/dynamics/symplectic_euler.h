@@ -2,7 +2,7 @@
 // over the sub-step is v', which is what contact needs. (The position form loses h^2 a to rounding:
 // doc/concepts/step.md.)
 #pragma once
-#include "phyxel/phyxels.h"
+#include "body/phyxels.h"
 
 namespace dfm {
 

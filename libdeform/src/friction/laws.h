@@ -5,10 +5,10 @@
 #include <string>
 #include <vector>
 
+#include "contact/contact_state.h"
 #include "core/memory.h"
 #include "deform/base.h"
-#include "surfel/contact_state.h"
-#include "surfel/surface.h"
+#include "geometry/surface.h"
 
 namespace dfm {
 

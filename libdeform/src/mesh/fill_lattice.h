@@ -8,8 +8,8 @@
 #include <cstdint>
 #include <functional>
 
+#include "geometry/winding.h"
 #include "mesh/tri_mesh.h"
-#include "mesh/winding.h"
 
 namespace dfm {
 

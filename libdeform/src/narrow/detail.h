@@ -5,12 +5,12 @@
 #include <cstdint>
 #include <span>
 
-#include "surfel/contact_set.h"
-#include "surfel/convex.h"
-#include "surfel/obstacle_shape.h"
-#include "surfel/reach.h"
-#include "surfel/views.h"
-#include "surfel/voxel_grid.h"
+#include "contact/contact_set.h"
+#include "contact/reach.h"
+#include "geometry/convex.h"
+#include "geometry/obstacle_shape.h"
+#include "geometry/views.h"
+#include "geometry/voxel_grid.h"
 
 namespace dfm::narrow {
 

@@ -10,8 +10,8 @@
 // apart than the surfaces, so such a contact keeps nothing away that the others would let come.
 #include <algorithm>
 
+#include "geometry/closest.h"
 #include "narrow/detail.h"
-#include "surfel/closest.h"
 
 namespace dfm::narrow {
 

@@ -2,8 +2,8 @@
 
 #include <algorithm>
 
+#include "geometry/area.h"
 #include "narrow/detail.h"
-#include "surfel/area.h"
 
 namespace dfm {
 namespace {

@@ -13,9 +13,9 @@
 #include <cstdint>
 #include <span>
 
+#include "contact/contact_set.h"
 #include "core/memory.h"
-#include "surfel/contact_set.h"
-#include "surfel/views.h"
+#include "geometry/views.h"
 
 namespace dfm {
 

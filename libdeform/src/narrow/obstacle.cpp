@@ -3,9 +3,9 @@
 // same rule as between bodies: only local minima of the distance, seen from outside.
 #include <algorithm>
 
+#include "geometry/area.h"
+#include "geometry/closest.h"
 #include "narrow/detail.h"
-#include "surfel/area.h"
-#include "surfel/closest.h"
 
 namespace dfm::narrow {
 

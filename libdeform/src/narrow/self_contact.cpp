@@ -19,9 +19,9 @@
 #include <algorithm>
 #include <initializer_list>
 
+#include "geometry/area.h"
+#include "geometry/closest.h"
 #include "narrow/detail.h"
-#include "surfel/area.h"
-#include "surfel/closest.h"
 
 namespace dfm {
 namespace {
@@ -29,7 +29,7 @@ namespace {
 using namespace narrow;
 
 // Sine of the fold at the positions x + ahead v: negative where the edge is convex; an open edge is as convex
-// as can be (surfel/convex.h).
+// as can be (geometry/convex.h).
 double fold(const Surface &s, uint32_t edge, double ahead) {
   const uint32_t *const ends = &s.edge[2 * size_t{edge}], *const tris = &s.edge_tri[2 * size_t{edge}];
   if (tris[0] == kNone || tris[1] == kNone) return -1;

@@ -4,10 +4,10 @@
 #include <functional>
 #include <span>
 
+#include "body/self_rest.h"
+#include "contact/contact_set.h"
 #include "core/memory.h"
-#include "surfel/contact_set.h"
-#include "surfel/self_rest.h"
-#include "surfel/views.h"
+#include "geometry/views.h"
 
 namespace dfm {
 

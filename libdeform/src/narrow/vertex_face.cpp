@@ -12,9 +12,9 @@
 // planes across concave edges): the far side of a thin body does not pull p through.
 #include <algorithm>
 
+#include "geometry/area.h"
+#include "geometry/closest.h"
 #include "narrow/detail.h"
-#include "surfel/area.h"
-#include "surfel/closest.h"
 
 namespace dfm::narrow {
 namespace {

@@ -1,7 +1,7 @@
 // The plan: which stages a sub-step runs, and which effects they are there for, derived from what the scene
 // contains. A stage that nothing calls for is not in the list, so it costs no instruction; `deform explain`
 // prints both lists with the reasons. The order of the stages is that of the contact method's table
-// (world/method.h).
+// (step/method.h).
 #pragma once
 #include <cstddef>
 #include <string>

@@ -3,11 +3,11 @@
 #include <algorithm>
 #include <cmath>
 
+#include "ccd/toi.h"
+#include "geometry/area.h"
+#include "geometry/closest.h"
+#include "geometry/obstacle_shape.h"
 #include "narrow/detail.h"
-#include "narrow/toi.h"
-#include "surfel/area.h"
-#include "surfel/closest.h"
-#include "surfel/obstacle_shape.h"
 
 namespace dfm::rollback {
 namespace {

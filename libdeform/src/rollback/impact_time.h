@@ -9,8 +9,8 @@
 #include <cstdint>
 #include <span>
 
-#include "surfel/contact_set.h"
-#include "surfel/views.h"
+#include "contact/contact_set.h"
+#include "geometry/views.h"
 
 namespace dfm::rollback {
 

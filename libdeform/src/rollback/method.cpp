@@ -2,8 +2,8 @@
 #include "rollback/rollback.h"
 
 #include "rollback/stages.h"
-#include "world/stage_costs.h"
-#include "world/stages.h"
+#include "step/stage_costs.h"
+#include "step/stages.h"
 
 namespace dfm::rollback {
 namespace {

@@ -2,7 +2,7 @@
 // 5.4. Vertices that collide go back to the time of their impact. doc/concepts/rollback.md,
 // doc/decisions/0022-rollback-to-compare.md.
 #pragma once
-#include "world/method.h"
+#include "step/method.h"
 
 namespace dfm::rollback {
 

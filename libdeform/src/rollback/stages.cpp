@@ -17,13 +17,13 @@
 
 #include <algorithm>
 
+#include "body/make_surface.h"
 #include "core/error.h"
 #include "rollback/equations.h"
 #include "rollback/impact_time.h"
-#include "surfel/make_surface.h"
-#include "world/context.h"
-#include "world/stages.h"
-#include "world/world.h"
+#include "state/world.h"
+#include "step/context.h"
+#include "step/stages.h"
 
 namespace dfm::rollback {
 

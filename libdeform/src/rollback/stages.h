@@ -3,7 +3,7 @@
 #include <cstdint>
 #include <memory>
 
-#include "world/method.h"
+#include "step/method.h"
 
 namespace dfm::rollback {
 

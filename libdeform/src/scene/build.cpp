@@ -4,7 +4,7 @@
 #include <utility>
 
 #include "core/error.h"
-#include "rigid/host.h"
+#include "dynamics/rigid/host.h"
 #include "scene/load.h"
 
 namespace dfm::scene {

@@ -6,7 +6,7 @@
 #include <filesystem>
 
 #include "scene/keys.h"
-#include "world/step_sizes.h"
+#include "state/step_sizes.h"
 
 namespace dfm::scene {
 

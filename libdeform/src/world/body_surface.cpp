@@ -2,10 +2,10 @@
 
 #include <cmath>
 
+#include "body/make_surface.h"
 #include "core/error.h"
 #include "mesh/mesh.h"
-#include "surfel/make_surface.h"
-#include "world/world.h"
+#include "state/world.h"
 
 namespace dfm {
 namespace {

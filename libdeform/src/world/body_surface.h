@@ -1,6 +1,6 @@
 // The skin of a new body: the boundary of its cells, or a surface of its own that hangs on its points.
 #pragma once
-#include "world/body.h"
+#include "state/body.h"
 
 namespace dfm {
 

@@ -5,10 +5,10 @@
 #include <cstring>
 #include <optional>
 
+#include "body/coupling_rows.h"
 #include "core/error.h"
 #include "mesh/mesh.h"
-#include "surfel/coupling_rows.h"
-#include "world/world.h"
+#include "state/world.h"
 
 namespace dfm {
 namespace {

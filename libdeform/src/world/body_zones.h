@@ -1,6 +1,6 @@
 // Which group and which material each triangle of a body's surface has.
 #pragma once
-#include "world/material.h"
+#include "state/material.h"
 
 namespace dfm {
 

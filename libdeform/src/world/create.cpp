@@ -9,14 +9,14 @@
 #include "core/handle.h"
 #include "friction/pair_rules.h"
 #include "mesh/mesh.h"
+#include "state/bounds.h"
+#include "state/material.h"
+#include "step/context.h"
+#include "step/method.h"
+#include "step/stages.h"
 #include "world/body_surface.h"
 #include "world/body_zones.h"
-#include "world/bounds.h"
 #include "world/idle.h"
-#include "world/material.h"
-#include "world/context.h"
-#include "world/method.h"
-#include "world/stages.h"
 
 namespace dfm {
 namespace {

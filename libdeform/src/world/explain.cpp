@@ -4,9 +4,9 @@
 #include <cmath>
 
 #include "core/error.h"
+#include "step/context.h"
+#include "step/method.h"
 #include "world/idle.h"
-#include "world/context.h"
-#include "world/method.h"
 
 namespace dfm {
 namespace {

@@ -8,11 +8,11 @@
 #include "core/error.h"
 #include "friction/pair_rules.h"
 #include "plugin/params.h"
-#include "world/context.h"
-#include "world/method.h"
-#include "world/stages.h"
-#include "world/world.h"
-#include "world/pair_table.h"
+#include "state/world.h"
+#include "step/context.h"
+#include "step/method.h"
+#include "step/pair_table.h"
+#include "step/stages.h"
 
 namespace dfm {
 namespace {

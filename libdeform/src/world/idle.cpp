@@ -4,7 +4,7 @@
 #include <cstring>
 
 #include "core/error.h"
-#include "world/world.h"
+#include "state/world.h"
 
 namespace dfm {
 namespace {

@@ -4,8 +4,8 @@
 #include <string>
 #include <vector>
 
-#include "world/body.h"
-#include "world/material.h"
+#include "state/body.h"
+#include "state/material.h"
 
 namespace dfm {
 

@@ -4,10 +4,10 @@
 #include <cmath>
 
 #include "core/error.h"
-#include "plugin/registry.h"
 #include "plugin/params.h"
-#include "world/stages.h"
-#include "world/world.h"
+#include "plugin/registry.h"
+#include "state/world.h"
+#include "step/stages.h"
 
 namespace dfm {
 

@@ -1,6 +1,6 @@
 // Sums over a body: momentum, energy, volume; the model's own energy and its runtime parameters.
 #pragma once
-#include "world/body.h"
+#include "state/body.h"
 
 namespace dfm {
 

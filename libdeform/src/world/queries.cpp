@@ -2,9 +2,9 @@
 
 #include <algorithm>
 
-#include "surfel/closest.h"
-#include "surfel/views.h"
-#include "world/world.h"
+#include "geometry/closest.h"
+#include "geometry/views.h"
+#include "state/world.h"
 
 namespace dfm {
 namespace {

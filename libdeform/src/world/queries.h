@@ -1,7 +1,7 @@
 // Questions about the present state that no step needs: surface vectors and normals, rays, closest points.
 #pragma once
-#include "broad/triangle_search.h"
-#include "world/body.h"
+#include "geometry/triangle_search.h"
+#include "state/body.h"
 
 namespace dfm {
 
@@ -12,7 +12,7 @@ Vec3 surfel_vector(const Body &b, const Array<double> &phyxel_column, uint32_t s
 // [nsurfel,3], area-weighted
 void surface_normals(const Body &b, double *out);
 // Several threads may ask at once. The first who asks after positions have changed renews the trees
-// (world/search_tree.h); a later one allocates nothing.
+// (state/search_tree.h); a later one allocates nothing.
 dfm_ray_hit cast_ray(World &w, Vec3 origin, Vec3 unit_direction, double max_distance,
                      SearchCount *count = nullptr);
 dfm_ray_hit closest_surface(World &w, Vec3 p, double max_distance, SearchCount *count = nullptr);

@@ -4,11 +4,11 @@
 #include <cmath>
 
 #include "core/error.h"
-#include "world/bounds.h"
+#include "state/bounds.h"
+#include "state/world.h"
+#include "step/method.h"
+#include "step/rigid.h"
 #include "world/create.h"
-#include "world/rigid.h"
-#include "world/method.h"
-#include "world/world.h"
 
 namespace dfm {
 namespace {

@@ -13,16 +13,16 @@
 #include <cstring>
 #include <numeric>
 
+#include "body/make_surface.h"
 #include "core/error.h"
 #include "core/hash.h"
-#include "surfel/make_surface.h"
 #include "plugin/params.h"
+#include "state/world.h"
+#include "step/context.h"
+#include "step/method.h"
+#include "step/stages.h"
 #include "world/measure.h"
 #include "world/snapshot_stream.h"
-#include "world/context.h"
-#include "world/method.h"
-#include "world/stages.h"
-#include "world/world.h"
 
 namespace dfm {
 namespace {

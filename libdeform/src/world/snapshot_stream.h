@@ -16,7 +16,7 @@
 #include "core/hash.h"
 #include "deform/math.h"
 #include "math/vec3.h"
-#include "world/motion.h"
+#include "state/motion.h"
 
 namespace dfm {
 

@@ -1,7 +1,7 @@
 #include <gtest/gtest.h>
 
-#include "../surfel/detect_scene.h"
-#include "surfel/closest.h"
+#include "../narrow/detect_scene.h"
+#include "geometry/closest.h"
 
 namespace {
 

@@ -7,9 +7,9 @@
 #include <random>
 #include <set>
 
-#include "surfel/closest.h"
-#include "surfel/make_surface.h"
-#include "surfel/reach.h"
+#include "body/make_surface.h"
+#include "contact/reach.h"
+#include "geometry/closest.h"
 
 namespace dfm {
 namespace {

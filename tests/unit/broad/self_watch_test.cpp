@@ -6,9 +6,9 @@
 #include <algorithm>
 #include <random>
 
-#include "surfel/closest.h"
-#include "surfel/make_surface.h"
-#include "surfel/reach.h"
+#include "body/make_surface.h"
+#include "contact/reach.h"
+#include "geometry/closest.h"
 
 namespace dfm {
 namespace {

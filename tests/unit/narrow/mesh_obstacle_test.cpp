@@ -1,9 +1,9 @@
 // Meshes and voxels as obstacles: the same contacts as between bodies, on the body's dofs alone.
 #include <gtest/gtest.h>
 
-#include "../surfel/detect_scene.h"
-#include "surfel/obstacle_mesh.h"
-#include "surfel/voxel_grid.h"
+#include "body/obstacle_mesh.h"
+#include "detect_scene.h"
+#include "geometry/voxel_grid.h"
 
 namespace {
 

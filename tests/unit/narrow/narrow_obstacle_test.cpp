@@ -1,8 +1,8 @@
 #include <gtest/gtest.h>
 
-#include "../surfel/detect_scene.h"
-#include "surfel/closest.h"
-#include "surfel/obstacle_shape.h"
+#include "detect_scene.h"
+#include "geometry/closest.h"
+#include "geometry/obstacle_shape.h"
 
 namespace {
 

@@ -2,10 +2,10 @@
 
 #include <set>
 
-#include "../surfel/detect_scene.h"
 #include "core/hash.h"
-#include "surfel/area.h"
-#include "surfel/closest.h"
+#include "detect_scene.h"
+#include "geometry/area.h"
+#include "geometry/closest.h"
 
 namespace {
 

@@ -1,12 +1,12 @@
-// Cones of normals (surfel/convex.h): a feature makes a contact only along a direction in which it is the
+// Cones of normals (geometry/convex.h): a feature makes a contact only along a direction in which it is the
 // first of its surface. Flat patches have no ghosts at the rim of what slides over them, what sticks out
 // keeps its contact, and next to an edge's end either the end has it or the edge.
 #include <gtest/gtest.h>
 
 #include <set>
 
-#include "../surfel/detect_scene.h"
-#include "surfel/convex.h"
+#include "detect_scene.h"
+#include "geometry/convex.h"
 
 namespace {
 

@@ -3,7 +3,7 @@
 
 #include "core/error.h"
 #include "rollback/rollback.h"
-#include "world/method.h"
+#include "step/method.h"
 
 namespace {
 

@@ -6,8 +6,8 @@
 #include "obstacle.h"
 #include "rigid.h"
 #include "stack.h"
-#include "world/context.h"
-#include "world/pair_table.h"
+#include "step/context.h"
+#include "step/pair_table.h"
 
 namespace {
 

@@ -1,7 +1,7 @@
 // The library's own world behind a handle.
 #pragma once
 #include "core/handle.h"
-#include "world/world.h"
+#include "state/world.h"
 
 namespace test {
 

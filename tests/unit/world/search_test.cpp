@@ -5,12 +5,12 @@
 #include <random>
 #include <thread>
 
-#include "../surfel/detect_scene.h"
+#include "../narrow/detect_scene.h"
 #include "core/handle.h"
 #include "obstacle.h"
 #include "stack.h"
+#include "state/world.h"
 #include "world/queries.h"
-#include "world/world.h"
 
 namespace {
 

@@ -1,0 +1,309 @@
+// A surfel takes the motion of the phyxels that reach it, each carried on to the surfel by its own gradient
+// (Zerbato 2010, (3.9), with the corrections of doc/concepts/couplings.md):
+//
+//   u_s = sum_i W_i (u_i + H_i (X_s - X_i)),   W_i = w(|X_s - X_i|, h_i) / sum,
+//   H_i = sum_j w_ij (u_j - u_i) X_ij^T A_i^-1,   A_i = sum_j w_ij X_ij X_ij^T,   X_ij = X_j - X_i,
+//   w_ij = w(|X_ij|, h_i),   w(r, h) = 315/(64 pi h^9) (h^2 - r^2)^3  (3.11)
+//
+// All positions are rest positions, so that this is one row of N. h_i, the support, belongs to the phyxel i.
+// Every term in the sum over i extrapolates linear fields exactly, hence so does the row; without the
+// gradient (Shepard, couple_thesis) only constants are.
+#include <limits>
+
+#include "body/coupling_rows.h"
+
+namespace dfm {
+namespace {
+
+constexpr uint32_t kNeighbours = 10;  // whose mean distance is the unit of the support
+// det(A / trace A) below this: the neighbors lie in a plane (1/27 for a sphere of them)
+constexpr double kFlat = 1e-10;
+
+// (3.11) without its constant factor, which cancels in every quotient; (1 - r2/h2)^3 / h^3 neither over- nor
+// underflows at any scale of length.
+double kernel(double r2, double h) {
+  const double q = 1 - r2 / (h * h);
+  return q > 0 ? q * q * q / (h * h * h) : 0;
+}
+
+struct Symmetric {
+  double xx = 0, yy = 0, zz = 0, xy = 0, xz = 0, yz = 0;
+  void add(double w, Vec3 a) {
+    xx += w * a.x * a.x;
+    yy += w * a.y * a.y;
+    zz += w * a.z * a.z;
+    xy += w * a.x * a.y;
+    xz += w * a.x * a.z;
+    yz += w * a.y * a.z;
+  }
+};
+
+// The inverse, unless the vectors lie in a plane.
+bool invert(const Symmetric &s, Symmetric &out) {
+  const double trace = s.xx + s.yy + s.zz;
+  if (!(trace > 0)) return false;
+  const double f = 1 / trace;
+  const double a = f * s.xx;
+  const double b = f * s.yy;
+  const double c = f * s.zz;
+  const double d = f * s.xy;
+  const double e = f * s.xz;
+  const double g = f * s.yz;
+  const double cxx = b * c - g * g, cxy = e * g - d * c, cxz = d * g - b * e;
+  const double det = a * cxx + d * cxy + e * cxz;
+  if (!(det > kFlat)) return false;
+  const double scale = f / det;
+  out = {scale * cxx, scale * (a * c - e * e), scale * (a * b - d * d), scale * cxy,
+         scale * cxz, scale * (d * e - a * g)};
+  return true;
+}
+Vec3 operator*(const Symmetric &s, Vec3 v) {
+  return {s.xx * v.x + s.xy * v.y + s.xz * v.z, s.xy * v.x + s.yy * v.y + s.yz * v.z,
+          s.xz * v.x + s.yz * v.y + s.zz * v.z};
+}
+
+class Cloud {
+ public:
+  Cloud(const Memory &memory, const CouplingInput &in)
+      : rest(memory, in),
+        support(in.npoint, 0.0, HookAllocator<double>(memory)),
+        dots_(dots(memory, rest.point)),
+        dot_tree_(memory, dots_),
+        cubes_(find_supports(memory, in.support)),
+        cube_tree_(memory, cubes_) {}
+
+  LocalRest rest;
+  Array<double> support;  // [npoint] h_i, m
+
+  // Phyxels that reach x, ascending.
+  void reaching(Vec3 x, Array<uint32_t> &out) const {
+    out.clear();
+    cube_tree_.holding(x, [&](uint32_t i) {
+      if (norm2(x - rest.point[i]) < support[i] * support[i]) out.push_back(i);
+    });
+    std::sort(out.begin(), out.end());
+  }
+  // Other phyxels within the support of i, ascending.
+  void around(uint32_t i, Array<uint32_t> &out) const {
+    const double h2 = support[i] * support[i];
+    dot_tree_.near(rest.point[i], h2, [&](uint32_t j) {
+      if (j != i && norm2(rest.point[j] - rest.point[i]) < h2) out.push_back(j);
+    });
+    std::sort(out.begin(), out.end());
+  }
+
+ private:
+  Array<RestBox> dots_;
+  RestTree dot_tree_;
+  Array<RestBox> cubes_;
+  RestTree cube_tree_;
+
+  static Array<RestBox> dots(const Memory &memory, const Array<Vec3> &x) {
+    Array<RestBox> out(HookAllocator<RestBox>{memory});
+    for (const Vec3 p : x) out.push_back({p, p});
+    return out;
+  }
+  // Sets the supports; returns the cubes around them.
+  Array<RestBox> find_supports(const Memory &memory, double factor) {
+    Array<RestBox> cubes(HookAllocator<RestBox>{memory});
+    for (uint32_t i = 0; i < support.size(); ++i) {
+      double nearest[kNeighbours], limit2 = std::numeric_limits<double>::infinity();
+      uint32_t n = 0;
+      dot_tree_.near(rest.point[i], limit2, [&](uint32_t j) {
+        if (j == i) return;
+        const double d2 = norm2(rest.point[j] - rest.point[i]);
+        if (n == kNeighbours && d2 >= limit2) return;
+        uint32_t at = n < kNeighbours ? n++ : kNeighbours - 1;
+        for (; at > 0 && nearest[at - 1] > d2; --at) nearest[at] = nearest[at - 1];
+        nearest[at] = d2;
+        if (n == kNeighbours) limit2 = nearest[kNeighbours - 1];
+      });
+      double sum = 0;
+      for (uint32_t k = 0; k < n; ++k) sum += std::sqrt(nearest[k]);
+      const double h = n ? factor * sum / n : 0;
+      support[i] = h;
+      cubes.push_back({rest.point[i] - Vec3{h, h, h}, rest.point[i] + Vec3{h, h, h}});
+    }
+    return cubes;
+  }
+};
+
+// Neighbourhoods of the phyxels that reach a surfel, made when first met.
+class Neighbourhoods {
+ public:
+  Neighbourhoods(const Memory &memory, const Cloud &cloud)
+      : cloud_(cloud),
+        known_(cloud.support.size(), Known{}, HookAllocator<Known>(memory)),
+        neighbor_(HookAllocator<uint32_t>(memory)),
+        list_(HookAllocator<uint32_t>(memory)) {}
+  // state 0 not looked at, 1 spans space, 2 flat
+  struct Known {
+    size_t begin = 0, end = 0;
+    Symmetric inverse;
+    uint8_t state = 0;
+  };
+  const Known &of(uint32_t i) {
+    Known &k = known_[i];
+    if (k.state) return k;
+    list_.clear();
+    cloud_.around(i, list_);
+    k.begin = neighbor_.size();
+    neighbor_.insert(neighbor_.end(), list_.begin(), list_.end());
+    k.end = neighbor_.size();
+    Symmetric a;
+    for (uint32_t j : list_) {
+      const Vec3 d = cloud_.rest.point[j] - cloud_.rest.point[i];
+      a.add(kernel(norm2(d), cloud_.support[i]), d);
+    }
+    k.state = invert(a, k.inverse) ? 1 : 2;
+    return k;
+  }
+  uint32_t operator[](size_t k) const { return neighbor_[k]; }
+
+ private:
+  const Cloud &cloud_;
+  Array<Known> known_;
+  Array<uint32_t> neighbor_, list_;
+};
+
+// One row by scattering into a dense column, with the list of what was touched.
+class RowBuilder {
+ public:
+  RowBuilder(const Memory &memory, uint32_t npoint)
+      : value_(npoint, 0.0, HookAllocator<double>(memory)),
+        met_(npoint, uint8_t{0}, HookAllocator<uint8_t>(memory)),
+        touched_(HookAllocator<uint32_t>(memory)),
+        row_(HookAllocator<RowEntry>(memory)) {}
+  void add(uint32_t i, double w) {
+    if (!met_[i]) {
+      met_[i] = 1;
+      touched_.push_back(i);
+    }
+    value_[i] += w;
+  }
+  Array<RowEntry> &take() {
+    row_.clear();
+    std::sort(touched_.begin(), touched_.end());
+    for (uint32_t i : touched_) {
+      if (value_[i] != 0) row_.push_back({i, value_[i]});
+      value_[i] = 0;
+      met_[i] = 0;
+    }
+    touched_.clear();
+    return row_;
+  }
+
+ private:
+  Array<double> value_;
+  Array<uint8_t> met_;
+  Array<uint32_t> touched_;
+  Array<RowEntry> row_;
+};
+
+// Rounding in A^-1 of a flat neighborhood grows with its condition: the row is given back the linear fields
+// that it lost, by the least change relative to |w_j|:  w_j += |w_j| p_j . M^-1 (p_s - sum w p),  p = (1, X -
+// X_s),  M = sum |w| p p^T.
+void restore_linear(const Array<Vec3> &point, Vec3 x, Array<RowEntry> &row) {
+  double extent2 = 0;
+  for (const RowEntry &e : row) extent2 = std::max(extent2, norm2(point[e.col] - x));
+  const double unit = extent2 > 0 ? 1 / std::sqrt(extent2) : 0;
+  const auto basis = [&](uint32_t i, double p[4]) {
+    p[0] = 1;
+    store3(p + 1, unit * (point[i] - x));
+  };
+  double m[4][4] = {}, r[4] = {1, 0, 0, 0}, p[4];
+  for (const RowEntry &e : row) {
+    basis(e.col, p);
+    for (int a = 0; a < 4; ++a) {
+      r[a] -= e.weight * p[a];
+      for (int b = 0; b <= a; ++b) m[a][b] += std::fabs(e.weight) * p[a] * p[b];
+    }
+  }
+  for (int a = 0; a < 4; ++a) {  // Cholesky: m = L L^T
+    for (int b = 0; b <= a; ++b) {
+      double s = m[a][b];
+      for (int k = 0; k < b; ++k) s -= m[a][k] * m[b][k];
+      if (a == b && !(s > 1e-14 * m[0][0])) return;  // all but flat: what the row has is as good as it gets
+      m[a][b] = a == b ? std::sqrt(s) : s / m[b][b];
+    }
+    for (int k = 0; k < a; ++k) r[a] -= m[a][k] * r[k];
+    r[a] /= m[a][a];
+  }
+  for (int a = 3; a >= 0; --a) {
+    for (int k = a + 1; k < 4; ++k) r[a] -= m[k][a] * r[k];
+    r[a] /= m[a][a];
+  }
+  for (RowEntry &e : row) {
+    basis(e.col, p);
+    e.weight += std::fabs(e.weight) * (r[0] * p[0] + r[1] * p[1] + r[2] * p[2] + r[3] * p[3]);
+  }
+}
+
+// One row for each surfel from the phyxels that reach it, but for those that stand back, by `row`; where none
+// does, the row of its cell.
+template <class StandsBack, class Row>
+Coupling couple_by_reach(const Memory &memory, const CouplingInput &in, const Cloud &cloud,
+                         const StandsBack &stands_back, const Row &row) {
+  RowBuilder build(memory, in.npoint);
+  std::optional<RestCells> cells;
+  Array<uint32_t> reach(HookAllocator<uint32_t>{memory});
+  Coupling out = empty_coupling(memory, in.nsurfel);
+  for (uint32_t s = 0; s < in.nsurfel; ++s) {
+    const Vec3 x = cloud.rest.surfel[s];
+    cloud.reaching(x, reach);
+    std::erase_if(reach, stands_back);
+    double sum = 0;
+    for (uint32_t i : reach) sum += kernel(norm2(x - cloud.rest.point[i]), cloud.support[i]);
+    if (!(sum > 0)) {
+      append_cell_row(memory, in, cloud.rest, s, cells, out);
+      continue;
+    }
+    Array<RowEntry> &entries = row(x, reach, sum, build);
+    append_row(out, entries.data(), entries.size());
+  }
+  return out;
+}
+
+}  // namespace
+
+Coupling couple_mls(const Memory &memory, const CouplingInput &in) {
+  const Cloud cloud(memory, in);
+  const Array<Vec3> &point = cloud.rest.point;
+  Neighbourhoods near(memory, cloud);
+  // A phyxel whose neighbors lie in a plane has no gradient to give: it stands back where others
+  // reach the surfel.
+  const auto stands_back = [&](uint32_t i) { return near.of(i).state == 2; };
+  return couple_by_reach(
+      memory, in, cloud, stands_back,
+      [&](Vec3 x, const Array<uint32_t> &reach, double sum, RowBuilder &build) -> Array<RowEntry> & {
+        for (uint32_t i : reach) {
+          const Neighbourhoods::Known &k = near.of(i);
+          const double share = kernel(norm2(x - point[i]), cloud.support[i]) / sum;
+          const Vec3 a = share * (k.inverse * (x - point[i]));
+          double back = 0;
+          for (size_t e = k.begin; e < k.end; ++e) {
+            const Vec3 d = point[near[e]] - point[i];
+            const double w = kernel(norm2(d), cloud.support[i]) * dot(d, a);
+            build.add(near[e], w);
+            back += w;
+          }
+          build.add(i, share - back);
+        }
+        Array<RowEntry> &row = build.take();
+        for (int pass = 0; pass < 2; ++pass) restore_linear(point, x, row);
+        return row;
+      });
+}
+
+Coupling couple_thesis(const Memory &memory, const CouplingInput &in) {
+  const Cloud cloud(memory, in);
+  const auto never = [](uint32_t) { return false; };
+  return couple_by_reach(
+      memory, in, cloud, never,
+      [&](Vec3 x, const Array<uint32_t> &reach, double sum, RowBuilder &build) -> Array<RowEntry> & {
+        for (uint32_t i : reach) build.add(i, kernel(norm2(x - cloud.rest.point[i]), cloud.support[i]) / sum);
+        return build.take();
+      });
+}
+
+}  // namespace dfm

@@ -1,0 +1,208 @@
+// Topology of a surface is found by sorting, never by hashing, so that numbers depend on the input alone.
+#include "body/make_surface.h"
+
+#include <algorithm>
+
+#include "math/vec3.h"
+
+namespace dfm {
+namespace {
+
+constexpr double kPatchCosine = 0.5;  // faces within 60 degrees are one patch (doc/concepts/detection.md)
+
+struct Side {
+  uint64_t key;  // {lower surfel, higher surfel}
+  uint32_t tri;
+  uint8_t corner;  // the edge runs from this corner to the next one
+  bool forward;    // from the lower to the higher surfel
+};
+
+void number_surfels(uint32_t npoint, const uint32_t *tris, uint32_t ntri, Surface &out) {
+  Array<uint32_t> number(size_t{npoint}, kNone, out.tri.get_allocator());
+  for (size_t i = 0; i < size_t{3} * ntri; ++i) number[tris[i]] = 0;
+  out.point.clear();
+  for (uint32_t p = 0; p < npoint; ++p) {
+    if (number[p] == kNone) continue;
+    number[p] = uint32_t(out.point.size());
+    out.point.push_back(p);
+  }
+  out.nsurfel = uint32_t(out.point.size());
+  out.ntri = ntri;
+  out.tri.resize(size_t{3} * ntri);
+  for (size_t i = 0; i < out.tri.size(); ++i) out.tri[i] = number[tris[i]];
+}
+
+void find_edges(Surface &out) {
+  Array<Side> sides(out.tri.get_allocator());
+  sides.reserve(out.tri.size());
+  for (uint32_t t = 0; t < out.ntri; ++t)
+    for (uint8_t k = 0; k < 3; ++k) {
+      const uint32_t i = out.tri[3 * t + k], j = out.tri[3 * t + (k + 1) % 3];
+      sides.push_back({uint64_t{std::min(i, j)} << 32 | std::max(i, j), t, k, i < j});
+    }
+  std::sort(sides.begin(), sides.end(),
+            [](const Side &a, const Side &b) { return a.key != b.key ? a.key < b.key : a.tri < b.tri; });
+  out.edge.clear();
+  out.edge_tri.clear();
+  out.tri_edge.assign(size_t{3} * out.ntri, kNone);
+  out.tri_owns.assign(out.ntri, 0);
+  for (size_t s = 0; s < sides.size(); ++s) {
+    if (s == 0 || sides[s].key != sides[s - 1].key) {
+      out.edge.push_back(uint32_t(sides[s].key >> 32));
+      out.edge.push_back(uint32_t(sides[s].key));
+      out.edge_tri.insert(out.edge_tri.end(), {kNone, kNone});
+      out.tri_owns[sides[s].tri] |= 8u << sides[s].corner;
+    }
+    const uint32_t e = uint32_t(out.edge.size() / 2 - 1);
+    out.tri_edge[3 * sides[s].tri + sides[s].corner] = e;
+    uint32_t &slot = out.edge_tri[2 * e + (sides[s].forward ? 0 : 1)];
+    if (slot == kNone) slot = sides[s].tri;
+  }
+  out.nedge = uint32_t(out.edge.size() / 2);
+  Array<uint8_t> owned(out.nsurfel, 0, out.tri.get_allocator());
+  for (uint32_t t = 0; t < out.ntri; ++t)
+    for (int k = 0; k < 3; ++k) {
+      uint8_t &taken = owned[out.tri[3 * t + k]];
+      if (!taken) out.tri_owns[t] |= 1u << k;
+      taken = 1;
+    }
+}
+
+uint32_t root(Array<uint32_t> &parent, uint32_t i) {
+  while (parent[i] != i) i = parent[i] = parent[parent[i]];
+  return i;
+}
+
+// Patches are numbered in the order of their lowest triangles.
+void find_patches(const Array<Vec3> &normal, Surface &out) {
+  Array<uint32_t> parent(out.ntri, 0u, out.tri.get_allocator());
+  for (uint32_t t = 0; t < out.ntri; ++t) parent[t] = t;
+  for (uint32_t e = 0; e < out.nedge; ++e) {
+    const uint32_t s = out.edge_tri[2 * e], t = out.edge_tri[2 * e + 1];
+    if (s == kNone || t == kNone || dot(normal[s], normal[t]) < kPatchCosine) continue;
+    const uint32_t rs = root(parent, s), rt = root(parent, t);
+    parent[std::max(rs, rt)] = std::min(rs, rt);
+  }
+  out.patch.assign(out.ntri, 0);
+  uint32_t count = 0;
+  for (uint32_t t = 0; t < out.ntri; ++t) {
+    const uint32_t r = root(parent, t);
+    out.patch[t] = r == t ? count++ : out.patch[r];
+  }
+}
+
+void find_fans(Surface &out) {
+  out.fan_begin.assign(out.nsurfel + 1, 0);
+  for (const uint32_t s : out.tri) ++out.fan_begin[s + 1];
+  for (uint32_t s = 0; s < out.nsurfel; ++s) out.fan_begin[s + 1] += out.fan_begin[s];
+  out.fan.resize(out.tri.size());
+  Array<uint32_t> next(out.fan_begin);
+  for (uint32_t t = 0; t < out.ntri; ++t)
+    for (int k = 0; k < 3; ++k) out.fan[next[out.tri[3 * t + k]]++] = t;
+}
+
+}  // namespace
+
+void make_surface(const Memory &memory, uint32_t npoint, const double *rest, const uint32_t *boundary_tris,
+                  uint32_t ntri, Surface &out) {
+  const HookAllocator<uint32_t> a(memory);
+  out.tri = Array<uint32_t>(a);
+  out.edge = Array<uint32_t>(a);
+  out.edge_tri = Array<uint32_t>(a);
+  out.tri_edge = Array<uint32_t>(a);
+  out.tri_owns = Array<uint32_t>(a);
+  out.patch = Array<uint32_t>(a);
+  out.point = Array<uint32_t>(a);
+  out.row = Array<uint32_t>(a);
+  out.col = Array<uint32_t>(a);
+  out.weight = Array<double>(a);
+  out.fan_begin = Array<uint32_t>(a);
+  out.fan = Array<uint32_t>(a);
+  out.rest = Array<double>(a);
+  out.x = Array<double>(a);
+  out.v = Array<double>(a);
+  number_surfels(npoint, boundary_tris, ntri, out);
+  find_edges(out);
+
+  const auto at = [&](uint32_t surfel) { return load3(rest + size_t{3} * out.point[surfel]); };
+  Array<Vec3> normal(ntri, Vec3{}, a);
+  for (uint32_t t = 0; t < ntri; ++t) {
+    const uint32_t *c = &out.tri[3 * t];
+    normal[t] = normalized(cross(at(c[1]) - at(c[0]), at(c[2]) - at(c[0])));
+  }
+  find_patches(normal, out);
+  find_fans(out);
+
+  Array<double> length(a);
+  for (uint32_t e = 0; e < out.nedge; ++e)
+    length.push_back(norm(at(out.edge[2 * e + 1]) - at(out.edge[2 * e])));
+  if (!length.empty()) {
+    std::nth_element(length.begin(), length.begin() + length.size() / 2, length.end());
+    out.median_edge = length[length.size() / 2];
+  }
+  out.x.assign(size_t{4} * out.nsurfel, 0.0);
+  out.v.assign(size_t{4} * out.nsurfel, 0.0);
+  for (uint32_t s = 0; s < out.nsurfel; ++s) store3(&out.x[4 * s], at(s));
+}
+
+void wear_coupling(Coupling &&coupling, Surface &surface) {
+  surface.row = std::move(coupling.row);
+  surface.col = std::move(coupling.col);
+  surface.weight = std::move(coupling.weight);
+  surface.rest = Array<double>(size_t{3} * surface.nsurfel, 0.0, surface.weight.get_allocator());
+  for (uint32_t s = 0; s < surface.nsurfel; ++s)
+    store3(&surface.rest[size_t{3} * s], load3(&surface.x[size_t{4} * s]));
+  surface.point.clear();
+  surface.point.shrink_to_fit();
+  for (uint32_t s = 0; s < surface.nsurfel; ++s) {
+    double sum = 0;
+    surface.each_phyxel(s, [&](uint32_t, double w) { sum += std::fabs(w); });
+    surface.weight_sum = std::max(surface.weight_sum, sum);
+  }
+}
+
+void gather_rows(Surface &surface, const double *x, const double *v, uint32_t begin, uint32_t end) {
+  // Half a point: sums of whole ones (32 bytes) are kept in memory by gcc 12 where the machine's vectors are
+  // 16, at ten times the cost. The same operations on each component at every width; the fourth stays zero.
+  using Half = double __attribute__((vector_size(16)));
+  Half *const xs = reinterpret_cast<Half *>(surface.x.data());
+  Half *const vs = reinterpret_cast<Half *>(surface.v.data());
+  const uint32_t *const row = surface.row.data(), *const col = surface.col.data();
+  const double *const weight = surface.weight.data();
+  const Half *const xp = reinterpret_cast<const Half *>(x), *const vp = reinterpret_cast<const Half *>(v);
+  for (uint32_t s = begin; s < end; ++s) {
+    const size_t to = size_t{2} * s;
+    Half x0{0, 0}, x1{0, 0}, v0{0, 0}, v1{0, 0};
+    for (uint32_t i = row[s]; i < row[s + 1]; ++i) {
+      const size_t from = size_t{2} * col[i];
+      x0 += weight[i] * xp[from];
+      x1 += weight[i] * xp[from + 1];
+      if (v) {
+        v0 += weight[i] * vp[from];
+        v1 += weight[i] * vp[from + 1];
+      }
+    }
+    xs[to] = x0;
+    xs[to + 1] = x1;
+    if (v) {
+      vs[to] = v0;
+      vs[to + 1] = v1;
+    }
+  }
+}
+
+void gather_surface(Surface &surface, const double *x, const double *v) {
+  if (!surface.identity()) return gather_rows(surface, x, v, 0, surface.nsurfel);
+  double *__restrict xs = surface.x.data();
+  double *__restrict vs = surface.v.data();
+  const uint32_t *point = surface.point.data();
+  for (uint32_t s = 0; s < surface.nsurfel; ++s) {
+    const double *xp = x + size_t{4} * point[s];
+    for (int k = 0; k < 3; ++k) xs[4 * s + k] = xp[k];
+    if (!v) continue;
+    const double *vp = v + size_t{4} * point[s];
+    for (int k = 0; k < 3; ++k) vs[4 * s + k] = vp[k];
+  }
+}
+
+}  // namespace dfm

@@ -1,0 +1,31 @@
+// Builds a body's surface from its triangles, and renews positions and velocities of its surfels
+// from the phyxels.
+#pragma once
+#include <cstdint>
+
+#include "body/coupling.h"
+#include "core/memory.h"
+#include "geometry/surface.h"
+
+namespace dfm {
+
+// Identity coupling: the surfels are the points that the triangles use, in ascending point order.
+//   rest           [npoint,3] m
+//   boundary_tris  [ntri,3] point numbers, counter-clockwise seen from outside
+// Open and non-manifold edges are kept: an edge's second triangle may be missing, and beyond two triangles
+// the lowest ones count as its sides. x and v are sized and set to the rest shape and zero. Throws
+// std::bad_alloc.
+void make_surface(const Memory &memory, uint32_t npoint, const double *rest, const uint32_t *boundary_tris,
+                  uint32_t ntri, Surface &out);
+
+// Makes `surface`, built on its own points (all of them used, so that surfel s is point s), hang on phyxels.
+// x becomes N times them at the next gather.
+void wear_coupling(Coupling &&coupling, Surface &surface);
+
+// x_s = N x_p and v_s = N v_p. x and v are [npoint,4], aligned to 32 bytes; v null: x alone. Terms of a row
+// are added in its order, so that rows may be cut among threads: gather_rows does surfels [begin,end) of a
+// coupled surface.
+void gather_surface(Surface &surface, const double *x, const double *v);
+void gather_rows(Surface &surface, const double *x, const double *v, uint32_t begin, uint32_t end);
+
+}  // namespace dfm

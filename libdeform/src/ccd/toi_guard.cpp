@@ -1,0 +1,265 @@
+#include "ccd/toi_guard.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "ccd/toi_guard_motion.h"
+#include "contact/contact_set.h"
+#include "geometry/closest.h"
+#include "geometry/obstacle_shape.h"
+#include "geometry/voxel_grid.h"
+
+namespace dfm {
+namespace {
+
+using narrow::Features;
+using narrow::PairMotion;
+
+constexpr double kRounding = 1 + 1e-6;  // bounds hold in spite of rounding; nothing next to the margin
+
+// What stays above this never trips: whether a pair is asked about does not change the answer, whatever is
+// known of it from before.
+double clear_of(const GuardScene &scene) {
+  return kRounding * (scene.floor + 2 * narrow::kSharp * scene.margin);
+}
+
+// Least height of the features over each other along n.
+double height(const double *const at[4], int split, Vec3 n) {
+  double d[4];
+  for (int k = 0; k < 4; ++k) d[k] = n.x * at[k][0] + n.y * at[k][1] + n.z * at[k][2];
+  const double far = std::max(d[2], d[3]);
+  return split == 2 ? std::min(d[0], d[1]) - far : d[0] - std::max(d[1], far);
+}
+
+// From the second feature to the first, as they start.
+Vec3 apart(const Features &f) {
+  Vec3 x[4];
+  for (int k = 0; k < 4; ++k) x[k] = load3(f.start[k]);
+  if (f.split == 2) {
+    const auto c = closest_segments(x[0], x[1], x[2], x[3]);
+    return x[0] + c.s * (x[1] - x[0]) - x[2] - c.t * (x[3] - x[2]);
+  }
+  const auto c = closest_on_triangle(x[0], x[1], x[2], x[3]);
+  return x[0] - c.weight[0] * x[1] - c.weight[1] * x[2] - c.weight[2] * x[3];
+}
+
+// Two surfaces.
+class NearPairs {
+ public:
+  NearPairs(GuardScene &scene, const Array<Candidate> &list, GuardMemory &memory, Array<uint32_t> &near)
+      : scene_(scene), list_(list), memory_(memory), near_(near), floor_(clear_of(scene)) {}
+
+  void look(const GuardMemory::Run &run) {
+    const double now = kRounding * (run.way + run.travel), *const rest = memory_.rest.data();
+    a_ = &scene_.side(list_[run.begin], false);
+    b_ = &scene_.side(list_[run.begin], true);
+    for (uint32_t i = run.begin; i < run.end; ++i)
+      if (!(now < rest[i])) look(i, run.way, now);
+  }
+
+ private:
+  // The height along any direction is a lower bound of the distance, so what is found for the start is kept.
+  void look(uint32_t i, double way, double now) {
+    Features f(*a_, *b_, list_[i]);
+    double *const known = &memory_.normal[3 * size_t{i}], &rest = memory_.rest[i];
+    Vec3 n = load3(known);
+    if (norm2(n) > 0) {
+      const double start = height(f.start, f.split, n);
+      rest = way + start - floor_;
+      if (now < rest || stays_apart(f, n, start)) return;
+    }
+    const Vec3 v = apart(f);
+    const double d = norm(v);
+    if (d > 0) {
+      n = (1 / d) * v;
+      store3(known, n);
+      rest = way + d - floor_;
+      if (now < rest || stays_apart(f, n, height(f.start, f.split, n))) return;
+    }
+    near_.push_back(i);
+  }
+  bool stays_apart(Features &f, Vec3 n, double start) {
+    if (!(start > floor_)) return false;
+    f.find_ends(scene_);
+    return height(f.end, f.split, n) > floor_;
+  }
+
+  GuardScene &scene_;
+  const Array<Candidate> &list_;
+  GuardMemory &memory_;
+  Array<uint32_t> &near_;
+  double floor_;
+  GuardSide *a_ = nullptr, *b_ = nullptr;  // of the run
+};
+
+// A surface and a closed-form shape or voxels, in the frame of the obstacle.
+class NearObstacle {
+ public:
+  NearObstacle(GuardScene &scene, const Array<Candidate> &list, GuardMemory &memory, Array<uint32_t> &near)
+      : scene_(scene), list_(list), memory_(memory), near_(near), floor_(clear_of(scene)) {}
+
+  void look(const GuardMemory::Run &run) {
+    const Candidate &first = list_[run.begin];
+    const ObstacleView &view = scene_.obstacles[first.slot_b];
+    const double now = kRounding * (run.way + run.travel);
+    const narrow::ObstacleFrame frame(view, scene_.poses[first.slot_b]);
+    GuardSide &body = scene_.side(first, false);
+    for (uint32_t i = run.begin; i < run.end; ++i) {
+      if (now < memory_.rest[i]) continue;
+      if (view.shape == Shape::voxels) {
+        if (list_[i].kind != 0 || !far(frame, body, i, run.way, now)) near_.push_back(i);
+      } else if (!clear(frame, body, i, run.way)) {
+        near_.push_back(i);
+      }
+    }
+  }
+
+ private:
+  // A convex shape lies behind the plane at its point nearest to the feature's middle; a box also behind
+  // each of its faces.
+  bool clear(const narrow::ObstacleFrame &frame, GuardSide &body, uint32_t i, double way) {
+    const Candidate &c = list_[i];
+    const uint32_t *const corner = narrow::corners_of(*body.surface, c.kind, c.feature_a);
+    Vec3 from[3], middle, normal, on;
+    for (int k = 0; k <= c.kind; ++k) {
+      from[k] = frame.at_start(load3(&body.surface->x[4 * size_t{corner[k]}]));
+      middle += from[k];
+    }
+    const auto lowest = [&](Vec3 n, Vec3 p) {
+      double low = HUGE_VAL;
+      for (int k = 0; k <= c.kind; ++k) low = std::min(low, dot(n, from[k] - p));
+      return low;
+    };
+    double start = -HUGE_VAL;
+    if (c.kind > 0 && frame.shape.view().shape == Shape::box)
+      for (uint32_t f = 0; f < 6; ++f) {
+        const Vec3 n = frame.shape.face_normal(f), p = frame.shape.view().half_size[int(f >> 1)] * n;
+        if (const double low = lowest(n, p); low > start) {
+          start = low;
+          normal = n;
+          on = p;
+        }
+      }
+    if (!(start > floor_)) {
+      const ObstaclePoint p = frame.shape.closest((1.0 / (c.kind + 1)) * middle);
+      if (const double low = lowest(p.normal, p.point); low > start) {
+        start = low;
+        normal = p.normal;
+        on = p.point;
+      }
+    }
+    memory_.rest[i] = way + start - floor_;
+    if (!(start > floor_)) return false;
+    double end = HUGE_VAL;
+    for (int k = 0; k <= c.kind; ++k)
+      end = std::min(end, dot(normal, frame.at_end(load3(scene_.end(body, corner[k]))) - on));
+    return end > floor_;
+  }
+  bool far(const narrow::ObstacleFrame &frame, GuardSide &body, uint32_t i, double way, double now) {
+    const Vec3 x = frame.at_start(load3(&body.surface->x[4 * size_t{list_[i].feature_a}]));
+    memory_.rest[i] = way + frame.shape.view().grid->clearance(x) - floor_;
+    return now < memory_.rest[i];
+  }
+
+  GuardScene &scene_;
+  const Array<Candidate> &list_;
+  GuardMemory &memory_;
+  Array<uint32_t> &near_;
+  double floor_;
+};
+
+}  // namespace
+
+void GuardScene::find_end(GuardSide &s, uint32_t surfel) {
+  s.stamp[surfel] = round;
+  double *const out = &s.end[4 * size_t{surfel}];
+  const Vec3 x = load3(&s.surface->x[4 * size_t{surfel}]);
+  if (s.still) return store3(out, x);
+  // its pose is at the fraction already
+  if (s.local)
+    return store3(out, s.pose.position + rotate(s.pose.rotation, load3(&s.local[3 * size_t{surfel}])));
+  Vec3 way;
+  s.surface->each_phyxel(
+      surfel, [&](uint32_t p, double weight) { way += (weight * h) * load3(&s.mean[4 * size_t{p}]); });
+  store3(out, x + fraction * way);
+}
+
+void GuardMemory::follow(const Array<Candidate> &list) {
+  old_runs.swap(runs);
+  old_features.swap(features);
+  old_rest.swap(rest);
+  old_normal.swap(normal);
+  runs.clear();
+  const size_t n = list.size();
+  features.resize(n);
+  rest.resize(n);
+  normal.resize(3 * n);
+  for (uint32_t i = 0; i < n; ++i) {
+    const Candidate &c = list[i];
+    features[i] = uint64_t{c.feature_a} << 32 | c.feature_b;
+    const Run *const last = runs.empty() ? nullptr : &runs.back();
+    if (!last || last->slot_a != c.slot_a || last->slot_b != c.slot_b || last->obstacle != c.obstacle ||
+        last->kind != c.kind)
+      runs.push_back({i, i, c.slot_a, c.slot_b, c.obstacle, c.kind, 0, 0});
+    runs.back().end = i + 1;
+  }
+  // Runs come in one order in all lists, pairs in a run by their features.
+  size_t next = 0;
+  for (Run &run : runs) {
+    const auto same = [&](const Run &o) {
+      return o.slot_a == run.slot_a && o.slot_b == run.slot_b && o.obstacle == run.obstacle &&
+             o.kind == run.kind;
+    };
+    const auto found = std::find_if(old_runs.begin() + std::ptrdiff_t(next), old_runs.end(), same);
+    uint32_t j = 0, last = 0;
+    if (found != old_runs.end()) {
+      run.way = found->way;
+      j = found->begin;
+      last = found->end;
+      next = size_t(found - old_runs.begin()) + 1;
+    }
+    for (uint32_t i = run.begin; i < run.end; ++i) {
+      while (j < last && old_features[j] < features[i]) ++j;
+      const bool known = j < last && old_features[j] == features[i];
+      rest[i] = known ? old_rest[j] : -1;
+      for (size_t k = 0; k < 3; ++k) normal[3 * size_t{i} + k] = known ? old_normal[3 * size_t{j} + k] : 0;
+    }
+  }
+}
+
+void guard_near(GuardScene &scene, const Array<Candidate> &list, GuardMemory &memory, Array<uint32_t> &near) {
+  near.clear();
+  NearPairs pairs(scene, list, memory, near);
+  NearObstacle obstacles(scene, list, memory, near);
+  for (GuardMemory::Run &run : memory.runs) {
+    const Candidate &c = list[run.begin];
+    const GuardSide &a = scene.side(c, false), &b = scene.side(c, true);
+    run.travel = &a == &b ? 2 * a.deform
+                          : std::min(a.travel + b.travel, norm(a.drift - b.drift) + a.spread + b.spread);
+    if (a.still && b.still) continue;
+    if (c.obstacle && scene.obstacles[c.slot_b].shape != Shape::mesh) obstacles.look(run);
+    else pairs.look(run);
+  }
+}
+
+double guard_pairs(GuardScene &scene, const Array<Candidate> &list, std::span<const uint32_t> which,
+                   Array<GuardHit> &out) {
+  out.clear();
+  double least = 1;
+  for (const uint32_t i : which) {
+    const Candidate &c = list[i];
+    if (c.obstacle && scene.obstacles[c.slot_b].shape != Shape::mesh) continue;
+    Features f(scene.side(c, false), scene.side(c, true), c);
+    f.find_ends(scene);
+    const PairMotion pair(f);
+    GuardHit hit{i, 0, 0, 0, 0, {}};
+    if (pair.far_apart(scene.floor) || pair.plane_apart(scene.floor)) continue;
+    const auto touch = [&](double d, double within) { return pair.touch(d, within); };
+    if (!narrow::judge(touch, [&] { return pair.distance(0); }, scene.floor, scene.margin, hit)) continue;
+    out.push_back(hit);
+    least = std::min(least, hit.safe);
+  }
+  return least;
+}
+
+}  // namespace dfm

@@ -1,0 +1,116 @@
+// What the guard asks of detection: which of the listed feature pairs come as near as the floor d_g on the
+// way from the start to the end of a sub-step, and how far all of them may safely go. Conservative, on the
+// real motion (after the contact solve): vertex-face and edge-edge between bodies, of one body, and against
+// meshes; closed-form shapes and voxels in their own frames.
+//
+// A pair trips the guard only if its distance reaches d_g itself. The margin then decides where the motion
+// stops: at d_g + margin, an absolute distance, since one that is relative to the gap trips on every first
+// touch. A pair that starts nearer than twice the margin stops half way to the floor, so it always moves; one
+// that starts at or below the floor may rise, or come down to half of the distance that it has.
+#pragma once
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "core/memory.h"
+#include "geometry/views.h"
+
+namespace dfm {
+
+struct GuardHit {
+  uint32_t candidate;  // number in the list
+  // of an obstacle in closed form: which of its points or edges (as contacts number them); else 0
+  uint32_t part;
+  double t;      // fraction of the sub-step after which the distance reaches the floor; never late
+  double safe;   // up to there the distance stays above the floor by the margin; <= t
+  double start;  // m, distance at the start
+  double at[3];  // at t: weights of the triangle's corners, or places on edge a and edge b
+};
+
+// Where an obstacle's pose stands at the end of the sub-step.
+struct GuardPose {
+  Vec3 position;
+  Quat rotation;
+};
+
+// One surface and where its surfels end. Few surfels are near anything, so ends are found when they are
+// first asked for.
+struct GuardSide {
+  const Surface *surface = nullptr;
+  bool still = false;
+  const double *mean = nullptr;  // [n,4] m/s of the phyxels: end = start + h mean
+  // or: [nsurfel,3] a mesh in its frame, which ends at `pose`
+  const double *local = nullptr;
+  GuardPose pose;
+  double travel = 0;  // m, bounds the way of any surfel
+  Vec3 drift;         // m, a way common to all surfels, from which
+  double spread = 0;  // m, none differs by more
+  // m, none moves by more beyond a rigid motion of all; of bodies that may touch themselves
+  double deform = 0;
+  Array<double> end;  // [nsurfel,4], where `stamp` is the scene's round
+  Array<uint32_t> stamp;
+};
+
+// Sides: bodies by slot, then obstacles by slot (those that are not meshes only hold their motion).
+struct GuardScene {
+  std::span<const BodyView> bodies;
+  std::span<const ObstacleView> obstacles;
+  std::vector<GuardSide> sides;
+  std::vector<GuardPose> poses;  // of obstacles, at the end
+  double h = 0, fraction = 1;    // s; of the way, that is taken
+  double floor = 0, margin = 0;  // m: d_g, 0.1 (d_c - d_g)
+  uint32_t round = 0;            // ends of earlier rounds are out of date
+
+  GuardSide &side(const Candidate &c, bool second) {
+    return sides[!second ? c.slot_a : c.obstacle ? bodies.size() + c.slot_b : c.slot_b];
+  }
+  const double *end(GuardSide &s, uint32_t surfel) {
+    if (s.stamp[surfel] != round) find_end(s, surfel);
+    return &s.end[4 * size_t{surfel}];
+  }
+  void find_end(GuardSide &s, uint32_t surfel);
+};
+
+// What is known of the listed pairs; saves work and changes nothing. Holds as long as d_c and the bodies
+// stand; what two lists share is carried over.
+struct GuardMemory {
+  struct Run {  // of the list: one pair of sides, one kind
+    uint32_t begin, end, slot_a, slot_b;
+    uint8_t obstacle, kind;
+    // m, bounds of the motion of the two sides against each other: in all sub-steps since the run is
+    // known; in this one
+    double way, travel;
+  };
+  Array<Run> runs, old_runs;
+  Array<uint64_t> features, old_features;  // by candidate: feature a, feature b
+  Array<double> rest, old_rest;            // m, `way` up to which it stays clear of the floor
+  // [n,3] direction along which it was last found to be apart; zero: none
+  Array<double> normal, old_normal;
+
+  void follow(const Array<Candidate> &list);
+  void forget() { runs.clear(); }
+  // the sub-step has been taken
+  void keep() {
+    for (Run &r : runs) r.way += r.travel;
+  }
+};
+
+// The candidates that may come to the floor, ascending: all that the other functions need to be asked about.
+// Nearly all of a list ends at the first comparison (way + travel < rest), nearly all others at a plane that
+// keeps the two features apart at the start and at the end. memory follows the list.
+void guard_near(GuardScene &scene, const Array<Candidate> &list, GuardMemory &memory, Array<uint32_t> &near);
+
+// Of the candidates that `which` names, those between two surfaces; those that touch at the start are
+// passed over: what is through already cannot be kept out. out is cleared; hits come in the order of the
+// list. Returns the least `safe` of all hits, 1 where there are none. Does not allocate once out's
+// capacity has settled.
+double guard_pairs(GuardScene &scene, const Array<Candidate> &list, std::span<const uint32_t> which,
+                   Array<GuardHit> &out);
+
+// The same for closed-form shapes and voxels, appended to out. In the obstacle's own frame, where it stands
+// still and surfels move on the straight line from start to end: for a shape that turns that is another path
+// than in the world, but one that has the same ends. Surfels that start inside the shape are let out.
+double guard_obstacles(GuardScene &scene, const Array<Candidate> &list, std::span<const uint32_t> which,
+                       Array<GuardHit> &out);
+
+}  // namespace dfm

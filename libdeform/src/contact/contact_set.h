@@ -1,0 +1,50 @@
+// Contacts of one sub-step as a structure of arrays: what narrow/ finds, contact/ and friction/ solve,
+// step/ keeps and world/ reports.
+//
+//        a (surfel, edge or triangle of body a)
+//        |  ^ normal (from b to a)
+//   -----+-----  b (triangle or edge of body b, or an obstacle)
+//
+// Relative velocity u = sum_k weight[k] v[node[k]] - v_obstacle; the weights of side a sum to +1, those of
+// side b to -1 (or there are none).
+//
+// Nodes are world-wide surfel numbers: surfel s of the body in slot k is node first_node[k] + s.
+#pragma once
+#include <compare>
+#include <cstdint>
+
+#include "core/memory.h"
+
+namespace dfm {
+
+enum ContactKind : uint8_t { kVertexFace = 0, kEdgeEdge = 1, kPrimitive = 2 };
+
+// One contact's geometry, as narrow/ emits it. 160 bytes, plain.
+struct ContactPoint {
+  // persistent: (kind, a's feature, b's body or obstacle, b's patch); unique within a sub-step
+  uint64_t key;
+  uint32_t slot_a, slot_b;  // body slots in the world; slot_b = obstacle slot if obstacle
+  // surfel, edge or triangle number within its body; primitive: obstacle feature (face, edge, corner)
+  uint32_t feature_a, feature_b;
+  uint8_t kind, obstacle, nnode;
+  uint8_t type_a;  // what feature_a is: 0 surfel, 1 edge, 2 triangle
+  // area: of an edge or triangle contact, the node that lent it, plus 1; else 0
+  uint32_t lender;
+  uint32_t node[4];
+  double weight[4];
+  double point[3];     // m, midway between the closest points
+  double normal[3];    // unit, from b to a
+  double distance;     // m, true distance, >= 0; negative: depth below b's surface, for recovery
+  double area;         // m2
+  double velocity[3];  // m/s of the obstacle where a's closest point is, belt included; 0 for bodies
+};
+
+// Two edges that touched each other at the end of the last sub-step; b: of a body or of a mesh
+// that has no dofs.
+struct Crossing {
+  uint64_t id_a, id_b;
+  uint32_t edge_a, edge_b;
+  auto operator<=>(const Crossing &) const = default;
+};
+
+}  // namespace dfm

@@ -1,0 +1,48 @@
+#include "contact/distribute.h"
+
+#include <algorithm>
+
+namespace dfm {
+
+void distribute(std::span<const ContactPoint> contacts, const double *frame, const double *impulse,
+                std::span<const ImpulseSink> sinks) {
+  for (const ImpulseSink &s : sinks) std::fill(s.surfel, s.surfel + size_t(3) * s.nnode, 0.0);
+  for (size_t i = 0; i < contacts.size(); ++i) {
+    const double *const f = frame + 9 * i, *const l = impulse + 3 * i;
+    if (l[0] == 0 && l[1] == 0 && l[2] == 0) continue;
+    const Vec3 p = l[0] * load3(f) + l[1] * load3(f + 3) + l[2] * load3(f + 6);
+    for (uint32_t k = 0; k < contacts[i].nnode; ++k) {
+      const uint32_t node = contacts[i].node[k];
+      auto sink = std::upper_bound(sinks.begin(), sinks.end(), node,
+                                   [](uint32_t value, const ImpulseSink &s) { return value < s.first_node; });
+      --sink;
+      double *const to = sink->surfel + size_t(3) * (node - sink->first_node);
+      store3(to, load3(to) + contacts[i].weight[k] * p);
+    }
+  }
+  for (const ImpulseSink &s : sinks) {
+    if (!s.phyxel) continue;
+    const Surface &surface = *s.surface;
+    if (!surface.identity()) {
+      scatter_surface(surface, s.surfel, s.npoint, s.phyxel);
+      continue;
+    }
+    for (uint32_t j = 0; j < s.nnode; ++j)
+      store3(s.phyxel + size_t(4) * surface.point[j], load3(s.surfel + size_t(3) * j));
+  }
+}
+
+void scatter_surface(const Surface &surface, const double *surfel, uint32_t npoint, double *phyxel) {
+  std::fill(phyxel, phyxel + size_t(4) * npoint, 0.0);
+  using Point = double __attribute__((vector_size(32)));
+  Point *const to = reinterpret_cast<Point *>(phyxel);
+  for (uint32_t s = 0; s < surface.nsurfel; ++s) {
+    const double *const f = surfel + size_t(3) * s;
+    if (f[0] == 0 && f[1] == 0 && f[2] == 0) continue;
+    const Point p{f[0], f[1], f[2], 0};
+    for (uint32_t j = surface.row[s]; j < surface.row[s + 1]; ++j)
+      to[surface.col[j]] += surface.weight[j] * p;
+  }
+}
+
+}  // namespace dfm

@@ -1,0 +1,29 @@
+// Contact impulses to surfels to phyxels: f_s = sum_k w_k p at the contact's nodes, f_p = N^T f_s. Force,
+// torque and power are those of the contacts to rounding, because it is the transpose of how the contacts
+// read velocities.
+#pragma once
+#include <span>
+
+#include "contact/contact_set.h"
+#include "geometry/surface.h"
+#include "math/vec3.h"
+
+namespace dfm {
+
+struct ImpulseSink {
+  uint32_t first_node, nnode, npoint;
+  const Surface *surface;
+  double *surfel;  // [nsurfel,3] N s, zeroed here
+  // [npoint,4] N s, written where surfels hang, zero elsewhere from the start; null: self-stepping,
+  // surfel impulses do
+  double *phyxel;
+};
+
+void distribute(std::span<const ContactPoint> contacts, const double *frame, const double *impulse,
+                std::span<const ImpulseSink> sinks);
+
+// f_p = N^T f_s of a coupled surface: surfel [nsurfel,3], phyxel [npoint,4] is overwritten. A surfel that
+// carries nothing costs one look.
+void scatter_surface(const Surface &surface, const double *surfel, uint32_t npoint, double *phyxel);
+
+}  // namespace dfm

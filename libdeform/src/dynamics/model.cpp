@@ -1,0 +1,89 @@
+#include "dynamics/model.h"
+
+#include "core/error.h"
+#include "plugin/registry.h"
+
+namespace dfm {
+
+size_t model_state_size(const dfm_slot *slots, uint32_t nslot, uint32_t npoint, uint32_t ncell,
+                        uint32_t nedge) {
+  size_t total = 0;
+  for (uint32_t s = 0; s < nslot; ++s) {
+    const dfm_slot &slot = slots[s];
+    const size_t count = slot.unit == DFM_PER_POINT  ? npoint
+                         : slot.unit == DFM_PER_CELL ? ncell
+                         : slot.unit == DFM_PER_EDGE ? nedge
+                                                     : 1;
+    total += count * slot.width;
+  }
+  return total;
+}
+
+void ModelInstance::create(const dfm_type &t, const dfm_host &h, const dfm_mesh &mesh, const Memory &memory,
+                           std::vector<double> values) {
+  type = &t;
+  host = &h;
+  ops = static_cast<const dfm_model *>(t.ops);
+  params = std::move(values);
+  if (!(ops->cells & DFM_CELL_TET))
+    fail(DFM_E_UNSUPPORTED, "model '%s' takes no tetrahedra; choose another model for this mesh", t.id);
+  const dfm_status s = call("create", [&] { return ops->create(host, &mesh, &self); });
+  if (s != DFM_OK || !self) {
+    self = nullptr;
+    fail(s < 0 ? s : DFM_E_FATAL, "model '%s' refused the body (status %d); the log says why", t.id, int(s));
+  }
+  const dfm_slots *own = nullptr;
+  if (ops->extension)
+    call("extension", [&] {
+      stepper = static_cast<const dfm_stepper *>(ops->extension(self, "dfm.stepper/1"));
+      own = static_cast<const dfm_slots *>(ops->extension(self, DFM_EXT_SLOTS));
+      effects = static_cast<const dfm_effects *>(ops->extension(self, DFM_EXT_EFFECTS));
+      idle = static_cast<const dfm_idle *>(ops->extension(self, DFM_EXT_IDLE));
+      limited = static_cast<const dfm_limited *>(ops->extension(self, DFM_EXT_LIMITED));
+      return DFM_OK;
+    });
+  if (!stepper && !ops->add_forces)
+    fail(DFM_E_UNSUPPORTED, "model '%s' neither adds forces nor steps itself; report it to its author", t.id);
+  if (own) check_slots(t.id, own->slots, own->nslot, false);
+  const size_t nstate = model_state_size(own ? own->slots : ops->slots, own ? own->nslot : ops->nslot,
+                                         mesh.npoint, mesh.ncell, mesh.nedge);
+  state = Array<double>(nstate, 0.0, HookAllocator<double>(memory));
+  state_out = state;
+  if (nstate && ops->state_init &&
+      call("state_init", [&] { return ops->state_init(self, state.data()); }) != DFM_OK)
+    fail(DFM_E_FATAL, "model '%s' could not initialize its state", t.id);
+}
+
+bool ModelInstance::works(const std::string &effect) const {
+  if (!effects || !effects->active) return true;
+  const char *const *active = nullptr;
+  call("effects", [&] {
+    active = effects->active(self);
+    return DFM_OK;
+  });
+  for (; active && *active; ++active)
+    if (effect == *active) return true;
+  return false;
+}
+
+uint32_t ModelInstance::limited_cells() const {
+  uint32_t n = 0;
+  if (limited && limited->count)
+    call("limited", [&] {
+      n = limited->count(self);
+      return DFM_OK;
+    });
+  return n;
+}
+
+std::string ModelInstance::idle_reason(uint32_t row) const {
+  const char *why = nullptr;
+  if (idle && idle->why)
+    call("idle", [&] {
+      why = idle->why(self, row);
+      return DFM_OK;
+    });
+  return why ? why : "";
+}
+
+}  // namespace dfm

@@ -1,0 +1,193 @@
+#include "dynamics/rigid/joints.h"
+
+#include "dynamics/rigid/turn.h"
+
+namespace dfm {
+namespace {
+
+Quat rotation_of(const dfm_rigid_state &s) {
+  return {s.rotation[0], s.rotation[1], s.rotation[2], s.rotation[3]};
+}
+
+// Where one side of a joint stands.
+struct Side {
+  Vec3 center;
+  Quat turn;
+};
+Side side(uint32_t part, std::span<const dfm_rigid_state> state) {
+  if (part == DFM_RIGID_WORLD) return {};
+  return {load3(state[part].position), rotation_of(state[part])};
+}
+
+constexpr double kRedundant = 1e-12;  // of a row's own diagonal: what is left of it after the earlier rows
+
+Vec3 unit_vector(int k) {
+  Vec3 e;
+  e[k] = 1;
+  return e;
+}
+
+// (p_a - p_b) . t with p_a of a's anchor and p_b the point of b that the force of the row acts on.
+JointRow point_row(const RigidJoint &j, Vec3 arm_a, Vec3 arm_b, Vec3 t, double error) {
+  return {j.a, j.b, t, cross(arm_a, t), -t, -cross(arm_b, t), error};
+}
+
+JointRow spin_row(const RigidJoint &j, Vec3 t, double error) { return {j.a, j.b, {}, t, {}, -t, error}; }
+
+// M^-1 J^T of one side.
+void response(Vec3 l, Vec3 a, const RigidPart &part, const dfm_rigid_state &state, Vec3 &dv, Vec3 &dw) {
+  dv = part.inverse_mass * l;
+  dw = in_axes(rotation_of(state), part.inverse_moments, a);
+}
+
+}  // namespace
+
+RigidJoint make_joint(const dfm_joint_def &def, std::span<const dfm_rigid_def> bodies) {
+  RigidJoint j{};
+  j.type = def.type;
+  j.a = def.body;
+  j.b = def.with;
+  auto stand = [&](uint32_t part) -> Side {
+    if (part == DFM_RIGID_WORLD) return {};
+    return {load3(bodies[part].pose.position), unit_quat(bodies[part].pose.rotation)};
+  };
+  const Side a = stand(j.a), b = stand(j.b);
+  const Vec3 anchor = load3(def.anchor), axis = j.can_drive() ? normalized(load3(def.axis)) : Vec3{0, 0, 1};
+  const Vec3 side = any_tangent(axis);
+  j.anchor_a = rotate_back(a.turn, anchor - a.center);
+  j.anchor_b = rotate_back(b.turn, anchor - b.center);
+  j.axis_a = rotate_back(a.turn, axis);
+  j.axis_b = rotate_back(b.turn, axis);
+  j.side_b[0] = rotate_back(b.turn, side);
+  j.side_b[1] = rotate_back(b.turn, cross(axis, side));
+  j.turn = conjugate(b.turn) * a.turn;
+  return j;
+}
+
+void hold_rows(const RigidJoint &j, std::span<const dfm_rigid_state> state, std::vector<JointRow> &out) {
+  const Side a = side(j.a, state), b = side(j.b, state);
+  const Vec3 arm_a = rotate(a.turn, j.anchor_a), arm_b = rotate(b.turn, j.anchor_b);
+  const Vec3 apart = a.center + arm_a - (b.center + arm_b);
+  if (j.type == DFM_JOINT_SLIDER) {
+    // Sides and axis belong to b, so the force acts on b where a's anchor is.
+    for (const Vec3 &s : j.side_b) {
+      const Vec3 t = rotate(b.turn, s);
+      out.push_back(point_row(j, arm_a, arm_b + apart, t, dot(apart, t)));
+    }
+  } else {
+    for (int k = 0; k < 3; ++k) out.push_back(point_row(j, arm_a, arm_b, unit_vector(k), apart[k]));
+  }
+  if (j.type == DFM_JOINT_HINGE) {
+    const Vec3 n = rotate(a.turn, j.axis_a);
+    for (const Vec3 &s : j.side_b) {
+      const Vec3 t = rotate(b.turn, s);
+      out.push_back(spin_row(j, cross(n, t), dot(n, t)));  // d/dt (n . t) = (w_a - w_b) . (n x t)
+    }
+  } else if (j.type != DFM_JOINT_BALL) {
+    const Vec3 off = rotation_vector(a.turn * conjugate(b.turn * j.turn));
+    for (int k = 0; k < 3; ++k) out.push_back(spin_row(j, unit_vector(k), off[k]));
+  }
+}
+
+JointRow drive_row(const RigidJoint &j, std::span<const dfm_rigid_state> state) {
+  const Side a = side(j.a, state), b = side(j.b, state);
+  const Vec3 axis = rotate(b.turn, j.axis_b);
+  if (j.type == DFM_JOINT_HINGE)
+    return spin_row(j, axis, dot(rotation_vector(a.turn * conjugate(b.turn * j.turn)), axis));
+  const Vec3 arm_a = rotate(a.turn, j.anchor_a);
+  const Vec3 arm_b = rotate(b.turn, j.anchor_b);
+  const Vec3 apart = a.center + arm_a - (b.center + arm_b);
+  return point_row(j, arm_a, arm_b + apart, axis, dot(apart, axis));
+}
+
+double row_rate(const JointRow &r, std::span<const double> v) {
+  const double *const a = &v[6 * size_t{r.a}];
+  double rate = dot(r.la, load3(a)) + dot(r.aa, load3(a + 3));
+  if (r.b == DFM_RIGID_WORLD) return rate;
+  const double *const b = &v[6 * size_t{r.b}];
+  return rate + dot(r.lb, load3(b)) + dot(r.ab, load3(b + 3));
+}
+
+void JointSystem::build(std::span<const JointRow> rows, std::span<const RigidPart> parts,
+                        std::span<const dfm_rigid_state> state) {
+  n_ = rows.size();
+  factor_.assign(n_ * n_, 0.0);
+  responses_.assign(12 * n_, 0.0);
+  for (size_t i = 0; i < n_; ++i) {
+    const JointRow &r = rows[i];
+    double *const m = &responses_[12 * i];
+    Vec3 dv, dw;
+    response(r.la, r.aa, parts[r.a], state[r.a], dv, dw);
+    store3(m, dv);
+    store3(m + 3, dw);
+    if (r.b == DFM_RIGID_WORLD) continue;
+    response(r.lb, r.ab, parts[r.b], state[r.b], dv, dw);
+    store3(m + 6, dv);
+    store3(m + 9, dw);
+  }
+  // Lower triangle of A: row i on the response of row k, side by side where they share a part.
+  for (size_t i = 0; i < n_; ++i)
+    for (size_t k = 0; k <= i; ++k) {
+      const JointRow &r = rows[i], &q = rows[k];
+      const double *const m = &responses_[12 * k];
+      double sum = 0;
+      auto add = [&](uint32_t part, Vec3 l, Vec3 a) {
+        if (part == DFM_RIGID_WORLD) return;
+        if (part == q.a) sum += dot(l, load3(m)) + dot(a, load3(m + 3));
+        if (part == q.b) sum += dot(l, load3(m + 6)) + dot(a, load3(m + 9));
+      };
+      add(r.a, r.la, r.aa);
+      add(r.b, r.lb, r.ab);
+      factor_[i * n_ + k] = sum;
+    }
+  // L D L^T in place: D on the diagonal, 0 where the row is left out.
+  for (size_t i = 0; i < n_; ++i) {
+    double *const row = &factor_[i * n_];
+    const double own = row[i];
+    for (size_t k = 0; k < i; ++k) {
+      const double *const other = &factor_[k * n_];
+      double sum = row[k];
+      for (size_t m = 0; m < k; ++m) sum -= row[m] * other[m] * factor_[m * n_ + m];
+      row[k] = other[k] > 0 ? sum / other[k] : 0;
+    }
+    double pivot = own;
+    for (size_t k = 0; k < i; ++k) pivot -= row[k] * row[k] * factor_[k * n_ + k];
+    row[i] = pivot > kRedundant * own ? pivot : 0;
+  }
+}
+
+void JointSystem::solve(std::span<double> x) const {
+  auto d = [&](size_t i) { return factor_[i * n_ + i]; };
+  for (size_t i = 0; i < n_; ++i) {
+    if (!(d(i) > 0)) {
+      x[i] = 0;
+      continue;
+    }
+    for (size_t k = 0; k < i; ++k) x[i] -= factor_[i * n_ + k] * x[k];
+  }
+  for (size_t i = 0; i < n_; ++i) x[i] = d(i) > 0 ? x[i] / d(i) : 0;
+  for (size_t i = n_; i-- > 0;) {
+    if (!(d(i) > 0)) continue;
+    for (size_t k = i + 1; k < n_; ++k) x[i] -= factor_[k * n_ + i] * x[k];
+  }
+}
+
+void JointSystem::push(std::span<const JointRow> rows, std::span<const double> x,
+                       std::span<const RigidPart> parts, std::span<const dfm_rigid_state> state,
+                       std::span<double> velocity) {
+  for (size_t i = 0; i < rows.size(); ++i) {
+    const JointRow &r = rows[i];
+    auto add = [&](uint32_t part, Vec3 l, Vec3 a) {
+      if (part == DFM_RIGID_WORLD) return;
+      Vec3 dv, dw;
+      response(x[i] * l, x[i] * a, parts[part], state[part], dv, dw);
+      double *const v = &velocity[6 * size_t{part}];
+      store3(v, load3(v) + dv);
+      store3(v + 3, load3(v + 3) + dw);
+    };
+    add(r.a, r.la, r.aa);
+    add(r.b, r.lb, r.ab);
+  }
+}
+
+}  // namespace dfm

@@ -1,0 +1,22 @@
+// The area that a surfel brings to a contact: a third of the triangles around it, as seen along the
+// contact's normal, so that a patch that touches all over adds up to its area and a rim does not count the
+// sides beside it.
+#pragma once
+#include "geometry/surface.h"
+#include "math/vec3.h"
+
+namespace dfm {
+
+// m2. outward: unit normal of the surfel's body at the contact.
+inline double facing_area(const Surface &surface, uint32_t surfel, Vec3 outward) {
+  const auto x = [&](uint32_t s) { return load3(&surface.x[4 * size_t{s}]); };
+  double sum = 0;
+  for (uint32_t k = surface.fan_begin[surfel]; k < surface.fan_begin[surfel + 1]; ++k) {
+    const uint32_t *const c = &surface.tri[3 * size_t{surface.fan[k]}];
+    const double part = dot(outward, cross(x(c[1]) - x(c[0]), x(c[2]) - x(c[0])));
+    if (part > 0) sum += part;
+  }
+  return sum / 6;
+}
+
+}  // namespace dfm

@@ -1,0 +1,52 @@
+// An obstacle's shape in world coordinates: its axes, corners and signed distance. Made once per obstacle and
+// use, so that the many queries against it rotate nothing.
+#pragma once
+#include <cstdint>
+
+#include "geometry/views.h"
+#include "math/vec3.h"
+
+namespace dfm {
+
+struct ObstaclePoint {
+  Vec3 point;       // on the obstacle's surface
+  Vec3 normal;      // unit, outward
+  double distance;  // negative inside
+  uint32_t face;    // box: the face that the normal belongs to, or leans to most; else 0
+};
+
+class ObstacleShape {
+ public:
+  explicit ObstacleShape(const ObstacleView &view);
+  const ObstacleView &view() const { return view_; }
+  Vec3 axis(int k) const { return axis_[k]; }  // local x, y, z
+  // sphere: the center, twice; capsule: centers of its caps
+  Vec3 end(int k) const { return end_[k]; }
+
+  // Box: corner i lies at + along axis k where bit k is set. Edges 4k..4k+3 run along axis k. Faces 2k
+  // (toward -axis k), 2k+1 (toward +).
+  Vec3 corner(uint32_t i) const;
+  void edge(uint32_t i, Vec3 &from, Vec3 &to, uint32_t faces[2]) const;
+  Vec3 face_normal(uint32_t i) const { return i & 1 ? axis_[i >> 1] : -axis_[i >> 1]; }
+
+  ObstaclePoint closest(Vec3 p) const;  // not of a mesh
+  Vec3 local(Vec3 p) const { return rotate_back(view_.rotation, p - view_.position); }
+  // Voxels: may p, or a place near it, be nearer than `limit`? (VoxelGrid::near)
+  bool voxels_near(Vec3 p, double limit) const;
+  // Velocity with which the shape at q moves, without the belt and without a round shape's spin about itself,
+  // which moves no surface.
+  Vec3 shape_velocity(Vec3 q) const;
+  // Largest distance from position at which rotation moves the shape; 0 for a sphere; a plane has none (its
+  // caller bounds it).
+  double extent() const;
+  // Axis-parallel bounds; not for a plane or a mesh.
+  void bounds(double lo[3], double hi[3]) const;
+
+ private:
+  ObstaclePoint closest_on_box(Vec3 p) const;
+  ObstaclePoint closest_on_voxels(Vec3 p) const;
+  ObstacleView view_;
+  Vec3 axis_[3], end_[2];
+};
+
+}  // namespace dfm

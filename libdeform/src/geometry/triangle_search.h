@@ -1,0 +1,54 @@
+// The first triangle on a ray and the closest one to a point, through a tree of boxes. Nodes are visited
+// nearest first, and left out only where no triangle in them can do better, so the answers are those of a
+// look at every triangle: of equals the lowest number.
+#pragma once
+#include <cmath>
+#include <cstdint>
+#include <limits>
+#include <span>
+
+#include "geometry/box_tree.h"
+#include "geometry/closest.h"
+#include "geometry/surface.h"
+
+namespace dfm {
+
+inline constexpr double kFar = std::numeric_limits<double>::infinity();
+
+struct Triangles {
+  const BoxTree &tree;
+  std::span<const uint32_t> corners;  // [ntri,3]
+  const double *x;                    // [points,4], those that the tree was made from
+  Vec3 corner(uint32_t t, uint32_t k) const { return load3(x + 4 * size_t{corners[3 * size_t{t} + k]}); }
+};
+
+// Boxes and triangles that were looked at.
+struct SearchCount {
+  uint64_t nodes = 0;
+  uint64_t triangles = 0;
+};
+
+struct TriangleOnRay {
+  double distance = kFar;
+  uint32_t triangle = kNone;
+};
+struct TriangleNearPoint {
+  double key = kFar;
+  uint32_t triangle = kNone;
+  TrianglePoint at{};
+};
+
+// Moeller and Trumbore 1997: distance along the ray, or infinity. Both sides count.
+double ray_triangle(Vec3 o, Vec3 d, Vec3 a, Vec3 b, Vec3 c);
+
+// Up to and with `limit`. A triangle counts where it is met inside of its box, to 1e-8 of all lengths: where
+// a ray grazes it by less than 1e-7 rad the numbers mean no more than that.
+TriangleOnRay first_on_ray(const Triangles &triangles, Vec3 o, Vec3 unit, double limit,
+                           SearchCount *count = nullptr);
+
+// Of least key(squared distance), a function that does not fall, up to and with `limit`.
+enum class DistanceKey : uint8_t { squared, root };
+TriangleNearPoint closest_to(const Triangles &triangles, Vec3 p, DistanceKey key, double limit,
+                             SearchCount *count = nullptr);
+
+}  // namespace dfm

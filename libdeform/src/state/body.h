@@ -1,0 +1,99 @@
+// A soft body: its points, surface, model and how it moves, and what is prescribed for it.
+#pragma once
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "body/zones.h"
+#include "deform/deform.h"
+#include "dynamics/dynamics.h"
+#include "state/energy_book.h"
+#include "state/motion.h"
+#include "state/search_tree.h"
+#include "state/sleep.h"
+
+namespace dfm {
+
+struct World;
+
+// An entry of a material that the body's model has no parameter for.
+struct Unused { std::string key, material; };
+// A model parameter that differs from cell to cell, and who said so ("field", "materials", "share").
+struct CellField {
+  std::string key, from;
+  uint32_t width;
+  Array<double> values;
+};
+
+// A lasting load: force[i] on points[i], times the keyed scale, times 1 + sine.
+struct Load {
+  uint32_t number;
+  std::vector<uint32_t> points;
+  std::vector<double> force;
+  std::vector<dfm_scale_key> keys;
+  dfm_sine sine{};
+};
+// A spring of rest length zero from the weighted mean of points to a place, or a path of places.
+struct Spring {
+  uint32_t number;
+  std::vector<uint32_t> points;
+  std::vector<double> weights;
+  std::vector<dfm_vector_key> keys;
+  Vec3 to;
+  double stiffness, damping;
+};
+// Held points carried by keyed poses (relative to the first key) and a sine.
+struct HeldMotion {
+  std::vector<uint32_t> points;
+  std::vector<double> start;
+  std::vector<dfm_pose_key> keys;
+  dfm_sine sine{};
+};
+
+inline constexpr int32_t kNoCoupling = -1;
+
+struct Body {
+  World *world = nullptr;
+  uint64_t id = 0, handle = 0;
+  uint32_t slot = 0;
+  std::string name, material;
+  uint32_t category = 1, collides_with = ~0u;
+  void *user = nullptr;
+
+  Phyxels p;
+  uint64_t x_version = 1;  // rises whenever p.x may have changed
+  Array<uint32_t> tets, edges;
+  Surface surface;
+  SurfaceZones zones;
+  int32_t coupling = kNoCoupling;  // DFM_COUPLING_* of a surface of its own
+  ModelInstance model;
+  std::unique_ptr<Dynamics> dynamics;  // how it moves
+  double mass = 0, rest_volume = 0;
+  Array<double> share;  // [ntet] how much of each cell is material; empty: all
+  std::vector<CellField> fields;
+  std::vector<Unused> unused;
+  std::vector<Load> loads;
+  std::vector<Spring> springs;
+  std::vector<HeldMotion> motions;
+  uint32_t next_load = 1;  // number of the next load or spring
+  Vec3 contact_impulse;    // N s since creation
+  EnergyBook energy;
+  Array<double> surfel_impulse;  // [nsurfel,3] N s of the last sub-step
+  // [n,4] what the contact method keeps of each point; empty where it keeps nothing
+  Array<double> method_values;
+  // as last asked for; holds while asleep
+  struct {
+    bool known = false;
+    StepBound found;
+    uint32_t inverted = 0;
+  } bound;
+  Slumber slumber;
+  // [n,4] m, positions since which it is calm; empty where nothing may sleep
+  Array<double> anchor;
+  std::unique_ptr<SearchTree> search;  // rays and closest points
+
+  bool loads_vary() const;
+  double impulse_time() const;  // s that surfel_impulse belongs to
+};
+
+}  // namespace dfm

@@ -1,0 +1,23 @@
+// What pairs did to each other over the whole last step; step/step_impulses.h adds it up.
+#pragma once
+#include "core/memory.h"
+#include "math/vec3.h"
+
+namespace dfm {
+
+struct StepImpulses {
+  struct Pair {
+    uint64_t a, b;                   // ids; between two bodies a is the lower one
+    Vec3 impulse;                    // N s, on a
+    Vec3 place;                      // m N s: points of contact, weighted with their normal impulses
+    double normal;                   // N s, sum of normal impulses
+    double touching;                 // s, in which it carried something
+    double peak_normal, peak_force;  // N, means over the sub-step where they were largest
+    Vec3 now;                        // N s, of the present sub-step
+    double now_normal;
+  };
+  Array<Pair> pairs;  // sorted by (a, b)
+  double idle = 0;    // s of this step in which everybody slept: forces are those of the report
+};
+
+}  // namespace dfm

@@ -1,0 +1,212 @@
+#include "state/material.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+#include <map>
+
+#include "core/error.h"
+#include "core/handle.h"
+#include "plugin/params.h"
+#include "state/world.h"
+
+namespace dfm {
+
+CellMaterials cell_materials(const World &w, const dfm_body_def &def, const std::string &body,
+                             const Material &plain) {
+  CellMaterials out;
+  auto find = [&](dfm_material handle) -> const Material & {
+    if (!handle) return plain;
+    const Material &m = resolve<Material>(Kind::material, handle);
+    if (m.world != &w)
+      fail(DFM_E_HANDLE, "body '%s': its material '%s' belongs to another world", body.c_str(),
+           m.name.c_str());
+    return m;
+  };
+  const Material &whole = find(def.material);
+  if (!def.cell_materials) {
+    out.list.push_back(&whole);
+    return out;
+  }
+  std::map<dfm_material, uint32_t> known;
+  out.of.resize(def.ntet);
+  for (uint32_t t = 0; t < def.ntet; ++t) {
+    const dfm_material handle = def.cell_materials[t] ? def.cell_materials[t] : def.material;
+    const auto [at, fresh] = known.try_emplace(handle, uint32_t(out.list.size()));
+    if (fresh) out.list.push_back(&find(handle));
+    out.of[t] = at->second;
+  }
+  if (out.list.size() == 1) out.of.clear();
+  return out;
+}
+
+void check_share(const dfm_body_def &def, const std::string &body) {
+  for (uint32_t t = 0; def.cell_share && t < def.ntet; ++t)
+    if (!(def.cell_share[t] > 0 && def.cell_share[t] <= 1))
+      fail(DFM_E_ARG,
+           "body '%s': the share of cell %u is %g; it must lie above 0 and be at most 1 (leave empty cells "
+           "out)",
+           body.c_str(), t, def.cell_share[t]);
+}
+
+void lump_body(Body &b, const dfm_body_def &def, const CellMaterials &cells) {
+  std::vector<double> density;
+  for (uint32_t k : cells.of) density.push_back(cells.list[k]->def.density);
+  const LumpedMass lumped =
+      lump_mass(b.p.n, b.p.rest.data(), def.ntet, b.tets.data(), cells.list[0]->def.density,
+                density.empty() ? nullptr : density.data(), def.cell_share, b.p.mass.data());
+  b.rest_volume = lumped.volume;
+  b.mass = lumped.mass;
+}
+
+namespace {
+
+// A model parameter that the body does not give comes from the material's entry of the same key.
+std::vector<double> values_of(const dfm_type &type, const dfm_params &given, const Material &m) {
+  std::vector<dfm_param_value> entries;
+  const double *const values[] = {&m.def.young, &m.def.poisson, &m.def.damping_mass,
+                                  &m.def.damping_stiffness};
+  const char *const keys[] = {"young", "poisson", "damping_mass", "damping_stiffness"};
+  for (int i = 0; i < 4; ++i) entries.push_back({keys[i], values[i], 1});
+  for (size_t i = 0; i < m.extra_keys.size(); ++i)
+    entries.push_back(
+        {m.extra_keys[i].c_str(), m.extra_values[i].data(), static_cast<uint32_t>(m.extra_values[i].size())});
+  return pack_params(type, {given.values, given.values ? given.n : 0},
+                     [&](const char *key) -> const dfm_param_value * {
+                       for (const auto &e : entries)
+                         if (std::strcmp(e.key, key) == 0) return &e;
+                       return nullptr;
+                     });
+}
+
+std::vector<std::string> keys_by_cell(const dfm_type &type) {
+  std::vector<std::string> keys;
+  for (uint32_t i = 0; i < type.nparam; ++i)
+    if (type.params[i].flags & DFM_PARAM_PER_CELL) keys.push_back(type.params[i].key);
+  return keys;
+}
+
+[[noreturn]] void unknown_field(const dfm_type &type, const std::string &body, const char *key) {
+  const std::vector<std::string> keys = keys_by_cell(type);
+  bool row = false;
+  for (uint32_t i = 0; i < type.nparam; ++i) row = row || std::strcmp(type.params[i].key, key) == 0;
+  const std::string near = row ? "" : nearest(key, keys);
+  const std::string has = keys.empty() ? "it takes no parameter by cell" : "by cell it takes: " + join(keys);
+  fail(DFM_E_ARG, "body '%s': field '%s': %s has no such parameter by cell%s; %s", body.c_str(), key, type.id,
+       near.empty() ? (row ? ", it holds for the whole body" : "")
+                    : (", did you mean '" + near + "'?").c_str(),
+       has.c_str());
+}
+
+void check_fields(const dfm_type &type, const dfm_body_def &def, const std::string &body) {
+  if (def.nfield && !def.fields)
+    fail(DFM_E_ARG, "body '%s': %u fields are announced, but fields is NULL", body.c_str(), def.nfield);
+  const std::vector<std::string> keys = keys_by_cell(type);
+  for (uint32_t n = 0; n < def.nfield; ++n) {
+    const dfm_cell_field &f = def.fields[n];
+    if (!f.key || !f.values)
+      fail(DFM_E_ARG, "body '%s': field %u has no %s", body.c_str(), n, f.key ? "values" : "key");
+    if (std::find(keys.begin(), keys.end(), f.key) == keys.end()) unknown_field(type, body, f.key);
+    for (uint32_t k = 0; k < n; ++k)
+      if (std::strcmp(def.fields[k].key, f.key) == 0)
+        fail(DFM_E_ARG, "body '%s': the field '%s' is given twice", body.c_str(), f.key);
+    for (uint32_t k = 0; def.model_params.values && k < def.model_params.n; ++k)
+      if (def.model_params.values[k].key && std::strcmp(def.model_params.values[k].key, f.key) == 0)
+        fail(DFM_E_ARG, "body '%s': '%s' is given both as one value and as a field; keep one", body.c_str(),
+             f.key);
+  }
+}
+
+void check_field_values(const dfm_param &row, const dfm_cell_field &f, uint32_t ntet,
+                        const std::string &body) {
+  if (f.width != row.width)
+    fail(DFM_E_ARG, "body '%s': field '%s' has %u value%s per cell, %u expected", body.c_str(), f.key,
+         f.width, f.width == 1 ? "" : "s", row.width);
+  const bool whole = row.flags & (DFM_PARAM_INTEGER | DFM_PARAM_ENUM);
+  for (size_t i = 0; i < size_t(ntet) * row.width; ++i)
+    if (!(f.values[i] >= row.min && f.values[i] <= row.max) ||
+        (whole && f.values[i] != std::floor(f.values[i])))
+      fail(DFM_E_ARG, "body '%s': field '%s': cell %zu is %g; expected a %s in [%g, %g]%s%s", body.c_str(),
+           f.key, i / row.width, f.values[i], whole ? "whole number" : "number", row.min, row.max,
+           std::strcmp(row.unit, "1") == 0 ? "" : " ", std::strcmp(row.unit, "1") == 0 ? "" : row.unit);
+}
+
+// One parameter of the table: where its values stand in the packed ones, and what they are for each material.
+struct Row {
+  const dfm_param &param;
+  size_t at;
+  const std::vector<std::vector<double>> &packed;  // by material
+  const double *of(size_t material) const { return &packed[material][at]; }
+  bool differs(size_t *where) const {
+    for (size_t k = 1; k < packed.size(); ++k)
+      if (!std::equal(of(0), of(0) + param.width, of(k))) {
+        *where = k;
+        return true;
+      }
+    return false;
+  }
+};
+
+CellField *add_field(Body &b, const World &w, const dfm_param &row, const char *from, uint32_t ntet) {
+  b.fields.push_back({row.key, from, row.width,
+                      Array<double>(size_t(ntet) * row.width, 0.0, HookAllocator<double>(w.memory()))});
+  return &b.fields.back();
+}
+
+void scale_young(Body &b, const World &w, const char *model, const Row &row, CellField *field,
+                 uint32_t ntet) {
+  if (!(row.param.flags & DFM_PARAM_PER_CELL)) {
+    w.context->logf(DFM_LOG_WARNING,
+                    "body '%s': %s takes one Young's modulus for all cells, so cells that are filled in part "
+                    "are as stiff as full ones",
+                    b.name.c_str(), model);
+    return;
+  }
+  if (!field) {
+    field = add_field(b, w, row.param, "share", ntet);
+    std::fill(field->values.begin(), field->values.end(), *row.of(0));
+  } else {
+    field->from += " and share";
+  }
+  for (uint32_t t = 0; t < ntet; ++t)
+    field->values[t] = std::max(row.param.min, field->values[t] * b.share[t]);
+}
+
+}  // namespace
+
+std::vector<double> model_values(const World &w, Body &b, const dfm_type &type, const dfm_body_def &def,
+                                 const CellMaterials &cells) {
+  check_fields(type, def, b.name);
+  std::vector<std::vector<double>> packed;
+  for (const Material *m : cells.list) packed.push_back(values_of(type, def.model_params, *m));
+  size_t at = 0;
+  for (uint32_t i = 0; i < type.nparam; at += type.params[i++].width) {
+    const Row row{type.params[i], at, packed};
+    const dfm_param &p = row.param;
+    CellField *field = nullptr;
+    const dfm_cell_field *given = nullptr;
+    for (uint32_t n = 0; n < def.nfield; ++n)
+      if (std::strcmp(def.fields[n].key, p.key) == 0) given = &def.fields[n];
+    size_t other = 0;
+    if (given) {
+      check_field_values(p, *given, def.ntet, b.name);
+      field = add_field(b, w, p, "field", def.ntet);
+      std::copy_n(given->values, field->values.size(), field->values.begin());
+    } else if (row.differs(&other)) {
+      if (!(p.flags & DFM_PARAM_PER_CELL))
+        fail(DFM_E_ARG,
+             "body '%s': %s takes one '%s' for all cells, but its materials '%s' and '%s' differ in it (%g "
+             "and %g); give it in the model's parameters",
+             b.name.c_str(), type.id, p.key, cells.list[0]->name.c_str(), cells.list[other]->name.c_str(),
+             *row.of(0), *row.of(other));
+      field = add_field(b, w, p, "materials", def.ntet);
+      for (uint32_t t = 0; t < def.ntet; ++t)
+        std::copy_n(row.of(cells.of[t]), p.width, &field->values[size_t(t) * p.width]);
+    }
+    if (!b.share.empty() && std::strcmp(p.key, "young") == 0 && p.width == 1)
+      scale_young(b, w, type.id, row, field, def.ntet);
+  }
+  return std::move(packed[0]);
+}
+
+}  // namespace dfm

@@ -1,0 +1,50 @@
+// A rigid shape that bodies touch: prescribed, or one of a host's rigid bodies.
+#pragma once
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "body/obstacle_mesh.h"
+#include "body/zones.h"
+#include "deform/deform.h"
+#include "geometry/voxel_grid.h"
+#include "state/motion.h"
+#include "state/search_tree.h"
+
+namespace dfm {
+
+struct RigidSet;
+struct World;
+
+inline constexpr double kDefaultFriction = 0.5;  // of a material that has no entry "friction"
+
+struct Obstacle {
+  World *world = nullptr;
+  uint64_t id = 0, handle = 0;
+  uint32_t slot = 0;
+  std::string name, material;
+  SurfaceZones::Zone zone{"", "", kDefaultFriction};
+  dfm_obstacle_def def{};
+  std::vector<dfm_pose_key> keys;
+  Pose pose;    // now
+  Pose target;  // at the end of the next step, where move_to set it
+  bool has_target = false;
+  RigidSet *rigid = nullptr;  // a body of a rigid host: where it stands in `rigid`
+  uint32_t rigid_body = 0;
+  bool added = false;  // a further shape of that body, at `local` in its frame
+  Pose local;
+  bool moves() const {
+    return !keys.empty() || def.sine.amplitude[0] != 0 || def.sine.amplitude[1] != 0 ||
+           def.sine.amplitude[2] != 0;
+  }
+  Array<double> points;  // mesh, voxels: as given, in its frame
+  Array<uint32_t> triangles;
+  std::unique_ptr<ObstacleMesh> mesh;
+  std::unique_ptr<VoxelGrid> grid;
+  std::unique_ptr<SearchTree> search;  // rays
+  Pose pose_at_time(double t) const;
+  // of a sub-step, in a step that lasts for `left` from t
+  Pose end_pose(double t, double h, double left) const;
+};
+
+}  // namespace dfm

@@ -1,0 +1,115 @@
+// The world: what lasts. step/step.cpp is the table of contents of what happens to it in a step,
+// step/context.h has the buffers of that.
+#pragma once
+#include <atomic>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "contact/report.h"
+#include "contact/store.h"
+#include "friction/laws.h"
+#include "plan/plan.h"
+#include "plugin/context.h"
+#include "state/body.h"
+#include "state/energy_book.h"
+#include "state/impulses.h"
+#include "state/material.h"
+#include "state/obstacle.h"
+#include "state/overlaps.h"
+#include "state/pair_tables.h"
+#include "state/rigid_set.h"
+#include "state/step_sizes.h"
+#include "state/world_bound.h"
+
+namespace dfm {
+
+struct ContactMethod;
+struct StepContext;
+
+struct FrictionRule {
+  std::string between[2];
+  uint32_t law;
+};
+struct FilterRule {
+  std::string between[2];
+  bool collide;
+};
+struct PairWork {
+  uint64_t a, b;
+  double work;
+};
+
+struct Gravity {
+  std::vector<dfm_vector_key> keys;
+  Vec3 now;  // m/s2
+};
+
+// A measurement of what creeps (dfm_world_hold_begin).
+struct Hold {
+  bool on = false;
+  double start = 0;  // s
+};
+
+// between steps; with more, so many of the oldest go that
+inline constexpr size_t kMostEvents = 65536;
+inline constexpr size_t kEventsAtOnce = 1024;  // the next steps find room
+
+struct World {
+  dfm_context *context;
+  uint64_t handle = 0;
+  dfm_world_def def{};
+  std::vector<std::string> asked_effects;
+  Gravity gravity;
+
+  std::vector<std::unique_ptr<Body>> bodies;         // in id order
+  std::vector<std::unique_ptr<Obstacle>> obstacles;  // in id order
+  std::vector<std::unique_ptr<Material>> materials;
+  std::vector<std::unique_ptr<RigidSet>> rigid_sets;  // each a host's bodies, which are obstacles too
+  std::vector<std::unique_ptr<LawInstance>> laws;     // the first is the default law, made when first needed
+  std::vector<FrictionRule> friction;
+  std::vector<FilterRule> filters;
+  Overlaps overlaps;
+  // rises when positions or d_c change otherwise than by a step
+  uint64_t placements = 0;
+  uint64_t next_id = 1;
+
+  // Derived from the above by prepare() whenever something changed.
+  bool changed = true;
+  bool revalued = false;  // values_changed(): tables hold, the plan is looked at
+  Plan plan;
+  PairTables pairs;
+  double offset = 0;                      // d_c, m
+  const ContactMethod *method = nullptr;  // its table of stages, and what it cannot do (step/method.h)
+
+  // Time.
+  double time = 0;  // s
+  uint64_t step_count = 0;
+  WorldBound bound;
+  StepSizes sizes;
+  EnergyWatch watch;
+  std::atomic<bool> busy{false};  // a call of the API changes it (api/call.h)
+
+  std::unique_ptr<StepContext> steps;  // buffers: step/context.h
+
+  ContactStore store;
+  Report report;
+  std::vector<PairWork> work;  // sorted by (a, b)
+  std::vector<dfm_contact_event> events;
+  StepImpulses step_impulses;
+  Hold hold;
+  uint32_t sleepers = 0;
+
+  dfm_world_stats stats{};
+
+  explicit World(dfm_context *c);
+  ~World();
+  const Memory &memory() const { return context->memory; }
+
+  // world.cpp
+  Body *find_body(const std::string &name);
+  Obstacle *find_obstacle(const std::string &name);
+  uint64_t handle_of(uint64_t id) const;  // body or obstacle; 0 if gone
+};
+
+}  // namespace dfm

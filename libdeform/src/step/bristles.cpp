@@ -1,0 +1,188 @@
+// Bristles between sub-steps.
+//
+//   normal turns    contact/store.cpp, transport(): by the smallest rotation that takes it along
+//   surfaces spin   here: about the normal, by half of what each of the two turns
+//   area changes    here: sigma0 A z is kept where A grows, z where A shrinks
+//   bristles slide  here: areas go where the load asks for them (contact/areas.h, contact/exchange.h), as far
+//   as sliding renews the bristles
+//                   (contact/renewal.h)
+//
+// A surface's turn about n within the sub-step is what its points near the contact did, x -> x': with r from
+// their middle, in the plane of n,
+//     tan(angle) = sum n . (r x r') / sum r . r'
+// is the rotation of least squares (Kabsch 1976, in the plane); exact for a rigid motion, whatever its size.
+#include "step/bristles.h"
+
+#include <algorithm>
+
+#include "state/world.h"
+#include "step/context.h"
+#include "step/stages.h"
+
+namespace dfm {
+namespace {
+
+// A turn in the plane of n: cosine and sine.
+struct Turn { double c, s; };
+Turn unit_turn(double c, double s) {
+  const double size = std::sqrt(c * c + s * s);
+  return size > 0 ? Turn{c / size, s / size} : Turn{1, 0};
+}
+
+// Points of a surface around a contact's feature: corners of the triangles that have it.
+class Neighborhood {
+ public:
+  explicit Neighborhood(const Body &b) : body_(b) {}
+
+  void around(uint8_t type, uint32_t feature) {
+    const Surface &s = body_.surface;
+    if (type == 0)
+      for (uint32_t k = s.fan_begin[feature]; k < s.fan_begin[feature + 1]; ++k) triangle(s.fan[k]);
+    else if (type == 1)
+      for (int k = 0; k < 2; ++k) triangle(s.edge_tri[2 * size_t{feature} + size_t(k)]);
+    else triangle(feature);
+  }
+
+  Turn turn(Vec3 n) const {
+    if (count_ == 0) return {1, 0};
+    const Vec3 from = (1.0 / count_) * before_, to = (1.0 / count_) * after_;
+    double c = 0, s = 0;
+    for (uint32_t k = 0; k < count_; ++k) {
+      const Vec3 r = at_[k] - from, q = moved_[k] - to;
+      c += dot(r, q) - dot(n, r) * dot(n, q);
+      s += dot(n, cross(r, q));
+    }
+    return unit_turn(c, s);
+  }
+
+ private:
+  // corners, counted once per triangle; the first twelve triangles of a fan tell its turn
+  static constexpr uint32_t kMost = 36;
+  const Body &body_;
+  uint32_t count_ = 0;
+  Vec3 at_[kMost], moved_[kMost], before_, after_;
+
+  void triangle(uint32_t t) {
+    if (t == kNone || count_ + 3 > kMost) return;
+    for (int k = 0; k < 3; ++k) {
+      const uint32_t surfel = body_.surface.tri[3 * size_t{t} + size_t(k)];
+      Vec3 now;
+      body_.surface.each_phyxel(surfel, [&](uint32_t phyxel, double weight) {
+        now += weight * load3(&body_.p.x[size_t(phyxel) * kStride]);
+      });
+      at_[count_] = load3(&body_.surface.x[4 * size_t{surfel}]);
+      moved_[count_] = now;
+      before_ += at_[count_];
+      after_ += now;
+      ++count_;
+    }
+  }
+};
+
+Turn turn_of(const Body &b, uint8_t type, uint32_t feature, Vec3 n) {
+  Neighborhood near(b);
+  near.around(type, feature);
+  return near.turn(n);
+}
+
+Turn turn_of(const World &w, const StepContext &step, const Obstacle &o, Vec3 n) {
+  if (!o.rigid && !o.has_target && !o.moves()) return {1, 0};
+  const double a = step.guard.motion *
+                   dot(n, spin_between(o.pose.rotation, o.end_pose(w.time, step.h, step.left).rotation, 1));
+  const double half = 0.5 * a * (1 + a * a / 12);  // tan(a / 2) up to a^5
+  return unit_turn(1 - half * half, 2 * half);     // of length one: what is halved after it counts on that
+}
+
+}  // namespace
+
+void share_areas(World &w, StepContext &step) {
+  const auto counts = [](const LawInstance *law) {
+    return (law->ops->needs & DFM_NEED_AREA) && !(law->ops->flags & DFM_FRIC_SET_VALUED);
+  };
+  step.shares = std::any_of(w.pairs.laws.begin(), w.pairs.laws.end(), counts);
+  if (!step.shares) {
+    step.exchange.clear();
+    return step.aim.clear();
+  }
+  const uint32_t n = step.rows.n;
+  step.sharing.resize(n);
+  step.aim.resize(n);
+  step.stands.resize(n);
+  step.ways.resize(n);
+  step.renewed.resize(n);
+  step.areas.share(step.contacts, step.rows.impulse.data(), 1.1 * w.offset, step.aim.data());
+  for (uint32_t i = 0; i < n; ++i)
+    step.sharing[i] = counts(w.pairs.laws[step.state.law[i]]) ? step.state.law[i] : kNone;
+  step.exchange.list(step.contacts, step.sources, step.sharing.data(), step.aim.data());
+  step.renewal.list(step.contacts, step.rows.impulse.data());
+  for (uint32_t i = 0; i < n; ++i) {
+    const uint32_t m = step.match[i];
+    const bool carries = step.sharing[i] != kNone && step.rows.impulse[3 * size_t{i}] > 0;
+    step.stands[i] =
+        carries && m < w.store.due.size() && w.store.law[m] == step.state.law[i] && w.store.due[m] > 0;
+    step.state.area[i] = step.stands[i] ? w.store.due[m] : step.aim[i];
+  }
+  step.renewal.fill(step.stands.data(), step.aim.data(), step.state.area.data());
+}
+
+// Slid on: beyond what the bristles have taken up. The slip that a law was asked at is known to a hundredth
+// (friction/local_solve.cpp); five count as none.
+void follow_load(World &w, StepContext &step) {
+  ContactStore &to = step.next_store;
+  const ContactState &s = step.state;
+  const uint32_t n = static_cast<uint32_t>(step.aim.size());
+  to.due.resize(n);
+  if (n == 0) return;
+  for (uint32_t i = 0; i < n; ++i) {
+    step.ways[i] = {0, 0};
+    if (step.sharing[i] == kNone || !(step.rows.impulse[3 * size_t{i}] > 0)) continue;
+    const LawInstance &law = *w.pairs.laws[s.law[i]];
+    const double x = step.h * s.vt[i], y = step.h * s.vt[s.stride + i], far = std::sqrt(x * x + y * y);
+    double pairs = 0;
+    for (uint32_t k = 0; k + 1 < law.nstate; ++k) {
+      if (!law.tangent[k]) continue;
+      const double *const z = &s.bristle[size_t{k} * s.stride + i];
+      const double *const after = &s.bristle_out[size_t{k} * s.stride + i];
+      const double a = x - (after[0] - z[0]), b = y - (after[s.stride] - z[s.stride]);
+      step.ways[i].slid += std::max(0.0, std::sqrt(a * a + b * b) - 0.05 * far);
+      step.ways[i].out += std::sqrt(after[0] * after[0] + after[s.stride] * after[s.stride]);
+      ++pairs;
+      ++k;
+    }
+    if (pairs == 0) step.ways[i].slid = far;
+  }
+  step.renewal.measure(step.h, step.rows.impulse.data(), step.ways.data(), s.dwell.data(),
+                       step.renewed.data());
+  step.exchange.pass(step.rows.impulse.data(), step.aim.data());
+  for (uint32_t i = 0; i < n; ++i) to.due[i] = s.area[i] + step.renewed[i] * (step.aim[i] - s.area[i]);
+}
+
+void fit_bristles(World &w, StepContext &step) {
+  ContactState &s = step.state;
+  if (s.nstate == 0) return;
+  for (uint32_t i = 0; i < step.rows.n; ++i) {
+    const uint32_t m = step.match[i];
+    if (m == kNone || !(w.store.area[m] < s.area[i])) continue;
+    const LawInstance &law = *w.pairs.laws[s.law[i]];
+    for (uint32_t k = 0; k < law.nstate; ++k)
+      if (law.tangent[k]) s.bristle[size_t(k) * s.stride + i] *= w.store.area[m] / s.area[i];
+  }
+}
+
+void turn_frames(World &w, StepContext &step) {
+  ContactStore &to = step.next_store;
+  for (uint32_t i = 0; i < step.rows.n; ++i) {
+    const LawInstance &law = *w.pairs.laws[step.state.law[i]];
+    if (!law.turns || !to.touching[i]) continue;
+    const ContactPoint &c = step.contacts[i];
+    const Vec3 n = load3(c.normal), t = load3(&to.tangent[3 * size_t{i}]);
+    const Turn a = turn_of(*w.bodies[c.slot_a], c.type_a, c.feature_a, n);
+    const Turn b = c.obstacle ? turn_of(w, step, *w.obstacles[c.slot_b], n)
+                              : turn_of(*w.bodies[c.slot_b], c.kind == kEdgeEdge ? 1 : 2, c.feature_b, n);
+    // half of the sum
+    const Turn both{a.c * b.c - a.s * b.s, a.c * b.s + a.s * b.c}, mean = unit_turn(1 + both.c, both.s);
+    store3(&to.tangent[3 * size_t{i}], mean.c * t + mean.s * cross(n, t));
+  }
+}
+
+}  // namespace dfm

@@ -1,0 +1,292 @@
+#include "step/budget.h"
+
+#include <array>
+#include <atomic>
+#include <chrono>
+#include <cstring>
+#include <type_traits>
+
+#include "body/make_surface.h"
+#include "core/error.h"
+#include "state/world.h"
+#include "step/context.h"
+#include "step/stages.h"
+
+namespace dfm {
+namespace {
+
+// Shares of the budget at which the step begins to go without polish, sweeps and guard pieces.
+constexpr double kNoPolishAt = 0.25, kFewSweepsAt = 0.5, kNoPiecesAt = 0.75;
+// Where none is given, a step may cost this many times what its planned sub-steps cost with
+// nothing in contact.
+constexpr uint64_t kAutomaticFactor = 1000;
+
+struct StepStopped {
+  enum Why { work, time, asked } why;
+};
+
+// Worlds that were asked to stop. A signal may arrive while any lock is held, so there is none; 0: free.
+constexpr size_t kMostRequests = 64;
+std::array<std::atomic<uint64_t>, kMostRequests> requests{};
+std::atomic<uint32_t> waiting{0};
+static_assert(std::atomic<uint64_t>::is_always_lock_free && std::atomic<uint32_t>::is_always_lock_free);
+
+bool take_request(uint64_t world) noexcept {
+  bool found = false;
+  for (auto &r : requests) {
+    uint64_t is = world;
+    if (r.compare_exchange_strong(is, 0)) {
+      waiting.fetch_sub(1);
+      found = true;
+    }
+  }
+  return found;
+}
+
+double now() {
+  return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
+}
+
+double used_share(const StepContext &step) {
+  const Budget &b = step.budget;
+  double share = b.limit ? double(b.work) / double(b.limit) : 0;
+  if (b.end > 0) share = std::max(share, 1 - (b.end - now()) / b.span);
+  return share;
+}
+
+// One list of what a step changes serves writing down and putting back. Room: what putting back may need is
+// reserved before.
+struct Keep {
+  std::vector<unsigned char> &out;
+  template <class T>
+  void value(const T &x) {
+    static_assert(std::is_trivially_copyable_v<T>);
+    const auto *const p = reinterpret_cast<const unsigned char *>(&x);
+    out.insert(out.end(), p, p + sizeof x);
+  }
+  template <class A>
+  void array(const A &a) {
+    value(uint64_t(a.size()));
+    const auto *const p = reinterpret_cast<const unsigned char *>(a.data());
+    out.insert(out.end(), p, p + a.size() * sizeof(a[0]));
+  }
+  template <class A>
+  void length(const A &a) {
+    value(uint64_t(a.size()));
+  }
+};
+struct PutBack {
+  const unsigned char *at;
+  template <class T>
+  void value(T &x) {
+    std::memcpy(&x, at, sizeof x);
+    at += sizeof x;
+  }
+  template <class A>
+  void array(A &a) {
+    uint64_t n;
+    value(n);
+    a.resize(n);
+    if (n) std::memcpy(static_cast<void *>(a.data()), at, n * sizeof(a[0]));
+    at += n * sizeof(a[0]);
+  }
+  template <class A>
+  void length(A &a) {
+    uint64_t n;
+    value(n);
+    a.resize(n);
+  }
+};
+
+template <class Stream>
+void changing(Stream &s, World &w) {
+  s.value(w.time);
+  s.value(w.bound.step);
+  s.value(w.bound.inverted);
+  s.value(w.bound.age);
+  s.value(w.bound.body);
+  s.value(w.bound.point);
+  s.value(w.gravity.now);
+  s.value(w.step_count);
+  s.value(w.sleepers);
+  s.value(w.watch);
+  for (auto &b : w.bodies) {
+    s.array(b->p.x);
+    s.array(b->p.v);
+    s.array(b->model.state);
+    s.array(b->surfel_impulse);
+    s.array(b->method_values);
+    s.array(b->anchor);
+    s.value(b->contact_impulse);
+    s.value(b->energy);
+    s.value(b->slumber);
+    s.value(b->bound);
+  }
+  for (auto &o : w.obstacles) {
+    s.value(o->pose);
+    s.value(o->has_target);
+  }
+  for (auto &set : w.rigid_sets) {
+    s.array(set->state);
+    s.array(set->extra);
+    s.array(set->total);
+    s.array(set->impulse);
+    s.value(set->last_h);
+  }
+  s.value(w.store.n);
+  s.value(w.store.nstate);
+  s.value(w.store.h);
+  each_column([&](const ContactColumn &, auto &column) { s.array(column); }, w.store);
+  s.value(w.report.n);
+  s.value(w.report.h);
+  each_report_column([&](size_t, auto &column) { s.array(column); }, w.report);
+  s.array(w.work);
+  s.length(w.events);  // a step only adds to it, and it may wait for the host for many steps
+}
+
+// The two stores and the two reports change places as sub-steps end, so what is put back may have to fit into
+// the other one.
+void reserve_others(World &w, StepContext &step) {
+  each_column([](const ContactColumn &, const auto &from, auto &to) { to.reserve(from.size()); }, w.store,
+              step.next_store);
+  each_report_column([](size_t, const auto &from, auto &to) { to.reserve(from.size()); }, w.report,
+                     step.last_report);
+}
+
+// What the step changes at its start, before it is known whether more has to be kept.
+template <class Stream>
+void changed_at_once(Stream &s, World &w) {
+  s.array(w.step_impulses.pairs);
+  s.value(w.step_impulses.idle);
+  s.value(w.sizes);
+}
+
+void return_to_start(World &w, StepContext &step) {
+  PutBack from{step.budget.start.data()};
+  changed_at_once(from, w);
+  if (step.budget.kept) {
+    changing(from, w);
+    for (auto &b : w.bodies) {
+      ++b->x_version;
+      if (b->slumber.asleep) gather_surface(b->surface, b->p.x.data(), b->p.v.data());
+    }
+    gather_active(w);
+  }
+  const uint64_t cheapened = w.stats.cheapened;
+  w.stats = step.budget.stats;
+  w.stats.cheapened = cheapened;
+  step.guard.forget();
+}
+
+void tell(const World &w, const StepContext &step, StepStopped::Why why, double dt) {
+  const unsigned long long number = w.step_count;
+  if (why == StepStopped::asked)
+    return set_last_error(format("step %llu was asked to stop; the state is as before it", number).c_str());
+  const char *const body = w.bound.body ? w.bound.body->name.c_str() : "?";
+  if (why == StepStopped::time)
+    return set_last_error(format("step %llu: %g s of simulated time took longer than max_time (%g s); the "
+                                 "state is as before it; take a shorter step, or give it more time",
+                                 number, dt, w.def.max_time)
+                              .c_str());
+  set_last_error(format("step %llu: %g s of simulated time need more than %llu units of work (max_work), in "
+                        "contact or in body '%s', whose step bound is the least; the state is as before it; "
+                        "take a shorter step, soften the blow, or raise max_work",
+                        number, dt, static_cast<unsigned long long>(step.budget.limit), body)
+                     .c_str());
+}
+
+}  // namespace
+
+uint64_t body_work(const World &w, const StepContext &step) {
+  uint64_t sum = 1;
+  for (const uint32_t i : step.active) sum += w.bodies[i]->p.n + w.bodies[i]->tets.size() / 4;
+  return sum;
+}
+
+uint64_t surface_work(const World &w, const StepContext &step) {
+  uint64_t sum = 1;
+  for (const uint32_t i : step.active) sum += w.bodies[i]->surface.nsurfel;
+  return sum;
+}
+
+void plan_work(World &w, StepContext &step, uint32_t substeps) {
+  step.budget.limit = w.def.max_work
+                          ? w.def.max_work
+                          : kAutomaticFactor * substeps * (body_work(w, step) + surface_work(w, step));
+}
+
+void charge(World &w, StepContext &step, uint64_t units) {
+  Budget &b = step.budget;
+  b.work += units;
+  if (b.limit && b.work > b.limit) throw StepStopped{StepStopped::work};
+  if (b.end > 0 && now() > b.end) throw StepStopped{StepStopped::time};
+  if (waiting.load(std::memory_order_relaxed) != 0 && take_request(w.handle))
+    throw StepStopped{StepStopped::asked};
+}
+
+bool spares(StepContext &step, Thrift what) {
+  const double from = what == Thrift::polish   ? kNoPolishAt
+                      : what == Thrift::sweeps ? kFewSweepsAt
+                                               : kNoPiecesAt;
+  if (!(used_share(step) > from)) return false;
+  step.budget.used = std::max(step.budget.used, what);
+  return true;
+}
+
+void keep_start(World &w, StepContext &step) {
+  Budget &b = step.budget;
+  if (b.kept) return;
+  Keep to{b.start};
+  changing(to, w);
+  reserve_others(w, step);
+  b.kept = true;
+}
+
+dfm_status step_within_budget(World &w, double dt, uint32_t *trouble) {
+  StepContext &step = *w.steps;
+  Budget &b = step.budget;
+  b.work = b.limit = 0;
+  b.kept = false;
+  b.used = Thrift::none;
+  b.stats = w.stats;
+  b.span = w.def.max_time;
+  b.end = b.span > 0 ? now() + b.span : 0;
+  b.start.clear();
+  Keep to{b.start};
+  changed_at_once(to, w);
+  dfm_status status = DFM_DISCARD;
+  try {
+    status = run_step(w, step, dt, trouble);
+  } catch (const StepStopped &stopped) {
+    return_to_start(w, step);
+    tell(w, step, stopped.why, dt);
+    *trouble = stopped.why == StepStopped::asked ? DFM_TROUBLE_INTERRUPTED : DFM_TROUBLE_BUDGET;
+    ++w.stats.discarded;
+  }
+  if (b.used != Thrift::none) {
+    *trouble |= DFM_TROUBLE_BUDGET;
+    ++w.stats.cheapened;
+  }
+  if (w.events.size() > kMostEvents)
+    w.events.erase(w.events.begin(), w.events.end() - kMostEvents + kEventsAtOnce);
+  w.stats.work = b.work;
+  w.stats.work_max = std::max(w.stats.work_max, b.work);
+  return status;
+}
+
+bool request_stop(uint64_t world) noexcept {
+  for (auto &r : requests)
+    if (r.load() == world) return true;
+  for (auto &r : requests) {
+    uint64_t none = 0;
+    if (r.compare_exchange_strong(none, world)) {
+      waiting.fetch_add(1);
+      return true;
+    }
+  }
+  return false;
+}
+
+void forget_stop(uint64_t world) noexcept { take_request(world); }
+
+}  // namespace dfm

@@ -1,0 +1,58 @@
+// Where bodies end: contact impulses to points, then positions and velocities at the end of the sub-step.
+#include <algorithm>
+
+#include "core/error.h"
+#include "step/context.h"
+#include "step/energy_watch.h"
+#include "step/first_failure.h"
+#include "step/stages.h"
+#include "step/step_impulses.h"
+
+namespace dfm {
+
+bool find_ends(World &w, StepContext &step, uint32_t *trouble) {
+  const SubStep now = sub_step_of(w, step);
+  const bool touched = w.plan.has(StageRole::gives_impulses) && step.rows.n > 0;
+  FirstFailure failed;
+  w.context->tasks.parallel_for(
+      static_cast<uint32_t>(step.active.size()), 1, [&](uint32_t begin, uint32_t end) {
+        for (const uint32_t i : std::span(step.active).subspan(begin, end - begin)) {
+          Body &b = *w.bodies[i];
+          if (!b.dynamics->end_state(now, b.surfel_impulse.data(), touched)) failed.note(i);
+        }
+      });
+  step.ended = true;
+  if (failed.body == kNone) return true;
+  *trouble |= DFM_TROUBLE_PLUGIN;
+  const Body &b = *w.bodies[failed.body];
+  set_last_error(format("step %llu, body '%s': model '%s' could not end its step, or ended it with something "
+                        "not finite; take a smaller step or change the model",
+                        static_cast<unsigned long long>(w.step_count), b.name.c_str(), b.model.type->id)
+                     .c_str());
+  return false;
+}
+
+bool stage_commit(World &w, StepContext &step, uint32_t *trouble) {
+  if (!step.ended && !find_ends(w, step, trouble)) return false;
+  book_energy(w, step, step.guard.motion);
+  const SubStep now = sub_step_of(w, step);
+  w.context->tasks.parallel_for(
+      static_cast<uint32_t>(step.active.size()), 1, [&](uint32_t begin, uint32_t end) {
+        for (const uint32_t i : std::span(step.active).subspan(begin, end - begin)) {
+          Body &b = *w.bodies[i];
+          b.dynamics->commit(now, step.guard.motion);  // the guard may leave out some of the way
+          ++b.x_version;
+          if (!w.plan.touches()) continue;
+          Vec3 sum;
+          for (uint32_t s = 0; s < b.surface.nsurfel; ++s) sum += load3(&b.surfel_impulse[3 * size_t(s)]);
+          b.contact_impulse += sum;
+        }
+      });
+  if (w.plan.touches()) {
+    keep_contacts(w, step);
+    add_impulses(w);
+  }
+  return true;
+}
+
+}  // namespace dfm

@@ -1,0 +1,101 @@
+// Buffers of a step, by the stage that writes them. Nothing here is state, and no snapshot has any of it.
+// What lasts is the World's (state/world.h).
+#pragma once
+#include <memory>
+#include <vector>
+
+#include "broad/broad_phase.h"
+#include "contact/areas.h"
+#include "contact/distribute.h"
+#include "contact/exchange.h"
+#include "contact/renewal.h"
+#include "contact/solver.h"
+#include "contact/store.h"
+#include "friction/laws.h"
+#include "geometry/views.h"
+#include "state/world.h"
+#include "step/budget.h"
+#include "step/guard.h"
+#include "step/islands.h"
+#include "step/method.h"
+#include "step/self_contact.h"
+#include "step/stages.h"
+
+namespace dfm {
+
+struct StageTime {
+  double seconds = 0;
+  uint64_t calls = 0;
+};
+
+struct StepContext {
+  // s: of the sub-step; from its start to the end of the step
+  double h = 0, left = 0;
+  Budget budget;
+  std::vector<StageTime> stage_times;  // by row of the method's table
+
+  // prepare(): the world's entities as the stages see them
+  SceneFacts facts;  // what the plan was made from
+  // how often prepare() has made all of this anew, and the plan
+  struct { uint64_t tables = 0, plans = 0; } made;
+  std::vector<BodyView> body_views;
+  std::vector<ObstacleView> obstacle_views;
+  std::vector<RigidPlace> rigid_places;  // by obstacle slot; empty without rigid bodies
+  std::vector<uint32_t> rigid_groups;    // bodies per group, all sets
+  std::vector<DofSource> sources;
+  std::vector<std::unique_ptr<SelfBody>> self_bodies;  // in id order; those that may touch themselves
+
+  // motion
+  Array<Driven> driven;
+  // predict
+  Array<double> free_kinetic;  // [bodies] J, without contact; of this sub-step
+  // broad, narrow, self
+  BroadPhase broad;
+  Array<ContactPoint> contacts;
+  Array<uint8_t> lent;  // scratch of the narrow phase
+
+  // contact <-> friction
+  ContactRows rows;
+  ContactState state;
+  Acceleration acceleration;
+  Tolerance tolerance;
+  Residual residual;
+  uint32_t passes = 0, sweeps = 0;
+  Array<double> disturbance, best_impulse;
+  LawBatches batches;
+  Array<double> tangents;
+  // [contacts] place in the store that the contact goes on from, or kNone
+  Array<uint32_t> match;
+  Array<uint32_t> block_surfels;  // responses of self-stepping bodies
+  Array<double> block_impulse, block_velocity;
+  // a host has answered, and the solve goes on from its last impulses
+  bool rigid_again = false;
+  AreaShares areas;
+  AreaExchange exchange;
+  // law of contacts whose areas follow the load, else kNone
+  Array<uint32_t> sharing;
+  bool shares = false;  // does any law count by area?
+  Array<double> aim;    // [contacts] m2, what they should stand for, if so
+  Renewal renewal;
+  Array<uint8_t> stands;  // [contacts] carries, and has an area that it keeps
+  Array<Renewal::Way> ways;
+  Array<double> renewed;
+  std::unique_ptr<MethodBuffers> method;  // of stages that the contact method has for itself
+
+  // distribute, guard
+  std::vector<ImpulseSink> sinks;
+  bool ended = false;  // find_ends() has been asked since the last solve
+  Guard guard;
+  // commit: trades places with the world's
+  ContactStore next_store;
+  Report last_report;
+  // sleep. With nobody asleep `active` holds all bodies.
+  Islands islands;
+  // slots that the stages work on, ascending; slots woken in this sub-step
+  Array<uint32_t> active, woken;
+  Array<uint8_t> stirred;  // [island]
+
+  explicit StepContext(const Memory &memory);
+};
+
+}  // namespace dfm

@@ -1,0 +1,248 @@
+#include "step/energy_watch.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "core/error.h"
+#include "state/world.h"
+#include "step/context.h"
+#include "step/stages.h"
+
+namespace dfm {
+namespace {
+
+// An energy costs about as much as two sub-steps.
+constexpr uint32_t kEvery = 512;
+// So a look for every so many sub-steps costs less than 1 %.
+constexpr uint32_t kLookCosts = 256;
+// Of the energy of the kick: a third is what stiff modes give back on average as they calm down, and a look
+// sees it at one instant.
+constexpr double kGivesBack = 0.5;
+// Stiff modes that hold their energy as motion alone show it in the kick within a quarter of their period: so
+// long a base is being taken.
+constexpr uint32_t kSettles = 8;     // sub-steps
+constexpr double kRounding = 1e-12;  // of the sums that a balance is the difference of
+constexpr double kPositionDigits = 8 * 2.3e-16;
+
+// Booked is the work of impulses: contacts that act on bodies in another way leave nothing to balance
+// the energy with.
+bool watching(const World &w) {
+  return w.def.energy_watch > 0 && w.plan.has(StageRole::gives_impulses) == w.plan.touches();
+}
+bool books(const Body &b) { return b.dynamics->abilities().energy; }
+bool watched(const Body &b) {
+  return books(b) && (b.model.ops->caps & DFM_CAP_ENERGY) && b.model.ops->energy;
+}
+// Loads that change from sub-step to sub-step have no potential: their work is booked as it is done.
+bool books_loads(const Body &b) { return b.loads_vary(); }
+
+struct Look {
+  double kinetic = 0, elastic = 0, balance = 0, gives_back = 0, rounding = 0;  // J
+};
+
+// What holders of driven points do, by the trapezoid of the force: the force at the start of this sub-step
+// counts for half of the way of the one before, and, where `now`, for half of this one's.
+double work_of_holders(const World &w, const StepContext &step, const Body &b, bool now) {
+  double sum = 0;
+  for (const Driven &d : step.driven) {
+    if (d.velocity < b.p.v.data() || d.velocity >= b.p.v.data() + b.p.v.size()) continue;
+    const size_t at = size_t(d.velocity - b.p.v.data());
+    const double force = b.p.f[at] + b.p.mass[at / kStride] * w.gravity.now[int(at % kStride)];
+    sum -= 0.5 * force * (w.watch.last_h * d.before + (now ? step.h * *d.velocity : 0));
+  }
+  return sum;
+}
+
+// Another size h of the sub-steps makes of G = .. + v.M v* / 2 another quantity that the scheme keeps, which
+// is larger by (h2 - h1) v.f / 2. The changes that the library makes itself are few, so what they bring is
+// bounded and no instability.
+double work_of_new_size(const World &w, const StepContext &step, const Body &b) {
+  if (!w.watch.new_size || !(w.watch.last_h > 0)) return 0;
+  const bool load_booked = books_loads(b);
+  const Phyxels &p = b.p;
+  double sum = 0;
+  for (uint32_t i = 0; i < p.n; ++i)
+    for (size_t k = 0, at = size_t(i) * kStride; k < 3; ++k, ++at)
+      if (p.moves(at))
+        sum += p.v[at] * (p.mass[i] * (p.v_free[at] - p.v[at]) - (load_booked ? step.h * p.load[at] : 0));
+  return 0.5 * (1 - w.watch.last_h / step.h) * sum;
+}
+
+// The energy that the scheme keeps, U(x) - F.x + v.M v_free / 2, and half of the energy of the kick, by which
+// it may rise as stiff modes calm down.
+bool look(World &w, StepContext &step, Body &b, Look &out) {
+  const Phyxels &p = b.p;
+  const bool load_booked = books_loads(b);
+  double kinetic = 0, cross = 0, kick = 0, potential = 0, reach = 0;
+  for (uint32_t i = 0; i < p.n; ++i) {
+    const size_t at = size_t(i) * kStride;
+    const double m = p.mass[i];
+    for (size_t k = 0; k < 3; ++k) {
+      const double x = p.x[at + k], v = p.v[at + k], load = p.load[at + k];
+      reach = std::max(reach, std::fabs(x));
+      potential -= (m * w.gravity.now[int(k)] + (load_booked ? 0 : load)) * x;
+      if (!p.moves(at + k)) continue;
+      const double change = p.v_free[at + k] - v;
+      kinetic += 0.5 * (m * v * v);
+      kick += 0.5 * (m * change * change);
+      cross += 0.5 * v * (m * p.v_free[at + k] - (load_booked ? step.h * load : 0));
+    }
+  }
+  double elastic = 0;
+  const dfm_kin kin = b.dynamics->kin(w.time, 0);
+  if (b.model.call("energy", [&] { return b.model.ops->energy(b.model.self, &kin, &elastic); }) != DFM_OK)
+    return false;
+  const double drift = kPositionDigits * reach / step.h;
+  out = {kinetic, elastic,
+         elastic + potential + cross -
+             (b.energy.work + work_of_holders(w, step, b, false) + work_of_new_size(w, step, b)),
+         kGivesBack * kick,
+         kRounding * (std::fabs(b.energy.work) + std::fabs(potential) + kinetic + elastic) +
+             b.mass * drift * drift};
+  return true;
+}
+
+void book_contact(World &w, StepContext &step) {
+  for (uint32_t d = 0; d < step.rows.ndof; ++d) {
+    if (step.rows.source[d] == kNone) continue;
+    Body &b = *w.bodies[step.rows.source[d]];
+    if (!books(b)) continue;
+    const size_t at = size_t(step.rows.point[d]) * kStride;
+    const double *const end = b.dynamics->end().v;
+    double sum = 0;
+    for (size_t k = 0; k < 3; ++k) {
+      if (b.p.moves(at + k)) sum += 0.5 * b.p.impulse[at + k] * (b.p.v[at + k] + end[at + k]);
+    }
+    b.energy.work += sum;
+  }
+}
+
+// Loads without a potential; and, where the guard left out a part of the way, what the inner forces would
+// have done on it.
+void book_body(World &w, StepContext &step, Body &b, double motion) {
+  const bool load_booked = books_loads(b);
+  const Phyxels &p = b.p;
+  double sum = 0;
+  for (uint32_t i = 0; i < p.n; ++i)
+    for (size_t k = 0, at = size_t(i) * kStride; k < 3; ++k, ++at) {
+      const double booked = load_booked ? p.load[at] : 0;
+      if (!p.moves(at) || (booked == 0 && motion == 1)) continue;
+      const double end = b.dynamics->end().v[at];
+      sum += step.h * booked * 0.5 * (p.v[at] + end);
+      if (motion < 1)
+        sum += (1 - motion) * step.h * end * (p.f[at] + p.mass[i] * w.gravity.now[int(k)] - booked);
+    }
+  b.energy.work += sum;
+}
+
+}  // namespace
+
+// Of G = U(x) - m g.x + v.M v* / 2 with v* = v + h g + ..: a weight that changes does work at the places x -
+// h v / 2, whatever the motion. The sub-step may fail after this and be tried again with another gravity,
+// from the same state: then the rest is booked.
+void change_gravity(World &w, Vec3 gravity) {
+  const Vec3 by = gravity - w.gravity.now;
+  w.gravity.now = gravity;
+  if (!watching(w) || norm2(by) == 0) return;
+  for (auto &b : w.bodies) {
+    if (!watched(*b)) continue;
+    const Phyxels &p = b->p;
+    for (uint32_t i = 0; i < p.n; ++i)
+      for (size_t k = 0, at = size_t(i) * kStride; k < 3; ++k, ++at)
+        b->energy.work -=
+            p.mass[i] * by[int(k)] * (p.x[at] - (p.moves(at) ? 0.5 * w.watch.last_h * p.v[at] : 0));
+  }
+}
+
+bool watch_energy(World &w, StepContext &step, uint32_t *trouble) {
+  // pieces of a sub-step are not compared with whole ones
+  if (!watching(w) || step.guard.planned != step.h) return true;
+  double moving = 0;
+  for (const uint32_t i : step.active) moving += watched(*w.bodies[i]) ? step.free_kinetic[i] : 0;
+  const double limit = w.def.energy_watch * w.stats.energy_max;
+  bool due = w.watch.age >= kEvery;
+  for (const uint32_t i : step.active) {
+    const EnergyBook &e = w.bodies[i]->energy;
+    const bool faster = step.free_kinetic[i] > 2 * e.kinetic + limit;
+    const bool wants_base = e.known < kSettles && (e.known > 0 || faster);
+    due = due || (watched(*w.bodies[i]) &&
+                  (e.known == kSettles ? faster : wants_base && w.watch.credit >= kLookCosts));
+  }
+  dfm_world_stats &s = w.stats;
+  if (!due) {
+    s.energy_max = std::max(s.energy_max, moving);
+    return true;
+  }
+  w.watch.credit -= std::min(w.watch.credit, kLookCosts);
+  double total = 0, gain = 0, most = 0;
+  const Body *worst = nullptr;
+  for (const uint32_t i : step.active) {
+    Body &b = *w.bodies[i];
+    Look now;
+    if (!watched(b) || !look(w, step, b, now)) continue;
+    EnergyBook &e = b.energy;
+    total += now.kinetic + now.elastic;
+    const double rise = now.balance - e.base - now.rounding, level = now.balance + now.gives_back;
+    const bool settled = e.known == kSettles;
+    if (settled && rise > 0) gain += rise;
+    if (settled && rise > most) {
+      most = rise;
+      worst = &b;
+    }
+    e.base = settled ? std::min(e.base, level) : e.known ? std::max(e.base, level) : level;
+    e.known += !settled;
+    e.kinetic = now.kinetic;
+  }
+  if (w.watch.age == ~0u) s.energy_start = total;
+  w.watch.age = 0;
+  if (worst && most > w.def.energy_watch * std::max(s.energy_max, total - most)) {
+    s.energy_gain = std::max(s.energy_gain, gain);
+    *trouble |= DFM_TROUBLE_ENERGY;
+    w.watch.age = kEvery;  // the next step is asked again
+    set_last_error(
+        format("step %llu, body '%s': its energy has grown by %.3g J beyond what loads, motions and contact "
+               "have put in (limit: %g %% of %.3g J, the largest energy so far); take a shorter step, or "
+               "give the material stiffness damping (energy_watch sets the limit, 0 switches the watch off)",
+               static_cast<unsigned long long>(w.step_count), worst->name.c_str(), most,
+               100 * w.def.energy_watch, s.energy_max)
+            .c_str());
+    return false;
+  }
+  s.energy_max = std::max({s.energy_max, total, moving});
+  s.energy_gain = std::max(s.energy_gain, gain);
+  return true;
+}
+
+void book_energy(World &w, StepContext &step, double motion) {
+  if (!watching(w)) return;
+  const bool touched = w.plan.touches() && step.rows.n > 0;
+  if (touched) book_contact(w, step);
+  for (const uint32_t i : step.active) {
+    Body &b = *w.bodies[i];
+    if (!step.driven.empty()) b.energy.work += work_of_holders(w, step, b, true);
+    if (books(b) && step.guard.planned == step.h) b.energy.work += work_of_new_size(w, step, b);
+    if (books(b) && (motion < 1 || books_loads(b))) book_body(w, step, b, motion);
+  }
+  w.watch.last_h = motion * step.h;
+  w.watch.new_size = w.watch.new_size && step.guard.planned != step.h;
+  w.watch.age += w.watch.age < kEvery;
+  w.watch.credit += w.watch.credit < kMostCredit;
+}
+
+void forget_energy(Body &b) { b.energy = {}; }
+
+void forget_energy(World &w) {
+  for (auto &b : w.bodies) forget_energy(*b);
+}
+
+bool sound(const EnergyBook &e) {
+  return e.known <= kSettles && std::isfinite(e.base) && std::isfinite(e.work) && e.kinetic >= 0 &&
+         std::isfinite(e.kinetic);
+}
+
+bool sound(const EnergyWatch &e) {
+  return (e.age <= kEvery || e.age == ~0u) && e.credit <= kMostCredit && e.last_h >= 0 &&
+         std::isfinite(e.last_h);
+}
+
+}  // namespace dfm

@@ -1,0 +1,26 @@
+// Does a body gain energy that nobody gave it? Every body that a force model moves has a balance: its energy
+// less the work that loads, motions and contact have done on it. The scheme keeps it, dampers lower it,
+// nothing real raises it. What is booked and why the bounds are what they are: doc/concepts/energy_watch.md.
+#pragma once
+#include <cstdint>
+
+#include "math/vec3.h"
+#include "state/energy_book.h"
+
+namespace dfm {
+
+struct StepContext;
+struct World;
+struct Body;
+
+// Gravity that varies: sets the present one, and books what that does to the potentials.
+void change_gravity(World &w, Vec3 gravity);
+// After predict. False: a body has gained too much; the sentence says which.
+bool watch_energy(World &w, StepContext &step, uint32_t *trouble);
+// Before commit: what this sub-step puts into the bodies.
+void book_energy(World &w, StepContext &step, double motion);
+// The host changes what only it can: the next look takes a new base.
+void forget_energy(Body &b);
+void forget_energy(World &w);
+
+}  // namespace dfm

@@ -1,0 +1,91 @@
+// The sentence for a contact solve that cannot be used: which bodies, which law, and what the law was asked.
+#include <cmath>
+#include <string>
+
+#include "core/error.h"
+#include "state/world.h"
+#include "step/context.h"
+#include "step/stages.h"
+
+namespace dfm {
+namespace {
+
+// The body to name where no contact is to blame: where a load or a parameter is out of bounds, that body is
+// off before contact is.
+const Body &fastest(const World &w) {
+  const Body *fast = w.bodies.front().get();
+  double most = -1;
+  for (const auto &b : w.bodies)
+    for (const double v : b->surface.v)
+      if (!(std::fabs(v) <= most)) {
+        most = std::isnan(v) ? INFINITY : std::fabs(v);
+        fast = b.get();
+      }
+  return *fast;
+}
+
+// The first contact that the solve has left with something not finite, or kNone.
+uint32_t spoilt(const StepContext &step) {
+  for (uint32_t i = 0; i < step.rows.n; ++i)
+    for (size_t k = 0; k < 3; ++k)
+      if (!std::isfinite(step.rows.impulse[3 * size_t{i} + k])) return i;
+  return kNone;
+}
+
+std::string sides(const World &w, const StepContext &step, uint32_t i) {
+  if (i >= step.contacts.size()) return format("body '%s' (the fastest one)", fastest(w).name.c_str());
+  const ContactPoint &c = step.contacts[i];
+  if (c.obstacle)
+    return format("body '%s' on obstacle '%s'", w.bodies[c.slot_a]->name.c_str(),
+                  w.obstacles[c.slot_b]->name.c_str());
+  return format("bodies '%s' and '%s'", w.bodies[c.slot_a]->name.c_str(), w.bodies[c.slot_b]->name.c_str());
+}
+
+// What the law was asked at a contact, and whether all of it is finite.
+struct Asked {
+  std::string text;
+  bool sound;
+};
+Asked asked(const StepContext &step, const LawInstance &law, uint32_t i) {
+  const ContactState &s = step.state;
+  const size_t n = s.stride;
+  double sum = 0;
+  const auto number = [&](double v) {
+    sum += 0.0 * v;
+    return format("%.9g", v);
+  };
+  std::string text = "normal force " + number(s.fn[i]) + " N, slip " + number(s.vt[i]) + " " +
+                     number(s.vt[n + i]) + " m/s, force that stops it " + number(s.ft_stop[i]) + " " +
+                     number(s.ft_stop[n + i]) + " N, area " + number(s.area[i]) + " m2, in contact for " +
+                     number(s.dwell[i]) + " s, step " + number(step.h) + " s, state";
+  for (uint32_t k = 0; k < law.nstate; ++k) text += " " + number(s.bristle[size_t{k} * n + i]);
+  if (law.nstate == 0) text += " none";
+  return {text, sum == 0};
+}
+
+}  // namespace
+
+uint32_t tell_failed_solve(World &w, StepContext &step, const LawInstance *law) {
+  const uint32_t at = law ? step.batches.failed() : spoilt(step);
+  const std::string where =
+      format("step %llu, %s", static_cast<unsigned long long>(w.step_count), sides(w, step, at).c_str());
+  constexpr const char *kDo = "take a smaller step, lessen the loads or change the law";
+  const Asked in = law && at != kNone ? asked(step, *law, at) : Asked{"", true};
+  if (!law || !in.sound) {
+    set_last_error(
+        format(
+            "%s: the contact solve is not finite%s; %s", where.c_str(),
+            law ? (", so that law '" + std::string(law->type->id) + "' was asked at " + in.text).c_str() : "",
+            kDo)
+            .c_str());
+    return DFM_TROUBLE_NONFINITE;
+  }
+  const std::string what =
+      at == kNone ? "refused to answer"
+                  : "answered with something not finite, or a limit below zero, when asked at " + in.text;
+  set_last_error(
+      format("%s: friction law '%s' %s; %s", where.c_str(), law->type->id, what.c_str(), kDo).c_str());
+  return DFM_TROUBLE_PLUGIN;
+}
+
+}  // namespace dfm

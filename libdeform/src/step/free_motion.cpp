@@ -1,0 +1,85 @@
+// How bodies would move without contact, and where that puts their surfaces: stages model, predict,
+// gather, broad.
+#include <algorithm>
+#include <cmath>
+
+#include "body/make_surface.h"
+#include "core/error.h"
+#include "state/bounds.h"
+#include "step/context.h"
+#include "step/first_failure.h"
+#include "step/stages.h"
+
+namespace dfm {
+
+SubStep sub_step_of(const World &w, const StepContext &step) {
+  return {w.time, step.h, w.gravity.now, kLight};
+}
+
+bool stage_model(World &w, Active active, const SubStep &now, uint32_t *trouble) {
+  FirstFailure failed;
+  w.context->tasks.parallel_for(static_cast<uint32_t>(active.size()), 1, [&](uint32_t begin, uint32_t end) {
+    for (const uint32_t i : active.subspan(begin, end - begin))
+      if (!w.bodies[i]->dynamics->add_forces(now)) failed.note(i);
+  });
+  if (failed.body == kNone) return true;
+  *trouble |= DFM_TROUBLE_PLUGIN;
+  const Body &b = *w.bodies[failed.body];
+  set_last_error(format("step %llu, body '%s': model '%s' could not compute its forces; take a smaller step "
+                        "or change the model",
+                        static_cast<unsigned long long>(w.step_count), b.name.c_str(), b.model.type->id)
+                     .c_str());
+  return false;
+}
+
+bool stage_predict(World &w, Active active, const SubStep &now, Array<double> &kinetic, uint32_t *trouble) {
+  const bool touches = w.plan.touches();
+  FirstFailure failed;
+  w.context->tasks.parallel_for(static_cast<uint32_t>(active.size()), 1, [&](uint32_t begin, uint32_t end) {
+    for (const uint32_t i : active.subspan(begin, end - begin)) {
+      Body &b = *w.bodies[i];
+      if (!b.dynamics->free_motion(now, kinetic[i])) failed.note(i);
+      if (touches && b.surface.identity())
+        gather_surface(b.surface, b.p.x.data(), b.dynamics->point_velocity());
+    }
+  });
+  if (failed.body == kNone) return true;
+  const Body &b = *w.bodies[failed.body];
+  *trouble |= DFM_TROUBLE_NONFINITE;
+  const size_t n = b.dynamics->point_velocity() ? b.p.n : b.surface.nsurfel;
+  const double speed = largest_coordinate(b.dynamics->contact_velocity(), n, kStride);
+  const std::string what = speed > kLight && std::isfinite(speed)
+                               ? format("a point would move at %.3g m/s, faster than light", speed)
+                               : "forces or velocities are not finite";
+  set_last_error(format("step %llu, body '%s': %s (model '%s'); take a smaller step, or look for loads and "
+                        "parameters that are too large",
+                        static_cast<unsigned long long>(w.step_count), b.name.c_str(), what.c_str(),
+                        b.model.type->id)
+                     .c_str());
+  return false;
+}
+
+// Surfels that hang on several phyxels: rows of N are independent of each other, so they are cut
+// among the threads.
+void stage_gather(World &w, Active active) {
+  for (const uint32_t i : active) {
+    const auto &b = w.bodies[i];
+    if (b->surface.identity()) continue;
+    const double *const v = b->dynamics->point_velocity();
+    w.context->tasks.parallel_for(b->surface.nsurfel, 1024, [&](uint32_t begin, uint32_t end) {
+      gather_rows(b->surface, b->p.x.data(), v, begin, end);
+    });
+  }
+}
+
+void stage_broad(std::span<const BodyView> bodies, std::span<const ObstacleView> obstacles,
+                 const PairFilter &filter, double h, double offset, BroadPhase &out) {
+  try {
+    out.update(bodies, obstacles, filter, h, offset);
+  } catch (...) {
+    out.clear();  // out of memory half way through its lists: they are made anew next time
+    throw;
+  }
+}
+
+}  // namespace dfm

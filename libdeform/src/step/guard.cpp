@@ -1,0 +1,253 @@
+// No crossing at the end of a sub-step, whatever the speed. Between distribute and commit the way of every
+// surfel is known: a straight line from x to x + h v. Every listed pair of features is asked, conservatively,
+// whether it comes as near as d_g = d_c / 2 on that way (ccd/toi_guard). If so:
+//
+//   1  each hit becomes a contact, linearized at its hit time, and the solve runs again, warm
+//      at most 4 times
+//   2  the sub-step is taken anew, shorter: up to the safe part of the way, but no less than a quarter
+//      at most 8 times
+//   3  all that moves takes the safe fraction of its way; velocities stay, so no momentum is lost, only way
+//
+// What is not listed is not asked: broad/ covers the motion after the solve too (BroadPhase::cover). Why the
+// order is this one and the cut is the whole world's: doc/decisions/0020-guard-cuts-time.md.
+#include "step/guard.h"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "contact/reach.h"
+#include "geometry/obstacle_shape.h"
+#include "geometry/pierce.h"
+#include "narrow/detail.h"
+#include "state/world.h"
+#include "step/context.h"
+#include "step/stages.h"
+
+namespace dfm {
+namespace {
+
+constexpr uint32_t kSolves = 4, kCuts = 8, kFractions = 40;
+constexpr double kLeastCut = 0.25;
+constexpr double kSlow = 0.01;  // of d_g: what moves by less needs no closer look at how it does
+
+// The mean of the surfels' predicted velocities, and how far any of them is from it.
+void split_motion(const Surface &s, Vec3 &mean, double &spread) {
+  Vec3 sum;
+  for (uint32_t i = 0; i < s.nsurfel; ++i) sum += load3(&s.v[size_t{4} * i]);
+  mean = (1.0 / s.nsurfel) * sum;
+  double most = 0;
+  for (uint32_t i = 0; i < s.nsurfel; ++i) most = std::max(most, norm2(load3(&s.v[size_t{4} * i]) - mean));
+  spread = std::sqrt(most);
+}
+
+// Only what contacts have touched moves otherwise than predicted.
+void bound_speeds(World &w, StepContext &step) {
+  Guard &g = step.guard;
+  g.speed.assign(w.bodies.size(), 0.0);
+  g.change.assign(w.bodies.size(), 0.0);
+  for (uint32_t d = 0; d < step.rows.ndof; ++d) {
+    const uint32_t i = step.rows.source[d];
+    if (i == kNone) continue;
+    const Vec3 y = load3(&step.rows.y[size_t(d) * kStride]);
+    const Vec3 change = y - load3(&step.rows.y_free[size_t(d) * kStride]);
+    g.speed[i] = std::max(g.speed[i], norm2(y));
+    g.change[i] = std::max(g.change[i], norm2(change));
+  }
+  // else nothing has looked at the speeds before the solve
+  const bool listed = w.plan.has(StageRole::lists_pairs);
+  for (const uint32_t i : step.active) {
+    const Body &b = *w.bodies[i];
+    const double before = listed ? step.broad.speed(i) : largest_speed(b.surface);
+    double &speed = g.speed[i];
+    speed = std::sqrt(speed);
+    g.change[i] = b.surface.weight_sum * std::sqrt(g.change[i]);
+    speed = b.surface.identity() ? std::max(speed, before) : before + g.change[i];
+    b.dynamics->bound_ends(speed, g.change[i]);
+  }
+}
+
+// All pairs that may come near: candidates of two sides, behind them those of bodies with themselves.
+void follow_lists(World &w, StepContext &step) {
+  Guard &g = step.guard;
+  const bool pairs = w.plan.has(StageRole::lists_pairs);
+  if (pairs)
+    step.broad.cover(step.body_views, step.obstacle_views, w.pairs.filter, step.h, w.offset, g.speed);
+  const bool fresh = cover_self(w, step);
+  if (std::exchange(g.placements, w.placements) != w.placements) g.forget();
+  const uint64_t renewals = step.broad.stats().renewals;
+  if (!fresh && !g.memory.runs.empty() && g.lists == renewals) return;
+  g.lists = renewals;
+  g.list = join_self(step, pairs ? &step.broad.candidates() : nullptr, g.joined) ? &g.joined
+                                                                                 : &step.broad.candidates();
+  g.memory.follow(*g.list);
+}
+
+void make_room(GuardSide &s, const Surface &surface) {
+  s.surface = &surface;
+  if (s.stamp.size() != surface.nsurfel) {
+    s.stamp.assign(surface.nsurfel, 0);
+    s.end.assign(size_t{4} * surface.nsurfel, 0.0);
+  }
+}
+
+// How all sides move as the solve left them.
+void set_sides(World &w, StepContext &step) {
+  GuardScene &scene = step.guard.scene;
+  const size_t nb = w.bodies.size();
+  scene.bodies = step.body_views;
+  scene.obstacles = step.obstacle_views;
+  scene.sides.resize(nb + w.obstacles.size());
+  scene.poses.resize(w.obstacles.size());
+  scene.h = step.h;
+  scene.floor = 0.5 * w.offset;
+  scene.margin = 0.1 * (w.offset - scene.floor);
+  for (size_t i = 0; i < nb; ++i) {
+    const Body &b = *w.bodies[i];
+    GuardSide &s = scene.sides[i];
+    make_room(s, b.surface);
+    s.still = b.slumber.asleep;
+    s.travel = s.spread = step.h * step.guard.speed[i];
+    s.drift = {};
+    if (s.travel > kSlow * scene.floor) {
+      split_motion(b.surface, s.drift, s.spread);
+      s.drift = step.h * s.drift;
+      s.spread = step.h * (s.spread + step.guard.change[i]);
+    }
+    s.mean = b.dynamics->end().mean;
+    s.local = nullptr;
+  }
+  for (const auto &b : step.self_bodies) {
+    GuardSide &s = scene.sides[b->body->slot];
+    if (b->on) s.deform = step.h * (b->list.deforming() + step.guard.change[b->body->slot]);
+  }
+  for (size_t o = 0; o < w.obstacles.size(); ++o) {
+    const ObstacleView &v = step.obstacle_views[o];
+    GuardSide &s = scene.sides[nb + o];
+    const double turn = norm(v.spin);
+    s.drift = step.h * v.velocity;
+    s.spread =
+        turn > 0 ? step.h * turn * (v.shape == Shape::plane ? HUGE_VAL : ObstacleShape(v).extent()) : 0;
+    s.travel = norm(s.drift) + s.spread;
+    s.still = !v.moves();
+    if (v.shape != Shape::mesh) continue;
+    make_room(s, *v.surface);
+    s.local = w.obstacles[o]->mesh->local.data();
+  }
+}
+
+// Everything goes this fraction of its way.
+void set_fraction(World &w, StepContext &step, double fraction) {
+  GuardScene &scene = step.guard.scene;
+  step.guard.motion = scene.fraction = fraction;
+  ++scene.round;
+  for (size_t o = 0; o < w.obstacles.size(); ++o) {
+    const ObstacleView &v = step.obstacle_views[o];
+    GuardPose &to = scene.poses[o];
+    to = {v.position, v.rotation};
+    if (!v.moves()) continue;
+    const Pose end = w.obstacles[o]->end_pose(w.time, step.h, step.left);
+    to = {end.position, end.rotation};
+    if (fraction < 1)
+      to = {v.position + fraction * (end.position - v.position), slerp(v.rotation, end.rotation, fraction)};
+    scene.sides[w.bodies.size() + o].pose = to;
+  }
+}
+
+// Two surfaces that cross at the start (as given by the user) are let out: what is through cannot be kept
+// out, and to guard it would keep it in.
+bool cross_at_start(StepContext &step, const Candidate &c) {
+  Guard &g = step.guard;
+  const uint32_t slot_a = c.obstacle ? c.slot_a : std::min(c.slot_a, c.slot_b);
+  const uint32_t slot_b = c.obstacle ? c.slot_b : std::max(c.slot_a, c.slot_b);
+  for (const Guard::Through &t : g.through)
+    if (t.a == slot_a && t.b == slot_b && t.obstacle == bool(c.obstacle)) return t.yes;
+  const Surface &a = *step.body_views[slot_a].surface;
+  const Surface &b = c.obstacle ? *step.obstacle_views[slot_b].surface : *step.body_views[slot_b].surface;
+  bool yes = false;
+  step.broad.near_triangles_of(slot_a, slot_b, c.obstacle, [&](uint32_t s, uint32_t t) {
+    yes = yes || edges_pierce(a, s, b, t) || edges_pierce(b, t, a, s);
+  });
+  g.through.push_back({slot_a, slot_b, bool(c.obstacle), yes});
+  return yes;
+}
+
+// The safe fraction of the way; 1: nothing comes too near.
+double find_hits(World &w, StepContext &step) {
+  Guard &g = step.guard;
+  g.hits.clear();
+  charge(w, step, surface_work(w, step));
+  if (g.near.empty()) return 1;
+  const Array<Candidate> &list = *g.list;
+  guard_pairs(g.scene, list, g.near, g.hits);
+  std::erase_if(g.hits, [&](const GuardHit &hit) {
+    const Candidate &c = list[hit.candidate];
+    return of_one_body(c) ? !(guarded_apart(w, step, c) > 0) : cross_at_start(step, c);
+  });
+  guard_obstacles(g.scene, list, g.near, g.hits);
+  double least = 1;
+  for (const GuardHit &hit : g.hits) least = std::min(least, hit.safe);
+  return least;
+}
+
+// Sleepers that are hit before a contact has woken them.
+bool wake_hit(World &w, StepContext &step) {
+  const uint32_t before = w.sleepers;
+  for (const GuardHit &hit : step.guard.hits) {
+    const Candidate &c = (*step.guard.list)[hit.candidate];
+    if (w.sleepers == 0) break;
+    wake(w, *w.bodies[c.slot_a]);
+    if (!c.obstacle) wake(w, *w.bodies[c.slot_b]);
+  }
+  return w.sleepers < before;
+}
+
+}  // namespace
+
+// False: trouble, or guard.again: the sub-step is to be taken anew, guard.cut times as long.
+bool stage_guard(World &w, StepContext &step, uint32_t *trouble) {
+  step.guard.kept.clear();
+  step.guard.through.clear();
+  double safe = 1;
+  for (uint32_t solve = 0;; ++solve) {
+    if (!find_ends(w, step, trouble)) return false;
+    bound_speeds(w, step);
+    follow_lists(w, step);
+    set_sides(w, step);
+    set_fraction(w, step, 1);
+    guard_near(step.guard.scene, *step.guard.list, step.guard.memory, step.guard.near);
+    safe = find_hits(w, step);
+    if (step.guard.hits.empty()) return true;
+    step.guard.acted = true;
+    if (w.sleepers > 0 && wake_hit(w, step)) {
+      step.guard.again = true;
+      return false;
+    }
+    if (solve == kSolves || spares(step, Thrift::pieces)) break;
+    guard_add_hits(w, step);
+    if (step.residual.due > 1) --w.stats.unconverged;  // counted once, by the last solve
+    step.guard.resolving = true;
+    const bool solved = stage_solve(w, step, trouble);
+    step.guard.resolving = false;
+    // a host may have it solved once more
+    if (!solved || (!w.rigid_sets.empty() && !stage_rigid_commit(w, step, trouble))) return false;
+    ++w.stats.guard_solves;
+    row::distribute(w, step, trouble);
+  }
+  if (step.guard.pieces < kCuts && !spares(step, Thrift::pieces)) {
+    ++step.guard.pieces;
+    ++w.stats.guard_cuts;
+    step.guard.cut = std::max(safe, kLeastCut);
+    step.guard.again = true;
+    return false;
+  }
+  for (uint32_t k = 0; !step.guard.hits.empty(); ++k) {
+    set_fraction(w, step, k < kFractions ? step.guard.motion * std::min(safe, 0.999) : 0);
+    if (step.guard.motion == 0) break;
+    safe = find_hits(w, step);
+  }
+  w.stats.guard_lost += (1 - step.guard.motion) * step.h;
+  return true;
+}
+
+}  // namespace dfm

@@ -1,0 +1,290 @@
+// Hits of the guard as contacts: linearized at their hit times, so that the straight motion that the solve
+// sees ends outside.
+#include <algorithm>
+#include <array>
+
+#include "ccd/toi_guard_motion.h"
+#include "dynamics/rigid/turn.h"
+#include "narrow/detail.h"
+#include "state/world.h"
+#include "step/context.h"
+#include "step/guard.h"
+#include "step/stages.h"
+
+namespace dfm {
+namespace {
+
+constexpr uint32_t kMostHits = 128;
+
+// A hit as a contact: features, places on them and normal as they are at the hit time. Returns the distance
+// of the two places along that normal at the start, which is what a straight motion is added to.
+class HitContact {
+ public:
+  HitContact(World &w, StepContext &step, const GuardHit &hit)
+      : w_(w),
+        step_(step),
+        hit_(hit),
+        c_((*step.guard.list)[hit.candidate]),
+        end_(c_.obstacle ? step.guard.scene.poses[c_.slot_b] : GuardPose{}) {}
+
+  bool make(ContactPoint &out, double &along) {
+    out = {};
+    out.slot_a = c_.slot_a;
+    out.slot_b = c_.slot_b;
+    out.feature_a = c_.feature_a;
+    out.feature_b = c_.feature_b;
+    out.obstacle = c_.obstacle;
+    out.distance = hit_.start;
+    if (!c_.obstacle) {
+      on_body(out);
+    } else {
+      out.kind = kPrimitive;
+      if (step_.obstacle_views[c_.slot_b].shape == Shape::mesh) on_mesh(out);
+      else on_shape(out);
+    }
+    const double length = norm(now_);
+    if (!(length > 0)) return false;
+    const Vec3 n = (1 / length) * now_;
+    store3(out.normal, n);
+    store3(out.point, middle_);
+    if (c_.obstacle) {
+      const Vec3 belt = step_.obstacle_views[c_.slot_b].belt;
+      store3(out.velocity, obstacle_way_ + belt - dot(belt, n) * n);
+    }
+    along = dot(n, start_);
+    return true;
+  }
+
+ private:
+  // Adds weight times a surfel to one side.
+  void add(ContactPoint &out, uint32_t slot, uint32_t surfel, double weight) {
+    const BodyView &b = step_.body_views[slot];
+    const Vec3 x = load3(&b.surface->x[4 * size_t{surfel}]);
+    const Vec3 end = load3(step_.guard.scene.end(step_.guard.scene.sides[slot], surfel));
+    narrow::add_node(out, b.first_node + surfel, weight);
+    start_ += weight * x;
+    const Vec3 at = x + hit_.t * (end - x);
+    now_ += weight * at;
+    (weight < 0 ? on_b_ : on_a_) += std::fabs(weight) * at;
+  }
+  void on_body(ContactPoint &out) {
+    const Surface &a = *step_.body_views[c_.slot_a].surface, &b = *step_.body_views[c_.slot_b].surface;
+    out.kind = c_.kind;
+    if (c_.kind == kEdgeEdge) {
+      out.type_a = 1;
+      const uint32_t *const ea = &a.edge[2 * size_t{c_.feature_a}];
+      const uint32_t *const eb = &b.edge[2 * size_t{c_.feature_b}];
+      add(out, c_.slot_a, ea[0], 1 - hit_.at[0]);
+      add(out, c_.slot_a, ea[1], hit_.at[0]);
+      add(out, c_.slot_b, eb[0], hit_.at[1] - 1);
+      add(out, c_.slot_b, eb[1], -hit_.at[1]);
+    } else {
+      add(out, c_.slot_a, c_.feature_a, 1);
+      for (int k = 0; k < 3; ++k)
+        add(out, c_.slot_b, b.tri[3 * size_t{c_.feature_b} + size_t(k)], -hit_.at[k]);
+    }
+    middle_ = 0.5 * (on_a_ + on_b_);
+  }
+  void add_feature(ContactPoint &out, int kind, uint32_t feature) {
+    const uint32_t *const corner = narrow::corners_of(*step_.body_views[c_.slot_a].surface, kind, feature);
+    if (kind == 0) add(out, c_.slot_a, corner[0], 1);
+    if (kind == 1) {
+      add(out, c_.slot_a, corner[0], 1 - hit_.at[0]);
+      add(out, c_.slot_a, corner[1], hit_.at[0]);
+    }
+    for (int k = 0; kind == 2 && k < 3; ++k) add(out, c_.slot_a, corner[k], hit_.at[k]);
+  }
+  // The obstacle's point: from where it is to where it would get without this contact.
+  void carry(Vec3 from, Vec3 to) {
+    start_ -= from;
+    obstacle_way_ = (1 / step_.h) * (to - from);
+  }
+
+  void on_shape(ContactPoint &out) {
+    const ObstacleView &v = step_.obstacle_views[c_.slot_b];
+    out.type_a = c_.kind;
+    add_feature(out, c_.kind, c_.feature_a);
+    // The shape's point of the hit: nearest to the body's as the shape stands then.
+    ObstacleView at = v;
+    at.position = v.position + hit_.t * (end_.position - v.position);
+    at.rotation = slerp(v.rotation, end_.rotation, hit_.t);
+    const ObstaclePoint o = ObstacleShape(at).closest(on_a_);
+    out.feature_b = c_.kind == 0 ? o.face : hit_.part;
+    const Vec3 local = rotate_back(at.rotation, o.point - at.position);
+    now_ = o.distance > 0 ? on_a_ - o.point : o.normal;
+    middle_ = 0.5 * (on_a_ + o.point);
+    GuardPose to = end_;
+    if (const Obstacle &rigid = *w_.obstacles[c_.slot_b];
+        rigid.rigid && rigid.rigid->group[rigid.rigid_body] != DFM_RIGID_STILL) {
+      const double *const free = &rigid.rigid->velocity[6 * size_t{rigid.rigid_body}];
+      to = {v.position + step_.h * load3(free), turned(v.rotation, step_.h * load3(free + 3))};
+    }
+    carry(v.position + rotate(v.rotation, local), to.position + rotate(to.rotation, local));
+  }
+  void on_mesh(ContactPoint &out) {
+    GuardScene &scene = step_.guard.scene;
+    GuardSide &mesh = scene.side(c_, true);
+    const bool vertex = c_.kind == 2;  // of the mesh
+    out.type_a = c_.kind;
+    out.feature_a = vertex ? c_.feature_b : c_.feature_a;
+    out.feature_b = vertex ? c_.feature_a : c_.feature_b;
+    add_feature(out, c_.kind, out.feature_a);
+    const int corners = vertex ? 1 : c_.kind == 1 ? 2 : 3;
+    const uint32_t *const corner = narrow::corners_of(*mesh.surface, corners - 1, out.feature_b);
+    Vec3 from, to;
+    for (int k = 0; k < corners; ++k) {
+      const double weight = vertex ? 1 : corners == 3 ? hit_.at[k] : k ? hit_.at[1] : 1 - hit_.at[1];
+      from += weight * load3(&mesh.surface->x[4 * size_t{corner[k]}]);
+      to += weight * load3(scene.end(mesh, corner[k]));
+    }
+    const Vec3 then = from + hit_.t * (to - from);
+    now_ = on_a_ - then;
+    middle_ = 0.5 * (on_a_ + then);
+    carry(from, to);
+  }
+
+  World &w_;
+  StepContext &step_;
+  const GuardHit &hit_;
+  const Candidate &c_;
+  const GuardPose end_;  // of the obstacle
+  // differences of the sides (b from a); places; m/s
+  Vec3 start_, now_, on_a_, on_b_, middle_, obstacle_way_;
+};
+
+bool same_features(const ContactPoint &l, const ContactPoint &r) {
+  return l.slot_a == r.slot_a && l.slot_b == r.slot_b && l.obstacle == r.obstacle && l.kind == r.kind &&
+         l.type_a == r.type_a && l.feature_a == r.feature_a && l.feature_b == r.feature_b;
+}
+
+uint64_t free_key(const World &w, const StepContext &step, const ContactPoint &c) {
+  const uint64_t id_a = w.bodies[c.slot_a]->id;
+  const uint64_t id_b = c.obstacle ? w.obstacles[c.slot_b]->id : w.bodies[c.slot_b]->id;
+  uint32_t patch = c.feature_b;
+  if (!c.obstacle) {
+    const Surface &b = w.bodies[c.slot_b]->surface;
+    const uint32_t *const t = c.kind == kEdgeEdge ? &b.edge_tri[2 * size_t{c.feature_b}] : &c.feature_b;
+    patch = b.patch[c.kind == kEdgeEdge && t[0] == kNone ? t[1] : t[0]];
+  }
+  for (uint32_t ordinal = 0;; ++ordinal) {
+    const uint64_t key = narrow::contact_key(c, id_a, id_b, patch, ordinal);
+    if (std::none_of(step.contacts.begin(), step.contacts.end(),
+                     [&](const ContactPoint &o) { return o.key == key; }))
+      return key;
+  }
+}
+
+// Of each feature's hits with one other side the earliest, and of those the earliest kMostHits: one impact
+// trips all pairs around it, what the first ones leave is asked again, and a solve with thousands of nearly
+// equal rows would not converge.
+void choose_hits(StepContext &step) {
+  Array<GuardHit> &hits = step.guard.hits;
+  const Array<Candidate> &list = *step.guard.list;
+  const auto side = [&](const GuardHit &h) {
+    const Candidate &c = list[h.candidate];
+    return std::array<uint32_t, 5>{c.slot_a, c.obstacle, c.slot_b, c.kind, c.feature_a};
+  };
+  const auto earlier = [](const GuardHit &l, const GuardHit &r) {
+    return std::pair(l.t, std::pair(l.candidate, l.part)) < std::pair(r.t, std::pair(r.candidate, r.part));
+  };
+  std::sort(hits.begin(), hits.end(), [&](const GuardHit &l, const GuardHit &r) {
+    const auto a = side(l), b = side(r);
+    return a != b ? a < b : earlier(l, r);
+  });
+  hits.erase(std::unique(hits.begin(), hits.end(),
+                         [&](const GuardHit &l, const GuardHit &r) { return side(l) == side(r); }),
+             hits.end());
+  std::sort(hits.begin(), hits.end(), earlier);
+  if (hits.size() > kMostHits) hits.resize(kMostHits);
+}
+
+}  // namespace
+
+// Hits join the contacts of the sub-step, in their order; one that has a contact already turns it to how it
+// stands at the hit.
+void guard_add_hits(World &w, StepContext &step) {
+  Guard &g = step.guard;
+  choose_hits(step);
+  const auto kept = [&](uint64_t key) {
+    return std::find_if(g.kept.begin(), g.kept.end(), [&](const Guard::Kept &k) { return k.key == key; });
+  };
+  Array<Guard::Kept> before;
+  before.swap(g.kept);
+  for (uint32_t i = 0; i < step.rows.n; ++i) {
+    const double *const f = &step.rows.frame[size_t(i) * 9], *const l = &step.rows.impulse[size_t(i) * 3];
+    g.kept.push_back({step.contacts[i].key, l[0] * load3(f) + l[1] * load3(f + 3) + l[2] * load3(f + 6),
+                      step.rows.rate[i], false});
+  }
+  for (const Guard::Kept &k : before)
+    if (k.hit) kept(k.key)->hit = true;
+  for (const GuardHit &hit : g.hits) {
+    ContactPoint c;
+    double along;
+    if (!HitContact(w, step, hit).make(c, along)) continue;
+    // One that starts nearer than d_c comes no nearer; what it lacks to 0.8 d_c closes in the time that the
+    // sub-step was planned with.
+    const Candidate &pair = (*g.list)[hit.candidate];
+    const double apart = of_one_body(pair) ? guarded_apart(w, step, pair) : w.offset;
+    const double target =
+        hit.start < apart ? hit.start + std::max(0.0, 0.8 * apart - hit.start) * (step.h / g.planned) : apart;
+    c.distance += w.offset - apart;
+    const double rate = (along - target) / step.h;
+    const auto same = std::find_if(step.contacts.begin(), step.contacts.end(),
+                                   [&](const ContactPoint &o) { return same_features(o, c); });
+    if (same != step.contacts.end()) {
+      c.key = same->key;
+      c.area = same->area;
+      c.lender = same->lender;
+      *same = c;
+      const auto k = kept(c.key);
+      k->rate = rate;
+      k->hit = true;
+    } else {
+      c.key = free_key(w, step, c);
+      step.contacts.push_back(c);
+      g.kept.push_back({c.key, {}, rate, true});
+    }
+  }
+  std::sort(g.kept.begin(), g.kept.end(), [](const auto &l, const auto &r) { return l.key < r.key; });
+  const auto id_b = [&](const ContactPoint &c) {
+    return c.obstacle ? w.obstacles[c.slot_b]->id : w.bodies[c.slot_b]->id;
+  };
+  std::sort(step.contacts.begin(), step.contacts.end(), [&](const ContactPoint &l, const ContactPoint &r) {
+    if (of_one_body(l) != of_one_body(r)) return of_one_body(r);
+    if (l.slot_a != r.slot_a) return w.bodies[l.slot_a]->id < w.bodies[r.slot_a]->id;
+    if (l.obstacle != r.obstacle) return l.obstacle < r.obstacle;
+    if (l.slot_b != r.slot_b) return id_b(l) < id_b(r);
+    if (l.kind != r.kind) return l.kind < r.kind;
+    if (l.type_a != r.type_a) return l.type_a < r.type_a;
+    if (l.feature_a != r.feature_a) return l.feature_a < r.feature_a;
+    return l.feature_b != r.feature_b ? l.feature_b < r.feature_b : l.key < r.key;
+  });
+}
+
+namespace {
+const Guard::Kept *find_kept(const Guard &g, uint64_t key) {
+  const auto k = std::lower_bound(g.kept.begin(), g.kept.end(), key,
+                                  [](const auto &e, uint64_t v) { return e.key < v; });
+  return k == g.kept.end() || k->key != key ? nullptr : &*k;
+}
+}  // namespace
+
+void guard_impulses(StepContext &step) {
+  for (uint32_t i = 0; i < step.rows.n; ++i) {
+    const Guard::Kept *const k = find_kept(step.guard, step.contacts[i].key);
+    if (!k) continue;
+    const double *const f = &step.rows.frame[size_t(i) * 9];
+    double *const l = &step.rows.impulse[size_t(i) * 3];
+    l[0] = std::max(0.0, dot(load3(f), k->impulse));
+    l[1] = dot(load3(f + 3), k->impulse);
+    l[2] = dot(load3(f + 6), k->impulse);
+  }
+}
+
+void guard_rates(StepContext &step) {
+  for (uint32_t i = 0; i < step.rows.n; ++i)
+    if (const Guard::Kept *const k = find_kept(step.guard, step.contacts[i].key); k && k->hit)
+      step.rows.rate[i] = k->rate;
+}
+
+}  // namespace dfm

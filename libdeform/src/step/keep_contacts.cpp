@@ -1,0 +1,145 @@
+// What contacts leave behind when a sub-step has been taken: the store for the next one, events, the hold,
+// the work of friction, and the report.
+#include <algorithm>
+
+#include "state/world.h"
+#include "step/bristles.h"
+#include "step/context.h"
+#include "step/stages.h"
+#include "step/step_impulses.h"
+
+namespace dfm {
+
+// All memory that keep_contacts() will need, so that it cannot fail once the bodies have moved.
+void reserve_contacts(World &w, StepContext &step) {
+  const uint32_t n = step.rows.n + (w.sleepers ? w.store.n : 0), S = step.state.nstate;
+  ContactStore &to = step.next_store;
+  Report &next = w.sleepers ? step.last_report : w.report;  // the one that keep_contacts(w, step) will write
+  each_column([&](const ContactColumn &column, auto &values) { values.reserve(column.entries(n, S)); }, to);
+  each_report_column([&](size_t width, auto &column) { column.reserve(width * n); }, next);
+  w.work.reserve(std::min(w.work.size() + n, w.bodies.size() * (w.bodies.size() + w.obstacles.size())));
+  reserve_events(w, size_t(n) + w.store.n);
+  reserve_impulses(w, n);
+}
+
+void reserve_events(World &w, size_t more) {
+  const size_t most = w.events.size() + more;
+  if (w.events.capacity() < most) w.events.reserve(2 * most);
+}
+
+void add_event(World &w, uint32_t kind, uint64_t a, uint64_t b, uint64_t key, double t) {
+  w.events.push_back({sizeof(dfm_contact_event), kind, w.handle_of(a), w.handle_of(b), key, t});
+}
+
+void end_contacts(World &w) {
+  ContactStore &s = w.store;
+  reserve_events(w, s.n);
+  for (uint32_t i = 0; i < s.n; ++i)
+    if (s.touching[i]) add_event(w, DFM_EVENT_END, s.id_a[i], s.id_b[i], s.key[i], w.time);
+  each_column([](const ContactColumn &, auto &values) { values.clear(); }, s);
+  s.n = w.report.n = 0;
+  w.stats.contacts = w.stats.sticking = 0;
+}
+
+void list_crossings(World &w, StepContext &step) {
+  Array<Crossing> &list = step.next_store.crossings;
+  list.clear();
+  for (uint32_t i = 0; i < step.next_store.n; ++i) {
+    const ContactPoint &c = w.report.contacts[i];
+    if (c.type_a == 1 && step.next_store.touching[i])
+      list.push_back({step.next_store.id_a[i], step.next_store.id_b[i], c.feature_a, c.feature_b});
+  }
+  std::sort(list.begin(), list.end());
+}
+
+void keep_contacts(World &w, StepContext &step) {
+  const uint32_t n = step.rows.n, S = step.state.nstate;
+  ContactStore &to = step.next_store;
+  if (w.sleepers) std::swap(w.report, step.last_report);
+  to.n = n;
+  to.nstate = S;
+  to.h = step.h;
+  each_column(
+      [&](const ContactColumn &column, auto &values) {
+        if (column.width != kOwnLength) values.resize(column.entries(n, S));
+      },
+      to);
+  w.report.n = n;
+  w.report.h = step.h;
+  w.report.contacts.assign(step.contacts.begin(), step.contacts.end());
+  for (uint32_t i = 0; i < n; ++i) w.report.contacts[i].area = step.state.area[i];
+  w.report.frame.assign(step.rows.frame.begin(), step.rows.frame.end());
+  w.report.impulse.assign(step.rows.impulse.begin(), step.rows.impulse.end());
+  w.report.slip.resize(size_t(2) * n);
+  w.report.mode.resize(n);
+
+  uint32_t touching = 0, sticking = 0;
+  for (uint32_t i = 0; i < n; ++i) {
+    const ContactPoint &c = step.contacts[i];
+    const uint64_t a = w.bodies[c.slot_a]->id;
+    const uint64_t b = c.obstacle ? w.obstacles[c.slot_b]->id : w.bodies[c.slot_b]->id;
+    const double *const l = &step.rows.impulse[size_t(i) * 3];
+    const uint32_t m = step.match[i];
+    // also where the normal turned over and nothing else is taken along
+    const uint32_t known = m != kNone ? m : w.store.find(c.key);
+    const bool before = known != kNone && w.store.touching[known];
+    // hysteresis: a contact ends when it carries nothing and has opened by a tenth of the offset
+    const bool now = l[0] > 0 || (before && c.distance - w.offset < 0.1 * w.offset);
+    const bool stick = l[0] > 0 && step.state.mode[i] == 1;
+    to.key[i] = c.key;
+    to.id_a[i] = a;
+    to.id_b[i] = b;
+    to.law[i] = step.state.law[i];
+    to.by_key[i] = i;
+    store3(&to.normal[size_t(3) * i], load3(&step.rows.frame[size_t(9) * i]));
+    store3(&to.tangent[size_t(3) * i], load3(&step.rows.frame[size_t(9) * i + 3]));
+    store3(&to.impulse[size_t(3) * i], load3(l));
+    // its law wrote no further: the rest of the columns is another contact's
+    const uint32_t own = now ? w.pairs.laws[step.state.law[i]]->nstate : 0;
+    for (uint32_t s = 0; s < S; ++s)
+      to.bristle[size_t(S) * i + s] = s < own ? step.state.bristle_out[size_t(s) * step.state.stride + i] : 0;
+    to.dwell[i] = now ? step.state.dwell[i] + step.h : 0;
+    to.area[i] = step.state.area[i];
+    const double v1 = step.state.vt[i], v2 = step.state.vt[step.state.stride + i];
+    // A hold counts from hold_begin on: what sticks in the first sub-step after it, and in every one since.
+    const bool first = w.time <= w.hold.start, carried = !first && m != kNone && w.store.held[m];
+    const bool holds = w.hold.on && stick && (first || carried);
+    to.path[2 * i] = holds ? (carried ? w.store.path[2 * m] : 0) + step.h * v1 : 0;
+    to.path[2 * i + 1] = holds ? (carried ? w.store.path[2 * m + 1] : 0) + step.h * v2 : 0;
+    to.touching[i] = now;
+    to.held[i] = holds;
+    to.began[i] = now && !before;
+    if (now && !before) add_event(w, DFM_EVENT_BEGIN, a, b, c.key, w.time + step.h);
+    if (before && !now) add_event(w, DFM_EVENT_END, a, b, c.key, w.time + step.h);
+    w.report.slip[2 * i] = v1;
+    w.report.slip[2 * i + 1] = v2;
+    w.report.mode[i] = step.state.mode[i];
+    touching += now;
+    sticking += stick;
+
+    if (l[1] != 0 || l[2] != 0) {
+      auto it = std::lower_bound(w.work.begin(), w.work.end(), std::pair(a, b),
+                                 [](const PairWork &p, auto &k) { return std::pair(p.a, p.b) < k; });
+      if (it == w.work.end() || it->a != a || it->b != b) it = w.work.insert(it, {a, b, 0});
+      it->work += l[1] * v1 + l[2] * v2;
+    }
+  }
+  follow_load(w, step);
+  turn_frames(w, step);
+  std::sort(to.by_key.begin(), to.by_key.end(),
+            [&](uint32_t i, uint32_t j) { return to.key[i] < to.key[j]; });
+  if (w.sleepers) carry_sleepers(w, step, &touching, &sticking);
+  for (uint32_t m = 0; m < w.store.n; ++m)
+    if (w.store.touching[m] && !sleeps(w, step, m) && to.find(w.store.key[m]) == kNone)
+      add_event(w, DFM_EVENT_END, w.store.id_a[m], w.store.id_b[m], w.store.key[m], w.time + step.h);
+  list_crossings(w, step);
+  std::swap(w.store, step.next_store);
+
+  w.stats.contacts = touching;
+  w.stats.sticking = sticking;
+  w.stats.pairs_tested = static_cast<uint32_t>(step.broad.candidates().size());
+  w.stats.contacts_max = std::max(w.stats.contacts_max, touching);
+  w.stats.contacts_mean += (touching - w.stats.contacts_mean) / double(w.stats.substeps + 1);
+}
+
+}  // namespace dfm

@@ -1,0 +1,53 @@
+#include "step/move_obstacles.h"
+
+#include "step/context.h"
+#include "step/rigid.h"
+
+namespace dfm {
+
+Pose Obstacle::end_pose(double t, double h, double left) const {
+  if (rigid) return shape_pose(*this, rigid->next[rigid_body]);
+  if (!has_target) return moves() ? pose_at_time(t + h) : pose;
+  const double s = h / left;
+  return {pose.position + s * (target.position - pose.position),
+          slerp(pose.rotation, target.rotation, s < 1 ? s : 1)};
+}
+
+void view_obstacles(World &w, StepContext &step) {
+  const double t = w.time, h = step.h, left = step.left;
+  for (size_t i = 0; i < w.obstacles.size(); ++i) {
+    const Obstacle &o = *w.obstacles[i];
+    ObstacleView &v = step.obstacle_views[i];
+    v.position = o.pose.position;
+    v.rotation = o.pose.rotation;
+    v.velocity = v.spin = v.linear = {};
+    if (o.has_target) {
+      v.velocity = (1 / left) * (o.target.position - o.pose.position);
+      v.spin = spin_between(o.pose.rotation, o.target.rotation, left);
+    } else if (o.moves()) {
+      const Pose end = o.pose_at_time(t + h);
+      v.velocity = (1 / h) * (end.position - o.pose.position);
+      v.spin = spin_between(o.pose.rotation, end.rotation, h);
+    }
+    if (o.mesh) o.mesh->place(v.position, v.rotation, v.velocity, v.spin);
+  }
+}
+
+void move_obstacles(World &w, const StepContext &step, bool last) {
+  for (auto &o : w.obstacles) {
+    if (o->has_target || o->moves())
+      o->pose = last && o->has_target ? o->target : o->end_pose(w.time, step.h, step.left);
+    if (last) o->has_target = false;
+  }
+}
+
+void move_obstacles_by(World &w, const StepContext &step, double fraction) {
+  for (auto &o : w.obstacles) {
+    if (!o->has_target && !o->moves()) continue;
+    const Pose end = o->end_pose(w.time, step.h, step.left);
+    o->pose = {o->pose.position + fraction * (end.position - o->pose.position),
+               slerp(o->pose.rotation, end.rotation, fraction)};
+  }
+}
+
+}  // namespace dfm

@@ -1,0 +1,136 @@
+#include "step/overlap.h"
+
+#include <algorithm>
+#include <memory>
+
+#include "contact/reach.h"
+#include "core/error.h"
+#include "state/world.h"
+#include "step/context.h"
+#include "step/overlap_sides.h"
+#include "step/stages.h"
+#include "step/untangle.h"
+
+namespace dfm {
+namespace {
+
+constexpr uint64_t kReleaseEvery = 16;  // steps: pairs that are aside are looked at no more often
+constexpr size_t kSentences = 8;        // pairs that are named in the log one by one
+
+// Deeper than contact leads out. Closed shapes and voxels lead out from any depth; of triangles only
+// the nearest do.
+bool deep(const World &w, const OverlapPair &p, const Crossed &c) {
+  if (p.obstacle && !w.obstacles[p.b]->mesh) return false;
+  const Surface &a = w.bodies[p.a]->surface;
+  const Surface &b = p.obstacle ? w.obstacles[p.b]->mesh->surface : w.bodies[p.b]->surface;
+  return c.coincide || c.depth > std::min(recovery_depth(a), recovery_depth(b)) ||
+         2 * c.enclosed > (p.obstacle ? a.nsurfel : std::min(a.nsurfel, b.nsurfel));
+}
+
+uint64_t other_id(const World &w, const OverlapPair &p) {
+  return p.obstacle ? w.obstacles[p.b]->id : w.bodies[p.b]->id;
+}
+
+std::vector<Overlap> find_overlaps(World &w) {
+  std::vector<uint64_t> &placed = w.overlaps.placed;
+  std::sort(placed.begin(), placed.end());
+  const auto asked = [&](uint64_t id) {
+    return w.overlaps.all || std::binary_search(placed.begin(), placed.end(), id);
+  };
+  std::vector<Overlap> out;
+  OverlapSides sides(w);
+  const auto look = [&](const OverlapPair &p) {
+    const uint64_t a = w.bodies[p.a]->id, b = other_id(w, p);
+    if ((!asked(a) && !asked(b)) || !sides.may_touch(p)) return;
+    const Crossed c = sides.look(p, w.offset, false);
+    if (c.through) out.push_back({a, b, p.obstacle, c.crossings, c.enclosed, c.depth, deep(w, p, c)});
+  };
+  for (uint32_t i = 0; i < w.bodies.size(); ++i) {
+    for (uint32_t j = i + 1; j < w.bodies.size(); ++j) look({i, j, false});
+    for (uint32_t j = 0; j < w.obstacles.size(); ++j) look({i, j, true});
+  }
+  return out;
+}
+
+const Body *body_of_id(const World &w, uint64_t id) {
+  for (auto &b : w.bodies)
+    if (b->id == id) return b.get();
+  return nullptr;
+}
+const Obstacle *obstacle_of_id(const World &w, uint64_t id) {
+  for (auto &o : w.obstacles)
+    if (o->id == id) return o.get();
+  return nullptr;
+}
+
+void warn(const World &w, const Overlap &o) {
+  const Obstacle *const thing = o.obstacle ? obstacle_of_id(w, o.b) : nullptr;
+  const std::string &name = thing ? thing->name : body_of_id(w, o.b)->name;
+  w.context->logf(
+      DFM_LOG_WARNING,
+      "body '%s' and %s '%s' overlap by %.3g m (%u pairs of triangles cross, %u surface points inside): %s",
+      body_of_id(w, o.a)->name.c_str(),
+      !thing         ? "body"
+      : thing->rigid ? "rigid body"
+                     : "obstacle",
+      name.c_str(), o.depth, o.crossings, o.enclosed,
+      o.aside ? "they do not touch until they are apart; move one of them, or ask for \"untangle\""
+              : "contact pushes them apart slowly; move one of them, or ask for \"untangle\"");
+}
+
+// It is apart: contact again.
+void take_back(World &w, const Overlap &f) {
+  if (std::erase_if(w.overlaps.aside, [&](const PairAside &p) {
+        return p.a == f.a && p.b == f.b && (p.obstacle != 0) == f.obstacle;
+      }))
+    w.pairs.filter.set(f.a, f.b, f.obstacle, true);
+}
+
+}  // namespace
+
+void settle_overlaps(World &w) {
+  Overlaps &o = w.overlaps;
+  if (!o.due()) return;
+  std::vector<Overlap> found = find_overlaps(w);
+  if ((w.def.flags & DFM_WORLD_UNTANGLE || o.untangle) && !o.look_only) untangle(w, found);
+  std::vector<Overlap> left;
+  for (const Overlap &f : found) {
+    if (!f.separated) left.push_back(f);
+    else take_back(w, f);
+  }
+  for (size_t i = 0; i < left.size() && i < kSentences; ++i) warn(w, left[i]);
+  if (left.size() > kSentences)
+    w.context->logf(DFM_LOG_WARNING, "%zu more pairs overlap; dfm_world_overlaps lists them",
+                    left.size() - kSentences);
+  for (const Overlap &f : left) {
+    if (!f.aside || o.look_only || o.is_aside(f.a, f.b, f.obstacle)) continue;
+    o.aside.push_back({f.a, f.b, f.obstacle});
+    w.pairs.filter.set(f.a, f.b, f.obstacle, false);
+  }
+  o.found = std::move(found);
+  o.told = left.empty();
+  o.placed.clear();
+  o.all = o.look_only = o.untangle = false;
+}
+
+void keep_overlaps_aside(World &w) {
+  const auto gone = [&](const auto &p) {
+    return !body_of_id(w, p.a) || (p.obstacle ? !obstacle_of_id(w, p.b) : !body_of_id(w, p.b));
+  };
+  std::erase_if(w.overlaps.aside, gone);
+  std::erase_if(w.overlaps.found, gone);
+  for (const PairAside &p : w.overlaps.aside) w.pairs.filter.set(p.a, p.b, p.obstacle, false);
+}
+
+void release_overlaps(World &w) {
+  if (w.overlaps.aside.empty() || w.step_count % kReleaseEvery != 0) return;
+  OverlapSides sides(w);
+  std::erase_if(w.overlaps.aside, [&](const PairAside &p) {
+    const uint32_t j = p.obstacle ? obstacle_of_id(w, p.b)->slot : body_of_id(w, p.b)->slot;
+    if (sides.look({body_of_id(w, p.a)->slot, j, p.obstacle != 0}, w.offset, true).through) return false;
+    w.pairs.filter.set(p.a, p.b, p.obstacle, true);
+    return true;
+  });
+}
+
+}  // namespace dfm

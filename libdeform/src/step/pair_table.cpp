@@ -1,0 +1,149 @@
+// Friction laws of a world's pairs, from the rules by name, group and material.
+//
+// PairTables::law holds one law per pair of things. Only where rules tell parts of a surface apart does the
+// pair have a table over the zones of both sides as well, and only then is a contact asked which triangle it
+// stands on: a world without such rules runs no instruction of it.
+#include <algorithm>
+#include <cmath>
+
+#include "friction/pair_rules.h"
+#include "plugin/params.h"
+#include "state/world.h"
+#include "step/context.h"
+#include "step/pair_table.h"
+#include "step/stages.h"
+
+namespace dfm {
+namespace {
+
+const SurfaceZones::Zone &zone_at(const World &w, uint32_t thing, uint32_t zone) {
+  const uint32_t nb = static_cast<uint32_t>(w.bodies.size());
+  return thing < nb ? w.bodies[thing]->zones.list[zone] : w.obstacles[thing - nb]->zone;
+}
+
+uint32_t zone_count(const World &w, uint32_t thing) {
+  return thing < w.bodies.size() ? static_cast<uint32_t>(w.bodies[thing]->zones.list.size()) : 1;
+}
+
+const std::string &name_of(const World &w, uint32_t thing) {
+  const size_t nb = w.bodies.size();
+  return thing < nb ? w.bodies[thing]->name : w.obstacles[thing - nb]->name;
+}
+
+// No rule: Coulomb's law with the geometric mean of the two materials' coefficients (doc/decisions/0014).
+uint32_t default_law(World &w, double a, double b) {
+  const double mu = std::sqrt(a * b);
+  const dfm_param_value values[] = {{"mu_C", &mu, 1}, {"mu_S", &mu, 1}};
+  const bool plain = a == kDefaultFriction && b == kDefaultFriction;
+  const uint32_t law = add_law(w, "coulomb", std::span(values, plain ? 0 : 2));
+  w.laws[law]->by_default = true;
+  return law;
+}
+
+const FrictionRule *rule_of(const World &w, uint32_t a, const SurfaceZones::Zone &za, uint32_t b,
+                            const SurfaceZones::Zone &zb) {
+  return best_rule(w.friction, {name_of(w, a), za.group, za.material},
+                   {name_of(w, b), zb.group, zb.material});
+}
+
+// On which zones of its two sides a contact stands.
+struct Zones { uint32_t a, b; };
+Zones zones_of(const World &w, const ContactPoint &c) {
+  const Vec3 normal = load3(c.normal);
+  const auto zone = [](const Body &b, uint8_t type, uint32_t feature, Vec3 outward) {
+    return b.zones.of.empty() ? 0 : zone_of(b.surface, b.zones.of, type, feature, outward);
+  };
+  const uint32_t a = zone(*w.bodies[c.slot_a], c.type_a, c.feature_a, -normal);
+  return {a, c.obstacle ? 0 : zone(*w.bodies[c.slot_b], c.kind == kEdgeEdge ? 1 : 2, c.feature_b, normal)};
+}
+
+// Place among bodies and obstacles, or kNone.
+uint32_t thing_of(const World &w, uint64_t id) {
+  const auto is = [id](const auto &thing) { return thing->id == id; };
+  if (const auto b = std::find_if(w.bodies.begin(), w.bodies.end(), is); b != w.bodies.end())
+    return static_cast<uint32_t>(b - w.bodies.begin());
+  const auto o = std::find_if(w.obstacles.begin(), w.obstacles.end(), is);
+  return o == w.obstacles.end() ? kNone
+                                : static_cast<uint32_t>(w.bodies.size() + size_t(o - w.obstacles.begin()));
+}
+
+uint32_t law_of_zones(World &w, uint32_t a, uint32_t zone_a, uint32_t b, uint32_t zone_b) {
+  const SurfaceZones::Zone &za = zone_at(w, a, zone_a), &zb = zone_at(w, b, zone_b);
+  const FrictionRule *const rule = rule_of(w, a, za, b, zb);
+  return rule ? rule->law : default_law(w, za.friction, zb.friction);
+}
+
+}  // namespace
+
+uint32_t add_law(World &w, const char *name, std::span<const dfm_param_value> values,
+                 std::span<const uint8_t> free) {
+  const dfm_type &type = w.context->registry.find(DFM_KIND_FRICTION, name);
+  std::vector<double> packed = pack_params(type, values);
+  for (uint32_t i = 0; i < w.laws.size(); ++i)
+    if (w.laws[i]->type == &type && w.laws[i]->params == packed) return i;
+  auto law = std::make_unique<LawInstance>(type, w.context->host, std::move(packed));
+  if (law->nstate) need_ability(w, Ability::law_memory, "friction law", name);
+  return place_law(w, std::move(law), free);
+}
+
+uint32_t place_law(World &w, std::unique_ptr<LawInstance> law, std::span<const uint8_t> free) {
+  const auto found = std::find(free.begin(), free.end(), uint8_t(1));
+  if (found == free.end()) {
+    w.laws.push_back(std::move(law));
+    return static_cast<uint32_t>(w.laws.size() - 1);
+  }
+  const uint32_t place = static_cast<uint32_t>(found - free.begin());
+  w.laws[place] = std::move(law);
+  w.changed = true;
+  return place;
+}
+
+uint32_t pair_law(const World &w, uint32_t slot_a, bool obstacle, uint32_t slot_b) {
+  const size_t nb = w.bodies.size(), width = nb + w.obstacles.size();
+  return w.pairs.law[slot_a * width + (obstacle ? nb : 0) + slot_b];
+}
+
+void find_law(World &w, uint32_t a, uint32_t b, std::vector<uint32_t> &used) {
+  const size_t width = w.bodies.size() + w.obstacles.size();
+  const uint32_t na = zone_count(w, a), nb = zone_count(w, b);
+  std::vector<uint32_t> laws_of;
+  bool same = true;
+  for (uint32_t i = 0; i < na; ++i)
+    for (uint32_t j = 0; j < nb; ++j) {
+      laws_of.push_back(law_of_zones(w, a, i, b, j));
+      same = same && laws_of.back() == laws_of[0];
+    }
+  PairTables &to = w.pairs;
+  to.law[a * width + b] = laws_of[0];
+  used.assign(laws_of.begin(), same ? laws_of.begin() + 1 : laws_of.end());
+  if (same) return;
+  if (to.zone_table.empty()) to.zone_table.assign(w.bodies.size() * width, kNone);
+  to.zone_table[a * width + b] = static_cast<uint32_t>(to.zone_law.size());
+  to.zone_law.insert(to.zone_law.end(), laws_of.begin(), laws_of.end());
+}
+
+void set_zone_laws(const World &w, std::span<const ContactPoint> contacts, Array<uint32_t> &law) {
+  const size_t nb = w.bodies.size(), width = nb + w.obstacles.size();
+  for (uint32_t i = 0; i < contacts.size(); ++i) {
+    const ContactPoint &c = contacts[i];
+    const uint32_t table = w.pairs.zone_table[c.slot_a * width + (c.obstacle ? nb : 0) + c.slot_b];
+    if (table == kNone) continue;
+    const Zones zones = zones_of(w, c);
+    const size_t others = c.obstacle ? 1 : w.bodies[c.slot_b]->zones.list.size();
+    law[i] = w.pairs.zone_law[table + zones.a * others + zones.b];
+  }
+}
+
+void rename_law(World &w, const FrictionRule &rule, uint32_t to) {
+  ContactStore &s = w.store;
+  for (uint32_t m = 0; m < s.n; ++m) {
+    if (s.law[m] != rule.law) continue;
+    const uint32_t a = thing_of(w, s.id_a[m]), b = thing_of(w, s.id_b[m]);
+    if (a == kNone || b == kNone) continue;
+    // Nothing is reported after a restore, until the next step.
+    const Zones zones = m < w.report.n ? zones_of(w, w.report.contacts[m]) : Zones{0, 0};
+    if (rule_of(w, a, zone_at(w, a, zones.a), b, zone_at(w, b, zones.b)) == &rule) s.law[m] = to;
+  }
+}
+
+}  // namespace dfm

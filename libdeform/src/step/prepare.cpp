@@ -1,0 +1,251 @@
+// What is derived from a world whenever something has changed: plan, pair tables, rest distance, views of the
+// entities for the stages.
+#include "state/world.h"
+#include "step/context.h"
+#include "step/method.h"
+#include "step/stages.h"
+
+#include <algorithm>
+
+#include "core/error.h"
+#include "friction/pair_rules.h"
+#include "state/bounds.h"
+#include "step/energy_watch.h"
+#include "step/overlap.h"
+#include "step/pair_table.h"
+#include "step/rigid.h"
+
+namespace dfm {
+namespace {
+
+// Rest distance d_c: 1e-3 of the median surface edge, at least 64 rounding units of the largest coordinate,
+// at most 0.1 of the thinnest part: of the least mean thickness and of the shortest median edge.
+double contact_offset(const World &w) {
+  double edge = 0, shortest = 0, extent = 0;
+  std::vector<double> edges;
+  for (auto &b : w.bodies) {
+    edges.push_back(b->surface.median_edge);
+    const double thin = std::min(b->surface.median_edge, thickness(*b));
+    shortest = shortest == 0 ? thin : std::min(shortest, thin);
+    for (double x : b->p.x) extent = std::max(extent, std::fabs(x));
+  }
+  if (edges.empty()) return 1e-6;
+  std::nth_element(edges.begin(), edges.begin() + std::ptrdiff_t(edges.size() / 2), edges.end());
+  edge = edges[edges.size() / 2];
+  return std::min(std::max(1e-3 * edge, 64 * 2.220446049250313e-16 * extent), 0.1 * shortest);
+}
+
+void offer(const dfm_type &type, std::vector<SceneFacts::Provider> &to) {
+  for (const std::string &e : effects(type)) to.push_back({e, type.id});
+}
+
+// What is prescribed over time, as the plan has to know it.
+struct Prescribed {
+  bool gravity_keys = false;
+  bool loads_vary = false;
+  bool held_move = false;
+  bool obstacles_move = false;
+  bool operator==(const Prescribed &) const = default;
+};
+
+Prescribed prescribed(const World &w) {
+  Prescribed p;
+  p.gravity_keys = !w.gravity.keys.empty();
+  for (auto &b : w.bodies) {
+    p.loads_vary |= b->loads_vary();
+    p.held_move |= !b->motions.empty();
+  }
+  for (auto &o : w.obstacles) p.obstacles_move |= o->moves() || o->has_target;
+  return p;
+}
+
+void put(const Prescribed &p, SceneFacts &facts) {
+  facts.gravity_keys = p.gravity_keys;
+  facts.loads_vary = p.loads_vary;
+  facts.held_move = p.held_move;
+  facts.obstacles_move = p.obstacles_move;
+}
+
+// The plan alone, where values have changed so that another stage is called for.
+void look_at_plan(World &w, StepContext &step) {
+  const SceneFacts &old = step.facts;
+  const Prescribed now = prescribed(w);
+  if (now != Prescribed{old.gravity_keys, old.loads_vary, old.held_move, old.obstacles_move}) {
+    SceneFacts facts = old;
+    put(now, facts);
+    w.plan = make_plan(w.method->table, facts);
+    put(now, step.facts);
+    ++step.made.plans;
+  }
+  w.revalued = false;
+}
+
+}  // namespace
+
+void values_changed(World &w) {
+  w.revalued = true;
+  w.bound.age = kNone;
+  forget_energy(w);
+}
+
+void set_gravity_now(World &w) {
+  w.gravity.now = w.gravity.keys.empty() ? load3(w.def.gravity) : vector_at(w.gravity.keys, w.time);
+}
+
+void prepare(World &w, const RestoredChoice *restored) {
+  StepContext &step = *w.steps;
+  if (!w.changed) {
+    if (w.revalued) look_at_plan(w, step);
+    return settle_overlaps(w);
+  }
+  const uint32_t nb = static_cast<uint32_t>(w.bodies.size());
+  const uint32_t no = static_cast<uint32_t>(w.obstacles.size());
+  const uint32_t width = nb + no;
+  SceneFacts &facts = step.facts;
+  facts = {};
+  facts.bodies = nb;
+  facts.obstacles = no;
+  facts.sleep = w.def.sleep != 0;
+  put(prescribed(w), facts);
+
+  step.body_views.clear();
+  step.obstacle_views.clear();
+  step.sources.clear();
+  step.exchange.clear();
+  uint32_t node = 0, point = 0;
+  for (uint32_t i = 0; i < nb; ++i) {
+    Body &b = *w.bodies[i];
+    b.slot = i;
+    facts.self_stepping += !b.dynamics->abilities().forces;
+    const Surface &s = b.surface;
+    step.body_views.push_back({i, node, b.category, b.collides_with, b.id, &s});
+    step.sources.push_back(
+        {node, s.nsurfel, point, b.p.n, &s, b.dynamics->diagonal(), b.dynamics->contact_velocity()});
+    if (!s.identity()) {
+      ++facts.coupled;
+      facts.coupled_surfels += s.nsurfel;
+    }
+    node += s.nsurfel;
+    point += b.p.n;
+    for (const std::string &e : effects(*b.model.type))
+      (b.model.works(e) ? facts.offered : facts.idle).push_back({e, b.model.type->id});
+  }
+  for (uint32_t i = 0; i < no; ++i) {
+    Obstacle &o = *w.obstacles[i];
+    o.slot = i;
+    ObstacleView v{};
+    v.slot = i;
+    v.category = o.def.category;
+    v.collides_with = o.def.collides_with;
+    v.id = o.id;
+    v.shape = Shape(o.def.shape);
+    if (v.shape == Shape::none) v.category = v.collides_with = 0;
+    v.position = o.pose.position;
+    v.rotation = o.pose.rotation;
+    v.half_size = load3(o.def.half_size);
+    v.radius = o.def.radius;
+    v.half_length = o.def.half_length;
+    v.belt = load3(o.def.velocity_surface);
+    if (o.mesh) {
+      o.mesh->place(v.position, v.rotation, {}, {});
+      v.surface = &o.mesh->surface;
+      v.extent = o.mesh->extent;
+    }
+    if (o.grid) {
+      v.grid = o.grid.get();
+      v.extent = o.grid->extent();
+    }
+    step.obstacle_views.push_back(v);
+  }
+
+  place_rigids(w);
+  for (auto &set : w.rigid_sets) {
+    facts.rigid_bodies += static_cast<unsigned>(set->defs.size());
+    facts.rigid_joints += set->njoint;
+    if (facts.rigid_hosts.find(set->host_name) == std::string::npos)
+      facts.rigid_hosts += (facts.rigid_hosts.empty() ? "" : ", ") + set->host_name;
+    facts.offered.push_back({"two_way_rigid", "rigid host " + set->host_name});
+  }
+
+  // Pairs: filters, then laws. The default law is made only when a pair needs it.
+  // rises, so that lists made under older rules are renewed
+  const uint64_t filter_version = w.pairs.filter.version;
+  w.pairs.filter = PairFilter(w.memory());
+  w.pairs.filter.version = filter_version + 1;
+  w.pairs.law.assign(size_t(nb) * width, 0);
+  w.pairs.zone_table.clear();
+  w.pairs.zone_law.clear();
+  for (auto &law : w.laws) law->by_default = false;
+  std::vector<uint32_t> used;
+  for (uint32_t i = 0; i < nb; ++i) {
+    const PairSide a{w.bodies[i]->name, {}, w.bodies[i]->material};
+    for (uint32_t j = 0; j < width; ++j) {
+      const bool is_body = j < nb;
+      if (is_body && j == i) continue;
+      const uint64_t id = is_body ? w.bodies[j]->id : w.obstacles[j - nb]->id;
+      const PairSide b = is_body ? PairSide{w.bodies[j]->name, {}, w.bodies[j]->material}
+                                 : PairSide{w.obstacles[j - nb]->name, {}, w.obstacles[j - nb]->material};
+      bool touch = is_body ? (w.bodies[i]->category & w.bodies[j]->collides_with) &&
+                                 (w.bodies[j]->category & w.bodies[i]->collides_with)
+                           : (w.bodies[i]->category & w.obstacles[j - nb]->def.collides_with) &&
+                                 (w.obstacles[j - nb]->def.category & w.bodies[i]->collides_with);
+      if (const FilterRule *rule = best_rule(w.filters, a, b)) {
+        if (!is_body || i < j) w.pairs.filter.set(w.bodies[i]->id, id, !is_body, rule->collide);
+        touch = rule->collide;
+      }
+      if (!is_body && step.obstacle_views[j - nb].shape == Shape::none) touch = false;
+      if (!touch) continue;
+      if (is_body) facts.body_pairs += i < j;
+      else ++facts.obstacle_pairs;
+      find_law(w, i, j, used);
+      for (uint32_t law : used) offer(*w.laws[law]->type, facts.offered);
+    }
+  }
+  keep_overlaps_aside(w);
+  facts.effects_listed = w.def.effects != nullptr;
+  facts.asked = w.asked_effects;
+  choose_self_bodies(w, step, facts, used);
+  w.pairs.laws.clear();
+  for (auto &l : w.laws) w.pairs.laws.push_back(l.get());
+
+  for (const dfm_type *t : w.context->registry.list()) offer(*t, facts.available);
+  facts.unguarded = w.def.flags & DFM_WORLD_UNGUARDED;
+  facts.available.push_back({kSelfContact, "contact"});
+  if (nb && facts.effects_listed) facts.offered.push_back({kSelfContact, "contact"});
+  if (facts.self_bodies) need_ability(w, Ability::self_contact);
+  w.plan = make_plan(w.method->table, facts);
+  ++step.made.plans;
+  if (!restored && !w.plan.touches()) end_contacts(w);
+
+  // While contacts live it only falls: a larger one would turn their rest into a depth, and push them apart
+  // at 0.1 d_c / h.
+  const double wanted = contact_offset(w);
+  const double before = w.offset;
+  w.offset = restored                   ? restored->offset
+             : w.def.contact_offset > 0 ? w.def.contact_offset
+             : w.store.n > 0            ? std::min(w.offset, wanted)
+                                        : wanted;
+  if (!restored) check_offset(w);
+  for (auto &b : w.bodies)
+    if (w.def.sleep && b->anchor.empty()) b->anchor = b->p.x;
+  step.active.reserve(nb);
+  step.sinks.reserve(nb);
+  reserve_sleep(w, step, nb);
+  if (w.sleepers > 0 && w.offset != before) wake_all(w);  // contacts rest at another distance now
+  gather_active(w);
+  set_gravity_now(w);
+  w.bound.age = kNone;
+  step.free_kinetic.resize(nb);
+  if (!restored) {
+    forget_energy(w);
+  } else {
+    w.gravity.now = restored->gravity;
+    w.bound = restored->bound;
+  }
+  step.guard.forget();
+  w.changed = w.revalued = false;
+  ++step.made.tables;
+  settle_overlaps(w);
+}
+
+}  // namespace dfm

@@ -1,0 +1,359 @@
+// The two stages of rigid bodies, around the solve: how they would move without contact, and where
+// they end with it.
+#include "state/bounds.h"
+#include "step/rigid.h"
+
+#include <algorithm>
+#include <cmath>
+#include <new>
+
+#include "core/error.h"
+#include "dynamics/rigid/turn.h"
+#include "state/world.h"
+#include "step/context.h"
+#include "step/stages.h"
+
+namespace dfm {
+namespace {
+
+Quat rotation_of(const dfm_rigid_state &s) {
+  return {s.rotation[0], s.rotation[1], s.rotation[2], s.rotation[3]};
+}
+
+bool finite(const double *p, size_t n) {
+  double poison = 0;
+  for (size_t i = 0; i < n; ++i) poison += 0.0 * p[i];
+  return poison == 0;
+}
+constexpr size_t kStateValues = sizeof(dfm_rigid_state) / sizeof(double);
+
+// said: sentences() before the host was called. Its own reason comes along where it has given one.
+bool host_failed(const World &w, const RigidSet &set, dfm_status status, const char *what, uint64_t said,
+                 uint32_t *trouble) {
+  need_memory(status);
+  *trouble |= DFM_TROUBLE_PLUGIN;
+  const std::string why =
+      said != sentences() ? last_error() : "take a smaller step or look at its masses and motors";
+  set_last_error(format("step %llu, rigid body '%s' and those with it: host '%s' %s; %s",
+                        static_cast<unsigned long long>(w.step_count), set.defs[0].name,
+                        set.host_name.c_str(), what, why.c_str())
+                     .c_str());
+  return false;
+}
+
+}  // namespace
+
+void need_memory(dfm_status status) {
+  if (status == DFM_E_NOMEM) throw std::bad_alloc();
+}
+
+Obstacle &rigid_obstacle(World &w, uint64_t id) {
+  for (auto &o : w.obstacles)
+    if (o->id == id) return *o;
+  fail(DFM_E_FATAL, "a rigid body has lost its shape");
+}
+
+Pose shape_pose(const Obstacle &o, const dfm_rigid_state &s) {
+  const Pose body{load3(s.position), rotation_of(s)};
+  return o.added ? Pose{place(body, o.local.position), body.rotation * o.local.rotation} : body;
+}
+
+// Mean velocity of a shape's origin while its body moves so, as ObstacleView::velocity_at.
+Vec3 shape_velocity(const Obstacle &o, const dfm_rigid_state &start, Vec3 velocity, Vec3 spin, double h) {
+  if (!o.added) return velocity;
+  const Vec3 arm = rotate(rotation_of(start), o.local.position), turn = load3(start.spin);
+  const Vec3 first = cross(turn, arm), second = cross(turn, first), third = cross(turn, second);
+  return velocity + cross(spin, arm) + (0.5 * h) * second + (h * h / 6) * third;
+}
+
+void place_rigids(World &w) {
+  StepContext &step = *w.steps;
+  step.rigid_places.clear();
+  step.rigid_groups.clear();
+  if (w.rigid_sets.empty()) return;
+  step.rigid_places.resize(w.obstacles.size());
+  for (auto &set : w.rigid_sets) {
+    set->first_group = static_cast<uint32_t>(step.rigid_groups.size());
+    step.rigid_groups.resize(step.rigid_groups.size() + set->ngroup);
+    for (uint32_t g : set->group)
+      if (g != DFM_RIGID_STILL) ++step.rigid_groups[set->first_group + g];
+  }
+  for (auto &o : w.obstacles) {
+    if (!o->rigid) continue;
+    const uint32_t g = o->rigid->group[o->rigid_body];
+    if (g != DFM_RIGID_STILL)
+      step.rigid_places[o->slot] = {o->rigid->first_group + g, o->rigid->place[o->rigid_body], {}};
+  }
+}
+
+bool ask_rigids(World &w, uint32_t *trouble) {
+  const uint64_t said = sentences();
+  for (auto &set : w.rigid_sets) {
+    RigidSet &s = *set;
+    std::fill(s.velocity.begin(), s.velocity.end(), 0.0);
+    if (const dfm_status status = s.host.predict(s.self, &s.step, s.velocity.data()); status != DFM_OK)
+      return host_failed(w, s, status, "gave no velocities", said, trouble);
+    if (!finite(s.velocity.data(), s.velocity.size()))
+      return host_failed(w, s, DFM_OK, "gave velocities that are not finite", said, trouble);
+  }
+  return true;
+}
+
+bool stage_rigid_predict(World &w, StepContext &step, uint32_t *trouble) {
+  step.rigid_again = false;
+  for (auto &set : w.rigid_sets) {
+    const uint32_t n = static_cast<uint32_t>(set->defs.size());
+    set->step = {sizeof set->step,
+                 n,
+                 w.time,
+                 step.h,
+                 {w.gravity.now.x, w.gravity.now.y, w.gravity.now.z},
+                 set->state.data(),
+                 set->extra.data()};
+  }
+  if (!ask_rigids(w, trouble)) return false;
+  for (auto &set : w.rigid_sets) set->first.assign(set->velocity.begin(), set->velocity.end());
+  for (auto &o : w.obstacles) {
+    if (!o->rigid || o->rigid->group[o->rigid_body] == DFM_RIGID_STILL) continue;
+    const dfm_rigid_state &s = o->rigid->state[o->rigid_body];
+    const double *const v = &o->rigid->velocity[6 * size_t{o->rigid_body}];
+    ObstacleView &view = step.obstacle_views[o->slot];
+    view.velocity = shape_velocity(*o, s, load3(v), load3(v + 3), step.h);
+    view.spin = load3(v + 3);
+    view.linear = view.spin - load3(s.spin);
+    if (o->mesh) o->mesh->place(view.position, view.rotation, view.velocity, view.spin);
+    step.rigid_places[o->slot].center = load3(s.position);
+  }
+  return true;
+}
+
+void rigid_response(World &w, StepContext &step, uint32_t group, double *matrix) {
+  for (auto &set : w.rigid_sets) {
+    if (group < set->first_group || group >= set->first_group + set->ngroup) continue;
+    const size_t width = 6 * size_t{step.rigid_groups[group]};
+    const dfm_status status = set->host.respond(set->self, &set->step, group - set->first_group, matrix);
+    need_memory(status);
+    if (status != DFM_OK || !finite(matrix, width * width))
+      fail(DFM_E_FATAL, "rigid host '%s' does not answer impulses on '%s' and those with it",
+           set->host_name.c_str(), set->defs[0].name);
+    return;
+  }
+}
+
+// A host that says DFM_RIGID_AGAIN knows better now how its bodies move: the same contacts are solved once
+// more with its new velocities. Detection has been done with the first ones, so the difference stands in the
+// rows, as the rigid bodies' change of velocity before any impulse.
+void correct_rigids(World &w, StepContext &step) {
+  for (const ContactRows::Block &block : step.rows.blocks) {
+    if (block.group == kNone) continue;
+    for (auto &set : w.rigid_sets)
+      for (uint32_t i = 0; i < set->defs.size(); ++i) {
+        if (set->group[i] == DFM_RIGID_STILL || set->first_group + set->group[i] != block.group) continue;
+        const double *const now = &set->velocity[6 * size_t{i}], *const then = &set->first[6 * size_t{i}];
+        double *const y = &step.rows.y[4 * size_t{block.first + 2 * set->place[i]}];
+        store3(y, load3(now) - load3(then));
+        store3(y + 4, load3(now + 3) - load3(then + 3));
+      }
+  }
+}
+
+void sum_rigid_impulses(World &w, StepContext &step) {
+  for (auto &set : w.rigid_sets) std::fill(set->impulse.begin(), set->impulse.end(), 0.0);
+  const ContactRows &rows = step.rows;
+  if (!w.plan.touches() || rows.rigid.empty()) return;
+  for (uint32_t i = 0; i < rows.n; ++i) {
+    if (rows.rigid[i] == kNone) continue;
+    const Obstacle &o = *w.obstacles[step.contacts[i].slot_b];
+    const double *const f = &rows.frame[size_t(9) * i], *const l = &rows.impulse[size_t(3) * i];
+    const Vec3 p = l[0] * load3(f) + l[1] * load3(f + 3) + l[2] * load3(f + 6);
+    double *const to = &o.rigid->impulse[6 * size_t{o.rigid_body}];
+    store3(to, load3(to) - p);
+    store3(to + 3, load3(to + 3) - cross(load3(&rows.arm[size_t(3) * i]), p));
+  }
+}
+
+bool revise_rigids(World &w, StepContext &step) {
+  if (std::none_of(w.rigid_sets.begin(), w.rigid_sets.end(),
+                   [](auto &set) { return set->host.revise != nullptr; }))
+    return false;
+  sum_rigid_impulses(w, step);
+  bool any = false;
+  for (auto &set : w.rigid_sets) {
+    if (!set->host.revise) continue;
+    uint32_t changed = 0;
+    const dfm_status status =
+        set->host.revise(set->self, &set->step, set->impulse.data(), set->revised.data(), &changed);
+    need_memory(status);
+    if (status != DFM_OK || !finite(set->revised.data(), set->revised.size()))
+      fail(DFM_E_FATAL, "rigid host '%s' does not answer contact on '%s' and those with it",
+           set->host_name.c_str(), set->defs[0].name);
+    if (!changed) continue;
+    any = true;
+    for (const ContactRows::Block &block : step.rows.blocks) {
+      if (block.group == kNone || block.group < set->first_group ||
+          block.group >= set->first_group + set->ngroup)
+        continue;
+      rigid_response(w, step, block.group, &step.rows.response[block.response]);
+      for (uint32_t i = 0; i < set->defs.size(); ++i) {
+        if (set->group[i] != block.group - set->first_group) continue;
+        for (uint32_t k = 0; k < 2; ++k)
+          for (Array<double> *y : {&step.rows.y, &step.rows.y_free})
+            store3(&(*y)[size_t(block.first + 2 * set->place[i] + k) * 4],
+                   load3(&set->revised[6 * size_t{i} + 3 * k]) - load3(&set->first[6 * size_t{i} + 3 * k]));
+      }
+      step.rows.push_rigid(block);
+    }
+  }
+  return any;
+}
+
+// 1: all have ended their step; 2: somebody asks for another solve; 0: failed.
+int ask_rigid_ends(World &w, uint32_t *trouble) {
+  const uint64_t said = sentences();
+  bool again = false;
+  for (auto &set : w.rigid_sets)
+    if (const dfm_status status =
+            set->host.push ? set->host.push(set->self, &set->step, set->impulse.data()) : DFM_OK;
+        status != DFM_OK)
+      return host_failed(w, *set, status, "did not take its impulses", said, trouble);
+  for (auto &set : w.rigid_sets) {
+    RigidSet &s = *set;
+    const dfm_status status =
+        s.host.commit(s.self, &s.step, s.impulse.data(), s.next.data(), s.next_extra.data());
+    if (status != DFM_OK && status != DFM_RIGID_AGAIN)
+      return host_failed(w, s, status, "could not end its step", said, trouble);
+    again |= status == DFM_RIGID_AGAIN;
+    for (uint32_t i = 0; i < s.defs.size(); ++i)
+      if (s.group[i] == DFM_RIGID_STILL) s.next[i] = s.state[i];
+    if (!finite(reinterpret_cast<const double *>(s.next.data()), kStateValues * s.next.size()) ||
+        !finite(s.next_extra.data(), s.next_extra.size()))
+      return host_failed(w, s, DFM_OK, "ended its step with something not finite", said, trouble);
+  }
+  return again ? 2 : 1;
+}
+
+bool stage_rigid_commit(World &w, StepContext &step, uint32_t *trouble) {
+  for (uint32_t round = 0;; ++round) {
+    sum_rigid_impulses(w, step);
+    const int end = ask_rigid_ends(w, trouble);
+    if (end == 0) return false;
+    if (end == 1 || round == DFM_RIGID_MOST_AGAIN || !w.plan.touches() || step.rows.n == 0) break;
+    step.rigid_again = true;
+    ++w.stats.rigid_again;
+    if (!ask_rigids(w, trouble) || !stage_solve(w, step, trouble)) return false;
+  }
+  step.rigid_again = false;
+  // What is looked at from here on (the guard) sees how they truly move.
+  for (auto &o : w.obstacles) {
+    if (!o->rigid || o->rigid->group[o->rigid_body] == DFM_RIGID_STILL) continue;
+    const Pose from = shape_pose(*o, o->rigid->state[o->rigid_body]);
+    const Pose to = shape_pose(*o, o->rigid->next[o->rigid_body]);
+    step.obstacle_views[o->slot].velocity = (1 / step.h) * (to.position - from.position);
+    step.obstacle_views[o->slot].spin =
+        (1 / step.h) * rotation_vector(to.rotation * conjugate(from.rotation));
+    step.obstacle_views[o->slot].linear = {};
+  }
+  return true;
+}
+
+void keep_rigids(World &w, StepContext &step) {
+  for (auto &set : w.rigid_sets) {
+    // the share of their way that the guard has left
+    for (uint32_t i = 0; step.guard.motion < 1 && i < set->defs.size(); ++i) {
+      const dfm_rigid_state &from = set->state[i];
+      dfm_rigid_state &to = set->next[i];
+      const Quat q = slerp(rotation_of(from), rotation_of(to), step.guard.motion);
+      store3(to.position,
+             load3(from.position) + step.guard.motion * (load3(to.position) - load3(from.position)));
+      to.rotation[0] = q.x;
+      to.rotation[1] = q.y;
+      to.rotation[2] = q.z;
+      to.rotation[3] = q.w;
+    }
+    set->state.swap(set->next);
+    set->extra.swap(set->next_extra);
+    for (uint32_t i = 0; i < set->defs.size(); ++i)
+      for (uint32_t k = 0; k < 3; ++k) set->total[3 * i + k] += set->impulse[6 * i + k];
+    set->last_h = step.h;
+  }
+  if (!w.rigid_sets.empty())
+    for (auto &o : w.obstacles)
+      if (o->rigid) o->pose = shape_pose(*o, o->rigid->state[o->rigid_body]);
+}
+
+dfm_body_measure measure_rigid(const RigidSet &set, uint32_t i) {
+  const dfm_rigid_def &d = set.defs[i];
+  const dfm_rigid_state &s = set.state[i];
+  dfm_body_measure m{};
+  m.size = sizeof m;
+  m.mass = d.mass;
+  m.volume = m.rest_volume = solid_volume(d);
+  const Vec3 v = load3(s.velocity), w = load3(s.spin), L = in_axes(rotation_of(s), load3(d.inertia), w);
+  store3(m.com, load3(s.position));
+  store3(m.velocity, v);
+  store3(m.momentum, d.mass * v);
+  store3(m.angular, L);
+  m.kinetic = 0.5 * d.mass * norm2(v) + 0.5 * dot(w, L);
+  const double round =
+      d.shape == DFM_SHAPE_NONE ? 0 : d.radius + (d.shape == DFM_SHAPE_CAPSULE ? d.half_length : 0);
+  const double reach = d.shape == DFM_SHAPE_BOX ? norm(load3(d.half_size)) : round;
+  m.speed_max = norm(v) + norm(w) * reach;
+  for (uint32_t k = 0; k < 3; ++k) m.contact_impulse[k] = set.total[3 * i + k];
+  return m;
+}
+
+void set_rigid_state(Obstacle &o, const dfm_rigid_state &given) {
+  RigidSet &set = *o.rigid;
+  if (set.group[o.rigid_body] == DFM_RIGID_STILL)
+    fail(DFM_E_ARG, "rigid body '%s' is fixed; it cannot be put elsewhere", o.name.c_str());
+  if (!finite(reinterpret_cast<const double *>(&given), kStateValues))
+    fail(DFM_E_ARG, "rigid body '%s': the given state is not finite", o.name.c_str());
+  check_velocity("rigid body", o.name.c_str(), load3(given.velocity), load3(given.spin), 1);
+  check_place(*o.world, "rigid body", o.name.c_str(), largest_coordinate(given.position, 1, 3));
+  dfm_rigid_state &s = set.state[o.rigid_body];
+  s = given;
+  const Quat q = unit_quat(given.rotation);
+  s.rotation[0] = q.x;
+  s.rotation[1] = q.y;
+  s.rotation[2] = q.z;
+  s.rotation[3] = q.w;
+  for (auto &shape : o.world->obstacles)
+    if (shape->rigid == &set && shape->rigid_body == o.rigid_body) shape->pose = shape_pose(*shape, s);
+  ++o.world->placements;
+  values_changed(*o.world);
+}
+
+namespace {
+
+void check_joint(const RigidSet &set, uint32_t joint, dfm_status status) {
+  if (joint >= set.njoint)
+    fail(DFM_E_ARG, "there is no joint %u; the set of rigid body '%s' has %u", joint, set.defs[0].name,
+         set.njoint);
+  if (status != DFM_OK)
+    fail(DFM_E_ARG, "joint %u of the set of rigid body '%s' is neither hinge nor slider", joint,
+         set.defs[0].name);
+}
+
+}  // namespace
+
+void set_rigid_motor(RigidSet &set, uint32_t joint, double velocity, double max) {
+  if (!set.host.set_motor) fail(DFM_E_UNSUPPORTED, "rigid host '%s' has no motors", set.host_name.c_str());
+  if (!std::isfinite(velocity) || !(max >= 0 && std::isfinite(max)))
+    fail(DFM_E_ARG, "motor of joint %u: velocity %g and max %g must be finite, max not negative", joint,
+         velocity, max);
+  check_joint(set, joint, DFM_OK);
+  check_joint(set, joint, set.host.set_motor(set.self, joint, velocity, max, set.extra.data()));
+}
+
+void rigid_joint(RigidSet &set, uint32_t joint, double *position, double *rate, double *effort) {
+  if (!set.host.joint)
+    fail(DFM_E_UNSUPPORTED, "rigid host '%s' says nothing about its joints", set.host_name.c_str());
+  check_joint(set, joint, DFM_OK);
+  double p, r, e;
+  check_joint(set, joint, set.host.joint(set.self, set.state.data(), set.extra.data(), joint, &p, &r, &e));
+  if (position) *position = p;
+  if (rate) *rate = r;
+  if (effort) *effort = e;
+}
+
+}  // namespace dfm

@@ -1,0 +1,205 @@
+// Self contact. A body's surface touches itself where the effect is on for it:
+//
+//   the scene asks    contact.self, or "self_contact" among its effects; "auto": while the body folds so far
+//                     that it may (broad/self_watch.h)
+//   an effect needs   plan/plan.cpp: cutting, folding
+//   a filter rule     that names the body on both sides decides for this body, whatever the above say
+//
+// and where its model does not promise the effect itself. Contacts come behind those of pairs, body by body,
+// into the same solve; there both sides' weights fall on dofs of one body and are merged where they share
+// one, so the operator is exact (contact/rows.cpp).
+#include "step/self_contact.h"
+
+#include <algorithm>
+
+#include "ccd/toi_guard_motion.h"
+#include "geometry/pierce.h"
+#include "narrow/self_contact.h"
+#include "state/world.h"
+#include "step/context.h"
+#include "step/pair_table.h"
+#include "step/stages.h"
+
+namespace dfm {
+namespace {
+
+double median(std::vector<double> &v) {
+  if (v.empty()) return 0;
+  std::nth_element(v.begin(), v.begin() + std::ptrdiff_t(v.size() / 2), v.end());
+  return v[v.size() / 2];
+}
+
+// The last rule that names the body on both sides.
+uint8_t rule_of(const World &w, const Body &b, uint8_t otherwise) {
+  for (const FilterRule &rule : w.filters)
+    if (rule.between[0] == b.name && rule.between[1] == b.name)
+      otherwise = rule.collide ? DFM_SELF_ON : DFM_SELF_OFF;
+  return otherwise;
+}
+
+bool promises(const Body &b) {
+  const std::vector<std::string> words = effects(*b.model.type);
+  return std::find(words.begin(), words.end(), kSelfContact) != words.end() && b.model.works(kSelfContact);
+}
+
+SelfBody *self_body(StepContext &step, uint32_t slot) {
+  const auto at = std::lower_bound(step.self_bodies.begin(), step.self_bodies.end(), slot,
+                                   [](auto &s, uint32_t v) { return s->body->slot < v; });
+  return at != step.self_bodies.end() && (*at)->body->slot == slot ? at->get() : nullptr;
+}
+
+void find_tangled(SelfBody &b) {
+  const Surface &s = b.body->surface;
+  b.tangled.assign(s.nsurfel, 0);
+  b.looked = true;
+  b.list.near_triangles([&](uint32_t t, uint32_t u) {
+    const uint32_t *const c = &s.tri[3 * size_t{t}], *const d = &s.tri[3 * size_t{u}];
+    if (share_a_corner(c, d) || !(edges_pierce(s, t, s, u) || edges_pierce(s, u, s, t))) return;
+    for (int k = 0; k < 3; ++k) b.tangled[c[k]] = b.tangled[d[k]] = 1;
+  });
+}
+
+bool is_tangled(SelfBody &b, uint32_t surfel) {
+  if (!b.looked) find_tangled(b);
+  return b.tangled[surfel];
+}
+
+}  // namespace
+
+SelfBody::SelfBody(const Memory &m, const Body &b) : id(b.id), body(&b), list(m, b.surface) {
+  const Surface &s = b.surface;
+  rest.x = Array<double>(size_t{4} * s.nsurfel, 0.0, HookAllocator<double>(m));
+  const auto at = [&](uint32_t phyxel) { return load3(&b.p.rest[size_t{3} * phyxel]); };
+  for (uint32_t i = 0; i < s.nsurfel; ++i) {
+    Vec3 x;
+    s.each_phyxel(i, [&](uint32_t phyxel, double weight) { x += weight * at(phyxel); });
+    store3(&rest.x[4 * size_t{i}], x);
+  }
+  std::vector<double> cells;
+  for (size_t e = 0; e < b.edges.size(); e += 2) cells.push_back(norm(at(b.edges[e]) - at(b.edges[e + 1])));
+  rest.thin = 2 * std::max(s.median_edge, median(cells));
+}
+
+uint8_t asks_self_contact(const World &w) {
+  const bool listed =
+      std::find(w.asked_effects.begin(), w.asked_effects.end(), kSelfContact) != w.asked_effects.end();
+  return listed ? uint8_t{DFM_SELF_ON} : static_cast<uint8_t>(w.def.self_contact);
+}
+
+void choose_self_bodies(World &w, StepContext &step, SceneFacts &facts, std::vector<uint32_t> &used) {
+  facts.self = w.def.self_contact == DFM_SELF_ON;
+  const bool always = !self_asked_by(facts).empty();
+  facts.self_auto = w.def.self_contact == DFM_SELF_AUTO;
+  const uint8_t asked = always ? DFM_SELF_ON : facts.self_auto ? DFM_SELF_AUTO : DFM_SELF_OFF;
+  std::vector<std::unique_ptr<SelfBody>> before;
+  before.swap(step.self_bodies);
+  for (auto &b : w.bodies) {
+    const uint8_t when = rule_of(w, *b, asked);
+    if (promises(*b) || when == DFM_SELF_OFF) continue;
+    const auto same =
+        std::find_if(before.begin(), before.end(), [&](auto &s) { return s && s->id == b->id; });
+    step.self_bodies.push_back(same != before.end() ? std::move(*same)
+                                                    : std::make_unique<SelfBody>(w.memory(), *b));
+    SelfBody &self = *step.self_bodies.back();
+    if (when == DFM_SELF_ON) self.watch.reset();
+    else if (!self.watch)
+      self.watch = std::make_unique<SelfWatch>(w.memory(), b->surface, self.rest, self.list);
+    find_law(w, b->slot, b->slot, used);
+    for (const uint32_t law : used)
+      for (const std::string &e : effects(*w.laws[law]->type))
+        facts.offered.push_back({e, w.laws[law]->type->id});
+  }
+  facts.self_bodies = static_cast<unsigned>(step.self_bodies.size());
+}
+
+namespace {
+
+void switch_to(SelfBody &s, bool on) {
+  s.on = on;
+  s.list.set_wide(!on);
+}
+
+void count_self(World &w, StepContext &step) {
+  w.stats.self_bodies = static_cast<uint32_t>(
+      std::count_if(step.self_bodies.begin(), step.self_bodies.end(), [](auto &s) { return s->on; }));
+  w.stats.self_max = std::max(w.stats.self_max, w.stats.self_bodies);
+}
+
+// How fast a surfel goes to its end of the sub-step, as the solve left it.
+Vec3 velocity_after(const Body &b, uint32_t surfel) {
+  const double *const mean = b.dynamics->end().mean;
+  Vec3 sum;
+  b.surface.each_phyxel(
+      surfel, [&](uint32_t p, double weight) { sum += weight * load3(&mean[size_t(p) * kStride]); });
+  return sum;
+}
+
+}  // namespace
+
+void stage_self(World &w, StepContext &step) {
+  if (!w.plan.has(StageRole::finds_contacts)) step.contacts.clear();
+  const bool listed = w.plan.has(StageRole::lists_pairs);  // which has looked at the speeds
+  for (auto &s : step.self_bodies) {
+    const BodyView &view = step.body_views[s->body->slot];
+    s->looked = false;
+    if (view.asleep) continue;
+    switch_to(*s, !s->watch ||
+                      s->watch->near(step.h, w.offset, listed ? step.broad.speed(s->body->slot) : HUGE_VAL));
+    if (!s->on) continue;
+    s->list.update(step.h, w.offset);
+    SelfBody *const self = s.get();
+    const Tangled tangled = [self](uint32_t surfel) { return is_tangled(*self, surfel); };
+    find_self_contacts(view, s->rest, s->list.vertex_face(), s->list.edge_edge(), step.h, w.offset,
+                       w.plan.has(StageRole::guards) ? tangled : nullptr, step.lent, step.contacts);
+  }
+  count_self(w, step);
+}
+
+bool cover_self(World &w, StepContext &step) {
+  bool fresh = false;
+  for (auto &s : step.self_bodies) {
+    const Body &b = *s->body;
+    if (step.body_views[b.slot].asleep) continue;
+    const double change = step.guard.change[b.slot];
+    // A blow may fold within the sub-step what was far from itself before the solve.
+    if (!s->on &&
+        s->watch->meets(step.h, w.offset, change, [&](uint32_t surfel) { return velocity_after(b, surfel); }))
+      switch_to(*s, true);
+    if (s->on) s->list.cover(step.h, w.offset, change);
+    fresh |= s->joined != (s->on ? s->list.renewals() : 0);
+  }
+  if (fresh) count_self(w, step);
+  return fresh;
+}
+
+bool join_self(StepContext &step, const Array<Candidate> *pairs, Array<Candidate> &to) {
+  if (std::none_of(step.self_bodies.begin(), step.self_bodies.end(), [](auto &s) { return s->on; })) {
+    for (auto &s : step.self_bodies) s->joined = 0;
+    return false;
+  }
+  to.clear();
+  if (pairs) to.insert(to.end(), pairs->begin(), pairs->end());
+  for (auto &s : step.self_bodies) {
+    const uint32_t slot = s->body->slot;
+    s->joined = 0;
+    if (!s->on) continue;
+    for (const SelfPair &p : s->list.vertex_face()) to.push_back({slot, slot, p.a, p.b, kVertexFace, 0});
+    for (const SelfPair &p : s->list.edge_edge()) to.push_back({slot, slot, p.a, p.b, kEdgeEdge, 0});
+    s->joined = s->list.renewals();
+  }
+  return true;
+}
+
+double guarded_apart(World &w, StepContext &step, const Candidate &c) {
+  SelfBody &b = *self_body(step, c.slot_a);
+  const Surface &s = b.body->surface;
+  const bool edges = c.kind == kEdgeEdge;
+  const auto any = [&](const uint32_t *corner, int n) {
+    return std::any_of(corner, corner + n, [&](uint32_t surfel) { return is_tangled(b, surfel); });
+  };
+  const bool a_is = any(narrow::corners_of(s, edges ? 1 : 0, c.feature_a), edges ? 2 : 1);
+  const bool b_is = any(narrow::corners_of(s, edges ? 1 : 2, c.feature_b), edges ? 2 : 3);
+  return a_is && b_is ? 0 : self_apart(s, b.rest, ContactKind(c.kind), c.feature_a, c.feature_b, w.offset);
+}
+
+}  // namespace dfm

@@ -1,0 +1,49 @@
+// Bodies whose surfaces touch themselves: who they are, and what detection keeps of them. A world in which
+// none does has no stage for it.
+#pragma once
+#include <memory>
+
+#include "broad/self_list.h"
+#include "broad/self_watch.h"
+#include "geometry/views.h"
+#include "plan/plan.h"
+
+namespace dfm {
+
+struct StepContext;
+struct World;
+struct Body;
+
+struct SelfBody {
+  uint64_t id;
+  const Body *body;
+  SelfRest rest;
+  SelfList list;
+  std::unique_ptr<SelfWatch> watch;  // says when; null: always
+  bool on = false;                   // in this sub-step
+  // renewals of `list` that the guard's list was made of; 0: it is not in there
+  uint64_t joined = 0;
+  // [nsurfel] of a triangle that crosses another one at the start of the sub-step; where `looked`
+  Array<uint8_t> tangled;
+  bool looked = false;
+  SelfBody(const Memory &memory, const Body &b);
+};
+
+// DFM_SELF_*: what the world asks for (dfm_world_def.self_contact, or the effect in its list).
+uint8_t asks_self_contact(const World &w);
+// Of prepare(): fills step.self_bodies and what the plan is told of them; laws of the pairs of a body with
+// itself are found, `used` is scratch.
+void choose_self_bodies(World &w, StepContext &step, SceneFacts &facts, std::vector<uint32_t> &used);
+
+// Of the guard. Lists that do not cover the ways after the solve are made anew; true if any has changed since
+// it was joined.
+bool cover_self(World &w, StepContext &step);
+// Fills `to` with `pairs` (null: none) and behind them those of bodies with themselves; false: there are
+// none, and `to` is as it was.
+bool join_self(StepContext &step, const Array<Candidate> *pairs, Array<Candidate> &to);
+// m that the two features of a candidate of one body rest apart; 0 where the guard has nothing to keep:
+// they lie on each other at rest, or cross at the start of the sub-step, and what is through already
+// must be let out.
+double guarded_apart(World &w, StepContext &step, const Candidate &c);
+
+}  // namespace dfm

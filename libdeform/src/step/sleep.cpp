@@ -1,0 +1,313 @@
+// Sleep and waking.
+//
+//   end of a sub-step    a body whose points are all slower than sleep_speed, and within half of d_c of where
+//                        they were when its calm began, stays calm. Speed alone would let slow drift pass,
+//                        and never let a stiff body sleep that shivers by a nanometer an island sleeps when
+//                        all its bodies have been calm for sleep_time, none of its contacts slides or meets
+//                        an obstacle that moves or a rigid host's body, and nothing that is prescribed for
+//                        its bodies lies ahead
+//   asleep               x, contacts and their forces stay, v = 0; no stage works on the body. Detection
+//                        keeps its shape as a partner: pairs of which at least one side is awake, or an
+//                        obstacle that moves, are looked at as ever
+//   waking               a contact between such a pair, even one that is still open, wakes the whole island
+//                        before the sub-step goes on: the woken take the stages that the others have passed,
+//                        and detection looks again. So a woken body meets what comes with all of its own
+//                        dynamics, warm started by the contacts that it had when it fell asleep
+//
+// Everything is decided by the state alone, in the order of ids.
+#include "state/sleep.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "body/make_surface.h"
+#include "contact/reach.h"
+#include "narrow/narrow_phase.h"
+#include "state/world.h"
+#include "step/context.h"
+#include "step/stages.h"
+
+namespace dfm {
+namespace {
+
+constexpr double kStay = 0.5;  // of d_c
+constexpr double kForever = std::numeric_limits<double>::infinity();
+
+template <class Key>
+double last_time(const std::vector<Key> &keys) {
+  return keys.empty() ? -kForever : keys.back().t;
+}
+
+// From when on nothing that is prescribed for a body changes any more.
+double settled_from(const Body &b) {
+  double t = -kForever;
+  for (const Load &l : b.loads)
+    t = std::max(t, l.sine.amplitude[0] != 0 && l.sine.frequency != 0 ? kForever : last_time(l.keys));
+  for (const Spring &s : b.springs) t = std::max(t, last_time(s.keys));
+  for (const HeldMotion &m : b.motions) {
+    const bool swings = m.sine.frequency != 0 && norm2(load3(m.sine.amplitude)) != 0;
+    t = std::max(t, swings ? kForever : last_time(m.keys));
+  }
+  return t;
+}
+
+// Ids rise with the slots; slots themselves are renewed by prepare() only.
+uint32_t slot_of(const World &w, uint64_t id) {
+  const auto at = std::lower_bound(w.bodies.begin(), w.bodies.end(), id,
+                                   [](const auto &b, uint64_t value) { return b->id < value; });
+  return at != w.bodies.end() && (*at)->id == id ? static_cast<uint32_t>(at - w.bodies.begin()) : kNone;
+}
+
+bool asleep(const World &w, uint64_t id) {
+  const uint32_t i = slot_of(w, id);
+  return i != kNone && w.bodies[i]->slumber.asleep;
+}
+
+}  // namespace
+
+// Which bodies the stages of a sub-step work on, and whom contact impulses go to.
+void gather_active(World &w) {
+  StepContext &step = *w.steps;
+  step.active.clear();
+  step.sinks.clear();
+  for (uint32_t i = 0; i < w.bodies.size(); ++i) {
+    Body &b = *w.bodies[i];
+    step.body_views[i].asleep = b.slumber.asleep;
+    if (b.slumber.asleep) continue;
+    step.active.push_back(i);
+    step.sinks.push_back({step.body_views[i].first_node, b.surface.nsurfel, b.p.n, &b.surface,
+                          b.surfel_impulse.data(), b.dynamics->diagonal() ? b.p.impulse.data() : nullptr});
+  }
+  w.sleepers = static_cast<uint32_t>(w.bodies.size() - step.active.size());
+}
+
+void reserve_sleep(World &w, StepContext &step, uint32_t n) {
+  if (w.def.sleep) {
+    step.islands.reserve(n);
+    step.active.reserve(n);
+    step.woken.reserve(n);
+    step.stirred.reserve(n);
+  }
+}
+
+void rouse(World &w, std::span<const uint32_t> slots) {
+  StepContext &step = *w.steps;
+  // What time would have added to contacts that stay: their age, and the impulse that they pass on.
+  for (uint32_t m = 0; m < w.store.n; ++m) {
+    const uint32_t a = slot_of(w, w.store.id_a[m]);
+    if (w.store.touching[m] && a != kNone && w.bodies[a]->slumber.asleep &&
+        std::binary_search(slots.begin(), slots.end(), a))
+      w.store.dwell[m] += w.time - w.bodies[a]->slumber.since;
+  }
+  for (const uint32_t i : slots) {
+    Body &b = *w.bodies[i];
+    if (b.slumber.asleep) {
+      b.contact_impulse += (w.time - b.slumber.since) * b.slumber.force;
+      step.woken.push_back(i);
+    }
+    b.slumber = {};
+  }
+  if (!w.changed) gather_active(w);  // else prepare(w) does, whose views are out of date now
+}
+
+// The whole island, as its contacts stood when it fell asleep.
+void wake(World &w, Body &b) {
+  StepContext &step = *w.steps;
+  b.slumber.calm = 0;
+  if (!b.slumber.asleep) return;
+  step.islands.start(static_cast<uint32_t>(w.bodies.size()));
+  for (uint32_t m = 0; m < w.store.n; ++m) {
+    const uint32_t i = slot_of(w, w.store.id_a[m]), j = slot_of(w, w.store.id_b[m]);
+    if (i != kNone && j != kNone && w.bodies[i]->slumber.asleep && w.bodies[j]->slumber.asleep)
+      step.islands.join(i, j);
+  }
+  step.islands.finish();
+  const uint32_t k = step.islands.of[slot_of(w, b.id)];
+  rouse(w, {&step.islands.member[step.islands.begin[k]], step.islands.begin[k + 1] - step.islands.begin[k]});
+}
+
+void wake_all(World &w) {
+  StepContext &step = *w.steps;
+  for (auto &b : w.bodies) b->slumber.calm = 0;
+  if (w.sleepers == 0) return;
+  step.islands.start(static_cast<uint32_t>(w.bodies.size()));
+  step.islands.finish();
+  rouse(w, step.islands.member);  // of islands that no pair joins: all bodies, ascending
+}
+
+void wake_touching(World &w, uint64_t obstacle) {
+  for (uint32_t m = 0; m < w.store.n; ++m)
+    if (const uint32_t i = w.store.id_b[m] == obstacle ? slot_of(w, w.store.id_a[m]) : kNone; i != kNone)
+      wake(w, *w.bodies[i]);
+}
+
+// Nothing moves and nothing will: the sub-step would leave everything as it is. What a rigid host's bodies do
+// only the host knows.
+bool all_idle(const World &w, const StepContext &step) {
+  return w.sleepers > 0 && step.active.empty() && w.rigid_sets.empty() &&
+         std::none_of(step.obstacle_views.begin(), step.obstacle_views.end(),
+                      [](const ObstacleView &o) { return o.moves(); });
+}
+
+// At the end of a sub-step that has been committed; allocates nothing.
+void stage_sleep(World &w, StepContext &step) {
+  const double end = w.time + step.h;
+  step.woken.clear();
+  bool tired = false;
+  for (const uint32_t i : step.active) {
+    Body &b = *w.bodies[i];
+    const Phyxels &p = b.p;
+    double &calm = b.slumber.calm;
+    if (!(largest_norm(p.n, p.v.data(), nullptr) < w.def.sleep_speed)) {
+      calm = 0;
+    } else if (calm > 0 && largest_norm(p.n, p.x.data(), b.anchor.data()) <= kStay * w.offset) {
+      calm += step.h;
+    } else {
+      calm = step.h;
+      std::copy(p.x.begin(), p.x.end(), b.anchor.begin());
+    }
+    tired |= b.slumber.calm >= w.def.sleep_time;
+  }
+  if (!tired || end < last_time(w.gravity.keys)) return;
+
+  const size_t n = w.plan.touches() ? step.contacts.size() : 0;
+  step.islands.start(static_cast<uint32_t>(w.bodies.size()));
+  for (size_t i = 0; i < n; ++i)
+    if (!step.contacts[i].obstacle) step.islands.join(step.contacts[i].slot_a, step.contacts[i].slot_b);
+  step.islands.finish();
+  step.stirred.assign(step.islands.count, 0);
+  const double creep = w.def.contact_tolerance > 0 ? w.def.contact_tolerance : 1e-6;
+  for (const uint32_t i : step.active) {
+    const Body &b = *w.bodies[i];
+    if (!(b.slumber.calm >= w.def.sleep_time && settled_from(b) <= end)) step.stirred[step.islands.of[i]] = 1;
+  }
+  for (size_t i = 0; i < n; ++i) {
+    const ContactPoint &c = step.contacts[i];
+    const double *const l = &step.rows.impulse[3 * i];
+    // At the edge of its cone a contact may rest as well: sliding is what is faster than a contact that
+    // sticks may be left with.
+    const double s1 = step.state.vt[i], s2 = step.state.vt[step.state.stride + i];
+    const bool slides =
+        step.state.mode[i] != 1 && (l[1] != 0 || l[2] != 0) && s1 * s1 + s2 * s2 > creep * creep;
+    const bool pushed = c.obstacle && (w.obstacles[c.slot_b]->rigid || step.obstacle_views[c.slot_b].moves());
+    if (slides || pushed) step.stirred[step.islands.of[c.slot_a]] = 1;
+  }
+  bool any = false;
+  for (const uint32_t i : step.active)
+    if (!step.stirred[step.islands.of[i]]) {
+      fall_asleep(w, step, *w.bodies[i], end);
+      any = true;
+    }
+  if (any) gather_active(w);
+}
+
+void fall_asleep(World &w, StepContext &step, Body &b, double end) {
+  Phyxels &p = b.p;
+  Vec3 momentum, impulse;
+  double kinetic = 0;
+  for (uint32_t i = 0; i < p.n; ++i) {
+    const Vec3 v = load3(&p.v[size_t(i) * kStride]);
+    momentum += p.mass[i] * v;
+    kinetic += 0.5 * p.mass[i] * norm2(v);
+  }
+  w.stats.sleep_energy += kinetic;
+  store3(w.stats.sleep_momentum, load3(w.stats.sleep_momentum) + momentum);
+  std::fill(p.v.begin(), p.v.end(), 0.0);
+  std::fill(p.v_free.begin(), p.v_free.end(), 0.0);
+  gather_surface(b.surface, p.x.data(), p.v.data());  // detection goes on seeing it, where it stays
+  if (w.plan.touches())
+    for (uint32_t s = 0; s < b.surface.nsurfel; ++s) impulse += load3(&b.surfel_impulse[3 * size_t(s)]);
+  b.slumber = {true, 0, end, step.h, (1 / step.h) * impulse};
+  b.bound.known = false;
+}
+
+// Contacts of those who sleep go on behind the ones of this sub-step, in the order of their keys. last_report
+// belongs to `store`.
+void carry_sleepers(World &w, StepContext &step, uint32_t *touching, uint32_t *sticking) {
+  ContactStore &to = step.next_store;
+  const uint32_t own = to.n;
+  const double scale = w.store.h > 0 ? step.h / w.store.h : 0;  // impulses belong to a sub-step's length
+  const auto carry = [&](uint32_t from, uint32_t end) {
+    const auto copy = [=](const auto &source, auto &into, size_t width) {
+      into.insert(into.end(), source.begin() + std::ptrdiff_t(from * width),
+                  source.begin() + std::ptrdiff_t(end * width));
+    };
+    each_column(
+        [&](const ContactColumn &column, const auto &source, auto &into) {
+          if (column.carried && column.width != kOwnLength && column.width != kPerState)
+            copy(source, into, column.width);
+        },
+        w.store, to);
+    if (step.shares) copy(w.store.due.empty() ? w.store.area : w.store.due, to.due, 1);
+    each_report_column([&](size_t width, const auto &source, auto &into) { copy(source, into, width); },
+                       step.last_report, w.report);
+    if (to.nstate == w.store.nstate) copy(w.store.bristle, to.bristle, w.store.nstate);
+    else
+      for (uint32_t m = from; m < end; ++m)
+        for (uint32_t s = 0; s < to.nstate; ++s)
+          to.bristle.push_back(s < w.store.nstate ? w.store.bristle[size_t(w.store.nstate) * m + s] : 0);
+    to.n += end - from;
+  };
+  // While the same ones sleep they are the old store's tail, and go over as a whole.
+  uint32_t tail = w.store.n;
+  while (tail > 0 && sleeps(w, step, tail - 1) &&
+         (tail == w.store.n || w.store.key[tail - 1] < w.store.key[tail]))
+    --tail;
+  uint32_t before = 0;
+  while (before < tail && !sleeps(w, step, before)) ++before;
+  if (before == tail) {
+    carry(tail, w.store.n);
+  } else {
+    for (const uint32_t m : w.store.by_key)
+      if (sleeps(w, step, m)) carry(m, m + 1);
+  }
+  to.began.resize(to.n, 0);
+  to.by_key.resize(to.n);
+  w.report.n = to.n;
+  for (size_t i = size_t(3) * own; i < size_t(3) * to.n; ++i) to.impulse[i] *= scale;
+  std::copy(to.impulse.begin() + std::ptrdiff_t(size_t(3) * own), to.impulse.end(),
+            w.report.impulse.begin() + std::ptrdiff_t(size_t(3) * own));
+  for (uint32_t m = own; m < to.n; ++m) {
+    *touching += to.touching[m];
+    *sticking += to.impulse[size_t(3) * m] > 0 && w.report.mode[m] == 1;
+  }
+
+  // Two sorted runs: this sub-step's, which `match` takes meanwhile, and the carried, whose places
+  // are their order.
+  std::copy(to.by_key.begin(), to.by_key.begin() + own, step.match.begin());
+  for (uint32_t i = 0, m = own, k = 0; k < to.n; ++k)
+    to.by_key[k] = m == to.n || (i < own && to.key[step.match[i]] < to.key[m]) ? step.match[i++] : m++;
+}
+
+// Is a contact of the old store one of sleepers, which goes on as it is?
+bool sleeps(const World &w, const StepContext &step, uint32_t m) {
+  if (w.sleepers == 0) return false;
+  const uint32_t slot = step.last_report.contacts[m].slot_a;
+  return slot != kNone && w.bodies[slot]->slumber.asleep;
+}
+
+// Contacts that sleep stick: a hold that begins now counts them from now on.
+void hold_sleepers(World &w) {
+  for (uint32_t m = 0; m < w.store.n; ++m)
+    w.store.held[m] = w.store.impulse[size_t(3) * m] > 0 && asleep(w, w.store.id_a[m]);
+}
+
+// Before the world forgets a body or an obstacle: whom it touched wakes, and the contacts of those who sleep
+// on name slots that move up.
+void close_slot(World &w, uint64_t id, bool obstacle) {
+  const auto thing =
+      std::find_if(w.obstacles.begin(), w.obstacles.end(), [&](auto &o) { return o->id == id; });
+  const uint32_t slot = obstacle ? static_cast<uint32_t>(thing - w.obstacles.begin()) : slot_of(w, id);
+  if (obstacle) wake_touching(w, id);
+  else wake(w, *w.bodies[slot]);
+  if (w.sleepers == 0) w.report.n = 0;
+  for (ContactPoint &c : w.report.contacts) {
+    // touches no more, and is nobody's until the next sub-step drops it
+    if (!obstacle && c.slot_a == slot) c.slot_a = kNone;
+    else if (!obstacle && c.slot_a > slot && c.slot_a != kNone) --c.slot_a;
+    if (bool(c.obstacle) == obstacle && c.slot_b > slot) --c.slot_b;
+  }
+}
+
+}  // namespace dfm

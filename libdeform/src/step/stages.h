@@ -1,0 +1,102 @@
+// The stages of a sub-step, and what they share. The table of the contact method has their order
+// (step/method.h). False: the sub-step cannot be taken; `trouble` and dfm_last_error() say why, and nothing
+// of it has been committed.
+#pragma once
+#include <cstdint>
+#include <memory>
+#include <span>
+
+#include "broad/broad_phase.h"
+#include "deform/world.h"
+#include "dynamics/dynamics.h"
+#include "math/vec3.h"
+#include "plan/plan.h"
+#include "state/world_bound.h"
+
+namespace dfm {
+
+struct Body;
+struct LawInstance;
+struct StepContext;
+struct World;
+
+// What prepare() would choose anew and a restored world keeps: it was chosen at a state that is past.
+struct RestoredChoice {
+  Vec3 gravity;
+  WorldBound bound;
+  double offset;
+};
+// Plan, pair tables, offset, views of the entities; where nothing has changed it does nothing. Throws Error.
+void prepare(World &w, const RestoredChoice *restored = nullptr);
+// After a change of values that no table depends on: loads, motions, gravity, parameters of a model or of
+// a law. The step bound is asked for anew and the energy books begin anew; the plan is looked at in the
+// next prepare().
+void values_changed(World &w);
+void set_gravity_now(World &w);  // from what is prescribed, at the present time
+dfm_status run_step(World &w, StepContext &step, double dt, uint32_t *trouble);
+
+// The rows of the table: what a stage reads and writes of world and context stands in step.cpp.
+namespace row {
+bool motion(World &w, StepContext &step, uint32_t *trouble);
+bool model(World &w, StepContext &step, uint32_t *trouble);
+bool predict(World &w, StepContext &step, uint32_t *trouble);
+bool gather(World &w, StepContext &step, uint32_t *trouble);
+bool broad(World &w, StepContext &step, uint32_t *trouble);
+bool self(World &w, StepContext &step, uint32_t *trouble);
+bool distribute(World &w, StepContext &step, uint32_t *trouble);
+bool sleep(World &w, StepContext &step, uint32_t *trouble);
+}  // namespace row
+
+using Active = std::span<const uint32_t>;  // slots of the bodies that stages work on, ascending
+// A held component of a velocity that this sub-step has set.
+struct Driven { double *velocity, before; };
+
+void stage_motion(World &w, double h, Array<Driven> &driven);
+void undo_motion(Array<Driven> &driven);  // held velocities as before stage_motion()
+bool stage_model(World &w, Active active, const SubStep &now, uint32_t *trouble);
+// kinetic: [bodies] J, of the active ones, out.
+bool stage_predict(World &w, Active active, const SubStep &now, Array<double> &kinetic, uint32_t *trouble);
+bool stage_rigid_predict(World &w, StepContext &step, uint32_t *trouble);  // rigid.cpp
+void stage_gather(World &w, Active active);
+void stage_broad(std::span<const BodyView> bodies, std::span<const ObstacleView> obstacles,
+                 const PairFilter &filter, double h, double offset, BroadPhase &out);
+bool stage_narrow(World &w, StepContext &step, uint32_t *trouble);  // narrow.cpp
+void stage_self(World &w, StepContext &step);                       // self_contact.cpp
+bool stage_solve(World &w, StepContext &step, uint32_t *trouble);   // solve.cpp
+// rigid.cpp: ends beside the present states, kept by keep_rigids()
+bool stage_rigid_commit(World &w, StepContext &step, uint32_t *trouble);
+bool stage_guard(World &w, StepContext &step, uint32_t *trouble);  // guard.cpp
+bool stage_commit(World &w, StepContext &step, uint32_t *trouble);
+void stage_sleep(World &w, StepContext &step);  // sleep.cpp
+
+SubStep sub_step_of(const World &w, const StepContext &step);
+// Where all active bodies end with the impulses that have been distributed, beside their present states.
+bool find_ends(World &w, StepContext &step, uint32_t *trouble);
+void keep_rigids(World &w, StepContext &step);  // once the sub-step is known to succeed
+
+// solve.cpp
+void make_rows(World &w, StepContext &step);  // contacts as rows, with what they kept
+// to dfm_last_error(), null: not finite; which trouble that is
+uint32_t tell_failed_solve(World &w, StepContext &step, const LawInstance *law);
+void reserve_contacts(World &w, StepContext &step);  // memory for keep_contacts()
+void keep_contacts(World &w, StepContext &step);     // store, events, hold, work, report; allocates nothing
+// all, with their events, where no stage of a plan looks after them
+void end_contacts(World &w);
+void reserve_events(World &w, size_t more);
+void add_event(World &w, uint32_t kind, uint64_t a, uint64_t b, uint64_t key, double t);  // a, b: ids
+
+// sleep.cpp
+void gather_active(World &w);
+// waking and falling asleep allocate nothing, and cannot fail
+void reserve_sleep(World &w, StepContext &step, uint32_t n);
+void wake(World &w, Body &b);  // and its island
+void wake_all(World &w);
+void wake_touching(World &w, uint64_t obstacle);
+bool all_idle(const World &w, const StepContext &step);
+bool sleeps(const World &w, const StepContext &step, uint32_t m);  // a contact of the store
+void carry_sleepers(World &w, StepContext &step, uint32_t *touching, uint32_t *sticking);
+void close_slot(World &w, uint64_t id, bool obstacle);
+void fall_asleep(World &w, StepContext &step, Body &b, double end);
+void hold_sleepers(World &w);  // hold_begin() while contacts sleep
+
+}  // namespace dfm

@@ -1,0 +1,251 @@
+// One step, from top to bottom:
+//
+//   bound                            when it is due: sizes of the sub-steps (step_bound.cpp, step_sizes.cpp)
+//   sub-steps                        run_step(): equal ones, cut finer where the bound has fallen
+//     pieces                         advance(), piece(): shorter where the guard asks for it
+//       stages                       sub_step(): all rows of the method's table that the plan has
+//                                    chosen, or none
+//         waking                     narrow runs model to broad again for who has been woken (narrow.cpp)
+//         a rigid host's revision    solve, again, where a motor lets go; rigid commit, where a host asks for
+//                                    another solve (rigid.cpp)
+//         hits                       guard runs solve and distribute again with what would cross (guard.cpp)
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <utility>
+
+#include "core/error.h"
+#include "state/bounds.h"
+#include "state/world.h"
+#include "step/context.h"
+#include "step/energy_watch.h"
+#include "step/method.h"
+#include "step/move_obstacles.h"
+#include "step/overlap.h"
+#include "step/stage_costs.h"
+#include "step/stages.h"
+#include "step/step_bound.h"
+#include "step/step_impulses.h"
+
+namespace dfm {
+namespace {
+
+constexpr Stage kTable[] = {
+    {"motion", row::motion, cost::prescribed, when::motion},
+    {"model", row::model, cost::cells, when::model},
+    {"predict", row::predict, cost::points, when::predict},
+    {"rigid predict", stage_rigid_predict, cost::rigid_states, when::rigid_predict},
+    {"gather", row::gather, cost::weights, when::gather},
+    {"broad", row::broad, cost::surfels_and_triangles, when::broad, StageRole::lists_pairs},
+    {"narrow", stage_narrow, cost::candidates, when::narrow, StageRole::finds_contacts},
+    {"self contact", row::self, cost::self_surfels, when::self},
+    {"contact+friction", stage_solve, cost::contacts_and_sweeps, when::solve, StageRole::solves},
+    {"rigid commit", stage_rigid_commit, cost::rigid_states, when::rigid_commit},
+    {"distribute", row::distribute, cost::contacts_and_surfels, when::distribute, StageRole::gives_impulses},
+    {"guard", stage_guard, cost::candidates_near, when::guard, StageRole::guards},
+    {"commit", stage_commit, cost::points, when::commit},
+    {"sleep", row::sleep, cost::awake, when::sleep},
+};
+constexpr ContactMethod kVelocity{"velocity", kTable};
+
+// A row of the method's table, timed and traced.
+bool run(size_t row, World &w, StepContext &step, uint32_t *trouble) {
+  const Stage &stage = w.method->table[row];
+  struct Timer {
+    const Stage &stage;
+    World &w;
+    StageTime &time;
+    std::chrono::steady_clock::time_point start = std::chrono::steady_clock::now();
+    ~Timer() {
+      w.context->trace_end(stage.name);
+      time.seconds += std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+      ++time.calls;
+    }
+  };
+  w.context->trace_begin(stage.name);
+  const Timer timer{stage, w, step.stage_times[row]};
+  return stage.run(w, step, trouble);
+}
+
+bool advance(World &w, StepContext &step, double end, double goal, bool last, uint32_t *trouble);
+bool piece(World &w, StepContext &step, uint32_t *trouble);
+bool sub_step(World &w, StepContext &step, uint32_t *trouble);
+
+}  // namespace
+
+const ContactMethod &velocity_method() { return kVelocity; }
+
+namespace row {
+
+bool motion(World &w, StepContext &step, uint32_t *) {
+  stage_motion(w, step.h, step.driven);
+  return true;
+}
+bool model(World &w, StepContext &step, uint32_t *trouble) {
+  return stage_model(w, step.active, sub_step_of(w, step), trouble);
+}
+bool predict(World &w, StepContext &step, uint32_t *trouble) {
+  return stage_predict(w, step.active, sub_step_of(w, step), step.free_kinetic, trouble) &&
+         watch_energy(w, step, trouble);
+}
+bool gather(World &w, StepContext &step, uint32_t *) {
+  stage_gather(w, step.active);
+  return true;
+}
+bool broad(World &w, StepContext &step, uint32_t *) {
+  stage_broad(step.body_views, step.obstacle_views, w.pairs.filter, step.h, w.offset, step.broad);
+  return true;
+}
+bool self(World &w, StepContext &step, uint32_t *) {
+  stage_self(w, step);
+  return true;
+}
+bool distribute(World &, StepContext &step, uint32_t *) {
+  step.ended = false;
+  dfm::distribute(step.contacts, step.rows.frame.data(), step.rows.impulse.data(), step.sinks);
+  return true;
+}
+bool sleep(World &w, StepContext &step, uint32_t *) {
+  stage_sleep(w, step);
+  return true;
+}
+
+}  // namespace row
+
+dfm_status run_step(World &w, StepContext &step, double dt, uint32_t *trouble) {
+  prepare(w);
+  check_target_speeds(w, dt);
+  release_overlaps(w);
+  if (!std::exchange(w.overlaps.told, true)) *trouble |= DFM_TROUBLE_OVERLAP;
+  if (bound_due(w)) update_bound(w);
+  const double needed =
+      std::ceil(dt / w.bound.step - 1e-9);  // stable is infinite where nothing bounds the step
+  if (!(needed <= w.def.max_substeps)) {
+    set_last_error(
+        format("a step of %g s needs %g sub-steps of %g s (max_substeps %u): soften or coarsen body '%s', "
+               "whose point %u bounds the step, lower its damping, or take a shorter step",
+               dt, needed, w.bound.step, w.def.max_substeps, w.bound.body ? w.bound.body->name.c_str() : "?",
+               w.bound.point)
+            .c_str());
+    *trouble |= DFM_TROUBLE_SUBSTEPS;
+    return DFM_DISCARD;
+  }
+  const StepSizes before = w.sizes;
+  const uint32_t n =
+      static_cast<uint32_t>(std::min<double>(w.def.max_substeps, choose_pieces(w.sizes, dt, w.bound.step)));
+  w.watch.new_size = earned(before, w.sizes, w.bound.step);
+  plan_work(w, step, n);
+  if (n > 1) *trouble |= DFM_TROUBLE_SUBSTEPS;
+  if (w.bound.inverted) *trouble |= DFM_TROUBLE_INVERTED;
+
+  begin_impulses(w.step_impulses);
+  const double goal = w.time + dt;
+  // `cut` equal sub-steps since `from`; the rest of the step is cut finer where the bound has fallen
+  double from = w.time, span = dt;
+  uint32_t cut = n, done = 0;
+  for (uint32_t k = 0; k < cut; ++k, ++done) {
+    if (bound_due(w)) {
+      update_bound(w);
+      if (w.bound.inverted) *trouble |= DFM_TROUBLE_INVERTED;
+      const double more = (cut - k) * cut_finer(w.sizes, span / cut, w.bound.step);
+      if (!(done + more <= w.def.max_substeps)) {
+        set_last_error(format("step %llu: the shape of body '%s' has changed so much that the rest of the "
+                              "step needs %g sub-steps of %g s (max_substeps %u); take a shorter step",
+                              static_cast<unsigned long long>(w.step_count),
+                              w.bound.body ? w.bound.body->name.c_str() : "?",
+                              std::ceil((goal - w.time) / w.bound.step), w.bound.step, w.def.max_substeps)
+                           .c_str());
+        return DFM_E_DIVERGED;
+      }
+      if (more > cut - k) {
+        from = w.time;
+        span = goal - w.time;
+        cut = static_cast<uint32_t>(more);
+        k = 0;
+        w.watch.new_size = true;
+        *trouble |= DFM_TROUBLE_SUBSTEPS;
+      }
+    }
+    const bool last = k + 1 == cut;
+    const double end = last ? goal : from + span * (double(k + 1) / cut);
+    if (!advance(w, step, end, goal, last, trouble)) return DFM_E_DIVERGED;
+    pass(w.sizes);
+  }
+  w.stats.last_substeps = done;
+  w.stats.substeps_max = std::max(w.stats.substeps_max, done);
+  ++w.step_count;
+  w.stats.steps = w.step_count;
+  w.stats.time = w.time;
+  return DFM_OK;
+}
+
+namespace {
+
+// One planned sub-step, up to `end`: as a whole, or in the pieces that the guard cuts it into. last: of the
+// step, which ends at `goal`.
+bool advance(World &w, StepContext &step, double end, double goal, bool last, uint32_t *trouble) {
+  step.guard.pieces = 0;
+  step.guard.motion = 1;
+  step.guard.planned = end - w.time;
+  for (bool whole = false; !whole;) {
+    const double rest = step.h = end - w.time;
+    step.left = goal - w.time;
+    // waking changes what a later failure must put back
+    if (step.h < step.left || (w.def.sleep && !all_idle(w, step))) keep_start(w, step);
+    charge(w, step, 1);
+    view_obstacles(w, step);
+    if (all_idle(w, step)) {
+      w.stats.contacts_mean += (w.stats.contacts - w.stats.contacts_mean) / double(w.stats.substeps + 1);
+      w.step_impulses.idle += step.h;
+    } else if (!piece(w, step, trouble)) return false;
+    whole = step.h == rest;
+    if (step.guard.motion < 1) move_obstacles_by(w, step, step.guard.motion);
+    else move_obstacles(w, step, whole && last);
+    w.time = whole ? end : w.time + step.h;
+    ++w.stats.substeps;
+    ++w.bound.age;
+  }
+  return true;
+}
+
+// Shortens h until the guard has nothing against it.
+bool piece(World &w, StepContext &step, uint32_t *trouble) {
+  const uint32_t before = *trouble;
+  const uint64_t unconverged = w.stats.unconverged;
+  step.guard.acted = false;
+  while (!sub_step(w, step, trouble)) {
+    if (!step.guard.again) return false;
+    step.h *= step.guard.cut;
+    keep_start(w, step);
+    *trouble = before;
+    w.stats.unconverged = unconverged;
+    view_obstacles(w, step);
+  }
+  w.stats.guard_steps += step.guard.acted;
+  step.guard.memory.keep();
+  return true;
+}
+
+// All stages, or none: where one fails or throws, the state is that of the sub-step before.
+bool sub_step(World &w, StepContext &step, uint32_t *trouble) {
+  struct Undo {
+    World &w;
+    StepContext &step;
+    bool kept = false;
+    ~Undo() {
+      if (!kept) undo_motion(step.driven);
+    }
+  } undo{w, step};
+  step.driven.clear();
+  step.guard.start();
+  step.ended = false;
+  charge(w, step, body_work(w, step) + surface_work(w, step));
+  for (const PlannedStage &planned : w.plan.stages)
+    if (!run(planned.row, w, step, trouble)) return false;
+  keep_rigids(w, step);
+  return undo.kept = true;
+}
+
+}  // namespace
+
+}  // namespace dfm

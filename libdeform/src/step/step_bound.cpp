@@ -1,0 +1,70 @@
+#include "step/step_bound.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "core/error.h"
+#include "state/spring.h"
+#include "state/world.h"
+
+namespace dfm {
+namespace {
+
+// The bound depends on the state (volume terms stiffen as cells grow, tilted springs as they stretch). 0.9 of
+// it is used, which pays for what a shape changes by about a twentieth of its lengths; so it is asked for
+// again after 16 sub-steps, sooner where the edges stretch faster.
+constexpr uint32_t kBoundEvery = 16;
+constexpr double kBoundShare = 0.9, kBoundStrain = 0.05;
+
+uint32_t inverted_cells(const Body &b) {
+  uint32_t n = 0;
+  for (size_t t = 0; t < b.tets.size(); t += 4) n += tet_volume(b.p.x.data(), kStride, &b.tets[t]) < 0;
+  return n;
+}
+
+// 1/s, of the edge that stretches fastest.
+double ask_bound(World &w, Body &b) {
+  b.bound = {true, {}, inverted_cells(b)};
+  const auto springs = [&b](double *stiffness, double *damping) {
+    for (const Spring &spring : b.springs) add_spring_bound(spring, stiffness, damping);
+  };
+  if (!b.dynamics->bound(w.time, springs, b.bound.found))
+    fail(DFM_E_FATAL, "model '%s' of body '%s' gives no step bound", b.model.type->id, b.name.c_str());
+  return b.bound.found.strain_rate;
+}
+
+}  // namespace
+
+bool bound_due(const World &w) { return w.bound.age >= kBoundEvery; }
+
+void update_bound(World &w) {
+  w.bound.step = std::numeric_limits<double>::infinity();
+  w.bound.body = nullptr;
+  w.bound.point = 0;
+  w.bound.inverted = 0;
+  uint32_t limited = 0;
+  double fastest = 0;
+  for (auto &b : w.bodies) {
+    const bool stays = b->slumber.asleep && b->bound.known;
+    // who sleeps counts too: the step must not change when it wakes
+    if (!stays) fastest = std::max(fastest, ask_bound(w, *b));
+    w.bound.inverted += b->bound.inverted;
+    limited += b->model.limited_cells();
+    const StepBound &found = b->bound.found;
+    if (found.step < w.bound.step) {
+      w.bound.step = found.step;
+      w.bound.body = b.get();
+      w.bound.point = found.point;
+    }
+  }
+  w.bound.step *= kBoundShare;
+  w.stats.stable_step = w.bound.step;
+  w.stats.inverted_max = std::max(w.stats.inverted_max, w.bound.inverted);
+  w.stats.limited_max = std::max(w.stats.limited_max, limited);
+  const double keeps = kBoundStrain / (fastest * w.bound.step);  // sub-steps
+  w.bound.age =
+      keeps >= kBoundEvery || !(fastest > 0) ? 0 : kBoundEvery - static_cast<uint32_t>(std::max(1.0, keeps));
+}
+
+}  // namespace dfm

@@ -1,0 +1,12 @@
+// The bound of the step: the longest sub-step at which no mode of any body grows (doc/concepts/step.md).
+#pragma once
+#include "state/world_bound.h"
+
+namespace dfm {
+
+struct World;
+
+bool bound_due(const World &w);  // does the next sub-step ask for it?
+void update_bound(World &w);     // w.bound
+
+}  // namespace dfm

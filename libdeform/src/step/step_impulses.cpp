@@ -1,0 +1,78 @@
+#include "step/step_impulses.h"
+
+#include <algorithm>
+#include <utility>
+
+#include "state/world.h"
+#include "step/context.h"
+#include "step/stages.h"
+
+namespace dfm {
+namespace {
+
+StepImpulses::Pair &pair_of(Array<StepImpulses::Pair> &pairs, uint64_t a, uint64_t b) {
+  const auto before = [](const StepImpulses::Pair &p, const std::pair<uint64_t, uint64_t> &key) {
+    return std::pair(p.a, p.b) < key;
+  };
+  auto at = std::lower_bound(pairs.begin(), pairs.end(), std::pair(a, b), before);
+  if (at == pairs.end() || at->a != a || at->b != b) {
+    StepImpulses::Pair fresh{};
+    fresh.a = a;
+    fresh.b = b;
+    at = pairs.insert(at, fresh);
+  }
+  return *at;
+}
+
+// The report's forces for `time`, s, added to pairs; a peak is the mean over this time.
+void add(const World &w, double time, Array<StepImpulses::Pair> &pairs) {
+  const double scale = w.report.h > 0 ? time / w.report.h : 0;
+  for (StepImpulses::Pair &p : pairs) {
+    p.now = {};
+    p.now_normal = 0;
+  }
+  StepImpulses::Pair *pair = nullptr;  // contacts of a pair stand side by side
+  for (uint32_t i = 0; i < w.report.n; ++i) {
+    const double *const l = &w.report.impulse[size_t(3) * i], *const f = &w.report.frame[size_t(9) * i];
+    if (!(l[0] > 0)) continue;
+    const ContactPoint &c = w.report.contacts[i];
+    uint64_t a = w.bodies[c.slot_a]->id, b = c.obstacle ? w.obstacles[c.slot_b]->id : w.bodies[c.slot_b]->id;
+    const bool turned = !c.obstacle && b < a;
+    if (turned) std::swap(a, b);
+    if (!pair || pair->a != a || pair->b != b) pair = &pair_of(pairs, a, b);
+    const double normal = scale * l[0];
+    if (a != b)
+      pair->now += (turned ? -scale : scale) * (l[0] * load3(f) + l[1] * load3(f + 3) + l[2] * load3(f + 6));
+    pair->now_normal += normal;
+    pair->place += normal * load3(c.point);
+  }
+  for (StepImpulses::Pair &p : pairs) {
+    if (!(p.now_normal > 0)) continue;
+    p.impulse += p.now;
+    p.normal += p.now_normal;
+    p.touching += time;
+    p.peak_normal = std::max(p.peak_normal, p.now_normal / time);
+    p.peak_force = std::max(p.peak_force, norm(p.now) / time);
+  }
+}
+
+}  // namespace
+
+void begin_impulses(StepImpulses &s) {
+  s.pairs.clear();
+  s.idle = 0;
+}
+
+void reserve_impulses(World &w, uint32_t contacts) {
+  Array<StepImpulses::Pair> &pairs = w.step_impulses.pairs;
+  pairs.reserve(std::min(pairs.size() + contacts, w.bodies.size() * (w.bodies.size() + w.obstacles.size())));
+}
+
+void add_impulses(World &w) { add(w, w.report.h, w.step_impulses.pairs); }
+
+void list_impulses(const World &w, Array<StepImpulses::Pair> &out) {
+  out = w.step_impulses.pairs;
+  if (w.step_impulses.idle > 0) add(w, w.step_impulses.idle, out);
+}
+
+}  // namespace dfm

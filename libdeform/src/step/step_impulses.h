@@ -1,0 +1,16 @@
+// What contact did between two things over the whole last step: sums and peaks over its sub-steps. The
+// report holds the last sub-step alone, so a blow that begins and ends within a step, or peaks before its
+// end, is not in it.
+#pragma once
+#include "state/impulses.h"
+
+namespace dfm {
+
+struct World;
+
+void begin_impulses(StepImpulses &s);
+void reserve_impulses(World &w, uint32_t contacts);  // so that add_impulses() cannot fail
+void add_impulses(World &w);                         // of the sub-step that the report holds
+void list_impulses(const World &w, Array<StepImpulses::Pair> &out);
+
+}  // namespace dfm

@@ -1,0 +1,136 @@
+#include "state/step_sizes.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <limits>
+#include <random>
+
+using namespace dfm;
+
+namespace {
+
+// Sub-steps taken; sizes that differ from the one before.
+struct Count {
+  uint64_t substeps = 0, changes = 0;
+  double last = 0;
+};
+
+void step(StepSizes &s, double dt, double stable, Count &c) {
+  const double n = choose_pieces(s, dt, stable);
+  ASSERT_LE(dt / n, stable * (1 + 1e-8));
+  const double size = dt / n;
+  if (c.last > 0 && std::fabs(size - c.last) > 1e-9 * size) ++c.changes;
+  c.last = size;
+  for (uint64_t i = 0; i < uint64_t(n); ++i) pass(s);
+  c.substeps += uint64_t(n);
+}
+
+}  // namespace
+
+TEST(StepSizes, FixedStep_IsCutIntoNumbersOfAShortList) {
+  for (double q = 0.01; q < 3000; q *= 1.013) {
+    StepSizes s;
+    const double n = choose_pieces(s, q, 1);
+    EXPECT_GE(n, q - 1e-6);
+    EXPECT_LE(n, std::max(1.0, q + 1) * 1.25);
+    int e;
+    const double m = std::frexp(n, &e) * 8;  // 4 to 8: three bits are enough
+    EXPECT_EQ(m, std::floor(m)) << n;
+  }
+  for (const double n : {1, 2, 3, 4, 5, 6, 7, 8, 10, 12, 14, 16, 20, 24, 28, 32}) {
+    StepSizes s;
+    EXPECT_EQ(choose_pieces(s, n, 1), n) << "what divides evenly is not cut finer";
+  }
+}
+
+TEST(StepSizes, OfferedStep_IsARungNotAboveTheStableOneAndNotCut) {
+  for (double stable = 1e-9; stable < 10; stable *= 1.017) {
+    StepSizes s;
+    const double offer = offered_step(s, stable);
+    EXPECT_LE(offer, stable);
+    EXPECT_GE(offer, 0.8 * stable);
+    EXPECT_EQ(choose_pieces(s, offer, stable), 1);
+    EXPECT_EQ(offered_step(s, stable), offer);
+  }
+  const double none = std::numeric_limits<double>::infinity();
+  EXPECT_EQ(offered_step({}, none), none);
+  StepSizes s;
+  EXPECT_EQ(choose_pieces(s, 5, none), 1);
+}
+
+// A bound that wobbles by 30 % for ever, at any period: sizes change with the logarithm of the number of
+// sub-steps, then once in some 1e4.
+TEST(StepSizes, BoundThatSwings_ChangesThemEverMoreRarely) {
+  for (const bool fed_back : {false, true})
+    for (const double period : {2.0, 31.0, 700.0, 9000.0, 2e5}) {
+      StepSizes s;
+      Count c;
+      for (int i = 0; i < 400000; ++i) {
+        const double stable = 1e-4 * (1 + 0.3 * std::sin(6.283 * i / period));
+        step(s, fed_back ? offered_step(s, stable) : 3.1e-4, stable, c);
+      }
+      EXPECT_LE(c.changes, 60 + 4 * c.substeps / kMostPatience) << fed_back << ' ' << period;
+    }
+}
+
+TEST(StepSizes, BoundOfNoise_ChangesThemRarely) {
+  std::mt19937 random(3);
+  StepSizes s;
+  Count c;
+  for (int i = 0; i < 1000000; ++i) {
+    const double stable = 1e-4 * (1 - 0.4 * double(random()) / 4294967296.0);
+    step(s, offered_step(s, stable), stable, c);
+  }
+  EXPECT_LE(c.changes, 40u);
+}
+
+TEST(StepSizes, AfterADeepDip_RecoverSoon) {
+  StepSizes s;
+  Count c;
+  for (int dip = 0; dip < 12; ++dip) {
+    step(s, 1, 1e-3, c);  // patience has grown to its end after these
+    const uint64_t start = c.substeps;
+    for (int i = 0; i < 100 && c.last < 0.5; ++i) step(s, 1, 1, c);
+    EXPECT_GE(c.last, 0.5) << dip;
+    EXPECT_LE(c.substeps - start, 4000u) << dip;
+  }
+}
+
+// Frames of uneven length that a host measures: the number of sub-steps stays, their sizes vary no more
+// than the frames.
+TEST(StepSizes, FramesThatDifferALittle_KeepTheirNumberOfSubSteps) {
+  std::mt19937 random(5);
+  StepSizes s;
+  double last = 0, changed = 0;
+  for (int i = 0; i < 10000; ++i) {
+    const double dt = (1 + 0.03 * (double(random()) / 2147483648.0 - 1)) / 60;
+    const double stable = 1.3e-3 * (1 + 0.02 * std::sin(0.1 * i));
+    const double n = choose_pieces(s, dt, stable);
+    changed += last > 0 && n != last;
+    last = n;
+    for (int k = 0; k < int(n); ++k) pass(s);
+  }
+  EXPECT_LE(changed, 8);
+}
+
+TEST(StepSizes, BoundThatFallsInAStep_HalvesItsSubSteps) {
+  StepSizes s;
+  EXPECT_EQ(choose_pieces(s, 6, 1), 6);
+  EXPECT_EQ(cut_finer(s, 1, 0.97), 2);
+  EXPECT_EQ(choose_pieces(s, 6, 0.97), 12) << "the next step goes on with the same size";
+  EXPECT_EQ(cut_finer(s, 0.5, 0.97), 1);
+  EXPECT_GE(cut_finer(s, 1, 0), 1e15) << "no number of sub-steps is enough";
+}
+
+TEST(StepSizes, StateThatNoWorldComesTo_IsTold) {
+  EXPECT_TRUE(sound(StepSizes{}));
+  for (int bad = 0; bad < 4; ++bad) {
+    StepSizes s;
+    if (bad == 0) s.cut.size = NAN;
+    if (bad == 1) s.offer.size = -1;
+    if (bad == 2) s.cut.patience = 0;
+    if (bad == 3) s.offer.calm = kMostPatience + 1;
+    EXPECT_FALSE(sound(s)) << bad;
+  }
+}
