@@ -113,7 +113,7 @@ BAD = {
     "layers": [("libdeform/src/core/error.h", '#include "math/vec3.h"\n'),
                ("libdeform/src/broad/tree.cpp", '#include "narrow/pair.h"\n'),
                ("libdeform/src/broad/tree.cpp", '#include "../core/error.h"\n'),
-               ("libdeform/src/scene/reader.h", '#include "api/guard.h"\n'),
+               ("libdeform/src/scene/reader.h", '#include "api/as_status.h"\n'),
                ("libdeform/src/mesh/a.h", '=#include "plugin/loader.h"\n'),
                ("libdeform/src/plan/a.h", '=#include <state/world.h>\n'),
                ("libdeform/src/contact/a.h", '=#include "dynamics/dynamics.h"\n')],

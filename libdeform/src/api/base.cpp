@@ -8,8 +8,8 @@
 #include "plugin/context.h"
 
 using dfm::fail;
-using dfm::guard;
-using dfm::idle;
+using dfm::as_status;
+using dfm::exclusive;
 using dfm::used;
 
 namespace {
@@ -74,7 +74,7 @@ dfm_status dfm_fail(dfm_status status, const char *sentence) {
 
 dfm_status dfm_file_read(const char *path, uint64_t limit, const char *expected, dfm_file_take_fn take,
                          void *user) {
-  return dfm::guard([&] {
+  return dfm::as_status([&] {
     if (!path || !*path || !expected || !take)
       dfm::fail(DFM_E_ARG, "dfm_file_read: path is empty, or path, expected or take is NULL");
     const dfm::Array<char> bytes = dfm::read_whole_file(dfm::Memory::standard(), path, limit, expected);
@@ -83,7 +83,7 @@ dfm_status dfm_file_read(const char *path, uint64_t limit, const char *expected,
 }
 
 dfm_status dfm_file_write(const char *path, const void *bytes, size_t n) {
-  return dfm::guard([&] {
+  return dfm::as_status([&] {
     if (!path || !*path || (n && !bytes))
       dfm::fail(DFM_E_ARG, "dfm_file_write: path is empty, or path or bytes is NULL");
     dfm::AtomicFile file(path);
@@ -100,7 +100,7 @@ dfm_context_def dfm_context_def_default(void) {
 }
 
 dfm_status dfm_context_create(const dfm_context_def *def, dfm_context **out) {
-  return guard([&] {
+  return as_status([&] {
     if (!out) fail(DFM_E_ARG, "dfm_context_create: out is NULL");
     auto context = std::make_unique<dfm_context>(checked(def));
     context->loader.add_bundled();
@@ -131,29 +131,29 @@ void dfm_context_destroy(dfm_context *context) {
 }
 
 dfm_status dfm_plugin_load(dfm_context *context, const char *path) {
-  return guard([&] {
+  return as_status([&] {
     if (!path || !*path) fail(DFM_E_ARG, "dfm_plugin_load: the path is empty");
-    idle(require(context)).loader.load(path);
+    exclusive(require(context)).loader.load(path);
   });
 }
 
 dfm_status dfm_plugin_scan(dfm_context *context, const char *directory, uint32_t *loaded) {
-  return guard([&] {
+  return as_status([&] {
     if (!directory || !*directory) fail(DFM_E_ARG, "dfm_plugin_scan: the directory is empty");
-    const uint32_t n = idle(require(context)).loader.scan(directory);
+    const uint32_t n = exclusive(require(context)).loader.scan(directory);
     if (loaded) *loaded = n;
   });
 }
 
 dfm_status dfm_plugin_register_static(dfm_context *context, dfm_plugin_fn entry, const char *name) {
-  return guard([&] {
+  return as_status([&] {
     if (!entry || !name || !*name) fail(DFM_E_ARG, "dfm_plugin_register_static: entry and name are needed");
-    idle(require(context)).loader.add_static(entry, name);
+    exclusive(require(context)).loader.add_static(entry, name);
   });
 }
 
 dfm_status dfm_plugin_visit(dfm_context *context, dfm_plugin_visit_fn visit, void *user) {
-  return guard([&] {
+  return as_status([&] {
     if (!visit) fail(DFM_E_ARG, "dfm_plugin_visit: visit is NULL");
     const dfm::Registry &registry = used(require(context)).registry;
     for (const dfm_type *type : registry.list()) visit(user, type, registry.file_of(*type).c_str());
@@ -161,7 +161,7 @@ dfm_status dfm_plugin_visit(dfm_context *context, dfm_plugin_visit_fn visit, voi
 }
 
 dfm_status dfm_plugin_visit_passed(dfm_context *context, dfm_plugin_passed_fn visit, void *user) {
-  return guard([&] {
+  return as_status([&] {
     if (!visit) fail(DFM_E_ARG, "dfm_plugin_visit_passed: visit is NULL");
     for (const auto &passed : used(require(context)).registry.passed())
       visit(user, passed.file.c_str(), passed.reason.c_str());

@@ -117,23 +117,23 @@ dfm_body_def dfm_body_def_default(void) {
 }
 
 dfm_status dfm_body_create(dfm_world world, const dfm_body_def *def, dfm_body *out) {
-  return guard([&] {
-    World &w = idle(world_of(world));
+  return as_status([&] {
+    World &w = exclusive(world_of(world));
     need(out, "out");
     *out = create_body(w, take_def(def, dfm_body_def_default())).handle;
   });
 }
 
 dfm_status dfm_body_destroy(dfm_body body) {
-  return guard([&] {
+  return as_status([&] {
     Body &b = body_of(body);
-    idle(*b.world);
+    exclusive(*b.world);
     destroy_body(b);
   });
 }
 
 dfm_status dfm_body_get_info(dfm_body body, dfm_body_info *out) {
-  return guard([&] {
+  return as_status([&] {
     const Body &b = body_of(body);
     dfm_body_info i{};
     i.npoint = b.p.n;
@@ -152,13 +152,13 @@ dfm_status dfm_body_get_info(dfm_body body, dfm_body_info *out) {
 }
 
 dfm_status dfm_body_set_user(dfm_body body, void *user) {
-  return guard([&] { body_of(body).user = user; });
+  return as_status([&] { body_of(body).user = user; });
 }
 
 dfm_status dfm_body_set_filter(dfm_body body, uint32_t category, uint32_t collides_with) {
-  return guard([&] {
+  return as_status([&] {
     Body &b = body_of(body);
-    idle(*b.world);
+    exclusive(*b.world);
     b.category = category;
     b.collides_with = collides_with;
     disturb(b);
@@ -168,7 +168,7 @@ dfm_status dfm_body_set_filter(dfm_body body, uint32_t category, uint32_t collid
 }
 
 dfm_status dfm_body_get_state(dfm_body body, uint32_t capacity, double *x, double *v, uint32_t *n) {
-  return guard([&] {
+  return as_status([&] {
     const Body &b = body_of(body);
     if (!room(b.p.n, capacity, x ? x : v, n)) return;
     for (uint32_t i = 0; i < b.p.n; ++i) {
@@ -179,9 +179,9 @@ dfm_status dfm_body_get_state(dfm_body body, uint32_t capacity, double *x, doubl
 }
 
 dfm_status dfm_body_set_state(dfm_body body, uint32_t n, const double *x, const double *v) {
-  return guard([&] {
+  return as_status([&] {
     Body &b = body_of(body);
-    idle(*b.world);
+    exclusive(*b.world);
     if (n != b.p.n) fail(DFM_E_ARG, "body '%s' has %u points, %u were given", b.name.c_str(), b.p.n, n);
     for (size_t i = 0; i < size_t(3) * n; ++i)
       if ((x && !std::isfinite(x[i])) || (v && !std::isfinite(v[i])))
@@ -209,7 +209,7 @@ dfm_status dfm_body_set_state(dfm_body body, uint32_t n, const double *x, const 
 
 dfm_status dfm_body_get_rest(dfm_body body, uint32_t capacity_points, double *x, uint32_t capacity_tets,
                              uint32_t *tets) {
-  return guard([&] {
+  return as_status([&] {
     const Body &b = body_of(body);
     if (x && room(b.p.n, capacity_points, x, nullptr)) std::copy(b.p.rest.begin(), b.p.rest.end(), x);
     if (tets && room(static_cast<uint32_t>(b.tets.size() / 4), capacity_tets, tets, nullptr))
@@ -218,9 +218,9 @@ dfm_status dfm_body_get_rest(dfm_body body, uint32_t capacity_points, double *x,
 }
 
 dfm_status dfm_body_hold(dfm_body body, uint32_t n, const uint32_t *points, uint8_t axes) {
-  return guard([&] {
+  return as_status([&] {
     Body &b = body_of(body);
-    idle(*b.world);
+    exclusive(*b.world);
     check_points(b, n, points);
     if (axes > 7) fail(DFM_E_ARG, "axes is %u; it is a sum of 1 (x), 2 (y) and 4 (z)", unsigned(axes));
     if (axes == 0) drop_motions(b, {points, n});
@@ -234,9 +234,9 @@ dfm_status dfm_body_hold(dfm_body body, uint32_t n, const uint32_t *points, uint
 
 dfm_status dfm_body_move_held(dfm_body body, uint32_t n, const uint32_t *points, uint32_t nkey,
                               const dfm_pose_key *keys, const dfm_sine *sine) {
-  return guard([&] {
+  return as_status([&] {
     Body &b = body_of(body);
-    idle(*b.world);
+    exclusive(*b.world);
     check_points(b, n, points);
     check_motion(b, nkey, keys, sine);
     if (nkey == 0 && !sine) fail(DFM_E_ARG, "body '%s': a motion needs keys or a sine", b.name.c_str());
@@ -263,9 +263,9 @@ dfm_status dfm_body_move_held(dfm_body body, uint32_t n, const uint32_t *points,
 
 dfm_status dfm_body_add_load(dfm_body body, uint32_t n, const uint32_t *points, const double *force,
                              uint32_t nkey, const dfm_scale_key *keys, const dfm_sine *sine, uint32_t *load) {
-  return guard([&] {
+  return as_status([&] {
     Body &b = body_of(body);
-    idle(*b.world);
+    exclusive(*b.world);
     check_points(b, n, points);
     check_motion(b, nkey, keys, sine);
     if (n) need(force, "force");
@@ -286,9 +286,9 @@ dfm_status dfm_body_add_load(dfm_body body, uint32_t n, const uint32_t *points, 
 }
 
 dfm_status dfm_body_remove_load(dfm_body body, uint32_t load) {
-  return guard([&] {
+  return as_status([&] {
     Body &b = body_of(body);
-    idle(*b.world);
+    exclusive(*b.world);
     if (std::erase_if(b.loads, [&](const Load &l) { return l.number == load; }) == 0)
       fail(DFM_E_ARG, "body '%s' has no load %u", b.name.c_str(), load);
     sum_loads(b);
@@ -296,9 +296,9 @@ dfm_status dfm_body_remove_load(dfm_body body, uint32_t load) {
 }
 
 dfm_status dfm_body_add_spring(dfm_body body, const dfm_spring_def *def, uint32_t *spring) {
-  return guard([&] {
+  return as_status([&] {
     Body &b = body_of(body);
-    idle(*b.world);
+    exclusive(*b.world);
     b.springs.push_back(make_spring(
         b,
         take_def(def, dfm_spring_def{sizeof(dfm_spring_def), 0, nullptr, nullptr, {}, nullptr, 0, 0, 0, 0})));
@@ -309,9 +309,9 @@ dfm_status dfm_body_add_spring(dfm_body body, const dfm_spring_def *def, uint32_
 }
 
 dfm_status dfm_body_set_spring_target(dfm_body body, uint32_t spring, const double to[3]) {
-  return guard([&] {
+  return as_status([&] {
     Body &b = body_of(body);
-    idle(*b.world);
+    exclusive(*b.world);
     need(to, "to");
     Spring &s = spring_of(b, spring);
     if (!std::isfinite(to[0]) || !std::isfinite(to[1]) || !std::isfinite(to[2]))
@@ -323,7 +323,7 @@ dfm_status dfm_body_set_spring_target(dfm_body body, uint32_t spring, const doub
 }
 
 dfm_status dfm_body_get_spring_force(dfm_body body, uint32_t spring, double force[3]) {
-  return guard([&] {
+  return as_status([&] {
     Body &b = body_of(body);
     need(force, "force");
     store3(force, spring_force(b, spring_of(b, spring), b.world->time, 0));
@@ -331,18 +331,18 @@ dfm_status dfm_body_get_spring_force(dfm_body body, uint32_t spring, double forc
 }
 
 dfm_status dfm_body_remove_spring(dfm_body body, uint32_t spring) {
-  return guard([&] {
+  return as_status([&] {
     Body &b = body_of(body);
-    idle(*b.world);
+    exclusive(*b.world);
     b.springs.erase(b.springs.begin() + (&spring_of(b, spring) - b.springs.data()));
     springs_changed(b);
   });
 }
 
 dfm_status dfm_body_apply_impulse(dfm_body body, const double point[3], const double impulse[3]) {
-  return guard([&] {
+  return as_status([&] {
     Body &b = body_of(body);
-    idle(*b.world);
+    exclusive(*b.world);
     need(point, "point");
     need(impulse, "impulse");
     for (int k = 0; k < 3; ++k)
@@ -359,9 +359,9 @@ dfm_status dfm_body_apply_impulse(dfm_body body, const double point[3], const do
 }
 
 dfm_status dfm_body_set_params(dfm_body body, const dfm_params *params) {
-  return guard([&] {
+  return as_status([&] {
     Body &b = body_of(body);
-    idle(*b.world);
+    exclusive(*b.world);
     need(params, "params");
     set_model_params(b, *params);
     disturb(b);
@@ -369,14 +369,14 @@ dfm_status dfm_body_set_params(dfm_body body, const dfm_params *params) {
 }
 
 dfm_status dfm_body_wake(dfm_body body) {
-  return guard([&] {
+  return as_status([&] {
     Body &b = body_of(body);
-    wake(idle(*b.world), b);
+    wake(exclusive(*b.world), b);
   });
 }
 
 dfm_status dfm_body_is_asleep(dfm_body body, bool *asleep) {
-  return guard([&] {
+  return as_status([&] {
     const Body &b = body_of(body);
     need(asleep, "asleep");
     *asleep = b.slumber.asleep;
@@ -384,11 +384,11 @@ dfm_status dfm_body_is_asleep(dfm_body body, bool *asleep) {
 }
 
 dfm_status dfm_body_get_measure(dfm_body body, dfm_body_measure *out) {
-  return guard([&] { give(out, measure(body_of(body))); });
+  return as_status([&] { give(out, measure(body_of(body))); });
 }
 
 dfm_status dfm_body_energy_density(dfm_body body, uint32_t capacity, double *out) {
-  return guard([&] {
+  return as_status([&] {
     Body &b = body_of(body);
     if (!room(static_cast<uint32_t>(b.tets.size() / 4), capacity, out, nullptr)) return;
     energy_density(b, out);

@@ -21,7 +21,7 @@ class Call {
   Call(const Call &) = delete;
   Call &operator=(const Call &) = delete;
 
-  // The call whose body runs now. Only under guard().
+  // The call whose body runs now. Only under as_status().
   static Call &now() { return *innermost_; }
 
   // Works on `object`, which those that it calls may look at and not destroy.

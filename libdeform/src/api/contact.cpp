@@ -128,8 +128,8 @@ std::span<const dfm_param_value> values_of(const dfm_params &params, const char 
 }  // namespace
 
 dfm_status dfm_world_add_friction(dfm_world world, const dfm_friction_def *given) {
-  return guard([&] {
-    World &w = idle(world_of(world));
+  return as_status([&] {
+    World &w = exclusive(world_of(world));
     need(given, "def");
     const dfm_friction_def def = take_def(given, dfm_friction_def{});
     need(def.law, "law");
@@ -139,8 +139,8 @@ dfm_status dfm_world_add_friction(dfm_world world, const dfm_friction_def *given
 }
 
 dfm_status dfm_world_set_friction(dfm_world world, const char *a, const char *b, const dfm_params *params) {
-  return guard([&] {
-    World &w = idle(world_of(world));
+  return as_status([&] {
+    World &w = exclusive(world_of(world));
     need(a, "a");
     need(b, "b");
     need(params, "params");
@@ -149,8 +149,8 @@ dfm_status dfm_world_set_friction(dfm_world world, const char *a, const char *b,
 }
 
 dfm_status dfm_world_remove_friction(dfm_world world, const char *a, const char *b) {
-  return guard([&] {
-    World &w = idle(world_of(world));
+  return as_status([&] {
+    World &w = exclusive(world_of(world));
     need(a, "a");
     need(b, "b");
     remove_friction_rule(w, a, b);
@@ -158,8 +158,8 @@ dfm_status dfm_world_remove_friction(dfm_world world, const char *a, const char 
 }
 
 dfm_status dfm_world_filter_pair(dfm_world world, const char *a, const char *b, bool collide) {
-  return guard([&] {
-    World &w = idle(world_of(world));
+  return as_status([&] {
+    World &w = exclusive(world_of(world));
     add_rule(w.filters, FilterRule{{side(w, a, false), side(w, b, false)}, collide});
     if (collide) w.overlaps.all = true;
     wake_all(w);
@@ -168,8 +168,8 @@ dfm_status dfm_world_filter_pair(dfm_world world, const char *a, const char *b, 
 }
 
 dfm_status dfm_world_remove_filter(dfm_world world, const char *a, const char *b) {
-  return guard([&] {
-    World &w = idle(world_of(world));
+  return as_status([&] {
+    World &w = exclusive(world_of(world));
     need(a, "a");
     need(b, "b");
     const std::string between[2] = {a, b};
@@ -186,7 +186,7 @@ dfm_status dfm_world_remove_filter(dfm_world world, const char *a, const char *b
 
 dfm_status dfm_world_contacts_sized(dfm_world world, uint32_t row_size, uint32_t capacity, dfm_contact *out,
                                     uint32_t *n) {
-  return guard([&] {
+  return as_status([&] {
     Rows<dfm_contact> rows(out, row_size, "dfm_contact");
     const World &w = settled(world_of(world));
     uint32_t count = 0;
@@ -199,7 +199,7 @@ dfm_status dfm_world_contacts_sized(dfm_world world, uint32_t row_size, uint32_t
 }
 
 dfm_status dfm_world_law_info(dfm_world world, uint32_t law, dfm_law_info *info) {
-  return guard([&] {
+  return as_status([&] {
     const World &w = settled(world_of(world));
     if (law >= w.laws.size())
       fail(DFM_E_ARG,
@@ -218,7 +218,7 @@ dfm_status dfm_world_law_info(dfm_world world, uint32_t law, dfm_law_info *info)
 
 dfm_status dfm_world_pairs_sized(dfm_world world, uint32_t row_size, uint32_t capacity, dfm_pair_report *out,
                                  uint32_t *n) {
-  return guard([&] {
+  return as_status([&] {
     Rows<dfm_pair_report> rows(out, row_size, "dfm_pair_report");
     World &w = settled(world_of(world));
     // ids: the order of creation
@@ -281,7 +281,7 @@ dfm_status dfm_world_pairs_sized(dfm_world world, uint32_t row_size, uint32_t ca
 
 dfm_status dfm_world_pair_wrench(dfm_world world, uint64_t a, uint64_t b, const double point[3],
                                  double force[3], double moment[3]) {
-  return guard([&] {
+  return as_status([&] {
     const World &w = settled(world_of(world));
     need(point, "point");
     for (int k = 0; k < 3; ++k)
@@ -308,7 +308,7 @@ dfm_status dfm_world_pair_wrench(dfm_world world, uint64_t a, uint64_t b, const 
 
 dfm_status dfm_world_pair_impulses_sized(dfm_world world, uint32_t row_size, uint32_t capacity,
                                          dfm_pair_impulse *out, uint32_t *n) {
-  return guard([&] {
+  return as_status([&] {
     Rows<dfm_pair_impulse> rows(out, row_size, "dfm_pair_impulse");
     const World &w = world_of(world);
     Array<StepImpulses::Pair> pairs(HookAllocator<StepImpulses::Pair>(w.memory()));
@@ -331,9 +331,9 @@ dfm_status dfm_world_pair_impulses_sized(dfm_world world, uint32_t row_size, uin
 
 dfm_status dfm_world_events_sized(dfm_world world, uint32_t row_size, uint32_t capacity,
                                   dfm_contact_event *out, uint32_t *n) {
-  return guard([&] {
+  return as_status([&] {
     Rows<dfm_contact_event> rows(out, row_size, "dfm_contact_event");
-    World &w = idle(world_of(world));
+    World &w = exclusive(world_of(world));
     if (!room(static_cast<uint32_t>(w.events.size()), capacity, out, n)) return;
     for (const dfm_contact_event &e : w.events) rows.add(e);
     w.events.clear();
@@ -341,8 +341,8 @@ dfm_status dfm_world_events_sized(dfm_world world, uint32_t row_size, uint32_t c
 }
 
 dfm_status dfm_world_hold_begin(dfm_world world) {
-  return guard([&] {
-    World &w = idle(world_of(world));
+  return as_status([&] {
+    World &w = exclusive(world_of(world));
     w.hold.on = true;
     w.hold.start = w.time;
     std::fill(w.store.held.begin(), w.store.held.end(), uint8_t(0));
@@ -352,7 +352,7 @@ dfm_status dfm_world_hold_begin(dfm_world world) {
 }
 
 dfm_status dfm_world_hold(dfm_world world, double *creep, uint32_t *count) {
-  return guard([&] {
+  return as_status([&] {
     const World &w = settled(world_of(world));
     need(creep, "creep");
     double longest = 0;

@@ -19,7 +19,7 @@ std::vector<double> packed(const Array<double> &column, uint32_t n) {
 }  // namespace
 
 dfm_status dfm_debug_write_body(dfm_body body, const char *path) {
-  return guard([&] {
+  return as_status([&] {
     Body &b = body_of(body);
     need(path, "path");
     const std::vector<double> x = packed(b.p.x, b.p.n), v = packed(b.p.v, b.p.n);
@@ -42,7 +42,7 @@ dfm_status dfm_debug_write_body(dfm_body body, const char *path) {
 }
 
 dfm_status dfm_debug_write_surface(dfm_body body, const char *path) {
-  return guard([&] {
+  return as_status([&] {
     Body &b = body_of(body);
     need(path, "path");
     const uint32_t n = b.surface.nsurfel;
@@ -69,7 +69,7 @@ dfm_status dfm_debug_write_surface(dfm_body body, const char *path) {
 }
 
 dfm_status dfm_debug_draw(dfm_world world, uint32_t what, dfm_draw_line_fn line, void *user) {
-  return guard([&] {
+  return as_status([&] {
     const World &w = settled(world_of(world));
     if (!line) fail(DFM_E_ARG, "argument 'line' is NULL");
     double longest = 0;

@@ -1,11 +1,11 @@
 #include "api/mesh_objects.h"
 #include "deform/mesh.h"
 
-using dfm::guard;
+using dfm::as_status;
 using dfm::need;
 
 dfm_status dfm_tetmesh_fill(dfm_trimesh surface, uint32_t cells, dfm_tetmesh *out) {
-  return guard([&] {
+  return as_status([&] {
     need(out, "out");
     const dfm::TriMeshObject &object = dfm::TriMeshObject::of(surface);
     dfm::TetMesh mesh = dfm::fill_surface(object.mesh, cells);
@@ -16,7 +16,7 @@ dfm_status dfm_tetmesh_fill(dfm_trimesh surface, uint32_t cells, dfm_tetmesh *ou
 }
 
 dfm_status dfm_tetmesh_share(dfm_tetmesh mesh, const double **share) {
-  return guard([&] {
+  return as_status([&] {
     need(share, "share");
     const dfm::TetMesh &m = dfm::TetMeshObject::of(mesh).mesh;
     *share = m.share.empty() ? nullptr : m.share.data();

@@ -77,7 +77,7 @@ uint32_t state_width(const Law &law, const double *params) {
 }
 
 const dfm_type &type_from_file(dfm_context &context, const char *path) {
-  idle(context).loader.load(path);
+  exclusive(context).loader.load(path);
   std::vector<const dfm_type *> laws;
   std::vector<std::string> ids;
   for (const dfm_type *type : context.loader.types_of(path))
@@ -254,7 +254,7 @@ dfm_status evaluate(Law &law, const dfm_friction_in *given_in, dfm_friction_out 
 using namespace dfm;
 
 dfm_status dfm_law_open(dfm_context *context, const char *id_or_path, dfm_law *out) {
-  return guard([&] {
+  return as_status([&] {
     if (!context || !id_or_path || !*id_or_path || !out)
       fail(DFM_E_ARG, "dfm_law_open: context, name and out are needed");
     const std::string name = id_or_path;
@@ -276,7 +276,7 @@ dfm_status dfm_law_open(dfm_context *context, const char *id_or_path, dfm_law *o
 }
 
 dfm_status dfm_law_close(dfm_law law) {
-  return guard([&] {
+  return as_status([&] {
     Law &l = law_at(law);
     Call::now().need_alone(&l, "law");
     l.context.remove_live(law);
@@ -285,19 +285,19 @@ dfm_status dfm_law_close(dfm_law law) {
 }
 
 dfm_status dfm_law_type(dfm_law law, const dfm_type **out) {
-  return guard([&] {
+  return as_status([&] {
     if (!out) fail(DFM_E_ARG, "dfm_law_type: out is NULL");
     *out = &law_at(law).type;
   });
 }
 
 dfm_status dfm_law_eval(dfm_law law, const dfm_friction_in *in, dfm_friction_out *out) {
-  return guard([&] { return evaluate(law_at(law), in, out); });
+  return as_status([&] { return evaluate(law_at(law), in, out); });
 }
 
 dfm_status dfm_law_pack(dfm_law law, const dfm_params *params, uint32_t capacity, double *values,
                         uint32_t *n) {
-  return guard([&] {
+  return as_status([&] {
     if (params && params->n && !params->values) fail(DFM_E_ARG, "dfm_law_pack: params.values is NULL");
     const Law &l = law_at(law);
     const std::vector<double> packed = pack_params(

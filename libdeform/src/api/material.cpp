@@ -19,8 +19,8 @@ dfm_material_def dfm_material_def_default(void) {
 }
 
 dfm_status dfm_material_create(dfm_world world, const dfm_material_def *def, dfm_material *out) {
-  return guard([&] {
-    World &w = idle(world_of(world));
+  return as_status([&] {
+    World &w = exclusive(world_of(world));
     need(out, "out");
     auto m = std::make_unique<Material>();
     m->def = take_def(def, dfm_material_def_default());
@@ -68,9 +68,9 @@ dfm_status dfm_material_create(dfm_world world, const dfm_material_def *def, dfm
 }
 
 dfm_status dfm_material_destroy(dfm_material material) {
-  return guard([&] {
+  return as_status([&] {
     Material &m = material_of(material);
-    World &w = idle(*m.world);
+    World &w = exclusive(*m.world);
     handle_destroy(material);
     std::erase_if(w.materials, [&](auto &p) { return p.get() == &m; });
   });

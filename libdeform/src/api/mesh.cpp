@@ -7,12 +7,12 @@
 #include "mesh/raw_mesh.h"
 
 using dfm::fail;
-using dfm::guard;
+using dfm::as_status;
 using dfm::need;
 using Object = dfm::TetMeshObject;
 
 dfm_status dfm_tetmesh_read(dfm_context *context, const char *path, dfm_tetmesh *out) {
-  return guard([&] {
+  return as_status([&] {
     need(context, "context");
     dfm::used(*context);
     need(path, "path");
@@ -24,7 +24,7 @@ dfm_status dfm_tetmesh_read(dfm_context *context, const char *path, dfm_tetmesh 
 }
 
 dfm_status dfm_mesh_file_kind(dfm_context *context, const char *path, uint32_t *kind) {
-  return guard([&] {
+  return as_status([&] {
     need(context, "context");
     dfm::used(*context);
     need(path, "path");
@@ -34,7 +34,7 @@ dfm_status dfm_mesh_file_kind(dfm_context *context, const char *path, uint32_t *
 }
 
 dfm_status dfm_mesh_read(dfm_context *context, const char *path, dfm_tetmesh *cells, dfm_trimesh *surface) {
-  return guard([&] {
+  return as_status([&] {
     need(context, "context");
     dfm::used(*context);
     need(path, "path");
@@ -51,7 +51,7 @@ dfm_status dfm_mesh_read(dfm_context *context, const char *path, dfm_tetmesh *ce
 
 dfm_status dfm_tetmesh_make(dfm_context *context, const char *kind, const double size[3], uint32_t cells,
                             dfm_tetmesh *out) {
-  return guard([&] {
+  return as_status([&] {
     need(context, "context");
     dfm::used(*context);
     need(kind, "kind");
@@ -71,11 +71,11 @@ dfm_status dfm_tetmesh_make(dfm_context *context, const char *kind, const double
 }
 
 dfm_status dfm_tetmesh_destroy(dfm_tetmesh mesh) {
-  return guard([&] { Object::destroy(mesh); });
+  return as_status([&] { Object::destroy(mesh); });
 }
 
 dfm_status dfm_tetmesh_get_info(dfm_tetmesh mesh, dfm_tetmesh_info *out) {
-  return guard([&] {
+  return as_status([&] {
     const Object &object = Object::of(mesh);
     const dfm::TetMesh &m = object.mesh;
     const dfm::MeshStatistics &s = object.statistics;
@@ -109,7 +109,7 @@ dfm_status dfm_tetmesh_get_info(dfm_tetmesh mesh, dfm_tetmesh_info *out) {
 
 dfm_status dfm_tetmesh_data(dfm_tetmesh mesh, const double **points, const uint32_t **tets,
                             const uint32_t **file_point) {
-  return guard([&] {
+  return as_status([&] {
     const dfm::TetMesh &m = Object::of(mesh).mesh;
     if (points) *points = m.points.data();
     if (tets) *tets = m.tets.data();
@@ -118,7 +118,7 @@ dfm_status dfm_tetmesh_data(dfm_tetmesh mesh, const double **points, const uint3
 }
 
 dfm_status dfm_tetmesh_file_cells(dfm_tetmesh mesh, const uint32_t **file_cell) {
-  return guard([&] {
+  return as_status([&] {
     need(file_cell, "file_cell");
     const dfm::TetMesh &m = Object::of(mesh).mesh;
     *file_cell = m.file_cell.empty() ? nullptr : m.file_cell.data();
@@ -126,7 +126,7 @@ dfm_status dfm_tetmesh_file_cells(dfm_tetmesh mesh, const uint32_t **file_cell) 
 }
 
 dfm_status dfm_tetmesh_groups(dfm_tetmesh mesh, const char *const **names, const uint32_t **cell_group) {
-  return guard([&] {
+  return as_status([&] {
     const Object &object = Object::of(mesh);
     if (names) *names = object.names.data();
     if (cell_group) *cell_group = object.mesh.tet_group.data();
@@ -135,7 +135,7 @@ dfm_status dfm_tetmesh_groups(dfm_tetmesh mesh, const char *const **names, const
 
 dfm_status dfm_tetmesh_triangles(dfm_tetmesh mesh, const uint32_t **triangles, const uint32_t **group,
                                  uint32_t *n) {
-  return guard([&] {
+  return as_status([&] {
     const dfm::TetMesh &m = Object::of(mesh).mesh;
     if (triangles) *triangles = m.tris.data();
     if (group) *group = m.tri_group.data();
@@ -145,7 +145,7 @@ dfm_status dfm_tetmesh_triangles(dfm_tetmesh mesh, const uint32_t **triangles, c
 
 dfm_status dfm_tetmesh_group_points(dfm_tetmesh mesh, uint32_t group, uint32_t *dimension,
                                     const uint32_t **points, uint32_t *n) {
-  return guard([&] {
+  return as_status([&] {
     const dfm::TetMesh &m = Object::of(mesh).mesh;
     if (group >= m.groups.size())
       fail(DFM_E_ARG, "there is no group %u; the mesh has %zu", group, m.groups.size());
@@ -157,7 +157,7 @@ dfm_status dfm_tetmesh_group_points(dfm_tetmesh mesh, uint32_t group, uint32_t *
 }
 
 dfm_status dfm_tetmesh_write(dfm_tetmesh mesh, const char *path) {
-  return guard([&] {
+  return as_status([&] {
     need(path, "path");
     dfm::write_tet_mesh(Object::of(mesh).mesh, path);
   });

@@ -3,7 +3,7 @@
 #include <cstring>
 #include <vector>
 
-#include "api/guard.h"
+#include "api/as_status.h"
 #include "core/handle.h"
 #include "state/world.h"
 
@@ -28,7 +28,7 @@ inline Material &material_of(dfm_material h) { return part_of<Material>(Kind::ma
 
 // For calls that change the world: no other one may be inside it, neither around this one nor on
 // another thread.
-inline World &idle(World &w) {
+inline World &exclusive(World &w) {
   Call::now().change(&w, w.busy, "world");
   return w;
 }
@@ -48,7 +48,7 @@ inline dfm_context &used(dfm_context &context) {
 }
 
 // For calls that change what a context has loaded.
-inline dfm_context &idle(dfm_context &context) {
+inline dfm_context &exclusive(dfm_context &context) {
   Call::now().need_alone(&context, "context");
   return used(context);
 }

@@ -23,17 +23,17 @@ dfm_obstacle_def dfm_obstacle_def_default(void) {
 }
 
 dfm_status dfm_obstacle_create(dfm_world world, const dfm_obstacle_def *def, dfm_obstacle *out) {
-  return guard([&] {
-    World &w = idle(world_of(world));
+  return as_status([&] {
+    World &w = exclusive(world_of(world));
     need(out, "out");
     *out = create_obstacle(w, take_def(def, dfm_obstacle_def_default())).handle;
   });
 }
 
 dfm_status dfm_obstacle_destroy(dfm_obstacle obstacle) {
-  return guard([&] {
+  return as_status([&] {
     Obstacle &o = obstacle_of(obstacle);
-    idle(*o.world);
+    exclusive(*o.world);
     if (o.rigid && !o.added)
       fail(DFM_E_STATE, "'%s' is a rigid body; dfm_rigid_destroy removes it, with the set it came with",
            o.name.c_str());
@@ -42,7 +42,7 @@ dfm_status dfm_obstacle_destroy(dfm_obstacle obstacle) {
 }
 
 dfm_status dfm_obstacle_get_pose(dfm_obstacle obstacle, dfm_pose *out) {
-  return guard([&] {
+  return as_status([&] {
     const Obstacle &o = obstacle_of(obstacle);
     need(out, "out");
     store3(out->position, o.pose.position);
@@ -55,7 +55,7 @@ dfm_status dfm_obstacle_get_pose(dfm_obstacle obstacle, dfm_pose *out) {
 }
 
 dfm_status dfm_obstacle_get_def(dfm_obstacle obstacle, dfm_obstacle_def *out) {
-  return guard([&] { give(out, obstacle_of(obstacle).def); });
+  return as_status([&] { give(out, obstacle_of(obstacle).def); });
 }
 
 namespace {
@@ -63,7 +63,7 @@ namespace {
 // Where a host may put an obstacle; checked.
 Obstacle &movable(dfm_obstacle obstacle, const dfm_pose *pose) {
   Obstacle &o = obstacle_of(obstacle);
-  idle(*o.world);
+  exclusive(*o.world);
   need(pose, "pose");
   if (o.rigid)
     fail(DFM_E_STATE, "'%s' is a rigid body and moves by itself; dfm_rigid_set_state puts it somewhere",
@@ -78,7 +78,7 @@ Obstacle &movable(dfm_obstacle obstacle, const dfm_pose *pose) {
 }  // namespace
 
 dfm_status dfm_obstacle_move_to(dfm_obstacle obstacle, const dfm_pose *pose) {
-  return guard([&] {
+  return as_status([&] {
     Obstacle &o = movable(obstacle, pose);
     need_ability(*o.world, Ability::obstacle_motion, "obstacle", o.name);
     o.keys.clear();
@@ -89,7 +89,7 @@ dfm_status dfm_obstacle_move_to(dfm_obstacle obstacle, const dfm_pose *pose) {
 }
 
 dfm_status dfm_obstacle_teleport(dfm_obstacle obstacle, const dfm_pose *pose) {
-  return guard([&] {
+  return as_status([&] {
     Obstacle &o = movable(obstacle, pose);
     World &w = *o.world;
     w.overlaps.place(o.id);

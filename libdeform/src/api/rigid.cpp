@@ -23,7 +23,7 @@ Obstacle &rigid_of(dfm_rigid h) {
 }  // namespace
 
 dfm_status dfm_rigid_host_register(const char *name, const dfm_rigid_host *table) {
-  return guard([&] {
+  return as_status([&] {
     need(name, "name");
     need(table, "table");
     register_host(name, take_def(table, dfm_rigid_host{}));
@@ -44,8 +44,8 @@ dfm_rigid_def dfm_rigid_def_default(void) {
 }
 
 dfm_status dfm_rigid_create(dfm_world world, const char *host, const dfm_rigid_set_def *set, dfm_rigid *out) {
-  return guard([&] {
-    World &w = idle(world_of(world));
+  return as_status([&] {
+    World &w = exclusive(world_of(world));
     need(set, "set");
     need(out, "out");
     dfm_rigid_set_def def = take_def(set, dfm_rigid_set_def{});
@@ -59,17 +59,17 @@ dfm_status dfm_rigid_create(dfm_world world, const char *host, const dfm_rigid_s
 }
 
 dfm_status dfm_rigid_destroy(dfm_rigid rigid) {
-  return guard([&] {
+  return as_status([&] {
     Obstacle &o = rigid_of(rigid);
-    idle(*o.world);
+    exclusive(*o.world);
     destroy_rigids(*o.rigid);
   });
 }
 
 dfm_status dfm_rigid_add_shape(dfm_rigid rigid, const dfm_obstacle_def *def, dfm_obstacle *out) {
-  return guard([&] {
+  return as_status([&] {
     Obstacle &o = rigid_of(rigid);
-    idle(*o.world);
+    exclusive(*o.world);
     need(def, "def");
     need(out, "out");
     *out = add_rigid_shape(o, take_def(def, dfm_obstacle_def_default())).handle;
@@ -77,7 +77,7 @@ dfm_status dfm_rigid_add_shape(dfm_rigid rigid, const dfm_obstacle_def *def, dfm
 }
 
 dfm_status dfm_world_rigids(dfm_world world, uint32_t capacity, dfm_rigid *out, uint32_t *n) {
-  return guard([&] {
+  return as_status([&] {
     const World &w = world_of(world);
     uint32_t count = 0;
     for (auto &o : w.obstacles) count += o->rigid && !o->added;
@@ -88,7 +88,7 @@ dfm_status dfm_world_rigids(dfm_world world, uint32_t capacity, dfm_rigid *out, 
 }
 
 dfm_status dfm_world_find_rigid(dfm_world world, const char *name, dfm_rigid *out) {
-  return guard([&] {
+  return as_status([&] {
     World &w = world_of(world);
     need(name, "name");
     need(out, "out");
@@ -108,14 +108,14 @@ dfm_status dfm_world_find_rigid(dfm_world world, const char *name, dfm_rigid *ou
 }
 
 dfm_status dfm_rigid_get_def(dfm_rigid rigid, dfm_rigid_def *out) {
-  return guard([&] {
+  return as_status([&] {
     const Obstacle &o = rigid_of(rigid);
     give(out, o.rigid->defs[o.rigid_body]);
   });
 }
 
 dfm_status dfm_rigid_get_state(dfm_rigid rigid, dfm_rigid_state *out) {
-  return guard([&] {
+  return as_status([&] {
     const Obstacle &o = rigid_of(rigid);
     need(out, "out");
     *out = o.rigid->state[o.rigid_body];
@@ -123,9 +123,9 @@ dfm_status dfm_rigid_get_state(dfm_rigid rigid, dfm_rigid_state *out) {
 }
 
 dfm_status dfm_rigid_set_state(dfm_rigid rigid, const dfm_rigid_state *state) {
-  return guard([&] {
+  return as_status([&] {
     Obstacle &o = rigid_of(rigid);
-    World &w = idle(*o.world);
+    World &w = exclusive(*o.world);
     need(state, "state");
     set_rigid_state(o, *state);
     for (auto &shape : w.obstacles)
@@ -135,14 +135,14 @@ dfm_status dfm_rigid_set_state(dfm_rigid rigid, const dfm_rigid_state *state) {
 }
 
 dfm_status dfm_rigid_get_measure(dfm_rigid rigid, dfm_body_measure *out) {
-  return guard([&] {
+  return as_status([&] {
     const Obstacle &o = rigid_of(rigid);
     give(out, measure_rigid(*o.rigid, o.rigid_body));
   });
 }
 
 dfm_status dfm_rigid_contact_wrench(dfm_rigid rigid, double force[3], double moment[3]) {
-  return guard([&] {
+  return as_status([&] {
     const Obstacle &o = rigid_of(rigid);
     need(force, "force");
     need(moment, "moment");
@@ -155,13 +155,13 @@ dfm_status dfm_rigid_contact_wrench(dfm_rigid rigid, double force[3], double mom
 }
 
 dfm_status dfm_rigid_set_motor(dfm_rigid rigid, uint32_t joint, double velocity, double max) {
-  return guard([&] {
+  return as_status([&] {
     Obstacle &o = rigid_of(rigid);
-    idle(*o.world);
+    exclusive(*o.world);
     set_rigid_motor(*o.rigid, joint, velocity, max);
   });
 }
 
 dfm_status dfm_rigid_joint(dfm_rigid rigid, uint32_t joint, double *position, double *rate, double *effort) {
-  return guard([&] { rigid_joint(*rigid_of(rigid).rigid, joint, position, rate, effort); });
+  return as_status([&] { rigid_joint(*rigid_of(rigid).rigid, joint, position, rate, effort); });
 }

@@ -1,4 +1,4 @@
-// deform/scene.h: argument checks and the exception guard.
+// deform/scene.h: argument checks; exceptions become statuses.
 #include "deform/scene.h"
 
 #include <cstring>
@@ -42,7 +42,7 @@ void check_call(const dfm_context *context, const char *path, const void *out) {
 }  // namespace
 
 dfm_status dfm_scene_load(dfm_context *context, const char *path, dfm_world *out) {
-  return dfm::guard([&] {
+  return dfm::as_status([&] {
     check_call(context, path, out);
     dfm::used(*context);
     *out = Scene(context, path, nullptr).release_world();
@@ -51,7 +51,7 @@ dfm_status dfm_scene_load(dfm_context *context, const char *path, dfm_world *out
 
 dfm_status dfm_scene_open(dfm_context *context, const char *path, const dfm_scene_options *options,
                           dfm_scene *out) {
-  return dfm::guard([&] {
+  return dfm::as_status([&] {
     check_call(context, path, out);
     dfm::used(*context);
     const dfm_scene_options given = dfm::take_def(options, dfm_scene_options{});
@@ -69,18 +69,18 @@ dfm_status dfm_scene_open(dfm_context *context, const char *path, const dfm_scen
 }
 
 dfm_status dfm_scene_close(dfm_scene scene) {
-  return dfm::guard([&] { close_scene(scene); });
+  return dfm::as_status([&] { close_scene(scene); });
 }
 
 dfm_status dfm_scene_world(dfm_scene scene, dfm_world *out) {
-  return dfm::guard([&] {
+  return dfm::as_status([&] {
     if (!out) dfm::fail(DFM_E_ARG, "dfm_scene_world: out is NULL");
     *out = scene_of(scene).world();
   });
 }
 
 dfm_status dfm_scene_value(dfm_scene scene, const char *pointer, char *text, size_t *bytes) {
-  return dfm::guard([&] {
+  return dfm::as_status([&] {
     if (!pointer || !bytes)
       dfm::fail(DFM_E_ARG, "dfm_scene_value: %s is NULL", pointer ? "bytes" : "pointer");
     const std::string value = scene_of(scene).value(pointer);
@@ -95,7 +95,7 @@ dfm_status dfm_scene_value(dfm_scene scene, const char *pointer, char *text, siz
 }
 
 dfm_status dfm_scene_get_settings(dfm_scene scene, dfm_scene_settings *out) {
-  return dfm::guard([&] {
+  return dfm::as_status([&] {
     const Scene &s = scene_of(scene);
     const dfm::scene::Definition &d = s.definition();
     dfm_scene_settings r = {};
@@ -118,7 +118,7 @@ dfm_status dfm_scene_get_settings(dfm_scene scene, dfm_scene_settings *out) {
 
 dfm_status dfm_scene_probe(dfm_scene scene, uint32_t probe, const char **name, double position[3],
                            double velocity[3]) {
-  return dfm::guard([&] {
+  return dfm::as_status([&] {
     Scene &s = scene_of(scene);
     if (probe >= s.probe_count())
       dfm::fail(DFM_E_ARG, "dfm_scene_probe: there is no probe %u, the scene has %zu", probe,

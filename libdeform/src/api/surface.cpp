@@ -12,7 +12,7 @@ namespace {
 // Copies one [nsurfel,4] column; get(s) gives the vector of surfel s.
 template <class Get>
 dfm_status column(dfm_body body, uint32_t capacity, double *xyz, uint32_t *n, Get get) {
-  return guard([&] {
+  return as_status([&] {
     const Body &b = body_of(body);
     if (!room(b.surface.nsurfel, capacity, xyz, n)) return;
     for (uint32_t s = 0; s < b.surface.nsurfel; ++s) store3(xyz + size_t(3) * s, get(b, s));
@@ -37,7 +37,7 @@ dfm_status dfm_surface_forces(dfm_body body, uint32_t capacity, double *xyz, uin
 }
 
 dfm_status dfm_surface_normals(dfm_body body, uint32_t capacity, double *xyz, uint32_t *n) {
-  return guard([&] {
+  return as_status([&] {
     const Body &b = body_of(body);
     if (!room(b.surface.nsurfel, capacity, xyz, n)) return;
     surface_normals(b, xyz);
@@ -45,14 +45,14 @@ dfm_status dfm_surface_normals(dfm_body body, uint32_t capacity, double *xyz, ui
 }
 
 dfm_status dfm_surface_triangles(dfm_body body, uint32_t capacity, uint32_t *tri, uint32_t *n) {
-  return guard([&] {
+  return as_status([&] {
     const Surface &s = body_of(body).surface;
     if (room(s.ntri, capacity, tri, n)) std::copy(s.tri.begin(), s.tri.begin() + size_t(3) * s.ntri, tri);
   });
 }
 
 dfm_status dfm_surface_points(dfm_body body, uint32_t capacity, uint32_t *point, uint32_t *n) {
-  return guard([&] {
+  return as_status([&] {
     const Body &b = body_of(body);
     if (!b.surface.identity())
       fail(DFM_E_UNSUPPORTED,
@@ -65,7 +65,7 @@ dfm_status dfm_surface_points(dfm_body body, uint32_t capacity, uint32_t *point,
 
 dfm_status dfm_world_ray(dfm_world world, const double origin[3], const double direction[3],
                          double max_distance, dfm_ray_hit *hit) {
-  return guard([&] {
+  return as_status([&] {
     World &w = world_of(world);
     need(origin, "origin");
     need(direction, "direction");
@@ -78,7 +78,7 @@ dfm_status dfm_world_ray(dfm_world world, const double origin[3], const double d
 }
 
 dfm_status dfm_world_closest(dfm_world world, const double point[3], double max_distance, dfm_ray_hit *hit) {
-  return guard([&] {
+  return as_status([&] {
     World &w = world_of(world);
     need(point, "point");
     for (int k = 0; k < 3; ++k)

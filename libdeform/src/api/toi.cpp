@@ -3,7 +3,7 @@
 #include <cmath>
 #include <cstring>
 
-#include "api/guard.h"
+#include "api/as_status.h"
 #include "ccd/toi.h"
 
 namespace dfm {
@@ -58,7 +58,7 @@ using namespace dfm;
 
 dfm_status dfm_toi_point_triangle(const dfm_motion *p, const dfm_motion tri[3],
                                   const dfm_toi_options *options, double *t, double bary[3]) {
-  return guard([&] {
+  return as_status([&] {
     const char *const name = "dfm_toi_point_triangle";
     const dfm_toi_options o = checked(name, options);
     check(name, "p", p, 1);
@@ -70,7 +70,7 @@ dfm_status dfm_toi_point_triangle(const dfm_motion *p, const dfm_motion tri[3],
 
 dfm_status dfm_toi_edge_edge(const dfm_motion a[2], const dfm_motion b[2], const dfm_toi_options *options,
                              double *t, double ab[2]) {
-  return guard([&] {
+  return as_status([&] {
     const char *const name = "dfm_toi_edge_edge";
     const dfm_toi_options o = checked(name, options);
     check(name, "a", a, 2);

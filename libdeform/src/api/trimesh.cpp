@@ -6,7 +6,7 @@
 #include "mesh/raw_mesh.h"
 
 using dfm::fail;
-using dfm::guard;
+using dfm::as_status;
 using dfm::need;
 using Object = dfm::TriMeshObject;
 
@@ -19,7 +19,7 @@ void log_warnings(const dfm_context &context, const char *what, const dfm::TriMe
 }  // namespace
 
 dfm_status dfm_trimesh_read(dfm_context *context, const char *path, dfm_trimesh *out) {
-  return guard([&] {
+  return as_status([&] {
     need(context, "context");
     dfm::used(*context);
     need(path, "path");
@@ -32,7 +32,7 @@ dfm_status dfm_trimesh_read(dfm_context *context, const char *path, dfm_trimesh 
 
 dfm_status dfm_trimesh_create(dfm_context *context, uint32_t npoint, const double *points, uint32_t ntriangle,
                               const uint32_t *triangles, dfm_trimesh *out) {
-  return guard([&] {
+  return as_status([&] {
     need(context, "context");
     dfm::used(*context);
     need(points, "points");
@@ -53,7 +53,7 @@ dfm_status dfm_trimesh_create(dfm_context *context, uint32_t npoint, const doubl
 
 dfm_status dfm_trimesh_make(dfm_context *context, const char *kind, const double size[3], uint32_t triangles,
                             dfm_trimesh *out) {
-  return guard([&] {
+  return as_status([&] {
     need(context, "context");
     dfm::used(*context);
     need(kind, "kind");
@@ -78,11 +78,11 @@ dfm_status dfm_trimesh_make(dfm_context *context, const char *kind, const double
 }
 
 dfm_status dfm_trimesh_destroy(dfm_trimesh mesh) {
-  return guard([&] { Object::destroy(mesh); });
+  return as_status([&] { Object::destroy(mesh); });
 }
 
 dfm_status dfm_trimesh_get_info(dfm_trimesh mesh, dfm_trimesh_info *out) {
-  return guard([&] {
+  return as_status([&] {
     const Object &object = Object::of(mesh);
     const dfm::TriMesh &m = object.mesh;
     const dfm::TriMeshStatistics &s = object.statistics;
@@ -117,7 +117,7 @@ dfm_status dfm_trimesh_get_info(dfm_trimesh mesh, dfm_trimesh_info *out) {
 
 dfm_status dfm_trimesh_data(dfm_trimesh mesh, const double **points, const uint32_t **triangles,
                             const uint32_t **file_point) {
-  return guard([&] {
+  return as_status([&] {
     const dfm::TriMesh &m = Object::of(mesh).mesh;
     if (points) *points = m.points.data();
     if (triangles) *triangles = m.tris.data();
@@ -126,7 +126,7 @@ dfm_status dfm_trimesh_data(dfm_trimesh mesh, const double **points, const uint3
 }
 
 dfm_status dfm_trimesh_groups(dfm_trimesh mesh, const char *const **names, const uint32_t **triangle_group) {
-  return guard([&] {
+  return as_status([&] {
     const Object &object = Object::of(mesh);
     if (names) *names = object.names.data();
     if (triangle_group) *triangle_group = object.mesh.tri_group.data();
@@ -134,7 +134,7 @@ dfm_status dfm_trimesh_groups(dfm_trimesh mesh, const char *const **names, const
 }
 
 dfm_status dfm_trimesh_write(dfm_trimesh mesh, const char *path) {
-  return guard([&] {
+  return as_status([&] {
     need(path, "path");
     dfm::write_tri_mesh(Object::of(mesh).mesh, path);
   });

@@ -80,7 +80,7 @@ dfm_world_def dfm_world_def_default(void) {
 }
 
 dfm_status dfm_world_create(dfm_context *context, const dfm_world_def *def, dfm_world *out) {
-  return guard([&] {
+  return as_status([&] {
     need(context, "context");
     need(out, "out");
     auto w = std::make_unique<World>(&used(*context));
@@ -140,8 +140,8 @@ dfm_status dfm_world_create(dfm_context *context, const dfm_world_def *def, dfm_
 }
 
 dfm_status dfm_world_destroy(dfm_world world) {
-  return guard([&] {
-    World &w = idle(world_of(world));
+  return as_status([&] {
+    World &w = exclusive(world_of(world));
     w.context->remove_live(world);
     Call::now().let_go();
     destroy_world(world);
@@ -149,8 +149,8 @@ dfm_status dfm_world_destroy(dfm_world world) {
 }
 
 dfm_status dfm_world_set_gravity(dfm_world world, const double gravity[3]) {
-  return guard([&] {
-    World &w = idle(world_of(world));
+  return as_status([&] {
+    World &w = exclusive(world_of(world));
     need(gravity, "gravity");
     for (int k = 0; k < 3; ++k)
       if (!std::isfinite(gravity[k])) fail(DFM_E_ARG, "gravity is not finite; give m/s2");
@@ -163,8 +163,8 @@ dfm_status dfm_world_set_gravity(dfm_world world, const double gravity[3]) {
 }
 
 dfm_status dfm_world_set_gravity_keys(dfm_world world, uint32_t n, const dfm_vector_key *keys) {
-  return guard([&] {
-    World &w = idle(world_of(world));
+  return as_status([&] {
+    World &w = exclusive(world_of(world));
     if (n) need(keys, "keys");
     std::vector<dfm_vector_key> copy(keys, keys + n);
     check_keys(copy, "gravity");
@@ -176,8 +176,8 @@ dfm_status dfm_world_set_gravity_keys(dfm_world world, uint32_t n, const dfm_vec
 }
 
 dfm_status dfm_world_set_sleep(dfm_world world, bool sleep) {
-  return guard([&] {
-    World &w = idle(world_of(world));
+  return as_status([&] {
+    World &w = exclusive(world_of(world));
     if (sleep) need_ability(w, Ability::sleep);
     wake_all(w);
     w.def.sleep = sleep;
@@ -186,8 +186,8 @@ dfm_status dfm_world_set_sleep(dfm_world world, bool sleep) {
 }
 
 dfm_status dfm_world_step(dfm_world world, double dt, uint32_t *trouble) {
-  return guard([&]() -> dfm_status {
-    World &w = idle(world_of(world));
+  return as_status([&]() -> dfm_status {
+    World &w = exclusive(world_of(world));
     if (!(dt > 0 && std::isfinite(dt))) fail(DFM_E_ARG, "a step of %g s; it must be positive and finite", dt);
     if (const double floor = shortest_step(w, dt); dt < floor)
       fail(DFM_E_ARG, "%s", short_step(dt, floor).c_str());
@@ -199,8 +199,8 @@ dfm_status dfm_world_step(dfm_world world, double dt, uint32_t *trouble) {
 }
 
 dfm_status dfm_world_set_budget(dfm_world world, double max_time, uint64_t max_work) {
-  return guard([&] {
-    World &w = idle(world_of(world));
+  return as_status([&] {
+    World &w = exclusive(world_of(world));
     check_max_time(max_time);
     w.def.max_time = max_time;
     w.def.max_work = max_work;
@@ -210,19 +210,19 @@ dfm_status dfm_world_set_budget(dfm_world world, double max_time, uint64_t max_w
 dfm_status dfm_world_interrupt(dfm_world world) {
   // no look into the table: a signal may have come inside it
   if (uint8_t(world >> 32) != uint8_t(Kind::world))
-    return guard([&] {
+    return as_status([&] {
       fail(DFM_E_HANDLE,
            "world handle 0x%llx is not that of a world; pass the handle of the world to interrupt",
            static_cast<unsigned long long>(world));
     });
-  return request_stop(world) ? DFM_OK : guard([] {
+  return request_stop(world) ? DFM_OK : as_status([] {
     fail(DFM_E_NOMEM, "64 other worlds have been asked to stop and have not stepped since");
   });
 }
 
 dfm_status dfm_world_stable_step(dfm_world world, double *dt, dfm_body *body, uint32_t *point) {
-  return guard([&] {
-    World &w = idle(world_of(world));
+  return as_status([&] {
+    World &w = exclusive(world_of(world));
     need(dt, "dt");
     prepare(w);
     // The bound that the next step uses: asked anew only when it would ask, so that reading it
@@ -236,9 +236,9 @@ dfm_status dfm_world_stable_step(dfm_world world, double *dt, dfm_body *body, ui
 
 dfm_status dfm_world_overlaps_sized(dfm_world world, uint32_t row_size, uint32_t capacity, dfm_overlap *out,
                                     uint32_t *n) {
-  return guard([&] {
+  return as_status([&] {
     Rows<dfm_overlap> rows(out, row_size, "dfm_overlap");
-    World &w = idle(world_of(world));
+    World &w = exclusive(world_of(world));
     prepare(w);
     if (!room(static_cast<uint32_t>(w.overlaps.found.size()), capacity, out, n)) return;
     for (const Overlap &o : w.overlaps.found) {
@@ -251,8 +251,8 @@ dfm_status dfm_world_overlaps_sized(dfm_world world, uint32_t row_size, uint32_t
 }
 
 dfm_status dfm_world_find_overlaps(dfm_world world, uint32_t *n) {
-  return guard([&] {
-    World &w = idle(world_of(world));
+  return as_status([&] {
+    World &w = exclusive(world_of(world));
     prepare(w);
     const bool told = w.overlaps.told;
     w.overlaps.all = w.overlaps.look_only = true;
@@ -263,8 +263,8 @@ dfm_status dfm_world_find_overlaps(dfm_world world, uint32_t *n) {
 }
 
 dfm_status dfm_world_untangle(dfm_world world, uint32_t *left) {
-  return guard([&] {
-    World &w = idle(world_of(world));
+  return as_status([&] {
+    World &w = exclusive(world_of(world));
     w.overlaps.all = w.overlaps.untangle = true;
     prepare(w);
     const auto &found = w.overlaps.found;
@@ -285,8 +285,8 @@ uint64_t dfm_world_hash(dfm_world world) {
 }
 
 dfm_status dfm_world_snapshot(dfm_world world, void *buffer, size_t *bytes) {
-  return guard([&] {
-    World &w = idle(world_of(world));
+  return as_status([&] {
+    World &w = exclusive(world_of(world));
     prepare(w);
     std::vector<unsigned char> data;
     world_snapshot(w, data);
@@ -295,15 +295,15 @@ dfm_status dfm_world_snapshot(dfm_world world, void *buffer, size_t *bytes) {
 }
 
 dfm_status dfm_world_restore(dfm_world world, const void *buffer, size_t bytes) {
-  return guard([&] {
-    World &w = idle(world_of(world));
+  return as_status([&] {
+    World &w = exclusive(world_of(world));
     need(buffer, "buffer");
     world_restore(w, buffer, bytes);
   });
 }
 
 dfm_status dfm_world_find_body(dfm_world world, const char *name, dfm_body *out) {
-  return guard([&] {
+  return as_status([&] {
     World &w = world_of(world);
     need(name, "name");
     need(out, "out");
@@ -320,7 +320,7 @@ dfm_status dfm_world_find_body(dfm_world world, const char *name, dfm_body *out)
 }
 
 dfm_status dfm_world_bodies(dfm_world world, uint32_t capacity, dfm_body *bodies, uint32_t *n) {
-  return guard([&] {
+  return as_status([&] {
     World &w = world_of(world);
     if (!room(static_cast<uint32_t>(w.bodies.size()), capacity, bodies, n)) return;
     for (size_t i = 0; i < w.bodies.size(); ++i) bodies[i] = w.bodies[i]->handle;
@@ -328,7 +328,7 @@ dfm_status dfm_world_bodies(dfm_world world, uint32_t capacity, dfm_body *bodies
 }
 
 dfm_status dfm_world_obstacles(dfm_world world, uint32_t capacity, dfm_obstacle *obstacles, uint32_t *n) {
-  return guard([&] {
+  return as_status([&] {
     World &w = world_of(world);
     if (!room(static_cast<uint32_t>(w.obstacles.size()), capacity, obstacles, n)) return;
     for (size_t i = 0; i < w.obstacles.size(); ++i) obstacles[i] = w.obstacles[i]->handle;
@@ -336,7 +336,7 @@ dfm_status dfm_world_obstacles(dfm_world world, uint32_t capacity, dfm_obstacle 
 }
 
 dfm_status dfm_world_get_stats(dfm_world world, dfm_world_stats *out) {
-  return guard([&] {
+  return as_status([&] {
     const World &w = world_of(world);
     dfm_world_stats s = w.stats;
     s.rebuilds = w.steps->broad.stats().rebuilds;
@@ -350,9 +350,9 @@ dfm_status dfm_world_get_stats(dfm_world world, dfm_world_stats *out) {
 
 dfm_status dfm_world_profile_sized(dfm_world world, uint32_t row_size, uint32_t capacity, dfm_stage_time *out,
                                    uint32_t *n) {
-  return guard([&] {
+  return as_status([&] {
     Rows<dfm_stage_time> rows(out, row_size, "dfm_stage_time");
-    World &w = idle(world_of(world));
+    World &w = exclusive(world_of(world));
     prepare(w);
     if (!room(static_cast<uint32_t>(w.plan.stages.size()), capacity, out, n)) return;
     for (size_t i = 0; i < w.plan.stages.size(); ++i) {
@@ -364,8 +364,8 @@ dfm_status dfm_world_profile_sized(dfm_world world, uint32_t row_size, uint32_t 
 }
 
 dfm_status dfm_world_explain(dfm_world world, char *text, size_t *bytes) {
-  return guard([&] {
-    World &w = idle(world_of(world));
+  return as_status([&] {
+    World &w = exclusive(world_of(world));
     prepare(w);
     if (bound_due(w)) update_bound(w);
     const std::string json = explain(w);

@@ -11,7 +11,7 @@ namespace dfm {
 
 // Runs f and turns what it throws into a status and the sentence of dfm_last_error().
 template <class F>
-dfm_status guard(F &&f) noexcept {
+dfm_status as_status(F &&f) noexcept {
   Call call;
   try {
     if constexpr (std::is_same_v<std::invoke_result_t<F>, dfm_status>) {
