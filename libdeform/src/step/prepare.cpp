@@ -80,6 +80,152 @@ void look_at_plan(World &w, StepContext &step) {
   w.revalued = false;
 }
 
+void view_bodies(World &w, StepContext &step, SceneFacts &facts) {
+  step.body_views.clear();
+  step.sources.clear();
+  uint32_t node = 0, point = 0;
+  for (uint32_t i = 0; i < w.bodies.size(); ++i) {
+    Body &b = *w.bodies[i];
+    b.slot = i;
+    facts.self_stepping += !b.dynamics->abilities().forces;
+    const Surface &s = b.surface;
+    step.body_views.push_back({i, node, b.category, b.collides_with, b.id, &s});
+    step.sources.push_back(
+        {node, s.nsurfel, point, b.p.n, &s, b.dynamics->diagonal(), b.dynamics->contact_velocity()});
+    if (!s.identity()) {
+      ++facts.coupled;
+      facts.coupled_surfels += s.nsurfel;
+    }
+    node += s.nsurfel;
+    point += b.p.n;
+    for (const std::string &e : effects(*b.model.type))
+      (b.model.works(e) ? facts.offered : facts.idle).push_back({e, b.model.type->id});
+  }
+}
+
+ObstacleView view_of(Obstacle &o) {
+  ObstacleView v{};
+  v.slot = o.slot;
+  v.category = o.def.category;
+  v.collides_with = o.def.collides_with;
+  v.id = o.id;
+  v.shape = Shape(o.def.shape);
+  if (v.shape == Shape::none) v.category = v.collides_with = 0;
+  v.position = o.pose.position;
+  v.rotation = o.pose.rotation;
+  v.half_size = load3(o.def.half_size);
+  v.radius = o.def.radius;
+  v.half_length = o.def.half_length;
+  v.belt = load3(o.def.velocity_surface);
+  if (o.mesh) {
+    o.mesh->place(v.position, v.rotation, {}, {});
+    v.surface = &o.mesh->surface;
+    v.extent = o.mesh->extent;
+  }
+  if (o.grid) {
+    v.grid = o.grid.get();
+    v.extent = o.grid->extent();
+  }
+  return v;
+}
+
+void view_obstacles_anew(World &w, StepContext &step) {
+  step.obstacle_views.clear();
+  for (uint32_t i = 0; i < w.obstacles.size(); ++i) {
+    w.obstacles[i]->slot = i;
+    step.obstacle_views.push_back(view_of(*w.obstacles[i]));
+  }
+}
+
+void view_rigids(World &w, SceneFacts &facts) {
+  place_rigids(w);
+  for (auto &set : w.rigid_sets) {
+    facts.rigid_bodies += static_cast<unsigned>(set->defs.size());
+    facts.rigid_joints += set->njoint;
+    if (facts.rigid_hosts.find(set->host_name) == std::string::npos)
+      facts.rigid_hosts += (facts.rigid_hosts.empty() ? "" : ", ") + set->host_name;
+    facts.offered.push_back({"two_way_rigid", "rigid host " + set->host_name});
+  }
+}
+
+// What a body may meet: another body, or an obstacle.
+struct Partner {
+  uint64_t id;
+  uint32_t category, collides_with;
+  PairSide side;
+  bool has_shape;
+};
+Partner partner_of(const World &w, const StepContext &step, uint32_t thing) {
+  const uint32_t nb = static_cast<uint32_t>(w.bodies.size());
+  if (thing < nb) {
+    const Body &b = *w.bodies[thing];
+    return {b.id, b.category, b.collides_with, {b.name, {}, b.material}, true};
+  }
+  const Obstacle &o = *w.obstacles[thing - nb];
+  return {o.id,
+          o.def.category,
+          o.def.collides_with,
+          {o.name, {}, o.material},
+          step.obstacle_views[o.slot].shape != Shape::none};
+}
+
+// Filters, then laws. The default law is made only when a pair needs it.
+void make_pair_tables(World &w, StepContext &step, SceneFacts &facts) {
+  const uint32_t nb = static_cast<uint32_t>(w.bodies.size());
+  const uint32_t width = nb + static_cast<uint32_t>(w.obstacles.size());
+  // rises, so that lists made under older rules are renewed
+  const uint64_t filter_version = w.pairs.filter.version;
+  w.pairs.filter = PairFilter(w.memory());
+  w.pairs.filter.version = filter_version + 1;
+  w.pairs.law.assign(size_t(nb) * width, 0);
+  w.pairs.zone_table.clear();
+  w.pairs.zone_law.clear();
+  for (auto &law : w.laws) law->by_default = false;
+  std::vector<uint32_t> used;
+  for (uint32_t i = 0; i < nb; ++i) {
+    const Partner a = partner_of(w, step, i);
+    for (uint32_t j = 0; j < width; ++j) {
+      if (j == i) continue;
+      const bool is_body = j < nb;
+      const Partner b = partner_of(w, step, j);
+      bool touch = (a.category & b.collides_with) && (b.category & a.collides_with);
+      if (const FilterRule *rule = best_rule(w.filters, a.side, b.side)) {
+        if (!is_body || i < j) w.pairs.filter.set(a.id, b.id, !is_body, rule->collide);
+        touch = rule->collide;
+      }
+      if (!touch || !b.has_shape) continue;
+      if (is_body) facts.body_pairs += i < j;
+      else ++facts.obstacle_pairs;
+      find_law(w, i, j, used);
+      for (uint32_t law : used) offer(*w.laws[law]->type, facts.offered);
+    }
+  }
+  keep_overlaps_aside(w);
+  facts.effects_listed = w.def.effects != nullptr;
+  facts.asked = w.asked_effects;
+  choose_self_bodies(w, step, facts, used);
+  w.pairs.laws.clear();
+  for (auto &l : w.laws) w.pairs.laws.push_back(l.get());
+}
+
+void choose_plan(World &w, StepContext &step, SceneFacts &facts) {
+  for (const dfm_type *t : w.context->registry.list()) offer(*t, facts.available);
+  facts.unguarded = w.def.flags & DFM_WORLD_UNGUARDED;
+  facts.available.push_back({kSelfContact, "contact"});
+  if (facts.bodies && facts.effects_listed) facts.offered.push_back({kSelfContact, "contact"});
+  if (facts.self_bodies) need_ability(w, Ability::self_contact);
+  w.plan = make_plan(w.method->table, facts);
+  ++step.made.plans;
+}
+
+// While contacts live it only falls: a larger one would turn their rest into a depth, and push them apart at
+// 0.1 d_c / h.
+double choose_offset(const World &w) {
+  if (w.def.contact_offset > 0) return w.def.contact_offset;
+  const double wanted = contact_offset(w);
+  return w.store.n > 0 ? std::min(w.offset, wanted) : wanted;
+}
+
 }  // namespace
 
 void values_changed(World &w) {
@@ -99,132 +245,22 @@ void prepare(World &w, const RestoredChoice *restored) {
     return settle_overlaps(w);
   }
   const uint32_t nb = static_cast<uint32_t>(w.bodies.size());
-  const uint32_t no = static_cast<uint32_t>(w.obstacles.size());
-  const uint32_t width = nb + no;
   SceneFacts &facts = step.facts;
   facts = {};
   facts.bodies = nb;
-  facts.obstacles = no;
+  facts.obstacles = static_cast<unsigned>(w.obstacles.size());
   facts.sleep = w.def.sleep != 0;
   put(prescribed(w), facts);
-
-  step.body_views.clear();
-  step.obstacle_views.clear();
-  step.sources.clear();
   step.exchange.clear();
-  uint32_t node = 0, point = 0;
-  for (uint32_t i = 0; i < nb; ++i) {
-    Body &b = *w.bodies[i];
-    b.slot = i;
-    facts.self_stepping += !b.dynamics->abilities().forces;
-    const Surface &s = b.surface;
-    step.body_views.push_back({i, node, b.category, b.collides_with, b.id, &s});
-    step.sources.push_back(
-        {node, s.nsurfel, point, b.p.n, &s, b.dynamics->diagonal(), b.dynamics->contact_velocity()});
-    if (!s.identity()) {
-      ++facts.coupled;
-      facts.coupled_surfels += s.nsurfel;
-    }
-    node += s.nsurfel;
-    point += b.p.n;
-    for (const std::string &e : effects(*b.model.type))
-      (b.model.works(e) ? facts.offered : facts.idle).push_back({e, b.model.type->id});
-  }
-  for (uint32_t i = 0; i < no; ++i) {
-    Obstacle &o = *w.obstacles[i];
-    o.slot = i;
-    ObstacleView v{};
-    v.slot = i;
-    v.category = o.def.category;
-    v.collides_with = o.def.collides_with;
-    v.id = o.id;
-    v.shape = Shape(o.def.shape);
-    if (v.shape == Shape::none) v.category = v.collides_with = 0;
-    v.position = o.pose.position;
-    v.rotation = o.pose.rotation;
-    v.half_size = load3(o.def.half_size);
-    v.radius = o.def.radius;
-    v.half_length = o.def.half_length;
-    v.belt = load3(o.def.velocity_surface);
-    if (o.mesh) {
-      o.mesh->place(v.position, v.rotation, {}, {});
-      v.surface = &o.mesh->surface;
-      v.extent = o.mesh->extent;
-    }
-    if (o.grid) {
-      v.grid = o.grid.get();
-      v.extent = o.grid->extent();
-    }
-    step.obstacle_views.push_back(v);
-  }
-
-  place_rigids(w);
-  for (auto &set : w.rigid_sets) {
-    facts.rigid_bodies += static_cast<unsigned>(set->defs.size());
-    facts.rigid_joints += set->njoint;
-    if (facts.rigid_hosts.find(set->host_name) == std::string::npos)
-      facts.rigid_hosts += (facts.rigid_hosts.empty() ? "" : ", ") + set->host_name;
-    facts.offered.push_back({"two_way_rigid", "rigid host " + set->host_name});
-  }
-
-  // Pairs: filters, then laws. The default law is made only when a pair needs it.
-  // rises, so that lists made under older rules are renewed
-  const uint64_t filter_version = w.pairs.filter.version;
-  w.pairs.filter = PairFilter(w.memory());
-  w.pairs.filter.version = filter_version + 1;
-  w.pairs.law.assign(size_t(nb) * width, 0);
-  w.pairs.zone_table.clear();
-  w.pairs.zone_law.clear();
-  for (auto &law : w.laws) law->by_default = false;
-  std::vector<uint32_t> used;
-  for (uint32_t i = 0; i < nb; ++i) {
-    const PairSide a{w.bodies[i]->name, {}, w.bodies[i]->material};
-    for (uint32_t j = 0; j < width; ++j) {
-      const bool is_body = j < nb;
-      if (is_body && j == i) continue;
-      const uint64_t id = is_body ? w.bodies[j]->id : w.obstacles[j - nb]->id;
-      const PairSide b = is_body ? PairSide{w.bodies[j]->name, {}, w.bodies[j]->material}
-                                 : PairSide{w.obstacles[j - nb]->name, {}, w.obstacles[j - nb]->material};
-      bool touch = is_body ? (w.bodies[i]->category & w.bodies[j]->collides_with) &&
-                                 (w.bodies[j]->category & w.bodies[i]->collides_with)
-                           : (w.bodies[i]->category & w.obstacles[j - nb]->def.collides_with) &&
-                                 (w.obstacles[j - nb]->def.category & w.bodies[i]->collides_with);
-      if (const FilterRule *rule = best_rule(w.filters, a, b)) {
-        if (!is_body || i < j) w.pairs.filter.set(w.bodies[i]->id, id, !is_body, rule->collide);
-        touch = rule->collide;
-      }
-      if (!is_body && step.obstacle_views[j - nb].shape == Shape::none) touch = false;
-      if (!touch) continue;
-      if (is_body) facts.body_pairs += i < j;
-      else ++facts.obstacle_pairs;
-      find_law(w, i, j, used);
-      for (uint32_t law : used) offer(*w.laws[law]->type, facts.offered);
-    }
-  }
-  keep_overlaps_aside(w);
-  facts.effects_listed = w.def.effects != nullptr;
-  facts.asked = w.asked_effects;
-  choose_self_bodies(w, step, facts, used);
-  w.pairs.laws.clear();
-  for (auto &l : w.laws) w.pairs.laws.push_back(l.get());
-
-  for (const dfm_type *t : w.context->registry.list()) offer(*t, facts.available);
-  facts.unguarded = w.def.flags & DFM_WORLD_UNGUARDED;
-  facts.available.push_back({kSelfContact, "contact"});
-  if (nb && facts.effects_listed) facts.offered.push_back({kSelfContact, "contact"});
-  if (facts.self_bodies) need_ability(w, Ability::self_contact);
-  w.plan = make_plan(w.method->table, facts);
-  ++step.made.plans;
+  view_bodies(w, step, facts);
+  view_obstacles_anew(w, step);
+  view_rigids(w, facts);
+  make_pair_tables(w, step, facts);
+  choose_plan(w, step, facts);
   if (!restored && !w.plan.touches()) end_contacts(w);
 
-  // While contacts live it only falls: a larger one would turn their rest into a depth, and push them apart
-  // at 0.1 d_c / h.
-  const double wanted = contact_offset(w);
   const double before = w.offset;
-  w.offset = restored                   ? restored->offset
-             : w.def.contact_offset > 0 ? w.def.contact_offset
-             : w.store.n > 0            ? std::min(w.offset, wanted)
-                                        : wanted;
+  w.offset = restored ? restored->offset : choose_offset(w);
   if (!restored) check_offset(w);
   for (auto &b : w.bodies)
     if (w.def.sleep && b->anchor.empty()) b->anchor = b->p.x;
