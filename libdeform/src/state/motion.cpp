@@ -4,6 +4,7 @@
 
 #include "core/error.h"
 #include "math/trig.h"
+#include "math/turn.h"
 
 namespace dfm {
 namespace {
@@ -18,11 +19,6 @@ size_t locate(const std::vector<Key> &keys, double t, double *s) {
   while (keys[i + 1].t <= t) ++i;
   *s = (t - keys[i].t) / (keys[i + 1].t - keys[i].t);
   return i;
-}
-
-Quat normalized(Quat q) {
-  const double n = std::sqrt(q.x * q.x + q.y * q.y + q.z * q.z + q.w * q.w);
-  return {q.x / n, q.y / n, q.z / n, q.w / n};
 }
 
 template <class Key, class Finite>
@@ -46,23 +42,6 @@ bool all_finite(const double *p, int n) {
 
 Pose to_pose(const dfm_pose &p) { return {load3(p.position), unit_quat(p.rotation)}; }
 
-// Halving the arc needs square roots only: the midpoint of two unit quaternions is their normalized sum. 52
-// halvings follow the bits of s.
-Quat slerp(Quat a, Quat b, double s) {
-  if (a.x * b.x + a.y * b.y + a.z * b.z + a.w * b.w < 0) b = {-b.x, -b.y, -b.z, -b.w};
-  for (int bit = 0; bit < 52 && s > 0; ++bit) {
-    const Quat mid = normalized({a.x + b.x, a.y + b.y, a.z + b.z, a.w + b.w});
-    s *= 2;
-    if (s >= 1) {
-      a = mid;
-      s -= 1;
-    } else {
-      b = mid;
-    }
-  }
-  return a;
-}
-
 Vec3 spin_between(Quat a, Quat b, double h) {
   Quat d = b * Quat{-a.x, -a.y, -a.z, a.w};
   if (d.w < 0) d = {-d.x, -d.y, -d.z, -d.w};
@@ -70,7 +49,7 @@ Vec3 spin_between(Quat a, Quat b, double h) {
   const Quat one{};
   double scale = 2;
   for (int i = 0; i < 5; ++i) {
-    d = normalized({d.x + one.x, d.y + one.y, d.z + one.z, d.w + one.w});
+    d = unit({d.x + one.x, d.y + one.y, d.z + one.z, d.w + one.w});
     scale *= 2;
   }
   const Vec3 v{d.x, d.y, d.z};

@@ -22,7 +22,6 @@ double scale_at(const std::vector<dfm_scale_key> &keys, double t);
 // amplitude * sin(2 pi frequency t + phase)
 double sine_at(const dfm_sine &s, double t);
 
-Quat slerp(Quat a, Quat b, double s);
 // Angular velocity (world frame) that turns a into b in h seconds along the shorter arc, for arcs
 // well below a turn.
 Vec3 spin_between(Quat a, Quat b, double h);

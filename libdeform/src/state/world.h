@@ -8,6 +8,7 @@
 
 #include "contact/report.h"
 #include "contact/store.h"
+#include "dynamics/rigid/rigid_set.h"
 #include "friction/laws.h"
 #include "plan/plan.h"
 #include "plugin/context.h"
@@ -18,7 +19,6 @@
 #include "state/obstacle.h"
 #include "state/overlaps.h"
 #include "state/pair_tables.h"
-#include "state/rigid_set.h"
 #include "state/step_sizes.h"
 #include "state/world_bound.h"
 

@@ -19,6 +19,7 @@
 #include "contact/reach.h"
 #include "geometry/obstacle_shape.h"
 #include "geometry/pierce.h"
+#include "math/turn.h"
 #include "narrow/detail.h"
 #include "state/world.h"
 #include "step/context.h"

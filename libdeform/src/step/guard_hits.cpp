@@ -4,7 +4,7 @@
 #include <array>
 
 #include "ccd/toi_guard_motion.h"
-#include "dynamics/rigid/turn.h"
+#include "math/turn.h"
 #include "narrow/detail.h"
 #include "state/world.h"
 #include "step/context.h"

@@ -1,3 +1,4 @@
+#include "math/turn.h"
 #include "step/move_obstacles.h"
 
 #include "step/context.h"

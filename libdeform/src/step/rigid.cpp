@@ -8,7 +8,7 @@
 #include <new>
 
 #include "core/error.h"
-#include "dynamics/rigid/turn.h"
+#include "math/turn.h"
 #include "state/world.h"
 #include "step/context.h"
 #include "step/stages.h"
@@ -20,32 +20,21 @@ Quat rotation_of(const dfm_rigid_state &s) {
   return {s.rotation[0], s.rotation[1], s.rotation[2], s.rotation[3]};
 }
 
-bool finite(const double *p, size_t n) {
-  double poison = 0;
-  for (size_t i = 0; i < n; ++i) poison += 0.0 * p[i];
-  return poison == 0;
-}
-constexpr size_t kStateValues = sizeof(dfm_rigid_state) / sizeof(double);
-
 // said: sentences() before the host was called. Its own reason comes along where it has given one.
-bool host_failed(const World &w, const RigidSet &set, dfm_status status, const char *what, uint64_t said,
+bool host_failed(const World &w, const RigidSet &set, const HostFault &fault, uint64_t said,
                  uint32_t *trouble) {
-  need_memory(status);
+  need_memory(fault.status);
   *trouble |= DFM_TROUBLE_PLUGIN;
   const std::string why =
       said != sentences() ? last_error() : "take a smaller step or look at its masses and motors";
   set_last_error(format("step %llu, rigid body '%s' and those with it: host '%s' %s; %s",
                         static_cast<unsigned long long>(w.step_count), set.defs[0].name,
-                        set.host_name.c_str(), what, why.c_str())
+                        set.host_name.c_str(), fault.what, why.c_str())
                      .c_str());
   return false;
 }
 
 }  // namespace
-
-void need_memory(dfm_status status) {
-  if (status == DFM_E_NOMEM) throw std::bad_alloc();
-}
 
 Obstacle &rigid_obstacle(World &w, uint64_t id) {
   for (auto &o : w.obstacles)
@@ -88,29 +77,14 @@ void place_rigids(World &w) {
 
 bool ask_rigids(World &w, uint32_t *trouble) {
   const uint64_t said = sentences();
-  for (auto &set : w.rigid_sets) {
-    RigidSet &s = *set;
-    std::fill(s.velocity.begin(), s.velocity.end(), 0.0);
-    if (const dfm_status status = s.host.predict(s.self, &s.step, s.velocity.data()); status != DFM_OK)
-      return host_failed(w, s, status, "gave no velocities", said, trouble);
-    if (!finite(s.velocity.data(), s.velocity.size()))
-      return host_failed(w, s, DFM_OK, "gave velocities that are not finite", said, trouble);
-  }
+  for (auto &set : w.rigid_sets)
+    if (const HostFault fault = set->free_motion()) return host_failed(w, *set, fault, said, trouble);
   return true;
 }
 
 bool stage_rigid_predict(World &w, StepContext &step, uint32_t *trouble) {
   step.rigid_again = false;
-  for (auto &set : w.rigid_sets) {
-    const uint32_t n = static_cast<uint32_t>(set->defs.size());
-    set->step = {sizeof set->step,
-                 n,
-                 w.time,
-                 step.h,
-                 {w.gravity.now.x, w.gravity.now.y, w.gravity.now.z},
-                 set->state.data(),
-                 set->extra.data()};
-  }
+  for (auto &set : w.rigid_sets) set->begin(sub_step_of(w, step));
   if (!ask_rigids(w, trouble)) return false;
   for (auto &set : w.rigid_sets) set->first.assign(set->velocity.begin(), set->velocity.end());
   for (auto &o : w.obstacles) {
@@ -130,10 +104,7 @@ bool stage_rigid_predict(World &w, StepContext &step, uint32_t *trouble) {
 void rigid_response(World &w, StepContext &step, uint32_t group, double *matrix) {
   for (auto &set : w.rigid_sets) {
     if (group < set->first_group || group >= set->first_group + set->ngroup) continue;
-    const size_t width = 6 * size_t{step.rigid_groups[group]};
-    const dfm_status status = set->host.respond(set->self, &set->step, group - set->first_group, matrix);
-    need_memory(status);
-    if (status != DFM_OK || !finite(matrix, width * width))
+    if (!set->respond(group - set->first_group, step.rigid_groups[group], matrix))
       fail(DFM_E_FATAL, "rigid host '%s' does not answer impulses on '%s' and those with it",
            set->host_name.c_str(), set->defs[0].name);
     return;
@@ -180,11 +151,8 @@ bool revise_rigids(World &w, StepContext &step) {
   bool any = false;
   for (auto &set : w.rigid_sets) {
     if (!set->host.revise) continue;
-    uint32_t changed = 0;
-    const dfm_status status =
-        set->host.revise(set->self, &set->step, set->impulse.data(), set->revised.data(), &changed);
-    need_memory(status);
-    if (status != DFM_OK || !finite(set->revised.data(), set->revised.size()))
+    bool changed = false;
+    if (!set->revise(changed))
       fail(DFM_E_FATAL, "rigid host '%s' does not answer contact on '%s' and those with it",
            set->host_name.c_str(), set->defs[0].name);
     if (!changed) continue;
@@ -212,22 +180,11 @@ int ask_rigid_ends(World &w, uint32_t *trouble) {
   const uint64_t said = sentences();
   bool again = false;
   for (auto &set : w.rigid_sets)
-    if (const dfm_status status =
-            set->host.push ? set->host.push(set->self, &set->step, set->impulse.data()) : DFM_OK;
-        status != DFM_OK)
-      return host_failed(w, *set, status, "did not take its impulses", said, trouble);
+    if (const HostFault fault = set->take_impulses()) return host_failed(w, *set, fault, said, trouble);
   for (auto &set : w.rigid_sets) {
-    RigidSet &s = *set;
-    const dfm_status status =
-        s.host.commit(s.self, &s.step, s.impulse.data(), s.next.data(), s.next_extra.data());
-    if (status != DFM_OK && status != DFM_RIGID_AGAIN)
-      return host_failed(w, s, status, "could not end its step", said, trouble);
-    again |= status == DFM_RIGID_AGAIN;
-    for (uint32_t i = 0; i < s.defs.size(); ++i)
-      if (s.group[i] == DFM_RIGID_STILL) s.next[i] = s.state[i];
-    if (!finite(reinterpret_cast<const double *>(s.next.data()), kStateValues * s.next.size()) ||
-        !finite(s.next_extra.data(), s.next_extra.size()))
-      return host_failed(w, s, DFM_OK, "ended its step with something not finite", said, trouble);
+    bool one = false;
+    if (const HostFault fault = set->end_state(one)) return host_failed(w, *set, fault, said, trouble);
+    again |= one;
   }
   return again ? 2 : 1;
 }
@@ -257,25 +214,7 @@ bool stage_rigid_commit(World &w, StepContext &step, uint32_t *trouble) {
 }
 
 void keep_rigids(World &w, StepContext &step) {
-  for (auto &set : w.rigid_sets) {
-    // the share of their way that the guard has left
-    for (uint32_t i = 0; step.guard.motion < 1 && i < set->defs.size(); ++i) {
-      const dfm_rigid_state &from = set->state[i];
-      dfm_rigid_state &to = set->next[i];
-      const Quat q = slerp(rotation_of(from), rotation_of(to), step.guard.motion);
-      store3(to.position,
-             load3(from.position) + step.guard.motion * (load3(to.position) - load3(from.position)));
-      to.rotation[0] = q.x;
-      to.rotation[1] = q.y;
-      to.rotation[2] = q.z;
-      to.rotation[3] = q.w;
-    }
-    set->state.swap(set->next);
-    set->extra.swap(set->next_extra);
-    for (uint32_t i = 0; i < set->defs.size(); ++i)
-      for (uint32_t k = 0; k < 3; ++k) set->total[3 * i + k] += set->impulse[6 * i + k];
-    set->last_h = step.h;
-  }
+  for (auto &set : w.rigid_sets) set->commit(sub_step_of(w, step), step.guard.motion);
   if (!w.rigid_sets.empty())
     for (auto &o : w.obstacles)
       if (o->rigid) o->pose = shape_pose(*o, o->rigid->state[o->rigid_body]);
@@ -306,7 +245,7 @@ void set_rigid_state(Obstacle &o, const dfm_rigid_state &given) {
   RigidSet &set = *o.rigid;
   if (set.group[o.rigid_body] == DFM_RIGID_STILL)
     fail(DFM_E_ARG, "rigid body '%s' is fixed; it cannot be put elsewhere", o.name.c_str());
-  if (!finite(reinterpret_cast<const double *>(&given), kStateValues))
+  if (!finite_values({&given, 1}))
     fail(DFM_E_ARG, "rigid body '%s': the given state is not finite", o.name.c_str());
   check_velocity("rigid body", o.name.c_str(), load3(given.velocity), load3(given.spin), 1);
   check_place(*o.world, "rigid body", o.name.c_str(), largest_coordinate(given.position, 1, 3));

@@ -4,7 +4,7 @@
 #pragma once
 #include "math/vec3.h"
 #include "state/motion.h"
-#include "state/rigid_set.h"
+#include "dynamics/rigid/rigid_set.h"
 
 namespace dfm {
 
@@ -16,8 +16,6 @@ struct Obstacle;
 void create_rigids(World &w, const char *host, const dfm_rigid_set_def &def, uint64_t *out);
 void destroy_rigids(RigidSet &set);  // throws Error where the host keeps its bodies
 Obstacle &rigid_obstacle(World &w, uint64_t id);
-// a host without memory is no fault of what it was asked: ends as where the library itself finds none
-void need_memory(dfm_status status);
 void place_rigids(World &w);  // World::prepare(): slots and groups
 void rigid_response(World &w, StepContext &step, uint32_t group, double *matrix);
 void sum_rigid_impulses(World &w, StepContext &step);  // of the rows, into every set

@@ -139,16 +139,6 @@ void ask_host(RigidSet &set, const std::vector<dfm_joint_def> &joints, void *dat
 
 }  // namespace
 
-RigidSet::RigidSet(World &w, const std::string &name) : world(&w), host_name(name), host(find_host(name)) {
-  const Memory &m = w.memory();
-  use_memory(m, state, next);
-  use_memory(m, extra, next_extra, velocity, impulse, first, revised, total);
-}
-
-RigidSet::~RigidSet() {
-  if (self) host.destroy(self);
-}
-
 void destroy_rigids(RigidSet &set) {
   World &w = *set.world;
   const uint64_t said = sentences();
@@ -194,7 +184,7 @@ void create_rigids(World &w, const char *host, const dfm_rigid_set_def &def, uin
   need_ability(w, Ability::rigid_bodies);
   if (!def.nbody || !def.bodies) fail(DFM_E_ARG, "a set of rigid bodies needs at least one body");
   if (def.njoint && !def.joints) fail(DFM_E_ARG, "%u joints are announced, but joints is NULL", def.njoint);
-  auto owned = std::make_unique<RigidSet>(w, host ? host : "builtin");
+  auto owned = std::make_unique<RigidSet>(w, w.memory(), host ? host : "builtin");
   RigidSet &set = *owned;
   std::vector<std::string> names;
   for (uint32_t i = 0; i < def.nbody; ++i) {

@@ -11,7 +11,7 @@
 #include <set>
 
 #include "../world/inside.h"
-#include "dynamics/rigid/turn.h"
+#include "math/turn.h"
 #include "near.h"
 #include "world.h"
 

@@ -7,7 +7,7 @@
 
 #include "dense.h"
 #include "dynamics/rigid/host.h"
-#include "dynamics/rigid/turn.h"
+#include "math/turn.h"
 #include "near.h"
 #include "rigid.h"
 

@@ -19,7 +19,7 @@
 #include "core/error.h"
 #include "dynamics/rigid/host.h"
 #include "dynamics/rigid/joints.h"
-#include "dynamics/rigid/turn.h"
+#include "math/turn.h"
 
 namespace dfm {
 namespace {

@@ -1,6 +1,6 @@
 #include "dynamics/rigid/joints.h"
 
-#include "dynamics/rigid/turn.h"
+#include "math/turn.h"
 
 namespace dfm {
 namespace {

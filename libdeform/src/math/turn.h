@@ -1,5 +1,5 @@
-// Rotations of a rigid body over a step: exponential map, its inverse, and the mean spin that conserves
-// angular momentum. + - * / sqrt only.
+// Rotations: between two, and of a rigid body over a step: exponential map, its inverse, and the mean spin
+// that conserves angular momentum. + - * / sqrt only.
 #pragma once
 #include "math/trig.h"
 #include "math/vec3.h"
@@ -11,6 +11,23 @@ inline Quat unit(Quat q) {
   return {q.x / n, q.y / n, q.z / n, q.w / n};
 }
 inline Quat conjugate(Quat q) { return {-q.x, -q.y, -q.z, q.w}; }
+
+// From a to b along the shorter arc, s in [0,1]. Halving the arc needs square roots only: the midpoint of two
+// unit quaternions is their normalized sum. 52 halvings follow the bits of s.
+inline Quat slerp(Quat a, Quat b, double s) {
+  if (a.x * b.x + a.y * b.y + a.z * b.z + a.w * b.w < 0) b = {-b.x, -b.y, -b.z, -b.w};
+  for (int bit = 0; bit < 52 && s > 0; ++bit) {
+    const Quat mid = unit({a.x + b.x, a.y + b.y, a.z + b.z, a.w + b.w});
+    s *= 2;
+    if (s >= 1) {
+      a = mid;
+      s -= 1;
+    } else {
+      b = mid;
+    }
+  }
+  return a;
+}
 
 // q turned by the rotation vector r (world frame, rad).
 inline Quat turned(Quat q, Vec3 r) {

@@ -1,0 +1,109 @@
+#include "dynamics/rigid/rigid_set.h"
+
+#include <algorithm>
+#include <new>
+
+#include "math/turn.h"
+
+namespace dfm {
+namespace {
+
+constexpr size_t kStateValues = sizeof(dfm_rigid_state) / sizeof(double);
+
+Quat rotation_of(const dfm_rigid_state &s) {
+  return {s.rotation[0], s.rotation[1], s.rotation[2], s.rotation[3]};
+}
+
+}  // namespace
+
+void need_memory(dfm_status status) {
+  if (status == DFM_E_NOMEM) throw std::bad_alloc();
+}
+
+bool finite_values(const double *p, size_t n) {
+  double poison = 0;
+  for (size_t i = 0; i < n; ++i) poison += 0.0 * p[i];
+  return poison == 0;
+}
+bool finite_values(std::span<const dfm_rigid_state> states) {
+  return finite_values(reinterpret_cast<const double *>(states.data()), kStateValues * states.size());
+}
+
+RigidSet::RigidSet(World &w, const Memory &m, const std::string &name)
+    : world(&w), host_name(name), host(find_host(name)) {
+  use_memory(m, state, next);
+  use_memory(m, extra, next_extra, velocity, impulse, first, revised, total);
+}
+
+RigidSet::~RigidSet() {
+  if (self) host.destroy(self);
+}
+
+void RigidSet::begin(const SubStep &now) {
+  step = {sizeof step,
+          static_cast<uint32_t>(defs.size()),
+          now.time,
+          now.h,
+          {now.gravity.x, now.gravity.y, now.gravity.z},
+          state.data(),
+          extra.data()};
+}
+
+HostFault RigidSet::free_motion() {
+  std::fill(velocity.begin(), velocity.end(), 0.0);
+  const dfm_status status = host.predict(self, &step, velocity.data());
+  if (status != DFM_OK) return {status, "gave no velocities"};
+  if (!finite_values(velocity.data(), velocity.size())) return {DFM_OK, "gave velocities that are not finite"};
+  return {};
+}
+
+bool RigidSet::respond(uint32_t of_group, uint32_t bodies, double *matrix) {
+  const size_t width = 6 * size_t{bodies};
+  const dfm_status status = host.respond(self, &step, of_group, matrix);
+  need_memory(status);
+  return status == DFM_OK && finite_values(matrix, width * width);
+}
+
+bool RigidSet::revise(bool &changed) {
+  uint32_t any = 0;
+  const dfm_status status = host.revise(self, &step, impulse.data(), revised.data(), &any);
+  need_memory(status);
+  changed = any != 0;
+  return status == DFM_OK && finite_values(revised.data(), revised.size());
+}
+
+HostFault RigidSet::take_impulses() {
+  const dfm_status status = host.push ? host.push(self, &step, impulse.data()) : DFM_OK;
+  return status == DFM_OK ? HostFault{} : HostFault{status, "did not take its impulses"};
+}
+
+HostFault RigidSet::end_state(bool &again) {
+  const dfm_status status = host.commit(self, &step, impulse.data(), next.data(), next_extra.data());
+  if (status != DFM_OK && status != DFM_RIGID_AGAIN) return {status, "could not end its step"};
+  again = status == DFM_RIGID_AGAIN;
+  for (uint32_t i = 0; i < defs.size(); ++i)
+    if (group[i] == DFM_RIGID_STILL) next[i] = state[i];
+  if (!finite_values(next) || !finite_values(next_extra.data(), next_extra.size()))
+    return {DFM_OK, "ended its step with something not finite"};
+  return {};
+}
+
+void RigidSet::commit(const SubStep &now, double fraction) {
+  for (uint32_t i = 0; fraction < 1 && i < defs.size(); ++i) {
+    const dfm_rigid_state &from = state[i];
+    dfm_rigid_state &to = next[i];
+    const Quat q = slerp(rotation_of(from), rotation_of(to), fraction);
+    store3(to.position, load3(from.position) + fraction * (load3(to.position) - load3(from.position)));
+    to.rotation[0] = q.x;
+    to.rotation[1] = q.y;
+    to.rotation[2] = q.z;
+    to.rotation[3] = q.w;
+  }
+  state.swap(next);
+  extra.swap(next_extra);
+  for (uint32_t i = 0; i < defs.size(); ++i)
+    for (uint32_t k = 0; k < 3; ++k) total[3 * i + k] += impulse[6 * i + k];
+  last_h = now.h;
+}
+
+}  // namespace dfm
