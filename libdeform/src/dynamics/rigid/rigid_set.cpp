@@ -53,7 +53,8 @@ HostFault RigidSet::free_motion() {
   std::fill(velocity.begin(), velocity.end(), 0.0);
   const dfm_status status = host.predict(self, &step, velocity.data());
   if (status != DFM_OK) return {status, "gave no velocities"};
-  if (!finite_values(velocity.data(), velocity.size())) return {DFM_OK, "gave velocities that are not finite"};
+  if (!finite_values(velocity.data(), velocity.size()))
+    return {DFM_OK, "gave velocities that are not finite"};
   return {};
 }
 
