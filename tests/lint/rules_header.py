@@ -54,7 +54,7 @@ HOSTS = ("libdeform/src/", "bindings/cli/")
 # For plugins alone: the head of the entry.
 NO_HOST = re.compile(r"DFM_(ABI_OK|CAT_?|EXPORT)$")
 # Members that keep a place in a table, without a type: plugin_draft.h has it (decision 0078).
-SEATS = {"pattern", "stiffness", "fetch"}
+SEATS = {"fetch"}
 
 
 def plugin_callers(tree):

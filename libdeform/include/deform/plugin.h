@@ -131,9 +131,11 @@ typedef struct dfm_friction {
 /* ---- deformable model: host owns x, v, f and all state; plugin owns only rebuildable caches -------- */
 enum {
   DFM_CAP_ENERGY = 1,
+  DFM_CAP_STIFFNESS = 2, /* pattern and stiffness are there: the body may be moved by an implicit step */
   DFM_CAP_DAMPING = 4,
   DFM_CAP_ROTATION_INVARIANT = 16,
-  DFM_CAP_PLAUSIBLE = 32 /* not derived from a continuum */
+  DFM_CAP_PLAUSIBLE = 32,         /* not derived from a continuum */
+  DFM_CAP_CONSTANT_STIFFNESS = 64 /* stiffness depends on the parameters alone: one factorization serves */
 };
 enum { DFM_CELL_TET = 8 };
 typedef struct dfm_mesh {             /* rest configuration; borrowed during create() only */
@@ -175,8 +177,13 @@ typedef struct dfm_model {           /* self is void*: one shared struct tag wou
   /* [step] row sums += N/m, N s/m per point; *dt = min(*dt,
                                        * cell bound) */
   dfm_status (*energy)(void *self, const dfm_kin *k, double *joule); /* CAP_ENERGY; f = -dE/dx */
-  void (*pattern)(void);   /* draft: dfm_pattern_fn of plugin_draft.h; not called */
-  void (*stiffness)(void); /* draft: dfm_stiffness_fn of plugin_draft.h; not called */
+  /* [setup] CAP_STIFFNESS: pairs of points that answer each other, ij[nb,2], i <= j, each pair once, each
+   * point with itself. ij NULL: only counts. */
+  dfm_status (*pattern)(const void *self, uint32_t *nb, uint32_t *ij);
+  /* [step] CAP_STIFFNESS: blk[nb,9] += a*df_i/dx_j + b*df_i/dv_j, row-major, in the order of the pattern;
+   * block (j, i) is the transpose of (i, j). f is what add_forces adds at the same k; state_out is NULL.
+   * For a, b >= 0 the sum is to be negative semidefinite: what would make it indefinite is left out. */
+  dfm_status (*stiffness)(void *self, const dfm_kin *k, double a, double b, double *blk);
   const void *(*extension)(const void *self, const char *id); /* "dfm.stepper/1" ... */
 } dfm_model;
 /* Self-stepping model, extension "dfm.stepper/1". Contact, friction, report and pictures see surfels only.

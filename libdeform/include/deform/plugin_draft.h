@@ -9,12 +9,8 @@ extern "C" {
 #endif
 /* ---- models: cells other than tetrahedra ------------------------------------------------------------- */
 enum { DFM_CELL_POINT = 1, DFM_CELL_EDGE = 2, DFM_CELL_TRI = 4, DFM_CELL_HEX = 16 };
-/* ---- models: stiffness, for an implicit step ---------------------------------------------------------- */
-enum { DFM_CAP_STIFFNESS = 2, DFM_CAP_TOPOLOGY = 8 /* extension "dfm.topology/1" */ };
-/* Type of dfm_model.pattern: the blocks of the stiffness matrix, [nb,2] points, i <= j. [setup] */
-typedef dfm_status (*dfm_pattern_fn)(const void *self, uint32_t *nb, uint32_t *ij_or_null);
-/* Type of dfm_model.stiffness: blk[nb,9] += a*df/dx + b*df/dv, in the order of the pattern. [step] */
-typedef dfm_status (*dfm_stiffness_fn)(void *self, const dfm_kin *k, double a, double b, double *blk);
+/* ---- models: cells that come and go ------------------------------------------------------------------- */
+enum { DFM_CAP_TOPOLOGY = 8 /* extension "dfm.topology/1" */ };
 /* ---- self-stepping models: state that lives off the host ---------------------------------------------- */
 /* Type of dfm_stepper.fetch: copies what lives off the host. [step] */
 typedef dfm_status (*dfm_fetch_fn)(void *self, uint32_t what, double *dst);
