@@ -173,7 +173,7 @@ TEST(SceneErrors, NotDelivered_IsNeverIgnored) {
       {"/time/integrator=\"implicit_euler\"", "/time/integrator"},
       {"/contact/method=\"implicit\"", "/contact/method"},
       {"/output/color=\"stress\"", "/output/color"},
-      {"/bodies/0/start={\"invert\":true}", "/bodies/0/start"},
+      {"/bodies/0/start={\"state\":\"a.vtu\"}", "/bodies/0/start/state"},
       {"/bodies/0/switch=[{\"t\":1}]", "/bodies/0/switch"},
       {"/bodies/0/switch=[]", "/bodies/0/switch"},
       {"/bodies/0/pressure=5", "/bodies/0/pressure"}};

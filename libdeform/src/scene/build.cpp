@@ -5,7 +5,9 @@
 
 #include "core/error.h"
 #include "dynamics/rigid/host.h"
+#include "scene/jitter.h"
 #include "scene/load.h"
+#include "scene/start.h"
 
 namespace dfm::scene {
 namespace {
@@ -190,6 +192,9 @@ class Builder {
     std::copy_n(b.spin, 3, d.spin);
     dfm_body body = 0;
     check(dfm_body_create(world_, &d, &body), b.pointer);
+    if (b.start.kind != StartKind::rest)
+      check(dfm_body_set_state(body, mesh.npoint, start_positions(b.start, mesh, b.pose).data(), nullptr),
+            b.start.pointer);
     for (size_t i = 0; i < b.fixes.size(); ++i) move_held(body, b.fixes[i], held[i]);
     add_loads(body, b, mesh, nodal);
     for (const Spring &s : b.springs) add_spring(body, s, b.name, mesh);

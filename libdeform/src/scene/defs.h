@@ -76,10 +76,19 @@ struct MadeMesh {
   uint32_t cells = 0;
 };
 
+// How a body's points stand at the start.
+enum class StartKind { rest, scramble, plane, line, point, invert };
+struct Start {
+  std::string pointer;
+  StartKind kind = StartKind::rest;
+  uint64_t seed = 0;  // of scramble
+};
+
 struct Body {
   std::string pointer, name, mesh, material, model, nodal_bc;
   MadeMesh made;
   OwnSurface surface;
+  Start start;
   uint32_t fill = 0;  // cells; 0: not said
   std::vector<GroupMaterial> by_group;
   std::vector<FieldFile> fields;

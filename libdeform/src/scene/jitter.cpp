@@ -1,6 +1,5 @@
-#include <cmath>
+#include "scene/jitter.h"
 
-#include "scene/build.h"
 #include "scene/rotation.h"
 
 namespace dfm::scene {

@@ -160,6 +160,8 @@ Spring read_spring(const Node &entry) {
   return spring;
 }
 
+constexpr double kLargestSeed = 4294967295.0;
+
 uint32_t read_count(const Node &node, double least, double most) {
   const double n = node.number();
   if (!(n >= least && n <= most) || n != std::floor(n))
@@ -193,6 +195,24 @@ MadeMesh read_made(const Node &node) {
   return made;
 }
 
+Start read_start(const Node &node) {
+  node.object("start");
+  Start out;
+  out.pointer = node.pointer();
+  if (node.value().size() != 1)
+    node.fail("expected one of \"scramble\", \"flatten\" and \"invert\" to say how the body begins");
+  if (node.has("scramble")) {
+    out.kind = StartKind::scramble;
+    out.seed = read_count(node.member("scramble"), 0, kLargestSeed);
+  } else if (node.has("flatten")) {
+    const std::string onto = node.member("flatten").word("flatten");
+    out.kind = onto == "plane" ? StartKind::plane : onto == "line" ? StartKind::line : StartKind::point;
+  } else if (node.member("invert").boolean()) {
+    out.kind = StartKind::invert;
+  }
+  return out;
+}
+
 Body read_body(const Node &node, ReadContext &context) {
   Body b;
   node.object("body");
@@ -218,6 +238,7 @@ Body read_body(const Node &node, ReadContext &context) {
   for (const Node &entry : node.items("forces")) b.forces.push_back(read_force(entry));
   for (const Node &entry : node.items("springs")) b.springs.push_back(read_spring(entry));
   read_carriers(node, type, context, b);
+  if (node.has("start")) b.start = read_start(node.member("start"));
   if (node.has("nodal_bc")) b.nodal_bc = node.member("nodal_bc").text();
   return b;
 }

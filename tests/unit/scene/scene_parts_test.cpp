@@ -4,7 +4,7 @@
 #include <cmath>
 #include <random>
 
-#include "scene/build.h"
+#include "scene/jitter.h"
 #include "scene/node.h"
 #include "scene/rotation.h"
 #include "scene/select.h"

@@ -1,0 +1,157 @@
+// The key `start` of a scene's bodies: where each kind puts the points, what stays as it was, and what is
+// refused.
+#include <unistd.h>
+
+#include <algorithm>
+
+#include "support.h"
+#include "world.h"
+
+namespace {
+
+// Two bodies of one mesh and pose: "rested" begins at rest, "other" as `start` says.
+std::string scene(const std::string &start, const std::string &further = "") {
+  const std::string body = R"("mesh": {"make": "beam", "size": [0.2, 0.1, 0.06], "cells": 60},
+    "pose": {"position": [0.3, -0.2, 0.5], "rotation": {"axis": [0, 0, 1], "angle_deg": 90}, "scale": 2},
+    "velocity": [0.1, 0, 0], "spin": [0, 0, 3])";
+  return R"({"format": "deform-scene", "version": 1, "time": {"duration": 0.01, "step": 0.001},
+    "bodies": [{"name": "rested", )" +
+         body + "}, {\"name\": \"other\", " + body + ", \"start\": " + start + further +
+         R"(}], "contact": {"filter": [{"between": ["*", "*"], "collide": false}]}})";
+}
+
+struct Opened {
+  test::Context context;
+  dfm_scene scene = 0;
+  dfm_status status = DFM_OK;
+  explicit Opened(const std::string &text, uint64_t jitter = 0) {
+    const std::string path = test::scratch("scene_start_" + std::to_string(getpid())) + "/scene.json";
+    test::write_file(path, text);
+    dfm_scene_options options{};
+    options.size = sizeof options;
+    options.jitter_seed = jitter;
+    status = dfm_scene_open(context, path.c_str(), &options, &scene);
+  }
+  ~Opened() {
+    if (scene) dfm_scene_close(scene);
+  }
+  Opened(const Opened &) = delete;
+  Opened &operator=(const Opened &) = delete;
+  dfm_body body(const char *name) const {
+    dfm_world world = 0;
+    dfm_body out = 0;
+    test::ok(dfm_scene_world(scene, &world));
+    test::ok(dfm_world_find_body(world, name, &out));
+    return out;
+  }
+  // positions, then velocities
+  std::array<std::vector<double>, 2> state(const char *name) const {
+    uint32_t n = 0;
+    test::ok(dfm_body_get_state(body(name), 0, nullptr, nullptr, &n));
+    std::array<std::vector<double>, 2> out{std::vector<double>(3 * size_t(n)),
+                                           std::vector<double>(3 * size_t(n))};
+    test::ok(dfm_body_get_state(body(name), n, out[0].data(), out[1].data(), &n));
+    return out;
+  }
+};
+
+// The box of the rest positions: 0.4 x 0.2 x 0.12 m turned by 90 degrees about z.
+constexpr double kCenter[3] = {0.3 - 0.1, -0.2 + 0.2, 0.5 + 0.06}, kHalf[3] = {0.1, 0.2, 0.06};
+
+struct Flat {
+  const char *onto;
+  bool keeps[3];  // world axes
+};
+
+}  // namespace
+
+TEST(SceneStart, Flattened_LiesOnThePlaneLineOrPointOfItsFrame) {
+  for (const Flat &flat : {Flat{"plane", {true, true, false}}, Flat{"line", {false, true, false}},
+                           Flat{"point", {false, false, false}}}) {
+    const Opened s(scene(std::string(R"({"flatten": ")") + flat.onto + "\"}"));
+    ASSERT_EQ(s.status, DFM_OK) << dfm_last_error();
+    const auto rest = s.state("rested")[0], x = s.state("other")[0];
+    for (size_t i = 0; i < x.size(); ++i)
+      ASSERT_NEAR(x[i], flat.keeps[i % 3] ? rest[i] : kCenter[i % 3], 1e-15) << flat.onto;
+  }
+}
+
+TEST(SceneStart, Inverted_HasTheNegativeVolume) {
+  const Opened s(scene(R"({"invert": true})"));
+  ASSERT_EQ(s.status, DFM_OK) << dfm_last_error();
+  const auto rest = s.state("rested")[0], x = s.state("other")[0];
+  for (size_t i = 0; i < x.size(); ++i) ASSERT_NEAR(x[i], 2 * kCenter[i % 3] - rest[i], 1e-15);
+  const dfm_body_measure m = test::measure(s.body("other"));
+  EXPECT_NEAR(m.volume, -m.rest_volume, 1e-15);
+  dfm_body_info info{};
+  info.size = sizeof info;
+  test::ok(dfm_body_get_info(s.body("other"), &info));
+  EXPECT_EQ(m.inverted, info.ntet);
+}
+
+TEST(SceneStart, InvertFalse_IsRest) {
+  const Opened s(scene(R"({"invert": false})"));
+  ASSERT_EQ(s.status, DFM_OK) << dfm_last_error();
+  EXPECT_EQ(s.state("rested"), s.state("other"));
+}
+
+// Every point on its own, all over the box and within it; velocities are those of the body at rest.
+TEST(SceneStart, Scrambled_FillsTheBoxAndIsRepeatable) {
+  const Opened s(scene(R"({"scramble": 7})")), again(scene(R"({"scramble": 7})")),
+      other(scene(R"({"scramble": 8})"));
+  ASSERT_EQ(s.status, DFM_OK) << dfm_last_error();
+  const auto x = s.state("other"), rest = s.state("rested");
+  EXPECT_EQ(x, again.state("other"));
+  EXPECT_NE(x[0], other.state("other")[0]);
+  EXPECT_EQ(x[1], rest[1]);
+  double least[3] = {1, 1, 1}, most[3] = {-1, -1, -1};
+  size_t moved = 0;
+  for (size_t i = 0; i < x[0].size(); ++i) {
+    const double at = (x[0][i] - kCenter[i % 3]) / kHalf[i % 3];
+    ASSERT_LE(std::fabs(at), 1 + 1e-12);
+    least[i % 3] = std::min(least[i % 3], at);
+    most[i % 3] = std::max(most[i % 3], at);
+    moved += x[0][i] != rest[0][i];
+  }
+  EXPECT_EQ(moved, x[0].size());
+  for (int k = 0; k < 3; ++k) {
+    EXPECT_LT(least[k], -0.5);
+    EXPECT_GT(most[k], 0.5);
+  }
+}
+
+TEST(SceneStart, HeldPoints_StayWhereTheyAre) {
+  const Opened s(
+      scene(R"({"flatten": "point"})", R"(, "fix": [{"box": [[-1, -1, -1], [0.001, 1, 1]], "axes": "z"}])"));
+  ASSERT_EQ(s.status, DFM_OK) << dfm_last_error();
+  const auto rest = s.state("rested")[0], x = s.state("other")[0];
+  size_t held = 0;
+  for (size_t i = 0; i < x.size(); i += 3) {
+    ASSERT_NEAR(x[i], kCenter[0], 1e-15);
+    held += x[i + 2] == rest[i + 2] && rest[i + 2] != kCenter[2];
+  }
+  EXPECT_GT(held, 4u);
+}
+
+TEST(SceneStart, Jitter_MovesTheChangedBodyToo) {
+  const Opened still(scene(R"({"flatten": "point"})")), moved(scene(R"({"flatten": "point"})"), 3);
+  ASSERT_EQ(moved.status, DFM_OK) << dfm_last_error();
+  EXPECT_NE(still.state("other")[0], moved.state("other")[0]);
+}
+
+TEST(SceneStart, Mistakes_AreRefusedWithTheirPlace) {
+  const std::pair<const char *, std::vector<const char *>> cases[] = {
+      {"{}", {"/bodies/1/start", "scramble", "flatten", "invert"}},
+      {R"({"invert": true, "scramble": 1})", {"/bodies/1/start", "one of"}},
+      {R"({"scramble": -1})", {"/bodies/1/start/scramble", "whole number"}},
+      {R"({"scramble": 1.5})", {"/bodies/1/start/scramble", "whole number"}},
+      {R"({"flatten": "plain"})", {"/bodies/1/start/flatten", "plane"}},
+      {R"({"invert": 1})", {"/bodies/1/start/invert"}},
+      {R"({"scrambel": 1})", {"/bodies/1/start", "scramble"}},
+      {"true", {"/bodies/1/start"}}};
+  for (const auto &[start, parts] : cases) {
+    const Opened s(scene(start));
+    EXPECT_LT(s.status, 0) << start;
+    for (const char *part : parts) test::says({part});
+  }
+}
