@@ -175,6 +175,20 @@ dfm_status cell_energy(void *self, const dfm_kin *k, double *density) {
   return DFM_OK;
 }
 
+dfm_status pattern(const void *self, uint32_t *nb, uint32_t *ij) {
+  const Body &body = *static_cast<const Body *>(self);
+  *nb = body.nblocks();
+  if (ij) body.pattern(ij);
+  return DFM_OK;
+}
+
+dfm_status stiffness(void *self, const dfm_kin *k, double a, double b, double *blk) {
+  const Body &body = *static_cast<const Body *>(self);
+  if (body.lacks_state(*k)) return DFM_E_STATE;
+  body.add_stiffness(*k, a, b, blk);
+  return DFM_OK;
+}
+
 const char *const *active_effects(const void *self) {
   return static_cast<const Body *>(self)->active_effects;
 }
@@ -233,21 +247,22 @@ const void *extension(const void *self, const char *id) {
 const char *const kEffects[] = {"volume",     "damping",           "large_rotation",
                                 "anisotropy", "deform.relaxation", nullptr};
 
-const dfm_model kModel = {sizeof(dfm_model),
-                          DFM_CAP_ENERGY | DFM_CAP_DAMPING | DFM_CAP_ROTATION_INVARIANT | DFM_CAP_PLAUSIBLE,
-                          DFM_CELL_TET,
-                          0,
-                          nullptr,
-                          create,
-                          destroy,
-                          set_params,
-                          state_init,
-                          add_forces,
-                          bound,
-                          energy,
-                          nullptr,
-                          nullptr,
-                          extension};
+const dfm_model kModel = {
+    sizeof(dfm_model),
+    DFM_CAP_ENERGY | DFM_CAP_STIFFNESS | DFM_CAP_DAMPING | DFM_CAP_ROTATION_INVARIANT | DFM_CAP_PLAUSIBLE,
+    DFM_CELL_TET,
+    0,
+    nullptr,
+    create,
+    destroy,
+    set_params,
+    state_init,
+    add_forces,
+    bound,
+    energy,
+    pattern,
+    stiffness,
+    extension};
 
 const dfm_type kType = {sizeof(dfm_type),
                         DFM_KIND_MODEL,

@@ -191,6 +191,10 @@ struct Body {
   void cell_energy(const dfm_kin &k, double *density);
   void mask_springs(uint32_t n, const uint32_t *which, bool on);
   void rest_of_branches(uint32_t n, const dfm_kin &k);  // fills rest_now of block n
+  // Blocks of the tangent: the points, then the springs. See msm_tangent.cpp.
+  uint32_t nblocks() const { return npoint + nedge; }
+  void pattern(uint32_t *ij) const;
+  void add_stiffness(const dfm_kin &k, double a, double b, double *blk) const;
 
  private:
   double scale = 1;  // of shape
@@ -222,6 +226,10 @@ struct Body {
   void fill_stiffness();
   void find_weights(Room &room);
   double spring_energy(uint32_t e, const dfm_kin &k, const Branch &branch) const;
+  struct SpringTangent { double along, across; };  // N/m
+  SpringTangent spring_tangent(uint32_t e, double square, const Branch &branch) const;
+  void add_springs(const dfm_kin &k, double a, double b, double *blk) const;
+  void add_cells(const dfm_kin &k, double a, double *blk) const;
   void for_each_block(uint32_t least_cells, void (*fn)(void *, uint32_t, uint32_t), void *user);
 };
 
