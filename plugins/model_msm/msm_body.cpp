@@ -3,6 +3,7 @@
 // its points. No two workers write one place, and the order of every sum is fixed by the mesh.
 #include <deform/elementary.h>
 
+#include "../model_common/width.h"
 #include "msm_body.h"
 
 namespace msm {
@@ -44,21 +45,8 @@ void merge_pass(void *user, uint32_t begin, uint32_t end) {
 }  // namespace
 
 const Kernels *choose_kernels(const dfm_host *host) {
-  const Kernels *best = kernels_sse2();
-  const bool avx2 = __builtin_cpu_supports("avx2");
-  const bool avx512 = __builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512vl") &&
-                      __builtin_cpu_supports("avx512dq");
-  if (avx2) best = kernels_avx2();
-  if (avx512) best = kernels_avx512();
-  const char *forced = getenv("DEFORM_SIMD");
-  if (!forced || !*forced) return best;
-  if (!strcmp(forced, "sse2")) return kernels_sse2();
-  if (!strcmp(forced, "avx2") && avx2) return kernels_avx2();
-  if (!strcmp(forced, "avx512") && avx512) return kernels_avx512();
-  host->log(
-      host->ctx, 2, 0,
-      "msm: DEFORM_SIMD is none of sse2, avx2, avx512 or this processor lacks it; the best it has is used.");
-  return best;
+  const model::Width width = model::choose_width(host, "msm");
+  return width == model::kAvx512 ? kernels_avx512() : width == model::kAvx2 ? kernels_avx2() : kernels_sse2();
 }
 
 void Body::for_each_block(uint32_t least_cells, void (*fn)(void *, uint32_t, uint32_t), void *user) {

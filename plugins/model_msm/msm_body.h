@@ -6,12 +6,16 @@
 #include <algorithm>
 #include <cstdint>
 #include <cstring>
-#include <new>
-#include <utility>
 
+#include "../model_common/buffer.h"
+#include "../model_common/partition.h"
 #include "msm_kernel.h"
 
 namespace msm {
+
+using model::Buffer;
+using model::partition_capacity;
+using model::partition_points;
 
 // Rows of the parameter table; a row's value begins at its number, the last row is three wide.
 enum Param : uint32_t {
@@ -42,43 +46,6 @@ void complain(const dfm_host *h, const char *what);
 // `volume` that gives Poisson's ratio nu; springs alone give 1/4 and no volume modulus that is not
 // negative gives less.
 inline double volume_for(double nu) { return nu > 0.25 ? 3 * (4 * nu - 1) / (2 * (1 + nu)) : 0; }
-
-// Array in the host's memory; cleared on creation.
-template <class T>
-class Buffer {
- public:
-  Buffer() = default;
-  Buffer(const Buffer &) = delete;
-  Buffer &operator=(const Buffer &) = delete;
-  ~Buffer() { drop(); }
-  void drop() {
-    if (data_) host_->release(host_->ctx, data_, size_ * sizeof(T), 64);
-    data_ = nullptr;
-  }
-  void create(const dfm_host *host, size_t n) {
-    drop();
-    host_ = host;
-    size_ = n ? n : 1;
-    data_ = static_cast<T *>(host->alloc(host->ctx, size_ * sizeof(T), 64));
-    if (!data_) throw std::bad_alloc();
-    std::memset(static_cast<void *>(data_), 0, size_ * sizeof(T));
-  }
-  void swap(Buffer &other) {
-    std::swap(host_, other.host_);
-    std::swap(data_, other.data_);
-    std::swap(size_, other.size_);
-  }
-  bool empty() const { return !data_; }
-  T *data() { return data_; }
-  const T *data() const { return data_; }
-  T &operator[](size_t i) { return data_[i]; }
-  const T &operator[](size_t i) const { return data_[i]; }
-
- private:
-  const dfm_host *host_ = nullptr;
-  T *data_ = nullptr;
-  size_t size_ = 0;
-};
 
 struct Body {
   static constexpr uint32_t kNone = ~0u;
@@ -240,10 +207,6 @@ struct Call {
   double *f;
   const Branch *branch;
 };
-
-// Order of the points by recursive bisection and where each block begins in it. See msm_partition.cpp.
-uint32_t partition_points(const double *rest, uint32_t npoint, uint32_t *order, uint32_t *block_begin);
-uint32_t partition_capacity(uint32_t npoint);
 
 // Best kernels of this processor, or those that DEFORM_SIMD names.
 const Kernels *choose_kernels(const dfm_host *host);

@@ -1,5 +1,5 @@
 // Four doubles in one register.
-#include "msm_kernel_lanes_avx.h"
+#include "../model_common/lanes_avx.h"
 
 #include "msm_kernel_quad.h"
 

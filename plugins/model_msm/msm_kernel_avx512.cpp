@@ -1,18 +1,18 @@
 // Vectors of eight. A point with its velocity is one load; two quads of springs, or eight cells, share each
 // root and each division. Sums per point run in the order of the other kernels: first quad, then second;
 // cell after cell.
-#include "msm_kernel_lanes_avx.h"
+#include "../model_common/lanes_avx.h"
 
 #include "msm_kernel_quad.h"
 
 namespace msm {
 namespace {
 
-MSM_INLINE __m512d point8(const Block &b, uint32_t n) { return _mm512_load_pd(b.p + 8 * size_t(n)); }
-MSM_INLINE __m256d low(__m512d a) { return _mm512_castpd512_pd256(a); }
-MSM_INLINE __m256d high(__m512d a) { return _mm512_extractf64x4_pd(a, 1); }
+DEFORM_INLINE __m512d point8(const Block &b, uint32_t n) { return _mm512_load_pd(b.p + 8 * size_t(n)); }
+DEFORM_INLINE __m256d low(__m512d a) { return _mm512_castpd512_pd256(a); }
+DEFORM_INLINE __m256d high(__m512d a) { return _mm512_extractf64x4_pd(a, 1); }
 // In each half: out[k] = (s_k.x + s_k.y) + (s_k.z + s_k.w)
-MSM_INLINE __m512d sum_rows(__m512d s0, __m512d s1, __m512d s2, __m512d s3) {
+DEFORM_INLINE __m512d sum_rows(__m512d s0, __m512d s1, __m512d s2, __m512d s3) {
   const __m512d a = _mm512_add_pd(_mm512_unpacklo_pd(s0, s1), _mm512_unpackhi_pd(s0, s1));
   const __m512d b = _mm512_add_pd(_mm512_unpacklo_pd(s2, s3), _mm512_unpackhi_pd(s2, s3));
   const __m512i lo = _mm512_setr_epi64(0, 1, 8, 9, 4, 5, 12, 13);
@@ -21,12 +21,12 @@ MSM_INLINE __m512d sum_rows(__m512d s0, __m512d s1, __m512d s2, __m512d s3) {
 }
 
 // [d | e] -> [d d | d e], the terms of d.d and of d.e
-MSM_INLINE __m512d products(__m512d de) { return _mm512_mul_pd(_mm512_shuffle_f64x2(de, de, 0x44), de); }
+DEFORM_INLINE __m512d products(__m512d de) { return _mm512_mul_pd(_mm512_shuffle_f64x2(de, de, 0x44), de); }
 
 // Forces of four springs to their points; lane kFirst + k of scale belongs to spring k.
 template <int kFirst>
-MSM_INLINE void spread(const Block &b, const Quad &q, __m512d scale, __m512d d0, __m512d d1, __m512d d2,
-                       __m512d d3) {
+DEFORM_INLINE void spread(const Block &b, const Quad &q, __m512d scale, __m512d d0, __m512d d1, __m512d d2,
+                          __m512d d3) {
   const __m256d f0 = _mm256_mul_pd(low(_mm512_permutexvar_pd(_mm512_set1_epi64(kFirst), scale)), low(d0));
   const __m256d f1 = _mm256_mul_pd(low(_mm512_permutexvar_pd(_mm512_set1_epi64(kFirst + 1), scale)), low(d1));
   const __m256d f2 = _mm256_mul_pd(low(_mm512_permutexvar_pd(_mm512_set1_epi64(kFirst + 2), scale)), low(d2));
@@ -73,7 +73,7 @@ static void springs8(const Block &b, double damp) {
 }
 
 // Transposes the 4 x 4 of each half.
-MSM_INLINE void transpose(__m512d &r0, __m512d &r1, __m512d &r2, __m512d &r3) {
+DEFORM_INLINE void transpose(__m512d &r0, __m512d &r1, __m512d &r2, __m512d &r3) {
   const __m512d a = _mm512_unpacklo_pd(r0, r1), b = _mm512_unpackhi_pd(r0, r1);
   const __m512d c = _mm512_unpacklo_pd(r2, r3), d = _mm512_unpackhi_pd(r2, r3);
   const __m512i lo = _mm512_setr_epi64(0, 1, 8, 9, 4, 5, 12, 13);
@@ -85,38 +85,38 @@ MSM_INLINE void transpose(__m512d &r0, __m512d &r1, __m512d &r2, __m512d &r3) {
 }
 
 // Corner n of cells k and k + 4.
-MSM_INLINE __m512d corner(const Block &b, const Cell *c, int k, int n) {
+DEFORM_INLINE __m512d corner(const Block &b, const Cell *c, int k, int n) {
   return _mm512_insertf64x4(_mm512_castpd256_pd512(_mm256_load_pd(b.p + 8 * size_t(c[k].p[n]))),
                             _mm256_load_pd(b.p + 8 * size_t(c[k + 4].p[n])), 1);
 }
 
 struct Edges8 { __m512d x, y, z; };
-MSM_INLINE void gather_edges(const Block &b, const Cell *c, int n, __m512d o0, __m512d o1, __m512d o2,
-                             __m512d o3, Edges8 &out) {
+DEFORM_INLINE void gather_edges(const Block &b, const Cell *c, int n, __m512d o0, __m512d o1, __m512d o2,
+                                __m512d o3, Edges8 &out) {
   out.x = _mm512_sub_pd(corner(b, c, 0, n), o0);
   out.y = _mm512_sub_pd(corner(b, c, 1, n), o1);
   out.z = _mm512_sub_pd(corner(b, c, 2, n), o2);
   __m512d unused = _mm512_sub_pd(corner(b, c, 3, n), o3);
   transpose(out.x, out.y, out.z, unused);
 }
-MSM_INLINE __m512d minor2(__m512d a, __m512d b, __m512d c, __m512d d) {
+DEFORM_INLINE __m512d minor2(__m512d a, __m512d b, __m512d c, __m512d d) {
   return _mm512_sub_pd(_mm512_mul_pd(a, b), _mm512_mul_pd(c, d));
 }
-MSM_INLINE void cross(const Edges8 &a, const Edges8 &b, Edges8 &out) {
+DEFORM_INLINE void cross(const Edges8 &a, const Edges8 &b, Edges8 &out) {
   out.x = minor2(a.y, b.z, a.z, b.y);
   out.y = minor2(a.z, b.x, a.x, b.z);
   out.z = minor2(a.x, b.y, a.y, b.x);
 }
 
 struct Forces { __m512d f0, f1, f2, f3; };  // of cells k and k + 4 at one corner
-MSM_INLINE void forces_at(__m512d pressure, const Edges8 &g, Forces &f) {
+DEFORM_INLINE void forces_at(__m512d pressure, const Edges8 &g, Forces &f) {
   f.f0 = _mm512_mul_pd(pressure, g.x);
   f.f1 = _mm512_mul_pd(pressure, g.y);
   f.f2 = _mm512_mul_pd(pressure, g.z);
   f.f3 = _mm512_setzero_pd();
   transpose(f.f0, f.f1, f.f2, f.f3);
 }
-MSM_INLINE void add(Forces &a, const Forces &b) {
+DEFORM_INLINE void add(Forces &a, const Forces &b) {
   a.f0 = _mm512_add_pd(a.f0, b.f0);
   a.f1 = _mm512_add_pd(a.f1, b.f1);
   a.f2 = _mm512_add_pd(a.f2, b.f2);
@@ -124,28 +124,28 @@ MSM_INLINE void add(Forces &a, const Forces &b) {
 }
 // One cell after the other at each corner, corners 1 2 3 0, four cells at a time: the order of the
 // other kernels.
-MSM_INLINE void spread_low(const Block &b, const Cell *c, int n, const Forces &f) {
+DEFORM_INLINE void spread_low(const Block &b, const Cell *c, int n, const Forces &f) {
   add_to(b, c[0].p[n], low(f.f0));
   add_to(b, c[1].p[n], low(f.f1));
   add_to(b, c[2].p[n], low(f.f2));
   add_to(b, c[3].p[n], low(f.f3));
 }
-MSM_INLINE void spread_high(const Block &b, const Cell *c, int n, const Forces &f) {
+DEFORM_INLINE void spread_high(const Block &b, const Cell *c, int n, const Forces &f) {
   add_to(b, c[4].p[n], high(f.f0));
   add_to(b, c[5].p[n], high(f.f1));
   add_to(b, c[6].p[n], high(f.f2));
   add_to(b, c[7].p[n], high(f.f3));
 }
 
-MSM_INLINE __m512d dot(const Edges8 &a, const Edges8 &b) {
+DEFORM_INLINE __m512d dot(const Edges8 &a, const Edges8 &b) {
   return _mm512_add_pd(_mm512_add_pd(_mm512_mul_pd(a.x, b.x), _mm512_mul_pd(a.y, b.y)),
                        _mm512_mul_pd(a.z, b.z));
 }
-MSM_INLINE __m512d sum3(__m512d a, __m512d b, __m512d c) { return _mm512_add_pd(_mm512_add_pd(a, b), c); }
-MSM_INLINE Edges8 sum3(const Edges8 &a, const Edges8 &b, const Edges8 &c) {
+DEFORM_INLINE __m512d sum3(__m512d a, __m512d b, __m512d c) { return _mm512_add_pd(_mm512_add_pd(a, b), c); }
+DEFORM_INLINE Edges8 sum3(const Edges8 &a, const Edges8 &b, const Edges8 &c) {
   return {sum3(a.x, b.x, c.x), sum3(a.y, b.y, c.y), sum3(a.z, b.z, c.z)};
 }
-MSM_INLINE __m512d pressure_of(const Block &b, uint32_t t, __m512d now) {
+DEFORM_INLINE __m512d pressure_of(const Block &b, uint32_t t, __m512d now) {
   const __m512d rest = _mm512_load_pd(b.volume6 + t);
   const __m512d below = _mm512_mul_pd(_mm512_set1_pd(kCollapseBelow), rest);
   now = _mm512_max_pd(now, _mm512_mul_pd(_mm512_set1_pd(kLeastVolume), rest));
@@ -154,13 +154,13 @@ MSM_INLINE __m512d pressure_of(const Block &b, uint32_t t, __m512d now) {
   return _mm512_add_pd(_mm512_mul_pd(_mm512_load_pd(b.bulk + t), _mm512_sub_pd(rest, now)),
                        _mm512_mul_pd(_mm512_load_pd(b.collapse + t), lost));
 }
-MSM_INLINE __m512d squares(const Edges8 &e1, const Edges8 &e2, const Edges8 &e3) {
+DEFORM_INLINE __m512d squares(const Edges8 &e1, const Edges8 &e2, const Edges8 &e3) {
   const Edges8 sum = sum3(e1, e2, e3);
   return _mm512_sub_pd(_mm512_mul_pd(_mm512_set1_pd(4), sum3(dot(e1, e1), dot(e2, e2), dot(e3, e3))),
                        dot(sum, sum));
 }
-MSM_INLINE void stretched_forces(const Block &b, uint32_t t, __m512d q, __m512d now, const Edges8 &e1,
-                                 const Edges8 &e2, const Edges8 &e3, Edges8 &g1, Edges8 &g2, Edges8 &g3) {
+DEFORM_INLINE void stretched_forces(const Block &b, uint32_t t, __m512d q, __m512d now, const Edges8 &e1,
+                                    const Edges8 &e2, const Edges8 &e3, Edges8 &g1, Edges8 &g2, Edges8 &g3) {
   const __m512d limit = _mm512_load_pd(b.limit + t);
   const __m512d most = _mm512_max_pd(q, limit);
   const __m512d u = _mm512_div_pd(limit, most);

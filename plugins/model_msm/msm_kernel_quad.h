@@ -1,6 +1,6 @@
 // The kernels on vectors of four doubles, written once for the files that bring `v4` and its operations
-// (msm_kernel_lanes_avx.h, or two registers in msm_kernel_lanes_sse2.h). Everything here has internal linkage
-// (see the house rules on wide kernels).
+// (model_common/lanes_avx.h, or two registers in model_common/lanes_sse2.h). Everything here has internal
+// linkage (see the house rules on wide kernels).
 #pragma once
 #include <stddef.h>
 
@@ -9,13 +9,15 @@
 namespace msm {
 namespace {
 
-MSM_INLINE v4 point4(const Block &b, uint32_t n) { return load4(b.p + 8 * size_t(n)); }
-MSM_INLINE v4 velocity4(const Block &b, uint32_t n) { return load4(b.p + 8 * size_t(n) + 4); }
-MSM_INLINE void add_to(const Block &b, uint32_t n, v4 a) {
+using namespace lanes;
+
+DEFORM_INLINE v4 point4(const Block &b, uint32_t n) { return load4(b.p + 8 * size_t(n)); }
+DEFORM_INLINE v4 velocity4(const Block &b, uint32_t n) { return load4(b.p + 8 * size_t(n) + 4); }
+DEFORM_INLINE void add_to(const Block &b, uint32_t n, v4 a) {
   double *f = b.f + 4 * size_t(n);
   store4(f, load4(f) + a);
 }
-MSM_INLINE void take_from(const Block &b, uint32_t n, v4 a) {
+DEFORM_INLINE void take_from(const Block &b, uint32_t n, v4 a) {
   double *f = b.f + 4 * size_t(n);
   store4(f, load4(f) - a);
 }
@@ -30,16 +32,16 @@ static inline void load_block(const Block &b, const double *x, const double *v, 
 }
 
 template <Damping kDamping>
-MSM_INLINE v4 damp4(const Block &b, uint32_t n, double damp) {
+DEFORM_INLINE v4 damp4(const Block &b, uint32_t n, double damp) {
   if constexpr (kDamping == kPerSpring) return load4(b.damp + 4 * size_t(n));
   else return splat(damp);
 }
-MSM_INLINE v4 rates(const Block &b, const Quad &q, v4 d0, v4 d1, v4 d2, v4 d3) {
+DEFORM_INLINE v4 rates(const Block &b, const Quad &q, v4 d0, v4 d1, v4 d2, v4 d3) {
   const v4 vi = velocity4(b, q.i);
   return sum_rows(d0 * (velocity4(b, q.j[0]) - vi), d1 * (velocity4(b, q.j[1]) - vi),
                   d2 * (velocity4(b, q.j[2]) - vi), d3 * (velocity4(b, q.j[3]) - vi));
 }
-MSM_INLINE void spread_springs(const Block &b, const Quad &q, v4 scale, v4 d0, v4 d1, v4 d2, v4 d3) {
+DEFORM_INLINE void spread_springs(const Block &b, const Quad &q, v4 scale, v4 d0, v4 d1, v4 d2, v4 d3) {
   const v4 f0 = lane<0>(scale) * d0;
   const v4 f1 = lane<1>(scale) * d1;
   const v4 f2 = lane<2>(scale) * d2;
@@ -113,14 +115,15 @@ static inline void branches(const Block &b, double damp, const Branch &branch) {
 
 // Edges of four cells from their first corner to corner n, by component.
 struct Edges4 { v4 x, y, z; };
-MSM_INLINE void gather_edges(const Block &b, const Cell *c, int n, v4 o0, v4 o1, v4 o2, v4 o3, Edges4 &out) {
+DEFORM_INLINE void gather_edges(const Block &b, const Cell *c, int n, v4 o0, v4 o1, v4 o2, v4 o3,
+                                Edges4 &out) {
   v4 unused = point4(b, c[3].p[n]) - o3;
   out.x = point4(b, c[0].p[n]) - o0;
   out.y = point4(b, c[1].p[n]) - o1;
   out.z = point4(b, c[2].p[n]) - o2;
   transpose(out.x, out.y, out.z, unused);
 }
-MSM_INLINE void gather_all(const Block &b, const Cell *c, Edges4 &e1, Edges4 &e2, Edges4 &e3) {
+DEFORM_INLINE void gather_all(const Block &b, const Cell *c, Edges4 &e1, Edges4 &e2, Edges4 &e3) {
   const v4 o0 = point4(b, c[0].p[0]);
   const v4 o1 = point4(b, c[1].p[0]);
   const v4 o2 = point4(b, c[2].p[0]);
@@ -129,15 +132,15 @@ MSM_INLINE void gather_all(const Block &b, const Cell *c, Edges4 &e1, Edges4 &e2
   gather_edges(b, c, 2, o0, o1, o2, o3, e2);
   gather_edges(b, c, 3, o0, o1, o2, o3, e3);
 }
-MSM_INLINE void cross(const Edges4 &a, const Edges4 &b, Edges4 &out) {
+DEFORM_INLINE void cross(const Edges4 &a, const Edges4 &b, Edges4 &out) {
   out.x = a.y * b.z - a.z * b.y;
   out.y = a.z * b.x - a.x * b.z;
   out.z = a.x * b.y - a.y * b.x;
 }
-MSM_INLINE v4 dot(const Edges4 &a, const Edges4 &b) { return (a.x * b.x + a.y * b.y) + a.z * b.z; }
+DEFORM_INLINE v4 dot(const Edges4 &a, const Edges4 &b) { return (a.x * b.x + a.y * b.y) + a.z * b.z; }
 // Adds pressure * g to corner n of the four cells and hands the four forces back.
-MSM_INLINE void spread(const Block &b, const Cell *c, int n, v4 pressure, const Edges4 &g, v4 &f0, v4 &f1,
-                       v4 &f2, v4 &f3) {
+DEFORM_INLINE void spread(const Block &b, const Cell *c, int n, v4 pressure, const Edges4 &g, v4 &f0, v4 &f1,
+                          v4 &f2, v4 &f3) {
   f0 = pressure * g.x;
   f1 = pressure * g.y;
   f2 = pressure * g.z;
@@ -149,27 +152,27 @@ MSM_INLINE void spread(const Block &b, const Cell *c, int n, v4 pressure, const 
   add_to(b, c[3].p[n], f3);
 }
 
-MSM_INLINE v4 pressure_of(const Block &b, uint32_t t, v4 now) {
+DEFORM_INLINE v4 pressure_of(const Block &b, uint32_t t, v4 now) {
   const v4 rest = load4(b.volume6 + t);
   now = min4(max4(now, splat(kLeastVolume) * rest), splat(kMostVolume) * rest);
   return load4(b.bulk + t) * (rest - now) +
          load4(b.collapse + t) * max4(splat(kCollapseBelow) * rest - now, splat(0));
 }
 // Sum of the squares of the six edges.
-MSM_INLINE v4 squares(const Edges4 &e1, const Edges4 &e2, const Edges4 &e3) {
+DEFORM_INLINE v4 squares(const Edges4 &e1, const Edges4 &e2, const Edges4 &e3) {
   const Edges4 sum = {(e1.x + e2.x) + e3.x, (e1.y + e2.y) + e3.y, (e1.z + e2.z) + e3.z};
   return splat(4) * ((dot(e1, e1) + dot(e2, e2)) + dot(e3, e3)) - dot(sum, sum);
 }
 // Share of the volume that counts, and its derivative by the sum of squares q.
-MSM_INLINE v4 fade(v4 q, v4 limit, v4 &derivative) {
+DEFORM_INLINE v4 fade(v4 q, v4 limit, v4 &derivative) {
   const v4 most = max4(q, limit), u = limit / most, power = sqrt4(u) * u;
   derivative = splat(-3.75) * (power * (splat(1) - u)) / most;
   return power * (splat(2.5) - splat(1.5) * u);
 }
 // Forces of four cells of which one at least is beyond its limit; for the others they are pressure *
 // g, to the bit.
-MSM_INLINE void stretched_forces(const Block &b, uint32_t t, v4 q, v4 now, const Edges4 &e1, const Edges4 &e2,
-                                 const Edges4 &e3, Edges4 &g1, Edges4 &g2, Edges4 &g3) {
+DEFORM_INLINE void stretched_forces(const Block &b, uint32_t t, v4 q, v4 now, const Edges4 &e1,
+                                    const Edges4 &e2, const Edges4 &e3, Edges4 &g1, Edges4 &g2, Edges4 &g3) {
   v4 by_q;
   const v4 share = fade(q, load4(b.limit + t), by_q), p = pressure_of(b, t, now * share);
   const v4 along = p * share, inward = (splat(8) * p) * (now * by_q), quarter = splat(0.25);
@@ -220,7 +223,7 @@ static inline void volume_cells(const Block &b) {
   }
 }
 
-MSM_INLINE v4 weights(const Block &b, const Cell *c, int n) {
+DEFORM_INLINE v4 weights(const Block &b, const Cell *c, int n) {
   return set4(b.weight[c[0].p[n]], b.weight[c[1].p[n]], b.weight[c[2].p[n]], b.weight[c[3].p[n]]);
 }
 // Weighted row sums of the second derivative of a cell's energy, (1 / w_a) (k g_a sum_b g_b w_b + |p| l
@@ -355,7 +358,7 @@ static inline void spring_rows(const Block &b) {
 #define MSM_ROWS {spring_rows<kPlain>, spring_rows<kTilted>, spring_rows<kTurned>}, cell_rows
 
 template <int kLanes>
-MSM_INLINE void merge_lanes(double *sums, const Merge *merge, uint32_t n) {
+DEFORM_INLINE void merge_lanes(double *sums, const Merge *merge, uint32_t n) {
   for (uint32_t m = 0; m < n; ++m)
     for (int k = 0; k < kLanes; k += 4) {
       double *to = sums + kLanes * size_t(merge[m].to) + k;

@@ -1,5 +1,5 @@
 // The baseline of x86-64: four doubles are two registers.
-#include "msm_kernel_lanes_sse2.h"
+#include "../model_common/lanes_sse2.h"
 
 #include "msm_kernel_quad.h"
 

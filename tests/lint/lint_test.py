@@ -58,7 +58,9 @@ GOOD = {
     "plugins/model_msm/spring.h": "#pragma once\n",
     "plugins/friction_b/b.cpp": '#include "../friction_common/curve.h"\n',
     "plugins/friction_common/curve.h": "#pragma once\n",
-    "plugins/model_msm/spring_kernel_avx2.cpp": "#include <immintrin.h>\n#include \"spring.h\"\nnamespace {\n"
+    "plugins/model_common/half.h": "#pragma once\n",
+    "plugins/model_msm/spring_kernel_avx2.cpp": "#include <immintrin.h>\n#include \"spring.h\"\n"
+                                                "#include \"../model_common/half.h\"\nnamespace {\n"
                                                 "inline double half(double x) { return x / 2; }\n}\n",
     "bindings/cli/main.cpp": '#include <CLI/CLI.hpp>\n#include "deform/deform.h"\n',
     "libdeform/doc/howto/engine.md": "# Engine\n\n```c\nint x;\n```\n",
@@ -147,6 +149,7 @@ BAD = {
              ("libdeform/src/step/step.cpp", "=float y = expf(1.0f);\n"),
              ("libdeform/src/step/step.cpp", "=double f(double x) { return exp(x); }\n")],
     "kernels": [("plugins/model_msm/spring.h", "#include <vector>\n"),
+                ("plugins/model_common/half.h", "#include <vector>\n"),
                 ("plugins/model_msm/spring_kernel_avx2.cpp", "#include <vector>\n"),
                 ("plugins/model_msm/spring_kernel.h", "=#include <Eigen/Core>\n"),
                 ("plugins/model_msm/spring_kernel_avx2.cpp", "double f(double a) { return std::sqrt(a); }\n"),

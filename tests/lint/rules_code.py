@@ -164,12 +164,14 @@ def kernels(tree):
         for line, quote, name in includes(content):
             if name in KERNEL_HEADERS:
                 continue
-            if quote == '"' and "/" not in name and _resolves(tree, path, name):
-                # its own header keeps the same rules
-                pending.append(posixpath.join(posixpath.dirname(path), name))
+            shared = re.match(r"\.\./[a-z]+_common/[a-z0-9_]+\.h$", name)
+            if quote == '"' and ("/" not in name or shared) and _resolves(tree, path, name):
+                # its own header, or one that plugins of its kind share, keeps the same rules
+                pending.append(posixpath.normpath(posixpath.join(posixpath.dirname(path), name)))
             else:
                 yield (path, line, f"a kernel file includes {name}; allowed are "
-                                   f"{', '.join(sorted(KERNEL_HEADERS))} and headers beside it")
+                                   f"{', '.join(sorted(KERNEL_HEADERS))} and headers beside it or in "
+                                   f"KIND_common")
         code = without_comments(content, strings=True)
         for match in re.finditer(r"\b(std|Eigen)::", code):
             yield path, line_of(code, match.start()), f"a kernel file uses {match.group(0)}"

@@ -1,12 +1,12 @@
-#include "model_msm/msm_kernel_lanes_avx.h"
+#include "model_common/lanes_avx.h"
 
-namespace msm {
+namespace lanes {
 namespace {
-MSM_INLINE v4 gather4(const double *p, const unsigned *n) {
+DEFORM_INLINE v4 gather4(const double *p, const unsigned *n) {
   return _mm256_i32gather_pd(p, _mm_loadu_si128(reinterpret_cast<const __m128i *>(n)), 8);
 }
 }  // namespace
-}  // namespace msm
+}  // namespace lanes
 
 #include "msm_bound_lanes.h"
 

@@ -1,12 +1,12 @@
-#include "model_msm/msm_kernel_lanes_sse2.h"
+#include "model_common/lanes_sse2.h"
 
-namespace msm {
+namespace lanes {
 namespace {
-MSM_INLINE v4 gather4(const double *p, const unsigned *n) {
+DEFORM_INLINE v4 gather4(const double *p, const unsigned *n) {
   return {_mm_set_pd(p[n[1]], p[n[0]]), _mm_set_pd(p[n[3]], p[n[2]])};
 }
 }  // namespace
-}  // namespace msm
+}  // namespace lanes
 
 #include "msm_bound_lanes.h"
 

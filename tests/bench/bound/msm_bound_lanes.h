@@ -1,5 +1,5 @@
 // The plain kernels on four lanes, for the files that bring v4 (see
-// plugins/model_msm/msm_kernel_lanes_avx.h).
+// plugins/model_common/lanes_avx.h).
 #pragma once
 #include <stddef.h>
 
@@ -8,22 +8,22 @@
 namespace bound {
 namespace {
 
-using namespace msm;
+using namespace lanes;
 
 // Component arrays are read with gather instructions where there are any (gather4), four loads elsewhere.
-MSM_INLINE v4 scale_of(v4 dd, v4 rate, v4 stiffness, v4 rest, double damp) {
+DEFORM_INLINE v4 scale_of(v4 dd, v4 rate, v4 stiffness, v4 rest, double damp) {
   const v4 length = sqrt4(dd), inverse = splat(1.0) / length;
   const v4 stretch = (length - rest) * inverse + splat(damp) * ((rate * inverse) * inverse);
   return zero_unless_above(stiffness * stretch, dd, splat(1e-200));
 }
 
 template <int kStride>
-MSM_INLINE v4 get(const double *a, uint32_t n) {
+DEFORM_INLINE v4 get(const double *a, uint32_t n) {
   if constexpr (kStride == 4) return load4(a + 4 * size_t(n));
   else return load_xyz(a + 3 * size_t(n));
 }
 template <int kStride>
-MSM_INLINE void add(double *f, uint32_t n, v4 a) {
+DEFORM_INLINE void add(double *f, uint32_t n, v4 a) {
   if constexpr (kStride == 4) {
     store4(f + 4 * size_t(n), load4(f + 4 * size_t(n)) + a);
   } else {
@@ -34,7 +34,7 @@ MSM_INLINE void add(double *f, uint32_t n, v4 a) {
 }
 
 template <int kStride>
-MSM_INLINE void scatter(const Springs &s, const Points &p) {
+DEFORM_INLINE void scatter(const Springs &s, const Points &p) {
   for (uint32_t n = 0; n < s.nspring; n += 4) {
     const uint32_t *i = s.i + n, *j = s.j + n;
     const v4 d0 = get<kStride>(p.x, j[0]) - get<kStride>(p.x, i[0]);

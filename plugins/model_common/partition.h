@@ -2,12 +2,12 @@
 // order is a compact piece of the body, so a block of consecutive points fits the first-level cache together
 // with its halo whatever the size of the body, and neighbors lie close to each other within it. Depends on
 // rest positions and point numbers alone.
+#pragma once
 #include <algorithm>
+#include <cstddef>
+#include <cstdint>
 
-#include "msm_body.h"
-
-namespace msm {
-namespace {
+namespace model {
 
 constexpr uint32_t kBlockPoints = 1024, kLeafPoints = 4;
 
@@ -42,11 +42,12 @@ struct Partition {
   }
 };
 
-}  // namespace
+// Of block_begin, for partition_points.
+inline uint32_t partition_capacity(uint32_t npoint) { return 2 * (npoint / kBlockPoints) + 2; }
 
-uint32_t partition_capacity(uint32_t npoint) { return 2 * (npoint / kBlockPoints) + 2; }
-
-uint32_t partition_points(const double *rest, uint32_t npoint, uint32_t *order, uint32_t *block_begin) {
+// Fills order[npoint] and where each block begins in it; returns the number of blocks.
+inline uint32_t partition_points(const double *rest, uint32_t npoint, uint32_t *order,
+                                 uint32_t *block_begin) {
   for (uint32_t n = 0; n < npoint; ++n) order[n] = n;
   Partition partition{rest, order, block_begin};
   partition.split(0, npoint, false);
@@ -65,4 +66,4 @@ uint32_t partition_points(const double *rest, uint32_t npoint, uint32_t *order, 
   return partition.nblock;
 }
 
-}  // namespace msm
+}  // namespace model

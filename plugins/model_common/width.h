@@ -1,0 +1,34 @@
+// Which of the kernels compiled for several vector widths this processor runs.
+#pragma once
+#include <deform/plugin.h>
+
+#include <cstdio>
+#include <cstdlib>
+#include <cstring>
+
+namespace model {
+
+enum Width { kSse2, kAvx2, kAvx512 };
+
+// The widest that this processor has, or what DEFORM_SIMD asks for. `who` begins the sentence in the log.
+inline Width choose_width(const dfm_host *host, const char *who) {
+  const bool avx2 = __builtin_cpu_supports("avx2");
+  const bool avx512 = __builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512vl") &&
+                      __builtin_cpu_supports("avx512dq");
+  const Width best = avx512 ? kAvx512 : avx2 ? kAvx2 : kSse2;
+  const char *forced = std::getenv("DEFORM_SIMD");
+  if (!forced || !*forced) return best;
+  if (!std::strcmp(forced, "sse2")) return kSse2;
+  if (!std::strcmp(forced, "avx2") && avx2) return kAvx2;
+  if (!std::strcmp(forced, "avx512") && avx512) return kAvx512;
+  char text[200];
+  std::snprintf(
+      text, sizeof text,
+      "%s: DEFORM_SIMD is none of sse2, avx2, avx512 or this processor lacks it; the best it has is "
+      "used.",
+      who);
+  host->log(host->ctx, 2, 0, text);
+  return best;
+}
+
+}  // namespace model
