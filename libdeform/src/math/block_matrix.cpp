@@ -1,0 +1,95 @@
+#include "math/block_matrix.h"
+
+#include <algorithm>
+
+namespace dfm {
+
+void hold_components(const BlockPattern &pattern, const uint8_t *mask, double *blk) {
+  for (uint32_t b = 0; b < pattern.nb; ++b) {
+    const uint32_t i = pattern.ij[2 * size_t{b}], j = pattern.ij[2 * size_t{b} + 1];
+    if (!((mask[i] | mask[j]) & 7)) continue;
+    double *const a = blk + 9 * size_t{b};
+    for (uint32_t r = 0; r < 3; ++r)
+      for (uint32_t c = 0; c < 3; ++c)
+        if ((mask[i] >> r & 1) || (mask[j] >> c & 1)) a[3 * r + c] = i == j && r == c ? 1.0 : 0.0;
+  }
+}
+
+BlockMatrix::BlockMatrix(const Memory &memory) {
+  use_memory(memory, row_, column_, diagonal_, upper_, lower_);
+  use_memory(memory, value_);
+}
+
+void BlockMatrix::set_pattern(const BlockPattern &pattern) {
+  n_ = pattern.n;
+  nb_ = pattern.nb;
+  row_.assign(size_t{n_} + 1, 0);
+  for (uint32_t b = 0; b < nb_; ++b) {
+    const uint32_t i = pattern.ij[2 * size_t{b}], j = pattern.ij[2 * size_t{b} + 1];
+    ++row_[i + 1];
+    if (i != j) ++row_[j + 1];
+  }
+  for (uint32_t i = 0; i < n_; ++i) row_[i + 1] += row_[i];
+  const uint32_t count = row_[n_];
+  column_.resize(count);
+  // Every row gets its columns, sorts them, and each block of the pattern looks up its two places.
+  diagonal_.assign(row_.begin(), row_.end() - 1);
+  for (uint32_t b = 0; b < nb_; ++b) {
+    const uint32_t i = pattern.ij[2 * size_t{b}], j = pattern.ij[2 * size_t{b} + 1];
+    column_[diagonal_[i]++] = j;
+    if (i != j) column_[diagonal_[j]++] = i;
+  }
+  const auto place = [&](uint32_t i, uint32_t j) {
+    return uint32_t(std::lower_bound(column_.begin() + row_[i], column_.begin() + row_[i + 1], j) -
+                    column_.begin());
+  };
+  for (uint32_t i = 0; i < n_; ++i) {
+    std::sort(column_.begin() + row_[i], column_.begin() + row_[i + 1]);
+    diagonal_[i] = place(i, i);
+  }
+  upper_.resize(nb_);
+  lower_.resize(nb_);
+  for (uint32_t b = 0; b < nb_; ++b) {
+    const uint32_t i = pattern.ij[2 * size_t{b}], j = pattern.ij[2 * size_t{b} + 1];
+    upper_[b] = place(i, j);
+    lower_[b] = place(j, i);
+  }
+  value_.assign(9 * size_t{count}, 0.0);
+}
+
+void BlockMatrix::set_values(const double *blk) {
+  for (uint32_t b = 0; b < nb_; ++b) {
+    const double *const a = blk + 9 * size_t{b};
+    double *const u = &value_[9 * size_t{upper_[b]}];
+    for (uint32_t k = 0; k < 9; ++k) u[k] = a[k];
+    if (lower_[b] == upper_[b]) continue;
+    double *const l = &value_[9 * size_t{lower_[b]}];
+    for (uint32_t r = 0; r < 3; ++r)
+      for (uint32_t c = 0; c < 3; ++c) l[3 * r + c] = a[3 * c + r];
+  }
+}
+
+void BlockMatrix::multiply(uint32_t begin, uint32_t end, const double *x, double *y) const {
+  const double *a = &value_[9 * size_t{row_[begin]}];
+  for (uint32_t i = begin; i < end; ++i) {
+    // One sum per entry of a block: no sum waits for another, and pairs of them fill a vector.
+    double s[9] = {0, 0, 0, 0, 0, 0, 0, 0, 0};
+    for (uint32_t k = row_[i]; k < row_[i + 1]; ++k, a += 9) {
+      const double *const p = x + 3 * size_t{column_[k]};
+      const double q[9] = {p[0], p[1], p[2], p[0], p[1], p[2], p[0], p[1], p[2]};
+      for (uint32_t e = 0; e < 9; ++e) s[e] += a[e] * q[e];
+    }
+    double *const out = y + 3 * size_t{i};
+    for (uint32_t r = 0; r < 3; ++r) out[r] = (s[3 * r] + s[3 * r + 1]) + s[3 * r + 2];
+  }
+}
+
+void BlockMatrix::multiply(Tasks *tasks, const double *x, double *y) const {
+  if (!tasks || n_ <= kGrain) {
+    if (n_) multiply(0, n_, x, y);
+    return;
+  }
+  tasks->parallel_for(n_, kGrain, [&](uint32_t begin, uint32_t end) { multiply(begin, end, x, y); });
+}
+
+}  // namespace dfm

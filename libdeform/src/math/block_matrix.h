@@ -1,0 +1,48 @@
+// Symmetric matrices of 3x3 blocks between pairs of points: what a model's stiffness and an implicit step are
+// made of. Vectors are [n,3].
+#pragma once
+#include "core/memory.h"
+#include "core/tasks.h"
+
+namespace dfm {
+
+// The upper triangle by pairs of points, as dfm_model.pattern lists them: i <= j, each pair once, each point
+// with itself, in any order. Values blk[nb,9] are row-major, in the same order; block (j, i) is the transpose
+// of (i, j).
+struct BlockPattern {
+  uint32_t n = 0, nb = 0;
+  const uint32_t *ij = nullptr;  // [nb,2]
+};
+
+// Rows and columns of held components become those of the identity; mask[n]: bits 1 x, 2 y, 4 z.
+void hold_components(const BlockPattern &pattern, const uint8_t *mask, double *blk);
+
+// The whole matrix by rows, both triangles stored: the product then reads once and in order, and its rows may
+// be shared among threads without changing one bit.
+class BlockMatrix {
+ public:
+  explicit BlockMatrix(const Memory &memory);
+
+  void set_pattern(const BlockPattern &pattern);
+  void set_values(const double *blk);
+  uint32_t size() const { return n_; }  // points
+  // Blocks of row i: columns()[k] and values() + 9k for k in [rows()[i], rows()[i+1]), columns rising.
+  const Array<uint32_t> &rows() const { return row_; }
+  const Array<uint32_t> &columns() const { return column_; }
+  const double *values() const { return value_.data(); }
+  const double *diagonal(uint32_t i) const { return &value_[9 * size_t{diagonal_[i]}]; }
+
+  // y = A x in rows [begin, end)
+  void multiply(uint32_t begin, uint32_t end, const double *x, double *y) const;
+  void multiply(Tasks *tasks, const double *x, double *y) const;  // all rows; tasks may be null
+
+  static constexpr uint32_t kGrain = 256;  // rows that one thread takes at a time
+
+ private:
+  uint32_t n_ = 0, nb_ = 0;
+  Array<uint32_t> row_, column_, diagonal_;
+  Array<uint32_t> upper_, lower_;  // [nb] where block b of the pattern stands, as it is and transposed
+  Array<double> value_;
+};
+
+}  // namespace dfm

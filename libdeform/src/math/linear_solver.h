@@ -1,0 +1,33 @@
+// Solvers of A x = b for symmetric positive definite matrices of 3x3 blocks, behind one interface.
+#pragma once
+#include "math/block_matrix.h"
+
+namespace dfm {
+
+struct SolveInfo {
+  uint32_t iterations = 0;  // of all right-hand sides; 0 for a direct solver
+  double residual = 0;      // the largest relative residual that the solver stopped at, in its own norm
+  bool indefinite = false;  // a direction of negative or no curvature was met
+};
+
+class LinearSolver {
+ public:
+  virtual ~LinearSolver() = default;
+  virtual const char *name() const = 0;
+  // Exact up to rounding: neither the tolerance nor what x holds before the call matters.
+  virtual bool direct() const = 0;
+  // A new pattern; what is asked of the solver before the next factor() is void. Throws where memory ends.
+  virtual void analyse(const BlockPattern &pattern) = 0;
+  // New values blk[nb,9], read during the call only. False: the matrix is not positive definite, and nothing
+  // may be solved with it.
+  virtual bool factor(const double *blk) = 0;
+  // b, x [nrhs][n,3], not overlapping; an iterative solver starts from x and ends where the residual is
+  // tolerance times that of x = 0. False: it did not get there; x is its best.
+  virtual bool solve(uint32_t nrhs, const double *b, double *x, double tolerance, SolveInfo &info) = 0;
+  // w[3 nsel, 3 nsel] = S A^-1 S^T, row-major and symmetric: how the selected points, each named once, answer
+  // forces on each other.
+  virtual bool restricted(uint32_t nsel, const uint32_t *sel, double tolerance, double *w,
+                          SolveInfo &info) = 0;
+};
+
+}  // namespace dfm

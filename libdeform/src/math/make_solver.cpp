@@ -1,0 +1,29 @@
+#include "math/make_solver.h"
+
+#include <cstring>
+
+#include "core/error.h"
+#include "math/ldlt_solver.h"
+#include "math/pcg_solver.h"
+
+namespace dfm {
+
+namespace {
+
+constexpr uint32_t kFactorEveryStep = 1500;  // points up to which a factorization in every step is cheaper
+
+}  // namespace
+
+const char *solver_name(const SolverChoice &choice) {
+  if (std::strcmp(choice.name, "auto") != 0) return choice.name;
+  return choice.constant || choice.points <= kFactorEveryStep ? "ldlt" : "pcg";
+}
+
+std::unique_ptr<LinearSolver> make_solver(const SolverChoice &choice, const Memory &memory, Tasks *tasks) {
+  const char *const name = solver_name(choice);
+  if (std::strcmp(name, "ldlt") == 0) return std::make_unique<LdltSolver>(memory, tasks);
+  if (std::strcmp(name, "pcg") == 0) return std::make_unique<PcgSolver>(memory, tasks, choice.max_iterations);
+  fail(DFM_E_ARG, "there is no linear solver '%s'; choose auto, ldlt or pcg", name);
+}
+
+}  // namespace dfm

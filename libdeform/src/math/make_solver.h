@@ -1,0 +1,21 @@
+// Linear solvers by name.
+#pragma once
+#include <memory>
+
+#include "math/linear_solver.h"
+
+namespace dfm {
+
+struct SolverChoice {
+  const char *name = "auto";    // "auto", "ldlt", "pcg"
+  uint32_t points = 0;          // for "auto"
+  bool constant = false;        // the matrix stays as it is while the body lives
+  uint32_t max_iterations = 0;  // of an iterative solver, per right-hand side; 0: as many as there are rows
+};
+
+// The name that "auto" stands for: the factorization where it is done once, or is cheap.
+const char *solver_name(const SolverChoice &choice);
+// Throws Error where there is no solver of that name.
+std::unique_ptr<LinearSolver> make_solver(const SolverChoice &choice, const Memory &memory, Tasks *tasks);
+
+}  // namespace dfm

@@ -1,0 +1,35 @@
+// Conjugate gradients with a preconditioner of inverted 3x3 blocks (block Jacobi).
+#pragma once
+#include "math/linear_solver.h"
+
+namespace dfm {
+
+class PcgSolver final : public LinearSolver {
+ public:
+  // max_iterations per right-hand side; 0: as many as the matrix has rows
+  explicit PcgSolver(const Memory &memory, Tasks *tasks = nullptr, uint32_t max_iterations = 0);
+
+  const char *name() const override { return "pcg"; }
+  bool direct() const override { return false; }
+  void analyse(const BlockPattern &pattern) override;
+  bool factor(const double *blk) override;
+  // Stops where sqrt(r.M^-1 r) <= tolerance sqrt(b.M^-1 b).
+  bool solve(uint32_t nrhs, const double *b, double *x, double tolerance, SolveInfo &info) override;
+  bool restricted(uint32_t nsel, const uint32_t *sel, double tolerance, double *w, SolveInfo &info) override;
+
+ private:
+  bool solve_one(const double *b, double *x, double tolerance, SolveInfo &info);
+  // Calls f(begin, end) for cuts of the points and returns the sum of what it returns, always in one order.
+  template <class F>
+  double sum(F &&f);
+  void precondition(uint32_t begin, uint32_t end, const double *r, double *z) const;
+
+  Tasks *tasks_;
+  uint32_t max_iterations_;
+  bool ready_ = false;
+  BlockMatrix a_;
+  Array<double> inverse_;  // [n,9] of the diagonal blocks
+  Array<double> r_, z_, p_, q_, partial_, unit_, answer_;
+};
+
+}  // namespace dfm

@@ -1,0 +1,291 @@
+// Linear solvers of symmetric positive definite matrices of 3x3 blocks against dense solutions.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+#include <functional>
+#include <memory>
+#include <random>
+#include <vector>
+
+#include "dense.h"
+#include "core/error.h"
+#include "math/ldlt_solver.h"
+#include "math/make_solver.h"
+#include "math/pcg_solver.h"
+
+namespace {
+
+using dfm::BlockPattern;
+
+// A grid of points, each tied to its neighbors up to a corner of its cell, and a share of the identity: what
+// an implicit step of springs and masses looks like.
+struct Grid {
+  uint32_t n = 0;
+  std::vector<uint32_t> ij;
+  std::vector<double> blk;
+  BlockPattern pattern() const { return {n, uint32_t(ij.size() / 2), ij.data()}; }
+};
+
+Grid grid(uint32_t a, uint32_t b, uint32_t c, double mass, uint32_t seed = 1) {
+  Grid g;
+  g.n = a * b * c;
+  std::mt19937 random(seed);
+  std::uniform_real_distribution<double> uniform(0.5, 2.0);
+  std::vector<double> own(9 * size_t{g.n}, 0.0);
+  std::vector<std::pair<std::pair<uint32_t, uint32_t>, std::vector<double>>> blocks;
+  const auto point = [&](uint32_t x, uint32_t y, uint32_t z) { return (z * b + y) * a + x; };
+  for (uint32_t z = 0; z < c; ++z)
+    for (uint32_t y = 0; y < b; ++y)
+      for (uint32_t x = 0; x < a; ++x)
+        for (int dz = 0; dz <= 1; ++dz)
+          for (int dy = -1; dy <= 1; ++dy)
+            for (int dx = -1; dx <= 1; ++dx) {
+              if (dz == 0 && (dy < 0 || (dy == 0 && dx <= 0))) continue;
+              const int64_t u = int64_t(x) + dx, v = int64_t(y) + dy, w = int64_t(z) + dz;
+              if (u < 0 || v < 0 || u >= a || v >= b || w >= c) continue;
+              const double k = uniform(random), l2 = dx * dx + dy * dy + dz * dz;
+              const double e[3] = {double(dx), double(dy), double(dz)};
+              const uint32_t i = point(x, y, z), j = point(uint32_t(u), uint32_t(v), uint32_t(w));
+              std::vector<double> block(9);
+              for (uint32_t r = 0; r < 3; ++r)
+                for (uint32_t s = 0; s < 3; ++s) {
+                  // a little of the identity: a spring alone does nothing across itself
+                  const double value = k * (e[r] * e[s] / l2 + (r == s ? 0.1 : 0.0));
+                  block[3 * r + s] = -value;
+                  own[9 * i + 3 * r + s] += value;
+                  own[9 * j + 3 * r + s] += value;
+                }
+              blocks.push_back({{i, j}, block});
+            }
+  for (uint32_t i = 0; i < g.n; ++i) {
+    for (uint32_t r = 0; r < 3; ++r) own[9 * i + 4 * r] += mass;
+    blocks.push_back({{i, i}, std::vector<double>(own.begin() + 9 * i, own.begin() + 9 * i + 9)});
+  }
+  std::shuffle(blocks.begin(), blocks.end(), random);  // any order
+  for (const auto &[pair, block] : blocks) {
+    g.ij.insert(g.ij.end(), {pair.first, pair.second});
+    g.blk.insert(g.blk.end(), block.begin(), block.end());
+  }
+  return g;
+}
+
+test::Dense dense(const Grid &g) {
+  test::Dense a(3 * size_t{g.n}, 3 * size_t{g.n});
+  for (size_t b = 0; b < g.ij.size() / 2; ++b)
+    for (size_t r = 0; r < 3; ++r)
+      for (size_t c = 0; c < 3; ++c) {
+        const size_t row = 3 * g.ij[2 * b] + r, column = 3 * g.ij[2 * b + 1] + c;
+        a(row, column) = a(column, row) = g.blk[9 * b + 3 * r + c];
+      }
+  return a;
+}
+
+std::vector<double> noise(size_t n, uint32_t seed) {
+  std::mt19937 random(seed);
+  std::uniform_real_distribution<double> uniform(-1, 1);
+  std::vector<double> v(n);
+  for (double &x : v) x = uniform(random);
+  return v;
+}
+
+double worst(const std::vector<double> &a, const std::vector<double> &b) {
+  double difference = 0, size = 0;
+  for (size_t k = 0; k < a.size(); ++k) {
+    difference = std::max(difference, std::fabs(a[k] - b[k]));
+    size = std::max(size, std::fabs(b[k]));
+  }
+  return difference / size;
+}
+
+using Made = std::unique_ptr<dfm::LinearSolver>;
+const std::vector<std::pair<const char *, std::function<Made(dfm::Tasks *)>>> kSolvers = {
+    {"ldlt", [](dfm::Tasks *t) { return std::make_unique<dfm::LdltSolver>(dfm::Memory::standard(), t); }},
+    {"pcg", [](dfm::Tasks *t) { return std::make_unique<dfm::PcgSolver>(dfm::Memory::standard(), t); }},
+};
+
+TEST(BlockMatrix, Product_EqualsDense) {
+  const Grid g = grid(4, 3, 3, 0.1);
+  const std::vector<double> x = noise(3 * g.n, 2);
+  dfm::BlockMatrix m(dfm::Memory::standard());
+  m.set_pattern(g.pattern());
+  m.set_values(g.blk.data());
+  std::vector<double> y(x.size());
+  m.multiply(nullptr, x.data(), y.data());
+  EXPECT_LT(worst(y, dense(g) * x), 1e-15);
+}
+
+TEST(BlockMatrix, HeldComponents_AreThoseOfTheIdentity) {
+  Grid g = grid(3, 3, 2, 0.1);
+  std::vector<uint8_t> mask(g.n, 0);
+  mask[1] = 7;
+  mask[4] = 2;
+  mask[5] = 5;
+  const test::Dense before = dense(g);
+  hold_components(g.pattern(), mask.data(), g.blk.data());
+  const test::Dense after = dense(g);
+  const size_t m = 3 * g.n;
+  for (size_t r = 0; r < m; ++r)
+    for (size_t c = 0; c < m; ++c) {
+      const bool held = (mask[r / 3] >> r % 3 & 1) || (mask[c / 3] >> c % 3 & 1);
+      EXPECT_EQ(after(r, c), held ? (r == c ? 1.0 : 0.0) : before(r, c)) << r << ' ' << c;
+    }
+}
+
+TEST(LinearSolver, SeveralRightHandSides_EqualDense) {
+  Grid g = grid(4, 3, 3, 0.05);
+  std::vector<uint8_t> mask(g.n, 0);
+  mask[0] = 7;
+  mask[7] = 1;
+  hold_components(g.pattern(), mask.data(), g.blk.data());
+  const size_t m = 3 * g.n;
+  const test::Dense a = dense(g);
+  for (const auto &[name, make] : kSolvers) {
+    SCOPED_TRACE(name);
+    const Made solver = make(nullptr);
+    EXPECT_STREQ(solver->name(), name);
+    solver->analyse(g.pattern());
+    for (double scale : {1.0, 3.0}) {  // factor again on the same pattern
+      std::vector<double> blk = g.blk;
+      for (double &v : blk) v *= scale;
+      ASSERT_TRUE(solver->factor(blk.data()));
+      for (uint32_t nrhs : {1u, 7u, 8u, 19u}) {
+        const std::vector<double> b = noise(nrhs * m, nrhs);
+        std::vector<double> x(b.size(), 0.0);
+        dfm::SolveInfo info;
+        ASSERT_TRUE(solver->solve(nrhs, b.data(), x.data(), 1e-13, info));
+        EXPECT_EQ(info.iterations == 0, solver->direct());
+        EXPECT_LE(info.residual, 1e-13);
+        for (uint32_t k = 0; k < nrhs; ++k) {
+          std::vector<double> want = test::solved(a, std::vector<double>(&b[k * m], &b[k * m] + m));
+          for (double &v : want) v /= scale;
+          EXPECT_LT(worst(std::vector<double>(&x[k * m], &x[k * m] + m), want), 1e-11);
+        }
+      }
+    }
+  }
+}
+
+TEST(LinearSolver, RestrictedInverse_EqualsUnitResponses) {
+  const Grid g = grid(4, 3, 3, 0.05);
+  const std::vector<uint32_t> sel = {30, 2, 17, 5, 11};
+  const size_t m = 3 * g.n, wide = 3 * sel.size();
+  const test::Dense a = dense(g);
+  std::vector<double> want(wide * wide);
+  for (size_t c = 0; c < wide; ++c) {
+    std::vector<double> unit(m, 0.0);
+    unit[3 * sel[c / 3] + c % 3] = 1;
+    unit = test::solved(a, unit);
+    for (size_t r = 0; r < wide; ++r) want[r * wide + c] = unit[3 * sel[r / 3] + r % 3];
+  }
+  for (const auto &[name, make] : kSolvers) {
+    SCOPED_TRACE(name);
+    const Made solver = make(nullptr);
+    solver->analyse(g.pattern());
+    ASSERT_TRUE(solver->factor(g.blk.data()));
+    std::vector<double> w(wide * wide);
+    dfm::SolveInfo info;
+    ASSERT_TRUE(solver->restricted(uint32_t(sel.size()), sel.data(), 1e-13, w.data(), info));
+    EXPECT_LT(worst(w, want), 1e-12);
+    for (size_t r = 0; r < wide; ++r)
+      for (size_t c = 0; c < r; ++c) EXPECT_EQ(w[r * wide + c], w[c * wide + r]);
+  }
+}
+
+TEST(LinearSolver, SeveralThreads_SameBits) {
+  const Grid g = grid(12, 12, 9, 0.05);
+  const std::vector<uint32_t> sel = {700, 2, 17, 1200, 1100, 30, 5, 800};
+  const size_t m = 3 * g.n, wide = 3 * sel.size();
+  const std::vector<double> b = noise(20 * m, 5);
+  for (const auto &[name, make] : kSolvers) {
+    SCOPED_TRACE(name);
+    std::vector<double> first_x, first_w;
+    for (uint32_t threads : {1u, 2u, 4u}) {
+      dfm::Tasks tasks(threads, nullptr, nullptr);
+      const Made solver = make(&tasks);
+      solver->analyse(g.pattern());
+      ASSERT_TRUE(solver->factor(g.blk.data()));
+      std::vector<double> x(b.size(), 0.0), w(wide * wide);
+      dfm::SolveInfo info;
+      ASSERT_TRUE(solver->solve(20, b.data(), x.data(), 1e-8, info));
+      ASSERT_TRUE(solver->restricted(uint32_t(sel.size()), sel.data(), 1e-8, w.data(), info));
+      if (threads == 1) {
+        first_x = x;
+        first_w = w;
+      }
+      EXPECT_EQ(std::memcmp(x.data(), first_x.data(), x.size() * sizeof(double)), 0) << threads;
+      EXPECT_EQ(std::memcmp(w.data(), first_w.data(), w.size() * sizeof(double)), 0) << threads;
+    }
+  }
+}
+
+TEST(LinearSolver, MatrixThatIsNotPositiveDefinite_IsToldAndNothingIsSolved) {
+  const std::vector<double> b(3 * 36, 1.0);
+  for (double mass : {0.0, -0.5}) {  // free to move as a whole; and worse
+    const Grid g = grid(4, 3, 3, mass);
+    dfm::LdltSolver direct(dfm::Memory::standard());
+    direct.analyse(g.pattern());
+    EXPECT_FALSE(direct.factor(g.blk.data())) << mass;
+    std::vector<double> x(b.size(), 7.0);
+    dfm::SolveInfo info;
+    EXPECT_FALSE(direct.solve(1, b.data(), x.data(), 1e-9, info));
+    EXPECT_EQ(x, std::vector<double>(b.size(), 7.0));
+  }
+  // Conjugate gradients meet the curvature on their way.
+  const Grid g = grid(4, 3, 3, -0.5);
+  dfm::PcgSolver iterative(dfm::Memory::standard());
+  iterative.analyse(g.pattern());
+  ASSERT_TRUE(iterative.factor(g.blk.data()));
+  std::vector<double> x(b.size(), 0.0);
+  dfm::SolveInfo info;
+  EXPECT_FALSE(iterative.solve(1, b.data(), x.data(), 1e-9, info));
+  EXPECT_TRUE(info.indefinite);
+  for (double v : x) EXPECT_TRUE(std::isfinite(v));
+  // A diagonal block that is not positive definite is told by factor().
+  std::vector<double> blk = g.blk;
+  for (size_t k = 0; k < g.ij.size() / 2; ++k)
+    if (g.ij[2 * k] == g.ij[2 * k + 1]) blk[9 * k + 4] = -1;
+  EXPECT_FALSE(iterative.factor(blk.data()));
+}
+
+TEST(PcgSolver, StartAtTheSolution_TakesNoIteration) {
+  const Grid g = grid(5, 4, 4, 0.05);
+  const std::vector<double> b = noise(3 * g.n, 3);
+  dfm::PcgSolver solver(dfm::Memory::standard());
+  solver.analyse(g.pattern());
+  ASSERT_TRUE(solver.factor(g.blk.data()));
+  std::vector<double> x(b.size(), 0.0);
+  dfm::SolveInfo cold, warm;
+  ASSERT_TRUE(solver.solve(1, b.data(), x.data(), 1e-10, cold));
+  EXPECT_GT(cold.iterations, 5u);
+  ASSERT_TRUE(solver.solve(1, b.data(), x.data(), 1e-9, warm));
+  EXPECT_EQ(warm.iterations, 0u);
+}
+
+TEST(PcgSolver, LimitOfIterations_IsToldWithTheBestAnswer) {
+  const Grid g = grid(5, 4, 4, 0.01);
+  const std::vector<double> b = noise(3 * g.n, 3);
+  dfm::PcgSolver solver(dfm::Memory::standard(), nullptr, 3);
+  solver.analyse(g.pattern());
+  ASSERT_TRUE(solver.factor(g.blk.data()));
+  std::vector<double> x(b.size(), 0.0);
+  dfm::SolveInfo info;
+  EXPECT_FALSE(solver.solve(1, b.data(), x.data(), 1e-10, info));
+  EXPECT_EQ(info.iterations, 3u);
+  EXPECT_FALSE(info.indefinite);
+  EXPECT_GT(info.residual, 1e-10);
+  EXPECT_LT(info.residual, 1.0);
+}
+
+TEST(MakeSolver, AutomaticChoice_FactorsSmallAndConstantMatrices) {
+  EXPECT_STREQ(dfm::solver_name({"auto", 300, false, 0}), "ldlt");
+  EXPECT_STREQ(dfm::solver_name({"auto", 20000, false, 0}), "pcg");
+  EXPECT_STREQ(dfm::solver_name({"auto", 20000, true, 0}), "ldlt");
+  EXPECT_STREQ(dfm::solver_name({"pcg", 300, true, 0}), "pcg");
+  for (const char *name : {"ldlt", "pcg"})
+    EXPECT_STREQ(dfm::make_solver({name, 1, false, 0}, dfm::Memory::standard(), nullptr)->name(), name);
+  EXPECT_THROW(dfm::make_solver({"lu", 1, false, 0}, dfm::Memory::standard(), nullptr), dfm::Error);
+}
+
+}  // namespace
