@@ -1,136 +1,159 @@
 #include "math/ldlt_solver.h"
 
 #include <algorithm>
+#include <cstring>
 #include <limits>
-#include <vector>
-
-#include <Eigen/SparseCholesky>
 
 namespace dfm {
 
 namespace {
 
-using Sparse = Eigen::SparseMatrix<double, Eigen::ColMajor, int>;
-// Points are ordered by us, so that the three components of a point stay together.
-using Simplicial = Eigen::SimplicialLDLT<Sparse, Eigen::Upper, Eigen::NaturalOrdering<int>>;
-
 // Pivots below this share of the diagonal are rounding: the matrix is singular as far as doubles tell.
 constexpr double kPivot = 64 * std::numeric_limits<double>::epsilon();
+constexpr uint32_t kBlock = 24;         // columns of a panel that are factored at a time
+constexpr uint32_t kChunk = 96;         // columns that one pass over an update takes
+constexpr double kShared = 1.0e6;       // multiplications below which threads only wait for each other
+constexpr uint32_t kTilesPerShare = 4;  // of kTileColumns columns
+
+size_t rounded(size_t n) { return (n + kTileRows - 1) / kTileRows * kTileRows; }
 
 }  // namespace
 
-struct LdltSolver::Factor {
-  Sparse upper;  // of the ordered matrix
-  Simplicial ldlt;
-  Eigen::VectorXd pivots;
-  const Sparse &lower() const { return ldlt.matrixL().nestedExpression(); }  // strictly below the diagonal
-};
-
-LdltSolver::LdltSolver(const Memory &memory, Tasks *tasks) : tasks_(tasks) {
-  use_memory(memory, place_, target_, selected_, first_);
-  use_memory(memory, diagonal_, panels_);
+LdltSolver::LdltSolver(const Memory &memory, Tasks *tasks)
+    : kernels_(dense_kernels()), tasks_(tasks), nodes_(memory) {
+  use_memory(memory, entry_begin_, waiting_, selected_, reach_begin_, reach_);
+  use_memory(memory, value_, pivot_, inverse_, floor_, stack_, left_, right_, panels_, reached_);
+  use_memory(memory, entry_);
+  use_memory(memory, reached_begin_);
 }
-
-LdltSolver::~LdltSolver() = default;
 
 void LdltSolver::analyse(const BlockPattern &pattern) {
   ready_ = false;
   n_ = pattern.n;
-  nb_ = pattern.nb;
-  factor_ = std::make_unique<Factor>();
-  using Triplet = Eigen::Triplet<double, int>;
-  std::vector<Triplet> entries;
-  entries.reserve(2 * size_t{nb_});
-  for (uint32_t b = 0; b < nb_; ++b) {
-    const int i = int(pattern.ij[2 * size_t{b}]), j = int(pattern.ij[2 * size_t{b} + 1]);
-    entries.emplace_back(i, j, 1.0);
-    if (i != j) entries.emplace_back(j, i, 1.0);
-  }
-  const int n = int(n_);
-  Sparse points(n, n);
-  points.setFromTriplets(entries.begin(), entries.end());
-  Eigen::PermutationMatrix<Eigen::Dynamic, Eigen::Dynamic, int> order;
-  Eigen::AMDOrdering<int>()(points, order);  // order.indices()[k]: the point eliminated as the k-th
-  place_.resize(n_);
-  for (uint32_t k = 0; k < n_; ++k) place_[uint32_t(order.indices()[int(k)])] = k;
-
-  entries.clear();
-  entries.reserve(9 * size_t{nb_});
-  const auto scatter = [&](auto &&f) {  // f(entry of blk, row, column) for what stands in the upper triangle
-    for (uint32_t b = 0; b < nb_; ++b) {
-      const uint32_t i = place_[pattern.ij[2 * size_t{b}]], j = place_[pattern.ij[2 * size_t{b} + 1]];
-      for (uint32_t r = 0; r < 3; ++r)
-        for (uint32_t c = 0; c < 3; ++c) {
-          const uint32_t row = 3 * i + r, column = 3 * j + c;
-          if (i != j || row <= column)
-            f(9 * size_t{b} + 3 * r + c, std::min(row, column), std::max(row, column));
-        }
-    }
+  nodes_.build(pattern);
+  const uint32_t ns = nodes_.count();
+  entry_begin_.assign(size_t{ns} + 1, 0);
+  const auto column = [&](uint32_t b) {
+    return std::min(nodes_.place[pattern.ij[2 * size_t{b}]], nodes_.place[pattern.ij[2 * size_t{b} + 1]]);
   };
-  scatter([&](size_t, uint32_t row, uint32_t column) { entries.emplace_back(int(row), int(column), 1.0); });
-  Sparse &upper = factor_->upper;
-  upper.resize(int(3 * n_), int(3 * n_));
-  upper.setFromTriplets(entries.begin(), entries.end());
-  upper.makeCompressed();
-  target_.assign(9 * size_t{nb_}, UINT32_MAX);
-  scatter([&](size_t entry, uint32_t row, uint32_t column) {
-    const int *const begin = upper.innerIndexPtr() + upper.outerIndexPtr()[column];
-    const int *const end = upper.innerIndexPtr() + upper.outerIndexPtr()[column + 1];
-    target_[entry] = uint32_t(std::lower_bound(begin, end, int(row)) - upper.innerIndexPtr());
-  });
-  factor_->ldlt.analyzePattern(upper);
-  diagonal_.resize(3 * size_t{n_});
+  for (uint32_t b = 0; b < pattern.nb; ++b) ++entry_begin_[nodes_.owner[column(b)] + 1];
+  for (uint32_t s = 0; s < ns; ++s) entry_begin_[s + 1] += entry_begin_[s];
+  entry_.resize(pattern.nb);
+  waiting_.assign(entry_begin_.begin(), entry_begin_.end() - 1);
+  for (uint32_t b = 0; b < pattern.nb; ++b) {
+    const uint32_t i = nodes_.place[pattern.ij[2 * size_t{b}]];
+    const uint32_t j = nodes_.place[pattern.ij[2 * size_t{b} + 1]];
+    const uint32_t row = std::max(i, j), own = std::min(i, j), s = nodes_.owner[own];
+    uint32_t at = row - nodes_.begin[s];
+    if (row >= nodes_.begin[s + 1]) {
+      const auto first = nodes_.rows.begin() + nodes_.row_begin[s];
+      const auto last = nodes_.rows.begin() + nodes_.row_begin[s + 1];
+      at = nodes_.width(s) + uint32_t(std::lower_bound(first, last, row) - first);
+    }
+    const uint32_t ld = 3 * nodes_.height(s);
+    entry_[waiting_[s]++] = {b, 3 * at + 3 * (own - nodes_.begin[s]) * ld, i < j};
+  }
+  size_t pack = 0;
+  for (uint32_t s = 0; s < ns; ++s) pack = std::max(pack, rounded(3 * size_t{nodes_.height(s)}) * kChunk);
+  left_.resize(pack);
+  right_.resize(pack);
+  value_.resize(nodes_.value_begin[ns]);
+  stack_.resize(nodes_.stack);
+  for (Array<double> *v : {&pivot_, &inverse_, &floor_}) v->assign(3 * size_t{n_}, 0.0);
+}
+
+void LdltSolver::assemble(uint32_t s, const double *blk, double *panel) {
+  const size_t ld = 3 * size_t{nodes_.height(s)};
+  std::fill(panel, panel + 3 * nodes_.width(s) * ld, 0.0);
+  for (uint32_t e = entry_begin_[s]; e < entry_begin_[s + 1]; ++e) {
+    const double *const a = blk + 9 * size_t{entry_[e].block};
+    double *const to = panel + entry_[e].at;
+    const uint32_t row = entry_[e].transposed ? 1 : 3, column = 4 - row;
+    for (uint32_t c = 0; c < 3; ++c)
+      for (uint32_t r = 0; r < 3; ++r) to[r + c * ld] = a[r * row + c * column];
+  }
+  for (uint32_t k = 0; k < 3 * nodes_.width(s); ++k)
+    floor_[3 * size_t{nodes_.begin[s]} + k] = kPivot * panel[k + k * ld];
+}
+
+// The update of a child, lower triangle, goes to where its rows stand in the parent: into the panel, or into
+// the parent's own update.
+void LdltSolver::extend_add(uint32_t child, const double *update, uint32_t s, double *panel,
+                            double *own) const {
+  const uint32_t count = nodes_.below(child), width = nodes_.width(s);
+  const size_t from_ld = 3 * size_t{count}, ld = 3 * size_t{nodes_.height(s)},
+               own_ld = 3 * size_t{nodes_.below(s)};
+  const uint32_t *const place = &nodes_.relative[nodes_.row_begin[child]];
+  for (uint32_t b = 0; b < count; ++b)
+    for (uint32_t c = 0; c < 3; ++c) {
+      const double *const from = update + (3 * size_t{b} + c) * from_ld;
+      const bool pivot = place[b] < width;
+      // own update: its rows begin behind the pivots
+      double *const to = pivot ? panel + (3 * size_t{place[b]} + c) * ld
+                               : own + (3 * size_t{place[b] - width} + c) * own_ld - 3 * size_t{width};
+      for (uint32_t a = b; a < count; ++a)
+        for (uint32_t r = 0; r < 3; ++r) to[3 * size_t{place[a]} + r] += from[3 * size_t{a} + r];
+    }
+}
+
+// C[m rows, columns] -= A D A^T on and below the diagonal, A [m,k]
+void LdltSolver::subtract_product(uint32_t m, uint32_t columns, uint32_t k, const double *a, size_t ld,
+                                  const double *d, double *c, size_t ldc) {
+  for (uint32_t at = 0; at < k; at += kChunk) {
+    const uint32_t now = std::min(kChunk, k - at);
+    kernels_.pack(m, now, a + at * ld, ld, d + at, left_.data(), right_.data());
+    const auto some = [&](uint32_t begin, uint32_t end) {
+      kernels_.update(m, begin * kTileColumns, std::min(columns, end * kTileColumns), now, left_.data(),
+                      right_.data(), c, ldc);
+    };
+    const uint32_t tiles = (columns + kTileColumns - 1) / kTileColumns;
+    if (tasks_ && double(m) * columns * now > kShared)
+      tasks_->parallel_for(tiles, kTilesPerShare, [&](uint32_t begin, uint32_t end) { some(begin, end); });
+    else some(0, tiles);
+  }
+}
+
+bool LdltSolver::factor_panel(uint32_t s, double *panel, double *own) {
+  const uint32_t n = 3 * nodes_.width(s), m = 3 * nodes_.height(s), below = m - n;
+  const size_t ld = m, first = 3 * size_t{nodes_.begin[s]};
+  for (uint32_t j = 0; j < n; j += kBlock) {
+    const uint32_t now = std::min(kBlock, n - j), next = j + now;
+    double *const block = panel + j * ld;
+    if (kernels_.factor(m - j, now, block + j, ld, &pivot_[first + j], &floor_[first + j]) != now)
+      return false;
+    if (next < n)
+      subtract_product(m - next, n - next, now, block + next, ld, &pivot_[first + j],
+                       panel + next * ld + next, ld);
+  }
+  subtract_product(below, below, n, panel + n, ld, &pivot_[first], own, below);
+  return true;
 }
 
 bool LdltSolver::factor(const double *blk) {
   ready_ = false;
-  Sparse &upper = factor_->upper;
-  for (size_t e = 0; e < target_.size(); ++e)
-    if (target_[e] != UINT32_MAX) upper.valuePtr()[target_[e]] = blk[e];
-  for (uint32_t k = 0; k < 3 * n_; ++k) diagonal_[k] = upper.valuePtr()[upper.outerIndexPtr()[k + 1] - 1];
-  factor_->ldlt.factorize(upper);
-  if (n_ && factor_->ldlt.info() != Eigen::Success) return false;
-  factor_->pivots = factor_->ldlt.vectorD();
-  const double *const d = factor_->pivots.data();
-  for (uint32_t k = 0; k < 3 * n_; ++k)
-    if (!(d[k] > kPivot * diagonal_[k]) || !(d[k] <= std::numeric_limits<double>::max())) return false;
+  size_t top = 0;
+  uint32_t count = 0;
+  for (uint32_t s = 0; s < nodes_.count(); ++s) {
+    const auto square = [&](uint32_t node) { return 9 * size_t{nodes_.below(node)} * nodes_.below(node); };
+    double *const panel = &value_[nodes_.value_begin[s]], *const own = stack_.data() + top;
+    assemble(s, blk, panel);
+    std::fill(own, own + square(s), 0.0);
+    uint32_t first = count;
+    size_t base = top;
+    while (first > 0 && nodes_.parent[waiting_[first - 1]] == s) base -= square(waiting_[--first]);
+    size_t at = base;
+    for (uint32_t c = first; c < count; ++c) {
+      extend_add(waiting_[c], stack_.data() + at, s, panel, own);
+      at += square(waiting_[c]);
+    }
+    if (!factor_panel(s, panel, own)) return false;
+    std::memmove(stack_.data() + base, own, square(s) * sizeof(double));
+    top = base + square(s);
+    count = first;
+    waiting_[count++] = s;
+  }
+  for (size_t k = 0; k < pivot_.size(); ++k) inverse_[k] = 1 / pivot_[k];
   return ready_ = true;
-}
-
-void LdltSolver::forward(uint32_t first, double *panel) const {
-  const Sparse &l = factor_->lower();
-  const int *const outer = l.outerIndexPtr(), *const inner = l.innerIndexPtr();
-  const double *const value = l.valuePtr();
-  for (uint32_t k = first; k < 3 * n_; ++k) {
-    double x[kPanel];
-    bool zero = true;  // as above the first entry of a right-hand side, and beside what it reaches
-    for (uint32_t r = 0; r < kPanel; ++r) {
-      x[r] = panel[size_t{k} * kPanel + r];
-      zero = zero && x[r] == 0;
-    }
-    if (zero) continue;
-    for (int e = outer[k]; e < outer[k + 1]; ++e) {
-      double *const y = panel + size_t(inner[e]) * kPanel;
-      const double a = value[e];
-      for (uint32_t r = 0; r < kPanel; ++r) y[r] -= a * x[r];
-    }
-  }
-}
-
-void LdltSolver::backward(double *panel) const {
-  const Sparse &l = factor_->lower();
-  const int *const outer = l.outerIndexPtr(), *const inner = l.innerIndexPtr();
-  const double *const value = l.valuePtr();
-  for (uint32_t k = 3 * n_; k-- > 0;) {
-    double x[kPanel];
-    for (uint32_t r = 0; r < kPanel; ++r) x[r] = panel[size_t{k} * kPanel + r];
-    for (int e = outer[k]; e < outer[k + 1]; ++e) {
-      const double *const y = panel + size_t(inner[e]) * kPanel;
-      const double a = value[e];
-      for (uint32_t r = 0; r < kPanel; ++r) x[r] -= a * y[r];
-    }
-    for (uint32_t r = 0; r < kPanel; ++r) panel[size_t{k} * kPanel + r] = x[r];
-  }
 }
 
 template <class F>
@@ -144,74 +167,150 @@ void LdltSolver::each(uint32_t count, F &&f) const {
   });
 }
 
+void LdltSolver::solve_one(const double *b, double *x) {
+  const size_t rows = 3 * size_t{n_};
+  panels_.resize(std::max(panels_.size(), 2 * rows));
+  double *const y = panels_.data(), *const scratch = y + rows;
+  for (uint32_t i = 0; i < n_; ++i)
+    for (uint32_t c = 0; c < 3; ++c) y[3 * size_t{nodes_.place[i]} + c] = b[3 * size_t{i} + c];
+  const auto run = [&](auto kernel, uint32_t s) {
+    kernel(nodes_.width(s), nodes_.below(s), &value_[nodes_.value_begin[s]],
+           nodes_.rows.data() + nodes_.row_begin[s], y + 3 * size_t{nodes_.begin[s]}, y, scratch);
+  };
+  for (uint32_t s = 0; s < nodes_.count(); ++s) run(kernels_.forward_one, s);
+  for (size_t k = 0; k < rows; ++k) y[k] *= inverse_[k];
+  for (uint32_t s = nodes_.count(); s-- > 0;) run(kernels_.backward_one, s);
+  for (uint32_t i = 0; i < n_; ++i)
+    for (uint32_t c = 0; c < 3; ++c) x[3 * size_t{i} + c] = y[3 * size_t{nodes_.place[i]} + c];
+}
+
+void LdltSolver::solve_panel(uint32_t lanes, const double *b, double *x, double *panel) const {
+  const size_t rows = 3 * size_t{n_};
+  for (uint32_t i = 0; i < n_; ++i)
+    for (uint32_t c = 0; c < 3; ++c) {
+      double *const to = panel + (3 * size_t{nodes_.place[i]} + c) * kLanes;
+      for (uint32_t r = 0; r < kLanes; ++r) to[r] = r < lanes ? b[r * rows + 3 * size_t{i} + c] : 0.0;
+    }
+  const auto run = [&](auto kernel, uint32_t s) {
+    kernel(nodes_.width(s), nodes_.below(s), &value_[nodes_.value_begin[s]],
+           nodes_.rows.data() + nodes_.row_begin[s], panel + 3 * size_t{nodes_.begin[s]} * kLanes, panel);
+  };
+  for (uint32_t s = 0; s < nodes_.count(); ++s) run(kernels_.forward, s);
+  for (size_t k = 0; k < rows; ++k)
+    for (uint32_t r = 0; r < kLanes; ++r) panel[k * kLanes + r] *= inverse_[k];
+  for (uint32_t s = nodes_.count(); s-- > 0;) run(kernels_.backward, s);
+  for (uint32_t i = 0; i < n_; ++i)
+    for (uint32_t c = 0; c < 3; ++c) {
+      const double *const from = panel + (3 * size_t{nodes_.place[i]} + c) * kLanes;
+      for (uint32_t r = 0; r < lanes; ++r) x[r * rows + 3 * size_t{i} + c] = from[r];
+    }
+}
+
 bool LdltSolver::solve(uint32_t nrhs, const double *b, double *x, double, SolveInfo &info) {
   info = {};
   if (!ready_) return false;
-  const uint32_t npanel = (nrhs + kPanel - 1) / kPanel;
   const size_t rows = 3 * size_t{n_};
-  panels_.resize(npanel * rows * kPanel);
-  const auto one = [&](uint32_t p) {
-    double *const panel = panels_.data() + p * rows * kPanel;
-    const uint32_t lanes = std::min(kPanel, nrhs - p * kPanel);
-    for (uint32_t i = 0; i < n_; ++i)
-      for (uint32_t c = 0; c < 3; ++c) {
-        double *const to = panel + (3 * size_t{place_[i]} + c) * kPanel;
-        for (uint32_t r = 0; r < kPanel; ++r)
-          to[r] = r < lanes ? b[(size_t{p} * kPanel + r) * rows + 3 * size_t{i} + c] : 0.0;
-      }
-    forward(0, panel);
-    const double *const d = factor_->pivots.data();
-    for (size_t k = 0; k < rows; ++k)
-      for (uint32_t r = 0; r < kPanel; ++r) panel[k * kPanel + r] /= d[k];
-    backward(panel);
-    for (uint32_t i = 0; i < n_; ++i)
-      for (uint32_t c = 0; c < 3; ++c) {
-        const double *const from = panel + (3 * size_t{place_[i]} + c) * kPanel;
-        for (uint32_t r = 0; r < lanes; ++r) x[(size_t{p} * kPanel + r) * rows + 3 * size_t{i} + c] = from[r];
-      }
-  };
-  each(npanel, one);
+  if (nrhs == 1) {
+    solve_one(b, x);
+    return true;
+  }
+  const uint32_t npanel = (nrhs + kLanes - 1) / kLanes, together = std::min(npanel, slots());
+  panels_.resize(std::max(panels_.size(), together * rows * kLanes));
+  for (uint32_t first = 0; first < npanel; first += together)
+    each(std::min(together, npanel - first), [&](uint32_t slot) {
+      const size_t column = (size_t{first} + slot) * kLanes;
+      solve_panel(uint32_t(std::min<size_t>(kLanes, nrhs - column)), b + column * rows, x + column * rows,
+                  panels_.data() + slot * rows * kLanes);
+    });
   return true;
 }
 
-// W = S P^T L^-T D^-1 L^-1 P S^T = Y^T D^-1 Y with Y = L^-1 P S^T: the forward half is enough, and a column
-// of Y begins at the row of its point.
+// Supernodes that a panel's points reach: their own and all above (Gilbert and Peierls 1988).
+void LdltSolver::find_reach(uint32_t nsel, const uint32_t *sel) {
+  selected_.resize(nsel);
+  for (uint32_t k = 0; k < nsel; ++k) selected_[k] = k;
+  std::sort(selected_.begin(), selected_.end(),
+            [&](uint32_t a, uint32_t b) { return nodes_.place[sel[a]] < nodes_.place[sel[b]]; });
+  const size_t wide = 3 * size_t{nsel};
+  reach_.clear();
+  reach_begin_.assign(1, 0);
+  reached_begin_.assign(1, 0);
+  for (size_t c = 0; c < wide; c += kLanes) {
+    const uint32_t begin = reach_begin_.back();
+    const size_t last = std::min(wide, c + kLanes) - 1;
+    for (size_t k = c / 3; k <= last / 3; ++k)
+      for (uint32_t s = nodes_.owner[nodes_.place[sel[selected_[k]]]]; s != Supernodes::kNone;
+           s = nodes_.parent[s])
+        reach_.push_back(s);
+    std::sort(reach_.begin() + begin, reach_.end());
+    reach_.erase(std::unique(reach_.begin() + begin, reach_.end()), reach_.end());
+    size_t doubles = 0;
+    for (uint32_t e = begin; e < reach_.size(); ++e) doubles += 3 * size_t{nodes_.width(reach_[e])} * kLanes;
+    reach_begin_.push_back(uint32_t(reach_.size()));
+    reached_begin_.push_back(reached_begin_.back() + doubles);
+  }
+  reached_.resize(std::max(reached_.size(), reached_begin_.back()));
+}
+
+void LdltSolver::forward_reached(uint32_t p, const uint32_t *sel, uint32_t nsel, double *panel) {
+  const auto rows = [&](uint32_t s) { return panel + 3 * size_t{nodes_.begin[s]} * kLanes; };
+  const auto doubles = [&](uint32_t s) { return 3 * size_t{nodes_.width(s)} * kLanes; };
+  for (uint32_t e = reach_begin_[p]; e < reach_begin_[p + 1]; ++e)
+    std::fill(rows(reach_[e]), rows(reach_[e]) + doubles(reach_[e]), 0.0);
+  for (size_t c = size_t{p} * kLanes; c < std::min<size_t>(3 * size_t{nsel}, (size_t{p} + 1) * kLanes); ++c)
+    panel[(3 * size_t{nodes_.place[sel[selected_[c / 3]]]} + c % 3) * kLanes + c % kLanes] = 1.0;
+  double *to = &reached_[reached_begin_[p]];
+  for (uint32_t e = reach_begin_[p]; e < reach_begin_[p + 1]; ++e) {
+    const uint32_t s = reach_[e];
+    kernels_.forward(nodes_.width(s), nodes_.below(s), &value_[nodes_.value_begin[s]],
+                     nodes_.rows.data() + nodes_.row_begin[s], rows(s), panel);
+    to = std::copy(rows(s), rows(s) + doubles(s), to);
+  }
+}
+
+// sum[kLanes, kLanes] = Y_p^T D^-1 Y_q over the rows that both panels reach
+void LdltSolver::gram(uint32_t p, uint32_t q, double *sum) const {
+  std::fill(sum, sum + kLanes * kLanes, 0.0);
+  const double *left = &reached_[reached_begin_[p]], *right = &reached_[reached_begin_[q]];
+  uint32_t a = reach_begin_[p], b = reach_begin_[q];
+  const auto doubles = [&](uint32_t s) { return 3 * size_t{nodes_.width(s)} * kLanes; };
+  while (a < reach_begin_[p + 1] && b < reach_begin_[q + 1]) {
+    const uint32_t s = reach_[a], t = reach_[b];
+    if (s == t) kernels_.gram(3 * nodes_.width(s), left, &inverse_[3 * size_t{nodes_.begin[s]}], right, sum);
+    if (s <= t) {
+      left += doubles(s);
+      ++a;
+    }
+    if (t <= s) {
+      right += doubles(t);
+      ++b;
+    }
+  }
+}
+
+// W = S P^T L^-T D^-1 L^-1 P S^T = Y^T D^-1 Y with Y = L^-1 P S^T: the forward half is enough.
 bool LdltSolver::restricted(uint32_t nsel, const uint32_t *sel, double, double *w, SolveInfo &info) {
   info = {};
   if (!ready_) return false;
+  find_reach(nsel, sel);
   const size_t rows = 3 * size_t{n_}, wide = 3 * size_t{nsel};
-  selected_.resize(nsel);  // late points first in their panels
-  for (uint32_t s = 0; s < nsel; ++s) selected_[s] = s;
-  std::sort(selected_.begin(), selected_.end(),
-            [&](uint32_t a, uint32_t b) { return place_[sel[a]] < place_[sel[b]]; });
-  const uint32_t npanel = uint32_t((wide + kPanel - 1) / kPanel);
-  panels_.assign(npanel * rows * kPanel, 0.0);
-  first_.resize(npanel);
+  const uint32_t npanel = uint32_t(reach_begin_.size() - 1), together = std::min(npanel, slots());
+  panels_.resize(std::max(panels_.size(), together * rows * kLanes));
+  for (uint32_t first = 0; first < npanel; first += together)
+    each(std::min(together, npanel - first), [&](uint32_t slot) {
+      forward_reached(first + slot, sel, nsel, panels_.data() + slot * rows * kLanes);
+    });
   each(npanel, [&](uint32_t p) {
-    double *const panel = panels_.data() + p * rows * kPanel;
-    for (size_t c = size_t{p} * kPanel; c < std::min(wide, (size_t{p} + 1) * kPanel); ++c)
-      panel[(3 * size_t{place_[sel[selected_[c / 3]]]} + c % 3) * kPanel + c % kPanel] = 1.0;
-    first_[p] = 3 * place_[sel[selected_[size_t{p} * kPanel / 3]]];
-    forward(first_[p], panel);
-  });
-  const double *const d = factor_->pivots.data();
-  each(npanel, [&](uint32_t p) {
-    const double *const left = panels_.data() + p * rows * kPanel;
+    double sum[kLanes * kLanes];
     for (uint32_t q = 0; q <= p; ++q) {
-      const double *const right = panels_.data() + q * rows * kPanel;
-      double sum[kPanel][kPanel] = {};
-      for (size_t k = first_[p]; k < rows; ++k)
-        for (uint32_t a = 0; a < kPanel; ++a) {
-          const double y = left[k * kPanel + a] / d[k];
-          for (uint32_t b = 0; b < kPanel; ++b) sum[a][b] += y * right[k * kPanel + b];
-        }
-      for (size_t a = 0; a < kPanel && p * kPanel + a < wide; ++a)
-        for (size_t b = 0; b < kPanel && q * kPanel + b < wide; ++b) {
-          const size_t i = p * kPanel + a, j = q * kPanel + b;
+      gram(p, q, sum);
+      for (size_t a = 0; a < kLanes && p * kLanes + a < wide; ++a)
+        for (size_t b = 0; b < kLanes && q * kLanes + b < wide; ++b) {
+          const size_t i = p * kLanes + a, j = q * kLanes + b;
           if (j > i) continue;
-          const size_t row = 3 * size_t{selected_[i / 3]} + i % 3,
-                       column = 3 * size_t{selected_[j / 3]} + j % 3;
-          w[row * wide + column] = w[column * wide + row] = sum[a][b];
+          const size_t row = 3 * size_t{selected_[i / 3]} + i % 3;
+          const size_t column = 3 * size_t{selected_[j / 3]} + j % 3;
+          w[row * wide + column] = w[column * wide + row] = sum[a * kLanes + b];
         }
     }
   });

@@ -1,16 +1,15 @@
-// Direct solver: A = P^T L D L^T P with a minimum-degree order of the points, by Eigen's simplicial
-// factorization; L is applied to many right-hand sides at once by loops of our own.
+// Direct solver: A = P^T L D L^T P by a multifrontal factorization with supernodes. Order and pattern are
+// found once; factor() only computes.
 #pragma once
-#include <memory>
-
+#include "math/dense_kernel.h"
 #include "math/linear_solver.h"
+#include "math/supernodes.h"
 
 namespace dfm {
 
 class LdltSolver final : public LinearSolver {
  public:
   explicit LdltSolver(const Memory &memory, Tasks *tasks = nullptr);
-  ~LdltSolver() override;
 
   const char *name() const override { return "ldlt"; }
   bool direct() const override { return true; }
@@ -18,25 +17,40 @@ class LdltSolver final : public LinearSolver {
   bool factor(const double *blk) override;
   bool solve(uint32_t nrhs, const double *b, double *x, double tolerance, SolveInfo &info) override;
   bool restricted(uint32_t nsel, const uint32_t *sel, double tolerance, double *w, SolveInfo &info) override;
+  size_t factor_doubles() const { return value_.size(); }  // entries of L that are stored
 
  private:
-  struct Factor;  // Eigen's objects
-  // A right-hand side's components, in the order of the factor and with kPanel of them beside each other.
-  static constexpr uint32_t kPanel = 8;
-  void forward(uint32_t first, double *panel) const;
-  void backward(double *panel) const;
+  void assemble(uint32_t s, const double *blk, double *panel);
+  void extend_add(uint32_t child, const double *update, uint32_t s, double *panel, double *own) const;
+  bool factor_panel(uint32_t s, double *panel, double *own);
+  void subtract_product(uint32_t m, uint32_t columns, uint32_t k, const double *a, size_t ld, const double *d,
+                        double *c, size_t ldc);
+  void solve_one(const double *b, double *x);
+  void solve_panel(uint32_t lanes, const double *b, double *x, double *panel) const;
+  void find_reach(uint32_t nsel, const uint32_t *sel);
+  void forward_reached(uint32_t p, const uint32_t *sel, uint32_t nsel, double *panel);
+  void gram(uint32_t p, uint32_t q, double *sum) const;
   template <class F>
   void each(uint32_t count, F &&f) const;  // f(0) ... f(count - 1), on the threads there are
+  uint32_t slots() const { return tasks_ ? 2 * tasks_->threads() : 1; }
 
+  const DenseKernels &kernels_;
   Tasks *tasks_;
-  std::unique_ptr<Factor> factor_;
-  uint32_t n_ = 0, nb_ = 0;
+  Supernodes nodes_;
+  uint32_t n_ = 0;
   bool ready_ = false;
-  Array<uint32_t> place_;             // [n] position of a point in the order of elimination
-  Array<uint32_t> target_;            // [nb,9] where each value of a block goes, UINT32_MAX nowhere
-  Array<double> diagonal_;            // [3n] of A
-  Array<double> panels_;              // scratch: right-hand sides in panels, [panel][row][kPanel]
-  Array<uint32_t> selected_, first_;  // scratch of restricted: order of the points, first row of each panel
+  // Blocks of A by the supernode of their column: index of the block, place of its first value in the panel,
+  // and whether it goes there transposed.
+  struct Entry { uint32_t block, at, transposed; };
+  Array<uint32_t> entry_begin_;
+  Array<Entry> entry_;
+  Array<double> value_, pivot_, inverse_, floor_;   // L, D, 1/D, least pivots
+  Array<double> stack_, left_, right_;              // scratch of factor
+  Array<uint32_t> waiting_;                         // supernodes whose updates are on the stack
+  Array<double> panels_;                            // scratch: right-hand sides, [slot][3n][kLanes]
+  Array<uint32_t> selected_, reach_begin_, reach_;  // scratch of restricted: supernodes that a panel reaches
+  Array<size_t> reached_begin_;
+  Array<double> reached_;  // L^-1 P S^T by panels, rows of the reached supernodes only
 };
 
 }  // namespace dfm

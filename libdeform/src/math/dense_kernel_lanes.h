@@ -1,0 +1,255 @@
+// The loops of dense_kernel.h for vectors of kWidth doubles, which the including file defines.
+#pragma once
+#include "dense_kernel.h"
+
+#define DEFORM_INLINE static inline __attribute__((always_inline))
+
+namespace dfm {
+namespace {
+
+typedef double Vector __attribute__((vector_size(8 * kWidth)));
+typedef double Unaligned __attribute__((vector_size(8 * kWidth), aligned(8), may_alias));
+
+constexpr uint32_t kParts = kLanes / kWidth;  // vectors that hold one row of right-hand sides
+constexpr uint32_t kRows = 2 * kWidth;        // rows of an update's tile
+
+DEFORM_INLINE Vector load(const double *p) { return *(const Unaligned *)p; }
+DEFORM_INLINE void store(double *p, Vector v) { *(Unaligned *)p = v; }
+DEFORM_INLINE Vector splat(double a) { return a - Vector{}; }  // a - 0 is a, whatever its sign
+
+// Rows [begin, m) of a column less s times another.
+DEFORM_INLINE void subtract_scaled(uint32_t begin, uint32_t m, double s, const double *from, double *to) {
+  uint32_t i = begin;
+  const Vector v = splat(s);
+  for (; i + kWidth <= m; i += kWidth) store(to + i, load(to + i) - load(from + i) * v);
+  for (; i < m; ++i) to[i] -= from[i] * s;
+}
+
+uint32_t factor(uint32_t m, uint32_t n, double *a, size_t lda, double *d, const double *floor) {
+  for (uint32_t j = 0; j < n; ++j) {
+    double *const column = a + j * lda;
+    const double pivot = column[j];
+    if (!(pivot > floor[j]) || !(pivot <= __DBL_MAX__)) return j;
+    d[j] = pivot;
+    const double inverse = 1 / pivot;
+    uint32_t i = j + 1;
+    const Vector v = splat(inverse);
+    for (; i + kWidth <= m; i += kWidth) store(column + i, load(column + i) * v);
+    for (; i < m; ++i) column[i] *= inverse;
+    for (uint32_t k = j + 1; k < n; ++k) subtract_scaled(k, m, column[k] * pivot, column, a + k * lda);
+  }
+  return n;
+}
+
+void pack(uint32_t m, uint32_t k, const double *a, size_t lda, const double *d, double *pa, double *pb) {
+  for (uint32_t i = 0; i < m; i += kRows)
+    for (uint32_t c = 0; c < k; ++c, pa += kRows)
+      for (uint32_t r = 0; r < kRows; ++r) pa[r] = i + r < m ? a[i + r + c * lda] : 0.0;
+  for (uint32_t i = 0; i < m; i += kTileColumns)
+    for (uint32_t c = 0; c < k; ++c, pb += kTileColumns)
+      for (uint32_t r = 0; r < kTileColumns; ++r) pb[r] = i + r < m ? a[i + r + c * lda] * d[c] : 0.0;
+}
+
+void update(uint32_t m, uint32_t begin, uint32_t end, uint32_t k, const double *pa, const double *pb,
+            double *c, size_t ldc) {
+  for (uint32_t j = begin; j < end; j += kTileColumns)
+    for (uint32_t i = j / kRows * kRows; i < m; i += kRows) {
+      const double *left = pa + size_t(i) * k, *right = pb + size_t(j) * k;
+      Vector sum[kTileColumns][2] = {};
+      for (uint32_t e = 0; e < k; ++e, left += kRows, right += kTileColumns) {
+        const Vector low = load(left), high = load(left + kWidth);
+        for (uint32_t q = 0; q < kTileColumns; ++q) {
+          const Vector s = splat(right[q]);
+          sum[q][0] += low * s;
+          sum[q][1] += high * s;
+        }
+      }
+      for (uint32_t q = 0; q < kTileColumns && j + q < end; ++q) {
+        double *const to = c + i + (j + q) * ldc;
+        if (i + kRows <= m) {
+          store(to, load(to) - sum[q][0]);
+          store(to + kWidth, load(to + kWidth) - sum[q][1]);
+          continue;
+        }
+        double rest[kRows];
+        store(rest, sum[q][0]);
+        store(rest + kWidth, sum[q][1]);
+        for (uint32_t r = 0; i + r < m; ++r) to[r] -= rest[r];
+      }
+    }
+}
+
+DEFORM_INLINE double *row_of(const uint32_t *rows, uint32_t point, double *y) {
+  return y + 3 * size_t(rows[point]) * kLanes;
+}
+
+// sum[3 points] = rows `first` ... of the panel times the columns [0, n) of right-hand sides
+template <uint32_t kPoints>
+DEFORM_INLINE void times_columns(uint32_t n, const double *l, size_t ld, const double *x,
+                                 Vector (&sum)[3 * kPoints][kParts]) {
+  for (uint32_t k = 0; k < n; ++k, l += ld, x += kLanes) {
+    Vector v[kParts];
+    for (uint32_t p = 0; p < kParts; ++p) v[p] = load(x + p * kWidth);
+    for (uint32_t r = 0; r < 3 * kPoints; ++r) {
+      const Vector s = splat(l[r]);
+      for (uint32_t p = 0; p < kParts; ++p) sum[r][p] += s * v[p];
+    }
+  }
+}
+
+DEFORM_INLINE void subtract(double *to, const Vector (&sum)[kParts]) {
+  for (uint32_t p = 0; p < kParts; ++p) store(to + p * kWidth, load(to + p * kWidth) - sum[p]);
+}
+
+// row r of a point less l times row c
+DEFORM_INLINE void eliminate(double *to, double l, const double *from) {
+  for (uint32_t p = 0; p < kParts; ++p)
+    store(to + p * kWidth, load(to + p * kWidth) - splat(l) * load(from + p * kWidth));
+}
+
+template <uint32_t kPoints>
+DEFORM_INLINE void forward_rows(uint32_t point, uint32_t n, const double *l, size_t ld, const uint32_t *rows,
+                                const double *x, double *y) {
+  Vector sum[3 * kPoints][kParts] = {};
+  times_columns<kPoints>(n, l, ld, x, sum);
+  for (uint32_t q = 0; q < kPoints; ++q) {
+    double *const to = row_of(rows, point + q, y);
+    for (uint32_t r = 0; r < 3; ++r) subtract(to + r * kLanes, sum[3 * q + r]);
+  }
+}
+
+constexpr uint32_t kPoints = kWidth == 2 ? 1 : kWidth == 4 ? 2 : 3;  // as many sums as there are registers
+
+void forward(uint32_t width, uint32_t below, const double *l, const uint32_t *rows, double *x, double *y) {
+  const size_t ld = 3 * size_t(width + below);
+  for (uint32_t w = 0; w < width; ++w) {
+    double *const own = x + 3 * size_t(w) * kLanes;
+    const double *const block = l + 3 * size_t(w);
+    Vector sum[3][kParts] = {};
+    times_columns<1>(3 * w, block, ld, x, sum);
+    for (uint32_t r = 0; r < 3; ++r) subtract(own + r * kLanes, sum[r]);
+    const double *const diagonal = block + 3 * size_t(w) * ld;
+    eliminate(own + kLanes, diagonal[1], own);
+    eliminate(own + 2 * kLanes, diagonal[2], own);
+    eliminate(own + 2 * kLanes, diagonal[2 + ld], own + kLanes);
+  }
+  uint32_t b = 0;
+  for (; b + kPoints <= below; b += kPoints)
+    forward_rows<kPoints>(b, 3 * width, l + 3 * size_t(width + b), ld, rows, x, y);
+  for (; b < below; ++b) forward_rows<1>(b, 3 * width, l + 3 * size_t(width + b), ld, rows, x, y);
+}
+
+// sum[3] += columns of a point of the panel times three rows of right-hand sides
+DEFORM_INLINE void times_rows(const double *l, size_t ld, const double *y, Vector (&sum)[3][kParts]) {
+  for (uint32_t r = 0; r < 3; ++r, y += kLanes) {
+    Vector v[kParts];
+    for (uint32_t p = 0; p < kParts; ++p) v[p] = load(y + p * kWidth);
+    for (uint32_t c = 0; c < 3; ++c) {
+      const Vector s = splat(l[r + c * ld]);
+      for (uint32_t p = 0; p < kParts; ++p) sum[c][p] += s * v[p];
+    }
+  }
+}
+
+void backward(uint32_t width, uint32_t below, const double *l, const uint32_t *rows, double *x,
+              const double *y) {
+  const size_t ld = 3 * size_t(width + below);
+  for (uint32_t w = width; w-- > 0;) {
+    double *const own = x + 3 * size_t(w) * kLanes;
+    const double *const columns = l + 3 * size_t(w) * ld;
+    Vector sum[3][kParts] = {};
+    for (uint32_t b = 0; b < below; ++b)
+      times_rows(columns + 3 * size_t(width + b), ld, y + 3 * size_t(rows[b]) * kLanes, sum);
+    for (uint32_t k = w + 1; k < width; ++k)
+      times_rows(columns + 3 * size_t(k), ld, x + 3 * size_t(k) * kLanes, sum);
+    for (uint32_t r = 0; r < 3; ++r) subtract(own + r * kLanes, sum[r]);
+    const double *const diagonal = columns + 3 * size_t(w);
+    eliminate(own + kLanes, diagonal[2 + ld], own + 2 * kLanes);
+    eliminate(own, diagonal[2], own + 2 * kLanes);
+    eliminate(own, diagonal[1], own + kLanes);
+  }
+}
+
+void forward_one(uint32_t width, uint32_t below, const double *l, const uint32_t *rows, double *x, double *y,
+                 double *scratch) {
+  const uint32_t n = 3 * width, m = 3 * below;
+  const size_t ld = size_t(n) + m;
+  for (uint32_t k = 0; k < n; ++k) subtract_scaled(k + 1, n, x[k], l + k * ld, x);
+  const double *const under = l + n;
+  uint32_t i = 0;
+  for (; i + 4 * kWidth <= m; i += 4 * kWidth) {
+    Vector sum[4] = {};
+    for (uint32_t k = 0; k < n; ++k) {
+      const Vector s = splat(x[k]);
+      for (uint32_t q = 0; q < 4; ++q) sum[q] += load(under + k * ld + i + q * kWidth) * s;
+    }
+    for (uint32_t q = 0; q < 4; ++q) store(scratch + i + q * kWidth, sum[q]);
+  }
+  for (; i < m; ++i) {
+    double sum = 0;
+    for (uint32_t k = 0; k < n; ++k) sum += under[k * ld + i] * x[k];
+    scratch[i] = sum;
+  }
+  for (uint32_t b = 0; b < below; ++b)
+    for (uint32_t r = 0; r < 3; ++r) y[3 * size_t(rows[b]) + r] -= scratch[3 * b + r];
+}
+
+// Eight sums per column, whatever the width, added in pairs.
+DEFORM_INLINE double add_lanes(const double *s) {
+  return ((s[0] + s[4]) + (s[1] + s[5])) + ((s[2] + s[6]) + (s[3] + s[7]));
+}
+
+template <uint32_t kColumns>
+DEFORM_INLINE void dots(uint32_t n, const double *l, size_t ld, const double *y, double *out) {
+  Vector sum[kColumns][kParts] = {};
+  uint32_t i = 0;
+  for (; i + kLanes <= n; i += kLanes)
+    for (uint32_t p = 0; p < kParts; ++p) {
+      const Vector v = load(y + i + p * kWidth);
+      for (uint32_t c = 0; c < kColumns; ++c) sum[c][p] += load(l + c * ld + i + p * kWidth) * v;
+    }
+  for (uint32_t c = 0; c < kColumns; ++c) {
+    double lanes[kLanes];
+    for (uint32_t p = 0; p < kParts; ++p) store(lanes + p * kWidth, sum[c][p]);
+    for (uint32_t k = i; k < n; ++k) lanes[k - i] += l[c * ld + k] * y[k];
+    out[c] = add_lanes(lanes);
+  }
+}
+
+void backward_one(uint32_t width, uint32_t below, const double *l, const uint32_t *rows, double *x,
+                  const double *y, double *scratch) {
+  const uint32_t n = 3 * width, m = 3 * below;
+  const size_t ld = size_t(n) + m;
+  for (uint32_t b = 0; b < below; ++b)
+    for (uint32_t r = 0; r < 3; ++r) scratch[3 * b + r] = y[3 * size_t(rows[b]) + r];
+  for (uint32_t w = width; w-- > 0;) {
+    double *const own = x + 3 * size_t(w);
+    const double *const columns = l + 3 * size_t(w) * ld;
+    double sum[3], part[3];
+    dots<3>(m, columns + n, ld, scratch, sum);
+    dots<3>(n - 3 * (w + 1), columns + 3 * size_t(w + 1), ld, own + 3, part);
+    for (uint32_t c = 0; c < 3; ++c) own[c] -= sum[c] + part[c];
+    const double *const diagonal = columns + 3 * size_t(w);
+    own[1] -= diagonal[2 + ld] * own[2];
+    own[0] -= diagonal[2] * own[2];
+    own[0] -= diagonal[1] * own[1];
+  }
+}
+
+void gram(uint32_t n, const double *left, const double *d, const double *right, double *sum) {
+  for (uint32_t p = 0; p < kParts; ++p) {
+    Vector s[kLanes];
+    for (uint32_t a = 0; a < kLanes; ++a) s[a] = load(sum + a * kLanes + p * kWidth);
+    for (uint32_t k = 0; k < n; ++k) {
+      const Vector v = load(right + size_t(k) * kLanes + p * kWidth) * splat(d[k]);
+      for (uint32_t a = 0; a < kLanes; ++a) s[a] += splat(left[size_t(k) * kLanes + a]) * v;
+    }
+    for (uint32_t a = 0; a < kLanes; ++a) store(sum + a * kLanes + p * kWidth, s[a]);
+  }
+}
+
+}  // namespace
+}  // namespace dfm
+
+#define DEFORM_DENSE_KERNELS(name) \
+  {name, factor, pack, update, forward, backward, forward_one, backward_one, gram}

@@ -1,0 +1,40 @@
+// What a factorization A = P^T L D L^T P of a block matrix looks like before any value is known.
+#pragma once
+#include "math/block_matrix.h"
+
+namespace dfm {
+
+// Neighboring columns of L with (almost) the same rows form a supernode, stored as a dense panel. All counts
+// are points; each stands for three rows or columns.
+//
+//            begin  end
+//             | \      |      pivots: the columns of the supernode, a unit lower triangle
+//             |   \    |
+//   rows[0]   | . . .  |      rows below: ascending, the same for all its columns
+//   rows[1]   | . . .  |
+//
+// A supernode's parent owns the first of its rows; children come before their parent and next to each other's
+// subtrees (postorder).
+struct Supernodes {
+  static constexpr uint32_t kNone = UINT32_MAX;
+
+  explicit Supernodes(const Memory &memory);
+  void build(const BlockPattern &pattern);
+
+  uint32_t count() const { return uint32_t(parent.size()); }
+  uint32_t width(uint32_t s) const { return begin[s + 1] - begin[s]; }
+  uint32_t below(uint32_t s) const { return row_begin[s + 1] - row_begin[s]; }
+  uint32_t height(uint32_t s) const { return width(s) + below(s); }
+
+  Array<uint32_t> place;      // [n] position of a point in the order of elimination
+  Array<uint32_t> begin;      // [count + 1] first column
+  Array<uint32_t> owner;      // [n] supernode of a column
+  Array<uint32_t> parent;     // [count] kNone at a root
+  Array<uint32_t> row_begin;  // [count + 1] into rows
+  Array<uint32_t> rows;       // columns of the matrix
+  Array<uint32_t> relative;   // as rows: where a row stands in the parent, pivots first
+  Array<size_t> value_begin;  // [count + 1] of the panels [3 width][3 height], column after column
+  size_t stack = 0;           // doubles that the updates of children need at most
+};
+
+}  // namespace dfm

@@ -1,0 +1,126 @@
+// What each linear solver costs on the matrix of an implicit step, four sizes of a cylinder.
+//
+//   solver_bench [--csv FILE --commit HASH]
+//
+// Linear elasticity, E 1e5 Pa, nu 0.3, density 1,000 kg/m^3, step 1/60 s, one end held. `analyse` is paid
+// once, `factor` whenever the matrix changes; `solve` is per right-hand side, one at a time and 64 together,
+// to 1e-8 in the solver's norm; `restricted` is S A^-1 S^T of as many points of the surface as
+// stated. Best of some rounds.
+#include <chrono>
+#include <cstdio>
+#include <functional>
+#include <memory>
+
+#include "../unit/math/block_system.h"
+#include "machine.h"
+#include "math/ldlt_solver.h"
+#include "math/make_solver.h"
+
+namespace {
+
+constexpr double kTolerance = 1e-8;
+constexpr uint32_t kMany = 64;
+
+struct CountedMemory {
+  size_t live = 0, peak = 0;
+  dfm::Memory memory;
+  CountedMemory() {
+    memory.user = this;
+    memory.alloc = [](void *user, size_t bytes, size_t align) {
+      CountedMemory &m = *static_cast<CountedMemory *>(user);
+      m.live += bytes;
+      m.peak = std::max(m.peak, m.live);
+      const dfm::Memory &s = dfm::Memory::standard();
+      return s.alloc(s.user, bytes, align);
+    };
+    memory.release = [](void *user, void *p, size_t bytes, size_t align) {
+      static_cast<CountedMemory *>(user)->live -= bytes;
+      const dfm::Memory &s = dfm::Memory::standard();
+      s.release(s.user, p, bytes, align);
+    };
+  }
+};
+
+// Best of as many rounds as fit into half a second, at least two.
+double best_ms(const std::function<void()> &f) {
+  double best = HUGE_VAL, total = 0;
+  for (int round = 0; round < 2 || (total < 0.5 && round < 20); ++round) {
+    const auto begin = std::chrono::steady_clock::now();
+    f();
+    const double s = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+    best = std::min(best, s);
+    total += s;
+  }
+  return 1e3 * best;
+}
+
+void measure(const bench::Csv &sink, const char *name, uint32_t threads, const test::BlockSystem &system,
+             uint32_t ntet) {
+  CountedMemory counted;
+  dfm::Tasks tasks(threads, nullptr, nullptr);
+  const auto solver =
+      dfm::make_solver({name, system.n, false, 0}, counted.memory, threads > 1 ? &tasks : nullptr);
+  const double analyse = best_ms([&] { solver->analyse(system.pattern()); });
+  const double factor = best_ms([&] {
+    if (!solver->factor(system.blk.data())) std::puts("not positive definite");
+  });
+  const size_t rows = 3 * size_t{system.n};
+  std::vector<double> b(rows * kMany), x(rows * kMany);
+  for (size_t k = 0; k < b.size(); ++k) b[k] = double((k * 7919) % 1000) / 1000 - 0.3;
+  dfm::SolveInfo info;
+  const double one = best_ms([&] {
+    std::fill(x.begin(), x.end(), 0.0);
+    solver->solve(1, b.data(), x.data(), kTolerance, info);
+  });
+  const uint32_t iterations = info.iterations;
+  double many = 0;
+  if (solver->direct()) {
+    many = best_ms([&] { solver->solve(kMany, b.data(), x.data(), kTolerance, info); }) / kMany;
+    // bytes of solving, without those of 64 right-hand sides and of W
+  }
+  const double bytes = double(counted.peak) / ntet;
+  double restricted[2] = {0, 0};
+  std::vector<uint32_t> sel;
+  if (solver->direct())
+    for (uint32_t k = 0; k < 2; ++k) {
+      // the lowest points: a body that lies on the ground
+      std::vector<uint32_t> order(system.n);
+      for (uint32_t i = 0; i < system.n; ++i) order[i] = i;
+      std::stable_sort(order.begin(), order.end(), [&](uint32_t p, uint32_t q) {
+        return system.points[3 * size_t{p}] < system.points[3 * size_t{q}];
+      });
+      sel.assign(order.begin(), order.begin() + std::min<uint32_t>(system.n / 2, k ? 300 : 50));
+      std::vector<double> w(9 * sel.size() * sel.size());
+      restricted[k] =
+          best_ms([&] { solver->restricted(uint32_t(sel.size()), sel.data(), kTolerance, w.data(), info); });
+    }
+  const double per = iterations ? 1e6 * one / iterations / ntet : 0;
+  std::printf("%-8s %u %6u %7u %9.2f %9.2f %9.3f %9.3f %6u %8.2f %9.2f %9.2f %8.0f\n", name, threads,
+              system.n, ntet, analyse, factor, one, many, iterations, per, restricted[0], restricted[1],
+              bytes);
+  std::fflush(stdout);
+  if (sink.csv)
+    std::fprintf(sink.csv, "%s,%s,%u,%u,%u,%.3f,%.3f,%.4f,%.4f,%u,%.2f,%.3f,%.3f,%.0f\n", sink.head.c_str(),
+                 name, threads, system.n, ntet, analyse, factor, one, many, iterations, per, restricted[0],
+                 restricted[1], bytes);
+}
+
+}  // namespace
+
+int main(int argc, char **argv) {
+  const bench::Csv sink(
+      argc, argv,
+      "solver,threads,points,tetrahedra,analyse_ms,factor_ms,solve_ms,solve_of_64_ms,iterations,"
+      "iteration_ns_per_tet,restricted_50_ms,restricted_300_ms,bytes_per_tet");
+  std::printf("%-8s %s %6s %7s %9s %9s %9s %9s %6s %8s %9s %9s %8s\n", "solver", "t", "points", "tets",
+              "analyse", "factor", "solve", "of 64", "iter", "ns/it/t", "S 50", "S 300", "B/tet");
+  for (const uint32_t cells : {650u, 4800u, 11500u, 20200u}) {
+    const dfm::TetMesh mesh = dfm::make_cylinder(dfm::Memory::standard(), 0.05, 0.2, cells);
+    test::BlockSystem system = test::elastic_system(mesh, 1e5, 0.3, 1.0 / 60);
+    std::vector<uint8_t> mask(system.n, 0);
+    for (uint32_t i = 0; i < system.n; ++i) mask[i] = system.points[3 * size_t{i} + 2] < 1e-9 ? 7 : 0;
+    dfm::hold_components(system.pattern(), mask.data(), system.blk.data());
+    for (const char *name : {"ldlt", "pcg"})
+      for (const uint32_t threads : {1u, 2u}) measure(sink, name, threads, system, mesh.ntet());
+  }
+}
