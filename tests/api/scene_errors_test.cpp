@@ -167,11 +167,8 @@ TEST(SceneErrors, Names_AreUniqueAndKnown) {
 TEST(SceneErrors, NotDelivered_IsNeverIgnored) {
   const std::vector<std::pair<const char *, const char *>> later = {
       {"/rigid={\"bodies\":[{\"name\":\"r\",\"shape\":\"mesh\"}]}", "/rigid/bodies/0/shape"},
-      {"/solver={\"type\":\"ldlt\"}", "/solver"},
       {"/time/mode=\"static\"", "/time/mode"},
       {"/time/integrator=\"verlet\"", "/time/integrator"},
-      {"/time/integrator=\"implicit_euler\"", "/time/integrator"},
-      {"/contact/method=\"implicit\"", "/contact/method"},
       {"/output/color=\"stress\"", "/output/color"},
       {"/bodies/0/start={\"state\":\"a.vtu\"}", "/bodies/0/start/state"},
       {"/bodies/0/switch=[{\"t\":1}]", "/bodies/0/switch"},

@@ -11,9 +11,10 @@ struct Stack {
 };
 
 // drop: how far above its place the upper cube starts, m.
-inline Stack make_stack(dfm_context *c, double drop = 1e-4, double mu = 0.5) {
+inline Stack make_stack(dfm_context *c, double drop = 1e-4, double mu = 0.5,
+                        int32_t integrator = DFM_INTEGRATOR_AUTO) {
   Stack s;
-  s.world = make_world(c);
+  s.world = make_world(c, {0, 0, -9.81}, integrator);
   s.floor = add_plane(s.world, "floor");
   set_friction(s.world, mu);
   BodyOptions o;

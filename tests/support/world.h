@@ -137,8 +137,10 @@ inline void set_velocity(dfm_body body, std::array<double, 3> velocity) {
   ok(dfm_body_set_state(body, n, nullptr, v.data()));
 }
 
-inline dfm_world make_world(dfm_context *c, std::array<double, 3> gravity = {0, 0, -9.81}) {
+inline dfm_world make_world(dfm_context *c, std::array<double, 3> gravity = {0, 0, -9.81},
+                            int32_t integrator = DFM_INTEGRATOR_AUTO) {
   dfm_world_def d = dfm_world_def_default();
+  d.integrator = integrator;
   for (int k = 0; k < 3; ++k) d.gravity[k] = gravity[k];
   dfm_world w = 0;
   ok(dfm_world_create(c, &d, &w));

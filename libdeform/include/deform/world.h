@@ -7,11 +7,15 @@
 #ifdef __cplusplus
 extern "C" {
 #endif
-/* How contacts are solved. AUTO is VELOCITY. ROLLBACK is the scheme of Zerbato (2010, 4.2), to compare only:
- * it freezes what slides and loses momentum (doc/concepts/rollback.md); what it cannot do is refused with
- * DFM_E_UNSUPPORTED where it is made. 2 is kept for implicit. Since 0.1 (ROLLBACK). */
-enum { DFM_METHOD_AUTO = 0, DFM_METHOD_VELOCITY = 1, DFM_METHOD_ROLLBACK = 3 };
-enum { DFM_INTEGRATOR_AUTO = 0, DFM_INTEGRATOR_SYMPLECTIC_EULER = 1 };
+/* How contacts are solved: with the inverse masses of the points (VELOCITY, for the integrator
+ * SYMPLECTIC_EULER), or with the inverse of the matrix of the implicit step (IMPLICIT, for IMPLICIT_EULER).
+ * AUTO is the one that belongs to the integrator. ROLLBACK is the scheme of Zerbato (2010, 4.2), to compare
+ * only: it freezes what slides and loses momentum (doc/concepts/rollback.md); what it cannot do is refused
+ * with DFM_E_UNSUPPORTED where it is made. Since 0.1. */
+enum { DFM_METHOD_AUTO = 0, DFM_METHOD_VELOCITY = 1, DFM_METHOD_IMPLICIT = 2, DFM_METHOD_ROLLBACK = 3 };
+/* AUTO is SYMPLECTIC_EULER, or IMPLICIT_EULER where the method is IMPLICIT. IMPLICIT_EULER needs models that
+ * give their stiffness, and is stable at every step (doc/concepts/implicit.md). */
+enum { DFM_INTEGRATOR_AUTO = 0, DFM_INTEGRATOR_SYMPLECTIC_EULER = 1, DFM_INTEGRATOR_IMPLICIT_EULER = 2 };
 
 /* dfm_world_def.flags: without the guard against crossing (concepts/guard.md), to see what it does */
 enum {
@@ -59,6 +63,13 @@ typedef struct dfm_world_def {
    * soft bodies up to twice of it: 2 m v^2 at most (doc/concepts/contact.md) */
   double recovery_speed;
   double obstacle_speed; /* m/s: an obstacle that is told to move faster is refused; 0: 200 */
+  /* linear solver of the implicit step: "auto", "ldlt", "pcg" or the id of a plugin; NULL: "auto" */
+  const char *solver;
+  double solver_tolerance;    /* relative residual of an iterative solver; 0: 1e-10 */
+  uint32_t solver_iterations; /* of an iterative solver, at most; 0: as many as there are unknowns */
+  /* iterations of Newton's method per sub-step, at most; 0: 20. 1 is one linear solve without a line search,
+   * for an interactive scene */
+  uint32_t newton_iterations;
 } dfm_world_def;
 
 /** Gravity (0,0,-9.81), everything automatic. Threads: Any thread. Since 0.1. */

@@ -55,13 +55,45 @@ double shortest_step(const World &w, double dt) {
 const ContactMethod &method_of(int32_t number) {
   switch (number) {
     case DFM_METHOD_AUTO:
-    case DFM_METHOD_VELOCITY: return velocity_method();
+    case DFM_METHOD_VELOCITY:
+    case DFM_METHOD_IMPLICIT: return velocity_method();  // by what bodies answer: another operator
     case DFM_METHOD_ROLLBACK: return rollback::method();
   }
   fail(DFM_E_UNSUPPORTED,
-       "contact method %d is not available; use DFM_METHOD_AUTO, DFM_METHOD_VELOCITY or (to compare) "
-       "DFM_METHOD_ROLLBACK",
+       "contact method %d is not available; use DFM_METHOD_AUTO, DFM_METHOD_VELOCITY, DFM_METHOD_IMPLICIT "
+       "or (to compare) DFM_METHOD_ROLLBACK",
        number);
+}
+
+// Contact takes the operator of the integrator: with another one bodies at rest stand where they should not.
+void choose_integrator(World &w) {
+  const dfm_world_def &d = w.def;
+  if (d.integrator < DFM_INTEGRATOR_AUTO || d.integrator > DFM_INTEGRATOR_IMPLICIT_EULER)
+    fail(DFM_E_UNSUPPORTED,
+         "integrator %d is not available; use DFM_INTEGRATOR_AUTO, DFM_INTEGRATOR_SYMPLECTIC_EULER or "
+         "DFM_INTEGRATOR_IMPLICIT_EULER",
+         d.integrator);
+  const bool implicit = d.integrator == DFM_INTEGRATOR_IMPLICIT_EULER ||
+                        (d.integrator == DFM_INTEGRATOR_AUTO && d.method == DFM_METHOD_IMPLICIT);
+  if (!implicit && d.method == DFM_METHOD_IMPLICIT)
+    fail(DFM_E_UNSUPPORTED,
+         "contact method implicit belongs to the integrator implicit_euler; choose that, or "
+         "the contact method velocity for symplectic_euler");
+  if (implicit && (d.method == DFM_METHOD_VELOCITY || d.method == DFM_METHOD_ROLLBACK))
+    fail(DFM_E_UNSUPPORTED,
+         "contact method %s takes the inverse masses of points, which with the integrator "
+         "implicit_euler puts bodies at rest in the wrong place; choose the contact method implicit or auto",
+         d.method == DFM_METHOD_VELOCITY ? "velocity" : "rollback");
+  if (!(d.solver_tolerance >= 0 && d.solver_tolerance < 1))
+    fail(DFM_E_ARG, "solver_tolerance is %g; it must be 0 (the default) or a relative residual below 1",
+         d.solver_tolerance);
+  if (!implicit) return;
+  w.implicit.emplace();
+  if (d.solver) w.implicit->solver = d.solver;
+  if (d.solver_tolerance > 0) w.implicit->tolerance = d.solver_tolerance;
+  if (d.newton_iterations) w.implicit->newton = d.newton_iterations;
+  w.implicit->solver_iterations = d.solver_iterations;
+  w.implicit->tasks = &w.context->tasks;
 }
 
 }  // namespace
@@ -121,10 +153,7 @@ dfm_status dfm_world_create(dfm_context *context, const dfm_world_def *def, dfm_
              value);
     use_method(*w, method_of(w->def.method));
     if (w->def.sleep) need_ability(*w, Ability::sleep);
-    if (w->def.integrator != DFM_INTEGRATOR_AUTO && w->def.integrator != DFM_INTEGRATOR_SYMPLECTIC_EULER)
-      fail(DFM_E_UNSUPPORTED,
-           "integrator %d is not available; use DFM_INTEGRATOR_AUTO or DFM_INTEGRATOR_SYMPLECTIC_EULER",
-           w->def.integrator);
+    choose_integrator(*w);
     for (const char *const *e = w->def.effects; e && *e; ++e) w->asked_effects.push_back(*e);
     prepare(*w);
     w->changed = true;

@@ -156,30 +156,6 @@ void Acceleration::start(const ContactRows &rows) {
   std::copy(rows.impulse.begin(), rows.impulse.end(), from_.begin());
 }
 
-// gamma that makes |f - sum gamma_j df_j| least: normal equations by Cholesky, slightly regularized.
-// False: not usable.
-bool Acceleration::combine(const double *f, double *gamma) const {
-  double l[kWindow][kWindow], y[kWindow], trace = 0;
-  for (uint32_t j = 0; j < count_; ++j) trace += gram_[j][j];
-  for (uint32_t j = 0; j < count_; ++j) y[j] = dot(&df_[size_t(j) * n_], f, n_);
-  for (uint32_t j = 0; j < count_; ++j) {
-    for (uint32_t k = 0; k <= j; ++k) {
-      double sum = gram_[j][k] + (j == k ? 1e-12 * trace : 0);
-      for (uint32_t m = 0; m < k; ++m) sum -= l[j][m] * l[k][m];
-      if (j != k) l[j][k] = sum / l[k][k];
-      else if (sum > 0) l[j][j] = std::sqrt(sum);
-      else return false;
-    }
-    for (uint32_t k = 0; k < j; ++k) y[j] -= l[j][k] * y[k];
-    y[j] /= l[j][j];
-  }
-  for (uint32_t j = count_; j-- > 0;) {
-    for (uint32_t k = j + 1; k < count_; ++k) y[j] -= l[k][j] * gamma[k];
-    gamma[j] = y[j] / l[j][j];
-  }
-  return true;
-}
-
 void Acceleration::follow(ContactRows &rows) {
   std::fill(now_.begin(), now_.end(), 0.0);
   std::copy(rows.impulse.begin(), rows.impulse.end(), now_.begin());
@@ -206,8 +182,9 @@ void Acceleration::follow(ContactRows &rows) {
   first_ = false;
   last_ = size;
 
-  double gamma[kWindow] = {};
-  if (count_ > 0 && combine(f_.data(), gamma)) {
+  double y[kWindow], gamma[kWindow] = {};
+  for (uint32_t j = 0; j < count_; ++j) y[j] = dot(&df_[size_t(j) * n_], f_.data(), n_);
+  if (count_ > 0 && least_combination(count_, gram_, y, gamma)) {
     Four *const jumps = reinterpret_cast<Four *>(now_.data());
     for (uint32_t k = 0; k < n_ / 4; ++k) {
       Four sum{0, 0, 0, 0};

@@ -4,6 +4,7 @@
 #pragma once
 #include "contact/contact_state.h"
 #include "contact/rows.h"
+#include "math/anderson.h"
 
 namespace dfm {
 
@@ -29,7 +30,7 @@ class Acceleration {
   void follow(ContactRows &rows);       // after a sweep that another one follows
 
  private:
-  static constexpr uint32_t kWindow = 5;
+  static constexpr uint32_t kWindow = kAndersonWindow;
   uint32_t n_ = 0, count_ = 0, next_ = 0;  // values padded to fours, columns held, column to write
   bool first_ = true;
   double last_ = 0;
@@ -38,7 +39,6 @@ class Acceleration {
   Array<double> f_, g_, now_;  // [n] of the last sweep, f in the metric; scratch
   Array<double> df_, dg_;      // [window,n] differences of successive f and g
   double gram_[kWindow][kWindow] = {};
-  bool combine(const double *f, double *gamma) const;
 };
 
 // How far a state is from a solution. Per contact, m/s: r_n = |min(w_n lambda_n, u_n + gap/h)|, r_t = w_t

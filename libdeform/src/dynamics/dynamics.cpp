@@ -1,6 +1,10 @@
 #include "dynamics/dynamics.h"
 
+#include <algorithm>
+#include <cmath>
+
 #include "dynamics/explicit_points.h"
+#include "dynamics/implicit_points.h"
 #include "dynamics/self_stepping.h"
 
 namespace dfm {
@@ -8,10 +12,7 @@ namespace dfm {
 Dynamics::Dynamics(Phyxels &points, Surface &surface, ModelInstance &model)
     : p_(points), surface_(surface), model_(model) {}
 
-const double *Dynamics::contact_velocity() const {
-  const double *const points = point_velocity();
-  return points ? points : surface_.v.data();
-}
+const double *Dynamics::contact_velocity() const { return diagonal() ? point_velocity() : surface_.v.data(); }
 
 dfm_kin Dynamics::kin(double time, double h, bool trial) const {
   dfm_kin k{};
@@ -26,14 +27,30 @@ dfm_kin Dynamics::kin(double time, double h, bool trial) const {
   return k;
 }
 
+// From the points' mean velocities [npoint,4]; without contact the surfels have surface.v.
+void Dynamics::bound_surfel_ends(const double *mean, double &speed, double &change) const {
+  double fastest = 0, most = 0;
+  for (uint32_t s = 0; s < surface_.nsurfel; ++s) {
+    Vec3 u;
+    surface_.each_phyxel(s,
+                         [&](uint32_t p, double weight) { u += weight * load3(mean + size_t(p) * kStride); });
+    fastest = std::max(fastest, norm2(u));
+    most = std::max(most, norm2(u - load3(&surface_.v[size_t(s) * kStride])));
+  }
+  speed = std::sqrt(fastest);
+  change = std::sqrt(most);
+}
+
 void Dynamics::push(uint32_t point, double weight, const double *impulse) {
   const size_t at = size_t(point) * kStride;
   for (size_t k = 0; k < 3; ++k) p_.v[at + k] += weight * p_.inv_mass[at + k] * impulse[k];
 }
 
 std::unique_ptr<Dynamics> make_dynamics(const Memory &memory, Phyxels &points, Surface &surface,
-                                        ModelInstance &model, const Array<uint32_t> &edges) {
+                                        ModelInstance &model, const Array<uint32_t> &edges,
+                                        const ImplicitOptions *implicit) {
   if (model.stepper) return std::make_unique<SelfStepping>(memory, points, surface, model);
+  if (implicit) return std::make_unique<ImplicitPoints>(memory, points, surface, model, *implicit);
   return std::make_unique<ExplicitPoints>(memory, points, surface, model, edges);
 }
 

@@ -5,19 +5,21 @@
 //   add_forces    forces that follow from the state
 //   free_motion   the mean velocity over the sub-step without contact
 //   diagonal      what an impulse changes of that velocity, where points do not answer each other's impulses;
-//   respond       else, for many impulses at once
+//   response      else, between the touched surfels
+//   revise        the impulses of a solve are known: where both of these are not what they were taken for
+//                 there, they are found anew, and the solve goes on
 //   end_state     where it ends with the impulses that the solve has found; asked again after a further solve
 //   commit        the end becomes the present
 //
-// A body whose response is the inverse of a system matrix (implicit points) answers by respond() too, one
-// factorization for all right-hand sides; the matrix of the responses between its touched surfels is all that
-// contact sees (doc/decisions/0085-body-dynamics.md).
+// Why contact sees no more of a body: doc/decisions/0085-body-dynamics.md.
 #pragma once
 #include <functional>
 #include <limits>
 #include <memory>
+#include <string>
 
 #include "body/phyxels.h"
+#include "core/tasks.h"
 #include "dynamics/model.h"
 #include "geometry/surface.h"
 
@@ -41,11 +43,24 @@ using AddRowSums = std::function<void(double *stiffness, double *damping)>;
 // [n,4] m, m/s: of the points at the end of the sub-step; x_end = x + h mean.
 struct EndState { const double *x, *v, *mean; };
 
+// What revise() has found anew.
+enum class Revision { none, velocity, response, failed };  // response: and velocity
+
+// How implicit points solve.
+struct ImplicitOptions {
+  std::string solver = "auto";     // auto ldlt pcg, or that of a plugin
+  double tolerance = 1e-10;        // of an iterative solver, relative residual
+  uint32_t solver_iterations = 0;  // of it at most; 0: as many as unknowns
+  uint32_t newton = 20;            // at most; 1: one linear solve per sub-step, without a line search
+  Tasks *tasks = nullptr;          // for the rows of a large body's matrix
+};
+
 // What may be done to a body beside moving it.
 struct Abilities {
   bool forces = false;   // add_forces() does something
   bool springs = false;  // loads may depend on the state: bound() takes their row sums
   bool placed = false;   // its points may be put elsewhere, one by one
+  bool revises = false;  // revise() does something
   bool energy = false;   // the energy that its scheme keeps is known (step/energy_watch.h)
 };
 
@@ -68,11 +83,11 @@ class Dynamics {
   // [npoint,4] 1/kg, what an impulse changes of its own point; null: the unknowns of contact are the touched
   // surfels, which answer each other.
   virtual const double *diagonal() const { return nullptr; }
-  // Where diagonal() is null: du[k] [n,3] m/s by the impulses p[k] [n,3] N s, k < nrhs, at n distinct
-  // surfels. False: the model cannot.
-  virtual bool respond(const SubStep &, uint32_t, const uint32_t *, uint32_t, const double *, double *) {
-    return false;
-  }
+  // Where diagonal() is null: what impulses at n distinct surfels change of their velocities, [3n,3n] 1/kg,
+  // row-major, symmetric. False: the model cannot.
+  virtual bool response(const SubStep &, uint32_t, const uint32_t *, double *) { return false; }
+  // By the impulses at the surfels [nsurfel,3]; point_velocity() and response() then give what has changed.
+  virtual Revision revise(const SubStep &, const double *) { return Revision::none; }
   // [npoint,4] m/s without contact; null: free_motion() has written the surfels' own, surface.v.
   virtual const double *point_velocity() const { return nullptr; }
   const double *contact_velocity() const;  // of the unknowns: [npoint,4], or [nsurfel,4]
@@ -95,10 +110,14 @@ class Dynamics {
   Phyxels &p_;
   Surface &surface_;
   ModelInstance &model_;
+
+  void bound_surfel_ends(const double *mean, double &speed, double &change) const;
 };
 
 // What moves a body of this model. edges: [nedge,2] of its mesh.
+// implicit: null where the library's points move explicitly.
 std::unique_ptr<Dynamics> make_dynamics(const Memory &memory, Phyxels &points, Surface &surface,
-                                        ModelInstance &model, const Array<uint32_t> &edges);
+                                        ModelInstance &model, const Array<uint32_t> &edges,
+                                        const ImplicitOptions *implicit);
 
 }  // namespace dfm

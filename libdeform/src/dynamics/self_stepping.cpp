@@ -16,7 +16,9 @@ bool offers_many(const dfm_stepper &ops) {
 SelfStepping::SelfStepping(const Memory &memory, Phyxels &points, Surface &surface, ModelInstance &model)
     : Dynamics(points, surface, model),
       mean_(size_t(kStride) * points.n, 0.0, HookAllocator<double>(memory)),
-      surfels_(size_t(3) * surface.nsurfel, 0.0, HookAllocator<double>(memory)) {}
+      surfels_(size_t(3) * surface.nsurfel, 0.0, HookAllocator<double>(memory)) {
+  use_memory(memory, unit_, answer_);
+}
 
 // Loads and gravity are external forces of the model, which answers the surfels' mean velocities.
 bool SelfStepping::free_motion(const SubStep &now, double &) {
@@ -35,11 +37,11 @@ bool SelfStepping::free_motion(const SubStep &now, double &) {
   return good;
 }
 
-bool SelfStepping::respond(const SubStep &now, uint32_t n, const uint32_t *surfel, uint32_t nrhs,
-                           const double *p, double *du) {
+bool SelfStepping::respond(const SubStep &now, uint32_t n, const uint32_t *surfel, uint32_t nrhs) {
   const dfm_kin k = kin(now.time, now.h);
   const dfm_stepper &ops = *model_.stepper;
-  std::fill(du, du + size_t(3) * n * nrhs, 0.0);
+  const double *const p = unit_.data();
+  double *const du = answer_.data();
   if (offers_many(ops)) {
     const auto many = [&] { return ops.respond_many(model_.self, &k, n, surfel, nrhs, p, du); };
     return model_.call("respond_many", many) == DFM_OK;
@@ -49,6 +51,18 @@ bool SelfStepping::respond(const SubStep &now, uint32_t n, const uint32_t *surfe
     const auto one = [&] { return ops.respond(model_.self, &k, n, surfel, p + at, du + at); };
     if (model_.call("respond", one) != DFM_OK) return false;
   }
+  return true;
+}
+
+// The columns are the answers to unit impulses.
+bool SelfStepping::response(const SubStep &now, uint32_t n, const uint32_t *surfel, double *matrix) {
+  const uint32_t width = 3 * n;
+  unit_.assign(size_t(width) * width, 0.0);
+  answer_.assign(size_t(width) * width, 0.0);
+  for (uint32_t c = 0; c < width; ++c) unit_[size_t(c) * width + c] = 1;
+  if (!respond(now, n, surfel, width)) return false;
+  for (uint32_t r = 0; r < width; ++r)
+    for (uint32_t c = 0; c < width; ++c) matrix[size_t(r) * width + c] = answer_[size_t(c) * width + r];
   return true;
 }
 
@@ -70,16 +84,7 @@ bool SelfStepping::end_state(const SubStep &now, const double *surfel_impulse, b
 }
 
 void SelfStepping::bound_ends(double &speed, double &change) const {
-  double fastest = 0, most = 0;
-  for (uint32_t s = 0; s < surface_.nsurfel; ++s) {
-    Vec3 u;
-    surface_.each_phyxel(
-        s, [&](uint32_t p, double weight) { u += weight * load3(&mean_[size_t(p) * kStride]); });
-    fastest = std::max(fastest, norm2(u));
-    most = std::max(most, norm2(u - load3(&surface_.v[size_t(s) * kStride])));
-  }
-  speed = std::sqrt(fastest);
-  change = std::sqrt(most);
+  bound_surfel_ends(mean_.data(), speed, change);
 }
 
 void SelfStepping::commit(const SubStep &, double fraction) {

@@ -16,7 +16,7 @@ class ModelStiffness {
   bool evaluate(const ModelInstance &model, const dfm_kin &k, double a, double b);
 
   const Array<uint32_t> &pairs() const { return pairs_; }  // [nb,2] points, i <= j
-  const Array<double> &blocks() const { return blocks_; }  // [nb,9] row-major
+  Array<double> &blocks() { return blocks_; }              // [nb,9] row-major
 
  private:
   Array<uint32_t> pairs_;

@@ -48,6 +48,10 @@ class Builder {
     std::copy_n(def_.gravity, 3, w.gravity);
     w.method = def_.method;
     w.integrator = def_.integrator;
+    w.solver = def_.solver.c_str();
+    w.solver_tolerance = def_.solver_tolerance;
+    w.solver_iterations = def_.solver_iterations;
+    w.newton_iterations = def_.newton;
     w.contact_offset = def_.offset;
     w.contact_tolerance = def_.tolerance;
     w.sleep = def_.sleep;

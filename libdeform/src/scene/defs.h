@@ -151,6 +151,9 @@ struct Definition {
   int32_t method = DFM_METHOD_AUTO, integrator = DFM_INTEGRATOR_AUTO;
   double offset = 0, tolerance = 0, max_time = 0, max_work = 0, recovery_speed = 0, obstacle_speed = 0,
          energy_watch = dfm_world_def_default().energy_watch;
+  std::string solver = "auto";  // of the implicit step
+  double solver_tolerance = 0;
+  uint32_t solver_iterations = 0, newton = 0;
   uint32_t self = DFM_SELF_OFF;
   bool sleep = false, guard = true, untangle = false;
   bool effects_auto = true;

@@ -234,8 +234,28 @@ void read_time(const Node &scene, Definition &def) {
       step.fail("%g s at %g s a step are more than 1e12 steps", def.duration, def.step);
   }
   time.word("mode", "dynamic", "mode");
-  if (time.word("integrator", "auto", "integrator") == "symplectic_euler")
-    def.integrator = DFM_INTEGRATOR_SYMPLECTIC_EULER;
+  const std::string integrator = time.word("integrator", "auto", "integrator");
+  def.integrator = integrator == "symplectic_euler" ? DFM_INTEGRATOR_SYMPLECTIC_EULER
+                   : integrator == "implicit_euler" ? DFM_INTEGRATOR_IMPLICIT_EULER
+                                                    : DFM_INTEGRATOR_AUTO;
+}
+
+void read_solver(const Node &scene, Definition &def) {
+  if (!scene.has("solver")) return;
+  const Node solver = scene.member("solver");
+  solver.object("solver");
+  if (solver.has("type")) def.solver = solver.member("type").text();
+  if (solver.has("tolerance"))
+    def.solver_tolerance = solver.member("tolerance").number(Range{0, 1, true, true});
+  const Range count{1, 1e9, false, false};
+  const auto whole = [&](const char *key) {
+    const Node n = solver.member(key);
+    const double value = n.number(count);
+    if (value != std::floor(value)) n.fail("expected a whole number, found %g", value);
+    return static_cast<uint32_t>(value);
+  };
+  if (solver.has("max_iterations")) def.solver_iterations = whole("max_iterations");
+  if (solver.has("newton")) def.newton = whole("newton");
 }
 
 void read_effects(const Node &scene, Definition &def) {
@@ -344,6 +364,7 @@ void read_contact(const Node &scene, Definition &def, const ReadContext &context
   contact.object("contact");
   const std::string method = contact.word("method", "auto", "method");
   def.method = method == "velocity"   ? DFM_METHOD_VELOCITY
+               : method == "implicit" ? DFM_METHOD_IMPLICIT
                : method == "rollback" ? DFM_METHOD_ROLLBACK
                                       : DFM_METHOD_AUTO;
   def.sleep = contact.boolean("sleep", false);
@@ -448,6 +469,7 @@ Definition read_scene(json &tree, const std::string &file, const Types &types) {
   read_gravity(scene, def);
   read_time(scene, def);
   read_effects(scene, def);
+  read_solver(scene, def);
   read_materials(scene, def, context);
   def.bodies = read_bodies(scene, context);
   def.obstacles = read_obstacles(scene, context);

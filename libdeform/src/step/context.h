@@ -66,8 +66,8 @@ struct StepContext {
   Array<double> tangents;
   // [contacts] place in the store that the contact goes on from, or kNone
   Array<uint32_t> match;
-  Array<uint32_t> block_surfels;  // responses of self-stepping bodies
-  Array<double> block_impulse, block_velocity;
+  Array<uint32_t> block_surfels;  // responses of bodies whose points answer each other
+  bool bodies_revise = false;     // some body looks again at what the solve has made of it
   // a host has answered, and the solve goes on from its last impulses
   bool rigid_again = false;
   AreaShares areas;

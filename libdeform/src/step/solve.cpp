@@ -7,7 +7,9 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <utility>
 
+#include "body/make_surface.h"
 #include "contact/solver.h"
 #include "core/error.h"
 #include "state/world.h"
@@ -20,29 +22,21 @@
 namespace dfm {
 namespace {
 
-// Responses between the touched surfels of bodies whose points answer each other: the columns are those to
-// unit impulses.
+// Responses between the touched surfels of bodies whose points answer each other.
+void fill_response(World &w, StepContext &step, const ContactRows::Block &block) {
+  const Body &b = *w.bodies[block.source];
+  step.block_surfels.resize(block.count);
+  for (uint32_t k = 0; k < block.count; ++k) step.block_surfels[k] = step.rows.point[block.first + k];
+  if (!b.dynamics->response(sub_step_of(w, step), block.count, step.block_surfels.data(),
+                            &step.rows.response[block.response]))
+    fail(DFM_E_FATAL, "model '%s' of body '%s' does not answer impulses; change the model", b.model.type->id,
+         b.name.c_str());
+}
+
 void fill_responses(World &w, StepContext &step) {
   for (const ContactRows::Block &block : step.rows.blocks) {
-    if (block.group != kNone) {
-      rigid_response(w, step, block.group, &step.rows.response[block.response]);
-      continue;
-    }
-    const Body &b = *w.bodies[block.source];
-    const uint32_t n = block.count, width = 3 * n;
-    step.block_surfels.resize(n);
-    step.block_velocity.resize(size_t(width) * width);
-    step.block_impulse.assign(size_t(width) * width, 0.0);
-    for (uint32_t k = 0; k < n; ++k) step.block_surfels[k] = step.rows.point[block.first + k];
-    for (uint32_t c = 0; c < width; ++c) step.block_impulse[size_t(c) * width + c] = 1;
-    if (!b.dynamics->respond(sub_step_of(w, step), n, step.block_surfels.data(), width,
-                             step.block_impulse.data(), step.block_velocity.data()))
-      fail(DFM_E_FATAL, "model '%s' of body '%s' does not answer impulses; change the model",
-           b.model.type->id, b.name.c_str());
-    for (uint32_t r = 0; r < width; ++r)
-      for (uint32_t c = 0; c < width; ++c)
-        step.rows.response[block.response + size_t(r) * width + c] =
-            step.block_velocity[size_t(c) * width + r];
+    if (block.group == kNone) fill_response(w, step, block);
+    else rigid_response(w, step, block.group, &step.rows.response[block.response]);
   }
 }
 
@@ -55,7 +49,8 @@ void apply_last(ContactRows &rows) {
   }
 }
 
-constexpr uint32_t kMostRevisions = 6;  // of what rigid hosts take for granted, within a sub-step
+constexpr uint32_t kMostRevisions = 6;      // of what rigid hosts take for granted, within a sub-step
+constexpr uint32_t kMostRelinearized = 20;  // revisions of bodies, within a solve
 
 // Where laws remember, errors of the normal force do not average out: each time a force falls by one, the
 // cone cuts off a part of the bristle that does not come back when it rises; and a point that shakes under a
@@ -180,6 +175,78 @@ const LawInstance *solve_rows(World &w, StepContext &step) {
   }
 }
 
+namespace {
+
+// After the operator has changed.
+void finish_rows(World &w, StepContext &step) {
+  step.rows.finish(step.contacts, step.tangents.data(), step.h, step.guard.planned, w.offset);
+  if (!step.guard.kept.empty()) guard_rates(step);
+}
+
+enum class Revised { nothing, something, failed };
+
+// Bodies whose forces are not linear in the velocity look at what the impulses have made of them. What they
+// answer then is put in the place of what they answered before; impulses stay.
+Revised revise_bodies(World &w, StepContext &step) {
+  if (!step.bodies_revise) return Revised::nothing;
+  dfm::distribute(step.contacts, step.rows.frame.data(), step.rows.impulse.data(), step.sinks);
+  bool velocities = false, responses = false;
+  for (const ContactRows::Block &block : step.rows.blocks) {
+    if (block.group != kNone) continue;
+    Body &b = *w.bodies[block.source];
+    const Revision found = b.dynamics->revise(sub_step_of(w, step), b.surfel_impulse.data());
+    if (found == Revision::failed) {
+      set_last_error(format("step %llu, body '%s': model '%s' could not answer at the state that contact "
+                            "leads to; take a smaller step or change the model",
+                            static_cast<unsigned long long>(w.step_count), b.name.c_str(), b.model.type->id)
+                         .c_str());
+      return Revised::failed;
+    }
+    if (found == Revision::none) continue;
+    velocities = true;
+    gather_surface(b.surface, b.p.x.data(), b.dynamics->point_velocity());
+    for (uint32_t k = 0; k < block.count; ++k)
+      std::copy_n(&b.surface.v[size_t{kStride} * step.rows.point[block.first + k]], kStride,
+                  &step.rows.y_free[size_t{kStride} * (block.first + k)]);
+    if (found != Revision::response) continue;
+    responses = true;
+    fill_response(w, step, block);
+  }
+  if (!velocities) return Revised::nothing;
+  if (responses) finish_rows(w, step);
+  step.rows.restore();
+  return Revised::something;
+}
+
+// With what rigid hosts and bodies answer differently by the impulses that are found: the same problem again,
+// from these impulses. solved: false, a body could not.
+const LawInstance *solve_revised(World &w, StepContext &step, bool &solved) {
+  uint32_t passes = 0, sweeps = 0;
+  const LawInstance *bad = nullptr;
+  for (uint32_t hosts = 0, bodies = 0;;) {
+    bad = solve_rows(w, step);
+    passes += std::exchange(step.passes, 0);
+    sweeps += std::exchange(step.sweeps, 0);
+    if (bad) break;
+    // A motor holds or lets go.
+    if (hosts < kMostRevisions && !step.rows.rigid.empty() && revise_rigids(w, step)) {
+      finish_rows(w, step);
+      ++hosts;
+      continue;
+    }
+    if (bodies == kMostRelinearized) break;
+    const Revised revised = revise_bodies(w, step);
+    solved = revised != Revised::failed;
+    if (revised != Revised::something) break;
+    ++bodies;
+  }
+  step.passes = passes;
+  step.sweeps = sweeps;
+  return bad;
+}
+
+}  // namespace
+
 bool stage_solve(World &w, StepContext &step, uint32_t *trouble) {
   step.passes = step.sweeps = 0;
   step.residual = {};
@@ -189,20 +256,12 @@ bool stage_solve(World &w, StepContext &step, uint32_t *trouble) {
     reserve_contacts(w, step);
     return true;
   }
-  uint32_t passes_before = 0, sweeps_before = 0;
-  const LawInstance *bad = nullptr;
-  for (uint32_t revision = 0;; ++revision) {
-    bad = solve_rows(w, step);
-    if (bad || revision == kMostRevisions || step.rows.rigid.empty() || !revise_rigids(w, step)) break;
-    // A motor holds or lets go: the same problem with another response, from the impulses that were found.
-    step.rows.finish(step.contacts, step.tangents.data(), step.h, step.guard.planned, w.offset);
-    if (!step.guard.kept.empty()) guard_rates(step);
-    passes_before += step.passes;
-    sweeps_before += step.sweeps;
-    step.passes = step.sweeps = 0;
+  bool solved = true;
+  const LawInstance *const bad = solve_revised(w, step, solved);
+  if (!solved) {
+    *trouble |= DFM_TROUBLE_PLUGIN;
+    return false;
   }
-  step.passes += passes_before;
-  step.sweeps += sweeps_before;
   double poison = 0;
   for (double l : step.rows.impulse) poison += 0.0 * l;
   if (bad || poison != 0) {

@@ -154,7 +154,7 @@ Body &create_body(World &w, const dfm_body_def &def) {
   mesh.fixed = p.held.data();
   coupling.tell(mesh);
   b.model.create(type, w.context->host, mesh, m, std::move(values));
-  b.dynamics = make_dynamics(m, p, b.surface, b.model, b.edges);
+  b.dynamics = make_dynamics(m, p, b.surface, b.model, b.edges, w.implicit ? &*w.implicit : nullptr);
   if (!b.dynamics->abilities().placed) need_ability(w, Ability::self_stepping, "body", b.name);
   if (!b.surface.identity()) need_ability(w, Ability::own_surface, "body", b.name);
   if (w.method->point_values) make(b.method_values, size_t(kStride) * p.n);

@@ -1,0 +1,310 @@
+#include "dynamics/implicit_points.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "dynamics/symplectic_euler.h"
+#include "math/make_solver.h"
+
+namespace dfm {
+namespace {
+
+// What Newton's method may leave: this share of the largest change of velocity in the sub-step, and at rest
+// so much, m/s. Contact at rest is solved to 1e-6 m/s.
+constexpr double kShare = 1e-3, kRest = 1e-8;
+// A correction that does not halve the one before needs a new matrix.
+constexpr double kContracts = 0.5;
+// The line search ends where the slope along the correction has fallen to this share of what it was.
+constexpr double kSlopeLeft = 0.5;
+constexpr uint32_t kCuts = 8;
+
+double largest(const Array<double> &a) {
+  double most = 0;
+  for (const double value : a) most = std::max(most, std::fabs(value));
+  return most;
+}
+
+}  // namespace
+
+ImplicitPoints::ImplicitPoints(const Memory &memory, Phyxels &points, Surface &surface, ModelInstance &model,
+                               const ImplicitOptions &options)
+    : Dynamics(points, surface, model), options_(options), stiffness_(memory), ways_(memory) {
+  use_memory(memory, x_, v_, before_, residual_, push_, change_, scale_, weight_, held_, column_, points_,
+             between_);
+  x_.assign(size_t{kStride} * points.n, 0.0);
+  v_ = before_ = x_;
+  for (Array<double> *a : {&residual_, &push_, &change_, &scale_, &weight_})
+    a->assign(size_t{3} * points.n, 0.0);
+  held_.assign(points.n, 0);
+  stiffness_.create(model, points.n);
+  solver_ =
+      make_solver({options_.solver.c_str(), points.n, stiffness_.constant(), options_.solver_iterations},
+                  memory, options_.tasks);
+  solver_->analyse(pattern());
+}
+
+// The scheme is stable at any step. Springs of loads act with what they are at the start of the sub-step.
+bool ImplicitPoints::bound(double, const AddRowSums &outside, StepBound &out) {
+  Array<double> &stiffness = change_, &damping = residual_;
+  std::fill_n(stiffness.begin(), p_.n, 0.0);
+  std::fill_n(damping.begin(), p_.n, 0.0);
+  outside(stiffness.data(), damping.data());
+  out.step = stable_step(p_, stiffness.data(), damping.data(), &out.point);
+  return true;
+}
+
+// The model's forces at the end that the velocities v [npoint,4] lead to, into f. commits: with its next
+// state.
+bool ImplicitPoints::ask(const SubStep &now, const double *v, bool commits) {
+  for (size_t j = 0; j < x_.size(); ++j) {
+    v_[j] = v[j];
+    x_[j] = p_.x[j] + now.h * v[j];
+  }
+  std::copy(p_.load.begin(), p_.load.end(), p_.f.begin());
+  dfm_kin k = kin(now.time + now.h, now.h, commits);
+  k.x = x_.data();
+  k.v = v_.data();
+  return model_.call("add_forces", [&] { return model_.ops->add_forces(model_.self, &k, p_.f.data()); }) ==
+         DFM_OK;
+}
+
+// r(v) - push.
+bool ImplicitPoints::residual_at(const SubStep &now, const double *v, const double *push) {
+  if (!ask(now, v, false)) return false;
+  double poison = 0;
+  for (uint32_t i = 0; i < p_.n; ++i)
+    for (uint32_t c = 0; c < 3; ++c) {
+      const size_t at = size_t{kStride} * i + c, own = size_t{3} * i + c;
+      const double force = p_.f[at] + p_.mass[i] * now.gravity[int(c)];
+      const double given = push ? push[own] : 0;
+      residual_[own] = p_.moves(at) ? p_.mass[i] * (v[at] - p_.v[at]) - now.h * force - given : 0;
+      poison += 0.0 * residual_[own];
+    }
+  return poison == 0;
+}
+
+// A at the state where forces were asked last.
+bool ImplicitPoints::linearize(const SubStep &now) {
+  const bool known = stiffness_.constant() && factor_h_ == now.h && held_ == p_.held;
+  if (known) return true;
+  factor_h_ = 0;
+  dfm_kin k = kin(now.time + now.h, now.h);
+  k.x = x_.data();
+  k.v = v_.data();
+  if (!stiffness_.evaluate(model_, k, -now.h * now.h, -now.h)) return false;
+  Array<double> &blocks = stiffness_.blocks();
+  const Array<uint32_t> &pairs = stiffness_.pairs();
+  for (size_t b = 0; b < pairs.size() / 2; ++b) {
+    const uint32_t i = pairs[2 * b];
+    if (i != pairs[2 * b + 1]) continue;
+    for (size_t c = 0; c < 3; ++c) {
+      double &diagonal = blocks[9 * b + 4 * c];
+      diagonal += p_.mass[i];
+      const bool held = p_.held[i] & (1 << c);
+      scale_[3 * size_t{i} + c] = held ? 0 : 1 / diagonal;
+      weight_[3 * size_t{i} + c] = held ? 0 : diagonal;
+    }
+  }
+  hold_components(pattern(), p_.held.data(), blocks.data());
+  if (!solver_->factor(blocks.data())) return false;
+  factor_h_ = now.h;
+  held_ = p_.held;
+  return true;
+}
+
+bool ImplicitPoints::solve(const Array<double> &b, Array<double> &x) {
+  SolveInfo info;
+  std::fill(x.begin(), x.end(), 0.0);
+  return solver_->solve(1, b.data(), x.data(), options_.tolerance, info);
+}
+
+double ImplicitPoints::allowed_error(const Array<double> &v) const {
+  double most = 0;
+  for (size_t j = 0; j < v.size(); ++j) most = std::max(most, std::fabs(v[j] - p_.v[j]));
+  return kRest + kShare * most;
+}
+
+// From v, whose residual is known, along the way in change_: all of it, or less where more than kSlopeLeft of
+// the slope would push back. The residual is then that of the new v. Where a model cannot answer, the way is
+// halved.
+bool ImplicitPoints::search(const SubStep &now, Array<double> &v) {
+  const auto slope = [&] {
+    double sum = 0;
+    for (size_t j = 0; j < residual_.size(); ++j) sum -= residual_[j] * change_[j];
+    return sum;
+  };
+  const double start = slope();
+  double share = 1;
+  add(v, 1);
+  for (uint32_t cut = 0; cut < kCuts; ++cut) {
+    const bool known = residual_at(now, v.data(), nullptr);
+    const double left = known ? slope() : -start;  // below zero: too far
+    if (known && left >= -kSlopeLeft * start) return true;
+    const double next = share * (known ? std::clamp(start / (start - left), 0.1, 0.7) : 0.5);
+    add(v, next - share);
+    share = next;
+  }
+  return residual_at(now, v.data(), nullptr);
+}
+
+// Newton's method. A factorization costs many solves, so one serves while the residual falls well; the
+// combination of the ways it leads to makes good what the matrix is not.
+bool ImplicitPoints::free_motion(const SubStep &now, double &kinetic) {
+  Array<double> &v = p_.v_free;
+  v = p_.v;
+  error_ = 0;
+  if (!residual_at(now, v.data(), nullptr)) return false;
+  bool fresh = true;
+  for (uint32_t k = 0; k < options_.newton; ++k) {
+    if (fresh) {
+      if (!linearize(now)) return false;
+      ways_.start(change_.size());
+    }
+    if (!solve_way(residual_)) return false;
+    const double step = largest(change_), before = scaled_square(residual_);
+    accelerate(v);
+    if (!search(now, v)) return false;
+    if (stiffness_.constant()) break;
+    const double left = before > 0 ? std::sqrt(scaled_square(residual_) / before) : 0;
+    if (step * std::min(1.0, left) <= allowed_error(v)) break;
+    fresh = !solver_->direct() || left > kContracts;
+  }
+  kinetic = 0;
+  bool good = true;
+  for (uint32_t i = 0; i < p_.n; ++i) {
+    const Vec3 u = load3(&v[size_t{kStride} * i]);
+    kinetic += 0.5 * p_.mass[i] * norm2(u);
+    for (int c = 0; c < 3; ++c) good = good && std::fabs(u[c]) <= now.fastest;
+  }
+  return good;
+}
+
+// change_ = -A^-1 r
+bool ImplicitPoints::solve_way(const Array<double> &r) {
+  if (!solve(r, change_)) return false;
+  for (double &d : change_) d = -d;
+  return true;
+}
+
+// The way in change_ by what the ways before it have taught, where that still leads down.
+void ImplicitPoints::accelerate(const Array<double> &v) {
+  for (uint32_t i = 0; i < p_.n; ++i)
+    for (uint32_t c = 0; c < 3; ++c) push_[size_t{3} * i + c] = v[size_t{kStride} * i + c];
+  ways_.next(push_.data(), change_.data(), weight_.data(), push_.data());
+  double slope = 0;
+  for (size_t j = 0; j < push_.size(); ++j) slope -= residual_[j] * push_[j];
+  if (slope > 0) change_.swap(push_);
+}
+
+void ImplicitPoints::add(Array<double> &v, double share) const {
+  for (uint32_t i = 0; i < p_.n; ++i)
+    for (uint32_t c = 0; c < 3; ++c) v[size_t{kStride} * i + c] += share * change_[size_t{3} * i + c];
+}
+
+double ImplicitPoints::scaled_square(const Array<double> &r) const {
+  double sum = 0;
+  for (size_t j = 0; j < r.size(); ++j) sum += scale_[j] * (r[j] * r[j]);
+  return sum;
+}
+
+// W = N_c A^-1 N_c^T of the touched surfels.
+bool ImplicitPoints::response(const SubStep &, uint32_t n, const uint32_t *surfel, double *matrix) {
+  column_.assign(p_.n, kNone);
+  points_.clear();
+  for (uint32_t s = 0; s < n; ++s)
+    surface_.each_phyxel(surfel[s], [&](uint32_t p, double) {
+      if (column_[p] != kNone) return;
+      column_[p] = static_cast<uint32_t>(points_.size());
+      points_.push_back(p);
+    });
+  const uint32_t m = static_cast<uint32_t>(points_.size());
+  SolveInfo info;
+  if (surface_.identity()) return solver_->restricted(m, points_.data(), options_.tolerance, matrix, info);
+  between_.resize(size_t{9} * m * m);
+  if (!solver_->restricted(m, points_.data(), options_.tolerance, between_.data(), info)) return false;
+  std::fill_n(matrix, size_t{9} * n * n, 0.0);
+  for (uint32_t s = 0; s < n; ++s)
+    for (uint32_t t = 0; t < n; ++t)
+      surface_.each_phyxel(surfel[s], [&](uint32_t p, double ws) {
+        surface_.each_phyxel(surfel[t], [&](uint32_t q, double wt) {
+          for (size_t a = 0; a < 3; ++a)
+            for (size_t b = 0; b < 3; ++b)
+              matrix[(3 * size_t{s} + a) * 3 * n + 3 * size_t{t} + b] +=
+                  ws * wt * between_[(3 * size_t{column_[p]} + a) * 3 * m + 3 * size_t{column_[q]} + b];
+        });
+      });
+  return true;
+}
+
+// v_end = v_free + A^-1 push.
+bool ImplicitPoints::linear_end(const double *surfel_impulse) {
+  p_.v_end = p_.v_free;
+  std::fill(push_.begin(), push_.end(), 0.0);
+  if (!surfel_impulse) return true;
+  for (uint32_t s = 0; s < surface_.nsurfel; ++s) {
+    const Vec3 q = load3(&surfel_impulse[3 * size_t{s}]);
+    if (q.x == 0 && q.y == 0 && q.z == 0) continue;
+    surface_.each_phyxel(s, [&](uint32_t p, double w) {
+      for (uint32_t c = 0; c < 3; ++c)
+        if (p_.moves(size_t{kStride} * p + c)) push_[size_t{3} * p + c] += w * q[int(c)];
+    });
+  }
+  if (!solve(push_, change_)) return false;
+  for (uint32_t i = 0; i < p_.n; ++i)
+    for (uint32_t c = 0; c < 3; ++c) p_.v_end[size_t{kStride} * i + c] += change_[size_t{3} * i + c];
+  return true;
+}
+
+Revision ImplicitPoints::revise(const SubStep &now, const double *surfel_impulse) {
+  if (!abilities().revises) return Revision::none;
+  const double before = error_;
+  before_.swap(p_.v_end);
+  if (!linear_end(surfel_impulse)) return Revision::failed;
+  const bool known = residual_at(now, p_.v_end.data(), push_.data());
+  if (known && !solve_way(residual_)) return Revision::failed;
+  error_ = known ? largest(change_) : HUGE_VAL;
+  if (error_ <= allowed_error(p_.v_end)) return Revision::none;
+  // The first correction is tried with the matrix at hand, and so is each that halves the one before.
+  Array<double> &v = p_.v_free;
+  if (before == 0 || error_ <= kContracts * before) {
+    if (before == 0) ways_.start(change_.size());
+    accelerate(v);
+    add(v, 1);
+    return Revision::velocity;
+  }
+  // What leads away from the solution is taken half way.
+  const double share = error_ <= before ? 1 : 0.5;
+  for (size_t j = 0; j < v.size(); ++j) v[j] = before_[j] + share * (p_.v_end[j] - before_[j]);
+  if (!residual_at(now, v.data(), nullptr) || !linearize(now) || !solve_way(residual_))
+    return Revision::failed;
+  add(v, 1);
+  ways_.start(change_.size());
+  return Revision::response;
+}
+
+// Forces are asked once more where the model has a state, whose next value they write.
+bool ImplicitPoints::end_state(const SubStep &now, const double *surfel_impulse, bool touched) {
+  if (!linear_end(touched ? surfel_impulse : nullptr)) return false;
+  const Array<double> &v = p_.v_end;
+  if (!model_.state.empty() && !ask(now, v.data(), true)) return false;
+  double poison = 0;
+  for (size_t j = 0; j < v.size(); ++j) {
+    poison += 0.0 * v[j];
+    p_.x_end[j] = p_.x[j] + now.h * v[j];
+  }
+  return poison == 0;
+}
+
+// An impulse moves all points, touched or not.
+void ImplicitPoints::bound_ends(double &speed, double &change) const {
+  bound_surfel_ends(p_.v_end.data(), speed, change);
+}
+
+void ImplicitPoints::commit(const SubStep &now, double fraction) {
+  if (fraction < 1) shorten(p_, fraction * now.h);
+  p_.x.swap(p_.x_end);
+  p_.v.swap(p_.v_end);
+  model_.commit_state();
+}
+
+}  // namespace dfm

@@ -1,0 +1,73 @@
+// Points that the library moves by backward Euler under the forces of a model that gives their stiffness:
+//
+//   r(v) = M (v - v0) - h (f(x0 + h v, v) + loads + M g) = p        p: contact impulses at the points, N s
+//   A    = dr/dv = M - h df/dv - h^2 df/dx
+//
+// free_motion() solves r(v) = 0 by Newton's method with a line search and keeps A as it was last. Contact
+// sees A^-1, never M^-1: a prediction with A and contact with M^-1 leaves bodies at rest by h^2 p / m per
+// point where they should not be. revise() asks the true residual of the state that contact has found and
+// goes on from there, so that forces, contact and friction hold at one state, the end of the sub-step. Every
+// linear solve keeps linear momentum to its own tolerance, for the forces of a model and the rows of its
+// stiffness sum to zero. Source: Baraff and Witkin 1998, Large steps in cloth simulation, section 3.
+#pragma once
+#include <memory>
+
+#include "dynamics/dynamics.h"
+#include "dynamics/stiffness.h"
+#include "math/anderson.h"
+#include "math/linear_solver.h"
+
+namespace dfm {
+
+class ImplicitPoints : public Dynamics {
+ public:
+  ImplicitPoints(const Memory &memory, Phyxels &points, Surface &surface, ModelInstance &model,
+                 const ImplicitOptions &options);
+
+  Abilities abilities() const override {
+    return {.springs = true, .placed = true, .revises = options_.newton > 1 && !stiffness_.constant()};
+  }
+  bool bound(double time, const AddRowSums &outside, StepBound &out) override;
+  bool free_motion(const SubStep &now, double &kinetic) override;
+  const double *point_velocity() const override { return p_.v_free.data(); }
+  bool response(const SubStep &now, uint32_t n, const uint32_t *surfel, double *matrix) override;
+  Revision revise(const SubStep &now, const double *surfel_impulse) override;
+  bool end_state(const SubStep &now, const double *surfel_impulse, bool touched) override;
+  EndState end() const override { return {p_.x_end.data(), p_.v_end.data(), p_.v_end.data()}; }
+  void bound_ends(double &speed, double &change) const override;
+  void commit(const SubStep &now, double fraction) override;
+
+ private:
+  ImplicitOptions options_;
+  ModelStiffness stiffness_;
+  std::unique_ptr<LinearSolver> solver_;
+  Anderson ways_;
+  Array<double> x_, v_;              // [npoint,4] m, m/s: where forces are asked
+  Array<double> before_;             // [npoint,4] m/s, the end before the last revision
+  Array<double> residual_;           // [npoint,3] N s
+  Array<double> push_, change_;      // [npoint,3] N s of contact; m/s, a solution
+  Array<double> weight_, scale_;     // [npoint,3] kg, diagonal of A; 1/kg, its inverse; zero where held
+  Array<uint8_t> held_;              // [npoint] as in the factor at hand
+  Array<uint32_t> column_, points_;  // [npoint] place among the points that touched surfels hang on; these
+  Array<double> between_;            // [3m,3m] 1/kg, response between these points
+  double factor_h_ = 0;              // s, of the factor at hand; 0: none
+  double error_ = 0;                 // m/s, the correction that the last revision found; 0: none yet
+
+  BlockPattern pattern() const {
+    const Array<uint32_t> &pairs = stiffness_.pairs();
+    return {p_.n, static_cast<uint32_t>(pairs.size() / 2), pairs.data()};
+  }
+  bool ask(const SubStep &now, const double *v, bool commits);
+  bool residual_at(const SubStep &now, const double *v, const double *push);
+  bool linearize(const SubStep &now);
+  bool solve(const Array<double> &b, Array<double> &x);
+  bool solve_way(const Array<double> &r);
+  void accelerate(const Array<double> &v);
+  void add(Array<double> &v, double share) const;
+  bool search(const SubStep &now, Array<double> &v);
+  bool linear_end(const double *surfel_impulse);
+  double scaled_square(const Array<double> &r) const;
+  double allowed_error(const Array<double> &v) const;
+};
+
+}  // namespace dfm

@@ -1,0 +1,210 @@
+// Bodies that move by backward Euler, and their contact by the same matrix: rest, order, energy, momentum,
+// friction. Sources: doc/concepts/implicit.md; ../shared/reference/contact (incline_block).
+#include "stack.h"
+
+namespace {
+
+constexpr double kG = 9.81, kFrame = 1.0 / 60, kOffset = 5e-5;
+constexpr int32_t kImplicit = DFM_INTEGRATOR_IMPLICIT_EULER;
+
+test::BodyOptions cube(const char *name, double young, double z) {
+  test::BodyOptions o;
+  o.name = name;
+  o.young = young;
+  o.damping_stiffness = 2e-3;
+  o.position = {0, 0, z};
+  return o;
+}
+
+// Points whose rest height is below 1e-9 m are held along z.
+void hold_bottom(dfm_body b, double z) {
+  uint32_t n = 0;
+  std::vector<double> x(3 * 4096);
+  test::ok(dfm_body_get_state(b, 4096, x.data(), nullptr, &n));
+  std::vector<uint32_t> low;
+  for (uint32_t i = 0; i < n; ++i)
+    if (x[3 * i + 2] < z + 1e-9) low.push_back(i);
+  test::ok(dfm_body_hold(b, uint32_t(low.size()), low.data(), 4));
+}
+
+// How far the center of mass of a cube sinks under its weight.
+double sag_of_held_cube(double young) {
+  test::Context context;
+  const dfm_world w = test::make_world(context, {0, 0, -kG}, kImplicit);
+  const dfm_body b = test::make_body(context, w, "beam", {0.1, 0.1, 0.1}, 60, cube("cube", young, 0));
+  hold_bottom(b, 0);
+  const double before = test::measure(b).com[2];
+  test::run(w, 400, 10);
+  return before - test::measure(b).com[2];
+}
+
+}  // namespace
+
+// The static answer comes from the same mesh with its bottom held along z, without any contact.
+TEST(ImplicitContact, CubeOnPlane_SinksByItsStaticSag) {
+  for (const double young : {1e4, 1e5, 1e7}) {
+    const double expected = sag_of_held_cube(young);
+    for (const double h : {1e-3, kFrame}) {
+      test::Context context;
+      dfm_world_def d = dfm_world_def_default();
+      d.method = DFM_METHOD_IMPLICIT;
+      d.contact_offset = kOffset;
+      dfm_world w = 0;
+      test::ok(dfm_world_create(context, &d, &w));
+      const dfm_body b = test::make_body(context, w, "beam", {0.1, 0.1, 0.1}, 60, cube("cube", young, 1e-4));
+      test::add_plane(w, "floor");
+      test::set_friction(w, 0, "none");
+      const double before = test::measure(b).com[2] - 1e-4;
+      test::run(w, young < 5e4 ? 4 : 1, h);
+      double rest = 0;  // the solve leaves gaps a hundredth of their margin
+      const std::vector<dfm_contact> contacts = test::contacts(w);
+      for (const dfm_contact &c : contacts) rest += c.gap / double(contacts.size());
+      EXPECT_NEAR(before + kOffset + rest - test::measure(b).com[2], expected, 0.01 * expected)
+          << "E " << young << " Pa, step " << h << " s";
+      EXPECT_LT(test::measure(b).speed_max, 1e-4);
+    }
+  }
+}
+
+TEST(ImplicitContact, SlopeOf26Point5Degrees_SlidesAt049AndHoldsAt05) {
+  for (const double h : {1e-3, kFrame})
+    for (const double mu : {0.49, 0.5}) {
+      test::Context context;
+      const dfm_world w = test::make_world(context, {0, 0, -kG}, kImplicit);
+      test::BodyOptions o = cube("block", 1e6, 2e-5);
+      const dfm_body b = test::make_body(context, w, "beam", {0.1, 0.1, 0.1}, 60, o);
+      test::add_plane(w, "floor");
+      test::set_friction(w, mu);
+      std::vector<dfm_vector_key> keys;
+      for (int i = 0; i <= 100; ++i) {
+        const double s = i / 100.0, a = 26.5 * M_PI / 180 * s * s * (3 - 2 * s);
+        keys.push_back({0.2 + 1.5 * s, {kG * std::sin(a), 0, -kG * std::cos(a)}});
+      }
+      test::ok(dfm_world_set_gravity_keys(w, uint32_t(keys.size()), keys.data()));
+      test::run(w, 2, h);
+      const double before = test::measure(b).com[0];
+      test::run(w, 0.5, h);
+      const double way = test::measure(b).com[0] - before;
+      // slides with g (sin - 0.49 cos) = 0.0753 m/s2
+      if (mu < 0.495) EXPECT_GT(way, 0.5 * 0.5 * 0.0753 * 0.25) << "step " << h;
+      else EXPECT_LT(std::fabs(way), 0.5e-6 * 0.5) << "step " << h;
+    }
+}
+
+TEST(ImplicitContact, TwoCubesThatCollide_KeepTheirMomentum) {
+  test::Context context;
+  const dfm_world w = test::make_world(context, {0, 0, 0}, kImplicit);
+  test::set_friction(w, 0.4);
+  test::BodyOptions o = cube("lower", 1e5, 0);
+  o.velocity = {0.3, 0, 1};
+  const dfm_body lower = test::make_body(context, w, "beam", {0.1, 0.1, 0.1}, 60, o);
+  o = cube("upper", 2e4, 0.1005);
+  o.position[0] = 0.02;
+  o.spin = {1, 2, 3};
+  const dfm_body upper = test::make_body(context, w, "beam", {0.1, 0.1, 0.1}, 60, o);
+  const auto momentum = [&] {
+    std::array<double, 3> p{};
+    for (const dfm_body b : {lower, upper})
+      for (int k = 0; k < 3; ++k) p[size_t(k)] += test::measure(b).mass * test::measure(b).velocity[k];
+    return p;
+  };
+  const auto before = momentum();
+  uint32_t most = 0;
+  for (int step = 0; step < 60; ++step) {
+    test::run(w, 2e-3, 2e-3);
+    most = std::max<uint32_t>(most, uint32_t(test::contacts(w).size()));
+  }
+  EXPECT_GT(most, 3u);
+  for (size_t k = 0; k < 3; ++k) EXPECT_NEAR(momentum()[k], before[k], 1e-11) << k;
+  EXPECT_GT(test::measure(upper).velocity[2], 0.1);
+}
+
+namespace {
+
+// The tip of a bar that is held at one end and falls, 0.1 s.
+double tip(int32_t integrator, double h) {
+  test::Context context;
+  const dfm_world w = test::make_world(context, {0, 0, -kG}, integrator);
+  test::BodyOptions o;
+  o.young = 1e5;
+  const dfm_body b = test::make_body(context, w, "beam", {0.4, 0.1, 0.1}, 120, o);
+  uint32_t n = 0;
+  std::vector<double> x(3 * 4096);
+  test::ok(dfm_body_get_state(b, 4096, x.data(), nullptr, &n));
+  std::vector<uint32_t> held;
+  uint32_t far = 0;
+  for (uint32_t i = 0; i < n; ++i) {
+    if (x[3 * i] < 1e-9) held.push_back(i);
+    if (x[3 * i] > x[3 * far]) far = i;
+  }
+  test::ok(dfm_body_hold(b, uint32_t(held.size()), held.data(), 7));
+  test::run(w, 0.1, h);
+  test::ok(dfm_body_get_state(b, 4096, x.data(), nullptr, &n));
+  return x[3 * far + 2];
+}
+
+}  // namespace
+
+TEST(ImplicitEuler, HalvedStep_HalvesTheError) {
+  const double truth = tip(DFM_INTEGRATOR_SYMPLECTIC_EULER, 2.5e-5);
+  const double coarse = tip(kImplicit, 2e-3) - truth, fine = tip(kImplicit, 1e-3) - truth;
+  EXPECT_NEAR(coarse / fine, 2, 0.2);
+}
+
+// Backward Euler takes energy away, at any step.
+TEST(ImplicitEuler, FreeBar_GainsNoEnergy) {
+  for (const double h : {1e-3, kFrame, 0.1}) {
+    test::Context context;
+    const dfm_world w = test::make_world(context, {0, 0, 0}, kImplicit);
+    test::BodyOptions o;
+    o.young = 1e6;
+    o.spin = {0, 5, 1};
+    const dfm_body b = test::make_body(context, w, "beam", {0.4, 0.1, 0.1}, 120, o);
+    const auto energy = [&] { return test::measure(b).kinetic + test::measure(b).elastic; };
+    double last = energy();
+    for (int step = 0; step < 50; ++step) {
+      test::run(w, h, h);
+      EXPECT_LE(energy(), last * (1 + 1e-6)) << "step " << h;
+      last = energy();
+    }
+  }
+}
+
+// Several bodies on several threads; a world that is restored goes on with the same bits.
+TEST(ImplicitContact, StackOnThreads_KeepsItsBits) {
+  std::array<uint64_t, 2> hash{};
+  for (const uint32_t threads : {1u, 4u}) {
+    test::Context context(threads);
+    const test::Stack s = test::make_stack(context, 1e-3, 0.5, kImplicit);
+    test::run(s.world, 0.1, 5e-3);
+    const auto kept = test::snapshot(s.world);
+    test::run(s.world, 0.1, 5e-3);
+    const uint64_t end = dfm_world_hash(s.world);
+    test::ok(dfm_world_restore(s.world, kept.data(), kept.size()));
+    test::run(s.world, 0.1, 5e-3);
+    EXPECT_EQ(dfm_world_hash(s.world), end);
+    hash[threads > 1] = end;
+  }
+  EXPECT_EQ(hash[0], hash[1]);
+}
+
+TEST(ImplicitEuler, MethodOfAnotherIntegrator_IsRefused) {
+  test::Context context;
+  dfm_world w = 0;
+  dfm_world_def d = dfm_world_def_default();
+  d.integrator = kImplicit;
+  d.method = DFM_METHOD_VELOCITY;
+  EXPECT_EQ(dfm_world_create(context, &d, &w), DFM_E_UNSUPPORTED);
+  test::says({"velocity", "implicit_euler"});
+  d.integrator = DFM_INTEGRATOR_SYMPLECTIC_EULER;
+  d.method = DFM_METHOD_IMPLICIT;
+  EXPECT_EQ(dfm_world_create(context, &d, &w), DFM_E_UNSUPPORTED);
+  test::says({"implicit_euler", "velocity"});
+  d.integrator = DFM_INTEGRATOR_AUTO;
+  d.solver = "nonsense";
+  ASSERT_EQ(dfm_world_create(context, &d, &w), DFM_OK);
+  test::Tet tet("one");
+  dfm_body body = 0;
+  EXPECT_NE(dfm_body_create(w, &tet.def, &body), DFM_OK);
+  test::says({"nonsense", "ldlt", "pcg"});
+}
