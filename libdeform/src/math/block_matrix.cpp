@@ -2,6 +2,8 @@
 
 #include <algorithm>
 
+#include "math/width.h"
+
 namespace dfm {
 
 void hold_components(const BlockPattern &pattern, const uint8_t *mask, double *blk) {
@@ -15,7 +17,7 @@ void hold_components(const BlockPattern &pattern, const uint8_t *mask, double *b
   }
 }
 
-BlockMatrix::BlockMatrix(const Memory &memory) {
+BlockMatrix::BlockMatrix(const Memory &memory) : kernels_(block_kernels()) {
   use_memory(memory, row_, column_, diagonal_, upper_, lower_);
   use_memory(memory, value_);
 }
@@ -54,39 +56,22 @@ void BlockMatrix::set_pattern(const BlockPattern &pattern) {
     upper_[b] = place(i, j);
     lower_[b] = place(j, i);
   }
-  value_.assign(9 * size_t{count}, 0.0);
+  value_.assign(9 * size_t{count} + 1, 0.0);  // and what the load of the last column reads
 }
 
 void BlockMatrix::set_values(const double *blk) {
   for (uint32_t b = 0; b < nb_; ++b) {
     const double *const a = blk + 9 * size_t{b};
-    double *const u = &value_[9 * size_t{upper_[b]}];
-    for (uint32_t k = 0; k < 9; ++k) u[k] = a[k];
-    if (lower_[b] == upper_[b]) continue;
-    double *const l = &value_[9 * size_t{lower_[b]}];
+    double *const u = &value_[9 * size_t{upper_[b]}], *const l = &value_[9 * size_t{lower_[b]}];
     for (uint32_t r = 0; r < 3; ++r)
-      for (uint32_t c = 0; c < 3; ++c) l[3 * r + c] = a[3 * c + r];
-  }
-}
-
-void BlockMatrix::multiply(uint32_t begin, uint32_t end, const double *x, double *y) const {
-  const double *a = &value_[9 * size_t{row_[begin]}];
-  for (uint32_t i = begin; i < end; ++i) {
-    // One sum per entry of a block: no sum waits for another, and pairs of them fill a vector.
-    double s[9] = {0, 0, 0, 0, 0, 0, 0, 0, 0};
-    for (uint32_t k = row_[i]; k < row_[i + 1]; ++k, a += 9) {
-      const double *const p = x + 3 * size_t{column_[k]};
-      const double q[9] = {p[0], p[1], p[2], p[0], p[1], p[2], p[0], p[1], p[2]};
-      for (uint32_t e = 0; e < 9; ++e) s[e] += a[e] * q[e];
-    }
-    double *const out = y + 3 * size_t{i};
-    for (uint32_t r = 0; r < 3; ++r) out[r] = (s[3 * r] + s[3 * r + 1]) + s[3 * r + 2];
+      for (uint32_t c = 0; c < 3; ++c) u[3 * c + r] = a[3 * r + c];
+    if (l != u) std::copy(a, a + 9, l);
   }
 }
 
 void BlockMatrix::multiply(Tasks *tasks, const double *x, double *y) const {
   if (!tasks || n_ <= kGrain) {
-    if (n_) multiply(0, n_, x, y);
+    multiply(0, n_, x, y);
     return;
   }
   tasks->parallel_for(n_, kGrain, [&](uint32_t begin, uint32_t end) { multiply(begin, end, x, y); });

@@ -3,6 +3,7 @@
 #pragma once
 #include "core/memory.h"
 #include "core/tasks.h"
+#include "math/block_kernel.h"
 
 namespace dfm {
 
@@ -26,19 +27,21 @@ class BlockMatrix {
   void set_pattern(const BlockPattern &pattern);
   void set_values(const double *blk);
   uint32_t size() const { return n_; }  // points
-  // Blocks of row i: columns()[k] and values() + 9k for k in [rows()[i], rows()[i+1]), columns rising.
-  const Array<uint32_t> &rows() const { return row_; }
-  const Array<uint32_t> &columns() const { return column_; }
-  const double *values() const { return value_.data(); }
+  // Blocks of row i: column[k] and value + 9k for k in [row[i], row[i+1]), columns of the matrix rising; each
+  // block column after column.
+  BlockRows rows() const { return {row_.data(), column_.data(), value_.data()}; }
   const double *diagonal(uint32_t i) const { return &value_[9 * size_t{diagonal_[i]}]; }
 
-  // y = A x in rows [begin, end)
-  void multiply(uint32_t begin, uint32_t end, const double *x, double *y) const;
+  // y = A x in rows [begin, end); returns the sum of x.y there
+  double multiply(uint32_t begin, uint32_t end, const double *x, double *y) const {
+    return kernels_.multiply(rows(), begin, end, x, y);
+  }
   void multiply(Tasks *tasks, const double *x, double *y) const;  // all rows; tasks may be null
 
   static constexpr uint32_t kGrain = 256;  // rows that one thread takes at a time
 
  private:
+  const BlockKernels &kernels_;
   uint32_t n_ = 0, nb_ = 0;
   Array<uint32_t> row_, column_, diagonal_;
   Array<uint32_t> upper_, lower_;  // [nb] where block b of the pattern stands, as it is and transposed

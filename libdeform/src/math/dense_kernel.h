@@ -39,7 +39,5 @@ struct DenseKernels {
 const DenseKernels &dense_kernels_sse2();
 const DenseKernels &dense_kernels_avx2();
 const DenseKernels &dense_kernels_avx512();
-// The widest that this processor has, or what DEFORM_SIMD asks for.
-const DenseKernels &dense_kernels();
 
 }  // namespace dfm

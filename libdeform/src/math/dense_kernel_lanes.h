@@ -3,6 +3,12 @@
 #include "dense_kernel.h"
 
 #define DEFORM_INLINE static inline __attribute__((always_inline))
+// Loops over lanes and registers: arrays of vectors stay in registers only where no loop is left.
+#if defined(__clang__)
+#define DEFORM_UNROLL _Pragma("unroll")
+#else
+#define DEFORM_UNROLL _Pragma("GCC unroll 16")
+#endif
 
 namespace dfm {
 namespace {
@@ -43,11 +49,11 @@ uint32_t factor(uint32_t m, uint32_t n, double *a, size_t lda, double *d, const 
 
 void pack(uint32_t m, uint32_t k, const double *a, size_t lda, const double *d, double *pa, double *pb) {
   for (uint32_t i = 0; i < m; i += kRows)
-    for (uint32_t c = 0; c < k; ++c, pa += kRows)
-      for (uint32_t r = 0; r < kRows; ++r) pa[r] = i + r < m ? a[i + r + c * lda] : 0.0;
+    for (uint32_t c = 0; c < k; ++c, pa += kRows) DEFORM_UNROLL
+  for (uint32_t r = 0; r < kRows; ++r) pa[r] = i + r < m ? a[i + r + c * lda] : 0.0;
   for (uint32_t i = 0; i < m; i += kTileColumns)
-    for (uint32_t c = 0; c < k; ++c, pb += kTileColumns)
-      for (uint32_t r = 0; r < kTileColumns; ++r) pb[r] = i + r < m ? a[i + r + c * lda] * d[c] : 0.0;
+    for (uint32_t c = 0; c < k; ++c, pb += kTileColumns) DEFORM_UNROLL
+  for (uint32_t r = 0; r < kTileColumns; ++r) pb[r] = i + r < m ? a[i + r + c * lda] * d[c] : 0.0;
 }
 
 void update(uint32_t m, uint32_t begin, uint32_t end, uint32_t k, const double *pa, const double *pb,
@@ -58,12 +64,14 @@ void update(uint32_t m, uint32_t begin, uint32_t end, uint32_t k, const double *
       Vector sum[kTileColumns][2] = {};
       for (uint32_t e = 0; e < k; ++e, left += kRows, right += kTileColumns) {
         const Vector low = load(left), high = load(left + kWidth);
+        DEFORM_UNROLL
         for (uint32_t q = 0; q < kTileColumns; ++q) {
           const Vector s = splat(right[q]);
           sum[q][0] += low * s;
           sum[q][1] += high * s;
         }
       }
+      DEFORM_UNROLL
       for (uint32_t q = 0; q < kTileColumns && j + q < end; ++q) {
         double *const to = c + i + (j + q) * ldc;
         if (i + kRows <= m) {
@@ -89,20 +97,25 @@ DEFORM_INLINE void times_columns(uint32_t n, const double *l, size_t ld, const d
                                  Vector (&sum)[3 * kPoints][kParts]) {
   for (uint32_t k = 0; k < n; ++k, l += ld, x += kLanes) {
     Vector v[kParts];
+    DEFORM_UNROLL
     for (uint32_t p = 0; p < kParts; ++p) v[p] = load(x + p * kWidth);
+    DEFORM_UNROLL
     for (uint32_t r = 0; r < 3 * kPoints; ++r) {
       const Vector s = splat(l[r]);
+      DEFORM_UNROLL
       for (uint32_t p = 0; p < kParts; ++p) sum[r][p] += s * v[p];
     }
   }
 }
 
 DEFORM_INLINE void subtract(double *to, const Vector (&sum)[kParts]) {
+  DEFORM_UNROLL
   for (uint32_t p = 0; p < kParts; ++p) store(to + p * kWidth, load(to + p * kWidth) - sum[p]);
 }
 
 // row r of a point less l times row c
 DEFORM_INLINE void eliminate(double *to, double l, const double *from) {
+  DEFORM_UNROLL
   for (uint32_t p = 0; p < kParts; ++p)
     store(to + p * kWidth, load(to + p * kWidth) - splat(l) * load(from + p * kWidth));
 }
@@ -112,8 +125,10 @@ DEFORM_INLINE void forward_rows(uint32_t point, uint32_t n, const double *l, siz
                                 const double *x, double *y) {
   Vector sum[3 * kPoints][kParts] = {};
   times_columns<kPoints>(n, l, ld, x, sum);
+  DEFORM_UNROLL
   for (uint32_t q = 0; q < kPoints; ++q) {
     double *const to = row_of(rows, point + q, y);
+    DEFORM_UNROLL
     for (uint32_t r = 0; r < 3; ++r) subtract(to + r * kLanes, sum[3 * q + r]);
   }
 }
@@ -127,6 +142,7 @@ void forward(uint32_t width, uint32_t below, const double *l, const uint32_t *ro
     const double *const block = l + 3 * size_t(w);
     Vector sum[3][kParts] = {};
     times_columns<1>(3 * w, block, ld, x, sum);
+    DEFORM_UNROLL
     for (uint32_t r = 0; r < 3; ++r) subtract(own + r * kLanes, sum[r]);
     const double *const diagonal = block + 3 * size_t(w) * ld;
     eliminate(own + kLanes, diagonal[1], own);
@@ -143,9 +159,12 @@ void forward(uint32_t width, uint32_t below, const double *l, const uint32_t *ro
 DEFORM_INLINE void times_rows(const double *l, size_t ld, const double *y, Vector (&sum)[3][kParts]) {
   for (uint32_t r = 0; r < 3; ++r, y += kLanes) {
     Vector v[kParts];
+    DEFORM_UNROLL
     for (uint32_t p = 0; p < kParts; ++p) v[p] = load(y + p * kWidth);
+    DEFORM_UNROLL
     for (uint32_t c = 0; c < 3; ++c) {
       const Vector s = splat(l[r + c * ld]);
+      DEFORM_UNROLL
       for (uint32_t p = 0; p < kParts; ++p) sum[c][p] += s * v[p];
     }
   }
@@ -162,6 +181,7 @@ void backward(uint32_t width, uint32_t below, const double *l, const uint32_t *r
       times_rows(columns + 3 * size_t(width + b), ld, y + 3 * size_t(rows[b]) * kLanes, sum);
     for (uint32_t k = w + 1; k < width; ++k)
       times_rows(columns + 3 * size_t(k), ld, x + 3 * size_t(k) * kLanes, sum);
+    DEFORM_UNROLL
     for (uint32_t r = 0; r < 3; ++r) subtract(own + r * kLanes, sum[r]);
     const double *const diagonal = columns + 3 * size_t(w);
     eliminate(own + kLanes, diagonal[2 + ld], own + 2 * kLanes);
@@ -181,8 +201,10 @@ void forward_one(uint32_t width, uint32_t below, const double *l, const uint32_t
     Vector sum[4] = {};
     for (uint32_t k = 0; k < n; ++k) {
       const Vector s = splat(x[k]);
+      DEFORM_UNROLL
       for (uint32_t q = 0; q < 4; ++q) sum[q] += load(under + k * ld + i + q * kWidth) * s;
     }
+    DEFORM_UNROLL
     for (uint32_t q = 0; q < 4; ++q) store(scratch + i + q * kWidth, sum[q]);
   }
   for (; i < m; ++i) {
@@ -190,8 +212,8 @@ void forward_one(uint32_t width, uint32_t below, const double *l, const uint32_t
     for (uint32_t k = 0; k < n; ++k) sum += under[k * ld + i] * x[k];
     scratch[i] = sum;
   }
-  for (uint32_t b = 0; b < below; ++b)
-    for (uint32_t r = 0; r < 3; ++r) y[3 * size_t(rows[b]) + r] -= scratch[3 * b + r];
+  for (uint32_t b = 0; b < below; ++b) DEFORM_UNROLL
+  for (uint32_t r = 0; r < 3; ++r) y[3 * size_t(rows[b]) + r] -= scratch[3 * b + r];
 }
 
 // Eight sums per column, whatever the width, added in pairs.
@@ -203,13 +225,16 @@ template <uint32_t kColumns>
 DEFORM_INLINE void dots(uint32_t n, const double *l, size_t ld, const double *y, double *out) {
   Vector sum[kColumns][kParts] = {};
   uint32_t i = 0;
-  for (; i + kLanes <= n; i += kLanes)
-    for (uint32_t p = 0; p < kParts; ++p) {
-      const Vector v = load(y + i + p * kWidth);
-      for (uint32_t c = 0; c < kColumns; ++c) sum[c][p] += load(l + c * ld + i + p * kWidth) * v;
-    }
+  for (; i + kLanes <= n; i += kLanes) DEFORM_UNROLL
+  for (uint32_t p = 0; p < kParts; ++p) {
+    const Vector v = load(y + i + p * kWidth);
+    DEFORM_UNROLL
+    for (uint32_t c = 0; c < kColumns; ++c) sum[c][p] += load(l + c * ld + i + p * kWidth) * v;
+  }
+  DEFORM_UNROLL
   for (uint32_t c = 0; c < kColumns; ++c) {
     double lanes[kLanes];
+    DEFORM_UNROLL
     for (uint32_t p = 0; p < kParts; ++p) store(lanes + p * kWidth, sum[c][p]);
     for (uint32_t k = i; k < n; ++k) lanes[k - i] += l[c * ld + k] * y[k];
     out[c] = add_lanes(lanes);
@@ -220,14 +245,15 @@ void backward_one(uint32_t width, uint32_t below, const double *l, const uint32_
                   const double *y, double *scratch) {
   const uint32_t n = 3 * width, m = 3 * below;
   const size_t ld = size_t(n) + m;
-  for (uint32_t b = 0; b < below; ++b)
-    for (uint32_t r = 0; r < 3; ++r) scratch[3 * b + r] = y[3 * size_t(rows[b]) + r];
+  for (uint32_t b = 0; b < below; ++b) DEFORM_UNROLL
+  for (uint32_t r = 0; r < 3; ++r) scratch[3 * b + r] = y[3 * size_t(rows[b]) + r];
   for (uint32_t w = width; w-- > 0;) {
     double *const own = x + 3 * size_t(w);
     const double *const columns = l + 3 * size_t(w) * ld;
     double sum[3], part[3];
     dots<3>(m, columns + n, ld, scratch, sum);
     dots<3>(n - 3 * (w + 1), columns + 3 * size_t(w + 1), ld, own + 3, part);
+    DEFORM_UNROLL
     for (uint32_t c = 0; c < 3; ++c) own[c] -= sum[c] + part[c];
     const double *const diagonal = columns + 3 * size_t(w);
     own[1] -= diagonal[2 + ld] * own[2];
@@ -237,13 +263,17 @@ void backward_one(uint32_t width, uint32_t below, const double *l, const uint32_
 }
 
 void gram(uint32_t n, const double *left, const double *d, const double *right, double *sum) {
+  DEFORM_UNROLL
   for (uint32_t p = 0; p < kParts; ++p) {
     Vector s[kLanes];
+    DEFORM_UNROLL
     for (uint32_t a = 0; a < kLanes; ++a) s[a] = load(sum + a * kLanes + p * kWidth);
     for (uint32_t k = 0; k < n; ++k) {
       const Vector v = load(right + size_t(k) * kLanes + p * kWidth) * splat(d[k]);
+      DEFORM_UNROLL
       for (uint32_t a = 0; a < kLanes; ++a) s[a] += splat(left[size_t(k) * kLanes + a]) * v;
     }
+    DEFORM_UNROLL
     for (uint32_t a = 0; a < kLanes; ++a) store(sum + a * kLanes + p * kWidth, s[a]);
   }
 }

@@ -4,6 +4,8 @@
 #include <cstring>
 #include <limits>
 
+#include "math/width.h"
+
 namespace dfm {
 
 namespace {

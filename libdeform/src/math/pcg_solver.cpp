@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "math/width.h"
+
 namespace dfm {
 
 namespace {
@@ -23,12 +25,10 @@ bool invert(const double *a, double *out) {
   return true;
 }
 
-double dot3(const double *a, const double *b) { return (a[0] * b[0] + a[1] * b[1]) + a[2] * b[2]; }
-
 }  // namespace
 
 PcgSolver::PcgSolver(const Memory &memory, Tasks *tasks, uint32_t max_iterations)
-    : tasks_(tasks), max_iterations_(max_iterations), a_(memory) {
+    : kernels_(block_kernels()), tasks_(tasks), max_iterations_(max_iterations), a_(memory) {
   use_memory(memory, inverse_, r_, z_, p_, q_, partial_, unit_, answer_);
 }
 
@@ -36,7 +36,7 @@ void PcgSolver::analyse(const BlockPattern &pattern) {
   ready_ = false;
   a_.set_pattern(pattern);
   const size_t rows = 3 * size_t{pattern.n};
-  inverse_.assign(3 * rows, 0.0);
+  inverse_.assign(3 * rows + 1, 0.0);  // and what the load of the last column reads
   for (Array<double> *v : {&r_, &z_, &p_, &q_}) v->assign(rows, 0.0);
   partial_.assign((pattern.n + BlockMatrix::kGrain - 1) / BlockMatrix::kGrain, 0.0);
 }
@@ -49,25 +49,23 @@ bool PcgSolver::factor(const double *blk) {
   return ready_;
 }
 
-void PcgSolver::precondition(uint32_t begin, uint32_t end, const double *r, double *z) const {
-  for (uint32_t i = begin; i < end; ++i) {
-    const double *const m = &inverse_[9 * size_t{i}], *const p = r + 3 * size_t{i};
-    for (uint32_t c = 0; c < 3; ++c) z[3 * size_t{i} + c] = dot3(m + 3 * c, p);
-  }
-}
-
+// f(begin, end) for grains of the points, whatever the cut that a thread is given.
 template <class F>
-double PcgSolver::sum(F &&f) {
+void PcgSolver::each(F &&f) {
   constexpr uint32_t kGrain = BlockMatrix::kGrain;
   const uint32_t n = a_.size();
-  // A thread may be given several grains at once; each has its own partial sum all the same.
-  const auto some = [&](uint32_t begin, uint32_t end) {
-    for (uint32_t at = begin; at < end; at += kGrain)
-      partial_[at / kGrain] = f(at, std::min(end, at + kGrain));
+  const auto grains = [&](uint32_t begin, uint32_t end) {
+    for (uint32_t at = begin; at < end; at += kGrain) f(at, std::min(end, at + kGrain));
   };
   if (tasks_ && n > kGrain)
-    tasks_->parallel_for(n, kGrain, [&](uint32_t begin, uint32_t end) { some(begin, end); });
-  else some(0, n);
+    tasks_->parallel_for(n, kGrain, [&](uint32_t begin, uint32_t end) { grains(begin, end); });
+  else grains(0, n);
+}
+
+// The sum of what f returns, grain after grain.
+template <class F>
+double PcgSolver::sum(F &&f) {
+  each([&](uint32_t begin, uint32_t end) { partial_[begin / BlockMatrix::kGrain] = f(begin, end); });
   double total = 0;
   for (const double part : partial_) total += part;
   return total;
@@ -75,13 +73,11 @@ double PcgSolver::sum(F &&f) {
 
 bool PcgSolver::solve_one(const double *b, double *x, double tolerance, SolveInfo &info) {
   double *const r = r_.data(), *const z = z_.data(), *const p = p_.data(), *const q = q_.data();
-  // The norm of x = 0 first: r.z with r = b.
-  const double scale = sum([&](uint32_t begin, uint32_t end) {
-    precondition(begin, end, b, z);
-    double s = 0;
-    for (uint32_t i = begin; i < end; ++i) s += dot3(b + 3 * size_t{i}, z + 3 * size_t{i});
-    return s;
-  });
+  const auto precondition = [&](uint32_t begin, uint32_t end, const double *from) {
+    return kernels_.diagonal(inverse_.data(), begin, end, from, z);
+  };
+  const double scale =
+      sum([&](uint32_t begin, uint32_t end) { return precondition(begin, end, b); });  // of x = 0
   if (scale == 0) {
     std::fill(x, x + 3 * size_t{a_.size()}, 0.0);
     return true;
@@ -89,40 +85,27 @@ bool PcgSolver::solve_one(const double *b, double *x, double tolerance, SolveInf
   double rz = sum([&](uint32_t begin, uint32_t end) {
     a_.multiply(begin, end, x, q);
     for (size_t k = 3 * size_t{begin}; k < 3 * size_t{end}; ++k) r[k] = b[k] - q[k];
-    precondition(begin, end, r, z);
-    double s = 0;
-    for (uint32_t i = begin; i < end; ++i) s += dot3(r + 3 * size_t{i}, z + 3 * size_t{i});
-    return s;
+    return precondition(begin, end, r);
   });
   const uint64_t limit = max_iterations_ ? max_iterations_ : 3 * uint64_t{a_.size()};
   const double goal = tolerance * tolerance * scale;
-  std::copy(z_.begin(), z_.end(), p_.begin());
+  double beta = 0;
+  std::fill(p_.begin(), p_.end(), 0.0);
   uint64_t k = 0;
   for (; rz > goal && k < limit; ++k) {
-    const double curvature = sum([&](uint32_t begin, uint32_t end) {
-      a_.multiply(begin, end, p, q);
-      double s = 0;
-      for (uint32_t i = begin; i < end; ++i) s += dot3(p + 3 * size_t{i}, q + 3 * size_t{i});
-      return s;
-    });
+    each([&](uint32_t begin, uint32_t end) { kernels_.turn(begin, end, beta, z, p); });
+    const double curvature = sum([&](uint32_t begin, uint32_t end) { return a_.multiply(begin, end, p, q); });
     if (!(curvature > 0)) {  // not a number, too
       info.indefinite = true;
       break;
     }
     const double alpha = rz / curvature;
     const double next = sum([&](uint32_t begin, uint32_t end) {
-      for (size_t e = 3 * size_t{begin}; e < 3 * size_t{end}; ++e) {
-        x[e] += alpha * p[e];
-        r[e] -= alpha * q[e];
-      }
-      precondition(begin, end, r, z);
-      double s = 0;
-      for (uint32_t i = begin; i < end; ++i) s += dot3(r + 3 * size_t{i}, z + 3 * size_t{i});
-      return s;
+      kernels_.advance(begin, end, alpha, p, q, x, r);
+      return precondition(begin, end, r);
     });
-    const double beta = next / rz;
+    beta = next / rz;
     rz = next;
-    for (size_t e = 0; e < p_.size(); ++e) p[e] = z[e] + beta * p[e];
   }
   info.iterations += uint32_t(k);
   info.residual = std::max(info.residual, std::sqrt(std::max(rz, 0.0) / scale));

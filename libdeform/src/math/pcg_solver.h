@@ -19,11 +19,12 @@ class PcgSolver final : public LinearSolver {
 
  private:
   bool solve_one(const double *b, double *x, double tolerance, SolveInfo &info);
-  // Calls f(begin, end) for cuts of the points and returns the sum of what it returns, always in one order.
+  template <class F>
+  void each(F &&f);
   template <class F>
   double sum(F &&f);
-  void precondition(uint32_t begin, uint32_t end, const double *r, double *z) const;
 
+  const BlockKernels &kernels_;
   Tasks *tasks_;
   uint32_t max_iterations_;
   bool ready_ = false;
