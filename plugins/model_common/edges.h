@@ -7,7 +7,7 @@ namespace model {
 
 constexpr int kEdgeOf[6][2] = {{0, 1}, {0, 2}, {0, 3}, {1, 2}, {1, 3}, {2, 3}};
 
-// Number of each edge of a cell; edges [nedge,2] i < j, lexicographic. Throws a sentence where one is missing.
+// Number of each edge of a cell; edges [nedge,2] i < j, lexicographic. Throws a sentence where one lacks.
 inline void find_edges(const uint32_t *edges, uint32_t nedge, const uint32_t *cell, uint32_t *out) {
   const auto key = [](uint32_t i, uint32_t j) {
     return i < j ? uint64_t(i) << 32 | j : uint64_t(j) << 32 | i;

@@ -44,7 +44,8 @@ inline const char *wrong_with(const dfm_mesh &m) {
   return nullptr;
 }
 
-// A Body in the host's memory; body.create(h, m) may throw Refused, a sentence, or anything where memory ends.
+// A Body in the host's memory; body.create(h, m) may throw Refused, a sentence, or anything where memory
+// ends.
 template <class Body>
 dfm_status create(const dfm_host *h, const dfm_mesh *m, const char *who, void **self) {
   *self = nullptr;
