@@ -42,24 +42,13 @@ const dfm_param kParams[kParamCount] = {
      3, nullptr},
 };
 
-void complain(const dfm_host *h, const char *what) {
-  char text[256];
-  snprintf(text, sizeof text, "org.deform.msm: %s.", what);
-  h->log(h->ctx, 3, 0, text);
-}
-
 namespace {
+constexpr const char *kId = "org.deform.msm";
+}
+void complain(const dfm_host *h, const char *what) { model::complain(h, kId, what); }
 
-bool check_params(const dfm_host *h, const double *values) {
-  for (uint32_t n = 0; n < kValueCount; ++n) {
-    const dfm_param &p = kParams[n < kAxis ? n : uint32_t(kAxis)];
-    if (values[n] >= p.min && values[n] <= p.max) continue;
-    char text[200];
-    snprintf(text, sizeof text, "parameter %s = %g %s is outside %g .. %g", p.key, values[n], p.unit, p.min,
-             p.max);
-    complain(h, text);
-    return false;
-  }
+bool valid(const dfm_host *h, const double *values) {
+  if (!model::in_range(h, kId, kParams, kParamCount, values)) return false;
   if (values[kVolume] < 0 && values[kVolume] != kFromPoisson) {
     complain(h, "parameter volume lies between -1 (from poisson) and 0 (off); give one of them, or more");
     return false;
@@ -78,58 +67,15 @@ bool check_params(const dfm_host *h, const double *values) {
   return true;
 }
 
-const char *check_mesh(const dfm_mesh &m) {
-  if (m.cell != DFM_CELL_TET) return "the cells must be tetrahedra";
-  if (!m.npoint || !m.ncell || !m.nedge || !m.edges || !m.cells || !m.rest || !m.mass)
-    return "the mesh has no cells, points or edges";
-  for (size_t n = 0; n < 4 * size_t(m.ncell); ++n)
-    if (m.cells[n] >= m.npoint) return "a cell names a point that the mesh lacks";
-  for (size_t n = 0; n < 2 * size_t(m.nedge); ++n)
-    if (m.edges[n] >= m.npoint) return "an edge names a point that the mesh lacks";
-  return nullptr;
-}
+namespace {
 
 dfm_status create(const dfm_host *h, const dfm_mesh *m, void **self) {
-  *self = nullptr;
-  if (const char *wrong = check_mesh(*m)) {
-    complain(h, wrong);
-    return DFM_E_ARG;
-  }
-  if (!check_params(h, m->params)) return DFM_E_ARG;
-  void *memory = h->alloc(h->ctx, sizeof(Body), 64);
-  if (!memory) return DFM_E_NOMEM;
-  Body *body = new (memory) Body;
-  dfm_status status = DFM_OK;
-  try {
-    body->create(h, *m);
-  } catch (const Refused &) {
-    status = DFM_E_ARG;
-  } catch (const char *wrong) {
-    complain(h, wrong);
-    status = DFM_E_ARG;
-  } catch (...) {
-    status = DFM_E_NOMEM;
-  }
-  if (status == DFM_OK) {
-    *self = body;
-    return DFM_OK;
-  }
-  body->~Body();
-  h->release(h->ctx, memory, sizeof(Body), 64);
-  return status;
-}
-
-void destroy(void *self) {
-  Body *body = static_cast<Body *>(self);
-  if (!body) return;
-  const dfm_host *h = body->host;
-  body->~Body();
-  h->release(h->ctx, self, sizeof(Body), 64);
+  return model::create<Body>(h, m, kId, self);
 }
 
 dfm_status set_params(void *self, const double *params) {
   Body *body = static_cast<Body *>(self);
-  if (!check_params(body->host, params)) return DFM_E_ARG;
+  if (!valid(body->host, params)) return DFM_E_ARG;
   try {
     body->apply_params(params);
   } catch (...) {
@@ -254,7 +200,7 @@ const dfm_model kModel = {
     0,
     nullptr,
     create,
-    destroy,
+    model::destroy<Body>,
     set_params,
     state_init,
     add_forces,
@@ -266,7 +212,7 @@ const dfm_model kModel = {
 
 const dfm_type kType = {sizeof(dfm_type),
                         DFM_KIND_MODEL,
-                        "org.deform.msm",
+                        kId,
                         "mass-spring",
                         "0.2.0",
                         "MIT",

@@ -8,12 +8,14 @@
 #include <cstring>
 
 #include "../model_common/buffer.h"
+#include "../model_common/entry.h"
 #include "../model_common/partition.h"
 #include "msm_kernel.h"
 
 namespace msm {
 
 using model::Buffer;
+using model::Refused;
 using model::partition_capacity;
 using model::partition_points;
 
@@ -40,8 +42,8 @@ enum Force : uint32_t { kFormB, kFormA };
 enum Damper : uint32_t { kVoigt, kMaxwell, kStandardLinear };
 extern const dfm_param kParams[kParamCount];
 constexpr double kFromPoisson = -1;  // of `volume`: what gives the body the ratio `poisson`
-struct Refused {};                   // thrown after the reason was logged
 void complain(const dfm_host *h, const char *what);
+bool valid(const dfm_host *h, const double *values);  // of all parameters; false after the reason was logged
 
 // `volume` that gives Poisson's ratio nu; springs alone give 1/4 and no volume modulus that is not
 // negative gives less.

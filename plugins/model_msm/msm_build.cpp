@@ -1,6 +1,7 @@
 // From a mesh to blocks: rows of springs in quads, halos, and who adds up whose forces.
 #include <algorithm>
 
+#include "../model_common/edges.h"
 #include "msm_body.h"
 
 namespace msm {
@@ -8,21 +9,6 @@ namespace {
 
 // of a pass over the blocks at most: enough for the workers that one body can feed
 constexpr uint32_t kPieces = 32;
-
-constexpr int kEdgeOf[6][2] = {{0, 1}, {0, 2}, {0, 3}, {1, 2}, {1, 3}, {2, 3}};
-
-uint32_t find_edge(const uint32_t *edges, uint32_t nedge, uint32_t i, uint32_t j) {
-  if (i > j) std::swap(i, j);
-  uint32_t lo = 0, hi = nedge;
-  while (lo < hi) {
-    const uint32_t mid = lo + (hi - lo) / 2;
-    if (edges[2 * size_t(mid)] < i || (edges[2 * size_t(mid)] == i && edges[2 * size_t(mid) + 1] < j))
-      lo = mid + 1;
-    else hi = mid;
-  }
-  const bool found = lo < nedge && edges[2 * size_t(lo)] == i && edges[2 * size_t(lo) + 1] == j;
-  return found ? lo : Body::kNone;
-}
 
 }  // namespace
 
@@ -61,12 +47,9 @@ void Body::take_mesh(const dfm_mesh &m) {
     if (six() < 0) std::swap(q[2], q[3]);  // a volume below the one at rest is then less of it
     cell_volume6[c] = six();
     const double volume = cell_volume6[c] / 6;
-    for (int n = 0; n < 6; ++n) {
-      const uint32_t e = find_edge(edges.data(), nedge, q[kEdgeOf[n][0]], q[kEdgeOf[n][1]]);
-      if (e == kNone) throw "a cell has an edge that the mesh's edge list lacks";
-      cell_edge[6 * size_t(c) + n] = e;
-      edge_volume[e] += volume;
-    }
+    uint32_t *const e = cell_edge.data() + 6 * size_t(c);
+    model::find_edges(edges.data(), nedge, q, e);
+    for (int n = 0; n < 6; ++n) edge_volume[e[n]] += volume;
   }
   find_directions();
 }
@@ -294,6 +277,7 @@ void Body::build_blocks() {
 
 void Body::create(const dfm_host *h, const dfm_mesh &m) {
   host = h;
+  if (!valid(h, m.params)) throw Refused{};
   kernels = choose_kernels(h);
   take_mesh(m);
   take_fields(m);

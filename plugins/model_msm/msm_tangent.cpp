@@ -9,12 +9,14 @@
 // Left out, so that the sum stays negative semidefinite: A and T below zero (a compressed spring buckles),
 // the second derivative of the volume, and what a damper's force changes as its spring turns, which is not
 // symmetric.
+#include "../model_common/edges.h"
 #include "msm_body.h"
 
 namespace msm {
-namespace {
 
-constexpr int kPair[6][2] = {{0, 1}, {0, 2}, {0, 3}, {1, 2}, {1, 3}, {2, 3}};  // as in cell_edge
+using model::kEdgeOf;
+
+namespace {
 
 // blk += s u w^T
 void add_dyad(double *blk, double s, const double *u, const double *w) {
@@ -39,7 +41,7 @@ double counted_volume6(const double *const *x, double limit, double (*gradient)[
   for (int n = 0; n < 3; ++n) gradient[0][n] = -((gradient[1][n] + gradient[2][n]) + gradient[3][n]);
   const double six = volume6_of(x[0], x[1], x[2], x[3]);
   double q = 0;
-  for (const auto &pair : kPair) q += square_of(x[pair[0]], x[pair[1]]);
+  for (const auto &pair : kEdgeOf) q += square_of(x[pair[0]], x[pair[1]]);
   if (!(q > limit)) return six;
   const double u = limit / q, power = __builtin_sqrt(u) * u;
   const double share = power * (2.5 - 1.5 * u), by_q = -3.75 * (power * (1 - u)) / q;
@@ -72,7 +74,7 @@ Body::SpringTangent Body::spring_tangent(uint32_t e, double square, const Branch
 
 void Body::add_springs(const dfm_kin &k, double a, double b, double *blk) const {
   const Branch branch = branch_at(k);
-  const double damp = damp_scale() * params[kDampingStiffness];
+  const double even = damp_scale() * params[kDampingStiffness];
   for (uint32_t e = 0; e < nedge; ++e) {
     const uint32_t i = edges[2 * size_t(e)], j = edges[2 * size_t(e) + 1];
     const double *const xi = k.x + size_t(k.stride) * i;
@@ -83,7 +85,7 @@ void Body::add_springs(const dfm_kin &k, double a, double b, double *blk) const 
     const double across = a * t.across;
     if (damping_on && square > kShortestSquared) {
       const double tilt2 = edge_tilt.empty() ? 0 : edge_tilt[e], ratio = square / (square + tilt2);
-      along += b * (stiffness_of(e) * (edge_damp.empty() ? damp : edge_damp[e])) *
+      along += b * (stiffness_of(e) * (edge_damp.empty() ? even : edge_damp[e])) *
                (form() == kTurned ? __builtin_sqrt(ratio) : ratio);
     }
     if (along == 0 && across == 0) continue;
@@ -108,16 +110,16 @@ void Body::add_cells(const dfm_kin &k, double a, double *blk) const {
     const uint32_t *const q = cells.data() + 4 * size_t(cell_id[c]);
     const uint32_t *const e = cell_edge.data() + 6 * size_t(cell_id[c]);
     const double *x[4];
-    for (int p = 0; p < 4; ++p) x[p] = k.x + size_t(k.stride) * q[p];
+    for (int m = 0; m < 4; ++m) x[m] = k.x + size_t(k.stride) * q[m];
     double g[4][3];
     const double now = counted_volume6(x, limit[c], g), rest6 = volume6[c];
     if (!(now > kLeastVolume * rest6 && now < kMostVolume * rest6)) continue;  // the pressure is constant
     const double s = -a * (now < kCollapseBelow * rest6 ? stiffest : bulk[c]);
-    for (int p = 0; p < 4; ++p) add_dyad(blk + 9 * size_t(q[p]), s, g[p], g[p]);
-    for (int p = 0; p < 6; ++p) {
-      const int u = kPair[p][0], w = kPair[p][1];
+    for (int m = 0; m < 4; ++m) add_dyad(blk + 9 * size_t(q[m]), s, g[m], g[m]);
+    for (int m = 0; m < 6; ++m) {
+      const int u = kEdgeOf[m][0], w = kEdgeOf[m][1];
       const bool ordered = q[u] < q[w];
-      add_dyad(blk + 9 * (size_t(npoint) + e[p]), s, g[ordered ? u : w], g[ordered ? w : u]);
+      add_dyad(blk + 9 * (size_t(npoint) + e[m]), s, g[ordered ? u : w], g[ordered ? w : u]);
     }
   }
 }

@@ -24,6 +24,12 @@ inline std::string machine() {
   return "unknown";
 }
 
+// A sentence as one column.
+inline std::string quoted(std::string text) {
+  std::replace(text.begin(), text.end(), '"', '\'');
+  return '"' + text + '"';
+}
+
 // Rows for results/*.csv, where the program was called with --csv FILE --commit HASH.
 struct Csv {
   std::FILE *csv = nullptr;

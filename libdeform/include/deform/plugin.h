@@ -140,10 +140,12 @@ enum {
 enum { DFM_CELL_TET = 8 };
 typedef struct dfm_mesh {             /* rest configuration; borrowed during create() only */
   uint32_t size, npoint, ncell, cell; /* cell: one DFM_CELL_* */
-  const double *rest;                 /* [npoint,3] m */
-  const uint32_t *cells;              /* [ncell,k] */
-  const double *mass;                 /* [npoint] kg */
-  const double *params;               /* as in dfm_param */
+  /* [npoint,3] m, before the body's pose; where that has put them, for a model without
+   * DFM_CAP_ROTATION_INVARIANT */
+  const double *rest;
+  const uint32_t *cells; /* [ncell,k] */
+  const double *mass;    /* [npoint] kg */
+  const double *params;  /* as in dfm_param */
   /* DFM_PARAM_PER_CELL rows that differ by cell, NULL-terminated ("young") */
   const char *const *field_keys;
   /* [nfield] each [ncell, width of the row of that key], in the row's range */

@@ -88,4 +88,16 @@ uint32_t tell_failed_solve(World &w, StepContext &step, const LawInstance *law) 
   return DFM_TROUBLE_PLUGIN;
 }
 
+uint32_t tell_jam(World &w, StepContext &step) {
+  uint32_t worst = kNone;
+  for (uint32_t i = 0; i < step.rows.n; ++i)
+    if (worst == kNone || step.rows.impulse[3 * size_t{i}] > step.rows.impulse[3 * size_t{worst}]) worst = i;
+  set_last_error(
+      format("step %llu, %s: squeezed until nothing can move any more; open what closes on it, move "
+             "it slower, or make the body stiffer",
+             static_cast<unsigned long long>(w.step_count), sides(w, step, worst).c_str())
+          .c_str());
+  return DFM_TROUBLE_UNCONVERGED;
+}
+
 }  // namespace dfm

@@ -30,7 +30,8 @@ namespace {
 
 constexpr uint32_t kSolves = 4, kCuts = 8, kFractions = 40;
 constexpr double kLeastCut = 0.25;
-constexpr double kSlow = 0.01;  // of d_g: what moves by less needs no closer look at how it does
+constexpr double kNoWay = 1e-3;  // of the way of a sub-step: less than this is none
+constexpr double kSlow = 0.01;   // of d_g: what moves by less needs no closer look at how it does
 
 // The mean of the surfels' predicted velocities, and how far any of them is from it.
 void split_motion(const Surface &s, Vec3 &mean, double &spread) {
@@ -203,6 +204,17 @@ bool wake_hit(World &w, StepContext &step) {
   return w.sleepers < before;
 }
 
+// No motion is left and contact has no answer: what closes on a body has met. Impulses that cannot help would
+// grow from sub-step to sub-step, and their rounding is motion out of nothing. Only what is told where to go
+// leaves no answer: what is free gives way.
+bool jammed(const World &w, const StepContext &step) {
+  if (!(step.guard.motion < kNoWay && step.h > 0.5 * step.guard.planned && step.residual.due > 1))
+    return false;
+  for (size_t o = 0; o < w.obstacles.size(); ++o)
+    if (!w.obstacles[o]->rigid && step.obstacle_views[o].moves()) return true;
+  return !step.driven.empty();
+}
+
 }  // namespace
 
 // False: trouble, or guard.again: the sub-step is to be taken anew, guard.cut times as long.
@@ -246,6 +258,10 @@ bool stage_guard(World &w, StepContext &step, uint32_t *trouble) {
     set_fraction(w, step, k < kFractions ? step.guard.motion * std::min(safe, 0.999) : 0);
     if (step.guard.motion == 0) break;
     safe = find_hits(w, step);
+  }
+  if (jammed(w, step)) {
+    *trouble |= tell_jam(w, step);
+    return false;
   }
   w.stats.guard_lost += (1 - step.guard.motion) * step.h;
   return true;

@@ -78,6 +78,8 @@ void keep_rigids(World &w, StepContext &step);  // once the sub-step is known to
 void make_rows(World &w, StepContext &step);  // contacts as rows, with what they kept
 // to dfm_last_error(), null: not finite; which trouble that is
 uint32_t tell_failed_solve(World &w, StepContext &step, const LawInstance *law);
+// The sentence where the guard has left no way and contact has no answer. Gives the trouble bit.
+uint32_t tell_jam(World &w, StepContext &step);
 void reserve_contacts(World &w, StepContext &step);  // memory for keep_contacts()
 void keep_contacts(World &w, StepContext &step);     // store, events, hold, work, report; allocates nothing
 // all, with their events, where no stage of a plan looks after them

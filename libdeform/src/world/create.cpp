@@ -77,6 +77,16 @@ void place_phyxels(Body &b, const dfm_body_def &def) {
   }
 }
 
+// [n,3] the rest positions where the pose has put them, for a model whose forces do not turn with the body;
+// empty for the others.
+std::vector<double> rest_for(const dfm_type &type, const Body &b) {
+  std::vector<double> placed;
+  if (static_cast<const dfm_model *>(type.ops)->caps & DFM_CAP_ROTATION_INVARIANT) return placed;
+  for (size_t i = 0; i < b.p.n; ++i)
+    placed.insert(placed.end(), &b.p.x[i * kStride], &b.p.x[i * kStride] + 3);
+  return placed;
+}
+
 }  // namespace
 
 Body &create_body(World &w, const dfm_body_def &def) {
@@ -143,7 +153,8 @@ Body &create_body(World &w, const dfm_body_def &def) {
   mesh.npoint = p.n;
   mesh.ncell = def.ntet;
   mesh.cell = DFM_CELL_TET;
-  mesh.rest = p.rest.data();
+  const std::vector<double> placed = rest_for(type, b);
+  mesh.rest = placed.empty() ? p.rest.data() : placed.data();
   mesh.cells = b.tets.data();
   mesh.mass = p.mass.data();
   mesh.params = values.data();

@@ -1,0 +1,88 @@
+// What the entry of every model on tetrahedra does: checks of parameters and mesh, an instance in the host's
+// memory, and failures as a status after a sentence in the log.
+#pragma once
+#include <deform/plugin.h>
+
+#include <cstdio>
+#include <new>
+
+namespace model {
+
+struct Refused {};  // thrown after the reason was logged
+
+// `who` begins the sentence, `what` ends without a full stop.
+inline void complain(const dfm_host *h, const char *who, const char *what) {
+  char text[256];
+  snprintf(text, sizeof text, "%s: %s.", who, what);
+  h->log(h->ctx, 3, 0, text);
+}
+
+// Values of all rows end to end; false after the reason was logged.
+inline bool in_range(const dfm_host *h, const char *who, const dfm_param *rows, uint32_t nrow,
+                     const double *values) {
+  for (uint32_t r = 0; r < nrow; ++r)
+    for (uint32_t w = 0; w < rows[r].width; ++w, ++values) {
+      if (*values >= rows[r].min && *values <= rows[r].max) continue;
+      char text[200];
+      snprintf(text, sizeof text, "parameter %s = %g %s is outside %g .. %g", rows[r].key, *values,
+               rows[r].unit, rows[r].min, rows[r].max);
+      complain(h, who, text);
+      return false;
+    }
+  return true;
+}
+
+// What keeps a model on tetrahedra with edges from taking the mesh; NULL: nothing.
+inline const char *wrong_with(const dfm_mesh &m) {
+  if (m.cell != DFM_CELL_TET) return "the cells must be tetrahedra";
+  if (!m.npoint || !m.ncell || !m.nedge || !m.edges || !m.cells || !m.rest || !m.mass)
+    return "the mesh has no cells, points or edges";
+  for (size_t n = 0; n < 4 * size_t(m.ncell); ++n)
+    if (m.cells[n] >= m.npoint) return "a cell names a point that the mesh lacks";
+  for (size_t n = 0; n < 2 * size_t(m.nedge); ++n)
+    if (m.edges[n] >= m.npoint) return "an edge names a point that the mesh lacks";
+  return nullptr;
+}
+
+// A Body in the host's memory; body.create(h, m) may throw Refused, a sentence, or anything where memory
+// ends.
+template <class Body>
+dfm_status create(const dfm_host *h, const dfm_mesh *m, const char *who, void **self) {
+  *self = nullptr;
+  if (const char *wrong = wrong_with(*m)) {
+    complain(h, who, wrong);
+    return DFM_E_ARG;
+  }
+  void *memory = h->alloc(h->ctx, sizeof(Body), 64);
+  if (!memory) return DFM_E_NOMEM;
+  Body *body = new (memory) Body;
+  dfm_status status = DFM_OK;
+  try {
+    body->create(h, *m);
+  } catch (const Refused &) {
+    status = DFM_E_ARG;
+  } catch (const char *wrong) {
+    complain(h, who, wrong);
+    status = DFM_E_ARG;
+  } catch (...) {
+    status = DFM_E_NOMEM;
+  }
+  if (status == DFM_OK) {
+    *self = body;
+    return DFM_OK;
+  }
+  body->~Body();
+  h->release(h->ctx, memory, sizeof(Body), 64);
+  return status;
+}
+
+template <class Body>
+void destroy(void *self) {
+  Body *body = static_cast<Body *>(self);
+  if (!body) return;
+  const dfm_host *h = body->host;
+  body->~Body();
+  h->release(h->ctx, self, sizeof(Body), 64);
+}
+
+}  // namespace model

@@ -1,0 +1,122 @@
+// org.deform.linear_fem: linear elasticity on tetrahedra with linear shape functions. The stiffness is
+// constant: forces are those of small displacements, and a body that turns resists
+// (doc/models/linear_fem.md).
+#include <cstring>
+
+#include "linear_body.h"
+
+namespace linear {
+
+namespace {
+constexpr uint32_t kEach = DFM_PARAM_RUNTIME | DFM_PARAM_PER_CELL;
+}
+const dfm_param kParams[kParamCount] = {
+    {"young", "Young's modulus", "Pa", 1e-3, 1e13, 1e5, kEach | DFM_PARAM_LOG_SCALE, 1, nullptr},
+    {"poisson", "Poisson's ratio", "1", -0.99, 0.4999, 0.3, kEach, 1, nullptr},
+    {"damping_stiffness", "Rayleigh damping: damping over stiffness", "s", 0, 1e3, 0, kEach, 1, nullptr},
+    {"damping_mass", "Rayleigh damping: drag over mass", "1/s", 0, 1e6, 0, kEach, 1, nullptr},
+};
+
+namespace {
+
+dfm_status create(const dfm_host *h, const dfm_mesh *m, void **self) {
+  return model::create<Body>(h, m, kId, self);
+}
+
+dfm_status set_params(void *self, const double *params) {
+  Body *body = static_cast<Body *>(self);
+  if (!model::in_range(body->host, kId, kParams, kParamCount, params)) return DFM_E_ARG;
+  body->apply_params(params);
+  return DFM_OK;
+}
+
+dfm_status add_forces(void *self, const dfm_kin *k, double *f) {
+  static_cast<const Body *>(self)->add_forces(*k, f);
+  return DFM_OK;
+}
+
+dfm_status bound(void *self, const dfm_kin *, double *ksum, double *csum, double *) {
+  static_cast<const Body *>(self)->bound(ksum, csum);
+  return DFM_OK;
+}
+
+dfm_status energy(void *self, const dfm_kin *k, double *joule) {
+  *joule = static_cast<const Body *>(self)->energy(*k);
+  return DFM_OK;
+}
+
+dfm_status pattern(const void *self, uint32_t *nb, uint32_t *ij) {
+  const Body &body = *static_cast<const Body *>(self);
+  *nb = body.nblocks();
+  if (ij) body.pattern(ij);
+  return DFM_OK;
+}
+
+dfm_status stiffness(void *self, const dfm_kin *, double a, double b, double *blk) {
+  static_cast<const Body *>(self)->add_stiffness(a, b, blk);
+  return DFM_OK;
+}
+
+dfm_status cell_energy(void *self, const dfm_kin *k, double *density) {
+  static_cast<const Body *>(self)->cell_energy(*k, density);
+  return DFM_OK;
+}
+
+const char *const *active_effects(const void *self) {
+  return static_cast<const Body *>(self)->active_effects;
+}
+
+const dfm_cell_energy kCellEnergy = {sizeof(dfm_cell_energy), 0, cell_energy};
+const dfm_effects kActiveEffects = {sizeof(dfm_effects), 0, active_effects};
+
+const void *extension(const void *, const char *id) {
+  if (!strcmp(id, DFM_EXT_CELL_ENERGY)) return &kCellEnergy;
+  if (!strcmp(id, DFM_EXT_EFFECTS)) return &kActiveEffects;
+  return nullptr;
+}
+
+const char *const kEffects[] = {"damping", nullptr};
+
+const dfm_model kModel = {sizeof(dfm_model),
+                          DFM_CAP_ENERGY | DFM_CAP_STIFFNESS | DFM_CAP_DAMPING | DFM_CAP_CONSTANT_STIFFNESS,
+                          DFM_CELL_TET,
+                          0,
+                          nullptr,
+                          create,
+                          model::destroy<Body>,
+                          set_params,
+                          nullptr,
+                          add_forces,
+                          bound,
+                          energy,
+                          pattern,
+                          stiffness,
+                          extension};
+
+const dfm_type kType = {
+    sizeof(dfm_type),
+    DFM_KIND_MODEL,
+    kId,
+    "linear elasticity",
+    "0.1.0",
+    "MIT",
+    "first-order tetrahedra of linear elasticity (Zienkiewicz, Taylor, Zhu 2013, The Finite "
+    "Element Method: Its Basis and Fundamentals, ch. 2)",
+    kParams,
+    kParamCount,
+    sizeof(dfm_param),
+    kEffects,
+    &kModel};
+
+const dfm_type *const kTypes[] = {&kType};
+const dfm_plugin kPlugin = {sizeof(dfm_plugin), DFM_ABI, DFM_ABI_DRAFT, 1, kTypes, nullptr};
+
+}  // namespace
+}  // namespace linear
+
+extern "C" DFM_EXPORT const dfm_plugin *dfm_plugin_entry(const dfm_host *host, uint32_t, uint32_t) {
+  if (DFM_ABI_OK(host)) return &linear::kPlugin;
+  model::complain(host, linear::kId,
+                  "built for another draft of the plugin ABI: build it against this library's header");
+  return nullptr;
+}
