@@ -29,8 +29,12 @@ DEFORM_INLINE v4 min4(v4 a, v4 b) { return _mm256_min_pd(a, b); }
 DEFORM_INLINE bool any_above(v4 a, v4 limit) {
   return _mm256_movemask_pd(_mm256_cmp_pd(a, limit, _CMP_GT_OQ));
 }
+// bit k: lane k lies above; never for a NaN
+DEFORM_INLINE uint32_t mask_above(v4 a, v4 limit) {
+  return uint32_t(_mm256_movemask_pd(_mm256_cmp_pd(a, limit, _CMP_GT_OQ)));
+}
 DEFORM_INLINE uint32_t count_above(v4 a, v4 limit) {
-  return uint32_t(__builtin_popcount(uint32_t(_mm256_movemask_pd(_mm256_cmp_pd(a, limit, _CMP_GT_OQ)))));
+  return uint32_t(__builtin_popcount(mask_above(a, limit)));
 }
 DEFORM_INLINE v4 choose_above(v4 a, v4 limit, v4 above, v4 below) {
   return _mm256_blendv_pd(below, above, _mm256_cmp_pd(a, limit, _CMP_GT_OQ));

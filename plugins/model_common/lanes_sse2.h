@@ -30,9 +30,13 @@ DEFORM_INLINE v4 min4(v4 a, v4 b) { return {_mm_min_pd(a.lo, b.lo), _mm_min_pd(a
 DEFORM_INLINE bool any_above(v4 a, v4 limit) {
   return _mm_movemask_pd(_mm_cmpgt_pd(a.lo, limit.lo)) | _mm_movemask_pd(_mm_cmpgt_pd(a.hi, limit.hi));
 }
+// bit k: lane k lies above; never for a NaN
+DEFORM_INLINE uint32_t mask_above(v4 a, v4 limit) {
+  return uint32_t(_mm_movemask_pd(_mm_cmpgt_pd(a.lo, limit.lo)) |
+                  _mm_movemask_pd(_mm_cmpgt_pd(a.hi, limit.hi)) << 2);
+}
 DEFORM_INLINE uint32_t count_above(v4 a, v4 limit) {
-  return uint32_t(__builtin_popcount(uint32_t(_mm_movemask_pd(_mm_cmpgt_pd(a.lo, limit.lo)) |
-                                              _mm_movemask_pd(_mm_cmpgt_pd(a.hi, limit.hi)) << 2)));
+  return uint32_t(__builtin_popcount(mask_above(a, limit)));
 }
 DEFORM_INLINE __m128d choose(__m128d mask, __m128d yes, __m128d no) {
   return _mm_or_pd(_mm_and_pd(mask, yes), _mm_andnot_pd(mask, no));

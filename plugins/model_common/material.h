@@ -1,6 +1,7 @@
 // Linear elasticity: constants of the isotropic and of the transversely isotropic solid. Order of stress and
 // strain xx yy zz xy yz zx, shear strain as twice the tensor's (engineering).
 #pragma once
+#include <cmath>
 
 namespace model {
 
@@ -38,6 +39,17 @@ inline bool fibre_of(const Transverse &t, Fibre &out) {
   out.mu_along = t.shear_along;
   out.beta = c33 - lambda - 2 * mu - 2 * out.alpha - 4 * (t.shear_along - mu);
   return true;
+}
+
+// No strain has more than this times its square as twice its energy: the axially symmetric strains have the
+// 2 x 2 matrix of c11 + c12, sqrt 2 c13, c33, the others 2 mu and 2 mu_along.
+inline double largest_modulus(const Fibre &c) {
+  const double plane = 2 * (c.lambda + c.mu), cross = c.lambda + c.alpha;
+  const double along = c.lambda + 2 * c.alpha + 4 * c.mu_along - 2 * c.mu + c.beta;
+  const double half = 0.5 * (plane - along), mean = 0.5 * (plane + along);
+  const double both = mean + std::sqrt(half * half + 2 * (cross * cross)),
+               shear = 2 * std::fmax(c.mu, c.mu_along);
+  return both > shear ? both : shear;
 }
 
 // D[6][6] of stress = D strain; axis of unit length.

@@ -42,4 +42,17 @@ inline bool make_tetrahedron(const double *x0, const double *x1, const double *x
   return solid;
 }
 
+// Block (a, b) of the stiffness, V B_a^T D B_b row-major: the force that a displacement of corner b calls
+// for at corner a, with the sign of K. D as in material.h.
+inline void stiffness_block(const Tetrahedron &t, const double (*d)[6], int a, int b, double *out) {
+  constexpr int kVoigt[3][3] = {{0, 3, 5}, {3, 1, 4}, {5, 4, 2}};
+  for (int i = 0; i < 3; ++i)
+    for (int j = 0; j < 3; ++j) {
+      double sum = 0;
+      for (int k = 0; k < 3; ++k)
+        for (int l = 0; l < 3; ++l) sum += d[kVoigt[i][k]][kVoigt[j][l]] * (t.g[a][k] * t.g[b][l]);
+      out[3 * i + j] = t.volume * sum;
+    }
+}
+
 }  // namespace model

@@ -159,7 +159,7 @@ TEST(SceneErrors, Names_AreUniqueAndKnown) {
          {"/bodies/0/fix/0/box=[[5,5,5],[6,6,6]]", {"/bodies/0/fix/0/box", "no point"}},
          {"/bodies/0/fix/0={\"group\":\"left\"}", {"/bodies/0/fix/0/group", "left"}},
          {"/bodies/0/mesh=\"missing.msh\"", {"/bodies/0/mesh", "missing.msh"}},
-         {"/bodies/0/model/type=\"corotational_fem\"", {"/bodies/0/model/type", "msm"}},
+         {"/bodies/0/model/type=\"corotational\"", {"/bodies/0/model/type", "corotational_fem", "msm"}},
          {"/contact/friction/0/law=\"dalh\"", {"/contact/friction/0/law", "coulomb", "none"}},
          {"/effects=[\"cutting\"]", {"/effects", "cutting"}}});
 }

@@ -1,0 +1,146 @@
+// org.deform.corotational_fem: linear tetrahedra whose strain is measured in a frame that turns with each
+// cell. Zerbato 2010, 2.1.2, (2.1)-(2.13), as corrected in doc/models/corotational_fem.md, which derives
+// what stands here.
+#include <string.h>
+
+#include "../model_common/entry.h"
+#include "corot_body.h"
+
+namespace corot {
+
+namespace {
+constexpr char kId[] = "org.deform.corotational_fem";
+constexpr uint32_t kRun = DFM_PARAM_RUNTIME, kCell = DFM_PARAM_PER_CELL, kUnlessGiven = DFM_PARAM_AUTO;
+const char *const kRotations[] = {"polar", "svd", "qr", nullptr};
+}  // namespace
+
+const dfm_param kParams[kParamCount] = {
+    {"young", "Young's modulus", "Pa", 1e-3, 1e13, 1e5, kRun | DFM_PARAM_LOG_SCALE | kCell, 1, nullptr},
+    {"poisson", "Poisson ratio", "1", -0.99, 0.4999, 0.3, kRun | kCell, 1, nullptr},
+    {"damping_stiffness", "damping over stiffness of each cell", "s", 0, 1e3, 0, kRun | kCell, 1, nullptr},
+    {"damping_mass", "drag over mass of each point", "1/s", 0, 1e6, 0, kRun | kCell, 1, nullptr},
+    {"rotation", "how the frame of a cell is found; qr depends on the order of its corners", "1", 0, 2,
+     kPolar, kRun | DFM_PARAM_ENUM, 1, kRotations},
+    {"anisotropy_young", "Young's modulus along the axis; auto, -1: young", "Pa", kAuto, 1e13, kAuto,
+     kRun | kCell | kUnlessGiven, 1, nullptr},
+    {"anisotropy_poisson",
+     "contraction across the axis over the strain of a pull along it; auto, -1: poisson", "1", kAuto, 10,
+     kAuto, kRun | kCell | kUnlessGiven, 1, nullptr},
+    {"anisotropy_shear", "shear modulus along the axis; auto, -1: that of young and poisson", "Pa", kAuto,
+     1e13, kAuto, kRun | kCell | kUnlessGiven, 1, nullptr},
+    {"anisotropy_axis", "axis of the anisotropy; its length does not matter", "1", -1e6, 1e6, 1, kRun | kCell,
+     3, nullptr},
+};
+
+void complain(const dfm_host *h, const char *what) { model::complain(h, kId, what); }
+
+namespace {
+
+bool check_params(const dfm_host *h, const double *values) {
+  if (!model::in_range(h, kId, kParams, kParamCount, values)) return false;
+  const double *a = values + kAxis;
+  if (a[0] != 0 || a[1] != 0 || a[2] != 0) return true;
+  complain(h, "parameter anisotropy_axis is zero; give a direction");
+  return false;
+}
+
+dfm_status create(const dfm_host *h, const dfm_mesh *m, void **self) {
+  *self = nullptr;
+  return check_params(h, m->params) ? model::create<Body>(h, m, kId, self) : DFM_E_ARG;
+}
+
+dfm_status set_params(void *self, const double *params) {
+  Body *body = static_cast<Body *>(self);
+  if (!check_params(body->host, params)) return DFM_E_ARG;
+  try {
+    body->apply_params(params);
+  } catch (const model::Refused &) {
+    return DFM_E_ARG;
+  } catch (...) {
+    return DFM_E_NOMEM;
+  }
+  return DFM_OK;
+}
+
+dfm_status add_forces(void *self, const dfm_kin *k, double *f) {
+  static_cast<Body *>(self)->add_forces(*k, f);
+  return DFM_OK;
+}
+
+dfm_status bound(void *self, const dfm_kin *k, double *ksum, double *csum, double *) {
+  static_cast<Body *>(self)->bound(*k, ksum, csum);
+  return DFM_OK;
+}
+
+dfm_status energy(void *self, const dfm_kin *k, double *joule) {
+  *joule = static_cast<Body *>(self)->energy(*k);
+  return DFM_OK;
+}
+
+dfm_status cell_energy(void *self, const dfm_kin *k, double *density) {
+  static_cast<Body *>(self)->cell_energy(*k, density);
+  return DFM_OK;
+}
+
+const char *const *active_effects(const void *self) {
+  return static_cast<const Body *>(self)->active_effects;
+}
+
+const char *idle(const void *self, uint32_t row) {
+  return row < kParamCount ? static_cast<const Body *>(self)->idle(Param(row)) : nullptr;
+}
+
+const dfm_cell_energy kCellEnergy = {sizeof(dfm_cell_energy), 0, cell_energy};
+const dfm_effects kActiveEffects = {sizeof(dfm_effects), 0, active_effects};
+const dfm_idle kIdle = {sizeof(dfm_idle), 0, idle};
+
+const void *extension(const void *, const char *id) {
+  if (!strcmp(id, DFM_EXT_CELL_ENERGY)) return &kCellEnergy;
+  if (!strcmp(id, DFM_EXT_EFFECTS)) return &kActiveEffects;
+  if (!strcmp(id, DFM_EXT_IDLE)) return &kIdle;
+  return nullptr;
+}
+
+const char *const kEffects[] = {"volume", "damping", "large_rotation", "anisotropy", nullptr};
+
+const dfm_model kModel = {sizeof(dfm_model),
+                          DFM_CAP_ENERGY | DFM_CAP_DAMPING | DFM_CAP_ROTATION_INVARIANT,
+                          DFM_CELL_TET,
+                          0,
+                          nullptr,
+                          create,
+                          model::destroy<Body>,
+                          set_params,
+                          nullptr,
+                          add_forces,
+                          bound,
+                          energy,
+                          nullptr,
+                          nullptr,
+                          extension};
+
+const dfm_type kType = {sizeof(dfm_type),
+                        DFM_KIND_MODEL,
+                        kId,
+                        "corotational finite elements",
+                        "0.1.0",
+                        "MIT",
+                        "Zerbato 2010, (2.1)-(2.13) corrected; Mueller and Gross 2004, Interactive virtual "
+                        "materials; Horn 1987 for the rotation",
+                        kParams,
+                        kParamCount,
+                        sizeof(dfm_param),
+                        kEffects,
+                        &kModel};
+
+const dfm_type *const kTypes[] = {&kType};
+const dfm_plugin kPlugin = {sizeof(dfm_plugin), DFM_ABI, DFM_ABI_DRAFT, 1, kTypes, nullptr};
+
+}  // namespace
+}  // namespace corot
+
+extern "C" DFM_EXPORT const dfm_plugin *dfm_plugin_entry(const dfm_host *host, uint32_t, uint32_t) {
+  if (DFM_ABI_OK(host)) return &corot::kPlugin;
+  corot::complain(host, "built for another draft of the plugin ABI: build it against this library's header");
+  return nullptr;
+}

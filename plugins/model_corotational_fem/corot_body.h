@@ -1,0 +1,136 @@
+// A corotational body: the cells of a mesh, cut into blocks that fit the first-level cache, and the ops on
+// them.
+#pragma once
+#include <deform/plugin.h>
+
+#include <algorithm>
+#include <cstdint>
+
+#include "../model_common/buffer.h"
+#include "../model_common/material.h"
+#include "../model_common/partition.h"
+#include "../model_common/tetrahedron.h"
+#include "corot_kernel.h"
+
+namespace corot {
+
+using model::Buffer;
+
+// Rows of the parameter table; a row's value begins at its number, the last row is three wide.
+enum Param : uint32_t {
+  kYoung,
+  kPoisson,
+  kDampingStiffness,
+  kDampingMass,
+  kRotation,
+  kYoungAlong,
+  kPoissonAlong,
+  kShearAlong,
+  kAxis,
+  kParamCount,
+  kValueCount = kAxis + 3
+};
+enum RotationBy : uint32_t { kPolar, kSvd, kQr };
+extern const dfm_param kParams[kParamCount];
+constexpr double kAuto = -1;  // of the constants along the axis: as without an axis
+void complain(const dfm_host *h, const char *what);
+
+struct Body {
+  static constexpr uint32_t kNone = ~0u;
+  // From this size on the blocks go through the host's parallel_for; below it waking a worker costs more than
+  // it brings. Adding up the blocks is a twentieth of the work.
+  static constexpr uint32_t kParallelCells = 3000, kParallelMergeCells = 100000;
+
+  const dfm_host *host = nullptr;
+  const Kernels *kernels = nullptr;
+  uint32_t npoint = 0, ncell = 0, nblock = 0;
+  // blocks per piece of a pass at least; points of the largest block with its halo
+  uint32_t grain = 1, largest = 0;
+  double params[kValueCount] = {};
+  Buffer<double> field[kParamCount];  // [ncell,width] values by cell in place of a parameter's; empty without
+
+  // In the host's order.
+  Buffer<double> mass, volume;    // [npoint] kg, [ncell] m^3
+  Buffer<uint32_t> cells;         // [ncell,4], right-handed
+  Buffer<double> height_inverse;  // [ncell,4] 1/m, |g_a|
+  Buffer<double> point_drag;      // [npoint] N s/m; empty without drag
+  // [npoint] row sums at rest of stiffness and dampers, and their weights; [ncell,4] row of a cell per
+  // stiffness against turning
+  Buffer<double> rest_rows, damp_rows, weight, twist_share;
+  const char *active_effects[8] = {};  // of the present parameters, NULL-terminated
+
+  // In block order.
+  Buffer<Block> block;
+  Buffer<uint32_t> point;
+  Buffer<uint32_t> cell_id;   // [groups,8], kNone for one that fills up
+  Buffer<uint32_t> place_of;  // [ncell] where a cell stands in that order
+  Buffer<double> p, f, damp, value, damp_value;
+  Buffer<Group> group;
+  Buffer<FibreGroup> fibre;
+  Buffer<Merge> merge;                       // by owning block
+  Buffer<uint32_t> merge_begin, slot_begin;  // [nblock + 1]
+
+  uint32_t choice(Param which) const { return uint32_t(params[which]); }
+  double at(Param which, uint32_t c) const { return field[which].empty() ? params[which] : field[which][c]; }
+  const double *axis_of(uint32_t c) const {
+    return field[kAxis].empty() ? params + kAxis : field[kAxis].data() + 3 * size_t(c);
+  }
+  double largest_of(Param which) const;
+  bool given(Param which) const;  // auto in no cell
+  bool has_fibres() const { return given(kYoungAlong) || given(kPoissonAlong) || given(kShearAlong); }
+  bool has_dampers() const { return largest_of(kDampingStiffness) > 0; }
+  size_t lanes() const { return size_t(groups) * kGroup; }
+  uint32_t groups = 0;
+
+  // why a parameter does nothing beside the present others; NULL where it does
+  const char *idle(Param which) const;
+  void create(const dfm_host *h, const dfm_mesh &m);
+  void apply_params(const double *values);
+  void add_forces(const dfm_kin &k, double *f_out);
+  void bound(const dfm_kin &k, double *ksum, double *csum);
+  double energy(const dfm_kin &k);
+  void cell_energy(const dfm_kin &k, double *out);
+
+  // Block n with the packed points of the piece that begins at block `begin`: a piece uses one place for all
+  // of its blocks, which therefore stays in the cache however large the body is. Pieces begin at multiples of
+  // the grain, so no two share a place.
+  Block lend(uint32_t n, uint32_t begin) {
+    Block b = block[n];
+    b.p = p.data() + 8 * size_t(largest) * (begin / grain);
+    return b;
+  }
+
+ private:
+  void take_mesh(const dfm_mesh &m);
+  void take_fields(const dfm_mesh &m);
+  struct Layout;
+  void build_blocks(const dfm_mesh &m);
+  void order_cells(Layout &l) const;
+  uint32_t find_halo(Layout &l, uint32_t b) const;
+  void fill_groups(const Layout &l, const dfm_mesh &m, uint32_t b, uint32_t groups_at);
+  void build_merge(const Layout &l);
+  // what new parameters need, taken before anything changes: arrays to swap in, and sums on the way
+  struct Room {
+    Buffer<FibreGroup> fibre;
+    Buffer<double> damp, damp_value, point_drag, around, next, blocks;
+  };
+  void make_room(Room &room) const;
+  model::Fibre fibre_at(uint32_t c) const;
+  void fill_material(Room &room);
+  void fill_drag(Room &room);
+  void find_effects();
+  void find_rows(Room &room);
+  void for_each_block(uint32_t least_cells, void (*fn)(void *, uint32_t, uint32_t), void *user);
+};
+
+// What the passes over blocks hand on to their pieces.
+struct Call {
+  Body *body;
+  const dfm_kin *k;
+  double *f;
+};
+
+// Rest gradients of a cell of the body.
+model::Tetrahedron shape_of(const double *rest, const uint32_t *cell);
+
+}  // namespace corot

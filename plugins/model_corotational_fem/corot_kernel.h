@@ -1,0 +1,67 @@
+// Kernels of the corotational model, chosen at run time by instruction set. All of them do the same IEEE
+// operations in the same order, four cells at a time, so that the instruction set never shows in a result:
+//   gradient   F = (e1 (x) g1 + e2 (x) g2) + e3 (x) g3, e_k the edges from corner 0, g_k the rest gradients
+//   rotation   closed form from the trace of the stretch, see model_common/polar_lanes.h; cells for which that is not
+//              accurate go to Block::rotate one by one
+//   forces     f_k = -P g_k, f_0 = -((f_1 + f_2) + f_3), P V at once: 2 mu and lambda hold the volume
+// Corners are added cell after cell in the order 1 2 3 0. Plain data only: kernel files see no STL and
+// nothing with external inline code.
+#pragma once
+#include <stdint.h>
+
+namespace corot {
+
+constexpr uint32_t kGroup = 8;  // cells side by side in memory, one per lane of the widest vector
+
+struct Group {
+  double g[9][kGroup];                 // g[3 k + a]: component a of the gradient of corner k + 1 at rest
+  double mu2[kGroup], lambda[kGroup];  // 2 mu V, lambda V; 0 for a cell that fills up
+  uint32_t p[kGroup][4];               // local points
+};
+// Transverse isotropy: unit axis at rest and the constants of model_common/material.h times the volume.
+struct FibreGroup {
+  double axis[3][kGroup];
+  double alpha[kGroup], beta[kGroup], shear[kGroup];  // shear: 2 (mu_along - mu)
+  double most[kGroup];                                // largest eigenvalue of the elasticity, or more
+};
+
+// The rotation of a cell from its gradient, both row-major.
+using Rotate = void (*)(const double *gradient, double *rotation);
+
+// One block of the body: points it owns, then the points of other blocks that its cells touch (halo).
+struct Block {
+  uint32_t owned, local, groups, rotate_all;  // rotate_all: no closed form, every cell goes to `rotate`
+  const uint32_t *point;                      // [local] number of the point in the host's arrays
+  double *p;  // [local,8] x y z 0 vx vy vz 0: a point with its velocity is one cache line; lent by the pass
+  double *f;  // [local,4]
+  const Group *group;
+  const FibreGroup *fibre;  // NULL: isotropic
+  const double *damp;       // [groups,8] s; NULL: none
+  double *value;            // [groups,8] what `energies` and `twists` write
+  double *damp_value;       // [groups,8] what `twists` writes of dampers; NULL without
+  Rotate rotate;
+};
+
+// Slots of all blocks' f: a halo point of another block, and the point that it stands for.
+struct Merge { uint32_t from, to; };
+
+struct Kernels {
+  // Copies x (and v, unless NULL) of the block's points in and clears f.
+  void (*load)(const Block &b, const double *x, const double *v, uint32_t stride);
+  void (*forces)(const Block &b);
+  void (*energies)(const Block &b);  // J per cell
+  // Stiffness of each cell, and of its damper, beyond that at rest; see corot_bound.cpp.
+  void (*twists)(const Block &b);
+  void (*merge)(double *f, const Merge *merge, uint32_t n);
+  void (*store)(const Block &b, double *f, uint32_t stride);  // adds the owned points' forces to the host's
+};
+
+// The sum of the two smaller stretches of a cell, over the trace of all three, from which on the bound counts
+// it: where it vanishes two rotations are equally near and the energy has a kink.
+constexpr double kLeastPair = 0.1;
+
+const Kernels *kernels_sse2();
+const Kernels *kernels_avx2();
+const Kernels *kernels_avx512();
+
+}  // namespace corot

@@ -1,0 +1,386 @@
+// The kernels on vectors of four doubles, written once for the files that bring `v4` and its operations
+// (model_common/lanes_avx.h, lanes_sse2.h). Everything here has internal linkage.
+#pragma once
+#include <stddef.h>
+
+#include "../model_common/polar_lanes.h"
+#include "corot_kernel.h"
+
+namespace corot {
+namespace {
+
+using namespace lanes;
+
+DEFORM_INLINE v4 point4(const Block &b, uint32_t n) { return load4(b.p + 8 * size_t(n)); }
+DEFORM_INLINE v4 velocity4(const Block &b, uint32_t n) { return load4(b.p + 8 * size_t(n) + 4); }
+DEFORM_INLINE void add_to(const Block &b, uint32_t n, v4 a) {
+  double *f = b.f + 4 * size_t(n);
+  store4(f, load4(f) + a);
+}
+
+static inline void load_block(const Block &b, const double *x, const double *v, uint32_t stride) {
+  for (uint32_t n = 0; n < b.local; ++n) {
+    const size_t at = size_t(stride) * b.point[n];
+    store4(b.p + 8 * size_t(n), load_xyz(x + at));
+    if (v) store4(b.p + 8 * size_t(n) + 4, load_xyz(v + at));
+    store4(b.f + 4 * size_t(n), splat(0));
+  }
+}
+
+// Four cells of a group, from lane `at` on.
+struct Four {
+  const Group *group;
+  uint32_t at;
+};
+DEFORM_INLINE const uint32_t *cell(const Four &q, int k) { return q.group->p[q.at + uint32_t(k)]; }
+DEFORM_INLINE v4 rest4(const Four &q, int k) { return load4(q.group->g[k] + q.at); }
+
+// f += e (x) g for the edges from corner 0 to corner n; kOffset 0: positions, 4: velocities.
+template <int kOffset>
+DEFORM_INLINE void add_edges(const Block &b, const Four &q, int n, v4 o0, v4 o1, v4 o2, v4 o3, v4 *f) {
+  const auto corner = [&](int k) __attribute__((always_inline)) {
+    return load4(b.p + 8 * size_t(cell(q, k)[n]) + kOffset);
+  };
+  v4 x = corner(0) - o0, y = corner(1) - o1, z = corner(2) - o2, unused = corner(3) - o3;
+  transpose(x, y, z, unused);
+  for (int a = 0; a < 3; ++a) {
+    const v4 g = rest4(q, 3 * (n - 1) + a);
+    f[a] = n == 1 ? x * g : f[a] + x * g;
+    f[3 + a] = n == 1 ? y * g : f[3 + a] + y * g;
+    f[6 + a] = n == 1 ? z * g : f[6 + a] + z * g;
+  }
+}
+template <int kOffset>
+DEFORM_INLINE void gradient(const Block &b, const Four &q, v4 *f) {
+  const auto corner = [&](int k) __attribute__((always_inline)) {
+    return load4(b.p + 8 * size_t(cell(q, k)[0]) + kOffset);
+  };
+  const v4 o0 = corner(0), o1 = corner(1), o2 = corner(2), o3 = corner(3);
+  add_edges<kOffset>(b, q, 1, o0, o1, o2, o3, f);
+  add_edges<kOffset>(b, q, 2, o0, o1, o2, o3, f);
+  add_edges<kOffset>(b, q, 3, o0, o1, o2, o3, f);
+}
+
+static __attribute__((noinline)) void rotate_lanes(Rotate rotate, uint32_t which, const v4 *f, v4 *r) {
+  alignas(32) double from[9][4], to[9][4];
+  for (int k = 0; k < 9; ++k) {
+    store4(from[k], f[k]);
+    store4(to[k], r[k]);
+  }
+  for (int lane = 0; lane < 4; ++lane) {
+    if (!(which >> lane & 1)) continue;
+    double one[9], turned[9];
+    for (int k = 0; k < 9; ++k) one[k] = from[k][lane];
+    rotate(one, turned);
+    for (int k = 0; k < 9; ++k) to[k][lane] = turned[k];
+  }
+  for (int k = 0; k < 9; ++k) r[k] = load4(to[k]);
+}
+
+struct Wide {
+  typedef v4 V;
+  static inline __attribute__((always_inline)) v4 splat(double a) { return lanes::splat(a); }
+  static inline __attribute__((always_inline)) v4 root(v4 a) { return sqrt4(a); }
+};
+DEFORM_INLINE void rotation_of(const Block &b, const v4 *f, v4 *r) {
+  model::Polar<Wide> o;
+  model::polar(f, r, o);
+  const uint32_t good = mask_above(o.divisor, splat(model::kPolarDivisor) * o.cube) &
+                        mask_above(splat(model::kPolarStep) * o.trace, abs4(o.step)) &
+                        mask_above(o.n, splat(model::kPolarLeastSquare));
+  const uint32_t bad = b.rotate_all ? 15u : 15u & ~good;
+  if (__builtin_expect(bad != 0, 0)) rotate_lanes(b.rotate, bad, f, r);
+}
+
+// Symmetric part of R^T F less the identity: xx yy zz xy yz zx.
+DEFORM_INLINE void strain_of(const v4 *r, const v4 *f, v4 *e) {
+  const auto entry = [&](int i, int j) __attribute__((always_inline)) {
+    return (r[i] * f[j] + r[3 + i] * f[3 + j]) + r[6 + i] * f[6 + j];
+  };
+  const v4 one = splat(1), half = splat(0.5);
+  e[0] = entry(0, 0) - one;
+  e[1] = entry(1, 1) - one;
+  e[2] = entry(2, 2) - one;
+  e[3] = half * (entry(0, 1) + entry(1, 0));
+  e[4] = half * (entry(1, 2) + entry(2, 1));
+  e[5] = half * (entry(2, 0) + entry(0, 2));
+}
+
+struct Fibres { v4 a[3], alpha, beta, shear; };
+DEFORM_INLINE void load_fibres(const FibreGroup &g, uint32_t at, Fibres &out) {
+  for (int k = 0; k < 3; ++k) out.a[k] = load4(g.axis[k] + at);
+  out.alpha = load4(g.alpha + at);
+  out.beta = load4(g.beta + at);
+  out.shear = load4(g.shear + at);
+}
+// e a, and a.e a
+DEFORM_INLINE v4 along(const v4 *e, const v4 *a, v4 *ea) {
+  ea[0] = (e[0] * a[0] + e[3] * a[1]) + e[5] * a[2];
+  ea[1] = (e[3] * a[0] + e[1] * a[1]) + e[4] * a[2];
+  ea[2] = (e[5] * a[0] + e[4] * a[1]) + e[2] * a[2];
+  return (a[0] * ea[0] + a[1] * ea[1]) + a[2] * ea[2];
+}
+
+// Stresses times volume. The isotropic one has the axes of the strain.
+DEFORM_INLINE void stress_of(const Four &q, const v4 *e, v4 *s) {
+  const v4 mu2 = load4(q.group->mu2 + q.at);
+  const v4 pressure = load4(q.group->lambda + q.at) * ((e[0] + e[1]) + e[2]);
+  for (int k = 0; k < 6; ++k) s[k] = k < 3 ? mu2 * e[k] + pressure : mu2 * e[k];
+}
+DEFORM_INLINE void fibre_stress(const FibreGroup &g, uint32_t at, const v4 *e, v4 *s) {
+  Fibres c;
+  load_fibres(g, at, c);
+  v4 ea[3], pull[3];
+  const v4 t = (e[0] + e[1]) + e[2], q = along(e, c.a, ea), more = c.alpha * q,
+           both = c.alpha * t + c.beta * q;
+  for (int k = 0; k < 3; ++k) pull[k] = splat(0.5) * (both * c.a[k]) + c.shear * ea[k];
+  const auto pair = [&](int i, int j)
+                        __attribute__((always_inline)) { return c.a[i] * pull[j] + pull[i] * c.a[j]; };
+  s[0] = pair(0, 0) + more;
+  s[1] = pair(1, 1) + more;
+  s[2] = pair(2, 2) + more;
+  s[3] = pair(0, 1);
+  s[4] = pair(1, 2);
+  s[5] = pair(2, 0);
+}
+
+DEFORM_INLINE void add_fibre_stress(const FibreGroup &g, uint32_t at, const v4 *e, v4 *s) {
+  v4 more[6];
+  fibre_stress(g, at, e, more);
+  for (int k = 0; k < 6; ++k) s[k] = s[k] + more[k];
+}
+
+// -P g of corner k + 1 of the four cells, added there and handed back.
+DEFORM_INLINE void spread(const Block &b, const Four &q, int k, const v4 *stress, v4 *out) {
+  const v4 gx = rest4(q, 3 * k), gy = rest4(q, 3 * k + 1), gz = rest4(q, 3 * k + 2);
+  for (int i = 0; i < 3; ++i)
+    out[i] = splat(0) - ((stress[3 * i] * gx + stress[3 * i + 1] * gy) + stress[3 * i + 2] * gz);
+  out[3] = splat(0);
+  transpose(out[0], out[1], out[2], out[3]);
+  for (int c = 0; c < 4; ++c) add_to(b, cell(q, c)[k + 1], out[c]);
+}
+
+// P = R s
+DEFORM_INLINE void turn(const v4 *r, const v4 *s, v4 *p) {
+  for (int i = 0; i < 3; ++i)
+    for (int j = 0; j < 3; ++j)
+      p[3 * i + j] = (r[3 * i] * s[j] + r[3 * i + 1] * s[3 + j]) + r[3 * i + 2] * s[6 + j];
+}
+DEFORM_INLINE void full(const v4 *s, v4 *out) {
+  out[0] = s[0];
+  out[4] = s[1];
+  out[8] = s[2];
+  out[1] = out[3] = s[3];
+  out[5] = out[7] = s[4];
+  out[2] = out[6] = s[5];
+}
+DEFORM_INLINE void times(const v4 *m, const v4 *x, v4 *out) {
+  out[0] = (m[0] * x[0] + m[3] * x[1]) + m[5] * x[2];
+  out[1] = (m[3] * x[0] + m[1] * x[1]) + m[4] * x[2];
+  out[2] = (m[5] * x[0] + m[4] * x[1]) + m[2] * x[2];
+}
+
+// The frame turns with the material, R^T dR = [w]x with (t I - S) w = axial(R^T dF), t = tr S. The inverse
+// of that matrix is adjoint / det. Where two stretches cancel det vanishes, and what needs the inverse
+// fades with share = det / max(det, kLeastPair t^3): `inverse` is share times the inverse, no eigenvalue
+// above 1/(kLeastPair t).
+struct Turning { v4 inverse[6], share; };
+DEFORM_INLINE void turning(const v4 *s, Turning &out) {
+  const v4 t = (s[0] + s[1]) + s[2], a = t - s[0], b = t - s[1], c = t - s[2];
+  const v4 xx = b * c - s[4] * s[4], xy = s[5] * s[4] + s[3] * c, zx = s[3] * s[4] + b * s[5];
+  const v4 det = (a * xx - s[3] * xy) - s[5] * zx;
+  const v4 over = splat(1) / max4(det, splat(kLeastPair) * ((t * t) * t) + splat(1e-300));
+  out.share = det * over;
+  out.inverse[0] = over * xx;
+  out.inverse[1] = over * (a * c - s[5] * s[5]);
+  out.inverse[2] = over * (a * b - s[3] * s[3]);
+  out.inverse[3] = over * xy;
+  out.inverse[4] = over * (a * s[4] + s[3] * s[5]);
+  out.inverse[5] = over * zx;
+}
+
+// share dS/dt: the symmetric part of A - [w]x S with A = R^T dF/dt.
+DEFORM_INLINE void strain_rate(const v4 *r, const v4 *rate, const v4 *s, const Turning &turn_by, v4 *e) {
+  v4 a[9], axial[3], w[3];
+  for (int i = 0; i < 3; ++i)
+    for (int j = 0; j < 3; ++j)
+      a[3 * i + j] = (r[i] * rate[j] + r[3 + i] * rate[3 + j]) + r[6 + i] * rate[6 + j];
+  axial[0] = a[7] - a[5];
+  axial[1] = a[2] - a[6];
+  axial[2] = a[3] - a[1];
+  times(turn_by.inverse, axial, w);
+  const v4 half = splat(0.5), xy = w[2] * s[3], yz = w[0] * s[4], zx = w[1] * s[5], share = turn_by.share;
+  e[0] = share * a[0] - (zx - xy);
+  e[1] = share * a[4] - (xy - yz);
+  e[2] = share * a[8] - (yz - zx);
+  const v4 w01 = w[2] * (s[0] - s[1]) + (w[1] * s[4] - w[0] * s[5]);
+  const v4 w12 = w[0] * (s[1] - s[2]) + (w[2] * s[5] - w[1] * s[3]);
+  const v4 w20 = w[1] * (s[2] - s[0]) + (w[0] * s[3] - w[2] * s[4]);
+  e[3] = half * (share * (a[1] + a[3]) - w01);
+  e[4] = half * (share * (a[5] + a[7]) - w12);
+  e[5] = half * (share * (a[2] + a[6]) - w20);
+}
+
+// A stress whose axes are not those of S (fibres, dampers) works on dS as R (stress - [q]x) works on dF, (t
+// I - S) q = axial(stress S): the transpose of strain_rate. It leaves no torque. out += share (stress -
+// [q]x).
+DEFORM_INLINE void balance(const v4 *stress, const v4 *s, const Turning &turn_by, v4 *out) {
+  v4 axial[3], q[3], own[9];
+  axial[0] = ((stress[5] * s[3] + stress[4] * s[1]) + stress[2] * s[4]) -
+             ((stress[3] * s[5] + stress[1] * s[4]) + stress[4] * s[2]);
+  axial[1] = ((stress[0] * s[5] + stress[3] * s[4]) + stress[5] * s[2]) -
+             ((stress[5] * s[0] + stress[4] * s[3]) + stress[2] * s[5]);
+  axial[2] = ((stress[3] * s[0] + stress[1] * s[3]) + stress[4] * s[5]) -
+             ((stress[0] * s[3] + stress[3] * s[1]) + stress[5] * s[4]);
+  times(turn_by.inverse, axial, q);
+  full(stress, own);
+  for (int k = 0; k < 9; ++k) out[k] = out[k] + turn_by.share * own[k];
+  out[1] = out[1] + q[2];
+  out[3] = out[3] - q[2];
+  out[5] = out[5] + q[0];
+  out[7] = out[7] - q[0];
+  out[6] = out[6] + q[1];
+  out[2] = out[2] - q[1];
+}
+
+// What fibres and dampers add to the stress of a cell in its frame; f is lost.
+template <bool kFibre, bool kDamped>
+DEFORM_INLINE void add_others(const Block &b, uint32_t n, const Four &q, const v4 *r, const v4 *e, v4 *f,
+                              v4 *all) {
+  v4 s[6], other[6];
+  Turning turn_by;
+  for (int k = 0; k < 6; ++k) s[k] = k < 3 ? e[k] + splat(1) : e[k];
+  turning(s, turn_by);
+  if constexpr (kDamped) {
+    v4 rate[6];
+    gradient<4>(b, q, f);
+    strain_rate(r, f, s, turn_by, rate);
+    const v4 damp = load4(b.damp + size_t(kGroup) * n + q.at);
+    for (int k = 0; k < 6; ++k) rate[k] = damp * rate[k];
+    stress_of(q, rate, other);
+    for (int k = 0; k < 6; ++k) rate[k] = rate[k] + e[k];
+    if constexpr (kFibre) add_fibre_stress(b.fibre[n], q.at, rate, other);
+  } else {
+    fibre_stress(b.fibre[n], q.at, e, other);
+  }
+  balance(other, s, turn_by, all);
+}
+
+template <bool kFibre, bool kDamped>
+static inline void cell_forces(const Block &b) {
+  for (uint32_t n = 0; n < b.groups; ++n)
+    for (uint32_t at = 0; at < kGroup; at += 4) {
+      const Four q = {b.group + n, at};
+      v4 f[9], r[9], e[6], stress[6], all[9], p[9];
+      gradient<0>(b, q, f);
+      rotation_of(b, f, r);
+      strain_of(r, f, e);
+      stress_of(q, e, stress);
+      full(stress, all);
+      if constexpr (kFibre || kDamped) add_others<kFibre, kDamped>(b, n, q, r, e, f, all);
+      turn(r, all, p);
+      v4 sum[4], other[4];
+      spread(b, q, 0, p, sum);
+      for (int k = 1; k < 3; ++k) {
+        spread(b, q, k, p, other);
+        for (int c = 0; c < 4; ++c) sum[c] = sum[c] + other[c];
+      }
+      for (int c = 0; c < 4; ++c) add_to(b, cell(q, c)[0], splat(0) - sum[c]);
+    }
+}
+static inline void forces(const Block &b) {
+  if (b.fibre) return b.damp ? cell_forces<true, true>(b) : cell_forces<true, false>(b);
+  return b.damp ? cell_forces<false, true>(b) : cell_forces<false, false>(b);
+}
+
+template <bool kFibre>
+static inline void cell_energies(const Block &b) {
+  for (uint32_t n = 0; n < b.groups; ++n)
+    for (uint32_t at = 0; at < kGroup; at += 4) {
+      const Four q = {b.group + n, at};
+      v4 f[9], r[9], e[6], s[6];
+      gradient<0>(b, q, f);
+      rotation_of(b, f, r);
+      strain_of(r, f, e);
+      stress_of(q, e, s);
+      if constexpr (kFibre) add_fibre_stress(b.fibre[n], at, e, s);
+      const v4 own = (e[0] * s[0] + e[1] * s[1]) + e[2] * s[2];
+      const v4 mixed = (e[3] * s[3] + e[4] * s[4]) + e[5] * s[5];
+      store4(b.value + size_t(kGroup) * n + at, splat(0.5) * own + mixed);
+    }
+}
+static inline void energies(const Block &b) {
+  return b.fibre ? cell_energies<true>(b) : cell_energies<false>(b);
+}
+
+// What the rows of the bound count beyond the rest shape; corot_bound.cpp derives it. From the trace t of
+// the stretch and n = |F|^2: the mean stretch m = t/3 and the variance n/3 - m^2 enclose each stretch
+// within sqrt(2 variance) of m, the sum of two of them within 2 m -+ that, and the square of the difference
+// of two below 6 variances.
+template <bool kFibre>
+static inline void cell_twists(const Block &b) {
+  for (uint32_t n = 0; n < b.groups; ++n)
+    for (uint32_t at = 0; at < kGroup; at += 4) {
+      const Four q = {b.group + n, at};
+      v4 f[9], r[9];
+      gradient<0>(b, q, f);
+      rotation_of(b, f, r);
+      v4 square = f[0] * f[0], t = r[0] * f[0];
+      for (int k = 1; k < 9; ++k) {
+        square = square + f[k] * f[k];
+        t = t + r[k] * f[k];
+      }
+      const v4 third = splat(1.0 / 3), mean = third * t, zero = splat(0);
+      const v4 variance = max4(third * square - mean * mean, zero);
+      const v4 far = sqrt4(splat(2) * variance), most = splat(2) * mean + far;
+      const v4 least = max4(splat(2) * mean - far, splat(kLeastPair) * t) + splat(1e-300);
+      const v4 mu2 = load4(q.group->mu2 + at);
+      const v4 uneven = (splat(6) * variance) / (least * least);  // (s_i - s_j)^2 / (s_i + s_j)^2 at most
+      v4 twist;
+      if constexpr (kFibre) {
+        v4 e[6], stress[6];
+        strain_of(r, f, e);
+        stress_of(q, e, stress);
+        add_fibre_stress(b.fibre[n], at, e, stress);
+        const v4 own = (stress[0] * stress[0] + stress[1] * stress[1]) + stress[2] * stress[2];
+        const v4 mixed = (stress[3] * stress[3] + stress[4] * stress[4]) + stress[5] * stress[5];
+        const v4 size = sqrt4(own + splat(2) * mixed), longest = mean + far;
+        const v4 turn_by = (splat(6) * sqrt4(splat(1) + uneven)) / least +
+                           (splat(6) * (longest * longest)) / ((least * least) * least);
+        twist = load4(b.fibre[n].most + at) * (splat(1.4143) * sqrt4(uneven) + splat(0.5) * uneven) +
+                size * turn_by;
+      } else {
+        const v4 c = load4(q.group->lambda + at) * (t - splat(3)) - mu2;
+        twist = splat(0.5) *
+                max4(mu2 + (splat(2) * c) / choose_above(c, zero, least, most + splat(1e-300)), zero);
+      }
+      const size_t place = size_t(kGroup) * n + at;
+      store4(b.value + place, twist);
+      if (!b.damp) continue;
+      const v4 stiff = kFibre ? load4(b.fibre[n].most + at) : mu2;
+      store4(b.damp_value + place,
+             load4(b.damp + place) *
+                 (stiff * (kFibre ? splat(1.4143) * sqrt4(uneven) + splat(0.5) * uneven : uneven)));
+    }
+}
+static inline void twists(const Block &b) { return b.fibre ? cell_twists<true>(b) : cell_twists<false>(b); }
+
+static inline void merge_halo(double *f, const Merge *merge, uint32_t n) {
+  for (uint32_t m = 0; m < n; ++m) {
+    double *to = f + 4 * size_t(merge[m].to);
+    store4(to, load4(to) + load4(f + 4 * size_t(merge[m].from)));
+  }
+}
+
+static inline void add_to_host(const Block &b, double *f, uint32_t stride) {
+  for (uint32_t n = 0; n < b.owned; ++n) {
+    double *out = f + size_t(stride) * b.point[n];
+    const double *sum = b.f + 4 * size_t(n);
+    for (int k = 0; k < 3; ++k) out[k] += sum[k];
+  }
+}
+
+constexpr Kernels kKernels = {load_block, forces, energies, twists, merge_halo, add_to_host};
+
+}  // namespace
+}  // namespace corot

@@ -1,0 +1,181 @@
+// From parameters and fields by cell to what the passes read. What nothing calls for stays empty.
+#include <stdio.h>
+
+#include <cstring>
+
+#include "../model_common/entry.h"
+#include "../model_common/rotation.h"
+#include "corot_body.h"
+
+namespace corot {
+
+namespace {
+
+[[noreturn]] void refuse_field(const dfm_host *host, const dfm_param &row, uint32_t cell, double value) {
+  char text[200];
+  snprintf(text, sizeof text,
+           "field %s of cell %u is %g; %g .. %g %s is expected, and an axis that is not zero", row.key, cell,
+           value, row.min, row.max, row.unit);
+  complain(host, text);
+  throw model::Refused{};
+}
+
+Rotate rotate_by(uint32_t choice) {
+  return choice == kQr    ? model::rotation::gram_schmidt
+         : choice == kSvd ? model::rotation::by_singular_values
+                          : model::rotation::nearest;
+}
+
+}  // namespace
+
+void Body::take_fields(const dfm_mesh &m) {
+  for (uint32_t k = 0; m.field_keys && m.field_keys[k]; ++k)
+    for (uint32_t r = 0; r < kParamCount; ++r) {
+      const dfm_param &known = kParams[r];
+      if (!(known.flags & DFM_PARAM_PER_CELL) || std::strcmp(m.field_keys[k], known.key)) continue;
+      const double *values = m.fields[k];
+      for (uint32_t c = 0; c < ncell; ++c) {
+        double square = 0;
+        for (uint32_t w = 0; w < known.width; ++w) {
+          const double x = values[size_t(known.width) * c + w];
+          if (!(x >= known.min && x <= known.max)) refuse_field(host, known, c, x);
+          square += x * x;
+        }
+        if (r == kAxis && !(square > 0)) refuse_field(host, known, c, 0);
+      }
+      field[r].create(host, size_t(known.width) * ncell);
+      std::copy(values, values + size_t(known.width) * ncell, field[r].data());
+    }
+}
+
+double Body::largest_of(Param which) const {
+  return field[which].empty() ? params[which]
+                              : *std::max_element(field[which].data(), field[which].data() + ncell);
+}
+
+bool Body::given(Param which) const { return largest_of(which) != kAuto; }
+
+// Constants of a cell as a solid with an axis: what is left to `auto` is as without one. Refuses constants
+// without a positive energy.
+model::Fibre Body::fibre_at(uint32_t c) const {
+  const auto or_else = [&](Param which, double otherwise) {
+    const double x = at(which, c);
+    return x == kAuto ? otherwise : x;
+  };
+  const double young = at(kYoung, c), poisson = at(kPoisson, c);
+  const model::Transverse t = {young, poisson, or_else(kYoungAlong, young), or_else(kPoissonAlong, poisson),
+                               or_else(kShearAlong, model::lame_of(young, poisson).mu)};
+  model::Fibre out;
+  if (model::fibre_of(t, out)) return out;
+  char text[240];
+  snprintf(
+      text, sizeof text,
+      "anisotropy_young %g, anisotropy_poisson %g and anisotropy_shear %g with young %g and poisson %g have "
+      "no positive energy in cell %u; raise anisotropy_young or lower anisotropy_poisson",
+      t.young_along, t.poisson_along, t.shear_along, young, poisson, c);
+  complain(host, text);
+  throw model::Refused{};
+}
+
+void Body::make_room(Room &room) const {
+  if (has_fibres()) room.fibre.create(host, groups);
+  if (has_dampers()) {
+    room.damp.create(host, lanes());
+    room.damp_value.create(host, lanes());
+  }
+  if (largest_of(kDampingMass) > 0) {
+    room.point_drag.create(host, npoint);
+    room.around.create(host, npoint);
+  }
+  room.next.create(host, npoint);
+  room.blocks.create(host, 10 * size_t(ncell));
+  for (uint32_t c = 0; has_fibres() && c < ncell; ++c) (void)fibre_at(c);
+}
+
+void Body::fill_material(Room &room) {
+  fibre.swap(room.fibre);
+  damp.swap(room.damp);
+  damp_value.swap(room.damp_value);
+  for (size_t n = 0; n < lanes(); ++n) {
+    Group &g = group[n / kGroup];
+    const uint32_t lane = uint32_t(n % kGroup), c = cell_id[n];
+    const double v = c == kNone ? 0 : volume[c];
+    const uint32_t like = c == kNone ? 0 : c;
+    if (!damp.empty()) damp[n] = c == kNone ? 0 : at(kDampingStiffness, c);
+    if (!has_fibres()) {
+      const model::Lame lame = model::lame_of(at(kYoung, like), at(kPoisson, like));
+      g.mu2[lane] = 2 * lame.mu * v;
+      g.lambda[lane] = lame.lambda * v;
+      continue;
+    }
+    const model::Fibre constants = fibre_at(like);
+    const double *a = axis_of(like);
+    const double length = __builtin_sqrt((a[0] * a[0] + a[1] * a[1]) + a[2] * a[2]);
+    FibreGroup &out = fibre[n / kGroup];
+    g.mu2[lane] = 2 * constants.mu * v;
+    g.lambda[lane] = constants.lambda * v;
+    for (int k = 0; k < 3; ++k) out.axis[k][lane] = a[k] / length;
+    out.alpha[lane] = constants.alpha * v;
+    out.beta[lane] = constants.beta * v;
+    out.shear[lane] = 2 * (constants.mu_along - constants.mu) * v;
+    out.most[lane] = model::largest_modulus(constants) * v;
+  }
+  size_t groups_at = 0;
+  for (uint32_t b = 0; b < nblock; ++b) {
+    block[b].fibre = fibre.empty() ? nullptr : fibre.data() + groups_at;
+    block[b].damp = damp.empty() ? nullptr : damp.data() + kGroup * groups_at;
+    block[b].damp_value = damp.empty() ? nullptr : damp_value.data() + kGroup * groups_at;
+    block[b].rotate = rotate_by(choice(kRotation));
+    block[b].rotate_all = choice(kRotation) != kPolar;
+    groups_at += block[b].groups;
+  }
+}
+
+// Drag by cell is taken over the volume around a point.
+void Body::fill_drag(Room &room) {
+  point_drag.swap(room.point_drag);
+  if (point_drag.empty()) return;
+  for (uint32_t c = 0; c < ncell; ++c)
+    for (int a = 0; a < 4; ++a) {
+      const uint32_t i = cells[4 * size_t(c) + a];
+      point_drag[i] += volume[c] * at(kDampingMass, c);
+      room.around[i] += volume[c];
+    }
+  for (uint32_t i = 0; i < npoint; ++i)
+    point_drag[i] = room.around[i] > 0 ? point_drag[i] / room.around[i] * mass[i] : 0;
+}
+
+void Body::find_effects() {
+  size_t n = 0;
+  active_effects[n++] = "volume";
+  if (has_dampers() || !point_drag.empty()) active_effects[n++] = "damping";
+  active_effects[n++] = "large_rotation";
+  if (has_fibres()) active_effects[n++] = "anisotropy";
+  active_effects[n] = nullptr;
+}
+
+const char *Body::idle(Param which) const {
+  if (which == kAxis && !has_fibres())
+    return "anisotropy_young, anisotropy_poisson and anisotropy_shear are all auto";
+  return nullptr;
+}
+
+// All or nothing: what may fail comes first.
+void Body::apply_params(const double *values) {
+  double before[kValueCount];
+  std::copy(params, params + kValueCount, before);
+  std::copy(values, values + kValueCount, params);
+  Room room;
+  try {
+    make_room(room);
+  } catch (...) {
+    std::copy(before, before + kValueCount, params);
+    throw;
+  }
+  fill_material(room);
+  fill_drag(room);
+  find_rows(room);
+  find_effects();
+}
+
+}  // namespace corot
