@@ -1,8 +1,8 @@
 // Kernels of the corotational model, chosen at run time by instruction set. All of them do the same IEEE
 // operations in the same order, four cells at a time, so that the instruction set never shows in a result:
 //   gradient   F = (e1 (x) g1 + e2 (x) g2) + e3 (x) g3, e_k the edges from corner 0, g_k the rest gradients
-//   rotation   closed form from the trace of the stretch, see model_common/polar_lanes.h; cells for which that is not
-//              accurate go to Block::rotate one by one
+//   rotation   closed form from the trace of the stretch, see model_common/polar_lanes.h; cells for which
+//              that is not accurate go to Block::rotate one by one
 //   forces     f_k = -P g_k, f_0 = -((f_1 + f_2) + f_3), P V at once: 2 mu and lambda hold the volume
 // Corners are added cell after cell in the order 1 2 3 0. Plain data only: kernel files see no STL and
 // nothing with external inline code.
