@@ -43,8 +43,6 @@ Found look(dfm_context *context) {
   return found;
 }
 
-const char *kind_name(uint32_t kind) { return kind == DFM_KIND_FRICTION ? "law" : "model"; }
-
 std::vector<std::string> effects(const dfm_type &type) {
   std::vector<std::string> out;
   for (const char *const *e = type.effects; e && *e; ++e) out.push_back(*e);
@@ -117,9 +115,11 @@ std::vector<std::string> names_of(const dfm_param &row) {
   return out;
 }
 
-// What a model says of itself, in words; none of a law.
+// What a model or a solver says of itself, in words; none of a law.
 std::vector<std::string> capabilities(const dfm_type &type) {
   std::vector<std::string> out;
+  if (type.kind == DFM_KIND_SOLVER && static_cast<const dfm_solver *>(type.ops)->flags & DFM_SOLVER_DIRECT)
+    out.push_back("direct");
   if (type.kind != DFM_KIND_MODEL) return out;
   const uint32_t caps = static_cast<const dfm_model *>(type.ops)->caps;
   const struct {
@@ -140,7 +140,7 @@ void print_info(const Type &t) {
       "%s %s, version %s\n  name     %s\n  licence  %s\n  source   %s\n  file     %s\n  effects  %s\n",
       kind_name(type.kind), type.id, type.version, type.name, type.licence, type.source,
       shown(t.file).c_str(), joined(effects(type)).c_str());
-  if (type.kind == DFM_KIND_MODEL) std::printf("  can      %s\n", joined(capabilities(type)).c_str());
+  if (type.kind != DFM_KIND_FRICTION) std::printf("  can      %s\n", joined(capabilities(type)).c_str());
   if (type.nparam)
     std::printf("\n  %-18s %-10s %-16s %-10s %s\n", "parameter", "default", "range", "unit", "meaning");
   for (uint32_t i = 0; i < type.nparam; ++i) {
@@ -180,7 +180,8 @@ std::string json_info(const Type &t) {
     rows.push_back(o.text());
   }
   JsonObject head = json_head(t);
-  if (t.type->kind == DFM_KIND_MODEL) head.add("capabilities", json_array(quoted_all(capabilities(*t.type))));
+  if (t.type->kind != DFM_KIND_FRICTION)
+    head.add("capabilities", json_array(quoted_all(capabilities(*t.type))));
   return head.add("licence", quoted(t.type->licence))
       .add("source", quoted(t.type->source))
       .add("params", json_array(rows))

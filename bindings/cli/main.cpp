@@ -138,6 +138,10 @@ const std::vector<std::string> &warnings() { return kept_warnings; }
 
 void keep_warning(const std::string &sentence) { kept_warnings.push_back(sentence); }
 
+const char *kind_name(uint32_t kind) {
+  return kind == DFM_KIND_FRICTION ? "law" : kind == DFM_KIND_SOLVER ? "solver" : "model";
+}
+
 void warn(const std::string &sentence) { on_log(nullptr, DFM_LOG_WARNING, sentence.c_str()); }
 
 dfm_context *make_context(const Globals &g) {

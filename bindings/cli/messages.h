@@ -23,6 +23,8 @@ inline void need(dfm_status status) {
 void warn(const std::string &sentence);          // to stderr, and kept for the summary
 void keep_warning(const std::string &sentence);  // for the summary only
 const std::vector<std::string> &warnings();
+// Of a type of a plugin: "law", "model", "solver".
+const char *kind_name(uint32_t kind);
 // The valid name nearest to a wrong one, for "did you mean"; empty when nothing is near.
 std::string nearest(const std::string &word, const std::vector<std::string> &valid);
 // Exit code of a run that a signal ended in order, as shells give it for SIGINT.

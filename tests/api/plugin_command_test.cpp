@@ -63,6 +63,16 @@ TEST(PluginCommand, InfoOfAModel_SaysWhatItCan) {
   EXPECT_FALSE(has(test::deform({"plugin", "info", "coulomb", "--json"}).out, "capabilities"));
 }
 
+TEST(PluginCommand, SolverOfAFile_IsShownAndChecked) {
+  const std::string file = std::string(DEFORM_BINARY_DIR) + "/lib/tiny/tiny_solver.so";
+  const auto r = test::deform({"plugin", "info", file});
+  EXPECT_EQ(r.exit_code, 0) << r.err;
+  EXPECT_TRUE(has(r.out, "solver org.tiny.cholesky") && has(r.out, "can      direct")) << r.out;
+  const auto checked = test::deform({"plugin", "check", file});
+  EXPECT_EQ(checked.exit_code, 0) << checked.out;
+  EXPECT_TRUE(has(checked.out, "rules for solvers are not available yet")) << checked.out;
+}
+
 TEST(PluginCommand, InfoOfAFile_LoadsIt) {
   const auto r = test::deform({"plugin", "info", std::string(DEFORM_PLUGIN_DIR) + "/friction_none.so"});
   EXPECT_EQ(r.exit_code, 0) << r.err;

@@ -64,7 +64,7 @@ TEST(Registry, BadSelfDescriptions_AreRefusedWithASentence) {
                                                          {"bad_double_key", "\"first\" stands twice"},
                                                          {"bad_foreign_slot", "slot 0"},
                                                          {"bad_no_eval", "eval"},
-                                                         {"bad_draft_kind", "kind 3 is unknown"}};
+                                                         {"bad_unknown_kind", "kind 4 is unknown"}};
   for (const auto &[file, part] : cases) {
     Context c;
     EXPECT_EQ(dfm_plugin_load(c.c, plugin(file).c_str()), DFM_E_UNSUPPORTED) << file;

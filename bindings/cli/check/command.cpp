@@ -32,7 +32,6 @@ struct Report {
 };
 
 const char *const kNotLoaded = "it does not load (V02 says why)";
-const char *kind_name(uint32_t kind) { return kind == DFM_KIND_FRICTION ? "law" : "model"; }
 
 // ---- a rule of this file, in this process -----------------------------------------------------------------
 
@@ -176,6 +175,8 @@ class Rules {
           one(report_.by_type.back(), *rule, static_cast<int>(t));
       if (!globals_.json && report_.types[t].kind == DFM_KIND_MODEL)
         std::printf("  M01 to M15, the rules for models, are not available yet\n");
+      if (!globals_.json && report_.types[t].kind == DFM_KIND_SOLVER)
+        std::printf("  rules for solvers are not available yet\n");
     }
     return std::move(report_);
   }

@@ -150,16 +150,19 @@ void Plugin::copy_type(const void *from, uint32_t number) {
   type.params = copy->rows.data();
   type.param_size = sizeof(dfm_param);
   const void *ops = type.ops;
-  const bool law = type.kind == DFM_KIND_FRICTION;
-  const bool known = law ? copy_struct(copy->friction, ops, offsetof(dfm_friction, eval) + sizeof(void *))
-                         : type.kind == DFM_KIND_MODEL &&
-                               copy_struct(copy->model, ops, offsetof(dfm_model, destroy) + sizeof(void *));
-  if (!known)
+  const void *full = nullptr;
+  const auto take = [&](uint32_t kind, auto &as, size_t head) {
+    if (type.kind == kind && copy_struct(as, ops, uint32_t(head + sizeof(void *)))) full = &as;
+  };
+  take(DFM_KIND_FRICTION, copy->friction, offsetof(dfm_friction, eval));
+  take(DFM_KIND_MODEL, copy->model, offsetof(dfm_model, destroy));
+  take(DFM_KIND_SOLVER, copy->solver, offsetof(dfm_solver, release));
+  if (!full)
     broken(
         "type #%u has kind %u and operations that do not fit it, so nothing can be called; set kind, and "
         "ops.size to the sizeof of its struct",
         number, type.kind);
-  type.ops = law ? static_cast<const void *>(&copy->friction) : &copy->model;
+  type.ops = full;
   types_.push_back(std::move(copy));
   view_.push_back(&types_.back()->type);
 }

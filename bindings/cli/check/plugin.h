@@ -48,6 +48,7 @@ class Plugin {
     std::vector<dfm_param> rows;
     dfm_friction friction{};
     dfm_model model{};
+    dfm_solver solver{};
   };
   void copy_type(const void *from, uint32_t number);
   Host host_;

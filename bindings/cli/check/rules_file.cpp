@@ -241,6 +241,10 @@ std::string metadata_complete(const Subject &subject) {
   effects_known(type);
   if (type.kind == DFM_KIND_FRICTION) {
     law_sound(type, law_of(subject));
+  } else if (type.kind == DFM_KIND_SOLVER) {
+    const auto &solver = *static_cast<const dfm_solver *>(type.ops);
+    if (!solver.analyse || !solver.factor || !solver.solve || !solver.release)
+      broken("a solver without analyse, factor, solve and release cannot be used; set all four");
   } else {
     const auto &model = *static_cast<const dfm_model *>(type.ops);
     if (!model.create || !model.destroy)

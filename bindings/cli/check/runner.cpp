@@ -169,7 +169,7 @@ Verdict run_here(const Rule &rule, const Subject &subject) {
     const uint32_t kind = subject.type ? subject.type->kind : uint32_t(DFM_KIND_FRICTION);
     const auto run = kind == DFM_KIND_FRICTION ? rule.law : rule.model;
     if (!run)
-      return {Result::skip, "comes with the rules for models (M01 to M15), which are not available yet"};
+      return {Result::skip, "comes with the rules for models and solvers, which are not available yet"};
     return {Result::pass, run(subject)};
   } catch (const Broken &b) {
     return {Result::fail, b.what()};

@@ -82,10 +82,10 @@ typedef struct dfm_type {
   uint32_t nparam, param_size;
   /* promises, NULL-terminated: "stiction" "stribeck" ... or "vendor.word" */
   const char *const *effects;
-  /* dfm_friction or dfm_model: grows independently of this head */
+  /* dfm_friction, dfm_model or dfm_solver: grows independently of this head */
   const void *ops;
 } dfm_type;
-enum { DFM_KIND_FRICTION = 1, DFM_KIND_MODEL = 2 };
+enum { DFM_KIND_FRICTION = 1, DFM_KIND_MODEL = 2, DFM_KIND_SOLVER = 3 };
 /* ---- friction law: a pure function of a batch; all memory belongs to the host --------------------- */
 enum { DFM_NEED_FN = 1, DFM_NEED_VT = 2, DFM_NEED_FT_STOP = 4, DFM_NEED_AREA = 8, DFM_NEED_DWELL = 16 };
 enum { DFM_FRIC_ISOTROPIC = 1, DFM_FRIC_PASSIVE = 2, DFM_FRIC_JACOBIAN = 4, DFM_FRIC_SET_VALUED = 8 };
@@ -247,6 +247,22 @@ typedef struct dfm_limited {
   /* [step] as counted by the last call of bound */
   uint32_t (*count)(const void *self);
 } dfm_limited;
+/* ---- linear solver for the implicit system: symmetric positive definite, 3x3 blocks --------------- */
+enum { DFM_SOLVER_DIRECT = 1 /* exact up to rounding, whatever x holds and the tolerance is */ };
+typedef struct dfm_solver {
+  uint32_t size, flags; /* DFM_SOLVER_* */
+  /* [setup] a matrix of n points: pairs ij[nb,2], i <= j, each pair once, each point with itself, in any
+   * order; borrowed during the call */
+  dfm_status (*analyse)(const dfm_host *h, uint32_t n, uint32_t nb, const uint32_t *ij, void **self);
+  /* [step] values blk[nb,9], row-major, in that order; block (j, i) is the transpose of (i, j); borrowed
+   * during the call. DFM_DISCARD: the matrix is not positive definite. */
+  dfm_status (*factor)(void *self, const double *blk);
+  /* [step] after a factor() that gave DFM_OK: b, x [nrhs,n,3], not overlapping; starts from x, ends where the
+   * residual is tolerance times that of x = 0. DFM_DISCARD: it did not get there, x is its best. */
+  dfm_status (*solve)(void *self, uint32_t nrhs, const double *b, double *x, double tolerance);
+  /* [setup] */
+  void (*release)(void *self);
+} dfm_solver;
 /* ---- entry: the one symbol a plugin exports ------------------------------------------------------- */
 /* until ABI 1 */
 #define DFM_ABI_OK(h) ((h)->abi == DFM_ABI && (DFM_ABI != 0u || (h)->abi_draft == DFM_ABI_DRAFT))

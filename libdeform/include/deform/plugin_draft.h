@@ -25,19 +25,6 @@ typedef struct dfm_spring_mask {
   dfm_status (*set)(void *self, uint32_t n, const uint32_t *edges, uint8_t on);
   dfm_status (*get)(const void *self, uint8_t *on); /* [any] on[nedge] 1, 0 */
 } dfm_spring_mask;
-/* ---- linear solver for the implicit system (SPD, 3x3 blocks) ---------------------------------------- */
-typedef struct dfm_solver {
-  uint32_t size, flags;
-  /* [setup] */
-  dfm_status (*analyse)(const dfm_host *h, uint32_t n, uint32_t nb, const uint32_t *ij, void **self);
-  /* [step] */
-  dfm_status (*factor)(void *self, const double *blk);
-  /* [step] */
-  dfm_status (*solve)(void *self, const double *rhs, double *x, double tolerance);
-  /* [setup] */
-  void (*release)(void *self);
-} dfm_solver;
-enum { DFM_KIND_SOLVER = 3 }; /* dfm_type.kind whose ops is a dfm_solver; the library refuses it as unknown */
 #ifdef __cplusplus
 }
 #endif

@@ -4,7 +4,7 @@
 #include <cmath>
 
 #include "dynamics/symplectic_euler.h"
-#include "math/make_solver.h"
+#include "plugin/plugin_solver.h"
 
 namespace dfm {
 namespace {
@@ -39,7 +39,7 @@ ImplicitPoints::ImplicitPoints(const Memory &memory, Phyxels &points, Surface &s
   stiffness_.create(model, points.n);
   solver_ =
       make_solver({options_.solver.c_str(), points.n, stiffness_.constant(), options_.solver_iterations},
-                  memory, options_.tasks);
+                  *static_cast<const dfm_context *>(model.host->ctx), memory, options_.tasks);
   solver_->analyse(pattern());
 }
 

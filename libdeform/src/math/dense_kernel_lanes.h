@@ -72,7 +72,8 @@ void update(uint32_t m, uint32_t begin, uint32_t end, uint32_t k, const double *
         }
       }
       DEFORM_UNROLL
-      for (uint32_t q = 0; q < kTileColumns && j + q < end; ++q) {
+      for (uint32_t q = 0; q < kTileColumns; ++q) {
+        if (j + q >= end) break;
         double *const to = c + i + (j + q) * ldc;
         if (i + kRows <= m) {
           store(to, load(to) - sum[q][0]);

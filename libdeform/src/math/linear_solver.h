@@ -30,4 +30,15 @@ class LinearSolver {
                           SolveInfo &info) = 0;
 };
 
+// restricted() of a solver that can only solve: a right-hand side per column, some at a time.
+class RestrictedBySolving {
+ public:
+  explicit RestrictedBySolving(const Memory &memory) { use_memory(memory, b_, x_); }
+  bool run(LinearSolver &solver, uint32_t points, uint32_t nsel, const uint32_t *sel, double tolerance,
+           double *w, SolveInfo &info);
+
+ private:
+  Array<double> b_, x_;
+};
+
 }  // namespace dfm

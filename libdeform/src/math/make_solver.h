@@ -7,7 +7,7 @@
 namespace dfm {
 
 struct SolverChoice {
-  const char *name = "auto";    // "auto", "ldlt", "pcg"
+  const char *name = "auto";    // "auto", "ldlt", "pcg"; plugin_solver.h knows those of plugins, too
   uint32_t points = 0;          // for "auto"
   bool constant = false;        // the matrix stays as it is while the body lives
   uint32_t max_iterations = 0;  // of an iterative solver, per right-hand side; 0: as many as there are rows
@@ -15,7 +15,7 @@ struct SolverChoice {
 
 // The name that "auto" stands for: the factorization where it is done once, or is cheap.
 const char *solver_name(const SolverChoice &choice);
-// Throws Error where there is no solver of that name.
-std::unique_ptr<LinearSolver> make_solver(const SolverChoice &choice, const Memory &memory, Tasks *tasks);
+// One of the library's own; null where it has none of that name.
+std::unique_ptr<LinearSolver> own_solver(const SolverChoice &choice, const Memory &memory, Tasks *tasks);
 
 }  // namespace dfm

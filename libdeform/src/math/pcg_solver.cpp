@@ -28,8 +28,12 @@ bool invert(const double *a, double *out) {
 }  // namespace
 
 PcgSolver::PcgSolver(const Memory &memory, Tasks *tasks, uint32_t max_iterations)
-    : kernels_(block_kernels()), tasks_(tasks), max_iterations_(max_iterations), a_(memory) {
-  use_memory(memory, inverse_, r_, z_, p_, q_, partial_, unit_, answer_);
+    : kernels_(block_kernels()),
+      tasks_(tasks),
+      max_iterations_(max_iterations),
+      a_(memory),
+      by_solving_(memory) {
+  use_memory(memory, inverse_, r_, z_, p_, q_, partial_);
 }
 
 void PcgSolver::analyse(const BlockPattern &pattern) {
@@ -123,23 +127,7 @@ bool PcgSolver::solve(uint32_t nrhs, const double *b, double *x, double toleranc
 
 bool PcgSolver::restricted(uint32_t nsel, const uint32_t *sel, double tolerance, double *w, SolveInfo &info) {
   info = {};
-  if (!ready_) return false;
-  const size_t wide = 3 * size_t{nsel};
-  unit_.assign(3 * size_t{a_.size()}, 0.0);
-  answer_.resize(unit_.size());
-  bool good = true;
-  for (size_t c = 0; c < wide; ++c) {
-    const size_t at = 3 * size_t{sel[c / 3]} + c % 3;
-    unit_[at] = 1.0;
-    std::fill(answer_.begin(), answer_.end(), 0.0);
-    good = solve_one(unit_.data(), answer_.data(), tolerance, info) && good;
-    unit_[at] = 0.0;
-    for (size_t r = 0; r < wide; ++r) w[c * wide + r] = answer_[3 * size_t{sel[r / 3]} + r % 3];
-  }
-  for (size_t r = 0; r < wide; ++r)  // symmetric to the last bit, whatever the tolerance left
-    for (size_t c = 0; c < r; ++c)
-      w[r * wide + c] = w[c * wide + r] = 0.5 * (w[r * wide + c] + w[c * wide + r]);
-  return good;
+  return ready_ && by_solving_.run(*this, a_.size(), nsel, sel, tolerance, w, info);
 }
 
 }  // namespace dfm

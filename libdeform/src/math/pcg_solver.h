@@ -30,7 +30,8 @@ class PcgSolver final : public LinearSolver {
   bool ready_ = false;
   BlockMatrix a_;
   Array<double> inverse_;  // [n,9] of the diagonal blocks
-  Array<double> r_, z_, p_, q_, partial_, unit_, answer_;
+  Array<double> r_, z_, p_, q_, partial_;
+  RestrictedBySolving by_solving_;
 };
 
 }  // namespace dfm

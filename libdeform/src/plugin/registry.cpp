@@ -16,6 +16,7 @@ constexpr uint32_t kTypeHead = offsetof(dfm_type, ops) + sizeof(void *);
 constexpr uint32_t kParamHead = offsetof(dfm_param, names);
 constexpr uint32_t kLawHead = offsetof(dfm_friction, eval) + sizeof(void *);
 constexpr uint32_t kModelHead = offsetof(dfm_model, destroy) + sizeof(void *);
+constexpr uint32_t kSolverHead = offsetof(dfm_solver, release) + sizeof(void *);
 // no struct of this ABI will ever be larger: what claims more is not one
 constexpr uint32_t kLargest = 1u << 16;
 
@@ -56,7 +57,7 @@ void check_head(const dfm_type &type) {
       {"name", type.name}, {"version", type.version}, {"licence", type.licence}, {"source", type.source}};
   for (const auto &field : fields)
     if (!field.text || !*field.text) bad(id, format("its metadata lacks \"%s\"", field.key));
-  if (type.kind < DFM_KIND_FRICTION || type.kind > DFM_KIND_MODEL)
+  if (type.kind < DFM_KIND_FRICTION || type.kind > DFM_KIND_SOLVER)
     bad(id, format("its kind %u is unknown to this library", type.kind));
   if (!type.ops) bad(id, "it has no operations (ops is NULL)");
 }
@@ -114,6 +115,12 @@ void copy_ops(RegisteredType &out) {
     if (!out.friction.prepare != !out.friction.release) bad(id, "prepare and release go together");
     check_slots(id, out.friction.slots, out.friction.nslot, true);
     out.type.ops = &out.friction;
+  } else if (out.type.kind == DFM_KIND_SOLVER) {
+    copy_struct(out.solver, ops, kSolverHead, id, "dfm_solver");
+    const dfm_solver &s = out.solver;
+    if (!s.analyse || !s.factor || !s.solve || !s.release)
+      bad(id, "a solver needs analyse, factor, solve and release");
+    out.type.ops = &out.solver;
   } else {
     copy_struct(out.model, ops, kModelHead, id, "dfm_model");
     if (!out.model.create || !out.model.destroy) bad(id, "a model needs create and destroy");
@@ -158,7 +165,10 @@ std::span<const dfm_slot> law_slots(const dfm_type &type, const dfm_host &host, 
 }
 
 const char *kind_name(uint32_t kind) {
-  return kind == DFM_KIND_FRICTION ? "law" : kind == DFM_KIND_MODEL ? "model" : "type";
+  return kind == DFM_KIND_FRICTION ? "law"
+         : kind == DFM_KIND_MODEL  ? "model"
+         : kind == DFM_KIND_SOLVER ? "solver"
+                                   : "type";
 }
 
 std::string short_name(const dfm_type &type) {

@@ -17,6 +17,7 @@ struct RegisteredType {
   dfm_type type{};
   dfm_friction friction{};
   dfm_model model{};
+  dfm_solver solver{};
   std::vector<dfm_param> rows;
   std::string file;  // "static:NAME" for a registered one
 };
@@ -50,7 +51,7 @@ class Registry {
   std::vector<PassedFile> passed_;
 };
 
-const char *kind_name(uint32_t kind);  // "law", "model"
+const char *kind_name(uint32_t kind);  // "law", "model", "solver"
 std::string short_name(const dfm_type &type);
 std::vector<std::string> effects(const dfm_type &type);
 // Throws Error naming the type where a slot's unit, kind and width do not agree.
@@ -61,5 +62,8 @@ inline const dfm_friction &law_of(const dfm_type &type) {
   return *static_cast<const dfm_friction *>(type.ops);
 }
 inline const dfm_model &model_of(const dfm_type &type) { return *static_cast<const dfm_model *>(type.ops); }
+inline const dfm_solver &solver_of(const dfm_type &type) {
+  return *static_cast<const dfm_solver *>(type.ops);
+}
 
 }  // namespace dfm

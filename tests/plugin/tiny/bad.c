@@ -1,5 +1,5 @@
 /* One plugin per mistake in the self-description; the library refuses each with a sentence. */
-#include "deform/plugin_draft.h"
+#include "deform/plugin.h"
 
 #ifdef BAD_NO_SOURCE
 #define SOURCE ""
@@ -26,8 +26,8 @@
 #else
 #define UNIT DFM_PER_CONTACT
 #endif
-#ifdef BAD_DRAFT_KIND
-#define KIND DFM_KIND_SOLVER
+#ifdef BAD_UNKNOWN_KIND
+#define KIND 4
 #else
 #define KIND DFM_KIND_FRICTION
 #endif

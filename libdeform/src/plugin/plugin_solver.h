@@ -1,0 +1,38 @@
+// Linear solvers of plugins behind the interface of math/linear_solver.h, and the choice among all.
+#pragma once
+#include "math/make_solver.h"
+#include "plugin/context.h"
+
+namespace dfm {
+
+class PluginSolver final : public LinearSolver {
+ public:
+  PluginSolver(const dfm_type &type, const dfm_host &host, const Memory &memory);
+  ~PluginSolver() override;
+  PluginSolver(const PluginSolver &) = delete;
+  PluginSolver &operator=(const PluginSolver &) = delete;
+
+  const char *name() const override { return type_.id; }
+  bool direct() const override;
+  void analyse(const BlockPattern &pattern) override;  // throws Error naming the plugin where it fails
+  bool factor(const double *blk) override;
+  bool solve(uint32_t nrhs, const double *b, double *x, double tolerance, SolveInfo &info) override;
+  bool restricted(uint32_t nsel, const uint32_t *sel, double tolerance, double *w, SolveInfo &info) override;
+
+ private:
+  void release() noexcept;
+
+  const dfm_type &type_;
+  const dfm_solver &ops_;
+  const dfm_host &host_;
+  void *self_ = nullptr;
+  uint32_t n_ = 0;
+  bool ready_ = false;
+  RestrictedBySolving by_solving_;
+};
+
+// The solver of that name, the library's own or a plugin's. Throws Error with those there are.
+std::unique_ptr<LinearSolver> make_solver(const SolverChoice &choice, const dfm_context &context,
+                                          const Memory &memory, Tasks *tasks);
+
+}  // namespace dfm

@@ -1,0 +1,87 @@
+// A linear solver of a plugin behind the interface of the library's own.
+#include "plugin/plugin_solver.h"
+
+#include "../../plugin/tiny_support.h"
+#include "../math/grid_system.h"
+#include "core/error.h"
+
+namespace {
+
+const dfm::Memory &memory() { return dfm::Memory::standard(); }
+
+struct Loaded : tiny::Context {
+  Loaded() { EXPECT_EQ(dfm_plugin_load(c, tiny::plugin("tiny_solver").c_str()), DFM_OK) << dfm_last_error(); }
+  std::unique_ptr<dfm::LinearSolver> solver(const char *name = "cholesky") const {
+    return dfm::make_solver({name, 36, false, 0}, *c, memory(), nullptr);
+  }
+};
+
+TEST(PluginSolver, Solutions_EqualDense) {
+  const Loaded context;
+  const auto solver = context.solver();
+  EXPECT_STREQ(solver->name(), "org.tiny.cholesky");
+  EXPECT_TRUE(solver->direct());
+  const test::Grid g = test::grid(4, 3, 3, 0.05);
+  const size_t m = 3 * size_t{g.n};
+  const test::Dense a = test::dense(g);
+  const std::vector<double> b = test::noise(2 * m, 1);
+  std::vector<double> x(2 * m, 0.0);
+  dfm::SolveInfo info;
+  EXPECT_FALSE(solver->solve(1, b.data(), x.data(), 1e-9, info));  // nothing to solve with yet
+  solver->analyse(g.pattern());
+  EXPECT_FALSE(solver->solve(1, b.data(), x.data(), 1e-9, info));
+  ASSERT_TRUE(solver->factor(g.blk.data()));
+  ASSERT_TRUE(solver->solve(2, b.data(), x.data(), 1e-9, info));
+  for (size_t k = 0; k < 2; ++k)
+    EXPECT_LT(test::worst(std::vector<double>(&x[k * m], &x[k * m] + m),
+                          test::solved(a, std::vector<double>(&b[k * m], &b[k * m] + m))),
+              1e-11);
+  const std::vector<uint32_t> sel = {30, 2, 17};
+  std::vector<double> w(81), unit(m, 0.0);
+  ASSERT_TRUE(solver->restricted(3, sel.data(), 1e-9, w.data(), info));
+  unit[3 * 2 + 1] = 1;  // column 4 of w
+  unit = test::solved(a, unit);
+  for (size_t r = 0; r < 9; ++r) EXPECT_NEAR(w[9 * r + 4], unit[3 * sel[r / 3] + r % 3], 1e-12);
+}
+
+TEST(PluginSolver, MatrixThatIsNotPositiveDefinite_IsToldAndNothingIsSolved) {
+  const Loaded context;
+  const auto solver = context.solver();
+  const test::Grid g = test::grid(3, 3, 3, -1.0);
+  solver->analyse(g.pattern());
+  EXPECT_FALSE(solver->factor(g.blk.data()));
+  std::vector<double> b(3 * size_t{g.n}, 1.0), x(b.size(), 7.0);
+  dfm::SolveInfo info;
+  EXPECT_FALSE(solver->solve(1, b.data(), x.data(), 1e-9, info));
+  EXPECT_EQ(x, std::vector<double>(b.size(), 7.0));
+}
+
+TEST(PluginSolver, RefusedMatrix_NamesThePlugin) {
+  const Loaded context;
+  const auto solver = context.solver();
+  const test::Grid large = test::grid(5, 5, 5, 1.0), small = test::grid(2, 2, 2, 1.0);
+  try {
+    solver->analyse(large.pattern());
+    FAIL();
+  } catch (const dfm::Error &e) {
+    EXPECT_EQ(e.sentence, "solver 'org.tiny.cholesky' cannot take a matrix of 125 points; the log says why");
+  }
+  EXPECT_FALSE(solver->factor(large.blk.data()));
+  solver->analyse(small.pattern());  // and it can still be used
+  EXPECT_TRUE(solver->factor(small.blk.data()));
+}
+
+TEST(PluginSolver, Name_FindsOwnSolversAndPluginsElseListsThem) {
+  const Loaded context;
+  EXPECT_STREQ(context.solver("ldlt")->name(), "ldlt");
+  EXPECT_STREQ(context.solver("auto")->name(), "ldlt");
+  EXPECT_STREQ(context.solver("org.tiny.cholesky")->name(), "org.tiny.cholesky");
+  try {
+    context.solver("cholmod");
+    FAIL();
+  } catch (const dfm::Error &e) {
+    EXPECT_EQ(e.sentence, "no linear solver \"cholmod\" is loaded; choose auto, ldlt, pcg, cholesky");
+  }
+}
+
+}  // namespace
