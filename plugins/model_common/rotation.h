@@ -19,7 +19,7 @@ inline void jacobi(double (&a)[kN][kN], double (&v)[kN][kN]) {
         all += a[i][j] * a[i][j];
         if (i != j) off += a[i][j] * a[i][j];
       }
-    if (!(off > 1e-36 * all)) return;
+    if (!(off > 1e-33 * all)) return;
     for (int p = 0; p < kN; ++p)
       for (int q = p + 1; q < kN; ++q) {
         if (a[p][q] == 0) continue;
@@ -36,6 +36,7 @@ inline void jacobi(double (&a)[kN][kN], double (&v)[kN][kN]) {
           a[p][k] = c * x - s * y;
           a[q][k] = s * x + c * y;
         }
+        a[p][q] = a[q][p] = 0;
         for (int k = 0; k < kN; ++k) {
           const double x = v[k][p], y = v[k][q];
           v[k][p] = c * x - s * y;

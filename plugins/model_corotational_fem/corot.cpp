@@ -11,6 +11,7 @@ namespace corot {
 namespace {
 constexpr char kId[] = "org.deform.corotational_fem";
 constexpr uint32_t kRun = DFM_PARAM_RUNTIME, kCell = DFM_PARAM_PER_CELL, kUnlessGiven = DFM_PARAM_AUTO;
+const char *const kTangents[] = {"usual", "exact", nullptr};
 const char *const kRotations[] = {"polar", "svd", "qr", nullptr};
 }  // namespace
 
@@ -19,8 +20,10 @@ const dfm_param kParams[kParamCount] = {
     {"poisson", "Poisson ratio", "1", -0.99, 0.4999, 0.3, kRun | kCell, 1, nullptr},
     {"damping_stiffness", "damping over stiffness of each cell", "s", 0, 1e3, 0, kRun | kCell, 1, nullptr},
     {"damping_mass", "drag over mass of each point", "1/s", 0, 1e6, 0, kRun | kCell, 1, nullptr},
-    {"rotation", "how the frame of a cell is found; qr depends on the order of its corners", "1", 0, 2,
+    {"rotation", "how the frame of a cell is found; qr depends on the axes of the rest shape", "1", 0, 2,
      kPolar, kRun | DFM_PARAM_ENUM, 1, kRotations},
+    {"tangent", "stiffness for implicit steps; exact: with the turning of the frames", "1", 0, 1, kUsual,
+     kRun | DFM_PARAM_ENUM, 1, kTangents},
     {"anisotropy_young", "Young's modulus along the axis; auto, -1: young", "Pa", kAuto, 1e13, kAuto,
      kRun | kCell | kUnlessGiven, 1, nullptr},
     {"anisotropy_poisson",
@@ -77,6 +80,18 @@ dfm_status energy(void *self, const dfm_kin *k, double *joule) {
   return DFM_OK;
 }
 
+dfm_status pattern(const void *self, uint32_t *nb, uint32_t *ij) {
+  const Body &body = *static_cast<const Body *>(self);
+  *nb = body.pairs();
+  if (ij) body.pattern(ij);
+  return DFM_OK;
+}
+
+dfm_status stiffness(void *self, const dfm_kin *k, double a, double b, double *blk) {
+  static_cast<Body *>(self)->add_stiffness(*k, a, b, blk);
+  return DFM_OK;
+}
+
 dfm_status cell_energy(void *self, const dfm_kin *k, double *density) {
   static_cast<Body *>(self)->cell_energy(*k, density);
   return DFM_OK;
@@ -104,7 +119,7 @@ const void *extension(const void *, const char *id) {
 const char *const kEffects[] = {"volume", "damping", "large_rotation", "anisotropy", nullptr};
 
 const dfm_model kModel = {sizeof(dfm_model),
-                          DFM_CAP_ENERGY | DFM_CAP_DAMPING | DFM_CAP_ROTATION_INVARIANT,
+                          DFM_CAP_ENERGY | DFM_CAP_STIFFNESS | DFM_CAP_DAMPING | DFM_CAP_ROTATION_INVARIANT,
                           DFM_CELL_TET,
                           0,
                           nullptr,
@@ -115,8 +130,8 @@ const dfm_model kModel = {sizeof(dfm_model),
                           add_forces,
                           bound,
                           energy,
-                          nullptr,
-                          nullptr,
+                          pattern,
+                          stiffness,
                           extension};
 
 const dfm_type kType = {sizeof(dfm_type),

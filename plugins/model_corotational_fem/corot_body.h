@@ -23,6 +23,7 @@ enum Param : uint32_t {
   kDampingStiffness,
   kDampingMass,
   kRotation,
+  kTangent,
   kYoungAlong,
   kPoissonAlong,
   kShearAlong,
@@ -31,6 +32,7 @@ enum Param : uint32_t {
   kValueCount = kAxis + 3
 };
 enum RotationBy : uint32_t { kPolar, kSvd, kQr };
+enum Tangent : uint32_t { kUsual, kExact };
 extern const dfm_param kParams[kParamCount];
 constexpr double kAuto = -1;  // of the constants along the axis: as without an axis
 void complain(const dfm_host *h, const char *what);
@@ -43,7 +45,7 @@ struct Body {
 
   const dfm_host *host = nullptr;
   const Kernels *kernels = nullptr;
-  uint32_t npoint = 0, ncell = 0, nblock = 0;
+  uint32_t npoint = 0, ncell = 0, nedge = 0, nblock = 0;
   // blocks per piece of a pass at least; points of the largest block with its halo
   uint32_t grain = 1, largest = 0;
   double params[kValueCount] = {};
@@ -51,7 +53,8 @@ struct Body {
 
   // In the host's order.
   Buffer<double> mass, volume;    // [npoint] kg, [ncell] m^3
-  Buffer<uint32_t> cells;         // [ncell,4], right-handed
+  Buffer<uint32_t> cells;         // [ncell,4], each ascending, so that block (i, j) of a cell has i < j
+  Buffer<uint32_t> edges;         // [nedge,2]
   Buffer<double> height_inverse;  // [ncell,4] 1/m, |g_a|
   Buffer<double> point_drag;      // [npoint] N s/m; empty without drag
   // [npoint] row sums at rest of stiffness and dampers, and their weights; [ncell,4] row of a cell per
@@ -66,6 +69,7 @@ struct Body {
   Buffer<uint32_t> place_of;  // [ncell] where a cell stands in that order
   Buffer<double> p, f, damp, value, damp_value;
   Buffer<Group> group;
+  Buffer<SlotGroup> slots;
   Buffer<FibreGroup> fibre;
   Buffer<Merge> merge;                       // by owning block
   Buffer<uint32_t> merge_begin, slot_begin;  // [nblock + 1]
@@ -90,6 +94,10 @@ struct Body {
   void bound(const dfm_kin &k, double *ksum, double *csum);
   double energy(const dfm_kin &k);
   void cell_energy(const dfm_kin &k, double *out);
+
+  uint32_t pairs() const { return npoint + nedge; }
+  void pattern(uint32_t *ij) const;
+  void add_stiffness(const dfm_kin &k, double a, double b, double *blk);
 
   // Block n with the packed points of the piece that begins at block `begin`: a piece uses one place for all
   // of its blocks, which therefore stays in the cache however large the body is. Pieces begin at multiples of
@@ -116,6 +124,8 @@ struct Body {
   };
   void make_room(Room &room) const;
   model::Fibre fibre_at(uint32_t c) const;
+  void cell_elasticity(size_t place, double (*d)[6]) const;  // times the volume
+  void add_exact(const dfm_kin &k, uint32_t c, double a, double b, double *blk) const;
   void fill_material(Room &room);
   void fill_drag(Room &room);
   void find_effects();

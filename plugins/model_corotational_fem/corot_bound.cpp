@@ -58,25 +58,26 @@ void twist_pass(void *user, uint32_t begin, uint32_t end) {
 
 }  // namespace
 
+void Body::cell_elasticity(size_t place, double (*d)[6]) const {
+  const Group &g = group[place / kGroup];
+  const size_t lane = place % kGroup;
+  const double mu = g.mu2[lane] / 2;
+  if (fibre.empty()) return model::elasticity_matrix(model::Lame{g.lambda[lane], mu}, d);
+  const FibreGroup &own = fibre[place / kGroup];
+  const double axis[3] = {own.axis[0][lane], own.axis[1][lane], own.axis[2][lane]};
+  model::elasticity_matrix({g.lambda[lane], mu, own.alpha[lane], own.beta[lane], mu + own.shear[lane] / 2},
+                           axis, d);
+}
+
 void Body::find_rows(Room &room) {
   Buffer<double> &next = room.next, &blocks = room.blocks;
   for (uint32_t c = 0; c < ncell; ++c) {
     const size_t place = place_of[c];
-    const Group &g = group[place / kGroup];
-    const uint32_t lane = uint32_t(place % kGroup);
     model::Tetrahedron shape{1, {}};  // the constants hold the volume
-    for (int k = 0; k < 9; ++k) shape.g[k / 3 + 1][k % 3] = g.g[k][lane];
+    for (int k = 0; k < 9; ++k) shape.g[k / 3 + 1][k % 3] = group[place / kGroup].g[k][place % kGroup];
     for (int a = 0; a < 3; ++a) shape.g[0][a] = -((shape.g[1][a] + shape.g[2][a]) + shape.g[3][a]);
     double d[6][6];
-    const double mu = g.mu2[lane] / 2;
-    if (fibre.empty()) {
-      model::elasticity_matrix(model::Lame{g.lambda[lane], mu}, d);
-    } else {
-      const FibreGroup &own = fibre[place / kGroup];
-      const double axis[3] = {own.axis[0][lane], own.axis[1][lane], own.axis[2][lane]};
-      model::elasticity_matrix(
-          {g.lambda[lane], mu, own.alpha[lane], own.beta[lane], mu + own.shear[lane] / 2}, axis, d);
-    }
+    cell_elasticity(place, d);
     for (int a = 0; a < 4; ++a)
       for (int b = a; b < 4; ++b) {
         double one[9];

@@ -1,6 +1,7 @@
 // From a mesh to blocks: cells side by side in groups, halos, and who adds up whose forces.
-#include <stdio.h>
+#include <cmath>
 
+#include "../model_common/edges.h"
 #include "../model_common/width.h"
 #include "corot_body.h"
 
@@ -29,22 +30,25 @@ model::Tetrahedron shape_of(const double *rest, const uint32_t *cell) {
 void Body::take_mesh(const dfm_mesh &m) {
   npoint = m.npoint;
   ncell = m.ncell;
+  nedge = m.nedge;
   mass.create(host, npoint);
   weight.create(host, npoint);
   rest_rows.create(host, npoint);
   damp_rows.create(host, npoint);
   volume.create(host, ncell);
   cells.create(host, 4 * size_t(ncell));
+  edges.create(host, 2 * size_t(nedge));
   height_inverse.create(host, 4 * size_t(ncell));
   twist_share.create(host, 4 * size_t(ncell));
   place_of.create(host, ncell);
   std::copy(m.mass, m.mass + npoint, mass.data());
   std::copy(m.cells, m.cells + 4 * size_t(ncell), cells.data());
+  std::copy(m.edges, m.edges + 2 * size_t(nedge), edges.data());
   for (uint32_t c = 0; c < ncell; ++c) {
     uint32_t *q = cells.data() + 4 * size_t(c);
-    if (shape_of(m.rest, q).volume < 0) std::swap(q[2], q[3]);
+    std::sort(q, q + 4);
     const model::Tetrahedron shape = shape_of(m.rest, q);
-    volume[c] = shape.volume;
+    volume[c] = std::fabs(shape.volume);
     for (int a = 0; a < 4; ++a) {
       const double *g = shape.g[a];
       height_inverse[4 * size_t(c) + a] = __builtin_sqrt((g[0] * g[0] + g[1] * g[1]) + g[2] * g[2]);
@@ -102,6 +106,11 @@ void Body::fill_groups(const Layout &l, const dfm_mesh &m, uint32_t b, uint32_t 
     const model::Tetrahedron shape = shape_of(m.rest, cells.data() + 4 * size_t(c));
     for (int k = 0; k < 9; ++k) out.g[k][lane] = shape.g[k / 3 + 1][k % 3];
     for (int a = 0; a < 4; ++a) out.p[lane][a] = l.local[l.rank[cells[4 * size_t(c) + a]]];
+    uint32_t edge[6];
+    model::find_edges(edges.data(), nedge, cells.data() + 4 * size_t(c), edge);
+    for (int k = 0; k < 10; ++k)
+      slots[groups_at + n / kGroup].slot[k][lane] =
+          k < 4 ? cells[4 * size_t(c) + size_t(k)] : npoint + edge[k - 4];
     cell_id[place] = n < count ? c : kNone;
     if (n < count) place_of[c] = uint32_t(place);
   }
@@ -158,6 +167,7 @@ void Body::build_blocks(const dfm_mesh &m) {
   p.create(host, 8 * size_t(largest) * ((nblock + grain - 1) / grain));
   f.create(host, 4 * size_t(slot_begin[nblock]));
   group.create(host, groups);
+  slots.create(host, groups);
   cell_id.create(host, lanes());
   value.create(host, lanes());
 
@@ -180,6 +190,7 @@ void Body::build_blocks(const dfm_mesh &m) {
     out.point = points;
     out.f = f.data() + 4 * size_t(slot_begin[b]);
     out.group = group.data() + groups_at;
+    out.slots = slots.data() + groups_at;
     out.value = value.data() + size_t(kGroup) * groups_at;
     fill_groups(l, m, b, groups_at);
     groups_at += out.groups;

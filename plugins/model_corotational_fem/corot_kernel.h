@@ -18,6 +18,9 @@ struct Group {
   double mu2[kGroup], lambda[kGroup];  // 2 mu V, lambda V; 0 for a cell that fills up
   uint32_t p[kGroup][4];               // local points
 };
+// Where the blocks of a cell stand in the stiffness: its corners by themselves, then its edges in the order
+// of model_common/edges.h.
+struct SlotGroup { uint32_t slot[10][kGroup]; };
 // Transverse isotropy: unit axis at rest and the constants of model_common/material.h times the volume.
 struct FibreGroup {
   double axis[3][kGroup];
@@ -37,8 +40,9 @@ struct Block {
   const Group *group;
   const FibreGroup *fibre;  // NULL: isotropic
   const double *damp;       // [groups,8] s; NULL: none
-  double *value;            // [groups,8] what `energies` and `twists` write
-  double *damp_value;       // [groups,8] what `twists` writes of dampers; NULL without
+  const SlotGroup *slots;
+  double *value;       // [groups,8] what `energies` and `twists` write
+  double *damp_value;  // [groups,8] what `twists` writes of dampers; NULL without
   Rotate rotate;
 };
 
@@ -52,6 +56,8 @@ struct Kernels {
   void (*energies)(const Block &b);  // J per cell
   // Stiffness of each cell, and of its damper, beyond that at rest; see corot_bound.cpp.
   void (*twists)(const Block &b);
+  // blk -= (a + b damp) R K_e R^T of each cell
+  void (*tangents)(const Block &b, double a, double damp, double *blk);
   void (*merge)(double *f, const Merge *merge, uint32_t n);
   void (*store)(const Block &b, double *f, uint32_t stride);  // adds the owned points' forces to the host's
 };

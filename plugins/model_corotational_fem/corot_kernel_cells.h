@@ -365,6 +365,84 @@ static inline void cell_twists(const Block &b) {
 }
 static inline void twists(const Block &b) { return b.fibre ? cell_twists<true>(b) : cell_twists<false>(b); }
 
+// Blocks of R K_e R^T with q_a = R g_a: lambda q_a q_b^T + mu (q_b q_a^T + g_a.g_b I); with p the turned
+// axis and c_a = a.g_a the fibres add what the stress of fibre_stress does at corner a for the strain of a
+// motion of corner b.
+struct Turned { v4 q[4][3], g[4][3], axis[3], along[4], alpha, beta, shear; };
+template <bool kFibre>
+DEFORM_INLINE void block_of(const Turned &t, int a, int b, v4 lambda, v4 mu, v4 *out) {
+  const v4 *const x = t.q[a];
+  const v4 *const y = t.q[b];
+  const v4 gg = (t.g[a][0] * t.g[b][0] + t.g[a][1] * t.g[b][1]) + t.g[a][2] * t.g[b][2];
+  v4 same = mu * gg;
+  const v4 *const p = t.axis;
+  v4 right[3], left[3];  // right p^T + p left^T
+  if constexpr (kFibre) {
+    const v4 ca = t.along[a], cb = t.along[b], cc = ca * cb, half = splat(0.5) * t.shear;
+    same = same + half * cc;
+    const v4 own = splat(0.5) * (t.beta * cc + half * gg);
+    const v4 xr = t.alpha * cb, yr = half * ca, yl = t.alpha * ca, xl = half * cb;
+    for (int k = 0; k < 3; ++k) {
+      right[k] = (xr * x[k] + yr * y[k]) + own * p[k];
+      left[k] = (yl * y[k] + xl * x[k]) + own * p[k];
+    }
+  }
+  for (int i = 0; i < 3; ++i)
+    for (int j = 0; j < 3; ++j) {
+      v4 sum = lambda * (x[i] * y[j]) + mu * (y[i] * x[j]);
+      if constexpr (kFibre) sum = sum + (right[i] * p[j] + p[i] * left[j]);
+      out[3 * i + j] = i == j ? sum + same : sum;
+    }
+}
+template <bool kFibre>
+static inline void cell_tangents(const Block &b, double a, double damp, double *blk) {
+  constexpr int kFirst[10] = {0, 1, 2, 3, 0, 0, 0, 1, 1, 2}, kSecond[10] = {0, 1, 2, 3, 1, 2, 3, 2, 3, 3};
+  for (uint32_t n = 0; n < b.groups; ++n)
+    for (uint32_t at = 0; at < kGroup; at += 4) {
+      const Four q = {b.group + n, at};
+      v4 f[9], r[9];
+      gradient<0>(b, q, f);
+      rotation_of(b, f, r);
+      Turned t;
+      for (int c = 1; c < 4; ++c)
+        for (int k = 0; k < 3; ++k) t.g[c][k] = rest4(q, 3 * (c - 1) + k);
+      for (int c = 1; c < 4; ++c)
+        for (int k = 0; k < 3; ++k)
+          t.q[c][k] = (r[3 * k] * t.g[c][0] + r[3 * k + 1] * t.g[c][1]) + r[3 * k + 2] * t.g[c][2];
+      for (int k = 0; k < 3; ++k) {
+        t.g[0][k] = splat(0) - ((t.g[1][k] + t.g[2][k]) + t.g[3][k]);
+        t.q[0][k] = splat(0) - ((t.q[1][k] + t.q[2][k]) + t.q[3][k]);
+      }
+      v4 by = splat(a);
+      if (b.damp) by = by + splat(damp) * load4(b.damp + size_t(kGroup) * n + at);
+      if constexpr (kFibre) {
+        Fibres c;
+        load_fibres(b.fibre[n], at, c);
+        for (int k = 0; k < 3; ++k)
+          t.axis[k] = (r[3 * k] * c.a[0] + r[3 * k + 1] * c.a[1]) + r[3 * k + 2] * c.a[2];
+        for (int k = 0; k < 4; ++k)
+          t.along[k] = (c.a[0] * t.g[k][0] + c.a[1] * t.g[k][1]) + c.a[2] * t.g[k][2];
+        t.alpha = by * c.alpha;
+        t.beta = by * c.beta;
+        t.shear = by * c.shear;
+      }
+      const v4 lambda = by * load4(q.group->lambda + at), mu = splat(0.5) * (by * load4(q.group->mu2 + at));
+      for (int m = 0; m < 10; ++m) {
+        v4 one[9];
+        block_of<kFibre>(t, kFirst[m], kSecond[m], lambda, mu, one);
+        alignas(32) double spread_out[9][4];
+        for (int k = 0; k < 9; ++k) store4(spread_out[k], one[k]);
+        for (uint32_t c = 0; c < 4; ++c) {
+          double *const out = blk + 9 * size_t(b.slots[n].slot[m][at + c]);
+          for (int k = 0; k < 9; ++k) out[k] -= spread_out[k][c];
+        }
+      }
+    }
+}
+static inline void tangents(const Block &b, double a, double damp, double *blk) {
+  return b.fibre ? cell_tangents<true>(b, a, damp, blk) : cell_tangents<false>(b, a, damp, blk);
+}
+
 static inline void merge_halo(double *f, const Merge *merge, uint32_t n) {
   for (uint32_t m = 0; m < n; ++m) {
     double *to = f + 4 * size_t(merge[m].to);
@@ -380,7 +458,7 @@ static inline void add_to_host(const Block &b, double *f, uint32_t stride) {
   }
 }
 
-constexpr Kernels kKernels = {load_block, forces, energies, twists, merge_halo, add_to_host};
+constexpr Kernels kKernels = {load_block, forces, energies, twists, tangents, merge_halo, add_to_host};
 
 }  // namespace
 }  // namespace corot

@@ -1,0 +1,168 @@
+// Tangent of the forces, in blocks of 3x3: the points by themselves in their order, then the edges of the
+// mesh in theirs. The usual one is R K_e R^T, from the kernels: symmetric, no eigenvalue above zero. The
+// exact one, cell by cell here, is the derivative with the turning of R. With the notation of
+// corot_bound.cpp
+//   d2W = usual + sum_k max(0, e_k) q_k^2.
+// e_k < 0 is left out, so that the sum stays negative semidefinite: it belongs to the three turns alone,
+// which nothing else in d2W touches, and cutting it off is the projection of d2W. With v_k the axes of S, a
+// motion u of corner b has q_k = (R (v_k x g_b)).u / sqrt 2. Dampers, and fibres: L_a^T D L_b, L_b u the
+// change of S (the damper's times its fading, see strain_rate in corot_kernel_cells.h). What fibres under
+// stress change as S turns against their axes is left out.
+#include "../model_common/edges.h"
+#include "../model_common/rotation.h"
+#include "corot_body.h"
+
+namespace corot {
+namespace {
+
+constexpr double kLeast = 1e-12;  // two stretches that cancel, over the trace
+
+void cross(const double *x, const double *y, double *out) {
+  for (int k = 0; k < 3; ++k) out[k] = x[(k + 1) % 3] * y[(k + 2) % 3] - x[(k + 2) % 3] * y[(k + 1) % 3];
+}
+void turn(const double *r, const double *x, double *out) {
+  for (int k = 0; k < 3; ++k) out[k] = (r[3 * k] * x[0] + r[3 * k + 1] * x[1]) + r[3 * k + 2] * x[2];
+}
+
+// A cell at one shape: rotation, rest gradients, S with its axes (columns) and stretches.
+struct Shape {
+  double r[9], g[4][3], s[3][3], axis[3][3], stretch[3], trace;
+
+  // Change of S in xx yy zz xy yz zx, shear doubled, for a motion of corner b along the frame's axis i.
+  void change(int b, int i, double *out) const {
+    double w[3] = {}, e[3] = {}, ws[3][3], a[3][3] = {}, axial[3];
+    e[i] = 1;
+    for (int l = 0; l < 3; ++l) a[i][l] = g[b][l];
+    cross(g[b], e, axial);  // of e g^T
+    for (int k = 0; k < 3; ++k) {
+      const int m = (k + 1) % 3, n = (k + 2) % 3;
+      const double part = (axis[0][k] * axial[0] + axis[1][k] * axial[1]) + axis[2][k] * axial[2];
+      const double pair = stretch[m] + stretch[n];
+      if (pair > kLeast * trace)
+        for (int l = 0; l < 3; ++l) w[l] += part / pair * axis[l][k];
+    }
+    for (int l = 0; l < 3; ++l) {
+      const double column[3] = {s[0][l], s[1][l], s[2][l]};
+      double turned[3];
+      cross(w, column, turned);
+      for (int k = 0; k < 3; ++k) ws[k][l] = turned[k];
+    }
+    constexpr int kRow[6] = {0, 1, 2, 0, 1, 2}, kCol[6] = {0, 1, 2, 1, 2, 0};
+    for (int n = 0; n < 6; ++n) {
+      const int k = kRow[n], l = kCol[n];
+      const double both = (a[k][l] - ws[k][l]) + (a[l][k] - ws[l][k]);
+      out[n] = n < 3 ? 0.5 * both : both;
+    }
+  }
+  // det(t I - S) over what it counts as at least
+  double share() const {
+    const double det = (stretch[0] + stretch[1]) * (stretch[1] + stretch[2]) * (stretch[2] + stretch[0]);
+    const double least = kLeastPair * (trace * trace * trace);
+    return det < least ? (least > 0 ? std::max(det / least, 0.0) : 0) : 1;
+  }
+};
+
+void shape_at(const Group &group, uint32_t lane, const double *const *x, Shape &out) {
+  double f[9] = {};
+  for (int k = 0; k < 9; ++k) out.g[k / 3 + 1][k % 3] = group.g[k][lane];
+  for (int k = 0; k < 3; ++k) out.g[0][k] = -((out.g[1][k] + out.g[2][k]) + out.g[3][k]);
+  for (int a = 1; a < 4; ++a)
+    for (int k = 0; k < 3; ++k)
+      for (int l = 0; l < 3; ++l) f[3 * k + l] += (x[a][k] - x[0][k]) * out.g[a][l];
+  model::rotation::polar_of(f, out.r);
+  double s[3][3];
+  for (int k = 0; k < 3; ++k)
+    for (int l = 0; l < 3; ++l) {
+      const double kl = (out.r[k] * f[l] + out.r[3 + k] * f[3 + l]) + out.r[6 + k] * f[6 + l];
+      const double lk = (out.r[l] * f[k] + out.r[3 + l] * f[3 + k]) + out.r[6 + l] * f[6 + k];
+      out.s[k][l] = s[k][l] = 0.5 * (kl + lk);
+    }
+  model::jacobi(s, out.axis);
+  for (int k = 0; k < 3; ++k) out.stretch[k] = s[k][k];
+  out.trace = (s[0][0] + s[1][1]) + s[2][2];
+}
+
+}  // namespace
+
+void Body::pattern(uint32_t *ij) const {
+  for (uint32_t i = 0; i < npoint; ++i) ij[2 * size_t(i)] = ij[2 * size_t(i) + 1] = i;
+  for (size_t e = 0; e < nedge; ++e) {
+    ij[2 * (npoint + e)] = std::min(edges[2 * e], edges[2 * e + 1]);
+    ij[2 * (npoint + e) + 1] = std::max(edges[2 * e], edges[2 * e + 1]);
+  }
+}
+
+// Blocks of one cell: by the change of S, by R K_e R^T, by the turns.
+void Body::add_exact(const dfm_kin &k, uint32_t c, double a, double b, double *blk) const {
+  const size_t place = place_of[c];
+  const uint32_t lane = uint32_t(place % kGroup);
+  const Group &own = group[place / kGroup];
+  const double *x[4];
+  for (int m = 0; m < 4; ++m) x[m] = k.x + size_t(k.stride) * cells[4 * size_t(c) + m];
+  Shape shape;
+  shape_at(own, lane, x, shape);
+  const double share = shape.share(), damping = damp.empty() ? 0 : b * damp[place] * (share * share);
+  const bool by_change = !fibre.empty() && share >= 1;
+  const double change_by = damping + (by_change ? a : 0), frame_by = by_change ? 0 : a;
+  double d[6][6], change[4][3][6], turned[3][4][3], twist[3] = {};
+  cell_elasticity(place, d);
+  model::Tetrahedron rest{1, {}};  // the constants hold the volume
+  for (int m = 0; m < 4; ++m) {
+    std::copy(shape.g[m], shape.g[m] + 3, rest.g[m]);
+    for (int i = 0; i < 3; ++i) {
+      shape.change(m, i, change[m][i]);
+      const double axis[3] = {shape.axis[0][i], shape.axis[1][i], shape.axis[2][i]};
+      cross(axis, shape.g[m], turned[i][m]);
+    }
+  }
+  const double pull = own.lambda[lane] * (shape.trace - 3) - own.mu2[lane];
+  for (int m = 0; fibre.empty() && m < 3; ++m) {
+    const double pair = std::max(shape.stretch[(m + 1) % 3] + shape.stretch[(m + 2) % 3], kLeast * shape.trace);
+    if (pair > 0) twist[m] = 0.5 * a * std::max(0.0, own.mu2[lane] + 2 * pull / pair);
+  }
+  const auto add_block = [&](int m, int n, double *out) {
+    double frame[9], in_frame[3][3];
+    model::stiffness_block(rest, d, m, n, frame);
+    for (int i = 0; i < 3; ++i)
+      for (int j = 0; j < 3; ++j) {
+        double sum = frame_by * frame[3 * i + j];
+        for (int e = 0; e < 3; ++e) sum += twist[e] * (turned[e][m][i] * turned[e][n][j]);
+        for (int e = 0; change_by > 0 && e < 6; ++e)
+          for (int l = 0; l < 6; ++l) sum += change_by * (change[m][i][e] * (d[e][l] * change[n][j][l]));
+        in_frame[i][j] = sum;
+      }
+    double half[3][3];
+    for (int j = 0; j < 3; ++j) {
+      const double column[3] = {in_frame[0][j], in_frame[1][j], in_frame[2][j]};
+      double out_column[3];
+      turn(shape.r, column, out_column);
+      for (int i = 0; i < 3; ++i) half[i][j] = out_column[i];
+    }
+    for (int i = 0; i < 3; ++i) {
+      double row[3];
+      turn(shape.r, half[i], row);
+      for (int j = 0; j < 3; ++j) out[3 * i + j] -= row[j];
+    }
+  };
+  const SlotGroup &at_slots = slots[place / kGroup];
+  for (int m = 0; m < 4; ++m) add_block(m, m, blk + 9 * size_t(at_slots.slot[m][lane]));
+  for (int e = 0; e < 6; ++e)
+    add_block(model::kEdgeOf[e][0], model::kEdgeOf[e][1], blk + 9 * size_t(at_slots.slot[4 + e][lane]));
+}
+
+void Body::add_stiffness(const dfm_kin &k, double a, double b, double *blk) {
+  if (choice(kTangent) == kExact) {
+    for (uint32_t c = 0; c < ncell; ++c)
+      if (volume[c] > 0) add_exact(k, c, a, b, blk);
+  } else {
+    for (uint32_t n = 0; n < nblock; ++n) {
+      const Block own = lend(n, 0);
+      kernels->load(own, k.x, nullptr, k.stride);
+      kernels->tangents(own, a, b, blk);
+    }
+  }
+  for (uint32_t i = 0; !point_drag.empty() && i < npoint; ++i)
+    for (int n = 0; n < 9; n += 4) blk[9 * size_t(i) + size_t(n)] -= b * point_drag[i];
+}
+
+}  // namespace corot
