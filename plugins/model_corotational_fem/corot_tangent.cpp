@@ -117,7 +117,8 @@ void Body::add_exact(const dfm_kin &k, uint32_t c, double a, double b, double *b
   }
   const double pull = own.lambda[lane] * (shape.trace - 3) - own.mu2[lane];
   for (int m = 0; fibre.empty() && m < 3; ++m) {
-    const double pair = std::max(shape.stretch[(m + 1) % 3] + shape.stretch[(m + 2) % 3], kLeast * shape.trace);
+    const double pair =
+        std::max(shape.stretch[(m + 1) % 3] + shape.stretch[(m + 2) % 3], kLeast * shape.trace);
     if (pair > 0) twist[m] = 0.5 * a * std::max(0.0, own.mu2[lane] + 2 * pull / pair);
   }
   const auto add_block = [&](int m, int n, double *out) {

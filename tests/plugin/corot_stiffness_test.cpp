@@ -6,7 +6,8 @@
 namespace corot_test {
 namespace {
 
-const Params kFibres = {{"anisotropy_young", {1e6}}, {"anisotropy_shear", {1e5}}, {"anisotropy_axis", {1, 2, -0.5}}};
+const Params kFibres = {
+    {"anisotropy_young", {1e6}}, {"anisotropy_shear", {1e5}}, {"anisotropy_axis", {1, 2, -0.5}}};
 Params with(Params p, const char *key, double value) {
   p[key] = {value};
   return p;
@@ -121,7 +122,8 @@ TEST(CorotStiffness, ExactTangentOfPressedCell_IsTheProjectedDerivative) {
 TEST(CorotStiffness, ExactDampers_AreDifferencesByVelocity) {
   for (const Params &p : {Params{}, kFibres}) {
     Host host;
-    Instance b(host, kuhn_bar(2, 2, 1, 0.1), with(with(exact(p), "damping_stiffness", 0.01), "damping_mass", 3));
+    Instance b(host, kuhn_bar(2, 2, 1, 0.1),
+               with(with(exact(p), "damping_stiffness", 0.01), "damping_mass", 3));
     stretch(b, 1.2);
     b.shake(0.01, 1);
     const Dense c = tangent(b, 0, 1);
