@@ -30,6 +30,7 @@ namespace {
 
 constexpr uint32_t kSolves = 4, kCuts = 8, kFractions = 40;
 constexpr double kLeastCut = 0.25;
+constexpr double kLight = 299792458;  // m/s
 constexpr double kNoWay = 1e-3;  // of the way of a sub-step: less than this is none
 constexpr double kSlow = 0.01;   // of d_g: what moves by less needs no closer look at how it does
 
@@ -204,6 +205,15 @@ bool wake_hit(World &w, StepContext &step) {
   return w.sleepers < before;
 }
 
+// An impulse that alone would move its point faster than light has others against it that grow with it: what
+// it stands for has no answer, and its rounding is motion out of nothing.
+bool overloaded(const StepContext &step) {
+  if (!(step.residual.due > 1)) return false;
+  for (uint32_t i = 0; i < step.rows.n; ++i)
+    if (step.rows.wn[i] * step.rows.impulse[3 * size_t{i}] > kLight) return true;
+  return false;
+}
+
 // No motion is left and contact has no answer: what closes on a body has met. Impulses that cannot help would
 // grow from sub-step to sub-step, and their rounding is motion out of nothing. Only what is told where to go
 // leaves no answer: what is free gives way.
@@ -223,6 +233,10 @@ bool stage_guard(World &w, StepContext &step, uint32_t *trouble) {
   step.guard.through.clear();
   double safe = 1;
   for (uint32_t solve = 0;; ++solve) {
+    if (overloaded(step)) {
+      *trouble |= tell_jam(w, step);
+      return false;
+    }
     if (!find_ends(w, step, trouble)) return false;
     bound_speeds(w, step);
     follow_lists(w, step);
