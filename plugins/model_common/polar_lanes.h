@@ -22,15 +22,14 @@ constexpr double kPolarLeastSquare = 1e-80;  // of F; below it powers of t lose 
 template <class Ops>
 struct Polar {
   typename Ops::V c[6], cofactor[9];  // C as xx yy zz xy yz zx
-  typename Ops::V n, det, trace, step, divisor, cube;
+  typename Ops::V n, det, constant, trace, step, divisor, cube;
 };
 
-// f, r: nine vectors each, row-major.
+// In three parts, so that a caller may do each for many vectors: the root is a chain of divisions that wait
+// for each other. f, r: nine vectors, row-major.
 template <class Ops>
-static inline __attribute__((always_inline)) void polar(const typename Ops::V *f, typename Ops::V *r,
-                                                        Polar<Ops> &o) {
+static inline __attribute__((always_inline)) void polar_invariants(const typename Ops::V *f, Polar<Ops> &o) {
   using V = typename Ops::V;
-  const auto splat = [](double a) __attribute__((always_inline)) { return Ops::splat(a); };
   V *const c = o.c, *const q = o.cofactor;
   c[0] = (f[0] * f[0] + f[3] * f[3]) + f[6] * f[6];
   c[1] = (f[1] * f[1] + f[4] * f[4]) + f[7] * f[7];
@@ -47,28 +46,41 @@ static inline __attribute__((always_inline)) void polar(const typename Ops::V *f
   q[6] = f[1] * f[5] - f[2] * f[4];
   q[7] = f[2] * f[3] - f[0] * f[5];
   q[8] = f[0] * f[4] - f[1] * f[3];
-  const V n = (c[0] + c[1]) + c[2], two = splat(2);
-  const V det = (f[0] * q[0] + f[1] * q[1]) + f[2] * q[2], twice_det = two * det;
+  const V two = Ops::splat(2);
+  o.n = (c[0] + c[1]) + c[2];
+  o.det = (f[0] * q[0] + f[1] * q[1]) + f[2] * q[2];
   const V own = (c[0] * c[0] + c[1] * c[1]) + c[2] * c[2];
   const V mixed = (c[3] * c[3] + c[4] * c[4]) + c[5] * c[5];
-  const V constant = two * (own + two * mixed) - n * n;
-  V t = Ops::root(splat(3) * n), step = t;
+  o.constant = two * (own + two * mixed) - o.n * o.n;
+}
+
+template <class Ops>
+static inline __attribute__((always_inline)) void polar_trace(Polar<Ops> &o) {
+  using V = typename Ops::V;
+  const V n = o.n, twice_n = Ops::splat(2) * n, twice_det = Ops::splat(2) * o.det;
+  const V two = Ops::splat(2), three = Ops::splat(3), four = Ops::splat(4), eight = Ops::splat(8);
+  V t = Ops::root(three * n), step = t;
   for (int k = 0; k < 3; ++k) {
     const V square = t * t, slope = t * (square - n) - twice_det;  // a quarter of p'
-    const V p = square * (square - two * n) - splat(4) * (twice_det * t) + constant;
+    const V p = square * (square - twice_n) - four * (twice_det * t) + o.constant;
     // p'' is 4 (3 t^2 - n)
-    step = (two * (p * slope)) / (splat(8) * (slope * slope) - p * (splat(3) * square - n));
+    step = (two * (p * slope)) / (eight * (slope * slope) - p * (three * square - n));
     t = t - step;
   }
-  const V square = t * t;
-  o.n = n;
-  o.det = det;
   o.trace = t;
   o.step = step;
-  o.cube = square * t;
-  o.divisor = t * (square - n) - twice_det;
-  const V inverse = splat(1) / o.divisor;
-  const V linear = (square + n) * inverse, cofactor = (two * t) * inverse, cubic = two * inverse;
+  o.cube = (t * t) * t;
+  o.divisor = t * (t * t - n) - twice_det;
+}
+
+template <class Ops>
+static inline __attribute__((always_inline)) void polar_rotation(const typename Ops::V *f,
+                                                                 const Polar<Ops> &o, typename Ops::V *r) {
+  using V = typename Ops::V;
+  const V *const c = o.c, *const q = o.cofactor;
+  const V inverse = Ops::splat(1) / o.divisor;
+  const V linear = (o.trace * o.trace + o.n) * inverse, cubic = Ops::splat(2) * inverse;
+  const V cofactor = o.trace * cubic;
   for (int i = 0; i < 3; ++i) {
     const V *const row = f + 3 * i;
     const V x = (row[0] * c[0] + row[1] * c[3]) + row[2] * c[5];
@@ -78,6 +90,14 @@ static inline __attribute__((always_inline)) void polar(const typename Ops::V *f
     r[3 * i + 1] = (linear * row[1] + cofactor * q[3 * i + 1]) - cubic * y;
     r[3 * i + 2] = (linear * row[2] + cofactor * q[3 * i + 2]) - cubic * z;
   }
+}
+
+template <class Ops>
+static inline __attribute__((always_inline)) void polar(const typename Ops::V *f, typename Ops::V *r,
+                                                        Polar<Ops> &o) {
+  polar_invariants(f, o);
+  polar_trace(o);
+  polar_rotation(f, o, r);
 }
 
 }  // namespace

@@ -82,14 +82,45 @@ struct Wide {
   static inline __attribute__((always_inline)) v4 splat(double a) { return lanes::splat(a); }
   static inline __attribute__((always_inline)) v4 root(v4 a) { return sqrt4(a); }
 };
-DEFORM_INLINE void rotation_of(const Block &b, const v4 *f, v4 *r) {
-  model::Polar<Wide> o;
-  model::polar(f, r, o);
+DEFORM_INLINE void finish_rotation(const Block &b, const v4 *f, const model::Polar<Wide> &o, v4 *r) {
+  model::polar_rotation(f, o, r);
   const uint32_t good = mask_above(o.divisor, splat(model::kPolarDivisor) * o.cube) &
                         mask_above(splat(model::kPolarStep) * o.trace, abs4(o.step)) &
                         mask_above(o.n, splat(model::kPolarLeastSquare));
   const uint32_t bad = b.rotate_all ? 15u : 15u & ~good;
   if (__builtin_expect(bad != 0, 0)) rotate_lanes(b.rotate, bad, f, r);
+}
+
+// Calls use(group, place of the first lane in it, F, R) for every four cells of the block. The roots of some
+// fours are found side by side, because each is a chain of divisions.
+struct Pending {
+  v4 f[9];
+  model::Polar<Wide> o;
+};
+template <class Use>
+DEFORM_INLINE void each_four(const Block &b, const Use &use) {
+  constexpr uint32_t kSide = 8;
+  alignas(64) Pending pending[kSide];
+  const uint32_t fours = b.groups * (kGroup / 4);
+  for (uint32_t begin = 0; begin < fours; begin += kSide) {
+    const uint32_t count = fours - begin < kSide ? fours - begin : kSide;
+    for (uint32_t n = 0; n < count; ++n) {
+      const Four q = {b.group + (begin + n) / 2, (begin + n) % 2 * 4};
+      v4 f[9];
+      model::Polar<Wide> o;
+      gradient<0>(b, q, f);
+      model::polar_invariants(f, o);
+      for (int k = 0; k < 9; ++k) pending[n].f[k] = f[k];
+      pending[n].o = o;
+    }
+    for (uint32_t n = 0; n < count; ++n) model::polar_trace(pending[n].o);
+    for (uint32_t n = 0; n < count; ++n) {
+      v4 f[9], r[9];
+      for (int k = 0; k < 9; ++k) f[k] = pending[n].f[k];
+      finish_rotation(b, f, pending[n].o, r);
+      use((begin + n) / 2, (begin + n) % 2 * 4, f, r);
+    }
+  }
 }
 
 // Symmetric part of R^T F less the identity: xx yy zz xy yz zx.
@@ -268,25 +299,22 @@ DEFORM_INLINE void add_others(const Block &b, uint32_t n, const Four &q, const v
 
 template <bool kFibre, bool kDamped>
 static inline void cell_forces(const Block &b) {
-  for (uint32_t n = 0; n < b.groups; ++n)
-    for (uint32_t at = 0; at < kGroup; at += 4) {
-      const Four q = {b.group + n, at};
-      v4 f[9], r[9], e[6], stress[6], all[9], p[9];
-      gradient<0>(b, q, f);
-      rotation_of(b, f, r);
-      strain_of(r, f, e);
-      stress_of(q, e, stress);
-      full(stress, all);
-      if constexpr (kFibre || kDamped) add_others<kFibre, kDamped>(b, n, q, r, e, f, all);
-      turn(r, all, p);
-      v4 sum[4], other[4];
-      spread(b, q, 0, p, sum);
-      for (int k = 1; k < 3; ++k) {
-        spread(b, q, k, p, other);
-        for (int c = 0; c < 4; ++c) sum[c] = sum[c] + other[c];
-      }
-      for (int c = 0; c < 4; ++c) add_to(b, cell(q, c)[0], splat(0) - sum[c]);
+  each_four(b, [&](uint32_t n, uint32_t at, v4 *f, const v4 *r) __attribute__((always_inline)) {
+    const Four q = {b.group + n, at};
+    v4 e[6], stress[6], all[9], p[9];
+    strain_of(r, f, e);
+    stress_of(q, e, stress);
+    full(stress, all);
+    if constexpr (kFibre || kDamped) add_others<kFibre, kDamped>(b, n, q, r, e, f, all);
+    turn(r, all, p);
+    v4 sum[4], other[4];
+    spread(b, q, 0, p, sum);
+    for (int k = 1; k < 3; ++k) {
+      spread(b, q, k, p, other);
+      for (int c = 0; c < 4; ++c) sum[c] = sum[c] + other[c];
     }
+    for (int c = 0; c < 4; ++c) add_to(b, cell(q, c)[0], splat(0) - sum[c]);
+  });
 }
 static inline void forces(const Block &b) {
   if (b.fibre) return b.damp ? cell_forces<true, true>(b) : cell_forces<true, false>(b);
@@ -295,19 +323,16 @@ static inline void forces(const Block &b) {
 
 template <bool kFibre>
 static inline void cell_energies(const Block &b) {
-  for (uint32_t n = 0; n < b.groups; ++n)
-    for (uint32_t at = 0; at < kGroup; at += 4) {
-      const Four q = {b.group + n, at};
-      v4 f[9], r[9], e[6], s[6];
-      gradient<0>(b, q, f);
-      rotation_of(b, f, r);
-      strain_of(r, f, e);
-      stress_of(q, e, s);
-      if constexpr (kFibre) add_fibre_stress(b.fibre[n], at, e, s);
-      const v4 own = (e[0] * s[0] + e[1] * s[1]) + e[2] * s[2];
-      const v4 mixed = (e[3] * s[3] + e[4] * s[4]) + e[5] * s[5];
-      store4(b.value + size_t(kGroup) * n + at, splat(0.5) * own + mixed);
-    }
+  each_four(b, [&](uint32_t n, uint32_t at, v4 *f, const v4 *r) __attribute__((always_inline)) {
+    const Four q = {b.group + n, at};
+    v4 e[6], s[6];
+    strain_of(r, f, e);
+    stress_of(q, e, s);
+    if constexpr (kFibre) add_fibre_stress(b.fibre[n], at, e, s);
+    const v4 own = (e[0] * s[0] + e[1] * s[1]) + e[2] * s[2];
+    const v4 mixed = (e[3] * s[3] + e[4] * s[4]) + e[5] * s[5];
+    store4(b.value + size_t(kGroup) * n + at, splat(0.5) * own + mixed);
+  });
 }
 static inline void energies(const Block &b) {
   return b.fibre ? cell_energies<true>(b) : cell_energies<false>(b);
@@ -319,49 +344,45 @@ static inline void energies(const Block &b) {
 // of two below 6 variances.
 template <bool kFibre>
 static inline void cell_twists(const Block &b) {
-  for (uint32_t n = 0; n < b.groups; ++n)
-    for (uint32_t at = 0; at < kGroup; at += 4) {
-      const Four q = {b.group + n, at};
-      v4 f[9], r[9];
-      gradient<0>(b, q, f);
-      rotation_of(b, f, r);
-      v4 square = f[0] * f[0], t = r[0] * f[0];
-      for (int k = 1; k < 9; ++k) {
-        square = square + f[k] * f[k];
-        t = t + r[k] * f[k];
-      }
-      const v4 third = splat(1.0 / 3), mean = third * t, zero = splat(0);
-      const v4 variance = max4(third * square - mean * mean, zero);
-      const v4 far = sqrt4(splat(2) * variance), most = splat(2) * mean + far;
-      const v4 least = max4(splat(2) * mean - far, splat(kLeastPair) * t) + splat(1e-300);
-      const v4 mu2 = load4(q.group->mu2 + at);
-      const v4 uneven = (splat(6) * variance) / (least * least);  // (s_i - s_j)^2 / (s_i + s_j)^2 at most
-      v4 twist;
-      if constexpr (kFibre) {
-        v4 e[6], stress[6];
-        strain_of(r, f, e);
-        stress_of(q, e, stress);
-        add_fibre_stress(b.fibre[n], at, e, stress);
-        const v4 own = (stress[0] * stress[0] + stress[1] * stress[1]) + stress[2] * stress[2];
-        const v4 mixed = (stress[3] * stress[3] + stress[4] * stress[4]) + stress[5] * stress[5];
-        const v4 size = sqrt4(own + splat(2) * mixed), longest = mean + far;
-        const v4 turn_by = (splat(6) * sqrt4(splat(1) + uneven)) / least +
-                           (splat(6) * (longest * longest)) / ((least * least) * least);
-        twist = load4(b.fibre[n].most + at) * (splat(1.4143) * sqrt4(uneven) + splat(0.5) * uneven) +
-                size * turn_by;
-      } else {
-        const v4 c = load4(q.group->lambda + at) * (t - splat(3)) - mu2;
-        twist = splat(0.5) *
-                max4(mu2 + (splat(2) * c) / choose_above(c, zero, least, most + splat(1e-300)), zero);
-      }
-      const size_t place = size_t(kGroup) * n + at;
-      store4(b.value + place, twist);
-      if (!b.damp) continue;
-      const v4 stiff = kFibre ? load4(b.fibre[n].most + at) : mu2;
-      store4(b.damp_value + place,
-             load4(b.damp + place) *
-                 (stiff * (kFibre ? splat(1.4143) * sqrt4(uneven) + splat(0.5) * uneven : uneven)));
+  each_four(b, [&](uint32_t n, uint32_t at, v4 *f, const v4 *r) __attribute__((always_inline)) {
+    const Four q = {b.group + n, at};
+    v4 square = f[0] * f[0], t = r[0] * f[0];
+    for (int k = 1; k < 9; ++k) {
+      square = square + f[k] * f[k];
+      t = t + r[k] * f[k];
     }
+    const v4 third = splat(1.0 / 3), mean = third * t, zero = splat(0);
+    const v4 variance = max4(third * square - mean * mean, zero);
+    const v4 far = sqrt4(splat(2) * variance), most = splat(2) * mean + far;
+    const v4 least = max4(splat(2) * mean - far, splat(kLeastPair) * t) + splat(1e-300);
+    const v4 mu2 = load4(q.group->mu2 + at);
+    const v4 uneven = (splat(6) * variance) / (least * least);  // (s_i - s_j)^2 / (s_i + s_j)^2 at most
+    v4 twist;
+    if constexpr (kFibre) {
+      v4 e[6], stress[6];
+      strain_of(r, f, e);
+      stress_of(q, e, stress);
+      add_fibre_stress(b.fibre[n], at, e, stress);
+      const v4 own = (stress[0] * stress[0] + stress[1] * stress[1]) + stress[2] * stress[2];
+      const v4 mixed = (stress[3] * stress[3] + stress[4] * stress[4]) + stress[5] * stress[5];
+      const v4 size = sqrt4(own + splat(2) * mixed), longest = mean + far;
+      const v4 turn_by = (splat(6) * sqrt4(splat(1) + uneven)) / least +
+                         (splat(6) * (longest * longest)) / ((least * least) * least);
+      twist = load4(b.fibre[n].most + at) * (splat(1.4143) * sqrt4(uneven) + splat(0.5) * uneven) +
+              size * turn_by;
+    } else {
+      const v4 c = load4(q.group->lambda + at) * (t - splat(3)) - mu2;
+      twist =
+          splat(0.5) * max4(mu2 + (splat(2) * c) / choose_above(c, zero, least, most + splat(1e-300)), zero);
+    }
+    const size_t place = size_t(kGroup) * n + at;
+    store4(b.value + place, twist);
+    if (!b.damp) return;
+    const v4 stiff = kFibre ? load4(b.fibre[n].most + at) : mu2;
+    store4(b.damp_value + place,
+           load4(b.damp + place) *
+               (stiff * (kFibre ? splat(1.4143) * sqrt4(uneven) + splat(0.5) * uneven : uneven)));
+  });
 }
 static inline void twists(const Block &b) { return b.fibre ? cell_twists<true>(b) : cell_twists<false>(b); }
 
@@ -397,47 +418,42 @@ DEFORM_INLINE void block_of(const Turned &t, int a, int b, v4 lambda, v4 mu, v4 
 template <bool kFibre>
 static inline void cell_tangents(const Block &b, double a, double damp, double *blk) {
   constexpr int kFirst[10] = {0, 1, 2, 3, 0, 0, 0, 1, 1, 2}, kSecond[10] = {0, 1, 2, 3, 1, 2, 3, 2, 3, 3};
-  for (uint32_t n = 0; n < b.groups; ++n)
-    for (uint32_t at = 0; at < kGroup; at += 4) {
-      const Four q = {b.group + n, at};
-      v4 f[9], r[9];
-      gradient<0>(b, q, f);
-      rotation_of(b, f, r);
-      Turned t;
-      for (int c = 1; c < 4; ++c)
-        for (int k = 0; k < 3; ++k) t.g[c][k] = rest4(q, 3 * (c - 1) + k);
-      for (int c = 1; c < 4; ++c)
-        for (int k = 0; k < 3; ++k)
-          t.q[c][k] = (r[3 * k] * t.g[c][0] + r[3 * k + 1] * t.g[c][1]) + r[3 * k + 2] * t.g[c][2];
-      for (int k = 0; k < 3; ++k) {
-        t.g[0][k] = splat(0) - ((t.g[1][k] + t.g[2][k]) + t.g[3][k]);
-        t.q[0][k] = splat(0) - ((t.q[1][k] + t.q[2][k]) + t.q[3][k]);
-      }
-      v4 by = splat(a);
-      if (b.damp) by = by + splat(damp) * load4(b.damp + size_t(kGroup) * n + at);
-      if constexpr (kFibre) {
-        Fibres c;
-        load_fibres(b.fibre[n], at, c);
-        for (int k = 0; k < 3; ++k)
-          t.axis[k] = (r[3 * k] * c.a[0] + r[3 * k + 1] * c.a[1]) + r[3 * k + 2] * c.a[2];
-        for (int k = 0; k < 4; ++k)
-          t.along[k] = (c.a[0] * t.g[k][0] + c.a[1] * t.g[k][1]) + c.a[2] * t.g[k][2];
-        t.alpha = by * c.alpha;
-        t.beta = by * c.beta;
-        t.shear = by * c.shear;
-      }
-      const v4 lambda = by * load4(q.group->lambda + at), mu = splat(0.5) * (by * load4(q.group->mu2 + at));
-      for (int m = 0; m < 10; ++m) {
-        v4 one[9];
-        block_of<kFibre>(t, kFirst[m], kSecond[m], lambda, mu, one);
-        alignas(32) double spread_out[9][4];
-        for (int k = 0; k < 9; ++k) store4(spread_out[k], one[k]);
-        for (uint32_t c = 0; c < 4; ++c) {
-          double *const out = blk + 9 * size_t(b.slots[n].slot[m][at + c]);
-          for (int k = 0; k < 9; ++k) out[k] -= spread_out[k][c];
-        }
+  each_four(b, [&](uint32_t n, uint32_t at, v4 *f, const v4 *r) __attribute__((always_inline)) {
+    const Four q = {b.group + n, at};
+    Turned t;
+    for (int c = 1; c < 4; ++c)
+      for (int k = 0; k < 3; ++k) t.g[c][k] = rest4(q, 3 * (c - 1) + k);
+    for (int c = 1; c < 4; ++c)
+      for (int k = 0; k < 3; ++k)
+        t.q[c][k] = (r[3 * k] * t.g[c][0] + r[3 * k + 1] * t.g[c][1]) + r[3 * k + 2] * t.g[c][2];
+    for (int k = 0; k < 3; ++k) {
+      t.g[0][k] = splat(0) - ((t.g[1][k] + t.g[2][k]) + t.g[3][k]);
+      t.q[0][k] = splat(0) - ((t.q[1][k] + t.q[2][k]) + t.q[3][k]);
+    }
+    v4 by = splat(a);
+    if (b.damp) by = by + splat(damp) * load4(b.damp + size_t(kGroup) * n + at);
+    if constexpr (kFibre) {
+      Fibres c;
+      load_fibres(b.fibre[n], at, c);
+      for (int k = 0; k < 3; ++k)
+        t.axis[k] = (r[3 * k] * c.a[0] + r[3 * k + 1] * c.a[1]) + r[3 * k + 2] * c.a[2];
+      for (int k = 0; k < 4; ++k) t.along[k] = (c.a[0] * t.g[k][0] + c.a[1] * t.g[k][1]) + c.a[2] * t.g[k][2];
+      t.alpha = by * c.alpha;
+      t.beta = by * c.beta;
+      t.shear = by * c.shear;
+    }
+    const v4 lambda = by * load4(q.group->lambda + at), mu = splat(0.5) * (by * load4(q.group->mu2 + at));
+    for (int m = 0; m < 10; ++m) {
+      v4 one[9];
+      block_of<kFibre>(t, kFirst[m], kSecond[m], lambda, mu, one);
+      alignas(32) double spread_out[9][4];
+      for (int k = 0; k < 9; ++k) store4(spread_out[k], one[k]);
+      for (uint32_t c = 0; c < 4; ++c) {
+        double *const out = blk + 9 * size_t(b.slots[n].slot[m][at + c]);
+        for (int k = 0; k < 9; ++k) out[k] -= spread_out[k][c];
       }
     }
+  });
 }
 static inline void tangents(const Block &b, double a, double damp, double *blk) {
   return b.fibre ? cell_tangents<true>(b, a, damp, blk) : cell_tangents<false>(b, a, damp, blk);
