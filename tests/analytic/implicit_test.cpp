@@ -119,6 +119,45 @@ TEST(ImplicitContact, TwoCubesThatCollide_KeepTheirMomentum) {
   EXPECT_GT(test::measure(upper).velocity[2], 0.1);
 }
 
+// A stiff implicit cube on a soft explicit one on a plane, and a self-contained pair in free flight.
+TEST(ImplicitContact, ImplicitOnExplicit_KeepsMomentumAndRests) {
+  for (const bool flight : {true, false}) {
+    test::Context context;
+    const dfm_world w = test::make_world(context, {0, 0, flight ? 0 : -kG});
+    test::set_friction(w, 0.4);
+    test::BodyOptions o = cube("soft", 2e4, 1e-4);
+    o.damping_stiffness = 5e-3;
+    o.damping_mass = flight ? 0 : 20;  // it rocks
+    const dfm_body soft = test::make_body(context, w, "beam", {0.1, 0.1, 0.1}, 60, o);
+    o = cube("stiff", 1e8, 0.1003);
+    o.integrator = kImplicit;
+    o.damping_mass = flight ? 0 : 20;
+    o.position[0] = 0.013;
+    if (flight) o.velocity = {0.2, 0, -1};
+    const dfm_body stiff = test::make_body(context, w, "beam", {0.1, 0.1, 0.1}, 60, o);
+    const dfm_obstacle floor = flight ? 0 : test::add_plane(w, "floor");
+    uint32_t most = 0;
+    for (int step = 0; step < (flight ? 60 : 1500); ++step) {
+      test::run(w, 1e-3, 1e-3);
+      most = std::max<uint32_t>(most, uint32_t(test::contacts(w).size()));
+    }
+    EXPECT_GT(most, 3u);
+    dfm_world_stats stats{};
+    stats.size = sizeof stats;
+    test::ok(dfm_world_get_stats(w, &stats));
+    EXPECT_LE(stats.substeps_max, 4u) << "the stiff cube bounds nothing";
+    const dfm_body_measure a = test::measure(soft), b = test::measure(stiff);
+    if (flight) {
+      EXPECT_NEAR(a.mass * a.velocity[2] + b.mass * b.velocity[2], -b.mass, 1e-11);
+      EXPECT_NEAR(a.mass * a.velocity[0] + b.mass * b.velocity[0], 0.2 * b.mass, 1e-11);
+    } else {
+      EXPECT_LT(std::max(a.speed_max, b.speed_max), 1e-4);
+      for (const dfm_pair_report &p : test::pairs(w))  // between the cubes normals are tilted
+        EXPECT_TRUE(p.b != floor || std::fabs(p.normal - (a.mass + b.mass) * kG) < 1e-3) << p.normal;
+    }
+  }
+}
+
 namespace {
 
 // The tip of a bar that is held at one end and falls, 0.1 s.
@@ -186,6 +225,26 @@ TEST(ImplicitContact, StackOnThreads_KeepsItsBits) {
     hash[threads > 1] = end;
   }
   EXPECT_EQ(hash[0], hash[1]);
+}
+
+// No bound holds an implicit step. What is offered follows the error: short steps while the body swings, the
+// longest when it rests.
+TEST(ImplicitEuler, OfferedStep_GrowsAsTheBodyComesToRest) {
+  test::Context context;
+  const dfm_world w = test::make_world(context, {0, 0, -kG}, kImplicit);
+  const dfm_body b = test::make_body(context, w, "beam", {0.1, 0.1, 0.1}, 60, cube("cube", 1e4, 0));
+  hold_bottom(b, 0);
+  double shortest = 1, step = 0;
+  for (int k = 0; k < 400 && dfm_world_time(w) < 5; ++k) {
+    test::ok(dfm_world_stable_step(w, &step, nullptr, nullptr));
+    shortest = std::min(shortest, step);
+    uint32_t trouble = 0;
+    test::ok(dfm_world_step(w, step, &trouble));
+    EXPECT_EQ(trouble, 0u);
+  }
+  EXPECT_LT(shortest, 8e-3);
+  EXPECT_GT(step, 0.025);
+  EXPECT_LT(test::measure(b).speed_max, 1e-4);
 }
 
 TEST(ImplicitEuler, MethodOfAnotherIntegrator_IsRefused) {

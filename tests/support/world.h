@@ -56,6 +56,7 @@ struct BodyOptions {
   std::array<double, 3> position{}, velocity{}, spin{};
   std::array<double, 4> rotation{0, 0, 0, 1};
   const dfm_surface_def *surface = nullptr;
+  int32_t integrator = DFM_INTEGRATOR_AUTO;
 };
 
 // Points and cells of a mesh into a def that borrows them.
@@ -99,6 +100,7 @@ inline dfm_body make_body(dfm_context *c, dfm_world w, const char *kind, std::ar
   }
   for (int k = 0; k < 4; ++k) d.pose.rotation[k] = o.rotation[k];
   d.surface = o.surface;
+  d.integrator = o.integrator;
   dfm_body body = 0;
   ok(dfm_body_create(w, &d, &body));
   ok(dfm_tetmesh_destroy(mesh));

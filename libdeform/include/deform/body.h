@@ -64,6 +64,8 @@ typedef struct dfm_body_def {
   /* [ntet] how much of the cell is material, (0,1]: scales its mass and Young's modulus; NULL: all */
   const double *cell_share;
   const dfm_surface_groups *groups; /* named parts of its surface; NULL: none. Copied */
+  int32_t integrator;               /* DFM_INTEGRATOR_* of this body; AUTO: the world's */
+  uint32_t reserved;
 } dfm_body_def;
 
 /** No mesh, model msm, category 1, collides with all. Threads: Any thread. Since 0.1. */

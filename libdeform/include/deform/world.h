@@ -180,7 +180,9 @@ DFM_API dfm_status dfm_world_untangle(dfm_world world, uint32_t *left);
 
 /** A step that is not cut into sub-steps: (4, 5, 6, 7) 2^k s, at most 0.9 of the proven bound; +INFINITY if
  * nothing bounds it. It may be fed back at each step: it follows the bound down at once and up with delay, so
- * that steps change rarely (doc/concepts/step.md). dfm_world_stats.stable_step has the bound itself.
+ * that steps change rarely (doc/concepts/step.md). dfm_world_stats.stable_step has the bound itself. With the
+ * integrator IMPLICIT_EULER, which no bound holds, it follows the error of the last step instead, up to
+ * 1/30 s (doc/concepts/implicit.md).
  * @param dt          out, s
  * @param body,point  out, the element that bounds it; may be NULL
  * @return DFM_OK; DFM_E_HANDLE; DFM_E_FATAL a plugin gave no step bound. Threads: Not during

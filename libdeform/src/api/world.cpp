@@ -87,13 +87,12 @@ void choose_integrator(World &w) {
   if (!(d.solver_tolerance >= 0 && d.solver_tolerance < 1))
     fail(DFM_E_ARG, "solver_tolerance is %g; it must be 0 (the default) or a relative residual below 1",
          d.solver_tolerance);
-  if (!implicit) return;
-  w.implicit.emplace();
-  if (d.solver) w.implicit->solver = d.solver;
-  if (d.solver_tolerance > 0) w.implicit->tolerance = d.solver_tolerance;
-  if (d.newton_iterations) w.implicit->newton = d.newton_iterations;
-  w.implicit->solver_iterations = d.solver_iterations;
-  w.implicit->tasks = &w.context->tasks;
+  w.def.integrator = implicit ? DFM_INTEGRATOR_IMPLICIT_EULER : DFM_INTEGRATOR_SYMPLECTIC_EULER;
+  if (d.solver) w.implicit.solver = d.solver;
+  if (d.solver_tolerance > 0) w.implicit.tolerance = d.solver_tolerance;
+  if (d.newton_iterations) w.implicit.newton = d.newton_iterations;
+  w.implicit.solver_iterations = d.solver_iterations;
+  w.implicit.tasks = &w.context->tasks;
 }
 
 }  // namespace
@@ -258,6 +257,8 @@ dfm_status dfm_world_stable_step(dfm_world world, double *dt, dfm_body *body, ui
     // changes no result.
     if (bound_due(w)) update_bound(w);
     *dt = offered_step(w.sizes, w.bound.step);
+    const auto accurate = [](const auto &b) { return b->dynamics->abilities().accurate; };
+    if (std::any_of(w.bodies.begin(), w.bodies.end(), accurate)) *dt = std::min(*dt, accurate_step(w.sizes));
     if (body) *body = w.bound.body ? w.bound.body->handle : 0;
     if (point) *point = w.bound.point;
   });

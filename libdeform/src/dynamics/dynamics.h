@@ -57,11 +57,12 @@ struct ImplicitOptions {
 
 // What may be done to a body beside moving it.
 struct Abilities {
-  bool forces = false;   // add_forces() does something
-  bool springs = false;  // loads may depend on the state: bound() takes their row sums
-  bool placed = false;   // its points may be put elsewhere, one by one
-  bool revises = false;  // revise() does something
-  bool energy = false;   // the energy that its scheme keeps is known (step/energy_watch.h)
+  bool forces = false;    // add_forces() does something
+  bool springs = false;   // loads may depend on the state: bound() takes their row sums
+  bool placed = false;    // its points may be put elsewhere, one by one
+  bool revises = false;   // revise() does something
+  bool accurate = false;  // accurate_step() is known
+  bool energy = false;    // the energy that its scheme keeps is known (step/energy_watch.h)
 };
 
 class Dynamics {
@@ -99,6 +100,9 @@ class Dynamics {
   // Bounds of the surfels' mean velocities and of what contact has changed of them, m/s, as the linear
   // response gives them: replaced by the true ones where the end need not agree with it. After end_state().
   virtual void bound_ends(double &, double &) const {}
+  // s, the sub-step whose error would be what is wanted, by that of this one; infinite: not known. After
+  // end_state().
+  virtual double accurate_step(const SubStep &) const { return std::numeric_limits<double>::infinity(); }
   // fraction: of the way to the end that is taken; velocities are the end's.
   virtual void commit(const SubStep &now, double fraction) = 0;
 

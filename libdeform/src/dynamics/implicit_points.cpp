@@ -17,6 +17,8 @@ constexpr double kContracts = 0.5;
 // The line search ends where the slope along the correction has fallen to this share of what it was.
 constexpr double kSlopeLeft = 0.5;
 constexpr uint32_t kCuts = 8;
+// What a sub-step may err by, over the median edge of the surface; how much longer the next one may be.
+constexpr double kErrs = 0.005, kGrows = 2;
 
 double largest(const Array<double> &a) {
   double most = 0;
@@ -298,6 +300,24 @@ bool ImplicitPoints::end_state(const SubStep &now, const double *surfel_impulse,
 // An impulse moves all points, touched or not.
 void ImplicitPoints::bound_ends(double &speed, double &change) const {
   bound_surfel_ends(p_.v_end.data(), speed, change);
+}
+
+// Backward Euler errs by h^2 a / 2 in the position, a the acceleration; what all points have in common bends
+// nothing.
+double ImplicitPoints::accurate_step(const SubStep &now) const {
+  const auto gained = [&](uint32_t i) {
+    return load3(&p_.v_end[size_t{kStride} * i]) - load3(&p_.v[size_t{kStride} * i]);
+  };
+  Vec3 mean;
+  double mass = 0, most = 0;
+  for (uint32_t i = 0; i < p_.n; ++i) {
+    mean += p_.mass[i] * gained(i);
+    mass += p_.mass[i];
+  }
+  mean = (1 / mass) * mean;
+  for (uint32_t i = 0; i < p_.n; ++i) most = std::max(most, norm2(gained(i) - mean));
+  const double error = 0.5 * now.h * std::sqrt(most);
+  return now.h * std::min(kGrows, std::sqrt(kErrs * surface_.median_edge / error));
 }
 
 void ImplicitPoints::commit(const SubStep &now, double fraction) {

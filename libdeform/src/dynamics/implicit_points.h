@@ -25,7 +25,10 @@ class ImplicitPoints : public Dynamics {
                  const ImplicitOptions &options);
 
   Abilities abilities() const override {
-    return {.springs = true, .placed = true, .revises = options_.newton > 1 && !stiffness_.constant()};
+    return {.springs = true,
+            .placed = true,
+            .revises = options_.newton > 1 && !stiffness_.constant(),
+            .accurate = true};
   }
   bool bound(double time, const AddRowSums &outside, StepBound &out) override;
   bool free_motion(const SubStep &now, double &kinetic) override;
@@ -35,6 +38,7 @@ class ImplicitPoints : public Dynamics {
   bool end_state(const SubStep &now, const double *surfel_impulse, bool touched) override;
   EndState end() const override { return {p_.x_end.data(), p_.v_end.data(), p_.v_end.data()}; }
   void bound_ends(double &speed, double &change) const override;
+  double accurate_step(const SubStep &now) const override;
   void commit(const SubStep &now, double fraction) override;
 
  private:

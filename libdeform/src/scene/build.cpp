@@ -173,6 +173,7 @@ class Builder {
     d.tets = mesh.tets;
     d.material = material(b.material);
     d.model = b.model.c_str();
+    d.integrator = b.integrator;
     d.model_params = b.params.view();
     d.fixed = fixed.data();
     d.nfield = uint32_t(fields.size());

@@ -86,6 +86,7 @@ struct Start {
 
 struct Body {
   std::string pointer, name, mesh, material, model, nodal_bc;
+  int32_t integrator = DFM_INTEGRATOR_AUTO;
   MadeMesh made;
   OwnSurface surface;
   Start start;

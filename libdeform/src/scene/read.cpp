@@ -184,6 +184,13 @@ void check_rising(const Node &key, size_t i, double previous, double t) {
     key.at("t").fail("times of keyframes rise strictly; found %g after %g", t, previous);
 }
 
+int32_t integrator_of(const Node &holder) {
+  const std::string word = holder.word("integrator", "auto", "integrator");
+  return word == "symplectic_euler" ? DFM_INTEGRATOR_SYMPLECTIC_EULER
+         : word == "implicit_euler" ? DFM_INTEGRATOR_IMPLICIT_EULER
+                                    : DFM_INTEGRATOR_AUTO;
+}
+
 dfm_sine read_sine(const Node &sine, bool scalar) {
   dfm_sine out = {};
   sine.object("sine");
@@ -234,10 +241,7 @@ void read_time(const Node &scene, Definition &def) {
       step.fail("%g s at %g s a step are more than 1e12 steps", def.duration, def.step);
   }
   time.word("mode", "dynamic", "mode");
-  const std::string integrator = time.word("integrator", "auto", "integrator");
-  def.integrator = integrator == "symplectic_euler" ? DFM_INTEGRATOR_SYMPLECTIC_EULER
-                   : integrator == "implicit_euler" ? DFM_INTEGRATOR_IMPLICIT_EULER
-                                                    : DFM_INTEGRATOR_AUTO;
+  def.integrator = integrator_of(time);
 }
 
 void read_solver(const Node &scene, Definition &def) {

@@ -16,6 +16,7 @@ Definition read_scene(json &tree, const std::string &file, const Types &types);
 Params read_params(const Node &params, const dfm_type *type);
 std::vector<double> read_param(const Node &value, const dfm_param &row);
 const dfm_type *read_type(const Node &name, uint32_t kind, const Types &types);
+int32_t integrator_of(const Node &holder);  // its key `integrator`, DFM_INTEGRATOR_*
 dfm_sine read_sine(const Node &sine, bool scalar);
 void check_rising(const Node &keys, size_t i, double previous, double t);
 void check_fresh(const Node &name, const std::string &value, const std::vector<std::string> &taken,

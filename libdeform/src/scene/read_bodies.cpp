@@ -230,6 +230,7 @@ Body read_body(const Node &node, ReadContext &context) {
   if (!model.has("type")) model.value()["type"] = "msm";
   const dfm_type *type = read_type(model.member("type"), DFM_KIND_MODEL, context.types);
   b.model = type->id;
+  b.integrator = integrator_of(node);
   if (model.has("params")) b.params = read_params(model.member("params"), type);
   b.pose = read_pose(node, "pose", &b.scale);
   node.vector("velocity", b.velocity, 0, 0, 0);

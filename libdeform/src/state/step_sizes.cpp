@@ -13,6 +13,8 @@ constexpr double kRounding = 1e-9;  // of a quotient of two sizes
 constexpr double kSame = 1.06;
 // longer sub-steps are taken up to this share of the stable one, so that they need not be given up again soon
 constexpr double kRise = 0.9;
+// s, of implicit bodies: the first step, before an error is known, and the longest that is offered
+constexpr double kFirstOffer = 1e-3, kLongestOffer = 1.0 / 30;
 constexpr uint32_t kLeastCalm = 64;  // sub-steps: four evaluations of the bound
 
 // The smallest of 1, 2, 3 and (4, 5, 6, 7) 2^k that is not below x.
@@ -67,6 +69,10 @@ double offered_step(const StepSizes &s, double stable) {
   return std::isfinite(stable) && stable > 0 ? r.size : stable;
 }
 
+double accurate_step(const StepSizes &s) {
+  return rung_below(s.accurate > 0 ? std::min(s.accurate, kLongestOffer) : kFirstOffer);
+}
+
 double choose_pieces(StepSizes &s, double dt, double stable) {
   settle_offer(s.offer, stable);
   if (std::isinf(stable)) return 1;
@@ -103,7 +109,7 @@ void pass(StepSizes &s) {
   pass(s.offer);
 }
 
-bool sound(const StepSizes &s) { return sound(s.cut) && sound(s.offer); }
+bool sound(const StepSizes &s) { return s.accurate >= 0 && sound(s.cut) && sound(s.offer); }
 
 std::string short_step(double dt, double floor) {
   return format(

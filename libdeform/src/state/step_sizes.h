@@ -31,11 +31,15 @@ struct Rung {
 struct StepSizes {
   Rung cut;    // of the sub-steps that the last step was cut into
   Rung offer;  // of the step that dfm_world_stable_step answers, whatever the host takes
+  // s, that the errors of the last sub-step of implicit bodies allow; 0: none has been taken
+  double accurate = 0;
 };
 
 // stable: s, the longest sub-step allowed now (infinite: any).
 // s, a step that is not cut, and changes its size rarely if taken again and again
 double offered_step(const StepSizes &s, double stable);
+// The same for implicit bodies, whose step nothing bounds: by the error of the last one. It may change often.
+double accurate_step(const StepSizes &s);
 // number of sub-steps of the step dt, which may be too many for an integer
 double choose_pieces(StepSizes &s, double dt, double stable);
 // in mid-step, where the bound has fallen below size: into how many each one is cut

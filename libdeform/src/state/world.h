@@ -3,7 +3,6 @@
 #pragma once
 #include <atomic>
 #include <memory>
-#include <optional>
 #include <string>
 #include <vector>
 
@@ -61,7 +60,7 @@ struct World {
   uint64_t handle = 0;
   dfm_world_def def{};
   std::vector<std::string> asked_effects;
-  std::optional<ImplicitOptions> implicit;  // of its integrator; empty: points move explicitly
+  ImplicitOptions implicit;  // of bodies whose integrator is implicit
   Gravity gravity;
 
   std::vector<std::unique_ptr<Body>> bodies;         // in id order

@@ -1,5 +1,7 @@
 // Where bodies end: contact impulses to points, then positions and velocities at the end of the sub-step.
 #include <algorithm>
+#include <cmath>
+#include <limits>
 
 #include "core/error.h"
 #include "step/context.h"
@@ -36,6 +38,10 @@ bool stage_commit(World &w, StepContext &step, uint32_t *trouble) {
   if (!step.ended && !find_ends(w, step, trouble)) return false;
   book_energy(w, step, step.guard.motion);
   const SubStep now = sub_step_of(w, step);
+  double accurate = std::numeric_limits<double>::infinity();
+  for (const uint32_t i : step.active)
+    accurate = std::min(accurate, w.bodies[i]->dynamics->accurate_step(now));
+  w.sizes.accurate = std::isfinite(accurate) ? accurate : 0;
   w.context->tasks.parallel_for(
       static_cast<uint32_t>(step.active.size()), 1, [&](uint32_t begin, uint32_t end) {
         for (const uint32_t i : std::span(step.active).subspan(begin, end - begin)) {

@@ -381,6 +381,7 @@ void fields(Stream &s, W &w, const World &like) {
     s.value("calm of the size", r->calm, must::any);
     s.value("patience", r->patience, must::any);
   }
+  s.value("accurate step", w.sizes.accurate, must::not_negative);
   s.must_hold("step size", "sizes that the library chooses", [&] { return sound(w.sizes); });
   s.value("age of the energies", w.watch.age, must::any);
   s.value("credit of the energies", w.watch.credit, must::any);
