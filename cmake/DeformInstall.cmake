@@ -24,6 +24,10 @@ get_property(deform_plugins GLOBAL PROPERTY DEFORM_PLUGINS)
 if(deform_plugins)
   install(TARGETS ${deform_plugins} LIBRARY DESTINATION ${deform_plugin_dir})
 endif()
+# Under the GPL: no part of what is installed unless it is asked for by name.
+if(TARGET solver_cholmod)
+  install(TARGETS solver_cholmod LIBRARY DESTINATION ${deform_plugin_dir} COMPONENT cholmod EXCLUDE_FROM_ALL)
+endif()
 install(DIRECTORY ${CMAKE_SOURCE_DIR}/libdeform/include/deform DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}
   FILES_MATCHING PATTERN "*.h" PATTERN "*.hpp")
 install(FILES ${CMAKE_SOURCE_DIR}/libdeform/schema/deform-scene.schema.json

@@ -1,6 +1,6 @@
 // What each linear solver costs on the matrix of an implicit step, four sizes of a cylinder.
 //
-//   solver_bench [--csv FILE --commit HASH]
+//   solver_bench [--csv FILE --commit HASH] [--plugin FILE --solver NAME]
 //
 // Linear elasticity, E 1e5 Pa, nu 0.3, density 1,000 kg/m^3, step 1/60 s, one end held. `analyse` is paid
 // once, `factor` whenever the matrix changes; `solve` is per right-hand side, one at a time and 64 together,
@@ -8,13 +8,15 @@
 // stated. Best of some rounds.
 #include <chrono>
 #include <cstdio>
+#include <cstring>
 #include <functional>
 #include <memory>
 
 #include "../unit/math/block_system.h"
+#include "deform/deform.h"
 #include "machine.h"
 #include "math/ldlt_solver.h"
-#include "math/make_solver.h"
+#include "plugin/plugin_solver.h"
 
 namespace {
 
@@ -54,14 +56,18 @@ double best_ms(const std::function<void()> &f) {
   return 1e3 * best;
 }
 
-void measure(const bench::Csv &sink, const char *name, uint32_t threads, const test::BlockSystem &system,
-             uint32_t ntet) {
+// "pcg_one_level": told no places, so it has block Jacobi alone.
+void measure(const bench::Csv &sink, const dfm_context &context, const char *label, uint32_t threads,
+             const test::BlockSystem &system, uint32_t ntet) {
   CountedMemory counted;
+  const bool one_level = std::strcmp(label, "pcg_one_level") == 0;
+  const char *const name = one_level ? "pcg" : label;
   dfm::Tasks tasks(threads, nullptr, nullptr);
   const auto solver =
-      dfm::make_solver({name, system.n, false, 0}, counted.memory, threads > 1 ? &tasks : nullptr);
+      dfm::make_solver({name, system.n, false, 0}, context, counted.memory, threads > 1 ? &tasks : nullptr);
   const double analyse = best_ms([&] { solver->analyse(system.pattern()); });
   const double factor = best_ms([&] {
+    if (!one_level) solver->place(system.points.data(), 3);
     if (!solver->factor(system.blk.data())) std::puts("not positive definite");
   });
   const size_t rows = 3 * size_t{system.n};
@@ -95,13 +101,13 @@ void measure(const bench::Csv &sink, const char *name, uint32_t threads, const t
           best_ms([&] { solver->restricted(uint32_t(sel.size()), sel.data(), kTolerance, w.data(), info); });
     }
   const double per = iterations ? 1e6 * one / iterations / ntet : 0;
-  std::printf("%-8s %u %6u %7u %9.2f %9.2f %9.3f %9.3f %6u %8.2f %9.2f %9.2f %8.0f\n", name, threads,
+  std::printf("%-13s %u %6u %7u %9.2f %9.2f %9.3f %9.3f %6u %8.2f %9.2f %9.2f %8.0f\n", label, threads,
               system.n, ntet, analyse, factor, one, many, iterations, per, restricted[0], restricted[1],
               bytes);
   std::fflush(stdout);
   if (sink.csv)
     std::fprintf(sink.csv, "%s,%s,%u,%u,%u,%.3f,%.3f,%.4f,%.4f,%u,%.2f,%.3f,%.3f,%.0f\n", sink.head.c_str(),
-                 name, threads, system.n, ntet, analyse, factor, one, many, iterations, per, restricted[0],
+                 label, threads, system.n, ntet, analyse, factor, one, many, iterations, per, restricted[0],
                  restricted[1], bytes);
 }
 
@@ -112,15 +118,25 @@ int main(int argc, char **argv) {
       argc, argv,
       "solver,threads,points,tetrahedra,analyse_ms,factor_ms,solve_ms,solve_of_64_ms,iterations,"
       "iteration_ns_per_tet,restricted_50_ms,restricted_300_ms,bytes_per_tet");
-  std::printf("%-8s %s %6s %7s %9s %9s %9s %9s %6s %8s %9s %9s %8s\n", "solver", "t", "points", "tets",
+  std::printf("%-13s %s %6s %7s %9s %9s %9s %9s %6s %8s %9s %9s %8s\n", "solver", "t", "points", "tets",
               "analyse", "factor", "solve", "of 64", "iter", "ns/it/t", "S 50", "S 300", "B/tet");
+  std::vector<const char *> names = {"ldlt", "pcg", "pcg_one_level"};
+  dfm_context *context = nullptr;
+  const dfm_context_def def = dfm_context_def_default();
+  if (dfm_context_create(&def, &context) != DFM_OK) return 1;
+  for (int n = 1; n + 1 < argc; n += 2) {
+    if (!std::strcmp(argv[n], "--plugin") && dfm_plugin_load(context, argv[n + 1]) != DFM_OK)
+      std::puts(dfm_last_error());
+    if (!std::strcmp(argv[n], "--solver")) names.push_back(argv[n + 1]);
+  }
   for (const uint32_t cells : {650u, 4800u, 11500u, 20200u}) {
     const dfm::TetMesh mesh = dfm::make_cylinder(dfm::Memory::standard(), 0.05, 0.2, cells);
     test::BlockSystem system = test::elastic_system(mesh, 1e5, 0.3, 1.0 / 60);
     std::vector<uint8_t> mask(system.n, 0);
     for (uint32_t i = 0; i < system.n; ++i) mask[i] = system.points[3 * size_t{i} + 2] < 1e-9 ? 7 : 0;
     dfm::hold_components(system.pattern(), mask.data(), system.blk.data());
-    for (const char *name : {"ldlt", "pcg"})
-      for (const uint32_t threads : {1u, 2u}) measure(sink, name, threads, system, mesh.ntet());
+    for (const char *name : names)
+      for (const uint32_t threads : {1u, 2u}) measure(sink, *context, name, threads, system, mesh.ntet());
   }
+  dfm_context_destroy(context);
 }

@@ -108,6 +108,7 @@ bool ImplicitPoints::linearize(const SubStep &now) {
     }
   }
   hold_components(pattern(), p_.held.data(), blocks.data());
+  solver_->place(x_.data(), kStride);
   if (!solver_->factor(blocks.data())) return false;
   factor_h_ = now.h;
   held_ = p_.held;

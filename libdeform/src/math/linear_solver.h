@@ -18,6 +18,8 @@ class LinearSolver {
   virtual bool direct() const = 0;
   // A new pattern; what is asked of the solver before the next factor() is void. Throws where memory ends.
   virtual void analyse(const BlockPattern &pattern) = 0;
+  // Where the points are now, [n,stride]: before factor(), read there. Who is told may need fewer iterations.
+  virtual void place(const double *points, uint32_t stride) {}
   // New values blk[nb,9], read during the call only. False: the matrix is not positive definite, and nothing
   // may be solved with it.
   virtual bool factor(const double *blk) = 0;

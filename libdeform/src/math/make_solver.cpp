@@ -9,7 +9,8 @@ namespace dfm {
 
 namespace {
 
-constexpr uint32_t kFactorEveryStep = 1500;  // points up to which a factorization in every step is cheaper
+// Points up to which a factorization in every step is worth its price: doc/reference/solvers.md
+constexpr uint32_t kFactorEveryStep = 3000;
 
 }  // namespace
 

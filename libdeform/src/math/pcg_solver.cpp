@@ -25,6 +25,8 @@ bool invert(const double *a, double *out) {
   return true;
 }
 
+constexpr uint32_t kTwoLevels = 200;  // points below which one level has done before two are set up
+
 }  // namespace
 
 PcgSolver::PcgSolver(const Memory &memory, Tasks *tasks, uint32_t max_iterations)
@@ -32,17 +34,26 @@ PcgSolver::PcgSolver(const Memory &memory, Tasks *tasks, uint32_t max_iterations
       tasks_(tasks),
       max_iterations_(max_iterations),
       a_(memory),
+      coarse_(memory, tasks),
       by_solving_(memory) {
+  use_memory(memory, ij_);
   use_memory(memory, inverse_, r_, z_, p_, q_, partial_);
 }
 
 void PcgSolver::analyse(const BlockPattern &pattern) {
-  ready_ = false;
+  ready_ = patched_ = two_levels_ = false;
+  points_ = nullptr;
   a_.set_pattern(pattern);
+  ij_.assign(pattern.ij, pattern.ij + 2 * size_t{pattern.nb});
   const size_t rows = 3 * size_t{pattern.n};
   inverse_.assign(3 * rows + 1, 0.0);  // and what the load of the last column reads
   for (Array<double> *v : {&r_, &z_, &p_, &q_}) v->assign(rows, 0.0);
   partial_.assign((pattern.n + BlockMatrix::kGrain - 1) / BlockMatrix::kGrain, 0.0);
+}
+
+void PcgSolver::place(const double *points, uint32_t stride) {
+  points_ = points;
+  stride_ = stride;
 }
 
 bool PcgSolver::factor(const double *blk) {
@@ -50,6 +61,14 @@ bool PcgSolver::factor(const double *blk) {
   ready_ = true;
   for (uint32_t i = 0; i < a_.size() && ready_; ++i)
     ready_ = invert(a_.diagonal(i), &inverse_[9 * size_t{i}]);
+  two_levels_ = ready_ && points_ && a_.size() >= kTwoLevels;
+  if (two_levels_) {
+    const BlockPattern pattern{a_.size(), uint32_t(ij_.size() / 2), ij_.data()};
+    if (!patched_) coarse_.analyse(pattern, a_.rows());
+    patched_ = true;
+    two_levels_ = coarse_.factor(pattern, blk, a_.rows(), points_, stride_);
+  }
+  points_ = nullptr;
   return ready_;
 }
 
@@ -75,21 +94,35 @@ double PcgSolver::sum(F &&f) {
   return total;
 }
 
+// z = M^-1 r, where before(begin, end) makes r first; returns r.z
+template <class F>
+double PcgSolver::precondition(const double *r, F &&before) {
+  double *const z = z_.data();
+  if (!two_levels_)
+    return sum([&](uint32_t begin, uint32_t end) {
+      before(begin, end);
+      return kernels_.diagonal(inverse_.data(), begin, end, r, z);
+    });
+  each(before);
+  const double coarse = coarse_.solve(r);
+  const double fine = sum([&](uint32_t begin, uint32_t end) {
+    const double dot = kernels_.diagonal(inverse_.data(), begin, end, r, z);
+    coarse_.add(begin, end, z);
+    return dot;
+  });
+  return fine + coarse;
+}
+
 bool PcgSolver::solve_one(const double *b, double *x, double tolerance, SolveInfo &info) {
-  double *const r = r_.data(), *const z = z_.data(), *const p = p_.data(), *const q = q_.data();
-  const auto precondition = [&](uint32_t begin, uint32_t end, const double *from) {
-    return kernels_.diagonal(inverse_.data(), begin, end, from, z);
-  };
-  const double scale =
-      sum([&](uint32_t begin, uint32_t end) { return precondition(begin, end, b); });  // of x = 0
+  double *const r = r_.data(), *const p = p_.data(), *const q = q_.data();
+  const double scale = precondition(b, [](uint32_t, uint32_t) {});  // of x = 0
   if (scale == 0) {
     std::fill(x, x + 3 * size_t{a_.size()}, 0.0);
     return true;
   }
-  double rz = sum([&](uint32_t begin, uint32_t end) {
+  double rz = precondition(r, [&](uint32_t begin, uint32_t end) {
     a_.multiply(begin, end, x, q);
     for (size_t k = 3 * size_t{begin}; k < 3 * size_t{end}; ++k) r[k] = b[k] - q[k];
-    return precondition(begin, end, r);
   });
   const uint64_t limit = max_iterations_ ? max_iterations_ : 3 * uint64_t{a_.size()};
   const double goal = tolerance * tolerance * scale;
@@ -97,17 +130,15 @@ bool PcgSolver::solve_one(const double *b, double *x, double tolerance, SolveInf
   std::fill(p_.begin(), p_.end(), 0.0);
   uint64_t k = 0;
   for (; rz > goal && k < limit; ++k) {
-    each([&](uint32_t begin, uint32_t end) { kernels_.turn(begin, end, beta, z, p); });
+    each([&](uint32_t begin, uint32_t end) { kernels_.turn(begin, end, beta, z_.data(), p); });
     const double curvature = sum([&](uint32_t begin, uint32_t end) { return a_.multiply(begin, end, p, q); });
     if (!(curvature > 0)) {  // not a number, too
       info.indefinite = true;
       break;
     }
     const double alpha = rz / curvature;
-    const double next = sum([&](uint32_t begin, uint32_t end) {
-      kernels_.advance(begin, end, alpha, p, q, x, r);
-      return precondition(begin, end, r);
-    });
+    const double next = precondition(
+        r, [&](uint32_t begin, uint32_t end) { kernels_.advance(begin, end, alpha, p, q, x, r); });
     beta = next / rz;
     rz = next;
   }

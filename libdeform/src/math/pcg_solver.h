@@ -1,6 +1,7 @@
-// Conjugate gradients with a preconditioner of inverted 3x3 blocks (block Jacobi).
+// Conjugate gradients with a preconditioner of inverted 3x3 blocks (block Jacobi), and of rigid motions of
+// patches where the solver knows the places of the points (coarse_space.h).
 #pragma once
-#include "math/linear_solver.h"
+#include "math/coarse_space.h"
 
 namespace dfm {
 
@@ -12,6 +13,7 @@ class PcgSolver final : public LinearSolver {
   const char *name() const override { return "pcg"; }
   bool direct() const override { return false; }
   void analyse(const BlockPattern &pattern) override;
+  void place(const double *points, uint32_t stride) override;
   bool factor(const double *blk) override;
   // Stops where sqrt(r.M^-1 r) <= tolerance sqrt(b.M^-1 b).
   bool solve(uint32_t nrhs, const double *b, double *x, double tolerance, SolveInfo &info) override;
@@ -23,6 +25,8 @@ class PcgSolver final : public LinearSolver {
   void each(F &&f);
   template <class F>
   double sum(F &&f);
+  template <class F>
+  double precondition(const double *r, F &&before);
 
   const BlockKernels &kernels_;
   Tasks *tasks_;
@@ -31,6 +35,11 @@ class PcgSolver final : public LinearSolver {
   BlockMatrix a_;
   Array<double> inverse_;  // [n,9] of the diagonal blocks
   Array<double> r_, z_, p_, q_, partial_;
+  Array<uint32_t> ij_;  // pattern, for the coarse level
+  CoarseSpace coarse_;
+  const double *points_ = nullptr;
+  uint32_t stride_ = 0;
+  bool two_levels_ = false, patched_ = false;  // at work; patches are formed
   RestrictedBySolving by_solving_;
 };
 

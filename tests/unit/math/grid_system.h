@@ -17,6 +17,7 @@ struct Grid {
   uint32_t n = 0;
   std::vector<uint32_t> ij;
   std::vector<double> blk;
+  std::vector<double> points;
   dfm::BlockPattern pattern() const { return {n, uint32_t(ij.size() / 2), ij.data()}; }
 };
 
@@ -30,7 +31,8 @@ inline Grid grid(uint32_t a, uint32_t b, uint32_t c, double mass, uint32_t seed 
   const auto point = [&](uint32_t x, uint32_t y, uint32_t z) { return (z * b + y) * a + x; };
   for (uint32_t z = 0; z < c; ++z)
     for (uint32_t y = 0; y < b; ++y)
-      for (uint32_t x = 0; x < a; ++x)
+      for (uint32_t x = 0; x < a; ++x) {
+        g.points.insert(g.points.end(), {double(x), double(y), double(z)});
         for (int dz = 0; dz <= 1; ++dz)
           for (int dy = -1; dy <= 1; ++dy)
             for (int dx = -1; dx <= 1; ++dx) {
@@ -51,6 +53,7 @@ inline Grid grid(uint32_t a, uint32_t b, uint32_t c, double mass, uint32_t seed 
                 }
               blocks.push_back({{i, j}, block});
             }
+      }
   for (uint32_t i = 0; i < g.n; ++i) {
     for (uint32_t r = 0; r < 3; ++r) own[9 * i + 4 * r] += mass;
     blocks.push_back({{i, i}, std::vector<double>(own.begin() + 9 * i, own.begin() + 9 * i + 9)});

@@ -71,6 +71,34 @@ TEST(PluginSolver, RefusedMatrix_NamesThePlugin) {
   EXPECT_TRUE(solver->factor(small.blk.data()));
 }
 
+#ifdef DEFORM_HAS_CHOLMOD
+TEST(PluginSolver, Cholmod_EqualsTheOwnFactorization) {
+  const std::string file = std::string(DEFORM_PLUGIN_DIR) + "/solver_cholmod.so";
+  const tiny::Context context;
+  ASSERT_EQ(dfm_plugin_load(context.c, file.c_str()), DFM_OK) << dfm_last_error();
+  const test::Grid g = test::grid(9, 8, 7, 0.05);
+  const std::vector<double> b = test::noise(9 * size_t{g.n}, 1);
+  std::vector<double> answers[2];
+  for (const char *name : {"ldlt", "cholmod"}) {
+    const auto solver = dfm::make_solver({name, g.n, false, 0}, *context.c, memory(), nullptr);
+    solver->analyse(g.pattern());
+    for (double scale : {2.0, 1.0}) {
+      std::vector<double> blk = g.blk;
+      for (double &v : blk) v *= scale;
+      ASSERT_TRUE(solver->factor(blk.data()));
+    }
+    std::vector<double> &x = answers[name[0] == 'c'];
+    x.resize(b.size());
+    dfm::SolveInfo info;
+    ASSERT_TRUE(solver->solve(3, b.data(), x.data(), 0, info));
+    const test::Grid bad = test::grid(9, 8, 7, -1.0);
+    solver->analyse(bad.pattern());
+    EXPECT_FALSE(solver->factor(bad.blk.data()));
+  }
+  EXPECT_LT(test::worst(answers[1], answers[0]), 1e-11);
+}
+#endif
+
 TEST(PluginSolver, Name_FindsOwnSolversAndPluginsElseListsThem) {
   const Loaded context;
   EXPECT_STREQ(context.solver("ldlt")->name(), "ldlt");
