@@ -31,10 +31,10 @@ class Expectations {
     if (!cli::parse_json(read_file(folder() + scene + ".expect.json"), root_, nullptr, &why))
       ADD_FAILURE() << scene << ".expect.json: " << why;
     static const char *const known[] = {
-        "asks",    "why",          "least_contacts", "energy_input_J", "rest_speed",   "places",
-        "volume",  "recovers",     "keeps_spin",     "same_path_as",   "stops",        "within_reach",
-        "stretch", "hand",         "variants",       "models",         "combinations", "known_failures",
-        "set",     "soak_seconds", "jitter_velocity"};
+        "asks",           "why",     "least_contacts", "energy_input_J", "rest_speed",   "places",
+        "accelerates",    "volume",  "recovers",       "keeps_spin",     "same_path_as", "stops",
+        "within_reach",   "stretch", "hand",           "variants",       "models",       "combinations",
+        "known_failures", "set",     "soak_seconds",   "jitter_velocity"};
     const auto check = [&](const cli::JsonValue &object) {
       for (const cli::JsonMember &m : object.members)
         EXPECT_TRUE(
@@ -142,6 +142,17 @@ class Expectations {
               !(std::fabs(b.com[k] - std::stod(com.items[k].text)) <= within))
             say("%s ends at %c = %g; expected %s within %g", b.name.c_str(), "xyz"[k], b.com[k],
                 com.items[k].text.c_str(), within);
+      }
+      if (const cli::JsonValue *v = of_body("accelerates", b.name, variant, c.model)) {
+        const std::array<double, 3> by = vector(*v->find("by"));
+        const double within = std::stod(v->get("within"));
+        const double h = seen.time / double(std::max<uint64_t>(1, seen.stats.substeps));
+        for (size_t k = 0; k < 3; ++k) {
+          const double went = b.com[k] - b.com_start[k], expected = 0.5 * by[k] * seen.time * (seen.time + h);
+          if (!(std::fabs(went - expected) <= within))
+            say("%s goes %g m along %c; expected %g within %g", b.name.c_str(), went, "xyz"[k], expected,
+                within);
+        }
       }
       if (const cli::JsonValue *v = of_body("volume", b.name, variant, c.model)) {
         const double lo = std::stod(v->items[0].text), hi = std::stod(v->items[1].text);

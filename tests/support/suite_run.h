@@ -11,6 +11,7 @@
 #include "coupled.h"
 #include "crossing.h"
 #include "obstacle.h"
+#include "voxel_core.h"
 
 namespace test::suite {
 
@@ -47,7 +48,7 @@ struct Settings {
 
 struct BodySeen {
   std::string name;
-  std::array<double, 3> com{}, spin_start{}, spin{};
+  std::array<double, 3> com_start{}, com{}, spin_start{}, spin{};
   double volume_ratio = 0;
   double misfit = 0;  // largest change of an edge of a cell at the end, over its rest length
   uint32_t inverted = 0;
@@ -126,11 +127,15 @@ class Observer {
       if (w.def.shape == DFM_SHAPE_MESH)
         w.surface = {{w.def.points, w.def.points + 3 * size_t(w.def.npoint)},
                      {w.def.triangles, w.def.triangles + 3 * size_t(w.def.ntriangle)}};
+      if (w.def.shape == DFM_SHAPE_VOXELS)
+        w.surface = {cli::voxel_core(w.def),
+                     {w.def.triangles, w.def.triangles + 3 * size_t(w.def.ntriangle)}};
       walls_.push_back(std::move(w));
     }
     std::tie(seen_.start, seen_.energy_most) = energies();
     for (size_t b = 0; b < bodies_.size(); ++b) {
       const dfm_body_measure m = measure(bodies_[b].handle);
+      std::copy_n(m.com, 3, seen_.bodies[b].com_start.begin());
       std::copy_n(m.angular, 3, seen_.bodies[b].spin_start.begin());
     }
   }
