@@ -11,6 +11,7 @@ namespace corot {
 namespace {
 constexpr char kId[] = "org.deform.corotational_fem";
 constexpr uint32_t kRun = DFM_PARAM_RUNTIME, kCell = DFM_PARAM_PER_CELL, kUnlessGiven = DFM_PARAM_AUTO;
+const char *const kEnergies[] = {"corotational", "neo_hookean", "stvk", nullptr};
 const char *const kTangents[] = {"usual", "exact", nullptr};
 const char *const kRotations[] = {"polar", "svd", "qr", nullptr};
 }  // namespace
@@ -20,6 +21,8 @@ const dfm_param kParams[kParamCount] = {
     {"poisson", "Poisson ratio", "1", -0.99, 0.4999, 0.3, kRun | kCell, 1, nullptr},
     {"damping_stiffness", "damping over stiffness of each cell", "s", 0, 1e3, 0, kRun | kCell, 1, nullptr},
     {"damping_mass", "drag over mass of each point", "1/s", 0, 1e6, 0, kRun | kCell, 1, nullptr},
+    {"energy", "corotational: linear in the frame; or an energy of the gradient", "1", 0, 2, kLinear,
+     kRun | DFM_PARAM_ENUM, 1, kEnergies},
     {"rotation", "how the frame of a cell is found; qr depends on the axes of the rest shape", "1", 0, 2,
      kPolar, kRun | DFM_PARAM_ENUM, 1, kRotations},
     {"tangent", "stiffness for implicit steps; exact: with the turning of the frames", "1", 0, 1, kUsual,

@@ -1,6 +1,8 @@
 // The ops on the blocks. Forces run in two passes: each block loads its points and sums its cells into its
 // own array, halo included; then each block adds up, in block order, what the others' halos hold for its
 // points. No two workers write one place, and the order of every sum is fixed by the mesh.
+#include <deform/elementary.h>
+
 #include "corot_body.h"
 
 namespace corot {
@@ -56,18 +58,59 @@ void Body::add_forces(const dfm_kin &k, double *f_out) {
   for_each_block(kParallelMergeCells, merge_pass, &call);
 }
 
-double Body::energy(const dfm_kin &k) {
+// The logarithm is not for kernels: one cell after the other.
+double Body::direct_energy(const dfm_kin &k, size_t place) const {
+  const uint32_t c = cell_id[place], lane = uint32_t(place % kGroup);
+  const Group &own = group[place / kGroup];
+  const double *x[4];
+  for (int m = 0; m < 4; ++m) x[m] = k.x + size_t(k.stride) * cells[4 * size_t(c) + size_t(m)];
+  double grad[9], n = 0;
+  gradient_of(own, lane, x, grad);
+  for (const double entry : grad) n += entry * entry;
+  const double mu2 = own.mu2[lane], lambda = own.lambda[lane];
+  if (choice(kEnergy) == kVenant) {
+    double square = 0;
+    for (int i = 0; i < 3; ++i)
+      for (int j = 0; j < 3; ++j) {
+        const double e =
+            0.5 * (((grad[i] * grad[j] + grad[3 + i] * grad[3 + j]) + grad[6 + i] * grad[6 + j]) -
+                   (i == j ? 1 : 0));
+        square += e * e;
+      }
+    const double trace = 0.5 * (n - 3);
+    return 0.5 * (mu2 * square + lambda * (trace * trace));
+  }
+  const double m = 2.0 / 3 * mu2, l = lambda + 5.0 / 12 * mu2;
+  const double more = (grad[0] * (grad[4] * grad[8] - grad[5] * grad[7]) +
+                       grad[1] * (grad[5] * grad[6] - grad[3] * grad[8])) +
+                      grad[2] * (grad[3] * grad[7] - grad[4] * grad[6]) - 1;
+  return 0.5 * (m * ((n - 3) - dfm_log((n + 1) / 4)) + l * (more * more)) - 0.75 * m * more;
+}
+
+void Body::fill_energies(const dfm_kin &k) {
   Call call{this, &k, nullptr};
-  for_each_block(kParallelCells, energy_pass, &call);
+  if (choice(kEnergy) == kLinear) return for_each_block(kParallelCells, energy_pass, &call);
+  for (size_t place = 0; place < lanes(); ++place)
+    if (cell_id[place] != kNone) value[place] = direct_energy(k, place);
+}
+
+double Body::energy(const dfm_kin &k) {
+  fill_energies(k);
   double sum = 0;
   for (uint32_t c = 0; c < ncell; ++c) sum += value[place_of[c]];
   return sum;
 }
 
 void Body::cell_energy(const dfm_kin &k, double *out) {
-  Call call{this, &k, nullptr};
-  for_each_block(kParallelCells, energy_pass, &call);
+  fill_energies(k);
   for (uint32_t c = 0; c < ncell; ++c) out[c] = volume[c] > 0 ? value[place_of[c]] / volume[c] : 0;
+}
+
+void gradient_of(const Group &group, uint32_t lane, const double *const *x, double *f) {
+  for (int k = 0; k < 3; ++k)
+    for (int l = 0; l < 3; ++l)
+      f[3 * k + l] = ((x[1][k] - x[0][k]) * group.g[l][lane] + (x[2][k] - x[0][k]) * group.g[3 + l][lane]) +
+                     (x[3][k] - x[0][k]) * group.g[6 + l][lane];
 }
 
 }  // namespace corot

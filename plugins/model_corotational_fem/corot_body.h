@@ -22,6 +22,7 @@ enum Param : uint32_t {
   kPoisson,
   kDampingStiffness,
   kDampingMass,
+  kEnergy,
   kRotation,
   kTangent,
   kYoungAlong,
@@ -93,6 +94,7 @@ struct Body {
   void add_forces(const dfm_kin &k, double *f_out);
   void bound(const dfm_kin &k, double *ksum, double *csum);
   double energy(const dfm_kin &k);
+  void fill_energies(const dfm_kin &k);
   void cell_energy(const dfm_kin &k, double *out);
 
   uint32_t pairs() const { return npoint + nedge; }
@@ -124,6 +126,7 @@ struct Body {
   };
   void make_room(Room &room) const;
   model::Fibre fibre_at(uint32_t c) const;
+  double direct_energy(const dfm_kin &k, size_t place) const;
   void cell_elasticity(size_t place, double (*d)[6]) const;  // times the volume
   void add_exact(const dfm_kin &k, uint32_t c, double a, double b, double *blk) const;
   void fill_material(Room &room);
@@ -139,6 +142,9 @@ struct Call {
   const dfm_kin *k;
   double *f;
 };
+
+// Gradient of a cell at the positions of its corners, from the rest gradients of its lane; row-major.
+void gradient_of(const Group &group, uint32_t lane, const double *const *x, double *f);
 
 // Rest gradients of a cell of the body.
 model::Tetrahedron shape_of(const double *rest, const uint32_t *cell);

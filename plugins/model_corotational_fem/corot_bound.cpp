@@ -22,7 +22,9 @@
 // the symmetric part of A less a matrix of norm at most d |A|/sqrt 2, which adds |D| (sqrt 2 d + d^2/2);
 // and stress : d2S adds |stress| (6 sqrt(1 + d^2)/p + 6 s^2/p^3), p the least sum of two stretches, s the
 // largest one: d2S = X solves S X + X S = 2 Q, Q = dS [w]x S - S [w]x dS + S [w]x^T [w]x S, |w| <= |A|/p.
-#include "../model_common/rotation.h"
+// The energies of the gradient have rows of their own, of the second derivative at the shape. In W'' each
+// dyad X:dF with X of largest stretch x is at most x sum |u_a| |g_a|, |dF| too, and d2J is at most twice
+// the longest stretch, at least minus once that.
 #include "corot_body.h"
 
 namespace corot {
@@ -123,7 +125,7 @@ void Body::bound(const dfm_kin &k, double *ksum, double *csum) {
   Call call{this, &k, nullptr};
   for_each_block(kParallelCells, twist_pass, &call);
   for (uint32_t i = 0; i < npoint; ++i) {
-    ksum[i] += rest_rows[i];
+    ksum[i] += choice(kEnergy) == kLinear ? rest_rows[i] : 0;
     csum[i] += damp_rows[i] + (point_drag.empty() ? 0 : point_drag[i]);
   }
   for (uint32_t c = 0; c < ncell; ++c) {

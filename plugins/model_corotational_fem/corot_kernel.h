@@ -31,10 +31,20 @@ struct FibreGroup {
 // The rotation of a cell from its gradient, both row-major.
 using Rotate = void (*)(const double *gradient, double *rotation);
 
+// The energy of a cell: linear in the frame, or of the gradient itself (Smith, de Goes, Kim 2018; Saint
+// Venant and Kirchhoff). With mu, lambda those of linear elasticity and E = (F^T F - I)/2
+//   neo-Hookean  W = m/2 (n - 3) - m/2 ln((n + 1)/4) + l/2 (J - 1)^2 - 3/4 m (J - 1),  n = |F|^2, J = det F,
+//                m = 4/3 mu, l = lambda + 5/6 mu,
+//                P = m (1 - 1/(n + 1)) F + (l (J - 1) - 3/4 m) cof F
+//   St. Venant   W = mu E:E + lambda/2 (tr E)^2,  P = F (2 mu E + lambda tr(E) I)
+enum Energy : uint32_t { kLinear, kNeoHookean, kVenant };
+
 // One block of the body: points it owns, then the points of other blocks that its cells touch (halo).
 struct Block {
-  uint32_t owned, local, groups, rotate_all;  // rotate_all: no closed form, every cell goes to `rotate`
-  const uint32_t *point;                      // [local] number of the point in the host's arrays
+  uint32_t owned, local, groups;
+  uint32_t energy;        // Energy
+  uint32_t rotate_all;    // rotate_all: no closed form, every cell goes to `rotate`
+  const uint32_t *point;  // [local] number of the point in the host's arrays
   double *p;  // [local,8] x y z 0 vx vy vz 0: a point with its velocity is one cache line; lent by the pass
   double *f;  // [local,4]
   const Group *group;
@@ -53,8 +63,9 @@ struct Kernels {
   // Copies x (and v, unless NULL) of the block's points in and clears f.
   void (*load)(const Block &b, const double *x, const double *v, uint32_t stride);
   void (*forces)(const Block &b);
-  void (*energies)(const Block &b);  // J per cell
-  // Stiffness of each cell, and of its damper, beyond that at rest; see corot_bound.cpp.
+  void (*energies)(const Block &b);  // J per cell, of kLinear
+  // Stiffness of each cell, and of its damper, beyond that at rest; all of it where the energy is not linear.
+  // See corot_bound.cpp.
   void (*twists)(const Block &b);
   // blk -= (a + b damp) R K_e R^T of each cell
   void (*tangents)(const Block &b, double a, double damp, double *blk);

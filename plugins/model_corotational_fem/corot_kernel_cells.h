@@ -91,13 +91,13 @@ DEFORM_INLINE void finish_rotation(const Block &b, const v4 *f, const model::Pol
   if (__builtin_expect(bad != 0, 0)) rotate_lanes(b.rotate, bad, f, r);
 }
 
-// Calls use(group, place of the first lane in it, F, R) for every four cells of the block. The roots of some
-// fours are found side by side, because each is a chain of divisions.
+// Calls use(group, place of the first lane in it, F, R, its invariants) for every four cells of the block.
+// The roots of some fours are found side by side, because each is a chain of divisions.
 struct Pending {
   v4 f[9];
   model::Polar<Wide> o;
 };
-template <class Use>
+template <bool kRotations = true, class Use>
 DEFORM_INLINE void each_four(const Block &b, const Use &use) {
   constexpr uint32_t kSide = 8;
   alignas(64) Pending pending[kSide];
@@ -113,12 +113,12 @@ DEFORM_INLINE void each_four(const Block &b, const Use &use) {
       for (int k = 0; k < 9; ++k) pending[n].f[k] = f[k];
       pending[n].o = o;
     }
-    for (uint32_t n = 0; n < count; ++n) model::polar_trace(pending[n].o);
+    for (uint32_t n = 0; kRotations && n < count; ++n) model::polar_trace(pending[n].o);
     for (uint32_t n = 0; n < count; ++n) {
       v4 f[9], r[9];
       for (int k = 0; k < 9; ++k) f[k] = pending[n].f[k];
-      finish_rotation(b, f, pending[n].o, r);
-      use((begin + n) / 2, (begin + n) % 2 * 4, f, r);
+      if constexpr (kRotations) finish_rotation(b, f, pending[n].o, r);
+      use((begin + n) / 2, (begin + n) % 2 * 4, f, r, pending[n].o);
     }
   }
 }
@@ -297,45 +297,104 @@ DEFORM_INLINE void add_others(const Block &b, uint32_t n, const Four &q, const v
   balance(other, s, turn_by, all);
 }
 
-template <bool kFibre, bool kDamped>
+// P V of the energies of the gradient; see Energy.
+template <Energy kEnergy>
+DEFORM_INLINE void direct_stress(const Four &q, const v4 *f, const model::Polar<Wide> &o, v4 *p) {
+  const v4 mu2 = load4(q.group->mu2 + q.at), lambda = load4(q.group->lambda + q.at), one = splat(1);
+  if constexpr (kEnergy == kNeoHookean) {
+    const v4 m = splat(2.0 / 3) * mu2, l = lambda + splat(5.0 / 12) * mu2;
+    const v4 pull = m - m / (o.n + one), pressure = l * (o.det - one) - splat(0.75) * m;
+    for (int k = 0; k < 9; ++k) p[k] = pull * f[k] + pressure * o.cofactor[k];
+  } else {
+    v4 s[6];
+    const v4 half = splat(0.5), pressure = half * (lambda * (o.n - splat(3)));
+    for (int k = 0; k < 6; ++k)
+      s[k] = k < 3 ? half * (mu2 * (o.c[k] - one)) + pressure : half * (mu2 * o.c[k]);
+    v4 all[9];
+    full(s, all);
+    turn(f, all, p);
+  }
+}
+
+template <Energy kEnergy, bool kFibre, bool kDamped>
 static inline void cell_forces(const Block &b) {
-  each_four(b, [&](uint32_t n, uint32_t at, v4 *f, const v4 *r) __attribute__((always_inline)) {
-    const Four q = {b.group + n, at};
-    v4 e[6], stress[6], all[9], p[9];
-    strain_of(r, f, e);
-    stress_of(q, e, stress);
-    full(stress, all);
-    if constexpr (kFibre || kDamped) add_others<kFibre, kDamped>(b, n, q, r, e, f, all);
-    turn(r, all, p);
-    v4 sum[4], other[4];
-    spread(b, q, 0, p, sum);
-    for (int k = 1; k < 3; ++k) {
-      spread(b, q, k, p, other);
-      for (int c = 0; c < 4; ++c) sum[c] = sum[c] + other[c];
-    }
-    for (int c = 0; c < 4; ++c) add_to(b, cell(q, c)[0], splat(0) - sum[c]);
-  });
+  each_four<kEnergy == kLinear || kDamped>(
+      b, [&](uint32_t n, uint32_t at, v4 *f, const v4 *r, const model::Polar<Wide> &o)
+             __attribute__((always_inline)) {
+               const Four q = {b.group + n, at};
+               v4 e[6], stress[6], all[9], p[9];
+               if constexpr (kEnergy == kLinear || kDamped) strain_of(r, f, e);
+               if constexpr (kEnergy == kLinear) {
+                 stress_of(q, e, stress);
+                 full(stress, all);
+                 if constexpr (kFibre || kDamped) add_others<kFibre, kDamped>(b, n, q, r, e, f, all);
+                 turn(r, all, p);
+               } else {
+                 direct_stress<kEnergy>(q, f, o, p);
+                 if constexpr (kDamped) {
+                   v4 damper[9];
+                   for (int k = 0; k < 9; ++k) all[k] = splat(0);
+                   add_others<false, true>(b, n, q, r, e, f, all);
+                   turn(r, all, damper);
+                   for (int k = 0; k < 9; ++k) p[k] = p[k] + damper[k];
+                 }
+               }
+               v4 sum[4], other[4];
+               spread(b, q, 0, p, sum);
+               for (int k = 1; k < 3; ++k) {
+                 spread(b, q, k, p, other);
+                 for (int c = 0; c < 4; ++c) sum[c] = sum[c] + other[c];
+               }
+               for (int c = 0; c < 4; ++c) add_to(b, cell(q, c)[0], splat(0) - sum[c]);
+             });
 }
 static inline void forces(const Block &b) {
-  if (b.fibre) return b.damp ? cell_forces<true, true>(b) : cell_forces<true, false>(b);
-  return b.damp ? cell_forces<false, true>(b) : cell_forces<false, false>(b);
+  const bool damped = b.damp != nullptr;
+  if (b.energy == kNeoHookean)
+    return damped ? cell_forces<kNeoHookean, false, true>(b) : cell_forces<kNeoHookean, false, false>(b);
+  if (b.energy == kVenant)
+    return damped ? cell_forces<kVenant, false, true>(b) : cell_forces<kVenant, false, false>(b);
+  if (b.fibre) return damped ? cell_forces<kLinear, true, true>(b) : cell_forces<kLinear, true, false>(b);
+  return damped ? cell_forces<kLinear, false, true>(b) : cell_forces<kLinear, false, false>(b);
 }
 
 template <bool kFibre>
 static inline void cell_energies(const Block &b) {
-  each_four(b, [&](uint32_t n, uint32_t at, v4 *f, const v4 *r) __attribute__((always_inline)) {
-    const Four q = {b.group + n, at};
-    v4 e[6], s[6];
-    strain_of(r, f, e);
-    stress_of(q, e, s);
-    if constexpr (kFibre) add_fibre_stress(b.fibre[n], at, e, s);
-    const v4 own = (e[0] * s[0] + e[1] * s[1]) + e[2] * s[2];
-    const v4 mixed = (e[3] * s[3] + e[4] * s[4]) + e[5] * s[5];
-    store4(b.value + size_t(kGroup) * n + at, splat(0.5) * own + mixed);
-  });
+  each_four(b, [&](uint32_t n, uint32_t at, v4 *f, const v4 *r, const model::Polar<Wide> &o)
+                   __attribute__((always_inline)) {
+                     const Four q = {b.group + n, at};
+                     v4 e[6], s[6];
+                     strain_of(r, f, e);
+                     stress_of(q, e, s);
+                     if constexpr (kFibre) add_fibre_stress(b.fibre[n], at, e, s);
+                     const v4 own = (e[0] * s[0] + e[1] * s[1]) + e[2] * s[2];
+                     const v4 mixed = (e[3] * s[3] + e[4] * s[4]) + e[5] * s[5];
+                     store4(b.value + size_t(kGroup) * n + at, splat(0.5) * own + mixed);
+                   });
 }
 static inline void energies(const Block &b) {
   return b.fibre ? cell_energies<true>(b) : cell_energies<false>(b);
+}
+
+// Largest eigenvalue of a symmetric 3 x 3 matrix, or a little more, from its trace and the square of its
+// norm.
+DEFORM_INLINE v4 most_of(v4 trace, v4 square) {
+  const v4 third = splat(1.0 / 3);
+  return third * trace + sqrt4(splat(2.0 / 3) * max4(square - third * (trace * trace), splat(0)));
+}
+DEFORM_INLINE v4 direct_stiffness(uint32_t energy, const Four &q, const model::Polar<Wide> &o) {
+  const v4 mu2 = load4(q.group->mu2 + q.at), lambda = load4(q.group->lambda + q.at), zero = splat(0);
+  const v4 square = splat(0.5) * (o.constant + o.n * o.n);  // |C|^2
+  const v4 longest = max4(most_of(o.n, square), zero);      // of the squared stretches
+  if (energy == kVenant) {
+    const v4 pull = splat(0.5) * (lambda * (o.n - splat(3)) + mu2 * (longest - splat(1)));
+    return (lambda + mu2) * longest + max4(pull, zero);
+  }
+  const v4 m = splat(2.0 / 3) * mu2, l = lambda + splat(5.0 / 12) * mu2, n1 = o.n + splat(1);
+  const v4 pairs = splat(0.5) * (o.n * o.n - square), pressure = l * (o.det - splat(1)) - splat(0.75) * m;
+  const v4 area = max4(most_of(pairs, pairs * pairs - splat(2) * (o.n * (o.det * o.det))), zero);
+  const v4 by = choose_above(pressure, zero, splat(2) * pressure, zero - pressure);
+  return ((m - m / n1) + (splat(2) * (m * longest)) / (n1 * n1)) + (l * area + by * sqrt4(longest));
 }
 
 // What the rows of the bound count beyond the rest shape; corot_bound.cpp derives it. From the trace t of
@@ -344,7 +403,8 @@ static inline void energies(const Block &b) {
 // of two below 6 variances.
 template <bool kFibre>
 static inline void cell_twists(const Block &b) {
-  each_four(b, [&](uint32_t n, uint32_t at, v4 *f, const v4 *r) __attribute__((always_inline)) {
+  each_four(b, [&](uint32_t n, uint32_t at, v4 *f, const v4 *r,
+                   const model::Polar<Wide> &o) __attribute__((always_inline)) {
     const Four q = {b.group + n, at};
     v4 square = f[0] * f[0], t = r[0] * f[0];
     for (int k = 1; k < 9; ++k) {
@@ -358,7 +418,9 @@ static inline void cell_twists(const Block &b) {
     const v4 mu2 = load4(q.group->mu2 + at);
     const v4 uneven = (splat(6) * variance) / (least * least);  // (s_i - s_j)^2 / (s_i + s_j)^2 at most
     v4 twist;
-    if constexpr (kFibre) {
+    if (b.energy != kLinear) {
+      twist = direct_stiffness(b.energy, q, o);
+    } else if constexpr (kFibre) {
       v4 e[6], stress[6];
       strain_of(r, f, e);
       stress_of(q, e, stress);
@@ -418,7 +480,8 @@ DEFORM_INLINE void block_of(const Turned &t, int a, int b, v4 lambda, v4 mu, v4 
 template <bool kFibre>
 static inline void cell_tangents(const Block &b, double a, double damp, double *blk) {
   constexpr int kFirst[10] = {0, 1, 2, 3, 0, 0, 0, 1, 1, 2}, kSecond[10] = {0, 1, 2, 3, 1, 2, 3, 2, 3, 3};
-  each_four(b, [&](uint32_t n, uint32_t at, v4 *f, const v4 *r) __attribute__((always_inline)) {
+  each_four(b, [&](uint32_t n, uint32_t at, v4 *f, const v4 *r,
+                   const model::Polar<Wide> &o) __attribute__((always_inline)) {
     const Four q = {b.group + n, at};
     Turned t;
     for (int c = 1; c < 4; ++c)

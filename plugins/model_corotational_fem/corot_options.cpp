@@ -78,6 +78,12 @@ model::Fibre Body::fibre_at(uint32_t c) const {
 }
 
 void Body::make_room(Room &room) const {
+  if (has_fibres() && choice(kEnergy) != kLinear) {
+    complain(host,
+             "anisotropy takes the energy corotational only; choose it, or leave the constants along the "
+             "axis at auto");
+    throw model::Refused{};
+  }
   if (has_fibres()) room.fibre.create(host, groups);
   if (has_dampers()) {
     room.damp.create(host, lanes());
@@ -125,6 +131,7 @@ void Body::fill_material(Room &room) {
     block[b].fibre = fibre.empty() ? nullptr : fibre.data() + groups_at;
     block[b].damp = damp.empty() ? nullptr : damp.data() + kGroup * groups_at;
     block[b].damp_value = damp.empty() ? nullptr : damp_value.data() + kGroup * groups_at;
+    block[b].energy = choice(kEnergy);
     block[b].rotate = rotate_by(choice(kRotation));
     block[b].rotate_all = choice(kRotation) != kPolar;
     groups_at += block[b].groups;

@@ -63,12 +63,10 @@ struct Shape {
 };
 
 void shape_at(const Group &group, uint32_t lane, const double *const *x, Shape &out) {
-  double f[9] = {};
+  double f[9];
   for (int k = 0; k < 9; ++k) out.g[k / 3 + 1][k % 3] = group.g[k][lane];
   for (int k = 0; k < 3; ++k) out.g[0][k] = -((out.g[1][k] + out.g[2][k]) + out.g[3][k]);
-  for (int a = 1; a < 4; ++a)
-    for (int k = 0; k < 3; ++k)
-      for (int l = 0; l < 3; ++l) f[3 * k + l] += (x[a][k] - x[0][k]) * out.g[a][l];
+  gradient_of(group, lane, x, f);
   model::rotation::polar_of(f, out.r);
   double s[3][3];
   for (int k = 0; k < 3; ++k)
@@ -80,6 +78,53 @@ void shape_at(const Group &group, uint32_t lane, const double *const *x, Shape &
   model::jacobi(s, out.axis);
   for (int k = 0; k < 3; ++k) out.stretch[k] = s[k][k];
   out.trace = (s[0][0] + s[1][1]) + s[2][2];
+}
+
+// Second derivative of an energy of the gradient in the axes of S (Smith, de Goes and Kim 2019, Analytic
+// eigensystems for isotropic distortion energies): a 3 x 3 block for the stretches, and for each pair i < j
+// its turn (i against j) and its shear. What is negative is cut off.
+struct Modes { double stretch[3][3], turn[3], shear[3]; };  // pair k: the axes other than k
+void modes_of(uint32_t energy, const double *s, double mu2, double lambda, Modes &out) {
+  const double n = (s[0] * s[0] + s[1] * s[1]) + s[2] * s[2], det = s[0] * s[1] * s[2];
+  const double m = 2.0 / 3 * mu2, l = lambda + 5.0 / 12 * mu2, pull = m - m / (n + 1);
+  const double pressure = l * (det - 1) - 0.75 * m, trace = 0.5 * lambda * (n - 3), mu = 0.5 * mu2;
+  double a[3][3], v[3][3];
+  for (int i = 0; i < 3; ++i)
+    for (int j = 0; j < 3; ++j) {
+      const int k = 3 - i - j;  // the third axis, where i and j differ
+      if (energy == kVenant) {
+        a[i][j] = lambda * (s[i] * s[j]) + (i == j ? trace + mu * (3 * (s[i] * s[i]) - 1) : 0);
+      } else {
+        const double u = s[(i + 1) % 3] * s[(i + 2) % 3], w = s[(j + 1) % 3] * s[(j + 2) % 3];
+        a[i][j] =
+            2 * m / ((n + 1) * (n + 1)) * (s[i] * s[j]) + l * (u * w) + (i == j ? pull : pressure * s[k]);
+      }
+    }
+  model::jacobi(a, v);
+  for (int i = 0; i < 3; ++i)
+    for (int j = 0; j < 3; ++j) {
+      out.stretch[i][j] = 0;
+      for (int k = 0; k < 3; ++k) out.stretch[i][j] += std::max(a[k][k], 0.0) * (v[i][k] * v[j][k]);
+    }
+  for (int k = 0; k < 3; ++k) {
+    const double x = s[(k + 1) % 3], y = s[(k + 2) % 3], squares = x * x + y * y;
+    const double turn_by = energy == kVenant ? trace + mu * (squares - x * y - 1) : pull + pressure * s[k];
+    const double shear = energy == kVenant ? trace + mu * (squares + x * y - 1) : pull - pressure * s[k];
+    out.turn[k] = std::max(turn_by, 0.0);
+    out.shear[k] = std::max(shear, 0.0);
+  }
+}
+// Entry (i, j) of block (m, n) in the axes of S: p, q the gradients of the two corners there.
+double entry_of(const Modes &modes, int i, int j, const double *p, const double *q) {
+  double sum = modes.stretch[i][j] * (p[i] * q[j]);
+  for (int k = 0; k < 3; ++k) {
+    const int x = (k + 1) % 3, y = (k + 2) % 3;
+    if (i == k || j == k) continue;
+    // a motion along x shears by q_y, along y by q_x; it turns by q_y and -q_x
+    const double left = i == x ? p[y] : p[x], right = j == x ? q[y] : q[x];
+    sum += 0.5 * (modes.shear[k] + (i == j ? modes.turn[k] : -modes.turn[k])) * (left * right);
+  }
+  return sum;
 }
 
 }  // namespace
@@ -102,13 +147,20 @@ void Body::add_exact(const dfm_kin &k, uint32_t c, double a, double b, double *b
   Shape shape;
   shape_at(own, lane, x, shape);
   const double share = shape.share(), damping = damp.empty() ? 0 : b * damp[place] * (share * share);
+  const bool direct = choice(kEnergy) != kLinear;
+  Modes modes{};
+  double principal[4][3];
+  if (direct) modes_of(choice(kEnergy), shape.stretch, own.mu2[lane], own.lambda[lane], modes);
   const bool by_change = !fibre.empty() && share >= 1;
-  const double change_by = damping + (by_change ? a : 0), frame_by = by_change ? 0 : a;
+  const double change_by = damping + (by_change ? a : 0), frame_by = by_change || direct ? 0 : a;
   double d[6][6], change[4][3][6], turned[3][4][3], twist[3] = {};
   cell_elasticity(place, d);
   model::Tetrahedron rest{1, {}};  // the constants hold the volume
   for (int m = 0; m < 4; ++m) {
     std::copy(shape.g[m], shape.g[m] + 3, rest.g[m]);
+    for (int i = 0; i < 3; ++i)
+      principal[m][i] = (shape.axis[0][i] * shape.g[m][0] + shape.axis[1][i] * shape.g[m][1]) +
+                        shape.axis[2][i] * shape.g[m][2];
     for (int i = 0; i < 3; ++i) {
       shape.change(m, i, change[m][i]);
       const double axis[3] = {shape.axis[0][i], shape.axis[1][i], shape.axis[2][i]};
@@ -116,7 +168,7 @@ void Body::add_exact(const dfm_kin &k, uint32_t c, double a, double b, double *b
     }
   }
   const double pull = own.lambda[lane] * (shape.trace - 3) - own.mu2[lane];
-  for (int m = 0; fibre.empty() && m < 3; ++m) {
+  for (int m = 0; fibre.empty() && !direct && m < 3; ++m) {
     const double pair =
         std::max(shape.stretch[(m + 1) % 3] + shape.stretch[(m + 2) % 3], kLeast * shape.trace);
     if (pair > 0) twist[m] = 0.5 * a * std::max(0.0, own.mu2[lane] + 2 * pull / pair);
@@ -127,6 +179,10 @@ void Body::add_exact(const dfm_kin &k, uint32_t c, double a, double b, double *b
     for (int i = 0; i < 3; ++i)
       for (int j = 0; j < 3; ++j) {
         double sum = frame_by * frame[3 * i + j];
+        for (int e = 0; direct && e < 3; ++e)
+          for (int l = 0; l < 3; ++l)
+            sum +=
+                a * (shape.axis[i][e] * entry_of(modes, e, l, principal[m], principal[n]) * shape.axis[j][l]);
         for (int e = 0; e < 3; ++e) sum += twist[e] * (turned[e][m][i] * turned[e][n][j]);
         for (int e = 0; change_by > 0 && e < 6; ++e)
           for (int l = 0; l < 6; ++l) sum += change_by * (change[m][i][e] * (d[e][l] * change[n][j][l]));

@@ -22,14 +22,18 @@ TEST(CorotBound, RowSums_BoundTheTrueSpectrumInEveryShape) {
                                 {"anisotropy_shear", {1e5}},
                                 {"anisotropy_axis", {1, 1, 0.3}},
                                 {"damping_stiffness", {0.004}}};
-  for (const auto &[p, fields] : std::initializer_list<std::pair<Params, Fields>>{{{}, {}},
-                                                                                  {soft, {}},
-                                                                                  {damped, {}},
-                                                                                  {full, {}},
-                                                                                  {negative, {}},
-                                                                                  {fibres, {}},
-                                                                                  {damped_fibres, {}},
-                                                                                  {{}, uneven}})
+  for (const auto &[p, fields] : std::initializer_list<std::pair<Params, Fields>>{
+           {{}, {}},
+           {soft, {}},
+           {damped, {}},
+           {full, {}},
+           {negative, {}},
+           {fibres, {}},
+           {{{"energy", {1}}}, {}},
+           {{{"energy", {1}}, {"poisson", {0.45}}, {"damping_stiffness", {0.004}}}, {}},
+           {{{"energy", {2}}, {"poisson", {0.45}}}, {}},
+           {damped_fibres, {}},
+           {{}, uneven}})
     for (const double size : {1.0, 0.3, 2.0, -1.0, 10.0, -30.0}) {
       Host host;
       Instance b(host, mesh, p, 4, fields);

@@ -47,6 +47,8 @@ const std::vector<Params> &kinds() {
       {{"anisotropy_young", {1e6}}, {"anisotropy_axis", {1, 2, -1}}, {"damping_stiffness", {0.003}}},
       {{"rotation", {1}}},
       {{"rotation", {2}}},
+      {{"energy", {1}}, {"damping_stiffness", {0.003}}},
+      {{"energy", {2}}},
       {{"tangent", {1}}, {"damping_stiffness", {0.003}}}};
   return all;
 }
@@ -78,7 +80,7 @@ uint64_t fnv(const std::vector<double> &values) {
 TEST(CorotDeterminism, Compiler_NeverShowsInAResult) {
   Host host;  // one value for gcc and clang, -O0 and -O2, with and without sanitizers
   EXPECT_EQ(fnv(results(host, nullptr, kuhn_bar(4, 3, 2, 0.1, 0.2), kinds()[3])), 1786832424231213768ull);
-  EXPECT_EQ(fnv(results(host, nullptr, kuhn_bar(4, 3, 2, 0.1, 0.2), kinds()[6])), 13997715870648500101ull);
+  EXPECT_EQ(fnv(results(host, nullptr, kuhn_bar(4, 3, 2, 0.1, 0.2), kinds()[8])), 13997715870648500101ull);
 }
 
 TEST(CorotDeterminism, CutOfTheWorkAndStride_NeverShowInAResult) {
@@ -122,6 +124,7 @@ TEST(CorotParameters, ErrorsNameWhatIsWrong) {
   refused({{"poisson", {0.5}}}, {}, "poisson");
   refused({}, {{"young", {-1}}}, "field young of cell 0");
   refused({{"anisotropy_axis", {0, 0, 0}}}, {}, "anisotropy_axis");
+  refused({{"anisotropy_young", {1e6}}, {"energy", {1}}}, {}, "energy");
   refused({{"anisotropy_young", {1e3}}, {"poisson", {0.45}}}, {}, "anisotropy_young");
 }
 

@@ -9,6 +9,12 @@ const Params kFibres = {{"poisson", {0.3}},
                         {"anisotropy_poisson", {0.4}},
                         {"anisotropy_shear", {1e5}},
                         {"anisotropy_axis", {1, 2, -0.5}}};
+const Params kNeoHookean = {{"energy", {1}}, {"poisson", {0.4}}},
+             kVenant = {{"energy", {2}}, {"poisson", {0.4}}};
+Params damped(Params p) {
+  p["damping_stiffness"] = {0.01};
+  return p;
+}
 const Params kUneven = {{"young", {2e5}}, {"poisson", {0.4}}, {"damping_stiffness", {0.01}}};
 
 void move_rigidly(Instance &b, Vec axis, double angle, Vec shift) {
@@ -36,9 +42,8 @@ TEST(CorotForces, RigidMotionByAnyAngle_GivesNoForce) {
 }
 
 TEST(CorotForces, ShakenBody_HasNoNetForceOrTorque) {
-  Params both = kFibres;
-  both["damping_stiffness"] = {0.01};
-  for (const Params &p : {Params{}, kUneven, kFibres, both})
+  for (const Params &p : {Params{}, kUneven, kFibres, damped(kFibres), kNeoHookean, damped(kNeoHookean),
+                          kVenant, damped(kVenant)})
     for (const Mesh &mesh : {irregular_tet(), kuhn_bar(4, 2, 2, 0.1, 0.2)})
       for (const double shake : {1e-3, 0.03, 0.3}) {  // the last turns cells inside out
         Host host;
@@ -65,7 +70,8 @@ TEST(CorotForces, GramSchmidt_LeavesATorque) {
 }
 
 TEST(CorotForces, Force_IsTheGradientOfTheEnergy) {
-  for (const Params &p : {Params{{"poisson", {0.4}}}, kFibres})
+  for (const Params &p : {Params{{"poisson", {0.4}}}, kFibres, kNeoHookean, kVenant,
+                          Params{{"energy", {1}}, {"poisson", {-0.9}}}})
     for (const double shake : {0.005, 0.02}) {
       Host host;
       Instance b(host, kuhn_bar(3, 2, 2, 0.1, 0.2), p);
@@ -221,6 +227,37 @@ TEST(CorotForces, Damper_TakesThePowerOfItsStrainRate) {
   EXPECT_NEAR(power, 0.02 * change, 0.01 * std::abs(power));
 }
 
+// No force under any rotation, no energy at rest, and near it the forces of the linear law.
+TEST(CorotForces, OtherEnergies_AreTheLinearOneAtSmallStrain) {
+  for (const double kind : {1.0, 2.0}) {
+    Host host;
+    Instance linear(host, kuhn_bar(2, 2, 1, 0.1), {{"young", {1}}, {"poisson", {0.4}}});
+    Instance other(host, kuhn_bar(2, 2, 1, 0.1), {{"young", {1}}, {"poisson", {0.4}}, {"energy", {kind}}});
+    EXPECT_NEAR(other.energy(), 0, 1e-18);
+    for (double angle = 0; angle < 6.3; angle += 0.37) {
+      move_rigidly(other, {1, -2, 0.5}, angle, {3, 1, -2});
+      other.forces();
+      EXPECT_LT(other.largest_force(), 1e-14) << angle;
+    }
+    double before = 0;
+    for (const double shake : {1e-4, 1e-5, 1e-6}) {
+      for (Instance *b : {&linear, &other}) {
+        for (uint32_t i = 0; i < b->size(); ++i) b->set(b->x, i, b->mesh.at(i));
+        b->shake(shake, 0);
+        b->forces();
+      }
+      double most = 0;
+      for (uint32_t i = 0; i < linear.size(); ++i)
+        most = std::max(most, norm(other.get(other.f, i) - linear.get(linear.f, i)));
+      const double error = most / linear.largest_force();
+      if (before > 0) {
+        EXPECT_NEAR(error, 0.1 * before, 0.02 * before) << kind;  // first order in the strain
+      }
+      before = error;
+    }
+  }
+}
+
 // A stretched body that spins as a whole strains no damper.
 TEST(CorotForces, DamperUnderRigidSpin_TakesNothing) {
   Host host;
@@ -310,6 +347,23 @@ TEST(CorotForces, DegenerateShapes_AreFiniteAndRecover) {
     }
     EXPECT_LT(b.energy(), 1e-6 * start) << s.x << " " << s.y << " " << s.z;
   }
+}
+
+TEST(CorotForces, InvertedNeoHookeanBody_ComesBack) {
+  Host host;
+  Instance b(host, kuhn_bar(3, 2, 2, 0.1, 0.2),
+             {{"energy", {1}}, {"poisson", {0.4}}, {"damping_mass", {30}}, {"damping_stiffness", {1e-4}}});
+  for (uint32_t i = 0; i < b.size(); ++i) {
+    const Vec x = b.mesh.at(i);
+    const double off = 1e-6 * std::sin(double(7 * i));
+    b.set(b.x, i, {x[0] + off, x[1] - off, -0.5 * x[2] + off});
+  }
+  const double start = b.energy();
+  for (int n = 0; n < 6000; ++n) {
+    b.forces();
+    b.move(0.8 * b.bound());
+  }
+  EXPECT_LT(b.energy(), 1e-6 * start);
 }
 
 TEST(CorotForces, ExactlyDegenerateShapes_AreFinite) {
