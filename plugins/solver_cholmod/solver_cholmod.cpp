@@ -124,11 +124,11 @@ dfm_status solve(void *self, uint32_t nrhs, const double *b, double *x, double) 
 }
 void release(void *self) { delete static_cast<Cholmod *>(self); }
 
-const dfm_solver solver = {sizeof(dfm_solver),  DFM_SOLVER_DIRECT, dp::guarded<analyse>, dp::guarded<factor>,
-                           dp::guarded<solve>, release};
-const dfm_type type = dp::type(DFM_KIND_SOLVER, "org.deform.cholmod", "CHOLMOD", "1.0.0", "GPL-2.0-or-later",
-                               "Chen, Davis, Hager and Rajamanickam 2008, ACM TOMS 35 (3), algorithm 887",
-                               nullptr, &solver);
+const dfm_solver solver = {sizeof(dfm_solver),  DFM_SOLVER_DIRECT,  dp::guarded<analyse>,
+                           dp::guarded<factor>, dp::guarded<solve>, release};
+const dfm_type type =
+    dp::type(DFM_KIND_SOLVER, "org.deform.cholmod", "CHOLMOD", "1.0.0", "GPL-2.0-or-later",
+             "Chen, Davis, Hager and Rajamanickam 2008, ACM TOMS 35 (3), algorithm 887", nullptr, &solver);
 
 }  // namespace
 

@@ -7,7 +7,7 @@
 
 namespace dfm {
 
-struct BlockRows {  // rows of a BlockMatrix
+struct BlockRows {  // rows of a BlockMatrix, an even number of blocks each
   const uint32_t *row, *column;
   const double *value;
 };

@@ -50,11 +50,10 @@ double multiply(const BlockRows &a, uint32_t begin, uint32_t end, const double *
     Vector even[3][kParts] = {}, odd[3][kParts] = {};
     uint32_t k = a.row[i];
     const uint32_t last = a.row[i + 1];
-    for (; k + 1 < last; k += 2) {
+    for (; k < last; k += 2) {
       add_block(a.value + 9 * size_t(k), x + 3 * size_t(a.column[k]), even);
       add_block(a.value + 9 * size_t(k) + 9, x + 3 * size_t(a.column[k + 1]), odd);
     }
-    if (k < last) add_block(a.value + 9 * size_t(k), x + 3 * size_t(a.column[k]), even);
     DEFORM_UNROLL
     for (uint32_t c = 0; c < 3; ++c) DEFORM_UNROLL
     for (uint32_t p = 0; p < kParts; ++p) even[c][p] += odd[c][p];

@@ -31,9 +31,9 @@ void BlockMatrix::set_pattern(const BlockPattern &pattern) {
     ++row_[i + 1];
     if (i != j) ++row_[j + 1];
   }
-  for (uint32_t i = 0; i < n_; ++i) row_[i + 1] += row_[i];
+  for (uint32_t i = 0; i < n_; ++i) row_[i + 1] = row_[i] + (row_[i + 1] + 1) / 2 * 2;
   const uint32_t count = row_[n_];
-  column_.resize(count);
+  column_.assign(count, UINT32_MAX);
   // Every row gets its columns, sorts them, and each block of the pattern looks up its two places.
   diagonal_.assign(row_.begin(), row_.end() - 1);
   for (uint32_t b = 0; b < nb_; ++b) {
@@ -56,6 +56,8 @@ void BlockMatrix::set_pattern(const BlockPattern &pattern) {
     upper_[b] = place(i, j);
     lower_[b] = place(j, i);
   }
+  for (uint32_t i = 0; i < n_; ++i)
+    if (column_[row_[i + 1] - 1] == UINT32_MAX) column_[row_[i + 1] - 1] = i;
   value_.assign(9 * size_t{count} + 1, 0.0);  // and what the load of the last column reads
 }
 
@@ -70,7 +72,7 @@ void BlockMatrix::set_values(const double *blk) {
 }
 
 void BlockMatrix::multiply(Tasks *tasks, const double *x, double *y) const {
-  if (!tasks || n_ <= kGrain) {
+  if (!tasks || n_ <= kAlone) {
     multiply(0, n_, x, y);
     return;
   }

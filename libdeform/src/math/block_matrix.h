@@ -28,7 +28,7 @@ class BlockMatrix {
   void set_values(const double *blk);
   uint32_t size() const { return n_; }  // points
   // Blocks of row i: column[k] and value + 9k for k in [row[i], row[i+1]), columns of the matrix rising; each
-  // block column after column.
+  // block column after column. Rows have an even number of blocks: one of zeros on the diagonal may follow.
   BlockRows rows() const { return {row_.data(), column_.data(), value_.data()}; }
   const double *diagonal(uint32_t i) const { return &value_[9 * size_t{diagonal_[i]}]; }
 
@@ -38,7 +38,8 @@ class BlockMatrix {
   }
   void multiply(Tasks *tasks, const double *x, double *y) const;  // all rows; tasks may be null
 
-  static constexpr uint32_t kGrain = 256;  // rows that one thread takes at a time
+  static constexpr uint32_t kGrain = 64;   // rows that one thread takes at a time
+  static constexpr uint32_t kAlone = 512;  // rows that one thread has done before another has started
 
  private:
   const BlockKernels &kernels_;

@@ -216,7 +216,7 @@ double CoarseSpace::solve(const double *r) {
       store3(&r_[6 * size_t{p} + 3], moment);
     }
   };
-  if (tasks_ && n_ > BlockMatrix::kGrain)
+  if (tasks_ && n_ > BlockMatrix::kAlone)
     tasks_->parallel_for(patches_, 4, [&](uint32_t begin, uint32_t end) { some(begin, end); });
   else some(0, patches_);
   SolveInfo info;

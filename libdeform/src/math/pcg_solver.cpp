@@ -80,7 +80,7 @@ void PcgSolver::each(F &&f) {
   const auto grains = [&](uint32_t begin, uint32_t end) {
     for (uint32_t at = begin; at < end; at += kGrain) f(at, std::min(end, at + kGrain));
   };
-  if (tasks_ && n > kGrain)
+  if (tasks_ && n > BlockMatrix::kAlone)
     tasks_->parallel_for(n, kGrain, [&](uint32_t begin, uint32_t end) { grains(begin, end); });
   else grains(0, n);
 }

@@ -74,6 +74,8 @@ TEST(PluginSolver, RefusedMatrix_NamesThePlugin) {
 #ifdef DEFORM_HAS_CHOLMOD
 TEST(PluginSolver, Cholmod_EqualsTheOwnFactorization) {
   const std::string file = std::string(DEFORM_PLUGIN_DIR) + "/solver_cholmod.so";
+  setenv("OMP_THREAD_LIMIT", "1", 1);  // else threads of OpenMP and of the BLAS wait for each other
+  setenv("OPENBLAS_NUM_THREADS", "1", 1);
   const tiny::Context context;
   ASSERT_EQ(dfm_plugin_load(context.c, file.c_str()), DFM_OK) << dfm_last_error();
   const test::Grid g = test::grid(9, 8, 7, 0.05);
