@@ -73,6 +73,8 @@ class Dynamics {
   virtual ~Dynamics() = default;
 
   virtual Abilities abilities() const = 0;
+  // of a sub-step, over that of an explicit one: a rough number for the budget of a step
+  virtual uint32_t relative_work() const { return 1; }
 
   // False: the model gives none.
   virtual bool bound(double time, const AddRowSums &outside, StepBound &out) = 0;

@@ -199,7 +199,10 @@ void tell(const World &w, const StepContext &step, StepStopped::Why why, double 
 
 uint64_t body_work(const World &w, const StepContext &step) {
   uint64_t sum = 1;
-  for (const uint32_t i : step.active) sum += w.bodies[i]->p.n + w.bodies[i]->tets.size() / 4;
+  for (const uint32_t i : step.active) {
+    const Body &b = *w.bodies[i];
+    sum += b.dynamics->relative_work() * (b.p.n + b.tets.size() / 4);
+  }
   return sum;
 }
 
