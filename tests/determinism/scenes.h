@@ -6,12 +6,24 @@
 
 namespace scenes {
 
+// What a scene's bodies are made of and moved by, where it is not the default.
+struct Kind {
+  const char *model = "";
+  int32_t integrator = DFM_INTEGRATOR_AUTO;
+  test::BodyOptions body() const {
+    test::BodyOptions o;
+    o.model = model;
+    o.integrator = integrator;
+    return o;
+  }
+};
+
 // A ball that spins and slides as it meets a floor.
-inline dfm_world ball_on_floor(dfm_context *c) {
+inline dfm_world ball_on_floor(dfm_context *c, Kind kind = {}) {
   const dfm_world w = test::make_world(c);
   test::add_plane(w, "floor");
   test::set_friction(w, 0.4);
-  test::BodyOptions o;
+  test::BodyOptions o = kind.body();
   o.name = "ball";
   o.young = 2e4;
   o.damping_stiffness = 5e-4;
@@ -23,10 +35,10 @@ inline dfm_world ball_on_floor(dfm_context *c) {
 }
 
 // A beam held at both ends, another that falls across it: edges meet edges, with and without the volume term.
-inline dfm_world crossing_beams(dfm_context *c) {
+inline dfm_world crossing_beams(dfm_context *c, Kind kind = {}) {
   const dfm_world w = test::make_world(c);
   test::set_friction(w, 0.5);
-  test::BodyOptions o;
+  test::BodyOptions o = kind.body();
   o.name = "lower";
   o.young = 5e4;
   o.damping_stiffness = 5e-4;
@@ -40,7 +52,7 @@ inline dfm_world crossing_beams(dfm_context *c) {
     if (std::fabs(x[3 * i]) > 0.0999) ends.push_back(i);
   test::ok(dfm_body_hold(lower, uint32_t(ends.size()), ends.data(), 7));
   o.name = "upper";
-  o.volume = 1;
+  if (!*kind.model) o.volume = 1;
   o.position = {-0.017, -0.1, 0.0403};
   o.velocity = {0.05, 0, -0.4};
   o.spin = {0, 0, 1};
@@ -49,7 +61,7 @@ inline dfm_world crossing_beams(dfm_context *c) {
 }
 
 // Ten small bodies thrown together in a box of five planes.
-inline dfm_world ten_in_a_box(dfm_context *c) {
+inline dfm_world ten_in_a_box(dfm_context *c, Kind kind = {}) {
   const dfm_world w = test::make_world(c);
   const double s = std::sqrt(0.5);
   test::add_plane(w, "floor");
@@ -61,7 +73,7 @@ inline dfm_world ten_in_a_box(dfm_context *c) {
   const char *const kinds[] = {"ball", "beam", "cylinder"};
   const std::array<double, 3> sizes[] = {{0.015, 0, 0}, {0.025, 0.02, 0.02}, {0.012, 0.03, 0}};
   for (int i = 0; i < 10; ++i) {
-    test::BodyOptions o;
+    test::BodyOptions o = kind.body();
     o.young = 1e4;
     o.damping_stiffness = 1e-3;
     o.position = {-0.03 + 0.036 * (i % 2), -0.03 + 0.036 * (i / 2 % 2), 0.02 + 0.036 * (i / 4)};
@@ -90,13 +102,13 @@ inline dfm_world fine_ball(dfm_context *c) {
 
 // Two bodies with surfaces of their own: a ball that hangs by moving least squares falls on a block that
 // hangs by cells, on a floor.
-inline dfm_world coupled_pair(dfm_context *c) {
+inline dfm_world coupled_pair(dfm_context *c, Kind kind = {}) {
   const dfm_world w = test::make_world(c);
   test::add_plane(w, "floor");
   test::set_friction(w, 0.4);
   const test::Skin box = test::box_skin({0.1, 0.1, 0.06}, 8), ball = test::ball_skin(0.048, 3);
   const dfm_surface_def below = box.def(), above = ball.def(DFM_COUPLING_MLS, 1.5);
-  test::BodyOptions o;
+  test::BodyOptions o = kind.body();
   o.young = 5e4;
   o.damping_stiffness = 5e-4;
   o.name = "block";
@@ -245,21 +257,44 @@ inline dfm_world remembered(dfm_context *c) {
   return w;
 }
 
+// The same by backward Euler.
+template <dfm_world (*build)(dfm_context *, Kind)>
+dfm_world msm(dfm_context *c) {
+  return build(c, {"msm", DFM_INTEGRATOR_IMPLICIT_EULER});
+}
+template <dfm_world (*build)(dfm_context *, Kind)>
+dfm_world linear(dfm_context *c) {
+  return build(c, {"linear_fem", DFM_INTEGRATOR_IMPLICIT_EULER});
+}
+template <dfm_world (*build)(dfm_context *, Kind)>
+dfm_world corotational(dfm_context *c) {
+  return build(c, {"corotational_fem", DFM_INTEGRATOR_IMPLICIT_EULER});
+}
+
 struct Scene {
   const char *name;
   dfm_world (*build)(dfm_context *);
   int steps;
 };
-inline const Scene all[] = {{"ball_on_floor", ball_on_floor, 150},
-                            {"crossing_beams", crossing_beams, 150},
-                            {"ten_in_a_box", ten_in_a_box, 80},
+inline const Scene all[] = {{"ball_on_floor", [](dfm_context *c) { return ball_on_floor(c); }, 150},
+                            {"crossing_beams", [](dfm_context *c) { return crossing_beams(c); }, 150},
+                            {"ten_in_a_box", [](dfm_context *c) { return ten_in_a_box(c); }, 80},
                             {"fine_ball", fine_ball, 20},
-                            {"coupled_pair", coupled_pair, 80},
+                            {"coupled_pair", [](dfm_context *c) { return coupled_pair(c); }, 80},
                             {"dale", dale, 100},
                             {"woken", woken, 220},
                             {"rolled_back", rolled_back, 120},
                             {"folded", folded, 120},
-                            {"remembered", remembered, 70}};
+                            {"remembered", remembered, 70},
+                            {"implicit_msm_ball", msm<ball_on_floor>, 40},
+                            {"implicit_linear_ball", linear<ball_on_floor>, 40},
+                            {"implicit_corotational_ball", corotational<ball_on_floor>, 40},
+                            {"implicit_msm_beams", msm<crossing_beams>, 40},
+                            {"implicit_linear_beams", linear<crossing_beams>, 40},
+                            {"implicit_corotational_beams", corotational<crossing_beams>, 40},
+                            {"implicit_msm_skins", msm<coupled_pair>, 15},
+                            {"implicit_corotational_skins", corotational<coupled_pair>, 15},
+                            {"implicit_corotational_ten", corotational<ten_in_a_box>, 40}};
 
 inline void advance(dfm_world w, int steps) {
   for (int i = 0; i < steps; ++i) ASSERT_EQ(dfm_world_step(w, 1e-3, nullptr), DFM_OK) << dfm_last_error();
