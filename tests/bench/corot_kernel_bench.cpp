@@ -33,10 +33,13 @@ struct Row {
   double ns, bytes;
 };
 
+struct alignas(64) Aligned : corot::Group {};
+static_assert(sizeof(Aligned) == sizeof(corot::Group));
+
 double time_plain(const Mesh &mesh, corot_bound::Kernel kernel) {
   const uint32_t groups = (mesh.ncell() + corot::kGroup - 1) / corot::kGroup;
   std::vector<double> storage(2 * size_t(groups) * 72 + 16);
-  std::vector<corot::Group> group(groups);
+  std::vector<Aligned> group(groups);
   double *at = storage.data();
   while (reinterpret_cast<uintptr_t>(at) % 64) ++at;
   std::mt19937 random(1);
