@@ -1,7 +1,6 @@
 #include "math/ldlt_solver.h"
 
 #include <algorithm>
-#include <cstring>
 #include <limits>
 
 #include "math/width.h"
@@ -149,7 +148,7 @@ bool LdltSolver::factor(const double *blk) {
       at += square(waiting_[c]);
     }
     if (!factor_panel(s, panel, own)) return false;
-    std::memmove(stack_.data() + base, own, square(s) * sizeof(double));
+    if (base != top) std::copy(own, own + square(s), stack_.data() + base);
     top = base + square(s);
     count = first;
     waiting_[count++] = s;
