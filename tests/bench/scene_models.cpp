@@ -9,6 +9,9 @@
 #include <set>
 
 #include "machine.h"
+#ifdef DEFORM_HAS_ODE
+#include "deform/ode_host.h"
+#endif
 #include "suite.h"
 
 namespace {
@@ -45,6 +48,9 @@ int main(int argc, char **argv) {
     if (!std::strcmp(argv[i], "--simulated")) simulated = std::atof(argv[i + 1]);
     if (!std::strcmp(argv[i], "--patience")) patience = std::atof(argv[i + 1]);
   }
+#ifdef DEFORM_HAS_ODE
+  test::ok(dfm_ode_register());
+#endif
   const std::set<std::string> done = bench::names_in(argv[1], 0, 4);
   std::FILE *table = std::fopen(argv[1], "a");
   if (!table) {

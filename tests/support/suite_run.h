@@ -299,12 +299,15 @@ inline void change_start(dfm_world world, const Settings &how) {
   }
 }
 
-inline std::vector<std::string> assignments(const Settings &how, size_t nbody) {
+inline std::vector<std::string> assignments(const Settings &how, const std::vector<bool> &directed) {
   std::vector<std::string> out;
   const Combination &c = how.combination;
   if (!c.model.empty())
-    for (size_t b = 0; b < nbody; ++b)
-      out.push_back("/bodies/" + std::to_string(b) + "/model={\"type\":\"" + c.model + "\"}");
+    for (size_t b = 0; b < directed.size(); ++b) {
+      const std::string body = "/bodies/" + std::to_string(b);
+      out.push_back(body + "/model={\"type\":\"" + c.model + "\"}");
+      if (directed[b] && c.model != "msm") out.push_back(body + "/anisotropy/params={}");
+    }
   if (c.integrator == "explicit") out.push_back("/time/integrator=symplectic_euler");
   if (c.integrator == "implicit") {
     out.push_back("/time/integrator=implicit_euler");
@@ -316,21 +319,26 @@ inline std::vector<std::string> assignments(const Settings &how, size_t nbody) {
 
 }  // namespace detail
 
-// Bodies of a scene file: those of its "bodies", found without a reader by opening it once.
-inline size_t count_bodies(dfm_context *context, const std::string &path) {
+// Bodies of a scene file, found without a reader by opening it once: has each parameters of a direction?
+// Those are of the model that the scene names.
+inline std::vector<bool> bodies_of(dfm_context *context, const std::string &path) {
+  std::vector<bool> out;
   dfm_scene scene = 0;
-  dfm_world world = 0;
-  if (dfm_scene_open(context, path.c_str(), nullptr, &scene) != DFM_OK) return 0;
-  ok(dfm_scene_world(scene, &world));
-  const size_t n = listed(dfm_world_bodies, world).size();
+  if (dfm_scene_open(context, path.c_str(), nullptr, &scene) != DFM_OK) return out;
+  const auto has = [&](const std::string &key) {
+    size_t bytes = 0;
+    return dfm_scene_value(scene, ("/bodies/" + std::to_string(out.size()) + key).c_str(), nullptr, &bytes) ==
+           DFM_OK;
+  };
+  while (has("/name")) out.push_back(has("/anisotropy/params"));
   ok(dfm_scene_close(scene));
-  return n;
+  return out;
 }
 
 inline Seen run(const std::string &path, const Settings &how) {
   Seen seen;
   Context context;
-  std::vector<std::string> set = detail::assignments(how, count_bodies(context, path));
+  std::vector<std::string> set = detail::assignments(how, bodies_of(context, path));
   std::vector<const char *> texts;
   for (const std::string &s : set) texts.push_back(s.c_str());
   dfm_scene_options options{};
