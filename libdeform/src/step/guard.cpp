@@ -31,7 +31,7 @@ namespace {
 constexpr uint32_t kSolves = 4, kCuts = 8, kFractions = 40;
 constexpr double kLeastCut = 0.25;
 constexpr double kLight = 299792458;  // m/s
-constexpr double kNoWay = 1e-3;       // of the way of a sub-step: less than this is none
+constexpr double kNoWay = 0.02;       // of the way of a sub-step: less than this is none
 constexpr double kSlow = 0.01;        // of d_g: what moves by less needs no closer look at how it does
 
 // The mean of the surfels' predicted velocities, and how far any of them is from it.
