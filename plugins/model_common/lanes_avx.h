@@ -17,6 +17,8 @@ typedef __m256d v4;
 
 DEFORM_INLINE v4 load4(const double *p) { return _mm256_load_pd(p); }
 DEFORM_INLINE void store4(double *p, v4 a) { _mm256_store_pd(p, a); }
+DEFORM_INLINE v4 load4_anywhere(const double *p) { return _mm256_loadu_pd(p); }
+DEFORM_INLINE void store4_anywhere(double *p, v4 a) { _mm256_storeu_pd(p, a); }
 // masked: never read
 DEFORM_INLINE v4 load_xyz(const double *p) {
   return _mm256_maskload_pd(p, _mm256_setr_epi64x(-1, -1, -1, 0));

@@ -19,6 +19,11 @@ DEFORM_INLINE void store4(double *p, v4 a) {
   _mm_store_pd(p, a.lo);
   _mm_store_pd(p + 2, a.hi);
 }
+DEFORM_INLINE v4 load4_anywhere(const double *p) { return {_mm_loadu_pd(p), _mm_loadu_pd(p + 2)}; }
+DEFORM_INLINE void store4_anywhere(double *p, v4 a) {
+  _mm_storeu_pd(p, a.lo);
+  _mm_storeu_pd(p + 2, a.hi);
+}
 DEFORM_INLINE v4 load_xyz(const double *p) { return {_mm_loadu_pd(p), _mm_load_sd(p + 2)}; }
 DEFORM_INLINE v4 splat(double a) { return {_mm_set1_pd(a), _mm_set1_pd(a)}; }
 DEFORM_INLINE v4 set4(double a, double b, double c, double d) {

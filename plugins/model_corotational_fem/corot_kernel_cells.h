@@ -509,11 +509,15 @@ static inline void cell_tangents(const Block &b, double a, double damp, double *
     for (int m = 0; m < 10; ++m) {
       v4 one[9];
       block_of<kFibre>(t, kFirst[m], kSecond[m], lambda, mu, one);
-      alignas(32) double spread_out[9][4];
-      for (int k = 0; k < 9; ++k) store4(spread_out[k], one[k]);
+      alignas(32) double last[4];
+      transpose(one[0], one[1], one[2], one[3]);
+      transpose(one[4], one[5], one[6], one[7]);
+      store4(last, one[8]);
       for (uint32_t c = 0; c < 4; ++c) {
         double *const out = blk + 9 * size_t(b.slots[n].slot[m][at + c]);
-        for (int k = 0; k < 9; ++k) out[k] -= spread_out[k][c];
+        store4_anywhere(out, load4_anywhere(out) - one[c]);
+        store4_anywhere(out + 4, load4_anywhere(out + 4) - one[4 + c]);
+        out[8] -= last[c];
       }
     }
   });
