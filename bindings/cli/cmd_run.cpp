@@ -75,6 +75,7 @@ class Runner {
         options_(options),
         world_(scene.world()),
         duration_(options.time > 0 ? options.time : scene.settings().duration),
+        static_(scene.value("/time/mode") == "\"static\""),
         check_every_step_(options.check || scene.settings().check),
         progress_(!globals.quiet && !globals.json),
         outputs_(scene, options.out),
@@ -113,7 +114,7 @@ class Runner {
   // Sentences that the summary must hold whether or not anybody reads the terminal.
   std::vector<std::string> remarks() const {
     std::vector<std::string> out;
-    if (held_nothing_ || !result_.hold_begun)
+    if (!static_ && (held_nothing_ || !result_.hold_begun))
       out.push_back("hold.creep_max_um_per_s is null: no pair sticks throughout the last half of the run");
     const dfm_world_stats stats = world_stats(scene_);
     if (trouble_ & DFM_TROUBLE_SUBSTEPS)
@@ -153,8 +154,35 @@ class Runner {
     return rate > 0 ? 1 / rate : 0;
   }
 
+  // The equilibrium under the next share of the loads; false when it has all of them.
+  bool advance_load() {
+    const double step = scene_.settings().step;
+    const uint64_t n = step > 0 ? uint64_t(std::ceil(duration_ / step - 1e-6)) : 1;
+    if (result_.steps == n) return false;
+    dfm_equilibrium_def def = dfm_equilibrium_def_default();
+    def.load_from = double(result_.steps) / double(n);
+    def.load_to = double(result_.steps + 1) / double(n);
+    def.time = result_.start + duration_ * def.load_to - result_.simulated;
+    dfm_equilibrium_info info = {};
+    info.size = sizeof info;
+    const double begin = wall_seconds();
+    const dfm_status status = dfm_world_equilibrium(world_, &def, &info);
+    result_.times.add(wall_seconds() - begin);
+    if (status != DFM_OK) {
+      stop();
+      return false;
+    }
+    ++result_.steps;
+    result_.load_steps += info.load_steps;
+    result_.iterations += info.iterations;
+    result_.residual = info.residual;
+    result_.simulated = dfm_world_time(world_);
+    return true;
+  }
+
   // One step toward the end; false when there.
   bool advance() {
+    if (static_) return advance_load();
     const double left = result_.start + duration_ - result_.simulated;
     double step = scene_.settings().step;
     const bool automatic = step <= 0;
@@ -198,7 +226,7 @@ class Runner {
   // What is due at this time; its cost is kept out of the run's times.
   void outputs(bool start_state) {
     const double t = result_.simulated;
-    if (!result_.hold_begun && t >= result_.start + duration_ / 2)
+    if (!static_ && !result_.hold_begun && t >= result_.start + duration_ / 2)
       result_.hold_begun = dfm_world_hold_begin(world_) == DFM_OK;
     at_record_ = record_.due(t - result_.start);
     const bool frame_due = frames_ && frame_.due(t - result_.start);
@@ -240,6 +268,7 @@ class Runner {
   const RunOptions &options_;
   dfm_world world_;
   double duration_;
+  bool static_;  // equilibria under growing loads instead of steps in time
   bool check_every_step_, at_record_ = false, held_nothing_ = false;
   uint32_t trouble_ = 0;
   Progress progress_;

@@ -232,6 +232,13 @@ std::string summary_json(const SceneFile &scene, const RunOptions &options, cons
       .add("hold", hold.text())
       .add("effects", effects.text())
       .add("plugins", plugins_json(scene));
+  if (run.load_steps > 0) {
+    JsonObject equilibrium;
+    equilibrium.add("load_steps", std::to_string(run.load_steps))
+        .add("iterations", std::to_string(run.iterations))
+        .add("residual", number(run.residual));
+    out.add("equilibrium", equilibrium.text());
+  }
   out.add("bodies", bodies_json(scene))
       .add("contacts", contacts.text())
       .add("impulse", run.impulses)

@@ -41,6 +41,9 @@ struct RunResult {
   std::string impulses = "{}";  // JSON, Impulses::json()
   bool interrupted = false, stopped = false;
   std::string stop_reason, stop_body;
+  // of equilibria: those found, linear solves, share of the forces that the last one leaves
+  uint64_t load_steps = 0, iterations = 0;
+  double residual = 0;
   bool hold_begun = false;
   double creep = 0;  // m/s, NAN if no pair qualifies
   uint32_t hold_count = 0;

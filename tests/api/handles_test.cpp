@@ -85,6 +85,7 @@ std::vector<Call> world_calls() {
        [](uint64_t h) { return dfm_world_pair_wrench(h, 1, 2, zero3, nullptr, nullptr); }},
       {"world_events", [](uint64_t h) { return dfm_world_events(h, 0, nullptr, &count); }},
       {"world_events_sized", [](uint64_t h) { return dfm_world_events_sized(h, 40, 0, nullptr, &count); }},
+      {"world_equilibrium", [](uint64_t h) { return dfm_world_equilibrium(h, nullptr, nullptr); }},
       {"world_set_budget", [](uint64_t h) { return dfm_world_set_budget(h, 0, 0); }},
       {"world_set_sleep", [](uint64_t h) { return dfm_world_set_sleep(h, true); }},
       {"world_hold_begin", [](uint64_t h) { return dfm_world_hold_begin(h); }},

@@ -167,7 +167,7 @@ TEST(SceneErrors, Names_AreUniqueAndKnown) {
 TEST(SceneErrors, NotDelivered_IsNeverIgnored) {
   const std::vector<std::pair<const char *, const char *>> later = {
       {"/rigid={\"bodies\":[{\"name\":\"r\",\"shape\":\"mesh\"}]}", "/rigid/bodies/0/shape"},
-      {"/time/mode=\"static\"", "/time/mode"},
+
       {"/time/integrator=\"verlet\"", "/time/integrator"},
       {"/output/color=\"stress\"", "/output/color"},
       {"/bodies/0/start={\"state\":\"a.vtu\"}", "/bodies/0/start/state"},
@@ -244,10 +244,10 @@ TEST(SceneApi, ErrorsLeaveNothingBehind) {
   EXPECT_EQ(dfm_scene_open(nullptr, scene().c_str(), nullptr, &s), DFM_E_ARG);
   EXPECT_EQ(s, 77u);
   EXPECT_EQ(w, 77u);
-  const char *set[] = {"/time/mode=\"static\""};
+  const char *set[] = {"/time/integrator=\"verlet\""};
   dfm_scene_options options = {sizeof options, 1, set, 0};
   EXPECT_EQ(dfm_scene_open(context, scene().c_str(), &options, &s), DFM_E_UNSUPPORTED);
-  EXPECT_NE(std::string(dfm_last_error()).find("not available yet: /time/mode"), std::string::npos);
+  EXPECT_NE(std::string(dfm_last_error()).find("not available yet: /time/integrator"), std::string::npos);
 }
 
 TEST(SceneErrors, SelfContactAskedForAndRefused_SaysSo) {

@@ -426,6 +426,12 @@ class World : public Handle<dfm_world, struct WorldKind> {
   auto set_gravity(std::span<const dfm_vector_key> keys) const {
     return E::done(dfm_world_set_gravity_keys(raw_, rows(keys.size(), 1), keys.data()));
   }
+  auto equilibrium(const EquilibriumDef &def = {}) const {
+    return produce<E, dfm_equilibrium_info>([&](dfm_equilibrium_info &i) {
+      i.size = sizeof i;
+      return dfm_world_equilibrium(raw_, &def, &i);
+    });
+  }
   auto set_budget(double max_time, uint64_t max_work) const {
     return E::done(dfm_world_set_budget(raw_, max_time, max_work));
   }

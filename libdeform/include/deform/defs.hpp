@@ -17,6 +17,9 @@ struct ContextDef : dfm_context_def {
 struct WorldDef : dfm_world_def {
   WorldDef() noexcept : dfm_world_def(dfm_world_def_default()) {}
 };
+struct EquilibriumDef : dfm_equilibrium_def {
+  EquilibriumDef() noexcept : dfm_equilibrium_def(dfm_equilibrium_def_default()) {}
+};
 struct MaterialDef : dfm_material_def {
   MaterialDef() noexcept : dfm_material_def(dfm_material_def_default()) {}
 };

@@ -127,6 +127,35 @@ enum {
  *         DFM_E_HANDLE; DFM_E_BUSY called from inside a step
  * Threads: One thread at a time per world. Since 0.1. */
 DFM_API dfm_status dfm_world_step(dfm_world world, double dt, uint32_t *trouble);
+/** Where dfm_world_equilibrium goes and how far it looks. */
+typedef struct dfm_equilibrium_def {
+  uint32_t size;
+  uint32_t load_steps; /* 0: 1. Each starts from the one before; one without an answer is halved */
+  /* share of gravity and of loads at the start and the end; those that have keys or a sine follow these */
+  double load_from, load_to;
+  double time;             /* s that pass on the way: what has keys is at its end place after it; 0 */
+  double tolerance;        /* N left at a point per N of the largest load or reaction; 0: 1e-10 */
+  uint32_t max_iterations; /* of Newton's method per load step and body; 0: 200 */
+  uint32_t reserved;
+} dfm_equilibrium_def;
+typedef struct dfm_equilibrium_info {
+  uint32_t size;
+  uint32_t load_steps; /* that it took */
+  uint64_t iterations; /* linear solves, of all bodies and load steps */
+  double residual;     /* of the last load step: N left per N of the largest load or reaction, worst body */
+} dfm_equilibrium_info;
+/** One load step, from no load to all of it, no time passes. Threads: Any thread. Since 0.1. */
+DFM_API dfm_equilibrium_def dfm_equilibrium_def_default(void);
+/** Moves all bodies to where their inner forces balance gravity, loads and springs, with held points where
+ * they are told to be; velocities are zero then (doc/concepts/static.md). What relaxes or flows has done so.
+ * @param def   NULL: the default
+ * @param info  out; may be NULL
+ * @return DFM_OK; DFM_E_DIVERGED no equilibrium was found, or a body that nothing holds has loads that do not
+ * sum to zero; DFM_E_UNSUPPORTED a model without stiffness, bodies that may touch, rigid bodies; DFM_E_ARG;
+ * DFM_E_NOMEM; DFM_E_HANDLE; DFM_E_BUSY. On failure nothing has changed.
+ * Threads: Not during step. Since 0.1. */
+DFM_API dfm_status dfm_world_equilibrium(dfm_world world, const dfm_equilibrium_def *def,
+                                         dfm_equilibrium_info *info);
 /** What a step may cost from now on, as max_time and max_work of dfm_world_def say it.
  * @return DFM_OK; DFM_E_ARG max_time below zero or not a number. Threads: Not during step. Since 0.1. */
 DFM_API dfm_status dfm_world_set_budget(dfm_world world, double max_time, uint64_t max_work);

@@ -9,6 +9,7 @@
 #include "step/method.h"
 #include "step/stages.h"
 #include "step/step_bound.h"
+#include "world/equilibrium.h"
 #include "world/explain.h"
 #include "world/snapshot.h"
 
@@ -223,6 +224,30 @@ dfm_status dfm_world_step(dfm_world world, double dt, uint32_t *trouble) {
     const dfm_status s = step_within_budget(w, dt, &bits);
     if (trouble) *trouble = bits;
     return s;
+  });
+}
+
+dfm_equilibrium_def dfm_equilibrium_def_default(void) {
+  dfm_equilibrium_def d{};
+  d.size = sizeof d;
+  d.load_steps = 1;
+  d.load_to = 1;
+  return d;
+}
+
+dfm_status dfm_world_equilibrium(dfm_world world, const dfm_equilibrium_def *def,
+                                 dfm_equilibrium_info *info) {
+  return as_status([&] {
+    World &w = exclusive(world_of(world));
+    const dfm_equilibrium_def d = take_def(def, dfm_equilibrium_def_default());
+    for (const double value : {d.load_from, d.load_to, d.time, d.tolerance})
+      if (!std::isfinite(value) || value < 0)
+        fail(DFM_E_ARG, "load_from, load_to, time and tolerance must be finite and not negative; found %g",
+             value);
+    dfm_equilibrium_info found{};
+    found.size = sizeof found;
+    find_equilibrium(w, d, found);
+    if (info) give(info, found);
   });
 }
 

@@ -137,7 +137,7 @@ const Table &objects() {
 
 const Table &words() {
   static const Table table = {
-      {"mode", {{"dynamic", true}, {"static", false}}},
+      {"mode", {{"dynamic", true}, {"static", true}}},
       {"integrator",
        {{"auto", true}, {"symplectic_euler", true}, {"verlet", false}, {"implicit_euler", true}}},
       {"method", {{"auto", true}, {"velocity", true}, {"implicit", true}, {"rollback", true}}},

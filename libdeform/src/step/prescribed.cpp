@@ -6,6 +6,32 @@
 
 namespace dfm {
 
+void set_loads(Body &b, double t, double share) {
+  std::fill(b.p.load.begin(), b.p.load.end(), 0.0);
+  for (const Load &load : b.loads) {
+    const bool varies = load.sine.amplitude[0] != 0;
+    double scale = load.keys.empty() ? (varies ? 1 : share) : scale_at(load.keys, t);
+    if (varies) scale *= 1 + load.sine.amplitude[0] * sine_at(load.sine, t);
+    for (size_t i = 0; i < load.points.size(); ++i) {
+      double *const f = &b.p.load[size_t(load.points[i]) * kStride];
+      store3(f, load3(f) + scale * load3(&load.force[3 * i]));
+    }
+  }
+}
+
+void each_held_place(const Body &b, double t, const std::function<void(uint32_t, Vec3)> &use) {
+  for (const HeldMotion &m : b.motions) {
+    const Pose first = m.keys.empty() ? Pose{} : to_pose(m.keys.front().pose);
+    const Pose now = m.keys.empty() ? Pose{} : pose_at(m.keys, t);
+    const Vec3 shift =
+        m.sine.frequency != 0 || m.sine.phase != 0 ? sine_at(m.sine, t) * load3(m.sine.amplitude) : Vec3{};
+    for (size_t i = 0; i < m.points.size(); ++i) {
+      const Vec3 local = rotate_back(first.rotation, load3(&m.start[3 * i]) - first.position);
+      use(m.points[i], place(now, local) + shift);
+    }
+  }
+}
+
 void stage_motion(World &w, double h, Array<Driven> &driven) {
   // Held velocities are the one part of the state that changes before a sub-step is known to succeed; what
   // was there is kept.
@@ -13,34 +39,18 @@ void stage_motion(World &w, double h, Array<Driven> &driven) {
   for (auto &b : w.bodies) {
     if (b->slumber.asleep) continue;
     if (b->loads_vary()) {
-      std::fill(b->p.load.begin(), b->p.load.end(), 0.0);
-      for (const Load &load : b->loads) {
-        double scale = load.keys.empty() ? 1 : scale_at(load.keys, w.time + h);
-        if (load.sine.amplitude[0] != 0) scale *= 1 + load.sine.amplitude[0] * sine_at(load.sine, w.time + h);
-        for (size_t i = 0; i < load.points.size(); ++i) {
-          double *const f = &b->p.load[size_t(load.points[i]) * kStride];
-          store3(f, load3(f) + scale * load3(&load.force[3 * i]));
-        }
-      }
+      set_loads(*b, w.time + h, 1);
       for (const Spring &spring : b->springs) add_spring_force(*b, spring, w.time, h);
     }
-    for (const HeldMotion &m : b->motions) {
-      const Pose first = m.keys.empty() ? Pose{} : to_pose(m.keys.front().pose);
-      const Pose now = m.keys.empty() ? Pose{} : pose_at(m.keys, w.time + h);
-      const Vec3 shift = m.sine.frequency != 0 || m.sine.phase != 0
-                             ? sine_at(m.sine, w.time + h) * load3(m.sine.amplitude)
-                             : Vec3{};
-      for (size_t i = 0; i < m.points.size(); ++i) {
-        const size_t at = size_t(m.points[i]) * kStride;
-        const Vec3 local = rotate_back(first.rotation, load3(&m.start[3 * i]) - first.position);
-        const Vec3 v = (1 / h) * (place(now, local) + shift - load3(&b->p.x[at]));
-        for (int k = 0; k < 3; ++k)
-          if (b->p.held[m.points[i]] & (1 << k)) {
-            driven.push_back({&b->p.v[at + size_t(k)], b->p.v[at + size_t(k)]});
-            b->p.v[at + size_t(k)] = v[k];
-          }
-      }
-    }
+    each_held_place(*b, w.time + h, [&](uint32_t point, Vec3 to) {
+      const size_t at = size_t(point) * kStride;
+      const Vec3 v = (1 / h) * (to - load3(&b->p.x[at]));
+      for (int k = 0; k < 3; ++k)
+        if (b->p.held[point] & (1 << k)) {
+          driven.push_back({&b->p.v[at + size_t(k)], b->p.v[at + size_t(k)]});
+          b->p.v[at + size_t(k)] = v[k];
+        }
+    });
   }
 }
 

@@ -3,6 +3,7 @@
 // of it has been committed.
 #pragma once
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <span>
 
@@ -52,6 +53,10 @@ using Active = std::span<const uint32_t>;  // slots of the bodies that stages wo
 struct Driven { double *velocity, before; };
 
 void stage_motion(World &w, double h, Array<Driven> &driven);
+// b.p.load at time t; loads that nothing varies over time times share. Springs are not in it.
+void set_loads(Body &b, double t, double share);
+// Where held points that move are told to be at time t.
+void each_held_place(const Body &b, double t, const std::function<void(uint32_t point, Vec3 to)> &use);
 void undo_motion(Array<Driven> &driven);  // held velocities as before stage_motion()
 bool stage_model(World &w, Active active, const SubStep &now, uint32_t *trouble);
 // kinetic: [bodies] J, of the active ones, out.

@@ -1,0 +1,177 @@
+#include "dynamics/equilibrium.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "plugin/plugin_solver.h"
+
+namespace dfm {
+namespace {
+
+constexpr double kForever = 1e9;  // s: longer than any relaxation
+// The line search ends where the slope along the way has not fallen below minus this share of what it was.
+constexpr double kOvershoot = 0.5;
+constexpr uint32_t kCuts = 12;
+// Share of its own diagonal that a matrix gets which is singular, at first; a hundred times as much where
+// that is not enough.
+constexpr double kLeastRegular = 1e-9, kMostRegular = 1e-1;
+// Up to so many points a factorization beats conjugate gradients on a matrix without the mass of a step.
+constexpr uint32_t kFactored = 30000;
+constexpr double kRounding = 8 * 2.220446049250313e-16;
+
+}  // namespace
+
+Equilibrium::Equilibrium(const Memory &memory, Phyxels &points, ModelInstance &model,
+                         const ImplicitOptions &options)
+    : p_(points), model_(model), stiffness_(memory), solve_tolerance_(options.tolerance) {
+  use_memory(memory, zero_, residual_, way_, held_);
+  zero_.assign(size_t{kStride} * p_.n, 0.0);
+  residual_.assign(size_t{3} * p_.n, 0.0);
+  way_ = residual_;
+  stiffness_.create(model, p_.n);
+  solver_ = make_solver(
+      {options.solver.c_str(), p_.n, stiffness_.constant() || p_.n <= kFactored, options.solver_iterations},
+      *static_cast<const dfm_context *>(model.host->ctx), memory, options.tasks);
+  solver_->analyse(pattern());
+}
+
+dfm_kin Equilibrium::kin(double time) const {
+  dfm_kin k{};
+  k.size = sizeof k;
+  k.stride = kStride;
+  k.t = time;
+  k.dt = kForever;
+  k.x = p_.x.data();
+  k.v = zero_.data();
+  k.state = model_.state.data();
+  return k;
+}
+
+// What is not balanced at the present positions, and the largest load or reaction.
+bool Equilibrium::residual(double time, const Loads &loads) {
+  loads(p_.f.data());
+  scale_ = 0;
+  for (const double f : p_.f) scale_ = std::max(scale_, std::fabs(f));
+  const dfm_kin k = kin(time);
+  if (model_.call("add_forces", [&] { return model_.ops->add_forces(model_.self, &k, p_.f.data()); }) !=
+      DFM_OK)
+    return false;
+  double poison = 0;
+  for (uint32_t i = 0; i < p_.n; ++i)
+    for (uint32_t c = 0; c < 3; ++c) {
+      const size_t at = size_t{kStride} * i + c;
+      const bool moves = p_.moves(at);
+      residual_[size_t{3} * i + c] = moves ? p_.f[at] : 0;
+      if (!moves) scale_ = std::max(scale_, std::fabs(p_.f[at]));
+      poison += 0.0 * p_.f[at];
+    }
+  return poison == 0;
+}
+
+// Blocks of A are in place; adds a share of the diagonal, holds what is held, and factors.
+bool Equilibrium::factor(double share) {
+  const Array<uint32_t> &pairs = stiffness_.pairs();
+  Array<double> &blocks = stiffness_.blocks();
+  for (size_t b = 0; b < pairs.size() / 2; ++b) {
+    if (pairs[2 * b] != pairs[2 * b + 1]) continue;
+    const double mean = (blocks[9 * b] + blocks[9 * b + 4] + blocks[9 * b + 8]) / 3;
+    for (size_t c = 0; c < 9; c += 4) blocks[9 * b + c] += share * mean;
+  }
+  hold_components(pattern(), p_.held.data(), blocks.data());
+  return solver_->factor(blocks.data());
+}
+
+bool Equilibrium::linearize(double time, const double *softness, bool free) {
+  if (factored_ && stiffness_.constant() && held_ == p_.held) return true;
+  const Array<uint32_t> &pairs = stiffness_.pairs();
+  for (double share = free ? kLeastRegular : 0; share <= kMostRegular;
+       share = share > 0 ? 100 * share : kLeastRegular) {
+    if (!stiffness_.evaluate(model_, kin(time), -1, 0)) return false;
+    Array<double> &blocks = stiffness_.blocks();
+    double stiffest = 0, far = 0;
+    for (size_t b = 0; b < pairs.size() / 2; ++b) {
+      if (pairs[2 * b] != pairs[2 * b + 1]) continue;
+      for (size_t c = 0; c < 9; c += 4) {
+        blocks[9 * b + c] += softness[pairs[2 * b]];
+        stiffest = std::max(stiffest, blocks[9 * b + c]);
+      }
+    }
+    for (const double x : p_.x) far = std::max(far, std::fabs(x));
+    floor_ = kRounding * (stiffest * far);
+    factored_ = factor(share);
+    held_ = p_.held;
+    if (factored_) return true;
+  }
+  return false;
+}
+
+void Equilibrium::move(double share) {
+  for (uint32_t i = 0; i < p_.n; ++i)
+    for (uint32_t c = 0; c < 3; ++c) p_.x[size_t{kStride} * i + c] += share * way_[size_t{3} * i + c];
+}
+
+double Equilibrium::slope() const {
+  double sum = 0;
+  for (size_t j = 0; j < residual_.size(); ++j) sum += residual_[j] * way_[j];
+  return sum;
+}
+
+double Equilibrium::left() const {
+  double most = 0;
+  for (const double r : residual_) most = std::max(most, std::fabs(r));
+  return most;
+}
+
+// Along the way: all of it, or less where the forces would push back by more than kOvershoot of what they
+// pushed on, or the model cannot answer.
+bool Equilibrium::search(double time, const Loads &loads) {
+  const double start = slope();
+  double share = 1;
+  move(1);
+  for (uint32_t cut = 0; cut < kCuts; ++cut) {
+    const bool known = residual(time, loads);
+    const double now = known ? slope() : -start;
+    if (known && now >= -kOvershoot * start) return true;
+    const double next = share * (known ? std::clamp(start / (start - now), 0.1, 0.7) : 0.5);
+    move(next - share);
+    share = next;
+  }
+  return residual(time, loads);
+}
+
+EquilibriumResult Equilibrium::find(const EquilibriumLimits &limits, double time, const Loads &loads,
+                                    const double *softness, bool free) {
+  EquilibriumResult out;
+  bool polished = false;
+  if (!residual(time, loads)) return out;
+  while (true) {
+    out.left = left();
+    out.scale = scale_;
+    const bool small = out.left <= std::max(limits.tolerance * scale_, floor_);
+    // one more correction once it is small: forces are balanced long before positions are known
+    if ((small && polished) || (out.left == 0)) break;
+    polished = small;
+    if (out.iterations == limits.iterations || !linearize(time, softness, free)) return out;
+    ++out.iterations;
+    SolveInfo info;
+    std::fill(way_.begin(), way_.end(), 0.0);
+    if (!solver_->solve(1, residual_.data(), way_.data(), solve_tolerance_, info)) return out;
+    if (!search(time, loads)) return out;
+  }
+  out.found = true;
+  return out;
+}
+
+bool Equilibrium::relax(double time) {
+  if (model_.state.empty()) return false;
+  dfm_kin k = kin(time);
+  k.state_out = model_.state_out.data();
+  std::fill(p_.f.begin(), p_.f.end(), 0.0);
+  if (model_.call("add_forces", [&] { return model_.ops->add_forces(model_.self, &k, p_.f.data()); }) !=
+      DFM_OK)
+    return false;
+  model_.commit_state();
+  return true;
+}
+
+}  // namespace dfm

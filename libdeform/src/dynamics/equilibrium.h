@@ -1,0 +1,66 @@
+// Where the points of one body are in equilibrium: f(x) + loads = 0 at all components that are not held, by
+// Newton's method with a line search on the model's stiffness.
+#pragma once
+#include <functional>
+#include <memory>
+
+#include "dynamics/dynamics.h"
+#include "dynamics/stiffness.h"
+#include "math/linear_solver.h"
+
+namespace dfm {
+
+struct EquilibriumLimits {
+  double tolerance = 1e-10;  // N left per N of the largest load or reaction
+  uint32_t iterations = 200;
+};
+struct EquilibriumResult {
+  bool found = false;
+  uint32_t iterations = 0;  // linear solves
+  double left = 0;          // N, the largest component of a force that nothing balances
+  double scale = 0;         // N, the largest component of a load or of a reaction
+};
+
+class Equilibrium {
+ public:
+  // Throws Error where the model gives no stiffness.
+  Equilibrium(const Memory &memory, Phyxels &points, ModelInstance &model, const ImplicitOptions &options);
+
+  // Writes loads at the present positions, weight included, into f [npoint,4] N.
+  using Loads = std::function<void(double *f)>;
+  // From the present positions to the equilibrium. softest: [npoint] N/m of what the loads give way, added to
+  // the matrix. free: nothing holds the body, so that its matrix has to be regularized. Where none is found
+  // positions are anywhere; velocities are taken for zero.
+  EquilibriumResult find(const EquilibriumLimits &limits, double time, const Loads &loads,
+                         const double *softness, bool free);
+  // What relaxes or flows has done so: the model's next state in a time without end. False: there is none, or
+  // the model cannot.
+  bool relax(double time);
+
+ private:
+  Phyxels &p_;
+  ModelInstance &model_;
+  ModelStiffness stiffness_;
+  std::unique_ptr<LinearSolver> solver_;
+  double solve_tolerance_;
+  Array<double> zero_;            // [npoint,4] velocities
+  Array<double> residual_, way_;  // [npoint,3] N; m
+  Array<uint8_t> held_;           // as in the factor at hand
+  double floor_ = 0;              // N, rounding of forces at the present positions
+  double scale_ = 0;              // N, the largest load or reaction
+  bool factored_ = false;
+
+  BlockPattern pattern() const {
+    return {p_.n, static_cast<uint32_t>(stiffness_.pairs().size() / 2), stiffness_.pairs().data()};
+  }
+  dfm_kin kin(double time) const;
+  bool residual(double time, const Loads &loads);
+  bool linearize(double time, const double *softness, bool free);
+  bool factor(double share);
+  bool search(double time, const Loads &loads);
+  void move(double share);
+  double slope() const;
+  double left() const;
+};
+
+}  // namespace dfm

@@ -1,0 +1,241 @@
+#include "world/equilibrium.h"
+
+#include <algorithm>
+#include <cmath>
+#include <memory>
+#include <vector>
+
+#include "core/error.h"
+#include "dynamics/equilibrium.h"
+#include "state/spring.h"
+#include "state/world.h"
+#include "step/energy_watch.h"
+#include "step/stages.h"
+
+namespace dfm {
+namespace {
+
+// A load step without an answer is halved so many times.
+constexpr uint32_t kHalvings = 6;
+// What relaxes changes what is balanced, and the other way round: so often at most.
+constexpr uint32_t kRelaxations = 4;
+
+// Time and share of the loads.
+struct Station { double time, share; };
+
+class Search {
+ public:
+  Search(World &w, const dfm_equilibrium_def &def, dfm_equilibrium_info &info)
+      : w_(w), info_(info), start_{w.time, def.load_from}, end_{w.time + def.time, def.load_to} {
+    if (def.tolerance > 0) limits_.tolerance = def.tolerance;
+    if (def.max_iterations) limits_.iterations = def.max_iterations;
+    for (const auto &b : w.bodies) bodies_.push_back(make(*b, w.implicit));
+    keep();
+  }
+  Search(const Search &) = delete;
+  Search &operator=(const Search &) = delete;
+  ~Search() {
+    if (!done_) put_back(first_);
+    set_gravity_now(w_);
+    for (auto &b : w_.bodies) set_loads(*b, w_.time, 1);
+  }
+
+  void run(uint32_t load_steps) {
+    first_ = kept_;
+    Station at = start_;
+    for (uint32_t k = 1; k <= load_steps; ++k) {
+      const double done = double(k) / load_steps;
+      const Station to = k == load_steps ? end_ : between(done);
+      go(at, to, 0);
+      at = to;
+    }
+    for (auto &b : w_.bodies) std::fill(b->p.v.begin(), b->p.v.end(), 0.0);
+    done_ = true;
+  }
+
+ private:
+  struct One {
+    Body *body;
+    std::unique_ptr<Equilibrium> solver;
+    std::vector<double> softness;  // [npoint] N/m of the body's springs
+    bool free;                     // neither held nor on springs
+  };
+  struct Kept {
+    double time;
+    std::vector<std::vector<double>> x, state;
+  };
+
+  One make(Body &b, const ImplicitOptions &options) const {
+    One one{&b, std::make_unique<Equilibrium>(w_.memory(), b.p, b.model, options), {}, b.springs.empty()};
+    one.softness.assign(b.p.n, 0.0);
+    std::vector<double> damping(b.p.n, 0.0);
+    for (const Spring &s : b.springs) add_spring_bound(s, one.softness.data(), damping.data());
+    one.free = one.free && std::all_of(b.p.held.begin(), b.p.held.end(), [](uint8_t h) { return h == 0; });
+    return one;
+  }
+
+  Station between(double part) const {
+    return {start_.time + part * (end_.time - start_.time),
+            start_.share + part * (end_.share - start_.share)};
+  }
+
+  void keep() {
+    kept_ = {w_.time, {}, {}};
+    for (const auto &b : w_.bodies) {
+      kept_.x.emplace_back(b->p.x.begin(), b->p.x.end());
+      kept_.state.emplace_back(b->model.state.begin(), b->model.state.end());
+    }
+  }
+  void put_back(const Kept &kept) {
+    w_.time = kept.time;
+    for (size_t i = 0; i < w_.bodies.size(); ++i) {
+      std::copy(kept.x[i].begin(), kept.x[i].end(), w_.bodies[i]->p.x.begin());
+      std::copy(kept.state[i].begin(), kept.state[i].end(), w_.bodies[i]->model.state.begin());
+    }
+  }
+
+  // From an equilibrium at `from` to one at `to`, in halves where one step finds none.
+  void go(const Station &from, const Station &to, uint32_t halved) {
+    const Kept before = kept_;
+    const One *failed = nullptr;
+    EquilibriumResult result;
+    if (reach(to, failed, result)) {
+      ++info_.load_steps;
+      keep();
+      return;
+    }
+    if (halved == kHalvings || (from.time == to.time && from.share == to.share)) refuse(*failed, to, result);
+    put_back(before);
+    const Station middle = {0.5 * (from.time + to.time), 0.5 * (from.share + to.share)};
+    go(from, middle, halved + 1);
+    go(middle, to, halved + 1);
+  }
+
+  bool reach(const Station &to, const One *&failed, EquilibriumResult &result) {
+    w_.time = to.time;
+    set_gravity_now(w_);
+    if (w_.gravity.keys.empty()) w_.gravity.now = to.share * w_.gravity.now;
+    info_.residual = 0;
+    for (One &one : bodies_) {
+      Body &b = *one.body;
+      set_loads(b, to.time, to.share);
+      each_held_place(b, to.time, [&](uint32_t point, Vec3 x) {
+        for (int k = 0; k < 3; ++k)
+          if (b.p.held[point] & (1 << k)) b.p.x[size_t(point) * kStride + size_t(k)] = x[k];
+      });
+      check_balance(one);
+      for (uint32_t round = 0;; ++round) {
+        result = one.solver->find(
+            limits_, to.time, [&](double *f) { loads(b, f); }, one.softness.data(), one.free);
+        info_.iterations += result.iterations;
+        if (!result.found) {
+          failed = &one;
+          return false;
+        }
+        // done once what has relaxed changes nothing
+        if ((round > 0 && result.iterations <= 1) || round == kRelaxations || !one.solver->relax(to.time))
+          break;
+      }
+      info_.residual = std::max(info_.residual, result.scale > 0 ? result.left / result.scale : 0);
+    }
+    return true;
+  }
+
+  // At the present positions, weight and springs included.
+  void loads(Body &b, double *f) const {
+    const Phyxels &p = b.p;
+    for (size_t i = 0; i < p.n; ++i)
+      for (size_t k = 0; k < 3; ++k)
+        f[i * kStride + k] = p.load[i * kStride + k] + p.mass[i] * w_.gravity.now[int(k)];
+    for (const Spring &s : b.springs) {
+      const Vec3 pull = s.stiffness * (spring_end(s, w_.time) - mean_of(b, s));
+      for (size_t i = 0; i < s.points.size(); ++i) {
+        double *const at = f + size_t(s.points[i]) * kStride;
+        store3(at, load3(at) + s.weights[i] * pull);
+      }
+    }
+  }
+  static Vec3 mean_of(const Body &b, const Spring &s) {
+    Vec3 x;
+    for (size_t i = 0; i < s.points.size(); ++i)
+      x += s.weights[i] * load3(&b.p.x[size_t(s.points[i]) * kStride]);
+    return x;
+  }
+
+  void check_balance(const One &one) const {
+    if (!one.free) return;
+    const Body &b = *one.body;
+    Vec3 sum;
+    double all = 0;
+    for (size_t i = 0; i < b.p.n; ++i) {
+      const Vec3 f = load3(&b.p.load[i * kStride]) + b.p.mass[i] * w_.gravity.now;
+      sum += f;
+      all += std::sqrt(norm2(f));
+    }
+    if (!(std::sqrt(norm2(sum)) > 1e-9 * all)) return;
+    fail(DFM_E_DIVERGED,
+         "body '%s' has no equilibrium: nothing holds it, and its loads sum to [%g, %g, %g] N; hold some of "
+         "its "
+         "points (fix), or balance its loads",
+         b.name.c_str(), sum.x, sum.y, sum.z);
+  }
+
+  [[noreturn]] void refuse(const One &one, const Station &at, const EquilibriumResult &r) const {
+    fail(DFM_E_DIVERGED,
+         "body '%s': no equilibrium was found at %g of the loads (%u iterations; %g N are not balanced, the "
+         "largest "
+         "load or reaction is %g N); lower the loads, hold what may move freely, or look for parameters that "
+         "leave "
+         "the body without stiffness",
+         one.body->name.c_str(), at.share, r.iterations, r.left, r.scale);
+  }
+
+  World &w_;
+  dfm_equilibrium_info &info_;
+  Station start_, end_;
+  EquilibriumLimits limits_;
+  std::vector<One> bodies_;
+  Kept kept_, first_;
+  bool done_ = false;
+};
+
+void check(const World &w) {
+  if (!w.rigid_sets.empty())
+    fail(DFM_E_UNSUPPORTED,
+         "an equilibrium is not looked for where rigid bodies move; take them out, or run the world in time");
+  for (const auto &b : w.bodies)
+    if (b->model.stepper)
+      fail(DFM_E_UNSUPPORTED,
+           "body '%s': model '%s' steps itself and tells no stiffness, which an equilibrium needs; choose "
+           "another model",
+           b->name.c_str(), b->model.type->id);
+  if (w.plan.touches())
+    fail(DFM_E_UNSUPPORTED,
+         "an equilibrium with contact is not available yet; keep what may touch apart by the collision "
+         "filter, "
+         "or run the world in time with damping");
+}
+
+}  // namespace
+
+void find_equilibrium(World &w, const dfm_equilibrium_def &def, dfm_equilibrium_info &info) {
+  prepare(w);
+  check(w);
+  wake_all(w);
+  {
+    Search search(w, def, info);
+    search.run(def.load_steps ? def.load_steps : 1);
+  }
+  for (auto &b : w.bodies) {
+    forget_energy(*b);
+    ++b->x_version;
+    w.overlaps.place(b->id);
+  }
+  for (auto &o : w.obstacles)
+    if (o->moves()) o->pose = o->pose_at_time(w.time);
+  w.bound.age = kNone;
+  ++w.placements;
+  w.stats.time = w.time;
+}
+
+}  // namespace dfm
