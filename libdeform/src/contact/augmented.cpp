@@ -1,6 +1,7 @@
 #include "contact/augmented.h"
 
 #include <algorithm>
+#include <cmath>
 #include <limits>
 
 #include "contact/linear_law.h"
@@ -18,7 +19,6 @@ constexpr double kForcing = 0.1;
 // The Newton residual goes down to this share of what the multipliers are still off by.
 constexpr double kInner = 0.3;
 
-constexpr double kFiner = 0.2;
 // Of what may be left; the rest is for the rigid motions that take the remainder of momentum in the end.
 constexpr double kKept = 0.25;
 
@@ -56,9 +56,20 @@ Vec3 resist(const double *slope, Vec3 u) {
 
 }  // namespace
 
-AugmentedSolve::AugmentedSolve(const Memory &m) : rigid_(m) {
+AugmentedSolve::AugmentedSolve(const Memory &m) : updates_(m), rigid_(m) {
   use_memory(m, place_, local_, pn_, pt_, inverse_, touched_, normal_, answer_, slope_, speed_, change_,
-             seen_, given_, force_, r_, z_, p_, ap_, d_, ad_);
+             seen_, given_, last_, off_, metric_, force_, r_, z_, p_, ap_, d_, ad_);
+}
+
+void AugmentedSolve::respond(const MatrixPoints &points, double *out) {
+  for (uint32_t i = 0; i < points.n; ++i) {
+    double inverse[9];
+    invert(points.blocks + size_t(9) * i, points.moves + size_t(4) * i, inverse);
+    store3(out + size_t(4) * i, {inverse[0], inverse[4], inverse[8]});
+    out[size_t(4) * i + 3] = 0;
+  }
+  rigid_.find_bodies(points);
+  rigid_.add_response(points, out);
 }
 
 void AugmentedSolve::start(const ContactRows &rows, const MatrixPoints &points,
@@ -75,10 +86,12 @@ void AugmentedSolve::start(const ContactRows &rows, const MatrixPoints &points,
   for (uint32_t i = 0; i < n_; ++i)
     invert(points.blocks + size_t(9) * i, points.moves + size_t(4) * i, &local_[size_t(9) * i]);
   for (Array<double> *a : {&pn_, &pt_, &normal_}) a->resize(rows.n);
-  for (Array<double> *a : {&answer_, &speed_, &change_}) a->resize(size_t(3) * rows.n);
-  slope_.resize(size_t(4) * rows.n);
+  for (Array<double> *a : {&answer_, &speed_, &change_, &last_, &off_, &metric_})
+    a->resize(size_t(3) * rows.n);
   penalties(rows);
   rigid_.start(rows, points, place);
+  slope_.assign(size_t(4) * rows.n, 0.0);
+  factor(rows, points);
 }
 
 // By the points' own blocks, not by A^-1: a penalty much above them would ruin the conditioning of the
@@ -306,9 +319,46 @@ void AugmentedSolve::take(ContactRows &rows, const ContactState &law, double h) 
   }
 }
 
+// Updates converge linearly and, where contacts are nearly redundant, slowly: the next multipliers are the
+// combination of the last few that Anderson's method makes of them.
+void AugmentedSolve::extrapolate(ContactRows &rows) {
+  double size = 0;
+  for (uint32_t k = 0; k < 3 * rows.n; ++k) {
+    const double weight = k % 3 == 0 ? pn_[k / 3] : pt_[k / 3];
+    metric_[k] = weight;
+    off_[k] = rows.impulse[k] - last_[k];
+    size += weight * (off_[k] * off_[k]);
+  }
+  // contacts have opened or begun to slip: what was learned is void
+  if (size > 4 * last_size_) updates_.start(3 * rows.n);
+  last_size_ = size;
+  updates_.next(last_.data(), off_.data(), metric_.data(), off_.data());
+  for (uint32_t k = 0; k < 3 * rows.n; ++k) {
+    const double l = last_[k] + off_[k];
+    rows.impulse[k] = k % 3 == 0 ? std::max(0.0, l) : l;
+  }
+}
+
 void AugmentedSolve::show(ContactRows &rows, const double *v) const {
   for (uint32_t d = 0; d < ndof_; ++d)
     if (place_[d] != kNone) store3(&rows.y[size_t(4) * d], load3(v + size_t(4) * place_[d]));
+}
+
+// Of dofs that answer it is J^T of the impulses that they have answered.
+void AugmentedSolve::set_force(const ContactRows &rows, const MatrixPoints &points, const double *v) {
+  points.multiply(v, force_.data());
+  for (size_t k = 0; k < size_t(4) * n_; ++k) force_[k] -= points.load[k];
+  std::fill(given_.begin(), given_.end(), 0.0);
+  for (uint32_t i = 0; i < rows.n; ++i) rows.spread(i, load3(&rows.impulse[size_t(i) * 3]), given_.data());
+  for (uint32_t d = 0; d < ndof_; ++d)
+    if (place_[d] == kNone) fours(force_)[n_ + d] = fours(given_)[d];
+}
+
+double AugmentedSolve::error(const ContactRows &rows, const MatrixPoints &points, const double *v) {
+  set_force(rows, points, v);
+  answer_.assign(rows.impulse.begin(), rows.impulse.end());
+  residual(rows, points);
+  return precondition(rows, points);
 }
 
 AugmentedWork AugmentedSolve::run(ContactRows &rows, const ContactState &law, double h,
@@ -316,16 +366,15 @@ AugmentedWork AugmentedSolve::run(ContactRows &rows, const ContactState &law, do
                                   const MatrixPoints &points, double *v) {
   AugmentedWork work;
   linear *= kKept;
+  updates_.start(3 * rows.n);
+  last_size_ = HUGE_VAL;
+  linear *= kKept;
+  updates_.start(3 * rows.n);
+  last_size_ = HUGE_VAL;
   // m/s, to which systems are solved at least. A stiff light body's normal impulses change by much with
   // little speed, and friction that follows them moves the body by more than that speed: then finer.
   double floor = linear;
-  // force_ of the state that is given; that of dofs is J^T of their impulses
-  points.multiply(v, force_.data());
-  for (size_t k = 0; k < size_t(4) * n_; ++k) force_[k] -= points.load[k];
-  std::fill(given_.begin(), given_.end(), 0.0);
-  for (uint32_t i = 0; i < rows.n; ++i) rows.spread(i, load3(&rows.impulse[size_t(i) * 3]), given_.data());
-  for (uint32_t d = 0; d < ndof_; ++d)
-    if (place_[d] == kNone) fours(force_)[n_ + d] = fours(given_)[d];
+  set_force(rows, points, v);
   for (uint32_t i = 0; i < rows.n; ++i)
     normal_[i] = rows.impulse[size_t(i) * 3] > 0 ? rows.impulse[size_t(i) * 3] : h * law.fn[i];
   const auto follow = [&] {
@@ -344,29 +393,24 @@ AugmentedWork AugmentedSolve::run(ContactRows &rows, const ContactState &law, do
       off = std::max({off, pn_[i] * std::fabs(a[0] - l[0]), pt_[i] * std::fabs(a[1] - l[1]),
                       pt_[i] * std::fabs(a[2] - l[2])});
     }
-    if (work.linear <= std::max(floor, kInner * off)) {
-      const bool settled = work.linear <= linear;
-      take(rows, law, h);
+    if (work.linear <= std::max(linear, kInner * off)) {
+      last_.assign(rows.impulse.begin(), rows.impulse.end());
+      rows.impulse.assign(answer_.begin(), answer_.end());
       ++work.updates;
-      residual(rows, points);
-      work.linear = precondition(rows, points);
       const double left = weighted_residual(rows, weights(), law, h, tolerance).relative;
+      rows.impulse.assign(last_.begin(), last_.end());
       work.converged = left <= 0.5 && work.linear <= linear;
       if (work.converged || work.newton == most_newton) break;
-      if (settled && left <= 0.5) floor *= kFiner;
+      take(rows, law, h);
+      extrapolate(rows);
       answers(rows, law, h, true);
       residual(rows, points);
       factor(rows, points);
       work.linear = precondition(rows, points);
     }
-    if (work.newton == most_newton) {
-      take(rows, law, h);
-      residual(rows, points);
-      work.linear = precondition(rows, points);
-      break;
-    }
+    if (work.newton == most_newton) break;
     ++work.newton;
-    work.iterations += gradients(rows, points, work.linear, std::max(0.5 * floor, kForcing * work.linear));
+    work.iterations += gradients(rows, points, work.linear, std::max(0.5 * linear, kForcing * work.linear));
     const double t = search(rows, law, h);
     add(force_, t, ad_);
     for (size_t k = 0; k < size_t(4) * n_; ++k) v[k] += t * d_[k];
@@ -375,6 +419,7 @@ AugmentedWork AugmentedSolve::run(ContactRows &rows, const ContactState &law, do
         rows.y[size_t(4) * d + c] += t * d_[size_t(4) * (n_ + d) + c];
     follow();
   }
+  rows.impulse.assign(answer_.begin(), answer_.end());
   // What the residual leaves: of dofs that answer, all, so that their velocities are what their impulses
   // make; of free bodies, the momentum.
   for (uint32_t d = 0; d < ndof_; ++d)

@@ -20,6 +20,7 @@
 #include "contact/matrix_points.h"
 #include "contact/rigid_modes.h"
 #include "contact/solver.h"
+#include "math/anderson.h"
 
 namespace dfm {
 
@@ -33,6 +34,9 @@ struct AugmentedWork {
 class AugmentedSolve {
  public:
   explicit AugmentedSolve(const Memory &memory);
+  // [n,4] 1/kg, what an impulse changes of its own point, about: by the blocks of A, and for loose bodies by
+  // the rigid motion too. What `alone` of the rows is to be.
+  void respond(const MatrixPoints &points, double *out);
   // Before the first run of a sub-step. place: [ndof] the point of each dof of the rows in `points`; kNone:
   // the dof answers by itself or in a block. The rows' y of dofs that are none has been changed by the rows'
   // impulses from y_free.
@@ -41,6 +45,8 @@ class AugmentedSolve {
   // What the residuals of contacts are weighed with: the inverse penalties. An impulse that the residual is r
   // off for is exactly what the law answers at a velocity r off.
   Weights weights() const { return {pn_.data(), pt_.data()}; }
+  // m/s, max |A_ii^-1 (A v - load - J^T l)_i| with the rows' impulses, rigid motions included.
+  double error(const ContactRows &rows, const MatrixPoints &points, const double *v);
   // On the laws as they were last answered: changes the impulses and y of the rows, and v [n,4].
   // linear: m/s, how large `AugmentedWork::linear` may be. most_newton: systems, at most
   AugmentedWork run(ContactRows &rows, const ContactState &law, double h, const Tolerance &tolerance,
@@ -61,10 +67,15 @@ class AugmentedSolve {
   Array<double> slope_;           // [contacts,4] kg: normal; tangential a, b, c
   Array<double> speed_, change_;  // [contacts,3] relative velocity, and along the direction
   Array<double> seen_, given_;    // [ndof,4] scratch: velocities of dofs, impulses on dofs
+  // [contacts,3] multipliers before an update, what it changes, 1/kg what that is weighed with
+  Array<double> last_, off_, metric_;
+  double last_size_ = 0;
+  Anderson updates_;
   RigidModes rigid_;
   Vector force_;  // A v - load, of dofs: A (y - y_free)
   Vector r_, z_, p_, ap_, d_, ad_;
 
+  void set_force(const ContactRows &rows, const MatrixPoints &points, const double *v);
   void penalties(const ContactRows &rows);
   void gather(const double *v);  // -> seen_
   void answers(const ContactRows &rows, const ContactState &law, double h, bool slopes);
@@ -73,6 +84,7 @@ class AugmentedSolve {
   double precondition(const ContactRows &rows, const MatrixPoints &points);  // z_ = P r_; largest m/s
   uint32_t gradients(const ContactRows &rows, const MatrixPoints &points, double first, double target);
   void take(ContactRows &rows, const ContactState &law, double h);
+  void extrapolate(ContactRows &rows);
   double search(const ContactRows &rows, const ContactState &law, double h);
 };
 

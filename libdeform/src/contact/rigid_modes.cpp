@@ -8,7 +8,7 @@
 namespace dfm {
 RigidModes::RigidModes(const Memory &m) { use_memory(m, bodies_, body_of_dof_, arm_, matrix_, sums_, seen_); }
 
-void RigidModes::start(const ContactRows &rows, const MatrixPoints &points, std::span<const uint32_t> place) {
+void RigidModes::find_bodies(const MatrixPoints &points) {
   bodies_.clear();
   for (const MatrixPoints::Loose &l : points.loose) {
     Body b{l.first, l.n, 0, 0, {}, {}, {}};
@@ -32,6 +32,12 @@ void RigidModes::start(const ContactRows &rows, const MatrixPoints &points, std:
     inverse3(b.inertia, b.inverse);
     bodies_.push_back(b);
   }
+  sums_.resize(6 * bodies_.size());
+  matrix_.resize(36 * bodies_.size() * bodies_.size());
+}
+
+void RigidModes::start(const ContactRows &rows, const MatrixPoints &points, std::span<const uint32_t> place) {
+  find_bodies(points);
   body_of_dof_.assign(rows.ndof, kNone);
   arm_.resize(rows.ndof);
   for (uint32_t d = 0; d < rows.ndof; ++d)
@@ -40,8 +46,6 @@ void RigidModes::start(const ContactRows &rows, const MatrixPoints &points, std:
         body_of_dof_[d] = k;
         arm_[d] = load3(points.x + size_t(4) * place[d]) - bodies_[k].center;
       }
-  sums_.resize(6 * bodies_.size());
-  matrix_.resize(36 * bodies_.size() * bodies_.size());
 }
 
 void RigidModes::see(const ContactRows &rows, uint32_t i) {

@@ -11,6 +11,7 @@ namespace dfm {
 class RigidModes {
  public:
   explicit RigidModes(const Memory &memory);
+  void find_bodies(const MatrixPoints &points);  // for add_response() and give(); start() does it too
   // place: [ndof] the matrix point of each dof of the rows; kNone
   void start(const ContactRows &rows, const MatrixPoints &points, std::span<const uint32_t> place);
   // R^T (M + J^T C J) R; slope: [contacts,4] kg, C in each contact's frame: normal, then a, b, c of [a b; b

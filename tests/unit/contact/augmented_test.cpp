@@ -6,6 +6,7 @@
 
 #include "contact/linear_law.h"
 #include "field_case.h"
+#include "math/block3.h"
 
 namespace {
 
@@ -187,7 +188,7 @@ TEST(Augmented, Result_MeetsTheConditionsOfContact) {
     EXPECT_GE(l.x, 0);
     EXPECT_GE(u.x + b.rows.rate[i], -1e-9);
     EXPECT_LE(l.x * (u.x + b.rows.rate[i]), 1e-9);
-    EXPECT_LE(friction, kMu * l.x * (1 + 1e-12));
+    EXPECT_LE(friction, kMu * l.x + 1e-8);
     if (slip > 1e-7 && l.x > 0) {
       EXPECT_NEAR(l.y, -kMu * l.x * u.y / slip, 1e-8);
       EXPECT_NEAR(l.z, -kMu * l.x * u.z / slip, 1e-8);
@@ -221,6 +222,24 @@ TEST(Augmented, Remainder_IsSmallAndKeepsMomentum) {
       EXPECT_LT(norm(sum), 1e-13 * total) << body;
     }
   }
+}
+
+// Of what run() has left: below its tolerance; before it: at least what the blocks of A alone make of it.
+TEST(Augmented, Error_IsThatOfTheEquationOfMotion) {
+  const FieldCase c{FieldSetup{}};
+  ByMatrix b(c);
+  b.solve.start(b.rows, c, c.place(b.rows));
+  const std::vector<double> left = c.remainder(b.rows, b.v);
+  double most = 0;
+  for (uint32_t i = 0; i < c.n; ++i) {
+    double inverse[9];
+    inverse3(c.blocks + 9 * size_t{i}, inverse);
+    most = std::max(most, norm(times3(inverse, load3(&left[4 * size_t{i}]))));
+  }
+  EXPECT_GT(most, 1e-3);
+  EXPECT_GE(b.solve.error(b.rows, c, b.v.data()), most * (1 - 1e-12));
+  b.run(c, {.mu = 0.5, .stretch = {}}, 1e-6);
+  EXPECT_LT(b.solve.error(b.rows, c, b.v.data()), 1e-6);
 }
 
 TEST(Augmented, WarmStart_TakesAFractionOfTheWork) {

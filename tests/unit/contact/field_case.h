@@ -274,9 +274,7 @@ class FieldCase : public MatrixPoints {
     for (uint32_t b = 0; b * each < n; ++b)
       if (!set.held || b > 0) loose_.push_back({b * each, each});
     loose = loose_;
-    RigidModes rigid{Memory::standard()};
-    rigid.start(ContactRows{Memory::standard()}, *this, {});
-    rigid.add_response(*this, alone_.data());
+    AugmentedSolve{Memory::standard()}.respond(*this, alone_.data());
   }
 
   void touch(std::initializer_list<uint32_t> node, std::initializer_list<double> weight, bool floor) {
