@@ -20,7 +20,7 @@ constexpr double kForcing = 0.1;
 constexpr double kInner = 0.3;
 
 // Of what may be left; the rest is for the rigid motions that take the remainder of momentum in the end.
-constexpr double kKept = 0.25;
+constexpr double kKept = 0.0625;
 
 using Four = double __attribute__((vector_size(32)));
 Four *fours(Array<double> &a) { return reinterpret_cast<Four *>(a.data()); }
@@ -368,12 +368,6 @@ AugmentedWork AugmentedSolve::run(ContactRows &rows, const ContactState &law, do
   linear *= kKept;
   updates_.start(3 * rows.n);
   last_size_ = HUGE_VAL;
-  linear *= kKept;
-  updates_.start(3 * rows.n);
-  last_size_ = HUGE_VAL;
-  // m/s, to which systems are solved at least. A stiff light body's normal impulses change by much with
-  // little speed, and friction that follows them moves the body by more than that speed: then finer.
-  double floor = linear;
   set_force(rows, points, v);
   for (uint32_t i = 0; i < rows.n; ++i)
     normal_[i] = rows.impulse[size_t(i) * 3] > 0 ? rows.impulse[size_t(i) * 3] : h * law.fn[i];

@@ -44,7 +44,13 @@ using AddRowSums = std::function<void(double *stiffness, double *damping)>;
 struct EndState { const double *x, *v, *mean; };
 
 // What revise() has found anew.
-enum class Revision { none, velocity, response, failed };  // response: and velocity
+enum class Revision {
+  none,
+  velocity,
+  response,  // and velocity
+  diverged,  // there is no state to be found from here: the sub-step is too long
+  failed     // the model cannot
+};
 
 // How implicit points solve.
 struct ImplicitOptions {

@@ -14,6 +14,10 @@ namespace {
 constexpr double kShare = 1e-3, kRest = 1e-8;
 // A correction that does not halve the one before needs a new matrix.
 constexpr double kContracts = 0.5;
+// Corrections of one solve at most, what may be left of `allowed_error` then, and how far above the least
+// correction one may lie before the iteration counts as lost.
+constexpr uint32_t kRevisions = 20;
+constexpr double kTolerated = 1000, kDiverges = 1000;
 // The line search ends where the slope along the correction has fallen to this share of what it was.
 constexpr double kSlopeLeft = 0.5;
 constexpr uint32_t kCuts = 8;
@@ -156,6 +160,8 @@ bool ImplicitPoints::free_motion(const SubStep &now, double &kinetic) {
   Array<double> &v = p_.v_free;
   v = p_.v;
   error_ = 0;
+  least_error_ = HUGE_VAL;
+  revisions_ = 0;
   if (!residual_at(now, v.data(), nullptr)) return false;
   bool fresh = true;
   for (uint32_t k = 0; k < options_.newton; ++k) {
@@ -266,7 +272,13 @@ Revision ImplicitPoints::revise(const SubStep &now, const double *surfel_impulse
   const bool known = residual_at(now, p_.v_end.data(), push_.data());
   if (known && !solve_way(residual_)) return Revision::failed;
   error_ = known ? largest(change_) : HUGE_VAL;
-  if (error_ <= allowed_error(p_.v_end)) return Revision::none;
+  const double allowed = allowed_error(p_.v_end);
+  if (error_ <= allowed || (revisions_ >= kRevisions && error_ <= kTolerated * allowed)) {
+    revisions_ = 0;
+    return Revision::none;
+  }
+  if (++revisions_ > kRevisions || !(error_ <= kDiverges * least_error_)) return Revision::diverged;
+  least_error_ = std::min(least_error_, error_);
   // The first correction is tried with the matrix at hand, and so is each that halves the one before.
   Array<double> &v = p_.v_free;
   if (before == 0 || error_ <= kContracts * before) {

@@ -57,6 +57,8 @@ class ImplicitPoints : public Dynamics {
   Array<double> between_;            // [3m,3m] 1/kg, response between these points
   double factor_h_ = 0;              // s, of the factor at hand; 0: none
   double error_ = 0;                 // m/s, the correction that the last revision found; 0: none yet
+  double least_error_ = 0;           // m/s, of all revisions in the sub-step
+  uint32_t revisions_ = 0;           // since one found nothing to change
 
   BlockPattern pattern() const {
     const Array<uint32_t> &pairs = stiffness_.pairs();

@@ -119,6 +119,8 @@ void edge_edge(const Pair &pair, Run run, Array<ContactPoint> &out) {
     if (dot(normal, fb.outward()) < dot(normal, fa.outward())) normal = -normal;
     const double distance = dot(normal, r);
     if (!(distance < reach)) continue;
+    // Past an end there is no depth yet, and what keeps the end away is a contact of its own.
+    if (distance < -pair.offset && !(s > 0 && s < nn && t > 0 && t < nn)) continue;
     // As far as the edges can turn within the sub-step, their cones may open.
     const double slack = kCone + std::min(0.3, reach / std::sqrt(std::min(uu, ww)));
     if (!fb.leans_out(normal, slack) || !fa.leans_out(-normal, slack)) continue;

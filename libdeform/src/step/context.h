@@ -66,8 +66,9 @@ struct StepContext {
   Array<double> tangents;
   // [contacts] place in the store that the contact goes on from, or kNone
   Array<uint32_t> match;
-  Array<uint32_t> block_surfels;  // responses of bodies whose points answer each other
-  bool bodies_revise = false;     // some body looks again at what the solve has made of it
+  Array<uint32_t> block_surfels;    // responses of bodies whose points answer each other
+  bool bodies_revise = false;       // some body looks again at what the solve has made of it
+  const Body *unsettled = nullptr;  // that has found no state with its contacts
   // a host has answered, and the solve goes on from its last impulses
   bool rigid_again = false;
   AreaShares areas;

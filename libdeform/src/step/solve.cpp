@@ -49,8 +49,10 @@ void apply_last(ContactRows &rows) {
   }
 }
 
-constexpr uint32_t kMostRevisions = 6;      // of what rigid hosts take for granted, within a sub-step
-constexpr uint32_t kMostRelinearized = 20;  // revisions of bodies, within a solve
+constexpr uint32_t kMostRevisions = 6;  // of what rigid hosts take for granted, within a sub-step
+// A sub-step in which a body does not come to a state with its contacts is taken anew, half as long, down to
+// this share of the planned one.
+constexpr double kLeastPiece = 1.0 / 256;
 
 // Where laws remember, errors of the normal force do not average out: each time a force falls by one, the
 // cone cuts off a part of the bristle that does not come back when it rises; and a point that shakes under a
@@ -183,7 +185,7 @@ void finish_rows(World &w, StepContext &step) {
   if (!step.guard.kept.empty()) guard_rates(step);
 }
 
-enum class Revised { nothing, something, failed };
+enum class Revised { nothing, something, diverged, failed };
 
 // Bodies whose forces are not linear in the velocity look at what the impulses have made of them. What they
 // answer then is put in the place of what they answered before; impulses stay.
@@ -202,6 +204,10 @@ Revised revise_bodies(World &w, StepContext &step) {
                          .c_str());
       return Revised::failed;
     }
+    if (found == Revision::diverged) {
+      step.unsettled = &b;
+      return Revised::diverged;
+    }
     if (found == Revision::none) continue;
     velocities = true;
     gather_surface(b.surface, b.p.x.data(), b.dynamics->point_velocity());
@@ -219,11 +225,11 @@ Revised revise_bodies(World &w, StepContext &step) {
 }
 
 // With what rigid hosts and bodies answer differently by the impulses that are found: the same problem again,
-// from these impulses. solved: false, a body could not.
-const LawInstance *solve_revised(World &w, StepContext &step, bool &solved) {
+// from these impulses.
+const LawInstance *solve_revised(World &w, StepContext &step, Revised &revised) {
   uint32_t passes = 0, sweeps = 0;
   const LawInstance *bad = nullptr;
-  for (uint32_t hosts = 0, bodies = 0;;) {
+  for (uint32_t hosts = 0;;) {
     bad = solve_rows(w, step);
     passes += std::exchange(step.passes, 0);
     sweeps += std::exchange(step.sweeps, 0);
@@ -234,15 +240,28 @@ const LawInstance *solve_revised(World &w, StepContext &step, bool &solved) {
       ++hosts;
       continue;
     }
-    if (bodies == kMostRelinearized) break;
-    const Revised revised = revise_bodies(w, step);
-    solved = revised != Revised::failed;
+    revised = revise_bodies(w, step);
     if (revised != Revised::something) break;
-    ++bodies;
   }
   step.passes = passes;
   step.sweeps = sweeps;
   return bad;
+}
+
+// Shorter, a body moves less far from where its forces are known.
+bool retry_shorter(World &w, StepContext &step, uint32_t *trouble) {
+  if (step.h > kLeastPiece * step.guard.planned) {
+    step.guard.again = true;
+    step.guard.cut = 0.5;
+    return false;
+  }
+  set_last_error(
+      format("step %llu, body '%s': no state was found in which its forces and contacts agree, not "
+             "even in a sub-step of %g s; take a smaller step, or lessen the stiffness",
+             static_cast<unsigned long long>(w.step_count), step.unsettled->name.c_str(), step.h)
+          .c_str());
+  *trouble |= DFM_TROUBLE_NONFINITE;
+  return false;
 }
 
 }  // namespace
@@ -256,9 +275,10 @@ bool stage_solve(World &w, StepContext &step, uint32_t *trouble) {
     reserve_contacts(w, step);
     return true;
   }
-  bool solved = true;
-  const LawInstance *const bad = solve_revised(w, step, solved);
-  if (!solved) {
+  Revised revised = Revised::nothing;
+  const LawInstance *const bad = solve_revised(w, step, revised);
+  if (revised == Revised::diverged) return retry_shorter(w, step, trouble);
+  if (revised == Revised::failed) {
     *trouble |= DFM_TROUBLE_PLUGIN;
     return false;
   }
