@@ -51,9 +51,10 @@ struct Hold {
   double start = 0;  // s
 };
 
-// between steps; with more, so many of the oldest go that
+// Events that are kept between steps. Beyond that so many of the oldest go at once that the next steps find
+// room.
 inline constexpr size_t kMostEvents = 65536;
-inline constexpr size_t kEventsAtOnce = 1024;  // the next steps find room
+inline constexpr size_t kEventsAtOnce = 1024;
 
 struct World {
   dfm_context *context;

@@ -119,7 +119,7 @@ dfm_status run_step(World &w, StepContext &step, double dt, uint32_t *trouble) {
   if (!std::exchange(w.overlaps.told, true)) *trouble |= DFM_TROUBLE_OVERLAP;
   if (bound_due(w)) update_bound(w);
   const double needed =
-      std::ceil(dt / w.bound.step - 1e-9);  // stable is infinite where nothing bounds the step
+      std::ceil(dt / w.bound.step - 1e-9);  // bound.step is infinite where nothing bounds it
   if (!(needed <= w.def.max_substeps)) {
     set_last_error(
         format("a step of %g s needs %g sub-steps of %g s (max_substeps %u): soften or coarsen body '%s', "
