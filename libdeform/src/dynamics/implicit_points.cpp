@@ -17,7 +17,7 @@ constexpr double kContracts = 0.5;
 // Corrections of one solve at most, what may be left of `allowed_error` then, and how far above the least
 // correction one may lie before the iteration counts as lost.
 constexpr uint32_t kRevisions = 20;
-constexpr double kTolerated = 1000, kDiverges = 1000;
+constexpr double kTolerated = 100, kDiverges = 100;
 // The line search ends where the slope along the correction has fallen to this share of what it was.
 constexpr double kSlopeLeft = 0.5;
 constexpr uint32_t kCuts = 8;

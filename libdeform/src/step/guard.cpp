@@ -206,9 +206,10 @@ bool wake_hit(World &w, StepContext &step) {
 }
 
 // An impulse that alone would move its point faster than light has others against it that grow with it: what
-// it stands for has no answer, and its rounding is motion out of nothing.
-bool overloaded(const StepContext &step) {
-  if (!(step.residual.due > 1)) return false;
+// it stands for has no answer, and its rounding is motion out of nothing. What was put inside something else
+// has no answer either, and is led out of it (concepts/overlaps.md).
+bool overloaded(const World &w, const StepContext &step) {
+  if (!(step.residual.due > 1) || !w.overlaps.found.empty()) return false;
   for (uint32_t i = 0; i < step.rows.n; ++i)
     if (step.rows.wn[i] * step.rows.impulse[3 * size_t{i}] > kLight) return true;
   return false;
@@ -233,7 +234,7 @@ bool stage_guard(World &w, StepContext &step, uint32_t *trouble) {
   step.guard.through.clear();
   double safe = 1;
   for (uint32_t solve = 0;; ++solve) {
-    if (overloaded(step)) {
+    if (overloaded(w, step)) {
       *trouble |= tell_jam(w, step);
       return false;
     }
