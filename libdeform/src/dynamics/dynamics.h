@@ -40,8 +40,8 @@ struct StepBound {
 // Adds row sums of stiffness N/m and damping N s/m that act on the points from outside of the model.
 using AddRowSums = std::function<void(double *stiffness, double *damping)>;
 
-// [n,4] m, m/s: of the points at the end of the sub-step; x_end = x + h mean.
-struct EndState { const double *x, *v, *mean; };
+// [n,4] m/s: of the points at the end of the sub-step, and their mean on the way there.
+struct EndState { const double *v, *mean; };
 
 // What revise() has found anew.
 enum class Revision {

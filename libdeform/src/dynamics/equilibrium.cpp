@@ -3,15 +3,14 @@
 #include <algorithm>
 #include <cmath>
 
+#include "dynamics/line_search.h"
 #include "plugin/plugin_solver.h"
 
 namespace dfm {
 namespace {
 
 constexpr double kForever = 1e9;  // s: longer than any relaxation
-// The line search ends where the slope along the way has not fallen below minus this share of what it was.
-constexpr double kOvershoot = 0.5;
-constexpr uint32_t kCuts = 12;
+constexpr uint32_t kCuts = 12;    // of a correction that leads too far
 // Share of its own diagonal that a matrix gets which is singular, at first; a hundred times as much where
 // that is not enough.
 constexpr double kLeastRegular = 1e-9, kMostRegular = 1e-1;
@@ -32,7 +31,7 @@ Equilibrium::Equilibrium(const Memory &memory, Phyxels &points, ModelInstance &m
   solver_ = make_solver(
       {options.solver.c_str(), p_.n, stiffness_.constant() || p_.n <= kFactored, options.solver_iterations},
       *static_cast<const dfm_context *>(model.host->ctx), memory, options.tasks);
-  solver_->analyse(pattern());
+  solver_->analyse(stiffness_.pattern());
 }
 
 dfm_kin Equilibrium::kin(double time) const {
@@ -70,32 +69,27 @@ bool Equilibrium::residual(double time, const Loads &loads) {
 
 // Blocks of A are in place; adds a share of the diagonal, holds what is held, and factors.
 bool Equilibrium::factor(double share) {
-  const Array<uint32_t> &pairs = stiffness_.pairs();
+  stiffness_.each_own([&](uint32_t, double *block) {
+    const double mean = (block[0] + block[4] + block[8]) / 3;
+    for (size_t c = 0; c < 9; c += 4) block[c] += share * mean;
+  });
   Array<double> &blocks = stiffness_.blocks();
-  for (size_t b = 0; b < pairs.size() / 2; ++b) {
-    if (pairs[2 * b] != pairs[2 * b + 1]) continue;
-    const double mean = (blocks[9 * b] + blocks[9 * b + 4] + blocks[9 * b + 8]) / 3;
-    for (size_t c = 0; c < 9; c += 4) blocks[9 * b + c] += share * mean;
-  }
-  hold_components(pattern(), p_.held.data(), blocks.data());
+  hold_components(stiffness_.pattern(), p_.held.data(), blocks.data());
   return solver_->factor(blocks.data());
 }
 
 bool Equilibrium::linearize(double time, const double *softness, bool free) {
   if (factored_ && stiffness_.constant() && held_ == p_.held) return true;
-  const Array<uint32_t> &pairs = stiffness_.pairs();
   for (double share = free ? kLeastRegular : 0; share <= kMostRegular;
        share = share > 0 ? 100 * share : kLeastRegular) {
     if (!stiffness_.evaluate(model_, kin(time), -1, 0)) return false;
-    Array<double> &blocks = stiffness_.blocks();
     double stiffest = 0, far = 0;
-    for (size_t b = 0; b < pairs.size() / 2; ++b) {
-      if (pairs[2 * b] != pairs[2 * b + 1]) continue;
+    stiffness_.each_own([&](uint32_t i, double *block) {
       for (size_t c = 0; c < 9; c += 4) {
-        blocks[9 * b + c] += softness[pairs[2 * b]];
-        stiffest = std::max(stiffest, blocks[9 * b + c]);
+        block[c] += softness[i];
+        stiffest = std::max(stiffest, block[c]);
       }
-    }
+    });
     for (const double x : p_.x) far = std::max(far, std::fabs(x));
     floor_ = kRounding * (stiffest * far);
     factored_ = factor(share);
@@ -110,33 +104,21 @@ void Equilibrium::move(double share) {
     for (uint32_t c = 0; c < 3; ++c) p_.x[size_t{kStride} * i + c] += share * way_[size_t{3} * i + c];
 }
 
-double Equilibrium::slope() const {
-  double sum = 0;
-  for (size_t j = 0; j < residual_.size(); ++j) sum += residual_[j] * way_[j];
-  return sum;
-}
-
 double Equilibrium::left() const {
   double most = 0;
   for (const double r : residual_) most = std::max(most, std::fabs(r));
   return most;
 }
 
-// Along the way: all of it, or less where the forces would push back by more than kOvershoot of what they
-// pushed on, or the model cannot answer.
+// Along the way, to where the residual is known again.
 bool Equilibrium::search(double time, const Loads &loads) {
-  const double start = slope();
-  double share = 1;
-  move(1);
-  for (uint32_t cut = 0; cut < kCuts; ++cut) {
-    const bool known = residual(time, loads);
-    const double now = known ? slope() : -start;
-    if (known && now >= -kOvershoot * start) return true;
-    const double next = share * (known ? std::clamp(start / (start - now), 0.1, 0.7) : 0.5);
-    move(next - share);
-    share = next;
-  }
-  return residual(time, loads);
+  return search_line(
+      product(residual_, way_), kCuts, [&](double share) { move(share); },
+      [&](double &slope) {
+        const bool known = residual(time, loads);
+        slope = product(residual_, way_);
+        return known;
+      });
 }
 
 EquilibriumResult Equilibrium::find(const EquilibriumLimits &limits, double time, const Loads &loads,

@@ -28,9 +28,9 @@ class Equilibrium {
 
   // Writes loads at the present positions, weight included, into f [npoint,4] N.
   using Loads = std::function<void(double *f)>;
-  // From the present positions to the equilibrium. softest: [npoint] N/m of what the loads give way, added to
-  // the matrix. free: nothing holds the body, so that its matrix has to be regularized. Where none is found
-  // positions are anywhere; velocities are taken for zero.
+  // From the present positions to the equilibrium. softness: [npoint] N/m of what the loads give way, added
+  // to the matrix. free: nothing holds the body, so that its matrix has to be regularized. Where none is
+  // found positions are anywhere; velocities are taken for zero.
   EquilibriumResult find(const EquilibriumLimits &limits, double time, const Loads &loads,
                          const double *softness, bool free);
   // What relaxes or flows has done so: the model's next state in a time without end. False: there is none, or
@@ -50,16 +50,12 @@ class Equilibrium {
   double scale_ = 0;              // N, the largest load or reaction
   bool factored_ = false;
 
-  BlockPattern pattern() const {
-    return {p_.n, static_cast<uint32_t>(stiffness_.pairs().size() / 2), stiffness_.pairs().data()};
-  }
   dfm_kin kin(double time) const;
   bool residual(double time, const Loads &loads);
   bool linearize(double time, const double *softness, bool free);
   bool factor(double share);
   bool search(double time, const Loads &loads);
   void move(double share);
-  double slope() const;
   double left() const;
 };
 

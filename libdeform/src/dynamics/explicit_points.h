@@ -18,7 +18,7 @@ class ExplicitPoints : public Dynamics {
   const double *diagonal() const override { return p_.inv_mass.data(); }
   const double *point_velocity() const override { return p_.v_free.data(); }
   bool end_state(const SubStep &now, const double *surfel_impulse, bool touched) override;
-  EndState end() const override { return {p_.x_end.data(), p_.v_end.data(), p_.v_end.data()}; }
+  EndState end() const override { return {p_.v_end.data(), p_.v_end.data()}; }
   void commit(const SubStep &now, double fraction) override;
 
  private:

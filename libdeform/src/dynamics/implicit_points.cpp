@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "dynamics/line_search.h"
 #include "dynamics/symplectic_euler.h"
 #include "plugin/plugin_solver.h"
 
@@ -18,9 +19,7 @@ constexpr double kContracts = 0.5;
 // correction one may lie before the iteration counts as lost.
 constexpr uint32_t kRevisions = 20;
 constexpr double kTolerated = 100, kDiverges = 100;
-// The line search ends where the slope along the correction has fallen to this share of what it was.
-constexpr double kSlopeLeft = 0.5;
-constexpr uint32_t kCuts = 8;
+constexpr uint32_t kCuts = 8;  // of a correction that leads too far
 // What a sub-step may err by, over the median edge of the surface; how much longer the next one may be.
 constexpr double kErrs = 0.005, kGrows = 2;
 
@@ -35,8 +34,8 @@ double largest(const Array<double> &a) {
 ImplicitPoints::ImplicitPoints(const Memory &memory, Phyxels &points, Surface &surface, ModelInstance &model,
                                const ImplicitOptions &options)
     : Dynamics(points, surface, model), options_(options), stiffness_(memory), ways_(memory) {
-  use_memory(memory, x_, v_, before_, residual_, push_, change_, scale_, weight_, held_, column_, points_,
-             between_);
+  use_memory(memory, x_, v_, before_, residual_, push_, change_, springs_, dampers_, scale_, weight_, held_,
+             column_, points_, between_);
   x_.assign(size_t{kStride} * points.n, 0.0);
   v_ = before_ = x_;
   for (Array<double> *a : {&residual_, &push_, &change_, &scale_, &weight_})
@@ -46,16 +45,15 @@ ImplicitPoints::ImplicitPoints(const Memory &memory, Phyxels &points, Surface &s
   solver_ =
       make_solver({options_.solver.c_str(), points.n, stiffness_.constant(), options_.solver_iterations},
                   *static_cast<const dfm_context *>(model.host->ctx), memory, options_.tasks);
-  solver_->analyse(pattern());
+  solver_->analyse(stiffness_.pattern());
 }
 
 // The scheme is stable at any step. Springs of loads act with what they are at the start of the sub-step.
 bool ImplicitPoints::bound(double, const AddRowSums &outside, StepBound &out) {
-  Array<double> &stiffness = change_, &damping = residual_;
-  std::fill_n(stiffness.begin(), p_.n, 0.0);
-  std::fill_n(damping.begin(), p_.n, 0.0);
-  outside(stiffness.data(), damping.data());
-  out.step = stable_step(p_, stiffness.data(), damping.data(), &out.point);
+  springs_.assign(p_.n, 0.0);
+  dampers_.assign(p_.n, 0.0);
+  outside(springs_.data(), dampers_.data());
+  out.step = stable_step(p_, springs_.data(), dampers_.data(), &out.point);
   return true;
 }
 
@@ -98,20 +96,17 @@ bool ImplicitPoints::linearize(const SubStep &now) {
   k.x = x_.data();
   k.v = v_.data();
   if (!stiffness_.evaluate(model_, k, -now.h * now.h, -now.h)) return false;
-  Array<double> &blocks = stiffness_.blocks();
-  const Array<uint32_t> &pairs = stiffness_.pairs();
-  for (size_t b = 0; b < pairs.size() / 2; ++b) {
-    const uint32_t i = pairs[2 * b];
-    if (i != pairs[2 * b + 1]) continue;
+  stiffness_.each_own([&](uint32_t i, double *block) {
     for (size_t c = 0; c < 3; ++c) {
-      double &diagonal = blocks[9 * b + 4 * c];
+      double &diagonal = block[4 * c];
       diagonal += p_.mass[i];
       const bool held = p_.held[i] & (1 << c);
       scale_[3 * size_t{i} + c] = held ? 0 : 1 / diagonal;
       weight_[3 * size_t{i} + c] = held ? 0 : diagonal;
     }
-  }
-  hold_components(pattern(), p_.held.data(), blocks.data());
+  });
+  Array<double> &blocks = stiffness_.blocks();
+  hold_components(stiffness_.pattern(), p_.held.data(), blocks.data());
   solver_->place(x_.data(), kStride);
   if (!solver_->factor(blocks.data())) return false;
   factor_h_ = now.h;
@@ -131,27 +126,15 @@ double ImplicitPoints::allowed_error(const Array<double> &v) const {
   return kRest + kShare * most;
 }
 
-// From v, whose residual is known, along the way in change_: all of it, or less where more than kSlopeLeft of
-// the slope would push back. The residual is then that of the new v. Where a model cannot answer, the way is
-// halved.
+// From v, whose residual is known, along the way in change_. The residual is then that of the new v.
 bool ImplicitPoints::search(const SubStep &now, Array<double> &v) {
-  const auto slope = [&] {
-    double sum = 0;
-    for (size_t j = 0; j < residual_.size(); ++j) sum -= residual_[j] * change_[j];
-    return sum;
-  };
-  const double start = slope();
-  double share = 1;
-  add(v, 1);
-  for (uint32_t cut = 0; cut < kCuts; ++cut) {
-    const bool known = residual_at(now, v.data(), nullptr);
-    const double left = known ? slope() : -start;  // below zero: too far
-    if (known && left >= -kSlopeLeft * start) return true;
-    const double next = share * (known ? std::clamp(start / (start - left), 0.1, 0.7) : 0.5);
-    add(v, next - share);
-    share = next;
-  }
-  return residual_at(now, v.data(), nullptr);
+  return search_line(
+      -product(residual_, change_), kCuts, [&](double share) { add(v, share); },
+      [&](double &slope) {
+        const bool known = residual_at(now, v.data(), nullptr);
+        slope = -product(residual_, change_);
+        return known;
+      });
 }
 
 // Newton's method. A factorization costs many solves, so one serves while the residual falls well; the
@@ -200,9 +183,7 @@ void ImplicitPoints::accelerate(const Array<double> &v) {
   for (uint32_t i = 0; i < p_.n; ++i)
     for (uint32_t c = 0; c < 3; ++c) push_[size_t{3} * i + c] = v[size_t{kStride} * i + c];
   ways_.next(push_.data(), change_.data(), weight_.data(), push_.data());
-  double slope = 0;
-  for (size_t j = 0; j < push_.size(); ++j) slope -= residual_[j] * push_[j];
-  if (slope > 0) change_.swap(push_);
+  if (-product(residual_, push_) > 0) change_.swap(push_);
 }
 
 void ImplicitPoints::add(Array<double> &v, double share) const {

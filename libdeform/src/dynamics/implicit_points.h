@@ -37,7 +37,7 @@ class ImplicitPoints : public Dynamics {
   bool response(const SubStep &now, uint32_t n, const uint32_t *surfel, double *matrix) override;
   Revision revise(const SubStep &now, const double *surfel_impulse) override;
   bool end_state(const SubStep &now, const double *surfel_impulse, bool touched) override;
-  EndState end() const override { return {p_.x_end.data(), p_.v_end.data(), p_.v_end.data()}; }
+  EndState end() const override { return {p_.v_end.data(), p_.v_end.data()}; }
   void bound_ends(double &speed, double &change) const override;
   double accurate_step(const SubStep &now) const override;
   void commit(const SubStep &now, double fraction) override;
@@ -51,6 +51,7 @@ class ImplicitPoints : public Dynamics {
   Array<double> before_;             // [npoint,4] m/s, the end before the last revision
   Array<double> residual_;           // [npoint,3] N s
   Array<double> push_, change_;      // [npoint,3] N s of contact; m/s, a solution
+  Array<double> springs_, dampers_;  // [npoint] N/m, N s/m of loads
   Array<double> weight_, scale_;     // [npoint,3] kg, diagonal of A; 1/kg, its inverse; zero where held
   Array<uint8_t> held_;              // [npoint] as in the factor at hand
   Array<uint32_t> column_, points_;  // [npoint] place among the points that touched surfels hang on; these
@@ -60,10 +61,6 @@ class ImplicitPoints : public Dynamics {
   double least_error_ = 0;           // m/s, of all revisions in the sub-step
   uint32_t revisions_ = 0;           // since one found nothing to change
 
-  BlockPattern pattern() const {
-    const Array<uint32_t> &pairs = stiffness_.pairs();
-    return {p_.n, static_cast<uint32_t>(pairs.size() / 2), pairs.data()};
-  }
   bool ask(const SubStep &now, const double *v, bool commits);
   bool residual_at(const SubStep &now, const double *v, const double *push);
   bool linearize(const SubStep &now);

@@ -14,7 +14,7 @@ class SelfStepping : public Dynamics {
   bool free_motion(const SubStep &now, double &kinetic) override;
   bool response(const SubStep &now, uint32_t n, const uint32_t *surfel, double *matrix) override;
   bool end_state(const SubStep &now, const double *surfel_impulse, bool touched) override;
-  EndState end() const override { return {p_.x_end.data(), p_.v_end.data(), mean_.data()}; }
+  EndState end() const override { return {p_.v_end.data(), mean_.data()}; }
   void bound_ends(double &speed, double &change) const override;
   void commit(const SubStep &now, double fraction) override;
 

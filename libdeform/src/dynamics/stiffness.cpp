@@ -22,6 +22,7 @@ void ModelStiffness::create(const ModelInstance &model, uint32_t npoint) {
          "model '%s' promises a stiffness and has no function for it; report it to its "
          "author",
          id);
+  npoint_ = npoint;
   uint32_t nb = 0;
   if (model.call("pattern", [&] { return ops.pattern(model.self, &nb, nullptr); }) != DFM_OK)
     fail(DFM_E_FATAL, "model '%s' does not tell the pattern of its stiffness; the log says why", id);

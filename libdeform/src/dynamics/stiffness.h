@@ -1,6 +1,7 @@
 // The tangent stiffness of a model, as blocks of 3x3 between pairs of points.
 #pragma once
 #include "dynamics/model.h"
+#include "math/block_matrix.h"
 
 namespace dfm {
 
@@ -15,11 +16,18 @@ class ModelStiffness {
   // blocks = a df/dx + b df/dv; false: the model cannot.
   bool evaluate(const ModelInstance &model, const dfm_kin &k, double a, double b);
 
-  const Array<uint32_t> &pairs() const { return pairs_; }  // [nb,2] points, i <= j
-  Array<double> &blocks() { return blocks_; }              // [nb,9] row-major
+  BlockPattern pattern() const { return {npoint_, static_cast<uint32_t>(pairs_.size() / 2), pairs_.data()}; }
+  Array<double> &blocks() { return blocks_; }  // [nb,9] row-major
+  // act(point, block) on the blocks of points with themselves
+  template <class Act>
+  void each_own(const Act &act) {
+    for (size_t b = 0; b < pairs_.size() / 2; ++b)
+      if (pairs_[2 * b] == pairs_[2 * b + 1]) act(pairs_[2 * b], &blocks_[9 * b]);
+  }
 
  private:
-  Array<uint32_t> pairs_;
+  uint32_t npoint_ = 0;
+  Array<uint32_t> pairs_;  // [nb,2] points, i <= j
   Array<double> blocks_;
   bool constant_ = false;
 };

@@ -175,18 +175,15 @@ class Search {
     if (!(std::sqrt(norm2(sum)) > 1e-9 * all)) return;
     fail(DFM_E_DIVERGED,
          "body '%s' has no equilibrium: nothing holds it, and its loads sum to [%g, %g, %g] N; hold some of "
-         "its "
-         "points (fix), or balance its loads",
+         "its points (fix), or balance its loads",
          b.name.c_str(), sum.x, sum.y, sum.z);
   }
 
   [[noreturn]] void refuse(const One &one, const Station &at, const EquilibriumResult &r) const {
     fail(DFM_E_DIVERGED,
          "body '%s': no equilibrium was found at %g of the loads (%u iterations; %g N are not balanced, the "
-         "largest "
-         "load or reaction is %g N); lower the loads, hold what may move freely, or look for parameters that "
-         "leave "
-         "the body without stiffness",
+         "largest load or reaction is %g N); lower the loads, hold what may move freely, or look for "
+         "parameters that leave the body without stiffness",
          one.body->name.c_str(), at.share, r.iterations, r.left, r.scale);
   }
 
@@ -212,8 +209,7 @@ void check(const World &w) {
   if (w.plan.touches())
     fail(DFM_E_UNSUPPORTED,
          "an equilibrium with contact is not available yet; keep what may touch apart by the collision "
-         "filter, "
-         "or run the world in time with damping");
+         "filter, or run the world in time with damping");
 }
 
 }  // namespace

@@ -1,0 +1,36 @@
+// Newton's corrections, shortened where the whole of one leads too far.
+#pragma once
+#include <algorithm>
+#include <cstddef>
+#include <cstdint>
+
+namespace dfm {
+
+// a . b over all components, in their order.
+template <class Values>
+double product(const Values &a, const Values &b) {
+  double sum = 0;
+  for (size_t j = 0; j < a.size(); ++j) sum += a[j] * b[j];
+  return sum;
+}
+
+// Goes along a way: all of it, or less where what is sought would be pushed back by more than half of what
+// pushed it on. start: the slope at its beginning, above zero. move(share) goes on by that share of the way;
+// slope(value) writes the slope there, or returns false where it is not known, and the way is then halved.
+// False: it is not known at the end either.
+template <class Move, class Slope>
+bool search_line(double start, uint32_t cuts, const Move &move, const Slope &slope) {
+  constexpr double kOvershoot = 0.5;
+  double share = 1, now = 0;
+  move(1.0);
+  for (uint32_t cut = 0; cut < cuts; ++cut) {
+    const bool known = slope(now);
+    if (known && now >= -kOvershoot * start) return true;
+    const double next = share * (known ? std::clamp(start / (start - now), 0.1, 0.7) : 0.5);
+    move(next - share);
+    share = next;
+  }
+  return slope(now);
+}
+
+}  // namespace dfm
