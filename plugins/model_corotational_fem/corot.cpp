@@ -100,6 +100,11 @@ dfm_status cell_energy(void *self, const dfm_kin *k, double *density) {
   return DFM_OK;
 }
 
+dfm_status cell_stress(void *self, const dfm_kin *k, double *stress) {
+  static_cast<Body *>(self)->cell_stress(*k, stress);
+  return DFM_OK;
+}
+
 const char *const *active_effects(const void *self) {
   return static_cast<const Body *>(self)->active_effects;
 }
@@ -109,11 +114,13 @@ const char *idle(const void *self, uint32_t row) {
 }
 
 const dfm_cell_energy kCellEnergy = {sizeof(dfm_cell_energy), 0, cell_energy};
+const dfm_cell_stress kCellStress = {sizeof(dfm_cell_stress), 0, cell_stress};
 const dfm_effects kActiveEffects = {sizeof(dfm_effects), 0, active_effects};
 const dfm_idle kIdle = {sizeof(dfm_idle), 0, idle};
 
 const void *extension(const void *, const char *id) {
   if (!strcmp(id, DFM_EXT_CELL_ENERGY)) return &kCellEnergy;
+  if (!strcmp(id, DFM_EXT_CELL_STRESS)) return &kCellStress;
   if (!strcmp(id, DFM_EXT_EFFECTS)) return &kActiveEffects;
   if (!strcmp(id, DFM_EXT_IDLE)) return &kIdle;
   return nullptr;

@@ -44,6 +44,17 @@ void energy_pass(void *user, uint32_t begin, uint32_t end) {
   }
 }
 
+// f: [ncell,6] stresses
+void stress_pass(void *user, uint32_t begin, uint32_t end) {
+  const Call &call = *static_cast<const Call *>(user);
+  Body &body = *call.body;
+  for (uint32_t n = begin; n < end; ++n) {
+    const Block b = body.lend(n, begin);
+    body.kernels->load(b, call.k->x, nullptr, call.k->stride);
+    body.kernels->stresses(b, body.cell_id.data() + kGroup * size_t(b.group - body.group.data()), call.f);
+  }
+}
+
 }  // namespace
 
 void Body::for_each_block(uint32_t least_cells, void (*fn)(void *, uint32_t, uint32_t), void *user) {
@@ -104,6 +115,12 @@ double Body::energy(const dfm_kin &k) {
 void Body::cell_energy(const dfm_kin &k, double *out) {
   fill_energies(k);
   for (uint32_t c = 0; c < ncell; ++c) out[c] = volume[c] > 0 ? value[place_of[c]] / volume[c] : 0;
+}
+
+void Body::cell_stress(const dfm_kin &k, double *out) {
+  Call call{this, &k, out};
+  for_each_block(kParallelCells, stress_pass, &call);
+  for (size_t n = 0; n < 6 * size_t(ncell); ++n) out[n] = volume[n / 6] > 0 ? out[n] / volume[n / 6] : 0;
 }
 
 void gradient_of(const Group &group, uint32_t lane, const double *const *x, double *f) {

@@ -96,6 +96,7 @@ struct Body {
   double energy(const dfm_kin &k);
   void fill_energies(const dfm_kin &k);
   void cell_energy(const dfm_kin &k, double *out);
+  void cell_stress(const dfm_kin &k, double *out);
 
   uint32_t pairs() const { return npoint + nedge; }
   void pattern(uint32_t *ij) const;

@@ -63,6 +63,9 @@ struct Kernels {
   // Copies x (and v, unless NULL) of the block's points in and clears f.
   void (*load)(const Block &b, const double *x, const double *v, uint32_t stride);
   void (*forces)(const Block &b);
+  // out [ncell,6] of the host, Pa m^3: xx yy zz xy yz zx; cells [groups,8]: number of each, ~0 for one that
+  // fills up
+  void (*stresses)(const Block &b, const uint32_t *cells, double *out);
   void (*energies)(const Block &b);  // J per cell, of kLinear
   // Stiffness of each cell, and of its damper, beyond that at rest; all of it where the energy is not linear.
   // See corot_bound.cpp.
@@ -76,6 +79,9 @@ struct Kernels {
 // The sum of the two smaller stretches of a cell, over the trace of all three, from which on the bound counts
 // it: where it vanishes two rotations are equally near and the energy has a kink.
 constexpr double kLeastPair = 0.1;
+
+// The volume, over that at rest, that a flatter cell counts as having in its Cauchy stress.
+constexpr double kLeastVolume = 1e-3;
 
 const Kernels *kernels_sse2();
 const Kernels *kernels_avx2();

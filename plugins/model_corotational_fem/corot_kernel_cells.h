@@ -316,30 +316,37 @@ DEFORM_INLINE void direct_stress(const Four &q, const v4 *f, const model::Polar<
   }
 }
 
+// P V of four cells; f is lost where there are dampers.
+template <Energy kEnergy, bool kFibre, bool kDamped>
+DEFORM_INLINE void piola(const Block &b, uint32_t n, const Four &q, v4 *f, const v4 *r,
+                         const model::Polar<Wide> &o, v4 *p) {
+  v4 e[6], stress[6], all[9];
+  if constexpr (kEnergy == kLinear || kDamped) strain_of(r, f, e);
+  if constexpr (kEnergy == kLinear) {
+    stress_of(q, e, stress);
+    full(stress, all);
+    if constexpr (kFibre || kDamped) add_others<kFibre, kDamped>(b, n, q, r, e, f, all);
+    turn(r, all, p);
+  } else {
+    direct_stress<kEnergy>(q, f, o, p);
+    if constexpr (kDamped) {
+      v4 damper[9];
+      for (int k = 0; k < 9; ++k) all[k] = splat(0);
+      add_others<false, true>(b, n, q, r, e, f, all);
+      turn(r, all, damper);
+      for (int k = 0; k < 9; ++k) p[k] = p[k] + damper[k];
+    }
+  }
+}
+
 template <Energy kEnergy, bool kFibre, bool kDamped>
 static inline void cell_forces(const Block &b) {
   each_four<kEnergy == kLinear || kDamped>(
       b, [&](uint32_t n, uint32_t at, v4 *f, const v4 *r, const model::Polar<Wide> &o)
              __attribute__((always_inline)) {
                const Four q = {b.group + n, at};
-               v4 e[6], stress[6], all[9], p[9];
-               if constexpr (kEnergy == kLinear || kDamped) strain_of(r, f, e);
-               if constexpr (kEnergy == kLinear) {
-                 stress_of(q, e, stress);
-                 full(stress, all);
-                 if constexpr (kFibre || kDamped) add_others<kFibre, kDamped>(b, n, q, r, e, f, all);
-                 turn(r, all, p);
-               } else {
-                 direct_stress<kEnergy>(q, f, o, p);
-                 if constexpr (kDamped) {
-                   v4 damper[9];
-                   for (int k = 0; k < 9; ++k) all[k] = splat(0);
-                   add_others<false, true>(b, n, q, r, e, f, all);
-                   turn(r, all, damper);
-                   for (int k = 0; k < 9; ++k) p[k] = p[k] + damper[k];
-                 }
-               }
-               v4 sum[4], other[4];
+               v4 p[9], sum[4], other[4];
+               piola<kEnergy, kFibre, kDamped>(b, n, q, f, r, o, p);
                spread(b, q, 0, p, sum);
                for (int k = 1; k < 3; ++k) {
                  spread(b, q, k, p, other);
@@ -356,6 +363,33 @@ static inline void forces(const Block &b) {
     return damped ? cell_forces<kVenant, false, true>(b) : cell_forces<kVenant, false, false>(b);
   if (b.fibre) return damped ? cell_forces<kLinear, true, true>(b) : cell_forces<kLinear, true, false>(b);
   return damped ? cell_forces<kLinear, false, true>(b) : cell_forces<kLinear, false, false>(b);
+}
+
+// Cauchy stress P F^T / J times V, without dampers, J no less than kLeastVolume in size.
+template <Energy kEnergy, bool kFibre>
+static inline void cell_stresses(const Block &b, const uint32_t *cells, double *out) {
+  each_four<kEnergy == kLinear>(b, [&](uint32_t n, uint32_t at, v4 *f, const v4 *r,
+                                       const model::Polar<Wide> &o) __attribute__((always_inline)) {
+    const Four q = {b.group + n, at};
+    v4 p[9];
+    alignas(32) double one[6][4];
+    piola<kEnergy, kFibre, false>(b, n, q, f, r, o, p);
+    const v4 over = splat(1) / max4(abs4(o.det), splat(kLeastVolume));
+    constexpr int kRow[6] = {0, 1, 2, 0, 1, 2}, kCol[6] = {0, 1, 2, 1, 2, 0};
+    for (int k = 0; k < 6; ++k) {
+      const v4 *x = p + 3 * kRow[k], *y = f + 3 * kCol[k];
+      store4(one[k], over * ((x[0] * y[0] + x[1] * y[1]) + x[2] * y[2]));
+    }
+    for (uint32_t c = 0; c < 4; ++c) {
+      const uint32_t number = cells[size_t(kGroup) * n + at + c];
+      for (uint32_t k = 0; number != ~0u && k < 6; ++k) out[6 * size_t(number) + k] = one[k][c];
+    }
+  });
+}
+static inline void stresses(const Block &b, const uint32_t *cells, double *out) {
+  if (b.energy == kNeoHookean) return cell_stresses<kNeoHookean, false>(b, cells, out);
+  if (b.energy == kVenant) return cell_stresses<kVenant, false>(b, cells, out);
+  return b.fibre ? cell_stresses<kLinear, true>(b, cells, out) : cell_stresses<kLinear, false>(b, cells, out);
 }
 
 template <bool kFibre>
@@ -541,7 +575,8 @@ static inline void add_to_host(const Block &b, double *f, uint32_t stride) {
   }
 }
 
-constexpr Kernels kKernels = {load_block, forces, energies, twists, tangents, merge_halo, add_to_host};
+constexpr Kernels kKernels = {load_block, forces,   stresses,   energies,
+                              twists,     tangents, merge_halo, add_to_host};
 
 }  // namespace
 }  // namespace corot

@@ -206,8 +206,8 @@ void Body::bound(double *k, double *c) const {
   }
 }
 
-// J/m3, of strain e = sym(sum u_a g_a^T).
-double Body::density_of(uint32_t c, const dfm_kin &k, const Tetrahedron &t) const {
+// sym(sum u_a g_a^T): xx yy zz xy yz zx.
+void Body::strain_of(uint32_t c, const dfm_kin &k, const Tetrahedron &t, double *e) const {
   const uint32_t *const q = cells.data() + 4 * size_t(c);
   double h[3][3] = {}, u0[3], u[3];
   displacement(k, q[0], u0);
@@ -216,14 +216,21 @@ double Body::density_of(uint32_t c, const dfm_kin &k, const Tetrahedron &t) cons
     for (size_t r = 0; r < 3; ++r)
       for (size_t s = 0; s < 3; ++s) h[r][s] += (u[r] - u0[r]) * t.g[a][s];
   }
+  for (size_t r = 0; r < 3; ++r) {
+    e[r] = h[r][r];
+    e[3 + r] = 0.5 * (h[r][(r + 1) % 3] + h[(r + 1) % 3][r]);
+  }
+}
+
+// J/m3
+double Body::density_of(uint32_t c, const dfm_kin &k, const Tetrahedron &t) const {
+  double e[6];
+  strain_of(c, k, t, e);
   const model::Lame m = model::lame_of(at(kYoung, c), at(kPoisson, c));
-  const double trace = (h[0][0] + h[1][1]) + h[2][2];
+  const double trace = (e[0] + e[1]) + e[2];
+  constexpr size_t kEntry[9] = {0, 3, 5, 3, 1, 4, 5, 4, 2};
   double square = 0;
-  for (size_t r = 0; r < 3; ++r)
-    for (size_t s = 0; s < 3; ++s) {
-      const double e = 0.5 * (h[r][s] + h[s][r]);
-      square += e * e;
-    }
+  for (const size_t n : kEntry) square += e[n] * e[n];
   return 0.5 * m.lambda * (trace * trace) + m.mu * square;
 }
 
@@ -238,6 +245,17 @@ double Body::energy(const dfm_kin &k) const {
 void Body::cell_energy(const dfm_kin &k, double *density) const {
   Tetrahedron t;
   for (uint32_t c = 0; c < ncell; ++c) density[c] = cell(c, t) ? density_of(c, k, t) : 0;
+}
+
+void Body::cell_stress(const dfm_kin &k, double *stress) const {
+  Tetrahedron t;
+  for (uint32_t c = 0; c < ncell; ++c) {
+    double e[6] = {};
+    if (cell(c, t)) strain_of(c, k, t, e);
+    const model::Lame m = model::lame_of(at(kYoung, c), at(kPoisson, c));
+    const double pressure = m.lambda * ((e[0] + e[1]) + e[2]);
+    for (size_t n = 0; n < 6; ++n) stress[6 * size_t(c) + n] = 2 * m.mu * e[n] + (n < 3 ? pressure : 0);
+  }
 }
 
 void Body::pattern(uint32_t *ij) const {

@@ -30,6 +30,7 @@ struct Body {
   void bound(double *ksum, double *csum) const;
   double energy(const dfm_kin &k) const;
   void cell_energy(const dfm_kin &k, double *density) const;
+  void cell_stress(const dfm_kin &k, double *stress) const;
   // Blocks of the tangent: the points by themselves, then the edges of the mesh.
   uint32_t nblocks() const { return npoint + nedge; }
   void pattern(uint32_t *ij) const;
@@ -60,6 +61,7 @@ struct Body {
   bool cell(uint32_t c, Tetrahedron &out) const;  // false: flat at rest, it has no stiffness
   void add_cell(uint32_t c, const Tetrahedron &t, const model::Lame &m, double damp);
   void displacement(const dfm_kin &k, uint32_t point, double *u) const;
+  void strain_of(uint32_t c, const dfm_kin &k, const Tetrahedron &t, double *e) const;
   double density_of(uint32_t c, const dfm_kin &k, const Tetrahedron &t) const;
 };
 

@@ -240,6 +240,22 @@ void patch(const char *model, bool turned) {
     }
   for (const double d : density)
     EXPECT_NEAR(d / (0.5 * lambda * trace * trace + mu * square), 1, 1e-9) << model;
+  // and its stress, which the picture of the cells has too
+  std::vector<double> stress(6 * size_t(info.ntet));
+  EXPECT_EQ(dfm_body_stress(s.body, info.ntet - 1, stress.data()), DFM_E_ARG);
+  test::ok(dfm_body_stress(s.body, info.ntet, stress.data()));
+  if (!turned) {
+    constexpr size_t kRow[6] = {0, 1, 2, 0, 1, 2}, kColumn[6] = {0, 1, 2, 1, 2, 0};
+    for (size_t n = 0; n < stress.size(); ++n) {
+      const size_t r = kRow[n % 6], c = kColumn[n % 6];
+      EXPECT_NEAR(stress[n], mu * (kStrain[r][c] + kStrain[c][r]) + (r == c ? lambda * trace : 0), 1e-7);
+    }
+  }
+  const std::string path = testing::TempDir() + "patch_" + model + ".vtu";
+  test::ok(dfm_debug_write_body(s.body, path.c_str()));
+  const std::string picture = test::read_file(path);
+  EXPECT_NE(picture.find("Name=\"stress\" NumberOfComponents=\"6\""), std::string::npos);
+  EXPECT_NE(picture.find("Name=\"von_mises\""), std::string::npos);
 }
 
 TEST(Static, PatchTest_IsPassedByLinearElasticity) {

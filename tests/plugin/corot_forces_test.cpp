@@ -81,6 +81,72 @@ TEST(CorotForces, Force_IsTheGradientOfTheEnergy) {
     }
 }
 
+double present_volume(const Instance &b, uint32_t c) {
+  const uint32_t *q = &b.mesh.cells[4 * size_t(c)];
+  const Vec o = b.get(b.x, q[0]);
+  return dot(b.get(b.x, q[1]) - o, cross(b.get(b.x, q[2]) - o, b.get(b.x, q[3]) - o)) / 6;
+}
+
+// x = R U X: stress 2 mu (U - I) + lambda tr(U - I) I of the frame, its faces those of the present shape.
+TEST(CorotForces, CellStress_OfUniformStretchIsTheClosedForm) {
+  constexpr double kLambda = 1e5 * 0.3 / (1.3 * 0.4), kMu = 1e5 / 2.6, kStretch[3] = {1.2, 0.9, 1.05};
+  const Vec axis = (1 / std::sqrt(14.0)) * Vec{-1, 3, 2};
+  Host host;
+  Instance b(host, kuhn_bar(3, 2, 2, 0.1, 0.2), {{"poisson", {0.3}}, {"damping_stiffness", {0.1}}});
+  b.shake(0, 1);  // dampers are not in it
+  for (uint32_t i = 0; i < b.size(); ++i) {
+    const Vec x = b.mesh.at(i);
+    b.set(b.x, i, rotate({kStretch[0] * x[0], kStretch[1] * x[1], kStretch[2] * x[2]}, axis, 2.1));
+  }
+  double expected[3][3] = {};
+  for (size_t k = 0; k < 3; ++k) {
+    Vec e{};
+    e[k] = 1;
+    const Vec turned = rotate(e, axis, 2.1);
+    const double s = 2 * kMu * (kStretch[k] - 1) + kLambda * (1.2 + 0.9 + 1.05 - 3);
+    for (size_t r = 0; r < 3; ++r)
+      for (size_t c = 0; c < 3; ++c)
+        expected[r][c] += s * kStretch[k] / (1.2 * 0.9 * 1.05) * turned[r] * turned[c];
+  }
+  const std::vector<double> stress = stress_of_cells(b);
+  for (size_t n = 0; n < stress.size(); ++n)
+    EXPECT_NEAR(stress[n], expected[kStressRow[n % 6]][kStressColumn[n % 6]], 1e-10 * 1e5);
+}
+
+TEST(CorotForces, CellStress_IsSymmetricAndHasTheVirialOfTheForces) {
+  for (const Params &p : {Params{{"poisson", {0.4}}}, kFibres, kNeoHookean, kVenant}) {
+    Host host;
+    Instance b(host, kuhn_bar(3, 2, 2, 0.1, 0.2), p);
+    b.shake(0.01, 0);
+    b.forces();
+    const std::vector<double> stress = stress_of_cells(b);
+    for (size_t k = 0; k < 6; ++k) {
+      const size_t row = size_t(kStressRow[k]), column = size_t(kStressColumn[k]);
+      double sum = 0, virial = 0, turned = 0, scale = 0;
+      for (uint32_t c = 0; c < b.mesh.ncell(); ++c) {
+        const double part = present_volume(b, c) * stress[6 * size_t(c) + k];
+        sum += part;
+        scale += std::abs(part);
+      }
+      for (uint32_t i = 0; i < b.size(); ++i) {
+        virial -= b.get(b.f, i)[row] * b.get(b.x, i)[column];
+        turned -= b.get(b.f, i)[column] * b.get(b.x, i)[row];
+      }
+      EXPECT_NEAR(sum, virial, 1e-10 * scale) << k;
+      EXPECT_NEAR(sum, turned, 1e-10 * scale) << k;
+    }
+  }
+}
+
+TEST(CorotForces, CellStress_OfFlatAndInvertedCellsIsFinite) {
+  for (const double size : {0.0, -1.0, 1e-9}) {
+    Host host;
+    Instance b(host, kuhn_bar(2, 2, 2, 0.1));
+    for (uint32_t i = 0; i < b.size(); ++i) b.x[4 * i] *= size;
+    for (const double s : stress_of_cells(b)) EXPECT_TRUE(std::isfinite(s)) << size;
+  }
+}
+
 TEST(CorotForces, RenumberedPoints_GiveTheSameForces) {
   Host host;
   const Mesh mesh = irregular_tet();

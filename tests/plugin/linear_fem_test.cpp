@@ -38,6 +38,33 @@ struct Linear : ModelInstance {
   }
 };
 
+TEST(LinearFem, CellStress_OfUniformStrainIsTheClosedFormAndHasTheVirial) {
+  constexpr double kA[3][3] = {{1e-3, 4e-4, 0}, {2e-4, -5e-4, 1e-4}, {0, -3e-4, 7e-4}};
+  constexpr double kLambda = 1e5 * 0.3 / (1.3 * 0.4), kMu = 1e5 / 2.6, kTrace = 1e-3 - 5e-4 + 7e-4;
+  Host host;
+  Linear b(host, kuhn_bar(3, 2, 2, 0.1, 0.2), material(1e5, 0.3));
+  b.strain(kA);
+  const std::vector<double> stress = stress_of_cells(b);
+  for (size_t n = 0; n < stress.size(); ++n) {
+    const int r = kStressRow[n % 6], c = kStressColumn[n % 6];
+    EXPECT_NEAR(stress[n], kMu * (kA[r][c] + kA[c][r]) + (r == c ? kLambda * kTrace : 0), 1e-8);
+  }
+  b.shake(1e-3, 0);
+  b.forces();
+  // of the rest shape: -sum f X^T
+  const std::vector<double> shaken = stress_of_cells(b);
+  for (size_t k = 0; k < 6; ++k) {
+    double sum = 0, virial = 0, scale = 0;
+    for (uint32_t c = 0; c < b.mesh.ncell(); ++c) {
+      sum += b.mesh.volume(c) * shaken[6 * size_t(c) + k];
+      scale += b.mesh.volume(c) * std::abs(shaken[6 * size_t(c) + k]);
+    }
+    for (uint32_t i = 0; i < b.size(); ++i)
+      virial -= b.get(b.f, i)[size_t(kStressRow[k])] * b.mesh.at(i)[size_t(kStressColumn[k])];
+    EXPECT_NEAR(sum, virial, 1e-10 * scale) << k;
+  }
+}
+
 TEST(LinearFem, ForcesDampingAndBlocks_AreOneLinearMap) {
   const Mesh mesh = kuhn_bar(3, 2, 2, 0.1, 0.2);
   for (const Fields &fields : {Fields{}, uneven(mesh)})

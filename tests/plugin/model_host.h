@@ -378,6 +378,17 @@ inline double energy_of_cells(ModelInstance &b) {
   return sum;
 }
 
+// Pa, [ncell,6].
+inline std::vector<double> stress_of_cells(ModelInstance &b) {
+  const auto *ext = static_cast<const dfm_cell_stress *>(b.ops->extension(b.self, DFM_EXT_CELL_STRESS));
+  std::vector<double> stress(6 * size_t(b.mesh.ncell()));
+  const dfm_kin k = b.kin();
+  EXPECT_EQ(ext ? ext->cell_stress(b.self, &k, stress.data()) : DFM_E_UNSUPPORTED, DFM_OK);
+  return stress;
+}
+
+constexpr int kStressRow[6] = {0, 1, 2, 0, 1, 2}, kStressColumn[6] = {0, 1, 2, 1, 2, 0};
+
 // Central differences of the energy at every fifth point: 2 h^2 of its third derivative against its rounding
 // over h. `scale` is the largest force.
 inline void expect_force_is_gradient(ModelInstance &b, double h, double tolerance, const std::string &what) {

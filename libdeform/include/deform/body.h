@@ -190,6 +190,11 @@ DFM_API dfm_status dfm_body_get_measure(dfm_body body, dfm_body_measure *out);
  * @return DFM_OK; DFM_E_UNSUPPORTED the model offers none; DFM_E_ARG capacity too small; DFM_E_HANDLE.
  * Threads: Any thread. Not during step. Since 0.1. */
 DFM_API dfm_status dfm_body_energy_density(dfm_body body, uint32_t capacity, double *out);
+/** Cauchy stress of each cell, Pa, [ntet,6] as xx yy zz xy yz zx in the axes of the world, tension > 0;
+ * without dampers. @param capacity of out in cells
+ * @return DFM_OK; DFM_E_UNSUPPORTED the model offers none; DFM_E_ARG capacity too small; DFM_E_HANDLE.
+ * Threads: Any thread. Not during step. Since 0.1. */
+DFM_API dfm_status dfm_body_stress(dfm_body body, uint32_t capacity, double *out);
 #ifdef __cplusplus
 }
 #endif

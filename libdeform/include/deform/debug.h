@@ -6,7 +6,8 @@
 #ifdef __cplusplus
 extern "C" {
 #endif
-/** Phyxels as VTU (point data u, v; cell data energy_density where the model offers it). Never
+/** Phyxels as VTU (point data u, v; cell data energy_density, stress (xx yy zz xy yz zx) and von_mises
+ * where the model offers them). Never
  * leaves half a file.
  * Threads: Not during step. Since 0.1. */
 DFM_API dfm_status dfm_debug_write_body(dfm_body body, const char *path);

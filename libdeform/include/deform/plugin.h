@@ -218,6 +218,14 @@ typedef struct dfm_cell_energy {
   /* [step] density[ncell] = J/m^3 */
   dfm_status (*cell_energy)(void *self, const dfm_kin *k, double *density);
 } dfm_cell_energy;
+/* Extension "dfm.cell_stress/1" of a model (draft): stress of the elastic forces, for pictures and probes.
+ */
+#define DFM_EXT_CELL_STRESS "dfm.cell_stress/1"
+typedef struct dfm_cell_stress {
+  uint32_t size, reserved;
+  /* [step] stress[ncell,6] = Pa, Cauchy stress as xx yy zz xy yz zx in the axes of the world; tension > 0 */
+  dfm_status (*cell_stress)(void *self, const dfm_kin *k, double *stress);
+} dfm_cell_stress;
 /* Extension "dfm.slots/1" of a model (draft): state of this instance, where its parameters decide how much
  * there is. It stands in the place of dfm_model.slots, is asked for once after create() and stays as it is
  * while the instance lives. */

@@ -394,3 +394,11 @@ dfm_status dfm_body_energy_density(dfm_body body, uint32_t capacity, double *out
     energy_density(b, out);
   });
 }
+
+dfm_status dfm_body_stress(dfm_body body, uint32_t capacity, double *out) {
+  return as_status([&] {
+    Body &b = body_of(body);
+    if (!room(static_cast<uint32_t>(b.tets.size() / 4), capacity, out, nullptr)) return;
+    cell_stress(b, out);
+  });
+}

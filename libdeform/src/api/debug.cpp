@@ -1,5 +1,7 @@
 #include "deform/debug.h"
 
+#include <cmath>
+
 #include "api/objects.h"
 #include "mesh/mesh.h"
 #include "world/measure.h"
@@ -16,6 +18,12 @@ std::vector<double> packed(const Array<double> &column, uint32_t n) {
   return out;
 }
 
+// Equivalent stress of xx yy zz xy yz zx.
+double von_mises(const double *s) {
+  const double a = s[0] - s[1], b = s[1] - s[2], c = s[2] - s[0];
+  return std::sqrt(0.5 * (a * a + b * b + c * c) + 3 * (s[3] * s[3] + s[4] * s[4] + s[5] * s[5]));
+}
+
 }  // namespace
 
 dfm_status dfm_debug_write_body(dfm_body body, const char *path) {
@@ -23,7 +31,7 @@ dfm_status dfm_debug_write_body(dfm_body body, const char *path) {
     Body &b = body_of(body);
     need(path, "path");
     const std::vector<double> x = packed(b.p.x, b.p.n), v = packed(b.p.v, b.p.n);
-    std::vector<double> u = x, energy;
+    std::vector<double> u = x, energy, stress, mises;
     for (size_t i = 0; i < u.size(); ++i) u[i] -= b.p.rest[i];
     VtuGrid grid;
     grid.npoint = b.p.n;
@@ -32,10 +40,17 @@ dfm_status dfm_debug_write_body(dfm_body body, const char *path) {
     grid.points = x.data();
     grid.cells = b.tets.data();
     grid.point_data = {{"u", 3, u.data(), nullptr}, {"v", 3, v.data(), nullptr}};
-    if (b.model.ops->extension && b.model.ops->extension(b.model.self, DFM_EXT_CELL_ENERGY)) {
+    if (offers(b, DFM_EXT_CELL_ENERGY)) {
       energy.resize(grid.ncell);
       energy_density(b, energy.data());
-      grid.cell_data = {{"energy_density", 1, energy.data(), nullptr}};
+      grid.cell_data.push_back({"energy_density", 1, energy.data(), nullptr});
+    }
+    if (offers(b, DFM_EXT_CELL_STRESS)) {
+      stress.resize(size_t(6) * grid.ncell);
+      cell_stress(b, stress.data());
+      for (uint32_t c = 0; c < grid.ncell; ++c) mises.push_back(von_mises(&stress[size_t(6) * c]));
+      grid.cell_data.push_back({"stress", 6, stress.data(), nullptr});
+      grid.cell_data.push_back({"von_mises", 1, mises.data(), nullptr});
     }
     write_vtu(path, grid);
   });

@@ -54,19 +54,44 @@ dfm_body_measure measure(Body &b) {
   return m;
 }
 
-void energy_density(Body &b, double *out) {
-  const dfm_cell_energy *e = nullptr;
+namespace {
+
+const void *extension_of(const Body &b, const char *id) {
+  const void *found = nullptr;
   if (b.model.ops->extension)
     b.model.call("extension", [&] {
-      e = static_cast<const dfm_cell_energy *>(b.model.ops->extension(b.model.self, DFM_EXT_CELL_ENERGY));
+      found = b.model.ops->extension(b.model.self, id);
       return DFM_OK;
     });
+  return found;
+}
+
+// What a model gives by cell, at the present positions.
+template <class Give>
+void ask_by_cell(Body &b, const char *what, const Give &give) {
+  const dfm_kin k = b.dynamics->kin(b.world->time, 0);
+  if (b.model.call(what, [&] { return give(&k); }) != DFM_OK)
+    fail(DFM_E_FATAL, "model '%s' could not give its %s", b.model.type->id, what);
+}
+
+}  // namespace
+
+bool offers(const Body &b, const char *extension) { return extension_of(b, extension) != nullptr; }
+
+void energy_density(Body &b, double *out) {
+  const auto *e = static_cast<const dfm_cell_energy *>(extension_of(b, DFM_EXT_CELL_ENERGY));
   if (!e)
     fail(DFM_E_UNSUPPORTED, "model '%s' of body '%s' offers no energy per cell", b.model.type->id,
          b.name.c_str());
-  const dfm_kin k = b.dynamics->kin(b.world->time, 0);
-  if (b.model.call("cell_energy", [&] { return e->cell_energy(b.model.self, &k, out); }) != DFM_OK)
-    fail(DFM_E_FATAL, "model '%s' could not give its energy per cell", b.model.type->id);
+  ask_by_cell(b, "energy per cell", [&](const dfm_kin *k) { return e->cell_energy(b.model.self, k, out); });
+}
+
+void cell_stress(Body &b, double *out) {
+  const auto *e = static_cast<const dfm_cell_stress *>(extension_of(b, DFM_EXT_CELL_STRESS));
+  if (!e)
+    fail(DFM_E_UNSUPPORTED, "model '%s' of body '%s' offers no stress per cell", b.model.type->id,
+         b.name.c_str());
+  ask_by_cell(b, "stress per cell", [&](const dfm_kin *k) { return e->cell_stress(b.model.self, k, out); });
 }
 
 namespace {

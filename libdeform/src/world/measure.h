@@ -7,6 +7,9 @@ namespace dfm {
 dfm_body_measure measure(Body &b);
 // [ntet] J/m3; throws where the model offers none
 void energy_density(Body &b, double *out);
+// [ntet,6] Pa; throws where the model offers none
+void cell_stress(Body &b, double *out);
+bool offers(const Body &b, const char *extension);
 void set_model_params(Body &b, const dfm_params &params);  // runtime rows only; throws
 
 }  // namespace dfm
