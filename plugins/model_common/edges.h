@@ -7,23 +7,27 @@ namespace model {
 
 constexpr int kEdgeOf[6][2] = {{0, 1}, {0, 2}, {0, 3}, {1, 2}, {1, 3}, {2, 3}};
 
-// Number of each edge of a cell; edges [nedge,2] i < j, lexicographic. Throws a sentence where one lacks.
-inline void find_edges(const uint32_t *edges, uint32_t nedge, const uint32_t *cell, uint32_t *out) {
+// Number of the edge between two points; edges [nedge,2] i < j, lexicographic. Throws a sentence where it
+// lacks.
+inline uint32_t find_edge(const uint32_t *edges, uint32_t nedge, uint32_t a, uint32_t b) {
   const auto key = [](uint32_t i, uint32_t j) {
     return i < j ? uint64_t(i) << 32 | j : uint64_t(j) << 32 | i;
   };
   const auto listed = [&](uint32_t e) { return key(edges[2 * size_t(e)], edges[2 * size_t(e) + 1]); };
-  for (int n = 0; n < 6; ++n) {
-    const uint64_t wanted = key(cell[kEdgeOf[n][0]], cell[kEdgeOf[n][1]]);
-    uint32_t lo = 0, hi = nedge;
-    while (lo < hi) {
-      const uint32_t mid = lo + (hi - lo) / 2;
-      if (listed(mid) < wanted) lo = mid + 1;
-      else hi = mid;
-    }
-    if (lo == nedge || listed(lo) != wanted) throw "a cell has an edge that the mesh's edge list lacks";
-    out[n] = lo;
+  const uint64_t wanted = key(a, b);
+  uint32_t lo = 0, hi = nedge;
+  while (lo < hi) {
+    const uint32_t mid = lo + (hi - lo) / 2;
+    if (listed(mid) < wanted) lo = mid + 1;
+    else hi = mid;
   }
+  if (lo == nedge || listed(lo) != wanted) throw "a cell has an edge that the mesh's edge list lacks";
+  return lo;
+}
+
+// Numbers of the edges of a cell.
+inline void find_edges(const uint32_t *edges, uint32_t nedge, const uint32_t *cell, uint32_t *out) {
+  for (int n = 0; n < 6; ++n) out[n] = find_edge(edges, nedge, cell[kEdgeOf[n][0]], cell[kEdgeOf[n][1]]);
 }
 
 }  // namespace model

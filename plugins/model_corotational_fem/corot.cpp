@@ -13,6 +13,7 @@ constexpr char kId[] = "org.deform.corotational_fem";
 constexpr uint32_t kRun = DFM_PARAM_RUNTIME, kCell = DFM_PARAM_PER_CELL, kUnlessGiven = DFM_PARAM_AUTO;
 const char *const kEnergies[] = {"corotational", "neo_hookean", "stvk", nullptr};
 const char *const kTangents[] = {"usual", "exact", nullptr};
+const char *const kLockings[] = {"none", "nodal", nullptr};
 const char *const kRotations[] = {"polar", "svd", "qr", nullptr};
 }  // namespace
 
@@ -27,6 +28,8 @@ const dfm_param kParams[kParamCount] = {
      kPolar, kRun | DFM_PARAM_ENUM, 1, kRotations},
     {"tangent", "stiffness for implicit steps; exact: with the turning of the frames", "1", 0, 1, kUsual,
      kRun | DFM_PARAM_ENUM, 1, kTangents},
+    {"locking", "remedy near poisson 1/2; nodal: the volume change is averaged around each point", "1", 0, 1,
+     kLocked, DFM_PARAM_ENUM, 1, kLockings},
     {"anisotropy_young", "Young's modulus along the axis; auto, -1: young", "Pa", kAuto, 1e13, kAuto,
      kRun | kCell | kUnlessGiven, 1, nullptr},
     {"anisotropy_poisson",
@@ -58,6 +61,10 @@ dfm_status create(const dfm_host *h, const dfm_mesh *m, void **self) {
 dfm_status set_params(void *self, const double *params) {
   Body *body = static_cast<Body *>(self);
   if (!check_params(body->host, params)) return DFM_E_ARG;
+  if (params[kLocking] != body->params[kLocking]) {
+    complain(body->host, "parameter locking cannot change while the body lives; make it anew");
+    return DFM_E_ARG;
+  }
   try {
     body->apply_params(params);
   } catch (const model::Refused &) {

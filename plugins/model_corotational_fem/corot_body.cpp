@@ -6,15 +6,27 @@
 #include "corot_body.h"
 
 namespace corot {
+
+// `moves`: with velocities.
+Block load_block(const Call &call, uint32_t n, uint32_t begin, bool moves) {
+  Body &body = *call.body;
+  const Block b = body.lend(n, begin);
+  body.kernels->load(b, call.k->x, moves ? call.k->v : nullptr, call.k->stride);
+  for (uint32_t i = 0; b.nodal && i < b.local; ++i) {
+    const double *change = body.point_change.data() + 2 * size_t(b.point[i]);
+    b.p[8 * size_t(i) + 3] = change[0];
+    b.p[8 * size_t(i) + 7] = change[1];
+  }
+  return b;
+}
+
 namespace {
 
 void force_pass(void *user, uint32_t begin, uint32_t end) {
   const Call &call = *static_cast<const Call *>(user);
   Body &body = *call.body;
   for (uint32_t n = begin; n < end; ++n) {
-    const Block b = body.lend(n, begin);
-    body.kernels->load(b, call.k->x, b.damp ? call.k->v : nullptr, call.k->stride);
-    body.kernels->forces(b);
+    body.kernels->forces(load_block(call, n, begin, !body.damp.empty()));
   }
 }
 
@@ -38,9 +50,7 @@ void energy_pass(void *user, uint32_t begin, uint32_t end) {
   const Call &call = *static_cast<const Call *>(user);
   Body &body = *call.body;
   for (uint32_t n = begin; n < end; ++n) {
-    const Block b = body.lend(n, begin);
-    body.kernels->load(b, call.k->x, nullptr, call.k->stride);
-    body.kernels->energies(b);
+    body.kernels->energies(load_block(call, n, begin, false));
   }
 }
 
@@ -49,8 +59,7 @@ void stress_pass(void *user, uint32_t begin, uint32_t end) {
   const Call &call = *static_cast<const Call *>(user);
   Body &body = *call.body;
   for (uint32_t n = begin; n < end; ++n) {
-    const Block b = body.lend(n, begin);
-    body.kernels->load(b, call.k->x, nullptr, call.k->stride);
+    const Block b = load_block(call, n, begin, false);
     body.kernels->stresses(b, body.cell_id.data() + kGroup * size_t(b.group - body.group.data()), call.f);
   }
 }
@@ -65,6 +74,7 @@ void Body::for_each_block(uint32_t least_cells, void (*fn)(void *, uint32_t, uin
 
 void Body::add_forces(const dfm_kin &k, double *f_out) {
   Call call{this, &k, f_out};
+  if (nodal()) dilate(k);
   for_each_block(kParallelCells, force_pass, &call);
   for_each_block(kParallelMergeCells, merge_pass, &call);
 }
@@ -100,6 +110,7 @@ double Body::direct_energy(const dfm_kin &k, size_t place) const {
 
 void Body::fill_energies(const dfm_kin &k) {
   Call call{this, &k, nullptr};
+  if (nodal()) dilate(k);
   if (choice(kEnergy) == kLinear) return for_each_block(kParallelCells, energy_pass, &call);
   for (size_t place = 0; place < lanes(); ++place)
     if (cell_id[place] != kNone) value[place] = direct_energy(k, place);
@@ -119,6 +130,7 @@ void Body::cell_energy(const dfm_kin &k, double *out) {
 
 void Body::cell_stress(const dfm_kin &k, double *out) {
   Call call{this, &k, out};
+  if (nodal()) dilate(k);
   for_each_block(kParallelCells, stress_pass, &call);
   for (size_t n = 0; n < 6 * size_t(ncell); ++n) out[n] = volume[n / 6] > 0 ? out[n] / volume[n / 6] : 0;
 }

@@ -25,6 +25,7 @@ enum Param : uint32_t {
   kEnergy,
   kRotation,
   kTangent,
+  kLocking,
   kYoungAlong,
   kPoissonAlong,
   kShearAlong,
@@ -33,6 +34,7 @@ enum Param : uint32_t {
   kValueCount = kAxis + 3
 };
 enum RotationBy : uint32_t { kPolar, kSvd, kQr };
+enum Locking : uint32_t { kLocked, kNodal };
 enum Tangent : uint32_t { kUsual, kExact };
 extern const dfm_param kParams[kParamCount];
 constexpr double kAuto = -1;  // of the constants along the axis: as without an axis
@@ -62,6 +64,14 @@ struct Body {
   // stiffness against turning
   Buffer<double> rest_rows, damp_rows, weight, twist_share;
   const char *active_effects[8] = {};  // of the present parameters, NULL-terminated
+
+  // Where the volume change is that of the points (corot_nodal.cpp): [npoint,2] what divides the sums of the
+  // cells' shares in it and in its rate, and the quotients (point_change) at the last dilate().
+  Buffer<double> bulk, point_change;
+  Buffer<uint32_t> patch_begin, patch;          // [npoint + 1], points of the cells around a point, ascending
+  Buffer<uint32_t> pair_begin, pair_slot;       // [npoint + 1], places of the pairs of a patch in the blocks
+  Buffer<uint32_t> far_begin, far_point;        // [npoint + 1], j > i of patches that share no edge with i
+  Buffer<double> patch_gradient, patch_damper;  // [patch,3] of the volume change; of its rate, empty without
 
   // In block order.
   Buffer<Block> block;
@@ -98,7 +108,17 @@ struct Body {
   void cell_energy(const dfm_kin &k, double *out);
   void cell_stress(const dfm_kin &k, double *out);
 
-  uint32_t pairs() const { return npoint + nedge; }
+  bool nodal() const { return choice(kLocking) == kNodal; }
+  void dilate(const dfm_kin &k);  // before all that uses the volume change of the points
+  // dilate() has filled point_change
+  double mean_change(uint32_t c) const {
+    const uint32_t *q = cells.data() + 4 * size_t(c);
+    return 0.25 * ((point_change[2 * size_t(q[0])] + point_change[2 * size_t(q[1])]) +
+                   (point_change[2 * size_t(q[2])] + point_change[2 * size_t(q[3])]));
+  }
+
+  uint32_t far_pairs() const { return nodal() ? far_begin[npoint] : 0; }
+  uint32_t pairs() const { return npoint + nedge + far_pairs(); }
   void pattern(uint32_t *ij) const;
   void add_stiffness(const dfm_kin &k, double a, double b, double *blk);
 
@@ -120,10 +140,14 @@ struct Body {
   uint32_t find_halo(Layout &l, uint32_t b) const;
   void fill_groups(const Layout &l, const dfm_mesh &m, uint32_t b, uint32_t groups_at);
   void build_merge(const Layout &l);
+  void build_patches();
+  void find_bulk();
+  uint32_t slot_of(uint32_t i, uint32_t j) const;
+  void add_nodal(const dfm_kin &k, double a, double b, double *blk);
   // what new parameters need, taken before anything changes: arrays to swap in, and sums on the way
   struct Room {
     Buffer<FibreGroup> fibre;
-    Buffer<double> damp, damp_value, point_drag, around, next, blocks;
+    Buffer<double> damp, damp_value, patch_damper, point_drag, around, next, blocks;
   };
   void make_room(Room &room) const;
   model::Fibre fibre_at(uint32_t c) const;
@@ -143,6 +167,9 @@ struct Call {
   const dfm_kin *k;
   double *f;
 };
+
+// Block n with its points packed in; see Body::lend.
+Block load_block(const Call &call, uint32_t n, uint32_t begin, bool moves);
 
 // Gradient of a cell at the positions of its corners, from the rest gradients of its lane; row-major.
 void gradient_of(const Group &group, uint32_t lane, const double *const *x, double *f);

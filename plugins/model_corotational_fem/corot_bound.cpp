@@ -22,6 +22,9 @@
 // the symmetric part of A less a matrix of norm at most d |A|/sqrt 2, which adds |D| (sqrt 2 d + d^2/2);
 // and stress : d2S adds |stress| (6 sqrt(1 + d^2)/p + 6 s^2/p^3), p the least sum of two stretches, s the
 // largest one: d2S = X solves S X + X S = 2 Q, Q = dS [w]x S - S [w]x dS + S [w]x^T [w]x S, |w| <= |A|/p.
+// With the volume change of the points (corot_nodal.cpp) the square of their mean stands for the mean of the
+// squares of their cells, which is no less (Jensen): the rows at rest hold. The pressure of c is that of the
+// points.
 // The energies of the gradient have rows of their own, of the second derivative at the shape. In W'' each
 // dyad X:dF with X of largest stretch x is at most x sum |u_a| |g_a|, |dF| too, and d2J is at most twice
 // the longest stretch, at least minus once that.
@@ -52,9 +55,7 @@ void twist_pass(void *user, uint32_t begin, uint32_t end) {
   const Call &call = *static_cast<const Call *>(user);
   Body &body = *call.body;
   for (uint32_t n = begin; n < end; ++n) {
-    const Block b = body.lend(n, begin);
-    body.kernels->load(b, call.k->x, nullptr, call.k->stride);
-    body.kernels->twists(b);
+    body.kernels->twists(load_block(call, n, begin, false));
   }
 }
 
@@ -123,6 +124,7 @@ void Body::find_rows(Room &room) {
 
 void Body::bound(const dfm_kin &k, double *ksum, double *csum) {
   Call call{this, &k, nullptr};
+  if (nodal()) dilate(k);
   for_each_block(kParallelCells, twist_pass, &call);
   for (uint32_t i = 0; i < npoint; ++i) {
     ksum[i] += choice(kEnergy) == kLinear ? rest_rows[i] : 0;

@@ -204,6 +204,8 @@ void Body::create(const dfm_host *h, const dfm_mesh &m) {
   take_mesh(m);
   take_fields(m);
   build_blocks(m);
+  params[kLocking] = m.params[kLocking];  // cannot change later
+  if (nodal()) build_patches();
   apply_params(m.params);
 }
 

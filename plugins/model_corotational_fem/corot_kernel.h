@@ -43,9 +43,12 @@ enum Energy : uint32_t { kLinear, kNeoHookean, kVenant };
 struct Block {
   uint32_t owned, local, groups;
   uint32_t energy;        // Energy
-  uint32_t rotate_all;    // rotate_all: no closed form, every cell goes to `rotate`
+  uint32_t rotate_all;    // no closed form, every cell goes to `rotate`
+  uint32_t nodal;         // the volume change is that of the points, see corot_nodal.cpp
   const uint32_t *point;  // [local] number of the point in the host's arrays
-  double *p;  // [local,8] x y z 0 vx vy vz 0: a point with its velocity is one cache line; lent by the pass
+  // [local,8] x y z 0 vx vy vz 0: a point with its velocity is one cache line; lent by the pass. Where
+  // `nodal` the zeros are the volume change of the point and its rate.
+  double *p;
   double *f;  // [local,4]
   const Group *group;
   const FibreGroup *fibre;  // NULL: isotropic
@@ -62,6 +65,9 @@ struct Merge { uint32_t from, to; };
 struct Kernels {
   // Copies x (and v, unless NULL) of the block's points in and clears f.
   void (*load)(const Block &b, const double *x, const double *v, uint32_t stride);
+  // Adds the cells' shares in the volume change of their points, and in its rate where there are dampers, to
+  // the first two components of f.
+  void (*dilate)(const Block &b);
   void (*forces)(const Block &b);
   // out [ncell,6] of the host, Pa m^3: xx yy zz xy yz zx; cells [groups,8]: number of each, ~0 for one that
   // fills up

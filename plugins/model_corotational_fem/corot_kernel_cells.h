@@ -137,6 +137,27 @@ DEFORM_INLINE void strain_of(const v4 *r, const v4 *f, v4 *e) {
   e[5] = half * (entry(2, 0) + entry(0, 2));
 }
 
+DEFORM_INLINE v4 trace_of(const v4 *e) { return (e[0] + e[1]) + e[2]; }
+
+// Mean over the corners of the volume changes of points (kOffset 0), or of their rates (4).
+template <int kOffset, bool kSquares = false>
+DEFORM_INLINE v4 corner_mean(const Block &b, const Four &q) {
+  v4 sum[4];
+  for (int c = 0; c < 4; ++c) {
+    v4 x[4];
+    for (int a = 0; a < 4; ++a) {
+      x[a] = load4(b.p + 8 * size_t(cell(q, c)[a]) + kOffset);
+      if constexpr (kSquares) x[a] = x[a] * x[a];
+    }
+    sum[c] = (x[0] + x[1]) + (x[2] + x[3]);
+  }
+  transpose(sum[0], sum[1], sum[2], sum[3]);
+  return splat(0.25) * sum[3];
+}
+DEFORM_INLINE v4 bulk4(const Four &q) {
+  return load4(q.group->lambda + q.at) + splat(1.0 / 3) * load4(q.group->mu2 + q.at);
+}
+
 struct Fibres { v4 a[3], alpha, beta, shear; };
 DEFORM_INLINE void load_fibres(const FibreGroup &g, uint32_t at, Fibres &out) {
   for (int k = 0; k < 3; ++k) out.a[k] = load4(g.axis[k] + at);
@@ -155,15 +176,20 @@ DEFORM_INLINE v4 along(const v4 *e, const v4 *a, v4 *ea) {
 // Stresses times volume. The isotropic one has the axes of the strain.
 DEFORM_INLINE void stress_of(const Four &q, const v4 *e, v4 *s) {
   const v4 mu2 = load4(q.group->mu2 + q.at);
-  const v4 pressure = load4(q.group->lambda + q.at) * ((e[0] + e[1]) + e[2]);
+  const v4 pressure = load4(q.group->lambda + q.at) * trace_of(e);
+  for (int k = 0; k < 6; ++k) s[k] = k < 3 ? mu2 * e[k] + pressure : mu2 * e[k];
+}
+// With the volume change of the points in place of the cell's.
+DEFORM_INLINE void nodal_stress(const Four &q, const v4 *e, v4 change, v4 *s) {
+  const v4 mu2 = load4(q.group->mu2 + q.at);
+  const v4 pressure = bulk4(q) * change - splat(1.0 / 3) * (mu2 * trace_of(e));
   for (int k = 0; k < 6; ++k) s[k] = k < 3 ? mu2 * e[k] + pressure : mu2 * e[k];
 }
 DEFORM_INLINE void fibre_stress(const FibreGroup &g, uint32_t at, const v4 *e, v4 *s) {
   Fibres c;
   load_fibres(g, at, c);
   v4 ea[3], pull[3];
-  const v4 t = (e[0] + e[1]) + e[2], q = along(e, c.a, ea), more = c.alpha * q,
-           both = c.alpha * t + c.beta * q;
+  const v4 t = trace_of(e), q = along(e, c.a, ea), more = c.alpha * q, both = c.alpha * t + c.beta * q;
   for (int k = 0; k < 3; ++k) pull[k] = splat(0.5) * (both * c.a[k]) + c.shear * ea[k];
   const auto pair = [&](int i, int j)
                         __attribute__((always_inline)) { return c.a[i] * pull[j] + pull[i] * c.a[j]; };
@@ -297,6 +323,25 @@ DEFORM_INLINE void add_others(const Block &b, uint32_t n, const Four &q, const v
   balance(other, s, turn_by, all);
 }
 
+// The same for the options of Block::nodal.
+template <bool kDamped>
+DEFORM_INLINE void add_more(const Block &b, uint32_t n, const Four &q, const v4 *r, const v4 *e, v4 *f,
+                            v4 *all) {
+  if constexpr (kDamped) {
+    v4 s[6], rate[6], other[6];
+    Turning turn_by;
+    for (int k = 0; k < 6; ++k) s[k] = k < 3 ? e[k] + splat(1) : e[k];
+    turning(s, turn_by);
+    gradient<4>(b, q, f);
+    strain_rate(r, f, s, turn_by, rate);
+    const v4 damp = load4(b.damp + size_t(kGroup) * n + q.at);
+    for (int k = 0; k < 6; ++k) rate[k] = damp * rate[k];
+    if (b.nodal) nodal_stress(q, rate, damp * corner_mean<4>(b, q), other);
+    else stress_of(q, rate, other);
+    balance(other, s, turn_by, all);
+  }
+}
+
 // P V of the energies of the gradient; see Energy.
 template <Energy kEnergy>
 DEFORM_INLINE void direct_stress(const Four &q, const v4 *f, const model::Polar<Wide> &o, v4 *p) {
@@ -317,15 +362,17 @@ DEFORM_INLINE void direct_stress(const Four &q, const v4 *f, const model::Polar<
 }
 
 // P V of four cells; f is lost where there are dampers.
-template <Energy kEnergy, bool kFibre, bool kDamped>
+template <Energy kEnergy, bool kFibre, bool kDamped, bool kMore>
 DEFORM_INLINE void piola(const Block &b, uint32_t n, const Four &q, v4 *f, const v4 *r,
                          const model::Polar<Wide> &o, v4 *p) {
   v4 e[6], stress[6], all[9];
   if constexpr (kEnergy == kLinear || kDamped) strain_of(r, f, e);
   if constexpr (kEnergy == kLinear) {
-    stress_of(q, e, stress);
+    if (kMore && b.nodal) nodal_stress(q, e, corner_mean<0>(b, q), stress);
+    else stress_of(q, e, stress);
     full(stress, all);
-    if constexpr (kFibre || kDamped) add_others<kFibre, kDamped>(b, n, q, r, e, f, all);
+    if constexpr (kMore) add_more<kDamped>(b, n, q, r, e, f, all);
+    else if constexpr (kFibre || kDamped) add_others<kFibre, kDamped>(b, n, q, r, e, f, all);
     turn(r, all, p);
   } else {
     direct_stress<kEnergy>(q, f, o, p);
@@ -339,14 +386,14 @@ DEFORM_INLINE void piola(const Block &b, uint32_t n, const Four &q, v4 *f, const
   }
 }
 
-template <Energy kEnergy, bool kFibre, bool kDamped>
+template <Energy kEnergy, bool kFibre, bool kDamped, bool kMore = false>
 static inline void cell_forces(const Block &b) {
   each_four<kEnergy == kLinear || kDamped>(
       b, [&](uint32_t n, uint32_t at, v4 *f, const v4 *r, const model::Polar<Wide> &o)
              __attribute__((always_inline)) {
                const Four q = {b.group + n, at};
                v4 p[9], sum[4], other[4];
-               piola<kEnergy, kFibre, kDamped>(b, n, q, f, r, o, p);
+               piola<kEnergy, kFibre, kDamped, kMore>(b, n, q, f, r, o, p);
                spread(b, q, 0, p, sum);
                for (int k = 1; k < 3; ++k) {
                  spread(b, q, k, p, other);
@@ -355,25 +402,53 @@ static inline void cell_forces(const Block &b) {
                for (int c = 0; c < 4; ++c) add_to(b, cell(q, c)[0], splat(0) - sum[c]);
              });
 }
+// The share of a cell in the volume change of each of its points is k V/4 (tr S - 3), in its rate
+// damp k V/4 d(tr S)/dt, faded as in strain_rate.
+static inline void dilate(const Block &b) {
+  each_four(b, [&](uint32_t n, uint32_t at, v4 *f, const v4 *r, const model::Polar<Wide> &o)
+                   __attribute__((always_inline)) {
+                     const Four q = {b.group + n, at};
+                     const v4 quarter = splat(0.25) * bulk4(q);
+                     v4 e[6];
+                     strain_of(r, f, e);
+                     v4 part[4] = {quarter * trace_of(e), splat(0), splat(0), splat(0)};
+                     if (b.damp) {
+                       v4 s[6];
+                       Turning turn_by;
+                       for (int k = 0; k < 6; ++k) s[k] = k < 3 ? e[k] + splat(1) : e[k];
+                       turning(s, turn_by);
+                       gradient<4>(b, q, f);
+                       v4 rate = r[0] * f[0];
+                       for (int k = 1; k < 9; ++k) rate = rate + r[k] * f[k];
+                       part[1] = (load4(b.damp + size_t(kGroup) * n + at) * quarter) * (turn_by.share * rate);
+                     }
+                     transpose(part[0], part[1], part[2], part[3]);
+                     for (int c = 0; c < 4; ++c)
+                       for (int a = 0; a < 4; ++a) add_to(b, cell(q, c)[a], part[c]);
+                   });
+}
+
 static inline void forces(const Block &b) {
   const bool damped = b.damp != nullptr;
   if (b.energy == kNeoHookean)
     return damped ? cell_forces<kNeoHookean, false, true>(b) : cell_forces<kNeoHookean, false, false>(b);
   if (b.energy == kVenant)
     return damped ? cell_forces<kVenant, false, true>(b) : cell_forces<kVenant, false, false>(b);
+  if (b.nodal)
+    return damped ? cell_forces<kLinear, false, true, true>(b) : cell_forces<kLinear, false, false, true>(b);
   if (b.fibre) return damped ? cell_forces<kLinear, true, true>(b) : cell_forces<kLinear, true, false>(b);
   return damped ? cell_forces<kLinear, false, true>(b) : cell_forces<kLinear, false, false>(b);
 }
 
 // Cauchy stress P F^T / J times V, without dampers, J no less than kLeastVolume in size.
-template <Energy kEnergy, bool kFibre>
+template <Energy kEnergy, bool kFibre, bool kMore = false>
 static inline void cell_stresses(const Block &b, const uint32_t *cells, double *out) {
   each_four<kEnergy == kLinear>(b, [&](uint32_t n, uint32_t at, v4 *f, const v4 *r,
                                        const model::Polar<Wide> &o) __attribute__((always_inline)) {
     const Four q = {b.group + n, at};
     v4 p[9];
     alignas(32) double one[6][4];
-    piola<kEnergy, kFibre, false>(b, n, q, f, r, o, p);
+    piola<kEnergy, kFibre, false, kMore>(b, n, q, f, r, o, p);
     const v4 over = splat(1) / max4(abs4(o.det), splat(kLeastVolume));
     constexpr int kRow[6] = {0, 1, 2, 0, 1, 2}, kCol[6] = {0, 1, 2, 1, 2, 0};
     for (int k = 0; k < 6; ++k) {
@@ -389,6 +464,7 @@ static inline void cell_stresses(const Block &b, const uint32_t *cells, double *
 static inline void stresses(const Block &b, const uint32_t *cells, double *out) {
   if (b.energy == kNeoHookean) return cell_stresses<kNeoHookean, false>(b, cells, out);
   if (b.energy == kVenant) return cell_stresses<kVenant, false>(b, cells, out);
+  if (b.nodal) return cell_stresses<kLinear, false, true>(b, cells, out);
   return b.fibre ? cell_stresses<kLinear, true>(b, cells, out) : cell_stresses<kLinear, false>(b, cells, out);
 }
 
@@ -406,7 +482,26 @@ static inline void cell_energies(const Block &b) {
                      store4(b.value + size_t(kGroup) * n + at, splat(0.5) * own + mixed);
                    });
 }
+// Of the volume change a cell has the share 1/2 k V mean(change^2) of its corners: the sum over the cells is
+// that over the points.
+static inline void nodal_energies(const Block &b) {
+  each_four(b, [&](uint32_t n, uint32_t at, v4 *f, const v4 *r,
+                   const model::Polar<Wide> &o) __attribute__((always_inline)) {
+    const Four q = {b.group + n, at};
+    const v4 mu2 = load4(q.group->mu2 + at);
+    v4 e[6];
+    strain_of(r, f, e);
+    const v4 third = splat(1.0 / 3) * trace_of(e);
+    for (int k = 0; k < 3; ++k) e[k] = e[k] - third;
+    const v4 own = (e[0] * e[0] + e[1] * e[1]) + e[2] * e[2];
+    const v4 mixed = (e[3] * e[3] + e[4] * e[4]) + e[5] * e[5];
+    const v4 shape = mu2 * (splat(0.5) * own + mixed);
+    store4(b.value + size_t(kGroup) * n + at, shape + splat(0.5) * (bulk4(q) * corner_mean<0, true>(b, q)));
+  });
+}
 static inline void energies(const Block &b) {
+  if (b.nodal) return nodal_energies(b);
+
   return b.fibre ? cell_energies<true>(b) : cell_energies<false>(b);
 }
 
@@ -467,7 +562,8 @@ static inline void cell_twists(const Block &b) {
       twist = load4(b.fibre[n].most + at) * (splat(1.4143) * sqrt4(uneven) + splat(0.5) * uneven) +
               size * turn_by;
     } else {
-      const v4 c = load4(q.group->lambda + at) * (t - splat(3)) - mu2;
+      v4 c = load4(q.group->lambda + at) * (t - splat(3)) - mu2;
+      if (b.nodal) c = (bulk4(q) * corner_mean<0>(b, q) - third * (mu2 * (t - splat(3)))) - mu2;
       twist =
           splat(0.5) * max4(mu2 + (splat(2) * c) / choose_above(c, zero, least, most + splat(1e-300)), zero);
     }
@@ -539,7 +635,9 @@ static inline void cell_tangents(const Block &b, double a, double damp, double *
       t.beta = by * c.beta;
       t.shear = by * c.shear;
     }
-    const v4 lambda = by * load4(q.group->lambda + at), mu = splat(0.5) * (by * load4(q.group->mu2 + at));
+    const v4 mu2 = load4(q.group->mu2 + at), mu = splat(0.5) * (by * mu2);
+    // where `nodal` the volume change has blocks of its own
+    const v4 lambda = by * (b.nodal ? splat(-1.0 / 3) * mu2 : load4(q.group->lambda + at));
     for (int m = 0; m < 10; ++m) {
       v4 one[9];
       block_of<kFibre>(t, kFirst[m], kSecond[m], lambda, mu, one);
@@ -575,7 +673,7 @@ static inline void add_to_host(const Block &b, double *f, uint32_t stride) {
   }
 }
 
-constexpr Kernels kKernels = {load_block, forces,   stresses,   energies,
+constexpr Kernels kKernels = {load_block, dilate,   forces,     stresses,   energies,
                               twists,     tangents, merge_halo, add_to_host};
 
 }  // namespace

@@ -84,10 +84,16 @@ void Body::make_room(Room &room) const {
              "axis at auto");
     throw model::Refused{};
   }
+  if (nodal() && (has_fibres() || choice(kEnergy) != kLinear)) {
+    complain(host,
+             "locking nodal takes the energy corotational without anisotropy; choose them, or locking none");
+    throw model::Refused{};
+  }
   if (has_fibres()) room.fibre.create(host, groups);
   if (has_dampers()) {
     room.damp.create(host, lanes());
     room.damp_value.create(host, lanes());
+    if (nodal()) room.patch_damper.create(host, 3 * size_t(patch_begin[npoint]));
   }
   if (largest_of(kDampingMass) > 0) {
     room.point_drag.create(host, npoint);
@@ -102,6 +108,7 @@ void Body::fill_material(Room &room) {
   fibre.swap(room.fibre);
   damp.swap(room.damp);
   damp_value.swap(room.damp_value);
+  patch_damper.swap(room.patch_damper);
   for (size_t n = 0; n < lanes(); ++n) {
     Group &g = group[n / kGroup];
     const uint32_t lane = uint32_t(n % kGroup), c = cell_id[n];
@@ -133,6 +140,7 @@ void Body::fill_material(Room &room) {
     block[b].damp_value = damp.empty() ? nullptr : damp_value.data() + kGroup * groups_at;
     block[b].energy = choice(kEnergy);
     block[b].rotate = rotate_by(choice(kRotation));
+    block[b].nodal = nodal();
     block[b].rotate_all = choice(kRotation) != kPolar;
     groups_at += block[b].groups;
   }
@@ -181,6 +189,7 @@ void Body::apply_params(const double *values) {
   }
   fill_material(room);
   fill_drag(room);
+  if (nodal()) find_bulk();
   find_rows(room);
   find_effects();
 }

@@ -135,6 +135,12 @@ void Body::pattern(uint32_t *ij) const {
     ij[2 * (npoint + e)] = std::min(edges[2 * e], edges[2 * e + 1]);
     ij[2 * (npoint + e) + 1] = std::max(edges[2 * e], edges[2 * e + 1]);
   }
+  uint32_t *far = ij + 2 * (size_t(npoint) + nedge);
+  for (uint32_t i = 0; nodal() && i < npoint; ++i)
+    for (uint32_t n = far_begin[i]; n < far_begin[i + 1]; ++n) {
+      *far++ = i;
+      *far++ = far_point[n];
+    }
 }
 
 // Blocks of one cell: by the change of S, by R K_e R^T, by the turns.
@@ -155,6 +161,8 @@ void Body::add_exact(const dfm_kin &k, uint32_t c, double a, double b, double *b
   const double change_by = damping + (by_change ? a : 0), frame_by = by_change || direct ? 0 : a;
   double d[6][6], change[4][3][6], turned[3][4][3], twist[3] = {};
   cell_elasticity(place, d);
+  const double bulk_here = own.lambda[lane] + own.mu2[lane] / 3;
+  for (int i = 0; nodal() && i < 9; ++i) d[i / 3][i % 3] -= bulk_here;
   model::Tetrahedron rest{1, {}};  // the constants hold the volume
   for (int m = 0; m < 4; ++m) {
     std::copy(shape.g[m], shape.g[m] + 3, rest.g[m]);
@@ -167,7 +175,10 @@ void Body::add_exact(const dfm_kin &k, uint32_t c, double a, double b, double *b
       cross(axis, shape.g[m], turned[i][m]);
     }
   }
-  const double pull = own.lambda[lane] * (shape.trace - 3) - own.mu2[lane];
+  const double more = shape.trace - 3;
+  const double pressure =
+      nodal() ? bulk_here * mean_change(c) - own.mu2[lane] / 3 * more : own.lambda[lane] * more;
+  const double pull = pressure - own.mu2[lane];
   for (int m = 0; fibre.empty() && !direct && m < 3; ++m) {
     const double pair =
         std::max(shape.stretch[(m + 1) % 3] + shape.stretch[(m + 2) % 3], kLeast * shape.trace);
@@ -208,14 +219,17 @@ void Body::add_exact(const dfm_kin &k, uint32_t c, double a, double b, double *b
 }
 
 void Body::add_stiffness(const dfm_kin &k, double a, double b, double *blk) {
+  if (nodal()) {
+    dilate(k);
+    add_nodal(k, a, b, blk);
+  }
   if (choice(kTangent) == kExact) {
     for (uint32_t c = 0; c < ncell; ++c)
       if (volume[c] > 0) add_exact(k, c, a, b, blk);
   } else {
     for (uint32_t n = 0; n < nblock; ++n) {
-      const Block own = lend(n, 0);
-      kernels->load(own, k.x, nullptr, k.stride);
-      kernels->tangents(own, a, b, blk);
+      Call call{this, &k, nullptr};
+      kernels->tangents(load_block(call, n, 0, false), a, b, blk);
     }
   }
   for (uint32_t i = 0; !point_drag.empty() && i < npoint; ++i)

@@ -33,6 +33,8 @@ TEST(CorotBound, RowSums_BoundTheTrueSpectrumInEveryShape) {
            {{{"energy", {1}}, {"poisson", {0.45}}, {"damping_stiffness", {0.004}}}, {}},
            {{{"energy", {2}}, {"poisson", {0.45}}}, {}},
            {damped_fibres, {}},
+           {{{"locking", {1}}, {"poisson", {0.49}}, {"damping_stiffness", {0.004}}}, {}},
+           {{{"locking", {1}}}, uneven},
            {{}, uneven}})
     for (const double size : {1.0, 0.3, 2.0, -1.0, 10.0, -30.0}) {
       Host host;

@@ -53,9 +53,20 @@ const std::vector<Params> &kinds() {
   return all;
 }
 
+// and those that stay as the instance was made
+const std::vector<Params> &all_kinds() {
+  static const std::vector<Params> all = [] {
+    std::vector<Params> made = kinds();
+    made.push_back({{"locking", {1}}, {"poisson", {0.49}}});
+    made.push_back({{"locking", {1}}, {"damping_stiffness", {0.003}}, {"tangent", {1}}});
+    return made;
+  }();
+  return all;
+}
+
 TEST(CorotDeterminism, InstructionSet_NeverShowsInAResult) {
   for (const Mesh &mesh : {irregular_tet(), kuhn_bar(4, 3, 2, 0.1, 0.2), large_bar()})
-    for (const Params &p : kinds()) {
+    for (const Params &p : all_kinds()) {
       Host host;
       const std::vector<double> baseline = results(host, "sse2", mesh, p);
       for (const char *simd : {"avx2", "avx512"}) {
@@ -84,7 +95,7 @@ TEST(CorotDeterminism, Compiler_NeverShowsInAResult) {
 }
 
 TEST(CorotDeterminism, CutOfTheWorkAndStride_NeverShowInAResult) {
-  for (const Params &p : kinds()) {
+  for (const Params &p : all_kinds()) {
     Host host;
     const std::vector<double> baseline = results(host, nullptr, large_bar(), p);
     for (unsigned shuffle = 1; shuffle < 4; ++shuffle) {
@@ -126,23 +137,40 @@ TEST(CorotParameters, ErrorsNameWhatIsWrong) {
   refused({{"anisotropy_axis", {0, 0, 0}}}, {}, "anisotropy_axis");
   refused({{"anisotropy_young", {1e6}}, {"energy", {1}}}, {}, "energy");
   refused({{"anisotropy_young", {1e3}}, {"poisson", {0.45}}}, {}, "anisotropy_young");
+  refused({{"locking", {1}}, {"energy", {2}}}, {}, "locking nodal");
+  refused({{"locking", {1}}, {"anisotropy_young", {1e6}}}, {}, "locking nodal");
+}
+
+TEST(CorotParameters, LockingOfALivingInstance_IsRefusedAndChangesNothing) {
+  Host host;
+  Instance b(host, regular_tet());
+  const std::vector<double> values = Instance::row({{"locking", {1}}, {"young", {1e6}}});
+  EXPECT_EQ(b.ops->set_params(b.self, values.data()), DFM_E_ARG);
+  EXPECT_NE(host.logged.find("locking"), std::string::npos);
+  b.shake(0.1, 0);
+  EXPECT_EQ(b.energy(), [&] {
+    Instance same(host, regular_tet());
+    same.shake(0.1, 0);
+    return same.energy();
+  }());
 }
 
 TEST(CorotParameters, RefusedMemory_LeavesNothingBehindAndChangesNothing) {
   const Mesh mesh = kuhn_bar(2, 2, 1, 0.1);
   const Params other = {{"anisotropy_young", {1e6}}, {"damping_stiffness", {0.01}}, {"damping_mass", {1}}};
-  for (size_t n = 0;; ++n) {
-    Host host;
-    host.fail_at = n;
-    bool whole;
-    {
-      Instance b(host, mesh, other);
-      whole = b.status == DFM_OK;
-      EXPECT_TRUE(whole || b.status == DFM_E_NOMEM);
+  for (const Params &p : {other, Params{{"locking", {1}}, {"damping_stiffness", {0.01}}}})
+    for (size_t n = 0;; ++n) {
+      Host host;
+      host.fail_at = n;
+      bool whole;
+      {
+        Instance b(host, mesh, p);
+        whole = b.status == DFM_OK;
+        EXPECT_TRUE(whole || b.status == DFM_E_NOMEM);
+      }
+      EXPECT_EQ(host.live, 0u);
+      if (whole) break;
     }
-    EXPECT_EQ(host.live, 0u);
-    if (whole) break;
-  }
   for (size_t n = 0;; ++n) {
     Host host;
     Instance b(host, mesh), same(host, mesh);

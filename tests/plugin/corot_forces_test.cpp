@@ -11,6 +11,7 @@ const Params kFibres = {{"poisson", {0.3}},
                         {"anisotropy_axis", {1, 2, -0.5}}};
 const Params kNeoHookean = {{"energy", {1}}, {"poisson", {0.4}}},
              kVenant = {{"energy", {2}}, {"poisson", {0.4}}};
+const Params kNodal = {{"locking", {1}}, {"poisson", {0.45}}};
 Params damped(Params p) {
   p["damping_stiffness"] = {0.01};
   return p;
@@ -43,7 +44,7 @@ TEST(CorotForces, RigidMotionByAnyAngle_GivesNoForce) {
 
 TEST(CorotForces, ShakenBody_HasNoNetForceOrTorque) {
   for (const Params &p : {Params{}, kUneven, kFibres, damped(kFibres), kNeoHookean, damped(kNeoHookean),
-                          kVenant, damped(kVenant)})
+                          kVenant, damped(kVenant), kNodal, damped(kNodal)})
     for (const Mesh &mesh : {irregular_tet(), kuhn_bar(4, 2, 2, 0.1, 0.2)})
       for (const double shake : {1e-3, 0.03, 0.3}) {  // the last turns cells inside out
         Host host;
@@ -70,7 +71,7 @@ TEST(CorotForces, GramSchmidt_LeavesATorque) {
 }
 
 TEST(CorotForces, Force_IsTheGradientOfTheEnergy) {
-  for (const Params &p : {Params{{"poisson", {0.4}}}, kFibres, kNeoHookean, kVenant,
+  for (const Params &p : {Params{{"poisson", {0.4}}}, kFibres, kNeoHookean, kVenant, kNodal,
                           Params{{"energy", {1}}, {"poisson", {-0.9}}}})
     for (const double shake : {0.005, 0.02}) {
       Host host;
@@ -114,7 +115,7 @@ TEST(CorotForces, CellStress_OfUniformStretchIsTheClosedForm) {
 }
 
 TEST(CorotForces, CellStress_IsSymmetricAndHasTheVirialOfTheForces) {
-  for (const Params &p : {Params{{"poisson", {0.4}}}, kFibres, kNeoHookean, kVenant}) {
+  for (const Params &p : {Params{{"poisson", {0.4}}}, kFibres, kNeoHookean, kVenant, kNodal}) {
     Host host;
     Instance b(host, kuhn_bar(3, 2, 2, 0.1, 0.2), p);
     b.shake(0.01, 0);

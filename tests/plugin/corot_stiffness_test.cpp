@@ -24,6 +24,31 @@ void stretch(Instance &b, double by) {
   }
 }
 
+const Params kNodal = {{"locking", {1}}, {"poisson", {0.45}}};
+
+// The volume change of a point joins all points around it.
+TEST(CorotStiffness, NodalPattern_IsAllPairsOfPointsWithACommonNeighbor) {
+  Host host;
+  Instance b(host, kuhn_bar(3, 2, 2, 0.1, 0.2), kNodal);
+  std::vector<std::set<uint32_t>> around(b.size());
+  for (uint32_t i = 0; i < b.size(); ++i) around[i].insert(i);
+  for (size_t e = 0; e < b.mesh.edges.size(); e += 2) {
+    around[b.mesh.edges[e]].insert(b.mesh.edges[e + 1]);
+    around[b.mesh.edges[e + 1]].insert(b.mesh.edges[e]);
+  }
+  std::set<std::pair<uint32_t, uint32_t>> expected, got;
+  for (const auto &points : around)
+    for (const uint32_t i : points)
+      for (const uint32_t j : points) expected.insert(std::minmax(i, j));
+  const std::vector<uint32_t> ij = pattern_of(b);
+  for (size_t n = 0; n < ij.size(); n += 2) {
+    EXPECT_LE(ij[n], ij[n + 1]);
+    got.insert({ij[n], ij[n + 1]});
+  }
+  EXPECT_EQ(got, expected);
+  EXPECT_EQ(ij.size() / 2, expected.size());
+}
+
 TEST(CorotStiffness, Pattern_IsEachPointAndEachEdgeOnce) {
   Host host;
   Instance b(host, kuhn_bar(3, 2, 2, 0.1, 0.2));
@@ -32,7 +57,8 @@ TEST(CorotStiffness, Pattern_IsEachPointAndEachEdgeOnce) {
 
 // At rest and turned as a whole nothing is stressed: the usual tangent is the derivative.
 TEST(CorotStiffness, TurnedBody_HasTheDerivativeOfTheForces) {
-  for (const Params &p : {Params{}, kFibres, exact(), exact(kFibres), Params{{"poisson", {0.45}}}}) {
+  for (const Params &p :
+       {Params{}, kFibres, exact(), exact(kFibres), Params{{"poisson", {0.45}}}, kNodal, exact(kNodal)}) {
     Host host;
     Instance b(host, kuhn_bar(2, 2, 1, 0.1), with(p, "damping_stiffness", 0.01));
     for (uint32_t i = 0; i < b.size(); ++i)
@@ -50,7 +76,7 @@ TEST(CorotStiffness, TurnedBody_HasTheDerivativeOfTheForces) {
 // differences: of second order until rounding, over decades of the step.
 TEST(CorotStiffness, ExactTangentOfStretchedBody_IsTheDerivativeOverDecades) {
   for (const Params &p : {Params{}, Params{{"poisson", {0}}}, Params{{"poisson", {0.45}}},
-                          Params{{"energy", {1}}}, Params{{"energy", {2}}}}) {
+                          Params{{"energy", {1}}}, Params{{"energy", {2}}}, kNodal}) {
     Host host;
     Instance b(host, kuhn_bar(2, 2, 1, 0.1), exact(p));
     stretch(b, p.count("energy") ? 1.1 : 1.3);
@@ -99,7 +125,7 @@ TEST(CorotStiffness, ExactTangentOfPressedCell_IsTheProjectedDerivative) {
 }
 
 TEST(CorotStiffness, ExactDampers_AreDifferencesByVelocity) {
-  for (const Params &p : {Params{}, kFibres}) {
+  for (const Params &p : {Params{}, kFibres, kNodal}) {
     Host host;
     Instance b(host, kuhn_bar(2, 2, 1, 0.1),
                with(with(exact(p), "damping_stiffness", 0.01), "damping_mass", 3));
@@ -111,8 +137,9 @@ TEST(CorotStiffness, ExactDampers_AreDifferencesByVelocity) {
 }
 
 TEST(CorotStiffness, EveryShape_IsNegativeSemidefiniteAndFinite) {
-  for (const Params &p : {Params{}, exact(), kFibres, exact(kFibres), Params{{"poisson", {0.49}}},
-                          exact({{"poisson", {0.49}}}), exact({{"energy", {1}}}), exact({{"energy", {2}}})})
+  for (const Params &p :
+       {Params{}, exact(), kFibres, exact(kFibres), Params{{"poisson", {0.49}}}, exact({{"poisson", {0.49}}}),
+        exact({{"energy", {1}}}), exact({{"energy", {2}}}), kNodal, exact(kNodal)})
     for (const double size : {1.0, 0.3, 2.0, 0.0, -1.0, 10.0, -30.0}) {
       Host host;
       Instance b(host, kuhn_bar(2, 2, 1, 0.1, 0.2), with(p, "damping_stiffness", 0.01));

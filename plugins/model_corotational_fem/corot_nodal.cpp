@@ -1,0 +1,179 @@
+// Volume change by points, against locking near poisson 1/2 (after J. Bonet and A. J. Burton, A simple
+// average nodal pressure tetrahedral element for incompressible and nearly incompressible dynamic explicit
+// applications, Comm. Numer. Meth. Engng 14, 1998). With t the trace of the stretch of a cell, k its bulk
+// modulus and V its volume,
+//   W = sum over cells of V mu |dev e|^2 + sum over points of K/2 change^2,
+//   change = sum over the cells around the point of k V/4 (t - 3) / K,   K = sum of k V/4.
+// In a uniform strain of one material that is the energy of the cells; in any other it is no more, because
+// the square of a mean is no more than the mean of the squares. dt = R:dF, so the stress of a cell is
+//   2 mu dev e + k mean(change of its corners) I,
+// of the axes of S as before: forces are the gradient of W, and no torque is left. The tangent has for each
+// point the dyad of the gradient of its volume change, which joins all points of the cells around it; its
+// second derivative is in the turns of corot_bound.cpp. Dampers have the rate in place of the change, with
+// weights damp k V/4.
+#include "../model_common/edges.h"
+#include "../model_common/rotation.h"
+#include "corot_body.h"
+
+namespace corot {
+namespace {
+
+void share_pass(void *user, uint32_t begin, uint32_t end) {
+  const Call &call = *static_cast<const Call *>(user);
+  Body &body = *call.body;
+  for (uint32_t n = begin; n < end; ++n) body.kernels->dilate(load_block(call, n, begin, !body.damp.empty()));
+}
+
+void change_pass(void *user, uint32_t begin, uint32_t end) {
+  const Call &call = *static_cast<const Call *>(user);
+  Body &body = *call.body;
+  for (uint32_t n = begin; n < end; ++n) {
+    const Block &b = body.block[n];
+    body.kernels->merge(body.f.data(), body.merge.data() + body.merge_begin[n],
+                        body.merge_begin[n + 1] - body.merge_begin[n]);
+    for (uint32_t i = 0; i < b.owned; ++i)
+      for (size_t m = 0; m < 2; ++m) {
+        const double all = body.bulk[2 * size_t(b.point[i]) + m];
+        body.point_change[2 * size_t(b.point[i]) + m] = all > 0 ? b.f[4 * size_t(i) + m] / all : 0;
+      }
+  }
+}
+
+}  // namespace
+
+void Body::dilate(const dfm_kin &k) {
+  Call call{this, &k, nullptr};
+  for_each_block(kParallelCells, share_pass, &call);
+  for_each_block(kParallelMergeCells, change_pass, &call);
+}
+
+void Body::find_bulk() {
+  std::fill(bulk.data(), bulk.data() + 2 * size_t(npoint), 0.0);
+  for (uint32_t c = 0; c < ncell; ++c) {
+    const model::Lame m = model::lame_of(at(kYoung, c), at(kPoisson, c));
+    const double part = 0.25 * volume[c] * (m.lambda + 2 * m.mu / 3);
+    for (int a = 0; a < 4; ++a) {
+      const uint32_t i = cells[4 * size_t(c) + size_t(a)];
+      bulk[2 * size_t(i)] += part;
+      bulk[2 * size_t(i) + 1] += at(kDampingStiffness, c) * part;
+    }
+  }
+}
+
+// The points of the cells around a point are itself and its neighbors along edges.
+void Body::build_patches() {
+  bulk.create(host, 2 * size_t(npoint));
+  point_change.create(host, 2 * size_t(npoint));
+  patch_begin.create(host, size_t(npoint) + 1);
+  pair_begin.create(host, size_t(npoint) + 1);
+  far_begin.create(host, size_t(npoint) + 1);
+  for (size_t n = 0; n < 2 * size_t(nedge); ++n) ++patch_begin[edges[n] + 1];
+  for (uint32_t i = 0; i < npoint; ++i) {
+    const uint32_t size = patch_begin[i + 1] + 1;
+    patch_begin[i + 1] = patch_begin[i] + size;
+    pair_begin[i + 1] = pair_begin[i] + size * (size + 1) / 2;
+  }
+  patch.create(host, patch_begin[npoint]);
+  patch_gradient.create(host, 3 * size_t(patch_begin[npoint]));
+  pair_slot.create(host, pair_begin[npoint]);
+  Buffer<uint32_t> next, seen;
+  next.create(host, npoint);
+  seen.create(host, npoint);
+  for (uint32_t i = 0; i < npoint; ++i) {
+    next[i] = patch_begin[i];
+    patch[next[i]++] = i;
+    seen[i] = kNone;
+  }
+  for (size_t n = 0; n < 2 * size_t(nedge); ++n) patch[next[edges[n]]++] = edges[n ^ 1u];
+  for (uint32_t i = 0; i < npoint; ++i)
+    std::sort(&patch[patch_begin[i]], &patch[patch_begin[i]] + (patch_begin[i + 1] - patch_begin[i]));
+  // Points two edges away: counted, then listed.
+  const auto each_far = [&](uint32_t i, auto &&use) {
+    for (uint32_t n = patch_begin[i]; n < patch_begin[i + 1]; ++n) seen[patch[n]] = i;
+    for (uint32_t n = patch_begin[i]; n < patch_begin[i + 1]; ++n)
+      for (uint32_t m = patch_begin[patch[n]]; m < patch_begin[patch[n] + 1]; ++m) {
+        const uint32_t j = patch[m];
+        if (seen[j] == i) continue;
+        seen[j] = i;
+        if (j > i) use(j);
+      }
+  };
+  for (uint32_t i = 0; i < npoint; ++i) {
+    far_begin[i + 1] = far_begin[i];
+    each_far(i, [&](uint32_t) { ++far_begin[i + 1]; });
+  }
+  far_point.create(host, far_begin[npoint]);
+  std::fill(seen.data(), seen.data() + npoint, kNone);
+  for (uint32_t i = 0; i < npoint; ++i) {
+    uint32_t at = far_begin[i];
+    each_far(i, [&](uint32_t j) { far_point[at++] = j; });
+    std::sort(far_point.data() + far_begin[i], far_point.data() + at);
+  }
+  for (uint32_t i = 0; i < npoint; ++i) {
+    uint32_t at = pair_begin[i];
+    for (uint32_t n = patch_begin[i]; n < patch_begin[i + 1]; ++n)
+      for (uint32_t m = n; m < patch_begin[i + 1]; ++m) pair_slot[at++] = slot_of(patch[n], patch[m]);
+  }
+}
+
+// Of the block (i, j), i <= j, both in one patch.
+uint32_t Body::slot_of(uint32_t i, uint32_t j) const {
+  if (i == j) return i;
+  const uint32_t *const begin = far_point.data() + far_begin[i], *const end =
+                                                                     far_point.data() + far_begin[i + 1];
+  const uint32_t *const found = std::lower_bound(begin, end, j);
+  if (found != end && *found == j) return npoint + nedge + uint32_t(found - far_point.data());
+  return npoint + model::find_edge(edges.data(), nedge, i, j);
+}
+
+void Body::add_nodal(const dfm_kin &k, double a, double b, double *blk) {
+  const auto fill = [&](Buffer<double> &of) {
+    if (!of.empty()) std::fill(of.data(), of.data() + 3 * size_t(patch_begin[npoint]), 0.0);
+  };
+  fill(patch_gradient);
+  fill(patch_damper);
+  for (uint32_t c = 0; c < ncell; ++c) {
+    const size_t place = place_of[c], lane = place % kGroup;
+    const Group &own = group[place / kGroup];
+    const uint32_t *q = cells.data() + 4 * size_t(c);
+    const double *x[4];
+    for (size_t m = 0; m < 4; ++m) x[m] = k.x + size_t(k.stride) * q[m];
+    double grad[9], r[9], pull[4][3] = {};
+    gradient_of(own, uint32_t(lane), x, grad);
+    model::rotation::polar_of(grad, r);
+    const double part = 0.25 * (own.lambda[lane] + own.mu2[lane] / 3);
+    for (size_t m = 1; m < 4; ++m)
+      for (size_t i = 0; i < 3; ++i) {
+        const double *g = &own.g[3 * (m - 1)][lane];
+        pull[m][i] = part * ((r[3 * i] * g[0] + r[3 * i + 1] * g[kGroup]) + r[3 * i + 2] * g[2 * kGroup]);
+        pull[0][i] -= pull[m][i];
+      }
+    for (size_t n = 0; n < 4; ++n)
+      for (size_t m = 0; m < 4; ++m) {
+        const uint32_t *const all = patch.data();
+        const size_t to =
+            size_t(std::lower_bound(all + patch_begin[q[n]], all + patch_begin[q[n] + 1], q[m]) - all);
+        for (size_t i = 0; i < 3; ++i) {
+          patch_gradient[3 * to + i] += pull[m][i];
+          if (!patch_damper.empty()) patch_damper[3 * to + i] += damp[place] * pull[m][i];
+        }
+      }
+  }
+  const auto add_dyads = [&](const Buffer<double> &gradient, size_t kind, double by) {
+    for (uint32_t n = 0; n < npoint; ++n) {
+      const double all = bulk[2 * size_t(n) + kind];
+      if (!(all > 0)) continue;
+      const uint32_t *slot = pair_slot.data() + pair_begin[n];
+      for (size_t i = patch_begin[n]; i < patch_begin[n + 1]; ++i)
+        for (size_t j = i; j < patch_begin[n + 1]; ++j) {
+          double *const out = blk + 9 * size_t(*slot++);
+          for (size_t e = 0; e < 9; ++e)
+            out[e] -= by / all * (gradient[3 * i + e / 3] * gradient[3 * j + e % 3]);
+        }
+    }
+  };
+  add_dyads(patch_gradient, 0, a);
+  if (!patch_damper.empty() && b > 0) add_dyads(patch_damper, 1, b);
+}
+
+}  // namespace corot
