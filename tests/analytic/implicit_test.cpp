@@ -67,28 +67,36 @@ TEST(ImplicitContact, CubeOnPlane_SinksByItsStaticSag) {
 }
 
 TEST(ImplicitContact, SlopeOf26Point5Degrees_SlidesAt049AndHoldsAt05) {
-  for (const double h : {1e-3, kFrame})
-    for (const double mu : {0.49, 0.5}) {
-      test::Context context;
-      const dfm_world w = test::make_world(context, {0, 0, -kG}, kImplicit);
-      test::BodyOptions o = cube("block", 1e6, 2e-5);
-      const dfm_body b = test::make_body(context, w, "beam", {0.1, 0.1, 0.1}, 60, o);
-      test::add_plane(w, "floor");
-      test::set_friction(w, mu);
-      std::vector<dfm_vector_key> keys;
-      for (int i = 0; i <= 100; ++i) {
-        const double s = i / 100.0, a = 26.5 * M_PI / 180 * s * s * (3 - 2 * s);
-        keys.push_back({0.2 + 1.5 * s, {kG * std::sin(a), 0, -kG * std::cos(a)}});
-      }
-      test::ok(dfm_world_set_gravity_keys(w, uint32_t(keys.size()), keys.data()));
-      test::run(w, 2, h);
-      const double before = test::measure(b).com[0];
-      test::run(w, 0.5, h);
-      const double way = test::measure(b).com[0] - before;
-      // slides with g (sin - 0.49 cos) = 0.0753 m/s2
-      if (mu < 0.495) EXPECT_GT(way, 0.5 * 0.5 * 0.0753 * 0.25) << "step " << h;
-      else EXPECT_LT(std::fabs(way), 0.5e-6 * 0.5) << "step " << h;
+  struct Way {
+    const char *model;
+    double h, mu;
+  };
+  std::vector<Way> ways;
+  for (const char *model : {"msm", "corotational_fem"})
+    for (const double h : {1e-3, kFrame})
+      for (const double mu : {0.49, 0.5}) ways.push_back({model, h, mu});
+  for (const auto [model, h, mu] : ways) {
+    test::Context context;
+    const dfm_world w = test::make_world(context, {0, 0, -kG}, kImplicit);
+    test::BodyOptions o = cube("block", 1e6, 2e-5);
+    o.model = model;
+    const dfm_body b = test::make_body(context, w, "beam", {0.1, 0.1, 0.1}, 60, o);
+    test::add_plane(w, "floor");
+    test::set_friction(w, mu);
+    std::vector<dfm_vector_key> keys;
+    for (int i = 0; i <= 100; ++i) {
+      const double s = i / 100.0, a = 26.5 * M_PI / 180 * s * s * (3 - 2 * s);
+      keys.push_back({0.2 + 1.5 * s, {kG * std::sin(a), 0, -kG * std::cos(a)}});
     }
+    test::ok(dfm_world_set_gravity_keys(w, uint32_t(keys.size()), keys.data()));
+    test::run(w, 2, h);
+    const double before = test::measure(b).com[0];
+    test::run(w, 0.5, h);
+    const double way = test::measure(b).com[0] - before;
+    // slides with g (sin - 0.49 cos) = 0.0753 m/s2
+    if (mu < 0.495) EXPECT_GT(way, 0.5 * 0.5 * 0.0753 * 0.25) << model << ", step " << h;
+    else EXPECT_LT(std::fabs(way), 0.5e-6 * 0.5) << model << ", step " << h;
+  }
 }
 
 TEST(ImplicitContact, TwoCubesThatCollide_KeepTheirMomentum) {

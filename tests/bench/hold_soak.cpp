@@ -4,7 +4,8 @@
 // so at more than 1.25 times the rate of its formula.
 //
 //   hold_soak TABLE.csv [--only TEXT] [--seconds N]
-//       rows whose name contains TEXT; begins no row after N seconds
+//       rows whose name contains each TEXT; begins no row after N seconds
+#include <algorithm>
 #include <chrono>
 #include <cstdio>
 #include <cstring>
@@ -34,10 +35,21 @@ struct Step {
   double seconds;
 };
 constexpr Step kSteps[] = {{"1/1000", 1e-3}, {"1/60", 1.0 / 60}, {"1/240", 1.0 / 240}, {"1/10000", 1e-4}};
+// steps: so many of kSteps
+struct Bodies {
+  const char *model, *integrator;
+  int32_t i;
+  int steps;
+};
+constexpr Bodies kBodies[] = {{"msm", "explicit", DFM_INTEGRATOR_AUTO, 4},
+                              {"msm", "implicit", DFM_INTEGRATOR_IMPLICIT_EULER, 2},
+                              {"corotational_fem", "implicit", DFM_INTEGRATOR_IMPLICIT_EULER, 2}};
 
-std::string name_of(const Place &p, const char *law, const char *mesh, const Step &step) {
-  char text[160];
-  std::snprintf(text, sizeof text, "%s,%s,%g,%s,%s", p.scene, law, p.level, mesh, step.name);
+std::string name_of(const Place &p, const char *law, const Bodies &bodies, const char *mesh,
+                    const Step &step) {
+  char text[200];
+  std::snprintf(text, sizeof text, "%s,%s,%g,%s,%s,%s,%s", p.scene, law, p.level, bodies.model,
+                bodies.integrator, mesh, step.name);
   return text;
 }
 
@@ -48,13 +60,13 @@ int main(int argc, char **argv) {
     std::fprintf(stderr, "hold_soak TABLE.csv [--only TEXT] [--seconds N]\n");
     return 2;
   }
-  std::string only;
+  std::vector<std::string> only;
   double seconds = 1e9;
   for (int i = 2; i + 1 < argc; ++i) {
-    if (!std::strcmp(argv[i], "--only")) only = argv[i + 1];
+    if (!std::strcmp(argv[i], "--only")) only.push_back(argv[i + 1]);
     if (!std::strcmp(argv[i], "--seconds")) seconds = std::atof(argv[i + 1]);
   }
-  const std::set<std::string> done = bench::names_in(argv[1], 0, 5);
+  const std::set<std::string> done = bench::names_in(argv[1], 0, 7);
   std::FILE *table = std::fopen(argv[1], "a");
   if (!table) {
     std::perror(argv[1]);
@@ -62,33 +74,42 @@ int main(int argc, char **argv) {
   }
   if (done.empty())
     std::fprintf(table,
-                 "scene,law,level,mesh,step_s,creep_m_s,worst_contact_m_s,law_drift_m_s,stuck,substeps,"
+                 "scene,law,level,model,integrator,mesh,step_s,creep_m_s,worst_contact_m_s,law_drift_m_s,"
+                 "stuck,substeps,"
                  "unconverged,simulated_s,cpu_s,machine,compiler\n");
   const auto start = std::chrono::steady_clock::now();
   int bad = 0;
   // Coarse meshes and short runs first: what is stopped early has seen every law.
-  for (const bool fine : {false, true})
-    for (const Step &step : kSteps)
-      for (const Place &p : kPlaces)
-        for (const char *law : kLaws) {
-          if (p.cycles > 0 && fine) continue;  // a quarter of an hour each
-          // doc/laws/gms.md, limits
-          if (!std::strcmp(p.scene, "soft") && p.level > 0.5 && !std::strcmp(law, "gms")) continue;
-          const std::string name = name_of(p, law, fine ? "fine" : "coarse", step);
-          if (done.count(name) || name.find(only) == std::string::npos) continue;
-          if (std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count() > seconds)
-            continue;
-          const Result r = run_case({p.scene, law, p.level, step.seconds, fine, p.cycles});
-          const bool holds = r.drift > 0 ? r.creep < 1.25 * r.drift : r.creep < 1e-6;
-          bad += !holds;
-          std::fprintf(table, "%s,%.3g,%.3g,%.3g,%u,%llu,%llu,%g,%.2f,%s,%s\n", name.c_str(), r.creep,
-                       r.contact, r.drift, r.stuck, static_cast<unsigned long long>(r.substeps),
-                       static_cast<unsigned long long>(r.unconverged), r.simulated, r.seconds,
-                       bench::machine().c_str(), bench::compiler());
-          std::fflush(table);
-          std::printf("%-48s creep %9.3g m/s  law's drift %9.3g  %s\n", name.c_str(), r.creep, r.drift,
-                      holds ? "" : "TOO MUCH");
-        }
+  for (const Bodies &bodies : kBodies)
+    for (const bool fine : {false, true})
+      for (const Step *step = kSteps; step != kSteps + bodies.steps; ++step)
+        for (const Place &p : kPlaces)
+          for (const char *law : kLaws) {
+            const bool implicit = bodies.i == DFM_INTEGRATOR_IMPLICIT_EULER;
+            if (p.cycles > 0 && (fine || implicit)) continue;  // a quarter of an hour each
+            // doc/laws/gms.md, limits
+            if (!std::strcmp(p.scene, "soft") && p.level > 0.5 && !std::strcmp(law, "gms")) continue;
+            if (implicit && !promises_stiction(law)) continue;
+            const std::string name = name_of(p, law, bodies, fine ? "fine" : "coarse", *step);
+            if (done.count(name) || !std::all_of(only.begin(), only.end(), [&](const std::string &text) {
+                  return name.find(text) != std::string::npos;
+                }))
+              continue;
+            if (std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count() > seconds)
+              continue;
+            const Result r =
+                run_case({p.scene, law, p.level, step->seconds, fine, p.cycles, bodies.model, bodies.i});
+            const bool holds = r.drift > 0 ? r.creep < 1.25 * r.drift : r.creep < 1e-6;
+            bad += !holds;
+            std::fprintf(table, "%s,%.3g,%.3g,%.3g,%u,%llu,%llu,%g,%.2f,%s,%s\n", name.c_str(), r.creep,
+                         r.contact, r.drift, r.stuck, static_cast<unsigned long long>(r.substeps),
+                         static_cast<unsigned long long>(r.unconverged), r.simulated, r.seconds,
+                         bench::machine().c_str(), bench::compiler());
+            std::fflush(table);
+            std::printf("%-64s creep %9.3g m/s  law's drift %9.3g  %s\n", name.c_str(), r.creep, r.drift,
+                        holds ? "" : "TOO MUCH");
+            std::fflush(stdout);
+          }
   std::fclose(table);
   return bad > 0;
 }

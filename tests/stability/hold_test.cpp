@@ -70,6 +70,24 @@ TEST_P(Hold, PulledToAndFro_DriftsByTheLawsFormulaOrNotAtAll) {
   }
 }
 
+// Implicit bodies at the step of a frame and at 1 ms.
+TEST_P(Hold, ImplicitBodies_DoNotCreep) {
+  const auto held = [](const char *scene, double level, double step, const char *model) {
+    const Result r =
+        run_case({scene, GetParam(), level, step, false, 0, model, DFM_INTEGRATOR_IMPLICIT_EULER});
+    const std::string what = std::string(scene) + ", " + model + ", step " + std::to_string(step);
+    EXPECT_LT(r.creep, kCreep) << what;
+    EXPECT_LT(r.contact, kCreep) << what;
+    EXPECT_GE(r.stuck, 4u) << what;
+  };
+  for (const char *model : {"msm", "corotational_fem"}) {
+    held("slope", 0.99, 1.0 / 60, model);
+    held("pull", 0.99, 1.0 / 60, model);
+    held("slope", 0.99, 1e-3, model);
+  }
+  held("pinch", 1.05, 1.0 / 60, "corotational_fem");
+}
+
 // At a step far below what the bodies ask for, the solve's noise has the least time to die away between
 // two sub-steps.
 TEST(HoldBound, OnASoftBedInShortSteps_HoldsTheSame) {
