@@ -30,6 +30,14 @@ const dfm_param kParams[kParamCount] = {
      kRun | DFM_PARAM_ENUM, 1, kTangents},
     {"locking", "remedy near poisson 1/2; nodal: the volume change is averaged around each point", "1", 0, 1,
      kLocked, DFM_PARAM_ENUM, 1, kLockings},
+    {"yield", "von Mises stress at which the cells flow; 0: elastic", "Pa", 0, 1e13, 0, kRun | kCell, 1,
+     nullptr},
+    {"hardening", "growth of the yield stress over the equivalent plastic strain", "Pa", 0, 1e13, 0,
+     kRun | kCell, 1, nullptr},
+    {"creep", "one over the time in which the stress beyond yield relaxes; auto, -1: at once", "1/s", kAuto,
+     1e12, kAuto, kRun | kUnlessGiven, 1, nullptr},
+    {"plastic_limit", "accumulated equivalent plastic strain at which the flow ends; 0: none", "1", 0, 1e6, 0,
+     kRun | kCell, 1, nullptr},
     {"anisotropy_young", "Young's modulus along the axis; auto, -1: young", "Pa", kAuto, 1e13, kAuto,
      kRun | kCell | kUnlessGiven, 1, nullptr},
     {"anisotropy_poisson",
@@ -47,6 +55,10 @@ namespace {
 
 bool check_params(const dfm_host *h, const double *values) {
   if (!model::in_range(h, kId, kParams, kParamCount, values)) return false;
+  if (values[kCreep] < 0 && values[kCreep] != kAuto) {
+    complain(h, "parameter creep lies between -1 (at once) and 0 (no flow); give one of them, or more");
+    return false;
+  }
   const double *a = values + kAxis;
   if (a[0] != 0 || a[1] != 0 || a[2] != 0) return true;
   complain(h, "parameter anisotropy_axis is zero; give a direction");
@@ -65,6 +77,10 @@ dfm_status set_params(void *self, const double *params) {
     complain(body->host, "parameter locking cannot change while the body lives; make it anew");
     return DFM_E_ARG;
   }
+  if (params[kYield] > 0 && !body->plastic()) {
+    complain(body->host, "the body was made without yield and has no plastic strain; make it anew with it");
+    return DFM_E_ARG;
+  }
   try {
     body->apply_params(params);
   } catch (const model::Refused &) {
@@ -75,18 +91,30 @@ dfm_status set_params(void *self, const double *params) {
   return DFM_OK;
 }
 
+dfm_status state_init(const void *self, double *state) {
+  const Body &body = *static_cast<const Body *>(self);
+  if (body.plastic()) std::fill(state, state + size_t(kPlasticState) * body.ncell, 0.0);
+  return DFM_OK;
+}
+
 dfm_status add_forces(void *self, const dfm_kin *k, double *f) {
-  static_cast<Body *>(self)->add_forces(*k, f);
+  Body &body = *static_cast<Body *>(self);
+  if (body.lacks_state(*k)) return DFM_E_STATE;
+  body.add_forces(*k, f);
   return DFM_OK;
 }
 
 dfm_status bound(void *self, const dfm_kin *k, double *ksum, double *csum, double *) {
-  static_cast<Body *>(self)->bound(*k, ksum, csum);
+  Body &body = *static_cast<Body *>(self);
+  if (body.lacks_state(*k)) return DFM_E_STATE;
+  body.bound(*k, ksum, csum);
   return DFM_OK;
 }
 
 dfm_status energy(void *self, const dfm_kin *k, double *joule) {
-  *joule = static_cast<Body *>(self)->energy(*k);
+  Body &body = *static_cast<Body *>(self);
+  if (body.lacks_state(*k)) return DFM_E_STATE;
+  *joule = body.energy(*k);
   return DFM_OK;
 }
 
@@ -98,17 +126,23 @@ dfm_status pattern(const void *self, uint32_t *nb, uint32_t *ij) {
 }
 
 dfm_status stiffness(void *self, const dfm_kin *k, double a, double b, double *blk) {
-  static_cast<Body *>(self)->add_stiffness(*k, a, b, blk);
+  Body &body = *static_cast<Body *>(self);
+  if (body.lacks_state(*k)) return DFM_E_STATE;
+  body.add_stiffness(*k, a, b, blk);
   return DFM_OK;
 }
 
 dfm_status cell_energy(void *self, const dfm_kin *k, double *density) {
-  static_cast<Body *>(self)->cell_energy(*k, density);
+  Body &body = *static_cast<Body *>(self);
+  if (body.lacks_state(*k)) return DFM_E_STATE;
+  body.cell_energy(*k, density);
   return DFM_OK;
 }
 
 dfm_status cell_stress(void *self, const dfm_kin *k, double *stress) {
-  static_cast<Body *>(self)->cell_stress(*k, stress);
+  Body &body = *static_cast<Body *>(self);
+  if (body.lacks_state(*k)) return DFM_E_STATE;
+  body.cell_stress(*k, stress);
   return DFM_OK;
 }
 
@@ -122,18 +156,22 @@ const char *idle(const void *self, uint32_t row) {
 
 const dfm_cell_energy kCellEnergy = {sizeof(dfm_cell_energy), 0, cell_energy};
 const dfm_cell_stress kCellStress = {sizeof(dfm_cell_stress), 0, cell_stress};
+const dfm_slot kPlasticSlot = {DFM_PER_CELL, kPlasticState, DFM_SLOT_SCALAR, 0};
+const dfm_slots kNoSlots = {sizeof(dfm_slots), 0, nullptr}, kSlots = {sizeof(dfm_slots), 1, &kPlasticSlot};
 const dfm_effects kActiveEffects = {sizeof(dfm_effects), 0, active_effects};
 const dfm_idle kIdle = {sizeof(dfm_idle), 0, idle};
 
-const void *extension(const void *, const char *id) {
+const void *extension(const void *self, const char *id) {
   if (!strcmp(id, DFM_EXT_CELL_ENERGY)) return &kCellEnergy;
   if (!strcmp(id, DFM_EXT_CELL_STRESS)) return &kCellStress;
+  if (!strcmp(id, DFM_EXT_SLOTS)) return static_cast<const Body *>(self)->plastic() ? &kSlots : &kNoSlots;
   if (!strcmp(id, DFM_EXT_EFFECTS)) return &kActiveEffects;
   if (!strcmp(id, DFM_EXT_IDLE)) return &kIdle;
   return nullptr;
 }
 
-const char *const kEffects[] = {"volume", "damping", "large_rotation", "anisotropy", nullptr};
+const char *const kEffects[] = {"volume",     "damping",           "large_rotation",
+                                "anisotropy", "deform.plasticity", nullptr};
 
 const dfm_model kModel = {sizeof(dfm_model),
                           DFM_CAP_ENERGY | DFM_CAP_STIFFNESS | DFM_CAP_DAMPING | DFM_CAP_ROTATION_INVARIANT,
@@ -143,7 +181,7 @@ const dfm_model kModel = {sizeof(dfm_model),
                           create,
                           model::destroy<Body>,
                           set_params,
-                          nullptr,
+                          state_init,
                           add_forces,
                           bound,
                           energy,

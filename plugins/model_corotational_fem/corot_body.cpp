@@ -10,7 +10,11 @@ namespace corot {
 // `moves`: with velocities.
 Block load_block(const Call &call, uint32_t n, uint32_t begin, bool moves) {
   Body &body = *call.body;
-  const Block b = body.lend(n, begin);
+  Block b = body.lend(n, begin);
+  b.state = call.k->state;
+  b.state_out = call.k->state_out;
+  b.flow = call.flow;
+  b.per_flow = call.flow > 0 ? 1 / call.flow : 0;
   body.kernels->load(b, call.k->x, moves ? call.k->v : nullptr, call.k->stride);
   for (uint32_t i = 0; b.nodal && i < b.local; ++i) {
     const double *change = body.point_change.data() + 2 * size_t(b.point[i]);
@@ -60,7 +64,7 @@ void stress_pass(void *user, uint32_t begin, uint32_t end) {
   Body &body = *call.body;
   for (uint32_t n = begin; n < end; ++n) {
     const Block b = load_block(call, n, begin, false);
-    body.kernels->stresses(b, body.cell_id.data() + kGroup * size_t(b.group - body.group.data()), call.f);
+    body.kernels->stresses(b, b.cell, call.f);
   }
 }
 
@@ -72,8 +76,20 @@ void Body::for_each_block(uint32_t least_cells, void (*fn)(void *, uint32_t, uin
   fn(user, 0, nblock);
 }
 
+double Body::flow_at(const dfm_kin &k) const {
+  return !plastic() ? 0 : params[kCreep] == kAuto ? 1 : 1 - dfm_exp(-params[kCreep] * k.dt);
+}
+
+bool Body::lacks_state(const dfm_kin &k) const {
+  if (!plastic() || k.state) return false;
+  complain(host,
+           "the host gives no state, which yield needs: it must ask the instance for the "
+           "extension " DFM_EXT_SLOTS);
+  return true;
+}
+
 void Body::add_forces(const dfm_kin &k, double *f_out) {
-  Call call{this, &k, f_out};
+  Call call(this, &k, f_out);
   if (nodal()) dilate(k);
   for_each_block(kParallelCells, force_pass, &call);
   for_each_block(kParallelMergeCells, merge_pass, &call);
@@ -109,7 +125,7 @@ double Body::direct_energy(const dfm_kin &k, size_t place) const {
 }
 
 void Body::fill_energies(const dfm_kin &k) {
-  Call call{this, &k, nullptr};
+  Call call(this, &k, nullptr);
   if (nodal()) dilate(k);
   if (choice(kEnergy) == kLinear) return for_each_block(kParallelCells, energy_pass, &call);
   for (size_t place = 0; place < lanes(); ++place)
@@ -129,7 +145,7 @@ void Body::cell_energy(const dfm_kin &k, double *out) {
 }
 
 void Body::cell_stress(const dfm_kin &k, double *out) {
-  Call call{this, &k, out};
+  Call call(this, &k, out);
   if (nodal()) dilate(k);
   for_each_block(kParallelCells, stress_pass, &call);
   for (size_t n = 0; n < 6 * size_t(ncell); ++n) out[n] = volume[n / 6] > 0 ? out[n] / volume[n / 6] : 0;

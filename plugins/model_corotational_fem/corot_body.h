@@ -26,6 +26,10 @@ enum Param : uint32_t {
   kRotation,
   kTangent,
   kLocking,
+  kYield,
+  kHardening,
+  kCreep,
+  kPlasticLimit,
   kYoungAlong,
   kPoissonAlong,
   kShearAlong,
@@ -37,7 +41,7 @@ enum RotationBy : uint32_t { kPolar, kSvd, kQr };
 enum Locking : uint32_t { kLocked, kNodal };
 enum Tangent : uint32_t { kUsual, kExact };
 extern const dfm_param kParams[kParamCount];
-constexpr double kAuto = -1;  // of the constants along the axis: as without an axis
+constexpr double kAuto = -1;  // constants along the axis: as without an axis; creep: at once
 void complain(const dfm_host *h, const char *what);
 
 struct Body {
@@ -63,6 +67,7 @@ struct Body {
   // [npoint] row sums at rest of stiffness and dampers, and their weights; [ncell,4] row of a cell per
   // stiffness against turning
   Buffer<double> rest_rows, damp_rows, weight, twist_share;
+  bool made_plastic = false;
   const char *active_effects[8] = {};  // of the present parameters, NULL-terminated
 
   // Where the volume change is that of the points (corot_nodal.cpp): [npoint,2] what divides the sums of the
@@ -82,6 +87,7 @@ struct Body {
   Buffer<Group> group;
   Buffer<SlotGroup> slots;
   Buffer<FibreGroup> fibre;
+  Buffer<PlasticGroup> plastic_group;
   Buffer<Merge> merge;                       // by owning block
   Buffer<uint32_t> merge_begin, slot_begin;  // [nblock + 1]
 
@@ -108,6 +114,10 @@ struct Body {
   void cell_energy(const dfm_kin &k, double *out);
   void cell_stress(const dfm_kin &k, double *out);
 
+  // Whether the cells have a plastic strain, which is for good: it is state.
+  bool plastic() const { return made_plastic; }
+  bool lacks_state(const dfm_kin &k) const;  // says so
+  double flow_at(const dfm_kin &k) const;    // share of the flow that comes about in its step
   bool nodal() const { return choice(kLocking) == kNodal; }
   void dilate(const dfm_kin &k);  // before all that uses the volume change of the points
   // dilate() has filled point_change
@@ -153,7 +163,8 @@ struct Body {
   model::Fibre fibre_at(uint32_t c) const;
   double direct_energy(const dfm_kin &k, size_t place) const;
   void cell_elasticity(size_t place, double (*d)[6]) const;  // times the volume
-  void add_exact(const dfm_kin &k, uint32_t c, double a, double b, double *blk) const;
+  bool soften_cell(const dfm_kin &k, uint32_t c, const double (*s)[3], double (*d)[6]) const;
+  void add_cell_stiffness(const dfm_kin &k, uint32_t c, double a, double b, double *blk) const;
   void fill_material(Room &room);
   void fill_drag(Room &room);
   void find_effects();
@@ -166,6 +177,8 @@ struct Call {
   Body *body;
   const dfm_kin *k;
   double *f;
+  double flow;
+  Call(Body *of, const dfm_kin *at, double *out) : body(of), k(at), f(out), flow(of->flow_at(*at)) {}
 };
 
 // Block n with its points packed in; see Body::lend.

@@ -25,6 +25,11 @@
 // With the volume change of the points (corot_nodal.cpp) the square of their mean stands for the mean of the
 // squares of their cells, which is no less (Jensen): the rows at rest hold. The pressure of c is that of the
 // points.
+// Plastic cells (corot_plastic.h) have s = s(e) - 2 mu p with the flow's moduli in place of D, which are no
+// more (the potential is a least value over the flow). What p adds is -2 mu p : d2S, and S X + X S = 2 (dF^T
+// dF - dS^2) for X = d2S, from S^2 = F^T F. Both terms are positive semidefinite, so their difference is at
+// most sqrt(|A|^4 + |dS|^4) in norm; |dS|^2 <= (1 + d^2) |A|^2; hence, with c the least sum of two stretches,
+// |X| <= 2 sqrt 2 (1 + d^2) |A|^2 / c.
 // The energies of the gradient have rows of their own, of the second derivative at the shape. In W'' each
 // dyad X:dF with X of largest stretch x is at most x sum |u_a| |g_a|, |dF| too, and d2J is at most twice
 // the longest stretch, at least minus once that.
@@ -123,7 +128,7 @@ void Body::find_rows(Room &room) {
 }
 
 void Body::bound(const dfm_kin &k, double *ksum, double *csum) {
-  Call call{this, &k, nullptr};
+  Call call(this, &k, nullptr);
   if (nodal()) dilate(k);
   for_each_block(kParallelCells, twist_pass, &call);
   for (uint32_t i = 0; i < npoint; ++i) {

@@ -206,6 +206,9 @@ void Body::create(const dfm_host *h, const dfm_mesh &m) {
   build_blocks(m);
   params[kLocking] = m.params[kLocking];  // cannot change later
   if (nodal()) build_patches();
+  params[kYield] = m.params[kYield];
+  made_plastic = largest_of(kYield) > 0;
+  if (plastic()) plastic_group.create(host, groups);
   apply_params(m.params);
 }
 

@@ -28,6 +28,12 @@ struct FibreGroup {
   double most[kGroup];                                // largest eigenvalue of the elasticity, or more
 };
 
+// Plastic cells (corot_plastic.h): constants of the material, the first two times the volume. A cell that
+// does not flow has kNoYield.
+struct PlasticGroup { double yield[kGroup], hardening[kGroup], limit[kGroup]; };
+constexpr double kNoYield = 1e300;
+constexpr uint32_t kPlasticState = 7;  // doubles of state by cell: the plastic strain, its length so far
+
 // The rotation of a cell from its gradient, both row-major.
 using Rotate = void (*)(const double *gradient, double *rotation);
 
@@ -53,6 +59,13 @@ struct Block {
   const Group *group;
   const FibreGroup *fibre;  // NULL: isotropic
   const double *damp;       // [groups,8] s; NULL: none
+  // NULL: elastic; else the rest counts: state [ncell,7] of the host, `state_out` NULL where not wanted;
+  // number of each cell [groups,8], ~0 for one that fills up; share of the flow at once, and one over it.
+  const PlasticGroup *plastic;
+  const double *state;
+  double *state_out;
+  const uint32_t *cell;
+  double flow, per_flow;
   const SlotGroup *slots;
   double *value;       // [groups,8] what `energies` and `twists` write
   double *damp_value;  // [groups,8] what `twists` writes of dampers; NULL without

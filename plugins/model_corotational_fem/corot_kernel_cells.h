@@ -5,6 +5,7 @@
 
 #include "../model_common/polar_lanes.h"
 #include "corot_kernel.h"
+#include "corot_plastic.h"
 
 namespace corot {
 namespace {
@@ -81,6 +82,8 @@ struct Wide {
   typedef v4 V;
   static inline __attribute__((always_inline)) v4 splat(double a) { return lanes::splat(a); }
   static inline __attribute__((always_inline)) v4 root(v4 a) { return sqrt4(a); }
+  static inline __attribute__((always_inline)) v4 more(v4 a, v4 b) { return max4(a, b); }
+  static inline __attribute__((always_inline)) v4 less(v4 a, v4 b) { return min4(a, b); }
 };
 DEFORM_INLINE void finish_rotation(const Block &b, const v4 *f, const model::Polar<Wide> &o, v4 *r) {
   model::polar_rotation(f, o, r);
@@ -156,6 +159,55 @@ DEFORM_INLINE v4 corner_mean(const Block &b, const Four &q) {
 }
 DEFORM_INLINE v4 bulk4(const Four &q) {
   return load4(q.group->lambda + q.at) + splat(1.0 / 3) * load4(q.group->mu2 + q.at);
+}
+
+// State of four cells, and the constants of their flow.
+DEFORM_INLINE void load_plastic(const Block &b, uint32_t n, const Four &q, PlasticState<Wide> &s,
+                                PlasticLaw<Wide> &law) {
+  v4 first[4], last[4];  // components 0 to 3, and 3 to 6
+  for (uint32_t c = 0; c < 4; ++c) {
+    const uint32_t number = b.cell[size_t(kGroup) * n + q.at + c];
+    const double *own = b.state + size_t(kPlasticState) * (number == ~0u ? 0 : number);
+    first[c] = load4_anywhere(own);
+    last[c] = load4_anywhere(own + 3);
+  }
+  transpose(first[0], first[1], first[2], first[3]);
+  transpose(last[0], last[1], last[2], last[3]);
+  for (int k = 0; k < 6; ++k) s.strain[k] = k < 4 ? first[k] : last[k - 3];
+  s.length = last[3];
+  const PlasticGroup &own = b.plastic[n];
+  law = {load4(q.group->mu2 + q.at), load4(own.yield + q.at), load4(own.hardening + q.at),
+         load4(own.limit + q.at),    splat(b.flow),           splat(b.per_flow)};
+}
+DEFORM_INLINE void store_plastic(const Block &b, uint32_t n, const Four &q, const PlasticState<Wide> &s) {
+  alignas(32) double one[kPlasticState][4];
+  for (int k = 0; k < 6; ++k) store4(one[k], s.strain[k]);
+  store4(one[6], s.length);
+  for (uint32_t c = 0; c < 4; ++c) {
+    const uint32_t number = b.cell[size_t(kGroup) * n + q.at + c];
+    for (uint32_t k = 0; number != ~0u && k < kPlasticState; ++k)
+      b.state_out[size_t(kPlasticState) * number + k] = one[k][c];
+  }
+}
+// At the end of the flow for the strain e.
+DEFORM_INLINE void flowed(const Block &b, uint32_t n, const Four &q, const v4 *e, PlasticState<Wide> &s) {
+  PlasticLaw<Wide> law;
+  PlasticFlow<Wide> flow;
+  load_plastic(b, n, q, s, law);
+  find_flow<Wide>(law, e, s, flow);
+  take_flow(flow, s);
+}
+// Its potential less the energy of the elastic cell, times the volume.
+DEFORM_INLINE v4 plastic_energy(const Block &b, uint32_t n, const Four &q, const v4 *e) {
+  PlasticState<Wide> s;
+  PlasticLaw<Wide> law;
+  PlasticFlow<Wide> flow;
+  load_plastic(b, n, q, s, law);
+  find_flow<Wide>(law, e, s, flow);
+  const v4 own = (s.strain[0] * e[0] + s.strain[1] * e[1]) + s.strain[2] * e[2];
+  const v4 mixed = (s.strain[3] * e[3] + s.strain[4] * e[4]) + s.strain[5] * e[5];
+  const v4 kept = law.mu2 * (splat(0.5) * square_of<Wide>(s.strain) - (own + splat(2) * mixed));
+  return kept - flow.step * (flow.over - splat(0.5) * ((flow.stiff * law.per_flow) * flow.step));
 }
 
 struct Fibres { v4 a[3], alpha, beta, shear; };
@@ -323,23 +375,35 @@ DEFORM_INLINE void add_others(const Block &b, uint32_t n, const Four &q, const v
   balance(other, s, turn_by, all);
 }
 
-// The same for the options of Block::nodal.
+// The same for plastic cells, and for dampers beside the volume change of the points.
 template <bool kDamped>
 DEFORM_INLINE void add_more(const Block &b, uint32_t n, const Four &q, const v4 *r, const v4 *e, v4 *f,
                             v4 *all) {
+  if (!kDamped && !b.plastic) return;
+  v4 s[6], other[6];
+  Turning turn_by;
+  for (int k = 0; k < 6; ++k) {
+    s[k] = k < 3 ? e[k] + splat(1) : e[k];
+    other[k] = splat(0);
+  }
+  turning(s, turn_by);
   if constexpr (kDamped) {
-    v4 s[6], rate[6], other[6];
-    Turning turn_by;
-    for (int k = 0; k < 6; ++k) s[k] = k < 3 ? e[k] + splat(1) : e[k];
-    turning(s, turn_by);
+    v4 rate[6];
     gradient<4>(b, q, f);
     strain_rate(r, f, s, turn_by, rate);
     const v4 damp = load4(b.damp + size_t(kGroup) * n + q.at);
     for (int k = 0; k < 6; ++k) rate[k] = damp * rate[k];
     if (b.nodal) nodal_stress(q, rate, damp * corner_mean<4>(b, q), other);
     else stress_of(q, rate, other);
-    balance(other, s, turn_by, all);
   }
+  if (b.plastic) {
+    PlasticState<Wide> state;
+    flowed(b, n, q, e, state);
+    const v4 mu2 = load4(q.group->mu2 + q.at);
+    for (int k = 0; k < 6; ++k) other[k] = other[k] - mu2 * state.strain[k];
+    if (b.state_out) store_plastic(b, n, q, state);
+  }
+  balance(other, s, turn_by, all);
 }
 
 // P V of the energies of the gradient; see Energy.
@@ -434,7 +498,7 @@ static inline void forces(const Block &b) {
     return damped ? cell_forces<kNeoHookean, false, true>(b) : cell_forces<kNeoHookean, false, false>(b);
   if (b.energy == kVenant)
     return damped ? cell_forces<kVenant, false, true>(b) : cell_forces<kVenant, false, false>(b);
-  if (b.nodal)
+  if (b.nodal || b.plastic)
     return damped ? cell_forces<kLinear, false, true, true>(b) : cell_forces<kLinear, false, false, true>(b);
   if (b.fibre) return damped ? cell_forces<kLinear, true, true>(b) : cell_forces<kLinear, true, false>(b);
   return damped ? cell_forces<kLinear, false, true>(b) : cell_forces<kLinear, false, false>(b);
@@ -464,11 +528,20 @@ static inline void cell_stresses(const Block &b, const uint32_t *cells, double *
 static inline void stresses(const Block &b, const uint32_t *cells, double *out) {
   if (b.energy == kNeoHookean) return cell_stresses<kNeoHookean, false>(b, cells, out);
   if (b.energy == kVenant) return cell_stresses<kVenant, false>(b, cells, out);
-  if (b.nodal) return cell_stresses<kLinear, false, true>(b, cells, out);
+  if (b.nodal || b.plastic) return cell_stresses<kLinear, false, true>(b, cells, out);
   return b.fibre ? cell_stresses<kLinear, true>(b, cells, out) : cell_stresses<kLinear, false>(b, cells, out);
 }
 
-template <bool kFibre>
+// Of the volume change a cell has the share k V/2 mean(change^2) of its corners: the sum over the cells is
+// that over the points.
+DEFORM_INLINE v4 nodal_energy(const Block &b, const Four &q, const v4 *e) {
+  v4 way[6];
+  const v4 third = splat(1.0 / 3) * trace_of(e);
+  for (int k = 0; k < 6; ++k) way[k] = k < 3 ? e[k] - third : e[k];
+  const v4 shape = load4(q.group->mu2 + q.at) * square_of<Wide>(way);
+  return splat(0.5) * (shape + bulk4(q) * corner_mean<0, true>(b, q));
+}
+template <bool kFibre, bool kMore = false>
 static inline void cell_energies(const Block &b) {
   each_four(b, [&](uint32_t n, uint32_t at, v4 *f, const v4 *r, const model::Polar<Wide> &o)
                    __attribute__((always_inline)) {
@@ -479,29 +552,14 @@ static inline void cell_energies(const Block &b) {
                      if constexpr (kFibre) add_fibre_stress(b.fibre[n], at, e, s);
                      const v4 own = (e[0] * s[0] + e[1] * s[1]) + e[2] * s[2];
                      const v4 mixed = (e[3] * s[3] + e[4] * s[4]) + e[5] * s[5];
-                     store4(b.value + size_t(kGroup) * n + at, splat(0.5) * own + mixed);
+                     v4 sum = splat(0.5) * own + mixed;
+                     if (kMore && b.nodal) sum = nodal_energy(b, q, e);
+                     if (kMore && b.plastic) sum = sum + plastic_energy(b, n, q, e);
+                     store4(b.value + size_t(kGroup) * n + at, sum);
                    });
 }
-// Of the volume change a cell has the share 1/2 k V mean(change^2) of its corners: the sum over the cells is
-// that over the points.
-static inline void nodal_energies(const Block &b) {
-  each_four(b, [&](uint32_t n, uint32_t at, v4 *f, const v4 *r,
-                   const model::Polar<Wide> &o) __attribute__((always_inline)) {
-    const Four q = {b.group + n, at};
-    const v4 mu2 = load4(q.group->mu2 + at);
-    v4 e[6];
-    strain_of(r, f, e);
-    const v4 third = splat(1.0 / 3) * trace_of(e);
-    for (int k = 0; k < 3; ++k) e[k] = e[k] - third;
-    const v4 own = (e[0] * e[0] + e[1] * e[1]) + e[2] * e[2];
-    const v4 mixed = (e[3] * e[3] + e[4] * e[4]) + e[5] * e[5];
-    const v4 shape = mu2 * (splat(0.5) * own + mixed);
-    store4(b.value + size_t(kGroup) * n + at, shape + splat(0.5) * (bulk4(q) * corner_mean<0, true>(b, q)));
-  });
-}
 static inline void energies(const Block &b) {
-  if (b.nodal) return nodal_energies(b);
-
+  if (b.nodal || b.plastic) return cell_energies<false, true>(b);
   return b.fibre ? cell_energies<true>(b) : cell_energies<false>(b);
 }
 
@@ -566,6 +624,14 @@ static inline void cell_twists(const Block &b) {
       if (b.nodal) c = (bulk4(q) * corner_mean<0>(b, q) - third * (mu2 * (t - splat(3)))) - mu2;
       twist =
           splat(0.5) * max4(mu2 + (splat(2) * c) / choose_above(c, zero, least, most + splat(1e-300)), zero);
+      if (b.plastic) {
+        v4 e[6];
+        PlasticState<Wide> state;
+        strain_of(r, f, e);
+        flowed(b, n, q, e, state);
+        const v4 size = mu2 * sqrt4(square_of<Wide>(state.strain));
+        twist = twist + (splat(2.8285) * (size * (splat(1) + uneven))) / least;
+      }
     }
     const size_t place = size_t(kGroup) * n + at;
     store4(b.value + place, twist);

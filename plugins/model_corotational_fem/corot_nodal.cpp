@@ -42,7 +42,7 @@ void change_pass(void *user, uint32_t begin, uint32_t end) {
 }  // namespace
 
 void Body::dilate(const dfm_kin &k) {
-  Call call{this, &k, nullptr};
+  Call call(this, &k, nullptr);
   for_each_block(kParallelCells, share_pass, &call);
   for_each_block(kParallelMergeCells, change_pass, &call);
 }

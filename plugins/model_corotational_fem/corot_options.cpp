@@ -89,6 +89,10 @@ void Body::make_room(Room &room) const {
              "locking nodal takes the energy corotational without anisotropy; choose them, or locking none");
     throw model::Refused{};
   }
+  if (plastic() && (has_fibres() || choice(kEnergy) != kLinear)) {
+    complain(host, "yield takes the energy corotational without anisotropy; choose them, or yield 0");
+    throw model::Refused{};
+  }
   if (has_fibres()) room.fibre.create(host, groups);
   if (has_dampers()) {
     room.damp.create(host, lanes());
@@ -115,6 +119,13 @@ void Body::fill_material(Room &room) {
     const double v = c == kNone ? 0 : volume[c];
     const uint32_t like = c == kNone ? 0 : c;
     if (!damp.empty()) damp[n] = c == kNone ? 0 : at(kDampingStiffness, c);
+    if (plastic()) {
+      PlasticGroup &flow = plastic_group[n / kGroup];
+      const bool flows = v > 0 && at(kYield, like) > 0;
+      flow.yield[lane] = flows ? at(kYield, like) * v : kNoYield;
+      flow.hardening[lane] = flows ? at(kHardening, like) * v : 0;
+      flow.limit[lane] = at(kPlasticLimit, like) > 0 ? at(kPlasticLimit, like) : kNoYield;
+    }
     if (!has_fibres()) {
       const model::Lame lame = model::lame_of(at(kYoung, like), at(kPoisson, like));
       g.mu2[lane] = 2 * lame.mu * v;
@@ -141,6 +152,8 @@ void Body::fill_material(Room &room) {
     block[b].energy = choice(kEnergy);
     block[b].rotate = rotate_by(choice(kRotation));
     block[b].nodal = nodal();
+    block[b].plastic = plastic() ? plastic_group.data() + groups_at : nullptr;
+    block[b].cell = cell_id.data() + kGroup * groups_at;
     block[b].rotate_all = choice(kRotation) != kPolar;
     groups_at += block[b].groups;
   }
@@ -166,10 +179,13 @@ void Body::find_effects() {
   if (has_dampers() || !point_drag.empty()) active_effects[n++] = "damping";
   active_effects[n++] = "large_rotation";
   if (has_fibres()) active_effects[n++] = "anisotropy";
+  if (largest_of(kYield) > 0) active_effects[n++] = "deform.plasticity";
   active_effects[n] = nullptr;
 }
 
 const char *Body::idle(Param which) const {
+  if ((which == kHardening || which == kCreep || which == kPlasticLimit) && !(largest_of(kYield) > 0))
+    return "yield is 0";
   if (which == kAxis && !has_fibres())
     return "anisotropy_young, anisotropy_poisson and anisotropy_shear are all auto";
   return nullptr;

@@ -11,6 +11,7 @@
 #include "../model_common/edges.h"
 #include "../model_common/rotation.h"
 #include "corot_body.h"
+#include "corot_plastic.h"
 
 namespace corot {
 namespace {
@@ -127,6 +128,30 @@ double entry_of(const Modes &modes, int i, int j, const double *p, const double 
   return sum;
 }
 
+// out -= r m r^T
+void take_turned(const double *r, const double (*m)[3], double *out) {
+  double half[3][3];
+  for (int j = 0; j < 3; ++j) {
+    const double column[3] = {m[0][j], m[1][j], m[2][j]};
+    double out_column[3];
+    turn(r, column, out_column);
+    for (int i = 0; i < 3; ++i) half[i][j] = out_column[i];
+  }
+  for (int i = 0; i < 3; ++i) {
+    double row[3];
+    turn(r, half[i], row);
+    for (int j = 0; j < 3; ++j) out[3 * i + j] -= row[j];
+  }
+}
+
+struct Single {
+  using V = double;
+  static double splat(double a) { return a; }
+  static double root(double a) { return __builtin_sqrt(a); }
+  static double more(double a, double b) { return a > b ? a : b; }
+  static double less(double a, double b) { return a < b ? a : b; }
+};
+
 }  // namespace
 
 void Body::pattern(uint32_t *ij) const {
@@ -143,8 +168,37 @@ void Body::pattern(uint32_t *ij) const {
     }
 }
 
+// Takes from the elasticity d, times the volume, what the flow at the stretch s takes: the shear modulus
+// falls by the share of the way that flows, and along the way it becomes that of hardening. See
+// corot_plastic.h. False: no plastic strain.
+bool Body::soften_cell(const dfm_kin &k, uint32_t c, const double (*s)[3], double (*d)[6]) const {
+  const size_t place = place_of[c], lane = place % kGroup;
+  const PlasticGroup &own = plastic_group[place / kGroup];
+  const double part = flow_at(k), e[6] = {s[0][0] - 1, s[1][1] - 1, s[2][2] - 1, s[0][1], s[1][2], s[2][0]};
+  const PlasticLaw<Single> law = {
+      group[place / kGroup].mu2[lane], own.yield[lane], own.hardening[lane], own.limit[lane], part,
+      part > 0 ? 1 / part : 0};
+  PlasticState<Single> state;
+  const double *from = k.state + kPlasticState * size_t(c);
+  std::copy(from, from + 6, state.strain);
+  state.length = from[6];
+  PlasticFlow<Single> flow;
+  find_flow<Single>(law, e, state, flow);
+  if (flow.step > 0) {
+    const bool ended = flow.step < part * flow.over / flow.stiff;  // at the limit nothing flows any more
+    const double along = ended ? 1 : 1 - 1.5 * part * law.mu2 / flow.stiff, across = 1 - flow.share;
+    for (int i = 0; i < 6; ++i)
+      for (int j = 0; j < 6; ++j) {
+        const double deviator = (i == j ? (i < 3 ? 1 : 0.5) : 0) - (i < 3 && j < 3 ? 1.0 / 3 : 0);
+        const double dyad = flow.way[i] / flow.norm * (flow.way[j] / flow.norm);
+        d[i][j] += law.mu2 * ((across - 1) * (deviator - dyad) + (along - 1) * dyad);
+      }
+  }
+  return flow.step > 0 || square_of<Single>(state.strain) > 0;
+}
+
 // Blocks of one cell: by the change of S, by R K_e R^T, by the turns.
-void Body::add_exact(const dfm_kin &k, uint32_t c, double a, double b, double *blk) const {
+void Body::add_cell_stiffness(const dfm_kin &k, uint32_t c, double a, double b, double *blk) const {
   const size_t place = place_of[c];
   const uint32_t lane = uint32_t(place % kGroup);
   const Group &own = group[place / kGroup];
@@ -153,16 +207,23 @@ void Body::add_exact(const dfm_kin &k, uint32_t c, double a, double b, double *b
   Shape shape;
   shape_at(own, lane, x, shape);
   const double share = shape.share(), damping = damp.empty() ? 0 : b * damp[place] * (share * share);
-  const bool direct = choice(kEnergy) != kLinear;
+  const bool direct = choice(kEnergy) != kLinear, turns = choice(kTangent) == kExact;
   Modes modes{};
   double principal[4][3];
   if (direct) modes_of(choice(kEnergy), shape.stretch, own.mu2[lane], own.lambda[lane], modes);
-  const bool by_change = !fibre.empty() && share >= 1;
-  const double change_by = damping + (by_change ? a : 0), frame_by = by_change || direct ? 0 : a;
-  double d[6][6], change[4][3][6], turned[3][4][3], twist[3] = {};
+  double d[6][6], soft[6][6], change[4][3][6], turned[3][4][3], twist[3] = {};
   cell_elasticity(place, d);
+  std::copy(&d[0][0], &d[0][0] + 36, &soft[0][0]);
+  const bool flows = plastic() && soften_cell(k, c, shape.s, soft);
+  const bool by_fibre = turns && !fibre.empty() && share >= 1, by_flow = turns && flows && share >= 1;
+  const double change_by = (turns ? damping : 0) + (by_fibre ? a : 0), flow_by = by_flow ? a : 0;
+  const double frame_by = by_fibre || by_flow || direct ? 0 : a;
+  const double damped_by = turns || damp.empty() ? 0 : b * damp[place];
   const double bulk_here = own.lambda[lane] + own.mu2[lane] / 3;
-  for (int i = 0; nodal() && i < 9; ++i) d[i / 3][i % 3] -= bulk_here;
+  for (int i = 0; nodal() && i < 9; ++i) {
+    d[i / 3][i % 3] -= bulk_here;
+    soft[i / 3][i % 3] -= bulk_here;
+  }
   model::Tetrahedron rest{1, {}};  // the constants hold the volume
   for (int m = 0; m < 4; ++m) {
     std::copy(shape.g[m], shape.g[m] + 3, rest.g[m]);
@@ -179,17 +240,19 @@ void Body::add_exact(const dfm_kin &k, uint32_t c, double a, double b, double *b
   const double pressure =
       nodal() ? bulk_here * mean_change(c) - own.mu2[lane] / 3 * more : own.lambda[lane] * more;
   const double pull = pressure - own.mu2[lane];
-  for (int m = 0; fibre.empty() && !direct && m < 3; ++m) {
+  for (int m = 0; turns && fibre.empty() && !flows && !direct && m < 3; ++m) {
     const double pair =
         std::max(shape.stretch[(m + 1) % 3] + shape.stretch[(m + 2) % 3], kLeast * shape.trace);
     if (pair > 0) twist[m] = 0.5 * a * std::max(0.0, own.mu2[lane] + 2 * pull / pair);
   }
   const auto add_block = [&](int m, int n, double *out) {
-    double frame[9], in_frame[3][3];
-    model::stiffness_block(rest, d, m, n, frame);
+    double frame[9], damped[9] = {}, in_frame[3][3];
+    model::stiffness_block(rest, soft, m, n, frame);
+    if (damped_by > 0) model::stiffness_block(rest, d, m, n, damped);
     for (int i = 0; i < 3; ++i)
       for (int j = 0; j < 3; ++j) {
         double sum = frame_by * frame[3 * i + j];
+        if (damped_by > 0) sum += damped_by * damped[3 * i + j];
         for (int e = 0; direct && e < 3; ++e)
           for (int l = 0; l < 3; ++l)
             sum +=
@@ -197,20 +260,11 @@ void Body::add_exact(const dfm_kin &k, uint32_t c, double a, double b, double *b
         for (int e = 0; e < 3; ++e) sum += twist[e] * (turned[e][m][i] * turned[e][n][j]);
         for (int e = 0; change_by > 0 && e < 6; ++e)
           for (int l = 0; l < 6; ++l) sum += change_by * (change[m][i][e] * (d[e][l] * change[n][j][l]));
+        for (int e = 0; flow_by > 0 && e < 6; ++e)
+          for (int l = 0; l < 6; ++l) sum += flow_by * (change[m][i][e] * (soft[e][l] * change[n][j][l]));
         in_frame[i][j] = sum;
       }
-    double half[3][3];
-    for (int j = 0; j < 3; ++j) {
-      const double column[3] = {in_frame[0][j], in_frame[1][j], in_frame[2][j]};
-      double out_column[3];
-      turn(shape.r, column, out_column);
-      for (int i = 0; i < 3; ++i) half[i][j] = out_column[i];
-    }
-    for (int i = 0; i < 3; ++i) {
-      double row[3];
-      turn(shape.r, half[i], row);
-      for (int j = 0; j < 3; ++j) out[3 * i + j] -= row[j];
-    }
+    take_turned(shape.r, in_frame, out);
   };
   const SlotGroup &at_slots = slots[place / kGroup];
   for (int m = 0; m < 4; ++m) add_block(m, m, blk + 9 * size_t(at_slots.slot[m][lane]));
@@ -223,12 +277,12 @@ void Body::add_stiffness(const dfm_kin &k, double a, double b, double *blk) {
     dilate(k);
     add_nodal(k, a, b, blk);
   }
-  if (choice(kTangent) == kExact) {
+  if (choice(kTangent) == kExact || plastic()) {
     for (uint32_t c = 0; c < ncell; ++c)
-      if (volume[c] > 0) add_exact(k, c, a, b, blk);
+      if (volume[c] > 0) add_cell_stiffness(k, c, a, b, blk);
   } else {
     for (uint32_t n = 0; n < nblock; ++n) {
-      Call call{this, &k, nullptr};
+      Call call(this, &k, nullptr);
       kernels->tangents(load_block(call, n, 0, false), a, b, blk);
     }
   }

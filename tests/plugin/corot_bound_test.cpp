@@ -35,6 +35,8 @@ TEST(CorotBound, RowSums_BoundTheTrueSpectrumInEveryShape) {
            {damped_fibres, {}},
            {{{"locking", {1}}, {"poisson", {0.49}}, {"damping_stiffness", {0.004}}}, {}},
            {{{"locking", {1}}}, uneven},
+           {{{"yield", {1e3}}}, {}},
+           {{{"yield", {1e3}}, {"poisson", {0.45}}, {"damping_stiffness", {0.004}}}, {}},
            {{}, uneven}})
     for (const double size : {1.0, 0.3, 2.0, -1.0, 10.0, -30.0}) {
       Host host;
@@ -47,6 +49,7 @@ TEST(CorotBound, RowSums_BoundTheTrueSpectrumInEveryShape) {
               {size * x[0] + noise(random), x[1] + noise(random),
                std::sqrt(std::abs(size)) * x[2] + noise(random)});
       }
+      b.forces_and_step();  // plastic cells have a strain of their own then
       const double h = b.bound(), value = Operator(b).largest(h, 120);
       EXPECT_LE(value, 4 * (1 + 1e-6)) << (p.empty() ? "default" : p.begin()->first) << " " << size;
     }

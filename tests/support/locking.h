@@ -1,6 +1,7 @@
 // What locks near poisson 1/2: answers of linear tetrahedra over the truth, with and without the volume
 // change by points. Loads are those of the reference set, Young's modulus is 1e5 times theirs, so that
 // strains are small and the corotational model is linear.
+#pragma once
 #include "statics.h"
 
 namespace test {
