@@ -15,6 +15,7 @@ from installed_tree import clean_environment, install, run, without_spaces
 
 SCENE, STEPS = "examples/scenes/slope_block.json", 200
 DYNAMIC_LINKER = {"dlopen", "dlsym", "dlclose", "dlerror", "dladdr"}
+FILES_ONLY = {"solver_cholmod"}   # its library is under the GPL: CMakeLists.txt refuses it inside
 
 
 def asked_for(*paths):
@@ -70,7 +71,8 @@ def main():
         if f"state_hash {wanted}\n" not in said:
             sys.exit(f"{program} does not end {SCENE} in the bits of {dynamic_build}: {wanted}")
         for folder in sorted((pathlib.Path(source) / "plugins").iterdir()):
-            if any(folder.glob("*.cpp")) and f"from static:{folder.name}\n" not in said:
+            inside = any(folder.glob("*.cpp")) and folder.name not in FILES_ONLY
+            if inside and f"from static:{folder.name}\n" not in said:
                 sys.exit(f"{program} does not hold plugin {folder.name}")
     print(f"static and dynamic build end {SCENE} after {STEPS} steps in {wanted}")
 

@@ -32,8 +32,9 @@ struct DenseKernels {
                       double *y, double *scratch);
   void (*backward_one)(uint32_t width, uint32_t below, const double *l, const uint32_t *rows, double *x,
                        const double *y, double *scratch);
-  // sum[kLanes, kLanes] += left^T diag(d) right, left and right [n, kLanes]
-  void (*gram)(uint32_t n, const double *left, const double *d, const double *right, double *sum);
+  // sum[kLanes, kLanes] += left^T right, both [n, kLanes]; the transposed sum is that of (right, left), bit by
+  // bit
+  void (*gram)(uint32_t n, const double *left, const double *right, double *sum);
 };
 
 const DenseKernels &dense_kernels_sse2();

@@ -263,14 +263,14 @@ void backward_one(uint32_t width, uint32_t below, const double *l, const uint32_
   }
 }
 
-void gram(uint32_t n, const double *left, const double *d, const double *right, double *sum) {
+void gram(uint32_t n, const double *left, const double *right, double *sum) {
   DEFORM_UNROLL
   for (uint32_t p = 0; p < kParts; ++p) {
     Vector s[kLanes];
     DEFORM_UNROLL
     for (uint32_t a = 0; a < kLanes; ++a) s[a] = load(sum + a * kLanes + p * kWidth);
     for (uint32_t k = 0; k < n; ++k) {
-      const Vector v = load(right + size_t(k) * kLanes + p * kWidth) * splat(d[k]);
+      const Vector v = load(right + size_t(k) * kLanes + p * kWidth);
       DEFORM_UNROLL
       for (uint32_t a = 0; a < kLanes; ++a) s[a] += splat(left[size_t(k) * kLanes + a]) * v;
     }

@@ -1,6 +1,7 @@
 #include "math/ldlt_solver.h"
 
 #include <algorithm>
+#include <cmath>
 #include <limits>
 
 #include "math/width.h"
@@ -15,6 +16,8 @@ constexpr uint32_t kBlock = 24;         // columns of a panel that are factored 
 constexpr uint32_t kChunk = 96;         // columns that one pass over an update takes
 constexpr double kShared = 1.0e6;       // multiplications below which threads only wait for each other
 constexpr uint32_t kTilesPerShare = 4;  // of kTileColumns columns
+// Points beyond those asked for that restricted() keeps: so many times as many, and so many.
+constexpr uint32_t kKeepTimes = 2, kKeep = 64;
 
 size_t rounded(size_t n) { return (n + kTileRows - 1) / kTileRows * kTileRows; }
 
@@ -22,8 +25,9 @@ size_t rounded(size_t n) { return (n + kTileRows - 1) / kTileRows * kTileRows; }
 
 LdltSolver::LdltSolver(const Memory &memory, Tasks *tasks)
     : kernels_(dense_kernels()), tasks_(tasks), nodes_(memory) {
-  use_memory(memory, entry_begin_, waiting_, selected_, reach_begin_, reach_);
-  use_memory(memory, value_, pivot_, inverse_, floor_, stack_, left_, right_, panels_, reached_);
+  use_memory(memory, entry_begin_, waiting_, row_, column_, fresh_, reach_begin_, reach_);
+  use_memory(memory, value_, pivot_, inverse_, floor_, stack_, left_, right_, panels_);
+  use_memory(memory, root_, reached_, product_);
   use_memory(memory, entry_);
   use_memory(memory, reached_begin_);
 }
@@ -60,7 +64,9 @@ void LdltSolver::analyse(const BlockPattern &pattern) {
   right_.resize(pack);
   value_.resize(nodes_.value_begin[ns]);
   stack_.resize(nodes_.stack);
-  for (Array<double> *v : {&pivot_, &inverse_, &floor_}) v->assign(3 * size_t{n_}, 0.0);
+  for (Array<double> *v : {&pivot_, &inverse_, &root_, &floor_}) v->assign(3 * size_t{n_}, 0.0);
+  column_.assign(n_, Supernodes::kNone);
+  forget();
 }
 
 void LdltSolver::assemble(uint32_t s, const double *blk, double *panel) {
@@ -153,7 +159,11 @@ bool LdltSolver::factor(const double *blk) {
     count = first;
     waiting_[count++] = s;
   }
-  for (size_t k = 0; k < pivot_.size(); ++k) inverse_[k] = 1 / pivot_[k];
+  for (size_t k = 0; k < pivot_.size(); ++k) {
+    inverse_[k] = 1 / pivot_[k];
+    root_[k] = std::sqrt(inverse_[k]);
+  }
+  forget();
   return ready_ = true;
 }
 
@@ -226,22 +236,23 @@ bool LdltSolver::solve(uint32_t nrhs, const double *b, double *x, double, SolveI
   return true;
 }
 
-// Supernodes that a panel's points reach: their own and all above (Gilbert and Peierls 1988).
-void LdltSolver::find_reach(uint32_t nsel, const uint32_t *sel) {
-  selected_.resize(nsel);
-  for (uint32_t k = 0; k < nsel; ++k) selected_[k] = k;
-  std::sort(selected_.begin(), selected_.end(),
-            [&](uint32_t a, uint32_t b) { return nodes_.place[sel[a]] < nodes_.place[sel[b]]; });
-  const size_t wide = 3 * size_t{nsel};
+void LdltSolver::forget() {
+  known_ = 0;
+  std::fill(column_.begin(), column_.end(), Supernodes::kNone);
+  row_.clear();
   reach_.clear();
   reach_begin_.assign(1, 0);
   reached_begin_.assign(1, 0);
-  for (size_t c = 0; c < wide; c += kLanes) {
+  product_.clear();
+}
+
+// Supernodes that the points of panels from `first` on reach: their own and all above (Gilbert and Peierls
+// 1988).
+void LdltSolver::find_reach(uint32_t first) {
+  for (size_t c = size_t{first} * kLanes; c < row_.size(); c += kLanes) {
     const uint32_t begin = reach_begin_.back();
-    const size_t last = std::min(wide, c + kLanes) - 1;
-    for (size_t k = c / 3; k <= last / 3; ++k)
-      for (uint32_t s = nodes_.owner[nodes_.place[sel[selected_[k]]]]; s != Supernodes::kNone;
-           s = nodes_.parent[s])
+    for (size_t k = c; k < c + kLanes && row_[k] != Supernodes::kNone; ++k)
+      for (uint32_t s = nodes_.owner[row_[k] / 3]; s != Supernodes::kNone; s = nodes_.parent[s])
         reach_.push_back(s);
     std::sort(reach_.begin() + begin, reach_.end());
     reach_.erase(std::unique(reach_.begin() + begin, reach_.end()), reach_.end());
@@ -253,23 +264,26 @@ void LdltSolver::find_reach(uint32_t nsel, const uint32_t *sel) {
   reached_.resize(std::max(reached_.size(), reached_begin_.back()));
 }
 
-void LdltSolver::forward_reached(uint32_t p, const uint32_t *sel, uint32_t nsel, double *panel) {
+void LdltSolver::forward_reached(uint32_t p, double *panel) {
   const auto rows = [&](uint32_t s) { return panel + 3 * size_t{nodes_.begin[s]} * kLanes; };
   const auto doubles = [&](uint32_t s) { return 3 * size_t{nodes_.width(s)} * kLanes; };
   for (uint32_t e = reach_begin_[p]; e < reach_begin_[p + 1]; ++e)
     std::fill(rows(reach_[e]), rows(reach_[e]) + doubles(reach_[e]), 0.0);
-  for (size_t c = size_t{p} * kLanes; c < std::min<size_t>(3 * size_t{nsel}, (size_t{p} + 1) * kLanes); ++c)
-    panel[(3 * size_t{nodes_.place[sel[selected_[c / 3]]]} + c % 3) * kLanes + c % kLanes] = 1.0;
+  for (size_t lane = 0; lane < kLanes; ++lane)
+    if (const uint32_t row = row_[size_t{p} * kLanes + lane]; row != Supernodes::kNone)
+      panel[size_t{row} * kLanes + lane] = 1.0;
   double *to = &reached_[reached_begin_[p]];
   for (uint32_t e = reach_begin_[p]; e < reach_begin_[p + 1]; ++e) {
     const uint32_t s = reach_[e];
     kernels_.forward(nodes_.width(s), nodes_.below(s), &value_[nodes_.value_begin[s]],
                      nodes_.rows.data() + nodes_.row_begin[s], rows(s), panel);
-    to = std::copy(rows(s), rows(s) + doubles(s), to);
+    const double *const from = rows(s), *const root = &root_[3 * size_t{nodes_.begin[s]}];
+    for (size_t k = 0; k < 3 * size_t{nodes_.width(s)}; ++k)
+      for (size_t lane = 0; lane < kLanes; ++lane) *to++ = from[k * kLanes + lane] * root[k];
   }
 }
 
-// sum[kLanes, kLanes] = Y_p^T D^-1 Y_q over the rows that both panels reach
+// sum[kLanes, kLanes] = Y_p^T Y_q over the rows that both panels reach
 void LdltSolver::gram(uint32_t p, uint32_t q, double *sum) const {
   std::fill(sum, sum + kLanes * kLanes, 0.0);
   const double *left = &reached_[reached_begin_[p]], *right = &reached_[reached_begin_[q]];
@@ -277,7 +291,7 @@ void LdltSolver::gram(uint32_t p, uint32_t q, double *sum) const {
   const auto doubles = [&](uint32_t s) { return 3 * size_t{nodes_.width(s)} * kLanes; };
   while (a < reach_begin_[p + 1] && b < reach_begin_[q + 1]) {
     const uint32_t s = reach_[a], t = reach_[b];
-    if (s == t) kernels_.gram(3 * nodes_.width(s), left, &inverse_[3 * size_t{nodes_.begin[s]}], right, sum);
+    if (s == t) kernels_.gram(3 * nodes_.width(s), left, right, sum);
     if (s <= t) {
       left += doubles(s);
       ++a;
@@ -289,31 +303,61 @@ void LdltSolver::gram(uint32_t p, uint32_t q, double *sum) const {
   }
 }
 
-// W = S P^T L^-T D^-1 L^-1 P S^T = Y^T D^-1 Y with Y = L^-1 P S^T: the forward half is enough.
+// Columns of the points in fresh_, and their products with all that are known. What a product is depends on
+// its two points alone, not on when they were asked for: rows are added in the order of elimination.
+void LdltSolver::learn() {
+  std::sort(fresh_.begin(), fresh_.end(),
+            [&](uint32_t a, uint32_t b) { return nodes_.place[a] < nodes_.place[b]; });
+  const uint32_t first = uint32_t(row_.size() / kLanes);
+  for (const uint32_t i : fresh_) {
+    column_[i] = uint32_t(row_.size());
+    for (uint32_t c = 0; c < 3; ++c) row_.push_back(3 * nodes_.place[i] + c);
+  }
+  known_ += uint32_t(fresh_.size());
+  row_.resize((row_.size() + kLanes - 1) / kLanes * kLanes, Supernodes::kNone);
+  find_reach(first);
+  const size_t rows = 3 * size_t{n_};
+  const uint32_t count = uint32_t(reach_begin_.size() - 1), together = std::min(count - first, slots());
+  panels_.resize(std::max(panels_.size(), together * rows * kLanes));
+  for (uint32_t p = first; p < count; p += together)
+    each(std::min(together, count - p),
+         [&](uint32_t slot) { forward_reached(p + slot, panels_.data() + slot * rows * kLanes); });
+  product_.resize(size_t{count} * (count + 1) / 2 * kLanes * kLanes);
+  each(count - first, [&](uint32_t k) {
+    const uint32_t p = first + k;
+    double *const tiles = &product_[size_t{p} * (p + 1) / 2 * kLanes * kLanes];
+    for (uint32_t q = 0; q <= p; ++q) gram(p, q, tiles + size_t{q} * kLanes * kLanes);
+  });
+}
+
+// W = S P^T L^-T D^-1 L^-1 P S^T = Y^T Y with Y = D^-1/2 L^-1 P S^T: the forward half is enough. While a
+// factor serves, each point's half is found once.
 bool LdltSolver::restricted(uint32_t nsel, const uint32_t *sel, double, double *w, SolveInfo &info) {
   info = {};
   if (!ready_) return false;
-  find_reach(nsel, sel);
-  const size_t rows = 3 * size_t{n_}, wide = 3 * size_t{nsel};
-  const uint32_t npanel = uint32_t(reach_begin_.size() - 1), together = std::min(npanel, slots());
-  panels_.resize(std::max(panels_.size(), together * rows * kLanes));
-  for (uint32_t first = 0; first < npanel; first += together)
-    each(std::min(together, npanel - first), [&](uint32_t slot) {
-      forward_reached(first + slot, sel, nsel, panels_.data() + slot * rows * kLanes);
-    });
-  each(npanel, [&](uint32_t p) {
-    double sum[kLanes * kLanes];
-    for (uint32_t q = 0; q <= p; ++q) {
-      gram(p, q, sum);
-      for (size_t a = 0; a < kLanes && p * kLanes + a < wide; ++a)
-        for (size_t b = 0; b < kLanes && q * kLanes + b < wide; ++b) {
-          const size_t i = p * kLanes + a, j = q * kLanes + b;
-          if (j > i) continue;
-          const size_t row = 3 * size_t{selected_[i / 3]} + i % 3;
-          const size_t column = 3 * size_t{selected_[j / 3]} + j % 3;
-          w[row * wide + column] = w[column * wide + row] = sum[a * kLanes + b];
+  const auto find_fresh = [&] {
+    fresh_.clear();
+    for (uint32_t k = 0; k < nsel; ++k)
+      if (column_[sel[k]] == Supernodes::kNone) fresh_.push_back(sel[k]);
+  };
+  find_fresh();
+  if (known_ + fresh_.size() > size_t{1 + kKeepTimes} * nsel + kKeep) {
+    forget();
+    find_fresh();
+  }
+  if (!fresh_.empty()) learn();
+  const size_t wide = 3 * size_t{nsel};
+  each(nsel, [&](uint32_t i) {
+    for (uint32_t j = 0; j <= i; ++j)
+      for (size_t a = 0; a < 3; ++a)
+        for (size_t b = 0; b < 3; ++b) {
+          size_t p = column_[sel[i]] + a, q = column_[sel[j]] + b;
+          if (p < q) std::swap(p, q);
+          const size_t r = p / kLanes, c = q / kLanes;
+          const double value = product_[((r * (r + 1) / 2 + c) * kLanes + p % kLanes) * kLanes + q % kLanes];
+          w[(3 * size_t{i} + a) * wide + 3 * size_t{j} + b] = value;
+          w[(3 * size_t{j} + b) * wide + 3 * size_t{i} + a] = value;
         }
-    }
   });
   return true;
 }

@@ -27,8 +27,10 @@ class LdltSolver final : public LinearSolver {
                         double *c, size_t ldc);
   void solve_one(const double *b, double *x);
   void solve_panel(uint32_t lanes, const double *b, double *x, double *panel) const;
-  void find_reach(uint32_t nsel, const uint32_t *sel);
-  void forward_reached(uint32_t p, const uint32_t *sel, uint32_t nsel, double *panel);
+  void forget();
+  void learn();
+  void find_reach(uint32_t first);
+  void forward_reached(uint32_t p, double *panel);
   void gram(uint32_t p, uint32_t q, double *sum) const;
   template <class F>
   void each(uint32_t count, F &&f) const;  // f(0) ... f(count - 1), on the threads there are
@@ -44,13 +46,22 @@ class LdltSolver final : public LinearSolver {
   struct Entry { uint32_t block, at, transposed; };
   Array<uint32_t> entry_begin_;
   Array<Entry> entry_;
-  Array<double> value_, pivot_, inverse_, floor_;   // L, D, 1/D, least pivots
-  Array<double> stack_, left_, right_;              // scratch of factor
-  Array<uint32_t> waiting_;                         // supernodes whose updates are on the stack
-  Array<double> panels_;                            // scratch: right-hand sides, [slot][3n][kLanes]
-  Array<uint32_t> selected_, reach_begin_, reach_;  // scratch of restricted: supernodes that a panel reaches
+  Array<double> value_, pivot_, inverse_, floor_;  // L, D, 1/D, least pivots
+  Array<double> stack_, left_, right_;             // scratch of factor
+  Array<uint32_t> waiting_;                        // supernodes whose updates are on the stack
+  Array<double> panels_;                           // scratch: right-hand sides, [slot][3n][kLanes]
+
+  // What restricted() has found of the present factor: Y = D^-1/2 L^-1 P S^T of the points that it was asked
+  // for, and Y^T Y. Columns stand in panels of kLanes; every call that knows new points begins a panel.
+  uint32_t known_ = 0;          // points
+  Array<uint32_t> row_;         // [columns] row of Y^T's unit vector in the order of elimination; kNone: empty
+  Array<uint32_t> column_;      // [n] first column of a point, kNone
+  Array<uint32_t> fresh_;       // scratch: points that are not known yet
+  Array<double> root_;          // 1/sqrt(D)
+  Array<uint32_t> reach_begin_, reach_;  // supernodes that a panel reaches
   Array<size_t> reached_begin_;
-  Array<double> reached_;  // L^-1 P S^T by panels, rows of the reached supernodes only
+  Array<double> reached_;  // Y by panels, rows of the reached supernodes only
+  Array<double> product_;  // Y^T Y, tiles [kLanes, kLanes] of the lower triangle, row after row
 };
 
 }  // namespace dfm

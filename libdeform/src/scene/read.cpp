@@ -251,15 +251,9 @@ void read_solver(const Node &scene, Definition &def) {
   if (solver.has("type")) def.solver = solver.member("type").text();
   if (solver.has("tolerance"))
     def.solver_tolerance = solver.member("tolerance").number(Range{0, 1, true, true});
-  const Range count{1, 1e9, false, false};
-  const auto whole = [&](const char *key) {
-    const Node n = solver.member(key);
-    const double value = n.number(count);
-    if (value != std::floor(value)) n.fail("expected a whole number, found %g", value);
-    return static_cast<uint32_t>(value);
-  };
-  if (solver.has("max_iterations")) def.solver_iterations = whole("max_iterations");
-  if (solver.has("newton")) def.newton = whole("newton");
+  if (solver.has("max_iterations"))
+    def.solver_iterations = read_count(solver.member("max_iterations"), 1, 1e9);
+  if (solver.has("newton")) def.newton = read_count(solver.member("newton"), 1, 1e9);
 }
 
 void read_effects(const Node &scene, Definition &def) {
