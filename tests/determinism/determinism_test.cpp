@@ -44,7 +44,12 @@ TEST_P(Determinism, OneToEightThreads_GiveTheSameHash) {
   // eight runs, of the longest one until the ball has woken the block
   scene.steps = std::min(scene.steps, 165);
   const uint64_t one = scenes::run(scene, 1);
-  for (uint32_t threads = 2; threads <= 8; ++threads)
+#ifdef DEFORM_SANITIZED  // two numbers show a race as well as seven
+  const std::initializer_list<uint32_t> counts = {2, 8};
+#else
+  const std::initializer_list<uint32_t> counts = {2, 3, 4, 5, 6, 7, 8};
+#endif
+  for (const uint32_t threads : counts)
     EXPECT_EQ(scenes::run(scene, threads), one) << threads << " threads";
 }
 

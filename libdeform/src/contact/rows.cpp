@@ -270,30 +270,15 @@ void ContactRows::finish(std::span<const ContactPoint> contacts, const double *t
   }
 }
 
-Vec3 ContactRows::relative(uint32_t i, const double *of) const {
+Vec3 ContactRows::velocity(uint32_t i) const {
   Vec3 u;
-  for (uint32_t j = begin[i]; j < begin[i + 1]; ++j) u += weight[j] * load3(of + size_t(dof[j]) * 4);
+  for (uint32_t j = begin[i]; j < begin[i + 1]; ++j) u += weight[j] * load3(&y[size_t(dof[j]) * 4]);
   if (!rigid.empty() && rigid[i] != kNone) {
-    const double *const v = of + size_t(rigid[i]) * 4;
+    const double *const v = &y[size_t(rigid[i]) * 4];
     u -= load3(v) + dfm::cross(load3(v + 4), load3(&arm[size_t(3) * i]));
   }
   const double *const f = &frame[size_t(i) * 9];
-  return {dot(load3(f), u), dot(load3(f + 3), u), dot(load3(f + 6), u)};
-}
-
-Vec3 ContactRows::velocity(uint32_t i) const { return relative(i, y.data()) - load3(&drive[size_t(i) * 3]); }
-
-void ContactRows::spread(uint32_t i, Vec3 q, double *to) const {
-  const double *const f = &frame[size_t(i) * 9];
-  const Vec3 p = q.x * load3(f) + q.y * load3(f + 3) + q.z * load3(f + 6);
-  for (uint32_t j = begin[i]; j < begin[i + 1]; ++j) {
-    double *const at = to + size_t(dof[j]) * 4;
-    store3(at, load3(at) + weight[j] * p);
-  }
-  if (rigid.empty() || rigid[i] == kNone) return;
-  double *const at = to + size_t(rigid[i]) * 4;
-  store3(at, load3(at) - p);
-  store3(at + 4, load3(at + 4) - dfm::cross(load3(&arm[size_t(3) * i]), p));
+  return Vec3{dot(load3(f), u), dot(load3(f + 3), u), dot(load3(f + 6), u)} - load3(&drive[size_t(i) * 3]);
 }
 
 void ContactRows::response_apply(const Block &b, uint32_t d, Vec3 p) {

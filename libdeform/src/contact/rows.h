@@ -86,10 +86,7 @@ struct ContactRows {
   void finish(std::span<const ContactPoint> contacts, const double *tangents, double h, double planned,
               double offset);
 
-  Vec3 velocity(uint32_t i) const;  // relative velocity of contact i in its frame (normal, t1, t2)
-  Vec3 relative(uint32_t i, const double *of) const;  // the same of any [ndof,4], without the drive
-  // The transpose: adds an impulse, given in the frame, to the dofs of contact i in `to`, [ndof,4] N s.
-  void spread(uint32_t i, Vec3 impulse_frame, double *to) const;
+  Vec3 velocity(uint32_t i) const;             // relative velocity of contact i in its frame (normal, t1, t2)
   void apply(uint32_t i, Vec3 impulse_frame);  // changes y by an impulse given in the frame
   // y from the impulses alone: sweeps have left it not finite, or with their rounding
   void restore();

@@ -3,10 +3,71 @@
 #include <algorithm>
 #include <limits>
 
-#include "contact/linear_law.h"
-
 namespace dfm {
 namespace {
+
+struct Pair { double a, b; };
+
+// Friction impulse that the linearized law wants, given the contact's present impulse (l1, l2), slip (u1, u2)
+// and new normal impulse.
+//
+// Set-valued laws: lambda* = lambda - u / w_t would stop the slip. Inside the disc it is taken (stick);
+// outside the contact slides along lambda* on a disc whose radius grows with the slip speed s by the law's
+// slope c = -v^ . (dft/dv) v^ >= 0 (viscous part):
+//     radius(s) = R + h c (s - s0),  s = w_t (|lambda*| - radius(s))
+//     =>   s = w_t (|lambda*| - R + h c s0) / (1 + w_t h c).
+// The radius follows the normal impulse: in proportion while it sticks, by the law's dft/dfn while it slips
+// (its viscous part does not).
+//
+// Smooth laws: lambda = h [ft + D (u' - v) + d (fn' - fn)] with u' = u + w_t (lambda - lambda_old): a 2x2
+// system, positive definite
+// because only the negative semidefinite part of D is used. The law's limit is kept: an elastic bristle that
+// breaks away then slides on the cone at once instead of overshooting it. A contact that stuck when its law
+// was asked is kept inside the limit in proportion to the normal impulse. One that slid is kept inside what
+// the limit can be at all: limit(fn) is concave (a cone and a bounded part), so never above limit max(1, ln /
+// (h fn)). Without that the sweeps can run away. Where fn is small dft_dfn is steep, by mu^2 sigma1/(4 sigma0
+// h) with micro-damping, and holds for a hair's breadth alone; each sweep then answers a normal impulse with
+// several times as much friction, that with a normal impulse beside it, and so on until nothing is finite.
+Pair friction_impulse(const ContactRows &rows, const ContactState &s, uint32_t i, double h, double ln,
+                      double u1, double u2) {
+  const double wt = rows.wt[i], l1 = rows.impulse[size_t(i) * 3 + 1], l2 = rows.impulse[size_t(i) * 3 + 2];
+  const uint32_t n = s.stride;
+  const double fn = s.fn[i];
+  if (s.set_valued[i]) {
+    const double ratio = fn > 0 ? ln / (h * fn) : 0;
+    const double a = l1 - u1 / wt, b = l2 - u2 / wt, size = std::sqrt(a * a + b * b);
+    double radius = h * s.limit[i] * ratio;
+    if (s.mode[i] == 2) {
+      const double growth = std::sqrt(s.dft_dfn[i] * s.dft_dfn[i] + s.dft_dfn[n + i] * s.dft_dfn[n + i]);
+      radius = std::max(0.0, h * s.limit[i] + growth * (ln - h * fn));
+      const double v1 = s.vt[i], v2 = s.vt[n + i], speed = std::sqrt(v1 * v1 + v2 * v2);
+      double slope = 0;
+      if (speed > 0) {
+        const double e1 = v1 / speed, e2 = v2 / speed;
+        slope = std::max(0.0, -(e1 * (s.dft_dvt[i] * e1 + s.dft_dvt[n + i] * e2) +
+                                e2 * (s.dft_dvt[2 * n + i] * e1 + s.dft_dvt[3 * n + i] * e2)));
+      }
+      const double slip = std::max(0.0, wt * (size - radius + h * slope * speed) / (1 + wt * h * slope));
+      radius = std::max(0.0, radius + h * slope * (slip - speed));
+    }
+    if (size <= radius) return {a, b};
+    return {radius / size * a, radius / size * b};
+  }
+  const auto [d11, d12, d22] = dissipative_slope(s, i);
+  const double dfn = ln / h - fn;
+  const double v1 = u1 - wt * l1 - s.vt[i], v2 = u2 - wt * l2 - s.vt[n + i];
+  const double r1 = h * (s.ft[i] + d11 * v1 + d12 * v2 + s.dft_dfn[i] * dfn);
+  const double r2 = h * (s.ft[n + i] + d12 * v1 + d22 * v2 + s.dft_dfn[n + i] * dfn);
+  const double m11 = 1 - h * wt * d11;
+  const double m22 = 1 - h * wt * d22;
+  const double m12 = -h * wt * d12;
+  const double det = m11 * m22 - m12 * m12;
+  Pair l{(m22 * r1 - m12 * r2) / det, (m11 * r2 - m12 * r1) / det};
+  const double size = std::sqrt(l.a * l.a + l.b * l.b), radius = fn > 0 ? s.limit[i] / fn * ln : 0;
+  const double most = s.mode[i] == 1 ? radius : std::max(radius, h * s.limit[i]);
+  if (size > most) l = {most / size * l.a, most / size * l.b};
+  return l;
+}
 
 double normal_impulse(const ContactRows &rows, uint32_t i, double un) {
   return std::max(0.0, rows.impulse[size_t(i) * 3] - (un + rows.rate[i]) / rows.wn[i]);
@@ -46,11 +107,10 @@ void sweep(ContactRows &rows, const ContactState &law, double h) {
     const Vec3 u = rows.velocity(i);
     const double ln = normal_impulse(rows, i, u.x), d = ln - l[0];
     if (ln == 0 && l[0] == 0 && l[1] == 0 && l[2] == 0) continue;
-    Tangential t{0, 0};
+    Pair t{0, 0};
     if (ln > 0 && rows.wt[i] > 0)
-      t = friction_impulse(law, i, h, rows.wt[i], {l[1], l[2]},
-                           {u.y + rows.cross[2 * size_t(i)] * d, u.z + rows.cross[2 * size_t(i) + 1] * d},
-                           ln);
+      t = friction_impulse(rows, law, i, h, ln, u.y + rows.cross[2 * size_t(i)] * d,
+                           u.z + rows.cross[2 * size_t(i) + 1] * d);
     if (d == 0 && t.a == l[1] && t.b == l[2]) continue;
     rows.apply(i, {d, t.a - l[1], t.b - l[2]});
     l[0] = ln;
@@ -146,43 +206,41 @@ void Acceleration::follow(ContactRows &rows) {
 
 namespace {
 
-double normal_residual(const ContactRows &rows, Weights w, uint32_t i, Vec3 u) {
-  return std::fabs(std::min(w.n[i] * rows.impulse[size_t(i) * 3], u.x + rows.rate[i]));
+double normal_residual(const ContactRows &rows, uint32_t i, Vec3 u) {
+  return std::fabs(std::min(rows.wn[i] * rows.impulse[size_t(i) * 3], u.x + rows.rate[i]));
 }
 
-double tangent_residual(const ContactRows &rows, Weights w, uint32_t i, Tangential law) {
+double tangent_residual(const ContactRows &rows, uint32_t i, Pair law) {
   const double a = law.a - rows.impulse[size_t(i) * 3 + 1], b = law.b - rows.impulse[size_t(i) * 3 + 2];
-  return w.t[i] * std::sqrt(a * a + b * b);
+  return rows.wt[i] * std::sqrt(a * a + b * b);
 }
 
 // What the laws, asked at the present state, want contact i to carry. They are compared by the answer they
 // give together with the contact's own response, not by the bare force: the difference is then the velocity
 // that is left to correct. Where a set-valued law just slips, force and slip may differ in direction by much
 // while that is tiny; a smooth law with a steep slope c would count it 1 + h w_t c times.
-Tangential answered(const ContactRows &rows, Weights w, const ContactState &s, uint32_t i, double h, Vec3 u) {
-  const double *const l = &rows.impulse[size_t(i) * 3];
-  return friction_impulse(s, i, h, w.t[i], {l[1], l[2]}, {u.y, u.z}, l[0]);
+Pair answered(const ContactRows &rows, const ContactState &s, uint32_t i, double h, Vec3 u) {
+  return friction_impulse(rows, s, i, h, rows.impulse[size_t(i) * 3], u.y, u.z);
 }
 
-}  // namespace
-
-// law: linearized earlier, or asked at this state
-Residual weighted_residual(const ContactRows &rows, Weights w, const ContactState &law, double h,
-                           const Tolerance &tolerance) {
+// law(i, u) gives the friction impulse that contact i should carry.
+template <class Law>
+Residual residual(const ContactRows &rows, const Tolerance &tolerance, Law law) {
   Residual r;
   double poison = 0;
   for (uint32_t i = 0; i < rows.n; ++i) {
     if (!(rows.wn[i] > 0)) continue;
     const double *const l = &rows.impulse[size_t(i) * 3];
     const Vec3 u = rows.velocity(i);
-    const double normal = normal_residual(rows, w, i, u);
+    const double normal = normal_residual(rows, i, u);
     poison += 0.0 * ((u.x + u.y) + (u.z + l[0]));
     r.relative = std::max(r.relative, normal / tolerance.normal[i]);
     r.due = std::max(r.due, normal / tolerance.most_normal);
     r.speed = std::max(r.speed, normal);
     r.normal = std::max(r.normal, normal);
     if (!(rows.wt[i] > 0) || !(l[0] > 0)) continue;
-    const double tangent = tangent_residual(rows, w, i, answered(rows, w, law, i, h, u));
+    const Pair t = law(i, u);
+    const double tangent = tangent_residual(rows, i, t);
     const double allowed = std::max(tolerance.tangent[i], 1e-3 * std::sqrt(u.y * u.y + u.z * u.z));
     r.relative = std::max(r.relative, tangent / allowed);
     r.due = std::max(r.due, tangent / allowed);
@@ -193,17 +251,21 @@ Residual weighted_residual(const ContactRows &rows, Weights w, const ContactStat
   return r;
 }
 
+}  // namespace
+
 Residual inner_residual(const ContactRows &rows, const ContactState &law, double h,
                         const Tolerance &tolerance) {
-  return weighted_residual(rows, own_weights(rows), law, h, tolerance);
+  return residual(rows, tolerance, [&](uint32_t i, Vec3 u) {
+    return friction_impulse(rows, law, i, h, rows.impulse[size_t(i) * 3], u.y, u.z);
+  });
 }
 
 Residual true_residual(const ContactRows &rows, const ContactState &answer, double h,
                        const Tolerance &tolerance) {
-  return weighted_residual(rows, own_weights(rows), answer, h, tolerance);
+  return residual(rows, tolerance, [&](uint32_t i, Vec3 u) { return answered(rows, answer, i, h, u); });
 }
 
-void set_tolerance(const ContactRows &rows, Weights w, const ContactState &answer,
+void set_tolerance(const ContactRows &rows, const ContactState &answer,
                    std::span<const ContactPoint> contacts, double h, const ToleranceBounds &bounds,
                    uint32_t bodies, Array<double> &disturbance, Tolerance &tolerance) {
   disturbance.assign(2 * size_t{bodies}, 0.0);
@@ -215,8 +277,8 @@ void set_tolerance(const ContactRows &rows, Weights w, const ContactState &answe
     if (!(rows.wn[i] > 0)) continue;
     const Vec3 u = rows.velocity(i);
     const bool rubs = rows.wt[i] > 0 && (rows.impulse[size_t(i) * 3] > 0 || answer.fn[i] > 0);
-    const double normal = normal_residual(rows, w, i, u);
-    const double tangent = rubs ? tangent_residual(rows, w, i, answered(rows, w, answer, i, h, u)) : 0;
+    const double normal = normal_residual(rows, i, u);
+    const double tangent = rubs ? tangent_residual(rows, i, answered(rows, answer, i, h, u)) : 0;
     visit(i, [&](double *d) {
       d[0] = std::max(d[0], tangent);
       d[1] = std::max({d[1], tangent, normal});

@@ -57,25 +57,19 @@ struct ToleranceBounds { double tangent, normal, most_normal; };  // m/s: at res
 // `due` is the same with most_normal for normal[i]: what must be reached, where the rest may be left to the
 // next sub-step's warm start. `normal` is the worst r_n alone, m/s.
 struct Residual { double relative = 0, due = 0, speed = 0, normal = 0; };
-// 1/kg by contact, what weighs impulses against velocities: the rows' w_n and w_t, or any other positive
-// ones.
-struct Weights { const double *n, *t; };
-inline Weights own_weights(const ContactRows &rows) { return {rows.wn.data(), rows.wt.data()}; }
 // of the linearized laws
 Residual inner_residual(const ContactRows &rows, const ContactState &law, double h,
                         const Tolerance &tolerance);
 // laws asked at this state
 Residual true_residual(const ContactRows &rows, const ContactState &answer, double h,
                        const Tolerance &tolerance);
-Residual weighted_residual(const ContactRows &rows, Weights w, const ContactState &law, double h,
-                           const Tolerance &tolerance);
 
 // tangent[i] = max(bounds.tangent, 1e-2 d), d: the largest r_t that the warm start leaves at any contact of
 // the two bodies. A contact at rest is warm started at its solution, so d vanishes and the bound at rest
 // rules; while bodies shake, a hundredth of what the sub-step changes is enough, and what is left is part of
 // the next sub-step's d. normal[i] = max(bounds.normal, 2e-2 d), d the largest of all r_n and r_t, up to
 // most_normal. disturbance: scratch, two entries per body slot.
-void set_tolerance(const ContactRows &rows, Weights w, const ContactState &answer,
+void set_tolerance(const ContactRows &rows, const ContactState &answer,
                    std::span<const ContactPoint> contacts, double h, const ToleranceBounds &bounds,
                    uint32_t bodies, Array<double> &disturbance, Tolerance &tolerance);
 

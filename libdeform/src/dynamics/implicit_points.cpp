@@ -15,6 +15,8 @@ namespace {
 constexpr double kShare = 1e-3, kRest = 1e-8;
 // A correction that does not halve the one before needs a new matrix.
 constexpr double kContracts = 0.5;
+// The rest state's factor may fail to do so that often in a sub-step.
+constexpr uint32_t kPatience = 4;
 // Corrections of one solve at most, what may be left of `allowed_error` then, and how far above the least
 // correction one may lie before the iteration counts as lost.
 constexpr uint32_t kRevisions = 20;
@@ -33,7 +35,11 @@ double largest(const Array<double> &a) {
 
 ImplicitPoints::ImplicitPoints(const Memory &memory, Phyxels &points, Surface &surface, ModelInstance &model,
                                const ImplicitOptions &options)
-    : Dynamics(points, surface, model), options_(options), stiffness_(memory), ways_(memory) {
+    : Dynamics(points, surface, model),
+      options_(options),
+      stiffness_(memory),
+      memory_(memory),
+      ways_(memory) {
   use_memory(memory, x_, v_, before_, residual_, push_, change_, springs_, dampers_, scale_, weight_, held_,
              column_, points_, between_);
   x_.assign(size_t{kStride} * points.n, 0.0);
@@ -42,10 +48,18 @@ ImplicitPoints::ImplicitPoints(const Memory &memory, Phyxels &points, Surface &s
     a->assign(size_t{3} * points.n, 0.0);
   held_.assign(points.n, 0);
   stiffness_.create(model, points.n);
-  solver_ =
-      make_solver({options_.solver.c_str(), points.n, stiffness_.constant(), options_.solver_iterations},
-                  *static_cast<const dfm_context *>(model.host->ctx), memory, options_.tasks);
-  solver_->analyse(stiffness_.pattern());
+  std::unique_ptr<LinearSolver> solver = new_solver();
+  if (solver->direct() && (options_.newton > 1 || stiffness_.constant()))
+    rest_ = std::make_unique<RestFactor>(memory, points, model, stiffness_, std::move(solver));
+  else exact_ = std::move(solver);
+}
+
+std::unique_ptr<LinearSolver> ImplicitPoints::new_solver() const {
+  std::unique_ptr<LinearSolver> solver =
+      make_solver({options_.solver.c_str(), p_.n, stiffness_.constant(), options_.solver_iterations},
+                  *static_cast<const dfm_context *>(model_.host->ctx), memory_, options_.tasks);
+  solver->analyse(stiffness_.pattern());
+  return solver;
 }
 
 // The scheme is stable at any step. Springs of loads act with what they are at the start of the sub-step.
@@ -87,11 +101,24 @@ bool ImplicitPoints::residual_at(const SubStep &now, const double *v, const doub
   return poison == 0;
 }
 
+// The rest state's factor in place of A, turned to where forces were asked last. False: there is none.
+bool ImplicitPoints::take_rest(const SubStep &now) {
+  by_rest_ = rest_ && rest_->prepare(now.h);
+  if (!by_rest_) return false;
+  rest_->turn(x_.data());
+  slow_ = 0;
+  weight_ = rest_->diagonal();
+  for (size_t k = 0; k < scale_.size(); ++k) scale_[k] = weight_[k] > 0 ? 1 / weight_[k] : 0;
+  return true;
+}
+
 // A at the state where forces were asked last.
 bool ImplicitPoints::linearize(const SubStep &now) {
   const bool known = stiffness_.constant() && factor_h_ == now.h && held_ == p_.held;
   if (known) return true;
   factor_h_ = 0;
+  by_rest_ = false;
+  if (!exact_) exact_ = new_solver();
   dfm_kin k = kin(now.time + now.h, now.h);
   k.x = x_.data();
   k.v = v_.data();
@@ -107,18 +134,38 @@ bool ImplicitPoints::linearize(const SubStep &now) {
   });
   Array<double> &blocks = stiffness_.blocks();
   hold_components(stiffness_.pattern(), p_.held.data(), blocks.data());
-  solver_->place(x_.data(), kStride);
-  if (!solver_->factor(blocks.data())) return false;
+  exact_->place(x_.data(), kStride);
+  if (!exact_->factor(blocks.data())) return false;
   factor_h_ = now.h;
   held_ = p_.held;
   return true;
 }
 
 bool ImplicitPoints::solve(const Array<double> &b, Array<double> &x) {
+  if (by_rest_) return rest_->solve(b.data(), x.data());
   SolveInfo info;
   std::fill(x.begin(), x.end(), 0.0);
-  return solver_->solve(1, b.data(), x.data(), options_.tolerance, info);
+  return exact_->solve(1, b.data(), x.data(), options_.tolerance, info);
 }
+
+// What A^-1 says between points; held components answer nothing.
+bool ImplicitPoints::restricted(uint32_t count, const uint32_t *points, double *w) {
+  SolveInfo info;
+  if (by_rest_ ? !rest_->restricted(count, points, w)
+               : !exact_->restricted(count, points, options_.tolerance, w, info))
+    return false;
+  const size_t wide = size_t{3} * count;
+  for (uint32_t k = 0; k < count; ++k)
+    for (size_t c = 0; c < 3; ++c) {
+      if (p_.moves(size_t{kStride} * points[k] + c)) continue;
+      const size_t at = size_t{3} * k + c;
+      for (size_t other = 0; other < wide; ++other) w[at * wide + other] = w[other * wide + at] = 0;
+    }
+  return true;
+}
+
+// Whether the rest state's factor serves on, where it left that share of what there was.
+bool ImplicitPoints::patient(double left) { return by_rest_ && (left <= kContracts || ++slow_ <= kPatience); }
 
 double ImplicitPoints::allowed_error(const Array<double> &v) const {
   double most = 0;
@@ -137,8 +184,9 @@ bool ImplicitPoints::search(const SubStep &now, Array<double> &v) {
       });
 }
 
-// Newton's method. A factorization costs many solves, so one serves while the residual falls well; the
-// combination of the ways it leads to makes good what the matrix is not.
+// Newton's method. A factorization costs many solves, so that of the rest state serves while the residual
+// falls well, then one of A itself; the combination of the ways it leads to makes good what the matrix is
+// not.
 bool ImplicitPoints::free_motion(const SubStep &now, double &kinetic) {
   Array<double> &v = p_.v_free;
   v = p_.v;
@@ -146,7 +194,9 @@ bool ImplicitPoints::free_motion(const SubStep &now, double &kinetic) {
   least_error_ = HUGE_VAL;
   revisions_ = 0;
   if (!residual_at(now, v.data(), nullptr)) return false;
-  bool fresh = true;
+  ended_ = false;
+  ways_.start(change_.size());
+  bool fresh = !take_rest(now);
   for (uint32_t k = 0; k < options_.newton; ++k) {
     if (fresh) {
       if (!linearize(now)) return false;
@@ -159,7 +209,7 @@ bool ImplicitPoints::free_motion(const SubStep &now, double &kinetic) {
     if (stiffness_.constant()) break;
     const double left = before > 0 ? std::sqrt(scaled_square(residual_) / before) : 0;
     if (step * std::min(1.0, left) <= allowed_error(v)) break;
-    fresh = !solver_->direct() || left > kContracts;
+    fresh = by_rest_ ? !patient(left) : !exact_->direct() || left > kContracts;
   }
   kinetic = 0;
   bool good = true;
@@ -208,10 +258,9 @@ bool ImplicitPoints::response(const SubStep &, uint32_t n, const uint32_t *surfe
       points_.push_back(p);
     });
   const uint32_t m = static_cast<uint32_t>(points_.size());
-  SolveInfo info;
-  if (surface_.identity()) return solver_->restricted(m, points_.data(), options_.tolerance, matrix, info);
+  if (surface_.identity()) return restricted(m, points_.data(), matrix);
   between_.resize(size_t{9} * m * m);
-  if (!solver_->restricted(m, points_.data(), options_.tolerance, between_.data(), info)) return false;
+  if (!restricted(m, points_.data(), between_.data())) return false;
   std::fill_n(matrix, size_t{9} * n * n, 0.0);
   for (uint32_t s = 0; s < n; ++s)
     for (uint32_t t = 0; t < n; ++t)
@@ -228,27 +277,30 @@ bool ImplicitPoints::response(const SubStep &, uint32_t n, const uint32_t *surfe
 
 // v_end = v_free + A^-1 push.
 bool ImplicitPoints::linear_end(const double *surfel_impulse) {
-  p_.v_end = p_.v_free;
-  std::fill(push_.begin(), push_.end(), 0.0);
-  if (!surfel_impulse) return true;
-  for (uint32_t s = 0; s < surface_.nsurfel; ++s) {
+  std::fill(change_.begin(), change_.end(), 0.0);
+  for (uint32_t s = 0; surfel_impulse && s < surface_.nsurfel; ++s) {
     const Vec3 q = load3(&surfel_impulse[3 * size_t{s}]);
     if (q.x == 0 && q.y == 0 && q.z == 0) continue;
     surface_.each_phyxel(s, [&](uint32_t p, double w) {
       for (uint32_t c = 0; c < 3; ++c)
-        if (p_.moves(size_t{kStride} * p + c)) push_[size_t{3} * p + c] += w * q[int(c)];
+        if (p_.moves(size_t{kStride} * p + c)) change_[size_t{3} * p + c] += w * q[int(c)];
     });
   }
-  if (!solve(push_, change_)) return false;
-  for (uint32_t i = 0; i < p_.n; ++i)
-    for (uint32_t c = 0; c < 3; ++c) p_.v_end[size_t{kStride} * i + c] += change_[size_t{3} * i + c];
-  return true;
+  if (ended_ && change_ == push_) return true;
+  push_.swap(change_);
+  p_.v_end = p_.v_free;
+  if (surfel_impulse) {
+    if (!solve(push_, change_)) return false;
+    add(p_.v_end, 1);
+  }
+  return ended_ = true;
 }
 
 Revision ImplicitPoints::revise(const SubStep &now, const double *surfel_impulse) {
   if (!abilities().revises) return Revision::none;
   const double before = error_;
   before_.swap(p_.v_end);
+  ended_ = false;
   if (!linear_end(surfel_impulse)) return Revision::failed;
   const bool known = residual_at(now, p_.v_end.data(), push_.data());
   if (known && !solve_way(residual_)) return Revision::failed;
@@ -262,7 +314,9 @@ Revision ImplicitPoints::revise(const SubStep &now, const double *surfel_impulse
   least_error_ = std::min(least_error_, error_);
   // The first correction is tried with the matrix at hand, and so is each that halves the one before.
   Array<double> &v = p_.v_free;
-  if (before == 0 || error_ <= kContracts * before) {
+  ended_ = false;
+  if (before == 0 || error_ <= kContracts * before ||
+      (error_ <= kDiverges * before && patient(error_ / before))) {
     if (before == 0) ways_.start(change_.size());
     accelerate(v);
     add(v, 1);

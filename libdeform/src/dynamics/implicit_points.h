@@ -3,16 +3,18 @@
 //   r(v) = M (v - v0) - h (f(x0 + h v, v) + loads + M g) = p        p: contact impulses at the points, N s
 //   A    = dr/dv = M - h df/dv - h^2 df/dx
 //
-// free_motion() solves r(v) = 0 by Newton's method with a line search and keeps A as it was last. Contact
-// sees A^-1, never M^-1: a prediction with A and contact with M^-1 leaves bodies at rest by h^2 p / m per
-// point where they should not be. revise() asks the true residual of the state that contact has found and
-// goes on from there, so that forces, contact and friction hold at one state, the end of the sub-step. Every
-// linear solve keeps linear momentum to its own tolerance, for the forces of a model and the rows of its
-// stiffness sum to zero. Source: Baraff and Witkin 1998, Large steps in cloth simulation, section 3.
+// free_motion() solves r(v) = 0 by Newton's method with a line search, with the rest state's factor in place
+// of A (rest_factor.h) or with A as it was last. Contact sees A^-1, never M^-1: a prediction with A and
+// contact with M^-1 leaves bodies at rest by h^2 p / m per point where they should not be. revise() asks the
+// true residual of the state that contact has found and goes on from there, so that forces and contacts
+// hold at one state, the end of the sub-step. Every linear solve keeps linear momentum to its own tolerance:
+// the forces of a model and the rows of its stiffness sum to zero, and the rest state's factor has the rigid
+// motions apart. Source: Baraff and Witkin 1998, Large steps in cloth simulation, section 3.
 #pragma once
 #include <memory>
 
 #include "dynamics/dynamics.h"
+#include "dynamics/rest_factor.h"
 #include "dynamics/stiffness.h"
 #include "math/anderson.h"
 #include "math/linear_solver.h"
@@ -30,7 +32,7 @@ class ImplicitPoints : public Dynamics {
             .revises = options_.newton > 1 && !stiffness_.constant(),
             .accurate = true};
   }
-  uint32_t relative_work() const override { return 50; }  // 20 at 700 points, 110 at 2,600
+  uint32_t relative_work() const override { return 50; }  // 30 at 700 points, 60 at 4,300
   bool bound(double time, const AddRowSums &outside, StepBound &out) override;
   bool free_motion(const SubStep &now, double &kinetic) override;
   const double *point_velocity() const override { return p_.v_free.data(); }
@@ -45,7 +47,11 @@ class ImplicitPoints : public Dynamics {
  private:
   ImplicitOptions options_;
   ModelStiffness stiffness_;
-  std::unique_ptr<LinearSolver> solver_;
+  Memory memory_;
+  std::unique_ptr<RestFactor> rest_;     // null: where the solver is not direct, or one solve has to do
+  std::unique_ptr<LinearSolver> exact_;  // of A itself; null until it is wanted
+  bool by_rest_ = false;                 // which of the two stands for A
+  uint32_t slow_ = 0;                    // iterations with rest_ that did not halve what was left
   Anderson ways_;
   Array<double> x_, v_;              // [npoint,4] m, m/s: where forces are asked
   Array<double> before_;             // [npoint,4] m/s, the end before the last revision
@@ -60,11 +66,16 @@ class ImplicitPoints : public Dynamics {
   double error_ = 0;                 // m/s, the correction that the last revision found; 0: none yet
   double least_error_ = 0;           // m/s, of all revisions in the sub-step
   uint32_t revisions_ = 0;           // since one found nothing to change
+  bool ended_ = false;               // v_end is v_free and what push_ makes of it
 
+  std::unique_ptr<LinearSolver> new_solver() const;
   bool ask(const SubStep &now, const double *v, bool commits);
   bool residual_at(const SubStep &now, const double *v, const double *push);
+  bool take_rest(const SubStep &now);
   bool linearize(const SubStep &now);
+  bool patient(double left);
   bool solve(const Array<double> &b, Array<double> &x);
+  bool restricted(uint32_t count, const uint32_t *points, double *w);
   bool solve_way(const Array<double> &r);
   void accelerate(const Array<double> &v);
   void add(Array<double> &v, double share) const;

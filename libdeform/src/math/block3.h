@@ -9,6 +9,11 @@ inline Vec3 times3(const double *m, Vec3 a) {
           m[6] * a.x + m[7] * a.y + m[8] * a.z};
 }
 
+inline double determinant3(const double *m) {
+  return m[0] * (m[4] * m[8] - m[5] * m[7]) + m[1] * (m[5] * m[6] - m[3] * m[8]) +
+         m[2] * (m[3] * m[7] - m[4] * m[6]);
+}
+
 inline void inverse3(const double *m, double *out) {
   const double a = m[4] * m[8] - m[5] * m[7], b = m[5] * m[6] - m[3] * m[8], c = m[3] * m[7] - m[4] * m[6];
   const double det = m[0] * a + m[1] * b + m[2] * c;

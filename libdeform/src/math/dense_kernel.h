@@ -32,7 +32,7 @@ struct DenseKernels {
                       double *y, double *scratch);
   void (*backward_one)(uint32_t width, uint32_t below, const double *l, const uint32_t *rows, double *x,
                        const double *y, double *scratch);
-  // sum[kLanes, kLanes] += left^T right, both [n, kLanes]; the transposed sum is that of (right, left), bit by
+  // sum[kLanes, kLanes] += left^T right, both [n, kLanes]; the transposed sum is that of (right, left) to the
   // bit
   void (*gram)(uint32_t n, const double *left, const double *right, double *sum);
 };

@@ -53,11 +53,11 @@ class LdltSolver final : public LinearSolver {
 
   // What restricted() has found of the present factor: Y = D^-1/2 L^-1 P S^T of the points that it was asked
   // for, and Y^T Y. Columns stand in panels of kLanes; every call that knows new points begins a panel.
-  uint32_t known_ = 0;          // points
-  Array<uint32_t> row_;         // [columns] row of Y^T's unit vector in the order of elimination; kNone: empty
-  Array<uint32_t> column_;      // [n] first column of a point, kNone
-  Array<uint32_t> fresh_;       // scratch: points that are not known yet
-  Array<double> root_;          // 1/sqrt(D)
+  uint32_t known_ = 0;      // points
+  Array<uint32_t> row_;     // [columns] row of Y^T's unit vector in the order of elimination; kNone: empty
+  Array<uint32_t> column_;  // [n] first column of a point, kNone
+  Array<uint32_t> fresh_;   // scratch: points that are not known yet
+  Array<double> root_;      // 1/sqrt(D)
   Array<uint32_t> reach_begin_, reach_;  // supernodes that a panel reaches
   Array<size_t> reached_begin_;
   Array<double> reached_;  // Y by panels, rows of the reached supernodes only

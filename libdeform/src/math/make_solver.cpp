@@ -9,14 +9,14 @@ namespace dfm {
 
 namespace {
 
-// Points up to which a factorization in every step is worth its price: doc/reference/solvers.md
-constexpr uint32_t kFactorEveryStep = 3000;
+// Points up to which a factor that serves many steps is worth its time and memory: doc/reference/solvers.md
+constexpr uint32_t kFactored = 20000;
 
 }  // namespace
 
 const char *solver_name(const SolverChoice &choice) {
   if (std::strcmp(choice.name, "auto") != 0) return choice.name;
-  return choice.constant || choice.points <= kFactorEveryStep ? "ldlt" : "pcg";
+  return choice.constant || choice.points <= kFactored ? "ldlt" : "pcg";
 }
 
 std::unique_ptr<LinearSolver> own_solver(const SolverChoice &choice, const Memory &memory, Tasks *tasks) {

@@ -124,6 +124,13 @@ std::vector<double> read_param(const Node &value, const dfm_param &p) {
   return out;
 }
 
+uint32_t read_count(const Node &node, double least, double most) {
+  const double n = node.number();
+  if (!(n >= least && n <= most) || n != std::floor(n))
+    node.fail("expected a whole number from %.0f to %.0f, found %g", least, most, n);
+  return uint32_t(n);
+}
+
 Params read_params(const Node &params, const dfm_type *type) {
   Params out;
   if (!params.value().is_object()) params.fail("expected an object of parameters by key");

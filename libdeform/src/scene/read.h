@@ -13,6 +13,7 @@ struct ReadContext {
 Definition read_scene(json &tree, const std::string &file, const Types &types);
 
 // Parts that more than one file needs.
+uint32_t read_count(const Node &node, double least, double most);  // a whole number
 Params read_params(const Node &params, const dfm_type *type);
 std::vector<double> read_param(const Node &value, const dfm_param &row);
 const dfm_type *read_type(const Node &name, uint32_t kind, const Types &types);

@@ -162,13 +162,6 @@ Spring read_spring(const Node &entry) {
 
 constexpr double kLargestSeed = 4294967295.0;
 
-uint32_t read_count(const Node &node, double least, double most) {
-  const double n = node.number();
-  if (!(n >= least && n <= most) || n != std::floor(n))
-    node.fail("expected a whole number from %.0f to %.0f, found %g", least, most, n);
-  return uint32_t(n);
-}
-
 // {"make": "cylinder", "radius", "length", "cells"} and so on, with the keys of that shape and no others.
 MadeMesh read_made(const Node &node) {
   MadeMesh made;

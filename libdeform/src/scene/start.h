@@ -1,5 +1,4 @@
-// The state that a body begins in where that is not its rest state: scrambled, flattened, inside out, or the
-// one that a run has written.
+// The state that a body begins in where that is not its rest state: scrambled, flattened or inside out.
 #pragma once
 #include "scene/defs.h"
 #include "scene/select.h"

@@ -170,7 +170,7 @@ const LawInstance *solve_rows(World &w, StepContext &step) {
     }
     if (const LawInstance *bad = step.batches.slopes(step.h, step.state)) return bad;
     if (!step.sweeps)
-      set_tolerance(step.rows, own_weights(step.rows), step.state, step.contacts, step.h, bounds,
+      set_tolerance(step.rows, step.state, step.contacts, step.h, bounds,
                     static_cast<uint32_t>(w.bodies.size()), step.disturbance, step.tolerance);
     // at least one sweep on a warm start is part of the method
     sweep_until_good(w, step, step.acceleration, step.tolerance);

@@ -319,4 +319,25 @@ TEST(SolverChoice, AutomaticChoice_FactorsSmallAndConstantMatrices) {
   EXPECT_EQ(dfm::own_solver({"lu", 1, false, 0}, dfm::Memory::standard(), nullptr), nullptr);
 }
 
+// What is kept between calls must not show: a world that was restored asks for other points first.
+TEST(Ldlt, ResponseOfPoints_IsTheSameBitsWhateverWasAskedBefore) {
+  const Grid g = grid(6, 5, 4, 0.05);
+  dfm::LdltSolver kept(dfm::Memory::standard()), fresh(dfm::Memory::standard());
+  for (dfm::LdltSolver *solver : {&kept, &fresh}) {
+    solver->analyse(g.pattern());
+    ASSERT_TRUE(solver->factor(g.blk.data()));
+  }
+  dfm::SolveInfo info;
+  const auto asked = [&](dfm::LdltSolver &solver, const std::vector<uint32_t> &points) {
+    std::vector<double> w(9 * points.size() * points.size());
+    EXPECT_TRUE(solver.restricted(uint32_t(points.size()), points.data(), 0, w.data(), info));
+    return w;
+  };
+  const std::vector<uint32_t> wanted = {40, 7, 93, 12, 55};
+  for (const std::vector<uint32_t> &before :
+       {std::vector<uint32_t>{93}, {7, 100, 3}, {60, 61, 62, 63, 40, 12, 0, 1, 2, 119}})
+    asked(kept, before);
+  EXPECT_EQ(asked(kept, wanted), asked(fresh, wanted));
+}
+
 }  // namespace
