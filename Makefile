@@ -13,7 +13,7 @@ help:
 	@echo "make demo             two soft cylinders with and without friction: table, picture, out/demo/"
 	@echo "make test             the whole test suite"
 	@echo "make bench            the figures: kernels and full steps"
-	@echo "make soak             the stability suite, what holds and creeps: hours; goes on where stopped"
+	@echo "make soak             all jittered starts, the stability suite, what holds: hours; can be stopped"
 	@echo "make lint             layout, includes, headers, text"
 	@echo "make format           clang-format on all C and C++ files, one version everywhere"
 	@echo "make tidy             clang-tidy on the library, where it is installed"
@@ -61,7 +61,9 @@ bench: setup-bench build/bench/build.ninja
 	$(BUILD) bench --target run_bench
 
 # Rows that are in the table already are not run again.
-soak: setup-bench build/bench/build.ninja
+soak: setup-bench build/bench/build.ninja build/release/build.ninja
+	$(BUILD) release
+	DEFORM_SOAK=1 nice -n 19 ctest --preset release -j $(JOBS) -L stability -R Jittered
 	$(BUILD) bench --target hold_soak suite_soak
 	nice -n 19 build/bench/bin/suite_soak tests/bench/results/suite_soak.csv
 	nice -n 19 build/bench/bin/hold_soak tests/bench/results/hold_soak.csv

@@ -37,18 +37,6 @@ TEST(PressedRing, WithoutTheEffect_Crosses) {
   EXPECT_EQ(run.number("intersections_max"), run.number("intersections_self_max"));
 }
 
-TEST(PressedRing, JitteredRuns1To2_DoNotCross) {
-  test::expect_jittered("pressed_ring", 1, 2, kPressed, 20, walls_meet);
-}
-TEST(PressedRing, JitteredRuns3To4_DoNotCross) {
-  test::expect_jittered("pressed_ring", 3, 4, kPressed, 20, walls_meet);
-}
-TEST(PressedRing, JitteredRuns5To6_DoNotCross) {
-  test::expect_jittered("pressed_ring", 5, 6, kPressed, 20, walls_meet);
-}
-TEST(PressedRing, JitteredRuns7To8_DoNotCross) {
-  test::expect_jittered("pressed_ring", 7, 8, kPressed, 20, walls_meet);
-}
-TEST(PressedRing, JitteredRuns9To10_DoNotCross) {
-  test::expect_jittered("pressed_ring", 9, 10, kPressed, 20, walls_meet);
+TEST(PressedRing, JitteredRuns_DoNotCross) {
+  test::expect_jittered("pressed_ring", 1, 10, kPressed, 20, walls_meet);
 }

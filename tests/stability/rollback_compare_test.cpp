@@ -44,7 +44,7 @@ TEST(RollbackCompare, Rollback_FailsEachOfThem) {
   EXPECT_LT(run.last("flying").velocity[0] + run.last("struck").velocity[0], 0) << "momentum has turned over";
 }
 
-TEST(RollbackCompare, TenJitteredRuns_MeetTheClosedForms) {
+TEST(RollbackCompare, JitteredRuns_MeetTheClosedForms) {
   test::expect_jittered("rollback_compare", 1, 10, {}, 15, [](const test::SceneRun &run) {
     return slides(run) && bounces(run) && collides(run);
   });

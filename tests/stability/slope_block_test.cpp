@@ -33,4 +33,4 @@ TEST(SlopeBlock, FrictionZeroPointFourNine_Slides) {
   EXPECT_NEAR(run.last("block").com[0], 0.5 * 0.0753 * 2.2 * 2.2, 0.03);
 }
 
-TEST(SlopeBlock, TenJitteredRuns_AllHold) { test::expect_jittered("slope_block", 1, 10, {}, 10, holds); }
+TEST(SlopeBlock, JitteredRuns_AllHold) { test::expect_jittered("slope_block", 1, 10, {}, 10, holds); }
