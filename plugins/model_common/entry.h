@@ -76,6 +76,74 @@ dfm_status create(const dfm_host *h, const dfm_mesh *m, const char *who, void **
   return status;
 }
 
+// Values for a living instance; body.apply_params(values) changes nothing where it throws.
+template <class Body>
+dfm_status change(Body &body, const double *values) {
+  try {
+    body.apply_params(values);
+  } catch (const Refused &) {
+    return DFM_E_ARG;
+  } catch (...) {
+    return DFM_E_NOMEM;
+  }
+  return DFM_OK;
+}
+
+// Ops and extensions as calls of the Body. Its lacks_state(k) is true, and has said so, where the host gives
+// none that it needs; rows of its parameters are numbered by its Row.
+template <class Body>
+struct Ops {
+  template <class Use>
+  static dfm_status with_state(void *self, const dfm_kin *k, const Use &use) {
+    Body &body = *static_cast<Body *>(self);
+    if (body.lacks_state(*k)) return DFM_E_STATE;
+    use(body);
+    return DFM_OK;
+  }
+  static dfm_status add_forces(void *self, const dfm_kin *k, double *f) {
+    return with_state(self, k, [&](Body &body) { body.add_forces(*k, f); });
+  }
+  static dfm_status bound(void *self, const dfm_kin *k, double *ksum, double *csum, double *) {
+    return with_state(self, k, [&](Body &body) { body.bound(*k, ksum, csum); });
+  }
+  static dfm_status energy(void *self, const dfm_kin *k, double *joule) {
+    return with_state(self, k, [&](Body &body) { *joule = body.energy(*k); });
+  }
+  static dfm_status pattern(const void *self, uint32_t *nb, uint32_t *ij) {
+    const Body &body = *static_cast<const Body *>(self);
+    *nb = body.pairs();
+    if (ij) body.pattern(ij);
+    return DFM_OK;
+  }
+  static dfm_status stiffness(void *self, const dfm_kin *k, double a, double b, double *blk) {
+    return with_state(self, k, [&](Body &body) { body.add_stiffness(*k, a, b, blk); });
+  }
+  static dfm_status cell_energy(void *self, const dfm_kin *k, double *density) {
+    return with_state(self, k, [&](Body &body) { body.cell_energy(*k, density); });
+  }
+  static dfm_status cell_stress(void *self, const dfm_kin *k, double *stress) {
+    return with_state(self, k, [&](Body &body) { body.cell_stress(*k, stress); });
+  }
+  static const char *const *active_effects(const void *self) {
+    return static_cast<const Body *>(self)->active_effects;
+  }
+  static const char *idle(const void *self, uint32_t row) {
+    using Row = typename Body::Row;
+    return row < Row::kParamCount ? static_cast<const Body *>(self)->idle(Row(row)) : nullptr;
+  }
+  static constexpr dfm_cell_energy kCellEnergy = {sizeof(dfm_cell_energy), 0, cell_energy};
+  static constexpr dfm_cell_stress kCellStress = {sizeof(dfm_cell_stress), 0, cell_stress};
+  static constexpr dfm_effects kActiveEffects = {sizeof(dfm_effects), 0, active_effects};
+  static constexpr dfm_idle kIdle = {sizeof(dfm_idle), 0, idle};
+};
+
+// What the plugin's entry answers.
+inline const dfm_plugin *enter(const dfm_host *host, const char *who, const dfm_plugin &plugin) {
+  if (DFM_ABI_OK(host)) return &plugin;
+  complain(host, who, "built for another draft of the plugin ABI: build it against this library's header");
+  return nullptr;
+}
+
 template <class Body>
 void destroy(void *self) {
   Body *body = static_cast<Body *>(self);

@@ -9,7 +9,7 @@
 namespace corot {
 
 namespace {
-constexpr char kId[] = "org.deform.corotational_fem";
+using Ops = model::Ops<Body>;
 constexpr uint32_t kRun = DFM_PARAM_RUNTIME, kCell = DFM_PARAM_PER_CELL, kUnlessGiven = DFM_PARAM_AUTO;
 const char *const kEnergies[] = {"corotational", "neo_hookean", "stvk", nullptr};
 const char *const kTangents[] = {"usual", "exact", nullptr};
@@ -81,14 +81,7 @@ dfm_status set_params(void *self, const double *params) {
     complain(body->host, "the body was made without yield and has no plastic strain; make it anew with it");
     return DFM_E_ARG;
   }
-  try {
-    body->apply_params(params);
-  } catch (const model::Refused &) {
-    return DFM_E_ARG;
-  } catch (...) {
-    return DFM_E_NOMEM;
-  }
-  return DFM_OK;
+  return model::change(*body, params);
 }
 
 dfm_status state_init(const void *self, double *state) {
@@ -97,76 +90,15 @@ dfm_status state_init(const void *self, double *state) {
   return DFM_OK;
 }
 
-dfm_status add_forces(void *self, const dfm_kin *k, double *f) {
-  Body &body = *static_cast<Body *>(self);
-  if (body.lacks_state(*k)) return DFM_E_STATE;
-  body.add_forces(*k, f);
-  return DFM_OK;
-}
-
-dfm_status bound(void *self, const dfm_kin *k, double *ksum, double *csum, double *) {
-  Body &body = *static_cast<Body *>(self);
-  if (body.lacks_state(*k)) return DFM_E_STATE;
-  body.bound(*k, ksum, csum);
-  return DFM_OK;
-}
-
-dfm_status energy(void *self, const dfm_kin *k, double *joule) {
-  Body &body = *static_cast<Body *>(self);
-  if (body.lacks_state(*k)) return DFM_E_STATE;
-  *joule = body.energy(*k);
-  return DFM_OK;
-}
-
-dfm_status pattern(const void *self, uint32_t *nb, uint32_t *ij) {
-  const Body &body = *static_cast<const Body *>(self);
-  *nb = body.pairs();
-  if (ij) body.pattern(ij);
-  return DFM_OK;
-}
-
-dfm_status stiffness(void *self, const dfm_kin *k, double a, double b, double *blk) {
-  Body &body = *static_cast<Body *>(self);
-  if (body.lacks_state(*k)) return DFM_E_STATE;
-  body.add_stiffness(*k, a, b, blk);
-  return DFM_OK;
-}
-
-dfm_status cell_energy(void *self, const dfm_kin *k, double *density) {
-  Body &body = *static_cast<Body *>(self);
-  if (body.lacks_state(*k)) return DFM_E_STATE;
-  body.cell_energy(*k, density);
-  return DFM_OK;
-}
-
-dfm_status cell_stress(void *self, const dfm_kin *k, double *stress) {
-  Body &body = *static_cast<Body *>(self);
-  if (body.lacks_state(*k)) return DFM_E_STATE;
-  body.cell_stress(*k, stress);
-  return DFM_OK;
-}
-
-const char *const *active_effects(const void *self) {
-  return static_cast<const Body *>(self)->active_effects;
-}
-
-const char *idle(const void *self, uint32_t row) {
-  return row < kParamCount ? static_cast<const Body *>(self)->idle(Param(row)) : nullptr;
-}
-
-const dfm_cell_energy kCellEnergy = {sizeof(dfm_cell_energy), 0, cell_energy};
-const dfm_cell_stress kCellStress = {sizeof(dfm_cell_stress), 0, cell_stress};
 const dfm_slot kPlasticSlot = {DFM_PER_CELL, kPlasticState, DFM_SLOT_SCALAR, 0};
 const dfm_slots kNoSlots = {sizeof(dfm_slots), 0, nullptr}, kSlots = {sizeof(dfm_slots), 1, &kPlasticSlot};
-const dfm_effects kActiveEffects = {sizeof(dfm_effects), 0, active_effects};
-const dfm_idle kIdle = {sizeof(dfm_idle), 0, idle};
 
 const void *extension(const void *self, const char *id) {
-  if (!strcmp(id, DFM_EXT_CELL_ENERGY)) return &kCellEnergy;
-  if (!strcmp(id, DFM_EXT_CELL_STRESS)) return &kCellStress;
+  if (!strcmp(id, DFM_EXT_CELL_ENERGY)) return &Ops::kCellEnergy;
+  if (!strcmp(id, DFM_EXT_CELL_STRESS)) return &Ops::kCellStress;
   if (!strcmp(id, DFM_EXT_SLOTS)) return static_cast<const Body *>(self)->plastic() ? &kSlots : &kNoSlots;
-  if (!strcmp(id, DFM_EXT_EFFECTS)) return &kActiveEffects;
-  if (!strcmp(id, DFM_EXT_IDLE)) return &kIdle;
+  if (!strcmp(id, DFM_EXT_EFFECTS)) return &Ops::kActiveEffects;
+  if (!strcmp(id, DFM_EXT_IDLE)) return &Ops::kIdle;
   return nullptr;
 }
 
@@ -182,11 +114,11 @@ const dfm_model kModel = {sizeof(dfm_model),
                           model::destroy<Body>,
                           set_params,
                           state_init,
-                          add_forces,
-                          bound,
-                          energy,
-                          pattern,
-                          stiffness,
+                          Ops::add_forces,
+                          Ops::bound,
+                          Ops::energy,
+                          Ops::pattern,
+                          Ops::stiffness,
                           extension};
 
 const dfm_type kType = {sizeof(dfm_type),
@@ -210,7 +142,5 @@ const dfm_plugin kPlugin = {sizeof(dfm_plugin), DFM_ABI, DFM_ABI_DRAFT, 1, kType
 }  // namespace corot
 
 extern "C" DFM_EXPORT const dfm_plugin *dfm_plugin_entry(const dfm_host *host, uint32_t, uint32_t) {
-  if (DFM_ABI_OK(host)) return &corot::kPlugin;
-  corot::complain(host, "built for another draft of the plugin ABI: build it against this library's header");
-  return nullptr;
+  return model::enter(host, corot::kId, corot::kPlugin);
 }

@@ -42,9 +42,11 @@ enum Locking : uint32_t { kLocked, kNodal };
 enum Tangent : uint32_t { kUsual, kExact };
 extern const dfm_param kParams[kParamCount];
 constexpr double kAuto = -1;  // constants along the axis: as without an axis; creep: at once
+constexpr const char *kId = "org.deform.corotational_fem";
 void complain(const dfm_host *h, const char *what);
 
 struct Body {
+  using Row = Param;
   static constexpr uint32_t kNone = ~0u;
   // From this size on the blocks go through the host's parallel_for; below it waking a worker costs more than
   // it brings. Adding up the blocks is a twentieth of the work.

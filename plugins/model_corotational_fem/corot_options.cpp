@@ -1,24 +1,13 @@
 // From parameters and fields by cell to what the passes read. What nothing calls for stays empty.
 #include <stdio.h>
 
-#include <cstring>
-
-#include "../model_common/entry.h"
+#include "../model_common/params.h"
 #include "../model_common/rotation.h"
 #include "corot_body.h"
 
 namespace corot {
 
 namespace {
-
-[[noreturn]] void refuse_field(const dfm_host *host, const dfm_param &row, uint32_t cell, double value) {
-  char text[200];
-  snprintf(text, sizeof text,
-           "field %s of cell %u is %g; %g .. %g %s is expected, and an axis that is not zero", row.key, cell,
-           value, row.min, row.max, row.unit);
-  complain(host, text);
-  throw model::Refused{};
-}
 
 Rotate rotate_by(uint32_t choice) {
   return choice == kQr    ? model::rotation::gram_schmidt
@@ -29,29 +18,10 @@ Rotate rotate_by(uint32_t choice) {
 }  // namespace
 
 void Body::take_fields(const dfm_mesh &m) {
-  for (uint32_t k = 0; m.field_keys && m.field_keys[k]; ++k)
-    for (uint32_t r = 0; r < kParamCount; ++r) {
-      const dfm_param &known = kParams[r];
-      if (!(known.flags & DFM_PARAM_PER_CELL) || std::strcmp(m.field_keys[k], known.key)) continue;
-      const double *values = m.fields[k];
-      for (uint32_t c = 0; c < ncell; ++c) {
-        double square = 0;
-        for (uint32_t w = 0; w < known.width; ++w) {
-          const double x = values[size_t(known.width) * c + w];
-          if (!(x >= known.min && x <= known.max)) refuse_field(host, known, c, x);
-          square += x * x;
-        }
-        if (r == kAxis && !(square > 0)) refuse_field(host, known, c, 0);
-      }
-      field[r].create(host, size_t(known.width) * ncell);
-      std::copy(values, values + size_t(known.width) * ncell, field[r].data());
-    }
+  model::take_fields(host, kId, kParams, kParamCount, m, field, [](uint32_t, double) { return true; });
 }
 
-double Body::largest_of(Param which) const {
-  return field[which].empty() ? params[which]
-                              : *std::max_element(field[which].data(), field[which].data() + ncell);
-}
+double Body::largest_of(Param which) const { return model::largest_of(field[which], params[which], ncell); }
 
 bool Body::given(Param which) const { return largest_of(which) != kAuto; }
 
@@ -193,16 +163,8 @@ const char *Body::idle(Param which) const {
 
 // All or nothing: what may fail comes first.
 void Body::apply_params(const double *values) {
-  double before[kValueCount];
-  std::copy(params, params + kValueCount, before);
-  std::copy(values, values + kValueCount, params);
   Room room;
-  try {
-    make_room(room);
-  } catch (...) {
-    std::copy(before, before + kValueCount, params);
-    throw;
-  }
+  model::try_params(params, values, [&] { make_room(room); });
   fill_material(room);
   fill_drag(room);
   if (nodal()) find_bulk();

@@ -5,10 +5,9 @@
 // of the neighbors: bits do not depend on the cut of the work.
 
 #include <algorithm>
-#include <cstdio>
-#include <cstring>
 
 #include "../model_common/edges.h"
+#include "../model_common/params.h"
 #include "linear_body.h"
 
 namespace linear {
@@ -60,20 +59,7 @@ void Body::take_mesh(const dfm_mesh &m) {
 }
 
 void Body::take_fields(const dfm_mesh &m) {
-  for (uint32_t k = 0; m.field_keys && m.field_keys[k]; ++k)
-    for (uint32_t r = 0; r < kParamCount; ++r) {
-      if (std::strcmp(m.field_keys[k], kParams[r].key)) continue;
-      for (uint32_t c = 0; c < ncell; ++c)
-        if (!(m.fields[k][c] >= kParams[r].min && m.fields[k][c] <= kParams[r].max)) {
-          char text[200];
-          snprintf(text, sizeof text, "field %s of cell %u is %g %s; %g .. %g is expected", kParams[r].key, c,
-                   m.fields[k][c], kParams[r].unit, kParams[r].min, kParams[r].max);
-          model::complain(host, kId, text);
-          throw model::Refused{};
-        }
-      field[r].create(host, ncell);
-      std::copy(m.fields[k], m.fields[k] + ncell, field[r].data());
-    }
+  model::take_fields(host, kId, kParams, kParamCount, m, field, [](uint32_t, double) { return true; });
   if (!field[kDampingStiffness].empty()) damp_block.create(host, 9 * size_t(nedge));
 }
 
@@ -199,7 +185,7 @@ void Body::add_forces(const dfm_kin &k, double *f) const {
   else piece(&call, 0, npoint);
 }
 
-void Body::bound(double *k, double *c) const {
+void Body::bound(const dfm_kin &, double *k, double *c) const {
   for (uint32_t i = 0; i < npoint; ++i) {
     k[i] += ksum[i];
     c[i] += csum[i];
@@ -263,7 +249,7 @@ void Body::pattern(uint32_t *ij) const {
   std::copy(edges.data(), edges.data() + 2 * size_t(nedge), ij + 2 * size_t(npoint));
 }
 
-void Body::add_stiffness(double a, double b, double *blk) const {
+void Body::add_stiffness(const dfm_kin &, double a, double b, double *blk) const {
   const double all = damp_block.empty() ? a + b * params[kDampingStiffness] : a;
   for (size_t e = 0; e < nedge; ++e) {
     double *const first = blk + 9 * size_t(edges[2 * e]);

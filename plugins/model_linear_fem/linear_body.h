@@ -27,14 +27,15 @@ struct Body {
   void apply_params(const double *values);  // cannot fail
 
   void add_forces(const dfm_kin &k, double *f) const;
-  void bound(double *ksum, double *csum) const;
+  bool lacks_state(const dfm_kin &) const { return false; }
+  void bound(const dfm_kin &k, double *ksum, double *csum) const;
   double energy(const dfm_kin &k) const;
   void cell_energy(const dfm_kin &k, double *density) const;
   void cell_stress(const dfm_kin &k, double *stress) const;
   // Blocks of the tangent: the points by themselves, then the edges of the mesh.
-  uint32_t nblocks() const { return npoint + nedge; }
+  uint32_t pairs() const { return npoint + nedge; }
   void pattern(uint32_t *ij) const;
-  void add_stiffness(double a, double b, double *blk) const;
+  void add_stiffness(const dfm_kin &k, double a, double b, double *blk) const;
 
   // Rows [begin, end) of the forces.
   void force_rows(const dfm_kin &k, double *f, uint32_t begin, uint32_t end) const;

@@ -8,6 +8,7 @@
 namespace linear {
 
 namespace {
+using Ops = model::Ops<Body>;
 constexpr uint32_t kEach = DFM_PARAM_RUNTIME | DFM_PARAM_PER_CELL;
 }
 const dfm_param kParams[kParamCount] = {
@@ -26,59 +27,13 @@ dfm_status create(const dfm_host *h, const dfm_mesh *m, void **self) {
 dfm_status set_params(void *self, const double *params) {
   Body *body = static_cast<Body *>(self);
   if (!model::in_range(body->host, kId, kParams, kParamCount, params)) return DFM_E_ARG;
-  body->apply_params(params);
-  return DFM_OK;
+  return model::change(*body, params);
 }
-
-dfm_status add_forces(void *self, const dfm_kin *k, double *f) {
-  static_cast<const Body *>(self)->add_forces(*k, f);
-  return DFM_OK;
-}
-
-dfm_status bound(void *self, const dfm_kin *, double *ksum, double *csum, double *) {
-  static_cast<const Body *>(self)->bound(ksum, csum);
-  return DFM_OK;
-}
-
-dfm_status energy(void *self, const dfm_kin *k, double *joule) {
-  *joule = static_cast<const Body *>(self)->energy(*k);
-  return DFM_OK;
-}
-
-dfm_status pattern(const void *self, uint32_t *nb, uint32_t *ij) {
-  const Body &body = *static_cast<const Body *>(self);
-  *nb = body.nblocks();
-  if (ij) body.pattern(ij);
-  return DFM_OK;
-}
-
-dfm_status stiffness(void *self, const dfm_kin *, double a, double b, double *blk) {
-  static_cast<const Body *>(self)->add_stiffness(a, b, blk);
-  return DFM_OK;
-}
-
-dfm_status cell_energy(void *self, const dfm_kin *k, double *density) {
-  static_cast<const Body *>(self)->cell_energy(*k, density);
-  return DFM_OK;
-}
-
-dfm_status cell_stress(void *self, const dfm_kin *k, double *stress) {
-  static_cast<const Body *>(self)->cell_stress(*k, stress);
-  return DFM_OK;
-}
-
-const char *const *active_effects(const void *self) {
-  return static_cast<const Body *>(self)->active_effects;
-}
-
-const dfm_cell_energy kCellEnergy = {sizeof(dfm_cell_energy), 0, cell_energy};
-const dfm_cell_stress kCellStress = {sizeof(dfm_cell_stress), 0, cell_stress};
-const dfm_effects kActiveEffects = {sizeof(dfm_effects), 0, active_effects};
 
 const void *extension(const void *, const char *id) {
-  if (!strcmp(id, DFM_EXT_CELL_ENERGY)) return &kCellEnergy;
-  if (!strcmp(id, DFM_EXT_CELL_STRESS)) return &kCellStress;
-  if (!strcmp(id, DFM_EXT_EFFECTS)) return &kActiveEffects;
+  if (!strcmp(id, DFM_EXT_CELL_ENERGY)) return &Ops::kCellEnergy;
+  if (!strcmp(id, DFM_EXT_CELL_STRESS)) return &Ops::kCellStress;
+  if (!strcmp(id, DFM_EXT_EFFECTS)) return &Ops::kActiveEffects;
   return nullptr;
 }
 
@@ -93,11 +48,11 @@ const dfm_model kModel = {sizeof(dfm_model),
                           model::destroy<Body>,
                           set_params,
                           nullptr,
-                          add_forces,
-                          bound,
-                          energy,
-                          pattern,
-                          stiffness,
+                          Ops::add_forces,
+                          Ops::bound,
+                          Ops::energy,
+                          Ops::pattern,
+                          Ops::stiffness,
                           extension};
 
 const dfm_type kType = {
@@ -122,8 +77,5 @@ const dfm_plugin kPlugin = {sizeof(dfm_plugin), DFM_ABI, DFM_ABI_DRAFT, 1, kType
 }  // namespace linear
 
 extern "C" DFM_EXPORT const dfm_plugin *dfm_plugin_entry(const dfm_host *host, uint32_t, uint32_t) {
-  if (DFM_ABI_OK(host)) return &linear::kPlugin;
-  model::complain(host, linear::kId,
-                  "built for another draft of the plugin ABI: build it against this library's header");
-  return nullptr;
+  return model::enter(host, linear::kId, linear::kPlugin);
 }

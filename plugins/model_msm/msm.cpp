@@ -9,6 +9,7 @@
 namespace msm {
 
 namespace {
+using Ops = model::Ops<Body>;
 constexpr uint32_t kRun = DFM_PARAM_RUNTIME, kCell = DFM_PARAM_PER_CELL;
 const char *const kKinds[] = {"softer", "stiffer", nullptr};
 const char *const kForces[] = {"B", "A", nullptr};
@@ -42,9 +43,6 @@ const dfm_param kParams[kParamCount] = {
      3, nullptr},
 };
 
-namespace {
-constexpr const char *kId = "org.deform.msm";
-}
 void complain(const dfm_host *h, const char *what) { model::complain(h, kId, what); }
 
 bool valid(const dfm_host *h, const double *values) {
@@ -76,12 +74,7 @@ dfm_status create(const dfm_host *h, const dfm_mesh *m, void **self) {
 dfm_status set_params(void *self, const double *params) {
   Body *body = static_cast<Body *>(self);
   if (!valid(body->host, params)) return DFM_E_ARG;
-  try {
-    body->apply_params(params);
-  } catch (...) {
-    return DFM_E_NOMEM;
-  }
-  return DFM_OK;
+  return model::change(*body, params);
 }
 
 // Branches: r of every spring, then `kept` of the step before; 1 where none was.
@@ -91,56 +84,6 @@ dfm_status state_init(const void *self, double *state) {
   std::fill(state, state + body.nedge, 0.0);
   state[body.nedge] = 1;
   return DFM_OK;
-}
-
-dfm_status add_forces(void *self, const dfm_kin *k, double *f) {
-  Body &body = *static_cast<Body *>(self);
-  if (body.lacks_state(*k)) return DFM_E_STATE;
-  body.add_forces(*k, f);
-  return DFM_OK;
-}
-
-dfm_status bound(void *self, const dfm_kin *k, double *ksum, double *csum, double *) {
-  Body &body = *static_cast<Body *>(self);
-  if (body.lacks_state(*k)) return DFM_E_STATE;
-  body.bound(*k, ksum, csum);
-  return DFM_OK;
-}
-
-dfm_status energy(void *self, const dfm_kin *k, double *joule) {
-  const Body &body = *static_cast<const Body *>(self);
-  if (body.lacks_state(*k)) return DFM_E_STATE;
-  *joule = body.energy(*k);
-  return DFM_OK;
-}
-
-dfm_status cell_energy(void *self, const dfm_kin *k, double *density) {
-  Body &body = *static_cast<Body *>(self);
-  if (body.lacks_state(*k)) return DFM_E_STATE;
-  body.cell_energy(*k, density);
-  return DFM_OK;
-}
-
-dfm_status pattern(const void *self, uint32_t *nb, uint32_t *ij) {
-  const Body &body = *static_cast<const Body *>(self);
-  *nb = body.nblocks();
-  if (ij) body.pattern(ij);
-  return DFM_OK;
-}
-
-dfm_status stiffness(void *self, const dfm_kin *k, double a, double b, double *blk) {
-  const Body &body = *static_cast<const Body *>(self);
-  if (body.lacks_state(*k)) return DFM_E_STATE;
-  body.add_stiffness(*k, a, b, blk);
-  return DFM_OK;
-}
-
-const char *const *active_effects(const void *self) {
-  return static_cast<const Body *>(self)->active_effects;
-}
-
-const char *idle(const void *self, uint32_t row) {
-  return row < kParamCount ? static_cast<const Body *>(self)->idle(Param(row)) : nullptr;
 }
 
 uint32_t limited(const void *self) {
@@ -173,18 +116,15 @@ dfm_status get_mask(const void *self, uint8_t *on) {
 
 const dfm_slot kBranchSlots[] = {{DFM_PER_EDGE, 1, DFM_SLOT_SCALAR, 0},
                                  {DFM_PER_INSTANCE, 1, DFM_SLOT_SCALAR, 0}};
-const dfm_cell_energy kCellEnergy = {sizeof(dfm_cell_energy), 0, cell_energy};
 const dfm_slots kNoSlots = {sizeof(dfm_slots), 0, nullptr}, kSlots = {sizeof(dfm_slots), 2, kBranchSlots};
-const dfm_effects kActiveEffects = {sizeof(dfm_effects), 0, active_effects};
-const dfm_idle kIdle = {sizeof(dfm_idle), 0, idle};
 const dfm_limited kLimited = {sizeof(dfm_limited), 0, limited};
 const dfm_spring_mask kSpringMask = {sizeof(dfm_spring_mask), 0, set_mask, get_mask};
 
 const void *extension(const void *self, const char *id) {
-  if (!strcmp(id, DFM_EXT_CELL_ENERGY)) return &kCellEnergy;
+  if (!strcmp(id, DFM_EXT_CELL_ENERGY)) return &Ops::kCellEnergy;
   if (!strcmp(id, DFM_EXT_SLOTS)) return static_cast<const Body *>(self)->has_branch() ? &kSlots : &kNoSlots;
-  if (!strcmp(id, DFM_EXT_EFFECTS)) return &kActiveEffects;
-  if (!strcmp(id, DFM_EXT_IDLE)) return &kIdle;
+  if (!strcmp(id, DFM_EXT_EFFECTS)) return &Ops::kActiveEffects;
+  if (!strcmp(id, DFM_EXT_IDLE)) return &Ops::kIdle;
   if (!strcmp(id, DFM_EXT_LIMITED)) return &kLimited;
   if (!strcmp(id, DFM_EXT_SPRING_MASK)) return &kSpringMask;
   return nullptr;
@@ -203,11 +143,11 @@ const dfm_model kModel = {
     model::destroy<Body>,
     set_params,
     state_init,
-    add_forces,
-    bound,
-    energy,
-    pattern,
-    stiffness,
+    Ops::add_forces,
+    Ops::bound,
+    Ops::energy,
+    Ops::pattern,
+    Ops::stiffness,
     extension};
 
 const dfm_type kType = {sizeof(dfm_type),
@@ -231,7 +171,5 @@ const dfm_plugin kPlugin = {sizeof(dfm_plugin), DFM_ABI, DFM_ABI_DRAFT, 1, kType
 }  // namespace msm
 
 extern "C" DFM_EXPORT const dfm_plugin *dfm_plugin_entry(const dfm_host *host, uint32_t, uint32_t) {
-  if (DFM_ABI_OK(host)) return &msm::kPlugin;
-  msm::complain(host, "built for another draft of the plugin ABI: build it against this library's header");
-  return nullptr;
+  return model::enter(host, msm::kId, msm::kPlugin);
 }

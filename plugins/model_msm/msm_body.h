@@ -42,6 +42,7 @@ enum Force : uint32_t { kFormB, kFormA };
 enum Damper : uint32_t { kVoigt, kMaxwell, kStandardLinear };
 extern const dfm_param kParams[kParamCount];
 constexpr double kFromPoisson = -1;  // of `volume`: what gives the body the ratio `poisson`
+constexpr const char *kId = "org.deform.msm";
 void complain(const dfm_host *h, const char *what);
 bool valid(const dfm_host *h, const double *values);  // of all parameters; false after the reason was logged
 
@@ -50,6 +51,7 @@ bool valid(const dfm_host *h, const double *values);  // of all parameters; fals
 inline double volume_for(double nu) { return nu > 0.25 ? 3 * (4 * nu - 1) / (2 * (1 + nu)) : 0; }
 
 struct Body {
+  using Row = Param;
   static constexpr uint32_t kNone = ~0u;
   // From this size on the blocks go through the host's parallel_for; below it waking a worker costs more than
   // it brings. Adding up the blocks is a twentieth of the work.
@@ -161,7 +163,7 @@ struct Body {
   void mask_springs(uint32_t n, const uint32_t *which, bool on);
   void rest_of_branches(uint32_t n, const dfm_kin &k);  // fills rest_now of block n
   // Blocks of the tangent: the points, then the springs. See msm_tangent.cpp.
-  uint32_t nblocks() const { return npoint + nedge; }
+  uint32_t pairs() const { return npoint + nedge; }
   void pattern(uint32_t *ij) const;
   void add_stiffness(const dfm_kin &k, double a, double b, double *blk) const;
 

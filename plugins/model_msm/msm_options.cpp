@@ -1,10 +1,9 @@
 // From parameters and fields by cell to what the passes read: stiffness per spring, frozen extra
 // coordinates, dampers, drag, springs that are switched off. What nothing calls for stays empty and its
 // kernels are never chosen.
-#include <stdio.h>
-
 #include <algorithm>
 
+#include "../model_common/params.h"
 #include "msm_body.h"
 
 namespace msm {
@@ -18,35 +17,9 @@ static double spring_scale(double r) {
   return (__builtin_sqrt(b * b + 20 * r) - b) / 10 / 0.4;
 }
 
-[[noreturn]] static void refuse_field(const dfm_host *host, const dfm_param &row, uint32_t cell,
-                                      double value) {
-  char text[200];
-  snprintf(text, sizeof text,
-           "field %s of cell %u is %g; %g .. %g %s is expected, and an axis that is not zero", row.key, cell,
-           value, row.min, row.max, row.unit);
-  complain(host, text);
-  throw Refused{};
-}
-
 void Body::take_fields(const dfm_mesh &m) {
-  for (uint32_t k = 0; m.field_keys && m.field_keys[k]; ++k)
-    for (uint32_t r = 0; r < kParamCount; ++r) {
-      const dfm_param &known = kParams[r];
-      if (!(known.flags & DFM_PARAM_PER_CELL) || std::strcmp(m.field_keys[k], known.key)) continue;
-      const double *values = m.fields[k];
-      for (uint32_t c = 0; c < ncell; ++c) {
-        double square = 0;
-        for (uint32_t w = 0; w < known.width; ++w) {
-          const double x = values[size_t(known.width) * c + w];
-          if (!(x >= known.min && x <= known.max) || (r == kVolume && x < 0 && x != kFromPoisson))
-            refuse_field(host, known, c, x);
-          square += x * x;
-        }
-        if (r == kAxis && !(square > 0)) refuse_field(host, known, c, 0);
-      }
-      field[r].create(host, size_t(known.width) * ncell);
-      std::copy(values, values + size_t(known.width) * ncell, field[r].data());
-    }
+  const auto fits = [](uint32_t which, double x) { return which != kVolume || x >= 0 || x == kFromPoisson; };
+  model::take_fields(host, kId, kParams, kParamCount, m, field, fits);
 }
 
 // Every cell gives each of its edges E V, times what msm_stiffness.cpp finds. What all cells share (Young's
@@ -249,10 +222,7 @@ struct Aside {  // the mask, while no spring counts as off
 };
 }  // namespace
 
-double Body::largest_of(Param which) const {
-  return field[which].empty() ? params[which]
-                              : *std::max_element(field[which].data(), field[which].data() + ncell);
-}
+double Body::largest_of(Param which) const { return model::largest_of(field[which], params[which], ncell); }
 
 double Body::largest_volume() const {
   double most = volume_of(0);
@@ -287,16 +257,8 @@ void Body::make_room(Room &room) const {
 
 // All or nothing: what may fail comes first.
 void Body::apply_params(const double *values) {
-  double before[kValueCount];
-  std::copy(params, params + kValueCount, before);
-  std::copy(values, values + kValueCount, params);
   Room room;
-  try {
-    make_room(room);
-  } catch (...) {
-    std::copy(before, before + kValueCount, params);
-    throw;
-  }
+  model::try_params(params, values, [&] { make_room(room); });
   volume_on = largest_volume() > 0;
   cells_on = volume_on || largest_of(kCollapse) > 0;
   find_shapes();

@@ -95,6 +95,9 @@ TEST(CorotDeterminism, Compiler_NeverShowsInAResult) {
   Host host;  // one value for gcc and clang, -O0 and -O2, with and without sanitizers
   EXPECT_EQ(fnv(results(host, nullptr, kuhn_bar(4, 3, 2, 0.1, 0.2), kinds()[3])), 1786832424231213768ull);
   EXPECT_EQ(fnv(results(host, nullptr, kuhn_bar(4, 3, 2, 0.1, 0.2), kinds()[8])), 13997715870648500101ull);
+  EXPECT_EQ(fnv(results(host, nullptr, kuhn_bar(4, 3, 2, 0.1, 0.2), all_kinds()[11])), 298567644452849001ull);
+  EXPECT_EQ(fnv(results(host, nullptr, kuhn_bar(4, 3, 2, 0.1, 0.2), all_kinds()[12])),
+            17728538275654731524ull);
 }
 
 TEST(CorotDeterminism, CutOfTheWorkAndStride_NeverShowInAResult) {

@@ -1,0 +1,62 @@
+// Parameters that come as fields by cell, and sets of values that are taken as a whole or not at all.
+#pragma once
+#include <algorithm>
+#include <cstring>
+
+#include "buffer.h"
+#include "entry.h"
+
+namespace model {
+
+// Fields of the mesh for rows that may come by cell, [ncell, width] by row; an axis (three wide) is not zero.
+// `fits(row, value)` beside the row's range. Throws Refused after the reason was logged.
+template <class Fits>
+void take_fields(const dfm_host *host, const char *who, const dfm_param *rows, uint32_t nrow,
+                 const dfm_mesh &m, Buffer<double> *field, const Fits &fits) {
+  for (uint32_t k = 0; m.field_keys && m.field_keys[k]; ++k)
+    for (uint32_t r = 0; r < nrow; ++r) {
+      const dfm_param &row = rows[r];
+      if (!(row.flags & DFM_PARAM_PER_CELL) || std::strcmp(m.field_keys[k], row.key)) continue;
+      const bool axis = row.width == 3;
+      const auto refuse = [&](uint32_t cell, double value) {
+        char text[200];
+        std::snprintf(text, sizeof text, "field %s of cell %u is %g; %g .. %g %s is expected%s", row.key,
+                      cell, value, row.min, row.max, row.unit, axis ? ", and an axis that is not zero" : "");
+        complain(host, who, text);
+        throw Refused{};
+      };
+      const double *values = m.fields[k];
+      for (uint32_t c = 0; c < m.ncell; ++c) {
+        double square = 0;
+        for (uint32_t w = 0; w < row.width; ++w) {
+          const double x = values[size_t(row.width) * c + w];
+          if (!(x >= row.min && x <= row.max) || !fits(r, x)) refuse(c, x);
+          square += x * x;
+        }
+        if (axis && !(square > 0)) refuse(c, 0);
+      }
+      field[r].create(host, size_t(row.width) * m.ncell);
+      std::copy(values, values + size_t(row.width) * m.ncell, field[r].data());
+    }
+}
+
+// Of a parameter that may come by cell.
+inline double largest_of(const Buffer<double> &field, double value, uint32_t ncell) {
+  return field.empty() ? value : *std::max_element(field.data(), field.data() + ncell);
+}
+
+// `params` become `values` while make() takes the memory that they need, and stay so unless it throws.
+template <size_t kCount, class Make>
+void try_params(double (&params)[kCount], const double *values, const Make &make) {
+  double before[kCount];
+  std::copy(params, params + kCount, before);
+  std::copy(values, values + kCount, params);
+  try {
+    make();
+  } catch (...) {
+    std::copy(before, before + kCount, params);
+    throw;
+  }
+}
+
+}  // namespace model
