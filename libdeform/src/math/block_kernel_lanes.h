@@ -1,26 +1,12 @@
 // The loops of block_kernel.h for vectors of kWidth (2 or 4) doubles, which the including file defines.
 #pragma once
 #include "block_kernel.h"
-
-#define DEFORM_INLINE static inline __attribute__((always_inline))
-// Loops over lanes and registers: arrays of vectors stay in registers only where no loop is left.
-#if defined(__clang__)
-#define DEFORM_UNROLL _Pragma("unroll")
-#else
-#define DEFORM_UNROLL _Pragma("GCC unroll 16")
-#endif
+#include "kernel_vector.h"
 
 namespace dfm {
 namespace {
 
-typedef double Vector __attribute__((vector_size(8 * kWidth)));
-typedef double Unaligned __attribute__((vector_size(8 * kWidth), aligned(8), may_alias));
-
 constexpr uint32_t kParts = 4 / kWidth;  // vectors that hold a column and a lane more
-
-DEFORM_INLINE Vector load(const double *p) { return *(const Unaligned *)p; }
-DEFORM_INLINE void store(double *p, Vector v) { *(Unaligned *)p = v; }
-DEFORM_INLINE Vector splat(double a) { return a - Vector{}; }  // a - 0 is a, whatever its sign
 
 // sum[c] += column c of the block times x[c]
 DEFORM_INLINE void add_block(const double *a, const double *x, Vector (&sum)[3][kParts]) {

@@ -1,27 +1,13 @@
 // The loops of dense_kernel.h for vectors of kWidth doubles, which the including file defines.
 #pragma once
 #include "dense_kernel.h"
-
-#define DEFORM_INLINE static inline __attribute__((always_inline))
-// Loops over lanes and registers: arrays of vectors stay in registers only where no loop is left.
-#if defined(__clang__)
-#define DEFORM_UNROLL _Pragma("unroll")
-#else
-#define DEFORM_UNROLL _Pragma("GCC unroll 16")
-#endif
+#include "kernel_vector.h"
 
 namespace dfm {
 namespace {
 
-typedef double Vector __attribute__((vector_size(8 * kWidth)));
-typedef double Unaligned __attribute__((vector_size(8 * kWidth), aligned(8), may_alias));
-
 constexpr uint32_t kParts = kLanes / kWidth;  // vectors that hold one row of right-hand sides
 constexpr uint32_t kRows = 2 * kWidth;        // rows of an update's tile
-
-DEFORM_INLINE Vector load(const double *p) { return *(const Unaligned *)p; }
-DEFORM_INLINE void store(double *p, Vector v) { *(Unaligned *)p = v; }
-DEFORM_INLINE Vector splat(double a) { return a - Vector{}; }  // a - 0 is a, whatever its sign
 
 // Rows [begin, m) of a column less s times another.
 DEFORM_INLINE void subtract_scaled(uint32_t begin, uint32_t m, double s, const double *from, double *to) {
