@@ -144,7 +144,7 @@ def error(u, expected):
 
 
 def fitted(command, folder, fields):
-    """Modulus and slope with the least sum of squares over both fields; forces are so small that displacements
+    """Modulus and slope with the least squares over both fields; at such small forces displacements
     go by 1/modulus."""
     best = None
     for slope in np.arange(0.4, 3.01, 0.2):
