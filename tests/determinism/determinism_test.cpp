@@ -49,8 +49,7 @@ TEST_P(Determinism, OneToEightThreads_GiveTheSameHash) {
 #else
   const std::initializer_list<uint32_t> counts = {2, 3, 4, 5, 6, 7, 8};
 #endif
-  for (const uint32_t threads : counts)
-    EXPECT_EQ(scenes::run(scene, threads), one) << threads << " threads";
+  for (const uint32_t threads : counts) EXPECT_EQ(scenes::run(scene, threads), one) << threads << " threads";
 }
 
 TEST_P(Determinism, AHostThatCutsAndShuffles_GivesTheSameHash) {

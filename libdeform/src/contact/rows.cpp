@@ -2,11 +2,21 @@
 
 #include <algorithm>
 
+#include "math/width.h"
+
 namespace dfm {
 
-ContactRows::ContactRows(const Memory &m) {
-  use_memory(m, begin, dof, weight, y, y_free, alone, source, point, block, blocks, response, frame, drive,
-             rate, wn, wt, cross, impulse, dof_of_point_, dof_of_node_, place_, rigid, arm, dof_of_group_);
+ContactRows::ContactRows(const Memory &m) : kernels_(dense_kernels()) {
+  use_memory(m, begin, dof, weight, y, y_free, alone, source, point, block, blocks, response_, given_, frame,
+             drive, rate, wn, wt, cross, impulse, dof_of_point_, dof_of_node_, place_, rigid, arm,
+             dof_of_group_);
+}
+
+// Of the dofs from `first` on.
+void ContactRows::add_block(uint32_t from, uint32_t first, uint32_t group) {
+  const uint32_t count = ndof - first;
+  blocks.push_back({from, first, count, response_.size(), group});
+  response_.resize(response_.size() + size_t(12) * count * count);
 }
 
 // Blocks of the rigid groups that are touched, in their order.
@@ -26,9 +36,8 @@ void ContactRows::build_rigid(std::span<const ContactPoint> contacts, const Rigi
       point.push_back(k);
       block.push_back(static_cast<uint32_t>(blocks.size()));
     }
-    blocks.push_back({kNone, ndof, count, response.size(), g});
-    response.resize(response.size() + size_t(9) * count * count);
     ndof += count;
+    add_block(kNone, ndof - count, g);
   }
 }
 
@@ -69,7 +78,7 @@ void ContactRows::build(std::span<const ContactPoint> contacts, std::span<const 
   point.clear();
   block.clear();
   blocks.clear();
-  response.clear();
+  response_.clear();
   ndof = 0;
 
   auto source_of = [&](uint32_t node) {
@@ -96,10 +105,7 @@ void ContactRows::build(std::span<const ContactPoint> contacts, std::span<const 
       point.push_back(node - sources[s].first_node);
       block.push_back(static_cast<uint32_t>(blocks.size()));
     }
-    const uint32_t count = ndof - first;
-    if (count == 0) continue;
-    blocks.push_back({s, first, count, response.size(), kNone});
-    response.resize(response.size() + size_t(9) * count * count);
+    if (ndof > first) add_block(s, first, kNone);
   }
   rigid.clear();
   if (!rigids.of_obstacle.empty()) {
@@ -180,12 +186,11 @@ void ContactRows::build(std::span<const ContactPoint> contacts, std::span<const 
 Vec3 ContactRows::rigid_diagonal(uint32_t i, Vec3 a) const {
   const Block &b = blocks[block[rigid[i]]];
   const Vec3 r = load3(&arm[size_t(3) * i]), m = dfm::cross(r, a);
-  const size_t width = size_t(3) * b.count, own = size_t(3) * (rigid[i] - b.first);
+  const size_t own = rigid[i] - b.first;
   double p[6] = {a.x, a.y, a.z, m.x, m.y, m.z}, v[6];
   for (size_t row = 0; row < 6; ++row) {
-    const double *const to = &response[b.response + (own + row) * width + own];
     v[row] = 0;
-    for (size_t k = 0; k < 6; ++k) v[row] += to[k] * p[k];
+    for (size_t k = 0; k < 6; ++k) v[row] += response(b, 3 * own + k, own + row / 3, row % 3) * p[k];
   }
   return load3(v) + dfm::cross(load3(v + 3), r);
 }
@@ -202,13 +207,11 @@ Vec3 ContactRows::diagonal(uint32_t i, Vec3 a) const {
     const Block &b = blocks[block[d]];
     for (uint32_t l = begin[i]; l < begin[i + 1]; ++l) {
       if (block[dof[l]] != block[d]) continue;
-      const double *const r =
-          &response[b.response + size_t(3 * (d - b.first)) * 3 * b.count + 3 * (dof[l] - b.first)];
+      const size_t at = d - b.first, column = size_t(3) * (dof[l] - b.first);
       const double ww = weight[j] * weight[l];
-      for (uint32_t row = 0; row < 3; ++row) {
-        const double *const rr = r + size_t(row) * 3 * b.count;
-        sum[int(row)] += ww * (rr[0] * a.x + rr[1] * a.y + rr[2] * a.z);
-      }
+      for (uint32_t row = 0; row < 3; ++row)
+        sum[int(row)] += ww * (response(b, column, at, row) * a.x + response(b, column + 1, at, row) * a.y +
+                               response(b, column + 2, at, row) * a.z);
     }
   }
   if (!rigid.empty() && rigid[i] != kNone) sum += rigid_diagonal(i, a);
@@ -281,15 +284,20 @@ Vec3 ContactRows::velocity(uint32_t i) const {
   return Vec3{dot(load3(f), u), dot(load3(f + 3), u), dot(load3(f + 6), u)} - load3(&drive[size_t(i) * 3]);
 }
 
-void ContactRows::response_apply(const Block &b, uint32_t d, Vec3 p) {
-  const size_t width = size_t(3) * b.count, column = size_t(3) * (d - b.first);
-  for (uint32_t k = 0; k < b.count; ++k) {
-    double *const to = &y[size_t(b.first + k) * 4];
-    for (uint32_t row = 0; row < 3; ++row) {
-      const double *const r = &response[b.response + (size_t(3) * k + row) * width + column];
-      to[row] += r[0] * p.x + r[1] * p.y + r[2] * p.z;
+void ContactRows::take_response(const Block &b) {
+  const size_t wide = size_t(3) * b.count;
+  double *to = &response_[b.response];
+  for (size_t column = 0; column < wide; ++column)
+    for (size_t k = 0; k < b.count; ++k) {
+      for (size_t row = 0; row < 3; ++row) *to++ = given_[(3 * k + row) * wide + column];
+      *to++ = 0;
     }
-  }
+}
+
+void ContactRows::response_apply(const Block &b, uint32_t d, Vec3 p) {
+  const size_t width = size_t(4) * b.count;
+  kernels_.add_three(width, &response_[b.response + 3 * size_t(d - b.first) * width], &p.x,
+                     &y[size_t(b.first) * 4]);
 }
 
 void ContactRows::apply(uint32_t i, Vec3 q) {

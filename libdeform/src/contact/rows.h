@@ -16,6 +16,7 @@
 
 #include "contact/contact_set.h"
 #include "geometry/surface.h"
+#include "math/dense_kernel.h"
 #include "math/vec3.h"
 
 namespace dfm {
@@ -45,7 +46,7 @@ struct ContactRows {
   // then its spin.
   struct Block {
     uint32_t source, first, count;
-    size_t response;
+    size_t response;  // its first value
     uint32_t group;
   };
 
@@ -63,7 +64,6 @@ struct ContactRows {
   Array<uint32_t> rigid;
   Array<double> arm;  // [n,3] m, where there are any
   Array<Block> blocks;
-  Array<double> response;  // per block [3 count, 3 count] row-major, 1/kg
 
   Array<double> frame;   // [n,9] normal, tangent, normal x tangent
   Array<double> drive;   // [n,3] obstacle velocity in the frame
@@ -77,10 +77,17 @@ struct ContactRows {
   double recovery = 0;
 
   explicit ContactRows(const Memory &memory);
-  // Expands contacts to dofs. Blocks get their dofs and counts; the caller fills `response`, then
-  // calls finish().
+  // Expands contacts to dofs. Blocks get their dofs and counts; the caller gives their responses, then calls
+  // finish().
   void build(std::span<const ContactPoint> contacts, std::span<const DofSource> sources,
              const RigidPlaces &rigids = {});
+  // fill(matrix) writes the block's response, [3 count, 3 count] row-major, 1/kg.
+  template <class Fill>
+  void set_response(const Block &b, const Fill &fill) {
+    given_.resize(size_t(9) * b.count * b.count);
+    fill(given_.data());
+    take_response(b);
+  }
   // Frames from normals and tangents [n,3], W diagonals, rates. planned: s, time in which a depth closes;
   // longer than h where the guard has cut it, or depths would turn into speed.
   void finish(std::span<const ContactPoint> contacts, const double *tangents, double h, double planned,
@@ -99,6 +106,16 @@ struct ContactRows {
   // where a dof of a coupled surface stands in the row being made
   Array<uint32_t> place_;
   Array<uint32_t> dof_of_group_;  // first dof of a rigid group
+  const DenseKernels &kernels_;
+  // per block [3 count columns, 4 count], 1/kg: what an impulse at one dof changes of all, as y has them
+  Array<double> response_;
+  Array<double> given_;  // scratch
+  void add_block(uint32_t from, uint32_t first, uint32_t group);
+  void take_response(const Block &b);
+  // Of block b, at dof k's component `row`, by a unit impulse of that column.
+  double response(const Block &b, size_t column, size_t k, size_t row) const {
+    return response_[b.response + (column * b.count + k) * 4 + row];
+  }
   void build_rigid(std::span<const ContactPoint> contacts, const RigidPlaces &rigids);
   void set_arms(std::span<const ContactPoint> contacts, std::span<const DofSource> sources,
                 const RigidPlaces &rigids);

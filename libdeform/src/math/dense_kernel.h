@@ -35,6 +35,8 @@ struct DenseKernels {
   // sum[kLanes, kLanes] += left^T right, both [n, kLanes]; the transposed sum is that of (right, left) to the
   // bit
   void (*gram)(uint32_t n, const double *left, const double *right, double *sum);
+  // y[n] += a p, a [n,3] column after column
+  void (*add_three)(size_t n, const double *a, const double p[3], double *y);
 };
 
 const DenseKernels &dense_kernels_sse2();

@@ -265,8 +265,17 @@ void gram(uint32_t n, const double *left, const double *right, double *sum) {
   }
 }
 
+void add_three(size_t n, const double *a, const double p[3], double *y) {
+  const double *const b = a + n, *const c = b + n;
+  const Vector px = splat(p[0]), py = splat(p[1]), pz = splat(p[2]);
+  size_t i = 0;
+  for (; i + kWidth <= n; i += kWidth)
+    store(y + i, load(y + i) + ((load(a + i) * px + load(b + i) * py) + load(c + i) * pz));
+  for (; i < n; ++i) y[i] += (a[i] * p[0] + b[i] * p[1]) + c[i] * p[2];
+}
+
 }  // namespace
 }  // namespace dfm
 
 #define DEFORM_DENSE_KERNELS(name) \
-  {name, factor, pack, update, forward, backward, forward_one, backward_one, gram}
+  {name, factor, pack, update, forward, backward, forward_one, backward_one, gram, add_three}

@@ -101,12 +101,14 @@ bool stage_rigid_predict(World &w, StepContext &step, uint32_t *trouble) {
   return true;
 }
 
-void rigid_response(World &w, StepContext &step, uint32_t group, double *matrix) {
+void rigid_response(World &w, StepContext &step, const ContactRows::Block &block) {
   for (auto &set : w.rigid_sets) {
-    if (group < set->first_group || group >= set->first_group + set->ngroup) continue;
-    if (!set->respond(group - set->first_group, step.rigid_groups[group], matrix))
-      fail(DFM_E_FATAL, "rigid host '%s' does not answer impulses on '%s' and those with it",
-           set->host_name.c_str(), set->defs[0].name);
+    if (block.group < set->first_group || block.group >= set->first_group + set->ngroup) continue;
+    step.rows.set_response(block, [&](double *matrix) {
+      if (!set->respond(block.group - set->first_group, step.rigid_groups[block.group], matrix))
+        fail(DFM_E_FATAL, "rigid host '%s' does not answer impulses on '%s' and those with it",
+             set->host_name.c_str(), set->defs[0].name);
+    });
     return;
   }
 }
@@ -161,7 +163,7 @@ bool revise_rigids(World &w, StepContext &step) {
       if (block.group == kNone || block.group < set->first_group ||
           block.group >= set->first_group + set->ngroup)
         continue;
-      rigid_response(w, step, block.group, &step.rows.response[block.response]);
+      rigid_response(w, step, block);
       for (uint32_t i = 0; i < set->defs.size(); ++i) {
         if (set->group[i] != block.group - set->first_group) continue;
         for (uint32_t k = 0; k < 2; ++k)

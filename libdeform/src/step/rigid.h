@@ -2,6 +2,7 @@
 // body is an obstacle; the solve takes its response from the host, so that it feels what it pushes. The
 // states are the world's (snapshot, hash), the host only maps one to the next.
 #pragma once
+#include "contact/rows.h"
 #include "math/vec3.h"
 #include "state/motion.h"
 #include "dynamics/rigid/rigid_set.h"
@@ -17,7 +18,7 @@ void create_rigids(World &w, const char *host, const dfm_rigid_set_def &def, uin
 void destroy_rigids(RigidSet &set);  // throws Error where the host keeps its bodies
 Obstacle &rigid_obstacle(World &w, uint64_t id);
 void place_rigids(World &w);  // World::prepare(): slots and groups
-void rigid_response(World &w, StepContext &step, uint32_t group, double *matrix);
+void rigid_response(World &w, StepContext &step, const ContactRows::Block &group);
 void sum_rigid_impulses(World &w, StepContext &step);  // of the rows, into every set
 // true: a host answers differently under these impulses; rows have its new response, solve again
 bool revise_rigids(World &w, StepContext &step);

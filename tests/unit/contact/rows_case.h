@@ -185,10 +185,11 @@ class RowsCase {
     const uint32_t group_size[1] = {kRigids};
     rows.build(contacts, sources, {places_, group_size});
     for (const ContactRows::Block &block : rows.blocks)
-      for (size_t r = 0; r < 3 * block.count; ++r)
-        for (size_t c = 0; c < 3 * block.count; ++c)
-          rows.response[block.response + r * 3 * block.count + c] =
-              response_(unknown_of(block, r), unknown_of(block, c));
+      rows.set_response(block, [&](double *matrix) {
+        for (size_t r = 0; r < 3 * block.count; ++r)
+          for (size_t c = 0; c < 3 * block.count; ++c)
+            *matrix++ = response_(unknown_of(block, r), unknown_of(block, c));
+      });
     std::vector<double> tangents(3 * contacts.size());
     for (size_t i = 0; i < contacts.size(); ++i) store3(&tangents[3 * i], frame(i, 1));
     rows.finish(contacts, tangents.data(), kStep, kStep, kOffset);
