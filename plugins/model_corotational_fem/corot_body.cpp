@@ -39,8 +39,7 @@ void merge_pass(void *user, uint32_t begin, uint32_t end) {
   Body &body = *call.body;
   for (uint32_t n = begin; n < end; ++n) {
     const Block &b = body.block[n];
-    body.kernels->merge(body.f.data(), body.merge.data() + body.merge_begin[n],
-                        body.merge_begin[n + 1] - body.merge_begin[n]);
+    body.merge_block(*body.kernels, n);
     for (uint32_t i = 0; !body.point_drag.empty() && i < b.owned; ++i) {
       const double c = body.point_drag[b.point[i]];
       const double *v = call.k->v + size_t(call.k->stride) * b.point[i];
@@ -70,12 +69,6 @@ void stress_pass(void *user, uint32_t begin, uint32_t end) {
 
 }  // namespace
 
-void Body::for_each_block(uint32_t least_cells, void (*fn)(void *, uint32_t, uint32_t), void *user) {
-  if (ncell >= least_cells && host->parallel_for)
-    return host->parallel_for(host->ctx, nblock, grain, fn, user);
-  fn(user, 0, nblock);
-}
-
 double Body::flow_at(const dfm_kin &k) const {
   return !plastic() ? 0 : params[kCreep] == kAuto ? 1 : 1 - dfm_exp(-params[kCreep] * k.dt);
 }
@@ -91,8 +84,8 @@ bool Body::lacks_state(const dfm_kin &k) const {
 void Body::add_forces(const dfm_kin &k, double *f_out) {
   Call call(this, &k, f_out);
   if (nodal()) dilate(k);
-  for_each_block(kParallelCells, force_pass, &call);
-  for_each_block(kParallelMergeCells, merge_pass, &call);
+  for_each_block(ncell >= kParallelCells, force_pass, &call);
+  for_each_block(ncell >= kParallelMergeCells, merge_pass, &call);
 }
 
 // The logarithm is not for kernels: one cell after the other.
@@ -127,7 +120,7 @@ double Body::direct_energy(const dfm_kin &k, size_t place) const {
 void Body::fill_energies(const dfm_kin &k) {
   Call call(this, &k, nullptr);
   if (nodal()) dilate(k);
-  if (choice(kEnergy) == kLinear) return for_each_block(kParallelCells, energy_pass, &call);
+  if (choice(kEnergy) == kLinear) return for_each_block(ncell >= kParallelCells, energy_pass, &call);
   for (size_t place = 0; place < lanes(); ++place)
     if (cell_id[place] != kNone) value[place] = direct_energy(k, place);
 }
@@ -147,7 +140,7 @@ void Body::cell_energy(const dfm_kin &k, double *out) {
 void Body::cell_stress(const dfm_kin &k, double *out) {
   Call call(this, &k, out);
   if (nodal()) dilate(k);
-  for_each_block(kParallelCells, stress_pass, &call);
+  for_each_block(ncell >= kParallelCells, stress_pass, &call);
   for (size_t n = 0; n < 6 * size_t(ncell); ++n) out[n] = volume[n / 6] > 0 ? out[n] / volume[n / 6] : 0;
 }
 

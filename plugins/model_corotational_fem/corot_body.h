@@ -6,9 +6,8 @@
 #include <algorithm>
 #include <cstdint>
 
-#include "../model_common/buffer.h"
+#include "../model_common/blocks.h"
 #include "../model_common/material.h"
-#include "../model_common/partition.h"
 #include "../model_common/tetrahedron.h"
 #include "corot_kernel.h"
 
@@ -45,18 +44,14 @@ constexpr double kAuto = -1;  // constants along the axis: as without an axis; c
 constexpr const char *kId = "org.deform.corotational_fem";
 void complain(const dfm_host *h, const char *what);
 
-struct Body {
+struct Body : model::Blocks<Block> {
   using Row = Param;
-  static constexpr uint32_t kNone = ~0u;
   // From this size on the blocks go through the host's parallel_for; below it waking a worker costs more than
   // it brings. Adding up the blocks is a twentieth of the work.
   static constexpr uint32_t kParallelCells = 3000, kParallelMergeCells = 100000;
 
-  const dfm_host *host = nullptr;
   const Kernels *kernels = nullptr;
-  uint32_t npoint = 0, ncell = 0, nedge = 0, nblock = 0;
-  // blocks per piece of a pass at least; points of the largest block with its halo
-  uint32_t grain = 1, largest = 0;
+  uint32_t ncell = 0, nedge = 0;
   double params[kValueCount] = {};
   Buffer<double> field[kParamCount];  // [ncell,width] values by cell in place of a parameter's; empty without
 
@@ -81,17 +76,13 @@ struct Body {
   Buffer<double> patch_gradient, patch_damper;  // [patch,3] of the volume change; of its rate, empty without
 
   // In block order.
-  Buffer<Block> block;
-  Buffer<uint32_t> point;
   Buffer<uint32_t> cell_id;   // [groups,8], kNone for one that fills up
   Buffer<uint32_t> place_of;  // [ncell] where a cell stands in that order
-  Buffer<double> p, f, damp, value, damp_value;
+  Buffer<double> damp, value, damp_value;
   Buffer<Group> group;
   Buffer<SlotGroup> slots;
   Buffer<FibreGroup> fibre;
   Buffer<PlasticGroup> plastic_group;
-  Buffer<Merge> merge;                       // by owning block
-  Buffer<uint32_t> merge_begin, slot_begin;  // [nblock + 1]
 
   uint32_t choice(Param which) const { return uint32_t(params[which]); }
   double at(Param which, uint32_t c) const { return field[which].empty() ? params[which] : field[which][c]; }
@@ -134,24 +125,14 @@ struct Body {
   void pattern(uint32_t *ij) const;
   void add_stiffness(const dfm_kin &k, double a, double b, double *blk);
 
-  // Block n with the packed points of the piece that begins at block `begin`: a piece uses one place for all
-  // of its blocks, which therefore stays in the cache however large the body is. Pieces begin at multiples of
-  // the grain, so no two share a place.
-  Block lend(uint32_t n, uint32_t begin) {
-    Block b = block[n];
-    b.p = p.data() + 8 * size_t(largest) * (begin / grain);
-    return b;
-  }
-
  private:
   void take_mesh(const dfm_mesh &m);
   void take_fields(const dfm_mesh &m);
   struct Layout;
   void build_blocks(const dfm_mesh &m);
   void order_cells(Layout &l) const;
-  uint32_t find_halo(Layout &l, uint32_t b) const;
+  uint32_t cell_halo(Layout &l, uint32_t b) const;
   void fill_groups(const Layout &l, const dfm_mesh &m, uint32_t b, uint32_t groups_at);
-  void build_merge(const Layout &l);
   void build_patches();
   void find_bulk();
   uint32_t slot_of(uint32_t i, uint32_t j) const;
@@ -171,7 +152,6 @@ struct Body {
   void fill_drag(Room &room);
   void find_effects();
   void find_rows(Room &room);
-  void for_each_block(uint32_t least_cells, void (*fn)(void *, uint32_t, uint32_t), void *user);
 };
 
 // What the passes over blocks hand on to their pieces.

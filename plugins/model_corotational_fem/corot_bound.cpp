@@ -130,7 +130,7 @@ void Body::find_rows(Room &room) {
 void Body::bound(const dfm_kin &k, double *ksum, double *csum) {
   Call call(this, &k, nullptr);
   if (nodal()) dilate(k);
-  for_each_block(kParallelCells, twist_pass, &call);
+  for_each_block(ncell >= kParallelCells, twist_pass, &call);
   for (uint32_t i = 0; i < npoint; ++i) {
     ksum[i] += choice(kEnergy) == kLinear ? rest_rows[i] : 0;
     csum[i] += damp_rows[i] + (point_drag.empty() ? 0 : point_drag[i]);

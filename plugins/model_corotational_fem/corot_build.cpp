@@ -8,9 +8,6 @@
 namespace corot {
 namespace {
 
-// of a pass over the blocks at most: enough for the workers that one body can feed
-constexpr uint32_t kPieces = 32;
-
 const Kernels *choose_kernels(const dfm_host *host) {
   const model::Width width = model::choose_width(host, "corotational_fem");
   return width == model::kAvx512 ? kernels_avx512() : width == model::kAvx2 ? kernels_avx2() : kernels_sse2();
@@ -56,23 +53,15 @@ void Body::take_mesh(const dfm_mesh &m) {
   }
 }
 
-// What leads from the mesh to the blocks; a rank is a point's place in the order of partition_points.
-struct Body::Layout {
-  // points by rank, ranks by point, first rank of each block, block of a rank
-  Buffer<uint32_t> order, rank, begin, block_of;
+struct Body::Layout : Order {
   Buffer<uint32_t> cell_order, cell_begin;  // cells by block
-  // last block that saw a rank, its number there, ranks outside the block
-  Buffer<uint32_t> mark, local, halo;
 };
 
 // A cell belongs to the block of its lowest rank, in the order of that rank.
 void Body::order_cells(Layout &l) const {
   l.cell_order.create(host, ncell);
   l.cell_begin.create(host, size_t(nblock) + 1);
-  const auto lowest = [&](uint32_t c) {
-    const uint32_t *q = cells.data() + 4 * size_t(c);
-    return std::min(std::min(l.rank[q[0]], l.rank[q[1]]), std::min(l.rank[q[2]], l.rank[q[3]]));
-  };
+  const auto lowest = [&](uint32_t c) { return lowest_rank(l, cells.data() + 4 * size_t(c)); };
   for (uint32_t c = 0; c < ncell; ++c) {
     l.cell_order[c] = c;
     ++l.cell_begin[l.block_of[lowest(c)] + 1];
@@ -82,18 +71,11 @@ void Body::order_cells(Layout &l) const {
             [&](uint32_t a, uint32_t b) { return lowest(a) != lowest(b) ? lowest(a) < lowest(b) : a < b; });
 }
 
-// Ranks outside block b that its cells touch, ascending, in l.halo; returns how many.
-uint32_t Body::find_halo(Layout &l, uint32_t b) const {
-  uint32_t n = 0;
-  for (uint32_t c = l.cell_begin[b]; c < l.cell_begin[b + 1]; ++c)
-    for (int a = 0; a < 4; ++a) {
-      const uint32_t r = l.rank[cells[4 * size_t(l.cell_order[c]) + a]];
-      if (l.block_of[r] == b || l.mark[r] == b) continue;
-      l.mark[r] = b;
-      l.halo[n++] = r;
-    }
-  std::sort(l.halo.data(), l.halo.data() + n);
-  return n;
+uint32_t Body::cell_halo(Layout &l, uint32_t b) const {
+  return find_halo(l, b, [&](auto &&see) {
+    for (uint32_t c = l.cell_begin[b]; c < l.cell_begin[b + 1]; ++c)
+      for (int a = 0; a < 4; ++a) see(l.rank[cells[4 * size_t(l.cell_order[c]) + a]]);
+  });
 }
 
 // The last group is filled up with the block's first cell, which then has no stiffness.
@@ -116,79 +98,23 @@ void Body::fill_groups(const Layout &l, const dfm_mesh &m, uint32_t b, uint32_t 
   }
 }
 
-// Halo sums by owner, sources in block order: the order of the sums is the mesh's, never the threads'.
-void Body::build_merge(const Layout &l) {
-  merge_begin.create(host, size_t(nblock) + 1);
-  const auto each = [&](auto &&use) {
-    for (uint32_t b = 0; b < nblock; ++b)
-      for (uint32_t n = block[b].owned; n < block[b].local; ++n) use(b, n, l.rank[block[b].point[n]]);
-  };
-  each([&](uint32_t, uint32_t, uint32_t r) { ++merge_begin[l.block_of[r] + 1]; });
-  for (uint32_t b = 0; b < nblock; ++b) merge_begin[b + 1] += merge_begin[b];
-  merge.create(host, merge_begin[nblock]);
-  Buffer<uint32_t> at;
-  at.create(host, nblock);
-  std::copy(merge_begin.data(), merge_begin.data() + nblock, at.data());
-  each([&](uint32_t b, uint32_t n, uint32_t r) {
-    const uint32_t owner = l.block_of[r];
-    merge[at[owner]++] = {slot_begin[b] + n, slot_begin[owner] + (r - l.begin[owner])};
-  });
-}
-
 void Body::build_blocks(const dfm_mesh &m) {
   Layout l;
-  l.order.create(host, npoint);
-  l.rank.create(host, npoint);
-  l.block_of.create(host, npoint);
-  l.begin.create(host, model::partition_capacity(npoint));
-  nblock = model::partition_points(m.rest, npoint, l.order.data(), l.begin.data());
-  for (uint32_t b = 0; b < nblock; ++b)
-    for (uint32_t r = l.begin[b]; r < l.begin[b + 1]; ++r) {
-      l.rank[l.order[r]] = r;
-      l.block_of[r] = b;
-    }
+  order_points(l, m.rest);
   order_cells(l);
-  l.mark.create(host, npoint);
-  l.local.create(host, npoint);
-  l.halo.create(host, npoint);
-  std::fill(l.mark.data(), l.mark.data() + npoint, kNone);
-
   // Sizes, then one allocation per array, then each block's share.
-  slot_begin.create(host, size_t(nblock) + 1);
-  block.create(host, nblock);
+  create_points(l, [&](uint32_t b) { return cell_halo(l, b); });
   for (uint32_t b = 0; b < nblock; ++b) {
-    slot_begin[b + 1] = slot_begin[b] + (l.begin[b + 1] - l.begin[b]) + find_halo(l, b);
-    largest = std::max(largest, slot_begin[b + 1] - slot_begin[b]);
     block[b].groups = (l.cell_begin[b + 1] - l.cell_begin[b] + kGroup - 1) / kGroup;
     groups += block[b].groups;
   }
-  grain = (nblock + kPieces - 1) / kPieces;
-  point.create(host, slot_begin[nblock]);
-  p.create(host, 8 * size_t(largest) * ((nblock + grain - 1) / grain));
-  f.create(host, 4 * size_t(slot_begin[nblock]));
   group.create(host, groups);
   slots.create(host, groups);
   cell_id.create(host, lanes());
   value.create(host, lanes());
-
-  std::fill(l.mark.data(), l.mark.data() + npoint, kNone);
   uint32_t groups_at = 0;
   for (uint32_t b = 0; b < nblock; ++b) {
-    const uint32_t owned = l.begin[b + 1] - l.begin[b], nhalo = find_halo(l, b);
-    uint32_t *const points = point.data() + slot_begin[b];
-    for (uint32_t n = 0; n < owned; ++n) {
-      l.local[l.begin[b] + n] = n;
-      points[n] = l.order[l.begin[b] + n];
-    }
-    for (uint32_t n = 0; n < nhalo; ++n) {
-      l.local[l.halo[n]] = owned + n;
-      points[owned + n] = l.order[l.halo[n]];
-    }
-    Block &out = block[b];
-    out.owned = owned;
-    out.local = owned + nhalo;
-    out.point = points;
-    out.f = f.data() + 4 * size_t(slot_begin[b]);
+    Block &out = place_points(l, b, cell_halo(l, b));
     out.group = group.data() + groups_at;
     out.slots = slots.data() + groups_at;
     out.value = value.data() + size_t(kGroup) * groups_at;

@@ -9,6 +9,8 @@
 #pragma once
 #include <stdint.h>
 
+#include "../model_common/block_points.h"
+
 namespace corot {
 
 constexpr uint32_t kGroup = 8;  // cells side by side in memory, one per lane of the widest vector
@@ -45,17 +47,12 @@ using Rotate = void (*)(const double *gradient, double *rotation);
 //   St. Venant   W = mu E:E + lambda/2 (tr E)^2,  P = F (2 mu E + lambda tr(E) I)
 enum Energy : uint32_t { kLinear, kNeoHookean, kVenant };
 
-// One block of the body: points it owns, then the points of other blocks that its cells touch (halo).
-struct Block {
-  uint32_t owned, local, groups;
-  uint32_t energy;        // Energy
-  uint32_t rotate_all;    // no closed form, every cell goes to `rotate`
-  uint32_t nodal;         // the volume change is that of the points, see corot_nodal.cpp
-  const uint32_t *point;  // [local] number of the point in the host's arrays
-  // [local,8] x y z 0 vx vy vz 0: a point with its velocity is one cache line; lent by the pass. Where
-  // `nodal` the zeros are the volume change of the point and its rate.
-  double *p;
-  double *f;  // [local,4]
+// One block of the body. Where `nodal` the zeros of p are the volume change of the point and its rate.
+struct Block : model::BlockPoints {
+  uint32_t groups;
+  uint32_t energy;      // Energy
+  uint32_t rotate_all;  // no closed form, every cell goes to `rotate`
+  uint32_t nodal;       // the volume change is that of the points, see corot_nodal.cpp
   const Group *group;
   const FibreGroup *fibre;  // NULL: isotropic
   const double *damp;       // [groups,8] s; NULL: none
@@ -72,12 +69,9 @@ struct Block {
   Rotate rotate;
 };
 
-// Slots of all blocks' f: a halo point of another block, and the point that it stands for.
-struct Merge { uint32_t from, to; };
-
 struct Kernels {
-  // Copies x (and v, unless NULL) of the block's points in and clears f.
-  void (*load)(const Block &b, const double *x, const double *v, uint32_t stride);
+  // Those of model_common/block_lanes.h.
+  void (*load)(const model::BlockPoints &b, const double *x, const double *v, uint32_t stride);
   // Adds the cells' shares in the volume change of their points, and in its rate where there are dampers, to
   // the first two components of f.
   void (*dilate)(const Block &b);
@@ -91,8 +85,8 @@ struct Kernels {
   void (*twists)(const Block &b);
   // blk -= (a + b damp) R K_e R^T of each cell
   void (*tangents)(const Block &b, double a, double damp, double *blk);
-  void (*merge)(double *f, const Merge *merge, uint32_t n);
-  void (*store)(const Block &b, double *f, uint32_t stride);  // adds the owned points' forces to the host's
+  void (*merge)(double *f, const model::Merge *merge, uint32_t n);
+  void (*store)(const model::BlockPoints &b, double *f, uint32_t stride);
 };
 
 // The sum of the two smaller stretches of a cell, over the trace of all three, from which on the bound counts

@@ -3,6 +3,7 @@
 #pragma once
 #include <stddef.h>
 
+#include "../model_common/block_lanes.h"
 #include "../model_common/polar_lanes.h"
 #include "corot_kernel.h"
 #include "corot_plastic.h"
@@ -11,22 +12,6 @@ namespace corot {
 namespace {
 
 using namespace lanes;
-
-DEFORM_INLINE v4 point4(const Block &b, uint32_t n) { return load4(b.p + 8 * size_t(n)); }
-DEFORM_INLINE v4 velocity4(const Block &b, uint32_t n) { return load4(b.p + 8 * size_t(n) + 4); }
-DEFORM_INLINE void add_to(const Block &b, uint32_t n, v4 a) {
-  double *f = b.f + 4 * size_t(n);
-  store4(f, load4(f) + a);
-}
-
-static inline void load_block(const Block &b, const double *x, const double *v, uint32_t stride) {
-  for (uint32_t n = 0; n < b.local; ++n) {
-    const size_t at = size_t(stride) * b.point[n];
-    store4(b.p + 8 * size_t(n), load_xyz(x + at));
-    if (v) store4(b.p + 8 * size_t(n) + 4, load_xyz(v + at));
-    store4(b.f + 4 * size_t(n), splat(0));
-  }
-}
 
 // Four cells of a group, from lane `at` on.
 struct Four {
@@ -352,8 +337,8 @@ DEFORM_INLINE void balance(const v4 *stress, const v4 *s, const Turning &turn_by
   out[2] = out[2] - q[1];
 }
 
-// What fibres and dampers add to the stress of a cell in its frame; f is lost.
-template <bool kFibre, bool kDamped>
+// What fibres, dampers and plastic strain (kMore) add to the stress of a cell in its frame; f is lost.
+template <bool kFibre, bool kDamped, bool kMore>
 DEFORM_INLINE void add_others(const Block &b, uint32_t n, const Four &q, const v4 *r, const v4 *e, v4 *f,
                               v4 *all) {
   v4 s[6], other[6];
@@ -366,37 +351,16 @@ DEFORM_INLINE void add_others(const Block &b, uint32_t n, const Four &q, const v
     strain_rate(r, f, s, turn_by, rate);
     const v4 damp = load4(b.damp + size_t(kGroup) * n + q.at);
     for (int k = 0; k < 6; ++k) rate[k] = damp * rate[k];
-    stress_of(q, rate, other);
+    if (kMore && b.nodal) nodal_stress(q, rate, damp * corner_mean<4>(b, q), other);
+    else stress_of(q, rate, other);
     for (int k = 0; k < 6; ++k) rate[k] = rate[k] + e[k];
     if constexpr (kFibre) add_fibre_stress(b.fibre[n], q.at, rate, other);
-  } else {
+  } else if constexpr (kFibre) {
     fibre_stress(b.fibre[n], q.at, e, other);
+  } else {
+    for (int k = 0; k < 6; ++k) other[k] = splat(0);
   }
-  balance(other, s, turn_by, all);
-}
-
-// The same for plastic cells, and for dampers beside the volume change of the points.
-template <bool kDamped>
-DEFORM_INLINE void add_more(const Block &b, uint32_t n, const Four &q, const v4 *r, const v4 *e, v4 *f,
-                            v4 *all) {
-  if (!kDamped && !b.plastic) return;
-  v4 s[6], other[6];
-  Turning turn_by;
-  for (int k = 0; k < 6; ++k) {
-    s[k] = k < 3 ? e[k] + splat(1) : e[k];
-    other[k] = splat(0);
-  }
-  turning(s, turn_by);
-  if constexpr (kDamped) {
-    v4 rate[6];
-    gradient<4>(b, q, f);
-    strain_rate(r, f, s, turn_by, rate);
-    const v4 damp = load4(b.damp + size_t(kGroup) * n + q.at);
-    for (int k = 0; k < 6; ++k) rate[k] = damp * rate[k];
-    if (b.nodal) nodal_stress(q, rate, damp * corner_mean<4>(b, q), other);
-    else stress_of(q, rate, other);
-  }
-  if (b.plastic) {
+  if (kMore && b.plastic) {
     PlasticState<Wide> state;
     flowed(b, n, q, e, state);
     const v4 mu2 = load4(q.group->mu2 + q.at);
@@ -435,15 +399,14 @@ DEFORM_INLINE void piola(const Block &b, uint32_t n, const Four &q, v4 *f, const
     if (kMore && b.nodal) nodal_stress(q, e, corner_mean<0>(b, q), stress);
     else stress_of(q, e, stress);
     full(stress, all);
-    if constexpr (kMore) add_more<kDamped>(b, n, q, r, e, f, all);
-    else if constexpr (kFibre || kDamped) add_others<kFibre, kDamped>(b, n, q, r, e, f, all);
+    if (kFibre || kDamped || (kMore && b.plastic)) add_others<kFibre, kDamped, kMore>(b, n, q, r, e, f, all);
     turn(r, all, p);
   } else {
     direct_stress<kEnergy>(q, f, o, p);
     if constexpr (kDamped) {
       v4 damper[9];
       for (int k = 0; k < 9; ++k) all[k] = splat(0);
-      add_others<false, true>(b, n, q, r, e, f, all);
+      add_others<false, true, false>(b, n, q, r, e, f, all);
       turn(r, all, damper);
       for (int k = 0; k < 9; ++k) p[k] = p[k] + damper[k];
     }
@@ -722,21 +685,6 @@ static inline void cell_tangents(const Block &b, double a, double damp, double *
 }
 static inline void tangents(const Block &b, double a, double damp, double *blk) {
   return b.fibre ? cell_tangents<true>(b, a, damp, blk) : cell_tangents<false>(b, a, damp, blk);
-}
-
-static inline void merge_halo(double *f, const Merge *merge, uint32_t n) {
-  for (uint32_t m = 0; m < n; ++m) {
-    double *to = f + 4 * size_t(merge[m].to);
-    store4(to, load4(to) + load4(f + 4 * size_t(merge[m].from)));
-  }
-}
-
-static inline void add_to_host(const Block &b, double *f, uint32_t stride) {
-  for (uint32_t n = 0; n < b.owned; ++n) {
-    double *out = f + size_t(stride) * b.point[n];
-    const double *sum = b.f + 4 * size_t(n);
-    for (int k = 0; k < 3; ++k) out[k] += sum[k];
-  }
 }
 
 constexpr Kernels kKernels = {load_block, dilate,   forces,     stresses,   energies,

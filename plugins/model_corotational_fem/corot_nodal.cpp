@@ -29,8 +29,7 @@ void change_pass(void *user, uint32_t begin, uint32_t end) {
   Body &body = *call.body;
   for (uint32_t n = begin; n < end; ++n) {
     const Block &b = body.block[n];
-    body.kernels->merge(body.f.data(), body.merge.data() + body.merge_begin[n],
-                        body.merge_begin[n + 1] - body.merge_begin[n]);
+    body.merge_block(*body.kernels, n);
     for (uint32_t i = 0; i < b.owned; ++i)
       for (size_t m = 0; m < 2; ++m) {
         const double all = body.bulk[2 * size_t(b.point[i]) + m];
@@ -43,8 +42,8 @@ void change_pass(void *user, uint32_t begin, uint32_t end) {
 
 void Body::dilate(const dfm_kin &k) {
   Call call(this, &k, nullptr);
-  for_each_block(kParallelCells, share_pass, &call);
-  for_each_block(kParallelMergeCells, change_pass, &call);
+  for_each_block(ncell >= kParallelCells, share_pass, &call);
+  for_each_block(ncell >= kParallelMergeCells, change_pass, &call);
 }
 
 void Body::find_bulk() {

@@ -31,8 +31,7 @@ void merge_pass(void *user, uint32_t begin, uint32_t end) {
   };
   for (uint32_t n = begin; n < end; ++n) {
     const Block &b = body.block[n];
-    body.kernels->merge(body.f.data(), body.merge.data() + body.merge_begin[n],
-                        body.merge_begin[n + 1] - body.merge_begin[n]);
+    body.merge_block(*body.kernels, n);
     for (uint32_t i = 0; body.drag_on && i < b.owned; ++i) {
       const double c = drag(b.point[i]) * body.mass[b.point[i]];
       const double *v = call.k->v + size_t(call.k->stride) * b.point[i];
@@ -47,12 +46,6 @@ void merge_pass(void *user, uint32_t begin, uint32_t end) {
 const Kernels *choose_kernels(const dfm_host *host) {
   const model::Width width = model::choose_width(host, "msm");
   return width == model::kAvx512 ? kernels_avx512() : width == model::kAvx2 ? kernels_avx2() : kernels_sse2();
-}
-
-void Body::for_each_block(uint32_t least_cells, void (*fn)(void *, uint32_t, uint32_t), void *user) {
-  if (ncell >= least_cells && host->parallel_for)
-    return host->parallel_for(host->ctx, nblock, grain, fn, user);
-  fn(user, 0, nblock);
 }
 
 // Branches: exact for a stretch that grows evenly over a step, dp/dt = de/dt - p/tau, hence p+ = E p + kept
@@ -91,8 +84,8 @@ void Body::add_forces(const dfm_kin &k, double *f_out) {
   const Branch branch = branch_at(k);
   Call call{this, &k, f_out, has_branch() ? &branch : nullptr};
   if (has_branch() && k.state_out) k.state_out[nedge] = branch.next;
-  for_each_block(kParallelCells, force_pass, &call);
-  for_each_block(kParallelMergeCells, merge_pass, &call);
+  for_each_block(ncell >= kParallelCells, force_pass, &call);
+  for_each_block(ncell >= kParallelMergeCells, merge_pass, &call);
 }
 
 // T = k (L - L0 - part q), q the dashpot's extension: a plain spring of the same stiffness and a rest length

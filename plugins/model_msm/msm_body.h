@@ -7,17 +7,14 @@
 #include <cstdint>
 #include <cstring>
 
-#include "../model_common/buffer.h"
+#include "../model_common/blocks.h"
 #include "../model_common/entry.h"
-#include "../model_common/partition.h"
 #include "msm_kernel.h"
 
 namespace msm {
 
 using model::Buffer;
 using model::Refused;
-using model::partition_capacity;
-using model::partition_points;
 
 // Rows of the parameter table; a row's value begins at its number, the last row is three wide.
 enum Param : uint32_t {
@@ -50,18 +47,14 @@ bool valid(const dfm_host *h, const double *values);  // of all parameters; fals
 // negative gives less.
 inline double volume_for(double nu) { return nu > 0.25 ? 3 * (4 * nu - 1) / (2 * (1 + nu)) : 0; }
 
-struct Body {
+struct Body : model::Blocks<Block> {
   using Row = Param;
-  static constexpr uint32_t kNone = ~0u;
   // From this size on the blocks go through the host's parallel_for; below it waking a worker costs more than
   // it brings. Adding up the blocks is a twentieth of the work.
   static constexpr uint32_t kParallelCells = 10000, kParallelMergeCells = 100000;
 
-  const dfm_host *host = nullptr;
   const Kernels *kernels = nullptr;
-  uint32_t npoint = 0, ncell = 0, nedge = 0, nblock = 0;
-  // blocks per piece of a pass at least; points of the largest block with its halo
-  uint32_t grain = 1, largest = 0;
+  uint32_t ncell = 0, nedge = 0;
   double params[kValueCount] = {};
   Buffer<double> field[kParamCount];  // [ncell,width] values by cell in place of a parameter's; empty without
 
@@ -86,16 +79,13 @@ struct Body {
   const char *active_effects[8] = {};  // of the present parameters, NULL-terminated
 
   // In block order.
-  Buffer<Block> block;
-  Buffer<uint32_t> point, spring_edge, cell_id;
-  Buffer<double> p, f, stiffness, rest, bulk, collapse, limit, volume6, slot_weight, row;
+  Buffer<uint32_t> spring_edge, cell_id;
+  Buffer<double> stiffness, rest, bulk, collapse, limit, volume6, slot_weight, row;
   // as the springs'; rest_now: of plain springs with the same forces as those with branches
   Buffer<double> tilt, damp, rest_now;
   Buffer<uint32_t> limited;  // [nblock] cells beyond their limit at the last bound
   Buffer<Quad> quad;
   Buffer<Cell> cell;
-  Buffer<Merge> merge;                       // by owning block
-  Buffer<uint32_t> merge_begin, slot_begin;  // [nblock + 1]
 
   // why a parameter does nothing beside the present others; NULL where it does
   const char *idle(Param which) const;
@@ -146,15 +136,6 @@ struct Body {
   void create(const dfm_host *h, const dfm_mesh &m);
   void apply_params(const double *values);
 
-  // Block n with the packed points of the piece that begins at block `begin`: a piece uses one place for all
-  // of its blocks, which therefore stays in the cache however large the body is. Pieces begin at multiples of
-  // the grain, so no two share a place.
-  Block lend(uint32_t n, uint32_t begin) {
-    Block b = block[n];
-    b.p = p.data() + 8 * size_t(largest) * (begin / grain);
-    return b;
-  }
-
   void add_forces(const dfm_kin &k, double *f_out);
   void bound(const dfm_kin &k, double *ksum, double *csum);
   bool lacks_state(const dfm_kin &k) const;
@@ -176,10 +157,9 @@ struct Body {
   void order_springs(Layout &l) const;
   void order_cells(Layout &l) const;
   uint32_t high_rank(const Layout &l, uint32_t e) const;
-  uint32_t find_halo(Layout &l, uint32_t b) const;
+  uint32_t spring_halo(Layout &l, uint32_t b) const;
   size_t fill_springs(const Layout &l, Block &out, uint32_t b, size_t quads_at);
   size_t fill_cells(const Layout &l, Block &out, uint32_t b, size_t cells_at);
-  void build_merge(const Layout &l);
   void take_fields(const dfm_mesh &m);
   void find_shapes();
   // what new parameters need, taken before anything changes: arrays to swap in, and sums and
@@ -201,7 +181,6 @@ struct Body {
   SpringTangent spring_tangent(uint32_t e, double square, const Branch &branch) const;
   void add_springs(const dfm_kin &k, double a, double b, double *blk) const;
   void add_cells(const dfm_kin &k, double a, double *blk) const;
-  void for_each_block(uint32_t least_cells, void (*fn)(void *, uint32_t, uint32_t), void *user);
 };
 
 // What the passes over blocks hand on to their pieces.

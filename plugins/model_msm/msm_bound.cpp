@@ -86,8 +86,8 @@ void Body::find_weights(Room &room) {
   at_rest.x = rest_point.data();
   at_rest.stride = 3;
   RowCall diagonal{{this, &at_rest, nullptr, nullptr}, own.data(), nullptr};
-  for_each_block(kParallelCells, row_pass, static_cast<Call *>(&diagonal));
-  for_each_block(kParallelMergeCells, merge_row_pass, &diagonal);
+  for_each_block(ncell >= kParallelCells, row_pass, static_cast<Call *>(&diagonal));
+  for_each_block(ncell >= kParallelMergeCells, merge_row_pass, &diagonal);
   if (volume_on)
     for (uint32_t c = 0; c < ncell; ++c) {
       const uint32_t *q = cells.data() + 4 * size_t(c);
@@ -140,8 +140,8 @@ void Body::find_weights(Room &room) {
 
 void Body::bound(const dfm_kin &k, double *ksum, double *csum) {
   RowCall call{{this, &k, nullptr, nullptr}, ksum, csum};
-  for_each_block(kParallelCells, row_pass, static_cast<Call *>(&call));
-  for_each_block(kParallelMergeCells, merge_row_pass, &call);
+  for_each_block(ncell >= kParallelCells, row_pass, static_cast<Call *>(&call));
+  for_each_block(ncell >= kParallelMergeCells, merge_row_pass, &call);
 }
 
 }  // namespace msm

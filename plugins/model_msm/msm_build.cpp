@@ -5,13 +5,6 @@
 #include "msm_body.h"
 
 namespace msm {
-namespace {
-
-// of a pass over the blocks at most: enough for the workers that one body can feed
-constexpr uint32_t kPieces = 32;
-
-}  // namespace
-
 void Body::take_mesh(const dfm_mesh &m) {
   npoint = m.npoint;
   ncell = m.ncell;
@@ -54,15 +47,10 @@ void Body::take_mesh(const dfm_mesh &m) {
   find_directions();
 }
 
-// What leads from the mesh to the blocks; a rank is a point's place in the order of partition_points.
-struct Body::Layout {
-  // points by rank, ranks by point, first rank of each block, block of a rank
-  Buffer<uint32_t> order, rank, begin, block_of;
+struct Body::Layout : Order {
   // springs by their end of lower rank, other ends ascending
   Buffer<uint32_t> row, edge;
   Buffer<uint32_t> cell_order, cell_begin;  // cells by block
-  // last block that saw a rank, its number there, ranks outside the block
-  Buffer<uint32_t> mark, local, halo;
 };
 
 void Body::order_springs(Layout &l) const {
@@ -90,10 +78,7 @@ void Body::order_cells(Layout &l) const {
   l.cell_order.create(host, ncell);
   block_of_cell.create(host, ncell);
   l.cell_begin.create(host, size_t(nblock) + 1);
-  const auto lowest = [&](uint32_t c) {
-    const uint32_t *q = cells.data() + 4 * size_t(c);
-    return std::min(std::min(l.rank[q[0]], l.rank[q[1]]), std::min(l.rank[q[2]], l.rank[q[3]]));
-  };
+  const auto lowest = [&](uint32_t c) { return lowest_rank(l, cells.data() + 4 * size_t(c)); };
   for (uint32_t c = 0; c < ncell; ++c) {
     uint32_t of[4], best = 0, best_count = 0;
     for (int n = 0; n < 4; ++n) of[n] = l.block_of[l.rank[cells[4 * size_t(c) + n]]];
@@ -116,20 +101,12 @@ void Body::order_cells(Layout &l) const {
   });
 }
 
-// Ranks outside block b that its springs and cells touch, ascending, in l.halo; returns how many.
-uint32_t Body::find_halo(Layout &l, uint32_t b) const {
-  uint32_t n = 0;
-  const auto see = [&](uint32_t r) {
-    if (l.block_of[r] != b && l.mark[r] != b) {
-      l.mark[r] = b;
-      l.halo[n++] = r;
-    }
-  };
-  for (uint32_t s = l.row[l.begin[b]]; s < l.row[l.begin[b + 1]]; ++s) see(high_rank(l, l.edge[s]));
-  for (uint32_t c = l.cell_begin[b]; c < l.cell_begin[b + 1]; ++c)
-    for (int a = 0; a < 4; ++a) see(l.rank[cells[4 * size_t(l.cell_order[c]) + a]]);
-  std::sort(l.halo.data(), l.halo.data() + n);
-  return n;
+uint32_t Body::spring_halo(Layout &l, uint32_t b) const {
+  return find_halo(l, b, [&](auto &&see) {
+    for (uint32_t s = l.row[l.begin[b]]; s < l.row[l.begin[b + 1]]; ++s) see(high_rank(l, l.edge[s]));
+    for (uint32_t c = l.cell_begin[b]; c < l.cell_begin[b + 1]; ++c)
+      for (int a = 0; a < 4; ++a) see(l.rank[cells[4 * size_t(l.cell_order[c]) + a]]);
+  });
 }
 
 // Rows of springs as quads from quads_at on; a short one is filled up with its first end: no stiffness, and
@@ -178,63 +155,23 @@ size_t Body::fill_cells(const Layout &l, Block &out, uint32_t b, size_t cells_at
   return cells_at;
 }
 
-// Halo sums by owner, sources in block order: the order of the sums is the mesh's, never the threads'.
-void Body::build_merge(const Layout &l) {
-  merge_begin.create(host, size_t(nblock) + 1);
-  const auto each = [&](auto &&use) {
-    for (uint32_t b = 0; b < nblock; ++b)
-      for (uint32_t n = block[b].owned; n < block[b].local; ++n) use(b, n, l.rank[block[b].point[n]]);
-  };
-  each([&](uint32_t, uint32_t, uint32_t r) { ++merge_begin[l.block_of[r] + 1]; });
-  for (uint32_t b = 0; b < nblock; ++b) merge_begin[b + 1] += merge_begin[b];
-  merge.create(host, merge_begin[nblock]);
-  Buffer<uint32_t> at;
-  at.create(host, nblock);
-  std::copy(merge_begin.data(), merge_begin.data() + nblock, at.data());
-  each([&](uint32_t b, uint32_t n, uint32_t r) {
-    const uint32_t owner = l.block_of[r];
-    merge[at[owner]++] = {slot_begin[b] + n, slot_begin[owner] + (r - l.begin[owner])};
-  });
-}
-
 void Body::build_blocks() {
   Layout l;
-  l.order.create(host, npoint);
-  l.rank.create(host, npoint);
-  l.block_of.create(host, npoint);
-  l.begin.create(host, partition_capacity(npoint));
-  nblock = partition_points(rest_point.data(), npoint, l.order.data(), l.begin.data());
-  for (uint32_t b = 0; b < nblock; ++b)
-    for (uint32_t r = l.begin[b]; r < l.begin[b + 1]; ++r) {
-      l.rank[l.order[r]] = r;
-      l.block_of[r] = b;
-    }
+  order_points(l, rest_point.data());
   order_springs(l);
   order_cells(l);
-  l.mark.create(host, npoint);
-  l.local.create(host, npoint);
-  l.halo.create(host, npoint);
-  std::fill(l.mark.data(), l.mark.data() + npoint, kNone);
-
   // Sizes, then one allocation per array, then each block's share.
+  create_points(l, [&](uint32_t b) { return spring_halo(l, b); });
   size_t nquad = 0, ncells = 0;
-  slot_begin.create(host, size_t(nblock) + 1);
   for (uint32_t b = 0; b < nblock; ++b) {
     for (uint32_t r = l.begin[b]; r < l.begin[b + 1]; ++r) nquad += (l.row[r + 1] - l.row[r] + 3) / 4;
     nquad += nquad % 2;
     ncells += (l.cell_begin[b + 1] - l.cell_begin[b] + 7) / 8 * 8;
-    slot_begin[b + 1] = slot_begin[b] + (l.begin[b + 1] - l.begin[b]) + find_halo(l, b);
-    largest = std::max(largest, slot_begin[b + 1] - slot_begin[b]);
   }
-  grain = (nblock + kPieces - 1) / kPieces;
   const size_t nslot = slot_begin[nblock];
-  block.create(host, nblock);
-  point.create(host, nslot);
   slot_weight.create(host, nslot);
   std::fill(slot_weight.data(), slot_weight.data() + nslot, 1.0);
-  p.create(host, 8 * size_t(largest) * ((nblock + grain - 1) / grain));
   row.create(host, 8 * nslot);
-  f.create(host, 4 * nslot);
   quad.create(host, nquad);
   stiffness.create(host, 4 * nquad);
   rest.create(host, 4 * nquad);
@@ -247,24 +184,9 @@ void Body::build_blocks() {
   limit.create(host, ncells);
   limited.create(host, nblock);
 
-  std::fill(l.mark.data(), l.mark.data() + npoint, kNone);
   size_t quads_at = 0, cells_at = 0;
   for (uint32_t b = 0; b < nblock; ++b) {
-    const uint32_t owned = l.begin[b + 1] - l.begin[b], nhalo = find_halo(l, b);
-    uint32_t *const points = point.data() + slot_begin[b];
-    for (uint32_t n = 0; n < owned; ++n) {
-      l.local[l.begin[b] + n] = n;
-      points[n] = l.order[l.begin[b] + n];
-    }
-    for (uint32_t n = 0; n < nhalo; ++n) {
-      l.local[l.halo[n]] = owned + n;
-      points[owned + n] = l.order[l.halo[n]];
-    }
-    Block &out = block[b];
-    out.owned = owned;
-    out.local = owned + nhalo;
-    out.point = points;
-    out.f = f.data() + 4 * size_t(slot_begin[b]);
+    Block &out = place_points(l, b, spring_halo(l, b));
     out.edge = spring_edge.data() + 4 * quads_at;
     out.limited = limited.data() + b;
     out.row = row.data() + 8 * size_t(slot_begin[b]);

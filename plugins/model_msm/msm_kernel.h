@@ -18,6 +18,8 @@
 #pragma once
 #include <stdint.h>
 
+#include "../model_common/block_points.h"
+
 namespace msm {
 
 // Four springs that leave the same point. Short rows are filled with springs of stiffness zero.
@@ -25,14 +27,9 @@ struct Quad { uint32_t i, reserved, j[4]; };
 // A cell: local points, orientation as given.
 struct Cell { uint32_t p[4]; };
 
-// One block of the body: points it owns, then the points of other blocks that its springs and
-// cells touch (halo).
-struct Block {
-  uint32_t owned, local, quads, cells;  // quads is even, cells a multiple of 8
-  const uint32_t *point;                // [local] number of the point in the host's arrays
-  // [local,8] x y z 0 vx vy vz 0: a point with its velocity is one cache line; lent by the pass
-  double *p;
-  double *f;  // [local,4]
+// One block of the body.
+struct Block : model::BlockPoints {
+  uint32_t quads, cells;  // quads is even, cells a multiple of 8
   // [local,8] row sums: the springs' block xx yy zz, coupling (kTilted, kTurned), xy yz zx, then
   // the cells' row
   double *row;
@@ -50,9 +47,6 @@ struct Block {
   const double *limit;           // [cells] kLimit times the sum of the squared edges at rest, m^2
 };
 
-// Slots of all blocks' f: a halo point of another block, and the point that it stands for.
-struct Merge { uint32_t from, to; };
-
 // A spring with a dashpot in series beside it, for one step: p = r + kept e is the stretch of the branch's
 // spring (doc/models/msm.md).
 struct Branch {
@@ -69,8 +63,8 @@ enum Damping : uint32_t { kUndamped, kUniform, kPerSpring, kDampings };
 
 struct Kernels {
   const char *name;
-  // Copies x (and v, unless NULL) of the block's points in and clears f.
-  void (*load)(const Block &b, const double *x, const double *v, uint32_t stride);
+  // As merge and store those of model_common/block_lanes.h.
+  void (*load)(const model::BlockPoints &b, const double *x, const double *v, uint32_t stride);
   // damp: seconds, of kUniform
   void (*springs[kForms][kDampings])(const Block &b, double damp);
   // tilted or plain (tilt zero)
@@ -79,9 +73,9 @@ struct Kernels {
   // clears row, then both at the loaded points: what the step bound is made of
   void (*spring_rows[kForms])(const Block &b);
   void (*cell_rows)(const Block &b);
-  void (*merge)(double *f, const Merge *merge, uint32_t n);
-  void (*merge_rows)(double *row, const Merge *merge, uint32_t n);
-  void (*store)(const Block &b, double *f, uint32_t stride);  // adds the owned points' forces to the host's
+  void (*merge)(double *f, const model::Merge *merge, uint32_t n);
+  void (*merge_rows)(double *row, const model::Merge *merge, uint32_t n);
+  void (*store)(const model::BlockPoints &b, double *f, uint32_t stride);
 };
 
 // The share of its rest volume below which a cell resists collapse, and that below which the step bound

@@ -4,6 +4,7 @@
 #pragma once
 #include <stddef.h>
 
+#include "../model_common/block_lanes.h"
 #include "msm_kernel.h"
 
 namespace msm {
@@ -11,24 +12,9 @@ namespace {
 
 using namespace lanes;
 
-DEFORM_INLINE v4 point4(const Block &b, uint32_t n) { return load4(b.p + 8 * size_t(n)); }
-DEFORM_INLINE v4 velocity4(const Block &b, uint32_t n) { return load4(b.p + 8 * size_t(n) + 4); }
-DEFORM_INLINE void add_to(const Block &b, uint32_t n, v4 a) {
-  double *f = b.f + 4 * size_t(n);
-  store4(f, load4(f) + a);
-}
 DEFORM_INLINE void take_from(const Block &b, uint32_t n, v4 a) {
   double *f = b.f + 4 * size_t(n);
   store4(f, load4(f) - a);
-}
-
-static inline void load_block(const Block &b, const double *x, const double *v, uint32_t stride) {
-  for (uint32_t n = 0; n < b.local; ++n) {
-    const size_t at = size_t(stride) * b.point[n];
-    store4(b.p + 8 * size_t(n), load_xyz(x + at));
-    if (v) store4(b.p + 8 * size_t(n) + 4, load_xyz(v + at));
-    store4(b.f + 4 * size_t(n), splat(0));
-  }
 }
 
 template <Damping kDamping>
@@ -357,25 +343,7 @@ static inline void spring_rows(const Block &b) {
   }
 #define MSM_ROWS {spring_rows<kPlain>, spring_rows<kTilted>, spring_rows<kTurned>}, cell_rows
 
-template <int kLanes>
-DEFORM_INLINE void merge_lanes(double *sums, const Merge *merge, uint32_t n) {
-  for (uint32_t m = 0; m < n; ++m)
-    for (int k = 0; k < kLanes; k += 4) {
-      double *to = sums + kLanes * size_t(merge[m].to) + k;
-      store4(to, load4(to) + load4(sums + kLanes * size_t(merge[m].from) + k));
-    }
-}
-static inline void merge_halo(double *f, const Merge *merge, uint32_t n) { merge_lanes<4>(f, merge, n); }
 static inline void merge_rows(double *row, const Merge *merge, uint32_t n) { merge_lanes<8>(row, merge, n); }
-
-static inline void add_to_host(const Block &b, double *f, uint32_t stride) {
-  for (uint32_t n = 0; n < b.owned; ++n) {
-    double *out = f + size_t(stride) * b.point[n];
-    const double *sum = b.f + 4 * size_t(n);
-    _mm_storeu_pd(out, _mm_add_pd(_mm_loadu_pd(out), _mm_load_pd(sum)));
-    out[2] += sum[2];
-  }
-}
 
 }  // namespace
 }  // namespace msm
