@@ -111,8 +111,12 @@ struct Ops {
   }
   static dfm_status pattern(const void *self, uint32_t *nb, uint32_t *ij) {
     const Body &body = *static_cast<const Body *>(self);
-    *nb = body.pairs();
-    if (ij) body.pattern(ij);
+    try {
+      *nb = body.pairs();
+      if (ij) body.pattern(ij);
+    } catch (...) {
+      return DFM_E_NOMEM;
+    }
     return DFM_OK;
   }
   static dfm_status stiffness(void *self, const dfm_kin *k, double a, double b, double *blk) {

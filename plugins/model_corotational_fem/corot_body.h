@@ -70,10 +70,14 @@ struct Body : model::Blocks<Block> {
   // Where the volume change is that of the points (corot_nodal.cpp): [npoint,2] what divides the sums of the
   // cells' shares in it and in its rate, and the quotients (point_change) at the last dilate().
   Buffer<double> bulk, point_change;
-  Buffer<uint32_t> patch_begin, patch;          // [npoint + 1], points of the cells around a point, ascending
-  Buffer<uint32_t> pair_begin, pair_slot;       // [npoint + 1], places of the pairs of a patch in the blocks
-  Buffer<uint32_t> far_begin, far_point;        // [npoint + 1], j > i of patches that share no edge with i
-  Buffer<double> patch_gradient, patch_damper;  // [patch,3] of the volume change; of its rate, empty without
+  // Points around each point, which the tangent joins; made when the pattern is asked for.
+  struct Patches {
+    Buffer<uint32_t> begin, point;           // [npoint + 1], points of the cells around a point, ascending
+    Buffer<uint32_t> pair_begin, pair_slot;  // [npoint + 1], places of the pairs of a patch in the blocks
+    Buffer<uint32_t> far_begin, far_point;   // [npoint + 1], j > i of patches that share no edge with i
+    Buffer<double> gradient;                 // [points,3] of the volume change of the patch's point
+    bool made = false;
+  };
 
   // In block order.
   Buffer<uint32_t> cell_id;   // [groups,8], kNone for one that fills up
@@ -120,8 +124,7 @@ struct Body : model::Blocks<Block> {
                    (point_change[2 * size_t(q[2])] + point_change[2 * size_t(q[3])]));
   }
 
-  uint32_t far_pairs() const { return nodal() ? far_begin[npoint] : 0; }
-  uint32_t pairs() const { return npoint + nedge + far_pairs(); }
+  uint32_t pairs() const { return npoint + nedge + (nodal() ? ready_patches().far_begin[npoint] : 0); }
   void pattern(uint32_t *ij) const;
   void add_stiffness(const dfm_kin &k, double a, double b, double *blk);
 
@@ -133,14 +136,19 @@ struct Body : model::Blocks<Block> {
   void order_cells(Layout &l) const;
   uint32_t cell_halo(Layout &l, uint32_t b) const;
   void fill_groups(const Layout &l, const dfm_mesh &m, uint32_t b, uint32_t groups_at);
-  void build_patches();
+  mutable Patches patches;
+  Patches &ready_patches() const;
+  void find_patches(Patches &to) const;
+  void find_far_points(Patches &to) const;
+  void find_gradients(const dfm_kin &k, bool damped);
+  void add_dyads(size_t kind, double by, double *blk) const;
   void find_bulk();
-  uint32_t slot_of(uint32_t i, uint32_t j) const;
+  uint32_t slot_of(const Patches &in, uint32_t i, uint32_t j) const;
   void add_nodal(const dfm_kin &k, double a, double b, double *blk);
   // what new parameters need, taken before anything changes: arrays to swap in, and sums on the way
   struct Room {
     Buffer<FibreGroup> fibre;
-    Buffer<double> damp, damp_value, patch_damper, point_drag, around, next, blocks;
+    Buffer<double> damp, damp_value, point_drag, around, next, blocks;
   };
   void make_room(Room &room) const;
   model::Fibre fibre_at(uint32_t c) const;

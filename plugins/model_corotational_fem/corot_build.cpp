@@ -131,7 +131,10 @@ void Body::create(const dfm_host *h, const dfm_mesh &m) {
   take_fields(m);
   build_blocks(m);
   params[kLocking] = m.params[kLocking];  // cannot change later
-  if (nodal()) build_patches();
+  if (nodal()) {
+    bulk.create(host, 2 * size_t(npoint));
+    point_change.create(host, 2 * size_t(npoint));
+  }
   params[kYield] = m.params[kYield];
   made_plastic = largest_of(kYield) > 0;
   if (plastic()) plastic_group.create(host, groups);

@@ -59,78 +59,85 @@ void Body::find_bulk() {
   }
 }
 
+Body::Patches &Body::ready_patches() const {
+  if (patches.made) return patches;
+  find_patches(patches);
+  find_far_points(patches);
+  patches.gradient.create(host, 3 * size_t(patches.begin[npoint]));
+  patches.pair_slot.create(host, patches.pair_begin[npoint]);
+  for (uint32_t i = 0; i < npoint; ++i) {
+    uint32_t at = patches.pair_begin[i];
+    for (uint32_t n = patches.begin[i]; n < patches.begin[i + 1]; ++n)
+      for (uint32_t m = n; m < patches.begin[i + 1]; ++m)
+        patches.pair_slot[at++] = slot_of(patches, patches.point[n], patches.point[m]);
+  }
+  patches.made = true;
+  return patches;
+}
+
 // The points of the cells around a point are itself and its neighbors along edges.
-void Body::build_patches() {
-  bulk.create(host, 2 * size_t(npoint));
-  point_change.create(host, 2 * size_t(npoint));
-  patch_begin.create(host, size_t(npoint) + 1);
-  pair_begin.create(host, size_t(npoint) + 1);
-  far_begin.create(host, size_t(npoint) + 1);
-  for (size_t n = 0; n < 2 * size_t(nedge); ++n) ++patch_begin[edges[n] + 1];
+void Body::find_patches(Patches &to) const {
+  to.begin.create(host, size_t(npoint) + 1);
+  to.pair_begin.create(host, size_t(npoint) + 1);
+  for (size_t n = 0; n < 2 * size_t(nedge); ++n) ++to.begin[edges[n] + 1];
   for (uint32_t i = 0; i < npoint; ++i) {
-    const uint32_t size = patch_begin[i + 1] + 1;
-    patch_begin[i + 1] = patch_begin[i] + size;
-    pair_begin[i + 1] = pair_begin[i] + size * (size + 1) / 2;
+    const uint32_t size = to.begin[i + 1] + 1;
+    to.begin[i + 1] = to.begin[i] + size;
+    to.pair_begin[i + 1] = to.pair_begin[i] + size * (size + 1) / 2;
   }
-  patch.create(host, patch_begin[npoint]);
-  patch_gradient.create(host, 3 * size_t(patch_begin[npoint]));
-  pair_slot.create(host, pair_begin[npoint]);
-  Buffer<uint32_t> next, seen;
+  to.point.create(host, to.begin[npoint]);
+  Buffer<uint32_t> next;
   next.create(host, npoint);
-  seen.create(host, npoint);
   for (uint32_t i = 0; i < npoint; ++i) {
-    next[i] = patch_begin[i];
-    patch[next[i]++] = i;
-    seen[i] = kNone;
+    next[i] = to.begin[i];
+    to.point[next[i]++] = i;
   }
-  for (size_t n = 0; n < 2 * size_t(nedge); ++n) patch[next[edges[n]]++] = edges[n ^ 1u];
+  for (size_t n = 0; n < 2 * size_t(nedge); ++n) to.point[next[edges[n]]++] = edges[n ^ 1u];
   for (uint32_t i = 0; i < npoint; ++i)
-    std::sort(&patch[patch_begin[i]], &patch[patch_begin[i]] + (patch_begin[i + 1] - patch_begin[i]));
-  // Points two edges away: counted, then listed.
+    std::sort(to.point.data() + to.begin[i], to.point.data() + to.begin[i + 1]);
+}
+
+// Points two edges away: counted, then listed.
+void Body::find_far_points(Patches &to) const {
+  Buffer<uint32_t> seen;
+  seen.create(host, npoint);
+  to.far_begin.create(host, size_t(npoint) + 1);
   const auto each_far = [&](uint32_t i, auto &&use) {
-    for (uint32_t n = patch_begin[i]; n < patch_begin[i + 1]; ++n) seen[patch[n]] = i;
-    for (uint32_t n = patch_begin[i]; n < patch_begin[i + 1]; ++n)
-      for (uint32_t m = patch_begin[patch[n]]; m < patch_begin[patch[n] + 1]; ++m) {
-        const uint32_t j = patch[m];
+    for (uint32_t n = to.begin[i]; n < to.begin[i + 1]; ++n) seen[to.point[n]] = i;
+    for (uint32_t n = to.begin[i]; n < to.begin[i + 1]; ++n)
+      for (uint32_t m = to.begin[to.point[n]]; m < to.begin[to.point[n] + 1]; ++m) {
+        const uint32_t j = to.point[m];
         if (seen[j] == i) continue;
         seen[j] = i;
         if (j > i) use(j);
       }
   };
-  for (uint32_t i = 0; i < npoint; ++i) {
-    far_begin[i + 1] = far_begin[i];
-    each_far(i, [&](uint32_t) { ++far_begin[i + 1]; });
-  }
-  far_point.create(host, far_begin[npoint]);
   std::fill(seen.data(), seen.data() + npoint, kNone);
   for (uint32_t i = 0; i < npoint; ++i) {
-    uint32_t at = far_begin[i];
-    each_far(i, [&](uint32_t j) { far_point[at++] = j; });
-    std::sort(far_point.data() + far_begin[i], far_point.data() + at);
+    to.far_begin[i + 1] = to.far_begin[i];
+    each_far(i, [&](uint32_t) { ++to.far_begin[i + 1]; });
   }
+  to.far_point.create(host, to.far_begin[npoint]);
+  std::fill(seen.data(), seen.data() + npoint, kNone);
   for (uint32_t i = 0; i < npoint; ++i) {
-    uint32_t at = pair_begin[i];
-    for (uint32_t n = patch_begin[i]; n < patch_begin[i + 1]; ++n)
-      for (uint32_t m = n; m < patch_begin[i + 1]; ++m) pair_slot[at++] = slot_of(patch[n], patch[m]);
+    uint32_t at = to.far_begin[i];
+    each_far(i, [&](uint32_t j) { to.far_point[at++] = j; });
+    std::sort(to.far_point.data() + to.far_begin[i], to.far_point.data() + at);
   }
 }
 
 // Of the block (i, j), i <= j, both in one patch.
-uint32_t Body::slot_of(uint32_t i, uint32_t j) const {
+uint32_t Body::slot_of(const Patches &in, uint32_t i, uint32_t j) const {
   if (i == j) return i;
-  const uint32_t *const begin = far_point.data() + far_begin[i], *const end =
-                                                                     far_point.data() + far_begin[i + 1];
-  const uint32_t *const found = std::lower_bound(begin, end, j);
-  if (found != end && *found == j) return npoint + nedge + uint32_t(found - far_point.data());
+  const uint32_t *const all = in.far_point.data(), *const end = all + in.far_begin[i + 1];
+  const uint32_t *const found = std::lower_bound(all + in.far_begin[i], end, j);
+  if (found != end && *found == j) return npoint + nedge + uint32_t(found - all);
   return npoint + model::find_edge(edges.data(), nedge, i, j);
 }
 
-void Body::add_nodal(const dfm_kin &k, double a, double b, double *blk) {
-  const auto fill = [&](Buffer<double> &of) {
-    if (!of.empty()) std::fill(of.data(), of.data() + 3 * size_t(patch_begin[npoint]), 0.0);
-  };
-  fill(patch_gradient);
-  fill(patch_damper);
+// Of the volume change of each patch's point, or of its rate by the velocities, times what divides it.
+void Body::find_gradients(const dfm_kin &k, bool damped) {
+  std::fill(patches.gradient.data(), patches.gradient.data() + 3 * size_t(patches.begin[npoint]), 0.0);
   for (uint32_t c = 0; c < ncell; ++c) {
     const size_t place = place_of[c], lane = place % kGroup;
     const Group &own = group[place / kGroup];
@@ -140,7 +147,7 @@ void Body::add_nodal(const dfm_kin &k, double a, double b, double *blk) {
     double grad[9], r[9], pull[4][3] = {};
     gradient_of(own, uint32_t(lane), x, grad);
     model::rotation::polar_of(grad, r);
-    const double part = 0.25 * (own.lambda[lane] + own.mu2[lane] / 3);
+    const double part = 0.25 * (own.lambda[lane] + own.mu2[lane] / 3) * (damped ? damp[place] : 1);
     for (size_t m = 1; m < 4; ++m)
       for (size_t i = 0; i < 3; ++i) {
         const double *g = &own.g[3 * (m - 1)][lane];
@@ -149,30 +156,35 @@ void Body::add_nodal(const dfm_kin &k, double a, double b, double *blk) {
       }
     for (size_t n = 0; n < 4; ++n)
       for (size_t m = 0; m < 4; ++m) {
-        const uint32_t *const all = patch.data();
-        const size_t to =
-            size_t(std::lower_bound(all + patch_begin[q[n]], all + patch_begin[q[n] + 1], q[m]) - all);
-        for (size_t i = 0; i < 3; ++i) {
-          patch_gradient[3 * to + i] += pull[m][i];
-          if (!patch_damper.empty()) patch_damper[3 * to + i] += damp[place] * pull[m][i];
-        }
+        const uint32_t *const all = patches.point.data();
+        const uint32_t *const first = all + patches.begin[q[n]], *const last = all + patches.begin[q[n] + 1];
+        double *const to = patches.gradient.data() + 3 * size_t(std::lower_bound(first, last, q[m]) - all);
+        for (size_t i = 0; i < 3; ++i) to[i] += pull[m][i];
       }
   }
-  const auto add_dyads = [&](const Buffer<double> &gradient, size_t kind, double by) {
-    for (uint32_t n = 0; n < npoint; ++n) {
-      const double all = bulk[2 * size_t(n) + kind];
-      if (!(all > 0)) continue;
-      const uint32_t *slot = pair_slot.data() + pair_begin[n];
-      for (size_t i = patch_begin[n]; i < patch_begin[n + 1]; ++i)
-        for (size_t j = i; j < patch_begin[n + 1]; ++j) {
-          double *const out = blk + 9 * size_t(*slot++);
-          for (size_t e = 0; e < 9; ++e)
-            out[e] -= by / all * (gradient[3 * i + e / 3] * gradient[3 * j + e % 3]);
-        }
-    }
-  };
-  add_dyads(patch_gradient, 0, a);
-  if (!patch_damper.empty() && b > 0) add_dyads(patch_damper, 1, b);
+}
+
+// kind 0: of the volume change, 1: of its rate.
+void Body::add_dyads(size_t kind, double by, double *blk) const {
+  const double *const g = patches.gradient.data();
+  for (uint32_t n = 0; n < npoint; ++n) {
+    const double all = bulk[2 * size_t(n) + kind];
+    if (!(all > 0)) continue;
+    const uint32_t *slot = patches.pair_slot.data() + patches.pair_begin[n];
+    for (size_t i = patches.begin[n]; i < patches.begin[n + 1]; ++i)
+      for (size_t j = i; j < patches.begin[n + 1]; ++j) {
+        double *const out = blk + 9 * size_t(*slot++);
+        for (size_t e = 0; e < 9; ++e) out[e] -= by / all * (g[3 * i + e / 3] * g[3 * j + e % 3]);
+      }
+  }
+}
+
+void Body::add_nodal(const dfm_kin &k, double a, double b, double *blk) {
+  find_gradients(k, false);
+  add_dyads(0, a, blk);
+  if (damp.empty() || !(b > 0)) return;
+  find_gradients(k, true);
+  add_dyads(1, b, blk);
 }
 
 }  // namespace corot

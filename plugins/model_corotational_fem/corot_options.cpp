@@ -67,7 +67,6 @@ void Body::make_room(Room &room) const {
   if (has_dampers()) {
     room.damp.create(host, lanes());
     room.damp_value.create(host, lanes());
-    if (nodal()) room.patch_damper.create(host, 3 * size_t(patch_begin[npoint]));
   }
   if (largest_of(kDampingMass) > 0) {
     room.point_drag.create(host, npoint);
@@ -82,7 +81,6 @@ void Body::fill_material(Room &room) {
   fibre.swap(room.fibre);
   damp.swap(room.damp);
   damp_value.swap(room.damp_value);
-  patch_damper.swap(room.patch_damper);
   for (size_t n = 0; n < lanes(); ++n) {
     Group &g = group[n / kGroup];
     const uint32_t lane = uint32_t(n % kGroup), c = cell_id[n];

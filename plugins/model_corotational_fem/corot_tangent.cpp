@@ -162,9 +162,9 @@ void Body::pattern(uint32_t *ij) const {
   }
   uint32_t *far = ij + 2 * (size_t(npoint) + nedge);
   for (uint32_t i = 0; nodal() && i < npoint; ++i)
-    for (uint32_t n = far_begin[i]; n < far_begin[i + 1]; ++n) {
+    for (uint32_t n = patches.far_begin[i]; n < patches.far_begin[i + 1]; ++n) {
       *far++ = i;
-      *far++ = far_point[n];
+      *far++ = patches.far_point[n];
     }
 }
 

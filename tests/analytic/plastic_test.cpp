@@ -1,5 +1,5 @@
-// A bar pulled beyond yield and let go keeps the strain of the closed form, moved explicitly and implicitly,
-// and its plastic strain is part of a snapshot.
+// A bar pulled beyond yield and let go keeps the strain of the closed form, moved explicitly and implicitly
+// and from equilibrium to equilibrium, and its plastic strain is part of a snapshot.
 #include "support.h"
 #include "world.h"
 
@@ -52,21 +52,27 @@ struct Bar {
   ~Bar() { dfm_world_destroy(world); }
 
   // The end goes out by kPull and stays there.
-  void pull(double h) {
+  void move_out() {
     dfm_pose_key keys[2] = {};
     for (dfm_pose_key &key : keys) key.pose = dfm_body_def_default().pose;
     keys[1].t = 0.3;
     keys[1].pose.position[0] = kPull * kLength;
     test::ok(dfm_body_move_held(body, uint32_t(end.size()), end.data(), 2, keys, nullptr));
+  }
+  void pull(double h) {
+    move_out();
     test::run(world, 0.35, h);
   }
-  void let_go(double h) {
+  void release() {
     for (const uint32_t i : end) {
       uint8_t axes = 0;
       for (size_t k = 1; k < 3; ++k)
         if (rest[3 * i + k] < *std::min_element(rest.begin(), rest.end()) + 1e-9) axes |= uint8_t(1 << k);
       test::ok(dfm_body_hold(body, 1, &i, axes));
     }
+  }
+  void let_go(double h) {
+    release();
     test::run(world, 0.4, h);
   }
   double strain() const {
@@ -96,6 +102,20 @@ TEST(Plastic, BarPulledBeyondYieldAndLetGo_KeepsThePermanentStrain) {
     elastic.let_go(h);
     EXPECT_NEAR(elastic.strain(), 0, 0.01 * permanent) << integrator;
   }
+}
+
+TEST(Plastic, BarInEquilibriumBeyondYieldAndFree_KeepsThePermanentStrain) {
+  Bar bar(DFM_INTEGRATOR_AUTO);
+  bar.move_out();
+  dfm_equilibrium_def def = dfm_equilibrium_def_default();
+  def.time = 0.3;
+  def.load_steps = 3;
+  test::ok(dfm_world_equilibrium(bar.world, &def, nullptr));
+  EXPECT_NEAR(bar.strain(), kPull, 1e-12);
+  bar.release();
+  test::ok(dfm_world_equilibrium(bar.world, nullptr, nullptr));
+  const double permanent = (kYoung * kPull - kYield) / (kYoung + kHardening);
+  EXPECT_NEAR(bar.strain(), permanent, 1e-6 * permanent);
 }
 
 TEST(Plastic, SnapshotInTheFlow_GoesOnToTheSameBits) {
